@@ -1,0 +1,26 @@
+//! The words every crate speaks: posts, windows of heights, weights, TINs, load modules, limits.
+//!
+//! Plain values and their invariants; no serialisation (each file format owns its own), no algorithms.
+//! Coordinates: x east, y north, z up; row 0 is the southern edge; (row, column) is always in that order
+//! and is also the order in which every tie is broken.
+
+mod post;
+pub use post::{Post, PostRect};
+mod lattice;
+pub use lattice::{LATTICE_PER_POST, LatticePoint};
+mod units;
+pub use units::{Metres, QUANTA_PER_METRE, Spacing, metres_of_quanta, quanta_of_metres};
+mod dem;
+pub use dem::Dem;
+mod importance;
+pub use importance::{Importance, THOUSANDTHS};
+mod tin;
+pub use tin::{Tin, TinFault, Vertex};
+mod tile;
+pub use tile::{ModuleGrid, ModuleId, ModuleRect, Side, TileId};
+mod refined;
+pub use refined::{Refusal, RefusedBy, StopReason, TileTin};
+mod load_module;
+pub use load_module::{LoadModule, LoadModuleFault, ModuleResidual, ModuleVertex};
+mod breach;
+pub use breach::{Breach, BreachKind, BreachPlace};

@@ -1,0 +1,212 @@
+//! A load module: what the simulator loads at once.
+
+use std::collections::HashMap;
+
+use crate::ModuleId;
+
+/// A vertex of a load module, in quanta of 1/128 m from the load module's south-west corner.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct ModuleVertex {
+    /// North of the southern side (compared first, as everywhere).
+    pub y: u16,
+    /// East of the western side.
+    pub x: u16,
+    /// Height above the datum.
+    pub z: i32,
+}
+
+/// One finished load module.
+///
+/// Vertices are sorted by (y, x, z), triangles by their first corner, which is their smallest; so equal
+/// ground gives equal bytes. Triangles are counter-clockwise seen from above.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LoadModule {
+    /// Which load module.
+    pub id: ModuleId,
+    /// Length of a side in quanta of 1/128 m; at most 65,535.
+    pub side: u16,
+    /// Vertices in canonical order.
+    pub vertices: Vec<ModuleVertex>,
+    /// Corners of each triangle, counter-clockwise, smallest index first.
+    pub triangles: Vec<[u16; 3]>,
+    /// Class of the ground under each triangle.
+    pub classes: Vec<u8>,
+    /// Convex polygons: equal to the triangles unless clipped edges left larger pieces.
+    pub polygon_count: u32,
+    /// Residual of the DEM's posts that this load module owns.
+    pub residual: ModuleResidual,
+}
+
+/// Residuals over the posts a load module owns, in quanta of 1/128 m.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ModuleResidual {
+    /// Posts counted: owned and not void.
+    pub posts: u32,
+    /// Largest absolute residual.
+    pub largest: u32,
+    /// Sum of absolute residuals.
+    pub sum_abs: u64,
+    /// Sum of squared residuals.
+    pub sum_squared: u64,
+}
+
+/// What is wrong with a load module.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum LoadModuleFault {
+    /// A triangle names a vertex that does not exist.
+    NoSuchVertex { triangle: usize },
+    /// A vertex lies beyond a side.
+    VertexOutside { vertex: usize },
+    /// A triangle is clockwise or has no area.
+    NotCounterClockwise { triangle: usize },
+    /// Vertices or triangles are not in canonical order, or a vertex is listed twice.
+    NotCanonical,
+    /// Lists that belong together differ in length.
+    Inconsistent,
+    /// The doubled areas of the triangles do not add up to that of the square.
+    AreaMissing { found: i64, expected: i64 },
+    /// An edge inside the square has a triangle on one side only, or is used twice in one direction.
+    Crack { from: ModuleVertex, to: ModuleVertex },
+}
+
+impl std::fmt::Display for LoadModuleFault {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{self:?}")
+    }
+}
+
+impl LoadModule {
+    /// Doubled area of a triangle in squared quanta; positive when counter-clockwise.
+    pub fn doubled_area(&self, triangle: [u16; 3]) -> i64 {
+        let [a, b, c] = triangle.map(|v| self.vertices[usize::from(v)]);
+        let (bx, by) = (i64::from(b.x) - i64::from(a.x), i64::from(b.y) - i64::from(a.y));
+        let (cx, cy) = (i64::from(c.x) - i64::from(a.x), i64::from(c.y) - i64::from(a.y));
+        bx * cy - by * cx
+    }
+
+    /// Indices of the vertices on one side, west to east or south to north.
+    pub fn side_vertices(&self, side: crate::Side) -> Vec<u16> {
+        use crate::Side;
+        let on_side = |v: &ModuleVertex| match side {
+            Side::South => v.y == 0,
+            Side::North => v.y == self.side,
+            Side::West => v.x == 0,
+            Side::East => v.x == self.side,
+        };
+        // Canonical order is south to north, then west to east: both lists come out in order.
+        (0..self.vertices.len()).filter(|&i| on_side(&self.vertices[i])).map(|i| i as u16).collect()
+    }
+
+    /// Vertices on any of the four sides, corners counted once.
+    pub fn border_vertex_count(&self) -> usize {
+        let on_border = |v: &&ModuleVertex| v.x == 0 || v.y == 0 || v.x == self.side || v.y == self.side;
+        self.vertices.iter().filter(on_border).count()
+    }
+
+    /// Walks every invariant: indices, canonical order, orientation, area, cracks inside, T-junctions.
+    ///
+    /// # Errors
+    /// The first fault found.
+    pub fn check(&self) -> Result<(), LoadModuleFault> {
+        if self.classes.len() != self.triangles.len() {
+            return Err(LoadModuleFault::Inconsistent);
+        }
+        if let Some(vertex) = self.vertices.iter().position(|v| self.side < v.x || self.side < v.y) {
+            return Err(LoadModuleFault::VertexOutside { vertex });
+        }
+        let distinct = self.vertices.windows(2).all(|pair| (pair[0].y, pair[0].x) < (pair[1].y, pair[1].x));
+        let smallest_first = self.triangles.iter().all(|t| t[0] < t[1] && t[0] < t[2]);
+        if !distinct || !smallest_first || !self.triangles.is_sorted() {
+            return Err(LoadModuleFault::NotCanonical);
+        }
+        self.check_area()?;
+        self.check_edges()
+    }
+
+    fn check_area(&self) -> Result<(), LoadModuleFault> {
+        let mut area = 0;
+        for (index, &triangle) in self.triangles.iter().enumerate() {
+            if triangle.iter().any(|&v| self.vertices.len() <= usize::from(v)) {
+                return Err(LoadModuleFault::NoSuchVertex { triangle: index });
+            }
+            let doubled = self.doubled_area(triangle);
+            if doubled <= 0 {
+                return Err(LoadModuleFault::NotCounterClockwise { triangle: index });
+            }
+            area += doubled;
+        }
+        let expected = 2 * i64::from(self.side) * i64::from(self.side);
+        if area != expected {
+            return Err(LoadModuleFault::AreaMissing { found: area, expected });
+        }
+        Ok(())
+    }
+
+    fn check_edges(&self) -> Result<(), LoadModuleFault> {
+        let mut edges = HashMap::new();
+        for triangle in &self.triangles {
+            for i in 0..3 {
+                let (from, to) = (triangle[i], triangle[(i + 1) % 3]);
+                if edges.insert((from, to), ()).is_some() {
+                    return Err(self.crack(from, to));
+                }
+            }
+        }
+        let mut open: Vec<_> = edges
+            .keys()
+            .filter(|(from, to)| !edges.contains_key(&(*to, *from)) && !self.on_one_side(*from, *to))
+            .collect();
+        open.sort();
+        open.first().map_or(Ok(()), |&&(from, to)| Err(self.crack(from, to)))
+    }
+
+    fn crack(&self, from: u16, to: u16) -> LoadModuleFault {
+        LoadModuleFault::Crack { from: self.vertices[usize::from(from)], to: self.vertices[usize::from(to)] }
+    }
+
+    fn on_one_side(&self, from: u16, to: u16) -> bool {
+        let (a, b) = (self.vertices[usize::from(from)], self.vertices[usize::from(to)]);
+        let same_row = a.y == b.y && (a.y == 0 || a.y == self.side);
+        let same_col = a.x == b.x && (a.x == 0 || a.x == self.side);
+        same_row || same_col
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Side;
+
+    fn square() -> LoadModule {
+        let vertex = |y, x| ModuleVertex { y, x, z: 0 };
+        LoadModule {
+            id: ModuleId { row: 0, col: 0 },
+            side: 64_000,
+            vertices: vec![vertex(0, 0), vertex(0, 64_000), vertex(64_000, 0), vertex(64_000, 64_000)],
+            triangles: vec![[0, 1, 3], [0, 3, 2]],
+            classes: vec![0, 0],
+            polygon_count: 2,
+            residual: ModuleResidual::default(),
+        }
+    }
+
+    #[test]
+    fn a_square_of_two_triangles_is_sound() {
+        assert_eq!(square().check(), Ok(()));
+        assert_eq!(square().side_vertices(Side::North), [2, 3]);
+        assert_eq!(square().side_vertices(Side::East), [1, 3]);
+        assert_eq!(square().border_vertex_count(), 4);
+    }
+
+    #[test]
+    fn faults_are_told_apart() {
+        let mut module = square();
+        module.triangles.swap(0, 1);
+        assert_eq!(module.check(), Err(LoadModuleFault::NotCanonical));
+        let mut module = square();
+        module.triangles.pop();
+        assert_eq!(module.check(), Err(LoadModuleFault::Inconsistent));
+        module.classes.pop();
+        assert!(matches!(module.check(), Err(LoadModuleFault::AreaMissing { .. })));
+    }
+}

@@ -1,0 +1,158 @@
+//! Posts of the working grid and rectangles of them.
+
+/// One post of the working grid. Row 0 is the southern edge, column 0 the western one.
+///
+/// The order (row, then column) is the order in which ties are broken everywhere.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Post {
+    /// Posts north of the southern edge.
+    pub row: i32,
+    /// Posts east of the western edge.
+    pub col: i32,
+}
+
+impl Post {
+    /// The post at (row, col).
+    pub const fn new(row: i32, col: i32) -> Self {
+        Self { row, col }
+    }
+}
+
+impl std::fmt::Display for Post {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{},{}", self.row, self.col)
+    }
+}
+
+/// A rectangle of posts that holds all four of its border lines.
+///
+/// `n` cells have `n + 1` posts a side; ask [`PostRect::posts_wide`] or [`PostRect::cells_wide`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct PostRect {
+    /// Southernmost row.
+    pub south: i32,
+    /// Westernmost column.
+    pub west: i32,
+    /// Northernmost row, itself inside.
+    pub north: i32,
+    /// Easternmost column, itself inside.
+    pub east: i32,
+}
+
+impl PostRect {
+    /// The rectangle between two corner posts, both inside.
+    ///
+    /// # Panics
+    /// When `north < south` or `east < west`: an empty rectangle has no posts to hold.
+    pub fn new(south_west: Post, north_east: Post) -> Self {
+        assert!(
+            south_west.row <= north_east.row && south_west.col <= north_east.col,
+            "a rectangle of posts runs from its south-west to its north-east post, got {south_west} to {north_east}"
+        );
+        Self { south: south_west.row, west: south_west.col, north: north_east.row, east: north_east.col }
+    }
+
+    /// The rectangle of `rows` x `cols` posts whose south-west post is (0, 0).
+    pub fn of_size(rows: usize, cols: usize) -> Self {
+        Self::new(Post::new(0, 0), Post::new(rows as i32 - 1, cols as i32 - 1))
+    }
+
+    /// Columns of posts.
+    pub fn posts_wide(&self) -> usize {
+        (self.east - self.west) as usize + 1
+    }
+
+    /// Rows of posts.
+    pub fn posts_high(&self) -> usize {
+        (self.north - self.south) as usize + 1
+    }
+
+    /// Columns of cells.
+    pub fn cells_wide(&self) -> usize {
+        (self.east - self.west) as usize
+    }
+
+    /// Rows of cells.
+    pub fn cells_high(&self) -> usize {
+        (self.north - self.south) as usize
+    }
+
+    /// All posts inside.
+    pub fn post_count(&self) -> usize {
+        self.posts_wide() * self.posts_high()
+    }
+
+    /// The south-west corner.
+    pub fn south_west(&self) -> Post {
+        Post::new(self.south, self.west)
+    }
+
+    /// The north-east corner.
+    pub fn north_east(&self) -> Post {
+        Post::new(self.north, self.east)
+    }
+
+    /// The four corners: south-west, south-east, north-east, north-west.
+    pub fn corners(&self) -> [Post; 4] {
+        [
+            Post::new(self.south, self.west),
+            Post::new(self.south, self.east),
+            Post::new(self.north, self.east),
+            Post::new(self.north, self.west),
+        ]
+    }
+
+    /// Whether `post` lies inside or on a border line.
+    pub fn contains(&self, post: Post) -> bool {
+        self.south <= post.row && post.row <= self.north && self.west <= post.col && post.col <= self.east
+    }
+
+    /// Whether all of `other` lies inside.
+    pub fn contains_rect(&self, other: &PostRect) -> bool {
+        self.contains(other.south_west()) && self.contains(other.north_east())
+    }
+
+    /// The part both rectangles hold, border lines included.
+    pub fn intersection(&self, other: &PostRect) -> Option<PostRect> {
+        let cut = PostRect {
+            south: self.south.max(other.south),
+            west: self.west.max(other.west),
+            north: self.north.min(other.north),
+            east: self.east.min(other.east),
+        };
+        (cut.south <= cut.north && cut.west <= cut.east).then_some(cut)
+    }
+
+    /// The rectangle grown by `posts` on every side.
+    pub fn grown(&self, posts: i32) -> PostRect {
+        PostRect {
+            south: self.south - posts,
+            west: self.west - posts,
+            north: self.north + posts,
+            east: self.east + posts,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_rectangle_holds_all_four_border_lines() {
+        let rect = PostRect::of_size(3, 5);
+        assert_eq!((rect.posts_high(), rect.posts_wide()), (3, 5));
+        assert_eq!((rect.cells_high(), rect.cells_wide()), (2, 4));
+        assert!(rect.corners().iter().all(|&corner| rect.contains(corner)));
+        assert!(!rect.contains(Post::new(3, 0)));
+    }
+
+    #[test]
+    fn neighbouring_rectangles_intersect_in_the_line_they_share() {
+        let west = PostRect::new(Post::new(0, 0), Post::new(4, 4));
+        let east = PostRect::new(Post::new(0, 4), Post::new(4, 8));
+        let seam = west.intersection(&east).expect("they share column 4");
+        assert_eq!((seam.posts_wide(), seam.posts_high()), (1, 5));
+        assert_eq!(west.intersection(&PostRect::new(Post::new(0, 5), Post::new(1, 6))), None);
+    }
+}
