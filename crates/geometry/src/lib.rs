@@ -1,1 +1,23 @@
-//! (to be written)
+//! Exact questions about posts: left or right, inside a circle, under a triangle, across a line.
+//!
+//! Topology is decided in integers only; there is no epsilon. The triangle scan answers, for the posts
+//! under a triangle, how far the DEM lies from its plane, in wrapping lanes that are proven exact.
+
+pub mod cut;
+pub mod owned;
+pub mod resample;
+
+mod predicates;
+pub use predicates::{Canonical, in_circle, in_circle_canonical, orient};
+mod local;
+pub use local::{LocalPost, LocalRect};
+mod facet;
+pub use facet::Facet;
+mod spans;
+pub use spans::{Span, Spans};
+mod surface;
+pub use surface::{Surface, WORKING_POSTS_MAX};
+mod scan;
+pub use scan::{largest_numerator, locate, locate_all, rounded, squares_sum, visit_owned, visit_posts};
+mod level;
+pub use level::{levels_available, widest_level};

@@ -1,1 +1,11 @@
-//! (to be written)
+//! One definition of what counts against a limit, and the ledger a tile spends from.
+//!
+//! Identities per load module with `V` inner vertices, `B` vertices on its sides (corners included) and
+//! `E` inner edges of its polygons: triangles = 2 V + B - 2, polygons = 1 + E - V.
+
+mod count;
+pub use count::{polygons_of, start_triangles, triangles_of};
+mod windows;
+pub use windows::Windows;
+mod ledger;
+pub use ledger::{Allowance, Ledger, POINT_COST};

@@ -65,6 +65,14 @@ impl Importance {
         })
     }
 
+    /// Classes of one row, west to east; `None` when all posts are of class 0.
+    pub fn classes_of_row(&self, row: i32) -> Option<&[u8]> {
+        (!self.classes.is_empty()).then(|| {
+            let start = self.index(Post::new(row, self.rect.west));
+            &self.classes[start..start + self.rect.posts_wide()]
+        })
+    }
+
     fn index(&self, post: Post) -> usize {
         debug_assert!(self.rect.contains(post), "post {post} lies outside the mask window");
         (post.row - self.rect.south) as usize * self.rect.posts_wide() + (post.col - self.rect.west) as usize
@@ -101,5 +109,14 @@ mod tests {
         let south = mask.window(PostRect::new(Post::new(0, 0), Post::new(1, 3)));
         assert_eq!(south.uniform_weight(), Some(8000));
         assert_eq!(mask.weight(Post::new(3, 3)), 1000);
+    }
+
+    #[test]
+    fn classes_of_a_row_are_absent_when_all_posts_are_of_class_0() {
+        let rect = PostRect::of_size(2, 3);
+        let mask = Importance::new(rect, vec![8000; 6], vec![0, 0, 0, 1, 2, 0]);
+        assert_eq!(mask.classes_of_row(1), Some([1, 2, 0].as_slice()));
+        let south = mask.window(PostRect::new(Post::new(0, 0), Post::new(0, 2)));
+        assert_eq!(south.classes_of_row(0), None);
     }
 }

@@ -53,20 +53,20 @@ pub struct ModuleResidual {
 /// What is wrong with a load module.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum LoadModuleFault {
-    /// A triangle names a vertex that does not exist.
-    NoSuchVertex { triangle: usize },
-    /// A vertex lies beyond a side.
-    VertexOutside { vertex: usize },
-    /// A triangle is clockwise or has no area.
-    NotCounterClockwise { triangle: usize },
+    /// This triangle names a vertex that does not exist.
+    NoSuchVertex(usize),
+    /// This vertex lies beyond a side.
+    VertexOutside(usize),
+    /// This triangle is clockwise or has no area.
+    NotCounterClockwise(usize),
     /// Vertices or triangles are not in canonical order, or a vertex is listed twice.
     NotCanonical,
     /// Lists that belong together differ in length.
     Inconsistent,
-    /// The doubled areas of the triangles do not add up to that of the square.
-    AreaMissing { found: i64, expected: i64 },
-    /// An edge inside the square has a triangle on one side only, or is used twice in one direction.
-    Crack { from: ModuleVertex, to: ModuleVertex },
+    /// The doubled areas of the triangles add up to the first number, that of the square is the second.
+    AreaMissing(i64, i64),
+    /// This edge inside the square has a triangle on one side only, or is used twice in one direction.
+    Crack([ModuleVertex; 2]),
 }
 
 impl std::fmt::Display for LoadModuleFault {
@@ -112,7 +112,7 @@ impl LoadModule {
             return Err(LoadModuleFault::Inconsistent);
         }
         if let Some(vertex) = self.vertices.iter().position(|v| self.side < v.x || self.side < v.y) {
-            return Err(LoadModuleFault::VertexOutside { vertex });
+            return Err(LoadModuleFault::VertexOutside(vertex));
         }
         let distinct = self.vertices.windows(2).all(|pair| (pair[0].y, pair[0].x) < (pair[1].y, pair[1].x));
         let smallest_first = self.triangles.iter().all(|t| t[0] < t[1] && t[0] < t[2]);
@@ -127,17 +127,17 @@ impl LoadModule {
         let mut area = 0;
         for (index, &triangle) in self.triangles.iter().enumerate() {
             if triangle.iter().any(|&v| self.vertices.len() <= usize::from(v)) {
-                return Err(LoadModuleFault::NoSuchVertex { triangle: index });
+                return Err(LoadModuleFault::NoSuchVertex(index));
             }
             let doubled = self.doubled_area(triangle);
             if doubled <= 0 {
-                return Err(LoadModuleFault::NotCounterClockwise { triangle: index });
+                return Err(LoadModuleFault::NotCounterClockwise(index));
             }
             area += doubled;
         }
         let expected = 2 * i64::from(self.side) * i64::from(self.side);
         if area != expected {
-            return Err(LoadModuleFault::AreaMissing { found: area, expected });
+            return Err(LoadModuleFault::AreaMissing(area, expected));
         }
         Ok(())
     }
@@ -161,7 +161,7 @@ impl LoadModule {
     }
 
     fn crack(&self, from: u16, to: u16) -> LoadModuleFault {
-        LoadModuleFault::Crack { from: self.vertices[usize::from(from)], to: self.vertices[usize::from(to)] }
+        LoadModuleFault::Crack([self.vertices[usize::from(from)], self.vertices[usize::from(to)]])
     }
 
     fn on_one_side(&self, from: u16, to: u16) -> bool {
@@ -207,6 +207,6 @@ mod tests {
         module.triangles.pop();
         assert_eq!(module.check(), Err(LoadModuleFault::Inconsistent));
         module.classes.pop();
-        assert!(matches!(module.check(), Err(LoadModuleFault::AreaMissing { .. })));
+        assert!(matches!(module.check(), Err(LoadModuleFault::AreaMissing(..))));
     }
 }

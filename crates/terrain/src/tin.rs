@@ -29,18 +29,18 @@ pub struct Tin {
 /// What is wrong with a TIN.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum TinFault {
-    /// A triangle names a vertex that does not exist.
-    NoSuchVertex { triangle: usize },
-    /// A vertex lies outside the rectangle.
-    VertexOutside { vertex: usize },
-    /// A triangle is clockwise or has no area.
-    NotCounterClockwise { triangle: usize },
-    /// The same directed edge belongs to two triangles.
-    EdgeUsedTwice { from: LatticePoint, to: LatticePoint },
-    /// An edge has a triangle on one side only and does not lie on the border.
-    Crack { from: LatticePoint, to: LatticePoint },
-    /// The doubled areas of the triangles do not add up to the doubled area of the rectangle.
-    AreaMissing { found: i64, expected: i64 },
+    /// This triangle names a vertex that does not exist.
+    NoSuchVertex(usize),
+    /// This vertex lies outside the rectangle.
+    VertexOutside(usize),
+    /// This triangle is clockwise or has no area.
+    NotCounterClockwise(usize),
+    /// This directed edge belongs to two triangles.
+    EdgeUsedTwice([LatticePoint; 2]),
+    /// This edge has a triangle on one side only and does not lie on the border.
+    Crack([LatticePoint; 2]),
+    /// The doubled areas of the triangles add up to the first number, that of the rectangle is the second.
+    AreaMissing(i64, i64),
 }
 
 impl std::fmt::Display for TinFault {
@@ -67,7 +67,7 @@ impl Tin {
         let cells = (self.rect.cells_wide() * self.rect.cells_high()) as i64;
         let expected = 2 * cells * i64::from(LATTICE_PER_POST * LATTICE_PER_POST);
         if area != expected {
-            return Err(TinFault::AreaMissing { found: area, expected });
+            return Err(TinFault::AreaMissing(area, expected));
         }
         self.check_edges()
     }
@@ -76,7 +76,7 @@ impl Tin {
         let (low, high) = (LatticePoint::from(self.rect.south_west()), LatticePoint::from(self.rect.north_east()));
         let outside = |at: LatticePoint| at.row < low.row || high.row < at.row || at.col < low.col || high.col < at.col;
         match self.vertices.iter().position(|vertex| outside(vertex.at)) {
-            Some(vertex) => Err(TinFault::VertexOutside { vertex }),
+            Some(vertex) => Err(TinFault::VertexOutside(vertex)),
             None => Ok(()),
         }
     }
@@ -85,11 +85,11 @@ impl Tin {
         let mut area = 0;
         for (index, &triangle) in self.triangles.iter().enumerate() {
             if triangle.iter().any(|&v| self.vertices.len() <= v as usize) {
-                return Err(TinFault::NoSuchVertex { triangle: index });
+                return Err(TinFault::NoSuchVertex(index));
             }
             let doubled = self.doubled_area(triangle);
             if doubled <= 0 {
-                return Err(TinFault::NotCounterClockwise { triangle: index });
+                return Err(TinFault::NotCounterClockwise(index));
             }
             area += doubled;
         }
@@ -103,7 +103,7 @@ impl Tin {
             for i in 0..3 {
                 let (from, to) = (triangle[i], triangle[(i + 1) % 3]);
                 if edges.insert((place(from), place(to)), ()).is_some() {
-                    return Err(TinFault::EdgeUsedTwice { from: place(from), to: place(to) });
+                    return Err(TinFault::EdgeUsedTwice([place(from), place(to)]));
                 }
             }
         }
@@ -113,7 +113,7 @@ impl Tin {
             .collect();
         open.sort();
         match open.first() {
-            Some(&&(from, to)) => Err(TinFault::Crack { from, to }),
+            Some(&&(from, to)) => Err(TinFault::Crack([from, to])),
             None => Ok(()),
         }
     }
@@ -146,14 +146,14 @@ mod tests {
     fn a_missing_triangle_is_found() {
         let mut tin = square();
         tin.triangles.pop();
-        assert!(matches!(tin.check(), Err(TinFault::AreaMissing { .. })));
+        assert!(matches!(tin.check(), Err(TinFault::AreaMissing(..))));
     }
 
     #[test]
     fn a_clockwise_triangle_is_found() {
         let mut tin = square();
         tin.triangles[0] = [0, 2, 1];
-        assert_eq!(tin.check(), Err(TinFault::NotCounterClockwise { triangle: 0 }));
+        assert_eq!(tin.check(), Err(TinFault::NotCounterClockwise(0)));
     }
 
     #[test]
@@ -161,6 +161,6 @@ mod tests {
         let mut tin = square();
         tin.vertices.push(Vertex { at: Post::new(1, 1).into(), height: 0 });
         tin.triangles = vec![[0, 1, 4], [1, 2, 4], [0, 2, 3]];
-        assert!(matches!(tin.check(), Err(TinFault::Crack { .. })));
+        assert!(matches!(tin.check(), Err(TinFault::Crack(_))));
     }
 }

@@ -1,1 +1,25 @@
-//! (to be written)
+//! The TIN of one tile: which post comes next, and when to stop.
+//!
+//! Polis and McKeown, "Issues in iterative TIN generation to support large scale simulations" (AutoCarto
+//! 11, 1993), section 2: insert the posts of largest weighted residual again and again. [`refine`] does
+//! that for one tile and sees nothing but the tile's window; [`survey`] runs the same growth ahead to
+//! learn what each triangle would gain.
+
+mod task;
+pub use task::{Frame, LastBatch, Proximity, Rule, SeamSides, Stop, TileTask};
+mod refine;
+pub use refine::refine;
+mod survey;
+pub use survey::{CostUnit, SurveyTask, survey};
+mod ladder;
+pub use ladder::{gain_at_bin, ladder_bin};
+
+mod batch;
+mod criterion;
+mod gate;
+mod ground;
+mod growth;
+mod proximity;
+mod queue;
+mod sequence;
+mod start;

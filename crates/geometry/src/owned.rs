@@ -1,0 +1,323 @@
+//! The posts a triangle owns, where its corners may lie between posts, and the residual at each.
+//!
+//! The owner of a post is the triangle that holds it after an infinitesimal shift east, then a smaller one
+//! north; on the far borders of the area the shift is inward. So the triangles of a sheet share the posts
+//! out exactly once, posts that are corners or lie on edges included. Everything is whole numbers: rows
+//! are walked with exact floors and remainders, heights are compared as numerators over the doubled area.
+
+use std::ops::Range;
+
+use terrain::{Dem, ModuleGrid, ModuleId, Post, Spacing};
+
+use crate::Facet;
+
+/// Where posts lie in the plane of the triangles: every `units_per_post` units from `origin`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PostGrid {
+    /// The post at (0, 0) of the plane.
+    pub origin: Post,
+    /// Units between posts, positive.
+    pub units_per_post: i32,
+    /// Posts north of `origin` of the row that the triangles south of it own: the area's northern border.
+    pub far_row: Option<i32>,
+    /// Posts east of `origin` of the column that the triangles west of it own: the area's eastern border.
+    pub far_col: Option<i32>,
+}
+
+impl PostGrid {
+    /// The posts of a load module in its own quanta; those on the area's northern and eastern border belong to
+    /// the load modules there.
+    pub fn of_module(grid: ModuleGrid, module: ModuleId, spacing: Spacing) -> Self {
+        Self {
+            origin: grid.posts_of(module).south_west(),
+            units_per_post: spacing.quanta_per_post(),
+            far_row: (module.row + 1 == grid.rows).then_some(grid.side_cells),
+            far_col: (module.col + 1 == grid.cols).then_some(grid.side_cells),
+        }
+    }
+}
+
+/// Calls `visit` with each row that holds owned posts and the range of their columns, both counted from the
+/// origin, from south to north.
+///
+/// `facet` is counter-clockwise with corners at most 2^17 from the origin.
+#[inline]
+pub fn visit_rows(grid: &PostGrid, facet: &Facet, mut visit: impl FnMut(i32, Range<i32>)) {
+    let [low, middle, high] = by_height(facet);
+    let step = grid.units_per_post;
+    let first_at = |y: i32| ceil_div(y, step);
+    let (first, turn, end) = (first_at(low.1), first_at(middle.1), first_at(high.1));
+    // The long side from the lowest to the highest corner is the left one when the middle corner lies east of it.
+    let (dx, dy) = (i64::from(high.0 - low.0), i64::from(high.1 - low.1));
+    let long_is_left = dx * i64::from(middle.1 - low.1) < i64::from(middle.0 - low.0) * dy;
+    let mut row = |row: i32, long: &Walk, short: &Walk| {
+        let (left, right) = if long_is_left { (long, short) } else { (short, long) };
+        let cols = owned_cols(grid, left, right);
+        if !cols.is_empty() {
+            visit(row, cols);
+        }
+    };
+    if first < end {
+        let mut long = Walk::start(low, high, first, step);
+        if first < turn {
+            let mut short = Walk::start(low, middle, first, step);
+            for k in first..turn {
+                row(k, &long, &short);
+                long.north();
+                short.north();
+            }
+        }
+        if turn < end {
+            let mut short = Walk::start(middle, high, turn, step);
+            for k in turn..end {
+                row(k, &long, &short);
+                long.north();
+                short.north();
+            }
+        }
+    }
+    // A flat top on the northern border owns that row; a tip there has no width just south of it.
+    if grid.far_row.is_some_and(|far| far * step == high.1) && middle.1 == high.1 {
+        let at = |x: i32| Walk::fixed(x, step);
+        let cols = owned_cols(grid, &at(middle.0.min(high.0)), &at(middle.0.max(high.0)));
+        if !cols.is_empty() {
+            visit(high.1 / step, cols);
+        }
+    }
+}
+
+/// Calls `visit` with each owned post and its residual: DEM height less the triangle's, in quanta, rounded
+/// half away from zero.
+///
+/// Corners lie at most 2^16 units apart, heights have 24 bits, so all products stay below 2^61.
+#[inline]
+pub fn visit_residuals(grid: &PostGrid, facet: &Facet, dem: &Dem, mut visit: impl FnMut(Post, i64)) {
+    let division = Division::by(facet.den);
+    let step = i64::from(grid.units_per_post);
+    let (x0, y0, plane0) = (i64::from(facet.x[0]), i64::from(facet.y[0]), i64::from(facet.z[0]) * facet.den);
+    let east = facet.px * step;
+    visit_rows(grid, facet, |row, cols| {
+        let mut plane =
+            plane0 + facet.px * (i64::from(cols.start) * step - x0) + facet.py * (i64::from(row) * step - y0);
+        let first = Post::new(grid.origin.row + row, grid.origin.col + cols.start);
+        let skipped = (first.col - dem.rect().west) as usize;
+        let heights = &dem.row(first.row)[skipped..skipped + cols.len()];
+        for (col, &height) in (first.col..).zip(heights) {
+            visit(Post::new(first.row, col), division.rounded(i64::from(height) * facet.den - plane));
+            plane += east;
+        }
+    });
+}
+
+/// Corners as (x, y), from the southernmost to the northernmost.
+fn by_height(facet: &Facet) -> [(i32, i32); 3] {
+    let [mut a, mut b, mut c] = [0, 1, 2].map(|i| (facet.x[i], facet.y[i]));
+    if b.1 < a.1 {
+        std::mem::swap(&mut a, &mut b);
+    }
+    if c.1 < b.1 {
+        std::mem::swap(&mut b, &mut c);
+        if b.1 < a.1 {
+            std::mem::swap(&mut a, &mut b);
+        }
+    }
+    [a, b, c]
+}
+
+/// Columns between two sides of a triangle: the left crossing itself is inside, the right one is not,
+/// except on the area's eastern border.
+#[inline(always)]
+fn owned_cols(grid: &PostGrid, left: &Walk, right: &Walk) -> Range<i32> {
+    let (start, mut end) = (left.ceil(), right.ceil());
+    if grid.far_col == Some(right.floor) && left.floor < right.floor {
+        end += 1;
+    }
+    start..end
+}
+
+fn ceil_div(numerator: i32, den: i32) -> i32 {
+    -(-numerator).div_euclid(den)
+}
+
+/// Where a side crosses the rows of posts: (floor + remainder / den) posts east of the origin.
+#[derive(Clone, Copy)]
+struct Walk {
+    floor: i32,
+    remainder: i64,
+    den: i64,
+    step_floor: i32,
+    step_remainder: i64,
+}
+
+impl Walk {
+    /// The side from `low` up to `high`, which is higher, at row `row`.
+    #[inline(always)]
+    fn start(low: (i32, i32), high: (i32, i32), row: i32, units_per_post: i32) -> Self {
+        let (dx, dy) = (high.0 - low.0, high.1 - low.1);
+        let den = i64::from(dy) * i64::from(units_per_post);
+        let north = i64::from(row) * i64::from(units_per_post) - i64::from(low.1);
+        let east = i64::from(low.0) * i64::from(dy) + north * i64::from(dx);
+        Self {
+            floor: east.div_euclid(den) as i32,
+            remainder: east.rem_euclid(den),
+            den,
+            step_floor: dx.div_euclid(dy),
+            step_remainder: i64::from(dx.rem_euclid(dy)) * i64::from(units_per_post),
+        }
+    }
+
+    /// The place `x` itself.
+    fn fixed(x: i32, units_per_post: i32) -> Self {
+        let (floor, remainder) = (x.div_euclid(units_per_post), i64::from(x.rem_euclid(units_per_post)));
+        Self { floor, remainder, den: i64::from(units_per_post), step_floor: 0, step_remainder: 0 }
+    }
+
+    #[inline(always)]
+    fn ceil(&self) -> i32 {
+        self.floor + i32::from(0 < self.remainder)
+    }
+
+    #[inline(always)]
+    fn north(&mut self) {
+        self.floor += self.step_floor;
+        self.remainder += self.step_remainder;
+        if self.den <= self.remainder {
+            self.remainder -= self.den;
+            self.floor += 1;
+        }
+    }
+}
+
+/// Division by one number many times: a reciprocal guesses, the remainder decides.
+///
+/// The guess is off by less than one because the quotient has at most 26 bits and the product at most
+/// three roundings of 2^-53; so one comparison on either side makes it exact.
+#[derive(Clone, Copy)]
+struct Division {
+    den: i64,
+    reciprocal: f64,
+}
+
+impl Division {
+    fn by(den: i64) -> Self {
+        Self { den, reciprocal: 1.0 / den as f64 }
+    }
+
+    /// `numerator / den`, half away from zero; both below 2^60, the quotient below 2^26.
+    #[inline(always)]
+    fn rounded(&self, numerator: i64) -> i64 {
+        let size = numerator.abs();
+        let guess = (size as f64 * self.reciprocal + 0.5) as i64;
+        let doubled_rest = 2 * size + self.den - 2 * guess * self.den;
+        let quotient = guess - i64::from(doubled_rest < 0) + i64::from(2 * self.den <= doubled_rest);
+        if numerator < 0 { -quotient } else { quotient }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use terrain::PostRect;
+
+    use super::*;
+
+    /// SplitMix64.
+    fn draw(state: &mut u64) -> u64 {
+        *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = *state;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    /// Whether the facet holds the post after the shift, asked of the three half planes one by one.
+    fn owns(grid: &PostGrid, facet: &Facet, row: i32, col: i32) -> bool {
+        let (x, y) = (i64::from(col * grid.units_per_post), i64::from(row * grid.units_per_post));
+        let east = if grid.far_col == Some(col) { -1 } else { 1 };
+        let north = if grid.far_row == Some(row) { -1 } else { 1 };
+        (0..3).all(|i| {
+            let j = (i + 1) % 3;
+            let (dx, dy) = (i64::from(facet.x[j] - facet.x[i]), i64::from(facet.y[j] - facet.y[i]));
+            let side = dx * (y - i64::from(facet.y[i])) - dy * (x - i64::from(facet.x[i]));
+            (side, -dy * east, dx * north) > (0, 0, 0)
+        })
+    }
+
+    #[track_caller]
+    fn check(grid: &PostGrid, posts: i32, facet: &Facet) {
+        let mut found = Vec::new();
+        visit_rows(grid, facet, |row, cols| found.extend(cols.map(|col| (row, col))));
+        let all = (0..=posts).flat_map(|row| (0..=posts).map(move |col| (row, col)));
+        let last = |v: i32, far: Option<i32>| v < posts || far == Some(posts);
+        let expected: Vec<_> = all
+            .filter(|&(row, col)| last(row, grid.far_row) && last(col, grid.far_col))
+            .filter(|&(row, col)| owns(grid, facet, row, col))
+            .collect();
+        assert_eq!(found, expected, "posts owned by {facet:?}");
+    }
+
+    #[test]
+    fn owned_posts_are_those_of_the_shifted_triangle() {
+        let mut seed = 5;
+        for round in 0..6000 {
+            let (posts, units) = (8, [1, 2, 7, 3200][round % 4]);
+            let far = |on: bool| on.then_some(posts);
+            let (far_row, far_col) = (far(round % 3 == 0), far(round % 5 == 0));
+            let grid = PostGrid { origin: Post::new(0, 0), units_per_post: units, far_row, far_col };
+            // A third of the coordinates fall on posts, so edges and corners on posts are common.
+            let mut place = || match draw(&mut seed) % 3 {
+                0 => (draw(&mut seed) % (posts as u64 + 1)) as i32 * units,
+                _ => (draw(&mut seed) % (posts * units + 1) as u64) as i32,
+            };
+            let (mut x, mut y) = ([0; 3].map(|_| place()), [0; 3].map(|_| place()));
+            if Facet::new(x, y, [0; 3]).den < 0 {
+                x.swap(1, 2);
+                y.swap(1, 2);
+            }
+            let facet = Facet::new(x, y, [0; 3]);
+            if 0 < facet.den {
+                check(&grid, posts, &facet);
+            }
+        }
+    }
+
+    #[test]
+    fn a_division_is_exact_at_every_half() {
+        for den in [1, 2, 3, 12_799, 20_480_000, (1 << 33) - 1, 1 << 33] {
+            let division = Division::by(den);
+            for quotient in [0, 1, 2, 1000, (1 << 25) - 1] {
+                for near in -2..=2 {
+                    let numerator: i64 = quotient * den + den / 2 + near;
+                    let expected = numerator.signum() * ((2 * numerator.abs() + den) / (2 * den));
+                    assert_eq!(division.rounded(numerator), expected, "{numerator} / {den}");
+                    assert_eq!(division.rounded(-numerator), -expected, "-{numerator} / {den}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn residuals_are_those_of_a_wide_division() {
+        let mut seed = 9;
+        let rect = PostRect::new(Post::new(30, 70), Post::new(50, 90));
+        let dem = Dem::from_fn(rect, |_| Some((draw(&mut seed) % 400_000) as i32 - 200_000));
+        for round in 0..400 {
+            let units = [1, 25, 3200][round % 3];
+            let mut place = || (draw(&mut seed) % (20 * units as u64 + 1)) as i32;
+            let (x, y) = ([0; 3].map(|_| place()), [0; 3].map(|_| place()));
+            let z = [0; 3].map(|_| (draw(&mut seed) % 400_000) as i32 - 200_000);
+            let facet = Facet::new(x, y, z);
+            if facet.den <= 0 {
+                continue;
+            }
+            let grid = PostGrid { origin: rect.south_west(), units_per_post: units, far_row: None, far_col: None };
+            visit_residuals(&grid, &facet, &dem, |post, residual| {
+                let (east, north) = ((post.col - 70) * units - x[0], (post.row - 30) * units - y[0]);
+                let plane = facet.px as i128 * i128::from(east) + facet.py as i128 * i128::from(north);
+                let den = i128::from(facet.den);
+                let numerator = i128::from(dem.height(post) - z[0]) * den - plane;
+                let expected = numerator.signum() * ((2 * numerator.abs() + den) / (2 * den));
+                assert_eq!(i128::from(residual), expected);
+            });
+        }
+    }
+}

@@ -1,0 +1,84 @@
+//! Triangles whose numerators need more than 32 bits (a few hundred at the start of a run): f64 lanes that
+//! hold integers below 2^53, which is exact for tiles of at most 16,384 posts a side.
+//!
+//! Heights have at most 24 bits, so going over f32 to f64 loses nothing.
+
+use std::ops::ControlFlow;
+
+use fearless_simd::{Simd, f64x8, i32x16, prelude::*};
+
+use super::IOTA;
+use crate::{Facet, LocalPost, Spans, Surface};
+
+/// Visits the candidate posts of each span in groups of 16: row, first column, `|n|` of both halves (0
+/// beyond the span), until `visit` breaks.
+#[inline(always)]
+fn walk<S: Simd>(
+    simd: S,
+    surface: &Surface,
+    facet: &Facet,
+    mut visit: impl FnMut(i32, i32, f64x8<S>, f64x8<S>) -> ControlFlow<()>,
+) -> ControlFlow<()> {
+    let (iota_low, iota_high) = simd.cvt_f32_i32x16(i32x16::from_slice(simd, &IOTA)).widen();
+    let splat = |value: f64| f64x8::splat(simd, value);
+    let (px, den, zero) = (splat(facet.px as f64), splat(facet.den as f64), splat(0.0));
+    let (east_low, east_high) = (iota_low * px, iota_high * px);
+    let stride_lanes = splat(facet.px as f64 * 16.0);
+    let origin = facet.origin();
+    let (heights, stride) = surface.rows();
+    let candidates = surface.candidates();
+    for span in Spans::new(facet) {
+        if span.row < candidates.south || candidates.north < span.row {
+            continue;
+        }
+        let (mut left, right) = (span.left.max(candidates.west), span.right.min(candidates.east));
+        let first = splat((origin + facet.py * i64::from(span.row) + facet.px * i64::from(left)) as f64);
+        let (mut plane_low, mut plane_high) = (first + east_low, first + east_high);
+        while left <= right {
+            let index = span.row as usize * stride + left as usize;
+            let height = i32x16::from_slice(simd, &heights[index..index + 16]);
+            let (low, high) = simd.cvt_f32_i32x16(height).widen();
+            let (mut low, mut high) = (simd.abs_f64x8(low * den - plane_low), simd.abs_f64x8(high * den - plane_high));
+            if right - left < 15 {
+                let end = splat(f64::from(right - left + 1));
+                low = iota_low.simd_lt(end).select(low, zero);
+                high = iota_high.simd_lt(end).select(high, zero);
+            }
+            visit(span.row, left, low, high)?;
+            (plane_low, plane_high) = (plane_low + stride_lanes, plane_high + stride_lanes);
+            left += 16;
+        }
+    }
+    ControlFlow::Continue(())
+}
+
+/// Largest `|n|` over the candidate posts of the closed triangle.
+#[inline(always)]
+pub fn largest<S: Simd>(simd: S, surface: &Surface, facet: &Facet) -> u64 {
+    let mut largest = f64x8::splat(simd, 0.0);
+    let _ = walk(simd, surface, facet, |_, _, low, high| {
+        largest = largest.max(low).max(high);
+        ControlFlow::Continue(())
+    });
+    simd.reduce_max_f64x8(largest) as u64
+}
+
+/// Calls `visit` for the candidate posts whose `|n|` is at least `threshold`, row by row, until it breaks.
+#[inline(always)]
+pub fn reached<S: Simd>(
+    simd: S,
+    surface: &Surface,
+    facet: &Facet,
+    threshold: u64,
+    mut visit: impl FnMut(LocalPost) -> ControlFlow<()>,
+) -> ControlFlow<()> {
+    let threshold = f64x8::splat(simd, threshold as f64);
+    walk(simd, surface, facet, |row, col, low, high| {
+        let mut hits = low.simd_ge(threshold).to_bitmask() | high.simd_ge(threshold).to_bitmask() << 8;
+        while hits != 0 {
+            visit(LocalPost::new(row, col + hits.trailing_zeros() as i32))?;
+            hits &= hits - 1;
+        }
+        ControlFlow::Continue(())
+    })
+}

@@ -1,0 +1,104 @@
+//! The triangle scan: how far the DEM lies from a triangle's plane at the posts under it.
+//!
+//! With `n(x, y) = z * den - plane * den`, the residual at a post is `|n| / den`, rounded half away from
+//! zero. Inside the closed triangle the plane lies between the heights of its corners, so
+//! `|n| <= den * relief`; while that is below 2^31, arithmetic that wraps at 32 bits gives `n` exactly,
+//! whatever overflowed on the way. Larger triangles take 64-bit lanes.
+
+mod boxes;
+mod far;
+mod near;
+mod squares;
+mod visit;
+
+use std::ops::ControlFlow;
+
+use fearless_simd::Simd;
+
+use crate::{Facet, LocalPost, Surface};
+
+pub use squares::squares_sum;
+pub use visit::{visit_owned, visit_posts};
+
+/// Largest `den * relief` for which 32-bit lanes are exact.
+const NARROW_LIMIT: i64 = 1 << 31;
+
+/// Lane numbers.
+const IOTA: [i32; 16] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
+
+/// `numerator / den`, rounded half up (numerators are absolute values).
+#[inline(always)]
+pub fn rounded(numerator: u64, den: u64) -> u64 {
+    if numerator <= u64::from(u32::MAX) && den <= u64::from(u32::MAX) {
+        // One 32-bit division is several times faster than a 64-bit one.
+        let (n, d) = (numerator as u32, den as u32);
+        let quotient = n / d;
+        return u64::from(quotient) + u64::from(d - n % d <= n % d);
+    }
+    let quotient = numerator / den;
+    quotient + u64::from(den - numerator % den <= numerator % den)
+}
+
+/// Largest `|n|` over the candidate posts of the closed triangle.
+#[inline(always)]
+pub fn largest_numerator<S: Simd>(simd: S, surface: &Surface, facet: &Facet) -> u64 {
+    if NARROW_LIMIT <= facet.den * surface.relief() {
+        return far::largest(simd, surface, facet);
+    }
+    let (x0, x1, y0, y1) = facet.bounds();
+    let candidates = surface.candidates();
+    let all_candidates =
+        candidates.west <= x0 && x1 <= candidates.east && candidates.south <= y0 && y1 <= candidates.north;
+    let wide = x1 - x0;
+    if all_candidates && wide < 8 {
+        boxes::largest_8(simd, surface, facet, x0, y0, y1)
+    } else if all_candidates && wide < 16 {
+        boxes::largest_16(simd, surface, facet, x0, y0, y1)
+    } else {
+        near::largest(simd, surface, facet)
+    }
+}
+
+/// The first candidate post, row by row, whose `|n|` is at least `threshold` (1 or more).
+#[inline(always)]
+pub fn locate<S: Simd>(simd: S, surface: &Surface, facet: &Facet, threshold: u64) -> Option<LocalPost> {
+    let mut first = None;
+    let _ = reached(simd, surface, facet, threshold, |post| {
+        first = Some(post);
+        ControlFlow::Break(())
+    });
+    first
+}
+
+/// Calls `visit` for every candidate post whose `|n|` is at least `threshold` (1 or more), row by row.
+#[inline(always)]
+pub fn locate_all<S: Simd>(
+    simd: S,
+    surface: &Surface,
+    facet: &Facet,
+    threshold: u64,
+    mut visit: impl FnMut(LocalPost),
+) {
+    let _ = reached(simd, surface, facet, threshold, |post| {
+        visit(post);
+        ControlFlow::Continue(())
+    });
+}
+
+#[inline(always)]
+fn reached<S: Simd>(
+    simd: S,
+    surface: &Surface,
+    facet: &Facet,
+    threshold: u64,
+    visit: impl FnMut(LocalPost) -> ControlFlow<()>,
+) -> ControlFlow<()> {
+    if NARROW_LIMIT <= facet.den * surface.relief() {
+        far::reached(simd, surface, facet, threshold, visit)
+    } else {
+        near::reached(simd, surface, facet, threshold, visit)
+    }
+}
+
+#[cfg(test)]
+mod tests;

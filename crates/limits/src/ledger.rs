@@ -1,0 +1,169 @@
+//! What one tile may spend, and the ledger that never lets it spend more.
+
+use terrain::{ModuleId, ModuleRect, RefusedBy};
+
+/// Triangles any point adds in all: two inside a load module, or one on each side of a line.
+pub const POINT_COST: u32 = 2;
+
+/// Triangles one tile may add to its start, by load module, by window and in all.
+///
+/// Tiles spend from their own allowances only; the allowances of all tiles together respect every limit,
+/// so no tile needs to know what another spent.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Allowance {
+    /// Load modules the tile can touch: its own and the ring of neighbours beyond its sides.
+    pub modules: ModuleRect,
+    /// Triangles each of them may still gain from this tile, row-major.
+    pub module_room: Vec<u32>,
+    /// Windows that hold any of those load modules, by south-west load module.
+    pub windows: ModuleRect,
+    /// Height and width of a window, in load modules.
+    pub window_size: (u32, u32),
+    /// Triangles this tile may add to each window, row-major.
+    pub window_room: Vec<u32>,
+    /// Triangles this tile may add in all.
+    pub triangles: u32,
+}
+
+/// A tile's allowance as it is spent. Room only shrinks, so a refusal is final.
+#[derive(Clone, Debug)]
+pub struct Ledger {
+    allowance: Allowance,
+    spent: u32,
+}
+
+impl Ledger {
+    /// A ledger from which nothing has been spent.
+    pub fn new(allowance: Allowance) -> Self {
+        assert_eq!(allowance.module_room.len(), allowance.modules.count(), "one room per load module");
+        assert_eq!(allowance.window_room.len(), allowance.windows.count(), "one room per window");
+        Self { allowance, spent: 0 }
+    }
+
+    /// Triangles spent so far.
+    pub fn spent(&self) -> u32 {
+        self.spent
+    }
+
+    /// Triangles left for the whole tile.
+    pub fn left(&self) -> u32 {
+        self.allowance.triangles - self.spent
+    }
+
+    /// Triangles `module` may still gain.
+    pub fn room_of(&self, module: ModuleId) -> u32 {
+        self.allowance.module_room[self.module_index(module)]
+    }
+
+    fn module_index(&self, module: ModuleId) -> usize {
+        let modules = self.allowance.modules;
+        debug_assert!(modules.contains(module), "load module {module} is beyond this tile's ring");
+        (module.row - modules.south) as usize * modules.cols() as usize + (module.col - modules.west) as usize
+    }
+
+    /// Rows of window rooms that hold `module`, as index ranges.
+    fn window_rows(&self, module: ModuleId) -> impl Iterator<Item = std::ops::Range<usize>> + use<> {
+        let (windows, (rows, cols)) = (self.allowance.windows, self.allowance.window_size);
+        let south = module.row.saturating_sub(rows - 1).max(windows.south);
+        let west = module.col.saturating_sub(cols - 1).max(windows.west);
+        let north = (module.row + 1).min(windows.north);
+        let east = (module.col + 1).min(windows.east);
+        (south..north).map(move |row| {
+            let start = (row - windows.south) as usize * windows.cols() as usize;
+            start + (west - windows.west) as usize..start + (east - windows.west) as usize
+        })
+    }
+
+    /// Which limit refuses a point that adds `cost` triangles in `module`, if any does. The tile's total is
+    /// not asked: running out of it ends the tile.
+    ///
+    /// A point costs two triangles wherever it lies, and a window may hold both load modules beside a side
+    /// point, so windows are asked for two. One that has room for a single triangle stays as it is.
+    pub fn refuses(&self, module: ModuleId, cost: u32, beyond_tile: bool) -> Option<RefusedBy> {
+        if self.room_of(module) < cost {
+            return Some(if beyond_tile { RefusedBy::Reservation } else { RefusedBy::Module });
+        }
+        let full =
+            self.window_rows(module).any(|row| self.allowance.window_room[row].iter().any(|&room| room < POINT_COST));
+        full.then_some(RefusedBy::Window)
+    }
+
+    /// Spends `cost` triangles in `module`.
+    ///
+    /// # Panics
+    /// When a limit refuses them: the caller asks first.
+    pub fn charge(&mut self, module: ModuleId, cost: u32) {
+        let index = self.module_index(module);
+        let room = &mut self.allowance.module_room[index];
+        *room = room.checked_sub(cost).expect("the caller asked whether the load module has room");
+        for row in self.window_rows(module) {
+            for room in &mut self.allowance.window_room[row] {
+                *room = room.checked_sub(cost).expect("the caller asked whether every window has room");
+            }
+        }
+        self.spent += cost;
+        assert!(self.spent <= self.allowance.triangles, "a tile spends no more than its allowance");
+    }
+
+    /// Takes room in `module` for points a neighbour has chosen and paid for.
+    ///
+    /// Reservations keep this room free; what they could not foresee (pins) ends at zero.
+    pub fn inherit(&mut self, module: ModuleId, cost: u32) {
+        let index = self.module_index(module);
+        let room = &mut self.allowance.module_room[index];
+        *room = room.saturating_sub(cost);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Windows;
+    use terrain::ModuleGrid;
+
+    fn ledger(module_room: u32, window_room: u32) -> Ledger {
+        let grid = ModuleGrid { rows: 6, cols: 6, side_cells: 20 };
+        let modules = ModuleRect { south: 1, west: 1, north: 4, east: 5 };
+        let windows = Windows::new(grid, 3);
+        let touching = windows.touching(modules);
+        Ledger::new(Allowance {
+            modules,
+            module_room: vec![module_room; modules.count()],
+            windows: touching,
+            window_size: (windows.rows, windows.cols),
+            window_room: vec![window_room; touching.count()],
+            triangles: 1000,
+        })
+    }
+
+    #[test]
+    fn a_full_load_module_refuses_and_its_neighbour_does_not() {
+        let mut ledger = ledger(4, 1000);
+        let (full, free) = (ModuleId { row: 2, col: 2 }, ModuleId { row: 2, col: 3 });
+        ledger.charge(full, 2);
+        ledger.charge(full, 2);
+        assert_eq!(ledger.refuses(full, 1, false), Some(RefusedBy::Module));
+        assert_eq!(ledger.refuses(full, 1, true), Some(RefusedBy::Reservation));
+        assert_eq!(ledger.refuses(free, 2, false), None);
+        assert_eq!((ledger.spent(), ledger.left()), (4, 996));
+    }
+
+    #[test]
+    fn a_full_window_refuses_every_load_module_it_holds_and_no_other() {
+        let mut ledger = ledger(100, 6);
+        ledger.charge(ModuleId { row: 1, col: 1 }, 6);
+        // Windows at rows 0..=1, cols 0..=1 hold (1, 1); together they reach to row 3, column 3.
+        assert_eq!(ledger.refuses(ModuleId { row: 3, col: 3 }, 1, false), Some(RefusedBy::Window));
+        assert_eq!(ledger.refuses(ModuleId { row: 3, col: 4 }, 1, false), None);
+    }
+
+    #[test]
+    fn inherited_points_take_room_without_being_paid() {
+        let mut ledger = ledger(3, 1000);
+        let module = ModuleId { row: 1, col: 1 };
+        ledger.inherit(module, 2);
+        assert_eq!((ledger.room_of(module), ledger.spent()), (1, 0));
+        ledger.inherit(module, 5);
+        assert_eq!(ledger.room_of(module), 0);
+    }
+}

@@ -1,0 +1,204 @@
+//! The paper's passes: every post of exactly the largest weighted residual, thinned by proximity.
+//!
+//! A pass takes all triangles on top of the queue whose keys are equal; since every post lies in a closed
+//! triangle and posts on shared edges have the same residual in both, that is the global re-scan of the
+//! paper without scanning what did not change.
+
+use fearless_simd::Simd;
+use geometry::LocalPost;
+use terrain::StopReason;
+
+use crate::criterion::{Criterion, Largest};
+use crate::growth::{Growth, RunningSquares};
+use crate::proximity::{NearVertices, is_near};
+use crate::queue::Queue;
+use crate::task::{LastBatch, Proximity, Stop};
+
+/// How passes choose.
+pub(crate) struct Passes {
+    pub proximity: Option<Proximity>,
+    pub last_batch: LastBatch,
+}
+
+/// A post of the level now being worked off, in a triangle that is parked (key 0) meanwhile.
+#[derive(Clone, Copy)]
+struct Candidate {
+    post: LocalPost,
+    triangle: u32,
+    version: LocalPost,
+    /// Too near to a vertex. Vertices stay, so this does too.
+    crowded: bool,
+}
+
+/// State of the passes beside the growth itself.
+struct Batch {
+    queue: Queue<Largest>,
+    near: Option<NearVertices>,
+    /// Candidates of value `level`, sorted by post.
+    waiting: Vec<Candidate>,
+    level: u64,
+    dirty: Vec<u32>,
+}
+
+impl Passes {
+    /// Runs passes from the `vertices` already in the mesh until `stop` or until nothing is left.
+    #[inline(always)]
+    pub fn run<S: Simd>(&self, growth: &mut Growth<S>, vertices: &[LocalPost], stop: &Stop) -> StopReason {
+        growth.score_all(Largest);
+        let near = self.proximity.map(|proximity| {
+            let mut near = NearVertices::new(proximity, growth.ground.extent());
+            vertices.iter().for_each(|&post| near.add(post, growth.ground.height(post)));
+            near
+        });
+        let mut batch = Batch { queue: Queue::new(Largest), near, waiting: Vec::new(), level: 0, dirty: Vec::new() };
+        let mut squares = stop.rms_quanta.map(|rms| RunningSquares::new(growth, rms));
+        loop {
+            if growth.sequence.is_full(stop.points) || growth.gate.is_spent() {
+                return StopReason::BudgetSpent;
+            }
+            if squares.as_ref().is_some_and(RunningSquares::reached) {
+                return StopReason::RmsReached;
+            }
+            if !batch.gather(growth) {
+                return StopReason::Exhausted;
+            }
+            if stop.value.is_some_and(|value| batch.level <= value) {
+                return StopReason::ResidualReached;
+            }
+            let mut accepted = self.accept(growth, &mut batch);
+            if self.last_batch == LastBatch::Truncate
+                && let Some(points) = stop.points
+            {
+                accepted.truncate(points - growth.sequence.posts.len());
+            }
+            batch.insert(growth, &accepted, squares.as_mut());
+        }
+    }
+
+    /// The candidates of this pass that may go in, in row order; at least one.
+    fn accept<S: Simd>(&self, growth: &Growth<S>, batch: &mut Batch) -> Vec<Candidate> {
+        let mut accepted: Vec<Candidate> = Vec::new();
+        let Some(near) = &mut batch.near else {
+            accepted.extend_from_slice(&batch.waiting);
+            accepted.dedup_by_key(|candidate| candidate.post);
+            return accepted;
+        };
+        for candidate in &mut batch.waiting {
+            let height = growth.ground.height(candidate.post);
+            if candidate.crowded || accepted.last().is_some_and(|last| last.post == candidate.post) {
+                continue;
+            }
+            if near.crowd(candidate.post, height) {
+                candidate.crowded = true;
+            } else {
+                near.add(candidate.post, height);
+                accepted.push(*candidate);
+            }
+        }
+        if !accepted.is_empty() {
+            return accepted;
+        }
+        let proximity = self.proximity.expect("a test of proximity has its bounds");
+        let placed = |candidate: &Candidate| (candidate.post, growth.ground.height(candidate.post));
+        for candidate in &batch.waiting {
+            if !accepted.iter().any(|other| is_near(proximity, placed(candidate), placed(other))) {
+                near.add(candidate.post, growth.ground.height(candidate.post));
+                accepted.push(*candidate);
+            }
+        }
+        accepted
+    }
+}
+
+impl Batch {
+    /// Fills `waiting` with all permitted posts of the largest value. False when nothing is left.
+    #[inline(always)]
+    fn gather<S: Simd>(&mut self, growth: &mut Growth<S>) -> bool {
+        self.waiting.retain(|candidate| growth.corners(candidate.triangle)[0] == candidate.version);
+        if self.waiting.iter().any(|candidate| growth.gate.refuses(candidate.post).is_some()) {
+            self.release(growth);
+        }
+        loop {
+            let largest = self.queue.largest(&growth.mesh);
+            if self.waiting.is_empty() {
+                let Some(largest) = largest else { return false };
+                self.level = largest;
+            } else if largest.is_some_and(|largest| self.level < largest) {
+                self.release(growth);
+                continue;
+            }
+            while self.queue.largest(&growth.mesh) == Some(self.level) {
+                let top = self.queue.pop(&growth.mesh).expect("a queue with a largest key has a top");
+                self.gather_from(growth, top.triangle);
+            }
+            self.waiting.sort_by_key(|candidate| candidate.post);
+            if !self.waiting.is_empty() {
+                return true;
+            }
+        }
+    }
+
+    /// Parks a triangle and lists its permitted candidates; one without any settles for less.
+    fn gather_from<S: Simd>(&mut self, growth: &mut Growth<S>, triangle: u32) {
+        let corners = growth.corners(triangle);
+        let before = self.waiting.len();
+        let mut refused = None;
+        growth.ground.all_of_value(corners, self.level, |post| match growth.gate.refuses(post) {
+            None => self.waiting.push(Candidate { post, triangle, version: corners[0], crowded: false }),
+            Some(by) => refused = refused.or(Some((post, by))),
+        });
+        if let Some((post, by)) = refused {
+            growth.sequence.refuse(growth.tile, post, growth.ground.residual_at(corners, post), by);
+        }
+        if before < self.waiting.len() {
+            growth.mesh.set_key(triangle, 0);
+            return;
+        }
+        let permitted = growth.ground.worst_where(corners, |post| growth.gate.refuses(post).is_none());
+        growth.mesh.set_key(triangle, permitted.map_or(0, |(value, _)| value));
+        self.queue.push(&growth.mesh, triangle);
+    }
+
+    /// Gives the parked triangles back to the queue.
+    fn release<S: Simd>(&mut self, growth: &mut Growth<S>) {
+        for candidate in std::mem::take(&mut self.waiting) {
+            if growth.mesh.triangles()[candidate.triangle as usize].key == 0 {
+                growth.mesh.set_key(candidate.triangle, self.level);
+                self.queue.push(&growth.mesh, candidate.triangle);
+            }
+        }
+    }
+
+    /// Inserts the accepted posts, then scores what changed once.
+    #[inline(always)]
+    fn insert<S: Simd>(
+        &mut self,
+        growth: &mut Growth<S>,
+        accepted: &[Candidate],
+        mut squares: Option<&mut RunningSquares>,
+    ) {
+        self.dirty.clear();
+        for candidate in accepted {
+            if growth.gate.is_spent() {
+                break;
+            }
+            if growth.gate.refuses(candidate.post).is_some() {
+                continue;
+            }
+            let triangle = growth.mesh.triangle_at(candidate.post, candidate.triangle);
+            growth.select(candidate.post, triangle);
+            self.dirty.extend_from_slice(growth.mesh.insert(candidate.post, triangle));
+            if let Some(squares) = &mut squares {
+                squares.update(&growth.ground, &growth.mesh);
+            }
+        }
+        for &triangle in &self.dirty {
+            // Rewritten twice in one pass: scored once.
+            if growth.mesh.triangles()[triangle as usize].key == 0 {
+                let key = Largest.key(&growth.ground, growth.corners(triangle));
+                growth.mesh.set_key(triangle, key);
+                self.queue.push(&growth.mesh, triangle);
+            }
+        }
+    }
+}

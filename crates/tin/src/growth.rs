@@ -1,0 +1,135 @@
+//! Growing one post at a time: the top of the queue, again and again.
+
+use fearless_simd::Simd;
+use geometry::LocalPost;
+use mesh::Mesh;
+use terrain::{PostRect, StopReason};
+
+use crate::criterion::Criterion;
+use crate::gate::Gate;
+use crate::ground::Ground;
+use crate::queue::{Queue, Top};
+use crate::sequence::{Sequence, Witness};
+use crate::task::Stop;
+
+/// Everything a run changes.
+pub(crate) struct Growth<'a, S: Simd> {
+    pub tile: PostRect,
+    pub ground: Ground<'a, S>,
+    pub mesh: Mesh,
+    pub gate: Gate,
+    pub sequence: Sequence,
+}
+
+impl<S: Simd> Growth<'_, S> {
+    /// Inserts posts by `criterion` until `stop` or until nothing is left.
+    #[inline(always)]
+    pub fn run<C: Criterion>(&mut self, criterion: C, stop: &Stop, witness: &mut dyn Witness) -> StopReason {
+        let mut queue = Queue::new(criterion);
+        self.score_all(criterion);
+        let mut squares = stop.rms_quanta.map(|rms| RunningSquares::new(self, rms));
+        loop {
+            if self.sequence.is_full(stop.points) || self.gate.is_spent() {
+                return StopReason::BudgetSpent;
+            }
+            if squares.as_ref().is_some_and(RunningSquares::reached) {
+                return StopReason::RmsReached;
+            }
+            let Some(top) = queue.pop(&self.mesh) else { return StopReason::Exhausted };
+            if stop.value.is_some_and(|value| criterion.gain(top.key) <= value as f64) {
+                return StopReason::ResidualReached;
+            }
+            let Some(post) = self.located(criterion, &mut queue, top) else { continue };
+            self.select(post, top.triangle);
+            witness.selected(post, criterion.gain(top.key));
+            self.insert(criterion, &mut queue, post, top.triangle);
+            if let Some(squares) = &mut squares {
+                squares.update(&self.ground, &self.mesh);
+            }
+        }
+    }
+
+    /// Gives every triangle its key.
+    #[inline(always)]
+    pub fn score_all<C: Criterion>(&mut self, criterion: C) {
+        for triangle in 0..self.mesh.triangles().len() as u32 {
+            let corners = self.corners(triangle);
+            self.mesh.set_key(triangle, criterion.key(&self.ground, corners));
+        }
+    }
+
+    pub fn corners(&self, triangle: u32) -> [LocalPost; 3] {
+        self.mesh.triangles()[triangle as usize].corners
+    }
+
+    /// The post of the top triangle, once its turn has come among equal keys and no limit refuses it;
+    /// otherwise the triangle is entered again where it now belongs.
+    #[inline(always)]
+    fn located<C: Criterion>(&mut self, criterion: C, queue: &mut Queue<C>, top: Top) -> Option<LocalPost> {
+        let Some(post) = top.post else {
+            let post = criterion.post(&self.ground, self.corners(top.triangle), top.key);
+            queue.push_located(&self.mesh, top.triangle, post);
+            return None;
+        };
+        let Some(refused) = self.gate.refuses(post) else { return Some(post) };
+        let corners = self.corners(top.triangle);
+        self.sequence.refuse(self.tile, post, self.ground.residual_at(corners, post), refused);
+        // Counters only grow, so what is refused now stays refused and the triangle settles for less.
+        match self.ground.worst_where(corners, |post| self.gate.refuses(post).is_none()) {
+            Some((value, post)) => {
+                self.mesh.set_key(top.triangle, criterion.key_when_confined(top.key, value));
+                queue.push_located(&self.mesh, top.triangle, post);
+            }
+            None => self.mesh.set_key(top.triangle, 0),
+        }
+        None
+    }
+
+    /// Books a post: limits, residual, sequence.
+    pub fn select(&mut self, post: LocalPost, triangle: u32) {
+        self.gate.charge(post);
+        self.sequence.residuals.push(self.ground.residual_at(self.corners(triangle), post));
+        self.sequence.posts.push(post);
+    }
+
+    #[inline(always)]
+    fn insert<C: Criterion>(&mut self, criterion: C, queue: &mut Queue<C>, post: LocalPost, triangle: u32) {
+        let star = self.mesh.insert(post, triangle).len();
+        for index in 0..star {
+            let triangle = self.mesh.star()[index];
+            let key = criterion.key(&self.ground, self.corners(triangle));
+            self.mesh.set_key(triangle, key);
+            queue.push(&self.mesh, triangle);
+        }
+    }
+}
+
+/// The running sum of squared residuals over the whole tile; exact, since it sums whole numbers.
+pub(crate) struct RunningSquares {
+    of_triangle: Vec<f64>,
+    sum: f64,
+    goal: f64,
+}
+
+impl RunningSquares {
+    pub fn new<S: Simd>(growth: &Growth<S>, rms_quanta: f64) -> Self {
+        let squares = |record: &mesh::Triangle| growth.ground.plain_squares(record.corners);
+        let of_triangle: Vec<f64> = growth.mesh.triangles().iter().map(squares).collect();
+        let goal = rms_quanta * rms_quanta * growth.ground.post_count() as f64;
+        Self { sum: of_triangle.iter().sum(), of_triangle, goal }
+    }
+
+    pub fn reached(&self) -> bool {
+        self.sum <= self.goal
+    }
+
+    /// Accounts for the triangles the last insertion wrote.
+    pub fn update<S: Simd>(&mut self, ground: &Ground<S>, mesh: &Mesh) {
+        self.of_triangle.resize(mesh.triangles().len(), 0.0);
+        for &triangle in mesh.star() {
+            let squares = ground.plain_squares(mesh.triangles()[triangle as usize].corners);
+            let before = std::mem::replace(&mut self.of_triangle[triangle as usize], squares);
+            self.sum += squares - before;
+        }
+    }
+}

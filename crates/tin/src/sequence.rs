@@ -1,0 +1,37 @@
+//! What happened while a tile was refined: selected posts, refusals, and who wants to know.
+
+use geometry::LocalPost;
+use terrain::{ModuleId, PostRect, Refusal, RefusedBy};
+
+/// Told of every post as it is selected, with the gain that selected it.
+pub(crate) trait Witness {
+    fn selected(&mut self, post: LocalPost, gain: f64);
+}
+
+/// Nobody wants to know.
+pub(crate) struct Nobody;
+
+impl Witness for Nobody {
+    fn selected(&mut self, _post: LocalPost, _gain: f64) {}
+}
+
+/// The record of one run.
+#[derive(Default)]
+pub(crate) struct Sequence {
+    pub posts: Vec<LocalPost>,
+    /// Absolute residual (quanta) at which each post was selected.
+    pub residuals: Vec<u32>,
+    pub refused: Vec<Refusal>,
+}
+
+impl Sequence {
+    /// Whether as many points are in as may be.
+    pub fn is_full(&self, points: Option<usize>) -> bool {
+        points.is_some_and(|points| points <= self.posts.len())
+    }
+
+    /// Notes a refusal.
+    pub fn refuse(&mut self, tile: PostRect, post: LocalPost, residual: u32, (module, by): (ModuleId, RefusedBy)) {
+        self.refused.push(Refusal { post: post.post(tile), module, residual, by });
+    }
+}

@@ -1,0 +1,74 @@
+//! What a tile holds before the first post is selected.
+
+use geometry::{LocalPost, LocalRect};
+use limits::Allowance;
+use mesh::{Lines, Mesh};
+use terrain::{ModuleId, PostRect};
+
+use crate::gate::{Gate, ModuleLines};
+use crate::task::{Frame, SeamSides, TileTask};
+
+/// A mesh with its first vertices, in their order, and the gate to the next ones.
+pub(crate) struct Start {
+    pub mesh: Mesh,
+    pub vertices: Vec<LocalPost>,
+    pub gate: Gate,
+}
+
+impl Start {
+    /// The tile's corners, load-module corners, border points and inherited points.
+    pub fn new(task: &TileTask) -> Self {
+        let (mesh, mut gate) = match &task.frame {
+            Frame::Plain => (Mesh::new(task.rect, Lines::none()), Gate::Open),
+            Frame::Corners { side_cells } => (Mesh::with_corners_every(task.rect, *side_cells), Gate::Open),
+            Frame::Sides { side_cells, south_west, allowance } => (
+                Mesh::new(task.rect, Lines::every(*side_cells)),
+                gate_of(task.rect, *side_cells, *south_west, allowance),
+            ),
+        };
+        let inherited = task.inherited.iter().map(|&post| LocalPost::of(post, task.rect));
+        inherited.for_each(|post| gate.inherit(post));
+        let mut start = Self { vertices: first_corners(&mesh), mesh, gate };
+        start.insert_all(task);
+        start
+    }
+
+    fn insert_all(&mut self, task: &TileTask) {
+        let all = task.border.iter().chain(&task.inherited);
+        let mut posts: Vec<LocalPost> = all.map(|&post| LocalPost::of(post, task.rect)).collect();
+        posts.sort_unstable();
+        posts.dedup();
+        let mut hint = 0;
+        for post in posts {
+            let triangle = self.mesh.triangle_at(post, hint);
+            if !self.mesh.triangles()[triangle as usize].corners.contains(&post) {
+                hint = self.mesh.insert(post, triangle)[0];
+                self.vertices.push(post);
+            }
+        }
+    }
+}
+
+fn gate_of(rect: PostRect, side_cells: i32, south_west: ModuleId, allowance: &Allowance) -> Gate {
+    let along = |cells: usize| cells as u32 / side_cells as u32;
+    let lines = ModuleLines { side_cells, south_west, rows: along(rect.cells_high()), cols: along(rect.cells_wide()) };
+    Gate::limits(lines, allowance.clone())
+}
+
+fn first_corners(mesh: &Mesh) -> Vec<LocalPost> {
+    let mut corners: Vec<LocalPost> = mesh.triangles().iter().flat_map(|record| record.corners).collect();
+    corners.sort_unstable();
+    corners.dedup();
+    corners
+}
+
+/// Where candidates may lie: everywhere but on the sides that belong to somebody else.
+pub(crate) fn candidates(rect: PostRect, seams: SeamSides) -> LocalRect {
+    let shut = |open: bool| i32::from(!open);
+    LocalRect {
+        south: shut(seams.south),
+        west: shut(seams.west),
+        north: rect.cells_high() as i32 - shut(seams.north),
+        east: rect.cells_wide() as i32 - shut(seams.east),
+    }
+}

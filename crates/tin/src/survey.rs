@@ -1,0 +1,95 @@
+//! Running a tile ahead, alone, to learn what each triangle would gain.
+//!
+//! A global greedy run takes triangles in order of their keys; a tile's share of it is what the tile would
+//! have inserted before its own top key fell below the common threshold. So the gain of an insertion is
+//! the smallest key seen up to it.
+
+use fearless_simd::{Level, dispatch};
+use geometry::LocalPost;
+use terrain::{Dem, GainCurve, GainRun, Importance, PostRect};
+
+use crate::gate::{Charged, ModuleLines};
+use crate::ladder::ladder_bin;
+use crate::refine::grow;
+use crate::sequence::Witness;
+use crate::start::Start;
+use crate::task::{SeamSides, TileTask};
+
+/// A tile to survey.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SurveyTask {
+    /// The growth to run: every side shared with another tile open, nothing inherited.
+    pub growth: TileTask,
+    /// The sides this tile will own; what it selects on other open sides is its neighbours' to pay.
+    pub owned: SeamSides,
+    /// The area's load modules, to whose counts costs are booked.
+    pub grid: terrain::ModuleGrid,
+    /// What a run's cost counts.
+    pub cost: CostUnit,
+}
+
+/// What the cost of a run counts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CostUnit {
+    /// Triangles: two inside a load module, one on each side of a line.
+    Triangles,
+    /// Points.
+    Points,
+}
+
+/// The gains of one tile, in the order in which it would take them.
+pub fn survey(dem: &Dem, importance: &Importance, task: &SurveyTask, level: Level) -> GainCurve {
+    let mut recorder = Recorder::new(task);
+    let start = Start::new(&task.growth);
+    let _ = dispatch!(level, simd => grow(simd, dem, importance, &task.growth, start, &mut recorder));
+    GainCurve { tile: task.growth.tile, runs: recorder.runs }
+}
+
+struct Recorder {
+    rect: PostRect,
+    lines: ModuleLines,
+    owned: SeamSides,
+    cost: CostUnit,
+    bin: i32,
+    runs: Vec<GainRun>,
+}
+
+impl Recorder {
+    fn new(task: &SurveyTask) -> Self {
+        let (rect, side_cells) = (task.growth.rect, task.grid.side_cells);
+        let module = |at: i32| (at / side_cells) as u32;
+        let south_west = terrain::ModuleId { row: module(rect.south), col: module(rect.west) };
+        let (rows, cols) = (module(rect.cells_high() as i32), module(rect.cells_wide() as i32));
+        let lines = ModuleLines { side_cells, south_west, rows, cols };
+        Self { rect, lines, owned: task.owned, cost: task.cost, bin: i32::MAX, runs: Vec::new() }
+    }
+
+    fn is_ours(&self, post: LocalPost) -> bool {
+        let foreign = |on_side: bool, owned: bool| on_side && !owned;
+        !(foreign(post.row() == 0, self.owned.south)
+            || foreign(post.col() == 0, self.owned.west)
+            || foreign(post.row() == self.rect.cells_high() as i32, self.owned.north)
+            || foreign(post.col() == self.rect.cells_wide() as i32, self.owned.east))
+    }
+}
+
+impl Witness for Recorder {
+    fn selected(&mut self, post: LocalPost, gain: f64) {
+        self.bin = self.bin.min(ladder_bin(gain));
+        if !self.is_ours(post) {
+            return;
+        }
+        let bin = self.bin;
+        match (self.lines.charged(post), self.cost) {
+            (Some(Charged::Inside(module)), CostUnit::Triangles) => self.runs.push(GainRun { module, bin, cost: 2 }),
+            (Some(Charged::Between(first, second)), CostUnit::Triangles) => {
+                self.runs.push(GainRun { module: first, bin, cost: 1 });
+                self.runs.push(GainRun { module: second, bin, cost: 1 });
+            }
+            (Some(Charged::Inside(module) | Charged::Between(_, module)), CostUnit::Points) => {
+                self.runs.push(GainRun { module, bin, cost: 1 });
+            }
+            (None, _) => {}
+        }
+    }
+}

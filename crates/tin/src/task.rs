@@ -1,0 +1,119 @@
+//! What `refine` is asked to do for one tile.
+
+use limits::Allowance;
+use terrain::{ModuleId, Post, PostRect, TileId};
+
+/// Everything about one tile's refinement but the ground itself.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TileTask {
+    /// Which tile.
+    pub tile: TileId,
+    /// Its posts, seams included.
+    pub rect: PostRect,
+    /// What the tile starts from and what its edges must respect.
+    pub frame: Frame,
+    /// Border points on the area's outer border; part of every start.
+    pub border: Vec<Post>,
+    /// Border points that lower-ranked neighbours have chosen on the sides shared with them.
+    pub inherited: Vec<Post>,
+    /// The sides on which this tile may choose posts.
+    pub seams: SeamSides,
+    /// Which post comes next.
+    pub rule: Rule,
+    /// When to stop.
+    pub stop: Stop,
+}
+
+/// The sides of a tile whose posts it may select; the others are masked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SeamSides {
+    /// Row of the southern side.
+    pub south: bool,
+    /// Column of the eastern side.
+    pub east: bool,
+    /// Row of the northern side.
+    pub north: bool,
+    /// Column of the western side.
+    pub west: bool,
+}
+
+impl SeamSides {
+    /// All four sides are this tile's own.
+    pub const OPEN: Self = Self { south: true, east: true, north: true, west: true };
+    /// No side is.
+    pub const CLOSED: Self = Self { south: false, east: false, north: false, west: false };
+}
+
+/// What a tile starts from.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Frame {
+    /// The tile's four corners; there are no load modules.
+    Plain,
+    /// Every load-module corner is a vertex; edges are free to cross sides and are clipped later.
+    Corners {
+        /// Cells along a side of a load module.
+        side_cells: i32,
+    },
+    /// Load-module sides are edges from the start, and no limit is ever exceeded.
+    Sides {
+        /// Cells along a side of a load module.
+        side_cells: i32,
+        /// The tile's south-west load module.
+        south_west: ModuleId,
+        /// What the tile may spend.
+        allowance: Allowance,
+    },
+}
+
+/// Which post comes next.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Rule {
+    /// The one post of largest weighted residual (ties: first by row, then column).
+    WorstFirst,
+    /// The worst post of the triangle with the largest sum of squared weighted residuals; first of all
+    /// every post whose weighted residual exceeds `guard` (see [`Stop::value`] for its unit).
+    LargestSquares {
+        /// Weighted residual above which a post goes before all sums; `None` to go by sums only.
+        guard: Option<u64>,
+    },
+    /// The paper's passes: all posts of exactly the largest weighted residual, thinned by proximity.
+    Batches {
+        /// Residuals are rounded to this many quanta before they are compared (128 is 1 m).
+        residual_quantum: u32,
+        /// Candidates near a vertex wait; `None` to take every candidate.
+        proximity: Option<Proximity>,
+        /// What happens when a pass has more candidates than points are left.
+        last_batch: LastBatch,
+    },
+}
+
+/// A cylinder around each vertex in which no candidate is taken; both bounds are inside it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Proximity {
+    /// Horizontal radius in posts.
+    pub posts: f64,
+    /// Vertical reach in quanta.
+    pub quanta: u32,
+}
+
+/// What the paper's last pass does with more candidates than points left.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LastBatch {
+    /// Takes the first in row order: exactly as many points as asked for.
+    Truncate,
+    /// Takes all of them.
+    Finish,
+}
+
+/// When a tile stops selecting, whichever comes first; it also stops when its allowance is spent or
+/// nothing is left to select.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct Stop {
+    /// Selected points; initial ones do not count.
+    pub points: Option<usize>,
+    /// Largest weighted residual: weight in thousandths times the residual in units of the rule's
+    /// residual quantum (1/128 m unless the rule says otherwise).
+    pub value: Option<u64>,
+    /// RMS residual over all posts of the tile, in quanta.
+    pub rms_quanta: Option<f64>,
+}
