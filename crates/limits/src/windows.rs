@@ -16,7 +16,12 @@ pub struct Windows {
 impl Windows {
     /// The windows of `side` x `side` load modules in `grid`, cut to a smaller area.
     pub fn new(grid: ModuleGrid, side: u32) -> Self {
-        let (rows, cols) = (side.min(grid.rows), side.min(grid.cols));
+        Self::of_size(grid, side, side)
+    }
+
+    /// The windows of `rows` x `cols` load modules in `grid`, cut to a smaller area.
+    pub fn of_size(grid: ModuleGrid, rows: u32, cols: u32) -> Self {
+        let (rows, cols) = (rows.min(grid.rows), cols.min(grid.cols));
         let origins = ModuleRect { south: 0, west: 0, north: grid.rows - rows + 1, east: grid.cols - cols + 1 };
         Self { rows, cols, origins }
     }

@@ -60,6 +60,24 @@ impl Dem {
         dem
     }
 
+    /// A window without voids, each of whose rows is written by `write_row(row, heights)`, south to north.
+    ///
+    /// Heights are measured while they are in the cache, so this is the fast way to make a window.
+    pub fn from_row_fn(rect: PostRect, mut write_row: impl FnMut(i32, &mut [i32])) -> Self {
+        let mut dem = Self::empty(rect);
+        let (stride, wide) = (dem.stride, rect.posts_wide());
+        (dem.lowest, dem.highest) = (i32::MAX, i32::MIN);
+        for (padded, row) in dem.heights.chunks_mut(stride).zip(rect.south..=rect.north) {
+            let heights = &mut padded[..wide];
+            write_row(row, heights);
+            for &height in &*heights {
+                dem.lowest = dem.lowest.min(height);
+                dem.highest = dem.highest.max(height);
+            }
+        }
+        dem
+    }
+
     fn empty(rect: PostRect) -> Self {
         let padded = rect.posts_wide().next_multiple_of(LANES) + LANES;
         let stride = if padded.is_power_of_two() { padded + LANES } else { padded };
@@ -198,6 +216,17 @@ mod tests {
             assert_eq!(part.row(row), &dem.row(row)[5..=30]);
         }
         assert_eq!(part.range(), (305, 930));
+    }
+
+    #[test]
+    fn a_window_written_row_by_row_equals_one_written_post_by_post() {
+        let rect = PostRect::new(Post::new(-3, 5), Post::new(9, 30));
+        let by_row = Dem::from_row_fn(rect, |row, heights| {
+            for (height, col) in heights.iter_mut().zip(rect.west..) {
+                *height = row * 100 + col;
+            }
+        });
+        assert_eq!(by_row, sloping(rect));
     }
 
     #[test]

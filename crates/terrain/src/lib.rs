@@ -19,7 +19,7 @@ pub use importance::{Importance, THOUSANDTHS};
 mod tin;
 pub use tin::{Tin, TinFault, Vertex};
 mod tile;
-pub use tile::{ModuleGrid, ModuleId, ModuleRect, Side, TileId};
+pub use tile::{ModuleGrid, ModuleId, ModuleRect, SeamSides, Side, TileId};
 mod curve;
 pub use curve::{GainCurve, GainRun};
 mod refined;

@@ -61,6 +61,41 @@ impl Side {
     }
 }
 
+/// The sides of a tile that are its own: it may select posts there; the others are masked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct SeamSides {
+    /// The southern side.
+    pub south: bool,
+    /// The eastern side.
+    pub east: bool,
+    /// The northern side.
+    pub north: bool,
+    /// The western side.
+    pub west: bool,
+}
+
+impl SeamSides {
+    /// All four sides are this tile's own.
+    pub const OPEN: Self = Self { south: true, east: true, north: true, west: true };
+    /// No side is.
+    pub const CLOSED: Self = Self { south: false, east: false, north: false, west: false };
+
+    /// Whether `side` is open.
+    pub fn is_open(&self, side: Side) -> bool {
+        match side {
+            Side::South => self.south,
+            Side::East => self.east,
+            Side::North => self.north,
+            Side::West => self.west,
+        }
+    }
+
+    /// The sides for which `open` says so.
+    pub fn from_fn(open: impl Fn(Side) -> bool) -> Self {
+        Self { south: open(Side::South), east: open(Side::East), north: open(Side::North), west: open(Side::West) }
+    }
+}
+
 /// A half-open rectangle of load modules: rows `south..north`, columns `west..east`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct ModuleRect {

@@ -1,1 +1,15 @@
-//! (to be written)
+//! Where tiles meet, in which order they are refined, and what each may spend.
+//!
+//! Rank order, not timing, defines the result: a tile is seeded by exactly its lower-ranked neighbours.
+//! Limits are shared out before any tile is refined, so no tile needs to know what another spends.
+
+mod tiling;
+pub use tiling::{Order, Tiling};
+mod border;
+pub use border::{outer_border_posts, outer_sides};
+mod budget;
+pub use budget::{Budget, BudgetFault};
+mod allocate;
+pub use allocate::{Allocation, Gains, Share, allocate_equally, allocate_globally};
+mod points;
+pub use points::{points_equally, points_globally};

@@ -10,7 +10,7 @@ use terrain::StopReason;
 
 use crate::criterion::{Criterion, Largest};
 use crate::growth::{Growth, RunningSquares};
-use crate::proximity::{NearVertices, is_near};
+use crate::proximity::NearVertices;
 use crate::queue::Queue;
 use crate::task::{LastBatch, Proximity, Stop};
 
@@ -30,10 +30,17 @@ struct Candidate {
     crowded: bool,
 }
 
+/// Who is near whom, when the job asks.
+struct Crowding {
+    vertices: NearVertices,
+    /// Only what this pass has accepted: the second test, when all candidates were too near a vertex.
+    pass: NearVertices,
+}
+
 /// State of the passes beside the growth itself.
 struct Batch {
     queue: Queue<Largest>,
-    near: Option<NearVertices>,
+    near: Option<Crowding>,
     /// Candidates of value `level`, sorted by post.
     waiting: Vec<Candidate>,
     level: u64,
@@ -46,8 +53,9 @@ impl Passes {
     pub fn run<S: Simd>(&self, growth: &mut Growth<S>, vertices: &[LocalPost], stop: &Stop) -> StopReason {
         growth.score_all(Largest);
         let near = self.proximity.map(|proximity| {
-            let mut near = NearVertices::new(proximity, growth.ground.extent());
-            vertices.iter().for_each(|&post| near.add(post, growth.ground.height(post)));
+            let empty = || NearVertices::new(proximity, growth.ground.extent());
+            let mut near = Crowding { vertices: empty(), pass: empty() };
+            vertices.iter().for_each(|&post| near.vertices.add(post, growth.ground.height(post)));
             near
         });
         let mut batch = Batch { queue: Queue::new(Largest), near, waiting: Vec::new(), level: 0, dirty: Vec::new() };
@@ -88,21 +96,22 @@ impl Passes {
             if candidate.crowded || accepted.last().is_some_and(|last| last.post == candidate.post) {
                 continue;
             }
-            if near.crowd(candidate.post, height) {
+            if near.vertices.crowd(candidate.post, height) {
                 candidate.crowded = true;
             } else {
-                near.add(candidate.post, height);
+                near.vertices.add(candidate.post, height);
                 accepted.push(*candidate);
             }
         }
         if !accepted.is_empty() {
             return accepted;
         }
-        let proximity = self.proximity.expect("a test of proximity has its bounds");
-        let placed = |candidate: &Candidate| (candidate.post, growth.ground.height(candidate.post));
+        near.pass.clear();
         for candidate in &batch.waiting {
-            if !accepted.iter().any(|other| is_near(proximity, placed(candidate), placed(other))) {
-                near.add(candidate.post, growth.ground.height(candidate.post));
+            let height = growth.ground.height(candidate.post);
+            if !near.pass.crowd(candidate.post, height) {
+                near.pass.add(candidate.post, height);
+                near.vertices.add(candidate.post, height);
                 accepted.push(*candidate);
             }
         }
@@ -139,6 +148,7 @@ impl Batch {
     }
 
     /// Parks a triangle and lists its permitted candidates; one without any settles for less.
+    #[inline(always)]
     fn gather_from<S: Simd>(&mut self, growth: &mut Growth<S>, triangle: u32) {
         let corners = growth.corners(triangle);
         let before = self.waiting.len();

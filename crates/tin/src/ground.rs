@@ -57,6 +57,7 @@ impl<'a, S: Simd> Ground<'a, S> {
         }
     }
 
+    #[inline(always)]
     fn weight_at(&self, post: LocalPost) -> u64 {
         match &self.weights {
             Weights::Uniform(weight) => *weight,
@@ -65,11 +66,13 @@ impl<'a, S: Simd> Ground<'a, S> {
     }
 
     /// Residual at a post of a triangle in units, given the scan's numerator.
+    #[inline(always)]
     fn units(&self, facet: &Facet, numerator: u64) -> u64 {
         rounded(numerator, facet.den as u64 * self.unit)
     }
 
     /// Smallest numerator that rounds to `value` under weight `weight`.
+    #[inline(always)]
     fn threshold(&self, facet: &Facet, value: u64, weight: u64) -> u64 {
         ((2 * (value / weight) - 1) * facet.den as u64 * self.unit).div_ceil(2)
     }
@@ -86,6 +89,7 @@ impl<'a, S: Simd> Ground<'a, S> {
     }
 
     /// The first candidate, row by row, whose value is `value`, the largest of the triangle and positive.
+    #[inline(always)]
     pub fn first_of_value(&self, corners: [LocalPost; 3], value: u64) -> LocalPost {
         let facet = self.surface.facet(corners);
         let found = match self.weight_under(&facet) {
@@ -96,6 +100,7 @@ impl<'a, S: Simd> Ground<'a, S> {
     }
 
     /// Every candidate whose value is `value`, the largest of the triangle and positive, row by row.
+    #[inline(always)]
     pub fn all_of_value(&self, corners: [LocalPost; 3], value: u64, mut visit: impl FnMut(LocalPost)) {
         let facet = self.surface.facet(corners);
         match self.weight_under(&facet) {
@@ -152,11 +157,13 @@ impl<'a, S: Simd> Ground<'a, S> {
     }
 
     /// Sum of squared residuals over all posts the triangle owns, masked ones included, in quanta squared.
+    #[inline(always)]
     pub fn plain_squares(&self, corners: [LocalPost; 3]) -> f64 {
         squares_sum(self.simd, &self.everywhere, &self.everywhere.facet(corners))
     }
 
     /// Absolute residual at `post` under a triangle, in quanta.
+    #[inline(always)]
     pub fn residual_at(&self, corners: [LocalPost; 3], post: LocalPost) -> u32 {
         let facet = self.surface.facet(corners);
         let plane = facet.origin() + facet.px * i64::from(post.col()) + facet.py * i64::from(post.row());
@@ -165,11 +172,13 @@ impl<'a, S: Simd> Ground<'a, S> {
     }
 
     /// Height at `post`, in quanta.
+    #[inline(always)]
     pub fn height(&self, post: LocalPost) -> i32 {
         self.surface.height(post)
     }
 
     /// All posts of the window.
+    #[inline(always)]
     pub fn extent(&self) -> LocalRect {
         self.surface.extent()
     }

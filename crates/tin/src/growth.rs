@@ -58,6 +58,7 @@ impl<S: Simd> Growth<'_, S> {
         }
     }
 
+    #[inline(always)]
     pub fn corners(&self, triangle: u32) -> [LocalPost; 3] {
         self.mesh.triangles()[triangle as usize].corners
     }
@@ -86,6 +87,7 @@ impl<S: Simd> Growth<'_, S> {
     }
 
     /// Books a post: limits, residual, sequence.
+    #[inline(always)]
     pub fn select(&mut self, post: LocalPost, triangle: u32) {
         self.gate.charge(post);
         self.sequence.residuals.push(self.ground.residual_at(self.corners(triangle), post));
@@ -112,6 +114,7 @@ pub(crate) struct RunningSquares {
 }
 
 impl RunningSquares {
+    #[inline(always)]
     pub fn new<S: Simd>(growth: &Growth<S>, rms_quanta: f64) -> Self {
         let squares = |record: &mesh::Triangle| growth.ground.plain_squares(record.corners);
         let of_triangle: Vec<f64> = growth.mesh.triangles().iter().map(squares).collect();
@@ -124,6 +127,7 @@ impl RunningSquares {
     }
 
     /// Accounts for the triangles the last insertion wrote.
+    #[inline(always)]
     pub fn update<S: Simd>(&mut self, ground: &Ground<S>, mesh: &Mesh) {
         self.of_triangle.resize(mesh.triangles().len(), 0.0);
         for &triangle in mesh.star() {

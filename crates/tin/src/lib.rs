@@ -6,7 +6,7 @@
 //! learn what each triangle would gain.
 
 mod task;
-pub use task::{Frame, LastBatch, Proximity, Rule, SeamSides, Stop, TileTask};
+pub use task::{Frame, LastBatch, Proximity, Rule, Stop, TileTask};
 mod refine;
 pub use refine::refine;
 mod survey;
@@ -22,4 +22,6 @@ mod growth;
 mod proximity;
 mod queue;
 mod sequence;
+// Everything that is generic over the lanes is inlined into the one dispatch around a tile's refinement:
+// a function left on its own would be compiled for the oldest processor and call each lane operation.
 mod start;

@@ -10,6 +10,8 @@ pub(crate) struct NearVertices {
     cell_posts: i32,
     cells_wide: usize,
     cells: Vec<Vec<(LocalPost, i32)>>,
+    /// Cells that hold something, in the order in which they were first filled.
+    filled: Vec<usize>,
 }
 
 impl NearVertices {
@@ -18,7 +20,7 @@ impl NearVertices {
         let cell_posts = (proximity.posts.ceil() as i32).max(1);
         let cells_wide = (extent.east / cell_posts) as usize + 1;
         let cells_high = (extent.north / cell_posts) as usize + 1;
-        Self { proximity, cell_posts, cells_wide, cells: vec![Vec::new(); cells_wide * cells_high] }
+        Self { proximity, cell_posts, cells_wide, cells: vec![Vec::new(); cells_wide * cells_high], filled: Vec::new() }
     }
 
     fn cell(&self, post: LocalPost) -> (usize, usize) {
@@ -28,7 +30,18 @@ impl NearVertices {
     /// Adds a vertex.
     pub fn add(&mut self, post: LocalPost, height: i32) {
         let (row, col) = self.cell(post);
-        self.cells[row * self.cells_wide + col].push((post, height));
+        let index = row * self.cells_wide + col;
+        if self.cells[index].is_empty() {
+            self.filled.push(index);
+        }
+        self.cells[index].push((post, height));
+    }
+
+    /// Forgets all vertices.
+    pub fn clear(&mut self) {
+        for index in self.filled.drain(..) {
+            self.cells[index].clear();
+        }
     }
 
     /// Whether some vertex is near: within the radius and within the vertical reach, both inclusive.

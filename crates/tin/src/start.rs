@@ -3,10 +3,10 @@
 use geometry::{LocalPost, LocalRect};
 use limits::Allowance;
 use mesh::{Lines, Mesh};
-use terrain::{ModuleId, PostRect};
+use terrain::{ModuleId, PostRect, SeamSides};
 
 use crate::gate::{Gate, ModuleLines};
-use crate::task::{Frame, SeamSides, TileTask};
+use crate::task::{Frame, TileTask};
 
 /// A mesh with its first vertices, in their order, and the gate to the next ones.
 pub(crate) struct Start {

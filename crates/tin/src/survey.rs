@@ -6,14 +6,14 @@
 
 use fearless_simd::{Level, dispatch};
 use geometry::LocalPost;
-use terrain::{Dem, GainCurve, GainRun, Importance, PostRect};
+use terrain::{Dem, GainCurve, GainRun, Importance, PostRect, SeamSides};
 
 use crate::gate::{Charged, ModuleLines};
 use crate::ladder::ladder_bin;
 use crate::refine::grow;
 use crate::sequence::Witness;
 use crate::start::Start;
-use crate::task::{SeamSides, TileTask};
+use crate::task::TileTask;
 
 /// A tile to survey.
 #[derive(Clone, Debug, PartialEq)]

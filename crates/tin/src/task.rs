@@ -1,7 +1,7 @@
 //! What `refine` is asked to do for one tile.
 
 use limits::Allowance;
-use terrain::{ModuleId, Post, PostRect, TileId};
+use terrain::{ModuleId, Post, PostRect, SeamSides, TileId};
 
 /// Everything about one tile's refinement but the ground itself.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,26 +22,6 @@ pub struct TileTask {
     pub rule: Rule,
     /// When to stop.
     pub stop: Stop,
-}
-
-/// The sides of a tile whose posts it may select; the others are masked.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct SeamSides {
-    /// Row of the southern side.
-    pub south: bool,
-    /// Column of the eastern side.
-    pub east: bool,
-    /// Row of the northern side.
-    pub north: bool,
-    /// Column of the western side.
-    pub west: bool,
-}
-
-impl SeamSides {
-    /// All four sides are this tile's own.
-    pub const OPEN: Self = Self { south: true, east: true, north: true, west: true };
-    /// No side is.
-    pub const CLOSED: Self = Self { south: false, east: false, north: false, west: false };
 }
 
 /// What a tile starts from.
