@@ -1,0 +1,136 @@
+//! Puts one block of ground together: lie of the land, drainage, alluvium, playas.
+
+use crate::drainage::{Blend, Crest, FLANKS, OCTAVES, Octave, Posts, WAVELENGTHS_M, octaves};
+use crate::playa::Playa;
+use crate::region::{Lie, Region};
+
+/// Side of a block of ground in metres. Every place belongs to one block, whatever window asks for it, so numbers
+/// may be kept local to a block and single precision is enough.
+pub(crate) const BLOCK_M: f64 = 3_200.0;
+/// Metres between nodes of the lattice on which the region is evaluated.
+const NODE_M: f64 = 400.0;
+/// Nodes a side: those of the block, one before and one after for the cubic spline, one for its far border.
+const NODES: usize = 11;
+/// Depth in metres of the washes that each octave cuts into fans where incision is full.
+const WASHES_M: [f32; OCTAVES] = [0.0, 4.5, 3.5, 1.2];
+/// Height in metres of fan lobes at canyon mouths.
+const LOBE_M: f32 = 14.0;
+
+/// No ground is lower than this, in metres.
+pub(crate) const LOWEST_M: f32 = 300.0;
+/// No ground is higher than this, in metres.
+pub(crate) const HIGHEST_M: f32 = 2_500.0;
+
+/// One block of ground, ready to be sampled.
+#[derive(Debug)]
+pub(crate) struct Block {
+    corner_m: (f64, f64),
+    nodes: Vec<Lie>,
+    octaves: Vec<Octave>,
+    playas: Vec<Playa>,
+}
+
+impl Block {
+    /// The block whose south-west corner is given in metres; `playas` are those that touch it.
+    pub(crate) fn new(seed: u64, region: &Region, corner_m: (f64, f64), playas: Vec<Playa>) -> Self {
+        let octaves = octaves(seed, region, corner_m, BLOCK_M);
+        Self { corner_m, nodes: nodes(region, corner_m), octaves, playas }
+    }
+
+    /// Heights in metres at the posts of a patch, row-major.
+    pub(crate) fn heights_m(&self, posts: Posts<'_>) -> Vec<f32> {
+        let mut ground: Vec<Ground> = lie(&self.nodes, posts).iter().map(Ground::new).collect();
+        let mut blend = Blend::of_size(posts.count());
+        for (number, octave) in self.octaves.iter().enumerate() {
+            octave.blend(posts, &mut blend);
+            for (place, crest) in ground.iter_mut().zip(blend.crests()) {
+                place.cut(number, crest);
+            }
+        }
+        let mut heights_m: Vec<f32> = ground.iter().map(Ground::height_m).collect();
+        for playa in &self.playas {
+            playa.fill(self.corner_m, posts, &mut heights_m);
+        }
+        heights_m
+    }
+}
+
+/// The lie of the land at the nodes of a block's lattice.
+pub(crate) fn nodes(region: &Region, corner_m: (f64, f64)) -> Vec<Lie> {
+    let place_m = |corner_m: f64, node: usize| corner_m + (node as f64 - 1.0) * NODE_M;
+    let places = (0..NODES).flat_map(|row| (0..NODES).map(move |col| (row, col)));
+    places.map(|(row, col)| region.lie(place_m(corner_m.0, col), place_m(corner_m.1, row))).collect()
+}
+
+/// The lie of the land at the posts of a patch, row-major: a cubic spline through the block's nodes.
+pub(crate) fn lie(nodes: &[Lie], posts: Posts<'_>) -> Vec<Lie> {
+    let mut lies = Vec::with_capacity(posts.count());
+    let cols: Vec<(usize, [f32; 4])> = posts.east_m.iter().map(|&east_m| spline(east_m)).collect();
+    for &north_m in posts.north_m {
+        let (row, up) = spline(north_m);
+        let column = |col: usize| [0, 1, 2, 3].map(|up| &nodes[(row + up) * NODES + col]);
+        let line: [Lie; NODES] = std::array::from_fn(|col| Lie::weighed(column(col), up));
+        for &(col, right) in &cols {
+            lies.push(Lie::weighed([0, 1, 2, 3].map(|east| &line[col + east]), right));
+        }
+    }
+    lies
+}
+
+/// First node and weights of the cubic B-spline at a place in the block.
+fn spline(place_m: f32) -> (usize, [f32; 4]) {
+    let node = place_m / NODE_M as f32;
+    let first = (node as usize).min(NODES - 4);
+    let t = node - first as f32;
+    let r = 1.0 - t;
+    let weights = [
+        r * r * r / 6.0,
+        (t * t * (3.0 * t - 6.0) + 4.0) / 6.0,
+        (r * r * (3.0 * r - 6.0) + 4.0) / 6.0,
+        t * t * t / 6.0,
+    ];
+    (first, weights)
+}
+
+/// The ground at one post while drainage is being cut into it.
+#[derive(Clone, Copy, Debug)]
+struct Ground {
+    /// Alluvial surface, in metres.
+    alluvium_m: f32,
+    /// Bedrock above the alluvial surface, in metres; below 0 on fans and in basins.
+    bedrock_m: f32,
+    /// 1 in the mountains, 0 on fans.
+    mountain: f32,
+    /// How much of a wash this place may have, 0..1.
+    wash: f32,
+    /// How much room the next octave has: little on crests and in valley lines of the ones before.
+    room: f32,
+}
+
+impl Ground {
+    fn new(lie: &Lie) -> Self {
+        Self {
+            alluvium_m: lie.alluvium_m(),
+            bedrock_m: lie.bedrock_m(),
+            mountain: lie.mountain(),
+            wash: lie.wash(),
+            room: 1.0,
+        }
+    }
+
+    /// Cuts one octave's wave into bedrock and alluvium.
+    fn cut(&mut self, number: usize, crest: Crest) {
+        self.bedrock_m += 0.25 * WAVELENGTHS_M[number] * FLANKS[number] * self.room * self.mountain * crest.relief;
+        self.room *= 1.0 - 0.6 * crest.relief * crest.relief;
+        let channel = ((-crest.line - 0.62) * 4.0).clamp(0.0, 1.0);
+        self.alluvium_m -= WASHES_M[number] * self.wash * channel;
+        if number == 0 {
+            // A valley's mouth is the apex of a fan.
+            self.alluvium_m -= LOBE_M * self.wash * crest.relief;
+        }
+    }
+
+    fn height_m(&self) -> f32 {
+        (self.alluvium_m + self.bedrock_m.max(0.0)).clamp(LOWEST_M, HIGHEST_M)
+    }
+}
