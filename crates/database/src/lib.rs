@@ -1,1 +1,55 @@
-//! (to be written)
+//! Our files: one directory per gaming area, in which nothing is ever half-written.
+//!
+//! ```text
+//! ntc.tdb/
+//!   lock                 held while a build runs; stays when none does
+//!   database.json        what was asked for, what is there: written last
+//!   survey/r02c03.curve  gain curves; allocation.json
+//!   tiles/r02c03.tin     one tile's TIN
+//!   modules/r02c03.slm   one tile's load modules (FORMAT.md)
+//!   report.json …        what a run found; the only files that know times
+//! ```
+//!
+//! Every file is written under a temporary name and renamed into place; every file carries a checksum, so damage
+//! is found on reading and named by file and section. `terrain`'s values are mirrored here by private types.
+
+// A test that unwraps says by its line what failed.
+#![cfg_attr(test, allow(clippy::unwrap_used))]
+
+mod error;
+pub use error::DatabaseError;
+mod fingerprint;
+pub use fingerprint::{Fingerprint, FingerprintBuilder};
+mod codec;
+mod frame;
+pub use frame::Stamp;
+mod tile_file;
+pub use tile_file::{decode_tile, encode_tile};
+mod curve_file;
+pub use curve_file::{decode_curve, encode_curve};
+mod removals_file;
+pub use removals_file::{Removals, decode_removals, encode_removals};
+mod slm;
+pub use slm::{TileModules, decode_modules, encode_modules};
+mod json;
+mod manifest;
+pub use manifest::{
+    Area, FORMAT_VERSION, FileStamp, Manifest, ManifestState, SourceRecord, TileRecord, TileState, Totals,
+};
+mod report;
+pub use report::{
+    Report, ReportBreach, ReportClass, ReportPerModule, ReportPerWindow, ReportPlace, ReportPoints, ReportPool,
+    ReportRefusals, ReportResidual, ReportStage, ReportVoids,
+};
+mod lock;
+mod publish;
+pub use lock::Lock;
+mod folder;
+pub use folder::{Folder, files};
+mod database;
+pub use database::{Database, Previous};
+mod verify;
+pub use verify::Damage;
+
+#[cfg(test)]
+mod samples;

@@ -1,0 +1,57 @@
+//! The one door to `bincode`: fixed-width little-endian integers, a limit on size, no bytes left over.
+//!
+//! The crate is no longer maintained upstream, so nothing else names it; the layout is simple enough for any
+//! successor (a list is its length as `u64`, then its items; an option is a byte, then its value).
+
+use bincode::Options;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+/// Bytes of the longest payload: a tile of 4096 x 4096 posts, every post a vertex, takes 0.6 GiB.
+pub(crate) const PAYLOAD_BYTES_MAX: u64 = 1 << 30;
+
+fn options() -> impl Options {
+    bincode::DefaultOptions::new()
+        .with_little_endian()
+        .with_fixint_encoding()
+        .with_limit(PAYLOAD_BYTES_MAX)
+        .reject_trailing_bytes()
+}
+
+/// The bytes of `value`.
+///
+/// # Panics
+/// When they are more than [`PAYLOAD_BYTES_MAX`]: no plan lets a tile grow that large.
+pub(crate) fn encode(value: &impl Serialize) -> Vec<u8> {
+    options().serialize(value).expect("plain values of a bounded tile always encode")
+}
+
+/// The value whose bytes these are.
+///
+/// # Errors
+/// What is wrong with the bytes, in words.
+pub(crate) fn decode<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, String> {
+    options().deserialize(bytes).map_err(|error| error.to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_list_is_its_length_and_its_items() {
+        assert_eq!(encode(&vec![(1u16, -1i32)]), [1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 255, 255, 255, 255]);
+    }
+
+    #[test]
+    fn an_absurd_length_is_an_error_and_no_allocation() {
+        assert!(decode::<Vec<u64>>(&[255; 8]).is_err());
+        assert!(decode::<Vec<u64>>(&[255, 255, 255, 255, 255, 0, 0, 0, 1]).is_err());
+    }
+
+    #[test]
+    fn extra_bytes_are_an_error() {
+        assert_eq!(decode::<u16>(&[7, 0]), Ok(7));
+        assert!(decode::<u16>(&[7, 0, 0]).is_err());
+    }
+}

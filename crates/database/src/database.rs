@@ -1,0 +1,260 @@
+//! A database's directory, for writing: made or found, locked, and never half-written.
+
+use std::fs;
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+use terrain::{GainCurve, LoadModule, TileTin};
+
+use crate::folder::{MODULES, SURVEY, TILES, WORK, files};
+use crate::lock::LOCK_NAME;
+use crate::publish::{Durability, is_temporary, remove_left_over, sync, write_atomically};
+use crate::{
+    Area, DatabaseError, FileStamp, Folder, Lock, Manifest, ManifestState, Removals, Stamp, TileModules, encode_curve,
+    encode_modules, encode_removals, encode_tile, json,
+};
+
+/// The folders of a database that stay.
+const FOLDERS: [&str; 3] = [TILES, MODULES, SURVEY];
+/// What may lie in a database's directory and makes a directory without `database.json` ours.
+const OURS: [&str; 9] =
+    [LOCK_NAME, TILES, MODULES, SURVEY, WORK, files::DATABASE, files::REPORT, files::REPORT_HTML, files::BREACHES];
+
+/// A database that this process alone writes to.
+#[derive(Debug)]
+pub struct Database {
+    folder: Folder,
+    _lock: Lock,
+}
+
+/// What was in the directory before.
+#[derive(Debug)]
+pub enum Previous {
+    /// Nothing, or the beginnings of a build that was broken off before it wrote `database.json`.
+    Nothing,
+    /// A database of the same area.
+    Database(Box<Manifest>),
+    /// A database whose `database.json` is damaged. Its other files tell by themselves what they were made from.
+    Damaged(DatabaseError),
+}
+
+impl Database {
+    /// Makes the directory, or opens it to go on with the database of `area` in it. Locks it, makes the folders and
+    /// removes what a killed run left half-written.
+    ///
+    /// # Errors
+    /// When the directory holds anything that is not ours, a database of another format version or area, or a link in
+    /// place of a folder; when another build holds the lock; when it cannot be written to. Nothing is changed then.
+    pub fn create_or_open(dir: &Path, area: &Area) -> Result<(Self, Previous), DatabaseError> {
+        // Looked at before the lock is made, so that nothing is put into a directory that is not ours.
+        let folder = Folder::new(dir);
+        examine(&folder, area)?;
+        fs::create_dir_all(dir).map_err(|source| DatabaseError::from_io("create", dir, 0, source))?;
+        let lock = Lock::acquire(dir)?;
+        // Looked at again, now that nobody else can change it.
+        let previous = examine(&folder, area)?;
+        remove_left_over(dir)?;
+        for name in FOLDERS {
+            let path = folder.path(name);
+            make_folder(&path)?;
+            remove_left_over(&path)?;
+        }
+        Ok((Self { folder, _lock: lock }, previous))
+    }
+
+    /// The same directory, to read from.
+    pub fn folder(&self) -> &Folder {
+        &self.folder
+    }
+
+    /// Publishes a tile's TIN.
+    ///
+    /// # Errors
+    /// When the file cannot be written; the one before it is then still there.
+    pub fn write_tile(&self, stamp: &Stamp, tile: &TileTin) -> Result<FileStamp, DatabaseError> {
+        publish(&self.folder.tile_path(tile.tile), &encode_tile(stamp, tile))
+    }
+
+    /// Publishes the list of what was removed from a tile.
+    ///
+    /// # Errors
+    /// As [`Database::write_tile`].
+    pub fn write_removals(&self, stamp: &Stamp, removals: &Removals) -> Result<FileStamp, DatabaseError> {
+        publish(&self.folder.removals_path(removals.tile), &encode_removals(stamp, removals))
+    }
+
+    /// Publishes a tile's load modules.
+    ///
+    /// # Errors
+    /// As [`Database::write_tile`].
+    ///
+    /// # Panics
+    /// As [`encode_modules`].
+    pub fn write_modules(&self, tile: &TileModules, modules: &[LoadModule]) -> Result<FileStamp, DatabaseError> {
+        publish(&self.folder.modules_path(tile.tile), &encode_modules(tile, modules))
+    }
+
+    /// Publishes a tile's gain curve.
+    ///
+    /// # Errors
+    /// As [`Database::write_tile`].
+    pub fn write_curve(&self, stamp: &Stamp, curve: &GainCurve) -> Result<FileStamp, DatabaseError> {
+        publish(&self.folder.curve_path(curve.tile), &encode_curve(stamp, curve))
+    }
+
+    /// Publishes a value, which must be an object, as checksummed JSON under one of the names of [`files`].
+    ///
+    /// # Errors
+    /// As [`Database::write_tile`]; also when `value` is not an object.
+    pub fn write_json(&self, name: &str, value: &impl Serialize) -> Result<FileStamp, DatabaseError> {
+        let path = self.folder.path(name);
+        publish(&path, json::encode(&path, value)?.as_bytes())
+    }
+
+    /// Publishes bytes of another format under one of the names of [`files`].
+    ///
+    /// # Errors
+    /// As [`Database::write_tile`].
+    pub fn write_bytes(&self, name: &str, bytes: &[u8]) -> Result<FileStamp, DatabaseError> {
+        publish(&self.folder.path(name), bytes)
+    }
+
+    /// Removes a file by its name inside the directory, if it is there.
+    ///
+    /// # Errors
+    /// When it cannot be removed.
+    pub fn remove(&self, name: &str) -> Result<(), DatabaseError> {
+        remove_if_there(&self.folder.path(name))
+    }
+
+    /// Removes everything a build has made, for a fresh start. Whoever reads meanwhile finds no `database.json`.
+    ///
+    /// # Errors
+    /// When something cannot be removed.
+    pub fn clear(&self) -> Result<(), DatabaseError> {
+        for name in [files::DATABASE, files::REPORT, files::REPORT_HTML, files::BREACHES] {
+            self.remove(name)?;
+        }
+        for name in FOLDERS {
+            let folder = self.folder.path(name);
+            for path in list(&folder)? {
+                remove_if_there(&path)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Says, before a build changes its first file, that the files no longer belong together; on the disk when this
+    /// returns, if the disk said otherwise before.
+    ///
+    /// # Errors
+    /// When `database.json` cannot be written.
+    ///
+    /// # Panics
+    /// When `manifest` is not incomplete.
+    pub fn begin(&self, manifest: &Manifest) -> Result<(), DatabaseError> {
+        assert_eq!(manifest.state, ManifestState::Incomplete, "a build begins incomplete");
+        // Where there is no database yet, losing this file loses nothing, so it need not wait for the disk.
+        let first = !self.folder.path(files::DATABASE).exists();
+        self.write_manifest(manifest, if first { Durability::Later } else { Durability::Now })
+    }
+
+    /// Says that the build is complete, once every file it lists is on the disk.
+    ///
+    /// # Errors
+    /// When a listed file is missing or anything cannot be written.
+    ///
+    /// # Panics
+    /// When `manifest` is not complete.
+    pub fn finish(&self, manifest: &Manifest) -> Result<(), DatabaseError> {
+        assert_eq!(manifest.state, ManifestState::Complete, "a build ends complete");
+        let paths: Vec<PathBuf> = self.folder.listed_files(manifest).into_iter().map(|(path, _)| path).collect();
+        if let Some(path) = paths.iter().find(|path| !path.exists()) {
+            return Err(DatabaseError::Missing { path: path.clone() });
+        }
+        sync(self.folder.dir(), &paths, &FOLDERS.map(|name| self.folder.path(name)))?;
+        self.write_manifest(manifest, Durability::Now)
+    }
+
+    fn write_manifest(&self, manifest: &Manifest, durability: Durability) -> Result<(), DatabaseError> {
+        let path = self.folder.path(files::DATABASE);
+        write_atomically(&path, manifest.encode(&path)?.as_bytes(), durability)
+    }
+}
+
+fn publish(path: &Path, bytes: &[u8]) -> Result<FileStamp, DatabaseError> {
+    write_atomically(path, bytes, Durability::Later)?;
+    Ok(FileStamp::of(bytes))
+}
+
+fn remove_if_there(path: &Path) -> Result<(), DatabaseError> {
+    match fs::remove_file(path) {
+        Err(source) if source.kind() != ErrorKind::NotFound => Err(DatabaseError::from_io("remove", path, 0, source)),
+        _ => Ok(()),
+    }
+}
+
+/// Whether a database of `area` may be built in `folder`, and what is there. Changes nothing.
+fn examine(folder: &Folder, area: &Area) -> Result<Previous, DatabaseError> {
+    let dir = folder.dir();
+    match fs::metadata(dir) {
+        Ok(found) if found.is_dir() => {}
+        Ok(_) => return Err(DatabaseError::NotOurFolder { path: dir.to_path_buf(), found: "a file".into() }),
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Previous::Nothing),
+        Err(source) => return Err(DatabaseError::from_io("open", dir, 0, source)),
+    }
+    for name in FOLDERS {
+        check_folder(&folder.path(name))?;
+    }
+    let damage = match folder.manifest() {
+        Ok(manifest) => {
+            manifest.check_area(&folder.path(files::DATABASE), area)?;
+            return Ok(Previous::Database(Box::new(manifest)));
+        }
+        Err(DatabaseError::Missing { .. }) => None,
+        Err(error @ (DatabaseError::WrongChecksum { .. } | DatabaseError::Malformed { .. })) => Some(error),
+        Err(error) => return Err(error),
+    };
+    // Without a manifest to trust, nothing may lie there that a build does not make itself.
+    for path in list(dir)? {
+        let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+        if !OURS.contains(&name.as_str()) && !is_temporary(&name) {
+            return Err(DatabaseError::NotOurFolder { path: dir.to_path_buf(), found: name });
+        }
+    }
+    Ok(damage.map_or(Previous::Nothing, Previous::Damaged))
+}
+
+/// Makes a folder inside the database, unless it is there.
+fn make_folder(path: &Path) -> Result<(), DatabaseError> {
+    match fs::create_dir(path) {
+        Err(source) if source.kind() != ErrorKind::AlreadyExists => {
+            Err(DatabaseError::from_io("create", path, 0, source))
+        }
+        _ => check_folder(path),
+    }
+}
+
+/// A folder of ours is a real one: output never follows a link out of the directory.
+fn check_folder(path: &Path) -> Result<(), DatabaseError> {
+    match fs::symlink_metadata(path) {
+        Ok(found) if !found.is_dir() => Err(DatabaseError::NotAFolder { path: path.to_path_buf() }),
+        _ => Ok(()),
+    }
+}
+
+/// What lies in a folder, by name; nothing when there is no folder.
+pub(crate) fn list(folder: &Path) -> Result<Vec<PathBuf>, DatabaseError> {
+    let fault = |source| DatabaseError::from_io("list", folder, 0, source);
+    let entries = match fs::read_dir(folder) {
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Vec::new()),
+        entries => entries.map_err(fault)?,
+    };
+    let mut paths = entries.map(|entry| Ok(entry.map_err(fault)?.path())).collect::<Result<Vec<_>, _>>()?;
+    paths.sort();
+    Ok(paths)
+}
+
+#[cfg(test)]
+mod tests;

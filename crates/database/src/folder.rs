@@ -1,0 +1,215 @@
+//! A database's directory, for reading: names, and what the files say.
+
+use std::fs::File;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+use serde::de::DeserializeOwned;
+use terrain::{GainCurve, LoadModule, TileId, TileTin};
+
+use crate::frame::{FRAME_BYTES, Kind};
+use crate::{
+    DatabaseError, FileStamp, Manifest, Removals, Report, Stamp, TileModules, codec, curve_file, frame, json,
+    removals_file, slm, tile_file,
+};
+
+/// Names of files inside the directory.
+pub mod files {
+    /// What is there; written last.
+    pub const DATABASE: &str = "database.json";
+    /// What a run found.
+    pub const REPORT: &str = "report.json";
+    /// The same for a browser.
+    pub const REPORT_HTML: &str = "report.html";
+    /// Limits that could not be met, on a map.
+    pub const BREACHES: &str = "breaches.geojson";
+    /// What each tile may spend.
+    pub const ALLOCATION: &str = "survey/allocation.json";
+}
+
+/// Folder of the tiles' TINs.
+pub(crate) const TILES: &str = "tiles";
+/// Folder of the load modules.
+pub(crate) const MODULES: &str = "modules";
+/// Folder of the survey.
+pub(crate) const SURVEY: &str = "survey";
+/// Folder of checkpoints, gone at the end of a build.
+pub(crate) const WORK: &str = "work";
+
+/// Bytes of the longest file that is read: the longest payload and its frame.
+const FILE_BYTES_MAX: u64 = codec::PAYLOAD_BYTES_MAX + FRAME_BYTES as u64;
+
+/// The directory of a database, to read from. Holds no file open and no lock.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Folder {
+    dir: PathBuf,
+}
+
+impl Folder {
+    /// The database in `dir`, whether or not it is there yet.
+    pub fn new(dir: impl Into<PathBuf>) -> Self {
+        Self { dir: dir.into() }
+    }
+
+    /// The directory.
+    pub fn dir(&self) -> &Path {
+        &self.dir
+    }
+
+    /// Where a file lies, given its name inside the directory, such as one of [`files`].
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.dir.join(name)
+    }
+
+    /// Where the TIN of `tile` lies.
+    pub fn tile_path(&self, tile: TileId) -> PathBuf {
+        self.path(&format!("{TILES}/{tile}.tin"))
+    }
+
+    /// Where the list of removals of `tile` lies, in clip mode.
+    pub fn removals_path(&self, tile: TileId) -> PathBuf {
+        self.path(&format!("{TILES}/{tile}.removed"))
+    }
+
+    /// Where the load modules of `tile` lie.
+    pub fn modules_path(&self, tile: TileId) -> PathBuf {
+        self.path(&format!("{MODULES}/{tile}.slm"))
+    }
+
+    /// Where the gain curve of `tile` lies.
+    pub fn curve_path(&self, tile: TileId) -> PathBuf {
+        self.path(&format!("{SURVEY}/{tile}.curve"))
+    }
+
+    /// What `database.json` says.
+    ///
+    /// # Errors
+    /// When it is missing, damaged or of another format version.
+    pub fn manifest(&self) -> Result<Manifest, DatabaseError> {
+        let path = self.path(files::DATABASE);
+        Manifest::decode(&path, &read(&path)?)
+    }
+
+    /// What `report.json` says.
+    ///
+    /// # Errors
+    /// When it is missing or damaged.
+    pub fn report(&self) -> Result<Report, DatabaseError> {
+        self.read_json(files::REPORT)
+    }
+
+    /// The TIN of `tile`, and what it was made from.
+    ///
+    /// # Errors
+    /// When the file is missing, damaged or of another tile.
+    pub fn read_tile(&self, tile: TileId) -> Result<(Stamp, TileTin), DatabaseError> {
+        let path = self.tile_path(tile);
+        let (stamp, read) = tile_file::decode_tile(&path, &read(&path)?)?;
+        same_tile(path, read.tile, tile)?;
+        Ok((stamp, read))
+    }
+
+    /// What the TIN of `tile` was made from, by its header alone; `None` when there is none.
+    ///
+    /// # Errors
+    /// When the header cannot be read or is damaged.
+    pub fn tile_stamp(&self, tile: TileId) -> Result<Option<Stamp>, DatabaseError> {
+        self.stamp(Kind::Tile, &self.tile_path(tile))
+    }
+
+    /// What the gain curve of `tile` was made from, by its header alone; `None` when there is none.
+    ///
+    /// # Errors
+    /// When the header cannot be read or is damaged.
+    pub fn curve_stamp(&self, tile: TileId) -> Result<Option<Stamp>, DatabaseError> {
+        self.stamp(Kind::Curve, &self.curve_path(tile))
+    }
+
+    fn stamp(&self, kind: Kind, path: &Path) -> Result<Option<Stamp>, DatabaseError> {
+        let mut header = Vec::with_capacity(FRAME_BYTES);
+        let file = File::open(path).and_then(|file| file.take(FRAME_BYTES as u64).read_to_end(&mut header));
+        match file {
+            Ok(_) => frame::read_stamp(kind, path, &header).map(Some),
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),
+            Err(source) => Err(DatabaseError::from_io("read", path, 0, source)),
+        }
+    }
+
+    /// What was removed from `tile`, and what the list was made from.
+    ///
+    /// # Errors
+    /// When the file is missing, damaged or of another tile.
+    pub fn read_removals(&self, tile: TileId) -> Result<(Stamp, Removals), DatabaseError> {
+        let path = self.removals_path(tile);
+        let (stamp, read) = removals_file::decode_removals(&path, &read(&path)?)?;
+        same_tile(path, read.tile, tile)?;
+        Ok((stamp, read))
+    }
+
+    /// The load modules of `tile`, each sound, and what holds for all of them.
+    ///
+    /// # Errors
+    /// When the file is missing, damaged or of another tile, or a load module is unsound.
+    pub fn read_modules(&self, tile: TileId) -> Result<(TileModules, Vec<LoadModule>), DatabaseError> {
+        let path = self.modules_path(tile);
+        let (header, modules) = slm::decode_modules(&path, &read(&path)?)?;
+        same_tile(path, header.tile, tile)?;
+        Ok((header, modules))
+    }
+
+    /// The gain curve of `tile`, and what it was made from.
+    ///
+    /// # Errors
+    /// When the file is missing, damaged or of another tile.
+    pub fn read_curve(&self, tile: TileId) -> Result<(Stamp, GainCurve), DatabaseError> {
+        let path = self.curve_path(tile);
+        let (stamp, read) = curve_file::decode_curve(&path, &read(&path)?)?;
+        same_tile(path, read.tile, tile)?;
+        Ok((stamp, read))
+    }
+
+    /// A value that [`crate::Database::write_json`] wrote under this name.
+    ///
+    /// # Errors
+    /// When the file is missing or damaged, or holds something else.
+    pub fn read_json<T: DeserializeOwned>(&self, name: &str) -> Result<T, DatabaseError> {
+        let path = self.path(name);
+        json::decode(&path, &read(&path)?)
+    }
+
+    /// Whether the file of this name has the bytes that `stamp` promises.
+    ///
+    /// # Errors
+    /// When it is missing, or its length or content differs.
+    pub fn check_file(&self, path: &Path, stamp: &FileStamp) -> Result<(), DatabaseError> {
+        check_stamp(path, &read(path)?, stamp)
+    }
+}
+
+/// Whether `bytes`, read from `path`, are those that `stamp` promises.
+pub(crate) fn check_stamp(path: &Path, bytes: &[u8], stamp: &FileStamp) -> Result<(), DatabaseError> {
+    let (path, section) = (path.to_path_buf(), "whole file, against database.json");
+    let found = FileStamp::of(bytes);
+    if found.length != stamp.length {
+        return Err(DatabaseError::WrongLength { path, section, found: found.length, expected: stamp.length });
+    }
+    if found.blake3 != stamp.blake3 {
+        let (found, expected) = (found.blake3.to_string(), stamp.blake3.to_string());
+        return Err(DatabaseError::WrongChecksum { path, section, found, expected });
+    }
+    Ok(())
+}
+
+/// All of a file, unless it is longer than any of ours.
+pub(crate) fn read(path: &Path) -> Result<Vec<u8>, DatabaseError> {
+    let fault = |source| DatabaseError::from_io("read", path, 0, source);
+    let found = std::fs::metadata(path).map_err(fault)?.len();
+    if FILE_BYTES_MAX < found {
+        return Err(DatabaseError::TooLarge { path: path.to_path_buf(), found, limit: FILE_BYTES_MAX });
+    }
+    std::fs::read(path).map_err(fault)
+}
+
+fn same_tile(path: PathBuf, found: TileId, expected: TileId) -> Result<(), DatabaseError> {
+    if found == expected { Ok(()) } else { Err(DatabaseError::OtherTile { path, found, expected }) }
+}

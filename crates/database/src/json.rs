@@ -1,0 +1,89 @@
+//! Our JSON files: indented, keys in the order of their types, and a checksum as the last key.
+//!
+//! The checksum is the BLAKE3 hash of the text as it would stand without that key, so the file stays plain JSON and
+//! yet no byte of it can change unnoticed.
+
+use std::path::Path;
+
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+use crate::{DatabaseError, Fingerprint};
+
+/// What stands before the checksum's 64 digits, in place of the closing brace.
+const BEFORE: &str = ",\n  \"checksum\": \"";
+/// What stands after them.
+const AFTER: &str = "\"\n}\n";
+/// How every text ends before it is sealed.
+const END: &str = "\n}\n";
+
+/// The text of `value`, which must be a struct or a map with at least one key.
+///
+/// # Errors
+/// When `value` has a map whose keys are no texts, or is no object.
+pub(crate) fn encode(path: &Path, value: &impl Serialize) -> Result<String, DatabaseError> {
+    let text = serde_json::to_string_pretty(value).map_err(|error| malformed(path, error.to_string()))?;
+    match text.strip_suffix("\n}") {
+        Some(open) => Ok(seal(open)),
+        None => Err(malformed(path, "found a value without keys, expected an object")),
+    }
+}
+
+/// `open` is the text up to its closing brace.
+fn seal(open: &str) -> String {
+    let checksum = Fingerprint::of_bytes(format!("{open}{END}").as_bytes());
+    format!("{open}{BEFORE}{checksum}{AFTER}")
+}
+
+/// The value whose text, in the file at `path`, these bytes are.
+///
+/// # Errors
+/// When a byte is not as it was written, or the text has other keys than `T`.
+pub(crate) fn decode<T: DeserializeOwned>(path: &Path, bytes: &[u8]) -> Result<T, DatabaseError> {
+    let text = std::str::from_utf8(bytes).map_err(|error| malformed(path, error.to_string()))?;
+    let at = text.rfind(BEFORE).ok_or_else(|| malformed(path, "no checksum at the end"))?;
+    let (open, tail) = text.split_at(at);
+    let sealed = seal(open);
+    if sealed != text {
+        let stored = tail[BEFORE.len()..].trim_end_matches(AFTER);
+        let computed = sealed[at + BEFORE.len()..].trim_end_matches(AFTER);
+        let (found, expected) = (computed.to_string(), stored.to_string());
+        return Err(DatabaseError::WrongChecksum { path: path.to_path_buf(), section: "text", found, expected });
+    }
+    serde_json::from_str(&format!("{open}{END}")).map_err(|error| malformed(path, error.to_string()))
+}
+
+fn malformed(path: &Path, what: impl Into<String>) -> DatabaseError {
+    DatabaseError::Malformed { path: path.to_path_buf(), section: "JSON", what: what.into() }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use super::*;
+    use crate::samples;
+
+    #[test]
+    fn every_damage_is_an_error() {
+        let path = Path::new("x.json");
+        let value = BTreeMap::from([("a".to_string(), 1.5), ("checksum \" \n".to_string(), 0.1 + 0.2)]);
+        let text = encode(path, &value).unwrap();
+        assert_eq!(decode::<BTreeMap<String, f64>>(path, text.as_bytes()).unwrap(), value);
+        samples::check_every_damage(text.as_bytes(), |bytes| decode::<BTreeMap<String, f64>>(path, bytes).is_err());
+    }
+
+    #[test]
+    fn the_checksum_is_an_ordinary_last_key() {
+        let text = encode(Path::new("x.json"), &BTreeMap::from([("a", 1)])).unwrap();
+        let value: serde_json::Value = serde_json::from_str(&text).unwrap();
+        assert_eq!(value["a"], 1);
+        assert_eq!(value["checksum"].as_str().unwrap().len(), 64);
+    }
+
+    #[test]
+    fn a_value_without_keys_is_an_error() {
+        assert!(encode(Path::new("x.json"), &7).is_err());
+        assert!(encode(Path::new("x.json"), &BTreeMap::<String, u8>::new()).is_err());
+    }
+}

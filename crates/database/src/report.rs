@@ -1,0 +1,291 @@
+//! `report.json`: what a run found. The one file that knows times.
+
+use serde::{Deserialize, Serialize};
+use terrain::{Breach, BreachKind, BreachPlace, ModuleId};
+
+/// The content of `report.json`; its keys are a contract. Every number is finite.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Report {
+    /// Name of the gaming area.
+    pub area: String,
+    /// Tasks at once.
+    pub workers: u32,
+    /// Where the time went, in order.
+    pub stages: Vec<ReportStage>,
+    /// Points of the area.
+    pub points: ReportPoints,
+    /// Triangles of all load modules.
+    pub triangles: u64,
+    /// Convex polygons of all load modules.
+    pub polygons: u64,
+    /// Use of `per_load_module`.
+    pub per_load_module: ReportPerModule,
+    /// Use of `per_4km_square`.
+    pub per_4km: ReportPerWindow,
+    /// Use of the pool.
+    pub pool: ReportPool,
+    /// Against the working grid, every post counted once.
+    pub residual: ReportResidual,
+    /// Against the posts of the source DEM.
+    pub residual_against_source: Option<ReportResidual>,
+    /// The same for each class of the mask, in the job's order.
+    pub classes: Vec<ReportClass>,
+    /// RMS over all classes, each post counted once, whatever its class: in metres.
+    pub overall_point_weighted_rms_m: f64,
+    /// What the source says of its own accuracy, in metres.
+    pub dem_accuracy_m: Option<f64>,
+    /// Posts without a height in the source.
+    pub voids: ReportVoids,
+    /// Limits that could not be met.
+    pub breaches: Vec<ReportBreach>,
+    /// Posts that limits kept out.
+    pub refusals: ReportRefusals,
+    /// What else a reader should know, a sentence each.
+    pub warnings: Vec<String>,
+}
+
+/// One stage of the run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ReportStage {
+    /// Its name.
+    pub name: String,
+    /// Seconds on the clock.
+    pub wall_s: f64,
+    /// Seconds of all threads together.
+    pub cpu_s: f64,
+}
+
+/// Points of the area, each counted once.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ReportPoints {
+    /// Selected for their residual.
+    pub selected: u64,
+    /// Border points, corners not counted.
+    pub border: u64,
+    /// Corners of load modules.
+    pub corner: u64,
+    /// All.
+    pub total: u64,
+}
+
+/// Use of the limit per load module.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ReportPerModule {
+    /// Mean count.
+    pub mean: f64,
+    /// Largest count.
+    pub max: u64,
+    /// What the job allows.
+    pub limit: u64,
+    /// Load modules above it, those that the pool covers included.
+    pub over: u64,
+}
+
+/// Use of the limit per window of 4 km.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ReportPerWindow {
+    /// Largest count of any window of 8 x 8 load modules.
+    pub max: u64,
+    /// What the job allows.
+    pub limit: u64,
+    /// Windows above it.
+    pub over: u64,
+    /// Largest count of any 9 x 9 load modules: bounds a 4 km square at any offset.
+    pub worst_9x9: u64,
+}
+
+/// Use of the pool.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ReportPool {
+    /// Triangles above the limit that the area may use.
+    pub size: u64,
+    /// Those it used.
+    pub used: u64,
+}
+
+/// How far posts lie from the triangles, in metres.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ReportResidual {
+    /// Root mean square.
+    pub rms_m: f64,
+    /// Largest.
+    pub max_m: f64,
+    /// Mean of the absolute residuals.
+    pub mean_abs_m: f64,
+    /// 95 of 100 posts are within.
+    pub p95_m: f64,
+    /// 99 of 100 posts are within.
+    pub p99_m: f64,
+}
+
+/// One class of the mask.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ReportClass {
+    /// Its name.
+    pub name: String,
+    /// Posts of the working grid in it.
+    pub posts: u64,
+    /// Points of the TIN in it.
+    pub points: u64,
+    /// Its residuals.
+    pub residual: ReportResidual,
+}
+
+/// Posts without a height in the source.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ReportVoids {
+    /// All of them.
+    pub count: u64,
+    /// Those that were filled.
+    pub filled: u64,
+}
+
+/// One limit that could not be met.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ReportBreach {
+    /// `per_load_module`, `mean_per_load_module`, `per_4km_square` or `residual`.
+    pub kind: String,
+    /// Where.
+    #[serde(rename = "where")]
+    pub place: ReportPlace,
+    /// What was counted there.
+    pub count: u64,
+    /// What the limit allows there.
+    pub limit: u64,
+    /// How far the count is above it.
+    pub excess: u64,
+    /// Posts refused there.
+    pub refused: u32,
+    /// RMS residual there as built, in metres.
+    pub rms_with_m: f64,
+    /// RMS residual there without the limit, in metres, where it was computed.
+    pub rms_without_m: Option<f64>,
+}
+
+/// Where a limit was not met; rows and columns from the south-west, row first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ReportPlace {
+    /// One load module: its row and column.
+    Module([u32; 2]),
+    /// A window: row and column of its south-west load module.
+    Window([u32; 2]),
+    /// The whole area.
+    Area,
+}
+
+/// Posts that limits kept out.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ReportRefusals {
+    /// All of them.
+    pub count: u64,
+    /// By the limit of a load module.
+    pub by_module: u64,
+    /// By the limit of a window.
+    pub by_window: u64,
+    /// To keep free what a neighbour's side was promised.
+    pub by_reservation: u64,
+    /// The largest residual among them, in metres.
+    pub largest_m: f64,
+}
+
+impl From<&Breach> for ReportBreach {
+    fn from(breach: &Breach) -> Self {
+        let kind = match breach.kind {
+            BreachKind::LoadModule => "per_load_module",
+            BreachKind::Mean => "mean_per_load_module",
+            BreachKind::Window => "per_4km_square",
+            BreachKind::Residual => "residual",
+        };
+        Self {
+            kind: kind.into(),
+            place: breach.place.into(),
+            count: breach.count,
+            limit: breach.limit,
+            excess: breach.excess(),
+            refused: breach.refused,
+            rms_with_m: breach.rms_with_m,
+            rms_without_m: breach.rms_without_m,
+        }
+    }
+}
+
+impl From<BreachPlace> for ReportPlace {
+    fn from(place: BreachPlace) -> Self {
+        match place {
+            BreachPlace::Module(ModuleId { row, col }) => Self::Module([row, col]),
+            BreachPlace::Window(ModuleId { row, col }) => Self::Window([row, col]),
+            BreachPlace::Area => Self::Area,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::{json, samples};
+
+    fn report() -> Report {
+        let breach = Breach {
+            kind: BreachKind::Window,
+            place: BreachPlace::Window(ModuleId { row: 4, col: 5 }),
+            count: 4100,
+            limit: 4096,
+            refused: 3,
+            rms_with_m: 1.1,
+            rms_without_m: None,
+        };
+        Report {
+            area: "sample".into(),
+            workers: 2,
+            stages: vec![ReportStage { name: "refine".into(), wall_s: 0.25, cpu_s: 0.5 }],
+            points: ReportPoints { selected: 5, border: 16, corner: 4, total: 25 },
+            triangles: 32,
+            polygons: 32,
+            per_load_module: ReportPerModule { mean: 32.0, max: 32, limit: 100, over: 0 },
+            per_4km: ReportPerWindow { max: 4100, limit: 4096, over: 1, worst_9x9: 4200 },
+            pool: ReportPool::default(),
+            residual: ReportResidual { rms_m: 1.1, max_m: 9.0, mean_abs_m: 0.7, p95_m: 2.0, p99_m: 3.3 },
+            residual_against_source: None,
+            classes: vec![],
+            overall_point_weighted_rms_m: 1.1,
+            dem_accuracy_m: Some(2.5),
+            voids: ReportVoids::default(),
+            breaches: vec![ReportBreach::from(&breach)],
+            refusals: ReportRefusals::default(),
+            warnings: vec!["one tile is frozen".into()],
+        }
+    }
+
+    #[test]
+    fn the_keys_of_the_contract_are_there() {
+        let text = json::encode(Path::new("report.json"), &report()).unwrap();
+        let value: serde_json::Value = serde_json::from_str(&text).unwrap();
+        for pointer in [
+            "/area /workers /stages/0/name /stages/0/wall_s /stages/0/cpu_s /triangles /polygons /pool/size /pool/used",
+            "/points/selected /points/border /points/corner /points/total /residual/rms_m /residual/max_m",
+            "/residual/mean_abs_m /residual/p95_m /residual/p99_m /residual_against_source /classes /dem_accuracy_m",
+            "/per_load_module/mean /per_load_module/max /per_load_module/limit /per_load_module/over",
+            "/per_4km/max /per_4km/limit /per_4km/over /per_4km/worst_9x9 /voids/count /voids/filled /warnings",
+            "/breaches/0/kind /breaches/0/where /breaches/0/count /breaches/0/limit /breaches/0/excess",
+            "/breaches/0/refused /breaches/0/rms_with_m /breaches/0/rms_without_m",
+        ]
+        .iter()
+        .flat_map(|line| line.split(' '))
+        {
+            assert!(value.pointer(pointer).is_some(), "report.json lacks {pointer}");
+        }
+        assert_eq!(value["breaches"][0]["where"], serde_json::json!({ "window": [4, 5] }));
+        assert_eq!(value["breaches"][0]["excess"], 4);
+    }
+
+    #[test]
+    fn a_report_survives_its_file_and_every_damage_is_an_error() {
+        let path = Path::new("report.json");
+        let text = json::encode(path, &report()).unwrap();
+        assert_eq!(json::decode::<Report>(path, text.as_bytes()).unwrap(), report());
+        samples::check_every_damage(text.as_bytes(), |bytes| json::decode::<Report>(path, bytes).is_err());
+    }
+}

@@ -1,0 +1,130 @@
+//! Small values for the tests of this crate.
+
+use terrain::{
+    GainCurve, GainRun, GridFrame, LatticePoint, LoadModule, ModuleGrid, ModuleId, ModuleRect, ModuleResidual,
+    ModuleVertex, Post, PostRect, Refusal, RefusedBy, Spacing, StopReason, TileId, TileTin, Tin, Vertex,
+};
+
+use crate::{Area, Fingerprint, Stamp, TileModules};
+
+pub(crate) const TILE: TileId = TileId { row: 0, col: 1 };
+
+pub(crate) fn stamp() -> Stamp {
+    Stamp { algorithm_revision: 7, fingerprint: Fingerprint::of_bytes(b"sample") }
+}
+
+/// Every truncation, every flipped bit and an extra byte must be an error.
+#[track_caller]
+pub(crate) fn check_every_damage(good: &[u8], is_error: impl Fn(&[u8]) -> bool) {
+    assert!(!is_error(good), "the undamaged file must be accepted");
+    for length in 0..good.len() {
+        assert!(is_error(&good[..length]), "the first {length} bytes were accepted");
+    }
+    let mut bytes = good.to_vec();
+    for at in 0..bytes.len() {
+        for bit in 0..8 {
+            bytes[at] ^= 1 << bit;
+            assert!(is_error(&bytes), "bit {bit} of byte {at} was flipped and accepted");
+            bytes[at] ^= 1 << bit;
+        }
+    }
+    bytes.push(0);
+    assert!(is_error(&bytes), "an extra byte was accepted");
+}
+
+/// A square of 20 x 20 cells with one vertex inside.
+pub(crate) fn tile() -> TileTin {
+    let rect = PostRect::new(Post::new(0, 20), Post::new(20, 40));
+    let mut vertices: Vec<_> = rect.corners().iter().map(|&post| Vertex { at: post.into(), height: 12_800 }).collect();
+    vertices.push(Vertex { at: LatticePoint::new(83, 241), height: -5 });
+    let refused = vec![Refusal {
+        post: Post::new(3, 33),
+        module: ModuleId { row: 0, col: 1 },
+        residual: 17,
+        by: RefusedBy::Window,
+    }];
+    let tile = TileTin {
+        tile: TILE,
+        tin: Tin { rect, vertices, triangles: vec![[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]] },
+        initial_count: 4,
+        residuals: vec![12_805],
+        triangles_charged: 4,
+        refused,
+        stop: StopReason::Exhausted,
+    };
+    assert_eq!(tile.tin.check(), Ok(()));
+    tile
+}
+
+pub(crate) fn curve() -> GainCurve {
+    let run = |col, bin, cost| GainRun { module: ModuleId { row: 0, col }, bin, cost };
+    GainCurve { tile: TILE, runs: vec![run(1, 900, 2), run(2, 900, 4), run(1, -12, 70_000)] }
+}
+
+/// Load modules 2,3 and 2,4 of an area of 4 x 5.
+pub(crate) fn tile_modules() -> TileModules {
+    TileModules {
+        tile: TILE,
+        grid: ModuleGrid { rows: 4, cols: 5, side_cells: 20 },
+        modules: ModuleRect { south: 2, west: 3, north: 3, east: 5 },
+        frame: GridFrame {
+            origin_east_m: 505_000.0,
+            origin_north_m: 3_875_000.0,
+            spacing: Spacing::from_metres(25.0).unwrap(),
+        },
+        crs: "EPSG:32611".into(),
+        vertical_datum: "EGM96".into(),
+        fingerprint: Fingerprint(std::array::from_fn(|i| i as u8)),
+    }
+}
+
+pub(crate) fn modules() -> Vec<LoadModule> {
+    let vertex = |x, y, z| ModuleVertex { y, x, z };
+    let west = LoadModule {
+        id: ModuleId { row: 2, col: 3 },
+        side: 64_000,
+        vertices: vec![
+            vertex(0, 0, 128_000),
+            vertex(64_000, 0, 128_256),
+            vertex(0, 64_000, 128_128),
+            vertex(64_000, 64_000, 128_512),
+        ],
+        triangles: vec![[0, 1, 3], [0, 3, 2]],
+        classes: vec![0, 1],
+        polygon_count: 2,
+        residual: ModuleResidual { posts: 400, largest: 300, sum_abs: 25_600, sum_squared: 3_276_800 },
+    };
+    let east = LoadModule {
+        id: ModuleId { row: 2, col: 4 },
+        side: 64_000,
+        vertices: vec![
+            vertex(0, 0, 128_256),
+            vertex(64_000, 0, 128_000),
+            vertex(32_000, 25_600, -128),
+            vertex(0, 64_000, 128_512),
+            vertex(64_000, 64_000, 127_872),
+        ],
+        triangles: vec![[0, 1, 2], [0, 2, 3], [1, 4, 2], [2, 4, 3]],
+        classes: vec![1, 0, 0, 1],
+        polygon_count: 4,
+        residual: ModuleResidual { posts: 399, largest: 128, sum_abs: 12_800, sum_squared: 1_638_400 },
+    };
+    [&west, &east].iter().for_each(|module| assert_eq!(module.check(), Ok(())));
+    vec![west, east]
+}
+
+pub(crate) fn area() -> Area {
+    Area {
+        name: "sample".into(),
+        crs: "EPSG:32611".into(),
+        vertical_datum: "EGM96".into(),
+        origin_m: [505_000.0, 3_875_000.1],
+        size_m: [2500.0, 2000.0],
+        spacing_m: 25.0,
+        module_side_m: 500.0,
+        module_rows: 4,
+        module_cols: 5,
+        tile_rows: 1,
+        tile_cols: 2,
+    }
+}

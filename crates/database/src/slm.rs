@@ -1,0 +1,227 @@
+//! `modules/r02c03.slm`: the load modules of one tile, as a simulator reads them. `FORMAT.md` is the specification.
+
+use std::path::Path;
+
+use load_module_reader::{
+    FIXED_HEADER_BYTES, Header, INDEX_ENTRY_BYTES, LEVEL_COUNT, MAGIC, Module, QUANTA_PER_METRE, SlmFile, VERSION,
+};
+use terrain::{
+    GridFrame, LoadModule, ModuleGrid, ModuleId, ModuleRect, ModuleResidual, ModuleVertex, Side, Spacing, TileId,
+};
+
+use crate::{DatabaseError, Fingerprint};
+
+/// What holds for all load modules of a tile.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TileModules {
+    /// Which tile.
+    pub tile: TileId,
+    /// The load modules of the whole area.
+    pub grid: ModuleGrid,
+    /// Those of this tile.
+    pub modules: ModuleRect,
+    /// Where the working grid lies.
+    pub frame: GridFrame,
+    /// The coordinate reference system, such as `EPSG:32611`; at most 65,535 bytes.
+    pub crs: String,
+    /// What heights are above, empty when unknown; at most 65,535 bytes.
+    pub vertical_datum: String,
+    /// Of all that the load modules were made from.
+    pub fingerprint: Fingerprint,
+}
+
+impl TileModules {
+    /// Length of a load module's side in quanta of 1/128 m.
+    fn side(&self) -> i64 {
+        i64::from(self.grid.side_cells) * i64::from(self.frame.spacing.quanta_per_post())
+    }
+}
+
+/// The bytes of the file that holds `modules`.
+///
+/// # Panics
+/// When `modules` are not exactly those of the tile, row by row from the south-west, each with the tile's side and
+/// lists that belong together (and, in debug builds, sound: [`LoadModule::check`]).
+pub fn encode_modules(tile: &TileModules, modules: &[LoadModule]) -> Vec<u8> {
+    assert!(modules.iter().map(|module| module.id).eq(tile.modules.iter()), "a tile's file holds all its load modules");
+    let header_length = (FIXED_HEADER_BYTES + tile.crs.len() + tile.vertical_datum.len()).next_multiple_of(4) + 4;
+    let index_length = modules.len() * INDEX_ENTRY_BYTES + 4;
+    let mut index = Vec::with_capacity(index_length);
+    let mut sections = Vec::new();
+    for module in modules {
+        assert_eq!(i64::from(module.side), tile.side(), "load module {} has the side of the tile's grid", module.id);
+        debug_assert_eq!(module.check(), Ok(()), "load module {} is sound before it is written", module.id);
+        let start = sections.len();
+        put_module(&mut sections, module);
+        let offset = (header_length + index_length + start) as u64;
+        put_entry(&mut index, module, offset, (sections.len() - start) as u32);
+    }
+    put_checksum(&mut index, 0);
+    let file_length = header_length + index.len() + sections.len();
+    let mut file = Vec::with_capacity(file_length);
+    put_header(&mut file, tile, header_length as u32, file_length as u64);
+    file.extend_from_slice(&index);
+    file.extend_from_slice(&sections);
+    file
+}
+
+fn put_header(file: &mut Vec<u8>, tile: &TileModules, header_length: u32, file_length: u64) {
+    file.extend_from_slice(&MAGIC);
+    put_u16s(file, [VERSION, LEVEL_COUNT]);
+    put_u32s(file, [header_length]);
+    file.extend_from_slice(&file_length.to_le_bytes());
+    put_u32s(file, [tile.tile.row, tile.tile.col, tile.grid.rows, tile.grid.cols]);
+    put_u32s(file, [tile.modules.south, tile.modules.north, tile.modules.west, tile.modules.east]);
+    let cells = u32::try_from(tile.grid.side_cells).expect("a load module has a positive number of cells a side");
+    let side = u32::try_from(tile.side()).expect("the side equals that of every load module, which is 16 bits");
+    put_u32s(file, [side, cells, tile.frame.spacing.sixteenths(), QUANTA_PER_METRE]);
+    file.extend_from_slice(&tile.frame.origin_east_m.to_le_bytes());
+    file.extend_from_slice(&tile.frame.origin_north_m.to_le_bytes());
+    let text_length = |text: &str| u16::try_from(text.len()).expect("texts of the header are short");
+    put_u16s(file, [text_length(&tile.crs), text_length(&tile.vertical_datum)]);
+    file.extend_from_slice(&tile.fingerprint.0);
+    file.extend_from_slice(tile.crs.as_bytes());
+    file.extend_from_slice(tile.vertical_datum.as_bytes());
+    pad(file, 0);
+    put_checksum(file, 0);
+}
+
+fn put_entry(index: &mut Vec<u8>, module: &LoadModule, offset: u64, length: u32) {
+    index.extend_from_slice(&offset.to_le_bytes());
+    put_u32s(index, [length, module.vertices.len() as u32, module.triangles.len() as u32, module.polygon_count]);
+    let heights = || module.vertices.iter().map(|vertex| vertex.z);
+    for height in [heights().min(), heights().max()] {
+        index.extend_from_slice(&height.expect("a load module has at least its corners").to_le_bytes());
+    }
+}
+
+fn put_module(file: &mut Vec<u8>, module: &LoadModule) {
+    let start = file.len();
+    let counts = [module.vertices.len() as u32, module.triangles.len() as u32, module.polygon_count];
+    put_u32s(file, [module.id.row, module.id.col, 0]);
+    put_u32s(file, counts);
+    let sides = Side::ALL.map(|side| module.side_vertices(side));
+    put_u16s(file, sides.iter().map(|side| side.len() as u16));
+    let residual = &module.residual;
+    put_u32s(file, [residual.posts, residual.largest]);
+    file.extend_from_slice(&residual.sum_abs.to_le_bytes());
+    file.extend_from_slice(&residual.sum_squared.to_le_bytes());
+    for vertex in &module.vertices {
+        put_u16s(file, [vertex.x, vertex.y]);
+        file.extend_from_slice(&vertex.z.to_le_bytes());
+    }
+    put_u16s(file, module.triangles.iter().flatten().copied());
+    put_u16s(file, sides.iter().flatten().copied());
+    assert_eq!(module.classes.len(), module.triangles.len(), "load module {} has a class per triangle", module.id);
+    file.extend_from_slice(&module.classes);
+    pad(file, start);
+    put_checksum(file, start);
+}
+
+fn put_u16s(file: &mut Vec<u8>, values: impl IntoIterator<Item = u16>) {
+    values.into_iter().for_each(|value| file.extend_from_slice(&value.to_le_bytes()));
+}
+
+fn put_u32s(file: &mut Vec<u8>, values: impl IntoIterator<Item = u32>) {
+    values.into_iter().for_each(|value| file.extend_from_slice(&value.to_le_bytes()));
+}
+
+/// Zeros, until the section that begins at `start` is a multiple of four bytes long.
+fn pad(file: &mut Vec<u8>, start: usize) {
+    let length = (file.len() - start).next_multiple_of(4);
+    file.resize(start + length, 0);
+}
+
+fn put_checksum(file: &mut Vec<u8>, start: usize) {
+    let checksum = crc32fast::hash(&file[start..]);
+    file.extend_from_slice(&checksum.to_le_bytes());
+}
+
+/// The load modules in the file at `path` that has these bytes, each checked with [`LoadModule::check`].
+///
+/// # Errors
+/// When the file is not as it was written, or a load module in it is not sound.
+pub fn decode_modules(path: &Path, bytes: &[u8]) -> Result<(TileModules, Vec<LoadModule>), DatabaseError> {
+    let fault = |fault| DatabaseError::Modules { path: path.to_path_buf(), fault: Box::new(fault) };
+    let file = SlmFile::parse(bytes).map_err(fault)?;
+    let tile = tile_of(file.header());
+    let side = file.header().side;
+    let modules: Vec<LoadModule> = file.modules().iter().map(|module| load_module(module, side)).collect();
+    for module in &modules {
+        let unsound = |fault| DatabaseError::UnsoundModule { path: path.to_path_buf(), module: module.id, fault };
+        module.check().map_err(unsound)?;
+    }
+    Ok((tile, modules))
+}
+
+fn tile_of(header: &Header) -> TileModules {
+    let spacing = Spacing::from_sixteenths(header.spacing_sixteenths).expect("the reader refuses a spacing of zero");
+    let [origin_east_m, origin_north_m] = header.origin_m;
+    TileModules {
+        tile: TileId { row: header.tile_row, col: header.tile_col },
+        // The reader holds the side in cells below 65,536.
+        grid: ModuleGrid { rows: header.area_rows, cols: header.area_cols, side_cells: header.side_cells as i32 },
+        modules: ModuleRect { south: header.south, west: header.west, north: header.north, east: header.east },
+        frame: GridFrame { origin_east_m, origin_north_m, spacing },
+        crs: header.crs.clone(),
+        vertical_datum: header.vertical_datum.clone(),
+        fingerprint: Fingerprint(header.fingerprint),
+    }
+}
+
+fn load_module(module: &Module, side: u16) -> LoadModule {
+    let residual = &module.residual;
+    LoadModule {
+        id: ModuleId { row: module.row, col: module.col },
+        side,
+        vertices: module.vertices.iter().map(|v| ModuleVertex { y: v.y, x: v.x, z: v.z }).collect(),
+        triangles: module.triangles.clone(),
+        classes: module.classes.clone(),
+        polygon_count: module.polygon_count,
+        residual: ModuleResidual {
+            posts: residual.posts,
+            largest: residual.largest,
+            sum_abs: residual.sum_abs,
+            sum_squared: residual.sum_squared,
+        },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::samples;
+
+    fn decode(bytes: &[u8]) -> Result<(TileModules, Vec<LoadModule>), DatabaseError> {
+        decode_modules(Path::new("r00c01.slm"), bytes)
+    }
+
+    #[test]
+    fn load_modules_survive_their_file() {
+        let (tile, modules) = (samples::tile_modules(), samples::modules());
+        let bytes = encode_modules(&tile, &modules);
+        assert_eq!(decode(&bytes).unwrap(), (tile.clone(), modules.clone()));
+        assert_eq!(encode_modules(&tile, &modules), bytes);
+    }
+
+    #[test]
+    fn every_damage_is_an_error() {
+        let bytes = encode_modules(&samples::tile_modules(), &samples::modules());
+        samples::check_every_damage(&bytes, |bytes| decode(bytes).is_err());
+    }
+
+    #[test]
+    fn damage_is_named_by_file_and_section() {
+        let mut bytes = encode_modules(&samples::tile_modules(), &samples::modules());
+        let last = bytes.len() - 8;
+        bytes[last] ^= 64;
+        let error = decode(&bytes).unwrap_err().to_string();
+        assert!(error.starts_with("r00c01.slm: load module 2,4, offset "), "{error}");
+    }
+
+    #[test]
+    #[should_panic(expected = "a tile's file holds all its load modules")]
+    fn a_missing_load_module_is_not_written() {
+        encode_modules(&samples::tile_modules(), &samples::modules()[..1]);
+    }
+}

@@ -1,0 +1,222 @@
+//! `tiles/r02c03.tin`: one tile's TIN as `refine` made it. Private to this project; never edited.
+
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+use terrain::{
+    LATTICE_PER_POST, LatticePoint, ModuleId, Post, PostRect, Refusal, RefusedBy, StopReason, TileId, TileTin, Tin,
+    Vertex,
+};
+
+use crate::frame::{Kind, malformed};
+use crate::{DatabaseError, Stamp, codec, frame};
+
+/// Posts from the area's origin that a file may name: eighths of them still fit 32 bits, and so do differences.
+const POSTS_MAX: i32 = 1 << 27;
+
+/// [`TileTin`] as it lies on disk.
+#[derive(Serialize, Deserialize)]
+struct TileOnDisk {
+    tile: (u32, u32),
+    /// South, west, north, east.
+    rect: [i32; 4],
+    /// Row, column, height.
+    vertices: Vec<[i32; 3]>,
+    triangles: Vec<[u32; 3]>,
+    initial_count: u32,
+    residuals: Vec<u32>,
+    triangles_charged: u32,
+    refused: Vec<RefusalOnDisk>,
+    stop: u8,
+}
+
+#[derive(Serialize, Deserialize)]
+struct RefusalOnDisk {
+    post: (i32, i32),
+    module: (u32, u32),
+    residual: u32,
+    by: u8,
+}
+
+/// Codes of [`RefusedBy`] are places in this list; new ones go to its end.
+const REFUSED_BY: [RefusedBy; 3] = [RefusedBy::Module, RefusedBy::Window, RefusedBy::Reservation];
+/// Codes of [`StopReason`] are places in this list; new ones go to its end.
+const STOP: [StopReason; 4] =
+    [StopReason::BudgetSpent, StopReason::ResidualReached, StopReason::RmsReached, StopReason::Exhausted];
+
+/// The bytes of a tile file.
+pub fn encode_tile(stamp: &Stamp, tile: &TileTin) -> Vec<u8> {
+    let rect = tile.tin.rect;
+    let on_disk = TileOnDisk {
+        tile: (tile.tile.row, tile.tile.col),
+        rect: [rect.south, rect.west, rect.north, rect.east],
+        vertices: tile.tin.vertices.iter().map(|v| [v.at.row, v.at.col, v.height]).collect(),
+        triangles: tile.tin.triangles.clone(),
+        initial_count: tile.initial_count,
+        residuals: tile.residuals.clone(),
+        triangles_charged: tile.triangles_charged,
+        refused: tile.refused.iter().map(refusal_to_disk).collect(),
+        stop: code(&STOP, tile.stop),
+    };
+    frame::seal(Kind::Tile, stamp, &codec::encode(&on_disk))
+}
+
+/// The tile whose file, at `path`, has these bytes. Indices and places are checked, cracks are not: see
+/// [`terrain::Tin::check`].
+///
+/// # Errors
+/// When the file is not as it was written.
+pub fn decode_tile(path: &Path, bytes: &[u8]) -> Result<(Stamp, TileTin), DatabaseError> {
+    let (stamp, payload) = frame::open(Kind::Tile, path, bytes)?;
+    let tile = codec::decode(payload).and_then(from_disk).map_err(|what| malformed(path, what))?;
+    Ok((stamp, tile))
+}
+
+fn from_disk(on_disk: TileOnDisk) -> Result<TileTin, String> {
+    let rect = rect_from_disk(on_disk.rect)?;
+    let (low, high) = (LatticePoint::from(rect.south_west()), LatticePoint::from(rect.north_east()));
+    let inside = |[row, col, _]: &[i32; 3]| (low.row..=high.row).contains(row) && (low.col..=high.col).contains(col);
+    if let Some(vertex) = on_disk.vertices.iter().position(|vertex| !inside(vertex)) {
+        return Err(format!("vertex {vertex} lies outside the tile"));
+    }
+    let count = on_disk.vertices.len();
+    let exists = |vertex: &u32| (*vertex as usize) < count;
+    if let Some(triangle) = on_disk.triangles.iter().position(|triangle| !triangle.iter().all(exists)) {
+        return Err(format!("triangle {triangle} names a vertex of {count} that does not exist"));
+    }
+    if count < on_disk.initial_count as usize {
+        return Err(format!("found {} initial vertices, expected at most {count}", on_disk.initial_count));
+    }
+    let vertex = |[row, col, height]: [i32; 3]| Vertex { at: LatticePoint::new(row, col), height };
+    let vertices = on_disk.vertices.into_iter().map(vertex).collect();
+    Ok(TileTin {
+        tile: TileId { row: on_disk.tile.0, col: on_disk.tile.1 },
+        tin: Tin { rect, vertices, triangles: on_disk.triangles },
+        initial_count: on_disk.initial_count,
+        residuals: on_disk.residuals,
+        triangles_charged: on_disk.triangles_charged,
+        refused: on_disk.refused.into_iter().map(refusal_from_disk).collect::<Result<_, _>>()?,
+        stop: meaning(&STOP, on_disk.stop, "stop reason")?,
+    })
+}
+
+fn rect_from_disk([south, west, north, east]: [i32; 4]) -> Result<PostRect, String> {
+    let bounded = [south, west, north, east].iter().all(|line| (-POSTS_MAX..=POSTS_MAX).contains(line));
+    if bounded && south <= north && west <= east {
+        return Ok(PostRect { south, west, north, east });
+    }
+    Err(format!("rows {south} to {north}, columns {west} to {east} are no rectangle of posts"))
+}
+
+fn refusal_to_disk(refusal: &Refusal) -> RefusalOnDisk {
+    RefusalOnDisk {
+        post: (refusal.post.row, refusal.post.col),
+        module: (refusal.module.row, refusal.module.col),
+        residual: refusal.residual,
+        by: code(&REFUSED_BY, refusal.by),
+    }
+}
+
+fn refusal_from_disk(refusal: RefusalOnDisk) -> Result<Refusal, String> {
+    Ok(Refusal {
+        post: Post::new(refusal.post.0, refusal.post.1),
+        module: ModuleId { row: refusal.module.0, col: refusal.module.1 },
+        residual: refusal.residual,
+        by: meaning(&REFUSED_BY, refusal.by, "refusing limit")?,
+    })
+}
+
+fn code<T: PartialEq>(meanings: &[T], value: T) -> u8 {
+    let place = meanings.iter().position(|meaning| *meaning == value);
+    place.expect("the list names every variant") as u8
+}
+
+fn meaning<T: Copy>(meanings: &[T], code: u8, what: &str) -> Result<T, String> {
+    let found = meanings.get(usize::from(code)).copied();
+    found.ok_or_else(|| format!("found {what} {code}, expected below {}", meanings.len()))
+}
+
+const _: () = assert!(POSTS_MAX as i64 * LATTICE_PER_POST as i64 * 2 <= 1 << 31, "lattice differences fit 32 bits");
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::samples;
+
+    fn decode(bytes: &[u8]) -> Result<(Stamp, TileTin), DatabaseError> {
+        decode_tile(Path::new("r00c01.tin"), bytes)
+    }
+
+    #[test]
+    fn a_tile_survives_its_file() {
+        let (stamp, tile) = (samples::stamp(), samples::tile());
+        let bytes = encode_tile(&stamp, &tile);
+        assert_eq!(decode(&bytes).unwrap(), (stamp, tile.clone()));
+        assert_eq!(encode_tile(&stamp, &tile), bytes);
+    }
+
+    #[test]
+    fn every_reason_survives() {
+        for (stop, by) in STOP.into_iter().zip(REFUSED_BY.into_iter().cycle()) {
+            let mut tile = samples::tile();
+            tile.stop = stop;
+            tile.refused[0].by = by;
+            let (_, read) = decode(&encode_tile(&samples::stamp(), &tile)).unwrap();
+            assert_eq!((read.stop, read.refused[0].by), (stop, by));
+        }
+    }
+
+    #[test]
+    fn every_damage_is_an_error() {
+        samples::check_every_damage(&encode_tile(&samples::stamp(), &samples::tile()), |bytes| decode(bytes).is_err());
+    }
+
+    #[test]
+    fn a_payload_that_makes_no_sense_is_an_error_and_no_panic() {
+        let (stamp, tile) = (samples::stamp(), samples::tile());
+        let payload = encode_tile(&stamp, &tile)[frame::FRAME_BYTES..].to_vec();
+        for at in 0..payload.len() {
+            for value in [0, 0x7f, 0x80, 0xff] {
+                let mut odd = payload.clone();
+                odd[at] = value;
+                if let Ok((_, tile)) = decode(&frame::seal(Kind::Tile, &stamp, &odd)) {
+                    let _ = tile.tin.check();
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_triangle_of_a_missing_vertex_is_named() {
+        let mut tile = samples::tile();
+        tile.tin.triangles[1][2] = 77;
+        let error = decode(&encode_tile(&samples::stamp(), &tile)).unwrap_err();
+        let expected = "r00c01.tin: payload: triangle 1 names a vertex of 5 that does not exist";
+        assert_eq!(error.to_string(), expected);
+    }
+
+    /// The codec is no longer maintained: another decoder must find the same values in the same bytes.
+    #[test]
+    fn a_tile_can_be_decoded_by_another_crate() {
+        type OnDisk = (
+            (u32, u32),
+            [i32; 4],
+            Vec<[i32; 3]>,
+            Vec<[u32; 3]>,
+            u32,
+            Vec<u32>,
+            u32,
+            Vec<((i32, i32), (u32, u32), u32, u8)>,
+            u8,
+        );
+        let tile = samples::tile();
+        let bytes = encode_tile(&samples::stamp(), &tile);
+        let read: OnDisk = wincode::deserialize(&bytes[frame::FRAME_BYTES..]).unwrap();
+        assert_eq!(read.0, (tile.tile.row, tile.tile.col));
+        assert_eq!(read.2.len(), tile.tin.vertices.len());
+        assert_eq!(read.3, tile.tin.triangles);
+        assert_eq!(read.5, tile.residuals);
+        assert_eq!(read.7.len(), tile.refused.len());
+        assert_eq!(read.8, code(&STOP, tile.stop));
+    }
+}

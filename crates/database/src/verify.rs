@@ -1,0 +1,86 @@
+//! Reads everything again and says what is not as it was written.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+use serde::de::IgnoredAny;
+
+use crate::database::list;
+use crate::folder::{MODULES, SURVEY, TILES, check_stamp, files, read};
+use crate::publish::is_temporary;
+use crate::{DatabaseError, FileStamp, Folder, Manifest, curve_file, removals_file, slm, tile_file};
+
+/// One file that is not as it should be.
+#[derive(Debug)]
+pub struct Damage {
+    /// The file.
+    pub path: PathBuf,
+    /// What is wrong with it, by section where that is known.
+    pub error: DatabaseError,
+}
+
+impl Folder {
+    /// Every file that `manifest` lists, with how it must look.
+    pub(crate) fn listed_files(&self, manifest: &Manifest) -> Vec<(PathBuf, FileStamp)> {
+        let of_tiles = manifest.tiles.iter().flat_map(|record| {
+            let tile = record.tile();
+            [
+                (self.tile_path(tile), record.tin),
+                (self.removals_path(tile), record.removed),
+                (self.modules_path(tile), record.slm),
+                (self.curve_path(tile), record.curve),
+            ]
+        });
+        let of_tiles = of_tiles.filter_map(|(path, stamp)| Some((path, stamp?)));
+        let others = manifest.files.iter().map(|(name, stamp)| (self.path(name), *stamp));
+        of_tiles.chain(others).collect()
+    }
+
+    /// Reads every file that `manifest` lists: its sections, what they hold (TINs and load modules are walked for
+    /// cracks), and its hash; also `report.json`, where there is one. Files of ours that it does not list are named too. At most one finding per file, in
+    /// the order of the manifest.
+    ///
+    /// # Errors
+    /// When a folder cannot be listed; damage is no error but a finding.
+    pub fn verify(&self, manifest: &Manifest) -> Result<Vec<Damage>, DatabaseError> {
+        let listed = self.listed_files(manifest);
+        let mut damage = Vec::new();
+        for (path, stamp) in &listed {
+            if let Err(error) = check_listed(path, stamp) {
+                damage.push(Damage { path: path.clone(), error });
+            }
+        }
+        // It knows times, so no manifest lists it; its own checksum must do.
+        match self.read_json::<IgnoredAny>(files::REPORT) {
+            Ok(_) | Err(DatabaseError::Missing { .. }) => {}
+            Err(error) => damage.push(Damage { path: self.path(files::REPORT), error }),
+        }
+        let known: BTreeSet<PathBuf> = listed.into_iter().map(|(path, _)| path).collect();
+        for name in [TILES, MODULES, SURVEY] {
+            for path in list(&self.path(name))? {
+                let temporary = path.file_name().is_some_and(|name| is_temporary(&name.to_string_lossy()));
+                if !known.contains(&path) && !temporary {
+                    damage.push(Damage { path: path.clone(), error: DatabaseError::NotListed { path } });
+                }
+            }
+        }
+        Ok(damage)
+    }
+}
+
+/// Decodes first, because that names the section; a file that decodes may still be another than the one listed.
+fn check_listed(path: &Path, stamp: &FileStamp) -> Result<(), DatabaseError> {
+    let bytes = read(path)?;
+    match path.extension().and_then(|extension| extension.to_str()) {
+        Some("tin") => {
+            let (_, tile) = tile_file::decode_tile(path, &bytes)?;
+            let unsound = |fault| DatabaseError::UnsoundTin { path: path.to_path_buf(), fault };
+            tile.tin.check().map_err(unsound)?;
+        }
+        Some("slm") => drop(slm::decode_modules(path, &bytes)?),
+        Some("curve") => drop(curve_file::decode_curve(path, &bytes)?),
+        Some("removed") => drop(removals_file::decode_removals(path, &bytes)?),
+        _ => {}
+    }
+    check_stamp(path, &bytes, stamp)
+}

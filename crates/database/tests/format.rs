@@ -1,0 +1,173 @@
+//! `FORMAT.md` and the reader written from it alone agree with what the encoder writes.
+
+#![allow(clippy::unwrap_used)]
+
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use database::{Fingerprint, TileModules, encode_modules};
+use serde_json::{Value, json};
+use terrain::{
+    GridFrame, LoadModule, ModuleGrid, ModuleId, ModuleRect, ModuleResidual, ModuleVertex, Side, Spacing, TileId,
+};
+
+fn workspace() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
+fn vertex(x: u16, y: u16, z: i32) -> ModuleVertex {
+    ModuleVertex { y, x, z }
+}
+
+/// A load module of two triangles, 1000 m above the datum in the south and 1002 m in the north-east.
+fn flat(id: ModuleId) -> LoadModule {
+    LoadModule {
+        id,
+        side: 64_000,
+        vertices: vec![
+            vertex(0, 0, 128_000),
+            vertex(64_000, 0, 128_000),
+            vertex(0, 64_000, 128_128),
+            vertex(64_000, 64_000, 128_256),
+        ],
+        triangles: vec![[0, 1, 3], [0, 3, 2]],
+        classes: vec![0, 1],
+        polygon_count: 2,
+        residual: ModuleResidual { posts: 441, largest: 300, sum_abs: 25_600, sum_squared: 3_276_800 },
+    }
+}
+
+fn tile(rows: u32, cols: u32) -> TileModules {
+    TileModules {
+        tile: TileId { row: 0, col: 0 },
+        grid: ModuleGrid { rows, cols, side_cells: 20 },
+        modules: ModuleRect { south: 0, west: 0, north: rows, east: cols },
+        frame: GridFrame {
+            origin_east_m: 505_000.0,
+            origin_north_m: 3_875_000.0,
+            spacing: Spacing::from_metres(25.0).unwrap(),
+        },
+        crs: "EPSG:32611".into(),
+        vertical_datum: "EGM96".into(),
+        fingerprint: Fingerprint(std::array::from_fn(|i| i as u8)),
+    }
+}
+
+fn example() -> Vec<u8> {
+    encode_modules(&tile(1, 1), &[flat(ModuleId { row: 0, col: 0 })])
+}
+
+/// The bytes of the worked example: lines of offset, bytes, bar, meaning.
+fn bytes_of_page(page: &str) -> Vec<u8> {
+    let block = page.split("```hex\n").nth(1).unwrap().split("```").next().unwrap();
+    let mut bytes = Vec::new();
+    for line in block.lines() {
+        let mut words = line.split('|').next().unwrap().split_whitespace();
+        assert_eq!(words.next().unwrap().parse::<usize>().unwrap(), bytes.len(), "offset of the line {line:?}");
+        bytes.extend(words.map(|word| u8::from_str_radix(word, 16).unwrap()));
+    }
+    bytes
+}
+
+#[test]
+fn the_worked_example_is_what_the_encoder_writes() {
+    let page = std::fs::read_to_string(workspace().join("FORMAT.md")).unwrap();
+    let written = example().iter().fold(String::new(), |mut text, byte| {
+        write!(text, "{byte:02x} ").unwrap();
+        text
+    });
+    assert_eq!(bytes_of_page(&page), example(), "the encoder writes {written}");
+}
+
+/// Runs Python, or says that there is none.
+fn python(arguments: &[&str]) -> Option<Output> {
+    match Command::new("python3").arg("-B").args(arguments).current_dir(workspace()).output() {
+        Ok(output) => Some(output),
+        Err(error) => {
+            eprintln!("skipped: python3 does not start: {error}");
+            None
+        }
+    }
+}
+
+#[test]
+fn the_python_reader_finds_what_was_written() {
+    let tile = tile(2, 3);
+    let modules: Vec<_> = tile.modules.iter().map(|id| if id.col == 1 { pyramid(id) } else { flat(id) }).collect();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("r00c00.slm");
+    std::fs::write(&path, encode_modules(&tile, &modules)).unwrap();
+    let Some(output) = python(&["scripts/read_slm.py", "--json", path.to_str().unwrap()]) else { return };
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let dump: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(dump["header"], header_as_json());
+    assert_eq!(dump["modules"], Value::Array(modules.iter().map(as_json).collect()));
+}
+
+#[test]
+fn the_python_reader_refuses_every_damage() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("r00c00.slm");
+    std::fs::write(&path, example()).unwrap();
+    let program = "import sys; sys.path.insert(0, 'scripts'); import read_slm\n\
+        good = open(sys.argv[1], 'rb').read(); read_slm.parse(good)\n\
+        bad = [good[:n] for n in range(len(good))] + [good + b'\\0']\n\
+        bad += [good[:i] + bytes([good[i] ^ 1 << b]) + good[i + 1:] for i in range(len(good)) for b in range(8)]\n\
+        for data in bad:\n\
+        \x20   try: read_slm.parse(data)\n\
+        \x20   except read_slm.Damaged: continue\n\
+        \x20   sys.exit('accepted damage')\n";
+    let Some(output) = python(&["-c", program, path.to_str().unwrap()]) else { return };
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+}
+
+#[test]
+fn the_python_reader_says_what_is_damaged_and_fails() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("r00c00.slm");
+    let mut bytes = example();
+    bytes[200] ^= 1;
+    std::fs::write(&path, bytes).unwrap();
+    let Some(output) = python(&["scripts/read_slm.py", path.to_str().unwrap()]) else { return };
+    assert_eq!(output.status.code(), Some(2));
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(said.contains("r00c00.slm: load module 0,0") && said.contains("checksum"), "{said}");
+}
+
+fn pyramid(id: ModuleId) -> LoadModule {
+    let mut module = flat(id);
+    module.vertices.insert(2, vertex(32_000, 25_600, -128));
+    module.triangles = vec![[0, 1, 2], [0, 2, 3], [1, 4, 2], [2, 4, 3]];
+    module.classes = vec![1, 0, 255, 1];
+    module.polygon_count = 3;
+    module.residual.sum_squared = u64::MAX;
+    module
+}
+
+fn header_as_json() -> Value {
+    json!({
+        "tile": [0, 0], "area_modules": [2, 3], "rows": [0, 2], "columns": [0, 3],
+        "side": 64000, "side_cells": 20, "spacing_m": 25.0, "origin_m": [505000.0, 3875000.0],
+        "crs": "EPSG:32611", "vertical_datum": "EGM96",
+        "fingerprint": "000102030405060708090a0b0c0d0e0f101112131415161718191a1b1c1d1e1f",
+    })
+}
+
+fn as_json(module: &LoadModule) -> Value {
+    let [south, east, north, west] = Side::ALL.map(|side| module.side_vertices(side));
+    let residual = &module.residual;
+    json!({
+        "row": module.id.row,
+        "column": module.id.col,
+        "polygons": module.polygon_count,
+        "residual": {
+            "posts": residual.posts, "largest": residual.largest,
+            "sum_abs": residual.sum_abs, "sum_squared": residual.sum_squared,
+        },
+        "vertices": module.vertices.iter().map(|v| json!([v.x, v.y, v.z])).collect::<Vec<_>>(),
+        "triangles": module.triangles,
+        "sides": { "south": south, "east": east, "north": north, "west": west },
+        "classes": module.classes,
+    })
+}

@@ -1,0 +1,193 @@
+//! A whole file: header, index, load modules.
+
+use std::path::Path;
+
+use crate::{Header, IndexEntry, Module, ReadError, index};
+
+/// Bytes of the longest file that is read: far above any tile, and small enough to hold in memory.
+pub const FILE_BYTES_MAX: u64 = 1 << 30;
+
+/// All load modules of one tile, decoded and checked.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SlmFile {
+    header: Header,
+    index: Vec<IndexEntry>,
+    modules: Vec<Module>,
+}
+
+impl SlmFile {
+    /// Reads and checks the file at `path`.
+    ///
+    /// # Errors
+    /// When the file cannot be read or anything in it is not as `FORMAT.md` says; the error carries the path.
+    pub fn open(path: impl AsRef<Path>) -> Result<Self, ReadError> {
+        let path = path.as_ref();
+        let unreadable = |source| ReadError::Unreadable { path: path.to_path_buf(), source };
+        let found = std::fs::metadata(path).map_err(unreadable)?.len();
+        let parsed = if FILE_BYTES_MAX < found {
+            Err(ReadError::TooLarge { found, limit: FILE_BYTES_MAX })
+        } else {
+            Self::parse(&std::fs::read(path).map_err(unreadable)?)
+        };
+        parsed.map_err(|fault| ReadError::InFile { path: path.to_path_buf(), fault: Box::new(fault) })
+    }
+
+    /// Decodes and checks a file held in memory.
+    ///
+    /// # Errors
+    /// When anything in it is not as `FORMAT.md` says.
+    pub fn parse(bytes: &[u8]) -> Result<Self, ReadError> {
+        let found = bytes.len() as u64;
+        if FILE_BYTES_MAX < found {
+            return Err(ReadError::TooLarge { found, limit: FILE_BYTES_MAX });
+        }
+        let (header, header_length) = Header::parse(bytes)?;
+        let index = index::parse(bytes, &header, header_length)?;
+        let columns = header.west..header.east;
+        let places = (header.south..header.north).flat_map(|row| columns.clone().map(move |col| (row, col)));
+        let modules = places
+            .zip(&index)
+            .map(|(place, entry)| Module::parse(section(bytes, entry), &header, entry, place))
+            .collect::<Result<_, _>>()?;
+        Ok(Self { header, index, modules })
+    }
+
+    /// What holds for all load modules of the file.
+    pub fn header(&self) -> &Header {
+        &self.header
+    }
+
+    /// One entry per load module, row by row from the south-west.
+    pub fn index(&self) -> &[IndexEntry] {
+        &self.index
+    }
+
+    /// All load modules, row by row from the south-west.
+    pub fn modules(&self) -> &[Module] {
+        &self.modules
+    }
+
+    /// The load module at (`row`, `col`) of the area; `None` when it lies in another tile.
+    pub fn module(&self, row: u32, col: u32) -> Option<&Module> {
+        self.header.index_of(row, col).and_then(|index| self.modules.get(index))
+    }
+}
+
+/// The bytes of one section. The index has been checked against the length of the file.
+fn section<'a>(bytes: &'a [u8], entry: &IndexEntry) -> &'a [u8] {
+    let start = entry.offset as usize;
+    &bytes[start..start + entry.length as usize]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Section;
+    use crate::sample;
+
+    #[test]
+    fn a_sound_file_is_read_as_written() {
+        let file = SlmFile::parse(&sample::file()).unwrap();
+        assert_eq!((file.header().tile_row, file.header().tile_col), (0, 1));
+        assert_eq!(file.header().crs, "EPSG:32611");
+        assert_eq!(file.header().module_origin_m(2, 3), [501_500.0, 3_876_000.25]);
+        assert_eq!(file.modules().len(), 2);
+        let module = file.module(2, 4).unwrap();
+        assert_eq!(module.triangles, [[0, 1, 2], [0, 2, 3], [1, 4, 2], [2, 4, 3]]);
+        assert_eq!(module.sides, [vec![0, 1], vec![1, 4], vec![3, 4], vec![0, 3]]);
+        assert_eq!(module.classes, [1, 0, 0, 2]);
+        assert_eq!(module.residual.rms_m(), Some(1.0));
+        assert!(file.module(2, 5).is_none() && file.module(1, 4).is_none());
+    }
+
+    #[test]
+    fn every_truncation_is_an_error() {
+        let bytes = sample::file();
+        for length in 0..bytes.len() {
+            assert!(SlmFile::parse(&bytes[..length]).is_err(), "the first {length} bytes were accepted");
+        }
+    }
+
+    #[test]
+    fn every_flipped_bit_is_an_error() {
+        let mut bytes = sample::file();
+        for at in 0..bytes.len() {
+            for bit in 0..8 {
+                bytes[at] ^= 1 << bit;
+                assert!(SlmFile::parse(&bytes).is_err(), "bit {bit} of byte {at} was flipped and accepted");
+                bytes[at] ^= 1 << bit;
+            }
+        }
+    }
+
+    #[test]
+    fn every_byte_set_to_anything_is_an_error_where_checksums_are_mended() {
+        // With the checksums made right again only the checks of meaning are left: none may panic.
+        let good = sample::file();
+        for at in 0..good.len() {
+            for value in [0, 1, 0x7f, 0x80, 0xff] {
+                let mut bytes = good.clone();
+                bytes[at] = value;
+                sample::mend_checksums(&mut bytes);
+                let _ = SlmFile::parse(&bytes);
+            }
+        }
+    }
+
+    #[test]
+    fn extra_bytes_are_an_error() {
+        let mut bytes = sample::file();
+        let expected = bytes.len() as u64;
+        bytes.push(0);
+        let error = SlmFile::parse(&bytes).unwrap_err();
+        assert!(matches!(error, ReadError::WrongLength { found, expected: e } if found == e + 1 && e == expected));
+    }
+
+    #[test]
+    fn another_version_is_named() {
+        let mut bytes = sample::file();
+        bytes[8] = 2;
+        let error = SlmFile::parse(&bytes).unwrap_err();
+        assert_eq!(error.to_string(), "header, offset 8: found format version 2, expected 1");
+    }
+
+    #[track_caller]
+    fn check_damage(damage: impl FnOnce(&mut [u8], usize), expected: &str) {
+        let mut bytes = sample::file();
+        let section = SlmFile::parse(&bytes).unwrap().index()[1].offset as usize;
+        damage(&mut bytes, section);
+        sample::mend_checksums(&mut bytes);
+        let error = SlmFile::parse(&bytes).unwrap_err().to_string();
+        assert!(error.contains(expected), "{error:?} does not say {expected:?}");
+    }
+
+    #[test]
+    fn what_checksums_cannot_know_is_checked_too() {
+        let triangles = FIXED_AT + 5 * 8;
+        check_damage(|bytes, at| bytes[at + 4] = 9, "load module 2,4, offset 340: found column 9, expected 4");
+        check_damage(|bytes, at| bytes[at + triangles] = 5, "found vertex of a triangle 5, expected 0 to 4");
+        check_damage(|bytes, at| bytes[at + triangles + 2..][..4].copy_from_slice(&[2, 0, 1, 0]), "doubled area");
+        check_damage(|bytes, at| bytes[at + triangles + 24] = 1, "found vertex on a side 1, expected 0");
+        check_damage(|bytes, at| bytes[at + FIXED_AT + 5] = 90, "highest height");
+        check_damage(|bytes, at| bytes[at + FIXED_AT + 3] = 0xff, "found y 65280, expected 0 to 64000");
+        check_damage(|bytes, at| bytes[at + 24] = 3, "found length in the index");
+        check_damage(|bytes, _| bytes[32] = 2, "header, offset 44: found north 3, expected 1 to 2");
+    }
+
+    const FIXED_AT: usize = crate::FIXED_MODULE_BYTES;
+
+    #[test]
+    fn damage_names_the_load_module() {
+        let mut bytes = sample::file();
+        let last = bytes.len() - 1;
+        bytes[last] ^= 1;
+        let error = SlmFile::parse(&bytes).unwrap_err();
+        assert!(matches!(error, ReadError::WrongChecksum { section: Section::Module { row: 2, col: 4 }, .. }));
+    }
+
+    #[test]
+    fn a_missing_file_is_named() {
+        let error = SlmFile::open("no/such/r00c00.slm").unwrap_err();
+        assert!(error.to_string().starts_with("no/such/r00c00.slm: "));
+    }
+}

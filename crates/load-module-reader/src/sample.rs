@@ -1,0 +1,113 @@
+//! A small file for the tests, put together byte by byte from `FORMAT.md` alone.
+
+use crate::{FIXED_HEADER_BYTES, FIXED_MODULE_BYTES, MAGIC};
+
+const CRS: &[u8] = b"EPSG:32611";
+const DATUM: &[u8] = b"EGM96";
+
+/// Load modules 2,3 and 2,4 of tile 0,1.
+pub(crate) fn file() -> Vec<u8> {
+    let header_length = (FIXED_HEADER_BYTES + CRS.len() + DATUM.len()).next_multiple_of(4) + 4;
+    let flat = [(0, 0, 640), (64_000, 0, 640), (0, 64_000, 640), (64_000, 64_000, 640)];
+    let pyramid = [(0, 0, 640), (64_000, 0, 640), (30_000, 20_000, -7), (0, 64_000, 640), (64_000, 64_000, 640)];
+    let sections = [
+        module(3, &flat, &[[0, 1, 3], [0, 3, 2]], [[0, 1], [1, 3], [2, 3], [0, 2]], &[0, 1]),
+        module(
+            4,
+            &pyramid,
+            &[[0, 1, 2], [0, 2, 3], [1, 4, 2], [2, 4, 3]],
+            [[0, 1], [1, 4], [3, 4], [0, 3]],
+            &[1, 0, 0, 2],
+        ),
+    ];
+    let index_length = 2 * 32 + 4;
+    let file_length = header_length + index_length + sections[0].len() + sections[1].len();
+    let mut file = header(header_length, file_length);
+    let mut offset = header_length + index_length;
+    for (section, counts) in sections.iter().zip([[4, 2, 1], [5, 4, 4]]) {
+        put(&mut file, &(offset as u64).to_le_bytes());
+        put(&mut file, &(section.len() as u32).to_le_bytes());
+        counts.iter().for_each(|count: &u32| put(&mut file, &count.to_le_bytes()));
+        let low: i32 = if counts[0] == 5 { -7 } else { 640 };
+        put(&mut file, &low.to_le_bytes());
+        put(&mut file, &640i32.to_le_bytes());
+        offset += section.len();
+    }
+    put(&mut file, &[0; 4]);
+    sections.iter().for_each(|section| put(&mut file, section));
+    mend_checksums(&mut file);
+    file
+}
+
+fn put(file: &mut Vec<u8>, bytes: &[u8]) {
+    file.extend_from_slice(bytes);
+}
+
+fn header(header_length: usize, file_length: usize) -> Vec<u8> {
+    let mut file = MAGIC.to_vec();
+    put(&mut file, &[1, 0, 1, 0]);
+    put(&mut file, &(header_length as u32).to_le_bytes());
+    put(&mut file, &(file_length as u64).to_le_bytes());
+    for value in [0, 1, 4, 5, 2, 3, 3, 5, 64_000u32, 20, 400, 128] {
+        put(&mut file, &value.to_le_bytes());
+    }
+    put(&mut file, &500_000.0f64.to_le_bytes());
+    put(&mut file, &3_875_000.25f64.to_le_bytes());
+    put(&mut file, &[CRS.len() as u8, 0, DATUM.len() as u8, 0]);
+    put(&mut file, &[0xab; 32]);
+    put(&mut file, CRS);
+    put(&mut file, DATUM);
+    file.resize(header_length, 0);
+    file
+}
+
+fn module(
+    col: u32,
+    vertices: &[(u16, u16, i32)],
+    triangles: &[[u16; 3]],
+    sides: [[u16; 2]; 4],
+    classes: &[u8],
+) -> Vec<u8> {
+    let polygons = if vertices.len() == 4 { 1 } else { 4 };
+    let mut bytes = Vec::new();
+    for value in [2, col, 0, vertices.len() as u32, triangles.len() as u32, polygons] {
+        put(&mut bytes, &value.to_le_bytes());
+    }
+    put(&mut bytes, &[2, 0, 2, 0, 2, 0, 2, 0]);
+    put(&mut bytes, &400u32.to_le_bytes());
+    put(&mut bytes, &128u32.to_le_bytes());
+    put(&mut bytes, &(400u64 * 128).to_le_bytes());
+    put(&mut bytes, &(400u64 * 128 * 128).to_le_bytes());
+    assert_eq!(bytes.len(), FIXED_MODULE_BYTES);
+    for &(x, y, z) in vertices {
+        put(&mut bytes, &x.to_le_bytes());
+        put(&mut bytes, &y.to_le_bytes());
+        put(&mut bytes, &z.to_le_bytes());
+    }
+    triangles.iter().flatten().for_each(|v| put(&mut bytes, &v.to_le_bytes()));
+    sides.iter().flatten().for_each(|v| put(&mut bytes, &v.to_le_bytes()));
+    put(&mut bytes, classes);
+    bytes.resize(bytes.len().next_multiple_of(4) + 4, 0);
+    bytes
+}
+
+/// Makes the checksums right again where the lengths still allow it.
+pub(crate) fn mend_checksums(file: &mut [u8]) {
+    let header_length = u32::from_le_bytes([file[12], file[13], file[14], file[15]]) as usize;
+    mend(file, 0, header_length);
+    mend(file, header_length, 2 * 32 + 4);
+    for entry in 0..2 {
+        let at = header_length.saturating_add(entry * 32);
+        let Some(bytes) = file.get(at..).and_then(|rest| rest.get(..12)) else { return };
+        let word = |i: usize| u32::from_le_bytes([bytes[i], bytes[i + 1], bytes[i + 2], bytes[i + 3]]) as usize;
+        let (offset, length) = (word(0), word(8));
+        mend(file, offset, length);
+    }
+}
+
+fn mend(file: &mut [u8], start: usize, length: usize) {
+    let Some(section) = file.get_mut(start..).and_then(|rest| rest.get_mut(..length)) else { return };
+    if let Some((bytes, checksum)) = section.split_last_chunk_mut::<4>() {
+        *checksum = crc32fast::hash(bytes).to_le_bytes();
+    }
+}

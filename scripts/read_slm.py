@@ -1,0 +1,213 @@
+#!/usr/bin/env python3
+"""Reads a load-module file, as FORMAT.md describes it: prints a summary, or everything as JSON.
+
+    python3 scripts/read_slm.py ntc.tdb/modules/r00c00.slm
+    python3 scripts/read_slm.py --json ntc.tdb/modules/r00c00.slm
+
+Written from that page alone, with nothing but the standard library, to show that the page is enough.
+Exit codes: 0 read, 2 damaged or unreadable.
+"""
+
+import argparse
+import json
+import math
+import struct
+import sys
+import zlib
+
+MAGIC = b"\x89SLM\r\n\x1a\n"
+VERSION = 1
+FIXED_HEADER_BYTES = 124
+ENTRY = struct.Struct("<QIIIIii")
+SECTION = struct.Struct("<IIIIII4HIIQQ")
+SIDES = ["south", "east", "north", "west"]
+
+
+class Damaged(Exception):
+    """The file is not as FORMAT.md says."""
+
+
+def expect(holds, part, what):
+    if not holds:
+        raise Damaged(f"{part}: {what}")
+
+
+def checked(data, start, length, part):
+    """The part of `data` that ends with its checksum, without the checksum."""
+    expect(4 <= length and start + length <= len(data), part, f"{length} bytes at {start} of a file of {len(data)}")
+    body = data[start : start + length - 4]
+    (stored,) = struct.unpack_from("<I", data, start + length - 4)
+    found = zlib.crc32(body)
+    expect(found == stored, part, f"found checksum {found:08x}, expected {stored:08x}")
+    return body
+
+
+def padded(length):
+    return (length + 3) // 4 * 4
+
+
+def parse(data):
+    """The header, and the load modules in the order of the file."""
+    header, header_length = parse_header(data)
+    (south, north), (west, east) = header["rows"], header["columns"]
+    places = [(row, column) for row in range(south, north) for column in range(west, east)]
+    index_length = ENTRY.size * len(places) + 4
+    index = checked(data, header_length, index_length, "index")
+    end = header_length + index_length
+    modules = []
+    for place, entry in zip(places, ENTRY.iter_unpack(index)):
+        expect(entry[0] == end, "index", f"load module {place} begins at {entry[0]}, expected {end}")
+        modules.append(parse_module(data, header["side"], place, entry))
+        end += entry[1]
+    expect(end == len(data), "index", f"sections end at {end} of a file of {len(data)}")
+    return header, modules
+
+
+def parse_header(data):
+    part = "header"
+    expect(FIXED_HEADER_BYTES <= len(data), part, f"found {len(data)} bytes, expected {FIXED_HEADER_BYTES} or more")
+    expect(data[:8] == MAGIC, part, f"found {data[:8].hex(' ')}, expected {MAGIC.hex(' ')}")
+    version, levels, length, file_length = struct.unpack_from("<HHIQ", data, 8)
+    expect(version == VERSION, part, f"found version {version}, expected {VERSION}")
+    expect(FIXED_HEADER_BYTES + 4 <= length, part, f"found header length {length}")
+    body = checked(data, 0, length, part)
+    expect(levels == 1, part, f"found {levels} levels, expected 1")
+    expect(file_length == len(data), part, f"found {len(data)} bytes, expected {file_length}")
+    tile_row, tile_column, area_rows, area_columns = struct.unpack_from("<4I", body, 24)
+    south, north, west, east = struct.unpack_from("<4I", body, 40)
+    expect(south < north <= area_rows, part, f"rows {south} to {north} of {area_rows}")
+    expect(west < east <= area_columns, part, f"columns {west} to {east} of {area_columns}")
+    side, cells, spacing, quanta = struct.unpack_from("<4I", body, 56)
+    expect(side == cells * spacing * 8 and 0 < side < 65536, part, f"side {side} of {cells} cells of {spacing}")
+    expect(quanta == 128, part, f"found {quanta} quanta per metre, expected 128")
+    origin = struct.unpack_from("<2d", body, 72)
+    expect(all(map(math.isfinite, origin)), part, f"origin {origin}")
+    crs_length, datum_length = struct.unpack_from("<2H", body, 88)
+    texts_end = FIXED_HEADER_BYTES + crs_length + datum_length
+    expect(len(body) == padded(texts_end) and not any(body[texts_end:]), part, f"texts end at {texts_end}")
+    texts = body[FIXED_HEADER_BYTES:texts_end]
+    try:
+        crs, datum = texts[:crs_length].decode(), texts[crs_length:].decode()
+    except UnicodeDecodeError as error:
+        raise Damaged(f"{part}: {error}") from error
+    return {
+        "tile": [tile_row, tile_column],
+        "area_modules": [area_rows, area_columns],
+        "rows": [south, north],
+        "columns": [west, east],
+        "side": side,
+        "side_cells": cells,
+        "spacing_m": spacing / 16,
+        "origin_m": list(origin),
+        "crs": crs,
+        "vertical_datum": datum,
+        "fingerprint": body[92:124].hex(),
+    }, length
+
+
+def parse_module(data, side, place, entry):
+    part = f"load module {place[0]},{place[1]}"
+    offset, length, vertex_count, triangle_count, polygons, lowest, highest = entry
+    body = checked(data, offset, length, part)
+    expect(SECTION.size <= len(body), part, f"found a section of {length} bytes")
+    row, column, level, *counts = SECTION.unpack_from(body)
+    expect((row, column, level) == (*place, 0), part, f"found row {row}, column {column}, level {level}")
+    expect(tuple(counts[:3]) == (vertex_count, triangle_count, polygons), part, f"found counts {counts[:3]}")
+    expect(4 <= vertex_count <= 65535 and 1 <= polygons <= triangle_count, part, f"found counts {counts[:3]}")
+    side_counts, residual = counts[3:7], counts[7:]
+    triangles_at = SECTION.size + 8 * vertex_count
+    sides_at = triangles_at + 6 * triangle_count
+    classes_at = sides_at + 2 * sum(side_counts)
+    end = classes_at + triangle_count
+    expect(len(body) == padded(end) and not any(body[end:]), part, f"found {len(body)} bytes, expected {padded(end)}")
+    vertices = list(struct.iter_unpack("<HHi", body[SECTION.size : triangles_at]))
+    triangles = list(struct.iter_unpack("<3H", body[triangles_at:sides_at]))
+    on_sides = list(struct.unpack(f"<{sum(side_counts)}H", body[sides_at:classes_at]))
+    sides = {}
+    for name, count in zip(SIDES, side_counts):
+        sides[name], on_sides = on_sides[:count], on_sides[count:]
+    check_vertices(vertices, side, (lowest, highest), part)
+    check_triangles(triangles, vertices, side, part)
+    check_sides(sides, vertices, side, part)
+    return {
+        "row": row,
+        "column": column,
+        "polygons": polygons,
+        "residual": dict(zip(["posts", "largest", "sum_abs", "sum_squared"], residual)),
+        "vertices": vertices,
+        "triangles": triangles,
+        "sides": sides,
+        "classes": list(body[classes_at:end]),
+    }
+
+
+def check_vertices(vertices, side, heights, part):
+    places = [(y, x) for x, y, _ in vertices]
+    expect(all(max(place) <= side for place in places), part, "a vertex lies outside the square")
+    expect(all(a < b for a, b in zip(places, places[1:])), part, "vertices are not sorted")
+    found = (min(z for _, _, z in vertices), max(z for _, _, z in vertices))
+    expect(found == heights, part, f"found heights {found}, expected {heights}")
+
+
+def check_triangles(triangles, vertices, side, part):
+    total = 0
+    for triangle in triangles:
+        expect(max(triangle) < len(vertices), part, f"triangle {triangle} names a vertex of {len(vertices)}")
+        expect(triangle[0] < min(triangle[1:]), part, f"triangle {triangle} does not begin with its smallest vertex")
+        (ax, ay, _), (bx, by, _), (cx, cy, _) = (vertices[corner] for corner in triangle)
+        doubled = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
+        expect(0 < doubled, part, f"triangle {triangle} is not counter-clockwise")
+        total += doubled
+    expect(all(a < b for a, b in zip(triangles, triangles[1:])), part, "triangles are not sorted")
+    expect(total == 2 * side * side, part, f"found doubled area {total}, expected {2 * side * side}")
+
+
+def check_sides(sides, vertices, side, part):
+    lies_on = {
+        "south": lambda x, y: y == 0,
+        "east": lambda x, y: x == side,
+        "north": lambda x, y: y == side,
+        "west": lambda x, y: x == 0,
+    }
+    for name, found in sides.items():
+        expected = [index for index, (x, y, _) in enumerate(vertices) if lies_on[name](x, y)]
+        expect(found == expected, part, f"found {name}ern side {found}, expected {expected}")
+
+
+def summary(header, modules):
+    posts = sum(module["residual"]["posts"] for module in modules)
+    squares = sum(module["residual"]["sum_squared"] for module in modules)
+    triangles = [len(module["triangles"]) for module in modules]
+    (south, north), (west, east) = header["rows"], header["columns"]
+    return "\n".join(
+        [
+            f"tile           {header['tile'][0]},{header['tile'][1]}",
+            f"crs            {header['crs']}, heights above {header['vertical_datum'] or 'an unknown datum'}",
+            f"origin         {header['origin_m'][0]} east, {header['origin_m'][1]} north (of the area)",
+            f"load modules   {len(modules)}: rows {south} to {north - 1}, columns {west} to {east - 1}",
+            f"side           {header['side'] / 128} m, spacing {header['spacing_m']} m",
+            f"triangles      {sum(triangles)}, at most {max(triangles)} in a load module",
+            f"polygons       {sum(module['polygons'] for module in modules)}",
+            f"rms residual   {math.sqrt(squares / posts) / 128:.3f} m over {posts} posts" if posts else "no posts",
+        ]
+    )
+
+
+def main():
+    arguments = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    arguments.add_argument("file", help="a file of modules/, such as ntc.tdb/modules/r00c00.slm")
+    arguments.add_argument("--json", action="store_true", help="print everything as JSON")
+    options = arguments.parse_args()
+    try:
+        with open(options.file, "rb") as file:
+            header, modules = parse(file.read())
+    except (Damaged, OSError) as error:
+        reason = error.strerror if isinstance(error, OSError) else error
+        print(f"{options.file}: {reason}", file=sys.stderr)
+        return 2
+    print(json.dumps({"header": header, "modules": modules}) if options.json else summary(header, modules))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
