@@ -1,1 +1,10 @@
-//! (to be written)
+//! How true the ground is: residuals of load modules against the posts they own, exact.
+//!
+//! Each post of the area is owned by one load module and there by one triangle (south and west lines
+//! inside; the far lines only on the area's northern and eastern border), so sums over load modules are sums
+//! over the area. Voids are in no figure. Everything is whole quanta of 1/128 m until it is reported.
+
+mod tally;
+pub use tally::{Residuals, Tally};
+mod measure;
+pub use measure::{Ground, measure, residuals};

@@ -37,68 +37,22 @@ impl PostGrid {
     }
 }
 
-/// Calls `visit` with each row that holds owned posts and the range of their columns, both counted from the
-/// origin, from south to north.
-///
-/// `facet` is counter-clockwise with corners at most 2^17 from the origin.
-#[inline]
-pub fn visit_rows(grid: &PostGrid, facet: &Facet, mut visit: impl FnMut(i32, Range<i32>)) {
-    let [low, middle, high] = by_height(facet);
-    let step = grid.units_per_post;
-    let first_at = |y: i32| ceil_div(y, step);
-    let (first, turn, end) = (first_at(low.1), first_at(middle.1), first_at(high.1));
-    // The long side from the lowest to the highest corner is the left one when the middle corner lies east of it.
-    let (dx, dy) = (i64::from(high.0 - low.0), i64::from(high.1 - low.1));
-    let long_is_left = dx * i64::from(middle.1 - low.1) < i64::from(middle.0 - low.0) * dy;
-    let mut row = |row: i32, long: &Walk, short: &Walk| {
-        let (left, right) = if long_is_left { (long, short) } else { (short, long) };
-        let cols = owned_cols(grid, left, right);
-        if !cols.is_empty() {
-            visit(row, cols);
-        }
-    };
-    if first < end {
-        let mut long = Walk::start(low, high, first, step);
-        if first < turn {
-            let mut short = Walk::start(low, middle, first, step);
-            for k in first..turn {
-                row(k, &long, &short);
-                long.north();
-                short.north();
-            }
-        }
-        if turn < end {
-            let mut short = Walk::start(middle, high, turn, step);
-            for k in turn..end {
-                row(k, &long, &short);
-                long.north();
-                short.north();
-            }
-        }
-    }
-    // A flat top on the northern border owns that row; a tip there has no width just south of it.
-    if grid.far_row.is_some_and(|far| far * step == high.1) && middle.1 == high.1 {
-        let at = |x: i32| Walk::fixed(x, step);
-        let cols = owned_cols(grid, &at(middle.0.min(high.0)), &at(middle.0.max(high.0)));
-        if !cols.is_empty() {
-            visit(high.1 / step, cols);
-        }
-    }
-}
-
 /// Calls `visit` with each owned post and its residual: DEM height less the triangle's, in quanta, rounded
 /// half away from zero.
 ///
 /// Corners lie at most 2^16 units apart, heights have 24 bits, so all products stay below 2^61.
-#[inline]
-pub fn visit_residuals(grid: &PostGrid, facet: &Facet, dem: &Dem, mut visit: impl FnMut(Post, i64)) {
+///
+/// # Panics
+/// When the DEM window does not hold the triangle.
+#[inline(always)]
+pub fn visit_residuals(grid: &PostGrid, facet: &Facet, dem: &Dem, mut visit: impl FnMut(Post, i32)) {
     let division = Division::by(facet.den);
     let step = i64::from(grid.units_per_post);
     let (x0, y0, plane0) = (i64::from(facet.x[0]), i64::from(facet.y[0]), i64::from(facet.z[0]) * facet.den);
     let east = facet.px * step;
-    visit_rows(grid, facet, |row, cols| {
-        let mut plane =
-            plane0 + facet.px * (i64::from(cols.start) * step - x0) + facet.py * (i64::from(row) * step - y0);
+    for (row, cols) in OwnedRows::new(grid, facet) {
+        let (dx, dy) = (i64::from(cols.start) * step - x0, i64::from(row) * step - y0);
+        let mut plane = plane0 + facet.px * dx + facet.py * dy;
         let first = Post::new(grid.origin.row + row, grid.origin.col + cols.start);
         let skipped = (first.col - dem.rect().west) as usize;
         let heights = &dem.row(first.row)[skipped..skipped + cols.len()];
@@ -106,7 +60,98 @@ pub fn visit_residuals(grid: &PostGrid, facet: &Facet, dem: &Dem, mut visit: imp
             visit(Post::new(first.row, col), division.rounded(i64::from(height) * facet.den - plane));
             plane += east;
         }
-    });
+    }
+}
+
+/// The rows that hold owned posts of a triangle and the range of their columns, both counted from the origin,
+/// from south to north.
+#[derive(Clone)]
+pub struct OwnedRows {
+    far_col: Option<i32>,
+    units_per_post: i32,
+    posts_per_unit: f64,
+    middle: (i32, i32),
+    high: (i32, i32),
+    /// The next row, the first one at or north of the middle corner, and of the highest corner.
+    row: i32,
+    turn: i32,
+    end: i32,
+    /// Whether the long side, from the lowest to the highest corner, is the left one.
+    long_is_left: bool,
+    long: Walk,
+    short: Walk,
+    /// The row of a flat top on the area's northern border.
+    top: Option<i32>,
+}
+
+impl OwnedRows {
+    /// The rows of a counter-clockwise `facet` with corners at most 2^17 units from the origin.
+    #[inline(always)]
+    pub fn new(grid: &PostGrid, facet: &Facet) -> Self {
+        let [low, middle, high] = by_height(facet);
+        let step = grid.units_per_post;
+        let posts_per_unit = 1.0 / f64::from(step);
+        let first_at = |y: i32| -floored(-i64::from(y), i64::from(step), -f64::from(y) * posts_per_unit).0;
+        let (row, turn, end) = (first_at(low.1), first_at(middle.1), first_at(high.1));
+        let (dx, dy) = (i64::from(high.0 - low.0), i64::from(high.1 - low.1));
+        let long_is_left = dx * i64::from(middle.1 - low.1) < i64::from(middle.0 - low.0) * dy;
+        let long = Walk::start(low, high, row, (step, posts_per_unit));
+        let short = if row < turn { Walk::start(low, middle, row, (step, posts_per_unit)) } else { long };
+        // A flat top on the northern border owns that row; a tip there has no width just south of it.
+        let is_top = grid.far_row.is_some_and(|far| far * step == high.1) && middle.1 == high.1;
+        let top = is_top.then_some(end);
+        let far_col = grid.far_col;
+        Self {
+            far_col,
+            units_per_post: step,
+            posts_per_unit,
+            middle,
+            high,
+            row,
+            turn,
+            end,
+            long_is_left,
+            long,
+            short,
+            top,
+        }
+    }
+
+    /// Columns between two crossings: the left one itself is inside, the right one is not, except on the
+    /// area's eastern border.
+    #[inline(always)]
+    fn cols(&self, left: &Walk, right: &Walk) -> Range<i32> {
+        let (start, mut end) = (left.ceil(), right.ceil());
+        if self.far_col == Some(right.floor) && left.floor < right.floor {
+            end += 1;
+        }
+        start..end
+    }
+}
+
+impl Iterator for OwnedRows {
+    type Item = (i32, Range<i32>);
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<Self::Item> {
+        while self.row < self.end {
+            if self.row == self.turn {
+                self.short = Walk::start(self.middle, self.high, self.row, (self.units_per_post, self.posts_per_unit));
+            }
+            let (left, right) = if self.long_is_left { (&self.long, &self.short) } else { (&self.short, &self.long) };
+            let (row, cols) = (self.row, self.cols(left, right));
+            self.row += 1;
+            self.long.north();
+            self.short.north();
+            if !cols.is_empty() {
+                return Some((row, cols));
+            }
+        }
+        let row = self.top.take()?;
+        let at = |x: i32| Walk::fixed(x, self.units_per_post);
+        let (west, east) = (self.middle.0.min(self.high.0), self.middle.0.max(self.high.0));
+        Some((row, self.cols(&at(west), &at(east)))).filter(|(_, cols)| !cols.is_empty())
+    }
 }
 
 /// Corners as (x, y), from the southernmost to the northernmost.
@@ -124,21 +169,6 @@ fn by_height(facet: &Facet) -> [(i32, i32); 3] {
     [a, b, c]
 }
 
-/// Columns between two sides of a triangle: the left crossing itself is inside, the right one is not,
-/// except on the area's eastern border.
-#[inline(always)]
-fn owned_cols(grid: &PostGrid, left: &Walk, right: &Walk) -> Range<i32> {
-    let (start, mut end) = (left.ceil(), right.ceil());
-    if grid.far_col == Some(right.floor) && left.floor < right.floor {
-        end += 1;
-    }
-    start..end
-}
-
-fn ceil_div(numerator: i32, den: i32) -> i32 {
-    -(-numerator).div_euclid(den)
-}
-
 /// Where a side crosses the rows of posts: (floor + remainder / den) posts east of the origin.
 #[derive(Clone, Copy)]
 struct Walk {
@@ -152,18 +182,16 @@ struct Walk {
 impl Walk {
     /// The side from `low` up to `high`, which is higher, at row `row`.
     #[inline(always)]
-    fn start(low: (i32, i32), high: (i32, i32), row: i32, units_per_post: i32) -> Self {
-        let (dx, dy) = (high.0 - low.0, high.1 - low.1);
-        let den = i64::from(dy) * i64::from(units_per_post);
-        let north = i64::from(row) * i64::from(units_per_post) - i64::from(low.1);
-        let east = i64::from(low.0) * i64::from(dy) + north * i64::from(dx);
-        Self {
-            floor: east.div_euclid(den) as i32,
-            remainder: east.rem_euclid(den),
-            den,
-            step_floor: dx.div_euclid(dy),
-            step_remainder: i64::from(dx.rem_euclid(dy)) * i64::from(units_per_post),
-        }
+    fn start(low: (i32, i32), high: (i32, i32), row: i32, (units_per_post, posts_per_unit): (i32, f64)) -> Self {
+        let (dx, dy) = (i64::from(high.0) - i64::from(low.0), i64::from(high.1) - i64::from(low.1));
+        let units = i64::from(units_per_post);
+        let den = dy * units;
+        let east = i64::from(low.0) * dy + (i64::from(row) * units - i64::from(low.1)) * dx;
+        let reciprocal = 1.0 / dy as f64;
+        let (floor, remainder) = floored(east, den, east as f64 * reciprocal * posts_per_unit);
+        // A row further north, the place moves by dx / dy posts.
+        let (step_floor, step_remainder) = floored(dx, dy, dx as f64 * reciprocal);
+        Self { floor, remainder, den, step_floor, step_remainder: step_remainder * units }
     }
 
     /// The place `x` itself.
@@ -188,10 +216,28 @@ impl Walk {
     }
 }
 
+/// Floor and remainder of `numerator / den`, given the quotient within a thousandth: its nearest whole number
+/// is the floor or the next one.
+#[inline(always)]
+fn floored(numerator: i64, den: i64, quotient: f64) -> (i32, i64) {
+    let nearest = nearest(quotient);
+    let remainder = numerator - i64::from(nearest) * den;
+    let above = remainder < 0;
+    (nearest - i32::from(above), remainder + if above { den } else { 0 })
+}
+
+/// The whole number nearest to `v`, for |v| < 2^31: the sum has its last binary place at one, so its low bits
+/// are that number.
+#[inline(always)]
+fn nearest(v: f64) -> i32 {
+    const PLACE_OF_ONE: f64 = (1_u64 << 52) as f64 * 1.5;
+    (v + PLACE_OF_ONE).to_bits() as i32
+}
+
 /// Division by one number many times: a reciprocal guesses, the remainder decides.
 ///
-/// The guess is off by less than one because the quotient has at most 26 bits and the product at most
-/// three roundings of 2^-53; so one comparison on either side makes it exact.
+/// The guess is the nearest whole number or, close to a half, its other neighbour, because the quotient has at
+/// most 26 bits and the product at most three roundings of 2^-53; one comparison on either side makes it exact.
 #[derive(Clone, Copy)]
 struct Division {
     den: i64,
@@ -199,18 +245,19 @@ struct Division {
 }
 
 impl Division {
+    #[inline(always)]
     fn by(den: i64) -> Self {
         Self { den, reciprocal: 1.0 / den as f64 }
     }
 
-    /// `numerator / den`, half away from zero; both below 2^60, the quotient below 2^26.
+    /// `numerator / den`, half away from zero; the numerator below 2^60, the quotient below 2^26.
     #[inline(always)]
-    fn rounded(&self, numerator: i64) -> i64 {
-        let size = numerator.abs();
-        let guess = (size as f64 * self.reciprocal + 0.5) as i64;
-        let doubled_rest = 2 * size + self.den - 2 * guess * self.den;
-        let quotient = guess - i64::from(doubled_rest < 0) + i64::from(2 * self.den <= doubled_rest);
-        if numerator < 0 { -quotient } else { quotient }
+    fn rounded(&self, numerator: i64) -> i32 {
+        let guess = nearest(numerator as f64 * self.reciprocal);
+        let doubled_rest = 2 * (numerator - i64::from(guess) * self.den);
+        let up = self.den < doubled_rest + i64::from(0 < numerator);
+        let down = doubled_rest - i64::from(numerator < 0) < -self.den;
+        guess + i32::from(up) - i32::from(down)
     }
 }
 
@@ -245,7 +292,7 @@ mod tests {
     #[track_caller]
     fn check(grid: &PostGrid, posts: i32, facet: &Facet) {
         let mut found = Vec::new();
-        visit_rows(grid, facet, |row, cols| found.extend(cols.map(|col| (row, col))));
+        OwnedRows::new(grid, facet).for_each(|(row, cols)| found.extend(cols.map(|col| (row, col))));
         let all = (0..=posts).flat_map(|row| (0..=posts).map(move |col| (row, col)));
         let last = |v: i32, far: Option<i32>| v < posts || far == Some(posts);
         let expected: Vec<_> = all
@@ -288,8 +335,8 @@ mod tests {
                 for near in -2..=2 {
                     let numerator: i64 = quotient * den + den / 2 + near;
                     let expected = numerator.signum() * ((2 * numerator.abs() + den) / (2 * den));
-                    assert_eq!(division.rounded(numerator), expected, "{numerator} / {den}");
-                    assert_eq!(division.rounded(-numerator), -expected, "-{numerator} / {den}");
+                    assert_eq!(i64::from(division.rounded(numerator)), expected, "{numerator} / {den}");
+                    assert_eq!(i64::from(division.rounded(-numerator)), -expected, "-{numerator} / {den}");
                 }
             }
         }

@@ -11,7 +11,6 @@ macro_rules! largest_in_box {
         /// Largest `|n|` over the posts of a triangle whose bounding box fits the lanes.
         #[inline(always)]
         pub fn $name<S: Simd>(simd: S, surface: &Surface, facet: &Facet, x0: i32, y0: i32, y1: i32) -> u64 {
-            let splat = |value: i32| $lanes::splat(simd, value);
             let iota = $lanes::from_slice(simd, &IOTA[..$wide]);
             let (den, px, py) = (facet.den as i32, facet.px as i32, facet.py as i32);
             let start = facet.z[0]
@@ -19,15 +18,19 @@ macro_rules! largest_in_box {
                 .wrapping_add(px.wrapping_mul(x0 - facet.x[0]))
                 .wrapping_add(py.wrapping_mul(y0 - facet.y[0]));
             // den < 2^31 bounds the edge functions over a box this narrow, so they do not wrap.
-            let edge = |i: usize, j: usize| {
+            let ends = [(0, 1), (1, 2), (2, 0)].map(|(i, j)| {
                 let (dx, dy) = (facet.x[j] - facet.x[i], facet.y[j] - facet.y[i]);
-                let first = dx * (y0 - facet.y[i]) - dy * (x0 - facet.x[i]);
-                (splat(first) - iota * splat(dy), splat(dx))
-            };
-            let ((mut w0, step0), (mut w1, step1), (mut w2, step2)) = (edge(0, 1), edge(1, 2), edge(2, 0));
-            let (den, step) = (splat(den), splat(py));
-            let mut plane = iota * splat(px) + splat(start);
-            let zero = splat(0);
+                (dx * (y0 - facet.y[i]) - dy * (x0 - facet.x[i]), dx, dy)
+            });
+            let [(first0, dx0, dy0), (first1, dx1, dy1), (first2, dx2, dy2)] = ends;
+            let mut w0 = $lanes::splat(simd, first0) - iota * $lanes::splat(simd, dy0);
+            let mut w1 = $lanes::splat(simd, first1) - iota * $lanes::splat(simd, dy1);
+            let mut w2 = $lanes::splat(simd, first2) - iota * $lanes::splat(simd, dy2);
+            let (step0, step1, step2) =
+                ($lanes::splat(simd, dx0), $lanes::splat(simd, dx1), $lanes::splat(simd, dx2));
+            let (den, step) = ($lanes::splat(simd, den), $lanes::splat(simd, py));
+            let mut plane = iota * $lanes::splat(simd, px) + $lanes::splat(simd, start);
+            let zero = $lanes::splat(simd, 0);
             let mut largest = zero;
             let (heights, stride) = surface.rows();
             let first = y0 as usize * stride + x0 as usize;

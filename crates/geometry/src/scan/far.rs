@@ -10,20 +10,21 @@ use fearless_simd::{Simd, f64x8, i32x16, prelude::*};
 use super::IOTA;
 use crate::{Facet, LocalPost, Spans, Surface};
 
-/// Visits the candidate posts of each span in groups of 16: row, first column, `|n|` of both halves (0
-/// beyond the span), until `visit` breaks.
+/// Looks at `|n|` of 16 posts at a time. A trait rather than a closure: closures that several callers
+/// share are compiled on their own, without the lanes of the processor.
+trait Look<S: Simd> {
+    /// The 16 posts from (row, col), as two halves; 0 beyond the span.
+    fn look(&mut self, row: i32, col: i32, low: f64x8<S>, high: f64x8<S>) -> ControlFlow<()>;
+}
+
+/// Shows the candidate posts of a closed triangle to `look`, row by row, until it breaks.
 #[inline(always)]
-fn walk<S: Simd>(
-    simd: S,
-    surface: &Surface,
-    facet: &Facet,
-    mut visit: impl FnMut(i32, i32, f64x8<S>, f64x8<S>) -> ControlFlow<()>,
-) -> ControlFlow<()> {
+fn walk<S: Simd>(simd: S, surface: &Surface, facet: &Facet, look: &mut impl Look<S>) -> ControlFlow<()> {
     let (iota_low, iota_high) = simd.cvt_f32_i32x16(i32x16::from_slice(simd, &IOTA)).widen();
-    let splat = |value: f64| f64x8::splat(simd, value);
-    let (px, den, zero) = (splat(facet.px as f64), splat(facet.den as f64), splat(0.0));
+    let px = f64x8::splat(simd, facet.px as f64);
+    let (den, zero) = (f64x8::splat(simd, facet.den as f64), f64x8::splat(simd, 0.0));
     let (east_low, east_high) = (iota_low * px, iota_high * px);
-    let stride_lanes = splat(facet.px as f64 * 16.0);
+    let stride_lanes = f64x8::splat(simd, facet.px as f64 * 16.0);
     let origin = facet.origin();
     let (heights, stride) = surface.rows();
     let candidates = surface.candidates();
@@ -32,7 +33,8 @@ fn walk<S: Simd>(
             continue;
         }
         let (mut left, right) = (span.left.max(candidates.west), span.right.min(candidates.east));
-        let first = splat((origin + facet.py * i64::from(span.row) + facet.px * i64::from(left)) as f64);
+        let first = (origin + facet.py * i64::from(span.row) + facet.px * i64::from(left)) as f64;
+        let first = f64x8::splat(simd, first);
         let (mut plane_low, mut plane_high) = (first + east_low, first + east_high);
         while left <= right {
             let index = span.row as usize * stride + left as usize;
@@ -40,11 +42,11 @@ fn walk<S: Simd>(
             let (low, high) = simd.cvt_f32_i32x16(height).widen();
             let (mut low, mut high) = (simd.abs_f64x8(low * den - plane_low), simd.abs_f64x8(high * den - plane_high));
             if right - left < 15 {
-                let end = splat(f64::from(right - left + 1));
+                let end = f64x8::splat(simd, f64::from(right - left + 1));
                 low = iota_low.simd_lt(end).select(low, zero);
                 high = iota_high.simd_lt(end).select(high, zero);
             }
-            visit(span.row, left, low, high)?;
+            look.look(span.row, left, low, high)?;
             (plane_low, plane_high) = (plane_low + stride_lanes, plane_high + stride_lanes);
             left += 16;
         }
@@ -52,15 +54,39 @@ fn walk<S: Simd>(
     ControlFlow::Continue(())
 }
 
+struct Largest<S: Simd>(f64x8<S>);
+
+impl<S: Simd> Look<S> for Largest<S> {
+    #[inline(always)]
+    fn look(&mut self, _row: i32, _col: i32, low: f64x8<S>, high: f64x8<S>) -> ControlFlow<()> {
+        self.0 = self.0.max(low).max(high);
+        ControlFlow::Continue(())
+    }
+}
+
 /// Largest `|n|` over the candidate posts of the closed triangle.
 #[inline(always)]
 pub fn largest<S: Simd>(simd: S, surface: &Surface, facet: &Facet) -> u64 {
-    let mut largest = f64x8::splat(simd, 0.0);
-    let _ = walk(simd, surface, facet, |_, _, low, high| {
-        largest = largest.max(low).max(high);
+    let mut largest = Largest(f64x8::splat(simd, 0.0));
+    let _ = walk(simd, surface, facet, &mut largest);
+    simd.reduce_max_f64x8(largest.0) as u64
+}
+
+struct Reached<S: Simd, V> {
+    threshold: f64x8<S>,
+    visit: V,
+}
+
+impl<S: Simd, V: FnMut(LocalPost) -> ControlFlow<()>> Look<S> for Reached<S, V> {
+    #[inline(always)]
+    fn look(&mut self, row: i32, col: i32, low: f64x8<S>, high: f64x8<S>) -> ControlFlow<()> {
+        let mut hits = low.simd_ge(self.threshold).to_bitmask() | high.simd_ge(self.threshold).to_bitmask() << 8;
+        while hits != 0 {
+            (self.visit)(LocalPost::new(row, col + hits.trailing_zeros() as i32))?;
+            hits &= hits - 1;
+        }
         ControlFlow::Continue(())
-    });
-    simd.reduce_max_f64x8(largest) as u64
+    }
 }
 
 /// Calls `visit` for the candidate posts whose `|n|` is at least `threshold`, row by row, until it breaks.
@@ -70,15 +96,7 @@ pub fn reached<S: Simd>(
     surface: &Surface,
     facet: &Facet,
     threshold: u64,
-    mut visit: impl FnMut(LocalPost) -> ControlFlow<()>,
+    visit: impl FnMut(LocalPost) -> ControlFlow<()>,
 ) -> ControlFlow<()> {
-    let threshold = f64x8::splat(simd, threshold as f64);
-    walk(simd, surface, facet, |row, col, low, high| {
-        let mut hits = low.simd_ge(threshold).to_bitmask() | high.simd_ge(threshold).to_bitmask() << 8;
-        while hits != 0 {
-            visit(LocalPost::new(row, col + hits.trailing_zeros() as i32))?;
-            hits &= hits - 1;
-        }
-        ControlFlow::Continue(())
-    })
+    walk(simd, surface, facet, &mut Reached { threshold: f64x8::splat(simd, threshold as f64), visit })
 }

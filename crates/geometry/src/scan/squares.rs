@@ -7,7 +7,7 @@
 
 use fearless_simd::{Simd, f64x8, i32x16, prelude::*};
 
-use super::{IOTA, rounded, visit::owned_spans};
+use super::{IOTA, rounded, visit::OwnedSpans};
 use crate::{Facet, Surface};
 
 /// Largest `den` for which the reciprocal rounds exactly.
@@ -22,27 +22,32 @@ pub fn squares_sum<S: Simd>(simd: S, surface: &Surface, facet: &Facet) -> f64 {
     if RECIPROCAL_LIMIT <= facet.den || RELIEF_LIMIT <= surface.relief() {
         return squares_sum_by_division(surface, facet);
     }
-    let splat = |value: f64| f64x8::splat(simd, value);
     let (iota_low, iota_high) = simd.cvt_f32_i32x16(i32x16::from_slice(simd, &IOTA)).widen();
-    let (px, den, zero) = (splat(facet.px as f64), splat(facet.den as f64), splat(0.0));
-    let (reciprocal, half) = (splat(1.0 / facet.den as f64), splat(0.5 + 1.0 / f64::from(1 << 27)));
+    let rounding = Rounding::new(simd, facet.den);
+    let (px, zero) = (f64x8::splat(simd, facet.px as f64), f64x8::splat(simd, 0.0));
     let (east_low, east_high) = (iota_low * px, iota_high * px);
-    let stride_lanes = splat(facet.px as f64 * 16.0);
+    let stride_lanes = f64x8::splat(simd, facet.px as f64 * 16.0);
     let origin = facet.origin();
     let (mut sum_low, mut sum_high) = (zero, zero);
     let (heights, stride) = surface.rows();
-    for (row, mut left, right) in owned_spans(surface, facet) {
-        let first = splat((origin + facet.py * i64::from(row) + facet.px * i64::from(left)) as f64);
+    let mut spans = OwnedSpans::new(surface, facet);
+    while let Some((row, mut left, right)) = spans.next() {
+        let first = (origin + facet.py * i64::from(row) + facet.px * i64::from(left)) as f64;
+        let first = f64x8::splat(simd, first);
         let (mut plane_low, mut plane_high) = (first + east_low, first + east_high);
         while left <= right {
             let index = row as usize * stride + left as usize;
             let (low, high) = simd.cvt_f32_i32x16(i32x16::from_slice(simd, &heights[index..index + 16])).widen();
-            let residual =
-                |height: f64x8<S>, plane: f64x8<S>| (simd.abs_f64x8(height * den - plane) * reciprocal + half).floor();
-            let (mut low, mut high) = (residual(low, plane_low), residual(high, plane_high));
-            if right - left < 15 {
-                let end = splat(f64::from(right - left + 1));
+            let mut low = rounding.residuals(simd, low, plane_low);
+            if right - left < 8 {
+                let end = f64x8::splat(simd, f64::from(right - left + 1));
                 low = iota_low.simd_lt(end).select(low, zero);
+                sum_low = sum_low + low * low;
+                break;
+            }
+            let mut high = rounding.residuals(simd, high, plane_high);
+            if right - left < 15 {
+                let end = f64x8::splat(simd, f64::from(right - left + 1));
                 high = iota_high.simd_lt(end).select(high, zero);
             }
             (sum_low, sum_high) = (sum_low + low * low, sum_high + high * high);
@@ -51,6 +56,30 @@ pub fn squares_sum<S: Simd>(simd: S, surface: &Surface, facet: &Facet) -> f64 {
         }
     }
     simd.reduce_sum_f64x8(sum_low + sum_high)
+}
+
+/// Rounding by reciprocal, as the header proves.
+struct Rounding<S: Simd> {
+    den: f64x8<S>,
+    reciprocal: f64x8<S>,
+    half: f64x8<S>,
+}
+
+impl<S: Simd> Rounding<S> {
+    #[inline(always)]
+    fn new(simd: S, den: i64) -> Self {
+        Self {
+            den: f64x8::splat(simd, den as f64),
+            reciprocal: f64x8::splat(simd, 1.0 / den as f64),
+            half: f64x8::splat(simd, 0.5 + 1.0 / f64::from(1 << 27)),
+        }
+    }
+
+    /// Rounded absolute residuals of eight heights above eight plane numerators.
+    #[inline(always)]
+    fn residuals(&self, simd: S, heights: f64x8<S>, plane: f64x8<S>) -> f64x8<S> {
+        (simd.abs_f64x8(heights * self.den - plane) * self.reciprocal + self.half).floor()
+    }
 }
 
 /// The same sum by one division per post, for triangles beyond the reciprocal's proof.

@@ -1,6 +1,6 @@
 //! Posts of a triangle one at a time: for weights, masks and rare questions, and as the reference.
 
-use crate::{Facet, LocalPost, Span, Spans, Surface};
+use crate::{Facet, LocalPost, LocalRect, Spans, Surface};
 
 /// Calls `visit(post, |n|)` for every candidate post of the closed triangle, row by row.
 #[inline(always)]
@@ -18,7 +18,7 @@ pub fn visit_posts(surface: &Surface, facet: &Facet, visit: impl FnMut(LocalPost
 /// (inward on the far borders of the tile), so the triangles of a tile share its posts without overlap.
 #[inline(always)]
 pub fn visit_owned(surface: &Surface, facet: &Facet, visit: impl FnMut(LocalPost, u64)) {
-    visit_rows(surface, facet, owned_spans(surface, facet), visit);
+    visit_rows(surface, facet, OwnedSpans::new(surface, facet), visit);
 }
 
 #[inline(always)]
@@ -41,23 +41,48 @@ fn visit_rows(
 }
 
 /// Rows and inclusive columns of the candidate posts a triangle owns; empty rows have `right < left`.
-#[inline(always)]
-pub(super) fn owned_spans(surface: &Surface, facet: &Facet) -> impl Iterator<Item = (i32, i32, i32)> {
-    let (_, _, low, high) = facet.bounds();
-    let corners_on = |row: i32| facet.y.iter().filter(|&&y| y == row).count();
-    let (flat_bottom, flat_top) = (corners_on(low) == 2, corners_on(high) == 2);
-    let (extent, candidates) = (surface.extent(), surface.candidates());
-    Spans::new(facet).filter_map(move |span: Span| {
+pub(super) struct OwnedSpans {
+    spans: Spans,
+    candidates: LocalRect,
+    /// Rows from here on belong to the triangles above.
+    end: i32,
+    /// The lowest row, when a single corner stands on it.
+    lone_corner: i32,
+    last_col: i32,
+}
+
+impl OwnedSpans {
+    #[inline(always)]
+    pub fn new(surface: &Surface, facet: &Facet) -> Self {
+        let (_, _, low, high) = facet.bounds();
+        let is_flat = |row: i32| facet.y.iter().filter(|&&y| y == row).count() == 2;
+        let (extent, candidates) = (surface.extent(), surface.candidates());
         // The highest row belongs to the triangles above it, unless there is nothing above.
-        let is_owned_row = span.row < high || (flat_top && high == extent.north);
-        if !is_owned_row || span.row < candidates.south || candidates.north < span.row {
-            return None;
+        let keeps_top = high == extent.north && is_flat(high);
+        let end = (high + i32::from(keeps_top)).min(candidates.north + 1);
+        let lone_corner = if is_flat(low) { i32::MIN } else { low };
+        Self { spans: Spans::new(facet), candidates, end, lone_corner, last_col: extent.east }
+    }
+}
+
+impl Iterator for OwnedSpans {
+    type Item = (i32, i32, i32);
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<(i32, i32, i32)> {
+        loop {
+            let span = self.spans.next()?;
+            if self.end <= span.row {
+                return None;
+            }
+            if span.row < self.candidates.south {
+                continue;
+            }
+            // A post exactly on the right edge belongs to the triangle east of it, unless there is none; a
+            // lone lowest corner belongs to the triangle that holds the ground beside it.
+            let is_last = span.right == self.last_col && span.row != self.lone_corner;
+            let right = span.right - i32::from(span.right_exact && !is_last);
+            return Some((span.row, span.left.max(self.candidates.west), right.min(self.candidates.east)));
         }
-        // A post exactly on the right edge belongs to the triangle east of it, unless there is none; a
-        // lone lowest corner belongs to the triangle that holds the ground beside it.
-        let lone_corner = span.row == low && !flat_bottom;
-        let keeps_right = !span.right_exact || (span.right == extent.east && !lone_corner);
-        let right = if keeps_right { span.right } else { span.right - 1 };
-        Some((span.row, span.left.max(candidates.west), right.min(candidates.east)))
-    })
+    }
 }

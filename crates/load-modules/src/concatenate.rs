@@ -1,0 +1,146 @@
+//! Constrained edges: a tile's TIN told apart into the load modules it consists of.
+
+use terrain::{Importance, LatticePoint, LoadModule, Tin};
+
+use crate::Layout;
+use crate::pieces::{Corner, Pieces};
+
+/// The load modules of a tile whose TIN has every module line among its edges, row by row.
+///
+/// `mask` gives the classes of the tile's posts. Residuals are left empty.
+///
+/// # Panics
+/// When the TIN is not that of the tile, or a triangle crosses a module line.
+pub fn concatenate(tin: &Tin, layout: &Layout, mask: &Importance) -> Vec<LoadModule> {
+    assert_eq!(tin.rect, layout.grid.posts_of_rect(layout.modules), "the TIN covers the load modules of its tile");
+    let side = layout.side_lattice();
+    let mut pieces = vec![Pieces::default(); layout.modules.count()];
+    for triangle in &tin.triangles {
+        let corners = triangle.map(|v| tin.vertices[v as usize]);
+        let thirds = |v: [i32; 3]| v.into_iter().map(i64::from).sum::<i64>().div_euclid(3 * i64::from(side)) as i32;
+        let (row, col) = (thirds(corners.map(|v| v.at.row)), thirds(corners.map(|v| v.at.col)));
+        let slot = layout.slot(row, col).expect("triangles lie inside the tile");
+        let inside = |v: i32, module: i32| (0..=side).contains(&(v - module * side));
+        let whole = |at: LatticePoint| inside(at.row, row) && inside(at.col, col);
+        assert!(corners.iter().all(|v| whole(v.at)), "no triangle crosses a side of load module {row},{col}");
+        let step = i64::from(layout.spacing.quanta_per_lattice_step());
+        let local = |v: i32, module: i32| i64::from(v - module * side) * step;
+        pieces[slot].push(corners.map(|v| Corner::new(local(v.at.row, row), local(v.at.col, col), v.height, false)));
+    }
+    let modules = layout.modules.iter().zip(&pieces);
+    modules.map(|(id, pieces)| pieces.load_module(id, layout, mask)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use terrain::{ModuleGrid, ModuleRect, Side, Spacing, Vertex};
+
+    use super::*;
+    use crate::sheets::{Draw, assert_sides_are_shared};
+
+    /// A TIN over a tile of 2 x 3 load modules: each square triangulated on its own over shared sides.
+    fn constrained(layout: &Layout, seed: u64) -> Tin {
+        let mut draw = Draw(seed);
+        let rect = layout.grid.posts_of_rect(layout.modules);
+        let side = layout.side_lattice();
+        let (low, high) = (LatticePoint::from(rect.south_west()), LatticePoint::from(rect.north_east()));
+        let mut places = std::collections::BTreeSet::new();
+        for row in (low.row..=high.row).step_by(side as usize) {
+            for col in (low.col..=high.col).step_by(side as usize) {
+                places.insert(LatticePoint::new(row, col));
+            }
+        }
+        for i in 0..90 {
+            let mut within = |low: i32, high: i32| low + draw.below((high - low + 1) as u32) as i32;
+            let (mut row, mut col) = (within(low.row, high.row), within(low.col, high.col));
+            // A third on module lines, and those on whole posts.
+            if i % 3 == 0 {
+                row = row / side * side;
+                col = col / 8 * 8;
+            } else if i % 3 == 1 {
+                col = col / side * side;
+                row = row / 8 * 8;
+            }
+            places.insert(LatticePoint::new(row, col));
+        }
+        let vertices: Vec<_> = places.iter().map(|&at| Vertex { at, height: draw.below(9000) as i32 - 4000 }).collect();
+        let mut triangles = Vec::new();
+        for id in layout.modules.iter() {
+            let square = layout.grid.posts_of(id);
+            let (low, high) = (LatticePoint::from(square.south_west()), LatticePoint::from(square.north_east()));
+            let inside =
+                |at: LatticePoint| (low.row..=high.row).contains(&at.row) && (low.col..=high.col).contains(&at.col);
+            let own: Vec<_> = (0..vertices.len()).filter(|&v| inside(vertices[v].at)).collect();
+            let points: Vec<_> = own.iter().map(|&v| vertices[v].at).collect();
+            triangles.extend(mesh::delaunay(&points).into_iter().map(|t| t.map(|v| own[v as usize] as u32)));
+        }
+        Tin { rect, vertices, triangles }
+    }
+
+    fn layout() -> Layout {
+        let grid = ModuleGrid { rows: 4, cols: 6, side_cells: 20 };
+        let modules = ModuleRect { south: 1, west: 2, north: 3, east: 5 };
+        Layout { grid, modules, spacing: Spacing::from_metres(25.0).unwrap() }
+    }
+
+    #[test]
+    fn every_triangle_lands_in_its_load_module_at_its_place() {
+        for seed in 0..20 {
+            let layout = layout();
+            let tin = constrained(&layout, seed);
+            tin.check().unwrap();
+            let mask = Importance::uniform(tin.rect, 1000);
+            let modules = concatenate(&tin, &layout, &mask);
+            modules.iter().for_each(|module| assert_eq!(module.check(), Ok(())));
+            assert_eq!(modules.iter().map(|module| module.triangles.len()).sum::<usize>(), tin.triangles.len());
+            assert!(modules.iter().all(|module| module.polygon_count as usize == module.triangles.len()));
+            assert_sides_are_shared(&modules, layout.modules);
+            for module in &modules {
+                let corner = LatticePoint::from(layout.grid.posts_of(module.id).south_west());
+                for v in &module.vertices {
+                    let at = LatticePoint::new(corner.row + i32::from(v.y) / 400, corner.col + i32::from(v.x) / 400);
+                    assert!(tin.vertices.contains(&Vertex { at, height: v.z }));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_order_of_vertices_and_triangles_does_not_show() {
+        let layout = layout();
+        let tin = constrained(&layout, 3);
+        let mask = Importance::uniform(tin.rect, 1000);
+        let mut other = tin.clone();
+        other.vertices.reverse();
+        other.triangles.reverse();
+        let last = tin.vertices.len() as u32 - 1;
+        for triangle in &mut other.triangles {
+            *triangle = [last - triangle[2], last - triangle[0], last - triangle[1]];
+        }
+        other.check().unwrap();
+        assert_eq!(concatenate(&tin, &layout, &mask), concatenate(&other, &layout, &mask));
+    }
+
+    #[test]
+    #[should_panic(expected = "no triangle crosses a side")]
+    fn a_triangle_across_a_module_line_is_refused() {
+        let layout = layout();
+        let rect = layout.grid.posts_of_rect(layout.modules);
+        let vertices = rect.corners().map(|post| Vertex { at: post.into(), height: 0 }).to_vec();
+        let tin = Tin { rect, vertices, triangles: vec![[0, 1, 2], [0, 2, 3]] };
+        concatenate(&tin, &layout, &Importance::uniform(rect, 1000));
+    }
+
+    #[test]
+    fn side_lists_run_along_the_side() {
+        let layout = layout();
+        let tin = constrained(&layout, 5);
+        let modules = concatenate(&tin, &layout, &Importance::uniform(tin.rect, 1000));
+        for module in &modules {
+            for side in Side::ALL {
+                let list = module.side_vertices(side);
+                assert!(list.is_sorted() && 2 <= list.len());
+            }
+        }
+    }
+}

@@ -1,0 +1,67 @@
+//! What the tests of this crate share: seeded points and what neighbours must agree on.
+
+use std::collections::BTreeMap;
+
+use terrain::{LoadModule, ModuleGrid, ModuleId, ModuleRect, ModuleVertex, Post, PostRect, Side, Vertex};
+
+/// SplitMix64: the same numbers on any machine.
+pub(crate) struct Draw(pub(crate) u64);
+
+impl Draw {
+    pub(crate) fn below(&mut self, bound: u32) -> u32 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) % u64::from(bound)) as u32
+    }
+}
+
+/// Corners of all load modules, points every `border_step` posts on the outer border, and `count` random posts.
+pub(crate) fn points(grid: ModuleGrid, border_step: i32, count: usize, seed: u64) -> Vec<Vertex> {
+    let mut draw = Draw(seed);
+    let area = grid.area();
+    let mut places = std::collections::BTreeSet::new();
+    for post in posts(area) {
+        let on = |step: i32| post.row % step == 0 && post.col % step == 0;
+        let outer = post.row == 0 || post.col == 0 || post.row == area.north || post.col == area.east;
+        if on(grid.side_cells) || outer && on(border_step) {
+            places.insert(post);
+        }
+    }
+    for _ in 0..count {
+        let inner = |far: i32, draw: &mut Draw| 1 + draw.below(far as u32 - 1) as i32;
+        places.insert(Post::new(inner(area.north, &mut draw), inner(area.east, &mut draw)));
+    }
+    places.into_iter().map(|post| Vertex { at: post.into(), height: draw.below(60_000) as i32 - 9_000 }).collect()
+}
+
+pub(crate) fn posts(rect: PostRect) -> impl Iterator<Item = Post> {
+    (rect.south..=rect.north).flat_map(move |row| (rect.west..=rect.east).map(move |col| Post::new(row, col)))
+}
+
+/// The places along a side and the heights there.
+pub(crate) fn side_list(module: &LoadModule, side: Side) -> Vec<(u16, i32)> {
+    let along = |v: ModuleVertex| match side {
+        Side::South | Side::North => (v.x, v.z),
+        Side::East | Side::West => (v.y, v.z),
+    };
+    module.side_vertices(side).into_iter().map(|v| along(module.vertices[usize::from(v)])).collect()
+}
+
+/// Both load modules of every side list the same places and heights on it.
+#[track_caller]
+pub(crate) fn assert_sides_are_shared(modules: &[LoadModule], rect: ModuleRect) {
+    let by_id: BTreeMap<_, _> = modules.iter().map(|module| (module.id, module)).collect();
+    assert_eq!(by_id.len(), rect.count());
+    for module in modules {
+        let ModuleId { row, col } = module.id;
+        for (side, id) in [(Side::North, ModuleId { row: row + 1, col }), (Side::East, ModuleId { row, col: col + 1 })]
+        {
+            if let Some(other) = by_id.get(&id) {
+                let (own, theirs) = (side_list(module, side), side_list(other, side.opposite()));
+                assert_eq!(own, theirs, "side between load modules {} and {id}", module.id);
+            }
+        }
+    }
+}
