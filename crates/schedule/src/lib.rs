@@ -1,1 +1,23 @@
-//! (to be written)
+//! Workers: the only place with threads. Knows tasks by number and nothing of terrain.
+//!
+//! Two ways to spend workers: [`in_rank_order`], for tasks that build on their neighbours of lower rank, and
+//! [`for_each_independent`], for items that know nothing of one another. In both, results come back in task order, so
+//! neither timing nor the number of workers can be seen in them; a panic in a task becomes an error that names the
+//! task; and a flag (Ctrl-C) lets running tasks finish and starts no others.
+//!
+//! What is absent: no clock, no files, no printing.
+
+mod workers;
+pub use workers::Workers;
+mod error;
+pub use error::ScheduleError;
+mod plan;
+pub use plan::RankedTasks;
+mod attempt;
+mod ranked;
+mod ready;
+pub use ranked::{Event, in_rank_order, in_rank_order_observed};
+mod independent;
+pub use independent::for_each_independent;
+mod simulate;
+pub use simulate::{Simulation, simulate};

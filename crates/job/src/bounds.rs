@@ -1,0 +1,59 @@
+//! How large anything in a job may be, and why.
+
+/// Bytes of a job file: thousands of times a real one, so that a DEM named by mistake is not read as text.
+pub const JOB_BYTES_MAX: u64 = 1 << 20;
+
+/// Posts along a side of the area, less one: lattice coordinates (eighths) then fit 23 bits and every product of two
+/// is exact in 64. It is 26,000 km at 25 m.
+pub const CELLS_A_SIDE_MAX: i32 = 1 << 20;
+
+/// Load modules in the area: the ledger of counts holds each of them in memory.
+pub const MODULES_MAX: u64 = 1 << 24;
+
+/// Side of a load module in quanta of 1/128 m: its vertices have 16-bit coordinates.
+pub const SIDE_QUANTA_MAX: u32 = u16::MAX as u32;
+
+/// Metres from the origin of a projection: beyond any projection of the Earth, and exact to 1/128 m in an `f64`.
+pub const COORDINATE_M_MAX: f64 = 1.0e8;
+
+/// Tiles: each has three files and a place in `database.json`.
+pub const TILES_MAX: u64 = 1 << 16;
+
+/// Weight of a post: it is kept in 16 bits of thousandths.
+pub const WEIGHT_MAX: f64 = 65.535;
+
+/// Importance areas: each is laid over every window of the mask.
+pub const AREAS_MAX: usize = 1000;
+
+/// Classes besides the default one: a class is kept in 8 bits.
+pub const CLASSES_MAX: usize = 255;
+
+/// Source files: a mosaic of every cell of the Earth is 64,800.
+pub const SOURCES_MAX: usize = 65_536;
+
+/// Characters of a name: leaves room in the 255 bytes of a file name for what is put behind it.
+pub const NAME_CHARS_MAX: usize = 100;
+
+/// Triangles in a load module: its vertices are named by 16 bits.
+pub const PER_MODULE_MAX: u64 = u16::MAX as u64;
+
+/// Triangles in a window, in the pool, and selected points: vertices and triangles are named by 32 bits.
+pub const COUNT_MAX: u64 = u32::MAX as u64;
+
+/// Posts across which a void may be filled: beyond it the filled ground is invented.
+pub const FILL_POSTS_MAX: u64 = 1024;
+
+/// Residuals and tolerances in metres: heights go no further (24 bits of quanta).
+pub const RESIDUAL_M_MAX: f64 = 131_071.0;
+
+/// The side of the window that the third limit speaks of, in metres.
+pub const WINDOW_M: f64 = 4000.0;
+
+/// Tiles a side when the job does not say: the paper's.
+pub const TILES_DEFAULT: u32 = 6;
+
+/// EPSG codes: those below are datums and units, those above are other registries'.
+pub const EPSG_RANGE: std::ops::RangeInclusive<u32> = 1024..=32_766;
+
+/// Geographic coordinate systems that DEMs come in; a few of many, so that the common mistake has a clear message.
+pub const EPSG_GEOGRAPHIC: [u32; 13] = [4326, 4979, 4258, 4269, 4267, 4283, 4322, 4490, 4612, 4617, 4674, 6318, 7844];

@@ -1,0 +1,200 @@
+//! The disk: the job file itself, and the files it names or finds by pattern.
+//!
+//! A named file may lie anywhere. A pattern finds files below the folder it begins with, and nothing else: a match
+//! whose true place is outside (by a link) is refused, and so is a named file that is a link out of its own folder.
+//! So what a job reads can be seen from its text.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::io::Read;
+use std::path::{Component, Path, PathBuf};
+
+use crate::bounds::{JOB_BYTES_MAX, SOURCES_MAX};
+use crate::{AreaShape, DemSource, Fault, Job, JobError, NamedFile, read};
+
+/// A file that the job mentions: where its name stands in the job, and the fault to tell if it is not there.
+pub(crate) struct Mention {
+    pub place: Place,
+    pub fault: Box<Fault>,
+}
+
+/// Which list of the job names the file, and where in it.
+#[derive(Clone, Copy)]
+pub(crate) enum Place {
+    Source(usize),
+    ImportanceArea(usize),
+}
+
+impl Job {
+    /// Reads the job file at `path` and finds the files it names.
+    ///
+    /// # Errors
+    /// Everything a [`JobError`] can say; the first thing wrong in reading order.
+    pub fn load(path: &Path) -> Result<Job, JobError> {
+        let text = text_of(path)?;
+        let (mut job, mentions) = read::read(&text, path)?;
+        locate(&mut job, mentions)?;
+        Ok(job)
+    }
+
+    /// The job that `text` holds, as if it were the file at `path`; the disk is not looked at, so patterns stay
+    /// unexpanded and files may be missing.
+    ///
+    /// # Errors
+    /// Whatever is wrong with the text itself.
+    pub fn from_text(text: &str, path: &Path) -> Result<Job, JobError> {
+        read::read(text, path).map(|(job, _)| job)
+    }
+}
+
+fn text_of(path: &Path) -> Result<String, JobError> {
+    let unreadable = |source| JobError::Unreadable { path: path.to_owned(), source };
+    let file = fs::File::open(path).map_err(unreadable)?;
+    let mut bytes = Vec::new();
+    file.take(JOB_BYTES_MAX + 1).read_to_end(&mut bytes).map_err(unreadable)?;
+    if JOB_BYTES_MAX < bytes.len() as u64 {
+        let found = fs::metadata(path).map_or(bytes.len() as u64, |data| data.len());
+        return Err(JobError::TooLong { path: path.to_owned(), found, limit: JOB_BYTES_MAX });
+    }
+    String::from_utf8(bytes)
+        .map_err(|error| JobError::NotText { path: path.to_owned(), after: error.utf8_error().valid_up_to() })
+}
+
+/// Whether a name is a pattern.
+pub(crate) fn has_wildcard(written: &str) -> bool {
+    written.contains(['*', '?', '['])
+}
+
+/// Whether a pattern goes up a folder behind its first wildcard.
+pub(crate) fn leaves_after_wildcard(written: &str) -> bool {
+    let (_, rest) = split_pattern(written);
+    rest.components().any(|part| part == Component::ParentDir)
+}
+
+/// The folder a pattern begins with, and what is to be matched below it.
+fn split_pattern(written: &str) -> (PathBuf, PathBuf) {
+    let wild = |part: &Component| has_wildcard(&part.as_os_str().to_string_lossy());
+    let parts: Vec<Component> = Path::new(written).components().collect();
+    let first = parts.iter().position(wild).unwrap_or(parts.len());
+    (parts[..first].iter().collect(), parts[first..].iter().collect())
+}
+
+/// Checks every mentioned file and expands the patterns among the sources.
+fn locate(job: &mut Job, mentions: Vec<Mention>) -> Result<(), JobError> {
+    let folder = job.folder().to_owned();
+    let (mut found, mut seen) = (Vec::new(), BTreeSet::new());
+    for Mention { place, fault } in mentions {
+        match place {
+            Place::Source(index) => {
+                let DemSource::Files { files, .. } = &job.dem.source else { continue };
+                let more = source_files(&files[index], &folder, &fault)?;
+                // A file that two entries find keeps the higher priority.
+                found.extend(more.into_iter().filter(|file| seen.insert(file.path.clone())));
+                if SOURCES_MAX < found.len() {
+                    let expected = format!("at most {SOURCES_MAX} files");
+                    return Err(JobError::OutOfRange(Box::new(Fault { expected, ..*fault })));
+                }
+            }
+            Place::ImportanceArea(index) => match &job.importance.areas[index].shape {
+                AreaShape::Polygons { file } | AreaShape::RasterValue { file, .. } => {
+                    check_named(file, &folder, &fault)?
+                }
+                AreaShape::Sample(_) => {}
+            },
+        }
+    }
+    if let DemSource::Files { files, .. } = &mut job.dem.source {
+        *files = found;
+    }
+    Ok(())
+}
+
+/// The files that one entry of `dem.sources` stands for.
+fn source_files(named: &NamedFile, folder: &Path, fault: &Fault) -> Result<Vec<NamedFile>, JobError> {
+    if has_wildcard(&named.written) && !named.path.exists() {
+        return matches_of(&named.written, folder, fault);
+    }
+    check_named(named, folder, fault)?;
+    Ok(vec![named.clone()])
+}
+
+fn check_named(named: &NamedFile, folder: &Path, fault: &Fault) -> Result<(), JobError> {
+    let no_such = |found: &str, hint: String| {
+        let found = format!("{}, {found}", fault.found);
+        JobError::NoSuchFile(Box::new(Fault { found, hint, ..fault.clone() }))
+    };
+    let Ok(data) = fs::metadata(&named.path) else {
+        return Err(no_such("which cannot be opened", relative_hint(folder)));
+    };
+    if data.is_dir() {
+        return Err(no_such(
+            "which is a folder",
+            format!("its files are {}/*.tif", named.written.trim_end_matches('/')),
+        ));
+    }
+    if named.path.is_symlink() {
+        let home = named.path.parent().unwrap_or(Path::new("")).to_owned();
+        refuse_outside(&named.path, &home, fault)?;
+    }
+    Ok(())
+}
+
+fn relative_hint(folder: &Path) -> String {
+    let shown = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+    format!("paths are relative to the folder of the job file, {}", shown.display())
+}
+
+/// Refuses a file whose true place is not below `home`.
+fn refuse_outside(path: &Path, home: &Path, fault: &Fault) -> Result<(), JobError> {
+    let here = if home.as_os_str().is_empty() { Path::new(".") } else { home };
+    let (Ok(file), Ok(home)) = (path.canonicalize(), here.canonicalize()) else { return Ok(()) };
+    if file.starts_with(&home) {
+        return Ok(());
+    }
+    let found = format!("{}, where {} is a link to {}", fault.found, path.display(), file.display());
+    let expected = format!("files below {}", home.display());
+    let hint = "name the file that the link leads to; a named file may lie anywhere".to_owned();
+    Err(JobError::LeavesFolder(Box::new(Fault { found, expected, hint, ..fault.clone() })))
+}
+
+/// The files that a pattern finds, in the order of their paths.
+fn matches_of(written: &str, folder: &Path, fault: &Fault) -> Result<Vec<NamedFile>, JobError> {
+    let options =
+        glob::MatchOptions { case_sensitive: true, require_literal_separator: true, require_literal_leading_dot: true };
+    let (start, rest) = split_pattern(written);
+    let home = folder.join(&start);
+    let below = glob::Pattern::escape(&home.to_string_lossy());
+    let pattern = if below.is_empty() { rest } else { Path::new(&below).join(rest) };
+    let paths = glob::glob_with(&pattern.to_string_lossy(), options).map_err(|error| {
+        let (expected, hint) = (format!("a pattern ({})", error.msg), "* is any part of a name, ** any folders".into());
+        JobError::OutOfRange(Box::new(Fault { expected, hint, ..fault.clone() }))
+    })?;
+    let mut paths: Vec<PathBuf> = paths.flatten().filter(|path| path.is_file()).collect();
+    paths.sort();
+    if paths.is_empty() {
+        let (found, expected) =
+            (format!("{}, which no file matches", fault.found), "a pattern that finds a raster".to_owned());
+        let hint = relative_hint(folder);
+        return Err(JobError::NoSuchFile(Box::new(Fault { found, expected, hint, ..fault.clone() })));
+    }
+    paths.into_iter().map(|path| matched(path, folder, &home, fault)).collect()
+}
+
+/// A file that a pattern found, named as the job would name it.
+fn matched(path: PathBuf, folder: &Path, home: &Path, fault: &Fault) -> Result<NamedFile, JobError> {
+    refuse_outside(&path, home, fault)?;
+    let written = path.strip_prefix(folder).unwrap_or(&path).to_string_lossy().into_owned();
+    Ok(NamedFile { written, path })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pattern_begins_with_the_folders_before_its_first_wildcard() {
+        assert_eq!(split_pattern("../dem/*/a.tif"), (PathBuf::from("../dem"), PathBuf::from("*/a.tif")));
+        assert!(leaves_after_wildcard("dem/*/../../x.tif"));
+        assert!(!leaves_after_wildcard("../dem/*.tif"));
+    }
+}

@@ -1,0 +1,348 @@
+//! The job: plain values, resolved and checked.
+
+use std::path::{Path, PathBuf};
+
+use terrain::{ModuleGrid, Spacing};
+
+/// All a run needs, as the job file says it, defaults filled in.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Job {
+    /// The job file.
+    pub path: PathBuf,
+    /// The gaming area and its working grid.
+    pub area: Area,
+    /// Where heights come from.
+    pub dem: DemSpec,
+    /// Where ground matters more.
+    pub importance: ImportanceSpec,
+    /// How the work is cut.
+    pub tiles: TilesSpec,
+    /// What the product is cut into.
+    pub modules: ModulesSpec,
+    /// What the simulator cannot exceed.
+    pub limits: LimitsSpec,
+    /// How posts are chosen.
+    pub tin: TinSpec,
+}
+
+/// The gaming area and its working grid.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Area {
+    /// Name of the area: letters, digits, `-`, `_` and `.`, fit for a file name.
+    pub name: String,
+    /// EPSG code of the projected coordinate system, in metres.
+    pub epsg: u32,
+    /// East and north of the south-west post, in metres.
+    pub origin_m: [f64; 2],
+    /// Distance between posts of the working grid.
+    pub spacing: Spacing,
+    /// Load modules that make up the area.
+    pub grid: ModuleGrid,
+}
+
+/// Where heights come from.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DemSpec {
+    /// The built-in terrain or files.
+    pub source: DemSource,
+    /// What the heights are measured from, as the job says; for provenance only.
+    pub vertical_datum: Option<String>,
+    /// What to do about posts without a height.
+    pub voids: Voids,
+}
+
+/// The built-in terrain or files.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum DemSource {
+    /// The built-in basin-and-range terrain.
+    Sample {
+        /// Seed of the terrain.
+        seed: u64,
+    },
+    /// Rasters on disk.
+    Files {
+        /// Names and patterns as written in the job.
+        written: Vec<String>,
+        /// The files, in order of priority, none twice.
+        files: Vec<NamedFile>,
+    },
+}
+
+/// A file that the job names.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct NamedFile {
+    /// As written in the job, or as the job would write a file that a pattern found: for messages and provenance, so
+    /// that no output depends on where the job lies.
+    pub written: String,
+    /// Where it is: the folder of the job file joined with `written`.
+    pub path: PathBuf,
+}
+
+/// What to do about posts without a height.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Voids {
+    /// Any void inside the area is an error.
+    Fail,
+    /// Voids with a height within this many posts are filled from it; any other void is an error.
+    FillWithinPosts(u32),
+}
+
+/// Where ground matters more.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ImportanceSpec {
+    /// Weight of class 0, in thousandths.
+    pub default_weight: u16,
+    /// Areas in the order of the job file; a later one lies over an earlier one.
+    pub areas: Vec<ImportanceArea>,
+    /// Names of the classes; index 0 is the default one, at most 256 in all.
+    pub classes: Vec<String>,
+    /// How the borders between weights are softened.
+    pub smooth: Smooth,
+}
+
+/// Part of the area with its own weight.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ImportanceArea {
+    /// Which posts.
+    pub shape: AreaShape,
+    /// Index of its class in [`ImportanceSpec::classes`].
+    pub class: u8,
+    /// Weight in thousandths; 0 excludes posts from selection.
+    pub weight: u16,
+}
+
+/// Which posts an importance area holds.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum AreaShape {
+    /// Posts inside the polygons of a GeoJSON file.
+    Polygons {
+        /// The file.
+        file: NamedFile,
+    },
+    /// Posts where a class raster holds a value.
+    RasterValue {
+        /// The raster.
+        file: NamedFile,
+        /// The value.
+        value: i64,
+    },
+    /// Posts of a class of the sample terrain (only with [`DemSource::Sample`]).
+    Sample(SampleClass),
+}
+
+/// Classes the sample terrain comes with, besides its plains.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SampleClass {
+    /// Mountain blocks.
+    Mountains,
+}
+
+/// How the borders between weights are softened.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Smooth {
+    /// The separable 7-tap binomial.
+    Binomial7,
+    /// Not at all.
+    None,
+}
+
+/// How the work is cut.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TilesSpec {
+    /// Rows of tiles; each is at least two load modules high, or there is one.
+    pub rows: u32,
+    /// Columns of tiles; each is at least two load modules wide, or there is one.
+    pub columns: u32,
+    /// What the rank of a tile is.
+    pub order: TileOrder,
+    /// What a tile finds on its sides.
+    pub borders: Borders,
+}
+
+/// What the rank of a tile is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TileOrder {
+    /// (colour, row, column) with four colours: most tiles at once.
+    Color,
+    /// (row, column): a wave front.
+    Raster,
+}
+
+/// What a tile finds on its sides.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Borders {
+    /// The points its neighbours of lower rank chose.
+    Inherit,
+    /// A point every border step, and no others.
+    Regular,
+}
+
+/// What the product is cut into.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ModulesSpec {
+    /// Side of a load module in metres; its cells are [`ModuleGrid::side_cells`].
+    pub side_m: f64,
+    /// Side in quanta of 1/128 m.
+    pub side_quanta: u16,
+    /// Distance between initial points on the outer border, in metres.
+    pub border_step_m: f64,
+    /// The same in cells of the working grid.
+    pub border_step_cells: i32,
+    /// How load modules get their sides.
+    pub edges: Edges,
+}
+
+/// How load modules get their sides.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Edges {
+    /// Module lines are edges of the TIN from the start.
+    Constrained,
+    /// Triangles are cut at module lines after merging.
+    Clip(ClipHeights),
+}
+
+/// Height of a vertex that clipping makes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ClipHeights {
+    /// On the plane of the clipped triangle.
+    Coplanar,
+    /// Interpolated from the DEM.
+    Dem,
+}
+
+/// What the simulator cannot exceed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LimitsSpec {
+    /// What the limits count.
+    pub count: Count,
+    /// In one load module.
+    pub per_load_module: u32,
+    /// Above `per_load_module`, in the whole area together.
+    pub pool: u64,
+    /// Mean over all load modules.
+    pub mean_per_load_module: f64,
+    /// In every window of load modules.
+    pub window: WindowLimit,
+}
+
+/// A limit for every window of load modules.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct WindowLimit {
+    /// In one window.
+    pub limit: u32,
+    /// Rows of load modules in a window: those that cover 4 km, cut to the area.
+    pub rows: u32,
+    /// Columns of load modules in a window: those that cover 4 km, cut to the area.
+    pub cols: u32,
+}
+
+/// What the limits count.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Count {
+    /// Triangles, clipped pieces fanned.
+    Triangles,
+    /// Convex polygons, as clipping leaves them.
+    Polygons,
+}
+
+/// How posts are chosen.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TinSpec {
+    /// By which method.
+    pub method: Method,
+    /// What makes a post, or the triangle it lies in, worth a point.
+    pub key: ErrorKey,
+    /// What ends the choosing, apart from residuals.
+    pub budget: Budget,
+    /// How the budget is shared among tiles.
+    pub allocation: Allocation,
+    /// Residuals are rounded to this many quanta of 1/128 m before they are compared.
+    pub residual_quantum: u32,
+    /// The largest residual at which choosing may end, in metres.
+    pub max_residual_m: Option<f64>,
+    /// The RMS residual over the area at which choosing may end, in metres.
+    pub target_rms_m: Option<f64>,
+}
+
+/// By which method posts are chosen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Method {
+    /// The paper's: all posts of the largest residual at once, those too near a vertex left out.
+    Paper {
+        /// How near is too near; `None` leaves none out.
+        proximity: Option<Proximity>,
+        /// What becomes of a batch that exceeds the budget.
+        last_batch: LastBatch,
+    },
+    /// One worst post at a time.
+    Greedy,
+    /// Lowest RMS residual under the limits.
+    Optimised,
+}
+
+/// A post this near a vertex both ways is left out of a batch. Both bounds are inclusive.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Proximity {
+    /// Over the ground, in metres.
+    pub horizontal_m: f64,
+    /// In height, in metres.
+    pub vertical_m: f64,
+}
+
+/// What becomes of a batch that exceeds the budget.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LastBatch {
+    /// The budget is met exactly, in row order.
+    Truncate,
+    /// The batch goes in whole.
+    Finish,
+}
+
+/// What makes a post worth a point.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ErrorKey {
+    /// The largest weighted residual.
+    Max,
+    /// The sum of squared residuals in its triangle.
+    Sse,
+}
+
+/// What ends the choosing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Budget {
+    /// This many selected points in the whole area, pins included.
+    Points(u64),
+    /// As many triangles as the limits allow.
+    Limits,
+}
+
+/// How the budget is shared among tiles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Allocation {
+    /// The same for every tile.
+    Equal,
+    /// By what a survey of all tiles says they gain.
+    Global,
+}
+
+impl Job {
+    /// The folder that paths in the job are relative to.
+    pub fn folder(&self) -> &Path {
+        self.path.parent().unwrap_or(Path::new(""))
+    }
+}
+
+impl Area {
+    /// Width and height in metres, east then north.
+    pub fn size_m(&self) -> [f64; 2] {
+        let metres = |modules: u32| f64::from(modules) * f64::from(self.grid.side_cells) * self.spacing.metres();
+        [metres(self.grid.cols), metres(self.grid.rows)]
+    }
+}
+
+impl LimitsSpec {
+    /// Triangles (or polygons) that `mean_per_load_module` allows the whole area, rounded down.
+    pub fn area_budget(&self, grid: &ModuleGrid) -> u64 {
+        (self.mean_per_load_module * grid.count() as f64).floor() as u64
+    }
+}

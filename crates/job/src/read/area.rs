@@ -1,0 +1,178 @@
+//! `[area]` and `[load_modules]`: the working grid and the load modules on it.
+//!
+//! Read together, because each must fit the other: the spacing divides the border step, the border step the side of a
+//! load module, and that side the area.
+
+use terrain::{Metres, ModuleGrid, QUANTA_PER_METRE, Spacing};
+
+use crate::bounds::{
+    CELLS_A_SIDE_MAX, COORDINATE_M_MAX, EPSG_GEOGRAPHIC, EPSG_RANGE, MODULES_MAX, NAME_CHARS_MAX, SIDE_QUANTA_MAX,
+};
+use crate::entry::{Entry, Section};
+use crate::{Area, ClipHeights, Edges, JobError, ModulesSpec};
+
+pub(super) fn read(area: &Section, modules: &Section) -> Result<(Area, ModulesSpec), JobError> {
+    let name = name(area)?;
+    let epsg = epsg(area)?;
+    let origin_m = origin(area)?;
+    let (spacing_entry, spacing) = spacing(area)?;
+    let border_step_m = length(modules, "border_step_m", 125.0)?;
+    let side_m = length(modules, "side_m", 500.0)?;
+    let border_step_cells = border_step_cells(&spacing_entry, spacing, border_step_m)?;
+    let side_cells = side_cells(modules, spacing, side_m, border_step_m)?;
+    let grid = grid(area, spacing, side_cells, side_m)?;
+    // A multiple of the spacing, itself one of 1/16 m, so this is whole; and side_cells has checked that it fits.
+    let side_quanta = (side_m * f64::from(QUANTA_PER_METRE)) as u16;
+    let edges = edges(modules)?;
+    let modules = ModulesSpec { side_m, side_quanta, border_step_m, border_step_cells, edges };
+    Ok((Area { name, epsg, origin_m, spacing, grid }, modules))
+}
+
+fn name(area: &Section) -> Result<String, JobError> {
+    let expected = format!("1 to {NAME_CHARS_MAX} letters, digits, '-', '_' or '.', beginning with a letter or digit");
+    let entry = area.required("name", &expected)?;
+    let name = entry.text(&expected)?;
+    let good = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_' | '.');
+    let begins = name.starts_with(|c: char| c.is_ascii_alphanumeric());
+    if !begins || !name.chars().all(good) || NAME_CHARS_MAX < name.len() {
+        return Err(entry.out_of_range_with(expected, "the database is named after it: NAME.tdb"));
+    }
+    Ok(name.to_owned())
+}
+
+fn epsg(area: &Section) -> Result<u32, JobError> {
+    let expected = "a projected coordinate system in metres, as \"EPSG:32611\"";
+    let hint = "UTM zone 11 north on WGS 84 is EPSG:32611, zone 32 north EPSG:32632";
+    let entry = area.required("crs", expected)?;
+    let digits = entry.text(expected)?.strip_prefix("EPSG:").filter(|code| code.bytes().all(|b| b.is_ascii_digit()));
+    let code = digits.and_then(|digits| digits.parse().ok()).filter(|code| EPSG_RANGE.contains(code));
+    let code = code.ok_or_else(|| entry.out_of_range_with(expected, hint))?;
+    if EPSG_GEOGRAPHIC.contains(&code) {
+        let mut fault = entry.fault(expected);
+        fault.hint = hint.to_owned();
+        fault.found += ", which is in degrees";
+        return Err(JobError::OutOfRange(fault));
+    }
+    Ok(code)
+}
+
+fn origin(area: &Section) -> Result<[f64; 2], JobError> {
+    let expected = "[east, north] of the south-west post in metres";
+    let entry = area.required("origin_m", expected)?;
+    let origin = entry.pair(expected)?;
+    if origin.iter().any(|metres| COORDINATE_M_MAX < metres.abs()) {
+        return Err(entry.out_of_range(format!("{expected}, each within {COORDINATE_M_MAX:e} m of 0")));
+    }
+    Ok(origin)
+}
+
+fn spacing<'a>(area: &Section<'a>) -> Result<(Entry<'a>, Spacing), JobError> {
+    let expected = "metres between posts, a positive multiple of 1/16 m";
+    let hint = "25 divides the usual border step of 125 m; a DEM of any other spacing is resampled to it";
+    let entry = area.required("spacing_m", expected)?;
+    let spacing = Spacing::from_metres(entry.number(expected)?);
+    let spacing = spacing.ok_or_else(|| entry.out_of_range_with(expected, hint))?;
+    Ok((entry, spacing))
+}
+
+/// A length that has a default: positive, and no longer than the largest side of a load module.
+fn length(modules: &Section, key: &str, default: f64) -> Result<f64, JobError> {
+    let Some(entry) = modules.optional(key) else { return Ok(default) };
+    let metres = entry.number("a positive number of metres")?;
+    let longest = f64::from(SIDE_QUANTA_MAX) / f64::from(QUANTA_PER_METRE);
+    if metres <= 0.0 {
+        return Err(entry.out_of_range("a positive number of metres"));
+    }
+    if longest < metres {
+        let hint = "a load module has 16-bit coordinates of 1/128 m: 500 m is 64,000 of them";
+        return Err(entry.out_of_range_with(format!("at most {SIDE_QUANTA_MAX}/128 m"), hint));
+    }
+    Ok(metres)
+}
+
+fn border_step_cells(entry: &Entry, spacing: Spacing, border_step_m: f64) -> Result<i32, JobError> {
+    spacing.posts_in(Metres(border_step_m)).ok_or_else(|| {
+        let expected = format!("a spacing that divides load_modules.border_step_m, {border_step_m} m");
+        let hint = nearest_spacing(border_step_m, spacing.metres())
+            .map(|(near, parts)| format!("{near} m is {border_step_m} m / {parts}; the DEM is resampled to it"));
+        match hint {
+            Some(hint) => entry.out_of_range_with(expected, hint),
+            None => entry.out_of_range(expected),
+        }
+    })
+}
+
+/// The spacing nearest to `wanted` that divides the border step and is a multiple of 1/16 m, and into how many parts.
+fn nearest_spacing(border_step_m: f64, wanted: f64) -> Option<(f64, u32)> {
+    const PARTS_MAX: u32 = 8000; // 500 m in sixteenths: no more parts are possible
+    let fits = |parts: u32| {
+        let metres = border_step_m / f64::from(parts);
+        Spacing::from_metres(metres).filter(|s| s.metres() * f64::from(parts) == border_step_m).map(|_| (metres, parts))
+    };
+    let farther = |(metres, _): &(f64, u32)| (metres - wanted).abs();
+    (1..=PARTS_MAX).filter_map(fits).min_by(|a, b| farther(a).total_cmp(&farther(b)))
+}
+
+fn side_cells(modules: &Section, spacing: Spacing, side_m: f64, border_step_m: f64) -> Result<i32, JobError> {
+    let steps = side_m / border_step_m;
+    if let (0.0, Some(cells)) = (steps.fract(), spacing.posts_in(Metres(side_m))) {
+        return Ok(cells);
+    }
+    let expected =
+        format!("a side of a load module that is a multiple of its border step ({side_m} m of {border_step_m} m)");
+    let hint = "the usual ones are side_m = 500 and border_step_m = 125";
+    // Whichever of the two the job says is where the reader should look; the defaults fit each other.
+    match modules.optional("side_m").or_else(|| modules.optional("border_step_m")) {
+        Some(entry) => Err(entry.out_of_range_with(expected, hint)),
+        None => unreachable!("500 m is a multiple of 125 m and of every spacing that divides 125 m"),
+    }
+}
+
+fn grid(area: &Section, spacing: Spacing, side_cells: i32, side_m: f64) -> Result<ModuleGrid, JobError> {
+    let expected = "[width, height] of the area in metres";
+    let entry = area.required("size_m", expected)?;
+    let size_m = entry.pair(expected)?;
+    if size_m.iter().any(|&metres| metres <= 0.0) {
+        return Err(entry.out_of_range("a positive width and height in metres"));
+    }
+    let widest = f64::from(CELLS_A_SIDE_MAX) * spacing.metres();
+    if size_m.iter().any(|&metres| widest < metres) {
+        let most = format!("at most {CELLS_A_SIDE_MAX} cells a side, which is {widest} m at this spacing");
+        return Err(entry.out_of_range(most));
+    }
+    let [cols, rows] = size_m.map(|metres| metres / side_m);
+    if cols.fract() != 0.0 || rows.fract() != 0.0 {
+        let whole = size_m.map(|metres| (metres / side_m).floor() * side_m);
+        let expected = format!("whole numbers of load modules of {side_m} m");
+        return Err(if whole.contains(&0.0) {
+            entry.out_of_range(expected)
+        } else {
+            entry.out_of_range_with(expected, format!("[{}, {}] fits inside", whole[0], whole[1]))
+        });
+    }
+    if (MODULES_MAX as f64) < cols * rows {
+        return Err(entry.out_of_range(format!("at most {MODULES_MAX} load modules")));
+    }
+    // Both are whole and below 2^24 here.
+    Ok(ModuleGrid { rows: rows as u32, cols: cols as u32, side_cells })
+}
+
+fn edges(modules: &Section) -> Result<Edges, JobError> {
+    let clip = match modules.optional("edges") {
+        Some(entry) => entry.word(&[("constrained", false), ("clip", true)])?,
+        None => false,
+    };
+    let heights = modules.optional("clip_heights");
+    match (clip, heights) {
+        (true, Some(entry)) => {
+            Ok(Edges::Clip(entry.word(&[("coplanar", ClipHeights::Coplanar), ("dem", ClipHeights::Dem)])?))
+        }
+        (true, None) => Ok(Edges::Clip(ClipHeights::Coplanar)),
+        (false, None) => Ok(Edges::Constrained),
+        (false, Some(entry)) => Err(entry.conflict(
+            "edges = \"constrained\"",
+            "no clip_heights, since nothing is clipped",
+            "remove it, or write edges = \"clip\"",
+        )),
+    }
+}

@@ -1,0 +1,91 @@
+//! From the text of a job file to a [`Job`]: one function per section.
+
+mod area;
+mod dem;
+mod importance;
+mod limits;
+mod tiles;
+mod tin;
+
+use std::path::Path;
+
+use toml::de::DeTable;
+
+use crate::entry::{Document, Entry, Section, check_sections};
+use crate::files::Mention;
+use crate::{Job, JobError, NamedFile};
+
+/// The sections of a job file, their keys known.
+struct Sections<'a> {
+    area: Section<'a>,
+    dem: Section<'a>,
+    importance: Section<'a>,
+    tiles: Section<'a>,
+    modules: Section<'a>,
+    limits: Section<'a>,
+    tin: Section<'a>,
+    lod: Section<'a>,
+}
+
+/// Reads a job and lists the files it mentions; does not look at the disk.
+///
+/// Unknown keys are told before anything else: a key with a typo is the likely reason for one that is missing.
+pub(crate) fn read<'a>(text: &'a str, path: &'a Path) -> Result<(Job, Vec<Mention>), JobError> {
+    let document = Document { path, text };
+    let root = DeTable::parse(text).map_err(|error| syntax(document, &error))?;
+    let root = root.get_ref();
+    check_sections(document, root)?;
+    let section = |name| Section::of(document, root, name);
+    let sections = Sections {
+        area: section("area")?,
+        dem: section("dem")?,
+        importance: section("importance")?,
+        tiles: section("tiles")?,
+        modules: section("load_modules")?,
+        limits: section("limits")?,
+        tin: section("tin")?,
+        lod: section("lod")?,
+    };
+    job_of(&sections, path)
+}
+
+fn job_of(sections: &Sections, path: &Path) -> Result<(Job, Vec<Mention>), JobError> {
+    let mut mentions = Vec::new();
+    let (area, modules) = area::read(&sections.area, &sections.modules)?;
+    let dem = dem::read(&sections.dem, path, &mut mentions)?;
+    let importance = importance::read(&sections.importance, &dem.source, path, &mut mentions)?;
+    let tiles = tiles::read(&sections.tiles, &area.grid)?;
+    let limits = limits::read(&sections.limits, &area.grid, modules.side_m)?;
+    let tin = tin::read(&sections.tin, &sections.modules, modules.edges)?;
+    refuse_levels(&sections.lod)?;
+    Ok((Job { path: path.to_owned(), area, dem, importance, tiles, modules, limits, tin }, mentions))
+}
+
+/// Levels of detail are another version's; an empty list says so plainly.
+fn refuse_levels(lod: &Section) -> Result<(), JobError> {
+    let Some(entry) = lod.optional("levels") else { return Ok(()) };
+    let expected = "[], the finest level only";
+    if entry.list(expected)?.is_empty() {
+        Ok(())
+    } else {
+        Err(entry.unsupported(expected, "remove the section: load modules have one level"))
+    }
+}
+
+fn syntax(document: Document, error: &toml::de::Error) -> JobError {
+    let at = error.span().map_or(0, |span| span.start.min(document.text.len()));
+    let before = document.text.get(..at).unwrap_or("");
+    let column = 1 + before.chars().rev().take_while(|c| *c != '\n').count();
+    let message = error.message().lines().next().unwrap_or("unreadable").to_owned();
+    JobError::Syntax { path: document.path.to_owned(), line: 1 + before.matches('\n').count(), column, message }
+}
+
+/// The file that `entry` names, relative to the folder of the job.
+fn named_file(entry: &Entry, job: &Path) -> Result<NamedFile, JobError> {
+    let written = entry.text("the path of a file")?;
+    if written.is_empty() || written.contains('\0') {
+        return Err(entry.out_of_range("the path of a file, relative to the job file"));
+    }
+    let folder = job.parent().unwrap_or(Path::new(""));
+    Ok(NamedFile { written: written.to_owned(), path: folder.join(written) })
+}

@@ -1,0 +1,204 @@
+//! What a job becomes: defaults, units, the canonical text, and the job files of the project.
+
+// A test that unwraps says where it failed, which is all a test has to say.
+#![allow(clippy::unwrap_used)]
+
+use std::path::{Path, PathBuf};
+
+use job::{
+    Allocation, AreaShape, Budget, ClipHeights, Count, DemSource, Edges, ErrorKey, Job, LastBatch, Method, Proximity,
+    SampleClass, TileOrder, Voids, WindowLimit,
+};
+use terrain::ModuleGrid;
+
+const SHORTEST: &str = r#"
+[area]
+name = "small"
+crs = "EPSG:32611"
+origin_m = [-500.5, 3875000]
+size_m = [3000, 2500]
+spacing_m = 12.5
+[dem]
+source = "sample"
+"#;
+
+fn job(text: &str) -> Job {
+    Job::from_text(text, Path::new("jobs/x.toml")).unwrap()
+}
+
+fn configs() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs")
+}
+
+#[test]
+fn the_shortest_job_has_the_documented_defaults() {
+    let job = job(SHORTEST);
+    assert_eq!(job.area.grid, ModuleGrid { rows: 5, cols: 6, side_cells: 40 });
+    assert_eq!((job.area.size_m(), job.area.spacing.sixteenths()), ([3000.0, 2500.0], 200));
+    assert_eq!(job.dem.source, DemSource::Sample { seed: 1 });
+    assert_eq!((job.dem.voids, job.importance.default_weight), (Voids::Fail, 1000));
+    assert_eq!((job.tiles.rows, job.tiles.columns, job.tiles.order), (2, 3, TileOrder::Color));
+    assert_eq!((job.modules.side_quanta, job.modules.border_step_cells), (64_000, 10));
+    assert_eq!((job.modules.edges, job.limits.count), (Edges::Constrained, Count::Triangles));
+    assert_eq!((job.limits.per_load_module, job.limits.pool), (100, 0));
+    assert_eq!(job.limits.area_budget(&job.area.grid), 32 * 30);
+    assert_eq!(job.limits.window, WindowLimit { limit: 4096, rows: 5, cols: 6 });
+    assert_eq!((job.tin.method, job.tin.key, job.tin.budget), (Method::Optimised, ErrorKey::Sse, Budget::Limits));
+    assert_eq!((job.tin.allocation, job.tin.residual_quantum), (Allocation::Global, 1));
+}
+
+#[test]
+fn the_window_covers_four_kilometres() {
+    let sized = |side: u32, step: u32| {
+        let size = side * 60;
+        let text = SHORTEST.replace("[3000, 2500]", &format!("[{size}, {size}]")).replace("12.5", "6.25");
+        job(&format!("{text}[load_modules]\nside_m = {side}\nborder_step_m = {step}")).limits.window
+    };
+    assert_eq!(sized(500, 125), WindowLimit { limit: 4096, rows: 8, cols: 8 });
+    assert_eq!(sized(250, 125), WindowLimit { limit: 4096, rows: 16, cols: 16 });
+    // 4 km is 10.67 load modules of 375 m: the window that covers it is 11 wide.
+    assert_eq!(sized(375, 125), WindowLimit { limit: 4096, rows: 11, cols: 11 });
+}
+
+#[test]
+fn weights_and_classes_become_small_integers() {
+    let areas = r#"
+[importance]
+default = 8
+areas = [
+    { file = "a.geojson", class = "rough", weight = 0.125 },
+    { raster = "c.tif", value = -3, class = "lake", weight = 0 },
+    { sample = "mountains", class = "rough", weight = 65.535 },
+    { file = "b.geojson", class = "default", weight = 2 },
+]
+"#;
+    let importance = job(&format!("{SHORTEST}{areas}")).importance;
+    assert_eq!(importance.classes, ["default", "rough", "lake"]);
+    let parts: Vec<_> = importance.areas.iter().map(|area| (area.class, area.weight)).collect();
+    assert_eq!((importance.default_weight, parts), (8000, vec![(1, 125), (2, 0), (1, 65_535), (0, 2000)]));
+    let AreaShape::RasterValue { file, value } = &importance.areas[1].shape else { panic!("a raster") };
+    assert_eq!((file.path.as_path(), file.written.as_str(), *value), (Path::new("jobs/c.tif"), "c.tif", -3));
+}
+
+#[test]
+fn clipped_edges_and_batches_carry_their_own_keys() {
+    let paper = "[load_modules]\nedges = \"clip\"\n[tin]\nmethod = \"paper\"\npoints = 76_500\n";
+    let usual = job(&format!("{SHORTEST}{paper}"));
+    assert_eq!(usual.modules.edges, Edges::Clip(ClipHeights::Coplanar));
+    let proximity = Some(Proximity { horizontal_m: 300.0, vertical_m: 20.0 });
+    assert_eq!(usual.tin.method, Method::Paper { proximity, last_batch: LastBatch::Truncate });
+    assert_eq!((usual.tin.budget, usual.tin.key), (Budget::Points(76_500), ErrorKey::Max));
+    assert_eq!((usual.tin.allocation, usual.tin.residual_quantum), (Allocation::Equal, 128));
+    let other = job(&format!("{SHORTEST}{paper}proximity = false\nlast_batch = \"finish\"\nkey = \"sse\""));
+    assert_eq!(other.tin.method, Method::Paper { proximity: None, last_batch: LastBatch::Finish });
+    assert_eq!(other.tin.key, ErrorKey::Sse);
+}
+
+/// The canonical text of a job reads back as the same settings, and is its own canonical text.
+#[track_caller]
+fn check_canonical(job: &Job) {
+    let text = job.canonical_text();
+    let again = Job::from_text(&text, &job.path).unwrap();
+    assert_eq!(again.canonical_text(), text);
+    assert_eq!((again.area, again.importance, again.tiles), (job.area.clone(), job.importance.clone(), job.tiles));
+    assert_eq!((again.modules, again.limits, again.tin), (job.modules, job.limits, job.tin.clone()));
+}
+
+#[test]
+fn the_canonical_text_is_the_same_job() {
+    let variants = [
+        "",
+        "voids = { fill_within_posts = 8 }\nvertical_datum = \"EGM \\\"96\\\"\"\n",
+        "[tin]\nmethod = \"greedy\"\nkey = \"sse\"\nresidual_quantum_m = 0.5\nmax_residual_m = 0\n",
+        "[tin]\ntarget_rms_m = 1.25\nallocation = \"equal\"\n[load_modules]\nside_m = 250\n",
+        "[tin]\nmethod = \"paper\"\npoints = 9\nproximity = false\n[load_modules]\nedges = \"clip\"\n",
+        "[limits]\nmean_per_load_module = 31.7\npool = 12\n[tiles]\norder = \"raster\"\ncolumns = 1\n",
+        "[importance]\ndefault = 0.001\nareas = [{ sample = \"mountains\", class = \"m \\\\ n\", weight = 3 }]\n",
+    ];
+    for variant in variants {
+        check_canonical(&job(&format!("{SHORTEST}{variant}")));
+    }
+    let sample = AreaShape::Sample(SampleClass::Mountains);
+    assert_eq!(job(&format!("{SHORTEST}{}", variants[6])).importance.areas[0].shape, sample);
+}
+
+#[test]
+fn the_canonical_text_does_not_depend_on_layout_order_or_place() {
+    let other = r#"dem = { seed = 0x1, source = 'sample' } # inline
+area.spacing_m = 12.50
+area.size_m = [3e3, 2_500]
+area.origin_m = [-5005e-1, 3875000.0]
+area.crs = "EPSG:32611"
+area.name = "small"
+"#;
+    let other = Job::from_text(other, Path::new("/somewhere/else.toml")).unwrap();
+    assert_eq!(other.canonical_text(), job(SHORTEST).canonical_text());
+}
+
+#[test]
+fn every_setting_is_described_with_value_and_meaning() {
+    let described: Vec<String> =
+        job(SHORTEST).describe().into_iter().map(|s| format!("{} = {}: {}", s.key, s.value, s.meaning)).collect();
+    assert_eq!(
+        described,
+        [
+            r#"area.name = "small": name of the area"#,
+            r#"area.crs = "EPSG:32611": projected coordinate system, in metres"#,
+            "area.origin_m = [-500.5, 3875000]: east and north of the south-west post",
+            "area.size_m = [3000, 2500]: 6 x 5 load modules, west to east x south to north",
+            "area.spacing_m = 12.5: working grid of 241 x 201 posts",
+            r#"dem.source = "sample": the built-in basin-and-range terrain"#,
+            "dem.seed = 1: which one of its terrains",
+            r#"dem.voids = "fail": a post without a height is an error"#,
+            "importance.default = 1: weight of every post that no area holds",
+            "importance.areas = []: all ground matters the same",
+            r#"importance.smooth = "binomial-7": weights are softened across 7 x 7 posts"#,
+            "tiles.columns = 3: tiles west to east, each 2 load modules wide",
+            "tiles.rows = 2: tiles south to north, each 2 or 3 load modules high",
+            r#"tiles.order = "colour": four colours: most tiles at once"#,
+            r#"tiles.borders = "inherit": a tile takes over the border points of its lower-ranked neighbours"#,
+            "load_modules.side_m = 500: a side of a load module, 40 cells",
+            "load_modules.border_step_m = 125: between points on the outer border, 10 cells",
+            r#"load_modules.edges = "constrained": module lines are edges of the TIN from the start"#,
+            r#"limits.count = "triangles": limits count triangles"#,
+            "limits.per_load_module = 100: triangles in one load module",
+            "limits.pool = 0: triangles above that in the whole area together",
+            "limits.mean_per_load_module = 32: triangles on average, 960 in the whole area",
+            "limits.per_4km_square = 4096: triangles in every window of 5 x 6 load modules (2500 m x 3000 m)",
+            r#"tin.method = "optimised": lowest RMS residual under the limits"#,
+            r#"tin.key = "sse": a triangle is worth its weighted squared residuals"#,
+            r#"tin.allocation = "global": tiles share by what a survey says they gain"#,
+            r#"tin.height_fit = "off": vertices stand at DEM height"#,
+            r#"tin.lattice = "post": vertices stand on posts"#,
+        ]
+    );
+}
+
+#[test]
+fn the_project_s_own_jobs_are_sound() {
+    let mut names = Vec::new();
+    for entry in std::fs::read_dir(configs()).unwrap() {
+        let path = entry.unwrap().path();
+        let job = Job::from_text(&std::fs::read_to_string(&path).unwrap(), &path).unwrap();
+        check_canonical(&job);
+        assert_eq!(path.file_stem().unwrap().to_str(), Some(job.area.name.as_str()), "a job is named as its file");
+        names.push((job.area.name.clone(), job.area.grid.rows, job.area.grid.cols, job.tiles.rows * job.tiles.columns));
+    }
+    names.sort();
+    let expected = [("alps", 99, 99, 36), ("desert", 51, 51, 36), ("ntc", 100, 100, 36), ("paper", 100, 100, 36)];
+    assert_eq!(names, expected.map(|(name, rows, cols, tiles)| (name.to_owned(), rows, cols, tiles)));
+}
+
+#[test]
+fn jobs_on_real_terrain_find_it() {
+    for name in ["desert.toml", "alps.toml"] {
+        let path = configs().join(name);
+        let named = Job::from_text(&std::fs::read_to_string(&path).unwrap(), &path).unwrap();
+        let DemSource::Files { files, .. } = &named.dem.source else { panic!("the job names files") };
+        if !files[0].path.exists() {
+            eprintln!("skipped: {} is not here", files[0].path.display());
+            continue;
+        }
+        assert_eq!(Job::load(&path).unwrap(), named);
+    }
+}

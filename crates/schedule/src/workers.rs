@@ -1,0 +1,36 @@
+//! How many workers there are, and the pool they form for independent items.
+
+use std::sync::OnceLock;
+
+/// A number of workers. One worker is the calling thread itself; nothing is spawned for it.
+#[derive(Debug)]
+pub struct Workers {
+    count: usize,
+    /// Made on first use and kept, so that a build spawns its pool once.
+    pool: OnceLock<rayon::ThreadPool>,
+}
+
+impl Workers {
+    /// `count` workers.
+    ///
+    /// # Panics
+    /// When `count` is zero: nobody would do the work.
+    pub fn new(count: usize) -> Self {
+        assert!(0 < count, "work needs at least one worker");
+        Self { count, pool: OnceLock::new() }
+    }
+
+    /// How many there are.
+    pub fn count(&self) -> usize {
+        self.count
+    }
+
+    /// The pool for independent items, or why the system gave no threads for it.
+    pub(crate) fn pool(&self) -> Result<&rayon::ThreadPool, String> {
+        if let Some(pool) = self.pool.get() {
+            return Ok(pool);
+        }
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(self.count).build().map_err(|e| e.to_string())?;
+        Ok(self.pool.get_or_init(|| pool))
+    }
+}
