@@ -1,1 +1,140 @@
-//! (to be written)
+//! Decides where ground matters more: classes and weights per post, from polygons and class overlays.
+//!
+//! One verb, [`importance`]. Every post is decided from the area alone, never from the window asked for, so the
+//! windows of two tiles agree wherever they overlap.
+
+mod area;
+pub use area::{Area, Membership, Shape};
+mod polygon;
+pub use polygon::Polygon;
+mod smooth;
+
+use terrain::{Dem, GridFrame, Importance, PostRect};
+
+/// Index of the class of posts that no area claims.
+pub const DEFAULT_CLASS: u8 = 0;
+
+/// How weights of neighbouring posts are mixed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Smoothing {
+    /// Not at all: every post has the weight of its class.
+    None,
+    /// The separable 7-tap binomial \[1 6 15 20 15 6 1\]/64, clamped at the borders of the area.
+    Binomial7,
+}
+
+impl Smoothing {
+    /// How many posts around a window decide its weights.
+    pub fn halo(self) -> i32 {
+        match self {
+            Smoothing::None => 0,
+            Smoothing::Binomial7 => smooth::REACH,
+        }
+    }
+}
+
+/// What makes up an importance mask. Areas named later win where areas overlap.
+#[derive(Debug)]
+pub struct Mask<'a> {
+    /// Weight of posts that no area claims, in thousandths; 0 excludes them.
+    pub default_weight: u16,
+    /// Areas with a class and a weight of their own.
+    pub areas: Vec<Area<'a>>,
+    /// How weights are mixed.
+    pub smoothing: Smoothing,
+}
+
+impl Mask<'_> {
+    /// Names of the classes by index: `default`, then each new class in the order in which areas name it.
+    ///
+    /// An area may name `default` itself, to give a part of another area back.
+    pub fn class_names(&self) -> Vec<&str> {
+        let mut names = vec!["default"];
+        for area in &self.areas {
+            if !names.contains(&area.class.as_str()) {
+                names.push(&area.class);
+            }
+        }
+        names
+    }
+
+    /// Whether every post of any window weighs the same and is of the default class.
+    pub fn is_uniform(&self) -> bool {
+        self.areas.is_empty()
+    }
+}
+
+/// Weights and classes of the posts of `rect`, a window of the gaming area `area` on the grid `frame`.
+///
+/// Weights are smoothed with one rounding (half up) and posts of weight 0 stay 0; a post whose own weight is not 0
+/// never becomes 0 by rounding.
+///
+/// # Panics
+/// When `rect` is not inside `area`, or there are more than 256 classes.
+pub fn importance(mask: &Mask, area: PostRect, frame: &GridFrame, rect: PostRect) -> Importance {
+    assert!(area.contains_rect(&rect), "a window of the mask lies inside the gaming area");
+    if mask.is_uniform() {
+        return Importance::uniform(rect, mask.default_weight);
+    }
+    let wide = rect.grown(mask.smoothing.halo()).intersection(&area).expect("a window lies inside the area");
+    let claims = claims(mask, frame, wide);
+    let weights = match mask.smoothing {
+        Smoothing::None => claims.weights,
+        Smoothing::Binomial7 => smooth::binomial7(&claims.weights, wide, rect),
+    };
+    let classes = if wide == rect { claims.classes } else { cut(&claims.classes, wide, rect) };
+    Importance::new(rect, weights, classes)
+}
+
+/// The same mask with weight 0 at the void posts of `dem`, which therefore are never selected.
+///
+/// # Panics
+/// When `dem` does not hold every post of the mask's window.
+pub fn without_voids(importance: Importance, dem: &Dem) -> Importance {
+    if dem.void_count() == 0 {
+        return importance;
+    }
+    let rect = importance.rect();
+    assert!(dem.rect().contains_rect(&rect), "the window of heights holds the window of the mask");
+    let weight = |post| if dem.is_void(post) { 0 } else { importance.weight(post) };
+    let weights = posts(rect).map(weight).collect();
+    let classes = posts(rect).map(|post| importance.class(post)).collect();
+    Importance::new(rect, weights, classes)
+}
+
+fn posts(rect: PostRect) -> impl Iterator<Item = terrain::Post> {
+    (rect.south..=rect.north).flat_map(move |row| (rect.west..=rect.east).map(move |col| terrain::Post::new(row, col)))
+}
+
+/// Weight and class of every post of a window, row-major, before smoothing.
+struct Claims {
+    weights: Vec<u16>,
+    classes: Vec<u8>,
+}
+
+fn claims(mask: &Mask, frame: &GridFrame, rect: PostRect) -> Claims {
+    let names = mask.class_names();
+    let mut claims = Claims {
+        weights: vec![mask.default_weight; rect.post_count()],
+        classes: vec![DEFAULT_CLASS; rect.post_count()],
+    };
+    for area in &mask.areas {
+        let index = names.iter().position(|&name| name == area.class).expect("every area's class is listed");
+        let class = u8::try_from(index).expect("a mask has at most 256 classes");
+        area.shape.visit_spans(frame, rect, |span| {
+            claims.weights[span.clone()].fill(area.weight);
+            claims.classes[span].fill(class);
+        });
+    }
+    claims
+}
+
+fn cut(classes: &[u8], from: PostRect, rect: PostRect) -> Vec<u8> {
+    let west = (rect.west - from.west) as usize;
+    let south = (rect.south - from.south) as usize;
+    let rows = classes.chunks(from.posts_wide()).skip(south).take(rect.posts_high());
+    rows.flat_map(|row| row[west..west + rect.posts_wide()].iter().copied()).collect()
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,52 @@
+//! Prints what the reader makes of a GeoTIFF, for comparison with another reader (`scripts/compare_readers.py`).
+//!
+//! `read_posts FILE` writes one line of facts to stderr and every sample to stdout: 64-bit floats, little-endian,
+//! northern row first as files have it, NaN where void. A refusal is a line that begins with `refused:`.
+
+use std::io::Write;
+use std::path::Path;
+use std::time::Instant;
+
+use source_files::{GeoTiff, Raster, SourceError};
+use terrain::Post;
+
+fn main() -> std::io::Result<()> {
+    let path = std::env::args().nth(1).expect("give the path of a GeoTIFF");
+    match read(Path::new(&path)) {
+        Err(error) => eprintln!("refused: {error}\nhint: {}", error.hint().unwrap_or("none")),
+        Ok((file, raster, seconds)) => {
+            let (frame, scale) = (file.frame(), file.sample_scale());
+            eprintln!(
+                "{} {} {} {} {} {} {} {} {} {} {} {}",
+                frame.cols,
+                frame.rows,
+                frame.epsg,
+                frame.south_west_m[0],
+                frame.south_west_m[1],
+                frame.spacing_m[0],
+                frame.spacing_m[1],
+                raster.void_count(),
+                scale.scale,
+                scale.offset,
+                scale.unit_m,
+                seconds
+            );
+            std::io::stdout().write_all(&samples(&raster))?;
+        }
+    }
+    Ok(())
+}
+
+fn read(path: &Path) -> Result<(GeoTiff, Raster, f64), SourceError> {
+    let started = Instant::now();
+    let file = GeoTiff::open(path, None)?;
+    let raster = file.read(file.rect())?;
+    Ok((file, raster, started.elapsed().as_secs_f64()))
+}
+
+fn samples(raster: &Raster) -> Vec<u8> {
+    let rect = raster.window();
+    let rows = (rect.south..=rect.north).rev();
+    let posts = rows.flat_map(|row| (rect.west..=rect.east).map(move |col| Post::new(row, col)));
+    posts.flat_map(|post| raster.sample(post).unwrap_or(f64::NAN).to_le_bytes()).collect()
+}

@@ -1,0 +1,335 @@
+//! The first directory of a TIFF, read with every number doubted.
+//!
+//! The `tiff` crate multiplies what a file says before it can be asked what that is. So its sizes are checked here
+//! first: every value lies inside the file, and no size is beyond the limits. It also tells a truncated file from
+//! one that is no TIFF at all.
+
+use std::fs::File;
+use std::io::{Read, Seek, SeekFrom};
+use std::path::Path;
+
+use crate::SourceError;
+use crate::limits::{CHUNK_BYTES_MAX, CHUNKS_MAX, POSTS_A_SIDE_MAX, POSTS_MAX, TAGS_MAX};
+
+/// Tags whose values decide how the file is decoded.
+mod tag {
+    pub const IMAGE_WIDTH: u16 = 256;
+    pub const IMAGE_LENGTH: u16 = 257;
+    pub const BITS_PER_SAMPLE: u16 = 258;
+    pub const COMPRESSION: u16 = 259;
+    pub const PHOTOMETRIC: u16 = 262;
+    pub const FILL_ORDER: u16 = 266;
+    pub const SAMPLES_PER_PIXEL: u16 = 277;
+    pub const ROWS_PER_STRIP: u16 = 278;
+    pub const PREDICTOR: u16 = 317;
+    pub const TILE_WIDTH: u16 = 322;
+    pub const TILE_LENGTH: u16 = 323;
+    pub const SAMPLE_FORMAT: u16 = 339;
+}
+
+/// How one sample is stored.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum SampleKind {
+    U8,
+    U16,
+    I16,
+    I32,
+    F32,
+    F64,
+}
+
+impl SampleKind {
+    pub(crate) fn bytes(self) -> u64 {
+        match self {
+            SampleKind::U8 => 1,
+            SampleKind::U16 | SampleKind::I16 => 2,
+            SampleKind::I32 | SampleKind::F32 => 4,
+            SampleKind::F64 => 8,
+        }
+    }
+}
+
+/// Sizes of a raster and of the strips or tiles it is cut into, all within the limits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Layout {
+    pub cols: u32,
+    pub rows: u32,
+    /// Columns of a strip or tile, padding included.
+    pub chunk_cols: u32,
+    /// Rows of a strip or tile, padding included.
+    pub chunk_rows: u32,
+    pub tiled: bool,
+    pub sample: SampleKind,
+    /// Whether chunks are stored as they are.
+    pub uncompressed: bool,
+}
+
+impl Layout {
+    pub(crate) fn chunks_across(&self) -> u32 {
+        self.cols.div_ceil(self.chunk_cols)
+    }
+
+    pub(crate) fn chunk_count(&self) -> u32 {
+        self.chunks_across() * self.rows.div_ceil(self.chunk_rows)
+    }
+}
+
+/// Reads the first directory of the open file at `path` and checks it.
+pub(crate) fn read_layout(path: &Path, file: &mut File) -> Result<Layout, SourceError> {
+    let read = |source| SourceError::Read { path: path.into(), source };
+    let len = file.metadata().map_err(read)?.len();
+    let mut bytes = Bytes { path, file, len, little: true, big_tiff: false };
+    let directory = bytes.directory()?;
+    let first = |tag| directory.iter().find(|&&(found, _)| found == tag).map(|&(_, value)| value);
+    Facts { path, first: &first }.layout()
+}
+
+/// The open file, read at given places and never past its end.
+struct Bytes<'a> {
+    path: &'a Path,
+    file: &'a mut File,
+    len: u64,
+    little: bool,
+    big_tiff: bool,
+}
+
+impl Bytes<'_> {
+    fn take<const N: usize>(&mut self, at: u64, what: &str) -> Result<[u8; N], SourceError> {
+        self.holds(at, N as u64, what)?;
+        let mut taken = [0; N];
+        let read = self.file.seek(SeekFrom::Start(at)).and_then(|_| self.file.read_exact(&mut taken));
+        read.map_err(|source| SourceError::Read { path: self.path.into(), source })?;
+        Ok(taken)
+    }
+
+    fn holds(&self, at: u64, size: u64, what: &str) -> Result<(), SourceError> {
+        let expected = at.saturating_add(size);
+        if expected <= self.len {
+            return Ok(());
+        }
+        Err(SourceError::Truncated { path: self.path.into(), what: what.into(), expected, found: self.len })
+    }
+
+    /// An unsigned number of `N` bytes in the file's byte order.
+    fn number<const N: usize>(&mut self, at: u64, what: &str) -> Result<u64, SourceError> {
+        let mut bytes: [u8; N] = self.take(at, what)?;
+        if !self.little {
+            bytes.reverse();
+        }
+        Ok(bytes.iter().rev().fold(0, |number, &byte| number << 8 | u64::from(byte)))
+    }
+
+    fn header(&mut self) -> Result<u64, SourceError> {
+        let start: [u8; 4] = match self.len {
+            0..4 => Err(self.not_tiff(&[]))?,
+            _ => self.take(0, "the header")?,
+        };
+        (self.little, self.big_tiff) = match &start {
+            b"II\x2a\0" => (true, false),
+            b"MM\0\x2a" => (false, false),
+            b"II\x2b\0" => (true, true),
+            b"MM\0\x2b" => (false, true),
+            _ => return Err(self.not_tiff(&start)),
+        };
+        if !self.big_tiff { self.number::<4>(4, "the header") } else { self.number::<8>(8, "the header") }
+    }
+
+    fn not_tiff(&self, start: &[u8]) -> SourceError {
+        let hex: Vec<String> = start.iter().map(|byte| format!("{byte:02x}")).collect();
+        let found = if hex.is_empty() { format!("{} bytes in all", self.len) } else { hex.join(" ") };
+        SourceError::NotTiff { path: self.path.into(), found }
+    }
+
+    /// Every tag of the first directory with the first of its values, once all its values are known to lie in the file.
+    fn directory(&mut self) -> Result<Vec<(u16, u64)>, SourceError> {
+        const WHAT: &str = "the first directory";
+        let at = self.header()?;
+        let (count, start, size) = match self.big_tiff {
+            false => (self.number::<2>(at, WHAT)?, at.saturating_add(2), 12),
+            true => (self.number::<8>(at, WHAT)?, at.saturating_add(8), 20),
+        };
+        if TAGS_MAX < count {
+            return Err(SourceError::TooLarge { path: self.path.into(), what: "tags", found: count, limit: TAGS_MAX });
+        }
+        self.holds(start, count * size, WHAT)?;
+        let directory: Vec<_> = (0..count).map(|index| self.entry(start + index * size)).collect::<Result<_, _>>()?;
+        self.refuse_repeated(&directory)?;
+        Ok(directory)
+    }
+
+    /// Readers differ on which of two equal tags they believe.
+    fn refuse_repeated(&self, directory: &[(u16, u64)]) -> Result<(), SourceError> {
+        let mut tags: Vec<u16> = directory.iter().map(|&(tag, _)| tag).collect();
+        tags.sort_unstable();
+        match tags.windows(2).find(|pair| pair[0] == pair[1]) {
+            None => Ok(()),
+            Some(pair) => Err(SourceError::Malformed {
+                path: self.path.into(),
+                what: format!("tag {}", pair[0]),
+                found: "there twice".into(),
+                expected: "to be there once".into(),
+            }),
+        }
+    }
+
+    fn entry(&mut self, at: u64) -> Result<(u16, u64), SourceError> {
+        let tag = self.number::<2>(at, "a tag")? as u16;
+        let kind = self.number::<2>(at + 2, "a tag")?;
+        let (count, room, at) = match self.big_tiff {
+            false => (self.number::<4>(at + 4, "a tag")?, 4, at + 8),
+            true => (self.number::<8>(at + 4, "a tag")?, 8, at + 12),
+        };
+        let size = match kind {
+            1 | 2 | 6 | 7 => 1,
+            3 | 8 => 2,
+            4 | 9 | 11 | 13 => 4,
+            5 | 10 | 12 | 16..=18 => 8,
+            _ => 0,
+        };
+        let bytes = count.saturating_mul(size);
+        let place = match (room < bytes, self.big_tiff) {
+            (false, _) => at,
+            (true, false) => self.number::<4>(at, "a tag")?,
+            (true, true) => self.number::<8>(at, "a tag")?,
+        };
+        let what = format!("the value of tag {tag}");
+        self.holds(place, bytes, &what)?;
+        let first = match (count, size) {
+            (0, _) | (_, 0) => 0,
+            (_, 1) => self.number::<1>(place, &what)?,
+            (_, 2) => self.number::<2>(place, &what)?,
+            (_, 4) => self.number::<4>(place, &what)?,
+            _ => self.number::<8>(place, &what)?,
+        };
+        Ok((tag, first))
+    }
+}
+
+/// What the first directory says.
+struct Facts<'a> {
+    path: &'a Path,
+    first: &'a dyn Fn(u16) -> Option<u64>,
+}
+
+impl Facts<'_> {
+    fn layout(&self) -> Result<Layout, SourceError> {
+        self.check_colours()?;
+        let uncompressed = self.check_compression()?;
+        let sample = self.sample()?;
+        let cols = self.side(tag::IMAGE_WIDTH, "the width")?;
+        let rows = self.side(tag::IMAGE_LENGTH, "the height")?;
+        self.at_most(u64::from(cols) * u64::from(rows), POSTS_MAX, "posts")?;
+        let tiled = (self.first)(tag::TILE_WIDTH).is_some();
+        let (chunk_cols, chunk_rows) = match tiled {
+            true => (self.side(tag::TILE_WIDTH, "the tile width")?, self.side(tag::TILE_LENGTH, "the tile height")?),
+            false => (cols, self.rows_per_strip(rows)?),
+        };
+        let layout = Layout { cols, rows, chunk_cols, chunk_rows, tiled, sample, uncompressed };
+        let posts = u64::from(chunk_cols) * u64::from(chunk_rows);
+        self.at_most(posts * sample.bytes(), CHUNK_BYTES_MAX, "bytes in a strip or tile")?;
+        let chunks = u64::from(layout.chunks_across()) * u64::from(rows.div_ceil(chunk_rows));
+        self.at_most(chunks, CHUNKS_MAX, "strips or tiles")?;
+        Ok(layout)
+    }
+
+    fn at_most(&self, found: u64, limit: u64, what: &'static str) -> Result<(), SourceError> {
+        if found <= limit { Ok(()) } else { Err(SourceError::TooLarge { path: self.path.into(), what, found, limit }) }
+    }
+
+    fn side(&self, tag: u16, what: &str) -> Result<u32, SourceError> {
+        let malformed = |found: &str| SourceError::Malformed {
+            path: self.path.into(),
+            what: what.into(),
+            found: found.into(),
+            expected: "a positive number".into(),
+        };
+        let posts = (self.first)(tag).ok_or_else(|| malformed("missing"))?;
+        self.at_most(posts, POSTS_A_SIDE_MAX, "posts a side")?;
+        if posts == 0 { Err(malformed("0")) } else { Ok(posts as u32) }
+    }
+
+    /// Writers that put the whole raster into one strip say "infinitely many" or leave the tag out.
+    fn rows_per_strip(&self, rows: u32) -> Result<u32, SourceError> {
+        match (self.first)(tag::ROWS_PER_STRIP) {
+            None => Ok(rows),
+            Some(found) if u64::from(rows) <= found => Ok(rows),
+            Some(_) => self.side(tag::ROWS_PER_STRIP, "the number of rows in a strip"),
+        }
+    }
+
+    fn sample(&self) -> Result<SampleKind, SourceError> {
+        let bands = (self.first)(tag::SAMPLES_PER_PIXEL).unwrap_or(1);
+        if bands != 1 {
+            return Err(SourceError::Bands { path: self.path.into(), found: bands });
+        }
+        let bits = (self.first)(tag::BITS_PER_SAMPLE).unwrap_or(1);
+        let format = (self.first)(tag::SAMPLE_FORMAT).unwrap_or(1);
+        match (bits, format) {
+            (8, 1) => Ok(SampleKind::U8),
+            (16, 1) => Ok(SampleKind::U16),
+            (16, 2) => Ok(SampleKind::I16),
+            (32, 2) => Ok(SampleKind::I32),
+            (32, 3) => Ok(SampleKind::F32),
+            (64, 3) => Ok(SampleKind::F64),
+            _ => Err(SourceError::SampleFormat { path: self.path.into(), found: sample_name(bits, format) }),
+        }
+    }
+
+    fn check_colours(&self) -> Result<(), SourceError> {
+        if (self.first)(tag::FILL_ORDER).is_some_and(|order| order != 1) {
+            let found = "the bits of each byte are stored in reverse".into();
+            return Err(SourceError::TiffFeature { path: self.path.into(), found });
+        }
+        let found = match (self.first)(tag::PHOTOMETRIC) {
+            Some(1) => return Ok(()),
+            None => "not stated".into(),
+            Some(0) => "inverted (white is zero)".into(),
+            Some(2) => "RGB".into(),
+            Some(3) => "a palette".into(),
+            Some(other) => format!("of kind {other}"),
+        };
+        Err(SourceError::Photometric { path: self.path.into(), found })
+    }
+
+    /// Whether chunks are stored as they are.
+    fn check_compression(&self) -> Result<bool, SourceError> {
+        let code = (self.first)(tag::COMPRESSION).unwrap_or(1);
+        let predicted = (self.first)(tag::PREDICTOR).is_some_and(|predictor| predictor != 1);
+        match code {
+            1 | 32773 if predicted => Err(SourceError::Malformed {
+                path: self.path.into(),
+                what: "the predictor of a file without LZW, deflate or zstd".into(),
+                found: (self.first)(tag::PREDICTOR).unwrap_or(1).to_string(),
+                expected: "1 (none)".into(),
+            }),
+            1 => Ok(true),
+            5 | 8 | 32946 | 32773 | 50000 => Ok(false),
+            _ => Err(SourceError::Compression { path: self.path.into(), found: compression_name(code) }),
+        }
+    }
+}
+
+fn sample_name(bits: u64, format: u64) -> String {
+    let format = match format {
+        1 => "unsigned",
+        2 => "signed",
+        3 => "floating point",
+        5 | 6 => "complex",
+        _ => "of an undefined kind",
+    };
+    format!("{bits}-bit {format}")
+}
+
+fn compression_name(code: u64) -> String {
+    let name = match code {
+        2..=4 => "CCITT fax",
+        6 | 7 => "JPEG",
+        34712 => "JPEG 2000",
+        34887 => "LERC",
+        34925 => "LZMA",
+        50001 => "WebP",
+        50002 => "JPEG XL",
+        _ => return code.to_string(),
+    };
+    format!("{name} ({code})")
+}

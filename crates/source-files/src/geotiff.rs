@@ -1,0 +1,335 @@
+//! GeoTIFF files in: opened and judged at once, decoded strip by strip or tile by tile by whoever has a thread.
+//!
+//! [`GeoTiff::open`] reads the directory only. [`GeoTiff::decode`] is called with disjoint lists of chunks from any
+//! number of threads, each with a file handle of its own, and [`GeoTiff::assemble`] puts the chunks of a window
+//! together, southern row first.
+
+use std::fs::File;
+use std::io::{BufReader, ErrorKind};
+use std::path::Path;
+
+use terrain::PostRect;
+use tiff::decoder::{Decoder, DecodingResult, Limits};
+use tiff::tags::Tag;
+use tiff::{TiffError, TiffResult};
+
+use crate::directory::{Layout, SampleKind, read_layout};
+use crate::frame::{GeoTags, RasterFrame, SampleScale};
+use crate::limits::{CHUNK_BYTES_MAX, DIRECTORIES_MAX};
+use crate::{Raster, SourceError};
+
+const GDAL_METADATA: Tag = Tag::Unknown(42112);
+
+/// A GeoTIFF whose directory was read and found good; nothing is decoded yet.
+#[derive(Clone, Debug)]
+pub struct GeoTiff {
+    frame: RasterFrame,
+    scale: SampleScale,
+    layout: Layout,
+    nodata: Option<f64>,
+    /// Whether the first stored row is the southern one. Nearly always it is the northern one.
+    south_first: bool,
+    /// Bytes of each chunk in the file; 0 where the writer left out a chunk that is all void.
+    chunk_sizes: Vec<u64>,
+}
+
+/// One strip or tile, decoded.
+#[derive(Debug)]
+pub struct Chunk {
+    pub(crate) index: u32,
+    /// Rows as stored, padded to the width of a chunk; `None` for a chunk that is not in the file.
+    pub(crate) samples: Option<DecodingResult>,
+}
+
+impl GeoTiff {
+    /// Opens the file at `path` and reads its directory. `height_unit_m` (metres in a unit of height) overrides
+    /// what the file says.
+    ///
+    /// # Errors
+    /// Whatever makes it unusable: not a TIFF, broken, too large, or of a kind that is not supported.
+    pub fn open(path: &Path, height_unit_m: Option<f64>) -> Result<Self, SourceError> {
+        let mut file = File::open(path).map_err(|source| SourceError::Open { path: path.into(), source })?;
+        let layout = read_layout(path, &mut file)?;
+        let file_size = file.metadata().map_err(|source| SourceError::Read { path: path.into(), source })?.len();
+        let mut decoder = decoder(path, file)?;
+        refuse_masks(path, &mut decoder)?;
+        let tags = geo_tags(path, &mut decoder)?;
+        let (epsg, axes) = (tags.epsg(path)?, tags.axes(path)?);
+        let scale = tags.sample_scale(path, height_unit_m)?;
+        let south_first = 0.0 < axes.step_m[1];
+        let last_north_m = axes.first_m[1] + axes.step_m[1] * f64::from(layout.rows - 1);
+        let south_m = if south_first { axes.first_m[1] } else { last_north_m };
+        let frame = RasterFrame {
+            path: path.into(),
+            epsg,
+            south_west_m: [axes.first_m[0], south_m],
+            spacing_m: [axes.step_m[0], axes.step_m[1].abs()],
+            cols: layout.cols,
+            rows: layout.rows,
+        };
+        let nodata = nodata(path, &mut decoder)?;
+        let chunk_sizes = chunk_sizes(path, &mut decoder, &layout, file_size)?;
+        Ok(Self { frame, scale, layout, nodata, south_first, chunk_sizes })
+    }
+
+    /// Where its posts lie.
+    pub fn frame(&self) -> &RasterFrame {
+        &self.frame
+    }
+
+    /// What its samples mean.
+    pub fn sample_scale(&self) -> SampleScale {
+        self.scale
+    }
+
+    /// All its posts.
+    pub fn rect(&self) -> PostRect {
+        PostRect::of_size(self.layout.rows as usize, self.layout.cols as usize)
+    }
+
+    /// The strips or tiles that hold posts of `window`, in file order.
+    pub fn chunks_of(&self, window: PostRect) -> Vec<u32> {
+        (0..self.layout.chunk_count()).filter(|&chunk| self.posts_of(chunk).intersection(&window).is_some()).collect()
+    }
+
+    /// Posts of a strip or tile, padding left out.
+    pub(crate) fn posts_of(&self, chunk: u32) -> PostRect {
+        let layout = &self.layout;
+        let (down, across) = (chunk / layout.chunks_across(), chunk % layout.chunks_across());
+        let (first_row, west) = (down * layout.chunk_rows, across * layout.chunk_cols);
+        let last_row = (first_row + layout.chunk_rows).min(layout.rows) - 1;
+        let east = (west + layout.chunk_cols).min(layout.cols) - 1;
+        let flipped = |row: u32| if self.south_first { row } else { layout.rows - 1 - row } as i32;
+        let (south, north) = (flipped(first_row).min(flipped(last_row)), flipped(first_row).max(flipped(last_row)));
+        PostRect { south, west: west as i32, north, east: east as i32 }
+    }
+
+    /// Whether the first stored row of every chunk is its southern one.
+    pub(crate) fn south_first(&self) -> bool {
+        self.south_first
+    }
+
+    pub(crate) fn layout(&self) -> &Layout {
+        &self.layout
+    }
+
+    pub(crate) fn nodata(&self) -> Option<f64> {
+        self.nodata
+    }
+
+    /// Decodes some strips or tiles. May be called from several threads at once.
+    ///
+    /// # Errors
+    /// When the file is gone, or a chunk cannot be decoded.
+    pub fn decode(&self, chunks: &[u32]) -> Result<Vec<Chunk>, SourceError> {
+        let path = &self.frame.path;
+        let file = File::open(path).map_err(|source| SourceError::Open { path: path.clone(), source })?;
+        let mut decoder = decoder(path, file)?;
+        let decoded = chunks.iter().map(|&index| {
+            if self.chunk_sizes[index as usize] == 0 {
+                return Ok(Chunk { index, samples: None });
+            }
+            let samples = self.decode_one(&mut decoder, index).map_err(|error| error.to_string());
+            let samples = samples.and_then(|samples| self.as_promised(index, samples));
+            let samples = samples.map_err(|reason| self.chunk_error(index, reason))?;
+            Ok(Chunk { index, samples: Some(samples) })
+        });
+        decoded.collect()
+    }
+
+    /// Decodes whole rows, padding included. Asked to leave the padding out, the decoder reads row by row, which is
+    /// slower and at times loses the end of an LZW stream.
+    fn decode_one(&self, decoder: &mut FileDecoder, index: u32) -> TiffResult<DecodingResult> {
+        let mut samples = DecodingResult::U8(Vec::new());
+        let row_bytes = u64::from(self.layout.chunk_cols) * self.layout.sample.bytes();
+        decoder.read_chunk_to_buffer(&mut samples, index, row_bytes as usize)?;
+        Ok(samples)
+    }
+
+    /// The decoder reads the directory for itself. Should it ever see other sizes there than we did, or the file have
+    /// been replaced in between, it ends here.
+    fn as_promised(&self, index: u32, samples: DecodingResult) -> Result<DecodingResult, String> {
+        let expected = self.posts_of(index).posts_high() * self.layout.chunk_cols as usize;
+        match samples_in(&samples) {
+            Some((kind, count)) if kind == self.layout.sample && count == expected => Ok(samples),
+            found => Err(format!("it holds {found:?} samples, expected {:?}", (self.layout.sample, expected))),
+        }
+    }
+
+    fn chunk_error(&self, chunk: u32, reason: String) -> SourceError {
+        let chunks = self.layout.chunk_count();
+        SourceError::BrokenChunk { path: self.frame.path.clone(), chunk, chunks, reason }
+    }
+
+    /// Puts the chunks of `window` together.
+    ///
+    /// # Errors
+    /// When a height is infinite or beyond the limit.
+    ///
+    /// # Panics
+    /// When `window` is not inside the raster or a chunk of it is missing.
+    pub fn assemble(&self, window: PostRect, chunks: Vec<Chunk>) -> Result<Raster, SourceError> {
+        assert!(self.rect().contains_rect(&window), "a window lies inside the raster");
+        Raster::assemble(self, window, chunks)
+    }
+
+    /// Decodes and assembles the posts of `window` in this thread.
+    ///
+    /// # Errors
+    /// As [`GeoTiff::decode`] and [`GeoTiff::assemble`].
+    pub fn read(&self, window: PostRect) -> Result<Raster, SourceError> {
+        self.assemble(window, self.decode(&self.chunks_of(window))?)
+    }
+}
+
+/// The kind and number of decoded samples; `None` for kinds that are not read.
+fn samples_in(samples: &DecodingResult) -> Option<(SampleKind, usize)> {
+    match samples {
+        DecodingResult::U8(samples) => Some((SampleKind::U8, samples.len())),
+        DecodingResult::U16(samples) => Some((SampleKind::U16, samples.len())),
+        DecodingResult::I16(samples) => Some((SampleKind::I16, samples.len())),
+        DecodingResult::I32(samples) => Some((SampleKind::I32, samples.len())),
+        DecodingResult::F32(samples) => Some((SampleKind::F32, samples.len())),
+        DecodingResult::F64(samples) => Some((SampleKind::F64, samples.len())),
+        _ => None,
+    }
+}
+
+type FileDecoder = Decoder<BufReader<File>>;
+
+fn decoder(path: &Path, file: File) -> Result<FileDecoder, SourceError> {
+    let mut limits = Limits::default();
+    limits.decoding_buffer_size = CHUNK_BYTES_MAX as usize;
+    limits.intermediate_buffer_size = CHUNK_BYTES_MAX as usize;
+    // `read_layout` reads the same handle, and a decoder starts where the handle stands.
+    let mut reader = BufReader::new(file);
+    std::io::Seek::rewind(&mut reader).map_err(|source| SourceError::Read { path: path.into(), source })?;
+    let decoder = Decoder::new(reader).map_err(|error| directory_error(path, error))?;
+    Ok(decoder.with_limits(limits))
+}
+
+fn directory_error(path: &Path, error: TiffError) -> SourceError {
+    let path = path.into();
+    match error {
+        TiffError::IoError(source) if source.kind() != ErrorKind::UnexpectedEof => SourceError::Read { path, source },
+        TiffError::UnsupportedError(error) => SourceError::TiffFeature { path, found: error.to_string() },
+        error => SourceError::Malformed {
+            path,
+            what: "the directory".into(),
+            found: error.to_string(),
+            expected: "a sound one".into(),
+        },
+    }
+}
+
+/// Refuses a file whose first directory is an overview or whose voids are in a mask of their own, which would
+/// otherwise be read as ground.
+fn refuse_masks(path: &Path, decoder: &mut FileDecoder) -> Result<(), SourceError> {
+    const REDUCED: u32 = 1;
+    const MASK: u32 = 4;
+    let error = |error| directory_error(path, error);
+    let first: u32 = decoder.find_tag_unsigned(Tag::NewSubfileType).map_err(error)?.unwrap_or(0);
+    if first & (REDUCED | MASK) != 0 {
+        return Err(SourceError::NotFullRaster { path: path.into() });
+    }
+    let mut next = decoder.image_ifd().directory().next();
+    for _ in 0..DIRECTORIES_MAX {
+        let Some(pointer) = next else { break };
+        let directory = decoder.read_directory(pointer).map_err(error)?;
+        let mut tags = decoder.read_directory_tags(&directory);
+        if tags.find_tag_unsigned::<u32>(Tag::NewSubfileType).map_err(error)?.unwrap_or(0) & MASK != 0 {
+            return Err(SourceError::InternalMask { path: path.into() });
+        }
+        next = directory.next();
+    }
+    Ok(())
+}
+
+fn geo_tags(path: &Path, decoder: &mut FileDecoder) -> Result<GeoTags, SourceError> {
+    let mut value = |tag| decoder.find_tag(tag).map_err(|error| directory_error(path, error));
+    let doubles = |value: Option<tiff::decoder::ifd::Value>| {
+        value.map(|value| value.into_f64_vec()).transpose().map_err(|error| directory_error(path, error))
+    };
+    let keys = value(Tag::GeoKeyDirectoryTag)?.map(|value| value.into_u16_vec()).transpose();
+    let metadata = value(GDAL_METADATA)?.map(|value| value.into_string()).transpose();
+    Ok(GeoTags {
+        pixel_scale: doubles(value(Tag::ModelPixelScaleTag)?)?,
+        tie_points: doubles(value(Tag::ModelTiepointTag)?)?,
+        transformation: doubles(value(Tag::ModelTransformationTag)?)?,
+        keys: keys.map_err(|error| directory_error(path, error))?,
+        gdal_metadata: metadata.map_err(|error| directory_error(path, error))?,
+    })
+}
+
+/// The value that marks a void post.
+fn nodata(path: &Path, decoder: &mut FileDecoder) -> Result<Option<f64>, SourceError> {
+    let value = decoder.find_tag(Tag::GdalNodata).map_err(|error| directory_error(path, error))?;
+    let Some(value) = value else { return Ok(None) };
+    let text = value.into_string().map_err(|error| directory_error(path, error))?;
+    let text = text.trim_matches(['\0', ' ', '\n']);
+    let number = text.parse().map_err(|_| SourceError::Malformed {
+        path: path.into(),
+        what: "the nodata tag".into(),
+        found: format!("`{text}`"),
+        expected: "a number".into(),
+    });
+    number.map(Some)
+}
+
+/// Bytes of each chunk, once all are known to lie inside the file.
+fn chunk_sizes(
+    path: &Path,
+    decoder: &mut FileDecoder,
+    layout: &Layout,
+    file_size: u64,
+) -> Result<Vec<u64>, SourceError> {
+    let (offsets, sizes) = match layout.tiled {
+        true => (Tag::TileOffsets, Tag::TileByteCounts),
+        false => (Tag::StripOffsets, Tag::StripByteCounts),
+    };
+    let error = |error| directory_error(path, error);
+    let offsets = decoder.get_tag_u64_vec(offsets).map_err(error)?;
+    let sizes = decoder.get_tag_u64_vec(sizes).map_err(error)?;
+    let chunks = layout.chunk_count() as usize;
+    if offsets.len() != chunks || sizes.len() != chunks {
+        return Err(SourceError::Malformed {
+            path: path.into(),
+            what: "the table of strips or tiles".into(),
+            found: format!("{} offsets and {} lengths", offsets.len(), sizes.len()),
+            expected: format!("{chunks} of each"),
+        });
+    }
+    for (chunk, (&offset, &size)) in offsets.iter().zip(&sizes).enumerate() {
+        check_chunk(path, layout, chunk as u32, (offset, size), file_size)?;
+    }
+    Ok(sizes)
+}
+
+fn check_chunk(
+    path: &Path,
+    layout: &Layout,
+    chunk: u32,
+    (offset, size): (u64, u64),
+    file_size: u64,
+) -> Result<(), SourceError> {
+    let end = offset.saturating_add(size);
+    if file_size < end {
+        let what = format!("strip or tile {chunk} of {}", layout.chunk_count());
+        return Err(SourceError::Truncated { path: path.into(), what, expected: end, found: file_size });
+    }
+    // The decoder takes as many bytes as it needs, beyond the chunk's end if it must, and they would be another's.
+    let rows = match layout.tiled {
+        true => layout.chunk_rows,
+        false => layout.chunk_rows.min(layout.rows - chunk * layout.chunk_rows),
+    };
+    let needed = u64::from(rows) * u64::from(layout.chunk_cols) * layout.sample.bytes();
+    if layout.uncompressed && 0 < size && size < needed {
+        return Err(SourceError::Malformed {
+            path: path.into(),
+            what: format!("the length of strip or tile {chunk}"),
+            found: size.to_string(),
+            expected: needed.to_string(),
+        });
+    }
+    Ok(())
+}

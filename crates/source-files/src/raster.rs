@@ -1,0 +1,146 @@
+//! A window of a raster in memory: samples as stored, southern row first, and which of them are void.
+
+use terrain::{Post, PostRect};
+
+use crate::SourceError;
+use crate::frame::{RasterFrame, SampleScale};
+use crate::geotiff::{Chunk, GeoTiff};
+use crate::limits::HEIGHT_M_MAX;
+use crate::samples::Samples;
+
+/// The posts of a window of a raster. Posts are counted from the south-west post of the whole raster.
+#[derive(Clone, Debug)]
+pub struct Raster {
+    pub(crate) frame: RasterFrame,
+    pub(crate) scale: SampleScale,
+    pub(crate) window: PostRect,
+    pub(crate) samples: Samples,
+    pub(crate) voids: Voids,
+    range_m: Option<(f64, f64)>,
+}
+
+/// Which posts of a window are void.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Voids {
+    /// One bit per post, row-major; empty when none is void.
+    bits: Vec<u64>,
+    pub count: usize,
+    /// Whether void posts hold a height that keeps the mesh defined.
+    pub settled: bool,
+}
+
+impl Voids {
+    pub(crate) fn contains(&self, index: usize) -> bool {
+        !self.bits.is_empty() && self.bits[index / 64] >> (index % 64) & 1 == 1
+    }
+
+    fn mark(&mut self, index: usize) {
+        self.bits[index / 64] |= 1 << (index % 64);
+        self.count += 1;
+    }
+
+    pub(crate) fn clear(&mut self) {
+        *self = Voids { settled: true, ..Voids::default() };
+    }
+
+    /// Indices of the void posts, ascending.
+    pub(crate) fn iter(&self) -> impl Iterator<Item = usize> {
+        let words = self.bits.iter().enumerate().filter(|&(_, &word)| word != 0);
+        words
+            .flat_map(|(place, &word)| (0..64).filter(move |bit| word >> bit & 1 == 1).map(move |bit| place * 64 + bit))
+    }
+}
+
+impl Raster {
+    pub(crate) fn assemble(source: &GeoTiff, window: PostRect, chunks: Vec<Chunk>) -> Result<Self, SourceError> {
+        let mut samples = Samples::zeroed(source.layout().sample, window.post_count());
+        let mut placed = 0;
+        for chunk in chunks {
+            placed += place(source, window, &chunk, &mut samples);
+        }
+        assert_eq!(placed, window.post_count(), "the chunks of a window hold each of its posts once");
+        let survey = samples.survey(source.nodata());
+        let mut voids = Voids { settled: survey.voids == 0, ..Voids::default() };
+        if 0 < survey.voids {
+            voids.bits = vec![0; window.post_count().div_ceil(64)];
+            samples.visit_voids(source.nodata(), |index| voids.mark(index));
+        }
+        let scale = source.sample_scale();
+        let range_m = survey.range.map(|(lowest, highest)| (scale.height_m(lowest), scale.height_m(highest)));
+        let raster = Self { frame: source.frame().clone(), scale, window, samples, voids, range_m };
+        raster.check_range(survey.range)?;
+        Ok(raster)
+    }
+
+    fn check_range(&self, samples: Option<(f64, f64)>) -> Result<(), SourceError> {
+        let Some((lowest, highest)) = samples else { return Ok(()) };
+        if lowest.is_infinite() || highest.is_infinite() {
+            let index = (0..self.window.post_count()).find(|&index| self.samples.get(index).is_infinite());
+            let place_m = self.place_m(index.expect("a range that is not finite has a post that is not"));
+            return Err(SourceError::Infinite { path: self.frame.path.clone(), place_m });
+        }
+        let heights_m = [lowest, highest].map(|sample| self.scale.height_m(sample));
+        let inside = |height_m: &f64| height_m.abs() <= HEIGHT_M_MAX;
+        match heights_m.into_iter().find(|height_m| !inside(height_m)) {
+            None => Ok(()),
+            Some(found) => {
+                let path = self.frame.path.clone();
+                Err(SourceError::HeightOutOfRange { path, found, limit: HEIGHT_M_MAX })
+            }
+        }
+    }
+
+    /// Where the whole raster lies.
+    pub fn frame(&self) -> &RasterFrame {
+        &self.frame
+    }
+
+    /// The posts it holds, counted from the south-west post of the whole raster.
+    pub fn window(&self) -> PostRect {
+        self.window
+    }
+
+    /// How many posts are void.
+    pub fn void_count(&self) -> usize {
+        self.voids.count
+    }
+
+    /// Lowest and highest height in metres, voids left out; `None` when all are void.
+    pub fn range_m(&self) -> Option<(f64, f64)> {
+        self.range_m
+    }
+
+    /// The sample at `post` as stored; `None` where it is void.
+    ///
+    /// # Panics
+    /// When `post` lies outside the window.
+    pub fn sample(&self, post: Post) -> Option<f64> {
+        assert!(self.window.contains(post), "post {post} lies outside the window");
+        let (row, col) = (post.row - self.window.south, post.col - self.window.west);
+        let index = row as usize * self.window.posts_wide() + col as usize;
+        (!self.voids.contains(index)).then(|| self.samples.get(index))
+    }
+
+    /// Easting and northing of a post of the window by its index, in metres.
+    pub(crate) fn place_m(&self, index: usize) -> [f64; 2] {
+        let (row, col) = (index / self.window.posts_wide(), index % self.window.posts_wide());
+        self.frame.place_m(self.window.south as u32 + row as u32, self.window.west as u32 + col as u32)
+    }
+}
+
+/// Copies the part of a chunk that lies in the window; gives the number of posts.
+fn place(source: &GeoTiff, window: PostRect, chunk: &Chunk, samples: &mut Samples) -> usize {
+    let posts = source.posts_of(chunk.index);
+    let Some(cut) = posts.intersection(&window) else { return 0 };
+    let count = cut.posts_wide();
+    for row in cut.south..=cut.north {
+        let at = (row - window.south) as usize * window.posts_wide() + (cut.west - window.west) as usize;
+        let stored_row = if source.south_first() { row - posts.south } else { posts.north - row };
+        let from = stored_row as usize * source.layout().chunk_cols as usize + (cut.west - posts.west) as usize;
+        match &chunk.samples {
+            Some(decoded) => samples.copy(at, decoded, from, count),
+            None => samples.fill(at, count, source.nodata().unwrap_or(0.0)),
+        }
+    }
+    cut.post_count()
+}

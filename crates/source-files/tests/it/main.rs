@@ -1,0 +1,11 @@
+//! Files through the public doors: what is read, what is refused and how, and that nothing hostile gets further.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
+mod geotiff;
+mod hostile;
+mod overlays;
+mod real_files;
+mod refusals;
+mod resampling;
+mod support;
