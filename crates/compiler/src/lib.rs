@@ -1,1 +1,30 @@
-//! (to be written)
+//! The order of the stages: what comes after what, and nothing else.
+//!
+//! [`build`] is the table of contents; every stage is a crate of its own below this one.
+
+mod progress;
+pub use progress::{Event, Progress, Stage};
+mod error;
+pub use error::CompileError;
+mod run;
+pub use run::{ALGORITHM_REVISION, Options};
+mod build;
+pub use build::{Built, build};
+mod tile;
+pub use tile::{Rebuilt, rebuild_tile};
+mod plan;
+pub use plan::{Forecast, Plan, PlannedTile, plan, simulate};
+mod verify;
+pub use verify::{Status, Verdict, status, verify};
+mod raster;
+pub use raster::{Mesh, TinMethod, TinRequest, sample, tin};
+
+mod area;
+mod assemble;
+mod enforce;
+mod ground;
+mod publish;
+mod refine;
+mod report;
+mod survey;
+mod tasks;

@@ -7,7 +7,7 @@
 
 use std::ops::Range;
 
-use terrain::{Dem, ModuleGrid, ModuleId, Post, Spacing};
+use terrain::{Dem, ModuleGrid, ModuleId, Post, PostRect, Spacing};
 
 use crate::Facet;
 
@@ -33,6 +33,16 @@ impl PostGrid {
             units_per_post: spacing.quanta_per_post(),
             far_row: (module.row + 1 == grid.rows).then_some(grid.side_cells),
             far_col: (module.col + 1 == grid.cols).then_some(grid.side_cells),
+        }
+    }
+
+    /// The posts of a whole area in units of posts, its far borders included.
+    pub fn of_area(area: PostRect) -> Self {
+        Self {
+            origin: area.south_west(),
+            units_per_post: 1,
+            far_row: Some(area.cells_high() as i32),
+            far_col: Some(area.cells_wide() as i32),
         }
     }
 }

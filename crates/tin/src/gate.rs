@@ -78,6 +78,7 @@ impl Gate {
                 ledger.charge(first, 1);
                 ledger.charge(second, 1);
             }
+            // Load-module corners are there from the start.
             None => {}
         }
     }

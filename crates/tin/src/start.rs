@@ -28,13 +28,15 @@ impl Start {
         };
         let inherited = task.inherited.iter().map(|&post| LocalPost::of(post, task.rect));
         inherited.for_each(|post| gate.inherit(post));
+        let kept = task.kept.iter().map(|&post| LocalPost::of(post, task.rect));
+        kept.for_each(|post| gate.charge(post));
         let mut start = Self { vertices: first_corners(&mesh), mesh, gate };
         start.insert_all(task);
         start
     }
 
     fn insert_all(&mut self, task: &TileTask) {
-        let all = task.border.iter().chain(&task.inherited);
+        let all = task.border.iter().chain(&task.inherited).chain(&task.kept);
         let mut posts: Vec<LocalPost> = all.map(|&post| LocalPost::of(post, task.rect)).collect();
         posts.sort_unstable();
         posts.dedup();

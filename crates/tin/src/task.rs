@@ -16,6 +16,8 @@ pub struct TileTask {
     pub border: Vec<Post>,
     /// Border points that lower-ranked neighbours have chosen on the sides shared with them.
     pub inherited: Vec<Post>,
+    /// Border points on this tile's own seams that must stay as its neighbours hold them: paid for by this tile.
+    pub kept: Vec<Post>,
     /// The sides on which this tile may choose posts.
     pub seams: SeamSides,
     /// Which post comes next.

@@ -56,6 +56,7 @@ fn plain_task(rect: PostRect, rule: Rule, points: usize) -> TileTask {
         frame: Frame::Plain,
         border: Vec::new(),
         inherited: Vec::new(),
+        kept: Vec::new(),
         seams: SeamSides::OPEN,
         rule,
         stop: Stop { points: Some(points), ..Stop::default() },

@@ -1,0 +1,164 @@
+//! Load modules of every tile, their residuals and counts.
+
+use database::{FileStamp, Fingerprint, FingerprintBuilder, TileModules};
+use fidelity::Residuals;
+use job::{ClipHeights as JobClipHeights, Edges};
+use load_modules::{ClipHeights, Layout, clip, concatenate};
+use terrain::{LatticePoint, LoadModule, ModuleResidual, TileId, Vertex};
+
+use crate::refine::Published;
+use crate::run::{Run, Worked};
+use crate::{CompileError, Progress, Stage};
+
+/// What whole-area stages know of one tile's load modules: numbers only.
+#[derive(Clone)]
+pub(crate) struct Assembled {
+    pub file: FileStamp,
+    /// Per load module of the tile, row by row.
+    pub modules: Vec<ModuleNumbers>,
+    pub residuals: Residuals,
+    /// Points of the tile per class, each point of the area in one tile.
+    pub points: Vec<u64>,
+    /// Whether the file was written by this run.
+    pub is_new: bool,
+}
+
+/// Counts and residual of one load module.
+#[derive(Clone, Copy)]
+pub(crate) struct ModuleNumbers {
+    pub triangles: u32,
+    pub polygons: u32,
+    pub residual: ModuleResidual,
+}
+
+/// Assembles every tile.
+pub(crate) fn assemble(
+    run: &Run,
+    tins: &[Published],
+    progress: &mut dyn Progress,
+) -> Result<Vec<Assembled>, CompileError> {
+    let none = vec![Vec::new(); tins.len()];
+    let done = run.for_each_tile(Stage::Assemble, progress, |tile| {
+        let assembled = assemble_tile(run, tins, &none, tile)?;
+        Ok(if assembled.is_new { Worked::Made(assembled) } else { Worked::Kept(assembled) })
+    })?;
+    Ok(done.into_iter().map(Worked::into_inner).collect())
+}
+
+/// Assembles and publishes one tile, without the points that `removed` lists per tile.
+pub(crate) fn assemble_tile(
+    run: &Run,
+    tins: &[Published],
+    removed: &[Vec<LatticePoint>],
+    tile: TileId,
+) -> Result<Assembled, CompileError> {
+    let window = run.window(tile)?;
+    let area = &run.area;
+    let layout = Layout { grid: area.grid, modules: area.tiling.modules(tile, area.grid), spacing: area.frame.spacing };
+    let own = &tins[area.tiling.index(tile)];
+    let mut modules = match run.job.modules.edges {
+        Edges::Constrained => concatenate(&own.tin.tin, &layout, &window.importance),
+        Edges::Clip(heights) => {
+            let points = points_around(run, tins, removed, tile);
+            let heights = match heights {
+                JobClipHeights::Coplanar => ClipHeights::Coplanar,
+                JobClipHeights::Dem => ClipHeights::Dem(&window.dem),
+            };
+            clip(&points, &layout, heights, &window.importance)
+        }
+    };
+    let ground =
+        fidelity::Ground { dem: &window.dem, mask: &window.importance, grid: area.grid, spacing: area.frame.spacing };
+    let residuals = fidelity::measure(&mut modules, &ground);
+    let fingerprint = modules_fingerprint(run, tins, removed, tile);
+    let (file, is_new) = publish(run, tile, &layout, fingerprint, &modules)?;
+    let points = points_by_class(run, own, &removed[area.tiling.index(tile)], &window.importance);
+    let modules = modules.iter().map(numbers).collect();
+    Ok(Assembled { file, modules, residuals, points, is_new })
+}
+
+fn numbers(module: &LoadModule) -> ModuleNumbers {
+    ModuleNumbers {
+        triangles: module.triangles.len() as u32,
+        polygons: module.polygon_count,
+        residual: module.residual,
+    }
+}
+
+/// The points in and around a tile that clipping needs.
+pub(crate) fn points_around(run: &Run, tins: &[Published], removed: &[Vec<LatticePoint>], tile: TileId) -> Vec<Vertex> {
+    let mut near = run.area.tiling.neighbours(tile);
+    near.push(tile);
+    let indices: Vec<usize> = near.iter().map(|&other| run.area.tiling.index(other)).collect();
+    let all = indices.iter().flat_map(|&index| tins[index].tin.tin.vertices.iter().copied());
+    let mut gone: Vec<LatticePoint> = indices.iter().flat_map(|&index| removed[index].iter().copied()).collect();
+    gone.sort_unstable();
+    all.filter(|vertex| gone.binary_search(&vertex.at).is_err()).collect()
+}
+
+/// Of all that the load modules of a tile are made from.
+fn modules_fingerprint(run: &Run, tins: &[Published], removed: &[Vec<LatticePoint>], tile: TileId) -> Fingerprint {
+    let mut builder = FingerprintBuilder::new("modules").text(&format!("{:?}", run.job.modules));
+    let mut reach = match run.job.modules.edges {
+        Edges::Constrained => Vec::new(),
+        Edges::Clip(_) => run.area.tiling.neighbours(tile),
+    };
+    reach.push(tile);
+    for other in reach {
+        let index = run.area.tiling.index(other);
+        builder = builder.fingerprint(tins[index].stamp.fingerprint).number(removed[index].len() as u64);
+        for point in &removed[index] {
+            builder = builder.number(u64::from(point.row as u32) << 32 | u64::from(point.col as u32));
+        }
+    }
+    builder.finish()
+}
+
+/// Writes the file of a tile's load modules, unless the very same bytes lie there.
+fn publish(
+    run: &Run,
+    tile: TileId,
+    layout: &Layout,
+    fingerprint: Fingerprint,
+    modules: &[LoadModule],
+) -> Result<(FileStamp, bool), CompileError> {
+    let header = TileModules {
+        tile,
+        grid: layout.grid,
+        modules: layout.modules,
+        frame: run.area.frame,
+        crs: crs(run.job),
+        vertical_datum: run.job.dem.vertical_datum.clone().unwrap_or_default(),
+        fingerprint,
+    };
+    let bytes = database::encode_modules(&header, modules);
+    let stamp = FileStamp::of(&bytes);
+    let folder = run.database.folder();
+    if folder.check_file(&folder.modules_path(tile), &stamp).is_ok() {
+        return Ok((stamp, false));
+    }
+    Ok((run.database.write_modules(&header, modules)?, true))
+}
+
+/// The area's coordinate reference system, as files name it.
+pub(crate) fn crs(job: &job::Job) -> String {
+    format!("EPSG:{}", job.area.epsg)
+}
+
+/// Points by class of the post they stand on; a point on a seam counts in the tile that owns the post.
+fn points_by_class(run: &Run, own: &Published, removed: &[LatticePoint], importance: &terrain::Importance) -> Vec<u64> {
+    let (rect, area) = (own.tin.tin.rect, run.area.rect);
+    let mut points = vec![0; run.job.importance.classes.len()];
+    for vertex in &own.tin.tin.vertices {
+        let post = terrain::Post::new(
+            vertex.at.row.div_euclid(terrain::LATTICE_PER_POST),
+            vertex.at.col.div_euclid(terrain::LATTICE_PER_POST),
+        );
+        let beyond =
+            (post.row == rect.north && rect.north != area.north) || (post.col == rect.east && rect.east != area.east);
+        if !beyond && !removed.contains(&vertex.at) {
+            points[usize::from(importance.class(post))] += 1;
+        }
+    }
+    points
+}

@@ -1,0 +1,107 @@
+//! Why a run ended without a result.
+
+use database::DatabaseError;
+use schedule::ScheduleError;
+use source_files::SourceError;
+use terrain::TileId;
+use thiserror::Error;
+
+use crate::Stage;
+
+/// Why a run ended without a result.
+#[derive(Debug, Error)]
+pub enum CompileError {
+    /// A raster or a file of polygons cannot be used.
+    #[error(transparent)]
+    Source(#[from] SourceError),
+    /// The database cannot be read or written.
+    #[error(transparent)]
+    Database(#[from] DatabaseError),
+    /// The job asks for what cannot be.
+    #[error("{key}: {found}, expected {expected}")]
+    Impossible {
+        /// Key of the job, or the argument.
+        key: String,
+        /// What was found.
+        found: String,
+        /// What would do.
+        expected: String,
+        /// What to change.
+        hint: String,
+    },
+    /// A task panicked: a fault of ours.
+    #[error("tile {tile} failed in stage {}: {message}", stage.name())]
+    Panicked {
+        /// The stage.
+        stage: Stage,
+        /// The tile.
+        tile: TileId,
+        /// What the panic said.
+        message: String,
+    },
+    /// The run was asked to stop.
+    #[error("stopped in stage {} with {done} of {total} tiles done", stage.name())]
+    Stopped {
+        /// The stage.
+        stage: Stage,
+        /// Tiles it had finished.
+        done: usize,
+        /// Tiles it has.
+        total: usize,
+    },
+    /// The system gave no thread.
+    #[error("workers: {found}, expected as many threads as workers")]
+    NoThread {
+        /// What the system said.
+        found: String,
+    },
+    /// The database was made for another job.
+    #[error("{path}: built from another job than this one, expected the same job: {difference}")]
+    OtherJob {
+        /// The database.
+        path: String,
+        /// The first line that differs.
+        difference: String,
+    },
+}
+
+impl CompileError {
+    /// What could be done about it.
+    pub fn hint(&self) -> Option<String> {
+        match self {
+            CompileError::Source(error) => error.hint().map(str::to_owned),
+            CompileError::Database(error) => error.hint().map(str::to_owned),
+            CompileError::Impossible { hint, .. } => Some(hint.clone()),
+            CompileError::Panicked { .. } => {
+                Some("this is a fault of the compiler; what was published before is intact".to_owned())
+            }
+            CompileError::Stopped { .. } => Some("run the same command again to go on from here".to_owned()),
+            CompileError::NoThread { .. } => Some("use fewer --workers".to_owned()),
+            CompileError::OtherJob { .. } => Some("run `tiefort build` first, which rebuilds what changed".to_owned()),
+        }
+    }
+
+    /// Whether trying again later may work.
+    pub fn is_transient(&self) -> bool {
+        matches!(self, CompileError::Database(error) if error.is_transient())
+    }
+
+    /// Whether the run ended because it was asked to.
+    pub fn is_stopped(&self) -> bool {
+        matches!(self, CompileError::Stopped { .. })
+    }
+
+    /// The error of a stage's tasks, whose numbers are the row-major places of `tiles`.
+    pub(crate) fn from_schedule<R>(
+        stage: Stage,
+        tiles: &[TileId],
+        error: ScheduleError<R, CompileError>,
+    ) -> CompileError {
+        match error {
+            ScheduleError::Failed { error, .. } => error,
+            ScheduleError::Panicked { task, message } => CompileError::Panicked { stage, tile: tiles[task], message },
+            ScheduleError::Stopped { done, tasks } => CompileError::Stopped { stage, done: done.len(), total: tasks },
+            ScheduleError::NoThread { message, .. } => CompileError::NoThread { found: message },
+        }
+    }
+}

@@ -1,0 +1,127 @@
+//! What a job will do and take, before any work.
+
+use job::{Budget as PointBudget, DemSource, Edges, Job};
+use schedule::Simulation;
+use terrain::{ModuleRect, PostRect, Side, TileId};
+
+use crate::CompileError;
+use crate::area::GamingArea;
+
+/// A job, planned.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Plan {
+    /// Every tile, row by row from the south-west.
+    pub tiles: Vec<PlannedTile>,
+    /// What it will take.
+    pub forecast: Forecast,
+    /// Triangles of the area, at most.
+    pub budget: u64,
+    /// Triangles before any point is selected.
+    pub start: u64,
+    /// Tiles that can be refined at once: more workers have nothing to do there.
+    pub workers_useful: usize,
+}
+
+/// One tile of a plan.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PlannedTile {
+    /// Which.
+    pub tile: TileId,
+    /// Its place in the order of ranks.
+    pub rank: usize,
+    /// Its colour: tiles of one colour share neither side nor corner.
+    pub color: u32,
+    /// Its posts, seams included.
+    pub rect: PostRect,
+    /// Its load modules.
+    pub modules: ModuleRect,
+    /// The tiles whose border points seed it.
+    pub inherits_from: Vec<TileId>,
+}
+
+/// What a build is expected to take. Measured rates of one core at present; other machines differ.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Forecast {
+    /// Memory at most, with two workers.
+    pub memory_bytes: u64,
+    /// Seconds on one worker.
+    pub seconds: f64,
+    /// Size of the database.
+    pub disk_bytes: u64,
+}
+
+/// Seconds one core needs for a post of the area: heights, weights, residuals.
+const SECONDS_PER_POST: f64 = 60e-9;
+/// The same for a post of the sample terrain.
+const SECONDS_PER_SAMPLE_POST: f64 = 260e-9;
+/// Seconds for a selected point, survey included.
+const SECONDS_PER_POINT: f64 = 3.5e-6;
+/// Bytes of memory for a post of the area: working windows and the decoded source.
+const MEMORY_PER_POST: u64 = 14;
+/// Bytes of memory for a triangle, in TINs, load modules and curves.
+const MEMORY_PER_TRIANGLE: u64 = 120;
+/// Bytes of the program itself.
+const MEMORY_BASE: u64 = 24 << 20;
+/// Bytes on disk for a triangle: tile, load module and curve.
+const DISK_PER_TRIANGLE: u64 = 60;
+
+/// Plans a job; nothing is read but the job.
+///
+/// # Errors
+/// When no build can meet it: limits below the initial points, keys that contradict each other.
+pub fn plan(job: &Job) -> Result<Plan, CompileError> {
+    let area = GamingArea::new(job)?;
+    let mut ranks = vec![0; area.tiles.len()];
+    area.by_rank().into_iter().enumerate().for_each(|(rank, index)| ranks[index] = rank);
+    let tiles: Vec<PlannedTile> = area.tiles.iter().map(|&tile| planned(&area, tile, &ranks)).collect();
+    let of_color = |color| tiles.iter().filter(|tile| tile.color == color).count();
+    let workers_useful = (0..4).map(of_color).max().unwrap_or(1).max(1);
+    let (budget, start) = (area.budget.area, area.budget.start_total());
+    Ok(Plan { forecast: forecast(job, &area), tiles, budget, start, workers_useful })
+}
+
+fn planned(area: &GamingArea, tile: TileId, ranks: &[usize]) -> PlannedTile {
+    let tiling = &area.tiling;
+    let inherits = Side::ALL.into_iter().filter(|&side| tiling.inherits(tile, side));
+    PlannedTile {
+        tile,
+        rank: ranks[tiling.index(tile)],
+        color: tiling.color(tile),
+        rect: tiling.rect(tile),
+        modules: tiling.modules(tile, area.grid),
+        inherits_from: inherits.filter_map(|side| tiling.beyond(tile, side)).collect(),
+    }
+}
+
+fn forecast(job: &Job, area: &GamingArea) -> Forecast {
+    let posts = area.rect.post_count() as u64;
+    let triangles = match (job.tin.budget, job.modules.edges) {
+        (PointBudget::Points(points), _) => area.budget.start_total() + 2 * points,
+        (PointBudget::Limits, Edges::Constrained | Edges::Clip(_)) => area.budget.area,
+    };
+    let per_post = match job.dem.source {
+        DemSource::Sample { .. } => SECONDS_PER_SAMPLE_POST,
+        DemSource::Files { .. } => SECONDS_PER_POST,
+    };
+    let points = triangles as f64 / 2.0;
+    Forecast {
+        memory_bytes: MEMORY_BASE + posts * MEMORY_PER_POST + triangles * MEMORY_PER_TRIANGLE,
+        seconds: posts as f64 * per_post + points * SECONDS_PER_POINT,
+        disk_bytes: triangles * DISK_PER_TRIANGLE,
+    }
+}
+
+/// Plays the refinement of a plan with `workers` workers; a tile takes as long as it has posts, in posts.
+///
+/// # Panics
+/// When there is no worker.
+pub fn simulate(plan: &Plan, workers: usize) -> Simulation {
+    let ranks: Vec<usize> = plan.tiles.iter().map(|tile| tile.rank).collect();
+    let near = |a: TileId, b: TileId| a != b && a.row.abs_diff(b.row) <= 1 && a.col.abs_diff(b.col) <= 1;
+    let around = |tile: &PlannedTile| -> Vec<usize> {
+        (0..plan.tiles.len()).filter(|&other| near(tile.tile, plan.tiles[other].tile)).collect()
+    };
+    let neighbours: Vec<Vec<usize>> = plan.tiles.iter().map(around).collect();
+    let durations: Vec<f64> = plan.tiles.iter().map(|tile| tile.rect.post_count() as f64).collect();
+    schedule::simulate(&schedule::RankedTasks::new(&ranks, &neighbours), workers, &durations)
+}

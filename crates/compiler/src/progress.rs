@@ -1,0 +1,60 @@
+//! What a run tells while it runs. No clock here: whoever listens may look at one.
+
+use terrain::TileId;
+
+/// The stages of a build, in order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Stage {
+    /// Rasters and vectors are opened, decoded and judged.
+    Read,
+    /// Every tile alone: what would more points gain?
+    Survey,
+    /// The whole area's budget is shared out.
+    Allocate,
+    /// Every tile's TIN, in rank order.
+    Refine,
+    /// Load modules, and their residuals.
+    Assemble,
+    /// Clip mode: the least valuable points make room where a limit is exceeded.
+    Enforce,
+    /// The database is declared complete.
+    Publish,
+}
+
+impl Stage {
+    /// As in reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Stage::Read => "read",
+            Stage::Survey => "survey",
+            Stage::Allocate => "allocate",
+            Stage::Refine => "refine",
+            Stage::Assemble => "assemble",
+            Stage::Enforce => "enforce",
+            Stage::Publish => "publish",
+        }
+    }
+}
+
+/// One thing that happened.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Event {
+    /// A stage begins; it has so many tiles to do (0: it does not go by tiles).
+    Enter(Stage, usize),
+    /// A tile of a stage begins.
+    Started(Stage, TileId),
+    /// A tile of a stage is done.
+    Done(Stage, TileId),
+    /// A tile of a stage was published before and is still fresh.
+    Kept(Stage, TileId),
+    /// A stage ends.
+    Leave(Stage),
+    /// Something a person should know.
+    Note(String),
+}
+
+/// Listens to a run.
+pub trait Progress {
+    /// Called on the thread that runs the build, in order; must return at once.
+    fn tell(&mut self, event: Event);
+}

@@ -1,0 +1,129 @@
+//! The manifest: before anything changes, and when everything is there.
+
+use database::{Area, Manifest, ManifestState, Report, TileState, files};
+use job::Job;
+use serde_json::{Value, json};
+use terrain::TileId;
+
+use crate::assemble::{Assembled, crs};
+use crate::refine::Published;
+use crate::report::Findings;
+use crate::run::{ALGORITHM_REVISION, Run};
+use crate::survey::Shares;
+use crate::{CompileError, Event, Progress, Stage};
+
+/// The area as the database knows it.
+pub(crate) fn database_area(job: &Job) -> Area {
+    let grid = job.area.grid;
+    Area {
+        name: job.area.name.clone(),
+        crs: crs(job),
+        vertical_datum: job.dem.vertical_datum.clone().unwrap_or_default(),
+        origin_m: job.area.origin_m,
+        size_m: job.area.size_m(),
+        spacing_m: job.area.spacing.metres(),
+        module_side_m: job.modules.side_m,
+        module_rows: grid.rows,
+        module_cols: grid.cols,
+        tile_rows: job.tiles.rows,
+        tile_cols: job.tiles.columns,
+    }
+}
+
+/// A manifest of a build that has nothing yet.
+pub(crate) fn beginning(run: &Run) -> Manifest {
+    let mut manifest = Manifest::new(database_area(run.job), run.job.canonical_text(), ALGORITHM_REVISION);
+    manifest.sources = run.ground.records.clone();
+    manifest
+}
+
+/// Declares the database complete; `frozen` lists tiles whose sides are held as their neighbours have them.
+pub(crate) fn publish(
+    findings: &Findings,
+    shares: &Shares,
+    frozen: &[TileId],
+    progress: &mut dyn Progress,
+) -> Result<Report, CompileError> {
+    progress.tell(Event::Enter(Stage::Publish, 0));
+    let run = findings.run;
+    let report = findings.report();
+    let mut manifest = beginning(run);
+    manifest.state = ManifestState::Complete;
+    let allocation = run.database.write_json(files::ALLOCATION, &allocation_json(run, shares))?;
+    manifest.files.insert(files::ALLOCATION.to_owned(), allocation);
+    for (index, &tile) in run.area.tiles.iter().enumerate() {
+        let state = state_of(run, &report, tile, frozen.contains(&tile));
+        fill(run, &mut manifest, tile, state, &findings.tins[index], &findings.assembled[index])?;
+    }
+    manifest.totals = findings.totals(&report);
+    run.database.finish(&manifest)?;
+    progress.tell(Event::Leave(Stage::Publish));
+    Ok(report)
+}
+
+fn state_of(run: &Run, report: &Report, tile: TileId, is_frozen: bool) -> TileState {
+    let modules = run.area.tiling.modules(tile, run.area.grid);
+    let is_over = report.breaches.iter().any(|breach| match breach.place {
+        database::ReportPlace::Module([row, col]) => modules.contains(terrain::ModuleId { row, col }),
+        _ => false,
+    });
+    match (is_frozen, is_over) {
+        (true, _) => TileState::Frozen,
+        (false, true) => TileState::OverLimit,
+        (false, false) => TileState::Done,
+    }
+}
+
+fn fill(
+    run: &Run,
+    manifest: &mut Manifest,
+    tile: TileId,
+    state: TileState,
+    tin: &Published,
+    assembled: &Assembled,
+) -> Result<(), CompileError> {
+    let folder = run.database.folder();
+    let curve = folder.curve_path(tile);
+    let has_curve = run.job.tin.allocation == job::Allocation::Global;
+    let record = manifest.tile_mut(tile).expect("the manifest lists every tile");
+    record.state = state;
+    record.fingerprint = Some(tin.stamp.fingerprint);
+    record.tin = Some(database::FileStamp::of(&read(&folder.tile_path(tile))?));
+    record.slm = Some(assembled.file);
+    record.curve = if has_curve { Some(database::FileStamp::of(&read(&curve)?)) } else { None };
+    Ok(())
+}
+
+fn read(path: &std::path::Path) -> Result<Vec<u8>, CompileError> {
+    let read = std::fs::read(path);
+    Ok(read.map_err(|source| source_files::SourceError::Read { path: path.into(), source })?)
+}
+
+/// Numbers per tile, and per load module the exceptions only.
+fn allocation_json(run: &Run, shares: &Shares) -> Value {
+    let tiles: Vec<Value> = run
+        .area
+        .tiles
+        .iter()
+        .zip(&shares.tiles)
+        .map(|(tile, budget)| {
+            json!({
+                "row": tile.row,
+                "col": tile.col,
+                "points": budget.points,
+                "triangles": budget.allowance.as_ref().map(|allowance| allowance.triangles),
+            })
+        })
+        .collect();
+    let granted: Vec<Value> = shares.triangles.iter().flat_map(|allocation| &allocation.granted).map(granted).collect();
+    json!({
+        "threshold_bin": shares.triangles.as_ref().and_then(|allocation| allocation.threshold_bin),
+        "slack": shares.triangles.as_ref().map_or(0, |allocation| allocation.slack),
+        "granted": granted,
+        "tiles": tiles,
+    })
+}
+
+fn granted((module, triangles): &(terrain::ModuleId, u32)) -> Value {
+    json!({ "row": module.row, "col": module.col, "triangles": triangles })
+}

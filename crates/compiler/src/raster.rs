@@ -1,0 +1,397 @@
+//! Without load modules: just a mesh from a raster, on the raster's own posts; and the sample terrain as a raster.
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+use std::sync::atomic::AtomicBool;
+
+use database::ReportResidual;
+use fidelity::Tally;
+use geometry::WORKING_POSTS_MAX;
+use geometry::owned::{PostGrid, visit_residuals};
+use job::ErrorKey;
+use schedule::{Event as Scheduled, RankedTasks, Workers, in_rank_order_observed};
+use source_files::{GeoTiff, VoidPolicy, write_classes, write_heights};
+use terrain::{
+    Dem, GainCurve, GridFrame, Importance, ModuleGrid, PostRect, SeamSides, Side, Spacing, StopReason, THOUSANDTHS,
+    TileId, TileTin, Tin, Vertex, quanta_of_metres,
+};
+use tiling::{Order, Tiling, points_equally, points_globally};
+use tin::{CostUnit, Frame, LastBatch, Proximity, Rule, Stop, SurveyTask, TileTask};
+
+use crate::ground::decode;
+use crate::tasks::{posts_of, side_vertices};
+use crate::{CompileError, Event, Progress, Stage};
+
+/// Which post comes next.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TinMethod {
+    /// The best of ours.
+    Optimised,
+    /// The founding paper's passes.
+    Paper,
+    /// One post at a time: the worst of all, or the worst of the triangle with the largest sum of squares.
+    Greedy {
+        /// Which of the two.
+        key: ErrorKey,
+    },
+}
+
+/// A mesh to make from a raster.
+#[derive(Clone, Debug)]
+pub struct TinRequest {
+    /// The raster.
+    pub dem: PathBuf,
+    /// Which post comes next.
+    pub method: TinMethod,
+    /// Vertices at most, corners included.
+    pub points: Option<usize>,
+    /// Largest residual to accept, in metres.
+    pub max_residual_m: Option<f64>,
+    /// RMS residual to reach, in metres.
+    pub rms_m: Option<f64>,
+    /// Rows and columns of tiles.
+    pub tiles: (u32, u32),
+    /// Tiles at once.
+    pub workers: usize,
+}
+
+/// A mesh and where it lies.
+#[derive(Clone, Debug)]
+pub struct Mesh {
+    /// Vertices and triangles; rows and columns are the raster's, from its south-west post.
+    pub tin: Tin,
+    /// Easting of post (0, 0), in metres.
+    pub east_m: f64,
+    /// Northing of post (0, 0), in metres.
+    pub north_m: f64,
+    /// Metres between posts, to the east and to the north.
+    pub spacing_m: (f64, f64),
+    /// EPSG code of its coordinate reference system.
+    pub epsg: Option<u32>,
+    /// Against every post of the raster.
+    pub residual: ReportResidual,
+    /// Vertices.
+    pub points: usize,
+    /// Why selection ended: that of the tile that stopped for want of posts, if any did.
+    pub stop: StopReason,
+}
+
+/// Makes a mesh from a raster, untiled or in tiles with matching borders.
+///
+/// # Errors
+/// When the raster cannot be used, or nothing says when to stop.
+pub fn tin(request: &TinRequest, stop: &AtomicBool, progress: &mut dyn Progress) -> Result<Mesh, CompileError> {
+    let workers = Workers::new(request.workers);
+    progress.tell(Event::Enter(Stage::Read, 0));
+    let file = GeoTiff::open(&request.dem, None)?;
+    let mut raster = decode(&file, file.rect(), &workers, stop)?;
+    raster.settle_voids(VoidPolicy::Hole)?;
+    let scale = file.sample_scale();
+    let dem = Dem::from_fn(file.rect(), |post| {
+        raster.sample(post).and_then(|sample| quanta_of_metres(scale.height_m(sample)))
+    });
+    progress.tell(Event::Leave(Stage::Read));
+
+    let frame = file.frame();
+    let job = TinJob::new(request, &dem, frame.spacing_m)?;
+    let curves = job.survey(&dem, &workers, stop, progress)?;
+    let tiles = job.refine(&dem, curves.as_deref(), &workers, stop, progress)?;
+
+    progress.tell(Event::Enter(Stage::Assemble, 0));
+    let exhausted = tiles.iter().any(|tile| tile.stop == StopReason::Exhausted);
+    let stop = if exhausted { StopReason::Exhausted } else { tiles[0].stop };
+    let tin = join(dem.rect(), &tiles);
+    let residual = residual(&dem, &tin);
+    progress.tell(Event::Leave(Stage::Assemble));
+    Ok(Mesh {
+        points: tin.vertices.len(),
+        tin,
+        east_m: frame.south_west_m[0],
+        north_m: frame.south_west_m[1],
+        spacing_m: (frame.spacing_m[0], frame.spacing_m[1]),
+        epsg: Some(frame.epsg),
+        residual,
+        stop,
+    })
+}
+
+/// A request, checked against its raster.
+struct TinJob<'a> {
+    request: &'a TinRequest,
+    tiling: Tiling,
+    tiles: Vec<TileId>,
+    rule: Rule,
+    value: Option<u64>,
+}
+
+impl<'a> TinJob<'a> {
+    fn new(request: &'a TinRequest, dem: &Dem, spacing_m: [f64; 2]) -> Result<Self, CompileError> {
+        let rect = dem.rect();
+        let (rows, cols) = request.tiles;
+        let longest =
+            (rect.cells_high().div_ceil(rows.max(1) as usize)).max(rect.cells_wide().div_ceil(cols.max(1) as usize));
+        refuse(request, rect, longest, spacing_m)?;
+        let tiling = Tiling::new(rect, 1, rows, cols, Order::Color);
+        let quantum = if request.method == TinMethod::Paper { terrain::QUANTA_PER_METRE as u32 } else { 1 };
+        let units = |metres: f64| (metres * f64::from(terrain::QUANTA_PER_METRE) / f64::from(quantum)).floor() as u64;
+        let value = request.max_residual_m.map(|metres| u64::from(THOUSANDTHS) * units(metres));
+        let rule = match request.method {
+            TinMethod::Greedy { key: ErrorKey::Max } => Rule::WorstFirst,
+            // A residual to reach is reached by worst posts; sums of squares alone would go past it.
+            TinMethod::Optimised | TinMethod::Greedy { key: ErrorKey::Sse }
+                if value.is_some() && request.points.is_none() =>
+            {
+                Rule::WorstFirst
+            }
+            TinMethod::Optimised | TinMethod::Greedy { key: ErrorKey::Sse } => Rule::LargestSquares { guard: value },
+            TinMethod::Paper => Rule::Batches {
+                residual_quantum: quantum,
+                proximity: Some(Proximity {
+                    posts: 300.0 / spacing_m[0],
+                    quanta: 20 * terrain::QUANTA_PER_METRE as u32,
+                }),
+                last_batch: LastBatch::Truncate,
+            },
+        };
+        let tiles = tiling.tiles().collect();
+        Ok(Self { request, tiling, tiles, rule, value })
+    }
+
+    /// Points to select in all: those asked for less the corners of tiles.
+    fn points(&self) -> Option<u64> {
+        let corners = u64::from(self.tiling.rows() + 1) * u64::from(self.tiling.cols() + 1);
+        self.request.points.map(|points| (points as u64).saturating_sub(corners))
+    }
+
+    fn task(&self, tile: TileId, seams: SeamSides, inherited: Vec<terrain::Post>, points: Option<usize>) -> TileTask {
+        let by_squares = matches!(self.rule, Rule::LargestSquares { .. });
+        let rect = self.tiling.rect(tile);
+        // The raster's own border is nobody else's: its posts are ordinary candidates.
+        let outer = tiling::outer_sides(rect, self.area());
+        TileTask {
+            tile,
+            rect,
+            frame: Frame::Plain,
+            border: Vec::new(),
+            inherited,
+            kept: Vec::new(),
+            seams: SeamSides::from_fn(|side| seams.is_open(side) || outer.is_open(side)),
+            rule: self.rule.clone(),
+            stop: Stop {
+                points,
+                value: if by_squares { None } else { self.value },
+                rms_quanta: self.request.rms_m.map(|rms| rms * f64::from(terrain::QUANTA_PER_METRE)),
+            },
+        }
+    }
+
+    fn area(&self) -> PostRect {
+        let last = self.tiles[self.tiles.len() - 1];
+        PostRect::new(self.tiling.rect(self.tiles[0]).south_west(), self.tiling.rect(last).north_east())
+    }
+
+    /// With several tiles and a number of points, what each would gain.
+    fn survey(
+        &self,
+        dem: &Dem,
+        workers: &Workers,
+        stop: &AtomicBool,
+        progress: &mut dyn Progress,
+    ) -> Result<Option<Vec<GainCurve>>, CompileError> {
+        let Some(points) = self.points().filter(|_| 1 < self.tiles.len()) else { return Ok(None) };
+        progress.tell(Event::Enter(Stage::Survey, self.tiles.len()));
+        let reach = 3 * points as usize / self.tiles.len() + 1;
+        let level = geometry::widest_level();
+        // One load module as large as the raster: costs are points, and all are booked to it.
+        let grid = ModuleGrid { rows: 1, cols: 1, side_cells: i32::from(u16::MAX) };
+        let curves = schedule::for_each_independent(&self.tiles, workers, stop, |_, &tile| {
+            let mut growth = self.task(tile, self.tiling.shared_sides(tile), Vec::new(), Some(reach));
+            growth.stop = Stop { points: Some(reach), ..Stop::default() };
+            if let Rule::Batches { .. } = growth.rule {
+                growth.rule = Rule::WorstFirst;
+            }
+            let outer = tiling::outer_sides(growth.rect, self.area());
+            let owned = self.tiling.owned_sides(tile);
+            let owned = SeamSides::from_fn(|side| owned.is_open(side) || outer.is_open(side));
+            let window = dem.window(growth.rect);
+            let importance = weights(&window);
+            let task = SurveyTask { growth, owned, grid, cost: CostUnit::Points };
+            Ok(tin::survey(&window, &importance, &task, level))
+        });
+        let curves = curves.map_err(|error| CompileError::from_schedule(Stage::Survey, &self.tiles, error))?;
+        progress.tell(Event::Leave(Stage::Survey));
+        Ok(Some(curves))
+    }
+
+    fn refine(
+        &self,
+        dem: &Dem,
+        curves: Option<&[GainCurve]>,
+        workers: &Workers,
+        stop: &AtomicBool,
+        progress: &mut dyn Progress,
+    ) -> Result<Vec<TileTin>, CompileError> {
+        let ranks: Vec<_> = self.tiles.iter().map(|&tile| self.tiling.rank(tile)).collect();
+        let around =
+            |&tile: &TileId| self.tiling.neighbours(tile).iter().map(|&other| self.tiling.index(other)).collect();
+        let plan = RankedTasks::new(&ranks, &self.tiles.iter().map(around).collect::<Vec<Vec<usize>>>());
+        let mut by_rank: Vec<usize> = (0..self.tiles.len()).collect();
+        by_rank.sort_by_key(|&index| ranks[index]);
+        let shares = self.points().map(|points| match curves {
+            Some(curves) => points_globally(points, curves, &by_rank),
+            None => points_equally(points, self.tiles.len()),
+        });
+        let slots: Vec<OnceLock<TileTin>> = self.tiles.iter().map(|_| OnceLock::new()).collect();
+        progress.tell(Event::Enter(Stage::Refine, self.tiles.len()));
+        let task = |index: usize| {
+            let tile = self.tiles[index];
+            let seeds = self.inherited(tile, &slots);
+            let points = shares.as_ref().map(|shares| shares[index]);
+            let task = self.task(tile, self.tiling.owned_sides(tile), seeds, points);
+            let whole = task.rect == dem.rect();
+            let window = if whole { None } else { Some(dem.window(task.rect)) };
+            let window = window.as_ref().unwrap_or(dem);
+            let done = tin::refine(window, &weights(window), &task, geometry::widest_level());
+            assert!(slots[index].set(done).is_ok(), "each tile is refined once");
+            Ok(())
+        };
+        let observe = |event: Scheduled<()>| match event {
+            Scheduled::Started(index) => progress.tell(Event::Started(Stage::Refine, self.tiles[index])),
+            Scheduled::Done(index, ()) => progress.tell(Event::Done(Stage::Refine, self.tiles[index])),
+        };
+        in_rank_order_observed(&plan, workers, stop, task, observe)
+            .map_err(|error| CompileError::from_schedule(Stage::Refine, &self.tiles, error))?;
+        progress.tell(Event::Leave(Stage::Refine));
+        Ok(slots.into_iter().map(|slot| slot.into_inner().expect("every tile was refined")).collect())
+    }
+
+    fn inherited(&self, tile: TileId, slots: &[OnceLock<TileTin>]) -> Vec<terrain::Post> {
+        let inherits = Side::ALL.into_iter().filter(|&side| self.tiling.inherits(tile, side));
+        let beyond = inherits.filter_map(|side| Some((self.tiling.beyond(tile, side)?, side)));
+        let mut all: Vec<Vertex> = beyond
+            .flat_map(|(other, side)| {
+                let published = slots[self.tiling.index(other)].get().expect("lower-ranked neighbours come first");
+                side_vertices(published, side.opposite())
+            })
+            .collect();
+        all.sort_unstable();
+        all.dedup();
+        posts_of(&all)
+    }
+}
+
+fn refuse(request: &TinRequest, rect: PostRect, longest: usize, spacing_m: [f64; 2]) -> Result<(), CompileError> {
+    let impossible = |key: &str, found: String, expected: &str, hint: &str| {
+        Err(CompileError::Impossible { key: key.into(), found, expected: expected.into(), hint: hint.into() })
+    };
+    let (rows, cols) = request.tiles;
+    if rows == 0 || cols == 0 || rect.cells_high() < rows as usize || rect.cells_wide() < cols as usize {
+        let found = format!("{rows}x{cols} for {} x {} posts", rect.posts_high(), rect.posts_wide());
+        return impossible("--tiles", found, "at least one row and column, and a cell for each", "try --tiles 6x6");
+    }
+    if WORKING_POSTS_MAX <= longest {
+        let found = format!("tiles of {longest} cells");
+        return impossible("--tiles", found, "tiles below 16384 cells a side", "ask for more tiles");
+    }
+    if rect.posts_wide() < 2 || rect.posts_high() < 2 {
+        let found = format!("{} x {} posts", rect.posts_high(), rect.posts_wide());
+        return impossible("DEM", found, "at least 2 x 2 posts", "a mesh needs ground to cover");
+    }
+    if 1e-6 * spacing_m[0] < (spacing_m[0] - spacing_m[1]).abs() {
+        let found = format!("posts {} m by {} m apart", spacing_m[0], spacing_m[1]);
+        return impossible("DEM", found, "square posts", "resample it first: gdalwarp -tr 25 25 in.tif out.tif");
+    }
+    let corners = (rows as usize + 1) * (cols as usize + 1);
+    match request.points {
+        Some(points) if points < corners => impossible(
+            "--points",
+            points.to_string(),
+            &format!("at least the {corners} corners of tiles"),
+            "corners of tiles are vertices of every mesh",
+        ),
+        None if request.max_residual_m.is_none() && request.rms_m.is_none() => impossible(
+            "--points",
+            "nothing that says when to stop".into(),
+            "--points, --max-residual or --rms",
+            "for example --points 5000",
+        ),
+        _ => Ok(()),
+    }
+}
+
+/// Voids are never selected.
+fn weights(dem: &Dem) -> Importance {
+    mask::without_voids(Importance::uniform(dem.rect(), THOUSANDTHS), dem)
+}
+
+/// Tiles put together: points on shared lines are equal, so they are one vertex.
+fn join(rect: PostRect, tiles: &[TileTin]) -> Tin {
+    if let [only] = tiles {
+        return only.tin.clone();
+    }
+    let mut joined = Tin { rect, vertices: Vec::new(), triangles: Vec::new() };
+    let mut on_lines = HashMap::new();
+    for tile in tiles {
+        let part = &tile.tin;
+        let (low, high) =
+            (terrain::LatticePoint::from(part.rect.south_west()), terrain::LatticePoint::from(part.rect.north_east()));
+        let mut place = |vertex: &Vertex| {
+            let at = vertex.at;
+            let mut fresh = || {
+                joined.vertices.push(*vertex);
+                joined.vertices.len() as u32 - 1
+            };
+            let is_on_line = at.row == low.row || at.row == high.row || at.col == low.col || at.col == high.col;
+            if is_on_line { *on_lines.entry(at).or_insert_with(fresh) } else { fresh() }
+        };
+        let places: Vec<u32> = part.vertices.iter().map(&mut place).collect();
+        joined.triangles.extend(part.triangles.iter().map(|corners| corners.map(|v| places[v as usize])));
+    }
+    joined
+}
+
+/// Residuals at every post that is not void, each counted once.
+fn residual(dem: &Dem, tin: &Tin) -> ReportResidual {
+    let mut tally = Tally::default();
+    let rect = dem.rect();
+    for triangle in &tin.triangles {
+        let corners = triangle.map(|v| tin.vertices[v as usize]);
+        let posts = corners.map(|vertex| vertex.at.post().expect("vertices stand on posts"));
+        visit_triangle(dem, rect, posts, corners.map(|vertex| vertex.height), &mut tally);
+    }
+    crate::report::residual_of(&tally)
+}
+
+fn visit_triangle(dem: &Dem, rect: PostRect, posts: [terrain::Post; 3], heights: [i32; 3], tally: &mut Tally) {
+    let facet =
+        geometry::Facet::new(posts.map(|post| post.col - rect.west), posts.map(|post| post.row - rect.south), heights);
+    visit_residuals(&PostGrid::of_area(rect), &facet, dem, |post, residual| {
+        if !dem.is_void(post) {
+            tally.add(residual);
+        }
+    });
+}
+
+/// Writes the sample terrain as a GeoTIFF, and its classes as another where asked for.
+///
+/// # Errors
+/// When a file cannot be written.
+pub fn sample(
+    seed: u64,
+    posts: usize,
+    spacing: Spacing,
+    out: &Path,
+    classes: Option<&Path>,
+) -> Result<(), CompileError> {
+    /// EPSG code and origin of the sample terrain: UTM 11 north, near Fort Irwin, as in the project's jobs.
+    const PLACE: (u32, f64, f64) = (32_611, 505_000.0, 3_875_000.0);
+    let (epsg, origin_east_m, origin_north_m) = PLACE;
+    let frame = GridFrame { origin_east_m, origin_north_m, spacing };
+    let rect = PostRect::of_size(posts, posts);
+    write_heights(out, &frame, rect, epsg, |band| sample_terrain::heights(seed, band, spacing))?;
+    if let Some(path) = classes {
+        write_classes(path, &frame, rect, epsg, |band| sample_terrain::classes(seed, band, spacing))?;
+    }
+    Ok(())
+}

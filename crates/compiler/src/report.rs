@@ -1,0 +1,272 @@
+//! The numbers of a finished build, as the report gives them. Times are added by whoever holds the clock.
+
+use std::collections::BTreeSet;
+
+use database::{
+    Report, ReportBreach, ReportClass, ReportPerModule, ReportPerWindow, ReportPoints, ReportPool, ReportRefusals,
+    ReportResidual, ReportVoids, Totals,
+};
+use fidelity::{Residuals, Tally};
+use limits::Windows;
+use terrain::{Breach, BreachKind, BreachPlace, ModuleId, RefusedBy, metres_of_quanta};
+
+use crate::assemble::{Assembled, ModuleNumbers};
+use crate::enforce::{Enforced, by_module, counted};
+use crate::refine::Published;
+use crate::run::Run;
+
+/// Millimetres in a metre: the unit in which a residual's breach is counted.
+const MILLIMETRES: f64 = 1000.0;
+
+/// All that a report says but times.
+pub(crate) struct Findings<'a> {
+    pub run: &'a Run<'a>,
+    pub tins: &'a [Published],
+    pub assembled: &'a [Assembled],
+    pub enforced: &'a Enforced,
+}
+
+impl Findings<'_> {
+    /// The report.
+    pub fn report(&self) -> Report {
+        let run = self.run;
+        let residuals = self.residuals();
+        let total = residuals.total();
+        let counts = self.counts();
+        let points = self.points();
+        let breaches = self.breaches(&counts, &total);
+        let sum = |count: fn(&ModuleNumbers) -> u32| -> u64 {
+            by_module(run, self.assembled).iter().map(|numbers| u64::from(count(numbers))).sum()
+        };
+        Report {
+            area: run.job.area.name.clone(),
+            workers: run.workers.count() as u32,
+            stages: Vec::new(),
+            points,
+            triangles: sum(|numbers| numbers.triangles),
+            polygons: sum(|numbers| numbers.polygons),
+            per_load_module: self.per_module(&counts),
+            per_4km: self.per_window(&counts),
+            pool: self.pool(&counts),
+            residual: residual_of(&total),
+            residual_against_source: None,
+            classes: self.classes(&residuals),
+            overall_point_weighted_rms_m: self.point_weighted_rms_m(&residuals),
+            dem_accuracy_m: None,
+            voids: ReportVoids {
+                count: (run.ground.voids.filled + run.ground.voids.left) as u64,
+                filled: run.ground.voids.filled as u64,
+            },
+            breaches: breaches.iter().map(ReportBreach::from).collect(),
+            refusals: self.refusals(),
+            warnings: run.ground.warnings.clone(),
+        }
+    }
+
+    /// The sums of the manifest.
+    pub fn totals(&self, report: &Report) -> Totals {
+        let total = self.residuals().total();
+        Totals {
+            points: report.points.total,
+            triangles: report.triangles,
+            polygons: report.polygons,
+            modules_over: report.per_load_module.over,
+            breaches: report.breaches.len() as u64,
+            refused: report.refusals.count,
+            residual_posts: total.posts,
+            residual_largest: u64::from(total.largest),
+            residual_sum_abs: total.sum_abs,
+            residual_sum_squared: u64::try_from(total.sum_squared).unwrap_or(u64::MAX),
+        }
+    }
+
+    fn residuals(&self) -> Residuals {
+        let mut all = Residuals::default();
+        self.assembled.iter().for_each(|tile| all.merge(&tile.residuals));
+        all
+    }
+
+    fn counts(&self) -> Vec<u32> {
+        by_module(self.run, self.assembled).iter().map(|numbers| counted(self.run, numbers)).collect()
+    }
+
+    fn points(&self) -> ReportPoints {
+        let grid = self.run.area.grid;
+        let total: u64 = self.assembled.iter().flat_map(|tile| &tile.points).sum();
+        let corner = u64::from(grid.rows + 1) * u64::from(grid.cols + 1);
+        let selected: u64 = self.tins.iter().map(|tile| tile.tin.residuals.len() as u64).sum();
+        let gone: BTreeSet<_> = self.enforced.removed.iter().flatten().collect();
+        let selected = selected - gone.len() as u64;
+        ReportPoints { selected, border: total - corner - selected, corner, total }
+    }
+
+    fn per_module(&self, counts: &[u32]) -> ReportPerModule {
+        let limit = self.run.area.budget.per_module;
+        let sum: u64 = counts.iter().map(|&count| u64::from(count)).sum();
+        ReportPerModule {
+            mean: sum as f64 / counts.len() as f64,
+            max: u64::from(counts.iter().copied().max().unwrap_or(0)),
+            limit: u64::from(limit),
+            over: counts.iter().filter(|&&count| limit < count).count() as u64,
+        }
+    }
+
+    fn per_window(&self, counts: &[u32]) -> ReportPerWindow {
+        let budget = &self.run.area.budget;
+        let largest = |windows: &Windows| u64::from(windows.sums(budget.grid, counts).into_iter().max().unwrap_or(0));
+        let sums = budget.windows.sums(budget.grid, counts);
+        let wider = Windows::of_size(budget.grid, budget.windows.rows + 1, budget.windows.cols + 1);
+        ReportPerWindow {
+            max: largest(&budget.windows),
+            limit: u64::from(budget.per_window),
+            over: sums.iter().filter(|&&sum| budget.per_window < sum).count() as u64,
+            worst_9x9: largest(&wider),
+        }
+    }
+
+    fn pool(&self, counts: &[u32]) -> ReportPool {
+        let limit = self.run.area.budget.per_module;
+        let above: u64 = counts.iter().map(|&count| u64::from(count.saturating_sub(limit))).sum();
+        ReportPool { size: self.run.area.budget.pool, used: above.min(self.run.area.budget.pool) }
+    }
+
+    fn classes(&self, residuals: &Residuals) -> Vec<ReportClass> {
+        let nothing = Tally::default();
+        let class = |(index, name): (usize, &String)| {
+            let tally = residuals.classes.get(index).unwrap_or(&nothing);
+            let points = self.assembled.iter().map(|tile| tile.points[index]).sum();
+            ReportClass { name: name.clone(), posts: tally.posts, points, residual: residual_of(tally) }
+        };
+        self.run.job.importance.classes.iter().enumerate().map(class).collect()
+    }
+
+    /// The paper's way to pool classes: each by its points, not by its posts.
+    fn point_weighted_rms_m(&self, residuals: &Residuals) -> f64 {
+        let (mut squares, mut points) = (0.0, 0.0);
+        for (index, tally) in residuals.classes.iter().enumerate().filter(|(_, tally)| 0 < tally.posts) {
+            let weight = self.assembled.iter().map(|tile| tile.points[index]).sum::<u64>() as f64;
+            squares += weight * tally.rms_m() * tally.rms_m();
+            points += weight;
+        }
+        if points == 0.0 { 0.0 } else { (squares / points).sqrt() }
+    }
+
+    fn refusals(&self) -> ReportRefusals {
+        let mut found = ReportRefusals::default();
+        for refusal in self.tins.iter().flat_map(|tile| &tile.tin.refused) {
+            found.count += 1;
+            match refusal.by {
+                RefusedBy::Module => found.by_module += 1,
+                RefusedBy::Window => found.by_window += 1,
+                RefusedBy::Reservation => found.by_reservation += 1,
+            }
+            found.largest_m = found.largest_m.max(metres_of_quanta(refusal.residual as i32));
+        }
+        found
+    }
+
+    fn breaches(&self, counts: &[u32], total: &Tally) -> Vec<Breach> {
+        let budget = &self.run.area.budget;
+        let mut breaches = self.module_breaches(counts);
+        let sums = budget.windows.sums(budget.grid, counts);
+        for (origin, &sum) in budget.windows.origins.iter().zip(&sums).filter(|&(_, &sum)| budget.per_window < sum) {
+            let inside: Vec<ModuleId> = budget.windows.modules_of(origin).iter().collect();
+            breaches.push(self.breach(
+                BreachKind::Window,
+                BreachPlace::Window(origin),
+                sum,
+                budget.per_window,
+                &inside,
+            ));
+        }
+        let sum: u64 = counts.iter().map(|&count| u64::from(count)).sum();
+        if budget.area < sum {
+            let mut breach = self.breach(BreachKind::Mean, BreachPlace::Area, 0, 0, &[]);
+            (breach.count, breach.limit, breach.rms_with_m) = (sum, budget.area, total.rms_m());
+            breaches.push(breach);
+        }
+        breaches.extend(self.residual_breaches(total));
+        breaches
+    }
+
+    fn module_breaches(&self, counts: &[u32]) -> Vec<Breach> {
+        let budget = &self.run.area.budget;
+        let mut over: Vec<(u32, ModuleId)> = budget
+            .grid
+            .all()
+            .iter()
+            .zip(counts)
+            .filter(|&(_, &count)| budget.per_module < count)
+            .map(|(module, &count)| (count, module))
+            .collect();
+        over.sort_unstable();
+        let mut pool = budget.pool;
+        let mut breaches = Vec::new();
+        for (count, module) in over {
+            let excess = u64::from(count - budget.per_module);
+            if excess <= pool {
+                pool -= excess;
+                continue;
+            }
+            let place = BreachPlace::Module(module);
+            breaches.push(self.breach(BreachKind::LoadModule, place, count, budget.per_module, &[module]));
+        }
+        breaches
+    }
+
+    fn breach(&self, kind: BreachKind, place: BreachPlace, count: u32, limit: u32, inside: &[ModuleId]) -> Breach {
+        let grid = self.run.area.grid;
+        let now = by_module(self.run, self.assembled);
+        let before = self.enforced.before.as_ref();
+        let rms = |of: &dyn Fn(usize) -> ModuleNumbers| {
+            let parts = inside.iter().map(|&module| of(grid.index(module)).residual);
+            let (squares, posts) = parts.fold((0u64, 0u64), |(squares, posts), part| {
+                (squares + part.sum_squared, posts + u64::from(part.posts))
+            });
+            if posts == 0 { 0.0 } else { (squares as f64 / posts as f64).sqrt() / f64::from(terrain::QUANTA_PER_METRE) }
+        };
+        let refused = self.tins.iter().flat_map(|tile| &tile.tin.refused);
+        Breach {
+            kind,
+            place,
+            count: u64::from(count),
+            limit: u64::from(limit),
+            refused: refused.filter(|refusal| inside.contains(&refusal.module)).count() as u32,
+            rms_with_m: rms(&|index| *now[index]),
+            rms_without_m: before.map(|before| rms(&|index| before[index])),
+        }
+    }
+
+    /// Residuals that the job asked for and that something else kept from being reached.
+    fn residual_breaches(&self, total: &Tally) -> Vec<Breach> {
+        let tin = &self.run.job.tin;
+        let asked = [(tin.max_residual_m, total.max_m()), (tin.target_rms_m, total.rms_m())];
+        let missed = asked.into_iter().filter_map(|(limit, found)| Some((limit?, found)));
+        missed
+            .filter(|(limit, found)| limit < found)
+            .map(|(limit, found)| Breach {
+                kind: BreachKind::Residual,
+                place: BreachPlace::Area,
+                count: (found * MILLIMETRES).ceil() as u64,
+                limit: (limit * MILLIMETRES).floor() as u64,
+                refused: self.tins.iter().map(|tile| tile.tin.refused.len() as u32).sum(),
+                rms_with_m: total.rms_m(),
+                rms_without_m: None,
+            })
+            .collect()
+    }
+}
+
+/// A tally as the report gives it.
+pub(crate) fn residual_of(tally: &Tally) -> ReportResidual {
+    if tally.posts == 0 {
+        return ReportResidual::default();
+    }
+    ReportResidual {
+        rms_m: tally.rms_m(),
+        max_m: tally.max_m(),
+        mean_abs_m: tally.mean_abs_m(),
+        p95_m: tally.percentile_m(95.0),
+        p99_m: tally.percentile_m(99.0),
+    }
+}

@@ -1,0 +1,116 @@
+//! One run: a job, its ground, its database, its workers; and how a stage goes through the tiles.
+
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use database::{Database, FingerprintBuilder, Stamp};
+use job::Job;
+use schedule::{Event as Scheduled, RankedTasks, Workers, in_rank_order_observed};
+use terrain::TileId;
+
+use crate::area::GamingArea;
+use crate::ground::{Ground, Window};
+use crate::{CompileError, Event, Progress, Stage};
+
+/// Rises whenever the result of any stage may change for the same input; a test with golden hashes holds it.
+pub const ALGORITHM_REVISION: u32 = 1;
+
+/// What a run needs from whoever starts it.
+#[derive(Clone, Copy, Debug)]
+pub struct Options<'a> {
+    /// Tiles at once.
+    pub workers: usize,
+    /// Start over, whatever is published.
+    pub fresh: bool,
+    /// Raised to ask the run to stop after the tiles in progress.
+    pub stop: &'a AtomicBool,
+}
+
+/// Everything a stage may look at.
+pub(crate) struct Run<'a> {
+    pub job: &'a Job,
+    pub area: GamingArea,
+    pub ground: Ground,
+    pub workers: Workers,
+    pub stop: &'a AtomicBool,
+    pub database: Database,
+}
+
+/// How a stage dealt with one tile.
+pub(crate) enum Worked<R> {
+    /// It was done now.
+    Made(R),
+    /// What was published is fresh.
+    Kept(R),
+}
+
+impl<R> Worked<R> {
+    pub fn into_inner(self) -> R {
+        match self {
+            Worked::Made(result) | Worked::Kept(result) => result,
+        }
+    }
+}
+
+impl Run<'_> {
+    /// Runs one task per tile in any order, and tells about each.
+    pub fn for_each_tile<R: Send>(
+        &self,
+        stage: Stage,
+        progress: &mut dyn Progress,
+        task: impl Fn(TileId) -> Result<Worked<R>, CompileError> + Sync,
+    ) -> Result<Vec<Worked<R>>, CompileError> {
+        let alone = vec![Vec::new(); self.area.tiles.len()];
+        let ranks: Vec<usize> = (0..alone.len()).collect();
+        self.walk(stage, &RankedTasks::new(&ranks, &alone), progress, task)
+    }
+
+    /// Runs one task per tile, each after its lower-ranked neighbours, and tells about each.
+    pub fn in_rank_order<R: Send>(
+        &self,
+        stage: Stage,
+        progress: &mut dyn Progress,
+        task: impl Fn(TileId) -> Result<Worked<R>, CompileError> + Sync,
+    ) -> Result<Vec<Worked<R>>, CompileError> {
+        self.walk(stage, &self.area.ranked_tasks(), progress, task)
+    }
+
+    fn walk<R: Send>(
+        &self,
+        stage: Stage,
+        plan: &RankedTasks,
+        progress: &mut dyn Progress,
+        task: impl Fn(TileId) -> Result<Worked<R>, CompileError> + Sync,
+    ) -> Result<Vec<Worked<R>>, CompileError> {
+        let tiles = &self.area.tiles;
+        progress.tell(Event::Enter(stage, tiles.len()));
+        let observe = |event: Scheduled<Worked<R>>| {
+            progress.tell(match event {
+                Scheduled::Started(index) => Event::Started(stage, tiles[index]),
+                Scheduled::Done(index, Worked::Made(_)) => Event::Done(stage, tiles[index]),
+                Scheduled::Done(index, Worked::Kept(_)) => Event::Kept(stage, tiles[index]),
+            });
+        };
+        let run = |index: usize| task(tiles[index]);
+        let done = in_rank_order_observed(plan, &self.workers, self.stop, run, observe)
+            .map_err(|error| CompileError::from_schedule(stage, tiles, error))?;
+        progress.tell(Event::Leave(stage));
+        Ok(done)
+    }
+
+    /// The ground of a tile.
+    pub fn window(&self, tile: TileId) -> Result<Arc<Window>, CompileError> {
+        self.ground.tile(&self.area, tile)
+    }
+
+    /// A stamp of this revision for inputs that `feed` adds to a window's.
+    pub fn stamp(
+        &self,
+        purpose: &str,
+        window: &Window,
+        feed: impl FnOnce(FingerprintBuilder) -> FingerprintBuilder,
+    ) -> Stamp {
+        let builder = FingerprintBuilder::new(purpose).heights(&window.dem).importance(&window.importance);
+        Stamp { algorithm_revision: ALGORITHM_REVISION, fingerprint: feed(builder).finish() }
+    }
+}

@@ -1,0 +1,80 @@
+//! Survey and allocation: what would each tile gain, and what may it therefore spend.
+
+use database::FingerprintBuilder;
+use job::{Allocation as Mode, Budget as PointBudget, Edges};
+use terrain::{GainCurve, TileId};
+use tiling::{Allocation, Gains, allocate_equally, allocate_globally, points_equally, points_globally};
+use tin::SurveyTask;
+
+use crate::run::{Run, Worked};
+use crate::tasks::{TileBudget, survey_task};
+use crate::{CompileError, Event, Progress, Stage};
+
+/// What the area's budget came to.
+pub(crate) struct Shares {
+    /// One budget per tile, row-major.
+    pub tiles: Vec<TileBudget>,
+    /// How triangles were shared out; absent in clip mode, where they are counted after the clip.
+    pub triangles: Option<Allocation>,
+}
+
+/// Surveys every tile if the job asks for a global allocation.
+pub(crate) fn survey(run: &Run, progress: &mut dyn Progress) -> Result<Option<Vec<GainCurve>>, CompileError> {
+    if run.job.tin.allocation == Mode::Equal {
+        return Ok(None);
+    }
+    let level = geometry::widest_level();
+    let curves = run.for_each_tile(Stage::Survey, progress, |tile: TileId| {
+        let task = survey_task(run.job, &run.area, tile);
+        let window = run.window(tile)?;
+        let stamp = run.stamp("survey", &window, |builder| feed(builder, &task));
+        if run.database.folder().curve_stamp(tile).ok().flatten() == Some(stamp)
+            && let Ok((_, curve)) = run.database.folder().read_curve(tile)
+        {
+            return Ok(Worked::Kept(curve));
+        }
+        let curve = tin::survey(&window.dem, &window.importance, &task, level);
+        run.database.write_curve(&stamp, &curve)?;
+        Ok(Worked::Made(curve))
+    })?;
+    Ok(Some(curves.into_iter().map(Worked::into_inner).collect()))
+}
+
+fn feed(builder: FingerprintBuilder, task: &SurveyTask) -> FingerprintBuilder {
+    let growth = &task.growth;
+    builder
+        .text(&format!("{:?} {:?} {:?} {:?}", growth.rule, growth.stop, task.owned, task.cost))
+        .text(&format!("{:?}", growth.frame))
+        .text(&format!("{:?}", growth.border))
+}
+
+/// Shares out points and triangles; without curves equally, with them by one threshold.
+pub(crate) fn allocate(run: &Run, curves: Option<&[GainCurve]>, progress: &mut dyn Progress) -> Shares {
+    progress.tell(Event::Enter(Stage::Allocate, 0));
+    let shares = shares(run, curves);
+    progress.tell(Event::Leave(Stage::Allocate));
+    shares
+}
+
+fn shares(run: &Run, curves: Option<&[GainCurve]>) -> Shares {
+    let area = &run.area;
+    let by_rank = area.by_rank();
+    let points: Option<Vec<usize>> = match (run.job.tin.budget, curves) {
+        (PointBudget::Points(points), None) => Some(points_equally(points, area.tiles.len())),
+        (PointBudget::Points(points), Some(curves)) => Some(points_globally(points, curves, &by_rank)),
+        (PointBudget::Limits, _) => None,
+    };
+    let triangles = (run.job.modules.edges == Edges::Constrained).then(|| match (curves, &points) {
+        (Some(curves), None) => allocate_globally(&area.budget, &area.tiling, Gains { curves, by_rank: &by_rank }),
+        _ => allocate_equally(&area.budget, &area.tiling),
+    });
+    let tiles = (0..area.tiles.len()).map(|index| {
+        let mut allowance = triangles.as_ref().map(|allocation| allocation.shares[index].allowance.clone());
+        if let (Some(points), Some(allowance)) = (&points, &mut allowance) {
+            // Every point costs the same; `plan` has made sure that all of them fit.
+            allowance.triangles = points[index] as u32 * limits::POINT_COST;
+        }
+        TileBudget { points: points.as_ref().map(|points| points[index]), allowance }
+    });
+    Shares { tiles: tiles.collect(), triangles }
+}

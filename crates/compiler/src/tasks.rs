@@ -1,0 +1,168 @@
+//! From a job's words to one tile's task.
+
+use job::{Borders, Budget as PointBudget, Edges, ErrorKey, Job, LastBatch, Method};
+use limits::Allowance;
+use terrain::{LatticePoint, ModuleId, ModuleRect, Post, SeamSides, Side, TileId, TileTin, Vertex};
+use tiling::{outer_border_posts, outer_sides};
+use tin::{CostUnit, Frame, Proximity, Rule, Stop, SurveyTask, TileTask};
+
+use crate::area::GamingArea;
+
+/// A survey looks this many times further than an equal share.
+const SURVEY_REACH: u64 = 3;
+
+/// What one tile may spend.
+pub(crate) struct TileBudget {
+    pub points: Option<usize>,
+    pub allowance: Option<Allowance>,
+}
+
+/// The refinement of one tile, inheriting `inherited` from its lower-ranked neighbours.
+pub(crate) fn tile_task(
+    job: &Job,
+    area: &GamingArea,
+    tile: TileId,
+    budget: &TileBudget,
+    inherited: Vec<Post>,
+) -> TileTask {
+    let rect = area.tiling.rect(tile);
+    let regular = job.tiles.borders == Borders::Regular;
+    let border_sides = if regular { SeamSides::OPEN } else { outer_sides(rect, area.rect) };
+    let seams = if regular { SeamSides::CLOSED } else { area.tiling.owned_sides(tile) };
+    let points = budget.points;
+    TileTask {
+        tile,
+        rect,
+        frame: frame(job, area, tile, budget.allowance.clone()),
+        border: outer_border_posts(rect, border_sides, job.modules.border_step_cells),
+        inherited,
+        kept: Vec::new(),
+        seams,
+        rule: rule(job, area),
+        stop: Stop {
+            points,
+            value: if is_by_squares(job) { None } else { largest_value(job) },
+            rms_quanta: job.tin.target_rms_m.map(|rms| rms * f64::from(terrain::QUANTA_PER_METRE)),
+        },
+    }
+}
+
+fn frame(job: &Job, area: &GamingArea, tile: TileId, allowance: Option<Allowance>) -> Frame {
+    let side_cells = area.grid.side_cells;
+    match (job.modules.edges, allowance) {
+        (Edges::Constrained, Some(allowance)) => {
+            let modules = area.tiling.modules(tile, area.grid);
+            let south_west = ModuleId { row: modules.south, col: modules.west };
+            Frame::Sides { side_cells, south_west, allowance }
+        }
+        (Edges::Constrained, None) => unreachable!("constrained edges are allocated triangles"),
+        (Edges::Clip(_), _) => Frame::Corners { side_cells },
+    }
+}
+
+fn is_by_squares(job: &Job) -> bool {
+    job.tin.method == Method::Optimised || job.tin.key == ErrorKey::Sse
+}
+
+fn rule(job: &Job, area: &GamingArea) -> Rule {
+    match job.tin.method {
+        _ if is_by_squares(job) => Rule::LargestSquares { guard: largest_value(job) },
+        Method::Optimised | Method::Greedy => Rule::WorstFirst,
+        Method::Paper { proximity, last_batch } => Rule::Batches {
+            residual_quantum: job.tin.residual_quantum,
+            proximity: proximity.map(|proximity| Proximity {
+                posts: proximity.horizontal_m / area.frame.spacing.metres(),
+                quanta: (proximity.vertical_m * f64::from(terrain::QUANTA_PER_METRE)).round() as u32,
+            }),
+            last_batch: match last_batch {
+                LastBatch::Truncate => tin::LastBatch::Truncate,
+                LastBatch::Finish => tin::LastBatch::Finish,
+            },
+        },
+    }
+}
+
+/// `max_residual_m` as a weighted value: it holds where the ground matters most, and in proportion elsewhere.
+fn largest_value(job: &Job) -> Option<u64> {
+    let quantum = if matches!(job.tin.method, Method::Paper { .. }) { job.tin.residual_quantum } else { 1 };
+    let weights = job.importance.areas.iter().map(|spec| spec.weight);
+    let heaviest = weights.chain([job.importance.default_weight]).max().unwrap_or(0);
+    let units = |metres: f64| (metres * f64::from(terrain::QUANTA_PER_METRE) / f64::from(quantum)).floor();
+    job.tin.max_residual_m.map(|metres| u64::from(heaviest) * units(metres) as u64)
+}
+
+/// The survey of one tile: all it would select if it were alone.
+pub(crate) fn survey_task(job: &Job, area: &GamingArea, tile: TileId) -> SurveyTask {
+    let modules = area.tiling.modules(tile, area.grid);
+    let share = |total: u64| SURVEY_REACH * total * modules.count() as u64 / area.grid.count() as u64;
+    let (points, cost) = match job.tin.budget {
+        PointBudget::Points(points) => (Some(share(points) as usize), CostUnit::Points),
+        PointBudget::Limits => (None, CostUnit::Triangles),
+    };
+    let room = area.budget.area - area.budget.start_total();
+    let allowance = survey_allowance(area, modules, share(room) as u32);
+    let budget = TileBudget { points, allowance: Some(allowance) };
+    let mut growth = tile_task(job, area, tile, &budget, Vec::new());
+    growth.seams = area.tiling.shared_sides(tile);
+    growth.stop = Stop { points, ..Stop::default() };
+    if let Rule::Batches { .. } = growth.rule {
+        growth.rule = Rule::WorstFirst;
+    }
+    if let Rule::LargestSquares { guard } = &mut growth.rule {
+        *guard = None;
+    }
+    SurveyTask { growth, owned: area.tiling.owned_sides(tile), grid: area.grid, cost }
+}
+
+/// Load modules to their limit (or beyond it by the pool), no windows.
+fn survey_allowance(area: &GamingArea, modules: ModuleRect, triangles: u32) -> Allowance {
+    let ring = ModuleRect {
+        south: modules.south.saturating_sub(1),
+        west: modules.west.saturating_sub(1),
+        north: (modules.north + 1).min(area.grid.rows),
+        east: (modules.east + 1).min(area.grid.cols),
+    };
+    let cap = area.budget.per_module.saturating_add(u32::try_from(area.budget.pool).unwrap_or(u32::MAX));
+    let room = |module| cap - limits::start_triangles(area.grid, module, area.budget.border_step);
+    Allowance {
+        modules: ring,
+        module_room: ring.iter().map(room).collect(),
+        windows: ModuleRect { south: 0, west: 0, north: 0, east: 0 },
+        window_size: (area.budget.windows.rows, area.budget.windows.cols),
+        window_room: Vec::new(),
+        triangles,
+    }
+}
+
+/// The vertices a tile's TIN has on one of its sides, in canonical order.
+pub(crate) fn side_vertices(tin: &TileTin, side: Side) -> Vec<Vertex> {
+    let (low, high) = (LatticePoint::from(tin.tin.rect.south_west()), LatticePoint::from(tin.tin.rect.north_east()));
+    let on_side = |at: LatticePoint| match side {
+        Side::South => at.row == low.row,
+        Side::East => at.col == high.col,
+        Side::North => at.row == high.row,
+        Side::West => at.col == low.col,
+    };
+    let mut found: Vec<Vertex> = tin.tin.vertices.iter().copied().filter(|vertex| on_side(vertex.at)).collect();
+    found.sort_unstable();
+    found
+}
+
+/// What a tile inherits: the border points of its lower-ranked neighbours on the sides they share.
+pub(crate) fn inherited<'a>(area: &GamingArea, tile: TileId, published: impl Fn(TileId) -> &'a TileTin) -> Vec<Vertex> {
+    let inherits = Side::ALL.into_iter().filter(|&side| area.tiling.inherits(tile, side));
+    let beyond = inherits.filter_map(|side| Some((area.tiling.beyond(tile, side)?, side)));
+    let mut all: Vec<Vertex> =
+        beyond.flat_map(|(other, side)| side_vertices(published(other), side.opposite())).collect();
+    all.sort_unstable();
+    all.dedup();
+    all
+}
+
+/// The posts that vertices stand on.
+///
+/// # Panics
+/// When one stands between posts: seam vertices never do.
+pub(crate) fn posts_of(vertices: &[Vertex]) -> Vec<Post> {
+    vertices.iter().map(|vertex| vertex.at.post().expect("seam vertices stand on posts")).collect()
+}

@@ -1,0 +1,221 @@
+//! One tile again: the same task, and what its changed border reaches.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+use std::sync::Arc;
+
+use database::{Database, DatabaseError, Previous, Report};
+use job::Job;
+use terrain::{SeamSides, Side, TileId, TileTin, Vertex};
+
+use crate::assemble::assemble;
+use crate::build::open;
+use crate::enforce::enforce;
+use crate::publish::{beginning, publish};
+use crate::refine::{Published, refine_now, tile_stamp};
+use crate::report::Findings;
+use crate::run::{Options, Run};
+use crate::survey::{Shares, allocate};
+use crate::tasks::{inherited, posts_of, side_vertices, tile_task};
+use crate::{CompileError, Event, Progress, Stage};
+
+/// A tile that was run again.
+#[derive(Debug)]
+pub struct Rebuilt {
+    /// What was found in the whole area; stages empty as in a build.
+    pub report: Report,
+    /// Whether the tile's sides are held as its neighbours have them, until a full build.
+    pub frozen: bool,
+    /// The tiles that were refined, in rank order.
+    pub rebuilt: Vec<TileId>,
+    /// The database, still locked.
+    pub database: Database,
+}
+
+/// Runs one tile of a finished database again, with the published allocation.
+///
+/// If its outgoing border comes out as published, only this tile changes. Otherwise its sides are frozen as the
+/// neighbours have them, or, with `release_borders`, the tiles that the new border reaches are rebuilt too.
+///
+/// # Errors
+/// As `build`; when there is no such tile, no finished database, or it was built from another job.
+pub fn rebuild_tile(
+    job: &Job,
+    folder: &Path,
+    tile: TileId,
+    release_borders: bool,
+    options: &Options,
+    progress: &mut dyn Progress,
+) -> Result<Rebuilt, CompileError> {
+    let (run, previous) = open(job, folder, options, progress)?;
+    let mut frozen = refuse_unfinished(&run, folder, tile, previous)?;
+    let shares = published_shares(&run, progress)?;
+    let mut tins = published_tins(&run)?;
+    run.database.begin(&beginning(&run))?;
+
+    progress.tell(Event::Enter(Stage::Refine, 0));
+    let reached = if release_borders {
+        cascade(&run, &shares, &mut tins, tile, progress)?
+    } else {
+        rerun(&run, &shares, &mut tins, tile, progress)?
+    };
+    progress.tell(Event::Leave(Stage::Refine));
+    for &(tile, is_frozen) in &reached {
+        frozen.retain(|&other| other != tile);
+        frozen.extend(is_frozen.then_some(tile));
+    }
+
+    let mut assembled = assemble(&run, &tins, progress)?;
+    let enforced = enforce(&run, &tins, &mut assembled, progress)?;
+    let findings = Findings { run: &run, tins: &tins, assembled: &assembled, enforced: &enforced };
+    let report = publish(&findings, &shares, &frozen, progress)?;
+    let rebuilt = reached.iter().map(|&(tile, _)| tile).collect();
+    Ok(Rebuilt { report, frozen: frozen.contains(&tile), rebuilt, database: run.database })
+}
+
+/// Tiles that are frozen already; a refusal when there is nothing whole to go on from.
+fn refuse_unfinished(run: &Run, folder: &Path, tile: TileId, previous: Previous) -> Result<Vec<TileId>, CompileError> {
+    let tiling = &run.area.tiling;
+    if !tiling.contains(tile) {
+        return Err(CompileError::Impossible {
+            key: "ROW,COL".into(),
+            found: format!("{},{}", tile.row, tile.col),
+            expected: format!("a row below {} and a column below {}", tiling.rows(), tiling.cols()),
+            hint: "rows count from the south, columns from the west, both from 0".into(),
+        });
+    }
+    let manifest = match previous {
+        Previous::Database(manifest) => *manifest,
+        Previous::Damaged(error) => return Err(error.into()),
+        Previous::Nothing => {
+            let path = run.database.folder().path(database::files::DATABASE);
+            return Err(DatabaseError::Missing { path }.into());
+        }
+    };
+    let job = run.job.canonical_text();
+    if manifest.job != job {
+        let differs = manifest.job.lines().zip(job.lines()).find(|(theirs, ours)| theirs != ours);
+        let difference = differs.map_or_else(
+            || "one has more lines than the other".to_owned(),
+            |(theirs, ours)| format!("`{theirs}` there, `{ours}` here"),
+        );
+        return Err(CompileError::OtherJob { path: folder.display().to_string(), difference });
+    }
+    let is_frozen = |record: &&database::TileRecord| record.state == database::TileState::Frozen;
+    Ok(manifest.tiles.iter().filter(is_frozen).map(database::TileRecord::tile).collect())
+}
+
+/// The allocation the database was built with, from its published curves.
+fn published_shares(run: &Run, progress: &mut dyn Progress) -> Result<Shares, CompileError> {
+    if run.job.tin.allocation == job::Allocation::Equal {
+        return Ok(allocate(run, None, progress));
+    }
+    let folder = run.database.folder();
+    let curves = run.area.tiles.iter().map(|&tile| Ok(folder.read_curve(tile)?.1));
+    let curves: Vec<_> = curves.collect::<Result<_, CompileError>>()?;
+    Ok(allocate(run, Some(&curves), progress))
+}
+
+fn published_tins(run: &Run) -> Result<Vec<Published>, CompileError> {
+    let folder = run.database.folder();
+    let read = |&tile: &TileId| {
+        let (stamp, tin) = folder.read_tile(tile)?;
+        Ok(Published { tin: Arc::new(tin), stamp, is_new: false })
+    };
+    run.area.tiles.iter().map(read).collect()
+}
+
+/// What a tile inherits from its lower-ranked neighbours as they are now.
+fn seeds(run: &Run, tins: &[Published], tile: TileId) -> Vec<Vertex> {
+    inherited(&run.area, tile, |other| &*tins[run.area.tiling.index(other)].tin)
+}
+
+/// The tile's task as a full build would give it.
+fn refine_whole(run: &Run, shares: &Shares, tins: &[Published], tile: TileId) -> Result<Published, CompileError> {
+    let seeds = seeds(run, tins, tile);
+    let task = tile_task(run.job, &run.area, tile, &shares.tiles[run.area.tiling.index(tile)], posts_of(&seeds));
+    let window = run.window(tile)?;
+    let stamp = tile_stamp(run, &window, &task, &seeds);
+    Ok(Published { tin: Arc::new(refine_now(&window, &task, &seeds)), stamp, is_new: true })
+}
+
+/// Runs `tile`, with its sides frozen if its border would change. Gives it, and whether it is frozen.
+fn rerun(
+    run: &Run,
+    shares: &Shares,
+    tins: &mut [Published],
+    tile: TileId,
+    progress: &mut dyn Progress,
+) -> Result<Vec<(TileId, bool)>, CompileError> {
+    progress.tell(Event::Started(Stage::Refine, tile));
+    let index = run.area.tiling.index(tile);
+    let whole = refine_whole(run, shares, tins, tile)?;
+    let is_frozen = outgoing(run, &whole.tin) != outgoing(run, &tins[index].tin);
+    let done = if is_frozen { refine_frozen(run, shares, tins, tile)? } else { whole };
+    run.database.write_tile(&done.stamp, &done.tin)?;
+    tins[index] = done;
+    progress.tell(Event::Done(Stage::Refine, tile));
+    Ok(vec![(tile, is_frozen)])
+}
+
+/// The tile's task with every shared side held as it is published.
+fn refine_frozen(run: &Run, shares: &Shares, tins: &[Published], tile: TileId) -> Result<Published, CompileError> {
+    let index = run.area.tiling.index(tile);
+    let mut seeds = seeds(run, tins, tile);
+    let mut task = tile_task(run.job, &run.area, tile, &shares.tiles[index], posts_of(&seeds));
+    let own = outgoing(run, &tins[index].tin);
+    task.kept = posts_of(&own);
+    task.kept.retain(|post| !task.inherited.contains(post));
+    task.seams = SeamSides::CLOSED;
+    if let Some(points) = &mut task.stop.points {
+        // Seam points were selected once; load-module corners among them never were.
+        let side = run.area.grid.side_cells;
+        let selected = task.kept.iter().filter(|post| post.row % side != 0 || post.col % side != 0).count();
+        *points = points.saturating_sub(selected);
+    }
+    seeds.extend(own);
+    let window = run.window(tile)?;
+    let stamp = tile_stamp(run, &window, &task, &seeds);
+    Ok(Published { tin: Arc::new(refine_now(&window, &task, &seeds)), stamp, is_new: true })
+}
+
+/// Runs `tile` and every higher-ranked tile that a changed border reaches, in rank order.
+fn cascade(
+    run: &Run,
+    shares: &Shares,
+    tins: &mut [Published],
+    tile: TileId,
+    progress: &mut dyn Progress,
+) -> Result<Vec<(TileId, bool)>, CompileError> {
+    let tiling = &run.area.tiling;
+    let mut waiting = BTreeSet::from([(tiling.rank(tile), tile)]);
+    let mut reached = Vec::new();
+    while let Some((_, tile)) = waiting.pop_first() {
+        progress.tell(Event::Started(Stage::Refine, tile));
+        let index = tiling.index(tile);
+        let done = refine_whole(run, shares, tins, tile)?;
+        for side in Side::ALL {
+            let Some(other) = tiling.beyond(tile, side).filter(|&other| tiling.rank(tile) < tiling.rank(other)) else {
+                continue;
+            };
+            if side_vertices(&done.tin, side) != side_vertices(&tins[index].tin, side) {
+                waiting.insert((tiling.rank(other), other));
+            }
+        }
+        run.database.write_tile(&done.stamp, &done.tin)?;
+        tins[index] = done;
+        reached.push((tile, false));
+        progress.tell(Event::Done(Stage::Refine, tile));
+    }
+    Ok(reached)
+}
+
+/// The border points a tile hands to its higher-ranked neighbours.
+fn outgoing(run: &Run, tin: &TileTin) -> Vec<Vertex> {
+    let owned = run.area.tiling.owned_sides(tin.tile);
+    let sides = Side::ALL.into_iter().filter(|&side| owned.is_open(side));
+    let mut all: Vec<Vertex> = sides.flat_map(|side| side_vertices(tin, side)).collect();
+    all.sort_unstable();
+    all.dedup();
+    all
+}

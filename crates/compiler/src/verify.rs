@@ -1,0 +1,250 @@
+//! Re-reads a database and believes nothing it says: files, TINs, load modules, sides, identities, limits.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+
+use database::{Folder, Manifest, ManifestState, ReportResidual, TileState};
+use fidelity::Residuals;
+use job::{Count, DemSource, Edges, Job, NamedFile};
+use limits::{polygons_of, triangles_of};
+use schedule::Workers;
+use terrain::{LoadModule, ModuleId, Side, TileId};
+
+use crate::CompileError;
+use crate::area::GamingArea;
+use crate::ground::Ground;
+use crate::report::residual_of;
+
+/// How a database stands.
+#[derive(Clone, Debug)]
+pub struct Status {
+    /// Its `database.json`.
+    pub manifest: Manifest,
+    /// Whether a build is at work on it now.
+    pub locked: bool,
+}
+
+/// Reads how a database stands, without touching it.
+///
+/// # Errors
+/// When there is none, or its `database.json` cannot be read.
+pub fn status(folder: &Path) -> Result<Status, CompileError> {
+    let manifest = Folder::new(folder).manifest()?;
+    let locked = matches!(database::Lock::acquire(folder), Err(error) if error.is_transient());
+    Ok(Status { manifest, locked })
+}
+
+/// What a verification found.
+#[derive(Clone, Debug, Default)]
+pub struct Verdict {
+    /// What is wrong, a sentence each; empty when the database is sound.
+    pub problems: Vec<String>,
+    /// Files whose content was checked against its checksums and stamps.
+    pub checked_files: usize,
+    /// Load modules whose triangles, sides and counts were checked.
+    pub checked_modules: usize,
+    /// Residuals recomputed against a DEM, when one was given.
+    pub residual: Option<ReportResidual>,
+}
+
+/// Re-reads every file of a database and checks what a simulator relies on; with `dem`, recomputes residuals.
+///
+/// # Errors
+/// When there is no database, or `dem` cannot be used for its area. Damage is not an error but a problem.
+pub fn verify(folder: &Path, dem: Option<&Path>) -> Result<Verdict, CompileError> {
+    let manifest = Folder::new(folder).manifest()?;
+    let mut verdict = Verdict::default();
+    if manifest.state != ManifestState::Complete {
+        verdict.problems.push("database.json: incomplete: a build began and has not ended".into());
+        return Ok(verdict);
+    }
+    let folder = Folder::new(folder);
+    let damage = folder.verify(&manifest)?;
+    verdict.checked_files = listed(&manifest);
+    verdict.problems.extend(damage.iter().map(|damage| format!("{}: {}", damage.path.display(), damage.error)));
+    if !verdict.problems.is_empty() {
+        return Ok(verdict);
+    }
+    let (job, area) = job_of(&manifest, folder.dir())?;
+    let modules = read_modules(&folder, &area)?;
+    verdict.checked_modules = modules.len();
+    verdict.problems.extend(check_modules(&job, &area, &modules));
+    verdict.problems.extend(check_totals(&manifest, &modules));
+    if let Some(dem) = dem {
+        let residuals = recompute(job, &area, dem, &modules, &mut verdict.problems)?;
+        verdict.residual = Some(residual_of(&residuals.total()));
+    }
+    Ok(verdict)
+}
+
+fn listed(manifest: &Manifest) -> usize {
+    let of_tile = |tile: &database::TileRecord| {
+        [tile.tin.is_some(), tile.slm.is_some(), tile.curve.is_some(), tile.removed.is_some()]
+            .iter()
+            .filter(|&&there| there)
+            .count()
+    };
+    manifest.tiles.iter().map(of_tile).sum::<usize>() + manifest.files.len()
+}
+
+/// The job a database was built from, as it says itself.
+fn job_of(manifest: &Manifest, folder: &Path) -> Result<(Job, GamingArea), CompileError> {
+    let job = Job::from_text(&manifest.job, folder).map_err(|error| CompileError::Impossible {
+        key: "database.json: job".into(),
+        found: error.to_string(),
+        expected: "a job this version reads".into(),
+        hint: "the database was written by another version; build it again".into(),
+    })?;
+    let area = GamingArea::new(&job)?;
+    Ok((job, area))
+}
+
+/// All load modules by place, checked one by one as they are decoded.
+fn read_modules(folder: &Folder, area: &GamingArea) -> Result<BTreeMap<ModuleId, LoadModule>, CompileError> {
+    let mut all = BTreeMap::new();
+    for &tile in &area.tiles {
+        let (_, modules) = folder.read_modules(tile)?;
+        all.extend(modules.into_iter().map(|module| (module.id, module)));
+    }
+    Ok(all)
+}
+
+fn check_modules(job: &Job, area: &GamingArea, modules: &BTreeMap<ModuleId, LoadModule>) -> Vec<String> {
+    let mut problems = Vec::new();
+    for module in area.grid.all().iter() {
+        let Some(found) = modules.get(&module) else {
+            problems.push(format!("load module {module}: missing"));
+            continue;
+        };
+        if let Err(fault) = found.check() {
+            problems.push(format!("load module {module}: {fault}"));
+        }
+        problems.extend(check_identities(found));
+        let east = modules.get(&ModuleId { col: module.col + 1, ..module });
+        let north = modules.get(&ModuleId { row: module.row + 1, ..module });
+        for (other, side) in [(east, Side::East), (north, Side::North)] {
+            if other.is_some_and(|other| side_of(found, side) != side_of(other, side.opposite())) {
+                problems.push(format!("load module {module}: its {side:?} side differs from its neighbour's: a crack"));
+            }
+        }
+    }
+    if job.modules.edges == Edges::Constrained {
+        problems.extend(check_limits(job, area, modules));
+    }
+    problems
+}
+
+/// Both identities of every load module, from edges counted anew.
+fn check_identities(module: &LoadModule) -> Option<String> {
+    let border = module.border_vertex_count();
+    let inner = module.vertices.len() - border;
+    let triangles = module.triangles.len();
+    let expected = triangles_of(inner, border);
+    if triangles != expected {
+        return Some(format!("load module {}: {triangles} triangles, expected {expected}", module.id));
+    }
+    // Every triangle has three edges; those inside the square are shared by two.
+    let inner_edges = (3 * triangles - border) / 2;
+    let polygons = polygons_of(inner, inner_edges);
+    let count = module.polygon_count as usize;
+    (polygons < count).then(|| format!("load module {}: {count} polygons, expected at most {polygons}", module.id))
+}
+
+/// What a load module holds on a side: place along it and height.
+fn side_of(module: &LoadModule, side: Side) -> Vec<(u16, i32)> {
+    let vertices = module.side_vertices(side).into_iter().map(|index| module.vertices[usize::from(index)]);
+    let along = |vertex: terrain::ModuleVertex| match side {
+        Side::South | Side::North => (vertex.x, vertex.z),
+        Side::East | Side::West => (vertex.y, vertex.z),
+    };
+    vertices.map(along).collect()
+}
+
+/// With constrained edges no limit is ever exceeded, so any excess is a fault.
+fn check_limits(job: &Job, area: &GamingArea, modules: &BTreeMap<ModuleId, LoadModule>) -> Vec<String> {
+    let count = |module: &LoadModule| match job.limits.count {
+        Count::Triangles => module.triangles.len() as u32,
+        Count::Polygons => module.polygon_count,
+    };
+    let counts: Vec<u32> = area.grid.all().iter().map(|module| modules.get(&module).map_or(0, count)).collect();
+    let budget = &area.budget;
+    let mut problems = Vec::new();
+    let above: u64 = counts.iter().map(|&count| u64::from(count.saturating_sub(budget.per_module))).sum();
+    if budget.pool < above {
+        problems.push(format!("load modules: {above} triangles above the limit, the pool has {}", budget.pool));
+    }
+    let worst = budget.windows.sums(budget.grid, &counts).into_iter().max().unwrap_or(0);
+    if budget.per_window < worst {
+        problems.push(format!("windows: {worst} triangles in one, the limit is {}", budget.per_window));
+    }
+    let total: u64 = counts.iter().map(|&count| u64::from(count)).sum();
+    if budget.area < total {
+        problems.push(format!("area: {total} triangles, the limit is {}", budget.area));
+    }
+    problems
+}
+
+fn check_totals(manifest: &Manifest, modules: &BTreeMap<ModuleId, LoadModule>) -> Vec<String> {
+    let sum = |of: fn(&LoadModule) -> u64| modules.values().map(of).sum::<u64>();
+    let totals = &manifest.totals;
+    let pairs = [
+        ("triangles", sum(|module| module.triangles.len() as u64), totals.triangles),
+        ("polygons", sum(|module| u64::from(module.polygon_count)), totals.polygons),
+        ("posts", sum(|module| u64::from(module.residual.posts)), totals.residual_posts),
+        ("sum of squared residuals", sum(|module| module.residual.sum_squared), totals.residual_sum_squared),
+    ];
+    let differing = pairs.iter().filter(|(_, found, listed)| found != listed);
+    differing.map(|(what, found, listed)| format!("{what}: {found} in the files, {listed} in database.json")).collect()
+}
+
+/// Residuals against a DEM, load module by load module; those that disagree with the files are problems.
+fn recompute(
+    mut job: Job,
+    area: &GamingArea,
+    dem: &Path,
+    modules: &BTreeMap<ModuleId, LoadModule>,
+    problems: &mut Vec<String>,
+) -> Result<Residuals, CompileError> {
+    let written = dem.display().to_string();
+    let files = vec![NamedFile { written: written.clone(), path: dem.into() }];
+    job.dem.source = DemSource::Files { written: vec![written], files };
+    job.importance.areas.clear();
+    let ground = Ground::open(&job, area, &Workers::new(1), &AtomicBool::new(false))?;
+    let mut all = Residuals::default();
+    for &tile in &area.tiles {
+        let window = ground.tile(area, tile)?;
+        let ground = fidelity::Ground {
+            dem: &window.dem,
+            mask: &window.importance,
+            grid: area.grid,
+            spacing: area.frame.spacing,
+        };
+        let mut own: Vec<LoadModule> =
+            area.tiling.modules(tile, area.grid).iter().filter_map(|module| modules.get(&module).cloned()).collect();
+        all.merge(&fidelity::measure(&mut own, &ground));
+        let differs = |module: &&LoadModule| modules[&module.id].residual != module.residual;
+        problems.extend(own.iter().filter(differs).map(|module| {
+            format!("load module {}: its residuals against this DEM are not those in its file", module.id)
+        }));
+    }
+    Ok(all)
+}
+
+/// Tiles that are not as a full build would make them.
+fn frozen_tiles(manifest: &Manifest) -> Vec<TileId> {
+    let is_frozen = |record: &&database::TileRecord| record.state == TileState::Frozen;
+    manifest.tiles.iter().filter(is_frozen).map(database::TileRecord::tile).collect()
+}
+
+impl Status {
+    /// Whether every file belongs to one finished build.
+    pub fn is_complete(&self) -> bool {
+        self.manifest.state == ManifestState::Complete
+    }
+
+    /// Tiles that are frozen: a build makes them whole.
+    pub fn frozen(&self) -> Vec<TileId> {
+        frozen_tiles(&self.manifest)
+    }
+}
