@@ -5,7 +5,7 @@
 //! quanta; the next value below a tie is at least 1/(2 den) > 2^-24 away for den < 2^23. Sums of squares
 //! then stay whole numbers below 2^53 per lane for every triangle that small.
 
-use fearless_simd::{Simd, f64x8, i32x16, prelude::*};
+use fearless_simd::{Simd, f64x8, i32x8, i32x16, prelude::*};
 
 use super::{IOTA, rounded, visit::OwnedSpans};
 use crate::{Facet, Surface};
@@ -22,6 +22,108 @@ pub fn squares_sum<S: Simd>(simd: S, surface: &Surface, facet: &Facet) -> f64 {
     if RECIPROCAL_LIMIT <= facet.den || RELIEF_LIMIT <= surface.relief() {
         return squares_sum_by_division(surface, facet);
     }
+    let (x0, x1, y0, y1) = facet.bounds();
+    let (candidates, extent) = (surface.candidates(), surface.extent());
+    // Away from masked sides and from the far borders, whose posts have owners of their own, the edge
+    // functions alone tell who owns a post.
+    let is_plain = candidates.west <= x0
+        && x1 <= candidates.east.min(extent.east - 1)
+        && candidates.south <= y0
+        && y1 <= candidates.north.min(extent.north - 1);
+    if is_plain && x1 - x0 < 8 {
+        return squares_in_box_8(simd, surface, facet, x0, y0, y1);
+    }
+    if is_plain && x1 - x0 < 16 {
+        return squares_in_box_16(simd, surface, facet, x0, y0, y1);
+    }
+    squares_in_spans(simd, surface, facet)
+}
+
+/// Starts and steps of the three edge functions at (x0, y0), lowered where the triangle does not own the edge.
+#[inline(always)]
+fn owned_edges(facet: &Facet, x0: i32, y0: i32) -> [(i32, i32, i32); 3] {
+    [(0, 1), (1, 2), (2, 0)].map(|(i, j)| {
+        let (dx, dy) = (facet.x[j] - facet.x[i], facet.y[j] - facet.y[i]);
+        // A shift east, then a smaller one north, stays inside over edges that run south, or level to the east.
+        let is_owned = dy < 0 || (dy == 0 && 0 < dx);
+        let first = dx * (y0 - facet.y[i]) - dy * (x0 - facet.x[i]);
+        (first - i32::from(!is_owned), dx, dy)
+    })
+}
+
+/// A triangle under 8 columns wide: one load per row, no spans.
+#[inline(always)]
+fn squares_in_box_8<S: Simd>(simd: S, surface: &Surface, facet: &Facet, x0: i32, y0: i32, y1: i32) -> f64 {
+    let iota = i32x8::from_slice(simd, &IOTA[..8]);
+    let [(first0, dx0, dy0), (first1, dx1, dy1), (first2, dx2, dy2)] = owned_edges(facet, x0, y0);
+    let mut w0 = i32x8::splat(simd, first0) - iota * i32x8::splat(simd, dy0);
+    let mut w1 = i32x8::splat(simd, first1) - iota * i32x8::splat(simd, dy1);
+    let mut w2 = i32x8::splat(simd, first2) - iota * i32x8::splat(simd, dy2);
+    let (step0, step1, step2) = (i32x8::splat(simd, dx0), i32x8::splat(simd, dx1), i32x8::splat(simd, dx2));
+    let (zero, one) = (i32x8::splat(simd, 0), i32x8::splat(simd, 1));
+    let rounding = Rounding::new(simd, facet.den);
+    let start = facet.origin() + facet.py * i64::from(y0) + facet.px * i64::from(x0);
+    let east = wide(simd, iota) * f64x8::splat(simd, facet.px as f64);
+    let mut plane = east + f64x8::splat(simd, start as f64);
+    let step = f64x8::splat(simd, facet.py as f64);
+    let mut sum = f64x8::splat(simd, 0.0);
+    let (heights, stride) = surface.rows();
+    let first = y0 as usize * stride + x0 as usize;
+    let rows = &heights[first..][..(y1 - y0) as usize * stride + 8];
+    for row in rows.chunks(stride) {
+        let height = wide(simd, i32x8::from_slice(simd, &row[..8]));
+        let inside = (w0 | w1 | w2).simd_ge(zero).select(one, zero);
+        let residual = rounding.residuals(simd, height, plane) * wide(simd, inside);
+        sum = sum + residual * residual;
+        plane = plane + step;
+        (w0, w1, w2) = (w0 + step0, w1 + step1, w2 + step2);
+    }
+    simd.reduce_sum_f64x8(sum)
+}
+
+/// Eight whole numbers below 2^24 as f64, exactly.
+#[inline(always)]
+fn wide<S: Simd>(simd: S, numbers: i32x8<S>) -> f64x8<S> {
+    let (low, high) = simd.cvt_f32_i32x8(numbers).widen();
+    simd.combine_f64x4(low, high)
+}
+
+/// A triangle under 16 columns wide: one load per row, no spans.
+#[inline(always)]
+fn squares_in_box_16<S: Simd>(simd: S, surface: &Surface, facet: &Facet, x0: i32, y0: i32, y1: i32) -> f64 {
+    let iota = i32x16::from_slice(simd, &IOTA);
+    let [(first0, dx0, dy0), (first1, dx1, dy1), (first2, dx2, dy2)] = owned_edges(facet, x0, y0);
+    let mut w0 = i32x16::splat(simd, first0) - iota * i32x16::splat(simd, dy0);
+    let mut w1 = i32x16::splat(simd, first1) - iota * i32x16::splat(simd, dy1);
+    let mut w2 = i32x16::splat(simd, first2) - iota * i32x16::splat(simd, dy2);
+    let (step0, step1, step2) = (i32x16::splat(simd, dx0), i32x16::splat(simd, dx1), i32x16::splat(simd, dx2));
+    let (zero, one) = (i32x16::splat(simd, 0), i32x16::splat(simd, 1));
+    let rounding = Rounding::new(simd, facet.den);
+    let start = facet.origin() + facet.py * i64::from(y0) + facet.px * i64::from(x0);
+    let (start, px) = (f64x8::splat(simd, start as f64), f64x8::splat(simd, facet.px as f64));
+    let (east_low, east_high) = simd.cvt_f32_i32x16(iota).widen();
+    let (mut plane_low, mut plane_high) = (east_low * px + start, east_high * px + start);
+    let step = f64x8::splat(simd, facet.py as f64);
+    let (mut sum_low, mut sum_high) = (f64x8::splat(simd, 0.0), f64x8::splat(simd, 0.0));
+    let (heights, stride) = surface.rows();
+    let first = y0 as usize * stride + x0 as usize;
+    let rows = &heights[first..][..(y1 - y0) as usize * stride + 16];
+    for row in rows.chunks(stride) {
+        let (low, high) = simd.cvt_f32_i32x16(i32x16::from_slice(simd, &row[..16])).widen();
+        let inside = (w0 | w1 | w2).simd_ge(zero).select(one, zero);
+        let (inside_low, inside_high) = simd.cvt_f32_i32x16(inside).widen();
+        let low = rounding.residuals(simd, low, plane_low) * inside_low;
+        let high = rounding.residuals(simd, high, plane_high) * inside_high;
+        (sum_low, sum_high) = (sum_low + low * low, sum_high + high * high);
+        (plane_low, plane_high) = (plane_low + step, plane_high + step);
+        (w0, w1, w2) = (w0 + step0, w1 + step1, w2 + step2);
+    }
+    simd.reduce_sum_f64x8(sum_low + sum_high)
+}
+
+/// Any triangle, row by row.
+#[inline(always)]
+fn squares_in_spans<S: Simd>(simd: S, surface: &Surface, facet: &Facet) -> f64 {
     let (iota_low, iota_high) = simd.cvt_f32_i32x16(i32x16::from_slice(simd, &IOTA)).widen();
     let rounding = Rounding::new(simd, facet.den);
     let (px, zero) = (f64x8::splat(simd, facet.px as f64), f64x8::splat(simd, 0.0));
