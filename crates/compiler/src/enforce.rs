@@ -42,9 +42,11 @@ pub(crate) fn enforce(
         if need.is_met() {
             break;
         }
+        progress.tell(Event::Enter(Stage::Enforce, 0));
         enforced.before.get_or_insert_with(|| by_module(run, assembled).iter().map(|&&numbers| numbers).collect());
         let proposals = propose(run, tins, &enforced.removed, &need)?;
         let picked = pick(&mut need, proposals);
+        progress.tell(Event::Leave(Stage::Enforce));
         if picked.is_empty() {
             break;
         }
@@ -167,13 +169,23 @@ fn propose(
     let proposals = schedule::for_each_independent(&area.tiles, &run.workers, run.stop, |_, &tile| {
         let modules = area.tiling.modules(tile, area.grid);
         let layout = Layout { grid: area.grid, modules, spacing: area.frame.spacing };
-        let wide = area.tiling.rect(tile).grown(halo_posts(area.grid.side_cells));
-        let window = run.ground.window(wide.intersection(&area.rect).expect("a tile lies inside the area"))?;
+        // Most tiles have nothing over its limit anywhere near, and need no ground to say so.
+        if !over.iter().any(|&module| is_near(modules, module)) {
+            return Ok(Vec::new());
+        }
+        let window = run.ground.around(area, tile, halo_posts(area.grid.side_cells))?;
         let ground = RemovalGround { dem: &window.dem, mask: &window.importance, pins: &[], over: &over };
         Ok(propose_removals(&points_around(run, tins, removed, tile), &layout, &ground))
     });
     let proposals = proposals.map_err(|error| CompileError::from_schedule(Stage::Enforce, &area.tiles, error))?;
     Ok(proposals.into_iter().flatten().collect())
+}
+
+/// Whether removing a point of a tile could free something in `module`: a point reaches two load modules far.
+fn is_near(modules: terrain::ModuleRect, module: ModuleId) -> bool {
+    const REACH: u32 = 2;
+    let within = |at: u32, low: u32, high: u32| low <= at + REACH && at < high + REACH;
+    within(module.row, modules.south, modules.north) && within(module.col, modules.west, modules.east)
 }
 
 /// The cheapest proposals that free something needed.

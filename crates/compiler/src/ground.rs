@@ -85,6 +85,32 @@ impl Ground {
         Ok(slot.get_or_init(|| window).clone())
     }
 
+    /// The ground of a tile and of `halo` posts around it, put together from the windows of its neighbours, which
+    /// are kept where memory allows.
+    ///
+    /// # Errors
+    /// When the source has no heights there.
+    pub fn around(&self, area: &GamingArea, tile: TileId, halo: i32) -> Result<Window, CompileError> {
+        let wide = area.tiling.rect(tile).grown(halo);
+        let rect = wide.intersection(&self.rect).expect("a tile lies inside the area");
+        let mut near = area.tiling.neighbours(tile);
+        near.push(tile);
+        let parts = near.iter().map(|&other| self.tile(area, other)).collect::<Result<Vec<_>, _>>()?;
+        if self.kept.is_none() || !near.iter().all(|&other| reaches(area.tiling.rect(other), halo)) {
+            return self.window(rect);
+        }
+        let dem = Dem::from_row_fn(rect, |row, heights| {
+            for (part, cols) in
+                parts.iter().filter_map(|part| overlap(part.dem.rect(), rect, row).map(|cols| (part, cols)))
+            {
+                let (from, to) = (cols.start - part.dem.rect().west, cols.start - rect.west);
+                let part = &part.dem.row(row)[from as usize..][..cols.len()];
+                heights[to as usize..][..cols.len()].copy_from_slice(part);
+            }
+        });
+        Ok(Window { dem, importance: join_importance(&parts, rect) })
+    }
+
     /// The ground of any rectangle of the area.
     ///
     /// # Errors
@@ -98,6 +124,38 @@ impl Ground {
         let importance = mask::without_voids(importance, &dem);
         Ok(Window { dem, importance })
     }
+}
+
+/// Whether a halo never reaches beyond a tile.
+fn reaches(tile: PostRect, halo: i32) -> bool {
+    halo <= tile.cells_wide().min(tile.cells_high()) as i32
+}
+
+/// The columns of a row that a part holds of a whole.
+fn overlap(part: PostRect, whole: PostRect, row: i32) -> Option<std::ops::Range<i32>> {
+    let cut = part.intersection(&whole)?;
+    (cut.south <= row && row <= cut.north).then_some(cut.west..cut.east + 1)
+}
+
+fn join_importance(parts: &[Arc<Window>], rect: PostRect) -> Importance {
+    let first = parts[0].importance.uniform_weight();
+    let is_plain = |part: &Arc<Window>| {
+        part.importance.uniform_weight() == first
+            && part.importance.classes_of_row(part.importance.rect().south).is_none()
+    };
+    if let Some(weight) = first
+        && parts.iter().all(is_plain)
+    {
+        return Importance::uniform(rect, weight);
+    }
+    let holder = |post| parts.iter().find(|part| part.importance.rect().contains(post)).expect("parts cover the whole");
+    let posts = || {
+        (rect.south..=rect.north)
+            .flat_map(move |row| (rect.west..=rect.east).map(move |col| terrain::Post::new(row, col)))
+    };
+    let weights = posts().map(|post| holder(post).importance.weight(post)).collect();
+    let classes = posts().map(|post| holder(post).importance.class(post)).collect();
+    Importance::new(rect, weights, classes)
 }
 
 fn void_policy(voids: Voids) -> VoidPolicy {

@@ -1,9 +1,9 @@
 //! The manifest: before anything changes, and when everything is there.
 
-use database::{Area, Manifest, ManifestState, Report, TileState, files};
+use database::{Area, FileStamp, Manifest, ManifestState, Removals, Report, TileState, files};
 use job::Job;
 use serde_json::{Value, json};
-use terrain::TileId;
+use terrain::{LatticePoint, TileId};
 
 use crate::assemble::{Assembled, crs};
 use crate::refine::Published;
@@ -54,6 +54,8 @@ pub(crate) fn publish(
     for (index, &tile) in run.area.tiles.iter().enumerate() {
         let state = state_of(run, &report, tile, frozen.contains(&tile));
         fill(run, &mut manifest, tile, state, &findings.tins[index], &findings.assembled[index])?;
+        let removed = publish_removals(run, tile, &findings.tins[index], &findings.enforced.removed[index])?;
+        manifest.tile_mut(tile).expect("the manifest lists every tile").removed = removed;
     }
     manifest.totals = findings.totals(&report);
     run.database.finish(&manifest)?;
@@ -88,10 +90,28 @@ fn fill(
     let record = manifest.tile_mut(tile).expect("the manifest lists every tile");
     record.state = state;
     record.fingerprint = Some(tin.stamp.fingerprint);
-    record.tin = Some(database::FileStamp::of(&read(&folder.tile_path(tile))?));
+    record.tin = Some(FileStamp::of(&read(&folder.tile_path(tile))?));
     record.slm = Some(assembled.file);
-    record.curve = if has_curve { Some(database::FileStamp::of(&read(&curve)?)) } else { None };
+    record.curve = if has_curve { Some(FileStamp::of(&read(&curve)?)) } else { None };
     Ok(())
+}
+
+/// The list of points that enforcing took out of a tile, beside the tile's own file, which is never edited.
+fn publish_removals(
+    run: &Run,
+    tile: TileId,
+    tin: &Published,
+    removed: &[LatticePoint],
+) -> Result<Option<FileStamp>, CompileError> {
+    if removed.is_empty() {
+        let path = run.database.folder().removals_path(tile);
+        if path.exists() {
+            run.database.remove(&format!("tiles/{tile}.removed"))?;
+        }
+        return Ok(None);
+    }
+    let removals = Removals { tile, points: removed.to_vec() };
+    Ok(Some(run.database.write_removals(&tin.stamp, &removals)?))
 }
 
 fn read(path: &std::path::Path) -> Result<Vec<u8>, CompileError> {

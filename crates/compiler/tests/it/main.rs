@@ -1,0 +1,23 @@
+//! The whole compiler on small jobs, through the library: same bytes, sound load modules, runs that are stopped,
+//! damaged, repeated in part, or stand on difficult ground.
+
+// A test that unwraps says by its line what failed.
+#![allow(clippy::unwrap_used)]
+
+mod scene;
+
+mod findings;
+mod modes;
+mod product;
+mod surface;
+
+mod bytes;
+mod damage;
+mod difficult_ground;
+mod golden;
+mod one_tile_again;
+mod random_jobs;
+mod real_ground;
+mod soundness;
+mod stopped;
+mod window_figures;
