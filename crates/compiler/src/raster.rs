@@ -16,7 +16,7 @@ use terrain::{
     Dem, GainCurve, GridFrame, Importance, ModuleGrid, PostRect, SeamSides, Side, Spacing, StopReason, THOUSANDTHS,
     TileId, TileTin, Tin, Vertex, quanta_of_metres,
 };
-use tiling::{Order, Tiling, points_equally, points_globally};
+use tiling::{Gains, Order, Tiling, points_equally, points_globally};
 use tin::{CostUnit, Frame, LastBatch, Proximity, Rule, Stop, SurveyTask, TileTask};
 
 use crate::ground::decode;
@@ -239,7 +239,7 @@ impl<'a> TinJob<'a> {
         let mut by_rank: Vec<usize> = (0..self.tiles.len()).collect();
         by_rank.sort_by_key(|&index| ranks[index]);
         let shares = self.points().map(|points| match curves {
-            Some(curves) => points_globally(points, curves, &by_rank),
+            Some(curves) => points_globally(points, Gains { curves, by_rank: &by_rank, floor: None }),
             None => points_equally(points, self.tiles.len()),
         });
         let slots: Vec<OnceLock<TileTin>> = self.tiles.iter().map(|_| OnceLock::new()).collect();

@@ -56,16 +56,28 @@ pub(crate) fn allocate(run: &Run, curves: Option<&[GainCurve]>, progress: &mut d
     shares
 }
 
+/// A survey lets every tile choose on all its sides and so predicts a little better than tiles will do.
+const RMS_MARGIN: f64 = 0.99;
+
+/// The step of the ladder at which the area's RMS residual is predicted to be the one asked for.
+fn floor(run: &Run, curves: &[GainCurve]) -> Option<i32> {
+    let rms_quanta = run.job.tin.target_rms_m? * f64::from(terrain::QUANTA_PER_METRE) * RMS_MARGIN;
+    let posts: usize = run.area.tiles.iter().map(|&tile| run.area.tiling.rect(tile).post_count()).sum();
+    tiling::floor_for_rms(curves, rms_quanta * rms_quanta * posts as f64)
+}
+
 fn shares(run: &Run, curves: Option<&[GainCurve]>) -> Shares {
     let area = &run.area;
     let by_rank = area.by_rank();
+    let floor = curves.and_then(|curves| floor(run, curves));
+    let gains = |curves| Gains { curves, by_rank: &by_rank, floor };
     let points: Option<Vec<usize>> = match (run.job.tin.budget, curves) {
         (PointBudget::Points(points), None) => Some(points_equally(points, area.tiles.len())),
-        (PointBudget::Points(points), Some(curves)) => Some(points_globally(points, curves, &by_rank)),
+        (PointBudget::Points(points), Some(curves)) => Some(points_globally(points, gains(curves))),
         (PointBudget::Limits, _) => None,
     };
     let triangles = (run.job.modules.edges == Edges::Constrained).then(|| match (curves, &points) {
-        (Some(curves), None) => allocate_globally(&area.budget, &area.tiling, Gains { curves, by_rank: &by_rank }),
+        (Some(curves), None) => allocate_globally(&area.budget, &area.tiling, gains(curves)),
         _ => allocate_equally(&area.budget, &area.tiling),
     });
     let tiles = (0..area.tiles.len()).map(|index| {

@@ -1,6 +1,6 @@
 //! From a job's words to one tile's task.
 
-use job::{Borders, Budget as PointBudget, Edges, ErrorKey, Job, LastBatch, Method};
+use job::{Allocation, Borders, Budget as PointBudget, Edges, ErrorKey, Job, LastBatch, Method};
 use limits::Allowance;
 use terrain::{LatticePoint, ModuleId, ModuleRect, Post, SeamSides, Side, TileId, TileTin, Vertex};
 use tiling::{outer_border_posts, outer_sides};
@@ -42,7 +42,11 @@ pub(crate) fn tile_task(
         stop: Stop {
             points,
             value: if is_by_squares(job) { None } else { largest_value(job) },
-            rms_quanta: job.tin.target_rms_m.map(|rms| rms * f64::from(terrain::QUANTA_PER_METRE)),
+            // Shared out globally, the RMS is the area's: the allocation sees to it.
+            rms_quanta: match job.tin.allocation {
+                Allocation::Equal => job.tin.target_rms_m.map(|rms| rms * f64::from(terrain::QUANTA_PER_METRE)),
+                Allocation::Global => None,
+            },
         },
     }
 }
@@ -104,7 +108,8 @@ pub(crate) fn survey_task(job: &Job, area: &GamingArea, tile: TileId) -> SurveyT
     let budget = TileBudget { points, allowance: Some(allowance) };
     let mut growth = tile_task(job, area, tile, &budget, Vec::new());
     growth.seams = area.tiling.shared_sides(tile);
-    growth.stop = Stop { points, ..Stop::default() };
+    // An RMS of 0 is never reached, but has the sums of squares recorded.
+    growth.stop = Stop { points, value: None, rms_quanta: job.tin.target_rms_m.map(|_| 0.0) };
     if let Rule::Batches { .. } = growth.rule {
         growth.rule = Rule::WorstFirst;
     }

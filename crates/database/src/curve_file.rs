@@ -13,6 +13,7 @@ use crate::{DatabaseError, Stamp, codec, frame};
 struct CurveOnDisk {
     tile: (u32, u32),
     runs: Vec<RunOnDisk>,
+    squares: Vec<(i32, f64)>,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -29,7 +30,11 @@ struct RunOnDisk {
 pub fn encode_curve(stamp: &Stamp, curve: &GainCurve) -> Vec<u8> {
     assert!(curve.is_descending(), "a gain curve runs from the best point to the worst");
     let run = |run: &GainRun| RunOnDisk { module: (run.module.row, run.module.col), bin: run.bin, cost: run.cost };
-    let on_disk = CurveOnDisk { tile: (curve.tile.row, curve.tile.col), runs: curve.runs.iter().map(run).collect() };
+    let on_disk = CurveOnDisk {
+        tile: (curve.tile.row, curve.tile.col),
+        runs: curve.runs.iter().map(run).collect(),
+        squares: curve.squares.clone(),
+    };
     frame::seal(Kind::Curve, stamp, &codec::encode(&on_disk))
 }
 
@@ -46,7 +51,7 @@ pub fn decode_curve(path: &Path, bytes: &[u8]) -> Result<(Stamp, GainCurve), Dat
         cost: run.cost,
     };
     let tile = TileId { row: on_disk.tile.0, col: on_disk.tile.1 };
-    let curve = GainCurve { tile, runs: on_disk.runs.into_iter().map(run).collect() };
+    let curve = GainCurve { tile, runs: on_disk.runs.into_iter().map(run).collect(), squares: on_disk.squares };
     if curve.is_descending() {
         return Ok((stamp, curve));
     }

@@ -58,7 +58,11 @@ pub(crate) fn tile() -> TileTin {
 
 pub(crate) fn curve() -> GainCurve {
     let run = |col, bin, cost| GainRun { module: ModuleId { row: 0, col }, bin, cost };
-    GainCurve { tile: TILE, runs: vec![run(1, 900, 2), run(2, 900, 4), run(1, -12, 70_000)] }
+    GainCurve {
+        tile: TILE,
+        runs: vec![run(1, 900, 2), run(2, 900, 4), run(1, -12, 70_000)],
+        squares: vec![(900, 12.5), (-12, 3.0)],
+    }
 }
 
 /// Load modules 2,3 and 2,4 of an area of 4 x 5.

@@ -41,6 +41,8 @@ pub struct Gains<'a> {
     pub curves: &'a [GainCurve],
     /// Tiles from the lowest rank, by row-major place.
     pub by_rank: &'a [usize],
+    /// Gains below this step of the ladder are not wanted: the RMS residual asked for is reached without them.
+    pub floor: Option<i32>,
 }
 
 /// Part of the budget that may be left over rather than cut a rung in two.
@@ -166,6 +168,9 @@ impl<'a> State<'a> {
         let (mut left, mut next) = (room, vec![0usize; gains.curves.len()]);
         let mut threshold = None;
         while let Some(rung) = highest_rung(gains.curves, &next) {
+            if gains.floor.is_some_and(|floor| rung < floor) {
+                return Taken { threshold: gains.floor, left };
+            }
             let sum = rung_sum(gains.curves, &next, rung);
             if left < sum && left <= room / SLACK_SHARE {
                 return Taken { threshold: threshold.or(Some(rung)), left };
@@ -174,9 +179,7 @@ impl<'a> State<'a> {
                 let runs = &gains.curves[tile].runs;
                 while let Some(run) = runs.get(next[tile]).filter(|run| run.bin == rung) {
                     next[tile] += 1;
-                    if u64::from(run.cost) <= left && self.accept(tile, run.module, run.cost) {
-                        left -= u64::from(run.cost);
-                    }
+                    left -= self.accept_while_permitted(tile, run.module, run.cost, left);
                 }
             }
             threshold = Some(rung);
@@ -184,7 +187,20 @@ impl<'a> State<'a> {
         Taken { threshold: None, left }
     }
 
-    /// Books a run where every limit permits it.
+    /// Books as much of a run as limits and what is `left` permit, a point at a time. Gives what was booked.
+    fn accept_while_permitted(&mut self, tile: usize, module: ModuleId, cost: u32, left: u64) -> u64 {
+        let mut booked = 0;
+        while booked < cost {
+            let step = POINT_COST.min(cost - booked);
+            if left < u64::from(booked + step) || !self.accept(tile, module, step) {
+                break;
+            }
+            booked += step;
+        }
+        u64::from(booked)
+    }
+
+    /// Books triangles in a load module where every limit permits them.
     fn accept(&mut self, tile: usize, module: ModuleId, cost: u32) -> bool {
         let index = self.budget.grid.index(module);
         let over = (self.counts[index] + cost).saturating_sub(self.budget.per_module + self.granted[index]);

@@ -2,6 +2,8 @@
 
 use terrain::GainCurve;
 
+use crate::Gains;
+
 /// `points` shared equally; the remainder goes to the first tiles in row-major order.
 pub fn points_equally(points: u64, tiles: usize) -> Vec<usize> {
     let (each, rest) = (points as usize / tiles, points as usize % tiles);
@@ -10,13 +12,17 @@ pub fn points_equally(points: u64, tiles: usize) -> Vec<usize> {
 
 /// `points` shared by one common threshold of gain: as many points per tile as one greedy run over the
 /// whole area would have given it. Curves stand in the order of their tiles and cost one per point; the
-/// last rung is filled in rank order, `by_rank` naming tiles from the lowest.
-pub fn points_globally(points: u64, curves: &[GainCurve], by_rank: &[usize]) -> Vec<usize> {
+/// last rung is filled in rank order. Nothing below the floor is shared out.
+pub fn points_globally(points: u64, gains: Gains) -> Vec<usize> {
+    let Gains { curves, by_rank, floor } = gains;
     let mut shares = vec![0usize; curves.len()];
     let mut next = vec![0usize; curves.len()];
     let mut left = points;
     while 0 < left {
         let Some(rung) = highest_rung(curves, &next) else { break };
+        if floor.is_some_and(|floor| rung < floor) {
+            return shares;
+        }
         for &tile in by_rank {
             let runs = &curves[tile].runs;
             while let Some(run) = runs.get(next[tile]).filter(|run| run.bin == rung) {
@@ -34,6 +40,17 @@ pub fn points_globally(points: u64, curves: &[GainCurve], by_rank: &[usize]) -> 
     shares
 }
 
+/// The highest step of the ladder down to which all gains must be taken for the sums of squares of all tiles to come
+/// down to `goal`; `None` where the surveys never get there.
+pub fn floor_for_rms(curves: &[GainCurve], goal: f64) -> Option<i32> {
+    let mut steps: Vec<i32> = curves.iter().flat_map(|curve| curve.squares.iter().map(|&(step, _)| step)).collect();
+    steps.sort_unstable_by(|a, b| b.cmp(a));
+    steps.dedup();
+    let sum_at = |step: i32| curves.iter().map(|curve| curve.squares_at(step)).sum::<f64>();
+    // Sums fall from step to step, but for rounding in the choice of posts; the first that is low enough will do.
+    steps.into_iter().find(|&step| sum_at(step) <= goal)
+}
+
 /// The highest rung among the next runs of all curves.
 pub(crate) fn highest_rung(curves: &[GainCurve], next: &[usize]) -> Option<i32> {
     curves.iter().zip(next).filter_map(|(curve, &at)| Some(curve.runs.get(at)?.bin)).max()
@@ -46,7 +63,30 @@ mod tests {
 
     fn curve(col: u32, bins: &[i32]) -> GainCurve {
         let run = |&bin: &i32| GainRun { module: ModuleId { row: 0, col }, bin, cost: 1 };
-        GainCurve { tile: TileId { row: 0, col }, runs: bins.iter().map(run).collect() }
+        GainCurve { tile: TileId { row: 0, col }, runs: bins.iter().map(run).collect(), squares: Vec::new() }
+    }
+
+    fn shared(points: u64, curves: &[GainCurve], by_rank: &[usize], floor: Option<i32>) -> Vec<usize> {
+        points_globally(points, Gains { curves, by_rank, floor })
+    }
+
+    #[test]
+    fn nothing_below_the_floor_is_shared_out() {
+        let curves = [curve(0, &[9, 9, 2, 1]), curve(1, &[8, 5, 2])];
+        assert_eq!(shared(7, &curves, &[0, 1], Some(5)), [2, 2]);
+    }
+
+    #[test]
+    fn the_floor_is_the_highest_step_that_reaches_the_rms() {
+        let with = |col, squares| GainCurve { squares, ..curve(col, &[]) };
+        let curves = [
+            with(0, vec![(i32::MAX, 900.0), (9, 400.0), (2, 100.0)]),
+            with(1, vec![(i32::MAX, 500.0), (8, 100.0), (5, 60.0)]),
+        ];
+        assert_eq!(floor_for_rms(&curves, 500.0), Some(8));
+        assert_eq!(floor_for_rms(&curves, 460.0), Some(5));
+        assert_eq!(floor_for_rms(&curves, 10.0), None);
+        assert_eq!(floor_for_rms(&curves, 2000.0), Some(i32::MAX));
     }
 
     #[test]
@@ -58,14 +98,14 @@ mod tests {
     #[test]
     fn the_highest_gains_of_all_tiles_are_taken_first() {
         let curves = [curve(0, &[9, 9, 2, 1]), curve(1, &[8, 5, 2])];
-        assert_eq!(points_globally(4, &curves, &[0, 1]), [2, 2]);
-        assert_eq!(points_globally(5, &curves, &[0, 1]), [3, 2]);
-        assert_eq!(points_globally(5, &curves, &[1, 0]), [2, 3]);
+        assert_eq!(shared(4, &curves, &[0, 1], None), [2, 2]);
+        assert_eq!(shared(5, &curves, &[0, 1], None), [3, 2]);
+        assert_eq!(shared(5, &curves, &[1, 0], None), [2, 3]);
     }
 
     #[test]
     fn points_beyond_every_curve_are_shared_equally() {
         let curves = [curve(0, &[9]), curve(1, &[])];
-        assert_eq!(points_globally(6, &curves, &[0, 1]), [4, 2]);
+        assert_eq!(shared(6, &curves, &[0, 1], None), [4, 2]);
     }
 }

@@ -28,6 +28,9 @@ impl<S: Simd> Growth<'_, S> {
         let mut queue = Queue::new(criterion);
         self.score_all(criterion);
         let mut squares = stop.rms_quanta.map(|rms| RunningSquares::new(self, rms));
+        if let Some(squares) = &squares {
+            witness.squares(squares.sum);
+        }
         loop {
             if self.sequence.is_full(stop.points) || self.gate.is_spent() {
                 return StopReason::BudgetSpent;
@@ -45,6 +48,7 @@ impl<S: Simd> Growth<'_, S> {
             self.insert(criterion, &mut queue, post, top.triangle);
             if let Some(squares) = &mut squares {
                 squares.update(&self.ground, &self.mesh);
+                witness.squares(squares.sum);
             }
         }
     }

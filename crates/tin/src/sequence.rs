@@ -6,6 +6,9 @@ use terrain::{ModuleId, PostRect, Refusal, RefusedBy};
 /// Told of every post as it is selected, with the gain that selected it.
 pub(crate) trait Witness {
     fn selected(&mut self, post: LocalPost, gain: f64);
+
+    /// Told, where the job asks for an RMS residual, what the sum of squared residuals has come to.
+    fn squares(&mut self, _sum: f64) {}
 }
 
 /// Nobody wants to know.

@@ -6,7 +6,7 @@
 
 use fearless_simd::{Level, dispatch};
 use geometry::LocalPost;
-use terrain::{Dem, GainCurve, GainRun, Importance, PostRect, SeamSides};
+use terrain::{Dem, GainCurve, GainRun, Importance, PostRect, SeamSides, TileId};
 
 use crate::gate::{Charged, ModuleLines};
 use crate::ladder::ladder_bin;
@@ -42,7 +42,7 @@ pub fn survey(dem: &Dem, importance: &Importance, task: &SurveyTask, level: Leve
     let mut recorder = Recorder::new(task);
     let start = Start::new(&task.growth);
     let _ = dispatch!(level, simd => grow(simd, dem, importance, &task.growth, start, &mut recorder));
-    GainCurve { tile: task.growth.tile, runs: recorder.runs }
+    recorder.into_curve(task.growth.tile)
 }
 
 struct Recorder {
@@ -52,6 +52,7 @@ struct Recorder {
     cost: CostUnit,
     bin: i32,
     runs: Vec<GainRun>,
+    squares: Vec<(i32, f64)>,
 }
 
 impl Recorder {
@@ -61,7 +62,7 @@ impl Recorder {
         let south_west = terrain::ModuleId { row: module(rect.south), col: module(rect.west) };
         let (rows, cols) = (module(rect.cells_high() as i32), module(rect.cells_wide() as i32));
         let lines = ModuleLines { side_cells, south_west, rows, cols };
-        Self { rect, lines, owned: task.owned, cost: task.cost, bin: i32::MAX, runs: Vec::new() }
+        Self { rect, lines, owned: task.owned, cost: task.cost, bin: i32::MAX, runs: Vec::new(), squares: Vec::new() }
     }
 
     fn is_ours(&self, post: LocalPost) -> bool {
@@ -73,7 +74,27 @@ impl Recorder {
     }
 }
 
+impl Recorder {
+    /// The curve: runs of one step and one load module put together, so that its size is bounded.
+    fn into_curve(mut self, tile: TileId) -> GainCurve {
+        self.runs.sort_by_key(|run| (std::cmp::Reverse(run.bin), run.module));
+        self.runs.dedup_by(|next, run| {
+            let same = (run.bin, run.module) == (next.bin, next.module);
+            run.cost += if same { next.cost } else { 0 };
+            same
+        });
+        GainCurve { tile, runs: self.runs, squares: self.squares }
+    }
+}
+
 impl Witness for Recorder {
+    fn squares(&mut self, sum: f64) {
+        match self.squares.last_mut() {
+            Some((bin, latest)) if *bin == self.bin => *latest = sum,
+            _ => self.squares.push((self.bin, sum)),
+        }
+    }
+
     fn selected(&mut self, post: LocalPost, gain: f64) {
         self.bin = self.bin.min(ladder_bin(gain));
         if !self.is_ours(post) {

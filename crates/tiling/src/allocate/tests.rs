@@ -33,7 +33,7 @@ fn curves(tiling: &Tiling) -> Vec<GainCurve> {
             })
             .collect();
         runs.sort_by_key(|run| (std::cmp::Reverse(run.bin), run.module));
-        GainCurve { tile, runs }
+        GainCurve { tile, runs, squares: Vec::new() }
     };
     tiling.tiles().map(curve).collect()
 }
@@ -76,12 +76,13 @@ fn shares_respect_every_limit() {
     for order in [Order::Color, Order::Raster] {
         let tiling = tiling(order);
         let (by_rank, curves) = (ranks(&tiling), curves(&tiling));
-        for (per_module, pool, per_window) in [(100, 0, 4096), (40, 0, 4096), (100, 0, 1200), (40, 500, 2000), (9, 0, 320)]
+        for (per_module, pool, per_window) in
+            [(100, 0, 4096), (40, 0, 4096), (100, 0, 1200), (40, 500, 2000), (9, 0, 320)]
         {
             let budget = budget(per_module, pool, 32 * GRID.count() as u64, per_window);
             assert_eq!(budget.check(), Ok(()));
             check(&budget, &tiling, &allocate_equally(&budget, &tiling));
-            let gains = Gains { curves: &curves, by_rank: &by_rank };
+            let gains = Gains { curves: &curves, by_rank: &by_rank, floor: None };
             check(&budget, &tiling, &allocate_globally(&budget, &tiling, gains));
         }
     }
@@ -92,7 +93,7 @@ fn rough_ground_is_given_more_than_flat_ground() {
     let tiling = tiling(Order::Color);
     let (by_rank, curves) = (ranks(&tiling), curves(&tiling));
     let budget = budget(100, 0, 32 * GRID.count() as u64, 4096);
-    let allocation = allocate_globally(&budget, &tiling, Gains { curves: &curves, by_rank: &by_rank });
+    let allocation = allocate_globally(&budget, &tiling, Gains { curves: &curves, by_rank: &by_rank, floor: None });
     let triangles = |row, col| allocation.shares[tiling.index(TileId { row, col })].allowance.triangles;
     assert!(2 * triangles(2, 2) < triangles(0, 0), "{} {}", triangles(2, 2), triangles(0, 0));
     let total: u64 = allocation.shares.iter().map(|share| u64::from(share.allowance.triangles)).sum();
@@ -105,7 +106,7 @@ fn the_pool_goes_where_it_gains_most() {
     let tiling = tiling(Order::Color);
     let (by_rank, curves) = (ranks(&tiling), curves(&tiling));
     let budget = budget(40, 30, 32 * GRID.count() as u64, 4096);
-    let allocation = allocate_globally(&budget, &tiling, Gains { curves: &curves, by_rank: &by_rank });
+    let allocation = allocate_globally(&budget, &tiling, Gains { curves: &curves, by_rank: &by_rank, floor: None });
     let granted: u32 = allocation.granted.iter().map(|&(_, extra)| extra).sum();
     assert_eq!(granted, 30);
     // The steepest load modules lie in the south-west corner.
@@ -115,10 +116,11 @@ fn the_pool_goes_where_it_gains_most() {
 #[test]
 fn without_any_gain_the_budget_is_still_there_to_spend() {
     let tiling = tiling(Order::Color);
-    let none: Vec<GainCurve> = tiling.tiles().map(|tile| GainCurve { tile, runs: Vec::new() }).collect();
+    let none: Vec<GainCurve> =
+        tiling.tiles().map(|tile| GainCurve { tile, runs: Vec::new(), squares: Vec::new() }).collect();
     let budget = budget(100, 0, 32 * GRID.count() as u64, 4096);
     let by_rank = ranks(&tiling);
-    let allocation = allocate_globally(&budget, &tiling, Gains { curves: &none, by_rank: &by_rank });
+    let allocation = allocate_globally(&budget, &tiling, Gains { curves: &none, by_rank: &by_rank, floor: None });
     check(&budget, &tiling, &allocation);
     assert!(allocation.shares.iter().all(|share| 1000 < share.allowance.triangles));
 }
