@@ -1,2 +1,78 @@
-//! The command line.
-fn main() {}
+//! The command line: words in, words out, signals, clock. The only crate that prints, or reads the clock, the
+//! environment or arguments.
+//!
+//! ```text
+//!   main ─► commands/…   one file per command: arguments, help, what it calls
+//!             run        what `build` and `tile` share: announcement, listening, end table, report
+//!             progress   one thread that turns events into bars, lines or JSON
+//! ```
+//! Data goes to stdout, everything else to stderr.
+
+// A test that unwraps says by its line what failed.
+#![cfg_attr(test, allow(clippy::unwrap_used))]
+
+mod arguments;
+mod board;
+mod clock;
+mod commands;
+mod end_table;
+mod events;
+mod failure;
+mod files;
+mod lines;
+mod progress;
+mod run;
+mod signals;
+mod terminal;
+
+use std::process::ExitCode;
+
+use clap::Parser;
+
+use commands::Command;
+
+const AFTER_HELP: &str = "\
+Examples:
+  tiefort build configs/ntc.toml           compile a whole gaming area
+  tiefort tile configs/ntc.toml 2,3        re-run one tile of it
+  tiefort report ntc.tdb                   read what broke a limit, and why
+
+Rows and columns count from the south-west corner, row first.
+Exit codes:
+  0    all limits met, or sound
+  1    finished with breaches
+  2    failed, or damaged, or any warning or breach under --strict
+  75   not now: the same may do later
+  130  stopped by SIGINT; 143 by SIGTERM";
+
+/// Turns elevation rasters into a gaming area: a seamless terrain database of load modules within polygon limits.
+#[derive(Parser)]
+#[command(version, max_term_width = 100, after_help = AFTER_HELP)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+fn main() -> ExitCode {
+    failure::report_bugs_in_one_line();
+    // Wrong arguments end here, with exit code 2.
+    let cli = Cli::parse();
+    let outcome = std::panic::catch_unwind(|| cli.command.run());
+    match outcome {
+        Ok(Ok(outcome)) => outcome.into(),
+        Ok(Err(failure)) => failure.tell(),
+        Err(_) => failure::Failure::bug().tell(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    use super::*;
+
+    #[test]
+    fn the_arguments_of_all_commands_are_consistent() {
+        Cli::command().debug_assert();
+    }
+}

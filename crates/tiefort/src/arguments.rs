@@ -1,0 +1,114 @@
+//! Arguments that several commands share, and how their values are read.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use job::Job;
+use terrain::TileId;
+
+/// Most workers that may be asked for: each is a thread with a tile's memory.
+const WORKERS_MAX: i64 = 1024;
+
+/// How many tasks run at once.
+#[derive(Args, Clone, Debug)]
+pub struct Workers {
+    /// Tasks at once [default: one per core]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=WORKERS_MAX))]
+    workers: Option<u32>,
+}
+
+impl Workers {
+    /// What was asked for, or one worker per core.
+    pub fn count(&self) -> usize {
+        let cores = || std::thread::available_parallelism().map_or(1, |cores| cores.get());
+        self.workers.map_or_else(cores, |workers| workers as usize)
+    }
+}
+
+/// What `build` and `tile` have in common.
+#[derive(Args, Clone, Debug)]
+pub struct RunArguments {
+    /// Folder of the terrain database [default: NAME.tdb here, NAME being area.name of the job]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    #[command(flatten)]
+    pub workers: Workers,
+    /// Exit with 2 on any warning or breach
+    #[arg(long)]
+    pub strict: bool,
+    /// Print errors only
+    #[arg(long)]
+    pub quiet: bool,
+    /// Print events as JSON lines on stdout; the last one, "summary", holds the report
+    #[arg(long)]
+    pub json: bool,
+}
+
+impl RunArguments {
+    /// Where the database of `job` goes.
+    pub fn folder(&self, job: &Job) -> PathBuf {
+        self.out.clone().unwrap_or_else(|| PathBuf::from(format!("{}.tdb", job.area.name)))
+    }
+}
+
+/// Reads `ROW,COL`.
+///
+/// # Errors
+/// In words, when it is anything else.
+pub fn row_col(text: &str) -> Result<TileId, String> {
+    let pair = text.split_once(',').and_then(|(row, col)| Some((row.parse().ok()?, col.parse().ok()?)));
+    let (row, col) = pair.ok_or("expected ROW,COL, two whole numbers counted from the south-west, such as 2,3")?;
+    Ok(TileId { row, col })
+}
+
+/// Reads `ROWSxCOLUMNS`, each at least 1.
+///
+/// # Errors
+/// In words, when it is anything else.
+pub fn rows_by_columns(text: &str) -> Result<(u32, u32), String> {
+    let pair = text.split_once('x').and_then(|(rows, columns)| Some((rows.parse().ok()?, columns.parse().ok()?)));
+    match pair {
+        Some((rows, columns)) if 0 < rows && 0 < columns => Ok((rows, columns)),
+        _ => Err("expected ROWSxCOLUMNS, such as 6x6".into()),
+    }
+}
+
+/// Reads a finite number above zero.
+///
+/// # Errors
+/// In words, when it is anything else.
+pub fn positive(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(number) if number.is_finite() && 0.0 < number => Ok(number),
+        _ => Err("expected a number above 0".into()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_tile_is_two_whole_numbers_row_first() {
+        assert_eq!(row_col("2,3"), Ok(TileId { row: 2, col: 3 }));
+        for wrong in ["2", "2,", "-1,0", "2x3", "2,3,4", "2, 3", ""] {
+            assert!(row_col(wrong).is_err(), "{wrong:?} was read");
+        }
+    }
+
+    #[test]
+    fn a_grid_of_tiles_has_at_least_one() {
+        assert_eq!(rows_by_columns("6x4"), Ok((6, 4)));
+        for wrong in ["6", "0x1", "1x0", "6,4", "6x4x2"] {
+            assert!(rows_by_columns(wrong).is_err(), "{wrong:?} was read");
+        }
+    }
+
+    #[test]
+    fn a_length_is_finite_and_above_zero() {
+        assert_eq!(positive("31.25"), Ok(31.25));
+        for wrong in ["0", "-1", "inf", "nan", "1e999", "x"] {
+            assert!(positive(wrong).is_err(), "{wrong:?} was read");
+        }
+    }
+}

@@ -1,0 +1,43 @@
+//! `tiefort build`: a whole gaming area.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use job::Job;
+
+use crate::arguments::RunArguments;
+use crate::failure::{Failure, Outcome};
+use crate::run::{Finished, Run};
+
+const AFTER_HELP: &str = "\
+Examples:
+  tiefort build configs/ntc.toml
+  tiefort build desert.toml --out /data/desert.tdb --workers 8 --strict
+  tiefort build ntc.toml --json > events.jsonl
+
+A build that was stopped goes on where it stopped when the same command is run again.";
+
+/// Arguments of `build`.
+#[derive(Args)]
+#[command(after_help = AFTER_HELP)]
+pub struct Arguments {
+    /// The job file
+    #[arg(value_name = "JOB.toml")]
+    job: PathBuf,
+    #[command(flatten)]
+    run: RunArguments,
+    /// Keep nothing of an earlier build
+    #[arg(long)]
+    fresh: bool,
+}
+
+/// Builds.
+pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
+    let job = Job::load(&arguments.job)?;
+    let run = Run::announce(&job, &arguments.run, "building")?;
+    run.finish(|listener| {
+        let built = compiler::build(&job, run.folder(), &run.options(arguments.fresh), listener)?;
+        let tiles = format!("{} built, {} kept", built.rebuilt, built.kept);
+        Ok(Finished { report: built.report, database: built.database, tiles })
+    })
+}

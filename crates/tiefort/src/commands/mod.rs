@@ -1,0 +1,54 @@
+//! The commands, one file each: its arguments, its help, and what it calls.
+
+mod build;
+mod plan;
+mod report;
+mod sample;
+mod status;
+mod tile;
+mod tin;
+mod verify;
+
+use clap::Subcommand;
+
+use crate::failure::{Failure, Outcome};
+
+/// What to do.
+#[derive(Subcommand)]
+pub enum Command {
+    /// Compile a whole gaming area; what is published and fresh is kept
+    Build(build::Arguments),
+    /// Re-run one tile
+    Tile(tile::Arguments),
+    /// Show tiles, ranks, memory, time and disk before any work
+    Plan(plan::Arguments),
+    /// Show how far a database is, tile by tile
+    Status(status::Arguments),
+    /// Show what a build found: limits, residuals, breaches, times
+    Report(report::Arguments),
+    /// Check every file and every load module of a database
+    Verify(verify::Arguments),
+    /// Write the built-in basin-and-range terrain as a GeoTIFF
+    Sample(sample::Arguments),
+    /// Make just a mesh from a raster
+    Tin(tin::Arguments),
+}
+
+impl Command {
+    /// Does it.
+    ///
+    /// # Errors
+    /// Why it could not be done, for a person to read.
+    pub fn run(self) -> Result<Outcome, Failure> {
+        match self {
+            Command::Build(arguments) => build::run(&arguments),
+            Command::Tile(arguments) => tile::run(&arguments),
+            Command::Plan(arguments) => plan::run(&arguments),
+            Command::Status(arguments) => status::run(&arguments),
+            Command::Report(arguments) => report::run(&arguments),
+            Command::Verify(arguments) => verify::run(&arguments),
+            Command::Sample(arguments) => sample::run(&arguments),
+            Command::Tin(arguments) => tin::run(&arguments),
+        }
+    }
+}

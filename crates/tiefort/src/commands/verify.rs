@@ -1,0 +1,50 @@
+//! `tiefort verify`: is the database sound?
+
+use std::path::PathBuf;
+
+use clap::Args;
+use views::grouped;
+
+use crate::failure::{Failure, Outcome};
+use crate::terminal;
+
+const AFTER_HELP: &str = "\
+Examples:
+  tiefort verify ntc.tdb
+  tiefort verify desert.tdb --dem dem/desert.tif      measure residuals against this raster, too
+
+Exit codes: 0 sound; 2 damaged, each problem on a line of its own.";
+
+/// Arguments of `verify`.
+#[derive(Args)]
+#[command(after_help = AFTER_HELP)]
+pub struct Arguments {
+    /// Folder of the terrain database
+    #[arg(value_name = "DIR")]
+    database: PathBuf,
+    /// A raster of heights to measure residuals against
+    #[arg(long, value_name = "FILE")]
+    dem: Option<PathBuf>,
+}
+
+/// Verifies.
+pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
+    let verdict = compiler::verify(&arguments.database, arguments.dem.as_deref())?;
+    let mut text: String = verdict.problems.iter().map(|problem| format!("{problem}\n")).collect();
+    let checked = format!(
+        "{} files and {} load modules checked",
+        grouped(verdict.checked_files as u64),
+        grouped(verdict.checked_modules as u64)
+    );
+    text += &match verdict.problems.len() {
+        0 => format!("sound: {checked}\n"),
+        1 => format!("damaged: 1 problem; {checked}\n"),
+        problems => format!("damaged: {} problems; {checked}\n", grouped(problems as u64)),
+    };
+    if let Some(residual) = &verdict.residual {
+        let (rms_m, max_m, p99_m) = (residual.rms_m, residual.max_m, residual.p99_m);
+        text += &format!("residual: RMS {rms_m:.3} m, 99 % within {p99_m:.2} m, largest {max_m:.2} m\n");
+    }
+    terminal::print(&text)?;
+    Ok(if verdict.problems.is_empty() { Outcome::Sound } else { Outcome::Damaged })
+}

@@ -1,0 +1,152 @@
+//! Why a command ended without doing its work, in words: `error: …`, then `hint: …`; and exit codes.
+
+use std::fmt;
+use std::io;
+use std::path::Path;
+use std::process::ExitCode;
+
+use compiler::CompileError;
+use database::DatabaseError;
+use job::JobError;
+
+use crate::terminal;
+
+/// How a command ended that did its work.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outcome {
+    /// All limits met, or sound.
+    Sound,
+    /// Finished, with limits that could not be met.
+    Breaches,
+    /// Found damage, or anything at all under `--strict`.
+    Damaged,
+    /// Not now; the same may do later.
+    TryLater,
+}
+
+impl Outcome {
+    /// The exit code, a contract.
+    pub fn code(self) -> u8 {
+        match self {
+            Outcome::Sound => 0,
+            Outcome::Breaches => 1,
+            Outcome::Damaged => FAILED,
+            Outcome::TryLater => TRY_LATER,
+        }
+    }
+}
+
+impl From<Outcome> for ExitCode {
+    fn from(outcome: Outcome) -> Self {
+        ExitCode::from(outcome.code())
+    }
+}
+
+/// Exit code of a failure.
+const FAILED: u8 = 2;
+/// Exit code when trying again later may help: `EX_TEMPFAIL` of sysexits.
+const TRY_LATER: u8 = 75;
+
+/// Why a command did not do its work.
+#[derive(Debug)]
+pub struct Failure {
+    message: String,
+    hint: Option<String>,
+    code: u8,
+}
+
+impl Failure {
+    /// Something wrong with the world: exit code 2.
+    pub fn new(message: impl fmt::Display, hint: impl Into<String>) -> Self {
+        Self { message: message.to_string(), hint: Some(hint.into()), code: FAILED }
+    }
+
+    /// Something the stable command line names and this version does not do.
+    pub fn not_yet(what: &str, instead: &str) -> Self {
+        Self::new(format!("{what} is not supported yet"), instead)
+    }
+
+    /// A file that could not be written.
+    pub fn output(path: &Path, source: &io::Error) -> Self {
+        let hint = "check that the folder exists, is writable and has room; nothing was left half-written";
+        Self::new(format!("{}: cannot be written: {source}", path.display()), hint)
+    }
+
+    /// We are wrong; what and where was told when it happened.
+    pub fn bug() -> Self {
+        let hint = "this is a fault in tiefort, not in your input; please report it with the note above";
+        Self::new("found a state that should be impossible", hint)
+    }
+
+    /// Why the compiler ended early; `signal` is the exit code of the signal that came, if one did.
+    pub fn of_compiler(error: &CompileError, signal: Option<u8>) -> Self {
+        if error.is_stopped() {
+            let again = || "run the same command again: it goes on where it stopped".to_owned();
+            let (hint, code) = (error.hint().unwrap_or_else(again), signal.unwrap_or(FAILED));
+            return Self { message: error.to_string(), hint: Some(hint), code };
+        }
+        let code = if error.is_transient() { TRY_LATER } else { FAILED };
+        Self { message: error.to_string(), hint: error.hint(), code }
+    }
+
+    /// Prints it and gives the exit code.
+    pub fn tell(&self) -> ExitCode {
+        terminal::tell(&self.to_string());
+        ExitCode::from(self.code)
+    }
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        // What has no hint of its own is a refusal of the system.
+        let fallback = "check the path named above, its permissions, and the room on its disk";
+        write!(f, "error: {}\nhint: {}", self.message, self.hint.as_deref().unwrap_or(fallback))
+    }
+}
+
+impl From<JobError> for Failure {
+    fn from(error: JobError) -> Self {
+        Self::new(&error, error.hint())
+    }
+}
+
+impl From<CompileError> for Failure {
+    fn from(error: CompileError) -> Self {
+        Self::of_compiler(&error, None)
+    }
+}
+
+impl From<DatabaseError> for Failure {
+    fn from(error: DatabaseError) -> Self {
+        let code = if error.is_transient() { TRY_LATER } else { FAILED };
+        Self { message: error.to_string(), hint: error.hint().map(str::to_owned), code }
+    }
+}
+
+/// A panic is told in one line instead of the usual trace: what should have held, and where.
+pub fn report_bugs_in_one_line() {
+    std::panic::set_hook(Box::new(|panic| {
+        let place = panic.location().map(|place| format!(" ({}:{})", place.file(), place.line()));
+        let message = panic.payload_as_str().unwrap_or("no message");
+        terminal::tell(&format!("note: {message}{}", place.unwrap_or_default()));
+    }));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_hint_is_a_line_of_its_own() {
+        let failure = Failure::not_yet("--format html", "use --format text or json");
+        assert_eq!(failure.to_string(), "error: --format html is not supported yet\nhint: use --format text or json");
+    }
+
+    #[test]
+    fn a_held_lock_is_worth_trying_again() {
+        let failure = Failure::from(DatabaseError::Locked { path: "a.tdb".into() });
+        assert_eq!(failure.code, 75);
+        let failure = Failure::from(DatabaseError::Missing { path: "a.tdb".into() });
+        assert_eq!(failure.code, 2);
+    }
+}

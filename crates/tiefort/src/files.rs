@@ -1,0 +1,112 @@
+//! Files the command line itself touches: meshes it writes, sizes it tells.
+
+use std::fs;
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use crate::failure::Failure;
+
+/// Writes a file that appears under its name only when it is whole.
+///
+/// # Errors
+/// When it cannot be written; what lay there before is then still there.
+pub fn write_whole(
+    path: &Path,
+    write: impl FnOnce(&mut BufWriter<&fs::File>) -> io::Result<()>,
+) -> Result<(), Failure> {
+    let fault = |error: io::Error| Failure::output(path, &error);
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".tiefort-");
+    // A temporary file is private by default; this one is about to be an ordinary file.
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    let file = builder.tempfile_in(folder_of(path)).map_err(fault)?;
+    let mut out = BufWriter::new(file.as_file());
+    write(&mut out).and_then(|()| out.flush()).map_err(fault)?;
+    drop(out);
+    file.persist(path).map_err(|error| fault(error.error))?;
+    Ok(())
+}
+
+/// The folder a file is to appear in.
+fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// Whether a file can be made at `path`, asked before long work.
+///
+/// # Errors
+/// When the folder is missing or not writable, or `path` is a folder.
+pub fn check_writable(path: &Path) -> Result<(), Failure> {
+    if path.is_dir() {
+        return Err(Failure::new(format!("{}: found a folder, expected a file name", path.display()), "name the file"));
+    }
+    let probe = tempfile::Builder::new().prefix(".tiefort-").tempfile_in(folder_of(path));
+    probe.map(drop).map_err(|error| Failure::output(path, &error))
+}
+
+/// Bytes of each part of a database that is there: its folders, then its other files together.
+pub fn sizes(database: &Path) -> Vec<(&'static str, u64)> {
+    let folders = ["modules", "tiles", "survey"];
+    let mut sizes: Vec<_> = folders.into_iter().map(|name| (name, bytes_in(&database.join(name)))).collect();
+    sizes.push(("reports and the rest", bytes_in(database)));
+    sizes.retain(|&(_, bytes)| 0 < bytes);
+    sizes
+}
+
+/// Bytes of the files directly in `folder`; nothing where it cannot be read.
+fn bytes_in(folder: &Path) -> u64 {
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    let files = entries.filter_map(|entry| entry.metadata().ok()).filter(fs::Metadata::is_file);
+    files.map(|data| data.len()).sum()
+}
+
+/// A size as people say it: 1.2 MB.
+pub fn bytes_text(bytes: u64) -> String {
+    const UNITS: [&str; 4] = ["kB", "MB", "GB", "TB"];
+    if bytes < 1000 {
+        return format!("{bytes} bytes");
+    }
+    let mut size = bytes as f64 / 1000.0;
+    let mut unit = 0;
+    while 999.95 <= size && unit + 1 < UNITS.len() {
+        size /= 1000.0;
+        unit += 1;
+    }
+    format!("{size:.1} {}", UNITS[unit])
+}
+
+/// The extension of a file, in small letters; empty when there is none.
+pub fn extension(path: &Path) -> String {
+    path.extension().map(|extension| extension.to_string_lossy().to_lowercase()).unwrap_or_default()
+}
+
+/// `path` with what a person needs to find it.
+pub fn shown(path: &Path) -> PathBuf {
+    if path.is_relative() && path.components().count() == 1 { Path::new(".").join(path) } else { path.to_path_buf() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_read_as_people_say_them() {
+        for (bytes, text) in
+            [(0, "0 bytes"), (999, "999 bytes"), (1000, "1.0 kB"), (999_999, "1.0 MB"), (12_340_000, "12.3 MB")]
+        {
+            assert_eq!(bytes_text(bytes), text);
+        }
+    }
+
+    #[test]
+    fn a_file_that_fails_half_way_leaves_what_was_there() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("mesh.ply");
+        write_whole(&path, |out| out.write_all(b"old")).unwrap();
+        let broken = write_whole(&path, |out| out.write_all(b"new").and(Err(io::Error::other("full"))));
+        assert!(broken.unwrap_err().to_string().contains("mesh.ply: cannot be written: full"));
+        assert_eq!(fs::read(&path).unwrap(), b"old");
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+}

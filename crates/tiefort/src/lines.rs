@@ -1,0 +1,95 @@
+//! Progress as plain lines, for logs: one per stage, and at most about one a second in between.
+
+use compiler::Event;
+use database::ReportStage;
+
+/// Seconds between lines within a stage.
+const PAUSE_S: f64 = 1.0;
+
+/// Counts tiles and decides when a line is due.
+#[derive(Debug)]
+pub struct Lines {
+    workers: usize,
+    tiles: usize,
+    done: usize,
+    kept: usize,
+    last_s: f64,
+}
+
+impl Lines {
+    /// Nothing has happened yet.
+    pub fn new(workers: usize) -> Self {
+        Self { workers, tiles: 0, done: 0, kept: 0, last_s: 0.0 }
+    }
+
+    /// The line to print now, if one is due.
+    pub fn hear(&mut self, event: &Event, stage_time: Option<&ReportStage>, at_s: f64) -> Option<String> {
+        match event {
+            Event::Enter(_, tiles) => {
+                (self.tiles, self.done, self.kept, self.last_s) = (*tiles, 0, 0, at_s);
+                None
+            }
+            Event::Done(stage, _) => {
+                self.done += 1;
+                self.due(stage.name(), at_s)
+            }
+            Event::Kept(stage, _) => {
+                self.kept += 1;
+                self.due(stage.name(), at_s)
+            }
+            Event::Leave(stage) => {
+                let (wall_s, cpu_s) = stage_time.map(|time| (time.wall_s, time.cpu_s)).unwrap_or_default();
+                Some(self.end(stage.name(), wall_s, cpu_s))
+            }
+            Event::Note(text) => Some(format!("note: {text}")),
+            Event::Started(..) => None,
+        }
+    }
+
+    fn due(&mut self, stage: &str, at_s: f64) -> Option<String> {
+        if at_s - self.last_s < PAUSE_S {
+            return None;
+        }
+        self.last_s = at_s;
+        let (finished, tiles) = (self.done + self.kept, self.tiles);
+        Some(format!("{stage:<9}{finished:>5} of {tiles} tiles{:>9.1} s", at_s))
+    }
+
+    fn end(&self, stage: &str, wall_s: f64, cpu_s: f64) -> String {
+        let tiles = match (self.tiles, self.kept) {
+            (0, _) => String::new(),
+            (tiles, 0) => format!("{tiles} tiles"),
+            (tiles, kept) => format!("{tiles} tiles, {kept} kept"),
+        };
+        let busy = 100.0 * cpu_s / (wall_s * self.workers as f64);
+        let busy = if busy.is_finite() { format!("{busy:.0} % busy") } else { String::new() };
+        format!("{stage:<9} {tiles:<22}{wall_s:>8.2} s  {busy}").trim_end().to_owned()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use compiler::Stage;
+    use terrain::TileId;
+
+    #[test]
+    fn lines_within_a_stage_keep_a_second_apart() {
+        let mut lines = Lines::new(2);
+        assert_eq!(lines.hear(&Event::Enter(Stage::Refine, 36), None, 0.0), None);
+        let done = Event::Done(Stage::Refine, TileId { row: 0, col: 0 });
+        let told = (1..=36).filter_map(|step| lines.hear(&done, None, f64::from(step) / 10.0)).collect::<Vec<_>>();
+        assert_eq!(told.len(), 3);
+        assert_eq!(told[0], "refine      10 of 36 tiles      1.0 s");
+    }
+
+    #[test]
+    fn a_stage_ends_with_its_seconds_and_how_busy_the_workers_were() {
+        let mut lines = Lines::new(2);
+        lines.hear(&Event::Enter(Stage::Survey, 2), None, 0.0);
+        lines.hear(&Event::Kept(Stage::Survey, TileId { row: 0, col: 0 }), None, 0.0);
+        let time = ReportStage { name: "survey".into(), wall_s: 2.0, cpu_s: 3.0 };
+        let line = lines.hear(&Event::Leave(Stage::Survey), Some(&time), 2.0).unwrap();
+        assert_eq!(line, "survey    2 tiles, 1 kept           2.00 s  75 % busy");
+    }
+}

@@ -1,0 +1,180 @@
+//! Turns what a run tells into something to look at, on a thread of its own, so that the run never waits for a
+//! terminal.
+
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::thread::JoinHandle;
+
+use compiler::{Event, Progress};
+use database::ReportStage;
+use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+use crate::board::{Board, LEGEND};
+use crate::clock::StageClock;
+use crate::events;
+use crate::lines::Lines;
+use crate::terminal;
+
+/// Largest board that is drawn, in rows and columns of tiles: it has to fit an ordinary terminal.
+const BOARD_MAX: (u32, u32) = (18, 38);
+/// Times a second that a terminal is redrawn.
+const REDRAWS_HZ: u8 = 10;
+
+/// What a person or a program wants to see.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Show {
+    /// Nothing.
+    Nothing,
+    /// Bars and the board on a terminal, plain lines elsewhere.
+    Progress,
+    /// JSON lines on stdout.
+    Json,
+}
+
+/// Listens to a run: keeps the time of its stages and passes everything on to the reporter thread.
+#[derive(Debug)]
+pub struct Listener {
+    clock: StageClock,
+    sender: Option<Sender<Heard>>,
+    reporter: Option<JoinHandle<()>>,
+}
+
+/// An event with the time at which it happened.
+struct Heard {
+    event: Event,
+    stage_time: Option<ReportStage>,
+    at_s: f64,
+}
+
+impl Listener {
+    /// Starts the reporter thread for a run of `workers` on `tiles` = (rows, columns).
+    pub fn start(show: Show, tiles: (u32, u32), workers: usize) -> Self {
+        let (sender, receiver) = channel();
+        let display = match show {
+            Show::Nothing => None,
+            Show::Json => Some(Display::Json),
+            Show::Progress if terminal::is_watched() => Some(Display::Bars(Box::new(Bars::new(tiles, workers)))),
+            Show::Progress => Some(Display::Lines(Lines::new(workers))),
+        };
+        let reporter = display.map(|display| std::thread::spawn(move || report(receiver, display)));
+        Self { clock: StageClock::start(), sender: reporter.is_some().then_some(sender), reporter }
+    }
+
+    /// Waits until everything is shown; the stages, and seconds since the start.
+    pub fn finish(mut self) -> (Vec<ReportStage>, f64) {
+        self.sender = None;
+        if let Some(reporter) = self.reporter.take() {
+            // A reporter that panicked has said so; the work does not depend on it.
+            let _ = reporter.join();
+        }
+        let seconds = self.clock.seconds();
+        (self.clock.stages(), seconds)
+    }
+}
+
+impl Progress for Listener {
+    fn tell(&mut self, event: Event) {
+        let stage_time = self.clock.hear(&event);
+        if let Some(sender) = &self.sender {
+            let at_s = self.clock.seconds();
+            // Fails only when the reporter is gone, which must not stop the work.
+            let _ = sender.send(Heard { event, stage_time, at_s });
+        }
+    }
+}
+
+enum Display {
+    Json,
+    Lines(Lines),
+    Bars(Box<Bars>),
+}
+
+fn report(receiver: Receiver<Heard>, mut display: Display) {
+    for Heard { event, stage_time, at_s } in receiver {
+        match &mut display {
+            Display::Json => events::print_line(&events::event_json(&event, stage_time.as_ref(), at_s)),
+            Display::Lines(lines) => {
+                if let Some(line) = lines.hear(&event, stage_time.as_ref(), at_s) {
+                    terminal::tell(&line);
+                }
+            }
+            Display::Bars(bars) => bars.hear(&event, stage_time.as_ref(), at_s),
+        }
+    }
+    if let Display::Bars(bars) = display {
+        bars.clear();
+    }
+}
+
+/// A terminal: lines of finished stages, below them the bar of the current one and the board.
+struct Bars {
+    all: MultiProgress,
+    bar: ProgressBar,
+    board: Board,
+    board_rows: Vec<ProgressBar>,
+    lines: Lines,
+}
+
+impl Bars {
+    fn new((rows, columns): (u32, u32), workers: usize) -> Self {
+        let all = MultiProgress::with_draw_target(ProgressDrawTarget::stderr_with_hz(REDRAWS_HZ));
+        let bar = all.add(ProgressBar::no_length().with_style(style("{prefix:<9} {spinner} {elapsed}")));
+        let mut bars =
+            Self { all, bar, board: Board::new(rows, columns), board_rows: Vec::new(), lines: Lines::new(workers) };
+        if 1 < rows * columns && rows <= BOARD_MAX.0 && columns <= BOARD_MAX.1 {
+            bars.board_rows = (0..=rows).map(|_| bars.all.add(ProgressBar::no_length())).collect();
+            bars.board_rows.iter().for_each(|row| row.set_style(style("  {msg}")));
+            bars.draw_board();
+        }
+        bars.bar.enable_steady_tick(std::time::Duration::from_millis(250));
+        bars
+    }
+
+    fn hear(&mut self, event: &Event, stage_time: Option<&ReportStage>, at_s: f64) {
+        match event {
+            Event::Enter(stage, tiles) => self.enter(stage.name(), *tiles),
+            Event::Done(..) | Event::Kept(..) => self.bar.inc(1),
+            _ => {}
+        }
+        self.board.hear(event);
+        if !matches!(event, Event::Leave(_) | Event::Note(_)) {
+            self.draw_board();
+        }
+        let line = self.lines.hear(event, stage_time, at_s);
+        if let (Some(line), Event::Leave(_) | Event::Note(_)) = (line, event) {
+            // Fails when the terminal is gone; there is nobody to tell then.
+            let _ = self.all.println(line);
+        }
+    }
+
+    fn enter(&mut self, stage: &'static str, tiles: usize) {
+        self.bar.set_prefix(stage);
+        self.bar.reset();
+        if tiles == 0 {
+            self.bar.set_style(style("{prefix:<9} {spinner} {elapsed}"));
+        } else {
+            let color = if terminal::wants_color() { ".green" } else { "" };
+            let template = format!("{{prefix:<9}} [{{bar:36{color}}}] {{pos}} of {{len}} tiles  {{elapsed}}");
+            self.bar.set_style(style(&template).progress_chars("##."));
+            self.bar.set_length(tiles as u64);
+        }
+    }
+
+    fn draw_board(&self) {
+        let Some((legend, rows)) = self.board_rows.split_last() else { return };
+        for (row, line) in rows.iter().zip(self.board.lines()) {
+            row.set_message(line);
+        }
+        legend.set_message(LEGEND);
+    }
+
+    fn clear(self) {
+        self.bar.finish_and_clear();
+        self.board_rows.iter().for_each(ProgressBar::finish_and_clear);
+        // Fails when the terminal is gone.
+        let _ = self.all.clear();
+    }
+}
+
+fn style(template: &str) -> ProgressStyle {
+    ProgressStyle::with_template(template).expect("templates are constants of this file and well-formed")
+}

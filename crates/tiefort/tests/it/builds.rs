@@ -1,0 +1,112 @@
+//! From a job to a database and back to words.
+
+use std::fs;
+
+use serde_json::Value;
+
+use crate::scene::Scene;
+
+/// A scene with `small.toml` built in it.
+fn built() -> Scene {
+    let scene = Scene::with_job("small.toml", &[]);
+    scene.run_to(0, &["build", "job.toml", "--quiet"]);
+    scene
+}
+
+#[test]
+fn a_database_is_reported_on_verified_and_complete() {
+    let scene = built();
+    let status = scene.run_to(0, &["status", "small.tdb"]).stdout;
+    assert!(status.contains("complete") && status.contains("# #\n  # #") && status.contains("done: 4"), "{status}");
+    let report = scene.run_to(0, &["report", "small.tdb"]).stdout;
+    for part in ["Gaming area small", "mountains", "largest load module", "Refused posts", "refine"] {
+        assert!(report.contains(part), "{part:?} is not in: {report}");
+    }
+    assert!(report.lines().all(|line| line.chars().count() <= 100), "{report}");
+    let verify = scene.run_to(0, &["verify", "small.tdb"]).stdout;
+    assert!(verify.contains("sound") && verify.contains("64 load modules"), "{verify}");
+}
+
+#[test]
+fn the_report_has_the_keys_of_the_contract() {
+    let scene = built();
+    let report: Value =
+        serde_json::from_str(&scene.run_to(0, &["report", "small.tdb", "--format", "json"]).stdout).unwrap();
+    for pointer in "/area /workers /stages/0/name /stages/0/wall_s /stages/0/cpu_s /points/selected /points/border
+        /points/corner /points/total /triangles /polygons /per_load_module/mean /per_load_module/max
+        /per_load_module/limit /per_load_module/over /per_4km/max /per_4km/limit /per_4km/over /pool/size /pool/used
+        /residual/rms_m /residual/max_m /residual/mean_abs_m /residual/p95_m /residual/p99_m /dem_accuracy_m
+        /breaches /classes/0/posts /classes/0/points"
+        .split_whitespace()
+    {
+        assert!(report.pointer(pointer).is_some(), "the report lacks {pointer}");
+    }
+    let names: Vec<_> = report["stages"].as_array().unwrap().iter().map(|stage| stage["name"].clone()).collect();
+    for stage in ["read", "survey", "refine", "assemble", "publish"] {
+        assert!(names.iter().any(|name| name == stage), "{stage} is not among {names:?}");
+    }
+    let breaches: Value = serde_json::from_slice(&fs::read(scene.path("small.tdb/breaches.geojson")).unwrap()).unwrap();
+    assert_eq!(breaches["features"], serde_json::json!([]));
+}
+
+#[test]
+fn a_second_build_keeps_every_tile_and_a_fresh_one_none() {
+    let scene = built();
+    let database = fs::read(scene.path("small.tdb/database.json")).unwrap();
+    let again = scene.run_to(0, &["build", "job.toml"]);
+    assert!(again.stderr.contains("0 built, 4 kept"), "{}", again.stderr);
+    let fresh = scene.run_to(0, &["build", "job.toml", "--fresh"]);
+    assert!(fresh.stderr.contains("4 built, 0 kept"), "{}", fresh.stderr);
+    assert!(fs::read(scene.path("small.tdb/database.json")).unwrap() == database, "the same job gave other bytes");
+}
+
+#[test]
+fn a_tile_is_run_again_and_changes_nothing() {
+    let scene = built();
+    let modules = |scene: &Scene| fs::read(scene.path("small.tdb/modules/r01c01.slm")).unwrap();
+    let before = modules(&scene);
+    let said = scene.run_to(0, &["tile", "job.toml", "1,1"]);
+    assert!(said.stderr.contains("r01c01 built"), "{}", said.stderr);
+    assert!(modules(&scene) == before);
+    scene.run_to(0, &["verify", "small.tdb"]);
+}
+
+#[test]
+fn damage_is_found_and_named() {
+    let scene = built();
+    let path = scene.path("small.tdb/modules/r00c01.slm");
+    let mut bytes = fs::read(&path).unwrap();
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 1;
+    fs::write(&path, bytes).unwrap();
+    let said = scene.run_to(2, &["verify", "small.tdb"]);
+    assert!(said.stdout.contains("r00c01.slm") && said.stdout.contains("damaged"), "{}", said.stdout);
+    scene.run_to(0, &["build", "job.toml", "--quiet"]);
+    scene.run_to(0, &["verify", "small.tdb"]);
+}
+
+#[test]
+fn a_plan_lists_settings_tiles_and_forecast() {
+    let scene = Scene::with_job("small.toml", &[]);
+    let text = scene.run_to(0, &["plan", "job.toml", "--simulate", "4"]).stdout;
+    for part in ["area.spacing_m", "Load modules", "Memory", "4 workers", "rank  tile"] {
+        assert!(text.contains(part), "{part:?} is not in: {text}");
+    }
+    let plan: Value = serde_json::from_str(&scene.run_to(0, &["plan", "job.toml", "--emit", "json"]).stdout).unwrap();
+    assert_eq!(plan["tiles"].as_array().unwrap().len(), 4);
+    assert_eq!(plan["tiles"][0]["tile"], serde_json::json!([0, 0]));
+    assert!(plan["forecast"]["memory_bytes"].as_u64().unwrap() > 0);
+    assert!(!scene.path("small.tdb").exists());
+}
+
+#[test]
+fn a_pinned_down_residual_that_limits_forbid_is_a_breach() {
+    let scene = Scene::with_job("small.toml", &[("[limits]", "[tin]\nmax_residual_m = 0.01\n\n[limits]")]);
+    let said = scene.run_to(1, &["build", "job.toml"]);
+    assert!(said.stderr.contains("residual"), "{}", said.stderr);
+    scene.run_to(1, &["report", "small.tdb"]);
+    scene.run_to(1, &["status", "small.tdb"]);
+    scene.run_to(2, &["build", "job.toml", "--strict"]);
+    let breaches: Value = serde_json::from_slice(&fs::read(scene.path("small.tdb/breaches.geojson")).unwrap()).unwrap();
+    assert_eq!(breaches["features"][0]["properties"]["kind"], "residual");
+}

@@ -1,0 +1,51 @@
+//! A disk that is too small: the error says so, nothing half-written stays, and with room the same command goes on.
+
+use std::process::Command;
+
+use crate::scene::{Said, Scene};
+
+/// Builds into a file system of its own that holds 96 kB, then lists what is there.
+const SMALL_DISK: &str = "
+mkdir disk && mount -t tmpfs -o size=96k tmpfs disk || exit 99
+\"$0\" build job.toml --out disk/x.tdb
+code=$?
+find disk -name '.*' -type f >&2
+exit $code";
+
+/// Builds where no file may grow beyond 1 kB (two blocks of 512 bytes).
+const SHORT_FILES: &str = "trap '' XFSZ; ulimit -f 2; exec \"$0\" build job.toml --out x.tdb";
+
+#[test]
+fn a_disk_that_is_too_small_is_named_and_nothing_half_written_stays() {
+    let scene = Scene::with_job("small.toml", &[("spacing_m = 25", "spacing_m = 12.5")]);
+    let mut shell = Command::new("unshare");
+    shell.args(["--map-root-user", "--mount", "sh", "-c", SMALL_DISK, env!("CARGO_BIN_EXE_tiefort")]);
+    let output = match shell.current_dir(scene.path("")).output() {
+        Ok(output) if output.status.code() == Some(2) => output,
+        other => {
+            eprintln!("skipped: no small file system can be mounted here: {other:?}");
+            return;
+        }
+    };
+    let said = Said::from(output);
+    said.check_error(&["disk/x.tdb", "no space left"]);
+    assert!(!said.stderr.contains("disk/x.tdb/."), "a temporary file was left: {}", said.stderr);
+}
+
+#[cfg(unix)]
+#[test]
+fn a_file_that_cannot_be_written_whole_is_named_and_the_build_goes_on_when_it_can() {
+    let scene = Scene::with_job("small.toml", &[]);
+    let mut shell = Command::new("sh");
+    shell.args(["-c", SHORT_FILES, env!("CARGO_BIN_EXE_tiefort")]).current_dir(scene.path(""));
+    let said = Said::from(shell.output().unwrap());
+    assert_eq!(said.code, Some(2), "{}", said.stderr);
+    let errors: Vec<&str> = said.stderr.lines().filter(|line| line.starts_with("error: ")).collect();
+    assert_eq!(errors.len(), 1, "{}", said.stderr);
+    assert!(errors[0].contains("x.tdb"), "{}", errors[0]);
+    let hidden = |path: &std::path::PathBuf| path.file_name().unwrap().to_string_lossy().starts_with('.');
+    let left: Vec<_> = scene.everything().into_keys().filter(hidden).collect();
+    assert!(left.is_empty(), "half-written files were left: {left:?}");
+    scene.run_to(0, &["build", "job.toml", "--out", "x.tdb"]);
+    scene.run_to(0, &["verify", "x.tdb"]);
+}

@@ -1,0 +1,76 @@
+//! Help and wrong arguments.
+
+use crate::scene::Scene;
+
+const COMMANDS: [&str; 8] = ["build", "tile", "plan", "status", "report", "verify", "sample", "tin"];
+
+#[test]
+fn the_help_of_every_command_has_an_example_of_it() {
+    let scene = Scene::new();
+    for command in COMMANDS {
+        let help = scene.run_to(0, &[command, "--help"]).stdout;
+        assert!(help.contains("Examples:"), "{command}: {help}");
+        assert!(help.contains(&format!("  tiefort {command} ")), "{command}: {help}");
+    }
+    assert!(scene.run_to(0, &["--help"]).stdout.contains("Exit codes:"));
+}
+
+#[test]
+fn the_help_lists_every_command() {
+    let help = Scene::new().run_to(0, &["--help"]).stdout;
+    for command in COMMANDS {
+        assert!(help.contains(&format!("\n  {command} ")), "{help}");
+    }
+}
+
+#[test]
+fn an_unknown_flag_ends_with_2_and_names_it() {
+    let scene = Scene::new();
+    for command in COMMANDS {
+        let said = scene.run_to(2, &[command, "--no-such-flag"]);
+        assert!(said.stderr.contains("--no-such-flag"), "{}", said.stderr);
+        assert!(said.stdout.is_empty());
+    }
+    assert!(scene.run_to(2, &["biuld"]).stderr.contains("build"));
+    scene.run_to(2, &[]);
+}
+
+#[test]
+fn wrong_values_of_arguments_end_with_2_and_say_what_was_expected() {
+    let scene = Scene::with_job("small.toml", &[]);
+    for (arguments, expected) in [
+        (&["build", "job.toml", "--workers", "0"][..], "1..=1024"),
+        (&["build", "job.toml", "--workers", "many"], "invalid digit"),
+        (&["tile", "job.toml", "2"], "expected ROW,COL"),
+        (&["tile", "job.toml", "-1,0"], "expected ROW,COL"),
+        (&["tin", "a.tif", "--out", "m.ply"], "--points"),
+        (&["tin", "a.tif", "--rms", "nan", "--out", "m.ply"], "above 0"),
+        (&["tin", "a.tif", "--points", "9", "--tiles", "6", "--out", "m.ply"], "expected ROWSxCOLUMNS"),
+        (&["sample", "--spacing", "25.27", "--out", "a.tif"], "multiple of 1/16 m"),
+        (&["sample", "--posts", "1", "--out", "a.tif"], "2..="),
+        (&["report", "x.tdb", "--format", "pdf"], "html"),
+    ] {
+        let said = scene.run_to(2, arguments);
+        assert!(said.stderr.contains(expected), "{arguments:?}: {}", said.stderr);
+    }
+}
+
+#[test]
+fn what_is_not_supported_yet_says_so() {
+    let scene = Scene::with_job("small.toml", &[]);
+    for emit in ["slurm", "dask", "ninja"] {
+        scene.refuses(&["plan", "job.toml", "--emit", emit], &[emit, "not supported yet"]);
+    }
+    scene.refuses(&["report", "x.tdb", "--format", "html"], &["html", "not supported yet"]);
+    scene.refuses(&["tin", "a.tif", "--points", "9", "--out", "m.glb"], &["glb", "not supported yet"]);
+}
+
+#[test]
+fn arguments_that_do_not_fit_together_are_named() {
+    let scene = Scene::with_job("small.toml", &[]);
+    scene.refuses(&["tile", "job.toml", "2,0"], &["2,0", "row from 0 to 1"]);
+    scene.refuses(&["tin", "a.tif", "--points", "9", "--out", "m.xyz"], &["m.xyz", "\"xyz\"", "ply"]);
+    let key = ["tin", "a.tif", "--points", "9", "--method", "paper", "--key", "max", "--out", "m.ply"];
+    scene.refuses(&key, &["--key", "greedy"]);
+    scene.refuses(&["sample", "--posts", "9", "--classes", "a.tif", "--out", "a.tif"], &["a.tif", "two"]);
+}

@@ -1,0 +1,14 @@
+//! The whole program from outside: its words, its exit codes, its files.
+
+// A test that unwraps says by its line what failed.
+#![allow(clippy::unwrap_used)]
+
+mod bad_input;
+mod bad_jobs;
+mod builds;
+mod full_disk;
+mod help;
+mod meshes;
+mod raster;
+mod scene;
+mod streams;

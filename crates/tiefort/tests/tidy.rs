@@ -1,0 +1,422 @@
+//! What the compiler cannot check: who may use whom, sizes, headers, leftovers.
+//!
+//! It reads the project as text, and trusts rustfmt: a function ends at the brace below the line it begins on.
+
+// A test that unwraps says by its line what failed.
+#![allow(clippy::unwrap_used)]
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Lines of a function, its head and closing brace included.
+const FUNCTION_LINES_MAX: usize = 70;
+/// Lines of a file, its tests not counted.
+const FILE_LINES_MAX: usize = 500;
+/// Lines of a file with its tests.
+const FILE_LINES_WITH_TESTS_MAX: usize = 800;
+/// Characters of a line of code.
+const COLUMNS_MAX: usize = 120;
+
+/// The layers, lowest first. A crate uses only what lies below it.
+const LAYERS: [&[&str]; 7] = [
+    &["terrain", "load-module-reader"],
+    &["geometry"],
+    &["limits", "mesh"],
+    &["mask", "tiling", "tin", "methods", "load-modules", "fidelity", "sample-terrain"],
+    &["job", "schedule", "source-files", "database"],
+    &["compiler", "views"],
+    &["tiefort"],
+];
+
+/// Who uses whom. A new arrow is an event: a commit of its own, with `ARCHITECTURE.md` changed in it.
+const ARROWS: [(&str, &[&str]); 18] = [
+    ("terrain", &[]),
+    ("load-module-reader", &[]),
+    ("geometry", &["terrain"]),
+    ("limits", &["terrain"]),
+    ("mesh", &["terrain", "geometry"]),
+    ("mask", &["terrain"]),
+    ("tiling", &["terrain", "limits"]),
+    ("tin", &["terrain", "geometry", "mesh", "limits"]),
+    ("load-modules", &["terrain", "geometry", "mesh", "limits"]),
+    ("fidelity", &["terrain", "geometry"]),
+    ("sample-terrain", &["terrain"]),
+    ("job", &["terrain"]),
+    ("schedule", &[]),
+    ("source-files", &["terrain", "geometry", "mask"]),
+    ("database", &["terrain", "load-module-reader"]),
+    (
+        "compiler",
+        &[
+            "terrain",
+            "geometry",
+            "limits",
+            "mesh",
+            "mask",
+            "tiling",
+            "tin",
+            "load-modules",
+            "fidelity",
+            "sample-terrain",
+            "job",
+            "schedule",
+            "source-files",
+            "database",
+        ],
+    ),
+    ("views", &["terrain", "database"]),
+    ("tiefort", &["terrain", "job", "compiler", "database", "views"]),
+];
+
+/// Libraries that would break a promise elsewhere: threads, serialisation, arguments, the terminal, the clock.
+const OWNED_LIBRARIES: [(&str, &[&str]); 9] = [
+    ("rayon", &["schedule"]),
+    ("crossbeam", &["schedule"]),
+    ("serde", &["database"]),
+    ("bincode", &["database"]),
+    ("serde_json", &["database", "compiler", "views", "tiefort"]),
+    ("clap", &["tiefort"]),
+    ("indicatif", &["tiefort"]),
+    ("cpu-time", &["tiefort"]),
+    ("signal-hook", &["tiefort"]),
+];
+
+/// What no file may hold, split so that this one does not: unfinished work, and places of the machine it was made on.
+const BANNED_ANYWHERE: [&str; 7] = [
+    concat!("TO", "DO"),
+    concat!("FIX", "ME"),
+    concat!("/wo", "rk/"),
+    concat!("/tmp/", "bash"),
+    concat!("/tmp/", "target"),
+    concat!("crates", ".io"),
+    concat!("pypi", ".org"),
+];
+
+/// What no program text outside tests may hold.
+const BANNED_IN_PROGRAMS: [&str; 6] =
+    [concat!("to", "do!("), concat!("unimpl", "emented!("), concat!("db", "g!("), ".unwrap()", "#[ignore", "unsafe {"];
+
+/// What only the crates named may hold, outside tests.
+const OWNED_WORDS: [(&str, &[&str]); 10] = [
+    ("println!(", &["tiefort"]),
+    ("print!(", &["tiefort"]),
+    ("stdout()", &["tiefort"]),
+    ("stderr()", &["tiefort"]),
+    ("Instant::", &["tiefort"]),
+    ("SystemTime", &["tiefort"]),
+    ("std::env::", &["tiefort"]),
+    ("thread::spawn", &["schedule", "tiefort"]),
+    ("thread::scope", &["schedule"]),
+    ("std::fs", &["tiefort", "database", "source-files", "job", "load-module-reader"]),
+];
+
+/// Tables of cases that are longer than code may be: a row for every message of the job reader.
+const LONG_TABLES: [&str; 1] = ["crates/job/tests/errors.rs"];
+
+/// Folders that are not ours to check: built, fetched, or made by a run.
+const SKIPPED_FOLDERS: [&str; 4] = ["target", ".git", "scratch", "__pycache__"];
+
+/// A text file of the project.
+struct Text {
+    path: PathBuf,
+    lines: Vec<String>,
+}
+
+impl Text {
+    fn is_rust(&self) -> bool {
+        self.path.extension().is_some_and(|extension| extension == "rs")
+    }
+
+    /// The crate it belongs to, if any.
+    fn crate_name(&self) -> Option<String> {
+        let mut parts = self.path.iter().map(|part| part.to_string_lossy().into_owned());
+        parts.find(|part| part == "crates")?;
+        parts.next()
+    }
+
+    /// Whether all of it is code for developers: tests, benches, examples.
+    fn is_test(&self) -> bool {
+        let named = ["tests", "tests.rs", "samples.rs", "benches", "examples"];
+        self.path.iter().any(|part| named.contains(&&*part.to_string_lossy()))
+    }
+
+    /// The lines before the tests at the end of the file.
+    fn program(&self) -> &[String] {
+        if self.is_test() {
+            return &[];
+        }
+        let starts_tests = |pair: &[String]| {
+            let (attribute, module) = (pair[0].trim(), pair[1].trim());
+            attribute == "#[cfg(test)]" && module.contains("mod ") && module.ends_with('{')
+        };
+        let end = self.lines.windows(2).position(starts_tests).unwrap_or(self.lines.len());
+        &self.lines[..end]
+    }
+
+    /// Whether it is one of the long tables.
+    fn is_long_table(&self) -> bool {
+        LONG_TABLES.iter().any(|path| self.path == Path::new(path))
+    }
+
+    fn at(&self, line: usize, what: impl std::fmt::Display) -> String {
+        format!("{}:{}: {what}", self.path.display(), line + 1)
+    }
+}
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").canonicalize().unwrap()
+}
+
+/// Every text file of the project, by path from its root.
+fn texts() -> Vec<Text> {
+    let kinds = ["rs", "toml", "py", "sh", "md", "txt", "run"];
+    let mut texts = Vec::new();
+    let mut folders = vec![PathBuf::new()];
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(root().join(&folder)).unwrap() {
+            let name = entry.unwrap().file_name();
+            let path = folder.join(&name);
+            let full = root().join(&path);
+            if full.is_dir() {
+                if !SKIPPED_FOLDERS.contains(&&*name.to_string_lossy()) {
+                    folders.push(path);
+                }
+            } else if kinds.contains(&&*path.extension().unwrap_or(&name).to_string_lossy()) {
+                let text = fs::read_to_string(full).unwrap();
+                texts.push(Text { path, lines: text.lines().map(str::to_owned).collect() });
+            }
+        }
+    }
+    texts.sort_by(|a, b| a.path.cmp(&b.path));
+    assert!(100 < texts.len(), "the project was not found");
+    texts
+}
+
+#[track_caller]
+fn expect_none(faults: Vec<String>) {
+    assert!(faults.is_empty(), "{} faults:\n{}", faults.len(), faults.join("\n"));
+}
+
+/// The crates of the workspace with their `Cargo.toml`.
+fn manifests() -> Vec<(String, toml::Table)> {
+    let folders = fs::read_dir(root().join("crates")).unwrap().map(|entry| entry.unwrap().path());
+    let mut manifests: Vec<_> = folders
+        .filter(|folder| folder.join("Cargo.toml").exists())
+        .map(|folder| {
+            let text = fs::read_to_string(folder.join("Cargo.toml")).unwrap();
+            (folder.file_name().unwrap().to_string_lossy().into_owned(), text.parse().unwrap())
+        })
+        .collect();
+    manifests.sort_by(|a, b| a.0.cmp(&b.0));
+    manifests
+}
+
+fn uses(manifest: &toml::Table, section: &str) -> Vec<String> {
+    let table = manifest.get(section).and_then(toml::Value::as_table);
+    table.map(|table| table.keys().cloned().collect()).unwrap_or_default()
+}
+
+fn layer(name: &str) -> Option<usize> {
+    LAYERS.iter().position(|layer| layer.contains(&name))
+}
+
+#[test]
+fn a_crate_uses_only_what_the_table_of_arrows_says() {
+    let mut faults = Vec::new();
+    for (name, manifest) in manifests() {
+        let Some((_, allowed)) = ARROWS.iter().find(|(from, _)| *from == name) else {
+            faults.push(format!("{name}: not in the table of arrows"));
+            continue;
+        };
+        let used: Vec<String> = uses(&manifest, "dependencies").into_iter().filter(|to| layer(to).is_some()).collect();
+        let surplus = used.iter().filter(|to| !allowed.contains(&to.as_str()));
+        faults.extend(surplus.map(|to| format!("{name} uses {to}, which the table does not allow")));
+        let unused = allowed.iter().filter(|to| !used.iter().any(|used| used == *to));
+        faults.extend(unused.map(|to| format!("{name} no longer uses {to}, which the table lists")));
+    }
+    expect_none(faults);
+}
+
+#[test]
+fn every_arrow_points_down() {
+    let mut faults = Vec::new();
+    for (from, targets) in ARROWS {
+        let lower = |to: &&&str| layer(to) < layer(from);
+        faults.extend(targets.iter().filter(|to| !lower(to)).map(|to| format!("{from} lies no higher than {to}")));
+    }
+    for (name, manifest) in manifests() {
+        for to in uses(&manifest, "dev-dependencies").iter().filter(|to| layer(to).is_some()) {
+            if layer(&name) <= layer(to) {
+                faults.push(format!("tests of {name} lie no higher than {to}"));
+            }
+        }
+    }
+    expect_none(faults);
+}
+
+#[test]
+fn libraries_that_would_break_a_promise_stay_where_they_belong() {
+    let mut faults = Vec::new();
+    for (name, manifest) in manifests() {
+        let used = uses(&manifest, "dependencies");
+        for (library, owners) in OWNED_LIBRARIES {
+            if used.iter().any(|used| used == library) && !owners.contains(&name.as_str()) {
+                faults.push(format!("{name} uses {library}, which only {owners:?} may"));
+            }
+        }
+    }
+    expect_none(faults);
+}
+
+#[test]
+fn every_crate_takes_the_lints_and_the_version_of_the_workspace() {
+    let inherits = |manifest: &toml::Table, section: &str, key: &str| {
+        let value = manifest.get(section).and_then(|section| section.get(key));
+        value.map(|value| value.get("workspace").unwrap_or(value)).and_then(toml::Value::as_bool) == Some(true)
+    };
+    let faulty = |(name, manifest): (String, toml::Table)| {
+        let sound = inherits(&manifest, "lints", "workspace") && inherits(&manifest, "package", "version");
+        (!sound).then(|| format!("{name}: its lints or version are not the workspace's"))
+    };
+    expect_none(manifests().into_iter().filter_map(faulty).collect());
+}
+
+#[test]
+fn every_dependency_has_its_reason_beside_it() {
+    let text = fs::read_to_string(root().join("Cargo.toml")).unwrap();
+    let lines = text.lines().skip_while(|line| *line != "[workspace.dependencies]").skip(1);
+    let mut has_reason = false;
+    let mut faults = Vec::new();
+    for line in lines.take_while(|line| !line.starts_with('[')) {
+        let ours = line.contains("path = \"crates/");
+        match line.chars().next() {
+            None => has_reason = false,
+            Some('#') => has_reason = true,
+            Some(_) if !ours && !has_reason => faults.push(line.to_owned()),
+            // A reason serves the lines below it up to an empty one.
+            Some(_) => {}
+        }
+    }
+    expect_none(faults);
+}
+
+#[test]
+fn every_file_says_at_its_top_what_it_owns() {
+    let headless = |text: &&Text| text.is_rust() && !text.lines.first().is_some_and(|line| line.starts_with("//!"));
+    expect_none(texts().iter().filter(headless).map(|text| text.at(0, "no //! header")).collect());
+}
+
+#[test]
+fn no_file_is_too_long() {
+    let mut faults = Vec::new();
+    for text in texts().iter().filter(|text| text.is_rust() && !text.is_long_table()) {
+        let (program, all) = (text.program().len(), text.lines.len());
+        if FILE_LINES_MAX < program || FILE_LINES_WITH_TESTS_MAX < all {
+            faults.push(text.at(all - 1, format!("{program} lines without tests, {all} with them")));
+        }
+    }
+    expect_none(faults);
+}
+
+#[test]
+fn no_line_of_code_is_too_long() {
+    let mut faults = Vec::new();
+    let code =
+        |text: &&Text| !["md", "txt"].iter().any(|kind| text.path.extension().is_some_and(|found| found == *kind));
+    for text in texts().iter().filter(code) {
+        for (place, line) in text.lines.iter().enumerate() {
+            let columns = line.chars().count();
+            if COLUMNS_MAX < columns {
+                faults.push(text.at(place, format!("{columns} columns")));
+            }
+        }
+    }
+    expect_none(faults);
+}
+
+#[test]
+fn no_function_is_too_long() {
+    let mut faults = Vec::new();
+    for text in texts().iter().filter(|text| text.is_rust() && !text.is_long_table()) {
+        for (place, length) in functions(&text.lines) {
+            if FUNCTION_LINES_MAX < length {
+                faults.push(text.at(place, format!("a function of {length} lines")));
+            }
+        }
+    }
+    expect_none(faults);
+}
+
+/// Where each function begins, and how many lines it has.
+fn functions(lines: &[String]) -> Vec<(usize, usize)> {
+    let starts = lines.iter().enumerate().filter(|(_, line)| is_function_head(line));
+    starts.filter_map(|(place, line)| Some((place, function_length(&lines[place..], indent(line))?))).collect()
+}
+
+fn is_function_head(line: &str) -> bool {
+    let words: Vec<&str> = line.split_whitespace().take_while(|word| *word != "fn").collect();
+    let qualifier = |word: &&str| word.starts_with("pub") || ["const", "async", "unsafe", "extern"].contains(word);
+    words.len() < line.split_whitespace().count() && words.iter().all(qualifier)
+}
+
+fn indent(line: &str) -> usize {
+    line.len() - line.trim_start().len()
+}
+
+/// Lines up to the closing brace at `depth`; `None` for a function without a body.
+fn function_length(lines: &[String], depth: usize) -> Option<usize> {
+    if lines[0].ends_with('}') || lines[0].ends_with(';') {
+        return lines[0].ends_with('}').then_some(1);
+    }
+    let ends = |line: &&String| indent(line) == depth && (line.trim_start().starts_with('}') || line.ends_with(';'));
+    let end = lines.iter().skip(1).position(|line| ends(&line))? + 1;
+    Some(end + 1)
+}
+
+#[test]
+fn nothing_is_left_over() {
+    let mut faults = Vec::new();
+    for text in texts() {
+        for (place, line) in text.lines.iter().enumerate() {
+            faults.extend(BANNED_ANYWHERE.iter().filter(|word| line.contains(*word)).map(|word| text.at(place, word)));
+        }
+        if !text.is_rust() {
+            continue;
+        }
+        for (place, line) in text.program().iter().enumerate() {
+            faults.extend(
+                BANNED_IN_PROGRAMS.iter().filter(|word| code_of(line).contains(*word)).map(|word| text.at(place, word)),
+            );
+        }
+    }
+    expect_none(faults);
+}
+
+/// A line without its comment.
+fn code_of(line: &str) -> &str {
+    line.split("//").next().unwrap_or_default()
+}
+
+#[test]
+fn only_the_command_line_prints_and_looks_at_the_clock() {
+    let mut faults = Vec::new();
+    for text in texts().iter().filter(|text| text.is_rust()) {
+        let Some(name) = text.crate_name() else { continue };
+        for (place, line) in text.program().iter().enumerate() {
+            for (word, owners) in OWNED_WORDS {
+                if code_of(line).contains(word) && !owners.contains(&name.as_str()) {
+                    faults.push(text.at(place, format!("{word} belongs to {owners:?}")));
+                }
+            }
+        }
+    }
+    expect_none(faults);
+}
+
+#[test]
+fn the_length_of_a_function_is_counted_to_its_brace() {
+    let text =
+        "pub fn one() {}\n    pub(crate) const fn two(\n        a: u8,\n    ) -> u8 {\n        a\n    }\nfn three();";
+    let lines: Vec<String> = text.lines().map(str::to_owned).collect();
+    assert_eq!(functions(&lines), [(0, 1), (1, 5)]);
+}

@@ -1,0 +1,130 @@
+//! Breaches as GeoJSON: a polygon for each load module or window, with all its numbers.
+
+use database::{Report, ReportBreach, ReportPlace};
+use geojson::{Feature, FeatureCollection, Geometry, JsonObject, JsonValue};
+use serde_json::json;
+
+/// Where load modules and windows lie on the ground.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BreachPlaces {
+    /// East and north of the area's south-west post, in metres.
+    pub origin_m: [f64; 2],
+    /// Side of a load module, in metres.
+    pub module_side_m: f64,
+    /// Rows and columns of load modules in the area.
+    pub modules: [u32; 2],
+    /// Rows and columns of load modules in a window.
+    pub window: [u32; 2],
+    /// EPSG code of the area's coordinate system.
+    pub epsg: u32,
+}
+
+/// The breaches of `report` as a feature collection, indented, in metres of the area's coordinate system (named by a
+/// `crs` member, as GDAL and QGIS read it). Without breaches it is empty.
+pub fn breaches_geojson(report: &Report, places: &BreachPlaces) -> String {
+    let features = report.breaches.iter().map(|breach| feature(breach, places)).collect();
+    let crs = json!({ "type": "name", "properties": { "name": format!("urn:ogc:def:crs:EPSG::{}", places.epsg) } });
+    let members = [("name".to_owned(), json!("breaches")), ("crs".to_owned(), crs)];
+    let collection = FeatureCollection { bbox: None, features, foreign_members: Some(members.into_iter().collect()) };
+    let text = serde_json::to_string_pretty(&collection).expect("texts and finite numbers are JSON");
+    text + "\n"
+}
+
+fn feature(breach: &ReportBreach, places: &BreachPlaces) -> Feature {
+    let ring = places.ring(breach.place);
+    Feature {
+        bbox: None,
+        geometry: Some(Geometry::new_polygon([ring])),
+        id: None,
+        properties: Some(properties(breach)),
+        foreign_members: None,
+    }
+}
+
+fn properties(breach: &ReportBreach) -> JsonObject {
+    let (place, row_col) = match breach.place {
+        ReportPlace::Module(row_col) => ("module", Some(row_col)),
+        ReportPlace::Window(row_col) => ("window", Some(row_col)),
+        ReportPlace::Area => ("area", None),
+    };
+    let index = |which: usize| row_col.map_or(JsonValue::Null, |row_col| json!(row_col[which]));
+    let pairs = [
+        ("kind", json!(breach.kind)),
+        ("where", json!(place)),
+        ("row", index(0)),
+        ("col", index(1)),
+        ("count", json!(breach.count)),
+        ("limit", json!(breach.limit)),
+        ("excess", json!(breach.excess)),
+        ("refused", json!(breach.refused)),
+        ("rms_with_m", json!(breach.rms_with_m)),
+        ("rms_without_m", json!(breach.rms_without_m)),
+    ];
+    pairs.into_iter().map(|(key, value)| (key.to_owned(), value)).collect()
+}
+
+impl BreachPlaces {
+    /// South-west corner and extent of a place, in load modules: row, column, rows, columns.
+    fn extent(&self, place: ReportPlace) -> [u32; 4] {
+        match place {
+            ReportPlace::Module([row, col]) => [row, col, 1, 1],
+            ReportPlace::Window([row, col]) => [row, col, self.window[0], self.window[1]],
+            ReportPlace::Area => [0, 0, self.modules[0], self.modules[1]],
+        }
+    }
+
+    /// The closed ring around a place, counter-clockwise from the south-west.
+    fn ring(&self, place: ReportPlace) -> Vec<[f64; 2]> {
+        let [row, col, rows, cols] = self.extent(place);
+        let east_m = |col: u32| self.origin_m[0] + f64::from(col) * self.module_side_m;
+        let north_m = |row: u32| self.origin_m[1] + f64::from(row) * self.module_side_m;
+        let (west, east, south, north) = (east_m(col), east_m(col + cols), north_m(row), north_m(row + rows));
+        vec![[west, south], [east, south], [east, north], [west, north], [west, south]]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::samples;
+
+    const PLACES: BreachPlaces = BreachPlaces {
+        origin_m: [505_000.0, 3_875_000.0],
+        module_side_m: 500.0,
+        modules: [20, 30],
+        window: [8, 8],
+        epsg: 32611,
+    };
+
+    #[test]
+    fn a_module_and_a_window_stand_where_they_lie_with_all_their_numbers() {
+        let text = breaches_geojson(&samples::report(), &PLACES);
+        let value: JsonValue = serde_json::from_str(&text).unwrap();
+        assert_eq!(value["crs"]["properties"]["name"], "urn:ogc:def:crs:EPSG::32611");
+        let module = &value["features"][0];
+        let ring = json!([
+            [507500.0, 3877000.0],
+            [508000.0, 3877000.0],
+            [508000.0, 3877500.0],
+            [507500.0, 3877500.0],
+            [507500.0, 3877000.0]
+        ]);
+        assert_eq!(module["geometry"]["coordinates"][0], ring);
+        assert_eq!(module["properties"]["kind"], "per_load_module");
+        assert_eq!(module["properties"]["row"], 4);
+        assert_eq!(module["properties"]["excess"], 7);
+        let window = &value["features"][1];
+        assert_eq!(window["geometry"]["coordinates"][0][2], json!([505500.0 + 4000.0, 3875000.0 + 4000.0]));
+        assert_eq!(window["properties"]["rms_without_m"], 0.98);
+        assert_eq!(value["features"][2]["properties"]["row"], JsonValue::Null);
+        assert_eq!(value["features"][2]["geometry"]["coordinates"][0][2], json!([520000.0, 3885000.0]));
+    }
+
+    #[test]
+    fn no_breach_is_an_empty_collection() {
+        let mut report = samples::report();
+        report.breaches.clear();
+        let value: JsonValue = serde_json::from_str(&breaches_geojson(&report, &PLACES)).unwrap();
+        assert_eq!(value["features"], json!([]));
+    }
+}

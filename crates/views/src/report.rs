@@ -1,0 +1,248 @@
+//! The report as text: what a terrain engineer reads first on top, everything that broke a limit below, no colour,
+//! at most 100 columns.
+
+use database::{Report, ReportBreach, ReportPlace, ReportResidual, ReportStage};
+
+use crate::table::{Align, Table, grouped};
+
+use Align::{Left, Right};
+
+/// Columns that no line of the report exceeds, names and warnings of any length apart.
+const COLUMNS_MAX: usize = 100;
+
+/// The whole report, ending in a line end.
+pub fn report_text(report: &Report) -> String {
+    let parts = [
+        headline(report),
+        limits(report),
+        residuals(report),
+        refusals(report),
+        breaches(report),
+        warnings(report),
+        stages(report),
+    ];
+    parts.into_iter().flatten().collect::<Vec<_>>().join("\n")
+}
+
+fn headline(report: &Report) -> Option<String> {
+    let points = &report.points;
+    let mut table = Table::new(&[Left, Right, Left]);
+    table.row(["triangles", &grouped(report.triangles), &format!("{} convex polygons", grouped(report.polygons))]);
+    let kinds = format!(
+        "{} selected, {} on borders, {} corners of load modules",
+        grouped(points.selected),
+        grouped(points.border),
+        grouped(points.corner)
+    );
+    table.row(["points", &grouped(points.total), &kinds]);
+    let largest = format!("RMS residual against the working grid, largest {:.2} m", report.residual.max_m);
+    table.row(["residual", &format!("{:.3} m", report.residual.rms_m), &largest]);
+    let verdict = match report.breaches.len() {
+        0 => "every limit is met".to_owned(),
+        1 => "limit is not met".to_owned(),
+        _ => "limits are not met".to_owned(),
+    };
+    table.row(["breaches", &grouped(report.breaches.len() as u64), &verdict]);
+    Some(format!("Gaming area {}\n{}", report.area, table.text(2)))
+}
+
+fn limits(report: &Report) -> Option<String> {
+    let (module, window, pool) = (&report.per_load_module, &report.per_4km, &report.pool);
+    let mut table = Table::new(&[Left, Right, Right, Right]);
+    table.row(["Limits", "used", "limit", "over"]);
+    let number = grouped;
+    table.row(["  largest load module".into(), number(module.max), number(module.limit), number(module.over)]);
+    let mean = format!("{:.2}", module.mean);
+    let mean_breach = report.breaches.iter().find(|breach| breach.kind == "mean_per_load_module");
+    let over = mean_breach.map_or("0", |_| "1");
+    table.row(["  mean of load modules", &mean, "", over]);
+    table.row(["  largest 4 km square".into(), number(window.max), number(window.limit), number(window.over)]);
+    table.row(["  largest 9 x 9 load modules".into(), number(window.worst_9x9), String::new(), String::new()]);
+    table.row(["  pool".into(), number(pool.used), number(pool.size), String::new()]);
+    Some(table.text(0))
+}
+
+fn residuals(report: &Report) -> Option<String> {
+    let mut table = Table::new(&[Left, Right, Right, Right, Right, Right, Right, Right]);
+    table.row(["Residuals in metres", "posts", "points", "RMS", "mean abs", "95 %", "99 %", "largest"]);
+    let posts: u64 = report.classes.iter().map(|class| class.posts).sum();
+    let all = if report.classes.is_empty() { String::new() } else { grouped(posts) };
+    residual_row(&mut table, "  all, weighted by posts", all, grouped(report.points.total), &report.residual);
+    for class in &report.classes {
+        let name = format!("  {}", class.name);
+        residual_row(&mut table, &name, grouped(class.posts), grouped(class.points), &class.residual);
+    }
+    if let Some(source) = &report.residual_against_source {
+        residual_row(&mut table, "  against the source DEM", String::new(), String::new(), source);
+    }
+    let mut text = table.text(0);
+    if !report.classes.is_empty() {
+        let by_points = report.overall_point_weighted_rms_m;
+        text +=
+            &format!("  RMS of the classes weighted by points, as the founding paper prints it: {by_points:.3} m\n");
+    }
+    if let Some(accuracy_m) = report.dem_accuracy_m {
+        text += &format!("  the source states an accuracy of {accuracy_m} m\n");
+    }
+    if 0 < report.voids.count {
+        let (voids, filled) = (grouped(report.voids.count), grouped(report.voids.filled));
+        text += &format!("  posts without a height in the source: {voids}, of which {filled} were filled\n");
+    }
+    Some(text)
+}
+
+fn residual_row(table: &mut Table, name: &str, posts: String, points: String, residual: &ReportResidual) {
+    let ReportResidual { rms_m, max_m, mean_abs_m, p95_m, p99_m } = *residual;
+    let metres = [(rms_m, 3), (mean_abs_m, 3), (p95_m, 2), (p99_m, 2), (max_m, 2)];
+    let metres = metres.map(|(metres, digits)| format!("{metres:.digits$}"));
+    table.row([name.to_owned(), posts, points].into_iter().chain(metres));
+}
+
+fn refusals(report: &Report) -> Option<String> {
+    let refused = &report.refusals;
+    if refused.count == 0 {
+        return Some("Refused posts: none\n".into());
+    }
+    let mut table = Table::new(&[Right, Left]);
+    table.row([grouped(refused.by_module), "by the limit of a load module".into()]);
+    table.row([grouped(refused.by_window), "by the limit of a 4 km square".into()]);
+    table.row([grouped(refused.by_reservation), "to keep what a neighbour's side was promised".into()]);
+    let largest = format!("largest residual among them {:.2} m", refused.largest_m);
+    Some(format!("Refused posts: {}, {largest}\n{}", grouped(refused.count), table.text(2)))
+}
+
+fn breaches(report: &Report) -> Option<String> {
+    if report.breaches.is_empty() {
+        return Some("Breaches: none\n".into());
+    }
+    let mut table = Table::new(&[Left, Left, Right, Right, Right, Right, Right, Right]);
+    table.row(["Breaches", "where (row,col)", "count", "limit", "excess", "refused", "RMS m", "without limit"]);
+    for breach in &report.breaches {
+        table.row(breach_row(breach));
+    }
+    Some(table.text(0))
+}
+
+fn breach_row(breach: &ReportBreach) -> [String; 8] {
+    let place = match breach.place {
+        ReportPlace::Module([row, col]) => format!("load module {row},{col}"),
+        ReportPlace::Window([row, col]) => format!("window from {row},{col}"),
+        ReportPlace::Area => "whole area".into(),
+    };
+    [
+        format!("  {}", breach.kind),
+        place,
+        amount(breach, breach.count),
+        amount(breach, breach.limit),
+        amount(breach, breach.excess),
+        breach.refused.to_string(),
+        format!("{:.3}", breach.rms_with_m),
+        breach.rms_without_m.map_or(String::new(), |rms_m| format!("{rms_m:.3}")),
+    ]
+}
+
+/// A count; of a residual, which is counted in millimetres, the metres.
+fn amount(breach: &ReportBreach, count: u64) -> String {
+    if breach.kind == "residual" { format!("{}.{:03} m", grouped(count / 1000), count % 1000) } else { grouped(count) }
+}
+
+fn warnings(report: &Report) -> Option<String> {
+    if report.warnings.is_empty() {
+        return None;
+    }
+    let lines = report.warnings.iter().flat_map(|warning| wrapped(warning, COLUMNS_MAX - 4));
+    let lines: String = lines.map(|line| format!("  {line}\n")).collect();
+    Some(format!("Warnings: {}\n{lines}", report.warnings.len()))
+}
+
+/// `text` in lines of at most `columns` characters, later ones indented; a longer word keeps its line to itself.
+fn wrapped(text: &str, columns: usize) -> Vec<String> {
+    let mut lines = vec![String::new()];
+    for word in text.split_whitespace() {
+        let line = lines.last_mut().expect("there is always a line");
+        if line.is_empty() {
+            *line = word.into();
+        } else if line.chars().count() + 1 + word.chars().count() <= columns {
+            *line += " ";
+            *line += word;
+        } else {
+            lines.push(format!("  {word}"));
+        }
+    }
+    lines
+}
+
+fn stages(report: &Report) -> Option<String> {
+    (!report.stages.is_empty()).then(|| stage_table(&report.stages, report.workers).text(0))
+}
+
+/// One row per stage and one for all: wall and CPU seconds, workers, share of the workers' time that was busy, and
+/// share of the wall time.
+pub fn stage_table(stages: &[ReportStage], workers: u32) -> Table {
+    let mut table = Table::new(&[Left, Right, Right, Right, Right, Right]);
+    table.row(["Stages", "wall s", "cpu s", "workers", "busy %", "of all %"]);
+    let wall_s: f64 = stages.iter().map(|stage| stage.wall_s).sum();
+    let cpu_s: f64 = stages.iter().map(|stage| stage.cpu_s).sum();
+    let total = ReportStage { name: "all".into(), wall_s, cpu_s };
+    for stage in stages.iter().chain([&total]) {
+        table.row([
+            format!("  {}", stage.name),
+            format!("{:.2}", stage.wall_s),
+            format!("{:.2}", stage.cpu_s),
+            workers.to_string(),
+            percent(stage.cpu_s, stage.wall_s * f64::from(workers)),
+            percent(stage.wall_s, wall_s),
+        ]);
+    }
+    table
+}
+
+fn percent(part: f64, whole: f64) -> String {
+    if 0.0 < whole { format!("{:.0}", 100.0 * part / whole) } else { "-".into() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::samples;
+
+    #[test]
+    fn the_report_reads_as_the_golden_text() {
+        let golden = concat!(env!("CARGO_MANIFEST_DIR"), "/src/report.golden.txt");
+        let text = report_text(&samples::report());
+        if std::env::var_os("UPDATE_GOLDEN").is_some() {
+            std::fs::write(golden, &text).unwrap();
+        }
+        assert_eq!(text, std::fs::read_to_string(golden).unwrap(), "UPDATE_GOLDEN=1 rewrites {golden}");
+    }
+
+    #[test]
+    fn no_line_is_wider_than_a_hundred_columns() {
+        let mut report = samples::report();
+        report.triangles = 1_000_000_000;
+        report.warnings.push("a word and another ".repeat(30));
+        for line in report_text(&report).lines() {
+            assert!(line.chars().count() <= COLUMNS_MAX, "{} columns: {line}", line.chars().count());
+        }
+    }
+
+    #[test]
+    fn a_report_without_findings_says_so() {
+        let mut report = samples::report();
+        report.breaches.clear();
+        report.refusals = Default::default();
+        report.warnings.clear();
+        report.stages.clear();
+        let text = report_text(&report);
+        for expected in ["every limit is met", "Refused posts: none", "Breaches: none"] {
+            assert!(text.contains(expected), "{text}");
+        }
+        assert!(!text.contains("Warnings") && !text.contains("Stages"), "{text}");
+    }
+
+    #[test]
+    fn a_stage_without_time_has_no_share() {
+        let text = stage_table(&[ReportStage { name: "read".into(), wall_s: 0.0, cpu_s: 0.0 }], 2).text(0);
+        assert!(text.contains('-') && !text.contains("NaN"), "{text}");
+    }
+}

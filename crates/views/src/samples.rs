@@ -1,0 +1,48 @@
+//! A report with something in every part, for the tests of this crate.
+
+use database::{
+    Report, ReportBreach, ReportClass, ReportPerModule, ReportPerWindow, ReportPlace, ReportPoints, ReportPool,
+    ReportRefusals, ReportResidual, ReportStage, ReportVoids,
+};
+
+pub(crate) fn residual(rms_m: f64) -> ReportResidual {
+    ReportResidual { rms_m, max_m: 14.0 * rms_m, mean_abs_m: 0.6 * rms_m, p95_m: 2.0 * rms_m, p99_m: 3.3 * rms_m }
+}
+
+fn breach(kind: &str, place: ReportPlace, count: u64, limit: u64, rms_without_m: Option<f64>) -> ReportBreach {
+    let excess = count - limit;
+    ReportBreach { kind: kind.into(), place, count, limit, excess, refused: 3, rms_with_m: 1.1, rms_without_m }
+}
+
+fn class(name: &str, posts: u64, points: u64, rms_m: f64) -> ReportClass {
+    ReportClass { name: name.into(), posts, points, residual: residual(rms_m) }
+}
+
+pub(crate) fn report() -> Report {
+    let stage = |name: &str, wall_s, cpu_s| ReportStage { name: name.into(), wall_s, cpu_s };
+    Report {
+        area: "fort_irwin".into(),
+        workers: 2,
+        stages: vec![stage("read", 0.25, 0.4), stage("survey", 1.5, 3.0), stage("refine", 12.25, 24.0)],
+        points: ReportPoints { selected: 76_500, border: 1_200, corner: 10_201, total: 87_901 },
+        triangles: 319_998,
+        polygons: 319_998,
+        per_load_module: ReportPerModule { mean: 31.9998, max: 107, limit: 100, over: 1 },
+        per_4km: ReportPerWindow { max: 4_100, limit: 4_096, over: 1, worst_9x9: 4_990 },
+        pool: ReportPool { size: 500, used: 7 },
+        residual: residual(2.999),
+        residual_against_source: Some(residual(3.1)),
+        classes: vec![class("plains", 2_587_215, 64_939, 0.869), class("mountains", 1_313_410, 28_532, 5.268)],
+        overall_point_weighted_rms_m: 2.999,
+        dem_accuracy_m: Some(2.5),
+        voids: ReportVoids { count: 12, filled: 12 },
+        breaches: vec![
+            breach("per_load_module", ReportPlace::Module([4, 5]), 107, 100, None),
+            breach("per_4km_square", ReportPlace::Window([0, 1]), 4_100, 4_096, Some(0.98)),
+            breach("mean_per_load_module", ReportPlace::Area, 320_010, 320_000, None),
+            breach("residual", ReportPlace::Area, 17_547, 10, None),
+        ],
+        refusals: ReportRefusals { count: 41, by_module: 30, by_window: 8, by_reservation: 3, largest_m: 7.5 },
+        warnings: vec!["tile r01c02 is frozen; a build makes it whole".into()],
+    }
+}
