@@ -1,7 +1,7 @@
 //! Load modules of every tile, their residuals and counts.
 
 use database::{FileStamp, Fingerprint, FingerprintBuilder, TileModules};
-use fidelity::Residuals;
+use fidelity::{Residuals, Tally};
 use job::{ClipHeights as JobClipHeights, Edges};
 use load_modules::{ClipHeights, Layout, clip, concatenate};
 use terrain::{LatticePoint, LoadModule, ModuleResidual, TileId, Vertex};
@@ -17,6 +17,8 @@ pub(crate) struct Assembled {
     /// Per load module of the tile, row by row.
     pub modules: Vec<ModuleNumbers>,
     pub residuals: Residuals,
+    /// Against the source's own posts, where those are others than the working grid's.
+    pub at_source: Option<Tally>,
     /// Points of the tile per class, each point of the area in one tile.
     pub points: Vec<u64>,
     /// Whether the file was written by this run.
@@ -70,11 +72,12 @@ pub(crate) fn assemble_tile(
     let ground =
         fidelity::Ground { dem: &window.dem, mask: &window.importance, grid: area.grid, spacing: area.frame.spacing };
     let residuals = fidelity::measure(&mut modules, &ground);
+    let at_source = run.ground.residuals_at_source(&modules, area);
     let fingerprint = modules_fingerprint(run, tins, removed, tile);
     let (file, is_new) = publish(run, tile, &layout, fingerprint, &modules)?;
     let points = points_by_class(run, own, &removed[area.tiling.index(tile)], &window.importance);
     let modules = modules.iter().map(numbers).collect();
-    Ok(Assembled { file, modules, residuals, points, is_new })
+    Ok(Assembled { file, modules, residuals, at_source, points, is_new })
 }
 
 fn numbers(module: &LoadModule) -> ModuleNumbers {

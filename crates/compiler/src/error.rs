@@ -55,6 +55,12 @@ pub enum CompileError {
         /// What the system said.
         found: String,
     },
+    /// The database is in the middle of a build.
+    #[error("{path}: incomplete, expected a database that a build has finished")]
+    Unfinished {
+        /// The database.
+        path: String,
+    },
     /// The database was made for another job.
     #[error("{path}: built from another job than this one, expected the same job: {difference}")]
     OtherJob {
@@ -77,6 +83,9 @@ impl CompileError {
             }
             CompileError::Stopped { .. } => Some("run the same command again to go on from here".to_owned()),
             CompileError::NoThread { .. } => Some("use fewer --workers".to_owned()),
+            CompileError::Unfinished { .. } => {
+                Some("run `tiefort build` first, which goes on from what is there".to_owned())
+            }
             CompileError::OtherJob { .. } => Some("run `tiefort build` first, which rebuilds what changed".to_owned()),
         }
     }

@@ -4,6 +4,7 @@ use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, OnceLock};
 
 use database::{Fingerprint, SourceRecord};
+use fidelity::{SourcePosts, Tally, residuals_at_source};
 use job::{AreaShape, DemSource, ImportanceArea, Job, Smooth, Voids};
 use mask::{Mask, Shape, Smoothing};
 use schedule::Workers;
@@ -109,6 +110,25 @@ impl Ground {
             }
         });
         Ok(Window { dem, importance: join_importance(&parts, rect) })
+    }
+
+    /// Residuals of load modules at the source's own posts; `None` where those are the posts of the working grid.
+    pub fn residuals_at_source(&self, modules: &[terrain::LoadModule], area: &GamingArea) -> Option<Tally> {
+        let Source::Raster(raster) = &self.source else { return None };
+        let frame = raster.frame();
+        let quanta = |metres: f64| metres * f64::from(terrain::QUANTA_PER_METRE);
+        let spacing = self.frame.spacing.metres();
+        let off = [frame.south_west_m[0] - self.frame.origin_east_m, frame.south_west_m[1] - self.frame.origin_north_m];
+        if frame.spacing_m == [spacing; 2] && off.iter().all(|metres| (metres / spacing).fract() == 0.0) {
+            return None;
+        }
+        let source = SourcePosts {
+            window: raster.window(),
+            south_west: off.map(quanta),
+            step: frame.spacing_m.map(quanta),
+            height_m: &|post| raster.height_m(post),
+        };
+        Some(residuals_at_source(modules, area.grid, self.frame.spacing, &source))
     }
 
     /// The ground of any rectangle of the area.

@@ -49,7 +49,7 @@ impl Findings<'_> {
             per_4km: self.per_window(&counts),
             pool: self.pool(&counts),
             residual: residual_of(&total),
-            residual_against_source: None,
+            residual_against_source: Some(self.at_source(&total)),
             classes: self.classes(&residuals),
             overall_point_weighted_rms_m: self.point_weighted_rms_m(&residuals),
             dem_accuracy_m: None,
@@ -84,6 +84,16 @@ impl Findings<'_> {
         let mut all = Residuals::default();
         self.assembled.iter().for_each(|tile| all.merge(&tile.residuals));
         all
+    }
+
+    /// Against the source's posts; the working grid's where those are the same.
+    fn at_source(&self, total: &Tally) -> ReportResidual {
+        let mut all = Tally::default();
+        for tile in self.assembled {
+            let Some(tally) = &tile.at_source else { return residual_of(total) };
+            all.merge(tally);
+        }
+        residual_of(&all)
     }
 
     fn counts(&self) -> Vec<u32> {

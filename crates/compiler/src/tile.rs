@@ -92,6 +92,10 @@ fn refuse_unfinished(run: &Run, folder: &Path, tile: TileId, previous: Previous)
             return Err(DatabaseError::Missing { path }.into());
         }
     };
+    // A build that was stopped may have left tiles of two different grounds side by side.
+    if manifest.state != database::ManifestState::Complete {
+        return Err(CompileError::Unfinished { path: folder.display().to_string() });
+    }
     let job = run.job.canonical_text();
     if manifest.job != job {
         let differs = manifest.job.lines().zip(job.lines()).find(|(theirs, ours)| theirs != ours);

@@ -8,3 +8,5 @@ mod tally;
 pub use tally::{Residuals, Tally};
 mod measure;
 pub use measure::{Ground, measure, residuals};
+mod source;
+pub use source::{SourcePosts, residuals_at_source};

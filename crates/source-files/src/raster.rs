@@ -121,6 +121,14 @@ impl Raster {
         (!self.voids.contains(index)).then(|| self.samples.get(index))
     }
 
+    /// The height at `post` in metres; `None` where it is void.
+    ///
+    /// # Panics
+    /// When `post` lies outside the window.
+    pub fn height_m(&self, post: Post) -> Option<f64> {
+        self.sample(post).map(|sample| self.scale.height_m(sample))
+    }
+
     /// Easting and northing of a post of the window by its index, in metres.
     pub(crate) fn place_m(&self, index: usize) -> [f64; 2] {
         let (row, col) = (index / self.window.posts_wide(), index % self.window.posts_wide());
