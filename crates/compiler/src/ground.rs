@@ -281,8 +281,7 @@ fn record(path: &str, content: &[u8]) -> SourceRecord {
 }
 
 fn file_record(written: &str, path: &std::path::Path) -> Result<SourceRecord, CompileError> {
-    let read = std::fs::read(path).map_err(|source| source_files::SourceError::Read { path: path.into(), source })?;
-    Ok(record(written, &read))
+    Ok(record(written, &source_files::content(path)?))
 }
 
 /// Heights that look like a sentinel nobody declared.

@@ -21,6 +21,7 @@ pub use raster::{Mesh, TinMethod, TinRequest, sample, tin};
 
 mod area;
 mod assemble;
+mod bound;
 mod enforce;
 mod ground;
 mod publish;

@@ -46,7 +46,7 @@ pub(crate) fn publish(
 ) -> Result<Report, CompileError> {
     progress.tell(Event::Enter(Stage::Publish, 0));
     let run = findings.run;
-    let report = findings.report();
+    let report = findings.report()?;
     let mut manifest = beginning(run);
     manifest.state = ManifestState::Complete;
     let allocation = run.database.write_json(files::ALLOCATION, &allocation_json(run, shares))?;
@@ -85,14 +85,13 @@ fn fill(
     assembled: &Assembled,
 ) -> Result<(), CompileError> {
     let folder = run.database.folder();
-    let curve = folder.curve_path(tile);
     let has_curve = run.job.tin.allocation == job::Allocation::Global;
     let record = manifest.tile_mut(tile).expect("the manifest lists every tile");
     record.state = state;
     record.fingerprint = Some(tin.stamp.fingerprint);
-    record.tin = Some(FileStamp::of(&read(&folder.tile_path(tile))?));
+    record.tin = Some(folder.stamp_file(&folder.tile_path(tile))?);
     record.slm = Some(assembled.file);
-    record.curve = if has_curve { Some(FileStamp::of(&read(&curve)?)) } else { None };
+    record.curve = if has_curve { Some(folder.stamp_file(&folder.curve_path(tile))?) } else { None };
     Ok(())
 }
 
@@ -112,11 +111,6 @@ fn publish_removals(
     }
     let removals = Removals { tile, points: removed.to_vec() };
     Ok(Some(run.database.write_removals(&tin.stamp, &removals)?))
-}
-
-fn read(path: &std::path::Path) -> Result<Vec<u8>, CompileError> {
-    let read = std::fs::read(path);
-    Ok(read.map_err(|source| source_files::SourceError::Read { path: path.into(), source })?)
 }
 
 /// Numbers per tile, and per load module the exceptions only.

@@ -4,13 +4,16 @@ use std::collections::BTreeSet;
 
 use database::{
     Report, ReportBreach, ReportClass, ReportPerModule, ReportPerWindow, ReportPoints, ReportPool, ReportRefusals,
-    ReportResidual, ReportVoids, Totals,
+    ReportResidual, ReportStops, ReportVoids, Totals,
 };
 use fidelity::{Residuals, Tally};
+use job::Count;
 use limits::Windows;
-use terrain::{Breach, BreachKind, BreachPlace, ModuleId, RefusedBy, metres_of_quanta};
+use terrain::{Breach, BreachKind, BreachPlace, ModuleId, RefusedBy, StopReason, metres_of_quanta};
 
+use crate::CompileError;
 use crate::assemble::{Assembled, ModuleNumbers};
+use crate::bound::bound;
 use crate::enforce::{Enforced, by_module, counted};
 use crate::refine::Published;
 use crate::run::Run;
@@ -28,7 +31,10 @@ pub(crate) struct Findings<'a> {
 
 impl Findings<'_> {
     /// The report.
-    pub fn report(&self) -> Report {
+    ///
+    /// # Errors
+    /// When what a limit cost cannot be computed.
+    pub fn report(&self) -> Result<Report, CompileError> {
         let run = self.run;
         let residuals = self.residuals();
         let total = residuals.total();
@@ -38,11 +44,16 @@ impl Findings<'_> {
         let sum = |count: fn(&ModuleNumbers) -> u32| -> u64 {
             by_module(run, self.assembled).iter().map(|numbers| u64::from(count(numbers))).sum()
         };
-        Report {
+        let bound = bound(run, self.tins, &counts, &by_module(run, self.assembled))?;
+        Ok(Report {
             area: run.job.area.name.clone(),
             workers: run.workers.count() as u32,
             stages: Vec::new(),
             points,
+            count: match run.job.limits.count {
+                Count::Triangles => "triangles".into(),
+                Count::Polygons => "polygons".into(),
+            },
             triangles: sum(|numbers| numbers.triangles),
             polygons: sum(|numbers| numbers.polygons),
             per_load_module: self.per_module(&counts),
@@ -59,7 +70,19 @@ impl Findings<'_> {
             },
             breaches: breaches.iter().map(ReportBreach::from).collect(),
             refusals: self.refusals(),
+            bound,
+            stops: self.stops(),
             warnings: run.ground.warnings.clone(),
+        })
+    }
+
+    fn stops(&self) -> ReportStops {
+        let count = |reason| self.tins.iter().filter(|tile| tile.tin.stop == reason).count() as u64;
+        ReportStops {
+            budget_spent: count(StopReason::BudgetSpent),
+            residual_reached: count(StopReason::ResidualReached),
+            rms_reached: count(StopReason::RmsReached),
+            exhausted: count(StopReason::Exhausted),
         }
     }
 
@@ -115,6 +138,7 @@ impl Findings<'_> {
         let sum: u64 = counts.iter().map(|&count| u64::from(count)).sum();
         ReportPerModule {
             mean: sum as f64 / counts.len() as f64,
+            mean_limit: self.run.job.limits.mean_per_load_module,
             max: u64::from(counts.iter().copied().max().unwrap_or(0)),
             limit: u64::from(limit),
             over: counts.iter().filter(|&&count| limit < count).count() as u64,

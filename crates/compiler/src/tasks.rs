@@ -68,7 +68,8 @@ fn is_by_squares(job: &Job) -> bool {
     job.tin.method == Method::Optimised || job.tin.key == ErrorKey::Sse
 }
 
-fn rule(job: &Job, area: &GamingArea) -> Rule {
+/// Which post comes next.
+pub(crate) fn rule(job: &Job, area: &GamingArea) -> Rule {
     match job.tin.method {
         _ if is_by_squares(job) => Rule::LargestSquares { guard: largest_value(job) },
         Method::Optimised | Method::Greedy => Rule::WorstFirst,

@@ -177,6 +177,14 @@ impl Folder {
         json::decode(&path, &read(&path)?)
     }
 
+    /// How a file looks now.
+    ///
+    /// # Errors
+    /// When it cannot be read.
+    pub fn stamp_file(&self, path: &Path) -> Result<FileStamp, DatabaseError> {
+        Ok(FileStamp::of(&read(path)?))
+    }
+
     /// Whether the file of this name has the bytes that `stamp` promises.
     ///
     /// # Errors

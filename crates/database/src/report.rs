@@ -14,6 +14,8 @@ pub struct Report {
     pub stages: Vec<ReportStage>,
     /// Points of the area.
     pub points: ReportPoints,
+    /// What limits count: `triangles` or `polygons`.
+    pub count: String,
     /// Triangles of all load modules.
     pub triangles: u64,
     /// Convex polygons of all load modules.
@@ -40,6 +42,10 @@ pub struct Report {
     pub breaches: Vec<ReportBreach>,
     /// Posts that limits kept out.
     pub refusals: ReportRefusals,
+    /// Where limits were met only by refusing posts, most posts first.
+    pub bound: Vec<ReportBound>,
+    /// Why tiles stopped selecting.
+    pub stops: ReportStops,
     /// What else a reader should know, a sentence each.
     pub warnings: Vec<String>,
 }
@@ -73,6 +79,8 @@ pub struct ReportPoints {
 pub struct ReportPerModule {
     /// Mean count.
     pub mean: f64,
+    /// Mean count that the job allows.
+    pub mean_limit: f64,
     /// Largest count.
     pub max: u64,
     /// What the job allows.
@@ -189,6 +197,41 @@ pub struct ReportRefusals {
     pub largest_m: f64,
 }
 
+/// A limit that was met by refusing posts.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ReportBound {
+    /// `per_load_module` or `per_4km_square`.
+    pub kind: String,
+    /// Where.
+    #[serde(rename = "where")]
+    pub place: ReportPlace,
+    /// What was counted there.
+    pub count: u64,
+    /// What the job allows there, before the pool.
+    pub limit: u64,
+    /// Posts refused there.
+    pub refused: u32,
+    /// The largest residual among them when they were refused, in metres.
+    pub refused_largest_m: f64,
+    /// RMS residual there as built, in metres.
+    pub rms_with_m: f64,
+    /// RMS residual there had the refused posts been selected, in metres.
+    pub rms_without_m: f64,
+}
+
+/// How many tiles stopped selecting for which reason.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ReportStops {
+    /// All points or triangles allotted to the tile were spent.
+    pub budget_spent: u64,
+    /// The residual asked for was reached.
+    pub residual_reached: u64,
+    /// The RMS residual asked for was reached.
+    pub rms_reached: u64,
+    /// Nothing was left to select: every residual is zero, masked or refused.
+    pub exhausted: u64,
+}
+
 impl From<&Breach> for ReportBreach {
     fn from(breach: &Breach) -> Self {
         let kind = match breach.kind {
@@ -242,9 +285,10 @@ mod tests {
             workers: 2,
             stages: vec![ReportStage { name: "refine".into(), wall_s: 0.25, cpu_s: 0.5 }],
             points: ReportPoints { selected: 5, border: 16, corner: 4, total: 25 },
+            count: "triangles".into(),
             triangles: 32,
             polygons: 32,
-            per_load_module: ReportPerModule { mean: 32.0, max: 32, limit: 100, over: 0 },
+            per_load_module: ReportPerModule { mean: 32.0, mean_limit: 32.0, max: 32, limit: 100, over: 0 },
             per_4km: ReportPerWindow { max: 4100, limit: 4096, over: 1, worst_9x9: 4200 },
             pool: ReportPool::default(),
             residual: ReportResidual { rms_m: 1.1, max_m: 9.0, mean_abs_m: 0.7, p95_m: 2.0, p99_m: 3.3 },
@@ -255,6 +299,17 @@ mod tests {
             voids: ReportVoids::default(),
             breaches: vec![ReportBreach::from(&breach)],
             refusals: ReportRefusals::default(),
+            bound: vec![ReportBound {
+                kind: "per_4km_square".into(),
+                place: ReportPlace::Window([2, 0]),
+                count: 4095,
+                limit: 4096,
+                refused: 7,
+                refused_largest_m: 9.5,
+                rms_with_m: 1.5,
+                rms_without_m: 1.25,
+            }],
+            stops: ReportStops { budget_spent: 35, exhausted: 1, ..ReportStops::default() },
             warnings: vec!["one tile is frozen".into()],
         }
     }

@@ -8,6 +8,8 @@ pub mod limits;
 
 mod error;
 pub use error::SourceError;
+mod content;
+pub use content::content;
 mod directory;
 mod frame;
 pub use frame::{RasterFrame, SampleScale};

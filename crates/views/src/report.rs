@@ -17,6 +17,7 @@ pub fn report_text(report: &Report) -> String {
         limits(report),
         residuals(report),
         refusals(report),
+        bound(report),
         breaches(report),
         warnings(report),
         stages(report),
@@ -49,13 +50,13 @@ fn headline(report: &Report) -> Option<String> {
 fn limits(report: &Report) -> Option<String> {
     let (module, window, pool) = (&report.per_load_module, &report.per_4km, &report.pool);
     let mut table = Table::new(&[Left, Right, Right, Right]);
-    table.row(["Limits", "used", "limit", "over"]);
+    table.row([&format!("Limits, in {}", report.count), "used", "limit", "over"]);
     let number = grouped;
     table.row(["  largest load module".into(), number(module.max), number(module.limit), number(module.over)]);
     let mean = format!("{:.2}", module.mean);
     let mean_breach = report.breaches.iter().find(|breach| breach.kind == "mean_per_load_module");
     let over = mean_breach.map_or("0", |_| "1");
-    table.row(["  mean of load modules", &mean, "", over]);
+    table.row(["  mean of load modules", &mean, &format!("{:.2}", module.mean_limit), over]);
     table.row(["  largest 4 km square".into(), number(window.max), number(window.limit), number(window.over)]);
     table.row(["  largest 9 x 9 load modules".into(), number(window.worst_9x9), String::new(), String::new()]);
     table.row(["  pool".into(), number(pool.used), number(pool.size), String::new()]);
@@ -111,6 +112,34 @@ fn refusals(report: &Report) -> Option<String> {
     Some(format!("Refused posts: {}, {largest}\n{}", grouped(refused.count), table.text(2)))
 }
 
+/// Rows of a long list that a text report shows; the JSON has them all.
+const BOUND_ROWS_MAX: usize = 10;
+
+/// Where limits were met by refusing posts, and what that cost.
+fn bound(report: &Report) -> Option<String> {
+    if report.bound.is_empty() {
+        return None;
+    }
+    let mut table = Table::new(&[Left, Left, Right, Right, Right, Right, Right, Right]);
+    let title = "Limits that refused posts";
+    table.row([title, "where (row,col)", "count", "limit", "refused", "largest m", "RMS m", "without limit"]);
+    for bound in report.bound.iter().take(BOUND_ROWS_MAX) {
+        table.row([
+            format!("  {}", bound.kind),
+            place(bound.place),
+            grouped(bound.count),
+            grouped(bound.limit),
+            grouped(u64::from(bound.refused)),
+            format!("{:.2}", bound.refused_largest_m),
+            format!("{:.3}", bound.rms_with_m),
+            format!("{:.3}", bound.rms_without_m),
+        ]);
+    }
+    let more = report.bound.len().saturating_sub(BOUND_ROWS_MAX);
+    let rest = if more == 0 { String::new() } else { format!("  and {more} more in report.json\n") };
+    Some(format!("{}{rest}", table.text(0)))
+}
+
 fn breaches(report: &Report) -> Option<String> {
     if report.breaches.is_empty() {
         return Some("Breaches: none\n".into());
@@ -123,15 +152,18 @@ fn breaches(report: &Report) -> Option<String> {
     Some(table.text(0))
 }
 
-fn breach_row(breach: &ReportBreach) -> [String; 8] {
-    let place = match breach.place {
+fn place(place: ReportPlace) -> String {
+    match place {
         ReportPlace::Module([row, col]) => format!("load module {row},{col}"),
         ReportPlace::Window([row, col]) => format!("window from {row},{col}"),
         ReportPlace::Area => "whole area".into(),
-    };
+    }
+}
+
+fn breach_row(breach: &ReportBreach) -> [String; 8] {
     [
         format!("  {}", breach.kind),
-        place,
+        place(breach.place),
         amount(breach, breach.count),
         amount(breach, breach.limit),
         amount(breach, breach.excess),

@@ -1,8 +1,8 @@
 //! A report with something in every part, for the tests of this crate.
 
 use database::{
-    Report, ReportBreach, ReportClass, ReportPerModule, ReportPerWindow, ReportPlace, ReportPoints, ReportPool,
-    ReportRefusals, ReportResidual, ReportStage, ReportVoids,
+    Report, ReportBound, ReportBreach, ReportClass, ReportPerModule, ReportPerWindow, ReportPlace, ReportPoints,
+    ReportPool, ReportRefusals, ReportResidual, ReportStage, ReportStops, ReportVoids,
 };
 
 pub(crate) fn residual(rms_m: f64) -> ReportResidual {
@@ -12,6 +12,11 @@ pub(crate) fn residual(rms_m: f64) -> ReportResidual {
 fn breach(kind: &str, place: ReportPlace, count: u64, limit: u64, rms_without_m: Option<f64>) -> ReportBreach {
     let excess = count - limit;
     ReportBreach { kind: kind.into(), place, count, limit, excess, refused: 3, rms_with_m: 1.1, rms_without_m }
+}
+
+fn bound(kind: &str, place: ReportPlace, count: u64, limit: u64, refused: u32) -> ReportBound {
+    let (refused_largest_m, rms_with_m, rms_without_m) = (7.5, 1.1, 0.98);
+    ReportBound { kind: kind.into(), place, count, limit, refused, refused_largest_m, rms_with_m, rms_without_m }
 }
 
 fn class(name: &str, posts: u64, points: u64, rms_m: f64) -> ReportClass {
@@ -25,9 +30,10 @@ pub(crate) fn report() -> Report {
         workers: 2,
         stages: vec![stage("read", 0.25, 0.4), stage("survey", 1.5, 3.0), stage("refine", 12.25, 24.0)],
         points: ReportPoints { selected: 76_500, border: 1_200, corner: 10_201, total: 87_901 },
+        count: "triangles".into(),
         triangles: 319_998,
         polygons: 319_998,
-        per_load_module: ReportPerModule { mean: 31.9998, max: 107, limit: 100, over: 1 },
+        per_load_module: ReportPerModule { mean: 31.9998, mean_limit: 32.0, max: 107, limit: 100, over: 1 },
         per_4km: ReportPerWindow { max: 4_100, limit: 4_096, over: 1, worst_9x9: 4_990 },
         pool: ReportPool { size: 500, used: 7 },
         residual: residual(2.999),
@@ -43,6 +49,11 @@ pub(crate) fn report() -> Report {
             breach("residual", ReportPlace::Area, 17_547, 10, None),
         ],
         refusals: ReportRefusals { count: 41, by_module: 30, by_window: 8, by_reservation: 3, largest_m: 7.5 },
+        bound: vec![
+            bound("per_4km_square", ReportPlace::Window([0, 1]), 4_096, 4_096, 5),
+            bound("per_load_module", ReportPlace::Module([4, 5]), 99, 100, 3),
+        ],
+        stops: ReportStops { budget_spent: 35, exhausted: 1, ..ReportStops::default() },
         warnings: vec!["tile r01c02 is frozen; a build makes it whole".into()],
     }
 }
