@@ -57,11 +57,11 @@ const SECONDS_PER_SAMPLE_POST: f64 = 260e-9;
 /// Seconds for a selected point, survey included.
 const SECONDS_PER_POINT: f64 = 3.5e-6;
 /// Bytes of memory for a post of the area: working windows and the decoded source.
-const MEMORY_PER_POST: u64 = 14;
+const MEMORY_PER_POST: u64 = 8;
 /// Bytes of memory for a triangle, in TINs, load modules and curves.
-const MEMORY_PER_TRIANGLE: u64 = 120;
+const MEMORY_PER_TRIANGLE: u64 = 60;
 /// Bytes of the program itself.
-const MEMORY_BASE: u64 = 24 << 20;
+const MEMORY_BASE: u64 = 8 << 20;
 /// Bytes on disk for a triangle: tile, load module and curve.
 const DISK_PER_TRIANGLE: u64 = 60;
 

@@ -7,6 +7,7 @@ use std::sync::Arc;
 use database::{Database, DatabaseError, Previous, Report};
 use job::Job;
 use terrain::{SeamSides, Side, TileId, TileTin, Vertex};
+use tin::TileTask;
 
 use crate::assemble::assemble;
 use crate::build::open;
@@ -138,9 +139,13 @@ fn seeds(run: &Run, tins: &[Published], tile: TileId) -> Vec<Vertex> {
 fn refine_whole(run: &Run, shares: &Shares, tins: &[Published], tile: TileId) -> Result<Published, CompileError> {
     let seeds = seeds(run, tins, tile);
     let task = tile_task(run.job, &run.area, tile, &shares.tiles[run.area.tiling.index(tile)], posts_of(&seeds));
-    let window = run.window(tile)?;
-    let stamp = tile_stamp(run, &window, &task, &seeds);
-    Ok(Published { tin: Arc::new(refine_now(&window, &task, &seeds)), stamp, is_new: true })
+    refine_task(run, &task, &seeds)
+}
+
+fn refine_task(run: &Run, task: &TileTask, seeds: &[Vertex]) -> Result<Published, CompileError> {
+    let window = run.window(task.tile)?;
+    let stamp = tile_stamp(run, &window, task, seeds);
+    Ok(Published { tin: Arc::new(refine_now(&window, task, seeds)), stamp, is_new: true })
 }
 
 /// Runs `tile`, with its sides frozen if its border would change. Gives it, and whether it is frozen.
@@ -178,9 +183,7 @@ fn refine_frozen(run: &Run, shares: &Shares, tins: &[Published], tile: TileId) -
         *points = points.saturating_sub(selected);
     }
     seeds.extend(own);
-    let window = run.window(tile)?;
-    let stamp = tile_stamp(run, &window, &task, &seeds);
-    Ok(Published { tin: Arc::new(refine_now(&window, &task, &seeds)), stamp, is_new: true })
+    refine_task(run, &task, &seeds)
 }
 
 /// Runs `tile` and every higher-ranked tile that a changed border reaches, in rank order.

@@ -37,8 +37,8 @@ impl Folder {
     }
 
     /// Reads every file that `manifest` lists: its sections, what they hold (TINs and load modules are walked for
-    /// cracks), and its hash; also `report.json`, where there is one. Files of ours that it does not list are named too. At most one finding per file, in
-    /// the order of the manifest.
+    /// cracks), and its hash; also `report.json`, where there is one. Files of ours that it does not list are named
+    /// too. At most one finding per file, in the order of the manifest.
     ///
     /// # Errors
     /// When a folder cannot be listed; damage is no error but a finding.
