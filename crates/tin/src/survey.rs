@@ -77,7 +77,8 @@ impl Recorder {
 impl Recorder {
     /// The curve: runs of one step and one load module put together, so that its size is bounded.
     fn into_curve(mut self, tile: TileId) -> GainCurve {
-        self.runs.sort_by_key(|run| (std::cmp::Reverse(run.bin), run.module));
+        // Steps come best first already; only load modules within a step have to be put in order.
+        self.runs.chunk_by_mut(|a, b| a.bin == b.bin).for_each(|step| step.sort_unstable_by_key(|run| run.module));
         self.runs.dedup_by(|next, run| {
             let same = (run.bin, run.module) == (next.bin, next.module);
             run.cost += if same { next.cost } else { 0 };

@@ -18,16 +18,13 @@ macro_rules! largest_in_box {
                 .wrapping_add(px.wrapping_mul(x0 - facet.x[0]))
                 .wrapping_add(py.wrapping_mul(y0 - facet.y[0]));
             // den < 2^31 bounds the edge functions over a box this narrow, so they do not wrap.
-            let ends = [(0, 1), (1, 2), (2, 0)].map(|(i, j)| {
-                let (dx, dy) = (facet.x[j] - facet.x[i], facet.y[j] - facet.y[i]);
-                (dx * (y0 - facet.y[i]) - dy * (x0 - facet.x[i]), dx, dy)
-            });
-            let [(first0, dx0, dy0), (first1, dx1, dy1), (first2, dx2, dy2)] = ends;
+            let (first0, dx0, dy0) = edge(facet, 0, 1, x0, y0);
+            let (first1, dx1, dy1) = edge(facet, 1, 2, x0, y0);
+            let (first2, dx2, dy2) = edge(facet, 2, 0, x0, y0);
             let mut w0 = $lanes::splat(simd, first0) - iota * $lanes::splat(simd, dy0);
             let mut w1 = $lanes::splat(simd, first1) - iota * $lanes::splat(simd, dy1);
             let mut w2 = $lanes::splat(simd, first2) - iota * $lanes::splat(simd, dy2);
-            let (step0, step1, step2) =
-                ($lanes::splat(simd, dx0), $lanes::splat(simd, dx1), $lanes::splat(simd, dx2));
+            let (step0, step1, step2) = ($lanes::splat(simd, dx0), $lanes::splat(simd, dx1), $lanes::splat(simd, dx2));
             let (den, step) = ($lanes::splat(simd, den), $lanes::splat(simd, py));
             let mut plane = iota * $lanes::splat(simd, px) + $lanes::splat(simd, start);
             let zero = $lanes::splat(simd, 0);
@@ -45,6 +42,13 @@ macro_rules! largest_in_box {
             u64::from(largest.reduce_max() as u32)
         }
     };
+}
+
+/// Start and steps (north, east) of the function of edge `i`, `j` at (x0, y0).
+#[inline(always)]
+fn edge(facet: &Facet, i: usize, j: usize, x0: i32, y0: i32) -> (i32, i32, i32) {
+    let (dx, dy) = (facet.x[j] - facet.x[i], facet.y[j] - facet.y[i]);
+    (dx * (y0 - facet.y[i]) - dy * (x0 - facet.x[i]), dx, dy)
 }
 
 /// Absolute values by lane; one instruction where the processor has it.
