@@ -152,6 +152,7 @@ pub(crate) fn crs(job: &job::Job) -> String {
 fn points_by_class(run: &Run, own: &Published, removed: &[LatticePoint], importance: &terrain::Importance) -> Vec<u64> {
     let (rect, area) = (own.tin.tin.rect, run.area.rect);
     let mut points = vec![0; run.job.importance.classes.len()];
+    let removed: std::collections::BTreeSet<&LatticePoint> = removed.iter().collect();
     for vertex in &own.tin.tin.vertices {
         let post = terrain::Post::new(
             vertex.at.row.div_euclid(terrain::LATTICE_PER_POST),

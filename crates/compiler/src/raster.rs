@@ -23,6 +23,9 @@ use crate::ground::decode;
 use crate::tasks::{posts_of, side_vertices};
 use crate::{CompileError, Event, Progress, Stage};
 
+/// The paper's proximity test: metres across, metres in height.
+const PROXIMITY_M: (f64, u32) = (300.0, 20);
+
 /// Which post comes next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TinMethod {
@@ -148,8 +151,8 @@ impl<'a> TinJob<'a> {
             TinMethod::Paper => Rule::Batches {
                 residual_quantum: quantum,
                 proximity: Some(Proximity {
-                    posts: 300.0 / spacing_m[0],
-                    quanta: 20 * terrain::QUANTA_PER_METRE as u32,
+                    posts: PROXIMITY_M.0 / spacing_m[0],
+                    quanta: PROXIMITY_M.1 * terrain::QUANTA_PER_METRE as u32,
                 }),
                 last_batch: LastBatch::Truncate,
             },

@@ -9,7 +9,7 @@ use database::{
 use fidelity::{Residuals, Tally};
 use job::Count;
 use limits::Windows;
-use terrain::{Breach, BreachKind, BreachPlace, ModuleId, RefusedBy, StopReason, metres_of_quanta};
+use terrain::{Breach, BreachKind, BreachPlace, LatticePoint, ModuleId, RefusedBy, StopReason, metres_of_quanta};
 
 use crate::CompileError;
 use crate::assemble::{Assembled, ModuleNumbers};
@@ -128,9 +128,16 @@ impl Findings<'_> {
         let total: u64 = self.assembled.iter().flat_map(|tile| &tile.points).sum();
         let corner = u64::from(grid.rows + 1) * u64::from(grid.cols + 1);
         let selected: u64 = self.tins.iter().map(|tile| tile.tin.residuals.len() as u64).sum();
-        let gone: BTreeSet<_> = self.enforced.removed.iter().flatten().collect();
-        let selected = selected - gone.len() as u64;
+        let selected = selected - self.selected_and_removed();
         ReportPoints { selected, border: total - corner - selected, corner, total }
+    }
+
+    /// Selected points that enforcing took out again. A point on a seam is listed with every tile that holds it, but
+    /// was selected by one.
+    fn selected_and_removed(&self) -> u64 {
+        let gone: BTreeSet<LatticePoint> = self.enforced.removed.iter().flatten().copied().collect();
+        let selected = self.tins.iter().flat_map(|tile| &tile.tin.tin.vertices[tile.tin.initial_count as usize..]);
+        selected.filter(|vertex| gone.contains(&vertex.at)).count() as u64
     }
 
     fn per_module(&self, counts: &[u32]) -> ReportPerModule {

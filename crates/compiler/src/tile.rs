@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Arc;
 
-use database::{Database, DatabaseError, Previous, Report};
+use database::{Database, DatabaseError, Folder, Previous, Report};
 use job::Job;
 use terrain::{SeamSides, Side, TileId, TileTin, Vertex};
 use tin::TileTask;
@@ -48,6 +48,8 @@ pub fn rebuild_tile(
     options: &Options,
     progress: &mut dyn Progress,
 ) -> Result<Rebuilt, CompileError> {
+    // Nothing is created where there is nothing to go on from.
+    Folder::new(folder).manifest()?;
     let (run, previous) = open(job, folder, options, progress)?;
     let mut frozen = refuse_unfinished(&run, folder, tile, previous)?;
     let shares = published_shares(&run, progress)?;

@@ -31,8 +31,7 @@ pub struct Status {
 /// When there is none, or its `database.json` cannot be read.
 pub fn status(folder: &Path) -> Result<Status, CompileError> {
     let manifest = Folder::new(folder).manifest()?;
-    let locked = matches!(database::Lock::acquire(folder), Err(error) if error.is_transient());
-    Ok(Status { manifest, locked })
+    Ok(Status { manifest, locked: database::Lock::is_held(folder) })
 }
 
 /// What a verification found.
@@ -69,7 +68,11 @@ pub fn verify(folder: &Path, dem: Option<&Path>) -> Result<Verdict, CompileError
     let (job, area) = job_of(&manifest, folder.dir())?;
     let modules = read_modules(&folder, &area)?;
     verdict.checked_modules = modules.len();
-    verdict.problems.extend(check_modules(&job, &area, &modules));
+    verdict.problems.extend(check_modules(&area, &modules));
+    // With constrained edges no limit is ever exceeded; with clipped ones only where a breach says so.
+    if job.modules.edges == Edges::Constrained || manifest.totals.breaches == 0 {
+        verdict.problems.extend(check_limits(&job, &area, &modules));
+    }
     verdict.problems.extend(check_totals(&manifest, &modules));
     if let Some(dem) = dem {
         let residuals = recompute(job, &area, dem, &modules, &mut verdict.problems)?;
@@ -110,7 +113,7 @@ fn read_modules(folder: &Folder, area: &GamingArea) -> Result<BTreeMap<ModuleId,
     Ok(all)
 }
 
-fn check_modules(job: &Job, area: &GamingArea, modules: &BTreeMap<ModuleId, LoadModule>) -> Vec<String> {
+fn check_modules(area: &GamingArea, modules: &BTreeMap<ModuleId, LoadModule>) -> Vec<String> {
     let mut problems = Vec::new();
     for module in area.grid.all().iter() {
         let Some(found) = modules.get(&module) else {
@@ -128,9 +131,6 @@ fn check_modules(job: &Job, area: &GamingArea, modules: &BTreeMap<ModuleId, Load
                 problems.push(format!("load module {module}: its {side:?} side differs from its neighbour's: a crack"));
             }
         }
-    }
-    if job.modules.edges == Edges::Constrained {
-        problems.extend(check_limits(job, area, modules));
     }
     problems
 }
@@ -161,7 +161,7 @@ fn side_of(module: &LoadModule, side: Side) -> Vec<(u16, i32)> {
     vertices.map(along).collect()
 }
 
-/// With constrained edges no limit is ever exceeded, so any excess is a fault.
+/// Counts against every limit, from the load modules themselves.
 fn check_limits(job: &Job, area: &GamingArea, modules: &BTreeMap<ModuleId, LoadModule>) -> Vec<String> {
     let count = |module: &LoadModule| match job.limits.count {
         Count::Triangles => module.triangles.len() as u32,

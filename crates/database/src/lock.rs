@@ -32,6 +32,12 @@ impl Lock {
             Err(TryLockError::Error(source)) => Err(fault(source)),
         }
     }
+
+    /// Whether a build holds the lock of the database in `dir`. Makes no file, and keeps no other reader out.
+    pub fn is_held(dir: &Path) -> bool {
+        let Ok(file) = File::open(dir.join(LOCK_NAME)) else { return false };
+        matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock))
+    }
 }
 
 #[cfg(test)]
@@ -48,9 +54,11 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let first = Lock::acquire(folder.path()).unwrap();
         let error = Lock::acquire(folder.path()).unwrap_err();
+        assert!(Lock::is_held(folder.path()));
         assert!(error.is_transient());
         assert!(error.to_string().starts_with(&folder.path().display().to_string()));
         drop(first);
+        assert!(!Lock::is_held(folder.path()));
         Lock::acquire(folder.path()).unwrap();
     }
 

@@ -56,47 +56,58 @@ struct Ground<'a> {
 impl Ground<'_> {
     fn count(&self, tally: &mut Tally) {
         let wide = self.posts.posts_wide();
-        let mut counted = vec![false; self.posts.post_count()];
+        // Heights in quanta by post; NaN where there is none, or where the post is counted already.
+        let mut heights = Vec::with_capacity(self.posts.post_count());
+        for row in self.posts.south..=self.posts.north {
+            heights.extend((self.posts.west..=self.posts.east).map(|col| {
+                let height_m = (self.source.height_m)(Post::new(row, col));
+                height_m.map_or(f64::NAN, |height_m| height_m * f64::from(terrain::QUANTA_PER_METRE))
+            }));
+        }
         for triangle in &self.module.triangles {
             let corners = triangle.map(|v| {
                 let vertex = self.module.vertices[usize::from(v)];
                 [f64::from(vertex.x), f64::from(vertex.y), f64::from(vertex.z)]
             });
-            self.visit(corners, |post, plane| {
-                let index = (post.row - self.posts.south) as usize * wide + (post.col - self.posts.west) as usize;
-                if !std::mem::replace(&mut counted[index], true)
-                    && let Some(height_m) = (self.source.height_m)(post)
-                {
-                    let quanta = height_m * f64::from(terrain::QUANTA_PER_METRE);
-                    tally.add((quanta - plane).round() as i32);
+            self.visit(corners, |row, col, plane| {
+                let height = &mut heights[row * wide + col];
+                if !height.is_nan() {
+                    tally.add((*height - plane).round() as i32);
+                    *height = f64::NAN;
                 }
             });
         }
     }
 
-    /// Calls `visit` with each post of the closed triangle and the plane's height there, in quanta.
-    fn visit(&self, [a, b, c]: [[f64; 3]; 3], mut visit: impl FnMut(Post, f64)) {
+    /// Calls `visit` with row and column (from the first post inside) of each post of the closed triangle, and the
+    /// plane's height there, in quanta.
+    fn visit(&self, [a, b, c]: [[f64; 3]; 3], mut visit: impl FnMut(usize, usize, f64)) {
         /// Share of the triangle by which rounding may put a post on an edge outside both sides of it.
         const ON_EDGE: f64 = 1e-9;
-        let den = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
-        let range = |axis: usize, low: i32, high: i32| {
-            let (first, step) = (self.source.south_west[axis] - self.corner[axis], self.source.step[axis]);
-            let least = a[axis].min(b[axis]).min(c[axis]);
-            let most = a[axis].max(b[axis]).max(c[axis]);
-            (((least - first) / step - ON_EDGE).ceil() as i32).max(low)
-                ..=(((most - first) / step + ON_EDGE).floor() as i32).min(high)
-        };
-        let place = |axis: usize, at: i32| {
+        let scale = 1.0 / ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]));
+        let first = |axis: usize, at: i32| {
             self.source.south_west[axis] + f64::from(at) * self.source.step[axis] - self.corner[axis]
         };
-        for row in range(1, self.posts.south, self.posts.north) {
-            let y = place(1, row);
-            for col in range(0, self.posts.west, self.posts.east) {
-                let x = place(0, col);
-                let at_b = ((x - a[0]) * (c[1] - a[1]) - (y - a[1]) * (c[0] - a[0])) / den;
-                let at_c = ((b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0])) / den;
+        let (x0, y0) = (first(0, self.posts.west), first(1, self.posts.south));
+        let range = |axis: usize, start: f64, posts: usize| {
+            let place = |at: f64| (at - start) / self.source.step[axis];
+            let low = place(a[axis].min(b[axis]).min(c[axis])) - ON_EDGE;
+            let high = place(a[axis].max(b[axis]).max(c[axis])) + ON_EDGE;
+            (low.ceil().max(0.0) as usize, ((high + 1.0).floor().max(0.0) as usize).min(posts))
+        };
+        let (south, north) = range(1, y0, self.posts.posts_high());
+        let (west, east) = range(0, x0, self.posts.posts_wide());
+        // Shares of b and c at a post, and what they change by from post to post eastwards.
+        let step_b = self.source.step[0] * (c[1] - a[1]) * scale;
+        let step_c = -self.source.step[0] * (b[1] - a[1]) * scale;
+        for row in south..north {
+            let (x, y) = (x0 - a[0], y0 + row as f64 * self.source.step[1] - a[1]);
+            let at_b = (x * (c[1] - a[1]) - y * (c[0] - a[0])) * scale;
+            let at_c = ((b[0] - a[0]) * y - (b[1] - a[1]) * x) * scale;
+            for col in west..east {
+                let (at_b, at_c) = (at_b + col as f64 * step_b, at_c + col as f64 * step_c);
                 if -ON_EDGE <= at_b && -ON_EDGE <= at_c && at_b + at_c <= 1.0 + ON_EDGE {
-                    visit(Post::new(row, col), a[2] + at_b * (b[2] - a[2]) + at_c * (c[2] - a[2]));
+                    visit(row, col, a[2] + at_b * (b[2] - a[2]) + at_c * (c[2] - a[2]));
                 }
             }
         }

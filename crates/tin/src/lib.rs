@@ -4,6 +4,9 @@
 //! 11, 1993), section 2: insert the posts of largest weighted residual again and again. [`refine`] does
 //! that for one tile and sees nothing but the tile's window; [`survey`] runs the same growth ahead to
 //! learn what each triangle would gain.
+//!
+//! Everything generic over the lanes is inlined into the one dispatch around a tile's refinement: a function left
+//! on its own would be compiled for the oldest processor and call each lane operation.
 
 mod task;
 pub use task::{Frame, LastBatch, Proximity, Rule, Stop, TileTask};
@@ -22,6 +25,4 @@ mod growth;
 mod proximity;
 mod queue;
 mod sequence;
-// Everything that is generic over the lanes is inlined into the one dispatch around a tile's refinement:
-// a function left on its own would be compiled for the oldest processor and call each lane operation.
 mod start;

@@ -81,8 +81,10 @@ fn by_squares<S: Simd>(
 fn finish(dem: &Dem, task: &TileTask, initial: &[LocalPost], grown: Grown, stop: StopReason) -> TileTin {
     let order: Vec<LocalPost> = initial.iter().chain(&grown.sequence.posts).copied().collect();
     let mut refused = grown.sequence.refused;
-    refused.sort_by_key(|refusal| (std::cmp::Reverse(refusal.residual), refusal.post));
+    // A post can come up again in another triangle; its largest residual is the one that counts.
+    refused.sort_by_key(|refusal| (refusal.post, std::cmp::Reverse(refusal.residual)));
     refused.dedup_by_key(|refusal| refusal.post);
+    refused.sort_by_key(|refusal| (std::cmp::Reverse(refusal.residual), refusal.post));
     TileTin {
         tile: task.tile,
         tin: tin_of(dem, &order, &grown.mesh),

@@ -36,7 +36,7 @@ macro_rules! largest_in_box {
                 let numerator = ($lanes::from_slice(simd, &row[..$wide]) * den - plane).abs_lanes(simd);
                 let inside = (w0 | w1 | w2).simd_ge(zero);
                 largest = largest.max(inside.select(numerator, zero));
-                plane = plane + step;
+                plane += step;
                 (w0, w1, w2) = (w0 + step0, w1 + step1, w2 + step2);
             }
             u64::from(largest.reduce_max() as u32)

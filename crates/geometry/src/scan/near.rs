@@ -63,7 +63,7 @@ pub fn largest<S: Simd>(simd: S, surface: &Surface, facet: &Facet) -> u64 {
             let numerator = simd.abs_i32x16(height * lanes.den - plane);
             let inside = lanes.iota.simd_lt(i32x16::splat(simd, remaining));
             largest = largest.max(inside.select(numerator, zero));
-            plane = plane + lanes.stride;
+            plane += lanes.stride;
             index += 16;
             remaining -= 16;
         }
@@ -102,7 +102,7 @@ pub fn reached<S: Simd>(
                 visit(LocalPost::new(span.row, col + hits.trailing_zeros() as i32))?;
                 hits &= hits - 1;
             }
-            plane = plane + lanes.stride;
+            plane += lanes.stride;
             col += 16;
         }
     }

@@ -75,8 +75,8 @@ fn squares_in_box_8<S: Simd>(simd: S, surface: &Surface, facet: &Facet, x0: i32,
         let height = wide(simd, i32x8::from_slice(simd, &row[..8]));
         let inside = (w0 | w1 | w2).simd_ge(zero).select(one, zero);
         let residual = rounding.residuals(simd, height, plane) * wide(simd, inside);
-        sum = sum + residual * residual;
-        plane = plane + step;
+        sum += residual * residual;
+        plane += step;
         (w0, w1, w2) = (w0 + step0, w1 + step1, w2 + step2);
     }
     simd.reduce_sum_f64x8(sum)
@@ -135,8 +135,7 @@ fn squares_in_spans<S: Simd>(simd: S, surface: &Surface, facet: &Facet) -> f64 {
     let origin = facet.origin();
     let (mut sum_low, mut sum_high) = (zero, zero);
     let (heights, stride) = surface.rows();
-    let mut spans = OwnedSpans::new(surface, facet);
-    while let Some((row, mut left, right)) = spans.next() {
+    for (row, mut left, right) in OwnedSpans::new(surface, facet) {
         let first = (origin + facet.py * i64::from(row) + facet.px * i64::from(left)) as f64;
         let first = f64x8::splat(simd, first);
         let (mut plane_low, mut plane_high) = (first + east_low, first + east_high);
@@ -147,7 +146,7 @@ fn squares_in_spans<S: Simd>(simd: S, surface: &Surface, facet: &Facet) -> f64 {
             if right - left < 8 {
                 let end = f64x8::splat(simd, f64::from(right - left + 1));
                 low = iota_low.simd_lt(end).select(low, zero);
-                sum_low = sum_low + low * low;
+                sum_low += low * low;
                 break;
             }
             let mut high = rounding.residuals(simd, high, plane_high);
