@@ -51,7 +51,6 @@ const ARROWS: [(&str, &[&str]); 18] = [
             "terrain",
             "geometry",
             "limits",
-            "mesh",
             "mask",
             "tiling",
             "tin",

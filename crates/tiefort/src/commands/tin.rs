@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::{ArgGroup, Args, ValueEnum};
 use compiler::{Mesh, TinMethod, TinRequest};
+use serde_json::json;
 use terrain::StopReason;
 use views::{Coordinates, MeshPlace, grouped};
 
@@ -11,7 +12,7 @@ use crate::arguments::{Workers, positive, rows_by_columns};
 use crate::failure::{Failure, Outcome};
 use crate::progress::{Listener, Show};
 use crate::signals::Signals;
-use crate::{files, terminal};
+use crate::{events, files, terminal};
 
 const AFTER_HELP: &str = "\
 Examples:
@@ -56,6 +57,9 @@ pub struct Arguments {
     /// Print errors only
     #[arg(long)]
     quiet: bool,
+    /// Print events as JSON lines, the last one the summary
+    #[arg(long, conflicts_with = "quiet")]
+    json: bool,
     /// The mesh to write: .ply or .obj
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
@@ -100,14 +104,25 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let request = request(arguments)?;
     files::check_writable(&arguments.out)?;
     let signals = Signals::watch()?;
-    let show = if arguments.quiet { Show::Nothing } else { Show::Progress };
+    let show = match (arguments.json, arguments.quiet) {
+        (true, _) => Show::Json,
+        (false, true) => Show::Nothing,
+        (false, false) => Show::Progress,
+    };
     let mut listener = Listener::start(show, arguments.tiles, request.workers);
     let meshed = compiler::tin(&request, signals.stop(), &mut listener);
     let (_, seconds) = listener.finish();
     let mesh = meshed.map_err(|error| Failure::of_compiler(&error, signals.exit_code()))?;
     write(&mesh, kind, arguments)?;
-    if !arguments.quiet {
-        terminal::tell(&summary(&mesh, seconds));
+    match show {
+        Show::Nothing => {}
+        Show::Json => events::print_line(&json!({
+            "event": "summary",
+            "points": mesh.points,
+            "triangles": mesh.tin.triangles.len(),
+            "residual": mesh.residual,
+        })),
+        Show::Progress => terminal::tell(&summary(&mesh, seconds)),
     }
     Ok(Outcome::Sound)
 }
