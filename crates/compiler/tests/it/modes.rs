@@ -29,7 +29,7 @@ fn clip(text: &str) -> Words {
 
 /// Load-module sides are edges of the TIN.
 pub fn constrained() -> Vec<Mode> {
-    let paper = "method = \"paper\"\npoints = 1500";
+    let paper = "method = \"paper\"\npoints = 800";
     vec![
         ("optimised", Words::sample()),
         ("paper", tin(paper)),
@@ -55,15 +55,15 @@ pub fn constrained() -> Vec<Mode> {
 
 /// Triangles are cut at load-module lines.
 pub fn clipped() -> Vec<Mode> {
-    let paper = "method = \"paper\"\npoints = 1500";
+    let paper = "method = \"paper\"\npoints = 800";
     let with_dem = |words: Words| Words { modules: format!("{CLIP}\nclip_heights = \"dem\""), ..words };
     let with_limits = |limits: &str| Words { limits: limits.into(), ..clip(paper) };
     vec![
         ("clip, paper", clip(paper)),
         ("clip, paper, no proximity test", clip(&format!("{paper}\nproximity = false\nlast_batch = \"finish\""))),
         ("clip, paper, heights of the dem", with_dem(clip(paper))),
-        ("clip, greedy squares", clip("method = \"greedy\"\nkey = \"sse\"\npoints = 1500\nallocation = \"global\"")),
-        ("clip, greedy equal", clip("method = \"greedy\"\npoints = 1500\nallocation = \"equal\"")),
+        ("clip, greedy squares", clip("method = \"greedy\"\nkey = \"sse\"\npoints = 800\nallocation = \"global\"")),
+        ("clip, greedy equal", clip("method = \"greedy\"\npoints = 800\nallocation = \"equal\"")),
         ("clip, to an rms", clip("method = \"greedy\"\ntarget_rms_m = 9")),
         ("clip, raster order", Words { order: "order = \"raster\"".into(), ..clip(paper) }),
         ("clip, regular borders", Words { order: "borders = \"regular\"".into(), ..clip(paper) }),
@@ -90,7 +90,7 @@ fn excluded() -> Words {
 /// The scene of a mode, with the files some of them name.
 #[track_caller]
 pub fn scene((_, words): &Mode) -> Scene {
-    Scene::with_files(words, |folder| write_polygon(&folder.join("excluded.geojson"), [-100.0, -100.0, 5300.0, 2700.0]))
+    Scene::with_files(words, |folder| write_polygon(&folder.join("excluded.geojson"), [-100.0, -100.0, 3800.0, 1800.0]))
 }
 
 /// A rectangle, [west, south, east, north] in metres from the origin, as GeoJSON.

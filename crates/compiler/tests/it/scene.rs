@@ -31,11 +31,11 @@ pub struct Words {
 }
 
 impl Words {
-    /// 12 x 14 load modules of the sample terrain in 3 x 3 tiles, everything else as it is by default.
+    /// 9 x 10 load modules of the sample terrain in 3 x 3 tiles, everything else as it is by default.
     pub fn sample() -> Self {
         let empty = String::new;
         Self {
-            size: (12, 14),
+            size: (9, 10),
             tiles: (3, 3),
             dem: "source = \"sample\"\nseed = 1".into(),
             importance: empty(),

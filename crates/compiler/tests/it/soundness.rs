@@ -1,0 +1,127 @@
+//! Every mode gives a sound product: no cracks, no T-junctions, exact areas, both identities, limits, true numbers.
+
+use job::Edges as JobEdges;
+use terrain::Dem;
+
+use crate::findings::{check_limits, check_report};
+use crate::modes;
+use crate::product::{Edges, Product};
+use crate::scene::{SIDE_CELLS, Scene, Words, sample_dem};
+use crate::surface::sums_of_product;
+
+/// Builds a scene's job and checks all of it against `dem`.
+#[track_caller]
+pub fn check(scene: &Scene, dem: &Dem) {
+    let built = scene.build("area", 2);
+    let edges = match scene.job.modules.edges {
+        JobEdges::Constrained => Edges::Constrained,
+        JobEdges::Clip(_) => Edges::Clipped,
+    };
+    let product = Product::read(&scene.path("area"));
+    product.check(edges);
+    check_limits(&scene.job, &product, &built, edges);
+    check_report(&scene.job, &product, &built, &sums_of_product(&product, dem));
+    check_heights(&product, dem, edges);
+    drop(built);
+    scene.verify("area");
+}
+
+/// Load-module corners stand at DEM height, and with constrained edges every vertex does, on a post.
+#[track_caller]
+fn check_heights(product: &Product, dem: &Dem, edges: Edges) {
+    let step = product.side / i64::from(SIDE_CELLS);
+    for (&(row, col), module) in &product.modules {
+        for vertex in &module.vertices {
+            let (x, y) = (i64::from(vertex.x), i64::from(vertex.y));
+            let is_corner = x % product.side == 0 && y % product.side == 0;
+            if edges == Edges::Constrained || is_corner {
+                assert_eq!((x % step, y % step), (0, 0), "load module {row},{col}: a vertex between posts");
+                let post = terrain::Post::new(
+                    row as i32 * SIDE_CELLS + (y / step) as i32,
+                    col as i32 * SIDE_CELLS + (x / step) as i32,
+                );
+                assert_eq!(vertex.z, dem.height(post), "load module {row},{col}: height at {post}");
+            }
+        }
+    }
+}
+
+#[track_caller]
+fn check_modes(modes: Vec<modes::Mode>) {
+    let dem = sample_dem(modes[0].1.grid(), 1);
+    for mode in modes {
+        eprintln!("mode: {}", mode.0);
+        check(&modes::scene(&mode), &dem);
+    }
+}
+
+#[test]
+fn every_constrained_mode_is_whole_and_within_its_limits() {
+    check_modes(modes::constrained());
+}
+
+#[test]
+fn every_clipped_mode_is_whole_and_tells_every_limit_it_exceeds() {
+    check_modes(modes::clipped());
+}
+
+#[test]
+fn enforcing_meets_limits_that_can_be_met() {
+    for mode in modes::clipped().into_iter().filter(|mode| mode.0.contains("limits that bind")) {
+        let scene = modes::scene(&mode);
+        let built = scene.build("area", 2);
+        assert_eq!(built.report.breaches, [], "{}", mode.0);
+        assert!(built.report.points.selected < 800, "{}: no point was taken out", mode.0);
+    }
+}
+
+#[test]
+fn regular_border_points_that_make_room_are_not_counted_as_selected_ones() {
+    // Hardly a point is selected, so nearly all that is taken out are points of the regular borders.
+    let words = Words {
+        size: (7, 3),
+        tiles: (3, 1),
+        order: "borders = \"regular\"".into(),
+        modules: "edges = \"clip\"".into(),
+        limits: "per_load_module = 12\nmean_per_load_module = 10\nper_4km_square = 130".into(),
+        tin: "method = \"greedy\"\npoints = 3".into(),
+        ..Words::sample()
+    };
+    check(&Scene::new(&words), &sample_dem(words.grid(), 1));
+}
+
+#[test]
+fn limits_that_no_removal_can_meet_are_breaches() {
+    // What load modules start with: once a border point is chosen in the merge, its pieces are more.
+    let tin = "method = \"paper\"\npoints = 800".into();
+    let limits = "per_load_module = 8\nmean_per_load_module = 3.3\nper_4km_square = 192".into();
+    let words = Words { modules: "edges = \"clip\"".into(), limits, tin, ..Words::sample() };
+    let scene = Scene::new(&words);
+    check(&scene, &sample_dem(words.grid(), 1));
+    let report = scene.build("area", 2).report;
+    assert!(!report.breaches.is_empty());
+    assert!(report.breaches.iter().all(|breach| breach.rms_without_m.is_some()), "what the limit cost was computed");
+}
+
+#[test]
+fn the_outer_border_holds_a_point_every_border_step_and_no_other() {
+    for mode in modes::all().into_iter().step_by(5) {
+        let scene = modes::scene(&mode);
+        drop(scene.build("area", 2));
+        let product = Product::read(&scene.path("area"));
+        let along = |row: u32, col: u32, on: fn(&load_module_reader::Vertex, i64) -> Option<u16>| {
+            let mut found: Vec<u16> =
+                product.modules[&(row, col)].vertices.iter().filter_map(|v| on(v, product.side)).collect();
+            found.sort_unstable();
+            assert_eq!(found, [0, 16_000, 32_000, 48_000, 64_000], "{}: load module {row},{col}", mode.0);
+        };
+        for col in 0..product.cols {
+            along(0, col, |v, _| (v.y == 0).then_some(v.x));
+            along(product.rows - 1, col, |v, side| (i64::from(v.y) == side).then_some(v.x));
+        }
+        for row in 0..product.rows {
+            along(row, 0, |v, _| (v.x == 0).then_some(v.y));
+            along(row, product.cols - 1, |v, side| (i64::from(v.x) == side).then_some(v.y));
+        }
+    }
+}
