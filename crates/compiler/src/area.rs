@@ -26,6 +26,7 @@ impl GamingArea {
     /// When the limits leave no room for the initial points, or keys contradict each other.
     pub fn new(job: &Job) -> Result<Self, CompileError> {
         let grid = job.area.grid;
+        refuse_sizes(job)?;
         let order = match job.tiles.order {
             TileOrder::Color => Order::Color,
             TileOrder::Raster => Order::Raster,
@@ -65,6 +66,30 @@ impl GamingArea {
         by_rank.sort_by_key(|&index| self.tiling.rank(self.tiles[index]));
         by_rank
     }
+}
+
+/// Sizes that no tile can be refined at.
+fn refuse_sizes(job: &Job) -> Result<(), CompileError> {
+    let grid = job.area.grid;
+    if grid.side_cells < 2 {
+        return Err(CompileError::Impossible {
+            key: "area.spacing_m".into(),
+            found: format!("{}, one cell to a load module", job.area.spacing.metres()),
+            expected: "at least two cells along a side".into(),
+            hint: "a load module needs posts inside; use a smaller spacing".into(),
+        });
+    }
+    let longest = |modules: u32, tiles: u32| modules.div_ceil(tiles) as usize * grid.side_cells as usize;
+    let cells = longest(grid.rows, job.tiles.rows).max(longest(grid.cols, job.tiles.columns));
+    if geometry::WORKING_POSTS_MAX <= cells {
+        return Err(CompileError::Impossible {
+            key: "tiles".into(),
+            found: format!("{} x {}, which makes tiles of {cells} cells a side", job.tiles.rows, job.tiles.columns),
+            expected: format!("tiles below {} cells a side", geometry::WORKING_POSTS_MAX),
+            hint: "ask for more tiles.rows and tiles.columns".into(),
+        });
+    }
+    Ok(())
 }
 
 fn refuse_impossible(job: &Job, budget: &Budget) -> Result<(), CompileError> {

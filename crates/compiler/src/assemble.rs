@@ -2,7 +2,7 @@
 
 use database::{FileStamp, Fingerprint, FingerprintBuilder, TileModules};
 use fidelity::{Residuals, Tally};
-use job::{ClipHeights as JobClipHeights, Edges};
+use job::{Borders, ClipHeights as JobClipHeights, Edges};
 use load_modules::{ClipHeights, Layout, clip, concatenate};
 use terrain::{LatticePoint, LoadModule, ModuleResidual, TileId, Vertex};
 
@@ -21,6 +21,8 @@ pub(crate) struct Assembled {
     pub at_source: Option<Tally>,
     /// Points of the tile per class, each point of the area in one tile.
     pub points: Vec<u64>,
+    /// Those of them that every build starts from: border points, corners not counted.
+    pub border: u64,
     /// Whether the file was written by this run.
     pub is_new: bool,
 }
@@ -75,9 +77,23 @@ pub(crate) fn assemble_tile(
     let at_source = run.ground.residuals_at_source(&modules, area);
     let fingerprint = modules_fingerprint(run, tins, removed, tile);
     let (file, is_new) = publish(run, tile, &layout, fingerprint, &modules)?;
-    let points = points_by_class(run, own, &removed[area.tiling.index(tile)], &window.importance);
+    let (points, border) = count_points(run, own, &removed[area.tiling.index(tile)], &window.importance);
     let modules = modules.iter().map(numbers).collect();
-    Ok(Assembled { file, modules, residuals, at_source, points, is_new })
+    Ok(Assembled { file, modules, residuals, at_source, points, border, is_new })
+}
+
+/// The published load modules of a tile as they are: their own numbers, and residuals against today's ground.
+pub(crate) fn read_assembled(run: &Run, tins: &[Published], tile: TileId) -> Result<Assembled, CompileError> {
+    let (area, folder, window) = (&run.area, run.database.folder(), run.window(tile)?);
+    let (_, mut modules) = folder.read_modules(tile)?;
+    let file = folder.stamp_file(&folder.modules_path(tile))?;
+    let as_published = modules.iter().map(numbers).collect();
+    let ground =
+        fidelity::Ground { dem: &window.dem, mask: &window.importance, grid: area.grid, spacing: area.frame.spacing };
+    let residuals = fidelity::measure(&mut modules, &ground);
+    let at_source = run.ground.residuals_at_source(&modules, area);
+    let (points, border) = count_points(run, &tins[area.tiling.index(tile)], &[], &window.importance);
+    Ok(Assembled { file, modules: as_published, residuals, at_source, points, border, is_new: false })
 }
 
 fn numbers(module: &LoadModule) -> ModuleNumbers {
@@ -148,21 +164,36 @@ pub(crate) fn crs(job: &job::Job) -> String {
     format!("EPSG:{}", job.area.epsg)
 }
 
-/// Points by class of the post they stand on; a point on a seam counts in the tile that owns the post.
-fn points_by_class(run: &Run, own: &Published, removed: &[LatticePoint], importance: &terrain::Importance) -> Vec<u64> {
+/// Points by class of the post they stand on, and how many of them are border points that every build starts from.
+/// A point on a seam counts in the tile that owns the post.
+fn count_points(
+    run: &Run,
+    own: &Published,
+    removed: &[LatticePoint],
+    importance: &terrain::Importance,
+) -> (Vec<u64>, u64) {
     let (rect, area) = (own.tin.tin.rect, run.area.rect);
+    let side = run.area.grid.side_cells;
+    let is_regular = run.job.tiles.borders == Borders::Regular;
     let mut points = vec![0; run.job.importance.classes.len()];
+    let mut border = 0;
     let removed: std::collections::BTreeSet<&LatticePoint> = removed.iter().collect();
-    for vertex in &own.tin.tin.vertices {
+    for vertex in own.tin.tin.vertices.iter().filter(|vertex| !removed.contains(&vertex.at)) {
         let post = terrain::Post::new(
             vertex.at.row.div_euclid(terrain::LATTICE_PER_POST),
             vertex.at.col.div_euclid(terrain::LATTICE_PER_POST),
         );
         let beyond =
             (post.row == rect.north && rect.north != area.north) || (post.col == rect.east && rect.east != area.east);
-        if !beyond && !removed.contains(&vertex.at) {
-            points[usize::from(importance.class(post))] += 1;
+        if beyond {
+            continue;
         }
+        points[usize::from(importance.class(post))] += 1;
+        let on_line = |rect: terrain::PostRect| {
+            post.row == rect.south || post.row == rect.north || post.col == rect.west || post.col == rect.east
+        };
+        let is_corner = post.row % side == 0 && post.col % side == 0;
+        border += u64::from(!is_corner && (on_line(area) || (is_regular && on_line(rect))));
     }
-    points
+    (points, border)
 }

@@ -6,11 +6,12 @@ use std::collections::{BTreeMap, BTreeSet};
 use database::{ReportBound, ReportPlace};
 use fidelity::Ground;
 use load_modules::{Layout, concatenate};
-use terrain::{ModuleId, ModuleRect, ModuleResidual, Post, Refusal, RefusedBy, SeamSides, metres_of_quanta};
+use terrain::{ModuleId, ModuleRect, ModuleResidual, Post, Refusal, RefusedBy, SeamSides, TileId, metres_of_quanta};
 use tin::{Frame, Stop, TileTask};
 
 use crate::CompileError;
 use crate::assemble::ModuleNumbers;
+use crate::ground::Window;
 use crate::refine::Published;
 use crate::run::Run;
 use crate::tasks::rule;
@@ -23,14 +24,14 @@ pub(crate) fn bound(
     numbers: &[&ModuleNumbers],
 ) -> Result<Vec<ReportBound>, CompileError> {
     let refused = refused_by_module(tins);
-    let modules: Vec<ModuleId> = refused.keys().copied().collect();
-    let freed = schedule::for_each_independent(&modules, &run.workers, run.stop, |_, &module| {
-        let tile = run.area.tiling.tile_of_module(module, run.area.grid);
-        without_limit(run, &tins[run.area.tiling.index(tile)], module, refused[&module].len())
+    let tiles: BTreeSet<TileId> =
+        refused.keys().map(|&module| run.area.tiling.tile_of_module(module, run.area.grid)).collect();
+    let tiles: Vec<TileId> = tiles.into_iter().collect();
+    let freed = schedule::for_each_independent(&tiles, &run.workers, run.stop, |_, &tile| {
+        without_limits(run, &tins[run.area.tiling.index(tile)], &refused)
     });
-    let tiles: Vec<_> = modules.iter().map(|&module| run.area.tiling.tile_of_module(module, run.area.grid)).collect();
     let freed = freed.map_err(|error| CompileError::from_schedule(crate::Stage::Publish, &tiles, error))?;
-    let freed: BTreeMap<ModuleId, ModuleResidual> = modules.into_iter().zip(freed).collect();
+    let freed: BTreeMap<ModuleId, ModuleResidual> = freed.into_iter().flatten().collect();
 
     let sums = run.area.budget.windows.sums(run.area.grid, counts);
     let places = by_place(run, &refused, &sums);
@@ -123,20 +124,31 @@ fn rms_m(parts: impl Iterator<Item = ModuleResidual>) -> f64 {
     if posts == 0 { 0.0 } else { (squares as f64 / posts as f64).sqrt() / f64::from(terrain::QUANTA_PER_METRE) }
 }
 
-/// The residual of a load module had it been given `extra` more points.
-fn without_limit(run: &Run, own: &Published, module: ModuleId, extra: usize) -> Result<ModuleResidual, CompileError> {
+/// The residuals of the load modules of a tile in which posts were refused, had those been selected.
+fn without_limits(
+    run: &Run,
+    own: &Published,
+    refused: &BTreeMap<ModuleId, Vec<Refusal>>,
+) -> Result<Vec<(ModuleId, ModuleResidual)>, CompileError> {
+    let tile = run.area.tiling.modules(own.tin.tile, run.area.grid);
+    let window = run.window(own.tin.tile)?;
+    let posts: BTreeSet<Post> = own.tin.tin.vertices.iter().filter_map(|vertex| vertex.at.post()).collect();
+    let here = refused.iter().filter(|(module, _)| tile.contains(**module));
+    Ok(here.map(|(&module, refusals)| (module, without_limit(run, &window, &posts, module, refusals.len()))).collect())
+}
+
+/// The residual of a load module had it been given `extra` more points than the `posts` of its tile.
+fn without_limit(run: &Run, window: &Window, posts: &BTreeSet<Post>, module: ModuleId, extra: usize) -> ModuleResidual {
     let area = &run.area;
     let rect = area.grid.posts_of(module);
-    let window = run.window(own.tin.tile)?;
     let (dem, importance) = (window.dem.window(rect), window.importance.window(rect));
-    let posts: BTreeSet<Post> = own.tin.tin.vertices.iter().filter_map(|vertex| vertex.at.post()).collect();
     let is_on_side = |post: &Post| {
         post.row == rect.south || post.row == rect.north || post.col == rect.west || post.col == rect.east
     };
-    let (sides, inner): (Vec<Post>, Vec<Post>) =
-        posts.into_iter().filter(|&post| rect.contains(post)).partition(is_on_side);
+    let rows = posts.range(rect.south_west()..=rect.north_east()).copied();
+    let (sides, inner): (Vec<Post>, Vec<Post>) = rows.filter(|&post| rect.contains(post)).partition(is_on_side);
     let task = TileTask {
-        tile: own.tin.tile,
+        tile: area.tiling.tile_of_module(module, area.grid),
         rect,
         frame: Frame::Plain,
         border: Vec::new(),
@@ -152,5 +164,5 @@ fn without_limit(run: &Run, own: &Published, module: ModuleId, extra: usize) -> 
     let mut modules = concatenate(&refined.tin, &layout, &importance);
     let ground = Ground { dem: &dem, mask: &importance, grid: area.grid, spacing: area.frame.spacing };
     fidelity::measure(&mut modules, &ground);
-    Ok(modules[0].residual)
+    modules[0].residual
 }

@@ -96,10 +96,10 @@ impl Ground {
         let rect = wide.intersection(&self.rect).expect("a tile lies inside the area");
         let mut near = area.tiling.neighbours(tile);
         near.push(tile);
-        let parts = near.iter().map(|&other| self.tile(area, other)).collect::<Result<Vec<_>, _>>()?;
         if self.kept.is_none() || !near.iter().all(|&other| reaches(area.tiling.rect(other), halo)) {
             return self.window(rect);
         }
+        let parts = near.iter().map(|&other| self.tile(area, other)).collect::<Result<Vec<_>, _>>()?;
         let dem = Dem::from_row_fn(rect, |row, heights| {
             for (part, cols) in
                 parts.iter().filter_map(|part| overlap(part.dem.rect(), rect, row).map(|cols| (part, cols)))

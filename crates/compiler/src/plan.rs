@@ -1,6 +1,6 @@
 //! What a job will do and take, before any work.
 
-use job::{Budget as PointBudget, DemSource, Edges, Job};
+use job::{Budget as PointBudget, DemSource, Edges, Job, TileOrder};
 use schedule::Simulation;
 use terrain::{ModuleRect, PostRect, Side, TileId};
 
@@ -75,7 +75,11 @@ pub fn plan(job: &Job) -> Result<Plan, CompileError> {
     area.by_rank().into_iter().enumerate().for_each(|(rank, index)| ranks[index] = rank);
     let tiles: Vec<PlannedTile> = area.tiles.iter().map(|&tile| planned(&area, tile, &ranks)).collect();
     let of_color = |color| tiles.iter().filter(|tile| tile.color == color).count();
-    let workers_useful = (0..4).map(of_color).max().unwrap_or(1).max(1);
+    let workers_useful = match job.tiles.order {
+        TileOrder::Color => (0..4).map(of_color).max().unwrap_or(1).max(1),
+        // A wave front: each row of tiles two columns behind the row south of it.
+        TileOrder::Raster => (job.tiles.rows as usize).min(job.tiles.columns.div_ceil(2) as usize),
+    };
     let (budget, start) = (area.budget.area, area.budget.start_total());
     Ok(Plan { forecast: forecast(job, &area), tiles, budget, start, workers_useful })
 }

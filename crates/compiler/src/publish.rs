@@ -10,6 +10,7 @@ use crate::refine::Published;
 use crate::report::Findings;
 use crate::run::{ALGORITHM_REVISION, Run};
 use crate::survey::Shares;
+use crate::tasks::is_surveyed;
 use crate::{CompileError, Event, Progress, Stage};
 
 /// The area as the database knows it.
@@ -85,7 +86,10 @@ fn fill(
     assembled: &Assembled,
 ) -> Result<(), CompileError> {
     let folder = run.database.folder();
-    let has_curve = run.job.tin.allocation == job::Allocation::Global;
+    let has_curve = is_surveyed(run.job);
+    if !has_curve {
+        run.database.remove(&format!("survey/{tile}.curve"))?;
+    }
     let record = manifest.tile_mut(tile).expect("the manifest lists every tile");
     record.state = state;
     record.fingerprint = Some(tin.stamp.fingerprint);

@@ -1,7 +1,5 @@
 //! The numbers of a finished build, as the report gives them. Times are added by whoever holds the clock.
 
-use std::collections::BTreeSet;
-
 use database::{
     Report, ReportBreach, ReportClass, ReportPerModule, ReportPerWindow, ReportPoints, ReportPool, ReportRefusals,
     ReportResidual, ReportStops, ReportVoids, Totals,
@@ -9,7 +7,7 @@ use database::{
 use fidelity::{Residuals, Tally};
 use job::Count;
 use limits::Windows;
-use terrain::{Breach, BreachKind, BreachPlace, LatticePoint, ModuleId, RefusedBy, StopReason, metres_of_quanta};
+use terrain::{Breach, BreachKind, BreachPlace, ModuleId, RefusedBy, StopReason, metres_of_quanta};
 
 use crate::CompileError;
 use crate::assemble::{Assembled, ModuleNumbers};
@@ -88,7 +86,9 @@ impl Findings<'_> {
 
     /// The sums of the manifest.
     pub fn totals(&self, report: &Report) -> Totals {
-        let total = self.residuals().total();
+        // From the load modules' own numbers, which `verify` adds up again.
+        let of_modules = by_module(self.run, self.assembled);
+        let sum = |of: fn(&ModuleNumbers) -> u64| of_modules.iter().map(|numbers| of(numbers)).sum::<u64>();
         Totals {
             points: report.points.total,
             triangles: report.triangles,
@@ -96,10 +96,10 @@ impl Findings<'_> {
             modules_over: report.per_load_module.over,
             breaches: report.breaches.len() as u64,
             refused: report.refusals.count,
-            residual_posts: total.posts,
-            residual_largest: u64::from(total.largest),
-            residual_sum_abs: total.sum_abs,
-            residual_sum_squared: u64::try_from(total.sum_squared).unwrap_or(u64::MAX),
+            residual_posts: sum(|numbers| u64::from(numbers.residual.posts)),
+            residual_largest: of_modules.iter().map(|numbers| u64::from(numbers.residual.largest)).max().unwrap_or(0),
+            residual_sum_abs: sum(|numbers| numbers.residual.sum_abs),
+            residual_sum_squared: sum(|numbers| numbers.residual.sum_squared),
         }
     }
 
@@ -127,17 +127,8 @@ impl Findings<'_> {
         let grid = self.run.area.grid;
         let total: u64 = self.assembled.iter().flat_map(|tile| &tile.points).sum();
         let corner = u64::from(grid.rows + 1) * u64::from(grid.cols + 1);
-        let selected: u64 = self.tins.iter().map(|tile| tile.tin.residuals.len() as u64).sum();
-        let selected = selected - self.selected_and_removed();
-        ReportPoints { selected, border: total - corner - selected, corner, total }
-    }
-
-    /// Selected points that enforcing took out again. A point on a seam is listed with every tile that holds it, but
-    /// was selected by one.
-    fn selected_and_removed(&self) -> u64 {
-        let gone: BTreeSet<LatticePoint> = self.enforced.removed.iter().flatten().copied().collect();
-        let selected = self.tins.iter().flat_map(|tile| &tile.tin.tin.vertices[tile.tin.initial_count as usize..]);
-        selected.filter(|vertex| gone.contains(&vertex.at)).count() as u64
+        let border: u64 = self.assembled.iter().map(|tile| tile.border).sum();
+        ReportPoints { selected: total - corner - border, border, corner, total }
     }
 
     fn per_module(&self, counts: &[u32]) -> ReportPerModule {

@@ -1,13 +1,13 @@
 //! Survey and allocation: what would each tile gain, and what may it therefore spend.
 
 use database::FingerprintBuilder;
-use job::{Allocation as Mode, Budget as PointBudget, Edges};
+use job::{Budget as PointBudget, Edges};
 use terrain::{GainCurve, TileId};
 use tiling::{Allocation, Gains, allocate_equally, allocate_globally, points_equally, points_globally};
 use tin::SurveyTask;
 
 use crate::run::{Run, Worked};
-use crate::tasks::{TileBudget, survey_task};
+use crate::tasks::{TileBudget, is_surveyed, survey_task};
 use crate::{CompileError, Event, Progress, Stage};
 
 /// What the area's budget came to.
@@ -20,7 +20,7 @@ pub(crate) struct Shares {
 
 /// Surveys every tile if the job asks for a global allocation.
 pub(crate) fn survey(run: &Run, progress: &mut dyn Progress) -> Result<Option<Vec<GainCurve>>, CompileError> {
-    if run.job.tin.allocation == Mode::Equal {
+    if !is_surveyed(run.job) {
         return Ok(None);
     }
     let level = geometry::widest_level();

@@ -43,9 +43,9 @@ pub(crate) fn tile_task(
             points,
             value: if is_by_squares(job) { None } else { largest_value(job) },
             // Shared out globally, the RMS is the area's: the allocation sees to it.
-            rms_quanta: match job.tin.allocation {
-                Allocation::Equal => job.tin.target_rms_m.map(|rms| rms * f64::from(terrain::QUANTA_PER_METRE)),
-                Allocation::Global => None,
+            rms_quanta: match is_surveyed(job) {
+                true => None,
+                false => job.tin.target_rms_m.map(|rms| rms * f64::from(terrain::QUANTA_PER_METRE)),
             },
         },
     }
@@ -64,8 +64,21 @@ fn frame(job: &Job, area: &GamingArea, tile: TileId, allowance: Option<Allowance
     }
 }
 
+/// Whether what a tile may spend depends on what it would gain: a budget shared out globally. Clipped edges without
+/// a number of points have no budget to share, only an end to reach.
+pub(crate) fn is_surveyed(job: &Job) -> bool {
+    let has_budget = job.tin.budget != PointBudget::Limits || job.modules.edges == Edges::Constrained;
+    job.tin.allocation == Allocation::Global && has_budget
+}
+
 fn is_by_squares(job: &Job) -> bool {
-    job.tin.method == Method::Optimised || job.tin.key == ErrorKey::Sse
+    // Where a residual is the only end, it is reached by worst posts; sums of squares would go on past it.
+    let ends_at_residual = job.tin.max_residual_m.is_some() && job.tin.budget == PointBudget::Limits;
+    match job.tin.method {
+        Method::Optimised => true,
+        Method::Greedy => job.tin.key == ErrorKey::Sse && !ends_at_residual,
+        Method::Paper { .. } => job.tin.key == ErrorKey::Sse,
+    }
 }
 
 /// Which post comes next.

@@ -5,19 +5,19 @@ use std::path::Path;
 use std::sync::Arc;
 
 use database::{Database, DatabaseError, Folder, Previous, Report};
-use job::Job;
-use terrain::{SeamSides, Side, TileId, TileTin, Vertex};
+use job::{Edges, Job};
+use terrain::{Post, SeamSides, Side, TileId, TileTin, Vertex};
 use tin::TileTask;
 
-use crate::assemble::assemble;
+use crate::assemble::{Assembled, assemble, assemble_tile, read_assembled};
 use crate::build::open;
 use crate::enforce::enforce;
 use crate::publish::{beginning, publish};
 use crate::refine::{Published, refine_now, tile_stamp};
 use crate::report::Findings;
-use crate::run::{Options, Run};
+use crate::run::{Options, Run, Worked};
 use crate::survey::{Shares, allocate};
-use crate::tasks::{inherited, posts_of, side_vertices, tile_task};
+use crate::tasks::{inherited, is_surveyed, posts_of, side_vertices, tile_task};
 use crate::{CompileError, Event, Progress, Stage};
 
 /// A tile that was run again.
@@ -68,12 +68,53 @@ pub fn rebuild_tile(
         frozen.extend(is_frozen.then_some(tile));
     }
 
-    let mut assembled = assemble(&run, &tins, progress)?;
+    let mut assembled = match run.job.modules.edges {
+        // Only what was refined again is published; the rest is read as it is.
+        Edges::Constrained => reassemble(&run, &tins, &reached, progress)?,
+        // The enforcer counts the whole area, from every point that was selected.
+        Edges::Clip(_) => assemble(&run, &tins, progress)?,
+    };
     let enforced = enforce(&run, &tins, &mut assembled, progress)?;
     let findings = Findings { run: &run, tins: &tins, assembled: &assembled, enforced: &enforced };
-    let report = publish(&findings, &shares, &frozen, progress)?;
+    let mut report = publish(&findings, &shares, &frozen, progress)?;
+    let stale = stale(&run, &shares, &tins, &reached)?;
+    if 0 < stale {
+        report
+            .warnings
+            .push(format!("{stale} other tiles were made from other ground or borders; a build renews them"));
+    }
     let rebuilt = reached.iter().map(|&(tile, _)| tile).collect();
     Ok(Rebuilt { report, frozen: frozen.contains(&tile), rebuilt, database: run.database })
+}
+
+/// Assembles the tiles that were refined again and reads the others as they are published.
+fn reassemble(
+    run: &Run,
+    tins: &[Published],
+    reached: &[(TileId, bool)],
+    progress: &mut dyn Progress,
+) -> Result<Vec<Assembled>, CompileError> {
+    let none = vec![Vec::new(); tins.len()];
+    let done = run.for_each_tile(Stage::Assemble, progress, |tile| {
+        if reached.iter().any(|&(other, _)| other == tile) {
+            return Ok(Worked::Made(assemble_tile(run, tins, &none, tile)?));
+        }
+        Ok(Worked::Kept(read_assembled(run, tins, tile)?))
+    })?;
+    Ok(done.into_iter().map(Worked::into_inner).collect())
+}
+
+/// Tiles other than those of `reached` that a build would refine again: made from other ground than today's.
+fn stale(run: &Run, shares: &Shares, tins: &[Published], reached: &[(TileId, bool)]) -> Result<usize, CompileError> {
+    let mut count = 0;
+    for (index, &tile) in run.area.tiles.iter().enumerate() {
+        let seeds = seeds(run, tins, tile);
+        let task = tile_task(run.job, &run.area, tile, &shares.tiles[index], posts_of(&seeds));
+        let stamp = tile_stamp(run, &*run.window(tile)?, &task, &seeds);
+        let is_reached = reached.iter().any(|&(other, _)| other == tile);
+        count += usize::from(!is_reached && stamp != tins[index].stamp);
+    }
+    Ok(count)
 }
 
 /// Tiles that are frozen already; a refusal when there is nothing whole to go on from.
@@ -114,7 +155,7 @@ fn refuse_unfinished(run: &Run, folder: &Path, tile: TileId, previous: Previous)
 
 /// The allocation the database was built with, from its published curves.
 fn published_shares(run: &Run, progress: &mut dyn Progress) -> Result<Shares, CompileError> {
-    if run.job.tin.allocation == job::Allocation::Equal {
+    if !is_surveyed(run.job) {
         return Ok(allocate(run, None, progress));
     }
     let folder = run.database.folder();
@@ -179,9 +220,10 @@ fn refine_frozen(run: &Run, shares: &Shares, tins: &[Published], tile: TileId) -
     task.kept.retain(|post| !task.inherited.contains(post));
     task.seams = SeamSides::CLOSED;
     if let Some(points) = &mut task.stop.points {
-        // Seam points were selected once; load-module corners among them never were.
+        // Seam points were selected once; load-module corners and regular border points among them never were.
         let side = run.area.grid.side_cells;
-        let selected = task.kept.iter().filter(|post| post.row % side != 0 || post.col % side != 0).count();
+        let is_corner = |post: &Post| post.row % side == 0 && post.col % side == 0;
+        let selected = task.kept.iter().filter(|post| !is_corner(post) && !task.border.contains(post)).count();
         *points = points.saturating_sub(selected);
     }
     seeds.extend(own);
