@@ -1,6 +1,7 @@
 //! Random small jobs on random ground: whatever is asked for, the product is whole and the limits are told truly.
 //!
-//! A failure prints its seed; `TIEFORT_SEED=n` runs that one alone, `TIEFORT_JOBS=n` the first n. Seeds that once failed stay in `KEPT`.
+//! A failure prints its seed; `TIEFORT_SEED=n` runs that one alone, `TIEFORT_JOBS=n` the first n. Seeds that once
+//! failed stay in `KEPT`.
 
 use compiler::CompileError;
 use terrain::Dem;
