@@ -71,9 +71,7 @@ pub(crate) fn assemble_tile(
             clip(&points, &layout, heights, &window.importance)
         }
     };
-    let ground =
-        fidelity::Ground { dem: &window.dem, mask: &window.importance, grid: area.grid, spacing: area.frame.spacing };
-    let residuals = fidelity::measure(&mut modules, &ground);
+    let residuals = fidelity::measure(&mut modules, &window.measured(area));
     let at_source = run.ground.residuals_at_source(&modules, area);
     let fingerprint = modules_fingerprint(run, tins, removed, tile);
     let (file, is_new) = publish(run, tile, &layout, fingerprint, &modules)?;
@@ -88,9 +86,7 @@ pub(crate) fn read_assembled(run: &Run, tins: &[Published], tile: TileId) -> Res
     let (_, mut modules) = folder.read_modules(tile)?;
     let file = folder.stamp_file(&folder.modules_path(tile))?;
     let as_published = modules.iter().map(numbers).collect();
-    let ground =
-        fidelity::Ground { dem: &window.dem, mask: &window.importance, grid: area.grid, spacing: area.frame.spacing };
-    let residuals = fidelity::measure(&mut modules, &ground);
+    let residuals = fidelity::measure(&mut modules, &window.measured(area));
     let at_source = run.ground.residuals_at_source(&modules, area);
     let (points, border) = count_points(run, &tins[area.tiling.index(tile)], &[], &window.importance);
     Ok(Assembled { file, modules: as_published, residuals, at_source, points, border, is_new: false })

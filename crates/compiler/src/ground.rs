@@ -43,6 +43,14 @@ pub(crate) struct Window {
     pub importance: Importance,
 }
 
+impl Window {
+    /// What load modules of this rectangle are measured against.
+    pub fn measured(&self, area: &GamingArea) -> fidelity::Ground<'_> {
+        let spacing = area.frame.spacing;
+        fidelity::Ground { dem: &self.dem, mask: &self.importance, grid: area.grid, spacing }
+    }
+}
+
 impl Ground {
     /// Opens and judges everything the job names.
     ///

@@ -13,14 +13,14 @@ use job::ErrorKey;
 use schedule::{Event as Scheduled, RankedTasks, Workers, in_rank_order_observed};
 use source_files::{GeoTiff, VoidPolicy, write_classes, write_heights};
 use terrain::{
-    Dem, GainCurve, GridFrame, Importance, ModuleGrid, PostRect, SeamSides, Side, Spacing, StopReason, THOUSANDTHS,
-    TileId, TileTin, Tin, Vertex, quanta_of_metres,
+    Dem, GainCurve, GridFrame, Importance, ModuleGrid, PostRect, SeamSides, Spacing, StopReason, THOUSANDTHS, TileId,
+    TileTin, Tin, Vertex, quanta_of_metres,
 };
 use tiling::{Gains, Order, Tiling, points_equally, points_globally};
 use tin::{CostUnit, Frame, LastBatch, Proximity, Rule, Stop, SurveyTask, TileTask};
 
 use crate::ground::decode;
-use crate::tasks::{posts_of, side_vertices};
+use crate::tasks::{inherited, posts_of};
 use crate::{CompileError, Event, Progress, Stage};
 
 /// The paper's proximity test: metres across, metres in height.
@@ -249,7 +249,10 @@ impl<'a> TinJob<'a> {
         progress.tell(Event::Enter(Stage::Refine, self.tiles.len()));
         let task = |index: usize| {
             let tile = self.tiles[index];
-            let seeds = self.inherited(tile, &slots);
+            let published = |other: TileId| {
+                slots[self.tiling.index(other)].get().expect("lower-ranked neighbours are published first")
+            };
+            let seeds = posts_of(&inherited(&self.tiling, tile, published));
             let points = shares.as_ref().map(|shares| shares[index]);
             let task = self.task(tile, self.tiling.owned_sides(tile), seeds, points);
             let whole = task.rect == dem.rect();
@@ -267,20 +270,6 @@ impl<'a> TinJob<'a> {
             .map_err(|error| CompileError::from_schedule(Stage::Refine, &self.tiles, error))?;
         progress.tell(Event::Leave(Stage::Refine));
         Ok(slots.into_iter().map(|slot| slot.into_inner().expect("every tile was refined")).collect())
-    }
-
-    fn inherited(&self, tile: TileId, slots: &[OnceLock<TileTin>]) -> Vec<terrain::Post> {
-        let inherits = Side::ALL.into_iter().filter(|&side| self.tiling.inherits(tile, side));
-        let beyond = inherits.filter_map(|side| Some((self.tiling.beyond(tile, side)?, side)));
-        let mut all: Vec<Vertex> = beyond
-            .flat_map(|(other, side)| {
-                let published = slots[self.tiling.index(other)].get().expect("lower-ranked neighbours come first");
-                side_vertices(published, side.opposite())
-            })
-            .collect();
-        all.sort_unstable();
-        all.dedup();
-        posts_of(&all)
     }
 }
 

@@ -28,7 +28,7 @@ pub(crate) fn refine(run: &Run, shares: &Shares, progress: &mut dyn Progress) ->
         let published = |other: TileId| {
             &*slots[run.area.tiling.index(other)].get().expect("lower-ranked neighbours are published first").tin
         };
-        let seeds = inherited(&run.area, tile, published);
+        let seeds = inherited(&run.area.tiling, tile, published);
         let index = run.area.tiling.index(tile);
         let task = tile_task(run.job, &run.area, tile, &shares.tiles[index], posts_of(&seeds));
         let window = run.window(tile)?;

@@ -3,7 +3,7 @@
 use job::{Allocation, Borders, Budget as PointBudget, Edges, ErrorKey, Job, LastBatch, Method};
 use limits::Allowance;
 use terrain::{LatticePoint, ModuleId, ModuleRect, Post, SeamSides, Side, TileId, TileTin, Vertex};
-use tiling::{outer_border_posts, outer_sides};
+use tiling::{Tiling, outer_border_posts, outer_sides};
 use tin::{CostUnit, Frame, Proximity, Rule, Stop, SurveyTask, TileTask};
 
 use crate::area::GamingArea;
@@ -168,9 +168,9 @@ pub(crate) fn side_vertices(tin: &TileTin, side: Side) -> Vec<Vertex> {
 }
 
 /// What a tile inherits: the border points of its lower-ranked neighbours on the sides they share.
-pub(crate) fn inherited<'a>(area: &GamingArea, tile: TileId, published: impl Fn(TileId) -> &'a TileTin) -> Vec<Vertex> {
-    let inherits = Side::ALL.into_iter().filter(|&side| area.tiling.inherits(tile, side));
-    let beyond = inherits.filter_map(|side| Some((area.tiling.beyond(tile, side)?, side)));
+pub(crate) fn inherited<'a>(tiling: &Tiling, tile: TileId, published: impl Fn(TileId) -> &'a TileTin) -> Vec<Vertex> {
+    let inherits = Side::ALL.into_iter().filter(|&side| tiling.inherits(tile, side));
+    let beyond = inherits.filter_map(|side| Some((tiling.beyond(tile, side)?, side)));
     let mut all: Vec<Vertex> =
         beyond.flat_map(|(other, side)| side_vertices(published(other), side.opposite())).collect();
     all.sort_unstable();

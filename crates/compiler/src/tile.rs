@@ -175,7 +175,7 @@ fn published_tins(run: &Run) -> Result<Vec<Published>, CompileError> {
 
 /// What a tile inherits from its lower-ranked neighbours as they are now.
 fn seeds(run: &Run, tins: &[Published], tile: TileId) -> Vec<Vertex> {
-    inherited(&run.area, tile, |other| &*tins[run.area.tiling.index(other)].tin)
+    inherited(&run.area.tiling, tile, |other| &*tins[run.area.tiling.index(other)].tin)
 }
 
 /// The tile's task as a full build would give it.

@@ -214,15 +214,9 @@ fn recompute(
     let mut all = Residuals::default();
     for &tile in &area.tiles {
         let window = ground.tile(area, tile)?;
-        let ground = fidelity::Ground {
-            dem: &window.dem,
-            mask: &window.importance,
-            grid: area.grid,
-            spacing: area.frame.spacing,
-        };
         let mut own: Vec<LoadModule> =
             area.tiling.modules(tile, area.grid).iter().filter_map(|module| modules.get(&module).cloned()).collect();
-        all.merge(&fidelity::measure(&mut own, &ground));
+        all.merge(&fidelity::measure(&mut own, &window.measured(area)));
         let differs = |module: &&LoadModule| modules[&module.id].residual != module.residual;
         problems.extend(own.iter().filter(differs).map(|module| {
             format!("load module {}: its residuals against this DEM are not those in its file", module.id)
