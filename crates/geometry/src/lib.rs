@@ -21,3 +21,5 @@ mod scan;
 pub use scan::{largest_numerator, locate, locate_all, rounded, squares_sum, visit_owned, visit_posts};
 mod level;
 pub use level::{levels_available, widest_level};
+mod ridge;
+pub use ridge::is_ridge_candidate;

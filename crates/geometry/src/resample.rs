@@ -142,7 +142,7 @@ pub fn blend_rows(near: &[f64], far: &[f64], tap: Tap, scale: HeightScale, out: 
 ///
 /// Adding 3 x 2^51 leaves the nearest integer, ties to even, in the low bits. A tie that went towards zero shows as a
 /// rest of exactly a half (subtraction is exact here) and is put right.
-fn rounded(value: f64) -> i32 {
+pub fn rounded(value: f64) -> i32 {
     const WHOLE: f64 = 6_755_399_441_055_744.0;
     let shifted = value + WHOLE;
     let rest = value - (shifted - WHOLE);

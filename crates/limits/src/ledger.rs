@@ -25,10 +25,13 @@ pub struct Allowance {
     pub triangles: u32,
 }
 
-/// A tile's allowance as it is spent. Room only shrinks, so a refusal is final.
+/// A tile's allowance as it is spent. While nothing is refunded, room only shrinks and a refusal is final.
 #[derive(Clone, Debug)]
 pub struct Ledger {
+    /// What may be spent in each load module, less what neighbours spent there.
     allowance: Allowance,
+    modules: Vec<u32>,
+    windows: Vec<u32>,
     spent: u32,
 }
 
@@ -37,7 +40,8 @@ impl Ledger {
     pub fn new(allowance: Allowance) -> Self {
         assert_eq!(allowance.module_room.len(), allowance.modules.count(), "one room per load module");
         assert_eq!(allowance.window_room.len(), allowance.windows.count(), "one room per window");
-        Self { allowance, spent: 0 }
+        let (modules, windows) = (vec![0; allowance.module_room.len()], vec![0; allowance.window_room.len()]);
+        Self { allowance, modules, windows, spent: 0 }
     }
 
     /// Triangles spent so far.
@@ -45,14 +49,28 @@ impl Ledger {
         self.spent
     }
 
-    /// Triangles left for the whole tile.
-    pub fn left(&self) -> u32 {
-        self.allowance.triangles - self.spent
+    /// Triangles left for the whole tile; negative where a TIN was booked that exceeds them.
+    pub fn left(&self) -> i64 {
+        i64::from(self.allowance.triangles) - i64::from(self.spent)
     }
 
     /// Triangles `module` may still gain.
     pub fn room_of(&self, module: ModuleId) -> u32 {
-        self.allowance.module_room[self.module_index(module)]
+        let index = self.module_index(module);
+        self.allowance.module_room[index].saturating_sub(self.modules[index])
+    }
+
+    /// Whether `module`, or a window that holds it, has more than it may.
+    pub fn is_over(&self, module: ModuleId) -> bool {
+        let index = self.module_index(module);
+        let over = |index: usize| self.allowance.window_room[index] < self.windows[index];
+        self.allowance.module_room[index] < self.modules[index] || self.window_rows(module).any(|mut row| row.any(over))
+    }
+
+    /// Whether any load module or window has more than it may.
+    pub fn is_any_over(&self) -> bool {
+        let over = |room: &[u32], spent: &[u32]| room.iter().zip(spent).any(|(room, spent)| room < spent);
+        over(&self.allowance.module_room, &self.modules) || over(&self.allowance.window_room, &self.windows)
     }
 
     fn module_index(&self, module: ModuleId) -> usize {
@@ -83,9 +101,8 @@ impl Ledger {
         if self.room_of(module) < cost {
             return Some(if beyond_tile { RefusedBy::Reservation } else { RefusedBy::Module });
         }
-        let full =
-            self.window_rows(module).any(|row| self.allowance.window_room[row].iter().any(|&room| room < POINT_COST));
-        full.then_some(RefusedBy::Window)
+        let full = |index: usize| self.allowance.window_room[index] < self.windows[index] + POINT_COST;
+        self.window_rows(module).any(|mut row| row.any(full)).then_some(RefusedBy::Window)
     }
 
     /// Spends `cost` triangles in `module`.
@@ -93,16 +110,32 @@ impl Ledger {
     /// # Panics
     /// When a limit refuses them: the caller asks first.
     pub fn charge(&mut self, module: ModuleId, cost: u32) {
-        let index = self.module_index(module);
-        let room = &mut self.allowance.module_room[index];
-        *room = room.checked_sub(cost).expect("the caller asked whether the load module has room");
-        for row in self.window_rows(module) {
-            for room in &mut self.allowance.window_room[row] {
-                *room = room.checked_sub(cost).expect("the caller asked whether every window has room");
-            }
-        }
-        self.spent += cost;
+        self.book(module, cost);
+        assert!(!self.is_over(module), "the caller asked whether load module and windows have room");
         assert!(self.spent <= self.allowance.triangles, "a tile spends no more than its allowance");
+    }
+
+    /// Notes `cost` triangles that `module` has already, whether or not it may.
+    pub fn book(&mut self, module: ModuleId, cost: u32) {
+        self.each_count(module, |count| *count += cost);
+    }
+
+    /// Takes back `cost` triangles of `module`.
+    ///
+    /// # Panics
+    /// When there are not so many.
+    pub fn refund(&mut self, module: ModuleId, cost: u32) {
+        self.each_count(module, |count| *count = count.checked_sub(cost).expect("only what was booked is refunded"));
+    }
+
+    /// Everything in which triangles of `module` count.
+    fn each_count(&mut self, module: ModuleId, mut change: impl FnMut(&mut u32)) {
+        let index = self.module_index(module);
+        change(&mut self.modules[index]);
+        for row in self.window_rows(module) {
+            self.windows[row].iter_mut().for_each(&mut change);
+        }
+        change(&mut self.spent);
     }
 
     /// Takes room in `module` for points a neighbour has chosen and paid for.

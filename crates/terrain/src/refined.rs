@@ -7,12 +7,14 @@ use crate::{ModuleId, Post, TileId, Tin};
 pub struct TileTin {
     /// Which tile.
     pub tile: TileId,
-    /// Vertices in insertion order: the initial ones, then the selected ones.
+    /// The initial vertices, then the others: in the order in which they were selected or, where they were optimised,
+    /// by row and column.
     pub tin: Tin,
     /// How many of the vertices were there before selection began: corners, load-module corners, border
     /// points, inherited points.
     pub initial_count: u32,
-    /// Residual (absolute, in quanta) at which each selected vertex was inserted, in order.
+    /// Residual (absolute, in quanta) at which each selected vertex was inserted, in order; empty where the TIN was
+    /// optimised, since no vertex is then where it was inserted.
     pub residuals: Vec<u32>,
     /// Triangles charged to this tile: its own points, in every load module they touch.
     pub triangles_charged: u32,

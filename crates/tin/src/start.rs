@@ -1,11 +1,10 @@
 //! What a tile holds before the first post is selected.
 
 use geometry::{LocalPost, LocalRect};
-use limits::Allowance;
 use mesh::{Lines, Mesh};
-use terrain::{ModuleId, PostRect, SeamSides};
+use terrain::{PostRect, SeamSides};
 
-use crate::gate::{Gate, ModuleLines};
+use crate::gate::Gate;
 use crate::task::{Frame, TileTask};
 
 /// A mesh with its first vertices, in their order, and the gate to the next ones.
@@ -18,18 +17,12 @@ pub(crate) struct Start {
 impl Start {
     /// The tile's corners, load-module corners, border points and inherited points.
     pub fn new(task: &TileTask) -> Self {
-        let (mesh, mut gate) = match &task.frame {
-            Frame::Plain => (Mesh::new(task.rect, Lines::none()), Gate::Open),
-            Frame::Corners { side_cells } => (Mesh::with_corners_every(task.rect, *side_cells), Gate::Open),
-            Frame::Sides { side_cells, south_west, allowance } => (
-                Mesh::new(task.rect, Lines::every(*side_cells)),
-                gate_of(task.rect, *side_cells, *south_west, allowance),
-            ),
+        let mesh = match &task.frame {
+            Frame::Plain => Mesh::new(task.rect, Lines::none()),
+            Frame::Corners { side_cells } => Mesh::with_corners_every(task.rect, *side_cells),
+            Frame::Sides { side_cells, .. } => Mesh::new(task.rect, Lines::every(*side_cells)),
         };
-        let inherited = task.inherited.iter().map(|&post| LocalPost::of(post, task.rect));
-        inherited.for_each(|post| gate.inherit(post));
-        let kept = task.kept.iter().map(|&post| LocalPost::of(post, task.rect));
-        kept.for_each(|post| gate.charge(post));
+        let gate = task.ledger().map_or(Gate::Open, Gate::Limits);
         let mut start = Self { vertices: first_corners(&mesh), mesh, gate };
         start.insert_all(task);
         start
@@ -49,12 +42,6 @@ impl Start {
             }
         }
     }
-}
-
-fn gate_of(rect: PostRect, side_cells: i32, south_west: ModuleId, allowance: &Allowance) -> Gate {
-    let along = |cells: usize| cells as u32 / side_cells as u32;
-    let lines = ModuleLines { side_cells, south_west, rows: along(rect.cells_high()), cols: along(rect.cells_wide()) };
-    Gate::limits(lines, allowance.clone())
 }
 
 fn first_corners(mesh: &Mesh) -> Vec<LocalPost> {

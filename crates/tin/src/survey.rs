@@ -6,9 +6,9 @@
 
 use fearless_simd::{Level, dispatch};
 use geometry::LocalPost;
+use limits::{Charged, ModuleLines};
 use terrain::{Dem, GainCurve, GainRun, Importance, PostRect, SeamSides, TileId};
 
-use crate::gate::{Charged, ModuleLines};
 use crate::ladder::ladder_bin;
 use crate::refine::grow;
 use crate::sequence::Witness;
@@ -61,7 +61,7 @@ impl Recorder {
         let module = |at: i32| (at / side_cells) as u32;
         let south_west = terrain::ModuleId { row: module(rect.south), col: module(rect.west) };
         let (rows, cols) = (module(rect.cells_high() as i32), module(rect.cells_wide() as i32));
-        let lines = ModuleLines { side_cells, south_west, rows, cols };
+        let lines = ModuleLines { side: side_cells, south_west, rows, cols };
         Self { rect, lines, owned: task.owned, cost: task.cost, bin: i32::MAX, runs: Vec::new(), squares: Vec::new() }
     }
 
@@ -102,7 +102,7 @@ impl Witness for Recorder {
             return;
         }
         let bin = self.bin;
-        match (self.lines.charged(post), self.cost) {
+        match (self.lines.charged(post.row(), post.col()), self.cost) {
             (Some(Charged::Inside(module)), CostUnit::Triangles) => self.runs.push(GainRun { module, bin, cost: 2 }),
             (Some(Charged::Between(first, second)), CostUnit::Triangles) => {
                 self.runs.push(GainRun { module: first, bin, cost: 1 });

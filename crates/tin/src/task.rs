@@ -1,6 +1,6 @@
 //! What `refine` is asked to do for one tile.
 
-use limits::Allowance;
+use limits::{Allowance, ModuleLines, TileLedger};
 use terrain::{ModuleId, Post, PostRect, SeamSides, TileId};
 
 /// Everything about one tile's refinement but the ground itself.
@@ -24,6 +24,22 @@ pub struct TileTask {
     pub rule: Rule,
     /// When to stop.
     pub stop: Stop,
+}
+
+impl TileTask {
+    /// What the tile may spend, in posts from its south-west post, with room taken for inherited points and kept ones
+    /// paid for; `None` where there are no limits.
+    pub fn ledger(&self) -> Option<TileLedger> {
+        let Frame::Sides { side_cells, south_west, allowance } = &self.frame else { return None };
+        let along = |cells: usize| cells as u32 / *side_cells as u32;
+        let (rows, cols) = (along(self.rect.cells_high()), along(self.rect.cells_wide()));
+        let lines = ModuleLines { side: *side_cells, south_west: *south_west, rows, cols };
+        let mut ledger = TileLedger::new(lines, allowance.clone());
+        let local = |post: &Post| (post.row - self.rect.south, post.col - self.rect.west);
+        self.inherited.iter().map(local).for_each(|(row, col)| ledger.inherit(row, col));
+        self.kept.iter().map(local).for_each(|(row, col)| ledger.charge(row, col));
+        Some(ledger)
+    }
 }
 
 /// What a tile starts from.

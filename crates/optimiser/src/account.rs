@@ -1,0 +1,143 @@
+//! What the mesh has and what it may have.
+
+use limits::{POINT_COST, TileLedger};
+use terrain::{ModuleId, RefusedBy};
+
+use crate::place::{PER_POST, Place};
+use crate::sheet::{Hold, NONE, Sheet, Vertex};
+use crate::task::Budget;
+
+/// The budget as it is spent and refunded, and what was lent beyond it for a while.
+pub(crate) struct Account {
+    books: Books,
+    loan: i64,
+}
+
+enum Books {
+    /// Triangles or vertices in all.
+    Total {
+        /// What one vertex inside and one on the border cost.
+        cost: (i64, i64),
+        most: i64,
+        left: i64,
+    },
+    /// Load modules, windows and the tile's total, by place.
+    Limits(TileLedger),
+}
+
+impl Account {
+    /// The account of a sheet as it stands; it may be overdrawn.
+    pub fn new(budget: &Budget, sheet: &Sheet) -> Self {
+        let books = match budget {
+            Budget::Triangles(most) => {
+                Books::Total { cost: (2, 1), most: *most as i64, left: *most as i64 - sheet.triangle_count as i64 }
+            }
+            Budget::Vertices(most) => {
+                Books::Total { cost: (1, 1), most: *most as i64, left: *most as i64 - sheet.vertex_count as i64 }
+            }
+            Budget::Limits(ledger) => {
+                let mut ledger = ledger.clone().in_finer_steps(PER_POST);
+                let live = sheet.vertices.iter().filter(|vertex| vertex.edge != NONE);
+                let paid = live.filter(|vertex| !vertex.hold.has(Hold::PLACE));
+                paid.for_each(|vertex| ledger.book(vertex.at.y, vertex.at.x));
+                Books::Limits(ledger)
+            }
+        };
+        Self { books, loan: 0 }
+    }
+
+    /// Permits `share` of the whole more than there may be in the end; 0 takes that back.
+    pub fn lend(&mut self, share: f64) {
+        self.loan = (share * self.most() as f64) as i64;
+    }
+
+    /// Keeps so many triangles (or vertices) back.
+    pub fn keep_back(&mut self, count: i64) {
+        self.loan = -count;
+    }
+
+    /// Triangles (or vertices) the whole may have.
+    fn most(&self) -> i64 {
+        match &self.books {
+            Books::Total { most, .. } => *most,
+            Books::Limits(ledger) => i64::from(ledger.counts().spent()) + ledger.counts().left(),
+        }
+    }
+
+    /// How many triangles (or vertices) more the whole may have.
+    pub fn left(&self) -> i64 {
+        self.loan
+            + match &self.books {
+                Books::Total { left, .. } => *left,
+                Books::Limits(ledger) => ledger.counts().left(),
+            }
+    }
+
+    /// What any vertex may cost.
+    pub fn dearest(&self) -> i64 {
+        match &self.books {
+            Books::Total { cost, .. } => cost.0,
+            Books::Limits(_) => i64::from(POINT_COST),
+        }
+    }
+
+    fn cost_of(&self, vertex: &Vertex) -> i64 {
+        match &self.books {
+            Books::Total { cost, .. } => {
+                if vertex.hold.is_on_line() {
+                    cost.1
+                } else {
+                    cost.0
+                }
+            }
+            Books::Limits(_) => i64::from(POINT_COST),
+        }
+    }
+
+    /// The load module whose limit, or whose window's, refuses a vertex there.
+    pub fn refuses(&self, at: Place) -> Option<(ModuleId, RefusedBy)> {
+        let Books::Limits(ledger) = &self.books else { return None };
+        ledger.refuses(at.y, at.x)
+    }
+
+    /// Whether a vertex fits into the total and every limit.
+    pub fn permits(&self, vertex: &Vertex) -> bool {
+        self.cost_of(vertex) <= self.left() && self.refuses(vertex.at).is_none()
+    }
+
+    /// Spends what a vertex costs.
+    pub fn charge(&mut self, vertex: &Vertex) {
+        let price = self.cost_of(vertex);
+        match &mut self.books {
+            Books::Total { left, .. } => *left -= price,
+            Books::Limits(ledger) => ledger.book(vertex.at.y, vertex.at.x),
+        }
+    }
+
+    /// Takes back what a vertex cost.
+    pub fn refund(&mut self, vertex: &Vertex) {
+        let price = self.cost_of(vertex);
+        match &mut self.books {
+            Books::Total { left, .. } => *left += price,
+            Books::Limits(ledger) => ledger.refund(vertex.at.y, vertex.at.x),
+        }
+    }
+
+    /// Whether any load module or window has more than it may.
+    pub fn is_any_over(&self) -> bool {
+        matches!(&self.books, Books::Limits(ledger) if ledger.counts().is_any_over())
+    }
+
+    /// Whether taking a vertex out brings something nearer to its limit that is over it.
+    pub fn relieves(&self, vertex: &Vertex) -> bool {
+        matches!(&self.books, Books::Limits(ledger) if ledger.is_over(vertex.at.y, vertex.at.x))
+    }
+
+    /// Triangles spent so far.
+    pub fn spent(&self) -> u32 {
+        match &self.books {
+            Books::Total { .. } => 0,
+            Books::Limits(ledger) => ledger.counts().spent(),
+        }
+    }
+}

@@ -1,0 +1,90 @@
+//! Flips: the other diagonal of two triangles, where it fits the ground better.
+
+use crate::form::{Form, squares};
+use crate::patch::Patch;
+use crate::place::Place;
+use crate::sheet::{LEAST_AREA, NONE, Sheet};
+
+/// Passes at most; hardly any mesh needs more than six.
+const PASSES_MAX: usize = 10;
+/// Part of the two triangles' squares that a flip has to gain: below it lies rounding.
+const LEAST_GAIN: f64 = 1e-4;
+/// Part of a triangle's mean squares below which two triangles are left as they are.
+const LEAST_SHARE: f64 = 0.02;
+
+/// Flips edges near stirred vertices, until none gains; stirs what it touches. Gives the flips.
+pub(crate) fn flip_all(sheet: &mut Sheet) -> usize {
+    let mut patch = Patch::default();
+    let least = LEAST_SHARE * sheet.squares() / sheet.triangle_count as f64;
+    let mut active: Vec<bool> = sheet.vertices.iter().map(|vertex| vertex.is_stirred).collect();
+    let mut total = 0;
+    for _ in 0..PASSES_MAX {
+        let mut touched = vec![false; active.len()];
+        let mut flips = 0;
+        for triangle in 0..sheet.triangles.len() as u32 {
+            for k in 0..3 {
+                let edge = 4 * triangle + k;
+                if !sheet.is_live(triangle) || !is_active(sheet, edge, &active) || !find(sheet, edge, least, &mut patch)
+                {
+                    continue;
+                }
+                for (corners, _) in &patch.new {
+                    corners.iter().for_each(|&corner| touched[corner as usize] = true);
+                }
+                sheet.apply(&mut patch);
+                flips += 1;
+            }
+        }
+        total += flips;
+        if flips == 0 {
+            break;
+        }
+        active = touched;
+    }
+    total
+}
+
+/// Whether an inner edge, looked at from its lower side only, has an active vertex near.
+#[inline(always)]
+fn is_active(sheet: &Sheet, edge: u32, active: &[bool]) -> bool {
+    let twin = sheet.twin(edge);
+    if twin == NONE || twin < edge {
+        return false;
+    }
+    let (a, b) = sheet.ends(edge);
+    [a, b, sheet.apex(edge), sheet.apex(twin)].iter().any(|&vertex| active[vertex as usize])
+}
+
+/// Fills `patch` with the flip of an inner edge, if that is valid and gains.
+#[inline(always)]
+fn find(sheet: &Sheet, edge: u32, least: f64, patch: &mut Patch) -> bool {
+    let twin = sheet.twin(edge);
+    let old = sheet.triangles[(edge >> 2) as usize].squares + sheet.triangles[(twin >> 2) as usize].squares;
+    if old <= least {
+        return false;
+    }
+    let (a, b) = sheet.ends(edge);
+    let (c, d) = (sheet.apex(edge), sheet.apex(twin));
+    let (first, second) = ([a, d, c], [d, b, c]);
+    let (at_first, at_second) = (sheet.places(first), sheet.places(second));
+    let area = |[a, b, c]: [Place; 3]| Place::orient(a, b, c);
+    if area(at_first) < LEAST_AREA || area(at_second) < LEAST_AREA || sheet.is_constrained(a, b) {
+        return false;
+    }
+    let moments = &sheet.ground.moments;
+    let diagonal = moments.edge(at_first[1], at_first[2]);
+    let sums = diagonal + moments.edge(at_first[0], at_first[1]) + moments.edge(at_first[2], at_first[0]);
+    let squares_first = squares(&sums, at_first, sheet.heights(first));
+    let bound = old * (1.0 - LEAST_GAIN);
+    if bound <= squares_first {
+        return false;
+    }
+    let rest = moments.edge(at_second[0], at_second[1]) + moments.edge(at_second[1], at_second[2]) - diagonal;
+    if bound <= squares_first + squares(&rest, at_second, sheet.heights(second)) {
+        return false;
+    }
+    patch.clear();
+    patch.old.extend([edge >> 2, twin >> 2]);
+    patch.new.extend([(first, Form::new(&sums, at_first)), (second, Form::new(&rest, at_second))]);
+    true
+}

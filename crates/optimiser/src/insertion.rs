@@ -1,0 +1,206 @@
+//! Putting a vertex in: where the residual under a triangle is largest, with the flips around it that gain.
+
+use crate::form::{Form, squares};
+use crate::moments::Sums;
+use crate::patch::Patch;
+use crate::place::Place;
+use crate::refit::Fit;
+use crate::sheet::{Hold, LEAST_AREA, NONE, Sheet, next, previous};
+
+/// Triangles one insertion may rewrite.
+const REACH_MAX: usize = 14;
+/// Part of two triangles' squares that a flip around a new vertex has to gain.
+const LEAST_FLIP_GAIN: f64 = 1e-3;
+
+/// What finding an insertion needs and leaves behind.
+#[derive(Default)]
+pub(crate) struct Insertion {
+    pub patch: Patch,
+    pub fit: Fit,
+    /// The new vertex's star, counter-clockwise but for the order of its parts.
+    faces: Vec<Face>,
+}
+
+/// A triangle of the new vertex, by its opposite edge.
+#[derive(Clone, Copy)]
+struct Face {
+    from: u32,
+    to: u32,
+    /// The opposite edge from outside.
+    twin: u32,
+    /// Sums west of the edges to `from`, along the opposite edge, and to `to`.
+    sums: [Sums; 3],
+    squares: f64,
+}
+
+/// A vertex to be.
+#[derive(Clone, Copy)]
+struct Guest {
+    at: Place,
+    height: f64,
+    vertex: u32,
+}
+
+/// How an insertion was found.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Found {
+    /// Squares gained.
+    pub gain: f64,
+    /// The new vertex: it belongs to the sheet's arrays, but to no triangle before the patch is applied.
+    pub vertex: u32,
+}
+
+impl Insertion {
+    /// The gain of a new vertex in `triangle`; its patch is then ready to be applied, and the vertex has to be dropped
+    /// if it is not. `None` where nothing can be inserted.
+    #[inline(always)]
+    pub fn find(&mut self, sheet: &mut Sheet, triangle: u32) -> Option<Found> {
+        let corners = sheet.triangles[triangle as usize].corners;
+        let places = sheet.places(corners);
+        let (_, at) = sheet.ground.worst(places, sheet.heights(corners))?;
+        let (on_edge, hold) = self.classify(sheet, triangle, places, at)?;
+        let hold = hold.and(sheet.ground.height_hold(at));
+        let vertex = sheet.add_vertex(at, sheet.ground.height(at), hold);
+        let found = self.split(sheet, triangle, on_edge, vertex);
+        match found {
+            Some(gain) => Some(Found { gain, vertex }),
+            None => {
+                sheet.drop_vertex(vertex);
+                None
+            }
+        }
+    }
+
+    /// The edge a place lies on, if any, and what holds a vertex there.
+    fn classify(&self, sheet: &Sheet, triangle: u32, places: [Place; 3], at: Place) -> Option<(Option<u32>, Hold)> {
+        let mut on_edge = None;
+        for k in 0..3 {
+            let side = Place::orient(places[k], places[(k + 1) % 3], at);
+            if side < 0 || (side == 0 && on_edge.is_some()) {
+                return None;
+            }
+            if side == 0 {
+                on_edge = Some(4 * triangle + k as u32);
+            }
+        }
+        Some((on_edge, sheet.line_hold(at)))
+    }
+
+    /// Splits the triangle, flips around the new vertex, fits heights. Gives the gain.
+    fn split(&mut self, sheet: &Sheet, triangle: u32, on_edge: Option<u32>, vertex: u32) -> Option<f64> {
+        let record = &sheet.vertices[vertex as usize];
+        let guest = Guest { at: record.at, height: record.height, vertex };
+        self.patch.clear();
+        self.faces.clear();
+        self.patch.old.push(triangle);
+        for k in 0..3 {
+            let edge = 4 * triangle + k;
+            if on_edge != Some(edge) {
+                self.push_face(sheet, guest, edge);
+                continue;
+            }
+            let twin = sheet.twin(edge);
+            if twin != NONE {
+                self.patch.old.push(twin >> 2);
+                self.push_face(sheet, guest, next(twin));
+                self.push_face(sheet, guest, previous(twin));
+            }
+        }
+        self.flip_around(sheet, guest);
+        let valid = |face: &Face| LEAST_AREA <= Place::orient(guest.at, sheet.at(face.from), sheet.at(face.to));
+        if !self.faces.iter().all(valid) {
+            return None;
+        }
+        let old: f64 = self.patch.old.iter().map(|&old| sheet.triangles[old as usize].squares).sum();
+        let new: f64 = self.faces.iter().map(|face| face.squares).sum();
+        self.fill_patch(sheet, guest);
+        Some(old - new + self.fit.refit(sheet, &mut self.patch))
+    }
+
+    /// The triangle between the new vertex and an edge seen from inside.
+    #[inline(always)]
+    fn push_face(&mut self, sheet: &Sheet, guest: Guest, edge: u32) {
+        let (from, to) = sheet.ends(edge);
+        let (a, b) = (sheet.at(from), sheet.at(to));
+        let moments = &sheet.ground.moments;
+        let sums = [moments.edge(guest.at, a), moments.edge(a, b), moments.edge(guest.at, b)];
+        self.faces.push(Face::new(sheet, guest, (from, to), sheet.twin(edge), sums));
+    }
+
+    /// Takes neighbours in while the flip of the edge to them gains.
+    fn flip_around(&mut self, sheet: &Sheet, guest: Guest) {
+        const TRIES_MAX: usize = 60;
+        let mut index = 0;
+        for _ in 0..TRIES_MAX {
+            let Some(&face) = self.faces.get(index) else { return };
+            match self.flipped(sheet, guest, &face) {
+                Some([first, second]) => {
+                    self.patch.old.push(face.twin >> 2);
+                    self.faces[index] = first;
+                    self.faces.push(second);
+                }
+                None => index += 1,
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn flipped(&self, sheet: &Sheet, guest: Guest, face: &Face) -> Option<[Face; 2]> {
+        let beyond = face.twin >> 2;
+        if face.twin == NONE
+            || REACH_MAX <= self.patch.old.len()
+            || sheet.is_constrained(face.from, face.to)
+            || self.patch.old.contains(&beyond)
+        {
+            return None;
+        }
+        let apex = sheet.apex(face.twin);
+        let (a, d, b) = (sheet.at(face.from), sheet.at(apex), sheet.at(face.to));
+        if Place::orient(guest.at, a, d) < LEAST_AREA || Place::orient(guest.at, d, b) < LEAST_AREA {
+            return None;
+        }
+        let old = face.squares + sheet.triangles[beyond as usize].squares;
+        let moments = &sheet.ground.moments;
+        let spoke = moments.edge(guest.at, d);
+        let sums = [face.sums[0], moments.edge(a, d), spoke];
+        let (first_twin, second_twin) = (sheet.twin(next(face.twin)), sheet.twin(previous(face.twin)));
+        let first = Face::new(sheet, guest, (face.from, apex), first_twin, sums);
+        if old <= first.squares {
+            return None;
+        }
+        let sums = [spoke, moments.edge(d, b), face.sums[2]];
+        let second = Face::new(sheet, guest, (apex, face.to), second_twin, sums);
+        (first.squares + second.squares < old * (1.0 - LEAST_FLIP_GAIN)).then_some([first, second])
+    }
+
+    fn fill_patch(&mut self, sheet: &Sheet, guest: Guest) {
+        for face in &self.faces {
+            let corners = [guest.vertex, face.from, face.to];
+            self.patch.new.push((corners, Form::new(&face.all(), sheet.places(corners))));
+        }
+        for vertex in std::iter::once(guest.vertex).chain(self.faces.iter().flat_map(|face| [face.from, face.to])) {
+            if sheet.vertices[vertex as usize].hold.height_is_free() && !self.patch.refit.contains(&vertex) {
+                self.patch.refit.push(vertex);
+            }
+        }
+    }
+}
+
+impl Face {
+    #[inline(always)]
+    fn new(sheet: &Sheet, guest: Guest, (from, to): (u32, u32), twin: u32, sums: [Sums; 3]) -> Self {
+        let mut face = Self { from, to, twin, sums, squares: 0.0 };
+        let (a, b) = (&sheet.vertices[from as usize], &sheet.vertices[to as usize]);
+        let corners = [guest.at, a.at, b.at];
+        // A first triangle may be too thin to have a plane; a flip may still mend it, and if not, it is refused.
+        if Place::orient(corners[0], corners[1], corners[2]) != 0 {
+            face.squares = squares(&face.all(), corners, [guest.height, a.height, b.height]);
+        }
+        face
+    }
+
+    #[inline(always)]
+    fn all(&self) -> Sums {
+        self.sums[0] + self.sums[1] - self.sums[2]
+    }
+}

@@ -1,0 +1,36 @@
+//! Makes the TIN of a tile truer without making it larger.
+//!
+//! Selection alone leaves a TIN whose vertices stand on posts, at the DEM's height, joined as Delaunay would have it.
+//! Freed from all three, the same number of triangles follows the ground with well under half the residual.
+//! What carries it: (i) every vertex moves in x, y and height by Gauss-Newton steps on the true sum of squares, (ii)
+//! the moments of the posts under any triangle come from prefix sums along rows, and (iii) the mesh is grown beyond
+//! the budget first and thinned by what each vertex is truly worth.
+
+mod task;
+pub use task::{Budget, Effort, HeightFit, Lattice, Task};
+mod optimise;
+pub use optimise::{Optimised, optimise, overshoot};
+
+mod account;
+mod curve;
+mod exchange;
+mod flips;
+mod form;
+mod ground;
+mod insertion;
+mod moments;
+mod patch;
+mod place;
+mod queue;
+mod refit;
+mod removal;
+mod sheet;
+mod sweep;
+mod thin;
+
+#[cfg(test)]
+mod scene;
+#[cfg(test)]
+mod step_tests;
+#[cfg(test)]
+mod tests;

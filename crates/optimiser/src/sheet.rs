@@ -1,0 +1,468 @@
+//! The mesh while it is being improved: half-edges, vertices anywhere on the working lattice, a form per triangle.
+
+use terrain::{PostRect, Tin, Vertex as TinVertex};
+
+use crate::curve::along_curve;
+use crate::form::Form;
+use crate::ground::Ground;
+use crate::place::{PER_POST, Place};
+
+/// No edge, no vertex, no triangle.
+pub(crate) const NONE: u32 = u32::MAX;
+
+/// Least doubled area of a triangle, a quarter of a square post. That no triangle turns over keeps the mesh an
+/// embedding; that none comes near it keeps its slopes sane.
+pub(crate) const LEAST_AREA: i64 = (PER_POST * PER_POST / 4) as i64;
+
+/// What may not change about a vertex.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub(crate) struct Hold(u8);
+
+impl Hold {
+    pub const FREE: Self = Self(0);
+    /// It stays on its line of constant x.
+    pub const COLUMN: Self = Self(1);
+    /// It stays on its line of constant y.
+    pub const ROW: Self = Self(2);
+    /// It neither moves nor goes.
+    pub const PLACE: Self = Self(4);
+    /// It keeps its height.
+    pub const HEIGHT: Self = Self(8);
+    /// It stands at the DEM's height wherever it moves.
+    pub const CREST: Self = Self(16);
+
+    pub const fn and(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+
+    #[inline(always)]
+    pub const fn has(self, other: Self) -> bool {
+        self.0 & other.0 != 0
+    }
+
+    /// Whether it may neither move nor be removed: held, or a corner of load modules.
+    #[inline(always)]
+    pub const fn is_fixed(self) -> bool {
+        self.has(Self::PLACE) || self.is_corner()
+    }
+
+    #[inline(always)]
+    const fn is_corner(self) -> bool {
+        self.0 & 3 == 3
+    }
+
+    /// Whether it lies on a line and may move along it.
+    #[inline(always)]
+    pub const fn is_on_line(self) -> bool {
+        self.0 & 3 != 0
+    }
+
+    /// Whether its height is free to be fitted.
+    #[inline(always)]
+    pub const fn height_is_free(self) -> bool {
+        !self.has(Self::HEIGHT) && !self.has(Self::CREST)
+    }
+}
+
+/// One vertex.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Vertex {
+    pub at: Place,
+    /// In quanta above the ground's level.
+    pub height: f64,
+    /// An edge that leaves it; [`NONE`] once it is gone.
+    pub edge: u32,
+    pub hold: Hold,
+    /// Whether something near it changed since this was last asked.
+    pub is_stirred: bool,
+}
+
+/// One triangle, counter-clockwise. An edge is `4 * triangle + corner it leaves`.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Triangle {
+    /// The first is [`NONE`] once the triangle is gone.
+    pub corners: [u32; 3],
+    pub twins: [u32; 3],
+    /// Sum of squared residuals.
+    pub squares: f64,
+}
+
+#[inline(always)]
+pub(crate) fn next(edge: u32) -> u32 {
+    if edge & 3 == 2 { edge - 2 } else { edge + 1 }
+}
+
+#[inline(always)]
+pub(crate) fn previous(edge: u32) -> u32 {
+    if edge & 3 == 0 { edge + 2 } else { edge - 1 }
+}
+
+/// The triangles around a vertex, counter-clockwise.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Star {
+    pub triangles: Vec<u32>,
+    /// Corner `i` is the one after the vertex in triangle `i`; a vertex on the border has one more than triangles.
+    pub ring: Vec<u32>,
+}
+
+impl Star {
+    pub fn is_closed(&self) -> bool {
+        self.triangles.len() == self.ring.len()
+    }
+}
+
+/// Which vertices are held, and where lines run.
+pub(crate) struct Layout<'a> {
+    /// Steps between lines that edges may not cross; `None` where only the tile's border is one.
+    pub line_step: Option<i32>,
+    /// What else may not change about a vertex.
+    pub hold: &'a dyn Fn(&TinVertex) -> Hold,
+}
+
+/// The mesh of a tile.
+pub(crate) struct Sheet<'a> {
+    pub ground: &'a Ground<'a>,
+    pub vertices: Vec<Vertex>,
+    pub triangles: Vec<Triangle>,
+    pub forms: Vec<Form>,
+    pub triangle_count: usize,
+    pub vertex_count: usize,
+    free_vertices: Vec<u32>,
+    pub(crate) free_triangles: Vec<u32>,
+    line_step: Option<i32>,
+}
+
+impl<'a> Sheet<'a> {
+    /// The sheet of a TIN, in an order in which neighbours in space are neighbours in memory.
+    pub fn new(ground: &'a Ground<'a>, tin: &Tin, layout: &Layout) -> Self {
+        let mut sheet = Self {
+            ground,
+            vertices: Vec::new(),
+            triangles: Vec::new(),
+            forms: Vec::new(),
+            triangle_count: 0,
+            vertex_count: 0,
+            free_vertices: Vec::new(),
+            free_triangles: Vec::new(),
+            line_step: layout.line_step,
+        };
+        let vertices = tin.vertices.iter().map(|vertex| {
+            let at = Place::of(vertex.at, tin.rect);
+            Vertex {
+                at,
+                height: f64::from(vertex.height) - ground.level(),
+                edge: NONE,
+                hold: sheet.line_hold(at).and((layout.hold)(vertex)),
+                is_stirred: true,
+            }
+        });
+        let vertices = vertices.collect();
+        sheet.fill(vertices, &tin.triangles);
+        sheet
+    }
+
+    /// Orders vertices and triangles along a curve again: a third of the time of all later steps on a large tile.
+    pub fn renumber(&mut self) {
+        let vertices = std::mem::take(&mut self.vertices);
+        let triangles: Vec<[u32; 3]> =
+            self.triangles.iter().map(|record| record.corners).filter(|corners| corners[0] != NONE).collect();
+        self.free_vertices.clear();
+        self.free_triangles.clear();
+        self.fill(vertices, &triangles);
+    }
+
+    fn fill(&mut self, vertices: Vec<Vertex>, triangles: &[[u32; 3]]) {
+        let mut used = vec![false; vertices.len()];
+        triangles.iter().flatten().for_each(|&vertex| used[vertex as usize] = true);
+        let live = (0..vertices.len() as u32).filter(|&vertex| used[vertex as usize]);
+        let order = along_curve(live, |vertex| vertices[vertex as usize].at);
+        let mut place = vec![NONE; vertices.len()];
+        order.iter().enumerate().for_each(|(index, &vertex)| place[vertex as usize] = index as u32);
+        self.vertices = order.iter().map(|&vertex| vertices[vertex as usize]).collect();
+        let corners = |triangle: u32| triangles[triangle as usize].map(|vertex| place[vertex as usize]);
+        let middle = |triangle: u32| {
+            let [a, b, c] = corners(triangle).map(|vertex| self.vertices[vertex as usize].at);
+            Place::new((a.x + b.x + c.x) / 3, (a.y + b.y + c.y) / 3)
+        };
+        let order = along_curve(0..triangles.len() as u32, middle);
+        self.triangles = order
+            .iter()
+            .map(|&triangle| Triangle { corners: corners(triangle), twins: [NONE; 3], squares: 0.0 })
+            .collect();
+        self.link();
+        self.forms = self.triangles.iter().map(|record| self.form_of(record.corners)).collect();
+        (0..self.triangles.len() as u32).for_each(|triangle| self.settle(triangle));
+        (self.vertex_count, self.triangle_count) = (self.vertices.len(), self.triangles.len());
+    }
+
+    /// Finds every edge's twin.
+    fn link(&mut self) {
+        let mut leaving = vec![NONE; self.vertices.len()];
+        let mut beside = vec![NONE; 4 * self.triangles.len()];
+        for (triangle, record) in self.triangles.iter().enumerate() {
+            for (k, &corner) in record.corners.iter().enumerate() {
+                let edge = 4 * triangle as u32 + k as u32;
+                beside[edge as usize] = std::mem::replace(&mut leaving[corner as usize], edge);
+            }
+        }
+        for (vertex, &edge) in self.vertices.iter_mut().zip(&leaving) {
+            vertex.edge = edge;
+        }
+        for edge in self.edges() {
+            let (from, to) = self.ends(edge);
+            let mut other = leaving[to as usize];
+            while other != NONE && self.ends(other).1 != from {
+                other = beside[other as usize];
+            }
+            self.triangles[(edge >> 2) as usize].twins[(edge & 3) as usize] = other;
+        }
+    }
+
+    fn edges(&self) -> impl Iterator<Item = u32> + use<> {
+        (0..self.triangles.len() as u32).flat_map(|triangle| (0..3).map(move |k| 4 * triangle + k))
+    }
+
+    /// What lies on a line may only move along it.
+    pub fn line_hold(&self, at: Place) -> Hold {
+        let far = self.ground.far();
+        let is_line = |at: i32, far: i32| match self.line_step {
+            Some(step) => at % step == 0,
+            None => at == 0 || at == far,
+        };
+        let column = if is_line(at.x, far.x) { Hold::COLUMN } else { Hold::FREE };
+        let row = if is_line(at.y, far.y) { Hold::ROW } else { Hold::FREE };
+        column.and(row)
+    }
+
+    #[inline(always)]
+    pub fn at(&self, vertex: u32) -> Place {
+        self.vertices[vertex as usize].at
+    }
+
+    #[inline(always)]
+    pub fn places(&self, corners: [u32; 3]) -> [Place; 3] {
+        [self.at(corners[0]), self.at(corners[1]), self.at(corners[2])]
+    }
+
+    #[inline(always)]
+    pub fn heights(&self, corners: [u32; 3]) -> [f64; 3] {
+        let height = |vertex: u32| self.vertices[vertex as usize].height;
+        [height(corners[0]), height(corners[1]), height(corners[2])]
+    }
+
+    #[inline(always)]
+    pub fn twin(&self, edge: u32) -> u32 {
+        self.triangles[(edge >> 2) as usize].twins[(edge & 3) as usize]
+    }
+
+    /// The vertices an edge leaves and reaches.
+    #[inline(always)]
+    pub fn ends(&self, edge: u32) -> (u32, u32) {
+        let corners = &self.triangles[(edge >> 2) as usize].corners;
+        (corners[(edge & 3) as usize], corners[(next(edge) & 3) as usize])
+    }
+
+    /// The corner that `edge` does not touch.
+    #[inline(always)]
+    pub fn apex(&self, edge: u32) -> u32 {
+        self.triangles[(edge >> 2) as usize].corners[(previous(edge) & 3) as usize]
+    }
+
+    pub fn is_live(&self, triangle: u32) -> bool {
+        self.triangles[triangle as usize].corners[0] != NONE
+    }
+
+    pub fn is_vertex(&self, vertex: u32) -> bool {
+        self.vertices[vertex as usize].edge != NONE
+    }
+
+    /// Whether the edge between two neighbours lies on a line.
+    #[inline(always)]
+    pub fn is_constrained(&self, a: u32, b: u32) -> bool {
+        let (a, b) = (&self.vertices[a as usize], &self.vertices[b as usize]);
+        let both = |line: Hold| a.hold.has(line) && b.hold.has(line);
+        (a.at.x == b.at.x && both(Hold::COLUMN)) || (a.at.y == b.at.y && both(Hold::ROW))
+    }
+
+    pub fn form_of(&self, corners: [u32; 3]) -> Form {
+        let places = self.places(corners);
+        Form::new(&self.ground.moments.triangle(places), places)
+    }
+
+    /// Brings a triangle's squares up to date with its corners' heights.
+    #[inline(always)]
+    pub fn settle(&mut self, triangle: u32) {
+        let heights = self.heights(self.triangles[triangle as usize].corners);
+        self.triangles[triangle as usize].squares = self.forms[triangle as usize].squares(heights);
+    }
+
+    /// Sum of squared residuals over all posts.
+    pub fn squares(&self) -> f64 {
+        self.triangles.iter().map(|record| record.squares).sum()
+    }
+
+    /// Sum of squared residuals over all posts, whatever their weights.
+    pub fn plain_squares(&self) -> f64 {
+        match self.ground.uniform_weight() {
+            // One weight for all is a weight of one.
+            Some(weight) if 0.0 < weight => self.squares(),
+            _ => {
+                let live = self.triangles.iter().filter(|record| record.corners[0] != NONE);
+                live.map(|record| self.ground.plain_squares(self.places(record.corners), self.heights(record.corners)))
+                    .sum()
+            }
+        }
+    }
+
+    /// Rounds all heights to whole quanta, which is how they are kept.
+    pub fn round_heights(&mut self) {
+        let level = self.ground.level();
+        for vertex in &mut self.vertices {
+            vertex.height = (vertex.height + level).round() - level;
+        }
+        for triangle in 0..self.triangles.len() as u32 {
+            if self.is_live(triangle) {
+                self.settle(triangle);
+            }
+        }
+    }
+
+    pub fn stir_all(&mut self) {
+        self.vertices.iter_mut().for_each(|vertex| vertex.is_stirred = true);
+    }
+
+    /// Fills `star` with the triangles around a vertex.
+    #[inline(always)]
+    pub fn star(&self, vertex: u32, star: &mut Star) {
+        star.triangles.clear();
+        star.ring.clear();
+        let entry = self.vertices[vertex as usize].edge;
+        // Clockwise to the border, if there is one, and then around from there.
+        let mut first = entry;
+        loop {
+            let twin = self.twin(first);
+            if twin == NONE {
+                break;
+            }
+            first = next(twin);
+            if first == entry {
+                break;
+            }
+        }
+        let mut edge = first;
+        loop {
+            star.triangles.push(edge >> 2);
+            star.ring.push(self.ends(edge).1);
+            let back = previous(edge);
+            let twin = self.twin(back);
+            if twin == NONE {
+                star.ring.push(self.ends(back).0);
+                return;
+            }
+            edge = twin;
+            if edge == first {
+                return;
+            }
+        }
+    }
+
+    /// A new vertex; it belongs to no triangle yet.
+    pub fn add_vertex(&mut self, at: Place, height: f64, hold: Hold) -> u32 {
+        let vertex = Vertex { at, height, edge: NONE, hold, is_stirred: true };
+        match self.free_vertices.pop() {
+            Some(index) => {
+                self.vertices[index as usize] = vertex;
+                index
+            }
+            None => {
+                self.vertices.push(vertex);
+                self.vertices.len() as u32 - 1
+            }
+        }
+    }
+
+    /// Gives back a vertex that no triangle has.
+    pub fn drop_vertex(&mut self, vertex: u32) {
+        self.vertices[vertex as usize].edge = NONE;
+        self.free_vertices.push(vertex);
+    }
+
+    /// Brings all triangles around a vertex up to date with its height.
+    #[inline(always)]
+    pub fn settle_around(&mut self, vertex: u32) {
+        let entry = self.vertices[vertex as usize].edge;
+        let mut edge = entry;
+        loop {
+            self.settle(edge >> 2);
+            let twin = self.twin(previous(edge));
+            if twin == NONE {
+                break;
+            }
+            edge = twin;
+            if edge == entry {
+                return;
+            }
+        }
+        edge = entry;
+        loop {
+            let twin = self.twin(edge);
+            if twin == NONE {
+                return;
+            }
+            edge = next(twin);
+            self.settle(edge >> 2);
+        }
+    }
+
+    /// What is wrong with the links between triangles and vertices, if anything is.
+    pub fn fault(&self) -> Option<String> {
+        for edge in self.edges().filter(|&edge| self.is_live(edge >> 2)) {
+            let (from, to) = self.ends(edge);
+            let twin = self.twin(edge);
+            if twin != NONE && (!self.is_live(twin >> 2) || self.ends(twin) != (to, from) || self.twin(twin) != edge) {
+                return Some(format!("edge {edge} from {from} to {to} and its twin {twin} disagree"));
+            }
+            if twin == NONE && !self.is_constrained(from, to) {
+                return Some(format!("edge {edge} from {from} to {to} has no twin"));
+            }
+            if !self.is_vertex(from) {
+                return Some(format!("edge {edge} leaves a vertex that is gone"));
+            }
+        }
+        for vertex in (0..self.vertices.len() as u32).filter(|&vertex| self.is_vertex(vertex)) {
+            let edge = self.vertices[vertex as usize].edge;
+            if !self.is_live(edge >> 2) || self.ends(edge).0 != vertex {
+                return Some(format!("vertex {vertex} does not leave edge {edge}"));
+            }
+        }
+        let flat = |record: &&Triangle| {
+            let [a, b, c] = self.places(record.corners);
+            Place::orient(a, b, c) <= 0
+        };
+        self.triangles
+            .iter()
+            .filter(|record| record.corners[0] != NONE)
+            .find(flat)
+            .map(|record| format!("{record:?} is flat"))
+    }
+
+    /// The finished TIN: first the vertices that were there from the start, then the others, by row and column.
+    ///
+    /// # Panics
+    /// When a vertex lies between lattice points.
+    pub fn into_tin(self, rect: PostRect) -> Tin {
+        let mut order: Vec<u32> = (0..self.vertices.len() as u32).filter(|&vertex| self.is_vertex(vertex)).collect();
+        let is_movable = |vertex: u32| !self.vertices[vertex as usize].hold.is_fixed();
+        order.sort_unstable_by_key(|&vertex| (is_movable(vertex), self.at(vertex)));
+        let mut index = vec![NONE; self.vertices.len()];
+        order.iter().enumerate().for_each(|(place, &vertex)| index[vertex as usize] = place as u32);
+        let vertices = order.iter().map(|&vertex| {
+            let vertex = &self.vertices[vertex as usize];
+            let height = (vertex.height + self.ground.level()).round() as i32;
+            TinVertex { at: vertex.at.lattice_point(rect), height }
+        });
+        let live = self.triangles.iter().filter(|record| record.corners[0] != NONE);
+        let triangles = live.map(|record| record.corners.map(|vertex| index[vertex as usize])).collect();
+        Tin { rect, vertices: vertices.collect(), triangles }
+    }
+}

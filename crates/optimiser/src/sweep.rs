@@ -1,0 +1,453 @@
+//! Moving one vertex after another, in x, y and height, to where the squares around it are least.
+//!
+//! A vertex that moves by (dx, dy, dh) changes the surface at a post of an incident triangle by
+//! l (dh - gx dx - gy dy), where l is the vertex's barycentric coordinate there and (gx, gy) the triangle's slope: the
+//! surface is continuous, so posts that change hands do not matter. The normal equations of such a step need only the
+//! forms of the triangles. No post is read.
+
+use crate::flips::flip_all;
+use crate::form::{Form, Hinge};
+use crate::moments::Sums;
+use crate::place::{PER_POST, Place};
+use crate::refit::DAMPING;
+use crate::sheet::{Hold, LEAST_AREA, Sheet, Star, Vertex};
+
+/// Relative and absolute damping of steps in the plane.
+const PLANE_DAMPING: (f64, f64) = (0.01, 0.02);
+/// Normal equations flatter than this have no step.
+const LEAST_DETERMINANT: f64 = 1e-4;
+/// Lattice places that are tried for a vertex, of 36 around it: two more gain nothing (measured).
+const SNAPS_TRIED: usize = 8;
+/// A step goes no further than this part of the farthest neighbour's distance.
+const STEP_MAX: f64 = 0.6;
+/// A move that gains this part of the mean squares of a triangle stirs its surroundings.
+const STIRRING_SHARE: f64 = 0.005;
+/// Quanta squared that a move has to gain at least.
+const LEAST_GAIN: f64 = 1e-5;
+
+/// Steps of vertices.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Steps {
+    /// In 64ths of a post. On the tile's border, where a neighbour goes on from posts, vertices move from post to post.
+    pub inner: i32,
+    /// Whether single steps in the four directions are tried too.
+    pub pattern: bool,
+}
+
+/// Moves vertices of a sheet.
+pub(crate) struct Mover {
+    pub steps: Steps,
+    /// Gain above which a move stirs its surroundings.
+    stirring: f64,
+    star: Star,
+    around: Vec<(Place, f64)>,
+    /// Sums west of the edges from the vertex, and of those opposite to it.
+    spokes: Vec<Sums>,
+    rims: Vec<Sums>,
+    candidates: Vec<Place>,
+    /// Lattice places by what the normal equations promise of them.
+    ranked: Vec<(f64, Place)>,
+}
+
+/// A place and a height for a vertex, and what the squares around it then come to.
+#[derive(Clone, Copy)]
+struct Stand {
+    at: Place,
+    height: f64,
+    squares: f64,
+}
+
+/// The normal equations of one vertex: a step in the plane, heights eliminated, and the height alone.
+#[derive(Default)]
+struct Normal {
+    matrix: [[f64; 3]; 3],
+    pull: [f64; 3],
+    stiffness: f64,
+    height_pull: f64,
+    squares: f64,
+    /// Distance to the farthest neighbour, in posts.
+    reach: f64,
+}
+
+impl Mover {
+    pub fn new(steps: Steps) -> Self {
+        Self {
+            steps,
+            stirring: f64::INFINITY,
+            star: Star::default(),
+            around: Vec::new(),
+            spokes: Vec::new(),
+            rims: Vec::new(),
+            candidates: Vec::new(),
+            ranked: Vec::new(),
+        }
+    }
+
+    /// Moves every vertex once, or every stirred one. Gives the squares gained.
+    pub fn sweep(&mut self, sheet: &mut Sheet, only_stirred: bool) -> f64 {
+        self.stirring = STIRRING_SHARE * sheet.squares() / sheet.triangle_count as f64;
+        let mut gain = 0.0;
+        for vertex in 0..sheet.vertices.len() as u32 {
+            if sheet.is_vertex(vertex) && (!only_stirred || sheet.vertices[vertex as usize].is_stirred) {
+                gain += self.relax(sheet, vertex);
+            }
+        }
+        self.stirring = f64::INFINITY;
+        gain
+    }
+
+    /// Sweeps over all vertices, each followed by flips.
+    pub fn sweep_and_flip(&mut self, sheet: &mut Sheet, sweeps: usize) {
+        for _ in 0..sweeps {
+            sheet.stir_all();
+            self.sweep(sheet, false);
+            flip_all(sheet);
+        }
+    }
+
+    /// Moves one vertex to a better place, if there is one, and to its best height. Gives the squares gained.
+    #[inline(always)]
+    pub fn relax(&mut self, sheet: &mut Sheet, vertex: u32) -> f64 {
+        let record = sheet.vertices[vertex as usize];
+        if record.hold.has(Hold::PLACE) {
+            return 0.0;
+        }
+        sheet.star(vertex, &mut self.star);
+        self.look_around(sheet);
+        let normal = self.normal(sheet, vertex);
+        let stay = height_only(&record, &normal);
+        self.candidates.clear();
+        if !record.hold.is_fixed() {
+            self.find_candidates(sheet, &record, &normal);
+        }
+        let mut best = stay;
+        let mut has_rims = false;
+        for index in 0..self.candidates.len() {
+            let at = self.candidates[index];
+            if !self.is_valid(at) {
+                continue;
+            }
+            if !has_rims {
+                self.sum_rims(sheet);
+                has_rims = true;
+            }
+            let stand = self.stand(sheet, at, record.height, record.hold);
+            if stand.squares < best.squares - LEAST_GAIN {
+                best = stand;
+                if !self.steps.pattern {
+                    break;
+                }
+            }
+        }
+        self.settle(sheet, vertex, best);
+        let gain = normal.squares - best.squares;
+        if self.stirring < gain {
+            sheet.vertices[vertex as usize].is_stirred = true;
+            self.star.ring.iter().for_each(|&other| sheet.vertices[other as usize].is_stirred = true);
+        }
+        gain
+    }
+
+    /// Moves one vertex to the DEM's height at a place of one's own choice; `false` where it may not stand there.
+    pub fn put(&mut self, sheet: &mut Sheet, vertex: u32, at: Place) -> bool {
+        let record = sheet.vertices[vertex as usize];
+        if record.hold.is_fixed() || held_to_line(at, record.at, record.hold) != at {
+            return false;
+        }
+        sheet.star(vertex, &mut self.star);
+        self.look_around(sheet);
+        if !self.is_valid(at) {
+            return false;
+        }
+        self.sum_rims(sheet);
+        self.settle(sheet, vertex, Stand { at, height: sheet.ground.height(at), squares: 0.0 });
+        true
+    }
+
+    /// Moves one vertex to the best of the lattice places around it that leave triangles of at least `least_area`;
+    /// `false` where there is none.
+    ///
+    /// The normal equations say in which order the places are promising, and the first few valid ones are tried.
+    pub fn snap(&mut self, sheet: &mut Sheet, vertex: u32, least_area: i64) -> bool {
+        let record = sheet.vertices[vertex as usize];
+        let step = self.step(sheet, &record);
+        if record.hold.is_fixed() || (record.at.x % step == 0 && record.at.y % step == 0) {
+            return true;
+        }
+        sheet.star(vertex, &mut self.star);
+        self.look_around(sheet);
+        self.sum_rims(sheet);
+        self.rank_places(sheet, vertex, step);
+        let mut best = None;
+        let mut tried = 0;
+        for index in 0..self.ranked.len() {
+            let at = self.ranked[index].1;
+            if !self.leaves(at, least_area) {
+                continue;
+            }
+            let stand = self.stand(sheet, at, record.height, record.hold);
+            if best.is_none_or(|best: Stand| stand.squares < best.squares) {
+                best = Some(stand);
+            }
+            tried += 1;
+            if tried == SNAPS_TRIED {
+                break;
+            }
+        }
+        best.inspect(|&best| self.settle(sheet, vertex, best)).is_some()
+    }
+
+    /// Fills `ranked` with the lattice places around a vertex, the most promising first.
+    fn rank_places(&mut self, sheet: &Sheet, vertex: u32, step: i32) {
+        const RINGS: i32 = 2;
+        let record = sheet.vertices[vertex as usize];
+        let plane = self.normal(sheet, vertex).plane();
+        let (x, y) = (record.at.x - record.at.x % step, record.at.y - record.at.y % step);
+        self.ranked.clear();
+        for j in -RINGS..=RINGS + 1 {
+            for i in -RINGS..=RINGS + 1 {
+                let at = held_to_line(Place::new(x + i * step, y + j * step), record.at, record.hold);
+                if is_inside(sheet, at) {
+                    let (dx, dy) = Place::new(at.x - record.at.x, at.y - record.at.y).posts();
+                    self.ranked.push((plane.rise(dx, dy), at));
+                }
+            }
+        }
+        self.ranked.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        self.ranked.dedup_by_key(|place| place.1);
+    }
+
+    #[inline(always)]
+    fn step(&self, sheet: &Sheet, record: &Vertex) -> i32 {
+        let (at, far) = (record.at, sheet.ground.far());
+        let is_on_border = at.x == 0 || at.y == 0 || at.x == far.x || at.y == far.y;
+        if is_on_border { PER_POST } else { self.steps.inner }
+    }
+
+    #[inline(always)]
+    fn look_around(&mut self, sheet: &Sheet) {
+        self.around.clear();
+        let look = |&vertex: &u32| (sheet.at(vertex), sheet.vertices[vertex as usize].height);
+        self.around.extend(self.star.ring.iter().map(look));
+    }
+
+    /// The places and heights that triangle `i` of the star has beside the vertex.
+    #[inline(always)]
+    fn opposite(&self, i: usize) -> [(Place, f64); 2] {
+        let next = if i + 1 == self.around.len() { 0 } else { i + 1 };
+        [self.around[i], self.around[next]]
+    }
+
+    #[inline(always)]
+    fn is_valid(&self, at: Place) -> bool {
+        self.leaves(at, LEAST_AREA)
+    }
+
+    /// Whether a vertex at a place leaves every triangle around it at least so large.
+    #[inline(always)]
+    fn leaves(&self, at: Place, least_area: i64) -> bool {
+        (0..self.star.triangles.len()).all(|i| {
+            let [a, b] = self.opposite(i);
+            least_area <= Place::orient(at, a.0, b.0)
+        })
+    }
+
+    #[inline(always)]
+    fn normal(&self, sheet: &Sheet, vertex: u32) -> Normal {
+        let record = &sheet.vertices[vertex as usize];
+        let crest = record.hold.has(Hold::CREST).then(|| sheet.ground.slope(record.at));
+        let mut normal = Normal::default();
+        for (i, &triangle) in self.star.triangles.iter().enumerate() {
+            let face = &sheet.triangles[triangle as usize];
+            let k =
+                face.corners.iter().position(|&corner| corner == vertex).expect("a star's triangles have its vertex");
+            let form = &sheet.forms[triangle as usize];
+            let pull = form.pull(k, sheet.heights(face.corners));
+            let [a, b] = self.opposite(i);
+            let (ax, ay) = Place::new(a.0.x - record.at.x, a.0.y - record.at.y).posts();
+            let (bx, by) = Place::new(b.0.x - record.at.x, b.0.y - record.at.y).posts();
+            let (ha, hb) = (a.1 - record.height, b.1 - record.height);
+            let per_area = 1.0 / (ax * by - ay * bx);
+            let slope = [(ha * by - hb * ay) * per_area, (hb * ax - ha * bx) * per_area];
+            // A vertex that keeps to the ground rises with it.
+            let toward = match crest {
+                Some(ground) => [ground[0] - slope[0], ground[1] - slope[1], 0.0],
+                None => [-slope[0], -slope[1], 1.0],
+            };
+            normal.add(toward, form.aa[k], pull);
+            normal.squares += face.squares;
+            normal.reach = normal.reach.max(ax.abs()).max(ay.abs());
+        }
+        normal
+    }
+
+    fn find_candidates(&mut self, sheet: &Sheet, record: &Vertex, normal: &Normal) {
+        let step = self.step(sheet, record);
+        let (from, hold) = (record.at, record.hold);
+        if let Some((dx, dy)) = normal.step(hold) {
+            for part in [1.0, 0.5, 0.25] {
+                let round = |from: i32, by: f64| {
+                    let to = f64::from(from) + part * by * f64::from(PER_POST);
+                    (to / f64::from(step)).round() as i32 * step
+                };
+                let at = held_to_line(Place::new(round(from.x, dx), round(from.y, dy)), from, hold);
+                if at != from && is_inside(sheet, at) && !self.candidates.contains(&at) {
+                    self.candidates.push(at);
+                }
+            }
+        }
+        if self.steps.pattern {
+            for (i, j) in [(1, 0), (-1, 0), (0, 1), (0, -1)] {
+                let at = held_to_line(Place::new(from.x + i * step, from.y + j * step), from, hold);
+                if at != from && is_inside(sheet, at) {
+                    self.candidates.push(at);
+                }
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn sum_rims(&mut self, sheet: &Sheet) {
+        self.rims.clear();
+        for i in 0..self.star.triangles.len() {
+            let [a, b] = self.opposite(i);
+            self.rims.push(sheet.ground.moments.edge(a.0, b.0));
+        }
+    }
+
+    /// The sums of triangle `i` of the star, spokes and rims being summed.
+    #[inline(always)]
+    fn sums(&self, i: usize) -> Sums {
+        let next = if i + 1 == self.spokes.len() { 0 } else { i + 1 };
+        self.spokes[i] + self.rims[i] - self.spokes[next]
+    }
+
+    /// What comes of standing at a valid place, at the best height there.
+    #[inline(always)]
+    fn stand(&mut self, sheet: &Sheet, at: Place, height: f64, hold: Hold) -> Stand {
+        self.spokes.clear();
+        for &(to, _) in &self.around {
+            self.spokes.push(sheet.ground.moments.edge(at, to));
+        }
+        let height = if hold.has(Hold::CREST) { sheet.ground.height(at) } else { height };
+        let mut all = Hinge::default();
+        for i in 0..self.star.triangles.len() {
+            let [a, b] = self.opposite(i);
+            all += Hinge::new(&self.sums(i), [at, a.0, b.0], [height, a.1, b.1]);
+        }
+        if !hold.height_is_free() {
+            return Stand { at, height, squares: all.squares };
+        }
+        let rise = all.pull / (all.stiffness + DAMPING);
+        Stand { at, height: height + rise, squares: all.squares - rise * (2.0 * all.pull - rise * all.stiffness) }
+    }
+
+    /// Puts the vertex where it is to stand.
+    #[inline(always)]
+    fn settle(&mut self, sheet: &mut Sheet, vertex: u32, stand: Stand) {
+        let record = &mut sheet.vertices[vertex as usize];
+        record.height = stand.height;
+        let moved = record.at != stand.at;
+        if moved {
+            record.at = stand.at;
+            self.spokes.clear();
+            for &(to, _) in &self.around {
+                self.spokes.push(sheet.ground.moments.edge(stand.at, to));
+            }
+        }
+        for i in 0..self.star.triangles.len() {
+            let triangle = self.star.triangles[i];
+            if moved {
+                let corners = sheet.triangles[triangle as usize].corners;
+                sheet.forms[triangle as usize] = Form::new(&self.sums(i), sheet.places(corners));
+            }
+            sheet.settle(triangle);
+        }
+    }
+}
+
+impl Normal {
+    #[inline(always)]
+    fn add(&mut self, toward: [f64; 3], stiffness: f64, pull: f64) {
+        for i in 0..3 {
+            for j in 0..3 {
+                self.matrix[i][j] += stiffness * toward[i] * toward[j];
+            }
+            self.pull[i] += pull * toward[i];
+        }
+        self.stiffness += stiffness;
+        self.height_pull += pull;
+    }
+
+    #[inline(always)]
+    fn plane(&self) -> Plane {
+        let (matrix, pull) = (&self.matrix, &self.pull);
+        let per_height = 1.0 / (matrix[2][2] + DAMPING);
+        let reduced = |i: usize, j: usize| matrix[i][j] - matrix[i][2] * matrix[2][j] * per_height;
+        Plane {
+            a: reduced(0, 0) + matrix[0][0] * PLANE_DAMPING.0 + PLANE_DAMPING.1,
+            b: reduced(0, 1),
+            d: reduced(1, 1) + matrix[1][1] * PLANE_DAMPING.0 + PLANE_DAMPING.1,
+            u: pull[0] - matrix[0][2] * pull[2] * per_height,
+            w: pull[1] - matrix[1][2] * pull[2] * per_height,
+        }
+    }
+
+    /// The damped Gauss-Newton step in the plane, in posts; `None` where there is none.
+    #[inline(always)]
+    fn step(&self, hold: Hold) -> Option<(f64, f64)> {
+        let Plane { a, b, d, u, w } = self.plane();
+        let (dx, dy) = match (hold.has(Hold::COLUMN), hold.has(Hold::ROW)) {
+            (true, true) => return None,
+            (true, false) => (0.0, w / d),
+            (false, true) => (u / a, 0.0),
+            (false, false) => {
+                let determinant = a * d - b * b;
+                if determinant <= LEAST_DETERMINANT {
+                    return None;
+                }
+                ((d * u - b * w) / determinant, (a * w - b * u) / determinant)
+            }
+        };
+        let (length, most) = (dx.abs().max(dy.abs()), STEP_MAX * self.reach);
+        let shorten = if most < length { most / length } else { 1.0 };
+        Some((dx * shorten, dy * shorten))
+    }
+}
+
+/// A step's normal equations in the plane, heights eliminated.
+struct Plane {
+    a: f64,
+    b: f64,
+    d: f64,
+    u: f64,
+    w: f64,
+}
+
+impl Plane {
+    /// By how much the squares change with a step, as far as the equations go.
+    #[inline(always)]
+    fn rise(&self, dx: f64, dy: f64) -> f64 {
+        dx * (self.a * dx + 2.0 * self.b * dy - 2.0 * self.u) + dy * (self.d * dy - 2.0 * self.w)
+    }
+}
+
+/// The best height where the vertex stands.
+#[inline(always)]
+fn height_only(record: &Vertex, normal: &Normal) -> Stand {
+    if !record.hold.height_is_free() {
+        return Stand { at: record.at, height: record.height, squares: normal.squares };
+    }
+    let rise = normal.height_pull / (normal.stiffness + DAMPING);
+    let gain = rise * (2.0 * normal.height_pull - rise * normal.stiffness);
+    Stand { at: record.at, height: record.height + rise, squares: normal.squares - gain }
+}
+
+fn held_to_line(to: Place, from: Place, hold: Hold) -> Place {
+    Place::new(if hold.has(Hold::COLUMN) { from.x } else { to.x }, if hold.has(Hold::ROW) { from.y } else { to.y })
+}
+
+fn is_inside(sheet: &Sheet, at: Place) -> bool {
+    let far = sheet.ground.far();
+    0 <= at.x && 0 <= at.y && at.x <= far.x && at.y <= far.y
+}

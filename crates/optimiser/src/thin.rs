@@ -1,0 +1,120 @@
+//! Thinning: the vertices whose absence costs least go, until what is left fits.
+
+use crate::account::Account;
+use crate::patch::Patch;
+use crate::queue::Queue;
+use crate::removal::Removal;
+use crate::sheet::Sheet;
+use crate::sweep::Mover;
+
+/// A vertex whose surroundings have changed and that became dearer by this part is put back and waits its turn again.
+pub(crate) const DEARER: f64 = 0.02;
+/// Quanta squared by which a cost may rise without the vertex being put back.
+const DEARER_QUANTA: f64 = 0.02;
+
+/// Whether a cost rose so far that others may now be cheaper. Costs can be negative: fitting the heights around a
+/// hole can gain more than the vertex was worth.
+pub(crate) fn is_dearer(now: f64, before: f64) -> bool {
+    before + DEARER * before.abs() + DEARER_QUANTA < now
+}
+
+/// Until when to thin.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Until {
+    /// Until nothing is over the budget, loans included.
+    Afforded,
+    /// Until nothing is over its limit, only there.
+    LimitsMet,
+    /// While the sum of squares stays below.
+    Squares(f64),
+}
+
+/// What thinning works with.
+pub(crate) struct Shears<'a> {
+    pub removal: &'a mut Removal,
+    pub mover: &'a mut Mover,
+    /// No hole may leave a weighted residual above this many quanta.
+    pub largest: Option<f64>,
+}
+
+/// Removes vertices, the cheapest first; each time the vertices around the hole move at once.
+pub(crate) fn thin(sheet: &mut Sheet, account: &mut Account, until: Until, shears: Shears) {
+    let Shears { removal, mover, largest } = shears;
+    let mut queue = Queue::default();
+    let mut is_stale = vec![false; sheet.vertices.len()];
+    // What cannot go now may go once its surroundings have changed.
+    let mut is_stuck = vec![false; sheet.vertices.len()];
+    for vertex in 0..sheet.vertices.len() as u32 {
+        match removal.find(sheet, vertex) {
+            Some(cost) => queue.enter(vertex, -cost),
+            None => is_stuck[vertex as usize] = true,
+        }
+    }
+    let mut unstuck = Vec::new();
+    let mut squares = sheet.squares();
+    while !is_done(account, until, squares) {
+        let Some((vertex, worth)) = queue.pop() else { return };
+        let record = sheet.vertices[vertex as usize];
+        if matches!(until, Until::LimitsMet) && !account.relieves(&record) {
+            continue;
+        }
+        let Some(cost) = removal.find(sheet, vertex) else {
+            is_stuck[vertex as usize] = true;
+            continue;
+        };
+        let was_stale = std::mem::replace(&mut is_stale[vertex as usize], false);
+        if was_stale && is_dearer(cost, -worth) {
+            queue.enter(vertex, -cost);
+            continue;
+        }
+        if let Until::Squares(most) = until
+            && most < squares + cost
+        {
+            return;
+        }
+        if largest.is_some() {
+            // Heights as they are, so that what is checked is what is done.
+            removal.patch.refit.clear();
+            removal.patch.rise.clear();
+        }
+        if largest.is_some_and(|largest| leaves_more_than(largest, sheet, &removal.patch)) {
+            continue;
+        }
+        squares += cost;
+        account.refund(&record);
+        sheet.apply(&mut removal.patch);
+        sheet.drop_vertex(vertex);
+        for index in 0..removal.star.ring.len() {
+            let other = removal.star.ring[index];
+            if largest.is_none() {
+                squares -= mover.relax(sheet, other);
+            }
+            is_stale[other as usize] = true;
+            if std::mem::replace(&mut is_stuck[other as usize], false)
+                && !sheet.vertices[other as usize].hold.is_fixed()
+            {
+                unstuck.push(other);
+            }
+        }
+        for other in unstuck.drain(..) {
+            match removal.find(sheet, other) {
+                Some(cost) => queue.enter(other, -cost),
+                None => is_stuck[other as usize] = true,
+            }
+        }
+    }
+}
+
+fn is_done(account: &Account, until: Until, squares: f64) -> bool {
+    match until {
+        Until::Afforded => 0 <= account.left(),
+        Until::LimitsMet => !account.is_any_over(),
+        Until::Squares(most) => most <= squares,
+    }
+}
+
+/// Whether the triangles of a patch leave a larger weighted residual somewhere.
+fn leaves_more_than(largest: f64, sheet: &Sheet, patch: &Patch) -> bool {
+    let worst = |corners: [u32; 3]| sheet.ground.worst(sheet.places(corners), sheet.heights(corners));
+    patch.new.iter().any(|&(corners, _)| worst(corners).is_some_and(|(residual, _)| largest < residual))
+}
