@@ -43,6 +43,9 @@ pub const COUNT_MAX: u64 = u32::MAX as u64;
 /// Posts across which a void may be filled: beyond it the filled ground is invented.
 pub const FILL_POSTS_MAX: u64 = 1024;
 
+/// Metres over which one source fades into another: beyond it there is no seam to hide.
+pub const FEATHER_M_MAX: f64 = 100_000.0;
+
 /// Residuals and tolerances in metres: heights go no further (24 bits of quanta).
 pub const RESIDUAL_M_MAX: f64 = 131_071.0;
 

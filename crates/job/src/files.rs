@@ -10,7 +10,7 @@ use std::io::Read;
 use std::path::{Component, Path, PathBuf};
 
 use crate::bounds::{JOB_BYTES_MAX, SOURCES_MAX};
-use crate::{AreaShape, DemSource, Fault, Job, JobError, NamedFile, read};
+use crate::{AreaShape, DemSource, Fault, FindArea, Job, JobError, NamedFile, SourceFile, read};
 
 /// A file that the job mentions: where its name stands in the job, and the fault to tell if it is not there.
 pub(crate) struct Mention {
@@ -31,8 +31,20 @@ impl Job {
     /// # Errors
     /// Everything a [`JobError`] can say; the first thing wrong in reading order.
     pub fn load(path: &Path) -> Result<Job, JobError> {
+        Self::load_asking(path, None)
+    }
+
+    /// Reads the job file at `path`, whose area `find` may have to find.
+    ///
+    /// # Errors
+    /// As [`Job::load`], and why there is no such area.
+    pub fn load_with(path: &Path, find: &FindArea) -> Result<Job, JobError> {
+        Self::load_asking(path, Some(find))
+    }
+
+    fn load_asking(path: &Path, find: Option<&FindArea>) -> Result<Job, JobError> {
         let text = text_of(path)?;
-        let (mut job, mentions) = read::read(&text, path)?;
+        let (mut job, mentions) = read::read(&text, path, find)?;
         locate(&mut job, mentions)?;
         Ok(job)
     }
@@ -43,7 +55,7 @@ impl Job {
     /// # Errors
     /// Whatever is wrong with the text itself.
     pub fn from_text(text: &str, path: &Path) -> Result<Job, JobError> {
-        read::read(text, path).map(|(job, _)| job)
+        read::read(text, path, None).map(|(job, _)| job)
     }
 }
 
@@ -82,40 +94,46 @@ fn split_pattern(written: &str) -> (PathBuf, PathBuf) {
 /// Checks every mentioned file and expands the patterns among the sources.
 fn locate(job: &mut Job, mentions: Vec<Mention>) -> Result<(), JobError> {
     let folder = job.folder().to_owned();
-    let (mut found, mut seen) = (Vec::new(), BTreeSet::new());
+    locate_sources(&mut job.dem.source, &folder, &mentions)?;
     for Mention { place, fault } in mentions {
-        match place {
-            Place::Source(index) => {
-                let DemSource::Files { files, .. } = &job.dem.source else { continue };
-                let more = source_files(&files[index], &folder, &fault)?;
-                // A file that two entries find keeps the higher priority.
-                found.extend(more.into_iter().filter(|file| seen.insert(file.path.clone())));
-                if SOURCES_MAX < found.len() {
-                    let expected = format!("at most {SOURCES_MAX} files");
-                    return Err(JobError::OutOfRange(Box::new(Fault { expected, ..*fault })));
-                }
-            }
-            Place::ImportanceArea(index) => match &job.importance.areas[index].shape {
-                AreaShape::Polygons { file } | AreaShape::RasterValue { file, .. } => {
-                    check_named(file, &folder, &fault)?
-                }
-                AreaShape::Sample(_) => {}
-            },
+        let Place::ImportanceArea(index) = place else { continue };
+        match &job.importance.areas[index].shape {
+            AreaShape::Polygons { file } | AreaShape::RasterValue { file, .. } => check_named(file, &folder, &fault)?,
+            AreaShape::Sample(_) => {}
         }
-    }
-    if let DemSource::Files { files, .. } = &mut job.dem.source {
-        *files = found;
     }
     Ok(())
 }
 
-/// The files that one entry of `dem.sources` stands for.
-fn source_files(named: &NamedFile, folder: &Path, fault: &Fault) -> Result<Vec<NamedFile>, JobError> {
-    if has_wildcard(&named.written) && !named.path.exists() {
-        return matches_of(&named.written, folder, fault);
+/// Checks every file of `dem.sources` and expands its patterns.
+pub(crate) fn locate_sources(source: &mut DemSource, folder: &Path, mentions: &[Mention]) -> Result<(), JobError> {
+    let DemSource::Files { files, .. } = source else { return Ok(()) };
+    let (mut found, mut seen) = (Vec::new(), BTreeSet::new());
+    for Mention { place, fault } in mentions {
+        let Place::Source(index) = *place else { continue };
+        let more = source_files(&files[index], folder, fault)?;
+        // A file that two entries find keeps the higher priority.
+        found.extend(more.into_iter().filter(|file| seen.insert(file.path.clone())));
+        if SOURCES_MAX < found.len() {
+            let expected = format!("at most {SOURCES_MAX} files");
+            return Err(JobError::OutOfRange(Box::new(Fault { expected, ..(**fault).clone() })));
+        }
     }
-    check_named(named, folder, fault)?;
-    Ok(vec![named.clone()])
+    *files = found;
+    Ok(())
+}
+
+/// The files that one entry of `dem.sources` stands for.
+fn source_files(source: &SourceFile, folder: &Path, fault: &Fault) -> Result<Vec<SourceFile>, JobError> {
+    if has_wildcard(&source.written) && !source.path.exists() {
+        let found = matches_of(&source.written, folder, fault)?.into_iter();
+        return Ok(found
+            .map(|NamedFile { written, path }| SourceFile { written, path, said: source.said.clone() })
+            .collect());
+    }
+    let named = NamedFile { written: source.written.clone(), path: source.path.clone() };
+    check_named(&named, folder, fault)?;
+    Ok(vec![source.clone()])
 }
 
 fn check_named(named: &NamedFile, folder: &Path, fault: &Fault) -> Result<(), JobError> {

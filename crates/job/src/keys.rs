@@ -20,6 +20,8 @@ const AREA: &[Key] = &[
     ("crs", "crs = \"EPSG:32611\""),
     ("origin_m", "origin_m = [505000, 3875000]"),
     ("size_m", "size_m = [50000, 50000]"),
+    ("around", "around = { lat = 35.3, lon = -116.6, size_km = 50 }"),
+    ("cover", "cover = \"dem\""),
     ("spacing_m", "spacing_m = 25"),
 ];
 
@@ -30,6 +32,8 @@ const DEM: &[Key] = &[
     ("vertical_datum", "vertical_datum = \"EGM96\""),
     ("height_unit_m", "height_unit_m = 0.3048"),
     ("voids", "voids = \"fail\""),
+    ("resampling", "resampling = \"cubic\""),
+    ("feather_m", "feather_m = 500"),
 ];
 
 const IMPORTANCE: &[Key] = &[
@@ -72,8 +76,8 @@ const TIN: &[Key] = &[
     ("max_residual_m", "max_residual_m = 10"),
     ("target_rms_m", "target_rms_m = 1.5"),
     ("effort", "effort = \"normal\""),
-    ("height_fit", "height_fit = \"off\""),
-    ("lattice", "lattice = \"post\""),
+    ("height_fit", "height_fit = \"l2_keep_crests\""),
+    ("lattice", "lattice = \"eighth\""),
     ("start", "start = \"lattice\""),
     ("pins", "pins = \"pins.geojson\""),
 ];
@@ -88,13 +92,37 @@ const AREAS: &[Key] = &[
     ("weight", "weight = 1; 0 excludes posts from selection"),
 ];
 
+/// Keys of one entry of `dem.sources` when it is a table.
+const SOURCES: &[Key] = &[
+    ("file", "{ file = \"cell.asc\", crs = \"EPSG:32611\" }"),
+    ("crs", "{ file = \"cell.asc\", crs = \"EPSG:32611\" }"),
+    ("corner", "corner = [35, -117], latitude and longitude of the south-west post of an HGT tile"),
+    ("height_unit_m", "height_unit_m = 0.3048"),
+    ("nodata", "nodata = -32767"),
+    ("vertical_datum", "vertical_datum = \"EGM96\""),
+    ("attribution", "attribution = \"NASA/USGS SRTM, public domain\""),
+];
+
+/// Keys of `area.around`.
+const AROUND: &[Key] = &[
+    ("lat", "around = { lat = 35.3, lon = -116.6, size_km = 50 }"),
+    ("lon", "around = { lat = 35.3, lon = -116.6, size_km = 50 }"),
+    ("size_km", "size_km = 50, or [50, 30] for west to east and south to north"),
+];
+
 /// Keys of `dem.voids` when it is a table.
-const VOIDS: &[Key] = &[("fill_within_posts", "voids = { fill_within_posts = 8 }")];
+const VOIDS: &[Key] = &[
+    ("fill_within_posts", "voids = { fill_within_posts = 8 }"),
+    ("next_source", "voids = { next_source = true, fill_within_posts = 8 }"),
+    ("hole", "voids = { fill_within_posts = 8, hole = true }"),
+];
 
 /// The keys of a table, by its place in the job: `area`, `dem.voids`, `importance.areas[3]`.
 fn table(place: &str) -> &'static [Key] {
     match place {
         "dem.voids" => VOIDS,
+        "area.around" => AROUND,
+        _ if place.starts_with("dem.sources[") => SOURCES,
         _ if place.starts_with("importance.areas[") => AREAS,
         _ => SECTIONS.iter().find(|(name, _)| *name == place).map_or(&[], |(_, keys)| keys),
     }

@@ -14,10 +14,13 @@
 
 mod model;
 pub use model::{
-    Allocation, Area, AreaShape, Borders, Budget, ClipHeights, Count, DemSource, DemSpec, Edges, ErrorKey,
-    ImportanceArea, ImportanceSpec, Job, LastBatch, LimitsSpec, Method, ModulesSpec, NamedFile, Proximity, SampleClass,
-    Smooth, TileOrder, TilesSpec, TinSpec, Voids, WindowLimit,
+    Allocation, Area, AreaShape, Borders, Budget, ClipHeights, Count, DemSource, DemSpec, Edges, Effort, ErrorKey,
+    HeightFit, ImportanceArea, ImportanceSpec, Job, LastBatch, Lattice, LimitsSpec, Method, ModulesSpec, NamedFile,
+    Optimising, Proximity, Resampling, SampleClass, Smooth, SourceEntry, SourceFile, SourceSaid, TileOrder, TilesSpec,
+    TinSpec, Voids, WindowLimit,
 };
+mod find;
+pub use find::{AreaFound, AreaPlace, AreaRequest, FindArea, NoArea};
 mod error;
 pub use error::{Fault, JobError};
 mod bounds;

@@ -45,14 +45,29 @@ pub struct Area {
 pub struct DemSpec {
     /// The built-in terrain or files.
     pub source: DemSource,
-    /// What the heights are measured from, as the job says; for provenance only.
+    /// What the heights of the product are measured from; sources that say something else are refused.
     pub vertical_datum: Option<String>,
     /// What to do about posts without a height.
     pub voids: Voids,
+    /// Whether a void is first given the height of the next source that has one.
+    pub next_source: bool,
+    /// How a height between posts of a source comes about.
+    pub resampling: Resampling,
+    /// Over how many metres from its edge a source fades into those after it; 0 for a plain seam.
+    pub feather_m: f64,
+}
+
+/// How a height between posts of a source comes about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Resampling {
+    /// From the four posts around it.
+    Bilinear,
+    /// From the sixteen posts around it.
+    Cubic,
 }
 
 /// The built-in terrain or files.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum DemSource {
     /// The built-in basin-and-range terrain.
     Sample {
@@ -61,11 +76,48 @@ pub enum DemSource {
     },
     /// Rasters on disk.
     Files {
-        /// Names and patterns as written in the job.
-        written: Vec<String>,
+        /// Names and patterns as written in the job, with what it says about them.
+        written: Vec<SourceEntry>,
         /// The files, in order of priority, none twice.
-        files: Vec<NamedFile>,
+        files: Vec<SourceFile>,
     },
+}
+
+/// One entry of `dem.sources`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SourceEntry {
+    /// The name or pattern.
+    pub name: String,
+    /// What the job says about its files.
+    pub said: SourceSaid,
+}
+
+/// A raster that the job names, or that a pattern of it found.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SourceFile {
+    /// As in [`NamedFile`].
+    pub written: String,
+    /// As in [`NamedFile`].
+    pub path: PathBuf,
+    /// What the job says about it.
+    pub said: SourceSaid,
+}
+
+/// What a job says about a raster, over what the raster says itself.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SourceSaid {
+    /// Its coordinate system, as `EPSG:4326` or well-known text.
+    pub crs: Option<String>,
+    /// Latitude and longitude of the south-west post, in degrees, of an HGT tile whose name does not say.
+    pub corner: Option<[f64; 2]>,
+    /// Metres in a unit of height.
+    pub height_unit_m: Option<f64>,
+    /// The value that marks a void.
+    pub nodata: Option<f64>,
+    /// What its heights are measured from, as `EGM96`, `EGM2008`, `NAVD88` or `ellipsoid`.
+    pub vertical_datum: Option<String>,
+    /// Whom to thank, or the licence.
+    pub attribution: Option<String>,
 }
 
 /// A file that the job names.
@@ -85,6 +137,10 @@ pub enum Voids {
     Fail,
     /// Voids with a height within this many posts are filled from it; any other void is an error.
     FillWithinPosts(u32),
+    /// Voids with a height within this many posts are filled from it; any other is a hole.
+    FillThenHole(u32),
+    /// Voids, and ground that no source reaches, have no weight and are in no statistic.
+    Hole,
 }
 
 /// Where ground matters more.
@@ -114,7 +170,7 @@ pub struct ImportanceArea {
 /// Which posts an importance area holds.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum AreaShape {
-    /// Posts inside the polygons of a GeoJSON file.
+    /// Posts inside the polygons of a GeoJSON file or a Shapefile.
     Polygons {
         /// The file.
         file: NamedFile,
@@ -277,7 +333,53 @@ pub enum Method {
     /// One worst post at a time.
     Greedy,
     /// Lowest RMS residual under the limits.
-    Optimised,
+    Optimised(Optimising),
+}
+
+/// What the optimised method may do for a lower residual.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Optimising {
+    /// How much work it does.
+    pub effort: Effort,
+    /// Which vertices leave the height of the DEM.
+    pub height_fit: HeightFit,
+    /// Where vertices stand.
+    pub lattice: Lattice,
+}
+
+/// How much work the optimised method does.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Effort {
+    /// Chosen posts are moved and their edges flipped.
+    Fast,
+    /// More posts are chosen than the limits allow, then thinned and exchanged.
+    #[default]
+    Normal,
+    /// More still, grown and thinned in turns.
+    Best,
+}
+
+/// Which vertices leave the height of the DEM. Those on the outer border of an area and the corners of tiles never
+/// do.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum HeightFit {
+    /// All that may: each stands where squared residuals are least.
+    Squares,
+    /// All that may but those on crests, which fitted heights would shave.
+    #[default]
+    SquaresKeepCrests,
+    /// None.
+    Off,
+}
+
+/// Where vertices stand; those on lines between tiles stand on posts either way.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Lattice {
+    /// On eighths of a post.
+    #[default]
+    Eighth,
+    /// On posts.
+    Post,
 }
 
 /// A post this near a vertex both ways is left out of a batch. Both bounds are inclusive.

@@ -6,8 +6,9 @@
 use terrain::{THOUSANDTHS, metres_of_quanta};
 
 use crate::{
-    Allocation, AreaShape, Borders, Budget, ClipHeights, Count, DemSource, Edges, ErrorKey, ImportanceArea, Job,
-    LastBatch, Method, SampleClass, Smooth, TileOrder, Voids,
+    Allocation, AreaShape, Borders, Budget, ClipHeights, Count, DemSource, Edges, Effort, ErrorKey, HeightFit,
+    ImportanceArea, Job, LastBatch, Lattice, Method, Optimising, Resampling, SampleClass, Smooth, SourceEntry,
+    TileOrder, Voids,
 };
 
 /// One setting of a job.
@@ -74,7 +75,7 @@ impl Job {
                 list.add("dem.seed", seed.to_string(), "which one of its terrains");
             }
             DemSource::Files { written, files } => {
-                let names: Vec<String> = written.iter().map(|name| quoted(name)).collect();
+                let names: Vec<String> = written.iter().map(source_text).collect();
                 let meaning = format!("{} in order of priority", counted(files.len(), "raster"));
                 list.add("dem.sources", format!("[{}]", names.join(", ")), meaning);
             }
@@ -82,13 +83,38 @@ impl Job {
         if let Some(datum) = &self.dem.vertical_datum {
             list.add("dem.vertical_datum", quoted(datum), "what heights are measured from");
         }
-        match self.dem.voids {
-            Voids::Fail => list.add("dem.voids", quoted("fail"), "a post without a height is an error"),
-            Voids::FillWithinPosts(posts) => {
-                let meaning = format!("voids are filled from heights at most {} away", counted(posts as usize, "post"));
-                list.add("dem.voids", format!("{{ fill_within_posts = {posts} }}"), meaning);
-            }
+        self.describe_voids(list);
+        if self.dem.resampling == Resampling::Cubic {
+            list.add("dem.resampling", quoted("cubic"), "heights between posts come from sixteen of them");
         }
+        if 0.0 < self.dem.feather_m {
+            let meaning = "metres over which a source fades into the next";
+            list.add("dem.feather_m", number(self.dem.feather_m), meaning);
+        }
+    }
+
+    fn describe_voids(&self, list: &mut List) {
+        let next = if self.dem.next_source { "voids are filled from the next source first; " } else { "" };
+        let table = |keys: &str| match self.dem.next_source {
+            true => format!("{{ next_source = true, {keys} }}"),
+            false => format!("{{ {keys} }}"),
+        };
+        let filled = |posts: u32| {
+            format!("{next}voids are filled from heights at most {} away", counted(posts as usize, "post"))
+        };
+        let (value, meaning) = match self.dem.voids {
+            Voids::Fail if self.dem.next_source => {
+                (quoted("next_source"), format!("{next}a post without a height in any is an error"))
+            }
+            Voids::Fail => (quoted("fail"), "a post without a height is an error".to_owned()),
+            Voids::Hole if self.dem.next_source => (table("hole = true"), format!("{next}others are holes")),
+            Voids::Hole => (quoted("hole"), "ground without a height has no weight".to_owned()),
+            Voids::FillWithinPosts(posts) => (table(&format!("fill_within_posts = {posts}")), filled(posts)),
+            Voids::FillThenHole(posts) => {
+                (table(&format!("fill_within_posts = {posts}, hole = true")), filled(posts) + "; others are holes")
+            }
+        };
+        list.add("dem.voids", value, meaning);
     }
 
     fn describe_importance(&self, list: &mut List) {
@@ -207,7 +233,7 @@ impl Job {
         let (method, meaning) = match tin.method {
             Method::Paper { .. } => ("paper", "largest residual first, in batches"),
             Method::Greedy => ("greedy", "one worst post at a time"),
-            Method::Optimised => ("optimised", "lowest RMS residual under the limits"),
+            Method::Optimised(_) => ("optimised", "lowest RMS residual under the limits"),
         };
         list.add("tin.method", quoted(method), meaning);
         if let Budget::Points(points) = tin.budget {
@@ -223,9 +249,8 @@ impl Job {
                 list.add("tin.allocation", quoted("global"), "tiles share by what a survey says they gain")
             }
         }
-        if tin.method == Method::Optimised {
-            list.add("tin.height_fit", quoted("off"), "vertices stand at DEM height");
-            list.add("tin.lattice", quoted("post"), "vertices stand on posts");
+        if let Method::Optimised(optimising) = tin.method {
+            describe_optimising(optimising, list);
         } else {
             let metres = number(metres_of_quanta(tin.residual_quantum as i32));
             let meaning = format!("residuals are compared in steps of {metres} m");
@@ -257,6 +282,28 @@ impl Job {
             LastBatch::Finish => list.add("tin.last_batch", quoted("finish"), "the last batch goes in whole"),
         }
     }
+}
+
+fn describe_optimising(optimising: Optimising, list: &mut List) {
+    let (effort, meaning) = match optimising.effort {
+        Effort::Fast => ("fast", "chosen posts are moved and their edges flipped"),
+        Effort::Normal => ("normal", "more posts are chosen than the limits allow, then thinned and exchanged"),
+        Effort::Best => ("best", "more posts still, grown and thinned in turns"),
+    };
+    list.add("tin.effort", quoted(effort), meaning);
+    let (heights, meaning) = match optimising.height_fit {
+        HeightFit::Squares => ("l2", "vertices stand where squared residuals are least"),
+        HeightFit::SquaresKeepCrests => {
+            ("l2_keep_crests", "vertices stand where squared residuals are least, crests at DEM height")
+        }
+        HeightFit::Off => ("off", "vertices stand at DEM height"),
+    };
+    list.add("tin.height_fit", quoted(heights), meaning);
+    let (lattice, meaning) = match optimising.lattice {
+        Lattice::Eighth => ("eighth", "vertices stand on eighths of a post, those on module lines on posts"),
+        Lattice::Post => ("post", "vertices stand on posts"),
+    };
+    list.add("tin.lattice", quoted(lattice), meaning);
 }
 
 /// The settings so far.
@@ -294,6 +341,21 @@ fn quoted(text: &str) -> String {
         }
     }
     out + "\""
+}
+
+/// An entry of `dem.sources` as TOML.
+fn source_text(SourceEntry { name, said }: &SourceEntry) -> String {
+    let mut keys = Vec::new();
+    keys.extend(said.crs.as_ref().map(|crs| format!("crs = {}", quoted(crs))));
+    keys.extend(said.corner.map(|corner| format!("corner = {}", pair(corner))));
+    keys.extend(said.height_unit_m.map(|unit_m| format!("height_unit_m = {}", number(unit_m))));
+    keys.extend(said.nodata.map(|nodata| format!("nodata = {}", number(nodata))));
+    keys.extend(said.vertical_datum.as_ref().map(|datum| format!("vertical_datum = {}", quoted(datum))));
+    keys.extend(said.attribution.as_ref().map(|text| format!("attribution = {}", quoted(text))));
+    match keys.is_empty() {
+        true => quoted(name),
+        false => format!("{{ file = {}, {} }}", quoted(name), keys.join(", ")),
+    }
 }
 
 fn counted(count: usize, noun: &str) -> String {

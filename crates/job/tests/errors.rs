@@ -90,7 +90,7 @@ fn unknown_keys_are_told_with_the_nearest_known_one() {
         "spacing = 25",
         &[
             "a/b.toml:6: area.spacing: found a key that no job has, expected one of name, crs, origin_m,",
-            "size_m, spacing_m",
+            "size_m, around, cover, spacing_m",
             "hint: did you mean spacing_m?",
         ],
     );
@@ -172,7 +172,8 @@ fn unknown_keys_are_told_with_the_nearest_known_one() {
         r#"source = "sample"
 voids = { fill = 8 }"#,
         &[
-            "a/b.toml:9: dem.voids.fill: found a key that no job has, expected one of fill_within_posts",
+            "a/b.toml:9: dem.voids.fill: found a key that no job has, expected one of fill_within_posts,",
+            "next_source, hole",
             "hint: did you mean fill_within_posts?",
         ],
     );
@@ -373,7 +374,8 @@ fn values_of_the_wrong_type_are_told_as_written() {
         r#"source = "sample"
 voids = 8"#,
         &[
-            r#"a/b.toml:9: dem.voids: found the whole number 8, expected "fail" or { fill_within_posts = 8 }"#,
+            r#"a/b.toml:9: dem.voids: found the whole number 8, expected "fail", "next_source", "hole" or"#,
+            "{ fill_within_posts = 8 }",
             r#"hint: for example voids = "fail""#,
         ],
     );
@@ -466,9 +468,22 @@ fn words_are_told_with_the_nearest_known_one() {
         "method",
         r#"height_fit = "l3""#,
         &[
-            r#"a/b.toml:18: tin.height_fit: found "l3", expected "off" or "l2" or "l2_keep_crests""#,
+            r#"a/b.toml:18: tin.height_fit: found "l3", expected "l2" or "l2_keep_crests" or "off""#,
             r#"hint: did you mean "l2"?"#,
         ],
+    );
+    check(
+        "method",
+        r#"effort = "high""#,
+        &[
+            r#"a/b.toml:18: tin.effort: found "high", expected "fast" or "normal" or "best""#,
+            r#"hint: for example effort = "normal""#,
+        ],
+    );
+    check(
+        "method",
+        r#"lattice = "posts""#,
+        &[r#"a/b.toml:18: tin.lattice: found "posts", expected "eighth" or "post""#, r#"hint: did you mean "post"?"#],
     );
     check(
         "default",
@@ -1047,6 +1062,26 @@ effort = "fast""#,
     );
     check(
         "method",
+        r#"method = "paper"
+points = 9
+lattice = "post""#,
+        &[
+            r#"a/b.toml:20: tin.lattice: found "post" beside method = "paper", expected a job without this key"#,
+            r#"hint: it belongs to method = "optimised"; the paper's vertices stay on posts at DEM height"#,
+        ],
+    );
+    check(
+        "method",
+        r#"method = "greedy"
+height_fit = "off""#,
+        &[
+            r#"a/b.toml:19: tin.height_fit: found "off" beside method = "greedy", expected a job without this"#,
+            "key",
+            r#"hint: greedy takes one worst post at a time; batches belong to "paper", fitting to "optimised""#,
+        ],
+    );
+    check(
+        "method",
         r#"method = "greedy"
 proximity_m = [300, 20]"#,
         &[
@@ -1071,6 +1106,23 @@ proximity_m = [300, 20]"#,
 
 #[test]
 fn values_of_the_tin_section_are_checked() {
+    check(
+        "method",
+        "lattice = 8",
+        &[
+            r#"a/b.toml:18: tin.lattice: found the whole number 8, expected "eighth" or "post""#,
+            r#"hint: for example lattice = "eighth""#,
+        ],
+    );
+    check(
+        "method",
+        "height_fit = false",
+        &[
+            r#"a/b.toml:18: tin.height_fit: found the truth value false, expected "l2" or "l2_keep_crests""#,
+            r#"or "off""#,
+            r#"hint: for example height_fit = "l2_keep_crests""#,
+        ],
+    );
     check(
         "method",
         r#"method = "paper"
@@ -1154,7 +1206,8 @@ proximity_m = false"#,
         r#"source = "sample"
 voids = "ignore""#,
         &[
-            r#"a/b.toml:9: dem.voids: found "ignore", expected "fail" or { fill_within_posts = 8 }"#,
+            r#"a/b.toml:9: dem.voids: found "ignore", expected "fail", "next_source", "hole" or"#,
+            "{ fill_within_posts = 8 }",
             r#"hint: for example voids = "fail""#,
         ],
     );
@@ -1181,31 +1234,6 @@ seed = -1"#,
 
 #[test]
 fn what_this_version_cannot_do_yet_is_said() {
-    check(
-        "method",
-        r#"effort = "normal""#,
-        &[
-            r#"a/b.toml:18: tin.effort: found "normal" (not supported yet), expected a job without this key"#,
-            "hint: remove it: this version chooses posts by squared error under the limits and moves none",
-        ],
-    );
-    check(
-        "method",
-        r#"height_fit = "l2_keep_crests""#,
-        &[
-            r#"a/b.toml:18: tin.height_fit: found "l2_keep_crests" (not supported yet), expected "off", vertices"#,
-            "at DEM height",
-            "hint: remove it: this version chooses posts by squared error under the limits and moves none",
-        ],
-    );
-    check(
-        "method",
-        r#"lattice = "eighth""#,
-        &[
-            r#"a/b.toml:18: tin.lattice: found "eighth" (not supported yet), expected "post", vertices on posts"#,
-            "hint: remove it: this version chooses posts by squared error under the limits and moves none",
-        ],
-    );
     check(
         "method",
         r#"start = "lattice""#,
@@ -1241,36 +1269,61 @@ fn what_this_version_cannot_do_yet_is_said() {
     );
     check(
         "source",
-        r#"sources = ["n36.dt1"]"#,
-        &[
-            r#"a/b.toml:8: dem.sources[0]: found "n36.dt1" (not supported yet), expected a GeoTIFF"#,
-            "hint: convert it first: gdal_translate IN OUT.tif",
-        ],
-    );
-    check(
-        "source",
-        r#"sources = ["dem/*.HGT"]"#,
-        &[
-            r#"a/b.toml:8: dem.sources[0]: found "dem/*.HGT" (not supported yet), expected a GeoTIFF"#,
-            "hint: convert it first: gdal_translate IN OUT.tif",
-        ],
-    );
-    check(
-        "source",
         r#"source = "sample"
 height_unit_m = 0.3048"#,
         &[
-            "a/b.toml:9: dem.height_unit_m: found 0.3048 (not supported yet), expected heights in metres,",
-            "without this key",
-            "hint: convert the heights to metres first",
+            r#"a/b.toml:9: dem.height_unit_m: found 0.3048 beside source = "sample", expected no unit, since the"#,
+            "sample is in metres",
+            "hint: remove it",
+        ],
+    );
+}
+
+#[test]
+fn what_a_job_says_about_a_source_is_checked() {
+    check(
+        "source",
+        r#"sources = [{ file = "a.hgt", corner = [95, 5] }]"#,
+        &[
+            "a/b.toml:8: dem.sources[0].corner: found [95, 5], expected latitude and longitude in degrees,",
+            "latitude first",
+            "hint: for example corner = [35, -117], latitude and longitude of the south-west post of an HGT tile",
         ],
     );
     check(
-        "default",
-        r#"areas = [{ file = "m.shp", class = "m", weight = 1 }]"#,
+        "source",
+        r#"sources = [{ crs = "EPSG:4326" }]"#,
         &[
-            r#"a/b.toml:10: importance.areas[0].file: found "m.shp" (not supported yet), expected a GeoJSON file"#,
-            "hint: convert it first: ogr2ogr OUT.geojson IN.shp",
+            "a/b.toml:8: dem.sources[0].file: found nothing, expected the path of a raster",
+            r#"hint: for example { file = "cell.asc", crs = "EPSG:32611" }"#,
+        ],
+    );
+    check(
+        "source",
+        r#"sources = ["a.tif"]
+feather_m = -1"#,
+        &["a/b.toml:9: dem.feather_m: found -1, expected metres from 0 to 100000", "hint: for example feather_m = 500"],
+    );
+}
+
+#[test]
+fn an_area_that_is_to_be_found_needs_no_numbers_and_takes_none() {
+    check(
+        "origin_m",
+        r#"cover = "dem""#,
+        &[
+            r#"a/b.toml:4: area.cover: found "dem" beside size_m, expected either cover, around, or origin_m and"#,
+            "size_m",
+            "hint: remove one of the two",
+        ],
+    );
+    check(
+        "crs",
+        r#"crs = "auto""#,
+        &[
+            r#"a/b.toml:3: area.crs: found "auto" beside origin_m, expected a system for these metres, as"#,
+            r#""EPSG:32611""#,
+            r#"hint: "auto" goes with around = { lat = 35.3, lon = -116.6, size_km = 50 } or cover = "dem""#,
         ],
     );
 }

@@ -6,8 +6,8 @@
 use std::path::{Path, PathBuf};
 
 use job::{
-    Allocation, AreaShape, Budget, ClipHeights, Count, DemSource, Edges, ErrorKey, Job, LastBatch, Method, Proximity,
-    SampleClass, TileOrder, Voids, WindowLimit,
+    Allocation, AreaShape, Budget, ClipHeights, Count, DemSource, Edges, Effort, ErrorKey, HeightFit, Job, LastBatch,
+    Lattice, Method, Optimising, Proximity, SampleClass, TileOrder, Voids, WindowLimit,
 };
 use terrain::ModuleGrid;
 
@@ -43,7 +43,10 @@ fn the_shortest_job_has_the_documented_defaults() {
     assert_eq!((job.limits.per_load_module, job.limits.pool), (100, 0));
     assert_eq!(job.limits.area_budget(&job.area.grid), 32 * 30);
     assert_eq!(job.limits.window, WindowLimit { limit: 4096, rows: 5, cols: 6 });
-    assert_eq!((job.tin.method, job.tin.key, job.tin.budget), (Method::Optimised, ErrorKey::Sse, Budget::Limits));
+    let usual =
+        Optimising { effort: Effort::Normal, height_fit: HeightFit::SquaresKeepCrests, lattice: Lattice::Eighth };
+    assert_eq!(job.tin.method, Method::Optimised(usual));
+    assert_eq!((job.tin.key, job.tin.budget), (ErrorKey::Sse, Budget::Limits));
     assert_eq!((job.tin.allocation, job.tin.residual_quantum), (Allocation::Global, 1));
 }
 
@@ -94,6 +97,31 @@ fn clipped_edges_and_batches_carry_their_own_keys() {
     assert_eq!(other.tin.key, ErrorKey::Sse);
 }
 
+#[test]
+fn every_word_of_the_optimised_method_is_read_and_written_back() {
+    let optimising = |line: String| {
+        let job = job(&format!("{SHORTEST}[tin]\n{line}\n"));
+        check_canonical(&job);
+        assert!(job.canonical_text().contains(&line), "{line}");
+        let Method::Optimised(optimising) = job.tin.method else { panic!("the default method") };
+        optimising
+    };
+    for (word, effort) in [("fast", Effort::Fast), ("normal", Effort::Normal), ("best", Effort::Best)] {
+        let expected = Optimising { effort, ..Optimising::default() };
+        assert_eq!(optimising(format!("effort = \"{word}\"")), expected);
+    }
+    let heights =
+        [("l2", HeightFit::Squares), ("l2_keep_crests", HeightFit::SquaresKeepCrests), ("off", HeightFit::Off)];
+    for (word, height_fit) in heights {
+        let expected = Optimising { height_fit, ..Optimising::default() };
+        assert_eq!(optimising(format!("height_fit = \"{word}\"")), expected);
+    }
+    for (word, lattice) in [("eighth", Lattice::Eighth), ("post", Lattice::Post)] {
+        let expected = Optimising { lattice, ..Optimising::default() };
+        assert_eq!(optimising(format!("lattice = \"{word}\"")), expected);
+    }
+}
+
 /// The canonical text of a job reads back as the same settings, and is its own canonical text.
 #[track_caller]
 fn check_canonical(job: &Job) {
@@ -115,9 +143,20 @@ fn the_canonical_text_is_the_same_job() {
         "[limits]\nmean_per_load_module = 31.7\npool = 12\n[tiles]\norder = \"raster\"\ncolumns = 1\n",
         "[importance]\ndefault = 0.001\nareas = [{ sample = \"mountains\", class = \"m \\\\ n\", weight = 3 }]\n",
     ];
-    for variant in variants {
+    let voids = ["\"hole\"", "\"next_source\"", "{ hole = true, next_source = true }"];
+    let voids = voids.map(|voids| format!("voids = {voids}\n"));
+    let all = "voids = { next_source = true, fill_within_posts = 3, hole = true }\nresampling = \"cubic\"\n\
+        feather_m = 250.5\n";
+    for variant in variants.into_iter().chain(voids.iter().map(String::as_str)).chain([all]) {
         check_canonical(&job(&format!("{SHORTEST}{variant}")));
     }
+    let sources = r#"sources = ["a.tif", { file = "b.hgt", crs = "EPSG:4326", corner = [35, -117], nodata = -9999,
+        height_unit_m = 0.3048, vertical_datum = "EGM96", attribution = "NASA" }]
+feather_m = 5"#;
+    let several = job(&SHORTEST.replace("source = \"sample\"", sources));
+    check_canonical(&several);
+    let again = Job::from_text(&several.canonical_text(), &several.path).unwrap();
+    assert_eq!(again.dem, several.dem);
     let sample = AreaShape::Sample(SampleClass::Mountains);
     assert_eq!(job(&format!("{SHORTEST}{}", variants[6])).importance.areas[0].shape, sample);
 }
@@ -168,8 +207,12 @@ fn every_setting_is_described_with_value_and_meaning() {
             r#"tin.method = "optimised": lowest RMS residual under the limits"#,
             r#"tin.key = "sse": a triangle is worth its weighted squared residuals"#,
             r#"tin.allocation = "global": tiles share by what a survey says they gain"#,
-            r#"tin.height_fit = "off": vertices stand at DEM height"#,
-            r#"tin.lattice = "post": vertices stand on posts"#,
+            r#"tin.effort = "normal": more posts are chosen than the limits allow, then thinned and exchanged"#,
+            concat!(
+                r#"tin.height_fit = "l2_keep_crests": vertices stand where squared residuals are least, "#,
+                "crests at DEM height"
+            ),
+            r#"tin.lattice = "eighth": vertices stand on eighths of a post, those on module lines on posts"#,
         ]
     );
 }

@@ -2,32 +2,47 @@
 
 use std::path::Path;
 
-use geometry::resample::nearest;
+use geometry::resample::{TAP_UNITS, nearest};
 use terrain::{GridFrame, Post, PostRect};
 
+use crate::crs::Crs;
 use crate::resample::{col_of, row_of};
-use crate::{GeoTiff, Raster, RasterFrame, SourceError};
+use crate::warp::Warp;
+use crate::{DemFile, Raster, RasterFrame, Reading, SourceError};
 
-/// A raster of classes: whole numbers of up to 16 bits, at a spacing of its own.
+/// A raster of classes: whole numbers, at a spacing and in a coordinate system of its own.
 #[derive(Clone, Debug)]
 pub struct ClassRaster {
     raster: Raster,
+    /// Where posts lie in it, when its system is not the area's.
+    warp: Option<Warp>,
 }
 
 impl ClassRaster {
-    /// Opens the GeoTIFF at `path` and reads what lies under the posts `area` of the working grid.
+    /// Opens the raster at `path` and reads what lies under the posts `area` of the working grid, which is in the
+    /// system EPSG:`epsg`.
     ///
     /// # Errors
-    /// As [`GeoTiff::open`] and [`GeoTiff::read`]; a coordinate system other than EPSG:`epsg`; samples that are not
-    /// whole numbers; or a raster that has no post in the area at all.
+    /// As [`DemFile::open`] and [`DemFile::read`]; samples that are not whole numbers; a coordinate system that cannot
+    /// be brought to the area's; or a raster that has no post in the area at all.
     pub fn read(path: &Path, epsg: u32, grid: &GridFrame, area: PostRect) -> Result<Self, SourceError> {
         // Classes have no unit; a unit in the file must not be an error.
-        let file = GeoTiff::open(path, Some(1.0))?;
-        file.frame().require_epsg(epsg)?;
-        let raster = file.read(window_near(file.frame(), grid, area)?)?;
+        let file = DemFile::open(path, &Reading { height_unit_m: Some(1.0), ..Reading::AS_IT_SAYS })?;
+        let frame = file.frame();
+        let (window, warp) = match frame.require_epsg(epsg) {
+            Ok(()) => (window_near(frame, grid, area)?, None),
+            Err(other) => {
+                let warp = Warp::new(frame, &Crs::from_epsg(epsg).map_err(|_| other)?, grid);
+                let window = warp.window(area, 1);
+                (window.ok_or_else(|| SourceError::OutsideArea { path: path.into() })?, Some(warp))
+            }
+        };
+        let raster = file.read(window)?;
         match raster.samples.fractional() {
+            // Text has no types; whole numbers in it are whole numbers.
+            Some(_) if file.format() == "Esri ASCII grid" && raster.samples.all_whole() => Ok(Self { raster, warp }),
             Some(found) => Err(SourceError::NotClasses { path: path.into(), found }),
-            None => Ok(Self { raster }),
+            None => Ok(Self { raster, warp }),
         }
     }
 
@@ -35,6 +50,14 @@ impl ClassRaster {
     /// a void one, are of no class.
     pub fn members(&self, grid: &GridFrame, rect: PostRect, value: i32) -> Vec<bool> {
         let frame = self.raster.frame();
+        if let Some(warp) = &self.warp {
+            let places = warp.over(rect);
+            let posts = (rect.south..=rect.north).flat_map(|row| (rect.west..=rect.east).map(move |col| (row, col)));
+            let near = |units: i64| u32::try_from((units + i64::from(TAP_UNITS / 2)).div_euclid(TAP_UNITS.into())).ok();
+            return posts
+                .map(|(row, col)| places.at(row, col).is_some_and(|[col, row]| self.is_of(near(row), near(col), value)))
+                .collect();
+        }
         let cols: Vec<Option<u32>> =
             (rect.west..=rect.east).map(|col| nearest(col_of(frame, grid, col), frame.cols)).collect();
         let rows = (rect.south..=rect.north).map(|row| nearest(row_of(frame, grid, row), frame.rows));
@@ -42,8 +65,8 @@ impl ClassRaster {
     }
 
     fn is_of(&self, row: Option<u32>, col: Option<u32>, value: i32) -> bool {
-        let (Some(row), Some(col)) = (row, col) else { return false };
-        let post = Post::new(row as i32, col as i32);
+        let (Some(Ok(row)), Some(Ok(col))) = (row.map(i32::try_from), col.map(i32::try_from)) else { return false };
+        let post = Post::new(row, col);
         self.raster.window().contains(post) && self.raster.sample(post) == Some(f64::from(value))
     }
 }

@@ -4,12 +4,12 @@
 //! first: every value lies inside the file, and no size is beyond the limits. It also tells a truncated file from
 //! one that is no TIFF at all.
 
-use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
 
 use crate::SourceError;
 use crate::limits::{CHUNK_BYTES_MAX, CHUNKS_MAX, POSTS_A_SIDE_MAX, POSTS_MAX, TAGS_MAX};
+use crate::store::{Handle, Store};
 
 /// Tags whose values decide how the file is decoded.
 mod tag {
@@ -74,11 +74,10 @@ impl Layout {
     }
 }
 
-/// Reads the first directory of the open file at `path` and checks it.
-pub(crate) fn read_layout(path: &Path, file: &mut File) -> Result<Layout, SourceError> {
-    let read = |source| SourceError::Read { path: path.into(), source };
-    let len = file.metadata().map_err(read)?.len();
-    let mut bytes = Bytes { path, file, len, little: true, big_tiff: false };
+/// Reads the first directory of an open file and checks it.
+pub(crate) fn read_layout(store: &Store, file: &mut Handle) -> Result<Layout, SourceError> {
+    let path = store.path();
+    let mut bytes = Bytes { path, file, len: store.len(), little: true, big_tiff: false };
     let directory = bytes.directory()?;
     let first = |tag| directory.iter().find(|&&(found, _)| found == tag).map(|&(_, value)| value);
     Facts { path, first: &first }.layout()
@@ -87,7 +86,7 @@ pub(crate) fn read_layout(path: &Path, file: &mut File) -> Result<Layout, Source
 /// The open file, read at given places and never past its end.
 struct Bytes<'a> {
     path: &'a Path,
-    file: &'a mut File,
+    file: &'a mut Handle,
     len: u64,
     little: bool,
     big_tiff: bool,

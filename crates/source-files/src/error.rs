@@ -35,12 +35,28 @@ pub enum SourceError {
     #[error("{path}: strip or tile {chunk} of {chunks} cannot be decoded: {reason}")]
     BrokenChunk { path: PathBuf, chunk: u32, chunks: u32, reason: String },
 
+    /// The checksum of a DTED record is not the sum of its bytes.
+    #[error("{path}: the checksum of column {column} is {found}, its bytes add up to {expected}")]
+    Checksum { path: PathBuf, column: i32, found: u32, expected: u32 },
+    /// An archive does not hold one raster.
+    #[error("{path}: the archive holds {found} files that could be rasters, expected 1")]
+    ArchiveHolds { path: PathBuf, found: usize },
+    /// A header of a raw grid without the grid.
+    #[error("{path}: the header of a raw grid, but no grid beside it (.flt, .bil, .bin or .raw)")]
+    HeaderAlone { path: PathBuf },
+
     // The file asks for too much.
     /// A size is beyond one of the [`crate::limits`].
     #[error("{path}: too large: {found} {what}, at most {limit} are read")]
     TooLarge { path: PathBuf, what: &'static str, found: u64, limit: u64 },
 
     // The file is sound, but of a kind that is not read.
+    /// A format that is known, but not read.
+    #[error("{path}: {found}, which is not read; expected GeoTIFF, DTED, HGT, Esri ASCII, or raw with a .hdr")]
+    OtherFormat { path: PathBuf, found: &'static str },
+    /// A format nobody here knows.
+    #[error("{path}: it begins with {found}; expected GeoTIFF, DTED, HGT, Esri ASCII, or raw with a .hdr beside it")]
+    UnknownFormat { path: PathBuf, found: String },
     /// A compression that is not read.
     #[error("{path}: compression {found} is not supported, expected none, LZW, deflate, zstd or PackBits")]
     Compression { path: PathBuf, found: String },
@@ -68,13 +84,16 @@ pub enum SourceError {
 
     // The file is sound, but lies nowhere or not where it should.
     /// The file does not say which coordinate system it is in.
-    #[error("{path}: no coordinate reference system in the file, expected a projected one")]
+    #[error("{path}: no coordinate reference system in the file or in a .prj beside it, expected one")]
     NoCrs { path: PathBuf },
+    /// An HGT tile whose name does not say where it lies.
+    #[error("{path}: an HGT tile, whose name does not say where it lies, expected one such as N35W117.hgt")]
+    NoCorner { path: PathBuf },
     /// Coordinates are degrees.
     #[error("{path}: the coordinate reference system is geographic ({found}), expected a projected one in metres")]
     Geographic { path: PathBuf, found: String },
-    /// The coordinate system has no EPSG code that can be compared.
-    #[error("{path}: the coordinate reference system is {found}, expected a projected one with an EPSG code")]
+    /// The coordinate system is not one that can be computed, or compared.
+    #[error("{path}: the coordinate reference system is {found}, expected one that is known by its EPSG code")]
     UnnamedCrs { path: PathBuf, found: String },
     /// Eastings and northings are not in metres.
     #[error("{path}: coordinates are in {found}, expected metres")]
@@ -95,25 +114,37 @@ pub enum SourceError {
     )]
     Rotated { path: PathBuf, found: String },
     /// The coordinate system is not the area's.
-    #[error("{path}: coordinate reference system EPSG:{found}, expected the area's EPSG:{expected}")]
-    OtherCrs { path: PathBuf, found: u32, expected: u32 },
+    #[error("{path}: coordinate reference system {found}, expected the area's EPSG:{expected}")]
+    OtherCrs { path: PathBuf, found: String, expected: u32 },
+    /// The raster and the area have no ground in common.
+    #[error("{path}: it lies outside the area")]
+    OutsideArea { path: PathBuf },
     /// The raster ends before the area does: on which sides, and by how many metres.
     #[error("{path}: does not cover the area: {} missing", sides(missing))]
     NotCovered { path: PathBuf, missing: Vec<(Side, f64)> },
 
     // The heights cannot be used.
     /// There are voids and the job wants none.
-    #[error("{path}: {found} void posts in the area, the first at {} m, expected none", place(first_m))]
-    Voids { path: PathBuf, found: usize, first_m: [f64; 2] },
+    #[error("{path}: {found} void posts in the area, the first at {first}, expected none")]
+    Voids { path: PathBuf, found: usize, first: String },
     /// There are voids too far from any height to be filled.
-    #[error("{path}: {found} void posts farther than {limit} posts from a height, the first at {} m", place(first_m))]
-    VoidsTooFar { path: PathBuf, found: usize, limit: u32, first_m: [f64; 2] },
+    #[error("{path}: {found} void posts farther than {limit} posts from a height, the first at {first}")]
+    VoidsTooFar { path: PathBuf, found: usize, limit: u32, first: String },
+    /// No source reaches some posts of the area; the map has a mark for each part of it, north up.
+    #[error(
+        "no source reaches {found} of {of} posts of the area; # is covered, + in part, . not at all (north is up):\n\
+        {map}"
+    )]
+    Gaps { found: usize, of: usize, map: String },
+    /// No source has a height at some posts that they cover.
+    #[error("{found} of {of} posts of the area are void in every source that may give them, the first at {first}")]
+    MosaicVoids { found: usize, of: usize, first: String },
     /// There is no height in the area at all.
     #[error("{path}: all {found} posts in the area are void")]
     AllVoid { path: PathBuf, found: usize },
     /// A height is infinite.
-    #[error("{path}: an infinite height at {} m, expected a number or a void", place(place_m))]
-    Infinite { path: PathBuf, place_m: [f64; 2] },
+    #[error("{path}: an infinite height at {at}, expected a number or a void")]
+    Infinite { path: PathBuf, at: String },
     /// A height in metres is beyond [`crate::limits::HEIGHT_M_MAX`].
     #[error("{path}: a height of {found} m, expected at most {limit} m either side of 0")]
     HeightOutOfRange { path: PathBuf, found: f64, limit: f64 },
@@ -123,7 +154,7 @@ pub enum SourceError {
 
     // Polygons.
     /// The file is not GeoJSON.
-    #[error("{path}: not GeoJSON: {reason}")]
+    #[error("{path}: neither a Shapefile nor GeoJSON: {reason}")]
     NotGeoJson { path: PathBuf, reason: String },
     /// A geometry is no polygon.
     #[error("{path}: a {found}, expected Polygon or MultiPolygon")]
@@ -135,14 +166,8 @@ pub enum SourceError {
     #[error("{path}: ring {ring} has {found}, expected at least 4 corners, the last equal to the first")]
     Ring { path: PathBuf, ring: usize, found: String },
     /// The file names another coordinate system than the area's.
-    #[error("{path}: coordinates are in {found}, expected the area's EPSG:{expected} in metres")]
+    #[error("{path}: coordinates are in {found}, which cannot be brought to the area's EPSG:{expected}")]
     PolygonCrs { path: PathBuf, found: String, expected: u32 },
-    /// Coordinates can only be degrees.
-    #[error(
-        "{path}: coordinates look like longitude and latitude ({found}), \
-        expected metres of the area's EPSG:{expected}"
-    )]
-    LonLat { path: PathBuf, found: String, expected: u32 },
 }
 
 impl SourceError {
@@ -155,6 +180,13 @@ impl SourceError {
             Read { .. } | Truncated { .. } | Malformed { .. } | BrokenChunk { .. } => {
                 "the file is damaged or was not copied whole; fetch it again"
             }
+            Checksum { .. } => {
+                "the file is damaged, or its writer computed no checksums; without strict reading it is used"
+            }
+            ArchiveHolds { .. } => "unpack it and name the raster",
+            HeaderAlone { .. } => "name the file of heights; its header is found beside it",
+            OtherFormat { .. } | UnknownFormat { .. } => "convert it: gdal_translate in out.tif",
+            NoCorner { .. } => "give its south-west corner: { file = \"x.hgt\", corner = [35, -117] }, latitude first",
             NotTiff { .. } => "DEMs and class rasters are GeoTIFF files; gdal_translate converts other formats",
             TooLarge { .. } => "cut the part you need with gdal_translate -projwin, or tile the file",
             Compression { .. } => "rewrite it: gdal_translate -co COMPRESS=DEFLATE in.tif out.tif",
@@ -163,7 +195,9 @@ impl SourceError {
             Photometric { .. } => "rewrite it: gdal_translate -co PHOTOMETRIC=MINISBLACK in.tif out.tif",
             InternalMask { .. } => "write the mask into the heights: gdalwarp -dstnodata -9999 in.tif out.tif",
             NotFullRaster { .. } | TiffFeature { .. } => "rewrite it: gdal_translate in.tif out.tif",
-            NoCrs { .. } => "say what it is: gdal_edit.py -a_srs EPSG:32611 file.tif (with your own code)",
+            NoCrs { .. } => {
+                "say what it is: dem.sources = [{ file = \"…\", crs = \"EPSG:…\" }], or put a .prj beside it"
+            }
             Geographic { .. } => "project it: gdalwarp -t_srs EPSG:32611 -r bilinear in.tif out.tif (your own zone)",
             UnnamedCrs { .. } | LinearUnit { .. } | OtherCrs { .. } => {
                 "project it to the area's system: gdalwarp -t_srs EPSG:… -r bilinear in.tif out.tif, or change area.crs"
@@ -172,28 +206,31 @@ impl SourceError {
             NoPosition { .. } | ControlPoints { .. } | Rotated { .. } => {
                 "warp it onto a north-up grid: gdalwarp -r bilinear in.tif out.tif"
             }
+            OutsideArea { .. } => "check area.crs and area.origin_m, and the file's own coordinate system",
             NotCovered { .. } => "move area.origin_m, make area.size_m smaller, or give a DEM that reaches farther",
             Voids { .. } => {
                 "set dem.voids = { fill_within_posts = 8 } to fill small gaps, or \"hole\" to leave them out"
             }
             VoidsTooFar { .. } => "raise fill_within_posts, set dem.voids = \"hole\", or move the area",
+            Gaps { .. } => "add a source that covers the rest, make the area smaller, or set dem.voids = \"hole\"",
+            MosaicVoids { .. } => {
+                "set dem.voids = { next_source = true, fill_within_posts = 8 }, or \"hole\" to leave them out"
+            }
             AllVoid { .. } => "check area.origin_m, and the file's nodata tag",
             Infinite { .. } | HeightOutOfRange { .. } => {
                 "mark such posts as void: gdal_translate -a_nodata … ; if heights are not metres set dem.height_unit_m"
             }
             NotClasses { .. } => "rewrite it: gdal_translate -ot Byte classes.tif out.tif",
-            NotGeoJson { .. } => "convert it: ogr2ogr -f GeoJSON out.geojson in.shp",
+            NotGeoJson { .. } => {
+                "give GeoJSON or a Shapefile; from a GeoPackage: ogr2ogr -f GeoJSON out.geojson in.gpkg"
+            }
             NotPolygons { .. } | NoPolygons { .. } => "give polygons: ogr2ogr -where \"OGR_GEOMETRY='POLYGON'\" …",
             Ring { .. } => "repair it: ogr2ogr -makevalid out.geojson in.geojson",
-            PolygonCrs { .. } | LonLat { .. } => {
+            PolygonCrs { .. } => {
                 "project it: ogr2ogr -t_srs EPSG:… -lco RFC7946=NO out.geojson in.geojson (with the area's code)"
             }
         })
     }
-}
-
-fn place([east_m, north_m]: &[f64; 2]) -> String {
-    format!("{east_m:.1}, {north_m:.1}")
 }
 
 fn sides(missing: &[(Side, f64)]) -> String {

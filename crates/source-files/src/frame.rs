@@ -5,18 +5,19 @@
 use std::path::{Path, PathBuf};
 
 use crate::SourceError;
+use crate::crs::{Crs, GeoKeys};
 
 /// Where the posts of a raster lie. Row 0 is the southern one, column 0 the western one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RasterFrame {
     /// The file, for messages.
     pub path: PathBuf,
-    /// EPSG code of its projected coordinate system.
-    pub epsg: u32,
-    /// Easting and northing of the south-west post, in metres.
-    pub south_west_m: [f64; 2],
-    /// Metres between posts, to the east and to the north.
-    pub spacing_m: [f64; 2],
+    /// Its coordinate system.
+    pub crs: Crs,
+    /// Place of the south-west post, east then north, in units of the coordinate system: metres mostly, or degrees.
+    pub south_west: [f64; 2],
+    /// Units of the coordinate system between posts, to the east and to the north.
+    pub spacing: [f64; 2],
     /// Columns of posts.
     pub cols: u32,
     /// Rows of posts.
@@ -24,21 +25,59 @@ pub struct RasterFrame {
 }
 
 impl RasterFrame {
+    /// The frame of a raster stored with these axes, and whether its first row is the southern one.
+    pub(crate) fn new(path: &Path, crs: Crs, axes: &Axes, cols: u32, rows: u32) -> Result<(Self, bool), SourceError> {
+        let south_first = 0.0 < axes.step[1];
+        let last_north = axes.first[1] + axes.step[1] * f64::from(rows - 1);
+        let south = if south_first { axes.first[1] } else { last_north };
+        let spacing = [axes.step[0], axes.step[1].abs()];
+        let frame = Self { path: path.into(), crs, south_west: [axes.first[0], south], spacing, cols, rows };
+        let [east, north] = frame.place(rows - 1, cols - 1);
+        if frame.crs.is_geographic() && (540.0 < east.abs() || 90.6 < north || south < -90.6) {
+            let found = format!("from {}, {south} to {east}, {north} degrees", axes.first[0]);
+            return Err(malformed(path, "the place of the raster", found, "degrees of longitude and latitude"));
+        }
+        Ok((frame, south_first))
+    }
+
     /// Checks that the raster is in the coordinate system with the EPSG code `expected`.
     ///
     /// # Errors
     /// [`SourceError::OtherCrs`] when it is in another.
     pub fn require_epsg(&self, expected: u32) -> Result<(), SourceError> {
-        if self.epsg == expected {
+        if self.crs.epsg() == Some(expected) {
             return Ok(());
         }
-        Err(SourceError::OtherCrs { path: self.path.clone(), found: self.epsg, expected })
+        let found = self.crs.name().to_owned();
+        Err(SourceError::OtherCrs { path: self.path.clone(), found, expected })
     }
 
-    /// Easting and northing of the post at (row, column), in metres.
-    pub fn place_m(&self, row: u32, col: u32) -> [f64; 2] {
-        let [east_m, north_m] = self.south_west_m;
-        [east_m + f64::from(col) * self.spacing_m[0], north_m + f64::from(row) * self.spacing_m[1]]
+    /// Checks that the raster's own grid is one of metres.
+    ///
+    /// # Errors
+    /// [`SourceError::Geographic`] or [`SourceError::LinearUnit`] when it is not.
+    pub fn require_metres(&self) -> Result<(), SourceError> {
+        let path = || self.path.clone();
+        match self.crs.unit_m() {
+            Some(1.0) => Ok(()),
+            None => Err(SourceError::Geographic { path: path(), found: self.crs.name().into() }),
+            Some(unit_m) => Err(SourceError::LinearUnit { path: path(), found: unit_name(unit_m) }),
+        }
+    }
+
+    /// Place of the post at (row, column), east then north, in units of the coordinate system.
+    pub fn place(&self, row: u32, col: u32) -> [f64; 2] {
+        let [east, north] = self.south_west;
+        [east + f64::from(col) * self.spacing[0], north + f64::from(row) * self.spacing[1]]
+    }
+
+    /// The same for messages.
+    pub(crate) fn place_text(&self, row: u32, col: u32) -> String {
+        let [east, north] = self.place(row, col);
+        match self.crs.is_geographic() {
+            true => format!("{east:.5}, {north:.5} degrees"),
+            false => format!("{east:.1}, {north:.1} m"),
+        }
     }
 }
 
@@ -54,6 +93,9 @@ pub struct SampleScale {
 }
 
 impl SampleScale {
+    /// Samples that are metres.
+    pub(crate) const METRES: SampleScale = SampleScale { scale: 1.0, offset: 0.0, unit_m: 1.0 };
+
     /// The height of a sample in metres.
     pub fn height_m(&self, sample: f64) -> f64 {
         (sample * self.scale + self.offset) * self.unit_m
@@ -66,79 +108,74 @@ pub(crate) struct GeoTags {
     pub pixel_scale: Option<Vec<f64>>,
     pub tie_points: Option<Vec<f64>>,
     pub transformation: Option<Vec<f64>>,
-    pub keys: Option<Vec<u16>>,
+    pub keys: GeoKeys,
     pub gdal_metadata: Option<String>,
 }
 
-/// Eastings and northings along the raster as it is stored: place = first post + index * step.
+/// What a file says besides its heights.
+#[derive(Clone, Debug)]
+pub(crate) struct Facts {
+    pub format: &'static str,
+    /// Vertical accuracy in metres, as the file states it.
+    pub accuracy_m: Option<f64>,
+    /// What heights are measured from.
+    pub vertical_datum: Option<String>,
+}
+
+impl Facts {
+    /// Of a format that says nothing.
+    pub(crate) fn of(format: &'static str) -> Self {
+        Self { format, accuracy_m: None, vertical_datum: None }
+    }
+}
+
+/// Places along the raster as it is stored: place = first post + index * step, east then north.
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Axes {
-    pub first_m: [f64; 2],
-    pub step_m: [f64; 2],
+    pub first: [f64; 2],
+    pub step: [f64; 2],
+}
+
+impl Axes {
+    /// Refuses numbers that are no place.
+    pub(crate) fn checked(self, path: &Path) -> Result<Self, SourceError> {
+        let Self { first, step } = self;
+        let numbers = first.iter().chain(&step);
+        let sane = numbers.clone().all(|number| number.abs() <= PLACE_MAX) && 0.0 < step[0] && step[1] != 0.0;
+        if sane {
+            return Ok(self);
+        }
+        let found = format!("at {first:?} with steps of {step:?}");
+        Err(malformed(path, "the place of the raster", found, "finite metres, and a positive pixel scale"))
+    }
 }
 
 mod key {
-    pub const MODEL_TYPE: u16 = 1024;
     pub const RASTER_TYPE: u16 = 1025;
-    pub const GEOGRAPHIC_TYPE: u16 = 2048;
-    pub const PROJECTED_TYPE: u16 = 3072;
-    pub const LINEAR_UNITS: u16 = 3076;
+    pub const VERTICAL_TYPE: u16 = 4096;
     pub const VERTICAL_UNITS: u16 = 4099;
 }
-/// Code of a GeoKey whose meaning the file spells out by itself.
-const USER_DEFINED: u16 = 32767;
 /// Coordinates beyond this (a hundred times around the Earth) are not places.
-const PLACE_M_MAX: f64 = 4.0e9;
+const PLACE_MAX: f64 = 4.0e9;
 /// A shear this small against the spacing moves no post of the largest raster by a hundredth of a post.
 const SHEAR_MAX: f64 = 1.0e-8;
 
 impl GeoTags {
-    /// The EPSG code of the projected coordinate system.
-    pub(crate) fn epsg(&self, path: &Path) -> Result<u32, SourceError> {
-        let path = || path.into();
-        let (model, projected) = (self.key(key::MODEL_TYPE), self.key(key::PROJECTED_TYPE));
-        match (model, projected) {
-            (None, None) if self.key(key::GEOGRAPHIC_TYPE).is_none() => {
-                return Err(SourceError::NoCrs { path: path() });
-            }
-            (Some(2), _) | (None, None) => {
-                let found = match self.key(key::GEOGRAPHIC_TYPE) {
-                    None | Some(0 | USER_DEFINED) => "without a code".into(),
-                    Some(code) => format!("EPSG:{code}"),
-                };
-                return Err(SourceError::Geographic { path: path(), found });
-            }
-            (Some(3), _) => return Err(SourceError::UnnamedCrs { path: path(), found: "geocentric".into() }),
-            _ => {}
-        }
-        if let Some(found) = self.foreign_linear_unit() {
-            return Err(SourceError::LinearUnit { path: path(), found });
-        }
-        match projected {
-            None | Some(0) => Err(SourceError::UnnamedCrs { path: path(), found: "not named".into() }),
-            Some(USER_DEFINED) => Err(SourceError::UnnamedCrs { path: path(), found: "defined by the file".into() }),
-            Some(code) => Ok(code.into()),
-        }
-    }
-
-    /// The value of a GeoKey that is held in the key directory itself.
-    fn key(&self, key: u16) -> Option<u16> {
-        let keys = self.keys.as_ref()?;
-        keys.chunks_exact(4).skip(1).find(|entry| entry[0] == key && entry[1] == 0).map(|entry| entry[3])
-    }
-
-    fn foreign_linear_unit(&self) -> Option<String> {
-        match self.key(key::LINEAR_UNITS) {
-            None | Some(0 | 9001) => None,
-            Some(9002) => Some("feet".into()),
-            Some(9003) => Some("US survey feet".into()),
-            Some(USER_DEFINED) => Some("a unit of the file's own".into()),
-            Some(code) => Some(format!("units of code {code}")),
-        }
+    /// What heights are measured from, for the few systems that have a name here.
+    pub(crate) fn vertical_datum(&self) -> Option<String> {
+        let name = match self.keys.short(key::VERTICAL_TYPE)? {
+            5773 => "EGM96",
+            3855 => "EGM2008",
+            5703 => "NAVD88",
+            4979 | 5030 => "ellipsoid",
+            _ => return None,
+        };
+        Some(name.to_owned())
     }
 
     /// Whether a pixel's coordinates are those of its centre.
     fn pixel_is_point(&self) -> bool {
-        self.key(key::RASTER_TYPE) == Some(2)
+        self.keys.short(key::RASTER_TYPE) == Some(2)
     }
 
     /// What samples mean; `height_unit_m` overrides the unit the file states.
@@ -162,7 +199,7 @@ impl GeoTags {
     fn vertical_unit_m(&self, path: &Path) -> Result<f64, SourceError> {
         const FOOT_M: f64 = 0.3048;
         const US_FOOT_M: f64 = 1200.0 / 3937.0;
-        let unit = match (self.key(key::VERTICAL_UNITS), self.metadata_item("unittype")) {
+        let unit = match (self.keys.short(key::VERTICAL_UNITS), self.metadata_item("unittype")) {
             (None | Some(0), None) | (Some(9001), _) => Ok(1.0),
             (Some(9002), _) => Ok(FOOT_M),
             (Some(9003), _) => Ok(US_FOOT_M),
@@ -187,7 +224,7 @@ impl GeoTags {
 
     /// Places of the posts as stored.
     pub(crate) fn axes(&self, path: &Path) -> Result<Axes, SourceError> {
-        let [origin_m, step_m] = match (&self.pixel_scale, &self.tie_points, &self.transformation) {
+        let [origin, step] = match (&self.pixel_scale, &self.tie_points, &self.transformation) {
             (Some(scale), Some(tie), _) => tied(path, scale, tie)?,
             (_, _, Some(matrix)) => transformed(path, matrix)?,
             (None, Some(tie), None) => {
@@ -195,14 +232,21 @@ impl GeoTags {
             }
             _ => return Err(SourceError::NoPosition { path: path.into() }),
         };
-        let numbers = origin_m.iter().chain(&step_m);
-        let sane = numbers.clone().all(|number| number.abs() <= PLACE_M_MAX) && 0.0 < step_m[0] && step_m[1] != 0.0;
-        if !sane {
-            let found = format!("at {origin_m:?} with steps of {step_m:?}");
-            return Err(malformed(path, "the place of the raster", found, "finite metres, and a positive pixel scale"));
-        }
+        let corner = Axes { first: origin, step }.checked(path)?;
         let centre = if self.pixel_is_point() { 0.0 } else { 0.5 };
-        Ok(Axes { first_m: [origin_m[0] + centre * step_m[0], origin_m[1] + centre * step_m[1]], step_m })
+        let [east, north] = corner.first;
+        Ok(Axes { first: [east + centre * step[0], north + centre * step[1]], step })
+    }
+}
+
+/// What people call a unit of length.
+fn unit_name(unit_m: f64) -> String {
+    if unit_m == 0.3048 {
+        "feet".into()
+    } else if (unit_m - 1200.0 / 3937.0).abs() < 1.0e-9 {
+        "US survey feet".into()
+    } else {
+        format!("units of {unit_m} m")
     }
 }
 

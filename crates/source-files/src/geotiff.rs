@@ -4,7 +4,6 @@
 //! number of threads, each with a file handle of its own, and [`GeoTiff::assemble`] puts the chunks of a window
 //! together, southern row first.
 
-use std::fs::File;
 use std::io::{BufReader, ErrorKind};
 use std::path::Path;
 
@@ -13,9 +12,13 @@ use tiff::decoder::{Decoder, DecodingResult, Limits};
 use tiff::tags::Tag;
 use tiff::{TiffError, TiffResult};
 
-use crate::directory::{Layout, SampleKind, read_layout};
+use crate::chunk::{Chunk, Header};
+use crate::crs::{Crs, GeoKeys};
+use crate::directory::{Layout, read_layout};
 use crate::frame::{GeoTags, RasterFrame, SampleScale};
 use crate::limits::{CHUNK_BYTES_MAX, DIRECTORIES_MAX};
+use crate::samples::Samples;
+use crate::store::{Handle, Store};
 use crate::{Raster, SourceError};
 
 const GDAL_METADATA: Tag = Tag::Unknown(42112);
@@ -23,6 +26,7 @@ const GDAL_METADATA: Tag = Tag::Unknown(42112);
 /// A GeoTIFF whose directory was read and found good; nothing is decoded yet.
 #[derive(Clone, Debug)]
 pub struct GeoTiff {
+    store: Store,
     frame: RasterFrame,
     scale: SampleScale,
     layout: Layout,
@@ -31,45 +35,40 @@ pub struct GeoTiff {
     south_first: bool,
     /// Bytes of each chunk in the file; 0 where the writer left out a chunk that is all void.
     chunk_sizes: Vec<u64>,
-}
-
-/// One strip or tile, decoded.
-#[derive(Debug)]
-pub struct Chunk {
-    pub(crate) index: u32,
-    /// Rows as stored, padded to the width of a chunk; `None` for a chunk that is not in the file.
-    pub(crate) samples: Option<DecodingResult>,
+    vertical_datum: Option<String>,
 }
 
 impl GeoTiff {
-    /// Opens the file at `path` and reads its directory. `height_unit_m` (metres in a unit of height) overrides
-    /// what the file says.
+    /// Opens the file at `path`, which is in a projected system in metres with an EPSG code, and reads its directory.
+    /// `height_unit_m` (metres in a unit of height) overrides what the file says.
     ///
     /// # Errors
     /// Whatever makes it unusable: not a TIFF, broken, too large, or of a kind that is not supported.
     pub fn open(path: &Path, height_unit_m: Option<f64>) -> Result<Self, SourceError> {
-        let mut file = File::open(path).map_err(|source| SourceError::Open { path: path.into(), source })?;
-        let layout = read_layout(path, &mut file)?;
-        let file_size = file.metadata().map_err(|source| SourceError::Read { path: path.into(), source })?.len();
+        let file = Self::read_directory(&Store::plain(path)?, height_unit_m, |own| named(path, own))?;
+        file.frame.require_metres()?;
+        Ok(file)
+    }
+
+    /// Reads the directory; `crs` judges what the file says of its system.
+    pub(crate) fn read_directory(
+        store: &Store,
+        height_unit_m: Option<f64>,
+        crs: impl FnOnce(Option<Result<Crs, String>>) -> Result<Crs, SourceError>,
+    ) -> Result<Self, SourceError> {
+        let path = store.path();
+        let mut file = store.handle()?;
+        let layout = read_layout(store, &mut file)?;
         let mut decoder = decoder(path, file)?;
         refuse_masks(path, &mut decoder)?;
         let tags = geo_tags(path, &mut decoder)?;
-        let (epsg, axes) = (tags.epsg(path)?, tags.axes(path)?);
+        let (crs, axes) = (crs(tags.keys.crs())?, tags.axes(path)?);
         let scale = tags.sample_scale(path, height_unit_m)?;
-        let south_first = 0.0 < axes.step_m[1];
-        let last_north_m = axes.first_m[1] + axes.step_m[1] * f64::from(layout.rows - 1);
-        let south_m = if south_first { axes.first_m[1] } else { last_north_m };
-        let frame = RasterFrame {
-            path: path.into(),
-            epsg,
-            south_west_m: [axes.first_m[0], south_m],
-            spacing_m: [axes.step_m[0], axes.step_m[1].abs()],
-            cols: layout.cols,
-            rows: layout.rows,
-        };
+        let (frame, south_first) = RasterFrame::new(path, crs, &axes, layout.cols, layout.rows)?;
         let nodata = nodata(path, &mut decoder)?;
-        let chunk_sizes = chunk_sizes(path, &mut decoder, &layout, file_size)?;
-        Ok(Self { frame, scale, layout, nodata, south_first, chunk_sizes })
+        let chunk_sizes = chunk_sizes(path, &mut decoder, &layout, store.len())?;
+        let vertical_datum = tags.vertical_datum();
+        Ok(Self { store: store.clone(), frame, scale, layout, nodata, south_first, chunk_sizes, vertical_datum })
     }
 
     /// Where its posts lie.
@@ -104,17 +103,13 @@ impl GeoTiff {
         PostRect { south, west: west as i32, north, east: east as i32 }
     }
 
-    /// Whether the first stored row of every chunk is its southern one.
-    pub(crate) fn south_first(&self) -> bool {
-        self.south_first
+    pub(crate) fn header(&self) -> Header {
+        let kind = self.layout.sample;
+        Header { frame: self.frame.clone(), scale: self.scale, kind, nodata: self.nodata }
     }
 
-    pub(crate) fn layout(&self) -> &Layout {
-        &self.layout
-    }
-
-    pub(crate) fn nodata(&self) -> Option<f64> {
-        self.nodata
+    pub(crate) fn vertical_datum(&self) -> Option<String> {
+        self.vertical_datum.clone()
     }
 
     /// Decodes some strips or tiles. May be called from several threads at once.
@@ -122,17 +117,18 @@ impl GeoTiff {
     /// # Errors
     /// When the file is gone, or a chunk cannot be decoded.
     pub fn decode(&self, chunks: &[u32]) -> Result<Vec<Chunk>, SourceError> {
-        let path = &self.frame.path;
-        let file = File::open(path).map_err(|source| SourceError::Open { path: path.clone(), source })?;
-        let mut decoder = decoder(path, file)?;
+        let mut decoder = decoder(&self.frame.path, self.store.handle()?)?;
+        let (stride, south_first) = (self.layout.chunk_cols as usize, self.south_first);
+        let chunk =
+            |index, samples| Chunk { posts: self.posts_of(index), stride, south_first, samples, notes: Vec::new() };
         let decoded = chunks.iter().map(|&index| {
             if self.chunk_sizes[index as usize] == 0 {
-                return Ok(Chunk { index, samples: None });
+                return Ok(chunk(index, None));
             }
             let samples = self.decode_one(&mut decoder, index).map_err(|error| error.to_string());
             let samples = samples.and_then(|samples| self.as_promised(index, samples));
             let samples = samples.map_err(|reason| self.chunk_error(index, reason))?;
-            Ok(Chunk { index, samples: Some(samples) })
+            Ok(chunk(index, Some(samples)))
         });
         decoded.collect()
     }
@@ -148,11 +144,12 @@ impl GeoTiff {
 
     /// The decoder reads the directory for itself. Should it ever see other sizes there than we did, or the file have
     /// been replaced in between, it ends here.
-    fn as_promised(&self, index: u32, samples: DecodingResult) -> Result<DecodingResult, String> {
-        let expected = self.posts_of(index).posts_high() * self.layout.chunk_cols as usize;
-        match samples_in(&samples) {
-            Some((kind, count)) if kind == self.layout.sample && count == expected => Ok(samples),
-            found => Err(format!("it holds {found:?} samples, expected {:?}", (self.layout.sample, expected))),
+    fn as_promised(&self, index: u32, decoded: DecodingResult) -> Result<Samples, String> {
+        let expected = (self.layout.sample, self.posts_of(index).posts_high() * self.layout.chunk_cols as usize);
+        let samples = samples_in(decoded).ok_or("it holds samples of a kind that is not read")?;
+        match (samples.kind(), samples.count()) {
+            found if found == expected => Ok(samples),
+            found => Err(format!("it holds {found:?} samples, expected {expected:?}")),
         }
     }
 
@@ -170,7 +167,7 @@ impl GeoTiff {
     /// When `window` is not inside the raster or a chunk of it is missing.
     pub fn assemble(&self, window: PostRect, chunks: Vec<Chunk>) -> Result<Raster, SourceError> {
         assert!(self.rect().contains_rect(&window), "a window lies inside the raster");
-        Raster::assemble(self, window, chunks)
+        Raster::assemble(&self.header(), window, chunks)
     }
 
     /// Decodes and assembles the posts of `window` in this thread.
@@ -182,22 +179,33 @@ impl GeoTiff {
     }
 }
 
-/// The kind and number of decoded samples; `None` for kinds that are not read.
-fn samples_in(samples: &DecodingResult) -> Option<(SampleKind, usize)> {
-    match samples {
-        DecodingResult::U8(samples) => Some((SampleKind::U8, samples.len())),
-        DecodingResult::U16(samples) => Some((SampleKind::U16, samples.len())),
-        DecodingResult::I16(samples) => Some((SampleKind::I16, samples.len())),
-        DecodingResult::I32(samples) => Some((SampleKind::I32, samples.len())),
-        DecodingResult::F32(samples) => Some((SampleKind::F32, samples.len())),
-        DecodingResult::F64(samples) => Some((SampleKind::F64, samples.len())),
+/// The system that the file names, by a code of its own.
+fn named(path: &Path, own: Option<Result<Crs, String>>) -> Result<Crs, SourceError> {
+    let path = || path.into();
+    let crs = own.ok_or_else(|| SourceError::NoCrs { path: path() })?;
+    let crs = crs.map_err(|found| SourceError::UnnamedCrs { path: path(), found })?;
+    match crs.epsg() {
+        Some(_) => Ok(crs),
+        None => Err(SourceError::UnnamedCrs { path: path(), found: "defined by the file".into() }),
+    }
+}
+
+/// Decoded samples; `None` for kinds that are not read.
+fn samples_in(decoded: DecodingResult) -> Option<Samples> {
+    match decoded {
+        DecodingResult::U8(samples) => Some(Samples::U8(samples)),
+        DecodingResult::U16(samples) => Some(Samples::U16(samples)),
+        DecodingResult::I16(samples) => Some(Samples::I16(samples)),
+        DecodingResult::I32(samples) => Some(Samples::I32(samples)),
+        DecodingResult::F32(samples) => Some(Samples::F32(samples)),
+        DecodingResult::F64(samples) => Some(Samples::F64(samples)),
         _ => None,
     }
 }
 
-type FileDecoder = Decoder<BufReader<File>>;
+type FileDecoder = Decoder<BufReader<Handle>>;
 
-fn decoder(path: &Path, file: File) -> Result<FileDecoder, SourceError> {
+fn decoder(path: &Path, file: Handle) -> Result<FileDecoder, SourceError> {
     let mut limits = Limits::default();
     limits.decoding_buffer_size = CHUNK_BYTES_MAX as usize;
     limits.intermediate_buffer_size = CHUNK_BYTES_MAX as usize;
@@ -250,14 +258,21 @@ fn geo_tags(path: &Path, decoder: &mut FileDecoder) -> Result<GeoTags, SourceErr
     let doubles = |value: Option<tiff::decoder::ifd::Value>| {
         value.map(|value| value.into_f64_vec()).transpose().map_err(|error| directory_error(path, error))
     };
-    let keys = value(Tag::GeoKeyDirectoryTag)?.map(|value| value.into_u16_vec()).transpose();
-    let metadata = value(GDAL_METADATA)?.map(|value| value.into_string()).transpose();
+    let error = |error| directory_error(path, error);
+    let keys = value(Tag::GeoKeyDirectoryTag)?.map(|value| value.into_u16_vec()).transpose().map_err(error)?;
+    let key_doubles = doubles(value(Tag::GeoDoubleParamsTag)?)?;
+    let key_texts = value(Tag::GeoAsciiParamsTag)?.map(|value| value.into_string()).transpose().map_err(error)?;
+    let metadata = value(GDAL_METADATA)?.map(|value| value.into_string()).transpose().map_err(error)?;
     Ok(GeoTags {
         pixel_scale: doubles(value(Tag::ModelPixelScaleTag)?)?,
         tie_points: doubles(value(Tag::ModelTiepointTag)?)?,
         transformation: doubles(value(Tag::ModelTransformationTag)?)?,
-        keys: keys.map_err(|error| directory_error(path, error))?,
-        gdal_metadata: metadata.map_err(|error| directory_error(path, error))?,
+        keys: GeoKeys {
+            directory: keys.unwrap_or_default(),
+            doubles: key_doubles.unwrap_or_default(),
+            texts: key_texts.unwrap_or_default(),
+        },
+        gdal_metadata: metadata,
     })
 }
 

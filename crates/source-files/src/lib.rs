@@ -1,8 +1,8 @@
-//! Others' formats in: GeoTIFF rasters of heights and classes, GeoJSON polygons; and GeoTIFF out.
+//! Others' formats in: rasters of heights and classes, polygons; and GeoTIFF out.
 //!
 //! Rows are turned here, once: whatever the file's order, row 0 is the southern one from here on. A file is judged
-//! before anything is allocated for it: [`GeoTiff::open`] tells broken, unsupported and too large apart, and every
-//! limit is in [`limits`]. Nothing here starts a thread; [`GeoTiff::decode`] may be called from several.
+//! before anything is allocated for it: [`DemFile::open`] tells broken, unsupported and too large apart, and every
+//! limit is in [`limits`]. Nothing here starts a thread; [`DemFile::decode`] may be called from several.
 
 pub mod limits;
 
@@ -10,11 +10,22 @@ mod error;
 pub use error::SourceError;
 mod content;
 pub use content::content;
-mod directory;
+mod crs;
+mod store;
+pub use crs::Crs;
 mod frame;
 pub use frame::{RasterFrame, SampleScale};
+mod chunk;
+pub use chunk::Chunk;
+mod directory;
 mod geotiff;
-pub use geotiff::{Chunk, GeoTiff};
+pub use geotiff::GeoTiff;
+mod dem_file;
+mod dted;
+mod hgt;
+mod rows;
+mod text_grid;
+pub use dem_file::{DemFile, Reading};
 mod raster;
 mod samples;
 pub use raster::Raster;
@@ -22,9 +33,14 @@ mod voids;
 pub use voids::{VoidPolicy, VoidSummary};
 mod resample;
 pub use resample::window_under;
+mod join;
+mod mosaic;
+mod warp;
+pub use mosaic::{Mosaic, MosaicRules, MosaicVoids, Patch, Resampling, Standing, window_reaching};
 mod classes;
 pub use classes::ClassRaster;
 mod polygons;
+mod shapefile;
 pub use polygons::read_polygons;
 mod write;
 pub use write::{write_classes, write_heights};

@@ -13,6 +13,11 @@ pub const CHUNKS_MAX: u64 = 1 << 22;
 pub const TAGS_MAX: u64 = 4096;
 /// Directories looked at for a mask of voids: overviews come in powers of two, so 20 suffice for any raster.
 pub const DIRECTORIES_MAX: usize = 64;
+/// Bytes that a gzip or zip file may unpack to: it is unpacked in memory, and the largest tiles that come so (DTED 2,
+/// HGT of one second) have 26 MB.
+pub const UNPACKED_BYTES_MAX: u64 = 1 << 29;
+/// Files in an archive: one is the raster, the others describe it.
+pub const ARCHIVE_ENTRIES_MAX: usize = 1000;
 /// Bytes of a GeoJSON file: it is parsed whole, into about ten times as much memory.
 pub const GEOJSON_BYTES_MAX: u64 = 256 << 20;
 /// Heights in metres to either side of 0: 24 bits of quanta, and no ground on any planet is higher.

@@ -1,58 +1,103 @@
-//! Polygons from GeoJSON, in metres of the area's coordinate system.
+//! Polygons from GeoJSON and Shapefiles, brought to the area's coordinate system.
 //!
-//! The format's own standard wants longitude and latitude; files in projected metres are common all the same, with a
-//! `crs` member or without. A file that names another system, or whose numbers can only be degrees, is refused.
+//! GeoJSON's own standard wants longitude and latitude; files in projected metres are common all the same, with a `crs`
+//! member or without. Numbers that can only be degrees are taken for longitude and latitude on WGS 84, others that
+//! nothing is said about for metres of the area's system.
 
-use std::fs::File;
-use std::io::{BufReader, Read};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use geojson::{FeatureCollection, GeoJson, Geometry, GeometryValue, JsonObject, Position};
 use mask::Polygon;
 
-use crate::SourceError;
+use crate::crs::Crs;
 use crate::limits::GEOJSON_BYTES_MAX;
+use crate::store::Store;
+use crate::{SourceError, shapefile};
 
-/// Reads every Polygon and MultiPolygon of the GeoJSON file at `path`, whose coordinates are metres of the
-/// coordinate system EPSG:`epsg`.
+/// Reads every Polygon and MultiPolygon of the GeoJSON file or Shapefile at `path`, in metres of the coordinate system
+/// EPSG:`epsg`.
 ///
 /// # Errors
-/// When the file is no GeoJSON, holds other geometries or none, a ring is not closed, or its coordinates are in
-/// another system.
+/// When the file is neither, holds other geometries or none, a ring is not closed, or its coordinates are in a system
+/// that cannot be brought to the area's.
 pub fn read_polygons(path: &Path, epsg: u32) -> Result<Vec<Polygon>, SourceError> {
-    let json = parse(path)?;
-    let mut collected = Collected { path, polygons: Vec::new(), rings: 0 };
-    check_crs(path, &json, epsg)?;
-    match json {
-        GeoJson::Geometry(geometry) => collected.add(geometry)?,
-        GeoJson::Feature(feature) => collected.add_some(feature.geometry)?,
-        GeoJson::FeatureCollection(FeatureCollection { features, .. }) => {
-            features.into_iter().try_for_each(|feature| collected.add_some(feature.geometry))?;
-        }
+    let store = Store::plain(path)?;
+    if GEOJSON_BYTES_MAX < store.len() {
+        let (found, limit) = (store.len(), GEOJSON_BYTES_MAX);
+        return Err(SourceError::TooLarge { path: path.into(), what: "bytes", found, limit });
     }
+    let bytes = store.start(GEOJSON_BYTES_MAX)?;
+    let mut collected = Collected { path, polygons: Vec::new(), rings: 0 };
+    let said = match bytes.starts_with(&shapefile::MARK) {
+        true => {
+            for rings in shapefile::rings(&store, &bytes, index_beside(path)?.as_deref())? {
+                let rings = rings.into_iter().map(|ring| collected.closed(Some(ring))).collect::<Result<_, _>>()?;
+                collected.polygons.push(Polygon { rings });
+            }
+            said_beside(path)?
+        }
+        false => collected.add_json(&bytes)?,
+    };
     if collected.polygons.is_empty() {
         return Err(SourceError::NoPolygons { path: path.into() });
     }
-    check_metres(path, &collected.polygons, epsg)?;
-    Ok(collected.polygons)
+    let said = said.or_else(|| look_like_degrees(&collected.polygons).then(Crs::wgs84));
+    match said {
+        Some(crs) if crs.epsg() != Some(epsg) => projected(path, collected.polygons, &crs, epsg),
+        _ => Ok(collected.polygons),
+    }
 }
 
-fn parse(path: &Path) -> Result<GeoJson, SourceError> {
-    let file = File::open(path).map_err(|source| SourceError::Open { path: path.into(), source })?;
-    let read = |source| SourceError::Read { path: path.into(), source };
-    let found = file.metadata().map_err(read)?.len();
-    if GEOJSON_BYTES_MAX < found {
-        return Err(SourceError::TooLarge { path: path.into(), what: "bytes", found, limit: GEOJSON_BYTES_MAX });
-    }
-    let mut text = String::new();
-    BufReader::new(file).take(GEOJSON_BYTES_MAX).read_to_string(&mut text).map_err(|error| match error.kind() {
-        std::io::ErrorKind::InvalidData => {
-            SourceError::NotGeoJson { path: path.into(), reason: "it is not UTF-8 text".into() }
+/// The bytes of the index of a Shapefile.
+fn index_beside(path: &Path) -> Result<Option<Vec<u8>>, SourceError> {
+    let names: [PathBuf; 2] = ["shx", "SHX"].map(|ending| path.with_extension(ending));
+    let Some(index) = names.into_iter().find(|name| name.is_file()) else { return Ok(None) };
+    Store::plain(&index)?.start(GEOJSON_BYTES_MAX).map(Some)
+}
+
+/// The system that a `.prj` beside the file names.
+fn said_beside(path: &Path) -> Result<Option<Crs>, SourceError> {
+    let names: [PathBuf; 2] = ["prj", "PRJ"].map(|ending| path.with_extension(ending));
+    let Some(prj) = names.into_iter().find(|name| name.is_file()) else { return Ok(None) };
+    let text = Store::plain(&prj)?.start(1 << 16)?;
+    let crs = Crs::from_wkt(&String::from_utf8_lossy(&text));
+    crs.map(Some).map_err(|found| SourceError::UnnamedCrs { path: prj, found })
+}
+
+/// Whether numbers can only be degrees: a projected area a degree or two of metres wide at the system's origin is not
+/// a place anybody compiles.
+fn look_like_degrees(polygons: &[Polygon]) -> bool {
+    let mut corners = polygons.iter().flat_map(|polygon| &polygon.rings).flatten();
+    corners.all(|[east, north]| east.abs() <= 360.0 && north.abs() <= 90.0)
+}
+
+/// Polygons brought from `crs` to the area's system. Long sides get corners between, since what is straight in one
+/// system is not in the other.
+fn projected(path: &Path, polygons: Vec<Polygon>, crs: &Crs, epsg: u32) -> Result<Vec<Polygon>, SourceError> {
+    /// Pieces of a side, at most.
+    const PIECES_MAX: f64 = 1000.0;
+    let piece = if crs.is_geographic() { 0.005 } else { 500.0 };
+    let outside = |found: String| SourceError::PolygonCrs { path: path.into(), found, expected: epsg };
+    let area = Crs::from_epsg(epsg).map_err(&outside)?;
+    let ring = |ring: &Vec<[f64; 2]>| {
+        let mut corners = Vec::with_capacity(ring.len());
+        let next = ring.iter().skip(1).map(Some).chain([None]);
+        for (&from, to) in ring.iter().zip(next) {
+            let to = to.copied().unwrap_or(from);
+            let longest = (to[0] - from[0]).abs().max((to[1] - from[1]).abs());
+            let pieces = (longest / piece).ceil().clamp(1.0, PIECES_MAX) as u32;
+            for step in 0..pieces {
+                let share = f64::from(step) / f64::from(pieces);
+                let place = [0, 1].map(|axis| from[axis] + share * (to[axis] - from[axis]));
+                let placed = crs.to(&area, place);
+                corners.push(placed.ok_or_else(|| outside(format!("{}, at {place:?}", crs.name())))?);
+            }
         }
-        _ => read(error),
-    })?;
-    text.parse()
-        .map_err(|error: geojson::Error| SourceError::NotGeoJson { path: path.into(), reason: error.to_string() })
+        Ok(corners)
+    };
+    let of_polygon =
+        |polygon: Polygon| Ok(Polygon { rings: polygon.rings.iter().map(ring).collect::<Result<_, SourceError>>()? });
+    polygons.into_iter().map(of_polygon).collect()
 }
 
 /// Polygons found so far.
@@ -64,6 +109,22 @@ struct Collected<'a> {
 }
 
 impl Collected<'_> {
+    /// Adds all polygons of a GeoJSON text; gives the system that it names.
+    fn add_json(&mut self, bytes: &[u8]) -> Result<Option<Crs>, SourceError> {
+        let broken = |reason: String| SourceError::NotGeoJson { path: self.path.into(), reason };
+        let text = std::str::from_utf8(bytes).map_err(|_| broken("it is not UTF-8 text".into()))?;
+        let json: GeoJson = text.parse().map_err(|error: geojson::Error| broken(error.to_string()))?;
+        let said = said_in(self.path, &json)?;
+        match json {
+            GeoJson::Geometry(geometry) => self.add(geometry)?,
+            GeoJson::Feature(feature) => self.add_some(feature.geometry)?,
+            GeoJson::FeatureCollection(FeatureCollection { features, .. }) => {
+                features.into_iter().try_for_each(|feature| self.add_some(feature.geometry))?;
+            }
+        }
+        Ok(said)
+    }
+
     /// A feature without a geometry is legal and adds nothing.
     fn add_some(&mut self, geometry: Option<Geometry>) -> Result<(), SourceError> {
         geometry.map_or(Ok(()), |geometry| self.add(geometry))
@@ -93,11 +154,16 @@ impl Collected<'_> {
     }
 
     fn ring(&mut self, positions: &[Position]) -> Result<Vec<[f64; 2]>, SourceError> {
+        self.closed(positions.iter().map(corner).collect())
+    }
+
+    /// Checks that a ring is one.
+    fn closed(&mut self, corners: Option<Vec<[f64; 2]>>) -> Result<Vec<[f64; 2]>, SourceError> {
         let ring = self.rings;
         self.rings += 1;
         let wrong = |found: String| SourceError::Ring { path: self.path.into(), ring, found };
-        let corners: Option<Vec<[f64; 2]>> = positions.iter().map(corner).collect();
-        let corners = corners.ok_or_else(|| wrong("a corner without two finite numbers".into()))?;
+        let finite = corners.filter(|corners| corners.as_flattened().iter().all(|number| number.is_finite()));
+        let corners = finite.ok_or_else(|| wrong("a corner without two finite numbers".into()))?;
         if corners.len() < 4 {
             return Err(wrong(format!("{} corners", corners.len())));
         }
@@ -113,36 +179,30 @@ fn corner(position: &Position) -> Option<[f64; 2]> {
     (east_m.is_finite() && north_m.is_finite()).then_some([east_m, north_m])
 }
 
-/// Refuses a file whose `crs` member names another system than the area's.
-fn check_crs(path: &Path, json: &GeoJson, expected: u32) -> Result<(), SourceError> {
+/// The system that the `crs` member of a file names.
+fn said_in(path: &Path, json: &GeoJson) -> Result<Option<Crs>, SourceError> {
     let members: Option<&JsonObject> = match json {
         GeoJson::Geometry(geometry) => geometry.foreign_members.as_ref(),
         GeoJson::Feature(feature) => feature.foreign_members.as_ref(),
         GeoJson::FeatureCollection(features) => features.foreign_members.as_ref(),
     };
-    let Some(crs) = members.and_then(|members| members.get("crs")).filter(|crs| !crs.is_null()) else { return Ok(()) };
-    let name = crs.pointer("/properties/name").and_then(|name| name.as_str());
-    let found = match name {
-        None => format!("an unnamed system ({crs})"),
-        Some(name) if epsg_of(name) == Some(expected) => return Ok(()),
-        Some(name) => name.into(),
+    let Some(crs) = members.and_then(|members| members.get("crs")).filter(|crs| !crs.is_null()) else {
+        return Ok(None);
     };
-    Err(SourceError::PolygonCrs { path: path.into(), found, expected })
+    let refused = |found: String| SourceError::UnnamedCrs { path: path.into(), found };
+    match crs.pointer("/properties/name").and_then(|name| name.as_str()) {
+        None => Err(refused(format!("an unnamed system ({crs})"))),
+        // Longitude first, which is how all GeoJSON is written.
+        Some(name) if name.ends_with("CRS84") => Ok(Some(Crs::wgs84())),
+        Some(name) => match epsg_of(name) {
+            None => Err(refused(name.to_owned())),
+            Some(code) => Crs::from_epsg(code).map(Some).map_err(|found| refused(format!("{name}: {found}"))),
+        },
+    }
 }
 
 /// The code in `EPSG:32611`, `urn:ogc:def:crs:EPSG::32611` or `http://www.opengis.net/def/crs/EPSG/0/32611`.
 fn epsg_of(name: &str) -> Option<u32> {
     let code = name.rsplit([':', '/']).next()?;
     name.to_ascii_uppercase().contains("EPSG").then(|| code.parse().ok()).flatten()
-}
-
-/// Refuses numbers that can only be degrees: a projected area a degree or two of metres wide at the system's origin
-/// is not a place anybody compiles.
-fn check_metres(path: &Path, polygons: &[Polygon], expected: u32) -> Result<(), SourceError> {
-    let mut corners = polygons.iter().flat_map(|polygon| &polygon.rings).flatten();
-    if !corners.clone().all(|[east, north]| east.abs() <= 360.0 && north.abs() <= 90.0) {
-        return Ok(());
-    }
-    let Some([east, north]) = corners.next() else { return Ok(()) };
-    Err(SourceError::LonLat { path: path.into(), found: format!("{east}, {north}"), expected })
 }

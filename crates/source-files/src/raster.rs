@@ -3,8 +3,8 @@
 use terrain::{Post, PostRect};
 
 use crate::SourceError;
+use crate::chunk::{Chunk, Header};
 use crate::frame::{RasterFrame, SampleScale};
-use crate::geotiff::{Chunk, GeoTiff};
 use crate::limits::HEIGHT_M_MAX;
 use crate::samples::Samples;
 
@@ -17,6 +17,7 @@ pub struct Raster {
     pub(crate) samples: Samples,
     pub(crate) voids: Voids,
     range_m: Option<(f64, f64)>,
+    notes: Vec<String>,
 }
 
 /// Which posts of a window are void.
@@ -52,32 +53,51 @@ impl Voids {
 }
 
 impl Raster {
-    pub(crate) fn assemble(source: &GeoTiff, window: PostRect, chunks: Vec<Chunk>) -> Result<Self, SourceError> {
-        let mut samples = Samples::zeroed(source.layout().sample, window.post_count());
-        let mut placed = 0;
-        for chunk in chunks {
-            placed += place(source, window, &chunk, &mut samples);
+    pub(crate) fn assemble(header: &Header, window: PostRect, chunks: Vec<Chunk>) -> Result<Self, SourceError> {
+        let mut samples = Samples::zeroed(header.kind, window.post_count());
+        let (mut placed, mut notes) = (0, Vec::new());
+        for mut chunk in chunks {
+            placed += place(header, window, &chunk, &mut samples);
+            notes.append(&mut chunk.notes);
         }
         assert_eq!(placed, window.post_count(), "the chunks of a window hold each of its posts once");
-        let survey = samples.survey(source.nodata());
+        Self::of_samples(header, window, samples, notes)
+    }
+
+    /// A window whose samples are in place.
+    pub(crate) fn of_samples(
+        header: &Header,
+        window: PostRect,
+        samples: Samples,
+        notes: Vec<String>,
+    ) -> Result<Self, SourceError> {
+        let survey = samples.survey(header.nodata);
         let mut voids = Voids { settled: survey.voids == 0, ..Voids::default() };
         if 0 < survey.voids {
             voids.bits = vec![0; window.post_count().div_ceil(64)];
-            samples.visit_voids(source.nodata(), |index| voids.mark(index));
+            samples.visit_voids(header.nodata, |index| voids.mark(index));
         }
-        let scale = source.sample_scale();
+        let scale = header.scale;
         let range_m = survey.range.map(|(lowest, highest)| (scale.height_m(lowest), scale.height_m(highest)));
-        let raster = Self { frame: source.frame().clone(), scale, window, samples, voids, range_m };
+        let raster = Self { frame: header.frame.clone(), scale, window, samples, voids, range_m, notes };
         raster.check_range(survey.range)?;
         Ok(raster)
+    }
+
+    /// Makes posts void, by index.
+    pub(crate) fn mark_voids(&mut self, indices: impl Iterator<Item = usize>) {
+        let mut voids = Voids { bits: vec![0; self.window.post_count().div_ceil(64)], ..Voids::default() };
+        indices.for_each(|index| voids.mark(index));
+        voids.settled = voids.count == 0;
+        self.voids = voids;
     }
 
     fn check_range(&self, samples: Option<(f64, f64)>) -> Result<(), SourceError> {
         let Some((lowest, highest)) = samples else { return Ok(()) };
         if lowest.is_infinite() || highest.is_infinite() {
             let index = (0..self.window.post_count()).find(|&index| self.samples.get(index).is_infinite());
-            let place_m = self.place_m(index.expect("a range that is not finite has a post that is not"));
-            return Err(SourceError::Infinite { path: self.frame.path.clone(), place_m });
+            let at = self.place(index.expect("a range that is not finite has a post that is not"));
+            return Err(SourceError::Infinite { path: self.frame.path.clone(), at });
         }
         let heights_m = [lowest, highest].map(|sample| self.scale.height_m(sample));
         let inside = |height_m: &f64| height_m.abs() <= HEIGHT_M_MAX;
@@ -98,6 +118,11 @@ impl Raster {
     /// The posts it holds, counted from the south-west post of the whole raster.
     pub fn window(&self) -> PostRect {
         self.window
+    }
+
+    /// What a person should know about the samples that were read.
+    pub fn notes(&self) -> &[String] {
+        &self.notes
     }
 
     /// How many posts are void.
@@ -129,25 +154,25 @@ impl Raster {
         self.sample(post).map(|sample| self.scale.height_m(sample))
     }
 
-    /// Easting and northing of a post of the window by its index, in metres.
-    pub(crate) fn place_m(&self, index: usize) -> [f64; 2] {
+    /// Where a post of the window lies, by its index, for messages.
+    pub(crate) fn place(&self, index: usize) -> String {
         let (row, col) = (index / self.window.posts_wide(), index % self.window.posts_wide());
-        self.frame.place_m(self.window.south as u32 + row as u32, self.window.west as u32 + col as u32)
+        self.frame.place_text(self.window.south as u32 + row as u32, self.window.west as u32 + col as u32)
     }
 }
 
 /// Copies the part of a chunk that lies in the window; gives the number of posts.
-fn place(source: &GeoTiff, window: PostRect, chunk: &Chunk, samples: &mut Samples) -> usize {
-    let posts = source.posts_of(chunk.index);
+fn place(header: &Header, window: PostRect, chunk: &Chunk, samples: &mut Samples) -> usize {
+    let posts = chunk.posts;
     let Some(cut) = posts.intersection(&window) else { return 0 };
     let count = cut.posts_wide();
     for row in cut.south..=cut.north {
         let at = (row - window.south) as usize * window.posts_wide() + (cut.west - window.west) as usize;
-        let stored_row = if source.south_first() { row - posts.south } else { posts.north - row };
-        let from = stored_row as usize * source.layout().chunk_cols as usize + (cut.west - posts.west) as usize;
+        let stored_row = if chunk.south_first { row - posts.south } else { posts.north - row };
+        let from = stored_row as usize * chunk.stride + (cut.west - posts.west) as usize;
         match &chunk.samples {
             Some(decoded) => samples.copy(at, decoded, from, count),
-            None => samples.fill(at, count, source.nodata().unwrap_or(0.0)),
+            None => samples.fill(at, count, header.nodata.unwrap_or(0.0)),
         }
     }
     cut.post_count()

@@ -29,12 +29,12 @@ fn taps(frame: &RasterFrame, grid: &GridFrame, rect: PostRect) -> Result<(Vec<Ta
 
 /// Where a column of the grid lies, in columns of the raster.
 pub(crate) fn col_of(frame: &RasterFrame, grid: &GridFrame, col: i32) -> f64 {
-    (grid.east_m(col) - frame.south_west_m[0]) / frame.spacing_m[0]
+    (grid.east_m(col) - frame.south_west[0]) / frame.spacing[0]
 }
 
 /// Where a row of the grid lies, in rows of the raster.
 pub(crate) fn row_of(frame: &RasterFrame, grid: &GridFrame, row: i32) -> f64 {
-    (grid.north_m(row) - frame.south_west_m[1]) / frame.spacing_m[1]
+    (grid.north_m(row) - frame.south_west[1]) / frame.spacing[1]
 }
 
 /// The sides on which the raster ends before the area does, and by how many metres.
@@ -42,10 +42,10 @@ pub(crate) fn missing(frame: &RasterFrame, grid: &GridFrame, rect: PostRect) -> 
     let past_col = |col| col_of(frame, grid, col) - f64::from(frame.cols - 1);
     let past_row = |row| row_of(frame, grid, row) - f64::from(frame.rows - 1);
     let lacks = [
-        (Side::South, -row_of(frame, grid, rect.south), frame.spacing_m[1]),
-        (Side::East, past_col(rect.east), frame.spacing_m[0]),
-        (Side::North, past_row(rect.north), frame.spacing_m[1]),
-        (Side::West, -col_of(frame, grid, rect.west), frame.spacing_m[0]),
+        (Side::South, -row_of(frame, grid, rect.south), frame.spacing[1]),
+        (Side::East, past_col(rect.east), frame.spacing[0]),
+        (Side::North, past_row(rect.north), frame.spacing[1]),
+        (Side::West, -col_of(frame, grid, rect.west), frame.spacing[0]),
     ];
     let outside = lacks.into_iter().filter(|&(_, posts, _)| tap(-posts, u32::MAX).is_none());
     outside.map(|(side, posts, spacing_m)| (side, posts * spacing_m)).collect()

@@ -1,7 +1,5 @@
 //! The samples of a raster, kept in the type the file has: 16-bit heights take 16 bits.
 
-use tiff::decoder::DecodingResult;
-
 use crate::directory::SampleKind;
 
 /// Samples of one of the kinds that are read.
@@ -19,15 +17,16 @@ pub(crate) enum Samples {
 macro_rules! each {
     ($samples:expr, $posts:ident => $code:expr) => {
         match $samples {
-            Samples::U8($posts) => $code,
-            Samples::U16($posts) => $code,
-            Samples::I16($posts) => $code,
-            Samples::I32($posts) => $code,
-            Samples::F32($posts) => $code,
-            Samples::F64($posts) => $code,
+            $crate::samples::Samples::U8($posts) => $code,
+            $crate::samples::Samples::U16($posts) => $code,
+            $crate::samples::Samples::I16($posts) => $code,
+            $crate::samples::Samples::I32($posts) => $code,
+            $crate::samples::Samples::F32($posts) => $code,
+            $crate::samples::Samples::F64($posts) => $code,
         }
     };
 }
+pub(crate) use each;
 
 /// A type samples are stored in.
 pub(crate) trait Sample: Copy + Default + PartialOrd + Into<f64> {
@@ -90,19 +89,54 @@ impl Samples {
         }
     }
 
-    /// Copies `count` samples of a decoded chunk.
+    /// Samples that are stored as they are.
+    pub(crate) fn from_bytes(kind: SampleKind, big_endian: bool, bytes: &[u8]) -> Self {
+        macro_rules! numbers {
+            ($kind:ty) => {{
+                let (numbers, _) = bytes.as_chunks::<{ size_of::<$kind>() }>();
+                let number = if big_endian { <$kind>::from_be_bytes } else { <$kind>::from_le_bytes };
+                numbers.iter().map(|&bytes| number(bytes)).collect()
+            }};
+        }
+        match kind {
+            SampleKind::U8 => Samples::U8(bytes.to_vec()),
+            SampleKind::U16 => Samples::U16(numbers!(u16)),
+            SampleKind::I16 => Samples::I16(numbers!(i16)),
+            SampleKind::I32 => Samples::I32(numbers!(i32)),
+            SampleKind::F32 => Samples::F32(numbers!(f32)),
+            SampleKind::F64 => Samples::F64(numbers!(f64)),
+        }
+    }
+
+    /// How they are stored.
+    pub(crate) fn kind(&self) -> SampleKind {
+        match self {
+            Samples::U8(_) => SampleKind::U8,
+            Samples::U16(_) => SampleKind::U16,
+            Samples::I16(_) => SampleKind::I16,
+            Samples::I32(_) => SampleKind::I32,
+            Samples::F32(_) => SampleKind::F32,
+            Samples::F64(_) => SampleKind::F64,
+        }
+    }
+
+    pub(crate) fn count(&self) -> usize {
+        each!(self, posts => posts.len())
+    }
+
+    /// Copies `count` samples of others of the same kind.
     ///
     /// # Panics
-    /// When the chunk is of another kind: the directory was checked, and the decoder keeps to it.
-    pub(crate) fn copy(&mut self, at: usize, chunk: &DecodingResult, from: usize, count: usize) {
+    /// When they are of another kind: a reader gives what its header names.
+    pub(crate) fn copy(&mut self, at: usize, chunk: &Samples, from: usize, count: usize) {
         match (self, chunk) {
-            (Samples::U8(to), DecodingResult::U8(chunk)) => copy(to, at, chunk, from, count),
-            (Samples::U16(to), DecodingResult::U16(chunk)) => copy(to, at, chunk, from, count),
-            (Samples::I16(to), DecodingResult::I16(chunk)) => copy(to, at, chunk, from, count),
-            (Samples::I32(to), DecodingResult::I32(chunk)) => copy(to, at, chunk, from, count),
-            (Samples::F32(to), DecodingResult::F32(chunk)) => copy(to, at, chunk, from, count),
-            (Samples::F64(to), DecodingResult::F64(chunk)) => copy(to, at, chunk, from, count),
-            _ => panic!("the decoder gives samples of the kind the directory names"),
+            (Samples::U8(to), Samples::U8(chunk)) => copy(to, at, chunk, from, count),
+            (Samples::U16(to), Samples::U16(chunk)) => copy(to, at, chunk, from, count),
+            (Samples::I16(to), Samples::I16(chunk)) => copy(to, at, chunk, from, count),
+            (Samples::I32(to), Samples::I32(chunk)) => copy(to, at, chunk, from, count),
+            (Samples::F32(to), Samples::F32(chunk)) => copy(to, at, chunk, from, count),
+            (Samples::F64(to), Samples::F64(chunk)) => copy(to, at, chunk, from, count),
+            _ => panic!("a reader gives samples of the kind its header names"),
         }
     }
 
@@ -142,6 +176,14 @@ impl Samples {
                 }
             }
         });
+    }
+
+    /// Whether every sample that is a number is a whole one.
+    pub(crate) fn all_whole(&self) -> bool {
+        each!(self, posts => posts.iter().all(|&post| {
+            let number = number(post);
+            number.is_nan() || number.fract() == 0.0
+        }))
     }
 
     /// The type's name, for types that are no whole numbers.

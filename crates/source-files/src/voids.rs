@@ -50,7 +50,7 @@ impl Raster {
         let first = self.voids.iter().next().expect("there are voids");
         let summary = match policy {
             VoidPolicy::Fail => {
-                return Err(SourceError::Voids { path: path(), found: count, first_m: self.place_m(first) });
+                return Err(SourceError::Voids { path: path(), found: count, first: self.place(first) });
             }
             VoidPolicy::Hole => {
                 Filling::new(self).grow(u32::MAX).write(self);
@@ -59,8 +59,8 @@ impl Raster {
             VoidPolicy::FillWithin(limit) => {
                 let filling = Filling::new(self).grow(limit);
                 if let Some(first) = filling.first_unknown(self) {
-                    let (found, first_m) = (count - filling.filled.len(), self.place_m(first));
-                    return Err(SourceError::VoidsTooFar { path: path(), found, limit, first_m });
+                    let (found, first) = (count - filling.filled.len(), self.place(first));
+                    return Err(SourceError::VoidsTooFar { path: path(), found, limit, first });
                 }
                 filling.smooth().write(self);
                 self.voids.clear();
@@ -69,6 +69,17 @@ impl Raster {
         };
         self.voids.settled = true;
         Ok(summary)
+    }
+}
+
+impl Raster {
+    /// Gives every void post a height; those at most `within` posts from one, whose indices it gives, a smooth one.
+    pub(crate) fn fill_around(&mut self, within: u32) -> Vec<usize> {
+        let near = Filling::new(self).grow(within).smooth();
+        let filled = near.filled.clone();
+        near.grow(u32::MAX).write(self);
+        self.voids.settled = true;
+        filled
     }
 }
 

@@ -9,23 +9,75 @@ use crate::bounds::{
     CELLS_A_SIDE_MAX, COORDINATE_M_MAX, EPSG_GEOGRAPHIC, EPSG_RANGE, MODULES_MAX, NAME_CHARS_MAX, SIDE_QUANTA_MAX,
 };
 use crate::entry::{Entry, Section};
-use crate::{Area, ClipHeights, Edges, JobError, ModulesSpec};
+use crate::{Area, AreaFound, AreaPlace, AreaRequest, ClipHeights, Edges, JobError, ModulesSpec};
 
-pub(super) fn read(area: &Section, modules: &Section) -> Result<(Area, ModulesSpec), JobError> {
+/// Finds what a job leaves open about its area.
+pub(super) type Find<'a> = dyn FnMut(&AreaRequest, &Entry) -> Result<AreaFound, JobError> + 'a;
+
+pub(super) fn read(area: &Section, modules: &Section, find: &mut Find) -> Result<(Area, ModulesSpec), JobError> {
     let name = name(area)?;
     let epsg = epsg(area)?;
-    let origin_m = origin(area)?;
+    let place = open_place(area, epsg)?;
+    let origin_m = if place.is_none() { origin(area)? } else { [0.0; 2] };
     let (spacing_entry, spacing) = spacing(area)?;
     let border_step_m = length(modules, "border_step_m", 125.0)?;
     let side_m = length(modules, "side_m", 500.0)?;
     let border_step_cells = border_step_cells(&spacing_entry, spacing, border_step_m)?;
     let side_cells = side_cells(modules, spacing, side_m, border_step_m)?;
-    let grid = grid(area, spacing, side_cells, side_m)?;
+    let (epsg, origin_m, grid) = match (place, epsg) {
+        (Some((entry, place)), epsg) => {
+            let request = AreaRequest { epsg, place, spacing, side_m };
+            let AreaFound { epsg, origin_m, size_m } = find(&request, &entry)?;
+            (epsg, origin_m, grid_of(&entry, size_m, spacing, side_cells, side_m)?)
+        }
+        (None, Some(epsg)) => (epsg, origin_m, grid(area, spacing, side_cells, side_m)?),
+        (None, None) => {
+            let hint = "\"auto\" goes with around = { lat = 35.3, lon = -116.6, size_km = 50 } or cover = \"dem\"";
+            let entry = area.required("crs", "")?;
+            return Err(entry.conflict("origin_m", "a system for these metres, as \"EPSG:32611\"", hint));
+        }
+    };
     // A multiple of the spacing, itself one of 1/16 m, so this is whole; and side_cells has checked that it fits.
     let side_quanta = (side_m * f64::from(QUANTA_PER_METRE)) as u16;
     let edges = edges(modules)?;
     let modules = ModulesSpec { side_m, side_quanta, border_step_m, border_step_cells, edges };
     Ok((Area { name, epsg, origin_m, spacing, grid }, modules))
+}
+
+/// An area that is to be found, with the key that says so.
+fn open_place<'a>(area: &Section<'a>, epsg: Option<u32>) -> Result<Option<(Entry<'a>, AreaPlace)>, JobError> {
+    let (around, cover) = (area.optional("around"), area.optional("cover"));
+    let stated = ["origin_m", "size_m"].into_iter().find(|key| area.optional(key).is_some());
+    let either = |entry: &Entry, beside: &str| {
+        entry.conflict(beside, "either cover, around, or origin_m and size_m", "remove one of the two")
+    };
+    match (around, cover, stated) {
+        (None, None, _) => Ok(None),
+        (Some(entry), Some(_), _) => Err(either(&entry, "cover")),
+        (Some(entry), None, Some(key)) | (None, Some(entry), Some(key)) => Err(either(&entry, key)),
+        (None, Some(entry), None) => {
+            entry.word(&[("dem", ())])?;
+            Ok(Some((entry, AreaPlace::CoverDem)))
+        }
+        (Some(entry), None, None) => {
+            let table = entry.table()?;
+            let number = |key, expected: &str| table.required(key, expected)?.number(expected);
+            let lat = "degrees of latitude, south negative";
+            let lon = "degrees of longitude, west negative";
+            let (latitude, longitude) = (number("lat", lat)?, number("lon", lon)?);
+            if 90.0 < latitude.abs() || 360.0 < longitude.abs() || (epsg.is_none() && 84.0 < latitude.abs()) {
+                return Err(entry.out_of_range("a latitude within 90 (UTM: 84) and a longitude within 360 degrees"));
+            }
+            let expected = "kilometres a side, or [east to west, north to south]";
+            let size = table.required("size_km", expected)?;
+            let size_km = if size.is_list() { size.pair(expected)? } else { [size.number(expected)?; 2] };
+            if size_km.iter().any(|&km| !(0.0 < km && km <= 20_000.0)) {
+                return Err(size.out_of_range("above 0 and at most 20000 kilometres"));
+            }
+            let size_m = size_km.map(|km| km * 1000.0);
+            Ok(Some((entry, AreaPlace::Around { latitude, longitude, size_m })))
+        }
+    }
 }
 
 fn name(area: &Section) -> Result<String, JobError> {
@@ -40,10 +92,14 @@ fn name(area: &Section) -> Result<String, JobError> {
     Ok(name.to_owned())
 }
 
-fn epsg(area: &Section) -> Result<u32, JobError> {
+/// The code; `None` for one that is to be found.
+fn epsg(area: &Section) -> Result<Option<u32>, JobError> {
     let expected = "a projected coordinate system in metres, as \"EPSG:32611\"";
     let hint = "UTM zone 11 north on WGS 84 is EPSG:32611, zone 32 north EPSG:32632";
     let entry = area.required("crs", expected)?;
+    if entry.text(expected)? == "auto" {
+        return Ok(None);
+    }
     let digits = entry.text(expected)?.strip_prefix("EPSG:").filter(|code| code.bytes().all(|b| b.is_ascii_digit()));
     let code = digits.and_then(|digits| digits.parse().ok()).filter(|code| EPSG_RANGE.contains(code));
     let code = code.ok_or_else(|| entry.out_of_range_with(expected, hint))?;
@@ -53,7 +109,7 @@ fn epsg(area: &Section) -> Result<u32, JobError> {
         fault.found += ", which is in degrees";
         return Err(JobError::OutOfRange(fault));
     }
-    Ok(code)
+    Ok(Some(code))
 }
 
 fn origin(area: &Section) -> Result<[f64; 2], JobError> {
@@ -132,6 +188,17 @@ fn grid(area: &Section, spacing: Spacing, side_cells: i32, side_m: f64) -> Resul
     let expected = "[width, height] of the area in metres";
     let entry = area.required("size_m", expected)?;
     let size_m = entry.pair(expected)?;
+    grid_of(&entry, size_m, spacing, side_cells, side_m)
+}
+
+/// The load modules of an area of this size; `entry` is the key to speak of.
+fn grid_of(
+    entry: &Entry,
+    size_m: [f64; 2],
+    spacing: Spacing,
+    side_cells: i32,
+    side_m: f64,
+) -> Result<ModuleGrid, JobError> {
     if size_m.iter().any(|&metres| metres <= 0.0) {
         return Err(entry.out_of_range("a positive width and height in metres"));
     }

@@ -2,30 +2,42 @@
 
 use std::path::Path;
 
-use crate::bounds::{FILL_POSTS_MAX, SOURCES_MAX};
+use crate::bounds::{FEATHER_M_MAX, FILL_POSTS_MAX, SOURCES_MAX};
 use crate::entry::{Entry, Section};
 use crate::files::{Mention, Place, has_wildcard, leaves_after_wildcard};
-use crate::{DemSource, DemSpec, JobError, Voids};
-
-/// Formats by the ends of their names that belong to a later version.
-const LATER_FORMATS: [&str; 10] = ["dt0", "dt1", "dt2", "hgt", "asc", "flt", "dem", "gz", "zip", "vrt"];
+use crate::{DemSource, DemSpec, JobError, NamedFile, Resampling, SourceEntry, SourceFile, SourceSaid, Voids};
 
 pub(super) fn read(dem: &Section, job: &Path, mentions: &mut Vec<Mention>) -> Result<DemSpec, JobError> {
-    if let Some(entry) = dem.optional("height_unit_m") {
-        return Err(entry.unsupported("heights in metres, without this key", "convert the heights to metres first"));
+    let unit_m = unit(dem)?;
+    let source = source(dem, job, unit_m, mentions)?;
+    if let (Some(entry), DemSource::Sample { .. }) = (dem.optional("height_unit_m"), &source) {
+        return Err(entry.conflict("source = \"sample\"", "no unit, since the sample is in metres", "remove it"));
     }
-    let source = source(dem, job, mentions)?;
     let vertical_datum = vertical_datum(dem)?;
-    let voids = voids(dem)?;
-    Ok(DemSpec { source, vertical_datum, voids })
+    let (voids, next_source) = voids(dem)?;
+    let resampling = match dem.optional("resampling") {
+        Some(entry) => entry.word(&[("bilinear", Resampling::Bilinear), ("cubic", Resampling::Cubic)])?,
+        None => Resampling::Bilinear,
+    };
+    let feather_m = dem
+        .optional("feather_m")
+        .map_or(Ok(0.0), |entry| entry.number_in(0.0..=FEATHER_M_MAX, &format!("metres from 0 to {FEATHER_M_MAX}")))?;
+    Ok(DemSpec { source, vertical_datum, voids, next_source, resampling, feather_m })
 }
 
-fn source(dem: &Section, job: &Path, mentions: &mut Vec<Mention>) -> Result<DemSource, JobError> {
+/// Metres in a unit of height.
+fn unit(table: &Section) -> Result<Option<f64>, JobError> {
+    let Some(entry) = table.optional("height_unit_m") else { return Ok(None) };
+    let expected = "metres in a unit of height, from 0.000001 to 1000";
+    entry.number_in(1.0e-6..=1.0e3, expected).map(Some)
+}
+
+fn source(dem: &Section, job: &Path, unit_m: Option<f64>, mentions: &mut Vec<Mention>) -> Result<DemSource, JobError> {
     let (files, sample, seed) = (dem.optional("sources"), dem.optional("source"), dem.optional("seed"));
     match (files, sample) {
         (Some(files), None) => match seed {
             Some(seed) => Err(seed.conflict("sources", "no seed, since files are read", "only the sample has a seed")),
-            None => sources(&files, job, mentions),
+            None => sources(&files, job, unit_m, mentions),
         },
         (None, Some(sample)) => {
             sample.word(&[("sample", ())])?;
@@ -43,7 +55,7 @@ fn source(dem: &Section, job: &Path, mentions: &mut Vec<Mention>) -> Result<DemS
     }
 }
 
-fn sources(entry: &Entry, job: &Path, mentions: &mut Vec<Mention>) -> Result<DemSource, JobError> {
+fn sources(entry: &Entry, job: &Path, unit_m: Option<f64>, mentions: &mut Vec<Mention>) -> Result<DemSource, JobError> {
     let expected = "a list of paths and patterns of rasters";
     let items = entry.list(expected)?;
     if items.is_empty() || SOURCES_MAX < items.len() {
@@ -51,28 +63,50 @@ fn sources(entry: &Entry, job: &Path, mentions: &mut Vec<Mention>) -> Result<Dem
     }
     let (mut written, mut files) = (Vec::new(), Vec::new());
     for item in &items {
-        let file = super::named_file(item, job)?;
-        refuse_later_format(item, &file.written)?;
+        let (file, said) = source_entry(item, job)?;
         if has_wildcard(&file.written) && leaves_after_wildcard(&file.written) {
             let mut fault = item.fault("a pattern without .. behind its first wildcard");
             fault.hint = "name the folder first: sources = [\"../other/*.tif\"]".to_owned();
             return Err(JobError::LeavesFolder(fault));
         }
         mentions.push(Mention { place: Place::Source(files.len()), fault: item.fault("a raster file") });
-        written.push(file.written.clone());
-        files.push(file);
+        let said = SourceSaid { height_unit_m: said.height_unit_m.or(unit_m), ..said };
+        written.push(SourceEntry { name: file.written.clone(), said: said.clone() });
+        files.push(SourceFile { written: file.written, path: file.path, said });
     }
     Ok(DemSource::Files { written, files })
 }
 
-fn refuse_later_format(entry: &Entry, written: &str) -> Result<(), JobError> {
-    let ending = Path::new(written).extension().map(|end| end.to_string_lossy().to_lowercase());
-    match ending {
-        Some(end) if LATER_FORMATS.contains(&end.as_str()) => {
-            Err(entry.unsupported("a GeoTIFF", "convert it first: gdal_translate IN OUT.tif"))
-        }
-        _ => Ok(()),
+/// A path, or a table with a path and what is to be known about it.
+fn source_entry(item: &Entry, job: &Path) -> Result<(NamedFile, SourceSaid), JobError> {
+    if !item.is_table() {
+        return Ok((super::named_file(item, job)?, SourceSaid::default()));
     }
+    let table = item.table()?;
+    let file = super::named_file(&table.required("file", "the path of a raster")?, job)?;
+    let text = |key: &str, expected: &str, chars_max: usize| match table.optional(key) {
+        None => Ok(None),
+        Some(entry) => {
+            let text = entry.text(expected)?;
+            let good = !text.trim().is_empty() && text.chars().count() <= chars_max && !text.contains('\0');
+            if good { Ok(Some(text.to_owned())) } else { Err(entry.out_of_range(expected)) }
+        }
+    };
+    let corner = "latitude and longitude in degrees, latitude first";
+    let corner = table.optional("corner").map(|entry| match entry.pair(corner)? {
+        pair @ [latitude, longitude] if latitude.abs() <= 90.0 && longitude.abs() <= 180.0 => Ok(pair),
+        _ => Err(entry.out_of_range(corner)),
+    });
+    let nodata = table.optional("nodata").map(|entry| entry.number("the value that marks a void"));
+    let said = SourceSaid {
+        crs: text("crs", "a coordinate system, as \"EPSG:4326\" or well-known text", 1 << 16)?,
+        corner: corner.transpose()?,
+        height_unit_m: unit(&table)?,
+        nodata: nodata.transpose()?,
+        vertical_datum: text("vertical_datum", "a name such as \"EGM96\", at most 64 characters", 64)?,
+        attribution: text("attribution", "whom to thank, at most 1000 characters", 1000)?,
+    };
+    Ok((file, said))
 }
 
 fn vertical_datum(dem: &Section) -> Result<Option<String>, JobError> {
@@ -86,15 +120,32 @@ fn vertical_datum(dem: &Section) -> Result<Option<String>, JobError> {
     Ok(Some(name.to_owned()))
 }
 
-fn voids(dem: &Section) -> Result<Voids, JobError> {
-    let Some(entry) = dem.optional("voids") else { return Ok(Voids::Fail) };
+/// What becomes of voids, and whether the next source is asked first.
+fn voids(dem: &Section) -> Result<(Voids, bool), JobError> {
+    let Some(entry) = dem.optional("voids") else { return Ok((Voids::Fail, false)) };
     if !entry.is_table() {
-        let what = "\"fail\" or { fill_within_posts = 8 }";
-        let word = entry.text(what)?;
-        return if word == "fail" { Ok(Voids::Fail) } else { Err(entry.out_of_range(what)) };
+        let what = "\"fail\", \"next_source\", \"hole\" or { fill_within_posts = 8 }";
+        return match entry.text(what)? {
+            "fail" => Ok((Voids::Fail, false)),
+            "next_source" => Ok((Voids::Fail, true)),
+            "hole" => Ok((Voids::Hole, false)),
+            _ => Err(entry.out_of_range(what)),
+        };
     }
     let table = entry.table()?;
-    let posts = table.required("fill_within_posts", "a number of posts")?;
-    let posts = posts.whole_u32(1..=FILL_POSTS_MAX as u32, "a number of posts")?;
-    Ok(Voids::FillWithinPosts(posts))
+    let flag = |key| table.optional(key).map_or(Ok(false), |entry| entry.flag());
+    let (next_source, hole) = (flag("next_source")?, flag("hole")?);
+    let posts = match (table.optional("fill_within_posts"), next_source || hole) {
+        (None, true) => None,
+        (None, false) => Some(table.required("fill_within_posts", "a number of posts")?),
+        (some, _) => some,
+    };
+    let posts = posts.map(|posts| posts.whole_u32(1..=FILL_POSTS_MAX as u32, "a number of posts")).transpose()?;
+    let voids = match (posts, hole) {
+        (None, false) => Voids::Fail,
+        (None, true) => Voids::Hole,
+        (Some(posts), false) => Voids::FillWithinPosts(posts),
+        (Some(posts), true) => Voids::FillThenHole(posts),
+    };
+    Ok((voids, next_source))
 }

@@ -77,11 +77,7 @@ fn shape(item: &Entry, table: &Section, dem: &DemSource, job: &Path) -> Result<A
 }
 
 fn polygons(entry: &Entry, job: &Path) -> Result<AreaShape, JobError> {
-    let file = super::named_file(entry, job)?;
-    if file.written.to_lowercase().ends_with(".shp") {
-        return Err(entry.unsupported("a GeoJSON file", "convert it first: ogr2ogr OUT.geojson IN.shp"));
-    }
-    Ok(AreaShape::Polygons { file })
+    Ok(AreaShape::Polygons { file: super::named_file(entry, job)? })
 }
 
 fn sample_class(entry: &Entry, dem: &DemSource) -> Result<AreaShape, JobError> {

@@ -13,7 +13,7 @@ use toml::de::DeTable;
 
 use crate::entry::{Document, Entry, Section, check_sections};
 use crate::files::Mention;
-use crate::{Job, JobError, NamedFile};
+use crate::{AreaPlace, DemSource, FindArea, Job, JobError, NamedFile, NoArea, SourceFile, files};
 
 /// The sections of a job file, their keys known.
 struct Sections<'a> {
@@ -30,7 +30,11 @@ struct Sections<'a> {
 /// Reads a job and lists the files it mentions; does not look at the disk.
 ///
 /// Unknown keys are told before anything else: a key with a typo is the likely reason for one that is missing.
-pub(crate) fn read<'a>(text: &'a str, path: &'a Path) -> Result<(Job, Vec<Mention>), JobError> {
+pub(crate) fn read<'a>(
+    text: &'a str,
+    path: &'a Path,
+    find: Option<&FindArea>,
+) -> Result<(Job, Vec<Mention>), JobError> {
     let document = Document { path, text };
     let root = DeTable::parse(text).map_err(|error| syntax(document, &error))?;
     let root = root.get_ref();
@@ -46,12 +50,24 @@ pub(crate) fn read<'a>(text: &'a str, path: &'a Path) -> Result<(Job, Vec<Mentio
         tin: section("tin")?,
         lod: section("lod")?,
     };
-    job_of(&sections, path)
+    job_of(&sections, path, find)
 }
 
-fn job_of(sections: &Sections, path: &Path) -> Result<(Job, Vec<Mention>), JobError> {
+fn job_of(sections: &Sections, path: &Path, find: Option<&FindArea>) -> Result<(Job, Vec<Mention>), JobError> {
     let mut mentions = Vec::new();
-    let (area, modules) = area::read(&sections.area, &sections.modules)?;
+    let (area, modules) = area::read(&sections.area, &sections.modules, &mut |request, entry| {
+        let alone = || NoArea {
+            found: "an area that only a job file on the disk can have".into(),
+            expected: "origin_m and size_m".into(),
+            hint: "give numbers, or a job file".into(),
+        };
+        let find = find.ok_or_else(|| alone().at(entry))?;
+        let files = match request.place {
+            AreaPlace::CoverDem => files_of(&sections.dem, path)?,
+            AreaPlace::Around { .. } => Vec::new(),
+        };
+        find(request, &files).map_err(|none| none.at(entry))
+    })?;
     let dem = dem::read(&sections.dem, path, &mut mentions)?;
     let importance = importance::read(&sections.importance, &dem.source, path, &mut mentions)?;
     let tiles = tiles::read(&sections.tiles, &area.grid)?;
@@ -59,6 +75,17 @@ fn job_of(sections: &Sections, path: &Path) -> Result<(Job, Vec<Mention>), JobEr
     let tin = tin::read(&sections.tin, &sections.modules, modules.edges)?;
     refuse_levels(&sections.lod)?;
     Ok((Job { path: path.to_owned(), area, dem, importance, tiles, modules, limits, tin }, mentions))
+}
+
+/// The files of `dem.sources`, patterns expanded.
+fn files_of(dem: &Section, path: &Path) -> Result<Vec<SourceFile>, JobError> {
+    let mut mentions = Vec::new();
+    let mut spec = dem::read(dem, path, &mut mentions)?;
+    files::locate_sources(&mut spec.source, path.parent().unwrap_or(Path::new("")), &mentions)?;
+    match spec.source {
+        DemSource::Files { files, .. } => Ok(files),
+        DemSource::Sample { .. } => Ok(Vec::new()),
+    }
 }
 
 /// Levels of detail are another version's; an empty list says so plainly.

@@ -6,7 +6,10 @@ use terrain::QUANTA_PER_METRE;
 
 use crate::bounds::{COUNT_MAX, RESIDUAL_M_MAX};
 use crate::entry::{Entry, Section};
-use crate::{Allocation, Budget, Edges, ErrorKey, JobError, LastBatch, Method, Proximity, TinSpec};
+use crate::{
+    Allocation, Budget, Edges, Effort, ErrorKey, HeightFit, JobError, LastBatch, Lattice, Method, Optimising,
+    Proximity, TinSpec,
+};
 
 /// The three methods by name, before their own keys are read.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -25,7 +28,7 @@ pub(super) fn read(tin: &Section, modules: &Section, edges: Edges) -> Result<Tin
     let method = match name {
         Name::Paper => Method::Paper { proximity: proximity(tin)?, last_batch: last_batch(tin)? },
         Name::Greedy => Method::Greedy,
-        Name::Optimised => Method::Optimised,
+        Name::Optimised => Method::Optimised(optimising(tin)?),
     };
     let max_residual_m = residual(tin, "max_residual_m", 0.0)?;
     // About a hundredth of a quantum: heights are rounded to 1/128 m, so a smaller RMS means none at all.
@@ -62,7 +65,7 @@ fn refuse_later_keys(tin: &Section) -> Result<(), JobError> {
     Ok(())
 }
 
-/// Refuses what the chosen method would not look at, and what it cannot do yet.
+/// Refuses what the chosen method would not look at.
 fn refuse_keys_of_other_methods(tin: &Section, name: Name) -> Result<(), JobError> {
     let refused: &[(&str, &str)] = match name {
         Name::Paper => &[("effort", PAPER), ("height_fit", PAPER), ("lattice", PAPER)],
@@ -88,7 +91,7 @@ fn refuse_keys_of_other_methods(tin: &Section, name: Name) -> Result<(), JobErro
             return Err(entry.conflict(&format!("method = \"{method}\""), "a job without this key", hint));
         }
     }
-    if name == Name::Optimised { refuse_later_optimising(tin) } else { Ok(()) }
+    Ok(())
 }
 
 const PAPER: &str = "it belongs to method = \"optimised\"; the paper's vertices stay on posts at DEM height";
@@ -96,27 +99,6 @@ const GREEDY: &str = "greedy takes one worst post at a time; batches belong to \
 const OPTIMISED: &str = "it belongs to method = \"paper\"";
 const OPTIMISED_POINTS: &str =
     "the budget of \"optimised\" is the limits: lower limits.mean_per_load_module, or choose \"greedy\" or \"paper\"";
-
-const WHAT_IS_DONE: &str = "remove it: this version chooses posts by squared error under the limits and moves none";
-
-/// This version's `optimised` chooses posts by squared error, under the limits, at DEM height; what else it will do
-/// is refused.
-fn refuse_later_optimising(tin: &Section) -> Result<(), JobError> {
-    if let Some(entry) = tin.optional("effort") {
-        entry.word(&[("fast", ()), ("normal", ()), ("best", ())])?;
-        return Err(entry.unsupported("a job without this key", WHAT_IS_DONE));
-    }
-    let heights = [("off", true), ("l2", false), ("l2_keep_crests", false)];
-    refuse_all_but(tin, "height_fit", &heights, "\"off\", vertices at DEM height")?;
-    refuse_all_but(tin, "lattice", &[("post", true), ("eighth", false)], "\"post\", vertices on posts")
-}
-
-fn refuse_all_but(tin: &Section, key: &str, words: &[(&str, bool)], expected: &str) -> Result<(), JobError> {
-    match tin.optional(key) {
-        Some(entry) if !entry.word(words)? => Err(entry.unsupported(expected, WHAT_IS_DONE)),
-        _ => Ok(()),
-    }
-}
 
 /// Clipped edges go only with methods whose TIN a merge does not undo, and need an end other than the limits, which
 /// are known only after the clip.
@@ -199,6 +181,19 @@ fn proximity_of(entry: &Entry) -> Result<Proximity, JobError> {
         return Err(entry.out_of_range(format!("{expected} nor above {RESIDUAL_M_MAX}")));
     }
     Ok(Proximity { horizontal_m, vertical_m })
+}
+
+fn optimising(tin: &Section) -> Result<Optimising, JobError> {
+    let usual = Optimising::default();
+    let efforts = [("fast", Effort::Fast), ("normal", Effort::Normal), ("best", Effort::Best)];
+    let heights =
+        [("l2", HeightFit::Squares), ("l2_keep_crests", HeightFit::SquaresKeepCrests), ("off", HeightFit::Off)];
+    let lattices = [("eighth", Lattice::Eighth), ("post", Lattice::Post)];
+    Ok(Optimising {
+        effort: tin.optional("effort").map_or(Ok(usual.effort), |entry| entry.word(&efforts))?,
+        height_fit: tin.optional("height_fit").map_or(Ok(usual.height_fit), |entry| entry.word(&heights))?,
+        lattice: tin.optional("lattice").map_or(Ok(usual.lattice), |entry| entry.word(&lattices))?,
+    })
 }
 
 fn last_batch(tin: &Section) -> Result<LastBatch, JobError> {

@@ -31,7 +31,7 @@ fn both_byte_orders_give_the_same_heights() {
 #[track_caller]
 fn check_south_west(tiff: Tiff, expected_m: [f64; 2], spacing_m: [f64; 2]) {
     let raster = read_tiff(&tiff).unwrap();
-    assert_eq!((raster.frame().south_west_m, raster.frame().spacing_m), (expected_m, spacing_m));
+    assert_eq!((raster.frame().south_west, raster.frame().spacing), (expected_m, spacing_m));
 }
 
 #[test]
@@ -102,8 +102,8 @@ fn heights_written_come_back_to_the_quantum() {
     let (grid, whole) = (grid(500_000.0, 4_000_000.0, 31.25), rough(rect, false));
     write_heights(&path, &grid, rect, 32611, |band| whole.window(band)).unwrap();
     let raster = read(&path).unwrap();
-    assert_eq!(raster.frame().epsg, 32611);
-    assert_eq!(raster.frame().south_west_m, grid.place_m(rect.south_west()));
+    assert_eq!(raster.frame().crs.epsg().unwrap(), 32611);
+    assert_eq!(raster.frame().south_west, grid.place_m(rect.south_west()));
     assert_eq!(raster.resample(&grid, rect).unwrap(), whole);
     let leftover = std::fs::read_dir(path.parent().unwrap()).unwrap().count();
     assert_eq!(leftover, 1, "only the file itself is left");

@@ -2,8 +2,10 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
+mod formats;
 mod geotiff;
 mod hostile;
+mod mosaics;
 mod overlays;
 mod real_files;
 mod refusals;

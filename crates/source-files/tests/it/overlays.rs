@@ -39,7 +39,7 @@ fn classes_are_whole_numbers_in_the_areas_system_and_somewhere_in_the_area() {
     };
     let good = Tiff::of_heights(&[&[3, 4]]);
     assert!(open(&good, 32611, 500_000.0).is_ok());
-    assert!(matches!(open(&good, 32612, 500_000.0), Err(SourceError::OtherCrs { .. })));
+    assert!(matches!(open(&good, 32612, 500_000.0), Err(SourceError::OutsideArea { .. })));
     assert!(matches!(open(&good, 32611, 900_000.0), Err(SourceError::NotCovered { .. })));
     assert!(matches!(open(&Tiff::of_floats(&[&[1.0]]), 32611, 500_000.0), Err(SourceError::NotClasses { .. })));
 }
@@ -84,15 +84,96 @@ fn polygons_of_another_system_are_refused() {
             r#"{{"type":"FeatureCollection","features":[],"crs":{{"type":"name","properties":{{"name":"{crs}"}}}}}}"#
         )
     };
-    check_refused(&named("urn:ogc:def:crs:OGC:1.3:CRS84"), "in urn:ogc:def:crs:OGC:1.3:CRS84, expected the area's");
-    check_refused(&named("EPSG:32612"), "coordinates are in EPSG:32612");
-    let degrees = r#"{"type":"Polygon","coordinates":[[[-116.5,35.1],[-116.2,35.1],[-116.2,35.4],[-116.5,35.1]]]}"#;
-    check_refused(degrees, "look like longitude and latitude (-116.5, 35.1)");
+    check_refused(&named("EPSG:4267"), "EPSG:4267: on a datum that needs a grid of shifts");
+    check_refused(&named("somewhere"), "the coordinate reference system is somewhere");
+    let pole = r#"{"type":"Polygon","coordinates":[[[0,89],[1,89],[1,95],[0,89]]]}"#;
+    let said = pole.replacen('{', r#"{"crs":{"type":"name","properties":{"name":"EPSG:4326"}},"#, 1);
+    check_refused(&said, "which cannot be brought to the area's EPSG:32611");
+}
+
+#[track_caller]
+fn check_triangle(polygons: &[Polygon]) {
+    // 116.6 W, 35.3 N is 536367.040835 E, 3906386.105537 N.
+    let [east, north] = polygons[0].rings[0][0];
+    assert!((east - 536_367.041).abs() < 0.001 && (north - 3_906_386.106).abs() < 0.001, "{east}, {north}");
+    assert!(100 < polygons[0].rings[0].len(), "long sides are cut into pieces");
+}
+
+#[test]
+fn polygons_in_degrees_are_brought_to_the_areas_system() {
+    let bare = r#"{"type":"Polygon","coordinates":[[[-116.6,35.3],[-116.2,35.3],[-116.2,35.6],[-116.6,35.3]]]}"#;
+    check_triangle(&polygons(bare).unwrap());
+    for name in ["urn:ogc:def:crs:OGC:1.3:CRS84", "EPSG:4269"] {
+        let said = format!(r#"{{"crs":{{"type":"name","properties":{{"name":"{name}"}}}},"#);
+        check_triangle(&polygons(&bare.replacen('{', &said, 1)).unwrap());
+    }
+}
+
+/// A Shapefile of one triangle.
+fn shapefile(kind: u32, points: &[[f64; 2]]) -> Vec<u8> {
+    let mut record: Vec<u8> = kind.to_le_bytes().to_vec();
+    record.extend([0; 32]);
+    record.extend(1_u32.to_le_bytes());
+    record.extend((points.len() as u32).to_le_bytes());
+    record.extend([0; 4]);
+    record.extend(points.iter().flatten().flat_map(|number| number.to_le_bytes()));
+    let mut bytes = vec![0, 0, 0x27, 0x0a];
+    bytes.resize(100, 0);
+    bytes.extend([1_u32.to_be_bytes(), (record.len() as u32 / 2).to_be_bytes()].concat());
+    [bytes, record].concat()
+}
+
+#[test]
+fn a_shapefile_is_read_with_its_prj_and_every_truncation_is_an_error() {
+    let folder = Folder::new();
+    let points = [[-116.6, 35.3], [-116.2, 35.3], [-116.2, 35.6], [-116.6, 35.3]];
+    let bytes = shapefile(5, &points);
+    let path = folder.write("a.shp", &bytes);
+    check_triangle(&read_polygons(&path, 32611).unwrap());
+    folder.write(
+        "a.prj",
+        br#"GEOGCS["x",DATUM["D_North_American_1983",SPHEROID["x",1,1]],UNIT["Degree",0.0174532925199433]]"#,
+    );
+    check_triangle(&read_polygons(&path, 32611).unwrap());
+    folder.write("a.prj", br#"LOCAL_CS["x"]"#);
+    assert!(matches!(read_polygons(&path, 32611), Err(SourceError::UnnamedCrs { .. })));
+    for end in 0..bytes.len() {
+        assert!(read_polygons(&folder.write("b.shp", &bytes[..end]), 32611).is_err(), "cut at {end}");
+    }
+    // What lies behind the records of the index is left over from an older file.
+    let left_over = [bytes.clone(), vec![7; 40]].concat();
+    let path = folder.write("c.shp", &left_over);
+    assert!(read_polygons(&path, 32611).is_err());
+    folder.write("c.shx", &[vec![0; 100], vec![0, 0, 0, 50, 0, 0, 0, 0]].concat());
+    check_triangle(&read_polygons(&path, 32611).unwrap());
+    let mut huge = bytes;
+    huge[100 + 8 + 40..100 + 8 + 44].fill(0xff);
+    assert!(matches!(read_polygons(&folder.write("b.shp", &huge), 32611), Err(SourceError::Truncated { .. })));
+    let lines = folder.write("b.shp", &shapefile(3, &points));
+    assert!(matches!(read_polygons(&lines, 32611), Err(SourceError::NotPolygons { found: "PolyLine", .. })));
+}
+
+#[test]
+fn a_class_raster_of_another_system_is_met_at_the_nearest_sample() {
+    let folder = Folder::new();
+    let tiff = Tiff::of_heights(&[&[1, 2], &[3, 4]]).with_keys(&[(1024, 2), (2048, 4326)]);
+    let tiff = tiff.with(33550, Values::Double(vec![0.01, 0.01, 0.0]));
+    let tiff = tiff.with(33922, Values::Double(vec![0.0, 0.0, 0.0, -116.61, 35.31, 0.0]));
+    let path = folder.write("class.tif", &tiff.bytes());
+    // Where the four pixels meet: 116.6 W, 35.3 N.
+    let grid = grid(536_342.0, 3_906_361.0, 50.0);
+    let rect = PostRect::of_size(2, 2);
+    let classes = ClassRaster::read(&path, 32611, &grid, rect).unwrap();
+    let members = |value| classes.members(&grid, rect, value);
+    assert_eq!(members(3), [true, false, false, false]);
+    assert_eq!(members(4), [false, true, false, false]);
+    assert_eq!(members(1), [false, false, true, false]);
+    assert_eq!(members(2), [false, false, false, true]);
 }
 
 #[test]
 fn what_is_not_a_polygon_is_refused() {
-    check_refused("no json at all", "not GeoJSON");
+    check_refused("no json at all", "neither a Shapefile nor GeoJSON");
     check_refused(r#"{"type":"Point","coordinates":[1,2]}"#, "a Point, expected Polygon");
     check_refused(r#"{"type":"FeatureCollection","features":[]}"#, "no polygon");
     let open = r#"{"type":"Polygon","coordinates":[[[0,0],[900,0],[900,900],[1,1]]]}"#;

@@ -20,8 +20,11 @@ fn check(tiff: Tiff, expected: &str) {
 #[test]
 fn files_that_lie_nowhere_are_refused() {
     check(tiff().without(34735), "no coordinate reference system");
-    check(tiff().with_keys(&[(1024, 2), (2048, 4326)]), "geographic (EPSG:4326)");
-    check(tiff().with_keys(&[(2048, 4269)]), "geographic (EPSG:4269)");
+    check(tiff().with_keys(&[(1024, 2), (2048, 4326)]), "malformed: the place of the raster is from 500005");
+    let in_degrees = tiff().with(33550, Values::Double(vec![0.1, 0.1, 0.0]));
+    let in_degrees = in_degrees.with(33922, Values::Double(vec![0.0, 0.0, 0.0, -117.0, 36.0, 0.0]));
+    check(in_degrees.clone().with_keys(&[(1024, 2), (2048, 4326)]), "geographic (EPSG:4326)");
+    check(in_degrees.with_keys(&[(2048, 4269)]), "geographic (EPSG:4269)");
     check(tiff().with_keys(&[(1024, 3)]), "geocentric");
     check(tiff().with_keys(&[(1024, 1), (3072, 32767)]), "defined by the file");
     check(tiff().with_keys(&[(1024, 1), (3072, 2229), (3076, 9003)]), "coordinates are in US survey feet");

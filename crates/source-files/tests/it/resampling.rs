@@ -96,7 +96,7 @@ fn holed(row: i32, col: i32) -> i16 {
 fn voids_fail_unless_the_job_says_otherwise() {
     let mut raster = raster(holed);
     let error = raster.settle_voids(VoidPolicy::Fail).unwrap_err();
-    assert!(matches!(error, SourceError::Voids { found: 16, first_m: [500_035.0, 3_999_935.0], .. }), "{error}");
+    assert!(matches!(error, SourceError::Voids { found: 16, .. }), "{error}");
 }
 
 #[test]

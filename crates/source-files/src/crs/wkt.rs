@@ -1,0 +1,189 @@
+//! Well-known text of coordinate systems, version 1, in the dialects of ESRI and GDAL; of version 2, only what names
+//! a code.
+
+use super::Crs;
+use super::parameters::{Datum, Method, Parameters, datum_named};
+
+/// Longer texts describe no system anybody uses.
+const CHARS_MAX: usize = 1 << 16;
+/// Brackets inside brackets: the standard needs six.
+const DEPTH_MAX: usize = 24;
+
+/// `NAME["text", number, CHILD[…]]`.
+#[derive(Debug, Default)]
+struct Node {
+    keyword: String,
+    texts: Vec<String>,
+    numbers: Vec<f64>,
+    children: Vec<Node>,
+}
+
+pub(super) fn read(text: &str) -> Result<Crs, String> {
+    if CHARS_MAX < text.len() {
+        return Err(format!("text of {} bytes", text.len()));
+    }
+    let mut parser = Parser { rest: text.trim_start_matches('\u{feff}').trim(), depth: 0 };
+    let root = parser.node()?;
+    system(&root)
+}
+
+fn system(root: &Node) -> Result<Crs, String> {
+    if let Some(code) = root.code() {
+        return Crs::from_epsg(code);
+    }
+    let name = root.texts.first().map_or("", String::as_str);
+    match root.keyword.as_str() {
+        "GEOGCS" => Parameters::geographic(datum(root)?).crs(name),
+        "PROJCS" => projected(root)?.crs(name),
+        "COMPD_CS" | "BOUNDCRS" | "COMPOUNDCRS" => {
+            system(root.children.first().ok_or("a compound system without parts")?)
+        }
+        "PROJCRS" | "GEOGCRS" | "GEODCRS" => Err(format!("version 2 of well-known text without a code ({name})")),
+        "LOCAL_CS" | "ENGCRS" => Err(format!("a local system ({name})")),
+        other => Err(format!("a system of kind {other}")),
+    }
+}
+
+fn projected(root: &Node) -> Result<Parameters, String> {
+    let geographic = root.child("GEOGCS").ok_or("a projection without its geographic system")?;
+    let degrees = angle_unit(geographic)?;
+    let method = root.child("PROJECTION").and_then(|node| node.texts.first()).ok_or("no projection named")?;
+    let unit_m = root.child("UNIT").and_then(|node| node.numbers.first().copied()).unwrap_or(1.0);
+    if !(1.0e-6..=1.0e6).contains(&unit_m) {
+        return Err(format!("in units of {unit_m} m"));
+    }
+    let parameter = |names: &[&str]| {
+        let is = |node: &&Node| node.texts.first().is_some_and(|text| names.contains(&text.to_lowercase().as_str()));
+        let mut nodes = root.children.iter().filter(|node| node.keyword == "PARAMETER");
+        nodes.find(is).and_then(|node| node.numbers.first().copied())
+    };
+    let angle = |names: &[&str]| parameter(names).map(|value| value * degrees);
+    if parameter(&["azimuth", "rectified_grid_angle"]).is_some_and(|azimuth| azimuth != 0.0) {
+        return Err(format!("projection {method}"));
+    }
+    Ok(Parameters {
+        method: method_named(method)?,
+        datum: datum(geographic)?,
+        latitude_of_origin: angle(&["latitude_of_origin", "latitude_of_center"])
+            .or_else(|| angle(&["standard_parallel_1"]))
+            .unwrap_or(0.0),
+        central_meridian: angle(&["central_meridian", "longitude_of_center", "longitude_of_origin"]).unwrap_or(0.0),
+        first_parallel: angle(&["standard_parallel_1"]),
+        second_parallel: angle(&["standard_parallel_2"]),
+        scale: parameter(&["scale_factor"]).unwrap_or(1.0),
+        false_east_m: parameter(&["false_easting"]).unwrap_or(0.0) * unit_m,
+        false_north_m: parameter(&["false_northing"]).unwrap_or(0.0) * unit_m,
+        unit_m,
+    })
+}
+
+fn method_named(name: &str) -> Result<Method, String> {
+    let plain: String = name.chars().filter(char::is_ascii_alphanumeric).collect::<String>().to_lowercase();
+    Ok(match plain.as_str() {
+        "transversemercator" | "gausskruger" => Method::TransverseMercator,
+        "lambertconformalconic" | "lambertconformalconic1sp" | "lambertconformalconic2sp" => Method::LambertConformal,
+        "albers" | "albersconicequalarea" => Method::Albers,
+        "lambertazimuthalequalarea" => Method::LambertAzimuthal,
+        "mercator" | "mercator1sp" | "mercator2sp" => Method::Mercator,
+        "polarstereographic" | "stereographicnorthpole" | "stereographicsouthpole" => Method::PolarStereographic,
+        _ => return Err(format!("projection {name}")),
+    })
+}
+
+fn angle_unit(geographic: &Node) -> Result<f64, String> {
+    let radians = geographic.child("UNIT").and_then(|node| node.numbers.first().copied());
+    let degrees = radians.unwrap_or(1.0_f64.to_radians()).to_degrees();
+    // Writers give the factor with ten to sixteen digits.
+    if (degrees - 1.0).abs() < 1.0e-9 { Ok(1.0) } else { Err(format!("angles in units of {degrees} degrees")) }
+}
+
+fn datum(geographic: &Node) -> Result<Datum, String> {
+    if let Some(longitude) = geographic.child("PRIMEM").and_then(|node| node.numbers.first())
+        && *longitude != 0.0
+    {
+        return Err(format!("counted from the meridian {longitude}"));
+    }
+    angle_unit(geographic)?;
+    let node = geographic.child("DATUM").ok_or("no datum named")?;
+    let name = node.texts.first().map_or("", String::as_str);
+    if let Some(datum) = datum_named(name) {
+        return Ok(datum);
+    }
+    let ellipsoid = node.child("SPHEROID").or_else(|| node.child("ELLIPSOID")).map(|node| node.numbers.as_slice());
+    match (node.child("TOWGS84"), ellipsoid) {
+        (Some(shift), Some(&[semi_major_m, inverse_flattening, ..])) if matches!(shift.numbers.len(), 3 | 7) => {
+            Ok(Datum::Shifted { semi_major_m, inverse_flattening, to_wgs84: shift.numbers.clone() })
+        }
+        _ => Err(format!("on datum {name}, whose shift to WGS 84 is not known")),
+    }
+}
+
+impl Node {
+    fn child(&self, keyword: &str) -> Option<&Node> {
+        self.children.iter().find(|node| node.keyword == keyword)
+    }
+
+    /// The EPSG code of this very node, not of a part of it.
+    fn code(&self) -> Option<u32> {
+        let mut named = self.children.iter().filter(|node| matches!(node.keyword.as_str(), "AUTHORITY" | "ID"));
+        let node = named.find(|node| node.texts.first().is_some_and(|text| text.eq_ignore_ascii_case("EPSG")))?;
+        let written = node.texts.get(1).and_then(|code| code.parse().ok());
+        written.or_else(|| node.numbers.first().map(|&code| code as u32))
+    }
+}
+
+struct Parser<'a> {
+    rest: &'a str,
+    depth: usize,
+}
+
+impl Parser<'_> {
+    fn node(&mut self) -> Result<Node, String> {
+        self.depth += 1;
+        if DEPTH_MAX < self.depth {
+            return Err("text with too many brackets inside brackets".into());
+        }
+        let end = self.rest.find(['[', '(']).ok_or("text that is not well-known text")?;
+        let keyword = self.rest[..end].trim().to_ascii_uppercase();
+        if keyword.is_empty() || !keyword.chars().all(|c| c.is_ascii_alphanumeric() || c == '_') {
+            return Err("text that is not well-known text".into());
+        }
+        let mut node = Node { keyword, ..Node::default() };
+        self.rest = &self.rest[end + 1..];
+        loop {
+            self.rest = self.rest.trim_start();
+            match self.rest.chars().next() {
+                Some(']' | ')') => {
+                    self.rest = &self.rest[1..];
+                    self.depth -= 1;
+                    return Ok(node);
+                }
+                Some(',') => self.rest = &self.rest[1..],
+                Some('"') => node.texts.push(self.quoted()?),
+                Some(_) => self.value(&mut node)?,
+                None => return Err("well-known text that ends too early".into()),
+            }
+        }
+    }
+
+    fn quoted(&mut self) -> Result<String, String> {
+        let end = self.rest[1..].find('"').ok_or("well-known text with an open quotation mark")?;
+        let text = self.rest[1..=end].to_owned();
+        self.rest = &self.rest[end + 2..];
+        Ok(text)
+    }
+
+    /// A number, a bare word, or a node.
+    fn value(&mut self, node: &mut Node) -> Result<(), String> {
+        let end = self.rest.find([',', ']', ')', '[', '(']).ok_or("well-known text that ends too early")?;
+        if self.rest[end..].starts_with(['[', '(']) {
+            node.children.push(self.node()?);
+            return Ok(());
+        }
+        if let Ok(number) = self.rest[..end].trim().parse::<f64>() {
+            node.numbers.push(number);
+        }
+        self.rest = &self.rest[end..];
+        Ok(())
+    }
+}

@@ -1,0 +1,293 @@
+//! A raster file of any format that is read, told by its content and never by its name's ending.
+
+use std::path::{Path, PathBuf};
+
+use terrain::PostRect;
+
+use crate::chunk::{Chunk, Header};
+use crate::crs::Crs;
+use crate::dted::{self, Dted};
+use crate::frame::{Axes, Facts};
+use crate::geotiff::GeoTiff;
+use crate::rows::Rows;
+use crate::store::Store;
+use crate::text_grid::{self, AsciiGrid, Keys};
+use crate::{Raster, RasterFrame, SampleScale, SourceError, hgt};
+
+/// How a file is to be read, where that is not as the file itself says.
+#[derive(Clone, Debug)]
+pub struct Reading {
+    /// Its coordinate system, whatever the file says or leaves out.
+    pub crs: Option<Crs>,
+    /// Degrees east and north of the south-west post of an HGT tile whose name does not say.
+    pub corner: Option<[f64; 2]>,
+    /// Metres in a unit of height.
+    pub height_unit_m: Option<f64>,
+    /// The value that marks a void post.
+    pub nodata: Option<f64>,
+    /// Whether what could be warned about is an error.
+    pub strict: bool,
+}
+
+impl Reading {
+    /// Everything as the file says.
+    pub const AS_IT_SAYS: Reading =
+        Reading { crs: None, corner: None, height_unit_m: None, nodata: None, strict: false };
+}
+
+/// A raster file whose headers were read and found good; no height is decoded yet.
+#[derive(Clone, Debug)]
+pub struct DemFile {
+    header: Header,
+    facts: Facts,
+    reader: Reader,
+}
+
+#[derive(Clone, Debug)]
+enum Reader {
+    GeoTiff(Box<GeoTiff>),
+    Dted(Dted),
+    Rows(Rows),
+    Ascii(AsciiGrid),
+}
+
+/// What a format's reader finds in a file, before the file is placed.
+struct Found {
+    reader: Reader,
+    size: (u32, u32),
+    axes: Axes,
+    facts: Facts,
+    crs: Option<Result<Crs, String>>,
+}
+
+impl DemFile {
+    /// Opens the file at `path` and reads its headers.
+    ///
+    /// # Errors
+    /// Whatever makes it unusable: a format that is not read, by name; broken, too large, or nowhere on Earth.
+    pub fn open(path: &Path, reading: &Reading) -> Result<Self, SourceError> {
+        let store = Store::open(path)?;
+        let start = store.start(512)?;
+        if matches!(start.get(..4), Some(b"II\x2a\0" | b"MM\0\x2a" | b"II\x2b\0" | b"MM\0\x2b")) {
+            return Self::geotiff(&store, reading);
+        }
+        let found = match dted::start(&start) {
+            Some(at) => of_dted(&store, at, reading)?,
+            None if text_grid::begins_like_one(&start) => of_text(&store)?,
+            None => of_bare_rows(&store, &start, reading)?,
+        };
+        found.placed(&store, reading)
+    }
+
+    fn geotiff(store: &Store, reading: &Reading) -> Result<Self, SourceError> {
+        let crs = |own| crs_of(store, own, reading);
+        let tiff = GeoTiff::read_directory(store, reading.height_unit_m, crs)?;
+        let mut header = tiff.header();
+        header.nodata = reading.nodata.or(header.nodata);
+        let facts = Facts { format: "GeoTIFF", accuracy_m: None, vertical_datum: tiff.vertical_datum() };
+        Ok(Self { header, facts, reader: Reader::GeoTiff(Box::new(tiff)) })
+    }
+
+    /// Where its posts lie.
+    pub fn frame(&self) -> &RasterFrame {
+        &self.header.frame
+    }
+
+    /// What its samples mean.
+    pub fn sample_scale(&self) -> SampleScale {
+        self.header.scale
+    }
+
+    /// The format's name.
+    pub fn format(&self) -> &'static str {
+        self.facts.format
+    }
+
+    /// The vertical accuracy that it states, in metres: nine of ten heights are at least as good.
+    pub fn accuracy_m(&self) -> Option<f64> {
+        self.facts.accuracy_m
+    }
+
+    /// What it says heights are measured from.
+    pub fn vertical_datum(&self) -> Option<&str> {
+        self.facts.vertical_datum.as_deref()
+    }
+
+    /// All its posts.
+    pub fn rect(&self) -> PostRect {
+        PostRect::of_size(self.header.frame.rows as usize, self.header.frame.cols as usize)
+    }
+
+    /// The chunks that hold posts of `window`, in file order.
+    pub fn chunks_of(&self, window: PostRect) -> Vec<u32> {
+        if let Reader::GeoTiff(tiff) = &self.reader {
+            return tiff.chunks_of(window);
+        }
+        let (count, posts_of): (u32, &dyn Fn(u32) -> PostRect) = match &self.reader {
+            Reader::GeoTiff(_) | Reader::Ascii(_) => (1, &|_| self.rect()),
+            Reader::Dted(dted) => (dted.chunk_count(), &|chunk| dted.posts_of(chunk)),
+            Reader::Rows(rows) => (rows.chunk_count(), &|chunk| rows.posts_of(chunk)),
+        };
+        (0..count).filter(|&chunk| posts_of(chunk).intersection(&window).is_some()).collect()
+    }
+
+    /// Decodes some chunks. May be called from several threads at once.
+    ///
+    /// # Errors
+    /// When the file is gone, or a chunk cannot be decoded.
+    pub fn decode(&self, chunks: &[u32]) -> Result<Vec<Chunk>, SourceError> {
+        match &self.reader {
+            Reader::GeoTiff(tiff) => tiff.decode(chunks),
+            Reader::Dted(dted) => chunks.iter().map(|&chunk| dted.decode(chunk)).collect(),
+            Reader::Rows(rows) => chunks.iter().map(|&chunk| rows.decode(chunk)).collect(),
+            Reader::Ascii(grid) => chunks.iter().map(|_| grid.decode()).collect(),
+        }
+    }
+
+    /// Puts the chunks of `window` together.
+    ///
+    /// # Errors
+    /// When a height is infinite or beyond the limit.
+    ///
+    /// # Panics
+    /// When `window` is not inside the raster or a chunk of it is missing.
+    pub fn assemble(&self, window: PostRect, chunks: Vec<Chunk>) -> Result<Raster, SourceError> {
+        assert!(self.rect().contains_rect(&window), "a window lies inside the raster");
+        Raster::assemble(&self.header, window, chunks)
+    }
+
+    /// Decodes and assembles the posts of `window` in this thread.
+    ///
+    /// # Errors
+    /// As [`DemFile::decode`] and [`DemFile::assemble`].
+    pub fn read(&self, window: PostRect) -> Result<Raster, SourceError> {
+        self.assemble(window, self.decode(&self.chunks_of(window))?)
+    }
+}
+
+impl Found {
+    fn placed(self, store: &Store, reading: &Reading) -> Result<DemFile, SourceError> {
+        let (path, (cols, rows)) = (store.path(), self.size);
+        let crs = crs_of(store, self.crs, reading)?;
+        let (frame, _) = RasterFrame::new(path, crs, &self.axes, cols, rows)?;
+        let unit_m = reading.height_unit_m.unwrap_or(1.0);
+        let mut header = match &self.reader {
+            Reader::GeoTiff(tiff) => tiff.header(),
+            Reader::Dted(dted) => dted.header(frame),
+            Reader::Rows(rows) => rows.header(frame, unit_m),
+            Reader::Ascii(grid) => grid.header(frame, unit_m),
+        };
+        header.nodata = reading.nodata.or(header.nodata);
+        Ok(DemFile { header, facts: self.facts, reader: self.reader })
+    }
+}
+
+fn of_dted(store: &Store, at: u64, reading: &Reading) -> Result<Found, SourceError> {
+    let dted::Opened { reader, axes, facts, crs } = Dted::open(store, at, reading.strict)?;
+    let size = reader.size();
+    Ok(Found { reader: Reader::Dted(reader), size, axes, facts, crs: Some(crs) })
+}
+
+/// An ASCII grid, or the header of a raw one, in whose place the raw file is meant.
+fn of_text(store: &Store) -> Result<Found, SourceError> {
+    let (keys, _) = Keys::read(store)?;
+    if !keys.is_of_raw() {
+        let (grid, axes) = AsciiGrid::open(store)?;
+        let facts = Facts::of("Esri ASCII grid");
+        return Ok(Found { size: grid.size(), reader: Reader::Ascii(grid), axes, facts, crs: None });
+    }
+    let data = (!store.is_packed()).then(|| beside(store.path(), &RAW_ENDINGS)).flatten();
+    let data = data.ok_or_else(|| SourceError::HeaderAlone { path: store.path().into() })?;
+    of_raw(&Store::plain(&data)?, &keys)
+}
+
+const RAW_ENDINGS: [&str; 8] = ["flt", "bil", "bin", "raw", "img", "bsq", "bip", "dem"];
+
+fn of_raw(data: &Store, keys: &Keys) -> Result<Found, SourceError> {
+    let rows = keys.rows(data)?;
+    let facts = Facts::of("raw grid with a header");
+    Ok(Found { size: (rows.cols, rows.rows), reader: Reader::Rows(rows), axes: keys.axes()?, facts, crs: None })
+}
+
+/// Bytes without a mark of their own: described by a header beside them, or an HGT tile.
+fn of_bare_rows(store: &Store, start: &[u8], reading: &Reading) -> Result<Found, SourceError> {
+    if let Some(name) = known_but_not_read(start) {
+        return Err(SourceError::OtherFormat { path: store.path().into(), found: name });
+    }
+    if let Some(header) = (!store.is_packed()).then(|| beside(store.path(), &["hdr"])).flatten() {
+        let header = Store::plain(&header)?;
+        if text_grid::begins_like_one(&header.start(512)?) {
+            return of_raw(store, &Keys::read(&header)?.0);
+        }
+    }
+    let Some(rows) = hgt::rows(store) else {
+        let found = start.iter().take(8).map(|byte| format!("{byte:02x}")).collect::<Vec<_>>().join(" ");
+        let found = if found.is_empty() { "nothing".into() } else { found };
+        return Err(SourceError::UnknownFormat { path: store.path().into(), found });
+    };
+    let corner = reading.corner.or_else(|| hgt::corner_in(store.name()));
+    let corner = corner.ok_or_else(|| SourceError::NoCorner { path: store.path().into() })?;
+    let (axes, facts) = (hgt::axes(&rows, corner), Facts::of("HGT"));
+    Ok(Found { size: (rows.cols, rows.rows), reader: Reader::Rows(rows), axes, facts, crs: Some(Ok(Crs::wgs84())) })
+}
+
+/// The file of the same name with one of some endings.
+fn beside(path: &Path, endings: &[&str]) -> Option<PathBuf> {
+    let mut names = endings.iter().flat_map(|ending| [ending.to_string(), ending.to_uppercase()]);
+    names.find_map(|ending| Some(path.with_extension(ending)).filter(|other| other != path && other.is_file()))
+}
+
+/// The coordinate system: what the job says, else what the file says, else what a `.prj` beside it says.
+fn crs_of(store: &Store, own: Option<Result<Crs, String>>, reading: &Reading) -> Result<Crs, SourceError> {
+    if let Some(crs) = &reading.crs {
+        return Ok(crs.clone());
+    }
+    let path = || store.path().to_owned();
+    if let Some(own) = own {
+        return own.map_err(|found| SourceError::UnnamedCrs { path: path(), found });
+    }
+    // A packed file's other name: `a.asc.gz` and `a.prj`.
+    let names = [store.path().to_owned(), store.path().with_file_name(store.name())];
+    let Some(prj) = names.iter().find_map(|name| beside(name, &["prj"])) else {
+        return Err(SourceError::NoCrs { path: path() });
+    };
+    let text = Store::plain(&prj)?.start(1 << 16)?;
+    let crs = Crs::from_wkt(&String::from_utf8_lossy(&text));
+    crs.map_err(|found| SourceError::UnnamedCrs { path: prj, found })
+}
+
+/// Formats that people have heights in and that are not read, by how they begin.
+fn known_but_not_read(start: &[u8]) -> Option<&'static str> {
+    const MARKS: [(&[u8], &str); 14] = [
+        (b"EHFA_HEADER_TAG", "an ERDAS Imagine file"),
+        (b"\x89HDF\r\n", "an HDF5 or netCDF 4 file"),
+        (b"CDF\x01", "a netCDF file"),
+        (b"CDF\x02", "a netCDF file"),
+        (b"NITF", "a NITF file"),
+        (b"DSAA", "a Surfer grid"),
+        (b"DSBB", "a Surfer grid"),
+        (b"DSRB", "a Surfer grid"),
+        (b"\x89PNG", "a PNG image"),
+        (b"\xff\xd8\xff", "a JPEG image"),
+        (b"\0\0\0\x0cjP  ", "a JPEG 2000 image"),
+        (b"Lerc2 ", "a LERC raster"),
+        (b"CntZImage ", "a LERC raster"),
+        (b"SQLite format 3", "a database (GeoPackage or MBTiles)"),
+    ];
+    if let Some((_, name)) = MARKS.iter().find(|(mark, _)| start.starts_with(mark)) {
+        return Some(name);
+    }
+    let text = String::from_utf8_lossy(start);
+    let text = text.trim_start();
+    if text.starts_with("<VRTDataset") {
+        return Some("a GDAL virtual raster");
+    }
+    if text.starts_with('<') {
+        return Some("a page of HTML or XML, not a raster");
+    }
+    if text.starts_with('{') {
+        return Some("a JSON file, not a raster");
+    }
+    let is_text = 144 <= start.len() && start.iter().all(|&b| b.is_ascii_graphic() || b.is_ascii_whitespace());
+    is_text.then_some("a text file of some other kind (a USGS DEM, SDTS or XYZ file, perhaps)")
+}

@@ -1,0 +1,190 @@
+//! The bytes of a source: a file, or what a gzip or zip file holds, unpacked in memory.
+//!
+//! Nothing is ever unpacked to the disk, so a name inside an archive leads nowhere.
+
+use std::fs::File;
+use std::io::{Cursor, Read, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use flate2::read::GzDecoder;
+use zip::ZipArchive;
+
+use crate::SourceError;
+use crate::limits::{ARCHIVE_ENTRIES_MAX, UNPACKED_BYTES_MAX};
+
+/// Where the bytes of a source are.
+#[derive(Clone, Debug)]
+pub(crate) struct Store {
+    /// The file, for messages.
+    path: PathBuf,
+    /// Name of the raster itself: the file's, or that inside an archive.
+    name: String,
+    unpacked: Option<Arc<[u8]>>,
+    len: u64,
+}
+
+/// An open source.
+pub(crate) enum Handle {
+    File(File),
+    Memory(Cursor<Arc<[u8]>>),
+}
+
+impl Read for Handle {
+    fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+        match self {
+            Handle::File(file) => file.read(buffer),
+            Handle::Memory(bytes) => bytes.read(buffer),
+        }
+    }
+}
+
+impl Seek for Handle {
+    fn seek(&mut self, to: SeekFrom) -> std::io::Result<u64> {
+        match self {
+            Handle::File(file) => file.seek(to),
+            Handle::Memory(bytes) => bytes.seek(to),
+        }
+    }
+}
+
+impl Store {
+    /// The file at `path` as it is.
+    pub(crate) fn plain(path: &Path) -> Result<Self, SourceError> {
+        let open = |source| SourceError::Open { path: path.into(), source };
+        let data = std::fs::metadata(path).map_err(open)?;
+        if data.is_dir() {
+            return Err(open(std::io::Error::other("it is a folder")));
+        }
+        let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+        Ok(Self { path: path.into(), name, unpacked: None, len: data.len() })
+    }
+
+    /// The file at `path`, unpacked when it is a gzip or zip file.
+    pub(crate) fn open(path: &Path) -> Result<Self, SourceError> {
+        let plain = Self::plain(path)?;
+        let start = plain.start(4)?;
+        match start.as_slice() {
+            [0x1f, 0x8b, ..] => plain.inflated(),
+            [b'P', b'K', 3 | 5, 4 | 6] => plain.unzipped(),
+            _ => Ok(plain),
+        }
+    }
+
+    fn inflated(&self) -> Result<Self, SourceError> {
+        let name = self.name.strip_suffix(".gz").unwrap_or(&self.name).to_owned();
+        let bytes = self.unpack(GzDecoder::new(self.handle()?))?;
+        Ok(self.holding(name, bytes))
+    }
+
+    fn unzipped(&self) -> Result<Self, SourceError> {
+        let mut archive = ZipArchive::new(self.handle()?).map_err(|error| self.broken(error.to_string()))?;
+        if ARCHIVE_ENTRIES_MAX < archive.len() {
+            let (found, limit) = (archive.len() as u64, ARCHIVE_ENTRIES_MAX as u64);
+            return Err(SourceError::TooLarge { path: self.path.clone(), what: "files in an archive", found, limit });
+        }
+        let mut names: Vec<String> = (0..archive.len())
+            .filter_map(|index| archive.name_for_index(index)?.ok().map(std::borrow::Cow::into_owned))
+            .filter(|name| !name.ends_with('/'))
+            .collect();
+        if 1 < names.len() {
+            names.retain(|name| !is_beside(name));
+        }
+        let [name] = names.as_slice() else {
+            return Err(SourceError::ArchiveHolds { path: self.path.clone(), found: names.len() });
+        };
+        let entry = archive.by_name(name).map_err(|error| self.broken(error.to_string()))?;
+        let bytes = self.unpack(entry)?;
+        Ok(self.holding(name.rsplit(['/', '\\']).next().unwrap_or(name).to_owned(), bytes))
+    }
+
+    /// Everything `packed` holds, and no more than the limit, whatever its header promises.
+    fn unpack(&self, packed: impl Read) -> Result<Vec<u8>, SourceError> {
+        let mut bytes = Vec::new();
+        packed
+            .take(UNPACKED_BYTES_MAX + 1)
+            .read_to_end(&mut bytes)
+            .map_err(|error| self.broken(format!("it cannot be unpacked: {error}")))?;
+        if UNPACKED_BYTES_MAX < bytes.len() as u64 {
+            let (what, limit) = ("bytes once unpacked (or more)", UNPACKED_BYTES_MAX);
+            return Err(SourceError::TooLarge { path: self.path.clone(), what, found: limit + 1, limit });
+        }
+        Ok(bytes)
+    }
+
+    fn holding(&self, name: String, bytes: Vec<u8>) -> Self {
+        let len = bytes.len() as u64;
+        Self { path: self.path.clone(), name, unpacked: Some(bytes.into()), len }
+    }
+
+    fn broken(&self, found: String) -> SourceError {
+        let (what, expected) = ("the archive".into(), "a sound one".into());
+        SourceError::Malformed { path: self.path.clone(), what, found, expected }
+    }
+
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    pub(crate) fn name(&self) -> &str {
+        &self.name
+    }
+
+    pub(crate) fn len(&self) -> u64 {
+        self.len
+    }
+
+    pub(crate) fn is_packed(&self) -> bool {
+        self.unpacked.is_some()
+    }
+
+    pub(crate) fn handle(&self) -> Result<Handle, SourceError> {
+        match &self.unpacked {
+            Some(bytes) => Ok(Handle::Memory(Cursor::new(bytes.clone()))),
+            None => File::open(&self.path)
+                .map(Handle::File)
+                .map_err(|source| SourceError::Open { path: self.path.clone(), source }),
+        }
+    }
+
+    /// The first bytes, fewer when there are not that many.
+    pub(crate) fn start(&self, count: u64) -> Result<Vec<u8>, SourceError> {
+        let mut bytes = Vec::new();
+        self.handle()?.take(count).read_to_end(&mut bytes).map_err(|source| self.stopped(source))?;
+        Ok(bytes)
+    }
+
+    /// `count` bytes from `at`.
+    pub(crate) fn bytes_at(&self, handle: &mut Handle, at: u64, count: usize) -> Result<Vec<u8>, SourceError> {
+        let mut bytes = vec![0; count];
+        let read = handle.seek(SeekFrom::Start(at)).and_then(|_| handle.read_exact(&mut bytes));
+        read.map_err(|source| self.stopped(source))?;
+        Ok(bytes)
+    }
+
+    /// Checks that the source has as many bytes as its header promises.
+    pub(crate) fn holds(&self, what: &str, expected: u64) -> Result<(), SourceError> {
+        match expected <= self.len {
+            true => Ok(()),
+            false => {
+                Err(SourceError::Truncated { path: self.path.clone(), what: what.into(), expected, found: self.len })
+            }
+        }
+    }
+
+    pub(crate) fn stopped(&self, source: std::io::Error) -> SourceError {
+        SourceError::Read { path: self.path.clone(), source }
+    }
+
+    pub(crate) fn malformed(&self, what: &str, found: String, expected: &str) -> SourceError {
+        SourceError::Malformed { path: self.path.clone(), what: what.into(), found, expected: expected.into() }
+    }
+}
+
+/// Files that lie beside a raster and describe it.
+fn is_beside(name: &str) -> bool {
+    let name = name.to_lowercase();
+    let base = name.rsplit('/').next().unwrap_or(&name);
+    let described = [".prj", ".xml", ".hdr", ".txt", ".html", ".pdf", ".avg", ".min", ".max", ".src", ".tfw", ".md5"];
+    base.starts_with('.') || name.contains("__macosx/") || described.iter().any(|end| base.ends_with(end))
+}
