@@ -92,9 +92,9 @@ def replaced(text, pattern, by):
 
 
 def write_jobs(job):
-    """Job files by name: this project's default, and the paper's method with either kind of edge."""
+    """Job files by name: this project's method at its fastest, and the paper's with either kind of edge."""
     paper = replaced(job, r'method = "optimised"', PAPER)
-    texts = {"default": job}
+    texts = {"default": replaced(job, r'method = "optimised"', 'method = "optimised"\neffort = "fast"')}
     for edges in ["clip", "constrained"]:
         texts[f"paper-{edges}"] = f'{paper}\n[load_modules]\nedges = "{edges}"\n'
     paths = {name: FOLDER / f"{name}.toml" for name in texts}
@@ -255,7 +255,7 @@ def table(rounds, heights, memory_mb):
         name = f"paper-{edges}"
         rows.append(seconds_row(f"build, paper, {edges}", rounds, name, wall, cpu, BAR_PAPER))
         rows.append(seconds_row("  sum of its stages", rounds, name, stages, cpu, None))
-    rows.append(seconds_row("build, default", rounds, "default", wall, cpu, BAR_BUILD))
+    rows.append(seconds_row("build, optimised, fast", rounds, "default", wall, cpu, BAR_BUILD))
     rows.append(seconds_row("  sum of its stages", rounds, "default", stages, cpu, None))
     theirs, untiled, tiled = (rms(rounds[-1][name]["mesh"], heights) for name in ["peer", "untiled", "tiled"])
     rows.append(["RMS of pydelatin", f"{theirs:.4f} m", "1", "", "", "", ""])

@@ -4,7 +4,7 @@ use database::{FileStamp, Fingerprint, FingerprintBuilder, TileModules};
 use fidelity::{Residuals, Tally};
 use job::{Borders, ClipHeights as JobClipHeights, Edges};
 use load_modules::{ClipHeights, Layout, clip, concatenate};
-use terrain::{LatticePoint, LoadModule, ModuleResidual, TileId, Vertex};
+use terrain::{LATTICE_PER_POST, LatticePoint, LoadModule, ModuleResidual, Post, PostRect, TileId, Vertex};
 
 use crate::refine::Published;
 use crate::run::{Run, Worked};
@@ -160,7 +160,8 @@ pub(crate) fn crs(job: &job::Job) -> String {
     format!("EPSG:{}", job.area.epsg)
 }
 
-/// Points by class of the post they stand on, and how many of them are border points that every build starts from.
+/// Points by class of the post they stand on, or next south-west of them, and how many of them are border points that
+/// every build starts from.
 /// A point on a seam counts in the tile that owns the post.
 fn count_points(
     run: &Run,
@@ -169,26 +170,28 @@ fn count_points(
     importance: &terrain::Importance,
 ) -> (Vec<u64>, u64) {
     let (rect, area) = (own.tin.tin.rect, run.area.rect);
-    let side = run.area.grid.side_cells;
+    let side = run.area.grid.side_cells * LATTICE_PER_POST;
     let is_regular = run.job.tiles.borders == Borders::Regular;
     let mut points = vec![0; run.job.importance.classes.len()];
     let mut border = 0;
     let removed: std::collections::BTreeSet<&LatticePoint> = removed.iter().collect();
     for vertex in own.tin.tin.vertices.iter().filter(|vertex| !removed.contains(&vertex.at)) {
-        let post = terrain::Post::new(
-            vertex.at.row.div_euclid(terrain::LATTICE_PER_POST),
-            vertex.at.col.div_euclid(terrain::LATTICE_PER_POST),
-        );
-        let beyond =
-            (post.row == rect.north && rect.north != area.north) || (post.col == rect.east && rect.east != area.east);
+        let at = vertex.at;
+        let is_at = |place: i32, line: i32| place == line * LATTICE_PER_POST;
+        let beyond = (is_at(at.row, rect.north) && rect.north != area.north)
+            || (is_at(at.col, rect.east) && rect.east != area.east);
         if beyond {
             continue;
         }
+        let post = Post::new(at.row.div_euclid(LATTICE_PER_POST), at.col.div_euclid(LATTICE_PER_POST));
         points[usize::from(importance.class(post))] += 1;
-        let on_line = |rect: terrain::PostRect| {
-            post.row == rect.south || post.row == rect.north || post.col == rect.west || post.col == rect.east
+        let on_line = |rect: PostRect| {
+            is_at(at.row, rect.south)
+                || is_at(at.row, rect.north)
+                || is_at(at.col, rect.west)
+                || is_at(at.col, rect.east)
         };
-        let is_corner = post.row % side == 0 && post.col % side == 0;
+        let is_corner = at.row % side == 0 && at.col % side == 0;
         border += u64::from(!is_corner && (on_line(area) || (is_regular && on_line(rect))));
     }
     (points, border)

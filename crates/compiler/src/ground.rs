@@ -3,16 +3,17 @@
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, OnceLock};
 
-use database::{Fingerprint, SourceRecord};
+use database::SourceRecord;
 use fidelity::{SourcePosts, Tally, residuals_at_source};
-use job::{AreaShape, DemSource, ImportanceArea, Job, Smooth, Voids};
+use job::{AreaShape, DemSource, ImportanceArea, Job, Smooth};
 use mask::{Mask, Shape, Smoothing};
 use schedule::Workers;
-use source_files::{ClassRaster, GeoTiff, Raster, VoidPolicy, VoidSummary, read_polygons, window_under};
+use source_files::{ClassRaster, Patch, VoidSummary, read_polygons};
 use terrain::{Dem, GridFrame, Importance, PostRect, TileId};
 
 use crate::area::GamingArea;
-use crate::{CompileError, Stage};
+use crate::sources::{Census, Opened, Source, file_record, record};
+use crate::{CompileError, Stage, sources};
 
 /// Posts of an area up to which the windows of tiles are kept between stages (7 bytes a post).
 const KEPT_POSTS_MAX: usize = 16 << 20;
@@ -26,15 +27,12 @@ pub(crate) struct Ground {
     kept: Option<Vec<OnceLock<Arc<Window>>>>,
     /// Voids of the source under the area.
     pub voids: VoidSummary,
+    /// Vertical accuracy of the least accurate source that states one, in metres.
+    pub accuracy_m: Option<f64>,
     /// For the manifest.
     pub records: Vec<SourceRecord>,
     /// What a person should know about the sources.
     pub warnings: Vec<String>,
-}
-
-enum Source {
-    Sample(u64),
-    Raster(Box<Raster>),
 }
 
 /// The ground of a rectangle of posts.
@@ -57,26 +55,64 @@ impl Ground {
     /// # Errors
     /// When a file cannot be used for this area.
     pub fn open(job: &Job, area: &GamingArea, workers: &Workers, stop: &AtomicBool) -> Result<Self, CompileError> {
-        let mut records = Vec::new();
-        let mut voids = VoidSummary::default();
-        let source = match &job.dem.source {
-            DemSource::Sample { seed } => {
-                records.push(record(&format!("sample seed={seed}"), &seed.to_le_bytes()));
-                Source::Sample(*seed)
-            }
-            DemSource::Files { files, written } => {
-                let [file] = files.as_slice() else { return Err(several_sources(written, files.len())) };
-                let mut raster = read_raster(job, area, &file.path, workers, stop)?;
-                voids = raster.settle_voids(void_policy(job.dem.voids))?;
-                records.push(file_record(&file.written, &file.path)?);
-                Source::Raster(Box::new(raster))
-            }
+        let opened = match &job.dem.source {
+            DemSource::Sample { seed } => Opened {
+                source: Source::Sample(*seed),
+                voids: VoidSummary::default(),
+                records: vec![record(&format!("sample seed={seed}"), &seed.to_le_bytes())],
+                warnings: Vec::new(),
+                accuracy_m: None,
+            },
+            DemSource::Files { files, .. } => sources::open(job, area, files, workers, stop)?,
         };
+        let Opened { source, voids, mut records, warnings, accuracy_m } = opened;
         let mask = open_mask(job, area, &mut records)?;
         let keep = area.rect.post_count() <= KEPT_POSTS_MAX;
         let kept = keep.then(|| area.tiles.iter().map(|_| OnceLock::new()).collect());
-        let warnings = warnings(&source);
-        Ok(Self { source, mask, rect: area.rect, frame: area.frame, kept, voids, records, warnings })
+        let (rect, frame) = (area.rect, area.frame);
+        let mut ground = Self { source, mask, rect, frame, kept, voids, records, warnings, accuracy_m };
+        if let Source::Mosaic(_) = ground.source {
+            ground.take_census(job, area, workers, stop)?;
+        }
+        Ok(ground)
+    }
+
+    /// Looks at every post of a mosaic once, and judges what is missing.
+    fn take_census(
+        &mut self,
+        job: &Job,
+        area: &GamingArea,
+        workers: &Workers,
+        stop: &AtomicBool,
+    ) -> Result<(), CompileError> {
+        let of_tile = |_: usize, &tile: &TileId| -> Result<Census, CompileError> {
+            let Source::Mosaic(mosaic) = &self.source else { return Ok(Census::new()) };
+            let patch = mosaic.resample(area.tiling.rect(tile));
+            let census = Census::of(&patch, area.rect);
+            if let Some(kept) = &self.kept {
+                let window = Arc::new(self.with_importance(patch));
+                kept[area.tiling.index(tile)].get_or_init(|| window);
+            }
+            Ok(census)
+        };
+        let parts = schedule::for_each_independent(&area.tiles, workers, stop, of_tile)
+            .map_err(|error| CompileError::from_schedule(Stage::Read, &area.tiles, error))?;
+        let mut census = Census::new();
+        parts.iter().for_each(|part| census.add(part));
+        self.voids = census.judge(job, area)?;
+        if 0 < census.gap {
+            let (gap, of) = (census.gap, area.rect.post_count());
+            let map = census.map();
+            self.warnings.push(format!("no source reaches {gap} of {of} posts, which are holes (north is up):\n{map}"));
+        }
+        Ok(())
+    }
+
+    fn with_importance(&self, patch: Patch) -> Window {
+        let dem = patch.dem();
+        let importance = mask::importance(&self.mask, self.rect, &self.frame, dem.rect());
+        let importance = mask::without_voids(importance, &dem);
+        Window { dem, importance }
     }
 
     /// The ground of one tile, made once where memory allows.
@@ -120,20 +156,25 @@ impl Ground {
         Ok(Window { dem, importance: join_importance(&parts, rect) })
     }
 
+    /// Whether the source has posts of its own to measure at: several sources have none in common.
+    pub fn has_source_posts(&self) -> bool {
+        !matches!(self.source, Source::Mosaic(_))
+    }
+
     /// Residuals of load modules at the source's own posts; `None` where those are the posts of the working grid.
     pub fn residuals_at_source(&self, modules: &[terrain::LoadModule], area: &GamingArea) -> Option<Tally> {
         let Source::Raster(raster) = &self.source else { return None };
         let frame = raster.frame();
         let quanta = |metres: f64| metres * f64::from(terrain::QUANTA_PER_METRE);
         let spacing = self.frame.spacing.metres();
-        let off = [frame.south_west_m[0] - self.frame.origin_east_m, frame.south_west_m[1] - self.frame.origin_north_m];
-        if frame.spacing_m == [spacing; 2] && off.iter().all(|metres| (metres / spacing).fract() == 0.0) {
+        let off = [frame.south_west[0] - self.frame.origin_east_m, frame.south_west[1] - self.frame.origin_north_m];
+        if frame.spacing == [spacing; 2] && off.iter().all(|metres| (metres / spacing).fract() == 0.0) {
             return None;
         }
         let source = SourcePosts {
             window: raster.window(),
             south_west: off.map(quanta),
-            step: frame.spacing_m.map(quanta),
+            step: frame.spacing.map(quanta),
             height_m: &|post| raster.height_m(post),
         };
         Some(residuals_at_source(modules, area.grid, self.frame.spacing, &source))
@@ -147,6 +188,7 @@ impl Ground {
         let dem = match &self.source {
             Source::Sample(seed) => sample_terrain::heights(*seed, rect, self.frame.spacing),
             Source::Raster(raster) => raster.resample(&self.frame, rect)?,
+            Source::Mosaic(mosaic) => return Ok(self.with_importance(mosaic.resample(rect))),
         };
         let importance = mask::importance(&self.mask, self.rect, &self.frame, rect);
         let importance = mask::without_voids(importance, &dem);
@@ -184,53 +226,6 @@ fn join_importance(parts: &[Arc<Window>], rect: PostRect) -> Importance {
     let weights = posts().map(|post| holder(post).importance.weight(post)).collect();
     let classes = posts().map(|post| holder(post).importance.class(post)).collect();
     Importance::new(rect, weights, classes)
-}
-
-fn void_policy(voids: Voids) -> VoidPolicy {
-    match voids {
-        Voids::Fail => VoidPolicy::Fail,
-        Voids::FillWithinPosts(posts) => VoidPolicy::FillWithin(posts),
-    }
-}
-
-fn several_sources(written: &[String], found: usize) -> CompileError {
-    CompileError::Impossible {
-        key: "dem.sources".into(),
-        found: format!("{found} files under {}", written.join(", ")),
-        expected: "one file".into(),
-        hint: "several sources side by side are not supported yet; merge them with gdalbuildvrt and gdal_translate"
-            .into(),
-    }
-}
-
-/// Decodes what lies under the area, chunks shared among the workers.
-fn read_raster(
-    job: &Job,
-    area: &GamingArea,
-    path: &std::path::Path,
-    workers: &Workers,
-    stop: &AtomicBool,
-) -> Result<Raster, CompileError> {
-    let file = GeoTiff::open(path, None)?;
-    file.frame().require_epsg(job.area.epsg)?;
-    let window = window_under(file.frame(), &area.frame, area.rect)?;
-    decode(&file, window, workers, stop)
-}
-
-/// Decodes a window of a raster on all workers.
-pub(crate) fn decode(
-    file: &GeoTiff,
-    window: PostRect,
-    workers: &Workers,
-    stop: &AtomicBool,
-) -> Result<Raster, CompileError> {
-    let chunks = file.chunks_of(window);
-    let parts: Vec<&[u32]> = chunks.chunks(chunks.len().div_ceil(4 * workers.count()).max(1)).collect();
-    let decoded =
-        schedule::for_each_independent(&parts, workers, stop, |_, part| file.decode(part).map_err(CompileError::from));
-    let nowhere = vec![TileId { row: 0, col: 0 }; parts.len()];
-    let decoded = decoded.map_err(|error| CompileError::from_schedule(Stage::Read, &nowhere, error))?;
-    Ok(file.assemble(window, decoded.into_iter().flatten().collect())?)
 }
 
 fn open_mask(job: &Job, area: &GamingArea, records: &mut Vec<SourceRecord>) -> Result<Mask<'static>, CompileError> {
@@ -282,32 +277,4 @@ fn open_shape(
             }))
         }
     })
-}
-
-fn record(path: &str, content: &[u8]) -> SourceRecord {
-    SourceRecord { path: path.to_owned(), blake3: Fingerprint::of_bytes(content), attribution: None }
-}
-
-fn file_record(written: &str, path: &std::path::Path) -> Result<SourceRecord, CompileError> {
-    Ok(record(written, &source_files::content(path)?))
-}
-
-/// Heights that look like a sentinel nobody declared.
-fn warnings(source: &Source) -> Vec<String> {
-    const LOWEST_LAND_M: f64 = -450.0;
-    const HIGHEST_LAND_M: f64 = 8900.0;
-    let Source::Raster(raster) = source else { return Vec::new() };
-    let Some((lowest, highest)) = raster.range_m() else { return Vec::new() };
-    let path = raster.frame().path.display();
-    let mut warnings = Vec::new();
-    if lowest < LOWEST_LAND_M || HIGHEST_LAND_M < highest {
-        warnings.push(format!(
-            "{path}: heights run from {lowest} m to {highest} m, beyond any land on Earth; \
-             a void marker without a nodata tag would look like that"
-        ));
-    }
-    if raster.frame().epsg == 3857 {
-        warnings.push(format!("{path}: EPSG:3857 metres are not ground metres away from the equator"));
-    }
-    warnings
 }

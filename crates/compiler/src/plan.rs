@@ -1,11 +1,12 @@
 //! What a job will do and take, before any work.
 
-use job::{Budget as PointBudget, DemSource, Edges, Job, TileOrder};
+use job::{Budget as PointBudget, DemSource, Edges, Effort, Job, TileOrder};
 use schedule::Simulation;
 use terrain::{ModuleRect, PostRect, Side, TileId};
 
 use crate::CompileError;
 use crate::area::GamingArea;
+use crate::refinement::optimising;
 
 /// A job, planned.
 #[derive(Clone, Debug, PartialEq)]
@@ -60,6 +61,8 @@ const SECONDS_PER_POINT: f64 = 3.5e-6;
 const MEMORY_PER_POST: u64 = 8;
 /// Bytes of memory for a triangle, in TINs, load modules and curves.
 const MEMORY_PER_TRIANGLE: u64 = 60;
+/// Bytes of memory for a post and for a triangle of a tile that is being optimised, and how many tiles are so at once.
+const MEMORY_OPTIMISING: (u64, u64, u64) = (40, 600, 2);
 /// Bytes of the program itself.
 const MEMORY_BASE: u64 = 8 << 20;
 /// Bytes on disk for a triangle: tile, load module and curve.
@@ -108,9 +111,20 @@ fn forecast(job: &Job, area: &GamingArea) -> Forecast {
         DemSource::Files { .. } => SECONDS_PER_POST,
     };
     let points = triangles as f64 / 2.0;
+    // Measured on the jobs in `configs`, one worker.
+    let per_triangle = match optimising(job).map(|optimising| optimising.effort) {
+        None => 0.0,
+        Some(Effort::Fast) => 6e-6,
+        Some(Effort::Normal) => 35e-6,
+        Some(Effort::Best) => 200e-6,
+    };
+    let (of_post, of_triangle, at_once) = MEMORY_OPTIMISING;
+    let tiles = area.tiles.len() as u64;
+    let in_work = (posts * of_post + triangles * of_triangle) / tiles * at_once.min(tiles);
+    let in_work = if optimising(job).is_some() { in_work } else { 0 };
     Forecast {
-        memory_bytes: MEMORY_BASE + posts * MEMORY_PER_POST + triangles * MEMORY_PER_TRIANGLE,
-        seconds: posts as f64 * per_post + points * SECONDS_PER_POINT,
+        memory_bytes: in_work + MEMORY_BASE + posts * MEMORY_PER_POST + triangles * MEMORY_PER_TRIANGLE,
+        seconds: posts as f64 * per_post + points * SECONDS_PER_POINT + triangles as f64 * per_triangle,
         disk_bytes: triangles * DISK_PER_TRIANGLE,
     }
 }

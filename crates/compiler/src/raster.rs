@@ -9,17 +9,19 @@ use database::ReportResidual;
 use fidelity::Tally;
 use geometry::WORKING_POSTS_MAX;
 use geometry::owned::{PostGrid, visit_residuals};
-use job::ErrorKey;
+use job::{ErrorKey, Optimising};
 use schedule::{Event as Scheduled, RankedTasks, Workers, in_rank_order_observed};
-use source_files::{GeoTiff, VoidPolicy, write_classes, write_heights};
+use source_files::{DemFile, Reading, VoidPolicy, write_classes, write_heights};
 use terrain::{
-    Dem, GainCurve, GridFrame, Importance, ModuleGrid, PostRect, SeamSides, Spacing, StopReason, THOUSANDTHS, TileId,
-    TileTin, Tin, Vertex, quanta_of_metres,
+    Dem, GainCurve, GridFrame, Importance, LATTICE_PER_POST, LatticePoint, ModuleGrid, Post, PostRect, SeamSides,
+    Spacing, StopReason, THOUSANDTHS, TileId, TileTin, Tin, Vertex, quanta_of_metres,
 };
 use tiling::{Gains, Order, Tiling, points_equally, points_globally};
 use tin::{CostUnit, Frame, LastBatch, Proximity, Rule, Stop, SurveyTask, TileTask};
 
-use crate::ground::decode;
+use crate::ground::Window;
+use crate::refinement::{Most, Refinement};
+use crate::sources::decode;
 use crate::tasks::{inherited, posts_of};
 use crate::{CompileError, Event, Progress, Stage};
 
@@ -30,7 +32,7 @@ const PROXIMITY_M: (f64, u32) = (300.0, 20);
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TinMethod {
     /// The best of ours.
-    Optimised,
+    Optimised(Optimising),
     /// The founding paper's passes.
     Paper,
     /// One post at a time: the worst of all, or the worst of the triangle with the largest sum of squares.
@@ -49,6 +51,8 @@ pub struct TinRequest {
     pub method: TinMethod,
     /// Vertices at most, corners included.
     pub points: Option<usize>,
+    /// Triangles at most; of the optimised method, and instead of `points`.
+    pub triangles: Option<usize>,
     /// Largest residual to accept, in metres.
     pub max_residual_m: Option<f64>,
     /// RMS residual to reach, in metres.
@@ -64,6 +68,8 @@ pub struct TinRequest {
 pub struct Mesh {
     /// Vertices and triangles; rows and columns are the raster's, from its south-west post.
     pub tin: Tin,
+    /// The raster's heights.
+    pub dem: Dem,
     /// Easting of post (0, 0), in metres.
     pub east_m: f64,
     /// Northing of post (0, 0), in metres.
@@ -87,7 +93,8 @@ pub struct Mesh {
 pub fn tin(request: &TinRequest, stop: &AtomicBool, progress: &mut dyn Progress) -> Result<Mesh, CompileError> {
     let workers = Workers::new(request.workers);
     progress.tell(Event::Enter(Stage::Read, 0));
-    let file = GeoTiff::open(&request.dem, None)?;
+    let file = DemFile::open(&request.dem, &Reading::AS_IT_SAYS)?;
+    file.frame().require_metres()?;
     let mut raster = decode(&file, file.rect(), &workers, stop)?;
     raster.settle_voids(VoidPolicy::Hole)?;
     let scale = file.sample_scale();
@@ -97,7 +104,7 @@ pub fn tin(request: &TinRequest, stop: &AtomicBool, progress: &mut dyn Progress)
     progress.tell(Event::Leave(Stage::Read));
 
     let frame = file.frame();
-    let job = TinJob::new(request, &dem, frame.spacing_m)?;
+    let job = TinJob::new(request, &dem, frame.spacing)?;
     let curves = job.survey(&dem, &workers, stop, progress)?;
     let tiles = job.refine(&dem, curves.as_deref(), &workers, stop, progress)?;
 
@@ -110,12 +117,13 @@ pub fn tin(request: &TinRequest, stop: &AtomicBool, progress: &mut dyn Progress)
     Ok(Mesh {
         points: tin.vertices.len(),
         tin,
-        east_m: frame.south_west_m[0],
-        north_m: frame.south_west_m[1],
-        spacing_m: (frame.spacing_m[0], frame.spacing_m[1]),
-        epsg: Some(frame.epsg),
+        east_m: frame.south_west[0],
+        north_m: frame.south_west[1],
+        spacing_m: (frame.spacing[0], frame.spacing[1]),
+        epsg: frame.crs.epsg(),
         residual,
         stop,
+        dem,
     })
 }
 
@@ -142,12 +150,12 @@ impl<'a> TinJob<'a> {
         let rule = match request.method {
             TinMethod::Greedy { key: ErrorKey::Max } => Rule::WorstFirst,
             // A residual to reach is reached by worst posts; sums of squares alone would go past it.
-            TinMethod::Optimised | TinMethod::Greedy { key: ErrorKey::Sse }
-                if value.is_some() && request.points.is_none() =>
+            TinMethod::Optimised(_) | TinMethod::Greedy { key: ErrorKey::Sse }
+                if value.is_some() && request.points.is_none() && request.triangles.is_none() =>
             {
                 Rule::WorstFirst
             }
-            TinMethod::Optimised | TinMethod::Greedy { key: ErrorKey::Sse } => Rule::LargestSquares { guard: value },
+            TinMethod::Optimised(_) | TinMethod::Greedy { key: ErrorKey::Sse } => Rule::LargestSquares { guard: value },
             TinMethod::Paper => Rule::Batches {
                 residual_quantum: quantum,
                 proximity: Some(Proximity {
@@ -164,7 +172,24 @@ impl<'a> TinJob<'a> {
     /// Points to select in all: those asked for less the corners of tiles.
     fn points(&self) -> Option<u64> {
         let corners = u64::from(self.tiling.rows() + 1) * u64::from(self.tiling.cols() + 1);
-        self.request.points.map(|points| (points as u64).saturating_sub(corners))
+        let start = 2 * self.tiles.len();
+        // No point makes more than two triangles, in its tile or on both sides of a line.
+        let triangles = self.request.triangles.map(|triangles| (triangles.saturating_sub(start) / 2) as u64);
+        self.request.points.map(|points| (points as u64).saturating_sub(corners)).or(triangles)
+    }
+
+    /// What is to be done for a tile; optimised where it is grown by squares and the method says so.
+    fn refinement(&self, task: TileTask) -> Refinement {
+        let optimising = match (self.request.method, &task.rule) {
+            (TinMethod::Optimised(optimising), Rule::LargestSquares { .. }) => Some(optimising),
+            _ => None,
+        };
+        // Alone, a tile's border makes one triangle a point, and the number asked for is met exactly.
+        let most = match self.request.triangles {
+            Some(triangles) if self.tiles.len() == 1 => Most::Triangles(triangles),
+            _ => Most::AsTask,
+        };
+        Refinement { task, optimising, most }
     }
 
     fn task(&self, tile: TileId, seams: SeamSides, inherited: Vec<terrain::Post>, points: Option<usize>) -> TileTask {
@@ -252,13 +277,12 @@ impl<'a> TinJob<'a> {
             let published = |other: TileId| {
                 slots[self.tiling.index(other)].get().expect("lower-ranked neighbours are published first")
             };
-            let seeds = posts_of(&inherited(&self.tiling, tile, published));
+            let seeds = inherited(&self.tiling, tile, published);
             let points = shares.as_ref().map(|shares| shares[index]);
-            let task = self.task(tile, self.tiling.owned_sides(tile), seeds, points);
-            let whole = task.rect == dem.rect();
-            let window = if whole { None } else { Some(dem.window(task.rect)) };
-            let window = window.as_ref().unwrap_or(dem);
-            let done = tin::refine(window, &weights(window), &task, geometry::widest_level());
+            let task = self.task(tile, self.tiling.owned_sides(tile), posts_of(&seeds), points);
+            let dem = dem.window(task.rect);
+            let window = Window { importance: weights(&dem), dem };
+            let done = self.refinement(task).run(&window, &seeds);
             assert!(slots[index].set(done).is_ok(), "each tile is refined once");
             Ok(())
         };
@@ -302,12 +326,14 @@ fn refuse(request: &TinRequest, rect: PostRect, longest: usize, spacing_m: [f64;
             &format!("at least the {corners} corners of tiles"),
             "corners of tiles are vertices of every mesh",
         ),
-        None if request.max_residual_m.is_none() && request.rms_m.is_none() => impossible(
-            "--points",
-            "nothing that says when to stop".into(),
-            "--points, --max-residual or --rms",
-            "for example --points 5000",
-        ),
+        None if [request.max_residual_m, request.rms_m, request.triangles.map(|_| 0.0)].iter().all(Option::is_none) => {
+            impossible(
+                "--points",
+                "nothing that says when to stop".into(),
+                "--points, --triangles, --max-residual or --rms",
+                "for example --points 5000",
+            )
+        }
         _ => Ok(()),
     }
 }
@@ -326,8 +352,7 @@ fn join(rect: PostRect, tiles: &[TileTin]) -> Tin {
     let mut on_lines = HashMap::new();
     for tile in tiles {
         let part = &tile.tin;
-        let (low, high) =
-            (terrain::LatticePoint::from(part.rect.south_west()), terrain::LatticePoint::from(part.rect.north_east()));
+        let (low, high) = (LatticePoint::from(part.rect.south_west()), LatticePoint::from(part.rect.north_east()));
         let mut place = |vertex: &Vertex| {
             let at = vertex.at;
             let mut fresh = || {
@@ -346,19 +371,32 @@ fn join(rect: PostRect, tiles: &[TileTin]) -> Tin {
 /// Residuals at every post that is not void, each counted once.
 fn residual(dem: &Dem, tin: &Tin) -> ReportResidual {
     let mut tally = Tally::default();
-    let rect = dem.rect();
     for triangle in &tin.triangles {
-        let corners = triangle.map(|v| tin.vertices[v as usize]);
-        let posts = corners.map(|vertex| vertex.at.post().expect("vertices stand on posts"));
-        visit_triangle(dem, rect, posts, corners.map(|vertex| vertex.height), &mut tally);
+        visit_triangle(dem, triangle.map(|v| tin.vertices[v as usize]), &mut tally);
     }
     crate::report::residual_of(&tally)
 }
 
-fn visit_triangle(dem: &Dem, rect: PostRect, posts: [terrain::Post; 3], heights: [i32; 3], tally: &mut Tally) {
-    let facet =
-        geometry::Facet::new(posts.map(|post| post.col - rect.west), posts.map(|post| post.row - rect.south), heights);
-    visit_residuals(&PostGrid::of_area(rect), &facet, dem, |post, residual| {
+fn visit_triangle(dem: &Dem, corners: [Vertex; 3], tally: &mut Tally) {
+    let rect = dem.rect();
+    // Counted from a post near the triangle, its corners stay small in a raster of any size.
+    let least = |pick: fn(&Vertex) -> i32| {
+        corners.iter().map(pick).min().expect("a triangle has corners").div_euclid(LATTICE_PER_POST)
+    };
+    let origin = Post::new(least(|vertex| vertex.at.row), least(|vertex| vertex.at.col));
+    let from = LatticePoint::from(origin);
+    let grid = PostGrid {
+        origin,
+        units_per_post: LATTICE_PER_POST,
+        far_row: Some(rect.north - origin.row),
+        far_col: Some(rect.east - origin.col),
+    };
+    let facet = geometry::Facet::new(
+        corners.map(|vertex| vertex.at.col - from.col),
+        corners.map(|vertex| vertex.at.row - from.row),
+        corners.map(|vertex| vertex.height),
+    );
+    visit_residuals(&grid, &facet, dem, |post, residual| {
         if !dem.is_void(post) {
             tally.add(residual);
         }

@@ -3,13 +3,13 @@
 use std::sync::{Arc, OnceLock};
 
 use database::{FingerprintBuilder, Stamp};
-use terrain::{Dem, TileId, TileTin, Vertex};
-use tin::TileTask;
+use terrain::{TileId, TileTin, Vertex};
 
 use crate::ground::Window;
+use crate::refinement::Refinement;
 use crate::run::{Run, Worked};
 use crate::survey::Shares;
-use crate::tasks::{inherited, posts_of, tile_task};
+use crate::tasks::{inherited, posts_of, tile_refinement};
 use crate::{CompileError, Progress, Stage};
 
 /// A tile's published TIN and what it was made from.
@@ -30,9 +30,9 @@ pub(crate) fn refine(run: &Run, shares: &Shares, progress: &mut dyn Progress) ->
         };
         let seeds = inherited(&run.area.tiling, tile, published);
         let index = run.area.tiling.index(tile);
-        let task = tile_task(run.job, &run.area, tile, &shares.tiles[index], posts_of(&seeds));
+        let refinement = tile_refinement(run.job, &run.area, tile, &shares.tiles[index], posts_of(&seeds));
         let window = run.window(tile)?;
-        let done = refine_or_keep(run, &window, &task, &seeds)?;
+        let done = refine_or_keep(run, &window, &refinement, &seeds)?;
         let kept = !done.is_new;
         assert!(slots[index].set(done).is_ok(), "each tile is refined once");
         Ok(if kept { Worked::Kept(()) } else { Worked::Made(()) })
@@ -41,47 +41,34 @@ pub(crate) fn refine(run: &Run, shares: &Shares, progress: &mut dyn Progress) ->
 }
 
 /// Keeps a tile that was made from the same inputs, and refines any other.
-fn refine_or_keep(run: &Run, window: &Window, task: &TileTask, seeds: &[Vertex]) -> Result<Published, CompileError> {
-    let stamp = tile_stamp(run, window, task, seeds);
+fn refine_or_keep(
+    run: &Run,
+    window: &Window,
+    refinement: &Refinement,
+    seeds: &[Vertex],
+) -> Result<Published, CompileError> {
+    let stamp = tile_stamp(run, window, refinement, seeds);
+    let tile = refinement.task.tile;
     let folder = run.database.folder();
-    if folder.tile_stamp(task.tile).ok().flatten() == Some(stamp)
-        && let Ok((_, tin)) = folder.read_tile(task.tile)
+    if folder.tile_stamp(tile).ok().flatten() == Some(stamp)
+        && let Ok((_, tin)) = folder.read_tile(tile)
     {
         return Ok(Published { tin: Arc::new(tin), stamp, is_new: false });
     }
-    let tin = refine_now(window, task, seeds);
+    let tin = refinement.run(window, seeds);
     run.database.write_tile(&stamp, &tin)?;
     Ok(Published { tin: Arc::new(tin), stamp, is_new: true })
 }
 
 /// What a tile's TIN is made from.
-pub(crate) fn tile_stamp(run: &Run, window: &Window, task: &TileTask, seeds: &[Vertex]) -> Stamp {
-    run.stamp("tile", window, |builder| feed(builder, task, seeds))
+pub(crate) fn tile_stamp(run: &Run, window: &Window, refinement: &Refinement, seeds: &[Vertex]) -> Stamp {
+    run.stamp("tile", window, |builder| feed(builder, refinement, seeds))
 }
 
-/// Refines a tile. Seam points stand at the heights they were published with, whatever the DEM says today.
-pub(crate) fn refine_now(window: &Window, task: &TileTask, seeds: &[Vertex]) -> TileTin {
-    let level = geometry::widest_level();
-    let differs = |seed: &Vertex| seed.at.post().is_some_and(|post| window.dem.height(post) != seed.height);
-    if !seeds.iter().any(differs) {
-        return tin::refine(&window.dem, &window.importance, task, level);
-    }
-    tin::refine(&with_heights(&window.dem, seeds), &window.importance, task, level)
-}
-
-fn with_heights(dem: &Dem, seeds: &[Vertex]) -> Dem {
-    let mut at: Vec<(terrain::Post, i32)> =
-        seeds.iter().filter_map(|seed| Some((seed.at.post()?, seed.height))).collect();
-    at.sort_unstable();
-    Dem::from_fn(dem.rect(), |post| match at.binary_search_by_key(&post, |&(post, _)| post) {
-        Ok(found) => Some(at[found].1),
-        Err(_) => Some(dem.height(post)),
-    })
-}
-
-fn feed(builder: FingerprintBuilder, task: &TileTask, seeds: &[Vertex]) -> FingerprintBuilder {
+fn feed(builder: FingerprintBuilder, refinement: &Refinement, seeds: &[Vertex]) -> FingerprintBuilder {
+    let task = &refinement.task;
     let mut builder = builder
-        .text(&format!("{:?} {:?} {:?}", task.rule, task.stop, task.seams))
+        .text(&format!("{:?} {:?} {:?} {:?}", task.rule, task.stop, task.seams, refinement.optimising))
         .text(&format!("{:?}", task.frame))
         .text(&format!("{:?} {:?}", task.border, task.kept))
         .number(seeds.len() as u64);

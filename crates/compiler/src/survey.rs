@@ -6,6 +6,7 @@ use terrain::{GainCurve, TileId};
 use tiling::{Allocation, Gains, allocate_equally, allocate_globally, points_equally, points_globally};
 use tin::SurveyTask;
 
+use crate::refinement::optimising;
 use crate::run::{Run, Worked};
 use crate::tasks::{TileBudget, is_surveyed, survey_task};
 use crate::{CompileError, Event, Progress, Stage};
@@ -59,17 +60,33 @@ pub(crate) fn allocate(run: &Run, curves: Option<&[GainCurve]>, progress: &mut d
 /// A survey lets every tile choose on all its sides and so predicts a little better than tiles will do.
 const RMS_MARGIN: f64 = 0.99;
 
-/// The step of the ladder at which the area's RMS residual is predicted to be the one asked for.
-fn floor(run: &Run, curves: &[GainCurve]) -> Option<i32> {
-    let rms_quanta = run.job.tin.target_rms_m? * f64::from(terrain::QUANTA_PER_METRE) * RMS_MARGIN;
-    let posts: usize = run.area.tiles.iter().map(|&tile| run.area.tiling.rect(tile).post_count()).sum();
-    tiling::floor_for_rms(curves, rms_quanta * rms_quanta * posts as f64)
+/// Where the gains of an area reach the RMS residual asked for.
+struct Goal {
+    /// The step of the ladder down to which they are taken.
+    floor: i32,
+    /// The RMS residual of each tile there, in quanta.
+    rms_quanta: Vec<f64>,
+}
+
+impl Goal {
+    /// Where selection alone is predicted to reach the RMS residual asked for, if the job asks for one.
+    fn new(run: &Run, curves: &[GainCurve]) -> Option<Self> {
+        let posts: Vec<f64> =
+            run.area.tiles.iter().map(|&tile| run.area.tiling.rect(tile).post_count() as f64).collect();
+        let rms = run.job.tin.target_rms_m? * f64::from(terrain::QUANTA_PER_METRE) * RMS_MARGIN;
+        let floor = tiling::floor_for_rms(curves, rms * rms * posts.iter().sum::<f64>())?;
+        let rms_quanta = curves.iter().zip(&posts).map(|(curve, posts)| (curve.squares_at(floor) / posts).sqrt());
+        Some(Self { floor, rms_quanta: rms_quanta.collect() })
+    }
 }
 
 fn shares(run: &Run, curves: Option<&[GainCurve]>) -> Shares {
     let area = &run.area;
     let by_rank = area.by_rank();
-    let floor = curves.and_then(|curves| floor(run, curves));
+    let goal = curves.and_then(|curves| Goal::new(run, curves));
+    let floor = goal.as_ref().map(|goal| goal.floor);
+    // What is optimised needs fewer points for the same residual: each tile is to come down to its part of it.
+    let goal = goal.filter(|_| optimising(run.job).is_some());
     let gains = |curves| Gains { curves, by_rank: &by_rank, floor };
     let points: Option<Vec<usize>> = match (run.job.tin.budget, curves) {
         (PointBudget::Points(points), None) => Some(points_equally(points, area.tiles.len())),
@@ -86,7 +103,11 @@ fn shares(run: &Run, curves: Option<&[GainCurve]>) -> Shares {
             // Every point costs the same; `plan` has made sure that all of them fit.
             allowance.triangles = points[index] as u32 * limits::POINT_COST;
         }
-        TileBudget { points: points.as_ref().map(|points| points[index]), allowance }
+        TileBudget {
+            points: points.as_ref().map(|points| points[index]),
+            allowance,
+            rms_quanta: goal.as_ref().map(|goal| goal.rms_quanta[index]),
+        }
     });
     Shares { tiles: tiles.collect(), triangles }
 }

@@ -7,24 +7,35 @@ use tiling::{Tiling, outer_border_posts, outer_sides};
 use tin::{CostUnit, Frame, Proximity, Rule, Stop, SurveyTask, TileTask};
 
 use crate::area::GamingArea;
+use crate::refinement::{Most, Refinement, optimising};
 
 /// A survey looks this many times further than an equal share.
 const SURVEY_REACH: u64 = 3;
+/// The same, where an RMS residual is asked for that optimising reaches within the budget and selection alone does not.
+const SURVEY_REACH_TO_RMS: u64 = 5;
 
 /// What one tile may spend.
 pub(crate) struct TileBudget {
     pub points: Option<usize>,
     pub allowance: Option<Allowance>,
+    /// RMS residual (quanta) that is good enough for this tile, where the area's is shared out.
+    pub rms_quanta: Option<f64>,
 }
 
-/// The refinement of one tile, inheriting `inherited` from its lower-ranked neighbours.
-pub(crate) fn tile_task(
+/// The refinement of one tile, optimised if the job says so.
+pub(crate) fn tile_refinement(
     job: &Job,
     area: &GamingArea,
     tile: TileId,
     budget: &TileBudget,
     inherited: Vec<Post>,
-) -> TileTask {
+) -> Refinement {
+    let task = tile_task(job, area, tile, budget, inherited);
+    Refinement { task, optimising: optimising(job), most: Most::AsTask }
+}
+
+/// The growth of one tile, inheriting `inherited` from its lower-ranked neighbours.
+fn tile_task(job: &Job, area: &GamingArea, tile: TileId, budget: &TileBudget, inherited: Vec<Post>) -> TileTask {
     let rect = area.tiling.rect(tile);
     let regular = job.tiles.borders == Borders::Regular;
     let border_sides = if regular { SeamSides::OPEN } else { outer_sides(rect, area.rect) };
@@ -44,7 +55,7 @@ pub(crate) fn tile_task(
             value: if is_by_squares(job) { None } else { largest_value(job) },
             // Shared out globally, the RMS is the area's: the allocation sees to it.
             rms_quanta: match is_surveyed(job) {
-                true => None,
+                true => budget.rms_quanta,
                 false => job.tin.target_rms_m.map(|rms| rms * f64::from(terrain::QUANTA_PER_METRE)),
             },
         },
@@ -75,7 +86,7 @@ fn is_by_squares(job: &Job) -> bool {
     // Where a residual is the only end, it is reached by worst posts; sums of squares would go on past it.
     let ends_at_residual = job.tin.max_residual_m.is_some() && job.tin.budget == PointBudget::Limits;
     match job.tin.method {
-        Method::Optimised => true,
+        Method::Optimised(_) => true,
         Method::Greedy => job.tin.key == ErrorKey::Sse && !ends_at_residual,
         Method::Paper { .. } => job.tin.key == ErrorKey::Sse,
     }
@@ -85,7 +96,7 @@ fn is_by_squares(job: &Job) -> bool {
 pub(crate) fn rule(job: &Job, area: &GamingArea) -> Rule {
     match job.tin.method {
         _ if is_by_squares(job) => Rule::LargestSquares { guard: largest_value(job) },
-        Method::Optimised | Method::Greedy => Rule::WorstFirst,
+        Method::Optimised(_) | Method::Greedy => Rule::WorstFirst,
         Method::Paper { proximity, last_batch } => Rule::Batches {
             residual_quantum: job.tin.residual_quantum,
             proximity: proximity.map(|proximity| Proximity {
@@ -112,14 +123,16 @@ fn largest_value(job: &Job) -> Option<u64> {
 /// The survey of one tile: all it would select if it were alone.
 pub(crate) fn survey_task(job: &Job, area: &GamingArea, tile: TileId) -> SurveyTask {
     let modules = area.tiling.modules(tile, area.grid);
-    let share = |total: u64| SURVEY_REACH * total * modules.count() as u64 / area.grid.count() as u64;
+    let reach =
+        if job.tin.target_rms_m.is_some() && optimising(job).is_some() { SURVEY_REACH_TO_RMS } else { SURVEY_REACH };
+    let share = |total: u64| reach * total * modules.count() as u64 / area.grid.count() as u64;
     let (points, cost) = match job.tin.budget {
         PointBudget::Points(points) => (Some(share(points) as usize), CostUnit::Points),
         PointBudget::Limits => (None, CostUnit::Triangles),
     };
     let room = area.budget.area - area.budget.start_total();
     let allowance = survey_allowance(area, modules, share(room) as u32);
-    let budget = TileBudget { points, allowance: Some(allowance) };
+    let budget = TileBudget { points, allowance: Some(allowance), rms_quanta: None };
     let mut growth = tile_task(job, area, tile, &budget, Vec::new());
     growth.seams = area.tiling.shared_sides(tile);
     // An RMS of 0 is never reached, but has the sums of squares recorded.

@@ -7,17 +7,17 @@ use std::sync::Arc;
 use database::{Database, DatabaseError, Folder, Previous, Report};
 use job::{Edges, Job};
 use terrain::{Post, SeamSides, Side, TileId, TileTin, Vertex};
-use tin::TileTask;
 
 use crate::assemble::{Assembled, assemble, assemble_tile, read_assembled};
 use crate::build::open;
 use crate::enforce::enforce;
 use crate::publish::{beginning, publish};
-use crate::refine::{Published, refine_now, tile_stamp};
+use crate::refine::{Published, tile_stamp};
+use crate::refinement::Refinement;
 use crate::report::Findings;
 use crate::run::{Options, Run, Worked};
 use crate::survey::{Shares, allocate};
-use crate::tasks::{inherited, is_surveyed, posts_of, side_vertices, tile_task};
+use crate::tasks::{inherited, is_surveyed, posts_of, side_vertices, tile_refinement};
 use crate::{CompileError, Event, Progress, Stage};
 
 /// A tile that was run again.
@@ -109,8 +109,8 @@ fn stale(run: &Run, shares: &Shares, tins: &[Published], reached: &[(TileId, boo
     let mut count = 0;
     for (index, &tile) in run.area.tiles.iter().enumerate() {
         let seeds = seeds(run, tins, tile);
-        let task = tile_task(run.job, &run.area, tile, &shares.tiles[index], posts_of(&seeds));
-        let stamp = tile_stamp(run, &*run.window(tile)?, &task, &seeds);
+        let refinement = tile_refinement(run.job, &run.area, tile, &shares.tiles[index], posts_of(&seeds));
+        let stamp = tile_stamp(run, &*run.window(tile)?, &refinement, &seeds);
         let is_reached = reached.iter().any(|&(other, _)| other == tile);
         count += usize::from(!is_reached && stamp != tins[index].stamp);
     }
@@ -181,14 +181,14 @@ fn seeds(run: &Run, tins: &[Published], tile: TileId) -> Vec<Vertex> {
 /// The tile's task as a full build would give it.
 fn refine_whole(run: &Run, shares: &Shares, tins: &[Published], tile: TileId) -> Result<Published, CompileError> {
     let seeds = seeds(run, tins, tile);
-    let task = tile_task(run.job, &run.area, tile, &shares.tiles[run.area.tiling.index(tile)], posts_of(&seeds));
-    refine_task(run, &task, &seeds)
+    let budget = &shares.tiles[run.area.tiling.index(tile)];
+    refine_tile(run, &tile_refinement(run.job, &run.area, tile, budget, posts_of(&seeds)), &seeds)
 }
 
-fn refine_task(run: &Run, task: &TileTask, seeds: &[Vertex]) -> Result<Published, CompileError> {
-    let window = run.window(task.tile)?;
-    let stamp = tile_stamp(run, &window, task, seeds);
-    Ok(Published { tin: Arc::new(refine_now(&window, task, seeds)), stamp, is_new: true })
+fn refine_tile(run: &Run, refinement: &Refinement, seeds: &[Vertex]) -> Result<Published, CompileError> {
+    let window = run.window(refinement.task.tile)?;
+    let stamp = tile_stamp(run, &window, refinement, seeds);
+    Ok(Published { tin: Arc::new(refinement.run(&window, seeds)), stamp, is_new: true })
 }
 
 /// Runs `tile`, with its sides frozen if its border would change. Gives it, and whether it is frozen.
@@ -214,7 +214,8 @@ fn rerun(
 fn refine_frozen(run: &Run, shares: &Shares, tins: &[Published], tile: TileId) -> Result<Published, CompileError> {
     let index = run.area.tiling.index(tile);
     let mut seeds = seeds(run, tins, tile);
-    let mut task = tile_task(run.job, &run.area, tile, &shares.tiles[index], posts_of(&seeds));
+    let mut refinement = tile_refinement(run.job, &run.area, tile, &shares.tiles[index], posts_of(&seeds));
+    let task = &mut refinement.task;
     let own = outgoing(run, &tins[index].tin);
     task.kept = posts_of(&own);
     task.kept.retain(|post| !task.inherited.contains(post));
@@ -227,7 +228,7 @@ fn refine_frozen(run: &Run, shares: &Shares, tins: &[Published], tile: TileId) -
         *points = points.saturating_sub(selected);
     }
     seeds.extend(own);
-    refine_task(run, &task, &seeds)
+    refine_tile(run, &refinement, &seeds)
 }
 
 /// Runs `tile` and every higher-ranked tile that a changed border reaches, in rank order.

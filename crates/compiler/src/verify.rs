@@ -6,7 +6,7 @@ use std::sync::atomic::AtomicBool;
 
 use database::{Folder, Manifest, ManifestState, ReportResidual, TileState};
 use fidelity::Residuals;
-use job::{Count, DemSource, Edges, Job, NamedFile};
+use job::{Count, DemSource, Edges, Job, SourceEntry, SourceFile, SourceSaid};
 use limits::{polygons_of, triangles_of};
 use schedule::Workers;
 use terrain::{LoadModule, ModuleId, Side, TileId};
@@ -92,7 +92,7 @@ fn listed(manifest: &Manifest) -> usize {
 }
 
 /// The job a database was built from, as it says itself.
-fn job_of(manifest: &Manifest, folder: &Path) -> Result<(Job, GamingArea), CompileError> {
+pub(crate) fn job_of(manifest: &Manifest, folder: &Path) -> Result<(Job, GamingArea), CompileError> {
     let job = Job::from_text(&manifest.job, folder).map_err(|error| CompileError::Impossible {
         key: "database.json: job".into(),
         found: error.to_string(),
@@ -104,7 +104,7 @@ fn job_of(manifest: &Manifest, folder: &Path) -> Result<(Job, GamingArea), Compi
 }
 
 /// All load modules by place, checked one by one as they are decoded.
-fn read_modules(folder: &Folder, area: &GamingArea) -> Result<BTreeMap<ModuleId, LoadModule>, CompileError> {
+pub(crate) fn read_modules(folder: &Folder, area: &GamingArea) -> Result<BTreeMap<ModuleId, LoadModule>, CompileError> {
     let mut all = BTreeMap::new();
     for &tile in &area.tiles {
         let (_, modules) = folder.read_modules(tile)?;
@@ -207,8 +207,9 @@ fn recompute(
     problems: &mut Vec<String>,
 ) -> Result<Residuals, CompileError> {
     let written = dem.display().to_string();
-    let files = vec![NamedFile { written: written.clone(), path: dem.into() }];
-    job.dem.source = DemSource::Files { written: vec![written], files };
+    let said = SourceSaid::default();
+    let files = vec![SourceFile { written: written.clone(), path: dem.into(), said: said.clone() }];
+    job.dem.source = DemSource::Files { written: vec![SourceEntry { name: written, said }], files };
     job.importance.areas.clear();
     let ground = Ground::open(&job, area, &Workers::new(1), &AtomicBool::new(false))?;
     let mut all = Residuals::default();

@@ -3,6 +3,8 @@
 //! Each post of the area is owned by one load module and there by one triangle (south and west lines
 //! inside; the far lines only on the area's northern and eastern border), so sums over load modules are sums
 //! over the area. Voids are in no figure. Everything is whole quanta of 1/128 m until it is reported.
+//!
+//! And what matters to a tank: [`line_of_sight`] and [`slope`], of the load modules of an area or of a plain TIN.
 
 mod tally;
 pub use tally::{Residuals, Tally};
@@ -10,3 +12,15 @@ mod measure;
 pub use measure::{Ground, measure, residuals};
 mod source;
 pub use source::{SourcePosts, residuals_at_source};
+mod cells;
+mod triangles;
+pub use triangles::Triangles;
+mod draw;
+mod samples;
+mod sight;
+pub use sight::{EYE_M, LineOfSight, RANGE_M, line_of_sight};
+mod slope;
+pub use slope::{SlopeDifference, slope};
+
+#[cfg(test)]
+mod scene;

@@ -28,6 +28,18 @@ pub fn write_whole(
     Ok(())
 }
 
+/// Writes a text file where there is none yet.
+///
+/// # Errors
+/// When there is one, or it cannot be written.
+pub fn write_new(path: &Path, text: &str) -> Result<(), Failure> {
+    if path.exists() {
+        let message = format!("{}: found a file, expected a name that is free", path.display());
+        return Err(Failure::new(message, "give another name; nothing that is there is ever overwritten"));
+    }
+    write_whole(path, |out| out.write_all(text.as_bytes()))
+}
+
 /// The folder a file is to appear in.
 fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))

@@ -20,6 +20,7 @@ mod events;
 mod failure;
 mod files;
 mod lines;
+mod measures;
 mod progress;
 mod run;
 mod signals;

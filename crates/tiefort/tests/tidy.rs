@@ -22,14 +22,14 @@ const LAYERS: [&[&str]; 7] = [
     &["terrain", "load-module-reader"],
     &["geometry"],
     &["limits", "mesh"],
-    &["mask", "tiling", "tin", "methods", "load-modules", "fidelity", "sample-terrain"],
+    &["mask", "tiling", "tin", "optimiser", "methods", "load-modules", "fidelity", "sample-terrain"],
     &["job", "schedule", "source-files", "database"],
     &["compiler", "views"],
     &["tiefort"],
 ];
 
 /// Who uses whom. A new arrow is an event: a commit of its own, with `ARCHITECTURE.md` changed in it.
-const ARROWS: [(&str, &[&str]); 18] = [
+const ARROWS: [(&str, &[&str]); 19] = [
     ("terrain", &[]),
     ("load-module-reader", &[]),
     ("geometry", &["terrain"]),
@@ -38,6 +38,7 @@ const ARROWS: [(&str, &[&str]); 18] = [
     ("mask", &["terrain"]),
     ("tiling", &["terrain", "limits"]),
     ("tin", &["terrain", "geometry", "mesh", "limits"]),
+    ("optimiser", &["terrain", "geometry", "limits"]),
     ("load-modules", &["terrain", "geometry", "mesh", "limits"]),
     ("fidelity", &["terrain", "geometry"]),
     ("sample-terrain", &["terrain"]),
@@ -54,6 +55,7 @@ const ARROWS: [(&str, &[&str]); 18] = [
             "mask",
             "tiling",
             "tin",
+            "optimiser",
             "load-modules",
             "fidelity",
             "sample-terrain",

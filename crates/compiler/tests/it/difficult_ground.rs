@@ -1,7 +1,7 @@
 //! Ground that is flat, has holes, is excluded, or has fewer posts than points are asked for.
 
 use compiler::{TinMethod, TinRequest};
-use job::ErrorKey;
+use job::{ErrorKey, Optimising};
 use terrain::{Dem, Post, PostRect, StopReason};
 
 use crate::modes::write_polygon;
@@ -106,11 +106,13 @@ fn a_mesh_of_more_points_than_posts_is_every_post() {
     let path = folder.path().join("dem.tif");
     write_dem(&path, &dem);
     for tiles in [(1, 1), (2, 3)] {
-        for method in [TinMethod::Greedy { key: ErrorKey::Max }, TinMethod::Paper, TinMethod::Optimised] {
+        let optimised = TinMethod::Optimised(Optimising::default());
+        for method in [TinMethod::Greedy { key: ErrorKey::Max }, TinMethod::Paper, optimised] {
             let request = TinRequest {
                 dem: path.clone(),
                 method,
                 points: Some(10_000),
+                triangles: None,
                 max_residual_m: None,
                 rms_m: None,
                 tiles,
@@ -222,9 +224,16 @@ fn voids_of_a_mesh_are_no_vertices_and_in_no_statistic() {
     write_dem(&path, &holed);
     for tiles in [(1, 1), (2, 3)] {
         let method = TinMethod::Greedy { key: ErrorKey::Sse };
-        let (points, workers) = (Some(400), 2);
-        let request =
-            TinRequest { dem: path.clone(), method, points, max_residual_m: None, rms_m: None, tiles, workers };
+        let request = TinRequest {
+            dem: path.clone(),
+            method,
+            points: Some(400),
+            triangles: None,
+            max_residual_m: None,
+            rms_m: None,
+            tiles,
+            workers: 2,
+        };
         let mesh = compiler::tin(&request, &false.into(), &mut Silent).unwrap();
         mesh.tin.check().unwrap();
         assert_eq!(mesh.points, mesh.tin.vertices.len());

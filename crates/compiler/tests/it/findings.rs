@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use compiler::Built;
 use database::{ReportBreach, ReportPlace};
 use job::{Count, Job};
-use terrain::{LatticePoint, Post};
+use terrain::{LATTICE_PER_POST, LatticePoint};
 
 use crate::product::{Edges, Product};
 use crate::scene::SIDE_CELLS;
@@ -126,7 +126,7 @@ pub fn check_report(job: &Job, product: &Product, built: &Built, sums: &Sums) {
 fn check_points(job: &Job, product: &Product, built: &Built) {
     let points = &built.report.points;
     let folder = built.database.folder();
-    let left = posts(product);
+    let left = lattice_points(product);
     // Where enforcing took out a point of a module line, a triangle may be cut in the very same place: such a post
     // looks as if the point were still there.
     let on_line = |at: LatticePoint| at.row % (8 * SIDE_CELLS) == 0 || at.col % (8 * SIDE_CELLS) == 0;
@@ -134,7 +134,7 @@ fn check_points(job: &Job, product: &Product, built: &Built) {
     for record in &folder.manifest().unwrap().tiles {
         let (_, tile) = folder.read_tile(record.tile()).unwrap();
         tile.tin.check().unwrap();
-        let is_left = |at: &LatticePoint| left.contains(&at.post().unwrap());
+        let is_left = |at: &LatticePoint| left.contains(at);
         let vertices: Vec<_> = tile.tin.vertices.iter().map(|vertex| vertex.at).collect();
         all.extend(vertices.iter().copied().filter(is_left));
         selected.extend(vertices[tile.initial_count as usize..].iter().copied().filter(is_left));
@@ -152,15 +152,16 @@ fn check_points(job: &Job, product: &Product, built: &Built) {
     }
 }
 
-/// The posts on which load modules have vertices.
-fn posts(product: &Product) -> BTreeSet<Post> {
-    let step = product.side / i64::from(SIDE_CELLS);
-    let mut posts = BTreeSet::new();
+/// The lattice points on which load modules have vertices.
+fn lattice_points(product: &Product) -> BTreeSet<LatticePoint> {
+    let side = SIDE_CELLS * LATTICE_PER_POST;
+    let step = product.side / i64::from(side);
+    let mut points = BTreeSet::new();
     for (&(row, col), module) in &product.modules {
-        let origin = Post::new(row as i32 * SIDE_CELLS, col as i32 * SIDE_CELLS);
-        let on_posts = module.vertices.iter().map(|v| (i64::from(v.y), i64::from(v.x)));
-        let on_posts = on_posts.filter(|(y, x)| y % step == 0 && x % step == 0);
-        posts.extend(on_posts.map(|(y, x)| Post::new(origin.row + (y / step) as i32, origin.col + (x / step) as i32)));
+        let on_lattice = module.vertices.iter().map(|v| (i64::from(v.y), i64::from(v.x)));
+        let on_lattice = on_lattice.filter(|(y, x)| y % step == 0 && x % step == 0);
+        let (south, west) = (row as i32 * side, col as i32 * side);
+        points.extend(on_lattice.map(|(y, x)| LatticePoint::new(south + (y / step) as i32, west + (x / step) as i32)));
     }
-    posts
+    points
 }

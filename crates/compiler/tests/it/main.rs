@@ -15,6 +15,7 @@ mod bytes;
 mod damage;
 mod difficult_ground;
 mod golden;
+mod measures;
 mod one_tile_again;
 mod random_jobs;
 mod real_ground;

@@ -60,7 +60,7 @@ fn build(job: &Job, folder: &Path, workers: usize) -> (Built, Product) {
     (built, product)
 }
 
-/// ALGORITHMS 5.6 gives 1.643 m; its figures hold within a fifth.
+/// ALGORITHMS 5.6 gives 0.82 m optimised and 1.643 m selected only; its figures hold within a fifth.
 #[track_caller]
 fn check_band(found: f64, expected: f64) {
     let band = 0.8 * expected..=1.2 * expected;
@@ -75,7 +75,7 @@ fn the_desert_is_sound_as_true_as_specified_and_the_same_for_one_worker_and_two(
     let job = job("desert.toml", &[]);
     let (two, product) = build(&job, &folder.path().join("two"), 2);
     check_report(&job, &product, &two, &sums_of_product(&product, &dem));
-    check_band(two.report.residual.rms_m, 1.643);
+    check_band(two.report.residual.rms_m, 0.82);
     drop(two);
     drop(build(&job, &folder.path().join("one"), 1));
     let trees = ["one", "two"].map(|name| {
@@ -87,7 +87,7 @@ fn the_desert_is_sound_as_true_as_specified_and_the_same_for_one_worker_and_two(
     let verdict = compiler::verify(&folder.path().join("one"), Some(&path)).unwrap();
     assert!(verdict.problems.is_empty(), "{:?}", verdict.problems);
     assert_eq!((verdict.checked_modules, verdict.checked_files), (51 * 51, 3 * 36 + 1));
-    check_band(verdict.residual.unwrap().rms_m, 1.643);
+    check_band(verdict.residual.unwrap().rms_m, 0.82);
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Every mode gives a sound product: no cracks, no T-junctions, exact areas, both identities, limits, true numbers.
 
-use job::Edges as JobEdges;
-use terrain::Dem;
+use job::{Edges as JobEdges, HeightFit, Job, Lattice, Method, Optimising};
+use terrain::{Dem, Post};
 
 use crate::findings::{check_limits, check_report};
 use crate::modes;
@@ -21,25 +21,43 @@ pub fn check(scene: &Scene, dem: &Dem) {
     product.check(edges);
     check_limits(&scene.job, &product, &built, edges);
     check_report(&scene.job, &product, &built, &sums_of_product(&product, dem));
-    check_heights(&product, dem, edges);
+    check_heights(&scene.job, &product, dem, edges);
     drop(built);
     scene.verify("area");
 }
 
-/// Load-module corners stand at DEM height, and with constrained edges every vertex does, on a post.
+/// Where vertices may stand: corners of load modules and all that is not optimised on posts, the rest on eighths. At
+/// DEM height stands the outer border, and all that is not fitted.
 #[track_caller]
-fn check_heights(product: &Product, dem: &Dem, edges: Edges) {
+fn check_heights(job: &Job, product: &Product, dem: &Dem, edges: Edges) {
+    let (is_free, is_fitted) = match job.tin.method {
+        Method::Optimised(Optimising { height_fit, lattice, .. }) => {
+            (lattice == Lattice::Eighth, height_fit != HeightFit::Off)
+        }
+        Method::Paper { .. } | Method::Greedy => (false, false),
+    };
     let step = product.side / i64::from(SIDE_CELLS);
     for (&(row, col), module) in &product.modules {
         for vertex in &module.vertices {
             let (x, y) = (i64::from(vertex.x), i64::from(vertex.y));
-            let is_corner = x % product.side == 0 && y % product.side == 0;
-            if edges == Edges::Constrained || is_corner {
-                assert_eq!((x % step, y % step), (0, 0), "load module {row},{col}: a vertex between posts");
-                let post = terrain::Post::new(
-                    row as i32 * SIDE_CELLS + (y / step) as i32,
-                    col as i32 * SIDE_CELLS + (x / step) as i32,
-                );
+            let on_line = [x % product.side == 0, y % product.side == 0];
+            let is_corner = on_line == [true; 2];
+            if edges == Edges::Clipped && !is_corner {
+                continue;
+            }
+            let step = if is_free && !is_corner { step / 8 } else { step };
+            assert_eq!((x % step, y % step), (0, 0), "load module {row},{col}: a vertex off its lattice");
+            let post = Post::new(
+                row as i32 * SIDE_CELLS + (y * i64::from(SIDE_CELLS) / product.side) as i32,
+                col as i32 * SIDE_CELLS + (x * i64::from(SIDE_CELLS) / product.side) as i32,
+            );
+            let area = dem.rect();
+            let is_on_post =
+                (x * i64::from(SIDE_CELLS)) % product.side == 0 && (y * i64::from(SIDE_CELLS)) % product.side == 0;
+            let is_outer = is_on_post
+                && on_line != [false; 2]
+                && (post.row == area.south || post.row == area.north || post.col == area.west || post.col == area.east);
+            if (!is_fitted && is_on_post) || is_outer {
                 assert_eq!(vertex.z, dem.height(post), "load module {row},{col}: height at {post}");
             }
         }

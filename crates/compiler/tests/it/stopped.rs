@@ -2,7 +2,7 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use compiler::{Event, Progress, Stage};
+use compiler::{CompileError, Event, Progress, Sights, Stage};
 
 use crate::modes;
 use crate::scene::{Scene, Words, assert_same, sample_dem, tile};
@@ -37,6 +37,8 @@ fn build_and_stop(scene: &Scene, stage: Stage, tiles: usize, workers: usize) {
     assert!(!status.is_complete() && !status.locked);
     let verdict = compiler::verify(&scene.path("area"), None).unwrap();
     assert!(verdict.problems.iter().any(|problem| problem.contains("incomplete")), "{:?}", verdict.problems);
+    let measured = compiler::fidelity(&scene.path("area"), None, Sights::USUAL);
+    assert!(matches!(measured, Err(CompileError::Unfinished { .. })), "{measured:?}");
 }
 
 #[test]

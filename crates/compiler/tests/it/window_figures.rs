@@ -1,8 +1,9 @@
-//! The figures of ALGORITHMS 2.12 and 4.4 on the 460 x 376 window of the real desert, each within a fifth.
+//! The figures of ALGORITHMS 2.12, 4.4 and 6.10 on the 460 x 376 window of the real desert, residuals within a fifth.
 
 use compiler::{TinMethod, TinRequest};
+use fidelity::Triangles;
 use job::ErrorKey;
-use terrain::{Dem, Importance, Post, PostRect, SeamSides, THOUSANDTHS, TileId, Tin};
+use terrain::{Dem, Importance, Metres, Post, PostRect, SeamSides, THOUSANDTHS, TileId, Tin};
 use tin::{Frame, LastBatch, Proximity, Rule, Stop, TileTask};
 
 use crate::real_ground::{data, read_dem};
@@ -90,6 +91,27 @@ fn squares_are_nearer_to_the_ground_than_the_worst_post() {
     assert!((0.05..0.25).contains(&gain), "squares are {gain} better");
 }
 
+/// What is seen and how steep it is: agreement, share visible on the TIN, RMS difference of slopes in degrees.
+#[track_caller]
+fn check_measures(dem: &Dem, rule: Rule, [agreement, visible, slope]: [f64; 3]) {
+    let triangles = Triangles::of_tin(&refined(dem, rule, 5000));
+    let sight = fidelity::line_of_sight(dem, &triangles, Metres(25.0), 20_000, 1);
+    let steepness = fidelity::slope(dem, &triangles, Metres(25.0));
+    assert_eq!((sight.pairs(), steepness.posts), (20_000, 458 * 374));
+    let expected = [agreement, visible, 0.283, slope];
+    let found = [sight.agreement(), sight.visible_share_tin(), sight.visible_share_dem(), steepness.rms_degrees];
+    // Two half widths of 20,000 pairs for shares, a twentieth for slopes.
+    let within = [0.008, 0.012, 0.012, slope / 20.0];
+    let is_near = (0..4).all(|i| (found[i] - expected[i]).abs() <= within[i]);
+    assert!(is_near, "found {found:?}, expected {expected:?} within {within:?}");
+}
+
+#[test]
+fn the_worst_post_shows_what_the_desert_hides_as_measured() {
+    let Some(dem) = window() else { return };
+    check_measures(&dem, Rule::WorstFirst, [0.919, 0.311, 2.41]);
+}
+
 #[test]
 fn a_mesh_from_a_raster_is_that_of_the_method_and_tiles_cost_little() {
     let Some(dem) = window() else { return };
@@ -97,9 +119,16 @@ fn a_mesh_from_a_raster_is_that_of_the_method_and_tiles_cost_little() {
     let path = folder.path().join("window.tif");
     write_dem(&path, &dem);
     let mesh = |method, tiles, workers| {
-        let points = Some(5000);
-        let request =
-            TinRequest { dem: path.clone(), method, points, max_residual_m: None, rms_m: None, tiles, workers };
+        let request = TinRequest {
+            dem: path.clone(),
+            method,
+            points: Some(5000),
+            triangles: None,
+            max_residual_m: None,
+            rms_m: None,
+            tiles,
+            workers,
+        };
         let mesh = compiler::tin(&request, &false.into(), &mut Silent).unwrap();
         mesh.tin.check().unwrap();
         let sums = sums_of_tin(&mesh.tin, &dem);

@@ -33,7 +33,7 @@ pub struct Arguments {
 
 /// Builds.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
-    let job = Job::load(&arguments.job)?;
+    let job = Job::load_with(&arguments.job, &compiler::find_area)?;
     let run = Run::announce(&job, &arguments.run, "building")?;
     run.finish(|listener| {
         let built = compiler::build(&job, run.folder(), &run.options(arguments.fresh), listener)?;

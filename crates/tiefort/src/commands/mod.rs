@@ -1,6 +1,8 @@
 //! The commands, one file each: its arguments, its help, and what it calls.
 
 mod build;
+mod fidelity;
+mod init;
 mod plan;
 mod report;
 mod sample;
@@ -16,6 +18,8 @@ use crate::failure::{Failure, Outcome};
 /// What to do.
 #[derive(Subcommand)]
 pub enum Command {
+    /// Write a job for the rasters you have
+    Init(init::Arguments),
     /// Compile a whole gaming area; what is published and fresh is kept
     Build(build::Arguments),
     /// Re-run one tile
@@ -28,6 +32,8 @@ pub enum Command {
     Report(report::Arguments),
     /// Check every file and every load module of a database
     Verify(verify::Arguments),
+    /// Measure how true a database is: residuals, line of sight, slope
+    Fidelity(fidelity::Arguments),
     /// Write the built-in basin-and-range terrain as a GeoTIFF
     Sample(sample::Arguments),
     /// Make just a mesh from a raster
@@ -41,12 +47,14 @@ impl Command {
     /// Why it could not be done, for a person to read.
     pub fn run(self) -> Result<Outcome, Failure> {
         match self {
+            Command::Init(arguments) => init::run(&arguments),
             Command::Build(arguments) => build::run(&arguments),
             Command::Tile(arguments) => tile::run(&arguments),
             Command::Plan(arguments) => plan::run(&arguments),
             Command::Status(arguments) => status::run(&arguments),
             Command::Report(arguments) => report::run(&arguments),
             Command::Verify(arguments) => verify::run(&arguments),
+            Command::Fidelity(arguments) => fidelity::run(&arguments),
             Command::Sample(arguments) => sample::run(&arguments),
             Command::Tin(arguments) => tin::run(&arguments),
         }

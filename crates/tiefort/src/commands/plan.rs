@@ -52,7 +52,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         let what = format!("--emit {}", name.get_name());
         return Err(Failure::not_yet(&what, "use --emit json, or build on one machine: `tiefort build`"));
     }
-    let job = Job::load(&arguments.job)?;
+    let job = Job::load_with(&arguments.job, &compiler::find_area)?;
     let plan = compiler::plan(&job)?;
     let text = match arguments.emit {
         Some(_) => json_text(&job, &plan, arguments.simulate),
@@ -65,6 +65,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
 fn plan_text(job: &Job, plan: &Plan, simulated: Option<u32>) -> String {
     let mut text = format!("Settings of {}\n{}\n", job.path.display(), run::settings_text(job));
     text += &forecast_table(job, plan).text(0);
+    text += &format!("\n{}", corner_table(job).text(0));
     if let Some(workers) = simulated {
         let played = compiler::simulate(plan, workers as usize);
         let (seconds, busy, chain) = (played.makespan, 100.0 * played.busy, played.critical_path);
@@ -84,6 +85,22 @@ fn forecast_table(job: &Job, plan: &Plan) -> Table {
     table.row(["Memory", &files::bytes_text(forecast.memory_bytes), "about, at its peak"]);
     table.row(["Disk", &files::bytes_text(forecast.disk_bytes), "about"]);
     table.row(["Time", &format!("{:.1} s", forecast.seconds), "about"]);
+    table
+}
+
+fn corner_table(job: &Job) -> Table {
+    let mut table = Table::new(&[Align::Left, Align::Right, Align::Right, Align::Right, Align::Right]);
+    let system = format!("EPSG:{}", job.area.epsg);
+    table.row(["Corners", &format!("{system} east"), "north", "WGS 84 latitude", "longitude"]);
+    for corner in compiler::corners(job) {
+        let [east_m, north_m] = corner.place_m.map(|metres| format!("{metres:.2}"));
+        let degrees = corner.lon_lat.map(|[longitude, latitude]| [latitude, longitude]);
+        let [latitude, longitude] = match degrees {
+            Some(degrees) => degrees.map(|degrees| format!("{degrees:.7}")),
+            None => ["unknown".to_owned(), "unknown".to_owned()],
+        };
+        table.row([corner.name.to_owned(), east_m, north_m, latitude, longitude]);
+    }
     table
 }
 
@@ -118,11 +135,16 @@ fn json_text(job: &Job, plan: &Plan, simulated: Option<u32>) -> String {
     });
     let tiles: Vec<Value> = by_rank(plan).into_iter().map(tile_json).collect();
     let forecast = &plan.forecast;
+    let corners: Vec<Value> = compiler::corners(job)
+        .iter()
+        .map(|corner| json!({ "name": corner.name, "place_m": corner.place_m, "lon_lat": corner.lon_lat }))
+        .collect();
     let value = json!({
         "area": job.area.name,
         "budget_triangles": plan.budget,
         "start_triangles": plan.start,
         "workers_useful": plan.workers_useful,
+        "corners": corners,
         "forecast": { "memory_bytes": forecast.memory_bytes, "seconds": forecast.seconds,
                       "disk_bytes": forecast.disk_bytes },
         "simulation": played,

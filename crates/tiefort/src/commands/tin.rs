@@ -3,8 +3,9 @@
 use std::path::PathBuf;
 
 use clap::{ArgGroup, Args, ValueEnum};
-use compiler::{Mesh, TinMethod, TinRequest};
-use serde_json::json;
+use compiler::{Measures, Mesh, Sights, TinMethod, TinRequest};
+use job::Optimising;
+use serde_json::{Value, json};
 use terrain::StopReason;
 use views::{Coordinates, MeshPlace, grouped};
 
@@ -12,21 +13,26 @@ use crate::arguments::{Workers, positive, rows_by_columns};
 use crate::failure::{Failure, Outcome};
 use crate::progress::{Listener, Show};
 use crate::signals::Signals;
-use crate::{events, files, terminal};
+use crate::{events, files, measures, terminal};
 
 const AFTER_HELP: &str = "\
 Examples:
   tiefort tin dem.tif --points 76500 --out mesh.ply
   tiefort tin dem.tif --max-residual 2 --method greedy --key max --out mesh.obj
+  tiefort tin dem.tif --points 5000 --measure --out mesh.ply      line of sight and slope, too
   tiefort tin dem.tif --rms 1.5 --tiles 6x6 --workers 8 --coordinates map --out mesh.ply
 
-The first of --points, --max-residual and --rms that is reached ends it. Coordinates are metres from the south-west
-post (Blender, MeshLab); with --coordinates map they are eastings and northings in 64 bits (QGIS).";
+The first of --points (or --triangles), --max-residual and --rms that is reached ends it.
+Coordinates are metres from the south-west post (Blender, MeshLab); with --coordinates map they are
+eastings and northings in 64 bits (QGIS).";
+
+/// Arguments that say when to stop: at least one is given.
+const ENDS: [&str; 4] = ["points", "triangles", "max_residual", "rms"];
 
 /// Arguments of `tin`.
 #[derive(Args)]
 #[command(after_help = AFTER_HELP)]
-#[command(group = ArgGroup::new("end").args(["points", "max_residual", "rms"]).required(true).multiple(true))]
+#[command(group = ArgGroup::new("end").args(ENDS).required(true).multiple(true))]
 pub struct Arguments {
     /// The raster of heights
     #[arg(value_name = "DEM")]
@@ -34,6 +40,9 @@ pub struct Arguments {
     /// Vertices of the mesh
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(4..))]
     points: Option<u32>,
+    /// Most triangles of the mesh, instead of --points; for --method optimised only
+    #[arg(long, value_name = "N", conflicts_with = "points", value_parser = clap::value_parser!(u32).range(2..))]
+    triangles: Option<u32>,
     /// Largest residual in metres
     #[arg(long, value_name = "M", value_parser = positive)]
     max_residual: Option<f64>,
@@ -49,9 +58,21 @@ pub struct Arguments {
     /// What makes a post worth a point; for --method greedy only
     #[arg(long, value_enum)]
     key: Option<Key>,
+    /// How much work is done for a lower residual; for --method optimised only [default: normal]
+    #[arg(long, value_enum)]
+    effort: Option<Effort>,
+    /// Which vertices leave the height of the raster; for --method optimised only [default: l2_keep_crests]
+    #[arg(long, value_name = "FIT", value_enum)]
+    height_fit: Option<HeightFit>,
+    /// Where vertices stand; for --method optimised only [default: eighth]
+    #[arg(long, value_enum)]
+    lattice: Option<Lattice>,
     /// What coordinates are counted from
     #[arg(long, value_enum, default_value_t = Frame::Local)]
     coordinates: Frame,
+    /// Measure line of sight and slope of the mesh against the raster, as `tiefort fidelity` does
+    #[arg(long, conflicts_with = "quiet")]
+    measure: bool,
     #[command(flatten)]
     workers: Workers,
     /// Print errors only
@@ -81,6 +102,36 @@ enum Key {
     Max,
     /// The squared residuals in its triangle
     Sse,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Effort {
+    /// Chosen posts are moved and their edges flipped
+    Fast,
+    /// More points are chosen than asked for, then thinned and exchanged
+    Normal,
+    /// More points still, grown and thinned in turns
+    Best,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum HeightFit {
+    /// All: each stands where squared residuals are least
+    #[value(name = "l2")]
+    Squares,
+    /// All but those on crests
+    #[value(name = "l2_keep_crests")]
+    SquaresKeepCrests,
+    /// None
+    Off,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Lattice {
+    /// On eighths of a post
+    Eighth,
+    /// On posts
+    Post,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -114,17 +165,35 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let (_, seconds) = listener.finish();
     let mesh = meshed.map_err(|error| Failure::of_compiler(&error, signals.exit_code()))?;
     write(&mesh, kind, arguments)?;
+    let measured = arguments.measure.then(|| compiler::measure(&mesh, Sights::USUAL));
     match show {
         Show::Nothing => {}
-        Show::Json => events::print_line(&json!({
-            "event": "summary",
-            "points": mesh.points,
-            "triangles": mesh.tin.triangles.len(),
-            "residual": mesh.residual,
-        })),
-        Show::Progress => terminal::tell(&summary(&mesh, seconds)),
+        Show::Json => events::print_line(&summary_json(&mesh, measured.as_ref())),
+        Show::Progress => terminal::tell(&(summary(&mesh, seconds) + &measured_text(measured.as_ref()))),
     }
     Ok(Outcome::Sound)
+}
+
+fn summary_json(mesh: &Mesh, measured: Option<&Measures>) -> Value {
+    let mut summary = json!({
+        "event": "summary",
+        "points": mesh.points,
+        "triangles": mesh.tin.triangles.len(),
+        "residual": mesh.residual,
+    });
+    if let Some(measured) = measured {
+        summary["line_of_sight"] = measures::sight_json(&measured.line_of_sight);
+        summary["slope"] = measures::slope_json(&measured.slope);
+    }
+    summary
+}
+
+fn measured_text(measured: Option<&Measures>) -> String {
+    let mut table = measures::table();
+    if let Some(measured) = measured {
+        measures::add_rows(&mut table, measured);
+    }
+    table.text(0)
 }
 
 fn kind(arguments: &Arguments) -> Result<Kind, Failure> {
@@ -143,19 +212,11 @@ fn kind(arguments: &Arguments) -> Result<Kind, Failure> {
 }
 
 fn request(arguments: &Arguments) -> Result<TinRequest, Failure> {
-    let method = match (arguments.method, arguments.key) {
-        (Method::Greedy, key) => TinMethod::Greedy { key: job_key(key.unwrap_or(Key::Max)) },
-        (Method::Optimised, None) => TinMethod::Optimised,
-        (Method::Paper, None) => TinMethod::Paper,
-        (_, Some(_)) => {
-            let message = "found --key with another method than greedy, expected the method's own";
-            return Err(Failure::new(message, "leave --key out, or add --method greedy"));
-        }
-    };
     Ok(TinRequest {
         dem: arguments.dem.clone(),
-        method,
+        method: method(arguments)?,
         points: arguments.points.map(|points| points as usize),
+        triangles: arguments.triangles.map(|triangles| triangles as usize),
         max_residual_m: arguments.max_residual,
         rms_m: arguments.rms,
         tiles: arguments.tiles,
@@ -163,10 +224,64 @@ fn request(arguments: &Arguments) -> Result<TinRequest, Failure> {
     })
 }
 
+fn method(arguments: &Arguments) -> Result<TinMethod, Failure> {
+    if arguments.method != Method::Optimised {
+        refuse_flags_of_optimised(arguments)?;
+    }
+    match (arguments.method, arguments.key) {
+        (Method::Greedy, key) => Ok(TinMethod::Greedy { key: job_key(key.unwrap_or(Key::Max)) }),
+        (Method::Optimised, None) => Ok(TinMethod::Optimised(optimising(arguments))),
+        (Method::Paper, None) => Ok(TinMethod::Paper),
+        (_, Some(_)) => {
+            let message = "found --key with another method than greedy, expected the method's own";
+            Err(Failure::new(message, "leave --key out, or add --method greedy"))
+        }
+    }
+}
+
+fn refuse_flags_of_optimised(arguments: &Arguments) -> Result<(), Failure> {
+    if arguments.triangles.is_some() {
+        let message = "found --triangles with another method than optimised, expected --points";
+        return Err(Failure::new(message, "those methods count points; a mesh has about twice as many triangles"));
+    }
+    let flags = [
+        ("--effort", arguments.effort.is_some()),
+        ("--height-fit", arguments.height_fit.is_some()),
+        ("--lattice", arguments.lattice.is_some()),
+    ];
+    let Some((flag, _)) = flags.into_iter().find(|&(_, given)| given) else { return Ok(()) };
+    let message = format!("found {flag} with another method than optimised, expected the method's own");
+    Err(Failure::new(message, format!("leave {flag} out, or add --method optimised")))
+}
+
 fn job_key(key: Key) -> job::ErrorKey {
     match key {
         Key::Max => job::ErrorKey::Max,
         Key::Sse => job::ErrorKey::Sse,
+    }
+}
+
+/// The flags given, over a job's defaults.
+fn optimising(arguments: &Arguments) -> Optimising {
+    let usual = Optimising::default();
+    let effort = |effort| match effort {
+        Effort::Fast => job::Effort::Fast,
+        Effort::Normal => job::Effort::Normal,
+        Effort::Best => job::Effort::Best,
+    };
+    let height_fit = |height_fit| match height_fit {
+        HeightFit::Squares => job::HeightFit::Squares,
+        HeightFit::SquaresKeepCrests => job::HeightFit::SquaresKeepCrests,
+        HeightFit::Off => job::HeightFit::Off,
+    };
+    let lattice = |lattice| match lattice {
+        Lattice::Eighth => job::Lattice::Eighth,
+        Lattice::Post => job::Lattice::Post,
+    };
+    Optimising {
+        effort: arguments.effort.map_or(usual.effort, effort),
+        height_fit: arguments.height_fit.map_or(usual.height_fit, height_fit),
+        lattice: arguments.lattice.map_or(usual.lattice, lattice),
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::scene::Scene;
 
-const COMMANDS: [&str; 8] = ["build", "tile", "plan", "status", "report", "verify", "sample", "tin"];
+const COMMANDS: [&str; 9] = ["build", "tile", "plan", "status", "report", "verify", "fidelity", "sample", "tin"];
 
 #[test]
 fn the_help_of_every_command_has_an_example_of_it() {
@@ -43,12 +43,20 @@ fn wrong_values_of_arguments_end_with_2_and_say_what_was_expected() {
         (&["build", "job.toml", "--workers", "many"], "invalid digit"),
         (&["tile", "job.toml", "2"], "expected ROW,COL"),
         (&["tile", "job.toml", "-1,0"], "expected ROW,COL"),
-        (&["tin", "a.tif", "--out", "m.ply"], "--points"),
+        (&["tin", "a.tif", "--out", "m.ply"], "--points <N>|--triangles <N>|--max-residual <M>|--rms <R>"),
+        (&["tin", "a.tif", "--triangles", "1", "--out", "m.ply"], "2.."),
+        (&["tin", "a.tif", "--triangles", "9", "--points", "9", "--out", "m.ply"], "cannot be used with"),
+        (&["tin", "a.tif", "--points", "9", "--effort", "high", "--out", "m.ply"], "fast, normal, best"),
+        (&["tin", "a.tif", "--points", "9", "--height-fit", "l3", "--out", "m.ply"], "l2, l2_keep_crests, off"),
+        (&["tin", "a.tif", "--points", "9", "--lattice", "8", "--out", "m.ply"], "eighth, post"),
         (&["tin", "a.tif", "--rms", "nan", "--out", "m.ply"], "above 0"),
         (&["tin", "a.tif", "--points", "9", "--tiles", "6", "--out", "m.ply"], "expected ROWSxCOLUMNS"),
         (&["sample", "--spacing", "25.27", "--out", "a.tif"], "multiple of 1/16 m"),
         (&["sample", "--posts", "1", "--out", "a.tif"], "2..="),
         (&["report", "x.tdb", "--format", "pdf"], "html"),
+        (&["fidelity", "x.tdb", "--pairs", "0"], "1..="),
+        (&["fidelity", "x.tdb", "--seed", "x"], "--seed"),
+        (&["tin", "a.tif", "--points", "9", "--measure", "--quiet", "--out", "m.ply"], "--measure"),
     ] {
         let said = scene.run_to(2, arguments);
         assert!(said.stderr.contains(expected), "{arguments:?}: {}", said.stderr);
@@ -72,5 +80,13 @@ fn arguments_that_do_not_fit_together_are_named() {
     scene.refuses(&["tin", "a.tif", "--points", "9", "--out", "m.xyz"], &["m.xyz", "\"xyz\"", "ply"]);
     let key = ["tin", "a.tif", "--points", "9", "--method", "paper", "--key", "max", "--out", "m.ply"];
     scene.refuses(&key, &["--key", "greedy"]);
+    for method in ["paper", "greedy"] {
+        for flag in [["--effort", "fast"], ["--height-fit", "off"], ["--lattice", "post"]] {
+            let given = ["tin", "a.tif", "--points", "9", "--method", method, flag[0], flag[1], "--out", "m.ply"];
+            scene.refuses(&given, &[flag[0], "another method than optimised"]);
+        }
+        let counted = ["tin", "a.tif", "--triangles", "9", "--method", method, "--out", "m.ply"];
+        scene.refuses(&counted, &["--triangles", "expected --points"]);
+    }
     scene.refuses(&["sample", "--posts", "9", "--classes", "a.tif", "--out", "a.tif"], &["a.tif", "two"]);
 }

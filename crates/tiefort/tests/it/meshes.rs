@@ -2,6 +2,8 @@
 
 use std::fs;
 
+use serde_json::Value;
+
 use crate::raster::Raster;
 use crate::scene::Scene;
 
@@ -45,6 +47,39 @@ fn tiles_and_targets_make_a_mesh_too() {
 fn a_mesh_of_a_bad_raster_is_refused() {
     let scene = Scene::new();
     fs::write(scene.path("dem.tif"), "no raster").unwrap();
-    scene.refuses(&["tin", "dem.tif", "--points", "9", "--out", "mesh.ply"], &["dem.tif", "not a TIFF"]);
+    scene.refuses(&["tin", "dem.tif", "--points", "9", "--out", "mesh.ply"], &["dem.tif", "it begins with 6e 6f"]);
     scene.refuses(&["tin", "none.tif", "--points", "9", "--out", "mesh.ply"], &["none.tif"]);
+}
+
+#[test]
+fn a_mesh_is_measured_when_asked_and_more_points_show_more_of_the_truth() {
+    let scene = Scene::new();
+    Raster::sound().write(&scene.path("dem.tif"));
+    let said = scene.run_to(0, &["tin", "dem.tif", "--points", "60", "--measure", "--out", "mesh.ply"]);
+    assert!(said.stdout.is_empty() && said.stderr.contains("Line of sight") && said.stderr.contains("Slope"));
+    let said = scene.run_to(0, &["tin", "dem.tif", "--points", "60", "--out", "mesh.ply"]);
+    assert!(!said.stderr.contains("Line of sight"), "{}", said.stderr);
+    let summary = |points: &str| -> Value {
+        let said = scene.run_to(0, &["tin", "dem.tif", "--points", points, "--measure", "--json", "--out", "mesh.ply"]);
+        serde_json::from_str(said.stdout.lines().last().unwrap()).unwrap()
+    };
+    let (few, many) = (summary("20"), summary("2000"));
+    let figure = |summary: &Value, pointer: &str| summary.pointer(pointer).and_then(Value::as_f64).unwrap();
+    assert!(figure(&few, "/line_of_sight/agreement") < figure(&many, "/line_of_sight/agreement"));
+    assert!(figure(&many, "/slope/rms_degrees") < figure(&few, "/slope/rms_degrees"));
+}
+
+#[test]
+fn no_effort_makes_more_triangles_than_asked_for() {
+    let scene = Scene::new();
+    scene.run_to(0, &["sample", "--posts", "41", "--out", "dem.tif"]);
+    for effort in ["fast", "normal", "best"] {
+        for triangles in ["2", "11", "60"] {
+            let words = ["--triangles", triangles, "--effort", effort, "--out", "mesh.obj", "--quiet"];
+            scene.run_to(0, &[&["tin", "dem.tif"], &words[..]].concat());
+            let obj = std::fs::read_to_string(scene.path("mesh.obj")).unwrap();
+            let found = obj.lines().filter(|line| line.starts_with("f ")).count();
+            assert!(found <= triangles.parse().unwrap(), "{effort}: {found} of {triangles}");
+        }
+    }
 }

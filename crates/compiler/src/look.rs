@@ -1,0 +1,165 @@
+//! A first look at rasters: what they are, and the area, grid and tiles that suit them.
+
+use std::path::{Path, PathBuf};
+
+use source_files::{Crs, DemFile, RasterFrame, Reading, SourceError};
+use terrain::Spacing;
+
+use crate::CompileError;
+use crate::locate::{covered, utm_of};
+
+/// What a raster is.
+#[derive(Clone, Debug)]
+pub struct Seen {
+    /// The file.
+    pub path: PathBuf,
+    /// Its format's name.
+    pub format: &'static str,
+    /// Columns and rows of posts.
+    pub size: (u32, u32),
+    /// Name of its coordinate system.
+    pub crs: String,
+    /// Between posts, in the system's units, east then north.
+    pub spacing: [f64; 2],
+    /// Whether those units are degrees.
+    pub is_geographic: bool,
+    /// Void posts, and the lowest and highest height in metres; `None` for a raster too large to look into at once.
+    pub heights: Option<(usize, Option<(f64, f64)>)>,
+    /// What it says heights are measured from.
+    pub vertical_datum: Option<String>,
+    /// Vertical accuracy that it states, in metres.
+    pub accuracy_m: Option<f64>,
+    /// Damage that does not keep it from being read, and doubts about its datum.
+    pub notes: Vec<String>,
+    /// Whether the system was given to it, because it names none.
+    pub crs_given: bool,
+}
+
+/// An area that suits some rasters.
+#[derive(Clone, Debug)]
+pub struct Suggestion {
+    /// What each raster is, in the order given.
+    pub seen: Vec<Seen>,
+    /// EPSG code of the area's system.
+    pub epsg: u32,
+    /// East and north of the south-west post, in metres.
+    pub origin_m: [f64; 2],
+    /// Width and height in metres.
+    pub size_m: [f64; 2],
+    /// Metres between posts of the working grid.
+    pub spacing_m: f64,
+    /// Rows and columns of tiles.
+    pub tiles: (u32, u32),
+}
+
+/// Sides that every job has unless it says otherwise, in metres.
+const SIDE_M: f64 = 500.0;
+const BORDER_STEP_M: f64 = 125.0;
+/// Posts of a raster up to which it is decoded for a look.
+const LOOK_POSTS_MAX: usize = 1 << 26;
+/// Load modules along a side of a tile, about: the founding paper's.
+const MODULES_A_TILE: f64 = 17.0;
+
+/// Looks at rasters and finds the area that suits them. `given` is the system of those that name none.
+///
+/// # Errors
+/// When one cannot be read, or not even two load modules each way fit inside them.
+pub fn look_at(paths: &[PathBuf], given: Option<&str>) -> Result<Suggestion, CompileError> {
+    let (mut seen, mut frames) = (Vec::new(), Vec::new());
+    for path in paths {
+        let (file, crs_given) = open(path, given)?;
+        frames.push(file.frame().clone());
+        seen.push(look(&file, crs_given)?);
+    }
+    let impossible = |found: String, hint: String| CompileError::Impossible {
+        key: "FILES".into(),
+        found,
+        expected: "rasters that an area can be laid into".into(),
+        hint,
+    };
+    let crs = area_crs(&frames).map_err(|none| impossible(none.found, none.hint))?;
+    let epsg = crs.epsg().expect("systems with a code only are chosen");
+    let spacing = spacing_for(&frames, &crs);
+    let (origin_m, size_m) =
+        covered(&frames, &crs, spacing, SIDE_M).map_err(|none| impossible(none.found, none.hint))?;
+    let modules = size_m.map(|metres| (metres / SIDE_M).round() as u32);
+    if modules.iter().any(|&modules| modules < 2) {
+        let found = format!("room for {} x {} load modules of {SIDE_M} m", modules[1], modules[0]);
+        return Err(impossible(found, "two each way are the least; give more files, or a larger raster".into()));
+    }
+    let tiles = modules.map(|modules| ((f64::from(modules) / MODULES_A_TILE).round() as u32).clamp(1, modules / 2));
+    Ok(Suggestion { seen, epsg, origin_m, size_m, spacing_m: spacing.metres(), tiles: (tiles[1], tiles[0]) })
+}
+
+fn open(path: &Path, given: Option<&str>) -> Result<(DemFile, bool), CompileError> {
+    match (DemFile::open(path, &Reading::AS_IT_SAYS), given) {
+        (Ok(file), _) => Ok((file, false)),
+        (Err(SourceError::NoCrs { .. }), Some(given)) => {
+            let crs = Crs::named(given).map_err(|found| CompileError::Impossible {
+                key: "--crs".into(),
+                found: format!("{given}: {found}"),
+                expected: "a system that can be computed".into(),
+                hint: "for example --crs EPSG:32611".into(),
+            })?;
+            Ok((DemFile::open(path, &Reading { crs: Some(crs), ..Reading::AS_IT_SAYS })?, true))
+        }
+        (Err(error), _) => Err(error.into()),
+    }
+}
+
+fn look(file: &DemFile, crs_given: bool) -> Result<Seen, CompileError> {
+    let frame = file.frame();
+    let mut notes: Vec<String> = frame.crs.remark().map(str::to_owned).into_iter().collect();
+    let mut heights = None;
+    if file.rect().post_count() <= LOOK_POSTS_MAX {
+        let raster = file.read(file.rect())?;
+        heights = Some((raster.void_count(), raster.range_m()));
+        notes.extend(raster.notes().iter().take(3).cloned());
+    }
+    Ok(Seen {
+        path: frame.path.clone(),
+        format: file.format(),
+        size: (frame.cols, frame.rows),
+        crs: frame.crs.name().to_owned(),
+        spacing: frame.spacing,
+        is_geographic: frame.crs.is_geographic(),
+        heights,
+        vertical_datum: file.vertical_datum().map(str::to_owned),
+        accuracy_m: file.accuracy_m(),
+        notes,
+        crs_given,
+    })
+}
+
+/// The rasters' own system where all share one in true metres; else the UTM zone of their middle.
+fn area_crs(frames: &[RasterFrame]) -> Result<Crs, job::NoArea> {
+    const WEB_MERCATOR: u32 = 3857;
+    let first = &frames[0].crs;
+    let shared = frames.iter().all(|frame| frame.crs == *first);
+    let metric = first.unit_m() == Some(1.0) && first.epsg().is_some_and(|code| code != WEB_MERCATOR);
+    if shared && metric { Ok(first.clone()) } else { utm_of(frames) }
+}
+
+/// The spacing nearest to that of the finest raster that divides the border step and is a multiple of 1/16 m.
+fn spacing_for(frames: &[RasterFrame], crs: &Crs) -> Spacing {
+    let metres = |frame: &RasterFrame| {
+        let (row, col) = (frame.rows / 2, frame.cols / 2);
+        let places = [(row, col), (row, col + 1), (row + 1, col)].map(|(row, col)| {
+            let [east, north] = frame.south_west;
+            let place = [east + f64::from(col) * frame.spacing[0], north + f64::from(row) * frame.spacing[1]];
+            frame.crs.to(crs, place)
+        });
+        let [Some(a), Some(b), Some(c)] = places else { return None };
+        let apart = |p: [f64; 2], q: [f64; 2]| ((p[0] - q[0]).powi(2) + (p[1] - q[1]).powi(2)).sqrt();
+        // Posts of a degree grid are closer east to west; what lies between the two keeps the detail of both.
+        Some((apart(a, b) * apart(a, c)).sqrt())
+    };
+    let wanted = frames.iter().filter_map(metres).fold(f64::INFINITY, f64::min);
+    let fits = |parts: u32| {
+        let metres = BORDER_STEP_M / f64::from(parts);
+        Spacing::from_metres(metres).filter(|spacing| spacing.metres() * f64::from(parts) == BORDER_STEP_M)
+    };
+    let ratio = |spacing: &Spacing| (spacing.metres() / wanted).max(wanted / spacing.metres());
+    let nearest = (1..=2000).filter_map(fits).min_by(|a, b| ratio(a).total_cmp(&ratio(b)));
+    nearest.expect("the border step itself divides it")
+}

@@ -1,0 +1,150 @@
+//! One tile's refinement: grown to its budget, or grown beyond it and optimised.
+
+use job::{Effort, HeightFit, Job, Lattice, Method, Optimising};
+use limits::Allowance;
+use optimiser::{Budget, Optimised, Task, optimise, overshoot};
+use terrain::{Dem, LatticePoint, THOUSANDTHS, TileTin, Vertex};
+use tin::{Frame, Rule, Stop, TileTask};
+
+use crate::ground::Window;
+
+/// Room in a window of load modules while a tile is grown beyond its budget.
+const NO_LIMIT: u32 = u32::MAX / 4;
+
+/// What is to be done for one tile.
+#[derive(Clone, Debug)]
+pub(crate) struct Refinement {
+    /// What to select, within which budget.
+    pub task: TileTask,
+    /// How what is selected is then optimised, if it is.
+    pub optimising: Option<Optimising>,
+    /// What the finished mesh may have where there are no load modules.
+    pub most: Most,
+}
+
+/// Where there are no load modules, the most a mesh may have.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Most {
+    /// What the task says.
+    AsTask,
+    /// So many triangles.
+    Triangles(usize),
+}
+
+/// The settings of a job's method, where it is the optimised one.
+pub(crate) fn optimising(job: &Job) -> Option<Optimising> {
+    match job.tin.method {
+        Method::Optimised(optimising) => Some(optimising),
+        Method::Greedy | Method::Paper { .. } => None,
+    }
+}
+
+impl Refinement {
+    /// Refines the tile. `seeds` are the vertices it inherits or keeps, at the heights they were published with,
+    /// whatever the DEM says today.
+    pub fn run(&self, window: &Window, seeds: &[Vertex]) -> TileTin {
+        let grown = |task: &TileTask| {
+            let level = geometry::widest_level();
+            let differs = |seed: &Vertex| seed.at.post().is_some_and(|post| window.dem.height(post) != seed.height);
+            if !seeds.iter().any(differs) {
+                return tin::refine(&window.dem, &window.importance, task, level);
+            }
+            tin::refine(&with_heights(&window.dem, seeds), &window.importance, task, level)
+        };
+        let Some(optimising) = self.optimising else { return grown(&self.task) };
+        let grown = grown(&self.beyond_budget(optimising));
+        let optimised =
+            optimise(&window.dem, &window.importance, &grown.tin, &self.optimisation(optimising, grown.initial_count));
+        self.join(grown, optimised)
+    }
+
+    /// The growth, with room to thin from.
+    fn beyond_budget(&self, optimising: Optimising) -> TileTask {
+        let times = overshoot(effort(optimising));
+        let more = |count: usize| (count as f64 * times) as usize;
+        let mut task = self.task.clone();
+        if let Frame::Sides { allowance, .. } = &mut task.frame {
+            *allowance = Allowance {
+                triangles: more(allowance.triangles as usize) as u32,
+                window_room: match optimising.effort {
+                    Effort::Fast => allowance.window_room.clone(),
+                    Effort::Normal | Effort::Best => vec![NO_LIMIT; allowance.window_room.len()],
+                },
+                ..allowance.clone()
+            };
+        }
+        let points = match self.most {
+            // A post makes two triangles at most, and two are there: a fast tile is never thinned, so must not exceed.
+            Most::Triangles(triangles) => Some(more(triangles).saturating_sub(2) / 2),
+            Most::AsTask => task.stop.points.map(more),
+        };
+        task.stop = Stop { points, ..task.stop };
+        task
+    }
+
+    fn optimisation(&self, optimising: Optimising, initial: u32) -> Task {
+        let task = &self.task;
+        let held = [&task.border, &task.inherited, &task.kept].into_iter().flatten();
+        // Tiles that meet in a corner only agree on it because none of them fits it.
+        let held = held.copied().chain(task.rect.corners()).map(LatticePoint::from).collect();
+        let budget = match (task.ledger(), self.most) {
+            (Some(ledger), _) => Budget::Limits(ledger),
+            (None, Most::Triangles(most)) => Budget::Triangles(most),
+            (None, Most::AsTask) => {
+                Budget::Vertices(task.stop.points.map_or(NO_LIMIT as usize, |points| points + initial as usize))
+            }
+        };
+        let Rule::LargestSquares { guard } = task.rule else { unreachable!("what is optimised is grown by squares") };
+        Task {
+            held,
+            open: task.seams,
+            line_step: match task.frame {
+                Frame::Sides { side_cells, .. } => Some(side_cells),
+                Frame::Plain | Frame::Corners { .. } => None,
+            },
+            budget,
+            effort: effort(optimising),
+            height_fit: match optimising.height_fit {
+                HeightFit::Squares => optimiser::HeightFit::Squares,
+                HeightFit::SquaresKeepCrests => optimiser::HeightFit::SquaresKeepCrests,
+                HeightFit::Off => optimiser::HeightFit::Off,
+            },
+            lattice: match optimising.lattice {
+                Lattice::Eighth => optimiser::Lattice::Eighth,
+                Lattice::Post => optimiser::Lattice::Post,
+            },
+            rms_quanta: task.stop.rms_quanta,
+            largest_quanta: guard.map(|value| value as f64 / f64::from(THOUSANDTHS)),
+        }
+    }
+
+    fn join(&self, grown: TileTin, optimised: Optimised) -> TileTin {
+        let Optimised { tin, spent, refused, stop } = optimised;
+        TileTin {
+            tin,
+            residuals: Vec::new(),
+            triangles_charged: spent,
+            refused: refused.unwrap_or(grown.refused),
+            stop,
+            ..grown
+        }
+    }
+}
+
+fn effort(optimising: Optimising) -> optimiser::Effort {
+    match optimising.effort {
+        Effort::Fast => optimiser::Effort::Fast,
+        Effort::Normal => optimiser::Effort::Normal,
+        Effort::Best => optimiser::Effort::Best,
+    }
+}
+
+fn with_heights(dem: &Dem, seeds: &[Vertex]) -> Dem {
+    let mut at: Vec<(terrain::Post, i32)> =
+        seeds.iter().filter_map(|seed| Some((seed.at.post()?, seed.height))).collect();
+    at.sort_unstable();
+    Dem::from_fn(dem.rect(), |post| match at.binary_search_by_key(&post, |&(post, _)| post) {
+        Ok(found) => Some(at[found].1),
+        Err(_) => Some(dem.height(post)),
+    })
+}

@@ -1,0 +1,278 @@
+//! Line of sight: of two vehicles, does one see the other on the TIN when it does on the DEM?
+//!
+//! Pairs are drawn at random: the first place anywhere in the area, the second in any direction and at any range
+//! of a few kilometres, both inside. Eyes stand above each ground by itself: those of the TIN on the TIN. The DEM
+//! is bilinear between posts and looked at every half post; the TIN is looked at where an edge is crossed, which
+//! misses nothing. So a TIN through every post is not perfect either: on the real desert it agrees for 99.3 % of
+//! pairs, and what it hides beyond the DEM lies between two looks or in the warp of a cell.
+//!
+//! Only `+ - * /` and square roots in a fixed order decide, so counts are the same on every machine.
+
+use terrain::{Dem, Metres, PostRect, QUANTA_PER_METRE};
+
+use crate::draw::Draw;
+use crate::samples::DemSamples;
+use crate::triangles::Triangles;
+
+/// Height of eyes and targets above the ground, in metres: a tank's.
+pub const EYE_M: f64 = 2.5;
+/// Nearest and farthest target, in metres.
+pub const RANGE_M: (f64, f64) = (200.0, 4000.0);
+/// How often a pair that leaves the area is drawn again before it is left out.
+const DRAWS_MAX: u32 = 1000;
+
+/// How often the two grounds agreed on what is seen: pairs of places.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct LineOfSight {
+    /// Seen on both.
+    pub visible: u64,
+    /// Hidden on both.
+    pub hidden: u64,
+    /// Seen on the TIN only.
+    pub false_visible: u64,
+    /// Seen on the DEM only.
+    pub false_hidden: u64,
+    /// In no figure: pairs whose line lies over voids of the DEM, or that fit nowhere into the area.
+    pub left_out: u64,
+}
+
+impl LineOfSight {
+    /// Pairs that were compared.
+    pub fn pairs(&self) -> u64 {
+        self.visible + self.hidden + self.false_visible + self.false_hidden
+    }
+
+    /// Share of pairs on which DEM and TIN agree; 1 without pairs.
+    pub fn agreement(&self) -> f64 {
+        1.0 - self.false_visible_share() - self.false_hidden_share()
+    }
+
+    /// Share of all pairs that only the TIN shows.
+    pub fn false_visible_share(&self) -> f64 {
+        self.share(self.false_visible)
+    }
+
+    /// Share of all pairs that only the DEM shows.
+    pub fn false_hidden_share(&self) -> f64 {
+        self.share(self.false_hidden)
+    }
+
+    /// Share of pairs seen on the DEM.
+    pub fn visible_share_dem(&self) -> f64 {
+        self.share(self.visible + self.false_hidden)
+    }
+
+    /// Share of pairs seen on the TIN.
+    pub fn visible_share_tin(&self) -> f64 {
+        self.share(self.visible + self.false_visible)
+    }
+
+    /// How far, either way, the agreement of all possible pairs may lie from that of these (95 %).
+    ///
+    /// Two pairs that agree and two that do not are added, so that perfect agreement does not look certain
+    /// (Agresti and Coull 1998).
+    pub fn half_width(&self) -> f64 {
+        const DEVIATIONS: f64 = 1.96;
+        let pairs = self.pairs() as f64 + 4.0;
+        let agreement = ((self.visible + self.hidden) as f64 + 2.0) / pairs;
+        DEVIATIONS * (agreement * (1.0 - agreement) / pairs).sqrt()
+    }
+
+    fn share(&self, pairs: u64) -> f64 {
+        if self.pairs() == 0 { 0.0 } else { pairs as f64 / self.pairs() as f64 }
+    }
+}
+
+/// Draws `pairs` pairs of places from `seed` and compares what is seen on the DEM with what is seen on the TIN.
+///
+/// # Panics
+/// When the DEM does not hold all posts of the triangles.
+pub fn line_of_sight(dem: &Dem, triangles: &Triangles, spacing: Metres, pairs: u32, seed: u64) -> LineOfSight {
+    let rect = triangles.rect();
+    assert!(dem.rect().contains_rect(&rect), "the DEM holds the ground of the triangles");
+    let samples = DemSamples::new(dem);
+    let mut found = LineOfSight::default();
+    for index in 0..pairs {
+        let pair = draw_pair(rect, spacing, Draw::new(seed, u64::from(index)));
+        match pair.filter(|&pair| dem.void_count() == 0 || !touches_void(&samples, pair)) {
+            Some(pair) => *found.count(sees(&samples, pair), sees_on(triangles, pair)) += 1,
+            None => found.left_out += 1,
+        }
+    }
+    found
+}
+
+impl LineOfSight {
+    fn count(&mut self, on_dem: bool, on_tin: bool) -> &mut u64 {
+        match (on_dem, on_tin) {
+            (true, true) => &mut self.visible,
+            (false, false) => &mut self.hidden,
+            (false, true) => &mut self.false_visible,
+            (true, false) => &mut self.false_hidden,
+        }
+    }
+}
+
+/// Two places, east and north in posts.
+type Pair = [[f64; 2]; 2];
+
+/// A pair inside `rect`; `None` where none was found.
+fn draw_pair(rect: PostRect, spacing: Metres, mut draw: Draw) -> Option<Pair> {
+    let (wide, high) = (rect.cells_wide() as f64, rect.cells_high() as f64);
+    let nearest = RANGE_M.0 / spacing.0;
+    // Nothing farther than the diagonal fits, so leaving it out changes no chance, only how often we draw.
+    let farthest = (RANGE_M.1 / spacing.0).min((wide * wide + high * high).sqrt());
+    if farthest < nearest {
+        return None;
+    }
+    (0..DRAWS_MAX).find_map(|_| {
+        let (x, y) = (wide * draw.unit(), high * draw.unit());
+        let [east, north] = draw.direction();
+        let range = nearest + (farthest - nearest) * draw.unit();
+        let (to_x, to_y) = (x + range * east, y + range * north);
+        let is_inside = 0.0 <= to_x && to_x <= wide && 0.0 <= to_y && to_y <= high;
+        let place = |x: f64, y: f64| [x + f64::from(rect.west), y + f64::from(rect.south)];
+        is_inside.then(|| [place(x, y), place(to_x, to_y)])
+    })
+}
+
+/// Places along a pair's line at most half a post apart, with the share of the way; both ends are among them.
+fn steps([from, to]: Pair) -> impl Iterator<Item = (f64, [f64; 2])> {
+    const STEPS_PER_POST: f64 = 2.0;
+    let (dx, dy) = (to[0] - from[0], to[1] - from[1]);
+    let count = ((dx * dx + dy * dy).sqrt() * STEPS_PER_POST).ceil().max(1.0);
+    (0..=count as u32).map(move |step| {
+        let share = f64::from(step) / count;
+        (share, [from[0] + share * dx, from[1] + share * dy])
+    })
+}
+
+fn touches_void(samples: &DemSamples, pair: Pair) -> bool {
+    steps(pair).any(|(_, place)| samples.is_void(place))
+}
+
+/// An eye, or a target, above the ground at `place`; heights are in quanta.
+fn above(place: [f64; 2], ground: f64) -> [f64; 3] {
+    [place[0], place[1], ground + EYE_M * f64::from(QUANTA_PER_METRE)]
+}
+
+/// Whether the second place of a pair is seen from the first on the DEM.
+fn sees(samples: &DemSamples, pair: Pair) -> bool {
+    let [eye, target] = pair.map(|place| above(place, samples.height(place)));
+    steps(pair).all(|(share, place)| samples.height(place) <= eye[2] + share * (target[2] - eye[2]))
+}
+
+/// Whether the second place of a pair is seen from the first on the triangles.
+fn sees_on(triangles: &Triangles, pair: Pair) -> bool {
+    let [eye, target] = pair.map(|place| above(place, triangles.height_at(place)));
+    !triangles.hide(eye, target)
+}
+
+#[cfg(test)]
+mod tests {
+    use terrain::{Post, PostRect};
+
+    use super::*;
+    use crate::scene::{full_tin, random_tin};
+
+    const SPACING: Metres = Metres(25.0);
+
+    fn dem(height: impl Fn(Post) -> Option<i32>) -> Dem {
+        Dem::from_fn(PostRect::new(Post::new(5, -40), Post::new(205, 160)), height)
+    }
+
+    #[track_caller]
+    fn check(dem: &Dem, tin: &terrain::Tin, expected: impl Fn(&LineOfSight) -> bool) -> LineOfSight {
+        let found = line_of_sight(dem, &Triangles::of_tin(tin), SPACING, 4000, 1);
+        assert_eq!(found.pairs() + found.left_out, 4000);
+        assert!(expected(&found), "{found:?}");
+        found
+    }
+
+    #[test]
+    fn on_flat_ground_everything_is_seen() {
+        let flat = dem(|_| Some(77));
+        let tin = random_tin(flat.rect(), 300, |_, _| 77, 3);
+        let found = check(&flat, &tin, |found| found.visible == 4000);
+        assert_eq!((found.agreement(), found.visible_share_dem(), found.visible_share_tin()), (1.0, 1.0, 1.0));
+        assert!(0.0 < found.half_width() && found.half_width() < 0.001);
+    }
+
+    #[test]
+    fn a_wall_that_the_tin_lacks_is_false_visible_and_the_other_way_round() {
+        let wall = dem(|post| Some(if post.col == 60 { 100_000 } else { 0 }));
+        let flat = dem(|_| Some(0));
+        let lacking = random_tin(flat.rect(), 300, |_, _| 0, 3);
+        let lost = check(&wall, &lacking, |found| found.hidden == 0 && found.false_hidden == 0);
+        // A third of the pairs or so cross the middle of 5 km at ranges of up to 4 km.
+        assert!((0.2..0.5).contains(&lost.false_visible_share()), "{lost:?}");
+        let gained = check(&flat, &full_tin(&wall), |found| found.hidden == 0 && found.false_visible == 0);
+        assert_eq!(gained.false_hidden_share(), 1.0 - gained.visible_share_tin());
+        // An eye on the wall's own slope may look past its top between two steps on the DEM, never on the TIN.
+        assert!((lost.false_visible..lost.false_visible + 20).contains(&gained.false_hidden), "{gained:?}");
+        let both = check(&wall, &full_tin(&wall), |found| found.false_visible == 0 && found.false_hidden < 20);
+        assert_eq!(both.hidden, lost.false_visible);
+    }
+
+    #[test]
+    fn a_tin_through_every_post_agrees_but_for_the_warp_inside_cells() {
+        let hills = dem(|post| Some(((post.row % 37 - 18) * (post.col % 29 - 14)) * 30));
+        let found = check(&hills, &full_tin(&hills), |found| 0.97 < found.agreement());
+        assert!((0.05..0.95).contains(&found.visible_share_dem()), "{found:?}");
+    }
+
+    #[test]
+    fn counts_are_the_same_on_every_machine() {
+        let hills = dem(|post| Some(((post.row % 37 - 18) * (post.col % 29 - 14)) * 30));
+        let tin = random_tin(hills.rect(), 900, |at, _| hills.height(Post::new(at.row / 8, at.col / 8)), 11);
+        let counted = LineOfSight { visible: 279, hidden: 3230, false_visible: 246, false_hidden: 245, left_out: 0 };
+        check(&hills, &tin, |found| *found == counted);
+    }
+
+    #[test]
+    fn pairs_over_voids_are_left_out_and_the_others_stay_the_same() {
+        let height = |post: Post| ((post.row % 37 - 18) * (post.col % 29 - 14)) * 30;
+        let whole = dem(|post| Some(height(post)));
+        let tin = random_tin(whole.rect(), 500, |at, _| height(Post::new(at.row / 8, at.col / 8)), 8);
+        let mut holed = dem(|post| (post != Post::new(100, 60)).then(|| height(post)));
+        holed.fill_voids(height);
+        let with = check(&whole, &tin, |found| found.left_out == 0);
+        let without = check(&holed, &tin, |found| 0 < found.left_out && found.left_out < 400);
+        assert!(without.visible <= with.visible && without.hidden <= with.hidden);
+        let nothing = dem(|_| None);
+        let none = check(&nothing, &tin, |found| found.left_out == 4000);
+        assert_eq!((none.pairs(), none.agreement(), none.visible_share_dem()), (0, 1.0, 0.0));
+    }
+
+    #[test]
+    fn pairs_lie_inside_and_at_ranges_that_matter() {
+        let rect = PostRect::new(Post::new(5, -40), Post::new(205, 160));
+        let mut longest: f64 = 0.0;
+        for index in 0..2000 {
+            let [from, to] = draw_pair(rect, SPACING, Draw::new(5, index)).unwrap();
+            for [x, y] in [from, to] {
+                assert!(-40.0 <= x && x <= 160.0 && 5.0 <= y && y <= 205.0);
+            }
+            let range = ((to[0] - from[0]).powi(2) + (to[1] - from[1]).powi(2)).sqrt() * 25.0;
+            assert!(200.0 - 1e-6 <= range && range <= 4000.0 + 1e-6);
+            longest = longest.max(range);
+        }
+        assert!(3900.0 < longest);
+    }
+
+    #[test]
+    fn an_area_without_room_for_a_pair_leaves_all_out() {
+        // A diagonal of 198 m.
+        let small = Dem::from_fn(PostRect::of_size(6, 7), |_| Some(0));
+        let found = line_of_sight(&small, &Triangles::of_tin(&full_tin(&small)), SPACING, 9, 1);
+        assert_eq!(found, LineOfSight { left_out: 9, ..LineOfSight::default() });
+    }
+
+    #[test]
+    fn steps_hold_both_ends_and_are_half_a_post_at_most() {
+        let places: Vec<_> = steps([[0.0, 0.0], [3.0, 4.0]]).collect();
+        assert_eq!(places.len(), 11);
+        assert_eq!((places[0], places[10]), ((0.0, [0.0, 0.0]), (1.0, [3.0, 4.0])));
+        assert_eq!(steps([[0.0, 0.0], [0.0, 10.1]]).count(), 22);
+    }
+}

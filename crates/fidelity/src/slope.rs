@@ -1,0 +1,205 @@
+//! Slope: does the ground fall as steeply, and the same way, on the TIN as on the DEM?
+//!
+//! Both are asked in one way: central differences over the two neighbouring posts each way, of DEM heights and of
+//! the TIN's heights at the same posts. So a TIN through every post differs nowhere, and a fold of the TIN between
+//! two posts does not count as a slope of its own. Posts on the border have no differences; those that are void, or
+//! next to a void, are left out. Angles are figures to read and decide nothing, so their last bits may differ
+//! between machines.
+
+use terrain::{Dem, Metres, Post, QUANTA_PER_METRE};
+
+use crate::triangles::Triangles;
+
+/// Bins in a degree: how fine a percentile of angles is told.
+const BINS_PER_DEGREE: f64 = 1000.0;
+
+/// How slopes differ, in degrees, over the inner posts.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SlopeDifference {
+    /// Posts compared.
+    pub posts: u64,
+    /// Root mean square of the difference in steepness; 0 without posts.
+    pub rms_degrees: f64,
+    /// Mean angle between the normals.
+    pub normal_mean_degrees: f64,
+    /// The angle that 95 % of the normals do not exceed, at most 0.001 too large.
+    pub normal_p95_degrees: f64,
+}
+
+/// Compares the slopes of the TIN with those of the DEM.
+///
+/// # Panics
+/// When the DEM does not hold all posts of the triangles.
+pub fn slope(dem: &Dem, triangles: &Triangles, spacing: Metres) -> SlopeDifference {
+    let rect = triangles.rect();
+    assert!(dem.rect().contains_rect(&rect), "the DEM holds the ground of the triangles");
+    let tin_row = |row: i32| -> Vec<f64> {
+        (rect.west..=rect.east).map(|col| triangles.height_at([f64::from(col), f64::from(row)])).collect()
+    };
+    let dem_row = |row: i32| -> Vec<f64> {
+        dem.row(row)[(rect.west - dem.rect().west) as usize..][..rect.posts_wide()]
+            .iter()
+            .map(|&height| f64::from(height))
+            .collect()
+    };
+    let mut sums = Sums::new();
+    let per_quantum = 1.0 / (2.0 * spacing.0 * f64::from(QUANTA_PER_METRE));
+    if rect.cells_wide() < 2 || rect.cells_high() < 2 {
+        return sums.figures();
+    }
+    let mut tin = [tin_row(rect.south), tin_row(rect.south + 1)];
+    for row in rect.south + 1..rect.north {
+        let tin_north = tin_row(row + 1);
+        let [tin_south, tin_here] = tin;
+        let (dem_south, dem_here, dem_north) = (dem_row(row - 1), dem_row(row), dem_row(row + 1));
+        for i in 1..rect.cells_wide() {
+            if dem.void_count() == 0 || !is_near_void(dem, Post::new(row, rect.west + i as i32)) {
+                let gradient = |south: &[f64], here: &[f64], north: &[f64]| {
+                    [(here[i + 1] - here[i - 1]) * per_quantum, (north[i] - south[i]) * per_quantum]
+                };
+                sums.add(gradient(&dem_south, &dem_here, &dem_north), gradient(&tin_south, &tin_here, &tin_north));
+            }
+        }
+        tin = [tin_here, tin_north];
+    }
+    sums.figures()
+}
+
+/// Whether `post` or one of its four neighbours is void.
+fn is_near_void(dem: &Dem, Post { row, col }: Post) -> bool {
+    [(row, col), (row - 1, col), (row + 1, col), (row, col - 1), (row, col + 1)]
+        .into_iter()
+        .any(|(row, col)| dem.is_void(Post::new(row, col)))
+}
+
+/// Sums over the posts, in the order of posts.
+struct Sums {
+    posts: u64,
+    squared: f64,
+    between: f64,
+    /// Posts by the angle between normals.
+    bins: Vec<u64>,
+}
+
+impl Sums {
+    fn new() -> Self {
+        Self { posts: 0, squared: 0.0, between: 0.0, bins: vec![0; (180.0 * BINS_PER_DEGREE) as usize + 1] }
+    }
+
+    /// Counts a post by its two gradients, metres up for each metre east and north.
+    fn add(&mut self, dem: [f64; 2], tin: [f64; 2]) {
+        let steepness = |[x, y]: [f64; 2]| (x * x + y * y).sqrt().atan().to_degrees();
+        let difference = steepness(dem) - steepness(tin);
+        let between = angle_between(dem, tin);
+        self.posts += 1;
+        self.squared += difference * difference;
+        self.between += between;
+        self.bins[(between * BINS_PER_DEGREE).ceil() as usize] += 1;
+    }
+
+    fn figures(&self) -> SlopeDifference {
+        if self.posts == 0 {
+            return SlopeDifference::default();
+        }
+        let rank = (self.posts * 95).div_ceil(100);
+        let mut below = 0;
+        let reached = self.bins.iter().position(|&posts| {
+            below += posts;
+            rank <= below
+        });
+        let posts = self.posts as f64;
+        SlopeDifference {
+            posts: self.posts,
+            rms_degrees: (self.squared / posts).sqrt(),
+            normal_mean_degrees: self.between / posts,
+            normal_p95_degrees: reached.map_or(0.0, |bin| bin as f64 / BINS_PER_DEGREE),
+        }
+    }
+}
+
+/// Angle between the normals (-x, -y, 1) of two gradients, in degrees.
+fn angle_between([ax, ay]: [f64; 2], [bx, by]: [f64; 2]) -> f64 {
+    let (x, y, z) = (by - ay, ax - bx, ax * by - ay * bx);
+    (x * x + y * y + z * z).sqrt().atan2(ax * bx + ay * by + 1.0).to_degrees()
+}
+
+#[cfg(test)]
+mod tests {
+    use terrain::PostRect;
+
+    use super::*;
+    use crate::scene::{full_tin, height_by_search, random_tin};
+
+    const SPACING: Metres = Metres(25.0);
+
+    fn rect() -> PostRect {
+        PostRect::new(Post::new(-3, 4), Post::new(30, 47))
+    }
+
+    #[test]
+    fn a_tin_through_every_post_differs_nowhere() {
+        let dem = Dem::from_fn(rect(), |post| Some(post.row * post.row * 50 - post.col * 77));
+        let found = slope(&dem, &Triangles::of_tin(&full_tin(&dem)), SPACING);
+        assert_eq!(found, SlopeDifference { posts: 32 * 42, ..SlopeDifference::default() });
+    }
+
+    #[test]
+    fn a_flat_tin_under_a_ramp_differs_by_the_angle_of_the_ramp() {
+        // 25 m up for each 25 m east: 45 degrees.
+        let dem = Dem::from_fn(rect(), |post| Some(post.col * 25 * 128));
+        let flat = Dem::from_fn(rect(), |_| Some(5));
+        let found = slope(&dem, &Triangles::of_tin(&full_tin(&flat)), SPACING);
+        for degrees in [found.rms_degrees, found.normal_mean_degrees, found.normal_p95_degrees] {
+            assert!((degrees - 45.0).abs() < 0.0011, "{found:?}");
+        }
+        // As steep, but the other way: steepness agrees, normals stand at a right angle.
+        let back = Dem::from_fn(rect(), |post| Some(-post.col * 25 * 128));
+        let found = slope(&dem, &Triangles::of_tin(&full_tin(&back)), SPACING);
+        assert!(found.rms_degrees < 1e-9 && (found.normal_mean_degrees - 90.0).abs() < 1e-9, "{found:?}");
+    }
+
+    #[test]
+    fn posts_at_voids_are_left_out() {
+        let dem = Dem::from_fn(rect(), |post| (post != Post::new(10, 20)).then_some(0));
+        let tin = random_tin(rect(), 40, |_, _| 0, 1);
+        let found = slope(&dem, &Triangles::of_tin(&tin), SPACING);
+        assert_eq!((found.posts, found.rms_degrees), (32 * 42 - 5, 0.0));
+        let line = Dem::from_fn(PostRect::of_size(2, 9), |_| Some(0));
+        assert_eq!(slope(&line, &Triangles::of_tin(&full_tin(&line)), SPACING), SlopeDifference::default());
+    }
+
+    #[test]
+    fn figures_equal_those_of_one_post_after_another() {
+        for seed in 0..6 {
+            let tin = random_tin(rect(), 10 << seed, |_, dice| dice.below(3000), seed);
+            // A wider window than the TIN covers.
+            let dem = Dem::from_fn(rect().grown(2), |post| Some((post.row * 31 + post.col * 17) % 101 * 20));
+            let steepness = |[x, y]: [f64; 2]| x.hypot(y).atan().to_degrees();
+            let (mut squares, mut angles) = (0.0, Vec::new());
+            for row in rect().south + 1..rect().north {
+                for col in rect().west + 1..rect().east {
+                    let gradient = |height: &dyn Fn(i32, i32) -> f64| {
+                        [height(0, 1) - height(0, -1), height(1, 0) - height(-1, 0)].map(|rise| rise / 6400.0)
+                    };
+                    let a = gradient(&|up, right| f64::from(dem.height(Post::new(row + up, col + right))));
+                    let b =
+                        gradient(&|up, right| height_by_search(&tin, [f64::from(col + right), f64::from(row + up)]));
+                    squares += (steepness(a) - steepness(b)).powi(2);
+                    let lengths = (1.0 + a[0] * a[0] + a[1] * a[1]).sqrt() * (1.0 + b[0] * b[0] + b[1] * b[1]).sqrt();
+                    angles.push(((1.0 + a[0] * b[0] + a[1] * b[1]) / lengths).acos().to_degrees());
+                }
+            }
+            angles.sort_by(f64::total_cmp);
+            let posts = angles.len();
+            let expected = [
+                (squares / posts as f64).sqrt(),
+                angles.iter().sum::<f64>() / posts as f64,
+                angles[(posts * 95).div_ceil(100) - 1],
+            ];
+            let found = slope(&dem, &Triangles::of_tin(&tin), SPACING);
+            let figures = [found.rms_degrees, found.normal_mean_degrees, found.normal_p95_degrees];
+            let agree = figures.iter().zip(expected).all(|(found, expected)| (found - expected).abs() < 0.0011);
+            assert!(agree && found.posts == posts as u64, "seed {seed}: {found:?}, expected {expected:?}");
+        }
+    }
+}

@@ -1,0 +1,187 @@
+//! `tiefort init`: a job for the rasters somebody has, with what each of its numbers is.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use compiler::{Seen, Suggestion};
+
+use crate::failure::{Failure, Outcome};
+use crate::terminal;
+
+const AFTER_HELP: &str = "\
+Examples:
+  tiefort init n35w117.dt2 n35w118.dt2 --out fort.toml
+  tiefort init dem/*.hgt > area.toml && tiefort build area.toml
+  tiefort init grid.asc --crs EPSG:32611
+
+The job covers the largest rectangle of whole load modules inside the files.";
+
+/// Arguments of `init`.
+#[derive(Args)]
+#[command(after_help = AFTER_HELP)]
+pub struct Arguments {
+    /// Rasters: GeoTIFF, DTED, HGT, Esri ASCII, raw with a .hdr; also in .gz and .zip; in order of priority
+    #[arg(value_name = "FILES", required = true)]
+    files: Vec<PathBuf>,
+    /// Where to write the job; it must not exist yet [default: standard output]
+    #[arg(long, value_name = "JOB.toml")]
+    out: Option<PathBuf>,
+    /// Coordinate system of files that do not say
+    #[arg(long, value_name = "EPSG:CODE")]
+    crs: Option<String>,
+}
+
+/// Writes a job.
+pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
+    let suggestion = compiler::look_at(&arguments.files, arguments.crs.as_deref())?;
+    let Some(out) = &arguments.out else {
+        terminal::print(&job_text(&suggestion, Path::new(""), "area", arguments.crs.as_deref()))?;
+        return Ok(Outcome::Sound);
+    };
+    let name = out.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
+    let folder = out.parent().unwrap_or(Path::new(""));
+    let text = job_text(&suggestion, folder, &name, arguments.crs.as_deref());
+    crate::files::write_new(out, &text)?;
+    terminal::print(&format!("{} is written; build it: tiefort build {}\n", out.display(), out.display()))?;
+    Ok(Outcome::Sound)
+}
+
+fn job_text(suggestion: &Suggestion, folder: &Path, name: &str, given: Option<&str>) -> String {
+    let Suggestion { seen, epsg, origin_m, size_m, spacing_m, tiles } = suggestion;
+    let modules = size_m.map(|metres| metres / 500.0);
+    let mut text = format!(
+        "# Written by `tiefort init`. Every line may be changed; `tiefort plan` on this file shows what follows.\n\
+         \n[area]\nname = \"{}\"\n\
+         crs = \"EPSG:{epsg}\"{}\n\
+         origin_m = [{}, {}]  # east and north of the south-west post\n\
+         size_m = [{}, {}]  # {} x {} load modules: the largest rectangle that the files cover\n\
+         spacing_m = {spacing_m}  # of the working grid; it divides 125 m\n\n[dem]\nsources = [\n",
+        plain_name(name),
+        if (32601..=32760).contains(epsg) { "  # the UTM zone of the files' middle, or their own" } else { "" },
+        origin_m[0],
+        origin_m[1],
+        size_m[0],
+        size_m[1],
+        modules[0],
+        modules[1],
+    );
+    for file in seen {
+        text += &source_text(file, folder, given);
+    }
+    text += "]\n";
+    text += &voids_text(seen);
+    text += &datum_text(seen);
+    text += &format!(
+        "\n[tiles]\ncolumns = {}\nrows = {}\n\n[limits]\n\
+         per_load_module = 100         # triangles\n\
+         mean_per_load_module = 32     # over the whole area: {} triangles\n\
+         per_4km_square = 4096         # in every window of 8 x 8 load modules\n\n\
+         [tin]\nmethod = \"optimised\"          # the budget is the limits\n",
+        tiles.1,
+        tiles.0,
+        views::grouped((modules[0] * modules[1] * 32.0) as u64),
+    );
+    text
+}
+
+/// A name that a job may have, made of any.
+fn plain_name(name: &str) -> String {
+    let plain: String =
+        name.chars().map(|c| if c.is_ascii_alphanumeric() || "-_.".contains(c) { c } else { '-' }).take(100).collect();
+    let plain = plain.trim_start_matches(['-', '_', '.']);
+    if plain.is_empty() { "area".into() } else { plain.to_owned() }
+}
+
+fn source_text(seen: &Seen, folder: &Path, given: Option<&str>) -> String {
+    let path = quoted(&relative(&seen.path, folder));
+    let mut keys = Vec::new();
+    if let (true, Some(crs)) = (seen.crs_given, given) {
+        keys.push(format!("crs = {}", quoted(crs)));
+    }
+    keys.extend(undeclared_void(seen).map(|mark| format!("nodata = {mark}")));
+    let entry = match keys.is_empty() {
+        true => path,
+        false => format!("{{ file = {path}, {} }}", keys.join(", ")),
+    };
+    let unit = if seen.is_geographic { "seconds" } else { "m" };
+    let [east, north] = seen.spacing.map(|step| if seen.is_geographic { step * 3600.0 } else { step });
+    let (cols, rows) = seen.size;
+    let mut facts =
+        format!("{}, {}, {cols} x {rows} posts, {} x {} {unit}", seen.format, seen.crs, short(east), short(north));
+    match &seen.heights {
+        Some((voids, range)) => {
+            if let Some((low, high)) = range {
+                facts += &format!(", {} to {} m", short(*low), short(*high));
+            }
+            facts += &match voids {
+                0 => ", no voids".to_owned(),
+                voids => format!(", {} void", views::grouped(*voids as u64)),
+            };
+        }
+        None => facts += ", too large to look for voids here",
+    }
+    if undeclared_void(seen).is_some() {
+        facts += ", whose lowest height can only mark voids";
+    }
+    if let Some(accuracy_m) = seen.accuracy_m {
+        facts += &format!(", accurate to {accuracy_m} m");
+    }
+    facts += &match &seen.vertical_datum {
+        Some(datum) => format!(", heights above {datum}"),
+        None => ", heights above an unknown datum".to_owned(),
+    };
+    let notes: String = seen.notes.iter().map(|note| format!("    # {}\n", note.replace('\n', " "))).collect();
+    format!("    # {facts}\n{notes}    {entry},\n")
+}
+
+/// The usual marks of a void, where a file has one for its lowest height and does not declare it.
+fn undeclared_void(seen: &Seen) -> Option<f64> {
+    let (_, range) = seen.heights.as_ref()?;
+    let (low, _) = (*range)?;
+    [-32768.0, -32767.0, -9999.0].into_iter().find(|&mark| low == mark)
+}
+
+fn short(number: f64) -> String {
+    let rounded = (number * 1000.0).round() / 1000.0;
+    format!("{rounded}")
+}
+
+fn voids_text(seen: &[Seen]) -> String {
+    let has = |file: &Seen| file.heights.as_ref().is_none_or(|(voids, _)| 0 < *voids);
+    let voids = seen.iter().any(|file| has(file) || undeclared_void(file).is_some());
+    let next = if 1 < seen.len() { "next_source = true, " } else { "" };
+    match voids {
+        true => format!(
+            "# Small voids are filled from around them, larger ones have no weight; \"fail\" would refuse both.\n\
+             voids = {{ {next}fill_within_posts = 8, hole = true }}\n"
+        ),
+        false => "voids = \"fail\"                # there are none\n".to_owned(),
+    }
+}
+
+/// The vertical datum, where the files agree on one.
+fn datum_text(seen: &[Seen]) -> String {
+    let first = seen.first().and_then(|file| file.vertical_datum.as_ref());
+    match first.filter(|first| seen.iter().all(|file| file.vertical_datum.as_ref() == Some(first))) {
+        Some(datum) => format!("vertical_datum = {}\n", quoted(datum)),
+        None => {
+            "# vertical_datum = \"EGM96\"     # the files do not say, or not the same; write it if you know\n".into()
+        }
+    }
+}
+
+/// The path as a job in `folder` names it.
+fn relative(path: &Path, folder: &Path) -> String {
+    let here = |path: &Path| if path.as_os_str().is_empty() { PathBuf::from(".") } else { path.to_owned() };
+    let (Ok(file), Ok(folder)) = (path.canonicalize(), here(folder).canonicalize()) else {
+        return path.display().to_string();
+    };
+    match file.strip_prefix(&folder) {
+        Ok(below) => below.display().to_string(),
+        Err(_) => file.display().to_string(),
+    }
+}
+
+fn quoted(text: &str) -> String {
+    serde_json::Value::from(text).to_string()
+}

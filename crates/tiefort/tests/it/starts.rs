@@ -1,0 +1,122 @@
+//! From rasters that somebody has to a job that works: `init`, and areas that are found instead of stated.
+
+use std::fs;
+
+use crate::scene::Scene;
+
+/// An ASCII grid of 81 x 81 posts at 25 m, its south-west post `east` m from 506000 E; `row` counts from the north.
+fn grid(east: usize, height: impl Fn(usize, usize) -> String) -> String {
+    let head = format!("ncols 81\nnrows 81\nxllcenter {}\nyllcenter 3876000\ncellsize 25\n", 506_000 + east);
+    let row = |row: usize| (0..81).map(|col| height(row, col) + " ").collect::<String>() + "\n";
+    head + &(0..81).map(row).collect::<String>()
+}
+
+fn hills(row: usize, col: usize) -> String {
+    format!("{}", 700 + (row * row + 3 * col * row) % 97)
+}
+
+#[test]
+fn a_job_that_init_writes_builds_at_once() {
+    let scene = Scene::new();
+    fs::write(scene.path("west.asc"), grid(0, hills)).unwrap();
+    let holed = |row, col| if (20..23).contains(&row) && col == 40 { "-9999".into() } else { hills(row, col) };
+    fs::write(scene.path("east.asc"), grid(2025, holed)).unwrap();
+    let files = ["init", "west.asc", "east.asc", "--crs", "EPSG:32611", "--out", "here.toml"];
+    let said = scene.run_to(0, &files);
+    assert!(said.stdout.contains("here.toml is written"), "{}", said.stdout);
+    let job = fs::read_to_string(scene.path("here.toml")).unwrap();
+    for line in [
+        "name = \"here\"",
+        "crs = \"EPSG:32611\"",
+        "origin_m = [506000, 3876000]",
+        "size_m = [4000, 2000]",
+        "{ file = \"east.asc\", crs = \"EPSG:32611\" },",
+        "# Esri ASCII grid, EPSG:32611, 81 x 81 posts, 25 x 25 m, 700 to 796 m, 3 void, heights above an unknown datum",
+        "voids = { next_source = true, fill_within_posts = 8, hole = true }",
+    ] {
+        assert!(job.contains(line), "{line} is not in:\n{job}");
+    }
+    scene.run_to(0, &["build", "here.toml", "--workers", "1"]);
+    scene.run_to(0, &["verify", "here.tdb"]);
+    scene.run_to(0, &["build", "here.toml", "--workers", "3", "--out", "other.tdb"]);
+    let manifest = |folder: &str| fs::read(scene.path(folder).join("database.json")).unwrap();
+    assert!(manifest("here.tdb") == manifest("other.tdb"), "any number of workers makes the same of a mosaic");
+    scene.refuses(&files, &["here.toml", "found a file"]);
+}
+
+#[test]
+fn init_says_what_a_file_lacks() {
+    let scene = Scene::new();
+    fs::write(scene.path("a.asc"), grid(0, hills)).unwrap();
+    scene.refuses(&["init", "a.asc"], &["a.asc", "no coordinate reference system"]);
+    scene.refuses(&["init", "a.asc", "--crs", "EPSG:4267"], &["--crs", "needs a grid of shifts"]);
+    let small = grid(0, hills).replace("cellsize 25", "cellsize 5");
+    fs::write(scene.path("small.asc"), small).unwrap();
+    scene.refuses(&["init", "small.asc", "--crs", "EPSG:32611"], &["no", "load module"]);
+    scene.refuses(&["init", "none.tif"], &["none.tif"]);
+}
+
+#[test]
+fn an_area_is_found_around_a_place_and_over_the_sources() {
+    let scene = Scene::new();
+    fs::write(scene.path("a.asc"), grid(0, hills)).unwrap();
+    let job = |area: &str, dem: &str| {
+        let area = format!("[area]\nname = \"a\"\ncrs = \"auto\"\n{area}\nspacing_m = 25\n");
+        format!("{area}[dem]\n{dem}\n[tin]\nmethod = \"optimised\"\n")
+    };
+    let sources = "sources = [{ file = \"a.asc\", crs = \"EPSG:32611\" }]";
+    fs::write(scene.path("cover.toml"), job("cover = \"dem\"", sources)).unwrap();
+    let plan = scene.run_to(0, &["plan", "cover.toml"]).stdout;
+    assert!(plan.contains("[506000, 3876000]") && plan.contains("[2000, 2000]"), "{plan}");
+    scene.run_to(0, &["build", "cover.toml"]);
+    let around = "around = { lat = 35.3, lon = -116.6, size_km = [4, 2.2] }";
+    fs::write(scene.path("around.toml"), job(around, "source = \"sample\"")).unwrap();
+    let plan = scene.run_to(0, &["plan", "around.toml"]).stdout;
+    // The middle is 536367 E, 3906386 N; 2.2 km are five load modules.
+    assert!(plan.contains("EPSG:32611") && plan.contains("[4000, 2500]"), "{plan}");
+    assert!(plan.contains("534375.00  3905125.00") && plan.contains("35.28"), "corners in both systems: {plan}");
+    fs::write(scene.path("none.toml"), job("cover = \"dem\"", "source = \"sample\"")).unwrap();
+    scene.refuses(&["plan", "none.toml"], &["area.cover", "no raster"]);
+}
+
+#[test]
+fn ground_that_no_source_reaches_is_shown_on_a_map_unless_it_may_be_a_hole() {
+    let scene = Scene::new();
+    fs::write(scene.path("a.asc"), grid(0, hills)).unwrap();
+    let job = |voids: &str| {
+        format!(
+            "[area]\nname = \"a\"\ncrs = \"EPSG:32611\"\norigin_m = [505000, 3876000]\nsize_m = [3000, 2000]\n\
+             spacing_m = 25\n[dem]\nresampling = \"cubic\"\nvoids = \"{voids}\"\n\
+             sources = [{{ file = \"a.asc\", crs = \"EPSG:32611\" }}]\n[tin]\nmethod = \"optimised\"\n"
+        )
+    };
+    fs::write(scene.path("job.toml"), job("fail")).unwrap();
+    scene.refuses(&["build", "job.toml"], &["no source reaches 3240 of 9801 posts"]);
+    let map = scene.run_to(2, &["build", "job.toml"]).stderr;
+    assert!(map.contains("...............+#####") && map.contains("hint: add a source"), "{map}");
+    fs::write(scene.path("job.toml"), job("hole")).unwrap();
+    scene.run_to(0, &["build", "job.toml"]);
+    let report = scene.run_to(0, &["report", "a.tdb"]).stdout;
+    assert!(report.contains("3,240"), "{report}");
+}
+
+#[test]
+fn heights_above_different_datums_are_not_mixed_and_unknown_ones_are_told() {
+    let scene = Scene::new();
+    fs::write(scene.path("a.asc"), grid(0, hills)).unwrap();
+    let job = |dem: &str, said: &str| {
+        format!(
+            "[area]\nname = \"a\"\ncrs = \"EPSG:32611\"\norigin_m = [506000, 3876000]\nsize_m = [2000, 2000]\n\
+             spacing_m = 25\n[dem]\n{dem}\nsources = [{{ file = \"a.asc\", crs = \"EPSG:32611\"{said} }}]\n\
+             [tin]\nmethod = \"optimised\"\n"
+        )
+    };
+    let above = "vertical_datum = \"EGM96\"";
+    fs::write(scene.path("job.toml"), job(above, ", vertical_datum = \"ellipsoid\"")).unwrap();
+    scene.refuses(&["build", "job.toml"], &["dem.vertical_datum", "ellipsoid", "EGM96", "geoid"]);
+    fs::write(scene.path("job.toml"), job(above, ", vertical_datum = \"egm 96\"")).unwrap();
+    scene.run_to(0, &["build", "job.toml"]);
+    fs::write(scene.path("job.toml"), job(above, "")).unwrap();
+    let said = scene.run_to(0, &["build", "job.toml"]).stderr;
+    assert!(said.contains("does not say what its heights are measured from"), "{said}");
+}

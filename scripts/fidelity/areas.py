@@ -1,0 +1,274 @@
+"""Whole gaming areas at an equal number of triangles with all limits, and what cutting an area into tiles costs."""
+
+import dataclasses
+import json
+import os
+import tomllib
+
+from fidelity import terrain
+from fidelity.workshop import (DATA, FOLDER, ROOT, evaluate, faults, markdown, number, ratio, run, scratch, skip,
+                               tell, why, write_heights, write_mesh)
+
+EFFORTS = ("fast", "normal", "best")
+HEIGHT_FITS = ("l2", "l2_keep_crests")
+# The bisection ends this near to the mean it looks for, in triangles per load module; or with points this near to each
+# other, in parts of them, as when limits hold the mean below it whatever the points.
+MEAN_WITHIN = 0.02
+POINTS_WITHIN = 0.002
+BUILDS_MAX = 14
+NEAR_SEAMS_M = 250
+MODULE_M = 500
+HEAD = ["", "mean", "RMS m", "of paper", "of grid", "max m", "mean m", "largest", "4 km", "breaches", "seconds", "MB",
+        "valid", "sight %", "visible %", "slope RMS"]
+
+
+@dataclasses.dataclass
+class Area:
+    """A job to start from, and its working grid as the evaluator reads it."""
+
+    name: str
+    job: dict
+    heights: object
+    raw: object
+    spacing_m: tuple
+
+
+def areas(tiefort, quick, wanted):
+    """The jobs that are wanted and whose rasters are there. The sample comes twice: with importance and without."""
+    names = ["desert"] if quick else ["desert", "alps", "ntc", "ntc-even"]
+    for name in filter(wanted, names):
+        job = tomllib.loads((ROOT / "configs" / f"{name.removesuffix('-even')}.toml").read_text())
+        if name.endswith("-even"):
+            job.pop("importance")
+        sources = [DATA / path.split("shared/data/")[-1] for path in job["dem"].get("sources", [])]
+        missing = [path for path in sources if not path.exists()]
+        if missing:
+            skip(name, f"no {missing[0]}")
+            continue
+        if sources:
+            job["dem"]["sources"] = [str(path) for path in sources]
+        heights = terrain.working_grid(job, tiefort)
+        if heights is not None:
+            raw = FOLDER / f"{name}-area.heights"
+            write_heights(raw, heights)
+            yield Area(name, job, heights, raw, (job["area"]["spacing_m"],) * 2)
+
+
+# --- jobs ---
+
+
+def toml(value):
+    """A value of a job as TOML; JSON's notation is TOML's but for tables."""
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{key} = {toml(item)}" for key, item in value.items()) + " }"
+    if isinstance(value, list):
+        return "[" + ", ".join(map(toml, value)) + "]"
+    return json.dumps(value)
+
+
+def changed(job, **sections):
+    """A job with keys of some sections set; `tin` is replaced as a whole."""
+    job = {name: dict(section) for name, section in job.items()}
+    for name, keys in sections.items():
+        job[name] = dict(keys) if name == "tin" else job.get(name, {}) | keys
+    return job
+
+
+def write_job(job):
+    path = FOLDER / "job.toml"
+    lines = []
+    for name, section in job.items():
+        lines += [f"[{name}]", *(f"{key} = {toml(value)}" for key, value in section.items()), ""]
+    path.write_text("\n".join(lines))
+    return path
+
+
+def build(tiefort, area, job, judge=True):
+    """Builds a database from nothing; what the run took, what it reports, and what the evaluator says of it."""
+    path = write_job(job)
+    with scratch("area.tdb") as database:
+        ran = run(tiefort, "build", path, "--out", database, "--workers", os.cpu_count(), "--fresh", "--quiet")
+        if ran["code"] not in (0, 1):
+            return ran
+        ran["report"] = json.loads((database / "report.json").read_text())
+        if judge:
+            ran["judged"] = judge_database(database, area)
+            check_against_report(ran, area)
+    return ran
+
+
+def check_against_report(ran, area):
+    theirs, ours = ran["report"]["residual"]["rms_m"], ran["judged"]["rms_m"]
+    if 0.001 * ours < abs(theirs - ours):
+        tell(f"NOTE {area.name}: report.json has RMS {theirs:.4f} m, the evaluator {ours:.4f} m")
+
+
+def judge_database(database, area):
+    """Load modules as one mesh, welded where they hold equal points, read by the project's reader in Python."""
+    import read_slm
+
+    ids, vertices, triangles, lines = {}, [], [], [set(), set()]
+    for path in sorted((database / "modules").glob("*.slm")):
+        header, modules = read_slm.parse(path.read_bytes())
+        side, cells = header["side"], header["side_cells"]
+        lines[0].add(header["columns"][0] * cells)
+        lines[1].add(header["rows"][0] * cells)
+        for module in modules:
+            own = []
+            for x, y, z in module["vertices"]:
+                point = (module["column"] * side + x, module["row"] * side + y, z)
+                own.append(ids.setdefault(point, len(ids)))
+                if own[-1] == len(vertices):
+                    vertices.append((point[0] * cells / side, point[1] * cells / side, z / 128))
+            triangles += [(own[a], own[b], own[c]) for a, b, c in module["triangles"]]
+    mesh = FOLDER / "area.mesh"
+    write_mesh(mesh, vertices, triangles, side // cells)
+    columns, rows = (",".join(map(str, sorted(found - {0}))) for found in lines)
+    return evaluate(mesh, area.raw, area.spacing_m, "--seams", f"{columns}/{rows}",
+                    int(NEAR_SEAMS_M // area.spacing_m[0]))
+
+
+# --- at equal triangles ---
+
+
+def compare(tiefort, area):
+    """The table of an area; its rows for machines, by name."""
+    limit = area.job["limits"]["mean_per_load_module"]
+    tell(f"{area.name}: the regular grid, and paper + clip brought to {limit} triangles per load module")
+    results = {"regular grid": regular_grid(area)}
+    for allocation in ("equal", "global"):
+        results[f"paper + clip, {allocation}"] = paper_clip(tiefort, area, limit, allocation)
+    for name, tin in optimised(tiefort, area):
+        tell(f"{area.name}: {name}")
+        ran = build(tiefort, area, changed(area.job, tin=tin))
+        if "report" in ran:
+            results[name] = row_of(ran)
+        else:
+            skip(f"{area.name}, {name}", why(ran))
+    results = {name: result for name, result in results.items() if result}
+    paper, grid = best_paper(results).get("rms_m"), results["regular grid"]["rms_m"]
+    seen = results["regular grid"]["judged"]["sight"]["dem_visible"]
+    title = f"{area.name}: whole area, all limits (the DEM shows {100 * seen:.1f} % of lines of sight)"
+    markdown(title, HEAD, [cells(name, result, paper, grid) for name, result in results.items()])
+    return results
+
+
+def optimised(tiefort, area):
+    """What the compiler is asked for, by name; one row as it is where it does not know efforts yet."""
+    plain = {"method": "optimised"}
+    asked = plain | {"effort": EFFORTS[0], "height_fit": HEIGHT_FITS[0]}
+    ran = run(tiefort, "plan", write_job(changed(area.job, tin=asked)))
+    if ran["code"] != 0:
+        skip(f"{area.name}, efforts", f"{why(ran)}; `optimised` is run as it is")
+        return [("optimised, as it is", plain)]
+    return [(f"{effort}, {fit}", plain | {"effort": effort, "height_fit": fit})
+            for effort in EFFORTS for fit in HEIGHT_FITS]
+
+
+def best_paper(results):
+    """The paper's row of lowest RMS. Its own practice is equal shares of points; shares by need are stronger."""
+    rows = [result for name, result in results.items() if name.startswith("paper + clip")]
+    return min(rows, key=lambda row: row["rms_m"], default={})
+
+
+def row_of(ran):
+    report = ran["report"]
+    return {
+        "mean": report["per_load_module"]["mean"],
+        "largest": report["per_load_module"]["max"],
+        "window": report["per_4km"]["max"],
+        "breaches": len(report["breaches"]),
+        "triangles": report["triangles"],
+        **{key: report["residual"][key] for key in ("rms_m", "max_m", "mean_abs_m")},
+        "seconds": ran["wall_s"],
+        "cpu_s": ran["cpu_s"],
+        "peak_mb": ran["peak_mb"],
+        "judged": ran.get("judged"),
+    }
+
+
+def paper_clip(tiefort, area, mean, allocation):
+    """The paper's method with clipped edges at the number of points that gives `mean` triangles per load module.
+
+    The limit on the mean is lifted meanwhile, or points would be taken out to meet it after they were chosen; the
+    limits of a load module and of a 4 km square stay.
+    """
+    limits = {"mean_per_load_module": area.job["limits"]["per_load_module"]}
+    modules = area.job["area"]["size_m"][0] * area.job["area"]["size_m"][1] // MODULE_M**2
+    tin = {"method": "paper", "key": "max", "allocation": allocation}
+    low, high, best = 0, modules * mean, None
+    points = modules * mean // 4
+    for _ in range(BUILDS_MAX):
+        job = changed(area.job, limits=limits, load_modules={"edges": "clip"}, tin=tin | {"points": int(points)})
+        ran = build(tiefort, area, job, judge=False)
+        if "report" not in ran:
+            return skip(f"{area.name}, paper + clip", why(ran))
+        found = ran["report"]["per_load_module"]["mean"]
+        if best is None or abs(found - mean) < abs(best[0] - mean):
+            best = (found, job)
+        if abs(found - mean) <= MEAN_WITHIN or high - low <= POINTS_WITHIN * high:
+            break
+        low, high = (points, high) if found < mean else (low, points)
+        points = (low + high) // 2
+    return row_of(build(tiefort, area, best[1])) | {"points": best[1]["tin"]["points"]}
+
+
+def regular_grid(area):
+    """A vertex every border step, two triangles a cell: 32 a load module of 500 m at 125 m."""
+    import numpy
+
+    step = int(area.job.get("load_modules", {}).get("border_step_m", 125) // area.spacing_m[0])
+    rows, columns = (numpy.arange(0, posts, step) for posts in area.heights.shape)
+    y, x = (axis.ravel() for axis in numpy.meshgrid(rows, columns, indexing="ij"))
+    a = (numpy.arange(len(rows) - 1)[:, None] * len(columns) + numpy.arange(len(columns) - 1)).ravel()
+    b, c, d = a + 1, a + 1 + len(columns), a + len(columns)
+    mesh = FOLDER / "area.mesh"
+    write_mesh(mesh, numpy.column_stack([x, y, area.heights[y, x]]),
+               numpy.concatenate([numpy.column_stack([a, b, c]), numpy.column_stack([a, c, d])]))
+    judged = evaluate(mesh, area.raw, area.spacing_m)
+    cells_a_side = MODULE_M / area.spacing_m[0] / step
+    result = {key: judged[key] for key in ("rms_m", "max_m", "mean_abs_m", "triangles")}
+    return result | {"mean": 2 * cells_a_side**2, "judged": judged}
+
+
+def cells(name, result, paper, grid):
+    judged = result["judged"]
+    sight = judged["sight"]
+    return [
+        name, number(result["mean"], 2), number(result["rms_m"], 3), ratio(result["rms_m"], paper),
+        ratio(result["rms_m"], grid), number(result["max_m"], 1), number(result["mean_abs_m"], 3),
+        number(result.get("largest"), 0), number(result.get("window"), 0), number(result.get("breaches"), 0),
+        number(result.get("seconds"), 2), number(result.get("peak_mb"), 0), faults(judged),
+        number(100 * sight["agreement"], 1), number(100 * sight["tin_visible"], 1),
+        number(judged["slope_rms_degrees"], 2),
+    ]
+
+
+# --- the cost of tiles ---
+
+
+def tiling(tiefort, area):
+    """RMS of one area in ever more tiles, points shared by what they gain and equally; and near tile lines."""
+    effort = {} if optimised(tiefort, area)[0][0] == "optimised, as it is" else {"effort": "normal"}
+    results, rows = {}, []
+    for side in (1, 3, 6, 12):
+        for allocation in ("global", "equal") if 1 < side else ("global",):
+            name = f"{side} x {side}" + (f", {allocation}" if 1 < side else "")
+            tell(f"{area.name}: tiles {name}")
+            tin = {"method": "optimised", "allocation": allocation} | effort
+            ran = build(tiefort, area, changed(area.job, tiles={"columns": side, "rows": side}, tin=tin))
+            if "report" not in ran:
+                skip(f"{area.name}, tiles {name}", why(ran))
+                continue
+            results[name] = row_of(ran)
+    whole = results.get("1 x 1", {}).get("rms_m")
+    for name, result in results.items():
+        seams = result["judged"].get("seams", {})
+        near = ratio(seams["rms_m"], seams["others_rms_m"]) if seams.get("posts") else ""
+        rows.append([name, number(result["mean"], 2), number(result["rms_m"], 3), ratio(result["rms_m"], whole),
+                     number(result["max_m"], 1), near, number(result["breaches"], 0), number(result["seconds"], 2),
+                     number(result["peak_mb"], 0), faults(result["judged"])])
+    head = ["tiles", "mean", "RMS m", "of 1 x 1", "max m", f"RMS within {NEAR_SEAMS_M} m of a tile line, of elsewhere",
+            "breaches", "seconds", "MB", "valid"]
+    markdown(f"{area.name}: what tiles cost", head, rows)
+    return results

@@ -1,0 +1,161 @@
+"""What the fidelity benchmark works with: a Python with its packages, its C++ programs, files, runs, tables."""
+
+import contextlib
+import hashlib
+import json
+import os
+import pathlib
+import shutil
+import struct
+import subprocess
+import sys
+import venv
+
+from bench import LAUNCHER, ROOT
+
+TARGET = pathlib.Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
+FOLDER = TARGET / "bench" / "fidelity"
+VENV = FOLDER / "venv"
+PACKAGES = ["pydelatin==0.4.0", "numpy", "rasterio"]
+SOURCES = pathlib.Path(__file__).resolve().parent
+DATA = pathlib.Path(os.environ.get("TIEFORT_DATA", ROOT / ".." / "shared" / "data")).resolve()
+
+
+def tell(text):
+    """Says something to whoever waits; tables go to stdout."""
+    print(text, file=sys.stderr, flush=True)
+
+
+def skip(what, why):
+    tell(f"SKIPPED {what}: {why}")
+
+
+# --- programs ---
+
+
+def prepare_venv():
+    """Installs the packages, and goes on in the Python that has them."""
+    if pathlib.Path(sys.prefix) == VENV:
+        return
+    python = VENV / ("Scripts" if os.name == "nt" else "bin") / "python"
+    if not python.exists():
+        venv.create(VENV, with_pip=True)
+    subprocess.run([python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", *PACKAGES], check=True)
+    sys.exit(subprocess.run([python, *sys.argv]).returncode)
+
+
+def compiled(name, *flags):
+    """The program made of a C++ file of this folder, compiled when it is not the newest; None when it cannot be."""
+    source, program = SOURCES / f"{name}.cpp", FOLDER / name
+    if program.exists() and source.stat().st_mtime < program.stat().st_mtime:
+        return program
+    if not shutil.which("g++"):
+        return skip(name, "no g++")
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    done = subprocess.run(["g++", "-O2", "-std=c++17", *flags, "-o", program, source], capture_output=True, text=True)
+    if done.returncode != 0:
+        return skip(name, f"g++ does not compile it\n{done.stderr}")
+    return program
+
+
+def lindstrom_turk():
+    """The driver of CGAL's edge collapse; its headers are installed where that is permitted."""
+    if not pathlib.Path("/usr/include/CGAL/Surface_mesh_simplification").exists():
+        if os.name == "nt" or os.geteuid() != 0 or not shutil.which("apt-get"):
+            return skip("Lindstrom-Turk", "libcgal-dev is not installed, and this user may not install it")
+        tell("installing libcgal-dev")
+        for words in [["update", "--quiet"], ["install", "--yes", "--no-install-recommends", "libcgal-dev"]]:
+            if subprocess.run(["apt-get", *words], stdout=subprocess.DEVNULL).returncode != 0:
+                return skip("Lindstrom-Turk", f"apt-get {words[0]} did not work")
+    return compiled("lindstrom_turk", "-DNDEBUG")
+
+
+def run(*command):
+    """Runs a command: exit code, output, wall and CPU seconds, peak memory in MB (of the command alone)."""
+    command = [str(word) for word in command]
+    launched = subprocess.run([sys.executable, "-S", "-c", LAUNCHER, *command], capture_output=True, check=True)
+    return json.loads(launched.stdout)
+
+
+def last_line(text):
+    lines = text.strip().splitlines()
+    return lines[-1] if lines else ""
+
+
+def why(ran):
+    """The message of a command that ended with an error, in a line."""
+    lines = [line for line in ran["err"].splitlines() if line.strip()]
+    found = [line for line in lines if line.startswith("error")] or lines[-1:]
+    return f"exit code {ran['code']}: {found[0] if found else 'no message'}"
+
+
+# --- files ---
+
+
+def write_heights(path, heights):
+    """Heights, rows from the south, as the C++ programs read them."""
+    rows, columns = heights.shape
+    path.write_bytes(struct.pack("<II", columns, rows) + heights.astype("<f4").tobytes())
+
+
+def write_mesh(path, vertices, triangles, steps_per_post=1):
+    """A mesh in posts from the south-west one, as the evaluator reads it."""
+    import numpy
+
+    vertices, triangles = numpy.asarray(vertices, "<f8"), numpy.asarray(triangles, "<u4")
+    head = struct.pack("<8sIII", b"MESHPOST", steps_per_post, len(vertices), len(triangles))
+    path.write_bytes(head + vertices.tobytes() + triangles.tobytes())
+
+
+def evaluate(mesh, heights, spacing_m, *options):
+    """What the evaluator says of a mesh file, as a dictionary."""
+    ran = run(compiled("evaluate"), mesh, heights, *spacing_m, *options)
+    if ran["code"] not in (0, 1):
+        sys.exit(f"the evaluator cannot read {mesh}: {why(ran)}")
+    return json.loads(ran["out"])
+
+
+def digest(path):
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+@contextlib.contextmanager
+def scratch(name):
+    """A folder for one thing at a time, gone afterwards: a database of a large area is not small."""
+    path = FOLDER / name
+    shutil.rmtree(path, ignore_errors=True)
+    try:
+        yield path
+    finally:
+        shutil.rmtree(path, ignore_errors=True)
+
+
+# --- tables ---
+
+
+def faults(judged):
+    """`yes`, or what is wrong with a surface: the first few of its faults."""
+    if judged["valid"]:
+        return "yes"
+    found = [f"{count} {name.replace('_', ' ')}" for name, count in judged["faults"].items() if count]
+    return "NO: " + ", ".join(found[:2]) + (f", {len(found) - 2} more kinds" if 2 < len(found) else "")
+
+
+def number(value, digits):
+    return "" if value is None else f"{value:,.{digits}f}"
+
+
+def ratio(value, of, digits=3):
+    return "" if value is None or not of else f"{value / of:.{digits}f}"
+
+
+def markdown(title, head, rows):
+    """A table as Markdown, padded so that it can be read as it is."""
+    cells = [[str(cell) for cell in row] for row in [head, *rows]]
+    widths = [max(len(row[column]) for row in cells) for column in range(len(head))]
+    padded = [
+        "| " + " | ".join([row[0].ljust(widths[0]), *(cell.rjust(w) for cell, w in zip(row[1:], widths[1:]))]) + " |"
+        for row in cells
+    ]
+    rule = "| " + " | ".join(["-" * widths[0], *("-" * (w - 1) + ":" for w in widths[1:])]) + " |"
+    print("\n".join([f"\n### {title}\n", padded[0], rule, *padded[1:]]), flush=True)
