@@ -64,8 +64,10 @@ impl Refinement {
         let more = |count: usize| (count as f64 * times) as usize;
         let mut task = self.task.clone();
         if let Frame::Sides { allowance, .. } = &mut task.frame {
+            let room = |room: &[u32]| room.iter().map(|&room| more(room as usize) as u32).collect();
             *allowance = Allowance {
                 triangles: more(allowance.triangles as usize) as u32,
+                module_room: room(&allowance.module_room),
                 window_room: match optimising.effort {
                     Effort::Fast => allowance.window_room.clone(),
                     Effort::Normal | Effort::Best => vec![NO_LIMIT; allowance.window_room.len()],

@@ -1,6 +1,6 @@
 //! The ledger of one tile, by place: what a point there is charged to, asked and booked in one go.
 
-use terrain::{ModuleId, RefusedBy};
+use terrain::{ModuleId, ModuleRect, RefusedBy};
 
 use crate::{Allowance, Charged, Ledger, ModuleLines, POINT_COST};
 
@@ -84,6 +84,21 @@ impl TileLedger {
             Some(Charged::Between(first, second)) => self.ledger.is_over(first) || self.ledger.is_over(second),
             None => false,
         }
+    }
+
+    /// The load modules in which a point has to go before one can come there, where a limit refuses it.
+    pub fn where_to_save(&self, row: i32, col: i32) -> Option<ModuleRect> {
+        let (module, _) = self.refuses(row, col)?;
+        let cost = match self.lines.charged(row, col)? {
+            Charged::Inside(_) => POINT_COST,
+            Charged::Between(..) => 1,
+        };
+        Some(self.ledger.where_to_save(module, cost))
+    }
+
+    /// What a point there is charged to; `None` for a load-module corner.
+    pub fn charged(&self, row: i32, col: i32) -> Option<Charged> {
+        self.lines.charged(row, col)
     }
 
     /// The counts behind it.

@@ -1,7 +1,7 @@
 //! What the mesh has and what it may have.
 
-use limits::{POINT_COST, TileLedger};
-use terrain::{ModuleId, RefusedBy};
+use limits::{Charged, POINT_COST, TileLedger};
+use terrain::{ModuleId, ModuleRect, RefusedBy};
 
 use crate::place::{PER_POST, Place};
 use crate::sheet::{Hold, NONE, Sheet, Vertex};
@@ -98,6 +98,28 @@ impl Account {
     pub fn refuses(&self, at: Place) -> Option<(ModuleId, RefusedBy)> {
         let Books::Limits(ledger) = &self.books else { return None };
         ledger.refuses(at.y, at.x)
+    }
+
+    /// The load modules in which a vertex has to go before one can come there, where a limit refuses it.
+    pub fn where_to_save(&self, at: Place) -> Option<ModuleRect> {
+        let Books::Limits(ledger) = &self.books else { return None };
+        ledger.where_to_save(at.y, at.x)
+    }
+
+    /// The load module a place lies in, or the first of the two beside it; `None` for corners and without limits.
+    pub fn module_of(&self, at: Place) -> Option<ModuleId> {
+        let Books::Limits(ledger) = &self.books else { return None };
+        match ledger.charged(at.y, at.x)? {
+            Charged::Inside(module) | Charged::Between(module, _) => Some(module),
+        }
+    }
+
+    /// Whether `guest` would fit if `vertex` were not there.
+    pub fn permits_instead_of(&mut self, vertex: &Vertex, guest: &Vertex) -> bool {
+        self.refund(vertex);
+        let permitted = self.permits(guest);
+        self.charge(vertex);
+        permitted
     }
 
     /// Whether a vertex fits into the total and every limit.

@@ -4,7 +4,8 @@ use crate::account::Account;
 use crate::insertion::{Found, Insertion};
 use crate::queue::Queue;
 use crate::removal::Removal;
-use crate::sheet::{NONE, Sheet};
+use crate::sheet::{NONE, Sheet, Vertex};
+use crate::tenants::Tenants;
 use crate::thin::is_dearer;
 
 /// Part of its gain that an insertion may have lost since it was judged.
@@ -30,6 +31,8 @@ pub(crate) struct Exchange {
     judged: Vec<[u32; 3]>,
     removals: Queue,
     insertions: Queue,
+    /// Who stands where, once a limit has refused somebody in this round.
+    tenants: Option<Tenants>,
 }
 
 /// The tools of a round.
@@ -66,7 +69,7 @@ impl Exchange {
                     break;
                 }
                 self.insertions.pop();
-                count += usize::from(self.insert(sheet, account, triangle, gain, tools));
+                count += usize::from(self.insert(sheet, account, terms, (triangle, gain), tools));
             }
         }
         count
@@ -78,7 +81,7 @@ impl Exchange {
     }
 
     fn judge_all(&mut self, sheet: &mut Sheet, terms: Terms, tools: &mut Tools) {
-        (self.removals, self.insertions) = (Queue::default(), Queue::default());
+        (self.removals, self.insertions, self.tenants) = (Queue::default(), Queue::default(), None);
         self.grow(sheet);
         if terms == Terms::OneForOne {
             for vertex in 0..sheet.vertices.len() as u32 {
@@ -125,12 +128,20 @@ impl Exchange {
         }
     }
 
-    fn remove(&mut self, sheet: &mut Sheet, account: &mut Account, vertex: u32, before: f64, tools: &mut Tools) {
-        let Some(cost) = tools.removal.find(sheet, vertex) else { return };
+    /// Gives whether the vertex went; it does not if it has become dearer.
+    fn remove(
+        &mut self,
+        sheet: &mut Sheet,
+        account: &mut Account,
+        vertex: u32,
+        before: f64,
+        tools: &mut Tools,
+    ) -> bool {
+        let Some(cost) = tools.removal.find(sheet, vertex) else { return false };
         if is_dearer(cost, before) {
             self.costs[vertex as usize] = Some(cost);
             self.removals.enter(vertex, -cost);
-            return;
+            return false;
         }
         account.refund(&sheet.vertices[vertex as usize]);
         tools.removal.patch.old.iter().for_each(|&old| self.insertions.cancel(old));
@@ -139,6 +150,7 @@ impl Exchange {
         let ring = std::mem::take(&mut tools.removal.star.ring);
         self.judge_around(sheet, &ring, tools);
         tools.removal.star.ring = ring;
+        true
     }
 
     /// Gives whether a vertex was inserted.
@@ -146,13 +158,18 @@ impl Exchange {
         &mut self,
         sheet: &mut Sheet,
         account: &mut Account,
-        triangle: u32,
-        before: f64,
+        terms: Terms,
+        (triangle, before): (u32, f64),
         tools: &mut Tools,
     ) -> bool {
         let Some(Found { gain, vertex }) = tools.insertion.find(sheet, triangle) else { return false };
-        if !account.permits(&sheet.vertices[vertex as usize]) {
+        let guest = sheet.vertices[vertex as usize];
+        if !account.permits(&guest) {
             sheet.drop_vertex(vertex);
+            if terms == Terms::OneForOne && self.make_room(sheet, account, &guest, (triangle, gain), tools) {
+                // The ground around may have changed: it comes up again, and next if it is still worth as much.
+                self.insertions.enter(triangle, gain);
+            }
             return false;
         }
         if gain < before - LOST * before - LEAST_GAIN {
@@ -163,7 +180,10 @@ impl Exchange {
             }
             return false;
         }
-        account.charge(&sheet.vertices[vertex as usize]);
+        account.charge(&guest);
+        if let Some(tenants) = &mut self.tenants {
+            tenants.enter(account, sheet, vertex);
+        }
         tools.insertion.patch.old.iter().for_each(|&old| self.insertions.cancel(old));
         sheet.apply(&mut tools.insertion.patch);
         let mut around = Vec::new();
@@ -172,6 +192,34 @@ impl Exchange {
         }
         self.judge_around(sheet, &around, tools);
         true
+    }
+
+    /// Where limits refuse a guest in `triangle`: takes the vertex out that explains least of those which stand in its
+    /// way, if the guest explains more. Gives whether one went.
+    fn make_room(
+        &mut self,
+        sheet: &mut Sheet,
+        account: &mut Account,
+        guest: &Vertex,
+        (triangle, gain): (u32, f64),
+        tools: &mut Tools,
+    ) -> bool {
+        let Some(place) = account.where_to_save(guest.at) else { return false };
+        let tenants = self.tenants.get_or_insert_with(|| Tenants::new(account, sheet));
+        let corners = sheet.triangles[triangle as usize].corners;
+        let cost = |vertex: u32| self.costs[vertex as usize].filter(|_| sheet.is_vertex(vertex));
+        let cheap = tenants.within(place).filter(|vertex| !corners.contains(vertex));
+        let mut cheap: Vec<(f64, u32)> = cheap
+            .filter_map(|vertex| Some((cost(vertex)?, vertex)))
+            .filter(|(cost, _)| cost + LEAST_GAIN < gain)
+            .collect();
+        cheap.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        for (before, vertex) in cheap {
+            if account.permits_instead_of(&sheet.vertices[vertex as usize], guest) {
+                return self.remove(sheet, account, vertex, before, tools);
+            }
+        }
+        false
     }
 
     /// Judges again what a change has touched: its vertices, and the triangles around them.
@@ -189,7 +237,7 @@ impl Exchange {
             }
             // A vertex that may not go still has triangles.
             sheet.star(vertex, &mut star);
-            for &triangle in &star.triangles {
+            for triangle in star.triangles() {
                 if !triangles.contains(&triangle) {
                     triangles.push(triangle);
                 }

@@ -3,7 +3,7 @@
 use crate::form::{Form, squares};
 use crate::patch::Patch;
 use crate::place::Place;
-use crate::sheet::{LEAST_AREA, NONE, Sheet};
+use crate::sheet::{LEAST_AREA, NONE, Sheet, next, previous};
 
 /// Passes at most; hardly any mesh needs more than six.
 const PASSES_MAX: usize = 10;
@@ -16,7 +16,9 @@ const LEAST_SHARE: f64 = 0.02;
 pub(crate) fn flip_all(sheet: &mut Sheet) -> usize {
     let mut patch = Patch::default();
     let least = LEAST_SHARE * sheet.squares() / sheet.triangle_count as f64;
-    let mut active: Vec<bool> = sheet.vertices.iter().map(|vertex| vertex.is_stirred).collect();
+    let is_stirred = |corner: u32| sheet.vertices.get(corner as usize).is_some_and(|vertex| vertex.is_stirred);
+    let mut active: Vec<bool> =
+        sheet.triangles.iter().map(|triangle| triangle.corners.into_iter().any(is_stirred)).collect();
     let mut total = 0;
     for _ in 0..PASSES_MAX {
         let mut touched = vec![false; active.len()];
@@ -28,9 +30,7 @@ pub(crate) fn flip_all(sheet: &mut Sheet) -> usize {
                 {
                     continue;
                 }
-                for (corners, _) in &patch.new {
-                    corners.iter().for_each(|&corner| touched[corner as usize] = true);
-                }
+                patch.old.iter().for_each(|&triangle| touched[triangle as usize] = true);
                 sheet.apply(&mut patch);
                 flips += 1;
             }
@@ -44,15 +44,11 @@ pub(crate) fn flip_all(sheet: &mut Sheet) -> usize {
     total
 }
 
-/// Whether an inner edge, looked at from its lower side only, has an active vertex near.
+/// Whether an inner edge, looked at from its lower side only, has an active triangle beside it.
 #[inline(always)]
 fn is_active(sheet: &Sheet, edge: u32, active: &[bool]) -> bool {
     let twin = sheet.twin(edge);
-    if twin == NONE || twin < edge {
-        return false;
-    }
-    let (a, b) = sheet.ends(edge);
-    [a, b, sheet.apex(edge), sheet.apex(twin)].iter().any(|&vertex| active[vertex as usize])
+    twin != NONE && edge < twin && (active[(edge >> 2) as usize] || active[(twin >> 2) as usize])
 }
 
 /// Fills `patch` with the flip of an inner edge, if that is valid and gains.
@@ -73,13 +69,13 @@ fn find(sheet: &Sheet, edge: u32, least: f64, patch: &mut Patch) -> bool {
     }
     let moments = &sheet.ground.moments;
     let diagonal = moments.edge(at_first[1], at_first[2]);
-    let sums = diagonal + moments.edge(at_first[0], at_first[1]) + moments.edge(at_first[2], at_first[0]);
+    let sums = diagonal + sheet.sums_of(next(twin)) + sheet.sums_of(previous(edge));
     let squares_first = squares(&sums, at_first, sheet.heights(first));
     let bound = old * (1.0 - LEAST_GAIN);
     if bound <= squares_first {
         return false;
     }
-    let rest = moments.edge(at_second[0], at_second[1]) + moments.edge(at_second[1], at_second[2]) - diagonal;
+    let rest = sheet.sums_of(previous(twin)) + sheet.sums_of(next(edge)) - diagonal;
     if bound <= squares_first + squares(&rest, at_second, sheet.heights(second)) {
         return false;
     }

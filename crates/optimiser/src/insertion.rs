@@ -123,7 +123,7 @@ impl Insertion {
         let (from, to) = sheet.ends(edge);
         let (a, b) = (sheet.at(from), sheet.at(to));
         let moments = &sheet.ground.moments;
-        let sums = [moments.edge(guest.at, a), moments.edge(a, b), moments.edge(guest.at, b)];
+        let sums = [moments.edge(guest.at, a), sheet.sums_of(edge), moments.edge(guest.at, b)];
         self.faces.push(Face::new(sheet, guest, (from, to), sheet.twin(edge), sums));
     }
 
@@ -160,16 +160,15 @@ impl Insertion {
             return None;
         }
         let old = face.squares + sheet.triangles[beyond as usize].squares;
-        let moments = &sheet.ground.moments;
-        let spoke = moments.edge(guest.at, d);
-        let sums = [face.sums[0], moments.edge(a, d), spoke];
-        let (first_twin, second_twin) = (sheet.twin(next(face.twin)), sheet.twin(previous(face.twin)));
-        let first = Face::new(sheet, guest, (face.from, apex), first_twin, sums);
+        let spoke = sheet.ground.moments.edge(guest.at, d);
+        let (first_rim, second_rim) = (next(face.twin), previous(face.twin));
+        let sums = [face.sums[0], sheet.sums_of(first_rim), spoke];
+        let first = Face::new(sheet, guest, (face.from, apex), sheet.twin(first_rim), sums);
         if old <= first.squares {
             return None;
         }
-        let sums = [spoke, moments.edge(d, b), face.sums[2]];
-        let second = Face::new(sheet, guest, (apex, face.to), second_twin, sums);
+        let sums = [spoke, sheet.sums_of(second_rim), face.sums[2]];
+        let second = Face::new(sheet, guest, (apex, face.to), sheet.twin(second_rim), sums);
         (first.squares + second.squares < old * (1.0 - LEAST_FLIP_GAIN)).then_some([first, second])
     }
 

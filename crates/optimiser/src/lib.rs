@@ -26,6 +26,7 @@ mod refit;
 mod removal;
 mod sheet;
 mod sweep;
+mod tenants;
 mod thin;
 
 #[cfg(test)]

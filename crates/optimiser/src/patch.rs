@@ -1,6 +1,7 @@
 //! Changing a mesh in one place: other triangles over the same outline.
 
 use crate::form::Form;
+use crate::moments::Sums;
 use crate::sheet::{NONE, Sheet, Triangle};
 
 /// A change in one place: triangles that go, triangles that come over the same outline, heights that move.
@@ -11,8 +12,16 @@ pub(crate) struct Patch {
     /// Vertices whose heights are fitted again, and by how much they rise.
     pub refit: Vec<u32>,
     pub rise: Vec<f64>,
-    outline: Vec<(u32, u32, u32)>,
+    outline: Vec<Outer>,
     slots: Vec<u32>,
+}
+
+/// An edge of the outline of what is changed.
+struct Outer {
+    from: u32,
+    to: u32,
+    twin: u32,
+    sums: Sums,
 }
 
 impl Patch {
@@ -61,7 +70,7 @@ impl Sheet<'_> {
                 let twin = self.twin(edge);
                 if twin == NONE || !patch.old.contains(&(twin >> 2)) {
                     let (from, to) = self.ends(edge);
-                    patch.outline.push((from, to, twin));
+                    patch.outline.push(Outer { from, to, twin, sums: self.sums_of(edge) });
                 }
             }
         }
@@ -81,6 +90,7 @@ impl Sheet<'_> {
         self.free_triangles.pop().unwrap_or_else(|| {
             self.triangles.push(Triangle { corners: [NONE; 3], twins: [NONE; 3], squares: 0.0 });
             self.forms.push(Form::default());
+            self.sums.push([Sums::default(); 3]);
             self.triangles.len() as u32 - 1
         })
     }
@@ -93,8 +103,13 @@ impl Sheet<'_> {
         let vertex = &mut self.vertices[from as usize];
         vertex.edge = edge;
         vertex.is_stirred = true;
-        let twin = match patch.outline.iter().find(|&&(a, b, _)| a == from && b == to) {
-            Some(&(_, _, twin)) => twin,
+        let outer = patch.outline.iter().find(|outer| outer.from == from && outer.to == to);
+        self.sums[patch.slots[i] as usize][k] = match outer {
+            Some(outer) => outer.sums,
+            None => self.ground.moments.edge(self.at(from), self.at(to)),
+        };
+        let twin = match outer {
+            Some(outer) => outer.twin,
             None => patch
                 .new
                 .iter()

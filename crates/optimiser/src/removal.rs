@@ -30,8 +30,8 @@ impl Removal {
         }
         sheet.star(vertex, &mut self.star);
         self.patch.clear();
-        self.patch.old.extend_from_slice(&self.star.triangles);
-        let old: f64 = self.star.triangles.iter().map(|&triangle| sheet.triangles[triangle as usize].squares).sum();
+        self.patch.old.extend(self.star.triangles());
+        let old: f64 = self.star.triangles().map(|triangle| sheet.triangles[triangle as usize].squares).sum();
         let new = if record.hold.is_on_line() && self.star.is_closed() {
             let (first, second) = self.ends_of_line(sheet, record.hold, record.at)?;
             let ring = &self.star.ring;

@@ -5,6 +5,7 @@ use terrain::{PostRect, Tin, Vertex as TinVertex};
 use crate::curve::along_curve;
 use crate::form::Form;
 use crate::ground::Ground;
+use crate::moments::Sums;
 use crate::place::{PER_POST, Place};
 
 /// No edge, no vertex, no triangle.
@@ -100,14 +101,20 @@ pub(crate) fn previous(edge: u32) -> u32 {
 /// The triangles around a vertex, counter-clockwise.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Star {
-    pub triangles: Vec<u32>,
-    /// Corner `i` is the one after the vertex in triangle `i`; a vertex on the border has one more than triangles.
+    /// The edges that leave the vertex, one in each triangle.
+    pub edges: Vec<u32>,
+    /// Where they lead; a vertex on the border has one more neighbour than triangles.
     pub ring: Vec<u32>,
 }
 
 impl Star {
     pub fn is_closed(&self) -> bool {
-        self.triangles.len() == self.ring.len()
+        self.edges.len() == self.ring.len()
+    }
+
+    #[inline(always)]
+    pub fn triangles(&self) -> impl ExactSizeIterator<Item = u32> {
+        self.edges.iter().map(|&edge| edge >> 2)
     }
 }
 
@@ -125,6 +132,8 @@ pub(crate) struct Sheet<'a> {
     pub vertices: Vec<Vertex>,
     pub triangles: Vec<Triangle>,
     pub forms: Vec<Form>,
+    /// Sums west of each triangle's edges: an edge is walked when it comes to be, not whenever it is looked at.
+    pub sums: Vec<[Sums; 3]>,
     pub triangle_count: usize,
     pub vertex_count: usize,
     free_vertices: Vec<u32>,
@@ -140,6 +149,7 @@ impl<'a> Sheet<'a> {
             vertices: Vec::new(),
             triangles: Vec::new(),
             forms: Vec::new(),
+            sums: Vec::new(),
             triangle_count: 0,
             vertex_count: 0,
             free_vertices: Vec::new(),
@@ -190,7 +200,8 @@ impl<'a> Sheet<'a> {
             .map(|&triangle| Triangle { corners: corners(triangle), twins: [NONE; 3], squares: 0.0 })
             .collect();
         self.link();
-        self.forms = self.triangles.iter().map(|record| self.form_of(record.corners)).collect();
+        self.walk_edges();
+        self.forms = self.triangles.iter().zip(&self.sums).map(|(record, sums)| self.form_of(record, sums)).collect();
         (0..self.triangles.len() as u32).for_each(|triangle| self.settle(triangle));
         (self.vertex_count, self.triangle_count) = (self.vertices.len(), self.triangles.len());
     }
@@ -216,6 +227,26 @@ impl<'a> Sheet<'a> {
             }
             self.triangles[(edge >> 2) as usize].twins[(edge & 3) as usize] = other;
         }
+    }
+
+    /// Sums west of every edge; its twin has the same, negative.
+    fn walk_edges(&mut self) {
+        self.sums.clear();
+        for (triangle, record) in self.triangles.iter().enumerate() {
+            let [a, b, c] = self.places(record.corners);
+            let sums = |k: usize, from: Place, to: Place| match record.twins[k] {
+                twin if twin < 4 * triangle as u32 => -self.sums_of(twin),
+                _ => self.ground.moments.edge(from, to),
+            };
+            let sums = [sums(0, a, b), sums(1, b, c), sums(2, c, a)];
+            self.sums.push(sums);
+        }
+    }
+
+    /// Sums over the posts west of an edge.
+    #[inline(always)]
+    pub fn sums_of(&self, edge: u32) -> Sums {
+        self.sums[(edge >> 2) as usize][(edge & 3) as usize]
     }
 
     fn edges(&self) -> impl Iterator<Item = u32> + use<> {
@@ -284,9 +315,8 @@ impl<'a> Sheet<'a> {
         (a.at.x == b.at.x && both(Hold::COLUMN)) || (a.at.y == b.at.y && both(Hold::ROW))
     }
 
-    pub fn form_of(&self, corners: [u32; 3]) -> Form {
-        let places = self.places(corners);
-        Form::new(&self.ground.moments.triangle(places), places)
+    fn form_of(&self, record: &Triangle, sums: &[Sums; 3]) -> Form {
+        Form::new(&(sums[0] + sums[1] + sums[2]), self.places(record.corners))
     }
 
     /// Brings a triangle's squares up to date with its corners' heights.
@@ -334,7 +364,7 @@ impl<'a> Sheet<'a> {
     /// Fills `star` with the triangles around a vertex.
     #[inline(always)]
     pub fn star(&self, vertex: u32, star: &mut Star) {
-        star.triangles.clear();
+        star.edges.clear();
         star.ring.clear();
         let entry = self.vertices[vertex as usize].edge;
         // Clockwise to the border, if there is one, and then around from there.
@@ -351,7 +381,7 @@ impl<'a> Sheet<'a> {
         }
         let mut edge = first;
         loop {
-            star.triangles.push(edge >> 2);
+            star.edges.push(edge);
             star.ring.push(self.ends(edge).1);
             let back = previous(edge);
             let twin = self.twin(back);

@@ -10,7 +10,7 @@ use crate::form::{Form, Hinge};
 use crate::moments::Sums;
 use crate::place::{PER_POST, Place};
 use crate::refit::DAMPING;
-use crate::sheet::{Hold, LEAST_AREA, Sheet, Star, Vertex};
+use crate::sheet::{Hold, LEAST_AREA, Sheet, Star, Vertex, next};
 
 /// Relative and absolute damping of steps in the plane.
 const PLANE_DAMPING: (f64, f64) = (0.01, 0.02);
@@ -43,6 +43,8 @@ pub(crate) struct Mover {
     around: Vec<(Place, f64)>,
     /// Sums west of the edges from the vertex, and of those opposite to it.
     spokes: Vec<Sums>,
+    /// The place the spokes were summed from.
+    hub: Option<Place>,
     rims: Vec<Sums>,
     candidates: Vec<Place>,
     /// Lattice places by what the normal equations promise of them.
@@ -77,6 +79,7 @@ impl Mover {
             star: Star::default(),
             around: Vec::new(),
             spokes: Vec::new(),
+            hub: None,
             rims: Vec::new(),
             candidates: Vec::new(),
             ranked: Vec::new(),
@@ -227,6 +230,7 @@ impl Mover {
     #[inline(always)]
     fn look_around(&mut self, sheet: &Sheet) {
         self.around.clear();
+        self.hub = None;
         let look = |&vertex: &u32| (sheet.at(vertex), sheet.vertices[vertex as usize].height);
         self.around.extend(self.star.ring.iter().map(look));
     }
@@ -234,8 +238,13 @@ impl Mover {
     /// The places and heights that triangle `i` of the star has beside the vertex.
     #[inline(always)]
     fn opposite(&self, i: usize) -> [(Place, f64); 2] {
-        let next = if i + 1 == self.around.len() { 0 } else { i + 1 };
-        [self.around[i], self.around[next]]
+        [self.around[i], self.around[self.after(i)]]
+    }
+
+    /// The neighbour after neighbour `i`.
+    #[inline(always)]
+    fn after(&self, i: usize) -> usize {
+        if i + 1 == self.around.len() { 0 } else { i + 1 }
     }
 
     #[inline(always)]
@@ -246,7 +255,7 @@ impl Mover {
     /// Whether a vertex at a place leaves every triangle around it at least so large.
     #[inline(always)]
     fn leaves(&self, at: Place, least_area: i64) -> bool {
-        (0..self.star.triangles.len()).all(|i| {
+        (0..self.star.edges.len()).all(|i| {
             let [a, b] = self.opposite(i);
             least_area <= Place::orient(at, a.0, b.0)
         })
@@ -257,11 +266,9 @@ impl Mover {
         let record = &sheet.vertices[vertex as usize];
         let crest = record.hold.has(Hold::CREST).then(|| sheet.ground.slope(record.at));
         let mut normal = Normal::default();
-        for (i, &triangle) in self.star.triangles.iter().enumerate() {
-            let face = &sheet.triangles[triangle as usize];
-            let k =
-                face.corners.iter().position(|&corner| corner == vertex).expect("a star's triangles have its vertex");
-            let form = &sheet.forms[triangle as usize];
+        for (i, &edge) in self.star.edges.iter().enumerate() {
+            let (triangle, k) = ((edge >> 2) as usize, (edge & 3) as usize);
+            let (face, form) = (&sheet.triangles[triangle], &sheet.forms[triangle]);
             let pull = form.pull(k, sheet.heights(face.corners));
             let [a, b] = self.opposite(i);
             let (ax, ay) = Place::new(a.0.x - record.at.x, a.0.y - record.at.y).posts();
@@ -309,29 +316,31 @@ impl Mover {
     #[inline(always)]
     fn sum_rims(&mut self, sheet: &Sheet) {
         self.rims.clear();
-        for i in 0..self.star.triangles.len() {
-            let [a, b] = self.opposite(i);
-            self.rims.push(sheet.ground.moments.edge(a.0, b.0));
+        self.rims.extend(self.star.edges.iter().map(|&edge| sheet.sums_of(next(edge))));
+    }
+
+    #[inline(always)]
+    fn sum_spokes(&mut self, sheet: &Sheet, at: Place) {
+        if self.hub != Some(at) {
+            self.spokes.clear();
+            self.spokes.extend(self.around.iter().map(|&(to, _)| sheet.ground.moments.edge(at, to)));
+            self.hub = Some(at);
         }
     }
 
     /// The sums of triangle `i` of the star, spokes and rims being summed.
     #[inline(always)]
     fn sums(&self, i: usize) -> Sums {
-        let next = if i + 1 == self.spokes.len() { 0 } else { i + 1 };
-        self.spokes[i] + self.rims[i] - self.spokes[next]
+        self.spokes[i] + self.rims[i] - self.spokes[self.after(i)]
     }
 
     /// What comes of standing at a valid place, at the best height there.
     #[inline(always)]
     fn stand(&mut self, sheet: &Sheet, at: Place, height: f64, hold: Hold) -> Stand {
-        self.spokes.clear();
-        for &(to, _) in &self.around {
-            self.spokes.push(sheet.ground.moments.edge(at, to));
-        }
+        self.sum_spokes(sheet, at);
         let height = if hold.has(Hold::CREST) { sheet.ground.height(at) } else { height };
         let mut all = Hinge::default();
-        for i in 0..self.star.triangles.len() {
+        for i in 0..self.star.edges.len() {
             let [a, b] = self.opposite(i);
             all += Hinge::new(&self.sums(i), [at, a.0, b.0], [height, a.1, b.1]);
         }
@@ -350,16 +359,16 @@ impl Mover {
         let moved = record.at != stand.at;
         if moved {
             record.at = stand.at;
-            self.spokes.clear();
-            for &(to, _) in &self.around {
-                self.spokes.push(sheet.ground.moments.edge(stand.at, to));
-            }
+            self.sum_spokes(sheet, stand.at);
         }
-        for i in 0..self.star.triangles.len() {
-            let triangle = self.star.triangles[i];
+        for i in 0..self.star.edges.len() {
+            let (triangle, k) = (self.star.edges[i] >> 2, (self.star.edges[i] & 3) as usize);
             if moved {
                 let corners = sheet.triangles[triangle as usize].corners;
+                // Its own corners in their order: forms are rounded, and not alike from another corner.
                 sheet.forms[triangle as usize] = Form::new(&self.sums(i), sheet.places(corners));
+                let sums = &mut sheet.sums[triangle as usize];
+                (sums[k], sums[(k + 2) % 3]) = (self.spokes[i], -self.spokes[self.after(i)]);
             }
             sheet.settle(triangle);
         }
