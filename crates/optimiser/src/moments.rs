@@ -102,6 +102,11 @@ impl Moments {
         let at = row as usize * self.stride + col as usize;
         self.heights[at + 1][1] - self.heights[at][1]
     }
+
+    /// Sums over the posts that a counter-clockwise triangle owns.
+    pub fn triangle(&self, [a, b, c]: [Place; 3]) -> Sums {
+        self.edge(a, b) + self.edge(b, c) + self.edge(c, a)
+    }
 }
 
 /// Sums about a place of one's own.
@@ -246,12 +251,6 @@ impl Moments {
             Sums { heights, shape: [x, xx, y * xy, y * y * yy], rest: [y * heights[0], y * heights[1]] }
         };
         west_of(a.x) - west_of(b.x)
-    }
-
-    /// Sums over the posts that a counter-clockwise triangle owns.
-    #[inline(always)]
-    pub fn triangle(&self, [a, b, c]: [Place; 3]) -> Sums {
-        self.edge(a, b) + self.edge(b, c) + self.edge(c, a)
     }
 }
 
