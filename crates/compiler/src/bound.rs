@@ -1,23 +1,15 @@
-//! Where a limit was met only by refusing posts, and what it cost: each such load module is refined once more by
-//! itself, its sides as they are, with the refused posts let in.
+//! Where a limit was met only by refusing posts, and what it cost.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use database::{ReportBound, ReportPlace};
-use load_modules::{Layout, concatenate};
-use terrain::{
-    Dem, LATTICE_PER_POST, LatticePoint, ModuleId, ModuleRect, ModuleResidual, Post, PostRect, Refusal, RefusedBy,
-    SeamSides, TileId, Vertex, metres_of_quanta,
-};
-use tin::{Frame, Stop, TileTask};
+use terrain::{ModuleId, ModuleRect, ModuleResidual, Refusal, RefusedBy, TileId, metres_of_quanta};
 
 use crate::CompileError;
 use crate::assemble::ModuleNumbers;
-use crate::ground::Window;
 use crate::refine::Published;
-use crate::refinement::{Most, Refinement, optimising};
 use crate::run::Run;
-use crate::tasks::{posts_of, rule};
+use crate::without_limits::without_limits;
 
 /// The limits that refused posts, most posts first. `counts` and `numbers` are of every load module, row-major.
 pub(crate) fn bound(
@@ -125,75 +117,4 @@ fn rms_m(parts: impl Iterator<Item = ModuleResidual>) -> f64 {
     let (squares, posts) =
         parts.fold((0u64, 0u64), |(squares, posts), part| (squares + part.sum_squared, posts + u64::from(part.posts)));
     if posts == 0 { 0.0 } else { (squares as f64 / posts as f64).sqrt() / f64::from(terrain::QUANTA_PER_METRE) }
-}
-
-/// The residuals of the load modules of a tile in which posts were refused, had those been selected.
-fn without_limits(
-    run: &Run,
-    own: &Published,
-    refused: &BTreeMap<ModuleId, Vec<Refusal>>,
-) -> Result<Vec<(ModuleId, ModuleResidual)>, CompileError> {
-    let tile = run.area.tiling.modules(own.tin.tile, run.area.grid);
-    let window = run.window(own.tin.tile)?;
-    let mut vertices = own.tin.tin.vertices.clone();
-    vertices.sort_unstable();
-    let here = refused.iter().filter(|(module, _)| tile.contains(**module));
-    Ok(here
-        .map(|(&module, refusals)| (module, without_limit(run, &window, &vertices, module, refusals.len())))
-        .collect())
-}
-
-/// The residual of a load module had it been given `extra` more points than it has. `vertices` are those of its tile
-/// by row and column.
-fn without_limit(run: &Run, window: &Window, vertices: &[Vertex], module: ModuleId, extra: usize) -> ModuleResidual {
-    let area = &run.area;
-    let rect = area.grid.posts_of(module);
-    let (sides, inner) = sides_and_inner(vertices, rect);
-    let sides = on_posts(&sides, &window.dem);
-    let task = TileTask {
-        tile: area.tiling.tile_of_module(module, area.grid),
-        rect,
-        frame: Frame::Plain,
-        border: Vec::new(),
-        inherited: posts_of(&sides),
-        kept: Vec::new(),
-        seams: SeamSides::CLOSED,
-        rule: rule(run.job, area),
-        stop: Stop { points: Some(inner + extra), ..Stop::default() },
-    };
-    let window = Window { dem: window.dem.window(rect), importance: window.importance.window(rect) };
-    let refinement = Refinement { task, optimising: optimising(run.job), most: Most::AsTask };
-    let refined = refinement.run(&window, &sides);
-    let here = ModuleRect { south: module.row, west: module.col, north: module.row + 1, east: module.col + 1 };
-    let layout = Layout { grid: area.grid, modules: here, spacing: area.frame.spacing };
-    let mut modules = concatenate(&refined.tin, &layout, &window.importance);
-    fidelity::measure(&mut modules, &window.measured(area));
-    modules[0].residual
-}
-
-/// The vertices on the sides of a load module, and how many lie inside it.
-fn sides_and_inner(vertices: &[Vertex], rect: PostRect) -> (Vec<Vertex>, usize) {
-    let (low, high) = (LatticePoint::from(rect.south_west()), LatticePoint::from(rect.north_east()));
-    let first = vertices.partition_point(|vertex| vertex.at.row < low.row);
-    let rows = vertices[first..].iter().take_while(|vertex| vertex.at.row <= high.row);
-    let within = rows.filter(|vertex| low.col <= vertex.at.col && vertex.at.col <= high.col);
-    let is_on_side =
-        |at: LatticePoint| at.row == low.row || at.row == high.row || at.col == low.col || at.col == high.col;
-    let (sides, inner): (Vec<Vertex>, Vec<Vertex>) = within.copied().partition(|vertex| is_on_side(vertex.at));
-    (sides, inner.len())
-}
-
-/// Side vertices moved along their side to the nearest post, at the DEM's height there if they had to move: selection
-/// starts from posts.
-fn on_posts(sides: &[Vertex], dem: &Dem) -> Vec<Vertex> {
-    let nearest = |at: i32| (at + LATTICE_PER_POST / 2).div_euclid(LATTICE_PER_POST);
-    let moved = |vertex: &Vertex| {
-        let post = Post::new(nearest(vertex.at.row), nearest(vertex.at.col));
-        let at = LatticePoint::from(post);
-        Vertex { at, height: if at == vertex.at { vertex.height } else { dem.height(post) } }
-    };
-    let mut moved: Vec<Vertex> = sides.iter().map(moved).collect();
-    moved.sort_unstable();
-    moved.dedup_by_key(|vertex| vertex.at);
-    moved
 }

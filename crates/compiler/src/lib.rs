@@ -38,3 +38,4 @@ mod report;
 mod sources;
 mod survey;
 mod tasks;
+mod without_limits;

@@ -2,8 +2,8 @@
 
 use job::{Effort, HeightFit, Job, Lattice, Method, Optimising};
 use limits::Allowance;
-use optimiser::{Budget, Optimised, Task, optimise, overshoot};
-use terrain::{Dem, LatticePoint, THOUSANDTHS, TileTin, Vertex};
+use optimiser::{Budget, Optimised, Task, fill, optimise, overshoot};
+use terrain::{Dem, LatticePoint, THOUSANDTHS, TileTin, Tin, Vertex};
 use tin::{Frame, Rule, Stop, TileTask};
 
 use crate::ground::Window;
@@ -56,6 +56,11 @@ impl Refinement {
         let optimised =
             optimise(&window.dem, &window.importance, &grown.tin, &self.optimisation(optimising, grown.initial_count));
         self.join(grown, optimised)
+    }
+
+    /// A TIN with as many vertices more as the task's points permit, all counted; what it has is left alone.
+    pub fn fill(&self, window: &Window, optimising: Optimising, start: &Tin) -> Tin {
+        fill(&window.dem, &window.importance, start, &self.optimisation(optimising, 0)).tin
     }
 
     /// The growth, with room to thin from.

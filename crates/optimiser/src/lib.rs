@@ -9,7 +9,7 @@
 mod task;
 pub use task::{Budget, Effort, HeightFit, Lattice, Task};
 mod optimise;
-pub use optimise::{Optimised, optimise, overshoot};
+pub use optimise::{Optimised, fill, optimise, overshoot};
 
 mod account;
 mod curve;

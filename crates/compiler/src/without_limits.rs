@@ -1,0 +1,105 @@
+//! What load modules would be like without the limits that refused posts in them.
+//!
+//! Each is taken by itself, its sides as they are, and given as many points more as were refused. One that was
+//! optimised keeps its vertices and gains others where they explain most; where posts were selected, they are selected
+//! again.
+
+use std::collections::BTreeMap;
+
+use load_modules::{Layout, concatenate};
+use terrain::{
+    LATTICE_PER_POST, ModuleGrid, ModuleId, ModuleRect, ModuleResidual, PostRect, Refusal, SeamSides, Tin, Vertex,
+};
+use tin::{Frame, Stop, TileTask};
+
+use crate::CompileError;
+use crate::ground::Window;
+use crate::refine::Published;
+use crate::refinement::{Most, Refinement, optimising};
+use crate::run::Run;
+use crate::tasks::{posts_of, rule};
+
+/// The residuals of the load modules of a tile in which posts were refused, had it had that many more.
+pub(crate) fn without_limits(
+    run: &Run,
+    own: &Published,
+    refused: &BTreeMap<ModuleId, Vec<Refusal>>,
+) -> Result<Vec<(ModuleId, ModuleResidual)>, CompileError> {
+    let tile = run.area.tiling.modules(own.tin.tile, run.area.grid);
+    let window = run.window(own.tin.tile)?;
+    let parts = parts(&own.tin.tin, run.area.grid, tile);
+    let here = tile.iter().zip(&parts).filter_map(|(module, part)| Some((module, part, refused.get(&module)?)));
+    Ok(here
+        .map(|(module, part, refusals)| (module, without_limit(run, &window, module, part, refusals.len())))
+        .collect())
+}
+
+fn without_limit(run: &Run, window: &Window, module: ModuleId, part: &Tin, extra: usize) -> ModuleResidual {
+    let rect = part.rect;
+    let window = Window { dem: window.dem.window(rect), importance: window.importance.window(rect) };
+    let (sides, inner): (Vec<Vertex>, Vec<Vertex>) = part.vertices.iter().partition(|vertex| is_on_side(vertex, rect));
+    let optimising = optimising(run.job);
+    // What is filled has its sides already and counts all vertices; what is selected starts from its sides.
+    let (inherited, points) = match optimising {
+        Some(_) => (Vec::new(), part.vertices.len()),
+        None => (posts_of(&sides), inner.len()),
+    };
+    let task = TileTask {
+        tile: run.area.tiling.tile_of_module(module, run.area.grid),
+        rect,
+        frame: Frame::Plain,
+        border: Vec::new(),
+        inherited,
+        kept: Vec::new(),
+        seams: SeamSides::CLOSED,
+        rule: rule(run.job, &run.area),
+        stop: Stop { points: Some(points + extra), ..Stop::default() },
+    };
+    let refinement = Refinement { task, optimising, most: Most::AsTask };
+    let tin = match optimising {
+        Some(optimising) => refinement.fill(&window, optimising, part),
+        None => refinement.run(&window, &sides).tin,
+    };
+    let here = ModuleRect { south: module.row, west: module.col, north: module.row + 1, east: module.col + 1 };
+    let layout = Layout { grid: run.area.grid, modules: here, spacing: run.area.frame.spacing };
+    let mut modules = concatenate(&tin, &layout, &window.importance);
+    fidelity::measure(&mut modules, &window.measured(&run.area));
+    modules[0].residual
+}
+
+fn is_on_side(vertex: &Vertex, rect: PostRect) -> bool {
+    let step = |at: i32| at * LATTICE_PER_POST;
+    let at = vertex.at;
+    [rect.south, rect.north].map(step).contains(&at.row) || [rect.west, rect.east].map(step).contains(&at.col)
+}
+
+/// The parts of a tile's TIN that are its load modules, row by row.
+fn parts(tin: &Tin, grid: ModuleGrid, tile: ModuleRect) -> Vec<Tin> {
+    let empty = |id| Tin { rect: grid.posts_of(id), vertices: Vec::new(), triangles: Vec::new() };
+    let mut parts: Vec<Tin> = tile.iter().map(empty).collect();
+    let side = i64::from(grid.side_cells * LATTICE_PER_POST);
+    for triangle in &tin.triangles {
+        let corners = triangle.map(|v| tin.vertices[v as usize]);
+        let thirds = |v: [i32; 3]| (v.into_iter().map(i64::from).sum::<i64>() / (3 * side)) as u32;
+        let (row, col) = (thirds(corners.map(|v| v.at.row)), thirds(corners.map(|v| v.at.col)));
+        let part = &mut parts[((row - tile.south) * tile.cols() + col - tile.west) as usize];
+        let first = part.vertices.len() as u32;
+        part.vertices.extend(corners);
+        part.triangles.push([first, first + 1, first + 2]);
+    }
+    parts.iter_mut().for_each(weld);
+    parts
+}
+
+/// Names every vertex once.
+fn weld(part: &mut Tin) {
+    let corners = std::mem::take(&mut part.vertices);
+    part.vertices = corners.clone();
+    part.vertices.sort_unstable();
+    part.vertices.dedup();
+    let index = |corner: u32| {
+        let found = part.vertices.binary_search(&corners[corner as usize]);
+        found.expect("every corner is among the vertices") as u32
+    };
+    part.triangles.iter_mut().for_each(|triangle| *triangle = triangle.map(index));
+}
