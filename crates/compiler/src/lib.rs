@@ -29,6 +29,7 @@ pub use measures::{BuiltResidual, DatabaseFidelity, Measures, Sights, fidelity, 
 mod area;
 mod assemble;
 mod bound;
+mod coarse;
 mod enforce;
 mod ground;
 mod publish;

@@ -146,12 +146,16 @@ fn effort(optimising: Optimising) -> optimiser::Effort {
     }
 }
 
+/// The DEM with the heights of the seeds.
 fn with_heights(dem: &Dem, seeds: &[Vertex]) -> Dem {
     let mut at: Vec<(terrain::Post, i32)> =
         seeds.iter().filter_map(|seed| Some((seed.at.post()?, seed.height))).collect();
     at.sort_unstable();
-    Dem::from_fn(dem.rect(), |post| match at.binary_search_by_key(&post, |&(post, _)| post) {
-        Ok(found) => Some(at[found].1),
-        Err(_) => Some(dem.height(post)),
+    let rect = dem.rect();
+    Dem::from_row_fn(rect, |row, heights| {
+        heights.copy_from_slice(dem.row(row));
+        let first = at.partition_point(|&(post, _)| post.row < row);
+        let here = at[first..].iter().take_while(|&&(post, _)| post.row == row);
+        here.for_each(|&(post, height)| heights[(post.col - rect.west) as usize] = height);
     })
 }

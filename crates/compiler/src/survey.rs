@@ -6,9 +6,10 @@ use terrain::{GainCurve, TileId};
 use tiling::{Allocation, Gains, allocate_equally, allocate_globally, points_equally, points_globally};
 use tin::SurveyTask;
 
+use crate::coarse::coarse;
 use crate::refinement::optimising;
 use crate::run::{Run, Worked};
-use crate::tasks::{TileBudget, is_surveyed, survey_task};
+use crate::tasks::{TileBudget, is_surveyed, is_surveyed_in_haste, survey_task};
 use crate::{CompileError, Event, Progress, Stage};
 
 /// What the area's budget came to.
@@ -26,15 +27,19 @@ pub(crate) fn survey(run: &Run, progress: &mut dyn Progress) -> Result<Option<Ve
     }
     let level = geometry::widest_level();
     let curves = run.for_each_tile(Stage::Survey, progress, |tile: TileId| {
-        let task = survey_task(run.job, &run.area, tile);
-        let window = run.window(tile)?;
-        let stamp = run.stamp("survey", &window, |builder| feed(builder, &task));
+        let (window, task) = (run.window(tile)?, survey_task(run.job, &run.area, tile));
+        let coarse = if is_surveyed_in_haste(run.job) { coarse(&window, &task) } else { None };
+        let (window, task) = match &coarse {
+            Some((window, task)) => (window, task),
+            None => (&*window, &task),
+        };
+        let stamp = run.stamp("survey", window, |builder| feed(builder, task));
         if run.database.folder().curve_stamp(tile).ok().flatten() == Some(stamp)
             && let Ok((_, curve)) = run.database.folder().read_curve(tile)
         {
             return Ok(Worked::Kept(curve));
         }
-        let curve = tin::survey(&window.dem, &window.importance, &task, level);
+        let curve = tin::survey(&window.dem, &window.importance, task, level);
         run.database.write_curve(&stamp, &curve)?;
         Ok(Worked::Made(curve))
     })?;

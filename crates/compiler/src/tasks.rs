@@ -1,6 +1,6 @@
 //! From a job's words to one tile's task.
 
-use job::{Allocation, Borders, Budget as PointBudget, Edges, ErrorKey, Job, LastBatch, Method};
+use job::{Allocation, Borders, Budget as PointBudget, Edges, Effort, ErrorKey, Job, LastBatch, Method};
 use limits::Allowance;
 use terrain::{LatticePoint, ModuleId, ModuleRect, Post, SeamSides, Side, TileId, TileTin, Vertex};
 use tiling::{Tiling, outer_border_posts, outer_sides};
@@ -11,6 +11,8 @@ use crate::refinement::{Most, Refinement, optimising};
 
 /// A survey looks this many times further than an equal share.
 const SURVEY_REACH: u64 = 3;
+/// The same, for a quick look: few tiles deserve more, and a fast build does not wait for them.
+const SURVEY_REACH_OF_FAST: u64 = 2;
 /// The same, where an RMS residual is asked for that optimising reaches within the budget and selection alone does not.
 const SURVEY_REACH_TO_RMS: u64 = 5;
 
@@ -82,6 +84,12 @@ pub(crate) fn is_surveyed(job: &Job) -> bool {
     job.tin.allocation == Allocation::Global && has_budget
 }
 
+/// Whether the survey may be coarse: what it misjudges costs a fast build less than looking closer would.
+pub(crate) fn is_surveyed_in_haste(job: &Job) -> bool {
+    let is_fast = optimising(job).is_some_and(|optimising| optimising.effort == Effort::Fast);
+    is_fast && job.tin.target_rms_m.is_none()
+}
+
 fn is_by_squares(job: &Job) -> bool {
     // Where a residual is the only end, it is reached by worst posts; sums of squares would go on past it.
     let ends_at_residual = job.tin.max_residual_m.is_some() && job.tin.budget == PointBudget::Limits;
@@ -123,8 +131,11 @@ fn largest_value(job: &Job) -> Option<u64> {
 /// The survey of one tile: all it would select if it were alone.
 pub(crate) fn survey_task(job: &Job, area: &GamingArea, tile: TileId) -> SurveyTask {
     let modules = area.tiling.modules(tile, area.grid);
-    let reach =
-        if job.tin.target_rms_m.is_some() && optimising(job).is_some() { SURVEY_REACH_TO_RMS } else { SURVEY_REACH };
+    let reach = match optimising(job) {
+        Some(_) if job.tin.target_rms_m.is_some() => SURVEY_REACH_TO_RMS,
+        Some(_) if is_surveyed_in_haste(job) => SURVEY_REACH_OF_FAST,
+        _ => SURVEY_REACH,
+    };
     let share = |total: u64| reach * total * modules.count() as u64 / area.grid.count() as u64;
     let (points, cost) = match job.tin.budget {
         PointBudget::Points(points) => (Some(share(points) as usize), CostUnit::Points),

@@ -6,6 +6,8 @@
 //! off ridges into valleys and the pattern branches as drainage does. It needs no neighbouring heights, so any
 //! window can be evaluated alone. The idea is that of erosion filters made of noise and of phasor noise.
 
+use fearless_simd::{Level, Simd, dispatch};
+
 use crate::noise::Stream;
 use crate::region::Region;
 
@@ -163,6 +165,12 @@ impl Octave {
 
     /// The blend of all waves at the posts of a patch, into `blend`.
     pub(crate) fn blend(&self, posts: Posts<'_>, blend: &mut Blend) {
+        // Compiled once for each width of lanes; single numbers come out the same in all of them.
+        dispatch!(Level::new(), simd => self.blend_in_lanes(simd, posts, blend));
+    }
+
+    #[inline(always)]
+    fn blend_in_lanes<S: Simd>(&self, _: S, posts: Posts<'_>, blend: &mut Blend) {
         blend.cosine.fill(0.0);
         blend.sine.fill(0.0);
         let wide = posts.east_m.len();
@@ -178,6 +186,7 @@ impl Octave {
     }
 
     /// The pivots whose cells lie within reach of a patch, in the order in which they are stored.
+    #[inline(always)]
     fn around(&self, posts: Posts<'_>) -> impl Iterator<Item = &Pivot> {
         let (cell, reach_m) = (f64::from(cell_m(self.number)), f64::from(reach_m(self.number)));
         let cells = |places: &[f32], corner_m: f64, first: i64, count: usize| {
@@ -191,6 +200,7 @@ impl Octave {
     }
 
     /// One pivot's wave along one row. A plain loop over equal slices: the compiler makes lanes of it.
+    #[inline(always)]
     fn blend_span(&self, pivot: &Pivot, dy: f32, east_m: &[f32], cosine: &mut [f32], sine: &mut [f32]) {
         let per_reach2 = 1.0 / (reach_m(self.number) * reach_m(self.number));
         let per_wave = 1.0 / WAVELENGTHS_M[self.number];
@@ -228,6 +238,7 @@ impl Posts<'_> {
     }
 
     /// Indices of the places within reach of `centre_m`; one more on either side does no harm, it weighs 0.
+    #[inline(always)]
     fn reached(&self, places: &[f32], centre_m: f32, reach_m: f32) -> std::ops::Range<usize> {
         let per_spacing = 1.0 / self.spacing_m;
         // A float below 0 becomes index 0.
@@ -278,6 +289,7 @@ fn reach_m(number: usize) -> f32 {
 }
 
 /// Cosine and sine of a number of turns, from parabolas: within 6 %, which is all a wave needs.
+#[inline(always)]
 fn wave(turns: f32) -> (f32, f32) {
     /// Adding and taking away 1.5 * 2^23 rounds to a whole number without a branch.
     const ROUND: f32 = 12_582_912.0;
