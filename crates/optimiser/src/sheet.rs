@@ -455,6 +455,9 @@ impl<'a> Sheet<'a> {
             if twin == NONE && !self.is_constrained(from, to) {
                 return Some(format!("edge {edge} from {from} to {to} has no twin"));
             }
+            if self.sums_of(edge) != self.ground.moments.edge(self.at(from), self.at(to)) {
+                return Some(format!("edge {edge} from {from} to {to} has the sums of another"));
+            }
             if !self.is_vertex(from) {
                 return Some(format!("edge {edge} leaves a vertex that is gone"));
             }

@@ -9,10 +9,10 @@ use crate::ground::Ground;
 use crate::insertion::Insertion;
 use crate::place::PER_POST;
 use crate::removal::Removal;
-use crate::scene::{even, grid, patchy, rough};
+use crate::scene::{Caps, confined, even, grid, patchy, rough, spent};
 use crate::sheet::{Hold, Layout, NONE, Sheet};
 use crate::sweep::{Mover, Steps};
-use crate::task::{Budget, HeightFit};
+use crate::task::{Budget, Effort, HeightFit};
 use crate::thin::{Shears, Until, is_dearer, thin};
 
 const RECT: PostRect = PostRect { south: 7, west: -3, north: 67, east: 77 };
@@ -75,6 +75,41 @@ fn every_post_is_owned_once_after_every_kind_of_change() {
     let mut tools = Tools { removal: &mut removal, insertion: &mut insertion };
     assert!(0 < Exchange::default().round(&mut sheet, &mut account, Terms::OneForOne, 50, &mut tools));
     check(&sheet, "exchange");
+}
+
+#[test]
+fn whoever_comes_where_a_limit_is_met_takes_somebodys_place() {
+    const SIDE: i32 = 20;
+    const NO_LIMIT: u32 = 10_000;
+    let rect = PostRect { south: 0, west: 0, north: 40, east: 40 };
+    let dem = rough(rect, 6);
+    let importance = even(rect);
+    let start = grid(&dem, 4);
+    // All four load modules have the same, so that either all of them are full or the one window is.
+    let no_limit = Caps { side: SIDE, per_module: NO_LIMIT, per_window: NO_LIMIT, triangles: NO_LIMIT };
+    let full = spent(&start, &confined(&start, no_limit, Effort::Normal), SIDE)[0];
+    for (per_module, per_window) in [(full, NO_LIMIT), (NO_LIMIT, 4 * full)] {
+        let caps = Caps { per_module, per_window, ..no_limit };
+        let task = confined(&start, caps, Effort::Normal);
+        let ground = Ground::new(&dem, &importance, SeamSides::CLOSED, HeightFit::Squares);
+        let hold = |vertex: &terrain::Vertex| match task.held.contains(&vertex.at) {
+            true => Hold::PLACE.and(Hold::HEIGHT),
+            false => Hold::FREE,
+        };
+        let layout = Layout { line_step: Some(SIDE * PER_POST), hold: &hold };
+        let mut sheet = Sheet::new(&ground, &start, &layout);
+        let mut account = Account::new(&task.budget, &sheet);
+        let before = sheet.squares();
+        let (mut removal, mut insertion) = (Removal::default(), Insertion::default());
+        let mut tools = Tools { removal: &mut removal, insertion: &mut insertion };
+        let count = Exchange::default().round(&mut sheet, &mut account, Terms::OneForOne, 20, &mut tools);
+        assert!(0 < count && sheet.squares() < before, "{count} came");
+        assert_eq!(sheet.fault(), None);
+        sheet.round_heights();
+        let after = spent(&sheet.into_tin(rect), &task, SIDE);
+        assert!(after.iter().all(|&after| after <= per_module), "{after:?}");
+        assert!(after.iter().sum::<u32>() <= per_window, "{after:?}");
+    }
 }
 
 #[test]
