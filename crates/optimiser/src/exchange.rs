@@ -75,6 +75,32 @@ impl Exchange {
         count
     }
 
+    /// Gives triangles of at least `least` squares a vertex where limits have refused one, in exchange for the vertex
+    /// that explains least of those which stand in its way. Nothing else is judged, so this costs next to nothing.
+    pub fn relieve(&mut self, sheet: &mut Sheet, account: &mut Account, least: f64, tools: &mut Tools) {
+        self.grow(sheet);
+        let live = (0..sheet.triangles.len() as u32).filter(|&triangle| sheet.is_live(triangle));
+        let squares = |triangle: u32| sheet.triangles[triangle as usize].squares;
+        let mut worst: Vec<u32> = live.filter(|&triangle| least <= squares(triangle)).collect();
+        worst.sort_unstable_by(|&a, &b| squares(b).total_cmp(&squares(a)).then(a.cmp(&b)));
+        for triangle in worst {
+            if !sheet.is_live(triangle) || sheet.triangles[triangle as usize].squares < least {
+                continue;
+            }
+            let Some(Found { gain, vertex }) = tools.insertion.find(sheet, triangle) else { continue };
+            let guest = sheet.vertices[vertex as usize];
+            sheet.drop_vertex(vertex);
+            let Some(place) = account.where_to_save(guest.at) else { continue };
+            let tenants = self.tenants.get_or_insert_with(|| Tenants::new(account, sheet));
+            for tenant in tenants.within(place) {
+                self.costs[tenant as usize] = tools.removal.find(sheet, tenant);
+            }
+            if self.make_room(sheet, account, &guest, (triangle, gain), tools) {
+                self.insert(sheet, account, Terms::OnlyInsert, (triangle, gain), tools);
+            }
+        }
+    }
+
     /// What the least useful vertex of the last round explains.
     pub fn cheapest(&mut self) -> Option<f64> {
         self.removals.peek().map(|(_, worth)| -worth)

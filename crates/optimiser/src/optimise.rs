@@ -36,6 +36,9 @@ const LIMITS_FROM: f64 = 0.1;
 const ROUND_SHARE: usize = 10;
 /// Exchange ends with a round in which less than one vertex in so many was exchanged.
 const IDLE_SHARE: usize = 1000;
+/// Times the mean squares of a triangle above which a fast tile gives it a vertex in exchange for another: a lone post
+/// of many metres that a full window has refused.
+const RELIEVED_FROM: f64 = 25.0;
 /// How far a cycle grows beyond the budget.
 const CYCLE_SHARE: f64 = 0.2;
 
@@ -160,6 +163,9 @@ impl Work<'_, '_> {
         }
         self.thin_to_goal();
         self.mover.sweep_and_flip(&mut self.sheet, recipe.sweeps);
+        if recipe.rounds == 0 {
+            self.relieve();
+        }
         self.exchange(recipe.rounds);
         for _ in 0..recipe.cycles {
             self.cycle();
@@ -221,6 +227,13 @@ impl Work<'_, '_> {
     fn exchange_once(&mut self, exchange: &mut Exchange, terms: Terms, most: usize) -> usize {
         let mut tools = Tools { removal: &mut self.removal, insertion: &mut self.insertion };
         exchange.round(&mut self.sheet, &mut self.account, terms, most, &mut tools)
+    }
+
+    /// Where limits have refused a vertex that is worth many others, one of these goes for it.
+    fn relieve(&mut self) {
+        let least = RELIEVED_FROM * self.sheet.squares() / self.sheet.triangle_count as f64;
+        let mut tools = Tools { removal: &mut self.removal, insertion: &mut self.insertion };
+        Exchange::default().relieve(&mut self.sheet, &mut self.account, least, &mut tools);
     }
 
     /// Inserts where it gains most while there is room.
