@@ -3,8 +3,9 @@
 use limits::{Charged, POINT_COST, TileLedger};
 use terrain::{ModuleId, ModuleRect, RefusedBy};
 
+use crate::hold::Hold;
 use crate::place::{PER_POST, Place};
-use crate::sheet::{Hold, NONE, Sheet, Vertex};
+use crate::sheet::{NONE, Sheet, Vertex};
 use crate::task::Budget;
 
 /// The budget as it is spent and refunded, and what was lent beyond it for a while.

@@ -5,9 +5,9 @@ use std::ops::Range;
 use geometry::is_ridge_candidate;
 use terrain::{Dem, Importance, Post, SeamSides, THOUSANDTHS};
 
+use crate::hold::Hold;
 use crate::moments::{Moments, Walk};
 use crate::place::{PER_POST, Place};
-use crate::sheet::Hold;
 use crate::task::HeightFit;
 
 /// Heights, weights and their moments.

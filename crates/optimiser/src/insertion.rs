@@ -1,11 +1,12 @@
 //! Putting a vertex in: where the residual under a triangle is largest, with the flips around it that gain.
 
 use crate::form::{Form, squares};
+use crate::hold::Hold;
 use crate::moments::Sums;
 use crate::patch::Patch;
 use crate::place::Place;
 use crate::refit::Fit;
-use crate::sheet::{Hold, LEAST_AREA, NONE, Sheet, next, previous};
+use crate::sheet::{LEAST_AREA, NONE, Sheet, next, previous};
 
 /// Triangles one insertion may rewrite.
 const REACH_MAX: usize = 14;

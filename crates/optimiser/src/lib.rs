@@ -17,6 +17,7 @@ mod exchange;
 mod flips;
 mod form;
 mod ground;
+mod hold;
 mod insertion;
 mod moments;
 mod patch;

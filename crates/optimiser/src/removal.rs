@@ -1,11 +1,12 @@
 //! Taking a vertex out: the best triangulation of the hole, the heights around it fitted again.
 
 use crate::form::{Form, squares};
+use crate::hold::Hold;
 use crate::moments::Sums;
 use crate::patch::Patch;
 use crate::place::Place;
 use crate::refit::Fit;
-use crate::sheet::{Hold, LEAST_AREA, Sheet, Star};
+use crate::sheet::{LEAST_AREA, Sheet, Star};
 
 /// Corners of a hole, at most.
 const CORNERS_MAX: usize = 13;

@@ -5,6 +5,7 @@ use terrain::{PostRect, Tin, Vertex as TinVertex};
 use crate::curve::along_curve;
 use crate::form::Form;
 use crate::ground::Ground;
+use crate::hold::Hold;
 use crate::moments::Sums;
 use crate::place::{PER_POST, Place};
 
@@ -14,56 +15,6 @@ pub(crate) const NONE: u32 = u32::MAX;
 /// Least doubled area of a triangle, a quarter of a square post. That no triangle turns over keeps the mesh an
 /// embedding; that none comes near it keeps its slopes sane.
 pub(crate) const LEAST_AREA: i64 = (PER_POST * PER_POST / 4) as i64;
-
-/// What may not change about a vertex.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub(crate) struct Hold(u8);
-
-impl Hold {
-    pub const FREE: Self = Self(0);
-    /// It stays on its line of constant x.
-    pub const COLUMN: Self = Self(1);
-    /// It stays on its line of constant y.
-    pub const ROW: Self = Self(2);
-    /// It neither moves nor goes.
-    pub const PLACE: Self = Self(4);
-    /// It keeps its height.
-    pub const HEIGHT: Self = Self(8);
-    /// It stands at the DEM's height wherever it moves.
-    pub const CREST: Self = Self(16);
-
-    pub const fn and(self, other: Self) -> Self {
-        Self(self.0 | other.0)
-    }
-
-    #[inline(always)]
-    pub const fn has(self, other: Self) -> bool {
-        self.0 & other.0 != 0
-    }
-
-    /// Whether it may neither move nor be removed: held, or a corner of load modules.
-    #[inline(always)]
-    pub const fn is_fixed(self) -> bool {
-        self.has(Self::PLACE) || self.is_corner()
-    }
-
-    #[inline(always)]
-    const fn is_corner(self) -> bool {
-        self.0 & 3 == 3
-    }
-
-    /// Whether it lies on a line and may move along it.
-    #[inline(always)]
-    pub const fn is_on_line(self) -> bool {
-        self.0 & 3 != 0
-    }
-
-    /// Whether its height is free to be fitted.
-    #[inline(always)]
-    pub const fn height_is_free(self) -> bool {
-        !self.has(Self::HEIGHT) && !self.has(Self::CREST)
-    }
-}
 
 /// One vertex.
 #[derive(Clone, Copy, Debug)]

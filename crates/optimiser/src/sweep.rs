@@ -7,10 +7,11 @@
 
 use crate::flips::flip_all;
 use crate::form::{Form, Hinge};
+use crate::hold::Hold;
 use crate::moments::Sums;
 use crate::place::{PER_POST, Place};
 use crate::refit::DAMPING;
-use crate::sheet::{Hold, LEAST_AREA, Sheet, Star, Vertex, next};
+use crate::sheet::{LEAST_AREA, Sheet, Star, Vertex, next};
 
 /// Relative and absolute damping of steps in the plane.
 const PLANE_DAMPING: (f64, f64) = (0.01, 0.02);
