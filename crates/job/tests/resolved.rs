@@ -207,12 +207,12 @@ fn every_setting_is_described_with_value_and_meaning() {
             r#"tin.method = "optimised": lowest RMS residual under the limits"#,
             r#"tin.key = "sse": a triangle is worth its weighted squared residuals"#,
             r#"tin.allocation = "global": tiles share by what a survey says they gain"#,
-            r#"tin.effort = "normal": more posts are chosen than the limits allow, then thinned and exchanged"#,
+            r#"tin.effort = "normal": more posts are chosen, thinned, exchanged: a fifth below fast, 6 times as long"#,
             concat!(
                 r#"tin.height_fit = "l2_keep_crests": vertices stand where squared residuals are least, "#,
                 "crests at DEM height"
             ),
-            r#"tin.lattice = "eighth": vertices stand on eighths of a post, those on module lines on posts"#,
+            r#"tin.lattice = "eighth": vertices stand on eighths of a post, those on lines between tiles on posts"#,
         ]
     );
 }

