@@ -26,6 +26,9 @@ mod measures;
 pub use fidelity::{LineOfSight, SlopeDifference};
 pub use measures::{BuiltResidual, DatabaseFidelity, Measures, Sights, fidelity, measure};
 
+mod product;
+pub use product::{LimitUse, NO_RESIDUAL, Product, ProductGround, Wanted, WantedGround, product};
+
 mod area;
 mod assemble;
 mod bound;

@@ -9,7 +9,7 @@
 mod tally;
 pub use tally::{Residuals, Tally};
 mod measure;
-pub use measure::{Ground, measure, residuals};
+pub use measure::{Ground, each_residual, measure, residuals};
 mod source;
 pub use source::{SourcePosts, residuals_at_source};
 mod cells;

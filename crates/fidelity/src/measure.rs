@@ -42,6 +42,20 @@ pub fn residuals(module: &LoadModule, ground: &Ground) -> Residuals {
     all
 }
 
+/// Calls `each` with every post that a load module owns and its residual: DEM less triangles, in quanta. Voids are left
+/// out.
+///
+/// # Panics
+/// When the window of `ground` does not hold all posts of the load module.
+pub fn each_residual(module: &LoadModule, ground: &Ground, mut each: impl FnMut(terrain::Post, i32)) {
+    let whole = ground.dem.void_count() == 0;
+    visit(module, ground, |post, residual| {
+        if whole || !ground.dem.is_void(post) {
+            each(post, residual);
+        }
+    });
+}
+
 fn count(module: &LoadModule, ground: &Ground, all: &mut Residuals) -> ModuleResidual {
     let rect = ground.grid.posts_of(module.id);
     assert!(ground.dem.rect().contains_rect(&rect), "the DEM window holds load module {}", module.id);

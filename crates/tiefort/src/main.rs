@@ -23,6 +23,7 @@ mod lines;
 mod measures;
 mod progress;
 mod run;
+mod scene;
 mod signals;
 mod terminal;
 

@@ -4,6 +4,7 @@ mod build;
 mod fidelity;
 mod init;
 mod plan;
+mod render;
 mod report;
 mod sample;
 mod status;
@@ -30,6 +31,8 @@ pub enum Command {
     Status(status::Arguments),
     /// Show what a build found: limits, residuals, breaches, times
     Report(report::Arguments),
+    /// Draw it: relief, perspective, wireframe, residuals, density, limits, tiles
+    Render(render::Arguments),
     /// Check every file and every load module of a database
     Verify(verify::Arguments),
     /// Measure how true a database is: residuals, line of sight, slope
@@ -53,6 +56,7 @@ impl Command {
             Command::Plan(arguments) => plan::run(&arguments),
             Command::Status(arguments) => status::run(&arguments),
             Command::Report(arguments) => report::run(&arguments),
+            Command::Render(arguments) => render::run(&arguments),
             Command::Verify(arguments) => verify::run(&arguments),
             Command::Fidelity(arguments) => fidelity::run(&arguments),
             Command::Sample(arguments) => sample::run(&arguments),
