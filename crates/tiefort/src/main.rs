@@ -21,6 +21,7 @@ mod failure;
 mod files;
 mod lines;
 mod measures;
+mod page;
 mod progress;
 mod run;
 mod scene;

@@ -9,7 +9,9 @@
 mod mesh;
 pub use mesh::{Coordinates, MeshPlace, write_obj, write_ply};
 mod breaches;
-pub use breaches::{BreachPlaces, breaches_geojson};
+pub use breaches::{BreachPlaces, breaches_csv, breaches_geojson};
+mod page;
+pub use page::{Advice, Page, PageSetting, advise, report_html};
 mod picture;
 pub use picture::{
     Camera, Color, Drawn, Eye, Facets, Image, Look, Map, NO_RESIDUAL, Panel, RESIDUAL_SCALE_M, Scene, SceneGround,

@@ -69,7 +69,6 @@ fn what_is_not_supported_yet_says_so() {
     for emit in ["slurm", "dask", "ninja"] {
         scene.refuses(&["plan", "job.toml", "--emit", emit], &[emit, "not supported yet"]);
     }
-    scene.refuses(&["report", "x.tdb", "--format", "html"], &["html", "not supported yet"]);
     scene.refuses(&["tin", "a.tif", "--points", "9", "--out", "m.glb"], &["glb", "not supported yet"]);
 }
 

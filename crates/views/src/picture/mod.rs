@@ -8,6 +8,7 @@
 //! Pictures are pure: the same ground gives the same bytes, on any machine. What is absent: threads, files, clocks.
 
 mod camera;
+mod closeup;
 mod color;
 mod depth;
 mod facets;
@@ -25,6 +26,7 @@ mod text;
 mod wireframe;
 
 pub use camera::Camera;
+pub(crate) use closeup::module_pictures;
 pub use color::Color;
 pub use facets::Facets;
 pub use image::Image;
