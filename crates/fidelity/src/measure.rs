@@ -112,13 +112,28 @@ impl Sums {
     }
 }
 
+/// Calls `each` with every post that one triangle of a load module owns and its residual, voids included.
+pub(crate) fn visit_triangle(
+    module: &LoadModule,
+    ground: &Ground,
+    triangle: [u16; 3],
+    each: impl FnMut(terrain::Post, i32),
+) {
+    let posts = PostGrid::of_module(ground.grid, module.id, ground.spacing);
+    visit_residuals(&posts, &facet(module, triangle), ground.dem, each);
+}
+
+#[inline(always)]
+fn facet(module: &LoadModule, triangle: [u16; 3]) -> Facet {
+    let corners = triangle.map(|v| module.vertices[usize::from(v)]);
+    Facet::new(corners.map(|v| i32::from(v.x)), corners.map(|v| i32::from(v.y)), corners.map(|v| v.z))
+}
+
 #[inline(always)]
 fn visit(module: &LoadModule, ground: &Ground, mut each: impl FnMut(terrain::Post, i32)) {
     let posts = PostGrid::of_module(ground.grid, module.id, ground.spacing);
     for &triangle in &module.triangles {
-        let corners = triangle.map(|v| module.vertices[usize::from(v)]);
-        let facet = Facet::new(corners.map(|v| i32::from(v.x)), corners.map(|v| i32::from(v.y)), corners.map(|v| v.z));
-        visit_residuals(&posts, &facet, ground.dem, &mut each);
+        visit_residuals(&posts, &facet(module, triangle), ground.dem, &mut each);
     }
 }
 
