@@ -137,7 +137,7 @@ def refine_seconds(run, workers):
 def run_build(tiefort, job, out):
     """Builds a database from nothing; adds what its report says."""
     shutil.rmtree(out, ignore_errors=True)
-    run = measured(tiefort, "build", job, "--out", out, "--workers", 2, "--json")
+    run = measured(tiefort, "build", job, "--out", out, "--workers", 2, "--json", "--no-html")
     run["report"] = json.loads(run["out"].splitlines()[-1])["report"]
     run["stages_s"] = sum(stage["wall_s"] for stage in run["report"]["stages"])
     shutil.rmtree(out)

@@ -26,6 +26,13 @@ mod measures;
 pub use fidelity::{LineOfSight, SlopeDifference};
 pub use measures::{BuiltResidual, DatabaseFidelity, Measures, Sights, fidelity, measure};
 
+mod product;
+pub use product::{LimitUse, NO_RESIDUAL, Product, ProductGround, Wanted, WantedGround, product};
+mod explain;
+pub use explain::{ExplainedRefusal, ExplainedWindow, Explanation, OneMore, explain};
+mod difference;
+pub use difference::{Difference, ModuleDifference, SettingDifference, difference};
+
 mod area;
 mod assemble;
 mod bound;

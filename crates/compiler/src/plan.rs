@@ -74,9 +74,7 @@ const DISK_PER_TRIANGLE: u64 = 60;
 /// When no build can meet it: limits below the initial points, keys that contradict each other.
 pub fn plan(job: &Job) -> Result<Plan, CompileError> {
     let area = GamingArea::new(job)?;
-    let mut ranks = vec![0; area.tiles.len()];
-    area.by_rank().into_iter().enumerate().for_each(|(rank, index)| ranks[index] = rank);
-    let tiles: Vec<PlannedTile> = area.tiles.iter().map(|&tile| planned(&area, tile, &ranks)).collect();
+    let tiles = planned_tiles(&area);
     let of_color = |color| tiles.iter().filter(|tile| tile.color == color).count();
     let workers_useful = match job.tiles.order {
         TileOrder::Color => (0..4).map(of_color).max().unwrap_or(1).max(1),
@@ -85,6 +83,13 @@ pub fn plan(job: &Job) -> Result<Plan, CompileError> {
     };
     let (budget, start) = (area.budget.area, area.budget.start_total());
     Ok(Plan { forecast: forecast(job, &area), tiles, budget, start, workers_useful })
+}
+
+/// Every tile of an area, row by row from the south-west.
+pub(crate) fn planned_tiles(area: &GamingArea) -> Vec<PlannedTile> {
+    let mut ranks = vec![0; area.tiles.len()];
+    area.by_rank().into_iter().enumerate().for_each(|(rank, index)| ranks[index] = rank);
+    area.tiles.iter().map(|&tile| planned(area, tile, &ranks)).collect()
 }
 
 fn planned(area: &GamingArea, tile: TileId, ranks: &[usize]) -> PlannedTile {

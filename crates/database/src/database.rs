@@ -18,8 +18,18 @@ use crate::{
 /// The folders of a database that stay.
 const FOLDERS: [&str; 3] = [TILES, MODULES, SURVEY];
 /// What may lie in a database's directory and makes a directory without `database.json` ours.
-const OURS: [&str; 9] =
-    [LOCK_NAME, TILES, MODULES, SURVEY, WORK, files::DATABASE, files::REPORT, files::REPORT_HTML, files::BREACHES];
+const OURS: [&str; 10] = [
+    LOCK_NAME,
+    TILES,
+    MODULES,
+    SURVEY,
+    WORK,
+    files::DATABASE,
+    files::REPORT,
+    files::REPORT_HTML,
+    files::BREACHES,
+    files::BREACHES_CSV,
+];
 
 /// A database that this process alone writes to.
 #[derive(Debug)]
@@ -133,7 +143,7 @@ impl Database {
     /// # Errors
     /// When something cannot be removed.
     pub fn clear(&self) -> Result<(), DatabaseError> {
-        for name in [files::DATABASE, files::REPORT, files::REPORT_HTML, files::BREACHES] {
+        for name in [files::DATABASE, files::REPORT, files::REPORT_HTML, files::BREACHES, files::BREACHES_CSV] {
             self.remove(name)?;
         }
         for name in FOLDERS {

@@ -23,6 +23,8 @@ pub mod files {
     pub const REPORT_HTML: &str = "report.html";
     /// Limits that could not be met, on a map.
     pub const BREACHES: &str = "breaches.geojson";
+    /// The same as a table.
+    pub const BREACHES_CSV: &str = "breaches.csv";
     /// What each tile may spend.
     pub const ALLOCATION: &str = "survey/allocation.json";
 }

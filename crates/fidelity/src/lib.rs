@@ -9,7 +9,9 @@
 mod tally;
 pub use tally::{Residuals, Tally};
 mod measure;
-pub use measure::{Ground, measure, residuals};
+pub use measure::{Ground, each_residual, measure, residuals};
+mod split;
+pub use split::{Split, best_split};
 mod source;
 pub use source::{SourcePosts, residuals_at_source};
 mod cells;

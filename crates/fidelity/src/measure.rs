@@ -42,6 +42,20 @@ pub fn residuals(module: &LoadModule, ground: &Ground) -> Residuals {
     all
 }
 
+/// Calls `each` with every post that a load module owns and its residual: DEM less triangles, in quanta. Voids are left
+/// out.
+///
+/// # Panics
+/// When the window of `ground` does not hold all posts of the load module.
+pub fn each_residual(module: &LoadModule, ground: &Ground, mut each: impl FnMut(terrain::Post, i32)) {
+    let whole = ground.dem.void_count() == 0;
+    visit(module, ground, |post, residual| {
+        if whole || !ground.dem.is_void(post) {
+            each(post, residual);
+        }
+    });
+}
+
 fn count(module: &LoadModule, ground: &Ground, all: &mut Residuals) -> ModuleResidual {
     let rect = ground.grid.posts_of(module.id);
     assert!(ground.dem.rect().contains_rect(&rect), "the DEM window holds load module {}", module.id);
@@ -98,13 +112,28 @@ impl Sums {
     }
 }
 
+/// Calls `each` with every post that one triangle of a load module owns and its residual, voids included.
+pub(crate) fn visit_triangle(
+    module: &LoadModule,
+    ground: &Ground,
+    triangle: [u16; 3],
+    each: impl FnMut(terrain::Post, i32),
+) {
+    let posts = PostGrid::of_module(ground.grid, module.id, ground.spacing);
+    visit_residuals(&posts, &facet(module, triangle), ground.dem, each);
+}
+
+#[inline(always)]
+fn facet(module: &LoadModule, triangle: [u16; 3]) -> Facet {
+    let corners = triangle.map(|v| module.vertices[usize::from(v)]);
+    Facet::new(corners.map(|v| i32::from(v.x)), corners.map(|v| i32::from(v.y)), corners.map(|v| v.z))
+}
+
 #[inline(always)]
 fn visit(module: &LoadModule, ground: &Ground, mut each: impl FnMut(terrain::Post, i32)) {
     let posts = PostGrid::of_module(ground.grid, module.id, ground.spacing);
     for &triangle in &module.triangles {
-        let corners = triangle.map(|v| module.vertices[usize::from(v)]);
-        let facet = Facet::new(corners.map(|v| i32::from(v.x)), corners.map(|v| i32::from(v.y)), corners.map(|v| v.z));
-        visit_residuals(&posts, &facet, ground.dem, &mut each);
+        visit_residuals(&posts, &facet(module, triangle), ground.dem, &mut each);
     }
 }
 

@@ -33,6 +33,9 @@ pub struct RunArguments {
     pub out: Option<PathBuf>,
     #[command(flatten)]
     pub workers: Workers,
+    /// Do not draw report.html; `tiefort report --format html` does later
+    #[arg(long)]
+    pub no_html: bool,
     /// Exit with 2 on any warning or breach
     #[arg(long)]
     pub strict: bool,

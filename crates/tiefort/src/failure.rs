@@ -18,6 +18,8 @@ pub enum Outcome {
     Sound,
     /// Finished, with limits that could not be met.
     Breaches,
+    /// Compared, and not alike.
+    Differ,
     /// Found damage, or anything at all under `--strict`.
     Damaged,
     /// Not now; the same may do later.
@@ -29,7 +31,7 @@ impl Outcome {
     pub fn code(self) -> u8 {
         match self {
             Outcome::Sound => 0,
-            Outcome::Breaches => 1,
+            Outcome::Breaches | Outcome::Differ => 1,
             Outcome::Damaged => FAILED,
             Outcome::TryLater => TRY_LATER,
         }
@@ -138,8 +140,8 @@ mod tests {
 
     #[test]
     fn a_hint_is_a_line_of_its_own() {
-        let failure = Failure::not_yet("--format html", "use --format text or json");
-        assert_eq!(failure.to_string(), "error: --format html is not supported yet\nhint: use --format text or json");
+        let failure = Failure::not_yet("a mesh as .glb", "write .ply or .obj");
+        assert_eq!(failure.to_string(), "error: a mesh as .glb is not supported yet\nhint: write .ply or .obj");
     }
 
     #[test]

@@ -21,8 +21,10 @@ mod failure;
 mod files;
 mod lines;
 mod measures;
+mod page;
 mod progress;
 mod run;
+mod scene;
 mod signals;
 mod terminal;
 

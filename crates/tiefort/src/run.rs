@@ -6,7 +6,7 @@ use compiler::{CompileError, Options};
 use database::{Database, Report, files};
 use job::Job;
 use serde_json::json;
-use views::{Align, BreachPlaces, Table, breaches_geojson};
+use views::{Align, BreachPlaces, Table, breaches_csv, breaches_geojson};
 
 use crate::arguments::RunArguments;
 use crate::end_table::{End, end_table};
@@ -14,7 +14,7 @@ use crate::events;
 use crate::failure::{Failure, Outcome};
 use crate::progress::{Listener, Show};
 use crate::signals::Signals;
-use crate::terminal;
+use crate::{page, terminal};
 
 /// A run of the compiler on a job, as a person follows it.
 #[derive(Debug)]
@@ -78,8 +78,7 @@ impl<'a> Run<'a> {
             worked.map_err(|error| Failure::of_compiler(&error, self.signals.exit_code()))?;
         report.stages = stages;
         database.write_json(files::REPORT, &report)?;
-        let breaches = breaches_geojson(&report, &places(self.job));
-        database.write_bytes(files::BREACHES, breaches.as_bytes())?;
+        self.write_views(&database, &report)?;
         let outcome = self.judge(&report);
         match self.show() {
             Show::Nothing => {}
@@ -94,6 +93,21 @@ impl<'a> Run<'a> {
             }
         }
         Ok(outcome)
+    }
+
+    /// What people look at, beside `report.json`.
+    fn write_views(&self, database: &Database, report: &Report) -> Result<(), Failure> {
+        let places = places(self.job);
+        database.write_bytes(files::BREACHES, breaches_geojson(report, &places).as_bytes())?;
+        database.write_bytes(files::BREACHES_CSV, breaches_csv(report, &places).as_bytes())?;
+        if self.arguments.no_html {
+            // That of an earlier build would tell of another one.
+            database.remove(files::REPORT_HTML)?;
+            return Ok(());
+        }
+        let page = page::of_build(database.folder(), self.job, report, self.arguments.workers.count())?;
+        database.write_bytes(files::REPORT_HTML, page.as_bytes())?;
+        Ok(())
     }
 
     fn show(&self) -> Show {

@@ -1,4 +1,5 @@
-//! Breaches as GeoJSON: a polygon for each load module or window, with all its numbers.
+//! Breaches for maps and for tables: as GeoJSON, a polygon for each load module or window with all its numbers, and as
+//! CSV, a line for each.
 
 use database::{Report, ReportBreach, ReportPlace};
 use geojson::{Feature, FeatureCollection, Geometry, JsonObject, JsonValue};
@@ -30,6 +31,39 @@ pub fn breaches_geojson(report: &Report, places: &BreachPlaces) -> String {
     text + "\n"
 }
 
+/// The breaches of `report` as CSV: a line of names, then one for each, with the numbers of [`breaches_geojson`] and
+/// the place's western, southern, eastern and northern side in metres of the area's coordinate system.
+pub fn breaches_csv(report: &Report, places: &BreachPlaces) -> String {
+    let mut text =
+        "kind,where,row,col,count,limit,excess,refused,rms_with_m,rms_without_m,west_m,south_m,east_m,north_m\n"
+            .to_owned();
+    for breach in &report.breaches {
+        let (place, row_col) = place_of(breach.place);
+        let index = |which: usize| row_col.map_or(String::new(), |row_col| row_col[which].to_string());
+        let ReportBreach { kind, count, limit, excess, refused, rms_with_m, .. } = breach;
+        let without = breach.rms_without_m.map_or(String::new(), |rms_m| rms_m.to_string());
+        let ring = places.ring(breach.place);
+        let ([west, south], [east, north]) = (ring[0], ring[2]);
+        // Nothing here can hold a comma or a quote: kinds and places are words of ours, the rest are numbers.
+        text += &format!(
+            "{kind},{place},{},{},{count},{limit},{excess},{refused},{rms_with_m},{without},\
+             {west},{south},{east},{north}\n",
+            index(0),
+            index(1)
+        );
+    }
+    text
+}
+
+/// What a place is called, and its row and column.
+fn place_of(place: ReportPlace) -> (&'static str, Option<[u32; 2]>) {
+    match place {
+        ReportPlace::Module(row_col) => ("module", Some(row_col)),
+        ReportPlace::Window(row_col) => ("window", Some(row_col)),
+        ReportPlace::Area => ("area", None),
+    }
+}
+
 fn feature(breach: &ReportBreach, places: &BreachPlaces) -> Feature {
     let ring = places.ring(breach.place);
     Feature {
@@ -42,11 +76,7 @@ fn feature(breach: &ReportBreach, places: &BreachPlaces) -> Feature {
 }
 
 fn properties(breach: &ReportBreach) -> JsonObject {
-    let (place, row_col) = match breach.place {
-        ReportPlace::Module(row_col) => ("module", Some(row_col)),
-        ReportPlace::Window(row_col) => ("window", Some(row_col)),
-        ReportPlace::Area => ("area", None),
-    };
+    let (place, row_col) = place_of(breach.place);
     let index = |which: usize| row_col.map_or(JsonValue::Null, |row_col| json!(row_col[which]));
     let pairs = [
         ("kind", json!(breach.kind)),
@@ -118,6 +148,17 @@ mod tests {
         assert_eq!(window["properties"]["rms_without_m"], 0.98);
         assert_eq!(value["features"][2]["properties"]["row"], JsonValue::Null);
         assert_eq!(value["features"][2]["geometry"]["coordinates"][0][2], json!([520000.0, 3885000.0]));
+    }
+
+    #[test]
+    fn a_line_of_csv_has_a_field_for_every_name() {
+        let text = breaches_csv(&samples::report(), &PLACES);
+        let lines: Vec<Vec<&str>> = text.lines().map(|line| line.split(',').collect()).collect();
+        assert!(lines.iter().all(|line| line.len() == lines[0].len()), "{text}");
+        assert_eq!(lines.len(), 1 + samples::report().breaches.len());
+        assert_eq!(lines[1][..7], ["per_load_module", "module", "4", "5", "107", "100", "7"]);
+        assert_eq!(lines[1][10..], ["507500", "3877000", "508000", "3877500"]);
+        assert_eq!((lines[3][1], lines[3][2], lines[3][3]), ("area", "", ""));
     }
 
     #[test]

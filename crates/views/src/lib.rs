@@ -1,4 +1,4 @@
-//! What people look at: meshes for viewers, breaches on a map, the report as text.
+//! What people look at: pictures, the report as text and as a page, breaches on a map, meshes for viewers.
 //!
 //! Pure: values in, bytes or text out. Nothing here opens a file, reads a clock or asks what the terminal can do;
 //! delete this crate and the load modules still come out the same.
@@ -9,7 +9,15 @@
 mod mesh;
 pub use mesh::{Coordinates, MeshPlace, write_obj, write_ply};
 mod breaches;
-pub use breaches::{BreachPlaces, breaches_geojson};
+pub use breaches::{BreachPlaces, breaches_csv, breaches_geojson};
+mod page;
+pub use page::{Advice, Page, PageSetting, advise, report_html};
+mod picture;
+pub use picture::{
+    Camera, Color, Drawn, Eye, Facets, Image, Look, Map, NO_RESIDUAL, Panel, RESIDUAL_SCALE_M, Scene, SceneGround,
+    SceneLimits, SceneTile, Shown, Sight, Style, Surface, draw_map, draw_panels, draw_perspective, draw_sight,
+    draw_wireframe,
+};
 mod table;
 pub use table::{Align, Table, grouped};
 mod report;

@@ -174,7 +174,7 @@ fn breach_row(breach: &ReportBreach) -> [String; 8] {
 }
 
 /// A count; of a residual, which is counted in millimetres, the metres.
-fn amount(breach: &ReportBreach, count: u64) -> String {
+pub(crate) fn amount(breach: &ReportBreach, count: u64) -> String {
     if breach.kind == "residual" { format!("{}.{:03} m", grouped(count / 1000), count % 1000) } else { grouped(count) }
 }
 

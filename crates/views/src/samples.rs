@@ -1,9 +1,40 @@
-//! A report with something in every part, for the tests of this crate.
+//! A report with something in every part and a small piece of terrain, for the tests of this crate.
+
+use terrain::{LoadModule, ModuleGrid, ModuleId, ModuleResidual, ModuleVertex, Spacing};
 
 use database::{
     Report, ReportBound, ReportBreach, ReportClass, ReportPerModule, ReportPerWindow, ReportPlace, ReportPoints,
     ReportPool, ReportRefusals, ReportResidual, ReportStage, ReportStops, ReportVoids,
 };
+
+/// 2 x 3 load modules of 20 x 20 cells, 25 m apart.
+pub(crate) const GRID: ModuleGrid = ModuleGrid { rows: 2, cols: 3, side_cells: 20 };
+pub(crate) fn spacing() -> Spacing {
+    Spacing::from_sixteenths(400).unwrap()
+}
+
+/// Load modules of four triangles each around a middle vertex, over a slope.
+pub(crate) fn modules() -> Vec<LoadModule> {
+    let side = 64_000_u16;
+    let height = |row: u32, col: u32, x: u16, y: u16| {
+        let (x, y) = (i64::from(col) * 64_000 + i64::from(x), i64::from(row) * 64_000 + i64::from(y));
+        (64_000 + x / 10 - y / 20) as i32
+    };
+    let module = |id: ModuleId| {
+        let vertex = |(x, y): (u16, u16)| ModuleVertex { x, y, z: height(id.row, id.col, x, y) };
+        let places = [(0, 0), (side, 0), (20_000, 30_000), (0, side), (side, side)];
+        LoadModule {
+            id,
+            side,
+            vertices: places.into_iter().map(vertex).collect(),
+            triangles: vec![[0, 1, 2], [0, 2, 3], [1, 4, 2], [2, 4, 3]],
+            classes: vec![0; 4],
+            polygon_count: 4,
+            residual: ModuleResidual::default(),
+        }
+    };
+    GRID.all().iter().map(module).collect()
+}
 
 pub(crate) fn residual(rms_m: f64) -> ReportResidual {
     ReportResidual { rms_m, max_m: 14.0 * rms_m, mean_abs_m: 0.6 * rms_m, p95_m: 2.0 * rms_m, p99_m: 3.3 * rms_m }

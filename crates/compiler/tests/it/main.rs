@@ -18,6 +18,7 @@ mod golden;
 mod measures;
 mod one_tile_again;
 mod random_jobs;
+mod read_back;
 mod real_ground;
 mod soundness;
 mod stopped;

@@ -1,9 +1,12 @@
 //! The commands, one file each: its arguments, its help, and what it calls.
 
 mod build;
+mod diff;
+mod explain;
 mod fidelity;
 mod init;
 mod plan;
+mod render;
 mod report;
 mod sample;
 mod status;
@@ -30,6 +33,12 @@ pub enum Command {
     Status(status::Arguments),
     /// Show what a build found: limits, residuals, breaches, times
     Report(report::Arguments),
+    /// Draw it: relief, perspective, wireframe, residuals, density, limits, tiles
+    Render(render::Arguments),
+    /// Explain one load module: what it holds, what was refused, what one more point would buy
+    Explain(explain::Arguments),
+    /// List the load modules in which two databases differ, and by how much
+    Diff(diff::Arguments),
     /// Check every file and every load module of a database
     Verify(verify::Arguments),
     /// Measure how true a database is: residuals, line of sight, slope
@@ -53,6 +62,9 @@ impl Command {
             Command::Plan(arguments) => plan::run(&arguments),
             Command::Status(arguments) => status::run(&arguments),
             Command::Report(arguments) => report::run(&arguments),
+            Command::Render(arguments) => render::run(&arguments),
+            Command::Explain(arguments) => explain::run(&arguments),
+            Command::Diff(arguments) => diff::run(&arguments),
             Command::Verify(arguments) => verify::run(&arguments),
             Command::Fidelity(arguments) => fidelity::run(&arguments),
             Command::Sample(arguments) => sample::run(&arguments),

@@ -3,15 +3,18 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use database::Folder;
+use compiler::{CompileError, Wanted, WantedGround, product};
+use database::{Folder, Report};
 
+use crate::arguments::Workers;
 use crate::failure::{Failure, Outcome};
-use crate::terminal;
+use crate::{page, terminal};
 
 const AFTER_HELP: &str = "\
 Examples:
   tiefort report ntc.tdb
   tiefort report ntc.tdb --format json | jq '.breaches[].where'
+  tiefort report ntc.tdb --format html > report.html      one file, with maps; a build leaves it in DIR, too
 
 Exit codes: 0 all limits met; 1 with breaches; 2 no report to read.";
 
@@ -25,6 +28,11 @@ pub struct Arguments {
     /// For a person, a program or a browser
     #[arg(long, value_enum, default_value_t = Format::Text)]
     format: Format,
+    /// The raster to take for the ground; for html only [default: what the database was built from]
+    #[arg(long, value_name = "DEM")]
+    against: Option<PathBuf>,
+    #[command(flatten)]
+    workers: Workers,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -33,22 +41,38 @@ enum Format {
     Text,
     /// For a program
     Json,
-    /// For a browser (not supported yet)
+    /// For a browser
     Html,
 }
 
 /// Prints the report.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
-    if arguments.format == Format::Html {
-        return Err(Failure::not_yet("--format html", "use --format text or json"));
+    if arguments.against.is_some() && arguments.format != Format::Html {
+        let message = "found --against with a report that draws nothing, expected --format html";
+        return Err(Failure::new(message, "leave --against out, or add --format html"));
     }
     let report = Folder::new(&arguments.database).report()?;
     let text = match arguments.format {
         Format::Json => {
             serde_json::to_string_pretty(&report).expect("a report that was read from JSON is JSON again") + "\n"
         }
-        _ => views::report_text(&report),
+        Format::Text => views::report_text(&report),
+        Format::Html => html(arguments, &report)?,
     };
     terminal::print(&text)?;
     Ok(if report.breaches.is_empty() { Outcome::Sound } else { Outcome::Breaches })
+}
+
+/// The page; without the ground's part of it where the ground is not to be found and none was named.
+fn html(arguments: &Arguments, report: &Report) -> Result<String, Failure> {
+    let ground = arguments.against.as_deref().map_or(WantedGround::Recorded, WantedGround::Raster);
+    let wanted = Wanted { part: None, ground, workers: arguments.workers.count() };
+    let product = match product(&arguments.database, &wanted) {
+        Err(error @ (CompileError::Impossible { .. } | CompileError::Source(_))) if arguments.against.is_none() => {
+            terminal::tell(&format!("note: {error}; the page is drawn without it\nhint: --against DEM names it\n"));
+            product(&arguments.database, &Wanted { ground: WantedGround::None, ..wanted })?
+        }
+        found => found?,
+    };
+    Ok(page::page(&product, report))
 }

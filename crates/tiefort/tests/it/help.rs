@@ -54,6 +54,13 @@ fn wrong_values_of_arguments_end_with_2_and_say_what_was_expected() {
         (&["sample", "--spacing", "25.27", "--out", "a.tif"], "multiple of 1/16 m"),
         (&["sample", "--posts", "1", "--out", "a.tif"], "2..="),
         (&["report", "x.tdb", "--format", "pdf"], "html"),
+        (&["render", "x.tdb", "--view", "photo", "--out", "a.png"], "relief, perspective, wireframe, residual"),
+        (&["render", "x.tdb", "--view", "relief", "--size", "9", "--out", "a.png"], "200..=8000"),
+        (&["render", "x.tdb", "--view", "relief", "--modules", "3,3..2,2", "--out", "a.png"], "ROW,COL..ROW,COL"),
+        (&["render", "x.tdb", "--view", "perspective", "--eye", "1", "--out", "a.png"], "EAST,NORTH"),
+        (&["render", "x.tdb", "--view", "perspective", "--pitch", "95", "--out", "a.png"], "-89 to 89"),
+        (&["explain", "x.tdb", "2"], "expected ROW,COL"),
+        (&["diff", "x.tdb"], "<B>"),
         (&["fidelity", "x.tdb", "--pairs", "0"], "1..="),
         (&["fidelity", "x.tdb", "--seed", "x"], "--seed"),
         (&["tin", "a.tif", "--points", "9", "--measure", "--quiet", "--out", "m.ply"], "--measure"),
@@ -69,7 +76,6 @@ fn what_is_not_supported_yet_says_so() {
     for emit in ["slurm", "dask", "ninja"] {
         scene.refuses(&["plan", "job.toml", "--emit", emit], &[emit, "not supported yet"]);
     }
-    scene.refuses(&["report", "x.tdb", "--format", "html"], &["html", "not supported yet"]);
     scene.refuses(&["tin", "a.tif", "--points", "9", "--out", "m.glb"], &["glb", "not supported yet"]);
 }
 
@@ -88,5 +94,10 @@ fn arguments_that_do_not_fit_together_are_named() {
         let counted = ["tin", "a.tif", "--triangles", "9", "--method", method, "--out", "m.ply"];
         scene.refuses(&counted, &["--triangles", "expected --points"]);
     }
+    let map = ["render", "x.tdb", "--view", "density", "--eye", "1,2", "--out", "a.png"];
+    scene.refuses(&map, &["--eye", "perspective or wireframe"]);
+    let map = ["render", "x.tdb", "--view", "relief", "--against", "a.tif", "--out", "a.png"];
+    scene.refuses(&map, &["--against", "no use for it"]);
+    scene.refuses(&["report", "x.tdb", "--against", "a.tif"], &["--against", "--format html"]);
     scene.refuses(&["sample", "--posts", "9", "--classes", "a.tif", "--out", "a.tif"], &["a.tif", "two"]);
 }

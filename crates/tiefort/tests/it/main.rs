@@ -14,3 +14,4 @@ mod raster;
 mod scene;
 mod starts;
 mod streams;
+mod views;

@@ -1,0 +1,131 @@
+//! `tiefort diff`: which load modules of two databases differ, and by how much.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use compiler::{Difference, ModuleDifference, difference};
+use serde_json::{Value, json};
+use views::{Align, Table, grouped};
+
+use crate::arguments::Workers;
+use crate::failure::{Failure, Outcome};
+use crate::terminal;
+
+const AFTER_HELP: &str = "\
+Examples:
+  tiefort diff before.tdb after.tdb
+  tiefort diff before.tdb after.tdb --format json | jq '.changed[].module'
+
+\"apart\" is how far the two surfaces lie apart at most, at posts of the working grid.
+Exit codes: 0 all load modules alike; 1 some differ; 2 nothing to compare.";
+
+/// Arguments of `diff`.
+#[derive(Args)]
+#[command(after_help = AFTER_HELP)]
+pub struct Arguments {
+    /// Folder of a terrain database
+    #[arg(value_name = "A")]
+    first: PathBuf,
+    /// Folder of another one of the same area
+    #[arg(value_name = "B")]
+    second: PathBuf,
+    /// List every load module that differs, not only those farthest apart
+    #[arg(long)]
+    all: bool,
+    /// For a person or a program
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    format: Format,
+    #[command(flatten)]
+    workers: Workers,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Format {
+    /// For a person
+    Text,
+    /// For a program
+    Json,
+}
+
+/// Rows of the list, unless all are asked for.
+const ROWS_MAX: usize = 20;
+
+/// Compares.
+pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
+    let found = difference(&arguments.first, &arguments.second, arguments.workers.count())?;
+    let rows = if arguments.all { usize::MAX } else { ROWS_MAX };
+    terminal::print(&match arguments.format {
+        Format::Text => text(&found, rows),
+        Format::Json => format!("{:#}\n", to_json(&found)),
+    })?;
+    Ok(if found.changed.is_empty() { Outcome::Sound } else { Outcome::Differ })
+}
+
+fn text(found: &Difference, rows: usize) -> String {
+    let (changed, modules) = (grouped(found.changed.len() as u64), grouped(found.modules as u64));
+    let mut text = match found.changed.len() {
+        0 => format!("All {modules} load modules are alike.\n"),
+        _ => format!("{changed} of {modules} load modules differ.\n"),
+    };
+    if !found.settings.is_empty() {
+        let mut table = Table::new(&[Align::Left, Align::Left, Align::Left]);
+        table.row(["setting", "A", "B"]);
+        for setting in &found.settings {
+            table.row([&setting.key, &setting.values[0], &setting.values[1]]);
+        }
+        text += &format!("\n{}", table.text(0));
+    }
+    if found.changed.is_empty() {
+        return text;
+    }
+    let [before, after] = found.triangles;
+    let [rms_before_m, rms_after_m] = found.rms_m;
+    text += &format!(
+        "\nWhole area: {} triangles in A, {} in B; RMS residual {rms_before_m:.3} m, {rms_after_m:.3} m\n\n",
+        grouped(before),
+        grouped(after)
+    );
+    text + &list(found, rows)
+}
+
+/// The load modules that differ, those farthest apart first.
+fn list(found: &Difference, rows: usize) -> String {
+    let mut order: Vec<&ModuleDifference> = found.changed.iter().collect();
+    order.sort_by(|a, b| b.apart_m.total_cmp(&a.apart_m).then(a.module.cmp(&b.module)));
+    let mut table = Table::new(&[Align::Left, Align::Right, Align::Right, Align::Right, Align::Right, Align::Right]);
+    table.row(["load module", "apart", "triangles A", "B", "RMS A", "B"]);
+    for module in order.iter().take(rows) {
+        table.row([
+            module.module.to_string(),
+            format!("{:.2} m", module.apart_m),
+            module.triangles[0].to_string(),
+            module.triangles[1].to_string(),
+            format!("{:.3} m", module.rms_m[0]),
+            format!("{:.3} m", module.rms_m[1]),
+        ]);
+    }
+    let more = order.len().saturating_sub(rows);
+    let rest = if more == 0 { String::new() } else { format!("and {} more: --all\n", grouped(more as u64)) };
+    table.text(0) + &rest
+}
+
+fn to_json(found: &Difference) -> Value {
+    let module = |module: &ModuleDifference| {
+        json!({
+            "module": [module.module.row, module.module.col],
+            "apart_m": module.apart_m,
+            "triangles": module.triangles,
+            "polygons": module.polygons,
+            "rms_m": module.rms_m,
+            "max_m": module.largest_m,
+        })
+    };
+    let settings = found.settings.iter().map(|setting| json!({ "key": setting.key, "values": setting.values }));
+    json!({
+        "modules": found.modules,
+        "triangles": found.triangles,
+        "rms_m": found.rms_m,
+        "settings": settings.collect::<Vec<_>>(),
+        "changed": found.changed.iter().map(module).collect::<Vec<_>>(),
+    })
+}

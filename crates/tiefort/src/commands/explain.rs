@@ -1,0 +1,231 @@
+//! `tiefort explain`: one load module, and why it is as it is.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use compiler::{Explanation, WantedGround, explain};
+use serde_json::{Value, json};
+use terrain::{ModuleId, RefusedBy, StopReason, TileId};
+use views::{Align, Table, grouped};
+
+use crate::arguments::{Workers, row_col};
+use crate::failure::{Failure, Outcome};
+use crate::terminal;
+
+const AFTER_HELP: &str = "\
+Examples:
+  tiefort explain ntc.tdb 42,17
+  tiefort explain ntc.tdb 42,17 --format json | jq .one_more
+
+A point adds two triangles. What one more would buy is the best split of one triangle at one post,
+its height chosen for the least squared residuals; nothing else moves.
+
+Exit codes: 0 explained; 2 no such load module, or no database to read.";
+
+/// Arguments of `explain`.
+#[derive(Args)]
+#[command(after_help = AFTER_HELP)]
+pub struct Arguments {
+    /// Folder of the terrain database
+    #[arg(value_name = "DIR")]
+    database: PathBuf,
+    /// Row and column of the load module, from the south-west
+    #[arg(value_name = "ROW,COL", value_parser = row_col)]
+    module: TileId,
+    /// For a person or a program
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    format: Format,
+    /// The raster to take for the ground [default: what the database was built from]
+    #[arg(long, value_name = "DEM")]
+    against: Option<PathBuf>,
+    #[command(flatten)]
+    workers: Workers,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Format {
+    /// For a person
+    Text,
+    /// For a program
+    Json,
+}
+
+/// Explains.
+pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
+    let module = ModuleId { row: arguments.module.row, col: arguments.module.col };
+    let ground = arguments.against.as_deref().map_or(WantedGround::Recorded, WantedGround::Raster);
+    let found = explain(&arguments.database, module, ground, arguments.workers.count())?;
+    terminal::print(&match arguments.format {
+        Format::Text => text(&found),
+        Format::Json => format!("{:#}\n", to_json(&found)),
+    })?;
+    Ok(Outcome::Sound)
+}
+
+fn text(found: &Explanation) -> String {
+    let [west, south, east, north] = found.extent_m;
+    let mut text = format!("Load module {}: east {west} to {east}, north {south} to {north}\n\n", found.module);
+    text += &counts(found).text(2);
+    text += "\n";
+    text += &refused_text(found);
+    text += "\n";
+    text += &one_more_text(found);
+    text
+}
+
+fn counts(found: &Explanation) -> Table {
+    let mut table = Table::new(&[Align::Left, Align::Right, Align::Left]);
+    let percent = |count: u32, limit: u32| format!("{:.0} %", 100.0 * f64::from(count) / f64::from(limit));
+    let (count, limit) = found.count;
+    let granted = if found.granted == 0 { String::new() } else { format!(", {} more from the pool", found.granted) };
+    let of_limit = format!("{} of the limit of {limit}{granted}", percent(count, limit));
+    table.row([found.count_of.as_str(), &grouped(u64::from(count)), &of_limit]);
+    if found.count_of == "triangles" && found.polygons != found.triangles {
+        table.row(["polygons", &grouped(u64::from(found.polygons)), "before they were cut into triangles"]);
+    }
+    let [s, e, n, w] = found.vertices_on_sides;
+    let inside = format!("inside; {s}, {e}, {n}, {w} on the southern, eastern, northern and western side");
+    table.row(["vertices", &grouped(u64::from(found.vertices_inside)), &inside]);
+    let window = found.window;
+    let around = format!(
+        "{} of the limit of {}, in the fullest window around, {} x {} from {}",
+        percent(window.count, window.limit),
+        grouped(u64::from(window.limit)),
+        window.size[0],
+        window.size[1],
+        window.origin
+    );
+    table.row(["window", &grouped(u64::from(window.count)), &around]);
+    let [rms_m, mean_m, largest_m] = found.residual_m;
+    let (place, of) = (grouped(found.place.0 as u64), grouped(found.place.1 as u64));
+    let residual = format!("RMS, mean {mean_m:.2} m, largest {largest_m:.2} m; {place} of {of} from the worst");
+    table.row(["residual", &format!("{rms_m:.3} m"), &residual]);
+    let (tile, state, stop) = found.tile;
+    let allowed = found.tile_triangles.1.map_or(String::new(), |allowed| format!(" of {} allowed", grouped(allowed)));
+    let state = format!("{state:?}").to_lowercase();
+    // Points of clipped edges are charged no triangles: those are counted after the cut.
+    let charged = match found.tile_triangles.0 {
+        0 => String::new(),
+        charged => format!(", charged {} triangles{allowed}", grouped(u64::from(charged))),
+    };
+    table.row(["tile", &tile.to_string(), &format!("{state}{charged}; stopped: {}", stop_text(stop))]);
+    for (class, count) in &found.classes {
+        table.row(["class", &grouped(u64::from(*count)), &format!("triangles on {class}")]);
+    }
+    table
+}
+
+fn stop_text(stop: StopReason) -> &'static str {
+    match stop {
+        StopReason::BudgetSpent => "its share was spent",
+        StopReason::ResidualReached => "the residual asked for was reached",
+        StopReason::RmsReached => "the RMS residual asked for was reached",
+        StopReason::Exhausted => "nothing was left to choose",
+    }
+}
+
+fn by_text(by: RefusedBy) -> &'static str {
+    match by {
+        RefusedBy::Module => "limits.per_load_module",
+        RefusedBy::Window => "limits.per_4km_square",
+        RefusedBy::Reservation => "room kept for a neighbour's side",
+    }
+}
+
+/// Refused posts that a text lists; JSON has them all.
+const REFUSED_MAX: usize = 10;
+
+fn refused_text(found: &Explanation) -> String {
+    let (count, limit) = found.count;
+    if found.refused.is_empty() {
+        let why = if count < limit {
+            ": it holds what its tile's share of the budget found worth a triangle here"
+        } else {
+            ""
+        };
+        return format!("No post was refused here{why}.\n");
+    }
+    let mut table = Table::new(&[Align::Right, Align::Right, Align::Right, Align::Left]);
+    table.row(["east", "north", "residual", "refused by"]);
+    for refusal in found.refused.iter().take(REFUSED_MAX) {
+        let [east, north] = refusal.place_m.map(|metres| metres.to_string());
+        table.row([east, north, format!("{:.2} m", refusal.residual_m), by_text(refusal.by).into()]);
+    }
+    let more = found.refused.len().saturating_sub(REFUSED_MAX);
+    let rest = if more == 0 { String::new() } else { format!("  and {more} more: --format json\n") };
+    format!("{} posts were refused here\n{}{rest}", found.refused.len(), table.text(2))
+}
+
+fn one_more_text(found: &Explanation) -> String {
+    match (&found.one_more, &found.no_ground) {
+        (Some(more), _) => {
+            let [east, north] = more.place_m;
+            let [rms_m, ..] = found.residual_m;
+            format!(
+                "One more point, two triangles, would take the RMS residual from {rms_m:.3} m to {:.3} m:\n  at {east} \
+                 {north}, {:.2} m {} the triangle there; half of that a triangle.\n  \
+                 {} of {} load modules would gain more.\n",
+                more.rms_after_m,
+                more.raised_m.abs(),
+                if more.raised_m < 0.0 { "below" } else { "above" },
+                grouped(more.place as u64 - 1),
+                grouped(found.place.1 as u64)
+            )
+        }
+        (None, Some(why)) => format!(
+            "What one more point would buy was not computed: {why}\n  --against DEM names the raster to look at\n"
+        ),
+        (None, None) => "One more point would buy nothing: no post lies inside a triangle and off it.\n".into(),
+    }
+}
+
+fn to_json(found: &Explanation) -> Value {
+    let (tile, state, stop) = found.tile;
+    let [rms_m, mean_abs_m, max_m] = found.residual_m;
+    let window = found.window;
+    let classes = found.classes.iter().map(|(name, count)| json!({ "name": name, "triangles": count }));
+    json!({
+        "module": [found.module.row, found.module.col],
+        "extent_m": found.extent_m,
+        "tile": {
+            "row": tile.row,
+            "col": tile.col,
+            "state": state,
+            "stop": stop_text(stop),
+            "triangles": found.tile_triangles.0,
+            "allowed": found.tile_triangles.1,
+        },
+        "triangles": found.triangles,
+        "polygons": found.polygons,
+        "vertices_inside": found.vertices_inside,
+        "vertices_on_sides": found.vertices_on_sides,
+        "per_load_module": { "count": found.count.0, "limit": found.count.1, "granted": found.granted },
+        "per_4km": {
+            "window": [window.origin.row, window.origin.col],
+            "count": window.count,
+            "limit": window.limit,
+        },
+        "classes": classes.collect::<Vec<_>>(),
+        "residual": {
+            "posts": found.posts,
+            "rms_m": rms_m,
+            "mean_abs_m": mean_abs_m,
+            "max_m": max_m,
+            "place": found.place.0,
+            "of": found.place.1,
+        },
+        "refused": found.refused.iter().map(|refusal| json!({
+            "place_m": refusal.place_m,
+            "residual_m": refusal.residual_m,
+            "by": by_text(refusal.by),
+        })).collect::<Vec<_>>(),
+        "one_more": found.one_more.map(|more| json!({
+            "place_m": more.place_m,
+            "raised_m": more.raised_m,
+            "triangles": 2,
+            "rms_after_m": more.rms_after_m,
+            "place": more.place,
+        })),
+        "no_ground": found.no_ground,
+    })
+}

@@ -1,0 +1,71 @@
+//! From a database that was read back to what pictures and reports are drawn from.
+
+use compiler::{LimitUse, Product};
+use database::{Report, ReportPlace, TileState};
+use terrain::{LoadModule, ModuleId, ModuleRect};
+use views::{Scene, SceneGround, SceneLimits, SceneTile};
+
+/// What a scene borrows besides the product itself.
+#[derive(Debug)]
+pub struct SceneParts {
+    limits: SceneLimits,
+    tiles: Vec<SceneTile>,
+}
+
+impl SceneParts {
+    /// Of a product, of which `limit_use` is known when all of it was read.
+    pub fn new(product: &Product, limit_use: Option<LimitUse>, report: Option<&Report>) -> Self {
+        let limits = &product.job.limits;
+        let use_of = limit_use.unwrap_or(LimitUse { modules: Vec::new(), windows: Vec::new(), window: [1, 1] });
+        let places = report.iter().flat_map(|report| &report.bound).map(|bound| bound.place);
+        let id = |[row, col]: [u32; 2]| ModuleId { row, col };
+        let (mut bound_modules, mut bound_windows) = (Vec::new(), Vec::new());
+        for place in places {
+            match place {
+                ReportPlace::Module(place) => bound_modules.push(id(place)),
+                ReportPlace::Window(place) => bound_windows.push(id(place)),
+                ReportPlace::Area => {}
+            }
+        }
+        let limits = SceneLimits {
+            count: match limits.count {
+                job::Count::Triangles => "triangles".into(),
+                job::Count::Polygons => "polygons".into(),
+            },
+            modules: use_of.modules,
+            per_load_module: limits.per_load_module,
+            window: use_of.window,
+            windows: use_of.windows,
+            per_window: limits.window.limit,
+            bound_modules,
+            bound_windows,
+        };
+        let state = |tile| product.manifest.tile(tile).map_or(TileState::Missing, |record| record.state);
+        let tiles = product.tiles.iter().map(|planned| SceneTile {
+            tile: planned.tile,
+            modules: planned.modules,
+            rank: planned.rank,
+            color: planned.color,
+            state: state(planned.tile),
+        });
+        Self { limits, tiles: tiles.collect() }
+    }
+
+    /// The scene of `part`, whose load modules are `modules`, row by row from the south-west.
+    pub fn scene<'a>(&'a self, product: &'a Product, part: ModuleRect, modules: &'a [LoadModule]) -> Scene<'a> {
+        Scene {
+            name: &product.manifest.area.name,
+            crs: &product.manifest.area.crs,
+            grid: product.grid,
+            frame: product.frame,
+            part,
+            modules,
+            ground: product
+                .ground
+                .as_ref()
+                .map(|ground| SceneGround { dem: &ground.dem, residuals: &ground.residuals }),
+            limits: &self.limits,
+            tiles: &self.tiles,
+        }
+    }
+}

@@ -1,0 +1,259 @@
+//! `report.html`: one file with everything in it that a person wants to know of a database, for a screen and for paper.
+//!
+//! It loads nothing: style, charts and pictures are inside. Nothing of it runs.
+
+mod advice;
+mod charts;
+mod maps;
+mod tables;
+
+pub(crate) use advice::place_text;
+pub use advice::{Advice, advise};
+
+use database::{Manifest, Report};
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+use terrain::{LoadModule, ModuleId};
+
+use crate::picture::Scene;
+use crate::table::grouped;
+
+use charts::Histogram;
+
+/// One setting of a job, as the page lists it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PageSetting {
+    /// The key with its section.
+    pub key: String,
+    /// The value as the job file writes it.
+    pub value: String,
+    /// What it means.
+    pub meaning: String,
+}
+
+/// What the page is made from.
+#[derive(Clone, Copy, Debug)]
+pub struct Page<'a> {
+    /// What the build found.
+    pub report: &'a Report,
+    /// What was built, and from what.
+    pub manifest: &'a Manifest,
+    /// With which settings.
+    pub settings: &'a [PageSetting],
+    /// All of it to be drawn; without one, the page has no maps.
+    pub scene: Option<&'a Scene<'a>>,
+}
+
+/// Metres that an observer sees, unless he is told otherwise.
+const VISIBLE_M: f64 = 3500.0;
+/// Load modules that are shown as the worst.
+const WORST_COUNT: usize = 10;
+
+/// The whole page.
+pub fn report_html(page: &Page) -> String {
+    let Page { report, manifest, .. } = page;
+    let page = html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                title { (report.area) ": terrain database" }
+                style { (PreEscaped(include_str!("style.css"))) }
+            }
+            body {
+                h1 { "Gaming area " (report.area) }
+                p.quiet { (what_it_is(manifest)) }
+                nav {
+                    @for (id, name) in SECTIONS { a href={ "#" (id) } { (name) } }
+                }
+                (tables::verdict(report))
+                (headline(page))
+                section id="limits" { h2 { "Limits" } (tables::limits(report)) (tables::advice(report)) }
+                section id="residuals" { h2 { "Residuals" } (tables::residuals(report)) (histograms(page)) }
+                @if let Some(scene) = page.scene {
+                    section id="maps" { h2 { "Maps" } (maps::maps(scene)) }
+                    section id="worst" { h2 { "The worst load modules" } (worst(page, scene)) }
+                }
+                section id="breaches" { h2 { "Breaches" } (tables::breaches(report)) }
+                section id="times" { h2 { "Times" } (tables::stages(report)) }
+                section id="made-from" { h2 { "Made from" } (tables::sources(manifest)) (settings(page)) }
+            }
+        }
+    };
+    page.into_string()
+}
+
+const SECTIONS: [(&str, &str); 7] = [
+    ("limits", "Limits"),
+    ("residuals", "Residuals"),
+    ("maps", "Maps"),
+    ("worst", "Worst load modules"),
+    ("breaches", "Breaches"),
+    ("times", "Times"),
+    ("made-from", "Made from"),
+];
+
+fn what_it_is(manifest: &Manifest) -> String {
+    let area = &manifest.area;
+    let datum = match area.vertical_datum.as_str() {
+        "" => "an unknown vertical datum",
+        datum => datum,
+    };
+    format!(
+        "{} x {} km from {} {} in {}, heights above {datum}; {} load modules of {} m, posts {} m apart.",
+        area.size_m[0] / 1000.0,
+        area.size_m[1] / 1000.0,
+        area.origin_m[0],
+        area.origin_m[1],
+        area.crs,
+        grouped(u64::from(area.module_rows) * u64::from(area.module_cols)),
+        area.module_side_m,
+        area.spacing_m
+    )
+}
+
+fn headline(page: &Page) -> Markup {
+    let report = page.report;
+    let modules = report.per_load_module;
+    let figures = [
+        (grouped(report.triangles), format!("triangles, {:.2} in the mean load module", modules.mean)),
+        (grouped(report.points.total), "points".into()),
+        (format!("{:.3} m", report.residual.rms_m), "RMS residual, all posts alike".into()),
+        (format!("{:.2} m", report.residual.max_m), "largest residual".into()),
+        (
+            format!("{} of {}", grouped(modules.max), grouped(modules.limit)),
+            format!("{} in the fullest load module", report.count),
+        ),
+        (
+            format!("{} of {}", grouped(report.per_4km.max), grouped(report.per_4km.limit)),
+            format!("{} in the fullest 4 km window", report.count),
+        ),
+        (grouped(report.breaches.len() as u64), "breaches".into()),
+        (grouped(report.refusals.count), "posts refused by limits".into()),
+    ];
+    let seen = page.scene.and_then(most_seen);
+    html! {
+        div.figures {
+            @for (figure, what) in &figures { div { b { (figure) } span { (what) } } }
+            @if let Some((count, module)) = seen {
+                div {
+                    b { (grouped(count)) }
+                    span {
+                        "triangles at most within " (VISIBLE_M / 1000.0) " km of an observer, in load module " (module)
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// The most triangles that an observer in the middle of a load module has within his visible range, and in which: those
+/// of every load module that any part of lies so near.
+fn most_seen(scene: &Scene) -> Option<(u64, ModuleId)> {
+    let side_m = scene.side_m();
+    let reach = (VISIBLE_M / side_m + 0.5).ceil() as i64;
+    let gap = |off: i64| ((off.abs() as f64 - 0.5) * side_m).max(0.0);
+    let offsets: Vec<(i64, i64)> = (-reach..=reach)
+        .flat_map(|row| (-reach..=reach).map(move |col| (row, col)))
+        .filter(|&(row, col)| gap(row) * gap(row) + gap(col) * gap(col) <= VISIBLE_M * VISIBLE_M)
+        .collect();
+    let counts: Vec<u64> = scene.modules.iter().map(|module| module.triangles.len() as u64).collect();
+    let (rows, cols) = (i64::from(scene.grid.rows), i64::from(scene.grid.cols));
+    let seen = |module: ModuleId| -> u64 {
+        let places = offsets.iter().map(|(row, col)| (i64::from(module.row) + row, i64::from(module.col) + col));
+        let inside = places.filter(|&(row, col)| 0 <= row && row < rows && 0 <= col && col < cols);
+        inside.map(|(row, col)| counts[(row * cols + col) as usize]).sum()
+    };
+    // The first of equals, so that the page is the same each time.
+    scene
+        .grid
+        .all()
+        .iter()
+        .map(|module| (seen(module), module))
+        .reduce(|best, next| if best.0 < next.0 { next } else { best })
+}
+
+fn histograms(page: &Page) -> Markup {
+    let Some(scene) = page.scene else { return html! {} };
+    let limits = scene.limits;
+    let modules =
+        Histogram::of_counts(&limits.modules, limits.per_load_module, &format!("{} in a load module", limits.count));
+    let residuals = scene.ground.map(|ground| {
+        let reach_m = reach_m(page.report.residual.p99_m);
+        Histogram::of_metres(
+            maps::residuals_m(&ground),
+            reach_m,
+            "residual of a post in metres; the ends hold the rest",
+        )
+    });
+    html! {
+        div.pair {
+            figure { figcaption { "Load modules by " (limits.count) } (PreEscaped(modules.svg())) }
+            @if let Some(residuals) = residuals {
+                figure { figcaption { "Posts by residual: DEM less TIN" } (PreEscaped(residuals.svg())) }
+            }
+        }
+    }
+}
+
+/// A round number of metres that 99 of 100 residuals lie within.
+fn reach_m(p99_m: f64) -> f64 {
+    [0.1, 0.2, 0.5, 1.0, 2.0, 4.0, 5.0, 10.0, 20.0, 50.0, 100.0]
+        .into_iter()
+        .find(|reach| p99_m <= *reach)
+        .unwrap_or(200.0)
+}
+
+fn worst(page: &Page, scene: &Scene) -> Markup {
+    let mean_squares = |module: &LoadModule| match module.residual.posts {
+        0 => 0.0,
+        posts => module.residual.sum_squared as f64 / f64::from(posts),
+    };
+    let mut order: Vec<&LoadModule> = scene.modules.iter().collect();
+    // Stable: of equals the first from the south-west.
+    order.sort_by(|a, b| mean_squares(b).total_cmp(&mean_squares(a)));
+    order.truncate(WORST_COUNT);
+    let quanta = f64::from(terrain::QUANTA_PER_METRE);
+    html! {
+        p {
+            "Those with the largest RMS residual: their triangles, and where these lie above (blue) and below (red) "
+            "the ground, on the scale of the map above."
+        }
+        div.worst {
+            @for module in order {
+                article {
+                    h3 { "Load module " (module.id) }
+                    (maps::module_images(scene, module))
+                    p {
+                        "RMS " (format!("{:.2}", mean_squares(module).sqrt() / quanta)) " m, largest "
+                        (format!("{:.2}", f64::from(module.residual.largest) / quanta)) " m; "
+                        (scene.limits.modules[scene.grid.index(module.id)]) " of " (scene.limits.per_load_module) " "
+                        (scene.limits.count) (refused_text(page.report, module.id)) ". "
+                        code { "tiefort explain DIR " (module.id) }
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn refused_text(report: &Report, module: ModuleId) -> String {
+    let here = database::ReportPlace::Module([module.row, module.col]);
+    let refused: u32 = report.bound.iter().filter(|bound| bound.place == here).map(|bound| bound.refused).sum();
+    if refused == 0 { String::new() } else { format!(", {refused} posts refused") }
+}
+
+fn settings(page: &Page) -> Markup {
+    html! {
+        h3 { "Settings" }
+        table {
+            tr { th { "Key" } th { "Value" } th { "Meaning" } }
+            @for setting in page.settings {
+                tr { td { code { (setting.key) } } td { code { (setting.value) } } td { (setting.meaning) } }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,239 @@
+//! Tables of the page: limits and advice, residuals, breaches, times, sources.
+
+use database::{Manifest, Report, ReportResidual};
+use maud::{Markup, html};
+
+use super::{advise, place_text};
+use crate::table::grouped;
+
+/// Rows of a long list that the page shows; the files beside it have them all.
+const ROWS_MAX: usize = 100;
+
+pub(super) fn verdict(report: &Report) -> Markup {
+    let breaches = report.breaches.len() as u64;
+    html! {
+        @if breaches == 0 {
+            div.verdict { "Every limit is met." }
+        } @else {
+            div.verdict.breached {
+                b { (grouped(breaches)) } @if breaches == 1 { " limit is" } @else { " limits are" }
+                " not met: see " a href="#breaches" { "breaches" } "."
+            }
+        }
+        @for warning in &report.warnings { pre.quiet { "warning: " (warning) } }
+    }
+}
+
+pub(super) fn limits(report: &Report) -> Markup {
+    let (modules, windows) = (report.per_load_module, report.per_4km);
+    let rows = [
+        (
+            "limits.per_load_module",
+            grouped(modules.max),
+            grouped(modules.limit),
+            modules.max as f64 / modules.limit as f64,
+            modules.over,
+        ),
+        (
+            "limits.mean_per_load_module",
+            format!("{:.2}", modules.mean),
+            modules.mean_limit.to_string(),
+            modules.mean / modules.mean_limit,
+            u64::from(modules.mean_limit < modules.mean),
+        ),
+        (
+            "limits.per_4km_square",
+            grouped(windows.max),
+            grouped(windows.limit),
+            windows.max as f64 / windows.limit as f64,
+            windows.over,
+        ),
+    ];
+    html! {
+        table {
+            tr {
+                th { "Limit, in " (report.count) } th.n { "most used" } th.n { "limit" } th.n { "use" } th.n { "above" }
+            }
+            @for (name, used, limit, share, over) in rows {
+                tr {
+                    td { code { (name) } } td.n { (used) } td.n { (limit) }
+                    td.n { (format!("{:.1} %", 100.0 * share)) } td.n { (grouped(over)) }
+                }
+            }
+            tr {
+                td { code { "limits.pool" } } td.n { (grouped(report.pool.used)) } td.n { (grouped(report.pool.size)) }
+                td.n {} td.n {}
+            }
+        }
+        p.quiet { "The fullest 9 x 9 load modules, which bound a 4 km square at any offset, hold "
+            (grouped(windows.worst_9x9)) " " (report.count) "." }
+        (bound(report))
+    }
+}
+
+/// Where limits were met by refusing posts, and what that cost.
+fn bound(report: &Report) -> Markup {
+    let refused = &report.refusals;
+    if refused.count == 0 {
+        return html! { p { "No limit kept a post out." } };
+    }
+    html! {
+        h3 { "Where limits kept posts out" }
+        p {
+            (grouped(refused.count)) " posts were refused: "
+            (grouped(refused.by_module)) " by the limit of a load module, "
+            (grouped(refused.by_window)) " by that of a 4 km square, " (grouped(refused.by_reservation))
+            " to keep what a neighbour's side was promised. The largest residual among them is "
+            (format!("{:.2} m", refused.largest_m)) "."
+        }
+        @if !report.bound.is_empty() {
+            table {
+                tr {
+                    th { "Limit" } th { "Where" } th.n { "count" } th.n { "limit" } th.n { "refused" }
+                    th.n { "largest, m" } th.n { "RMS, m" } th.n { "RMS without the limit, m" }
+                }
+                @for bound in report.bound.iter().take(ROWS_MAX / 4) {
+                    tr {
+                        td { code { (bound.kind) } } td { (place_text(bound.place)) } td.n { (grouped(bound.count)) }
+                        td.n { (grouped(bound.limit)) } td.n { (bound.refused) }
+                        td.n { (format!("{:.2}", bound.refused_largest_m)) }
+                        td.n { (format!("{:.3}", bound.rms_with_m)) }
+                        td.n { (format!("{:.3}", bound.rms_without_m)) }
+                    }
+                }
+            }
+            (more(report.bound.len(), ROWS_MAX / 4, "report.json"))
+        }
+    }
+}
+
+fn more(rows: usize, shown: usize, file: &str) -> Markup {
+    html! {
+        @if shown < rows { p.quiet { "and " (grouped((rows - shown) as u64)) " more in " code { (file) } "." } }
+    }
+}
+
+pub(super) fn advice(report: &Report) -> Markup {
+    let advice = advise(report);
+    html! {
+        h3 { "What to change" }
+        @if advice.is_empty() { p { "Nothing binds: more would need finer ground, not other limits." } }
+        @for advice in advice {
+            div.advice {
+                p { b { (advice.policy) } ": " (advice.found) }
+                p { code { (advice.change) } }
+                p { (advice.effect) }
+            }
+        }
+    }
+}
+
+pub(super) fn residuals(report: &Report) -> Markup {
+    let row = |name: &str, posts: String, points: String, residual: &ReportResidual| {
+        let ReportResidual { rms_m, max_m, mean_abs_m, p95_m, p99_m } = *residual;
+        html! {
+            tr {
+                td { (name) } td.n { (posts) } td.n { (points) }
+                td.n { (format!("{rms_m:.3}")) } td.n { (format!("{max_m:.2}")) }
+                td.n { (format!("{mean_abs_m:.3}")) } td.n { (format!("{p95_m:.2}")) } td.n { (format!("{p99_m:.2}")) }
+            }
+        }
+    };
+    html! {
+        table {
+            tr {
+                th { "Residuals in metres" } th.n { "posts" } th.n { "points" } th.n { "RMS" } th.n { "largest" }
+                th.n { "mean" } th.n { "95 %" } th.n { "99 %" }
+            }
+            @for class in &report.classes {
+                (row(&class.name, grouped(class.posts), grouped(class.points), &class.residual))
+            }
+            (row(
+                "overall, weighted by posts",
+                grouped(report.classes.iter().map(|class| class.posts).sum()),
+                grouped(report.points.total),
+                &report.residual,
+            ))
+            @if let Some(source) = &report.residual_against_source {
+                (row("against the source DEM", String::new(), String::new(), source))
+            }
+        }
+        @if 1 < report.classes.len() {
+            p.quiet {
+                "Pooled by points, as the founding paper's Table 2 prints its overall figure: RMS "
+                (format!("{:.3} m", report.overall_point_weighted_rms_m)) "."
+            }
+        }
+        @if let Some(accuracy_m) = report.dem_accuracy_m {
+            p.quiet { "The source states an accuracy of " (accuracy_m) " m." }
+        }
+        @if 0 < report.voids.count {
+            p.quiet {
+                "Posts without a height in the source: " (grouped(report.voids.count)) ", of which "
+                (grouped(report.voids.filled)) " were filled."
+            }
+        }
+    }
+}
+
+pub(super) fn breaches(report: &Report) -> Markup {
+    if report.breaches.is_empty() {
+        return html! { p { "None." } };
+    }
+    html! {
+        p { "All of them with their places: " code { "breaches.csv" } ", " code { "breaches.geojson" } "." }
+        table {
+            tr {
+                th { "Limit" } th { "Where" } th.n { "count" } th.n { "limit" } th.n { "excess" } th.n { "refused" }
+                th.n { "RMS, m" } th.n { "RMS without the limit, m" }
+            }
+            @for breach in report.breaches.iter().take(ROWS_MAX) {
+                tr {
+                    td { code { (breach.kind) } } td { (place_text(breach.place)) }
+                    @for count in [breach.count, breach.limit, breach.excess] {
+                        td.n { (crate::report::amount(breach, count)) }
+                    }
+                    td.n { (breach.refused) } td.n { (format!("{:.3}", breach.rms_with_m)) }
+                    td.n { @if let Some(rms_m) = breach.rms_without_m { (format!("{rms_m:.3}")) } }
+                }
+            }
+        }
+        (more(report.breaches.len(), ROWS_MAX, "breaches.csv"))
+    }
+}
+
+pub(super) fn stages(report: &Report) -> Markup {
+    let wall_s: f64 = report.stages.iter().map(|stage| stage.wall_s).sum();
+    let cpu_s: f64 = report.stages.iter().map(|stage| stage.cpu_s).sum();
+    html! {
+        p.quiet { (format!("{wall_s:.2} s with {} workers.", report.workers)) }
+        table {
+            tr { th { "Stage" } th.n { "wall, s" } th.n { "cpu, s" } th { "share of the time" } }
+            @for stage in &report.stages {
+                tr {
+                    td { (stage.name) }
+                    td.n { (format!("{:.2}", stage.wall_s)) } td.n { (format!("{:.2}", stage.cpu_s)) }
+                    td { span.bar style=(format!("width:{:.1}px", 300.0 * stage.wall_s / wall_s.max(1e-9))) {} }
+                }
+            }
+            tr { td { b { "all" } } td.n { (format!("{wall_s:.2}")) } td.n { (format!("{cpu_s:.2}")) } td {} }
+        }
+    }
+}
+
+pub(super) fn sources(manifest: &Manifest) -> Markup {
+    html! {
+        table {
+            tr { th { "Source" } th { "BLAKE3 of its content" } th { "Attribution" } }
+            @for source in &manifest.sources {
+                tr {
+                    td { code { (source.path) } } td { code { (source.blake3.to_string()) } }
+                    td { (source.attribution.as_deref().unwrap_or("")) }
+                }
+            }
+        }
+        p.quiet {
+            "Algorithm revision " (manifest.algorithm_revision) ", database format " (manifest.format_version) "."
+        }
+    }
+}

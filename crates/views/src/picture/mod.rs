@@ -1,0 +1,80 @@
+//! Pictures of terrain, drawn here: shaded, from above and in perspective, and maps of what was built.
+//!
+//! ```text
+//!   Scene ─► plan (metres to pixels) ─► relief, residual_map, wireframe, module_maps ─┐
+//!   Surface, Camera ─► depth (nearer covers) ─► perspective ─► panels                ├─► sheet ─► Image ─► PNG
+//!                                                      titles, scales, legends ◄─────┘
+//! ```
+//! Pictures are pure: the same ground gives the same bytes, on any machine. What is absent: threads, files, clocks.
+
+mod camera;
+mod closeup;
+mod color;
+mod depth;
+mod facets;
+mod image;
+mod module_maps;
+mod panels;
+mod perspective;
+mod plan;
+mod relief;
+mod residual_map;
+mod scene;
+mod sheet;
+mod sight;
+mod text;
+mod wireframe;
+
+pub use camera::Camera;
+pub(crate) use closeup::module_pictures;
+pub use color::Color;
+pub use facets::Facets;
+pub use image::Image;
+pub use panels::{Panel, Style, draw_panels};
+pub use perspective::{Drawn, Look, Surface, draw_perspective, draw_wireframe};
+pub use relief::Shown;
+pub use residual_map::RESIDUAL_SCALE_M;
+pub use scene::{NO_RESIDUAL, Scene, SceneGround, SceneLimits, SceneTile};
+pub use sight::{Eye, Sight, draw_sight};
+
+/// A map of a scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Map {
+    /// Shaded relief with tints for heights.
+    Relief(Shown),
+    /// Edges of the triangles.
+    Wireframe,
+    /// Residuals on a scale that ends at so many metres either way.
+    Residuals(f64),
+    /// Triangles per load module.
+    Density,
+    /// Use of both limits.
+    Limits,
+    /// Tiles, their order and state.
+    Tiles,
+}
+
+impl Map {
+    /// Whether it shows the ground that the load modules were made from.
+    pub fn needs_ground(&self) -> bool {
+        matches!(self, Map::Relief(Shown::Dem | Shown::Both) | Map::Residuals(_))
+    }
+}
+
+/// Draws a map whose longer side is `longest` pixels, with all that stands around it.
+///
+/// # Panics
+/// When the map needs ground that the scene has not.
+pub fn draw_map(scene: &Scene, map: Map, longest: usize) -> Image {
+    match map {
+        Map::Relief(shown) => relief::relief(scene, shown, longest),
+        Map::Wireframe => wireframe::wireframe(scene, longest),
+        Map::Residuals(scale_m) => {
+            let ground = scene.ground.expect("residuals are drawn of a scene with its ground");
+            residual_map::residuals(scene, &ground, scale_m, longest)
+        }
+        Map::Density => module_maps::density(scene, longest),
+        Map::Limits => module_maps::limits(scene, longest),
+        Map::Tiles => module_maps::tiles(scene, longest),
+    }
+}

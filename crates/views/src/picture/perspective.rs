@@ -1,0 +1,462 @@
+//! The ground as an observer sees it, shaded or as a wireframe: of a DEM, of a TIN, or of load modules.
+//!
+//! All of them are drawn by the same light, the same tints and the same haze, so that two pictures from one eye differ
+//! by their surfaces alone.
+
+use terrain::{Dem, metres_of_quanta};
+
+use super::camera::{Camera, View};
+use super::color::{Color, GREY, INK, WHITE, lit, mix};
+use super::depth::{Corner, DepthImage};
+use super::facets::{Facets, light_of_triangle};
+use super::image::Image;
+use super::relief::{Tints, lights, range_m};
+
+/// What stands in a picture.
+#[derive(Clone, Copy, Debug)]
+pub enum Surface<'a> {
+    /// Every post of a DEM, so many metres apart west to east and south to north.
+    Posts(&'a Dem, [f64; 2]),
+    /// Triangles of a TIN or of load modules.
+    Triangles(&'a Facets),
+}
+
+/// How a surface is drawn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Look {
+    /// The observer.
+    pub camera: Camera,
+    /// Pixels across and down.
+    pub pixels: [usize; 2],
+    /// Heights are drawn so many times as large as they are.
+    pub times: f64,
+    /// Lowest and highest height of the tints, in metres: the same for pictures that are to be compared.
+    pub range_m: (f64, f64),
+}
+
+impl Look {
+    /// From where one overlooks all of a surface in a direction (degrees from north over east), `wide` pixels across:
+    /// one look for every picture that is to be compared with that of this surface.
+    pub fn overlooking(surface: &Surface, direction_degrees: f64, times: f64, wide: usize) -> Self {
+        const FIELD_OF_VIEW: f64 = 40.0;
+        let (extent_m, range_m) = (surface.extent_m(), surface.range_m());
+        let camera = Camera::overlooking(extent_m, range_m, times, direction_degrees, FIELD_OF_VIEW);
+        Self { camera, pixels: [wide, wide * 9 / 16], times, range_m }
+    }
+}
+
+/// A picture of a surface.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Drawn {
+    /// The picture.
+    pub image: Image,
+    /// Metres to a pixel where the middle of the picture meets the ground; `None` where it meets the sky.
+    pub middle_m: Option<f64>,
+}
+
+const SKY: [Color; 2] = [[150, 182, 214], [226, 236, 244]];
+const HAZE: Color = [214, 224, 232];
+/// Metres at which haze takes half of a colour, for an extent of one metre.
+const HAZE_HALF: f64 = 2.6;
+const WALL: Color = [150, 140, 128];
+
+impl Surface<'_> {
+    /// West, south, east and north, in metres from the area's south-west post.
+    pub fn extent_m(&self) -> [f64; 4] {
+        match self {
+            Surface::Triangles(facets) => facets.extent_m,
+            Surface::Posts(dem, [x, y]) => {
+                let rect = dem.rect();
+                let metres = |posts: i32, spacing_m: &f64| f64::from(posts) * spacing_m;
+                [metres(rect.west, x), metres(rect.south, y), metres(rect.east, x), metres(rect.north, y)]
+            }
+        }
+    }
+
+    /// Lowest and highest height, in metres.
+    pub fn range_m(&self) -> (f64, f64) {
+        match self {
+            Surface::Triangles(facets) => facets.range_m(),
+            Surface::Posts(dem, _) => range_m(dem),
+        }
+    }
+}
+
+/// Draws a surface in colours of its heights, under light from the north-west.
+pub fn draw_perspective(surface: &Surface, look: &Look) -> Drawn {
+    let tints = Tints::new(look.range_m);
+    let mut stage = Stage::new(surface, look, true);
+    let half_m = stage.haze_half_m;
+    let color = |[height_m, light]: [f64; 2], ahead: f64| {
+        mix(lit(tints.at(height_m), light as f32), HAZE, haze_share(ahead, half_m))
+    };
+    stage.draw(surface, look.times, &color);
+    stage.draw_walls(surface, look, |_, ahead| mix(WALL, HAZE, haze_share(ahead, half_m)));
+    stage.finish()
+}
+
+/// Draws the edges of a surface that the observer sees: of every triangle; of a DEM a line every few posts.
+pub fn draw_wireframe(surface: &Surface, look: &Look) -> Drawn {
+    let mut stage = Stage::new(surface, look, false);
+    let pale = |_: [f64; 2], _: f64| WHITE;
+    stage.draw(surface, look.times, &pale);
+    stage.draw_walls(surface, look, pale);
+    let place = |[x, y, z]: [f64; 3]| [x, y, z * look.times];
+    match surface {
+        Surface::Triangles(facets) => facets.each_edge(|ends, is_line| {
+            let (thick, ink) = if is_line && facets.side_m.is_some() { (3.0, INK) } else { (2.0, GREY) };
+            stage.line(ends.map(place), thick, ink);
+        }),
+        Surface::Posts(dem, spacing_m) => stage.draw_grid(dem, *spacing_m, look.times),
+    }
+    stage.finish()
+}
+
+/// How much haze lies before something: half of it at `half_m`, and never all. No exponential, so that every machine
+/// has the same.
+fn haze_share(ahead_m: f64, half_m: f64) -> f64 {
+    let far = (ahead_m / half_m) * (ahead_m / half_m);
+    0.75 * far / (1.0 + far)
+}
+
+/// A picture that is being drawn.
+struct Stage {
+    depth: DepthImage,
+    view: View,
+    eye_m: [f64; 3],
+    haze_half_m: f64,
+}
+
+/// Cells along a side of a block of posts that is drawn at one step.
+const BLOCK: i32 = 64;
+/// Samples that a step of posts may cover: finer ones are not seen.
+const STEP_SAMPLES: f64 = 2.0;
+
+impl Stage {
+    fn new(surface: &Surface, look: &Look, has_sky: bool) -> Self {
+        // The horizon is found before there is a picture, in pixels.
+        let horizon = look.camera.view(look.pixels).horizon().clamp(0.0, look.pixels[1] as f64);
+        let backdrop = |row: f64| match has_sky {
+            true => mix(SKY[0], SKY[1], if horizon <= row { 1.0 } else { row / horizon }),
+            false => WHITE,
+        };
+        let depth = DepthImage::new(look.pixels, backdrop);
+        let view = look.camera.view(depth.size());
+        let [west, south, east, north] = surface.extent_m();
+        let haze_half_m = HAZE_HALF * (east - west).max(north - south);
+        Self { depth, view, eye_m: look.camera.eye_m, haze_half_m }
+    }
+
+    fn finish(self) -> Drawn {
+        let ahead_m = self.depth.middle_m();
+        let per_pixel = |ahead_m: f64| ahead_m * super::depth::SAMPLES as f64 / self.view.focal;
+        Drawn { middle_m: ahead_m.map(per_pixel), image: self.depth.image() }
+    }
+
+    fn line(&mut self, ends: [[f64; 3]; 2], thick: f64, color: Color) {
+        self.depth.line(&self.view, ends.map(|end| self.view.turned(end)), thick, color);
+    }
+
+    fn draw(&mut self, surface: &Surface, times: f64, color: &impl Fn([f64; 2], f64) -> Color) {
+        match surface {
+            Surface::Triangles(facets) => {
+                let view = self.view;
+                let turned: Vec<[f64; 3]> =
+                    facets.vertices.iter().map(|&[x, y, z]| view.turned([x, y, z * times])).collect();
+                for &corners in &facets.corners {
+                    let light = f64::from(light_of_triangle(facets.triangle(corners), times));
+                    let corner = |v: u32| {
+                        let values = [facets.vertices[v as usize][2], light];
+                        Corner { turned: turned[v as usize], values }
+                    };
+                    self.depth.triangle(&view, corners.map(corner), color);
+                }
+            }
+            Surface::Posts(dem, spacing_m) => self.draw_posts(dem, *spacing_m, times, color),
+        }
+    }
+
+    /// Blocks of posts, far ones at wider steps with the light of the posts between.
+    fn draw_posts(&mut self, dem: &Dem, spacing_m: [f64; 2], times: f64, color: &impl Fn([f64; 2], f64) -> Color) {
+        let posts = LitPosts { dem, spacing_m, times, lights: lights(dem, spacing_m, times) };
+        let rect = dem.rect();
+        for south in (rect.south..rect.north).step_by(BLOCK as usize) {
+            for west in (rect.west..rect.east).step_by(BLOCK as usize) {
+                let (north, east) = ((south + BLOCK).min(rect.north), (west + BLOCK).min(rect.east));
+                let ([x0, y0, _], [x1, y1, _]) = (posts.place(south, west), posts.place(north, east));
+                let middle = posts.place((south + north) / 2, (west + east) / 2);
+                let (low_m, high_m) = range_m(dem);
+                let reach = [(x1 - x0) / 2.0, (y1 - y0) / 2.0, (high_m - low_m) * times];
+                let radius = (reach[0] * reach[0] + reach[1] * reach[1] + reach[2] * reach[2]).sqrt() + spacing_m[0];
+                if self.view.may_see(middle, radius) {
+                    let step = self.step([x0, y0, x1, y1], middle[2], spacing_m);
+                    self.draw_block(&posts, [south, west, north, east], step, color);
+                }
+            }
+        }
+    }
+
+    /// Posts between the corners of what is drawn of a block: as many as are no larger than the samples there.
+    fn step(&self, [west, south, east, north]: [f64; 4], up: f64, spacing_m: [f64; 2]) -> i32 {
+        let [x, y, z] = self.eye_m;
+        let beside = [(west - x).max(x - east).max(0.0), (south - y).max(y - north).max(0.0), z - up];
+        let away = (beside[0] * beside[0] + beside[1] * beside[1] + beside[2] * beside[2]).sqrt();
+        let samples = spacing_m[0].max(spacing_m[1]) * self.view.focal / away.max(1.0);
+        let mut step = 1;
+        while step < 16 && 2.0 * f64::from(step) * samples <= STEP_SAMPLES {
+            step *= 2;
+        }
+        step
+    }
+
+    fn draw_block(
+        &mut self,
+        posts: &LitPosts,
+        [south, west, north, east]: [i32; 4],
+        step: i32,
+        color: &impl Fn([f64; 2], f64) -> Color,
+    ) {
+        let lines =
+            |first: i32, last: i32| -> Vec<i32> { (first..last).step_by(step as usize).chain([last]).collect() };
+        let (rows, cols) = (lines(south, north), lines(west, east));
+        let view = self.view;
+        let corner = |row: i32, col: i32| posts.corner(&view, row, col, step);
+        let mut below: Vec<Corner> = cols.iter().map(|&col| corner(rows[0], col)).collect();
+        // On the border of the surface there is no neighbour, and a wall hangs there.
+        let rect = posts.dem.rect();
+        if south != rect.south {
+            self.draw_skirt(posts, &below, step, color);
+        }
+        let mut sides: [Vec<Corner>; 2] = [vec![below[0]], vec![below[below.len() - 1]]];
+        for &row in &rows[1..] {
+            let above: Vec<Corner> = cols.iter().map(|&col| corner(row, col)).collect();
+            for i in 1..cols.len() {
+                let [a, b, c, d] = [below[i - 1], below[i], above[i], above[i - 1]];
+                self.depth.triangle(&view, [a, b, c], color);
+                self.depth.triangle(&view, [a, c, d], color);
+            }
+            sides[0].push(above[0]);
+            sides[1].push(above[above.len() - 1]);
+            below = above;
+        }
+        if north != rect.north {
+            self.draw_skirt(posts, &below, step, color);
+        }
+        for (side, is_border) in sides.iter().zip([west == rect.west, east == rect.east]) {
+            if !is_border {
+                self.draw_skirt(posts, side, step, color);
+            }
+        }
+    }
+
+    /// A strip that hangs from the side of a block and closes the gap to a neighbour drawn at another step.
+    fn draw_skirt(&mut self, posts: &LitPosts, side: &[Corner], step: i32, color: &impl Fn([f64; 2], f64) -> Color) {
+        let down =
+            self.view.turned([self.eye_m[0], self.eye_m[1], self.eye_m[2] - posts.spacing_m[0] * f64::from(step)]);
+        let hung = |corner: Corner| {
+            let turned = std::array::from_fn(|i| corner.turned[i] + down[i]);
+            Corner { turned, ..corner }
+        };
+        let view = self.view;
+        for pair in side.windows(2) {
+            let [a, b] = [pair[0], pair[1]];
+            self.depth.triangle(&view, [a, b, hung(b)], color);
+            self.depth.triangle(&view, [a, hung(b), hung(a)], color);
+        }
+    }
+
+    /// Sides of the surface down to its lowest height, so that it stands as a block and not as a sheet.
+    fn draw_walls(&mut self, surface: &Surface, look: &Look, color: impl Fn([f64; 2], f64) -> Color) {
+        let [west, _, east, _] = surface.extent_m();
+        let foot = surface.range_m().0 * look.times - 0.02 * (east - west);
+        let view = self.view;
+        let mut wall = |ends: [[f64; 3]; 2]| {
+            let [a, b] = ends;
+            let corner = |place: [f64; 3]| Corner { turned: view.turned(place), values: [0.0; 2] };
+            let [top_a, top_b] = [a, b].map(|[x, y, z]| corner([x, y, z * look.times]));
+            let [foot_a, foot_b] = [a, b].map(|[x, y, _]| corner([x, y, foot]));
+            self.depth.triangle(&view, [top_a, top_b, foot_b], &color);
+            self.depth.triangle(&view, [top_a, foot_b, foot_a], &color);
+        };
+        match surface {
+            Surface::Triangles(facets) => {
+                let [west, south, east, north] = facets.extent_m;
+                facets.each_edge(|ends, _| {
+                    let on = |axis: usize, line: f64| ends[0][axis] == line && ends[1][axis] == line;
+                    if on(0, west) || on(0, east) || on(1, south) || on(1, north) {
+                        wall(ends);
+                    }
+                });
+            }
+            Surface::Posts(dem, spacing_m) => {
+                let rect = dem.rect();
+                let place = |row: i32, col: i32| place_of(dem, *spacing_m, row, col);
+                for col in rect.west..rect.east {
+                    wall([place(rect.south, col), place(rect.south, col + 1)]);
+                    wall([place(rect.north, col), place(rect.north, col + 1)]);
+                }
+                for row in rect.south..rect.north {
+                    wall([place(row, rect.west), place(row + 1, rect.west)]);
+                    wall([place(row, rect.east), place(row + 1, rect.east)]);
+                }
+            }
+        }
+    }
+
+    /// Rows and columns of posts, as many of them as stay apart on the picture.
+    fn draw_grid(&mut self, dem: &Dem, spacing_m: [f64; 2], times: f64) {
+        /// Lines across the longer side, at most.
+        const LINES: i32 = 160;
+        let rect = dem.rect();
+        let cells = rect.cells_wide().max(rect.cells_high()) as i32;
+        let step = (cells + LINES - 1) / LINES;
+        let place = |row: i32, col: i32| {
+            let [x, y, z] = place_of(dem, spacing_m, row, col);
+            [x, y, z * times]
+        };
+        for row in (rect.south..rect.north).step_by(step as usize).chain([rect.north]) {
+            for col in rect.west..rect.east {
+                self.line([place(row, col), place(row, col + 1)], 2.0, GREY);
+            }
+        }
+        for col in (rect.west..rect.east).step_by(step as usize).chain([rect.east]) {
+            for row in rect.south..rect.north {
+                self.line([place(row, col), place(row + 1, col)], 2.0, GREY);
+            }
+        }
+    }
+}
+
+/// East, north and up of a post, in metres.
+fn place_of(dem: &Dem, spacing_m: [f64; 2], row: i32, col: i32) -> [f64; 3] {
+    let height_m = metres_of_quanta(dem.height(terrain::Post::new(row, col)));
+    [f64::from(col) * spacing_m[0], f64::from(row) * spacing_m[1], height_m]
+}
+
+/// Posts with their light.
+struct LitPosts<'a> {
+    dem: &'a Dem,
+    spacing_m: [f64; 2],
+    times: f64,
+    lights: Vec<f32>,
+}
+
+impl LitPosts<'_> {
+    /// A post with heights as they are drawn.
+    fn place(&self, row: i32, col: i32) -> [f64; 3] {
+        let [x, y, z] = place_of(self.dem, self.spacing_m, row, col);
+        [x, y, z * self.times]
+    }
+
+    fn corner(&self, view: &View, row: i32, col: i32, step: i32) -> Corner {
+        let [x, y, z] = place_of(self.dem, self.spacing_m, row, col);
+        Corner { turned: view.turned([x, y, z * self.times]), values: [z, self.light(row, col, step)] }
+    }
+
+    /// The mean light of the posts that a corner stands for.
+    fn light(&self, row: i32, col: i32, step: i32) -> f64 {
+        let rect = self.dem.rect();
+        let wide = rect.posts_wide();
+        let near = |at: i32, first: i32, last: i32| ((at - step / 2).max(first), (at + (step - 1) / 2).min(last));
+        let ((south, north), (west, east)) = (near(row, rect.south, rect.north), near(col, rect.west, rect.east));
+        let mut sum = 0.0;
+        for row in south..=north {
+            let start = (row - rect.south) as usize * wide;
+            let lights = &self.lights[start + (west - rect.west) as usize..=start + (east - rect.west) as usize];
+            sum += lights.iter().map(|&light| f64::from(light)).sum::<f64>();
+        }
+        sum / f64::from((north - south + 1) * (east - west + 1))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use terrain::{LatticePoint, Post, PostRect, Tin, Vertex};
+
+    use super::*;
+
+    const SPACING_M: [f64; 2] = [25.0, 25.0];
+
+    /// Hills over so many cells a side.
+    fn hills(cells: i32) -> Dem {
+        let wave = |at: i32, length: i32| {
+            let phase = at.rem_euclid(length) - length / 2;
+            phase * phase
+        };
+        let rect = PostRect { south: 0, west: 0, north: cells, east: cells };
+        Dem::from_fn(rect, |post| Some(100_000 + 6 * wave(post.row, 90) + 5 * wave(post.col, 70)))
+    }
+
+    /// The TIN that stands on every post of a DEM.
+    fn every_post(dem: &Dem) -> Tin {
+        let rect = dem.rect();
+        let wide = rect.posts_wide() as u32;
+        let vertices = (rect.south..=rect.north).flat_map(|row| {
+            (rect.west..=rect.east).map(move |col| {
+                let post = Post::new(row, col);
+                Vertex { at: LatticePoint::from(post), height: dem.height(post) }
+            })
+        });
+        let cells = (0..rect.cells_high() as u32)
+            .flat_map(|row| (0..rect.cells_wide() as u32).map(move |col| row * wide + col));
+        let triangles = cells.flat_map(|a| [[a, a + 1, a + wide + 1], [a, a + wide + 1, a + wide]]).collect();
+        Tin { rect, vertices: vertices.collect(), triangles }
+    }
+
+    #[test]
+    fn no_sky_shows_through_the_ground_where_blocks_of_different_steps_meet() {
+        let dem = hills(900);
+        let camera = Camera {
+            eye_m: [11_000.0, 200.0, 950.0],
+            direction_degrees: 5.0,
+            pitch_degrees: -4.0,
+            field_of_view_degrees: 60.0,
+        };
+        let look = Look { camera, pixels: [240, 135], times: 1.0, range_m: range_m(&dem) };
+        let drawn = draw_perspective(&Surface::Posts(&dem, SPACING_M), &look);
+        let empty = hills(1);
+        let behind = Camera { direction_degrees: 180.0, ..camera };
+        let sky = draw_perspective(&Surface::Posts(&empty, SPACING_M), &Look { camera: behind, ..look }).image;
+        for x in 0..240 {
+            let is_sky = |y: &usize| drawn.image.pixel(x, *y) == sky.pixel(x, *y);
+            let ground = (0..135).find(|y| !is_sky(y)).unwrap();
+            assert_eq!((ground..135).find(is_sky), None, "column {x}: sky below row {ground}");
+        }
+        assert!(drawn.middle_m.is_some());
+    }
+
+    #[test]
+    fn a_tin_on_every_post_is_seen_as_the_dem_is() {
+        let dem = hills(60);
+        let facets = Facets::of_tin(&every_post(&dem), SPACING_M);
+        let posts = Surface::Posts(&dem, SPACING_M);
+        let look = Look::overlooking(&posts, 30.0, 1.0, 200);
+        let of_posts = draw_perspective(&posts, &look);
+        let of_facets = draw_perspective(&Surface::Triangles(&facets), &look);
+        let (mut differing, mut inside) = (0, 0);
+        for (a, b) in (0..200 * 112)
+            .map(|at| (at % 200, at / 200))
+            .map(|(x, y)| (of_posts.image.pixel(x, y), of_facets.image.pixel(x, y)))
+        {
+            inside += usize::from(a != SKY[1]);
+            // Flat triangles under the same light as blended posts: nearly, not exactly, the same.
+            differing += usize::from((0..3).any(|i| 24 < a[i].abs_diff(b[i])));
+        }
+        assert!(5000 < inside && differing < inside / 50, "{differing} of {inside}");
+    }
+
+    #[test]
+    fn a_wireframe_has_ink_on_white_and_nothing_else() {
+        let dem = hills(40);
+        let posts = Surface::Posts(&dem, SPACING_M);
+        let facets = Facets::of_tin(&every_post(&dem), SPACING_M);
+        let look = Look::overlooking(&posts, 0.0, 1.0, 160);
+        for surface in [posts, Surface::Triangles(&facets)] {
+            let image = draw_wireframe(&surface, &look).image;
+            let pixels: Vec<Color> = (0..160 * 90).map(|at| image.pixel(at % 160, at / 160)).collect();
+            assert!(pixels.iter().all(|[r, g, b]| r == g && g == b), "only greys");
+            let inked = pixels.iter().filter(|pixel| **pixel != WHITE).count();
+            assert!(pixels.len() / 20 < inked && inked < pixels.len() * 9 / 10, "{inked}");
+        }
+    }
+}

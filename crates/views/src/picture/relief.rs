@@ -1,0 +1,138 @@
+//! Shaded relief with tints for heights, as the founding paper's Figures 13 and 14.
+
+use terrain::{Dem, metres_of_quanta};
+
+use super::color::{Color, HEIGHTS, NOTHING, lit};
+use super::facets::{Facets, light_of, light_of_triangle};
+use super::image::Image;
+use super::plan::{Plan, Posts, Samples};
+use super::scene::Scene;
+use super::sheet::{Legend, Sheet};
+use crate::table::grouped;
+
+/// Heights in the shading are drawn so many times as large as they are, so that plains show their form.
+pub(crate) const SHADING_TIMES: f64 = 2.0;
+
+/// Colours of heights.
+#[derive(Clone, Debug)]
+pub(crate) struct Tints {
+    low_m: f64,
+    high_m: f64,
+    colors: Vec<Color>,
+}
+
+impl Tints {
+    /// Tints from the lowest to the highest height, in metres.
+    pub fn new((low_m, high_m): (f64, f64)) -> Self {
+        Self { low_m, high_m: high_m.max(low_m + 1.0), colors: HEIGHTS.table(256) }
+    }
+
+    #[inline]
+    pub fn at(&self, height_m: f64) -> Color {
+        let share = (height_m - self.low_m) / (self.high_m - self.low_m);
+        self.colors[(share.clamp(0.0, 1.0) * 255.0) as usize]
+    }
+
+    pub fn legend(&self) -> Legend {
+        let steps = 4;
+        let marks = (0..=steps).map(|step| {
+            let share = f64::from(step) / f64::from(steps);
+            (share, format!("{:.0} m", self.low_m + share * (self.high_m - self.low_m)))
+        });
+        Legend::Ramp { title: "Height".into(), ramp: HEIGHTS, marks: marks.collect() }
+    }
+}
+
+/// Which surface a picture shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Shown {
+    /// The load modules.
+    Tin,
+    /// The ground they were made from.
+    Dem,
+    /// Both, side by side.
+    Both,
+}
+
+/// Relief of triangles.
+pub(crate) fn facets_relief(facets: &Facets, plan: &Plan, tints: &Tints) -> Image {
+    let mut samples = Samples::new(plan);
+    for &corners in &facets.corners {
+        let corners = facets.triangle(corners);
+        let light = light_of_triangle(corners, SHADING_TIMES);
+        plan.cover(corners, |row, col, height_m| samples.add(row, col, lit(tints.at(height_m), light)));
+    }
+    samples.image(NOTHING)
+}
+
+/// Relief of posts.
+pub(crate) fn posts_relief(dem: &Dem, posts: &Posts, plan: &Plan, tints: &Tints) -> Image {
+    let (wide, lights) = (dem.rect().posts_wide(), lights(dem, posts.spacing_m, SHADING_TIMES));
+    let rect = dem.rect();
+    let heights: Vec<f32> = (rect.south..=rect.north)
+        .flat_map(|row| dem.row(row).iter().map(|&quanta| metres_of_quanta(quanta) as f32))
+        .collect();
+    let mut samples = Samples::new(plan);
+    posts.sample(plan, |between| {
+        let height_m = f64::from(between.blend(wide, |post| heights[post]));
+        let light = between.blend(wide, |post| lights[post]);
+        samples.add(between.sample[0], between.sample[1], lit(tints.at(height_m), light));
+    });
+    samples.image(NOTHING)
+}
+
+/// How light every post is, row by row from the south-west, with heights drawn `times` as large.
+pub(crate) fn lights(dem: &Dem, spacing_m: [f64; 2], times: f64) -> Vec<f32> {
+    let rect = dem.rect();
+    let scale = spacing_m.map(|metres| times / (metres * f64::from(terrain::QUANTA_PER_METRE)));
+    let mut lights = Vec::with_capacity(rect.post_count());
+    for row in rect.south..=rect.north {
+        let (below, above) = (row.max(rect.south + 1) - 1, row.min(rect.north - 1) + 1);
+        let (south, here, north) = (dem.row(below), dem.row(row), dem.row(above));
+        let rows = f64::from(above - below);
+        for col in 0..here.len() {
+            let (before, after) = (col.max(1) - 1, (col + 1).min(here.len() - 1));
+            let to_east = f64::from(here[after] - here[before]) / (after - before) as f64 * scale[0];
+            let to_north = f64::from(north[col] - south[col]) / rows * scale[1];
+            lights.push(light_of(to_east, to_north));
+        }
+    }
+    lights
+}
+
+/// Heights of a DEM in metres, lowest and highest.
+pub(crate) fn range_m(dem: &Dem) -> (f64, f64) {
+    let (low, high) = dem.range();
+    (metres_of_quanta(low), metres_of_quanta(high))
+}
+
+/// The relief of a scene, its longer side `longest` pixels; the ground only where it is there.
+pub(crate) fn relief(scene: &Scene, shown: Shown, longest: usize) -> Image {
+    let facets = Facets::of_modules(scene.modules, scene.grid, scene.frame.spacing);
+    let plan = scene.plan(longest);
+    let range = scene.ground.map_or_else(|| facets.range_m(), |ground| range_m(ground.dem));
+    let tints = Tints::new(range);
+    let coordinates = scene.coordinates();
+    let sheet = |title: &str, detail: String| Sheet {
+        title: format!("{}: {title}", scene.name),
+        subtitle: format!("{}, {detail}", scene.what()),
+        coordinates: &coordinates,
+        legends: vec![tints.legend()],
+        notes: format!("Light from the north-west; heights count {SHADING_TIMES} times in the shading."),
+    };
+    let tin = || {
+        let detail = format!("{} triangles", grouped(facets.count() as u64));
+        sheet("relief of the load modules", detail).around(&facets_relief(&facets, &plan, &tints), &plan)
+    };
+    let dem = || {
+        let ground = scene.ground.expect("whoever asks for the ground has it");
+        let detail = format!("posts {} m apart", scene.frame.spacing.metres());
+        let map = posts_relief(ground.dem, &scene.posts(&ground), &plan, &tints);
+        sheet("relief of the DEM", detail).around(&map, &plan)
+    };
+    match shown {
+        Shown::Tin => tin(),
+        Shown::Dem => dem(),
+        Shown::Both => Image::beside(&[dem(), tin()], 8),
+    }
+}

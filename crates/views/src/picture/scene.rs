@@ -1,0 +1,116 @@
+//! A finished area, as pictures of it need it: plain values that somebody else has read.
+
+use terrain::{Dem, GridFrame, LoadModule, ModuleGrid, ModuleId, ModuleRect, TileId};
+
+use super::plan::{Plan, Posts};
+use super::sheet::Coordinates;
+
+/// A finished area, or a part of it.
+#[derive(Clone, Debug)]
+pub struct Scene<'a> {
+    /// Name of the area.
+    pub name: &'a str,
+    /// Name of its coordinate system.
+    pub crs: &'a str,
+    /// All load modules of the area.
+    pub grid: ModuleGrid,
+    /// Where posts lie.
+    pub frame: GridFrame,
+    /// The part that is looked at.
+    pub part: ModuleRect,
+    /// The load modules of that part, row by row from the south-west.
+    pub modules: &'a [LoadModule],
+    /// The ground they stand for, where it is there to look at.
+    pub ground: Option<SceneGround<'a>>,
+    /// What limits count, and how much of them is used.
+    pub limits: &'a SceneLimits,
+    /// All tiles of the area, row by row from the south-west.
+    pub tiles: &'a [SceneTile],
+}
+
+/// The ground under a part of an area.
+#[derive(Clone, Copy, Debug)]
+pub struct SceneGround<'a> {
+    /// Heights at the posts of the part.
+    pub dem: &'a Dem,
+    /// Residual at each post, DEM less triangles, in quanta, row by row from the south-west; [`NO_RESIDUAL`] at voids.
+    pub residuals: &'a [i32],
+}
+
+/// Stands for the residual of a void.
+pub const NO_RESIDUAL: i32 = i32::MIN;
+
+/// Limits of an area and how much of them is used.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SceneLimits {
+    /// What is counted: `triangles` or `polygons`.
+    pub count: String,
+    /// Count of each load module of the area, row by row from the south-west.
+    pub modules: Vec<u32>,
+    /// Limit of a load module.
+    pub per_load_module: u32,
+    /// Rows and columns of load modules in a window.
+    pub window: [u32; 2],
+    /// Count of each window, by its south-west load module, row by row.
+    pub windows: Vec<u32>,
+    /// Limit of a window.
+    pub per_window: u32,
+    /// Load modules and windows, by their south-west load module, where posts were refused.
+    pub bound_modules: Vec<ModuleId>,
+    /// The same of windows.
+    pub bound_windows: Vec<ModuleId>,
+}
+
+/// A tile as a plan shows it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SceneTile {
+    /// Which.
+    pub tile: TileId,
+    /// Its load modules.
+    pub modules: ModuleRect,
+    /// Its place in the order of ranks.
+    pub rank: usize,
+    /// Its colour: tiles of one colour may be refined at once.
+    pub color: u32,
+    /// How it stands.
+    pub state: database::TileState,
+}
+
+impl Scene<'_> {
+    /// Side of a load module in metres.
+    pub(crate) fn side_m(&self) -> f64 {
+        f64::from(self.grid.side_cells) * self.frame.spacing.metres()
+    }
+
+    /// West, south, east and north of a rectangle of load modules, in metres from the area's south-west post.
+    pub(crate) fn extent_m(&self, modules: ModuleRect) -> [f64; 4] {
+        [modules.west, modules.south, modules.east, modules.north].map(|line| f64::from(line) * self.side_m())
+    }
+
+    /// The plan of the part that is looked at.
+    pub(crate) fn plan(&self, longest: usize) -> Plan {
+        Plan::of(self.extent_m(self.part), longest)
+    }
+
+    pub(crate) fn coordinates(&self) -> Coordinates {
+        let origin_m = [self.frame.origin_east_m, self.frame.origin_north_m];
+        Coordinates { origin_m, crs: self.crs.to_owned() }
+    }
+
+    /// The posts of the ground.
+    pub(crate) fn posts(&self, ground: &SceneGround) -> Posts {
+        Posts { rect: ground.dem.rect(), spacing_m: [self.frame.spacing.metres(); 2] }
+    }
+
+    /// What is looked at, in words.
+    pub(crate) fn what(&self) -> String {
+        let part = self.part;
+        let [west, south, east, north] = self.extent_m(part);
+        let size = format!("{} x {} km", (east - west) / 1000.0, (north - south) / 1000.0);
+        if part == self.grid.all() {
+            return size;
+        }
+        let (last_row, last_col) = (part.north - 1, part.east - 1);
+        format!("load modules {},{} to {last_row},{last_col}, {size}", part.south, part.west)
+    }
+}
