@@ -26,6 +26,9 @@ mod measures;
 pub use fidelity::{LineOfSight, SlopeDifference};
 pub use measures::{BuiltResidual, DatabaseFidelity, Measures, Sights, fidelity, measure};
 
+mod built_from;
+pub use built_from::BuiltFrom;
+
 mod area;
 mod assemble;
 mod bound;

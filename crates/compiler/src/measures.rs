@@ -123,7 +123,7 @@ fn triangles_of(folder: &Folder, area: &GamingArea) -> Result<Triangles, Compile
 
 /// Points the job at the ground to measure against, and gives its name. What is void in a raster of one's own choice
 /// is left out.
-fn choose_ground(
+pub(crate) fn choose_ground(
     job: &mut Job,
     manifest: &Manifest,
     folder: &Path,
