@@ -21,9 +21,11 @@ mod failure;
 mod files;
 mod lines;
 mod measures;
+mod new_folder;
 mod progress;
 mod run;
 mod signals;
+mod steps;
 mod terminal;
 
 use std::process::ExitCode;

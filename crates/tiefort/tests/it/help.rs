@@ -2,7 +2,8 @@
 
 use crate::scene::Scene;
 
-const COMMANDS: [&str; 9] = ["build", "tile", "plan", "status", "report", "verify", "fidelity", "sample", "tin"];
+const COMMANDS: [&str; 10] =
+    ["build", "tile", "plan", "status", "report", "verify", "fidelity", "export", "sample", "tin"];
 
 #[test]
 fn the_help_of_every_command_has_an_example_of_it() {
