@@ -76,8 +76,19 @@ impl Earth {
             hint: "this format needs longitude and latitude; export a mesh or a GeoTIFF instead".into(),
         })?;
         let mut earth = Self { crs, wgs84: Crs::wgs84(), datum, geoid: None };
+        let outline = earth.outline(product)?;
+        let longitudes = || outline.iter().map(|place| place[0]);
+        let (west, east) = (longitudes().fold(180.0, f64::min), longitudes().fold(-180.0, f64::max));
+        if 180.0 < east - west {
+            return Err(ExportError::Impossible {
+                what: "the area".into(),
+                found: format!("ground from {west:.3} to {east:.3} degrees, across the 180th meridian or a pole"),
+                expected: "ground on one side of it".into(),
+                hint: "export the two sides one after the other, with --modules".into(),
+            });
+        }
         if datum == Datum::Egm96 {
-            earth.geoid = Some(GeoidGrid::over(&earth.outline(product)?));
+            earth.geoid = Some(GeoidGrid::over(&outline));
         }
         Ok(earth)
     }
@@ -229,6 +240,22 @@ mod tests {
         assert!((-35.0..-25.0).contains(&direct), "{direct}");
         let back = earth.place_m(place).unwrap();
         assert!((back[0] - 505_500.0).abs() < 1e-6 && (back[1] - 3_875_250.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn the_geoid_is_that_of_its_makers() {
+        // Places and heights that come with the makers' own program.
+        for (latitude, longitude, metres) in [
+            (38.628_155, 269.779_155, -31.628),
+            (-14.621_217, 305.021_114, -2.969),
+            (46.874_319, 102.448_729, -43.575),
+            (-23.617_446, 133.874_712, 15.871),
+            (38.625_473, 359.999_5, 50.066),
+            (-0.466_744, 0.002_3, 17.329),
+        ] {
+            let found = egm96::egm96_compute_altitude_offset(latitude, longitude);
+            assert!((found - metres).abs() < 0.002, "{latitude} {longitude}: {found}, expected {metres}");
+        }
     }
 
     #[test]

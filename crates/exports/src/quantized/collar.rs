@@ -1,5 +1,4 @@
-//! Ground around what is exported, so that tiles are covered to their borders: it goes straight out at the height of
-//! the border.
+//! Ground around what is exported, so that tiles are covered to their borders: it goes straight out from the border.
 
 use crate::earth::{Earth, directions};
 use crate::globe::Globe;
@@ -19,7 +18,8 @@ pub(crate) struct Sheet {
     pub triangles: Vec<[u32; 3]>,
 }
 
-/// A mesh on the globe with `collar_m` metres of ground around it.
+/// A mesh on the globe with `collar_m` metres of ground around it; `outer_m` gives the height of its outer edge beside
+/// a border of some height.
 ///
 /// # Errors
 /// When the collar leaves the coordinate system.
@@ -29,6 +29,7 @@ pub(crate) fn with_collar(
     globe: &Globe,
     earth: &Earth,
     collar_m: f64,
+    outer_m: impl Fn(f64) -> f64,
 ) -> Result<Sheet, ExportError> {
     let mut sheet = Sheet {
         lon_lat: globe.lon_lat.clone(),
@@ -43,7 +44,7 @@ pub(crate) fn with_collar(
             mesh.vertices[v as usize].map(|quanta| f64::from(quanta) / f64::from(terrain::QUANTA_PER_METRE));
         let lon_lat = earth.lon_lat([west + x + out[0] * collar_m, south + y + out[1] * collar_m])?;
         sheet.lon_lat.push(lon_lat);
-        sheet.height_m.push(globe.height_m[v as usize]);
+        sheet.height_m.push(outer_m(globe.height_m[v as usize]));
         sheet.normal.push(directions(lon_lat)[2]);
         Ok(sheet.lon_lat.len() as u32 - 1)
     };

@@ -1,7 +1,7 @@
 //! Quantized-mesh 1.0 for globes: the triangles themselves at the finest level, cut at the borders of tiles, and a
 //! regular grid of heights for every tile above, up to both roots.
 //!
-//! Tiles have no holes: around what is exported the ground goes on at the height of its border.
+//! Tiles have no holes: around what is exported the ground goes on from its border and falls to the lowest height.
 
 mod clip;
 mod collar;
@@ -18,7 +18,7 @@ use crate::globe::Globe;
 use crate::mesh::{Mesh, cross, minus, unit};
 use crate::{Datum, ExportError, Product, Put, Work};
 use collar::{Sheet, with_collar};
-use lattice::{Ladder, Node, STEPS, lon_lat, steps, tile_degrees, tiles};
+use lattice::{Ladder, Node, STEPS, lon_lat, steps, tiles};
 use tile::Tile;
 
 /// Load modules along a tile of the finest level, about.
@@ -45,9 +45,12 @@ pub fn write_quantized_mesh(
     let heights = || globe.height_m.iter().copied();
     let (low, high) = (heights().fold(f64::INFINITY, f64::min), heights().fold(f64::NEG_INFINITY, f64::max));
     let level = finest_level(product.side_m());
-    let scene = Scene { product, earth: &earth, ladder: Ladder::over(low, high), level };
+    let mut scene = Scene { product, earth: &earth, ladder: Ladder::over(low, high), level, fall_m: 0.0 };
     let bounds = scene.bounds(&globe);
-    let sheet = with_collar(product, &mesh, &globe, &earth, collar_m(product, level))?;
+    let collar_m = scene.collar_m(&bounds)?;
+    let extent_m = f64::from(product.rect.rows().max(product.rect.cols())) * product.side_m();
+    scene.fall_m = (2.0 * collar_m).max(0.2 * extent_m);
+    let sheet = with_collar(product, &mesh, &globe, &earth, collar_m, |height_m| scene.fallen(height_m, collar_m))?;
     scene.write_finest(&sheet, &bounds, put, work)?;
     scene.write_grids(&bounds, put, work)?;
     let layer = scene.layer(&bounds);
@@ -59,13 +62,6 @@ pub fn write_quantized_mesh(
 fn finest_level(side_m: f64) -> u32 {
     let level = (180.0 * DEGREE_M / (MODULES_PER_TILE * side_m)).log2().ceil();
     level.clamp(1.0, 20.0) as u32
-}
-
-/// How far ground goes on around what is exported: over every tile that it touches, and over those that only its
-/// bounds touch because its sides do not run along meridians.
-fn collar_m(product: &Product, level: u32) -> f64 {
-    let extent = f64::from(product.rect.rows().max(product.rect.cols())) * product.side_m();
-    2.0 * tile_degrees(level) * DEGREE_M + 0.1 * extent
 }
 
 /// Lowest and highest steps of the finest level, east and north.
@@ -87,11 +83,27 @@ impl Bounds {
     }
 }
 
+/// The steps at which tiles begin and end.
+fn ends([first, last]: [i64; 2]) -> [i64; 2] {
+    [first * STEPS, (last + 1) * STEPS]
+}
+
+fn too_wide(product: &Product) -> ExportError {
+    ExportError::Impossible {
+        what: "the area".into(),
+        found: format!("ground around it that {} does not reach", product.crs()),
+        expected: "an area well inside its coordinate system".into(),
+        hint: "export a smaller block with --modules".into(),
+    }
+}
+
 struct Scene<'a> {
     product: &'a Product,
     earth: &'a Earth,
     ladder: Ladder,
     level: u32,
+    /// How far from the border the ground has fallen to the foot of the ladder, metres.
+    fall_m: f64,
 }
 
 impl Scene<'_> {
@@ -107,6 +119,32 @@ impl Scene<'_> {
         };
         let ([west, east], [south, north]) = (degrees(0), degrees(1));
         Bounds { x: range(0), y: range(1), degrees: [west, south, east, north] }
+    }
+
+    /// How far ground has to go on around what is exported, so that it covers every tile of the finest level to its
+    /// borders; these need not run along the sides of the area.
+    fn collar_m(&self, bounds: &Bounds) -> Result<f64, ExportError> {
+        /// Places looked at along a border of all tiles together.
+        const LOOKS: i64 = 256;
+        const MARGIN_M: f64 = 10.0;
+        let (cols, rows) = bounds.tiles(self.level, self.level);
+        let ([west, east], [south, north]) = (ends(cols), ends(rows));
+        let rect = self.product.rect;
+        let low = self.product.corner_m(rect.south, rect.west);
+        let high = self.product.corner_m(rect.north, rect.east);
+        let along = |from: i64, to: i64, look: i64| from + (to - from) * look / LOOKS;
+        let looks = (0..=LOOKS).flat_map(|look| {
+            let (x, y) = (along(west, east, look), along(south, north, look));
+            [[x, south], [x, north], [west, y], [east, y]]
+        });
+        let mut collar_m = MARGIN_M;
+        for steps in looks {
+            let place = self.earth.place_m(lon_lat(self.level, steps)).ok_or_else(|| too_wide(self.product))?;
+            for axis in 0..2 {
+                collar_m = collar_m.max(low[axis] - place[axis] + MARGIN_M).max(place[axis] - high[axis] + MARGIN_M);
+            }
+        }
+        Ok(collar_m)
     }
 
     /// The tiles that hold the triangles themselves.
@@ -190,22 +228,26 @@ impl Scene<'_> {
         tile
     }
 
-    /// Height above the ellipsoid at a longitude and latitude: that of the nearest place of the product, or far away
-    /// the foot of the ladder.
+    /// The height so far outside of a border of this height.
+    fn fallen(&self, border_m: f64, outside_m: f64) -> f64 {
+        border_m + (outside_m / self.fall_m).min(1.0) * (self.ladder.foot_m - border_m)
+    }
+
+    /// Height above the ellipsoid at a longitude and latitude, on what is exported or around it.
     fn height_at(&self, place: [f64; 2]) -> f64 {
-        let product = self.product;
-        let [west, south] = product.corner_m(product.rect.south, product.rect.west);
-        let [east, north] = product.corner_m(product.rect.north, product.rect.east);
-        let reach = (east - west).max(north - south);
-        let Some([x, y]) = self.earth.place_m(place) else { return self.ladder.foot_m };
-        let near = |value: f64, low: f64, high: f64| low - reach <= value && value <= high + reach;
-        if !near(x, west, east) || !near(y, south, north) {
+        let rect = self.product.rect;
+        let (low, high) = (self.product.corner_m(rect.south, rect.west), self.product.corner_m(rect.north, rect.east));
+        let Some(place) = self.earth.place_m(place) else { return self.ladder.foot_m };
+        let beyond = |axis: usize| (low[axis] - place[axis]).max(place[axis] - high[axis]);
+        let outside_m = beyond(0).max(beyond(1)).max(0.0);
+        // Far away a system may give anything, or nothing.
+        if !outside_m.is_finite() || self.fall_m <= outside_m {
             return self.ladder.foot_m;
         }
-        let inside = [x.clamp(west, east), y.clamp(south, north)];
-        let height = height_m(product, inside).unwrap_or(0.0);
+        let inside = [0, 1].map(|axis| place[axis].clamp(low[axis], high[axis]));
+        let height = height_m(self.product, inside).unwrap_or(0.0);
         let above = self.earth.lon_lat(inside).map_or(0.0, |place| self.earth.datum_m(place));
-        height + above
+        self.fallen(height + above, outside_m)
     }
 
     fn layer(&self, bounds: &Bounds) -> Value {
@@ -217,7 +259,7 @@ impl Scene<'_> {
         json!({
             "tilejson": "2.1.0",
             "name": area.name,
-            "description": format!("{} above {}; {}", area.crs, area.vertical_datum, self.earth.datum().said()),
+            "description": format!("from {}; {}", area.crs, self.earth.datum().said()),
             "version": "1.0.0",
             "format": "quantized-mesh-1.0",
             "scheme": "tms",

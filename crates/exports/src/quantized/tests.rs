@@ -67,7 +67,15 @@ fn decode(bytes: &[u8]) -> Decoded {
     }
 }
 
-fn exported() -> BTreeMap<String, Vec<u8>> {
+/// The sample where its sides run across meridians: the pole of Lambert's azimuthal projection is far away.
+fn slanted() -> Product {
+    let mut product = samples::product();
+    product.manifest.area.crs = "EPSG:3035".into();
+    (product.frame.origin_east_m, product.frame.origin_north_m) = (6_400_000.0, 4_900_000.0);
+    product
+}
+
+fn exported(product: &Product) -> BTreeMap<String, Vec<u8>> {
     let files = Mutex::new(BTreeMap::new());
     let put = |name: &str, bytes: &[u8]| {
         files.lock().unwrap().insert(name.to_owned(), bytes.to_vec());
@@ -75,7 +83,7 @@ fn exported() -> BTreeMap<String, Vec<u8>> {
     };
     let (workers, stop) = (Workers::new(2), AtomicBool::new(false));
     let work = Work { workers: &workers, stop: &stop, tell: &|_| {} };
-    write_quantized_mesh(&samples::product(), Some(Datum::Ellipsoid), &put, &work).unwrap();
+    write_quantized_mesh(product, Some(Datum::Ellipsoid), &put, &work).unwrap();
     files.into_inner().unwrap()
 }
 
@@ -86,7 +94,12 @@ fn key(name: &str) -> (u32, i64, i64) {
 
 #[test]
 fn tiles_are_covered_listed_and_agree_on_their_borders() {
-    let files = exported();
+    for product in [samples::product(), slanted()] {
+        check_tiles(&exported(&product));
+    }
+}
+
+fn check_tiles(files: &BTreeMap<String, Vec<u8>>) {
     let layer: Value = serde_json::from_slice(&files["layer.json"]).unwrap();
     let available = layer["available"].as_array().unwrap();
     let tiles: BTreeMap<(u32, i64, i64), Decoded> = files
@@ -134,8 +147,8 @@ fn tiles_are_covered_listed_and_agree_on_their_borders() {
 
 #[test]
 fn the_finest_tiles_have_the_heights_of_the_load_modules() {
-    let files = exported();
     let product = samples::product();
+    let files = exported(&product);
     let earth = Earth::new(&product, Some(Datum::Ellipsoid)).unwrap();
     let level = finest_level(product.side_m());
     let mut found = 0;
