@@ -5,7 +5,9 @@
 use std::io::{Result, Write};
 
 use serde_json::{Value, json};
+use terrain::{LATTICE_PER_POST, Tin, metres_of_quanta};
 
+use crate::mesh::normals;
 use crate::{Facts, Mesh, Product};
 
 /// Base colours of classes, in order and over again: tell apart by the colour-blind, too.
@@ -162,6 +164,45 @@ pub fn write_glb(out: &mut impl Write, product: &Product, mesh: &Mesh) -> Result
         }),
     };
     out.write_all(&gltf.with_groups(&mesh.triangles, &mesh.classes).bytes())
+}
+
+/// Where a TIN of a raster's own posts lies.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TinPlace {
+    /// East and north of post (0, 0), in metres.
+    pub origin_m: [f64; 2],
+    /// Metres between posts, west to east and south to north.
+    pub spacing_m: [f64; 2],
+    /// The coordinate system, where it is known.
+    pub crs: Option<String>,
+}
+
+/// Writes a TIN as binary glTF, counted from its south-west post.
+///
+/// # Errors
+/// Those of `out`.
+pub fn write_tin_glb(out: &mut impl Write, tin: &Tin, place: &TinPlace) -> Result<()> {
+    let [dx, dy] = place.spacing_m;
+    let places: Vec<[f64; 3]> = tin
+        .vertices
+        .iter()
+        .map(|vertex| {
+            let posts = |lattice: i32, from: i32| f64::from(lattice) / f64::from(LATTICE_PER_POST) - f64::from(from);
+            let (row, col) = (posts(vertex.at.row, tin.rect.south), posts(vertex.at.col, tin.rect.west));
+            [col * dx, row * dy, metres_of_quanta(vertex.height)]
+        })
+        .collect();
+    let south_west = [f64::from(tin.rect.west) * dx, f64::from(tin.rect.south) * dy];
+    let gltf = Gltf {
+        positions: places.iter().copied().map(turned).collect(),
+        normals: normals(&places, &tin.triangles).into_iter().map(turned).collect(),
+        groups: vec![(0, tin.triangles.clone())],
+        extras: json!({
+            "crs": place.crs, "axes": "x east, y up, z south",
+            "offset_m": [place.origin_m[0] + south_west[0], place.origin_m[1] + south_west[1], 0.0],
+        }),
+    };
+    out.write_all(&gltf.bytes())
 }
 
 #[cfg(test)]

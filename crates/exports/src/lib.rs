@@ -21,7 +21,7 @@ pub use sidecar::{Facts, sidecar};
 mod polygon_files;
 pub use polygon_files::{write_obj, write_ply};
 mod glb;
-pub use glb::write_glb;
+pub use glb::{TinPlace, write_glb, write_tin_glb};
 mod modules;
 pub use modules::write_modules;
 mod geotiff;

@@ -71,7 +71,6 @@ fn what_is_not_supported_yet_says_so() {
         scene.refuses(&["plan", "job.toml", "--emit", emit], &[emit, "not supported yet"]);
     }
     scene.refuses(&["report", "x.tdb", "--format", "html"], &["html", "not supported yet"]);
-    scene.refuses(&["tin", "a.tif", "--points", "9", "--out", "m.glb"], &["glb", "not supported yet"]);
 }
 
 #[test]
