@@ -221,9 +221,12 @@ fn export(arguments: &Arguments, work: &Work) -> Result<String, Failure> {
         folder.finish()?;
     }
     let triangles: usize = product.modules.iter().map(|module| module.triangles.len()).sum();
-    let (modules, triangles) = (grouped(product.modules.len() as u64), grouped(triangles as u64));
+    let modules = match product.modules.len() {
+        1 => "1 load module".to_owned(),
+        count => format!("{} load modules", grouped(count as u64)),
+    };
     let said = said.map(|datum| format!("{}\n", datum.said())).unwrap_or_default();
-    Ok(format!("{said}{modules} load modules, {triangles} triangles"))
+    Ok(format!("{said}{modules}, {} triangles", grouped(triangles as u64)))
 }
 
 fn write_raster(arguments: &Arguments, product: &Product, work: &Work) -> Result<(), Failure> {
