@@ -32,6 +32,8 @@ mod explain;
 pub use explain::{ExplainedRefusal, ExplainedWindow, Explanation, OneMore, explain};
 mod difference;
 pub use difference::{Difference, ModuleDifference, SettingDifference, difference};
+mod built_from;
+pub use built_from::BuiltFrom;
 
 mod area;
 mod assemble;

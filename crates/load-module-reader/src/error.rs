@@ -126,6 +126,25 @@ pub enum ReadError {
         /// What it should have been.
         expected: &'static str,
     },
+    /// There is no load-module file where an area was expected.
+    NoFiles {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// A file belongs to another area, grid or coordinate system than the first.
+    OtherArea {
+        /// The file.
+        file: String,
+        /// The first one.
+        first: String,
+    },
+    /// A load module of the area is in no file.
+    NoSuchModule {
+        /// Its row in the area.
+        row: u32,
+        /// Its column in the area.
+        col: u32,
+    },
     /// A file that was opened by its path is damaged.
     InFile {
         /// The file.
@@ -164,6 +183,13 @@ impl fmt::Display for ReadError {
             Self::NotAValue { section, offset, field, expected } => {
                 write!(f, "{section}, offset {offset}: {field} is not {expected}")
             }
+            Self::NoFiles { path } => {
+                write!(f, "{}: found no load-module file, expected one for each tile", path.display())
+            }
+            Self::OtherArea { file, first } => {
+                write!(f, "{file}: found another area than that of {first}, expected files of one area")
+            }
+            Self::NoSuchModule { row, col } => write!(f, "load module {row},{col}: found no file that holds it"),
             Self::InFile { path, fault } => write!(f, "{}: {fault}", path.display()),
         }
     }

@@ -41,8 +41,8 @@ impl SlmFile {
         if FILE_BYTES_MAX < found {
             return Err(ReadError::TooLarge { found, limit: FILE_BYTES_MAX });
         }
-        let (header, header_length) = Header::parse(bytes)?;
-        let index = index::parse(bytes, &header, header_length)?;
+        let (header, header_length) = Header::parse(bytes, found)?;
+        let index = index::parse(bytes, &header, header_length, found)?;
         let columns = header.west..header.east;
         let places = (header.south..header.north).flat_map(|row| columns.clone().map(move |col| (row, col)));
         let modules = places

@@ -72,8 +72,8 @@ impl Header {
         inside.then(|| (row - self.south) as usize * (self.east - self.west) as usize + (col - self.west) as usize)
     }
 
-    /// The header at the start of `file`, and its length.
-    pub(crate) fn parse(file: &[u8]) -> Result<(Self, usize), ReadError> {
+    /// The header at the start of a file of `file_bytes` bytes, of which `file` is the beginning, and its length.
+    pub(crate) fn parse(file: &[u8], file_bytes: u64) -> Result<(Self, usize), ReadError> {
         let mut cursor = Cursor::new(file, 0, Section::Header);
         check_start(&mut cursor)?;
         let offset = cursor.offset();
@@ -89,10 +89,10 @@ impl Header {
         check_section(bytes, 0, Section::Header)?;
         cursor.expect(offset, "level count", i64::from(level_count), i64::from(LEVEL_COUNT))?;
         let header = Self::parse_fields(Cursor::new(bytes, 0, Section::Header))?;
-        if file.len() as u64 == file_length {
+        if file_bytes == file_length {
             return Ok((header, header_length));
         }
-        Err(ReadError::WrongLength { found: file.len() as u64, expected: file_length })
+        Err(ReadError::WrongLength { found: file_bytes, expected: file_length })
     }
 
     /// All after the lengths, up to the end of the header.

@@ -25,8 +25,14 @@ pub struct IndexEntry {
     pub z_high: i32,
 }
 
-/// The index that follows a header of `header_length` bytes, row by row from the south-west.
-pub(crate) fn parse(file: &[u8], header: &Header, header_length: usize) -> Result<Vec<IndexEntry>, ReadError> {
+/// The index that follows a header of `header_length` bytes, row by row from the south-west. `file` is the beginning
+/// of a file of `file_bytes` bytes, and holds at least the index.
+pub(crate) fn parse(
+    file: &[u8],
+    header: &Header,
+    header_length: usize,
+    file_bytes: u64,
+) -> Result<Vec<IndexEntry>, ReadError> {
     let base = header_length as u64;
     let length = header.module_count().saturating_mul(INDEX_ENTRY_BYTES as u64).saturating_add(4);
     let rest = &file[header_length..];
@@ -41,14 +47,14 @@ pub(crate) fn parse(file: &[u8], header: &Header, header_length: usize) -> Resul
     let mut next = base + length;
     let mut entries = Vec::with_capacity(bytes.len() / INDEX_ENTRY_BYTES);
     for _ in 0..header.module_count() {
-        let entry = read_entry(&mut cursor, next, file.len() as u64)?;
+        let entry = read_entry(&mut cursor, next, file_bytes)?;
         next += u64::from(entry.length);
         entries.push(entry);
     }
-    if next == file.len() as u64 {
+    if next == file_bytes {
         return Ok(entries);
     }
-    Err(ReadError::WrongLength { found: file.len() as u64, expected: next })
+    Err(ReadError::WrongLength { found: file_bytes, expected: next })
 }
 
 /// One entry, whose section must begin at `next`: sections lie back to back.

@@ -1,20 +1,56 @@
-//! Reads our load-module files (`modules/r02c03.slm`), all the load modules of one tile each.
+//! Reads our load-module files (`modules/r02c03.slm`) and answers what a simulator asks of the ground.
 //!
 //! Written for simulators: it depends on nothing else of this project, owns all it returns and never panics,
 //! whatever the bytes. The layout is described field by field in `FORMAT.md`. Every section of a file carries
 //! a checksum, every length and offset has exactly one right value, and what the sections hold is checked too:
-//! what [`SlmFile::parse`] returns is sound, and anything else is a [`ReadError`].
+//! what is returned is sound, and anything else is a [`ReadError`].
+//!
+//! [`Area`] opens all files of a database and reads only their headers and indexes. [`Area::load`] brings a [`Block`]
+//! of load modules into memory as [`Ground`], and [`Ground::moved`] follows the observer and reads only what is new.
+//! A query takes constant expected time. [`SlmFile`] is the plain way to read one whole file.
 //!
 //! ```no_run
+//! use load_module_reader::{Area, Keep, Sight};
+//!
 //! # fn main() -> Result<(), load_module_reader::ReadError> {
-//! let file = load_module_reader::SlmFile::open("ntc.tdb/modules/r00c00.slm")?;
-//! if let Some(module) = file.module(3, 5) {
-//!     let [east_m, north_m] = file.header().module_origin_m(3, 5);
-//!     println!("{} triangles at {east_m} {north_m}", module.triangles.len());
+//! let area = Area::open("ntc.tdb", Keep::OnDisk)?;
+//! let mut tank = [530_125.0, 3_899_310.5];
+//!
+//! // 15 x 15 load modules around the tank: a view of 3.5 km and more in every direction.
+//! let mut ground = area.load(area.block_around(tank, 7))?;
+//!
+//! for _ in 0..1000 {
+//!     tank[0] += 12.0;
+//!     let block = area.block_around(tank, 7);
+//!     if block != ground.block() {
+//!         // A row or a column of load modules is read, the others are kept.
+//!         ground = ground.moved(&area, block)?;
+//!     }
+//!     let Some(under) = ground.sample(tank) else { break };
+//!     let [east, north, up] = under.normal;
+//!     println!("{:.2} m, class {}, facing {east:.2} {north:.2} {up:.2}", under.height_m, under.class);
+//!
+//!     let gun = [tank[0], tank[1], under.height_m + 2.5];
+//!     let target = [tank[0] + 1500.0, tank[1] + 400.0];
+//!     let Some(height_m) = ground.height_m(target) else { continue };
+//!     match ground.sight(gun, [target[0], target[1], height_m + 2.5]) {
+//!         Sight::Free => println!("seen"),
+//!         Sight::Hidden(share) => println!("hidden by the ground {:.0} % of the way", share * 100.0),
+//!         Sight::Unknown => println!("not loaded that far"),
+//!     }
+//! }
+//!
+//! // For drawing: vertices and triangles of every load module in view.
+//! for module in ground.modules() {
+//!     let module = module.module();
+//!     println!("{},{}: {} triangles", module.row, module.col, module.triangles.len());
 //! }
 //! # Ok(())
 //! # }
 //! ```
+//!
+//! Files may also be mapped into memory: give [`TileFile::of_bytes`] a map of your own, for which this crate, being
+//! free of `unsafe`, has no code; `load-module-reader-c` does that.
 
 // A test that unwraps says by its line what failed.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
@@ -30,6 +66,17 @@ mod module;
 pub use module::{FIXED_MODULE_BYTES, Module, Residual, Vertex};
 mod file;
 pub use file::{FILE_BYTES_MAX, SlmFile};
+mod tile_file;
+pub use tile_file::{Bytes, Keep, TileFile};
+mod lookup;
+mod terrain_module;
+pub use terrain_module::{Sample, TerrainModule};
+mod ground;
+pub use ground::{Block, Ground, Sight};
+mod area;
+pub use area::{Area, Frame};
 
 #[cfg(test)]
 mod sample;
+#[cfg(test)]
+mod tests;

@@ -6,7 +6,8 @@ use crate::{Header, IndexEntry, QUANTA_PER_METRE, ReadError, Section};
 /// Bytes of a load module's section before its vertices.
 pub const FIXED_MODULE_BYTES: usize = 56;
 
-/// A vertex, in quanta of 1/128 m from the load module's south-west corner.
+/// A vertex, in quanta of 1/128 m from the load module's south-west corner. It lies in memory as C would have it.
+#[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Vertex {
     /// East of the western side.

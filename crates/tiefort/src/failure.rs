@@ -7,6 +7,7 @@ use std::process::ExitCode;
 
 use compiler::CompileError;
 use database::DatabaseError;
+use exports::ExportError;
 use job::JobError;
 
 use crate::terminal;
@@ -91,6 +92,11 @@ impl Failure {
         Self { message: error.to_string(), hint: error.hint(), code }
     }
 
+    /// With the exit code of the signal that came, if one did: then that is why.
+    pub fn after(self, signal: Option<u8>) -> Self {
+        Self { code: signal.unwrap_or(self.code), ..self }
+    }
+
     /// Prints it and gives the exit code.
     pub fn tell(&self) -> ExitCode {
         terminal::tell(&self.to_string());
@@ -115,6 +121,15 @@ impl From<JobError> for Failure {
 impl From<CompileError> for Failure {
     fn from(error: CompileError) -> Self {
         Self::of_compiler(&error, None)
+    }
+}
+
+impl From<ExportError> for Failure {
+    fn from(error: ExportError) -> Self {
+        match error {
+            ExportError::Database(error) => error.into(),
+            error => Self { message: error.to_string(), hint: error.hint(), code: FAILED },
+        }
     }
 }
 

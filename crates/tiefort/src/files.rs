@@ -4,6 +4,8 @@ use std::fs;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
+use tempfile::NamedTempFile;
+
 use crate::failure::Failure;
 
 /// Writes a file that appears under its name only when it is whole.
@@ -14,18 +16,45 @@ pub fn write_whole(
     path: &Path,
     write: impl FnOnce(&mut BufWriter<&fs::File>) -> io::Result<()>,
 ) -> Result<(), Failure> {
+    write_whole_or(path, |out| write(out).map_err(|error| Failure::output(path, &error)))
+}
+
+/// The same where writing may fail for other reasons.
+///
+/// # Errors
+/// Those of `write`, and when the file cannot be written.
+pub fn write_whole_or(
+    path: &Path,
+    write: impl FnOnce(&mut BufWriter<&fs::File>) -> Result<(), Failure>,
+) -> Result<(), Failure> {
     let fault = |error: io::Error| Failure::output(path, &error);
+    let file = temporary_beside(path)?;
+    let mut out = BufWriter::new(file.as_file());
+    write(&mut out)?;
+    out.flush().map_err(fault)?;
+    drop(out);
+    file.persist(path).map_err(|error| fault(error.error))?;
+    Ok(())
+}
+
+/// Lets `make` write a file under a temporary name, then gives it its own.
+///
+/// # Errors
+/// Those of `make`, and when the file cannot be made.
+pub fn make_whole(path: &Path, make: impl FnOnce(&Path) -> Result<(), Failure>) -> Result<(), Failure> {
+    let file = temporary_beside(path)?;
+    make(file.path())?;
+    file.persist(path).map_err(|error| Failure::output(path, &error.error))?;
+    Ok(())
+}
+
+fn temporary_beside(path: &Path) -> Result<NamedTempFile, Failure> {
     let mut builder = tempfile::Builder::new();
     builder.prefix(".tiefort-");
     // A temporary file is private by default; this one is about to be an ordinary file.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let file = builder.tempfile_in(folder_of(path)).map_err(fault)?;
-    let mut out = BufWriter::new(file.as_file());
-    write(&mut out).and_then(|()| out.flush()).map_err(fault)?;
-    drop(out);
-    file.persist(path).map_err(|error| fault(error.error))?;
-    Ok(())
+    builder.tempfile_in(folder_of(path)).map_err(|error| Failure::output(path, &error))
 }
 
 /// Writes a text file where there is none yet.

@@ -21,11 +21,13 @@ mod failure;
 mod files;
 mod lines;
 mod measures;
+mod new_folder;
 mod page;
 mod progress;
 mod run;
 mod scene;
 mod signals;
+mod steps;
 mod terminal;
 
 use std::process::ExitCode;

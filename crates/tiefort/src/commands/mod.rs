@@ -3,6 +3,7 @@
 mod build;
 mod diff;
 mod explain;
+mod export;
 mod fidelity;
 mod init;
 mod plan;
@@ -43,6 +44,8 @@ pub enum Command {
     Verify(verify::Arguments),
     /// Measure how true a database is: residuals, line of sight, slope
     Fidelity(fidelity::Arguments),
+    /// Write a database in another program's format: meshes, single load modules
+    Export(export::Arguments),
     /// Write the built-in basin-and-range terrain as a GeoTIFF
     Sample(sample::Arguments),
     /// Make just a mesh from a raster
@@ -67,6 +70,7 @@ impl Command {
             Command::Diff(arguments) => diff::run(&arguments),
             Command::Verify(arguments) => verify::run(&arguments),
             Command::Fidelity(arguments) => fidelity::run(&arguments),
+            Command::Export(arguments) => export::run(&arguments),
             Command::Sample(arguments) => sample::run(&arguments),
             Command::Tin(arguments) => tin::run(&arguments),
         }

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::{ArgGroup, Args, ValueEnum};
 use compiler::{Measures, Mesh, Sights, TinMethod, TinRequest};
+use exports::TinPlace;
 use job::Optimising;
 use serde_json::{Value, json};
 use terrain::StopReason;
@@ -81,7 +82,7 @@ pub struct Arguments {
     /// Print events as JSON lines, the last one the summary
     #[arg(long, conflicts_with = "quiet")]
     json: bool,
-    /// The mesh to write: .ply or .obj
+    /// The mesh to write: .ply, .obj or .glb
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
 }
@@ -147,6 +148,7 @@ enum Frame {
 enum Kind {
     Ply,
     Obj,
+    Glb,
 }
 
 /// Makes the mesh.
@@ -200,11 +202,15 @@ fn kind(arguments: &Arguments) -> Result<Kind, Failure> {
     match files::extension(&arguments.out).as_str() {
         "ply" => Ok(Kind::Ply),
         "obj" => Ok(Kind::Obj),
-        "glb" => Err(Failure::not_yet("a mesh as .glb", "write .ply or .obj")),
+        "glb" if arguments.coordinates == Frame::Map => {
+            let message = "found --coordinates map with a .glb, which has no room for map coordinates";
+            Err(Failure::new(message, "leave --coordinates out, or write .ply or .obj"))
+        }
+        "glb" => Ok(Kind::Glb),
         found => {
             let path = arguments.out.display();
             Err(Failure::new(
-                format!("{path}: found the extension {found:?}, expected \"ply\" or \"obj\""),
+                format!("{path}: found the extension {found:?}, expected \"ply\", \"obj\" or \"glb\""),
                 "the extension of --out says which kind of mesh is written",
             ))
         }
@@ -299,6 +305,11 @@ fn write(mesh: &Mesh, kind: Kind, arguments: &Arguments) -> Result<(), Failure> 
     files::write_whole(&arguments.out, |out| match kind {
         Kind::Ply => views::write_ply(out, &mesh.tin, &place, coordinates),
         Kind::Obj => views::write_obj(out, &mesh.tin, &place, coordinates),
+        Kind::Glb => {
+            let crs = mesh.epsg.map(|code| format!("EPSG:{code}"));
+            let origin_m = [mesh.east_m, mesh.north_m];
+            exports::write_tin_glb(out, &mesh.tin, &TinPlace { origin_m, spacing_m: place.spacing_m, crs })
+        }
     })
 }
 

@@ -2,7 +2,8 @@
 
 use crate::scene::Scene;
 
-const COMMANDS: [&str; 9] = ["build", "tile", "plan", "status", "report", "verify", "fidelity", "sample", "tin"];
+const COMMANDS: [&str; 10] =
+    ["build", "tile", "plan", "status", "report", "verify", "fidelity", "export", "sample", "tin"];
 
 #[test]
 fn the_help_of_every_command_has_an_example_of_it() {
@@ -76,7 +77,6 @@ fn what_is_not_supported_yet_says_so() {
     for emit in ["slurm", "dask", "ninja"] {
         scene.refuses(&["plan", "job.toml", "--emit", emit], &[emit, "not supported yet"]);
     }
-    scene.refuses(&["tin", "a.tif", "--points", "9", "--out", "m.glb"], &["glb", "not supported yet"]);
 }
 
 #[test]

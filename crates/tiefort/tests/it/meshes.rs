@@ -32,6 +32,21 @@ fn an_obj_has_the_points_that_were_asked_for() {
 }
 
 #[test]
+fn a_glb_says_where_it_lies_and_has_no_map_coordinates() {
+    let scene = Scene::new();
+    Raster::sound().write(&scene.path("dem.tif"));
+    scene.run_to(0, &["tin", "dem.tif", "--points", "200", "--out", "mesh.glb", "--quiet"]);
+    let mesh = fs::read(scene.path("mesh.glb")).unwrap();
+    assert!(mesh.starts_with(b"glTF"));
+    let length = u32::from_le_bytes(mesh[12..16].try_into().unwrap()) as usize;
+    let document: Value = serde_json::from_slice(&mesh[20..20 + length]).unwrap();
+    assert_eq!(document["accessors"][0]["count"], 200);
+    assert_eq!(document["asset"]["extras"]["crs"], "EPSG:32611");
+    let map = ["tin", "dem.tif", "--points", "9", "--coordinates", "map", "--out", "other.glb"];
+    scene.refuses(&map, &["--coordinates map", ".glb"]);
+}
+
+#[test]
 fn tiles_and_targets_make_a_mesh_too() {
     let scene = Scene::new();
     Raster::sound().write(&scene.path("dem.tif"));

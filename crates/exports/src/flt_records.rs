@@ -1,0 +1,271 @@
+//! Records of OpenFlight 16.1: big-endian, each with its opcode and its length first.
+
+use crate::glb::COLOURS;
+
+/// Format revision level: 16.1.
+const REVISION: i32 = 1610;
+/// Bytes of a palette's own record, before its first vertex.
+pub(crate) const PALETTE_BYTES: usize = 8;
+/// Bytes of a vertex with colour and normal.
+pub(crate) const VERTEX_BYTES: usize = 56;
+/// Bytes of the longest record: its length has 16 bits.
+const RECORD_BYTES_MAX: usize = 65_532;
+
+mod opcode {
+    pub const HEADER: u16 = 1;
+    pub const GROUP: u16 = 2;
+    pub const OBJECT: u16 = 4;
+    pub const FACE: u16 = 5;
+    pub const PUSH: u16 = 10;
+    pub const POP: u16 = 11;
+    pub const COMMENT: u16 = 31;
+    pub const LONG_ID: u16 = 33;
+    pub const EXTERNAL: u16 = 63;
+    pub const VERTEX_PALETTE: u16 = 67;
+    pub const VERTEX_NORMAL: u16 = 69;
+    pub const VERTEX_LIST: u16 = 72;
+}
+
+/// A file in the making.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Records {
+    bytes: Vec<u8>,
+}
+
+/// What the header says of the place.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Place {
+    /// East and north, in metres, to add to coordinates of the file.
+    pub offset_m: [f64; 2],
+    /// South-west and north-east corner, longitude first.
+    pub corners: [[f64; 2]; 2],
+    /// Zone of UTM, negative in the south; `None` for another projection.
+    pub utm_zone: Option<i16>,
+    /// Radius of the content around its middle, in metres.
+    pub radius_m: f64,
+}
+
+impl Records {
+    /// The bytes so far.
+    pub(crate) fn into_bytes(self) -> Vec<u8> {
+        self.bytes
+    }
+
+    fn open(&mut self, opcode: u16, length: usize) {
+        let length = u16::try_from(length).expect("records are written shorter than 64 kB");
+        self.put(&opcode.to_be_bytes());
+        self.put(&length.to_be_bytes());
+    }
+
+    fn put(&mut self, bytes: &[u8]) {
+        self.bytes.extend_from_slice(bytes);
+    }
+
+    fn i16s(&mut self, numbers: &[i16]) {
+        numbers.iter().for_each(|number| self.bytes.extend_from_slice(&number.to_be_bytes()));
+    }
+
+    fn i32s(&mut self, numbers: &[i32]) {
+        numbers.iter().for_each(|number| self.bytes.extend_from_slice(&number.to_be_bytes()));
+    }
+
+    fn u32s(&mut self, numbers: &[u32]) {
+        numbers.iter().for_each(|number| self.bytes.extend_from_slice(&number.to_be_bytes()));
+    }
+
+    fn f64s(&mut self, numbers: &[f64]) {
+        numbers.iter().for_each(|number| self.bytes.extend_from_slice(&number.to_be_bytes()));
+    }
+
+    fn zeros(&mut self, count: usize) {
+        self.bytes.resize(self.bytes.len() + count, 0);
+    }
+
+    /// A text in a field of `length` bytes, cut to leave a zero at its end.
+    fn text(&mut self, text: &str, length: usize) {
+        let fits = text.len().min(length - 1);
+        self.put(&text.as_bytes()[..fits]);
+        self.zeros(length - fits);
+    }
+
+    /// The first record of a file.
+    pub(crate) fn header(&mut self, place: &Place) {
+        const METRES: u8 = 0;
+        const SAVE_NORMALS: u32 = 0x8000_0000;
+        const FLAT_EARTH: i32 = 0;
+        const UTM: i32 = 4;
+        const DOUBLES: i16 = 1;
+        const OPEN_FLIGHT: i32 = 100;
+        self.open(opcode::HEADER, 324);
+        self.text("db", 8);
+        self.i32s(&[REVISION, 0]);
+        // No date: the same database gives the same file.
+        self.zeros(32);
+        self.i16s(&[1, 1, 1, 1, 1]);
+        self.put(&[METRES, 0]);
+        self.u32s(&[SAVE_NORMALS]);
+        self.zeros(24);
+        self.i32s(&[if place.utm_zone.is_some() { UTM } else { FLAT_EARTH }]);
+        self.zeros(28);
+        self.i16s(&[1, DOUBLES]);
+        self.i32s(&[OPEN_FLIGHT]);
+        self.f64s(&[place.offset_m[0], place.offset_m[1], place.offset_m[0], place.offset_m[1]]);
+        self.i16s(&[1, 1]);
+        self.zeros(8);
+        self.i16s(&[1, 1, 1, 1]);
+        self.zeros(4);
+        let [[west, south], [east, north]] = place.corners;
+        let middle = [(south + north) / 2.0, (west + east) / 2.0];
+        self.f64s(&[south, west, north, east, middle[0], middle[1], 0.0, 0.0]);
+        self.i16s(&[1, 1, 1, 1]);
+        self.zeros(8);
+        // The ellipsoid of WGS 84.
+        self.i32s(&[0]);
+        self.i16s(&[1, 1, place.utm_zone.unwrap_or(0)]);
+        self.zeros(6);
+        self.f64s(&[0.0, place.radius_m]);
+        self.i16s(&[1, 1]);
+        self.zeros(4);
+        self.f64s(&[6_378_137.0, 6_356_752.314_245_179]);
+    }
+
+    /// A text about the record before.
+    pub(crate) fn comment(&mut self, text: &str) {
+        let text: String = text.chars().filter(char::is_ascii).take(RECORD_BYTES_MAX - 8).collect();
+        let length = (text.len() + 1).next_multiple_of(4);
+        self.open(opcode::COMMENT, 4 + length);
+        self.text(&text, length);
+    }
+
+    pub(crate) fn push(&mut self) {
+        self.open(opcode::PUSH, 4);
+    }
+
+    pub(crate) fn pop(&mut self) {
+        self.open(opcode::POP, 4);
+    }
+
+    /// A node that holds others.
+    pub(crate) fn group(&mut self, name: &str) {
+        self.open(opcode::GROUP, 44);
+        self.text(name, 8);
+        self.zeros(32);
+        self.long_id(name);
+    }
+
+    /// A node that holds faces.
+    pub(crate) fn object(&mut self, name: &str) {
+        self.open(opcode::OBJECT, 28);
+        self.text(name, 8);
+        self.zeros(16);
+        self.long_id(name);
+    }
+
+    /// The name of the node before, where it is longer than seven bytes.
+    fn long_id(&mut self, name: &str) {
+        if 7 < name.len() {
+            let length = (name.len() + 1).next_multiple_of(4);
+            self.open(opcode::LONG_ID, 4 + length);
+            self.text(name, length);
+        }
+    }
+
+    /// The palette of all vertices: place, normal.
+    pub(crate) fn vertices(&mut self, vertices: &[([f64; 3], [f64; 3])]) {
+        const PACKED_COLOUR: i16 = 0x1000;
+        self.open(opcode::VERTEX_PALETTE, PALETTE_BYTES);
+        self.u32s(&[(PALETTE_BYTES + vertices.len() * VERTEX_BYTES) as u32]);
+        for (place, normal) in vertices {
+            self.open(opcode::VERTEX_NORMAL, VERTEX_BYTES);
+            self.i16s(&[0, PACKED_COLOUR]);
+            self.f64s(place);
+            normal.iter().for_each(|part| self.bytes.extend_from_slice(&(*part as f32).to_be_bytes()));
+            self.u32s(&[u32::MAX, 0, 0]);
+        }
+    }
+
+    /// A triangle over vertices of the palette, its class as surface material.
+    pub(crate) fn face(&mut self, triangle: [u32; 3], class: u8) {
+        const TERRAIN_PACKED_COLOUR: u32 = 0x8000_0000 | 0x2000_0000 | 0x1000_0000;
+        const FACE_COLOUR_WITH_NORMALS: u8 = 2;
+        let [red, green, blue] = COLOURS[usize::from(class) % COLOURS.len()].map(|part| (part * 255.0).round() as u32);
+        self.open(opcode::FACE, 80);
+        self.zeros(8 + 4 + 2 + 2 + 4 + 2);
+        // No textures, no material; the class as surface material code; no feature.
+        self.i16s(&[-1, -1, -1, i16::from(class), 0]);
+        self.zeros(4 + 2 + 2);
+        self.u32s(&[TERRAIN_PACKED_COLOUR]);
+        self.put(&[FACE_COLOUR_WITH_NORMALS]);
+        self.zeros(7);
+        self.u32s(&[0xff00_0000 | blue << 16 | green << 8 | red, 0]);
+        self.i16s(&[-1, 0]);
+        self.u32s(&[u32::MAX, u32::MAX]);
+        self.i16s(&[0, -1]);
+        self.push();
+        self.open(opcode::VERTEX_LIST, 16);
+        self.u32s(&triangle.map(|v| (PALETTE_BYTES + v as usize * VERTEX_BYTES) as u32));
+        self.pop();
+    }
+
+    /// A reference to another file, by its path from this one.
+    pub(crate) fn external(&mut self, path: &str) {
+        self.open(opcode::EXTERNAL, 216);
+        self.text(path, 200);
+        self.zeros(4);
+        // Nothing is overridden.
+        self.u32s(&[0]);
+        self.i16s(&[0, 0]);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Opcode and length of each record.
+    fn records(bytes: &[u8]) -> Vec<(u16, usize)> {
+        let (mut at, mut found) = (0, Vec::new());
+        while at < bytes.len() {
+            let word = |at: usize| u16::from_be_bytes([bytes[at], bytes[at + 1]]);
+            found.push((word(at), usize::from(word(at + 2))));
+            at += found[found.len() - 1].1;
+        }
+        assert_eq!(at, bytes.len());
+        found
+    }
+
+    #[test]
+    fn every_record_is_as_long_as_it_says() {
+        let mut all = Records::default();
+        let corners = [[-117.0, 35.0], [-116.9, 35.1]];
+        all.header(&Place { offset_m: [5.0e5, 3.9e6], corners, utm_zone: Some(11), radius_m: 2828.0 });
+        assert_eq!(all.bytes.len(), 324);
+        all.comment("abc");
+        all.vertices(&[([0.0; 3], [0.0, 0.0, 1.0]); 3]);
+        all.push();
+        all.group("a");
+        all.object("r0001c0002");
+        all.face([0, 1, 2], 3);
+        all.external("squares/r00c00.flt");
+        all.pop();
+        let expected = [
+            (1, 324),
+            (31, 8),
+            (67, 8),
+            (69, 56),
+            (69, 56),
+            (69, 56),
+            (10, 4),
+            (2, 44),
+            (4, 28),
+            (33, 16),
+            (5, 80),
+            (10, 4),
+            (72, 16),
+            (11, 4),
+            (63, 216),
+            (11, 4),
+        ];
+        assert_eq!(records(&all.into_bytes()), expected);
+    }
+}

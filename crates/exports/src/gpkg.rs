@@ -1,0 +1,308 @@
+//! A GeoPackage for QGIS: load modules, breaches, tiles and the triangles themselves, as layers of one file.
+//!
+//! The one export that opens its file itself, because the library does; it is given a temporary name.
+
+use std::path::Path;
+
+use database::{Report, ReportPlace};
+use rusqlite::{Connection, ToSql, params};
+use terrain::{LoadModule, ModuleRect, QUANTA_PER_METRE, metres_of_quanta};
+
+use crate::gpkg_geometry::{polygon, polygon_z};
+use crate::{ExportError, Product, Step, Work};
+
+/// `GPKG`, and version 1.3 of it.
+const APPLICATION_ID: i32 = 0x4750_4b47;
+const VERSION: i32 = 10_300;
+/// When the layers are said to have changed: the same database gives the same file.
+const CHANGED: &str = "1970-01-01T00:00:00.000Z";
+
+/// A layer: its name, what it shows, its columns, whether its geometry has heights.
+struct Layer {
+    name: &'static str,
+    description: &'static str,
+    columns: &'static [(&'static str, &'static str)],
+    has_z: bool,
+}
+
+const MODULES: Layer = Layer {
+    name: "load_modules",
+    description: "load modules with their counts and residuals",
+    columns: &[
+        ("row", "INTEGER"),
+        ("col", "INTEGER"),
+        ("triangles", "INTEGER"),
+        ("polygons", "INTEGER"),
+        ("vertices", "INTEGER"),
+        ("posts", "INTEGER"),
+        ("rms_m", "DOUBLE"),
+        ("mean_abs_m", "DOUBLE"),
+        ("max_m", "DOUBLE"),
+        ("lowest_m", "DOUBLE"),
+        ("highest_m", "DOUBLE"),
+    ],
+    has_z: false,
+};
+const BREACHES: Layer = Layer {
+    name: "breaches",
+    description: "limits that could not be met",
+    columns: &[
+        ("kind", "TEXT"),
+        ("place", "TEXT"),
+        ("row", "INTEGER"),
+        ("col", "INTEGER"),
+        ("count", "INTEGER"),
+        ("limit_there", "INTEGER"),
+        ("excess", "INTEGER"),
+        ("refused", "INTEGER"),
+        ("rms_with_m", "DOUBLE"),
+        ("rms_without_m", "DOUBLE"),
+    ],
+    has_z: false,
+};
+const TILES: Layer = Layer {
+    name: "tiles",
+    description: "tiles, the units of work",
+    columns: &[("row", "INTEGER"), ("col", "INTEGER"), ("state", "TEXT")],
+    has_z: false,
+};
+const TRIANGLES: Layer = Layer {
+    name: "triangles",
+    description: "the triangles of the TIN, heights above the vertical datum",
+    columns: &[
+        ("module_row", "INTEGER"),
+        ("module_col", "INTEGER"),
+        ("class", "INTEGER"),
+        ("slope_degrees", "DOUBLE"),
+        ("area_m2", "DOUBLE"),
+    ],
+    has_z: true,
+};
+
+/// West, south, east and north, in metres.
+type Extent = [f64; 4];
+
+/// Writes a GeoPackage at `path`, where no file may be. `window` is the rows and columns of load modules that a window
+/// of the report has.
+///
+/// # Errors
+/// When it cannot be written, or the work was asked to stop.
+pub fn write_gpkg(
+    path: &Path,
+    product: &Product,
+    report: &Report,
+    window: [u32; 2],
+    work: &Work,
+) -> Result<(), ExportError> {
+    let fault = |error: rusqlite::Error| ExportError::write("GeoPackage")(std::io::Error::other(error));
+    let mut connection = Connection::open(path).map_err(fault)?;
+    // The file has a temporary name until it is whole, so nothing has to survive a crash.
+    connection.execute_batch("PRAGMA journal_mode = OFF; PRAGMA synchronous = OFF;").map_err(fault)?;
+    let transaction = connection.transaction().map_err(fault)?;
+    let package = Package { connection: &transaction, srs: product.epsg().map_or(-1, |code| code as i32) };
+    package.describe(product).map_err(fault)?;
+    package.add_modules(product).map_err(fault)?;
+    package.add_breaches(product, report, window).map_err(fault)?;
+    package.add_tiles(product).map_err(fault)?;
+    package.add_triangles(product, work, fault)?;
+    transaction.commit().map_err(fault)
+}
+
+struct Package<'a> {
+    connection: &'a Connection,
+    /// The coordinate system as the package numbers it.
+    srs: i32,
+}
+
+impl Package<'_> {
+    /// The tables that every package has, and the coordinate system.
+    fn describe(&self, product: &Product) -> rusqlite::Result<()> {
+        self.connection
+            .execute_batch(&format!("PRAGMA application_id = {APPLICATION_ID}; PRAGMA user_version = {VERSION};"))?;
+        self.connection.execute_batch(include_str!("gpkg.sql"))?;
+        let add = "INSERT INTO gpkg_spatial_ref_sys VALUES (?1, ?2, ?3, ?4, ?5, NULL)";
+        let mut add = self.connection.prepare(add)?;
+        add.execute(params!["undefined, projected", -1, "NONE", -1, "undefined"])?;
+        add.execute(params!["undefined, geographic", 0, "NONE", 0, "undefined"])?;
+        let wgs84 = crs_definitions::from_code(4326).map_or("undefined", |known| known.wkt);
+        add.execute(params!["WGS 84", 4326, "EPSG", 4326, wgs84])?;
+        if ![-1, 0, 4326].contains(&self.srs) {
+            let known = u16::try_from(self.srs).ok().and_then(crs_definitions::from_code);
+            let definition = known.map_or("undefined", |known| known.wkt);
+            add.execute(params![product.crs(), self.srs, "EPSG", self.srs, definition])?;
+        }
+        Ok(())
+    }
+
+    /// Makes the table of a layer and lists it; the statement that adds a feature: geometry first, then its columns.
+    fn begin(&self, layer: &Layer, extent: Extent) -> rusqlite::Result<rusqlite::Statement<'_>> {
+        let Layer { name, description, columns, has_z } = layer;
+        let declared: String = columns.iter().map(|(name, kind)| format!(", {name} {kind}")).collect();
+        self.connection.execute_batch(&format!(
+            "CREATE TABLE {name} (fid INTEGER PRIMARY KEY AUTOINCREMENT NOT NULL, geom POLYGON{declared});"
+        ))?;
+        let [west, south, east, north] = extent;
+        self.connection.execute(
+            "INSERT INTO gpkg_contents VALUES (?1, 'features', ?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)",
+            params![name, description, CHANGED, west, south, east, north, self.srs],
+        )?;
+        self.connection.execute(
+            "INSERT INTO gpkg_geometry_columns VALUES (?1, 'geom', 'POLYGON', ?2, ?3, 0)",
+            params![name, self.srs, i32::from(*has_z)],
+        )?;
+        let names: String = columns.iter().map(|(name, _)| format!(", {name}")).collect();
+        let places: String = (2..2 + columns.len()).map(|place| format!(", ?{place}")).collect();
+        self.connection.prepare(&format!("INSERT INTO {name} (geom{names}) VALUES (?1{places})"))
+    }
+
+    fn add_modules(&self, product: &Product) -> rusqlite::Result<()> {
+        let mut add = self.begin(&MODULES, extent(product, product.rect))?;
+        for module in &product.modules {
+            let (row, col) = (module.id.row, module.id.col);
+            let geometry =
+                self.rectangle(extent(product, ModuleRect { south: row, west: col, north: row + 1, east: col + 1 }));
+            let (metre, posts) = (f64::from(QUANTA_PER_METRE), f64::from(module.residual.posts));
+            let mean = |sum: u64| (0 < module.residual.posts).then(|| sum as f64 / posts);
+            let heights = || module.vertices.iter().map(|vertex| vertex.z);
+            add.execute(params![
+                geometry,
+                row,
+                col,
+                module.triangles.len() as i64,
+                module.polygon_count,
+                module.vertices.len() as i64,
+                module.residual.posts,
+                mean(module.residual.sum_squared).map(|mean| mean.sqrt() / metre),
+                mean(module.residual.sum_abs).map(|mean| mean / metre),
+                f64::from(module.residual.largest) / metre,
+                heights().min().map(metres_of_quanta),
+                heights().max().map(metres_of_quanta),
+            ])?;
+        }
+        Ok(())
+    }
+
+    fn add_breaches(&self, product: &Product, report: &Report, window: [u32; 2]) -> rusqlite::Result<()> {
+        let mut add = self.begin(&BREACHES, extent(product, product.grid.all()))?;
+        for breach in &report.breaches {
+            let (place, at, [rows, cols]) = match breach.place {
+                ReportPlace::Module(at) => ("module", Some(at), [1, 1]),
+                ReportPlace::Window(at) => ("window", Some(at), window),
+                ReportPlace::Area => ("area", None, [product.grid.rows, product.grid.cols]),
+            };
+            let [row, col] = at.unwrap_or([0, 0]);
+            let rect = ModuleRect { south: row, west: col, north: row + rows, east: col + cols };
+            add.execute(params![
+                self.rectangle(extent(product, rect)),
+                breach.kind,
+                place,
+                at.map(|at| at[0]),
+                at.map(|at| at[1]),
+                breach.count as i64,
+                breach.limit as i64,
+                breach.excess as i64,
+                breach.refused,
+                breach.rms_with_m,
+                breach.rms_without_m,
+            ])?;
+        }
+        Ok(())
+    }
+
+    fn add_tiles(&self, product: &Product) -> rusqlite::Result<()> {
+        let mut add = self.begin(&TILES, extent(product, product.grid.all()))?;
+        for tile in &product.tiles {
+            let state = product.manifest.tile(tile.tile).map(|record| serde_json::json!(record.state));
+            let state = state.and_then(|state| state.as_str().map(str::to_owned));
+            let geometry = self.rectangle(extent(product, tile.modules));
+            add.execute(params![geometry, tile.tile.row, tile.tile.col, state])?;
+        }
+        Ok(())
+    }
+
+    fn add_triangles(
+        &self,
+        product: &Product,
+        work: &Work,
+        fault: impl Fn(rusqlite::Error) -> ExportError,
+    ) -> Result<(), ExportError> {
+        let mut add = self.begin(&TRIANGLES, extent(product, product.rect)).map_err(&fault)?;
+        let total = product.modules.len();
+        for (done, module) in product.modules.iter().enumerate() {
+            if work.stop.load(std::sync::atomic::Ordering::Relaxed) {
+                return Err(ExportError::Stopped { what: "load modules", done, total });
+            }
+            self.add_triangles_of(&mut add, product, module).map_err(&fault)?;
+            (work.tell)(Step { what: "load modules", done: done + 1, total });
+        }
+        Ok(())
+    }
+
+    fn add_triangles_of(
+        &self,
+        add: &mut rusqlite::Statement,
+        product: &Product,
+        module: &LoadModule,
+    ) -> rusqlite::Result<()> {
+        let [east_m, north_m] = product.corner_m(module.id.row, module.id.col);
+        let metre = f64::from(QUANTA_PER_METRE);
+        for (&triangle, class) in module.triangles.iter().zip(&module.classes) {
+            let corners = triangle.map(|v| {
+                let v = module.vertices[usize::from(v)];
+                [east_m + f64::from(v.x) / metre, north_m + f64::from(v.y) / metre, metres_of_quanta(v.z)]
+            });
+            let [a, b, c] = corners;
+            let normal = crate::mesh::cross(crate::mesh::minus(b, a), crate::mesh::minus(c, a));
+            let slope = normal[0].hypot(normal[1]).atan2(normal[2]).to_degrees();
+            let values: [&dyn ToSql; 6] =
+                [&polygon_z(self.srs, corners), &module.id.row, &module.id.col, class, &slope, &(normal[2] / 2.0)];
+            add.execute(values)?;
+        }
+        Ok(())
+    }
+
+    fn rectangle(&self, [west, south, east, north]: Extent) -> Vec<u8> {
+        polygon(self.srs, &[[west, south], [east, south], [east, north], [west, north]])
+    }
+}
+
+fn extent(product: &Product, rect: ModuleRect) -> Extent {
+    let [west, south] = product.corner_m(rect.south, rect.west);
+    let [east, north] = product.corner_m(rect.north, rect.east);
+    [west, south, east, north]
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::AtomicBool;
+
+    use schedule::Workers;
+
+    use super::*;
+    use crate::samples;
+
+    #[test]
+    fn a_package_has_its_layers_with_a_feature_for_each_thing() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.gpkg");
+        let (workers, stop) = (Workers::new(1), AtomicBool::new(false));
+        let work = Work { workers: &workers, stop: &stop, tell: &|_| {} };
+        write_gpkg(&path, &samples::product(), &samples::report(), [8, 8], &work).unwrap();
+        let package = Connection::open(&path).unwrap();
+        let count = |layer: &str| -> i64 {
+            package.query_row(&format!("SELECT count(*) FROM {layer}"), [], |row| row.get(0)).unwrap()
+        };
+        assert_eq!([count("load_modules"), count("breaches"), count("tiles"), count("triangles")], [2, 1, 1, 6]);
+        assert_eq!(count("gpkg_contents"), 4);
+        let id: i32 = package.query_row("PRAGMA application_id", [], |row| row.get(0)).unwrap();
+        assert_eq!(id.to_be_bytes(), *b"GPKG");
+        let rms: f64 = package.query_row("SELECT rms_m FROM load_modules WHERE col = 0", [], |row| row.get(0)).unwrap();
+        assert!((rms - (3_276_800.0_f64 / 400.0).sqrt() / 128.0).abs() < 1e-12);
+        let area: f64 = package.query_row("SELECT sum(area_m2) FROM triangles", [], |row| row.get(0)).unwrap();
+        assert_eq!(area, 500_000.0);
+        let wkt: String = package
+            .query_row("SELECT definition FROM gpkg_spatial_ref_sys WHERE srs_id = 32611", [], |row| row.get(0))
+            .unwrap();
+        assert!(wkt.contains("UTM zone 11N"), "{wkt}");
+    }
+}

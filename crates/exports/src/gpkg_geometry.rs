@@ -1,0 +1,53 @@
+//! Polygons as a GeoPackage stores them: a header with the extent, then well-known binary.
+
+/// Little-endian, with an extent in x and y.
+const FLAGS: u8 = 0b0000_0011;
+/// Codes of well-known binary.
+const POLYGON: u32 = 3;
+const POLYGON_Z: u32 = 1003;
+
+/// A polygon of one ring; `ring` does not repeat its first place.
+pub(crate) fn polygon(srs: i32, ring: &[[f64; 2]]) -> Vec<u8> {
+    blob(srs, POLYGON, ring)
+}
+
+/// A triangle with heights.
+pub(crate) fn polygon_z(srs: i32, corners: [[f64; 3]; 3]) -> Vec<u8> {
+    blob(srs, POLYGON_Z, &corners)
+}
+
+fn blob<const N: usize>(srs: i32, kind: u32, ring: &[[f64; N]]) -> Vec<u8> {
+    let mut bytes = Vec::with_capacity(8 + 32 + 13 + 8 * N * (ring.len() + 1));
+    bytes.extend_from_slice(&[b'G', b'P', 0, FLAGS]);
+    bytes.extend_from_slice(&srs.to_le_bytes());
+    for axis in 0..2 {
+        let values = || ring.iter().map(|place| place[axis]);
+        for end in [values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max)] {
+            bytes.extend_from_slice(&end.to_le_bytes());
+        }
+    }
+    bytes.push(1);
+    for number in [kind, 1, ring.len() as u32 + 1] {
+        bytes.extend_from_slice(&number.to_le_bytes());
+    }
+    for place in ring.iter().chain(ring.first()) {
+        place.iter().for_each(|number| bytes.extend_from_slice(&number.to_le_bytes()));
+    }
+    bytes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_triangle_is_closed_and_its_extent_stands_before_it() {
+        let bytes = polygon_z(32611, [[0.0, 0.0, 5.0], [2.0, 0.0, 6.0], [0.0, 3.0, 7.0]]);
+        assert_eq!(bytes.len(), 8 + 32 + 13 + 4 * 24);
+        assert_eq!((&bytes[..4], &bytes[4..8]), (&b"GP\0\x03"[..], &32611_i32.to_le_bytes()[..]));
+        assert_eq!(bytes[16..24], 2.0_f64.to_le_bytes());
+        assert_eq!(bytes[41..45], 1003_u32.to_le_bytes());
+        assert_eq!(bytes[53..77], bytes[bytes.len() - 24..]);
+        assert_eq!(polygon(1, &[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]]).len(), 8 + 32 + 13 + 4 * 16);
+    }
+}

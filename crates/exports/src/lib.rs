@@ -1,0 +1,47 @@
+//! A finished database in other programs' formats. We write these and never read them.
+//!
+//! [`Product::read`] takes the load modules of an area, or of a block of it, into memory; each export is a function of
+//! the product. What becomes one file is written to an `io::Write`; what becomes many is handed, file by file, to a
+//! [`Put`], which may be called from several threads. Nothing here opens a file (GeoPackage, whose library does,
+//! excepted), prints, or reads a clock.
+
+// A test that unwraps says by its line what failed.
+#![cfg_attr(test, allow(clippy::unwrap_used))]
+
+mod error;
+pub use error::ExportError;
+mod work;
+pub use work::{Put, Step, Work};
+mod product;
+pub use product::{Block, Product};
+mod mesh;
+pub use mesh::{Coordinates, Mesh};
+mod sidecar;
+pub use sidecar::{Facts, sidecar};
+mod polygon_files;
+pub use polygon_files::{write_obj, write_ply};
+mod glb;
+pub use glb::{TinPlace, write_glb, write_tin_glb};
+mod modules;
+pub use modules::write_modules;
+mod geotiff;
+mod surface;
+pub use surface::{GroundHeights, write_residual, write_surface};
+mod gpkg;
+mod gpkg_geometry;
+pub use gpkg::write_gpkg;
+mod earth;
+pub use earth::{Datum, Earth};
+mod flt_records;
+mod metaflight;
+mod openflight;
+pub use openflight::write_openflight;
+mod coarse;
+mod globe;
+mod tiles3d;
+pub use tiles3d::write_3dtiles;
+mod quantized;
+pub use quantized::write_quantized_mesh;
+
+#[cfg(test)]
+mod samples;

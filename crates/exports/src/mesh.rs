@@ -1,0 +1,195 @@
+//! The load modules of a product as one mesh: vertices on shared sides are one vertex.
+
+use std::collections::HashMap;
+use std::ops::Range;
+
+use terrain::{LoadModule, ModuleId, ModuleRect, ModuleVertex, QUANTA_PER_METRE};
+
+use crate::Product;
+
+/// What coordinates are counted from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Coordinates {
+    /// From the south-west corner of what is exported: for Blender, MeshLab and the like.
+    Local,
+    /// Eastings and northings: 64-bit floats, for QGIS and other geographic programs.
+    Map,
+}
+
+/// Triangles over common vertices.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Mesh {
+    /// East, north and up in quanta of 1/128 m; east and north from the mesh's south-west corner.
+    pub vertices: Vec<[i32; 3]>,
+    /// Corners, counter-clockwise seen from above.
+    pub triangles: Vec<[u32; 3]>,
+    /// Class of the ground under each triangle.
+    pub classes: Vec<u8>,
+    /// First triangle of each load module, row by row from the south-west, and the end of the last.
+    pub(crate) starts: Vec<usize>,
+}
+
+/// Some load modules of a mesh, over vertices of their own.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Part {
+    /// Vertices of the mesh, in the order in which they are first used.
+    pub vertices: Vec<u32>,
+    /// Corners by place in `vertices`.
+    pub triangles: Vec<[u32; 3]>,
+    /// Class of each triangle.
+    pub classes: Vec<u8>,
+    /// Each load module, and its triangles among those of the part.
+    pub modules: Vec<(ModuleId, Range<usize>)>,
+}
+
+/// Extent in quanta up to which every coordinate is exact as a 32-bit float.
+const EXACT_QUANTA_MAX: i32 = 1 << 24;
+
+impl Mesh {
+    /// All of a product.
+    pub fn of(product: &Product) -> Self {
+        let (side, rect) = (product.side(), product.rect);
+        let mut mesh = Self::default();
+        let mut shared = HashMap::new();
+        for module in &product.modules {
+            let corner = [(module.id.col - rect.west) as i32 * side, (module.id.row - rect.south) as i32 * side];
+            mesh.starts.push(mesh.triangles.len());
+            mesh.add(module, corner, &mut shared);
+        }
+        mesh.starts.push(mesh.triangles.len());
+        mesh
+    }
+
+    /// The load modules of `rect`, which `product`, of which this is the mesh, holds.
+    pub(crate) fn part(&self, product: &Product, rect: ModuleRect) -> Part {
+        let mut part = Part::default();
+        let mut place_of = HashMap::new();
+        for id in rect.iter() {
+            let (row, col) = (id.row - product.rect.south, id.col - product.rect.west);
+            let index = (row * product.rect.cols() + col) as usize;
+            let own = self.starts[index]..self.starts[index + 1];
+            let start = part.triangles.len();
+            for triangle in &self.triangles[own.clone()] {
+                let placed = triangle.map(|v| {
+                    *place_of.entry(v).or_insert_with(|| {
+                        part.vertices.push(v);
+                        part.vertices.len() as u32 - 1
+                    })
+                });
+                part.triangles.push(placed);
+            }
+            part.classes.extend_from_slice(&self.classes[own]);
+            part.modules.push((id, start..part.triangles.len()));
+        }
+        part
+    }
+
+    fn add(&mut self, module: &LoadModule, corner: [i32; 2], shared: &mut HashMap<[i32; 2], u32>) {
+        let on_side = |v: &ModuleVertex| v.x == 0 || v.y == 0 || v.x == module.side || v.y == module.side;
+        let mut index_of = Vec::with_capacity(module.vertices.len());
+        for vertex in &module.vertices {
+            let (x, y) = (corner[0] + i32::from(vertex.x), corner[1] + i32::from(vertex.y));
+            let next = self.vertices.len() as u32;
+            let index = if on_side(vertex) { *shared.entry([x, y]).or_insert(next) } else { next };
+            if index == next {
+                self.vertices.push([x, y, vertex.z]);
+            }
+            index_of.push(index);
+        }
+        self.triangles.extend(module.triangles.iter().map(|triangle| triangle.map(|v| index_of[usize::from(v)])));
+        self.classes.extend_from_slice(&module.classes);
+    }
+
+    /// East, north and up of each vertex in metres from the mesh's south-west corner.
+    pub(crate) fn metres(&self) -> impl Iterator<Item = [f64; 3]> {
+        self.vertices.iter().map(|vertex| vertex.map(|quanta| f64::from(quanta) / f64::from(QUANTA_PER_METRE)))
+    }
+
+    /// Whether every coordinate, counted from the south-west corner, is exact as a 32-bit float.
+    pub(crate) fn fits_floats(&self) -> bool {
+        self.vertices.iter().flatten().all(|quanta| quanta.abs() <= EXACT_QUANTA_MAX)
+    }
+
+    /// The direction the ground faces at each vertex: that of the triangles around it, larger ones counting more.
+    pub(crate) fn normals(&self) -> Vec<[f64; 3]> {
+        let places: Vec<[f64; 3]> = self.metres().collect();
+        normals(&places, &self.triangles)
+    }
+}
+
+/// Unit normals at vertices, of the triangles around each, by area.
+pub(crate) fn normals(places: &[[f64; 3]], triangles: &[[u32; 3]]) -> Vec<[f64; 3]> {
+    let mut sums = vec![[0.0; 3]; places.len()];
+    for &triangle in triangles {
+        let [a, b, c] = triangle.map(|v| places[v as usize]);
+        let normal = cross(minus(b, a), minus(c, a));
+        for v in triangle {
+            let sum = &mut sums[v as usize];
+            (0..3).for_each(|axis| sum[axis] += normal[axis]);
+        }
+    }
+    sums.into_iter().map(unit).collect()
+}
+
+pub(crate) fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+pub(crate) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+pub(crate) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// A vector of length one; up, for a vector without a direction.
+pub(crate) fn unit(v: [f64; 3]) -> [f64; 3] {
+    let length = dot(v, v).sqrt();
+    if length == 0.0 { [0.0, 0.0, 1.0] } else { v.map(|part| part / length) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::samples;
+
+    #[test]
+    fn shared_sides_are_welded_and_nothing_else_is() {
+        let product = samples::product();
+        let mesh = Mesh::of(&product);
+        // Two load modules of 4 and 5 vertices that share 2.
+        assert_eq!((mesh.vertices.len(), mesh.triangles.len(), mesh.classes.len()), (7, 6, 6));
+        let doubled: i64 = mesh
+            .triangles
+            .iter()
+            .map(|triangle| {
+                let [a, b, c] = triangle.map(|v| mesh.vertices[v as usize].map(i64::from));
+                (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+            })
+            .sum();
+        assert_eq!(doubled, 2 * 2 * 64_000 * 64_000);
+    }
+
+    #[test]
+    fn a_part_has_the_triangles_of_its_load_modules_over_its_own_vertices() {
+        let product = samples::product();
+        let mesh = Mesh::of(&product);
+        let part = mesh.part(&product, samples::eastern().rect);
+        assert_eq!((part.vertices.len(), part.triangles.len()), (5, 4));
+        for (own, whole) in part.triangles.iter().zip(&mesh.triangles[2..]) {
+            assert_eq!(own.map(|v| part.vertices[v as usize]), *whole);
+        }
+        assert_eq!(part.modules, [(ModuleId { row: 0, col: 1 }, 0..4)]);
+    }
+
+    #[test]
+    fn level_ground_faces_up_and_a_slope_leans() {
+        let places = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1.0, 1.0]];
+        let flat = normals(&places, &[[0, 1, 2]]);
+        assert_eq!(flat[0], [0.0, 0.0, 1.0]);
+        let both = normals(&places, &[[0, 1, 2], [1, 3, 2]]);
+        assert!(both[3][0] < 0.0 && both[3][1] < 0.0 && 0.0 < both[3][2]);
+        assert!((dot(both[1], both[1]) - 1.0).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,60 @@
+//! One load-module file (`FORMAT.md`) per load module, for simulators that page single files.
+
+use database::{TileModules, encode_modules};
+use terrain::{ModuleId, ModuleRect};
+
+use crate::{ExportError, Product, Put, Work};
+
+/// The name of a load module's file: `r0012c0034.slm`.
+pub(crate) fn file_name(id: ModuleId, extension: &str) -> String {
+    format!("r{:04}c{:04}.{extension}", id.row, id.col)
+}
+
+/// Writes every load module of a product as a file of its own, a tile's file that holds one load module.
+///
+/// # Errors
+/// When a file cannot be written, or the work was asked to stop.
+pub fn write_modules(product: &Product, put: &Put, work: &Work) -> Result<(), ExportError> {
+    let all: Vec<usize> = (0..product.modules.len()).collect();
+    work.each("load modules", &all, |&index| {
+        let module = &product.modules[index];
+        let ModuleId { row, col } = module.id;
+        let alone = ModuleRect { south: row, west: col, north: row + 1, east: col + 1 };
+        let tile = &product.tiles[product.tile_of[index] as usize];
+        let header = TileModules { modules: alone, ..tile.clone() };
+        let name = file_name(module.id, "slm");
+        put(&name, &encode_modules(&header, std::slice::from_ref(module))).map_err(ExportError::write(&name))
+    })?;
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+    use std::sync::Mutex;
+    use std::sync::atomic::AtomicBool;
+
+    use schedule::Workers;
+
+    use super::*;
+    use crate::samples;
+
+    #[test]
+    fn each_file_holds_one_load_module_as_it_was() {
+        let product = samples::product();
+        let files = Mutex::new(Vec::new());
+        let put = |name: &str, bytes: &[u8]| {
+            files.lock().unwrap().push((name.to_owned(), bytes.to_vec()));
+            Ok(())
+        };
+        let (workers, stop) = (Workers::new(2), AtomicBool::new(false));
+        write_modules(&product, &put, &Work { workers: &workers, stop: &stop, tell: &|_| {} }).unwrap();
+        let mut files = files.into_inner().unwrap();
+        files.sort();
+        assert_eq!(files.iter().map(|(name, _)| &**name).collect::<Vec<_>>(), ["r0000c0000.slm", "r0000c0001.slm"]);
+        for ((name, bytes), module) in files.iter().zip(&product.modules) {
+            let (header, read) = database::decode_modules(Path::new(name), bytes).unwrap();
+            assert_eq!((header.modules.count(), &read[..]), (1, std::slice::from_ref(module)));
+        }
+    }
+}

@@ -1,0 +1,154 @@
+//! OpenFlight: a file for each 4 km square, one that refers to all of them, and a MetaFlight index.
+//!
+//! All files count from one origin, the south-west corner of what is exported, and say in their headers where it lies;
+//! so they fit together as they are.
+
+use terrain::{ModuleId, ModuleRect};
+
+use crate::earth::Earth;
+use crate::flt_records::{Place, Records};
+use crate::mesh::Mesh;
+use crate::metaflight::{Grid, metaflight};
+use crate::modules::file_name;
+use crate::{Coordinates, Datum, ExportError, Facts, Product, Put, Work};
+
+/// Side of a square in metres.
+pub(crate) const SQUARE_M: f64 = 4000.0;
+
+/// Writes `squares/*.flt`, `area.flt` and `area.mft`.
+///
+/// # Errors
+/// When a file cannot be written, the area's system cannot be computed, or the work was asked to stop.
+pub fn write_openflight(product: &Product, put: &Put, work: &Work) -> Result<(), ExportError> {
+    let mesh = Mesh::of(product);
+    let normals = mesh.normals();
+    let places: Vec<[f64; 3]> = mesh.metres().collect();
+    let squares = product.squares(square_side(product));
+    // Longitudes and latitudes only.
+    let earth = Earth::new(product, Some(Datum::Ellipsoid))?;
+    let about = Facts::z_up(product, Coordinates::Local).comments(product).join("\n");
+    work.each("squares", &squares, |&rect| {
+        let part = mesh.part(product, rect);
+        let mut records = Records::default();
+        records.header(&place(product, &earth, rect)?);
+        records.comment(&about);
+        let vertex = |&v: &u32| (places[v as usize], normals[v as usize]);
+        records.vertices(&part.vertices.iter().map(vertex).collect::<Vec<_>>());
+        records.push();
+        records.group("square");
+        records.push();
+        for (id, triangles) in &part.modules {
+            records.object(&file_name(*id, "").replace('.', ""));
+            records.push();
+            let of_module = part.triangles[triangles.clone()].iter().zip(&part.classes[triangles.clone()]);
+            of_module.for_each(|(&triangle, &class)| records.face(triangle, class));
+            records.pop();
+        }
+        records.pop();
+        records.pop();
+        let name = format!("squares/{}", square_name(product, rect, "flt"));
+        put(&name, &records.into_bytes()).map_err(ExportError::write(&name))
+    })?;
+    let mut records = Records::default();
+    records.header(&place(product, &earth, product.rect)?);
+    records.comment(&about);
+    records.push();
+    records.group("area");
+    records.push();
+    for &rect in &squares {
+        records.external(&format!("squares/{}", square_name(product, rect, "flt")));
+    }
+    records.pop();
+    records.pop();
+    put("area.flt", &records.into_bytes()).map_err(ExportError::write("area.flt"))?;
+    let index = metaflight(product, &grid(product), &place(product, &earth, product.rect)?);
+    put("area.mft", index.as_bytes()).map_err(ExportError::write("area.mft"))
+}
+
+/// Load modules along the side of a square.
+pub(crate) fn square_side(product: &Product) -> u32 {
+    (SQUARE_M / product.side_m()).round().max(1.0) as u32
+}
+
+/// The name of a square's file by its row and column in the area: `r03c12.flt`.
+pub(crate) fn square_name(product: &Product, rect: ModuleRect, extension: &str) -> String {
+    let side = square_side(product);
+    let ModuleId { row, col } = ModuleId { row: rect.south / side, col: rect.west / side };
+    format!("r{row:02}c{col:02}.{extension}")
+}
+
+/// How squares divide what is exported.
+fn grid(product: &Product) -> Grid {
+    let (side, rect) = (square_side(product), product.rect);
+    let first = [rect.south / side, rect.west / side];
+    let count = [rect.north.div_ceil(side) - first[0], rect.east.div_ceil(side) - first[1]];
+    Grid { first, count, side_m: f64::from(side) * product.side_m() }
+}
+
+fn place(product: &Product, earth: &Earth, rect: ModuleRect) -> Result<Place, ExportError> {
+    let [west, south] = product.corner_m(rect.south, rect.west);
+    let [east, north] = product.corner_m(rect.north, rect.east);
+    Ok(Place {
+        offset_m: product.corner_m(product.rect.south, product.rect.west),
+        corners: [earth.lon_lat([west, south])?, earth.lon_lat([east, north])?],
+        utm_zone: utm_zone(product.epsg()),
+        radius_m: (east - west).hypot(north - south) / 2.0,
+    })
+}
+
+/// The zone of UTM that an EPSG code stands for, negative in the south.
+fn utm_zone(epsg: Option<u32>) -> Option<i16> {
+    match epsg? {
+        // On WGS 84, NAD83 and ETRS89.
+        code @ (32_601..=32_660 | 26_901..=26_923 | 25_828..=25_838) => Some((code % 100) as i16),
+        code @ 32_701..=32_760 => Some(-((code % 100) as i16)),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+    use std::sync::Mutex;
+    use std::sync::atomic::AtomicBool;
+
+    use schedule::Workers;
+
+    use super::*;
+    use crate::samples;
+
+    #[test]
+    fn an_area_is_a_file_per_square_one_that_refers_to_them_and_an_index() {
+        let files = Mutex::new(BTreeMap::new());
+        let put = |name: &str, bytes: &[u8]| {
+            files.lock().unwrap().insert(name.to_owned(), bytes.to_vec());
+            Ok(())
+        };
+        let (workers, stop) = (Workers::new(2), AtomicBool::new(false));
+        write_openflight(&samples::product(), &put, &Work { workers: &workers, stop: &stop, tell: &|_| {} }).unwrap();
+        let files = files.into_inner().unwrap();
+        assert_eq!(files.keys().collect::<Vec<_>>(), ["area.flt", "area.mft", "squares/r00c00.flt"]);
+        let count = |code: u16, bytes: &[u8]| {
+            let (mut at, mut count) = (0, 0);
+            while at < bytes.len() {
+                let word = |at: usize| u16::from_be_bytes([bytes[at], bytes[at + 1]]);
+                count += usize::from(word(at) == code);
+                at += usize::from(word(at + 2));
+            }
+            count
+        };
+        let square = &files["squares/r00c00.flt"];
+        assert_eq!([count(69, square), count(5, square), count(4, square)], [7, 6, 2]);
+        assert_eq!(count(10, square), count(11, square));
+        assert_eq!(count(63, &files["area.flt"]), 1);
+        assert!(String::from_utf8_lossy(&files["area.mft"]).contains("<NumRowDivisions>1</NumRowDivisions>"));
+    }
+
+    #[test]
+    fn zones_of_utm_are_known_by_their_codes() {
+        assert_eq!(utm_zone(Some(32611)), Some(11));
+        assert_eq!(utm_zone(Some(32733)), Some(-33));
+        assert_eq!(utm_zone(Some(25832)), Some(32));
+        assert_eq!([utm_zone(Some(3035)), utm_zone(None)], [None, None]);
+    }
+}

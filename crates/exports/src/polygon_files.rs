@@ -1,0 +1,114 @@
+//! A mesh as PLY or OBJ, z up, with what a reader needs to know of its place as comments.
+
+use std::io::{Result, Write};
+
+use crate::{Coordinates, Facts, Mesh, Product};
+
+/// Writes `mesh` as binary little-endian PLY, the class of each triangle as its property. Coordinates are 32-bit
+/// floats where these are exact, else 64-bit ones. Nothing is buffered here: give it a `BufWriter`.
+///
+/// # Errors
+/// Those of `out`.
+pub fn write_ply(out: &mut impl Write, product: &Product, mesh: &Mesh, coordinates: Coordinates) -> Result<()> {
+    let facts = Facts::z_up(product, coordinates);
+    let offset = offset(&facts, product);
+    let short = coordinates == Coordinates::Local && mesh.fits_floats();
+    writeln!(out, "ply\nformat binary_little_endian 1.0")?;
+    for line in facts.comments(product) {
+        writeln!(out, "comment {line}")?;
+    }
+    writeln!(out, "element vertex {}", mesh.vertices.len())?;
+    for axis in ["x", "y", "z"] {
+        writeln!(out, "property {} {axis}", if short { "float" } else { "double" })?;
+    }
+    writeln!(out, "element face {}", mesh.triangles.len())?;
+    writeln!(out, "property list uchar int vertex_indices\nproperty uchar class\nend_header")?;
+    for place in mesh.metres() {
+        for (metres, offset_m) in place.into_iter().zip(offset) {
+            match short {
+                true => out.write_all(&(metres as f32).to_le_bytes())?,
+                false => out.write_all(&(metres + offset_m).to_le_bytes())?,
+            }
+        }
+    }
+    for (triangle, class) in mesh.triangles.iter().zip(&mesh.classes) {
+        out.write_all(&[3])?;
+        for corner in triangle {
+            out.write_all(&corner.to_le_bytes())?;
+        }
+        out.write_all(&[*class])?;
+    }
+    Ok(())
+}
+
+/// Writes `mesh` as OBJ, the triangles of each class as a group. Nothing is buffered here: give it a `BufWriter`.
+///
+/// # Errors
+/// Those of `out`.
+pub fn write_obj(out: &mut impl Write, product: &Product, mesh: &Mesh, coordinates: Coordinates) -> Result<()> {
+    let facts = Facts::z_up(product, coordinates);
+    let offset = offset(&facts, product);
+    for line in facts.comments(product) {
+        writeln!(out, "# {line}")?;
+    }
+    for place in mesh.metres() {
+        let [x, y, z] = [0, 1, 2].map(|axis| place[axis] + offset[axis]);
+        // The shortest digits that read back as the same number.
+        writeln!(out, "v {x} {y} {z}")?;
+    }
+    for class in mesh.classes_present() {
+        writeln!(out, "g class_{class}")?;
+        for ([a, b, c], _) in mesh.triangles.iter().zip(&mesh.classes).filter(|(_, of)| **of == class) {
+            writeln!(out, "f {} {} {}", a + 1, b + 1, c + 1)?;
+        }
+    }
+    Ok(())
+}
+
+/// What to add to coordinates from the mesh's south-west corner.
+fn offset(facts: &Facts, product: &Product) -> [f64; 3] {
+    let local = Facts::z_up(product, Coordinates::Local).offset_m;
+    [0, 1, 2].map(|axis| local[axis] - facts.offset_m[axis])
+}
+
+impl Mesh {
+    /// Every class that a triangle has, in order.
+    pub(crate) fn classes_present(&self) -> Vec<u8> {
+        let mut present = [false; 256];
+        self.classes.iter().for_each(|&class| present[usize::from(class)] = true);
+        (0..=u8::MAX).filter(|&class| present[usize::from(class)]).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::samples;
+
+    fn text(coordinates: Coordinates) -> String {
+        let product = samples::product();
+        let mut bytes = Vec::new();
+        write_obj(&mut bytes, &product, &Mesh::of(&product), coordinates).unwrap();
+        String::from_utf8(bytes).unwrap()
+    }
+
+    #[test]
+    fn an_obj_has_groups_of_classes_and_stands_where_asked() {
+        let local = text(Coordinates::Local);
+        assert!(local.contains("\nv 0 0 1000\n") && local.contains("\ng class_0\n") && local.contains("\ng class_1\n"));
+        assert_eq!(local.lines().filter(|line| line.starts_with("f ")).count(), 6);
+        assert!(text(Coordinates::Map).contains("# crs EPSG:32611\nv 505000 3875000 1000\n"));
+    }
+
+    #[test]
+    fn a_ply_is_as_long_as_its_header_promises() {
+        let product = samples::product();
+        let mesh = Mesh::of(&product);
+        for (coordinates, vertex_bytes) in [(Coordinates::Local, 12), (Coordinates::Map, 24)] {
+            let mut bytes = Vec::new();
+            write_ply(&mut bytes, &product, &mesh, coordinates).unwrap();
+            let header = bytes.windows(11).position(|window| window == b"end_header\n").unwrap() + 11;
+            assert_eq!(bytes.len() - header, 7 * vertex_bytes + 6 * 14);
+        }
+    }
+}

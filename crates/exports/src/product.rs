@@ -1,0 +1,159 @@
+//! What is exported: the load modules of an area, or of a block of it, and where they lie.
+
+use std::path::Path;
+
+use database::{Folder, Manifest, ManifestState, TileModules};
+use terrain::{GridFrame, LoadModule, ModuleGrid, ModuleId, ModuleRect, TileId};
+
+use crate::{ExportError, Work};
+
+/// A block of load modules by its south-west and north-east one, both inside.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Block {
+    /// The one in the south-west.
+    pub south_west: ModuleId,
+    /// The one in the north-east.
+    pub north_east: ModuleId,
+}
+
+/// The load modules of a block, each sound, and what holds for all of them.
+#[derive(Clone, Debug)]
+pub struct Product {
+    /// What `database.json` says.
+    pub manifest: Manifest,
+    /// The load modules of the whole area.
+    pub grid: ModuleGrid,
+    /// Where the working grid lies.
+    pub frame: GridFrame,
+    /// The load modules that are exported.
+    pub rect: ModuleRect,
+    /// These, row by row from the south-west.
+    pub modules: Vec<LoadModule>,
+    /// The tile of each of them.
+    pub(crate) tiles: Vec<TileModules>,
+    /// Place in `tiles` of each module's tile.
+    pub(crate) tile_of: Vec<u32>,
+}
+
+impl Product {
+    /// Reads the load modules of `block`, or all of the area.
+    ///
+    /// # Errors
+    /// When the database is missing, unfinished or damaged, or has no such load modules.
+    pub fn read(folder: &Path, block: Option<Block>, work: &Work) -> Result<Self, ExportError> {
+        let folder = Folder::new(folder);
+        let manifest = folder.manifest()?;
+        if manifest.state != ManifestState::Complete {
+            return Err(ExportError::Unfinished { path: folder.dir().display().to_string() });
+        }
+        let rect = rect_of(&manifest, block)?;
+        let ids: Vec<TileId> = manifest.tiles.iter().map(database::TileRecord::tile).collect();
+        let read = work.each("tiles read", &ids, |&tile| {
+            let (tile, mut modules) = folder.read_modules(tile)?;
+            modules.retain(|module| rect.contains(module.id));
+            Ok((tile, modules))
+        })?;
+        Self::put_together(manifest, rect, read)
+    }
+
+    fn put_together(
+        manifest: Manifest,
+        rect: ModuleRect,
+        read: Vec<(TileModules, Vec<LoadModule>)>,
+    ) -> Result<Self, ExportError> {
+        let mut tiles = Vec::new();
+        let mut placed: Vec<(u32, LoadModule)> = Vec::with_capacity(rect.count());
+        for (tile, modules) in read {
+            placed.extend(modules.into_iter().map(|module| (tiles.len() as u32, module)));
+            tiles.push(tile);
+        }
+        placed.sort_by_key(|(_, module)| module.id);
+        let whole = placed.iter().map(|(_, module)| module.id).eq(rect.iter());
+        let (Some(first), true) = (tiles.first(), whole) else {
+            return Err(ExportError::Impossible {
+                what: "the database".into(),
+                found: format!("{} load modules in its files", placed.len()),
+                expected: format!("{}, each once", rect.count()),
+                hint: "the database is damaged: `tiefort verify` says where".into(),
+            });
+        };
+        let (grid, frame) = (first.grid, first.frame);
+        let (tile_of, modules) = placed.into_iter().unzip();
+        Ok(Self { manifest, grid, frame, rect, modules, tiles, tile_of })
+    }
+
+    /// Length of a load module's side in quanta of 1/128 m.
+    pub fn side(&self) -> i32 {
+        self.grid.side_cells * self.frame.spacing.quanta_per_post()
+    }
+
+    /// Length of a load module's side in metres.
+    pub fn side_m(&self) -> f64 {
+        f64::from(self.grid.side_cells) * self.frame.spacing.metres()
+    }
+
+    /// Easting and northing of the south-west corner of a load module.
+    pub fn corner_m(&self, row: u32, col: u32) -> [f64; 2] {
+        let [east_m, north_m] = [self.frame.origin_east_m, self.frame.origin_north_m];
+        [east_m + f64::from(col) * self.side_m(), north_m + f64::from(row) * self.side_m()]
+    }
+
+    /// The load module at (`row`, `col`) of the area, if it is exported.
+    pub fn module(&self, id: ModuleId) -> Option<&LoadModule> {
+        let index =
+            |rect: ModuleRect| (id.row - rect.south) as usize * rect.cols() as usize + (id.col - rect.west) as usize;
+        self.rect.contains(id).then(|| &self.modules[index(self.rect)])
+    }
+
+    /// The coordinate system as the database names it.
+    pub fn crs(&self) -> &str {
+        &self.manifest.area.crs
+    }
+
+    /// The EPSG code of the coordinate system, where it is named by one.
+    pub fn epsg(&self) -> Option<u32> {
+        self.crs().strip_prefix("EPSG:").and_then(|code| code.parse().ok())
+    }
+
+    /// What heights are above; empty when unknown.
+    pub fn vertical_datum(&self) -> &str {
+        &self.manifest.area.vertical_datum
+    }
+
+    /// Whom to thank for the sources.
+    pub fn attributions(&self) -> Vec<&str> {
+        self.manifest.sources.iter().filter_map(|source| source.attribution.as_deref()).collect()
+    }
+
+    /// Rectangles of at most `side` x `side` load modules, cut on lines that are multiples of `side` in the area.
+    pub(crate) fn squares(&self, side: u32) -> Vec<ModuleRect> {
+        let starts = |low: u32, high: u32| (low / side..high.div_ceil(side)).map(move |index| index * side);
+        let clipped = |south: u32, west: u32| ModuleRect {
+            south: south.max(self.rect.south),
+            west: west.max(self.rect.west),
+            north: (south + side).min(self.rect.north),
+            east: (west + side).min(self.rect.east),
+        };
+        starts(self.rect.south, self.rect.north)
+            .flat_map(|south| starts(self.rect.west, self.rect.east).map(move |west| clipped(south, west)))
+            .collect()
+    }
+}
+
+fn rect_of(manifest: &Manifest, block: Option<Block>) -> Result<ModuleRect, ExportError> {
+    let (rows, cols) = (manifest.area.module_rows, manifest.area.module_cols);
+    let Some(Block { south_west, north_east }) = block else {
+        return Ok(ModuleRect { south: 0, west: 0, north: rows, east: cols });
+    };
+    let inside = north_east.row < rows && north_east.col < cols;
+    if inside && south_west.row <= north_east.row && south_west.col <= north_east.col {
+        let (north, east) = (north_east.row + 1, north_east.col + 1);
+        return Ok(ModuleRect { south: south_west.row, west: south_west.col, north, east });
+    }
+    Err(ExportError::Impossible {
+        what: "--modules".into(),
+        found: format!("{south_west}..{north_east}"),
+        expected: format!("load modules from 0,0 to {},{}", rows.saturating_sub(1), cols.saturating_sub(1)),
+        hint: "name the south-west one first, then the north-east one, each as ROW,COL".into(),
+    })
+}

@@ -1,0 +1,313 @@
+//! Quantized-mesh 1.0 for globes: the triangles themselves at the finest level, cut at the borders of tiles, and a
+//! regular grid of heights for every tile above, up to both roots.
+//!
+//! Tiles have no holes: around what is exported the ground goes on from its border and falls to the lowest height.
+
+mod clip;
+mod collar;
+mod lattice;
+mod tile;
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use serde_json::{Value, json};
+use terrain::{LoadModule, ModuleId, QUANTA_PER_METRE};
+
+use crate::earth::{Earth, directions, earth_centred};
+use crate::globe::Globe;
+use crate::mesh::{Mesh, cross, minus, unit};
+use crate::{Datum, ExportError, Product, Put, Work};
+use collar::{Sheet, with_collar};
+use lattice::{Ladder, Node, STEPS, lon_lat, steps, tiles};
+use tile::Tile;
+
+/// Load modules along a tile of the finest level, about.
+const MODULES_PER_TILE: f64 = 5.0;
+/// Metres in a degree of latitude.
+const DEGREE_M: f64 = 111_320.0;
+/// Squares of heights along a side of a tile above the finest level.
+const GRID: i64 = 64;
+
+/// Writes `layer.json` and `LEVEL/COLUMN/ROW.terrain`. `assumed` is what to take heights to be above; else the database
+/// says it. Gives what was done to heights.
+///
+/// # Errors
+/// When a file cannot be written, heights cannot be brought above the ellipsoid, or the work was asked to stop.
+pub fn write_quantized_mesh(
+    product: &Product,
+    assumed: Option<Datum>,
+    put: &Put,
+    work: &Work,
+) -> Result<Datum, ExportError> {
+    let earth = Earth::new(product, assumed)?;
+    let mesh = Mesh::of(product);
+    let globe = Globe::of(product, &mesh, &earth, work)?;
+    let heights = || globe.height_m.iter().copied();
+    let (low, high) = (heights().fold(f64::INFINITY, f64::min), heights().fold(f64::NEG_INFINITY, f64::max));
+    let level = finest_level(product.side_m());
+    let mut scene = Scene { product, earth: &earth, ladder: Ladder::over(low, high), level, fall_m: 0.0 };
+    let bounds = scene.bounds(&globe);
+    let collar_m = scene.collar_m(&bounds)?;
+    let extent_m = f64::from(product.rect.rows().max(product.rect.cols())) * product.side_m();
+    scene.fall_m = (2.0 * collar_m).max(0.2 * extent_m);
+    let sheet = with_collar(product, &mesh, &globe, &earth, collar_m, |height_m| scene.fallen(height_m, collar_m))?;
+    scene.write_finest(&sheet, &bounds, put, work)?;
+    scene.write_grids(&bounds, put, work)?;
+    let layer = scene.layer(&bounds);
+    put("layer.json", format!("{layer:#}\n").as_bytes()).map_err(ExportError::write("layer.json"))?;
+    Ok(earth.datum())
+}
+
+/// The level whose tiles are some load modules wide.
+fn finest_level(side_m: f64) -> u32 {
+    let level = (180.0 * DEGREE_M / (MODULES_PER_TILE * side_m)).log2().ceil();
+    level.clamp(1.0, 20.0) as u32
+}
+
+/// Lowest and highest steps of the finest level, east and north.
+struct Bounds {
+    x: (i64, i64),
+    y: (i64, i64),
+    /// West, south, east and north in degrees.
+    degrees: [f64; 4],
+}
+
+impl Bounds {
+    /// First and last column and row of the tiles of a level.
+    fn tiles(&self, finest: u32, level: u32) -> ([i64; 2], [i64; 2]) {
+        let range = |(low, high): (i64, i64)| {
+            let tiles = tiles(low, high);
+            [tiles.start() >> (finest - level), tiles.end() >> (finest - level)]
+        };
+        if level == 0 { ([0, 1], [0, 0]) } else { (range(self.x), range(self.y)) }
+    }
+}
+
+/// The steps at which tiles begin and end.
+fn ends([first, last]: [i64; 2]) -> [i64; 2] {
+    [first * STEPS, (last + 1) * STEPS]
+}
+
+fn too_wide(product: &Product) -> ExportError {
+    ExportError::Impossible {
+        what: "the area".into(),
+        found: format!("ground around it that {} does not reach", product.crs()),
+        expected: "an area well inside its coordinate system".into(),
+        hint: "export a smaller block with --modules".into(),
+    }
+}
+
+struct Scene<'a> {
+    product: &'a Product,
+    earth: &'a Earth,
+    ladder: Ladder,
+    level: u32,
+    /// How far from the border the ground has fallen to the foot of the ladder, metres.
+    fall_m: f64,
+}
+
+impl Scene<'_> {
+    fn bounds(&self, globe: &Globe) -> Bounds {
+        let places: Vec<[i64; 2]> = globe.lon_lat.iter().map(|&place| steps(self.level, place)).collect();
+        let range = |axis: usize| {
+            let values = || places.iter().map(|place| place[axis]);
+            (values().min().unwrap_or(0), values().max().unwrap_or(0))
+        };
+        let degrees = |axis: usize| {
+            let values = || globe.lon_lat.iter().map(|place| place[axis]);
+            [values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max)]
+        };
+        let ([west, east], [south, north]) = (degrees(0), degrees(1));
+        Bounds { x: range(0), y: range(1), degrees: [west, south, east, north] }
+    }
+
+    /// How far ground has to go on around what is exported, so that it covers every tile of the finest level to its
+    /// borders; these need not run along the sides of the area.
+    fn collar_m(&self, bounds: &Bounds) -> Result<f64, ExportError> {
+        /// Places looked at along a border of all tiles together.
+        const LOOKS: i64 = 256;
+        const MARGIN_M: f64 = 10.0;
+        let (cols, rows) = bounds.tiles(self.level, self.level);
+        let ([west, east], [south, north]) = (ends(cols), ends(rows));
+        let rect = self.product.rect;
+        let low = self.product.corner_m(rect.south, rect.west);
+        let high = self.product.corner_m(rect.north, rect.east);
+        let along = |from: i64, to: i64, look: i64| from + (to - from) * look / LOOKS;
+        let looks = (0..=LOOKS).flat_map(|look| {
+            let (x, y) = (along(west, east, look), along(south, north, look));
+            [[x, south], [x, north], [west, y], [east, y]]
+        });
+        let mut collar_m = MARGIN_M;
+        for steps in looks {
+            let place = self.earth.place_m(lon_lat(self.level, steps)).ok_or_else(|| too_wide(self.product))?;
+            for axis in 0..2 {
+                collar_m = collar_m.max(low[axis] - place[axis] + MARGIN_M).max(place[axis] - high[axis] + MARGIN_M);
+            }
+        }
+        Ok(collar_m)
+    }
+
+    /// The tiles that hold the triangles themselves.
+    fn write_finest(&self, sheet: &Sheet, bounds: &Bounds, put: &Put, work: &Work) -> Result<(), ExportError> {
+        let node = |v: u32| {
+            let (place, height_m) = (sheet.lon_lat[v as usize], sheet.height_m[v as usize]);
+            let [x, y] = steps(self.level, place);
+            Node { x, y, h: self.ladder.rung(height_m), normal: sheet.normal[v as usize] }
+        };
+        let nodes: Vec<Node> = (0..sheet.lon_lat.len() as u32).map(node).collect();
+        let (cols, rows) = bounds.tiles(self.level, self.level);
+        let mut of_tile: BTreeMap<[i64; 2], Vec<[Node; 3]>> = BTreeMap::new();
+        for triangle in &sheet.triangles {
+            let triangle = triangle.map(|v| nodes[v as usize]);
+            let range = |of: fn(&Node) -> i64, [first, last]: [i64; 2]| {
+                let values = || triangle.iter().map(of);
+                let tiles = tiles(values().min().unwrap_or(0), values().max().unwrap_or(0));
+                *tiles.start().max(&first)..=*tiles.end().min(&last)
+            };
+            for row in range(|node| node.y, rows) {
+                for col in range(|node| node.x, cols) {
+                    of_tile.entry([row, col]).or_default().push(triangle);
+                }
+            }
+        }
+        let of_tile: Vec<_> = of_tile.into_iter().collect();
+        work.each("tiles of triangles", &of_tile, |([row, col], triangles)| {
+            let mut tile = Tile::new(self.level, *col, *row);
+            triangles.iter().for_each(|&triangle| tile.add(&clip::piece(triangle, *col, *row)));
+            assert!(0.999 < tile.covered(), "ground goes on over all of tile {}/{col}/{row}", self.level);
+            self.put(put, &tile, [*col, *row], self.level)
+        })?;
+        Ok(())
+    }
+
+    /// The tiles above, each a grid of heights.
+    fn write_grids(&self, bounds: &Bounds, put: &Put, work: &Work) -> Result<(), ExportError> {
+        let mut all = BTreeSet::new();
+        for level in 0..self.level {
+            let (cols, rows) = bounds.tiles(self.level, level);
+            all.extend((rows[0]..=rows[1]).flat_map(|row| (cols[0]..=cols[1]).map(move |col| (level, col, row))));
+        }
+        let all: Vec<(u32, i64, i64)> = all.into_iter().collect();
+        work.each("tiles of heights", &all, |&(level, col, row)| {
+            let tile = self.grid(level, col, row);
+            self.put(put, &tile, [col, row], level)
+        })?;
+        Ok(())
+    }
+
+    fn put(&self, put: &Put, tile: &Tile, [col, row]: [i64; 2], level: u32) -> Result<(), ExportError> {
+        let name = format!("{level}/{col}/{row}.terrain");
+        put(&name, &tile.bytes(&self.ladder)).map_err(ExportError::write(&name))
+    }
+
+    /// A tile of heights at the corners of squares, and of normals across them.
+    fn grid(&self, level: u32, col: i64, row: i64) -> Tile {
+        let at = |tile: i64, index: i64| tile * STEPS + (index * STEPS + GRID / 2).div_euclid(GRID);
+        // One more line on every side, for normals that agree with the neighbours'.
+        let samples: Vec<[f64; 2]> = (-1..=GRID + 1)
+            .flat_map(|j| (-1..=GRID + 1).map(move |i| (i, j)))
+            .map(|(i, j)| lon_lat(level, [at(col, i), at(row, j)]))
+            .collect();
+        let heights: Vec<f64> = samples.iter().map(|&place| self.height_at(place)).collect();
+        let wide = (GRID + 3) as usize;
+        let index = |i: i64, j: i64| (j + 1) as usize * wide + (i + 1) as usize;
+        let place = |i: i64, j: i64| {
+            let [longitude, latitude] = samples[index(i, j)];
+            earth_centred([longitude, latitude.clamp(-90.0, 90.0)], heights[index(i, j)])
+        };
+        let node = |i: i64, j: i64| {
+            let across = cross(minus(place(i + 1, j), place(i - 1, j)), minus(place(i, j + 1), place(i, j - 1)));
+            let level_ground = across == [0.0; 3];
+            let normal = if level_ground { directions(samples[index(i, j)])[2] } else { unit(across) };
+            Node { x: at(col, i), y: at(row, j), h: self.ladder.rung(heights[index(i, j)]), normal }
+        };
+        let mut tile = Tile::new(level, col, row);
+        for (i, j) in (0..GRID).flat_map(|j| (0..GRID).map(move |i| (i, j))) {
+            tile.add(&[node(i, j), node(i + 1, j), node(i + 1, j + 1), node(i, j + 1)]);
+        }
+        tile
+    }
+
+    /// The height so far outside of a border of this height.
+    fn fallen(&self, border_m: f64, outside_m: f64) -> f64 {
+        border_m + (outside_m / self.fall_m).min(1.0) * (self.ladder.foot_m - border_m)
+    }
+
+    /// Height above the ellipsoid at a longitude and latitude, on what is exported or around it.
+    fn height_at(&self, place: [f64; 2]) -> f64 {
+        let rect = self.product.rect;
+        let (low, high) = (self.product.corner_m(rect.south, rect.west), self.product.corner_m(rect.north, rect.east));
+        let Some(place) = self.earth.place_m(place) else { return self.ladder.foot_m };
+        let beyond = |axis: usize| (low[axis] - place[axis]).max(place[axis] - high[axis]);
+        let outside_m = beyond(0).max(beyond(1)).max(0.0);
+        // Far away a system may give anything, or nothing.
+        if !outside_m.is_finite() || self.fall_m <= outside_m {
+            return self.ladder.foot_m;
+        }
+        let inside = [0, 1].map(|axis| place[axis].clamp(low[axis], high[axis]));
+        let height = height_m(self.product, inside).unwrap_or(0.0);
+        let above = self.earth.lon_lat(inside).map_or(0.0, |place| self.earth.datum_m(place));
+        self.fallen(height + above, outside_m)
+    }
+
+    fn layer(&self, bounds: &Bounds) -> Value {
+        let available = |level: u32| {
+            let ([first_col, last_col], [first_row, last_row]) = bounds.tiles(self.level, level);
+            json!([{ "startX": first_col, "startY": first_row, "endX": last_col, "endY": last_row }])
+        };
+        let area = &self.product.manifest.area;
+        json!({
+            "tilejson": "2.1.0",
+            "name": area.name,
+            "description": format!("from {}; {}", area.crs, self.earth.datum().said()),
+            "version": "1.0.0",
+            "format": "quantized-mesh-1.0",
+            "scheme": "tms",
+            "projection": "EPSG:4326",
+            "tiles": ["{z}/{x}/{y}.terrain"],
+            "extensions": ["octvertexnormals"],
+            "attribution": self.product.attributions().join("; "),
+            "bounds": bounds.degrees,
+            "minzoom": 0,
+            "maxzoom": self.level,
+            "available": (0..=self.level).map(available).collect::<Vec<_>>(),
+        })
+    }
+}
+
+/// Height of the triangles at an easting and northing of a product, in metres above its datum.
+fn height_m(product: &Product, [east_m, north_m]: [f64; 2]) -> Option<f64> {
+    let rect = product.rect;
+    let index = |metres: f64, first: u32, last: u32| ((metres / product.side_m()) as u32).clamp(first, last);
+    let (x, y) = (east_m - product.frame.origin_east_m, north_m - product.frame.origin_north_m);
+    let id = ModuleId { row: index(y, rect.south, rect.north - 1), col: index(x, rect.west, rect.east - 1) };
+    let corner = [f64::from(id.col) * product.side_m(), f64::from(id.row) * product.side_m()];
+    let quanta = f64::from(QUANTA_PER_METRE);
+    height_in(product.module(id)?, [(x - corner[0]) * quanta, (y - corner[1]) * quanta])
+}
+
+/// Height of the triangle at a place in quanta, or of the one next to it.
+fn height_in(module: &LoadModule, [x, y]: [f64; 2]) -> Option<f64> {
+    let mut best = (f64::NEG_INFINITY, None);
+    for triangle in &module.triangles {
+        let [a, b, c] = triangle.map(|v| {
+            let v = module.vertices[usize::from(v)];
+            [f64::from(v.x), f64::from(v.y), f64::from(v.z)]
+        });
+        let left = |a: [f64; 3], b: [f64; 3]| (b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0]);
+        let shares = [left(b, c), left(c, a), left(a, b)];
+        let whole: f64 = shares.iter().sum();
+        let least = shares.iter().fold(f64::INFINITY, |least, share| least.min(share / whole));
+        if best.0 < least {
+            let height = (a[2] * shares[0] + b[2] * shares[1] + c[2] * shares[2]) / whole;
+            best = (least, Some(height / f64::from(QUANTA_PER_METRE)));
+        }
+        if 0.0 <= least {
+            break;
+        }
+    }
+    best.1
+}
+
+#[cfg(test)]
+mod tests;

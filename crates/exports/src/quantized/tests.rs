@@ -1,0 +1,171 @@
+//! Tests of whole exports, through a decoder of their own.
+
+use std::sync::Mutex;
+use std::sync::atomic::AtomicBool;
+
+use schedule::Workers;
+
+use super::*;
+use crate::samples;
+
+/// A tile as a reader of the format sees it.
+struct Decoded {
+    foot_m: f32,
+    top_m: f32,
+    /// u, v and height of each vertex.
+    vertices: Vec<[i64; 3]>,
+    triangles: Vec<[u32; 3]>,
+    /// West, south, east and north.
+    edges: [Vec<u32>; 4],
+    normals: Vec<[u8; 2]>,
+}
+
+fn decode(bytes: &[u8]) -> Decoded {
+    let u16_at = |at: usize| u16::from_le_bytes([bytes[at], bytes[at + 1]]);
+    let u32_at = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
+    let count = u32_at(88) as usize;
+    assert!(count <= 65_536);
+    let part = |part: usize| {
+        let mut sum = 0;
+        (0..count)
+            .map(|i| {
+                let folded = i64::from(u16_at(92 + 2 * (part * count + i)));
+                sum += (folded >> 1) ^ -(folded & 1);
+                sum
+            })
+            .collect::<Vec<i64>>()
+    };
+    let (u, v, h) = (part(0), part(1), part(2));
+    let mut at = 92 + 6 * count;
+    let triangle_count = u32_at(at) as usize;
+    at += 4;
+    let mut next = 0;
+    let mut indices = Vec::new();
+    for i in 0..3 * triangle_count {
+        let code = u32::from(u16_at(at + 2 * i));
+        indices.push(next - code);
+        next += u32::from(code == 0);
+    }
+    at += 6 * triangle_count;
+    let edges = std::array::from_fn(|_| {
+        let length = u32_at(at) as usize;
+        let edge = (0..length).map(|i| u32::from(u16_at(at + 4 + 2 * i))).collect();
+        at += 4 + 2 * length;
+        edge
+    });
+    assert_eq!((bytes[at], u32_at(at + 1) as usize), (1, 2 * count));
+    let normals = bytes[at + 5..].chunks_exact(2).map(|pair| [pair[0], pair[1]]).collect();
+    assert_eq!(bytes.len(), at + 5 + 2 * count);
+    let float = |at: usize| f32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
+    Decoded {
+        foot_m: float(24),
+        top_m: float(28),
+        vertices: (0..count).map(|i| [u[i], v[i], h[i]]).collect(),
+        triangles: indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect(),
+        edges,
+        normals,
+    }
+}
+
+/// The sample where its sides run across meridians: the pole of Lambert's azimuthal projection is far away.
+fn slanted() -> Product {
+    let mut product = samples::product();
+    product.manifest.area.crs = "EPSG:3035".into();
+    (product.frame.origin_east_m, product.frame.origin_north_m) = (6_400_000.0, 4_900_000.0);
+    product
+}
+
+fn exported(product: &Product) -> BTreeMap<String, Vec<u8>> {
+    let files = Mutex::new(BTreeMap::new());
+    let put = |name: &str, bytes: &[u8]| {
+        files.lock().unwrap().insert(name.to_owned(), bytes.to_vec());
+        Ok(())
+    };
+    let (workers, stop) = (Workers::new(2), AtomicBool::new(false));
+    let work = Work { workers: &workers, stop: &stop, tell: &|_| {} };
+    write_quantized_mesh(product, Some(Datum::Ellipsoid), &put, &work).unwrap();
+    files.into_inner().unwrap()
+}
+
+fn key(name: &str) -> (u32, i64, i64) {
+    let parts: Vec<i64> = name.trim_end_matches(".terrain").split('/').map(|part| part.parse().unwrap()).collect();
+    (parts[0] as u32, parts[1], parts[2])
+}
+
+#[test]
+fn tiles_are_covered_listed_and_agree_on_their_borders() {
+    for product in [samples::product(), slanted()] {
+        check_tiles(&exported(&product));
+    }
+}
+
+fn check_tiles(files: &BTreeMap<String, Vec<u8>>) {
+    let layer: Value = serde_json::from_slice(&files["layer.json"]).unwrap();
+    let available = layer["available"].as_array().unwrap();
+    let tiles: BTreeMap<(u32, i64, i64), Decoded> = files
+        .iter()
+        .filter(|(name, _)| name.ends_with(".terrain"))
+        .map(|(name, bytes)| (key(name), decode(bytes)))
+        .collect();
+    let mut listed = 0;
+    for (level, ranges) in available.iter().enumerate() {
+        let of = |name: &str| ranges[0][name].as_i64().unwrap();
+        for col in of("startX")..=of("endX") {
+            for row in of("startY")..=of("endY") {
+                assert!(tiles.contains_key(&(level as u32, col, row)), "{level}/{col}/{row} is listed");
+                listed += 1;
+            }
+        }
+    }
+    assert_eq!(listed, tiles.len());
+    assert!(tiles.contains_key(&(0, 0, 0)) && tiles.contains_key(&(0, 1, 0)));
+    let mut compared = 0;
+    for (&(level, col, row), tile) in &tiles {
+        let area: i64 = tile
+            .triangles
+            .iter()
+            .map(|t| {
+                let [a, b, c] = t.map(|v| tile.vertices[v as usize]);
+                (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+            })
+            .sum();
+        assert!((area as f64 / (2 * STEPS * STEPS) as f64 - 1.0).abs() < 1e-3, "{level}/{col}/{row}");
+        assert!(tile.vertices.iter().flatten().all(|part| (0..=STEPS).contains(part)));
+        for (neighbour, mine, theirs, along) in [((level, col + 1, row), 2, 0, 1), ((level, col, row + 1), 3, 1, 0)] {
+            let Some(other) = tiles.get(&neighbour) else { continue };
+            let line = |tile: &Decoded, edge: usize| -> Vec<(i64, i64, [u8; 2])> {
+                let nodes = tile.edges[edge].iter().map(|&v| v as usize);
+                nodes.map(|v| (tile.vertices[v][along], tile.vertices[v][2], tile.normals[v])).collect()
+            };
+            assert_eq!(line(tile, mine), line(other, theirs), "{level}/{col}/{row}");
+            assert_eq!((tile.foot_m, tile.top_m), (other.foot_m, other.top_m));
+            compared += 1;
+        }
+    }
+    assert!(0 < compared);
+}
+
+#[test]
+fn the_finest_tiles_have_the_heights_of_the_load_modules() {
+    let product = samples::product();
+    let files = exported(&product);
+    let earth = Earth::new(&product, Some(Datum::Ellipsoid)).unwrap();
+    let level = finest_level(product.side_m());
+    let mut found = 0;
+    for (name, bytes) in files.iter().filter(|(name, _)| name.starts_with(&format!("{level}/"))) {
+        let (_, col, row) = key(name);
+        let tile = decode(bytes);
+        let rung_m = f64::from(tile.top_m - tile.foot_m) / STEPS as f64;
+        for [u, v, h] in tile.vertices {
+            let place = earth.place_m(lon_lat(level, [col * STEPS + u, row * STEPS + v])).unwrap();
+            let inside = (505_000.0..506_000.0).contains(&place[0]) && (3_875_000.0..3_875_500.0).contains(&place[1]);
+            if inside {
+                let height = f64::from(tile.foot_m) + h as f64 * rung_m;
+                let expected = height_m(&product, place).unwrap();
+                assert!((height - expected).abs() < rung_m / 2.0 + 0.02, "{height} {expected}");
+                found += 1;
+            }
+        }
+    }
+    assert!(3 < found, "{found}");
+}

@@ -1,0 +1,225 @@
+//! One tile of quantized-mesh 1.0, with oct-encoded normals.
+
+use std::collections::HashMap;
+
+use super::clip::doubled_area;
+use super::lattice::{Ladder, Node, STEPS, lon_lat};
+use crate::earth::earth_centred;
+use crate::mesh::{cross, dot, minus, unit};
+
+/// Half axes of WGS 84's ellipsoid.
+const HALF_AXES_M: [f64; 3] = [6_378_137.0, 6_378_137.0, 6_356_752.314_245_179];
+
+/// A tile in the making.
+#[derive(Debug)]
+pub(crate) struct Tile {
+    level: u32,
+    col: i64,
+    row: i64,
+    nodes: Vec<Node>,
+    place_of: HashMap<(i64, i64), u32>,
+    triangles: Vec<[u32; 3]>,
+}
+
+impl Tile {
+    pub(crate) fn new(level: u32, col: i64, row: i64) -> Self {
+        Self { level, col, row, nodes: Vec::new(), place_of: HashMap::new(), triangles: Vec::new() }
+    }
+
+    /// Adds a convex polygon as a fan; what is thinner than the lattice is left out.
+    pub(crate) fn add(&mut self, polygon: &[Node]) {
+        for i in 1..polygon.len().saturating_sub(1) {
+            let corners = [polygon[0], polygon[i], polygon[i + 1]];
+            if 0 < doubled_area(&corners[0], &corners[1], &corners[2]) {
+                let triangle = corners.map(|node| self.place(node));
+                self.triangles.push(triangle);
+            }
+        }
+    }
+
+    /// The vertex at a node's place: numbered when it is first used, as the format wants it.
+    fn place(&mut self, node: Node) -> u32 {
+        let next = self.nodes.len() as u32;
+        let place = *self.place_of.entry((node.x, node.y)).or_insert(next);
+        if place == next {
+            self.nodes.push(node);
+        }
+        place
+    }
+
+    /// Share of the tile that its triangles cover.
+    pub(crate) fn covered(&self) -> f64 {
+        let area = |&[a, b, c]: &[u32; 3]| {
+            doubled_area(&self.nodes[a as usize], &self.nodes[b as usize], &self.nodes[c as usize])
+        };
+        self.triangles.iter().map(area).sum::<i64>() as f64 / (2 * STEPS * STEPS) as f64
+    }
+
+    /// The bytes of its file.
+    pub(crate) fn bytes(&self, ladder: &Ladder) -> Vec<u8> {
+        let mut bytes = Vec::with_capacity(128 + 10 * self.nodes.len() + 6 * self.triangles.len());
+        self.put_header(&mut bytes, ladder);
+        bytes.extend_from_slice(&(self.nodes.len() as u32).to_le_bytes());
+        let (west, south) = (self.col * STEPS, self.row * STEPS);
+        let parts: [&dyn Fn(&Node) -> i64; 3] = [&|n| n.x - west, &|n| n.y - south, &|n| n.h];
+        for part in parts {
+            let mut before = 0;
+            for node in &self.nodes {
+                bytes.extend_from_slice(&zigzag(part(node) - before).to_le_bytes());
+                before = part(node);
+            }
+        }
+        let wide = usize::from(u16::MAX) + 1 < self.nodes.len();
+        if wide {
+            bytes.resize(bytes.len().next_multiple_of(4), 0);
+        }
+        self.put_triangles(&mut bytes, wide);
+        self.put_edges(&mut bytes, wide);
+        put_normals(&mut bytes, &self.nodes);
+        bytes
+    }
+
+    fn put_header(&self, bytes: &mut Vec<u8>, ladder: &Ladder) {
+        let place = |node: &Node| earth_centred(lon_lat(self.level, [node.x, node.y]), ladder.height_m(node.h));
+        let places: Vec<[f64; 3]> = self.nodes.iter().map(place).collect();
+        let end = |pick: fn(f64, f64) -> f64, from: f64| {
+            places.iter().fold([from; 3], |end, place| [0, 1, 2].map(|axis| pick(end[axis], place[axis])))
+        };
+        let (low, high) = (end(f64::min, f64::INFINITY), end(f64::max, f64::NEG_INFINITY));
+        let middle = [0, 1, 2].map(|axis| f64::midpoint(low[axis], high[axis]));
+        let distance = |place: &[f64; 3]| dot(minus(*place, middle), minus(*place, middle)).sqrt();
+        let radius = places.iter().map(distance).fold(0.0, f64::max);
+        let mut put = |number: f64| bytes.extend_from_slice(&number.to_le_bytes());
+        middle.into_iter().for_each(&mut put);
+        let (foot, top) = (ladder.foot_m as f32, ladder.top_m() as f32);
+        bytes.extend_from_slice(&foot.to_le_bytes());
+        bytes.extend_from_slice(&top.to_le_bytes());
+        for number in middle.into_iter().chain([radius]).chain(horizon_point(middle, &places)) {
+            bytes.extend_from_slice(&number.to_le_bytes());
+        }
+    }
+
+    /// Triangles by "high water mark": how far below the next new vertex each one is.
+    fn put_triangles(&self, bytes: &mut Vec<u8>, wide: bool) {
+        bytes.extend_from_slice(&(self.triangles.len() as u32).to_le_bytes());
+        let mut next = 0;
+        for &vertex in self.triangles.as_flattened() {
+            put_index(bytes, next - vertex, wide);
+            next += u32::from(vertex == next);
+        }
+    }
+
+    /// Vertices on the western, southern, eastern and northern border, in order along it.
+    fn put_edges(&self, bytes: &mut Vec<u8>, wide: bool) {
+        let (west, south) = (self.col * STEPS, self.row * STEPS);
+        let edges: [&Along; 4] = [
+            &|n| (n.x == west).then_some(n.y),
+            &|n| (n.y == south).then_some(n.x),
+            &|n| (n.x == west + STEPS).then_some(n.y),
+            &|n| (n.y == south + STEPS).then_some(n.x),
+        ];
+        for edge in edges {
+            let mut along: Vec<(i64, u32)> =
+                (0..).zip(&self.nodes).filter_map(|(index, node)| Some((edge(node)?, index))).collect();
+            along.sort_unstable();
+            bytes.extend_from_slice(&(along.len() as u32).to_le_bytes());
+            along.iter().for_each(|&(_, index)| put_index(bytes, index, wide));
+        }
+    }
+}
+
+/// How far along a border a node on it lies.
+type Along<'a> = dyn Fn(&Node) -> Option<i64> + 'a;
+
+fn put_index(bytes: &mut Vec<u8>, index: u32, wide: bool) {
+    match wide {
+        true => bytes.extend_from_slice(&index.to_le_bytes()),
+        false => bytes.extend_from_slice(&(index as u16).to_le_bytes()),
+    }
+}
+
+fn zigzag(step: i64) -> u16 {
+    ((step << 1) ^ (step >> 63)) as u16
+}
+
+/// The extension with the normals: its number, its length, two bytes for each vertex.
+fn put_normals(bytes: &mut Vec<u8>, nodes: &[Node]) {
+    const OCT_NORMALS: u8 = 1;
+    bytes.push(OCT_NORMALS);
+    bytes.extend_from_slice(&(2 * nodes.len() as u32).to_le_bytes());
+    nodes.iter().for_each(|node| bytes.extend_from_slice(&oct(node.normal)));
+}
+
+/// A unit vector as a place on an unfolded octahedron.
+fn oct(normal: [f64; 3]) -> [u8; 2] {
+    let sum: f64 = normal.iter().map(|part| part.abs()).sum();
+    let [x, y] = [normal[0] / sum, normal[1] / sum];
+    let sign = |v: f64| if v < 0.0 { -1.0 } else { 1.0 };
+    let folded = match normal[2] < 0.0 {
+        true => [(1.0 - y.abs()) * sign(x), (1.0 - x.abs()) * sign(y)],
+        false => [x, y],
+    };
+    folded.map(|part| ((part.clamp(-1.0, 1.0) * 0.5 + 0.5) * 255.0).round() as u8)
+}
+
+/// The point that is hidden by the horizon only if all of the tile is, in axes in which the ellipsoid is a sphere of
+/// radius one.
+fn horizon_point(middle: [f64; 3], places: &[[f64; 3]]) -> [f64; 3] {
+    /// A height, in radii, from which nothing is ever hidden.
+    const NEVER_HIDDEN: f64 = 100.0;
+    let scaled = |place: [f64; 3]| [0, 1, 2].map(|axis| place[axis] / HALF_AXES_M[axis]);
+    let towards = unit(scaled(middle));
+    let reach = |place: &[f64; 3]| {
+        let place = scaled(*place);
+        let (squared, direction) = (dot(place, place).max(1.0), unit(place));
+        let (cos_a, sin_a) =
+            (dot(direction, towards), dot(cross(direction, towards), cross(direction, towards)).sqrt());
+        let cos_b = 1.0 / squared.sqrt();
+        let sin_b = (squared - 1.0).sqrt() * cos_b;
+        let reach = 1.0 / (cos_a * cos_b - sin_a * sin_b);
+        if reach.is_finite() && 0.0 < reach { reach.min(NEVER_HIDDEN) } else { NEVER_HIDDEN }
+    };
+    let furthest = places.iter().map(reach).fold(1.0, f64::max);
+    towards.map(|part| part * furthest)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn steps_are_folded_and_normals_unfold_again() {
+        assert_eq!([zigzag(0), zigzag(-1), zigzag(1), zigzag(-32_767), zigzag(32_767)], [0, 1, 2, 65_533, 65_534]);
+        for normal in [[0.0, 0.0, 1.0], [0.6, -0.48, 0.64], [-0.6, 0.48, -0.64], [0.0, 0.0, -1.0]] {
+            let [x, y] = oct(normal).map(|byte| f64::from(byte) / 255.0 * 2.0 - 1.0);
+            let z = 1.0 - x.abs() - y.abs();
+            let sign = |v: f64| if v < 0.0 { -1.0 } else { 1.0 };
+            let [x, y] = if z < 0.0 { [(1.0 - y.abs()) * sign(x), (1.0 - x.abs()) * sign(y)] } else { [x, y] };
+            assert!(0.999 < dot(unit([x, y, z]), normal), "{normal:?}");
+        }
+    }
+
+    #[test]
+    fn a_tile_of_one_square_has_every_part_at_its_place() {
+        let node = |x, y, h| Node { x, y, h, normal: [0.0, 0.0, 1.0] };
+        let mut tile = Tile::new(1, 2, 1);
+        let (west, south) = (2 * STEPS, STEPS);
+        let square = [
+            node(west, south, 0),
+            node(west + STEPS, south, 5),
+            node(west + STEPS, south + STEPS, STEPS),
+            node(west, south + STEPS, 0),
+        ];
+        tile.add(&square);
+        assert_eq!(tile.covered(), 1.0);
+        let bytes = tile.bytes(&Ladder::over(0.0, 100.0));
+        assert_eq!(bytes.len(), 88 + 4 + 4 * 6 + 4 + 12 + 4 * (4 + 4) + 5 + 8);
+        let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
+        assert_eq!((word(88), word(116)), (4, 2));
+        // 0 1 2, 0 2 3: each new vertex is a zero.
+        let indices: Vec<u16> = bytes[120..132].chunks(2).map(|b| u16::from_le_bytes([b[0], b[1]])).collect();
+        assert_eq!(indices, [0, 0, 0, 3, 1, 0]);
+        assert_eq!(word(132), 2);
+        assert_eq!(&bytes[136..140], [0, 0, 3, 0]);
+    }
+}

@@ -1,0 +1,127 @@
+//! A small product for the tests of this crate: two load modules side by side, in an area of two.
+
+use database::{
+    Area, Fingerprint, Manifest, Report, ReportBreach, ReportPerModule, ReportPerWindow, ReportPlace, ReportPoints,
+    ReportPool, ReportRefusals, ReportResidual, ReportStops, ReportVoids, TileModules, TileRecord,
+};
+use terrain::{GridFrame, LoadModule, ModuleGrid, ModuleId, ModuleRect, ModuleResidual, ModuleVertex, Spacing, TileId};
+
+use crate::Product;
+
+pub(crate) const GRID: ModuleGrid = ModuleGrid { rows: 1, cols: 2, side_cells: 20 };
+
+pub(crate) fn product() -> Product {
+    let tile = TileId { row: 0, col: 0 };
+    let frame = GridFrame {
+        origin_east_m: 505_000.0,
+        origin_north_m: 3_875_000.0,
+        spacing: Spacing::from_metres(25.0).unwrap(),
+    };
+    let rect = GRID.all();
+    let tile_modules = TileModules {
+        tile,
+        grid: GRID,
+        modules: rect,
+        frame,
+        crs: "EPSG:32611".into(),
+        vertical_datum: "EGM96".into(),
+        fingerprint: Fingerprint([7; 32]),
+    };
+    let mut manifest = Manifest::new(area(), "[area]\n".into(), 1);
+    manifest.tiles = vec![TileRecord::missing(tile)];
+    Product { manifest, grid: GRID, frame, rect, modules: modules(), tiles: vec![tile_modules], tile_of: vec![0, 0] }
+}
+
+/// The eastern load module alone.
+pub(crate) fn eastern() -> Product {
+    let mut product = product();
+    product.rect = ModuleRect { south: 0, west: 1, north: 1, east: 2 };
+    product.modules.remove(0);
+    product.tile_of.pop();
+    product
+}
+
+fn area() -> Area {
+    Area {
+        name: "sample".into(),
+        crs: "EPSG:32611".into(),
+        vertical_datum: "EGM96".into(),
+        origin_m: [505_000.0, 3_875_000.0],
+        size_m: [1000.0, 500.0],
+        spacing_m: 25.0,
+        module_side_m: 500.0,
+        module_rows: 1,
+        module_cols: 2,
+        tile_rows: 1,
+        tile_cols: 1,
+    }
+}
+
+fn modules() -> Vec<LoadModule> {
+    let vertex = |x, y, z| ModuleVertex { y, x, z };
+    let corner = [vertex(0, 0, 128_000), vertex(64_000, 0, 128_256)];
+    let west = LoadModule {
+        id: ModuleId { row: 0, col: 0 },
+        side: 64_000,
+        vertices: vec![corner[0], corner[1], vertex(0, 64_000, 128_128), vertex(64_000, 64_000, 128_512)],
+        triangles: vec![[0, 1, 3], [0, 3, 2]],
+        classes: vec![0, 1],
+        polygon_count: 2,
+        residual: ModuleResidual { posts: 400, largest: 300, sum_abs: 25_600, sum_squared: 3_276_800 },
+    };
+    let east = LoadModule {
+        id: ModuleId { row: 0, col: 1 },
+        side: 64_000,
+        vertices: vec![
+            vertex(0, 0, 128_256),
+            vertex(64_000, 0, 128_000),
+            vertex(32_000, 25_600, 127_000),
+            vertex(0, 64_000, 128_512),
+            vertex(64_000, 64_000, 127_872),
+        ],
+        triangles: vec![[0, 1, 2], [0, 2, 3], [1, 4, 2], [2, 4, 3]],
+        classes: vec![1, 0, 0, 1],
+        polygon_count: 4,
+        residual: ModuleResidual { posts: 441, largest: 128, sum_abs: 12_800, sum_squared: 1_638_400 },
+    };
+    [&west, &east].iter().for_each(|module| assert_eq!(module.check(), Ok(())));
+    vec![west, east]
+}
+
+/// A report with one breach.
+pub(crate) fn report() -> Report {
+    let residual = ReportResidual { rms_m: 1.0, max_m: 5.0, mean_abs_m: 0.5, p95_m: 2.0, p99_m: 3.0 };
+    let breach = ReportBreach {
+        kind: "per_load_module".into(),
+        place: ReportPlace::Module([0, 1]),
+        count: 4,
+        limit: 3,
+        excess: 1,
+        refused: 0,
+        rms_with_m: 1.0,
+        rms_without_m: None,
+    };
+    Report {
+        area: "sample".into(),
+        workers: 1,
+        stages: Vec::new(),
+        points: ReportPoints { selected: 0, border: 0, corner: 6, total: 7 },
+        count: "triangles".into(),
+        triangles: 6,
+        polygons: 6,
+        per_load_module: ReportPerModule { mean: 3.0, mean_limit: 32.0, max: 4, limit: 3, over: 1 },
+        per_4km: ReportPerWindow { max: 6, limit: 4096, over: 0, worst_9x9: 6 },
+        pool: ReportPool { size: 0, used: 0 },
+        residual,
+        residual_against_source: None,
+        classes: Vec::new(),
+        overall_point_weighted_rms_m: 1.0,
+        dem_accuracy_m: None,
+        voids: ReportVoids { count: 0, filled: 0 },
+        breaches: vec![breach],
+        refusals: ReportRefusals::default(),
+        bound: Vec::new(),
+        stops: ReportStops::default(),
+        warnings: Vec::new(),
+    }
+}

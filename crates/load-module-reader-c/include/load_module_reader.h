@@ -1,0 +1,106 @@
+/*
+ * Reads the load modules of a terrain database, and answers what a simulator asks of the ground.
+ *
+ * Link with libload_module_reader_c.a (cargo build --release -p load-module-reader-c) and, on Linux,
+ * with -lpthread -ldl -lm.
+ *
+ *     char why[256];
+ *     lmr_area *area = lmr_open("ntc.tdb", LMR_MAPPED, why, sizeof why);
+ *     if (!area) { fprintf(stderr, "%s\n", why); exit(2); }
+ *     lmr_ground *ground = lmr_load(area, east, north, 7, why, sizeof why);
+ *     for (;;) {
+ *         double height;
+ *         lmr_move(ground, area, east, north, 7, why, sizeof why);
+ *         if (lmr_height(ground, east, north, &height)) drive(height);
+ *     }
+ *     lmr_unload(ground);
+ *     lmr_close(area);
+ *
+ * Places are eastings and northings in metres of the area's coordinate system; heights are metres above its
+ * vertical datum. Functions that only ask may be called for one ground from many threads at once.
+ * Files are checked when they are read: no file, however damaged, makes a function do harm. Only with LMR_MAPPED,
+ * a file that another program makes shorter while it is mapped ends this one (SIGBUS).
+ */
+#ifndef LOAD_MODULE_READER_H
+#define LOAD_MODULE_READER_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* A database that is open. */
+typedef struct lmr_area lmr_area;
+/* Load modules that are loaded. */
+typedef struct lmr_ground lmr_ground;
+
+/* Where the bytes of files are kept while an area is open. */
+enum { LMR_ON_DISK = 0, LMR_IN_MEMORY = 1, LMR_MAPPED = 2 };
+
+/* For `reach`: the whole area. */
+#define LMR_ALL UINT32_MAX
+
+typedef struct {
+    uint32_t rows, cols;     /* of load modules */
+    double side_m;           /* of a load module */
+    double east_m, north_m;  /* south-west corner of the area */
+} lmr_frame;
+
+typedef struct {
+    double height_m;
+    double normal[3];        /* unit vector out of the ground: east, north, up */
+    uint8_t class_of_ground; /* 0 is the default */
+} lmr_sample;
+
+/* Quanta of 1/128 m: x and y from the load module's south-west corner, z above the vertical datum. */
+typedef struct {
+    uint16_t x, y;
+    int32_t z;
+} lmr_vertex;
+
+/* A load module for drawing. What it points to lives until the ground is moved or unloaded. */
+typedef struct {
+    uint32_t row, col;
+    double east_m, north_m;           /* of its south-west corner */
+    const lmr_vertex *vertices;
+    size_t vertex_count;
+    const uint16_t (*triangles)[3];   /* counter-clockwise seen from above */
+    const uint8_t *classes;           /* one for each triangle */
+    size_t triangle_count;
+} lmr_module;
+
+/* What lmr_sight answers. */
+enum { LMR_FREE = 0, LMR_HIDDEN = 1, LMR_UNKNOWN = 2 };
+
+/* Opens a database, or a folder of load-module files. NULL on failure, with the reason in `why` (cut to fit). */
+lmr_area *lmr_open(const char *dir, int keep, char *why, size_t why_size);
+void lmr_close(lmr_area *area);
+void lmr_describe(const lmr_area *area, lmr_frame *frame);
+
+/* Loads the 2 * reach + 1 load modules a side around a place, less what lies beyond the area. NULL on failure. */
+lmr_ground *lmr_load(const lmr_area *area, double east_m, double north_m, uint32_t reach, char *why, size_t why_size);
+/* The same around another place: only what is new is read. 1, or 0 on failure; then the ground is as it was. */
+int lmr_move(lmr_ground *ground, const lmr_area *area, double east_m, double north_m, uint32_t reach,
+             char *why, size_t why_size);
+void lmr_unload(lmr_ground *ground);
+
+/* 1, or 0 where nothing is loaded. */
+int lmr_height(const lmr_ground *ground, double east_m, double north_m, double *height_m);
+int lmr_sample_at(const lmr_ground *ground, double east_m, double north_m, lmr_sample *sample);
+/* Many heights at once; NaN where nothing is loaded. */
+void lmr_heights(const lmr_ground *ground, const double (*places_m)[2], double *heights_m, size_t count);
+/* Whether the ground stands between two places (east, north, height). LMR_HIDDEN sets `share`: how far along. */
+int lmr_sight(const lmr_ground *ground, const double from_m[3], const double to_m[3], double *share);
+
+/* Load modules that are loaded, row by row from the south-west. */
+size_t lmr_module_count(const lmr_ground *ground);
+/* 1, or 0 when there is no such one. */
+int lmr_module_at(const lmr_ground *ground, size_t index, lmr_module *module);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

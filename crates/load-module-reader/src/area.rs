@@ -1,0 +1,165 @@
+//! A gaming area opened for a simulator: all its files, of which load modules are taken as they are needed.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use crate::{Block, Ground, Header, Keep, ReadError, TerrainModule, TileFile};
+
+/// Extension of load-module files.
+const EXTENSION: &str = "slm";
+
+/// A gaming area: its files, headers and indexes read, load modules left where they are.
+#[derive(Debug)]
+pub struct Area {
+    files: Vec<TileFile>,
+    /// Place in `files` of each load module's file, row by row; `u32::MAX` where there is none.
+    file_of: Vec<u32>,
+    frame: Frame,
+}
+
+/// Where load modules lie.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Frame {
+    /// Rows of load modules in the area.
+    pub rows: u32,
+    /// Columns of load modules in the area.
+    pub cols: u32,
+    /// Side of a load module in quanta of 1/128 m.
+    pub side: u16,
+    /// Easting and northing of the area's south-west corner, metres.
+    pub origin_m: [f64; 2],
+    /// The coordinate system, such as `EPSG:32611`.
+    pub crs: String,
+    /// What heights are above; empty when unknown.
+    pub vertical_datum: String,
+}
+
+impl Frame {
+    fn of(header: &Header) -> Self {
+        Self {
+            rows: header.area_rows,
+            cols: header.area_cols,
+            side: header.side,
+            origin_m: header.origin_m,
+            crs: header.crs.clone(),
+            vertical_datum: header.vertical_datum.clone(),
+        }
+    }
+
+    /// Side of a load module in metres.
+    pub fn side_m(&self) -> f64 {
+        f64::from(self.side) / f64::from(crate::QUANTA_PER_METRE)
+    }
+
+    /// Row and column of the load module under a place, however far outside the area that lies.
+    pub fn module_at(&self, [east_m, north_m]: [f64; 2]) -> [i64; 2] {
+        let index = |metres: f64, origin: f64| ((metres - origin) / self.side_m()).floor() as i64;
+        [index(north_m, self.origin_m[1]), index(east_m, self.origin_m[0])]
+    }
+}
+
+impl Area {
+    /// Opens the load modules of a terrain database, `DIR` or `DIR/modules`, or any folder of load-module files.
+    ///
+    /// # Errors
+    /// When there are none, one cannot be read, or they do not belong to one area.
+    pub fn open(dir: impl AsRef<Path>, keep: Keep) -> Result<Self, ReadError> {
+        let paths = Self::files_in(dir)?;
+        Self::of_files(paths.iter().map(|path| TileFile::open(path, keep)).collect::<Result<_, _>>()?)
+    }
+
+    /// The load-module files of a terrain database, `DIR` or `DIR/modules`, or of any folder, by name.
+    ///
+    /// # Errors
+    /// When the folder cannot be read, or there are none.
+    pub fn files_in(dir: impl AsRef<Path>) -> Result<Vec<PathBuf>, ReadError> {
+        let dir = dir.as_ref();
+        let inner = dir.join("modules");
+        let folder = if inner.is_dir() { inner } else { dir.to_path_buf() };
+        let unreadable = |source| ReadError::Unreadable { path: folder.clone(), source };
+        let mut paths = Vec::new();
+        for entry in std::fs::read_dir(&folder).map_err(unreadable)? {
+            let path = entry.map_err(unreadable)?.path();
+            if path.extension().is_some_and(|extension| extension == EXTENSION) {
+                paths.push(path);
+            }
+        }
+        paths.sort();
+        if paths.is_empty() { Err(ReadError::NoFiles { path: folder }) } else { Ok(paths) }
+    }
+
+    /// An area of files that are open already, such as memory maps of your own ([`TileFile::of_bytes`]).
+    ///
+    /// # Errors
+    /// When there are none, or they do not belong to one area.
+    pub fn of_files(files: Vec<TileFile>) -> Result<Self, ReadError> {
+        let Some(first) = files.first() else { return Err(ReadError::NoFiles { path: Path::new("").into() }) };
+        let frame = Frame::of(first.header());
+        let mut file_of = vec![u32::MAX; frame.rows as usize * frame.cols as usize];
+        for (place, file) in (0..).zip(&files) {
+            let header = file.header();
+            if Frame::of(header) != frame {
+                return Err(ReadError::OtherArea { file: format!("{file:?}"), first: format!("{first:?}") });
+            }
+            for row in header.south..header.north {
+                let start = row as usize * frame.cols as usize;
+                let own = &mut file_of[start + header.west as usize..start + header.east as usize];
+                own.fill(place);
+            }
+        }
+        Ok(Self { files, file_of, frame })
+    }
+
+    /// Where load modules lie.
+    pub fn frame(&self) -> &Frame {
+        &self.frame
+    }
+
+    /// Every load module of the area.
+    pub fn whole(&self) -> Block {
+        Block { south: 0, west: 0, north: self.frame.rows, east: self.frame.cols }
+    }
+
+    /// The block of `2 * reach + 1` load modules a side around a place, less what lies beyond the area.
+    pub fn block_around(&self, place_m: [f64; 2], reach: u32) -> Block {
+        let [row, col] = self.frame.module_at(place_m);
+        let reach = i64::from(reach);
+        let range = |at: i64, count: u32| {
+            let clamped = |edge: i64| edge.clamp(0, i64::from(count)) as u32;
+            (clamped(at - reach), clamped(at.saturating_add(reach + 1)))
+        };
+        let ((south, north), (west, east)) = (range(row, self.frame.rows), range(col, self.frame.cols));
+        Block { south, west, north: north.max(south), east: east.max(west) }
+    }
+
+    /// Loads a block, ready to be asked.
+    ///
+    /// # Errors
+    /// When a load module cannot be read, is damaged, or is in no file.
+    pub fn load(&self, block: Block) -> Result<Ground, ReadError> {
+        Ground::empty(self.frame.clone()).moved(self, block)
+    }
+
+    /// Loads one row of a block; `into` takes each load module with its column.
+    pub(crate) fn load_row(
+        &self,
+        row: u32,
+        cols: std::ops::Range<u32>,
+        mut into: impl FnMut(u32, Arc<TerrainModule>),
+    ) -> Result<(), ReadError> {
+        let start = row as usize * self.frame.cols as usize;
+        let mut col = cols.start;
+        while col < cols.end {
+            let place = self.file_of[start + col as usize];
+            let Some(file) = self.files.get(place as usize) else {
+                return Err(ReadError::NoSuchModule { row, col });
+            };
+            let end = cols.end.min(file.header().east);
+            for module in file.row(row, col..end)? {
+                into(module.col, Arc::new(TerrainModule::new(module, self.frame.side)));
+            }
+            col = end;
+        }
+        Ok(())
+    }
+}

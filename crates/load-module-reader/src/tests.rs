@@ -1,0 +1,233 @@
+//! Tests of what is asked of the ground, against slow and obvious answers.
+
+use std::sync::Arc;
+
+use crate::lookup::STEPS;
+use crate::{Area, Block, Ground, Keep, Module, ReadError, Residual, Sight, TerrainModule, TileFile, Vertex, sample};
+
+const SIDE: u16 = 64_000;
+
+/// SplitMix64.
+struct Draw(u64);
+
+impl Draw {
+    fn below(&mut self, bound: u64) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        (z ^ (z >> 31)) % bound
+    }
+}
+
+/// A load module over `n` x `n` squares whose inner corners are shaken, each cut along one diagonal or the other.
+fn rough(n: u16, seed: u64) -> Module {
+    let mut draw = Draw(seed);
+    let step = SIDE / n;
+    let mut vertices = Vec::new();
+    for row in 0..=n {
+        for col in 0..=n {
+            let mut shaken = |index: u16| match index {
+                0 => 0,
+                _ if index == n => SIDE,
+                _ => index * step + draw.below(u64::from(step / 2)) as u16 - step / 4,
+            };
+            let (x, y) = (shaken(col), shaken(row));
+            vertices.push(Vertex { x, y, z: draw.below(20_000) as i32 });
+        }
+    }
+    let mut triangles = Vec::new();
+    for row in 0..n {
+        for col in 0..n {
+            let at = |row: u16, col: u16| row * (n + 1) + col;
+            let [a, b, c, d] = [at(row, col), at(row, col + 1), at(row + 1, col + 1), at(row + 1, col)];
+            match draw.below(2) {
+                0 => triangles.extend([[a, b, c], [a, c, d]]),
+                _ => triangles.extend([[a, b, d], [b, c, d]]),
+            }
+        }
+    }
+    let residual = Residual { posts: 0, largest: 0, sum_abs: 0, sum_squared: 0 };
+    let (classes, polygon_count) = (vec![3; triangles.len()], triangles.len() as u32);
+    Module { row: 0, col: 0, vertices, triangles, classes, sides: Default::default(), polygon_count, residual }
+}
+
+/// The height at a place in quanta, from every triangle that holds it.
+fn by_search(module: &Module, [x, y]: [f64; 2]) -> f64 {
+    let mut best = (f64::NEG_INFINITY, 0.0);
+    for triangle in &module.triangles {
+        let [a, b, c] = triangle.map(|v| {
+            let v = module.vertices[usize::from(v)];
+            [f64::from(v.x), f64::from(v.y), f64::from(v.z)]
+        });
+        let left = |a: [f64; 3], b: [f64; 3]| (b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0]);
+        let shares = [left(b, c), left(c, a), left(a, b)];
+        let whole: f64 = shares.iter().sum();
+        let least = shares.iter().fold(f64::INFINITY, |least, share| least.min(share / whole));
+        if best.0 < least {
+            best = (least, (a[2] * shares[0] + b[2] * shares[1] + c[2] * shares[2]) / whole);
+        }
+    }
+    best.1 / 128.0
+}
+
+#[test]
+fn heights_equal_those_of_a_search_through_all_triangles() {
+    for (n, seed) in [(1, 1), (2, 2), (5, 3), (13, 4), (40, 5)] {
+        let module = rough(n, seed);
+        let prepared = TerrainModule::new(module.clone(), SIDE);
+        let mut draw = Draw(seed);
+        for _ in 0..2000 {
+            let place = [0, 1].map(|_| draw.below(u64::from(SIDE) * STEPS as u64 + 1) as i64);
+            let found = prepared.lookup().height_m(place).expect("some triangle holds every place");
+            let expected = by_search(&module, place.map(|steps| steps as f64 / STEPS as f64));
+            assert!((found - expected).abs() < 1e-6, "seed {seed} at {place:?}: {found}, expected {expected}");
+        }
+        for vertex in &module.vertices {
+            let place = [i64::from(vertex.x) * STEPS, i64::from(vertex.y) * STEPS];
+            assert_eq!(prepared.lookup().height_m(place), Some(f64::from(vertex.z) / 128.0));
+        }
+    }
+}
+
+fn sample_area() -> Area {
+    let file = TileFile::of_bytes("sample", Arc::new(sample::file())).unwrap();
+    Area::of_files(vec![file]).unwrap()
+}
+
+/// Both load modules of the sample: 2,3 is level at 5 m, 2,4 a pit whose bottom lies below zero.
+fn sample_ground() -> Ground {
+    sample_area().load(Block { south: 2, west: 3, north: 3, east: 5 }).unwrap()
+}
+
+#[test]
+fn ground_has_heights_normals_and_classes() {
+    let ground = sample_ground();
+    let [east, north] = [501_500.0, 3_876_000.25];
+    let flat = ground.sample([east + 400.0, north + 20.0]).unwrap();
+    assert_eq!((flat.height_m, flat.normal, flat.class), (5.0, [0.0, 0.0, 1.0], 0));
+    assert_eq!(ground.sample([east + 20.0, north + 400.0]).unwrap().class, 1);
+    let bottom = [east + 500.0 + 30_000.0 / 128.0, north + 20_000.0 / 128.0];
+    assert_eq!(ground.height_m(bottom), Some(-7.0 / 128.0));
+    let slope = ground.sample([bottom[0], north + 10.0]).unwrap();
+    assert!(0.0 < slope.normal[1] && slope.normal[0].abs() < 1e-12, "{slope:?}");
+    // The far side of the area belongs to it; beyond, and where nothing is loaded, is nothing.
+    assert_eq!(ground.height_m([502_500.0, north]), Some(5.0));
+    for nowhere in [[502_500.01, north], [east - 0.01, north], [east, north - 1.0], [f64::NAN, north], [1e300, 0.0]] {
+        assert_eq!(ground.height_m(nowhere), None, "{nowhere:?}");
+    }
+    let places: Vec<[f64; 2]> =
+        (0..100).map(|i| [east - 9.0 + 11.0 * f64::from(i), north + 4.0 * f64::from(i)]).collect();
+    let mut heights = vec![0.0; places.len()];
+    ground.heights_m(&places, &mut heights);
+    for (&place, height_m) in places.iter().zip(heights) {
+        assert_eq!(ground.height_m(place), (!height_m.is_nan()).then_some(height_m), "{place:?}");
+    }
+}
+
+#[test]
+fn a_line_of_sight_ends_at_the_first_ground_above_it() {
+    let ground = sample_ground();
+    let [east, north] = [501_500.0, 3_876_000.25];
+    let above = |along: f64, up: f64| [east + along, north + 20_000.0 / 128.0, up];
+    assert_eq!(ground.sight(above(10.0, 6.0), above(990.0, 6.0)), Sight::Free);
+    assert_eq!(ground.sight(above(10.0, 5.0), above(490.0, 5.0)), Sight::Free, "what only touches hides nothing");
+    // From the pit one does not see over its rim.
+    let Sight::Hidden(share) = ground.sight(above(734.375, 1.0), above(100.0, 5.5)) else { panic!("the rim hides") };
+    assert!((0.3..0.4).contains(&share), "{share}");
+    assert_eq!(ground.sight(above(10.0, 6.0), above(-400.0, 6.0)), Sight::Unknown);
+    assert_eq!(ground.sight(above(734.375, 1.0), above(-100.0, 1.0)), Sight::Hidden(share_of_rim()));
+}
+
+/// Along the level line 1 m up from the bottom, westwards, the slope reaches it where it has risen by 135/128 m; the
+/// first edge beyond is the side of the load module, at the rim.
+fn share_of_rim() -> f64 {
+    234.375 / 834.375
+}
+
+#[test]
+fn a_line_of_sight_agrees_with_small_steps() {
+    let module = rough(9, 7);
+    let mut file = sample_ground();
+    let prepared = Arc::new(TerrainModule::new(module.clone(), SIDE));
+    file = file.with_modules(vec![Arc::clone(&prepared), prepared]);
+    let [east, north] = [501_500.0, 3_876_000.25];
+    let mut draw = Draw(11);
+    let (mut hidden, mut free) = (0, 0);
+    for _ in 0..400 {
+        let mut place = || [0, 1].map(|_| draw.below(500_000) as f64 / 1000.0);
+        let (from, to) = (place(), place());
+        let (up, over) = (draw.below(160) as f64, draw.below(160) as f64);
+        let at = |share: f64| {
+            let local = [0, 1].map(|axis| from[axis] + share * (to[axis] - from[axis]));
+            let ground = by_search(&module, local.map(|metres| metres * 128.0));
+            up + share * (over - up) - ground
+        };
+        let least = (0..=2000).map(|step| at(f64::from(step) / 2000.0)).fold(f64::INFINITY, f64::min);
+        let world = |[x, y]: [f64; 2], up: f64| [east + x, north + y, up];
+        match file.sight(world(from, up), world(to, over)) {
+            Sight::Free => {
+                free += 1;
+                assert!(-0.5 < least, "{least}");
+            }
+            Sight::Hidden(share) => {
+                hidden += 1;
+                assert!(at(share) < 1e-6, "{} at {share}", at(share));
+            }
+            Sight::Unknown => panic!("all of it is loaded"),
+        }
+    }
+    assert!(20 < hidden && 20 < free, "{hidden} hidden, {free} free");
+}
+
+#[test]
+fn moving_keeps_what_is_loaded_and_reads_the_rest() {
+    let area = sample_area();
+    let west = area.load(Block { south: 2, west: 3, north: 3, east: 4 }).unwrap();
+    let both = west.moved(&area, Block { south: 2, west: 3, north: 3, east: 5 }).unwrap();
+    assert!(Arc::ptr_eq(&west.modules()[0], &both.modules()[0]));
+    assert_eq!(both.modules()[1].module().col, 4);
+    assert!(matches!(area.load(area.whole()), Err(ReadError::NoSuchModule { row: 0, col: 0 })));
+}
+
+#[test]
+fn a_block_is_cut_at_the_ends_of_the_area() {
+    let area = sample_area();
+    let block = |place, reach| {
+        let Block { south, west, north, east } = area.block_around(place, reach);
+        [south, west, north, east]
+    };
+    let [east, north] = area.frame().origin_m;
+    assert_eq!(block([east + 750.0, north + 1250.0], 1), [1, 0, 4, 3]);
+    assert_eq!(block([east + 750.0, north + 1250.0], 100), [0, 0, 4, 5]);
+    assert_eq!(area.block_around([0.0, 0.0], 7).count(), 0);
+    assert_eq!(area.block_around([f64::INFINITY, north], 7).count(), 0);
+}
+
+#[test]
+fn files_on_disk_in_memory_and_damaged_are_told_apart() {
+    let folder = std::env::temp_dir().join(format!("load-module-reader-{}", std::process::id()));
+    std::fs::create_dir_all(folder.join("modules")).unwrap();
+    assert!(matches!(Area::open(&folder, Keep::OnDisk), Err(ReadError::NoFiles { .. })));
+    let path = folder.join("modules/r00c01.slm");
+    let bytes = sample::file();
+    std::fs::write(&path, &bytes).unwrap();
+    let block = Block { south: 2, west: 3, north: 3, east: 5 };
+    for keep in [Keep::OnDisk, Keep::InMemory] {
+        let ground = Area::open(&folder, keep).unwrap().load(block).unwrap();
+        assert_eq!(ground.height_m([501_500.0, 3_876_000.25]), Some(5.0));
+    }
+    for length in 0..bytes.len() {
+        std::fs::write(&path, &bytes[..length]).unwrap();
+        let opened = Area::open(&folder, Keep::OnDisk);
+        assert!(opened.and_then(|area| area.load(block)).is_err(), "the first {length} bytes were accepted");
+    }
+    for at in 0..bytes.len() {
+        let mut damaged = bytes.clone();
+        damaged[at] ^= 0x10;
+        let file = TileFile::of_bytes("damaged", Arc::new(damaged));
+        let loaded = file.and_then(|file| Area::of_files(vec![file])).and_then(|area| area.load(block));
+        assert!(loaded.is_err(), "byte {at} was changed and accepted");
+    }
+    std::fs::remove_dir_all(folder).unwrap();
+}

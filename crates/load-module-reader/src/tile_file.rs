@@ -1,0 +1,152 @@
+//! A tile's file opened for paging: header and index are decoded at once, load modules when they are asked for.
+
+use std::fs::File;
+use std::io::{Read, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use crate::{FILE_BYTES_MAX, Header, IndexEntry, Module, ReadError, index};
+
+/// Where the bytes of files are kept while an area is open.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Keep {
+    /// On disk: what is asked for is read then, mostly from the system's cache.
+    OnDisk,
+    /// In memory, all of them.
+    InMemory,
+}
+
+/// The bytes of a whole file, wherever they are: a `Vec<u8>`, or a memory map of your own.
+pub type Bytes = Arc<dyn AsRef<[u8]> + Send + Sync>;
+
+/// A file whose load modules are decoded one by one.
+pub struct TileFile {
+    path: PathBuf,
+    header: Header,
+    index: Vec<IndexEntry>,
+    source: Source,
+}
+
+enum Source {
+    File(Mutex<File>),
+    Bytes(Bytes),
+}
+
+impl std::fmt::Debug for TileFile {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Header { tile_row, tile_col, .. } = self.header;
+        write!(f, "tile {tile_row},{tile_col} in {}", self.path.display())
+    }
+}
+
+impl TileFile {
+    /// Opens the file at `path`.
+    ///
+    /// # Errors
+    /// When it cannot be read, or header or index are not as `FORMAT.md` says; the error carries the path.
+    pub fn open(path: impl AsRef<Path>, keep: Keep) -> Result<Self, ReadError> {
+        let path = path.as_ref();
+        let unreadable = |source| ReadError::Unreadable { path: path.to_path_buf(), source };
+        let mut file = File::open(path).map_err(unreadable)?;
+        let found = file.metadata().map_err(unreadable)?.len();
+        if FILE_BYTES_MAX < found {
+            return Err(in_file(path, ReadError::TooLarge { found, limit: FILE_BYTES_MAX }));
+        }
+        if keep == Keep::InMemory {
+            let mut bytes = Vec::with_capacity(found as usize);
+            file.read_to_end(&mut bytes).map_err(unreadable)?;
+            return Self::of_bytes(path, Arc::new(bytes));
+        }
+        let start = read_start(&mut file, found).map_err(unreadable)?;
+        let (header, index) = parse_start(&start, found).map_err(|fault| in_file(path, fault))?;
+        Ok(Self { path: path.to_path_buf(), header, index, source: Source::File(Mutex::new(file)) })
+    }
+
+    /// A file whose bytes are at hand already; `name` is for messages.
+    ///
+    /// # Errors
+    /// When header or index are not as `FORMAT.md` says.
+    pub fn of_bytes(name: impl AsRef<Path>, bytes: Bytes) -> Result<Self, ReadError> {
+        let path = name.as_ref();
+        let whole = (*bytes).as_ref();
+        let (header, index) = parse_start(whole, whole.len() as u64).map_err(|fault| in_file(path, fault))?;
+        Ok(Self { path: path.to_path_buf(), header, index, source: Source::Bytes(bytes) })
+    }
+
+    /// What holds for all load modules of the file.
+    pub fn header(&self) -> &Header {
+        &self.header
+    }
+
+    /// One entry per load module, row by row from the south-west.
+    pub fn index(&self) -> &[IndexEntry] {
+        &self.index
+    }
+
+    /// Decodes and checks the load modules of columns `cols` of one row of the area, all of which the file must hold.
+    /// They lie side by side in the file, so they are read at once.
+    ///
+    /// # Errors
+    /// When they cannot be read or are damaged.
+    pub(crate) fn row(&self, row: u32, cols: std::ops::Range<u32>) -> Result<Vec<Module>, ReadError> {
+        let Some(first) = self.header.index_of(row, cols.start) else { return Ok(Vec::new()) };
+        let entries = &self.index[first..first + cols.len()];
+        let (Some(low), Some(high)) = (entries.first(), entries.last()) else { return Ok(Vec::new()) };
+        let (start, end) = (low.offset, high.offset + u64::from(high.length));
+        let read;
+        let bytes = match &self.source {
+            Source::Bytes(bytes) => &(**bytes).as_ref()[start as usize..end as usize],
+            Source::File(file) => {
+                read = read_at(file, start, (end - start) as usize)
+                    .map_err(|source| ReadError::Unreadable { path: self.path.clone(), source })?;
+                &read
+            }
+        };
+        let decode = |(col, entry): (u32, &IndexEntry)| {
+            let at = (entry.offset - start) as usize;
+            Module::parse(&bytes[at..at + entry.length as usize], &self.header, entry, (row, col))
+        };
+        let modules: Result<Vec<Module>, ReadError> = cols.zip(entries).map(decode).collect();
+        modules.map_err(|fault| in_file(&self.path, fault))
+    }
+}
+
+fn in_file(path: &Path, fault: ReadError) -> ReadError {
+    ReadError::InFile { path: path.to_path_buf(), fault: Box::new(fault) }
+}
+
+fn parse_start(start: &[u8], file_length: u64) -> Result<(Header, Vec<IndexEntry>), ReadError> {
+    let (header, header_length) = Header::parse(start, file_length)?;
+    let index = index::parse(start, &header, header_length, file_length)?;
+    Ok((header, index))
+}
+
+/// The bytes of header and index, or, if they do not say how many these are, the first few.
+fn read_start(file: &mut File, file_length: u64) -> std::io::Result<Vec<u8>> {
+    const GUESS: u64 = 64 << 10;
+    let mut start = Vec::new();
+    file.by_ref().take(GUESS).read_to_end(&mut start)?;
+    let word = |at: usize| start.get(at..at + 4).map(|b| u64::from(u32::from_le_bytes([b[0], b[1], b[2], b[3]])));
+    let (Some(header), Some(south), Some(north), Some(west), Some(east)) =
+        (word(12), word(40), word(44), word(48), word(52))
+    else {
+        return Ok(start);
+    };
+    // Wrong numbers are found later; here they must only not ask for more than there is.
+    let modules = north.saturating_sub(south).saturating_mul(east.saturating_sub(west));
+    let wanted = header.saturating_add(modules.saturating_mul(32)).saturating_add(4).min(file_length);
+    if GUESS < wanted {
+        file.take(wanted - GUESS).read_to_end(&mut start)?;
+    }
+    Ok(start)
+}
+
+/// Reads a piece of a file that other threads may be reading, too.
+fn read_at(file: &Mutex<File>, offset: u64, length: usize) -> std::io::Result<Vec<u8>> {
+    let mut bytes = vec![0; length];
+    // A reader that panicked left the file as it was: every piece begins with a seek.
+    let mut file = file.lock().unwrap_or_else(PoisonError::into_inner);
+    file.seek(SeekFrom::Start(offset))?;
+    file.read_exact(&mut bytes)?;
+    Ok(bytes)
+}

@@ -1,0 +1,268 @@
+//! `tiefort export`: a finished database in another program's format.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use compiler::{BuiltFrom, CompileError};
+use database::Folder;
+use exports::{Block, Coordinates, Datum, ExportError, Facts, Mesh, Product, Work};
+use job::Job;
+use terrain::{ModuleId, PostRect};
+use views::grouped;
+
+use crate::arguments::{Workers, row_col};
+use crate::failure::{Failure, Outcome};
+use crate::new_folder::NewFolder;
+use crate::signals::Signals;
+use crate::steps::Steps;
+use crate::{files, terminal};
+
+const AFTER_HELP: &str = "\
+Examples:
+  tiefort export ntc.tdb --format glb --modules 40,40..54,54 --out block.glb
+  tiefort export ntc.tdb --format modules --out ntc_modules
+  tiefort export ntc.tdb --format gpkg --out ntc.gpkg
+  tiefort export ntc.tdb --format geotiff --layer residual --out residual.tif
+  tiefort export ntc.tdb --format 3dtiles --assume-datum EGM96 --out ntc_3dtiles
+
+A mesh (ply, obj, glb) is counted in metres from the south-west corner of what is exported; the file
+itself and NAME.json beside it say where that is. Load modules are named ROW,COL from the south-west.
+3dtiles and quantized-mesh want heights above the ellipsoid: they know EGM96 and the ellipsoid, and
+refuse any other datum unless told what to take it for.";
+
+/// Arguments of `export`.
+#[derive(Args)]
+#[command(after_help = AFTER_HELP)]
+pub struct Arguments {
+    /// Folder of the terrain database
+    #[arg(value_name = "DIR")]
+    database: PathBuf,
+    /// What to write
+    #[arg(long, value_enum)]
+    format: Format,
+    /// The south-west and north-east load module of a block, or a single one [default: the whole area]
+    #[arg(long, value_name = "ROW,COL..ROW,COL", value_parser = block)]
+    modules: Option<Block>,
+    /// Level of detail; 0 is the finest, and the only one in a database yet
+    #[arg(long, value_name = "K", default_value_t = 0)]
+    lod: u32,
+    /// What coordinates are counted from; for ply and obj only
+    #[arg(long, value_enum, default_value_t = Frame::Local)]
+    coordinates: Frame,
+    /// What the raster holds; for geotiff only [default: surface]
+    #[arg(long, value_enum)]
+    layer: Option<Layer>,
+    /// The raster to take the residual against [default: the ground the database was built from]
+    #[arg(long, value_name = "DEM")]
+    against: Option<PathBuf>,
+    /// What to take heights to be above, whatever the database says: EGM96, ellipsoid, or metres that their datum
+    /// lies above the ellipsoid; for 3dtiles and quantized-mesh only
+    #[arg(long, value_name = "DATUM", value_parser = datum, allow_hyphen_values = true)]
+    assume_datum: Option<Datum>,
+    #[command(flatten)]
+    workers: Workers,
+    /// Print errors only
+    #[arg(long)]
+    quiet: bool,
+    /// The file or folder to write; nothing may be there yet where it is a folder
+    #[arg(long, value_name = "PATH")]
+    out: PathBuf,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Format {
+    /// A folder with one load-module file (FORMAT.md) for each load module
+    Modules,
+    /// A mesh as binary PLY
+    Ply,
+    /// A mesh as Wavefront OBJ
+    Obj,
+    /// A mesh as binary glTF 2.0
+    Glb,
+    /// A raster of the compiled surface, or of its residual
+    Geotiff,
+    /// A GeoPackage for QGIS: load modules, breaches, tiles, triangles
+    Gpkg,
+    /// A folder of OpenFlight 16.1 files, one for each 4 km square, and a MetaFlight index
+    Openflight,
+    /// A folder of 3D Tiles 1.1, for globes
+    #[value(name = "3dtiles")]
+    Tiles3d,
+    /// A folder of quantized-mesh 1.0 terrain, for globes
+    QuantizedMesh,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Layer {
+    /// Height of the compiled surface at every post
+    Surface,
+    /// Height of the ground less that of the surface
+    Residual,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Frame {
+    /// The south-west corner of what is exported
+    Local,
+    /// The map's origin
+    Map,
+}
+
+fn block(text: &str) -> Result<Block, String> {
+    let module = |text: &str| row_col(text).map(|tile| ModuleId { row: tile.row, col: tile.col });
+    let wrong = |_| "expected ROW,COL..ROW,COL, the south-west and the north-east load module, such as 2,3..5,7";
+    let (south_west, north_east) = text.split_once("..").unwrap_or((text, text));
+    Ok(Block { south_west: module(south_west).map_err(wrong)?, north_east: module(north_east).map_err(wrong)? })
+}
+
+fn datum(text: &str) -> Result<Datum, String> {
+    let metres = text.parse().ok().filter(|metres: &f64| metres.abs() <= DATUM_M_MAX).map(Datum::Above);
+    metres.or_else(|| Datum::named(text)).ok_or("expected EGM96, ellipsoid, or metres to add, such as -30.5".into())
+}
+
+/// How far a datum may lie above or below the ellipsoid: twice what any geoid does.
+const DATUM_M_MAX: f64 = 250.0;
+
+impl Format {
+    /// The extension its one file must have; `None` where it is a folder.
+    fn extension(self) -> Option<&'static str> {
+        match self {
+            Format::Ply => Some("ply"),
+            Format::Obj => Some("obj"),
+            Format::Glb => Some("glb"),
+            Format::Geotiff => Some("tif"),
+            Format::Gpkg => Some("gpkg"),
+            Format::Modules | Format::Openflight | Format::Tiles3d | Format::QuantizedMesh => None,
+        }
+    }
+
+    /// Whether its heights are above the ellipsoid of WGS 84.
+    fn is_for_globes(self) -> bool {
+        matches!(self, Format::Tiles3d | Format::QuantizedMesh)
+    }
+}
+
+/// Exports.
+pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
+    check(arguments)?;
+    let signals = Signals::watch()?;
+    let steps = Steps::start(arguments.quiet);
+    let tell = |step| steps.tell(step);
+    let workers = schedule::Workers::new(arguments.workers.count());
+    let work = Work { workers: &workers, stop: signals.stop(), tell: &tell };
+    let exported = export(arguments, &work);
+    let seconds = steps.finish();
+    let summary = exported.map_err(|failure| failure.after(signals.exit_code()))?;
+    if !arguments.quiet {
+        terminal::tell(&format!("{summary} in {seconds:.1} s: {}", files::shown(&arguments.out).display()));
+    }
+    Ok(Outcome::Sound)
+}
+
+/// Refuses what cannot be, before any work.
+fn check(arguments: &Arguments) -> Result<(), Failure> {
+    if 0 < arguments.lod {
+        let message = format!("--lod: found level {}, expected 0, the only level in the database", arguments.lod);
+        return Err(Failure::new(message, "leave --lod out"));
+    }
+    if arguments.coordinates == Frame::Map && !matches!(arguments.format, Format::Ply | Format::Obj) {
+        let message = "found --coordinates map with a format that has no room for map coordinates, expected ply or obj";
+        return Err(Failure::new(message, "leave --coordinates out; NAME.json beside the file says where it lies"));
+    }
+    let residual = arguments.layer == Some(Layer::Residual);
+    if arguments.layer.is_some() && arguments.format != Format::Geotiff {
+        let message = "found --layer with another format than geotiff, expected none";
+        return Err(Failure::new(message, "leave --layer out, or add --format geotiff"));
+    }
+    if arguments.assume_datum.is_some() && !arguments.format.is_for_globes() {
+        let message = "found --assume-datum with a format whose heights stay as they are, expected none";
+        return Err(Failure::new(message, "leave --assume-datum out; only 3dtiles and quantized-mesh need it"));
+    }
+    if arguments.against.is_some() && !residual {
+        let message = "found --against without --layer residual, expected both or none";
+        return Err(Failure::new(message, "only a residual is taken against a raster"));
+    }
+    let Some(expected) = arguments.format.extension() else { return Ok(()) };
+    let found = files::extension(&arguments.out);
+    if found != expected {
+        let message = format!("{}: found the extension {found:?}, expected {expected:?}", arguments.out.display());
+        return Err(Failure::new(
+            message,
+            format!("--format {expected} writes one file whose name ends in .{expected}"),
+        ));
+    }
+    files::check_writable(&arguments.out)
+}
+
+/// Does it; what was exported, in words.
+fn export(arguments: &Arguments, work: &Work) -> Result<String, Failure> {
+    let folder = match arguments.format.extension() {
+        Some(_) => None,
+        None => Some(NewFolder::begin(&arguments.out)?),
+    };
+    let product = Product::read(&arguments.database, arguments.modules, work)?;
+    match arguments.format {
+        Format::Ply | Format::Obj | Format::Glb => write_mesh(arguments, &product)?,
+        Format::Geotiff => write_raster(arguments, &product, work)?,
+        Format::Gpkg => write_package(arguments, &product, work)?,
+        _ => {}
+    }
+    let mut said = None;
+    if let Some(folder) = folder {
+        let put = |name: &str, bytes: &[u8]| folder.put(name, bytes);
+        match arguments.format {
+            Format::Openflight => exports::write_openflight(&product, &put, work)?,
+            Format::Tiles3d => said = Some(exports::write_3dtiles(&product, arguments.assume_datum, &put, work)?),
+            Format::QuantizedMesh => {
+                said = Some(exports::write_quantized_mesh(&product, arguments.assume_datum, &put, work)?);
+            }
+            _ => exports::write_modules(&product, &put, work)?,
+        }
+        folder.finish()?;
+    }
+    let triangles: usize = product.modules.iter().map(|module| module.triangles.len()).sum();
+    let modules = match product.modules.len() {
+        1 => "1 load module".to_owned(),
+        count => format!("{} load modules", grouped(count as u64)),
+    };
+    let said = said.map(|datum| format!("{}\n", datum.said())).unwrap_or_default();
+    Ok(format!("{said}{modules}, {} triangles", grouped(triangles as u64)))
+}
+
+fn write_raster(arguments: &Arguments, product: &Product, work: &Work) -> Result<(), Failure> {
+    if arguments.layer != Some(Layer::Residual) {
+        return files::write_whole_or(&arguments.out, |out| Ok(exports::write_surface(out, product, work)?));
+    }
+    let ground = BuiltFrom::open(&arguments.database, arguments.against.as_deref())?;
+    let fault = |error: CompileError| ExportError::Ground { message: error.to_string(), hint: error.hint() };
+    let heights = |rect: PostRect| ground.heights(rect).map_err(fault);
+    files::write_whole_or(&arguments.out, |out| Ok(exports::write_residual(out, product, &heights, work)?))
+}
+
+fn write_package(arguments: &Arguments, product: &Product, work: &Work) -> Result<(), Failure> {
+    let report = Folder::new(&arguments.database).report()?;
+    let job = Job::from_text(&product.manifest.job, &arguments.database)?;
+    let window = [job.limits.window.rows, job.limits.window.cols];
+    files::make_whole(&arguments.out, |path| Ok(exports::write_gpkg(path, product, &report, window, work)?))
+}
+
+fn write_mesh(arguments: &Arguments, product: &Product) -> Result<(), Failure> {
+    let mesh = Mesh::of(product);
+    let coordinates = match arguments.coordinates {
+        Frame::Local => Coordinates::Local,
+        Frame::Map => Coordinates::Map,
+    };
+    let facts = match arguments.format {
+        Format::Glb => Facts::y_up(product),
+        _ => Facts::z_up(product, coordinates),
+    };
+    files::write_whole(&arguments.out, |out| match arguments.format {
+        Format::Obj => exports::write_obj(out, product, &mesh, coordinates),
+        Format::Glb => exports::write_glb(out, product, &mesh),
+        _ => exports::write_ply(out, product, &mesh, coordinates),
+    })?;
+    let mut beside = arguments.out.clone().into_os_string();
+    beside.push(".json");
+    let text = exports::sidecar(product, &mesh, &facts);
+    files::write_whole(&PathBuf::from(beside), |out| std::io::Write::write_all(out, text.as_bytes()))
+}

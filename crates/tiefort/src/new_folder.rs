@@ -1,0 +1,86 @@
+//! A folder of many files that appears under its name only when it is whole.
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use tempfile::TempDir;
+
+use crate::failure::Failure;
+
+/// A folder in the making, beside the place where it will appear.
+#[derive(Debug)]
+pub struct NewFolder {
+    path: PathBuf,
+    making: TempDir,
+}
+
+impl NewFolder {
+    /// Begins a folder that will appear at `path`.
+    ///
+    /// # Errors
+    /// When something is there already, or the folder around it is missing or not writable.
+    pub fn begin(path: &Path) -> Result<Self, Failure> {
+        let is_empty = || fs::read_dir(path).is_ok_and(|mut entries| entries.next().is_none());
+        if path.exists() && !is_empty() {
+            let message = format!("{}: found something there, expected a name that is free", path.display());
+            return Err(Failure::new(message, "give another name, or remove it; nothing is ever overwritten"));
+        }
+        let path = std::path::absolute(path).map_err(|error| Failure::output(path, &error))?;
+        let around = path.parent().unwrap_or(Path::new("/"));
+        let mut builder = tempfile::Builder::new();
+        builder.prefix(".tiefort-");
+        // A temporary folder is private by default; this one is about to be an ordinary one.
+        #[cfg(unix)]
+        builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o777));
+        let making = builder.tempdir_in(around).map_err(|error| Failure::output(&path, &error))?;
+        Ok(Self { path, making })
+    }
+
+    /// Writes a file of this name, `/` between folders.
+    ///
+    /// # Errors
+    /// Those of the system.
+    pub fn put(&self, name: &str, bytes: &[u8]) -> io::Result<()> {
+        let path = self.making.path().join(name);
+        match fs::write(&path, bytes) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => {
+                fs::create_dir_all(path.parent().unwrap_or(self.making.path()))?;
+                fs::write(&path, bytes)
+            }
+            written => written,
+        }
+    }
+
+    /// Lets the folder appear.
+    ///
+    /// # Errors
+    /// When it cannot; then nothing is left behind.
+    pub fn finish(self) -> Result<(), Failure> {
+        fs::rename(self.making.path(), &self.path).map_err(|error| Failure::output(&self.path, &error))?;
+        // It is no longer there to be removed.
+        let _ = self.making.keep();
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_folder_appears_whole_or_not_at_all() {
+        let around = tempfile::tempdir().unwrap();
+        let path = around.path().join("out");
+        let folder = NewFolder::begin(&path).unwrap();
+        folder.put("a/b/c.bin", b"c").unwrap();
+        assert!(!path.exists());
+        drop(folder);
+        assert_eq!(fs::read_dir(around.path()).unwrap().count(), 0);
+        let folder = NewFolder::begin(&path).unwrap();
+        folder.put("a/b/c.bin", b"c").unwrap();
+        folder.finish().unwrap();
+        assert_eq!(fs::read(path.join("a/b/c.bin")).unwrap(), b"c");
+        assert!(NewFolder::begin(&path).unwrap_err().to_string().contains("found something there"));
+    }
+}

@@ -1,0 +1,92 @@
+//! `export`: every format is written, placed, and refused where it cannot be.
+
+use std::fs;
+
+use serde_json::Value;
+
+use crate::scene::{Scene, everything_below};
+
+/// A finished database `a.tdb` of 8 x 8 load modules in 2 x 2 tiles.
+fn built() -> Scene {
+    let scene = Scene::with_job("small.toml", &[]);
+    scene.run_to(0, &["build", "job.toml", "--out", "a.tdb", "--quiet"]);
+    scene
+}
+
+#[test]
+fn every_format_is_written_and_the_same_every_time() {
+    let scene = built();
+    let names = ["modules", "mesh.ply", "mesh.obj", "mesh.glb", "a.tif", "a.gpkg", "flt", "tiles", "terrain"];
+    let formats = ["modules", "ply", "obj", "glb", "geotiff", "gpkg", "openflight", "3dtiles", "quantized-mesh"];
+    for (format, name) in formats.into_iter().zip(names) {
+        for folder in ["one", "two"] {
+            fs::create_dir_all(scene.path(folder)).unwrap();
+            let (out, workers) = (format!("{folder}/{name}"), if folder == "one" { "1" } else { "2" });
+            let mut arguments = vec!["export", "a.tdb", "--format", format, "--out", &out, "--workers", workers];
+            if ["3dtiles", "quantized-mesh"].contains(&format) {
+                arguments.extend(["--assume-datum", "EGM96"]);
+            }
+            let said = scene.run_to(0, &arguments);
+            assert!(said.stdout.is_empty() && said.stderr.contains("64 load modules"), "{format}: {}", said.stderr);
+        }
+    }
+    let (one, two) = (everything_below(&scene.path("one")), everything_below(&scene.path("two")));
+    assert_eq!(one.len(), two.len());
+    for ((path, bytes), (_, others)) in one.iter().zip(&two) {
+        assert!(bytes == others, "{} differs from run to run", path.display());
+    }
+    assert_eq!(fs::read_dir(scene.path("one/modules")).unwrap().count(), 64);
+    assert_eq!(fs::read_dir(scene.path("one/tiles/modules")).unwrap().count(), 64);
+}
+
+#[test]
+fn a_block_is_what_was_asked_for_and_says_where_it_lies() {
+    let scene = built();
+    let block = ["export", "a.tdb", "--format", "glb", "--modules", "2,3..3,5", "--out", "b.glb", "--quiet"];
+    assert!(scene.run_to(0, &block).stderr.is_empty());
+    let sidecar: Value = serde_json::from_slice(&fs::read(scene.path("b.glb.json")).unwrap()).unwrap();
+    assert_eq!(sidecar["offset_m"][0], 506_500.0);
+    assert_eq!(sidecar["bounds_m"]["north"], 3_877_000.0);
+    assert_eq!(sidecar["load_modules"]["north_east"], serde_json::json!([3, 5]));
+    scene.run_to(0, &["export", "a.tdb", "--format", "modules", "--modules", "7,0", "--out", "one"]);
+    assert!(scene.path("one/r0007c0000.slm").exists());
+}
+
+#[test]
+fn residuals_at_every_post_add_up_to_those_of_the_report() {
+    let scene = built();
+    let words = ["--format", "geotiff", "--layer", "residual", "--out", "residual.tif", "--quiet"];
+    scene.run_to(0, &[&["export", "a.tdb"], &words[..]].concat());
+    let file = fs::File::open(scene.path("residual.tif")).unwrap();
+    let image = tiff::decoder::Decoder::new(file).unwrap().read_image().unwrap();
+    let tiff::decoder::DecodingResult::F32(residuals) = image else { panic!("residuals are floats") };
+    assert_eq!(residuals.len(), 161 * 161);
+    let squares: f64 = residuals.iter().map(|&residual| f64::from(residual).powi(2)).sum();
+    let report: Value = serde_json::from_slice(&fs::read(scene.path("a.tdb/report.json")).unwrap()).unwrap();
+    let rms_m = report["residual"]["rms_m"].as_f64().unwrap();
+    assert!(((squares / residuals.len() as f64).sqrt() - rms_m).abs() < 1e-9);
+    let largest = residuals.iter().fold(0.0_f32, |largest, residual| largest.max(residual.abs()));
+    assert_eq!(f64::from(largest), report["residual"]["max_m"].as_f64().unwrap());
+}
+
+#[test]
+fn what_cannot_be_exported_is_refused() {
+    let scene = built();
+    let refuses =
+        |words: &[&str], parts: &[&str]| scene.refuses(&[&["export", "a.tdb", "--format"], words].concat(), parts);
+    refuses(&["ply", "--out", "mesh.obj"], &["mesh.obj", "\"obj\"", "\"ply\""]);
+    refuses(&["ply", "--modules", "0,0..8,0", "--out", "mesh.ply"], &["0,0..8,0", "from 0,0 to 7,7"]);
+    refuses(&["ply", "--modules", "3,0..2,0", "--out", "mesh.ply"], &["3,0..2,0"]);
+    refuses(&["ply", "--lod", "1", "--out", "mesh.ply"], &["level 1", "0"]);
+    refuses(&["glb", "--coordinates", "map", "--out", "mesh.glb"], &["--coordinates map"]);
+    refuses(&["glb", "--layer", "residual", "--out", "mesh.glb"], &["--layer"]);
+    refuses(&["geotiff", "--against", "a.tif", "--out", "b.tif"], &["--against"]);
+    refuses(&["gpkg", "--assume-datum", "EGM96", "--out", "b.gpkg"], &["--assume-datum"]);
+    refuses(&["modules", "--out", "a.tdb"], &["a.tdb", "expected a name that is free"]);
+    for format in ["3dtiles", "quantized-mesh"] {
+        refuses(&[format, "--out", "new"], &["unknown datum", "EGM96"]);
+    }
+    scene.refuses(&["export", "none.tdb", "--format", "ply", "--out", "mesh.ply"], &["none.tdb"]);
+    let said = scene.run_to(2, &["export", "a.tdb", "--format", "3dtiles", "--assume-datum", "sea", "--out", "new"]);
+    assert!(said.stderr.contains("expected EGM96"), "{}", said.stderr);
+}
