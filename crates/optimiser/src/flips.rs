@@ -2,8 +2,8 @@
 
 use crate::form::{Form, squares};
 use crate::patch::Patch;
-use crate::place::Place;
-use crate::sheet::{LEAST_AREA, NONE, Sheet, next, previous};
+use crate::place::{Place, Shape};
+use crate::sheet::{NONE, Sheet, next, previous};
 
 /// Passes at most; hardly any mesh needs more than six.
 const PASSES_MAX: usize = 10;
@@ -63,8 +63,8 @@ fn find(sheet: &Sheet, edge: u32, least: f64, patch: &mut Patch) -> bool {
     let (c, d) = (sheet.apex(edge), sheet.apex(twin));
     let (first, second) = ([a, d, c], [d, b, c]);
     let (at_first, at_second) = (sheet.places(first), sheet.places(second));
-    let area = |[a, b, c]: [Place; 3]| Place::orient(a, b, c);
-    if area(at_first) < LEAST_AREA || area(at_second) < LEAST_AREA || sheet.is_constrained(a, b) {
+    let is_sound = |[a, b, c]: [Place; 3]| Shape::Sound.admits(a, b, c);
+    if !is_sound(at_first) || !is_sound(at_second) || sheet.is_constrained(a, b) {
         return false;
     }
     let moments = &sheet.ground.moments;

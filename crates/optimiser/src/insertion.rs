@@ -4,9 +4,9 @@ use crate::form::{Form, squares};
 use crate::hold::Hold;
 use crate::moments::Sums;
 use crate::patch::Patch;
-use crate::place::Place;
+use crate::place::{Place, Shape};
 use crate::refit::Fit;
-use crate::sheet::{LEAST_AREA, NONE, Sheet, next, previous};
+use crate::sheet::{NONE, Sheet, next, previous};
 
 /// Triangles one insertion may rewrite.
 const REACH_MAX: usize = 14;
@@ -108,7 +108,7 @@ impl Insertion {
             }
         }
         self.flip_around(sheet, guest);
-        let valid = |face: &Face| LEAST_AREA <= Place::orient(guest.at, sheet.at(face.from), sheet.at(face.to));
+        let valid = |face: &Face| Shape::Sound.admits(guest.at, sheet.at(face.from), sheet.at(face.to));
         if !self.faces.iter().all(valid) {
             return None;
         }
@@ -157,7 +157,7 @@ impl Insertion {
         }
         let apex = sheet.apex(face.twin);
         let (a, d, b) = (sheet.at(face.from), sheet.at(apex), sheet.at(face.to));
-        if Place::orient(guest.at, a, d) < LEAST_AREA || Place::orient(guest.at, d, b) < LEAST_AREA {
+        if !Shape::Sound.admits(guest.at, a, d) || !Shape::Sound.admits(guest.at, d, b) {
             return None;
         }
         let old = face.squares + sheet.triangles[beyond as usize].squares;

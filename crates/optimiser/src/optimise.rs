@@ -8,10 +8,10 @@ use crate::flips::flip_all;
 use crate::ground::Ground;
 use crate::hold::Hold;
 use crate::insertion::Insertion;
-use crate::place::{PER_POST, Place};
+use crate::place::{PER_POST, Place, Shape};
 use crate::queue::Queue;
 use crate::removal::Removal;
-use crate::sheet::{LEAST_AREA, Layout, NONE, Sheet, Star};
+use crate::sheet::{Layout, NONE, Sheet, Star};
 use crate::sweep::{Mover, Steps};
 use crate::task::{Effort, Lattice, Task};
 use crate::thin::{Shears, Until, thin};
@@ -381,18 +381,18 @@ impl Work<'_, '_> {
     fn snap(&mut self) {
         self.mover.steps.inner = self.final_step();
         let all = 0..self.sheet.vertices.len() as u32;
-        let mut homeless: Vec<u32> = all.filter(|&vertex| !self.has_place(vertex, LEAST_AREA)).collect();
+        let mut homeless: Vec<u32> = all.filter(|&vertex| !self.has_place(vertex, Shape::Sound)).collect();
         // Once its neighbours stand on the lattice, a vertex finds a place or can go; a place between triangles of any
-        // size is the last resort.
-        homeless.retain(|&vertex| !self.has_place(vertex, LEAST_AREA) && !self.take_out(vertex));
-        homeless.retain(|&vertex| !self.has_place(vertex, 1) && !self.take_out(vertex));
+        // shape is the last resort.
+        homeless.retain(|&vertex| !self.has_place(vertex, Shape::Sound) && !self.take_out(vertex));
+        homeless.retain(|&vertex| !self.has_place(vertex, Shape::Upright) && !self.take_out(vertex));
         assert!(homeless.is_empty(), "{} vertices have no place on the lattice and cannot go", homeless.len());
         self.fill_up();
     }
 
     /// Whether a vertex stands on the final lattice now, or is gone.
-    fn has_place(&mut self, vertex: u32, least_area: i64) -> bool {
-        !self.sheet.is_vertex(vertex) || self.mover.snap(&mut self.sheet, vertex, least_area)
+    fn has_place(&mut self, vertex: u32, shape: Shape) -> bool {
+        !self.sheet.is_vertex(vertex) || self.mover.snap(&mut self.sheet, vertex, shape)
     }
 
     /// Takes a vertex out, if that leaves a valid mesh.

@@ -4,9 +4,9 @@ use crate::form::{Form, squares};
 use crate::hold::Hold;
 use crate::moments::Sums;
 use crate::patch::Patch;
-use crate::place::Place;
+use crate::place::{Place, Shape};
 use crate::refit::Fit;
-use crate::sheet::{LEAST_AREA, Sheet, Star};
+use crate::sheet::{Sheet, Star};
 
 /// Corners of a hole, at most.
 const CORNERS_MAX: usize = 13;
@@ -133,7 +133,7 @@ impl Hole {
         for k in i + 1..j {
             let parts = self.best[i][k] + self.best[k][j];
             let corners = [self.at[i], self.at[k], self.at[j]];
-            if best <= parts || Place::orient(corners[0], corners[1], corners[2]) < LEAST_AREA {
+            if best <= parts || !Shape::Sound.admits(corners[0], corners[1], corners[2]) {
                 continue;
             }
             let heights = [self.height[i], self.height[k], self.height[j]];

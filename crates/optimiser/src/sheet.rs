@@ -7,14 +7,10 @@ use crate::form::Form;
 use crate::ground::Ground;
 use crate::hold::Hold;
 use crate::moments::Sums;
-use crate::place::{PER_POST, Place};
+use crate::place::Place;
 
 /// No edge, no vertex, no triangle.
 pub(crate) const NONE: u32 = u32::MAX;
-
-/// Least doubled area of a triangle, a quarter of a square post. That no triangle turns over keeps the mesh an
-/// embedding; that none comes near it keeps its slopes sane.
-pub(crate) const LEAST_AREA: i64 = (PER_POST * PER_POST / 4) as i64;
 
 /// One vertex.
 #[derive(Clone, Copy, Debug)]

@@ -9,9 +9,9 @@ use crate::flips::flip_all;
 use crate::form::{Form, Hinge};
 use crate::hold::Hold;
 use crate::moments::Sums;
-use crate::place::{PER_POST, Place};
+use crate::place::{PER_POST, Place, Shape};
 use crate::refit::DAMPING;
-use crate::sheet::{LEAST_AREA, Sheet, Star, Vertex, next};
+use crate::sheet::{Sheet, Star, Vertex, next};
 
 /// Relative and absolute damping of steps in the plane.
 const PLANE_DAMPING: (f64, f64) = (0.01, 0.02);
@@ -160,7 +160,7 @@ impl Mover {
         }
         sheet.star(vertex, &mut self.star);
         self.look_around(sheet);
-        if !self.is_valid(at) {
+        if !self.leaves(at, Shape::Large) {
             return false;
         }
         self.sum_rims(sheet);
@@ -168,11 +168,11 @@ impl Mover {
         true
     }
 
-    /// Moves one vertex to the best of the lattice places around it that leave triangles of at least `least_area`;
+    /// Moves one vertex to the best of the lattice places around it that leave every triangle its shape;
     /// `false` where there is none.
     ///
     /// The normal equations say in which order the places are promising, and the first few valid ones are tried.
-    pub fn snap(&mut self, sheet: &mut Sheet, vertex: u32, least_area: i64) -> bool {
+    pub fn snap(&mut self, sheet: &mut Sheet, vertex: u32, shape: Shape) -> bool {
         let record = sheet.vertices[vertex as usize];
         let step = self.step(sheet, &record);
         if record.hold.is_fixed() || (record.at.x % step == 0 && record.at.y % step == 0) {
@@ -186,7 +186,7 @@ impl Mover {
         let mut tried = 0;
         for index in 0..self.ranked.len() {
             let at = self.ranked[index].1;
-            if !self.leaves(at, least_area) {
+            if !self.leaves(at, shape) {
                 continue;
             }
             let stand = self.stand(sheet, at, record.height, record.hold);
@@ -250,15 +250,15 @@ impl Mover {
 
     #[inline(always)]
     fn is_valid(&self, at: Place) -> bool {
-        self.leaves(at, LEAST_AREA)
+        self.leaves(at, Shape::Sound)
     }
 
-    /// Whether a vertex at a place leaves every triangle around it at least so large.
+    /// Whether a vertex at a place leaves every triangle around it such a shape.
     #[inline(always)]
-    fn leaves(&self, at: Place, least_area: i64) -> bool {
+    fn leaves(&self, at: Place, shape: Shape) -> bool {
         (0..self.star.edges.len()).all(|i| {
             let [a, b] = self.opposite(i);
-            least_area <= Place::orient(at, a.0, b.0)
+            shape.admits(at, a.0, b.0)
         })
     }
 
