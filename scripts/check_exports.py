@@ -209,6 +209,12 @@ def check_gpkg(database, arguments, scratch):
     expect(int(layers["load_modules"].triangles.sum()) == database.triangles, "counts add up")
     triangles = geopandas.read_file(path, layer="triangles")
     expect(len(triangles) == database.triangles and bool(triangles.has_z.all()), "triangles: polygons with heights")
+    import pyogrio
+    fast = pyogrio.read_info(path, layer="triangles")["capabilities"]["fast_spatial_filter"]
+    east, north = (database.origin[axis] + database.side / 2 for axis in (0, 1))
+    near = geopandas.read_file(path, layer="triangles", bbox=(east, north, east + 1, north + 1))
+    touching = int(triangles.intersects(near.union_all().envelope).sum())
+    expect(fast and 0 < len(near) <= touching, f"triangles: {len(near)} found through the spatial index")
     area = triangles.geometry.area.sum()
     whole = database.rows * database.cols * database.side ** 2
     expect(abs(area / whole - 1) < 1e-9, f"triangles cover {area / 1e6:.3f} km2")

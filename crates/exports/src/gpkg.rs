@@ -9,7 +9,7 @@ use rusqlite::{Connection, ToSql, params};
 use terrain::{LoadModule, ModuleRect, QUANTA_PER_METRE, metres_of_quanta};
 
 use crate::gpkg_geometry::{polygon, polygon_z};
-use crate::{ExportError, Product, Step, Work};
+use crate::{ExportError, Product, Step, Work, gpkg_index};
 
 /// `GPKG`, and version 1.3 of it.
 const APPLICATION_ID: i32 = 0x4750_4b47;
@@ -105,6 +105,9 @@ pub fn write_gpkg(
     package.add_breaches(product, report, window).map_err(fault)?;
     package.add_tiles(product).map_err(fault)?;
     package.add_triangles(product, work, fault)?;
+    for layer in [MODULES, BREACHES, TILES, TRIANGLES] {
+        gpkg_index::add(&transaction, layer.name).map_err(fault)?;
+    }
     transaction.commit().map_err(fault)
 }
 
@@ -293,7 +296,13 @@ mod tests {
             package.query_row(&format!("SELECT count(*) FROM {layer}"), [], |row| row.get(0)).unwrap()
         };
         assert_eq!([count("load_modules"), count("breaches"), count("tiles"), count("triangles")], [2, 1, 1, 6]);
-        assert_eq!(count("gpkg_contents"), 4);
+        assert_eq!([count("gpkg_contents"), count("gpkg_extensions")], [4, 4]);
+        let found: i64 = package
+            .query_row("SELECT count(*) FROM rtree_triangles_geom WHERE 505400 < maxx AND minx < 505490", [], |row| {
+                row.get(0)
+            })
+            .unwrap();
+        assert_eq!((count("rtree_triangles_geom"), found), (6, 2));
         let id: i32 = package.query_row("PRAGMA application_id", [], |row| row.get(0)).unwrap();
         assert_eq!(id.to_be_bytes(), *b"GPKG");
         let rms: f64 = package.query_row("SELECT rms_m FROM load_modules WHERE col = 0", [], |row| row.get(0)).unwrap();

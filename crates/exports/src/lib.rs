@@ -29,6 +29,7 @@ mod surface;
 pub use surface::{GroundHeights, write_residual, write_surface};
 mod gpkg;
 mod gpkg_geometry;
+mod gpkg_index;
 pub use gpkg::write_gpkg;
 mod earth;
 pub use earth::{Datum, Earth};
