@@ -69,6 +69,19 @@ impl Folder {
         Ok(damage)
     }
 
+    /// Whether every file that `manifest` lists has the bytes it had, and no file of ours lies beside them.
+    ///
+    /// # Errors
+    /// When a folder cannot be listed.
+    pub fn verify_bytes(&self, manifest: &Manifest) -> Result<bool, DatabaseError> {
+        let listed = self.listed_files(manifest);
+        let mut files = 0;
+        for name in [TILES, MODULES, MEASURED, SURVEY] {
+            files += list(&self.path(name))?.len();
+        }
+        Ok(files == listed.len() && listed.iter().all(|(path, stamp)| self.check_file(path, stamp).is_ok()))
+    }
+
     /// Files that the report lists and that are not as they were written. One that is gone is no damage: a person may
     /// have taken it away.
     fn damage_beside(&self, beside: &Beside) -> Vec<Damage> {
