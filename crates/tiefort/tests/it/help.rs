@@ -2,7 +2,8 @@
 
 use crate::scene::Scene;
 
-const COMMANDS: [&str; 9] = ["build", "tile", "plan", "status", "report", "verify", "fidelity", "sample", "tin"];
+const COMMANDS: [&str; 11] =
+    ["build", "tile", "plan", "task", "worker", "status", "report", "verify", "fidelity", "sample", "tin"];
 
 #[test]
 fn the_help_of_every_command_has_an_example_of_it() {
@@ -66,9 +67,6 @@ fn wrong_values_of_arguments_end_with_2_and_say_what_was_expected() {
 #[test]
 fn what_is_not_supported_yet_says_so() {
     let scene = Scene::with_job("small.toml", &[]);
-    for emit in ["slurm", "dask", "ninja"] {
-        scene.refuses(&["plan", "job.toml", "--emit", emit], &[emit, "not supported yet"]);
-    }
     scene.refuses(&["report", "x.tdb", "--format", "html"], &["html", "not supported yet"]);
     scene.refuses(&["tin", "a.tif", "--points", "9", "--out", "m.glb"], &["glb", "not supported yet"]);
 }

@@ -12,5 +12,6 @@ mod measures;
 mod meshes;
 mod raster;
 mod scene;
+mod shared;
 mod starts;
 mod streams;
