@@ -7,7 +7,7 @@
 
 use std::collections::BTreeMap;
 
-use terrain::{LoadModule, ModuleGrid, ModuleId};
+use terrain::{Dem, LoadModule, ModuleGrid, ModuleId, ModuleResidual, Post, Spacing};
 
 /// A corner: east, north, height.
 type Corner = (u16, u16, i32);
@@ -84,6 +84,64 @@ fn edges(module: &LoadModule) -> Result<BTreeMap<(Corner, Corner), u32>, String>
     Ok(edges)
 }
 
+/// The residual of a load module at the posts it owns, post by post: each in the triangle that holds it, or would if
+/// it were moved a little east and still less north (inwards at the area's far sides), interpolated in 128 bits.
+pub(crate) fn residual(module: &LoadModule, dem: &Dem, grid: ModuleGrid, spacing: Spacing) -> ModuleResidual {
+    let (rect, area) = (grid.posts_of(module.id), grid.area());
+    let quanta = spacing.quanta_per_post();
+    // Posts of a load module, as it counts its quanta.
+    let south_west = Post::new(module.id.row as i32 * grid.side_cells, module.id.col as i32 * grid.side_cells);
+    let mut residual = ModuleResidual::default();
+    for triangle in &module.triangles {
+        let corners = triangle.map(|index| {
+            let vertex = module.vertices[usize::from(index)];
+            [i128::from(vertex.x), i128::from(vertex.y), i128::from(vertex.z)]
+        });
+        let span = |axis: usize, from: i32, low: i32, high: i32| {
+            let (least, most) = corners.iter().fold((i128::MAX, i128::MIN), |(least, most), corner| {
+                (least.min(corner[axis]), most.max(corner[axis]))
+            });
+            let first = from + (least / i128::from(quanta)) as i32;
+            let last = from + (most / i128::from(quanta)) as i32;
+            first.max(low)..=last.min(high)
+        };
+        for row in span(1, south_west.row, rect.south, rect.north) {
+            for col in span(0, south_west.col, rect.west, rect.east) {
+                let post = Post::new(row, col);
+                let at = [(col - south_west.col) * quanta, (row - south_west.row) * quanta].map(i128::from);
+                let inwards = [if col == area.east { -1 } else { 1 }, if row == area.north { -1 } else { 1 }];
+                if dem.is_void(post) {
+                    continue;
+                }
+                if let Some(size) = height_above(&corners, at, inwards, dem.height(post)).map(i32::unsigned_abs) {
+                    residual.posts += 1;
+                    residual.largest = residual.largest.max(size);
+                    residual.sum_abs += u64::from(size);
+                    residual.sum_squared += u64::from(size) * u64::from(size);
+                }
+            }
+        }
+    }
+    residual
+}
+
+/// How far a height stands above a triangle that holds its place, rounded to the nearest quantum, halves outwards.
+fn height_above(corners: &[[i128; 3]; 3], at: [i128; 2], inwards: [i128; 2], height: i32) -> Option<i32> {
+    let side = |from: [i128; 3], to: [i128; 3]| {
+        let (east, north) = (to[0] - from[0], to[1] - from[1]);
+        let left = east * (at[1] - from[1]) - north * (at[0] - from[0]);
+        (left, (left, -north * inwards[0], east * inwards[1]) > (0, 0, 0))
+    };
+    let [a, b, c] = *corners;
+    let [(of_a, in_a), (of_b, in_b), (of_c, in_c)] = [side(b, c), side(c, a), side(a, b)];
+    if !(in_a && in_b && in_c) {
+        return None;
+    }
+    let whole = of_a + of_b + of_c;
+    let above = i128::from(height) * whole - (a[2] * of_a + b[2] * of_b + c[2] * of_c);
+    Some((above.signum() * ((2 * above.abs() + whole) / (2 * whole))) as i32)
+}
+
 /// The largest sum of `counts`, row by row, over any window of `rows` x `columns` load modules, cut to the area: added
 /// up one by one.
 pub(crate) fn fullest_window(grid: ModuleGrid, counts: &[u32], rows: u32, columns: u32) -> u64 {
@@ -124,7 +182,7 @@ pub(crate) fn problems(grid: ModuleGrid, modules: &BTreeMap<ModuleId, LoadModule
 
 #[cfg(test)]
 mod tests {
-    use terrain::{ModuleResidual, ModuleVertex};
+    use terrain::ModuleVertex;
 
     use super::*;
 
@@ -182,6 +240,32 @@ mod tests {
         junction.triangles[0] = [0, 1, 5];
         junction.triangles.push([1, 4, 5]);
         check([junction, square(1, false)], "on one side only: a crack");
+    }
+
+    #[test]
+    fn every_post_is_counted_once_and_halves_are_rounded_outwards() {
+        let grid = ModuleGrid { rows: 1, cols: 2, side_cells: 4 };
+        let spacing = Spacing::from_sixteenths(4).unwrap();
+        let side = u16::try_from(4 * spacing.quanta_per_post()).unwrap();
+        let scaled = |col: u32| {
+            let mut module = square(col, false);
+            let whole = |place: u16| if place == 50 { side / 2 } else { place / 100 * side };
+            for vertex in &mut module.vertices {
+                (vertex.x, vertex.y) = (whole(vertex.x), whole(vertex.y));
+            }
+            module.side = side;
+            module
+        };
+        let dem = Dem::from_fn(grid.area(), |post| Some(7 + post.row - 2 * post.col));
+        let parts = [0, 1].map(|col| residual(&scaled(col), &dem, grid, spacing));
+        assert_eq!(parts.map(|part| part.posts), [20, 25]);
+        let sizes: Vec<i64> = (0..5).flat_map(|row| (0..9).map(move |col| i64::from(row - 2 * col))).collect();
+        let sum = |of: fn(&ModuleResidual) -> u64| parts.iter().map(of).sum::<u64>();
+        assert_eq!(sum(|part| part.sum_abs), sizes.iter().map(|size| size.unsigned_abs()).sum::<u64>());
+        assert_eq!(sum(|part| part.sum_squared), sizes.iter().map(|size| (size * size) as u64).sum::<u64>());
+        let half = [[0, 0, 0], [4, 0, 0], [0, 4, 2]];
+        assert_eq!(height_above(&half, [1, 1], [1, 1], 1), Some(1));
+        assert_eq!(height_above(&half, [1, 1], [1, 1], 0), Some(-1));
     }
 
     #[test]

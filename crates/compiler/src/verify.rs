@@ -203,6 +203,12 @@ fn recompute(
         let mut own: Vec<LoadModule> =
             area.tiling.modules(tile, area.grid).iter().filter_map(|module| modules.get(&module).cloned()).collect();
         all.merge(&fidelity::measure(&mut own, &window.measured(area)));
+        let recounted = |module: &LoadModule| {
+            recount::residual(module, &window.dem, area.grid, area.frame.spacing) == module.residual
+        };
+        problems.extend(own.iter().filter(|module| !recounted(module)).map(|module| {
+            format!("load module {}: two ways to measure its residuals against this DEM disagree", module.id)
+        }));
         let differs = |module: &&LoadModule| modules[&module.id].residual != module.residual;
         problems.extend(own.iter().filter(differs).map(|module| {
             format!("load module {}: its residuals against this DEM are not those in its file", module.id)
