@@ -65,7 +65,10 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     })?;
     let WorkerEnd { units, published } = end;
     match published {
-        Some(built) => run.conclude(Finished::from(*built), times),
+        Some(built) => {
+            let tiles = format!("done by workers; this one did {units} units of work and published");
+            run.conclude(Finished { tiles, ..Finished::from(*built) }, times)
+        }
         None => {
             if !arguments.run.quiet {
                 terminal::tell(&format!("the build is done; this worker did {units} units of work"));
