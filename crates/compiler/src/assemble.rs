@@ -1,19 +1,22 @@
 //! Load modules of every tile, their residuals and counts.
 
-use database::{FileStamp, Fingerprint, FingerprintBuilder, TileModules};
+use database::{FileStamp, Fingerprint, FingerprintBuilder, Measured, Stamp, TileModules};
 use fidelity::{Residuals, Tally};
 use job::{Borders, ClipHeights as JobClipHeights, Edges};
 use load_modules::{ClipHeights, Layout, clip, concatenate};
 use terrain::{LATTICE_PER_POST, LatticePoint, LoadModule, ModuleResidual, Post, PostRect, TileId, Vertex};
 
+use crate::measured::{from_measured, to_measured};
 use crate::refine::Published;
-use crate::run::{Run, Worked};
+use crate::run::{ALGORITHM_REVISION, Run, Worked};
 use crate::{CompileError, Progress, Stage};
 
 /// What whole-area stages know of one tile's load modules: numbers only.
-#[derive(Clone)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Assembled {
     pub file: FileStamp,
+    /// The file of what follows.
+    pub measured: FileStamp,
     /// Per load module of the tile, row by row.
     pub modules: Vec<ModuleNumbers>,
     pub residuals: Residuals,
@@ -28,12 +31,15 @@ pub(crate) struct Assembled {
 }
 
 /// Counts and residual of one load module.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ModuleNumbers {
     pub triangles: u32,
     pub polygons: u32,
     pub residual: ModuleResidual,
 }
+
+/// The published TIN of a tile, by its place.
+pub(crate) type TinOf<'a> = dyn Fn(usize) -> &'a Published + Sync + 'a;
 
 /// Assembles every tile.
 pub(crate) fn assemble(
@@ -43,23 +49,29 @@ pub(crate) fn assemble(
 ) -> Result<Vec<Assembled>, CompileError> {
     let none = vec![Vec::new(); tins.len()];
     let done = run.for_each_tile(Stage::Assemble, progress, |tile| {
-        let assembled = assemble_tile(run, tins, &none, tile)?;
-        Ok(if assembled.is_new { Worked::Made(assembled) } else { Worked::Kept(assembled) })
+        let assembled = assemble_tile(run, &|index| &tins[index], &none, tile)?;
+        Ok(if assembled.is_new { Worked::Made(assembled, None) } else { Worked::Kept(assembled) })
     })?;
     Ok(done.into_iter().map(Worked::into_inner).collect())
 }
 
-/// Assembles and publishes one tile, without the points that `removed` lists per tile.
+/// Assembles, measures and publishes one tile, without the points that `removed` lists per tile; or keeps what is
+/// published and fresh.
 pub(crate) fn assemble_tile(
     run: &Run,
-    tins: &[Published],
+    tins: &TinOf,
     removed: &[Vec<LatticePoint>],
     tile: TileId,
 ) -> Result<Assembled, CompileError> {
-    let window = run.window(tile)?;
     let area = &run.area;
+    let fingerprint = modules_fingerprint(run, tins, removed, tile);
+    let stamp = measured_stamp(run, fingerprint);
+    if let Some(kept) = kept(run, &stamp, tile) {
+        return Ok(kept);
+    }
+    let window = run.window(tile)?;
     let layout = Layout { grid: area.grid, modules: area.tiling.modules(tile, area.grid), spacing: area.frame.spacing };
-    let own = &tins[area.tiling.index(tile)];
+    let own = tins(area.tiling.index(tile));
     let mut modules = match run.job.modules.edges {
         Edges::Constrained => concatenate(&own.tin.tin, &layout, &window.importance),
         Edges::Clip(heights) => {
@@ -73,11 +85,39 @@ pub(crate) fn assemble_tile(
     };
     let residuals = fidelity::measure(&mut modules, &window.measured(area));
     let at_source = run.ground.residuals_at_source(&modules, area);
-    let fingerprint = modules_fingerprint(run, tins, removed, tile);
     let (file, is_new) = publish(run, tile, &layout, fingerprint, &modules)?;
     let (points, border) = count_points(run, own, &removed[area.tiling.index(tile)], &window.importance);
     let modules = modules.iter().map(numbers).collect();
-    Ok(Assembled { file, modules, residuals, at_source, points, border, is_new })
+    let nothing = FileStamp::of(&[]);
+    let mut done = Assembled { file, measured: nothing, modules, residuals, at_source, points, border, is_new };
+    done.measured = run.database.write_measured(&stamp, &to_measured(tile, &done))?;
+    Ok(done)
+}
+
+/// What a tile's load modules and the numbers of them are made from, and by.
+fn measured_stamp(run: &Run, modules: Fingerprint) -> Stamp {
+    let mut builder = FingerprintBuilder::new("measured")
+        .fingerprint(modules)
+        .number(run.job.importance.classes.len() as u64)
+        .text(&format!("{:?}", run.job.tiles.borders));
+    if run.ground.has_posts_between() {
+        for record in &run.records {
+            builder = builder.fingerprint(record.blake3);
+        }
+    }
+    Stamp { algorithm_revision: ALGORITHM_REVISION, fingerprint: builder.finish() }
+}
+
+/// The published load modules of a tile, if they and the numbers of them are fresh and undamaged.
+fn kept(run: &Run, stamp: &Stamp, tile: TileId) -> Option<Assembled> {
+    let folder = run.database.folder();
+    let (found, measured) = folder.read_measured(tile).ok()?;
+    let area = &run.area;
+    let is_whole = |measured: &Measured| measured.modules.len() == area.tiling.modules(tile, area.grid).iter().count();
+    let is_fresh = found == *stamp && is_whole(&measured);
+    folder.check_file(&folder.modules_path(tile), &measured.modules_file).ok().filter(|()| is_fresh)?;
+    let file = folder.stamp_file(&folder.measured_path(tile)).ok()?;
+    Some(from_measured(measured, file))
 }
 
 /// The published load modules of a tile as they are: their own numbers, and residuals against today's ground.
@@ -89,7 +129,8 @@ pub(crate) fn read_assembled(run: &Run, tins: &[Published], tile: TileId) -> Res
     let residuals = fidelity::measure(&mut modules, &window.measured(area));
     let at_source = run.ground.residuals_at_source(&modules, area);
     let (points, border) = count_points(run, &tins[area.tiling.index(tile)], &[], &window.importance);
-    Ok(Assembled { file, modules: as_published, residuals, at_source, points, border, is_new: false })
+    let measured = folder.stamp_file(&folder.measured_path(tile))?;
+    Ok(Assembled { file, measured, modules: as_published, residuals, at_source, points, border, is_new: false })
 }
 
 fn numbers(module: &LoadModule) -> ModuleNumbers {
@@ -101,18 +142,18 @@ fn numbers(module: &LoadModule) -> ModuleNumbers {
 }
 
 /// The points in and around a tile that clipping needs.
-pub(crate) fn points_around(run: &Run, tins: &[Published], removed: &[Vec<LatticePoint>], tile: TileId) -> Vec<Vertex> {
+pub(crate) fn points_around(run: &Run, tins: &TinOf, removed: &[Vec<LatticePoint>], tile: TileId) -> Vec<Vertex> {
     let mut near = run.area.tiling.neighbours(tile);
     near.push(tile);
     let indices: Vec<usize> = near.iter().map(|&other| run.area.tiling.index(other)).collect();
-    let all = indices.iter().flat_map(|&index| tins[index].tin.tin.vertices.iter().copied());
+    let all = indices.iter().flat_map(|&index| tins(index).tin.tin.vertices.iter().copied());
     let mut gone: Vec<LatticePoint> = indices.iter().flat_map(|&index| removed[index].iter().copied()).collect();
     gone.sort_unstable();
     all.filter(|vertex| gone.binary_search(&vertex.at).is_err()).collect()
 }
 
 /// Of all that the load modules of a tile are made from.
-fn modules_fingerprint(run: &Run, tins: &[Published], removed: &[Vec<LatticePoint>], tile: TileId) -> Fingerprint {
+fn modules_fingerprint(run: &Run, tins: &TinOf, removed: &[Vec<LatticePoint>], tile: TileId) -> Fingerprint {
     let mut builder = FingerprintBuilder::new("modules").text(&format!("{:?}", run.job.modules));
     let mut reach = match run.job.modules.edges {
         Edges::Constrained => Vec::new(),
@@ -121,7 +162,7 @@ fn modules_fingerprint(run: &Run, tins: &[Published], removed: &[Vec<LatticePoin
     reach.push(tile);
     for other in reach {
         let index = run.area.tiling.index(other);
-        builder = builder.fingerprint(tins[index].stamp.fingerprint).number(removed[index].len() as u64);
+        builder = builder.fingerprint(tins(index).stamp.fingerprint).number(removed[index].len() as u64);
         for point in &removed[index] {
             builder = builder.number(u64::from(point.row as u32) << 32 | u64::from(point.col as u32));
         }

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use database::{Database, Previous, Report};
+use database::{Database, Folder, Manifest, ManifestState, Previous, Report, TileState};
 use job::Job;
 use schedule::Workers;
 
@@ -13,19 +13,22 @@ use crate::ground::Ground;
 use crate::publish::{beginning, database_area, publish};
 use crate::refine::refine;
 use crate::report::Findings;
-use crate::run::{Options, Run};
+use crate::run::{ALGORITHM_REVISION, Options, Run};
 use crate::survey::{allocate, survey};
-use crate::{CompileError, Event, Progress, Stage};
+use crate::{CompileError, Event, Progress, Stage, sources};
 
 /// A finished build.
 #[derive(Debug)]
 pub struct Built {
-    /// What was found; its stages are empty until whoever holds the clock fills them in.
+    /// What was found; its stages are empty until whoever holds the clock fills them in, unless nothing was done: then
+    /// it is the report of the build before.
     pub report: Report,
     /// Tiles that were published before and are still fresh.
     pub kept: usize,
     /// Tiles that were refined now.
     pub rebuilt: usize,
+    /// Whether anything was done at all.
+    pub is_unchanged: bool,
     /// The database, still locked.
     pub database: Database,
 }
@@ -36,12 +39,22 @@ pub struct Built {
 /// When the job cannot be met by any build, a source cannot be used, or the database cannot be written; what
 /// was published before stays as it is.
 pub fn build(job: &Job, folder: &Path, options: &Options, progress: &mut dyn Progress) -> Result<Built, CompileError> {
-    let (run, _) = open(job, folder, options, progress)?;
+    if !options.fresh
+        && let Some(built) = unchanged(job, folder, progress)?
+    {
+        return Ok(built);
+    }
+    let mut run = open(job, folder, options, progress)?;
     if options.fresh {
         run.database.clear()?;
+        run.previous = None;
     }
     run.database.begin(&beginning(&run))?;
+    finish(run, progress)
+}
 
+/// Every stage of a run that has begun; what is published and fresh is kept.
+pub(crate) fn finish(run: Run, progress: &mut dyn Progress) -> Result<Built, CompileError> {
     let curves = survey(&run, progress)?;
     let shares = allocate(&run, curves.as_deref(), progress);
     let tins = refine(&run, &shares, progress)?;
@@ -50,8 +63,8 @@ pub fn build(job: &Job, folder: &Path, options: &Options, progress: &mut dyn Pro
 
     let findings = Findings { run: &run, tins: &tins, assembled: &assembled, enforced: &enforced };
     let report = publish(&findings, &shares, &[], progress)?;
-    let rebuilt = tins.iter().filter(|tile| tile.is_new).count();
-    Ok(Built { report, kept: tins.len() - rebuilt, rebuilt, database: run.database })
+    let rebuilt = tins.iter().filter(|tile| tile.cause.is_some()).count();
+    Ok(Built { report, kept: tins.len() - rebuilt, rebuilt, is_unchanged: false, database: run.database })
 }
 
 /// Everything a run stands on: the plan, the sources, the locked database. Nothing is changed yet.
@@ -60,15 +73,63 @@ pub(crate) fn open<'a>(
     folder: &Path,
     options: &Options<'a>,
     progress: &mut dyn Progress,
-) -> Result<(Run<'a>, Previous), CompileError> {
+) -> Result<Run<'a>, CompileError> {
+    open_with(job, options, progress, |area| Database::create_or_open(folder, area))
+}
+
+/// The same, with the database locked by `lock`.
+pub(crate) fn open_with<'a>(
+    job: &'a Job,
+    options: &Options<'a>,
+    progress: &mut dyn Progress,
+    lock: impl FnOnce(&database::Area) -> Result<(Database, Previous), database::DatabaseError>,
+) -> Result<Run<'a>, CompileError> {
     let area = GamingArea::new(job)?;
     let workers = Workers::new(options.workers);
     progress.tell(Event::Enter(Stage::Read, 0));
+    let records = sources::records(job)?;
     let ground = Ground::open(job, &area, &workers, options.stop)?;
     progress.tell(Event::Leave(Stage::Read));
     for warning in &ground.warnings {
         progress.tell(Event::Note(warning.clone()));
     }
-    let (database, previous) = Database::create_or_open(folder, &database_area(job))?;
-    Ok((Run { job, area, ground, workers, stop: options.stop, database }, previous))
+    let (database, previous) = lock(&database_area(job))?;
+    let previous = match previous {
+        Previous::Database(manifest) => Some(*manifest),
+        Previous::Nothing | Previous::Damaged(_) => None,
+    };
+    Ok(Run { job, area, ground, workers, stop: options.stop, database, records, previous })
+}
+
+/// The finished database in `folder`, if a build of `job` would change nothing in it: made from the same job and the
+/// same sources by the same revision, every tile whole, every file with its bytes. Nothing is decoded for that.
+fn unchanged(job: &Job, folder: &Path, progress: &mut dyn Progress) -> Result<Option<Built>, CompileError> {
+    let there = Folder::new(folder);
+    if !there.manifest().is_ok_and(|manifest| might_be_fresh(&manifest, job)) {
+        return Ok(None);
+    }
+    GamingArea::new(job)?;
+    progress.tell(Event::Enter(Stage::Read, 0));
+    let records = sources::records(job)?;
+    let (database, _) = Database::create_or_open(folder, &database_area(job))?;
+    // Looked at again, now that nobody else can change it.
+    let manifest = there.manifest()?;
+    let report = there.report();
+    let is_fresh = might_be_fresh(&manifest, job) && manifest.sources == records && there.verify_bytes(&manifest)?;
+    progress.tell(Event::Leave(Stage::Read));
+    match report {
+        Ok(report) if is_fresh => {
+            let kept = manifest.tiles.len();
+            Ok(Some(Built { report, kept, rebuilt: 0, is_unchanged: true, database }))
+        }
+        _ => Ok(None),
+    }
+}
+
+/// Whether a manifest is of a finished build of `job` by this revision, as far as it says itself.
+pub(crate) fn might_be_fresh(manifest: &Manifest, job: &Job) -> bool {
+    manifest.state == ManifestState::Complete
+        && manifest.algorithm_revision == ALGORITHM_REVISION
+        && manifest.job == job.canonical_text()
+        && manifest.tiles.iter().all(|record| record.state != TileState::Frozen)
 }

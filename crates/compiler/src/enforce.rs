@@ -56,7 +56,8 @@ pub(crate) fn enforce(
             if !reached.contains(&tile) {
                 return Ok(Worked::Kept(None));
             }
-            Ok(Worked::Made(Some(assemble_tile(run, tins, &enforced.removed, tile)?)))
+            let again = assemble_tile(run, &|index| &tins[index], &enforced.removed, tile)?;
+            Ok(Worked::Made(Some(again), None))
         })?;
         for (slot, fresh) in assembled.iter_mut().zip(again) {
             if let Some(fresh) = fresh.into_inner() {
@@ -175,7 +176,7 @@ fn propose(
         }
         let window = run.ground.around(area, tile, halo_posts(area.grid.side_cells))?;
         let ground = RemovalGround { dem: &window.dem, mask: &window.importance, pins: &[], over: &over };
-        Ok(propose_removals(&points_around(run, tins, removed, tile), &layout, &ground))
+        Ok(propose_removals(&points_around(run, &|index| &tins[index], removed, tile), &layout, &ground))
     });
     let proposals = proposals.map_err(|error| CompileError::from_schedule(Stage::Enforce, &area.tiles, error))?;
     Ok(proposals.into_iter().flatten().collect())

@@ -49,6 +49,20 @@ pub enum CompileError {
         /// Tiles it has.
         total: usize,
     },
+    /// Other processes build something else in the same directory.
+    #[error("{path}: other processes are building from another job or other sources here")]
+    OtherRun {
+        /// The directory.
+        path: String,
+    },
+    /// What a unit of work needs is not done yet.
+    #[error("{unit} needs {needs}, which is not done yet")]
+    NotReady {
+        /// The unit of work.
+        unit: String,
+        /// What it waits for.
+        needs: String,
+    },
     /// The system gave no thread.
     #[error("workers: {found}, expected as many threads as workers")]
     NoThread {
@@ -82,6 +96,10 @@ impl CompileError {
                 Some("this is a fault of the compiler; what was published before is intact".to_owned())
             }
             CompileError::Stopped { .. } => Some("run the same command again to go on from here".to_owned()),
+            CompileError::OtherRun { .. } => {
+                Some("wait for them to end, or build into another folder with --out".to_owned())
+            }
+            CompileError::NotReady { .. } => Some("try again when it is, or run `tiefort build`".to_owned()),
             CompileError::NoThread { .. } => Some("use fewer --workers".to_owned()),
             CompileError::Unfinished { .. } => {
                 Some("run `tiefort build` first, which goes on from what is there".to_owned())
@@ -92,7 +110,11 @@ impl CompileError {
 
     /// Whether trying again later may work.
     pub fn is_transient(&self) -> bool {
-        matches!(self, CompileError::Database(error) if error.is_transient())
+        match self {
+            CompileError::Database(error) => error.is_transient(),
+            CompileError::NotReady { .. } | CompileError::OtherRun { .. } => true,
+            _ => false,
+        }
     }
 
     /// Whether the run ended because it was asked to.

@@ -3,7 +3,6 @@
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, OnceLock};
 
-use database::SourceRecord;
 use fidelity::{SourcePosts, Tally, residuals_at_source};
 use job::{AreaShape, DemSource, ImportanceArea, Job, Smooth};
 use mask::{Mask, Shape, Smoothing};
@@ -12,7 +11,7 @@ use source_files::{ClassRaster, Patch, VoidSummary, read_polygons};
 use terrain::{Dem, GridFrame, Importance, PostRect, TileId};
 
 use crate::area::GamingArea;
-use crate::sources::{Census, Opened, Source, file_record, record};
+use crate::sources::{Census, Opened, Source};
 use crate::{CompileError, Stage, sources};
 
 /// Posts of an area up to which the windows of tiles are kept between stages (7 bytes a post).
@@ -29,8 +28,6 @@ pub(crate) struct Ground {
     pub voids: VoidSummary,
     /// Vertical accuracy of the least accurate source that states one, in metres.
     pub accuracy_m: Option<f64>,
-    /// For the manifest.
-    pub records: Vec<SourceRecord>,
     /// What a person should know about the sources.
     pub warnings: Vec<String>,
 }
@@ -59,18 +56,17 @@ impl Ground {
             DemSource::Sample { seed } => Opened {
                 source: Source::Sample(*seed),
                 voids: VoidSummary::default(),
-                records: vec![record(&format!("sample seed={seed}"), &seed.to_le_bytes())],
                 warnings: Vec::new(),
                 accuracy_m: None,
             },
             DemSource::Files { files, .. } => sources::open(job, area, files, workers, stop)?,
         };
-        let Opened { source, voids, mut records, warnings, accuracy_m } = opened;
-        let mask = open_mask(job, area, &mut records)?;
+        let Opened { source, voids, warnings, accuracy_m } = opened;
+        let mask = open_mask(job, area)?;
         let keep = area.rect.post_count() <= KEPT_POSTS_MAX;
         let kept = keep.then(|| area.tiles.iter().map(|_| OnceLock::new()).collect());
         let (rect, frame) = (area.rect, area.frame);
-        let mut ground = Self { source, mask, rect, frame, kept, voids, records, warnings, accuracy_m };
+        let mut ground = Self { source, mask, rect, frame, kept, voids, warnings, accuracy_m };
         if let Source::Mosaic(_) = ground.source {
             ground.take_census(job, area, workers, stop)?;
         }
@@ -163,14 +159,9 @@ impl Ground {
 
     /// Residuals of load modules at the source's own posts; `None` where those are the posts of the working grid.
     pub fn residuals_at_source(&self, modules: &[terrain::LoadModule], area: &GamingArea) -> Option<Tally> {
-        let Source::Raster(raster) = &self.source else { return None };
+        let (raster, off) = self.posts_between()?;
         let frame = raster.frame();
         let quanta = |metres: f64| metres * f64::from(terrain::QUANTA_PER_METRE);
-        let spacing = self.frame.spacing.metres();
-        let off = [frame.south_west[0] - self.frame.origin_east_m, frame.south_west[1] - self.frame.origin_north_m];
-        if frame.spacing == [spacing; 2] && off.iter().all(|metres| (metres / spacing).fract() == 0.0) {
-            return None;
-        }
         let source = SourcePosts {
             window: raster.window(),
             south_west: off.map(quanta),
@@ -178,6 +169,22 @@ impl Ground {
             height_m: &|post| raster.height_m(post),
         };
         Some(residuals_at_source(modules, area.grid, self.frame.spacing, &source))
+    }
+
+    /// Whether the source's posts are others than those of the working grid, so that two sources may differ in what
+    /// is measured and not in any window.
+    pub fn has_posts_between(&self) -> bool {
+        self.posts_between().is_some()
+    }
+
+    /// The one raster, if its posts are others than those of the working grid, and how far it lies off.
+    fn posts_between(&self) -> Option<(&source_files::Raster, [f64; 2])> {
+        let Source::Raster(raster) = &self.source else { return None };
+        let frame = raster.frame();
+        let spacing = self.frame.spacing.metres();
+        let off = [frame.south_west[0] - self.frame.origin_east_m, frame.south_west[1] - self.frame.origin_north_m];
+        let is_on_grid = frame.spacing == [spacing; 2] && off.iter().all(|metres| (metres / spacing).fract() == 0.0);
+        (!is_on_grid).then_some((raster, off))
     }
 
     /// The ground of any rectangle of the area.
@@ -228,13 +235,13 @@ fn join_importance(parts: &[Arc<Window>], rect: PostRect) -> Importance {
     Importance::new(rect, weights, classes)
 }
 
-fn open_mask(job: &Job, area: &GamingArea, records: &mut Vec<SourceRecord>) -> Result<Mask<'static>, CompileError> {
+fn open_mask(job: &Job, area: &GamingArea) -> Result<Mask<'static>, CompileError> {
     let mut areas = Vec::new();
     for spec in &job.importance.areas {
         areas.push(mask::Area {
             class: job.importance.classes[usize::from(spec.class)].clone(),
             weight: spec.weight,
-            shape: open_shape(job, area, spec, records)?,
+            shape: open_shape(job, area, spec)?,
         });
     }
     let smoothing = match job.importance.smooth {
@@ -244,20 +251,11 @@ fn open_mask(job: &Job, area: &GamingArea, records: &mut Vec<SourceRecord>) -> R
     Ok(Mask { default_weight: job.importance.default_weight, areas, smoothing })
 }
 
-fn open_shape(
-    job: &Job,
-    area: &GamingArea,
-    spec: &ImportanceArea,
-    records: &mut Vec<SourceRecord>,
-) -> Result<Shape<'static>, CompileError> {
+fn open_shape(job: &Job, area: &GamingArea, spec: &ImportanceArea) -> Result<Shape<'static>, CompileError> {
     let (epsg, frame) = (job.area.epsg, area.frame);
     Ok(match &spec.shape {
-        AreaShape::Polygons { file } => {
-            records.push(file_record(&file.written, &file.path)?);
-            Shape::Polygons(read_polygons(&file.path, epsg)?)
-        }
+        AreaShape::Polygons { file } => Shape::Polygons(read_polygons(&file.path, epsg)?),
         AreaShape::RasterValue { file, value } => {
-            records.push(file_record(&file.written, &file.path)?);
             let raster = ClassRaster::read(&file.path, epsg, &frame, area.rect)?;
             // A value beyond 32 bits is in no class raster.
             let value = i32::try_from(*value).ok();

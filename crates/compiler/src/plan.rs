@@ -1,12 +1,12 @@
 //! What a job will do and take, before any work.
 
 use job::{Budget as PointBudget, DemSource, Edges, Effort, Job, TileOrder};
-use schedule::Simulation;
 use terrain::{ModuleRect, PostRect, Side, TileId};
 
 use crate::CompileError;
 use crate::area::GamingArea;
 use crate::refinement::optimising;
+use crate::tasks::is_surveyed;
 
 /// A job, planned.
 #[derive(Clone, Debug, PartialEq)]
@@ -21,6 +21,10 @@ pub struct Plan {
     pub start: u64,
     /// Tiles that can be refined at once: more workers have nothing to do there.
     pub workers_useful: usize,
+    /// Whether tiles are surveyed before they are refined.
+    pub is_surveyed: bool,
+    /// Whether the load modules of a tile are made from its neighbours' TINs too.
+    pub is_clipped: bool,
 }
 
 /// One tile of a plan.
@@ -38,6 +42,8 @@ pub struct PlannedTile {
     pub modules: ModuleRect,
     /// The tiles whose border points seed it.
     pub inherits_from: Vec<TileId>,
+    /// The tiles it waits for: those of lower rank that share a side or a corner with it.
+    pub after: Vec<TileId>,
 }
 
 /// What a build is expected to take. Measured rates of one core at present; other machines differ.
@@ -45,6 +51,10 @@ pub struct PlannedTile {
 pub struct Forecast {
     /// Memory at most, with two workers.
     pub memory_bytes: u64,
+    /// The part of it that is there however many workers there are.
+    pub shared_bytes: u64,
+    /// What each worker adds.
+    pub worker_bytes: u64,
     /// Seconds on one worker.
     pub seconds: f64,
     /// Size of the database.
@@ -61,8 +71,10 @@ const SECONDS_PER_POINT: f64 = 3.5e-6;
 const MEMORY_PER_POST: u64 = 8;
 /// Bytes of memory for a triangle, in TINs, load modules and curves.
 const MEMORY_PER_TRIANGLE: u64 = 60;
-/// Bytes of memory for a post and for a triangle of a tile that is being optimised, and how many tiles are so at once.
-const MEMORY_OPTIMISING: (u64, u64, u64) = (40, 600, 2);
+/// Bytes of memory for a post and for a triangle of a tile that is being optimised.
+const MEMORY_OPTIMISING: (u64, u64) = (40, 600);
+/// The same for a tile that is only grown.
+const MEMORY_GROWING: (u64, u64) = (2, 100);
 /// Bytes of the program itself.
 const MEMORY_BASE: u64 = 8 << 20;
 /// Bytes on disk for a triangle: tile, load module and curve.
@@ -82,7 +94,9 @@ pub fn plan(job: &Job) -> Result<Plan, CompileError> {
         TileOrder::Raster => (job.tiles.rows as usize).min(job.tiles.columns.div_ceil(2) as usize),
     };
     let (budget, start) = (area.budget.area, area.budget.start_total());
-    Ok(Plan { forecast: forecast(job, &area), tiles, budget, start, workers_useful })
+    let is_clipped = matches!(job.modules.edges, Edges::Clip(_));
+    let forecast = forecast(job, &area);
+    Ok(Plan { forecast, tiles, budget, start, workers_useful, is_surveyed: is_surveyed(job), is_clipped })
 }
 
 /// Every tile of an area, row by row from the south-west.
@@ -102,6 +116,7 @@ fn planned(area: &GamingArea, tile: TileId, ranks: &[usize]) -> PlannedTile {
         rect: tiling.rect(tile),
         modules: tiling.modules(tile, area.grid),
         inherits_from: inherits.filter_map(|side| tiling.beyond(tile, side)).collect(),
+        after: tiling.neighbours(tile).into_iter().filter(|&other| tiling.rank(other) < tiling.rank(tile)).collect(),
     }
 }
 
@@ -123,28 +138,15 @@ fn forecast(job: &Job, area: &GamingArea) -> Forecast {
         Some(Effort::Normal) => 35e-6,
         Some(Effort::Best) => 200e-6,
     };
-    let (of_post, of_triangle, at_once) = MEMORY_OPTIMISING;
+    let (of_post, of_triangle) = if optimising(job).is_some() { MEMORY_OPTIMISING } else { MEMORY_GROWING };
     let tiles = area.tiles.len() as u64;
-    let in_work = (posts * of_post + triangles * of_triangle) / tiles * at_once.min(tiles);
-    let in_work = if optimising(job).is_some() { in_work } else { 0 };
+    let worker_bytes = (posts * of_post + triangles * of_triangle) / tiles;
+    let shared_bytes = MEMORY_BASE + posts * MEMORY_PER_POST + triangles * MEMORY_PER_TRIANGLE;
     Forecast {
-        memory_bytes: in_work + MEMORY_BASE + posts * MEMORY_PER_POST + triangles * MEMORY_PER_TRIANGLE,
+        memory_bytes: shared_bytes + worker_bytes * tiles.min(2),
+        shared_bytes,
+        worker_bytes,
         seconds: posts as f64 * per_post + points * SECONDS_PER_POINT + triangles as f64 * per_triangle,
         disk_bytes: triangles * DISK_PER_TRIANGLE,
     }
-}
-
-/// Plays the refinement of a plan with `workers` workers; a tile takes as long as it has posts, in posts.
-///
-/// # Panics
-/// When there is no worker.
-pub fn simulate(plan: &Plan, workers: usize) -> Simulation {
-    let ranks: Vec<usize> = plan.tiles.iter().map(|tile| tile.rank).collect();
-    let near = |a: TileId, b: TileId| a != b && a.row.abs_diff(b.row) <= 1 && a.col.abs_diff(b.col) <= 1;
-    let around = |tile: &PlannedTile| -> Vec<usize> {
-        (0..plan.tiles.len()).filter(|&other| near(tile.tile, plan.tiles[other].tile)).collect()
-    };
-    let neighbours: Vec<Vec<usize>> = plan.tiles.iter().map(around).collect();
-    let durations: Vec<f64> = plan.tiles.iter().map(|tile| tile.rect.post_count() as f64).collect();
-    schedule::simulate(&schedule::RankedTasks::new(&ranks, &neighbours), workers, &durations)
 }

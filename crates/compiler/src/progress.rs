@@ -43,6 +43,8 @@ pub enum Event {
     Enter(Stage, usize),
     /// A tile of a stage begins.
     Started(Stage, TileId),
+    /// Why a tile that was published before is made again; told just before it is done.
+    Because(Stage, TileId, String),
     /// A tile of a stage is done.
     Done(Stage, TileId),
     /// A tile of a stage was published before and is still fresh.

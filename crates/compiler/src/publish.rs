@@ -31,10 +31,14 @@ pub(crate) fn database_area(job: &Job) -> Area {
     }
 }
 
-/// A manifest of a build that has nothing yet.
+/// A manifest of a build that has not published anything yet.
 pub(crate) fn beginning(run: &Run) -> Manifest {
     let mut manifest = Manifest::new(database_area(run.job), run.job.canonical_text(), ALGORITHM_REVISION);
-    manifest.sources = run.ground.records.clone();
+    manifest.sources = run.records.clone();
+    // What was there before, by its bytes: while the build is under way, these files are not its own yet.
+    if let Some(previous) = &run.previous {
+        manifest.tiles.clone_from(&previous.tiles);
+    }
     manifest
 }
 
@@ -93,6 +97,8 @@ fn fill(
     let record = manifest.tile_mut(tile).expect("the manifest lists every tile");
     record.state = state;
     record.fingerprint = Some(tin.stamp.fingerprint);
+    record.made_from.clone_from(&tin.made_from);
+    record.measured = Some(assembled.measured);
     record.tin = Some(folder.stamp_file(&folder.tile_path(tile))?);
     record.slm = Some(assembled.file);
     record.curve = if has_curve { Some(folder.stamp_file(&folder.curve_path(tile))?) } else { None };

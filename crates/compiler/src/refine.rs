@@ -2,23 +2,26 @@
 
 use std::sync::{Arc, OnceLock};
 
-use database::{FingerprintBuilder, Stamp};
+use database::{FingerprintBuilder, MadeFrom, Stamp};
 use terrain::{TileId, TileTin, Vertex};
 
+use crate::cause::{Cause, cause, made_from, summary};
 use crate::ground::Window;
 use crate::refinement::Refinement;
 use crate::run::{Run, Worked};
 use crate::survey::Shares;
-use crate::tasks::{inherited, posts_of, tile_refinement};
-use crate::{CompileError, Progress, Stage};
+use crate::tasks::{TileBudget, inherited, posts_of, tile_refinement};
+use crate::{CompileError, Event, Progress, Stage};
 
 /// A tile's published TIN and what it was made from.
 #[derive(Clone)]
 pub(crate) struct Published {
     pub tin: Arc<TileTin>,
     pub stamp: Stamp,
-    /// Whether this run made it.
-    pub is_new: bool,
+    /// The same by parts; unknown where an earlier build did not say.
+    pub made_from: Option<MadeFrom>,
+    /// Why this run made it, if it did.
+    pub cause: Option<Cause>,
 }
 
 /// Refines every tile, or keeps what is published and fresh.
@@ -28,16 +31,36 @@ pub(crate) fn refine(run: &Run, shares: &Shares, progress: &mut dyn Progress) ->
         let published = |other: TileId| {
             &*slots[run.area.tiling.index(other)].get().expect("lower-ranked neighbours are published first").tin
         };
-        let seeds = inherited(&run.area.tiling, tile, published);
         let index = run.area.tiling.index(tile);
-        let refinement = tile_refinement(run.job, &run.area, tile, &shares.tiles[index], posts_of(&seeds));
-        let window = run.window(tile)?;
-        let done = refine_or_keep(run, &window, &refinement, &seeds)?;
-        let kept = !done.is_new;
+        let done = refine_tile(run, &shares.tiles[index], &inherited(&run.area.tiling, tile, published), tile)?;
+        let cause = done.cause.clone();
         assert!(slots[index].set(done).is_ok(), "each tile is refined once");
-        Ok(if kept { Worked::Kept(()) } else { Worked::Made(()) })
+        Ok(match cause {
+            None => Worked::Kept(()),
+            Some(Cause::New) => Worked::Made((), None),
+            Some(cause) => Worked::Made((), Some(cause.to_string())),
+        })
     })?;
-    Ok(slots.into_iter().map(|slot| slot.into_inner().expect("every tile was refined")).collect())
+    let tins = slots.into_iter().map(|slot| slot.into_inner().expect("every tile was refined"));
+    let tins: Vec<Published> = tins.collect();
+    let causes: Vec<(TileId, Cause)> =
+        tins.iter().filter_map(|tile| Some((tile.tin.tile, tile.cause.clone()?))).collect();
+    if let Some(text) = summary(tins.len(), &causes) {
+        progress.tell(Event::Note(text));
+    }
+    Ok(tins)
+}
+
+/// Refines a tile that inherits `seeds`, or keeps what is published and fresh.
+pub(crate) fn refine_tile(
+    run: &Run,
+    budget: &TileBudget,
+    seeds: &[Vertex],
+    tile: TileId,
+) -> Result<Published, CompileError> {
+    let refinement = tile_refinement(run.job, &run.area, tile, budget, posts_of(seeds));
+    let window = run.window(tile)?;
+    refine_or_keep(run, &window, &refinement, seeds)
 }
 
 /// Keeps a tile that was made from the same inputs, and refines any other.
@@ -49,15 +72,18 @@ fn refine_or_keep(
 ) -> Result<Published, CompileError> {
     let stamp = tile_stamp(run, window, refinement, seeds);
     let tile = refinement.task.tile;
+    let parts = made_from(window, refinement, |builder| feed_seeds(builder, seeds));
     let folder = run.database.folder();
-    if folder.tile_stamp(tile).ok().flatten() == Some(stamp)
+    let published = folder.tile_stamp(tile);
+    if matches!(published, Ok(Some(found)) if found == stamp)
         && let Ok((_, tin)) = folder.read_tile(tile)
     {
-        return Ok(Published { tin: Arc::new(tin), stamp, is_new: false });
+        return Ok(Published { tin: Arc::new(tin), stamp, made_from: Some(parts), cause: None });
     }
+    let cause = cause(run, tile, &published, &stamp, &parts);
     let tin = refinement.run(window, seeds);
     run.database.write_tile(&stamp, &tin)?;
-    Ok(Published { tin: Arc::new(tin), stamp, is_new: true })
+    Ok(Published { tin: Arc::new(tin), stamp, made_from: Some(parts), cause: Some(cause) })
 }
 
 /// What a tile's TIN is made from.
@@ -67,11 +93,16 @@ pub(crate) fn tile_stamp(run: &Run, window: &Window, refinement: &Refinement, se
 
 fn feed(builder: FingerprintBuilder, refinement: &Refinement, seeds: &[Vertex]) -> FingerprintBuilder {
     let task = &refinement.task;
-    let mut builder = builder
+    let builder = builder
         .text(&format!("{:?} {:?} {:?} {:?}", task.rule, task.stop, task.seams, refinement.optimising))
         .text(&format!("{:?}", task.frame))
-        .text(&format!("{:?} {:?}", task.border, task.kept))
-        .number(seeds.len() as u64);
+        .text(&format!("{:?} {:?}", task.border, task.kept));
+    feed_seeds(builder, seeds)
+}
+
+/// The border points that a tile inherits or keeps.
+pub(crate) fn feed_seeds(builder: FingerprintBuilder, seeds: &[Vertex]) -> FingerprintBuilder {
+    let mut builder = builder.number(seeds.len() as u64);
     for seed in seeds {
         builder = builder.number(pack(seed.at.row, seed.at.col)).number(u64::from(seed.height as u32));
     }

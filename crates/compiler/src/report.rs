@@ -1,5 +1,7 @@
 //! The numbers of a finished build, as the report gives them. Times are added by whoever holds the clock.
 
+use std::collections::BTreeMap;
+
 use database::{
     Report, ReportBreach, ReportClass, ReportPerModule, ReportPerWindow, ReportPoints, ReportPool, ReportRefusals,
     ReportResidual, ReportStops, ReportVoids, Totals,
@@ -71,6 +73,8 @@ impl Findings<'_> {
             bound,
             stops: self.stops(),
             warnings: run.ground.warnings.clone(),
+            tiles: Vec::new(),
+            files: BTreeMap::new(),
         })
     }
 

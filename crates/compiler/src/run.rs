@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use database::{Database, FingerprintBuilder, Stamp};
+use database::{Database, FingerprintBuilder, Manifest, SourceRecord, Stamp};
 use job::Job;
 use schedule::{Event as Scheduled, RankedTasks, Workers, in_rank_order_observed};
 use terrain::TileId;
@@ -34,12 +34,16 @@ pub(crate) struct Run<'a> {
     pub workers: Workers,
     pub stop: &'a AtomicBool,
     pub database: Database,
+    /// What the heights and weights are made from.
+    pub records: Vec<SourceRecord>,
+    /// What `database.json` said before this run.
+    pub previous: Option<Manifest>,
 }
 
 /// How a stage dealt with one tile.
 pub(crate) enum Worked<R> {
-    /// It was done now.
-    Made(R),
+    /// It was done now; and why, where something was there before.
+    Made(R, Option<String>),
     /// What was published is fresh.
     Kept(R),
 }
@@ -47,7 +51,7 @@ pub(crate) enum Worked<R> {
 impl<R> Worked<R> {
     pub fn into_inner(self) -> R {
         match self {
-            Worked::Made(result) | Worked::Kept(result) => result,
+            Worked::Made(result, _) | Worked::Kept(result) => result,
         }
     }
 }
@@ -85,9 +89,12 @@ impl Run<'_> {
         let tiles = &self.area.tiles;
         progress.tell(Event::Enter(stage, tiles.len()));
         let observe = |event: Scheduled<Worked<R>>| {
+            if let Scheduled::Done(index, Worked::Made(_, Some(why))) = &event {
+                progress.tell(Event::Because(stage, tiles[*index], why.clone()));
+            }
             progress.tell(match event {
                 Scheduled::Started(index) => Event::Started(stage, tiles[index]),
-                Scheduled::Done(index, Worked::Made(_)) => Event::Done(stage, tiles[index]),
+                Scheduled::Done(index, Worked::Made(..)) => Event::Done(stage, tiles[index]),
                 Scheduled::Done(index, Worked::Kept(_)) => Event::Kept(stage, tiles[index]),
             });
         };

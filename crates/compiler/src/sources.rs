@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
 use database::{Fingerprint, SourceRecord};
-use job::{Job, Resampling, SourceFile, SourceSaid, Voids};
+use job::{AreaShape, DemSource, Job, Resampling, SourceFile, SourceSaid, Voids};
 use schedule::Workers;
 use source_files::{
     Crs, DemFile, Mosaic, MosaicRules, MosaicVoids, Patch, Raster, Reading, SourceError, Standing, VoidPolicy,
@@ -29,7 +29,6 @@ pub(crate) enum Source {
 pub(crate) struct Opened {
     pub source: Source,
     pub voids: VoidSummary,
-    pub records: Vec<SourceRecord>,
     pub warnings: Vec<String>,
     pub accuracy_m: Option<f64>,
 }
@@ -53,18 +52,13 @@ pub(crate) fn open(
     workers: &Workers,
     stop: &AtomicBool,
 ) -> Result<Opened, CompileError> {
-    let mut records = Vec::new();
-    for file in files {
-        let attribution = file.said.attribution.clone();
-        records.push(SourceRecord { attribution, ..file_record(&file.written, &file.path)? });
-    }
     if let Some((decoded, voids)) = open_alone(job, area, files, workers, stop)? {
         let Decoded { source, warnings, accuracy_m } = decoded;
-        return Ok(Opened { source: Source::Raster(Box::new(source)), voids, records, warnings, accuracy_m });
+        return Ok(Opened { source: Source::Raster(Box::new(source)), voids, warnings, accuracy_m });
     }
     let Decoded { source, warnings, accuracy_m } = open_mosaic(job, area, files, workers, stop)?;
     let voids = VoidSummary::default();
-    Ok(Opened { source: Source::Mosaic(Box::new(source)), voids, records, warnings, accuracy_m })
+    Ok(Opened { source: Source::Mosaic(Box::new(source)), voids, warnings, accuracy_m })
 }
 
 /// A datum's name without what people write differently: `EGM 96` is `egm96`.
@@ -247,13 +241,39 @@ pub(crate) fn decode(
     Ok(file.assemble(window, decoded.into_iter().flatten().collect())?)
 }
 
+/// What a job's heights and weights are made from: the content of every file it names, hashed and not decoded.
+///
+/// # Errors
+/// When a file cannot be read.
+pub(crate) fn records(job: &Job) -> Result<Vec<SourceRecord>, CompileError> {
+    let mut records = Vec::new();
+    match &job.dem.source {
+        DemSource::Sample { seed } => records.push(record(&format!("sample seed={seed}"), &seed.to_le_bytes())),
+        DemSource::Files { files, .. } => {
+            for file in files {
+                let attribution = file.said.attribution.clone();
+                records.push(SourceRecord { attribution, ..file_record(&file.written, &file.path)? });
+            }
+        }
+    }
+    for area in &job.importance.areas {
+        match &area.shape {
+            AreaShape::Polygons { file } | AreaShape::RasterValue { file, .. } => {
+                records.push(file_record(&file.written, &file.path)?);
+            }
+            AreaShape::Sample(_) => {}
+        }
+    }
+    Ok(records)
+}
+
 /// The record of a file that a build was made from.
-pub(crate) fn file_record(written: &str, path: &Path) -> Result<SourceRecord, CompileError> {
+fn file_record(written: &str, path: &Path) -> Result<SourceRecord, CompileError> {
     Ok(record(written, &source_files::content(path)?))
 }
 
 /// The record of some content.
-pub(crate) fn record(path: &str, content: &[u8]) -> SourceRecord {
+fn record(path: &str, content: &[u8]) -> SourceRecord {
     SourceRecord { path: path.to_owned(), blake3: Fingerprint::of_bytes(content), attribution: None }
 }
 

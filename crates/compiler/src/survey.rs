@@ -1,6 +1,6 @@
 //! Survey and allocation: what would each tile gain, and what may it therefore spend.
 
-use database::FingerprintBuilder;
+use database::{FingerprintBuilder, Stamp};
 use job::{Budget as PointBudget, Edges};
 use terrain::{GainCurve, TileId};
 use tiling::{Allocation, Gains, allocate_equally, allocate_globally, points_equally, points_globally};
@@ -25,25 +25,27 @@ pub(crate) fn survey(run: &Run, progress: &mut dyn Progress) -> Result<Option<Ve
     if !is_surveyed(run.job) {
         return Ok(None);
     }
-    let level = geometry::widest_level();
-    let curves = run.for_each_tile(Stage::Survey, progress, |tile: TileId| {
-        let (window, task) = (run.window(tile)?, survey_task(run.job, &run.area, tile));
-        let coarse = if is_surveyed_in_haste(run.job) { coarse(&window, &task) } else { None };
-        let (window, task) = match &coarse {
-            Some((window, task)) => (window, task),
-            None => (&*window, &task),
-        };
-        let stamp = run.stamp("survey", window, |builder| feed(builder, task));
-        if run.database.folder().curve_stamp(tile).ok().flatten() == Some(stamp)
-            && let Ok((_, curve)) = run.database.folder().read_curve(tile)
-        {
-            return Ok(Worked::Kept(curve));
-        }
-        let curve = tin::survey(&window.dem, &window.importance, task, level);
-        run.database.write_curve(&stamp, &curve)?;
-        Ok(Worked::Made(curve))
-    })?;
+    let curves = run.for_each_tile(Stage::Survey, progress, |tile| Ok(survey_tile(run, tile)?.1))?;
     Ok(Some(curves.into_iter().map(Worked::into_inner).collect()))
+}
+
+/// Surveys a tile, or keeps what is published and fresh; with the stamp of what it is made from.
+pub(crate) fn survey_tile(run: &Run, tile: TileId) -> Result<(Stamp, Worked<GainCurve>), CompileError> {
+    let (window, task) = (run.window(tile)?, survey_task(run.job, &run.area, tile));
+    let coarse = if is_surveyed_in_haste(run.job) { coarse(&window, &task) } else { None };
+    let (window, task) = match &coarse {
+        Some((window, task)) => (window, task),
+        None => (&*window, &task),
+    };
+    let stamp = run.stamp("survey", window, |builder| feed(builder, task));
+    if run.database.folder().curve_stamp(tile).ok().flatten() == Some(stamp)
+        && let Ok((_, curve)) = run.database.folder().read_curve(tile)
+    {
+        return Ok((stamp, Worked::Kept(curve)));
+    }
+    let curve = tin::survey(&window.dem, &window.importance, task, geometry::widest_level());
+    run.database.write_curve(&stamp, &curve)?;
+    Ok((stamp, Worked::Made(curve, None)))
 }
 
 fn feed(builder: FingerprintBuilder, task: &SurveyTask) -> FingerprintBuilder {

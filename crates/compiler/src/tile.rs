@@ -4,15 +4,16 @@ use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Arc;
 
-use database::{Database, DatabaseError, Folder, Previous, Report};
+use database::{Database, DatabaseError, Folder, Manifest, Report, TileRecord};
 use job::{Edges, Job};
 use terrain::{Post, SeamSides, Side, TileId, TileTin, Vertex};
 
 use crate::assemble::{Assembled, assemble, assemble_tile, read_assembled};
 use crate::build::open;
+use crate::cause::{Cause, made_from};
 use crate::enforce::enforce;
 use crate::publish::{beginning, publish};
-use crate::refine::{Published, tile_stamp};
+use crate::refine::{Published, feed_seeds, tile_stamp};
 use crate::refinement::Refinement;
 use crate::report::Findings;
 use crate::run::{Options, Run, Worked};
@@ -50,8 +51,8 @@ pub fn rebuild_tile(
 ) -> Result<Rebuilt, CompileError> {
     // Nothing is created where there is nothing to go on from.
     Folder::new(folder).manifest()?;
-    let (run, previous) = open(job, folder, options, progress)?;
-    let mut frozen = refuse_unfinished(&run, folder, tile, previous)?;
+    let run = open(job, folder, options, progress)?;
+    let mut frozen = refuse_unfinished(&run, folder, tile)?;
     let shares = published_shares(&run, progress)?;
     let mut tins = published_tins(&run)?;
     run.database.begin(&beginning(&run))?;
@@ -97,7 +98,7 @@ fn reassemble(
     let none = vec![Vec::new(); tins.len()];
     let done = run.for_each_tile(Stage::Assemble, progress, |tile| {
         if reached.iter().any(|&(other, _)| other == tile) {
-            return Ok(Worked::Made(assemble_tile(run, tins, &none, tile)?));
+            return Ok(Worked::Made(assemble_tile(run, &|index| &tins[index], &none, tile)?, None));
         }
         Ok(Worked::Kept(read_assembled(run, tins, tile)?))
     })?;
@@ -118,7 +119,7 @@ fn stale(run: &Run, shares: &Shares, tins: &[Published], reached: &[(TileId, boo
 }
 
 /// Tiles that are frozen already; a refusal when there is nothing whole to go on from.
-fn refuse_unfinished(run: &Run, folder: &Path, tile: TileId, previous: Previous) -> Result<Vec<TileId>, CompileError> {
+fn refuse_unfinished(run: &Run, folder: &Path, tile: TileId) -> Result<Vec<TileId>, CompileError> {
     let tiling = &run.area.tiling;
     if !tiling.contains(tile) {
         return Err(CompileError::Impossible {
@@ -128,16 +129,12 @@ fn refuse_unfinished(run: &Run, folder: &Path, tile: TileId, previous: Previous)
             hint: "rows count from the south, columns from the west, both from 0".into(),
         });
     }
-    let manifest = match previous {
-        Previous::Database(manifest) => *manifest,
-        Previous::Damaged(error) => return Err(error.into()),
-        Previous::Nothing => {
-            let path = run.database.folder().path(database::files::DATABASE);
-            return Err(DatabaseError::Missing { path }.into());
-        }
+    let Some(manifest) = &run.previous else {
+        let path = run.database.folder().path(database::files::DATABASE);
+        return Err(DatabaseError::Missing { path }.into());
     };
     // A build that was stopped may have left tiles of two different grounds side by side.
-    if manifest.state != database::ManifestState::Complete {
+    if manifest.state != database::ManifestState::Complete && !is_whole_but(run, manifest, tile) {
         return Err(CompileError::Unfinished { path: folder.display().to_string() });
     }
     let job = run.job.canonical_text();
@@ -151,6 +148,24 @@ fn refuse_unfinished(run: &Run, folder: &Path, tile: TileId, previous: Previous)
     }
     let is_frozen = |record: &&database::TileRecord| record.state == database::TileState::Frozen;
     Ok(manifest.tiles.iter().filter(is_frozen).map(database::TileRecord::tile).collect())
+}
+
+/// Whether every tile but this one is as the last complete database had it: a re-run of this tile was broken off.
+fn is_whole_but(run: &Run, manifest: &Manifest, tile: TileId) -> bool {
+    let folder = run.database.folder();
+    let is_whole = |record: &TileRecord| {
+        let other = record.tile();
+        let surveyed = is_surveyed(run.job).then_some((folder.curve_path(other), record.curve));
+        let alone = (other != tile).then_some([
+            (folder.tile_path(other), record.tin),
+            (folder.modules_path(other), record.slm),
+            (folder.measured_path(other), record.measured),
+        ]);
+        let files = surveyed.into_iter().chain(alone.into_iter().flatten());
+        files.into_iter().all(|(path, stamp)| stamp.is_some_and(|stamp| folder.check_file(&path, &stamp).is_ok()))
+    };
+    // Clipped load modules reach into their neighbours' files, so nothing around the tile would be as it was.
+    run.job.modules.edges == Edges::Constrained && manifest.tiles.iter().all(is_whole)
 }
 
 /// The allocation the database was built with, from its published curves.
@@ -168,7 +183,9 @@ fn published_tins(run: &Run) -> Result<Vec<Published>, CompileError> {
     let folder = run.database.folder();
     let read = |&tile: &TileId| {
         let (stamp, tin) = folder.read_tile(tile)?;
-        Ok(Published { tin: Arc::new(tin), stamp, is_new: false })
+        let record = run.previous.as_ref().and_then(|manifest| manifest.tile(tile));
+        let made_from = record.and_then(|record| record.made_from.clone());
+        Ok(Published { tin: Arc::new(tin), stamp, made_from, cause: None })
     };
     run.area.tiles.iter().map(read).collect()
 }
@@ -188,7 +205,8 @@ fn refine_whole(run: &Run, shares: &Shares, tins: &[Published], tile: TileId) ->
 fn refine_tile(run: &Run, refinement: &Refinement, seeds: &[Vertex]) -> Result<Published, CompileError> {
     let window = run.window(refinement.task.tile)?;
     let stamp = tile_stamp(run, &window, refinement, seeds);
-    Ok(Published { tin: Arc::new(refinement.run(&window, seeds)), stamp, is_new: true })
+    let made_from = Some(made_from(&window, refinement, |builder| feed_seeds(builder, seeds)));
+    Ok(Published { tin: Arc::new(refinement.run(&window, seeds)), stamp, made_from, cause: Some(Cause::Other) })
 }
 
 /// Runs `tile`, with its sides frozen if its border would change. Gives it, and whether it is frozen.

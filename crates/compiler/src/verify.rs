@@ -4,35 +4,18 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-use database::{Folder, Manifest, ManifestState, ReportResidual, TileState};
+use database::{Folder, Manifest, ManifestState, ReportResidual};
 use fidelity::Residuals;
 use job::{Count, DemSource, Edges, Job, SourceEntry, SourceFile, SourceSaid};
 use limits::{polygons_of, triangles_of};
 use schedule::Workers;
-use terrain::{LoadModule, ModuleId, Side, TileId};
+use terrain::{LoadModule, ModuleId, Side};
 
 use crate::CompileError;
 use crate::area::GamingArea;
 use crate::ground::Ground;
+use crate::recount;
 use crate::report::residual_of;
-
-/// How a database stands.
-#[derive(Clone, Debug)]
-pub struct Status {
-    /// Its `database.json`.
-    pub manifest: Manifest,
-    /// Whether a build is at work on it now.
-    pub locked: bool,
-}
-
-/// Reads how a database stands, without touching it.
-///
-/// # Errors
-/// When there is none, or its `database.json` cannot be read.
-pub fn status(folder: &Path) -> Result<Status, CompileError> {
-    let manifest = Folder::new(folder).manifest()?;
-    Ok(Status { manifest, locked: database::Lock::is_held(folder) })
-}
 
 /// What a verification found.
 #[derive(Clone, Debug, Default)]
@@ -69,6 +52,7 @@ pub fn verify(folder: &Path, dem: Option<&Path>) -> Result<Verdict, CompileError
     let modules = read_modules(&folder, &area)?;
     verdict.checked_modules = modules.len();
     verdict.problems.extend(check_modules(&area, &modules));
+    verdict.problems.extend(recount::problems(area.grid, &modules));
     // With constrained edges no limit is ever exceeded; with clipped ones only where a breach says so.
     if job.modules.edges == Edges::Constrained || manifest.totals.breaches == 0 {
         verdict.problems.extend(check_limits(&job, &area, &modules));
@@ -83,7 +67,8 @@ pub fn verify(folder: &Path, dem: Option<&Path>) -> Result<Verdict, CompileError
 
 fn listed(manifest: &Manifest) -> usize {
     let of_tile = |tile: &database::TileRecord| {
-        [tile.tin.is_some(), tile.slm.is_some(), tile.curve.is_some(), tile.removed.is_some()]
+        [&tile.tin, &tile.slm, &tile.measured, &tile.curve, &tile.removed]
+            .map(Option::is_some)
             .iter()
             .filter(|&&there| there)
             .count()
@@ -174,8 +159,8 @@ fn check_limits(job: &Job, area: &GamingArea, modules: &BTreeMap<ModuleId, LoadM
     if budget.pool < above {
         problems.push(format!("load modules: {above} triangles above the limit, the pool has {}", budget.pool));
     }
-    let worst = budget.windows.sums(budget.grid, &counts).into_iter().max().unwrap_or(0);
-    if budget.per_window < worst {
+    let worst = recount::fullest_window(budget.grid, &counts, budget.windows.rows, budget.windows.cols);
+    if u64::from(budget.per_window) < worst {
         problems.push(format!("windows: {worst} triangles in one, the limit is {}", budget.per_window));
     }
     let total: u64 = counts.iter().map(|&count| u64::from(count)).sum();
@@ -218,28 +203,16 @@ fn recompute(
         let mut own: Vec<LoadModule> =
             area.tiling.modules(tile, area.grid).iter().filter_map(|module| modules.get(&module).cloned()).collect();
         all.merge(&fidelity::measure(&mut own, &window.measured(area)));
+        let recounted = |module: &LoadModule| {
+            recount::residual(module, &window.dem, area.grid, area.frame.spacing) == module.residual
+        };
+        problems.extend(own.iter().filter(|module| !recounted(module)).map(|module| {
+            format!("load module {}: two ways to measure its residuals against this DEM disagree", module.id)
+        }));
         let differs = |module: &&LoadModule| modules[&module.id].residual != module.residual;
         problems.extend(own.iter().filter(differs).map(|module| {
             format!("load module {}: its residuals against this DEM are not those in its file", module.id)
         }));
     }
     Ok(all)
-}
-
-/// Tiles that are not as a full build would make them.
-fn frozen_tiles(manifest: &Manifest) -> Vec<TileId> {
-    let is_frozen = |record: &&database::TileRecord| record.state == TileState::Frozen;
-    manifest.tiles.iter().filter(is_frozen).map(database::TileRecord::tile).collect()
-}
-
-impl Status {
-    /// Whether every file belongs to one finished build.
-    pub fn is_complete(&self) -> bool {
-        self.manifest.state == ManifestState::Complete
-    }
-
-    /// Tiles that are frozen: a build makes them whole.
-    pub fn frozen(&self) -> Vec<TileId> {
-        frozen_tiles(&self.manifest)
-    }
 }

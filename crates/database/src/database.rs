@@ -7,21 +7,24 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 use terrain::{GainCurve, LoadModule, TileTin};
 
-use crate::folder::{MODULES, SURVEY, TILES, WORK, files};
+use crate::folder::{MEASURED, MODULES, SURVEY, TILES, WORK, files};
 use crate::lock::LOCK_NAME;
 use crate::publish::{Durability, is_temporary, remove_left_over, sync, write_atomically};
 use crate::{
-    Area, DatabaseError, FileStamp, Folder, Lock, Manifest, ManifestState, Removals, Stamp, TileModules, encode_curve,
-    encode_modules, encode_removals, encode_tile, json,
+    Area, DatabaseError, FileStamp, Folder, Lock, Manifest, ManifestState, Measured, Removals, Stamp, TileModules,
+    Work, encode_curve, encode_measured, encode_modules, encode_removals, encode_tile, json,
 };
 
 /// The folders of a database that stay.
-const FOLDERS: [&str; 3] = [TILES, MODULES, SURVEY];
+const FOLDERS: [&str; 4] = [TILES, MODULES, MEASURED, SURVEY];
+/// What is written beside a finished build.
+const REPORTS: [&str; 4] = [files::REPORT, files::REPORT_HTML, files::BREACHES, files::BREACHES_CSV];
 /// What may lie in a database's directory and makes a directory without `database.json` ours.
-const OURS: [&str; 10] = [
+const OURS: [&str; 11] = [
     LOCK_NAME,
     TILES,
     MODULES,
+    MEASURED,
     SURVEY,
     WORK,
     files::DATABASE,
@@ -31,7 +34,7 @@ const OURS: [&str; 10] = [
     files::BREACHES_CSV,
 ];
 
-/// A database that this process alone writes to.
+/// A database to write to: by this process alone, or by all that have joined it.
 #[derive(Debug)]
 pub struct Database {
     folder: Folder,
@@ -64,13 +67,64 @@ impl Database {
         let lock = Lock::acquire(dir)?;
         // Looked at again, now that nobody else can change it.
         let previous = examine(&folder, area)?;
-        remove_left_over(dir)?;
-        for name in FOLDERS {
-            let path = folder.path(name);
-            make_folder(&path)?;
-            remove_left_over(&path)?;
-        }
+        FOLDERS.iter().try_for_each(|name| make_folder(&folder.path(name)))?;
+        let database = Self { folder, _lock: lock };
+        database.sweep()?;
+        database.remove_work()?;
+        Ok((database, previous))
+    }
+
+    /// The same for one of several processes that share the directory: it keeps builds out and no other process, and
+    /// removes nothing.
+    ///
+    /// # Errors
+    /// As [`Database::create_or_open`].
+    pub fn join(dir: &Path, area: &Area) -> Result<(Self, Previous), DatabaseError> {
+        let folder = Folder::new(dir);
+        examine(&folder, area)?;
+        fs::create_dir_all(dir).map_err(|source| DatabaseError::from_io("create", dir, 0, source))?;
+        let lock = Lock::share(dir)?;
+        let previous = examine(&folder, area)?;
+        FOLDERS.iter().try_for_each(|name| make_folder(&folder.path(name)))?;
         Ok((Self { folder, _lock: lock }, previous))
+    }
+
+    /// Removes what killed processes left half-written. Whoever is writing at this moment finds its file gone.
+    ///
+    /// # Errors
+    /// When a folder cannot be listed, or a file in it not removed.
+    pub fn sweep(&self) -> Result<(), DatabaseError> {
+        remove_left_over(self.folder.dir())?;
+        FOLDERS.iter().try_for_each(|name| remove_left_over(&self.folder.path(name)))
+    }
+
+    /// What processes that share the directory leave for one another during the run of this name.
+    ///
+    /// # Errors
+    /// When its folders cannot be made.
+    pub fn work(&self, run: &str) -> Result<Work, DatabaseError> {
+        let work = self.folder.path(WORK);
+        make_folder(&work)?;
+        make_folder(&work.join(run))?;
+        for name in Work::FOLDERS {
+            make_folder(&work.join(run).join(name))?;
+        }
+        Ok(self.folder.work(run))
+    }
+
+    /// Removes what processes left for one another, once the build is published or nobody shares the directory.
+    ///
+    /// # Errors
+    /// When something cannot be removed.
+    pub fn remove_work(&self) -> Result<(), DatabaseError> {
+        let path = self.folder.path(WORK);
+        check_folder(&path)?;
+        match fs::remove_dir_all(&path) {
+            Err(source) if source.kind() != ErrorKind::NotFound => {
+                Err(DatabaseError::from_io("remove", &path, 0, source))
+            }
+            _ => Ok(()),
+        }
     }
 
     /// The same directory, to read from.
@@ -103,6 +157,14 @@ impl Database {
     /// As [`encode_modules`].
     pub fn write_modules(&self, tile: &TileModules, modules: &[LoadModule]) -> Result<FileStamp, DatabaseError> {
         publish(&self.folder.modules_path(tile.tile), &encode_modules(tile, modules))
+    }
+
+    /// Publishes what was measured of a tile's load modules.
+    ///
+    /// # Errors
+    /// As [`Database::write_tile`].
+    pub fn write_measured(&self, stamp: &Stamp, measured: &Measured) -> Result<FileStamp, DatabaseError> {
+        publish(&self.folder.measured_path(measured.tile), &encode_measured(stamp, measured))
     }
 
     /// Publishes a tile's gain curve.
@@ -143,9 +205,8 @@ impl Database {
     /// # Errors
     /// When something cannot be removed.
     pub fn clear(&self) -> Result<(), DatabaseError> {
-        for name in [files::DATABASE, files::REPORT, files::REPORT_HTML, files::BREACHES, files::BREACHES_CSV] {
-            self.remove(name)?;
-        }
+        self.remove(files::DATABASE)?;
+        REPORTS.iter().try_for_each(|name| self.remove(name))?;
         for name in FOLDERS {
             let folder = self.folder.path(name);
             for path in list(&folder)? {
@@ -156,7 +217,7 @@ impl Database {
     }
 
     /// Says, before a build changes its first file, that the files no longer belong together; on the disk when this
-    /// returns, if the disk said otherwise before.
+    /// returns, if the disk said otherwise before. What was reported of the files before is removed.
     ///
     /// # Errors
     /// When `database.json` cannot be written.
@@ -167,7 +228,8 @@ impl Database {
         assert_eq!(manifest.state, ManifestState::Incomplete, "a build begins incomplete");
         // Where there is no database yet, losing this file loses nothing, so it need not wait for the disk.
         let first = !self.folder.path(files::DATABASE).exists();
-        self.write_manifest(manifest, if first { Durability::Later } else { Durability::Now })
+        self.write_manifest(manifest, if first { Durability::Later } else { Durability::Now })?;
+        REPORTS.iter().try_for_each(|name| self.remove(name))
     }
 
     /// Says that the build is complete, once every file it lists is on the disk.

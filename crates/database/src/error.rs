@@ -58,6 +58,12 @@ pub enum DatabaseError {
         /// What should be a folder.
         path: PathBuf,
     },
+    /// A link, or a folder in place of a file, inside the database.
+    #[error("{}: found a link or a folder, expected a file", path.display())]
+    NotAFile {
+        /// What should be a file.
+        path: PathBuf,
+    },
     /// The file is of another kind.
     #[error("{}: header: found {found:02x?}, expected {expected:02x?}", path.display())]
     NotOurFile {
@@ -208,7 +214,9 @@ impl DatabaseError {
             Self::DiskFull { .. } => "free some space and run the same command again; finished tiles are kept",
             Self::NotWritable { .. } => "choose another folder with --out",
             Self::NotOurFolder { .. } => "choose another folder with --out, or empty this one",
-            Self::NotAFolder { .. } => "output never follows a link out of its folder; remove it",
+            Self::NotAFolder { .. } | Self::NotAFile { .. } => {
+                "output never follows a link out of its folder; remove it"
+            }
             Self::OtherVersion { .. } => "another version of tiefort wrote it; build into another folder with --out",
             Self::OtherArea { .. } => "the folder holds another gaming area; build into another one with --out",
             Self::Locked { .. } => "wait for the other run to end, or build into another folder with --out",

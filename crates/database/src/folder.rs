@@ -9,8 +9,8 @@ use terrain::{GainCurve, LoadModule, TileId, TileTin};
 
 use crate::frame::{FRAME_BYTES, Kind};
 use crate::{
-    DatabaseError, FileStamp, Manifest, Removals, Report, Stamp, TileModules, codec, curve_file, frame, json,
-    removals_file, slm, tile_file,
+    DatabaseError, FileStamp, Manifest, Measured, Removals, Report, Stamp, TileModules, Work, codec, curve_file, frame,
+    json, measured_file, removals_file, slm, tile_file,
 };
 
 /// Names of files inside the directory.
@@ -33,9 +33,11 @@ pub mod files {
 pub(crate) const TILES: &str = "tiles";
 /// Folder of the load modules.
 pub(crate) const MODULES: &str = "modules";
+/// Folder of what was measured of them.
+pub(crate) const MEASURED: &str = "measured";
 /// Folder of the survey.
 pub(crate) const SURVEY: &str = "survey";
-/// Folder of checkpoints, gone at the end of a build.
+/// Folder of leases and marks, gone at the end of a build.
 pub(crate) const WORK: &str = "work";
 
 /// Bytes of the longest file that is read: the longest payload and its frame.
@@ -78,6 +80,11 @@ impl Folder {
         self.path(&format!("{MODULES}/{tile}.slm"))
     }
 
+    /// Where what was measured of the load modules of `tile` lies.
+    pub fn measured_path(&self, tile: TileId) -> PathBuf {
+        self.path(&format!("{MEASURED}/{tile}.sums"))
+    }
+
     /// Where the gain curve of `tile` lies.
     pub fn curve_path(&self, tile: TileId) -> PathBuf {
         self.path(&format!("{SURVEY}/{tile}.curve"))
@@ -90,6 +97,11 @@ impl Folder {
     pub fn manifest(&self) -> Result<Manifest, DatabaseError> {
         let path = self.path(files::DATABASE);
         Manifest::decode(&path, &read(&path)?)
+    }
+
+    /// What processes that share the directory leave for one another during the run of this name.
+    pub fn work(&self, run: &str) -> Work {
+        Work::new(self.path(WORK).join(run))
     }
 
     /// What `report.json` says.
@@ -157,6 +169,17 @@ impl Folder {
         let (header, modules) = slm::decode_modules(&path, &read(&path)?)?;
         same_tile(path, header.tile, tile)?;
         Ok((header, modules))
+    }
+
+    /// What was measured of the load modules of `tile`, and what those were made from.
+    ///
+    /// # Errors
+    /// When the file is missing, damaged or of another tile.
+    pub fn read_measured(&self, tile: TileId) -> Result<(Stamp, Measured), DatabaseError> {
+        let path = self.measured_path(tile);
+        let (stamp, read) = measured_file::decode_measured(&path, &read(&path)?)?;
+        same_tile(path, read.tile, tile)?;
+        Ok((stamp, read))
     }
 
     /// The gain curve of `tile`, and what it was made from.

@@ -36,6 +36,7 @@ pub(crate) enum Kind {
     Tile,
     Curve,
     Removals,
+    Measured,
 }
 
 impl Kind {
@@ -44,6 +45,7 @@ impl Kind {
             Kind::Tile => *b"\x89TIN\r\n\x1a\n",
             Kind::Curve => *b"\x89CRV\r\n\x1a\n",
             Kind::Removals => *b"\x89REM\r\n\x1a\n",
+            Kind::Measured => *b"\x89SUM\r\n\x1a\n",
         }
     }
 }

@@ -7,6 +7,8 @@
 //!   survey/r02c03.curve  gain curves; allocation.json
 //!   tiles/r02c03.tin     one tile's TIN
 //!   modules/r02c03.slm   one tile's load modules (FORMAT.md)
+//!   measured/r02c03.sums what was measured of them
+//!   work/                leases and marks of processes that share the directory; gone at the end of a build
 //!   report.json …        what a run found; the only files that know times
 //! ```
 //!
@@ -29,21 +31,30 @@ mod curve_file;
 pub use curve_file::{decode_curve, encode_curve};
 mod removals_file;
 pub use removals_file::{Removals, decode_removals, encode_removals};
+mod measured_file;
+pub use measured_file::{Measured, MeasuredModule, MeasuredTally, decode_measured, encode_measured};
 mod slm;
+/// Version of the load-module files.
+pub use load_module_reader::VERSION as MODULES_FORMAT_VERSION;
 pub use slm::{TileModules, decode_modules, encode_modules};
 mod json;
 mod manifest;
 pub use manifest::{
-    Area, FORMAT_VERSION, FileStamp, Manifest, ManifestState, SourceRecord, TileRecord, TileState, Totals,
+    Area, FORMAT_VERSION, FileStamp, MadeFrom, Manifest, ManifestState, SourceRecord, TileRecord, TileState, Totals,
 };
 mod report;
 pub use report::{
     Report, ReportBound, ReportBreach, ReportClass, ReportPerModule, ReportPerWindow, ReportPlace, ReportPoints,
-    ReportPool, ReportRefusals, ReportResidual, ReportStage, ReportStops, ReportVoids,
+    ReportPool, ReportRefusals, ReportResidual, ReportStage, ReportStops, ReportTile, ReportVoids,
 };
 mod lock;
 mod publish;
-pub use lock::Lock;
+pub use lock::{Held, Lock};
+pub use publish::Writing;
+mod leases;
+pub use leases::{Claim, Lease, Leases};
+mod work;
+pub use work::{Share, ShareAllowance, Work};
 mod folder;
 pub use folder::{Folder, files};
 mod database;

@@ -1,15 +1,26 @@
-//! One build at a time in one directory: a lock that dies with its process.
+//! One build at a time in one directory, or any number of processes that share one: a lock that dies with its process.
 //!
 //! The lock is the system's, on the file `lock`; the file itself means nothing and stays. Removing it would let one
 //! process hold the removed file and another a new one of the same name.
 
-use std::fs::{File, TryLockError};
+use std::fs::{File, TryLockError, symlink_metadata};
 use std::path::Path;
 
 use crate::DatabaseError;
 
 /// The name of the file that is locked.
 pub(crate) const LOCK_NAME: &str = "lock";
+
+/// Who holds the lock of a database.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Held {
+    /// Nobody.
+    Free,
+    /// Processes that share the directory.
+    Shared,
+    /// One build.
+    Alone,
+}
 
 /// Held as long as this value lives; the system frees it when the process ends, however it ends.
 #[derive(Debug)]
@@ -23,20 +34,43 @@ impl Lock {
     /// # Errors
     /// [`DatabaseError::Locked`] when another build holds it; others when the file cannot be made.
     pub fn acquire(dir: &Path) -> Result<Self, DatabaseError> {
+        Self::take(dir, File::try_lock)
+    }
+
+    /// Takes a share of the lock, without waiting: any number of processes may hold one, and no build beside them.
+    ///
+    /// # Errors
+    /// As [`Lock::acquire`].
+    pub fn share(dir: &Path) -> Result<Self, DatabaseError> {
+        Self::take(dir, File::try_lock_shared)
+    }
+
+    fn take(dir: &Path, lock: fn(&File) -> Result<(), TryLockError>) -> Result<Self, DatabaseError> {
         let path = dir.join(LOCK_NAME);
         let fault = |source| DatabaseError::from_io("lock", &path, 0, source);
+        // A link would have a file made wherever it leads.
+        if symlink_metadata(&path).is_ok_and(|found| !found.is_file()) {
+            return Err(DatabaseError::NotAFile { path });
+        }
         let file = File::options().create(true).append(true).open(&path).map_err(fault)?;
-        match file.try_lock() {
+        match lock(&file) {
             Ok(()) => Ok(Self { _file: file }),
             Err(TryLockError::WouldBlock) => Err(DatabaseError::Locked { path: dir.to_path_buf() }),
             Err(TryLockError::Error(source)) => Err(fault(source)),
         }
     }
 
-    /// Whether a build holds the lock of the database in `dir`. Makes no file, and keeps no other reader out.
-    pub fn is_held(dir: &Path) -> bool {
-        let Ok(file) = File::open(dir.join(LOCK_NAME)) else { return false };
-        matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock))
+    /// Who holds the lock of the database in `dir`. Makes no file, and keeps others out for an instant at most.
+    pub fn held(dir: &Path) -> Held {
+        let Ok(file) = File::open(dir.join(LOCK_NAME)) else { return Held::Free };
+        if matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)) {
+            return Held::Alone;
+        }
+        let _ = file.unlock();
+        match file.try_lock() {
+            Err(TryLockError::WouldBlock) => Held::Shared,
+            _ => Held::Free,
+        }
     }
 }
 
@@ -54,12 +88,35 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let first = Lock::acquire(folder.path()).unwrap();
         let error = Lock::acquire(folder.path()).unwrap_err();
-        assert!(Lock::is_held(folder.path()));
+        assert_eq!(Lock::held(folder.path()), Held::Alone);
+        assert!(Lock::share(folder.path()).unwrap_err().is_transient());
         assert!(error.is_transient());
         assert!(error.to_string().starts_with(&folder.path().display().to_string()));
         drop(first);
-        assert!(!Lock::is_held(folder.path()));
+        assert_eq!(Lock::held(folder.path()), Held::Free);
         Lock::acquire(folder.path()).unwrap();
+    }
+
+    #[test]
+    fn many_may_share_it_and_none_has_it_alone_meanwhile() {
+        let folder = tempfile::tempdir().unwrap();
+        let shares = [Lock::share(folder.path()).unwrap(), Lock::share(folder.path()).unwrap()];
+        assert_eq!(Lock::held(folder.path()), Held::Shared);
+        assert!(Lock::acquire(folder.path()).unwrap_err().is_transient());
+        drop(shares);
+        Lock::acquire(folder.path()).unwrap();
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_in_place_of_the_lock_is_refused_and_makes_nothing() {
+        let folder = tempfile::tempdir().unwrap();
+        let elsewhere = tempfile::tempdir().unwrap();
+        let made = elsewhere.path().join("made");
+        std::os::unix::fs::symlink(&made, folder.path().join(LOCK_NAME)).unwrap();
+        let error = Lock::acquire(folder.path()).unwrap_err();
+        assert!(matches!(error, DatabaseError::NotAFile { .. }) && error.hint().is_some(), "{error}");
+        assert!(!made.exists());
     }
 
     /// Does nothing unless `a_killed_process_holds_no_lock` starts it in a process of its own.

@@ -9,7 +9,9 @@ use terrain::TileId;
 use crate::{DatabaseError, Fingerprint, json};
 
 /// Version of the database's format; rises with any change that an older reader would misread.
-pub const FORMAT_VERSION: u32 = 1;
+///
+/// 2: what was measured of a tile lies in a file of its own, and every tile says by parts what it was made from.
+pub const FORMAT_VERSION: u32 = 2;
 
 /// The content of `database.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -114,6 +116,9 @@ pub struct TileRecord {
     pub state: TileState,
     /// Of all that the tile was made from; absent while missing.
     pub fingerprint: Option<Fingerprint>,
+    /// The same by parts, so that a later build can say what changed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub made_from: Option<MadeFrom>,
     /// Its file in `tiles/`.
     pub tin: Option<FileStamp>,
     /// Its list of removals in `tiles/`, in clip mode.
@@ -121,6 +126,9 @@ pub struct TileRecord {
     pub removed: Option<FileStamp>,
     /// Its file in `modules/`.
     pub slm: Option<FileStamp>,
+    /// Its file in `measured/`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub measured: Option<FileStamp>,
     /// Its file in `survey/`; absent where nothing is surveyed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub curve: Option<FileStamp>,
@@ -130,13 +138,39 @@ impl TileRecord {
     /// A tile that has no file yet.
     pub fn missing(tile: TileId) -> Self {
         let (state, TileId { row, col }) = (TileState::Missing, tile);
-        Self { row, col, state, fingerprint: None, tin: None, removed: None, slm: None, curve: None }
+        Self {
+            row,
+            col,
+            state,
+            fingerprint: None,
+            made_from: None,
+            tin: None,
+            removed: None,
+            slm: None,
+            measured: None,
+            curve: None,
+        }
     }
 
     /// Which tile.
     pub fn tile(&self) -> TileId {
         TileId { row: self.row, col: self.col }
     }
+}
+
+/// What a tile was made from, each part as the first 16 hexadecimal digits of its fingerprint.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct MadeFrom {
+    /// The heights of its window.
+    pub heights: String,
+    /// The weights and classes of its window.
+    pub weights: String,
+    /// What the job says of selecting and optimising, and the places of its border.
+    pub rules: String,
+    /// What it may spend.
+    pub allowance: String,
+    /// The border points it inherits.
+    pub borders: String,
 }
 
 /// How a tile stands.
@@ -215,12 +249,20 @@ impl Manifest {
 
     /// The record of `tile`, if the area has it.
     pub fn tile(&self, tile: TileId) -> Option<&TileRecord> {
-        self.tiles.iter().find(|record| record.tile() == tile)
+        self.tiles.get(self.place(tile)?)
     }
 
     /// The record of `tile`, to be changed, if the area has it.
     pub fn tile_mut(&mut self, tile: TileId) -> Option<&mut TileRecord> {
-        self.tiles.iter_mut().find(|record| record.tile() == tile)
+        let place = self.place(tile)?;
+        self.tiles.get_mut(place)
+    }
+
+    /// Where the record of a tile is: they lie row by row.
+    fn place(&self, tile: TileId) -> Option<usize> {
+        let inside = tile.row < self.area.tile_rows && tile.col < self.area.tile_cols;
+        let place = tile.row as usize * self.area.tile_cols as usize + tile.col as usize;
+        (inside && self.tiles.get(place)?.tile() == tile).then_some(place)
     }
 
     /// The text of the file at `path`.
@@ -293,9 +335,9 @@ mod tests {
     #[test]
     fn another_version_is_told_from_damage() {
         let path = Path::new("database.json");
-        let text = json::encode(path, &BTreeMap::from([("format_version", 2)])).unwrap();
+        let text = json::encode(path, &BTreeMap::from([("format_version", 3)])).unwrap();
         let error = Manifest::decode(path, text.as_bytes()).unwrap_err();
-        assert_eq!(error.to_string(), "database.json: found format version 2, expected 1");
+        assert_eq!(error.to_string(), "database.json: found format version 3, expected 2");
     }
 
     #[test]

@@ -7,6 +7,7 @@
 use std::fs::{File, Permissions};
 use std::io::{Error, ErrorKind, Write};
 use std::path::{Path, PathBuf};
+use std::sync::{PoisonError, RwLock, RwLockWriteGuard};
 
 use crate::DatabaseError;
 
@@ -24,10 +25,27 @@ pub(crate) enum Durability {
     Later,
 }
 
+/// Held for reading by whoever writes a file.
+static GATE: RwLock<()> = RwLock::new(());
+
+/// Keeps this process from writing, so that it can end at once and leave nothing half-written.
+#[derive(Debug)]
+pub struct Writing {
+    _gate: RwLockWriteGuard<'static, ()>,
+}
+
+impl Writing {
+    /// Keeps every thread from beginning to write as long as the value lives; `None` while one is writing.
+    pub fn held_back() -> Option<Self> {
+        GATE.try_write().ok().map(|gate| Self { _gate: gate })
+    }
+}
+
 /// Writes `bytes` to `path` so that no reader ever sees a part of them, replacing what was there.
 pub(crate) fn write_atomically(path: &Path, bytes: &[u8], durability: Durability) -> Result<(), DatabaseError> {
     let fault = |source| DatabaseError::from_io("write", path, bytes.len() as u64, without_path(source));
     let folder = folder_of(path);
+    let _gate = GATE.read().unwrap_or_else(PoisonError::into_inner);
     let mut builder = tempfile::Builder::new();
     builder.prefix(TEMPORARY_PREFIX).suffix(TEMPORARY_SUFFIX);
     let permissions = ordinary_permissions();
@@ -164,6 +182,26 @@ mod tests {
         write_atomically(&link, b"ours", Durability::Later).unwrap();
         assert_eq!(std::fs::read(&outside).unwrap(), b"theirs");
         assert!(!std::fs::symlink_metadata(&link).unwrap().is_symlink());
+    }
+
+    #[test]
+    fn nobody_writes_while_writing_is_held_back() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.tin");
+        // Other tests of this process may be writing.
+        let held = loop {
+            if let Some(held) = Writing::held_back() {
+                break held;
+            }
+        };
+        let writer = std::thread::spawn({
+            let path = path.clone();
+            move || write_atomically(&path, b"late", Durability::Later).unwrap()
+        });
+        assert!(!path.exists());
+        drop(held);
+        writer.join().unwrap();
+        assert!(path.exists());
     }
 
     #[test]

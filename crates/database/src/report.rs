@@ -1,7 +1,11 @@
 //! `report.json`: what a run found. The one file that knows times.
 
+use std::collections::BTreeMap;
+
 use serde::{Deserialize, Serialize};
 use terrain::{Breach, BreachKind, BreachPlace, ModuleId};
+
+use crate::FileStamp;
 
 /// The content of `report.json`; its keys are a contract. Every number is finite.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -48,6 +52,21 @@ pub struct Report {
     pub stops: ReportStops,
     /// What else a reader should know, a sentence each.
     pub warnings: Vec<String>,
+    /// What each tile took, where it was worked on in this run.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub tiles: Vec<ReportTile>,
+    /// Files written beside the report, and how they must look.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub files: BTreeMap<String, FileStamp>,
+}
+
+/// Seconds that one tile took.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ReportTile {
+    /// Row and column.
+    pub tile: [u32; 2],
+    /// Seconds on the clock, by stage; a stage that kept the tile is absent.
+    pub seconds: BTreeMap<String, f64>,
 }
 
 /// One stage of the run.
@@ -311,6 +330,8 @@ mod tests {
             }],
             stops: ReportStops { budget_spent: 35, exhausted: 1, ..ReportStops::default() },
             warnings: vec!["one tile is frozen".into()],
+            tiles: vec![ReportTile { tile: [0, 1], seconds: BTreeMap::from([("refine".into(), 0.5)]) }],
+            files: BTreeMap::from([("breaches.geojson".into(), FileStamp::of(b"{}"))]),
         }
     }
 

@@ -5,7 +5,7 @@ use terrain::{
     ModuleVertex, Post, PostRect, Refusal, RefusedBy, Spacing, StopReason, TileId, TileTin, Tin, Vertex,
 };
 
-use crate::{Area, Fingerprint, Stamp, TileModules};
+use crate::{Area, FileStamp, Fingerprint, Measured, MeasuredModule, MeasuredTally, Stamp, TileModules};
 
 pub(crate) const TILE: TileId = TileId { row: 0, col: 1 };
 
@@ -54,6 +54,26 @@ pub(crate) fn tile() -> TileTin {
     };
     assert_eq!(tile.tin.check(), Ok(()));
     tile
+}
+
+pub(crate) fn measured() -> Measured {
+    let tally = MeasuredTally {
+        posts: 3,
+        sum: -4,
+        sum_abs: 6,
+        sum_squared: [1, 14],
+        largest: 3,
+        bins: vec![(1, 2), (9000, 1)],
+    };
+    Measured {
+        tile: TILE,
+        modules_file: FileStamp::of(b"slm"),
+        modules: vec![MeasuredModule { triangles: 32, posts: 3, largest: 3, ..MeasuredModule::default() }; 2],
+        classes: vec![tally.clone(), MeasuredTally::default()],
+        at_source: Some(tally),
+        points: vec![7, 0],
+        border: 2,
+    }
 }
 
 pub(crate) fn curve() -> GainCurve {

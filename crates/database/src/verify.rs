@@ -1,14 +1,14 @@
 //! Reads everything again and says what is not as it was written.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use serde::de::IgnoredAny;
+use serde::Deserialize;
 
 use crate::database::list;
-use crate::folder::{MODULES, SURVEY, TILES, check_stamp, files, read};
+use crate::folder::{MEASURED, MODULES, SURVEY, TILES, check_stamp, files, read};
 use crate::publish::is_temporary;
-use crate::{DatabaseError, FileStamp, Folder, Manifest, curve_file, removals_file, slm, tile_file};
+use crate::{DatabaseError, FileStamp, Folder, Manifest, curve_file, measured_file, removals_file, slm, tile_file};
 
 /// One file that is not as it should be.
 #[derive(Debug)]
@@ -28,6 +28,7 @@ impl Folder {
                 (self.tile_path(tile), record.tin),
                 (self.removals_path(tile), record.removed),
                 (self.modules_path(tile), record.slm),
+                (self.measured_path(tile), record.measured),
                 (self.curve_path(tile), record.curve),
             ]
         });
@@ -51,12 +52,13 @@ impl Folder {
             }
         }
         // It knows times, so no manifest lists it; its own checksum must do.
-        match self.read_json::<IgnoredAny>(files::REPORT) {
-            Ok(_) | Err(DatabaseError::Missing { .. }) => {}
+        match self.read_json::<Beside>(files::REPORT) {
+            Ok(beside) => damage.extend(self.damage_beside(&beside)),
+            Err(DatabaseError::Missing { .. }) => {}
             Err(error) => damage.push(Damage { path: self.path(files::REPORT), error }),
         }
         let known: BTreeSet<PathBuf> = listed.into_iter().map(|(path, _)| path).collect();
-        for name in [TILES, MODULES, SURVEY] {
+        for name in [TILES, MODULES, MEASURED, SURVEY] {
             for path in list(&self.path(name))? {
                 let temporary = path.file_name().is_some_and(|name| is_temporary(&name.to_string_lossy()));
                 if !known.contains(&path) && !temporary {
@@ -66,6 +68,42 @@ impl Folder {
         }
         Ok(damage)
     }
+
+    /// Whether every file that `manifest` lists has the bytes it had, and no file of ours lies beside them.
+    ///
+    /// # Errors
+    /// When a folder cannot be listed.
+    pub fn verify_bytes(&self, manifest: &Manifest) -> Result<bool, DatabaseError> {
+        let listed = self.listed_files(manifest);
+        let mut files = 0;
+        for name in [TILES, MODULES, MEASURED, SURVEY] {
+            files += list(&self.path(name))?.len();
+        }
+        Ok(files == listed.len() && listed.iter().all(|(path, stamp)| self.check_file(path, stamp).is_ok()))
+    }
+
+    /// Files that the report lists and that are not as they were written. One that is gone is no damage: a person may
+    /// have taken it away.
+    fn damage_beside(&self, beside: &Beside) -> Vec<Damage> {
+        let check = |(name, stamp): (&String, &FileStamp)| {
+            let path = self.path(name);
+            match read(&path).and_then(|bytes| check_stamp(&path, &bytes, stamp)) {
+                Ok(()) | Err(DatabaseError::Missing { .. }) => None,
+                Err(error) => Some(Damage { path, error }),
+            }
+        };
+        beside.files.iter().filter(|(name, _)| BESIDE.contains(&name.as_str())).filter_map(check).collect()
+    }
+}
+
+/// What may be written beside a report.
+const BESIDE: [&str; 2] = [files::REPORT_HTML, files::BREACHES];
+
+/// What a report says of the files beside it.
+#[derive(Deserialize)]
+struct Beside {
+    #[serde(default)]
+    files: BTreeMap<String, FileStamp>,
 }
 
 /// Decodes first, because that names the section; a file that decodes may still be another than the one listed.
@@ -78,6 +116,7 @@ fn check_listed(path: &Path, stamp: &FileStamp) -> Result<(), DatabaseError> {
             tile.tin.check().map_err(unsound)?;
         }
         Some("slm") => drop(slm::decode_modules(path, &bytes)?),
+        Some("sums") => drop(measured_file::decode_measured(path, &bytes)?),
         Some("curve") => drop(curve_file::decode_curve(path, &bytes)?),
         Some("removed") => drop(removals_file::decode_removals(path, &bytes)?),
         _ => {}

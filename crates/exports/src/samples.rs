@@ -1,5 +1,7 @@
 //! A small product for the tests of this crate: two load modules side by side, in an area of two.
 
+use std::collections::BTreeMap;
+
 use database::{
     Area, Fingerprint, Manifest, Report, ReportBreach, ReportPerModule, ReportPerWindow, ReportPlace, ReportPoints,
     ReportPool, ReportRefusals, ReportResidual, ReportStops, ReportVoids, TileModules, TileRecord,
@@ -105,6 +107,8 @@ pub(crate) fn report() -> Report {
         area: "sample".into(),
         workers: 1,
         stages: Vec::new(),
+        tiles: Vec::new(),
+        files: BTreeMap::new(),
         points: ReportPoints { selected: 0, border: 0, corner: 6, total: 7 },
         count: "triangles".into(),
         triangles: 6,

@@ -48,6 +48,22 @@ impl Tally {
         &mut self.histogram
     }
 
+    /// Bins of the histogram that hold posts, in ascending order, and how many: with the sums, all there is to keep.
+    pub fn filled_bins(&self) -> impl Iterator<Item = (u32, u64)> + '_ {
+        self.histogram.iter().enumerate().filter(|&(_, &posts)| 0 < posts).map(|(bin, &posts)| (bin as u32, posts))
+    }
+
+    /// The same sums with these bins; bins that no tally has are left out.
+    #[must_use]
+    pub fn with_bins(mut self, bins: impl IntoIterator<Item = (u32, u64)>) -> Self {
+        for (bin, posts) in bins {
+            if let Some(slot) = self.bins().get_mut(bin as usize) {
+                *slot = posts;
+            }
+        }
+        self
+    }
+
     /// Counts the posts of another set too.
     pub fn merge(&mut self, other: &Tally) {
         self.posts += other.posts;

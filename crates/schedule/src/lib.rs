@@ -19,5 +19,7 @@ mod ready;
 pub use ranked::{Event, in_rank_order, in_rank_order_observed};
 mod independent;
 pub use independent::for_each_independent;
+mod heartbeat;
+pub use heartbeat::with_heartbeat;
 mod simulate;
 pub use simulate::{Simulation, simulate};

@@ -8,10 +8,13 @@
 pub struct RankedTasks {
     /// Place of each task in the order (rank, task number).
     places: Vec<usize>,
-    /// Neighbours of lower rank, per task.
-    lower: Vec<Vec<usize>>,
-    /// Neighbours of higher rank, per task.
-    higher: Vec<Vec<usize>>,
+    /// Neighbours of every task, one task after the other, those of lower rank first: a million tasks are held in
+    /// tens of megabytes.
+    links: Vec<usize>,
+    /// Where in `links` those of a task begin; one more at the end.
+    begins: Vec<usize>,
+    /// Where those of higher rank begin.
+    middles: Vec<usize>,
     /// Seed of a random order among ready tasks; `None` takes the lowest rank first.
     shuffle: Option<u64>,
 }
@@ -37,14 +40,16 @@ impl RankedTasks {
         for (place, &task) in order.iter().enumerate() {
             places[task] = place;
         }
-        let side = |lower: bool| {
-            let keep = |task: usize, other: usize| (places[other] < places[task]) == lower;
-            let part = |(task, beside): (usize, &Vec<usize>)| {
-                beside.iter().copied().filter(|&other| keep(task, other)).collect()
-            };
-            neighbours.iter().enumerate().map(part).collect()
-        };
-        Self { lower: side(true), higher: side(false), places, shuffle: None }
+        let (mut links, mut begins, mut middles) = (Vec::new(), Vec::with_capacity(ranks.len() + 1), Vec::new());
+        for (task, beside) in neighbours.iter().enumerate() {
+            let is_lower = |other: &usize| places[*other] < places[task];
+            begins.push(links.len());
+            links.extend(beside.iter().copied().filter(is_lower));
+            middles.push(links.len());
+            links.extend(beside.iter().copied().filter(|other| !is_lower(other)));
+        }
+        begins.push(links.len());
+        Self { places, links, begins, middles, shuffle: None }
     }
 
     /// The same tasks, with ready ones taken in a random order: for tests that results do not depend on it.
@@ -70,12 +75,20 @@ impl RankedTasks {
 
     /// The neighbours `task` waits for.
     pub fn lower(&self, task: usize) -> &[usize] {
-        &self.lower[task]
+        &self.links[self.begins[task]..self.middles[task]]
     }
 
     /// The neighbours that wait for `task`.
     pub fn higher(&self, task: usize) -> &[usize] {
-        &self.higher[task]
+        &self.links[self.middles[task]..self.begins[task + 1]]
+    }
+
+    /// Bytes that a coordinator of these tasks holds: what is here, and what it keeps of each task while it runs.
+    pub fn coordinator_bytes(&self) -> u64 {
+        /// State, count of missing neighbours, place in the queue, result.
+        const BYTES_PER_TASK: usize = 48;
+        let words = self.places.len() + self.links.len() + self.begins.len() + self.middles.len();
+        (words * size_of::<usize>() + self.places.len() * BYTES_PER_TASK) as u64
     }
 
     /// Key by which ready tasks are taken, smallest first.

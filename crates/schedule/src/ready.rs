@@ -1,6 +1,7 @@
 //! The tasks whose lower-ranked neighbours are all done, and the bookkeeping that gets them there.
 
-use std::collections::BTreeSet;
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
 
 use crate::RankedTasks;
 
@@ -18,20 +19,20 @@ pub(crate) struct Ready<'a> {
     /// Lower-ranked neighbours not yet done, per task.
     missing: Vec<usize>,
     /// (urgency, task) of every task that may start.
-    queue: BTreeSet<(u64, usize)>,
+    queue: BinaryHeap<Reverse<(u64, usize)>>,
 }
 
 impl<'a> Ready<'a> {
     pub(crate) fn new(plan: &'a RankedTasks) -> Self {
         let missing: Vec<usize> = (0..plan.len()).map(|task| plan.lower(task).len()).collect();
         let free = (0..plan.len()).filter(|&task| missing[task] == 0);
-        let queue = free.map(|task| (plan.urgency(task), task)).collect();
+        let queue = free.map(|task| Reverse((plan.urgency(task), task))).collect();
         Self { plan, states: vec![State::Waiting; plan.len()], missing, queue }
     }
 
     /// Takes the most urgent task that may start.
     pub(crate) fn start(&mut self) -> Option<usize> {
-        let (_, task) = self.queue.pop_first()?;
+        let Reverse((_, task)) = self.queue.pop()?;
         let done = |&other: &usize| self.states[other] == State::Done;
         assert!(self.plan.lower(task).iter().all(done), "task {task} starts after its lower-ranked neighbours");
         let busy = |&other: &usize| self.states[other] == State::InProgress;
@@ -47,7 +48,7 @@ impl<'a> Ready<'a> {
         for &other in self.plan.higher(task) {
             self.missing[other] -= 1;
             if self.missing[other] == 0 {
-                self.queue.insert((self.plan.urgency(other), other));
+                self.queue.push(Reverse((self.plan.urgency(other), other)));
             }
         }
     }

@@ -1,5 +1,8 @@
 //! How long a plan would take, without running it.
 
+use std::cmp::{Ordering, Reverse};
+use std::collections::BinaryHeap;
+
 use crate::RankedTasks;
 use crate::ready::Ready;
 
@@ -12,6 +15,8 @@ pub struct Simulation {
     pub busy: f64,
     /// The longest chain of tasks that wait for one another: no number of workers is faster.
     pub critical_path: f64,
+    /// Tasks that ran at once, at most.
+    pub at_once: usize,
 }
 
 /// Plays the coordinator with `workers` workers and tasks of the given durations.
@@ -22,28 +27,51 @@ pub fn simulate(plan: &RankedTasks, workers: usize, durations: &[f64]) -> Simula
     assert!(0 < workers, "work needs at least one worker");
     assert_eq!(durations.len(), plan.len(), "one duration per task");
     let mut ready = Ready::new(plan);
-    let mut running: Vec<(f64, usize)> = Vec::new();
+    let mut running: BinaryHeap<Reverse<Ends>> = BinaryHeap::new();
     let mut now = 0.0;
+    let mut at_once = 0;
     loop {
         while running.len() < workers
             && let Some(task) = ready.start()
         {
-            running.push((now + durations[task], task));
+            running.push(Reverse(Ends { at: now + durations[task], task }));
         }
-        let Some(next) = (0..running.len()).min_by(|&a, &b| earlier(running[a], running[b])) else { break };
-        let (end, task) = running.swap_remove(next);
-        now = end;
-        ready.finish(task);
+        at_once = at_once.max(running.len());
+        let Some(Reverse(next)) = running.pop() else { break };
+        now = next.at;
+        ready.finish(next.task);
     }
     let work: f64 = durations.iter().sum();
     let offered = now * workers as f64;
     let busy = if offered == 0.0 { 1.0 } else { work / offered };
-    Simulation { makespan: now, busy, critical_path: critical_path(plan, durations) }
+    Simulation { makespan: now, busy, critical_path: critical_path(plan, durations), at_once }
 }
 
-fn earlier(a: (f64, usize), b: (f64, usize)) -> std::cmp::Ordering {
-    a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))
+/// When a running task ends; of those that end at once, the one of lowest number first.
+struct Ends {
+    at: f64,
+    task: usize,
 }
+
+impl Ord for Ends {
+    fn cmp(&self, other: &Self) -> Ordering {
+        self.at.total_cmp(&other.at).then(self.task.cmp(&other.task))
+    }
+}
+
+impl PartialOrd for Ends {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl PartialEq for Ends {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other) == Ordering::Equal
+    }
+}
+
+impl Eq for Ends {}
 
 fn critical_path(plan: &RankedTasks, durations: &[f64]) -> f64 {
     let mut order: Vec<usize> = (0..plan.len()).collect();
@@ -85,6 +113,12 @@ mod tests {
             let run = simulate(&plan, workers, &durations);
             assert!(alone.critical_path <= run.makespan && run.makespan <= alone.makespan);
         }
+    }
+
+    #[test]
+    fn a_quarter_of_the_tiles_runs_at_once_at_most() {
+        let run = simulate(&four_colours(12, 12), 1000, &[1.0; 144]);
+        assert_eq!((run.makespan, run.at_once, run.critical_path), (4.0, 36, 4.0));
     }
 
     #[test]

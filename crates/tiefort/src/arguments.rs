@@ -2,9 +2,11 @@
 
 use std::path::PathBuf;
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 use job::Job;
 use terrain::TileId;
+
+use crate::resources;
 
 /// Most workers that may be asked for: each is a thread with a tile's memory.
 const WORKERS_MAX: i64 = 1024;
@@ -12,17 +14,35 @@ const WORKERS_MAX: i64 = 1024;
 /// How many tasks run at once.
 #[derive(Args, Clone, Debug)]
 pub struct Workers {
-    /// Tasks at once [default: one per core]
+    /// Tasks at once [default: one per core, fewer where memory or a cgroup is short]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=WORKERS_MAX))]
     workers: Option<u32>,
 }
 
 impl Workers {
-    /// What was asked for, or one worker per core.
+    /// What was asked for, or one worker per core that this process may use.
     pub fn count(&self) -> usize {
-        let cores = || std::thread::available_parallelism().map_or(1, |cores| cores.get());
-        self.workers.map_or_else(cores, |workers| workers as usize)
+        self.workers.map_or_else(resources::cores, |workers| workers as usize)
     }
+
+    /// What was asked for, or as many as cores and memory allow for `job`; and a remark where memory decides.
+    pub fn for_job(&self, job: &Job) -> (usize, Option<String>) {
+        let forecast = compiler::plan(job).map(|plan| plan.forecast);
+        match forecast {
+            Ok(forecast) => resources::workers(self.workers.map(|workers| workers as usize), &forecast),
+            // The run itself says what is wrong with the job.
+            Err(_) => (self.count(), None),
+        }
+    }
+}
+
+/// How a run is followed on stderr.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Log {
+    /// Words
+    Text,
+    /// One JSON object a line
+    Json,
 }
 
 /// What `build` and `tile` have in common.
@@ -42,6 +62,12 @@ pub struct RunArguments {
     /// Print errors only
     #[arg(long)]
     pub quiet: bool,
+    /// Tell everything on stderr: every tile, how long it took and why it was made again
+    #[arg(short, long, conflicts_with = "quiet")]
+    pub verbose: bool,
+    /// How everything is told on stderr; json implies -v
+    #[arg(long, value_name = "FORMAT", conflicts_with = "quiet")]
+    pub log: Option<Log>,
     /// Print events as JSON lines on stdout; the last one, "summary", holds the report
     #[arg(long)]
     pub json: bool,

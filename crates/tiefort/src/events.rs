@@ -16,6 +16,11 @@ pub fn event_json(event: &Event, stage_time: Option<&ReportStage>, at_s: f64) ->
     let mut value = match event {
         Event::Enter(stage, tiles) => json!({ "event": "enter", "stage": stage.name(), "tiles": tiles }),
         Event::Started(stage, tile) => tile_event("started", stage, tile),
+        Event::Because(stage, tile, why) => {
+            let mut value = tile_event("because", stage, tile);
+            value["why"] = json!(why);
+            value
+        }
         Event::Done(stage, tile) => tile_event("done", stage, tile),
         Event::Kept(stage, tile) => tile_event("kept", stage, tile),
         Event::Leave(stage) => {
@@ -26,6 +31,24 @@ pub fn event_json(event: &Event, stage_time: Option<&ReportStage>, at_s: f64) ->
     };
     value["at_s"] = json!(at_s);
     value
+}
+
+/// A line of the log on stderr, in words.
+pub fn event_text(event: &Event, stage_time: Option<&ReportStage>, at_s: f64) -> String {
+    let words = match event {
+        Event::Enter(stage, 0) => format!("{} begins", stage.name()),
+        Event::Enter(stage, tiles) => format!("{} begins with {tiles} tiles", stage.name()),
+        Event::Started(stage, tile) => format!("{} {tile} begins", stage.name()),
+        Event::Because(stage, tile, why) => format!("{} {tile} was made again: {why}", stage.name()),
+        Event::Done(stage, tile) => format!("{} {tile} is done", stage.name()),
+        Event::Kept(stage, tile) => format!("{} {tile} is kept", stage.name()),
+        Event::Leave(stage) => {
+            let (wall_s, cpu_s) = stage_time.map(|time| (time.wall_s, time.cpu_s)).unwrap_or_default();
+            format!("{} ends after {wall_s:.2} s, {cpu_s:.2} s of CPU", stage.name())
+        }
+        Event::Note(text) => format!("note: {text}"),
+    };
+    format!("{at_s:>9.3} s  {words}")
 }
 
 /// Prints one line of JSON at once. Nobody may be listening any more; the work goes on all the same.

@@ -64,11 +64,6 @@ impl Failure {
         Self { message: message.to_string(), hint: Some(hint.into()), code: FAILED }
     }
 
-    /// Something the stable command line names and this version does not do.
-    pub fn not_yet(what: &str, instead: &str) -> Self {
-        Self::new(format!("{what} is not supported yet"), instead)
-    }
-
     /// A file that could not be written.
     pub fn output(path: &Path, source: &io::Error) -> Self {
         let hint = "check that the folder exists, is writable and has room; nothing was left half-written";
@@ -155,8 +150,8 @@ mod tests {
 
     #[test]
     fn a_hint_is_a_line_of_its_own() {
-        let failure = Failure::not_yet("a mesh as .glb", "write .ply or .obj");
-        assert_eq!(failure.to_string(), "error: a mesh as .glb is not supported yet\nhint: write .ply or .obj");
+        let failure = Failure::new("a mesh as .xyz is unknown", "write .ply or .obj");
+        assert_eq!(failure.to_string(), "error: a mesh as .xyz is unknown\nhint: write .ply or .obj");
     }
 
     #[test]

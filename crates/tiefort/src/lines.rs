@@ -42,7 +42,7 @@ impl Lines {
                 Some(self.end(stage.name(), wall_s, cpu_s))
             }
             Event::Note(text) => Some(format!("note: {text}")),
-            Event::Started(..) => None,
+            Event::Started(..) | Event::Because(..) => None,
         }
     }
 

@@ -15,7 +15,9 @@ mod arguments;
 mod board;
 mod clock;
 mod commands;
+mod costs;
 mod end_table;
+mod engines;
 mod events;
 mod failure;
 mod files;
@@ -24,6 +26,7 @@ mod measures;
 mod new_folder;
 mod page;
 mod progress;
+mod resources;
 mod run;
 mod scene;
 mod signals;
@@ -31,6 +34,7 @@ mod steps;
 mod terminal;
 
 use std::process::ExitCode;
+use std::sync::LazyLock;
 
 use clap::Parser;
 
@@ -50,9 +54,20 @@ Exit codes:
   75   not now: the same may do later
   130  stopped by SIGINT; 143 by SIGTERM";
 
+/// Version of the program, of what it writes, and of how it decides.
+static LONG_VERSION: LazyLock<String> = LazyLock::new(|| {
+    format!(
+        "{}\ndatabase format {}\nload-module format {}\nalgorithm revision {}",
+        env!("CARGO_PKG_VERSION"),
+        database::FORMAT_VERSION,
+        database::MODULES_FORMAT_VERSION,
+        compiler::ALGORITHM_REVISION
+    )
+});
+
 /// Turns elevation rasters into a gaming area: a seamless terrain database of load modules within polygon limits.
 #[derive(Parser)]
-#[command(version, max_term_width = 100, after_help = AFTER_HELP)]
+#[command(version, long_version = LONG_VERSION.as_str(), max_term_width = 100, after_help = AFTER_HELP)]
 struct Cli {
     #[command(subcommand)]
     command: Command,

@@ -1,11 +1,13 @@
 //! Turns what a run tells into something to look at, on a thread of its own, so that the run never waits for a
 //! terminal.
 
+use std::collections::BTreeMap;
 use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 
-use compiler::{Event, Progress};
-use database::ReportStage;
+use compiler::{Event, Progress, Stage};
+use database::{ReportStage, ReportTile};
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use crate::board::{Board, LEGEND};
@@ -13,6 +15,7 @@ use crate::clock::StageClock;
 use crate::events;
 use crate::lines::Lines;
 use crate::terminal;
+use terrain::TileId;
 
 /// Largest board that is drawn, in rows and columns of tiles: it has to fit an ordinary terminal.
 const BOARD_MAX: (u32, u32) = (18, 38);
@@ -28,12 +31,50 @@ pub enum Show {
     Progress,
     /// JSON lines on stdout.
     Json,
+    /// Every event in words on stderr.
+    Verbose,
+    /// Every event as JSON lines on stderr.
+    JsonLog,
+}
+
+/// Where a run is, for whoever has to end it in a hurry.
+#[derive(Debug, Default)]
+pub struct Place {
+    stage: Option<Stage>,
+    done: usize,
+    total: usize,
+}
+
+impl Place {
+    fn hear(&mut self, event: &Event) {
+        match event {
+            Event::Enter(stage, tiles) => (self.stage, self.done, self.total) = (Some(*stage), 0, *tiles),
+            Event::Done(..) | Event::Kept(..) => self.done += 1,
+            _ => {}
+        }
+    }
+
+    /// In words, as an error of the compiler would say it.
+    pub fn words(&self) -> String {
+        match (self.stage, self.total) {
+            (None, _) => "stopped before the first stage".into(),
+            (Some(stage), 0) => format!("stopped in stage {}", stage.name()),
+            (Some(stage), total) => {
+                format!("stopped in stage {} with {} of {total} tiles done", stage.name(), self.done)
+            }
+        }
+    }
 }
 
 /// Listens to a run: keeps the time of its stages and passes everything on to the reporter thread.
 #[derive(Debug)]
 pub struct Listener {
     clock: StageClock,
+    place: Arc<Mutex<Place>>,
+    /// When each tile at work began.
+    begun: BTreeMap<(Stage, TileId), f64>,
+    /// Seconds of each tile, by stage.
+    tiles: BTreeMap<TileId, BTreeMap<String, f64>>,
     sender: Option<Sender<Heard>>,
     reporter: Option<JoinHandle<()>>,
 }
@@ -52,28 +93,75 @@ impl Listener {
         let display = match show {
             Show::Nothing => None,
             Show::Json => Some(Display::Json),
+            Show::Verbose => Some(Display::Log(events::event_text)),
+            Show::JsonLog => Some(Display::Log(|event, time, at_s| events::event_json(event, time, at_s).to_string())),
             Show::Progress if terminal::is_watched() => Some(Display::Bars(Box::new(Bars::new(tiles, workers)))),
             Show::Progress => Some(Display::Lines(Lines::new(workers))),
         };
         let reporter = display.map(|display| std::thread::spawn(move || report(receiver, display)));
-        Self { clock: StageClock::start(), sender: reporter.is_some().then_some(sender), reporter }
+        Self {
+            clock: StageClock::start(),
+            place: Arc::default(),
+            begun: BTreeMap::new(),
+            tiles: BTreeMap::new(),
+            sender: reporter.is_some().then_some(sender),
+            reporter,
+        }
     }
 
-    /// Waits until everything is shown; the stages, and seconds since the start.
-    pub fn finish(mut self) -> (Vec<ReportStage>, f64) {
+    /// Where the run is, as it goes on.
+    pub fn place(&self) -> Arc<Mutex<Place>> {
+        Arc::clone(&self.place)
+    }
+
+    fn time_tile(&mut self, event: &Event) {
+        match event {
+            Event::Started(stage, tile) => {
+                self.begun.insert((*stage, *tile), self.clock.seconds());
+            }
+            Event::Kept(stage, tile) => {
+                self.begun.remove(&(*stage, *tile));
+            }
+            Event::Done(stage, tile) => {
+                if let Some(begun_s) = self.begun.remove(&(*stage, *tile)) {
+                    let seconds = self.tiles.entry(*tile).or_default().entry(stage.name().to_owned()).or_default();
+                    *seconds += self.clock.seconds() - begun_s;
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// Waits until everything is shown; the times of stages and tiles, and seconds since the start.
+    pub fn finish(mut self) -> Times {
         self.sender = None;
         if let Some(reporter) = self.reporter.take() {
             // A reporter that panicked has said so; the work does not depend on it.
             let _ = reporter.join();
         }
         let seconds = self.clock.seconds();
-        (self.clock.stages(), seconds)
+        let tile =
+            |(tile, seconds): (TileId, BTreeMap<String, f64>)| ReportTile { tile: [tile.row, tile.col], seconds };
+        Times { stages: self.clock.stages(), tiles: self.tiles.into_iter().map(tile).collect(), seconds }
     }
+}
+
+/// Where the time of a run went.
+#[derive(Debug)]
+pub struct Times {
+    /// By stage.
+    pub stages: Vec<ReportStage>,
+    /// By tile that was worked on.
+    pub tiles: Vec<ReportTile>,
+    /// In all.
+    pub seconds: f64,
 }
 
 impl Progress for Listener {
     fn tell(&mut self, event: Event) {
         let stage_time = self.clock.hear(&event);
+        self.time_tile(&event);
+        self.place.lock().unwrap_or_else(PoisonError::into_inner).hear(&event);
         if let Some(sender) = &self.sender {
             let at_s = self.clock.seconds();
             // Fails only when the reporter is gone, which must not stop the work.
@@ -84,6 +172,7 @@ impl Progress for Listener {
 
 enum Display {
     Json,
+    Log(fn(&Event, Option<&ReportStage>, f64) -> String),
     Lines(Lines),
     Bars(Box<Bars>),
 }
@@ -92,6 +181,7 @@ fn report(receiver: Receiver<Heard>, mut display: Display) {
     for Heard { event, stage_time, at_s } in receiver {
         match &mut display {
             Display::Json => events::print_line(&events::event_json(&event, stage_time.as_ref(), at_s)),
+            Display::Log(line) => terminal::tell(&line(&event, stage_time.as_ref(), at_s)),
             Display::Lines(lines) => {
                 if let Some(line) = lines.hear(&event, stage_time.as_ref(), at_s) {
                     terminal::tell(&line);
@@ -136,7 +226,7 @@ impl Bars {
             _ => {}
         }
         self.board.hear(event);
-        if !matches!(event, Event::Leave(_) | Event::Note(_)) {
+        if !matches!(event, Event::Leave(_) | Event::Note(_) | Event::Because(..)) {
             self.draw_board();
         }
         let line = self.lines.hear(event, stage_time, at_s);

@@ -1,19 +1,20 @@
 //! What `build` and `tile` share: the announcement, listening, and the end, with its report.
 
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
 
-use compiler::{CompileError, Options};
-use database::{Database, Report, files};
+use compiler::{Built, CompileError, Options};
+use database::{Database, Lease, Report, files};
 use job::Job;
 use serde_json::json;
 use views::{Align, BreachPlaces, Table, breaches_csv, breaches_geojson};
 
-use crate::arguments::RunArguments;
+use crate::arguments::{Log, RunArguments};
 use crate::end_table::{End, end_table};
 use crate::events;
 use crate::failure::{Failure, Outcome};
-use crate::progress::{Listener, Show};
-use crate::signals::Signals;
+use crate::progress::{Listener, Show, Times};
+use crate::signals::{self, Signals};
 use crate::{page, terminal};
 
 /// A run of the compiler on a job, as a person follows it.
@@ -22,7 +23,12 @@ pub struct Run<'a> {
     job: &'a Job,
     arguments: &'a RunArguments,
     folder: PathBuf,
+    workers: usize,
+    /// Whether other processes do the rest: then there is no board to show, and every tile is told.
+    is_part: bool,
     signals: Signals,
+    /// What a process that shares the directory holds, to be given up if it has to end.
+    lease: Arc<Mutex<Option<Lease>>>,
 }
 
 /// What came of a run, before times are known.
@@ -34,6 +40,15 @@ pub struct Finished {
     pub database: Database,
     /// Which tiles were built and which kept, in words.
     pub tiles: String,
+    /// Whether nothing had to be done, so that the report is the one of the build before.
+    pub is_unchanged: bool,
+}
+
+impl From<Built> for Finished {
+    fn from(built: Built) -> Self {
+        let tiles = format!("{} built, {} kept", built.rebuilt, built.kept);
+        Self { report: built.report, database: built.database, tiles, is_unchanged: built.is_unchanged }
+    }
 }
 
 impl<'a> Run<'a> {
@@ -42,14 +57,34 @@ impl<'a> Run<'a> {
     /// # Errors
     /// When signals cannot be watched.
     pub fn announce(job: &'a Job, arguments: &'a RunArguments, what: &str) -> Result<Self, Failure> {
-        let run = Self { job, arguments, folder: arguments.folder(job), signals: Signals::watch()? };
-        if run.show() == Show::Progress {
-            let (version, workers) = (env!("CARGO_PKG_VERSION"), arguments.workers.count());
+        let (run, remark) = Self::new(job, arguments, false)?;
+        if matches!(run.show(), Show::Progress | Show::Verbose) {
+            let (version, workers) = (env!("CARGO_PKG_VERSION"), run.workers);
             let (path, folder) = (job.path.display(), run.folder.display());
             terminal::tell(&format!("tiefort {version}: {what} {path} into {folder}, {workers} workers\n"));
+            remark.iter().for_each(|remark| terminal::tell(&format!("note: {remark}")));
             terminal::tell(&settings_text(job));
         }
         Ok(run)
+    }
+
+    /// Announces a part of a build in one line.
+    ///
+    /// # Errors
+    /// When signals cannot be watched.
+    pub fn announce_briefly(job: &'a Job, arguments: &'a RunArguments, what: &str) -> Result<Self, Failure> {
+        let (run, _) = Self::new(job, arguments, true)?;
+        if matches!(run.show(), Show::Progress | Show::Verbose) {
+            let (path, folder) = (job.path.display(), run.folder.display());
+            terminal::tell(&format!("tiefort {}: {what} of {path} in {folder}", env!("CARGO_PKG_VERSION")));
+        }
+        Ok(run)
+    }
+
+    fn new(job: &'a Job, arguments: &'a RunArguments, is_part: bool) -> Result<(Self, Option<String>), Failure> {
+        let (workers, remark) = arguments.workers.for_job(job);
+        let (folder, signals) = (arguments.folder(job), Signals::watch()?);
+        Ok((Self { job, arguments, folder, workers, is_part, signals, lease: Arc::default() }, remark))
     }
 
     /// Where the database lies.
@@ -59,7 +94,37 @@ impl<'a> Run<'a> {
 
     /// What the compiler is told.
     pub fn options(&self, fresh: bool) -> Options<'_> {
-        Options { workers: self.arguments.workers.count(), fresh, stop: self.signals.stop() }
+        Options { workers: self.workers, fresh, stop: self.signals.stop() }
+    }
+
+    /// Keeps in mind which lease this process holds.
+    pub fn hold(&self, lease: Option<Lease>) {
+        *self.lease.lock().unwrap_or_else(PoisonError::into_inner) = lease;
+    }
+
+    /// Runs `work` while someone listens; what it gives, and where the time went.
+    ///
+    /// # Errors
+    /// Why the compiler ended early.
+    pub fn listen<T>(
+        &self,
+        work: impl FnOnce(&mut Listener) -> Result<T, CompileError>,
+    ) -> Result<(T, Times), Failure> {
+        let tiles = (self.job.tiles.rows, self.job.tiles.columns);
+        let mut listener = Listener::start(self.show(), tiles, self.workers);
+        let (place, lease) = (listener.place(), Arc::clone(&self.lease));
+        self.signals.end_in_time(move || {
+            // Others may have what is given up at once; if that fails, the lease expires.
+            let held = lease.lock().unwrap_or_else(PoisonError::into_inner).take();
+            let _ = held.map(Lease::give_up);
+            signals::stopped(&place.lock().unwrap_or_else(PoisonError::into_inner).words())
+        });
+        let worked = work(&mut listener);
+        let times = listener.finish();
+        // From here on this thread says how the process ends.
+        self.signals.tell_once(|| {});
+        let worked = worked.map_err(|error| Failure::of_compiler(&error, self.signals.exit_code()))?;
+        Ok((worked, times))
     }
 
     /// Runs `work` while someone listens, then writes the report and tells the end.
@@ -70,15 +135,32 @@ impl<'a> Run<'a> {
         &self,
         work: impl FnOnce(&mut Listener) -> Result<Finished, CompileError>,
     ) -> Result<Outcome, Failure> {
-        let tiles = (self.job.tiles.rows, self.job.tiles.columns);
-        let mut listener = Listener::start(self.show(), tiles, self.arguments.workers.count());
-        let worked = work(&mut listener);
-        let (stages, seconds) = listener.finish();
-        let Finished { mut report, database, tiles } =
-            worked.map_err(|error| Failure::of_compiler(&error, self.signals.exit_code()))?;
-        report.stages = stages;
-        database.write_json(files::REPORT, &report)?;
-        self.write_views(&database, &report)?;
+        let (finished, times) = self.listen(work)?;
+        self.conclude(finished, times)
+    }
+
+    /// Writes the report of a run, unless nothing was done, and tells the end.
+    ///
+    /// # Errors
+    /// When the report cannot be written.
+    pub fn conclude(&self, finished: Finished, times: Times) -> Result<Outcome, Failure> {
+        let Finished { mut report, database, tiles, is_unchanged } = finished;
+        if !is_unchanged {
+            report.stages = times.stages;
+            report.tiles = times.tiles;
+            let places = places(self.job);
+            let breaches = [
+                (files::BREACHES, breaches_geojson(&report, &places)),
+                (files::BREACHES_CSV, breaches_csv(&report, &places)),
+            ];
+            for (name, text) in breaches {
+                let stamp = database.write_bytes(name, text.as_bytes())?;
+                report.files.insert(name.to_owned(), stamp);
+            }
+            database.write_json(files::REPORT, &report)?;
+            self.write_page(&database, &report)?;
+            database.remove_work()?;
+        }
         let outcome = self.judge(&report);
         match self.show() {
             Show::Nothing => {}
@@ -86,20 +168,30 @@ impl<'a> Run<'a> {
                 "event": "summary",
                 "database": self.folder.display().to_string(),
                 "exit_code": outcome.code(),
+                "unchanged": is_unchanged,
                 "report": report,
             })),
-            Show::Progress => {
-                terminal::tell(&end_table(&End { report: &report, tiles: &tiles, folder: &self.folder, seconds }));
+            Show::JsonLog => terminal::tell(
+                &json!({ "event": "end", "exit_code": outcome.code(), "unchanged": is_unchanged,
+                         "database": self.folder.display().to_string(), "at_s": times.seconds })
+                .to_string(),
+            ),
+            Show::Progress | Show::Verbose if is_unchanged => terminal::tell(&format!(
+                "nothing changed: all {} tiles in {} are fresh, so nothing was done ({:.2} s)",
+                self.job.tiles.rows * self.job.tiles.columns,
+                self.folder.display(),
+                times.seconds
+            )),
+            Show::Progress | Show::Verbose => {
+                let end = End { report: &report, tiles: &tiles, folder: &self.folder, seconds: times.seconds };
+                terminal::tell(&end_table(&end));
             }
         }
         Ok(outcome)
     }
 
-    /// What people look at, beside `report.json`.
-    fn write_views(&self, database: &Database, report: &Report) -> Result<(), Failure> {
-        let places = places(self.job);
-        database.write_bytes(files::BREACHES, breaches_geojson(report, &places).as_bytes())?;
-        database.write_bytes(files::BREACHES_CSV, breaches_csv(report, &places).as_bytes())?;
+    /// The report for people to look at, beside `report.json`.
+    fn write_page(&self, database: &Database, report: &Report) -> Result<(), Failure> {
         if self.arguments.no_html {
             // That of an earlier build would tell of another one.
             database.remove(files::REPORT_HTML)?;
@@ -111,10 +203,13 @@ impl<'a> Run<'a> {
     }
 
     fn show(&self) -> Show {
-        match (self.arguments.json, self.arguments.quiet) {
-            (true, _) => Show::Json,
-            (false, true) => Show::Nothing,
-            (false, false) => Show::Progress,
+        let RunArguments { json, quiet, verbose, log, .. } = self.arguments;
+        match (json, quiet, log) {
+            (true, ..) => Show::Json,
+            (_, true, _) => Show::Nothing,
+            (.., Some(Log::Json)) => Show::JsonLog,
+            _ if *verbose || self.is_part => Show::Verbose,
+            _ => Show::Progress,
         }
     }
 

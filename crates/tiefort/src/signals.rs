@@ -1,21 +1,38 @@
-//! SIGINT and SIGTERM: the first asks the run to stop in an orderly way, the second ends it at once.
+//! SIGINT and SIGTERM: the first asks the run to stop in an orderly way and ends it within a second, the second ends
+//! it at once.
+//!
+//! A run looks at the flag between tiles, and a tile may take minutes. So a thread gives it a moment to stop by itself,
+//! then holds writing back, so that nothing is left half-written, says how to go on, and ends the process. What a
+//! tile has not published is done again by the next run.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::thread;
+use std::time::{Duration, Instant};
 
+use database::Writing;
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
 
 use crate::failure::Failure;
+use crate::terminal;
 
 /// Added to a signal's number, gives the exit code shells expect.
 const EXIT_BASE: i32 = 128;
+/// How often the flag is looked at.
+const LOOK: Duration = Duration::from_millis(20);
+/// What a run has to stop by itself.
+const GRACE: Duration = Duration::from_millis(400);
+/// What whoever is writing a file has to finish it.
+const WRITING: Duration = Duration::from_millis(300);
 
 /// Watches for signals from [`Signals::watch`] until the process ends.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Signals {
     stop: Arc<AtomicBool>,
     received: Arc<AtomicUsize>,
+    /// Whether the end of the process has been told.
+    told: Arc<AtomicBool>,
 }
 
 impl Signals {
@@ -24,7 +41,7 @@ impl Signals {
     /// # Errors
     /// When the system refuses.
     pub fn watch() -> Result<Self, Failure> {
-        let signals = Self { stop: Arc::default(), received: Arc::default() };
+        let signals = Self { stop: Arc::default(), received: Arc::default(), told: Arc::default() };
         for signal in [SIGINT, SIGTERM] {
             signals.register(signal).map_err(|error| {
                 Failure::new(format!("the system refuses to watch signal {signal}: {error}"), "try again")
@@ -51,4 +68,49 @@ impl Signals {
         let signal = self.received.load(Ordering::SeqCst) as i32;
         (signal != 0).then_some((EXIT_BASE + signal) as u8)
     }
+
+    /// Ends the process soon after a signal, if it has not ended by itself: `last` is done first and says what to tell.
+    pub fn end_in_time(&self, last: impl FnOnce() -> Failure + Send + 'static) {
+        let signals = self.clone();
+        thread::spawn(move || {
+            while !signals.stop.load(Ordering::Relaxed) {
+                thread::sleep(LOOK);
+            }
+            thread::sleep(GRACE);
+            let failure = last();
+            // Held until the process is gone.
+            let _held_back = held_back_within(WRITING);
+            signals.tell_once(|| {
+                failure.tell();
+            });
+            std::process::exit(i32::from(signals.exit_code().unwrap_or(1)));
+        });
+    }
+
+    /// Tells how the process ends, unless it is being told already: then the process ends under this call.
+    pub fn tell_once(&self, tell: impl FnOnce()) {
+        if self.told.swap(true, Ordering::SeqCst) {
+            loop {
+                thread::park();
+            }
+        }
+        tell();
+    }
+}
+
+/// Keeps other threads from beginning to write; without effect where one writes for longer than `patience`.
+fn held_back_within(patience: Duration) -> Option<Writing> {
+    let start = Instant::now();
+    loop {
+        match Writing::held_back() {
+            None if start.elapsed() < patience => thread::sleep(Duration::from_millis(5)),
+            held => return held,
+        }
+    }
+}
+
+/// Says that the process is being ended where it is.
+pub fn stopped(place: &str) -> Failure {
+    terminal::clear_line();
+    Failure::new(place, "run the same command again to go on from here")
 }

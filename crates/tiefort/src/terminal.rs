@@ -23,6 +23,13 @@ pub fn tell(text: &str) {
     let _ = stderr().lock().write_all(format!("{text}{line_end}").as_bytes());
 }
 
+/// Ends a line that bars may have left half-drawn.
+pub fn clear_line() {
+    if is_watched() {
+        tell("");
+    }
+}
+
 /// Whether a person sees stderr as it is written.
 pub fn is_watched() -> bool {
     stderr().is_terminal() && std::env::var_os("TERM").is_none_or(|kind| kind != "dumb")

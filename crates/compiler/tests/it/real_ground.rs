@@ -86,7 +86,7 @@ fn the_desert_is_sound_as_true_as_specified_and_the_same_for_one_worker_and_two(
     assert_same(&trees[0], &trees[1], "one worker and two");
     let verdict = compiler::verify(&folder.path().join("one"), Some(&path)).unwrap();
     assert!(verdict.problems.is_empty(), "{:?}", verdict.problems);
-    assert_eq!((verdict.checked_modules, verdict.checked_files), (51 * 51, 3 * 36 + 1));
+    assert_eq!((verdict.checked_modules, verdict.checked_files), (51 * 51, 4 * 36 + 1));
     check_band(verdict.residual.unwrap().rms_m, 0.82);
 }
 

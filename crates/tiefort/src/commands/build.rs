@@ -37,7 +37,6 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let run = Run::announce(&job, &arguments.run, "building")?;
     run.finish(|listener| {
         let built = compiler::build(&job, run.folder(), &run.options(arguments.fresh), listener)?;
-        let tiles = format!("{} built, {} kept", built.rebuilt, built.kept);
-        Ok(Finished { report: built.report, database: built.database, tiles })
+        Ok(Finished::from(built))
     })
 }

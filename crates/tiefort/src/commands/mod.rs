@@ -11,9 +11,11 @@ mod render;
 mod report;
 mod sample;
 mod status;
+mod task;
 mod tile;
 mod tin;
 mod verify;
+mod worker;
 
 use clap::Subcommand;
 
@@ -30,6 +32,10 @@ pub enum Command {
     Tile(tile::Arguments),
     /// Show tiles, ranks, memory, time and disk before any work
     Plan(plan::Arguments),
+    /// Do one unit of work of a build, for engines
+    Task(task::Arguments),
+    /// Take work from a shared folder until the build is done
+    Worker(worker::Arguments),
     /// Show how far a database is, tile by tile
     Status(status::Arguments),
     /// Show what a build found: limits, residuals, breaches, times
@@ -63,6 +69,8 @@ impl Command {
             Command::Build(arguments) => build::run(&arguments),
             Command::Tile(arguments) => tile::run(&arguments),
             Command::Plan(arguments) => plan::run(&arguments),
+            Command::Task(arguments) => task::run(&arguments),
+            Command::Worker(arguments) => worker::run(&arguments),
             Command::Status(arguments) => status::run(&arguments),
             Command::Report(arguments) => report::run(&arguments),
             Command::Render(arguments) => render::run(&arguments),

@@ -3,19 +3,29 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use compiler::{Plan, PlannedTile};
+use compiler::{Plan, PlannedTile, Played};
 use job::Job;
 use serde_json::{Value, json};
 use views::{Align, Table, grouped};
 
+use crate::arguments::rows_by_columns;
+use crate::engines::{self, Glue};
 use crate::failure::{Failure, Outcome};
-use crate::{files, run, terminal};
+use crate::{costs, files, run, terminal};
 
 const AFTER_HELP: &str = "\
 Examples:
   tiefort plan configs/ntc.toml
-  tiefort plan configs/ntc.toml --simulate 16
-  tiefort plan configs/ntc.toml --emit json | jq .forecast";
+  tiefort plan configs/ntc.toml --simulate 1,2,16
+  tiefort plan configs/ntc.toml --simulate 1,100,10000 --tiles 6x6,100x100,1000x1000
+  tiefort plan configs/ntc.toml --emit json | jq .forecast
+  tiefort plan configs/ntc.toml --emit ninja --out /data/ntc.tdb > build.ninja && ninja
+  tiefort plan configs/ntc.toml --emit slurm --out /share/ntc.tdb > ntc.sh && bash ntc.sh
+  tiefort plan configs/ntc.toml --emit dask --out /share/ntc.tdb > ntc.py && python3 ntc.py scheduler:8786
+
+A simulation takes what tiles cost from the report of a database that was built from this job, and forecasts it where
+there is none. Tiles that touch never run at once, so at most a quarter of them does: choose 10 to 32 tiles for each
+worker.";
 
 /// Arguments of `plan`.
 #[derive(Args)]
@@ -28,51 +38,105 @@ pub struct Arguments {
     #[arg(long, value_name = "FORMAT")]
     emit: Option<Emit>,
     /// Also play the build with so many workers
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
-    simulate: Option<u32>,
+    #[arg(long, value_name = "N", value_delimiter = ',', value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    simulate: Vec<u32>,
+    /// Play it in so many tiles; more tiles than load modules make a larger area
+    #[arg(long, value_name = "ROWSxCOLUMNS", value_delimiter = ',', requires = "simulate")]
+    #[arg(value_parser = rows_by_columns)]
+    tiles: Vec<(u32, u32)>,
+    /// Folder of the terrain database [default: NAME.tdb here]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Tiles that a task of an engine does, one after the other [default: so many that it takes half a minute]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65_536))]
+    pack: Option<u32>,
 }
+
+/// Tiles that are played at most.
+const PLAYED_TILES_MAX: u64 = 1 << 20;
+/// Tiles that are listed one by one for a person.
+const LISTED_TILES_MAX: usize = 1024;
 
 /// For which program.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Emit {
     /// Everything as JSON
     Json,
-    /// A batch script for Slurm (not supported yet)
+    /// A script that submits everything to Slurm
     Slurm,
-    /// A script for Dask (not supported yet)
+    /// A Python program for a Dask cluster
     Dask,
-    /// A build file for ninja (not supported yet)
+    /// A build file for ninja, on one machine
     Ninja,
 }
 
 /// Plans.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
-    if let Some(emit @ (Emit::Slurm | Emit::Dask | Emit::Ninja)) = arguments.emit {
-        let name = emit.to_possible_value().expect("every format has a name");
-        let what = format!("--emit {}", name.get_name());
-        return Err(Failure::not_yet(&what, "use --emit json, or build on one machine: `tiefort build`"));
-    }
     let job = Job::load_with(&arguments.job, &compiler::find_area)?;
     let plan = compiler::plan(&job)?;
+    let played = played(&job, &plan, arguments)?;
+    let glue = || Glue::new(&job, &plan, arguments.out.as_deref(), arguments.pack);
     let text = match arguments.emit {
-        Some(_) => json_text(&job, &plan, arguments.simulate),
-        None => plan_text(&job, &plan, arguments.simulate),
+        Some(Emit::Json) => json_text(&job, &plan, &played),
+        Some(Emit::Ninja) => engines::ninja(&glue()?),
+        Some(Emit::Slurm) => engines::slurm(&glue()?),
+        Some(Emit::Dask) => engines::dask(&glue()?),
+        None => plan_text(&job, &plan, &played),
     };
     terminal::print(&text)?;
     Ok(Outcome::Sound)
 }
 
-fn plan_text(job: &Job, plan: &Plan, simulated: Option<u32>) -> String {
+/// The build played with every number of workers, in every number of tiles.
+fn played(job: &Job, plan: &Plan, arguments: &Arguments) -> Result<Vec<Played>, Failure> {
+    if let Some((rows, columns)) =
+        arguments.tiles.iter().find(|(r, c)| PLAYED_TILES_MAX < u64::from(*r) * u64::from(*c))
+    {
+        let message = format!("--tiles: found {rows}x{columns}, expected at most {PLAYED_TILES_MAX} tiles");
+        return Err(Failure::new(message, "the largest that is played is 1024x1024"));
+    }
+    let default = PathBuf::from(format!("{}.tdb", job.area.name));
+    let costs = costs::of(job, plan, arguments.out.as_ref().unwrap_or(&default));
+    let own = (job.tiles.rows, job.tiles.columns);
+    let tiles = if arguments.tiles.is_empty() { &[own][..] } else { &arguments.tiles };
+    let workers: Vec<usize> = arguments.simulate.iter().map(|&workers| workers as usize).collect();
+    if workers.is_empty() {
+        return Ok(Vec::new());
+    }
+    let modules = job.area.grid.count() as u64;
+    Ok(tiles.iter().flat_map(|&tiles| compiler::play(&costs, tiles, modules, job.tiles.order, &workers)).collect())
+}
+
+fn plan_text(job: &Job, plan: &Plan, played: &[Played]) -> String {
     let mut text = format!("Settings of {}\n{}\n", job.path.display(), run::settings_text(job));
     text += &forecast_table(job, plan).text(0);
     text += &format!("\n{}", corner_table(job).text(0));
-    if let Some(workers) = simulated {
-        let played = compiler::simulate(plan, workers as usize);
-        let (seconds, busy, chain) = (played.makespan, 100.0 * played.busy, played.critical_path);
-        text += &format!("\nPlayed with {workers} workers: {seconds:.1} s, {busy:.0} % busy; ");
-        text += &format!("the longest chain of tiles takes {chain:.1} s\n");
+    if !played.is_empty() {
+        text += &format!("\n{}", played_table(played).text(0));
     }
-    text + "\n" + &tile_table(plan).text(0)
+    if plan.tiles.len() <= LISTED_TILES_MAX {
+        text += &format!("\n{}", tile_table(plan).text(0));
+    }
+    text
+}
+
+fn played_table(played: &[Played]) -> Table {
+    let mut table = Table::new(&[Align::Right; 8]);
+    table.row(["tiles", "area", "workers", "time", "busy", "longest chain", "at once", "coordinator"]);
+    for run in played {
+        let (rows, columns) = run.tiles;
+        table.row([
+            format!("{rows} x {columns}"),
+            format!("{} x", grouped(run.area_times.round() as u64)),
+            format!("{} workers", grouped(run.workers as u64)),
+            format!("{:.1} s", run.seconds),
+            format!("{:.1} %", 100.0 * run.busy),
+            format!("{:.1} s", run.longest_chain_s),
+            grouped(run.at_once as u64),
+            files::bytes_text(run.coordinator_bytes),
+        ]);
+    }
+    table
 }
 
 fn forecast_table(job: &Job, plan: &Plan) -> Table {
@@ -127,12 +191,15 @@ fn by_rank(plan: &Plan) -> Vec<&PlannedTile> {
     tiles
 }
 
-fn json_text(job: &Job, plan: &Plan, simulated: Option<u32>) -> String {
-    let played = simulated.map(|workers| {
-        let played = compiler::simulate(plan, workers as usize);
-        json!({ "workers": workers, "seconds": played.makespan, "busy": played.busy,
-                "longest_chain_s": played.critical_path })
-    });
+fn json_text(job: &Job, plan: &Plan, played: &[Played]) -> String {
+    let simulation: Vec<Value> = played
+        .iter()
+        .map(|run| {
+            json!({ "tiles": [run.tiles.0, run.tiles.1], "workers": run.workers, "seconds": run.seconds,
+                    "busy": run.busy, "longest_chain_s": run.longest_chain_s, "at_once": run.at_once,
+                    "coordinator_bytes": run.coordinator_bytes, "area_times": run.area_times })
+        })
+        .collect();
     let tiles: Vec<Value> = by_rank(plan).into_iter().map(tile_json).collect();
     let forecast = &plan.forecast;
     let corners: Vec<Value> = compiler::corners(job)
@@ -147,7 +214,7 @@ fn json_text(job: &Job, plan: &Plan, simulated: Option<u32>) -> String {
         "corners": corners,
         "forecast": { "memory_bytes": forecast.memory_bytes, "seconds": forecast.seconds,
                       "disk_bytes": forecast.disk_bytes },
-        "simulation": played,
+        "simulation": simulation,
         "tiles": tiles,
     });
     format!("{value:#}\n")
@@ -165,5 +232,6 @@ fn tile_json(tile: &PlannedTile) -> Value {
         "first_module": [modules.south, modules.west],
         "modules": [modules.rows(), modules.cols()],
         "inherits_from": from,
+        "after": tile.after.iter().map(|id| [id.row, id.col]).collect::<Vec<_>>(),
     })
 }

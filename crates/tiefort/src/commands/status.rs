@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use compiler::Status;
-use database::{Manifest, ManifestState, TileState};
+use compiler::{Status, TileProgress};
+use database::{Held, Manifest};
 use views::grouped;
 
 use crate::board::Board;
@@ -27,57 +27,62 @@ pub struct Arguments {
 }
 
 /// Every state of a tile, its character and its name.
-const STATES: [(TileState, char, &str); 5] = [
-    (TileState::Done, '#', "done"),
-    (TileState::OverLimit, '!', "over a limit"),
-    (TileState::Frozen, 'f', "frozen"),
-    (TileState::Failed, 'x', "failed"),
-    (TileState::Missing, '.', "missing"),
+const STATES: [(TileProgress, char, &str); 5] = [
+    (TileProgress::Done, '#', "done"),
+    (TileProgress::OverLimit, '!', "over a limit"),
+    (TileProgress::Frozen, 'f', "frozen"),
+    (TileProgress::Earlier, 'o', "of the build before, kept if still fresh"),
+    (TileProgress::Missing, '.', "missing"),
 ];
 
 /// Tells the status.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let status = compiler::status(&arguments.database)?;
     terminal::print(&status_text(&status))?;
-    let complete = status.manifest.state == ManifestState::Complete;
-    Ok(match (status.locked, complete, status.manifest.totals.breaches) {
-        (true, ..) => Outcome::TryLater,
-        (false, false, _) => Outcome::Damaged,
-        (false, true, 0) => Outcome::Sound,
-        (false, true, _) => Outcome::Breaches,
+    let missing = status.tiles.iter().any(|(_, progress)| *progress == TileProgress::Missing);
+    let complete = status.is_complete() && !missing;
+    Ok(match (status.held, complete, status.manifest.totals.breaches) {
+        (Held::Alone, ..) | (Held::Shared, false, _) => Outcome::TryLater,
+        (_, false, _) => Outcome::Damaged,
+        (_, true, 0) => Outcome::Sound,
+        (_, true, _) => Outcome::Breaches,
     })
 }
 
 fn status_text(status: &Status) -> String {
-    let Manifest { area, state, tiles, totals, .. } = &status.manifest;
-    let state = match (status.locked, state) {
-        (true, _) => "being built right now",
-        (false, ManifestState::Incomplete) => "incomplete: `tiefort build` goes on with it",
-        (false, ManifestState::Complete) => "complete",
+    let Manifest { area, totals, .. } = &status.manifest;
+    let tiles = &status.tiles;
+    let missing = tiles.iter().any(|(_, progress)| *progress == TileProgress::Missing);
+    let state = match (status.held, status.is_complete()) {
+        (Held::Alone, _) => "being built right now",
+        (Held::Shared, false) => "being built right now by processes that share it",
+        (Held::Free, false) => "incomplete: `tiefort build` goes on with it",
+        (_, true) if missing => "damaged: files are missing; `tiefort build` makes them again",
+        (_, true) => "complete",
     };
     let mut text = format!("Gaming area {}: {state}\n\n", area.name);
     let mut board = Board::new(area.tile_rows, area.tile_cols);
-    for record in tiles {
-        board.mark(record.tile(), mark(record.state));
+    for &(tile, progress) in tiles {
+        board.mark(tile, mark(progress));
     }
     for line in board.lines() {
         text += &format!("  {line}\n");
     }
     text += "\n";
     for (state, mark, name) in STATES {
-        let count = tiles.iter().filter(|record| record.state == state).count();
+        let count = tiles.iter().filter(|(_, progress)| *progress == state).count();
         if 0 < count {
             text += &format!("  {mark} {name}: {}\n", grouped(count as u64));
         }
     }
-    if status.manifest.state == ManifestState::Complete {
+    if status.is_complete() {
         let (points, triangles) = (grouped(totals.points), grouped(totals.triangles));
         text += &format!("\n{triangles} triangles, {points} points, {} breaches\n", grouped(totals.breaches));
     }
     text
 }
 
-fn mark(state: TileState) -> char {
+fn mark(state: TileProgress) -> char {
     let known = STATES.iter().find(|(known, ..)| *known == state);
     known.map(|(_, mark, _)| *mark).expect("every state is in the table")
 }

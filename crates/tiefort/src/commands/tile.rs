@@ -47,11 +47,15 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         let names: Vec<String> = rebuilt.rebuilt.iter().map(TileId::to_string).collect();
         let frozen = if rebuilt.frozen { "; frozen: a build makes it whole" } else { "" };
         let tiles = format!("{} built{frozen}", names.join(", "));
-        Ok(Finished { report: rebuilt.report, database: rebuilt.database, tiles })
+        Ok(Finished { report: rebuilt.report, database: rebuilt.database, tiles, is_unchanged: false })
     })
 }
 
-fn check_tile(job: &Job, tile: TileId) -> Result<(), Failure> {
+/// Refuses a tile that the job does not have.
+///
+/// # Errors
+/// When there is no such tile.
+pub fn check_tile(job: &Job, tile: TileId) -> Result<(), Failure> {
     let (rows, columns) = (job.tiles.rows, job.tiles.columns);
     if tile.row < rows && tile.col < columns {
         return Ok(());

@@ -1,6 +1,7 @@
 //! `tiefort tin`: just a mesh from a raster.
 
 use std::path::PathBuf;
+use std::sync::PoisonError;
 
 use clap::{ArgGroup, Args, ValueEnum};
 use compiler::{Measures, Mesh, Sights, TinMethod, TinRequest};
@@ -13,7 +14,7 @@ use views::{Coordinates, MeshPlace, grouped};
 use crate::arguments::{Workers, positive, rows_by_columns};
 use crate::failure::{Failure, Outcome};
 use crate::progress::{Listener, Show};
-use crate::signals::Signals;
+use crate::signals::{self, Signals};
 use crate::{events, files, measures, terminal};
 
 const AFTER_HELP: &str = "\
@@ -163,15 +164,20 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         (false, false) => Show::Progress,
     };
     let mut listener = Listener::start(show, arguments.tiles, request.workers);
+    let place = listener.place();
+    signals.end_in_time(move || signals::stopped(&place.lock().unwrap_or_else(PoisonError::into_inner).words()));
     let meshed = compiler::tin(&request, signals.stop(), &mut listener);
-    let (_, seconds) = listener.finish();
+    let seconds = listener.finish().seconds;
+    signals.tell_once(|| {});
     let mesh = meshed.map_err(|error| Failure::of_compiler(&error, signals.exit_code()))?;
     write(&mesh, kind, arguments)?;
     let measured = arguments.measure.then(|| compiler::measure(&mesh, Sights::USUAL));
     match show {
         Show::Nothing => {}
         Show::Json => events::print_line(&summary_json(&mesh, measured.as_ref())),
-        Show::Progress => terminal::tell(&(summary(&mesh, seconds) + &measured_text(measured.as_ref()))),
+        Show::Progress | Show::Verbose | Show::JsonLog => {
+            terminal::tell(&(summary(&mesh, seconds) + &measured_text(measured.as_ref())));
+        }
     }
     Ok(Outcome::Sound)
 }

@@ -54,7 +54,7 @@ fn a_second_build_keeps_every_tile_and_a_fresh_one_none() {
     let scene = built();
     let database = fs::read(scene.path("small.tdb/database.json")).unwrap();
     let again = scene.run_to(0, &["build", "job.toml"]);
-    assert!(again.stderr.contains("0 built, 4 kept"), "{}", again.stderr);
+    assert!(again.stderr.contains("nothing changed: all 4 tiles"), "{}", again.stderr);
     let fresh = scene.run_to(0, &["build", "job.toml", "--fresh"]);
     assert!(fresh.stderr.contains("4 built, 0 kept"), "{}", fresh.stderr);
     assert!(fs::read(scene.path("small.tdb/database.json")).unwrap() == database, "the same job gave other bytes");

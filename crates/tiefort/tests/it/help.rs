@@ -2,8 +2,8 @@
 
 use crate::scene::Scene;
 
-const COMMANDS: [&str; 10] =
-    ["build", "tile", "plan", "status", "report", "verify", "fidelity", "export", "sample", "tin"];
+const COMMANDS: [&str; 12] =
+    ["build", "tile", "plan", "task", "worker", "status", "report", "verify", "fidelity", "export", "sample", "tin"];
 
 #[test]
 fn the_help_of_every_command_has_an_example_of_it() {
@@ -68,14 +68,6 @@ fn wrong_values_of_arguments_end_with_2_and_say_what_was_expected() {
     ] {
         let said = scene.run_to(2, arguments);
         assert!(said.stderr.contains(expected), "{arguments:?}: {}", said.stderr);
-    }
-}
-
-#[test]
-fn what_is_not_supported_yet_says_so() {
-    let scene = Scene::with_job("small.toml", &[]);
-    for emit in ["slurm", "dask", "ninja"] {
-        scene.refuses(&["plan", "job.toml", "--emit", emit], &[emit, "not supported yet"]);
     }
 }
 

@@ -13,6 +13,7 @@ mod measures;
 mod meshes;
 mod raster;
 mod scene;
+mod shared;
 mod starts;
 mod streams;
 mod views;

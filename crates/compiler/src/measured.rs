@@ -1,0 +1,85 @@
+//! Between what a build knows of a tile's load modules and the file that keeps it.
+
+use database::{FileStamp, Measured, MeasuredModule, MeasuredTally};
+use fidelity::{Residuals, Tally};
+use terrain::{ModuleResidual, TileId};
+
+use crate::assemble::{Assembled, ModuleNumbers};
+
+/// What is kept of a tile's load modules.
+pub(crate) fn to_measured(tile: TileId, assembled: &Assembled) -> Measured {
+    let module = |numbers: &ModuleNumbers| MeasuredModule {
+        triangles: numbers.triangles,
+        polygons: numbers.polygons,
+        posts: numbers.residual.posts,
+        largest: numbers.residual.largest,
+        sum_abs: numbers.residual.sum_abs,
+        sum_squared: numbers.residual.sum_squared,
+    };
+    Measured {
+        tile,
+        modules_file: assembled.file,
+        modules: assembled.modules.iter().map(module).collect(),
+        classes: assembled.residuals.classes.iter().map(to_tally).collect(),
+        at_source: assembled.at_source.as_ref().map(to_tally),
+        points: assembled.points.clone(),
+        border: assembled.border,
+    }
+}
+
+/// What was kept, in a file of this stamp.
+pub(crate) fn from_measured(measured: Measured, file: FileStamp) -> Assembled {
+    let module = |module: &MeasuredModule| ModuleNumbers {
+        triangles: module.triangles,
+        polygons: module.polygons,
+        residual: ModuleResidual {
+            posts: module.posts,
+            largest: module.largest,
+            sum_abs: module.sum_abs,
+            sum_squared: module.sum_squared,
+        },
+    };
+    Assembled {
+        file: measured.modules_file,
+        measured: file,
+        modules: measured.modules.iter().map(module).collect(),
+        residuals: Residuals { classes: measured.classes.iter().map(from_tally).collect() },
+        at_source: measured.at_source.as_ref().map(from_tally),
+        points: measured.points,
+        border: measured.border,
+        is_new: false,
+    }
+}
+
+fn to_tally(tally: &Tally) -> MeasuredTally {
+    MeasuredTally {
+        posts: tally.posts,
+        sum: tally.sum,
+        sum_abs: tally.sum_abs,
+        sum_squared: [(tally.sum_squared >> 64) as u64, tally.sum_squared as u64],
+        largest: tally.largest,
+        bins: tally.filled_bins().collect(),
+    }
+}
+
+fn from_tally(tally: &MeasuredTally) -> Tally {
+    let [high, low] = tally.sum_squared.map(u128::from);
+    let mut sums = Tally::default().with_bins(tally.bins.iter().copied());
+    (sums.posts, sums.sum, sums.sum_abs) = (tally.posts, tally.sum, tally.sum_abs);
+    (sums.sum_squared, sums.largest) = (high << 64 | low, tally.largest);
+    sums
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_tally_survives_being_kept() {
+        let mut tally = Tally::default();
+        [3, -4, 5000, 0, -128, i32::MAX].into_iter().for_each(|residual| tally.add(residual));
+        tally.sum_squared += 1 << 70;
+        assert_eq!(from_tally(&to_tally(&tally)), tally);
+        assert_eq!(from_tally(&to_tally(&Tally::default())), Tally::default());
+    }
+}

@@ -1,0 +1,175 @@
+//! A process that takes units of work from a shared directory until the build is done.
+//!
+//! Which units are ready follows from marks; who does which from leases. A tile is ready once every lower-ranked tile
+//! that touches it is done, so two tiles that touch are never at work at once, unless a lease has expired under a
+//! process that was only slow. No clock is looked at here: the caller says what time it is.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+use std::time::Duration;
+
+use database::{Claim, Lease, Leases, ManifestState};
+use job::Job;
+
+use crate::build::Built;
+use crate::run::Options;
+use crate::unit::{Session, Standing, Unit};
+use crate::{CompileError, Event, Progress, Stage};
+
+/// How a worker shares a directory with others.
+#[derive(Clone, Copy)]
+pub struct Sharing<'a> {
+    /// A name that no other worker has.
+    pub name: &'a str,
+    /// A lease that nobody has renewed for so long is free.
+    pub lease: Duration,
+    /// How long to wait when nothing is ready.
+    pub pause: Duration,
+    /// The time of this process's own clock, from any beginning.
+    pub now: &'a dyn Fn() -> Duration,
+    /// Waits.
+    pub wait: &'a dyn Fn(Duration),
+    /// Told which lease is held, to be given up if the process has to end.
+    pub holding: &'a (dyn Fn(Option<Lease>) + Sync),
+}
+
+/// What a worker did.
+#[derive(Debug)]
+pub struct WorkerEnd {
+    /// Units of work it did.
+    pub units: usize,
+    /// The build, if this worker published it.
+    pub published: Option<Box<Built>>,
+}
+
+/// How often a lease is renewed while it lasts once.
+const RENEWALS: u32 = 4;
+
+/// Takes units of work on the build of `job` in `folder` until it is published, by this worker or another.
+///
+/// # Errors
+/// As a build. What other workers do is not affected.
+pub fn work(
+    job: &Job,
+    folder: &Path,
+    options: &Options,
+    sharing: &Sharing,
+    progress: &mut dyn Progress,
+) -> Result<WorkerEnd, CompileError> {
+    let session = Session::join(job, folder, options, progress)?;
+    if session.standing == Standing::Finished {
+        return Ok(WorkerEnd { units: 0, published: None });
+    }
+    let mut worker = Worker {
+        open: if session.standing == Standing::UnderWay { session.units() } else { Vec::new() },
+        leases: session.work.leases(sharing.name, sharing.lease),
+        sharing,
+        session,
+        units: 0,
+    };
+    loop {
+        if options.stop.load(std::sync::atomic::Ordering::Relaxed) {
+            let total = worker.session.units().len();
+            return Err(CompileError::Stopped { stage: Stage::Refine, done: total - worker.open.len(), total });
+        }
+        if worker.is_published() {
+            return Ok(WorkerEnd { units: worker.units, published: None });
+        }
+        match worker.next()? {
+            Some((Unit::Publish, lease)) => return worker.publish(&lease, progress),
+            Some((unit, lease)) => worker.perform(unit, lease, progress)?,
+            None => (sharing.wait)(sharing.pause),
+        }
+    }
+}
+
+struct Worker<'a, 'b> {
+    session: Session<'a>,
+    sharing: &'b Sharing<'b>,
+    leases: Leases,
+    /// Units that were not done when last looked at.
+    open: Vec<Unit>,
+    units: usize,
+}
+
+impl Worker<'_, '_> {
+    /// Whether somebody has finished the build and reported on it.
+    fn is_published(&self) -> bool {
+        let folder = self.session.run.database.folder();
+        let complete = |manifest: database::Manifest| manifest.state == ManifestState::Complete;
+        self.session.standing == Standing::UnderWay
+            && folder.manifest().is_ok_and(complete)
+            && (folder.report().is_ok() || !self.session.work.path().exists())
+    }
+
+    /// A unit that is ready and now ours; the last one once all others are done.
+    fn next(&mut self) -> Result<Option<(Unit, Lease)>, CompileError> {
+        let marked: BTreeSet<String> = self.session.work.all_marked().into_iter().collect();
+        let is_done = |unit: &Unit| marked.contains(&unit.name());
+        self.open.retain(|unit| !is_done(unit));
+        let mut ready: Vec<Unit> = match self.open.is_empty() {
+            true => vec![Unit::Publish],
+            false => self.open.iter().copied().filter(|&unit| self.session.needs(unit).iter().all(is_done)).collect(),
+        };
+        // Workers begin at different places, so that they rarely ask for the same lease.
+        let places = ready.len().max(1);
+        ready.rotate_left(self.sharing.name.bytes().fold(0, |sum, byte| (sum * 31 + usize::from(byte)) % places));
+        for unit in ready {
+            if let Claim::Ours(lease, _) = self.leases.claim(&unit.name(), (self.sharing.now)())? {
+                // It may have been done between the look at the marks and the claim.
+                if self.session.work.marked(&unit.name()).is_none() {
+                    return Ok(Some((unit, lease)));
+                }
+            }
+        }
+        Ok(None)
+    }
+
+    fn perform(&mut self, unit: Unit, lease: Lease, progress: &mut dyn Progress) -> Result<(), CompileError> {
+        let session = &self.session;
+        let done = self.holding(&lease, || session.perform(unit, progress));
+        match done {
+            Ok(()) => {
+                self.units += 1;
+                Ok(())
+            }
+            Err(CompileError::NotReady { .. }) => {
+                // What it builds on was damaged, and is made again first.
+                self.open = self.session.units();
+                Ok(lease.give_up()?)
+            }
+            // Whoever published the build has swept away what this process was writing.
+            Err(_) if self.is_published() => Ok(()),
+            Err(error) => {
+                // Others may have it at once; if that cannot be said either, the lease expires.
+                let _ = lease.give_up();
+                Err(error)
+            }
+        }
+    }
+
+    fn publish(self, lease: &Lease, progress: &mut dyn Progress) -> Result<WorkerEnd, CompileError> {
+        let Self { session, sharing, units, .. } = self;
+        progress.tell(Event::Note("every tile is done: publishing".into()));
+        let built = hold(sharing, lease, || session.publish(progress))?;
+        Ok(WorkerEnd { units: units + 1, published: Some(Box::new(built)) })
+    }
+
+    fn holding<R>(&self, lease: &Lease, work: impl FnOnce() -> R) -> R {
+        hold(self.sharing, lease, work)
+    }
+}
+
+/// Does `work` while the lease is renewed.
+fn hold<R>(sharing: &Sharing, lease: &Lease, work: impl FnOnce() -> R) -> R {
+    (sharing.holding)(Some(lease.clone()));
+    let mut count = 0;
+    let renew = || {
+        count += 1;
+        // Where it cannot be renewed it expires, and the work is done twice: no harm.
+        let _ = lease.renew(count);
+    };
+    let result = schedule::with_heartbeat(sharing.lease / RENEWALS, renew, work);
+    (sharing.holding)(None);
+    result
+}

@@ -1,0 +1,229 @@
+//! What a build does again after a change, what it says of it, and that the bytes are those of a fresh build.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::Path;
+
+use compiler::{Event, Progress, Stage};
+use job::Job;
+use terrain::{Dem, Post, TileId};
+
+use crate::scene::{Scene, Words, assert_same, sample_dem, tile};
+
+/// Keeps what was told.
+#[derive(Default)]
+struct Heard {
+    because: Vec<(TileId, String)>,
+    surveyed: usize,
+    assembled: usize,
+    notes: Vec<String>,
+    entered: Vec<Stage>,
+}
+
+impl Progress for Heard {
+    fn tell(&mut self, event: Event) {
+        match event {
+            Event::Because(Stage::Refine, tile, why) => self.because.push((tile, why)),
+            Event::Done(Stage::Survey, _) => self.surveyed += 1,
+            Event::Done(Stage::Assemble, _) => self.assembled += 1,
+            Event::Note(text) => self.notes.push(text),
+            Event::Enter(stage, _) => self.entered.push(stage),
+            _ => {}
+        }
+    }
+}
+
+/// Builds `area` again, and gives what was told and the tiles that were refined, which a fresh build then equals.
+#[track_caller]
+fn rebuilt(scene: &Scene, what: &str) -> (Heard, BTreeSet<TileId>) {
+    let mut heard = Heard::default();
+    let built = scene.build_watched("area", 2, &false.into(), &mut heard).unwrap_or_else(|error| panic!("{error}"));
+    let refined: BTreeSet<TileId> = heard.because.iter().map(|(tile, _)| *tile).collect();
+    assert_eq!(built.rebuilt, refined.len(), "{what}: not every tile that was refined says why: {:?}", heard.because);
+    drop(built);
+    fs::remove_dir_all(scene.path("fresh")).ok();
+    drop(scene.build("fresh", 2));
+    assert_same(&scene.product("fresh"), &scene.product("area"), what);
+    (heard, refined)
+}
+
+fn words() -> Words {
+    // Nothing is shared out over the whole area, so a change stays where borders lead it.
+    Words { tin: "method = \"greedy\"\nallocation = \"equal\"".into(), ..Words::raster() }
+}
+
+fn with_block(dem: &Dem, low: Post, high: Post) -> Dem {
+    let inside = |post: Post| (low.row..=high.row).contains(&post.row) && (low.col..=high.col).contains(&post.col);
+    Dem::from_fn(dem.rect(), |post| {
+        Some(dem.height(post) + if inside(post) { 128 * ((post.row * post.col) % 37) } else { 0 })
+    })
+}
+
+#[test]
+fn nothing_changed_means_nothing_done_and_no_stage_but_reading() {
+    for words in [words(), Words::raster()] {
+        let scene = Scene::on(&words, &sample_dem(words.grid(), 1));
+        let built = scene.build("area", 2);
+        let report = built.report.clone();
+        built.database.write_json(database::files::REPORT, &report).unwrap();
+        drop(built);
+        let before = crate::scene::tree(&scene.path("area"));
+        let mut heard = Heard::default();
+        let again = scene.build_watched("area", 2, &false.into(), &mut heard).unwrap();
+        assert!(again.is_unchanged && again.report == report);
+        assert_eq!((again.kept, again.rebuilt, heard.entered), (9, 0, vec![Stage::Read]));
+        drop(again);
+        assert!(before == crate::scene::tree(&scene.path("area")), "a build that does nothing changed a file");
+    }
+}
+
+#[test]
+fn without_its_report_a_finished_database_is_walked_through_again() {
+    let scene = Scene::new(&Words::sample());
+    drop(scene.build("area", 2));
+    let again = scene.build("area", 2);
+    assert_eq!((again.is_unchanged, again.kept, again.rebuilt), (false, 9, 0));
+}
+
+#[test]
+fn a_changed_block_of_the_dem_reaches_its_tile_and_what_its_borders_lead_to() {
+    for order in ["colour", "raster"] {
+        let words = Words { order: format!("order = \"{order}\""), ..words() };
+        let ground = sample_dem(words.grid(), 1);
+        let scene = Scene::on(&words, &ground);
+        drop(scene.build("area", 2));
+        for (low, high, within) in
+            [(Post::new(20, 20), Post::new(40, 50), tile(0, 0)), (Post::new(80, 100), Post::new(100, 120), tile(1, 1))]
+        {
+            scene.replace_dem(&with_block(&ground, low, high));
+            let (heard, refined) = rebuilt(&scene, order);
+            let why =
+                |tile: TileId| heard.because.iter().find(|(other, _)| *other == tile).map(|(_, why)| why.as_str());
+            assert!(why(within).unwrap().contains("its heights changed"), "{order}: {:?}", heard.because);
+            assert!(refined.len() < 9, "{order}: {within} reached every tile");
+            for (other, why) in heard.because.iter().filter(|(other, _)| *other != within) {
+                let is_expected = why.contains("border") || why.contains("heights");
+                assert!(is_expected, "{order}: {other} was refined again: {why}");
+            }
+            assert!(heard.notes.iter().any(|note| note.contains("refined again")), "{:?}", heard.notes);
+            assert_eq!(heard.assembled, refined.len(), "{order}: load modules of tiles that were kept were made again");
+        }
+    }
+}
+
+#[test]
+fn a_changed_mask_reaches_the_tiles_it_weighs() {
+    let polygon = |east: f64| {
+        let corner = |e: f64, n: f64| format!("[{}, {}]", 505_000.0 + e, 3_875_000.0 + n);
+        let ring = [(200.0, 200.0), (east, 200.0), (east, 900.0), (200.0, 900.0), (200.0, 200.0)];
+        let ring: Vec<String> = ring.iter().map(|&(e, n)| corner(e, n)).collect();
+        format!(
+            "{{\"type\":\"FeatureCollection\",\"crs\":{{\"type\":\"name\",\"properties\":{{\"name\":\"EPSG:32611\"}}}},\
+             \"features\":[{{\"type\":\"Feature\",\"properties\":{{}},\"geometry\":{{\"type\":\"Polygon\",\
+             \"coordinates\":[[{}]]}}}}]}}",
+            ring.join(",")
+        )
+    };
+    let importance = "default = 8\nareas = [{ file = \"m.geojson\", class = \"m\", weight = 1 }]".to_owned();
+    let words = Words { importance, ..words() };
+    let ground = sample_dem(words.grid(), 1);
+    let scene = Scene::with_files(&words, |folder: &Path| {
+        crate::scene::write_dem(&folder.join("dem.tif"), &ground);
+        fs::write(folder.join("m.geojson"), polygon(1200.0)).unwrap();
+    });
+    drop(scene.build("area", 2));
+    fs::write(scene.path("m.geojson"), polygon(900.0)).unwrap();
+    let (heard, refined) = rebuilt(&scene, "mask");
+    assert!(refined.contains(&tile(0, 0)) && refined.len() < 9, "{refined:?}");
+    assert!(heard.because.iter().any(|(at, why)| *at == tile(0, 0) && why.contains("its weights changed")));
+}
+
+#[test]
+fn a_changed_limit_moves_allowances_and_keeps_surveys_that_it_does_not_reach() {
+    let ground = sample_dem(Words::raster().grid(), 1);
+    let mut scene = Scene::on(&Words::raster(), &ground);
+    drop(scene.build("area", 2));
+    let text = Words { limits: "mean_per_load_module = 30".into(), ..Words::raster() }.text();
+    scene.job = Job::from_text(&text, &scene.path("job.toml")).unwrap();
+    let (heard, refined) = rebuilt(&scene, "limit");
+    assert!(!refined.is_empty());
+    assert!(heard.because.iter().any(|(_, why)| why.contains("its allowance moved")), "{:?}", heard.because);
+}
+
+#[test]
+fn a_small_edit_of_an_optimised_area_moves_few_tiles() {
+    let words = Words { size: (12, 12), tiles: (4, 4), ..Words::raster() };
+    let ground = sample_dem(words.grid(), 1);
+    let scene = Scene::on(&words, &ground);
+    drop(scene.build("area", 2));
+    let edited =
+        Dem::from_fn(ground.rect(), |post| Some(ground.height(post) + i32::from(post == Post::new(25, 25)) * 64));
+    scene.replace_dem(&edited);
+    let (heard, refined) = rebuilt(&scene, "small edit");
+    assert_eq!(heard.surveyed, 1);
+    assert!(refined.contains(&tile(0, 0)) && refined.len() < 16, "{refined:?}: {:?}", heard.because);
+}
+
+#[test]
+fn another_area_is_refused_and_nothing_is_touched() {
+    let scene = Scene::new(&Words::sample());
+    drop(scene.build("area", 2));
+    let before = scene.product("area");
+    for (change, key) in [
+        (Words { size: (10, 10), ..Words::sample() }, "size_m"),
+        (Words { tiles: (3, 2), ..Words::sample() }, "tile_cols"),
+    ] {
+        let job = Job::from_text(&change.text(), &scene.path("job.toml")).unwrap();
+        for fresh in [false, true] {
+            let options = compiler::Options { workers: 1, fresh, stop: &false.into() };
+            let error = compiler::build(&job, &scene.path("area"), &options, &mut crate::scene::Silent).unwrap_err();
+            assert!(error.to_string().contains(key) && error.hint().is_some(), "{error}");
+        }
+    }
+    assert_same(&before, &scene.product("area"), "refused");
+}
+
+#[test]
+fn another_format_version_is_refused_and_nothing_is_touched() {
+    let scene = Scene::new(&Words::sample());
+    drop(scene.build("area", 2));
+    let path = scene.path("area/database.json");
+    let text = fs::read_to_string(&path).unwrap();
+    let version = format!("\"format_version\": {}", database::FORMAT_VERSION);
+    // As another version would write it, with its own checksum.
+    let other: serde_json::Value =
+        serde_json::from_str(&text.replacen(&version, "\"format_version\": 999", 1)).unwrap();
+    let mut other = other.as_object().unwrap().clone();
+    other.remove("checksum");
+    let (folder, _) = database::Database::create_or_open(&scene.path("area"), &area_of(&scene)).unwrap();
+    folder.write_json("database.json", &other).unwrap();
+    drop(folder);
+    let before = scene.product("area");
+    let error = scene.try_build("area", 1).unwrap_err();
+    assert!(error.to_string().contains("999") && error.hint().is_some(), "{error}");
+    assert_same(&before, &scene.product("area"), "refused");
+}
+
+fn area_of(scene: &Scene) -> database::Area {
+    database::Folder::new(scene.path("area")).manifest().unwrap().area
+}
+
+#[test]
+fn an_older_algorithm_revision_is_built_again_and_said_so() {
+    let scene = Scene::new(&Words::sample());
+    drop(scene.build("area", 2));
+    let wanted = scene.product("area");
+    let folder = database::Folder::new(scene.path("area"));
+    let manifest = folder.manifest().unwrap();
+    let (database, _) = database::Database::create_or_open(&scene.path("area"), &manifest.area).unwrap();
+    for record in &manifest.tiles {
+        let (stamp, tin) = folder.read_tile(record.tile()).unwrap();
+        let older = database::Stamp { algorithm_revision: stamp.algorithm_revision - 1, ..stamp };
+        database.write_tile(&older, &tin).unwrap();
+    }
+    drop(database);
+    let (heard, refined) = rebuilt(&scene, "revision");
+    assert_eq!(refined.len(), 9);
+    assert!(heard.because.iter().all(|(_, why)| why.contains("algorithm revision")), "{:?}", heard.because);
+    assert_same(&wanted, &scene.product("area"), "revision");
+}

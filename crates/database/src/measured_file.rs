@@ -1,0 +1,121 @@
+//! `measured/r02c03.sums`: what was measured of a tile's load modules, so that a build that keeps them need neither
+//! make nor measure them again.
+//!
+//! It names the load-module file it speaks of by its bytes, so the two cannot come apart. Private to this project.
+
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+use terrain::TileId;
+
+use crate::frame::{Kind, malformed};
+use crate::{DatabaseError, FileStamp, Fingerprint, Stamp, codec, frame};
+
+/// What was measured of the load modules of one tile.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Measured {
+    /// The tile.
+    pub tile: TileId,
+    /// The bytes of the load-module file that was measured.
+    pub modules_file: FileStamp,
+    /// Numbers of each load module, row by row.
+    pub modules: Vec<MeasuredModule>,
+    /// Residuals against the working grid, by class of ground.
+    pub classes: Vec<MeasuredTally>,
+    /// Residuals against the source's own posts, where those are others.
+    pub at_source: Option<MeasuredTally>,
+    /// Points by class of ground.
+    pub points: Vec<u64>,
+    /// Points on the border that every build starts from.
+    pub border: u64,
+}
+
+/// Counts and residual of one load module.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct MeasuredModule {
+    /// Its triangles.
+    pub triangles: u32,
+    /// Its convex polygons.
+    pub polygons: u32,
+    /// Posts with a residual.
+    pub posts: u32,
+    /// Largest absolute residual, in quanta.
+    pub largest: u32,
+    /// Sum of absolute residuals.
+    pub sum_abs: u64,
+    /// Sum of squared residuals.
+    pub sum_squared: u64,
+}
+
+/// Residuals of a set of posts, in quanta.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct MeasuredTally {
+    /// Posts.
+    pub posts: u64,
+    /// Sum of residuals with their signs.
+    pub sum: i64,
+    /// Sum of absolute residuals.
+    pub sum_abs: u64,
+    /// Sum of squared residuals: the upper 64 bits, then the lower.
+    pub sum_squared: [u64; 2],
+    /// Largest absolute residual.
+    pub largest: u32,
+    /// Bins of the histogram that are not empty, in ascending order, and their posts.
+    pub bins: Vec<(u32, u64)>,
+}
+
+#[derive(Serialize, Deserialize)]
+struct MeasuredOnDisk {
+    tile: (u32, u32),
+    length: u64,
+    blake3: [u8; 32],
+    modules: Vec<MeasuredModule>,
+    classes: Vec<MeasuredTally>,
+    at_source: Option<MeasuredTally>,
+    points: Vec<u64>,
+    border: u64,
+}
+
+/// The bytes of what was measured.
+pub fn encode_measured(stamp: &Stamp, measured: &Measured) -> Vec<u8> {
+    let Measured { tile, modules_file, modules, classes, at_source, points, border } = measured.clone();
+    let on_disk = MeasuredOnDisk {
+        tile: (tile.row, tile.col),
+        length: modules_file.length,
+        blake3: modules_file.blake3.0,
+        modules,
+        classes,
+        at_source,
+        points,
+        border,
+    };
+    frame::seal(Kind::Measured, stamp, &codec::encode(&on_disk))
+}
+
+/// What was measured, whose file, at `path`, has these bytes.
+///
+/// # Errors
+/// When the file is not as it was written.
+pub fn decode_measured(path: &Path, bytes: &[u8]) -> Result<(Stamp, Measured), DatabaseError> {
+    let (stamp, payload) = frame::open(Kind::Measured, path, bytes)?;
+    let on_disk: MeasuredOnDisk = codec::decode(payload).map_err(|what| malformed(path, what))?;
+    let MeasuredOnDisk { tile: (row, col), length, blake3, modules, classes, at_source, points, border } = on_disk;
+    let modules_file = FileStamp { length, blake3: Fingerprint(blake3) };
+    let tile = TileId { row, col };
+    Ok((stamp, Measured { tile, modules_file, modules, classes, at_source, points, border }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::samples;
+
+    #[test]
+    fn what_was_measured_survives_its_file_and_every_damage_is_an_error() {
+        let path = Path::new("r00c01.sums");
+        let measured = samples::measured();
+        let bytes = encode_measured(&samples::stamp(), &measured);
+        assert_eq!(decode_measured(path, &bytes).unwrap(), (samples::stamp(), measured));
+        samples::check_every_damage(&bytes, |bytes| decode_measured(path, bytes).is_err());
+    }
+}

@@ -1,0 +1,98 @@
+//! `tiefort task`: one unit of a build's work, for engines that run the rest.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use compiler::{Unit, UnitEnd};
+use job::Job;
+use terrain::TileId;
+
+use crate::arguments::{RunArguments, row_col};
+use crate::commands::tile::check_tile;
+use crate::failure::{Failure, Outcome};
+use crate::run::{Finished, Run};
+
+const AFTER_HELP: &str = "\
+Examples:
+  tiefort task configs/ntc.toml survey 2,3 --out /share/ntc.tdb
+  tiefort task configs/ntc.toml refine 0,0 0,2 0,4 --out /share/ntc.tdb
+  tiefort task configs/ntc.toml publish --out /share/ntc.tdb
+
+The order is: survey of every tile, allocate, refine of every tile after its lower-ranked neighbours, assemble of every
+tile (with clipped edges after its neighbours' refine), publish. A unit may be run any number of times, anywhere that
+shares the folder; one that finds its result published and fresh ends with 0 at once. Where the job surveys nothing,
+survey does nothing. publish makes whatever is missing or damaged, so it always ends with the result of a build.
+
+Exit codes: 0 done; 1 published, with breaches; 2 failed; 75 what it needs is not done yet: try again.";
+
+/// Arguments of `task`.
+#[derive(Args)]
+#[command(after_help = AFTER_HELP)]
+pub struct Arguments {
+    /// The job file
+    #[arg(value_name = "JOB.toml")]
+    job: PathBuf,
+    /// What to do
+    #[arg(value_name = "STAGE")]
+    stage: StageName,
+    /// Row and column of each tile, counted from the south-west
+    #[arg(value_name = "ROW,COL", value_parser = row_col)]
+    tiles: Vec<TileId>,
+    #[command(flatten)]
+    run: RunArguments,
+}
+
+/// A stage that engines run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum StageName {
+    /// What more points would gain, tile by tile
+    Survey,
+    /// What each tile may spend
+    Allocate,
+    /// The TINs of tiles
+    Refine,
+    /// The load modules of tiles
+    Assemble,
+    /// All that is left, and the report
+    Publish,
+}
+
+/// Does it.
+pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
+    let job = Job::load_with(&arguments.job, &compiler::find_area)?;
+    let units = units(&job, arguments)?;
+    let names: Vec<String> = units.iter().map(|unit| unit.name()).collect();
+    let run = Run::announce_briefly(&job, &arguments.run, &names.join(" "))?;
+    let (end, times) =
+        run.listen(|listener| compiler::perform(&job, run.folder(), &units, &run.options(false), listener))?;
+    match end {
+        UnitEnd::Published(built) => run.conclude(Finished::from(*built), times),
+        UnitEnd::Done | UnitEnd::Finished => Ok(Outcome::Sound),
+    }
+}
+
+fn units(job: &Job, arguments: &Arguments) -> Result<Vec<Unit>, Failure> {
+    let Arguments { stage, tiles, .. } = arguments;
+    let name = stage.to_possible_value().map(|value| value.get_name().to_owned()).unwrap_or_default();
+    let alone = |unit: Unit| match tiles.is_empty() {
+        true => Ok(vec![unit]),
+        false => {
+            let message = format!("{name}: found a tile, expected none");
+            Err(Failure::new(message, "allocate and publish are of the whole area"))
+        }
+    };
+    let of_tiles = |unit: fn(TileId) -> Unit| {
+        if tiles.is_empty() {
+            let message = format!("{name}: found no tile, expected ROW,COL at least once");
+            return Err(Failure::new(message, "`tiefort plan` lists the tiles in the order of their ranks"));
+        }
+        tiles.iter().map(|&tile| check_tile(job, tile).map(|()| unit(tile))).collect()
+    };
+    match stage {
+        StageName::Survey => of_tiles(Unit::Survey),
+        StageName::Allocate => alone(Unit::Allocate),
+        StageName::Refine => of_tiles(Unit::Refine),
+        StageName::Assemble => of_tiles(Unit::Assemble),
+        StageName::Publish => alone(Unit::Publish),
+    }
+}

@@ -1,0 +1,86 @@
+//! `tiefort worker`: one of any number of processes that build a database in a shared folder.
+
+use std::path::PathBuf;
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+
+use clap::Args;
+use compiler::{Sharing, WorkerEnd};
+use job::Job;
+
+use crate::arguments::RunArguments;
+use crate::failure::{Failure, Outcome};
+use crate::run::{Finished, Run};
+use crate::terminal;
+
+const AFTER_HELP: &str = "\
+Examples:
+  tiefort worker configs/ntc.toml --out /share/ntc.tdb        on every host, as often as it has cores
+
+Start it any number of times, on any hosts that share the folder, at any time. Each takes tiles that are ready and that
+nobody else is working on, until the build is done; one of them publishes it. Any of them may be killed: what it was
+working on is done by another once its lease is over. Clocks need not agree.
+
+Exit codes: 0 done; 1 published, with breaches; 2 failed; 75 a build or another job is at work in the folder.";
+
+/// What a worker waits for when nothing is ready.
+const PAUSE: Duration = Duration::from_millis(200);
+
+/// Arguments of `worker`.
+#[derive(Args)]
+#[command(after_help = AFTER_HELP)]
+pub struct Arguments {
+    /// The job file
+    #[arg(value_name = "JOB.toml")]
+    job: PathBuf,
+    #[command(flatten)]
+    run: RunArguments,
+    /// Seconds after which work that nobody has been heard of is done by another worker
+    #[arg(long, value_name = "SECONDS", default_value_t = 60)]
+    #[arg(value_parser = clap::value_parser!(u64).range(1..=86_400))]
+    lease: u64,
+}
+
+/// Works.
+pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
+    let job = Job::load_with(&arguments.job, &compiler::find_area)?;
+    let run = Run::announce_briefly(&job, &arguments.run, "worker")?;
+    let (name, start) = (name(), Instant::now());
+    let lease = Duration::from_secs(arguments.lease);
+    let sharing = Sharing {
+        name: &name,
+        lease,
+        pause: PAUSE.min(lease / 4),
+        now: &|| start.elapsed(),
+        wait: &|pause| std::thread::sleep(pause),
+        holding: &|lease| run.hold(lease),
+    };
+    let (end, times) = run.listen(|listener| {
+        loop {
+            // Those that begin at once may find each other half-way; a build or another job stays longer.
+            match compiler::work(&job, run.folder(), &run.options(false), &sharing, listener) {
+                Err(error) if error.is_transient() && start.elapsed() < lease => (sharing.wait)(PAUSE),
+                worked => return worked,
+            }
+        }
+    })?;
+    let WorkerEnd { units, published } = end;
+    match published {
+        Some(built) => {
+            let tiles = format!("done by workers; this one did {units} units of work and published");
+            run.conclude(Finished { tiles, ..Finished::from(*built) }, times)
+        }
+        None => {
+            if !arguments.run.quiet {
+                terminal::tell(&format!("the build is done; this worker did {units} units of work"));
+            }
+            Ok(Outcome::Sound)
+        }
+    }
+}
+
+/// A name that no other worker has: the host's, the process's number, and when it began.
+fn name() -> String {
+    let host = std::fs::read_to_string("/etc/hostname").unwrap_or_default();
+    let nanoseconds = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_nanos());
+    format!("{}-{}-{nanoseconds:x}", host.trim(), std::process::id())
+}

@@ -1,0 +1,47 @@
+//! Load-module files: whatever the bytes, an answer or an error, and what is read is sound.
+#![no_main]
+
+use std::path::Path;
+
+use libfuzzer_sys::fuzz_target;
+use load_module_reader::{INDEX_ENTRY_BYTES, SlmFile};
+
+/// The same with right checksums of the header, the index and each section, as far as the lengths in the file say where
+/// those are: they stand in the way of everything behind them.
+fn with_checksums(bytes: &[u8]) -> Vec<u8> {
+    let mut bytes = bytes.to_vec();
+    let word = |bytes: &[u8], at: usize| -> usize {
+        let part = bytes.get(at..).and_then(|part| part.first_chunk::<4>());
+        part.map_or(0, |part| u32::from_le_bytes(*part) as usize)
+    };
+    let header = word(&bytes, 12);
+    let rows = word(&bytes, 44).saturating_sub(word(&bytes, 40));
+    let columns = word(&bytes, 52).saturating_sub(word(&bytes, 48));
+    let index = header.saturating_add(rows.saturating_mul(columns).saturating_mul(INDEX_ENTRY_BYTES)).saturating_add(4);
+    for entry in (header..index.min(bytes.len())).step_by(INDEX_ENTRY_BYTES) {
+        let (offset, length) = (word(&bytes, entry), word(&bytes, entry + 8));
+        seal(&mut bytes, offset, offset.saturating_add(length));
+    }
+    seal(&mut bytes, header, index);
+    seal(&mut bytes, 0, header);
+    bytes
+}
+
+/// Puts the checksum of what is before them into the last four bytes of a section.
+fn seal(bytes: &mut [u8], from: usize, to: usize) {
+    if from + 4 <= to && to <= bytes.len() {
+        let sum = crc32fast::hash(&bytes[from..to - 4]);
+        bytes[to - 4..to].copy_from_slice(&sum.to_le_bytes());
+    }
+}
+
+fuzz_target!(|bytes: &[u8]| {
+    for bytes in [bytes.to_vec(), with_checksums(bytes)] {
+        let direct = SlmFile::parse(&bytes);
+        let decoded = database::decode_modules(Path::new("fuzz.slm"), &bytes);
+        assert!(direct.is_ok() || decoded.is_err(), "the database read what the reader refuses");
+        if let Ok((header, modules)) = decoded {
+            assert_eq!(database::encode_modules(&header, &modules), bytes, "read, written and not the same");
+        }
+    }
+});
