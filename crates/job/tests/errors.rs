@@ -1348,3 +1348,30 @@ fn patterns_may_not_leave_their_folder() {
         ],
     );
 }
+
+#[track_caller]
+fn check_part(old: &str, new: &str, expected: &str) {
+    let mut lines: Vec<&str> = SOUND.lines().collect();
+    let at = lines.iter().position(|line| line.starts_with(old)).expect("a line to replace");
+    lines[at] = new;
+    let error = Job::from_text(&lines.join("\n"), Path::new("a/b.toml")).expect_err("this job is wrong");
+    assert!(told(&error).contains(expected), "{}", told(&error));
+}
+
+#[test]
+fn water_geoids_and_slopes_are_told_what_they_need() {
+    let dem = |keys: &str| format!("source = \"sample\"\n{keys}");
+    check_part("source", &dem("water = { level_m = 3 }"), "dem.water.file: found nothing");
+    let geoids = dem("geoids = [{ datum = \"ellipsoid\", file = \"a.gtx\" }]");
+    check_part("source", &geoids, "dem.geoids[0].datum: found \"ellipsoid\", expected a datum other than");
+    let area = |keys: &str| format!("areas = [{{ {keys}, class = \"m\", weight = 1 }}]");
+    check_part(
+        "default",
+        &area("slope_above_percent = 20"),
+        "smooth_m: found nothing, expected metres from 0 to 10000",
+    );
+    let level = area("slope_above_percent = 0, smooth_m = 0");
+    check_part("default", &level, "slope_above_percent: found 0, expected a slope in percent, above 0");
+    let other = area("file = \"m.geojson\", smooth_m = 5");
+    check_part("default", &other, "hint: smooth_m goes with slope_above_percent");
+}
