@@ -72,7 +72,7 @@ pub(crate) fn assemble_tile(
         }
     };
     let residuals = fidelity::measure(&mut modules, &window.measured(area));
-    let at_source = run.ground.residuals_at_source(&modules, area);
+    let at_source = run.ground.relief.residuals_at_source(&modules, area, area.tiling.rect(tile))?;
     let fingerprint = modules_fingerprint(run, tins, removed, tile);
     let (file, is_new) = publish(run, tile, &layout, fingerprint, &modules)?;
     let (points, border) = count_points(run, own, &removed[area.tiling.index(tile)], &window.importance);
@@ -87,7 +87,7 @@ pub(crate) fn read_assembled(run: &Run, tins: &[Published], tile: TileId) -> Res
     let file = folder.stamp_file(&folder.modules_path(tile))?;
     let as_published = modules.iter().map(numbers).collect();
     let residuals = fidelity::measure(&mut modules, &window.measured(area));
-    let at_source = run.ground.residuals_at_source(&modules, area);
+    let at_source = run.ground.relief.residuals_at_source(&modules, area, area.tiling.rect(tile))?;
     let (points, border) = count_points(run, &tins[area.tiling.index(tile)], &[], &window.importance);
     Ok(Assembled { file, modules: as_published, residuals, at_source, points, border, is_new: false })
 }

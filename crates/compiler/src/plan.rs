@@ -6,6 +6,8 @@ use terrain::{ModuleRect, PostRect, Side, TileId};
 
 use crate::CompileError;
 use crate::area::GamingArea;
+use crate::ground::KEPT_POSTS_MAX;
+use crate::large::CACHE_BYTES_MAX;
 use crate::refinement::optimising;
 
 /// A job, planned.
@@ -59,6 +61,10 @@ const SECONDS_PER_SAMPLE_POST: f64 = 260e-9;
 const SECONDS_PER_POINT: f64 = 3.5e-6;
 /// Bytes of memory for a post of the area: working windows and the decoded source.
 const MEMORY_PER_POST: u64 = 8;
+/// The same for a post of a tile that is worked on, where windows are not kept.
+const MEMORY_PER_POST_IN_WORK: u64 = 24;
+/// Bytes of a raster for a post of the area, about.
+const BYTES_PER_SOURCE_POST: u64 = 4;
 /// Bytes of memory for a triangle, in TINs, load modules and curves.
 const MEMORY_PER_TRIANGLE: u64 = 60;
 /// Bytes of memory for a post and for a triangle of a tile that is being optimised, and how many tiles are so at once.
@@ -122,8 +128,17 @@ fn forecast(job: &Job, area: &GamingArea) -> Forecast {
     let tiles = area.tiles.len() as u64;
     let in_work = (posts * of_post + triangles * of_triangle) / tiles * at_once.min(tiles);
     let in_work = if optimising(job).is_some() { in_work } else { 0 };
+    let heights = match job.dem.source {
+        _ if posts <= KEPT_POSTS_MAX as u64 => posts * MEMORY_PER_POST,
+        DemSource::Sample { .. } => posts / tiles * MEMORY_PER_POST_IN_WORK * at_once.min(tiles),
+        // Rasters are held up to a bound and read by window beyond it; how many posts they have is in no job.
+        DemSource::Files { .. } => {
+            posts / tiles * MEMORY_PER_POST_IN_WORK * at_once.min(tiles)
+                + (posts * BYTES_PER_SOURCE_POST).min(CACHE_BYTES_MAX + CACHE_BYTES_MAX / 4)
+        }
+    };
     Forecast {
-        memory_bytes: in_work + MEMORY_BASE + posts * MEMORY_PER_POST + triangles * MEMORY_PER_TRIANGLE,
+        memory_bytes: in_work + MEMORY_BASE + heights + triangles * MEMORY_PER_TRIANGLE,
         seconds: posts as f64 * per_post + points * SECONDS_PER_POINT + triangles as f64 * per_triangle,
         disk_bytes: triangles * DISK_PER_TRIANGLE,
     }

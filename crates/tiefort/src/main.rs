@@ -19,6 +19,7 @@ mod end_table;
 mod events;
 mod failure;
 mod files;
+mod fit;
 mod lines;
 mod measures;
 mod progress;

@@ -1,6 +1,6 @@
 //! `tiefort plan`: what a build would do, before any work.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use compiler::{Plan, PlannedTile};
@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use views::{Align, Table, grouped};
 
 use crate::failure::{Failure, Outcome};
-use crate::{files, run, terminal};
+use crate::{files, fit, run, terminal};
 
 const AFTER_HELP: &str = "\
 Examples:
@@ -30,6 +30,9 @@ pub struct Arguments {
     /// Also play the build with so many workers
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     simulate: Option<u32>,
+    /// Plan even what is forecast not to fit this machine
+    #[arg(long)]
+    force: bool,
 }
 
 /// For which program.
@@ -59,6 +62,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         None => plan_text(&job, &plan, arguments.simulate),
     };
     terminal::print(&text)?;
+    if !arguments.force {
+        fit::check(&plan.forecast, Path::new("."))?;
+    }
     Ok(Outcome::Sound)
 }
 
