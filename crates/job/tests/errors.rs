@@ -163,7 +163,7 @@ fn unknown_keys_are_told_with_the_nearest_known_one() {
         r#"areas = [{ file = "m.geojson", clas = "m", weight = 1 }]"#,
         &[
             "a/b.toml:10: importance.areas[0].clas: found a key that no job has, expected one of file, raster,",
-            "value, sample, class, weight",
+            "value, slope_above_percent, smooth_m, sample, class, weight",
             "hint: did you mean class?",
         ],
     );
@@ -365,7 +365,7 @@ fn values_of_the_wrong_type_are_told_as_written() {
         "areas = [3]",
         &[
             "a/b.toml:10: importance.areas[0]: found the whole number 3, expected a table of file, raster,",
-            "value, sample, class, weight",
+            "value, slope_above_percent, smooth_m, sample, class, weight",
             r#"hint: for example areas = [{ file = "mountains.geojson", class = "mountains", weight = 1 }]"#,
         ],
     );
@@ -982,7 +982,7 @@ seed = 3"#,
         &[
             r#"a/b.toml:10: importance.areas[0]: found { file = "m.geojson", raster = "c.tif", class = "m","#,
             r#"weight …, expected exactly one of file = "x.geojson", raster = "x.tif" with value, sample ="#,
-            r#""mountains""#,
+            r#""mountains", slope_above_percent = 20"#,
             r#"hint: for example areas = [{ file = "mountains.geojson", class = "mountains", weight = 1 }]"#,
         ],
     );
@@ -1000,7 +1000,7 @@ seed = 3"#,
         r#"areas = [{ class = "m", weight = 1 }]"#,
         &[
             r#"a/b.toml:10: importance.areas[0]: found { class = "m", weight = 1 }, expected exactly one of file"#,
-            r#"= "x.geojson", raster = "x.tif" with value, sample = "mountains""#,
+            r#"= "x.geojson", raster = "x.tif" with value, sample = "mountains", slope_above_percent = 20"#,
             r#"hint: for example areas = [{ file = "mountains.geojson", class = "mountains", weight = 1 }]"#,
         ],
     );

@@ -110,10 +110,11 @@ impl Gtx {
         let (south_west, step) = ([number(8)?, number(0)?], [number(24)?, number(16)?]);
         let (rows, cols) = (count(32)?, count(36)?);
         let sides = [rows, cols].iter().all(|&side| 2 <= side && u64::from(side) <= POSTS_A_SIDE_MAX);
-        let bytes = u64::from(rows) * u64::from(cols) * 4 + GTX_HEADER;
+        let posts = u64::from(rows) * u64::from(cols);
+        let bytes = posts.checked_mul(4).and_then(|bytes| bytes.checked_add(GTX_HEADER));
         let place = south_west[1].abs() <= 90.0 && south_west[0].abs() <= 360.0;
         let steps = step.iter().all(|&step| 0.0 < step && step <= 10.0);
-        (sides && bytes == store.len() && place && steps).then_some(Self { south_west, step, cols, rows })
+        (sides && bytes == Some(store.len()) && place && steps).then_some(Self { south_west, step, cols, rows })
     }
 
     fn read(&self, store: &Store, south: f64, north: f64) -> Result<Raster, SourceError> {

@@ -5,7 +5,7 @@ use std::io::Write;
 use flate2::Compression;
 use flate2::write::{GzEncoder, ZlibEncoder};
 use proptest::prelude::*;
-use source_files::{DemFile, GeoTiff, Reading, SourceError, VoidPolicy, read_polygons, write_heights};
+use source_files::{DemFile, GeoTiff, Geoid, Reading, SourceError, VoidPolicy, read_polygons, write_heights};
 use terrain::{Dem, PostRect};
 
 use crate::support::{Folder, Tiff, Values, grid};
@@ -130,6 +130,15 @@ fn a_name_in_an_archive_leads_nowhere() {
 }
 
 #[test]
+fn a_geoid_grid_of_sizes_that_overflow_is_no_grid() {
+    let folder = Folder::new();
+    // Found by fuzzing: rows times columns times four bytes went past 64 bits.
+    let header: Vec<u8> = [-90.0, -180.0, 10.0, 10.0_f64].iter().flat_map(|number| number.to_be_bytes()).collect();
+    let bytes = [header, vec![0xf0, 0, 0, 0xc1, 0xf0, 0, 0, 0xc1]].concat();
+    assert!(Geoid::read(&folder.write("huge.gtx", &bytes), 34.0, 36.0).is_err());
+}
+
+#[test]
 fn text_headers_with_numbers_that_are_none_are_refused() {
     let folder = Folder::new();
     let refused = |size: &str, cell: &str| {
@@ -143,7 +152,7 @@ fn text_headers_with_numbers_that_are_none_are_refused() {
     assert!(refused("ncols 2\nnrows 2", "1e400").contains("cellsize"));
     assert!(refused("ncols 4294967295\nnrows 2", "30").contains("posts a side"));
     assert!(refused("ncols 1000000\nnrows 1000000", "30").contains("too large"));
-    assert!(refused("ncols 2\nnrows 3", "30").contains("4 numbers"));
+    assert!(refused("ncols 2\nnrows 3", "30").contains("truncated: the last number"));
 }
 
 proptest! {
