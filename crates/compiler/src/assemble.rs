@@ -84,7 +84,7 @@ pub(crate) fn assemble_tile(
         }
     };
     let residuals = fidelity::measure(&mut modules, &window.measured(area));
-    let at_source = run.ground.residuals_at_source(&modules, area);
+    let at_source = run.ground.relief.residuals_at_source(&modules, area, area.tiling.rect(tile))?;
     let (file, is_new) = publish(run, tile, &layout, fingerprint, &modules)?;
     let (points, border) = count_points(run, own, &removed[area.tiling.index(tile)], &window.importance);
     let modules = modules.iter().map(numbers).collect();
@@ -100,7 +100,7 @@ fn measured_stamp(run: &Run, modules: Fingerprint) -> Stamp {
         .fingerprint(modules)
         .number(run.job.importance.classes.len() as u64)
         .text(&format!("{:?}", run.job.tiles.borders));
-    if run.ground.has_posts_between() {
+    if run.ground.relief.has_posts_between() {
         for record in &run.records {
             builder = builder.fingerprint(record.blake3);
         }
@@ -127,7 +127,7 @@ pub(crate) fn read_assembled(run: &Run, tins: &[Published], tile: TileId) -> Res
     let file = folder.stamp_file(&folder.modules_path(tile))?;
     let as_published = modules.iter().map(numbers).collect();
     let residuals = fidelity::measure(&mut modules, &window.measured(area));
-    let at_source = run.ground.residuals_at_source(&modules, area);
+    let at_source = run.ground.relief.residuals_at_source(&modules, area, area.tiling.rect(tile))?;
     let (points, border) = count_points(run, &tins[area.tiling.index(tile)], &[], &window.importance);
     let measured = folder.stamp_file(&folder.measured_path(tile))?;
     Ok(Assembled { file, measured, modules: as_published, residuals, at_source, points, border, is_new: false })

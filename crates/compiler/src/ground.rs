@@ -3,24 +3,30 @@
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, OnceLock};
 
-use fidelity::{SourcePosts, Tally, residuals_at_source};
-use job::{AreaShape, DemSource, ImportanceArea, Job, Smooth};
-use mask::{Mask, Shape, Smoothing};
+use job::{DemSource, Job};
+use mask::Mask;
 use schedule::Workers;
-use source_files::{ClassRaster, Patch, VoidSummary, read_polygons};
+use source_files::{VoidSummary, read_polygons};
 use terrain::{Dem, GridFrame, Importance, PostRect, TileId};
 
 use crate::area::GamingArea;
-use crate::sources::{Census, Opened, Source};
-use crate::{CompileError, Stage, sources};
+use crate::census::Census;
+use crate::large::WHOLE_BYTES_MAX;
+use crate::mask_of::{Fault, Opening};
+use crate::relief::Relief;
+use crate::sources::{Opened, Source};
+use crate::water::{Soundings, Water};
+use crate::{CompileError, Stage, sources, water};
 
 /// Posts of an area up to which the windows of tiles are kept between stages (7 bytes a post).
-const KEPT_POSTS_MAX: usize = 16 << 20;
+pub(crate) const KEPT_POSTS_MAX: usize = 16 << 20;
 
 /// Where heights and weights come from.
 pub(crate) struct Ground {
-    source: Source,
+    pub relief: Arc<Relief>,
     mask: Mask<'static>,
+    /// What went wrong in a part of the mask that reads files or heights on demand.
+    fault: Fault,
     rect: PostRect,
     frame: GridFrame,
     kept: Option<Vec<OnceLock<Arc<Window>>>>,
@@ -52,6 +58,16 @@ impl Ground {
     /// # Errors
     /// When a file cannot be used for this area.
     pub fn open(job: &Job, area: &GamingArea, workers: &Workers, stop: &AtomicBool) -> Result<Self, CompileError> {
+        Self::open_within(job, area, (workers, stop), WHOLE_BYTES_MAX)
+    }
+
+    /// The same, where rasters that take more than `whole_bytes_max` bytes are read by window.
+    pub(crate) fn open_within(
+        job: &Job,
+        area: &GamingArea,
+        (workers, stop): (&Workers, &AtomicBool),
+        whole_bytes_max: u64,
+    ) -> Result<Self, CompileError> {
         let opened = match &job.dem.source {
             DemSource::Sample { seed } => Opened {
                 source: Source::Sample(*seed),
@@ -59,15 +75,26 @@ impl Ground {
                 warnings: Vec::new(),
                 accuracy_m: None,
             },
-            DemSource::Files { files, .. } => sources::open(job, area, files, workers, stop)?,
+            DemSource::Files { files, .. } => sources::open(job, area, files, workers, stop, whole_bytes_max)?,
         };
-        let Opened { source, voids, warnings, accuracy_m } = opened;
-        let mask = open_mask(job, area)?;
+        let Opened { source, voids, mut warnings, accuracy_m } = opened;
+        let mut relief = Relief { source, frame: area.frame, water: None };
+        let polygons = match &job.dem.water {
+            None => Vec::new(),
+            Some(water) => {
+                let polygons = read_polygons(&water.file.path, job.area.epsg)?;
+                relief.water = Some(Water::new(job, polygons.clone(), area.frame, area.rect));
+                warnings.extend(find_levels(&mut relief, area, workers, stop)?);
+                polygons
+            }
+        };
+        let (relief, fault) = (Arc::new(relief), Fault::default());
+        let mask = Opening { job, area, relief: &relief, fault: &fault }.mask(polygons)?;
         let keep = area.rect.post_count() <= KEPT_POSTS_MAX;
         let kept = keep.then(|| area.tiles.iter().map(|_| OnceLock::new()).collect());
         let (rect, frame) = (area.rect, area.frame);
-        let mut ground = Self { source, mask, rect, frame, kept, voids, warnings, accuracy_m };
-        if let Source::Mosaic(_) = ground.source {
+        let mut ground = Self { relief, mask, fault, rect, frame, kept, voids, warnings, accuracy_m };
+        if !ground.relief.has_source_posts() {
             ground.take_census(job, area, workers, stop)?;
         }
         Ok(ground)
@@ -82,19 +109,21 @@ impl Ground {
         stop: &AtomicBool,
     ) -> Result<(), CompileError> {
         let of_tile = |_: usize, &tile: &TileId| -> Result<Census, CompileError> {
-            let Source::Mosaic(mosaic) = &self.source else { return Ok(Census::new()) };
-            let patch = mosaic.resample(area.tiling.rect(tile));
+            let Some(patch) = self.relief.patch(area.tiling.rect(tile))? else { return Ok(Census::new()) };
             let census = Census::of(&patch, area.rect);
             if let Some(kept) = &self.kept {
-                let window = Arc::new(self.with_importance(patch));
+                let window = Arc::new(self.with_importance(patch.dem())?);
                 kept[area.tiling.index(tile)].get_or_init(|| window);
             }
             Ok(census)
         };
-        let parts = schedule::for_each_independent(&area.tiles, workers, stop, of_tile)
-            .map_err(|error| CompileError::from_schedule(Stage::Read, &area.tiles, error))?;
         let mut census = Census::new();
-        parts.iter().for_each(|part| census.add(part));
+        // A census is some kilobytes, so those of a large area are added up as they come.
+        for tiles in area.tiles.chunks(1 << 10) {
+            let parts = schedule::for_each_independent(tiles, workers, stop, of_tile)
+                .map_err(|error| CompileError::from_schedule(Stage::Read, tiles, error))?;
+            parts.iter().for_each(|part| census.add(part));
+        }
         self.voids = census.judge(job, area)?;
         if 0 < census.gap {
             let (gap, of) = (census.gap, area.rect.post_count());
@@ -104,11 +133,11 @@ impl Ground {
         Ok(())
     }
 
-    fn with_importance(&self, patch: Patch) -> Window {
-        let dem = patch.dem();
+    fn with_importance(&self, dem: Dem) -> Result<Window, CompileError> {
         let importance = mask::importance(&self.mask, self.rect, &self.frame, dem.rect());
+        self.fault.take()?;
         let importance = mask::without_voids(importance, &dem);
-        Window { dem, importance }
+        Ok(Window { dem, importance })
     }
 
     /// The ground of one tile, made once where memory allows.
@@ -152,54 +181,12 @@ impl Ground {
         Ok(Window { dem, importance: join_importance(&parts, rect) })
     }
 
-    /// Whether the source has posts of its own to measure at: several sources have none in common.
-    pub fn has_source_posts(&self) -> bool {
-        !matches!(self.source, Source::Mosaic(_))
-    }
-
-    /// Residuals of load modules at the source's own posts; `None` where those are the posts of the working grid.
-    pub fn residuals_at_source(&self, modules: &[terrain::LoadModule], area: &GamingArea) -> Option<Tally> {
-        let (raster, off) = self.posts_between()?;
-        let frame = raster.frame();
-        let quanta = |metres: f64| metres * f64::from(terrain::QUANTA_PER_METRE);
-        let source = SourcePosts {
-            window: raster.window(),
-            south_west: off.map(quanta),
-            step: frame.spacing.map(quanta),
-            height_m: &|post| raster.height_m(post),
-        };
-        Some(residuals_at_source(modules, area.grid, self.frame.spacing, &source))
-    }
-
-    /// Whether the source's posts are others than those of the working grid, so that two sources may differ in what
-    /// is measured and not in any window.
-    pub fn has_posts_between(&self) -> bool {
-        self.posts_between().is_some()
-    }
-
-    /// The one raster, if its posts are others than those of the working grid, and how far it lies off.
-    fn posts_between(&self) -> Option<(&source_files::Raster, [f64; 2])> {
-        let Source::Raster(raster) = &self.source else { return None };
-        let frame = raster.frame();
-        let spacing = self.frame.spacing.metres();
-        let off = [frame.south_west[0] - self.frame.origin_east_m, frame.south_west[1] - self.frame.origin_north_m];
-        let is_on_grid = frame.spacing == [spacing; 2] && off.iter().all(|metres| (metres / spacing).fract() == 0.0);
-        (!is_on_grid).then_some((raster, off))
-    }
-
     /// The ground of any rectangle of the area.
     ///
     /// # Errors
     /// When the source has no heights there.
     pub fn window(&self, rect: PostRect) -> Result<Window, CompileError> {
-        let dem = match &self.source {
-            Source::Sample(seed) => sample_terrain::heights(*seed, rect, self.frame.spacing),
-            Source::Raster(raster) => raster.resample(&self.frame, rect)?,
-            Source::Mosaic(mosaic) => return Ok(self.with_importance(mosaic.resample(rect))),
-        };
-        let importance = mask::importance(&self.mask, self.rect, &self.frame, rect);
-        let importance = mask::without_voids(importance, &dem);
-        Ok(Window { dem, importance })
+        self.with_importance(self.relief.dem(rect)?)
     }
 }
 
@@ -235,44 +222,28 @@ fn join_importance(parts: &[Arc<Window>], rect: PostRect) -> Importance {
     Importance::new(rect, weights, classes)
 }
 
-fn open_mask(job: &Job, area: &GamingArea) -> Result<Mask<'static>, CompileError> {
-    let mut areas = Vec::new();
-    for spec in &job.importance.areas {
-        areas.push(mask::Area {
-            class: job.importance.classes[usize::from(spec.class)].clone(),
-            weight: spec.weight,
-            shape: open_shape(job, area, spec)?,
-        });
+/// Finds the level of each body of water from the heights of all tiles; what a person should know about it.
+fn find_levels(
+    relief: &mut Relief,
+    area: &GamingArea,
+    workers: &Workers,
+    stop: &AtomicBool,
+) -> Result<Option<String>, CompileError> {
+    let Some(water) = relief.water.as_ref().filter(|water| water.is_unknown()) else { return Ok(None) };
+    let tiles: Vec<TileId> = area.tiles.iter().copied().filter(|&tile| water.reaches(area.tiling.rect(tile))).collect();
+    let mut all = Soundings::new();
+    for tiles in tiles.chunks(1 << 10) {
+        let sound = |_: usize, &tile: &TileId| -> Result<Soundings, CompileError> {
+            Ok(water.sound(&relief.dry(area.tiling.rect(tile))?, area.rect))
+        };
+        let parts = schedule::for_each_independent(tiles, workers, stop, sound)
+            .map_err(|error| CompileError::from_schedule(Stage::Read, tiles, error))?;
+        parts.into_iter().for_each(|part| water::add(&mut all, part));
     }
-    let smoothing = match job.importance.smooth {
-        Smooth::Binomial7 => Smoothing::Binomial7,
-        Smooth::None => Smoothing::None,
-    };
-    Ok(Mask { default_weight: job.importance.default_weight, areas, smoothing })
+    let without = relief.water.as_mut().map_or(0, |water| water.level(&all));
+    let told = || format!("{without} bodies of water hold no post with a height and are left as they are");
+    Ok((0 < without).then(told))
 }
 
-fn open_shape(job: &Job, area: &GamingArea, spec: &ImportanceArea) -> Result<Shape<'static>, CompileError> {
-    let (epsg, frame) = (job.area.epsg, area.frame);
-    Ok(match &spec.shape {
-        AreaShape::Polygons { file } => Shape::Polygons(read_polygons(&file.path, epsg)?),
-        AreaShape::RasterValue { file, value } => {
-            let raster = ClassRaster::read(&file.path, epsg, &frame, area.rect)?;
-            // A value beyond 32 bits is in no class raster.
-            let value = i32::try_from(*value).ok();
-            Shape::Members(Box::new(move |rect| match value {
-                Some(value) => raster.members(&frame, rect, value),
-                None => vec![false; rect.post_count()],
-            }))
-        }
-        AreaShape::Sample(job::SampleClass::Mountains) => {
-            let seed = match &job.dem.source {
-                DemSource::Sample { seed } => *seed,
-                DemSource::Files { .. } => sample_terrain::DEFAULT_SEED,
-            };
-            Shape::Members(Box::new(move |rect| {
-                let classes = sample_terrain::classes(seed, rect, frame.spacing);
-                classes.into_iter().map(|class| class == sample_terrain::MOUNTAIN).collect()
-            }))
-        }
-    })
-}
+#[cfg(test)]
+mod tests;

@@ -18,7 +18,7 @@ pub fn find_area(request: &AreaRequest, files: &[SourceFile]) -> Result<AreaFoun
         AreaPlace::Around { latitude, longitude, size_m } => around(request, [longitude, latitude], size_m),
         AreaPlace::CoverDem => {
             let frames = files.iter().map(|file| {
-                let reading = reading(file).map_err(|error| no_area(error.to_string()))?;
+                let reading = reading(file, false).map_err(|error| no_area(error.to_string()))?;
                 let opened = DemFile::open(&file.path, &reading).map_err(|error| no_area(error.to_string()))?;
                 Ok(opened.frame().clone())
             });

@@ -23,8 +23,10 @@ pub struct Seen {
     pub spacing: [f64; 2],
     /// Whether those units are degrees.
     pub is_geographic: bool,
-    /// Void posts, and the lowest and highest height in metres; `None` for a raster too large to look into at once.
-    pub heights: Option<(usize, Option<(f64, f64)>)>,
+    /// Void posts.
+    pub voids: usize,
+    /// Lowest and highest height in metres; `None` when all posts are void.
+    pub range_m: Option<(f64, f64)>,
     /// What it says heights are measured from.
     pub vertical_datum: Option<String>,
     /// Vertical accuracy that it states, in metres.
@@ -55,8 +57,6 @@ pub struct Suggestion {
 /// Sides that every job has unless it says otherwise, in metres.
 const SIDE_M: f64 = 500.0;
 const BORDER_STEP_M: f64 = 125.0;
-/// Posts of a raster up to which it is decoded for a look.
-const LOOK_POSTS_MAX: usize = 1 << 26;
 /// Load modules along a side of a tile, about: the founding paper's.
 const MODULES_A_TILE: f64 = 17.0;
 
@@ -110,12 +110,8 @@ fn open(path: &Path, given: Option<&str>) -> Result<(DemFile, bool), CompileErro
 fn look(file: &DemFile, crs_given: bool) -> Result<Seen, CompileError> {
     let frame = file.frame();
     let mut notes: Vec<String> = frame.crs.remark().map(str::to_owned).into_iter().collect();
-    let mut heights = None;
-    if file.rect().post_count() <= LOOK_POSTS_MAX {
-        let raster = file.read(file.rect())?;
-        heights = Some((raster.void_count(), raster.range_m()));
-        notes.extend(raster.notes().iter().take(3).cloned());
-    }
+    let found = file.look(file.rect(), &file.chunks_of(file.rect()))?;
+    notes.extend(found.notes.iter().take(3).cloned());
     Ok(Seen {
         path: frame.path.clone(),
         format: file.format(),
@@ -123,7 +119,8 @@ fn look(file: &DemFile, crs_given: bool) -> Result<Seen, CompileError> {
         crs: frame.crs.name().to_owned(),
         spacing: frame.spacing,
         is_geographic: frame.crs.is_geographic(),
-        heights,
+        voids: found.voids,
+        range_m: found.range_m,
         vertical_datum: file.vertical_datum().map(str::to_owned),
         accuracy_m: file.accuracy_m(),
         notes,

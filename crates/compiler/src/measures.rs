@@ -163,8 +163,8 @@ fn find_source(record: Option<&SourceRecord>, folder: &Path) -> Result<PathBuf, 
     let places: Vec<PathBuf> = beside.iter().map(|folder| folder.join(&record.path)).chain([here]).collect();
     let mut other = None;
     for place in &places {
-        match source_files::content(place) {
-            Ok(bytes) if Fingerprint::of_bytes(&bytes) == record.blake3 => return Ok(place.clone()),
+        match source_files::content(place).map(Fingerprint::of_reader) {
+            Ok(Ok(content)) if content == record.blake3 => return Ok(place.clone()),
             Ok(_) => other = Some(place),
             Err(_) => {}
         }

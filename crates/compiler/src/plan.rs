@@ -5,6 +5,8 @@ use terrain::{ModuleRect, PostRect, Side, TileId};
 
 use crate::CompileError;
 use crate::area::GamingArea;
+use crate::ground::KEPT_POSTS_MAX;
+use crate::large::CACHE_BYTES_MAX;
 use crate::refinement::optimising;
 use crate::tasks::is_surveyed;
 
@@ -69,6 +71,10 @@ const SECONDS_PER_SAMPLE_POST: f64 = 260e-9;
 const SECONDS_PER_POINT: f64 = 3.5e-6;
 /// Bytes of memory for a post of the area: working windows and the decoded source.
 const MEMORY_PER_POST: u64 = 8;
+/// The same for a post of a tile that is worked on, where windows are not kept.
+const MEMORY_PER_POST_IN_WORK: u64 = 24;
+/// Bytes of a raster for a post of the area, about.
+const BYTES_PER_SOURCE_POST: u64 = 4;
 /// Bytes of memory for a triangle, in TINs, load modules and curves.
 const MEMORY_PER_TRIANGLE: u64 = 60;
 /// Bytes of memory for a post and for a triangle of a tile that is being optimised.
@@ -140,8 +146,17 @@ fn forecast(job: &Job, area: &GamingArea) -> Forecast {
     };
     let (of_post, of_triangle) = if optimising(job).is_some() { MEMORY_OPTIMISING } else { MEMORY_GROWING };
     let tiles = area.tiles.len() as u64;
-    let worker_bytes = (posts * of_post + triangles * of_triangle) / tiles;
-    let shared_bytes = MEMORY_BASE + posts * MEMORY_PER_POST + triangles * MEMORY_PER_TRIANGLE;
+    let heights = |at_once: u64| match job.dem.source {
+        _ if posts <= KEPT_POSTS_MAX as u64 => posts * MEMORY_PER_POST,
+        DemSource::Sample { .. } => posts / tiles * MEMORY_PER_POST_IN_WORK * at_once,
+        // Rasters are held up to a bound and read by window beyond it; how many posts they have is in no job.
+        DemSource::Files { .. } => {
+            posts / tiles * MEMORY_PER_POST_IN_WORK * at_once
+                + (posts * BYTES_PER_SOURCE_POST).min(CACHE_BYTES_MAX + CACHE_BYTES_MAX / 4)
+        }
+    };
+    let worker_bytes = (posts * of_post + triangles * of_triangle) / tiles + heights(1) - heights(0);
+    let shared_bytes = MEMORY_BASE + heights(0) + triangles * MEMORY_PER_TRIANGLE;
     Forecast {
         memory_bytes: shared_bytes + worker_bytes * tiles.min(2),
         shared_bytes,

@@ -403,13 +403,14 @@ fn visit_triangle(dem: &Dem, corners: [Vertex; 3], tally: &mut Tally) {
     });
 }
 
-/// Writes the sample terrain as a GeoTIFF, and its classes as another where asked for.
+/// Writes the sample terrain as a GeoTIFF, and its classes as another where asked for; `size` is rows and columns of
+/// posts, and no more than a band of rows is ever held.
 ///
 /// # Errors
 /// When a file cannot be written.
 pub fn sample(
     seed: u64,
-    posts: usize,
+    (rows, cols): (usize, usize),
     spacing: Spacing,
     out: &Path,
     classes: Option<&Path>,
@@ -418,7 +419,7 @@ pub fn sample(
     const PLACE: (u32, f64, f64) = (32_611, 505_000.0, 3_875_000.0);
     let (epsg, origin_east_m, origin_north_m) = PLACE;
     let frame = GridFrame { origin_east_m, origin_north_m, spacing };
-    let rect = PostRect::of_size(posts, posts);
+    let rect = PostRect::of_size(rows, cols);
     write_heights(out, &frame, rect, epsg, |band| sample_terrain::heights(seed, band, spacing))?;
     if let Some(path) = classes {
         write_classes(path, &frame, rect, epsg, |band| sample_terrain::classes(seed, band, spacing))?;

@@ -60,7 +60,7 @@ impl Findings<'_> {
             per_4km: self.per_window(&counts),
             pool: self.pool(&counts),
             residual: residual_of(&total),
-            residual_against_source: run.ground.has_source_posts().then(|| self.at_source(&total)),
+            residual_against_source: run.ground.relief.has_source_posts().then(|| self.at_source(&total)),
             classes: self.classes(&residuals),
             overall_point_weighted_rms_m: self.point_weighted_rms_m(&residuals),
             dem_accuracy_m: run.ground.accuracy_m,

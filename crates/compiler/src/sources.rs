@@ -7,13 +7,14 @@ use database::{Fingerprint, SourceRecord};
 use job::{AreaShape, DemSource, Job, Resampling, SourceFile, SourceSaid, Voids};
 use schedule::Workers;
 use source_files::{
-    Crs, DemFile, Mosaic, MosaicRules, MosaicVoids, Patch, Raster, Reading, SourceError, Standing, VoidPolicy,
-    VoidSummary, window_under,
+    Crs, DemFile, Mosaic, MosaicRules, MosaicVoids, Raster, RasterFrame, Reading, SourceError, VoidPolicy, VoidSummary,
+    WideMosaic, Windows, window_under,
 };
 use terrain::{PostRect, TileId};
 
 use crate::area::GamingArea;
-use crate::{CompileError, Stage};
+use crate::datums::{Datums, datum_of, judge_datums};
+use crate::{CompileError, Stage, large};
 
 /// Where heights come from.
 pub(crate) enum Source {
@@ -23,6 +24,10 @@ pub(crate) enum Source {
     Raster(Box<Raster>),
     /// Any number of rasters.
     Mosaic(Box<Mosaic>),
+    /// The same as [`Source::Raster`], read by window; it has no voids.
+    Window(Box<Windows>),
+    /// The same as [`Source::Mosaic`], read by window.
+    Wide(Box<WideMosaic>),
 }
 
 /// The rasters of a job.
@@ -34,11 +39,11 @@ pub(crate) struct Opened {
 }
 
 /// What was decoded of one file that is used, or of several.
-struct Decoded<S> {
-    source: S,
-    warnings: Vec<String>,
+pub(crate) struct Decoded<S> {
+    pub source: S,
+    pub warnings: Vec<String>,
     /// Vertical accuracy of the least accurate, in metres.
-    accuracy_m: Option<f64>,
+    pub accuracy_m: Option<f64>,
 }
 
 /// Opens, judges and decodes the files of a job.
@@ -51,7 +56,13 @@ pub(crate) fn open(
     files: &[SourceFile],
     workers: &Workers,
     stop: &AtomicBool,
+    whole_bytes_max: u64,
 ) -> Result<Opened, CompileError> {
+    if let Some(Decoded { source, warnings, accuracy_m }) =
+        large::open(job, area, files, (workers, stop), whole_bytes_max)?
+    {
+        return Ok(Opened { source, voids: VoidSummary::default(), warnings, accuracy_m });
+    }
     if let Some((decoded, voids)) = open_alone(job, area, files, workers, stop)? {
         let Decoded { source, warnings, accuracy_m } = decoded;
         return Ok(Opened { source: Source::Raster(Box::new(source)), voids, warnings, accuracy_m });
@@ -59,41 +70,6 @@ pub(crate) fn open(
     let Decoded { source, warnings, accuracy_m } = open_mosaic(job, area, files, workers, stop)?;
     let voids = VoidSummary::default();
     Ok(Opened { source: Source::Mosaic(Box::new(source)), voids, warnings, accuracy_m })
-}
-
-/// A datum's name without what people write differently: `EGM 96` is `egm96`.
-fn plain_datum(name: &str) -> String {
-    name.chars().filter(char::is_ascii_alphanumeric).collect::<String>().to_ascii_lowercase()
-}
-
-/// Refuses heights above different datums in one product; tells of those that are above nobody knows what.
-fn judge_datums(job: &Job, datums: &[(&SourceFile, Option<String>)]) -> Result<Vec<String>, CompileError> {
-    let known = datums.iter().find_map(|(_, datum)| datum.clone());
-    let Some(wanted) = job.dem.vertical_datum.clone().or(known) else { return Ok(Vec::new()) };
-    let mut warnings = Vec::new();
-    for (file, datum) in datums {
-        match datum {
-            Some(datum) if plain_datum(datum) != plain_datum(&wanted) => {
-                return Err(CompileError::Impossible {
-                    key: "dem.vertical_datum".into(),
-                    found: format!("heights of {} above {datum}, where {wanted} is wanted", file.written),
-                    expected: "heights above one datum, since no geoid grid is read yet".into(),
-                    hint: "convert it first with a geoid grid (gdalwarp), or correct what the job says of it".into(),
-                });
-            }
-            Some(_) => {}
-            None => warnings.push(format!(
-                "{}: it does not say what its heights are measured from; they are carried as they are",
-                file.path.display()
-            )),
-        }
-    }
-    Ok(warnings)
-}
-
-/// What the heights of a file are measured from: as the job says, else as the file does.
-fn datum_of(file: &SourceFile, opened: &DemFile) -> Option<String> {
-    file.said.vertical_datum.clone().or_else(|| opened.vertical_datum().map(str::to_owned))
 }
 
 /// One raster on the area's own system whose posts need no projecting; `None` where that is not so.
@@ -114,7 +90,7 @@ fn open_alone(
     if job.dem.resampling == Resampling::Cubic {
         return Ok(None);
     }
-    let opened = DemFile::open(&file.path, &reading(file)?)?;
+    let opened = DemFile::open(&file.path, &reading(file, job.dem.strict)?)?;
     if opened.frame().require_epsg(job.area.epsg).is_err() {
         return Ok(None);
     }
@@ -123,8 +99,15 @@ fn open_alone(
         window => window?,
     };
     let mut raster = decode(&opened, window, workers, stop)?;
+    // Voids may lie in water, which is level and so is ground: only a mosaic asks that of each post.
+    if job.dem.water.is_some() && 0 < raster.void_count() {
+        return Ok(None);
+    }
     let voids = raster.settle_voids(policy)?;
-    let mut warnings = judge_datums(job, &[(file, datum_of(file, &opened))])?;
+    let Datums { shifts, mut warnings } = judge_datums(job, area, &[(file, datum_of(file, &opened))])?;
+    if shifts[0].is_some() {
+        return Ok(None);
+    }
     warnings.append(&mut raster_warnings(&raster));
     let accuracy_m = opened.accuracy_m();
     Ok(Some((Decoded { source: raster, warnings, accuracy_m }, voids)))
@@ -141,7 +124,7 @@ fn open_mosaic(
     let (mut rasters, mut warnings, mut accuracy_m) = (Vec::new(), Vec::new(), None);
     let mut datums = Vec::new();
     for file in files {
-        let opened = DemFile::open(&file.path, &reading(file)?)?;
+        let opened = DemFile::open(&file.path, &reading(file, job.dem.strict)?)?;
         let path = file.path.display();
         let Some(window) = opened.window_reaching(&crs, &area.frame, area.rect) else {
             warnings.push(format!("{path}: it lies outside the area and is not used"));
@@ -160,32 +143,42 @@ fn open_mosaic(
         datums.push((file, datum_of(file, &opened)));
         rasters.push(raster);
     }
-    warnings.append(&mut judge_datums(job, &datums)?);
+    let mut judged = judge_datums(job, area, &datums)?;
+    warnings.append(&mut judged.warnings);
+    rasters.iter_mut().zip(judged.shifts).for_each(|(raster, shift)| raster.set_shift(shift));
     if let ([file], true) = (files, rasters.is_empty()) {
         return Err(SourceError::OutsideArea { path: file.path.clone() }.into());
     }
     if rasters.is_empty() {
-        return Err(CompileError::Impossible {
-            key: "dem.sources".into(),
-            found: "no raster that reaches into the area".into(),
-            expected: "one at least".into(),
-            hint: "check area.crs and area.origin_m; `tiefort init FILES…` writes an area that fits".into(),
-        });
+        return Err(nothing_reaches());
     }
+    let source = Mosaic::new(rasters, mosaic_rules(job), &crs, &area.frame, area.rect)?;
+    Ok(Decoded { source, warnings, accuracy_m })
+}
+
+pub(crate) fn nothing_reaches() -> CompileError {
+    CompileError::Impossible {
+        key: "dem.sources".into(),
+        found: "no raster that reaches into the area".into(),
+        expected: "one at least".into(),
+        hint: "check area.crs and area.origin_m; `tiefort init FILES…` writes an area that fits".into(),
+    }
+}
+
+/// What a job says of several sources.
+pub(crate) fn mosaic_rules(job: &Job) -> MosaicRules {
     let fill_within = match job.dem.voids {
         Voids::FillWithinPosts(posts) | Voids::FillThenHole(posts) => posts,
         Voids::Fail | Voids::Hole => 0,
     };
-    let rules = MosaicRules {
+    MosaicRules {
         resampling: match job.dem.resampling {
             Resampling::Bilinear => source_files::Resampling::Bilinear,
             Resampling::Cubic => source_files::Resampling::Cubic,
         },
         feather_m: job.dem.feather_m,
         voids: MosaicVoids { next_source: job.dem.next_source, fill_within },
-    };
-    let source = Mosaic::new(rasters, rules, &crs, &area.frame, area.rect)?;
-    Ok(Decoded { source, warnings, accuracy_m })
+    }
 }
 
 /// The system of the area.
@@ -211,7 +204,7 @@ pub(crate) fn area_crs(job: &Job) -> Result<Crs, CompileError> {
 ///
 /// # Errors
 /// When the job names a coordinate system that cannot be computed.
-pub(crate) fn reading(file: &SourceFile) -> Result<Reading, CompileError> {
+pub(crate) fn reading(file: &SourceFile, strict: bool) -> Result<Reading, CompileError> {
     let SourceSaid { crs, corner, height_unit_m, nodata, .. } = &file.said;
     let crs = crs.as_deref().map(|text| {
         Crs::named(text).map_err(|found| CompileError::Impossible {
@@ -222,7 +215,7 @@ pub(crate) fn reading(file: &SourceFile) -> Result<Reading, CompileError> {
         })
     });
     let corner = corner.map(|[latitude, longitude]| [longitude, latitude]);
-    Ok(Reading { crs: crs.transpose()?, corner, height_unit_m: *height_unit_m, nodata: *nodata, strict: false })
+    Ok(Reading { crs: crs.transpose()?, corner, height_unit_m: *height_unit_m, nodata: *nodata, strict })
 }
 
 /// Decodes a window of a raster on all workers.
@@ -256,12 +249,18 @@ pub(crate) fn records(job: &Job) -> Result<Vec<SourceRecord>, CompileError> {
             }
         }
     }
+    for geoid in &job.dem.geoids {
+        records.push(file_record(&geoid.file.written, &geoid.file.path)?);
+    }
+    if let Some(water) = &job.dem.water {
+        records.push(file_record(&water.file.written, &water.file.path)?);
+    }
     for area in &job.importance.areas {
         match &area.shape {
             AreaShape::Polygons { file } | AreaShape::RasterValue { file, .. } => {
                 records.push(file_record(&file.written, &file.path)?);
             }
-            AreaShape::Sample(_) => {}
+            AreaShape::Slope { .. } | AreaShape::Sample(_) => {}
         }
     }
     Ok(records)
@@ -269,7 +268,9 @@ pub(crate) fn records(job: &Job) -> Result<Vec<SourceRecord>, CompileError> {
 
 /// The record of a file that a build was made from.
 fn file_record(written: &str, path: &Path) -> Result<SourceRecord, CompileError> {
-    Ok(record(written, &source_files::content(path)?))
+    let content = Fingerprint::of_reader(source_files::content(path)?);
+    let blake3 = content.map_err(|source| SourceError::Read { path: path.into(), source })?;
+    Ok(SourceRecord { path: written.to_owned(), blake3, attribution: None })
 }
 
 /// The record of some content.
@@ -277,14 +278,18 @@ fn record(path: &str, content: &[u8]) -> SourceRecord {
     SourceRecord { path: path.to_owned(), blake3: Fingerprint::of_bytes(content), attribution: None }
 }
 
-/// What a person should know about a raster: heights that look like a sentinel nobody declared, and more.
 fn raster_warnings(raster: &Raster) -> Vec<String> {
+    warnings_of(raster.frame(), raster.range_m(), raster.notes())
+}
+
+/// What a person should know about a raster: heights that look like a sentinel nobody declared, and more.
+pub(crate) fn warnings_of(frame: &RasterFrame, range_m: Option<(f64, f64)>, notes: &[String]) -> Vec<String> {
     const LOWEST_LAND_M: f64 = -450.0;
     const HIGHEST_LAND_M: f64 = 8900.0;
     const NOTES_MAX: usize = 5;
-    let (path, crs) = (raster.frame().path.display(), &raster.frame().crs);
+    let (path, crs) = (frame.path.display(), &frame.crs);
     let mut warnings = Vec::new();
-    if let Some((lowest, highest)) = raster.range_m()
+    if let Some((lowest, highest)) = range_m
         && (lowest < LOWEST_LAND_M || HIGHEST_LAND_M < highest)
     {
         warnings.push(format!(
@@ -296,105 +301,9 @@ fn raster_warnings(raster: &Raster) -> Vec<String> {
         warnings.push(format!("{path}: EPSG:3857 metres are not ground metres away from the equator"));
     }
     warnings.extend(crs.remark().map(|remark| format!("{path}: {}: {remark}", crs.name())));
-    warnings.extend(raster.notes().iter().take(NOTES_MAX).cloned());
-    if NOTES_MAX < raster.notes().len() {
-        warnings.push(format!("{path}: {} more of the same kind", raster.notes().len() - NOTES_MAX));
+    warnings.extend(notes.iter().take(NOTES_MAX).cloned());
+    if NOTES_MAX < notes.len() {
+        warnings.push(format!("{path}: {} more of the same kind", notes.len() - NOTES_MAX));
     }
     warnings
-}
-
-/// How many posts of the area stand how, and where there is nothing.
-#[derive(Clone)]
-pub(crate) struct Census {
-    pub filled: usize,
-    pub void: usize,
-    pub gap: usize,
-    first_void: Option<terrain::Post>,
-    /// Posts without a source and posts in all, by part of the area, the southern row first.
-    parts: Vec<(usize, usize)>,
-}
-
-/// Columns and rows of the map of what is covered.
-const MAP_COLS: usize = 48;
-const MAP_ROWS: usize = 24;
-
-impl Census {
-    pub fn new() -> Self {
-        Self { filled: 0, void: 0, gap: 0, first_void: None, parts: vec![(0, 0); MAP_COLS * MAP_ROWS] }
-    }
-
-    /// Of one tile; a post on a side that two tiles share counts in the southern or western one.
-    pub fn of(patch: &Patch, area: PostRect) -> Self {
-        let (mut census, rect) = (Self::new(), patch.rect);
-        for row in rect.south + i32::from(area.south < rect.south)..=rect.north {
-            for col in rect.west + i32::from(area.west < rect.west)..=rect.east {
-                let index = (row - rect.south) as usize * rect.posts_wide() + (col - rect.west) as usize;
-                let part = (row - area.south) as usize * MAP_ROWS / area.posts_high() * MAP_COLS
-                    + (col - area.west) as usize * MAP_COLS / area.posts_wide();
-                census.parts[part].1 += 1;
-                match patch.standings[index] {
-                    Standing::Height => {}
-                    Standing::Filled => census.filled += 1,
-                    Standing::Void => {
-                        census.void += 1;
-                        census.first_void = census.first_void.or(Some(terrain::Post::new(row, col)));
-                    }
-                    Standing::Gap => {
-                        census.gap += 1;
-                        census.parts[part].0 += 1;
-                    }
-                }
-            }
-        }
-        census
-    }
-
-    pub fn add(&mut self, other: &Census) {
-        self.filled += other.filled;
-        self.void += other.void;
-        self.gap += other.gap;
-        self.first_void = self.first_void.or(other.first_void);
-        for (sum, part) in self.parts.iter_mut().zip(&other.parts) {
-            *sum = (sum.0 + part.0, sum.1 + part.1);
-        }
-    }
-
-    /// What the job's voids make of it.
-    ///
-    /// # Errors
-    /// When ground is missing and the job wants none to be.
-    pub fn judge(&self, job: &Job, area: &GamingArea) -> Result<VoidSummary, CompileError> {
-        let of = area.rect.post_count();
-        if self.gap + self.void == of {
-            return Err(CompileError::Impossible {
-                key: "dem.sources".into(),
-                found: "no height in the whole area".into(),
-                expected: "heights in some of it at least".into(),
-                hint: "check area.crs and area.origin_m, and the void markers of the files".into(),
-            });
-        }
-        if !matches!(job.dem.voids, Voids::Hole | Voids::FillThenHole(_)) {
-            if 0 < self.gap {
-                return Err(SourceError::Gaps { found: self.gap, of, map: self.map() }.into());
-            }
-            if let Some(first) = self.first_void {
-                let [east_m, north_m] = area.frame.place_m(first);
-                let first = format!("{east_m:.1}, {north_m:.1} m");
-                return Err(SourceError::MosaicVoids { found: self.void, of, first }.into());
-            }
-        }
-        Ok(VoidSummary { filled: self.filled, left: self.void + self.gap })
-    }
-
-    /// What is covered, north up: `#` wholly, `+` in part, `.` not at all.
-    pub fn map(&self) -> String {
-        let mark = |&(gap, of): &(usize, usize)| match (gap, of) {
-            (_, 0) => None,
-            (0, _) => Some('#'),
-            (gap, of) if gap < of => Some('+'),
-            _ => Some('.'),
-        };
-        let lines = self.parts.chunks(MAP_COLS).rev().map(|line| line.iter().filter_map(mark).collect::<String>());
-        lines.filter(|line| !line.is_empty()).map(|line| format!("    {line}")).collect::<Vec<_>>().join("\n")
-    }
 }

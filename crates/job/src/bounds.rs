@@ -60,3 +60,11 @@ pub const EPSG_RANGE: std::ops::RangeInclusive<u32> = 1024..=32_766;
 
 /// Geographic coordinate systems that DEMs come in; a few of many, so that the common mistake has a clear message.
 pub const EPSG_GEOGRAPHIC: [u32; 13] = [4326, 4979, 4258, 4269, 4267, 4283, 4322, 4490, 4612, 4617, 4674, 6318, 7844];
+/// Geoid grids of a job: there are not that many vertical datums.
+pub const GEOIDS_MAX: usize = 16;
+/// Characters of the name of a vertical datum.
+pub const DATUM_CHARS_MAX: usize = 64;
+/// Metres over which slopes may be averaged: a halo of that size is read around every tile.
+pub const SMOOTH_M_MAX: f64 = 10_000.0;
+/// Slope in percent of a wall nearly upright.
+pub const SLOPE_PERCENT_MAX: f64 = 10_000.0;

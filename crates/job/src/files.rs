@@ -23,6 +23,8 @@ pub(crate) struct Mention {
 pub(crate) enum Place {
     Source(usize),
     ImportanceArea(usize),
+    Geoid(usize),
+    Water,
 }
 
 impl Job {
@@ -96,11 +98,16 @@ fn locate(job: &mut Job, mentions: Vec<Mention>) -> Result<(), JobError> {
     let folder = job.folder().to_owned();
     locate_sources(&mut job.dem.source, &folder, &mentions)?;
     for Mention { place, fault } in mentions {
-        let Place::ImportanceArea(index) = place else { continue };
-        match &job.importance.areas[index].shape {
-            AreaShape::Polygons { file } | AreaShape::RasterValue { file, .. } => check_named(file, &folder, &fault)?,
-            AreaShape::Sample(_) => {}
-        }
+        let named = match place {
+            Place::Source(_) => None,
+            Place::Geoid(index) => Some(&job.dem.geoids[index].file),
+            Place::Water => job.dem.water.as_ref().map(|water| &water.file),
+            Place::ImportanceArea(index) => match &job.importance.areas[index].shape {
+                AreaShape::Polygons { file } | AreaShape::RasterValue { file, .. } => Some(file),
+                AreaShape::Sample(_) | AreaShape::Slope { .. } => None,
+            },
+        };
+        named.map_or(Ok(()), |file| check_named(file, &folder, &fault))?;
     }
     Ok(())
 }

@@ -34,6 +34,8 @@ const DEM: &[Key] = &[
     ("voids", "voids = \"fail\""),
     ("resampling", "resampling = \"cubic\""),
     ("feather_m", "feather_m = 500"),
+    ("geoids", "geoids = [{ datum = \"EGM96\", file = \"egm96_15.gtx\" }]"),
+    ("water", "water = \"lakes.geojson\""),
 ];
 
 const IMPORTANCE: &[Key] = &[
@@ -87,6 +89,8 @@ const AREAS: &[Key] = &[
     ("file", "{ file = \"mountains.geojson\", class = \"mountains\", weight = 1 }"),
     ("raster", "{ raster = \"class.tif\", value = 3, class = \"mountains\", weight = 1 }"),
     ("value", "{ raster = \"class.tif\", value = 3, class = \"mountains\", weight = 1 }"),
+    ("slope_above_percent", "{ slope_above_percent = 20, smooth_m = 500, class = \"mountains\", weight = 1 }"),
+    ("smooth_m", "{ slope_above_percent = 20, smooth_m = 500, class = \"mountains\", weight = 1 }"),
     ("sample", "{ sample = \"mountains\", class = \"mountains\", weight = 1 }"),
     ("class", "class = \"mountains\"; reports tell classes apart"),
     ("weight", "weight = 1; 0 excludes posts from selection"),
@@ -101,6 +105,20 @@ const SOURCES: &[Key] = &[
     ("nodata", "nodata = -32767"),
     ("vertical_datum", "vertical_datum = \"EGM96\""),
     ("attribution", "attribution = \"NASA/USGS SRTM, public domain\""),
+];
+
+/// Keys of one entry of `dem.geoids`.
+const GEOIDS: &[Key] = &[
+    ("datum", "{ datum = \"EGM96\", file = \"egm96_15.gtx\" }"),
+    ("file", "{ datum = \"EGM96\", file = \"egm96_15.gtx\" }"),
+];
+
+/// Keys of `dem.water` when it is a table.
+const WATER: &[Key] = &[
+    ("file", "water = { file = \"lakes.geojson\" }"),
+    ("level_m", "water = { file = \"sea.geojson\", level_m = 0 }"),
+    ("class", "class = \"water\"; triangles carry it"),
+    ("weight", "weight = 1; 0 excludes posts from selection"),
 ];
 
 /// Keys of `area.around`.
@@ -122,6 +140,8 @@ fn table(place: &str) -> &'static [Key] {
     match place {
         "dem.voids" => VOIDS,
         "area.around" => AROUND,
+        "dem.water" => WATER,
+        _ if place.starts_with("dem.geoids[") => GEOIDS,
         _ if place.starts_with("dem.sources[") => SOURCES,
         _ if place.starts_with("importance.areas[") => AREAS,
         _ => SECTIONS.iter().find(|(name, _)| *name == place).map_or(&[], |(_, keys)| keys),

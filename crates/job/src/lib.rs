@@ -19,6 +19,8 @@ pub use model::{
     Optimising, Proximity, Resampling, SampleClass, Smooth, SourceEntry, SourceFile, SourceSaid, TileOrder, TilesSpec,
     TinSpec, Voids, WindowLimit,
 };
+mod ground;
+pub use ground::{GeoidSpec, WaterSpec};
 mod find;
 pub use find::{AreaFound, AreaPlace, AreaRequest, FindArea, NoArea};
 mod error;

@@ -4,6 +4,8 @@ use std::path::{Path, PathBuf};
 
 use terrain::{ModuleGrid, Spacing};
 
+use crate::{GeoidSpec, WaterSpec};
+
 /// All a run needs, as the job file says it, defaults filled in.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Job {
@@ -55,6 +57,12 @@ pub struct DemSpec {
     pub resampling: Resampling,
     /// Over how many metres from its edge a source fades into those after it; 0 for a plain seam.
     pub feather_m: f64,
+    /// Grids for converting between vertical datums.
+    pub geoids: Vec<GeoidSpec>,
+    /// Water that is to lie level.
+    pub water: Option<WaterSpec>,
+    /// Whether damage that could be warned about is an error. Asked for by whoever runs the job, not in its text.
+    pub strict: bool,
 }
 
 /// How a height between posts of a source comes about.
@@ -181,6 +189,13 @@ pub enum AreaShape {
         file: NamedFile,
         /// The value.
         value: i64,
+    },
+    /// Posts where the ground is steep.
+    Slope {
+        /// Slope in thousandths of a percent above which ground belongs.
+        above: u32,
+        /// Radius in millimetres over which slopes are averaged first.
+        smooth_mm: u32,
     },
     /// Posts of a class of the sample terrain (only with [`DemSource::Sample`]).
     Sample(SampleClass),

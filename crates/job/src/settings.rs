@@ -6,9 +6,9 @@
 use terrain::{THOUSANDTHS, metres_of_quanta};
 
 use crate::{
-    Allocation, AreaShape, Borders, Budget, ClipHeights, Count, DemSource, Edges, Effort, ErrorKey, HeightFit,
-    ImportanceArea, Job, LastBatch, Lattice, Method, Optimising, Resampling, SampleClass, Smooth, SourceEntry,
-    TileOrder, Voids,
+    Allocation, AreaShape, Borders, Budget, ClipHeights, Count, DemSource, Edges, Effort, ErrorKey, GeoidSpec,
+    HeightFit, ImportanceArea, Job, LastBatch, Lattice, Method, Optimising, Resampling, SampleClass, Smooth,
+    SourceEntry, TileOrder, Voids, WaterSpec,
 };
 
 /// One setting of a job.
@@ -91,6 +91,30 @@ impl Job {
             let meaning = "metres over which a source fades into the next";
             list.add("dem.feather_m", number(self.dem.feather_m), meaning);
         }
+        if !self.dem.geoids.is_empty() {
+            let grid = |geoid: &GeoidSpec| {
+                format!("{{ datum = {}, file = {} }}", quoted(&geoid.datum), quoted(&geoid.file.written))
+            };
+            let grids: Vec<String> = self.dem.geoids.iter().map(grid).collect();
+            let meaning = "heights of vertical datums above the ellipsoid, for converting";
+            list.add("dem.geoids", format!("[{}]", grids.join(", ")), meaning);
+        }
+        if let Some(water) = &self.dem.water {
+            let (value, meaning) = self.water_text(water);
+            list.add("dem.water", value, meaning);
+        }
+    }
+
+    fn water_text(&self, water: &WaterSpec) -> (String, &'static str) {
+        let mut keys = vec![format!("file = {}", quoted(&water.file.written))];
+        keys.extend(water.level_m.map(|level_m| format!("level_m = {}", number(level_m))));
+        keys.push(format!("class = {}", quoted(&self.importance.classes[usize::from(water.class)])));
+        keys.extend(water.weight.map(|thousandths| format!("weight = {}", weight(thousandths))));
+        let meaning = match water.level_m {
+            Some(_) => "water lies at one level",
+            None => "each body of water lies level, at the median of its heights",
+        };
+        (format!("{{ {} }}", keys.join(", ")), meaning)
     }
 
     fn describe_voids(&self, list: &mut List) {
@@ -141,6 +165,10 @@ impl Job {
         let shape = match &area.shape {
             AreaShape::Polygons { file } => format!("file = {}", quoted(&file.written)),
             AreaShape::RasterValue { file, value } => format!("raster = {}, value = {value}", quoted(&file.written)),
+            AreaShape::Slope { above, smooth_mm } => {
+                let [above, smooth_m] = [above, smooth_mm].map(|thousandths| number(f64::from(*thousandths) / 1000.0));
+                format!("slope_above_percent = {above}, smooth_m = {smooth_m}")
+            }
             AreaShape::Sample(SampleClass::Mountains) => "sample = \"mountains\"".to_owned(),
         };
         let class = quoted(&self.importance.classes[usize::from(area.class)]);

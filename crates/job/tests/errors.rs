@@ -163,7 +163,7 @@ fn unknown_keys_are_told_with_the_nearest_known_one() {
         r#"areas = [{ file = "m.geojson", clas = "m", weight = 1 }]"#,
         &[
             "a/b.toml:10: importance.areas[0].clas: found a key that no job has, expected one of file, raster,",
-            "value, sample, class, weight",
+            "value, slope_above_percent, smooth_m, sample, class, weight",
             "hint: did you mean class?",
         ],
     );
@@ -365,7 +365,7 @@ fn values_of_the_wrong_type_are_told_as_written() {
         "areas = [3]",
         &[
             "a/b.toml:10: importance.areas[0]: found the whole number 3, expected a table of file, raster,",
-            "value, sample, class, weight",
+            "value, slope_above_percent, smooth_m, sample, class, weight",
             r#"hint: for example areas = [{ file = "mountains.geojson", class = "mountains", weight = 1 }]"#,
         ],
     );
@@ -982,7 +982,7 @@ seed = 3"#,
         &[
             r#"a/b.toml:10: importance.areas[0]: found { file = "m.geojson", raster = "c.tif", class = "m","#,
             r#"weight …, expected exactly one of file = "x.geojson", raster = "x.tif" with value, sample ="#,
-            r#""mountains""#,
+            r#""mountains", slope_above_percent = 20"#,
             r#"hint: for example areas = [{ file = "mountains.geojson", class = "mountains", weight = 1 }]"#,
         ],
     );
@@ -1000,7 +1000,7 @@ seed = 3"#,
         r#"areas = [{ class = "m", weight = 1 }]"#,
         &[
             r#"a/b.toml:10: importance.areas[0]: found { class = "m", weight = 1 }, expected exactly one of file"#,
-            r#"= "x.geojson", raster = "x.tif" with value, sample = "mountains""#,
+            r#"= "x.geojson", raster = "x.tif" with value, sample = "mountains", slope_above_percent = 20"#,
             r#"hint: for example areas = [{ file = "mountains.geojson", class = "mountains", weight = 1 }]"#,
         ],
     );
@@ -1347,4 +1347,31 @@ fn patterns_may_not_leave_their_folder() {
             r#"hint: for example sources = ["dem/*.tif"]"#,
         ],
     );
+}
+
+#[track_caller]
+fn check_part(old: &str, new: &str, expected: &str) {
+    let mut lines: Vec<&str> = SOUND.lines().collect();
+    let at = lines.iter().position(|line| line.starts_with(old)).expect("a line to replace");
+    lines[at] = new;
+    let error = Job::from_text(&lines.join("\n"), Path::new("a/b.toml")).expect_err("this job is wrong");
+    assert!(told(&error).contains(expected), "{}", told(&error));
+}
+
+#[test]
+fn water_geoids_and_slopes_are_told_what_they_need() {
+    let dem = |keys: &str| format!("source = \"sample\"\n{keys}");
+    check_part("source", &dem("water = { level_m = 3 }"), "dem.water.file: found nothing");
+    let geoids = dem("geoids = [{ datum = \"ellipsoid\", file = \"a.gtx\" }]");
+    check_part("source", &geoids, "dem.geoids[0].datum: found \"ellipsoid\", expected a datum other than");
+    let area = |keys: &str| format!("areas = [{{ {keys}, class = \"m\", weight = 1 }}]");
+    check_part(
+        "default",
+        &area("slope_above_percent = 20"),
+        "smooth_m: found nothing, expected metres from 0 to 10000",
+    );
+    let level = area("slope_above_percent = 0, smooth_m = 0");
+    check_part("default", &level, "slope_above_percent: found 0, expected a slope in percent, above 0");
+    let other = area("file = \"m.geojson\", smooth_m = 5");
+    check_part("default", &other, "hint: smooth_m goes with slope_above_percent");
 }

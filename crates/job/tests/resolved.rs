@@ -143,6 +143,11 @@ fn the_canonical_text_is_the_same_job() {
         "[limits]\nmean_per_load_module = 31.7\npool = 12\n[tiles]\norder = \"raster\"\ncolumns = 1\n",
         "[importance]\ndefault = 0.001\nareas = [{ sample = \"mountains\", class = \"m \\\\ n\", weight = 3 }]\n",
     ];
+    let ground = "water = { file = \"w.gpkg\", level_m = -0.5, class = \"sea\", weight = 0 }\n\
+        geoids = [{ datum = \"EGM96\", file = \"g.gtx\" }]\n[importance]\n\
+        areas = [{ slope_above_percent = 12.5, smooth_m = 400, class = \"sea\", weight = 1 }]\n";
+    check_canonical(&job(&format!("{SHORTEST}{ground}")));
+    check_canonical(&job(&format!("{SHORTEST}water = \"w.shp\"\n")));
     let voids = ["\"hole\"", "\"next_source\"", "{ hole = true, next_source = true }"];
     let voids = voids.map(|voids| format!("voids = {voids}\n"));
     let all = "voids = { next_source = true, fill_within_posts = 3, hole = true }\nresampling = \"cubic\"\n\

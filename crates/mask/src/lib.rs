@@ -7,6 +7,8 @@ mod area;
 pub use area::{Area, Membership, Shape};
 mod polygon;
 pub use polygon::Polygon;
+mod slope;
+pub use slope::{steep, steep_halo};
 mod smooth;
 
 use terrain::{Dem, GridFrame, Importance, PostRect};

@@ -29,8 +29,19 @@ struct Edge {
 }
 
 impl Polygon {
+    /// The posts among which all that are inside lie.
+    pub fn bounds(&self, frame: &GridFrame) -> Option<PostRect> {
+        let corners = || self.rings.iter().flatten().map(|&corner| steps(corner, frame));
+        let range = |axis: usize| {
+            let (low, high) = (corners().map(|at| at[axis]).min()?, corners().map(|at| at[axis]).max()?);
+            Some((low.div_euclid(STEPS) as i32, (high.div_euclid(STEPS) + 1) as i32))
+        };
+        let ((west, east), (south, north)) = (range(0)?, range(1)?);
+        Some(PostRect { south, west, north, east })
+    }
+
     /// Calls `claim` with ranges of row-major indices into `rect` that hold exactly the posts inside.
-    pub(crate) fn visit_spans(&self, frame: &GridFrame, rect: PostRect, mut claim: impl FnMut(Range<usize>)) {
+    pub fn visit_spans(&self, frame: &GridFrame, rect: PostRect, mut claim: impl FnMut(Range<usize>)) {
         let mut crossings = vec![Vec::new(); rect.posts_high()];
         for edge in self.rings.iter().flat_map(|ring| edges(ring, frame)) {
             for row in edge.rows(rect) {

@@ -2,10 +2,10 @@
 
 use terrain::PostRect;
 
-use crate::RasterFrame;
 use crate::directory::SampleKind;
 use crate::frame::SampleScale;
 use crate::samples::Samples;
+use crate::{DatumShift, RasterFrame};
 
 /// All of a raster but its samples.
 #[derive(Clone, Debug)]
@@ -14,6 +14,8 @@ pub(crate) struct Header {
     pub scale: SampleScale,
     pub kind: SampleKind,
     pub nodata: Option<f64>,
+    /// How its heights become those above the datum that is wanted.
+    pub shift: Option<DatumShift>,
 }
 
 /// One strip or tile, or a run of rows or columns, decoded.
@@ -28,4 +30,13 @@ pub struct Chunk {
     pub(crate) samples: Option<Samples>,
     /// What a person should know about it.
     pub(crate) notes: Vec<String>,
+}
+
+impl Chunk {
+    /// Bytes of memory that its samples take.
+    pub(crate) fn bytes(&self) -> u64 {
+        const BESIDES: u64 = 128;
+        let samples = self.samples.as_ref().map_or(0, |samples| samples.count() as u64 * samples.kind().bytes());
+        samples + BESIDES
+    }
 }

@@ -8,11 +8,11 @@ use crate::chunk::{Chunk, Header};
 use crate::crs::Crs;
 use crate::dted::{self, Dted};
 use crate::frame::{Axes, Facts};
-use crate::geotiff::GeoTiff;
+use crate::geotiff::{FileDecoder, GeoTiff};
 use crate::rows::Rows;
 use crate::store::Store;
 use crate::text_grid::{self, AsciiGrid, Keys};
-use crate::{Raster, RasterFrame, SampleScale, SourceError, hgt};
+use crate::{DatumShift, Raster, RasterFrame, SampleScale, SourceError, hgt};
 
 /// How a file is to be read, where that is not as the file itself says.
 #[derive(Clone, Debug)]
@@ -98,6 +98,11 @@ impl DemFile {
         self.header.scale
     }
 
+    /// Has a mosaic bring its heights to another datum.
+    pub fn set_shift(&mut self, shift: Option<DatumShift>) {
+        self.header.shift = shift;
+    }
+
     /// The format's name.
     pub fn format(&self) -> &'static str {
         self.facts.format
@@ -120,15 +125,42 @@ impl DemFile {
 
     /// The chunks that hold posts of `window`, in file order.
     pub fn chunks_of(&self, window: PostRect) -> Vec<u32> {
-        if let Reader::GeoTiff(tiff) = &self.reader {
-            return tiff.chunks_of(window);
+        let Some(cut) = self.rect().intersection(&window) else { return Vec::new() };
+        match &self.reader {
+            Reader::GeoTiff(tiff) => tiff.chunks_of(cut),
+            Reader::Dted(dted) => dted.chunks_of(cut.west, cut.east).collect(),
+            Reader::Rows(rows) => rows.chunks_of(cut.south, cut.north).collect(),
+            Reader::Ascii(grid) => grid.chunks_of(cut.south, cut.north).collect(),
         }
-        let (count, posts_of): (u32, &dyn Fn(u32) -> PostRect) = match &self.reader {
-            Reader::GeoTiff(_) | Reader::Ascii(_) => (1, &|_| self.rect()),
-            Reader::Dted(dted) => (dted.chunk_count(), &|chunk| dted.posts_of(chunk)),
-            Reader::Rows(rows) => (rows.chunk_count(), &|chunk| rows.posts_of(chunk)),
-        };
-        (0..count).filter(|&chunk| posts_of(chunk).intersection(&window).is_some()).collect()
+    }
+
+    /// The posts of one chunk.
+    pub(crate) fn posts_of(&self, chunk: u32) -> PostRect {
+        match &self.reader {
+            Reader::GeoTiff(tiff) => tiff.posts_of(chunk),
+            Reader::Dted(dted) => dted.posts_of(chunk),
+            Reader::Rows(rows) => rows.posts_of(chunk),
+            Reader::Ascii(grid) => grid.posts_of(chunk),
+        }
+    }
+
+    /// Decodes one chunk with the decoder lent, which is made where the format needs one and there is none yet.
+    pub(crate) fn decode_one(&self, chunk: u32, lent: &mut Option<FileDecoder>) -> Result<Chunk, SourceError> {
+        match &self.reader {
+            Reader::GeoTiff(tiff) => {
+                let mut decoder = lent.take().map_or_else(|| tiff.decoder(), Ok)?;
+                let decoded = tiff.decode_with(&mut decoder, chunk);
+                *lent = Some(decoder);
+                decoded
+            }
+            Reader::Dted(dted) => dted.decode(chunk),
+            Reader::Rows(rows) => rows.decode(chunk),
+            Reader::Ascii(grid) => grid.decode_rows(chunk),
+        }
+    }
+
+    pub(crate) fn header(&self) -> &Header {
+        &self.header
     }
 
     /// Decodes some chunks. May be called from several threads at once.
@@ -140,7 +172,8 @@ impl DemFile {
             Reader::GeoTiff(tiff) => tiff.decode(chunks),
             Reader::Dted(dted) => chunks.iter().map(|&chunk| dted.decode(chunk)).collect(),
             Reader::Rows(rows) => chunks.iter().map(|&chunk| rows.decode(chunk)).collect(),
-            Reader::Ascii(grid) => chunks.iter().map(|_| grid.decode()).collect(),
+            // Text is read from its beginning, so all of it at once unless a part is asked for.
+            Reader::Ascii(grid) => grid.decode(chunks),
         }
     }
 

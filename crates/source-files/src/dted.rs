@@ -106,15 +106,16 @@ impl Dted {
     }
 
     pub(crate) fn header(&self, frame: crate::RasterFrame) -> Header {
-        Header { frame, scale: SampleScale::METRES, kind: SampleKind::I16, nodata: Some(VOID.into()) }
+        Header { frame, scale: SampleScale::METRES, kind: SampleKind::I16, nodata: Some(VOID.into()), shift: None }
     }
 
     pub(crate) fn size(&self) -> (u32, u32) {
         (self.cols, self.rows)
     }
 
-    pub(crate) fn chunk_count(&self) -> u32 {
-        self.cols.div_ceil(COLUMNS_PER_CHUNK)
+    /// The chunks that hold some columns.
+    pub(crate) fn chunks_of(&self, west: i32, east: i32) -> std::ops::RangeInclusive<u32> {
+        west as u32 / COLUMNS_PER_CHUNK..=east as u32 / COLUMNS_PER_CHUNK
     }
 
     pub(crate) fn posts_of(&self, chunk: u32) -> PostRect {

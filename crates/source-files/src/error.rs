@@ -154,7 +154,7 @@ pub enum SourceError {
 
     // Polygons.
     /// The file is not GeoJSON.
-    #[error("{path}: neither a Shapefile nor GeoJSON: {reason}")]
+    #[error("{path}: neither a Shapefile, a GeoPackage nor GeoJSON: {reason}")]
     NotGeoJson { path: PathBuf, reason: String },
     /// A geometry is no polygon.
     #[error("{path}: a {found}, expected Polygon or MultiPolygon")]
@@ -221,9 +221,7 @@ impl SourceError {
                 "mark such posts as void: gdal_translate -a_nodata … ; if heights are not metres set dem.height_unit_m"
             }
             NotClasses { .. } => "rewrite it: gdal_translate -ot Byte classes.tif out.tif",
-            NotGeoJson { .. } => {
-                "give GeoJSON or a Shapefile; from a GeoPackage: ogr2ogr -f GeoJSON out.geojson in.gpkg"
-            }
+            NotGeoJson { .. } => "give GeoJSON, a Shapefile or a GeoPackage; from others: ogr2ogr out.geojson in.…",
             NotPolygons { .. } | NoPolygons { .. } => "give polygons: ogr2ogr -where \"OGR_GEOMETRY='POLYGON'\" …",
             Ring { .. } => "repair it: ogr2ogr -makevalid out.geojson in.geojson",
             PolygonCrs { .. } => {

@@ -88,7 +88,13 @@ impl GeoTiff {
 
     /// The strips or tiles that hold posts of `window`, in file order.
     pub fn chunks_of(&self, window: PostRect) -> Vec<u32> {
-        (0..self.layout.chunk_count()).filter(|&chunk| self.posts_of(chunk).intersection(&window).is_some()).collect()
+        let Some(cut) = self.rect().intersection(&window) else { return Vec::new() };
+        let layout = &self.layout;
+        let stored = |row: i32| if self.south_first { row as u32 } else { layout.rows - 1 - row as u32 };
+        let (first, last) = (stored(cut.south).min(stored(cut.north)), stored(cut.south).max(stored(cut.north)));
+        let (west, east) = (cut.west as u32 / layout.chunk_cols, cut.east as u32 / layout.chunk_cols);
+        let down = first / layout.chunk_rows..=last / layout.chunk_rows;
+        down.flat_map(|down| (west..=east).map(move |across| down * layout.chunks_across() + across)).collect()
     }
 
     /// Posts of a strip or tile, padding left out.
@@ -105,7 +111,7 @@ impl GeoTiff {
 
     pub(crate) fn header(&self) -> Header {
         let kind = self.layout.sample;
-        Header { frame: self.frame.clone(), scale: self.scale, kind, nodata: self.nodata }
+        Header { frame: self.frame.clone(), scale: self.scale, kind, nodata: self.nodata, shift: None }
     }
 
     pub(crate) fn vertical_datum(&self) -> Option<String> {
@@ -117,20 +123,25 @@ impl GeoTiff {
     /// # Errors
     /// When the file is gone, or a chunk cannot be decoded.
     pub fn decode(&self, chunks: &[u32]) -> Result<Vec<Chunk>, SourceError> {
-        let mut decoder = decoder(&self.frame.path, self.store.handle()?)?;
+        let mut decoder = self.decoder()?;
+        chunks.iter().map(|&index| self.decode_with(&mut decoder, index)).collect()
+    }
+
+    /// A decoder of its own: it reads the directory once, for any number of chunks.
+    pub(crate) fn decoder(&self) -> Result<FileDecoder, SourceError> {
+        decoder(&self.frame.path, self.store.handle()?)
+    }
+
+    pub(crate) fn decode_with(&self, decoder: &mut FileDecoder, index: u32) -> Result<Chunk, SourceError> {
         let (stride, south_first) = (self.layout.chunk_cols as usize, self.south_first);
-        let chunk =
-            |index, samples| Chunk { posts: self.posts_of(index), stride, south_first, samples, notes: Vec::new() };
-        let decoded = chunks.iter().map(|&index| {
-            if self.chunk_sizes[index as usize] == 0 {
-                return Ok(chunk(index, None));
-            }
-            let samples = self.decode_one(&mut decoder, index).map_err(|error| error.to_string());
-            let samples = samples.and_then(|samples| self.as_promised(index, samples));
-            let samples = samples.map_err(|reason| self.chunk_error(index, reason))?;
-            Ok(chunk(index, Some(samples)))
-        });
-        decoded.collect()
+        let chunk = |samples| Chunk { posts: self.posts_of(index), stride, south_first, samples, notes: Vec::new() };
+        if self.chunk_sizes[index as usize] == 0 {
+            return Ok(chunk(None));
+        }
+        let samples = self.decode_one(decoder, index).map_err(|error| error.to_string());
+        let samples = samples.and_then(|samples| self.as_promised(index, samples));
+        let samples = samples.map_err(|reason| self.chunk_error(index, reason))?;
+        Ok(chunk(Some(samples)))
     }
 
     /// Decodes whole rows, padding included. Asked to leave the padding out, the decoder reads row by row, which is
@@ -203,7 +214,8 @@ fn samples_in(decoded: DecodingResult) -> Option<Samples> {
     }
 }
 
-type FileDecoder = Decoder<BufReader<Handle>>;
+/// The library's decoder on one open source.
+pub(crate) type FileDecoder = Decoder<BufReader<Handle>>;
 
 fn decoder(path: &Path, file: Handle) -> Result<FileDecoder, SourceError> {
     let mut limits = Limits::default();

@@ -3,14 +3,17 @@
 use terrain::{Post, PostRect};
 
 use crate::chunk::Header;
+use crate::directory::SampleKind;
 use crate::samples::Samples;
-use crate::{Raster, RasterFrame, SourceError, Standing};
+use crate::{DatumShift, Raster, RasterFrame, SampleScale, SourceError, Standing};
+
+/// Where the posts of a raster lie, what its samples are, and how they come to the datum that is wanted.
+pub(crate) type Meaning<'a> = (&'a RasterFrame, (SampleScale, &'a Option<DatumShift>));
 
 /// Whether a raster continues another's grid: same system, spacing and meaning of samples, whole posts apart.
-pub(crate) fn fits(first: &Raster, other: &Raster) -> bool {
+pub(crate) fn fits((a, first): Meaning, (b, other): Meaning) -> bool {
     const PHASE_MAX: f64 = 1.0e-3;
-    let (a, b) = (&first.frame, &other.frame);
-    let same = a.crs == b.crs && first.scale == other.scale;
+    let same = a.crs == b.crs && first == other;
     let near = |axis: usize| {
         let posts = (b.south_west[axis] - a.south_west[axis]) / a.spacing[axis];
         // Off by less than a hundredth of a post after all of either raster.
@@ -31,8 +34,7 @@ pub(crate) fn join(mut rasters: Vec<Raster>) -> Result<(Raster, Vec<Standing>), 
     }
     let offsets: Vec<[i64; 2]> = rasters.iter().map(|raster| offset(&rasters[0].frame, &raster.frame)).collect();
     let whole = Whole::of(&rasters, &offsets)?;
-    let same_kind = rasters.iter().all(|raster| raster.samples.kind() == rasters[0].samples.kind());
-    let kind = if same_kind { rasters[0].samples.kind() } else { crate::directory::SampleKind::F64 };
+    let kind = common_kind(rasters.iter().map(|raster| raster.samples.kind()));
     let mut samples = Samples::zeroed(kind, whole.window.post_count());
     let mut standings = vec![Standing::Gap; whole.window.post_count()];
     for (raster, offset) in rasters.iter().zip(&offsets) {
@@ -42,7 +44,7 @@ pub(crate) fn join(mut rasters: Vec<Raster>) -> Result<(Raster, Vec<Standing>), 
             .enumerate()
         {
             let standing = if raster.voids.contains(index) { Standing::Void } else { Standing::Height };
-            let at = whole.index(post, *offset);
+            let at = whole.index(post, whole.extent.shift(*offset));
             if standing < standings[at] {
                 standings[at] = standing;
                 samples.set(at, raster.samples.get(index));
@@ -50,8 +52,8 @@ pub(crate) fn join(mut rasters: Vec<Raster>) -> Result<(Raster, Vec<Standing>), 
         }
     }
     let first = rasters.remove(0);
-    let frame = whole.frame(&first.frame);
-    let header = Header { frame, scale: first.scale, kind, nodata: None };
+    let frame = whole.extent.frame(&first.frame);
+    let header = Header { frame, scale: first.scale, kind, nodata: None, shift: first.shift.clone() };
     let mut raster = Raster::of_samples(&header, whole.window, samples, Vec::new())?;
     let missing = standings.iter().enumerate().filter(|&(_, &standing)| Standing::Void <= standing);
     raster.mark_voids(missing.map(|(index, _)| index));
@@ -61,62 +63,85 @@ pub(crate) fn join(mut rasters: Vec<Raster>) -> Result<(Raster, Vec<Standing>), 
     Ok((raster, standings))
 }
 
+/// The type that holds samples of several.
+pub(crate) fn common_kind(mut kinds: impl Iterator<Item = SampleKind>) -> SampleKind {
+    let first = kinds.next().expect("a group holds rasters");
+    if kinds.all(|kind| kind == first) { first } else { SampleKind::F64 }
+}
+
 /// Whole posts from one raster's south-west post to another's.
-fn offset(from: &RasterFrame, to: &RasterFrame) -> [i64; 2] {
+pub(crate) fn offset(from: &RasterFrame, to: &RasterFrame) -> [i64; 2] {
     [0, 1].map(|axis| ((to.south_west[axis] - from.south_west[axis]) / from.spacing[axis]).round() as i64)
 }
 
 /// The extent of several rasters, in posts of the first.
-struct Whole {
+pub(crate) struct Extent {
     /// Its south-west post.
     low: [i64; 2],
     size: [u32; 2],
+}
+
+impl Extent {
+    pub(crate) fn of(frames: &[&RasterFrame], offsets: &[[i64; 2]]) -> Result<Self, SourceError> {
+        let all = || frames.iter().zip(offsets);
+        let low = [0, 1].map(|axis| offsets.iter().map(|offset| offset[axis]).min().unwrap_or(0));
+        let size = |axis: usize, count: fn(&RasterFrame) -> u32| {
+            all().map(|(frame, offset)| offset[axis] + i64::from(count(frame))).max().unwrap_or(0) - low[axis]
+        };
+        let size = [size(0, |frame| frame.cols), size(1, |frame| frame.rows)];
+        let limit = crate::limits::POSTS_A_SIDE_MAX;
+        if let Some(&found) = size.iter().find(|&&size| limit as i64 <= size) {
+            let (path, what) = (frames[0].path.clone(), "posts a side of joined files");
+            return Err(SourceError::TooLarge { path, what, found: found as u64, limit });
+        }
+        Ok(Self { low, size: size.map(|size| size as u32) })
+    }
+
+    /// Columns and rows from the extent's south-west post to that of a raster.
+    pub(crate) fn shift(&self, offset: [i64; 2]) -> [i32; 2] {
+        [0, 1].map(|axis| (offset[axis] - self.low[axis]) as i32)
+    }
+
+    pub(crate) fn frame(&self, first: &RasterFrame) -> RasterFrame {
+        let south_west = [0, 1].map(|axis| first.south_west[axis] + self.low[axis] as f64 * first.spacing[axis]);
+        RasterFrame { south_west, cols: self.size[0], rows: self.size[1], ..first.clone() }
+    }
+}
+
+/// Posts of a raster, counted from elsewhere: `east` columns and `north` rows on.
+pub(crate) fn shifted(rect: PostRect, [east, north]: [i32; 2]) -> PostRect {
+    PostRect { south: rect.south + north, west: rect.west + east, north: rect.north + north, east: rect.east + east }
+}
+
+/// The extent of several rasters, and the posts of it that they were read for.
+struct Whole {
+    extent: Extent,
     window: PostRect,
 }
 
 impl Whole {
     fn of(rasters: &[Raster], offsets: &[[i64; 2]]) -> Result<Self, SourceError> {
-        let frames = || rasters.iter().map(|raster| &raster.frame).zip(offsets);
-        let low = [0, 1].map(|axis| offsets.iter().map(|offset| offset[axis]).min().unwrap_or(0));
-        let size = |axis: usize, count: fn(&RasterFrame) -> u32| {
-            frames().map(|(frame, offset)| offset[axis] + i64::from(count(frame))).max().unwrap_or(0) - low[axis]
-        };
-        let size = [size(0, |frame| frame.cols), size(1, |frame| frame.rows)];
-        let limit = crate::limits::POSTS_A_SIDE_MAX;
-        if let Some(&found) = size.iter().find(|&&size| limit as i64 <= size) {
-            let path = rasters[0].frame.path.clone();
-            return Err(SourceError::TooLarge {
-                path,
-                what: "posts a side of joined files",
-                found: found as u64,
-                limit,
-            });
-        }
-        let windows = rasters.iter().zip(offsets).map(|(raster, offset)| {
-            let (east, north) = ((offset[0] - low[0]) as i32, (offset[1] - low[1]) as i32);
-            let window = raster.window;
-            [window.south + north, window.west + east, window.north + north, window.east + east]
+        let frames: Vec<&RasterFrame> = rasters.iter().map(|raster| &raster.frame).collect();
+        let extent = Extent::of(&frames, offsets)?;
+        let windows = rasters.iter().zip(offsets).map(|(raster, offset)| shifted(raster.window, extent.shift(*offset)));
+        let union = windows.reduce(|a, b| PostRect {
+            south: a.south.min(b.south),
+            west: a.west.min(b.west),
+            north: a.north.max(b.north),
+            east: a.east.max(b.east),
         });
-        let union = windows.reduce(|a, b| [a[0].min(b[0]), a[1].min(b[1]), a[2].max(b[2]), a[3].max(b[3])]);
-        let [south, west, north, east] = union.expect("a group holds rasters");
-        let window = PostRect { south, west, north, east };
+        let window = union.expect("a group holds rasters");
         let (found, limit) = (window.post_count() as u64, crate::limits::POSTS_MAX);
         if limit < found {
             let path = rasters[0].frame.path.clone();
             return Err(SourceError::TooLarge { path, what: "posts of joined files", found, limit });
         }
-        Ok(Self { low, size: size.map(|size| size as u32), window })
+        Ok(Self { extent, window })
     }
 
     /// Index in the window of a post of one of the rasters.
-    fn index(&self, post: Post, offset: [i64; 2]) -> usize {
-        let row = i64::from(post.row) + offset[1] - self.low[1] - i64::from(self.window.south);
-        let col = i64::from(post.col) + offset[0] - self.low[0] - i64::from(self.window.west);
+    fn index(&self, post: Post, [east, north]: [i32; 2]) -> usize {
+        let (row, col) = (post.row + north - self.window.south, post.col + east - self.window.west);
         row as usize * self.window.posts_wide() + col as usize
-    }
-
-    fn frame(&self, first: &RasterFrame) -> RasterFrame {
-        let south_west = [0, 1].map(|axis| first.south_west[axis] + self.low[axis] as f64 * first.spacing[axis]);
-        RasterFrame { south_west, cols: self.size[0], rows: self.size[1], ..first.clone() }
     }
 }

@@ -15,10 +15,14 @@ pub const TAGS_MAX: u64 = 4096;
 pub const DIRECTORIES_MAX: usize = 64;
 /// Bytes that a gzip or zip file may unpack to: it is unpacked in memory, and the largest tiles that come so (DTED 2,
 /// HGT of one second) have 26 MB.
-pub const UNPACKED_BYTES_MAX: u64 = 1 << 29;
+pub const UNPACKED_BYTES_MAX: u64 = 1 << 28;
 /// Files in an archive: one is the raster, the others describe it.
 pub const ARCHIVE_ENTRIES_MAX: usize = 1000;
 /// Bytes of a GeoJSON file: it is parsed whole, into about ten times as much memory.
 pub const GEOJSON_BYTES_MAX: u64 = 256 << 20;
 /// Heights in metres to either side of 0: 24 bits of quanta, and no ground on any planet is higher.
 pub const HEIGHT_M_MAX: f64 = 131_071.0;
+/// Layers of a GeoPackage: each is a query of its own.
+pub const LAYERS_MAX: usize = 1000;
+/// Features of a layer of a GeoPackage: its polygons are held in memory.
+pub const ROWS_MAX: u64 = 1 << 22;

@@ -8,6 +8,7 @@ use geometry::resample::{TAP_UNITS, rounded};
 use terrain::{Dem, GridFrame, Post, PostRect, QUANTA_PER_METRE};
 
 use crate::crs::Crs;
+use crate::geoid::Shifts;
 use crate::join::{fits, join};
 use crate::samples::{Sample, each};
 use crate::warp::{Place, Warp};
@@ -57,19 +58,23 @@ pub enum Standing {
 
 /// Files of one grid, as one raster.
 #[derive(Debug)]
-struct Layer {
-    raster: Raster,
+pub(crate) struct Layer {
+    pub raster: Raster,
     /// One for each post of the raster's window; empty when all are heights.
-    standings: Vec<Standing>,
-    warp: Warp,
-    posts_per_metre: [f64; 2],
+    pub standings: Vec<Standing>,
+    pub warp: Warp,
+    pub posts_per_metre: [f64; 2],
 }
 
 /// Rasters in order of priority.
 #[derive(Debug)]
 pub struct Mosaic {
-    layers: Vec<Layer>,
-    rules: MosaicRules,
+    pub(crate) layers: Vec<Layer>,
+    pub(crate) rules: MosaicRules,
+    /// System and grid of the area.
+    pub(crate) place: (Crs, GridFrame),
+    /// Height in quanta where no source reaches, when it cannot be that of the nearest edge of one.
+    pub(crate) beyond: Option<i32>,
 }
 
 /// Heights of a window and how each stands.
@@ -84,7 +89,7 @@ pub struct Patch {
 }
 
 /// Posts of a raster that are read around those under the area: cubic resampling reaches two beyond.
-const MARGIN: i64 = 4;
+pub(crate) const MARGIN: i64 = 4;
 
 /// The posts of a file that lie under `rect`; `None` when there are none.
 pub fn window_reaching(frame: &RasterFrame, area: &Crs, grid: &GridFrame, rect: PostRect) -> Option<PostRect> {
@@ -106,7 +111,7 @@ impl Mosaic {
         let mut groups: Vec<Vec<Raster>> = Vec::new();
         for raster in rasters {
             match groups.last_mut() {
-                Some(group) if fits(&group[0], &raster) => group.push(raster),
+                Some(group) if fits(group[0].meaning(), raster.meaning()) => group.push(raster),
                 _ => groups.push(vec![raster]),
             }
         }
@@ -123,7 +128,8 @@ impl Mosaic {
             let posts_per_metre = warp.posts_per_metre(rect);
             Ok(Layer { raster, standings, warp, posts_per_metre })
         });
-        Ok(Self { layers: layers.collect::<Result<_, SourceError>>()?, rules })
+        let place = (area.clone(), *grid);
+        Ok(Self { layers: layers.collect::<Result<_, SourceError>>()?, rules, place, beyond: None })
     }
 
     /// How many rasters are left once neighbours of one grid are joined.
@@ -143,15 +149,24 @@ impl Mosaic {
         let mut patch = Patch { rect, heights, standings };
         let wide = rect.posts_wide();
         let places: Vec<_> = self.layers.iter().map(|layer| layer.warp.over(rect)).collect();
+        let (area, grid) = &self.place;
+        let shifts: Vec<Option<Shifts>> = self
+            .layers
+            .iter()
+            .map(|layer| layer.raster.shift.as_ref().map(|shift| shift.over(area, grid, rect)))
+            .collect();
         let mut line = vec![(0.0, Standing::Gap); wide];
         let mut best = vec![Best::default(); wide];
         for (index, row) in (rect.south..=rect.north).enumerate() {
             best.fill(Best::default());
-            for (layer, places) in self.layers.iter().zip(&places) {
+            for ((layer, places), shifts) in self.layers.iter().zip(&places).zip(&shifts) {
                 if best.iter().all(|best| best.is_settled(self.rules.voids.next_source)) {
                     break;
                 }
                 layer.sample_line(|col| places.at(row, rect.west + col as i32), self.rules.resampling, &mut line);
+                if let Some(shifts) = shifts {
+                    line.iter_mut().zip(rect.west..).for_each(|(at, col)| at.0 += shifts.quanta_at(row, col));
+                }
                 for (col, (best, &(quanta, standing))) in best.iter_mut().zip(&line).enumerate() {
                     if standing == Standing::Gap || best.is_settled(self.rules.voids.next_source) {
                         continue;
@@ -175,6 +190,9 @@ impl Mosaic {
 
     /// A height where no source reaches: that of the nearest edge of one, so that the mesh is defined.
     fn beyond(&self, row: i32, col: i32) -> i32 {
+        if let Some(quanta) = self.beyond {
+            return quanta;
+        }
         let rect = PostRect { south: row, west: col, north: row, east: col };
         let clamped = self.layers.iter().filter_map(|layer| {
             let place = layer.warp.over(rect).at(row, col)?;

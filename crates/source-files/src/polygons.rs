@@ -1,4 +1,4 @@
-//! Polygons from GeoJSON and Shapefiles, brought to the area's coordinate system.
+//! Polygons from GeoJSON, Shapefiles and GeoPackages, brought to the area's coordinate system.
 //!
 //! GeoJSON's own standard wants longitude and latitude; files in projected metres are common all the same, with a `crs`
 //! member or without. Numbers that can only be degrees are taken for longitude and latitude on WGS 84, others that
@@ -12,19 +12,22 @@ use mask::Polygon;
 use crate::crs::Crs;
 use crate::limits::GEOJSON_BYTES_MAX;
 use crate::store::Store;
-use crate::{SourceError, shapefile};
+use crate::{SourceError, geopackage, shapefile};
 
-/// Reads every Polygon and MultiPolygon of the GeoJSON file or Shapefile at `path`, in metres of the coordinate system
-/// EPSG:`epsg`.
+/// Reads every Polygon and MultiPolygon of the GeoJSON file, Shapefile or GeoPackage at `path`, in metres of the
+/// coordinate system EPSG:`epsg`.
 ///
 /// # Errors
-/// When the file is neither, holds other geometries or none, a ring is not closed, or its coordinates are in a system
-/// that cannot be brought to the area's.
+/// When the file is none of them, holds other geometries or none, a ring is not closed, or its coordinates are in a
+/// system that cannot be brought to the area's.
 pub fn read_polygons(path: &Path, epsg: u32) -> Result<Vec<Polygon>, SourceError> {
     let store = Store::plain(path)?;
     if GEOJSON_BYTES_MAX < store.len() {
         let (found, limit) = (store.len(), GEOJSON_BYTES_MAX);
         return Err(SourceError::TooLarge { path: path.into(), what: "bytes", found, limit });
+    }
+    if store.start(geopackage::MARK.len() as u64)? == geopackage::MARK {
+        return of_geopackage(path, epsg);
     }
     let bytes = store.start(GEOJSON_BYTES_MAX)?;
     let mut collected = Collected { path, polygons: Vec::new(), rings: 0 };
@@ -41,10 +44,29 @@ pub fn read_polygons(path: &Path, epsg: u32) -> Result<Vec<Polygon>, SourceError
     if collected.polygons.is_empty() {
         return Err(SourceError::NoPolygons { path: path.into() });
     }
-    let said = said.or_else(|| look_like_degrees(&collected.polygons).then(Crs::wgs84));
+    placed(path, collected.polygons, said, epsg)
+}
+
+/// The polygons of all layers.
+fn of_geopackage(path: &Path, epsg: u32) -> Result<Vec<Polygon>, SourceError> {
+    let mut collected = Collected { path, polygons: Vec::new(), rings: 0 };
+    let mut all = Vec::new();
+    for layer in geopackage::layers(path)? {
+        for rings in layer.polygons {
+            let rings = rings.into_iter().map(|ring| collected.closed(Some(ring))).collect::<Result<_, _>>()?;
+            collected.polygons.push(Polygon { rings });
+        }
+        all.append(&mut placed(path, std::mem::take(&mut collected.polygons), layer.crs, epsg)?);
+    }
+    if all.is_empty() { Err(SourceError::NoPolygons { path: path.into() }) } else { Ok(all) }
+}
+
+/// Polygons in the area's system; `said` is their own, where it is known.
+fn placed(path: &Path, polygons: Vec<Polygon>, said: Option<Crs>, epsg: u32) -> Result<Vec<Polygon>, SourceError> {
+    let said = said.or_else(|| look_like_degrees(&polygons).then(Crs::wgs84));
     match said {
-        Some(crs) if crs.epsg() != Some(epsg) => projected(path, collected.polygons, &crs, epsg),
-        _ => Ok(collected.polygons),
+        Some(crs) if crs.epsg() != Some(epsg) => projected(path, polygons, &crs, epsg),
+        _ => Ok(polygons),
     }
 }
 

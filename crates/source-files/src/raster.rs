@@ -1,12 +1,15 @@
 //! A window of a raster in memory: samples as stored, southern row first, and which of them are void.
 
+use std::sync::Arc;
+
 use terrain::{Post, PostRect};
 
-use crate::SourceError;
 use crate::chunk::{Chunk, Header};
 use crate::frame::{RasterFrame, SampleScale};
+use crate::join::Meaning;
 use crate::limits::HEIGHT_M_MAX;
 use crate::samples::Samples;
+use crate::{DatumShift, SourceError};
 
 /// The posts of a window of a raster. Posts are counted from the south-west post of the whole raster.
 #[derive(Clone, Debug)]
@@ -16,6 +19,8 @@ pub struct Raster {
     pub(crate) window: PostRect,
     pub(crate) samples: Samples,
     pub(crate) voids: Voids,
+    /// How its heights become those above the datum that is wanted.
+    pub(crate) shift: Option<DatumShift>,
     range_m: Option<(f64, f64)>,
     notes: Vec<String>,
 }
@@ -64,6 +69,18 @@ impl Raster {
         Self::of_samples(header, window, samples, notes)
     }
 
+    /// Puts a window together from chunks that others may need too; what there is to know of them is told elsewhere.
+    pub(crate) fn assemble_shared(
+        header: &Header,
+        window: PostRect,
+        chunks: &[Arc<Chunk>],
+    ) -> Result<Self, SourceError> {
+        let mut samples = Samples::zeroed(header.kind, window.post_count());
+        let placed: usize = chunks.iter().map(|chunk| place(header, window, chunk, &mut samples)).sum();
+        assert_eq!(placed, window.post_count(), "the chunks of a window hold each of its posts once");
+        Self::of_samples(header, window, samples, Vec::new())
+    }
+
     /// A window whose samples are in place.
     pub(crate) fn of_samples(
         header: &Header,
@@ -79,7 +96,8 @@ impl Raster {
         }
         let scale = header.scale;
         let range_m = survey.range.map(|(lowest, highest)| (scale.height_m(lowest), scale.height_m(highest)));
-        let raster = Self { frame: header.frame.clone(), scale, window, samples, voids, range_m, notes };
+        let shift = header.shift.clone();
+        let raster = Self { frame: header.frame.clone(), scale, window, samples, voids, shift, range_m, notes };
         raster.check_range(survey.range)?;
         Ok(raster)
     }
@@ -133,6 +151,15 @@ impl Raster {
     /// Lowest and highest height in metres, voids left out; `None` when all are void.
     pub fn range_m(&self) -> Option<(f64, f64)> {
         self.range_m
+    }
+
+    /// Has a mosaic bring its heights to another datum.
+    pub fn set_shift(&mut self, shift: Option<DatumShift>) {
+        self.shift = shift;
+    }
+
+    pub(crate) fn meaning(&self) -> Meaning<'_> {
+        (&self.frame, (self.scale, &self.shift))
     }
 
     /// The sample at `post` as stored; `None` where it is void.

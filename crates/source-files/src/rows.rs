@@ -36,15 +36,11 @@ impl Rows {
 
     pub(crate) fn header(&self, frame: crate::RasterFrame, unit_m: f64) -> Header {
         let scale = SampleScale { unit_m, ..SampleScale::METRES };
-        Header { frame, scale, kind: self.kind, nodata: self.nodata }
+        Header { frame, scale, kind: self.kind, nodata: self.nodata, shift: None }
     }
 
     fn rows_per_chunk(&self) -> u32 {
         (CHUNK_BYTES / self.row_bytes.max(1)).clamp(1, u64::from(self.rows)) as u32
-    }
-
-    pub(crate) fn chunk_count(&self) -> u32 {
-        self.rows.div_ceil(self.rows_per_chunk())
     }
 
     pub(crate) fn posts_of(&self, chunk: u32) -> PostRect {
@@ -52,6 +48,12 @@ impl Rows {
         let last = (first + self.rows_per_chunk()).min(self.rows) - 1;
         let row = |stored: u32| (self.rows - 1 - stored) as i32;
         PostRect { south: row(last), west: 0, north: row(first), east: self.cols as i32 - 1 }
+    }
+
+    /// The chunks that hold some rows, counted from the south.
+    pub(crate) fn chunks_of(&self, south: i32, north: i32) -> std::ops::RangeInclusive<u32> {
+        let chunk = |row: i32| (self.rows - 1 - row as u32) / self.rows_per_chunk();
+        chunk(north)..=chunk(south)
     }
 
     pub(crate) fn decode(&self, chunk: u32) -> Result<Chunk, SourceError> {

@@ -185,15 +185,6 @@ impl Samples {
             number.is_nan() || number.fract() == 0.0
         }))
     }
-
-    /// The type's name, for types that are no whole numbers.
-    pub(crate) fn fractional(&self) -> Option<&'static str> {
-        match self {
-            Samples::F32(_) => Some("32-bit floating point"),
-            Samples::F64(_) => Some("64-bit floating point"),
-            _ => None,
-        }
-    }
 }
 
 fn number<T: Sample>(sample: T) -> f64 {

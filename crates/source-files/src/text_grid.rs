@@ -1,6 +1,8 @@
 //! Esri's ASCII grid, and the header beside a raw grid, which is written in the same way.
 
 use std::io::{BufRead, BufReader, Read};
+use std::ops::RangeInclusive;
+use std::sync::{Arc, OnceLock};
 
 use terrain::PostRect;
 
@@ -11,7 +13,7 @@ use crate::frame::{Axes, SampleScale};
 use crate::limits::POSTS_A_SIDE_MAX;
 use crate::rows::Rows;
 use crate::samples::Samples;
-use crate::store::Store;
+use crate::store::{Handle, Store};
 
 /// Keys and values of a header, keys in lower case, in the order of the file.
 pub(crate) struct Keys<'a> {
@@ -196,7 +198,12 @@ pub(crate) struct AsciiGrid {
     rows: u32,
     nodata: f64,
     header_bytes: u64,
+    /// Byte at which each chunk of rows begins, once somebody has counted the numbers before it.
+    starts: Arc<OnceLock<Vec<u64>>>,
 }
+
+/// Posts decoded at once, about.
+const CHUNK_POSTS: u32 = 1 << 18;
 
 impl AsciiGrid {
     pub(crate) fn open(store: &Store) -> Result<(Self, Axes), SourceError> {
@@ -205,7 +212,8 @@ impl AsciiGrid {
         let nodata = keys.nodata()?.unwrap_or(VOID);
         // Two bytes a post is the least that text can take, so a small file cannot ask for a large raster.
         store.holds("the last number", header_bytes.saturating_add(2 * u64::from(cols) * u64::from(rows) - 1))?;
-        Ok((Self { store: store.clone(), cols, rows, nodata, header_bytes }, keys.axes()?))
+        let starts = Arc::default();
+        Ok((Self { store: store.clone(), cols, rows, nodata, header_bytes, starts }, keys.axes()?))
     }
 
     pub(crate) fn size(&self) -> (u32, u32) {
@@ -214,47 +222,89 @@ impl AsciiGrid {
 
     pub(crate) fn header(&self, frame: crate::RasterFrame, unit_m: f64) -> Header {
         let scale = SampleScale { unit_m, ..SampleScale::METRES };
-        Header { frame, scale, kind: SampleKind::F32, nodata: Some(self.nodata) }
+        Header { frame, scale, kind: SampleKind::F32, nodata: Some(self.nodata), shift: None }
     }
 
-    pub(crate) fn posts(&self) -> PostRect {
-        PostRect::of_size(self.rows as usize, self.cols as usize)
+    fn rows_per_chunk(&self) -> u32 {
+        (CHUNK_POSTS / self.cols).clamp(1, self.rows)
     }
 
-    /// All numbers: text cannot be read from the middle.
-    pub(crate) fn decode(&self) -> Result<Chunk, SourceError> {
+    /// The chunks that hold some rows, counted from the south.
+    pub(crate) fn chunks_of(&self, south: i32, north: i32) -> RangeInclusive<u32> {
+        let chunk = |row: i32| (self.rows - 1 - row as u32) / self.rows_per_chunk();
+        chunk(north)..=chunk(south)
+    }
+
+    pub(crate) fn posts_of(&self, chunk: u32) -> PostRect {
+        let first = chunk * self.rows_per_chunk();
+        let last = (first + self.rows_per_chunk()).min(self.rows) - 1;
+        let row = |stored: u32| (self.rows - 1 - stored) as i32;
+        PostRect { south: row(last), west: 0, north: row(first), east: self.cols as i32 - 1 }
+    }
+
+    pub(crate) fn decode(&self, chunks: &[u32]) -> Result<Vec<Chunk>, SourceError> {
+        chunks.iter().map(|&chunk| self.decode_rows(chunk)).collect()
+    }
+
+    fn reader_at(&self, byte: u64) -> Result<BufReader<Handle>, SourceError> {
         let mut handle = self.store.handle()?;
-        let start = std::io::SeekFrom::Start(self.header_bytes);
-        std::io::Seek::seek(&mut handle, start).map_err(|source| self.store.stopped(source))?;
-        let mut reader = BufReader::with_capacity(1 << 18, handle);
-        let count = self.cols as usize * self.rows as usize;
-        let mut samples: Vec<f32> = Vec::with_capacity(count);
-        let mut word = Vec::new();
-        while let Some(text) = next_word(&mut reader, &mut word).map_err(|source| self.store.stopped(source))? {
-            let number = text.parse::<f64>().ok().filter(|_| samples.len() < count);
-            let number = number.ok_or_else(|| self.unexpected(samples.len(), count, text))?;
-            samples.push(number as f32);
+        std::io::Seek::seek(&mut handle, std::io::SeekFrom::Start(byte))
+            .map_err(|source| self.store.stopped(source))?;
+        Ok(BufReader::with_capacity(1 << 16, handle))
+    }
+
+    /// Where chunks begin: text cannot be read from the middle, so its numbers are counted once.
+    fn starts(&self) -> Result<&[u64], SourceError> {
+        if let Some(starts) = self.starts.get() {
+            return Ok(starts);
         }
-        if samples.len() != count {
-            return Err(self.store.malformed("the grid", format!("{} numbers", samples.len()), &count.to_string()));
+        let (count, per_chunk) =
+            (u64::from(self.cols) * u64::from(self.rows), u64::from(self.cols) * u64::from(self.rows_per_chunk()));
+        let mut reader = self.reader_at(self.header_bytes)?;
+        let (mut starts, mut found, mut byte, mut word) = (vec![self.header_bytes], 0, self.header_bytes, Vec::new());
+        while let Some(taken) = next_word(&mut reader, &mut word).map_err(|source| self.store.stopped(source))? {
+            (found, byte) = (found + 1, byte + taken);
+            if found % per_chunk == 0 && found < count {
+                starts.push(byte);
+            }
+            if count < found {
+                return Err(self.store.malformed("the grid", format!("more than {count} numbers"), &count.to_string()));
+            }
+        }
+        if found != count {
+            return Err(self.store.malformed("the grid", format!("{found} numbers"), &count.to_string()));
+        }
+        Ok(self.starts.get_or_init(|| starts))
+    }
+
+    pub(crate) fn decode_rows(&self, chunk: u32) -> Result<Chunk, SourceError> {
+        let posts = self.posts_of(chunk);
+        let mut reader = self.reader_at(self.starts()?[chunk as usize])?;
+        let before = chunk as usize * self.rows_per_chunk() as usize * self.cols as usize;
+        let mut samples: Vec<f32> = Vec::with_capacity(posts.post_count());
+        let mut word = Vec::new();
+        while samples.len() < posts.post_count() {
+            let found = next_word(&mut reader, &mut word).map_err(|source| self.store.stopped(source))?;
+            // What is not text is not a number either.
+            let text = std::str::from_utf8(&word).unwrap_or("bytes that are no text");
+            let number = text.parse::<f64>().ok().filter(|_| found.is_some());
+            samples.push(number.ok_or_else(|| self.unexpected(before + samples.len(), text))? as f32);
         }
         let (stride, samples) = (self.cols as usize, Some(Samples::F32(samples)));
-        Ok(Chunk { posts: self.posts(), stride, south_first: false, samples, notes: Vec::new() })
+        Ok(Chunk { posts, stride, south_first: false, samples, notes: Vec::new() })
     }
 
-    fn unexpected(&self, place: usize, count: usize, text: &str) -> SourceError {
-        if place == count {
-            return self.store.malformed("the grid", format!("more than {count} numbers"), &count.to_string());
-        }
+    fn unexpected(&self, place: usize, text: &str) -> SourceError {
         let (row, col) = (place / self.cols as usize, place % self.cols as usize);
         let shown: String = text.chars().take(20).collect();
         self.store.malformed(&format!("number {col} of line {row}"), format!("`{shown}`"), "a number")
     }
 }
 
-/// The next run of bytes that are not white space.
-fn next_word<'a>(reader: &mut impl BufRead, word: &'a mut Vec<u8>) -> std::io::Result<Option<&'a str>> {
+/// Reads the next run of bytes that are not white space into `word`; gives the bytes it took, white space and all.
+fn next_word(reader: &mut impl BufRead, word: &mut Vec<u8>) -> std::io::Result<Option<u64>> {
     word.clear();
+    let mut read = 0;
     loop {
         let buffer = reader.fill_buf()?;
         if buffer.is_empty() {
@@ -266,10 +316,10 @@ fn next_word<'a>(reader: &mut impl BufRead, word: &'a mut Vec<u8>) -> std::io::R
         word.extend_from_slice(&rest[..taken]);
         let ended = taken < rest.len() && !word.is_empty();
         reader.consume(skipped + taken);
+        read += (skipped + taken) as u64;
         if ended || NUMBER_BYTES_MAX < word.len() as u64 {
             break;
         }
     }
-    // What is not text is not a number either.
-    Ok((!word.is_empty()).then(|| std::str::from_utf8(word).unwrap_or("bytes that are no text")))
+    Ok((!word.is_empty()).then_some(read))
 }

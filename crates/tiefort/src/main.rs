@@ -21,6 +21,7 @@ mod engines;
 mod events;
 mod failure;
 mod files;
+mod fit;
 mod lines;
 mod measures;
 mod new_folder;

@@ -2,10 +2,12 @@
 
 use std::path::Path;
 
-use crate::bounds::{FEATHER_M_MAX, FILL_POSTS_MAX, SOURCES_MAX};
+use crate::bounds::{DATUM_CHARS_MAX, FEATHER_M_MAX, FILL_POSTS_MAX, GEOIDS_MAX, SOURCES_MAX};
 use crate::entry::{Entry, Section};
 use crate::files::{Mention, Place, has_wildcard, leaves_after_wildcard};
-use crate::{DemSource, DemSpec, JobError, NamedFile, Resampling, SourceEntry, SourceFile, SourceSaid, Voids};
+use crate::{
+    DemSource, DemSpec, GeoidSpec, JobError, NamedFile, Resampling, SourceEntry, SourceFile, SourceSaid, Voids,
+};
 
 pub(super) fn read(dem: &Section, job: &Path, mentions: &mut Vec<Mention>) -> Result<DemSpec, JobError> {
     let unit_m = unit(dem)?;
@@ -22,7 +24,36 @@ pub(super) fn read(dem: &Section, job: &Path, mentions: &mut Vec<Mention>) -> Re
     let feather_m = dem
         .optional("feather_m")
         .map_or(Ok(0.0), |entry| entry.number_in(0.0..=FEATHER_M_MAX, &format!("metres from 0 to {FEATHER_M_MAX}")))?;
-    Ok(DemSpec { source, vertical_datum, voids, next_source, resampling, feather_m })
+    let geoids = geoids(dem, job, mentions)?;
+    let (water, strict) = (None, false);
+    Ok(DemSpec { source, vertical_datum, voids, next_source, resampling, feather_m, geoids, water, strict })
+}
+
+/// Grids for converting between vertical datums.
+fn geoids(dem: &Section, job: &Path, mentions: &mut Vec<Mention>) -> Result<Vec<GeoidSpec>, JobError> {
+    let Some(entry) = dem.optional("geoids") else { return Ok(Vec::new()) };
+    let items = entry.list("a list of grids, each { datum = …, file = … }")?;
+    if GEOIDS_MAX < items.len() {
+        return Err(entry.out_of_range(format!("at most {GEOIDS_MAX} grids")));
+    }
+    let mut geoids = Vec::new();
+    for item in items {
+        let table = item.table()?;
+        let expected = "the name of a vertical datum, as sources have it";
+        let name = table.required("datum", expected)?;
+        let datum = name.text(expected)?.trim().to_owned();
+        if datum.is_empty() || DATUM_CHARS_MAX < datum.chars().count() || datum.chars().any(char::is_control) {
+            return Err(name.out_of_range(expected));
+        }
+        if datum.eq_ignore_ascii_case("ellipsoid") {
+            let hint = "heights above the ellipsoid need no grid; name the datum on the other side";
+            return Err(name.out_of_range_with("a datum other than the ellipsoid itself", hint));
+        }
+        let file = table.required("file", "the path of a geoid grid")?;
+        mentions.push(Mention { place: Place::Geoid(geoids.len()), fault: file.fault("a geoid grid") });
+        geoids.push(GeoidSpec { datum, file: super::named_file(&file, job)? });
+    }
+    Ok(geoids)
 }
 
 /// Metres in a unit of height.
@@ -110,11 +141,10 @@ fn source_entry(item: &Entry, job: &Path) -> Result<(NamedFile, SourceSaid), Job
 }
 
 fn vertical_datum(dem: &Section) -> Result<Option<String>, JobError> {
-    const CHARS_MAX: usize = 64;
     let Some(entry) = dem.optional("vertical_datum") else { return Ok(None) };
-    let expected = format!("a name such as \"EGM96\", at most {CHARS_MAX} characters");
+    let expected = format!("a name such as \"EGM96\", at most {DATUM_CHARS_MAX} characters");
     let name = entry.text(&expected)?;
-    if name.trim().is_empty() || CHARS_MAX < name.chars().count() || name.chars().any(char::is_control) {
+    if name.trim().is_empty() || DATUM_CHARS_MAX < name.chars().count() || name.chars().any(char::is_control) {
         return Err(entry.out_of_range(expected));
     }
     Ok(Some(name.to_owned()))

@@ -4,13 +4,17 @@ use std::path::Path;
 
 use terrain::THOUSANDTHS;
 
-use crate::bounds::{AREAS_MAX, CLASSES_MAX, NAME_CHARS_MAX, WEIGHT_MAX};
+use crate::bounds::{AREAS_MAX, CLASSES_MAX, NAME_CHARS_MAX, SLOPE_PERCENT_MAX, SMOOTH_M_MAX, WEIGHT_MAX};
 use crate::entry::{Entry, Section};
 use crate::files::{Mention, Place};
-use crate::{AreaShape, DemSource, ImportanceArea, ImportanceSpec, JobError, SampleClass, Smooth};
+use crate::{AreaShape, DemSource, ImportanceArea, ImportanceSpec, JobError, SampleClass, Smooth, WaterSpec};
 
 /// What class 0 is called.
 const DEFAULT_CLASS: &str = "default";
+/// What the class of water is called, unless the job says otherwise.
+const WATER_CLASS: &str = "water";
+/// No water on Earth lies farther from the level of the sea.
+const LEVEL_M_MAX: f64 = 10_000.0;
 
 pub(super) fn read(
     importance: &Section,
@@ -60,6 +64,16 @@ const VALUE: &str = "the value of the class in the raster";
 fn shape(item: &Entry, table: &Section, dem: &DemSource, job: &Path) -> Result<AreaShape, JobError> {
     let (file, raster) = (table.optional("file"), table.optional("raster"));
     let (value, sample) = (table.optional("value"), table.optional("sample"));
+    if let Some(above) = table.optional("slope_above_percent") {
+        return match file.or(raster).or(sample).or(value) {
+            None => slope(&above, table),
+            Some(other) => Err(other.conflict("slope_above_percent", "one of the two", "remove one of the two")),
+        };
+    }
+    if let Some(smooth) = table.optional("smooth_m") {
+        let hint = "smooth_m goes with slope_above_percent";
+        return Err(smooth.conflict("no slope", "no radius, since there are no slopes to average", hint));
+    }
     match (file, raster, sample) {
         (Some(file), None, None) => match value {
             Some(value) => Err(value.conflict("file", "no value, since polygons have none", "value goes with raster")),
@@ -70,10 +84,49 @@ fn shape(item: &Entry, table: &Section, dem: &DemSource, job: &Path) -> Result<A
             Ok(AreaShape::RasterValue { file: super::named_file(&raster, job)?, value })
         }
         (None, None, Some(sample)) => sample_class(&sample, dem),
-        _ => Err(JobError::Conflict(
-            item.fault("exactly one of file = \"x.geojson\", raster = \"x.tif\" with value, sample = \"mountains\""),
-        )),
+        _ => Err(JobError::Conflict(item.fault(
+            "exactly one of file = \"x.geojson\", raster = \"x.tif\" with value, sample = \"mountains\", \
+             slope_above_percent = 20",
+        ))),
     }
+}
+
+/// Ground steeper than so much, on the mean of what lies within a radius.
+fn slope(above: &Entry, table: &Section) -> Result<AreaShape, JobError> {
+    let percent = format!("a slope in percent, above 0 and at most {SLOPE_PERCENT_MAX}, in whole thousandths");
+    let thousandths = (above.number(&percent)? * 1000.0).round();
+    if !(1.0 <= thousandths && thousandths <= SLOPE_PERCENT_MAX * 1000.0) {
+        return Err(above.out_of_range(percent));
+    }
+    let expected = format!("metres from 0 to {SMOOTH_M_MAX}");
+    let smooth = table.required("smooth_m", &expected)?;
+    let millimetres = (smooth.number_in(0.0..=SMOOTH_M_MAX, &expected)? * 1000.0).round();
+    Ok(AreaShape::Slope { above: thousandths as u32, smooth_mm: millimetres as u32 })
+}
+
+/// `dem.water`: what it is to lie at belongs to the heights, its class to the mask.
+pub(super) fn water(
+    dem: &Section,
+    spec: &mut ImportanceSpec,
+    job: &Path,
+    mentions: &mut Vec<Mention>,
+) -> Result<Option<WaterSpec>, JobError> {
+    let Some(entry) = dem.optional("water") else { return Ok(None) };
+    mentions.push(Mention { place: Place::Water, fault: entry.fault("a file of polygons") });
+    if !entry.is_table() {
+        let (file, class) = (super::named_file(&entry, job)?, class_index(&entry, WATER_CLASS, &mut spec.classes)?);
+        return Ok(Some(WaterSpec { file, level_m: None, class, weight: None }));
+    }
+    let table = entry.table()?;
+    let file = super::named_file(&table.required("file", "the path of a file of polygons")?, job)?;
+    let expected = format!("a height in metres within {LEVEL_M_MAX} of 0");
+    let level = table.optional("level_m").map(|level| level.number_in(-LEVEL_M_MAX..=LEVEL_M_MAX, &expected));
+    let class = match table.optional("class") {
+        Some(_) => class(&table, &mut spec.classes)?,
+        None => class_index(&entry, WATER_CLASS, &mut spec.classes)?,
+    };
+    let weight = table.optional("weight").map(|entry| weight(&entry)).transpose()?;
+    Ok(Some(WaterSpec { file, level_m: level.transpose()?, class, weight }))
 }
 
 fn polygons(entry: &Entry, job: &Path) -> Result<AreaShape, JobError> {
@@ -100,6 +153,10 @@ fn class(table: &Section, classes: &mut Vec<String>) -> Result<u8, JobError> {
     if name.trim().is_empty() || NAME_CHARS_MAX < name.chars().count() || name.chars().any(char::is_control) {
         return Err(entry.out_of_range(expected));
     }
+    class_index(&entry, name, classes)
+}
+
+fn class_index(entry: &Entry, name: &str, classes: &mut Vec<String>) -> Result<u8, JobError> {
     let index = classes.iter().position(|class| class == name).unwrap_or_else(|| {
         classes.push(name.to_owned());
         classes.len() - 1

@@ -68,8 +68,9 @@ fn job_of(sections: &Sections, path: &Path, find: Option<&FindArea>) -> Result<(
         };
         find(request, &files).map_err(|none| none.at(entry))
     })?;
-    let dem = dem::read(&sections.dem, path, &mut mentions)?;
-    let importance = importance::read(&sections.importance, &dem.source, path, &mut mentions)?;
+    let mut dem = dem::read(&sections.dem, path, &mut mentions)?;
+    let mut importance = importance::read(&sections.importance, &dem.source, path, &mut mentions)?;
+    dem.water = importance::water(&sections.dem, &mut importance, path, &mut mentions)?;
     let tiles = tiles::read(&sections.tiles, &area.grid)?;
     let limits = limits::read(&sections.limits, &area.grid, modules.side_m)?;
     let tin = tin::read(&sections.tin, &sections.modules, modules.edges)?;

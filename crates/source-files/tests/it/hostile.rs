@@ -1,7 +1,11 @@
 //! Damaged files: every truncation is an error, and no byte whatever makes the reader panic.
 
+use std::io::Write;
+
+use flate2::Compression;
+use flate2::write::{GzEncoder, ZlibEncoder};
 use proptest::prelude::*;
-use source_files::{GeoTiff, VoidPolicy, read_polygons, write_heights};
+use source_files::{DemFile, GeoTiff, Geoid, Reading, SourceError, VoidPolicy, read_polygons, write_heights};
 use terrain::{Dem, PostRect};
 
 use crate::support::{Folder, Tiff, Values, grid};
@@ -55,6 +59,100 @@ fn no_single_byte_makes_the_reader_panic() {
             }
         }
     }
+}
+
+/// A file whose directory is followed by another one at `next`.
+fn with_next(tiff: &Tiff, next: impl Fn(u32) -> u32, more: &[u8]) -> Vec<u8> {
+    let (mut bytes, directory) = (tiff.bytes(), 8 + tiff.samples.len() as u32);
+    let at = directory as usize + 2 + 12 * tiff.tags.len();
+    let end = bytes.len() as u32;
+    bytes[at..at + 4].copy_from_slice(&next(end).to_le_bytes());
+    bytes.extend(more);
+    bytes
+}
+
+#[test]
+fn directories_that_go_in_a_circle_end() {
+    let (folder, tiff) = (Folder::new(), Tiff::of_heights(&[&[1, 2, 3], &[4, 5, 6]]));
+    let itself = 8 + tiff.samples.len() as u32;
+    let path = folder.write("circle.tif", &with_next(&tiff, |_| itself, &[]));
+    // Whether it is read or refused, it ends.
+    let _ = GeoTiff::open(&path, None).and_then(|file| file.read(file.rect()));
+}
+
+#[test]
+fn an_internal_mask_is_refused_by_name() {
+    let (folder, tiff) = (Folder::new(), Tiff::of_heights(&[&[1, 2, 3], &[4, 5, 6]]));
+    let mask = [1, 0, 254, 0, 4, 0, 1, 0, 0, 0, 4, 0, 0, 0, 0, 0, 0, 0];
+    let error = GeoTiff::open(&folder.write("mask.tif", &with_next(&tiff, |end| end, &mask)), None).unwrap_err();
+    assert!(error.to_string().contains("voids are given by an internal mask, expected a nodata tag"), "{error}");
+}
+
+#[test]
+fn a_strip_that_inflates_without_end_takes_no_more_than_it_promised() {
+    let folder = Folder::new();
+    let mut bomb = ZlibEncoder::new(Vec::new(), Compression::fast());
+    (0..64).for_each(|_| bomb.write_all(&[0; 1 << 20]).unwrap());
+    let mut tiff = Tiff::of_heights(&[&[1, 2, 3], &[4, 5, 6]]);
+    tiff.samples = bomb.finish().unwrap();
+    let size = tiff.samples.len() as u32;
+    let tiff = tiff.with(259, Values::Short(vec![8])).with(279, Values::Long(vec![size]));
+    let path = folder.write("bomb.tif", &tiff.bytes());
+    if let Ok(raster) = GeoTiff::open(&path, None).and_then(|file| file.read(file.rect())) {
+        assert_eq!(raster.window().post_count(), 6);
+    }
+}
+
+#[test]
+fn an_archive_that_unpacks_without_end_is_too_large() {
+    let folder = Folder::new();
+    let mut bomb = GzEncoder::new(Vec::new(), Compression::fast());
+    (0..260).for_each(|_| bomb.write_all(&[b' '; 1 << 20]).unwrap());
+    let path = folder.write("n00e000.hgt.gz", &bomb.finish().unwrap());
+    let error = DemFile::open(&path, &Reading::AS_IT_SAYS).unwrap_err();
+    assert!(matches!(error, SourceError::TooLarge { limit: 0x1000_0000, .. }), "{error}");
+}
+
+#[test]
+fn a_name_in_an_archive_leads_nowhere() {
+    let folder = Folder::new();
+    let path = folder.path("tile.zip");
+    let mut archive = zip::ZipWriter::new(std::fs::File::create(&path).unwrap());
+    archive.start_file("../../N35W117.hgt", zip::write::SimpleFileOptions::default()).unwrap();
+    archive.write_all(&vec![0; 1201 * 1201 * 2]).unwrap();
+    archive.finish().unwrap();
+    let file = DemFile::open(&path, &Reading::AS_IT_SAYS).unwrap();
+    assert_eq!(file.frame().south_west, [-117.0, 35.0]);
+    file.read(file.rect()).unwrap();
+    let names: Vec<_> =
+        std::fs::read_dir(path.parent().unwrap()).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+    assert_eq!(names, ["tile.zip"], "nothing is ever unpacked to the disk");
+}
+
+#[test]
+fn a_geoid_grid_of_sizes_that_overflow_is_no_grid() {
+    let folder = Folder::new();
+    // Found by fuzzing: rows times columns times four bytes went past 64 bits.
+    let header: Vec<u8> = [-90.0, -180.0, 10.0, 10.0_f64].iter().flat_map(|number| number.to_be_bytes()).collect();
+    let bytes = [header, vec![0xf0, 0, 0, 0xc1, 0xf0, 0, 0, 0xc1]].concat();
+    assert!(Geoid::read(&folder.write("huge.gtx", &bytes), 34.0, 36.0).is_err());
+}
+
+#[test]
+fn text_headers_with_numbers_that_are_none_are_refused() {
+    let folder = Folder::new();
+    let refused = |size: &str, cell: &str| {
+        let text = format!("{size}\nxllcorner 500000\nyllcorner 4000000\ncellsize {cell}\n1 2 3 4\n");
+        let path = folder.write("a.asc", text.as_bytes());
+        folder.write("a.prj", br#"PROJCS["x",AUTHORITY["EPSG","32611"]]"#);
+        DemFile::open(&path, &Reading::AS_IT_SAYS).and_then(|file| file.read(file.rect())).unwrap_err().to_string()
+    };
+    assert!(refused("ncols 2\nnrows 2", "NaN").contains("the place of the raster"));
+    assert!(refused("ncols 2\nnrows 2", "-30").contains("the place of the raster"));
+    assert!(refused("ncols 2\nnrows 2", "1e400").contains("cellsize"));
+    assert!(refused("ncols 4294967295\nnrows 2", "30").contains("posts a side"));
+    assert!(refused("ncols 1000000\nnrows 1000000", "30").contains("too large"));
+    assert!(refused("ncols 2\nnrows 3", "30").contains("truncated: the last number"));
 }
 
 proptest! {

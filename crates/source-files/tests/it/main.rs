@@ -11,3 +11,4 @@ mod real_files;
 mod refusals;
 mod resampling;
 mod support;
+mod windows;

@@ -7,23 +7,23 @@ use terrain::{GridFrame, Post, PostRect};
 
 use crate::support::{Folder, Tiff, Values, grid};
 
-const PLAIN: MosaicRules = MosaicRules {
+pub const PLAIN: MosaicRules = MosaicRules {
     resampling: Resampling::Bilinear,
     feather_m: 0.0,
     voids: MosaicVoids { next_source: false, fill_within: 0 },
 };
 
-fn utm() -> Crs {
+pub fn utm() -> Crs {
     Crs::from_epsg(32611).unwrap()
 }
 
-fn mosaic(files: &[DemFile], rules: MosaicRules, grid: &GridFrame, rect: PostRect) -> Result<Mosaic, SourceError> {
+pub fn mosaic(files: &[DemFile], rules: MosaicRules, grid: &GridFrame, rect: PostRect) -> Result<Mosaic, SourceError> {
     let reaching = files.iter().filter_map(|file| Some((file, file.window_reaching(&utm(), grid, rect)?)));
     let rasters = reaching.map(|(file, window)| file.read(window)).collect::<Result<_, _>>()?;
     Mosaic::new(rasters, rules, &utm(), grid, rect)
 }
 
-fn open(path: &Path) -> DemFile {
+pub fn open(path: &Path) -> DemFile {
     DemFile::open(path, &Reading { crs: None, ..Reading::AS_IT_SAYS }).unwrap()
 }
 
@@ -54,12 +54,12 @@ fn in_degrees(seconds: f64, posts: u32) -> Vec<f64> {
     heights(&Crs::wgs84(), [-117.0, 36.0], [seconds / 3600.0; 2], (posts, posts))
 }
 
-fn write_hgt(folder: &Folder) -> PathBuf {
+pub fn write_hgt(folder: &Folder) -> PathBuf {
     let heights = whole(&in_degrees(3.0, 1201));
     folder.write("N35W117.hgt", &heights.iter().flat_map(|height| height.to_be_bytes()).collect::<Vec<u8>>())
 }
 
-fn write_dted(folder: &Folder) -> PathBuf {
+pub fn write_dted(folder: &Folder) -> PathBuf {
     let heights = whole(&in_degrees(3.0, 1201));
     let mut bytes = b"UHL11170000W0350000N003000300005U  DT1         120112010".to_vec();
     bytes.resize(3428, b' ');
@@ -81,20 +81,20 @@ fn in_metres() -> Vec<f64> {
     heights(&utm(), [532_000.0, 3_929_000.0 + 240.0 * 30.0], [30.0; 2], (301, 241))
 }
 
-fn write_ascii(folder: &Folder) -> PathBuf {
+pub fn write_ascii(folder: &Folder) -> PathBuf {
     let numbers: String = in_metres().iter().map(|height| format!("{height:.2} ")).collect();
     folder.write("a.prj", br#"PROJCS["x",AUTHORITY["EPSG","32611"]]"#);
     folder.write("a.asc", (HEADER.to_owned() + &numbers).as_bytes())
 }
 
-fn write_raw(folder: &Folder) -> PathBuf {
+pub fn write_raw(folder: &Folder) -> PathBuf {
     folder.write("a.prj", br#"PROJCS["x",AUTHORITY["EPSG","32611"]]"#);
     folder.write("a.hdr", (HEADER.to_owned() + "byteorder LSBFIRST\n").as_bytes());
     folder.write("a.flt", &in_metres().iter().flat_map(|&height| (height as f32).to_le_bytes()).collect::<Vec<u8>>())
 }
 
 /// A GeoTIFF by its keys, its first post and its steps; pixels are areas or points.
-fn write_tiff(folder: &Folder, crs: &Crs, keys: &[(u16, u16)], is_point: bool) -> PathBuf {
+pub fn write_tiff(folder: &Folder, crs: &Crs, keys: &[(u16, u16)], is_point: bool) -> PathBuf {
     let (first, step) = match crs.is_geographic() {
         true => ([-116.70, 35.60], [1.0 / 3600.0; 2]),
         false => (Crs::wgs84().to(crs, [-116.70, 35.60]).unwrap(), [30.0; 2]),
@@ -170,7 +170,13 @@ fn every_format_is_registered_to_a_fiftieth_of_a_post() {
 // Several rasters.
 
 /// 16-bit heights in UTM zone 11 at 10 m, its south-west post at `at`; -1 is void.
-fn raster(folder: &Folder, name: &str, at: [f64; 2], size: (i32, i32), height: impl Fn(i32, i32) -> i16) -> DemFile {
+pub fn raster(
+    folder: &Folder,
+    name: &str,
+    at: [f64; 2],
+    size: (i32, i32),
+    height: impl Fn(i32, i32) -> i16,
+) -> DemFile {
     let rows: Vec<Vec<i16>> = (0..size.1).rev().map(|row| (0..size.0).map(|col| height(row, col)).collect()).collect();
     let rows: Vec<&[i16]> = rows.iter().map(Vec::as_slice).collect();
     let corner = [at[0] - 5.0, at[1] + f64::from(size.1 - 1) * 10.0 + 5.0];
@@ -179,7 +185,7 @@ fn raster(folder: &Folder, name: &str, at: [f64; 2], size: (i32, i32), height: i
     open(&folder.write(name, &tiff.bytes()))
 }
 
-fn metres(patch: &Patch, row: i32, col: i32) -> (f64, Standing) {
+pub fn metres(patch: &Patch, row: i32, col: i32) -> (f64, Standing) {
     let index = (row - patch.rect.south) as usize * patch.rect.posts_wide() + (col - patch.rect.west) as usize;
     (f64::from(patch.heights[index]) / 128.0, patch.standings[index])
 }

@@ -14,9 +14,9 @@ fn a_post_has_the_class_of_the_nearest_sample_and_none_beyond() {
     let path = folder.write("class.tif", &tiff.bytes());
     let grid = grid(499_990.0, 3_999_970.0, 5.0);
     let area = PostRect::of_size(9, 9);
-    let classes = ClassRaster::read(&path, 32611, &grid, area).unwrap();
+    let classes = ClassRaster::open(&path, 32611, &grid, area).unwrap();
     let picture = |value| {
-        let members = classes.members(&grid, area, value);
+        let members = classes.members(&grid, area, value).unwrap();
         let rows = members.chunks(9).rev();
         rows.map(|row| row.iter().map(|&member| if member { '#' } else { '.' }).collect()).collect::<Vec<String>>()
     };
@@ -26,7 +26,7 @@ fn a_post_has_the_class_of_the_nearest_sample_and_none_beyond() {
     assert_eq!(picture(3), [none, none, none, low, low, none, none, none, none]);
     assert!(picture(4).iter().all(|row| row == none), "a void sample is of no class");
     let east = PostRect::new(Post::new(2, 4), Post::new(3, 6));
-    assert_eq!(classes.members(&grid, east, -5), [true, true, false, true, true, false]);
+    assert_eq!(classes.members(&grid, east, -5).unwrap(), [true, true, false, true, true, false]);
 }
 
 #[test]
@@ -35,7 +35,7 @@ fn classes_are_whole_numbers_in_the_areas_system_and_somewhere_in_the_area() {
     let area = PostRect::of_size(3, 3);
     let open = |tiff: &Tiff, epsg, east_m| {
         let path = folder.write("class.tif", &tiff.bytes());
-        ClassRaster::read(&path, epsg, &grid(east_m, 3_999_990.0, 5.0), area).map(|_| ())
+        ClassRaster::open(&path, epsg, &grid(east_m, 3_999_990.0, 5.0), area).map(|_| ())
     };
     let good = Tiff::of_heights(&[&[3, 4]]);
     assert!(open(&good, 32611, 500_000.0).is_ok());
@@ -163,8 +163,8 @@ fn a_class_raster_of_another_system_is_met_at_the_nearest_sample() {
     // Where the four pixels meet: 116.6 W, 35.3 N.
     let grid = grid(536_342.0, 3_906_361.0, 50.0);
     let rect = PostRect::of_size(2, 2);
-    let classes = ClassRaster::read(&path, 32611, &grid, rect).unwrap();
-    let members = |value| classes.members(&grid, rect, value);
+    let classes = ClassRaster::open(&path, 32611, &grid, rect).unwrap();
+    let members = |value| classes.members(&grid, rect, value).unwrap();
     assert_eq!(members(3), [true, false, false, false]);
     assert_eq!(members(4), [false, true, false, false]);
     assert_eq!(members(1), [false, false, true, false]);
@@ -173,10 +173,72 @@ fn a_class_raster_of_another_system_is_met_at_the_nearest_sample() {
 
 #[test]
 fn what_is_not_a_polygon_is_refused() {
-    check_refused("no json at all", "neither a Shapefile nor GeoJSON");
+    check_refused("no json at all", "neither a Shapefile, a GeoPackage nor GeoJSON");
     check_refused(r#"{"type":"Point","coordinates":[1,2]}"#, "a Point, expected Polygon");
     check_refused(r#"{"type":"FeatureCollection","features":[]}"#, "no polygon");
     let open = r#"{"type":"Polygon","coordinates":[[[0,0],[900,0],[900,900],[1,1]]]}"#;
     check_refused(open, "ring 0 has a last corner that is not its first");
     check_refused(r#"{"type":"Polygon","coordinates":[[[0,0],[900,0],[0,0]]]}"#, "ring 0 has 3 corners");
+}
+
+/// A GeoPackage geometry: mark, flags, system, then a square as well-known binary.
+fn blob(west: f64, south: f64, side: f64) -> Vec<u8> {
+    let mut bytes = b"GP\0\x01".to_vec();
+    bytes.extend(26911_u32.to_le_bytes());
+    bytes.push(1);
+    bytes.extend([3_u32, 1, 5].iter().flat_map(|number| number.to_le_bytes()));
+    let (east, north) = (west + side, south + side);
+    let corners = [[west, south], [east, south], [east, north], [west, north], [west, south]];
+    bytes.extend(corners.as_flattened().iter().flat_map(|number| number.to_le_bytes()));
+    bytes
+}
+
+fn package(folder: &Folder, features: &str, blobs: &[Vec<u8>]) -> std::path::PathBuf {
+    let path = folder.path("areas.gpkg");
+    let database = rusqlite::Connection::open(&path).unwrap();
+    let tables =
+        "CREATE TABLE gpkg_spatial_ref_sys (srs_id INTEGER, organization TEXT, organization_coordsys_id INTEGER);
+        CREATE TABLE gpkg_geometry_columns (table_name TEXT, column_name TEXT, srs_id INTEGER);
+        INSERT INTO gpkg_spatial_ref_sys VALUES (4326, 'EPSG', 4326), (7, 'epsg', 32611);
+        INSERT INTO gpkg_geometry_columns VALUES ('lakes', 'geom', 7);";
+    database.execute_batch(tables).unwrap();
+    database.execute_batch(features).unwrap();
+    for blob in blobs {
+        database.execute("INSERT INTO lakes (geom) VALUES (?1)", [blob]).unwrap();
+    }
+    path
+}
+
+const LAKES: &str = "CREATE TABLE lakes (fid INTEGER PRIMARY KEY, geom BLOB); INSERT INTO lakes (geom) VALUES (NULL);";
+
+#[test]
+fn a_geopackage_gives_the_polygons_of_its_layers_in_the_areas_system() {
+    let folder = Folder::new();
+    let path = package(&folder, LAKES, &[blob(500_000.0, 4.0e6, 100.0), blob(500_300.0, 4.0e6, 50.0)]);
+    let polygons = read_polygons(&path, 32611).unwrap();
+    assert_eq!(polygons.len(), 2);
+    assert_eq!(polygons[1].rings[0][2], [500_350.0, 4_000_050.0]);
+    let elsewhere = read_polygons(&path, 32612).unwrap();
+    assert!(elsewhere[0].rings[0][0][0] < -30_000.0, "{:?}", elsewhere[0].rings[0][0]);
+}
+
+#[test]
+fn a_geopackage_without_polygons_with_programs_or_cut_short_is_refused() {
+    let refused = |features: &str, blobs: &[Vec<u8>]| {
+        let folder = Folder::new();
+        read_polygons(&package(&folder, features, blobs), 32611).unwrap_err().to_string()
+    };
+    let point = [&blob(0.0, 0.0, 1.0)[..9], &1_u32.to_le_bytes(), &[0; 16]].concat();
+    assert!(refused(LAKES, &[]).contains("no polygon in the file"));
+    assert!(refused(LAKES, &[point]).contains("a Point, expected Polygon"));
+    assert!(refused(LAKES, &[blob(0.0, 0.0, 1.0)[..60].to_vec()]).contains("a geometry that is cut short"));
+    let endless =
+        "CREATE VIEW lakes AS WITH RECURSIVE n(geom) AS (SELECT x'00' UNION ALL SELECT geom FROM n) SELECT geom FROM n";
+    assert!(refused(endless, &[]).contains("a layer `lakes` that is no table"));
+    let huge = [&blob(0.0, 0.0, 1.0)[..17], &u32::MAX.to_le_bytes()].concat();
+    assert!(refused(LAKES, &[huge]).contains("cut short"));
+    let folder = Folder::new();
+    let path = package(&folder, LAKES, &[blob(500_000.0, 4.0e6, 100.0)]);
+    let bytes = std::fs::read(&path).unwrap();
+    assert!(read_polygons(&folder.write("short.gpkg", &bytes[..4096]), 32611).is_err());
 }

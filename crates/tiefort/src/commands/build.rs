@@ -7,6 +7,7 @@ use job::Job;
 
 use crate::arguments::RunArguments;
 use crate::failure::{Failure, Outcome};
+use crate::fit;
 use crate::run::{Finished, Run};
 
 const AFTER_HELP: &str = "\
@@ -29,11 +30,18 @@ pub struct Arguments {
     /// Keep nothing of an earlier build
     #[arg(long)]
     fresh: bool,
+    /// Build even where memory or disk are forecast not to suffice
+    #[arg(long)]
+    force: bool,
 }
 
 /// Builds.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
-    let job = Job::load_with(&arguments.job, &compiler::find_area)?;
+    let mut job = Job::load_with(&arguments.job, &compiler::find_area)?;
+    job.dem.strict = arguments.run.strict;
+    if !arguments.force {
+        fit::check(&compiler::plan(&job)?.forecast, &arguments.run.folder(&job))?;
+    }
     let run = Run::announce(&job, &arguments.run, "building")?;
     run.finish(|listener| {
         let built = compiler::build(&job, run.folder(), &run.options(arguments.fresh), listener)?;

@@ -108,18 +108,13 @@ fn source_text(seen: &Seen, folder: &Path, given: Option<&str>) -> String {
     let (cols, rows) = seen.size;
     let mut facts =
         format!("{}, {}, {cols} x {rows} posts, {} x {} {unit}", seen.format, seen.crs, short(east), short(north));
-    match &seen.heights {
-        Some((voids, range)) => {
-            if let Some((low, high)) = range {
-                facts += &format!(", {} to {} m", short(*low), short(*high));
-            }
-            facts += &match voids {
-                0 => ", no voids".to_owned(),
-                voids => format!(", {} void", views::grouped(*voids as u64)),
-            };
-        }
-        None => facts += ", too large to look for voids here",
+    if let Some((low, high)) = seen.range_m {
+        facts += &format!(", {} to {} m", short(low), short(high));
     }
+    facts += &match seen.voids {
+        0 => ", no voids".to_owned(),
+        voids => format!(", {} void", views::grouped(voids as u64)),
+    };
     if undeclared_void(seen).is_some() {
         facts += ", whose lowest height can only mark voids";
     }
@@ -136,8 +131,7 @@ fn source_text(seen: &Seen, folder: &Path, given: Option<&str>) -> String {
 
 /// The usual marks of a void, where a file has one for its lowest height and does not declare it.
 fn undeclared_void(seen: &Seen) -> Option<f64> {
-    let (_, range) = seen.heights.as_ref()?;
-    let (low, _) = (*range)?;
+    let (low, _) = seen.range_m?;
     [-32768.0, -32767.0, -9999.0].into_iter().find(|&mark| low == mark)
 }
 
@@ -147,8 +141,7 @@ fn short(number: f64) -> String {
 }
 
 fn voids_text(seen: &[Seen]) -> String {
-    let has = |file: &Seen| file.heights.as_ref().is_none_or(|(voids, _)| 0 < *voids);
-    let voids = seen.iter().any(|file| has(file) || undeclared_void(file).is_some());
+    let voids = seen.iter().any(|file| 0 < file.voids || undeclared_void(file).is_some());
     let next = if 1 < seen.len() { "next_source = true, " } else { "" };
     match voids {
         true => format!(

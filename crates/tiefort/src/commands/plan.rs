@@ -1,6 +1,6 @@
 //! `tiefort plan`: what a build would do, before any work.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use compiler::{Plan, PlannedTile, Played};
@@ -11,7 +11,7 @@ use views::{Align, Table, grouped};
 use crate::arguments::rows_by_columns;
 use crate::engines::{self, Glue};
 use crate::failure::{Failure, Outcome};
-use crate::{costs, files, run, terminal};
+use crate::{costs, files, fit, run, terminal};
 
 const AFTER_HELP: &str = "\
 Examples:
@@ -50,6 +50,9 @@ pub struct Arguments {
     /// Tiles that a task of an engine does, one after the other [default: so many that it takes half a minute]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65_536))]
     pack: Option<u32>,
+    /// Plan even what is forecast not to fit this machine
+    #[arg(long)]
+    force: bool,
 }
 
 /// Tiles that are played at most.
@@ -84,6 +87,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         None => plan_text(&job, &plan, &played),
     };
     terminal::print(&text)?;
+    if !arguments.force {
+        fit::check(&plan.forecast, Path::new("."))?;
+    }
     Ok(Outcome::Sound)
 }
 

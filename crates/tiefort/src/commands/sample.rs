@@ -22,6 +22,9 @@ pub struct Arguments {
     /// Posts a side
     #[arg(long, value_name = "N", default_value_t = 2001, value_parser = clap::value_parser!(u32).range(2..=65_536))]
     posts: u32,
+    /// Posts from south to north, where the raster is not to be square
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=65_536))]
+    rows: Option<u32>,
     /// Metres between posts: a multiple of 1/16 m
     #[arg(long, value_name = "M", default_value = "25", value_parser = spacing)]
     spacing: Spacing,
@@ -43,7 +46,7 @@ fn spacing(text: &str) -> Result<Spacing, String> {
 
 /// Writes the rasters.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
-    let Arguments { posts, spacing, seed, classes, out } = arguments;
+    let Arguments { posts, rows, spacing, seed, classes, out } = arguments;
     if classes.as_ref() == Some(out) {
         let message = format!("{}: found the same file for --classes and --out, expected two", out.display());
         return Err(Failure::new(message, "give them different names"));
@@ -51,6 +54,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     for path in [Some(out), classes.as_ref()].into_iter().flatten() {
         files::check_writable(path)?;
     }
-    compiler::sample(*seed, *posts as usize, *spacing, out, classes.as_deref())?;
+    let size = (rows.unwrap_or(*posts) as usize, *posts as usize);
+    compiler::sample(*seed, size, *spacing, out, classes.as_deref())?;
     Ok(Outcome::Sound)
 }

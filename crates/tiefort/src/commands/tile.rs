@@ -37,7 +37,8 @@ pub struct Arguments {
 
 /// Re-runs the tile.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
-    let job = Job::load_with(&arguments.job, &compiler::find_area)?;
+    let mut job = Job::load_with(&arguments.job, &compiler::find_area)?;
+    job.dem.strict = arguments.run.strict;
     check_tile(&job, arguments.tile)?;
     let what = format!("re-running tile {},{} of", arguments.tile.row, arguments.tile.col);
     let run = Run::announce(&job, &arguments.run, &what)?;

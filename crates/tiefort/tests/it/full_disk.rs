@@ -7,7 +7,7 @@ use crate::scene::{Said, Scene};
 /// Builds into a file system of its own that holds 96 kB, then lists what is there.
 const SMALL_DISK: &str = "
 mkdir disk && mount -t tmpfs -o size=96k tmpfs disk || exit 99
-\"$0\" build job.toml --out disk/x.tdb
+\"$0\" build job.toml --out disk/x.tdb --force
 code=$?
 find disk -name '.*' -type f >&2
 exit $code";

@@ -1,0 +1,199 @@
+//! A mosaic of files too large to be decoded at once: each window is put together when it is asked for.
+//!
+//! A post comes out the same in every window. Heights between posts depend on the posts around them only; voids are
+//! filled block by block, in blocks that hang on the source's own grid, each seen with the ground around it.
+
+use terrain::{GridFrame, PostRect, quanta_of_metres};
+
+use crate::chunk::Header;
+use crate::crs::Crs;
+use crate::join::{Extent, common_kind, fits, offset, shifted};
+use crate::mosaic::{Layer, MARGIN};
+use crate::samples::Samples;
+use crate::warp::Warp;
+use crate::{Mosaic, MosaicRules, Patch, Raster, SourceError, Standing, Windows};
+
+/// Posts a side of the blocks in which voids are filled.
+const BLOCK_POSTS: i32 = 512;
+/// Posts around a block that are looked at, besides those that a void may be filled from.
+const AROUND_POSTS: i32 = 64;
+
+/// Files in order of priority, read by window.
+#[derive(Debug)]
+pub struct WideMosaic {
+    windows: Windows,
+    joints: Vec<Joint>,
+    rules: MosaicRules,
+    area: Crs,
+    grid: GridFrame,
+    /// Height in metres of ground that nobody knows and that lies near none: the lowest of all.
+    lowest_m: f64,
+}
+
+/// Files of one grid, as one raster.
+#[derive(Debug)]
+struct Joint {
+    header: Header,
+    /// Places in the list of files, and columns and rows from the joint's south-west post to theirs.
+    members: Vec<(usize, [i32; 2])>,
+    warp: Warp,
+    posts_per_metre: [f64; 2],
+}
+
+impl WideMosaic {
+    /// Of the files at the places `used`, in order of priority, for the area `rect`, in which the lowest height of
+    /// all files is `lowest_m`.
+    ///
+    /// # Errors
+    /// When joined rasters are together too large.
+    pub fn new(
+        windows: Windows,
+        used: &[usize],
+        rules: MosaicRules,
+        (area, grid, rect): (&Crs, &GridFrame, PostRect),
+        lowest_m: f64,
+    ) -> Result<Self, SourceError> {
+        let header = |index: usize| windows.files()[index].header();
+        let meaning = |index: usize| (&header(index).frame, (header(index).scale, &header(index).shift));
+        let mut groups: Vec<Vec<usize>> = Vec::new();
+        for &index in used {
+            match groups.last_mut() {
+                Some(group) if fits(meaning(group[0]), meaning(index)) => group.push(index),
+                _ => groups.push(vec![index]),
+            }
+        }
+        let joints = groups.into_iter().map(|group| {
+            let headers: Vec<&Header> = group.iter().map(|&index| header(index)).collect();
+            let (header, shifts) = joined(&headers)?;
+            let warp = Warp::new(&header.frame, area, grid);
+            let posts_per_metre = warp.posts_per_metre(rect);
+            Ok(Joint { header, members: group.into_iter().zip(shifts).collect(), warp, posts_per_metre })
+        });
+        let joints = joints.collect::<Result<_, SourceError>>()?;
+        Ok(Self { windows, joints, rules, area: area.clone(), grid: *grid, lowest_m })
+    }
+
+    /// Heights at the posts `rect` of the working grid.
+    ///
+    /// # Errors
+    /// When a file cannot be read any more.
+    pub fn resample(&self, rect: PostRect) -> Result<Patch, SourceError> {
+        let mut layers = Vec::new();
+        for joint in &self.joints {
+            let Some(window) = joint.warp.window(rect, MARGIN) else { continue };
+            let (raster, standings) = self.settled(joint, window)?;
+            let (warp, posts_per_metre) = (joint.warp.clone(), joint.posts_per_metre);
+            layers.push(Layer { raster, standings, warp, posts_per_metre });
+        }
+        let beyond = quanta_of_metres(self.lowest_m);
+        let place = (self.area.clone(), self.grid);
+        Ok(Mosaic { layers, rules: self.rules, place, beyond: Some(beyond.unwrap_or(0)) }.resample(rect))
+    }
+
+    /// How many strips or tiles were decoded so far, counting each time.
+    pub fn decoded(&self) -> u64 {
+        self.windows.decoded()
+    }
+
+    /// A window of a joint in which every post holds a height, and how each stands.
+    fn settled(&self, joint: &Joint, window: PostRect) -> Result<(Raster, Vec<Standing>), SourceError> {
+        let (mut raster, mut standings) = joint.read(&self.windows, window)?;
+        if standings.is_empty() {
+            return Ok((raster, standings));
+        }
+        let reach = self.rules.voids.fill_within as i32 + AROUND_POSTS;
+        let scale = joint.header.scale;
+        let lowest = (self.lowest_m / scale.unit_m - scale.offset) / scale.scale;
+        for block in blocks(window) {
+            let cut = block.intersection(&window).expect("blocks touch their window");
+            if posts(cut).all(|post| standings[index(window, post)] < Standing::Void) {
+                continue;
+            }
+            let around = block.grown(reach).intersection(&joint.rect()).expect("a block lies in its raster");
+            let (mut near, mut near_standings) = joint.read(&self.windows, around)?;
+            let is_known = near.void_count() < around.post_count();
+            for index in if is_known { near.fill_around(self.rules.voids.fill_within) } else { Vec::new() } {
+                if near_standings[index] == Standing::Void {
+                    near_standings[index] = Standing::Filled;
+                }
+            }
+            for post in posts(cut) {
+                let (at, from) = (index(window, post), index(around, post));
+                if Standing::Void <= standings[at] {
+                    standings[at] = near_standings[from];
+                    raster.samples.set(at, if is_known { near.samples.get(from) } else { lowest });
+                }
+            }
+        }
+        raster.voids.settled = true;
+        Ok((raster, standings))
+    }
+}
+
+/// The header of several rasters of one grid, and where each begins in it.
+fn joined(headers: &[&Header]) -> Result<(Header, Vec<[i32; 2]>), SourceError> {
+    if let [alone] = headers {
+        return Ok(((*alone).clone(), vec![[0, 0]]));
+    }
+    let offsets: Vec<[i64; 2]> = headers.iter().map(|header| offset(&headers[0].frame, &header.frame)).collect();
+    let frames: Vec<_> = headers.iter().map(|header| &header.frame).collect();
+    let extent = Extent::of(&frames, &offsets)?;
+    let kind = common_kind(headers.iter().map(|header| header.kind));
+    let (scale, shift) = (headers[0].scale, headers[0].shift.clone());
+    let header = Header { frame: extent.frame(frames[0]), scale, kind, nodata: None, shift };
+    Ok((header, offsets.into_iter().map(|offset| extent.shift(offset)).collect()))
+}
+
+impl Joint {
+    fn rect(&self) -> PostRect {
+        PostRect::of_size(self.header.frame.rows as usize, self.header.frame.cols as usize)
+    }
+
+    /// The posts of a window, and how they stand where not all are heights.
+    fn read(&self, windows: &Windows, window: PostRect) -> Result<(Raster, Vec<Standing>), SourceError> {
+        if let [(file, _)] = self.members[..] {
+            let raster = windows.read(file, window)?;
+            let standing = |index| if raster.voids.contains(index) { Standing::Void } else { Standing::Height };
+            let count = if raster.void_count() == 0 { 0 } else { window.post_count() };
+            let standings = (0..count).map(standing).collect();
+            return Ok((raster, standings));
+        }
+        let mut samples = Samples::zeroed(self.header.kind, window.post_count());
+        let mut standings = vec![Standing::Gap; window.post_count()];
+        for &(file, shift) in &self.members {
+            let Some(cut) = shifted(windows.files()[file].rect(), shift).intersection(&window) else { continue };
+            let raster = windows.read(file, shifted(cut, shift.map(|posts| -posts)))?;
+            for (from, post) in posts(cut).enumerate() {
+                let standing = if raster.voids.contains(from) { Standing::Void } else { Standing::Height };
+                let at = index(window, post);
+                if standing < standings[at] {
+                    standings[at] = standing;
+                    samples.set(at, raster.samples.get(from));
+                }
+            }
+        }
+        let mut raster = Raster::of_samples(&self.header, window, samples, Vec::new())?;
+        let missing = standings.iter().enumerate().filter(|&(_, &standing)| Standing::Void <= standing);
+        raster.mark_voids(missing.map(|(index, _)| index));
+        if raster.void_count() == 0 {
+            standings.clear();
+        }
+        Ok((raster, standings))
+    }
+}
+
+fn posts(rect: PostRect) -> impl Iterator<Item = terrain::Post> {
+    (rect.south..=rect.north).flat_map(move |row| (rect.west..=rect.east).map(move |col| terrain::Post::new(row, col)))
+}
+
+fn index(rect: PostRect, post: terrain::Post) -> usize {
+    (post.row - rect.south) as usize * rect.posts_wide() + (post.col - rect.west) as usize
+}
+
+/// The blocks that touch a window.
+fn blocks(window: PostRect) -> impl Iterator<Item = PostRect> {
+    let range = |low: i32, high: i32| low.div_euclid(BLOCK_POSTS)..=high.div_euclid(BLOCK_POSTS);
+    let (rows, cols) = (range(window.south, window.north), range(window.west, window.east));
+    rows.flat_map(move |row| cols.clone().map(move |col| (row * BLOCK_POSTS, col * BLOCK_POSTS)))
+        .map(|(south, west)| PostRect { south, west, north: south + BLOCK_POSTS - 1, east: west + BLOCK_POSTS - 1 })
+}

@@ -1,0 +1,124 @@
+//! Files of any size, read by window: what is asked for is decoded then, and kept while there is room.
+
+use terrain::PostRect;
+
+use crate::chunk_cache::ChunkCache;
+use crate::directory::SampleKind;
+use crate::{DemFile, Raster, SourceError};
+
+/// Files that are read by window. Several threads may ask at once; none decodes what another is decoding.
+#[derive(Debug)]
+pub struct Windows {
+    files: Vec<DemFile>,
+    cache: ChunkCache,
+}
+
+impl Windows {
+    /// Of some files, with room for `bytes_max` bytes of decoded samples.
+    pub fn new(files: Vec<DemFile>, bytes_max: u64) -> Self {
+        Self { files, cache: ChunkCache::new(bytes_max) }
+    }
+
+    /// The files, in the order given.
+    pub fn files(&self) -> &[DemFile] {
+        &self.files
+    }
+
+    /// How many strips or tiles were decoded so far, counting each time.
+    pub fn decoded(&self) -> u64 {
+        self.cache.decoded()
+    }
+
+    /// The posts `window` of the file at place `index`.
+    ///
+    /// # Errors
+    /// As [`DemFile::decode`] and [`DemFile::assemble`].
+    ///
+    /// # Panics
+    /// When there is no such file, or `window` is not inside the raster.
+    pub fn read(&self, index: usize, window: PostRect) -> Result<Raster, SourceError> {
+        let file = &self.files[index];
+        assert!(file.rect().contains_rect(&window), "a window lies inside the raster");
+        let chunks = file.chunks_of(window).into_iter().map(|chunk| self.cache.chunk(file, index, chunk));
+        Raster::assemble_shared(file.header(), window, &chunks.collect::<Result<Vec<_>, _>>()?)
+    }
+}
+
+/// What a look at part of a file finds.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Look {
+    /// Posts looked at.
+    pub posts: usize,
+    /// Those that are void.
+    pub voids: usize,
+    /// Where the first of them lies, for messages.
+    pub first_void: Option<String>,
+    /// Lowest and highest height in metres.
+    pub range_m: Option<(f64, f64)>,
+    /// What a person should know about it.
+    pub notes: Vec<String>,
+}
+
+impl Look {
+    /// Adds what was found in the part that comes next.
+    pub fn add(&mut self, mut other: Look) {
+        self.posts += other.posts;
+        self.voids += other.voids;
+        self.first_void = self.first_void.take().or(other.first_void);
+        let ranges = [self.range_m, other.range_m].into_iter().flatten();
+        self.range_m = ranges.reduce(|(low, high), (lower, higher)| (low.min(lower), high.max(higher)));
+        self.notes.append(&mut other.notes);
+    }
+}
+
+impl DemFile {
+    /// Looks at the posts of `window` in some of its chunks, one chunk at a time, and keeps nothing.
+    ///
+    /// # Errors
+    /// As [`DemFile::decode`] and [`DemFile::assemble`].
+    pub fn look(&self, window: PostRect, chunks: &[u32]) -> Result<Look, SourceError> {
+        let (mut look, mut lent) = (Look::default(), None);
+        for &chunk in chunks {
+            let Some(cut) = self.posts_of(chunk).intersection(&window) else { continue };
+            let raster = self.assemble(cut, vec![self.decode_one(chunk, &mut lent)?])?;
+            let first_void = raster.voids.iter().next().map(|index| raster.place(index));
+            look.add(Look {
+                posts: cut.post_count(),
+                voids: raster.void_count(),
+                first_void,
+                range_m: raster.range_m(),
+                notes: raster.notes().to_vec(),
+            });
+        }
+        Ok(look)
+    }
+
+    /// The name of the samples' type, where it is one of fractions.
+    pub(crate) fn fractional(&self) -> Option<&'static str> {
+        match self.header().kind {
+            SampleKind::F32 => Some("32-bit floating point"),
+            SampleKind::F64 => Some("64-bit floating point"),
+            SampleKind::U8 | SampleKind::U16 | SampleKind::I16 | SampleKind::I32 => None,
+        }
+    }
+
+    /// Whether a sample of `window` is no whole number; types that hold nothing else are not looked through.
+    pub(crate) fn first_fraction(&self, window: PostRect) -> Result<bool, SourceError> {
+        if self.fractional().is_none() {
+            return Ok(false);
+        }
+        let mut lent = None;
+        for chunk in self.chunks_of(window) {
+            let samples = self.decode_one(chunk, &mut lent)?.samples;
+            if samples.is_some_and(|samples| !samples.all_whole()) {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
+    /// Bytes that the posts of `window` take in memory, in the file's own type.
+    pub fn bytes_of(&self, window: PostRect) -> u64 {
+        window.post_count() as u64 * self.header().kind.bytes()
+    }
+}

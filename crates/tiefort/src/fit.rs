@@ -1,0 +1,75 @@
+//! Whether a build fits this machine: the memory and the disk that are free, against what it is expected to take.
+
+use std::path::Path;
+
+use compiler::Forecast;
+
+use crate::failure::Failure;
+use crate::files;
+
+/// Refuses a build that will not fit.
+///
+/// # Errors
+/// When more memory or disk is expected to be needed than is free; both numbers are told.
+pub fn check(forecast: &Forecast, folder: &Path) -> Result<(), Failure> {
+    let needs = [
+        ("memory", forecast.memory_bytes, free_memory(), "use more, smaller tiles, or a machine with more memory"),
+        ("disk", forecast.disk_bytes, free_disk(folder), "make room, or name another place with --out"),
+    ];
+    for (what, expected, free, hint) in needs {
+        if let Some(free) = free.filter(|&free| free < expected) {
+            let (expected, free) = (files::bytes_text(expected), files::bytes_text(free));
+            let message = format!("{what}: {free} free, expected the {expected} that this job is forecast to take");
+            return Err(Failure::new(message, format!("{hint}; --force tries all the same")));
+        }
+    }
+    Ok(())
+}
+
+/// Bytes of memory that programs may still take; `None` where the system does not say.
+fn free_memory() -> Option<u64> {
+    let text = std::fs::read_to_string("/proc/meminfo").ok()?;
+    let line = text.lines().find(|line| line.starts_with("MemAvailable:"))?;
+    let kilobytes: u64 = line.split_whitespace().nth(1)?.parse().ok()?;
+    Some(kilobytes << 10)
+}
+
+/// Bytes free on the disk on which `folder` is, or will be.
+#[cfg(target_os = "linux")]
+fn free_disk(folder: &Path) -> Option<u64> {
+    let whole = std::path::absolute(folder).ok()?;
+    let there = whole.ancestors().find(|folder| folder.exists())?;
+    let found = rustix::fs::statvfs(there).ok()?;
+    Some(found.f_bavail.saturating_mul(found.f_frsize))
+}
+
+#[cfg(not(target_os = "linux"))]
+fn free_disk(_: &Path) -> Option<u64> {
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_no_machine_has_is_refused_with_both_numbers_and_what_all_have_is_not() {
+        let forecast = |memory_bytes, disk_bytes| Forecast {
+            memory_bytes,
+            shared_bytes: memory_bytes,
+            worker_bytes: 0,
+            seconds: 1.0,
+            disk_bytes,
+        };
+        let here = std::env::temp_dir();
+        assert!(check(&forecast(1 << 20, 1 << 10), &here.join("not/there/yet")).is_ok());
+        if free_memory().is_some() {
+            let refused = check(&forecast(1 << 60, 1), &here).unwrap_err().to_string();
+            assert!(refused.contains("memory: ") && refused.contains("--force tries all the same"), "{refused}");
+        }
+        if free_disk(&here).is_some() {
+            let refused = check(&forecast(1, 1 << 62), &here).unwrap_err().to_string();
+            assert!(refused.contains("disk: "), "{refused}");
+        }
+    }
+}
