@@ -29,7 +29,7 @@ const LAYERS: [&[&str]; 7] = [
 ];
 
 /// Who uses whom. A new arrow is an event: a commit of its own, with `ARCHITECTURE.md` changed in it.
-const ARROWS: [(&str, &[&str]); 19] = [
+const ARROWS: [(&str, &[&str]); 20] = [
     ("terrain", &[]),
     ("load-module-reader", &[]),
     ("geometry", &["terrain"]),
@@ -39,6 +39,7 @@ const ARROWS: [(&str, &[&str]); 19] = [
     ("tiling", &["terrain", "limits"]),
     ("tin", &["terrain", "geometry", "mesh", "limits"]),
     ("optimiser", &["terrain", "geometry", "limits"]),
+    ("methods", &["terrain", "geometry", "mesh"]),
     ("load-modules", &["terrain", "geometry", "mesh", "limits"]),
     ("fidelity", &["terrain", "geometry"]),
     ("sample-terrain", &["terrain"]),
@@ -56,6 +57,7 @@ const ARROWS: [(&str, &[&str]); 19] = [
             "tiling",
             "tin",
             "optimiser",
+            "methods",
             "load-modules",
             "fidelity",
             "sample-terrain",
