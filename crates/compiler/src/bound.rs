@@ -157,11 +157,13 @@ fn without_limit(run: &Run, window: &Window, vertices: &[Vertex], module: Module
         border: Vec::new(),
         inherited: posts_of(&sides),
         kept: Vec::new(),
+        start: Vec::new(),
         seams: SeamSides::CLOSED,
         rule: rule(run.job, area),
         stop: Stop { points: Some(inner + extra), ..Stop::default() },
     };
-    let window = Window { dem: window.dem.window(rect), importance: window.importance.window(rect) };
+    let (dem, importance) = (window.dem.window(rect), window.importance.window(rect));
+    let window = Window { dem, importance, given: Vec::new() };
     let refinement = Refinement { task, optimising: optimising(run.job), most: Most::AsTask };
     let refined = refinement.run(&window, &sides);
     let here = ModuleRect { south: module.row, west: module.col, north: module.row + 1, east: module.col + 1 };

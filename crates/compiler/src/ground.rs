@@ -12,6 +12,7 @@ use source_files::{ClassRaster, Patch, VoidSummary, read_polygons};
 use terrain::{Dem, GridFrame, Importance, PostRect, TileId};
 
 use crate::area::GamingArea;
+use crate::given::{GamingAreaFrame, Given, GivenPost};
 use crate::sources::{Census, Opened, Source, file_record, record};
 use crate::{CompileError, Stage, sources};
 
@@ -25,6 +26,8 @@ pub(crate) struct Ground {
     rect: PostRect,
     frame: GridFrame,
     kept: Option<Vec<OnceLock<Arc<Window>>>>,
+    /// Points that the job gives.
+    pub given: Given,
     /// Voids of the source under the area.
     pub voids: VoidSummary,
     /// Vertical accuracy of the least accurate source that states one, in metres.
@@ -39,6 +42,8 @@ pub(crate) struct Ground {
 pub(crate) struct Window {
     pub dem: Dem,
     pub importance: Importance,
+    /// Posts that the job gives, of a tile's own window; none of any other.
+    pub given: Vec<GivenPost>,
 }
 
 impl Window {
@@ -69,8 +74,8 @@ impl Ground {
         let mask = open_mask(job, area, &mut records)?;
         let keep = area.rect.post_count() <= KEPT_POSTS_MAX;
         let kept = keep.then(|| area.tiles.iter().map(|_| OnceLock::new()).collect());
-        let (rect, frame) = (area.rect, area.frame);
-        let mut ground = Self { source, mask, rect, frame, kept, voids, records, warnings, accuracy_m };
+        let (rect, frame, given) = (area.rect, area.frame, Given::open(job, area, &mut records)?);
+        let mut ground = Self { source, mask, rect, frame, kept, given, voids, records, warnings, accuracy_m };
         if let Source::Mosaic(_) = ground.source {
             ground.take_census(job, area, workers, stop)?;
         }
@@ -90,7 +95,7 @@ impl Ground {
             let patch = mosaic.resample(area.tiling.rect(tile));
             let census = Census::of(&patch, area.rect);
             if let Some(kept) = &self.kept {
-                let window = Arc::new(self.with_importance(patch));
+                let window = Arc::new(self.with_given(area, tile, self.with_importance(patch))?);
                 kept[area.tiling.index(tile)].get_or_init(|| window);
             }
             Ok(census)
@@ -110,9 +115,19 @@ impl Ground {
 
     fn with_importance(&self, patch: Patch) -> Window {
         let dem = patch.dem();
+        let importance = self.weights(&dem);
+        Window { dem, importance, given: Vec::new() }
+    }
+
+    /// Weights and classes as the job and its pins have them.
+    fn weights(&self, dem: &Dem) -> Importance {
         let importance = mask::importance(&self.mask, self.rect, &self.frame, dem.rect());
-        let importance = mask::without_voids(importance, &dem);
-        Window { dem, importance }
+        let place = GamingAreaFrame { rect: self.rect, frame: self.frame };
+        mask::without_voids(self.given.weigh(importance, &place), dem)
+    }
+
+    fn with_given(&self, area: &GamingArea, tile: TileId, window: Window) -> Result<Window, CompileError> {
+        Ok(Window { given: self.given.of_tile(area, tile, &window.dem)?, ..window })
     }
 
     /// The ground of one tile, made once where memory allows.
@@ -121,12 +136,13 @@ impl Ground {
     /// When the source has no heights there.
     pub fn tile(&self, area: &GamingArea, tile: TileId) -> Result<Arc<Window>, CompileError> {
         let rect = area.tiling.rect(tile);
-        let Some(kept) = &self.kept else { return self.window(rect).map(Arc::new) };
+        let fresh = || self.with_given(area, tile, self.window(rect)?).map(Arc::new);
+        let Some(kept) = &self.kept else { return fresh() };
         let slot = &kept[area.tiling.index(tile)];
         if let Some(window) = slot.get() {
             return Ok(window.clone());
         }
-        let window = Arc::new(self.window(rect)?);
+        let window = fresh()?;
         Ok(slot.get_or_init(|| window).clone())
     }
 
@@ -153,7 +169,7 @@ impl Ground {
                 heights[to as usize..][..cols.len()].copy_from_slice(part);
             }
         });
-        Ok(Window { dem, importance: join_importance(&parts, rect) })
+        Ok(Window { dem, importance: join_importance(&parts, rect), given: Vec::new() })
     }
 
     /// Whether the source has posts of its own to measure at: several sources have none in common.
@@ -190,9 +206,8 @@ impl Ground {
             Source::Raster(raster) => raster.resample(&self.frame, rect)?,
             Source::Mosaic(mosaic) => return Ok(self.with_importance(mosaic.resample(rect))),
         };
-        let importance = mask::importance(&self.mask, self.rect, &self.frame, rect);
-        let importance = mask::without_voids(importance, &dem);
-        Ok(Window { dem, importance })
+        let importance = self.weights(&dem);
+        Ok(Window { dem, importance, given: Vec::new() })
     }
 }
 

@@ -22,6 +22,13 @@ mod verify;
 pub use verify::{Status, Verdict, status, verify};
 mod raster;
 pub use raster::{Mesh, TinMethod, TinRequest, sample, tin};
+mod compare;
+pub use compare::{
+    CompareEvent, CompareGround, CompareMethod, CompareRequest, CompareRow, Comparison, Equivalent, Forced, Impossible,
+    Made, compare,
+};
+mod inadequate;
+pub use inadequate::{Component, Inadequate, inadequate};
 mod measures;
 pub use fidelity::{LineOfSight, SlopeDifference};
 pub use measures::{BuiltResidual, DatabaseFidelity, Measures, Sights, fidelity, measure};
@@ -30,6 +37,7 @@ mod area;
 mod assemble;
 mod bound;
 mod enforce;
+mod given;
 mod ground;
 mod publish;
 mod refine;

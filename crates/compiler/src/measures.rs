@@ -75,8 +75,9 @@ pub fn fidelity(folder: &Path, against: Option<&Path>, sights: Sights) -> Result
         return Err(CompileError::Unfinished { path: folder.dir().display().to_string() });
     }
     let (mut job, area) = job_of(&manifest, folder.dir())?;
-    // No weight changes a figure.
+    // No weight and no point that was given changes a figure.
     job.importance.areas.clear();
+    (job.tin.start, job.tin.pins) = (None, None);
     let against = choose_ground(&mut job, &manifest, folder.dir(), against)?;
     let ground = Ground::open(&job, &area, &Workers::new(1), &AtomicBool::new(false))?;
     let dem = ground.window(area.rect)?.dem;
@@ -123,7 +124,7 @@ fn triangles_of(folder: &Folder, area: &GamingArea) -> Result<Triangles, Compile
 
 /// Points the job at the ground to measure against, and gives its name. What is void in a raster of one's own choice
 /// is left out.
-fn choose_ground(
+pub(crate) fn choose_ground(
     job: &mut Job,
     manifest: &Manifest,
     folder: &Path,
@@ -150,7 +151,7 @@ fn choose_ground(
 
 /// A raster a database was built from. Its path is written as the job has it, and the job may have lain anywhere; but
 /// its content is known, so any file with that content is the one.
-fn find_source(record: Option<&SourceRecord>, folder: &Path) -> Result<PathBuf, CompileError> {
+pub(crate) fn find_source(record: Option<&SourceRecord>, folder: &Path) -> Result<PathBuf, CompileError> {
     let missing = |found: String| CompileError::Impossible {
         key: folder.join(database::files::DATABASE).display().to_string(),
         found,

@@ -1,8 +1,8 @@
 //! The numbers of a finished build, as the report gives them. Times are added by whoever holds the clock.
 
 use database::{
-    Report, ReportBreach, ReportClass, ReportPerModule, ReportPerWindow, ReportPoints, ReportPool, ReportRefusals,
-    ReportResidual, ReportStops, ReportVoids, Totals,
+    Report, ReportBefore, ReportBreach, ReportClass, ReportPerModule, ReportPerWindow, ReportPoints, ReportPool,
+    ReportRefusals, ReportResidual, ReportStops, ReportVoids, Totals,
 };
 use fidelity::{Residuals, Tally};
 use job::Count;
@@ -57,6 +57,7 @@ impl Findings<'_> {
             per_load_module: self.per_module(&counts),
             per_4km: self.per_window(&counts),
             pool: self.pool(&counts),
+            before_removals: self.before_removals(),
             residual: residual_of(&total),
             residual_against_source: run.ground.has_source_posts().then(|| self.at_source(&total)),
             classes: self.classes(&residuals),
@@ -154,6 +155,16 @@ impl Findings<'_> {
             over: sums.iter().filter(|&&sum| budget.per_window < sum).count() as u64,
             worst_9x9: largest(&wider),
         }
+    }
+
+    fn before_removals(&self) -> Option<ReportBefore> {
+        let before = self.enforced.before.as_ref()?;
+        let counts: Vec<u32> = before.iter().map(|numbers| counted(self.run, numbers)).collect();
+        Some(ReportBefore {
+            removed: self.enforced.removed.iter().map(|points| points.len() as u64).sum(),
+            per_load_module: self.per_module(&counts),
+            per_4km: self.per_window(&counts),
+        })
     }
 
     fn pool(&self, counts: &[u32]) -> ReportPool {

@@ -6,7 +6,7 @@ use terrain::{GainCurve, TileId};
 use tiling::{Allocation, Gains, allocate_equally, allocate_globally, points_equally, points_globally};
 use tin::SurveyTask;
 
-use crate::refinement::optimising;
+use crate::refinement::{give, optimising};
 use crate::run::{Run, Worked};
 use crate::tasks::{TileBudget, is_surveyed, survey_task};
 use crate::{CompileError, Event, Progress, Stage};
@@ -26,8 +26,11 @@ pub(crate) fn survey(run: &Run, progress: &mut dyn Progress) -> Result<Option<Ve
     }
     let level = geometry::widest_level();
     let curves = run.for_each_tile(Stage::Survey, progress, |tile: TileId| {
-        let task = survey_task(run.job, &run.area, tile);
+        let mut task = survey_task(run.job, &run.area, tile);
         let window = run.window(tile)?;
+        if !window.given.is_empty() {
+            give(&mut task.growth, &window.given, window.dem.rect());
+        }
         let stamp = run.stamp("survey", &window, |builder| feed(builder, &task));
         if run.database.folder().curve_stamp(tile).ok().flatten() == Some(stamp)
             && let Ok((_, curve)) = run.database.folder().read_curve(tile)

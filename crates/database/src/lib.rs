@@ -38,8 +38,8 @@ pub use manifest::{
 };
 mod report;
 pub use report::{
-    Report, ReportBound, ReportBreach, ReportClass, ReportPerModule, ReportPerWindow, ReportPlace, ReportPoints,
-    ReportPool, ReportRefusals, ReportResidual, ReportStage, ReportStops, ReportVoids,
+    Report, ReportBefore, ReportBound, ReportBreach, ReportClass, ReportPerModule, ReportPerWindow, ReportPlace,
+    ReportPoints, ReportPool, ReportRefusals, ReportResidual, ReportStage, ReportStops, ReportVoids,
 };
 mod lock;
 mod publish;

@@ -10,7 +10,7 @@ use std::io::Read;
 use std::path::{Component, Path, PathBuf};
 
 use crate::bounds::{JOB_BYTES_MAX, SOURCES_MAX};
-use crate::{AreaShape, DemSource, Fault, FindArea, Job, JobError, NamedFile, SourceFile, read};
+use crate::{AreaShape, DemSource, Fault, FindArea, Job, JobError, NamedFile, SourceFile, Start, read};
 
 /// A file that the job mentions: where its name stands in the job, and the fault to tell if it is not there.
 pub(crate) struct Mention {
@@ -23,6 +23,8 @@ pub(crate) struct Mention {
 pub(crate) enum Place {
     Source(usize),
     ImportanceArea(usize),
+    Start,
+    Pins,
 }
 
 impl Job {
@@ -96,11 +98,19 @@ fn locate(job: &mut Job, mentions: Vec<Mention>) -> Result<(), JobError> {
     let folder = job.folder().to_owned();
     locate_sources(&mut job.dem.source, &folder, &mentions)?;
     for Mention { place, fault } in mentions {
-        let Place::ImportanceArea(index) = place else { continue };
-        match &job.importance.areas[index].shape {
-            AreaShape::Polygons { file } | AreaShape::RasterValue { file, .. } => check_named(file, &folder, &fault)?,
-            AreaShape::Sample(_) => {}
-        }
+        let file = match place {
+            Place::Source(_) => None,
+            Place::ImportanceArea(index) => match &job.importance.areas[index].shape {
+                AreaShape::Polygons { file } | AreaShape::RasterValue { file, .. } => Some(file),
+                AreaShape::Sample(_) => None,
+            },
+            Place::Start => match &job.tin.start {
+                Some(Start::File(file)) => Some(file),
+                Some(Start::Method { .. }) | None => None,
+            },
+            Place::Pins => job.tin.pins.as_ref(),
+        };
+        file.map_or(Ok(()), |file| check_named(file, &folder, &fault))?;
     }
     Ok(())
 }

@@ -19,6 +19,8 @@ pub use model::{
     Optimising, Proximity, Resampling, SampleClass, Smooth, SourceEntry, SourceFile, SourceSaid, TileOrder, TilesSpec,
     TinSpec, Voids, WindowLimit,
 };
+mod given;
+pub use given::{Start, StartMethod};
 mod find;
 pub use find::{AreaFound, AreaPlace, AreaRequest, FindArea, NoArea};
 mod error;

@@ -42,5 +42,7 @@ pub use classes::ClassRaster;
 mod polygons;
 mod shapefile;
 pub use polygons::read_polygons;
+mod given;
+pub use given::{GivenFeature, GivenShape, read_given};
 mod write;
 pub use write::{write_classes, write_heights};

@@ -10,6 +10,8 @@ mod mesh;
 pub use mesh::{Coordinates, MeshPlace, write_obj, write_ply};
 mod breaches;
 pub use breaches::{BreachPlaces, breaches_geojson};
+mod map;
+pub use map::{heat, write_map};
 mod table;
 pub use table::{Align, Table, grouped};
 mod report;
