@@ -1,7 +1,10 @@
 //! The commands, one file each: its arguments, its help, and what it calls.
 
 mod build;
+mod compare;
+mod diff;
 mod fidelity;
+mod inadequate;
 mod init;
 mod plan;
 mod report;
@@ -34,10 +37,16 @@ pub enum Command {
     Verify(verify::Arguments),
     /// Measure how true a database is: residuals, line of sight, slope
     Fidelity(fidelity::Arguments),
+    /// Show where a database is not good enough, and what could be done
+    Inadequate(inadequate::Arguments),
+    /// Show what changed from one database to another
+    Diff(diff::Arguments),
     /// Write the built-in basin-and-range terrain as a GeoTIFF
     Sample(sample::Arguments),
     /// Make just a mesh from a raster
     Tin(tin::Arguments),
+    /// Compare methods on a raster: points, residuals, equivalent points, times
+    Compare(compare::Arguments),
 }
 
 impl Command {
@@ -55,8 +64,11 @@ impl Command {
             Command::Report(arguments) => report::run(&arguments),
             Command::Verify(arguments) => verify::run(&arguments),
             Command::Fidelity(arguments) => fidelity::run(&arguments),
+            Command::Inadequate(arguments) => inadequate::run(&arguments),
+            Command::Diff(arguments) => diff::run(&arguments),
             Command::Sample(arguments) => sample::run(&arguments),
             Command::Tin(arguments) => tin::run(&arguments),
+            Command::Compare(arguments) => compare::run(&arguments),
         }
     }
 }

@@ -2,7 +2,20 @@
 
 use crate::scene::Scene;
 
-const COMMANDS: [&str; 9] = ["build", "tile", "plan", "status", "report", "verify", "fidelity", "sample", "tin"];
+const COMMANDS: [&str; 12] = [
+    "build",
+    "tile",
+    "plan",
+    "status",
+    "report",
+    "verify",
+    "fidelity",
+    "inadequate",
+    "diff",
+    "sample",
+    "tin",
+    "compare",
+];
 
 #[test]
 fn the_help_of_every_command_has_an_example_of_it() {

@@ -6,6 +6,7 @@
 mod bad_input;
 mod bad_jobs;
 mod builds;
+mod comparing;
 mod full_disk;
 mod help;
 mod measures;
