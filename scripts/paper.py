@@ -54,8 +54,9 @@ def limits(name, module, window):
 
 def tell(report, asked):
     points, before = report["points"], report.get("before_removals")
-    sums = " + ".join(f"{points[kind]:,} {kind}" for kind in ("selected", "corner", "border"))
-    print(f"{asked:,} points asked for: {sums} = {points['total']:,}")
+    fixed = f"{points['corner']:,} corners + {points['border']:,} on the border"
+    total = asked + points["corner"] + points["border"]
+    print(f"{asked:,} selected + {fixed} = {total:,}; in the load modules: {points['total']:,}")
     removed = f"after {before['removed']:,} points made room" if before else "as cut"
     if before:
         print(limits("before points made room", before["per_load_module"], before["per_4km"]))

@@ -1,5 +1,7 @@
 //! The numbers of a finished build, as the report gives them. Times are added by whoever holds the clock.
 
+use std::collections::BTreeSet;
+
 use database::{
     Report, ReportBefore, ReportBreach, ReportClass, ReportPerModule, ReportPerWindow, ReportPoints, ReportPool,
     ReportRefusals, ReportResidual, ReportStops, ReportVoids, Totals,
@@ -161,7 +163,8 @@ impl Findings<'_> {
         let before = self.enforced.before.as_ref()?;
         let counts: Vec<u32> = before.iter().map(|numbers| counted(self.run, numbers)).collect();
         Some(ReportBefore {
-            removed: self.enforced.removed.iter().map(|points| points.len() as u64).sum(),
+            // A point on a line between tiles is in the lists of both.
+            removed: self.enforced.removed.iter().flatten().collect::<BTreeSet<_>>().len() as u64,
             per_load_module: self.per_module(&counts),
             per_4km: self.per_window(&counts),
         })

@@ -1255,7 +1255,7 @@ fn a_start_is_a_file_or_a_method_with_a_number_of_points() {
         "method",
         r#"start = { method = "highlow", points = 5 }"#,
         &[
-            r#"a/b.toml:18: tin.start.points: found 5 with method = "highlow", expected no number, which is"#,
+            r#"a/b.toml:18: tin.start.points: found 5 beside method = "highlow", expected no number, which is"#,
             "the ground's choice",
             "hint: it takes all peaks and pits: leave points out",
         ],

@@ -130,12 +130,12 @@ fn load(path: &Path) -> Result<Job, Failure> {
     Ok(Job::load_with(path, &compiler::find_area)?)
 }
 
-/// When no method could do what was asked, that is an error.
+/// When no method could make the points it was asked for, that is an error.
 fn refuse_all(found: &Comparison) -> Result<(), Failure> {
-    match found.rows.iter().map(|row| row.made.as_ref()).collect::<Result<Vec<_>, _>>() {
-        Err(why) if !found.rows.iter().any(|row| row.made.is_ok()) => {
-            Err(Failure::new(why.to_string(), why.hint.clone()))
-        }
+    let mut asked = found.rows.iter().filter(|row| row.asked.is_some());
+    let first = asked.clone().find_map(|row| row.made.as_ref().err());
+    match first {
+        Some(why) if asked.all(|row| row.made.is_err()) => Err(Failure::new(why.to_string(), why.hint.clone())),
         _ => Ok(()),
     }
 }
