@@ -1,6 +1,6 @@
 //! Methods side by side: the figures of the founding paper's kind, on real ground where it is there.
 
-use std::path::PathBuf;
+use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
 use compiler::{
@@ -108,7 +108,7 @@ fn equivalent_points_are_the_fewest_whose_iterative_tin_is_better() {
     }
 }
 
-fn sample(path: &PathBuf) {
+fn sample(path: &Path) {
     let spacing = terrain::Spacing::from_metres(25.0).unwrap();
     compiler::sample(3, 161, spacing, path, None).unwrap();
 }

@@ -19,7 +19,7 @@ fn words(tin: &str) -> Words {
 }
 
 fn tins(scene: &Scene, folder: &str) -> Vec<TileTin> {
-    let folder = Folder::new(&scene.path(folder));
+    let folder = Folder::new(scene.path(folder));
     (0..9).map(|i| folder.read_tile(tile(i / 3, i % 3)).unwrap().1).collect()
 }
 
