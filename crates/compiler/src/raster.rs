@@ -307,8 +307,9 @@ impl<'a> TinJob<'a> {
             let points = shares.as_ref().map(|shares| shares[index]);
             let mut task = self.task(tile, self.tiling.owned_sides(tile), posts_of(&seeds), points);
             let dem = dem.window(task.rect);
-            let given = self.start(&dem)?;
-            // All vertices count, so what a tile starts from leaves fewer to select.
+            // All vertices count, so a tile starts from no more than its share, and that leaves fewer to select.
+            let mut given = self.start(&dem)?;
+            given.truncate(points.unwrap_or(usize::MAX));
             let started = start_posts(&given, task.rect, task.seams).len();
             task.stop.points = task.stop.points.map(|points| points.saturating_sub(started));
             let window = Window { importance: weights(&dem), dem, given };

@@ -122,3 +122,21 @@ fn pins_that_cannot_be_are_refused_before_anything_is_written() {
     scene.run_to(2, &["build", "job.toml", "--out", "a.tdb", "--quiet"]).check_error(&["tin.pins", "pins.geojson"]);
     assert!(!scene.path("a.tdb/database.json").exists());
 }
+
+#[test]
+fn a_mesh_starts_from_what_another_method_chooses() {
+    let scene = with_dem();
+    for tiles in ["1x1", "2x2"] {
+        let start = ["tin", "dem.tif", "--points", "300", "--tiles", tiles, "--method", "paper", "--out", "m.ply"];
+        let plain = json(scene.run_to(0, &[&start[..], &["--json"]].concat()).stdout.lines().last().unwrap());
+        let given = ["--start", "vip:100", "--json"];
+        let started = json(scene.run_to(0, &[&start[..], &given].concat()).stdout.lines().last().unwrap());
+        assert_eq!((&plain["points"], &started["points"]), (&Value::from(300), &Value::from(300)), "{tiles}");
+        // VIP's points are no help.
+        assert!(plain["residual"]["rms_m"].as_f64() < started["residual"]["rms_m"].as_f64());
+    }
+    let wrong =
+        |start: &str| scene.run_to(2, &["tin", "dem.tif", "--points", "9", "--start", start, "--out", "m.ply"]).stderr;
+    assert!(wrong("vip").contains("vip:1000") && wrong("vpi:5").contains("fowler-little"));
+    assert!(wrong("highlow:5").contains("highlow alone"));
+}
