@@ -167,6 +167,7 @@ fn propose(
 ) -> Result<Vec<Removal>, CompileError> {
     let over = need.over();
     let area = &run.area;
+    let pins = run.ground.given.pinned();
     let proposals = schedule::for_each_independent(&area.tiles, &run.workers, run.stop, |_, &tile| {
         let modules = area.tiling.modules(tile, area.grid);
         let layout = Layout { grid: area.grid, modules, spacing: area.frame.spacing };
@@ -175,7 +176,7 @@ fn propose(
             return Ok(Vec::new());
         }
         let window = run.ground.around(area, tile, halo_posts(area.grid.side_cells))?;
-        let ground = RemovalGround { dem: &window.dem, mask: &window.importance, pins: &[], over: &over };
+        let ground = RemovalGround { dem: &window.dem, mask: &window.importance, pins: &pins, over: &over };
         Ok(propose_removals(&points_around(run, &|index| &tins[index], removed, tile), &layout, &ground))
     });
     let proposals = proposals.map_err(|error| CompileError::from_schedule(Stage::Enforce, &area.tiles, error))?;

@@ -11,6 +11,7 @@ use terrain::{Dem, GridFrame, Importance, PostRect, TileId};
 
 use crate::area::GamingArea;
 use crate::census::Census;
+use crate::given::{GamingAreaFrame, Given, GivenPost};
 use crate::large::WHOLE_BYTES_MAX;
 use crate::mask_of::{Fault, Opening};
 use crate::relief::Relief;
@@ -30,6 +31,8 @@ pub(crate) struct Ground {
     rect: PostRect,
     frame: GridFrame,
     kept: Option<Vec<OnceLock<Arc<Window>>>>,
+    /// Points that the job gives.
+    pub given: Given,
     /// Voids of the source under the area.
     pub voids: VoidSummary,
     /// Vertical accuracy of the least accurate source that states one, in metres.
@@ -42,6 +45,8 @@ pub(crate) struct Ground {
 pub(crate) struct Window {
     pub dem: Dem,
     pub importance: Importance,
+    /// Posts that the job gives, of a tile's own window; none of any other.
+    pub given: Vec<GivenPost>,
 }
 
 impl Window {
@@ -92,8 +97,8 @@ impl Ground {
         let mask = Opening { job, area, relief: &relief, fault: &fault }.mask(polygons)?;
         let keep = area.rect.post_count() <= KEPT_POSTS_MAX;
         let kept = keep.then(|| area.tiles.iter().map(|_| OnceLock::new()).collect());
-        let (rect, frame) = (area.rect, area.frame);
-        let mut ground = Self { relief, mask, fault, rect, frame, kept, voids, warnings, accuracy_m };
+        let (rect, frame, given) = (area.rect, area.frame, Given::open(job, area)?);
+        let mut ground = Self { relief, mask, fault, rect, frame, kept, given, voids, warnings, accuracy_m };
         if !ground.relief.has_source_posts() {
             ground.take_census(job, area, workers, stop)?;
         }
@@ -112,7 +117,7 @@ impl Ground {
             let Some(patch) = self.relief.patch(area.tiling.rect(tile))? else { return Ok(Census::new()) };
             let census = Census::of(&patch, area.rect);
             if let Some(kept) = &self.kept {
-                let window = Arc::new(self.with_importance(patch.dem())?);
+                let window = Arc::new(self.with_given(area, tile, self.with_importance(patch.dem())?)?);
                 kept[area.tiling.index(tile)].get_or_init(|| window);
             }
             Ok(census)
@@ -133,11 +138,17 @@ impl Ground {
         Ok(())
     }
 
+    /// Weights and classes as the job and its pins have them.
     fn with_importance(&self, dem: Dem) -> Result<Window, CompileError> {
         let importance = mask::importance(&self.mask, self.rect, &self.frame, dem.rect());
         self.fault.take()?;
-        let importance = mask::without_voids(importance, &dem);
-        Ok(Window { dem, importance })
+        let place = GamingAreaFrame { rect: self.rect, frame: self.frame };
+        let importance = mask::without_voids(self.given.weigh(importance, &place), &dem);
+        Ok(Window { dem, importance, given: Vec::new() })
+    }
+
+    fn with_given(&self, area: &GamingArea, tile: TileId, window: Window) -> Result<Window, CompileError> {
+        Ok(Window { given: self.given.of_tile(area, tile, &window.dem)?, ..window })
     }
 
     /// The ground of one tile, made once where memory allows.
@@ -146,12 +157,13 @@ impl Ground {
     /// When the source has no heights there.
     pub fn tile(&self, area: &GamingArea, tile: TileId) -> Result<Arc<Window>, CompileError> {
         let rect = area.tiling.rect(tile);
-        let Some(kept) = &self.kept else { return self.window(rect).map(Arc::new) };
+        let fresh = || self.with_given(area, tile, self.window(rect)?).map(Arc::new);
+        let Some(kept) = &self.kept else { return fresh() };
         let slot = &kept[area.tiling.index(tile)];
         if let Some(window) = slot.get() {
             return Ok(window.clone());
         }
-        let window = Arc::new(self.window(rect)?);
+        let window = fresh()?;
         Ok(slot.get_or_init(|| window).clone())
     }
 
@@ -178,7 +190,7 @@ impl Ground {
                 heights[to as usize..][..cols.len()].copy_from_slice(part);
             }
         });
-        Ok(Window { dem, importance: join_importance(&parts, rect) })
+        Ok(Window { dem, importance: join_importance(&parts, rect), given: Vec::new() })
     }
 
     /// The ground of any rectangle of the area.

@@ -32,6 +32,13 @@ mod verify;
 pub use verify::{Verdict, verify};
 mod raster;
 pub use raster::{Mesh, TinMethod, TinRequest, sample, tin};
+mod compare;
+pub use compare::{
+    CompareEvent, CompareGround, CompareMethod, CompareRequest, CompareRow, Comparison, Equivalent, Forced, Impossible,
+    Made, compare,
+};
+mod inadequate;
+pub use inadequate::{Component, Inadequate, inadequate};
 mod measures;
 pub use fidelity::{LineOfSight, SlopeDifference};
 pub use measures::{BuiltResidual, DatabaseFidelity, Measures, Sights, fidelity, measure};
@@ -52,6 +59,7 @@ mod census;
 mod coarse;
 mod datums;
 mod enforce;
+mod given;
 mod ground;
 mod large;
 mod mask_of;

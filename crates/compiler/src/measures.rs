@@ -5,7 +5,7 @@ use std::sync::atomic::AtomicBool;
 
 use database::{Fingerprint, Folder, Manifest, ManifestState, SourceRecord, Totals};
 use fidelity::{LineOfSight, SlopeDifference, Triangles, line_of_sight, slope};
-use job::{DemSource, Job, SourceEntry, SourceFile, SourceSaid, Voids};
+use job::{DemSource, Job, NamedFile, SourceEntry, SourceFile, SourceSaid, Voids};
 use schedule::Workers;
 use terrain::{Dem, Metres, QUANTA_PER_METRE};
 
@@ -75,8 +75,9 @@ pub fn fidelity(folder: &Path, against: Option<&Path>, sights: Sights) -> Result
         return Err(CompileError::Unfinished { path: folder.dir().display().to_string() });
     }
     let (mut job, area) = job_of(&manifest, folder.dir())?;
-    // No weight changes a figure.
+    // No weight and no point that was given changes a figure.
     job.importance.areas.clear();
+    (job.tin.start, job.tin.pins) = (None, None);
     let against = choose_ground(&mut job, &manifest, folder.dir(), against)?;
     let ground = Ground::open(&job, &area, &Workers::new(1), &AtomicBool::new(false))?;
     let dem = ground.window(area.rect)?.dem;
@@ -129,6 +130,9 @@ pub(crate) fn choose_ground(
     folder: &Path,
     against: Option<&Path>,
 ) -> Result<String, CompileError> {
+    let water = job.dem.water.as_mut().map(|water| &mut water.file);
+    let shaping = job.dem.geoids.iter_mut().map(|geoid| &mut geoid.file).chain(water);
+    locate(shaping, manifest, folder)?;
     if let Some(path) = against {
         let (written, said) = (path.display().to_string(), SourceSaid::default());
         let files = vec![SourceFile { written: written.clone(), path: path.into(), said: said.clone() }];
@@ -146,6 +150,19 @@ pub(crate) fn choose_ground(
             Ok(names.join(", "))
         }
     }
+}
+
+/// Points names at the files that a database was built from.
+pub(crate) fn locate<'a>(
+    files: impl Iterator<Item = &'a mut NamedFile>,
+    manifest: &Manifest,
+    folder: &Path,
+) -> Result<(), CompileError> {
+    for file in files {
+        let record = manifest.sources.iter().find(|record| record.path == file.written);
+        file.path = find_source(record, folder)?;
+    }
+    Ok(())
 }
 
 /// A raster a database was built from. Its path is written as the job has it, and the job may have lain anywhere; but

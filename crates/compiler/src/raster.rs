@@ -9,16 +9,17 @@ use database::ReportResidual;
 use fidelity::Tally;
 use geometry::WORKING_POSTS_MAX;
 use geometry::owned::{PostGrid, visit_residuals};
-use job::{ErrorKey, Optimising};
+use job::{ErrorKey, Optimising, StartMethod};
 use schedule::{Event as Scheduled, RankedTasks, Workers, in_rank_order_observed};
 use source_files::{DemFile, Reading, VoidPolicy, write_classes, write_heights};
 use terrain::{
-    Dem, GainCurve, GridFrame, Importance, LATTICE_PER_POST, LatticePoint, ModuleGrid, Post, PostRect, SeamSides,
-    Spacing, StopReason, THOUSANDTHS, TileId, TileTin, Tin, Vertex, quanta_of_metres,
+    Dem, GainCurve, GridFrame, Importance, LATTICE_PER_POST, LatticePoint, Metres, ModuleGrid, Post, PostRect,
+    SeamSides, Spacing, StopReason, THOUSANDTHS, TileId, TileTin, Tin, Vertex, quanta_of_metres,
 };
 use tiling::{Gains, Order, Tiling, points_equally, points_globally};
 use tin::{CostUnit, Frame, LastBatch, Proximity, Rule, Stop, SurveyTask, TileTask};
 
+use crate::given::{GivenPost, chosen, refused, start_posts};
 use crate::ground::Window;
 use crate::refinement::{Most, Refinement};
 use crate::sources::decode;
@@ -57,6 +58,8 @@ pub struct TinRequest {
     pub max_residual_m: Option<f64>,
     /// RMS residual to reach, in metres.
     pub rms_m: Option<f64>,
+    /// What tiles start from beside their corners: a method, and points of it in all.
+    pub start: Option<(StartMethod, usize)>,
     /// Rows and columns of tiles.
     pub tiles: (u32, u32),
     /// Tiles at once.
@@ -112,7 +115,7 @@ pub fn tin(request: &TinRequest, stop: &AtomicBool, progress: &mut dyn Progress)
     let exhausted = tiles.iter().any(|tile| tile.stop == StopReason::Exhausted);
     let stop = if exhausted { StopReason::Exhausted } else { tiles[0].stop };
     let tin = join(dem.rect(), &tiles);
-    let residual = residual(&dem, &tin);
+    let residual = crate::report::residual_of(&tally_of(&dem, &tin));
     progress.tell(Event::Leave(Stage::Assemble));
     Ok(Mesh {
         points: tin.vertices.len(),
@@ -127,11 +130,24 @@ pub fn tin(request: &TinRequest, stop: &AtomicBool, progress: &mut dyn Progress)
     })
 }
 
+/// The TIN of one tile without load modules, over all of `dem`.
+///
+/// # Errors
+/// When the request does not fit the ground.
+pub(crate) fn untiled(request: &TinRequest, dem: &Dem, spacing_m: [f64; 2]) -> Result<TileTin, CompileError> {
+    let job = TinJob::new(request, dem, spacing_m)?;
+    let tile = job.tiles[0];
+    let task = job.task(tile, SeamSides::CLOSED, Vec::new(), job.points().map(|points| points as usize));
+    let window = Window { importance: weights(dem), dem: dem.clone(), given: Vec::new() };
+    Ok(job.refinement(task).run(&window, &[]))
+}
+
 /// A request, checked against its raster.
 struct TinJob<'a> {
     request: &'a TinRequest,
     tiling: Tiling,
     tiles: Vec<TileId>,
+    spacing: Metres,
     rule: Rule,
     value: Option<u64>,
 }
@@ -166,7 +182,7 @@ impl<'a> TinJob<'a> {
             },
         };
         let tiles = tiling.tiles().collect();
-        Ok(Self { request, tiling, tiles, rule, value })
+        Ok(Self { request, tiling, tiles, spacing: Metres(spacing_m[0]), rule, value })
     }
 
     /// Points to select in all: those asked for less the corners of tiles.
@@ -204,6 +220,7 @@ impl<'a> TinJob<'a> {
             border: Vec::new(),
             inherited,
             kept: Vec::new(),
+            start: Vec::new(),
             seams: SeamSides::from_fn(|side| seams.is_open(side) || outer.is_open(side)),
             rule: self.rule.clone(),
             stop: Stop {
@@ -252,6 +269,15 @@ impl<'a> TinJob<'a> {
         Ok(Some(curves))
     }
 
+    /// What a tile starts from beside its corners.
+    fn start(&self, dem: &Dem) -> Result<Vec<GivenPost>, CompileError> {
+        let Some((method, points)) = self.request.start else { return Ok(Vec::new()) };
+        let ground = methods::Ground { dem, spacing: self.spacing };
+        let share = points.div_ceil(self.tiles.len());
+        let posts = chosen(&ground, method, share).map_err(|why| refused("--start", method, why))?;
+        Ok(posts.into_iter().map(|at| GivenPost { at, pinned: false, outer: false, height: None }).collect())
+    }
+
     fn refine(
         &self,
         dem: &Dem,
@@ -279,9 +305,14 @@ impl<'a> TinJob<'a> {
             };
             let seeds = inherited(&self.tiling, tile, published);
             let points = shares.as_ref().map(|shares| shares[index]);
-            let task = self.task(tile, self.tiling.owned_sides(tile), posts_of(&seeds), points);
+            let mut task = self.task(tile, self.tiling.owned_sides(tile), posts_of(&seeds), points);
             let dem = dem.window(task.rect);
-            let window = Window { importance: weights(&dem), dem };
+            // All vertices count, so a tile starts from no more than its share, and that leaves fewer to select.
+            let mut given = self.start(&dem)?;
+            given.truncate(points.unwrap_or(usize::MAX));
+            let started = start_posts(&given, task.rect, task.seams).len();
+            task.stop.points = task.stop.points.map(|points| points.saturating_sub(started));
+            let window = Window { importance: weights(&dem), dem, given };
             let done = self.refinement(task).run(&window, &seeds);
             assert!(slots[index].set(done).is_ok(), "each tile is refined once");
             Ok(())
@@ -314,10 +345,7 @@ fn refuse(request: &TinRequest, rect: PostRect, longest: usize, spacing_m: [f64;
         let found = format!("{} x {} posts", rect.posts_high(), rect.posts_wide());
         return impossible("DEM", found, "at least 2 x 2 posts", "a mesh needs ground to cover");
     }
-    if 1e-6 * spacing_m[0] < (spacing_m[0] - spacing_m[1]).abs() {
-        let found = format!("posts {} m by {} m apart", spacing_m[0], spacing_m[1]);
-        return impossible("DEM", found, "square posts", "resample it first: gdalwarp -tr 25 25 in.tif out.tif");
-    }
+    refuse_spacing(spacing_m)?;
     let corners = (rows as usize + 1) * (cols as usize + 1);
     match request.points {
         Some(points) if points < corners => impossible(
@@ -336,6 +364,19 @@ fn refuse(request: &TinRequest, rect: PostRect, longest: usize, spacing_m: [f64;
         }
         _ => Ok(()),
     }
+}
+
+/// Refuses posts that are farther apart in one direction than in the other.
+pub(crate) fn refuse_spacing(spacing_m: [f64; 2]) -> Result<(), CompileError> {
+    if (spacing_m[0] - spacing_m[1]).abs() <= 1e-6 * spacing_m[0] {
+        return Ok(());
+    }
+    Err(CompileError::Impossible {
+        key: "DEM".into(),
+        found: format!("posts {} m by {} m apart", spacing_m[0], spacing_m[1]),
+        expected: "square posts".into(),
+        hint: "resample it first: gdalwarp -tr 25 25 in.tif out.tif".into(),
+    })
 }
 
 /// Voids are never selected.
@@ -368,13 +409,13 @@ fn join(rect: PostRect, tiles: &[TileTin]) -> Tin {
     joined
 }
 
-/// Residuals at every post that is not void, each counted once.
-fn residual(dem: &Dem, tin: &Tin) -> ReportResidual {
+/// Residuals at every post that a TIN covers and that is not void, each counted once.
+pub(crate) fn tally_of(dem: &Dem, tin: &Tin) -> Tally {
     let mut tally = Tally::default();
     for triangle in &tin.triangles {
         visit_triangle(dem, triangle.map(|v| tin.vertices[v as usize]), &mut tally);
     }
-    crate::report::residual_of(&tally)
+    tally
 }
 
 fn visit_triangle(dem: &Dem, corners: [Vertex; 3], tally: &mut Tally) {

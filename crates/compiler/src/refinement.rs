@@ -3,9 +3,10 @@
 use job::{Effort, HeightFit, Job, Lattice, Method, Optimising};
 use limits::Allowance;
 use optimiser::{Budget, Optimised, Task, fill, optimise, overshoot};
-use terrain::{Dem, LatticePoint, THOUSANDTHS, TileTin, Tin, Vertex};
+use terrain::{Dem, LatticePoint, PostRect, THOUSANDTHS, TileTin, Tin, Vertex};
 use tin::{Frame, Rule, Stop, TileTask};
 
+use crate::given::{GivenPost, border_posts, start_posts};
 use crate::ground::Window;
 
 /// Room in a window of load modules while a tile is grown beyond its budget.
@@ -43,6 +44,19 @@ impl Refinement {
     /// Refines the tile. `seeds` are the vertices it inherits or keeps, at the heights they were published with,
     /// whatever the DEM says today.
     pub fn run(&self, window: &Window, seeds: &[Vertex]) -> TileTin {
+        if window.given.is_empty() {
+            return self.run_given(window, seeds);
+        }
+        let mut own = self.clone();
+        give(&mut own.task, &window.given, window.dem.rect());
+        // What is inherited stands as it was published.
+        let is_free = |post: &&GivenPost| !seeds.iter().any(|seed| seed.at == post.at.into());
+        let given = window.given.iter().filter(is_free);
+        let heights = given.filter_map(|post| Some(Vertex { at: post.at.into(), height: post.height? }));
+        own.run_given(window, &heights.chain(seeds.iter().copied()).collect::<Vec<_>>())
+    }
+
+    fn run_given(&self, window: &Window, seeds: &[Vertex]) -> TileTin {
         let grown = |task: &TileTask| {
             let level = geometry::widest_level();
             let differs = |seed: &Vertex| seed.at.post().is_some_and(|post| window.dem.height(post) != seed.height);
@@ -91,9 +105,11 @@ impl Refinement {
 
     fn optimisation(&self, optimising: Optimising, initial: u32) -> Task {
         let task = &self.task;
-        let held = [&task.border, &task.inherited, &task.kept].into_iter().flatten();
+        let held = [&task.border, &task.inherited, &task.kept].into_iter().flatten().copied();
+        let pinned = task.start.iter().filter(|start| start.pinned).map(|start| start.at);
+        let held = held.chain(pinned);
         // Tiles that meet in a corner only agree on it because none of them fits it.
-        let held = held.copied().chain(task.rect.corners()).map(LatticePoint::from).collect();
+        let held = held.chain(task.rect.corners()).map(LatticePoint::from).collect();
         let budget = match (task.ledger(), self.most) {
             (Some(ledger), _) => Budget::Limits(ledger),
             (None, Most::Triangles(most)) => Budget::Triangles(most),
@@ -136,6 +152,16 @@ impl Refinement {
             ..grown
         }
     }
+}
+
+/// Adds what a job gives to a tile's task: points on the area's border to its border, others to what it starts from.
+pub(crate) fn give(task: &mut TileTask, given: &[GivenPost], rect: PostRect) {
+    task.start = start_posts(given, rect, task.seams);
+    task.start.retain(|start| !task.kept.contains(&start.at));
+    let outer: Vec<_> = border_posts(given).filter(|post| !task.border.contains(post)).collect();
+    task.border.extend(outer);
+    let pinned = task.start.iter().filter(|start| start.pinned).count();
+    task.stop.points = task.stop.points.map(|points| points.saturating_sub(pinned));
 }
 
 fn effort(optimising: Optimising) -> optimiser::Effort {

@@ -1,10 +1,10 @@
 //! The numbers of a finished build, as the report gives them. Times are added by whoever holds the clock.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use database::{
-    Report, ReportBreach, ReportClass, ReportPerModule, ReportPerWindow, ReportPoints, ReportPool, ReportRefusals,
-    ReportResidual, ReportStops, ReportVoids, Totals,
+    Report, ReportBefore, ReportBreach, ReportClass, ReportPerModule, ReportPerWindow, ReportPoints, ReportPool,
+    ReportRefusals, ReportResidual, ReportStops, ReportVoids, Totals,
 };
 use fidelity::{Residuals, Tally};
 use job::Count;
@@ -59,6 +59,7 @@ impl Findings<'_> {
             per_load_module: self.per_module(&counts),
             per_4km: self.per_window(&counts),
             pool: self.pool(&counts),
+            before_removals: self.before_removals(),
             residual: residual_of(&total),
             residual_against_source: run.ground.relief.has_source_posts().then(|| self.at_source(&total)),
             classes: self.classes(&residuals),
@@ -158,6 +159,17 @@ impl Findings<'_> {
             over: sums.iter().filter(|&&sum| budget.per_window < sum).count() as u64,
             worst_9x9: largest(&wider),
         }
+    }
+
+    fn before_removals(&self) -> Option<ReportBefore> {
+        let before = self.enforced.before.as_ref()?;
+        let counts: Vec<u32> = before.iter().map(|numbers| counted(self.run, numbers)).collect();
+        Some(ReportBefore {
+            // A point on a line between tiles is in the lists of both.
+            removed: self.enforced.removed.iter().flatten().collect::<BTreeSet<_>>().len() as u64,
+            per_load_module: self.per_module(&counts),
+            per_4km: self.per_window(&counts),
+        })
     }
 
     fn pool(&self, counts: &[u32]) -> ReportPool {

@@ -117,7 +117,10 @@ impl Run<'_> {
         window: &Window,
         feed: impl FnOnce(FingerprintBuilder) -> FingerprintBuilder,
     ) -> Stamp {
-        let builder = FingerprintBuilder::new(purpose).heights(&window.dem).importance(&window.importance);
+        let mut builder = FingerprintBuilder::new(purpose).heights(&window.dem).importance(&window.importance);
+        if !window.given.is_empty() {
+            builder = builder.text(&format!("{:?}", window.given));
+        }
         Stamp { algorithm_revision: ALGORITHM_REVISION, fingerprint: feed(builder).finish() }
     }
 }

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
 use database::{Fingerprint, SourceRecord};
-use job::{AreaShape, DemSource, Job, Resampling, SourceFile, SourceSaid, Voids};
+use job::{AreaShape, DemSource, Job, Resampling, SourceFile, SourceSaid, Start, Voids};
 use schedule::Workers;
 use source_files::{
     Crs, DemFile, Mosaic, MosaicRules, MosaicVoids, Raster, RasterFrame, Reading, SourceError, VoidPolicy, VoidSummary,
@@ -254,6 +254,12 @@ pub(crate) fn records(job: &Job) -> Result<Vec<SourceRecord>, CompileError> {
     }
     if let Some(water) = &job.dem.water {
         records.push(file_record(&water.file.written, &water.file.path)?);
+    }
+    if let Some(Start::File(file)) = &job.tin.start {
+        records.push(file_record(&file.written, &file.path)?);
+    }
+    if let Some(file) = &job.tin.pins {
+        records.push(file_record(&file.written, &file.path)?);
     }
     for area in &job.importance.areas {
         match &area.shape {

@@ -7,7 +7,7 @@ use tiling::{Allocation, Gains, allocate_equally, allocate_globally, points_equa
 use tin::SurveyTask;
 
 use crate::coarse::coarse;
-use crate::refinement::optimising;
+use crate::refinement::{give, optimising};
 use crate::run::{Run, Worked};
 use crate::tasks::{TileBudget, is_surveyed, is_surveyed_in_haste, survey_task};
 use crate::{CompileError, Event, Progress, Stage};
@@ -31,8 +31,12 @@ pub(crate) fn survey(run: &Run, progress: &mut dyn Progress) -> Result<Option<Ve
 
 /// Surveys a tile, or keeps what is published and fresh; with the stamp of what it is made from.
 pub(crate) fn survey_tile(run: &Run, tile: TileId) -> Result<(Stamp, Worked<GainCurve>), CompileError> {
-    let (window, task) = (run.window(tile)?, survey_task(run.job, &run.area, tile));
-    let coarse = if is_surveyed_in_haste(run.job) { coarse(&window, &task) } else { None };
+    let (window, mut task) = (run.window(tile)?, survey_task(run.job, &run.area, tile));
+    let is_given = !window.given.is_empty();
+    if is_given {
+        give(&mut task.growth, &window.given, window.dem.rect());
+    }
+    let coarse = if is_surveyed_in_haste(run.job) && !is_given { coarse(&window, &task) } else { None };
     let (window, task) = match &coarse {
         Some((window, task)) => (window, task),
         None => (&*window, &task),

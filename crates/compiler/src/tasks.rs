@@ -50,6 +50,7 @@ fn tile_task(job: &Job, area: &GamingArea, tile: TileId, budget: &TileBudget, in
         border: outer_border_posts(rect, border_sides, job.modules.border_step_cells),
         inherited,
         kept: Vec::new(),
+        start: Vec::new(),
         seams,
         rule: rule(job, area),
         stop: Stop {

@@ -44,8 +44,8 @@ pub use manifest::{
 };
 mod report;
 pub use report::{
-    Report, ReportBound, ReportBreach, ReportClass, ReportPerModule, ReportPerWindow, ReportPlace, ReportPoints,
-    ReportPool, ReportRefusals, ReportResidual, ReportStage, ReportStops, ReportTile, ReportVoids,
+    Report, ReportBefore, ReportBound, ReportBreach, ReportClass, ReportPerModule, ReportPerWindow, ReportPlace,
+    ReportPoints, ReportPool, ReportRefusals, ReportResidual, ReportStage, ReportStops, ReportTile, ReportVoids,
 };
 mod lock;
 mod publish;

@@ -30,6 +30,9 @@ pub struct Report {
     pub per_4km: ReportPerWindow,
     /// Use of the pool.
     pub pool: ReportPool,
+    /// Use of limits before points made room for them, where any did (clipped edges).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub before_removals: Option<ReportBefore>,
     /// Against the working grid, every post counted once.
     pub residual: ReportResidual,
     /// Against the posts of the source DEM.
@@ -128,6 +131,17 @@ pub struct ReportPool {
     pub size: u64,
     /// Those it used.
     pub used: u64,
+}
+
+/// What was cut, before points were taken out for limits.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ReportBefore {
+    /// Points that were taken out.
+    pub removed: u64,
+    /// Use of `per_load_module`.
+    pub per_load_module: ReportPerModule,
+    /// Use of `per_4km_square`.
+    pub per_4km: ReportPerWindow,
 }
 
 /// How far posts lie from the triangles, in metres.
@@ -310,6 +324,7 @@ mod tests {
             per_load_module: ReportPerModule { mean: 32.0, mean_limit: 32.0, max: 32, limit: 100, over: 0 },
             per_4km: ReportPerWindow { max: 4100, limit: 4096, over: 1, worst_9x9: 4200 },
             pool: ReportPool::default(),
+            before_removals: Some(ReportBefore { removed: 3, ..ReportBefore::default() }),
             residual: ReportResidual { rms_m: 1.1, max_m: 9.0, mean_abs_m: 0.7, p95_m: 2.0, p99_m: 3.3 },
             residual_against_source: None,
             classes: vec![],

@@ -116,6 +116,7 @@ pub(crate) fn report() -> Report {
         per_load_module: ReportPerModule { mean: 3.0, mean_limit: 32.0, max: 4, limit: 3, over: 1 },
         per_4km: ReportPerWindow { max: 6, limit: 4096, over: 0, worst_9x9: 6 },
         pool: ReportPool { size: 0, used: 0 },
+        before_removals: None,
         residual,
         residual_against_source: None,
         classes: Vec::new(),

@@ -10,7 +10,7 @@ use std::io::Read;
 use std::path::{Component, Path, PathBuf};
 
 use crate::bounds::{JOB_BYTES_MAX, SOURCES_MAX};
-use crate::{AreaShape, DemSource, Fault, FindArea, Job, JobError, NamedFile, SourceFile, read};
+use crate::{AreaShape, DemSource, Fault, FindArea, Job, JobError, NamedFile, SourceFile, Start, read};
 
 /// A file that the job mentions: where its name stands in the job, and the fault to tell if it is not there.
 pub(crate) struct Mention {
@@ -25,6 +25,8 @@ pub(crate) enum Place {
     ImportanceArea(usize),
     Geoid(usize),
     Water,
+    Start,
+    Pins,
 }
 
 impl Job {
@@ -106,6 +108,11 @@ fn locate(job: &mut Job, mentions: Vec<Mention>) -> Result<(), JobError> {
                 AreaShape::Polygons { file } | AreaShape::RasterValue { file, .. } => Some(file),
                 AreaShape::Sample(_) | AreaShape::Slope { .. } => None,
             },
+            Place::Start => match &job.tin.start {
+                Some(Start::File(file)) => Some(file),
+                Some(Start::Method { .. }) | None => None,
+            },
+            Place::Pins => job.tin.pins.as_ref(),
         };
         named.map_or(Ok(()), |file| check_named(file, &folder, &fault))?;
     }

@@ -80,7 +80,7 @@ const TIN: &[Key] = &[
     ("effort", "effort = \"normal\""),
     ("height_fit", "height_fit = \"l2_keep_crests\""),
     ("lattice", "lattice = \"eighth\""),
-    ("start", "start = \"lattice\""),
+    ("start", "start = { method = \"vip\", points = 1000 }, or a file: start = \"points.csv\""),
     ("pins", "pins = \"pins.geojson\""),
 ];
 
@@ -135,6 +135,12 @@ const VOIDS: &[Key] = &[
     ("hole", "voids = { fill_within_posts = 8, hole = true }"),
 ];
 
+/// Keys of `tin.start` when it is a table.
+const START: &[Key] = &[
+    ("method", "start = { method = \"vip\", points = 1000 }"),
+    ("points", "start = { method = \"vip\", points = 1000 }"),
+];
+
 /// The keys of a table, by its place in the job: `area`, `dem.voids`, `importance.areas[3]`.
 fn table(place: &str) -> &'static [Key] {
     match place {
@@ -142,6 +148,7 @@ fn table(place: &str) -> &'static [Key] {
         "area.around" => AROUND,
         "dem.water" => WATER,
         _ if place.starts_with("dem.geoids[") => GEOIDS,
+        "tin.start" => START,
         _ if place.starts_with("dem.sources[") => SOURCES,
         _ if place.starts_with("importance.areas[") => AREAS,
         _ => SECTIONS.iter().find(|(name, _)| *name == place).map_or(&[], |(_, keys)| keys),

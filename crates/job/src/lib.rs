@@ -21,6 +21,8 @@ pub use model::{
 };
 mod ground;
 pub use ground::{GeoidSpec, WaterSpec};
+mod given;
+pub use given::{Start, StartMethod};
 mod find;
 pub use find::{AreaFound, AreaPlace, AreaRequest, FindArea, NoArea};
 mod error;

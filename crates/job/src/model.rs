@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use terrain::{ModuleGrid, Spacing};
 
-use crate::{GeoidSpec, WaterSpec};
+use crate::{GeoidSpec, Start, WaterSpec};
 
 /// All a run needs, as the job file says it, defaults filled in.
 #[derive(Clone, Debug, PartialEq)]
@@ -333,6 +333,10 @@ pub struct TinSpec {
     pub max_residual_m: Option<f64>,
     /// The RMS residual over the area at which choosing may end, in metres.
     pub target_rms_m: Option<f64>,
+    /// What tiles start from beside corners and borders.
+    pub start: Option<Start>,
+    /// Points to add and to leave out, heights, and ground that matters more or less.
+    pub pins: Option<NamedFile>,
 }
 
 /// By which method posts are chosen.

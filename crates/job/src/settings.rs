@@ -8,7 +8,7 @@ use terrain::{THOUSANDTHS, metres_of_quanta};
 use crate::{
     Allocation, AreaShape, Borders, Budget, ClipHeights, Count, DemSource, Edges, Effort, ErrorKey, GeoidSpec,
     HeightFit, ImportanceArea, Job, LastBatch, Lattice, Method, Optimising, Resampling, SampleClass, Smooth,
-    SourceEntry, TileOrder, Voids, WaterSpec,
+    SourceEntry, Start, TileOrder, TinSpec, Voids, WaterSpec,
 };
 
 /// One setting of a job.
@@ -291,6 +291,7 @@ impl Job {
         if let Some(metres) = tin.target_rms_m {
             list.add("tin.target_rms_m", number(metres), "choosing ends at this RMS residual over the area");
         }
+        describe_given(tin, list);
     }
 
     fn describe_batches(&self, list: &mut List) {
@@ -396,6 +397,23 @@ fn share(modules: u32, tiles: u32) -> String {
     if modules.is_multiple_of(tiles) { least.to_string() } else { format!("{least} or {}", least + 1) }
 }
 
+/// Points that the job gives.
+fn describe_given(tin: &TinSpec, list: &mut List) {
+    match &tin.start {
+        Some(Start::File(file)) => list.add("tin.start", quoted(&file.written), "points that tiles start from"),
+        Some(Start::Method { method, points }) => {
+            let name = quoted(method.name());
+            let points = points.map_or(String::new(), |points| format!(", points = {points}"));
+            let meaning = "tiles start from what that method chooses";
+            list.add("tin.start", format!("{{ method = {name}{points} }}"), meaning);
+        }
+        None => {}
+    }
+    if let Some(file) = &tin.pins {
+        let meaning = "points to add and to leave out, heights, and ground that matters more or less";
+        list.add("tin.pins", quoted(&file.written), meaning);
+    }
+}
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1233,23 +1233,37 @@ seed = -1"#,
 }
 
 #[test]
+fn a_start_is_a_file_or_a_method_with_a_number_of_points() {
+    check(
+        "method",
+        r#"start = { method = "vpi", points = 5 }"#,
+        &[
+            r#"a/b.toml:18: tin.start.method: found "vpi", expected "vip" or "highlow" or "lattice""#,
+            r#"or "fowler-little" or "hierarchical" or "earlier" or "regular" or "contour""#,
+            r#"hint: did you mean "vip"?"#,
+        ],
+    );
+    check(
+        "method",
+        r#"start = { method = "vip" }"#,
+        &[
+            "a/b.toml:18: tin.start.points: found nothing, expected a number of points to start from",
+            "hint: points = 1000: so many in the whole area",
+        ],
+    );
+    check(
+        "method",
+        r#"start = { method = "highlow", points = 5 }"#,
+        &[
+            r#"a/b.toml:18: tin.start.points: found 5 beside method = "highlow", expected no number, which is"#,
+            "the ground's choice",
+            "hint: it takes all peaks and pits: leave points out",
+        ],
+    );
+}
+
+#[test]
 fn what_this_version_cannot_do_yet_is_said() {
-    check(
-        "method",
-        r#"start = "lattice""#,
-        &[
-            r#"a/b.toml:18: tin.start: found "lattice" (not supported yet), expected a job without this key"#,
-            "hint: remove it: every tile starts from its corners and borders",
-        ],
-    );
-    check(
-        "method",
-        r#"pins = "pins.geojson""#,
-        &[
-            r#"a/b.toml:18: tin.pins: found "pins.geojson" (not supported yet), expected a job without this key"#,
-            "hint: remove it: every tile starts from its corners and borders",
-        ],
-    );
     check(
         "pool",
         "[lod]\nlevels = [{ inner_share = 0.5 }]",

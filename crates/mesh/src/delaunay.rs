@@ -25,8 +25,25 @@ const HULL: u32 = u32::MAX;
 /// # Panics
 /// When a point is listed twice.
 pub fn delaunay<P: Canonical>(points: &[P]) -> Vec<[u32; 3]> {
-    let mut mesh = Neighbours::of(points);
-    mesh.flip_to_canonical(points);
+    let library = DelaunayTriangulation::<Point2<f64>>::bulk_load_stable(places(points))
+        .expect("32-bit whole numbers are within the library's bounds");
+    canonical(&library, points, |_, _| false)
+}
+
+/// Points where the library wants them. Whole numbers below 2^53 are exact in its coordinates, and its predicates
+/// are exact.
+pub(crate) fn places<P: Canonical>(points: &[P]) -> Vec<Point2<f64>> {
+    points.iter().map(|p| Point2::new(f64::from(p.col()), f64::from(p.row()))).collect()
+}
+
+/// The triangles of what the library made of `points`, canonical but for edges that are `kept`.
+pub(crate) fn canonical<P, T>(library: &T, points: &[P], kept: impl Fn(u32, u32) -> bool) -> Vec<[u32; 3]>
+where
+    P: Canonical,
+    T: Triangulation<Vertex = Point2<f64>>,
+{
+    let mut mesh = Neighbours::of(library, points.len());
+    mesh.flip_to_canonical(points, kept);
     let mut triangles = mesh.corners;
     for triangle in &mut triangles {
         let first = (0..3).min_by_key(|&i| triangle[i]).expect("a triangle has three corners");
@@ -43,13 +60,9 @@ struct Neighbours {
 }
 
 impl Neighbours {
-    /// Some Delaunay triangulation, ties as the library decides. Whole numbers below 2^53 are exact in its
-    /// coordinates, and its predicates are exact.
-    fn of<P: Canonical>(points: &[P]) -> Self {
-        let places = points.iter().map(|p| Point2::new(f64::from(p.col()), f64::from(p.row()))).collect();
-        let library = DelaunayTriangulation::<Point2<f64>>::bulk_load_stable(places)
-            .expect("32-bit whole numbers are within the library's bounds");
-        assert_eq!(library.num_vertices(), points.len(), "points to triangulate are distinct");
+    /// What the library made, ties as it decides.
+    fn of<T: Triangulation<Vertex = Point2<f64>>>(library: &T, points: usize) -> Self {
+        assert_eq!(library.num_vertices(), points, "points to triangulate are distinct");
         let count = library.num_inner_faces();
         let (mut corners, mut beside) = (Vec::with_capacity(count), Vec::with_capacity(count));
         // The library numbers its outer face 0 and the triangles from 1.
@@ -61,18 +74,18 @@ impl Neighbours {
         Self { corners, beside }
     }
 
-    fn flip_to_canonical<P: Canonical>(&mut self, points: &[P]) {
+    fn flip_to_canonical<P: Canonical>(&mut self, points: &[P], kept: impl Fn(u32, u32) -> bool) {
         let mut open: VecDeque<(u32, u32)> = VecDeque::new();
         for t in 0..self.corners.len() as u32 {
             for side in 0..3 {
                 // Each side once: from the triangle with the smaller number.
                 if t < self.beside[t as usize][side as usize] {
-                    self.settle(points, (t, side), &mut open);
+                    self.settle(points, &kept, (t, side), &mut open);
                 }
             }
         }
         while let Some(side) = open.pop_front() {
-            self.settle(points, side, &mut open);
+            self.settle(points, &kept, side, &mut open);
         }
     }
 
@@ -87,7 +100,13 @@ impl Neighbours {
     ///       \ /              \|/
     ///        p                p
     /// ```
-    fn settle<P: Canonical>(&mut self, points: &[P], (t, side): (u32, u32), open: &mut VecDeque<(u32, u32)>) {
+    fn settle<P: Canonical>(
+        &mut self,
+        points: &[P],
+        kept: impl Fn(u32, u32) -> bool,
+        (t, side): (u32, u32),
+        open: &mut VecDeque<(u32, u32)>,
+    ) {
         let (t, i) = (t as usize, side as usize);
         if self.beside[t][i] == HULL {
             return;
@@ -97,7 +116,7 @@ impl Neighbours {
         let j = self.side_towards(u, t);
         let p = self.corners[u][(j + 2) % 3];
         let place = |v: u32| points[v as usize];
-        if !in_circle_canonical(place(a), place(b), place(c), place(p)) {
+        if kept(a, b) || !in_circle_canonical(place(a), place(b), place(c), place(p)) {
             return;
         }
         debug_assert!(0 < orient(place(a), place(p), place(c)) && 0 < orient(place(p), place(b), place(c)));

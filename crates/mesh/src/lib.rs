@@ -10,3 +10,5 @@ mod lines;
 pub use lines::Lines;
 mod delaunay;
 pub use delaunay::delaunay;
+mod constrained;
+pub use constrained::constrained_delaunay;

@@ -168,6 +168,9 @@ pub enum SourceError {
     /// The file names another coordinate system than the area's.
     #[error("{path}: coordinates are in {found}, which cannot be brought to the area's EPSG:{expected}")]
     PolygonCrs { path: PathBuf, found: String, expected: u32 },
+    /// A point or polygon that somebody gives is not one.
+    #[error("{path}: {place}: found {found}, expected {expected}")]
+    Given { path: PathBuf, place: String, found: String, expected: String },
 }
 
 impl SourceError {
@@ -224,6 +227,7 @@ impl SourceError {
             NotGeoJson { .. } => "give GeoJSON, a Shapefile or a GeoPackage; from others: ogr2ogr out.geojson in.…",
             NotPolygons { .. } | NoPolygons { .. } => "give polygons: ogr2ogr -where \"OGR_GEOMETRY='POLYGON'\" …",
             Ring { .. } => "repair it: ogr2ogr -makevalid out.geojson in.geojson",
+            Given { .. } => "give GeoJSON, or comma-separated values with a header: east,north,height_m",
             PolygonCrs { .. } => {
                 "project it: ogr2ogr -t_srs EPSG:… -lco RFC7946=NO out.geojson in.geojson (with the area's code)"
             }

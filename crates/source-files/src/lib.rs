@@ -50,5 +50,7 @@ mod geopackage;
 mod polygons;
 mod shapefile;
 pub use polygons::read_polygons;
+mod given;
+pub use given::{GivenFeature, GivenShape, read_given};
 mod write;
 pub use write::{write_classes, write_heights};

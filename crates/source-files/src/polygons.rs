@@ -95,7 +95,12 @@ fn look_like_degrees(polygons: &[Polygon]) -> bool {
 
 /// Polygons brought from `crs` to the area's system. Long sides get corners between, since what is straight in one
 /// system is not in the other.
-fn projected(path: &Path, polygons: Vec<Polygon>, crs: &Crs, epsg: u32) -> Result<Vec<Polygon>, SourceError> {
+pub(crate) fn projected(
+    path: &Path,
+    polygons: Vec<Polygon>,
+    crs: &Crs,
+    epsg: u32,
+) -> Result<Vec<Polygon>, SourceError> {
     /// Pieces of a side, at most.
     const PIECES_MAX: f64 = 1000.0;
     let piece = if crs.is_geographic() { 0.005 } else { 500.0 };
@@ -196,13 +201,13 @@ impl Collected<'_> {
     }
 }
 
-fn corner(position: &Position) -> Option<[f64; 2]> {
+pub(crate) fn corner(position: &Position) -> Option<[f64; 2]> {
     let &[east_m, north_m, ..] = position.as_slice() else { return None };
     (east_m.is_finite() && north_m.is_finite()).then_some([east_m, north_m])
 }
 
 /// The system that the `crs` member of a file names.
-fn said_in(path: &Path, json: &GeoJson) -> Result<Option<Crs>, SourceError> {
+pub(crate) fn said_in(path: &Path, json: &GeoJson) -> Result<Option<Crs>, SourceError> {
     let members: Option<&JsonObject> = match json {
         GeoJson::Geometry(geometry) => geometry.foreign_members.as_ref(),
         GeoJson::Feature(feature) => feature.foreign_members.as_ref(),

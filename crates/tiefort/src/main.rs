@@ -20,6 +20,7 @@ mod end_table;
 mod engines;
 mod events;
 mod failure;
+mod figures;
 mod files;
 mod fit;
 mod lines;

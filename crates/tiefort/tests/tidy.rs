@@ -29,7 +29,7 @@ const LAYERS: [&[&str]; 7] = [
 ];
 
 /// Who uses whom. A new arrow is an event: a commit of its own, with `ARCHITECTURE.md` changed in it.
-const ARROWS: [(&str, &[&str]); 21] = [
+const ARROWS: [(&str, &[&str]); 22] = [
     ("terrain", &[]),
     ("load-module-reader", &[]),
     ("load-module-reader-c", &["load-module-reader"]),
@@ -40,6 +40,7 @@ const ARROWS: [(&str, &[&str]); 21] = [
     ("tiling", &["terrain", "limits"]),
     ("tin", &["terrain", "geometry", "mesh", "limits"]),
     ("optimiser", &["terrain", "geometry", "limits"]),
+    ("methods", &["terrain", "geometry", "mesh"]),
     ("load-modules", &["terrain", "geometry", "mesh", "limits"]),
     ("fidelity", &["terrain", "geometry"]),
     ("sample-terrain", &["terrain"]),
@@ -57,6 +58,7 @@ const ARROWS: [(&str, &[&str]); 21] = [
             "tiling",
             "tin",
             "optimiser",
+            "methods",
             "load-modules",
             "fidelity",
             "sample-terrain",

@@ -49,7 +49,7 @@ pub(crate) fn grow<S: Simd>(
         Rule::WorstFirst | Rule::LargestSquares { .. } => 1,
     };
     let ground = Ground::new(simd, dem, importance, candidates(task.rect, task.seams), unit);
-    let sequence = Sequence::default();
+    let sequence = Sequence { refused: start.refused, ..Sequence::default() };
     let mut growth = Growth { tile: task.rect, ground, mesh: start.mesh, gate: start.gate, sequence };
     let stop = match &task.rule {
         Rule::WorstFirst => growth.run(Largest, &task.stop, witness),

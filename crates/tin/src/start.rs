@@ -2,16 +2,18 @@
 
 use geometry::{LocalPost, LocalRect};
 use mesh::{Lines, Mesh};
-use terrain::{PostRect, SeamSides};
+use terrain::{PostRect, Refusal, SeamSides};
 
 use crate::gate::Gate;
-use crate::task::{Frame, TileTask};
+use crate::task::{Frame, StartPost, TileTask};
 
 /// A mesh with its first vertices, in their order, and the gate to the next ones.
 pub(crate) struct Start {
     pub mesh: Mesh,
     pub vertices: Vec<LocalPost>,
     pub gate: Gate,
+    /// Posts to start from that limits keep out. Their residual is 0: no ground has been looked at.
+    pub refused: Vec<Refusal>,
 }
 
 impl Start {
@@ -23,9 +25,35 @@ impl Start {
             Frame::Sides { side_cells, .. } => Mesh::new(task.rect, Lines::every(*side_cells)),
         };
         let gate = task.ledger().map_or(Gate::Open, Gate::Limits);
-        let mut start = Self { vertices: first_corners(&mesh), mesh, gate };
+        let mut start = Self { vertices: first_corners(&mesh), mesh, gate, refused: Vec::new() };
         start.insert_all(task);
+        start.insert_given(task);
         start
+    }
+
+    /// What somebody gives: pins without asking, others as far as limits permit.
+    fn insert_given(&mut self, task: &TileTask) {
+        let mut hint = 0;
+        let (pinned, others): (Vec<StartPost>, Vec<StartPost>) = task.start.iter().partition(|start| start.pinned);
+        for StartPost { at, pinned } in pinned.into_iter().chain(others) {
+            let post = LocalPost::of(at, task.rect);
+            let triangle = self.mesh.triangle_at(post, hint);
+            if self.mesh.triangles()[triangle as usize].corners.contains(&post) {
+                continue;
+            }
+            if !pinned {
+                if let Some((module, by)) = self.gate.refuses(post) {
+                    self.refused.push(Refusal { post: at, module, residual: 0, by });
+                    continue;
+                }
+                if self.gate.is_spent() {
+                    continue;
+                }
+                self.gate.charge(post);
+            }
+            hint = self.mesh.insert(post, triangle)[0];
+            self.vertices.push(post);
+        }
     }
 
     fn insert_all(&mut self, task: &TileTask) {

@@ -18,6 +18,8 @@ pub struct TileTask {
     pub inherited: Vec<Post>,
     /// Border points on this tile's own seams that must stay as its neighbours hold them: paid for by this tile.
     pub kept: Vec<Post>,
+    /// Posts to start from beside those, in this order; none on a side that belongs to somebody else.
+    pub start: Vec<StartPost>,
     /// The sides on which this tile may choose posts.
     pub seams: SeamSides,
     /// Which post comes next.
@@ -38,8 +40,24 @@ impl TileTask {
         let local = |post: &Post| (post.row - self.rect.south, post.col - self.rect.west);
         self.inherited.iter().map(local).for_each(|(row, col)| ledger.inherit(row, col));
         self.kept.iter().map(local).for_each(|(row, col)| ledger.charge(row, col));
+        let pinned = self.start.iter().filter(|start| start.pinned && self.is_charged(start.at));
+        pinned.map(|start| local(&start.at)).for_each(|(row, col)| ledger.book(row, col));
         Some(ledger)
     }
+
+    /// Whether a post that is given costs what a chosen one does: those that are there anyway cost nothing.
+    pub(crate) fn is_charged(&self, post: Post) -> bool {
+        ![&self.border, &self.inherited, &self.kept].into_iter().any(|posts| posts.contains(&post))
+    }
+}
+
+/// A post that a tile starts from because somebody says so.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct StartPost {
+    /// The post.
+    pub at: Post,
+    /// Whether it is in whatever limits say; others are refused like any post.
+    pub pinned: bool,
 }
 
 /// What a tile starts from.

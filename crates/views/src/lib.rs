@@ -10,6 +10,8 @@ mod mesh;
 pub use mesh::{Coordinates, MeshPlace, write_obj, write_ply};
 mod breaches;
 pub use breaches::{BreachPlaces, breaches_csv, breaches_geojson};
+mod map;
+pub use map::{heat, write_map};
 mod page;
 pub use page::{Advice, Page, PageSetting, advise, report_html};
 mod picture;

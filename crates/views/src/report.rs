@@ -60,7 +60,20 @@ fn limits(report: &Report) -> Option<String> {
     table.row(["  largest 4 km square".into(), number(window.max), number(window.limit), number(window.over)]);
     table.row(["  largest 9 x 9 load modules".into(), number(window.worst_9x9), String::new(), String::new()]);
     table.row(["  pool".into(), number(pool.used), number(pool.size), String::new()]);
-    Some(table.text(0))
+    Some(table.text(0) + &before_removals(report))
+}
+
+/// What exceeded limits before points made room.
+fn before_removals(report: &Report) -> String {
+    let Some(before) = &report.before_removals else { return String::new() };
+    let (module, window) = (&before.per_load_module, &before.per_4km);
+    let is_over = if module.mean_limit < module.mean { "1" } else { "0" };
+    let mut table = Table::new(&[Left, Right, Right]);
+    table.row([&format!("  before {} points were taken out for them", grouped(before.removed)), "used", "over"]);
+    table.row(["    largest load module".into(), grouped(module.max), grouped(module.over)]);
+    table.row(["    mean of load modules".into(), format!("{:.2}", module.mean), is_over.into()]);
+    table.row(["    largest 4 km square".into(), grouped(window.max), grouped(window.over)]);
+    table.text(0)
 }
 
 fn residuals(report: &Report) -> Option<String> {

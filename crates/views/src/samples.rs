@@ -3,8 +3,8 @@
 use terrain::{LoadModule, ModuleGrid, ModuleId, ModuleResidual, ModuleVertex, Spacing};
 
 use database::{
-    Report, ReportBound, ReportBreach, ReportClass, ReportPerModule, ReportPerWindow, ReportPlace, ReportPoints,
-    ReportPool, ReportRefusals, ReportResidual, ReportStage, ReportStops, ReportVoids,
+    Report, ReportBefore, ReportBound, ReportBreach, ReportClass, ReportPerModule, ReportPerWindow, ReportPlace,
+    ReportPoints, ReportPool, ReportRefusals, ReportResidual, ReportStage, ReportStops, ReportVoids,
 };
 
 /// 2 x 3 load modules of 20 x 20 cells, 25 m apart.
@@ -67,6 +67,11 @@ pub(crate) fn report() -> Report {
         per_load_module: ReportPerModule { mean: 31.9998, mean_limit: 32.0, max: 107, limit: 100, over: 1 },
         per_4km: ReportPerWindow { max: 4_100, limit: 4_096, over: 1, worst_9x9: 4_990 },
         pool: ReportPool { size: 500, used: 7 },
+        before_removals: Some(ReportBefore {
+            removed: 812,
+            per_load_module: ReportPerModule { mean: 32.25, mean_limit: 32.0, max: 131, limit: 100, over: 19 },
+            per_4km: ReportPerWindow { max: 4_810, limit: 4_096, over: 140, worst_9x9: 5_600 },
+        }),
         residual: residual(2.999),
         residual_against_source: Some(residual(3.1)),
         classes: vec![class("plains", 2_587_215, 64_939, 0.869), class("mountains", 1_313_410, 28_532, 5.268)],

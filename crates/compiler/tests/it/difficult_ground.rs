@@ -115,6 +115,7 @@ fn a_mesh_of_more_points_than_posts_is_every_post() {
                 triangles: None,
                 max_residual_m: None,
                 rms_m: None,
+                start: None,
                 tiles,
                 workers: 2,
             };
@@ -231,6 +232,7 @@ fn voids_of_a_mesh_are_no_vertices_and_in_no_statistic() {
             triangles: None,
             max_residual_m: None,
             rms_m: None,
+            start: None,
             tiles,
             workers: 2,
         };

@@ -12,8 +12,10 @@ mod product;
 mod surface;
 
 mod bytes;
+mod compare;
 mod damage;
 mod difficult_ground;
+mod given;
 mod golden;
 mod incremental;
 mod measures;

@@ -27,6 +27,7 @@ fn refined(dem: &Dem, rule: Rule, points: usize) -> Tin {
         border: Vec::new(),
         inherited: Vec::new(),
         kept: Vec::new(),
+        start: Vec::new(),
         seams: SeamSides::OPEN,
         rule,
         stop: Stop { points: Some(points - 4), ..Stop::default() },
@@ -126,6 +127,7 @@ fn a_mesh_from_a_raster_is_that_of_the_method_and_tiles_cost_little() {
             triangles: None,
             max_residual_m: None,
             rms_m: None,
+            start: None,
             tiles,
             workers,
         };

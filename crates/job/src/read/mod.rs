@@ -2,6 +2,7 @@
 
 mod area;
 mod dem;
+mod given;
 mod importance;
 mod limits;
 mod tiles;
@@ -73,7 +74,8 @@ fn job_of(sections: &Sections, path: &Path, find: Option<&FindArea>) -> Result<(
     dem.water = importance::water(&sections.dem, &mut importance, path, &mut mentions)?;
     let tiles = tiles::read(&sections.tiles, &area.grid)?;
     let limits = limits::read(&sections.limits, &area.grid, modules.side_m)?;
-    let tin = tin::read(&sections.tin, &sections.modules, modules.edges)?;
+    let given = given::read(&sections.tin, path, &mut mentions)?;
+    let tin = tin::read(&sections.tin, &sections.modules, modules.edges, given)?;
     refuse_levels(&sections.lod)?;
     Ok((Job { path: path.to_owned(), area, dem, importance, tiles, modules, limits, tin }, mentions))
 }

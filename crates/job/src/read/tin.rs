@@ -7,8 +7,8 @@ use terrain::QUANTA_PER_METRE;
 use crate::bounds::{COUNT_MAX, RESIDUAL_M_MAX};
 use crate::entry::{Entry, Section};
 use crate::{
-    Allocation, Budget, Edges, Effort, ErrorKey, HeightFit, JobError, LastBatch, Lattice, Method, Optimising,
-    Proximity, TinSpec,
+    Allocation, Budget, Edges, Effort, ErrorKey, HeightFit, JobError, LastBatch, Lattice, Method, NamedFile,
+    Optimising, Proximity, Start, TinSpec,
 };
 
 /// The three methods by name, before their own keys are read.
@@ -21,8 +21,12 @@ enum Name {
 
 const METHODS: [(&str, Name); 3] = [("optimised", Name::Optimised), ("paper", Name::Paper), ("greedy", Name::Greedy)];
 
-pub(super) fn read(tin: &Section, modules: &Section, edges: Edges) -> Result<TinSpec, JobError> {
-    refuse_later_keys(tin)?;
+pub(super) fn read(
+    tin: &Section,
+    modules: &Section,
+    edges: Edges,
+    given: (Option<Start>, Option<NamedFile>),
+) -> Result<TinSpec, JobError> {
     let name = tin.optional("method").map_or(Ok(Name::Optimised), |entry| entry.word(&METHODS))?;
     refuse_keys_of_other_methods(tin, name)?;
     let method = match name {
@@ -51,18 +55,9 @@ pub(super) fn read(tin: &Section, modules: &Section, edges: Edges) -> Result<Tin
         residual_quantum: residual_quantum(tin, name)?,
         max_residual_m,
         target_rms_m,
+        start: given.0,
+        pins: given.1,
     })
-}
-
-/// Keys whose work belongs to a later version.
-fn refuse_later_keys(tin: &Section) -> Result<(), JobError> {
-    for key in ["start", "pins"] {
-        if let Some(entry) = tin.optional(key) {
-            return Err(entry
-                .unsupported("a job without this key", "remove it: every tile starts from its corners and borders"));
-        }
-    }
-    Ok(())
 }
 
 /// Refuses what the chosen method would not look at.

@@ -9,6 +9,7 @@ use views::{Align, Table, grouped};
 
 use crate::arguments::Workers;
 use crate::failure::{Failure, Outcome};
+use crate::figures::Figures;
 use crate::terminal;
 
 const AFTER_HELP: &str = "\
@@ -53,15 +54,16 @@ const ROWS_MAX: usize = 20;
 /// Compares.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let found = difference(&arguments.first, &arguments.second, arguments.workers.count())?;
+    let figures = Figures::of(&arguments.first, &arguments.second);
     let rows = if arguments.all { usize::MAX } else { ROWS_MAX };
     terminal::print(&match arguments.format {
-        Format::Text => text(&found, rows),
-        Format::Json => format!("{:#}\n", to_json(&found)),
+        Format::Text => text(&found, &figures, rows),
+        Format::Json => format!("{:#}\n", to_json(&found, &figures)),
     })?;
     Ok(if found.changed.is_empty() { Outcome::Sound } else { Outcome::Differ })
 }
 
-fn text(found: &Difference, rows: usize) -> String {
+fn text(found: &Difference, figures: &Figures, rows: usize) -> String {
     let (changed, modules) = (grouped(found.changed.len() as u64), grouped(found.modules as u64));
     let mut text = match found.changed.len() {
         0 => format!("All {modules} load modules are alike.\n"),
@@ -78,14 +80,7 @@ fn text(found: &Difference, rows: usize) -> String {
     if found.changed.is_empty() {
         return text;
     }
-    let [before, after] = found.triangles;
-    let [rms_before_m, rms_after_m] = found.rms_m;
-    text += &format!(
-        "\nWhole area: {} triangles in A, {} in B; RMS residual {rms_before_m:.3} m, {rms_after_m:.3} m\n\n",
-        grouped(before),
-        grouped(after)
-    );
-    text + &list(found, rows)
+    format!("{text}\n{}\n{}", figures.text(), list(found, rows))
 }
 
 /// The load modules that differ, those farthest apart first.
@@ -109,7 +104,7 @@ fn list(found: &Difference, rows: usize) -> String {
     table.text(0) + &rest
 }
 
-fn to_json(found: &Difference) -> Value {
+fn to_json(found: &Difference, figures: &Figures) -> Value {
     let module = |module: &ModuleDifference| {
         json!({
             "module": [module.module.row, module.module.col],
@@ -125,6 +120,7 @@ fn to_json(found: &Difference) -> Value {
         "modules": found.modules,
         "triangles": found.triangles,
         "rms_m": found.rms_m,
+        "figures": figures.to_json(),
         "settings": settings.collect::<Vec<_>>(),
         "changed": found.changed.iter().map(module).collect::<Vec<_>>(),
     })

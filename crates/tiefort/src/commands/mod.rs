@@ -1,10 +1,12 @@
 //! The commands, one file each: its arguments, its help, and what it calls.
 
 mod build;
+mod compare;
 mod diff;
 mod explain;
 mod export;
 mod fidelity;
+mod inadequate;
 mod init;
 mod plan;
 mod render;
@@ -52,10 +54,14 @@ pub enum Command {
     Fidelity(fidelity::Arguments),
     /// Write a database in another program's format: meshes, single load modules
     Export(export::Arguments),
+    /// Show where a database is not good enough, and what could be done
+    Inadequate(inadequate::Arguments),
     /// Write the built-in basin-and-range terrain as a GeoTIFF
     Sample(sample::Arguments),
     /// Make just a mesh from a raster
     Tin(tin::Arguments),
+    /// Compare methods on a raster: points, residuals, equivalent points, times
+    Compare(compare::Arguments),
 }
 
 impl Command {
@@ -79,8 +85,10 @@ impl Command {
             Command::Verify(arguments) => verify::run(&arguments),
             Command::Fidelity(arguments) => fidelity::run(&arguments),
             Command::Export(arguments) => export::run(&arguments),
+            Command::Inadequate(arguments) => inadequate::run(&arguments),
             Command::Sample(arguments) => sample::run(&arguments),
             Command::Tin(arguments) => tin::run(&arguments),
+            Command::Compare(arguments) => compare::run(&arguments),
         }
     }
 }

@@ -6,7 +6,7 @@ use std::sync::PoisonError;
 use clap::{ArgGroup, Args, ValueEnum};
 use compiler::{Measures, Mesh, Sights, TinMethod, TinRequest};
 use exports::TinPlace;
-use job::Optimising;
+use job::{Optimising, StartMethod};
 use serde_json::{Value, json};
 use terrain::StopReason;
 use views::{Coordinates, MeshPlace, grouped};
@@ -21,6 +21,7 @@ const AFTER_HELP: &str = "\
 Examples:
   tiefort tin dem.tif --points 76500 --out mesh.ply
   tiefort tin dem.tif --max-residual 2 --method greedy --key max --out mesh.obj
+  tiefort tin dem.tif --points 5000 --start vip:1000 --method paper --out mesh.ply
   tiefort tin dem.tif --points 5000 --measure --out mesh.ply      line of sight and slope, too
   tiefort tin dem.tif --rms 1.5 --tiles 6x6 --workers 8 --coordinates map --out mesh.ply
 
@@ -51,6 +52,10 @@ pub struct Arguments {
     /// Root mean square of the residuals in metres
     #[arg(long, value_name = "R", value_parser = positive)]
     rms: Option<f64>,
+    /// Start from points of another method (vip, highlow, lattice, fowler-little, hierarchical, earlier, regular,
+    /// contour) and improve what it makes
+    #[arg(long, value_name = "METHOD:N", value_parser = start)]
+    start: Option<(StartMethod, usize)>,
     /// Refine so many rows and columns of tiles at once, their borders matched
     #[arg(long, value_name = "ROWSxCOLUMNS", default_value = "1x1", value_parser = rows_by_columns)]
     tiles: (u32, u32),
@@ -144,6 +149,22 @@ enum Frame {
     Map,
 }
 
+/// Reads `METHOD:N`, or `METHOD` alone of one whose number is the ground's choice.
+fn start(text: &str) -> Result<(StartMethod, usize), String> {
+    let (name, points) = text.split_once(':').map_or((text, None), |(name, points)| (name, Some(points)));
+    let found = StartMethod::NAMED.iter().find(|(known, _)| *known == name).map(|&(_, method)| method);
+    let names = || StartMethod::NAMED.map(|(name, _)| name).join(", ");
+    let method = found.ok_or_else(|| format!("expected METHOD:N with one of {}", names()))?;
+    match (method, points) {
+        (StartMethod::HighLow, None) => Ok((method, 0)),
+        (StartMethod::HighLow, Some(_)) => Err("expected highlow alone: it takes all peaks and pits".into()),
+        (_, points) => {
+            let points = points.and_then(|points| points.parse().ok()).filter(|&points| 0 < points);
+            points.map(|points| (method, points)).ok_or_else(|| format!("expected {name}:N, such as {name}:1000"))
+        }
+    }
+}
+
 /// A kind of file a mesh is written to.
 #[derive(Clone, Copy)]
 enum Kind {
@@ -231,6 +252,7 @@ fn request(arguments: &Arguments) -> Result<TinRequest, Failure> {
         triangles: arguments.triangles.map(|triangles| triangles as usize),
         max_residual_m: arguments.max_residual,
         rms_m: arguments.rms,
+        start: arguments.start,
         tiles: arguments.tiles,
         workers: arguments.workers.count(),
     })

@@ -2,8 +2,26 @@
 
 use crate::scene::Scene;
 
-const COMMANDS: [&str; 12] =
-    ["build", "tile", "plan", "task", "worker", "status", "report", "verify", "fidelity", "export", "sample", "tin"];
+const COMMANDS: [&str; 18] = [
+    "build",
+    "tile",
+    "plan",
+    "task",
+    "worker",
+    "status",
+    "report",
+    "render",
+    "explain",
+    "diff",
+    "verify",
+    "fidelity",
+    "export",
+    "inadequate",
+    "sample",
+    "tin",
+    "compare",
+    "init",
+];
 
 #[test]
 fn the_help_of_every_command_has_an_example_of_it() {

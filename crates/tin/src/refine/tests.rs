@@ -57,6 +57,7 @@ fn plain_task(rect: PostRect, rule: Rule, points: usize) -> TileTask {
         border: Vec::new(),
         inherited: Vec::new(),
         kept: Vec::new(),
+        start: Vec::new(),
         seams: SeamSides::OPEN,
         rule,
         stop: Stop { points: Some(points), ..Stop::default() },

@@ -1,0 +1,318 @@
+//! Points that a job gives: what tiles start from, and pins.
+//!
+//! A given point is a post of the working grid. It belongs to the tile that may choose there, so that tiles that share
+//! a line agree on it as on any border point; heights given for posts on lines hold on both sides.
+
+use job::{Job, NamedFile, Start, StartMethod};
+use methods::{
+    Boundary, Contours, Diagonal, Distance, Extrema, FowlerLittle, Ground as MethodGround, Impossible, LatticeTin,
+    Splitting,
+};
+use source_files::{GivenFeature, GivenShape, read_given};
+use terrain::{Dem, Importance, Metres, Post, PostRect, THOUSANDTHS, TileId, quanta_of_metres};
+use tin::StartPost;
+
+use crate::CompileError;
+use crate::area::GamingArea;
+
+/// A post that the job gives.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct GivenPost {
+    /// Where.
+    pub at: Post,
+    /// Whether it is in whatever limits say.
+    pub pinned: bool,
+    /// Whether it is on the outer border of the area, which no neighbour shares.
+    pub outer: bool,
+    /// The height it is to have, in quanta; the ground's where none is given.
+    pub height: Option<i32>,
+}
+
+/// What a job gives for its whole area.
+#[derive(Default)]
+pub(crate) struct Given {
+    start: Option<(StartMethod, u64)>,
+    posts: Vec<GivenPost>,
+    forbidden: Vec<Post>,
+    /// Weights are multiplied by so many thousandths inside polygons; 0 leaves posts out.
+    factors: Vec<(mask::Polygon, u32)>,
+}
+
+impl Given {
+    /// Reads what the job names.
+    ///
+    /// # Errors
+    /// When a file cannot be used, or a point of it lies where it may not.
+    pub fn open(job: &Job, area: &GamingArea) -> Result<Self, CompileError> {
+        let mut given = Self::default();
+        match &job.tin.start {
+            Some(Start::Method { method, points }) => given.start = Some((*method, points.unwrap_or(0))),
+            Some(Start::File(file)) => {
+                given.add_start(job, area, file)?;
+            }
+            None => {}
+        }
+        if let Some(file) = &job.tin.pins {
+            given.add_pins(job, area, file)?;
+        }
+        // Of two that give one post, pins come before points to start from, and the first of a file before later ones.
+        given.posts.sort_by_key(|post| (post.at, !post.pinned));
+        given.posts.dedup_by_key(|post| post.at);
+        given.forbidden.sort_unstable();
+        Ok(given)
+    }
+
+    fn add_start(&mut self, job: &Job, area: &GamingArea, file: &NamedFile) -> Result<(), CompileError> {
+        for feature in read_given(&file.path, job.area.epsg)? {
+            let GivenShape::Point(at) = feature.shape else {
+                return Err(wrong(file, &feature, "a polygon", "points to start from"));
+            };
+            let at = post_at(area, file, &feature, at)?;
+            let height = height_of(file, &feature)?;
+            // What stands at a height of its own is fixed, as is a point on the outer border.
+            let outer = is_on_border(area.rect, at);
+            self.posts.push(GivenPost { at, pinned: outer || height.is_some(), outer, height });
+        }
+        Ok(())
+    }
+
+    fn add_pins(&mut self, job: &Job, area: &GamingArea, file: &NamedFile) -> Result<(), CompileError> {
+        for feature in read_given(&file.path, job.area.epsg)? {
+            let height = height_of(file, &feature)?;
+            match (feature.pin.as_deref(), feature.shape.clone()) {
+                (Some("add"), GivenShape::Point(at)) => {
+                    let at = post_at(area, file, &feature, at)?;
+                    self.posts.push(GivenPost { at, pinned: true, outer: is_on_border(area.rect, at), height });
+                }
+                (Some("height"), GivenShape::Point(at)) => {
+                    if height.is_none() {
+                        return Err(wrong(file, &feature, "a height pin without height_m", "height_m in metres"));
+                    }
+                    let at = post_at(area, file, &feature, at)?;
+                    self.posts.push(GivenPost { at, pinned: true, outer: is_on_border(area.rect, at), height });
+                }
+                (Some("forbid"), GivenShape::Point(at)) => {
+                    let at = post_at(area, file, &feature, at)?;
+                    refuse_fixed(job, area, file, &feature, at)?;
+                    self.forbidden.push(at);
+                }
+                (Some("importance"), GivenShape::Polygon(polygon)) => {
+                    self.factors.push((polygon, factor_of(file, &feature)?));
+                }
+                (Some("exclude"), GivenShape::Polygon(polygon)) => self.factors.push((polygon, 0)),
+                (pin, shape) => {
+                    let shape = if matches!(shape, GivenShape::Point(_)) { "point" } else { "polygon" };
+                    let found =
+                        pin.map_or(format!("a {shape} without pin"), |pin| format!("a {shape} with pin {pin:?}"));
+                    let expected =
+                        "a point with \"add\", \"forbid\" or \"height\", a polygon with \"importance\" or \"exclude\"";
+                    return Err(wrong(file, &feature, &found, expected));
+                }
+            }
+        }
+        if let Some(both) = self.posts.iter().find(|post| post.pinned && self.forbidden.contains(&post.at)) {
+            return Err(CompileError::Impossible {
+                key: format!("tin.pins: {}", file.written),
+                found: format!("a point to add and a point to forbid at post {}", both.at),
+                expected: "one of the two".into(),
+                hint: "remove one of the pins".into(),
+            });
+        }
+        Ok(())
+    }
+
+    /// Pinned posts of the area, in ascending order.
+    pub fn pinned(&self) -> Vec<Post> {
+        self.posts.iter().filter(|post| post.pinned).map(|post| post.at).collect()
+    }
+
+    /// Weights with what pins say of them.
+    pub fn weigh(&self, importance: Importance, area: &GamingAreaFrame) -> Importance {
+        if self.forbidden.is_empty() && self.factors.is_empty() {
+            return importance;
+        }
+        let rect = importance.rect();
+        let mut weights: Vec<u32> = posts(rect).map(|post| u32::from(importance.weight(post))).collect();
+        for (polygon, factor) in &self.factors {
+            let inside = inside(polygon, area, rect);
+            for (weight, _) in weights.iter_mut().zip(inside).filter(|(_, inside)| *inside) {
+                let scaled = u64::from(*weight) * u64::from(*factor) / u64::from(THOUSANDTHS);
+                // What mattered still does, however small the factor.
+                let least = u64::from(0 < *weight && 0 < *factor);
+                *weight = scaled.clamp(least, u64::from(u16::MAX)) as u32;
+            }
+        }
+        let weights = posts(rect)
+            .zip(weights)
+            .map(|(post, weight)| if self.forbidden.binary_search(&post).is_ok() { 0 } else { weight as u16 });
+        let classes = posts(rect).map(|post| importance.class(post)).collect();
+        Importance::new(rect, weights.collect(), classes)
+    }
+
+    /// What a tile is given: all posts with heights on its ground, and those to start from that are its own to choose.
+    ///
+    /// # Errors
+    /// When the method to start from cannot make the tile's share of points.
+    pub fn of_tile(&self, area: &GamingArea, tile: TileId, dem: &Dem) -> Result<Vec<GivenPost>, CompileError> {
+        let rect = area.tiling.rect(tile);
+        let mut found: Vec<GivenPost> = self.posts.iter().copied().filter(|post| rect.contains(post.at)).collect();
+        if let Some((method, points)) = self.start {
+            let modules = area.tiling.modules(tile, area.grid).count() as u64;
+            let share = (points * modules).div_ceil(area.grid.count() as u64) as usize;
+            let spacing = Metres(area.frame.spacing.metres());
+            let chosen = chosen(&MethodGround { dem, spacing }, method, share)
+                .map_err(|why| refused("tin.start", method, why))?;
+            let known: std::collections::HashSet<Post> = found.iter().map(|post| post.at).collect();
+            // The outer border has its own points.
+            let fresh = chosen.into_iter().filter(|&at| !known.contains(&at) && !is_on_border(area.rect, at));
+            found.extend(fresh.map(|at| GivenPost { at, pinned: false, outer: false, height: None }));
+        }
+        Ok(found)
+    }
+}
+
+/// Where an area lies: what polygons need to be told of it.
+pub(crate) struct GamingAreaFrame {
+    /// Its posts.
+    pub rect: PostRect,
+    /// Its place.
+    pub frame: terrain::GridFrame,
+}
+
+/// The posts that a method chooses on a window, in its order, corners left out.
+pub(crate) fn chosen(ground: &MethodGround, method: StartMethod, points: usize) -> Result<Vec<Post>, Impossible> {
+    let rect = ground.dem.rect();
+    // Four of a method's points are the corners, which every tile has.
+    let count = (points + 4).min(rect.post_count());
+    let tin = match method {
+        StartMethod::Vip => methods::vip(ground, count, Distance::Perpendicular, Boundary::CornersOnly)?,
+        StartMethod::HighLow => methods::highlow(ground, Extrema::Strict)?,
+        StartMethod::Lattice => {
+            let step = methods::step_of_points(rect, (count / 2).max(4)).max(16);
+            methods::lattice_tin(ground, &LatticeTin { step, ..LatticeTin::of_points(count) })?
+        }
+        StartMethod::FowlerLittle => methods::fowler_little(ground, &FowlerLittle::of_points(count))?,
+        StartMethod::Hierarchical => methods::hierarchical(ground, count, Splitting::MaxError)?.cut(count),
+        StartMethod::Earlier => methods::earlier(ground, count)?,
+        StartMethod::Regular => methods::regular_grid(ground, methods::step_of_points(rect, count), Diagonal::Fixed)?,
+        StartMethod::Contour => methods::contour_tin(ground, Contours::Points(count), None)?,
+    };
+    let corners = rect.corners();
+    Ok(tin.vertices.iter().filter_map(|vertex| vertex.at.post()).filter(|post| !corners.contains(post)).collect())
+}
+
+/// What a method says no to, as an error of the key or argument that asks it.
+pub(crate) fn refused(key: &str, method: StartMethod, why: Impossible) -> CompileError {
+    CompileError::Impossible {
+        key: format!("{key}, method {}", method.name()),
+        found: why.found,
+        expected: why.expected,
+        hint: why.hint,
+    }
+}
+
+/// Of a tile's given posts those that it starts from, in their order: not those that its neighbours choose.
+pub(crate) fn start_posts(given: &[GivenPost], rect: PostRect, open: terrain::SeamSides) -> Vec<StartPost> {
+    let is_closed = |at: Post| {
+        (at.row == rect.south && !open.south)
+            || (at.row == rect.north && !open.north)
+            || (at.col == rect.west && !open.west)
+            || (at.col == rect.east && !open.east)
+    };
+    given
+        .iter()
+        .filter(|post| !post.outer && !is_closed(post.at))
+        .map(|post| StartPost { at: post.at, pinned: post.pinned })
+        .collect()
+}
+
+/// Given posts on the outer border of the area.
+pub(crate) fn border_posts(given: &[GivenPost]) -> impl Iterator<Item = Post> {
+    given.iter().filter(|post| post.outer).map(|post| post.at)
+}
+
+fn posts(rect: PostRect) -> impl Iterator<Item = Post> {
+    (rect.south..=rect.north).flat_map(move |row| (rect.west..=rect.east).map(move |col| Post::new(row, col)))
+}
+
+fn is_on_border(rect: PostRect, post: Post) -> bool {
+    post.row == rect.south || post.row == rect.north || post.col == rect.west || post.col == rect.east
+}
+
+/// Whether each post of a window lies inside a polygon, row-major.
+fn inside(polygon: &mask::Polygon, area: &GamingAreaFrame, rect: PostRect) -> Vec<bool> {
+    let shape = mask::Shape::Polygons(vec![polygon.clone()]);
+    let only = mask::Area { class: "inside".into(), weight: THOUSANDTHS, shape };
+    let mask = mask::Mask { default_weight: 0, areas: vec![only], smoothing: mask::Smoothing::None };
+    let found = mask::importance(&mask, area.rect, &area.frame, rect);
+    posts(rect).map(|post| 0 < found.weight(post)).collect()
+}
+
+/// The post nearest to a place, which must lie in the area.
+fn post_at(area: &GamingArea, file: &NamedFile, feature: &GivenFeature, at: [f64; 2]) -> Result<Post, CompileError> {
+    let frame = &area.frame;
+    let origin = [frame.origin_east_m, frame.origin_north_m];
+    let [col, row] = [0, 1].map(|axis| ((at[axis] - origin[axis]) / frame.spacing.metres()).round());
+    let fits = |v: f64| (-1e9..=1e9).contains(&v);
+    let post = (fits(row) && fits(col)).then(|| Post::new(row as i32, col as i32));
+    post.filter(|&post| area.rect.contains(post)).ok_or_else(|| {
+        let found = format!("a point at {:.1}, {:.1} m, outside the area", at[0], at[1]);
+        wrong(file, feature, &found, "points inside the area, its border included")
+    })
+}
+
+fn height_of(file: &NamedFile, feature: &GivenFeature) -> Result<Option<i32>, CompileError> {
+    let Some(metres) = feature.height_m else { return Ok(None) };
+    let quanta = quanta_of_metres(metres);
+    let found = || wrong(file, feature, &format!("a height of {metres} m"), "a height that terrain can have");
+    quanta.map(Some).ok_or_else(found)
+}
+
+/// The factor of an importance pin, in thousandths.
+fn factor_of(file: &NamedFile, feature: &GivenFeature) -> Result<u32, CompileError> {
+    const FACTOR_MAX: f64 = 1000.0;
+    match feature.factor.map(|factor| (factor * f64::from(THOUSANDTHS)).round()) {
+        Some(thousandths) if (1.0..=FACTOR_MAX * f64::from(THOUSANDTHS)).contains(&thousandths) => {
+            Ok(thousandths as u32)
+        }
+        _ => {
+            let found = feature.factor.map_or("no factor".to_owned(), |factor| format!("a factor of {factor}"));
+            Err(wrong(file, feature, &found, "factor from 0.001 to 1000; to leave ground out, \"exclude\""))
+        }
+    }
+}
+
+/// Refuses to forbid what is a vertex in any case.
+fn refuse_fixed(
+    job: &Job,
+    area: &GamingArea,
+    file: &NamedFile,
+    feature: &GivenFeature,
+    at: Post,
+) -> Result<(), CompileError> {
+    let side = area.grid.side_cells;
+    let is_corner = at.row % side == 0 && at.col % side == 0;
+    let step = job.modules.border_step_cells;
+    let on_border = is_on_border(area.rect, at) && at.row % step == 0 && at.col % step == 0;
+    match (is_corner, on_border) {
+        (true, _) => {
+            Err(wrong(file, feature, &format!("a forbidden post, {at}, that is a corner of load modules"), "another"))
+        }
+        (_, true) => Err(wrong(
+            file,
+            feature,
+            &format!("a forbidden post, {at}, that is a point of the outer border"),
+            "another",
+        )),
+        _ => Ok(()),
+    }
+}
+
+fn wrong(file: &NamedFile, feature: &GivenFeature, found: &str, expected: &str) -> CompileError {
+    CompileError::Impossible {
+        key: format!("{}: {}", file.path.display(), feature.place),
+        found: found.into(),
+        expected: expected.into(),
+        hint: "coordinates are metres of the area's system, or degrees; `tiefort plan` shows the area's corners".into(),
+    }
+}

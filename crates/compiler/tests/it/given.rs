@@ -1,0 +1,198 @@
+//! Points that a job gives: what tiles start from, and pins.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+
+use database::Folder;
+use terrain::{Post, TileTin, Vertex};
+
+use crate::product::{Edges, Product};
+use crate::scene::{ORIGIN_M, SIDE_CELLS, Scene, Words, differing, tile};
+
+const CONSTRAINED: &str = "method = \"greedy\"";
+const PAPER: &str = "method = \"paper\"\npoints = 900";
+
+fn words(tin: &str) -> Words {
+    let mean = "mean_per_load_module = 32";
+    let edges = if tin.contains("paper") { "edges = \"clip\"" } else { "" };
+    Words { tin: tin.into(), limits: mean.into(), modules: edges.into(), ..Words::sample() }
+}
+
+fn tins(scene: &Scene, folder: &str) -> Vec<TileTin> {
+    let folder = Folder::new(scene.path(folder));
+    (0..9).map(|i| folder.read_tile(tile(i / 3, i % 3)).unwrap().1).collect()
+}
+
+/// All vertices of an area that stand on posts, each once.
+fn vertices(scene: &Scene, folder: &str) -> BTreeSet<(Post, i32)> {
+    let all = tins(scene, folder);
+    let on_posts =
+        all.iter().flat_map(|tile| &tile.tin.vertices).filter_map(|v: &Vertex| Some((v.at.post()?, v.height)));
+    on_posts.collect()
+}
+
+/// Writes pins; each is (pin, row, col, more properties).
+fn write_pins(path: &Path, pins: &[(&str, i32, i32, &str)]) {
+    let feature = |&(pin, row, col, more): &(&str, i32, i32, &str)| {
+        let at = [ORIGIN_M[0] + f64::from(col) * 25.0, ORIGIN_M[1] + f64::from(row) * 25.0];
+        format!(
+            r#"{{"type":"Feature","geometry":{{"type":"Point","coordinates":[{},{}]}},
+                "properties":{{"pin":"{pin}"{more}}}}}"#,
+            at[0], at[1]
+        )
+    };
+    let all: Vec<String> = pins.iter().map(feature).collect();
+    std::fs::write(path, format!(r#"{{"type":"FeatureCollection","features":[{}]}}"#, all.join(","))).unwrap();
+}
+
+fn pinned(tin: &str, pins: &[(&str, i32, i32, &str)]) -> Scene {
+    Scene::with_files(&words(&format!("{tin}\npins = \"pins.geojson\"")), |folder| {
+        write_pins(&folder.join("pins.geojson"), pins);
+    })
+}
+
+#[track_caller]
+fn check_refused(scene: &Scene, expected: &str) {
+    let error = scene.try_build("a.tdb", 1).unwrap_err().to_string();
+    assert!(error.ends_with(expected), "{error}");
+}
+
+#[test]
+fn tiles_start_from_what_another_method_chooses_within_all_limits() {
+    for (start, tin) in [("vip", CONSTRAINED), ("lattice", CONSTRAINED), ("vip", PAPER), ("contour", PAPER)] {
+        let start = format!("{tin}\nstart = {{ method = \"{start}\", points = 450 }}");
+        let scene = Scene::new(&words(&start));
+        scene.build("a.tdb", 2);
+        scene.verify("a.tdb");
+        let edges = if tin == PAPER { Edges::Clipped } else { Edges::Constrained };
+        Product::read(&scene.path("a.tdb")).check(edges);
+        let without = Scene::new(&words(tin));
+        without.build("a.tdb", 2);
+        let count = |scene: &Scene| tins(scene, "a.tdb").iter().map(|tile| tile.initial_count).sum::<u32>();
+        let more = count(&scene) - count(&without);
+        assert!((200..700).contains(&more), "{start}: {more} points more to start from");
+        // What the same job builds again is the same, and one worker builds what two do.
+        scene.build("b.tdb", 1);
+        assert_eq!(differing(&scene.product("a.tdb"), &scene.product("b.tdb")), Vec::<String>::new());
+    }
+}
+
+#[test]
+fn a_pin_is_a_vertex_on_both_sides_of_a_line_with_the_height_it_says() {
+    // Inside a tile, on a line between tiles, on the outer border; 60 is where tiles meet.
+    let pins = [("add", 31, 33, ""), ("height", 27, 60, r#","height_m":1234.5"#), ("add", 0, 33, r#","height_m":900"#)];
+    for tin in [CONSTRAINED, PAPER, "method = \"optimised\""] {
+        let scene = pinned(tin, &pins);
+        scene.build("a.tdb", 2);
+        scene.verify("a.tdb");
+        let all = vertices(&scene, "a.tdb");
+        assert!(all.iter().any(|&(post, _)| post == Post::new(31, 33)), "{tin}");
+        assert!(all.contains(&(Post::new(27, 60), 1234 * 128 + 64)), "{tin}");
+        assert!(all.contains(&(Post::new(0, 33), 900 * 128)), "{tin}");
+        assert_eq!(all.iter().filter(|(post, _)| *post == Post::new(27, 60)).count(), 1);
+        let edges = if tin == PAPER { Edges::Clipped } else { Edges::Constrained };
+        Product::read(&scene.path("a.tdb")).check(edges);
+    }
+}
+
+#[test]
+fn a_forbidden_post_is_left_out_and_pins_count_towards_the_points() {
+    let first = pinned(PAPER, &[("add", 31, 33, "")]);
+    let report = first.build("a.tdb", 2).report;
+    assert!(report.points.selected <= 900, "{:?}", report.points);
+    let selected = |tins: &[TileTin]| -> Vec<Post> {
+        let own = &tins[4];
+        let chosen = &own.tin.vertices[own.initial_count as usize..];
+        chosen.iter().filter_map(|vertex| vertex.at.post()).filter(|post| post.row % SIDE_CELLS != 0).collect()
+    };
+    let inside = selected(&tins(&first, "a.tdb"));
+    let post = inside[inside.len() / 2];
+    let second = pinned(PAPER, &[("add", 31, 33, ""), ("forbid", post.row, post.col, "")]);
+    second.build("a.tdb", 2);
+    assert!(vertices(&first, "a.tdb").iter().any(|(at, _)| *at == post));
+    assert!(!vertices(&second, "a.tdb").iter().any(|(at, _)| *at == post));
+}
+
+#[test]
+fn only_tiles_that_a_pin_reaches_are_built_again() {
+    let scene = pinned(PAPER, &[("add", 31, 33, "")]);
+    scene.build("a.tdb", 2);
+    let before = scene.product("a.tdb");
+    // Far inside the north-eastern tile.
+    write_pins(&scene.path("pins.geojson"), &[("add", 31, 33, ""), ("add", 153, 171, "")]);
+    scene.build("a.tdb", 2);
+    let changed = differing(&before, &scene.product("a.tdb"));
+    // What clipped limits take out is decided over the whole area, but no other tile is refined again.
+    let refined: Vec<&String> = changed.iter().filter(|name| name.ends_with(".tin")).collect();
+    assert_eq!(refined, ["tiles/r02c02.tin"]);
+    scene.build("fresh.tdb", 2);
+    assert_eq!(differing(&scene.product("a.tdb"), &scene.product("fresh.tdb")), Vec::<String>::new());
+}
+
+#[test]
+fn a_polygon_of_importance_draws_points_and_an_excluded_one_has_none() {
+    let ring = |low: i32, high: i32| {
+        let at = |row: i32, col: i32| {
+            format!("[{},{}]", ORIGIN_M[0] + f64::from(col) * 25.0, ORIGIN_M[1] + f64::from(row) * 25.0)
+        };
+        let corners = [at(low, low), at(low, high), at(high, high), at(high, low), at(low, low)];
+        format!(r#"{{"type":"Polygon","coordinates":[[{}]]}}"#, corners.join(","))
+    };
+    let build = |said: &str| {
+        let text = format!(r#"{{"type":"Feature","geometry":{},"properties":{{{said}}}}}"#, ring(65, 115));
+        let tin = format!("{PAPER}\nallocation = \"equal\"\npins = \"pins.geojson\"");
+        let scene = Scene::with_files(&words(&tin), |folder| {
+            std::fs::write(folder.join("pins.geojson"), text).unwrap();
+        });
+        scene.build("a.tdb", 2);
+        let inside = |post: &Post| (66..115).contains(&post.row) && (66..115).contains(&post.col);
+        let is_corner = |post: &Post| post.row % SIDE_CELLS == 0 && post.col % SIDE_CELLS == 0;
+        vertices(&scene, "a.tdb").iter().filter(|(post, _)| inside(post) && !is_corner(post)).count()
+    };
+    let (none, usual, many) = (
+        build(r#""pin":"exclude""#),
+        build(r#""pin":"importance","factor":1"#),
+        build(r#""pin":"importance","factor":30"#),
+    );
+    assert!(none == 0 && usual < many, "{none}, {usual}, {many}");
+}
+
+#[test]
+fn what_no_pin_may_be_is_told_with_its_place_in_the_file() {
+    check_refused(
+        &pinned(CONSTRAINED, &[("add", 31, 33, ""), ("add", -3, 5, "")]),
+        "points inside the area, its border included",
+    );
+    check_refused(
+        &pinned(CONSTRAINED, &[("forbid", 40, 60, "")]),
+        "that is a corner of load modules, expected another",
+    );
+    check_refused(
+        &pinned(CONSTRAINED, &[("forbid", 0, 65, "")]),
+        "that is a point of the outer border, expected another",
+    );
+    check_refused(
+        &pinned(CONSTRAINED, &[("height", 31, 33, "")]),
+        "a height pin without height_m, expected height_m in metres",
+    );
+    check_refused(
+        &pinned(CONSTRAINED, &[("add", 7, 7, ""), ("forbid", 7, 7, "")]),
+        "at post 7,7, expected one of the two",
+    );
+}
+
+#[test]
+fn a_file_of_points_starts_tiles_and_fixes_the_border() {
+    let tin = format!("{CONSTRAINED}\nstart = \"points.csv\"");
+    let scene = Scene::with_files(&words(&tin), |folder| {
+        let at = |row: i32, col: i32| (ORIGIN_M[0] + f64::from(col) * 25.0, ORIGIN_M[1] + f64::from(row) * 25.0);
+        let (inner, border) = (at(31, 33), at(0, 47));
+        let text = format!("east,north,height_m\n{},{},\n{},{},777\n", inner.0, inner.1, border.0, border.1);
+        std::fs::write(folder.join("points.csv"), text).unwrap();
+    });
+    scene.build("a.tdb", 2);
+    scene.verify("a.tdb");
+    let all = vertices(&scene, "a.tdb");
+    assert!(all.contains(&(Post::new(0, 47), 777 * 128)));
+    assert!(all.iter().any(|(post, _)| *post == Post::new(31, 33)));
+}

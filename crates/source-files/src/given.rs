@@ -1,0 +1,266 @@
+//! Points that people give, and what they say of them: GeoJSON, or a table of comma-separated values.
+//!
+//! Coordinates are told apart as those of polygons are: what the file says, else degrees where numbers can only be
+//! degrees, else metres of the area's system.
+
+use std::path::Path;
+
+use geojson::{FeatureCollection, GeoJson, Geometry, GeometryValue, JsonObject, Position};
+use mask::Polygon;
+
+use crate::SourceError;
+use crate::crs::Crs;
+use crate::limits::GEOJSON_BYTES_MAX;
+use crate::polygons::{corner, projected, said_in};
+use crate::store::Store;
+
+/// One thing of a file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GivenFeature {
+    /// Where it stands in the file, for messages: `feature 3`, `line 12`.
+    pub place: String,
+    /// Where it lies.
+    pub shape: GivenShape,
+    /// Its `pin` property.
+    pub pin: Option<String>,
+    /// Its `height_m` property, or a third coordinate.
+    pub height_m: Option<f64>,
+    /// Its `factor` property.
+    pub factor: Option<f64>,
+}
+
+/// Where a thing lies, in metres of the area's system.
+#[derive(Clone, Debug, PartialEq)]
+pub enum GivenShape {
+    /// At a place.
+    Point([f64; 2]),
+    /// Over some ground.
+    Polygon(Polygon),
+}
+
+/// Reads the points and polygons of the file at `path`, in metres of the system EPSG:`epsg`.
+///
+/// # Errors
+/// When the file is neither GeoJSON nor a table with a header, holds lines or nothing, or its coordinates cannot be
+/// brought to the area's system.
+pub fn read_given(path: &Path, epsg: u32) -> Result<Vec<GivenFeature>, SourceError> {
+    let store = Store::plain(path)?;
+    if GEOJSON_BYTES_MAX < store.len() {
+        let (found, limit) = (store.len(), GEOJSON_BYTES_MAX);
+        return Err(SourceError::TooLarge { path: path.into(), what: "bytes", found, limit });
+    }
+    let bytes = store.start(GEOJSON_BYTES_MAX)?;
+    let text = std::str::from_utf8(&bytes)
+        .map_err(|_| fault(path, "the file", "bytes that are not UTF-8 text", "GeoJSON or comma-separated values"))?;
+    let is_json = text.trim_start_matches(['\u{feff}', ' ', '\t', '\r', '\n']).starts_with('{');
+    let (features, said) = if is_json { of_json(path, text)? } else { of_table(path, text)? };
+    if features.is_empty() {
+        return Err(fault(path, "the file", "nothing", "at least one point"));
+    }
+    let said = said.or_else(|| features.iter().all(looks_like_degrees).then(Crs::wgs84));
+    match said {
+        Some(crs) if crs.epsg() != Some(epsg) => brought(path, features, &crs, epsg),
+        _ => Ok(features),
+    }
+}
+
+fn fault(path: &Path, place: &str, found: impl Into<String>, expected: impl Into<String>) -> SourceError {
+    SourceError::Given { path: path.into(), place: place.into(), found: found.into(), expected: expected.into() }
+}
+
+fn looks_like_degrees(feature: &GivenFeature) -> bool {
+    let is_degrees = |[east, north]: &[f64; 2]| east.abs() <= 360.0 && north.abs() <= 90.0;
+    match &feature.shape {
+        GivenShape::Point(at) => is_degrees(at),
+        GivenShape::Polygon(polygon) => polygon.rings.iter().flatten().all(is_degrees),
+    }
+}
+
+fn brought(path: &Path, features: Vec<GivenFeature>, crs: &Crs, epsg: u32) -> Result<Vec<GivenFeature>, SourceError> {
+    let refused = |found: String| SourceError::PolygonCrs { path: path.into(), found, expected: epsg };
+    let area = Crs::from_epsg(epsg).map_err(refused)?;
+    let shape = |shape: GivenShape| match shape {
+        GivenShape::Point(at) => {
+            let placed = crs.to(&area, at).ok_or_else(|| refused(format!("{}, at {at:?}", crs.name())));
+            placed.map(GivenShape::Point)
+        }
+        GivenShape::Polygon(polygon) => {
+            let mut all = projected(path, vec![polygon], crs, epsg)?;
+            Ok(GivenShape::Polygon(all.remove(0)))
+        }
+    };
+    features.into_iter().map(|feature| Ok(GivenFeature { shape: shape(feature.shape)?, ..feature })).collect()
+}
+
+fn of_json(path: &Path, text: &str) -> Result<(Vec<GivenFeature>, Option<Crs>), SourceError> {
+    let json: GeoJson =
+        text.parse().map_err(|error: geojson::Error| fault(path, "the file", error.to_string(), "GeoJSON"))?;
+    let said = said_in(path, &json)?;
+    let mut found = Vec::new();
+    match json {
+        GeoJson::Geometry(geometry) => add(path, "the geometry", geometry, &JsonObject::new(), &mut found)?,
+        GeoJson::Feature(feature) => add_feature(path, 0, feature, &mut found)?,
+        GeoJson::FeatureCollection(FeatureCollection { features, .. }) => {
+            for (index, feature) in features.into_iter().enumerate() {
+                add_feature(path, index, feature, &mut found)?;
+            }
+        }
+    }
+    Ok((found, said))
+}
+
+fn add_feature(
+    path: &Path,
+    index: usize,
+    feature: geojson::Feature,
+    found: &mut Vec<GivenFeature>,
+) -> Result<(), SourceError> {
+    // A feature without a geometry is legal and adds nothing.
+    let Some(geometry) = feature.geometry else { return Ok(()) };
+    add(path, &format!("feature {index}"), geometry, &feature.properties.unwrap_or_default(), found)
+}
+
+fn add(
+    path: &Path,
+    place: &str,
+    geometry: Geometry,
+    properties: &JsonObject,
+    found: &mut Vec<GivenFeature>,
+) -> Result<(), SourceError> {
+    let mut put = |shape, height_m| -> Result<(), SourceError> {
+        let (height_m, factor) =
+            (number(path, place, properties, "height_m")?.or(height_m), number(path, place, properties, "factor")?);
+        let pin = properties.get("pin").and_then(|pin| pin.as_str()).map(str::to_owned);
+        found.push(GivenFeature { place: place.to_owned(), shape, pin, height_m, factor });
+        Ok(())
+    };
+    let mut point = |position: &Position| {
+        let at = corner(position).ok_or_else(|| fault(path, place, "no two finite numbers", "a place"))?;
+        put(GivenShape::Point(at), position.as_slice().get(2).copied())
+    };
+    let ring = |positions: &Vec<Position>| {
+        let corners: Option<Vec<[f64; 2]>> = positions.iter().map(corner).collect();
+        corners.filter(|corners| 4 <= corners.len() && corners.first() == corners.last())
+    };
+    let polygon = |rings: Vec<Vec<Position>>| {
+        let rings: Option<Vec<_>> = rings.iter().map(ring).collect();
+        let whole = rings.ok_or_else(|| fault(path, place, "a ring that is not one", "closed rings of 4 corners"))?;
+        Ok(GivenShape::Polygon(Polygon { rings: whole }))
+    };
+    match geometry.value {
+        GeometryValue::Point { coordinates } => point(&coordinates),
+        GeometryValue::MultiPoint { coordinates } => coordinates.iter().try_for_each(point),
+        GeometryValue::Polygon { coordinates } => put(polygon(coordinates)?, None),
+        GeometryValue::MultiPolygon { coordinates } => {
+            coordinates.into_iter().try_for_each(|rings| put(polygon(rings)?, None))
+        }
+        GeometryValue::GeometryCollection { .. } => Err(fault(path, place, "a GeometryCollection", "Point or Polygon")),
+        GeometryValue::LineString { .. } | GeometryValue::MultiLineString { .. } => {
+            Err(fault(path, place, "a LineString (not supported yet)", "Point or Polygon"))
+        }
+    }
+}
+
+fn number(path: &Path, place: &str, properties: &JsonObject, key: &str) -> Result<Option<f64>, SourceError> {
+    match properties.get(key).filter(|value| !value.is_null()) {
+        None => Ok(None),
+        Some(value) => {
+            let number = value.as_f64().filter(|number| number.is_finite());
+            number.map(Some).ok_or_else(|| fault(path, place, format!("{key} = {value}"), "a number"))
+        }
+    }
+}
+
+/// Names of columns, first those of the area's metres, then those of degrees.
+const EASTS: [&str; 6] = ["east", "easting", "east_m", "x", "lon", "longitude"];
+const NORTHS: [&str; 6] = ["north", "northing", "north_m", "y", "lat", "latitude"];
+const HEIGHTS: [&str; 5] = ["height_m", "height", "z", "elevation", "elev"];
+
+fn of_table(path: &Path, text: &str) -> Result<(Vec<GivenFeature>, Option<Crs>), SourceError> {
+    let mut lines = text.lines().zip(1..).filter(|(line, _)| !line.trim().is_empty());
+    let expected = "a header that names its columns, such as east,north,height_m or lon,lat";
+    let (header, _) = lines.next().ok_or_else(|| fault(path, "line 1", "nothing", expected))?;
+    let names: Vec<String> =
+        header.trim_start_matches('\u{feff}').split(',').map(|name| name.trim().to_lowercase()).collect();
+    let column = |known: &[&str]| names.iter().position(|name| known.contains(&name.as_str()));
+    let (Some(east), Some(north)) = (column(&EASTS), column(&NORTHS)) else {
+        return Err(fault(path, "line 1", format!("{header:?}"), expected));
+    };
+    let height = column(&HEIGHTS);
+    let said = names[east].starts_with("lon").then(Crs::wgs84);
+    let mut found = Vec::new();
+    for (line, index) in lines {
+        let place = format!("line {index}");
+        let cells: Vec<&str> = line.split(',').map(str::trim).collect();
+        let cell = |column: usize| {
+            let text = cells.get(column).copied().unwrap_or("");
+            let number = text.parse::<f64>().ok().filter(|number| number.is_finite());
+            number.ok_or_else(|| fault(path, &place, format!("{text:?}"), format!("a number for {:?}", names[column])))
+        };
+        let is_given = |&column: &usize| cells.get(column).is_some_and(|text| !text.is_empty());
+        found.push(GivenFeature {
+            shape: GivenShape::Point([cell(east)?, cell(north)?]),
+            height_m: height.filter(is_given).map(cell).transpose()?,
+            pin: None,
+            factor: None,
+            place: place.clone(),
+        });
+    }
+    Ok((found, said))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(name: &str, text: &str) -> Result<Vec<GivenFeature>, String> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        read_given(&path, 32_611).map_err(|error| error.to_string().replace(&path.display().to_string(), "F"))
+    }
+
+    #[track_caller]
+    fn check_fault(text: &str, expected: &str) {
+        assert_eq!(read("given", text).unwrap_err(), expected);
+    }
+
+    #[test]
+    fn a_table_needs_a_header_and_may_have_heights() {
+        let found = read("a.csv", "name, East,North,height\nx,505000,3875000,12.5\n\ny,505025,3875000,\n").unwrap();
+        assert_eq!(found[0].shape, GivenShape::Point([505_000.0, 3_875_000.0]));
+        assert_eq!((found[0].height_m, found[1].height_m, found[1].place.as_str()), (Some(12.5), None, "line 4"));
+        let columns = "a header that names its columns, such as east,north,height_m or lon,lat";
+        check_fault("a,b\n1,2\n", &format!("F: line 1: found \"a,b\", expected {columns}"));
+        check_fault("x,y\n1,\n", "F: line 2: found \"\", expected a number for \"y\"");
+        check_fault("x,y\n", "F: the file: found nothing, expected at least one point");
+    }
+
+    #[test]
+    fn degrees_are_brought_to_the_system_of_the_area() {
+        let table = read("a.csv", "lon,lat\n-117,35\n").unwrap();
+        let json = read("a.json", r#"{"type":"Point","coordinates":[-117,35]}"#).unwrap();
+        let GivenShape::Point([east, north]) = table[0].shape else { panic!("expected a point") };
+        assert!((east - 500_000.0).abs() < 0.01 && (north - 3_873_043.0).abs() < 1.0, "{east} {north}");
+        assert_eq!(table[0].shape, json[0].shape);
+    }
+
+    #[test]
+    fn what_a_feature_says_is_read_and_lines_are_refused() {
+        let feature = |geometry: &str, said: &str| {
+            format!(r#"{{"type":"Feature","geometry":{geometry},"properties":{{{said}}}}}"#)
+        };
+        let found =
+            read("a", &feature(r#"{"type":"Point","coordinates":[505000,3875000,7]}"#, r#""pin":"add""#)).unwrap();
+        assert_eq!((found[0].pin.as_deref(), found[0].height_m), (Some("add"), Some(7.0)));
+        let ring = "[[505000,3875000],[505100,3875000],[505100,3875100],[505000,3875000]]";
+        let polygon = format!(r#"{{"type":"Polygon","coordinates":[{ring}]}}"#);
+        let found = read("a", &feature(&polygon, r#""pin":"importance","factor":4"#)).unwrap();
+        assert_eq!(found[0].factor, Some(4.0));
+        check_fault(
+            &feature(r#"{"type":"LineString","coordinates":[[1,2],[3,4]]}"#, ""),
+            "F: feature 0: found a LineString (not supported yet), expected Point or Polygon",
+        );
+        check_fault(&feature(&polygon, r#""factor":"x""#), "F: feature 0: found factor = \"x\", expected a number");
+    }
+}

@@ -1,0 +1,173 @@
+//! `tiefort inadequate`: where the TIN is not good enough, and what could be done.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use compiler::{Component, Inadequate};
+use serde_json::{Value, json};
+use views::{Align, Table, grouped, heat, write_map};
+
+use crate::arguments::positive;
+use crate::failure::{Failure, Outcome};
+use crate::{files, terminal};
+
+const AFTER_HELP: &str = "\
+Examples:
+  tiefort inadequate ntc.tdb
+  tiefort inadequate ntc.tdb --tolerance 5 --out maps
+
+Writes inadequate.geojson (each piece of ground with its worst post, area, load modules, what stands in
+the way and what could be done), error.png (weighted residuals, black at twice the tolerance) and
+density.png (triangles or polygons of each load module, black at the limit), north up.
+
+What to do about it goes into a file of pins, GeoJSON, which the job names: [tin] pins = \"pins.geojson\".
+Points with \"pin\": \"add\", \"forbid\", or \"height\" with \"height_m\"; polygons with \"pin\": \"importance\"
+and \"factor\", or \"exclude\". The next build renews the tiles that the pins reach, and `tiefort diff` says
+what they bought.";
+
+/// Pieces of ground that the text shows; the file has them all.
+const ROWS_MAX: usize = 10;
+/// Pixels a side of a load module in the map of densities.
+const MODULE_PIXELS: usize = 6;
+
+/// Arguments of `inadequate`.
+#[derive(Args)]
+#[command(after_help = AFTER_HELP)]
+pub struct Arguments {
+    /// Folder of the terrain database
+    #[arg(value_name = "DIR")]
+    database: PathBuf,
+    /// Weighted residual in metres that is still good enough [default: 3 times the RMS residual as built]
+    #[arg(long, value_name = "M", value_parser = positive)]
+    tolerance: Option<f64>,
+    /// Folder for the three files [default: that of the database]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// For a person or a program
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    format: Format,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Format {
+    /// For a person
+    Text,
+    /// For a program: the content of inadequate.geojson
+    Json,
+}
+
+/// Finds, and writes the three files.
+pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
+    let folder = arguments.out.as_ref().unwrap_or(&arguments.database);
+    let files = ["inadequate.geojson", "error.png", "density.png"].map(|name| folder.join(name));
+    let found = compiler::inadequate(&arguments.database, arguments.tolerance)?;
+    files::check_writable(&files[0])?;
+    let collection = format!("{:#}\n", geojson(&found));
+    files::write_whole(&files[0], |out| std::io::Write::write_all(out, collection.as_bytes()))?;
+    let size = (found.rect.posts_high(), found.rect.posts_wide());
+    let darkest = (2.0 * found.tolerance_m) as f32;
+    files::write_whole(&files[1], |out| write_map(out, size, &found.residual_m, |metres| heat(metres / darkest)))?;
+    let (density, size) = density(&found);
+    files::write_whole(&files[2], |out| write_map(out, size, &density, heat))?;
+    terminal::print(&match arguments.format {
+        Format::Text => text(&found, &files),
+        Format::Json => collection,
+    })?;
+    Ok(Outcome::Sound)
+}
+
+/// The share that each load module has of its limit, as squares of pixels.
+fn density(found: &Inadequate) -> (Vec<f32>, (usize, usize)) {
+    let (rows, cols) = (found.modules.0 as usize * MODULE_PIXELS, found.modules.1 as usize * MODULE_PIXELS);
+    let count = |row: usize, col: usize| {
+        found.counts[row / MODULE_PIXELS * found.modules.1 as usize + col / MODULE_PIXELS] as f32
+    };
+    let share = |row: usize, col: usize| count(row, col) / found.per_module.max(1) as f32;
+    ((0..rows).flat_map(|row| (0..cols).map(move |col| (row, col))).map(|(r, c)| share(r, c)).collect(), (rows, cols))
+}
+
+fn text(found: &Inadequate, files: &[PathBuf; 3]) -> String {
+    let all = &found.components;
+    let posts: u64 = all.iter().map(|component| component.posts).sum();
+    let mut text = format!(
+        "Gaming area {}: {} pieces of ground, {} posts, above {:.2} m\n",
+        found.area,
+        grouped(all.len() as u64),
+        grouped(posts),
+        found.tolerance_m
+    );
+    if !all.is_empty() {
+        let mut table = Table::new(&[Align::Right, Align::Right, Align::Right, Align::Right, Align::Left, Align::Left]);
+        table.row(["posts", "worst m", "east", "north", "stands in the way", "what could be done"]);
+        all.iter().take(ROWS_MAX).for_each(|component| table.row(row(found, component)));
+        text += &format!("\n{}", table.text(0));
+        let more = all.len().saturating_sub(ROWS_MAX);
+        text += &if more == 0 { String::new() } else { format!("and {} more\n", grouped(more as u64)) };
+    }
+    let names: Vec<String> = files.iter().map(|path| path.display().to_string()).collect();
+    text + &format!("\nwritten: {}\n", names.join(", "))
+}
+
+fn row(found: &Inadequate, component: &Component) -> [String; 6] {
+    let [east, north] = place(found, component.worst.row, component.worst.col);
+    let blocked = component.blocked_by.first().map_or("nothing", |limit| limit.trim_start_matches("limits."));
+    [
+        grouped(component.posts),
+        format!("{:.2}", component.largest_m),
+        format!("{east:.0}"),
+        format!("{north:.0}"),
+        blocked.into(),
+        component.action.into(),
+    ]
+}
+
+fn place(found: &Inadequate, row: i32, col: i32) -> [f64; 2] {
+    let [east, north] = found.origin_m;
+    [east + f64::from(col) * found.spacing_m, north + f64::from(row) * found.spacing_m]
+}
+
+fn geojson(found: &Inadequate) -> Value {
+    let features: Vec<Value> = found.components.iter().map(|component| feature(found, component)).collect();
+    let name = format!("urn:ogc:def:crs:EPSG::{}", found.epsg);
+    json!({
+        "type": "FeatureCollection",
+        "name": "inadequate",
+        "crs": { "type": "name", "properties": { "name": name } },
+        "tolerance_m": found.tolerance_m,
+        "features": features,
+    })
+}
+
+/// A piece of ground: a rectangle around each run of its posts, half a post wide.
+fn feature(found: &Inadequate, component: &Component) -> Value {
+    let half = found.spacing_m / 2.0;
+    let rectangle = |&(row, first, last): &(i32, i32, i32)| {
+        let ([west, middle], [east, _]) = (place(found, row, first), place(found, row, last));
+        let (west, east, south, north) = (west - half, east + half, middle - half, middle + half);
+        json!([[[west, south], [east, south], [east, north], [west, north], [west, south]]])
+    };
+    let rectangles: Vec<Value> = component.runs.iter().map(rectangle).collect();
+    let modules: Vec<[u32; 2]> = component.modules.iter().map(|module| [module.row, module.col]).collect();
+    let [east, north] = place(found, component.worst.row, component.worst.col);
+    json!({
+        "type": "Feature",
+        "geometry": { "type": "MultiPolygon", "coordinates": rectangles },
+        "properties": {
+            "posts": component.posts,
+            "area_m2": component.posts as f64 * found.spacing_m * found.spacing_m,
+            "largest_m": component.largest_m,
+            "squares_m2": component.squares_m2,
+            "worst": {
+                "row": component.worst.row,
+                "col": component.worst.col,
+                "east_m": east,
+                "north_m": north,
+                "height_m": component.worst_height_m,
+            },
+            "load_modules": modules,
+            "blocked": !component.blocked_by.is_empty(),
+            "blocked_by": component.blocked_by,
+            "action": component.action,
+        },
+    })
+}

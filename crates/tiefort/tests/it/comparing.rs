@@ -1,0 +1,142 @@
+//! `compare`, `inadequate`, `diff`, and jobs with points of their own.
+
+use std::fs;
+
+use serde_json::Value;
+
+use crate::raster::Raster;
+use crate::scene::Scene;
+
+fn json(text: &str) -> Value {
+    serde_json::from_str(text).unwrap_or_else(|error| panic!("{error}: {text}"))
+}
+
+/// A folder with the sample terrain as a raster.
+fn with_dem() -> Scene {
+    let scene = Scene::new();
+    scene.run_to(0, &["sample", "--posts", "101", "--out", "dem.tif"]);
+    scene
+}
+
+#[test]
+fn methods_are_compared_in_words_and_for_programs() {
+    let scene = with_dem();
+    let said = scene.run_to(0, &["compare", "dem.tif", "--points", "450,700"]);
+    for part in
+        ["101 rows, 101 columns", "10,201 posts, 25 m apart", "equivalent", "400 of its 450 points are the border"]
+    {
+        assert!(said.stdout.contains(part), "{part:?} is not in: {}", said.stdout);
+    }
+    assert!(said.stderr.contains("20 of 20"), "{}", said.stderr);
+    let named =
+        ["compare", "dem.tif", "--methods", "iterative,lattice", "--points", "300", "--format", "json", "--quiet"];
+    let said = scene.run_to(0, &named);
+    assert_eq!(said.stderr, "");
+    let found = json(&said.stdout);
+    assert_eq!((&found["posts"], &found["rows"][1]["method"]), (&Value::from(10_201), &Value::from("lattice")));
+    assert!(0 < found["rows"][1]["equivalent_points"].as_u64().unwrap());
+    assert!(found["rows"][0]["equivalent_points"].is_null());
+}
+
+#[test]
+fn what_cannot_be_compared_is_told_with_what_is_possible() {
+    let scene = with_dem();
+    let refuses = |arguments: &[&str], parts: &[&str]| {
+        let all: Vec<&str> = ["compare", "dem.tif", "--quiet"].iter().chain(arguments).copied().collect();
+        scene.refuses(&all, parts);
+    };
+    refuses(&["--methods", "vip", "--points", "100"], &["vip", "100 points", "400 to 10201 points"]);
+    refuses(&["--points", "20000"], &["20000 points", "4 to 10201"]);
+    refuses(&["--window", "50,50,60x10"], &["--window", "101 rows and 101 columns"]);
+    assert!(scene.run_to(2, &["compare", "dem.tif", "--methods", "vpi"]).stderr.contains("fowler-little"));
+    assert!(scene.run_to(2, &["compare", "dem.tif", "--points", "3"]).stderr.contains("4.."));
+    assert!(scene.run_to(2, &["compare", "dem.tif", "--window", "1,2"]).stderr.contains("ROW,COL,ROWSxCOLUMNS"));
+    scene.refuses(&["compare", "none.tif"], &["none.tif"]);
+}
+
+#[test]
+fn a_job_is_compared_on_the_posts_of_its_raster() {
+    let scene = Scene::with_job("raster.toml", &[]);
+    Raster::sound().write(&scene.path("dem.tif"));
+    let arguments = ["compare", "job.toml", "--methods", "regular", "--points", "100", "--quiet"];
+    assert!(scene.run_to(0, &arguments).stdout.contains("posts of dem.tif in the area of"));
+}
+
+/// A pin as a feature.
+fn pin(said: &str, east_m: f64, north_m: f64) -> String {
+    format!(
+        r#"{{"type":"Feature","properties":{{{said}}},
+            "geometry":{{"type":"Point","coordinates":[{east_m},{north_m}]}}}}"#
+    )
+}
+
+#[test]
+fn what_is_inadequate_is_found_pinned_built_again_and_compared() {
+    let tin = "per_4km_square = 4096\n[tin]\nmethod = \"paper\"\npoints = 300";
+    let scene = Scene::with_job("small.toml", &[("per_4km_square = 4096", tin)]);
+    scene.run_to(0, &["build", "job.toml", "--out", "before.tdb", "--quiet"]);
+    let text = scene.run_to(0, &["inadequate", "before.tdb"]).stdout;
+    assert!(text.contains("pieces of ground") && text.contains("what could be done"), "{text}");
+    for name in ["error.png", "density.png"] {
+        assert!(fs::read(scene.path("before.tdb").join(name)).unwrap().starts_with(b"\x89PNG"));
+    }
+    let found = json(&fs::read_to_string(scene.path("before.tdb/inadequate.geojson")).unwrap());
+    let worst = &found["features"][0]["properties"];
+    let at = |key: &str| worst["worst"][key].as_f64().unwrap();
+    assert!(found["tolerance_m"].as_f64().unwrap() < worst["largest_m"].as_f64().unwrap());
+    assert_eq!(worst["area_m2"].as_f64().unwrap(), 625.0 * worst["posts"].as_f64().unwrap());
+    // A database with maps in it is as sound as before.
+    scene.run_to(0, &["verify", "before.tdb"]);
+
+    let pins = pin(r#""pin":"add""#, at("east_m"), at("north_m"));
+    fs::write(scene.path("pins.geojson"), pins).unwrap();
+    let job = fs::read_to_string(scene.path("job.toml")).unwrap();
+    fs::write(scene.path("job.toml"), job + "\npins = \"pins.geojson\"\n").unwrap();
+    scene.run_to(0, &["build", "job.toml", "--out", "after.tdb", "--quiet"]);
+    let text = scene.run_to(1, &["diff", "before.tdb", "after.tdb"]).stdout;
+    for part in ["RMS residual m", "tin.pins", "pins.geojson", "load modules differ"] {
+        assert!(text.contains(part), "{part:?} is not in: {text}");
+    }
+    let same = json(&scene.run_to(0, &["diff", "after.tdb", "after.tdb", "--format", "json"]).stdout);
+    assert_eq!(same["changed"], json("[]"));
+    // Weights of pins are found again beside the database.
+    scene.run_to(0, &["inadequate", "after.tdb", "--tolerance", "2", "--format", "json"]);
+    scene.run_to(0, &["fidelity", "after.tdb", "--pairs", "50"]);
+}
+
+#[test]
+fn pins_that_cannot_be_are_refused_before_anything_is_written() {
+    let pinned = "per_4km_square = 4096\n[tin]\npins = \"pins.geojson\"";
+    let scene = Scene::with_job("small.toml", &[("per_4km_square = 4096", pinned)]);
+    let refuses = |text: &str, parts: &[&str]| {
+        fs::write(scene.path("pins.geojson"), text).unwrap();
+        let said = scene.run_to(2, &["build", "job.toml", "--out", "a.tdb", "--quiet"]);
+        said.check_error(parts);
+    };
+    refuses(&pin(r#""pin":"add""#, 1.0e6, 0.0), &["pins.geojson", "feature 0", "outside the area"]);
+    refuses(&pin(r#""pin":"push""#, 506_000.0, 3_876_000.0), &["a point with pin \"push\"", "\"forbid\""]);
+    refuses("{}", &["pins.geojson", "expected GeoJSON"]);
+    let line = r#"{"type":"LineString","coordinates":[[506000,3876000],[506100,3876000]]}"#;
+    refuses(line, &["LineString (not supported yet)", "Point or Polygon"]);
+    fs::remove_file(scene.path("pins.geojson")).unwrap();
+    scene.run_to(2, &["build", "job.toml", "--out", "a.tdb", "--quiet"]).check_error(&["tin.pins", "pins.geojson"]);
+    assert!(!scene.path("a.tdb/database.json").exists());
+}
+
+#[test]
+fn a_mesh_starts_from_what_another_method_chooses() {
+    let scene = with_dem();
+    for tiles in ["1x1", "2x2"] {
+        let start = ["tin", "dem.tif", "--points", "300", "--tiles", tiles, "--method", "paper", "--out", "m.ply"];
+        let plain = json(scene.run_to(0, &[&start[..], &["--json"]].concat()).stdout.lines().last().unwrap());
+        let given = ["--start", "vip:100", "--json"];
+        let started = json(scene.run_to(0, &[&start[..], &given].concat()).stdout.lines().last().unwrap());
+        assert_eq!((&plain["points"], &started["points"]), (&Value::from(300), &Value::from(300)), "{tiles}");
+        // VIP's points are no help.
+        assert!(plain["residual"]["rms_m"].as_f64() < started["residual"]["rms_m"].as_f64());
+    }
+    let wrong =
+        |start: &str| scene.run_to(2, &["tin", "dem.tif", "--points", "9", "--start", start, "--out", "m.ply"]).stderr;
+    assert!(wrong("vip").contains("vip:1000") && wrong("vpi:5").contains("fowler-little"));
+    assert!(wrong("highlow:5").contains("highlow alone"));
+}
