@@ -23,8 +23,11 @@ pub use verify::{Status, Verdict, status, verify};
 mod raster;
 pub use raster::{Mesh, TinMethod, TinRequest, sample, tin};
 mod measures;
-pub use fidelity::{LineOfSight, SlopeDifference};
-pub use measures::{BuiltResidual, DatabaseFidelity, Measures, Sights, fidelity, measure};
+pub use fidelity::{
+    Cover, Distances, Drainage, GRADES, Hausdorff, LineOfSight, Measures, MeshForm, Registration, ResidualFigures,
+    SeamVisibility, SlopeClasses, SlopeDifference,
+};
+pub use measures::{BuiltResidual, DatabaseFidelity, Fidelity, Sights, fidelity, measure};
 
 mod area;
 mod assemble;

@@ -21,6 +21,7 @@ mod failure;
 mod files;
 mod lines;
 mod measures;
+mod measures_json;
 mod progress;
 mod run;
 mod signals;
