@@ -1,8 +1,8 @@
 //! Cover: can a vehicle hide where it can?
 //!
-//! A post lies in defilade when the straight line between a place on its one side and a place on the other, each at most
-//! 100 m away, passes at least 2 m above it: both sides hide what is 2 m high there. Looked at along the four lines
-//! through its eight neighbours, at posts. On a plane, however steep, and on a crest nothing is in defilade.
+//! A post lies in defilade when the straight line between a place on its one side and a place on the other, each at
+//! most 100 m away, passes at least 2 m above it: both sides hide what is 2 m high there. Looked at along the four
+//! lines through its eight neighbours, at posts. On a plane, however steep, and on a crest nothing is in defilade.
 
 use terrain::{Metres, QUANTA_PER_METRE};
 

@@ -1,8 +1,8 @@
 //! Where water runs: every post drains to one of its eight neighbours, all the way to the border or a void.
 //!
-//! Depressions are flooded from outside (priority flood, Barnes, Lehman and Mulla 2014): the lowest post of the shore is
-//! taken next, and what lies below it is flooded to its level. A post then drains down the steepest way of the flooded
-//! ground (D8), and where that is level, back the way the flood came. Either way it drains to a post that was
+//! Depressions are flooded from outside (priority flood, Barnes, Lehman and Mulla 2014): the lowest post of the shore
+//! is taken next, and what lies below it is flooded to its level. A post then drains down the steepest way of the
+//! flooded ground (D8), and where that is level, back the way the flood came. Either way it drains to a post that was
 //! flooded before it, so there are no circles, and one pass backwards adds up how many posts drain through each.
 
 use std::cmp::Reverse;
@@ -124,7 +124,9 @@ impl Filling<'_> {
 
 /// Whether water leaves the ground at a post: on the border, and beside a void.
 fn is_outlet(posts: &PostHeights, index: usize) -> bool {
-    neighbours(posts, index).count() < AROUND.len()
+    let (row, col) = (index / posts.wide(), index % posts.wide());
+    let is_border = row == 0 || row + 1 == posts.high() || col == 0 || col + 1 == posts.wide();
+    is_border || (posts.has_voids() && neighbours(posts, index).count() < AROUND.len())
 }
 
 #[cfg(test)]

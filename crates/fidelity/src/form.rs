@@ -1,9 +1,9 @@
 //! The form of the mesh itself: how sharp its triangles are, and whether they cover the ground once and without a gap.
 //!
 //! Angles are those of triangles seen from above. Gaps are asked with whole numbers: an edge inside the area with a
-//! triangle on one side only is a crack, one that has a vertex between its ends a T-junction, and vertices at one place but
-//! at different heights are torn. The triangles of each load module (of the whole area, for a plain mesh) add up to
-//! its area.
+//! triangle on one side only is a crack, one that has a vertex between its ends a T-junction, and vertices at one
+//! place but at different heights are torn. The triangles of each load module (of the whole area, for a plain mesh)
+//! add up to its area.
 
 use std::collections::BTreeMap;
 

@@ -92,8 +92,8 @@ impl<'a> DemGround<'a> {
         Self { dem, spacing, posts, streams, defilade }
     }
 
-    /// Measures a surface. Lines of sight are drawn from `seed`; load modules, if there are any that no triangle reaches
-    /// over, have `module_cells` a side from post (0, 0) on.
+    /// Measures a surface. Lines of sight are drawn from `seed`; load modules, if there are any that no triangle
+    /// reaches over, have `module_cells` a side from post (0, 0) on.
     ///
     /// # Panics
     /// When the triangles cover other posts than this ground.

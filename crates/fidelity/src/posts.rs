@@ -61,6 +61,11 @@ impl PostHeights {
         &self.quanta
     }
 
+    /// Whether the DEM has no height at some post.
+    pub(crate) fn has_voids(&self) -> bool {
+        !self.voids.is_empty()
+    }
+
     /// Whether the DEM has no height at a post.
     pub(crate) fn is_void(&self, index: usize) -> bool {
         !self.voids.is_empty() && self.voids[index]

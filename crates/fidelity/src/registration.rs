@@ -1,9 +1,9 @@
 //! Registration: does the TIN lie where the DEM does, or aside?
 //!
 //! Ground that is moved aside as a whole (a datum mistaken, posts taken for cells) is found by cross-correlation: the
-//! TIN's heights at posts are moved under the DEM's until their slopes agree best. Slopes, not heights, because heights
-//! of large forms agree nearly as well a few posts aside. Whole posts are tried on every fourth post of every fourth row
-//! first, then the best of them and its neighbours on all; a paraboloid through these nine tells the rest.
+//! TIN's heights at posts are moved under the DEM's until their slopes agree best. Slopes, not heights: those of large
+//! forms agree nearly as well a few posts aside. Whole posts are tried on some of the posts first, then the best of
+//! them and its neighbours on more; a paraboloid through these nine tells the rest.
 
 use terrain::{Metres, QUANTA_PER_METRE};
 
@@ -11,8 +11,8 @@ use crate::PostHeights;
 
 /// How far aside is looked, in posts, where the area is large enough.
 pub const SHIFT_POSTS_MAX: i32 = 8;
-/// Posts between those looked at first.
-const COARSE: usize = 4;
+/// About how many posts are looked at for each shift, first and then for the best and its neighbours.
+const POSTS_LOOKED_AT: (usize, usize) = (60_000, 1_000_000);
 
 /// Where the TIN lies against the DEM.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -59,7 +59,7 @@ pub fn registration(dem: &PostHeights, tin: &PostHeights, spacing: Metres) -> Op
         east_m: (f64::from(best[0]) + east) * spacing.0,
         north_m: (f64::from(best[1]) + north) * spacing.0,
         up_m: up / f64::from(QUANTA_PER_METRE),
-        correlation: both.correlation([0, 0], 1)?,
+        correlation: both.correlation([0, 0], both.step(POSTS_LOOKED_AT.1))?,
         best_correlation: nine[4],
         is_at_end: best.iter().any(|posts| reach <= posts.abs()),
     })
@@ -83,7 +83,7 @@ impl Both<'_> {
         let mut shifts: Vec<[i32; 2]> =
             (-reach..=reach).flat_map(|north| (-reach..=reach).map(move |east| [east, north])).collect();
         shifts.sort_by_key(|[east, north]| (east * east + north * north, *north, *east));
-        let step = if self.dem.wide().min(self.dem.high()) < 32 * COARSE { 1 } else { COARSE };
+        let step = self.step(POSTS_LOOKED_AT.0);
         let mut best = None;
         for shift in shifts {
             let found = self.correlation(shift, step)?;
@@ -97,9 +97,15 @@ impl Both<'_> {
     fn nine_around(&self, shift: [i32; 2]) -> Option<[f64; 9]> {
         let mut nine = [0.0; 9];
         for (number, found) in nine.iter_mut().enumerate() {
-            *found = self.correlation(moved(shift, number), 1)?;
+            *found = self.correlation(moved(shift, number), self.step(POSTS_LOOKED_AT.1))?;
         }
         Some(nine)
+    }
+
+    /// How many posts apart, both ways, so many posts of the area lie.
+    fn step(&self, wanted: usize) -> usize {
+        let posts = self.dem.quanta().len();
+        (1..).find(|step| posts <= wanted * step * step).unwrap_or(1)
     }
 
     /// How well the slopes of the DEM agree with those of the TIN that lie `shift` further, on every `step`th post.
@@ -121,6 +127,9 @@ impl Both<'_> {
     }
 
     fn is_near_void(&self, index: usize) -> bool {
+        if !self.dem.has_voids() {
+            return false;
+        }
         let wide = self.dem.wide();
         [index, index - 1, index + 1, index - wide, index + wide].iter().any(|&index| self.dem.is_void(index))
     }

@@ -1,7 +1,7 @@
 //! Seams: are the lines between load modules seen in the ground?
 //!
-//! A line that terrain does not explain shows as a crease. So the angle between the two triangles on an edge along such a
-//! line is held against that on other edges of like length; long edges lie in gentle ground and bend less.
+//! A line that terrain does not explain shows as a crease. So the angle between the two triangles on an edge along such
+//! a line is held against that on other edges of like length; long edges lie in gentle ground and bend less.
 
 use terrain::{Metres, QUANTA_PER_METRE};
 

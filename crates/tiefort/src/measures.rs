@@ -6,7 +6,7 @@ use views::{Align, Table, grouped};
 /// All measures as lines: what, of the surface, of the grid, and what it means.
 pub fn text(found: &Fidelity) -> String {
     let mut rows = Rows { found, table: Table::new(&[Align::Left, Align::Right, Align::Right, Align::Left]) };
-    rows.table.row(["", "this", "grid", ""]);
+    rows.table.row(["", "TIN", "grid", ""]);
     let (step, spacing) = (found.grid_step, found.spacing_m);
     let every = if step == 1 { "every post".into() } else { format!("every {step} posts") };
     rows.add("Triangles", &format!("the grid: {every}, {} m", f64::from(step) * spacing), |m| {
