@@ -62,8 +62,8 @@ impl Distances {
 /// Measures the distance both ways. Voids of the DEM, and vertices in cells around one, are left out.
 pub fn hausdorff(dem: &PostHeights, tin: &PostHeights, triangles: &Triangles, spacing: Metres) -> Hausdorff {
     let ground = Both { dem, tin, triangles, spacing: spacing.0 };
-    let from_posts = dem.known().map(|index| ground.from_post(index));
-    let from_vertices = (0..triangles.vertices().len()).filter_map(|vertex| ground.from_vertex(vertex));
+    let from_posts = dem.known().map(|index| ground.post_to_tin(index));
+    let from_vertices = (0..triangles.vertices().len()).filter_map(|vertex| ground.vertex_to_dem(vertex));
     Hausdorff { dem_to_tin: Distances::of(from_posts), tin_to_dem: Distances::of(from_vertices) }
 }
 
@@ -76,7 +76,7 @@ struct Both<'a> {
 }
 
 impl Both<'_> {
-    fn from_post(&self, index: usize) -> f64 {
+    fn post_to_tin(&self, index: usize) -> f64 {
         let (row, col) = (index / self.dem.wide(), index % self.dem.wide());
         let rect = self.dem.rect();
         let place = [f64::from(rect.west + col as i32), f64::from(rect.south + row as i32)];
@@ -99,7 +99,7 @@ impl Both<'_> {
         best.sqrt()
     }
 
-    fn from_vertex(&self, vertex: usize) -> Option<f64> {
+    fn vertex_to_dem(&self, vertex: usize) -> Option<f64> {
         let [x, y, quanta] = self.triangles.vertices()[vertex];
         let rect = self.dem.rect();
         let (x, y) = (x - f64::from(rect.west), y - f64::from(rect.south));
