@@ -40,8 +40,11 @@ pub use compare::{
 mod inadequate;
 pub use inadequate::{Component, Inadequate, inadequate};
 mod measures;
-pub use fidelity::{LineOfSight, SlopeDifference};
-pub use measures::{BuiltResidual, DatabaseFidelity, Measures, Sights, fidelity, measure};
+pub use fidelity::{
+    Cover, Distances, Drainage, GRADES, Hausdorff, LineOfSight, Measures, MeshForm, Registration, ResidualFigures,
+    SeamVisibility, SlopeClasses, SlopeDifference,
+};
+pub use measures::{BuiltResidual, DatabaseFidelity, Fidelity, Sights, fidelity, measure};
 
 mod product;
 pub use product::{LimitUse, NO_RESIDUAL, Product, ProductGround, Wanted, WantedGround, product};

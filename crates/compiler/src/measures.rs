@@ -1,10 +1,10 @@
-//! Fidelity beyond residuals, of a finished database or of a plain mesh: what matters to a tank.
+//! Fidelity of a finished database or of a plain mesh, always beside the regular grid of as many triangles.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
 use database::{Fingerprint, Folder, Manifest, ManifestState, SourceRecord, Totals};
-use fidelity::{LineOfSight, SlopeDifference, Triangles, line_of_sight, slope};
+use fidelity::{DemGround, Measures, Triangles, regular_grid};
 use job::{DemSource, Job, NamedFile, SourceEntry, SourceFile, SourceSaid, Voids};
 use schedule::Workers;
 use terrain::{Dem, Metres, QUANTA_PER_METRE};
@@ -28,13 +28,19 @@ impl Sights {
     pub const USUAL: Self = Self { pairs: 20_000, seed: 1 };
 }
 
-/// How true a surface is to a DEM, beyond its residuals.
+/// How true a surface is to a DEM, and the regular grid beside it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Measures {
-    /// What is seen.
-    pub line_of_sight: LineOfSight,
-    /// How steep it is.
-    pub slope: SlopeDifference,
+pub struct Fidelity {
+    /// The surface.
+    pub tin: Measures,
+    /// The regular grid over the same DEM with about as many triangles as the surface has polygons.
+    pub grid: Measures,
+    /// Posts between the vertices of that grid.
+    pub grid_step: i32,
+    /// Metres between posts.
+    pub spacing_m: f64,
+    /// Polygons of the surface, by the count its limits use.
+    pub polygons: u64,
 }
 
 /// How true a database is.
@@ -42,12 +48,12 @@ pub struct Measures {
 pub struct DatabaseFidelity {
     /// Name of the area.
     pub area: String,
-    /// What line of sight and slope are measured against: the terrain it was built from, or a raster.
+    /// What it is measured against: the terrain it was built from, or a raster.
     pub against: String,
     /// Residuals as the build measured them, against its own ground.
     pub residual: BuiltResidual,
-    /// Line of sight and slope.
-    pub measures: Measures,
+    /// All measures, those of residuals too.
+    pub measures: Fidelity,
 }
 
 /// Residuals that `database.json` keeps, in metres.
@@ -89,26 +95,44 @@ pub fn fidelity(folder: &Path, against: Option<&Path>, sights: Sights) -> Result
             hint: "`tiefort status` says where the area lies".into(),
         });
     }
-    let triangles = triangles_of(&folder, &area)?;
+    let (triangles, polygons) = triangles_of(&folder, &area)?;
     let residual = built_residual(&manifest.totals);
     let spacing = Metres(area.frame.spacing.metres());
-    let measures = compare(&dem, &triangles, spacing, sights);
+    let measures = compare(&dem, &triangles, polygons, spacing, sights, Some(area.grid.side_cells));
     Ok(DatabaseFidelity { area: manifest.area.name, against, residual, measures })
 }
 
 /// Measures a mesh against the raster it was made from.
-pub fn measure(mesh: &Mesh, sights: Sights) -> Measures {
-    compare(&mesh.dem, &Triangles::of_tin(&mesh.tin), Metres(mesh.spacing_m.0), sights)
+pub fn measure(mesh: &Mesh, sights: Sights) -> Fidelity {
+    let triangles = Triangles::of_tin(&mesh.tin);
+    compare(&mesh.dem, &triangles, triangles.count() as u64, Metres(mesh.spacing_m.0), sights, None)
 }
 
-fn compare(dem: &Dem, triangles: &Triangles, spacing: Metres, sights: Sights) -> Measures {
-    Measures {
-        line_of_sight: line_of_sight(dem, triangles, spacing, sights.pairs, sights.seed),
-        slope: slope(dem, triangles, spacing),
+fn compare(
+    dem: &Dem,
+    triangles: &Triangles,
+    polygons: u64,
+    spacing: Metres,
+    sights: Sights,
+    module_cells: Option<i32>,
+) -> Fidelity {
+    let rect = triangles.rect();
+    let ground = DemGround::new(dem, rect, spacing);
+    let measured = |triangles: &Triangles, cells| ground.measure(triangles, sights.pairs, sights.seed, cells);
+    let regular = regular_grid(dem, rect, polygons);
+    // Where its step does not divide a load module, the grid has no edges along lines between them.
+    let grid_cells = module_cells.filter(|cells| cells % regular.step == 0);
+    Fidelity {
+        tin: measured(triangles, module_cells),
+        grid: measured(&Triangles::of_tin(&regular.tin), grid_cells),
+        grid_step: regular.step,
+        spacing_m: spacing.0,
+        polygons,
     }
 }
 
-fn triangles_of(folder: &Folder, area: &GamingArea) -> Result<Triangles, CompileError> {
+/// The triangles of all load modules, and how many polygons they count.
+fn triangles_of(folder: &Folder, area: &GamingArea) -> Result<(Triangles, u64), CompileError> {
     let modules = read_modules(folder, area)?;
     let missing = area.grid.all().iter().find(|module| !modules.contains_key(module));
     if let Some(module) = missing {
@@ -119,7 +143,8 @@ fn triangles_of(folder: &Folder, area: &GamingArea) -> Result<Triangles, Compile
             hint: "the database is damaged: `tiefort verify` says where, `tiefort build --fresh` makes it anew".into(),
         });
     }
-    Ok(Triangles::of_modules(modules.values(), area.grid, area.frame.spacing))
+    let polygons = modules.values().map(|module| u64::from(module.polygon_count)).sum();
+    Ok((Triangles::of_modules(modules.values(), area.grid, area.frame.spacing), polygons))
 }
 
 /// Points the job at the ground to measure against, and gives its name. What is void in a raster of one's own choice

@@ -9,6 +9,7 @@
 //! ```
 //! Cells list too many rather than too few: whoever asks tests what it finds.
 
+use std::cell::Cell;
 use std::ops::RangeInclusive;
 
 /// Share of a cell by which rounding may move the end of a span; spans are grown by it.
@@ -78,6 +79,27 @@ impl Cells {
         found
     }
 
+    /// Calls `visit` with what may lie within `reach` of a place, which may shrink from call to call: first with what
+    /// may lie at the place itself. The same item may come more than once.
+    pub fn each_near(&self, place: [f64; 2], reach: &Cell<f64>, mut visit: impl FnMut(u32)) {
+        self.at(place).iter().for_each(|&item| visit(item));
+        let [x, y] = self.scaled(place);
+        let (home_row, home_col) = (last_below(y, self.rows), last_below(x, self.cols));
+        let span = |at: f64, count: usize| {
+            let cells = reach.get() / self.side + MARGIN;
+            last_below(at - cells, count)..=last_below(at + cells, count)
+        };
+        for row in span(y, self.rows) {
+            for col in span(x, self.cols) {
+                let away = [beyond(x, col), beyond(y, row)];
+                let squared = (away[0] * away[0] + away[1] * away[1]) * self.side * self.side;
+                if (row, col) != (home_row, home_col) && squared <= reach.get() * reach.get() {
+                    self.list(row, col).iter().for_each(|&item| visit(item));
+                }
+            }
+        }
+    }
+
     fn list(&self, row: usize, col: usize) -> &[u32] {
         let cell = row * self.cols + col;
         &self.listed[self.starts[cell]..self.starts[cell + 1]]
@@ -115,6 +137,11 @@ fn part_in_band(from: [f64; 2], to: [f64; 2], [low, high]: [f64; 2]) -> Option<[
     Some([if a[1] < low { at(low) } else { a[0] }, if high < b[1] { at(high) } else { b[0] }])
 }
 
+/// How far a coordinate lies outside a cell, in cells.
+fn beyond(at: f64, cell: usize) -> f64 {
+    (cell as f64 - at).max(at - (cell + 1) as f64).max(0.0)
+}
+
 /// The cell of a coordinate, the nearest one where it lies outside.
 fn last_below(at: f64, count: usize) -> usize {
     (at.max(0.0) as usize).min(count - 1)
@@ -145,6 +172,28 @@ mod tests {
         ] {
             assert_eq!(cells.at(place), expected, "{place:?}");
         }
+    }
+
+    #[test]
+    fn what_may_lie_near_is_found_within_reach_and_not_beyond() {
+        let cells = two_outlines();
+        let near = |place, reach: f64| {
+            let mut near = Vec::new();
+            cells.each_near(place, &Cell::new(reach), |item| near.push(item));
+            near.dedup();
+            near
+        };
+        assert_eq!(near([6.5, 3.5], 0.4), [] as [u32; 0]);
+        assert_eq!(near([6.5, 3.5], 0.6), [1]);
+        assert_eq!(near([7.9, 2.9], 0.2), [1]);
+        assert_eq!(near([0.5, 0.5], 9.0), [0, 1]);
+        // A reach that shrinks on the way ends the search.
+        let (reach, mut met) = (Cell::new(9.0), Vec::new());
+        cells.each_near([0.5, 0.5], &reach, |item| {
+            met.push(item);
+            reach.set(0.0);
+        });
+        assert_eq!(met, [0]);
     }
 
     #[test]

@@ -4,7 +4,9 @@
 //! inside; the far lines only on the area's northern and eastern border), so sums over load modules are sums
 //! over the area. Voids are in no figure. Everything is whole quanta of 1/128 m until it is reported.
 //!
-//! And what matters to a tank: [`line_of_sight`] and [`slope`], of the load modules of an area or of a plain TIN.
+//! And what matters to a tank, of the load modules of an area or of a plain TIN: what is seen, how steep it is, where
+//! there is cover, where water runs, how far the surfaces lie apart, and what the mesh is like. [`DemGround::measure`]
+//! takes all of these at once; [`regular_grid`] is what a TIN is held against.
 
 mod tally;
 pub use tally::{Residuals, Tally};
@@ -17,12 +19,35 @@ pub use source::{SourcePosts, residuals_at_source};
 mod cells;
 mod triangles;
 pub use triangles::Triangles;
+mod posts;
+pub use posts::{PostHeights, residuals_at_posts};
 mod draw;
 mod samples;
 mod sight;
 pub use sight::{EYE_M, LineOfSight, RANGE_M, line_of_sight};
 mod slope;
 pub use slope::{SlopeDifference, slope};
+mod grade;
+pub use grade::{GRADES, SlopeClasses, slope_classes};
+mod hausdorff;
+mod nearest;
+pub use hausdorff::{Distances, Hausdorff, hausdorff};
+mod drainage;
+mod flood;
+pub use drainage::{CHANNEL_POSTS, Drainage, PIT_M, Streams, drainage};
+mod cover;
+pub use cover::{COVER_RANGE_M, Cover, DEFILADE_M, Defilade, cover};
+mod edges;
+mod seam;
+pub use seam::{SeamVisibility, seam_visibility};
+mod form;
+pub use form::{MeshForm, SLIVER_DEGREES, mesh_form};
+mod registration;
+pub use registration::{Registration, SHIFT_POSTS_MAX, registration};
+mod regular;
+pub use regular::{RegularGrid, regular_grid};
+mod measures;
+pub use measures::{DemGround, Measures, ResidualFigures};
 
 #[cfg(test)]
 mod scene;

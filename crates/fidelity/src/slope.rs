@@ -6,9 +6,9 @@
 //! next to a void, are left out. Angles are figures to read and decide nothing, so their last bits may differ
 //! between machines.
 
-use terrain::{Dem, Metres, Post, QUANTA_PER_METRE};
+use terrain::Metres;
 
-use crate::triangles::Triangles;
+use crate::PostHeights;
 
 /// Bins in a degree: how fine a percentile of angles is told.
 const BINS_PER_DEGREE: f64 = 1000.0;
@@ -26,50 +26,13 @@ pub struct SlopeDifference {
     pub normal_p95_degrees: f64,
 }
 
-/// Compares the slopes of the TIN with those of the DEM.
-///
-/// # Panics
-/// When the DEM does not hold all posts of the triangles.
-pub fn slope(dem: &Dem, triangles: &Triangles, spacing: Metres) -> SlopeDifference {
-    let rect = triangles.rect();
-    assert!(dem.rect().contains_rect(&rect), "the DEM holds the ground of the triangles");
-    let tin_row = |row: i32| -> Vec<f64> {
-        (rect.west..=rect.east).map(|col| triangles.height_at([f64::from(col), f64::from(row)])).collect()
-    };
-    let dem_row = |row: i32| -> Vec<f64> {
-        dem.row(row)[(rect.west - dem.rect().west) as usize..][..rect.posts_wide()]
-            .iter()
-            .map(|&height| f64::from(height))
-            .collect()
-    };
+/// Compares the slopes of the TIN with those of the DEM at the inner posts.
+pub fn slope(dem: &PostHeights, tin: &PostHeights, spacing: Metres) -> SlopeDifference {
     let mut sums = Sums::new();
-    let per_quantum = 1.0 / (2.0 * spacing.0 * f64::from(QUANTA_PER_METRE));
-    if rect.cells_wide() < 2 || rect.cells_high() < 2 {
-        return sums.figures();
-    }
-    let mut tin = [tin_row(rect.south), tin_row(rect.south + 1)];
-    for row in rect.south + 1..rect.north {
-        let tin_north = tin_row(row + 1);
-        let [tin_south, tin_here] = tin;
-        let (dem_south, dem_here, dem_north) = (dem_row(row - 1), dem_row(row), dem_row(row + 1));
-        for i in 1..rect.cells_wide() {
-            if dem.void_count() == 0 || !is_near_void(dem, Post::new(row, rect.west + i as i32)) {
-                let gradient = |south: &[f64], here: &[f64], north: &[f64]| {
-                    [(here[i + 1] - here[i - 1]) * per_quantum, (north[i] - south[i]) * per_quantum]
-                };
-                sums.add(gradient(&dem_south, &dem_here, &dem_north), gradient(&tin_south, &tin_here, &tin_north));
-            }
-        }
-        tin = [tin_here, tin_north];
+    for index in dem.inner() {
+        sums.add(dem.gradient(index, spacing), tin.gradient(index, spacing));
     }
     sums.figures()
-}
-
-/// Whether `post` or one of its four neighbours is void.
-fn is_near_void(dem: &Dem, Post { row, col }: Post) -> bool {
-    [(row, col), (row - 1, col), (row + 1, col), (row, col - 1), (row, col + 1)]
-        .into_iter()
-        .any(|(row, col)| dem.is_void(Post::new(row, col)))
 }
 
 /// Sums over the posts, in the order of posts.
@@ -125,9 +88,10 @@ fn angle_between([ax, ay]: [f64; 2], [bx, by]: [f64; 2]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use terrain::PostRect;
+    use terrain::{Dem, Post, PostRect};
 
     use super::*;
+    use crate::Triangles;
     use crate::scene::{full_tin, height_by_search, random_tin};
 
     const SPACING: Metres = Metres(25.0);
@@ -136,10 +100,15 @@ mod tests {
         PostRect::new(Post::new(-3, 4), Post::new(30, 47))
     }
 
+    fn against(dem: &Dem, tin: &terrain::Tin) -> SlopeDifference {
+        let posts = PostHeights::of_dem(dem, tin.rect);
+        slope(&posts, &PostHeights::of_triangles(&Triangles::of_tin(tin), &posts), SPACING)
+    }
+
     #[test]
     fn a_tin_through_every_post_differs_nowhere() {
         let dem = Dem::from_fn(rect(), |post| Some(post.row * post.row * 50 - post.col * 77));
-        let found = slope(&dem, &Triangles::of_tin(&full_tin(&dem)), SPACING);
+        let found = against(&dem, &full_tin(&dem));
         assert_eq!(found, SlopeDifference { posts: 32 * 42, ..SlopeDifference::default() });
     }
 
@@ -148,13 +117,13 @@ mod tests {
         // 25 m up for each 25 m east: 45 degrees.
         let dem = Dem::from_fn(rect(), |post| Some(post.col * 25 * 128));
         let flat = Dem::from_fn(rect(), |_| Some(5));
-        let found = slope(&dem, &Triangles::of_tin(&full_tin(&flat)), SPACING);
+        let found = against(&dem, &full_tin(&flat));
         for degrees in [found.rms_degrees, found.normal_mean_degrees, found.normal_p95_degrees] {
             assert!((degrees - 45.0).abs() < 0.0011, "{found:?}");
         }
         // As steep, but the other way: steepness agrees, normals stand at a right angle.
         let back = Dem::from_fn(rect(), |post| Some(-post.col * 25 * 128));
-        let found = slope(&dem, &Triangles::of_tin(&full_tin(&back)), SPACING);
+        let found = against(&dem, &full_tin(&back));
         assert!(found.rms_degrees < 1e-9 && (found.normal_mean_degrees - 90.0).abs() < 1e-9, "{found:?}");
     }
 
@@ -162,10 +131,10 @@ mod tests {
     fn posts_at_voids_are_left_out() {
         let dem = Dem::from_fn(rect(), |post| (post != Post::new(10, 20)).then_some(0));
         let tin = random_tin(rect(), 40, |_, _| 0, 1);
-        let found = slope(&dem, &Triangles::of_tin(&tin), SPACING);
+        let found = against(&dem, &tin);
         assert_eq!((found.posts, found.rms_degrees), (32 * 42 - 5, 0.0));
         let line = Dem::from_fn(PostRect::of_size(2, 9), |_| Some(0));
-        assert_eq!(slope(&line, &Triangles::of_tin(&full_tin(&line)), SPACING), SlopeDifference::default());
+        assert_eq!(against(&line, &full_tin(&line)), SlopeDifference::default());
     }
 
     #[test]
@@ -196,7 +165,7 @@ mod tests {
                 angles.iter().sum::<f64>() / posts as f64,
                 angles[(posts * 95).div_ceil(100) - 1],
             ];
-            let found = slope(&dem, &Triangles::of_tin(&tin), SPACING);
+            let found = against(&dem, &tin);
             let figures = [found.rms_degrees, found.normal_mean_degrees, found.normal_p95_degrees];
             let agree = figures.iter().zip(expected).all(|(found, expected)| (found - expected).abs() < 0.0011);
             assert!(agree && found.posts == posts as u64, "seed {seed}: {found:?}, expected {expected:?}");

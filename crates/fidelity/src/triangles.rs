@@ -18,18 +18,17 @@ pub struct Triangles {
     vertices: Vec<[f64; 3]>,
     corners: Vec<[u32; 3]>,
     cells: Cells,
+    /// East and north in whole units, where equal places are equal numbers.
+    places: Vec<[i64; 2]>,
+    units_per_post: i64,
 }
 
 impl Triangles {
     /// Those of a TIN, whose vertices may stand anywhere on the lattice.
     pub fn of_tin(tin: &Tin) -> Self {
-        let posts = |lattice: i32| f64::from(lattice) / f64::from(LATTICE_PER_POST);
-        let vertices = tin
-            .vertices
-            .iter()
-            .map(|vertex| [posts(vertex.at.col), posts(vertex.at.row), f64::from(vertex.height)])
-            .collect();
-        Self::new(tin.rect, vertices, tin.triangles.clone())
+        let places = tin.vertices.iter().map(|v| [i64::from(v.at.col), i64::from(v.at.row)]).collect();
+        let heights = tin.vertices.iter().map(|vertex| vertex.height);
+        Self::new(tin.rect, (places, i64::from(LATTICE_PER_POST)), heights, tin.triangles.clone())
     }
 
     /// Those of the load modules of a whole area.
@@ -38,21 +37,29 @@ impl Triangles {
         grid: ModuleGrid,
         spacing: Spacing,
     ) -> Self {
-        let (mut vertices, mut corners) = (Vec::new(), Vec::new());
+        let (mut places, mut heights, mut corners) = (Vec::new(), Vec::new(), Vec::new());
+        let units_per_post = i64::from(spacing.quanta_per_post());
         for module in modules {
-            let first = vertices.len() as u32;
-            let side = i64::from(grid.side_cells) * i64::from(spacing.quanta_per_post());
-            let posts = |index: u32, quanta: u16| {
-                (i64::from(index) * side + i64::from(quanta)) as f64 / f64::from(spacing.quanta_per_post())
-            };
+            let first = places.len() as u32;
+            let side = i64::from(grid.side_cells) * units_per_post;
+            let quanta = |index: u32, within: u16| i64::from(index) * side + i64::from(within);
             let (row, col) = (module.id.row, module.id.col);
-            vertices.extend(module.vertices.iter().map(|v| [posts(col, v.x), posts(row, v.y), f64::from(v.z)]));
+            places.extend(module.vertices.iter().map(|v| [quanta(col, v.x), quanta(row, v.y)]));
+            heights.extend(module.vertices.iter().map(|v| v.z));
             corners.extend(module.triangles.iter().map(|triangle| triangle.map(|v| first + u32::from(v))));
         }
-        Self::new(grid.area(), vertices, corners)
+        Self::new(grid.area(), (places, units_per_post), heights, corners)
     }
 
-    fn new(rect: PostRect, vertices: Vec<[f64; 3]>, corners: Vec<[u32; 3]>) -> Self {
+    fn new(
+        rect: PostRect,
+        (places, units_per_post): (Vec<[i64; 2]>, i64),
+        heights: impl IntoIterator<Item = i32>,
+        corners: Vec<[u32; 3]>,
+    ) -> Self {
+        let posts = |units: i64| units as f64 / units_per_post as f64;
+        let vertices: Vec<[f64; 3]> =
+            places.iter().zip(heights).map(|(&[x, y], height)| [posts(x), posts(y), f64::from(height)]).collect();
         // About two triangles to a cell.
         let posts = rect.post_count() as f64;
         let side = (2.0 * posts / corners.len().max(1) as f64).sqrt().clamp(CELL_POSTS.0, CELL_POSTS.1);
@@ -61,7 +68,32 @@ impl Triangles {
         let cells = Cells::new(south_west, north_east, side, corners.len() as u32, |triangle| {
             corners[triangle as usize].map(|v| place_of(vertices[v as usize]))
         });
-        Self { rect, vertices, corners, cells }
+        Self { rect, vertices, corners, cells, places, units_per_post }
+    }
+
+    /// How many there are.
+    pub fn count(&self) -> usize {
+        self.corners.len()
+    }
+
+    /// Corners of all triangles, by vertex.
+    pub(crate) fn corners(&self) -> &[[u32; 3]] {
+        &self.corners
+    }
+
+    /// East and north in posts and height in quanta of all vertices; those of two load modules come twice.
+    pub(crate) fn vertices(&self) -> &[[f64; 3]] {
+        &self.vertices
+    }
+
+    /// East and north of all vertices in whole units, and how many make up a post.
+    pub(crate) fn places(&self) -> (&[[i64; 2]], i64) {
+        (&self.places, self.units_per_post)
+    }
+
+    /// Which triangles may lie under which place.
+    pub(crate) fn cells(&self) -> &Cells {
+        &self.cells
     }
 
     /// The posts they cover.
@@ -104,7 +136,7 @@ impl Triangles {
         })
     }
 
-    fn corners_of(&self, triangle: u32) -> [[f64; 3]; 3] {
+    pub(crate) fn corners_of(&self, triangle: u32) -> [[f64; 3]; 3] {
         self.corners[triangle as usize].map(|v| self.vertices[v as usize])
     }
 }

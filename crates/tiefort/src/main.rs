@@ -25,6 +25,7 @@ mod files;
 mod fit;
 mod lines;
 mod measures;
+mod measures_json;
 mod new_folder;
 mod page;
 mod progress;

@@ -1,115 +1,230 @@
-//! Line of sight and slope in words and as JSON: what `fidelity` and `tin --measure` have in common.
+//! Every measure of a surface beside those of the regular grid, in words: what `fidelity` and `tin --measure` share.
 
-use compiler::{LineOfSight, Measures, SlopeDifference};
-use serde_json::{Value, json};
+use compiler::{Fidelity, LineOfSight, Measures};
 use views::{Align, Table, grouped};
 
-/// A table of measures: what, how much, and what it means.
-pub fn table() -> Table {
-    Table::new(&[Align::Left, Align::Right, Align::Left])
+/// All measures as lines: what, of the surface, of the grid, and what it means.
+pub fn text(found: &Fidelity) -> String {
+    let mut rows = Rows { found, table: Table::new(&[Align::Left, Align::Right, Align::Right, Align::Left]) };
+    rows.table.row(["", "TIN", "grid", ""]);
+    let (step, spacing) = (found.grid_step, found.spacing_m);
+    let every = if step == 1 { "every post".into() } else { format!("every {step} posts") };
+    rows.add("Triangles", &format!("the grid: {every}, {} m", f64::from(step) * spacing), |m| {
+        Some(grouped(m.mesh.triangles))
+    });
+    rows.residual();
+    rows.sight();
+    rows.slope();
+    rows.cover();
+    rows.water();
+    rows.apart();
+    rows.mesh();
+    rows.table.text(0)
 }
 
-/// Adds line of sight and slope.
-pub fn add_rows(table: &mut Table, measures: &Measures) {
-    add_sight(table, &measures.line_of_sight);
-    add_slope(table, &measures.slope);
+struct Rows<'a> {
+    found: &'a Fidelity,
+    table: Table,
 }
 
-fn add_sight(table: &mut Table, sight: &LineOfSight) {
-    let left_out = if sight.left_out == 0 {
-        String::new()
-    } else {
-        format!(", {} left out (voids, or no room)", grouped(sight.left_out))
-    };
-    if sight.pairs() == 0 {
-        table.row(["Line of sight", "none", &format!("no pair to compare{left_out}")]);
-        return;
+impl Rows<'_> {
+    /// One measure of both; `None` is a dash.
+    fn add(&mut self, name: &str, meaning: &str, figure: impl Fn(&Measures) -> Option<String>) {
+        let [this, grid] = [&self.found.tin, &self.found.grid].map(|m| figure(m).unwrap_or_else(|| "-".into()));
+        self.table.row([name, &this, &grid, meaning]);
     }
-    let pairs = grouped(sight.pairs());
-    let wide = 100.0 * sight.half_width();
-    let shares = format!(
-        "false visible {}, false hidden {}",
-        percent(sight.false_visible_share()),
-        percent(sight.false_hidden_share())
-    );
-    table.row(["Line of sight", &percent(sight.agreement()), &format!("agreement, ± {wide:.2} %; {shares}")]);
-    let seen =
-        format!("visible on the DEM, {} on the TIN; {pairs} pairs{left_out}", percent(sight.visible_share_tin()));
-    table.row(["", &percent(sight.visible_share_dem()), &seen]);
-}
 
-fn add_slope(table: &mut Table, slope: &SlopeDifference) {
-    if slope.posts == 0 {
-        table.row(["Slope", "none", "no inner post to compare"]);
-        return;
+    fn residual(&mut self) {
+        let posts = self.found.tin.residual.posts;
+        let name = if posts == 0 { "Residual: no post" } else { "Residual" };
+        let figure = move |metres: f64| (0 < posts).then(|| format!("{metres:.3} m"));
+        self.add(name, &format!("RMS, {} posts", grouped(posts)), move |m| figure(m.residual.rms_m));
+        self.add("", "mean, DEM less surface", move |m| figure(m.residual.mean_m));
+        self.add("", "mean absolute", move |m| figure(m.residual.mean_abs_m));
+        self.add("", "half of the posts within", move |m| figure(m.residual.p50_m));
+        self.add("", "95 % within", move |m| figure(m.residual.p95_m));
+        self.add("", "99 % within", move |m| figure(m.residual.p99_m));
+        self.add("", "largest", move |m| figure(m.residual.max_m));
     }
-    let rms = format!("{:.2}°", slope.rms_degrees);
-    table.row(["Slope", &rms, &format!("RMS difference, {} inner posts", grouped(slope.posts))]);
-    let normals = format!("mean angle between normals, 95 % within {:.2}°", slope.normal_p95_degrees);
-    table.row(["", &format!("{:.2}°", slope.normal_mean_degrees), &normals]);
+
+    fn sight(&mut self) {
+        let sight = &self.found.tin.line_of_sight;
+        let left_out = match sight.left_out {
+            0 => String::new(),
+            pairs => format!(", {} left out (voids, or no room)", grouped(pairs)),
+        };
+        if sight.pairs() == 0 {
+            self.add("Line of sight", &format!("no pair to compare{left_out}"), |_| None);
+            return;
+        }
+        let share = |share: fn(&LineOfSight) -> f64| move |m: &Measures| Some(percent(share(&m.line_of_sight)));
+        let pairs = format!("agreement, {} pairs{left_out}", grouped(sight.pairs()));
+        self.add("Line of sight", &pairs, share(LineOfSight::agreement));
+        self.add("", "half width of that, 95 % sure", |m| Some(format!("± {}", percent(m.line_of_sight.half_width()))));
+        self.add("", "false visible", share(LineOfSight::false_visible_share));
+        self.add("", "false hidden", share(LineOfSight::false_hidden_share));
+        let on_dem = percent(sight.visible_share_dem());
+        self.add("", &format!("visible, {on_dem} on the DEM"), share(LineOfSight::visible_share_tin));
+    }
+
+    fn slope(&mut self) {
+        let posts = self.found.tin.slope.posts;
+        if posts == 0 {
+            self.add("Slope", "no inner post to compare", |_| None);
+            return;
+        }
+        let inner = format!("RMS difference, {} inner posts", grouped(posts));
+        self.add("Slope", &inner, |m| Some(degrees(m.slope.rms_degrees)));
+        self.add("", "mean angle between normals", |m| Some(degrees(m.slope.normal_mean_degrees)));
+        self.add("", "95 % of normals within", |m| Some(degrees(m.slope.normal_p95_degrees)));
+        let same = "of the ground in the same class of slope";
+        self.add("Trafficability", same, |m| Some(percent(m.slope_classes.agreement())));
+        self.add("", "in a gentler class than on the DEM", |m| Some(percent(m.slope_classes.gentler())));
+        self.add("", "in a steeper class", |m| Some(percent(m.slope_classes.steeper())));
+        let on_dem = self.found.tin.slope_classes.shares_dem().map(percent);
+        for (class, name) in ["up to 15 %", "15 to 30 %", "30 to 45 %", "above 45 %"].iter().enumerate() {
+            let meaning = format!("{name}, {} on the DEM", on_dem[class]);
+            self.add("", &meaning, |m| Some(percent(m.slope_classes.shares_tin()[class])));
+        }
+    }
+
+    fn cover(&mut self) {
+        let cover = self.found.tin.cover;
+        if cover.posts() == 0 {
+            return;
+        }
+        let name = "agreement: 2 m of defilade within 100 m";
+        self.add("Cover", name, |m| Some(percent(m.cover.agreement())));
+        let on_dem = percent(cover.share_dem());
+        self.add("", &format!("in defilade, {on_dem} on the DEM"), |m| Some(percent(m.cover.share_tin())));
+        let folds = cover.both + cover.lost;
+        self.add("", "of the DEM's cover kept", move |m| (0 < folds).then(|| percent(m.cover.kept())));
+    }
+
+    fn water(&mut self) {
+        let dem = self.found.tin.drainage;
+        let channels = format!("of the DEM's {} channel posts found within 2 posts", grouped(dem.channels_dem));
+        self.add("Drainage", &channels, |m| (0 < m.drainage.channels_dem).then(|| percent(m.drainage.recall())));
+        self.add("", "of its own channel posts the DEM has", |m| {
+            (0 < m.drainage.channels_tin).then(|| percent(m.drainage.precision()))
+        });
+        self.add("", "spurious pits deeper than 1 m", |m| Some(grouped(m.drainage.pits_spurious)));
+        let missed = format!("pits missed, of {} on the DEM", grouped(dem.pits_dem));
+        self.add("", &missed, |m| Some(grouped(m.drainage.pits_missed)));
+    }
+
+    fn apart(&mut self) {
+        let asked = 0 < self.found.tin.hausdorff.dem_to_tin.places;
+        let figure = move |metres: f64| asked.then(|| format!("{metres:.3} m"));
+        self.add("Hausdorff", "largest distance in space, DEM to surface", move |m| {
+            figure(m.hausdorff.dem_to_tin.max_m)
+        });
+        self.add("", "mean", move |m| figure(m.hausdorff.dem_to_tin.mean_m));
+        self.add("", "largest, vertices to DEM", move |m| figure(m.hausdorff.tin_to_dem.max_m));
+        self.add("", "mean", move |m| figure(m.hausdorff.tin_to_dem.mean_m));
+        let end = |is_at_end: bool| if is_at_end { "≥ " } else { "" };
+        self.add("Registration", "lies aside, by cross-correlation of slopes", |m| {
+            m.registration.map(|shift| format!("{}{:.2} m", end(shift.is_at_end), shift.aside_m()))
+        });
+        self.add("", "east", |m| m.registration.map(|shift| format!("{:.2} m", shift.east_m)));
+        self.add("", "north", |m| m.registration.map(|shift| format!("{:.2} m", shift.north_m)));
+    }
+
+    fn mesh(&mut self) {
+        if self.found.tin.seams.is_some() {
+            self.add("Seams", "bend on module lines, of that on other edges as long", |m| {
+                m.seams.and_then(|seams| seams.ratio()).map(|ratio| format!("{ratio:.3}"))
+            });
+        }
+        self.add("Mesh", "median of smallest angles", |m| Some(degrees(m.mesh.angle_median_degrees)));
+        self.add("", "5 % of triangles below", |m| Some(degrees(m.mesh.angle_p5_degrees)));
+        self.add("", "smallest of all", |m| Some(degrees(m.mesh.angle_min_degrees)));
+        self.add("", "of triangles below 5°", |m| Some(percent(m.mesh.sliver_share())));
+        self.add("", "cracks, T-junctions, torn places", |m| {
+            Some(grouped(m.mesh.cracks + m.mesh.t_junctions + m.mesh.torn))
+        });
+        self.add("", "areas that do not add up", |m| Some(grouped(m.mesh.wrong_areas)));
+    }
 }
 
 fn percent(share: f64) -> String {
     format!("{:.2} %", 100.0 * share)
 }
 
-/// Line of sight for a program: shares of pairs, from 0 to 1; `null` where no pair was compared.
-pub fn sight_json(sight: &LineOfSight) -> Value {
-    let share = |share: f64| if sight.pairs() == 0 { Value::Null } else { json!(share) };
-    json!({
-        "pairs": sight.pairs(),
-        "left_out": sight.left_out,
-        "agreement": share(sight.agreement()),
-        "half_width": share(sight.half_width()),
-        "false_visible": share(sight.false_visible_share()),
-        "false_hidden": share(sight.false_hidden_share()),
-        "visible_share_dem": share(sight.visible_share_dem()),
-        "visible_share_tin": share(sight.visible_share_tin()),
-    })
-}
-
-/// Slope for a program: angles in degrees; `null` where no post was compared.
-pub fn slope_json(slope: &SlopeDifference) -> Value {
-    let angle = |degrees: f64| if slope.posts == 0 { Value::Null } else { json!(degrees) };
-    json!({
-        "posts": slope.posts,
-        "rms_degrees": angle(slope.rms_degrees),
-        "normal_mean_degrees": angle(slope.normal_mean_degrees),
-        "normal_p95_degrees": angle(slope.normal_p95_degrees),
-    })
+fn degrees(angle: f64) -> String {
+    format!("{angle:.2}°")
 }
 
 #[cfg(test)]
 mod tests {
+    use compiler::SlopeDifference;
+    use serde_json::Value;
+
     use super::*;
+
+    fn figures() -> Measures {
+        Measures {
+            residual: compiler::ResidualFigures { posts: 9, rms_m: 1.25, max_m: 4.0, ..Default::default() },
+            line_of_sight: LineOfSight { visible: 280, hidden: 650, false_visible: 50, false_hidden: 20, left_out: 0 },
+            slope: SlopeDifference { posts: 4000, rms_degrees: 2.406, ..Default::default() },
+            slope_classes: Default::default(),
+            hausdorff: Default::default(),
+            drainage: Default::default(),
+            cover: Default::default(),
+            registration: None,
+            seams: None,
+            mesh: compiler::MeshForm { triangles: 32_000, ..Default::default() },
+        }
+    }
+
+    fn beside(tin: Measures, grid: Measures) -> Fidelity {
+        Fidelity { tin, grid, grid_step: 5, spacing_m: 25.0, polygons: 32_000 }
+    }
+
+    #[test]
+    fn each_figure_stands_beside_that_of_the_grid() {
+        let mut grid = figures();
+        grid.residual.rms_m = 3.5;
+        grid.line_of_sight =
+            LineOfSight { visible: 300, hidden: 600, false_visible: 60, false_hidden: 40, left_out: 0 };
+        let text = text(&beside(figures(), grid));
+        for line in [
+            "Triangles         32,000    32,000  the grid: every 5 posts, 125 m",
+            "Residual         1.250 m   3.500 m  RMS, 9 posts",
+            "Line of sight    93.00 %   90.00 %  agreement, 1,000 pairs",
+            "                ± 1.60 %  ± 1.87 %  half width of that, 95 % sure",
+            "                 33.00 %   36.00 %  visible, 30.00 % on the DEM",
+            "Slope              2.41°     2.41°  RMS difference, 4,000 inner posts",
+        ] {
+            assert!(text.lines().any(|found| found == line), "{line:?} is not in:\n{text}");
+        }
+    }
 
     #[test]
     fn without_a_pair_or_a_post_there_is_no_figure() {
         let nothing = Measures {
+            residual: Default::default(),
             line_of_sight: LineOfSight { left_out: 9, ..LineOfSight::default() },
             slope: SlopeDifference::default(),
+            ..figures()
         };
-        let mut rows = table();
-        add_rows(&mut rows, &nothing);
-        let text = rows.text(0);
-        assert!(text.contains("no pair to compare, 9 left out") && text.contains("no inner post"), "{text}");
-        assert_eq!(sight_json(&nothing.line_of_sight)["agreement"], Value::Null);
-        assert_eq!(slope_json(&nothing.slope)["rms_degrees"], Value::Null);
-    }
-
-    #[test]
-    fn shares_are_told_in_percent() {
-        let sight = LineOfSight { visible: 280, hidden: 650, false_visible: 50, false_hidden: 20, left_out: 0 };
-        let slope =
-            SlopeDifference { posts: 4000, rms_degrees: 2.406, normal_mean_degrees: 1.5, normal_p95_degrees: 4.004 };
-        let mut rows = table();
-        add_rows(&mut rows, &Measures { line_of_sight: sight, slope });
-        let expected = "\
-Line of sight  93.00 %  agreement, ± 1.60 %; false visible 5.00 %, false hidden 2.00 %
-               30.00 %  visible on the DEM, 33.00 % on the TIN; 1,000 pairs
-Slope            2.41°  RMS difference, 4,000 inner posts
-                 1.50°  mean angle between normals, 95 % within 4.00°
-";
-        assert_eq!(rows.text(0), expected);
+        let nothing = beside(nothing, nothing);
+        let text = text(&nothing);
+        for part in ["no pair to compare, 9 left out", "no inner post", "Residual: no post"] {
+            assert!(text.contains(part), "{part:?} is not in:\n{text}");
+        }
+        let json = Value::Object(crate::measures_json::fields(&nothing));
+        for pointer in [
+            "/line_of_sight/agreement",
+            "/slope/rms_degrees",
+            "/residual/rms_m",
+            "/hausdorff/max_m",
+            "/cover/agreement",
+            "/drainage/recall",
+            "/registration",
+            "/regular_grid/seams",
+        ] {
+            assert_eq!(json.pointer(pointer), Some(&Value::Null), "{pointer}");
+        }
     }
 }

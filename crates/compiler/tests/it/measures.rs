@@ -1,11 +1,11 @@
-//! Line of sight and slope of whole databases, and the ground they are measured against.
+//! Every measure of whole databases, and the ground they are measured against.
 
 use std::collections::BTreeMap;
 use std::fs;
 
-use compiler::{CompileError, DatabaseFidelity, Sights};
+use compiler::{CompileError, DatabaseFidelity, MeshForm, Sights};
 use database::Folder;
-use fidelity::Triangles;
+use fidelity::{DemGround, Triangles};
 use terrain::{Dem, LatticePoint, Metres, Post, Tin, Vertex};
 
 use crate::scene::{Scene, Words, sample_dem, tile, write_dem};
@@ -62,13 +62,51 @@ fn load_modules_are_measured_as_the_one_tin_they_make_up() {
     let tin = welded(&scene, &words());
     tin.check().unwrap();
     let found = measured(&scene, None).unwrap();
-    let (triangles, spacing) = (Triangles::of_tin(&tin), Metres(25.0));
-    let sight = fidelity::line_of_sight(&dem, &triangles, spacing, SIGHTS.pairs, SIGHTS.seed);
-    assert_eq!(found.measures.line_of_sight, sight);
-    assert_eq!(found.measures.slope, fidelity::slope(&dem, &triangles, spacing));
+    let ground = DemGround::new(&dem, tin.rect, Metres(25.0));
+    let mut welded = ground.measure(&Triangles::of_tin(&tin), SIGHTS.pairs, SIGHTS.seed, Some(20));
+    // Every vertex on a side stands in two load modules.
+    welded.hausdorff.tin_to_dem = found.measures.tin.hausdorff.tin_to_dem;
+    assert_eq!(found.measures.tin, welded);
+    let sight = welded.line_of_sight;
     assert!(sight.pairs() == 3000 && 0.8 < sight.agreement() && sight.agreement() < 1.0, "{sight:?}");
     let built = compiler::verify(&scene.path("area"), Some(&scene.path("dem.tif"))).unwrap().residual.unwrap();
     assert_eq!([found.residual.rms_m, found.residual.max_m], [built.rms_m, built.max_m]);
+    let residual = found.measures.tin.residual;
+    assert_eq!(
+        [residual.rms_m, residual.max_m, residual.mean_abs_m, residual.p95_m, residual.p99_m],
+        [built.rms_m, built.max_m, built.mean_abs_m, built.p95_m, built.p99_m]
+    );
+}
+
+#[test]
+fn a_database_is_sound_and_truer_than_the_grid_beside_it() {
+    let (scene, _) = built(&words());
+    let found = measured(&scene, None).unwrap().measures;
+    let gaps = |mesh: &MeshForm| mesh.cracks + mesh.t_junctions + mesh.torn + mesh.wrong_areas;
+    assert_eq!((gaps(&found.tin.mesh), gaps(&found.grid.mesh)), (0, 0));
+    let (polygons, triangles) = (found.polygons as f64, found.grid.mesh.triangles as f64);
+    assert!((0.6..1.6).contains(&(triangles / polygons)), "{polygons} polygons, a grid of {triangles} triangles");
+    assert!(found.tin.residual.rms_m < found.grid.residual.rms_m, "{found:?}");
+    assert!(found.tin.slope.rms_degrees < found.grid.slope.rms_degrees, "{found:?}");
+    let aside = found.tin.registration.unwrap();
+    assert!(aside.aside_m() < 2.5 && aside.up_m.abs() < 1.0, "{aside:?}");
+    assert!(0 < found.tin.seams.unwrap().edges);
+}
+
+#[test]
+fn a_raster_that_lies_aside_is_found_by_registration() {
+    let (scene, dem) = built(&words());
+    let rect = dem.rect();
+    let moved = Dem::from_fn(rect, |post| {
+        let (row, col) = ((post.row + 2).min(rect.north), (post.col - 3).max(rect.west));
+        Some(dem.height(Post::new(row, col)) + 640)
+    });
+    write_dem(&scene.path("moved.tif"), &moved);
+    // The raster lies 3 posts east and 2 south, so the database lies as far west and north; and 5 m below.
+    let aside = measured(&scene, Some("moved.tif")).unwrap().measures.tin.registration.unwrap();
+    let off = [aside.east_m + 75.0, aside.north_m - 50.0];
+    assert!(off.iter().all(|off| off.abs() < 6.0), "{aside:?}");
+    assert!(aside.correlation < aside.best_correlation, "{aside:?}");
 }
 
 #[test]
@@ -77,7 +115,7 @@ fn clipped_load_modules_are_measured_too_and_more_points_are_nearer_to_the_groun
         let tin = format!("method = \"greedy\"\npoints = {points}\nallocation = \"global\"");
         let limits = "mean_per_load_module = 90".into();
         let (scene, _) = built(&Words { modules: "edges = \"clip\"".into(), tin, limits, ..words() });
-        measured(&scene, None).unwrap().measures
+        measured(&scene, None).unwrap().measures.tin
     };
     let (few, many) = (clip(60), clip(1200));
     assert!(few.line_of_sight.agreement() < many.line_of_sight.agreement(), "{few:?} {many:?}");
@@ -114,7 +152,8 @@ fn the_sample_terrain_needs_no_file_and_voids_of_another_raster_are_left_out() {
     assert_eq!(measured(&scene, Some("whole.tif")).unwrap().measures, sample.measures);
     let hole = Post::new(60, 80);
     write_dem(&scene.path("holed.tif"), &Dem::from_fn(dem.rect(), |post| (post != hole).then(|| dem.height(post))));
-    let holed = measured(&scene, Some("holed.tif")).unwrap().measures;
+    let holed = measured(&scene, Some("holed.tif")).unwrap().measures.tin;
     assert!(0 < holed.line_of_sight.left_out, "{holed:?}");
-    assert_eq!(holed.slope.posts, sample.measures.slope.posts - 5);
+    assert_eq!(holed.slope.posts, sample.measures.tin.slope.posts - 5);
+    assert_eq!(holed.residual.posts, sample.measures.tin.residual.posts - 1);
 }

@@ -1,7 +1,7 @@
 //! The figures of ALGORITHMS 2.12, 4.4 and 6.10 on the 460 x 376 window of the real desert, residuals within a fifth.
 
 use compiler::{TinMethod, TinRequest};
-use fidelity::Triangles;
+use fidelity::{PostHeights, Triangles};
 use job::ErrorKey;
 use terrain::{Dem, Importance, Metres, Post, PostRect, SeamSides, THOUSANDTHS, TileId, Tin};
 use tin::{Frame, LastBatch, Proximity, Rule, Stop, TileTask};
@@ -97,7 +97,8 @@ fn squares_are_nearer_to_the_ground_than_the_worst_post() {
 fn check_measures(dem: &Dem, rule: Rule, [agreement, visible, slope]: [f64; 3]) {
     let triangles = Triangles::of_tin(&refined(dem, rule, 5000));
     let sight = fidelity::line_of_sight(dem, &triangles, Metres(25.0), 20_000, 1);
-    let steepness = fidelity::slope(dem, &triangles, Metres(25.0));
+    let posts = PostHeights::of_dem(dem, triangles.rect());
+    let steepness = fidelity::slope(&posts, &PostHeights::of_triangles(&triangles, &posts), Metres(25.0));
     assert_eq!((sight.pairs(), steepness.posts), (20_000, 458 * 374));
     let expected = [agreement, visible, 0.283, slope];
     let found = [sight.agreement(), sight.visible_share_tin(), sight.visible_share_dem(), steepness.rms_degrees];

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::PoisonError;
 
 use clap::{ArgGroup, Args, ValueEnum};
-use compiler::{Measures, Mesh, Sights, TinMethod, TinRequest};
+use compiler::{Fidelity, Mesh, Sights, TinMethod, TinRequest};
 use exports::TinPlace;
 use job::{Optimising, StartMethod};
 use serde_json::{Value, json};
@@ -15,14 +15,14 @@ use crate::arguments::{Workers, positive, rows_by_columns};
 use crate::failure::{Failure, Outcome};
 use crate::progress::{Listener, Show};
 use crate::signals::{self, Signals};
-use crate::{events, files, measures, terminal};
+use crate::{events, files, measures, measures_json, terminal};
 
 const AFTER_HELP: &str = "\
 Examples:
   tiefort tin dem.tif --points 76500 --out mesh.ply
   tiefort tin dem.tif --max-residual 2 --method greedy --key max --out mesh.obj
   tiefort tin dem.tif --points 5000 --start vip:1000 --method paper --out mesh.ply
-  tiefort tin dem.tif --points 5000 --measure --out mesh.ply      line of sight and slope, too
+  tiefort tin dem.tif --points 5000 --measure --out mesh.ply      every measure of fidelity, too
   tiefort tin dem.tif --rms 1.5 --tiles 6x6 --workers 8 --coordinates map --out mesh.ply
 
 The first of --points (or --triangles), --max-residual and --rms that is reached ends it.
@@ -77,7 +77,7 @@ pub struct Arguments {
     /// What coordinates are counted from
     #[arg(long, value_enum, default_value_t = Frame::Local)]
     coordinates: Frame,
-    /// Measure line of sight and slope of the mesh against the raster, as `tiefort fidelity` does
+    /// Measure the mesh against the raster, beside a regular grid, as `tiefort fidelity` does
     #[arg(long, conflicts_with = "quiet")]
     measure: bool,
     #[command(flatten)]
@@ -203,7 +203,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     Ok(Outcome::Sound)
 }
 
-fn summary_json(mesh: &Mesh, measured: Option<&Measures>) -> Value {
+fn summary_json(mesh: &Mesh, measured: Option<&Fidelity>) -> Value {
     let mut summary = json!({
         "event": "summary",
         "points": mesh.points,
@@ -211,18 +211,16 @@ fn summary_json(mesh: &Mesh, measured: Option<&Measures>) -> Value {
         "residual": mesh.residual,
     });
     if let Some(measured) = measured {
-        summary["line_of_sight"] = measures::sight_json(&measured.line_of_sight);
-        summary["slope"] = measures::slope_json(&measured.slope);
+        // The summary has its residual already.
+        for (name, figures) in measures_json::fields(measured).into_iter().filter(|(name, _)| name != "residual") {
+            summary[name] = figures;
+        }
     }
     summary
 }
 
-fn measured_text(measured: Option<&Measures>) -> String {
-    let mut table = measures::table();
-    if let Some(measured) = measured {
-        measures::add_rows(&mut table, measured);
-    }
-    table.text(0)
+fn measured_text(measured: Option<&Fidelity>) -> String {
+    measured.map_or_else(String::new, |found| format!("\n{}", measures::text(found)))
 }
 
 fn kind(arguments: &Arguments) -> Result<Kind, Failure> {

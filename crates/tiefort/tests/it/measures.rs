@@ -19,7 +19,26 @@ fn built() -> Scene {
 fn a_database_is_measured_in_words_and_for_programs() {
     let scene = built();
     let text = scene.run_to(0, &["fidelity", "area.tdb"]).stdout;
-    for part in ["dem.tif", "Residual", "as built", "Line of sight", "20,000 pairs", "Slope", "normals"] {
+    for part in [
+        "dem.tif",
+        "grid",
+        "Residual",
+        "99 % within",
+        "Line of sight",
+        "20,000 pairs",
+        "95 % sure",
+        "Slope",
+        "normals",
+        "Trafficability",
+        "above 45 %",
+        "Cover",
+        "Drainage",
+        "spurious pits",
+        "Hausdorff",
+        "Registration",
+        "Seams",
+        "T-junctions",
+    ] {
         assert!(text.contains(part), "{part:?} is not in: {text}");
     }
     assert!(text.lines().all(|line| line.chars().count() <= 100), "{text}");
@@ -29,7 +48,12 @@ fn a_database_is_measured_in_words_and_for_programs() {
         /residual_as_built/max_m /residual_as_built/posts /line_of_sight/agreement /line_of_sight/half_width
         /line_of_sight/false_visible /line_of_sight/false_hidden /line_of_sight/visible_share_dem
         /line_of_sight/visible_share_tin /line_of_sight/left_out /slope/rms_degrees /slope/normal_mean_degrees
-        /slope/normal_p95_degrees /slope/posts"
+        /slope/normal_p95_degrees /slope/posts /residual/p50_m /residual/p95_m /residual/p99_m /slope_classes/agreement
+        /slope_classes/shares_tin/3 /slope_classes/posts_by_class_on_dem_and_tin/3/3 /hausdorff/max_m
+        /hausdorff/dem_to_tin/mean_m /drainage/pits_spurious /drainage/channel_posts_dem /cover/agreement
+        /registration/aside_m /seams/ratio /mesh/below_5_degrees /mesh/is_sound /polygons /regular_grid/step_posts
+        /regular_grid/step_m /regular_grid/residual/rms_m /regular_grid/line_of_sight/half_width
+        /regular_grid/mesh/triangles"
         .split_whitespace()
     {
         assert!(found.pointer(pointer).is_some_and(|value| !value.is_null()), "{json} lacks {pointer}");
