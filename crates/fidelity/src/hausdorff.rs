@@ -11,9 +11,9 @@ use terrain::{Metres, QUANTA_PER_METRE};
 use crate::nearest::{BilinearCell, Point, squared_to_triangle};
 use crate::{PostHeights, Triangles};
 
-/// How far around a place something nearer is looked for, in posts. Only ground that is wrong by more than this is
-/// not looked at further, and the distance given there may be too large.
-const REACH_POSTS: f64 = 32.0;
+/// How far around a place something nearer is looked for, in posts: 400 m at 25 m. Only ground that is wrong by more
+/// than this is not looked at further, and the distance given there may be too large.
+const REACH_POSTS: f64 = 16.0;
 
 /// Distances both ways.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
