@@ -13,8 +13,18 @@ use crate::files;
 /// When more memory or disk is expected to be needed than is free; both numbers are told.
 pub fn check(forecast: &Forecast, folder: &Path) -> Result<(), Failure> {
     let needs = [
-        ("memory", forecast.memory_bytes, free_memory(), "use more, smaller tiles, or a machine with more memory"),
-        ("disk", forecast.disk_bytes, free_disk(folder), "make room, or name another place with --out"),
+        (
+            "memory".to_owned(),
+            forecast.memory_bytes,
+            free_memory(),
+            "use more, smaller tiles, or a machine with more memory",
+        ),
+        (
+            format!("disk of {}", folder.display()),
+            forecast.disk_bytes,
+            free_disk(folder),
+            "make room, or name another place with --out",
+        ),
     ];
     for (what, expected, free, hint) in needs {
         if let Some(free) = free.filter(|&free| free < expected) {

@@ -74,7 +74,7 @@ fn a_build_leaves_a_page_that_report_prints_again() {
     assert_eq!(said.stdout, page);
     let csv = fs::read_to_string(scene.path("small.tdb/breaches.csv")).unwrap();
     assert!(csv.starts_with("kind,where,row,col,count,limit,excess"), "{csv}");
-    scene.run_to(0, &["build", "job.toml", "--quiet", "--no-html"]);
+    scene.run_to(0, &["build", "job.toml", "--fresh", "--quiet", "--no-html"]);
     assert!(!scene.path("small.tdb/report.html").exists(), "a page of an earlier build would tell of another one");
 }
 
