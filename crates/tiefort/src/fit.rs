@@ -79,7 +79,7 @@ mod tests {
         }
         if free_disk(&here).is_some() {
             let refused = check(&forecast(1, 1 << 62), &here).unwrap_err().to_string();
-            assert!(refused.contains("disk: "), "{refused}");
+            assert!(refused.contains("disk of "), "{refused}");
         }
     }
 }
