@@ -29,6 +29,8 @@ mod scene;
 mod signals;
 mod steps;
 mod terminal;
+#[cfg(feature = "viewer")]
+mod viewer;
 
 use std::process::ExitCode;
 

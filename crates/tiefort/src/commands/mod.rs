@@ -14,6 +14,7 @@ mod status;
 mod tile;
 mod tin;
 mod verify;
+mod view;
 
 use clap::Subcommand;
 
@@ -36,6 +37,8 @@ pub enum Command {
     Report(report::Arguments),
     /// Draw it: relief, perspective, wireframe, residuals, density, limits, tiles
     Render(render::Arguments),
+    /// Drive through it, in a browser on this machine
+    View(view::Arguments),
     /// Explain one load module: what it holds, what was refused, what one more point would buy
     Explain(explain::Arguments),
     /// List the load modules in which two databases differ, and by how much
@@ -66,6 +69,7 @@ impl Command {
             Command::Status(arguments) => status::run(&arguments),
             Command::Report(arguments) => report::run(&arguments),
             Command::Render(arguments) => render::run(&arguments),
+            Command::View(arguments) => view::run(&arguments),
             Command::Explain(arguments) => explain::run(&arguments),
             Command::Diff(arguments) => diff::run(&arguments),
             Command::Verify(arguments) => verify::run(&arguments),

@@ -2,8 +2,8 @@
 
 use crate::scene::Scene;
 
-const COMMANDS: [&str; 10] =
-    ["build", "tile", "plan", "status", "report", "verify", "fidelity", "export", "sample", "tin"];
+const COMMANDS: [&str; 11] =
+    ["build", "tile", "plan", "status", "report", "view", "verify", "fidelity", "export", "sample", "tin"];
 
 #[test]
 fn the_help_of_every_command_has_an_example_of_it() {
@@ -60,6 +60,7 @@ fn wrong_values_of_arguments_end_with_2_and_say_what_was_expected() {
         (&["render", "x.tdb", "--view", "relief", "--modules", "3,3..2,2", "--out", "a.png"], "ROW,COL..ROW,COL"),
         (&["render", "x.tdb", "--view", "perspective", "--eye", "1", "--out", "a.png"], "EAST,NORTH"),
         (&["render", "x.tdb", "--view", "perspective", "--pitch", "95", "--out", "a.png"], "-89 to 89"),
+        (&["view", "x.tdb", "--port", "65536"], "0..=65535"),
         (&["explain", "x.tdb", "2"], "expected ROW,COL"),
         (&["diff", "x.tdb"], "<B>"),
         (&["fidelity", "x.tdb", "--pairs", "0"], "1..="),

@@ -15,4 +15,5 @@ mod raster;
 mod scene;
 mod starts;
 mod streams;
+mod view;
 mod views;
