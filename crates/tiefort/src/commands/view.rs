@@ -21,7 +21,6 @@ The viewer is built in by
 /// Arguments of `view`.
 #[derive(Args)]
 #[command(after_help = AFTER_HELP)]
-#[cfg_attr(not(feature = "viewer"), expect(dead_code, reason = "only the viewer reads them"))]
 pub struct Arguments {
     /// Folder of the terrain database
     #[arg(value_name = "DIR")]

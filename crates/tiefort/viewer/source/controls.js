@@ -9,7 +9,7 @@ const LOOK_PITCH = [-1.4, 1.2], AWAY = [8, 400];
 /** Pixels a pointer may stray in a click, and that a finger drags for full speed. */
 const CLICK_PX = 5, FULL_PX = 70;
 
-/** Calls `pick(x, y)` for clicks and `press(code)` for keys that switch something; gives a function that tells wishes. */
+/** Calls `pick(x, y)` for clicks and `press(code)` for keys that switch something; gives what tells wishes. */
 export function controls(canvas, tank, { pick, press }) {
   const held = new Set(), pointers = new Map();
   const clamp = (value, [low, high]) => Math.min(Math.max(value, low), high);

@@ -55,7 +55,7 @@ async function start() {
   window.tiefort = { state: () => state(view), skyBelowHorizon: () => skyBelowHorizon(view) };
 }
 
-/** Where the tank begins: the middle of the area, or what the address says (?east=…&north=…&heading=…; range=… sets the range). */
+/** Where the tank begins: the middle of the area, or what the address says (?east=…&north=…&heading=…). */
 function startPlace(area) {
   const asked = new URLSearchParams(location.search);
   const number = (name) => (asked.has(name) ? Number(asked.get(name)) : NaN);
@@ -81,7 +81,7 @@ function frame(view, seconds, wish) {
     view: terrain.inView(camera, tank.east, tank.north, range),
   };
   showFigures(area, view.figures);
-  if (terrain.fault) wrong(`Load modules could not be read: ${terrain.fault}`);
+  wrong(terrain.fault && `Load modules could not be read: ${terrain.fault}`);
 }
 
 /** The switches, by mouse or by key; gives what a key does. */
@@ -97,6 +97,7 @@ function switches(view) {
     note(at("dem").checked ? "reading the ground …" : "");
     try {
       await terrain.showDem(at("dem").checked);
+      unpick(view);
       note("");
     } catch (fault) {
       at("dem").checked = false;
@@ -132,8 +133,8 @@ function pick(view, x, y) {
   rays.setFromCamera(new Vector2((2 * x) / innerWidth - 1, 1 - (2 * y) / innerHeight), camera);
   const meshes = [...terrain.drawn.values()].map(({ mesh }) => mesh);
   const [hit] = rays.intersectObjects([...meshes, terrain.coarse.mesh], false);
-  if (view.outline) scene.remove(view.outline);
-  if (!hit) return showPicked(area, null);
+  unpick(view);
+  if (!hit) return;
   const place = [hit.point.x, -hit.point.z, hit.point.y], [row, col] = area.moduleAt(place[0], place[1]);
   const found = terrain.drawn.get(hit.object.userData.key);
   if (!found) return showPicked(area, { row, col, place });
@@ -151,6 +152,13 @@ function pick(view, x, y) {
   const residual = isTin ? undefined : surface.residuals[nearest(surface, number, place)];
   view.picked = { row: module.row, col: module.col, place, triangle: { number, normal, className, residual } };
   showPicked(area, view.picked);
+}
+
+/** Forgets what was clicked. */
+function unpick(view) {
+  if (view.outline) view.scene.remove(view.outline);
+  view.outline = view.picked = undefined;
+  showPicked(view.area, null);
 }
 
 /** The corner of a triangle that a place is nearest to. */

@@ -35,7 +35,8 @@ export class SmallMap {
           const place = row * wide + col, step = area.side_m / area.coarse_steps;
           // Light from the north-west.
           const slope = (heights[place + 1] - heights[place] + heights[place] - heights[place + wide]) / step;
-          color = colorOf.height(area, heights[place]).map((part) => part * Math.min(Math.max(0.9 + slope, 0.45), 1.25));
+          const shade = Math.min(Math.max(0.9 + slope, 0.45), 1.25);
+          color = colorOf.height(area, heights[place]).map((part) => part * shade);
         }
         picture.data.set([...bytes(color), 255], at);
       }

@@ -19,7 +19,10 @@ const lines = new LineBasicMaterial({ color: 0xffe14d });
 /** Corners of a surface's triangles, one after the other, as the renderer has them: each triangle is lit as one. */
 function corners({ points, triangles }) {
   const out = new Float32Array(3 * triangles.length);
-  triangles.forEach((vertex, i) => out.set([points[3 * vertex], points[3 * vertex + 2], -points[3 * vertex + 1]], 3 * i));
+  triangles.forEach((vertex, i) => {
+    const [east, north, height] = points.subarray(3 * vertex, 3 * vertex + 3);
+    out.set([east, height, -north], 3 * i);
+  });
   return out;
 }
 
@@ -99,7 +102,7 @@ export function coarseMesh(area) {
   return { mesh, repaint, cut };
 }
 
-/** Ends of a side of a load module in coarse steps, south, east, north, west: where it begins, and which way it goes. */
+/** A side of a load module (south, east, north, west) in coarse steps: where it begins, and which way it goes. */
 function sideLine(area, { row, col }, side) {
   const steps = area.coarse_steps, [south, west] = [row * steps, col * steps];
   return [[south, west, 0, 1], [south, west + steps, 1, 0], [south + steps, west, 0, 1], [south, west, 1, 0]][side];
@@ -108,7 +111,8 @@ function sideLine(area, { row, col }, side) {
 /** Upper and lower points of a wall along a side, from the surface's heights to `below(height, row, col)`. */
 function wallAlong(area, module, surface, side, below) {
   const [row, col, up, right] = sideLine(area, module, side);
-  const step = area.side_m / area.coarse_steps, [south, west] = [area.sides[1] + row * step, area.sides[0] + col * step];
+  const step = area.side_m / area.coarse_steps;
+  const [south, west] = [area.sides[1] + row * step, area.sides[0] + col * step];
   const fine = Array.from(surface.sides[side], (vertex) => {
     const [east, north, height] = surface.points.subarray(3 * vertex, 3 * vertex + 3);
     return [right ? (east - west) / step : (north - south) / step, height];

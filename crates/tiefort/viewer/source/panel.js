@@ -23,7 +23,7 @@ export function showFigures(area, { tank, loaded, view, under, frameMs }) {
     ["triangles in view", `${grouped(view.triangles)} in ${view.modules}`],
     [`${limits.count} in ${here}`, count],
     [`fullest ${limits.window.rows} x ${limits.window.cols}`,
-      `${grouped(loaded.fullest)} of ${grouped(limits.window.limit)}`],
+      `${loaded.fullest === null ? "–" : grouped(loaded.fullest)} of ${grouped(limits.window.limit)}`],
     ["frame", `${frameMs.toFixed(1)} ms`],
   ];
   const table = at("figures").querySelector("table");
@@ -84,6 +84,6 @@ export function note(words) {
 }
 
 export function wrong(words) {
-  at("wrong").style.display = "block";
-  at("wrong").textContent = words;
+  at("wrong").style.display = words ? "block" : "none";
+  at("wrong").textContent = words ?? "";
 }

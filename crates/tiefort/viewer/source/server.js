@@ -29,7 +29,8 @@ export async function readArea() {
   area.moduleAt = (east, north) =>
     [Math.floor(north / area.side_m) + area.corner[0], Math.floor(east / area.side_m) + area.corner[1]];
   area.inSystem = (east, north) => [area.origin_m[0] + east - area.sides[0], area.origin_m[1] + north - area.sides[1]];
-  area.fromSystem = (east, north) => [east - area.origin_m[0] + area.sides[0], north - area.origin_m[1] + area.sides[1]];
+  area.fromSystem = (east, north) =>
+    [east - area.origin_m[0] + area.sides[0], north - area.origin_m[1] + area.sides[1]];
   return area;
 }
 

@@ -20,11 +20,15 @@ export class Tank {
 
   /** One step of `seconds`; `wish` says forward, right, up from -1 to 1, and whether to hurry. */
   step(seconds, wish) {
+    const before = [this.east, this.north];
     if (this.flies) this.fly(seconds, wish);
     else this.drive(seconds, wish);
-    const [west, south, east, north] = this.terrain.area.sides;
+    const [west, south, east, north] = this.terrain.area.sides, wanted = [this.east, this.north];
     this.east = Math.min(Math.max(this.east, west + 1), east - 1);
     this.north = Math.min(Math.max(this.north, south + 1), north - 1);
+    // Nobody drives over the edge of the area.
+    if (wanted[0] !== this.east || wanted[1] !== this.north) this.speed = 0;
+    this.driven += Math.hypot(this.east - before[0], this.north - before[1]);
     this.settle();
   }
 
@@ -48,7 +52,6 @@ export class Tank {
   move(direction, metres) {
     this.east += Math.sin(direction) * metres;
     this.north += Math.cos(direction) * metres;
-    this.driven += Math.abs(metres);
   }
 
   /** Stands on the ground: height, pitch and roll from the triangles under the ends of both tracks. */

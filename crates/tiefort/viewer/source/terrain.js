@@ -6,6 +6,8 @@ import { triangleUnder } from "./surface.js";
 
 /** Metres from the middle of the area to where nothing is any more. */
 const APRON_M = 400_000;
+/** How long after load modules could not be read they are asked for again. */
+const AGAIN_MS = 2000;
 
 export class Terrain {
   constructor(area) {
@@ -16,6 +18,7 @@ export class Terrain {
     this.colors = "height";
     this.withEdges = this.withLines = this.withDem = false;
     this.block = null;
+    this.lacks = false;
     this.asked = new Set();
     this.fault = null;
     this.coarse = coarseMesh(area);
@@ -36,8 +39,8 @@ export class Terrain {
   /** Follows the observer: drops what is out of range, asks for what is missing. */
   follow(east, north, range) {
     const block = this.blockAround(east, north, range);
-    if (this.block && block.every((side, i) => side === this.block[i])) return;
-    this.block = block;
+    if (this.block && !this.lacks && block.every((side, i) => side === this.block[i])) return;
+    [this.block, this.lacks] = [block, false];
     let dropped = false;
     for (const key of this.drawn.keys()) {
       if (!this.isWanted(key)) dropped = this.drop(key) || dropped;
@@ -87,10 +90,12 @@ export class Terrain {
         if (this.isWanted(key)) this.draw(key, module);
       }
       this.closed();
+      this.fault = null;
     } catch (fault) {
-      // What was not loaded stays coarse; the page says so, and moving on asks again.
+      // What was not loaded stays coarse; the page says so, and asks again.
       keys.forEach((key) => this.asked.delete(key));
       this.fault = fault.message;
+      setTimeout(() => (this.lacks = true), AGAIN_MS);
     }
   }
 
@@ -194,10 +199,10 @@ export class Terrain {
     return { modules, triangles };
   }
 
-  /** Triangles of all that is loaded, and the count of its fullest whole window. */
+  /** Triangles of all that is loaded, and the count of its fullest whole window, if it holds one. */
   loaded() {
     const { area, drawn } = this, { rows, cols } = area.limits.window;
-    let triangles = 0, fullest = 0;
+    let triangles = 0, fullest = null;
     for (const { module } of drawn.values()) triangles += module.tin.triangles.length / 3;
     if (!this.block) return { modules: 0, triangles, fullest };
     const [south, west, north, east] = this.block;
@@ -208,7 +213,7 @@ export class Terrain {
           const found = drawn.get((row + Math.floor(cell / cols)) * area.cols + col + (cell % cols));
           sum += found ? this.count(found.module) : 0;
         }
-        fullest = Math.max(fullest, sum);
+        fullest = Math.max(fullest ?? 0, sum);
       }
     }
     return { modules: drawn.size, triangles, fullest };
