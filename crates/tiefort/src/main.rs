@@ -35,6 +35,8 @@ mod scene;
 mod signals;
 mod steps;
 mod terminal;
+#[cfg(feature = "viewer")]
+mod viewer;
 
 use std::process::ExitCode;
 use std::sync::LazyLock;

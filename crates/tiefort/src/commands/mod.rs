@@ -17,6 +17,7 @@ mod task;
 mod tile;
 mod tin;
 mod verify;
+mod view;
 mod worker;
 
 use clap::Subcommand;
@@ -44,6 +45,8 @@ pub enum Command {
     Report(report::Arguments),
     /// Draw it: relief, perspective, wireframe, residuals, density, limits, tiles
     Render(render::Arguments),
+    /// Drive through it, in a browser on this machine
+    View(view::Arguments),
     /// Explain one load module: what it holds, what was refused, what one more point would buy
     Explain(explain::Arguments),
     /// List the load modules in which two databases differ, and by how much
@@ -80,6 +83,7 @@ impl Command {
             Command::Status(arguments) => status::run(&arguments),
             Command::Report(arguments) => report::run(&arguments),
             Command::Render(arguments) => render::run(&arguments),
+            Command::View(arguments) => view::run(&arguments),
             Command::Explain(arguments) => explain::run(&arguments),
             Command::Diff(arguments) => diff::run(&arguments),
             Command::Verify(arguments) => verify::run(&arguments),

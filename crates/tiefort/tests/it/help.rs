@@ -2,7 +2,7 @@
 
 use crate::scene::Scene;
 
-const COMMANDS: [&str; 18] = [
+const COMMANDS: [&str; 19] = [
     "build",
     "tile",
     "plan",
@@ -10,6 +10,7 @@ const COMMANDS: [&str; 18] = [
     "worker",
     "status",
     "report",
+    "view",
     "render",
     "explain",
     "diff",
@@ -78,6 +79,7 @@ fn wrong_values_of_arguments_end_with_2_and_say_what_was_expected() {
         (&["render", "x.tdb", "--view", "relief", "--modules", "3,3..2,2", "--out", "a.png"], "ROW,COL..ROW,COL"),
         (&["render", "x.tdb", "--view", "perspective", "--eye", "1", "--out", "a.png"], "EAST,NORTH"),
         (&["render", "x.tdb", "--view", "perspective", "--pitch", "95", "--out", "a.png"], "-89 to 89"),
+        (&["view", "x.tdb", "--port", "65536"], "0..=65535"),
         (&["explain", "x.tdb", "2"], "expected ROW,COL"),
         (&["diff", "x.tdb"], "<B>"),
         (&["fidelity", "x.tdb", "--pairs", "0"], "1..="),

@@ -17,4 +17,5 @@ mod scene;
 mod shared;
 mod starts;
 mod streams;
+mod view;
 mod views;

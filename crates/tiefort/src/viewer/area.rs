@@ -1,0 +1,86 @@
+//! A database opened for the viewer: its load modules, and what the page is told about it first.
+
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+
+use axum::body::Bytes;
+use compiler::{Product, ProductGround, Wanted, WantedGround, product};
+use load_module_reader::{Area, Keep};
+use serde_json::json;
+use terrain::{ModuleGrid, ModuleRect};
+use views::RESIDUAL_SCALE_M;
+
+use super::overview::Overview;
+use crate::failure::Failure;
+
+/// How far the observer sees load modules.
+const VISIBLE_RANGE_M: f64 = 3500.0;
+
+/// A database that is looked at.
+pub struct Viewed {
+    /// Its folder.
+    pub folder: PathBuf,
+    /// Its load modules.
+    pub area: Area,
+    /// All load modules of the area.
+    pub grid: ModuleGrid,
+    /// What the page is told, as JSON.
+    pub description: String,
+    /// What the page draws far away and on its map.
+    pub overview: Bytes,
+    /// The ground, once it was asked for, or why there is none.
+    pub ground: OnceLock<Result<ProductGround, String>>,
+}
+
+impl Viewed {
+    /// Reads every load module once, for figures and coarse heights.
+    ///
+    /// # Errors
+    /// When the database is unfinished, damaged or missing.
+    pub fn open(folder: &Path) -> Result<Self, Failure> {
+        let first = ModuleRect { south: 0, west: 0, north: 1, east: 1 };
+        let product = product(folder, &Wanted { part: Some(first), ground: WantedGround::None, workers: 1 })?;
+        let damaged = |error| Failure::new(error, "`tiefort verify` says what is damaged, `tiefort build` mends it");
+        let area = Area::open(folder, Keep::OnDisk).map_err(damaged)?;
+        let overview = Overview::read(&area).map_err(damaged)?;
+        Ok(Self {
+            folder: folder.to_path_buf(),
+            grid: product.grid,
+            description: description(&product, &area, &overview),
+            overview: overview.bytes().into(),
+            ground: OnceLock::new(),
+            area,
+        })
+    }
+}
+
+fn description(product: &Product, area: &Area, overview: &Overview) -> String {
+    let (frame, manifest) = (area.frame(), &product.manifest);
+    let (limits, totals) = (&product.job.limits, &manifest.totals);
+    let window = limits.window;
+    json!({
+        "name": manifest.area.name,
+        "crs": frame.crs,
+        "vertical_datum": frame.vertical_datum,
+        "rows": frame.rows,
+        "cols": frame.cols,
+        "side_m": frame.side_m(),
+        "side_cells": product.grid.side_cells,
+        "spacing_m": manifest.area.spacing_m,
+        "origin_m": frame.origin_m,
+        "range_m": VISIBLE_RANGE_M,
+        "coarse_steps": overview.steps,
+        "height_m": overview.range_m,
+        "residual_scale_m": RESIDUAL_SCALE_M,
+        "triangles": totals.triangles,
+        "polygons": totals.polygons,
+        "classes": product.job.importance.classes,
+        "limits": {
+            "count": match limits.count { job::Count::Triangles => "triangles", job::Count::Polygons => "polygons" },
+            "per_load_module": limits.per_load_module,
+            "mean_per_load_module": limits.mean_per_load_module,
+            "window": { "rows": window.rows, "cols": window.cols, "limit": window.limit },
+        },
+    })
+    .to_string()
+}

@@ -1,0 +1,144 @@
+//! The server of `tiefort view`: a page and the load modules it asks for, on 127.0.0.1 only.
+//!
+//! ```text
+//!   /                                      the page, /viewer.js its program
+//!   /api/area                              what the area is, as JSON
+//!   /api/overview                          coarse heights and the figures of every load module (overview.rs)
+//!   /api/modules/SOUTH/WEST/NORTH/EAST     a block of load modules, whole (block.rs)
+//!   /api/dem                               whether the sources are at hand, as JSON; else `why` says why not
+//!   /api/dem/SOUTH/WEST/NORTH/EAST         the posts of such a block (posts.rs)
+//! ```
+//! Blocks are half-open. Everything is little-endian. An answer other than 200 is a sentence for a person.
+
+mod area;
+mod block;
+mod overview;
+mod posts;
+
+use std::net::{Ipv4Addr, SocketAddr};
+use std::path::Path;
+use std::sync::Arc;
+
+use axum::Router;
+use axum::extract::{Path as UrlPath, Request, State};
+use axum::http::{StatusCode, header};
+use axum::middleware::{self, Next};
+use axum::response::{IntoResponse, Response};
+use axum::routing::get;
+use load_module_reader::Block;
+use tokio::net::TcpListener;
+use tokio::runtime;
+
+use crate::failure::Failure;
+use crate::terminal;
+use area::Viewed;
+
+const PAGE: &str = include_str!("../../viewer/index.html");
+const PROGRAM: &str = include_str!("../../viewer/dist/viewer.js");
+/// What the page may load and ask: itself.
+const POLICY: &str = "default-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:";
+/// Load modules in one answer at most: a view of 8 km each way.
+const BLOCK_MODULES_MAX: usize = 1024;
+const FAULT: &str = "a fault in tiefort; the terminal says which";
+
+/// Serves `folder` until Ctrl-C.
+///
+/// # Errors
+/// When the database cannot be read, or the port is taken.
+pub fn serve(folder: &Path, port: u16) -> Result<(), Failure> {
+    let viewed = Arc::new(Viewed::open(folder)?);
+    let refused = |error: std::io::Error| {
+        Failure::new(
+            format!("127.0.0.1:{port}: cannot be served: {error}"),
+            "choose another --port, or 0 for a free one",
+        )
+    };
+    let runtime = runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build().map_err(refused)?;
+    runtime.block_on(async {
+        let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port)).await.map_err(refused)?;
+        let address = listener.local_addr().map_err(refused)?;
+        terminal::print(&format!("http://{address}/\n"))?;
+        terminal::tell(&format!("tiefort view: {}; open the address above, Ctrl-C ends this", folder.display()));
+        let server = tokio::spawn(axum::serve(listener, routes(viewed, address)).into_future());
+        let stopped = tokio::signal::ctrl_c().await;
+        // A page may hold its connections open for minutes: they end with the process.
+        server.abort();
+        stopped.map_err(refused)
+    })?;
+    runtime.shutdown_background();
+    Ok(())
+}
+
+fn routes(viewed: Arc<Viewed>, address: SocketAddr) -> Router {
+    Router::new()
+        .route("/", get(async || text("text/html; charset=utf-8", PAGE)))
+        .route("/viewer.js", get(async || text("text/javascript; charset=utf-8", PROGRAM)))
+        .route("/api/area", get(area))
+        .route("/api/overview", get(overview))
+        .route("/api/modules/{south}/{west}/{north}/{east}", get(modules))
+        .route("/api/dem", get(ground))
+        .route("/api/dem/{south}/{west}/{north}/{east}", get(dem))
+        .layer(middleware::from_fn(move |request: Request, next: Next| only_from_here(request, next, address)))
+        .with_state(viewed)
+}
+
+/// Refuses requests under another name than this machine's own, which a page from elsewhere could have had sent.
+async fn only_from_here(request: Request, next: Next, address: SocketAddr) -> Response {
+    let host = request.headers().get(header::HOST).and_then(|host| host.to_str().ok()).unwrap_or_default();
+    let names = [format!("127.0.0.1:{}", address.port()), format!("localhost:{}", address.port())];
+    if names.iter().any(|name| name == host) {
+        return next.run(request).await;
+    }
+    (StatusCode::FORBIDDEN, format!("found a request for {host:?}, expected {}", names[0])).into_response()
+}
+
+fn text(kind: &'static str, body: &'static str) -> impl IntoResponse {
+    ([(header::CONTENT_TYPE, kind), (header::CONTENT_SECURITY_POLICY, POLICY)], body)
+}
+
+async fn area(State(viewed): State<Arc<Viewed>>) -> impl IntoResponse {
+    ([(header::CONTENT_TYPE, "application/json")], viewed.description.clone())
+}
+
+async fn overview(State(viewed): State<Arc<Viewed>>) -> Response {
+    bytes(viewed.overview.clone())
+}
+
+async fn modules(State(viewed): State<Arc<Viewed>>, UrlPath(sides): UrlPath<[u32; 4]>) -> Response {
+    answer(sides, viewed, block::bytes).await
+}
+
+async fn ground(State(viewed): State<Arc<Viewed>>) -> impl IntoResponse {
+    let why = tokio::task::spawn_blocking(move || posts::ground(&viewed).err()).await;
+    let why = why.unwrap_or_else(|_| Some(FAULT.into()));
+    ([(header::CONTENT_TYPE, "application/json")], serde_json::json!({ "why": why }).to_string())
+}
+
+async fn dem(State(viewed): State<Arc<Viewed>>, UrlPath(sides): UrlPath<[u32; 4]>) -> Response {
+    answer(sides, viewed, posts::bytes).await
+}
+
+/// What `read` says of a block, read where it may wait for the disk.
+async fn answer(
+    [south, west, north, east]: [u32; 4],
+    viewed: Arc<Viewed>,
+    read: fn(&Viewed, Block) -> Result<Vec<u8>, String>,
+) -> Response {
+    let all = viewed.area.whole();
+    let sides_in_order = south < north && west < east && north <= all.north && east <= all.east;
+    let block = Block { south, west, north, east };
+    if !sides_in_order || BLOCK_MODULES_MAX < block.count() {
+        let expected = format!("a block of at most {BLOCK_MODULES_MAX} of {} x {} load modules", all.north, all.east);
+        return (StatusCode::NOT_FOUND, format!("found {south},{west} to {north},{east}, expected {expected}"))
+            .into_response();
+    }
+    match tokio::task::spawn_blocking(move || read(&viewed, block)).await {
+        Ok(Ok(found)) => bytes(found.into()),
+        Ok(Err(why)) => (StatusCode::CONFLICT, why).into_response(),
+        Err(_) => (StatusCode::INTERNAL_SERVER_ERROR, FAULT).into_response(),
+    }
+}
+
+fn bytes(body: axum::body::Bytes) -> Response {
+    ([(header::CONTENT_TYPE, "application/octet-stream")], body).into_response()
+}

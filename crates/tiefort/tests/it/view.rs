@@ -1,0 +1,102 @@
+//! `tiefort view`: the server, or word of how to build it in.
+
+use crate::scene::Scene;
+
+#[cfg(not(feature = "viewer"))]
+#[test]
+fn without_the_viewer_the_command_says_how_to_build_it_in() {
+    let scene = Scene::new();
+    scene.refuses(&["view", "small.tdb"], &["without the viewer", "build_viewer.sh", "--features viewer"]);
+}
+
+#[cfg(feature = "viewer")]
+mod server {
+    use std::io::{BufRead, BufReader, Read, Write};
+    use std::net::TcpStream;
+    use std::process::{Child, Stdio};
+
+    use serde_json::Value;
+
+    use super::Scene;
+
+    /// A server of `small.tdb`, ended with the test.
+    struct Server {
+        process: Child,
+        host: String,
+        scene: Scene,
+    }
+
+    impl Drop for Server {
+        fn drop(&mut self) {
+            let _ = self.process.kill();
+            let _ = self.process.wait();
+        }
+    }
+
+    fn served() -> Server {
+        let scene = Scene::with_job("small.toml", &[]);
+        scene.run_to(0, &["build", "job.toml", "--quiet", "--no-html"]);
+        let mut process =
+            scene.program().args(["view", "small.tdb"]).stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
+        let mut line = String::new();
+        BufReader::new(process.stdout.take().unwrap()).read_line(&mut line).unwrap();
+        let host = line.trim().strip_prefix("http://").unwrap().trim_end_matches('/').to_owned();
+        Server { process, host, scene }
+    }
+
+    impl Server {
+        /// Status and body of an answer to a request for `path` under the name `host`.
+        fn asked_as(&self, host: &str, path: &str) -> (u16, Vec<u8>) {
+            let mut stream = TcpStream::connect(&self.host).unwrap();
+            write!(stream, "GET {path} HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n\r\n").unwrap();
+            let mut answer = Vec::new();
+            stream.read_to_end(&mut answer).unwrap();
+            let end = answer.windows(4).position(|four| four == b"\r\n\r\n").unwrap();
+            let head = String::from_utf8(answer[..end].to_vec()).unwrap();
+            (head.split(' ').nth(1).unwrap().parse().unwrap(), answer[end + 4..].to_vec())
+        }
+
+        fn asked(&self, path: &str) -> (u16, Vec<u8>) {
+            self.asked_as(&self.host, path)
+        }
+    }
+
+    #[test]
+    fn the_server_hands_out_the_page_the_area_and_its_load_modules() {
+        let server = served();
+        let (status, page) = server.asked("/");
+        assert!(status == 200 && page.starts_with(b"<!doctype html>"));
+        assert!(server.asked("/viewer.js").1.len() > 100_000);
+        let area: Value = serde_json::from_slice(&server.asked("/api/area").1).unwrap();
+        assert_eq!((&area["rows"], &area["cols"]), (&8.into(), &8.into()));
+        let steps = area["coarse_steps"].as_u64().unwrap() as usize;
+        let (_, overview) = server.asked("/api/overview");
+        assert_eq!(overview.len(), 4 * (8 * steps + 1).pow(2) + 16 * 64);
+        let triangles = |place: usize| {
+            let at = overview.len() - 16 * (64 - place);
+            u32::from_le_bytes(overview[at..at + 4].try_into().unwrap())
+        };
+        assert_eq!(u64::from((0..64).map(triangles).sum::<u32>()), area["triangles"].as_u64().unwrap());
+        let (status, block) = server.asked("/api/modules/2/3/4/5");
+        let word = |place: usize| u32::from_le_bytes(block[4 * place..4 * place + 4].try_into().unwrap());
+        assert_eq!((status, word(0), word(1), word(3)), (200, 2, 3, triangles(2 * 8 + 3)));
+        assert_eq!(server.asked("/api/dem"), (200, br#"{"why":null}"#.to_vec()));
+        let (status, posts) = server.asked("/api/dem/2/3/4/5");
+        assert_eq!((status, posts.len()), (200, 8 * 41 * 41));
+    }
+
+    #[test]
+    fn what_cannot_be_answered_is_told_in_words() {
+        let server = served();
+        for wrong in ["/api/modules/2/3/2/5", "/api/modules/0/0/9/8", "/api/dem/0/0/8/9"] {
+            let (status, why) = server.asked(wrong);
+            assert!(status == 404 && String::from_utf8(why).unwrap().contains("of 8 x 8 load modules"), "{wrong}");
+        }
+        assert_eq!(server.asked("/api/modules/a/b/c/d").0, 400);
+        assert_eq!(server.asked("/etc/passwd").0, 404);
+        assert_eq!(server.asked_as("example.org", "/api/area").0, 403);
+        let port = server.host.rsplit(':').next().unwrap();
+        server.scene.refuses(&["view", "small.tdb", "--port", port], &[port, "cannot be served"]);
+        server.scene.refuses(&["view", "none.tdb"], &["none.tdb"]);
+    }
+}

@@ -1,0 +1,75 @@
+// The small map: the whole area, the block that is loaded, the observer.
+import { bytes, colorOf } from "./colors.js";
+
+/** Draws on `canvas`; `go(east, north)` is called for clicks. */
+export class SmallMap {
+  constructor(area, canvas, go) {
+    const longer = Math.max(area.rows, area.cols), size = canvas.width;
+    this.area = area;
+    this.canvas = canvas;
+    canvas.width = Math.max(Math.round((size * area.cols) / longer), 40);
+    canvas.height = Math.max(Math.round((size * area.rows) / longer), 40);
+    this.pixels = canvas.width / (area.cols * area.side_m);
+    this.ground = document.createElement("canvas");
+    canvas.addEventListener("click", (event) => {
+      const [x, y] = [event.offsetX / this.pixels, event.offsetY / this.pixels];
+      go(area.sides[0] + x, area.sides[3] - y);
+    });
+    this.repaint("height");
+  }
+
+  /** Paints the area anew: shaded heights, or a square for each load module. */
+  repaint(colors) {
+    const { area, ground } = this, { wide, high, heights } = area.coarse;
+    const byModule = colors !== "height";
+    [ground.width, ground.height] = byModule ? [area.cols, area.rows] : [wide - 1, high - 1];
+    const picture = new ImageData(ground.width, ground.height);
+    for (let row = 0; row < ground.height; row++) {
+      for (let col = 0; col < ground.width; col++) {
+        const at = 4 * ((ground.height - 1 - row) * ground.width + col);
+        let color;
+        if (byModule) {
+          const figures = area.figures(row, col);
+          color = colorOf[colors](area, colors === "limits" ? figures.count : figures.rms);
+        } else {
+          const place = row * wide + col, step = area.side_m / area.coarse_steps;
+          // Light from the north-west.
+          const slope = (heights[place + 1] - heights[place] + heights[place] - heights[place + wide]) / step;
+          const shade = Math.min(Math.max(0.9 + slope, 0.45), 1.25);
+          color = colorOf.height(area, heights[place]).map((part) => part * shade);
+        }
+        picture.data.set([...bytes(color), 255], at);
+      }
+    }
+    ground.getContext("2d").putImageData(picture, 0, 0);
+  }
+
+  draw(block, tank, range) {
+    const { area, canvas, pixels } = this, context = canvas.getContext("2d");
+    context.imageSmoothingEnabled = false;
+    context.drawImage(this.ground, 0, 0, canvas.width, canvas.height);
+    const [x, y] = [(tank.east - area.sides[0]) * pixels, (area.sides[3] - tank.north) * pixels];
+    if (block) {
+      const [south, west, north, east] = block.map((line) => line * area.side_m * pixels);
+      context.lineWidth = 1.5;
+      context.strokeStyle = "#ffe14d";
+      context.strokeRect(west, canvas.height - north, east - west, north - south);
+    }
+    context.beginPath();
+    context.arc(x, y, range * pixels, 0, 2 * Math.PI);
+    context.strokeStyle = "rgba(255, 255, 255, 0.7)";
+    context.lineWidth = 1;
+    context.stroke();
+    context.save();
+    context.translate(x, y);
+    context.rotate(tank.heading + (tank.flies ? tank.turned : 0));
+    context.beginPath();
+    for (const [right, down] of [[0, -8], [5, 6], [0, 3], [-5, 6]]) context.lineTo(right, down);
+    context.closePath();
+    context.fillStyle = "#d0257a";
+    context.strokeStyle = "#ffffff";
+    context.fill();
+    context.stroke();
+    context.restore();
+  }
+}

@@ -1,0 +1,119 @@
+// Asks the server, and reads what it answers. Places are metres east and north of `corner`, a corner of load modules in
+// the middle of the area, so that they are small numbers, whole in 1/128 m, that a 32-bit float holds exactly.
+
+const QUANTA = 128;
+
+async function answer(path) {
+  const response = await fetch(path);
+  if (!response.ok) throw new Error(await response.text());
+  return response;
+}
+
+/** What the area is, with its overview: heights on a coarse grid, figures of every load module. */
+export async function readArea() {
+  const area = await (await answer("/api/area")).json();
+  const bytes = await (await answer("/api/overview")).arrayBuffer();
+  const [wide, high] = [area.cols * area.coarse_steps + 1, area.rows * area.coarse_steps + 1];
+  area.corner = [Math.floor(area.rows / 2), Math.floor(area.cols / 2)];
+  area.coarse = { wide, high, heights: new Float32Array(bytes, 0, wide * high) };
+  const words = new Uint32Array(bytes, 4 * wide * high), metres = new Float32Array(bytes, 4 * wide * high);
+  const figures = (index) => {
+    const [triangles, polygons] = [words[4 * index], words[4 * index + 1]];
+    const count = area.limits.count === "triangles" ? triangles : polygons;
+    return { triangles, polygons, count, rms: metres[4 * index + 2], largest: metres[4 * index + 3] };
+  };
+  area.figures = (row, col) => figures(row * area.cols + col);
+  // West, south, east and north of the area.
+  area.sides = [-area.corner[1], -area.corner[0], area.cols - area.corner[1], area.rows - area.corner[0]]
+    .map((modules) => modules * area.side_m);
+  area.moduleAt = (east, north) =>
+    [Math.floor(north / area.side_m) + area.corner[0], Math.floor(east / area.side_m) + area.corner[1]];
+  area.inSystem = (east, north) => [area.origin_m[0] + east - area.sides[0], area.origin_m[1] + north - area.sides[1]];
+  area.fromSystem = (east, north) =>
+    [east - area.origin_m[0] + area.sides[0], north - area.origin_m[1] + area.sides[1]];
+  return area;
+}
+
+/** The load modules of a half-open block. */
+export async function readModules(area, [south, west, north, east]) {
+  const bytes = await (await answer(`/api/modules/${south}/${west}/${north}/${east}`)).arrayBuffer();
+  const modules = [];
+  for (let at = 0; at < bytes.byteLength;) {
+    const [module, end] = moduleAt(area, bytes, at);
+    modules.push(module);
+    at = end;
+  }
+  return modules;
+}
+
+function moduleAt(area, bytes, start) {
+  const [row, col, vertexCount, triangleCount, polygons, posts, ...sideCounts] = new Uint32Array(bytes, start, 10);
+  const [rms, largest] = new Float32Array(bytes, start + 44, 2);
+  let at = start + 52;
+  const [plan, heights] = [new Uint16Array(bytes, at, 4 * vertexCount), new Int32Array(bytes, at, 2 * vertexCount)];
+  at += 8 * vertexCount;
+  const triangles = new Uint16Array(bytes, at, 3 * triangleCount);
+  at += 6 * triangleCount;
+  const sides = [0, 1, 2, 3].map((side) => {
+    const list = new Uint16Array(bytes, at, sideCounts[side]);
+    at += 2 * sideCounts[side];
+    return list;
+  });
+  const classes = new Uint8Array(bytes, at, triangleCount);
+  at += triangleCount;
+  const [west, south] = [(col - area.corner[1]) * area.side_m, (row - area.corner[0]) * area.side_m];
+  const points = new Float32Array(3 * vertexCount);
+  for (let i = 0; i < vertexCount; i++) {
+    points[3 * i] = west + plan[4 * i] / QUANTA;
+    points[3 * i + 1] = south + plan[4 * i + 1] / QUANTA;
+    points[3 * i + 2] = heights[2 * i + 1] / QUANTA;
+  }
+  const tin = { points, triangles, sides };
+  return [{ row, col, polygons, posts, rms, largest, classes, tin }, start + 4 * Math.ceil((at - start) / 4)];
+}
+
+/** Fails with the reason where the sources of the database are not at hand. */
+export async function checkDem() {
+  const { why } = await (await answer("/api/dem")).json();
+  if (why !== null) throw new Error(why);
+}
+
+/** Puts the DEM's posts under load modules of a half-open block, each as a surface of two triangles a cell. */
+export async function readPosts(area, [south, west, north, east], modules) {
+  const bytes = await (await answer(`/api/dem/${south}/${west}/${north}/${east}`)).arrayBuffer();
+  const cells = area.side_cells;
+  const [wide, high] = [(east - west) * cells + 1, (north - south) * cells + 1];
+  const [heights, residuals] = [0, 1].map((part) => new Float32Array(bytes, 4 * part * wide * high, wide * high));
+  const step = area.side_m / cells, posts = cells + 1;
+  for (const module of modules) {
+    const points = new Float32Array(3 * posts * posts), found = new Float32Array(posts * posts);
+    const corner = [(module.col - area.corner[1]) * area.side_m, (module.row - area.corner[0]) * area.side_m];
+    for (let row = 0, i = 0; row < posts; row++) {
+      for (let col = 0; col < posts; col++, i++) {
+        const place = ((module.row - south) * cells + row) * wide + (module.col - west) * cells + col;
+        points.set([corner[0] + col * step, corner[1] + row * step, heights[place]], 3 * i);
+        found[i] = residuals[place];
+      }
+    }
+    module.dem = { points, residuals: found, ...gridOf(cells) };
+  }
+}
+
+const grids = new Map();
+
+/** Triangles and sides of a square of so many cells a side. */
+function gridOf(cells) {
+  if (!grids.has(cells)) {
+    const posts = cells + 1, triangles = [];
+    for (let row = 0; row < cells; row++) {
+      for (let col = 0; col < cells; col++) {
+        const at = row * posts + col;
+        triangles.push(at, at + 1, at + posts + 1, at, at + posts + 1, at + posts);
+      }
+    }
+    const line = (start, step) => Array.from({ length: posts }, (_, i) => start + i * step);
+    const sides = [line(0, 1), line(cells, posts), line(cells * posts, 1), line(0, posts)];
+    grids.set(cells, { triangles: new Uint32Array(triangles), sides });
+  }
+  return grids.get(cells);
+}

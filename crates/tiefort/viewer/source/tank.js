@@ -1,0 +1,131 @@
+// The observer: a tank that follows the triangles it stands on, or an eye that flies above them.
+import { BoxGeometry, CylinderGeometry, Group, Matrix4, Mesh, MeshLambertMaterial, Vector3 } from "three";
+
+const FORWARD_MPS = 18, BACK_MPS = 6, GAIN_MPS2 = 6, TURN_RADPS = 0.7;
+const FLY_MPS = 80, CLEARANCE_M = 3, CEILING_M = 12_000;
+/** Times as fast with the shift key. */
+const HURRY = 10;
+/** Half of the tracks' length and of the distance between them, metres. */
+const HALF_LENGTH = 3, HALF_WIDTH = 1.4;
+
+export class Tank {
+  constructor(terrain, east, north, heading) {
+    Object.assign(this, { terrain, east, north, heading, speed: 0, driven: 0, flies: false, height: null });
+    // Where the observer looks, beyond where the tank points; and how far behind it he is.
+    Object.assign(this, { turned: 0, pitch: -0.12, away: 22, chases: true });
+    // The tank's own axes: right, up, backwards.
+    this.axes = [new Vector3(1, 0, 0), new Vector3(0, 1, 0), new Vector3(0, 0, 1)];
+    this.model = model();
+  }
+
+  /** One step of `seconds`; `wish` says forward, right, up from -1 to 1, and whether to hurry. */
+  step(seconds, wish) {
+    const before = [this.east, this.north];
+    if (this.flies) this.fly(seconds, wish);
+    else this.drive(seconds, wish);
+    const [west, south, east, north] = this.terrain.area.sides, wanted = [this.east, this.north];
+    this.east = Math.min(Math.max(this.east, west + 1), east - 1);
+    this.north = Math.min(Math.max(this.north, south + 1), north - 1);
+    // Nobody drives over the edge of the area.
+    if (wanted[0] !== this.east || wanted[1] !== this.north) this.speed = 0;
+    this.driven += Math.hypot(this.east - before[0], this.north - before[1]);
+    this.settle();
+  }
+
+  drive(seconds, { forward, right, hurry }) {
+    const times = hurry ? HURRY : 1;
+    const wanted = forward * (forward < 0 ? BACK_MPS : FORWARD_MPS) * times;
+    const change = GAIN_MPS2 * times * seconds * (forward === 0 ? 2 : 1);
+    this.speed += Math.min(Math.max(wanted - this.speed, -change), change);
+    this.heading += right * TURN_RADPS * seconds * (this.speed < 0 ? -1 : 1);
+    this.move(this.heading, this.speed * seconds);
+  }
+
+  fly(seconds, { forward, right, up, hurry }) {
+    const reach = FLY_MPS * (hurry ? HURRY : 1) * seconds;
+    this.heading += right * TURN_RADPS * seconds;
+    this.speed = forward * FLY_MPS * (hurry ? HURRY : 1);
+    this.move(this.heading + this.turned, forward * reach);
+    this.altitude += 0.5 * up * reach;
+  }
+
+  move(direction, metres) {
+    this.east += Math.sin(direction) * metres;
+    this.north += Math.cos(direction) * metres;
+  }
+
+  /** Stands on the ground: height, pitch and roll from the triangles under the ends of both tracks. */
+  settle() {
+    const [sin, cos] = [Math.sin(this.heading), Math.cos(this.heading)];
+    const at = (along, aside) => this.terrain.under(
+      this.east + along * sin + aside * cos, this.north + along * cos - aside * sin)?.height;
+    const ends = [at(HALF_LENGTH, -HALF_WIDTH), at(HALF_LENGTH, HALF_WIDTH), at(-HALF_LENGTH, -HALF_WIDTH),
+      at(-HALF_LENGTH, HALF_WIDTH)];
+    // Not loaded yet: it stays as it stood.
+    if (ends.some((height) => height === undefined)) return;
+    const [left, right, backLeft, backRight] = ends;
+    this.height = Math.max((left + backRight) / 2, (right + backLeft) / 2);
+    const rise = (left + right - backLeft - backRight) / (4 * HALF_LENGTH);
+    const lean = (right + backRight - left - backLeft) / (4 * HALF_WIDTH);
+    const ahead = new Vector3(sin, rise, -cos).normalize(), aside = new Vector3(cos, lean, sin).normalize();
+    const up = new Vector3().crossVectors(aside, ahead).normalize();
+    this.axes = [new Vector3().crossVectors(ahead, up), up, ahead.clone().negate()];
+    this.tilt = [Math.asin(ahead.y), Math.asin(aside.y)];
+    this.altitude = this.flies ? Math.min(Math.max(this.altitude, this.height + CLEARANCE_M), CEILING_M) : this.height;
+  }
+
+  takeOff(flies) {
+    this.flies = flies;
+    this.altitude = (this.height ?? 0) + 60;
+    this.settle();
+  }
+
+  /** Puts the camera where the observer is. */
+  place(camera) {
+    if (this.height === null) return;
+    const base = new Vector3(this.east, this.height, -this.north);
+    this.model.visible = !this.flies && this.chases;
+    this.model.matrixAutoUpdate = false;
+    this.model.matrix = new Matrix4().makeBasis(...this.axes).setPosition(base);
+    const look = this.heading + this.turned;
+    const level = new Vector3(Math.sin(look), 0, -Math.cos(look));
+    const ahead = level.clone().multiplyScalar(Math.cos(this.pitch)).setY(Math.sin(this.pitch));
+    camera.up.set(0, 1, 0);
+    if (this.flies) {
+      camera.position.set(this.east, this.altitude, -this.north);
+    } else if (this.chases) {
+      camera.position.copy(base).addScaledVector(ahead, -this.away).add(new Vector3(0, 3, 0));
+      const ground = this.terrain.under(camera.position.x, -camera.position.z);
+      camera.position.y = Math.max(camera.position.y, (ground?.height ?? this.height) + 1.5);
+    } else {
+      // From the hatch, which leans as the tank does.
+      camera.up.copy(this.axes[1]);
+      camera.position.copy(base).addScaledVector(this.axes[1], 2.6);
+      const right = new Vector3(Math.cos(look), 0, Math.sin(look));
+      ahead.y += Math.sin(this.tilt?.[0] ?? 0) * Math.cos(this.turned) + right.y;
+    }
+    camera.lookAt(camera.position.clone().add(ahead));
+    camera.updateMatrixWorld();
+  }
+}
+
+/** Boxes and a gun, in metres; forward is -z. */
+function model() {
+  const paint = [0x4d5a34, 0x2c3128, 0x5b693e].map((color) => new MeshLambertMaterial({ color }));
+  const tank = new Group();
+  const box = (size, [x, y, z], which) => {
+    const mesh = new Mesh(new BoxGeometry(...size), paint[which]);
+    mesh.position.set(x, y, z);
+    tank.add(mesh);
+  };
+  box([2.4, 0.9, 6.6], [0, 1.05, 0], 0);
+  box([0.6, 0.95, 6.2], [-1.4, 0.48, 0], 1);
+  box([0.6, 0.95, 6.2], [1.4, 0.48, 0], 1);
+  box([2.2, 0.75, 2.9], [0, 1.85, 0.3], 2);
+  box([0.7, 0.25, 0.7], [0.5, 2.3, 0.6], 1);
+  const gun = new Mesh(new CylinderGeometry(0.09, 0.11, 4.6), paint[1]);
+  gun.rotation.x = Math.PI / 2;
+  gun.position.set(0, 1.9, -3.3);
+  tank.add(gun);
+  return tank;
+}

@@ -1,0 +1,221 @@
+// The block of load modules around the observer: loaded, drawn, dropped; beyond it the area as it is coarsely.
+import { Frustum, Group, Matrix4 } from "three";
+import { apron, coarseMesh, moduleLines, moduleMesh, paint, wallMeshes } from "./meshes.js";
+import { checkDem, readModules, readPosts } from "./server.js";
+import { triangleUnder } from "./surface.js";
+
+/** Metres from the middle of the area to where nothing is any more. */
+const APRON_M = 400_000;
+/** How long after load modules could not be read they are asked for again. */
+const AGAIN_MS = 2000;
+
+export class Terrain {
+  constructor(area) {
+    this.area = area;
+    this.group = new Group();
+    // By row * cols + col: {module, surface, mesh, edges}.
+    this.drawn = new Map();
+    this.colors = "height";
+    this.withEdges = this.withLines = this.withDem = false;
+    this.block = null;
+    this.lacks = false;
+    this.asked = new Set();
+    this.fault = null;
+    this.coarse = coarseMesh(area);
+    this.coarse.repaint(this.colors);
+    this.base = area.height_m[0] - 20;
+    this.group.add(this.coarse.mesh, apron(area, this.base, APRON_M));
+    this.closed();
+  }
+
+  /** The half-open block of load modules within `range` of a place. */
+  blockAround(east, north, range) {
+    const { area } = this, reach = Math.ceil(range / area.side_m), [row, col] = area.moduleAt(east, north);
+    const clamp = (value, end) => Math.min(Math.max(value, 0), end);
+    return [clamp(row - reach, area.rows), clamp(col - reach, area.cols), clamp(row + reach + 1, area.rows),
+      clamp(col + reach + 1, area.cols)];
+  }
+
+  /** Follows the observer: drops what is out of range, asks for what is missing. */
+  follow(east, north, range) {
+    const block = this.blockAround(east, north, range);
+    if (this.block && !this.lacks && block.every((side, i) => side === this.block[i])) return;
+    [this.block, this.lacks] = [block, false];
+    let dropped = false;
+    for (const key of this.drawn.keys()) {
+      if (!this.isWanted(key)) dropped = this.drop(key) || dropped;
+    }
+    if (dropped) this.closed();
+    for (const part of this.missing()) this.load(part);
+  }
+
+  isWanted(key) {
+    const [row, col] = [Math.floor(key / this.area.cols), key % this.area.cols];
+    const [south, west, north, east] = this.block;
+    return south <= row && row < north && west <= col && col < east;
+  }
+
+  /** Load modules of the block that are neither here nor on their way, as rectangles. */
+  missing() {
+    const [south, west, north, east] = this.block, parts = [];
+    const lacks = (row, col) => {
+      const key = row * this.area.cols + col;
+      return !this.drawn.has(key) && !this.asked.has(key);
+    };
+    for (let row = south; row < north; row++) {
+      for (let col = west; col < east; col++) {
+        if (!lacks(row, col)) continue;
+        const start = col;
+        while (col < east && lacks(row, col)) col++;
+        const below = parts.find((part) => part[1] === start && part[3] === col && part[2] === row);
+        if (below) below[2]++;
+        else parts.push([row, start, row + 1, col]);
+      }
+    }
+    return parts;
+  }
+
+  async load(part) {
+    const [south, west, north, east] = part, keys = [];
+    for (let row = south; row < north; row++) {
+      for (let col = west; col < east; col++) keys.push(row * this.area.cols + col);
+    }
+    keys.forEach((key) => this.asked.add(key));
+    try {
+      const modules = await readModules(this.area, part);
+      if (this.withDem) await readPosts(this.area, part, modules);
+      for (const module of modules) {
+        const key = module.row * this.area.cols + module.col;
+        this.asked.delete(key);
+        if (this.isWanted(key)) this.draw(key, module);
+      }
+      this.closed();
+      this.fault = null;
+    } catch (fault) {
+      // What was not loaded stays coarse; the page says so, and asks again.
+      keys.forEach((key) => this.asked.delete(key));
+      this.fault = fault.message;
+      setTimeout(() => (this.lacks = true), AGAIN_MS);
+    }
+  }
+
+  draw(key, module) {
+    this.drop(key);
+    const surface = (this.withDem && module.dem) || module.tin;
+    const { mesh, edges } = moduleMesh(surface);
+    edges.visible = this.withEdges;
+    paint(this.area, module, surface, mesh, this.colors);
+    mesh.userData.key = key;
+    this.group.add(mesh);
+    this.drawn.set(key, { module, surface, mesh, edges });
+  }
+
+  drop(key) {
+    const old = this.drawn.get(key);
+    if (!old) return false;
+    this.group.remove(old.mesh);
+    old.mesh.geometry.dispose();
+    return this.drawn.delete(key);
+  }
+
+  /** Makes the surface whole again after load modules came or went. */
+  closed() {
+    const { area, group } = this;
+    for (const old of [...(this.walls ?? []), this.lines].filter(Boolean)) {
+      group.remove(old);
+      old.geometry.dispose();
+    }
+    this.coarse.cut((row, col) => this.drawn.has(row * area.cols + col));
+    this.walls = wallMeshes(area, this.drawn, this.base);
+    this.lines = moduleLines(this.drawn);
+    this.lines.visible = this.withLines;
+    group.add(...this.walls, this.lines);
+  }
+
+  show({ colors, wireframe, lines }) {
+    [this.withEdges, this.withLines] = [wireframe, lines];
+    for (const one of this.drawn.values()) one.edges.visible = wireframe;
+    this.lines.visible = lines;
+    if (colors !== this.colors) {
+      this.colors = colors;
+      this.repaint();
+    }
+  }
+
+  repaint() {
+    this.coarse.repaint(this.colors);
+    for (const { module, surface, mesh } of this.drawn.values()) paint(this.area, module, surface, mesh, this.colors);
+  }
+
+  /** Shows the DEM, or the triangles again. Fails where the DEM is not at hand; then nothing has changed. */
+  async showDem(wanted) {
+    if (wanted) await checkDem();
+    const modules = [...this.drawn.values()].map(({ module }) => module);
+    if (wanted && modules.some((module) => !module.dem)) {
+      const rows = modules.map((module) => module.row), cols = modules.map((module) => module.col);
+      const part = [Math.min(...rows), Math.min(...cols), Math.max(...rows) + 1, Math.max(...cols) + 1];
+      await readPosts(this.area, part, modules);
+    }
+    this.withDem = wanted;
+    for (const module of modules) {
+      const key = module.row * this.area.cols + module.col;
+      if (this.drawn.has(key)) this.draw(key, module);
+    }
+    // What came meanwhile came without.
+    if (wanted) {
+      for (const [key, { module }] of this.drawn) if (!module.dem) this.drop(key);
+      for (const part of this.missing()) this.load(part);
+    }
+    this.closed();
+  }
+
+  /** What is drawn at a place: load module, triangle, height, normal; null where nothing fine is loaded. */
+  under(east, north) {
+    const [west, south, far, top] = this.area.sides;
+    const inside = [Math.min(Math.max(east, west), far - 1e-3), Math.min(Math.max(north, south), top - 1e-3)];
+    const [row, col] = this.area.moduleAt(...inside);
+    const found = this.drawn.get(row * this.area.cols + col);
+    const triangle = found && triangleUnder(found.surface, ...inside);
+    return triangle ? { ...found, ...triangle } : null;
+  }
+
+  count(module) {
+    return this.area.limits.count === "triangles" ? module.tin.triangles.length / 3 : module.polygons;
+  }
+
+  /** Load modules and triangles that the camera sees within its range. */
+  inView(camera, east, north, range) {
+    const frustum = new Frustum().setFromProjectionMatrix(
+      new Matrix4().multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse));
+    const { area } = this, side = area.side_m;
+    let [modules, triangles] = [0, 0];
+    for (const { module, surface, mesh } of this.drawn.values()) {
+      const [west, south] = [(module.col - area.corner[1]) * side, (module.row - area.corner[0]) * side];
+      const away = [Math.max(west - east, 0, east - west - side), Math.max(south - north, 0, north - south - side)];
+      if (range < Math.hypot(...away) || !frustum.intersectsObject(mesh)) continue;
+      modules += 1;
+      triangles += surface.triangles.length / 3;
+    }
+    return { modules, triangles };
+  }
+
+  /** Triangles of all that is loaded, and the count of its fullest whole window, if it holds one. */
+  loaded() {
+    const { area, drawn } = this, { rows, cols } = area.limits.window;
+    let triangles = 0, fullest = null;
+    for (const { module } of drawn.values()) triangles += module.tin.triangles.length / 3;
+    if (!this.block) return { modules: 0, triangles, fullest };
+    const [south, west, north, east] = this.block;
+    for (let row = south; row + rows <= north; row++) {
+      for (let col = west; col + cols <= east; col++) {
+        let sum = 0;
+        for (let cell = 0; cell < rows * cols; cell++) {
+          const found = drawn.get((row + Math.floor(cell / cols)) * area.cols + col + (cell % cols));
+          sum += found ? this.count(found.module) : 0;
+        }
+        fullest = Math.max(fullest ?? 0, sum);
+      }
+    }
+    return { modules: drawn.size, triangles, fullest };
+  }
+}

@@ -1,0 +1,340 @@
+#!/usr/bin/env node
+// Drives through a database in a headless Chromium, and looks for what is missing, torn or miscounted.
+//
+//   node scripts/check_viewer.mjs [DIR] [--tiefort PROGRAM] [--pictures DIR] [--chromium /usr/bin/chromium]
+//                                 [--metres 2000] [--range M] [--update-reference]
+//
+// DIR is a terrain database; without it tests/jobs/small.toml is built, and the first picture is compared with
+// scripts/viewer/reference.json. PROGRAM is built with the feature `viewer`. Counts are taken from the load-module
+// files by this script itself (FORMAT.md). Needs what scripts/build_viewer.sh installs. Exit code 0: all is well.
+import { spawn, spawnSync } from "node:child_process";
+import { existsSync, mkdirSync, mkdtempSync, readFileSync, readdirSync, rmSync, writeFileSync } from "node:fs";
+import { createRequire } from "node:module";
+import { tmpdir } from "node:os";
+import { dirname, join } from "node:path";
+import { fileURLToPath, pathToFileURL } from "node:url";
+import { parseArgs } from "node:util";
+
+const root = join(dirname(fileURLToPath(import.meta.url)), "..");
+const library = createRequire(join(root, "crates", "tiefort", "viewer", "package.json")).resolve("puppeteer-core");
+const { default: puppeteer } = await import(pathToFileURL(library));
+const reference = join(root, "scripts", "viewer", "reference.json");
+const { values, positionals } = parseArgs({
+  allowPositionals: true,
+  options: {
+    tiefort: { type: "string", default: join(root, "target", "release", "tiefort") },
+    pictures: { type: "string" },
+    chromium: { type: "string", default: "/usr/bin/chromium" },
+    metres: { type: "string", default: "2000" },
+    range: { type: "string" },
+    "update-reference": { type: "boolean", default: false },
+  },
+});
+/** The picture is compared on a grid of so many colours; levels of 255 that they may differ by. */
+const GRID = [32, 20], MEAN_LEVELS_MAX = 4, LEVELS_MAX = 40;
+const SIZE = { width: 1120, height: 700 };
+
+let faults = 0;
+const expect = (holds, what) => {
+  console.log(`${holds ? "ok   " : "WRONG"} ${what}`);
+  faults += holds ? 0 : 1;
+};
+const pause = (ms) => new Promise((later) => setTimeout(later, ms));
+
+const scratch = mkdtempSync(join(tmpdir(), "viewer-"));
+let folder = positionals[0];
+if (!folder) {
+  folder = join(scratch, "small.tdb");
+  const job = join(root, "tests", "jobs", "small.toml");
+  const words = ["build", job, "--out", folder, "--quiet", "--no-html"];
+  const built = spawnSync(values.tiefort, words, { stdio: "inherit" });
+  if (built.status !== 0) process.exit(2);
+}
+if (values.pictures) mkdirSync(values.pictures, { recursive: true });
+const own = readCounts(join(folder, "modules"));
+const { server, address } = await serve();
+const browser = await puppeteer.launch({
+  executablePath: values.chromium,
+  userDataDir: join(scratch, "profile"),
+  protocolTimeout: 300_000,
+  args: [
+    "--headless", "--no-sandbox", "--disable-quic", "--no-first-run", "--disable-background-networking",
+    "--disable-component-update", "--disable-sync", "--use-gl=angle", "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader", `--window-size=${SIZE.width},${SIZE.height}`,
+  ],
+});
+try {
+  await check();
+} finally {
+  await browser.close();
+  const ended = new Promise((end) => server.once("exit", (code, signal) => end(code ?? signal)));
+  server.kill("SIGINT");
+  expect((await ended) === 0, "Ctrl-C ends the server");
+  rmSync(scratch, { recursive: true, force: true });
+}
+console.log(`${faults} faults`);
+process.exit(faults === 0 ? 0 : 1);
+
+/** Starts the server on a free port. */
+async function serve() {
+  const server = spawn(values.tiefort, ["view", folder], { stdio: ["ignore", "pipe", "inherit"] });
+  const address = await new Promise((found, failed) => {
+    server.stdout.on("data", (text) => found(String(text).trim()));
+    server.once("exit", (code) => failed(new Error(`tiefort view ended with ${code}`)));
+  });
+  return { server, address };
+}
+
+/** Triangles and polygons of every load module, from headers and indexes. */
+function readCounts(modules) {
+  const area = { counts: new Map() };
+  for (const name of readdirSync(modules).filter((name) => name.endsWith(".slm"))) {
+    const file = readFileSync(join(modules, name));
+    const word = (at) => file.readUInt32LE(at);
+    [area.rows, area.cols, area.side] = [word(32), word(36), word(56) / 128];
+    area.origin = [file.readDoubleLE(72), file.readDoubleLE(80)];
+    let at = word(12);
+    for (let row = word(40); row < word(44); row++) {
+      for (let col = word(48); col < word(52); col++, at += 32) {
+        area.counts.set(row * area.cols + col, { triangles: word(at + 16), polygons: word(at + 20) });
+      }
+    }
+  }
+  return area;
+}
+
+async function check() {
+  const page = await browser.newPage();
+  await page.setViewport({ ...SIZE, hasTouch: true });
+  const said = [], failed = [], asked = [];
+  page.on("console", (message) => ["error", "warn"].includes(message.type()) && said.push(message.text()));
+  page.on("pageerror", (error) => said.push(String(error)));
+  page.on("response", (response) => response.ok() || failed.push(`${response.status()} ${response.url()}`));
+  page.on("request", (request) => asked.push(request.url()));
+  if (!positionals[0]) await compared(page);
+  const metres = Number(values.metres);
+  const middle = [own.origin[0] + (own.cols * own.side) / 2, own.origin[1] + (own.rows * own.side) / 2];
+  const range = values.range ?? (positionals[0] ? 3500 : 1000);
+  // On a slow machine the tank goes on a good while before the keys are seen to be let go.
+  const north = Math.max(own.origin[1] + 300, middle[1] - 0.85 * metres);
+  const start = `east=${middle[0] + 40}&north=${north}&heading=0&range=${range}`;
+  await open(page, start);
+  await whole(page, "at the start");
+  await counted(page, "at the start");
+  await picture(page, "start");
+  await drive(page, metres);
+  await settled(page);
+  await whole(page, "after the drive");
+  await counted(page, "after the drive");
+  await picture(page, "end");
+  await clicked(page);
+  await shown(page);
+  await touched(page);
+  await flown(page);
+  expect(failed.length === 0, `every answer was whole ${failed.slice(0, 3)}`);
+  expect(asked.every((url) => url.startsWith(address) || url.startsWith("data:")), "nothing was asked of anybody else");
+  expect(said.length === 0, `no error in the console ${said.slice(0, 3)}`);
+}
+
+async function open(page, start) {
+  await page.goto(`${address}?${start}`, { timeout: 120_000 });
+  await page.waitForFunction("window.tiefort !== undefined", { timeout: 120_000 });
+  await settled(page);
+}
+
+function state(page) {
+  return page.evaluate("window.tiefort.state()");
+}
+
+/** Waits until all that is wanted is there, and two pictures more. */
+async function settled(page) {
+  await page.waitForFunction(() => {
+    const { block, modules, waiting, height, fault } = window.tiefort.state();
+    const wanted = (block[2] - block[0]) * (block[3] - block[1]);
+    return fault !== null || (height !== null && waiting === 0 && modules === wanted);
+  }, { timeout: 120_000, polling: 100 });
+  await page.evaluate(() => new Promise((end) => requestAnimationFrame(() => requestAnimationFrame(end))));
+}
+
+/** No pixel below the horizon sees the sky. */
+async function whole(page, when) {
+  const { below, sky, places } = await page.evaluate("window.tiefort.skyBelowHorizon()");
+  const where = sky === 0 ? "" : `, such as ${JSON.stringify(places)}`;
+  expect(1000 < below && sky === 0, `no hole in the ground ${when}: ${sky} of ${below} pixels${where}`);
+}
+
+/** What is loaded is the block around the tank, all of it, and is counted right. */
+async function counted(page, when) {
+  const found = await state(page);
+  const area = await page.evaluate(async () => (await fetch("/api/area")).json());
+  const [south, west, north, east] = found.block;
+  const keys = [];
+  for (let row = south; row < north; row++) for (let col = west; col < east; col++) keys.push(row * own.cols + col);
+  const missing = keys.filter((key) => !found.loaded.includes(key)).length;
+  expect(missing === 0 && found.loaded.length === keys.length && found.modules === keys.length,
+    `${keys.length} load modules around the tank ${when}, ${missing} missing`);
+  const reach = [found.north - own.origin[1], found.east - own.origin[0]].map((place) => Math.floor(place / own.side));
+  const [row, col] = reach;
+  expect(south <= row && row < north && west <= col && col < east, `the tank stands among them ${when}`);
+  const triangles = keys.reduce((sum, key) => sum + own.counts.get(key).triangles, 0);
+  expect(found.triangles === triangles, `${triangles} triangles in them ${when}, counted ${found.triangles}`);
+  const { rows, cols } = area.limits.window;
+  let fullest = null;
+  for (let row = south; row + rows <= north; row++) {
+    for (let col = west; col + cols <= east; col++) {
+      let sum = 0;
+      for (let cell = 0; cell < rows * cols; cell++) {
+        const key = (row + Math.floor(cell / cols)) * own.cols + col + (cell % cols);
+        sum += own.counts.get(key)[area.limits.count];
+      }
+      fullest = Math.max(fullest ?? 0, sum);
+    }
+  }
+  expect(found.fullest === fullest, `${fullest ?? "no"} ${area.limits.count} in the fullest window ${when}`);
+  const seen = found.view.triangles;
+  expect(0 < seen && seen <= triangles, `${seen} triangles in view ${when}`);
+}
+
+/** Drives north with the keys, looking for holes on the way. */
+async function drive(page, metres) {
+  const before = await state(page);
+  await page.keyboard.down("ShiftLeft");
+  await page.keyboard.down("KeyW");
+  let [looks, holes, tilted, frames] = [0, 0, 0, []];
+  const began = Date.now();
+  for (let now = before; now.driven < metres && Date.now() - began < 240_000; now = await state(page)) {
+    // A look takes a second on a slow machine, and the tank goes on: none near the end, and slowly there.
+    if (0.75 * metres < now.driven) await page.keyboard.up("ShiftLeft");
+    if (now.driven < 0.4 * metres) {
+      const { sky } = await page.evaluate("window.tiefort.skyBelowHorizon()");
+      [looks, holes] = [looks + 1, holes + sky];
+    }
+    tilted = Math.max(tilted, ...now.tilt.map(Math.abs));
+    frames.push(now.frameMs);
+    await pause(50);
+  }
+  await page.keyboard.up("ShiftLeft");
+  await page.keyboard.up("KeyW");
+  await page.waitForFunction("window.tiefort.state().speed === 0", { timeout: 60_000 });
+  const after = await state(page);
+  const gone = Math.hypot(after.east - before.east, after.north - before.north);
+  const frame = frames.sort((a, b) => a - b)[Math.floor(frames.length / 2)];
+  expect(metres <= after.driven && 0.95 * metres < gone,
+    `drove ${gone.toFixed(0)} m; median frame ${frame?.toFixed(0)} ms`);
+  expect(holes === 0, `no hole in the ground on the way, ${looks} looks`);
+  expect(0.005 < tilted && tilted < 1, `pitched and rolled up to ${((tilted * 180) / Math.PI).toFixed(1)} degrees`);
+}
+
+/** A click on the ground tells the load module there. */
+async function clicked(page) {
+  await page.mouse.click(SIZE.width / 2 + 90, SIZE.height * 0.8);
+  const { picked } = await state(page);
+  const words = await page.$eval("#picked", (box) => box.innerText);
+  const counts = own.counts.get(picked?.row * own.cols + picked?.col);
+  const told = counts && [`Load module ${picked.row},${picked.col}`, `${counts.triangles} tri`];
+  expect(told?.every((part) => words.includes(part)),
+    `a click tells: ${words.split("\n").slice(0, 3).join("; ")}`);
+}
+
+/** Every switch, with a picture of each. */
+async function shown(page) {
+  await page.keyboard.press("KeyM");
+  for (const colors of ["residuals", "limits", "height"]) {
+    await page.select("#colors", colors);
+    await settled(page);
+    await picture(page, `colors-${colors}`);
+  }
+  await page.keyboard.press("KeyT");
+  await settled(page);
+  await picture(page, "without-edges");
+  await page.keyboard.press("KeyG");
+  const isRead = () => !document.getElementById("note").innerText.startsWith("reading");
+  await page.waitForFunction(isRead, { timeout: 120_000 });
+  const { showsDem } = await state(page);
+  const note = await page.$eval("#note", (box) => box.innerText);
+  expect(showsDem || note.includes("not at hand"), showsDem ? "the DEM is shown" : `no DEM, and told so: ${note}`);
+  if (showsDem) {
+    await whole(page, "of the DEM");
+    await page.select("#colors", "residuals");
+    await settled(page);
+    await picture(page, "dem");
+    await page.select("#colors", "height");
+    await page.keyboard.press("KeyG");
+  }
+  for (const key of ["KeyT", "KeyM"]) await page.keyboard.press(key);
+}
+
+/** A finger on the left half drives. */
+async function touched(page) {
+  const before = await state(page);
+  await page.touchscreen.touchStart(300, 400);
+  await page.touchscreen.touchMove(300, 320);
+  await pause(1500);
+  await page.touchscreen.touchEnd();
+  const after = await state(page);
+  expect(before.driven < after.driven, `a finger drove ${(after.driven - before.driven).toFixed(1)} m`);
+}
+
+/** From above, and from the hatch. */
+async function flown(page) {
+  await page.keyboard.press("KeyH");
+  await settled(page);
+  await whole(page, "from the hatch");
+  await picture(page, "hatch");
+  await page.keyboard.press("KeyF");
+  await page.keyboard.down("ShiftLeft");
+  await page.keyboard.down("KeyE");
+  await pause(1500);
+  await page.keyboard.up("KeyE");
+  await page.keyboard.up("ShiftLeft");
+  await page.mouse.move(600, 300);
+  await page.mouse.down();
+  await page.mouse.move(600, 240, { steps: 4 });
+  await page.mouse.up();
+  await settled(page);
+  await whole(page, "in flight");
+  await picture(page, "flight");
+}
+
+async function picture(page, name) {
+  if (values.pictures) await page.screenshot({ path: join(values.pictures, `${name}.png`) });
+}
+
+/** The scene alone, from above, as a grid of colours, beside that of the reference. */
+async function compared(page) {
+  await open(page, `east=${own.origin[0] + 700}&north=${own.origin[1] + 500}&heading=40&range=1000`);
+  await page.keyboard.press("KeyF");
+  await settled(page);
+  await picture(page, "reference");
+  const boxes = await page.addStyleTag({ content: ".box { visibility: hidden }" }).catch(() => null);
+  const shot = await page.screenshot({ encoding: "base64" });
+  await boxes?.evaluate((tag) => tag.remove());
+  const found = await page.evaluate(async (shot, [wide, high]) => {
+    const image = new Image();
+    image.src = `data:image/png;base64,${shot}`;
+    await image.decode();
+    const [canvas, sums] = [document.createElement("canvas"), Array(3 * wide * high).fill(0)];
+    [canvas.width, canvas.height] = [image.width, image.height];
+    const context = canvas.getContext("2d");
+    context.drawImage(image, 0, 0);
+    const { data } = context.getImageData(0, 0, image.width, image.height);
+    const [cellWide, cellHigh] = [Math.floor(image.width / wide), Math.floor(image.height / high)];
+    for (let y = 0; y < cellHigh * high; y++) {
+      for (let x = 0; x < cellWide * wide; x++) {
+        const cell = 3 * (Math.floor(y / cellHigh) * wide + Math.floor(x / cellWide));
+        for (let part = 0; part < 3; part++) sums[cell + part] += data[4 * (y * image.width + x) + part];
+      }
+    }
+    return sums.map((sum) => Math.round(sum / (cellWide * cellHigh)));
+  }, shot, GRID);
+  if (values["update-reference"]) {
+    mkdirSync(dirname(reference), { recursive: true });
+    writeFileSync(reference, `${JSON.stringify(found)}\n`);
+  }
+  if (!existsSync(reference)) return expect(false, "no reference picture: make it with --update-reference");
+  const wanted = JSON.parse(readFileSync(reference));
+  const off = found.map((level, i) => Math.abs(level - wanted[i]));
+  const mean = off.reduce((sum, level) => sum + level, 0) / off.length, most = Math.max(...off);
+  expect(mean < MEAN_LEVELS_MAX && most < LEVELS_MAX,
+    `the picture is that of the reference within ${mean.toFixed(2)} levels, ${most} at most`);
+}
