@@ -13,7 +13,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use fidelity::Tally;
 use job::Job;
-use terrain::PostRect;
+use terrain::{Dem, PostRect, Tin};
 
 pub use choose::CompareMethod;
 pub use methods::Impossible;
@@ -73,6 +73,8 @@ pub struct CompareRow {
 /// What a method made.
 #[derive(Clone, Debug)]
 pub struct Made {
+    /// The TIN.
+    pub tin: Tin,
     /// Its vertices.
     pub points: usize,
     /// Its triangles.
@@ -114,6 +116,8 @@ pub struct Comparison {
     pub ground: String,
     /// Rows and columns of posts.
     pub size: (usize, usize),
+    /// Its heights.
+    pub dem: Dem,
     /// Metres between posts.
     pub spacing_m: f64,
     /// Posts with a height.
@@ -143,7 +147,7 @@ pub fn compare(
         tell(CompareEvent::Started(index));
         let tin = row.method.make(&subject, row.asked)?;
         tell(CompareEvent::Done(index));
-        row.made = tin.map(|tin| subject.measure(&tin));
+        row.made = tin.map(|tin| subject.measure(tin));
         if request.strict {
             refuse(row)?;
         }
@@ -152,15 +156,10 @@ pub fn compare(
         tell(CompareEvent::Equivalents);
         equate(&subject, &mut rows)?;
     }
-    let Subject { dem, spacing, name, .. } = &subject;
-    let rect = dem.rect();
-    Ok(Comparison {
-        ground: name.clone(),
-        size: (rect.posts_high(), rect.posts_wide()),
-        spacing_m: spacing.0,
-        posts: subject.posts(),
-        rows,
-    })
+    let posts = subject.posts();
+    let Subject { dem, spacing, name } = subject;
+    let size = (dem.rect().posts_high(), dem.rect().posts_wide());
+    Ok(Comparison { ground: name, size, dem, spacing_m: spacing.0, posts, rows })
 }
 
 /// Makes an error of a row without a TIN.

@@ -74,8 +74,8 @@ impl Subject {
     }
 
     /// What a method made, measured.
-    pub fn measure(&self, tin: &Tin) -> Made {
-        let residual: Tally = tally_of(&self.dem, tin);
+    pub fn measure(&self, tin: Tin) -> Made {
+        let residual: Tally = tally_of(&self.dem, &tin);
         Made {
             points: tin.vertices.len(),
             triangles: tin.triangles.len(),
@@ -83,6 +83,7 @@ impl Subject {
             residual,
             equivalent: Equivalent::None,
             forced: None,
+            tin,
         }
     }
 }

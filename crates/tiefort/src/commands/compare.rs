@@ -8,9 +8,10 @@ use compiler::{CompareEvent, CompareGround, CompareMethod, CompareRequest, Compa
 use job::Job;
 use serde_json::{Value, json};
 use terrain::{Post, PostRect};
-use views::{Align, Table, grouped};
+use views::{Align, Facets, Image, Look, Panel, Style, Surface, Table, draw_panels, grouped};
 
 use crate::failure::{Failure, Outcome};
+use crate::new_folder::NewFolder;
 use crate::signals::Signals;
 use crate::{files, terminal};
 
@@ -19,6 +20,7 @@ Examples:
   tiefort compare dem.tif
   tiefort compare dem.tif --window 648,481,376x460 --points 2500,5000
   tiefort compare dem.tif --methods vip,iterative --points 5000 --format json
+  tiefort compare dem.tif --pictures figures
   tiefort compare mine.toml        on the raster of a job, cut to its area
 
 Methods:
@@ -57,6 +59,9 @@ pub struct Arguments {
     /// Only these posts: the south-western one, then how many
     #[arg(long, value_name = "ROW,COL,ROWSxCOLUMNS", value_parser = window)]
     window: Option<PostRect>,
+    /// Draw the ground and every TIN from one eye, shaded and as wires, into a new folder
+    #[arg(long, value_name = "DIR")]
+    pictures: Option<PathBuf>,
     /// For a person or a program
     #[arg(long, value_enum, default_value_t = Format::Text)]
     format: Format,
@@ -102,6 +107,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let found = compiler::compare(&request, signals.stop(), &mut |event| watch.hear(event));
     let found = found.map_err(|error| Failure::of_compiler(&error, signals.exit_code()))?;
     refuse_all(&found)?;
+    if let Some(folder) = &arguments.pictures {
+        draw(&found, NewFolder::begin(folder)?)?;
+    }
     terminal::print(&match arguments.format {
         Format::Text => text(&found, &watch.seconds),
         Format::Json => format!("{:#}\n", to_json(&found, &watch.seconds)),
@@ -138,6 +146,36 @@ fn refuse_all(found: &Comparison) -> Result<(), Failure> {
         Some(why) if asked.all(|row| row.made.is_err()) => Err(Failure::new(why.to_string(), why.hint.clone())),
         _ => Ok(()),
     }
+}
+
+/// Draws the paper's figures 1 to 12: each TIN beside the ground under one light, and its triangles as wires.
+fn draw(found: &Comparison, folder: NewFolder) -> Result<(), Failure> {
+    const WIDE: usize = 900;
+    const FROM_SOUTH_WEST: f64 = 45.0;
+    const TIMES: f64 = 2.0;
+    let spacing_m = [found.spacing_m; 2];
+    let ground = || Panel { label: "DEM".into(), surface: Surface::Posts(&found.dem, spacing_m) };
+    let look = Look::overlooking(&ground().surface, FROM_SOUTH_WEST, TIMES, WIDE);
+    let put = |name: String, image: &Image| {
+        let mut bytes = Vec::new();
+        image.write_png(&mut bytes).and_then(|()| folder.put(&name, &bytes)).map_err(|source| {
+            let hint = "check that its folder is writable and has room";
+            Failure::new(format!("{name}: cannot be written: {source}"), hint)
+        })
+    };
+    for row in &found.rows {
+        let Ok(made) = &row.made else { continue };
+        let facets = Facets::of_tin(&made.tin, spacing_m);
+        let (name, points) = (row.method.name(), grouped(made.points as u64));
+        let label = format!("{name}, {points} points, RMS residual {:.2} m", made.residual.rms_m());
+        let tin = || Panel { label: label.clone(), surface: Surface::Triangles(&facets) };
+        let (title, eye) = (format!("{}: {name}", found.ground), "From the south-west");
+        let shaded = draw_panels(&title, eye, &[ground(), tin()], Style::Shaded, &look);
+        put(format!("{name}-{}.png", made.points), &shaded)?;
+        let wires = draw_panels(&title, eye, &[tin()], Style::Wireframe, &look);
+        put(format!("{name}-{}-wires.png", made.points), &wires)?;
+    }
+    folder.finish()
 }
 
 /// Tells of each row as it is done, and keeps its time.

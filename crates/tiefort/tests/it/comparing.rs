@@ -39,6 +39,18 @@ fn methods_are_compared_in_words_and_for_programs() {
 }
 
 #[test]
+fn every_tin_of_a_comparison_is_drawn_twice() {
+    let scene = with_dem();
+    let drawn =
+        ["compare", "dem.tif", "--methods", "lattice,highlow", "--points", "300", "--quiet", "--pictures", "figures"];
+    scene.run_to(0, &drawn);
+    let names = fs::read_dir(scene.path("figures")).unwrap().map(|entry| entry.unwrap().path());
+    let names: Vec<_> = names.inspect(|path| assert!(fs::read(path).unwrap().starts_with(b"\x89PNG"))).collect();
+    assert_eq!(names.len(), 4, "{names:?}");
+    scene.refuses(&drawn, &["figures"]);
+}
+
+#[test]
 fn what_cannot_be_compared_is_told_with_what_is_possible() {
     let scene = with_dem();
     let refuses = |arguments: &[&str], parts: &[&str]| {
