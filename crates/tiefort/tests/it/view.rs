@@ -6,7 +6,9 @@ use crate::scene::Scene;
 #[test]
 fn without_the_viewer_the_command_says_how_to_build_it_in() {
     let scene = Scene::new();
-    scene.refuses(&["view", "small.tdb"], &["without the viewer", "build_viewer.sh", "--features viewer"]);
+    scene.refuses(&["view", "small.tdb"], &["without the viewer"]);
+    let hint = scene.run_to(2, &["view", "small.tdb"]).stderr;
+    assert!(hint.contains("scripts/build_viewer.sh") && hint.contains("--features viewer"), "{hint}");
 }
 
 #[cfg(feature = "viewer")]
@@ -18,8 +20,9 @@ mod server {
     use serde_json::Value;
 
     use super::Scene;
+    use crate::raster::Raster;
 
-    /// A server of `small.tdb`, ended with the test.
+    /// A server, ended with the test.
     struct Server {
         process: Child,
         host: String,
@@ -36,8 +39,12 @@ mod server {
     fn served() -> Server {
         let scene = Scene::with_job("small.toml", &[]);
         scene.run_to(0, &["build", "job.toml", "--quiet", "--no-html"]);
+        served_in(scene, "small.tdb")
+    }
+
+    fn served_in(scene: Scene, folder: &str) -> Server {
         let mut process =
-            scene.program().args(["view", "small.tdb"]).stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
+            scene.program().args(["view", folder]).stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
         let mut line = String::new();
         BufReader::new(process.stdout.take().unwrap()).read_line(&mut line).unwrap();
         let host = line.trim().strip_prefix("http://").unwrap().trim_end_matches('/').to_owned();
@@ -83,6 +90,20 @@ mod server {
         assert_eq!(server.asked("/api/dem"), (200, br#"{"why":null}"#.to_vec()));
         let (status, posts) = server.asked("/api/dem/2/3/4/5");
         assert_eq!((status, posts.len()), (200, 8 * 41 * 41));
+    }
+
+    #[test]
+    fn without_its_raster_a_database_is_served_and_says_that_there_is_no_dem() {
+        let scene = Scene::with_job("raster.toml", &[]);
+        Raster::sound().write(&scene.path("dem.tif"));
+        scene.run_to(0, &["build", "job.toml", "--quiet", "--no-html", "--out", "a.tdb"]);
+        std::fs::rename(scene.path("dem.tif"), scene.path("gone.tif")).unwrap();
+        let server = served_in(scene, "a.tdb");
+        assert_eq!(server.asked("/api/modules/0/0/1/1").0, 200);
+        let ground: Value = serde_json::from_slice(&server.asked("/api/dem").1).unwrap();
+        assert!(ground["why"].as_str().unwrap().contains("dem.tif"), "{ground}");
+        let (status, why) = server.asked("/api/dem/0/0/1/1");
+        assert!(status == 409 && String::from_utf8(why).unwrap().contains("dem.tif"));
     }
 
     #[test]
