@@ -12,7 +12,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/../fuzz"
 seconds=${1:-600}
 shift || true
 targets=("$@")
-[[ ${#targets[@]} -gt 0 ]] || targets=(geotiff rasters raw polygons geoid module_file tile_file manifest job)
+[[ ${#targets[@]} -gt 0 ]] || targets=(geotiff rasters raw polygons geoid pins module_file tile_file manifest job)
 
 host=$(rustc -vV | sed -n 's/^host: //p')
 build=${CARGO_TARGET_DIR:-target}/fuzz
@@ -30,6 +30,7 @@ seed() {
         rasters) endings=(dt0 zip gz asc txt hgt) ;;
         raw) endings=(hdr) ;;
         polygons) endings=(geojson shp gpkg) ;;
+        pins) endings=(geojson csv) ;;
         *) endings=(gtx) ;;
     esac
     for ending in "${endings[@]}"; do

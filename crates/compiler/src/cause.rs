@@ -56,6 +56,10 @@ pub(crate) fn made_from(
     MadeFrom {
         heights: brief(begin().heights(&window.dem)),
         weights: brief(begin().importance(&window.importance)),
+        given: match window.given.is_empty() {
+            true => String::new(),
+            false => brief(begin().text(&format!("{:?}", window.given))),
+        },
         rules: brief(begin().text(&rules)),
         allowance: brief(begin().text(&allowance)),
         borders: brief(borders(begin())),
@@ -92,6 +96,7 @@ fn differing(before: &MadeFrom, now: &MadeFrom) -> Vec<&'static str> {
     let pairs = [
         (&before.heights, &now.heights, "its heights changed"),
         (&before.weights, &now.weights, "its weights changed"),
+        (&before.given, &now.given, "the points given for it changed"),
         (&before.rules, &now.rules, "what the job says of selecting changed"),
         (&before.allowance, &now.allowance, "its allowance moved"),
         (&before.borders, &now.borders, "a neighbour's border changed"),

@@ -165,6 +165,9 @@ pub struct MadeFrom {
     pub heights: String,
     /// The weights and classes of its window.
     pub weights: String,
+    /// The points that the job gives for it: what it starts from, pins.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub given: String,
     /// What the job says of selecting and optimising, and the places of its border.
     pub rules: String,
     /// What it may spend.

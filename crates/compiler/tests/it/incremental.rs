@@ -139,6 +139,28 @@ fn a_changed_mask_reaches_the_tiles_it_weighs() {
 }
 
 #[test]
+fn a_changed_pin_reaches_its_tile_and_what_its_borders_lead_to() {
+    let pin = |east: f64| {
+        let at = [crate::scene::ORIGIN_M[0] + east, crate::scene::ORIGIN_M[1] + 425.0];
+        format!(
+            "{{\"type\":\"FeatureCollection\",\"features\":[{{\"type\":\"Feature\",\"properties\":{{\"pin\":\"add\"}},\
+             \"geometry\":{{\"type\":\"Point\",\"coordinates\":[{},{}]}}}}]}}",
+            at[0], at[1]
+        )
+    };
+    let tin = format!("{}\npins = \"pins.geojson\"", words().tin);
+    let scene = Scene::with_files(&Words { tin, ..Words::sample() }, |folder: &Path| {
+        fs::write(folder.join("pins.geojson"), pin(425.0)).unwrap();
+    });
+    drop(scene.build("area", 2));
+    fs::write(scene.path("pins.geojson"), pin(475.0)).unwrap();
+    let (heard, refined) = rebuilt(&scene, "pins");
+    assert!(refined.contains(&tile(0, 0)) && refined.len() < 9, "{refined:?}");
+    let of_pin = |(at, why): &(TileId, String)| *at == tile(0, 0) && why.contains("points given for it changed");
+    assert!(heard.because.iter().any(of_pin), "{:?}", heard.because);
+}
+
+#[test]
 fn a_changed_limit_moves_allowances_and_keeps_surveys_that_it_does_not_reach() {
     let ground = sample_dem(Words::raster().grid(), 1);
     let mut scene = Scene::on(&Words::raster(), &ground);
