@@ -158,8 +158,9 @@ impl<'a> Run<'a> {
                 report.files.insert(name.to_owned(), stamp);
             }
             database.write_json(files::REPORT, &report)?;
-            self.write_page(&database, &report)?;
+            // With the report other processes take the build for done; so nothing that takes long comes before this.
             database.remove_work()?;
+            self.write_page(&database, &report)?;
         }
         let outcome = self.judge(&report);
         match self.show() {
