@@ -97,9 +97,8 @@ impl Worker<'_, '_> {
     fn is_published(&self) -> bool {
         let folder = self.session.run.database.folder();
         let complete = |manifest: database::Manifest| manifest.state == ManifestState::Complete;
-        self.session.standing == Standing::UnderWay
-            && folder.manifest().is_ok_and(complete)
-            && (folder.report().is_ok() || !self.session.work.path().exists())
+        let is_swept = || self.session.standing == Standing::UnderWay && !self.session.work.path().exists();
+        folder.manifest().is_ok_and(complete) && (folder.report().is_ok() || is_swept())
     }
 
     /// A unit that is ready and now ours; the last one once all others are done.
