@@ -38,6 +38,8 @@ mod slm;
 pub use load_module_reader::VERSION as MODULES_FORMAT_VERSION;
 pub use slm::{TileModules, decode_modules, encode_modules};
 mod json;
+mod page;
+pub use page::seal_page;
 mod manifest;
 pub use manifest::{
     Area, FORMAT_VERSION, FileStamp, MadeFrom, Manifest, ManifestState, SourceRecord, TileRecord, TileState, Totals,

@@ -7,6 +7,7 @@ use serde::Deserialize;
 
 use crate::database::list;
 use crate::folder::{MEASURED, MODULES, SURVEY, TILES, check_stamp, files, read};
+use crate::page::check_page;
 use crate::publish::is_temporary;
 use crate::{DatabaseError, FileStamp, Folder, Manifest, curve_file, measured_file, removals_file, slm, tile_file};
 
@@ -38,7 +39,7 @@ impl Folder {
     }
 
     /// Reads every file that `manifest` lists: its sections, what they hold (TINs and load modules are walked for
-    /// cracks), and its hash; also `report.json`, where there is one. Files of ours that it does not list are named
+    /// cracks), and its hash; also the reports, where there are any. Files of ours that it does not list are named
     /// too. At most one finding per file, in the order of the manifest.
     ///
     /// # Errors
@@ -51,12 +52,8 @@ impl Folder {
                 damage.push(Damage { path: path.clone(), error });
             }
         }
-        // It knows times, so no manifest lists it; its own checksum must do.
-        match self.read_json::<Beside>(files::REPORT) {
-            Ok(beside) => damage.extend(self.damage_beside(&beside)),
-            Err(DatabaseError::Missing { .. }) => {}
-            Err(error) => damage.push(Damage { path: self.path(files::REPORT), error }),
-        }
+        // They know times, so no manifest lists them.
+        damage.extend(self.damage_of_reports());
         let known: BTreeSet<PathBuf> = listed.into_iter().map(|(path, _)| path).collect();
         for name in [TILES, MODULES, MEASURED, SURVEY] {
             for path in list(&self.path(name))? {
@@ -69,7 +66,8 @@ impl Folder {
         Ok(damage)
     }
 
-    /// Whether every file that `manifest` lists has the bytes it had, and no file of ours lies beside them.
+    /// Whether every file that `manifest` lists has the bytes it had, and so have the reports; and no file of ours lies
+    /// beside them.
     ///
     /// # Errors
     /// When a folder cannot be listed.
@@ -79,28 +77,34 @@ impl Folder {
         for name in [TILES, MODULES, MEASURED, SURVEY] {
             files += list(&self.path(name))?.len();
         }
-        Ok(files == listed.len() && listed.iter().all(|(path, stamp)| self.check_file(path, stamp).is_ok()))
+        let is_whole = |(path, stamp): &(PathBuf, FileStamp)| self.check_file(path, stamp).is_ok();
+        Ok(files == listed.len() && listed.iter().all(is_whole) && self.damage_of_reports().is_empty())
     }
 
-    /// Files that the report lists and that are not as they were written. One that is gone is no damage: a person may
-    /// have taken it away.
-    fn damage_beside(&self, beside: &Beside) -> Vec<Damage> {
-        let check = |(name, stamp): (&String, &FileStamp)| {
-            let path = self.path(name);
-            match read(&path).and_then(|bytes| check_stamp(&path, &bytes, stamp)) {
-                Ok(()) | Err(DatabaseError::Missing { .. }) => None,
-                Err(error) => Some(Damage { path, error }),
-            }
+    /// Reports that are not as they were written: `report.json` by its own checksum, the breaches by what it says of
+    /// them, the page by its last line. One that is gone is no damage: a person may have taken it away.
+    fn damage_of_reports(&self) -> Vec<Damage> {
+        let (beside, report) = match self.read_json(files::REPORT) {
+            Ok(beside) => (beside, Ok(())),
+            Err(error) => (Beside::default(), Err(error)),
         };
-        beside.files.iter().filter(|(name, _)| BESIDE.contains(&name.as_str())).filter_map(check).collect()
+        let page = self.path(files::REPORT_HTML);
+        let page = read(&page).and_then(|bytes| check_page(&page, &bytes));
+        let listed = beside.files.iter().filter(|(name, _)| BREACHES.contains(&name.as_str()));
+        let breaches = listed.map(|(name, stamp)| (name.as_str(), self.check_file(&self.path(name), stamp)));
+        let found = |(name, checked)| match checked {
+            Ok(()) | Err(DatabaseError::Missing { .. }) => None,
+            Err(error) => Some(Damage { path: self.path(name), error }),
+        };
+        [(files::REPORT, report), (files::REPORT_HTML, page)].into_iter().chain(breaches).filter_map(found).collect()
     }
 }
 
-/// What may be written beside a report.
-const BESIDE: [&str; 2] = [files::REPORT_HTML, files::BREACHES];
+/// What a report may list: names, not paths, since a damaged or foreign report could name anything.
+const BREACHES: [&str; 2] = [files::BREACHES, files::BREACHES_CSV];
 
 /// What a report says of the files beside it.
-#[derive(Deserialize)]
+#[derive(Default, Deserialize)]
 struct Beside {
     #[serde(default)]
     files: BTreeMap<String, FileStamp>,

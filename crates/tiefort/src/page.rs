@@ -1,7 +1,7 @@
 //! `report.html`, drawn from what a build left: by `build` itself, and by `report --format html` later.
 
 use compiler::{Product, Wanted, WantedGround, product};
-use database::{Folder, Report};
+use database::{Folder, Report, seal_page};
 use job::Job;
 use views::{Page, PageSetting, report_html};
 
@@ -32,5 +32,5 @@ pub fn page(product: &Product, report: &Report) -> String {
         .into_iter()
         .map(|setting| PageSetting { key: setting.key.to_owned(), value: setting.value, meaning: setting.meaning })
         .collect();
-    report_html(&Page { report, manifest: &product.manifest, settings: &settings, scene: Some(&scene) })
+    seal_page(&report_html(&Page { report, manifest: &product.manifest, settings: &settings, scene: Some(&scene) }))
 }
