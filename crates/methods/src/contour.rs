@@ -26,12 +26,20 @@ pub enum Contours {
     Points(usize),
 }
 
-/// The TIN of contours simplified by `line_tolerance_m`, half of the spacing where none is given.
+/// Posts by which lines are simplified where their interval is given: nothing is spared.
+const TOLERANCE_POSTS: f64 = 0.5;
+/// The same where a number of points is. Many lines drawn roughly are nearer to the ground than few drawn exactly: on
+/// 460 x 376 posts of desert mountains, 2500 points, 0.5, 1, 2 and 4 posts leave RMS 24.9, 13.2, 5.5 and 6.6 m.
+const TOLERANCE_POSTS_OF_FEW: f64 = 2.0;
+
+/// The TIN of contours simplified by `line_tolerance_m`; where none is given, by half a post for an interval and by two
+/// for a number of points.
 ///
 /// # Errors
 /// When a number is not possible.
 pub fn contour_tin(ground: &Ground, which: Contours, line_tolerance_m: Option<f64>) -> Result<Tin, Impossible> {
-    let line_tolerance_m = tolerance(line_tolerance_m.unwrap_or(ground.spacing.0 / 2.0))?;
+    let posts = if matches!(which, Contours::Points(_)) { TOLERANCE_POSTS_OF_FEW } else { TOLERANCE_POSTS };
+    let line_tolerance_m = tolerance(line_tolerance_m.unwrap_or(ground.spacing.0 * posts))?;
     match which {
         Contours::Interval(metres) => {
             let quanta = metres * f64::from(QUANTA_PER_METRE);

@@ -3,6 +3,10 @@
 //! De Floriani, Falcidieno, Nagy and Pienovi, "A hierarchical structure for surface approximation" (Computers and
 //! Graphics 8, 1984). Edges stay for good: the border of the window and its diagonal are as wrong in the end as in the
 //! beginning, and triangles become slivers. What it buys is a tree, each cut of which is a TIN.
+//!
+//! Were posts on edges taken, too, for one of the two triangles at the edge, residuals would be smaller (on 460 x 376
+//! posts of desert mountains RMS 15.7 instead of 20.8 m at 2500 points, 10.5 instead of 18.1 m at 5000), but the
+//! surface would have cracks and be no TIN.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
