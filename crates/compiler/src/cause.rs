@@ -56,10 +56,7 @@ pub(crate) fn made_from(
     MadeFrom {
         heights: brief(begin().heights(&window.dem)),
         weights: brief(begin().importance(&window.importance)),
-        given: match window.given.is_empty() {
-            true => String::new(),
-            false => brief(begin().text(&format!("{:?}", window.given))),
-        },
+        given: window.given_in_words().map(|given| brief(begin().text(&given))).unwrap_or_default(),
         rules: brief(begin().text(&rules)),
         allowance: brief(begin().text(&allowance)),
         borders: brief(borders(begin())),

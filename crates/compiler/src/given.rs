@@ -3,12 +3,14 @@
 //! A given point is a post of the working grid. It belongs to the tile that may choose there, so that tiles that share
 //! a line agree on it as on any border point; heights given for posts on lines hold on both sides.
 
+use std::path::Path;
+
 use job::{Job, NamedFile, Start, StartMethod};
 use methods::{
     Boundary, Contours, Diagonal, Distance, Extrema, FowlerLittle, Ground as MethodGround, Impossible, LatticeTin,
     Splitting,
 };
-use source_files::{GivenFeature, GivenShape, read_given};
+use source_files::{GivenFeature, GivenShape, RasterFrame, read_given};
 use terrain::{Dem, Importance, Metres, Post, PostRect, THOUSANDTHS, TileId, quanta_of_metres};
 use tin::StartPost;
 
@@ -65,10 +67,10 @@ impl Given {
     fn add_start(&mut self, job: &Job, area: &GamingArea, file: &NamedFile) -> Result<(), CompileError> {
         for feature in read_given(&file.path, job.area.epsg)? {
             let GivenShape::Point(at) = feature.shape else {
-                return Err(wrong(file, &feature, "a polygon", "points to start from"));
+                return Err(wrong(&file.path, &feature, "a polygon", "points to start from"));
             };
-            let at = post_at(area, file, &feature, at)?;
-            let height = height_of(file, &feature)?;
+            let at = Lattice::of_area(area).post(&file.path, &feature, at)?;
+            let height = height_of(&file.path, &feature)?;
             // What stands at a height of its own is fixed, as is a point on the outer border.
             let outer = is_on_border(area.rect, at);
             self.posts.push(GivenPost { at, pinned: outer || height.is_some(), outer, height });
@@ -78,26 +80,26 @@ impl Given {
 
     fn add_pins(&mut self, job: &Job, area: &GamingArea, file: &NamedFile) -> Result<(), CompileError> {
         for feature in read_given(&file.path, job.area.epsg)? {
-            let height = height_of(file, &feature)?;
+            let height = height_of(&file.path, &feature)?;
             match (feature.pin.as_deref(), feature.shape.clone()) {
                 (Some("add"), GivenShape::Point(at)) => {
-                    let at = post_at(area, file, &feature, at)?;
+                    let at = Lattice::of_area(area).post(&file.path, &feature, at)?;
                     self.posts.push(GivenPost { at, pinned: true, outer: is_on_border(area.rect, at), height });
                 }
                 (Some("height"), GivenShape::Point(at)) => {
                     if height.is_none() {
-                        return Err(wrong(file, &feature, "a height pin without height_m", "height_m in metres"));
+                        return Err(wrong(&file.path, &feature, "a height pin without height_m", "height_m in metres"));
                     }
-                    let at = post_at(area, file, &feature, at)?;
+                    let at = Lattice::of_area(area).post(&file.path, &feature, at)?;
                     self.posts.push(GivenPost { at, pinned: true, outer: is_on_border(area.rect, at), height });
                 }
                 (Some("forbid"), GivenShape::Point(at)) => {
-                    let at = post_at(area, file, &feature, at)?;
+                    let at = Lattice::of_area(area).post(&file.path, &feature, at)?;
                     refuse_fixed(job, area, file, &feature, at)?;
                     self.forbidden.push(at);
                 }
                 (Some("importance"), GivenShape::Polygon(polygon)) => {
-                    self.factors.push((polygon, factor_of(file, &feature)?));
+                    self.factors.push((polygon, factor_of(&file.path, &feature)?));
                 }
                 (Some("exclude"), GivenShape::Polygon(polygon)) => self.factors.push((polygon, 0)),
                 (pin, shape) => {
@@ -106,7 +108,7 @@ impl Given {
                         pin.map_or(format!("a {shape} without pin"), |pin| format!("a {shape} with pin {pin:?}"));
                     let expected =
                         "a point with \"add\", \"forbid\" or \"height\", a polygon with \"importance\" or \"exclude\"";
-                    return Err(wrong(file, &feature, &found, expected));
+                    return Err(wrong(&file.path, &feature, &found, expected));
                 }
             }
         }
@@ -124,6 +126,11 @@ impl Given {
     /// Pinned posts of the area, in ascending order.
     pub fn pinned(&self) -> Vec<Post> {
         self.posts.iter().filter(|post| post.pinned).map(|post| post.at).collect()
+    }
+
+    /// Posts of a rectangle that are forbidden, in ascending order.
+    pub fn forbidden(&self, rect: PostRect) -> Vec<Post> {
+        self.forbidden.iter().copied().filter(|&post| rect.contains(post)).collect()
     }
 
     /// Weights with what pins say of them.
@@ -248,28 +255,69 @@ fn inside(polygon: &mask::Polygon, area: &GamingAreaFrame, rect: PostRect) -> Ve
     posts(rect).map(|post| 0 < found.weight(post)).collect()
 }
 
-/// The post nearest to a place, which must lie in the area.
-fn post_at(area: &GamingArea, file: &NamedFile, feature: &GivenFeature, at: [f64; 2]) -> Result<Post, CompileError> {
-    let frame = &area.frame;
-    let origin = [frame.origin_east_m, frame.origin_north_m];
-    let [col, row] = [0, 1].map(|axis| ((at[axis] - origin[axis]) / frame.spacing.metres()).round());
-    let fits = |v: f64| (-1e9..=1e9).contains(&v);
-    let post = (fits(row) && fits(col)).then(|| Post::new(row as i32, col as i32));
-    post.filter(|&post| area.rect.contains(post)).ok_or_else(|| {
-        let found = format!("a point at {:.1}, {:.1} m, outside the area", at[0], at[1]);
-        wrong(file, feature, &found, "points inside the area, its border included")
-    })
+/// Posts in metres of a map.
+struct Lattice {
+    /// Those there are.
+    rect: PostRect,
+    /// Easting and northing of post (0, 0).
+    origin_m: [f64; 2],
+    spacing_m: f64,
 }
 
-fn height_of(file: &NamedFile, feature: &GivenFeature) -> Result<Option<i32>, CompileError> {
+impl Lattice {
+    fn of_area(area: &GamingArea) -> Self {
+        let frame = &area.frame;
+        let origin_m = [frame.origin_east_m, frame.origin_north_m];
+        Self { rect: area.rect, origin_m, spacing_m: frame.spacing.metres() }
+    }
+
+    /// The post nearest to the place of a feature, which must lie among them.
+    fn post(&self, path: &Path, feature: &GivenFeature, at: [f64; 2]) -> Result<Post, CompileError> {
+        let [col, row] = [0, 1].map(|axis| ((at[axis] - self.origin_m[axis]) / self.spacing_m).round());
+        let fits = |v: f64| (-1e9..=1e9).contains(&v);
+        let post = (fits(row) && fits(col)).then(|| Post::new(row as i32, col as i32));
+        post.filter(|&post| self.rect.contains(post)).ok_or_else(|| {
+            let found = format!("a point at {:.1}, {:.1} m, outside the area", at[0], at[1]);
+            wrong(path, feature, &found, "points inside the area, its border included")
+        })
+    }
+}
+
+/// The points of a file to start a mesh of a raster from, each post once, in ascending order; those with a height are
+/// fixed at it.
+///
+/// # Errors
+/// When the file cannot be used, or a point of it lies outside the raster.
+pub(crate) fn posts_of_file(path: &Path, frame: &RasterFrame, rect: PostRect) -> Result<Vec<GivenPost>, CompileError> {
+    let epsg = frame.crs.epsg().ok_or_else(|| CompileError::Impossible {
+        key: "--start".into(),
+        found: "a raster whose coordinate system has no EPSG code".into(),
+        expected: "one that places in a file can be brought to".into(),
+        hint: "name the system in a job: [area] crs, and [tin] start".into(),
+    })?;
+    let lattice = Lattice { rect, origin_m: frame.south_west, spacing_m: frame.spacing[0] };
+    let mut posts = Vec::new();
+    for feature in read_given(path, epsg)? {
+        let GivenShape::Point(at) = feature.shape else {
+            return Err(wrong(path, &feature, "a polygon", "points to start from"));
+        };
+        let (at, height) = (lattice.post(path, &feature, at)?, height_of(path, &feature)?);
+        posts.push(GivenPost { at, pinned: height.is_some(), outer: false, height });
+    }
+    posts.sort_by_key(|post| (post.at, !post.pinned));
+    posts.dedup_by_key(|post| post.at);
+    Ok(posts)
+}
+
+fn height_of(path: &Path, feature: &GivenFeature) -> Result<Option<i32>, CompileError> {
     let Some(metres) = feature.height_m else { return Ok(None) };
     let quanta = quanta_of_metres(metres);
-    let found = || wrong(file, feature, &format!("a height of {metres} m"), "a height that terrain can have");
+    let found = || wrong(path, feature, &format!("a height of {metres} m"), "a height that terrain can have");
     quanta.map(Some).ok_or_else(found)
 }
 
 /// The factor of an importance pin, in thousandths.
-fn factor_of(file: &NamedFile, feature: &GivenFeature) -> Result<u32, CompileError> {
+fn factor_of(path: &Path, feature: &GivenFeature) -> Result<u32, CompileError> {
     const FACTOR_MAX: f64 = 1000.0;
     match feature.factor.map(|factor| (factor * f64::from(THOUSANDTHS)).round()) {
         Some(thousandths) if (1.0..=FACTOR_MAX * f64::from(THOUSANDTHS)).contains(&thousandths) => {
@@ -277,7 +325,7 @@ fn factor_of(file: &NamedFile, feature: &GivenFeature) -> Result<u32, CompileErr
         }
         _ => {
             let found = feature.factor.map_or("no factor".to_owned(), |factor| format!("a factor of {factor}"));
-            Err(wrong(file, feature, &found, "factor from 0.001 to 1000; to leave ground out, \"exclude\""))
+            Err(wrong(path, feature, &found, "factor from 0.001 to 1000; to leave ground out, \"exclude\""))
         }
     }
 }
@@ -295,11 +343,14 @@ fn refuse_fixed(
     let step = job.modules.border_step_cells;
     let on_border = is_on_border(area.rect, at) && at.row % step == 0 && at.col % step == 0;
     match (is_corner, on_border) {
-        (true, _) => {
-            Err(wrong(file, feature, &format!("a forbidden post, {at}, that is a corner of load modules"), "another"))
-        }
+        (true, _) => Err(wrong(
+            &file.path,
+            feature,
+            &format!("a forbidden post, {at}, that is a corner of load modules"),
+            "another",
+        )),
         (_, true) => Err(wrong(
-            file,
+            &file.path,
             feature,
             &format!("a forbidden post, {at}, that is a point of the outer border"),
             "another",
@@ -308,9 +359,9 @@ fn refuse_fixed(
     }
 }
 
-fn wrong(file: &NamedFile, feature: &GivenFeature, found: &str, expected: &str) -> CompileError {
+fn wrong(path: &Path, feature: &GivenFeature, found: &str, expected: &str) -> CompileError {
     CompileError::Impossible {
-        key: format!("{}: {}", file.path.display(), feature.place),
+        key: format!("{}: {}", path.display(), feature.place),
         found: found.into(),
         expected: expected.into(),
         hint: "coordinates are metres of the area's system, or degrees; `tiefort plan` shows the area's corners".into(),

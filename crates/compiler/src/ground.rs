@@ -7,7 +7,7 @@ use job::{DemSource, Job};
 use mask::Mask;
 use schedule::Workers;
 use source_files::{VoidSummary, read_polygons};
-use terrain::{Dem, GridFrame, Importance, PostRect, TileId};
+use terrain::{Dem, GridFrame, Importance, Post, PostRect, TileId};
 
 use crate::area::GamingArea;
 use crate::census::Census;
@@ -47,9 +47,20 @@ pub(crate) struct Window {
     pub importance: Importance,
     /// Posts that the job gives, of a tile's own window; none of any other.
     pub given: Vec<GivenPost>,
+    /// Posts of such a window that it forbids.
+    pub forbidden: Vec<Post>,
 }
 
 impl Window {
+    /// What the job gives or forbids here; `None` where it does neither.
+    pub fn given_in_words(&self) -> Option<String> {
+        match (&self.given[..], &self.forbidden[..]) {
+            ([], []) => None,
+            (given, []) => Some(format!("{given:?}")),
+            (given, forbidden) => Some(format!("{given:?}, not {forbidden:?}")),
+        }
+    }
+
     /// What load modules of this rectangle are measured against.
     pub fn measured(&self, area: &GamingArea) -> fidelity::Ground<'_> {
         let spacing = area.frame.spacing;
@@ -144,11 +155,12 @@ impl Ground {
         self.fault.take()?;
         let place = GamingAreaFrame { rect: self.rect, frame: self.frame };
         let importance = mask::without_voids(self.given.weigh(importance, &place), &dem);
-        Ok(Window { dem, importance, given: Vec::new() })
+        Ok(Window { dem, importance, given: Vec::new(), forbidden: Vec::new() })
     }
 
     fn with_given(&self, area: &GamingArea, tile: TileId, window: Window) -> Result<Window, CompileError> {
-        Ok(Window { given: self.given.of_tile(area, tile, &window.dem)?, ..window })
+        let given = self.given.of_tile(area, tile, &window.dem)?;
+        Ok(Window { given, forbidden: self.given.forbidden(area.tiling.rect(tile)), ..window })
     }
 
     /// The ground of one tile, made once where memory allows.
@@ -190,7 +202,7 @@ impl Ground {
                 heights[to as usize..][..cols.len()].copy_from_slice(part);
             }
         });
-        Ok(Window { dem, importance: join_importance(&parts, rect), given: Vec::new() })
+        Ok(Window { dem, importance: join_importance(&parts, rect), given: Vec::new(), forbidden: Vec::new() })
     }
 
     /// The ground of any rectangle of the area.

@@ -7,17 +7,17 @@ use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-use database::{Folder, Manifest, ManifestState};
+use database::{Folder, ManifestState};
 use geometry::Facet;
 use geometry::owned::{PostGrid, visit_residuals};
-use job::{AreaShape, Count, Job};
+use job::{Count, Job};
 use schedule::Workers;
 use terrain::{Dem, Importance, LoadModule, ModuleId, ModuleRect, Post, PostRect, THOUSANDTHS, metres_of_quanta};
 
 use crate::CompileError;
 use crate::area::GamingArea;
 use crate::ground::{Ground, Window};
-use crate::measures::{choose_ground, locate};
+use crate::measures::{choose_ground, locate_weights};
 use crate::verify::{job_of, read_modules};
 
 /// Where a database is not good enough.
@@ -119,16 +119,6 @@ fn counted(job: &Job, module: &LoadModule) -> u32 {
         Count::Triangles => module.triangles.len() as u32,
         Count::Polygons => module.polygon_count,
     }
-}
-
-/// Points the job at the files that say what ground weighs; what tiles started from changes nothing any more.
-fn locate_weights(job: &mut Job, manifest: &Manifest, folder: &Path) -> Result<(), CompileError> {
-    job.tin.start = None;
-    let named = job.importance.areas.iter_mut().filter_map(|area| match &mut area.shape {
-        AreaShape::Polygons { file } | AreaShape::RasterValue { file, .. } => Some(file),
-        AreaShape::Slope { .. } | AreaShape::Sample(_) => None,
-    });
-    locate(named.chain(job.tin.pins.as_mut()), manifest, folder)
 }
 
 /// The weighted residual of each post: as it is where the ground matters most, in proportion elsewhere.

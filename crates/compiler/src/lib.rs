@@ -31,7 +31,9 @@ pub use status::{Status, TileProgress, status};
 mod verify;
 pub use verify::{Verdict, verify};
 mod raster;
-pub use raster::{Mesh, TinMethod, TinRequest, sample, tin};
+pub use raster::{Mesh, TinMethod, TinRequest, TinStart, tin};
+mod sample;
+pub use sample::sample;
 mod compare;
 pub use compare::{
     CompareEvent, CompareGround, CompareMethod, CompareRequest, CompareRow, Comparison, Equivalent, Forced, Impossible,
@@ -44,7 +46,7 @@ pub use fidelity::{
     Cover, Distances, Drainage, GRADES, Hausdorff, LineOfSight, Measures, MeshForm, Registration, ResidualFigures,
     SeamVisibility, SlopeClasses, SlopeDifference,
 };
-pub use measures::{BuiltResidual, DatabaseFidelity, Fidelity, Sights, fidelity, measure};
+pub use measures::{BuiltResidual, ClassResidual, DatabaseFidelity, Fidelity, Sights, fidelity, measure};
 
 mod product;
 pub use product::{LimitUse, NO_RESIDUAL, Product, ProductGround, Wanted, WantedGround, product};

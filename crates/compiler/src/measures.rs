@@ -4,13 +4,13 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
 use database::{Fingerprint, Folder, Manifest, ManifestState, SourceRecord, Totals};
-use fidelity::{DemGround, Measures, Triangles, regular_grid};
-use job::{DemSource, Job, NamedFile, SourceEntry, SourceFile, SourceSaid, Voids};
+use fidelity::{DemGround, Measures, ResidualFigures, Triangles, regular_grid};
+use job::{AreaShape, DemSource, Job, NamedFile, SourceEntry, SourceFile, SourceSaid, Voids};
 use schedule::Workers;
-use terrain::{Dem, Metres, QUANTA_PER_METRE};
+use terrain::{Dem, Importance, Metres, QUANTA_PER_METRE};
 
 use crate::area::GamingArea;
-use crate::ground::Ground;
+use crate::ground::{Ground, Window};
 use crate::verify::{job_of, read_modules};
 use crate::{CompileError, Mesh};
 
@@ -28,8 +28,19 @@ impl Sights {
     pub const USUAL: Self = Self { pairs: 20_000, seed: 1 };
 }
 
+/// Residuals on the ground of one class.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ClassResidual {
+    /// Its name.
+    pub name: String,
+    /// Those of the surface.
+    pub tin: ResidualFigures,
+    /// Those of the regular grid.
+    pub grid: ResidualFigures,
+}
+
 /// How true a surface is to a DEM, and the regular grid beside it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Fidelity {
     /// The surface.
     pub tin: Measures,
@@ -41,6 +52,8 @@ pub struct Fidelity {
     pub spacing_m: f64,
     /// Polygons of the surface, by the count its limits use.
     pub polygons: u64,
+    /// The classes of the ground that have posts, where there are several.
+    pub classes: Vec<ClassResidual>,
 }
 
 /// How true a database is.
@@ -54,6 +67,8 @@ pub struct DatabaseFidelity {
     pub residual: BuiltResidual,
     /// All measures, those of residuals too.
     pub measures: Fidelity,
+    /// Why residuals are not told by class, where the job has classes: a file that says which ground is which is gone.
+    pub no_classes: Option<String>,
 }
 
 /// Residuals that `database.json` keeps, in metres.
@@ -81,12 +96,15 @@ pub fn fidelity(folder: &Path, against: Option<&Path>, sights: Sights) -> Result
         return Err(CompileError::Unfinished { path: folder.dir().display().to_string() });
     }
     let (mut job, area) = job_of(&manifest, folder.dir())?;
-    // No weight and no point that was given changes a figure.
-    job.importance.areas.clear();
+    // No point that was given changes a figure, and weights do not; classes do.
     (job.tin.start, job.tin.pins) = (None, None);
     let against = choose_ground(&mut job, &manifest, folder.dir(), against)?;
+    let no_classes = locate_weights(&mut job, &manifest, folder.dir()).err().map(|error| error.to_string());
+    if no_classes.is_some() {
+        job.importance.areas.clear();
+    }
     let ground = Ground::open(&job, &area, &Workers::new(1), &AtomicBool::new(false))?;
-    let dem = ground.window(area.rect)?.dem;
+    let Window { dem, importance, .. } = ground.window(area.rect)?;
     if dem.void_count() == area.rect.post_count() {
         return Err(CompileError::Impossible {
             key: against,
@@ -98,36 +116,55 @@ pub fn fidelity(folder: &Path, against: Option<&Path>, sights: Sights) -> Result
     let (triangles, polygons) = triangles_of(&folder, &area)?;
     let residual = built_residual(&manifest.totals);
     let spacing = Metres(area.frame.spacing.metres());
-    let measures = compare(&dem, &triangles, polygons, spacing, sights, Some(area.grid.side_cells));
-    Ok(DatabaseFidelity { area: manifest.area.name, against, residual, measures })
+    let classes = (!job.importance.areas.is_empty()).then_some((&job.importance.classes[..], &importance));
+    let subject = Subject { dem: &dem, triangles: &triangles, polygons, spacing, classes };
+    let measures = compare(&subject, sights, Some(area.grid.side_cells));
+    Ok(DatabaseFidelity { area: manifest.area.name, against, residual, measures, no_classes })
 }
 
 /// Measures a mesh against the raster it was made from.
 pub fn measure(mesh: &Mesh, sights: Sights) -> Fidelity {
-    let triangles = Triangles::of_tin(&mesh.tin);
-    compare(&mesh.dem, &triangles, triangles.count() as u64, Metres(mesh.spacing_m.0), sights, None)
+    let triangles = &Triangles::of_tin(&mesh.tin);
+    let (polygons, spacing) = (triangles.count() as u64, Metres(mesh.spacing_m.0));
+    compare(&Subject { dem: &mesh.dem, triangles, polygons, spacing, classes: None }, sights, None)
 }
 
-fn compare(
-    dem: &Dem,
-    triangles: &Triangles,
+/// What is measured.
+struct Subject<'a> {
+    dem: &'a Dem,
+    triangles: &'a Triangles,
     polygons: u64,
     spacing: Metres,
-    sights: Sights,
-    module_cells: Option<i32>,
-) -> Fidelity {
+    /// Names of classes, and which ground is which.
+    classes: Option<(&'a [String], &'a Importance)>,
+}
+
+fn compare(subject: &Subject, sights: Sights, module_cells: Option<i32>) -> Fidelity {
+    let &Subject { dem, triangles, polygons, spacing, classes } = subject;
     let rect = triangles.rect();
     let ground = DemGround::new(dem, rect, spacing);
     let measured = |triangles: &Triangles, cells| ground.measure(triangles, sights.pairs, sights.seed, cells);
     let regular = regular_grid(dem, rect, polygons);
+    let grid = Triangles::of_tin(&regular.tin);
     // Where its step does not divide a load module, the grid has no edges along lines between them.
     let grid_cells = module_cells.filter(|cells| cells % regular.step == 0);
+    let by_class = |(names, importance): (&[String], &Importance)| -> Vec<ClassResidual> {
+        let of = |triangles| ground.residuals_by_class(triangles, |post| importance.class(post));
+        let all = names.iter().zip(of(triangles).into_iter().zip(of(&grid)));
+        let classes = all.map(|(name, (tin, grid))| ClassResidual { name: name.clone(), tin, grid });
+        let mut classes: Vec<_> = classes.filter(|class| 0 < class.tin.posts).collect();
+        if classes.len() == 1 {
+            classes.clear();
+        }
+        classes
+    };
     Fidelity {
         tin: measured(triangles, module_cells),
-        grid: measured(&Triangles::of_tin(&regular.tin), grid_cells),
+        grid: measured(&grid, grid_cells),
         grid_step: regular.step,
         spacing_m: spacing.0,
         polygons,
+        classes: classes.map(by_class).unwrap_or_default(),
     }
 }
 
@@ -178,7 +215,7 @@ pub(crate) fn choose_ground(
 }
 
 /// Points names at the files that a database was built from.
-pub(crate) fn locate<'a>(
+fn locate<'a>(
     files: impl Iterator<Item = &'a mut NamedFile>,
     manifest: &Manifest,
     folder: &Path,
@@ -188,6 +225,16 @@ pub(crate) fn locate<'a>(
         file.path = find_source(record, folder)?;
     }
     Ok(())
+}
+
+/// Points the job at the files that say what ground weighs; what tiles started from changes nothing any more.
+pub(crate) fn locate_weights(job: &mut Job, manifest: &Manifest, folder: &Path) -> Result<(), CompileError> {
+    job.tin.start = None;
+    let named = job.importance.areas.iter_mut().filter_map(|area| match &mut area.shape {
+        AreaShape::Polygons { file } | AreaShape::RasterValue { file, .. } => Some(file),
+        AreaShape::Slope { .. } | AreaShape::Sample(_) => None,
+    });
+    locate(named.chain(job.tin.pins.as_mut()), manifest, folder)
 }
 
 /// A raster a database was built from. Its path is written as the job has it, and the job may have lain anywhere; but

@@ -1,7 +1,7 @@
-//! Without load modules: just a mesh from a raster, on the raster's own posts; and the sample terrain as a raster.
+//! Without load modules: just a mesh from a raster, on the raster's own posts.
 
 use std::collections::HashMap;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::OnceLock;
 use std::sync::atomic::AtomicBool;
 
@@ -11,15 +11,15 @@ use geometry::WORKING_POSTS_MAX;
 use geometry::owned::{PostGrid, visit_residuals};
 use job::{ErrorKey, Optimising, StartMethod};
 use schedule::{Event as Scheduled, RankedTasks, Workers, in_rank_order_observed};
-use source_files::{DemFile, Reading, VoidPolicy, write_classes, write_heights};
+use source_files::{DemFile, Reading, VoidPolicy};
 use terrain::{
-    Dem, GainCurve, GridFrame, Importance, LATTICE_PER_POST, LatticePoint, Metres, ModuleGrid, Post, PostRect,
-    SeamSides, Spacing, StopReason, THOUSANDTHS, TileId, TileTin, Tin, Vertex, quanta_of_metres,
+    Dem, GainCurve, Importance, LATTICE_PER_POST, LatticePoint, Metres, ModuleGrid, Post, PostRect, SeamSides,
+    StopReason, THOUSANDTHS, TileId, TileTin, Tin, Vertex, quanta_of_metres,
 };
 use tiling::{Gains, Order, Tiling, points_equally, points_globally};
 use tin::{CostUnit, Frame, LastBatch, Proximity, Rule, Stop, SurveyTask, TileTask};
 
-use crate::given::{GivenPost, chosen, refused, start_posts};
+use crate::given::{GivenPost, chosen, posts_of_file, refused, start_posts};
 use crate::ground::Window;
 use crate::refinement::{Most, Refinement};
 use crate::sources::decode;
@@ -43,6 +43,15 @@ pub enum TinMethod {
     },
 }
 
+/// What a mesh starts from beside the corners of its tiles.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum TinStart {
+    /// So many points of a method in all.
+    Method(StartMethod, usize),
+    /// The points of a file; those with a height are fixed at it.
+    File(PathBuf),
+}
+
 /// A mesh to make from a raster.
 #[derive(Clone, Debug)]
 pub struct TinRequest {
@@ -58,8 +67,8 @@ pub struct TinRequest {
     pub max_residual_m: Option<f64>,
     /// RMS residual to reach, in metres.
     pub rms_m: Option<f64>,
-    /// What tiles start from beside their corners: a method, and points of it in all.
-    pub start: Option<(StartMethod, usize)>,
+    /// What tiles start from beside their corners.
+    pub start: Option<TinStart>,
     /// Rows and columns of tiles.
     pub tiles: (u32, u32),
     /// Tiles at once.
@@ -107,7 +116,11 @@ pub fn tin(request: &TinRequest, stop: &AtomicBool, progress: &mut dyn Progress)
     progress.tell(Event::Leave(Stage::Read));
 
     let frame = file.frame();
-    let job = TinJob::new(request, &dem, frame.spacing)?;
+    let mut job = TinJob::new(request, &dem, frame.spacing)?;
+    if let Some(TinStart::File(path)) = &request.start {
+        job.given = posts_of_file(path, frame, dem.rect())?;
+        job.refuse_given()?;
+    }
     let curves = job.survey(&dem, &workers, stop, progress)?;
     let tiles = job.refine(&dem, curves.as_deref(), &workers, stop, progress)?;
 
@@ -138,8 +151,7 @@ pub(crate) fn untiled(request: &TinRequest, dem: &Dem, spacing_m: [f64; 2]) -> R
     let job = TinJob::new(request, dem, spacing_m)?;
     let tile = job.tiles[0];
     let task = job.task(tile, SeamSides::CLOSED, Vec::new(), job.points().map(|points| points as usize));
-    let window = Window { importance: weights(dem), dem: dem.clone(), given: Vec::new() };
-    Ok(job.refinement(task).run(&window, &[]))
+    job.refined(task, dem.clone(), &[])
 }
 
 /// A request, checked against its raster.
@@ -150,6 +162,8 @@ struct TinJob<'a> {
     spacing: Metres,
     rule: Rule,
     value: Option<u64>,
+    /// Points of a file to start from.
+    given: Vec<GivenPost>,
 }
 
 impl<'a> TinJob<'a> {
@@ -182,7 +196,20 @@ impl<'a> TinJob<'a> {
             },
         };
         let tiles = tiling.tiles().collect();
-        Ok(Self { request, tiling, tiles, spacing: Metres(spacing_m[0]), rule, value })
+        Ok(Self { request, tiling, tiles, spacing: Metres(spacing_m[0]), rule, value, given: Vec::new() })
+    }
+
+    /// Refuses more points to start from than there may be.
+    fn refuse_given(&self) -> Result<(), CompileError> {
+        match self.points() {
+            Some(points) if (points as usize) < self.given.len() => Err(CompileError::Impossible {
+                key: "--start".into(),
+                found: format!("{} points", self.given.len()),
+                expected: format!("at most {points}, those asked for but for the corners of tiles"),
+                hint: "ask for more --points, or start from fewer".into(),
+            }),
+            _ => Ok(()),
+        }
     }
 
     /// Points to select in all: those asked for less the corners of tiles.
@@ -271,11 +298,31 @@ impl<'a> TinJob<'a> {
 
     /// What a tile starts from beside its corners.
     fn start(&self, dem: &Dem) -> Result<Vec<GivenPost>, CompileError> {
-        let Some((method, points)) = self.request.start else { return Ok(Vec::new()) };
+        let &Some(TinStart::Method(method, points)) = &self.request.start else {
+            let is_here = |post: &&GivenPost| dem.rect().contains(post.at);
+            return Ok(self.given.iter().filter(is_here).copied().collect());
+        };
         let ground = methods::Ground { dem, spacing: self.spacing };
         let share = points.div_ceil(self.tiles.len());
         let posts = chosen(&ground, method, share).map_err(|why| refused("--start", method, why))?;
         Ok(posts.into_iter().map(|at| GivenPost { at, pinned: false, outer: false, height: None }).collect())
+    }
+
+    /// A tile's TIN, from what it starts from. All vertices count, so it starts from no more than its share, and that
+    /// leaves fewer to select; fixed points are in whatever the share is.
+    fn refined(&self, mut task: TileTask, dem: Dem, seeds: &[Vertex]) -> Result<TileTin, CompileError> {
+        let mut given = self.start(&dem)?;
+        let fixed = given.iter().filter(|post| post.pinned).count();
+        let mut left = task.stop.points.unwrap_or(usize::MAX).saturating_sub(fixed);
+        given.retain(|post| {
+            let has_room = post.pinned || 0 < left;
+            left -= usize::from(!post.pinned && has_room);
+            has_room
+        });
+        let started = start_posts(&given, task.rect, task.seams).iter().filter(|start| !start.pinned).count();
+        task.stop.points = task.stop.points.map(|points| points.saturating_sub(started));
+        let window = Window { importance: weights(&dem), dem, given, forbidden: Vec::new() };
+        Ok(self.refinement(task).run(&window, seeds))
     }
 
     fn refine(
@@ -305,15 +352,9 @@ impl<'a> TinJob<'a> {
             };
             let seeds = inherited(&self.tiling, tile, published);
             let points = shares.as_ref().map(|shares| shares[index]);
-            let mut task = self.task(tile, self.tiling.owned_sides(tile), posts_of(&seeds), points);
-            let dem = dem.window(task.rect);
-            // All vertices count, so a tile starts from no more than its share, and that leaves fewer to select.
-            let mut given = self.start(&dem)?;
-            given.truncate(points.unwrap_or(usize::MAX));
-            let started = start_posts(&given, task.rect, task.seams).len();
-            task.stop.points = task.stop.points.map(|points| points.saturating_sub(started));
-            let window = Window { importance: weights(&dem), dem, given };
-            let done = self.refinement(task).run(&window, &seeds);
+            let task = self.task(tile, self.tiling.owned_sides(tile), posts_of(&seeds), points);
+            let window = dem.window(task.rect);
+            let done = self.refined(task, window, &seeds)?;
             assert!(slots[index].set(done).is_ok(), "each tile is refined once");
             Ok(())
         };
@@ -442,28 +483,4 @@ fn visit_triangle(dem: &Dem, corners: [Vertex; 3], tally: &mut Tally) {
             tally.add(residual);
         }
     });
-}
-
-/// Writes the sample terrain as a GeoTIFF, and its classes as another where asked for; `size` is rows and columns of
-/// posts, and no more than a band of rows is ever held.
-///
-/// # Errors
-/// When a file cannot be written.
-pub fn sample(
-    seed: u64,
-    (rows, cols): (usize, usize),
-    spacing: Spacing,
-    out: &Path,
-    classes: Option<&Path>,
-) -> Result<(), CompileError> {
-    /// EPSG code and origin of the sample terrain: UTM 11 north, near Fort Irwin, as in the project's jobs.
-    const PLACE: (u32, f64, f64) = (32_611, 505_000.0, 3_875_000.0);
-    let (epsg, origin_east_m, origin_north_m) = PLACE;
-    let frame = GridFrame { origin_east_m, origin_north_m, spacing };
-    let rect = PostRect::of_size(rows, cols);
-    write_heights(out, &frame, rect, epsg, |band| sample_terrain::heights(seed, band, spacing))?;
-    if let Some(path) = classes {
-        write_classes(path, &frame, rect, epsg, |band| sample_terrain::classes(seed, band, spacing))?;
-    }
-    Ok(())
 }

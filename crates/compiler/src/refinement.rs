@@ -3,7 +3,7 @@
 use job::{Effort, HeightFit, Job, Lattice, Method, Optimising};
 use limits::Allowance;
 use optimiser::{Budget, Optimised, Task, fill, optimise, overshoot};
-use terrain::{Dem, LatticePoint, PostRect, THOUSANDTHS, TileTin, Tin, Vertex};
+use terrain::{Dem, LatticePoint, Post, PostRect, THOUSANDTHS, TileTin, Tin, Vertex};
 use tin::{Frame, Rule, Stop, TileTask};
 
 use crate::given::{GivenPost, border_posts, start_posts};
@@ -67,14 +67,14 @@ impl Refinement {
         };
         let Some(optimising) = self.optimising else { return grown(&self.task) };
         let grown = grown(&self.beyond_budget(optimising));
-        let optimised =
-            optimise(&window.dem, &window.importance, &grown.tin, &self.optimisation(optimising, grown.initial_count));
+        let task = self.optimisation(optimising, grown.initial_count, &window.forbidden);
+        let optimised = optimise(&window.dem, &window.importance, &grown.tin, &task);
         self.join(grown, optimised)
     }
 
     /// A TIN with as many vertices more as the task's points permit, all counted; what it has is left alone.
     pub fn fill(&self, window: &Window, optimising: Optimising, start: &Tin) -> Tin {
-        fill(&window.dem, &window.importance, start, &self.optimisation(optimising, 0)).tin
+        fill(&window.dem, &window.importance, start, &self.optimisation(optimising, 0, &window.forbidden)).tin
     }
 
     /// The growth, with room to thin from.
@@ -103,7 +103,7 @@ impl Refinement {
         task
     }
 
-    fn optimisation(&self, optimising: Optimising, initial: u32) -> Task {
+    fn optimisation(&self, optimising: Optimising, initial: u32, forbidden: &[Post]) -> Task {
         let task = &self.task;
         let held = [&task.border, &task.inherited, &task.kept].into_iter().flatten().copied();
         let pinned = task.start.iter().filter(|start| start.pinned).map(|start| start.at);
@@ -137,6 +137,7 @@ impl Refinement {
                 Lattice::Post => optimiser::Lattice::Post,
             },
             rms_quanta: task.stop.rms_quanta,
+            forbidden: forbidden.to_vec(),
             largest_quanta: guard.map(|value| value as f64 / f64::from(THOUSANDTHS)),
         }
     }
@@ -174,8 +175,7 @@ fn effort(optimising: Optimising) -> optimiser::Effort {
 
 /// The DEM with the heights of the seeds.
 fn with_heights(dem: &Dem, seeds: &[Vertex]) -> Dem {
-    let mut at: Vec<(terrain::Post, i32)> =
-        seeds.iter().filter_map(|seed| Some((seed.at.post()?, seed.height))).collect();
+    let mut at: Vec<(Post, i32)> = seeds.iter().filter_map(|seed| Some((seed.at.post()?, seed.height))).collect();
     at.sort_unstable();
     let rect = dem.rect();
     Dem::from_row_fn(rect, |row, heights| {

@@ -118,8 +118,8 @@ impl Run<'_> {
         feed: impl FnOnce(FingerprintBuilder) -> FingerprintBuilder,
     ) -> Stamp {
         let mut builder = FingerprintBuilder::new(purpose).heights(&window.dem).importance(&window.importance);
-        if !window.given.is_empty() {
-            builder = builder.text(&format!("{:?}", window.given));
+        if let Some(given) = window.given_in_words() {
+            builder = builder.text(&given);
         }
         Stamp { algorithm_revision: ALGORITHM_REVISION, fingerprint: feed(builder).finish() }
     }

@@ -20,7 +20,7 @@ mod cells;
 mod triangles;
 pub use triangles::Triangles;
 mod posts;
-pub use posts::{PostHeights, residuals_at_posts};
+pub use posts::{PostHeights, residuals_at_posts, residuals_by_class};
 mod draw;
 mod samples;
 mod sight;

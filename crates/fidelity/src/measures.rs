@@ -1,6 +1,6 @@
 //! All measures of one surface against one DEM, what is asked of the DEM alone only once.
 
-use terrain::{Dem, Metres, PostRect};
+use terrain::{Dem, Metres, Post, PostRect};
 
 use crate::edges::Edges;
 use crate::form::form_with;
@@ -8,7 +8,7 @@ use crate::seam::seams_with;
 use crate::{
     Cover, Defilade, Drainage, Hausdorff, LineOfSight, MeshForm, PostHeights, Registration, SeamVisibility,
     SlopeClasses, SlopeDifference, Streams, Tally, Triangles, cover, drainage, hausdorff, line_of_sight, registration,
-    residuals_at_posts, slope, slope_classes,
+    residuals_at_posts, residuals_by_class, slope, slope_classes,
 };
 
 /// How true a surface is to a DEM, and what its mesh is like.
@@ -114,12 +114,20 @@ impl<'a> DemGround<'a> {
             mesh: form_with(triangles, module_cells, &edges),
         }
     }
+
+    /// Residuals of a surface for each class of ground, by its number; `class_of` gives that of a post.
+    ///
+    /// # Panics
+    /// When the triangles cover other posts than this ground.
+    pub fn residuals_by_class(&self, triangles: &Triangles, class_of: impl Fn(Post) -> u8) -> Vec<ResidualFigures> {
+        assert_eq!(triangles.rect(), self.posts.rect(), "the surface covers the ground it is measured against");
+        let tin = PostHeights::of_triangles(triangles, &self.posts);
+        residuals_by_class(&self.posts, &tin, class_of).iter().map(ResidualFigures::from).collect()
+    }
 }
 
 #[cfg(test)]
 mod tests {
-    use terrain::Post;
-
     use super::*;
     use crate::regular_grid;
     use crate::scene::full_tin;

@@ -105,6 +105,20 @@ pub fn residuals_at_posts(dem: &PostHeights, tin: &PostHeights) -> Tally {
     tally
 }
 
+/// The same for each class of ground, by its number; `class_of` gives that of a post.
+pub fn residuals_by_class(dem: &PostHeights, tin: &PostHeights, class_of: impl Fn(Post) -> u8) -> Vec<Tally> {
+    let mut tallies = Vec::new();
+    for index in dem.known() {
+        let (row, col) = ((index / dem.wide) as i32, (index % dem.wide) as i32);
+        let class = usize::from(class_of(Post::new(dem.rect.south + row, dem.rect.west + col)));
+        if tallies.len() <= class {
+            tallies.resize_with(class + 1, Tally::default);
+        }
+        tallies[class].add((dem.quanta[index] - tin.quanta[index]).round() as i32);
+    }
+    tallies
+}
+
 #[cfg(test)]
 mod tests {
     use terrain::Spacing;
@@ -134,6 +148,12 @@ mod tests {
         let posts = PostHeights::of_dem(&dem, area);
         let tin = PostHeights::of_triangles(&Triangles::of_modules(&modules, grid(2, 3), spacing), &posts);
         assert_eq!(residuals_at_posts(&posts, &tin), exact);
+        let by_class = residuals_by_class(&posts, &tin, |post| if post.row < 11 { 0 } else { 2 });
+        let share = |rows: std::ops::Range<i32>| rows.len() as u64 * (area.posts_wide() as u64 - 1);
+        assert_eq!(by_class.iter().map(|tally| tally.posts).collect::<Vec<_>>(), [share(0..11), 0, share(11..41)]);
+        let mut sum = by_class[0].clone();
+        sum.merge(&by_class[2]);
+        assert_eq!(sum, exact);
     }
 
     #[test]

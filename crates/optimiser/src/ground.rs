@@ -20,6 +20,8 @@ pub(crate) struct Ground<'a> {
     open: SeamSides,
     fit: HeightFit,
     far: Place,
+    /// Posts that no vertex may come nearest to, in ascending order.
+    forbidden: &'a [Post],
 }
 
 impl<'a> Ground<'a> {
@@ -27,7 +29,7 @@ impl<'a> Ground<'a> {
         let rect = dem.rect();
         let far = Place::new(rect.cells_wide() as i32 * PER_POST, rect.cells_high() as i32 * PER_POST);
         let weight = importance.uniform_weight().map(|weight| f64::from(weight) / f64::from(THOUSANDTHS));
-        Self { moments: Moments::new(dem, importance), dem, importance, weight, open, fit, far }
+        Self { moments: Moments::new(dem, importance), dem, importance, weight, open, fit, far, forbidden: &[] }
     }
 
     /// Quanta of height that count as zero.
@@ -46,6 +48,18 @@ impl<'a> Ground<'a> {
             || (at.x == 0 && !self.open.west)
             || (at.y == self.far.y && !self.open.north)
             || (at.x == self.far.x && !self.open.east)
+    }
+
+    /// Forbids vertices to come to stand at these posts, in ascending order.
+    pub fn forbid(&mut self, posts: &'a [Post]) {
+        self.forbidden = posts;
+    }
+
+    /// Whether the post nearest to a place is forbidden.
+    #[inline(always)]
+    pub fn is_forbidden(&self, at: Place) -> bool {
+        let nearest = |v: i32| (v + PER_POST / 2).div_euclid(PER_POST);
+        !self.forbidden.is_empty() && self.forbidden.binary_search(&self.post(nearest(at.y), nearest(at.x))).is_ok()
     }
 
     /// Posts of the tile.

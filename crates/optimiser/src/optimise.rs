@@ -102,7 +102,8 @@ pub fn fill(dem: &Dem, importance: &Importance, start: &Tin, task: &Task) -> Opt
 fn work_on(dem: &Dem, importance: &Importance, start: &Tin, task: &Task, steps: impl Fn(&mut Work)) -> Optimised {
     assert_eq!(dem.rect(), start.rect, "the TIN covers the window");
     assert_eq!(dem.rect(), importance.rect(), "heights and weights cover the same posts");
-    let ground = Ground::new(dem, importance, task.open, task.height_fit);
+    let mut ground = Ground::new(dem, importance, task.open, task.height_fit);
+    ground.forbid(&task.forbidden);
     let mut held = task.held.clone();
     held.sort_unstable();
     // What lies on a side that is not open is somebody else's, or the area's outer border.

@@ -82,6 +82,7 @@ pub(crate) fn free(triangles: usize, effort: Effort) -> Task {
         lattice: Lattice::Eighth,
         rms_quanta: None,
         largest_quanta: None,
+        forbidden: Vec::new(),
     }
 }
 

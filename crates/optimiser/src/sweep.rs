@@ -128,7 +128,7 @@ impl Mover {
         let mut has_rims = false;
         for index in 0..self.candidates.len() {
             let at = self.candidates[index];
-            if !self.is_valid(at) {
+            if sheet.ground.is_forbidden(at) || !self.is_valid(at) {
                 continue;
             }
             if !has_rims {
@@ -155,7 +155,8 @@ impl Mover {
     /// Moves one vertex to the DEM's height at a place of one's own choice; `false` where it may not stand there.
     pub fn put(&mut self, sheet: &mut Sheet, vertex: u32, at: Place) -> bool {
         let record = sheet.vertices[vertex as usize];
-        if record.hold.is_fixed() || held_to_line(at, record.at, record.hold) != at {
+        let strays = || held_to_line(at, record.at, record.hold) != at;
+        if record.hold.is_fixed() || strays() || sheet.ground.is_forbidden(at) {
             return false;
         }
         sheet.star(vertex, &mut self.star);
@@ -211,7 +212,7 @@ impl Mover {
         for j in -RINGS..=RINGS + 1 {
             for i in -RINGS..=RINGS + 1 {
                 let at = held_to_line(Place::new(x + i * step, y + j * step), record.at, record.hold);
-                if is_inside(sheet, at) {
+                if is_inside(sheet, at) && !sheet.ground.is_forbidden(at) {
                     let (dx, dy) = Place::new(at.x - record.at.x, at.y - record.at.y).posts();
                     self.ranked.push((plane.rise(dx, dy), at));
                 }

@@ -1,7 +1,7 @@
 //! What the optimiser is asked to do.
 
 use limits::TileLedger;
-use terrain::{LatticePoint, SeamSides};
+use terrain::{LatticePoint, Post, SeamSides};
 
 /// How much time to spend on one tile.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -50,6 +50,8 @@ pub enum Budget {
 pub struct Task {
     /// Vertices that keep place and height.
     pub held: Vec<LatticePoint>,
+    /// Posts that no vertex may come nearer to than to any other post, in ascending order; candidates they are none.
+    pub forbidden: Vec<Post>,
     /// Sides on which vertices may be chosen; those on the others are held, too.
     pub open: SeamSides,
     /// Posts between lines that edges may not cross; `None` where only the tile's border is one.

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use job::Job;
+use job::{Job, StartMethod};
 use terrain::TileId;
 
 use crate::resources;
@@ -110,6 +110,23 @@ pub fn positive(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(number) if number.is_finite() && 0.0 < number => Ok(number),
         _ => Err("expected a number above 0".into()),
+    }
+}
+
+/// Reads `METHOD:N`, or `METHOD` alone of one whose number is the ground's choice.
+pub fn start_method(text: &str) -> Result<(StartMethod, Option<usize>), String> {
+    let (name, points) = text.split_once(':').map_or((text, None), |(name, points)| (name, Some(points)));
+    let found = StartMethod::NAMED.iter().find(|(known, _)| *known == name).map(|&(_, method)| method);
+    let names = || StartMethod::NAMED.map(|(name, _)| name).join(", ");
+    let method = found.ok_or_else(|| format!("expected METHOD:N with one of {}", names()))?;
+    match (method, points) {
+        (StartMethod::HighLow, None) => Ok((method, None)),
+        (StartMethod::HighLow, Some(_)) => Err("expected highlow alone: it takes all peaks and pits".into()),
+        (_, points) => {
+            let points = points.and_then(|points| points.parse().ok()).filter(|&points| 0 < points);
+            let points = points.ok_or_else(|| format!("expected {name}:N, such as {name}:1000"))?;
+            Ok((method, Some(points)))
+        }
     }
 }
 

@@ -1,6 +1,6 @@
 //! Every measure of a surface beside those of the regular grid, in words: what `fidelity` and `tin --measure` share.
 
-use compiler::{Fidelity, LineOfSight, Measures};
+use compiler::{Fidelity, LineOfSight, Measures, ResidualFigures};
 use views::{Align, Table, grouped};
 
 /// All measures as lines: what, of the surface, of the grid, and what it means.
@@ -13,6 +13,7 @@ pub fn text(found: &Fidelity) -> String {
         Some(grouped(m.mesh.triangles))
     });
     rows.residual();
+    rows.classes();
     rows.sight();
     rows.slope();
     rows.cover();
@@ -45,6 +46,20 @@ impl Rows<'_> {
         self.add("", "95 % within", move |m| figure(m.residual.p95_m));
         self.add("", "99 % within", move |m| figure(m.residual.p99_m));
         self.add("", "largest", move |m| figure(m.residual.max_m));
+    }
+
+    /// Residuals on the ground of each class.
+    fn classes(&mut self) {
+        for class in &self.found.classes {
+            let posts = class.tin.posts;
+            let mut add = |name: &str, meaning: &str, figure: fn(&ResidualFigures) -> f64| {
+                let [this, grid] = [&class.tin, &class.grid].map(|found| format!("{:.3} m", figure(found)));
+                self.table.row([name, &this, &grid, meaning]);
+            };
+            add(&format!("On {}", class.name), &format!("RMS, {} posts", grouped(posts)), |found| found.rms_m);
+            add("", "99 % within", |found| found.p99_m);
+            add("", "largest", |found| found.max_m);
+        }
     }
 
     fn sight(&mut self) {
@@ -178,7 +193,7 @@ mod tests {
     }
 
     fn beside(tin: Measures, grid: Measures) -> Fidelity {
-        Fidelity { tin, grid, grid_step: 5, spacing_m: 25.0, polygons: 32_000 }
+        Fidelity { tin, grid, grid_step: 5, spacing_m: 25.0, polygons: 32_000, classes: Vec::new() }
     }
 
     #[test]

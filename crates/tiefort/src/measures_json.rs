@@ -2,8 +2,8 @@
 //! was there to measure.
 
 use compiler::{
-    Cover, Distances, Drainage, Fidelity, Hausdorff, LineOfSight, Measures, MeshForm, Registration, ResidualFigures,
-    SeamVisibility, SlopeClasses, SlopeDifference,
+    ClassResidual, Cover, Distances, Drainage, Fidelity, Hausdorff, LineOfSight, Measures, MeshForm, Registration,
+    ResidualFigures, SeamVisibility, SlopeClasses, SlopeDifference,
 };
 use serde_json::{Map, Value, json};
 
@@ -14,6 +14,13 @@ pub fn fields(found: &Fidelity) -> Map<String, Value> {
     grid.insert("step_posts".into(), json!(found.grid_step));
     grid.insert("step_m".into(), json!(f64::from(found.grid_step) * found.spacing_m));
     all.insert("polygons".into(), json!(found.polygons));
+    if !found.classes.is_empty() {
+        let class = |class: &ClassResidual| {
+            let (tin, grid) = (residual(&class.tin), residual(&class.grid));
+            json!({ "name": class.name, "residual": tin, "regular_grid": { "residual": grid } })
+        };
+        all.insert("classes".into(), found.classes.iter().map(class).collect());
+    }
     all.insert("regular_grid".into(), Value::Object(grid));
     all
 }

@@ -1,13 +1,13 @@
 //! The methods by name, and what each is asked for.
 
-use job::Optimising;
+use job::{Optimising, StartMethod};
 use methods::{
     Boundary, Contours, Diagonal, Distance, Extrema, FowlerLittle, Ground, Impossible, LatticeTin, Splitting,
 };
 use terrain::{Metres, PostRect, Tin};
 
-use super::subject::Subject;
-use crate::{CompileError, TinMethod};
+use super::subject::{Subject, Until};
+use crate::{CompileError, TinMethod, TinStart};
 
 /// Metres between the points of the regular grid of SIMNET.
 const SIMNET_M: Metres = Metres(125.0);
@@ -42,11 +42,13 @@ pub enum CompareMethod {
     Iterative,
     /// Ours.
     Optimised,
+    /// The iterative method from points of another: so many, or all there are of one whose number is the ground's.
+    IterativeFrom(StartMethod, Option<usize>),
 }
 
 use CompareMethod::{
-    Contour, Earlier, FowlerLittle as Fowler, Hierarchical, HighLow, Iterative, LatticeTin as Lattice, Optimised,
-    Regular, Simnet, Vip,
+    Contour, Earlier, FowlerLittle as Fowler, Hierarchical, HighLow, Iterative, IterativeFrom, LatticeTin as Lattice,
+    Optimised, Regular, Simnet, Vip,
 };
 
 impl CompareMethod {
@@ -78,8 +80,12 @@ impl CompareMethod {
     }
 
     /// Its name.
-    pub fn name(self) -> &'static str {
-        Self::NAMED.iter().find(|&&(_, method)| method == self).map_or("", |&(name, _)| name)
+    pub fn name(self) -> String {
+        match self {
+            IterativeFrom(start, Some(points)) => format!("iterative from {}:{points}", start.name()),
+            IterativeFrom(start, None) => format!("iterative from {}", start.name()),
+            _ => Self::NAMED.iter().find(|&&(_, method)| method == self).map_or("", |&(name, _)| name).to_owned(),
+        }
     }
 
     /// Whether it can be asked for a number of points.
@@ -112,8 +118,12 @@ impl CompareMethod {
             return Ok(Err(refused));
         }
         match self {
-            Iterative => on.refine(TinMethod::Paper, Some(points), None).map(Ok),
-            Optimised => on.refine(TinMethod::Optimised(Optimising::default()), Some(points), None).map(Ok),
+            Iterative => on.refine(TinMethod::Paper, None, Until::Points(points)).map(Ok),
+            IterativeFrom(start, from) => {
+                let start = TinStart::Method(start, from.unwrap_or(0));
+                on.refine(TinMethod::Paper, Some(start), Until::Points(points)).map(Ok)
+            }
+            Optimised => on.refine(TinMethod::Optimised(Optimising::default()), None, Until::Points(points)).map(Ok),
             other => Ok(other.simple(&on.ground(), points)),
         }
     }
@@ -130,7 +140,7 @@ impl CompareMethod {
             Regular(diagonal) => grid(methods::step_of_points(ground.dem.rect(), points), diagonal),
             Simnet(diagonal) => grid(methods::step_of_spacing(ground.spacing, SIMNET_M), diagonal),
             Contour => methods::contour_tin(ground, Contours::Points(points), None),
-            Iterative | Optimised => unreachable!("those are refined, not chosen"),
+            Iterative | IterativeFrom(..) | Optimised => unreachable!("those are refined, not chosen"),
         }
     }
 }

@@ -4,7 +4,7 @@ use fidelity::Tally;
 use terrain::QUANTA_PER_METRE;
 
 use super::Equivalent;
-use super::subject::Subject;
+use super::subject::{Subject, Until};
 use crate::{CompileError, TinMethod};
 
 /// Sums of squared residuals of the iterative TIN, from its corners on.
@@ -26,8 +26,8 @@ impl Curve {
     pub fn of(subject: &Subject, least_m: f64, points: usize) -> Result<Self, CompileError> {
         // The last batch is cut in row order, so a TIN of fewer points is a beginning of one of more.
         let below_m = least_m * (1.0 - 1e-9);
-        let tin = match subject.refine(TinMethod::Paper, None, Some(below_m)) {
-            Ok(tin) if tin.vertices.len() < points => subject.refine(TinMethod::Paper, Some(points), None),
+        let tin = match subject.refine(TinMethod::Paper, None, Until::RmsM(below_m)) {
+            Ok(tin) if tin.vertices.len() < points => subject.refine(TinMethod::Paper, None, Until::Points(points)),
             other => other,
         }?;
         let posts: Vec<_> = tin.vertices[CORNERS..].iter().filter_map(|vertex| vertex.at.post()).collect();

@@ -166,7 +166,7 @@ pub fn compare(
 fn refuse(row: &CompareRow) -> Result<(), CompileError> {
     let Err(why) = &row.made else { return Ok(()) };
     Err(CompileError::Impossible {
-        key: row.method.name().into(),
+        key: row.method.name(),
         found: why.found.clone(),
         expected: why.expected.clone(),
         hint: why.hint.clone(),

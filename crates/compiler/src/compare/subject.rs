@@ -17,7 +17,16 @@ use crate::area::GamingArea;
 use crate::ground::Ground;
 use crate::raster::{TinRequest, refuse_spacing, tally_of, untiled};
 use crate::sources::{decode, reading};
-use crate::{CompileError, TinMethod};
+use crate::{CompileError, TinMethod, TinStart};
+
+/// When a TIN is good enough.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Until {
+    /// With so many points.
+    Points(usize),
+    /// With such an RMS residual, in metres.
+    RmsM(f64),
+}
 
 /// The ground that methods are compared on.
 pub(super) struct Subject {
@@ -58,15 +67,15 @@ impl Subject {
     ///
     /// # Errors
     /// When the ground cannot be used.
-    pub fn refine(&self, method: TinMethod, points: Option<usize>, rms_m: Option<f64>) -> Result<Tin, CompileError> {
+    pub fn refine(&self, method: TinMethod, start: Option<TinStart>, until: Until) -> Result<Tin, CompileError> {
         let request = TinRequest {
             dem: Path::new("").into(),
             method,
-            points,
+            points: if let Until::Points(points) = until { Some(points) } else { None },
             triangles: None,
             max_residual_m: None,
-            rms_m,
-            start: None,
+            rms_m: if let Until::RmsM(rms_m) = until { Some(rms_m) } else { None },
+            start,
             tiles: (1, 1),
             workers: 1,
         };

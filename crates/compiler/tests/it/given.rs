@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use database::Folder;
-use terrain::{Post, TileTin, Vertex};
+use terrain::{LatticePoint, Post, TileTin, Vertex};
 
 use crate::product::{Edges, Product};
 use crate::scene::{ORIGIN_M, SIDE_CELLS, Scene, Words, differing, tile};
@@ -79,17 +79,17 @@ fn tiles_start_from_what_another_method_chooses_within_all_limits() {
 
 #[test]
 fn a_pin_is_a_vertex_on_both_sides_of_a_line_with_the_height_it_says() {
-    // Inside a tile, on a line between tiles, on the outer border; 60 is where tiles meet.
-    let pins = [("add", 31, 33, ""), ("height", 27, 60, r#","height_m":1234.5"#), ("add", 0, 33, r#","height_m":900"#)];
+    // Inside a tile, on a line between tiles, on the outer border; row 60 is where tiles meet.
+    let pins = [("add", 31, 33, ""), ("height", 60, 27, r#","height_m":1234.5"#), ("add", 0, 33, r#","height_m":900"#)];
     for tin in [CONSTRAINED, PAPER, "method = \"optimised\""] {
         let scene = pinned(tin, &pins);
         scene.build("a.tdb", 2);
         scene.verify("a.tdb");
         let all = vertices(&scene, "a.tdb");
         assert!(all.iter().any(|&(post, _)| post == Post::new(31, 33)), "{tin}");
-        assert!(all.contains(&(Post::new(27, 60), 1234 * 128 + 64)), "{tin}");
+        assert!(all.contains(&(Post::new(60, 27), 1234 * 128 + 64)), "{tin}");
         assert!(all.contains(&(Post::new(0, 33), 900 * 128)), "{tin}");
-        assert_eq!(all.iter().filter(|(post, _)| *post == Post::new(27, 60)).count(), 1);
+        assert_eq!(all.iter().filter(|(post, _)| *post == Post::new(60, 27)).count(), 1);
         let edges = if tin == PAPER { Edges::Clipped } else { Edges::Constrained };
         Product::read(&scene.path("a.tdb")).check(edges);
     }
@@ -111,6 +111,52 @@ fn a_forbidden_post_is_left_out_and_pins_count_towards_the_points() {
     second.build("a.tdb", 2);
     assert!(vertices(&first, "a.tdb").iter().any(|(at, _)| *at == post));
     assert!(!vertices(&second, "a.tdb").iter().any(|(at, _)| *at == post));
+}
+
+#[test]
+fn no_vertex_moves_to_where_a_forbidden_post_is_nearest() {
+    let free = Scene::new(&words("method = \"optimised\""));
+    free.build("a.tdb", 2);
+    let nearest = |at: LatticePoint| Post::new((at.row + 4).div_euclid(8), (at.col + 4).div_euclid(8));
+    // Inside a tile, and on a line between tiles and a line between load modules.
+    let stands = |post: Post, scene: &Scene, folder: &str| {
+        tins(scene, folder).iter().flat_map(|tile| &tile.tin.vertices).any(|v| nearest(v.at) == post)
+    };
+    let all = tins(&free, "a.tdb");
+    let inside = all[4].tin.vertices.iter().map(|v| nearest(v.at)).filter(|post| {
+        let (row, col) = (post.row % SIDE_CELLS, post.col % SIDE_CELLS);
+        (row == 0) != (col == 0) || (row == 9 && 0 < col)
+    });
+    let posts: Vec<Post> = inside.collect();
+    assert!(8 <= posts.len(), "{posts:?}");
+    let pins: Vec<_> = posts.iter().map(|post| ("forbid", post.row, post.col, "")).collect();
+    let scene = pinned("method = \"optimised\"", &pins);
+    scene.build("a.tdb", 2);
+    scene.verify("a.tdb");
+    for &post in &posts {
+        assert!(stands(post, &free, "a.tdb") && !stands(post, &scene, "a.tdb"), "{post}");
+    }
+}
+
+#[test]
+fn a_tile_with_a_new_pin_is_run_again_alone_and_made_whole_by_the_next_build() {
+    // On the line that tile 0,0 gives to its neighbour, and inside it.
+    let (outside, inside) = (("height", 60, 27, r#","height_m":1234.5"#), ("add", 31, 33, ""));
+    for tin in [CONSTRAINED, "method = \"optimised\""] {
+        let scene = pinned(tin, &[("add", 100, 100, "")]);
+        scene.build("area", 2);
+        write_pins(&scene.path("pins.geojson"), &[("add", 100, 100, ""), outside, inside]);
+        let (refined, is_frozen) = scene.tile("area", tile(0, 0), false);
+        assert!(refined == [tile(0, 0)] && is_frozen, "{tin}: {refined:?}");
+        let now = vertices(&scene, "area");
+        assert!(now.iter().any(|&(post, _)| post == Post::new(31, 33)), "{tin}");
+        assert!(!now.contains(&(Post::new(60, 27), 1234 * 128 + 64)), "{tin}: a frozen side has taken a pin");
+        scene.verify("area");
+        scene.build("area", 2);
+        assert!(vertices(&scene, "area").contains(&(Post::new(60, 27), 1234 * 128 + 64)), "{tin}");
+        scene.build("fresh", 2);
+        assert_eq!(differing(&scene.product("area"), &scene.product("fresh")), Vec::<String>::new(), "{tin}");
+    }
 }
 
 #[test]

@@ -5,11 +5,12 @@ use std::time::Instant;
 
 use clap::{Args, ValueEnum};
 use compiler::{CompareEvent, CompareGround, CompareMethod, CompareRequest, CompareRow, Comparison, Equivalent, Made};
-use job::Job;
+use job::{Job, StartMethod};
 use serde_json::{Value, json};
 use terrain::{Post, PostRect};
 use views::{Align, Facets, Image, Look, Panel, Style, Surface, Table, draw_panels, grouped};
 
+use crate::arguments::start_method;
 use crate::failure::{Failure, Outcome};
 use crate::new_folder::NewFolder;
 use crate::signals::Signals;
@@ -20,6 +21,7 @@ Examples:
   tiefort compare dem.tif
   tiefort compare dem.tif --window 648,481,376x460 --points 2500,5000
   tiefort compare dem.tif --methods vip,iterative --points 5000 --format json
+  tiefort compare dem.tif --methods vip,iterative --start vip:1000,highlow
   tiefort compare dem.tif --pictures figures
   tiefort compare mine.toml        on the raster of a job, cut to its area
 
@@ -52,6 +54,9 @@ pub struct Arguments {
     /// Methods by name, with commas [default: vip to optimised, highlow, simnet]
     #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = method)]
     methods: Vec<CompareMethod>,
+    /// Improve what other methods make: the iterative method from so many points of each, with commas
+    #[arg(long, value_name = "METHOD:N", value_delimiter = ',', value_parser = start_method)]
+    start: Vec<(StartMethod, Option<usize>)>,
     /// Numbers of points, with commas
     #[arg(long, value_name = "N,N", value_delimiter = ',', default_value = "2500,5000",
           value_parser = clap::value_parser!(u32).range(4..))]
@@ -130,6 +135,7 @@ fn request(arguments: &Arguments) -> Result<CompareRequest, Failure> {
     points.dedup();
     let is_chosen = !arguments.methods.is_empty();
     let mut methods = if is_chosen { arguments.methods.clone() } else { CompareMethod::usual() };
+    methods.extend(arguments.start.iter().map(|&(start, points)| CompareMethod::IterativeFrom(start, points)));
     methods.dedup();
     Ok(CompareRequest { ground, window: arguments.window, methods, points, strict: is_chosen })
 }
@@ -171,9 +177,10 @@ fn draw(found: &Comparison, folder: NewFolder) -> Result<(), Failure> {
         let tin = || Panel { label: label.clone(), surface: Surface::Triangles(&facets) };
         let (title, eye) = (format!("{}: {name}", found.ground), "From the south-west");
         let shaded = draw_panels(&title, eye, &[ground(), tin()], Style::Shaded, &look);
-        put(format!("{name}-{}.png", made.points), &shaded)?;
+        let file = name.replace([' ', ':'], "-");
+        put(format!("{file}-{}.png", made.points), &shaded)?;
         let wires = draw_panels(&title, eye, &[tin()], Style::Wireframe, &look);
-        put(format!("{name}-{}-wires.png", made.points), &wires)?;
+        put(format!("{file}-{}-wires.png", made.points), &wires)?;
     }
     folder.finish()
 }
@@ -222,7 +229,7 @@ fn names(request: &CompareRequest) -> Vec<String> {
         let takes = request.methods.iter().filter(|method| method.takes_points());
         takes.map(move |method| format!("{}, {} points", method.name(), grouped(points as u64)))
     });
-    let fixed = request.methods.iter().filter(|method| !method.takes_points()).map(|method| method.name().to_owned());
+    let fixed = request.methods.iter().filter(|method| !method.takes_points()).map(|method| method.name());
     by_points.chain(fixed).collect()
 }
 
@@ -250,7 +257,7 @@ fn text(found: &Comparison, seconds: &[f64]) -> String {
 fn cells(method: CompareMethod, made: &Made, posts: u64, seconds: f64) -> [String; 9] {
     let residual = &made.residual;
     [
-        method.name().into(),
+        method.name(),
         grouped(made.points as u64),
         grouped(made.triangles as u64),
         format!("{:.3}", residual.rms_m()),

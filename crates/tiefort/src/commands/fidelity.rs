@@ -69,7 +69,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
 }
 
 fn text(found: &DatabaseFidelity) -> String {
-    format!("Gaming area {} against {}\n\n{}", found.area, found.against, measures::text(&found.measures))
+    let note = found.no_classes.as_ref().map(|why| format!("\nnote: residuals are not told by class: {why}\n"));
+    let figures = measures::text(&found.measures);
+    format!("Gaming area {} against {}\n\n{figures}{}", found.area, found.against, note.unwrap_or_default())
 }
 
 fn to_json(found: &DatabaseFidelity, sights: Sights) -> Value {

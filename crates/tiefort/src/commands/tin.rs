@@ -1,17 +1,17 @@
 //! `tiefort tin`: just a mesh from a raster.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::PoisonError;
 
 use clap::{ArgGroup, Args, ValueEnum};
-use compiler::{Fidelity, Mesh, Sights, TinMethod, TinRequest};
+use compiler::{Fidelity, Mesh, Sights, TinMethod, TinRequest, TinStart};
 use exports::TinPlace;
-use job::{Optimising, StartMethod};
+use job::Optimising;
 use serde_json::{Value, json};
 use terrain::StopReason;
 use views::{Coordinates, MeshPlace, grouped};
 
-use crate::arguments::{Workers, positive, rows_by_columns};
+use crate::arguments::{Workers, positive, rows_by_columns, start_method};
 use crate::failure::{Failure, Outcome};
 use crate::progress::{Listener, Show};
 use crate::signals::{self, Signals};
@@ -22,6 +22,7 @@ Examples:
   tiefort tin dem.tif --points 76500 --out mesh.ply
   tiefort tin dem.tif --max-residual 2 --method greedy --key max --out mesh.obj
   tiefort tin dem.tif --points 5000 --start vip:1000 --method paper --out mesh.ply
+  tiefort tin dem.tif --points 5000 --start surveyed.csv --out mesh.ply      columns east,north,height_m
   tiefort tin dem.tif --points 5000 --measure --out mesh.ply      every measure of fidelity, too
   tiefort tin dem.tif --rms 1.5 --tiles 6x6 --workers 8 --coordinates map --out mesh.ply
 
@@ -53,9 +54,9 @@ pub struct Arguments {
     #[arg(long, value_name = "R", value_parser = positive)]
     rms: Option<f64>,
     /// Start from points of another method (vip, highlow, lattice, fowler-little, hierarchical, earlier, regular,
-    /// contour) and improve what it makes
-    #[arg(long, value_name = "METHOD:N", value_parser = start)]
-    start: Option<(StartMethod, usize)>,
+    /// contour) and improve what it makes; or from those of a file (.csv, .geojson), fixed where they have a height
+    #[arg(long, value_name = "METHOD:N|FILE", value_parser = start)]
+    start: Option<TinStart>,
     /// Refine so many rows and columns of tiles at once, their borders matched
     #[arg(long, value_name = "ROWSxCOLUMNS", default_value = "1x1", value_parser = rows_by_columns)]
     tiles: (u32, u32),
@@ -149,19 +150,11 @@ enum Frame {
     Map,
 }
 
-/// Reads `METHOD:N`, or `METHOD` alone of one whose number is the ground's choice.
-fn start(text: &str) -> Result<(StartMethod, usize), String> {
-    let (name, points) = text.split_once(':').map_or((text, None), |(name, points)| (name, Some(points)));
-    let found = StartMethod::NAMED.iter().find(|(known, _)| *known == name).map(|&(_, method)| method);
-    let names = || StartMethod::NAMED.map(|(name, _)| name).join(", ");
-    let method = found.ok_or_else(|| format!("expected METHOD:N with one of {}", names()))?;
-    match (method, points) {
-        (StartMethod::HighLow, None) => Ok((method, 0)),
-        (StartMethod::HighLow, Some(_)) => Err("expected highlow alone: it takes all peaks and pits".into()),
-        (_, points) => {
-            let points = points.and_then(|points| points.parse().ok()).filter(|&points| 0 < points);
-            points.map(|points| (method, points)).ok_or_else(|| format!("expected {name}:N, such as {name}:1000"))
-        }
+/// Reads the name of a file of points, or as [`start_method`].
+fn start(text: &str) -> Result<TinStart, String> {
+    match files::extension(Path::new(text)).as_str() {
+        "csv" | "geojson" | "json" => Ok(TinStart::File(text.into())),
+        _ => start_method(text).map(|(method, points)| TinStart::Method(method, points.unwrap_or(0))),
     }
 }
 
@@ -250,7 +243,7 @@ fn request(arguments: &Arguments) -> Result<TinRequest, Failure> {
         triangles: arguments.triangles.map(|triangles| triangles as usize),
         max_residual_m: arguments.max_residual,
         rms_m: arguments.rms,
-        start: arguments.start,
+        start: arguments.start.clone(),
         tiles: arguments.tiles,
         workers: arguments.workers.count(),
     })

@@ -152,3 +152,50 @@ fn a_mesh_starts_from_what_another_method_chooses() {
     assert!(wrong("vip").contains("vip:1000") && wrong("vpi:5").contains("fowler-little"));
     assert!(wrong("highlow:5").contains("highlow alone"));
 }
+
+#[test]
+fn a_mesh_starts_from_points_of_a_file_and_keeps_their_heights() {
+    let scene = with_dem();
+    // The sample's south-west post lies at 505000 east, 3875000 north; one point is on the line between tiles.
+    fs::write(
+        scene.path("points.csv"),
+        "east,north,height_m\n506000,3875505,1234.5\n506250,3876000,77\n506000,3876500,",
+    )
+    .unwrap();
+    let start = ["tin", "dem.tif", "--start", "points.csv", "--coordinates", "map", "--out", "m.obj"];
+    for method in ["optimised", "paper", "greedy"] {
+        for tiles in ["1x1", "2x2"] {
+            scene.run_to(0, &[&start[..], &["--points", "200", "--method", method, "--tiles", tiles]].concat());
+            let mesh = fs::read_to_string(scene.path("m.obj")).unwrap();
+            let places: Vec<Vec<f64>> = mesh
+                .lines()
+                .filter_map(|line| line.strip_prefix("v "))
+                .map(|line| line.split(' ').map(|number| number.parse().unwrap()).collect())
+                .collect();
+            for (north, east, height) in [(3_875_500.0, 506_000.0, 1234.5), (3_876_000.0, 506_250.0, 77.0)] {
+                assert!(places.contains(&vec![east, north, height]), "{method}, {tiles}: {east} {north}");
+            }
+        }
+    }
+    let few = [&start[..], &["--points", "6"]].concat();
+    scene.run_to(2, &few).check_error(&["--start: 3 points", "at most 2"]);
+    fs::write(scene.path("points.csv"), "east,north\n1,2\n").unwrap();
+    scene.run_to(2, &[&start[..], &["--points", "60"]].concat()).check_error(&["points.csv: line 2", "outside the"]);
+}
+
+#[test]
+fn what_a_method_makes_is_improved_in_a_row_of_its_own() {
+    let scene = with_dem();
+    let compare = ["compare", "dem.tif", "--points", "500", "--methods", "regular,iterative", "--format", "json"];
+    let found = json(&scene.run_to(0, &[&compare[..], &["--start", "regular:100,highlow"]].concat()).stdout);
+    let rms_m = |name: &str| {
+        let row = found["rows"].as_array().unwrap().iter().find(|row| row["method"] == name);
+        let row = row.unwrap_or_else(|| panic!("no row of {name}: {found:#}"));
+        assert!(row["points"].as_u64() <= Some(500), "{name}: {row}");
+        row["rms_m"].as_f64().unwrap()
+    };
+    assert!(rms_m("iterative from regular:100") < rms_m("regular"));
+    assert!(rms_m("iterative from highlow") < rms_m("regular"));
+    let wrong = |start: &str| scene.run_to(2, &[&compare[..], &["--start", start]].concat()).stderr;
+    assert!(wrong("highlow:9").contains("highlow alone") && wrong("vip").contains("vip:1000"));
+}

@@ -66,6 +66,25 @@ fn a_database_is_measured_in_words_and_for_programs() {
 }
 
 #[test]
+fn residuals_are_told_by_class_and_equal_those_of_the_build() {
+    let steep = r#"slope_above_percent = 25, smooth_m = 100, class = "steep""#;
+    let scene = Scene::with_job("small.toml", &[(r#"sample = "mountains", class = "mountains""#, steep)]);
+    scene.run_to(0, &["build", "job.toml", "--out", "area.tdb", "--quiet"]);
+    let text = scene.run_to(0, &["fidelity", "area.tdb", "--pairs", "100"]).stdout;
+    assert!(text.contains("On default") && text.contains("On steep"), "{text}");
+    let json = scene.run_to(0, &["fidelity", "area.tdb", "--pairs", "100", "--format", "json"]).stdout;
+    let found: Value = serde_json::from_str(&json).unwrap();
+    let report: Value = serde_json::from_str(&fs::read_to_string(scene.path("area.tdb/report.json")).unwrap()).unwrap();
+    for (class, built) in found["classes"].as_array().unwrap().iter().zip(report["classes"].as_array().unwrap()) {
+        assert_eq!((&class["name"], &class["residual"]["posts"]), (&built["name"], &built["posts"]));
+        let rms_m = |value: &Value| value["residual"]["rms_m"].as_f64().unwrap();
+        assert!((rms_m(class) - rms_m(built)).abs() < 1e-9, "{class} {built}");
+        assert!(rms_m(class) < rms_m(&class["regular_grid"]), "{class}");
+    }
+    assert_eq!(found["classes"].as_array().unwrap().len(), 2);
+}
+
+#[test]
 fn without_the_ground_of_the_build_a_raster_has_to_be_named() {
     let scene = built();
     fs::rename(scene.path("dem.tif"), scene.path("moved.tif")).unwrap();
