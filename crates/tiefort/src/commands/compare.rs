@@ -160,8 +160,8 @@ fn draw(found: &Comparison, folder: NewFolder) -> Result<(), Failure> {
     const FROM_SOUTH_WEST: f64 = 45.0;
     const TIMES: f64 = 2.0;
     let spacing_m = [found.spacing_m; 2];
-    let ground = || Panel { label: "DEM".into(), surface: Surface::Posts(&found.dem, spacing_m) };
-    let look = Look::overlooking(&ground().surface, FROM_SOUTH_WEST, TIMES, WIDE);
+    let dem = || Panel { label: "DEM".into(), surface: Surface::Posts(&found.dem, spacing_m) };
+    let look = Look::overlooking(&dem().surface, FROM_SOUTH_WEST, TIMES, WIDE);
     let put = |name: String, image: &Image| {
         let mut bytes = Vec::new();
         image.write_png(&mut bytes).and_then(|()| folder.put(&name, &bytes)).map_err(|source| {
@@ -175,8 +175,9 @@ fn draw(found: &Comparison, folder: NewFolder) -> Result<(), Failure> {
         let (name, points) = (row.method.name(), grouped(made.points as u64));
         let label = format!("{name}, {points} points, RMS residual {:.2} m", made.residual.rms_m());
         let tin = || Panel { label: label.clone(), surface: Surface::Triangles(&facets) };
-        let (title, eye) = (format!("{}: {name}", found.ground), "From the south-west");
-        let shaded = draw_panels(&title, eye, &[ground(), tin()], Style::Shaded, &look);
+        let ground = Path::new(&found.ground).file_name().map_or("", |file| file.to_str().unwrap_or(""));
+        let (title, eye) = (format!("{ground}: {name}"), "From the south-west");
+        let shaded = draw_panels(&title, eye, &[dem(), tin()], Style::Shaded, &look);
         let file = name.replace([' ', ':'], "-");
         put(format!("{file}-{}.png", made.points), &shaded)?;
         let wires = draw_panels(&title, eye, &[tin()], Style::Wireframe, &look);

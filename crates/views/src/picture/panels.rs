@@ -30,6 +30,8 @@ pub struct Panel<'a> {
 const GAP: i64 = 16;
 /// Pixels of the column that north, scale and tints stand in.
 const LEGEND_WIDE: i64 = 210;
+/// Pixels of that column above the tints.
+const ABOVE_TINTS: i64 = 146;
 
 /// Draws panels from one eye under one light, `look.pixels` each, with title, north, scale and tints. `eye` says in
 /// words where the eye is.
@@ -48,7 +50,8 @@ pub fn draw_panels(title: &str, eye: &str, panels: &[Panel], style: Style, look:
     let whole = GAP + panels.len() as i64 * (wide + GAP) + LEGEND_WIDE;
     let top = GAP + Font::Title.line() + GAP / 2 + Font::Bold.line();
     let notes = wrapped(&notes(eye, look), Font::Plain, whole - 2 * GAP);
-    let body = high.max(360) + GAP;
+    let tints: Option<Legend> = (style == Style::Shaded).then(|| Tints::new(look.range_m).legend());
+    let body = high.max(ABOVE_TINTS + tints.as_ref().map_or(0, Legend::high)) + GAP;
     let mut image =
         Image::new(whole as usize, (top + body + notes.len() as i64 * Font::Plain.line() + GAP) as usize, WHITE);
     let title = fitted(title, Font::Title, whole - 2 * GAP);
@@ -66,9 +69,8 @@ pub fn draw_panels(title: &str, eye: &str, panels: &[Panel], style: Style, look:
         draw_scale(&mut image, [left, top + 76], middle_m, LEGEND_WIDE - 2 * GAP);
         write(&mut image, [left, top + 110], "in the middle", Font::Plain, Anchor::Start, GREY);
     }
-    if style == Style::Shaded {
-        let legend: Legend = Tints::new(look.range_m).legend();
-        legend.draw(&mut image, [left, top + 146]);
+    if let Some(tints) = tints {
+        tints.draw(&mut image, [left, top + ABOVE_TINTS]);
     }
     for (index, line) in notes.iter().enumerate() {
         let place = [GAP, top + body + index as i64 * Font::Plain.line()];
