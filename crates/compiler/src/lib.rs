@@ -24,6 +24,7 @@ mod played;
 pub use played::{Costs, Played, TileCosts, play};
 mod locate;
 pub use locate::{Corner, corners, find_area};
+mod levels;
 mod look;
 pub use look::{Seen, Suggestion, look_at};
 mod status;

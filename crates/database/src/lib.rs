@@ -44,8 +44,9 @@ pub use manifest::{
 };
 mod report;
 pub use report::{
-    Report, ReportBefore, ReportBound, ReportBreach, ReportClass, ReportPerModule, ReportPerWindow, ReportPlace,
-    ReportPoints, ReportPool, ReportRefusals, ReportResidual, ReportStage, ReportStops, ReportTile, ReportVoids,
+    Report, ReportBefore, ReportBound, ReportBreach, ReportClass, ReportLevel, ReportPerModule, ReportPerWindow,
+    ReportPlace, ReportPoints, ReportPool, ReportRefusals, ReportResidual, ReportStage, ReportStops, ReportTile,
+    ReportVoids,
 };
 mod lock;
 mod publish;

@@ -120,6 +120,7 @@ pub(crate) fn report() -> Report {
         residual,
         residual_against_source: None,
         classes: Vec::new(),
+        levels: vec![],
         overall_point_weighted_rms_m: 1.0,
         dem_accuracy_m: None,
         voids: ReportVoids { count: 0, filled: 0 },
