@@ -33,6 +33,8 @@ mod verify;
 pub use verify::{Verdict, verify};
 mod raster;
 pub use raster::{Mesh, TinMethod, TinRequest, sample, tin};
+mod tin_levels;
+pub use tin_levels::tin_levels;
 mod compare;
 pub use compare::{
     CompareEvent, CompareGround, CompareMethod, CompareRequest, CompareRow, Comparison, Equivalent, Forced, Impossible,

@@ -2,8 +2,8 @@
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
-use std::sync::OnceLock;
 use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, OnceLock};
 
 use database::ReportResidual;
 use fidelity::Tally;
@@ -11,7 +11,7 @@ use geometry::WORKING_POSTS_MAX;
 use geometry::owned::{PostGrid, visit_residuals};
 use job::{ErrorKey, Optimising, StartMethod};
 use schedule::{Event as Scheduled, RankedTasks, Workers, in_rank_order_observed};
-use source_files::{DemFile, Reading, VoidPolicy, write_classes, write_heights};
+use source_files::{DemFile, RasterFrame, Reading, VoidPolicy, write_classes, write_heights};
 use terrain::{
     Dem, GainCurve, GridFrame, Importance, LATTICE_PER_POST, LatticePoint, Metres, ModuleGrid, Post, PostRect,
     SeamSides, Spacing, StopReason, THOUSANDTHS, TileId, TileTin, Tin, Vertex, quanta_of_metres,
@@ -72,7 +72,7 @@ pub struct Mesh {
     /// Vertices and triangles; rows and columns are the raster's, from its south-west post.
     pub tin: Tin,
     /// The raster's heights.
-    pub dem: Dem,
+    pub dem: Arc<Dem>,
     /// Easting of post (0, 0), in metres.
     pub east_m: f64,
     /// Northing of post (0, 0), in metres.
@@ -94,40 +94,66 @@ pub struct Mesh {
 /// # Errors
 /// When the raster cannot be used, or nothing says when to stop.
 pub fn tin(request: &TinRequest, stop: &AtomicBool, progress: &mut dyn Progress) -> Result<Mesh, CompileError> {
-    let workers = Workers::new(request.workers);
-    progress.tell(Event::Enter(Stage::Read, 0));
-    let file = DemFile::open(&request.dem, &Reading::AS_IT_SAYS)?;
-    file.frame().require_metres()?;
-    let mut raster = decode(&file, file.rect(), &workers, stop)?;
-    raster.settle_voids(VoidPolicy::Hole)?;
-    let scale = file.sample_scale();
-    let dem = Dem::from_fn(file.rect(), |post| {
-        raster.sample(post).and_then(|sample| quanta_of_metres(scale.height_m(sample)))
-    });
-    progress.tell(Event::Leave(Stage::Read));
-
-    let frame = file.frame();
-    let job = TinJob::new(request, &dem, frame.spacing)?;
-    let curves = job.survey(&dem, &workers, stop, progress)?;
-    let tiles = job.refine(&dem, curves.as_deref(), &workers, stop, progress)?;
-
+    let heights = Heights::read(request, stop, progress)?;
+    let tiles = heights.refine(request, stop, progress)?;
     progress.tell(Event::Enter(Stage::Assemble, 0));
     let exhausted = tiles.iter().any(|tile| tile.stop == StopReason::Exhausted);
     let stop = if exhausted { StopReason::Exhausted } else { tiles[0].stop };
-    let tin = join(dem.rect(), &tiles);
-    let residual = crate::report::residual_of(&tally_of(&dem, &tin));
+    let mesh = heights.mesh(join(heights.dem.rect(), &tiles), stop);
     progress.tell(Event::Leave(Stage::Assemble));
-    Ok(Mesh {
-        points: tin.vertices.len(),
-        tin,
-        east_m: frame.south_west[0],
-        north_m: frame.south_west[1],
-        spacing_m: (frame.spacing[0], frame.spacing[1]),
-        epsg: frame.crs.epsg(),
-        residual,
-        stop,
-        dem,
-    })
+    Ok(mesh)
+}
+
+/// A raster's heights, and where they lie.
+pub(crate) struct Heights {
+    pub dem: Arc<Dem>,
+    frame: RasterFrame,
+}
+
+impl Heights {
+    /// Those that a request names.
+    pub fn read(request: &TinRequest, stop: &AtomicBool, progress: &mut dyn Progress) -> Result<Self, CompileError> {
+        let workers = Workers::new(request.workers);
+        progress.tell(Event::Enter(Stage::Read, 0));
+        let file = DemFile::open(&request.dem, &Reading::AS_IT_SAYS)?;
+        file.frame().require_metres()?;
+        let mut raster = decode(&file, file.rect(), &workers, stop)?;
+        raster.settle_voids(VoidPolicy::Hole)?;
+        let scale = file.sample_scale();
+        let dem = Dem::from_fn(file.rect(), |post| {
+            raster.sample(post).and_then(|sample| quanta_of_metres(scale.height_m(sample)))
+        });
+        progress.tell(Event::Leave(Stage::Read));
+        Ok(Self { dem: Arc::new(dem), frame: file.frame().clone() })
+    }
+
+    /// The tiles of a request over these heights.
+    pub fn refine(
+        &self,
+        request: &TinRequest,
+        stop: &AtomicBool,
+        progress: &mut dyn Progress,
+    ) -> Result<Vec<TileTin>, CompileError> {
+        let workers = Workers::new(request.workers);
+        let job = TinJob::new(request, &self.dem, self.frame.spacing)?;
+        let curves = job.survey(&self.dem, &workers, stop, progress)?;
+        job.refine(&self.dem, curves.as_deref(), &workers, stop, progress)
+    }
+
+    /// A TIN over them as a mesh.
+    pub fn mesh(&self, tin: Tin, stop: StopReason) -> Mesh {
+        Mesh {
+            points: tin.vertices.len(),
+            residual: crate::report::residual_of(&tally_of(&self.dem, &tin)),
+            tin,
+            dem: Arc::clone(&self.dem),
+            east_m: self.frame.south_west[0],
+            north_m: self.frame.south_west[1],
+            spacing_m: (self.frame.spacing[0], self.frame.spacing[1]),
+            epsg: self.frame.crs.epsg(),
+            stop,
+        }
+    }
 }
 
 /// The TIN of one tile without load modules, over all of `dem`.
