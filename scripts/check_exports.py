@@ -41,12 +41,13 @@ class Database:
         self.folder = pathlib.Path(folder)
         self.manifest = json.loads((self.folder / "database.json").read_text())
         self.report = json.loads((self.folder / "report.json").read_text())
-        self.modules = {}
+        self.levels = {}
         for path in sorted((self.folder / "modules").glob("*.slm")):
             header, modules = read_slm.parse(path.read_bytes())
             self.header = header
             for module in modules:
-                self.modules[module["row"], module["column"]] = module
+                self.levels.setdefault((module["row"], module["column"]), []).append(module)
+        self.modules = {place: levels[0] for place, levels in self.levels.items()}
         area = self.manifest["area"]
         self.origin, self.side = area["origin_m"], area["module_side_m"]
         self.rows, self.cols = area["module_rows"], area["module_cols"]
@@ -111,9 +112,9 @@ def check_modules(database, arguments, scratch):
     expect(len(files) == len(database.modules), f"{len(files)} files, one for each load module")
     same = 0
     for path in files:
-        _, [module] = read_slm.parse(path.read_bytes())
-        same += module == database.modules[module["row"], module["column"]]
-    expect(same == len(files), "each holds its load module as it is in the database")
+        _, levels = read_slm.parse(path.read_bytes())
+        same += levels == database.levels[levels[0]["row"], levels[0]["column"]]
+    expect(same == len(files), "each holds its load module as it is in the database, at every level")
     shutil.rmtree(folder)
 
 
@@ -266,11 +267,17 @@ def check_3dtiles(database, arguments, scratch):
     own, longitude, latitude, pyproj = globe(database)
     tileset = json.loads((folder / "tileset.json").read_text())
     geodetic = pyproj.Transformer.from_crs(4978, 4979, always_xy=True)
-    found, triangles, files, worst = {}, 0, [], True
+    found, triangles, files, levels, worst = {}, 0, [], [], True
     for square in tileset["root"]["children"]:
         matrix = numpy.array(square["transform"]).reshape(4, 4).T
-        worst &= all(child["geometricError"] <= tileset["geometricError"] for child in square["children"])
-        for child in square["children"]:
+        leaves = square
+        # Coarser levels of detail, one mesh each, stand between a square and its load modules.
+        while "children" in leaves["children"][0]:
+            worst &= leaves["children"][0]["geometricError"] <= leaves["geometricError"]
+            leaves = leaves["children"][0]
+            levels.append(folder / leaves["content"]["uri"])
+        worst &= all(child["geometricError"] <= tileset["geometricError"] for child in leaves["children"])
+        for child in leaves["children"]:
             path = folder / child["content"]["uri"]
             files.append(path)
             document, _ = read_glb(path.read_bytes())
@@ -298,7 +305,8 @@ def check_3dtiles(database, arguments, scratch):
     expect(missing == 0, f"every vertex is where PROJ puts it, to a centimetre ({missing} missing)")
     spread = max(offsets) - min(offsets)
     expect(spread < 5, f"heights differ from the database's by {min(offsets):.3f} to {max(offsets):.3f} m")
-    validate([folder / square["content"]["uri"] for square in tileset["root"]["children"]] + files[:100], arguments)
+    squares = [folder / square["content"]["uri"] for square in tileset["root"]["children"]]
+    validate(squares + levels + files[:100], arguments)
 
 
 def decode_terrain(data):

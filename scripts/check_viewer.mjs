@@ -85,22 +85,25 @@ async function serve() {
   return { server, address };
 }
 
-/** Triangles and polygons of every load module, from headers and indexes. */
+/** Triangles and polygons of every load module, from headers and indexes; `levels` has those of every level. */
 function readCounts(modules) {
-  const area = { counts: new Map() };
+  const area = { levels: [] };
   for (const name of readdirSync(modules).filter((name) => name.endsWith(".slm"))) {
     const file = readFileSync(join(modules, name));
     const word = (at) => file.readUInt32LE(at);
     [area.rows, area.cols, area.side] = [word(32), word(36), word(56) / 128];
     area.origin = [file.readDoubleLE(72), file.readDoubleLE(80)];
     let at = word(12);
-    for (let row = word(40); row < word(44); row++) {
-      for (let col = word(48); col < word(52); col++, at += 32) {
-        area.counts.set(row * area.cols + col, { triangles: word(at + 16), polygons: word(at + 20) });
+    for (let level = 0; level < file.readUInt16LE(10); level++) {
+      const counts = (area.levels[level] ??= new Map());
+      for (let row = word(40); row < word(44); row++) {
+        for (let col = word(48); col < word(52); col++, at += 32) {
+          counts.set(row * area.cols + col, { triangles: word(at + 16), polygons: word(at + 20) });
+        }
       }
     }
   }
-  return area;
+  return { ...area, counts: area.levels[0] };
 }
 
 async function check() {
@@ -191,8 +194,28 @@ async function counted(page, when) {
     }
   }
   expect(found.fullest === fullest, `${fullest ?? "no"} ${area.limits.count} in the fullest window ${when}`);
+  if (1 < area.levels) farther(found, area, when);
   const seen = found.view.triangles;
   expect(0 < seen && seen <= triangles, `${seen} triangles in view ${when}`);
+}
+
+/** Around the block there are load modules at coarser levels, each at the level of its ring. */
+function farther(found, area, when) {
+  const inside = ([south, west, north, east], row, col) => south <= row && row < north && west <= col && col < east;
+  const expected = new Map();
+  for (let row = 0; row < own.rows; row++) {
+    for (let col = 0; col < own.cols; col++) {
+      const level = found.blocks.findIndex((block) => inside(block, row, col));
+      if (0 < level) expected.set(row * own.cols + col, level);
+    }
+  }
+  const right = found.coarser.filter(([level, row, col, triangles]) => {
+    const key = row * own.cols + col;
+    return expected.get(key) === level && own.levels[level].get(key).triangles === triangles;
+  });
+  expect(found.blocks.length === area.levels && right.length === expected.size
+    && found.coarser.length === expected.size,
+  `${expected.size} load modules at coarser levels around them ${when}, ${right.length} right`);
 }
 
 /** Drives north with the keys, looking for holes on the way. */

@@ -24,6 +24,10 @@ RUSTFLAGS="$flags" CARGO_TARGET_DIR="$build" cargo build --release --target "$ho
 seed() {
     local target=$1 ending
     mkdir -p "corpus/$target" "artifacts/$target"
+    if [[ $target == module_file ]]; then
+        python3 -B ../scripts/fuzz_seeds.py ../FORMAT.md "corpus/$target"
+        return 0
+    fi
     [[ -n ${TIEFORT_DATA:-} ]] || return 0
     case $target in
         geotiff) endings=(tif) ;;

@@ -47,17 +47,18 @@ def padded(length):
 
 
 def parse(data):
-    """The header, and the load modules in the order of the file."""
+    """The header, and the load modules at every level, in the order of the file."""
     header, header_length = parse_header(data)
     (south, north), (west, east) = header["rows"], header["columns"]
     places = [(row, column) for row in range(south, north) for column in range(west, east)]
+    places = [(level, place) for level in range(header["levels"]) for place in places]
     index_length = ENTRY.size * len(places) + 4
     index = checked(data, header_length, index_length, "index")
     end = header_length + index_length
     modules = []
-    for place, entry in zip(places, ENTRY.iter_unpack(index)):
+    for (level, place), entry in zip(places, ENTRY.iter_unpack(index)):
         expect(entry[0] == end, "index", f"load module {place} begins at {entry[0]}, expected {end}")
-        modules.append(parse_module(data, header["side"], place, entry))
+        modules.append(parse_module(data, header["side"], level, place, entry))
         end += entry[1]
     expect(end == len(data), "index", f"sections end at {end} of a file of {len(data)}")
     return header, modules
@@ -71,7 +72,7 @@ def parse_header(data):
     expect(version == VERSION, part, f"found version {version}, expected {VERSION}")
     expect(FIXED_HEADER_BYTES + 4 <= length, part, f"found header length {length}")
     body = checked(data, 0, length, part)
-    expect(levels == 1, part, f"found {levels} levels, expected 1")
+    expect(1 <= levels <= 8, part, f"found {levels} levels, expected 1 to 8")
     expect(file_length == len(data), part, f"found {len(data)} bytes, expected {file_length}")
     tile_row, tile_column, area_rows, area_columns = struct.unpack_from("<4I", body, 24)
     south, north, west, east = struct.unpack_from("<4I", body, 40)
@@ -91,6 +92,7 @@ def parse_header(data):
     except UnicodeDecodeError as error:
         raise Damaged(f"{part}: {error}") from error
     return {
+        "levels": levels,
         "tile": [tile_row, tile_column],
         "area_modules": [area_rows, area_columns],
         "rows": [south, north],
@@ -105,13 +107,13 @@ def parse_header(data):
     }, length
 
 
-def parse_module(data, side, place, entry):
-    part = f"load module {place[0]},{place[1]}"
+def parse_module(data, side, level, place, entry):
+    part = f"load module {place[0]},{place[1]}" + (f" at level {level}" if level else "")
     offset, length, vertex_count, triangle_count, polygons, lowest, highest = entry
     body = checked(data, offset, length, part)
     expect(SECTION.size <= len(body), part, f"found a section of {length} bytes")
-    row, column, level, *counts = SECTION.unpack_from(body)
-    expect((row, column, level) == (*place, 0), part, f"found row {row}, column {column}, level {level}")
+    row, column, found, *counts = SECTION.unpack_from(body)
+    expect((row, column, found) == (*place, level), part, f"found row {row}, column {column}, level {found}")
     expect(tuple(counts[:3]) == (vertex_count, triangle_count, polygons), part, f"found counts {counts[:3]}")
     expect(4 <= vertex_count <= 65535 and 1 <= polygons <= triangle_count, part, f"found counts {counts[:3]}")
     side_counts, residual = counts[3:7], counts[7:]
@@ -132,6 +134,7 @@ def parse_module(data, side, place, entry):
     return {
         "row": row,
         "column": column,
+        "level": level,
         "polygons": polygons,
         "residual": dict(zip(["posts", "largest", "sum_abs", "sum_squared"], residual)),
         "vertices": vertices,
@@ -175,22 +178,30 @@ def check_sides(sides, vertices, side, part):
 
 
 def summary(header, modules):
+    finest = [module for module in modules if module["level"] == 0]
+    triangles = [len(module["triangles"]) for module in finest]
+    (south, north), (west, east) = header["rows"], header["columns"]
+    lines = [
+        f"tile           {header['tile'][0]},{header['tile'][1]}",
+        f"crs            {header['crs']}, heights above {header['vertical_datum'] or 'an unknown datum'}",
+        f"origin         {header['origin_m'][0]} east, {header['origin_m'][1]} north (of the area)",
+        f"load modules   {len(finest)}: rows {south} to {north - 1}, columns {west} to {east - 1}",
+        f"side           {header['side'] / 128} m, spacing {header['spacing_m']} m",
+        f"triangles      {sum(triangles)}, at most {max(triangles)} in a load module",
+        f"polygons       {sum(module['polygons'] for module in finest)}",
+        f"rms residual   {rms(finest)}",
+    ]
+    for level in range(1, header["levels"]):
+        own = [module for module in modules if module["level"] == level]
+        count = sum(len(module["triangles"]) for module in own)
+        lines.append(f"level {level}        {count} triangles, rms residual {rms(own)}")
+    return "\n".join(lines)
+
+
+def rms(modules):
     posts = sum(module["residual"]["posts"] for module in modules)
     squares = sum(module["residual"]["sum_squared"] for module in modules)
-    triangles = [len(module["triangles"]) for module in modules]
-    (south, north), (west, east) = header["rows"], header["columns"]
-    return "\n".join(
-        [
-            f"tile           {header['tile'][0]},{header['tile'][1]}",
-            f"crs            {header['crs']}, heights above {header['vertical_datum'] or 'an unknown datum'}",
-            f"origin         {header['origin_m'][0]} east, {header['origin_m'][1]} north (of the area)",
-            f"load modules   {len(modules)}: rows {south} to {north - 1}, columns {west} to {east - 1}",
-            f"side           {header['side'] / 128} m, spacing {header['spacing_m']} m",
-            f"triangles      {sum(triangles)}, at most {max(triangles)} in a load module",
-            f"polygons       {sum(module['polygons'] for module in modules)}",
-            f"rms residual   {math.sqrt(squares / posts) / 128:.3f} m over {posts} posts" if posts else "no posts",
-        ]
-    )
+    return f"{math.sqrt(squares / posts) / 128:.3f} m over {posts} posts" if posts else "of no posts"
 
 
 def main():

@@ -17,7 +17,9 @@ fn with_checksums(bytes: &[u8]) -> Vec<u8> {
     let header = word(&bytes, 12);
     let rows = word(&bytes, 44).saturating_sub(word(&bytes, 40));
     let columns = word(&bytes, 52).saturating_sub(word(&bytes, 48));
-    let index = header.saturating_add(rows.saturating_mul(columns).saturating_mul(INDEX_ENTRY_BYTES)).saturating_add(4);
+    let levels = word(&bytes, 8) >> 16;
+    let entries = rows.saturating_mul(columns).saturating_mul(levels);
+    let index = header.saturating_add(entries.saturating_mul(INDEX_ENTRY_BYTES)).saturating_add(4);
     for entry in (header..index.min(bytes.len())).step_by(INDEX_ENTRY_BYTES) {
         let (offset, length) = (word(&bytes, entry), word(&bytes, entry + 8));
         seal(&mut bytes, offset, offset.saturating_add(length));
@@ -38,10 +40,10 @@ fn seal(bytes: &mut [u8], from: usize, to: usize) {
 fuzz_target!(|bytes: &[u8]| {
     for bytes in [bytes.to_vec(), with_checksums(bytes)] {
         let direct = SlmFile::parse(&bytes);
-        let decoded = database::decode_modules(Path::new("fuzz.slm"), &bytes);
+        let decoded = database::decode_levels(Path::new("fuzz.slm"), &bytes);
         assert!(direct.is_ok() || decoded.is_err(), "the database read what the reader refuses");
-        if let Ok((header, modules)) = decoded {
-            assert_eq!(database::encode_modules(&header, &modules), bytes, "read, written and not the same");
+        if let Ok((header, levels)) = decoded {
+            assert_eq!(database::encode_levels(&header, &levels), bytes, "read, written and not the same");
         }
     }
 });

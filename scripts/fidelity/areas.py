@@ -113,7 +113,7 @@ def judge_database(database, area):
         side, cells = header["side"], header["side_cells"]
         lines[0].add(header["columns"][0] * cells)
         lines[1].add(header["rows"][0] * cells)
-        for module in modules:
+        for module in (module for module in modules if module["level"] == 0):
             own = []
             for x, y, z in module["vertices"]:
                 point = (module["column"] * side + x, module["row"] * side + y, z)

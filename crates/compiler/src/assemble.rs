@@ -6,6 +6,7 @@ use job::{Borders, ClipHeights as JobClipHeights, Edges};
 use load_modules::{ClipHeights, Layout, clip, concatenate};
 use terrain::{LATTICE_PER_POST, LatticePoint, LoadModule, ModuleResidual, Post, PostRect, TileId, Vertex};
 
+use crate::levels::all_levels;
 use crate::measured::{from_measured, to_measured};
 use crate::refine::Published;
 use crate::run::{ALGORITHM_REVISION, Run, Worked};
@@ -19,6 +20,8 @@ pub(crate) struct Assembled {
     pub measured: FileStamp,
     /// Per load module of the tile, row by row.
     pub modules: Vec<ModuleNumbers>,
+    /// The same of every level beside the finest.
+    pub coarser: Vec<Vec<ModuleNumbers>>,
     pub residuals: Residuals,
     /// Against the source's own posts, where those are others than the working grid's.
     pub at_source: Option<Tally>,
@@ -85,11 +88,13 @@ pub(crate) fn assemble_tile(
     };
     let residuals = fidelity::measure(&mut modules, &window.measured(area));
     let at_source = run.ground.relief.residuals_at_source(&modules, area, area.tiling.rect(tile))?;
-    let (file, is_new) = publish(run, tile, &layout, fingerprint, &modules)?;
+    let mut levels = all_levels(run, modules, &layout, &window);
+    levels[1..].iter_mut().for_each(|level| drop(fidelity::measure(level, &window.measured(area))));
+    let (file, is_new) = publish(run, tile, &layout, fingerprint, &levels)?;
     let (points, border) = count_points(run, own, &removed[area.tiling.index(tile)], &window.importance);
-    let modules = modules.iter().map(numbers).collect();
-    let nothing = FileStamp::of(&[]);
-    let mut done = Assembled { file, measured: nothing, modules, residuals, at_source, points, border, is_new };
+    let (modules, coarser) = numbers_of(&levels);
+    let measured = FileStamp::of(&[]);
+    let mut done = Assembled { file, measured, modules, coarser, residuals, at_source, points, border, is_new };
     done.measured = run.database.write_measured(&stamp, &to_measured(tile, &done))?;
     Ok(done)
 }
@@ -113,24 +118,31 @@ fn kept(run: &Run, stamp: &Stamp, tile: TileId) -> Option<Assembled> {
     let folder = run.database.folder();
     let (found, measured) = folder.read_measured(tile).ok()?;
     let area = &run.area;
-    let is_whole = |measured: &Measured| measured.modules.len() == area.tiling.modules(tile, area.grid).iter().count();
+    let count = area.tiling.modules(tile, area.grid).count();
+    let is_whole = |measured: &Measured| measured.modules.len() == count * run.job.lod.level_count();
     let is_fresh = found == *stamp && is_whole(&measured);
     folder.check_file(&folder.modules_path(tile), &measured.modules_file).ok().filter(|()| is_fresh)?;
     let file = folder.stamp_file(&folder.measured_path(tile)).ok()?;
-    Some(from_measured(measured, file))
+    Some(from_measured(measured, count, file))
 }
 
 /// The published load modules of a tile as they are: their own numbers, and residuals against today's ground.
 pub(crate) fn read_assembled(run: &Run, tins: &[Published], tile: TileId) -> Result<Assembled, CompileError> {
     let (area, folder, window) = (&run.area, run.database.folder(), run.window(tile)?);
-    let (_, mut modules) = folder.read_modules(tile)?;
+    let (_, mut levels) = folder.read_levels(tile)?;
     let file = folder.stamp_file(&folder.modules_path(tile))?;
-    let as_published = modules.iter().map(numbers).collect();
-    let residuals = fidelity::measure(&mut modules, &window.measured(area));
-    let at_source = run.ground.relief.residuals_at_source(&modules, area, area.tiling.rect(tile))?;
+    let (modules, coarser) = numbers_of(&levels);
+    let residuals = fidelity::measure(&mut levels[0], &window.measured(area));
+    let at_source = run.ground.relief.residuals_at_source(&levels[0], area, area.tiling.rect(tile))?;
     let (points, border) = count_points(run, &tins[area.tiling.index(tile)], &[], &window.importance);
     let measured = folder.stamp_file(&folder.measured_path(tile))?;
-    Ok(Assembled { file, measured, modules: as_published, residuals, at_source, points, border, is_new: false })
+    Ok(Assembled { file, measured, modules, coarser, residuals, at_source, points, border, is_new: false })
+}
+
+/// Numbers of the finest level, and of each of the others.
+fn numbers_of(levels: &[Vec<LoadModule>]) -> (Vec<ModuleNumbers>, Vec<Vec<ModuleNumbers>>) {
+    let mut all = levels.iter().map(|level| level.iter().map(numbers).collect());
+    (all.next().unwrap_or_default(), all.collect())
 }
 
 fn numbers(module: &LoadModule) -> ModuleNumbers {
@@ -155,6 +167,9 @@ pub(crate) fn points_around(run: &Run, tins: &TinOf, removed: &[Vec<LatticePoint
 /// Of all that the load modules of a tile are made from.
 fn modules_fingerprint(run: &Run, tins: &TinOf, removed: &[Vec<LatticePoint>], tile: TileId) -> Fingerprint {
     let mut builder = FingerprintBuilder::new("modules").text(&format!("{:?}", run.job.modules));
+    if 1 < run.job.lod.level_count() {
+        builder = builder.text(&format!("{:?}", run.job.lod));
+    }
     let mut reach = match run.job.modules.edges {
         Edges::Constrained => Vec::new(),
         Edges::Clip(_) => run.area.tiling.neighbours(tile),
@@ -176,7 +191,7 @@ fn publish(
     tile: TileId,
     layout: &Layout,
     fingerprint: Fingerprint,
-    modules: &[LoadModule],
+    levels: &[Vec<LoadModule>],
 ) -> Result<(FileStamp, bool), CompileError> {
     let header = TileModules {
         tile,
@@ -187,13 +202,13 @@ fn publish(
         vertical_datum: run.job.dem.vertical_datum.clone().unwrap_or_default(),
         fingerprint,
     };
-    let bytes = database::encode_modules(&header, modules);
+    let bytes = database::encode_levels(&header, levels);
     let stamp = FileStamp::of(&bytes);
     let folder = run.database.folder();
     if folder.check_file(&folder.modules_path(tile), &stamp).is_ok() {
         return Ok((stamp, false));
     }
-    Ok((run.database.write_modules(&header, modules)?, true))
+    Ok((run.database.write_modules(&header, levels)?, true))
 }
 
 /// The area's coordinate reference system, as files name it.

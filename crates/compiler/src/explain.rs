@@ -48,6 +48,8 @@ pub struct Explanation {
     pub residual_m: [f64; 3],
     /// Posts measured.
     pub posts: u32,
+    /// Of every level, the finest first: triangles, RMS and largest residual in metres; none where there is only one.
+    pub levels: Vec<(u32, f64, f64)>,
     /// Its place among all load modules by RMS residual, the worst being 1, and how many there are.
     pub place: (usize, usize),
     /// Posts that were refused here, largest residual first.
@@ -122,7 +124,8 @@ pub fn explain(
     let (_, tin) = folder.read_tile(planned.tile)?;
     let allocation = folder.read_json(files::ALLOCATION)?;
     let splits = splits(&product, workers)?;
-    Ok(Explanation { no_ground, ..explained(&product, module, &tin, &allocation, splits.as_deref()) })
+    let levels = levels(&folder, planned.tile, module)?;
+    Ok(Explanation { no_ground, levels, ..explained(&product, module, &tin, &allocation, splits.as_deref()) })
 }
 
 fn check_inside(module: ModuleId, product: &Product) -> Result<(), CompileError> {
@@ -202,7 +205,22 @@ fn explained(
         refused: refused(product, tin, id),
         one_more: splits.and_then(|splits| one_more(product, splits, module)),
         no_ground: None,
+        levels: Vec::new(),
     }
+}
+
+/// Triangles, RMS and largest residual of every level of a load module, where there are several.
+fn levels(folder: &Folder, tile: TileId, id: ModuleId) -> Result<Vec<(u32, f64, f64)>, CompileError> {
+    let (_, levels) = folder.read_levels(tile)?;
+    if levels.len() == 1 {
+        return Ok(Vec::new());
+    }
+    let metre = f64::from(QUANTA_PER_METRE);
+    let figures = |module: &LoadModule| {
+        let rms = mean_squares(module.residual.sum_squared as f64, module).sqrt();
+        (module.triangles.len() as u32, rms / metre, f64::from(module.residual.largest) / metre)
+    };
+    Ok(levels.iter().flatten().filter(|module| module.id == id).map(figures).collect())
 }
 
 fn mean_squares(squares: f64, module: &LoadModule) -> f64 {

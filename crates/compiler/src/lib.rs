@@ -24,6 +24,7 @@ mod played;
 pub use played::{Costs, Played, TileCosts, play};
 mod locate;
 pub use locate::{Corner, corners, find_area};
+mod levels;
 mod look;
 pub use look::{Seen, Suggestion, look_at};
 mod status;
@@ -34,6 +35,9 @@ mod raster;
 pub use raster::{Mesh, TinMethod, TinRequest, TinStart, tin};
 mod sample;
 pub use sample::sample;
+mod tin_levels;
+mod tin_tally;
+pub use tin_levels::tin_levels;
 mod compare;
 pub use compare::{
     CompareEvent, CompareGround, CompareMethod, CompareRequest, CompareRow, Comparison, Equivalent, Forced, Impossible,

@@ -19,7 +19,7 @@ pub(crate) fn to_measured(tile: TileId, assembled: &Assembled) -> Measured {
     Measured {
         tile,
         modules_file: assembled.file,
-        modules: assembled.modules.iter().map(module).collect(),
+        modules: std::iter::once(&assembled.modules).chain(&assembled.coarser).flatten().map(module).collect(),
         classes: assembled.residuals.classes.iter().map(to_tally).collect(),
         at_source: assembled.at_source.as_ref().map(to_tally),
         points: assembled.points.clone(),
@@ -27,8 +27,8 @@ pub(crate) fn to_measured(tile: TileId, assembled: &Assembled) -> Measured {
     }
 }
 
-/// What was kept, in a file of this stamp.
-pub(crate) fn from_measured(measured: Measured, file: FileStamp) -> Assembled {
+/// What was kept of a tile of `count` load modules, in a file of this stamp.
+pub(crate) fn from_measured(measured: Measured, count: usize, file: FileStamp) -> Assembled {
     let module = |module: &MeasuredModule| ModuleNumbers {
         triangles: module.triangles,
         polygons: module.polygons,
@@ -39,10 +39,13 @@ pub(crate) fn from_measured(measured: Measured, file: FileStamp) -> Assembled {
             sum_squared: module.sum_squared,
         },
     };
+    let mut levels = measured.modules.chunks(count.max(1)).map(|level| level.iter().map(module).collect());
+    let modules = levels.next().unwrap_or_default();
     Assembled {
         file: measured.modules_file,
         measured: file,
-        modules: measured.modules.iter().map(module).collect(),
+        modules,
+        coarser: levels.collect(),
         residuals: Residuals { classes: measured.classes.iter().map(from_tally).collect() },
         at_source: measured.at_source.as_ref().map(from_tally),
         points: measured.points,

@@ -2,19 +2,17 @@
 
 use std::collections::HashMap;
 use std::path::PathBuf;
-use std::sync::OnceLock;
 use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, OnceLock};
 
 use database::ReportResidual;
-use fidelity::Tally;
 use geometry::WORKING_POSTS_MAX;
-use geometry::owned::{PostGrid, visit_residuals};
 use job::{ErrorKey, Optimising, StartMethod};
 use schedule::{Event as Scheduled, RankedTasks, Workers, in_rank_order_observed};
-use source_files::{DemFile, Reading, VoidPolicy};
+use source_files::{DemFile, RasterFrame, Reading, VoidPolicy};
 use terrain::{
-    Dem, GainCurve, Importance, LATTICE_PER_POST, LatticePoint, Metres, ModuleGrid, Post, PostRect, SeamSides,
-    StopReason, THOUSANDTHS, TileId, TileTin, Tin, Vertex, quanta_of_metres,
+    Dem, GainCurve, Importance, LatticePoint, Metres, ModuleGrid, PostRect, SeamSides, StopReason, THOUSANDTHS, TileId,
+    TileTin, Tin, Vertex, quanta_of_metres,
 };
 use tiling::{Gains, Order, Tiling, points_equally, points_globally};
 use tin::{CostUnit, Frame, LastBatch, Proximity, Rule, Stop, SurveyTask, TileTask};
@@ -24,6 +22,7 @@ use crate::ground::Window;
 use crate::refinement::{Most, Refinement};
 use crate::sources::decode;
 use crate::tasks::{inherited, posts_of};
+use crate::tin_tally::tally_of;
 use crate::{CompileError, Event, Progress, Stage};
 
 /// The paper's proximity test: metres across, metres in height.
@@ -81,7 +80,7 @@ pub struct Mesh {
     /// Vertices and triangles; rows and columns are the raster's, from its south-west post.
     pub tin: Tin,
     /// The raster's heights.
-    pub dem: Dem,
+    pub dem: Arc<Dem>,
     /// Easting of post (0, 0), in metres.
     pub east_m: f64,
     /// Northing of post (0, 0), in metres.
@@ -103,44 +102,70 @@ pub struct Mesh {
 /// # Errors
 /// When the raster cannot be used, or nothing says when to stop.
 pub fn tin(request: &TinRequest, stop: &AtomicBool, progress: &mut dyn Progress) -> Result<Mesh, CompileError> {
-    let workers = Workers::new(request.workers);
-    progress.tell(Event::Enter(Stage::Read, 0));
-    let file = DemFile::open(&request.dem, &Reading::AS_IT_SAYS)?;
-    file.frame().require_metres()?;
-    let mut raster = decode(&file, file.rect(), &workers, stop)?;
-    raster.settle_voids(VoidPolicy::Hole)?;
-    let scale = file.sample_scale();
-    let dem = Dem::from_fn(file.rect(), |post| {
-        raster.sample(post).and_then(|sample| quanta_of_metres(scale.height_m(sample)))
-    });
-    progress.tell(Event::Leave(Stage::Read));
-
-    let frame = file.frame();
-    let mut job = TinJob::new(request, &dem, frame.spacing)?;
-    if let Some(TinStart::File(path)) = &request.start {
-        job.given = posts_of_file(path, frame, dem.rect())?;
-        job.refuse_given()?;
-    }
-    let curves = job.survey(&dem, &workers, stop, progress)?;
-    let tiles = job.refine(&dem, curves.as_deref(), &workers, stop, progress)?;
-
+    let heights = Heights::read(request, stop, progress)?;
+    let tiles = heights.refine(request, stop, progress)?;
     progress.tell(Event::Enter(Stage::Assemble, 0));
     let exhausted = tiles.iter().any(|tile| tile.stop == StopReason::Exhausted);
     let stop = if exhausted { StopReason::Exhausted } else { tiles[0].stop };
-    let tin = join(dem.rect(), &tiles);
-    let residual = crate::report::residual_of(&tally_of(&dem, &tin));
+    let mesh = heights.mesh(join(heights.dem.rect(), &tiles), stop);
     progress.tell(Event::Leave(Stage::Assemble));
-    Ok(Mesh {
-        points: tin.vertices.len(),
-        tin,
-        east_m: frame.south_west[0],
-        north_m: frame.south_west[1],
-        spacing_m: (frame.spacing[0], frame.spacing[1]),
-        epsg: frame.crs.epsg(),
-        residual,
-        stop,
-        dem,
-    })
+    Ok(mesh)
+}
+
+/// A raster's heights, and where they lie.
+pub(crate) struct Heights {
+    pub dem: Arc<Dem>,
+    frame: RasterFrame,
+}
+
+impl Heights {
+    /// Those that a request names.
+    pub fn read(request: &TinRequest, stop: &AtomicBool, progress: &mut dyn Progress) -> Result<Self, CompileError> {
+        let workers = Workers::new(request.workers);
+        progress.tell(Event::Enter(Stage::Read, 0));
+        let file = DemFile::open(&request.dem, &Reading::AS_IT_SAYS)?;
+        file.frame().require_metres()?;
+        let mut raster = decode(&file, file.rect(), &workers, stop)?;
+        raster.settle_voids(VoidPolicy::Hole)?;
+        let scale = file.sample_scale();
+        let dem = Dem::from_fn(file.rect(), |post| {
+            raster.sample(post).and_then(|sample| quanta_of_metres(scale.height_m(sample)))
+        });
+        progress.tell(Event::Leave(Stage::Read));
+        Ok(Self { dem: Arc::new(dem), frame: file.frame().clone() })
+    }
+
+    /// The tiles of a request over these heights.
+    pub fn refine(
+        &self,
+        request: &TinRequest,
+        stop: &AtomicBool,
+        progress: &mut dyn Progress,
+    ) -> Result<Vec<TileTin>, CompileError> {
+        let workers = Workers::new(request.workers);
+        let mut job = TinJob::new(request, &self.dem, self.frame.spacing)?;
+        if let Some(TinStart::File(path)) = &request.start {
+            job.given = posts_of_file(path, &self.frame, self.dem.rect())?;
+            job.refuse_given()?;
+        }
+        let curves = job.survey(&self.dem, &workers, stop, progress)?;
+        job.refine(&self.dem, curves.as_deref(), &workers, stop, progress)
+    }
+
+    /// A TIN over them as a mesh.
+    pub fn mesh(&self, tin: Tin, stop: StopReason) -> Mesh {
+        Mesh {
+            points: tin.vertices.len(),
+            residual: crate::report::residual_of(&tally_of(&self.dem, &tin)),
+            tin,
+            dem: Arc::clone(&self.dem),
+            east_m: self.frame.south_west[0],
+            north_m: self.frame.south_west[1],
+            spacing_m: (self.frame.spacing[0], self.frame.spacing[1]),
+            epsg: self.frame.crs.epsg(),
+            stop,
+        }
+    }
 }
 
 /// The TIN of one tile without load modules, over all of `dem`.
@@ -448,39 +473,4 @@ fn join(rect: PostRect, tiles: &[TileTin]) -> Tin {
         joined.triangles.extend(part.triangles.iter().map(|corners| corners.map(|v| places[v as usize])));
     }
     joined
-}
-
-/// Residuals at every post that a TIN covers and that is not void, each counted once.
-pub(crate) fn tally_of(dem: &Dem, tin: &Tin) -> Tally {
-    let mut tally = Tally::default();
-    for triangle in &tin.triangles {
-        visit_triangle(dem, triangle.map(|v| tin.vertices[v as usize]), &mut tally);
-    }
-    tally
-}
-
-fn visit_triangle(dem: &Dem, corners: [Vertex; 3], tally: &mut Tally) {
-    let rect = dem.rect();
-    // Counted from a post near the triangle, its corners stay small in a raster of any size.
-    let least = |pick: fn(&Vertex) -> i32| {
-        corners.iter().map(pick).min().expect("a triangle has corners").div_euclid(LATTICE_PER_POST)
-    };
-    let origin = Post::new(least(|vertex| vertex.at.row), least(|vertex| vertex.at.col));
-    let from = LatticePoint::from(origin);
-    let grid = PostGrid {
-        origin,
-        units_per_post: LATTICE_PER_POST,
-        far_row: Some(rect.north - origin.row),
-        far_col: Some(rect.east - origin.col),
-    };
-    let facet = geometry::Facet::new(
-        corners.map(|vertex| vertex.at.col - from.col),
-        corners.map(|vertex| vertex.at.row - from.row),
-        corners.map(|vertex| vertex.height),
-    );
-    visit_residuals(&grid, &facet, dem, |post, residual| {
-        if !dem.is_void(post) {
-            tally.add(residual);
-        }
-    });
 }

@@ -180,6 +180,31 @@ pub(crate) fn problems(grid: ModuleGrid, modules: &BTreeMap<ModuleId, LoadModule
     problems
 }
 
+/// What is wrong where load modules of any two levels meet, a sentence each: every one is sound by itself.
+pub(crate) fn problems_between(grid: ModuleGrid, levels: &[BTreeMap<ModuleId, LoadModule>]) -> Vec<String> {
+    let known: Vec<BTreeMap<ModuleId, Sides>> = levels
+        .iter()
+        .map(|modules| modules.iter().filter_map(|(&id, module)| Some((id, sides(module).ok()?))).collect())
+        .collect();
+    let mut problems = Vec::new();
+    let pairs = (0..known.len()).flat_map(|here| (0..known.len()).map(move |there| (here, there)));
+    for (here, there) in pairs.filter(|(here, there)| here != there) {
+        for id in grid.all().iter() {
+            let Some(own) = known[here].get(&id) else { continue };
+            let (east, north) = (ModuleId { col: id.col + 1, ..id }, ModuleId { row: id.row + 1, ..id });
+            let beside = known[there].get(&east).map(|other| ("eastern", own.east == other.west));
+            let above = known[there].get(&north).map(|other| ("northern", own.north == other.south));
+            for (name, _) in [beside, above].into_iter().flatten().filter(|(_, is_shared)| !is_shared) {
+                problems.push(format!(
+                    "load module {id}: its edges on the {name} side at level {here} are not its neighbour's at level \
+                     {there}: a crack"
+                ));
+            }
+        }
+    }
+    problems
+}
+
 #[cfg(test)]
 mod tests {
     use terrain::ModuleVertex;
@@ -240,6 +265,18 @@ mod tests {
         junction.triangles[0] = [0, 1, 5];
         junction.triangles.push([1, 4, 5]);
         check([junction, square(1, false)], "on one side only: a crack");
+    }
+
+    #[test]
+    fn cracks_between_levels_are_found() {
+        let grid = ModuleGrid { rows: 1, cols: 2, side_cells: 4 };
+        let level = |extra: bool| -> BTreeMap<_, _> {
+            [square(0, extra), square(1, false)].into_iter().map(|module| (module.id, module)).collect()
+        };
+        assert_eq!(problems_between(grid, &[level(false), level(false)]), [""; 0]);
+        let found = problems_between(grid, &[level(false), level(true)]);
+        let expected = "load module 0,0: its edges on the eastern side at level 1 are not its neighbour's at level 0: ";
+        assert_eq!(found, [format!("{expected}a crack")]);
     }
 
     #[test]

@@ -3,8 +3,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use database::{
-    Report, ReportBefore, ReportBreach, ReportClass, ReportPerModule, ReportPerWindow, ReportPoints, ReportPool,
-    ReportRefusals, ReportResidual, ReportStops, ReportVoids, Totals,
+    Report, ReportBefore, ReportBreach, ReportClass, ReportLevel, ReportPerModule, ReportPerWindow, ReportPoints,
+    ReportPool, ReportRefusals, ReportResidual, ReportStops, ReportVoids, Totals,
 };
 use fidelity::{Residuals, Tally};
 use job::Count;
@@ -63,6 +63,7 @@ impl Findings<'_> {
             residual: residual_of(&total),
             residual_against_source: run.ground.relief.has_source_posts().then(|| self.at_source(&total)),
             classes: self.classes(&residuals),
+            levels: self.levels(),
             overall_point_weighted_rms_m: self.point_weighted_rms_m(&residuals),
             dem_accuracy_m: run.ground.accuracy_m,
             voids: ReportVoids {
@@ -188,6 +189,19 @@ impl Findings<'_> {
         self.run.job.importance.classes.iter().enumerate().map(class).collect()
     }
 
+    /// Figures of every level, where there are several.
+    fn levels(&self) -> Vec<ReportLevel> {
+        let shares = &self.run.job.lod.inner_shares;
+        if shares.is_empty() {
+            return Vec::new();
+        }
+        let finest = self.assembled.iter().flat_map(|tile| &tile.modules);
+        let coarser = |at: usize| self.assembled.iter().filter_map(move |tile| tile.coarser.get(at)).flatten();
+        let first = level_figures(0, 1.0, finest);
+        let rest = shares.iter().enumerate().map(|(at, &share)| level_figures(at as u32 + 1, share, coarser(at)));
+        std::iter::once(first).chain(rest).collect()
+    }
+
     /// The paper's way to pool classes: each by its points, not by its posts.
     fn point_weighted_rms_m(&self, residuals: &Residuals) -> f64 {
         let (mut squares, mut points) = (0.0, 0.0);
@@ -303,6 +317,20 @@ impl Findings<'_> {
             })
             .collect()
     }
+}
+
+/// Figures of one level from those of its load modules.
+fn level_figures<'a>(level: u32, inner_share: f64, modules: impl Iterator<Item = &'a ModuleNumbers>) -> ReportLevel {
+    let (mut triangles, mut posts, mut squares, mut largest) = (0, 0, 0u128, 0);
+    for ModuleNumbers { triangles: own, residual, .. } in modules {
+        triangles += u64::from(*own);
+        posts += u64::from(residual.posts);
+        squares += u128::from(residual.sum_squared);
+        largest = largest.max(residual.largest);
+    }
+    let metre = f64::from(terrain::QUANTA_PER_METRE);
+    let rms_m = if posts == 0 { 0.0 } else { (squares as f64 / posts as f64).sqrt() / metre };
+    ReportLevel { level, inner_share, triangles, rms_m, max_m: f64::from(largest) / metre }
 }
 
 /// A tally as the report gives it.

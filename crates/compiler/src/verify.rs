@@ -1,19 +1,19 @@
 //! Re-reads a database and believes nothing it says: files, TINs, load modules, sides, identities, limits.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
 use database::{Folder, Manifest, ManifestState, ReportResidual};
 use fidelity::Residuals;
-use job::{Count, DemSource, Edges, Job, SourceEntry, SourceFile, SourceSaid};
+use job::{Count, DemSource, Edges, Job, LodBorder, SourceEntry, SourceFile, SourceSaid};
 use limits::{polygons_of, triangles_of};
 use schedule::Workers;
 use terrain::{LoadModule, ModuleId, Side};
 
 use crate::CompileError;
 use crate::area::GamingArea;
-use crate::ground::Ground;
+use crate::ground::{Ground, Window};
 use crate::recount;
 use crate::report::residual_of;
 
@@ -49,17 +49,17 @@ pub fn verify(folder: &Path, dem: Option<&Path>) -> Result<Verdict, CompileError
         return Ok(verdict);
     }
     let (job, area) = job_of(&manifest, folder.dir())?;
-    let modules = read_modules(&folder, &area)?;
+    let levels = read_levels(&folder, &area, job.lod.level_count())?;
+    let modules = &levels[0];
     verdict.checked_modules = modules.len();
-    verdict.problems.extend(check_modules(&area, &modules));
-    verdict.problems.extend(recount::problems(area.grid, &modules));
+    verdict.problems.extend(check_levels(&job, &area, &levels));
     // With constrained edges no limit is ever exceeded; with clipped ones only where a breach says so.
     if job.modules.edges == Edges::Constrained || manifest.totals.breaches == 0 {
-        verdict.problems.extend(check_limits(&job, &area, &modules));
+        verdict.problems.extend(check_limits(&job, &area, modules));
     }
-    verdict.problems.extend(check_totals(&manifest, &modules));
+    verdict.problems.extend(check_totals(&manifest, modules));
     if let Some(dem) = dem {
-        let residuals = recompute(job, &area, dem, &modules, &mut verdict.problems)?;
+        let residuals = recompute(job, &area, dem, &levels, &mut verdict.problems)?;
         verdict.residual = Some(residual_of(&residuals.total()));
     }
     Ok(verdict)
@@ -88,8 +88,11 @@ pub(crate) fn job_of(manifest: &Manifest, folder: &Path) -> Result<(Job, GamingA
     Ok((job, area))
 }
 
-/// All load modules by place, checked one by one as they are decoded.
-pub(crate) fn read_modules(folder: &Folder, area: &GamingArea) -> Result<BTreeMap<ModuleId, LoadModule>, CompileError> {
+/// Load modules by place.
+type Modules = BTreeMap<ModuleId, LoadModule>;
+
+/// All load modules by place, at their finest level, checked one by one as they are decoded.
+pub(crate) fn read_modules(folder: &Folder, area: &GamingArea) -> Result<Modules, CompileError> {
     let mut all = BTreeMap::new();
     for &tile in &area.tiles {
         let (_, modules) = folder.read_modules(tile)?;
@@ -98,7 +101,57 @@ pub(crate) fn read_modules(folder: &Folder, area: &GamingArea) -> Result<BTreeMa
     Ok(all)
 }
 
-fn check_modules(area: &GamingArea, modules: &BTreeMap<ModuleId, LoadModule>) -> Vec<String> {
+/// The same at every level, the finest first; a level that is not in all files lacks load modules, and one that the job
+/// does not want comes after the others.
+fn read_levels(folder: &Folder, area: &GamingArea, level_count: usize) -> Result<Vec<Modules>, CompileError> {
+    let mut all = vec![BTreeMap::new(); level_count];
+    for &tile in &area.tiles {
+        let (_, levels) = folder.read_levels(tile)?;
+        all.resize_with(all.len().max(levels.len()), BTreeMap::new);
+        for (own, modules) in all.iter_mut().zip(levels) {
+            own.extend(modules.into_iter().map(|module| (module.id, module)));
+        }
+    }
+    Ok(all)
+}
+
+/// Every level on its own, then how they fit together.
+fn check_levels(job: &Job, area: &GamingArea, levels: &[Modules]) -> Vec<String> {
+    let mut problems = Vec::new();
+    let (found, expected) = (levels.len(), job.lod.level_count());
+    if expected < found {
+        problems.push(format!("load modules: {found} levels in a file, the job has {expected}"));
+    }
+    for (level, modules) in levels.iter().enumerate() {
+        let own = [check_modules(area, modules), recount::problems(area.grid, modules)].concat();
+        problems.extend(own.into_iter().map(|problem| at_level(level, problem)));
+        if 0 < level {
+            problems.extend(check_coarser(level, modules, &levels[level - 1]));
+        }
+    }
+    if job.lod.border == LodBorder::Full && problems.is_empty() {
+        problems.extend(recount::problems_between(area.grid, levels));
+    }
+    problems
+}
+
+fn at_level(level: usize, problem: String) -> String {
+    if level == 0 { problem } else { format!("level {level}: {problem}") }
+}
+
+/// A coarser level holds no place that the finer one lacks.
+fn check_coarser(level: usize, modules: &Modules, finer: &Modules) -> Vec<String> {
+    let is_new = |module: &&LoadModule| {
+        let known: BTreeSet<(u16, u16)> =
+            finer.get(&module.id).into_iter().flat_map(|finer| &finer.vertices).map(|v| (v.y, v.x)).collect();
+        module.vertices.iter().any(|v| !known.contains(&(v.y, v.x)))
+    };
+    let new = modules.values().filter(is_new);
+    new.map(|module| format!("level {level}: load module {}: a vertex that the finer level has not", module.id))
+        .collect()
+}
+
+fn check_modules(area: &GamingArea, modules: &Modules) -> Vec<String> {
     let mut problems = Vec::new();
     for module in area.grid.all().iter() {
         let Some(found) = modules.get(&module) else {
@@ -147,7 +200,7 @@ fn side_of(module: &LoadModule, side: Side) -> Vec<(u16, i32)> {
 }
 
 /// Counts against every limit, from the load modules themselves.
-fn check_limits(job: &Job, area: &GamingArea, modules: &BTreeMap<ModuleId, LoadModule>) -> Vec<String> {
+fn check_limits(job: &Job, area: &GamingArea, modules: &Modules) -> Vec<String> {
     let count = |module: &LoadModule| match job.limits.count {
         Count::Triangles => module.triangles.len() as u32,
         Count::Polygons => module.polygon_count,
@@ -170,7 +223,7 @@ fn check_limits(job: &Job, area: &GamingArea, modules: &BTreeMap<ModuleId, LoadM
     problems
 }
 
-fn check_totals(manifest: &Manifest, modules: &BTreeMap<ModuleId, LoadModule>) -> Vec<String> {
+fn check_totals(manifest: &Manifest, modules: &Modules) -> Vec<String> {
     let sum = |of: fn(&LoadModule) -> u64| modules.values().map(of).sum::<u64>();
     let totals = &manifest.totals;
     let pairs = [
@@ -188,7 +241,7 @@ fn recompute(
     mut job: Job,
     area: &GamingArea,
     dem: &Path,
-    modules: &BTreeMap<ModuleId, LoadModule>,
+    levels: &[Modules],
     problems: &mut Vec<String>,
 ) -> Result<Residuals, CompileError> {
     let written = dem.display().to_string();
@@ -200,19 +253,31 @@ fn recompute(
     let mut all = Residuals::default();
     for &tile in &area.tiles {
         let window = ground.tile(area, tile)?;
-        let mut own: Vec<LoadModule> =
-            area.tiling.modules(tile, area.grid).iter().filter_map(|module| modules.get(&module).cloned()).collect();
-        all.merge(&fidelity::measure(&mut own, &window.measured(area)));
-        let recounted = |module: &LoadModule| {
-            recount::residual(module, &window.dem, area.grid, area.frame.spacing) == module.residual
-        };
-        problems.extend(own.iter().filter(|module| !recounted(module)).map(|module| {
-            format!("load module {}: two ways to measure its residuals against this DEM disagree", module.id)
-        }));
-        let differs = |module: &&LoadModule| modules[&module.id].residual != module.residual;
-        problems.extend(own.iter().filter(differs).map(|module| {
-            format!("load module {}: its residuals against this DEM are not those in its file", module.id)
-        }));
+        for (level, modules) in levels.iter().enumerate() {
+            let ids = area.tiling.modules(tile, area.grid);
+            let mut own: Vec<LoadModule> = ids.iter().filter_map(|module| modules.get(&module).cloned()).collect();
+            let residuals = fidelity::measure(&mut own, &window.measured(area));
+            if level == 0 {
+                all.merge(&residuals);
+            }
+            let of_level = differing_residuals(&own, modules, &window, area);
+            problems.extend(of_level.into_iter().map(|problem| at_level(level, problem)));
+        }
     }
     Ok(all)
+}
+
+/// Load modules, measured just now, whose residuals are not those of a second opinion or of their files.
+fn differing_residuals(own: &[LoadModule], listed: &Modules, window: &Window, area: &GamingArea) -> Vec<String> {
+    let recounted =
+        |module: &LoadModule| recount::residual(module, &window.dem, area.grid, area.frame.spacing) == module.residual;
+    let doubtful = own.iter().filter(|module| !recounted(module)).map(|module| {
+        format!("load module {}: two ways to measure its residuals against this DEM disagree", module.id)
+    });
+    let differs = |module: &&LoadModule| listed[&module.id].residual != module.residual;
+    let wrong = own
+        .iter()
+        .filter(differs)
+        .map(|module| format!("load module {}: its residuals against this DEM are not those in its file", module.id));
+    doubtful.chain(wrong).collect()
 }

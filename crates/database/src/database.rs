@@ -12,7 +12,7 @@ use crate::lock::LOCK_NAME;
 use crate::publish::{Durability, is_temporary, remove_left_over, sync, write_atomically};
 use crate::{
     Area, DatabaseError, FileStamp, Folder, Lock, Manifest, ManifestState, Measured, Removals, Stamp, TileModules,
-    Work, encode_curve, encode_measured, encode_modules, encode_removals, encode_tile, json,
+    Work, encode_curve, encode_levels, encode_measured, encode_removals, encode_tile, json,
 };
 
 /// The folders of a database that stay.
@@ -148,15 +148,15 @@ impl Database {
         publish(&self.folder.removals_path(removals.tile), &encode_removals(stamp, removals))
     }
 
-    /// Publishes a tile's load modules.
+    /// Publishes a tile's load modules at every level, the finest first.
     ///
     /// # Errors
     /// As [`Database::write_tile`].
     ///
     /// # Panics
-    /// As [`encode_modules`].
-    pub fn write_modules(&self, tile: &TileModules, modules: &[LoadModule]) -> Result<FileStamp, DatabaseError> {
-        publish(&self.folder.modules_path(tile.tile), &encode_modules(tile, modules))
+    /// As [`encode_levels`].
+    pub fn write_modules(&self, tile: &TileModules, levels: &[Vec<LoadModule>]) -> Result<FileStamp, DatabaseError> {
+        publish(&self.folder.modules_path(tile.tile), &encode_levels(tile, levels))
     }
 
     /// Publishes what was measured of a tile's load modules.

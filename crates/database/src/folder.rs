@@ -160,7 +160,18 @@ impl Folder {
         Ok((stamp, read))
     }
 
-    /// The load modules of `tile`, each sound, and what holds for all of them.
+    /// The load modules of `tile` at every level, the finest first, each sound, and what holds for all of them.
+    ///
+    /// # Errors
+    /// When the file is missing, damaged or of another tile, or a load module is unsound.
+    pub fn read_levels(&self, tile: TileId) -> Result<(TileModules, Vec<Vec<LoadModule>>), DatabaseError> {
+        let path = self.modules_path(tile);
+        let (header, levels) = slm::decode_levels(&path, &read(&path)?)?;
+        same_tile(path, header.tile, tile)?;
+        Ok((header, levels))
+    }
+
+    /// The load modules of `tile` at their finest level, each sound, and what holds for all of them.
     ///
     /// # Errors
     /// When the file is missing, damaged or of another tile, or a load module is unsound.

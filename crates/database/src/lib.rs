@@ -36,7 +36,7 @@ pub use measured_file::{Measured, MeasuredModule, MeasuredTally, decode_measured
 mod slm;
 /// Version of the load-module files.
 pub use load_module_reader::VERSION as MODULES_FORMAT_VERSION;
-pub use slm::{TileModules, decode_modules, encode_modules};
+pub use slm::{TileModules, decode_levels, decode_modules, encode_levels, encode_modules};
 mod json;
 mod page;
 pub use page::seal_page;
@@ -46,8 +46,9 @@ pub use manifest::{
 };
 mod report;
 pub use report::{
-    Report, ReportBefore, ReportBound, ReportBreach, ReportClass, ReportPerModule, ReportPerWindow, ReportPlace,
-    ReportPoints, ReportPool, ReportRefusals, ReportResidual, ReportStage, ReportStops, ReportTile, ReportVoids,
+    Report, ReportBefore, ReportBound, ReportBreach, ReportClass, ReportLevel, ReportPerModule, ReportPerWindow,
+    ReportPlace, ReportPoints, ReportPool, ReportRefusals, ReportResidual, ReportStage, ReportStops, ReportTile,
+    ReportVoids,
 };
 mod lock;
 mod publish;

@@ -18,7 +18,7 @@ pub struct Measured {
     pub tile: TileId,
     /// The bytes of the load-module file that was measured.
     pub modules_file: FileStamp,
-    /// Numbers of each load module, row by row.
+    /// Numbers of each load module, level by level, row by row.
     pub modules: Vec<MeasuredModule>,
     /// Residuals against the working grid, by class of ground.
     pub classes: Vec<MeasuredTally>,

@@ -39,6 +39,9 @@ pub struct Report {
     pub residual_against_source: Option<ReportResidual>,
     /// The same for each class of the mask, in the job's order.
     pub classes: Vec<ReportClass>,
+    /// Levels of detail, the finest first; none where there is only that one.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub levels: Vec<ReportLevel>,
     /// RMS over all classes, each post counted once, whatever its class: in metres.
     pub overall_point_weighted_rms_m: f64,
     /// What the source says of its own accuracy, in metres.
@@ -170,6 +173,21 @@ pub struct ReportClass {
     pub points: u64,
     /// Its residuals.
     pub residual: ReportResidual,
+}
+
+/// One level of detail of all load modules.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ReportLevel {
+    /// Its number; 0 is the finest.
+    pub level: u32,
+    /// The share of the finest level's inner vertices that the job wants.
+    pub inner_share: f64,
+    /// Triangles of all load modules.
+    pub triangles: u64,
+    /// Root mean square residual against the working grid, in metres.
+    pub rms_m: f64,
+    /// Largest residual, in metres.
+    pub max_m: f64,
 }
 
 /// Posts without a height in the source.
@@ -328,6 +346,7 @@ mod tests {
             residual: ReportResidual { rms_m: 1.1, max_m: 9.0, mean_abs_m: 0.7, p95_m: 2.0, p99_m: 3.3 },
             residual_against_source: None,
             classes: vec![],
+            levels: vec![ReportLevel { level: 1, inner_share: 0.5, triangles: 20, rms_m: 1.5, max_m: 11.25 }],
             overall_point_weighted_rms_m: 1.1,
             dem_accuracy_m: Some(2.5),
             voids: ReportVoids::default(),
@@ -361,7 +380,8 @@ mod tests {
             "/per_load_module/mean /per_load_module/max /per_load_module/limit /per_load_module/over",
             "/per_4km/max /per_4km/limit /per_4km/over /per_4km/worst_9x9 /voids/count /voids/filled /warnings",
             "/breaches/0/kind /breaches/0/where /breaches/0/count /breaches/0/limit /breaches/0/excess",
-            "/breaches/0/refused /breaches/0/rms_with_m /breaches/0/rms_without_m",
+            "/breaches/0/refused /breaches/0/rms_with_m /breaches/0/rms_without_m /levels/0/level /levels/0/triangles",
+            "/levels/0/rms_m /levels/0/max_m",
         ]
         .iter()
         .flat_map(|line| line.split(' '))

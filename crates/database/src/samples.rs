@@ -137,6 +137,20 @@ pub(crate) fn modules() -> Vec<LoadModule> {
     vec![west, east]
 }
 
+/// The same load modules at three levels: as they are, all flat, all flat.
+pub(crate) fn levels() -> Vec<Vec<LoadModule>> {
+    let fine = modules();
+    let flat = |module: &LoadModule| LoadModule {
+        vertices: module.vertices.iter().copied().filter(|v| v.x == 0 || v.x == module.side).collect(),
+        residual: ModuleResidual { largest: 2 * module.residual.largest, ..module.residual },
+        id: module.id,
+        ..fine[0].clone()
+    };
+    let coarse: Vec<_> = fine.iter().map(flat).collect();
+    coarse.iter().for_each(|module| assert_eq!(module.check(), Ok(())));
+    vec![fine, coarse.clone(), coarse]
+}
+
 pub(crate) fn area() -> Area {
     Area {
         name: "sample".into(),

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use load_module_reader::{
-    FIXED_HEADER_BYTES, Header, INDEX_ENTRY_BYTES, LEVEL_COUNT, MAGIC, Module, QUANTA_PER_METRE, SlmFile, VERSION,
+    FIXED_HEADER_BYTES, Header, INDEX_ENTRY_BYTES, LEVELS_MAX, MAGIC, Module, QUANTA_PER_METRE, SlmFile, VERSION,
 };
 use terrain::{
     GridFrame, LoadModule, ModuleGrid, ModuleId, ModuleRect, ModuleResidual, ModuleVertex, Side, Spacing, TileId,
@@ -37,37 +37,56 @@ impl TileModules {
     }
 }
 
-/// The bytes of the file that holds `modules`.
+/// The bytes of the file that holds `modules`, at one level.
 ///
 /// # Panics
-/// When `modules` are not exactly those of the tile, row by row from the south-west, each with the tile's side and
-/// lists that belong together (and, in debug builds, sound: [`LoadModule::check`]).
+/// As [`encode_levels`].
 pub fn encode_modules(tile: &TileModules, modules: &[LoadModule]) -> Vec<u8> {
-    assert!(modules.iter().map(|module| module.id).eq(tile.modules.iter()), "a tile's file holds all its load modules");
+    encode(tile, &[modules])
+}
+
+/// The bytes of the file that holds these levels of a tile's load modules, the finest first.
+///
+/// # Panics
+/// When there are none or more than eight, or the load modules of one are not exactly those of the tile, row by row from
+/// the south-west, each with the tile's side and lists that belong together (and, in debug builds, sound:
+/// [`LoadModule::check`]).
+pub fn encode_levels(tile: &TileModules, levels: &[Vec<LoadModule>]) -> Vec<u8> {
+    encode(tile, &levels.iter().map(Vec::as_slice).collect::<Vec<_>>())
+}
+
+fn encode(tile: &TileModules, levels: &[&[LoadModule]]) -> Vec<u8> {
+    let level_count = u16::try_from(levels.len()).ok().filter(|count| (1..=LEVELS_MAX).contains(count));
+    let level_count = level_count.expect("a tile's file holds one level or a few");
     let header_length = (FIXED_HEADER_BYTES + tile.crs.len() + tile.vertical_datum.len()).next_multiple_of(4) + 4;
-    let index_length = modules.len() * INDEX_ENTRY_BYTES + 4;
+    let index_length = levels.len() * tile.modules.count() * INDEX_ENTRY_BYTES + 4;
     let mut index = Vec::with_capacity(index_length);
     let mut sections = Vec::new();
-    for module in modules {
-        assert_eq!(i64::from(module.side), tile.side(), "load module {} has the side of the tile's grid", module.id);
-        debug_assert_eq!(module.check(), Ok(()), "load module {} is sound before it is written", module.id);
-        let start = sections.len();
-        put_module(&mut sections, module);
-        let offset = (header_length + index_length + start) as u64;
-        put_entry(&mut index, module, offset, (sections.len() - start) as u32);
+    for (level, modules) in (0..).zip(levels) {
+        let is_whole = modules.iter().map(|module| module.id).eq(tile.modules.iter());
+        assert!(is_whole, "a tile's file holds all its load modules");
+        for module in *modules {
+            let id = module.id;
+            assert_eq!(i64::from(module.side), tile.side(), "load module {id} has the side of the tile's grid");
+            debug_assert_eq!(module.check(), Ok(()), "load module {id} is sound before it is written");
+            let start = sections.len();
+            put_module(&mut sections, module, level);
+            let offset = (header_length + index_length + start) as u64;
+            put_entry(&mut index, module, offset, (sections.len() - start) as u32);
+        }
     }
     put_checksum(&mut index, 0);
     let file_length = header_length + index.len() + sections.len();
     let mut file = Vec::with_capacity(file_length);
-    put_header(&mut file, tile, header_length as u32, file_length as u64);
+    put_header(&mut file, tile, level_count, header_length as u32, file_length as u64);
     file.extend_from_slice(&index);
     file.extend_from_slice(&sections);
     file
 }
 
-fn put_header(file: &mut Vec<u8>, tile: &TileModules, header_length: u32, file_length: u64) {
+fn put_header(file: &mut Vec<u8>, tile: &TileModules, level_count: u16, header_length: u32, file_length: u64) {
     file.extend_from_slice(&MAGIC);
-    put_u16s(file, [VERSION, LEVEL_COUNT]);
+    put_u16s(file, [VERSION, level_count]);
     put_u32s(file, [header_length]);
     file.extend_from_slice(&file_length.to_le_bytes());
     put_u32s(file, [tile.tile.row, tile.tile.col, tile.grid.rows, tile.grid.cols]);
@@ -95,10 +114,10 @@ fn put_entry(index: &mut Vec<u8>, module: &LoadModule, offset: u64, length: u32)
     }
 }
 
-fn put_module(file: &mut Vec<u8>, module: &LoadModule) {
+fn put_module(file: &mut Vec<u8>, module: &LoadModule, level: u32) {
     let start = file.len();
     let counts = [module.vertices.len() as u32, module.triangles.len() as u32, module.polygon_count];
-    put_u32s(file, [module.id.row, module.id.col, 0]);
+    put_u32s(file, [module.id.row, module.id.col, level]);
     put_u32s(file, counts);
     let sides = Side::ALL.map(|side| module.side_vertices(side));
     put_u16s(file, sides.iter().map(|side| side.len() as u16));
@@ -137,21 +156,35 @@ fn put_checksum(file: &mut Vec<u8>, start: usize) {
     file.extend_from_slice(&checksum.to_le_bytes());
 }
 
-/// The load modules in the file at `path` that has these bytes, each checked with [`LoadModule::check`].
+/// The load modules, at their finest level, in the file at `path` that has these bytes, each checked with
+/// [`LoadModule::check`].
 ///
 /// # Errors
 /// When the file is not as it was written, or a load module in it is not sound.
 pub fn decode_modules(path: &Path, bytes: &[u8]) -> Result<(TileModules, Vec<LoadModule>), DatabaseError> {
+    let (tile, levels) = decode_levels(path, bytes)?;
+    let finest = levels.into_iter().next().expect("the reader refuses a file without a level");
+    Ok((tile, finest))
+}
+
+/// The load modules at every level, the finest first, in the file at `path` that has these bytes, each checked with
+/// [`LoadModule::check`].
+///
+/// # Errors
+/// When the file is not as it was written, or a load module in it is not sound.
+pub fn decode_levels(path: &Path, bytes: &[u8]) -> Result<(TileModules, Vec<Vec<LoadModule>>), DatabaseError> {
     let fault = |fault| DatabaseError::Modules { path: path.to_path_buf(), fault: Box::new(fault) };
     let file = SlmFile::parse(bytes).map_err(fault)?;
-    let tile = tile_of(file.header());
-    let side = file.header().side;
-    let modules: Vec<LoadModule> = file.modules().iter().map(|module| load_module(module, side)).collect();
-    for module in &modules {
+    let header = file.header();
+    let level = |level: u16| -> Vec<LoadModule> {
+        file.level(level).unwrap_or(&[]).iter().map(|module| load_module(module, header.side)).collect()
+    };
+    let levels: Vec<Vec<LoadModule>> = (0..header.level_count).map(level).collect();
+    for module in levels.iter().flatten() {
         let unsound = |fault| DatabaseError::UnsoundModule { path: path.to_path_buf(), module: module.id, fault };
         module.check().map_err(unsound)?;
     }
-    Ok((tile, modules))
+    Ok((tile_of(header), levels))
 }
 
 fn tile_of(header: &Header) -> TileModules {
@@ -202,6 +235,17 @@ mod tests {
         let bytes = encode_modules(&tile, &modules);
         assert_eq!(decode(&bytes).unwrap(), (tile.clone(), modules.clone()));
         assert_eq!(encode_modules(&tile, &modules), bytes);
+    }
+
+    #[test]
+    fn levels_survive_their_file() {
+        let (tile, levels) = (samples::tile_modules(), samples::levels());
+        let bytes = encode_levels(&tile, &levels);
+        let path = Path::new("r00c01.slm");
+        assert_eq!(decode_levels(path, &bytes).unwrap(), (tile.clone(), levels.clone()));
+        assert_eq!(decode(&bytes).unwrap(), (tile.clone(), levels[0].clone()));
+        assert_eq!(encode_levels(&tile, &levels[..1]), encode_modules(&tile, &levels[0]));
+        samples::check_every_damage(&bytes, |bytes| decode_levels(path, bytes).is_err());
     }
 
     #[test]

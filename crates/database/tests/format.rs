@@ -6,7 +6,7 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use database::{Fingerprint, TileModules, encode_modules};
+use database::{Fingerprint, TileModules, encode_levels, encode_modules};
 use serde_json::{Value, json};
 use terrain::{
     GridFrame, LoadModule, ModuleGrid, ModuleId, ModuleRect, ModuleResidual, ModuleVertex, Side, Spacing, TileId,
@@ -101,8 +101,28 @@ fn the_python_reader_finds_what_was_written() {
     let Some(output) = python(&["scripts/read_slm.py", "--json", path.to_str().unwrap()]) else { return };
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let dump: Value = serde_json::from_slice(&output.stdout).unwrap();
-    assert_eq!(dump["header"], header_as_json());
-    assert_eq!(dump["modules"], Value::Array(modules.iter().map(as_json).collect()));
+    assert_eq!(dump["header"], header_as_json(1));
+    assert_eq!(dump["modules"], Value::Array(modules.iter().map(|module| as_json(module, 0)).collect()));
+}
+
+#[test]
+fn the_python_reader_finds_every_level() {
+    let tile = tile(2, 3);
+    let fine: Vec<_> = tile.modules.iter().map(pyramid).collect();
+    let coarse: Vec<_> = tile.modules.iter().map(flat).collect();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("r00c00.slm");
+    let bytes = encode_levels(&tile, &[fine.clone(), coarse.clone()]);
+    std::fs::write(&path, &bytes).unwrap();
+    let Some(output) = python(&["scripts/read_slm.py", "--json", path.to_str().unwrap()]) else { return };
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let dump: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(dump["header"], header_as_json(2));
+    let fine = fine.iter().map(|module| as_json(module, 0));
+    assert_eq!(dump["modules"], Value::Array(fine.chain(coarse.iter().map(|module| as_json(module, 1))).collect()));
+    let Some(output) = python(&["scripts/read_slm.py", path.to_str().unwrap()]) else { return };
+    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(said.contains("level 1        12 triangles, rms residual 0.673 m over 2646 posts"), "{said}");
 }
 
 #[test]
@@ -145,8 +165,9 @@ fn pyramid(id: ModuleId) -> LoadModule {
     module
 }
 
-fn header_as_json() -> Value {
+fn header_as_json(levels: u32) -> Value {
     json!({
+        "levels": levels,
         "tile": [0, 0], "area_modules": [2, 3], "rows": [0, 2], "columns": [0, 3],
         "side": 64000, "side_cells": 20, "spacing_m": 25.0, "origin_m": [505000.0, 3875000.0],
         "crs": "EPSG:32611", "vertical_datum": "EGM96",
@@ -154,12 +175,13 @@ fn header_as_json() -> Value {
     })
 }
 
-fn as_json(module: &LoadModule) -> Value {
+fn as_json(module: &LoadModule, level: u32) -> Value {
     let [south, east, north, west] = Side::ALL.map(|side| module.side_vertices(side));
     let residual = &module.residual;
     json!({
         "row": module.id.row,
         "column": module.id.col,
+        "level": level,
         "polygons": module.polygon_count,
         "residual": {
             "posts": residual.posts, "largest": residual.largest,

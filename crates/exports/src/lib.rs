@@ -13,7 +13,7 @@ pub use error::ExportError;
 mod work;
 pub use work::{Put, Step, Work};
 mod product;
-pub use product::{Block, Product};
+pub use product::{Block, Levels, Product};
 mod mesh;
 pub use mesh::{Coordinates, Mesh};
 mod sidecar;

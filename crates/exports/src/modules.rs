@@ -1,6 +1,6 @@
 //! One load-module file (`FORMAT.md`) per load module, for simulators that page single files.
 
-use database::{TileModules, encode_modules};
+use database::{TileModules, encode_levels};
 use terrain::{ModuleId, ModuleRect};
 
 use crate::{ExportError, Product, Put, Work};
@@ -10,7 +10,8 @@ pub(crate) fn file_name(id: ModuleId, extension: &str) -> String {
     format!("r{:04}c{:04}.{extension}", id.row, id.col)
 }
 
-/// Writes every load module of a product as a file of its own, a tile's file that holds one load module.
+/// Writes every load module of a product, at all of its levels, as a file of its own: a tile's file that holds one load
+/// module.
 ///
 /// # Errors
 /// When a file cannot be written, or the work was asked to stop.
@@ -23,7 +24,9 @@ pub fn write_modules(product: &Product, put: &Put, work: &Work) -> Result<(), Ex
         let tile = &product.tiles[product.tile_of[index] as usize];
         let header = TileModules { modules: alone, ..tile.clone() };
         let name = file_name(module.id, "slm");
-        put(&name, &encode_modules(&header, std::slice::from_ref(module))).map_err(ExportError::write(&name))
+        let coarser = product.coarser.iter().map(|level| vec![level[index].clone()]);
+        let levels: Vec<_> = std::iter::once(vec![module.clone()]).chain(coarser).collect();
+        put(&name, &encode_levels(&header, &levels)).map_err(ExportError::write(&name))
     })?;
     Ok(())
 }
@@ -41,20 +44,31 @@ mod tests {
 
     #[test]
     fn each_file_holds_one_load_module_as_it_was() {
-        let product = samples::product();
+        check(&samples::product());
+    }
+
+    #[test]
+    fn each_file_holds_all_levels_of_its_load_module() {
+        check(&samples::with_levels());
+    }
+
+    #[track_caller]
+    fn check(product: &Product) {
         let files = Mutex::new(Vec::new());
         let put = |name: &str, bytes: &[u8]| {
             files.lock().unwrap().push((name.to_owned(), bytes.to_vec()));
             Ok(())
         };
         let (workers, stop) = (Workers::new(2), AtomicBool::new(false));
-        write_modules(&product, &put, &Work { workers: &workers, stop: &stop, tell: &|_| {} }).unwrap();
+        write_modules(product, &put, &Work { workers: &workers, stop: &stop, tell: &|_| {} }).unwrap();
         let mut files = files.into_inner().unwrap();
         files.sort();
         assert_eq!(files.iter().map(|(name, _)| &**name).collect::<Vec<_>>(), ["r0000c0000.slm", "r0000c0001.slm"]);
-        for ((name, bytes), module) in files.iter().zip(&product.modules) {
-            let (header, read) = database::decode_modules(Path::new(name), bytes).unwrap();
-            assert_eq!((header.modules.count(), &read[..]), (1, std::slice::from_ref(module)));
+        for (index, (name, bytes)) in files.iter().enumerate() {
+            let (header, read) = database::decode_levels(Path::new(name), bytes).unwrap();
+            assert_eq!((header.modules.count(), read.len()), (1, 1 + product.coarser.len()));
+            let levels: Vec<_> = product.levels().map(|level| vec![level.modules[index].clone()]).collect();
+            assert_eq!(read, levels);
         }
     }
 }

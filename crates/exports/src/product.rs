@@ -16,6 +16,15 @@ pub struct Block {
     pub north_east: ModuleId,
 }
 
+/// Which levels of detail are exported.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Levels {
+    /// This one alone; 0 is the finest.
+    One(usize),
+    /// This one and all that are coarser.
+    From(usize),
+}
+
 /// The load modules of a block, each sound, and what holds for all of them.
 #[derive(Clone, Debug)]
 pub struct Product {
@@ -27,8 +36,12 @@ pub struct Product {
     pub frame: GridFrame,
     /// The load modules that are exported.
     pub rect: ModuleRect,
+    /// Their level of detail; 0 is the finest.
+    pub level: usize,
     /// These, row by row from the south-west.
     pub modules: Vec<LoadModule>,
+    /// The same at coarser levels, where these are exported, too.
+    pub coarser: Vec<Vec<LoadModule>>,
     /// The tile of each of them.
     pub(crate) tiles: Vec<TileModules>,
     /// Place in `tiles` of each module's tile.
@@ -39,8 +52,8 @@ impl Product {
     /// Reads the load modules of `block`, or all of the area.
     ///
     /// # Errors
-    /// When the database is missing, unfinished or damaged, or has no such load modules.
-    pub fn read(folder: &Path, block: Option<Block>, work: &Work) -> Result<Self, ExportError> {
+    /// When the database is missing, unfinished or damaged, or has no such load modules or levels.
+    pub fn read(folder: &Path, block: Option<Block>, wanted: Levels, work: &Work) -> Result<Self, ExportError> {
         let folder = Folder::new(folder);
         let manifest = folder.manifest()?;
         if manifest.state != ManifestState::Complete {
@@ -49,37 +62,51 @@ impl Product {
         let rect = rect_of(&manifest, block)?;
         let ids: Vec<TileId> = manifest.tiles.iter().map(database::TileRecord::tile).collect();
         let read = work.each("tiles read", &ids, |&tile| {
-            let (tile, mut modules) = folder.read_modules(tile)?;
-            modules.retain(|module| rect.contains(module.id));
-            Ok((tile, modules))
+            let (tile, levels) = folder.read_levels(tile)?;
+            let mut levels = wanted.of(levels)?;
+            levels.iter_mut().for_each(|modules| modules.retain(|module| rect.contains(module.id)));
+            Ok((tile, levels))
         })?;
-        Self::put_together(manifest, rect, read)
+        Self::put_together(manifest, rect, wanted.first(), read)
     }
 
     fn put_together(
         manifest: Manifest,
         rect: ModuleRect,
-        read: Vec<(TileModules, Vec<LoadModule>)>,
+        level: usize,
+        read: Vec<(TileModules, Vec<Vec<LoadModule>>)>,
     ) -> Result<Self, ExportError> {
         let mut tiles = Vec::new();
-        let mut placed: Vec<(u32, LoadModule)> = Vec::with_capacity(rect.count());
-        for (tile, modules) in read {
-            placed.extend(modules.into_iter().map(|module| (tiles.len() as u32, module)));
+        let level_count = read.iter().map(|(_, levels)| levels.len()).max().unwrap_or(0);
+        let mut placed: Vec<Vec<(u32, LoadModule)>> = vec![Vec::with_capacity(rect.count()); level_count];
+        for (tile, levels) in read {
+            for (placed, modules) in placed.iter_mut().zip(levels) {
+                placed.extend(modules.into_iter().map(|module| (tiles.len() as u32, module)));
+            }
             tiles.push(tile);
         }
-        placed.sort_by_key(|(_, module)| module.id);
-        let whole = placed.iter().map(|(_, module)| module.id).eq(rect.iter());
-        let (Some(first), true) = (tiles.first(), whole) else {
-            return Err(ExportError::Impossible {
-                what: "the database".into(),
-                found: format!("{} load modules in its files", placed.len()),
-                expected: format!("{}, each once", rect.count()),
-                hint: "the database is damaged: `tiefort verify` says where".into(),
-            });
-        };
+        let mut levels = Vec::with_capacity(level_count);
+        let mut tile_of = Vec::new();
+        for mut placed in placed {
+            placed.sort_by_key(|(_, module)| module.id);
+            if !placed.iter().map(|(_, module)| module.id).eq(rect.iter()) {
+                return Err(damaged(placed.len(), rect));
+            }
+            let (tiles, modules): (Vec<u32>, Vec<LoadModule>) = placed.into_iter().unzip();
+            levels.push(modules);
+            tile_of = tiles;
+        }
+        let mut levels = levels.into_iter();
+        let (Some(first), Some(modules)) = (tiles.first(), levels.next()) else { return Err(damaged(0, rect)) };
         let (grid, frame) = (first.grid, first.frame);
-        let (tile_of, modules) = placed.into_iter().unzip();
-        Ok(Self { manifest, grid, frame, rect, modules, tiles, tile_of })
+        Ok(Self { manifest, grid, frame, rect, level, modules, coarser: levels.collect(), tiles, tile_of })
+    }
+
+    /// The same at each of its levels, from fine to coarse, one at a time.
+    pub(crate) fn levels(&self) -> impl Iterator<Item = Self> {
+        let coarser = (self.level + 1..).zip(&self.coarser);
+        let all = std::iter::once((self.level, &self.modules)).chain(coarser);
+        all.map(|(level, modules)| Self { level, modules: modules.clone(), coarser: Vec::new(), ..self.clone() })
     }
 
     /// Length of a load module's side in quanta of 1/128 m.
@@ -137,6 +164,44 @@ impl Product {
         starts(self.rect.south, self.rect.north)
             .flat_map(|south| starts(self.rect.west, self.rect.east).map(move |west| clipped(south, west)))
             .collect()
+    }
+}
+
+impl Levels {
+    /// The finest of them.
+    fn first(self) -> usize {
+        match self {
+            Levels::One(level) | Levels::From(level) => level,
+        }
+    }
+
+    /// Those of a file's levels.
+    fn of(self, mut levels: Vec<Vec<LoadModule>>) -> Result<Vec<Vec<LoadModule>>, ExportError> {
+        if levels.len() <= self.first() {
+            return Err(ExportError::Impossible {
+                what: "--lod".into(),
+                found: format!("level {}", self.first()),
+                expected: match levels.len() {
+                    1 => "0, the only level in the database".into(),
+                    count => format!("0 to {}: the database has {count} levels", count - 1),
+                },
+                hint: "[lod] levels in a job gives load modules more levels; `tiefort report` lists them".into(),
+            });
+        }
+        let mut wanted = levels.split_off(self.first());
+        if matches!(self, Levels::One(_)) {
+            wanted.truncate(1);
+        }
+        Ok(wanted)
+    }
+}
+
+fn damaged(found: usize, rect: ModuleRect) -> ExportError {
+    ExportError::Impossible {
+        what: "the database".into(),
+        found: format!("{found} load modules in its files"),
+        expected: format!("{}, each once", rect.count()),
+        hint: "the database is damaged: `tiefort verify` says where".into(),
     }
 }
 

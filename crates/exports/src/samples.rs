@@ -31,7 +31,29 @@ pub(crate) fn product() -> Product {
     };
     let mut manifest = Manifest::new(area(), "[area]\n".into(), 1);
     manifest.tiles = vec![TileRecord::missing(tile)];
-    Product { manifest, grid: GRID, frame, rect, modules: modules(), tiles: vec![tile_modules], tile_of: vec![0, 0] }
+    Product {
+        manifest,
+        grid: GRID,
+        frame,
+        rect,
+        level: 0,
+        modules: modules(),
+        coarser: Vec::new(),
+        tiles: vec![tile_modules],
+        tile_of: vec![0, 0],
+    }
+}
+
+/// The same with a coarser level, at which both load modules are two triangles.
+pub(crate) fn with_levels() -> Product {
+    let mut product = product();
+    let mut flat = product.modules.clone();
+    flat[1].vertices.remove(2);
+    (flat[1].triangles, flat[1].classes, flat[1].polygon_count) = (vec![[0, 1, 3], [0, 3, 2]], vec![0, 1], 2);
+    flat[1].residual.largest = 1200;
+    flat.iter().for_each(|module| assert_eq!(module.check(), Ok(())));
+    product.coarser = vec![flat];
+    product
 }
 
 /// The eastern load module alone.
@@ -120,6 +142,7 @@ pub(crate) fn report() -> Report {
         residual,
         residual_against_source: None,
         classes: Vec::new(),
+        levels: vec![],
         overall_point_weighted_rms_m: 1.0,
         dem_accuracy_m: None,
         voids: ReportVoids { count: 0, filled: 0 },

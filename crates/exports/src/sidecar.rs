@@ -40,6 +40,9 @@ impl Facts {
             format!("{}, in metres; heights above {datum}, in steps of 1/{QUANTA_PER_METRE} m", self.axes),
             format!("load modules {}", modules_text(product)),
         ];
+        if 0 < product.level {
+            lines.push(format!("level of detail {}, where 0 is the finest", product.level));
+        }
         match self.offset_m == [0.0; 3] {
             true => lines.push(format!("crs {}", product.crs())),
             false => lines.push(format!("offset {east_m} {north_m} {up_m} to {}: add it to x, y, z", product.crs())),
@@ -78,7 +81,7 @@ pub fn sidecar(product: &Product, mesh: &Mesh, facts: &Facts) -> String {
             "north_east": [rect.north - 1, rect.east - 1],
             "side_m": product.side_m(),
         },
-        "level": 0,
+        "level": product.level,
         "vertices": mesh.vertices.len(),
         "triangles": mesh.triangles.len(),
         "attribution": product.attributions(),

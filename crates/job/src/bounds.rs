@@ -7,6 +7,9 @@ pub const JOB_BYTES_MAX: u64 = 1 << 20;
 /// is exact in 64. It is 26,000 km at 25 m.
 pub const CELLS_A_SIDE_MAX: i32 = 1 << 20;
 
+/// Levels of a load module beside the finest: the file format counts up to eight.
+pub const COARSER_LEVELS_MAX: usize = 7;
+
 /// Load modules in the area: the ledger of counts holds each of them in memory.
 pub const MODULES_MAX: u64 = 1 << 24;
 

@@ -12,7 +12,7 @@ const SECTIONS: [(&str, &[Key]); 8] = [
     ("load_modules", LOAD_MODULES),
     ("limits", LIMITS),
     ("tin", TIN),
-    ("lod", &[("levels", "levels = []")]),
+    ("lod", LOD),
 ];
 
 const AREA: &[Key] = &[
@@ -84,6 +84,12 @@ const TIN: &[Key] = &[
     ("pins", "pins = \"pins.geojson\""),
 ];
 
+const LOD: &[Key] =
+    &[("levels", "levels = [{ inner_share = 0.5 }, { inner_share = 0.2 }]"), ("border", "border = \"full\"")];
+
+/// Keys of one entry of `lod.levels`.
+const LEVELS: &[Key] = &[("inner_share", "{ inner_share = 0.5 }, half of the vertices inside a load module")];
+
 /// Keys of one entry of `importance.areas`.
 const AREAS: &[Key] = &[
     ("file", "{ file = \"mountains.geojson\", class = \"mountains\", weight = 1 }"),
@@ -151,6 +157,7 @@ fn table(place: &str) -> &'static [Key] {
         "tin.start" => START,
         _ if place.starts_with("dem.sources[") => SOURCES,
         _ if place.starts_with("importance.areas[") => AREAS,
+        _ if place.starts_with("lod.levels[") => LEVELS,
         _ => SECTIONS.iter().find(|(name, _)| *name == place).map_or(&[], |(_, keys)| keys),
     }
 }

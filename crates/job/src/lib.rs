@@ -21,6 +21,8 @@ pub use model::{
 };
 mod ground;
 pub use ground::{GeoidSpec, WaterSpec};
+mod lod;
+pub use lod::{LodBorder, LodSpec};
 mod given;
 pub use given::{Start, StartMethod};
 mod find;

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use terrain::{ModuleGrid, Spacing};
 
-use crate::{GeoidSpec, Start, WaterSpec};
+use crate::{GeoidSpec, LodSpec, Start, WaterSpec};
 
 /// All a run needs, as the job file says it, defaults filled in.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,6 +25,8 @@ pub struct Job {
     pub limits: LimitsSpec,
     /// How posts are chosen.
     pub tin: TinSpec,
+    /// Coarser levels of load modules.
+    pub lod: LodSpec,
 }
 
 /// The gaming area and its working grid.

@@ -7,8 +7,8 @@ use terrain::{THOUSANDTHS, metres_of_quanta};
 
 use crate::{
     Allocation, AreaShape, Borders, Budget, ClipHeights, Count, DemSource, Edges, Effort, ErrorKey, GeoidSpec,
-    HeightFit, ImportanceArea, Job, LastBatch, Lattice, Method, Optimising, Resampling, SampleClass, Smooth,
-    SourceEntry, Start, TileOrder, TinSpec, Voids, WaterSpec,
+    HeightFit, ImportanceArea, Job, LastBatch, Lattice, LodBorder, LodSpec, Method, Optimising, Resampling,
+    SampleClass, Smooth, SourceEntry, Start, TileOrder, TinSpec, Voids, WaterSpec,
 };
 
 /// One setting of a job.
@@ -33,6 +33,7 @@ impl Job {
         self.describe_modules(&mut list);
         self.describe_limits(&mut list);
         self.describe_tin(&mut list);
+        describe_lod(&self.lod, &mut list);
         list.0
     }
 
@@ -414,6 +415,27 @@ fn describe_given(tin: &TinSpec, list: &mut List) {
         list.add("tin.pins", quoted(&file.written), meaning);
     }
 }
+
+/// Levels beside the finest; a job without any says nothing of them.
+fn describe_lod(lod: &LodSpec, list: &mut List) {
+    if lod.inner_shares.is_empty() {
+        return;
+    }
+    let levels: Vec<String> =
+        lod.inner_shares.iter().map(|&share| format!("{{ inner_share = {} }}", number(share))).collect();
+    let meaning =
+        format!("{} beside the finest, with this share of its inner vertices", counted(levels.len(), "level"));
+    list.add("lod.levels", format!("[{}]", levels.join(", ")), meaning);
+    match lod.border {
+        LodBorder::Full => {
+            list.add("lod.border", quoted("full"), "levels keep all vertices on sides: any two fit together")
+        }
+        LodBorder::Own => {
+            list.add("lod.border", quoted("own"), "levels keep their share on sides, too: equal levels fit together")
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -338,7 +338,7 @@ fn values_of_the_wrong_type_are_told_as_written() {
         "[area]",
         "lod = 3\n[area]",
         &[
-            "a/b.toml:1: lod: found the whole number 3, expected a table of levels",
+            "a/b.toml:1: lod: found the whole number 3, expected a table of levels, border",
             "hint: configs/ntc.toml shows the usual keys with what they mean",
         ],
     );
@@ -1263,16 +1263,68 @@ fn a_start_is_a_file_or_a_method_with_a_number_of_points() {
 }
 
 #[test]
-fn what_this_version_cannot_do_yet_is_said() {
+fn levels_are_few_and_go_from_fine_to_coarse() {
+    let expected = "the share of inner vertices that the level keeps, above 0 and below 1";
+    for share in ["1", "0", "-0.5", "1.5"] {
+        let found = format!("a/b.toml:17: lod.levels[0].inner_share: found {share}, expected {expected}");
+        let hint = "hint: for example { inner_share = 0.5 }, half of the vertices inside a load module";
+        check("pool", &format!("[lod]\nlevels = [{{ inner_share = {share} }}]"), &[&found, hint]);
+    }
     check(
         "pool",
-        "[lod]\nlevels = [{ inner_share = 0.5 }]",
+        "[lod]\nlevels = [\n{ inner_share = 0.2 },\n{ inner_share = 0.2 },\n]",
         &[
-            "a/b.toml:17: lod.levels: found [{ inner_share = 0.5 }] (not supported yet), expected [], the",
-            "finest level only",
-            "hint: remove the section: load modules have one level",
+            "a/b.toml:19: lod.levels[1].inner_share: found 0.2, expected less than 0.2, the share of the level before",
+            "hint: levels go from fine to coarse",
         ],
     );
+    let eight: Vec<String> = (1..=8).rev().map(|tenths| format!("{{ inner_share = 0.{tenths} }}")).collect();
+    check(
+        "pool",
+        &format!("[lod]\nlevels = [{}]", eight.join(", ")),
+        &[
+            "a/b.toml:17: lod.levels: found [{ inner_share = 0.8 }, { inner_share = 0.7 }, { inner_share…, expected",
+            "a list of at most 7 levels, each coarser than the one before",
+            "hint: the finest level is always there and is not listed",
+        ],
+    );
+    check(
+        "pool",
+        "[lod]\nlevels = [0.5]",
+        &[
+            "a/b.toml:17: lod.levels[0]: found the number 0.5, expected a table of inner_share",
+            "hint: for example levels = [{ inner_share = 0.5 }, { inner_share = 0.2 }]",
+        ],
+    );
+    check(
+        "pool",
+        "[lod]\nlevels = [{ share = 0.5 }]",
+        &[
+            "a/b.toml:17: lod.levels[0].share: found a key that no job has, expected one of inner_share",
+            "hint: configs/ntc.toml shows the usual keys with what they mean",
+        ],
+    );
+}
+
+#[test]
+fn what_levels_keep_of_the_sides_is_full_or_own() {
+    check(
+        "pool",
+        "[lod]\nlevels = []\nborder = \"own\"",
+        &[
+            r#"a/b.toml:18: lod.border: found "own" beside no levels, expected a job without this key"#,
+            "hint: it says what coarser levels keep of the sides: add levels, or leave it out",
+        ],
+    );
+    check(
+        "pool",
+        "[lod]\nlevels = [{ inner_share = 0.5 }]\nborder = \"ful\"",
+        &[r#"a/b.toml:18: lod.border: found "ful", expected "full" or "own""#, r#"hint: did you mean "full"?"#],
+    );
+}
+
+#[test]
+fn what_this_version_cannot_do_yet_is_said() {
     check(
         "rows",
         r#"borders = "line""#,

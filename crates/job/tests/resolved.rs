@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use job::{
     Allocation, AreaShape, Budget, ClipHeights, Count, DemSource, Edges, Effort, ErrorKey, HeightFit, Job, LastBatch,
-    Lattice, Method, Optimising, Proximity, SampleClass, TileOrder, Voids, WindowLimit,
+    Lattice, LodBorder, Method, Optimising, Proximity, SampleClass, TileOrder, Voids, WindowLimit,
 };
 use terrain::ModuleGrid;
 
@@ -122,6 +122,22 @@ fn every_word_of_the_optimised_method_is_read_and_written_back() {
     }
 }
 
+#[test]
+fn levels_are_shares_of_the_finest() {
+    let finest = job(SHORTEST);
+    assert_eq!(finest.lod.level_count(), 1);
+    assert_eq!(job(&format!("{SHORTEST}[lod]\nlevels = []\n")).canonical_text(), finest.canonical_text());
+    let three = job(&format!("{SHORTEST}[lod]\nlevels = [{{ inner_share = 0.5 }}, {{ inner_share = 2e-1 }}]\n"));
+    assert_eq!((three.lod.inner_shares.as_slice(), three.lod.border), ([0.5, 0.2].as_slice(), LodBorder::Full));
+    let described: Vec<String> = three.describe().into_iter().map(|s| format!("{} = {}", s.key, s.value)).collect();
+    let levels = "lod.levels = [{ inner_share = 0.5 }, { inner_share = 0.2 }]";
+    assert_eq!(described[described.len() - 2..], [levels, r#"lod.border = "full""#]);
+    check_canonical(&three);
+    let own = job(&format!("{SHORTEST}[lod]\nlevels = [{{ inner_share = 0.125 }}]\nborder = \"own\"\n"));
+    assert_eq!((own.lod.level_count(), own.lod.border), (2, LodBorder::Own));
+    check_canonical(&own);
+}
+
 /// The canonical text of a job reads back as the same settings, and is its own canonical text.
 #[track_caller]
 fn check_canonical(job: &Job) {
@@ -130,6 +146,7 @@ fn check_canonical(job: &Job) {
     assert_eq!(again.canonical_text(), text);
     assert_eq!((again.area, again.importance, again.tiles), (job.area.clone(), job.importance.clone(), job.tiles));
     assert_eq!((again.modules, again.limits, again.tin), (job.modules, job.limits, job.tin.clone()));
+    assert_eq!(again.lod, job.lod);
 }
 
 #[test]

@@ -78,10 +78,15 @@ enum { LMR_FREE = 0, LMR_HIDDEN = 1, LMR_UNKNOWN = 2 };
 lmr_area *lmr_open(const char *dir, int keep, char *why, size_t why_size);
 void lmr_close(lmr_area *area);
 void lmr_describe(const lmr_area *area, lmr_frame *frame);
+/* Levels of detail of every load module, 1 or more: 0 is the finest, the last one the coarsest. */
+uint32_t lmr_level_count(const lmr_area *area);
 
 /* Loads the 2 * reach + 1 load modules a side around a place, less what lies beyond the area. NULL on failure. */
 lmr_ground *lmr_load(const lmr_area *area, double east_m, double north_m, uint32_t reach, char *why, size_t why_size);
-/* The same around another place: only what is new is read. 1, or 0 on failure; then the ground is as it was. */
+/* The same at another level of detail. */
+lmr_ground *lmr_load_level(const lmr_area *area, double east_m, double north_m, uint32_t reach, uint32_t level,
+                           char *why, size_t why_size);
+/* The same level around another place: only what is new is read. 1, or 0 on failure; then the ground is as it was. */
 int lmr_move(lmr_ground *ground, const lmr_area *area, double east_m, double north_m, uint32_t reach,
              char *why, size_t why_size);
 void lmr_unload(lmr_ground *ground);

@@ -143,10 +143,20 @@ pub unsafe extern "C" fn lmr_describe(area: *const Area, frame: *mut Frame) {
     *frame = Frame { rows: of.rows, cols: of.cols, side_m: of.side_m(), east_m, north_m };
 }
 
-/// Loads the ground around a place.
+/// Levels of detail of every load module.
 ///
 /// # Safety
-/// `area` comes from `lmr_open`, `why` is null or `why_size` bytes that may be written.
+/// `area` comes from `lmr_open`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn lmr_level_count(area: *const Area) -> u32 {
+    // SAFETY: the caller's word.
+    u32::from(unsafe { &*area }.frame().level_count)
+}
+
+/// Loads the ground around a place at its finest level.
+///
+/// # Safety
+/// As of `lmr_load_level`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn lmr_load(
     area: *const Area,
@@ -157,8 +167,28 @@ pub unsafe extern "C" fn lmr_load(
     why_size: usize,
 ) -> *mut Ground {
     // SAFETY: the caller's word.
+    unsafe { lmr_load_level(area, east_m, north_m, reach, 0, why, why_size) }
+}
+
+/// Loads the ground around a place at a level of detail.
+///
+/// # Safety
+/// `area` comes from `lmr_open`, `why` is null or `why_size` bytes that may be written.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn lmr_load_level(
+    area: *const Area,
+    east_m: f64,
+    north_m: f64,
+    reach: u32,
+    level: u32,
+    why: *mut c_char,
+    why_size: usize,
+) -> *mut Ground {
+    // SAFETY: the caller's word.
     let area = unsafe { &*area };
-    match area.load(block(area, [east_m, north_m], reach)) {
+    // No area has as many levels as what does not fit.
+    let level = u16::try_from(level).unwrap_or(u16::MAX);
+    match area.load_level(block(area, [east_m, north_m], reach), level) {
         Ok(ground) => Box::into_raw(Box::new(ground)),
         Err(error) => {
             // SAFETY: the caller's word.

@@ -15,6 +15,50 @@ fn worked_example() -> Vec<u8> {
     lines.flat_map(|line| line.split_whitespace().skip(1)).map(|byte| u8::from_str_radix(byte, 16).unwrap()).collect()
 }
 
+/// The same load module at two levels, the coarser one a metre higher.
+fn two_levels() -> Vec<u8> {
+    let one = worked_example();
+    let (header, entry, section) = (144, 32, 124);
+    let mut file = one[..header + entry].to_vec();
+    file.extend_from_slice(&one[header..header + entry + 4]);
+    for level in 0..2u8 {
+        file.extend_from_slice(&one[header + entry + 4..]);
+        let start = file.len() - section;
+        file[start + 8] = level;
+        for vertex in 0..4 {
+            let at = start + 56 + 8 * vertex + 4;
+            raise(&mut file[at..at + 4], 128 * i32::from(level));
+        }
+        seal(&mut file[start..]);
+    }
+    file[10] = 2;
+    let length = file.len() as u64;
+    file[16..24].copy_from_slice(&length.to_le_bytes());
+    seal(&mut file[..header]);
+    for level in 0..2 {
+        let at = header + entry * level;
+        let offset = header + 2 * entry + 4 + section * level;
+        file[at..at + 8].copy_from_slice(&(offset as u64).to_le_bytes());
+        raise(&mut file[at + 24..at + 28], 128 * level as i32);
+        raise(&mut file[at + 28..at + 32], 128 * level as i32);
+    }
+    seal(&mut file[header..header + 2 * entry + 4]);
+    file
+}
+
+fn raise(bytes: &mut [u8], by: i32) {
+    let number = i32::from_le_bytes(bytes.try_into().unwrap()) + by;
+    bytes.copy_from_slice(&number.to_le_bytes());
+}
+
+/// Puts the CRC-32 of what is before them into the last four bytes.
+fn seal(part: &mut [u8]) {
+    let (body, checksum) = part.split_last_chunk_mut::<4>().unwrap();
+    let bit = |sum: u32| if sum & 1 == 1 { sum >> 1 ^ 0xedb8_8320 } else { sum >> 1 };
+    let sum = body.iter().fold(u32::MAX, |sum, &byte| (0..8).fold(sum ^ u32::from(byte), |sum, _| bit(sum)));
+    *checksum = (!sum).to_le_bytes();
+}
+
 /// The static library of this crate, newest first: it lies beside the tests, or one folder up.
 fn library() -> PathBuf {
     let exe = std::env::current_exe().unwrap();
@@ -32,8 +76,6 @@ fn library() -> PathBuf {
 fn a_program_in_c_gets_right_answers() {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
     let folder = tempfile::tempdir().unwrap();
-    std::fs::create_dir(folder.path().join("modules")).unwrap();
-    std::fs::write(folder.path().join("modules/r00c00.slm"), worked_example()).unwrap();
     let program = folder.path().join("drive");
     let compiler = std::env::var("CC").unwrap_or_else(|_| "cc".into());
     let compiled = Command::new(compiler)
@@ -46,7 +88,12 @@ fn a_program_in_c_gets_right_answers() {
         .output()
         .unwrap();
     assert!(compiled.status.success(), "{}", String::from_utf8_lossy(&compiled.stderr));
-    let ran = Command::new(&program).arg(folder.path()).output().unwrap();
-    let said = String::from_utf8_lossy(&ran.stdout);
-    assert!(ran.status.success() && said == "0 faults\n", "{said}{}", String::from_utf8_lossy(&ran.stderr));
+    for (levels, file) in [("1", worked_example()), ("2", two_levels())] {
+        let area = folder.path().join(levels);
+        std::fs::create_dir_all(area.join("modules")).unwrap();
+        std::fs::write(area.join("modules/r00c00.slm"), file).unwrap();
+        let ran = Command::new(&program).arg(&area).arg(levels).output().unwrap();
+        let said = String::from_utf8_lossy(&ran.stdout);
+        assert!(ran.status.success() && said == "0 faults\n", "{said}{}", String::from_utf8_lossy(&ran.stderr));
+    }
 }

@@ -1,8 +1,12 @@
-/* Opens the database named on the command line in every way, and asks everything there is to ask. */
+/*
+ * Opens the database named on the command line in every way, and asks everything there is to ask. Behind the name: how
+ * many levels of detail it has.
+ */
 #include "load_module_reader.h"
 
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 static int faults = 0;
@@ -12,6 +16,26 @@ static void expect(int holds, const char *what) {
         printf("not so: %s\n", what);
         faults++;
     }
+}
+
+/* At every level there is load module 0,0; those coarser than the finest are a metre higher. */
+static void ask_levels(const lmr_area *area, uint32_t levels) {
+    char why[256] = "";
+    lmr_frame frame;
+    lmr_describe(area, &frame);
+    expect(lmr_level_count(area) == levels, "as many levels as there are");
+    for (uint32_t level = 0; level < levels; level++) {
+        lmr_ground *ground = lmr_load_level(area, frame.east_m, frame.north_m, 7, level, why, sizeof why);
+        double height = 0, expected = level == 0 ? 1000.0 : 1001.0;
+        expect(ground != NULL && lmr_height(ground, frame.east_m, frame.north_m, &height), why);
+        expect(height == expected, "the height of that level");
+        expect(lmr_move(ground, area, 0, 0, LMR_ALL, why, sizeof why), why);
+        expect(lmr_height(ground, frame.east_m, frame.north_m, &height) && height == expected, "the level stays");
+        lmr_unload(ground);
+    }
+    expect(lmr_load_level(area, frame.east_m, frame.north_m, 7, levels, why, sizeof why) == NULL, "no more levels");
+    expect(strncmp(why, "found level ", 12) == 0, why);
+    expect(lmr_load_level(area, frame.east_m, frame.north_m, 7, UINT32_MAX, why, sizeof why) == NULL, "nor any");
 }
 
 static void ask(const lmr_area *area) {
@@ -54,11 +78,14 @@ static void ask(const lmr_area *area) {
 
 int main(int argc, char **argv) {
     char why[32];
-    if (argc != 2) return 2;
+    if (argc != 3) return 2;
     for (int keep = LMR_ON_DISK; keep <= LMR_MAPPED; keep++) {
         lmr_area *area = lmr_open(argv[1], keep, why, sizeof why);
         expect(area != NULL, why);
-        if (area) ask(area);
+        if (area) {
+            ask(area);
+            ask_levels(area, (uint32_t)atoi(argv[2]));
+        }
         lmr_close(area);
     }
     expect(lmr_open("no/such/database", LMR_ON_DISK, why, sizeof why) == NULL, "no database there");

@@ -24,6 +24,8 @@ pub struct Frame {
     pub rows: u32,
     /// Columns of load modules in the area.
     pub cols: u32,
+    /// Levels of every load module: 0 is the finest, the last one the coarsest.
+    pub level_count: u16,
     /// Side of a load module in quanta of 1/128 m.
     pub side: u16,
     /// Easting and northing of the area's south-west corner, metres.
@@ -39,6 +41,7 @@ impl Frame {
         Self {
             rows: header.area_rows,
             cols: header.area_cols,
+            level_count: header.level_count,
             side: header.side,
             origin_m: header.origin_m,
             crs: header.crs.clone(),
@@ -137,12 +140,25 @@ impl Area {
     /// # Errors
     /// When a load module cannot be read, is damaged, or is in no file.
     pub fn load(&self, block: Block) -> Result<Ground, ReadError> {
-        Ground::empty(self.frame.clone()).moved(self, block)
+        self.load_level(block, 0)
     }
 
-    /// Loads one row of a block; `into` takes each load module with its column.
+    /// Loads a block at a level of detail; 0 is the finest.
+    ///
+    /// # Errors
+    /// When there is no such level, or a load module cannot be read, is damaged, or is in no file.
+    pub fn load_level(&self, block: Block, level: u16) -> Result<Ground, ReadError> {
+        let level_count = self.frame.level_count;
+        if level_count <= level {
+            return Err(ReadError::NoSuchLevel { found: level, level_count });
+        }
+        Ground::empty(self.frame.clone(), level).moved(self, block)
+    }
+
+    /// Loads a level of one row of a block; `into` takes each load module with its column.
     pub(crate) fn load_row(
         &self,
+        level: u16,
         row: u32,
         cols: std::ops::Range<u32>,
         mut into: impl FnMut(u32, Arc<TerrainModule>),
@@ -155,7 +171,7 @@ impl Area {
                 return Err(ReadError::NoSuchModule { row, col });
             };
             let end = cols.end.min(file.header().east);
-            for module in file.row(row, col..end)? {
+            for module in file.row(level, row, col..end)? {
                 into(module.col, Arc::new(TerrainModule::new(module, self.frame.side)));
             }
             col = end;

@@ -10,12 +10,14 @@ pub enum Section {
     Header,
     /// One entry per load module, and a checksum.
     Index,
-    /// One load module.
+    /// One level of a load module.
     Module {
         /// Its row in the area.
         row: u32,
         /// Its column in the area.
         col: u32,
+        /// Its level; 0 is the finest.
+        level: u16,
     },
 }
 
@@ -24,7 +26,8 @@ impl fmt::Display for Section {
         match self {
             Section::Header => f.write_str("header"),
             Section::Index => f.write_str("index"),
-            Section::Module { row, col } => write!(f, "load module {row},{col}"),
+            Section::Module { row, col, level: 0 } => write!(f, "load module {row},{col}"),
+            Section::Module { row, col, level } => write!(f, "load module {row},{col} at level {level}"),
         }
     }
 }
@@ -138,6 +141,13 @@ pub enum ReadError {
         /// The first one.
         first: String,
     },
+    /// The area's load modules have no such level.
+    NoSuchLevel {
+        /// The level.
+        found: u16,
+        /// Levels that there are, from 0 on.
+        level_count: u16,
+    },
     /// A load module of the area is in no file.
     NoSuchModule {
         /// Its row in the area.
@@ -190,6 +200,9 @@ impl fmt::Display for ReadError {
                 write!(f, "{file}: found another area than that of {first}, expected files of one area")
             }
             Self::NoSuchModule { row, col } => write!(f, "load module {row},{col}: found no file that holds it"),
+            Self::NoSuchLevel { found, level_count } => {
+                write!(f, "found level {found}, expected 0 to {}", level_count.saturating_sub(1))
+            }
             Self::InFile { path, fault } => write!(f, "{}: {fault}", path.display()),
         }
     }

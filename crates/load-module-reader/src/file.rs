@@ -12,6 +12,7 @@ pub const FILE_BYTES_MAX: u64 = 1 << 30;
 pub struct SlmFile {
     header: Header,
     index: Vec<IndexEntry>,
+    /// Level by level, each row by row from the south-west.
     modules: Vec<Module>,
 }
 
@@ -44,10 +45,11 @@ impl SlmFile {
         let (header, header_length) = Header::parse(bytes, found)?;
         let index = index::parse(bytes, &header, header_length, found)?;
         let columns = header.west..header.east;
-        let places = (header.south..header.north).flat_map(|row| columns.clone().map(move |col| (row, col)));
-        let modules = places
+        let places = || (header.south..header.north).flat_map(|row| columns.clone().map(move |col| (row, col)));
+        let of_levels = (0..header.level_count).flat_map(|level| places().map(move |place| (level, place)));
+        let modules = of_levels
             .zip(&index)
-            .map(|(place, entry)| Module::parse(section(bytes, entry), &header, entry, place))
+            .map(|((level, place), entry)| Module::parse(section(bytes, entry), &header, entry, level, place))
             .collect::<Result<_, _>>()?;
         Ok(Self { header, index, modules })
     }
@@ -57,17 +59,23 @@ impl SlmFile {
         &self.header
     }
 
-    /// One entry per load module, row by row from the south-west.
+    /// One entry per load module and level: level by level, row by row from the south-west.
     pub fn index(&self) -> &[IndexEntry] {
         &self.index
     }
 
-    /// All load modules, row by row from the south-west.
+    /// All load modules at their finest level, row by row from the south-west.
     pub fn modules(&self) -> &[Module] {
-        &self.modules
+        self.level(0).unwrap_or(&[])
     }
 
-    /// The load module at (`row`, `col`) of the area; `None` when it lies in another tile.
+    /// All load modules at a level, in the same order; `None` when there is no such level.
+    pub fn level(&self, level: u16) -> Option<&[Module]> {
+        let count = self.header.module_count() as usize;
+        self.modules.chunks(count.max(1)).nth(usize::from(level))
+    }
+
+    /// The load module at (`row`, `col`) of the area, at its finest level; `None` when it lies in another tile.
     pub fn module(&self, row: u32, col: u32) -> Option<&Module> {
         self.header.index_of(row, col).and_then(|index| self.modules.get(index))
     }
@@ -101,16 +109,35 @@ mod tests {
     }
 
     #[test]
+    fn a_file_of_two_levels_holds_each_load_module_twice() {
+        let file = SlmFile::parse(&sample::two_levels()).unwrap();
+        assert_eq!((file.header().level_count, file.index().len()), (2, 4));
+        let plain = SlmFile::parse(&sample::file()).unwrap();
+        assert_eq!((file.modules(), plain.level(1)), (plain.modules(), None));
+        let [west, east] = file.level(1).unwrap() else { panic!("two load modules") };
+        assert_eq!((west.col, west.level, west.triangles.len()), (3, 1, 2));
+        assert_eq!((east.col, east.level, east.triangles.len()), (4, 1, 2));
+        assert_eq!(file.level(2), None);
+        assert_eq!(file.module(2, 4).map(|module| module.level), Some(0));
+    }
+
+    #[test]
     fn every_truncation_is_an_error() {
-        let bytes = sample::file();
-        for length in 0..bytes.len() {
-            assert!(SlmFile::parse(&bytes[..length]).is_err(), "the first {length} bytes were accepted");
+        for bytes in [sample::file(), sample::two_levels()] {
+            for length in 0..bytes.len() {
+                assert!(SlmFile::parse(&bytes[..length]).is_err(), "the first {length} bytes were accepted");
+            }
         }
     }
 
     #[test]
     fn every_flipped_bit_is_an_error() {
-        let mut bytes = sample::file();
+        check_every_flip(sample::file());
+        check_every_flip(sample::two_levels());
+    }
+
+    #[track_caller]
+    fn check_every_flip(mut bytes: Vec<u8>) {
         for at in 0..bytes.len() {
             for bit in 0..8 {
                 bytes[at] ^= 1 << bit;
@@ -123,13 +150,14 @@ mod tests {
     #[test]
     fn every_byte_set_to_anything_is_an_error_where_checksums_are_mended() {
         // With the checksums made right again only the checks of meaning are left: none may panic.
-        let good = sample::file();
-        for at in 0..good.len() {
-            for value in [0, 1, 0x7f, 0x80, 0xff] {
-                let mut bytes = good.clone();
-                bytes[at] = value;
-                sample::mend_checksums(&mut bytes);
-                let _ = SlmFile::parse(&bytes);
+        for good in [sample::file(), sample::two_levels()] {
+            for at in 0..good.len() {
+                for value in [0, 1, 0x7f, 0x80, 0xff] {
+                    let mut bytes = good.clone();
+                    bytes[at] = value;
+                    sample::mend_checksums(&mut bytes);
+                    let _ = SlmFile::parse(&bytes);
+                }
             }
         }
     }
@@ -172,6 +200,20 @@ mod tests {
         check_damage(|bytes, at| bytes[at + FIXED_AT + 3] = 0xff, "found y 65280, expected 0 to 64000");
         check_damage(|bytes, at| bytes[at + 24] = 3, "found length in the index");
         check_damage(|bytes, _| bytes[32] = 2, "header, offset 44: found north 3, expected 1 to 2");
+        check_damage(|bytes, at| bytes[at + 8] = 1, "load module 2,4, offset 344: found level 1, expected 0");
+        check_damage(|bytes, _| bytes[10] = 0, "header, offset 10: found level count 0, expected 1 to 8");
+        check_damage(|bytes, _| bytes[10] = 9, "header, offset 10: found level count 9, expected 1 to 8");
+    }
+
+    #[test]
+    fn a_level_in_the_place_of_another_is_named() {
+        let mut bytes = sample::two_levels();
+        let section = SlmFile::parse(&bytes).unwrap().index()[3].offset as usize;
+        bytes[section + 8] = 0;
+        sample::mend_checksums(&mut bytes);
+        let error = SlmFile::parse(&bytes).unwrap_err().to_string();
+        assert!(error.starts_with("load module 2,4 at level 1, offset "), "{error}");
+        assert!(error.ends_with("found level 0, expected 1"), "{error}");
     }
 
     const FIXED_AT: usize = crate::FIXED_MODULE_BYTES;
@@ -182,7 +224,10 @@ mod tests {
         let last = bytes.len() - 1;
         bytes[last] ^= 1;
         let error = SlmFile::parse(&bytes).unwrap_err();
-        assert!(matches!(error, ReadError::WrongChecksum { section: Section::Module { row: 2, col: 4 }, .. }));
+        assert!(matches!(
+            error,
+            ReadError::WrongChecksum { section: Section::Module { row: 2, col: 4, level: 0 }, .. }
+        ));
     }
 
     #[test]

@@ -37,6 +37,7 @@ impl Block {
 #[derive(Clone, Debug)]
 pub struct Ground {
     frame: Frame,
+    level: u16,
     block: Block,
     /// Row by row from the south-west.
     modules: Vec<Arc<TerrainModule>>,
@@ -59,10 +60,15 @@ pub enum Sight {
 
 impl Ground {
     /// Nothing loaded yet.
-    pub(crate) fn empty(frame: Frame) -> Self {
+    pub(crate) fn empty(frame: Frame, level: u16) -> Self {
         let side_steps = i64::from(frame.side) * STEPS;
         let block = Block { south: 0, west: 0, north: 0, east: 0 };
-        Self { frame, block, modules: Vec::new(), lookups: Vec::new(), side_steps }
+        Self { frame, level, block, modules: Vec::new(), lookups: Vec::new(), side_steps }
+    }
+
+    /// The level of detail that is loaded; 0 is the finest.
+    pub fn level(&self) -> u16 {
+        self.level
     }
 
     /// The block that is loaded.
@@ -85,7 +91,7 @@ impl Ground {
         self.block.contains(row, col).then(|| &*self.modules[self.block.index(row, col)])
     }
 
-    /// The same ground for another block: what both hold is kept, only the rest is read.
+    /// The same ground, at the same level, for another block: what both hold is kept, only the rest is read.
     ///
     /// # Errors
     /// When a load module cannot be read, is damaged, or is in no file; this ground is as it was.
@@ -101,7 +107,9 @@ impl Ground {
                 }
                 // Up to what is loaded already, all at once.
                 let known = (col..block.east).find(|&col| self.block.contains(row, col)).unwrap_or(block.east);
-                area.load_row(row, col..known, |col, module| modules[block.index(row, col)] = Some(module))?;
+                area.load_row(self.level, row, col..known, |col, module| {
+                    modules[block.index(row, col)] = Some(module)
+                })?;
                 col = known;
             }
         }

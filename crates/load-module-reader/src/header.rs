@@ -7,8 +7,8 @@ use crate::{ReadError, Section};
 pub const MAGIC: [u8; 8] = *b"\x89SLM\r\n\x1a\n";
 /// The version of the format that this crate reads.
 pub const VERSION: u16 = 1;
-/// Levels of detail in a file of this version.
-pub const LEVEL_COUNT: u16 = 1;
+/// Levels of detail in a file at most.
+pub const LEVELS_MAX: u16 = 8;
 /// Quanta in a metre, of coordinates and heights alike.
 pub const QUANTA_PER_METRE: u32 = 128;
 /// Bytes of the header before its texts.
@@ -17,6 +17,8 @@ pub const FIXED_HEADER_BYTES: usize = 124;
 /// What holds for all load modules of a file. Rows and columns count load modules from the area's south-west.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Header {
+    /// Levels of every load module, the finest first.
+    pub level_count: u16,
     /// Row of the tile.
     pub tile_row: u32,
     /// Column of the tile.
@@ -61,7 +63,7 @@ impl Header {
         [east + f64::from(col) * self.side_m(), north + f64::from(row) * self.side_m()]
     }
 
-    /// Load modules in the file.
+    /// Load modules in the file, each of which has all levels.
     pub fn module_count(&self) -> u64 {
         u64::from(self.north - self.south) * u64::from(self.east - self.west)
     }
@@ -87,8 +89,8 @@ impl Header {
             expected: header_length as u64,
         })?;
         check_section(bytes, 0, Section::Header)?;
-        cursor.expect(offset, "level count", i64::from(level_count), i64::from(LEVEL_COUNT))?;
-        let header = Self::parse_fields(Cursor::new(bytes, 0, Section::Header))?;
+        cursor.within(offset, "level count", i64::from(level_count), (1, i64::from(LEVELS_MAX)))?;
+        let header = Self::parse_fields(level_count, Cursor::new(bytes, 0, Section::Header))?;
         if file_bytes == file_length {
             return Ok((header, header_length));
         }
@@ -96,7 +98,7 @@ impl Header {
     }
 
     /// All after the lengths, up to the end of the header.
-    fn parse_fields(mut cursor: Cursor) -> Result<Self, ReadError> {
+    fn parse_fields(level_count: u16, mut cursor: Cursor) -> Result<Self, ReadError> {
         cursor.take(24)?;
         let (tile_row, tile_col) = (cursor.u32()?, cursor.u32()?);
         let (area_rows, area_cols) = (cursor.u32()?, cursor.u32()?);
@@ -112,6 +114,7 @@ impl Header {
         cursor.padding()?;
         cursor.checksum()?;
         Ok(Self {
+            level_count,
             tile_row,
             tile_col,
             area_rows,

@@ -6,7 +6,7 @@ use crate::{FIXED_MODULE_BYTES, Header, ReadError, Section};
 /// Bytes of one entry of the index.
 pub const INDEX_ENTRY_BYTES: usize = 32;
 
-/// Where one load module lies in the file, and its size.
+/// Where one level of a load module lies in the file, and its size.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct IndexEntry {
     /// First byte of its section.
@@ -25,7 +25,7 @@ pub struct IndexEntry {
     pub z_high: i32,
 }
 
-/// The index that follows a header of `header_length` bytes, row by row from the south-west. `file` is the beginning
+/// The index that follows a header of `header_length` bytes: level by level, row by row from the south-west. `file` is the beginning
 /// of a file of `file_bytes` bytes, and holds at least the index.
 pub(crate) fn parse(
     file: &[u8],
@@ -34,7 +34,8 @@ pub(crate) fn parse(
     file_bytes: u64,
 ) -> Result<Vec<IndexEntry>, ReadError> {
     let base = header_length as u64;
-    let length = header.module_count().saturating_mul(INDEX_ENTRY_BYTES as u64).saturating_add(4);
+    let count = header.module_count().saturating_mul(u64::from(header.level_count));
+    let length = count.saturating_mul(INDEX_ENTRY_BYTES as u64).saturating_add(4);
     let rest = &file[header_length..];
     if (rest.len() as u64) < length {
         let found = rest.len() as u64;
@@ -46,7 +47,7 @@ pub(crate) fn parse(
     let mut cursor = Cursor::new(bytes, base, Section::Index);
     let mut next = base + length;
     let mut entries = Vec::with_capacity(bytes.len() / INDEX_ENTRY_BYTES);
-    for _ in 0..header.module_count() {
+    for _ in 0..count {
         let entry = read_entry(&mut cursor, next, file_bytes)?;
         next += u64::from(entry.length);
         entries.push(entry);

@@ -8,6 +8,8 @@
 //! [`Area`] opens all files of a database and reads only their headers and indexes. [`Area::load`] brings a [`Block`]
 //! of load modules into memory as [`Ground`], and [`Ground::moved`] follows the observer and reads only what is new.
 //! A query takes constant expected time. [`SlmFile`] is the plain way to read one whole file.
+//! Where load modules have several levels of detail, all of this is about the finest, and [`Area::load_level`] brings
+//! in another.
 //!
 //! ```no_run
 //! use load_module_reader::{Area, Keep, Sight};
@@ -59,7 +61,7 @@ mod error;
 pub use error::{ReadError, Section};
 mod bytes;
 mod header;
-pub use header::{FIXED_HEADER_BYTES, Header, LEVEL_COUNT, MAGIC, QUANTA_PER_METRE, VERSION};
+pub use header::{FIXED_HEADER_BYTES, Header, LEVELS_MAX, MAGIC, QUANTA_PER_METRE, VERSION};
 mod index;
 pub use index::{INDEX_ENTRY_BYTES, IndexEntry};
 mod module;

@@ -39,13 +39,15 @@ impl Residual {
     }
 }
 
-/// One load module. Its triangles cover its square exactly once; indices name `vertices`.
+/// One load module at one level. Its triangles cover its square exactly once; indices name `vertices`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Module {
     /// Row in the area; 0 is the southernmost.
     pub row: u32,
     /// Column in the area; 0 is the westernmost.
     pub col: u32,
+    /// Level of detail; 0 is the finest.
+    pub level: u16,
     /// Sorted by y, then x; no two at one place.
     pub vertices: Vec<Vertex>,
     /// Corners, counter-clockwise seen from above, smallest index first; sorted.
@@ -76,12 +78,13 @@ impl Module {
         bytes: &[u8],
         header: &Header,
         entry: &IndexEntry,
+        level: u16,
         (row, col): (u32, u32),
     ) -> Result<Self, ReadError> {
-        let section = Section::Module { row, col };
+        let section = Section::Module { row, col, level };
         check_section(bytes, entry.offset, section)?;
         let mut cursor = Cursor::new(bytes, entry.offset, section);
-        let fixed = read_fixed(&mut cursor, entry, (row, col))?;
+        let fixed = read_fixed(&mut cursor, entry, level, (row, col))?;
         check_length(&cursor, entry, &fixed.side_counts)?;
         let vertices = read_vertices(&mut cursor, header.side, entry)?;
         let triangles = read_triangles(&mut cursor, entry)?;
@@ -93,7 +96,8 @@ impl Module {
         cursor.padding()?;
         cursor.checksum()?;
         let polygon_count = entry.polygon_count;
-        let module = Self { row, col, vertices, triangles, classes, sides, polygon_count, residual: fixed.residual };
+        let residual = fixed.residual;
+        let module = Self { row, col, level, vertices, triangles, classes, sides, polygon_count, residual };
         module.check_cover(header.side, entry, section)?;
         Ok(module)
     }
@@ -125,10 +129,10 @@ struct Fixed {
     residual: Residual,
 }
 
-fn read_fixed(cursor: &mut Cursor, entry: &IndexEntry, (row, col): (u32, u32)) -> Result<Fixed, ReadError> {
+fn read_fixed(cursor: &mut Cursor, entry: &IndexEntry, level: u16, (row, col): (u32, u32)) -> Result<Fixed, ReadError> {
     cursor.expect_u32("row", row)?;
     cursor.expect_u32("column", col)?;
-    cursor.expect_u32("level", 0)?;
+    cursor.expect_u32("level", u32::from(level))?;
     cursor.expect_u32("vertex count", entry.vertex_count)?;
     cursor.expect_u32("triangle count", entry.triangle_count)?;
     cursor.expect_u32("polygon count", entry.polygon_count)?;

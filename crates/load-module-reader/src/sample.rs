@@ -5,29 +5,45 @@ use crate::{FIXED_HEADER_BYTES, FIXED_MODULE_BYTES, MAGIC};
 const CRS: &[u8] = b"EPSG:32611";
 const DATUM: &[u8] = b"EGM96";
 
+/// Vertices, triangles, side lists and classes of a load module.
+type Shape<'a> = (&'a [(u16, u16, i32)], &'a [[u16; 3]], [[u16; 2]; 4], &'a [u8]);
+
+const FLAT: Shape = (
+    &[(0, 0, 640), (64_000, 0, 640), (0, 64_000, 640), (64_000, 64_000, 640)],
+    &[[0, 1, 3], [0, 3, 2]],
+    [[0, 1], [1, 3], [2, 3], [0, 2]],
+    &[0, 1],
+);
+const PIT: Shape = (
+    &[(0, 0, 640), (64_000, 0, 640), (30_000, 20_000, -7), (0, 64_000, 640), (64_000, 64_000, 640)],
+    &[[0, 1, 2], [0, 2, 3], [1, 4, 2], [2, 4, 3]],
+    [[0, 1], [1, 4], [3, 4], [0, 3]],
+    &[1, 0, 0, 2],
+);
+
 /// Load modules 2,3 and 2,4 of tile 0,1.
 pub(crate) fn file() -> Vec<u8> {
+    file_of(&[[FLAT, PIT]])
+}
+
+/// The same, and a second level at which both are flat.
+pub(crate) fn two_levels() -> Vec<u8> {
+    file_of(&[[FLAT, PIT], [FLAT, FLAT]])
+}
+
+fn file_of(levels: &[[Shape; 2]]) -> Vec<u8> {
     let header_length = (FIXED_HEADER_BYTES + CRS.len() + DATUM.len()).next_multiple_of(4) + 4;
-    let flat = [(0, 0, 640), (64_000, 0, 640), (0, 64_000, 640), (64_000, 64_000, 640)];
-    let pyramid = [(0, 0, 640), (64_000, 0, 640), (30_000, 20_000, -7), (0, 64_000, 640), (64_000, 64_000, 640)];
-    let sections = [
-        module(3, &flat, &[[0, 1, 3], [0, 3, 2]], [[0, 1], [1, 3], [2, 3], [0, 2]], &[0, 1]),
-        module(
-            4,
-            &pyramid,
-            &[[0, 1, 2], [0, 2, 3], [1, 4, 2], [2, 4, 3]],
-            [[0, 1], [1, 4], [3, 4], [0, 3]],
-            &[1, 0, 0, 2],
-        ),
-    ];
-    let index_length = 2 * 32 + 4;
-    let file_length = header_length + index_length + sections[0].len() + sections[1].len();
-    let mut file = header(header_length, file_length);
+    let level = |(level, shapes): (u32, &[Shape; 2])| [module(3, level, shapes[0]), module(4, level, shapes[1])];
+    let sections: Vec<Vec<u8>> = (0..).zip(levels).flat_map(level).collect();
+    let index_length = sections.len() * 32 + 4;
+    let file_length = header_length + index_length + sections.iter().map(Vec::len).sum::<usize>();
+    let mut file = header(levels.len() as u8, header_length, file_length);
     let mut offset = header_length + index_length;
-    for (section, counts) in sections.iter().zip([[4, 2, 1], [5, 4, 4]]) {
+    for (section, shape) in sections.iter().zip(levels.iter().flatten()) {
+        let counts: [u32; 3] = if shape.0.len() == 5 { [5, 4, 4] } else { [4, 2, 1] };
         put(&mut file, &(offset as u64).to_le_bytes());
         put(&mut file, &(section.len() as u32).to_le_bytes());
-        counts.iter().for_each(|count: &u32| put(&mut file, &count.to_le_bytes()));
+        counts.iter().for_each(|count| put(&mut file, &count.to_le_bytes()));
         let low: i32 = if counts[0] == 5 { -7 } else { 640 };
         put(&mut file, &low.to_le_bytes());
         put(&mut file, &640i32.to_le_bytes());
@@ -43,9 +59,9 @@ fn put(file: &mut Vec<u8>, bytes: &[u8]) {
     file.extend_from_slice(bytes);
 }
 
-fn header(header_length: usize, file_length: usize) -> Vec<u8> {
+fn header(levels: u8, header_length: usize, file_length: usize) -> Vec<u8> {
     let mut file = MAGIC.to_vec();
-    put(&mut file, &[1, 0, 1, 0]);
+    put(&mut file, &[1, 0, levels, 0]);
     put(&mut file, &(header_length as u32).to_le_bytes());
     put(&mut file, &(file_length as u64).to_le_bytes());
     for value in [0, 1, 4, 5, 2, 3, 3, 5, 64_000u32, 20, 400, 128] {
@@ -61,16 +77,10 @@ fn header(header_length: usize, file_length: usize) -> Vec<u8> {
     file
 }
 
-fn module(
-    col: u32,
-    vertices: &[(u16, u16, i32)],
-    triangles: &[[u16; 3]],
-    sides: [[u16; 2]; 4],
-    classes: &[u8],
-) -> Vec<u8> {
+fn module(col: u32, level: u32, (vertices, triangles, sides, classes): Shape) -> Vec<u8> {
     let polygons = if vertices.len() == 4 { 1 } else { 4 };
     let mut bytes = Vec::new();
-    for value in [2, col, 0, vertices.len() as u32, triangles.len() as u32, polygons] {
+    for value in [2, col, level, vertices.len() as u32, triangles.len() as u32, polygons] {
         put(&mut bytes, &value.to_le_bytes());
     }
     put(&mut bytes, &[2, 0, 2, 0, 2, 0, 2, 0]);
@@ -95,8 +105,9 @@ fn module(
 pub(crate) fn mend_checksums(file: &mut [u8]) {
     let header_length = u32::from_le_bytes([file[12], file[13], file[14], file[15]]) as usize;
     mend(file, 0, header_length);
-    mend(file, header_length, 2 * 32 + 4);
-    for entry in 0..2 {
+    let entries = 2 * usize::from(file[10]);
+    mend(file, header_length, entries * 32 + 4);
+    for entry in 0..entries {
         let at = header_length.saturating_add(entry * 32);
         let Some(bytes) = file.get(at..).and_then(|rest| rest.get(..12)) else { return };
         let word = |i: usize| u32::from_le_bytes([bytes[i], bytes[i + 1], bytes[i + 2], bytes[i + 3]]) as usize;

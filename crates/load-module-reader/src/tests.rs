@@ -49,7 +49,17 @@ fn rough(n: u16, seed: u64) -> Module {
     }
     let residual = Residual { posts: 0, largest: 0, sum_abs: 0, sum_squared: 0 };
     let (classes, polygon_count) = (vec![3; triangles.len()], triangles.len() as u32);
-    Module { row: 0, col: 0, vertices, triangles, classes, sides: Default::default(), polygon_count, residual }
+    Module {
+        row: 0,
+        col: 0,
+        level: 0,
+        vertices,
+        triangles,
+        classes,
+        sides: Default::default(),
+        polygon_count,
+        residual,
+    }
 }
 
 /// The height at a place in quanta, from every triangle that holds it.
@@ -230,4 +240,26 @@ fn files_on_disk_in_memory_and_damaged_are_told_apart() {
         assert!(loaded.is_err(), "byte {at} was changed and accepted");
     }
     std::fs::remove_dir_all(folder).unwrap();
+}
+
+#[test]
+fn a_block_is_loaded_at_any_level_of_the_area() {
+    let area = Area::of_files(vec![TileFile::of_bytes("levels", Arc::new(sample::two_levels())).unwrap()]).unwrap();
+    assert_eq!(area.frame().level_count, 2);
+    let west = Block { south: 2, west: 3, north: 3, east: 4 };
+    let both = Block { east: 5, ..west };
+    let bottom = [502_000.0 + 30_000.0 / 128.0, 3_876_000.25 + 20_000.0 / 128.0];
+    assert_eq!(area.load(both).unwrap().height_m(bottom), Some(-7.0 / 128.0));
+    let coarse = area.load_level(west, 1).unwrap().moved(&area, both).unwrap();
+    assert_eq!((coarse.level(), coarse.height_m(bottom)), (1, Some(5.0)));
+    assert!(coarse.modules().iter().all(|module| module.module().level == 1));
+    let error = area.load_level(both, 2).unwrap_err().to_string();
+    assert_eq!(error, "found level 2, expected 0 to 1");
+}
+
+#[test]
+fn files_with_other_levels_are_of_another_area() {
+    let open = |name: &str, bytes: Vec<u8>| TileFile::of_bytes(name, Arc::new(bytes)).unwrap();
+    let files = vec![open("plain", sample::file()), open("levels", sample::two_levels())];
+    assert!(matches!(Area::of_files(files), Err(ReadError::OtherArea { .. })));
 }

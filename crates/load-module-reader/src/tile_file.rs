@@ -78,18 +78,23 @@ impl TileFile {
         &self.header
     }
 
-    /// One entry per load module, row by row from the south-west.
+    /// One entry per load module and level: level by level, row by row from the south-west.
     pub fn index(&self) -> &[IndexEntry] {
         &self.index
     }
 
-    /// Decodes and checks the load modules of columns `cols` of one row of the area, all of which the file must hold.
-    /// They lie side by side in the file, so they are read at once.
+    /// Decodes and checks a level of the load modules of columns `cols` of one row of the area, all of which the file
+    /// must hold. They lie side by side in the file, so they are read at once.
     ///
     /// # Errors
     /// When they cannot be read or are damaged.
-    pub(crate) fn row(&self, row: u32, cols: std::ops::Range<u32>) -> Result<Vec<Module>, ReadError> {
+    pub(crate) fn row(&self, level: u16, row: u32, cols: std::ops::Range<u32>) -> Result<Vec<Module>, ReadError> {
         let Some(first) = self.header.index_of(row, cols.start) else { return Ok(Vec::new()) };
+        let level_count = self.header.level_count;
+        if level_count <= level {
+            return Err(in_file(&self.path, ReadError::NoSuchLevel { found: level, level_count }));
+        }
+        let first = first + usize::from(level) * self.header.module_count() as usize;
         let entries = &self.index[first..first + cols.len()];
         let (Some(low), Some(high)) = (entries.first(), entries.last()) else { return Ok(Vec::new()) };
         let (start, end) = (low.offset, high.offset + u64::from(high.length));
@@ -104,7 +109,7 @@ impl TileFile {
         };
         let decode = |(col, entry): (u32, &IndexEntry)| {
             let at = (entry.offset - start) as usize;
-            Module::parse(&bytes[at..at + entry.length as usize], &self.header, entry, (row, col))
+            Module::parse(&bytes[at..at + entry.length as usize], &self.header, entry, level, (row, col))
         };
         let modules: Result<Vec<Module>, ReadError> = cols.zip(entries).map(decode).collect();
         modules.map_err(|fault| in_file(&self.path, fault))
@@ -133,7 +138,8 @@ fn read_start(file: &mut File, file_length: u64) -> std::io::Result<Vec<u8>> {
         return Ok(start);
     };
     // Wrong numbers are found later; here they must only not ask for more than there is.
-    let modules = north.saturating_sub(south).saturating_mul(east.saturating_sub(west));
+    let levels = start.get(10..12).map_or(1, |b| u64::from(u16::from_le_bytes([b[0], b[1]])));
+    let modules = north.saturating_sub(south).saturating_mul(east.saturating_sub(west)).saturating_mul(levels);
     let wanted = header.saturating_add(modules.saturating_mul(32)).saturating_add(4).min(file_length);
     if GUESS < wanted {
         file.take(wanted - GUESS).read_to_end(&mut start)?;

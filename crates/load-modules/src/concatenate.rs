@@ -36,46 +36,7 @@ mod tests {
     use terrain::{ModuleGrid, ModuleRect, Side, Spacing, Vertex};
 
     use super::*;
-    use crate::sheets::{Draw, assert_sides_are_shared};
-
-    /// A TIN over a tile of 2 x 3 load modules: each square triangulated on its own over shared sides.
-    fn constrained(layout: &Layout, seed: u64) -> Tin {
-        let mut draw = Draw(seed);
-        let rect = layout.grid.posts_of_rect(layout.modules);
-        let side = layout.side_lattice();
-        let (low, high) = (LatticePoint::from(rect.south_west()), LatticePoint::from(rect.north_east()));
-        let mut places = std::collections::BTreeSet::new();
-        for row in (low.row..=high.row).step_by(side as usize) {
-            for col in (low.col..=high.col).step_by(side as usize) {
-                places.insert(LatticePoint::new(row, col));
-            }
-        }
-        for i in 0..90 {
-            let mut within = |low: i32, high: i32| low + draw.below((high - low + 1) as u32) as i32;
-            let (mut row, mut col) = (within(low.row, high.row), within(low.col, high.col));
-            // A third on module lines, and those on whole posts.
-            if i % 3 == 0 {
-                row = row / side * side;
-                col = col / 8 * 8;
-            } else if i % 3 == 1 {
-                col = col / side * side;
-                row = row / 8 * 8;
-            }
-            places.insert(LatticePoint::new(row, col));
-        }
-        let vertices: Vec<_> = places.iter().map(|&at| Vertex { at, height: draw.below(9000) as i32 - 4000 }).collect();
-        let mut triangles = Vec::new();
-        for id in layout.modules.iter() {
-            let square = layout.grid.posts_of(id);
-            let (low, high) = (LatticePoint::from(square.south_west()), LatticePoint::from(square.north_east()));
-            let inside =
-                |at: LatticePoint| (low.row..=high.row).contains(&at.row) && (low.col..=high.col).contains(&at.col);
-            let own: Vec<_> = (0..vertices.len()).filter(|&v| inside(vertices[v].at)).collect();
-            let points: Vec<_> = own.iter().map(|&v| vertices[v].at).collect();
-            triangles.extend(mesh::delaunay(&points).into_iter().map(|t| t.map(|v| own[v as usize] as u32)));
-        }
-        Tin { rect, vertices, triangles }
-    }
+    use crate::sheets::{assert_sides_are_shared, constrained};
 
     fn layout() -> Layout {
         let grid = ModuleGrid { rows: 4, cols: 6, side_cells: 20 };

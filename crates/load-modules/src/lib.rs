@@ -20,5 +20,7 @@ pub use clip::{ClipHeights, clip, halo_posts};
 mod hole;
 mod removals;
 pub use removals::{Freed, Removal, RemovalGround, propose_removals};
+mod levels;
+pub use levels::{LevelGround, LevelSides, Levels, coarser_levels};
 #[cfg(test)]
 mod sheets;

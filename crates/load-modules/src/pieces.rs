@@ -141,7 +141,7 @@ fn triangulate_afresh(module: &mut LoadModule) -> usize {
     3 * module.triangles.len()
 }
 
-fn smallest_first([a, b, c]: [u16; 3]) -> [u16; 3] {
+pub(crate) fn smallest_first([a, b, c]: [u16; 3]) -> [u16; 3] {
     if a < b && a < c {
         [a, b, c]
     } else if b < c {
@@ -152,7 +152,7 @@ fn smallest_first([a, b, c]: [u16; 3]) -> [u16; 3] {
 }
 
 /// Both identities, and the square covered by positive areas; `check` walks the rest where assertions are on.
-fn assert_sound(module: &LoadModule, sides: usize) {
+pub(crate) fn assert_sound(module: &LoadModule, sides: usize) {
     let id = module.id;
     let areas = || module.triangles.iter().map(|&triangle| module.doubled_area(triangle));
     assert!(areas().all(|area| 0 < area), "triangles of load module {id} have area");

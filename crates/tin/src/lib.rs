@@ -12,6 +12,8 @@ mod task;
 pub use task::{Frame, LastBatch, Proximity, Rule, StartPost, Stop, TileTask};
 mod refine;
 pub use refine::refine;
+mod prefix;
+pub use prefix::prefix;
 mod survey;
 pub use survey::{CostUnit, SurveyTask, survey};
 mod ladder;

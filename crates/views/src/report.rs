@@ -16,6 +16,7 @@ pub fn report_text(report: &Report) -> String {
         headline(report),
         limits(report),
         residuals(report),
+        levels(report),
         refusals(report),
         bound(report),
         breaches(report),
@@ -110,6 +111,24 @@ fn residual_row(table: &mut Table, name: &str, posts: String, points: String, re
     let metres = [(rms_m, 3), (mean_abs_m, 3), (p95_m, 2), (p99_m, 2), (max_m, 2)];
     let metres = metres.map(|(metres, digits)| format!("{metres:.digits$}"));
     table.row([name.to_owned(), posts, points].into_iter().chain(metres));
+}
+
+/// Levels of detail, where there are several.
+fn levels(report: &Report) -> Option<String> {
+    let finest = report.levels.first()?;
+    let mut table = Table::new(&[Left, Right, Right, Right, Right, Right]);
+    table.row(["Levels of detail", "inner share", "triangles", "of level 0", "RMS m", "largest m"]);
+    for level in &report.levels {
+        table.row([
+            format!("  {}", level.level),
+            level.inner_share.to_string(),
+            grouped(level.triangles),
+            format!("{} %", percent(level.triangles as f64, finest.triangles as f64)),
+            format!("{:.3}", level.rms_m),
+            format!("{:.2}", level.max_m),
+        ]);
+    }
+    Some(table.text(0))
 }
 
 fn refusals(report: &Report) -> Option<String> {
@@ -283,6 +302,15 @@ mod tests {
             assert!(text.contains(expected), "{text}");
         }
         assert!(!text.contains("Warnings") && !text.contains("Stages"), "{text}");
+    }
+
+    #[test]
+    fn levels_are_a_table_where_there_are_several() {
+        assert_eq!(levels(&samples::report()), None);
+        let text = levels(&samples::with_levels()).unwrap();
+        let lines: Vec<Vec<&str>> = text.lines().map(|line| line.split_whitespace().collect()).collect();
+        assert_eq!(lines.len(), 4);
+        assert_eq!(lines[2], ["1", "0.5", "223,000", "70", "%", "4.250", "60.50"]);
     }
 
     #[test]

@@ -3,8 +3,8 @@
 use terrain::{LoadModule, ModuleGrid, ModuleId, ModuleResidual, ModuleVertex, Spacing};
 
 use database::{
-    Report, ReportBefore, ReportBound, ReportBreach, ReportClass, ReportPerModule, ReportPerWindow, ReportPlace,
-    ReportPoints, ReportPool, ReportRefusals, ReportResidual, ReportStage, ReportStops, ReportVoids,
+    Report, ReportBefore, ReportBound, ReportBreach, ReportClass, ReportLevel, ReportPerModule, ReportPerWindow,
+    ReportPlace, ReportPoints, ReportPool, ReportRefusals, ReportResidual, ReportStage, ReportStops, ReportVoids,
 };
 
 /// 2 x 3 load modules of 20 x 20 cells, 25 m apart.
@@ -75,6 +75,7 @@ pub(crate) fn report() -> Report {
         residual: residual(2.999),
         residual_against_source: Some(residual(3.1)),
         classes: vec![class("plains", 2_587_215, 64_939, 0.869), class("mountains", 1_313_410, 28_532, 5.268)],
+        levels: vec![],
         overall_point_weighted_rms_m: 2.999,
         dem_accuracy_m: Some(2.5),
         voids: ReportVoids { count: 12, filled: 12 },
@@ -94,4 +95,12 @@ pub(crate) fn report() -> Report {
         tiles: Vec::new(),
         files: std::collections::BTreeMap::new(),
     }
+}
+
+/// The same with two coarser levels.
+pub(crate) fn with_levels() -> Report {
+    let level =
+        |level, inner_share, triangles, rms_m| ReportLevel { level, inner_share, triangles, rms_m, max_m: 60.5 };
+    let levels = vec![level(0, 1.0, 319_998, 2.999), level(1, 0.5, 223_000, 4.25), level(2, 0.2, 165_000, 7.875)];
+    Report { levels, ..report() }
 }

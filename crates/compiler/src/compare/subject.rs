@@ -15,8 +15,9 @@ use terrain::{Dem, Metres, Post, PostRect, Tin, quanta_of_metres};
 use super::{CompareGround, CompareRequest, Equivalent, Made};
 use crate::area::GamingArea;
 use crate::ground::Ground;
-use crate::raster::{TinRequest, refuse_spacing, tally_of, untiled};
+use crate::raster::{TinRequest, refuse_spacing, untiled};
 use crate::sources::{decode, reading};
+use crate::tin_tally::tally_of;
 use crate::{CompileError, TinMethod, TinStart};
 
 /// When a TIN is good enough.

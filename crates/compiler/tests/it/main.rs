@@ -18,6 +18,7 @@ mod difficult_ground;
 mod given;
 mod golden;
 mod incremental;
+mod levels;
 mod measures;
 mod one_tile_again;
 mod random_jobs;

@@ -8,7 +8,7 @@ fn stamped(manifest: &mut Manifest, database: &Database) {
     record.state = TileState::Done;
     record.fingerprint = Some(samples::stamp().fingerprint);
     record.tin = Some(database.write_tile(&samples::stamp(), &samples::tile()).unwrap());
-    record.slm = Some(database.write_modules(&samples::tile_modules(), &samples::modules()).unwrap());
+    record.slm = Some(database.write_modules(&samples::tile_modules(), &samples::levels()).unwrap());
     record.curve = Some(database.write_curve(&samples::stamp(), &samples::curve()).unwrap());
 }
 
@@ -36,6 +36,7 @@ fn what_was_written_is_read_and_verified() {
     assert_eq!(read.tile_stamp(samples::TILE).unwrap(), Some(samples::stamp()));
     assert_eq!(read.tile_stamp(terrain::TileId { row: 5, col: 5 }).unwrap(), None);
     assert_eq!(read.read_modules(samples::TILE).unwrap(), (samples::tile_modules(), samples::modules()));
+    assert_eq!(read.read_levels(samples::TILE).unwrap(), (samples::tile_modules(), samples::levels()));
     assert_eq!(read.read_curve(samples::TILE).unwrap(), (samples::stamp(), samples::curve()));
     assert!(read.verify(&manifest).unwrap().is_empty());
 }

@@ -5,6 +5,7 @@ mod dem;
 mod given;
 mod importance;
 mod limits;
+mod lod;
 mod tiles;
 mod tin;
 
@@ -76,8 +77,8 @@ fn job_of(sections: &Sections, path: &Path, find: Option<&FindArea>) -> Result<(
     let limits = limits::read(&sections.limits, &area.grid, modules.side_m)?;
     let given = given::read(&sections.tin, path, &mut mentions)?;
     let tin = tin::read(&sections.tin, &sections.modules, modules.edges, given)?;
-    refuse_levels(&sections.lod)?;
-    Ok((Job { path: path.to_owned(), area, dem, importance, tiles, modules, limits, tin }, mentions))
+    let lod = lod::read(&sections.lod)?;
+    Ok((Job { path: path.to_owned(), area, dem, importance, tiles, modules, limits, tin, lod }, mentions))
 }
 
 /// The files of `dem.sources`, patterns expanded.
@@ -88,17 +89,6 @@ fn files_of(dem: &Section, path: &Path) -> Result<Vec<SourceFile>, JobError> {
     match spec.source {
         DemSource::Files { files, .. } => Ok(files),
         DemSource::Sample { .. } => Ok(Vec::new()),
-    }
-}
-
-/// Levels of detail are another version's; an empty list says so plainly.
-fn refuse_levels(lod: &Section) -> Result<(), JobError> {
-    let Some(entry) = lod.optional("levels") else { return Ok(()) };
-    let expected = "[], the finest level only";
-    if entry.list(expected)?.is_empty() {
-        Ok(())
-    } else {
-        Err(entry.unsupported(expected, "remove the section: load modules have one level"))
     }
 }
 

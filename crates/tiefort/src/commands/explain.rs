@@ -109,6 +109,10 @@ fn counts(found: &Explanation) -> Table {
         charged => format!(", charged {} triangles{allowed}", grouped(u64::from(charged))),
     };
     table.row(["tile", &tile.to_string(), &format!("{state}{charged}; stopped: {}", stop_text(stop))]);
+    for (level, (triangles, rms_m, largest_m)) in found.levels.iter().enumerate().skip(1) {
+        let figures = format!("triangles, RMS residual {rms_m:.3} m, largest {largest_m:.2} m");
+        table.row([format!("level {level}"), grouped(u64::from(*triangles)), figures]);
+    }
     for (class, count) in &found.classes {
         table.row(["class", &grouped(u64::from(*count)), &format!("triangles on {class}")]);
     }
@@ -226,6 +230,11 @@ fn to_json(found: &Explanation) -> Value {
             "rms_after_m": more.rms_after_m,
             "place": more.place,
         })),
+        "levels": found.levels.iter().map(|(triangles, rms_m, max_m)| json!({
+            "triangles": triangles,
+            "rms_m": rms_m,
+            "max_m": max_m,
+        })).collect::<Vec<_>>(),
         "no_ground": found.no_ground,
     })
 }

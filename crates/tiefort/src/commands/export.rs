@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use compiler::{BuiltFrom, CompileError};
 use database::Folder;
-use exports::{Block, Coordinates, Datum, ExportError, Facts, Mesh, Product, Work};
+use exports::{Block, Coordinates, Datum, ExportError, Facts, Levels, Mesh, Product, Work};
 use job::Job;
 use terrain::{ModuleId, PostRect};
 use views::grouped;
@@ -21,10 +21,13 @@ const AFTER_HELP: &str = "\
 Examples:
   tiefort export ntc.tdb --format glb --modules 40,40..54,54 --out block.glb
   tiefort export ntc.tdb --format modules --out ntc_modules
+  tiefort export ntc.tdb --format obj --lod 2 --out coarse.obj
   tiefort export ntc.tdb --format gpkg --out ntc.gpkg
   tiefort export ntc.tdb --format geotiff --layer residual --out residual.tif
   tiefort export ntc.tdb --format 3dtiles --assume-datum EGM96 --out ntc_3dtiles
 
+--lod K exports a coarser level of a database that has some ([lod] in its job). Files of modules hold
+all levels without it; 3dtiles puts levels coarser than K between a square and its load modules.
 A mesh (ply, obj, glb) is counted in metres from the south-west corner of what is exported; the file
 itself and NAME.json beside it say where that is. Load modules are named ROW,COL from the south-west.
 3dtiles and quantized-mesh want heights above the ellipsoid: they know EGM96 and the ellipsoid, and
@@ -43,9 +46,9 @@ pub struct Arguments {
     /// The south-west and north-east load module of a block, or a single one [default: the whole area]
     #[arg(long, value_name = "ROW,COL..ROW,COL", value_parser = block)]
     modules: Option<Block>,
-    /// Level of detail; 0 is the finest, and the only one in a database yet
-    #[arg(long, value_name = "K", default_value_t = 0)]
-    lod: u32,
+    /// Level of detail, 0 being the finest [default: 0; for modules and 3dtiles all that the database has]
+    #[arg(long, value_name = "K")]
+    lod: Option<usize>,
     /// What coordinates are counted from; for ply and obj only
     #[arg(long, value_enum, default_value_t = Frame::Local)]
     coordinates: Frame,
@@ -161,10 +164,6 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
 
 /// Refuses what cannot be, before any work.
 fn check(arguments: &Arguments) -> Result<(), Failure> {
-    if 0 < arguments.lod {
-        let message = format!("--lod: found level {}, expected 0, the only level in the database", arguments.lod);
-        return Err(Failure::new(message, "leave --lod out"));
-    }
     if arguments.coordinates == Frame::Map && !matches!(arguments.format, Format::Ply | Format::Obj) {
         let message = "found --coordinates map with a format that has no room for map coordinates, expected ply or obj";
         return Err(Failure::new(message, "leave --coordinates out; NAME.json beside the file says where it lies"));
@@ -194,13 +193,22 @@ fn check(arguments: &Arguments) -> Result<(), Failure> {
     files::check_writable(&arguments.out)
 }
 
+/// The levels that a format has room for: a tileset goes on to coarser ones.
+fn levels(arguments: &Arguments) -> Levels {
+    match (arguments.format, arguments.lod) {
+        (Format::Modules, None) => Levels::From(0),
+        (Format::Tiles3d, level) => Levels::From(level.unwrap_or(0)),
+        (_, level) => Levels::One(level.unwrap_or(0)),
+    }
+}
+
 /// Does it; what was exported, in words.
 fn export(arguments: &Arguments, work: &Work) -> Result<String, Failure> {
     let folder = match arguments.format.extension() {
         Some(_) => None,
         None => Some(NewFolder::begin(&arguments.out)?),
     };
-    let product = Product::read(&arguments.database, arguments.modules, work)?;
+    let product = Product::read(&arguments.database, arguments.modules, levels(arguments), work)?;
     match arguments.format {
         Format::Ply | Format::Obj | Format::Glb => write_mesh(arguments, &product)?,
         Format::Geotiff => write_raster(arguments, &product, work)?,
@@ -226,7 +234,15 @@ fn export(arguments: &Arguments, work: &Work) -> Result<String, Failure> {
         count => format!("{} load modules", grouped(count as u64)),
     };
     let said = said.map(|datum| format!("{}\n", datum.said())).unwrap_or_default();
-    Ok(format!("{said}{modules}, {} triangles", grouped(triangles as u64)))
+    let coarser: usize = product.coarser.iter().flatten().map(|module| module.triangles.len()).sum();
+    let level = match (product.level, product.coarser.len()) {
+        (0, 0) => String::new(),
+        (level, 0) => format!(" at level {level}"),
+        (level, more) => {
+            format!(" at level {level}, {} more at levels up to {}", grouped(coarser as u64), level + more)
+        }
+    };
+    Ok(format!("{said}{modules}, {} triangles{level}", grouped(triangles as u64)))
 }
 
 fn write_raster(arguments: &Arguments, product: &Product, work: &Work) -> Result<(), Failure> {

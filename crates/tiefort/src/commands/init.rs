@@ -76,7 +76,9 @@ fn job_text(suggestion: &Suggestion, folder: &Path, name: &str, given: Option<&s
          per_load_module = 100         # triangles\n\
          mean_per_load_module = 32     # over the whole area: {} triangles\n\
          per_4km_square = 4096         # in every window of 8 x 8 load modules\n\n\
-         [tin]\nmethod = \"optimised\"          # the budget is the limits\n",
+         [tin]\nmethod = \"optimised\"          # the budget is the limits\n\n\
+         # Coarser levels of every load module, for what is far away: the share of inner vertices each keeps.\n\
+         # [lod]\n# levels = [{{ inner_share = 0.5 }}, {{ inner_share = 0.2 }}]\n",
         tiles.1,
         tiles.0,
         views::grouped((modules[0] * modules[1] * 32.0) as u64),

@@ -9,7 +9,7 @@ use exports::TinPlace;
 use job::Optimising;
 use serde_json::{Value, json};
 use terrain::StopReason;
-use views::{Coordinates, MeshPlace, grouped};
+use views::{Align, Coordinates, MeshPlace, Table, grouped};
 
 use crate::arguments::{Workers, positive, rows_by_columns, start_method};
 use crate::failure::{Failure, Outcome};
@@ -24,14 +24,18 @@ Examples:
   tiefort tin dem.tif --points 5000 --start vip:1000 --method paper --out mesh.ply
   tiefort tin dem.tif --points 5000 --start surveyed.csv --out mesh.ply      columns east,north,height_m
   tiefort tin dem.tif --points 5000 --measure --out mesh.ply      every measure of fidelity, too
+  tiefort tin dem.tif --levels 1000,2500,5000 --method paper --out mesh.ply      mesh-1000.ply and so on
   tiefort tin dem.tif --rms 1.5 --tiles 6x6 --workers 8 --coordinates map --out mesh.ply
 
 The first of --points (or --triangles), --max-residual and --rms that is reached ends it.
+--levels writes one mesh for each number of vertices. With paper and greedy, each is the beginning of one
+sequence of posts: a mesh holds all vertices of the smaller ones. With optimised, whose vertices move, each
+is made anew: the best of its size, with vertices of its own.
 Coordinates are metres from the south-west post (Blender, MeshLab); with --coordinates map they are
 eastings and northings in 64 bits (QGIS).";
 
 /// Arguments that say when to stop: at least one is given.
-const ENDS: [&str; 4] = ["points", "triangles", "max_residual", "rms"];
+const ENDS: [&str; 5] = ["points", "triangles", "max_residual", "rms", "levels"];
 
 /// Arguments of `tin`.
 #[derive(Args)]
@@ -47,6 +51,15 @@ pub struct Arguments {
     /// Most triangles of the mesh, instead of --points; for --method optimised only
     #[arg(long, value_name = "N", conflicts_with = "points", value_parser = clap::value_parser!(u32).range(2..))]
     triangles: Option<u32>,
+    /// One mesh for each of these numbers of vertices, from few to many: mesh-1000.ply, mesh-2500.ply, …
+    #[arg(
+        long,
+        value_name = "N,N…",
+        value_delimiter = ',',
+        conflicts_with_all = ["points", "triangles", "max_residual", "rms"],
+        value_parser = clap::value_parser!(u32).range(4..)
+    )]
+    levels: Vec<u32>,
     /// Largest residual in metres
     #[arg(long, value_name = "M", value_parser = positive)]
     max_residual: Option<f64>,
@@ -170,7 +183,8 @@ enum Kind {
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let kind = kind(arguments)?;
     let request = request(arguments)?;
-    files::check_writable(&arguments.out)?;
+    let outs = outs(arguments);
+    outs.iter().try_for_each(|out| files::check_writable(out))?;
     let signals = Signals::watch()?;
     let show = match (arguments.json, arguments.quiet) {
         (true, _) => Show::Json,
@@ -180,20 +194,86 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let mut listener = Listener::start(show, arguments.tiles, request.workers);
     let place = listener.place();
     signals.end_in_time(move || signals::stopped(&place.lock().unwrap_or_else(PoisonError::into_inner).words()));
-    let meshed = compiler::tin(&request, signals.stop(), &mut listener);
+    let levels: Vec<usize> = arguments.levels.iter().map(|&points| points as usize).collect();
+    let meshed = match levels.is_empty() {
+        true => compiler::tin(&request, signals.stop(), &mut listener).map(|mesh| vec![mesh]),
+        false => compiler::tin_levels(&request, &levels, signals.stop(), &mut listener),
+    };
     let seconds = listener.finish().seconds;
     signals.tell_once(|| {});
-    let mesh = meshed.map_err(|error| Failure::of_compiler(&error, signals.exit_code()))?;
-    write(&mesh, kind, arguments)?;
-    let measured = arguments.measure.then(|| compiler::measure(&mesh, Sights::USUAL));
+    let meshes = meshed.map_err(|error| Failure::of_compiler(&error, signals.exit_code()))?;
+    for (mesh, out) in meshes.iter().zip(&outs) {
+        write(mesh, kind, arguments, out)?;
+    }
+    let measure = |mesh: &Mesh| arguments.measure.then(|| compiler::measure(mesh, Sights::USUAL));
+    let measured: Vec<Option<Fidelity>> = meshes.iter().map(measure).collect();
     match show {
         Show::Nothing => {}
-        Show::Json => events::print_line(&summary_json(&mesh, measured.as_ref())),
+        Show::Json => events::print_line(&told_json(&meshes, &measured, &outs, arguments)),
         Show::Progress | Show::Verbose | Show::JsonLog => {
-            terminal::tell(&(summary(&mesh, seconds) + &measured_text(measured.as_ref())));
+            terminal::tell(&told(&meshes, &measured, &outs, arguments, seconds));
         }
     }
     Ok(Outcome::Sound)
+}
+
+/// The files to write: one, or one for each level with its number of vertices in its name.
+fn outs(arguments: &Arguments) -> Vec<PathBuf> {
+    let out = &arguments.out;
+    if arguments.levels.is_empty() {
+        return vec![out.clone()];
+    }
+    let part = |part: Option<&std::ffi::OsStr>| part.unwrap_or_default().to_string_lossy().into_owned();
+    let (stem, extension) = (part(out.file_stem()), part(out.extension()));
+    arguments.levels.iter().map(|points| out.with_file_name(format!("{stem}-{points}.{extension}"))).collect()
+}
+
+/// What was made, for a program: of levels the last one's figures, and a list of all.
+fn told_json(meshes: &[Mesh], measured: &[Option<Fidelity>], outs: &[PathBuf], arguments: &Arguments) -> Value {
+    let all: Vec<Value> =
+        meshes.iter().zip(measured).map(|(mesh, measured)| summary_json(mesh, measured.as_ref())).collect();
+    let mut told = all.last().cloned().unwrap_or_default();
+    if !arguments.levels.is_empty() {
+        let level = |(mut level, out): (Value, &PathBuf)| {
+            level["file"] = json!(out.display().to_string());
+            level.as_object_mut().map(|level| level.remove("event"));
+            level
+        };
+        told["levels"] = all.into_iter().zip(outs).map(level).collect();
+    }
+    told
+}
+
+/// What was made, for a person.
+fn told(
+    meshes: &[Mesh],
+    measured: &[Option<Fidelity>],
+    outs: &[PathBuf],
+    arguments: &Arguments,
+    seconds: f64,
+) -> String {
+    if let ([mesh], true) = (meshes, arguments.levels.is_empty()) {
+        return summary(mesh, seconds) + &measured_text(measured[0].as_ref());
+    }
+    let mut table = Table::new(&[Align::Left, Align::Right, Align::Right, Align::Right, Align::Right, Align::Right]);
+    table.row(["level", "points", "triangles", "RMS m", "99 % m", "largest m"]);
+    for (mesh, out) in meshes.iter().zip(outs) {
+        let residual = &mesh.residual;
+        let [rms_m, p99_m, max_m] = [(residual.rms_m, 3), (residual.p99_m, 2), (residual.max_m, 2)]
+            .map(|(metres, digits)| format!("{metres:.digits$}"));
+        let name = files::shown(out).display().to_string();
+        table.row([name, grouped(mesh.points as u64), grouped(mesh.tin.triangles.len() as u64), rms_m, p99_m, max_m]);
+    }
+    let mut text = format!("{} levels in {seconds:.1} s\n{}", meshes.len(), table.text(0));
+    for ((mesh, out), asked) in meshes.iter().zip(outs).zip(&arguments.levels) {
+        if mesh.points < *asked as usize {
+            text += &format!("{}: {}\n", files::shown(out).display(), end(mesh.stop));
+        }
+    }
+    for (measured, out) in measured.iter().zip(outs).filter(|(measured, _)| measured.is_some()) {
+        text += &format!("\n{}{}", files::shown(out).display(), measured_text(measured.as_ref()));
+    }
+    text
 }
 
 fn summary_json(mesh: &Mesh, measured: Option<&Fidelity>) -> Value {
@@ -310,7 +390,7 @@ fn optimising(arguments: &Arguments) -> Optimising {
     }
 }
 
-fn write(mesh: &Mesh, kind: Kind, arguments: &Arguments) -> Result<(), Failure> {
+fn write(mesh: &Mesh, kind: Kind, arguments: &Arguments, out: &Path) -> Result<(), Failure> {
     let place = MeshPlace {
         east_m: mesh.east_m,
         north_m: mesh.north_m,
@@ -321,7 +401,7 @@ fn write(mesh: &Mesh, kind: Kind, arguments: &Arguments) -> Result<(), Failure> 
         Frame::Local => Coordinates::Local,
         Frame::Map => Coordinates::Map,
     };
-    files::write_whole(&arguments.out, |out| match kind {
+    files::write_whole(out, |out| match kind {
         Kind::Ply => views::write_ply(out, &mesh.tin, &place, coordinates),
         Kind::Obj => views::write_obj(out, &mesh.tin, &place, coordinates),
         Kind::Glb => {
@@ -332,13 +412,17 @@ fn write(mesh: &Mesh, kind: Kind, arguments: &Arguments) -> Result<(), Failure> 
     })
 }
 
-fn summary(mesh: &Mesh, seconds: f64) -> String {
-    let end = match mesh.stop {
+fn end(stop: StopReason) -> &'static str {
+    match stop {
         StopReason::BudgetSpent => "all points are spent",
         StopReason::ResidualReached => "the largest residual is reached",
         StopReason::RmsReached => "the RMS residual is reached",
         StopReason::Exhausted => "no post is left to choose",
-    };
+    }
+}
+
+fn summary(mesh: &Mesh, seconds: f64) -> String {
+    let end = end(mesh.stop);
     let (points, triangles) = (grouped(mesh.points as u64), grouped(mesh.tin.triangles.len() as u64));
     let (rms_m, p99_m, max_m) = (mesh.residual.rms_m, mesh.residual.p99_m, mesh.residual.max_m);
     let residual = format!("RMS {rms_m:.3} m, 99 % within {p99_m:.2} m, largest {max_m:.2} m");

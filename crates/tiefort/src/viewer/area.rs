@@ -64,6 +64,11 @@ fn description(product: &Product, area: &Area, overview: &Overview) -> String {
         "vertical_datum": frame.vertical_datum,
         "rows": frame.rows,
         "cols": frame.cols,
+        "levels": match product.job.lod.border {
+            job::LodBorder::Full => frame.level_count,
+            // Neighbours at two levels would not fit together.
+            job::LodBorder::Own => 1,
+        },
         "side_m": frame.side_m(),
         "side_cells": product.grid.side_cells,
         "spacing_m": manifest.area.spacing_m,

@@ -10,12 +10,12 @@ use load_module_reader::{Block, Module};
 use super::area::Viewed;
 use super::overview::residuals_m;
 
-/// The load modules of `block`.
+/// The load modules of `block` at a level of detail.
 ///
 /// # Errors
-/// In words, when one cannot be read.
-pub fn bytes(viewed: &Viewed, block: Block) -> Result<Vec<u8>, String> {
-    let ground = viewed.area.load(block).map_err(|error| error.to_string())?;
+/// In words, when there is no such level, or one cannot be read.
+pub fn bytes(viewed: &Viewed, block: Block, level: u16) -> Result<Vec<u8>, String> {
+    let ground = viewed.area.load_level(block, level).map_err(|error| error.to_string())?;
     let mut out = Vec::new();
     for module in ground.modules() {
         write(module.module(), &mut out);
@@ -57,6 +57,7 @@ mod tests {
         let module = Module {
             row: 3,
             col: 5,
+            level: 0,
             vertices: vec![vertex(0, 0), vertex(64000, 0), vertex(0, 64000), vertex(64000, 64000)],
             triangles: vec![[0, 1, 3], [0, 3, 2]],
             classes: vec![0, 1],

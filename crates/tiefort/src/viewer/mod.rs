@@ -5,6 +5,7 @@
 //!   /api/area                              what the area is, as JSON
 //!   /api/overview                          coarse heights and the figures of every load module (overview.rs)
 //!   /api/modules/SOUTH/WEST/NORTH/EAST     a block of load modules, whole (block.rs)
+//!   /api/levels/LEVEL/SOUTH/WEST/NORTH/EAST   the same at a level of detail
 //!   /api/dem                               whether the sources are at hand, as JSON; else `why` says why not
 //!   /api/dem/SOUTH/WEST/NORTH/EAST         the posts of such a block (posts.rs)
 //! ```
@@ -76,6 +77,7 @@ fn routes(viewed: Arc<Viewed>, address: SocketAddr) -> Router {
         .route("/api/area", get(area))
         .route("/api/overview", get(overview))
         .route("/api/modules/{south}/{west}/{north}/{east}", get(modules))
+        .route("/api/levels/{level}/{south}/{west}/{north}/{east}", get(level))
         .route("/api/dem", get(ground))
         .route("/api/dem/{south}/{west}/{north}/{east}", get(dem))
         .layer(middleware::from_fn(move |request: Request, next: Next| only_from_here(request, next, address)))
@@ -105,7 +107,14 @@ async fn overview(State(viewed): State<Arc<Viewed>>) -> Response {
 }
 
 async fn modules(State(viewed): State<Arc<Viewed>>, UrlPath(sides): UrlPath<[u32; 4]>) -> Response {
-    answer(sides, viewed, block::bytes).await
+    answer(sides, viewed, |viewed, block| block::bytes(viewed, block, 0)).await
+}
+
+async fn level(
+    State(viewed): State<Arc<Viewed>>,
+    UrlPath((level, south, west, north, east)): UrlPath<(u16, u32, u32, u32, u32)>,
+) -> Response {
+    answer([south, west, north, east], viewed, move |viewed, block| block::bytes(viewed, block, level)).await
 }
 
 async fn ground(State(viewed): State<Arc<Viewed>>) -> impl IntoResponse {
@@ -122,7 +131,7 @@ async fn dem(State(viewed): State<Arc<Viewed>>, UrlPath(sides): UrlPath<[u32; 4]
 async fn answer(
     [south, west, north, east]: [u32; 4],
     viewed: Arc<Viewed>,
-    read: fn(&Viewed, Block) -> Result<Vec<u8>, String>,
+    read: impl FnOnce(&Viewed, Block) -> Result<Vec<u8>, String> + Send + 'static,
 ) -> Response {
     let all = viewed.area.whole();
     let sides_in_order = south < north && west < east && north <= all.north && east <= all.east;

@@ -77,7 +77,7 @@ fn what_cannot_be_exported_is_refused() {
     refuses(&["ply", "--out", "mesh.obj"], &["mesh.obj", "\"obj\"", "\"ply\""]);
     refuses(&["ply", "--modules", "0,0..8,0", "--out", "mesh.ply"], &["0,0..8,0", "from 0,0 to 7,7"]);
     refuses(&["ply", "--modules", "3,0..2,0", "--out", "mesh.ply"], &["3,0..2,0"]);
-    refuses(&["ply", "--lod", "1", "--out", "mesh.ply"], &["level 1", "0"]);
+    refuses(&["ply", "--lod", "1", "--out", "mesh.ply"], &["--lod", "level 1", "0, the only level"]);
     refuses(&["glb", "--coordinates", "map", "--out", "mesh.glb"], &["--coordinates map"]);
     refuses(&["glb", "--layer", "residual", "--out", "mesh.glb"], &["--layer"]);
     refuses(&["geotiff", "--against", "a.tif", "--out", "b.tif"], &["--against"]);
@@ -89,4 +89,55 @@ fn what_cannot_be_exported_is_refused() {
     scene.refuses(&["export", "none.tdb", "--format", "ply", "--out", "mesh.ply"], &["none.tdb"]);
     let said = scene.run_to(2, &["export", "a.tdb", "--format", "3dtiles", "--assume-datum", "sea", "--out", "new"]);
     assert!(said.stderr.contains("expected EGM96"), "{}", said.stderr);
+}
+
+#[test]
+fn every_format_takes_any_level_that_the_database_has() {
+    let scene = Scene::with_job("small.toml", &[]);
+    let job = fs::read_to_string(scene.path("job.toml")).unwrap();
+    let lod = "\n[lod]\nlevels = [{ inner_share = 0.5 }, { inner_share = 0.2 }]\n";
+    fs::write(scene.path("job.toml"), job + lod).unwrap();
+    scene.run_to(0, &["build", "job.toml", "--out", "a.tdb", "--quiet"]);
+    scene.run_to(0, &["verify", "a.tdb"]);
+    let report: Value = serde_json::from_slice(&fs::read(scene.path("a.tdb/report.json")).unwrap()).unwrap();
+    let triangles = |level: usize| report["levels"][level]["triangles"].as_u64().unwrap();
+    assert!(triangles(2) < triangles(1) && triangles(1) < triangles(0));
+    for level in [0, 1, 2] {
+        let (lod, out) = (level.to_string(), format!("{level}.glb"));
+        scene.run_to(0, &["export", "a.tdb", "--format", "glb", "--lod", &lod, "--out", &out, "--quiet"]);
+        let sidecar: Value = serde_json::from_slice(&fs::read(scene.path(&format!("{out}.json"))).unwrap()).unwrap();
+        assert_eq!(
+            (sidecar["level"].as_u64(), sidecar["triangles"].as_u64()),
+            (Some(level), Some(triangles(level as usize)))
+        );
+    }
+    let names = ["m1", "mesh.ply", "mesh.obj", "a.tif", "a.gpkg", "flt", "terrain", "t1"];
+    let formats = ["modules", "ply", "obj", "geotiff", "gpkg", "openflight", "quantized-mesh", "3dtiles"];
+    for (format, name) in formats.into_iter().zip(names) {
+        let mut arguments = vec!["export", "a.tdb", "--format", format, "--lod", "1", "--out", name];
+        if ["3dtiles", "quantized-mesh"].contains(&format) {
+            arguments.extend(["--assume-datum", "EGM96"]);
+        }
+        let said = scene.run_to(0, &arguments).stderr;
+        assert!(said.contains(" triangles at level 1"), "{format}: {said}");
+        let missing = [&arguments[..5], &["3", "--out", "none.ply"]].concat();
+        if format == "ply" {
+            scene.refuses(&missing, &["--lod", "level 3", "0 to 2: the database has 3 levels"]);
+        }
+    }
+    let said = scene.run_to(0, &["export", "a.tdb", "--format", "modules", "--out", "all"]).stderr;
+    assert!(said.contains("at level 0") && said.contains("up to 2"), "{said}");
+    let alone = |folder: &str| fs::read(scene.path(folder).join("r0003c0004.slm")).unwrap();
+    assert_eq!((alone("all")[10], alone("m1")[10]), (3, 1));
+    let words = ["--format", "3dtiles", "--assume-datum", "EGM96", "--out", "tiles"];
+    scene.run_to(0, &[&["export", "a.tdb"], &words[..]].concat());
+    let tileset: Value = serde_json::from_slice(&fs::read(scene.path("tiles/tileset.json")).unwrap()).unwrap();
+    let mut tile = &tileset["root"];
+    let mut names = Vec::new();
+    while let Some(child) = tile["children"].get(0) {
+        assert!(child["geometricError"].as_f64() <= tile["geometricError"].as_f64());
+        names.push(child["content"]["uri"].as_str().unwrap().split("/r").next().unwrap().to_owned());
+        tile = child;
+    }
+    assert_eq!(names, ["squares", "levels/2", "levels/1", "modules"]);
 }

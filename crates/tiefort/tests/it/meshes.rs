@@ -46,6 +46,60 @@ fn a_glb_says_where_it_lies_and_has_no_map_coordinates() {
     scene.refuses(&map, &["--coordinates map", ".glb"]);
 }
 
+/// The vertices and the triangles of an OBJ, each by their places, whatever their order.
+fn obj(text: &str) -> (std::collections::BTreeSet<String>, std::collections::BTreeSet<Vec<String>>) {
+    let places: Vec<&str> = text.lines().filter_map(|line| line.strip_prefix("v ")).collect();
+    let corner = |word: &str| places[word.split('/').next().unwrap().parse::<usize>().unwrap() - 1].to_owned();
+    let faces = text.lines().filter_map(|line| line.strip_prefix("f "));
+    let triangle = |line: &str| {
+        let mut corners: Vec<String> = line.split_whitespace().map(corner).collect();
+        let first = (0..3).min_by_key(|&i| corners[i].clone()).unwrap();
+        corners.rotate_left(first);
+        corners
+    };
+    (places.iter().map(|&place| place.to_owned()).collect(), faces.map(triangle).collect())
+}
+
+#[test]
+fn a_level_is_the_mesh_of_so_many_points_and_holds_the_coarser_ones() {
+    let scene = Scene::new();
+    Raster::sound().write(&scene.path("dem.tif"));
+    let read = |name: &str| fs::read_to_string(scene.path(name)).unwrap();
+    for method in ["paper", "greedy", "optimised"] {
+        let words = ["tin", "dem.tif", "--levels", "30,100,200", "--method", method, "--out", "mesh.obj"];
+        let said = scene.run_to(0, &words).stderr;
+        assert!(said.contains("3 levels") && said.contains("mesh-200.obj"), "{said}");
+        for points in ["30", "100", "200"] {
+            let alone = ["tin", "dem.tif", "--points", points, "--method", method, "--out", "alone.obj", "--quiet"];
+            scene.run_to(0, &alone);
+            assert_eq!(obj(&read(&format!("mesh-{points}.obj"))), obj(&read("alone.obj")), "{method} {points}");
+        }
+        let [few, many] = ["30", "200"].map(|points| obj(&read(&format!("mesh-{points}.obj"))).0);
+        assert_eq!(few.is_subset(&many), method != "optimised", "{method}");
+    }
+    assert!(!scene.path("mesh.obj").exists());
+    let said = scene.run_to(0, &["tin", "dem.tif", "--levels", "30,60", "--json", "--out", "mesh.ply"]).stdout;
+    let summary: Value = serde_json::from_str(said.lines().last().unwrap()).unwrap();
+    assert_eq!((&summary["points"], &summary["levels"][0]["points"]), (&Value::from(60), &Value::from(30)));
+    assert!(summary["levels"][0]["file"].as_str().unwrap().ends_with("mesh-30.ply"));
+}
+
+#[test]
+fn levels_that_cannot_be_are_refused() {
+    let scene = Scene::new();
+    Raster::sound().write(&scene.path("dem.tif"));
+    let refuses = |words: &[&str], parts: &[&str]| {
+        scene.refuses(&[&["tin", "dem.tif", "--out", "mesh.ply", "--levels"], words].concat(), parts);
+    };
+    refuses(&["200,100"], &["--levels", "200,100", "each above the one before"]);
+    refuses(&["100,100"], &["--levels", "each above the one before"]);
+    refuses(&["100,200", "--tiles", "2x2"], &["2x2 tiles", "one tile"]);
+    refuses(&["20,200", "--method", "greedy", "--start", "regular:64"], &["--levels", "20", "at least the"]);
+    for words in [&["100", "--points", "200"][..], &["3,100"], &["100", "--rms", "1"], &["many"]] {
+        scene.run_to(2, &[&["tin", "dem.tif", "--out", "mesh.ply", "--levels"], words].concat());
+    }
+}
+
 #[test]
 fn tiles_and_targets_make_a_mesh_too() {
     let scene = Scene::new();

@@ -150,7 +150,7 @@ function pick(view, x, y) {
   const isTin = surface === module.tin;
   const className = isTin ? area.classes[module.classes[number]] ?? module.classes[number] : undefined;
   const residual = isTin ? undefined : surface.residuals[nearest(surface, number, place)];
-  view.picked = { row: module.row, col: module.col, place, triangle: { number, normal, className, residual } };
+  view.picked = { row: module.row, col: module.col, level: module.level, place, triangle: { number, normal, className, residual } };
   showPicked(area, view.picked);
 }
 
@@ -173,9 +173,11 @@ function state(view) {
   const [east, north] = area.inSystem(tank.east, tank.north);
   return {
     east, north, height: tank.height, heading: tank.heading, tilt: tank.tilt, driven: tank.driven, speed: tank.speed,
-    block: terrain.block, loaded: [...terrain.drawn.keys()], waiting: terrain.asked.size, fault: terrain.fault,
+    block: terrain.block, loaded: [...terrain.fine().keys()], waiting: terrain.asked.size, fault: terrain.fault,
     showsDem: terrain.withDem, modules: figures?.loaded.modules, triangles: figures?.loaded.triangles,
-    fullest: figures?.loaded.fullest, view: figures?.view, frameMs: view.frameMs, picked,
+    coarser: [...terrain.drawn.values()].filter(({ module }) => module.level !== 0)
+      .map(({ module }) => [module.level, module.row, module.col, module.tin.triangles.length / 3]),
+    blocks: terrain.blocks, fullest: figures?.loaded.fullest, view: figures?.view, frameMs: view.frameMs, picked,
   };
 }
 

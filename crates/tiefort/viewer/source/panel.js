@@ -26,6 +26,10 @@ export function showFigures(area, { tank, loaded, view, under, frameMs }) {
       `${loaded.fullest === null ? "–" : grouped(loaded.fullest)} of ${grouped(limits.window.limit)}`],
     ["frame", `${frameMs.toFixed(1)} ms`],
   ];
+  if (1 < area.levels) {
+    const { modules, triangles } = loaded.coarser;
+    rows.splice(7, 0, ["farther, coarser", `${grouped(triangles)} in ${grouped(modules)}`]);
+  }
   const table = at("figures").querySelector("table");
   while (table.rows.length < rows.length) [0, 1].forEach(((row) => () => row.insertCell())(table.insertRow()));
   rows.forEach((row, i) => row.forEach((words, j) => {
@@ -54,7 +58,7 @@ export function showPicked(area, picked) {
   const box = at("picked");
   box.style.display = picked ? "block" : "none";
   if (!picked) return;
-  const { row, col, place, triangle } = picked, figures = area.figures(row, col);
+  const { row, col, level, place, triangle } = picked, figures = area.figures(row, col);
   const [east, north] = area.inSystem(place[0], place[1]);
   const metres = (value) => (Number.isNaN(value) ? "no post measured" : `${value.toFixed(2)} m`);
   const lines = [
@@ -67,6 +71,7 @@ export function showPicked(area, picked) {
   if (triangle) {
     const slope = degrees(Math.acos(Math.min(triangle.normal[2], 1)));
     const kind = triangle.className === undefined ? "" : `, class ${triangle.className}`;
+    if (level) lines.push(`drawn at level ${level}`);
     lines.push(`triangle ${triangle.number}: slope ${slope.toFixed(1)}°${kind}`);
     if (triangle.residual !== undefined) lines.push(`residual at the nearest post ${metres(triangle.residual)}`);
   } else {

@@ -34,13 +34,13 @@ export async function readArea() {
   return area;
 }
 
-/** The load modules of a half-open block. */
-export async function readModules(area, [south, west, north, east]) {
-  const bytes = await (await answer(`/api/modules/${south}/${west}/${north}/${east}`)).arrayBuffer();
+/** The load modules of a half-open block at a level of detail; 0 is the finest. */
+export async function readModules(area, [south, west, north, east], level) {
+  const bytes = await (await answer(`/api/levels/${level}/${south}/${west}/${north}/${east}`)).arrayBuffer();
   const modules = [];
   for (let at = 0; at < bytes.byteLength;) {
     const [module, end] = moduleAt(area, bytes, at);
-    modules.push(module);
+    modules.push({ ...module, level });
     at = end;
   }
   return modules;

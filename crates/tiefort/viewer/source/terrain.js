@@ -1,4 +1,5 @@
-// The block of load modules around the observer: loaded, drawn, dropped; beyond it the area as it is coarsely.
+// The block of load modules around the observer: loaded, drawn, dropped; around it load modules at coarser levels of
+// detail, where the database has them; beyond these the area as it is coarsely.
 import { Frustum, Group, Matrix4 } from "three";
 import { apron, coarseMesh, moduleLines, moduleMesh, paint, wallMeshes } from "./meshes.js";
 import { checkDem, readModules, readPosts } from "./server.js";
@@ -6,6 +7,8 @@ import { triangleUnder } from "./surface.js";
 
 /** Metres from the middle of the area to where nothing is any more. */
 const APRON_M = 400_000;
+/** How much further each coarser level reaches than the one before, as a part of the visible range. */
+const RING = 0.5;
 /** How long after load modules could not be read they are asked for again. */
 const AGAIN_MS = 2000;
 
@@ -13,11 +16,13 @@ export class Terrain {
   constructor(area) {
     this.area = area;
     this.group = new Group();
-    // By row * cols + col: {module, surface, mesh, edges}.
+    // By row * cols + col: {module, surface, mesh, edges}. Levels that differ fit together, so that a load module stays
+    // until the one in its place has come.
     this.drawn = new Map();
     this.colors = "height";
     this.withEdges = this.withLines = this.withDem = false;
-    this.block = null;
+    // For each level the half-open block within which load modules are at least that fine.
+    this.blocks = [];
     this.lacks = false;
     this.asked = new Set();
     this.fault = null;
@@ -36,31 +41,52 @@ export class Terrain {
       clamp(col + reach + 1, area.cols)];
   }
 
+  /** The block of the finest level; null before anything was asked for. */
+  get block() {
+    return this.blocks[0] ?? null;
+  }
+
   /** Follows the observer: drops what is out of range, asks for what is missing. */
   follow(east, north, range) {
-    const block = this.blockAround(east, north, range);
-    if (this.block && !this.lacks && block.every((side, i) => side === this.block[i])) return;
-    [this.block, this.lacks] = [block, false];
+    // The DEM has one level, and would not fit to coarser load modules.
+    const levels = this.withDem ? 1 : this.area.levels;
+    const blocks = Array.from({ length: levels }, (_, level) =>
+      this.blockAround(east, north, range * (1 + RING * level)));
+    if (!this.lacks && String(blocks) === String(this.blocks)) return;
+    [this.blocks, this.lacks] = [blocks, false];
     let dropped = false;
     for (const key of this.drawn.keys()) {
-      if (!this.isWanted(key)) dropped = this.drop(key) || dropped;
+      if (this.levelOf(key) === -1) dropped = this.drop(key) || dropped;
     }
     if (dropped) this.closed();
-    for (const part of this.missing()) this.load(part);
+    this.loadMissing();
   }
 
-  isWanted(key) {
+  /** The level at which a load module is wanted; -1 when it is not. */
+  levelOf(key) {
     const [row, col] = [Math.floor(key / this.area.cols), key % this.area.cols];
-    const [south, west, north, east] = this.block;
-    return south <= row && row < north && west <= col && col < east;
+    return this.blocks.findIndex(([south, west, north, east]) =>
+      south <= row && row < north && west <= col && col < east);
   }
 
-  /** Load modules of the block that are neither here nor on their way, as rectangles. */
-  missing() {
-    const [south, west, north, east] = this.block, parts = [];
+  loadMissing() {
+    for (let level = 0; level < this.blocks.length; level++) {
+      for (const part of this.missing(level)) this.load(part, level);
+    }
+  }
+
+  /** What stands for a load module on its way. */
+  askedKey(key, level) {
+    return key + level * this.area.rows * this.area.cols;
+  }
+
+  /** Load modules that are wanted at a level and neither here nor on their way, as rectangles. */
+  missing(level) {
+    const [south, west, north, east] = this.blocks[level], parts = [];
     const lacks = (row, col) => {
       const key = row * this.area.cols + col;
-      return !this.drawn.has(key) && !this.asked.has(key);
+      return this.levelOf(key) === level && this.drawn.get(key)?.module.level !== level
+        && !this.asked.has(this.askedKey(key, level));
     };
     for (let row = south; row < north; row++) {
       for (let col = west; col < east; col++) {
@@ -75,19 +101,19 @@ export class Terrain {
     return parts;
   }
 
-  async load(part) {
+  async load(part, level) {
     const [south, west, north, east] = part, keys = [];
     for (let row = south; row < north; row++) {
-      for (let col = west; col < east; col++) keys.push(row * this.area.cols + col);
+      for (let col = west; col < east; col++) keys.push(this.askedKey(row * this.area.cols + col, level));
     }
     keys.forEach((key) => this.asked.add(key));
     try {
-      const modules = await readModules(this.area, part);
-      if (this.withDem) await readPosts(this.area, part, modules);
+      const modules = await readModules(this.area, part, level);
+      if (this.withDem && level === 0) await readPosts(this.area, part, modules);
       for (const module of modules) {
         const key = module.row * this.area.cols + module.col;
-        this.asked.delete(key);
-        if (this.isWanted(key)) this.draw(key, module);
+        this.asked.delete(this.askedKey(key, level));
+        if (this.levelOf(key) === level) this.draw(key, module);
       }
       this.closed();
       this.fault = null;
@@ -150,13 +176,19 @@ export class Terrain {
   /** Shows the DEM, or the triangles again. Fails where the DEM is not at hand; then nothing has changed. */
   async showDem(wanted) {
     if (wanted) await checkDem();
-    const modules = [...this.drawn.values()].map(({ module }) => module);
+    const modules = [...this.drawn.values()].map(({ module }) => module).filter((module) => module.level === 0);
     if (wanted && modules.some((module) => !module.dem)) {
       const rows = modules.map((module) => module.row), cols = modules.map((module) => module.col);
       const part = [Math.min(...rows), Math.min(...cols), Math.max(...rows) + 1, Math.max(...cols) + 1];
       await readPosts(this.area, part, modules);
     }
     this.withDem = wanted;
+    // Coarser levels go, or come again.
+    this.lacks = true;
+    if (wanted) this.blocks = this.blocks.slice(0, 1);
+    for (const key of [...this.drawn.keys()]) {
+      if (this.levelOf(key) !== this.drawn.get(key).module.level) this.drop(key);
+    }
     for (const module of modules) {
       const key = module.row * this.area.cols + module.col;
       if (this.drawn.has(key)) this.draw(key, module);
@@ -164,7 +196,7 @@ export class Terrain {
     // What came meanwhile came without.
     if (wanted) {
       for (const [key, { module }] of this.drawn) if (!module.dem) this.drop(key);
-      for (const part of this.missing()) this.load(part);
+      this.loadMissing();
     }
     this.closed();
   }
@@ -199,12 +231,22 @@ export class Terrain {
     return { modules, triangles };
   }
 
-  /** Triangles of all that is loaded, and the count of its fullest whole window, if it holds one. */
+  /** Load modules at their finest level, by key. */
+  fine() {
+    return new Map([...this.drawn].filter(([, { module }]) => module.level === 0));
+  }
+
+  /** Triangles of all that is loaded at the finest level, the count of its fullest whole window, if it holds one, and
+   * load modules and triangles at coarser levels. */
   loaded() {
-    const { area, drawn } = this, { rows, cols } = area.limits.window;
+    const { area } = this, drawn = this.fine(), { rows, cols } = area.limits.window;
     let triangles = 0, fullest = null;
-    for (const { module } of drawn.values()) triangles += module.tin.triangles.length / 3;
-    if (!this.block) return { modules: 0, triangles, fullest };
+    const coarser = { modules: this.drawn.size - drawn.size, triangles: 0 };
+    for (const { module } of this.drawn.values()) {
+      if (module.level === 0) triangles += module.tin.triangles.length / 3;
+      else coarser.triangles += module.tin.triangles.length / 3;
+    }
+    if (!this.block) return { modules: 0, triangles, fullest, coarser };
     const [south, west, north, east] = this.block;
     for (let row = south; row + rows <= north; row++) {
       for (let col = west; col + cols <= east; col++) {
@@ -216,6 +258,6 @@ export class Terrain {
         fullest = Math.max(fullest ?? 0, sum);
       }
     }
-    return { modules: drawn.size, triangles, fullest };
+    return { modules: drawn.size, triangles, fullest, coarser };
   }
 }

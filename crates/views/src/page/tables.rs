@@ -176,6 +176,31 @@ pub(super) fn residuals(report: &Report) -> Markup {
     }
 }
 
+/// Levels of detail, where there are several.
+pub(super) fn levels(report: &Report) -> Markup {
+    let finest = report.levels.first().map_or(0, |level| level.triangles);
+    html! {
+        @if !report.levels.is_empty() {
+            h3 { "Levels of detail" }
+            table {
+                tr {
+                    th { "Level" } th.n { "inner vertices" } th.n { "triangles" } th.n { "of level 0" }
+                    th.n { "RMS, m" } th.n { "largest, m" }
+                }
+                @for level in &report.levels {
+                    tr {
+                        td { (level.level) } td.n { (format!("{} %", 100.0 * level.inner_share)) }
+                        td.n { (grouped(level.triangles)) }
+                        td.n { (format!("{:.1} %", 100.0 * level.triangles as f64 / finest.max(1) as f64)) }
+                        td.n { (format!("{:.3}", level.rms_m)) } td.n { (format!("{:.2}", level.max_m)) }
+                    }
+                }
+            }
+            p.quiet { "Limits are about level 0; the others are for what is far away." }
+        }
+    }
+}
+
 pub(super) fn breaches(report: &Report) -> Markup {
     if report.breaches.is_empty() {
         return html! { p { "None." } };

@@ -107,7 +107,7 @@ impl Sheet<'_> {
 }
 
 impl Legend {
-    fn high(&self) -> i64 {
+    pub fn high(&self) -> i64 {
         Font::Bold.line() * self.title_lines().len() as i64
             + match self {
                 Legend::Ramp { .. } => RAMP_HIGH + Font::Plain.line(),

@@ -1,0 +1,27 @@
+//! Levels of detail, as a job asks for them.
+
+/// Coarser levels of load modules.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LodSpec {
+    /// For each level beside the finest, the share of the finest level's inner vertices that it keeps; strictly falling,
+    /// between 0 and 1.
+    pub inner_shares: Vec<f64>,
+    /// What becomes of the vertices on the sides.
+    pub border: LodBorder,
+}
+
+/// What becomes of the vertices on the sides of a load module at coarser levels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LodBorder {
+    /// All of them stay: neighbours fit together at any two levels.
+    Full,
+    /// A level keeps its share of each side's: neighbours fit together at the same level.
+    Own,
+}
+
+impl LodSpec {
+    /// Levels of a load module, the finest included.
+    pub fn level_count(&self) -> usize {
+        1 + self.inner_shares.len()
+    }
+}

@@ -1,0 +1,148 @@
+//! Coarser levels of a load module: the same square with fewer vertices.
+//!
+//! The vertices inside are ranked: again and again the one goes whose absence costs least, and a level keeps those
+//! that would go last. So a coarser level holds no vertex that a finer one lacks. What is left is triangulated as
+//! Delaunay would have it, and the vertices inside take the heights at which squared residuals are least.
+//! A side keeps all of its vertices, so that neighbours fit together at any two levels; or it is thinned by what it
+//! knows of itself alone, so that they fit together at the same level.
+
+mod fit;
+mod flip;
+mod posts;
+mod rank;
+mod sheet;
+mod sides;
+#[cfg(test)]
+mod tests;
+
+use terrain::{Dem, Importance, LoadModule, ModuleResidual, ModuleVertex, Side};
+
+use crate::{Layout, classes, pieces};
+use posts::Posts;
+use sheet::Sheet;
+
+/// Which levels a load module gets beside the finest.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Levels<'a> {
+    /// For each, the share of the finest level's inner vertices that it keeps; falling, between 0 and 1.
+    pub inner_shares: &'a [f64],
+    /// What becomes of the vertices on the sides.
+    pub sides: LevelSides,
+    /// Whether edges leave Delaunay where the other diagonal has smaller squared residuals.
+    pub flips: bool,
+}
+
+/// What becomes of the vertices on the sides.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LevelSides {
+    /// All of them stay.
+    Full,
+    /// Each side keeps its share, its ends always.
+    Own,
+}
+
+/// What levels are fitted to.
+#[derive(Clone, Copy, Debug)]
+pub struct LevelGround<'a> {
+    /// Heights at all posts of the load module; voids count nothing.
+    pub dem: &'a Dem,
+    /// Weights and classes of the same posts.
+    pub mask: &'a Importance,
+}
+
+/// The levels of a load module, one for each share, from fine to coarse. Residuals are left empty.
+///
+/// # Panics
+/// When shares do not fall, or the windows of `ground` do not hold the load module.
+pub fn coarser_levels(finest: &LoadModule, layout: &Layout, levels: &Levels, ground: &LevelGround) -> Vec<LoadModule> {
+    assert!(levels.inner_shares.is_sorted_by(|finer, coarser| coarser < finer), "levels go from fine to coarse");
+    let posts = Posts::new(finest.id, layout, ground);
+    let inner: Vec<u16> =
+        (0..).zip(&finest.vertices).filter(|(_, vertex)| is_inside(**vertex, finest.side)).map(|(v, _)| v).collect();
+    let kept: Vec<usize> = levels.inner_shares.iter().map(|&share| share_of(inner.len(), share)).collect();
+    let fewest = kept.last().copied().unwrap_or(inner.len());
+    let gone = rank::removal_order(&finest.vertices, &inner, inner.len() - fewest, &posts);
+    let sides = SideOrder::of(finest);
+    let level = |(&share, kept): (&f64, usize)| {
+        let mut stays = vec![true; finest.vertices.len()];
+        gone[..inner.len() - kept].iter().for_each(|&v| stays[usize::from(v)] = false);
+        if levels.sides == LevelSides::Own {
+            sides.thin(share, &mut stays);
+        }
+        let vertices = (finest.vertices.iter().zip(&stays)).filter(|(_, stays)| **stays).map(|(&vertex, _)| vertex);
+        let sheet = fitted(vertices.collect(), finest.side, levels.flips, &posts);
+        load_module(finest, sheet, layout, ground.mask)
+    };
+    levels.inner_shares.iter().zip(kept).map(level).collect()
+}
+
+/// So many of `count`, rounded half up.
+fn share_of(count: usize, share: f64) -> usize {
+    (count as f64 * share).round() as usize
+}
+
+fn is_inside(vertex: ModuleVertex, side: u16) -> bool {
+    0 < vertex.x && vertex.x < side && 0 < vertex.y && vertex.y < side
+}
+
+/// The vertices triangulated, those inside at fitted heights.
+fn fitted(vertices: Vec<ModuleVertex>, side: u16, flips: bool, posts: &Posts) -> Sheet {
+    /// Flips ask for other heights, and these for other flips; a third round hardly changes anything.
+    const ROUNDS: usize = 2;
+    let mut sheet = Sheet::delaunay(vertices, posts);
+    fit::fit_heights(&mut sheet, side, posts);
+    for _ in 0..ROUNDS {
+        if !flips || flip::flip_all(&mut sheet, posts) == 0 {
+            break;
+        }
+        fit::fit_heights(&mut sheet, side, posts);
+    }
+    sheet
+}
+
+/// The load module that a sheet is.
+fn load_module(finest: &LoadModule, sheet: Sheet, layout: &Layout, mask: &Importance) -> LoadModule {
+    let (vertices, triangles) = sheet.into_lists();
+    let mut module = LoadModule {
+        id: finest.id,
+        side: finest.side,
+        polygon_count: triangles.len() as u32,
+        triangles,
+        vertices,
+        classes: Vec::new(),
+        residual: ModuleResidual::default(),
+    };
+    module.classes = classes::of_triangles(&module, layout, mask);
+    let sides = 3 * module.triangles.len();
+    pieces::assert_sound(&module, sides);
+    module
+}
+
+/// The vertices of each side but its ends, in the order in which thinning takes them.
+struct SideOrder([Vec<u16>; 4]);
+
+impl SideOrder {
+    fn of(module: &LoadModule) -> Self {
+        Self(Side::ALL.map(|side| {
+            let list = module.side_vertices(side);
+            let line: Vec<_> = list.iter().map(|&v| along(side, module.vertices[usize::from(v)])).collect();
+            sides::removal_order(&line).into_iter().map(|place| list[place]).collect()
+        }))
+    }
+
+    /// Takes out all but a share of each side's.
+    fn thin(&self, share: f64, stays: &mut [bool]) {
+        for order in &self.0 {
+            let gone = order.len() - share_of(order.len(), share);
+            order[..gone].iter().for_each(|&v| stays[usize::from(v)] = false);
+        }
+    }
+}
+
+/// How far along its side a vertex lies, and its height.
+fn along(side: Side, vertex: ModuleVertex) -> (u16, i32) {
+    match side {
+        Side::South | Side::North => (vertex.x, vertex.z),
+        Side::East | Side::West => (vertex.y, vertex.z),
+    }
+}

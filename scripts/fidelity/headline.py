@@ -1,0 +1,51 @@
+"""The figures of README.md: what bench_fidelity.py measured, in two short tables."""
+
+import re
+
+from bench import ROOT
+
+MARK = "Written by `scripts/bench_fidelity.py --quick --readme`:\n\n"
+# Rows of a raster and of an area as they are called there, and as they are called here.
+RASTER_ROWS = {"greedy": "greedy insertion (`pydelatin`)", "Lindstrom-Turk": "edge collapse (CGAL, Lindstrom-Turk)",
+               "fast": "`fast`", "normal": "`normal`", "best": "`best`"}
+AREA_ROWS = {"regular grid": "regular grid of 125 m", "paper + clip": "the paper's method, clipped",
+             "fast, l2_keep_crests": "`fast`", "normal, l2_keep_crests": "`normal` (default)",
+             "best, l2_keep_crests": "`best`"}
+HEAD = "| {} | RMS m | largest m | lines of sight | slope RMS | s |\n| - | -: | -: | -: | -: | -: |\n"
+
+
+def row(name, result, rms_m, max_m):
+    judged = result["judged"]
+    sight, slope = 100 * judged["sight"]["agreement"], judged["slope_rms_degrees"]
+    seconds = f"{result['seconds']:.2f}" if result.get("seconds") else ""
+    return f"| {name} | {rms_m:.3f} | {max_m:.1f} | {sight:.1f} % | {slope:.2f}° | {seconds} |\n"
+
+
+def of_raster(results):
+    some = next(iter(results.values()))["judged"]
+    text = HEAD.format(f"the desert window, 460 x 376 posts, {some['triangles']:,} triangles")
+    for name, shown in RASTER_ROWS.items():
+        if name in results:
+            judged = results[name]["judged"]
+            text += row(shown, results[name], judged["rms_m"], judged["max_m"])
+    return text
+
+
+def of_area(name, results):
+    best = min((key for key in results if key.startswith("paper + clip")), key=lambda key: results[key]["rms_m"])
+    results = results | {"paper + clip": results[best]}
+    text = HEAD.format(f"the whole {name}, 6 x 6 tiles, 32 triangles a load module, all limits")
+    for key, shown in AREA_ROWS.items():
+        if key in results:
+            text += row(shown, results[key], results[key]["rms_m"], results[key]["max_m"])
+    return text
+
+
+def write(results):
+    """Puts the tables where README.md has them."""
+    raster = [found for name, found in results["rasters"].items() if name.startswith("desert-window")][-1]
+    text = of_raster(raster) + "\n" + "\n".join(of_area(*item) for item in results["areas"].items())
+    path = ROOT / "README.md"
+    before, rest = path.read_text().split(MARK)
+    after = re.sub(r"\A(\|[^\n]*\n|\n(?=\|))*", "", rest)
+    path.write_text(before + MARK + text + after)
