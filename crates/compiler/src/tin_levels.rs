@@ -9,8 +9,9 @@ use crate::{CompileError, Event, Progress, Stage};
 
 /// Makes a mesh for each of `levels`, numbers of vertices that rise.
 ///
-/// Methods that choose post by post make one sequence, and each level is the beginning of it: a level holds all vertices
-/// of those before. The optimised method moves its vertices, so that no sequence is left, and makes every level anew.
+/// Methods that choose post by post make one sequence, and each level is the beginning of it: a level holds all
+/// vertices of those before. The optimised method moves its vertices, so that no sequence is left, and makes every
+/// level anew.
 ///
 /// # Errors
 /// When the raster cannot be used, levels do not rise, or the request is cut into tiles.

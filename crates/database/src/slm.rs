@@ -48,8 +48,8 @@ pub fn encode_modules(tile: &TileModules, modules: &[LoadModule]) -> Vec<u8> {
 /// The bytes of the file that holds these levels of a tile's load modules, the finest first.
 ///
 /// # Panics
-/// When there are none or more than eight, or the load modules of one are not exactly those of the tile, row by row from
-/// the south-west, each with the tile's side and lists that belong together (and, in debug builds, sound:
+/// When there are none or more than eight, or the load modules of one are not exactly those of the tile, row by row
+/// from the south-west, each with the tile's side and lists that belong together (and, in debug builds, sound:
 /// [`LoadModule::check`]).
 pub fn encode_levels(tile: &TileModules, levels: &[Vec<LoadModule>]) -> Vec<u8> {
     encode(tile, &levels.iter().map(Vec::as_slice).collect::<Vec<_>>())

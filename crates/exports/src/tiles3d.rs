@@ -17,8 +17,8 @@ use crate::modules::file_name;
 use crate::openflight::{square_name, square_side};
 use crate::{Datum, ExportError, Product, Put, Work};
 
-/// Writes `tileset.json`, `squares/*.glb`, `modules/*.glb` and, for coarser levels, `levels/K/*.glb`. `assumed` is what to take heights to be above; else the
-/// database says it. Gives what was done to heights.
+/// Writes `tileset.json`, `squares/*.glb`, `modules/*.glb` and, for coarser levels, `levels/K/*.glb`. `assumed` is what
+/// to take heights to be above; else the database says it. Gives what was done to heights.
 ///
 /// # Errors
 /// When a file cannot be written, heights cannot be brought above the ellipsoid, or the work was asked to stop.

@@ -3,8 +3,8 @@
 /// Coarser levels of load modules.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LodSpec {
-    /// For each level beside the finest, the share of the finest level's inner vertices that it keeps; strictly falling,
-    /// between 0 and 1.
+    /// For each level beside the finest, the share of the finest level's inner vertices that it keeps; strictly
+    /// falling, between 0 and 1.
     pub inner_shares: Vec<f64>,
     /// What becomes of the vertices on the sides.
     pub border: LodBorder,

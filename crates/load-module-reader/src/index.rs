@@ -25,8 +25,8 @@ pub struct IndexEntry {
     pub z_high: i32,
 }
 
-/// The index that follows a header of `header_length` bytes: level by level, row by row from the south-west. `file` is the beginning
-/// of a file of `file_bytes` bytes, and holds at least the index.
+/// The index that follows a header of `header_length` bytes: level by level, row by row from the south-west. `file` is
+/// the beginning of a file of `file_bytes` bytes, and holds at least the index.
 pub(crate) fn parse(
     file: &[u8],
     header: &Header,

@@ -24,13 +24,13 @@ Examples:
   tiefort tin dem.tif --points 5000 --start vip:1000 --method paper --out mesh.ply
   tiefort tin dem.tif --points 5000 --start surveyed.csv --out mesh.ply      columns east,north,height_m
   tiefort tin dem.tif --points 5000 --measure --out mesh.ply      every measure of fidelity, too
-  tiefort tin dem.tif --levels 1000,2500,5000 --method paper --out mesh.ply      mesh-1000.ply and so on
+  tiefort tin dem.tif --levels 1000,2500,5000 --method paper --out mesh.ply
   tiefort tin dem.tif --rms 1.5 --tiles 6x6 --workers 8 --coordinates map --out mesh.ply
 
 The first of --points (or --triangles), --max-residual and --rms that is reached ends it.
---levels writes one mesh for each number of vertices. With paper and greedy, each is the beginning of one
-sequence of posts: a mesh holds all vertices of the smaller ones. With optimised, whose vertices move, each
-is made anew: the best of its size, with vertices of its own.
+--levels writes one mesh for each number of vertices: mesh-1000.ply, mesh-2500.ply and so on.
+With paper and greedy each is the beginning of one sequence of posts, and holds all vertices of the
+smaller ones. With optimised, whose vertices move, each is made anew, with vertices of its own.
 Coordinates are metres from the south-west post (Blender, MeshLab); with --coordinates map they are
 eastings and northings in 64 bits (QGIS).";
 

@@ -150,7 +150,8 @@ function pick(view, x, y) {
   const isTin = surface === module.tin;
   const className = isTin ? area.classes[module.classes[number]] ?? module.classes[number] : undefined;
   const residual = isTin ? undefined : surface.residuals[nearest(surface, number, place)];
-  view.picked = { row: module.row, col: module.col, level: module.level, place, triangle: { number, normal, className, residual } };
+  const { row: ownRow, col: ownCol, level } = module;
+  view.picked = { row: ownRow, col: ownCol, level, place, triangle: { number, normal, className, residual } };
   showPicked(area, view.picked);
 }
 

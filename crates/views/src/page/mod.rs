@@ -69,7 +69,9 @@ pub fn report_html(page: &Page) -> String {
                 (tables::verdict(report))
                 (headline(page))
                 section id="limits" { h2 { "Limits" } (tables::limits(report)) (tables::advice(report)) }
-                section id="residuals" { h2 { "Residuals" } (tables::residuals(report)) (tables::levels(report)) (histograms(page)) }
+                section id="residuals" {
+                    h2 { "Residuals" } (tables::residuals(report)) (tables::levels(report)) (histograms(page))
+                }
                 @if let Some(scene) = page.scene {
                     section id="maps" { h2 { "Maps" } (maps::maps(scene)) }
                     section id="worst" { h2 { "The worst load modules" } (worst(page, scene)) }
