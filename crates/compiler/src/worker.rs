@@ -58,6 +58,7 @@ pub fn work(
 ) -> Result<WorkerEnd, CompileError> {
     let session = Session::join(job, folder, options, progress)?;
     if session.standing == Standing::Finished {
+        session.work.sweep();
         return Ok(WorkerEnd { units: 0, published: None });
     }
     let mut worker = Worker {
@@ -73,6 +74,8 @@ pub fn work(
             return Err(CompileError::Stopped { stage: Stage::Refine, done: total - worker.open.len(), total });
         }
         if worker.is_published() {
+            // Whoever published may have been ended before it swept up.
+            worker.session.work.sweep();
             return Ok(WorkerEnd { units: worker.units, published: None });
         }
         match worker.next()? {

@@ -64,6 +64,21 @@ impl Work {
         Self { folder }
     }
 
+    /// Removes the folder once the build is published, and the one of all runs if no other is left there. Any number of
+    /// processes may do so at once; what none of them can remove, the next build does.
+    pub fn sweep(&self) {
+        /// What another process takes meanwhile ends a try.
+        const TRIES: usize = 5;
+        for _ in 0..TRIES {
+            if fs::remove_dir_all(&self.folder).is_ok() || !self.folder.exists() {
+                break;
+            }
+        }
+        if let Some(all) = self.folder.parent() {
+            let _ = fs::remove_dir(all);
+        }
+    }
+
     /// The leases, for the process that calls itself `holder`.
     pub fn leases(&self, holder: &str, expiry: Duration) -> Leases {
         Leases::new(self.folder.join(LEASES), holder, expiry)
@@ -152,5 +167,18 @@ mod tests {
         assert_eq!(work.marked("refine-r00c01"), None);
         database.remove_work().unwrap();
         assert!(!work.path().exists() && work.read_share(samples::TILE).is_err());
+    }
+
+    #[test]
+    fn any_number_of_processes_sweep_their_own_run_and_leave_others() {
+        let folder = tempfile::tempdir().unwrap();
+        let (database, _) = Database::join(&folder.path().join("a.tdb"), &samples::area()).unwrap();
+        let (work, other) = (database.work("run").unwrap(), database.work("other run").unwrap());
+        let fingerprint = samples::stamp().fingerprint;
+        (0..50).for_each(|unit| work.mark(&format!("unit-{unit}"), fingerprint).unwrap());
+        std::thread::scope(|scope| (0..4).for_each(|_| drop(scope.spawn(|| work.sweep()))));
+        assert!(!work.path().exists() && other.path().exists());
+        other.sweep();
+        assert!(!other.path().parent().unwrap().exists());
     }
 }
