@@ -213,3 +213,26 @@ fn levels_are_added_to_and_taken_from_an_area_without_refining_it() {
     again.sort_by_key(|module| module.id);
     assert_eq!(again, finest);
 }
+
+#[test]
+fn verify_finds_levels_that_do_not_fit_together_and_those_that_are_not_in_the_job() {
+    let scene = Scene::new(&words("", "", "own"));
+    let built = scene.build("area", 2);
+    let manifest = Folder::new(scene.path("area")).manifest().unwrap();
+    let problems = |before: &str, after: &str| {
+        let mut told = manifest.clone();
+        told.job = told.job.replace(before, after);
+        assert_ne!(told.job, manifest.job);
+        built.database.finish(&told).unwrap();
+        compiler::verify(&scene.path("area"), None).unwrap().problems
+    };
+    let torn = problems("border = \"own\"", "border = \"full\"");
+    let crack = "load module 0,0: its edges on the eastern side at level 0 are not its neighbour's at level 2: a crack";
+    assert!(torn.iter().any(|problem| problem == crack), "{torn:?}");
+    let missing = problems("{ inner_share = 0.2 }", "{ inner_share = 0.2 }, { inner_share = 0.1 }");
+    assert_eq!(missing[0], "level 3: load module 0,0: missing");
+    let more = problems(", { inner_share = 0.2 }", "");
+    assert_eq!(more, ["load modules: 3 levels in a file, the job has 2"]);
+    built.database.finish(&manifest).unwrap();
+    scene.verify("area");
+}

@@ -7,6 +7,9 @@ use crate::scene::{ORIGIN_M, Scene, Words};
 const CLIP: &str = "edges = \"clip\"";
 const MOUNTAINS: &str = "default = 8\nareas = [{ sample = \"mountains\", class = \"mountains\", weight = 1 }]";
 
+/// Follows the section `[tin]`.
+const LEVELS: &str = "[lod]\nlevels = [{ inner_share = 0.6 }, { inner_share = 0.25 }]";
+
 /// A mode with its name.
 pub type Mode = (&'static str, Words);
 
@@ -50,6 +53,7 @@ pub fn constrained() -> Vec<Mode> {
             with(|words| words.importance = MOUNTAINS.replace("weight = 1", "weight = 0") + "\nsmooth = \"none\""),
         ),
         ("two tiles excluded", excluded()),
+        ("levels of detail", tin(&format!("{LEVELS}\nborder = \"full\""))),
     ]
 }
 
@@ -73,6 +77,7 @@ pub fn clipped() -> Vec<Mode> {
             "clip, polygons counted, limits that bind",
             with_limits("count = \"polygons\"\nper_load_module = 36\nper_4km_square = 1300"),
         ),
+        ("clip, levels of detail", clip(&format!("{paper}\n{LEVELS}\nborder = \"own\""))),
     ]
 }
 

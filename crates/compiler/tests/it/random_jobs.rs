@@ -100,15 +100,27 @@ fn words(draw: &mut Draw) -> Words {
     }
 }
 
+/// Up to three levels of detail beside the finest.
+fn lod(draw: &mut Draw) -> String {
+    let shares = draw.one_of(&["", "0.5", "0.9 0.01", "0.75 0.5 0.25"]);
+    let levels: Vec<String> = shares.split_whitespace().map(|share| format!("{{ inner_share = {share} }}")).collect();
+    let border = draw.one_of(&["full", "own"]);
+    match levels.is_empty() {
+        true => String::new(),
+        false => format!("\n[lod]\nlevels = [{}]\nborder = \"{border}\"", levels.join(", ")),
+    }
+}
+
 /// Runs the job of a seed, and gives whether it was possible at all.
 fn run(seed: u64) -> bool {
     let _seed = Seed(seed);
     // Spread, since neighbouring states of the generator draw alike.
     let mut draw = Draw(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15));
-    let words = words(&mut draw);
+    let mut words = words(&mut draw);
     let dem = ground(&mut draw, &words);
     let mut along = |modules: u32| f64::from(draw.below(modules * 500));
     let (west, south) = (along(words.size.1), along(words.size.0));
+    words.tin += &lod(&mut draw);
     let scene = Scene::with_files(&words, |folder| {
         write_dem(&folder.join("dem.tif"), &dem);
         write_polygon(&folder.join("area.geojson"), [west, south, west + 1500.0, south + 900.0]);

@@ -13,22 +13,38 @@ const LEAST_GAIN: u128 = 10_000;
 /// Flips edges until none gains, in passes over the triangles; gives the flips. Sides stay.
 pub(super) fn flip_all(sheet: &mut Sheet, posts: &Posts) -> usize {
     let mut total = 0;
+    // Where neither triangle of an edge has changed since it was looked at, it would be found the same again.
+    let mut active = vec![true; sheet.triangles.len()];
     for _ in 0..PASSES_MAX {
+        let mut touched = vec![false; active.len()];
         let mut flips = 0;
-        for triangle in 0..sheet.triangles.len() as u32 {
+        for t in 0..sheet.triangles.len() {
             for k in 0..3 {
-                flips += usize::from(flip(sheet, triangle, k, posts));
+                let Some(u) = beside(sheet, t, k) else { continue };
+                let is_active = active[t] || active[u] || touched[t] || touched[u];
+                if is_active && flip(sheet, (t as u32, k), u as u32, posts) {
+                    (touched[t], touched[u]) = (true, true);
+                    flips += 1;
+                }
             }
         }
         total += flips;
         if flips == 0 {
             break;
         }
+        active = touched;
     }
     total
 }
 
-/// Flips the edge of triangle `t` from its corner `k` to the next, if that is valid and gains.
+/// The triangle beside the edge of triangle `t` from its corner `k` to the next, where its number is the higher one.
+fn beside(sheet: &Sheet, t: usize, k: usize) -> Option<usize> {
+    let triangle = sheet.triangles[t];
+    let other = sheet.beside(t as u32, triangle[k], triangle[(k + 1) % 3]);
+    other.map(|u| u as usize).filter(|&u| t < u)
+}
+
+/// Flips the edge of triangle `t` from its corner `k` to the next, beside which lies `u`, if that is valid and gains.
 ///
 /// ```text
 ///        c                c
@@ -39,13 +55,9 @@ pub(super) fn flip_all(sheet: &mut Sheet, posts: &Posts) -> usize {
 ///       \ /              \|/
 ///        d                d
 /// ```
-fn flip(sheet: &mut Sheet, t: u32, k: usize, posts: &Posts) -> bool {
+fn flip(sheet: &mut Sheet, (t, k): (u32, usize), u: u32, posts: &Posts) -> bool {
     let triangle = sheet.triangles[t as usize];
     let (a, b, c) = (triangle[k], triangle[(k + 1) % 3], triangle[(k + 2) % 3]);
-    let Some(u) = sheet.beside(t, a, b) else { return false };
-    if u < t {
-        return false;
-    }
     // Beside the edge seen from its end: b, a, d.
     let d = from_corner(sheet.triangles[u as usize], b)[2];
     let before = sheet.squares[t as usize] + sheet.squares[u as usize];

@@ -9,6 +9,8 @@ import { triangleUnder } from "./surface.js";
 const APRON_M = 400_000;
 /** How much further each coarser level reaches than the one before, as a part of the visible range. */
 const RING = 0.5;
+/** Load modules that the server gives at once. */
+const MODULES_MAX = 1024;
 /** How long after load modules could not be read they are asked for again. */
 const AGAIN_MS = 2000;
 
@@ -93,7 +95,8 @@ export class Terrain {
         if (!lacks(row, col)) continue;
         const start = col;
         while (col < east && lacks(row, col)) col++;
-        const below = parts.find((part) => part[1] === start && part[3] === col && part[2] === row);
+        const fits = ([south, west, , east]) => (row + 1 - south) * (east - west) <= MODULES_MAX;
+        const below = parts.find((part) => part[1] === start && part[3] === col && part[2] === row && fits(part));
         if (below) below[2]++;
         else parts.push([row, start, row + 1, col]);
       }
