@@ -5,9 +5,10 @@ use fidelity::{Residuals, Tally};
 use terrain::{ModuleResidual, TileId};
 
 use crate::assemble::{Assembled, ModuleNumbers};
+use crate::sums::Sums;
 
 /// What is kept of a tile's load modules.
-pub(crate) fn to_measured(tile: TileId, assembled: &Assembled) -> Measured {
+pub(crate) fn to_measured(tile: TileId, assembled: &Assembled, sums: &Sums) -> Measured {
     let module = |numbers: &ModuleNumbers| MeasuredModule {
         triangles: numbers.triangles,
         polygons: numbers.polygons,
@@ -20,15 +21,15 @@ pub(crate) fn to_measured(tile: TileId, assembled: &Assembled) -> Measured {
         tile,
         modules_file: assembled.file,
         modules: assembled.modules.iter().map(module).collect(),
-        classes: assembled.residuals.classes.iter().map(to_tally).collect(),
-        at_source: assembled.at_source.as_ref().map(to_tally),
-        points: assembled.points.clone(),
-        border: assembled.border,
+        classes: sums.residuals.classes.iter().map(to_tally).collect(),
+        at_source: sums.has_source.then(|| to_tally(&sums.at_source)),
+        points: sums.points.clone(),
+        border: sums.border,
     }
 }
 
 /// What was kept, in a file of this stamp.
-pub(crate) fn from_measured(measured: Measured, file: FileStamp) -> Assembled {
+pub(crate) fn from_measured(measured: Measured, file: FileStamp) -> (Assembled, Sums) {
     let module = |module: &MeasuredModule| ModuleNumbers {
         triangles: module.triangles,
         polygons: module.polygons,
@@ -39,16 +40,15 @@ pub(crate) fn from_measured(measured: Measured, file: FileStamp) -> Assembled {
             sum_squared: module.sum_squared,
         },
     };
-    Assembled {
-        file: measured.modules_file,
-        measured: file,
-        modules: measured.modules.iter().map(module).collect(),
+    let sums = Sums {
         residuals: Residuals { classes: measured.classes.iter().map(from_tally).collect() },
-        at_source: measured.at_source.as_ref().map(from_tally),
+        at_source: measured.at_source.as_ref().map(from_tally).unwrap_or_default(),
+        has_source: measured.at_source.is_some(),
         points: measured.points,
         border: measured.border,
-        is_new: false,
-    }
+    };
+    let modules = measured.modules.iter().map(module).collect();
+    (Assembled { file: measured.modules_file, measured: file, modules, is_new: false }, sums)
 }
 
 fn to_tally(tally: &Tally) -> MeasuredTally {

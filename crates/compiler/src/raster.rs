@@ -109,7 +109,7 @@ pub fn tin(request: &TinRequest, stop: &AtomicBool, progress: &mut dyn Progress)
     let frame = file.frame();
     let job = TinJob::new(request, &dem, frame.spacing)?;
     let curves = job.survey(&dem, &workers, stop, progress)?;
-    let tiles = job.refine(&dem, curves.as_deref(), &workers, stop, progress)?;
+    let tiles = job.refine(&dem, curves, &workers, stop, progress)?;
 
     progress.tell(Event::Enter(Stage::Assemble, 0));
     let exhausted = tiles.iter().any(|tile| tile.stop == StopReason::Exhausted);
@@ -281,7 +281,7 @@ impl<'a> TinJob<'a> {
     fn refine(
         &self,
         dem: &Dem,
-        curves: Option<&[GainCurve]>,
+        curves: Option<Vec<GainCurve>>,
         workers: &Workers,
         stop: &AtomicBool,
         progress: &mut dyn Progress,
@@ -293,7 +293,9 @@ impl<'a> TinJob<'a> {
         let mut by_rank: Vec<usize> = (0..self.tiles.len()).collect();
         by_rank.sort_by_key(|&index| ranks[index]);
         let shares = self.points().map(|points| match curves {
-            Some(curves) => points_globally(points, Gains { curves, by_rank: &by_rank, floor: None }),
+            Some(curves) => {
+                points_globally(points, Gains { bands: &mut std::iter::once(curves), by_rank: &by_rank, floor: None })
+            }
             None => points_equally(points, self.tiles.len()),
         });
         let slots: Vec<OnceLock<TileTin>> = self.tiles.iter().map(|_| OnceLock::new()).collect();
@@ -301,9 +303,9 @@ impl<'a> TinJob<'a> {
         let task = |index: usize| {
             let tile = self.tiles[index];
             let published = |other: TileId| {
-                slots[self.tiling.index(other)].get().expect("lower-ranked neighbours are published first")
+                Ok(slots[self.tiling.index(other)].get().expect("lower-ranked neighbours are published first"))
             };
-            let seeds = inherited(&self.tiling, tile, published);
+            let seeds = inherited(&self.tiling, tile, published)?;
             let points = shares.as_ref().map(|shares| shares[index]);
             let mut task = self.task(tile, self.tiling.owned_sides(tile), posts_of(&seeds), points);
             let dem = dem.window(task.rect);
