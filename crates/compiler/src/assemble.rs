@@ -4,12 +4,13 @@ use database::{FileStamp, Fingerprint, FingerprintBuilder, Measured, Stamp, Tile
 use fidelity::{Residuals, Tally};
 use job::{Borders, ClipHeights as JobClipHeights, Edges};
 use load_modules::{ClipHeights, Layout, clip, concatenate};
-use terrain::{LATTICE_PER_POST, LatticePoint, LoadModule, ModuleResidual, Post, PostRect, TileId, Vertex};
+use terrain::{LATTICE_PER_POST, LatticePoint, LoadModule, ModuleResidual, Post, PostRect, TileId, Tin, Vertex};
 
 use crate::levels::all_levels;
 use crate::measured::{from_measured, to_measured};
 use crate::refine::Published;
 use crate::run::{ALGORITHM_REVISION, Run, Worked};
+use crate::sums::{Adding, Sums};
 use crate::{CompileError, Progress, Stage};
 
 /// What whole-area stages know of one tile's load modules: numbers only.
@@ -22,13 +23,6 @@ pub(crate) struct Assembled {
     pub modules: Vec<ModuleNumbers>,
     /// The same of every level beside the finest.
     pub coarser: Vec<Vec<ModuleNumbers>>,
-    pub residuals: Residuals,
-    /// Against the source's own posts, where those are others than the working grid's.
-    pub at_source: Option<Tally>,
-    /// Points of the tile per class, each point of the area in one tile.
-    pub points: Vec<u64>,
-    /// Those of them that every build starts from: border points, corners not counted.
-    pub border: u64,
     /// Whether the file was written by this run.
     pub is_new: bool,
 }
@@ -41,44 +35,45 @@ pub(crate) struct ModuleNumbers {
     pub residual: ModuleResidual,
 }
 
-/// The published TIN of a tile, by its place.
-pub(crate) type TinOf<'a> = dyn Fn(usize) -> &'a Published + Sync + 'a;
+/// What the published TIN of a tile was made from, by the tile's place.
+pub(crate) type StampOf<'a> = dyn Fn(usize) -> Stamp + Sync + 'a;
 
 /// Assembles every tile.
 pub(crate) fn assemble(
     run: &Run,
     tins: &[Published],
     progress: &mut dyn Progress,
-) -> Result<Vec<Assembled>, CompileError> {
-    let none = vec![Vec::new(); tins.len()];
+) -> Result<(Vec<Assembled>, Sums), CompileError> {
+    let (none, adding) = (vec![Vec::new(); tins.len()], Adding::default());
     let done = run.for_each_tile(Stage::Assemble, progress, |tile| {
-        let assembled = assemble_tile(run, &|index| &tins[index], &none, tile)?;
+        let (assembled, sums) = assemble_tile(run, &|index| tins[index].stamp, &none, tile)?;
+        adding.add(sums);
         Ok(if assembled.is_new { Worked::Made(assembled, None) } else { Worked::Kept(assembled) })
     })?;
-    Ok(done.into_iter().map(Worked::into_inner).collect())
+    Ok((done.into_iter().map(Worked::into_inner).collect(), adding.finish()))
 }
 
 /// Assembles, measures and publishes one tile, without the points that `removed` lists per tile; or keeps what is
 /// published and fresh.
 pub(crate) fn assemble_tile(
     run: &Run,
-    tins: &TinOf,
+    stamps: &StampOf,
     removed: &[Vec<LatticePoint>],
     tile: TileId,
-) -> Result<Assembled, CompileError> {
+) -> Result<(Assembled, Sums), CompileError> {
     let area = &run.area;
-    let fingerprint = modules_fingerprint(run, tins, removed, tile);
+    let fingerprint = modules_fingerprint(run, stamps, removed, tile);
     let stamp = measured_stamp(run, fingerprint);
     if let Some(kept) = kept(run, &stamp, tile) {
         return Ok(kept);
     }
     let window = run.window(tile)?;
     let layout = Layout { grid: area.grid, modules: area.tiling.modules(tile, area.grid), spacing: area.frame.spacing };
-    let own = tins(area.tiling.index(tile));
+    let own = run.tin(tile, &stamps(area.tiling.index(tile)))?;
     let mut modules = match run.job.modules.edges {
-        Edges::Constrained => concatenate(&own.tin.tin, &layout, &window.importance),
+        Edges::Constrained => concatenate(&own.tin, &layout, &window.importance),
         Edges::Clip(heights) => {
-            let points = points_around(run, tins, removed, tile);
+            let points = points_around(run, stamps, removed, tile)?;
             let heights = match heights {
                 JobClipHeights::Coplanar => ClipHeights::Coplanar,
                 JobClipHeights::Dem => ClipHeights::Dem(&window.dem),
@@ -91,12 +86,16 @@ pub(crate) fn assemble_tile(
     let mut levels = all_levels(run, modules, &layout, &window);
     levels[1..].iter_mut().for_each(|level| drop(fidelity::measure(level, &window.measured(area))));
     let (file, is_new) = publish(run, tile, &layout, fingerprint, &levels)?;
-    let (points, border) = count_points(run, own, &removed[area.tiling.index(tile)], &window.importance);
+    let counted = count_points(run, &own.tin, &removed[area.tiling.index(tile)], &window.importance);
     let (modules, coarser) = numbers_of(&levels);
-    let measured = FileStamp::of(&[]);
-    let mut done = Assembled { file, measured, modules, coarser, residuals, at_source, points, border, is_new };
-    done.measured = run.database.write_measured(&stamp, &to_measured(tile, &done))?;
-    Ok(done)
+    let mut done = Assembled { file, measured: FileStamp::of(&[]), modules, coarser, is_new };
+    let sums = sums(residuals, at_source, counted);
+    done.measured = run.database.write_measured(&stamp, &to_measured(tile, &done, &sums))?;
+    Ok((done, sums))
+}
+
+fn sums(residuals: Residuals, at_source: Option<Tally>, (points, border): (Vec<u64>, u64)) -> Sums {
+    Sums { residuals, has_source: at_source.is_some(), at_source: at_source.unwrap_or_default(), points, border }
 }
 
 /// What a tile's load modules and the numbers of them are made from, and by.
@@ -114,7 +113,7 @@ fn measured_stamp(run: &Run, modules: Fingerprint) -> Stamp {
 }
 
 /// The published load modules of a tile, if they and the numbers of them are fresh and undamaged.
-fn kept(run: &Run, stamp: &Stamp, tile: TileId) -> Option<Assembled> {
+fn kept(run: &Run, stamp: &Stamp, tile: TileId) -> Option<(Assembled, Sums)> {
     let folder = run.database.folder();
     let (found, measured) = folder.read_measured(tile).ok()?;
     let area = &run.area;
@@ -127,16 +126,18 @@ fn kept(run: &Run, stamp: &Stamp, tile: TileId) -> Option<Assembled> {
 }
 
 /// The published load modules of a tile as they are: their own numbers, and residuals against today's ground.
-pub(crate) fn read_assembled(run: &Run, tins: &[Published], tile: TileId) -> Result<Assembled, CompileError> {
+pub(crate) fn read_assembled(run: &Run, tins: &[Published], tile: TileId) -> Result<(Assembled, Sums), CompileError> {
     let (area, folder, window) = (&run.area, run.database.folder(), run.window(tile)?);
     let (_, mut levels) = folder.read_levels(tile)?;
     let file = folder.stamp_file(&folder.modules_path(tile))?;
     let (modules, coarser) = numbers_of(&levels);
     let residuals = fidelity::measure(&mut levels[0], &window.measured(area));
     let at_source = run.ground.relief.residuals_at_source(&levels[0], area, area.tiling.rect(tile))?;
-    let (points, border) = count_points(run, &tins[area.tiling.index(tile)], &[], &window.importance);
+    let own = run.tin(tile, &tins[area.tiling.index(tile)].stamp)?;
+    let counted = count_points(run, &own.tin, &[], &window.importance);
     let measured = folder.stamp_file(&folder.measured_path(tile))?;
-    Ok(Assembled { file, measured, modules, coarser, residuals, at_source, points, border, is_new: false })
+    let done = Assembled { file, measured, modules, coarser, is_new: false };
+    Ok((done, sums(residuals, at_source, counted)))
 }
 
 /// Numbers of the finest level, and of each of the others.
@@ -154,18 +155,27 @@ fn numbers(module: &LoadModule) -> ModuleNumbers {
 }
 
 /// The points in and around a tile that clipping needs.
-pub(crate) fn points_around(run: &Run, tins: &TinOf, removed: &[Vec<LatticePoint>], tile: TileId) -> Vec<Vertex> {
+pub(crate) fn points_around(
+    run: &Run,
+    stamps: &StampOf,
+    removed: &[Vec<LatticePoint>],
+    tile: TileId,
+) -> Result<Vec<Vertex>, CompileError> {
     let mut near = run.area.tiling.neighbours(tile);
     near.push(tile);
-    let indices: Vec<usize> = near.iter().map(|&other| run.area.tiling.index(other)).collect();
-    let all = indices.iter().flat_map(|&index| tins(index).tin.tin.vertices.iter().copied());
-    let mut gone: Vec<LatticePoint> = indices.iter().flat_map(|&index| removed[index].iter().copied()).collect();
+    let index = |&other: &TileId| run.area.tiling.index(other);
+    let mut gone: Vec<LatticePoint> = near.iter().flat_map(|other| removed[index(other)].iter().copied()).collect();
     gone.sort_unstable();
-    all.filter(|vertex| gone.binary_search(&vertex.at).is_err()).collect()
+    let mut all = Vec::new();
+    for other in &near {
+        let tin = run.tin(*other, &stamps(index(other)))?;
+        all.extend(tin.tin.vertices.iter().filter(|vertex| gone.binary_search(&vertex.at).is_err()));
+    }
+    Ok(all)
 }
 
 /// Of all that the load modules of a tile are made from.
-fn modules_fingerprint(run: &Run, tins: &TinOf, removed: &[Vec<LatticePoint>], tile: TileId) -> Fingerprint {
+fn modules_fingerprint(run: &Run, stamps: &StampOf, removed: &[Vec<LatticePoint>], tile: TileId) -> Fingerprint {
     let mut builder = FingerprintBuilder::new("modules").text(&format!("{:?}", run.job.modules));
     if 1 < run.job.lod.level_count() {
         builder = builder.text(&format!("{:?}", run.job.lod));
@@ -177,7 +187,7 @@ fn modules_fingerprint(run: &Run, tins: &TinOf, removed: &[Vec<LatticePoint>], t
     reach.push(tile);
     for other in reach {
         let index = run.area.tiling.index(other);
-        builder = builder.fingerprint(tins(index).stamp.fingerprint).number(removed[index].len() as u64);
+        builder = builder.fingerprint(stamps(index).fingerprint).number(removed[index].len() as u64);
         for point in &removed[index] {
             builder = builder.number(u64::from(point.row as u32) << 32 | u64::from(point.col as u32));
         }
@@ -219,19 +229,14 @@ pub(crate) fn crs(job: &job::Job) -> String {
 /// Points by class of the post they stand on, or next south-west of them, and how many of them are border points that
 /// every build starts from.
 /// A point on a seam counts in the tile that owns the post.
-fn count_points(
-    run: &Run,
-    own: &Published,
-    removed: &[LatticePoint],
-    importance: &terrain::Importance,
-) -> (Vec<u64>, u64) {
-    let (rect, area) = (own.tin.tin.rect, run.area.rect);
+fn count_points(run: &Run, own: &Tin, removed: &[LatticePoint], importance: &terrain::Importance) -> (Vec<u64>, u64) {
+    let (rect, area) = (own.rect, run.area.rect);
     let side = run.area.grid.side_cells * LATTICE_PER_POST;
     let is_regular = run.job.tiles.borders == Borders::Regular;
     let mut points = vec![0; run.job.importance.classes.len()];
     let mut border = 0;
     let removed: std::collections::BTreeSet<&LatticePoint> = removed.iter().collect();
-    for vertex in own.tin.tin.vertices.iter().filter(|vertex| !removed.contains(&vertex.at)) {
+    for vertex in own.vertices.iter().filter(|vertex| !removed.contains(&vertex.at)) {
         let at = vertex.at;
         let is_at = |place: i32, line: i32| place == line * LATTICE_PER_POST;
         let beyond = (is_at(at.row, rect.north) && rect.north != area.north)

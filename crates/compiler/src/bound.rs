@@ -6,46 +6,111 @@ use database::{ReportBound, ReportPlace};
 use terrain::{ModuleId, ModuleRect, ModuleResidual, Refusal, RefusedBy, TileId, metres_of_quanta};
 
 use crate::CompileError;
-use crate::assemble::ModuleNumbers;
+use crate::enforce::ByModule;
 use crate::refine::Published;
 use crate::run::Run;
 use crate::without_limits::without_limits;
 
-/// The limits that refused posts, most posts first. `counts` and `numbers` are of every load module, row-major.
+/// Posts that limits kept out of one load module: how many, and the largest of their residuals, by what refused them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct RefusedPosts {
+    counts: [u32; 3],
+    largest: [u32; 3],
+}
+
+/// What refuses posts, in the order of the counts.
+const BY: [RefusedBy; 3] = [RefusedBy::Module, RefusedBy::Window, RefusedBy::Reservation];
+
+impl RefusedPosts {
+    /// Takes in one more.
+    fn add(&mut self, refusal: &Refusal) {
+        let by = BY.iter().position(|&by| by == refusal.by).expect("the list names every limit");
+        self.counts[by] += 1;
+        self.largest[by] = self.largest[by].max(refusal.residual);
+    }
+
+    /// Takes in those of another load module or tile.
+    pub fn merge(&mut self, other: &RefusedPosts) {
+        for by in 0..BY.len() {
+            self.counts[by] += other.counts[by];
+            self.largest[by] = self.largest[by].max(other.largest[by]);
+        }
+    }
+
+    /// Only those that `by` refused, or that anything else did.
+    fn part(&self, keep: impl Fn(RefusedBy) -> bool) -> RefusedPosts {
+        let mut part = RefusedPosts::default();
+        for by in (0..BY.len()).filter(|&by| keep(BY[by])) {
+            (part.counts[by], part.largest[by]) = (self.counts[by], self.largest[by]);
+        }
+        part
+    }
+
+    /// Those that one limit refused.
+    pub fn count_by(&self, by: RefusedBy) -> u32 {
+        BY.iter().position(|&one| one == by).map_or(0, |by| self.counts[by])
+    }
+
+    /// All of them.
+    pub fn count(&self) -> u32 {
+        self.counts.iter().sum()
+    }
+
+    /// The largest residual of any, in quanta.
+    pub fn largest(&self) -> u32 {
+        self.largest.into_iter().max().unwrap_or(0)
+    }
+}
+
+/// Refusals by load module, in ascending order.
+pub(crate) fn by_module(refused: &[Refusal]) -> Vec<(ModuleId, RefusedPosts)> {
+    let mut modules: BTreeMap<ModuleId, RefusedPosts> = BTreeMap::new();
+    refused.iter().for_each(|refusal| modules.entry(refusal.module).or_default().add(refusal));
+    modules.into_iter().collect()
+}
+
+/// Refusals of the whole area by load module: a tile is refused posts on its sides by load modules of its neighbours.
+pub(crate) fn of_area(tins: &[Published]) -> BTreeMap<ModuleId, RefusedPosts> {
+    let mut modules: BTreeMap<ModuleId, RefusedPosts> = BTreeMap::new();
+    for (module, posts) in tins.iter().flat_map(|tile| &tile.refused) {
+        modules.entry(*module).or_default().merge(posts);
+    }
+    modules
+}
+
+/// The limits that refused posts, most posts first. `counts` are of every load module, row-major.
 pub(crate) fn bound(
     run: &Run,
     tins: &[Published],
+    refused: &BTreeMap<ModuleId, RefusedPosts>,
     counts: &[u32],
-    numbers: &[&ModuleNumbers],
+    numbers: &ByModule,
 ) -> Result<Vec<ReportBound>, CompileError> {
-    let refused = refused_by_module(tins);
     let tiles: BTreeSet<TileId> =
         refused.keys().map(|&module| run.area.tiling.tile_of_module(module, run.area.grid)).collect();
     let tiles: Vec<TileId> = tiles.into_iter().collect();
     let freed = schedule::for_each_independent(&tiles, &run.workers, run.stop, |_, &tile| {
-        without_limits(run, &tins[run.area.tiling.index(tile)], &refused)
+        without_limits(run, &tins[run.area.tiling.index(tile)], refused)
     });
     let freed = freed.map_err(|error| CompileError::from_schedule(crate::Stage::Publish, &tiles, error))?;
     let freed: BTreeMap<ModuleId, ModuleResidual> = freed.into_iter().flatten().collect();
 
     let sums = run.area.budget.windows.sums(run.area.grid, counts);
-    let places = by_place(run, &refused, &sums);
+    let places = by_place(run, refused, &sums);
     let mut bound: Vec<ReportBound> = places
         .into_iter()
-        .map(|(place, refusals)| {
+        .map(|(place, posts)| {
             let inside = modules_of(run, place);
-            let with = inside.clone().map(|module| numbers[run.area.grid.index(module)].residual);
-            let without =
-                inside.map(|module| *freed.get(&module).unwrap_or(&numbers[run.area.grid.index(module)].residual));
-            let largest = refusals.iter().map(|refusal| refusal.residual).max().unwrap_or(0);
+            let with = inside.clone().map(|module| numbers.get(module).residual);
+            let without = inside.map(|module| *freed.get(&module).unwrap_or(&numbers.get(module).residual));
             let (kind, count, limit) = counted(run, place, counts, &sums);
             ReportBound {
                 kind: kind.into(),
                 place,
                 count,
                 limit,
-                refused: refusals.len() as u32,
-                refused_largest_m: metres_of_quanta(largest as i32),
+                refused: posts.count(),
+                refused_largest_m: metres_of_quanta(posts.largest() as i32),
                 rms_with_m: rms_m(with),
                 rms_without_m: rms_m(without),
             }
@@ -55,34 +120,32 @@ pub(crate) fn bound(
     Ok(bound)
 }
 
-fn refused_by_module(tins: &[Published]) -> BTreeMap<ModuleId, Vec<Refusal>> {
-    let mut refused: BTreeMap<ModuleId, Vec<Refusal>> = BTreeMap::new();
-    for refusal in tins.iter().flat_map(|tile| &tile.tin.refused) {
-        refused.entry(refusal.module).or_default().push(*refusal);
-    }
-    refused
-}
-
 /// Refusals by the load module or window whose limit caused them. A refusal by a window is booked to the fullest
 /// window that holds the load module.
-fn by_place(run: &Run, refused: &BTreeMap<ModuleId, Vec<Refusal>>, sums: &[u32]) -> Vec<(ReportPlace, Vec<Refusal>)> {
+fn by_place(
+    run: &Run,
+    refused: &BTreeMap<ModuleId, RefusedPosts>,
+    sums: &[u32],
+) -> impl Iterator<Item = (ReportPlace, RefusedPosts)> + use<> {
     let windows = &run.area.budget.windows;
-    let mut modules: BTreeMap<ModuleId, Vec<Refusal>> = BTreeMap::new();
-    let mut by_window: BTreeMap<ModuleId, Vec<Refusal>> = BTreeMap::new();
-    for (&module, refusals) in refused {
+    let mut modules: BTreeMap<ModuleId, RefusedPosts> = BTreeMap::new();
+    let mut by_window: BTreeMap<ModuleId, RefusedPosts> = BTreeMap::new();
+    for (&module, posts) in refused {
         let here = ModuleRect { south: module.row, west: module.col, north: module.row + 1, east: module.col + 1 };
         let sum = |origin: &ModuleId| sums[origin.row as usize * windows.origins.cols() as usize + origin.col as usize];
         let fullest = windows.touching(here).iter().max_by_key(|origin| (sum(origin), std::cmp::Reverse(*origin)));
-        for refusal in refusals {
-            match (refusal.by, fullest) {
-                (RefusedBy::Window, Some(origin)) => by_window.entry(origin).or_default().push(*refusal),
-                _ => modules.entry(module).or_default().push(*refusal),
-            }
+        let is_of_window = |by| by == RefusedBy::Window && fullest.is_some();
+        let (of_window, of_module) = (posts.part(is_of_window), posts.part(|by| !is_of_window(by)));
+        if let Some(origin) = fullest.filter(|_| 0 < of_window.count()) {
+            by_window.entry(origin).or_default().merge(&of_window);
+        }
+        if 0 < of_module.count() {
+            modules.entry(module).or_default().merge(&of_module);
         }
     }
-    let module = |(id, refusals): (ModuleId, Vec<Refusal>)| (ReportPlace::Module([id.row, id.col]), refusals);
-    let window = |(id, refusals): (ModuleId, Vec<Refusal>)| (ReportPlace::Window([id.row, id.col]), refusals);
-    modules.into_iter().map(module).chain(by_window.into_iter().map(window)).collect()
+    let module = |(id, posts): (ModuleId, RefusedPosts)| (ReportPlace::Module([id.row, id.col]), posts);
+    let window = |(id, posts): (ModuleId, RefusedPosts)| (ReportPlace::Window([id.row, id.col]), posts);
+    modules.into_iter().map(module).chain(by_window.into_iter().map(window))
 }
 
 fn modules_of(run: &Run, place: ReportPlace) -> impl Iterator<Item = ModuleId> + Clone + use<> {

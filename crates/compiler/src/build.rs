@@ -15,6 +15,7 @@ use crate::refine::refine;
 use crate::report::Findings;
 use crate::run::{ALGORITHM_REVISION, Options, Run};
 use crate::survey::{allocate, survey};
+use crate::tins::Tins;
 use crate::{CompileError, Event, Progress, Stage, sources};
 
 /// A finished build.
@@ -56,12 +57,14 @@ pub fn build(job: &Job, folder: &Path, options: &Options, progress: &mut dyn Pro
 /// Every stage of a run that has begun; what is published and fresh is kept.
 pub(crate) fn finish(run: Run, progress: &mut dyn Progress) -> Result<Built, CompileError> {
     let curves = survey(&run, progress)?;
-    let shares = allocate(&run, curves.as_deref(), progress);
+    let mut shares = allocate(&run, curves.as_ref(), progress)?;
+    drop(curves);
     let tins = refine(&run, &shares, progress)?;
-    let mut assembled = assemble(&run, &tins, progress)?;
-    let enforced = enforce(&run, &tins, &mut assembled, progress)?;
+    shares.forget_rooms();
+    let (mut assembled, mut sums) = assemble(&run, &tins, progress)?;
+    let enforced = enforce(&run, &tins, &mut assembled, &mut sums, progress)?;
 
-    let findings = Findings { run: &run, tins: &tins, assembled: &assembled, enforced: &enforced };
+    let findings = Findings { run: &run, tins: &tins, assembled: &assembled, sums: &sums, enforced: &enforced };
     let report = publish(&findings, &shares, &[], progress)?;
     let rebuilt = tins.iter().filter(|tile| tile.cause.is_some()).count();
     Ok(Built { report, kept: tins.len() - rebuilt, rebuilt, is_unchanged: false, database: run.database })
@@ -98,7 +101,7 @@ pub(crate) fn open_with<'a>(
         Previous::Database(manifest) => Some(*manifest),
         Previous::Nothing | Previous::Damaged(_) => None,
     };
-    Ok(Run { job, area, ground, workers, stop: options.stop, database, records, previous })
+    Ok(Run { job, area, ground, workers, stop: options.stop, database, records, tins: Tins::new(), previous })
 }
 
 /// The finished database in `folder`, if a build of `job` would change nothing in it: made from the same job and the

@@ -12,6 +12,7 @@ use terrain::{LatticePoint, ModuleId, Post, TileId};
 use crate::assemble::{Assembled, ModuleNumbers, assemble_tile, points_around};
 use crate::refine::Published;
 use crate::run::{Run, Worked};
+use crate::sums::Sums;
 use crate::{CompileError, Event, Progress, Stage};
 
 /// Rounds of removal and assembly, at most; what is over its limit after them is a breach.
@@ -31,6 +32,7 @@ pub(crate) fn enforce(
     run: &Run,
     tins: &[Published],
     assembled: &mut [Assembled],
+    sums: &mut Sums,
     progress: &mut dyn Progress,
 ) -> Result<Enforced, CompileError> {
     let mut enforced = Enforced { removed: vec![Vec::new(); tins.len()], before: None };
@@ -43,7 +45,7 @@ pub(crate) fn enforce(
             break;
         }
         progress.tell(Event::Enter(Stage::Enforce, 0));
-        enforced.before.get_or_insert_with(|| by_module(run, assembled).iter().map(|&&numbers| numbers).collect());
+        enforced.before.get_or_insert_with(|| ByModule { run, assembled }.iter().copied().collect());
         let proposals = propose(run, tins, &enforced.removed, &need)?;
         let picked = pick(&mut need, proposals);
         progress.tell(Event::Leave(Stage::Enforce));
@@ -56,7 +58,7 @@ pub(crate) fn enforce(
             if !reached.contains(&tile) {
                 return Ok(Worked::Kept(None));
             }
-            let again = assemble_tile(run, &|index| &tins[index], &enforced.removed, tile)?;
+            let (again, _) = assemble_tile(run, &|index| tins[index].stamp, &enforced.removed, tile)?;
             Ok(Worked::Made(Some(again), None))
         })?;
         for (slot, fresh) in assembled.iter_mut().zip(again) {
@@ -65,23 +67,34 @@ pub(crate) fn enforce(
             }
         }
     }
+    if enforced.before.is_some() {
+        *sums = Sums::published(run)?;
+    }
     Ok(enforced)
 }
 
-/// The numbers of every load module of the area, row-major.
-pub(crate) fn by_module<'a>(run: &Run, assembled: &'a [Assembled]) -> Vec<&'a ModuleNumbers> {
-    let area = &run.area;
-    area.grid
-        .all()
-        .iter()
-        .map(|module| {
-            let tile = area.tiling.tile_of_module(module, area.grid);
-            let modules = area.tiling.modules(tile, area.grid);
-            let place =
-                (module.row - modules.south) as usize * modules.cols() as usize + (module.col - modules.west) as usize;
-            &assembled[area.tiling.index(tile)].modules[place]
-        })
-        .collect()
+/// The numbers of every load module of the area, found in its tile.
+#[derive(Clone, Copy)]
+pub(crate) struct ByModule<'a> {
+    pub run: &'a Run<'a>,
+    pub assembled: &'a [Assembled],
+}
+
+impl<'a> ByModule<'a> {
+    /// Those of one load module.
+    pub fn get(self, module: ModuleId) -> &'a ModuleNumbers {
+        let area = &self.run.area;
+        let tile = area.tiling.tile_of_module(module, area.grid);
+        let modules = area.tiling.modules(tile, area.grid);
+        let place =
+            (module.row - modules.south) as usize * modules.cols() as usize + (module.col - modules.west) as usize;
+        &self.assembled[area.tiling.index(tile)].modules[place]
+    }
+
+    /// Those of every load module, row-major.
+    pub fn iter(self) -> impl Iterator<Item = &'a ModuleNumbers> {
+        self.run.area.grid.all().iter().map(move |module| self.get(module))
+    }
 }
 
 /// What is counted against limits.
@@ -103,7 +116,7 @@ struct Need<'a> {
 impl<'a> Need<'a> {
     fn new(run: &'a Run<'a>, assembled: &[Assembled]) -> Self {
         let budget = &run.area.budget;
-        let counts: Vec<u32> = by_module(run, assembled).iter().map(|numbers| counted(run, numbers)).collect();
+        let counts: Vec<u32> = ByModule { run, assembled }.iter().map(|numbers| counted(run, numbers)).collect();
         let limit = i64::from(budget.per_module);
         let mut modules: Vec<i64> = counts.iter().map(|&count| i64::from(count) - limit).collect();
         grant_pool(&mut modules, budget.pool);
@@ -177,7 +190,8 @@ fn propose(
         }
         let window = run.ground.around(area, tile, halo_posts(area.grid.side_cells))?;
         let ground = RemovalGround { dem: &window.dem, mask: &window.importance, pins: &pins, over: &over };
-        Ok(propose_removals(&points_around(run, &|index| &tins[index], removed, tile), &layout, &ground))
+        let points = points_around(run, &|index| tins[index].stamp, removed, tile)?;
+        Ok(propose_removals(&points, &layout, &ground))
     });
     let proposals = proposals.map_err(|error| CompileError::from_schedule(Stage::Enforce, &area.tiles, error))?;
     Ok(proposals.into_iter().flatten().collect())

@@ -5,9 +5,10 @@ use fidelity::{Residuals, Tally};
 use terrain::{ModuleResidual, TileId};
 
 use crate::assemble::{Assembled, ModuleNumbers};
+use crate::sums::Sums;
 
 /// What is kept of a tile's load modules.
-pub(crate) fn to_measured(tile: TileId, assembled: &Assembled) -> Measured {
+pub(crate) fn to_measured(tile: TileId, assembled: &Assembled, sums: &Sums) -> Measured {
     let module = |numbers: &ModuleNumbers| MeasuredModule {
         triangles: numbers.triangles,
         polygons: numbers.polygons,
@@ -20,15 +21,15 @@ pub(crate) fn to_measured(tile: TileId, assembled: &Assembled) -> Measured {
         tile,
         modules_file: assembled.file,
         modules: std::iter::once(&assembled.modules).chain(&assembled.coarser).flatten().map(module).collect(),
-        classes: assembled.residuals.classes.iter().map(to_tally).collect(),
-        at_source: assembled.at_source.as_ref().map(to_tally),
-        points: assembled.points.clone(),
-        border: assembled.border,
+        classes: sums.residuals.classes.iter().map(to_tally).collect(),
+        at_source: sums.has_source.then(|| to_tally(&sums.at_source)),
+        points: sums.points.clone(),
+        border: sums.border,
     }
 }
 
 /// What was kept of a tile of `count` load modules, in a file of this stamp.
-pub(crate) fn from_measured(measured: Measured, count: usize, file: FileStamp) -> Assembled {
+pub(crate) fn from_measured(measured: Measured, count: usize, file: FileStamp) -> (Assembled, Sums) {
     let module = |module: &MeasuredModule| ModuleNumbers {
         triangles: module.triangles,
         polygons: module.polygons,
@@ -40,17 +41,19 @@ pub(crate) fn from_measured(measured: Measured, count: usize, file: FileStamp) -
         },
     };
     let mut levels = measured.modules.chunks(count.max(1)).map(|level| level.iter().map(module).collect());
-    let modules = levels.next().unwrap_or_default();
-    Assembled {
-        file: measured.modules_file,
-        measured: file,
-        modules,
-        coarser: levels.collect(),
+    let (modules, coarser) = (levels.next().unwrap_or_default(), levels.collect());
+    let done = Assembled { file: measured.modules_file, measured: file, modules, coarser, is_new: false };
+    (done, sums_of(measured))
+}
+
+/// What was kept of a tile's residuals and points.
+pub(crate) fn sums_of(measured: Measured) -> Sums {
+    Sums {
         residuals: Residuals { classes: measured.classes.iter().map(from_tally).collect() },
-        at_source: measured.at_source.as_ref().map(from_tally),
+        at_source: measured.at_source.as_ref().map(from_tally).unwrap_or_default(),
+        has_source: measured.at_source.is_some(),
         points: measured.points,
         border: measured.border,
-        is_new: false,
     }
 }
 

@@ -139,10 +139,10 @@ fn allocation_json(run: &Run, shares: &Shares) -> Value {
             })
         })
         .collect();
-    let granted: Vec<Value> = shares.triangles.iter().flat_map(|allocation| &allocation.granted).map(granted).collect();
+    let granted: Vec<Value> = shares.granted.iter().map(granted).collect();
     json!({
-        "threshold_bin": shares.triangles.as_ref().and_then(|allocation| allocation.threshold_bin),
-        "slack": shares.triangles.as_ref().map_or(0, |allocation| allocation.slack),
+        "threshold_bin": shares.threshold_bin,
+        "slack": shares.slack,
         "granted": granted,
         "tiles": tiles,
     })

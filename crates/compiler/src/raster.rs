@@ -149,7 +149,7 @@ impl Heights {
             job.refuse_given()?;
         }
         let curves = job.survey(&self.dem, &workers, stop, progress)?;
-        job.refine(&self.dem, curves.as_deref(), &workers, stop, progress)
+        job.refine(&self.dem, curves, &workers, stop, progress)
     }
 
     /// A TIN over them as a mesh.
@@ -353,7 +353,7 @@ impl<'a> TinJob<'a> {
     fn refine(
         &self,
         dem: &Dem,
-        curves: Option<&[GainCurve]>,
+        curves: Option<Vec<GainCurve>>,
         workers: &Workers,
         stop: &AtomicBool,
         progress: &mut dyn Progress,
@@ -365,7 +365,9 @@ impl<'a> TinJob<'a> {
         let mut by_rank: Vec<usize> = (0..self.tiles.len()).collect();
         by_rank.sort_by_key(|&index| ranks[index]);
         let shares = self.points().map(|points| match curves {
-            Some(curves) => points_globally(points, Gains { curves, by_rank: &by_rank, floor: None }),
+            Some(curves) => {
+                points_globally(points, Gains { bands: &mut std::iter::once(curves), by_rank: &by_rank, floor: None })
+            }
             None => points_equally(points, self.tiles.len()),
         });
         let slots: Vec<OnceLock<TileTin>> = self.tiles.iter().map(|_| OnceLock::new()).collect();
@@ -373,9 +375,9 @@ impl<'a> TinJob<'a> {
         let task = |index: usize| {
             let tile = self.tiles[index];
             let published = |other: TileId| {
-                slots[self.tiling.index(other)].get().expect("lower-ranked neighbours are published first")
+                Ok(slots[self.tiling.index(other)].get().expect("lower-ranked neighbours are published first"))
             };
-            let seeds = inherited(&self.tiling, tile, published);
+            let seeds = inherited(&self.tiling, tile, published)?;
             let points = shares.as_ref().map(|shares| shares[index]);
             let task = self.task(tile, self.tiling.owned_sides(tile), posts_of(&seeds), points);
             let window = dem.window(task.rect);

@@ -3,8 +3,9 @@
 use std::sync::{Arc, OnceLock};
 
 use database::{FingerprintBuilder, MadeFrom, Stamp};
-use terrain::{TileId, TileTin, Vertex};
+use terrain::{ModuleId, StopReason, TileId, TileTin, Vertex};
 
+use crate::bound::{RefusedPosts, by_module};
 use crate::cause::{Cause, cause, made_from, summary};
 use crate::ground::Window;
 use crate::refinement::Refinement;
@@ -13,15 +14,27 @@ use crate::survey::Shares;
 use crate::tasks::{TileBudget, inherited, posts_of, tile_refinement};
 use crate::{CompileError, Event, Progress, Stage};
 
-/// A tile's published TIN and what it was made from.
+/// What a tile's published TIN was made from, and what the report says of it. The TIN itself is asked of the run.
 #[derive(Clone)]
 pub(crate) struct Published {
-    pub tin: Arc<TileTin>,
+    pub tile: TileId,
     pub stamp: Stamp,
+    /// Why selection ended.
+    pub stop: StopReason,
+    /// What limits kept out, by load module, in ascending order.
+    pub refused: Vec<(ModuleId, RefusedPosts)>,
     /// The same by parts; unknown where an earlier build did not say.
     pub made_from: Option<MadeFrom>,
     /// Why this run made it, if it did.
     pub cause: Option<Cause>,
+}
+
+impl Published {
+    /// Of a TIN that is published with this stamp.
+    pub fn new(tin: &TileTin, stamp: Stamp, made_from: Option<MadeFrom>, cause: Option<Cause>) -> Self {
+        let (tile, stop, refused) = (tin.tile, tin.stop, by_module(&tin.refused));
+        Self { tile, stamp, stop, refused, made_from, cause }
+    }
 }
 
 /// Refines every tile, or keeps what is published and fresh.
@@ -29,10 +42,11 @@ pub(crate) fn refine(run: &Run, shares: &Shares, progress: &mut dyn Progress) ->
     let slots: Vec<OnceLock<Published>> = run.area.tiles.iter().map(|_| OnceLock::new()).collect();
     run.in_rank_order(Stage::Refine, progress, |tile| {
         let published = |other: TileId| {
-            &*slots[run.area.tiling.index(other)].get().expect("lower-ranked neighbours are published first").tin
+            let slot = slots[run.area.tiling.index(other)].get();
+            run.tin(other, &slot.expect("lower-ranked neighbours are published first").stamp)
         };
         let index = run.area.tiling.index(tile);
-        let done = refine_tile(run, &shares.tiles[index], &inherited(&run.area.tiling, tile, published), tile)?;
+        let done = refine_tile(run, &shares.tiles[index], &inherited(&run.area.tiling, tile, published)?, tile)?;
         let cause = done.cause.clone();
         assert!(slots[index].set(done).is_ok(), "each tile is refined once");
         Ok(match cause {
@@ -44,7 +58,7 @@ pub(crate) fn refine(run: &Run, shares: &Shares, progress: &mut dyn Progress) ->
     let tins = slots.into_iter().map(|slot| slot.into_inner().expect("every tile was refined"));
     let tins: Vec<Published> = tins.collect();
     let causes: Vec<(TileId, Cause)> =
-        tins.iter().filter_map(|tile| Some((tile.tin.tile, tile.cause.clone()?))).collect();
+        tins.iter().filter_map(|published| Some((published.tile, published.cause.clone()?))).collect();
     if let Some(text) = summary(tins.len(), &causes) {
         progress.tell(Event::Note(text));
     }
@@ -78,12 +92,25 @@ fn refine_or_keep(
     if matches!(published, Ok(Some(found)) if found == stamp)
         && let Ok((_, tin)) = folder.read_tile(tile)
     {
-        return Ok(Published { tin: Arc::new(tin), stamp, made_from: Some(parts), cause: None });
+        return Ok(keep(run, tin, stamp, Some(parts), None));
     }
     let cause = cause(run, tile, &published, &stamp, &parts);
     let tin = refinement.run(window, seeds);
     run.database.write_tile(&stamp, &tin)?;
-    Ok(Published { tin: Arc::new(tin), stamp, made_from: Some(parts), cause: Some(cause) })
+    Ok(keep(run, tin, stamp, Some(parts), Some(cause)))
+}
+
+/// A TIN that is published with this stamp, kept for whoever asks for it next.
+pub(crate) fn keep(
+    run: &Run,
+    tin: TileTin,
+    stamp: Stamp,
+    made_from: Option<MadeFrom>,
+    cause: Option<Cause>,
+) -> Published {
+    let published = Published::new(&tin, stamp, made_from, cause);
+    run.tins.keep(stamp, Arc::new(tin));
+    published
 }
 
 /// What a tile's TIN is made from.

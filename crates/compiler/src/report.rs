@@ -13,19 +13,24 @@ use terrain::{Breach, BreachKind, BreachPlace, ModuleId, RefusedBy, StopReason, 
 
 use crate::CompileError;
 use crate::assemble::{Assembled, ModuleNumbers};
-use crate::bound::bound;
-use crate::enforce::{Enforced, by_module, counted};
+use crate::bound::{RefusedPosts, bound, of_area};
+use crate::enforce::{ByModule, Enforced, counted};
 use crate::refine::Published;
 use crate::run::Run;
+use crate::sums::Sums;
 
 /// Millimetres in a metre: the unit in which a residual's breach is counted.
 const MILLIMETRES: f64 = 1000.0;
+
+/// What limits kept out, by load module.
+type Refused = BTreeMap<ModuleId, RefusedPosts>;
 
 /// All that a report says but times.
 pub(crate) struct Findings<'a> {
     pub run: &'a Run<'a>,
     pub tins: &'a [Published],
     pub assembled: &'a [Assembled],
+    pub sums: &'a Sums,
     pub enforced: &'a Enforced,
 }
 
@@ -36,15 +41,15 @@ impl Findings<'_> {
     /// When what a limit cost cannot be computed.
     pub fn report(&self) -> Result<Report, CompileError> {
         let run = self.run;
-        let residuals = self.residuals();
+        let residuals = &self.sums.residuals;
         let total = residuals.total();
+        let refused = of_area(self.tins);
         let counts = self.counts();
         let points = self.points();
-        let breaches = self.breaches(&counts, &total);
-        let sum = |count: fn(&ModuleNumbers) -> u32| -> u64 {
-            by_module(run, self.assembled).iter().map(|numbers| u64::from(count(numbers))).sum()
-        };
-        let bound = bound(run, self.tins, &counts, &by_module(run, self.assembled))?;
+        let breaches = self.breaches(&counts, &refused, &total);
+        let numbers = self.by_module();
+        let sum = |count: fn(&ModuleNumbers) -> u32| -> u64 { numbers.iter().map(|one| u64::from(count(one))).sum() };
+        let bound = bound(run, self.tins, &refused, &counts, &numbers)?;
         Ok(Report {
             area: run.job.area.name.clone(),
             workers: run.workers.count() as u32,
@@ -62,16 +67,16 @@ impl Findings<'_> {
             before_removals: self.before_removals(),
             residual: residual_of(&total),
             residual_against_source: run.ground.relief.has_source_posts().then(|| self.at_source(&total)),
-            classes: self.classes(&residuals),
+            classes: self.classes(residuals),
             levels: self.levels(),
-            overall_point_weighted_rms_m: self.point_weighted_rms_m(&residuals),
+            overall_point_weighted_rms_m: self.point_weighted_rms_m(residuals),
             dem_accuracy_m: run.ground.accuracy_m,
             voids: ReportVoids {
                 count: (run.ground.voids.filled + run.ground.voids.left) as u64,
                 filled: run.ground.voids.filled as u64,
             },
             breaches: breaches.iter().map(ReportBreach::from).collect(),
-            refusals: self.refusals(),
+            refusals: refusals(&refused),
             bound,
             stops: self.stops(),
             warnings: run.ground.warnings.clone(),
@@ -81,7 +86,7 @@ impl Findings<'_> {
     }
 
     fn stops(&self) -> ReportStops {
-        let count = |reason| self.tins.iter().filter(|tile| tile.tin.stop == reason).count() as u64;
+        let count = |reason| self.tins.iter().filter(|tile| tile.stop == reason).count() as u64;
         ReportStops {
             budget_spent: count(StopReason::BudgetSpent),
             residual_reached: count(StopReason::ResidualReached),
@@ -93,8 +98,8 @@ impl Findings<'_> {
     /// The sums of the manifest.
     pub fn totals(&self, report: &Report) -> Totals {
         // From the load modules' own numbers, which `verify` adds up again.
-        let of_modules = by_module(self.run, self.assembled);
-        let sum = |of: fn(&ModuleNumbers) -> u64| of_modules.iter().map(|numbers| of(numbers)).sum::<u64>();
+        let of_modules = self.by_module();
+        let sum = |of: fn(&ModuleNumbers) -> u64| of_modules.iter().map(of).sum::<u64>();
         Totals {
             points: report.points.total,
             triangles: report.triangles,
@@ -109,31 +114,24 @@ impl Findings<'_> {
         }
     }
 
-    fn residuals(&self) -> Residuals {
-        let mut all = Residuals::default();
-        self.assembled.iter().for_each(|tile| all.merge(&tile.residuals));
-        all
+    fn by_module(&self) -> ByModule<'_> {
+        ByModule { run: self.run, assembled: self.assembled }
     }
 
     /// Against the source's posts; the working grid's where those are the same.
     fn at_source(&self, total: &Tally) -> ReportResidual {
-        let mut all = Tally::default();
-        for tile in self.assembled {
-            let Some(tally) = &tile.at_source else { return residual_of(total) };
-            all.merge(tally);
-        }
-        residual_of(&all)
+        residual_of(if self.sums.has_source { &self.sums.at_source } else { total })
     }
 
     fn counts(&self) -> Vec<u32> {
-        by_module(self.run, self.assembled).iter().map(|numbers| counted(self.run, numbers)).collect()
+        self.by_module().iter().map(|numbers| counted(self.run, numbers)).collect()
     }
 
     fn points(&self) -> ReportPoints {
         let grid = self.run.area.grid;
-        let total: u64 = self.assembled.iter().flat_map(|tile| &tile.points).sum();
+        let total: u64 = self.sums.points.iter().sum();
         let corner = u64::from(grid.rows + 1) * u64::from(grid.cols + 1);
-        let border: u64 = self.assembled.iter().map(|tile| tile.border).sum();
+        let border = self.sums.border;
         ReportPoints { selected: total - corner - border, border, corner, total }
     }
 
@@ -183,7 +181,7 @@ impl Findings<'_> {
         let nothing = Tally::default();
         let class = |(index, name): (usize, &String)| {
             let tally = residuals.classes.get(index).unwrap_or(&nothing);
-            let points = self.assembled.iter().map(|tile| tile.points[index]).sum();
+            let points = self.sums.points[index];
             ReportClass { name: name.clone(), posts: tally.posts, points, residual: residual_of(tally) }
         };
         self.run.job.importance.classes.iter().enumerate().map(class).collect()
@@ -206,30 +204,16 @@ impl Findings<'_> {
     fn point_weighted_rms_m(&self, residuals: &Residuals) -> f64 {
         let (mut squares, mut points) = (0.0, 0.0);
         for (index, tally) in residuals.classes.iter().enumerate().filter(|(_, tally)| 0 < tally.posts) {
-            let weight = self.assembled.iter().map(|tile| tile.points[index]).sum::<u64>() as f64;
+            let weight = self.sums.points[index] as f64;
             squares += weight * tally.rms_m() * tally.rms_m();
             points += weight;
         }
         if points == 0.0 { 0.0 } else { (squares / points).sqrt() }
     }
 
-    fn refusals(&self) -> ReportRefusals {
-        let mut found = ReportRefusals::default();
-        for refusal in self.tins.iter().flat_map(|tile| &tile.tin.refused) {
-            found.count += 1;
-            match refusal.by {
-                RefusedBy::Module => found.by_module += 1,
-                RefusedBy::Window => found.by_window += 1,
-                RefusedBy::Reservation => found.by_reservation += 1,
-            }
-            found.largest_m = found.largest_m.max(metres_of_quanta(refusal.residual as i32));
-        }
-        found
-    }
-
-    fn breaches(&self, counts: &[u32], total: &Tally) -> Vec<Breach> {
+    fn breaches(&self, counts: &[u32], refused: &Refused, total: &Tally) -> Vec<Breach> {
         let budget = &self.run.area.budget;
-        let mut breaches = self.module_breaches(counts);
+        let mut breaches = self.module_breaches(counts, refused);
         let sums = budget.windows.sums(budget.grid, counts);
         for (origin, &sum) in budget.windows.origins.iter().zip(&sums).filter(|&(_, &sum)| budget.per_window < sum) {
             let inside: Vec<ModuleId> = budget.windows.modules_of(origin).iter().collect();
@@ -238,20 +222,20 @@ impl Findings<'_> {
                 BreachPlace::Window(origin),
                 sum,
                 budget.per_window,
-                &inside,
+                (&inside, refused),
             ));
         }
         let sum: u64 = counts.iter().map(|&count| u64::from(count)).sum();
         if budget.area < sum {
-            let mut breach = self.breach(BreachKind::Mean, BreachPlace::Area, 0, 0, &[]);
+            let mut breach = self.breach(BreachKind::Mean, BreachPlace::Area, 0, 0, (&[], refused));
             (breach.count, breach.limit, breach.rms_with_m) = (sum, budget.area, total.rms_m());
             breaches.push(breach);
         }
-        breaches.extend(self.residual_breaches(total));
+        breaches.extend(self.residual_breaches(refused, total));
         breaches
     }
 
-    fn module_breaches(&self, counts: &[u32]) -> Vec<Breach> {
+    fn module_breaches(&self, counts: &[u32], refused: &Refused) -> Vec<Breach> {
         let budget = &self.run.area.budget;
         let mut over: Vec<(u32, ModuleId)> = budget
             .grid
@@ -271,36 +255,42 @@ impl Findings<'_> {
                 continue;
             }
             let place = BreachPlace::Module(module);
-            breaches.push(self.breach(BreachKind::LoadModule, place, count, budget.per_module, &[module]));
+            let here = (&[module][..], refused);
+            breaches.push(self.breach(BreachKind::LoadModule, place, count, budget.per_module, here));
         }
         breaches
     }
 
-    fn breach(&self, kind: BreachKind, place: BreachPlace, count: u32, limit: u32, inside: &[ModuleId]) -> Breach {
-        let grid = self.run.area.grid;
-        let now = by_module(self.run, self.assembled);
+    fn breach(
+        &self,
+        kind: BreachKind,
+        place: BreachPlace,
+        count: u32,
+        limit: u32,
+        (inside, refused): (&[ModuleId], &Refused),
+    ) -> Breach {
+        let (grid, now) = (self.run.area.grid, self.by_module());
         let before = self.enforced.before.as_ref();
-        let rms = |of: &dyn Fn(usize) -> ModuleNumbers| {
-            let parts = inside.iter().map(|&module| of(grid.index(module)).residual);
+        let rms = |of: &dyn Fn(ModuleId) -> ModuleNumbers| {
+            let parts = inside.iter().map(|&module| of(module).residual);
             let (squares, posts) = parts.fold((0u64, 0u64), |(squares, posts), part| {
                 (squares + part.sum_squared, posts + u64::from(part.posts))
             });
             if posts == 0 { 0.0 } else { (squares as f64 / posts as f64).sqrt() / f64::from(terrain::QUANTA_PER_METRE) }
         };
-        let refused = self.tins.iter().flat_map(|tile| &tile.tin.refused);
         Breach {
             kind,
             place,
             count: u64::from(count),
             limit: u64::from(limit),
-            refused: refused.filter(|refusal| inside.contains(&refusal.module)).count() as u32,
-            rms_with_m: rms(&|index| *now[index]),
-            rms_without_m: before.map(|before| rms(&|index| before[index])),
+            refused: inside.iter().filter_map(|module| refused.get(module)).map(RefusedPosts::count).sum(),
+            rms_with_m: rms(&|module| *now.get(module)),
+            rms_without_m: before.map(|before| rms(&|module| before[grid.index(module)])),
         }
     }
 
     /// Residuals that the job asked for and that something else kept from being reached.
-    fn residual_breaches(&self, total: &Tally) -> Vec<Breach> {
+    fn residual_breaches(&self, refused: &Refused, total: &Tally) -> Vec<Breach> {
         let tin = &self.run.job.tin;
         let asked = [(tin.max_residual_m, total.max_m()), (tin.target_rms_m, total.rms_m())];
         let missed = asked.into_iter().filter_map(|(limit, found)| Some((limit?, found)));
@@ -311,7 +301,7 @@ impl Findings<'_> {
                 place: BreachPlace::Area,
                 count: (found * MILLIMETRES).ceil() as u64,
                 limit: (limit * MILLIMETRES).floor() as u64,
-                refused: self.tins.iter().map(|tile| tile.tin.refused.len() as u32).sum(),
+                refused: refused.values().map(RefusedPosts::count).sum(),
                 rms_with_m: total.rms_m(),
                 rms_without_m: None,
             })
@@ -331,6 +321,19 @@ fn level_figures<'a>(level: u32, inner_share: f64, modules: impl Iterator<Item =
     let metre = f64::from(terrain::QUANTA_PER_METRE);
     let rms_m = if posts == 0 { 0.0 } else { (squares as f64 / posts as f64).sqrt() / metre };
     ReportLevel { level, inner_share, triangles, rms_m, max_m: f64::from(largest) / metre }
+}
+
+fn refusals(refused: &Refused) -> ReportRefusals {
+    let mut all = RefusedPosts::default();
+    refused.values().for_each(|posts| all.merge(posts));
+    let count = |by| u64::from(all.count_by(by));
+    ReportRefusals {
+        count: u64::from(all.count()),
+        by_module: count(RefusedBy::Module),
+        by_window: count(RefusedBy::Window),
+        by_reservation: count(RefusedBy::Reservation),
+        largest_m: metres_of_quanta(all.largest() as i32),
+    }
 }
 
 /// A tally as the report gives it.

@@ -6,10 +6,11 @@ use std::sync::atomic::AtomicBool;
 use database::{Database, FingerprintBuilder, Manifest, SourceRecord, Stamp};
 use job::Job;
 use schedule::{Event as Scheduled, RankedTasks, Workers, in_rank_order_observed};
-use terrain::TileId;
+use terrain::{TileId, TileTin};
 
 use crate::area::GamingArea;
 use crate::ground::{Ground, Window};
+use crate::tins::Tins;
 use crate::{CompileError, Event, Progress, Stage};
 
 /// Rises whenever the result of any stage may change for the same input; a test with golden hashes holds it.
@@ -36,6 +37,8 @@ pub(crate) struct Run<'a> {
     pub database: Database,
     /// What the heights and weights are made from.
     pub records: Vec<SourceRecord>,
+    /// The TINs that this run has published or read.
+    pub tins: Tins,
     /// What `database.json` said before this run.
     pub previous: Option<Manifest>,
 }
@@ -103,6 +106,11 @@ impl Run<'_> {
             .map_err(|error| CompileError::from_schedule(stage, tiles, error))?;
         progress.tell(Event::Leave(stage));
         Ok(done)
+    }
+
+    /// The TIN of a tile that is published with this stamp.
+    pub fn tin(&self, tile: TileId, stamp: &Stamp) -> Result<Arc<TileTin>, CompileError> {
+        Ok(self.tins.get(self.database.folder(), tile, stamp)?)
     }
 
     /// The ground of a tile.

@@ -1,12 +1,15 @@
 //! Survey and allocation: what would each tile gain, and what may it therefore spend.
 
+use std::sync::{Mutex, PoisonError};
+
 use database::{FingerprintBuilder, Stamp};
 use job::{Budget as PointBudget, Edges};
-use terrain::{GainCurve, TileId};
-use tiling::{Allocation, Gains, allocate_equally, allocate_globally, points_equally, points_globally};
+use terrain::{GainCurve, ModuleId, TileId};
+use tiling::{Gains, allocate_equally, allocate_globally, points_equally, points_globally};
 use tin::SurveyTask;
 
 use crate::coarse::coarse;
+use crate::curves::{Curves, Profile};
 use crate::refinement::{give, optimising};
 use crate::run::{Run, Worked};
 use crate::tasks::{TileBudget, is_surveyed, is_surveyed_in_haste, survey_task};
@@ -16,17 +19,39 @@ use crate::{CompileError, Event, Progress, Stage};
 pub(crate) struct Shares {
     /// One budget per tile, row-major.
     pub tiles: Vec<TileBudget>,
-    /// How triangles were shared out; absent in clip mode, where they are counted after the clip.
-    pub triangles: Option<Allocation>,
+    /// Rung of the ladder down to which gains are taken, where triangles are shared out by them.
+    pub threshold_bin: Option<i32>,
+    /// Triangles that no tile was given: the next rung did not fit. In clip mode they are counted after the clip.
+    pub slack: u64,
+    /// Load modules that were granted more than the limit, with the triangles granted from the pool.
+    pub granted: Vec<(ModuleId, u32)>,
+}
+
+impl Shares {
+    /// Drops the room of every load module and window, some kilobytes a tile, once all tiles are refined.
+    pub fn forget_rooms(&mut self) {
+        for allowance in self.tiles.iter_mut().filter_map(|budget| budget.allowance.as_mut()) {
+            (allowance.module_room, allowance.window_room) = (Vec::new(), Vec::new());
+        }
+    }
 }
 
 /// Surveys every tile if the job asks for a global allocation.
-pub(crate) fn survey(run: &Run, progress: &mut dyn Progress) -> Result<Option<Vec<GainCurve>>, CompileError> {
+pub(crate) fn survey<'a>(run: &'a Run, progress: &mut dyn Progress) -> Result<Option<Curves<'a>>, CompileError> {
     if !is_surveyed(run.job) {
         return Ok(None);
     }
-    let curves = run.for_each_tile(Stage::Survey, progress, |tile| Ok(survey_tile(run, tile)?.1))?;
-    Ok(Some(curves.into_iter().map(Worked::into_inner).collect()))
+    let profile = Mutex::new(Profile::default());
+    run.for_each_tile(Stage::Survey, progress, |tile| {
+        let (_, worked) = survey_tile(run, tile)?;
+        let (Worked::Made(curve, _) | Worked::Kept(curve)) = &worked;
+        profile.lock().unwrap_or_else(PoisonError::into_inner).add(curve);
+        Ok(match worked {
+            Worked::Made(_, why) => Worked::Made((), why),
+            Worked::Kept(_) => Worked::Kept(()),
+        })
+    })?;
+    Ok(Some(Curves::new(run, profile.into_inner().unwrap_or_else(PoisonError::into_inner))))
 }
 
 /// Surveys a tile, or keeps what is published and fresh; with the stamp of what it is made from.
@@ -61,11 +86,18 @@ fn feed(builder: FingerprintBuilder, task: &SurveyTask) -> FingerprintBuilder {
 }
 
 /// Shares out points and triangles; without curves equally, with them by one threshold.
-pub(crate) fn allocate(run: &Run, curves: Option<&[GainCurve]>, progress: &mut dyn Progress) -> Shares {
+///
+/// # Errors
+/// When a curve cannot be read back.
+pub(crate) fn allocate(
+    run: &Run,
+    curves: Option<&Curves>,
+    progress: &mut dyn Progress,
+) -> Result<Shares, CompileError> {
     progress.tell(Event::Enter(Stage::Allocate, 0));
-    let shares = shares(run, curves);
+    let shares = shares(run, curves)?;
     progress.tell(Event::Leave(Stage::Allocate));
-    shares
+    Ok(shares)
 }
 
 /// A survey lets every tile choose on all its sides and so predicts a little better than tiles will do.
@@ -81,35 +113,52 @@ struct Goal {
 
 impl Goal {
     /// Where selection alone is predicted to reach the RMS residual asked for, if the job asks for one.
-    fn new(run: &Run, curves: &[GainCurve]) -> Option<Self> {
+    fn new(run: &Run, curves: &Curves) -> Result<Option<Self>, CompileError> {
+        let Some(rms_m) = run.job.tin.target_rms_m else { return Ok(None) };
         let posts: Vec<f64> =
             run.area.tiles.iter().map(|&tile| run.area.tiling.rect(tile).post_count() as f64).collect();
-        let rms = run.job.tin.target_rms_m? * f64::from(terrain::QUANTA_PER_METRE) * RMS_MARGIN;
-        let floor = tiling::floor_for_rms(curves, rms * rms * posts.iter().sum::<f64>())?;
-        let rms_quanta = curves.iter().zip(&posts).map(|(curve, posts)| (curve.squares_at(floor) / posts).sqrt());
-        Some(Self { floor, rms_quanta: rms_quanta.collect() })
+        let rms = rms_m * f64::from(terrain::QUANTA_PER_METRE) * RMS_MARGIN;
+        let Some(floor) = curves.squares()?.floor_for(rms * rms * posts.iter().sum::<f64>()) else { return Ok(None) };
+        let of_tile = |(&tile, posts): (&TileId, &f64)| Ok((curves.read(tile)?.squares_at(floor) / posts).sqrt());
+        let rms_quanta = run.area.tiles.iter().zip(&posts).map(of_tile).collect::<Result<_, CompileError>>()?;
+        Ok(Some(Self { floor, rms_quanta }))
     }
 }
 
-fn shares(run: &Run, curves: Option<&[GainCurve]>) -> Shares {
+fn shares(run: &Run, curves: Option<&Curves>) -> Result<Shares, CompileError> {
     let area = &run.area;
     let by_rank = area.by_rank();
-    let goal = curves.and_then(|curves| Goal::new(run, curves));
+    let goal = curves.map(|curves| Goal::new(run, curves)).transpose()?.flatten();
     let floor = goal.as_ref().map(|goal| goal.floor);
     // What is optimised needs fewer points for the same residual: each tile is to come down to its part of it.
     let goal = goal.filter(|_| optimising(run.job).is_some());
-    let gains = |curves| Gains { curves, by_rank: &by_rank, floor };
     let points: Option<Vec<usize>> = match (run.job.tin.budget, curves) {
         (PointBudget::Points(points), None) => Some(points_equally(points, area.tiles.len())),
-        (PointBudget::Points(points), Some(curves)) => Some(points_globally(points, gains(curves))),
+        (PointBudget::Points(points), Some(curves)) => {
+            let mut bands = curves.bands();
+            let shared = points_globally(points, Gains { bands: &mut bands, by_rank: &by_rank, floor });
+            Some(bands.vouch(shared)?)
+        }
         (PointBudget::Limits, _) => None,
     };
-    let triangles = (run.job.modules.edges == Edges::Constrained).then(|| match (curves, &points) {
-        (Some(curves), None) => allocate_globally(&area.budget, &area.tiling, gains(curves)),
-        _ => allocate_equally(&area.budget, &area.tiling),
-    });
-    let tiles = (0..area.tiles.len()).map(|index| {
-        let mut allowance = triangles.as_ref().map(|allocation| allocation.shares[index].allowance.clone());
+    let triangles = match (run.job.modules.edges, curves, &points) {
+        (Edges::Clip(_), ..) => None,
+        (Edges::Constrained, Some(curves), None) => {
+            let mut bands = curves.bands();
+            let gains = Gains { bands: &mut bands, by_rank: &by_rank, floor };
+            let allocation = allocate_globally(&area.budget, &area.tiling, gains);
+            Some(bands.vouch(allocation)?)
+        }
+        (Edges::Constrained, ..) => Some(allocate_equally(&area.budget, &area.tiling)),
+    };
+    let (allowances, threshold_bin, slack, granted) = match triangles {
+        None => (vec![None; area.tiles.len()], None, 0, Vec::new()),
+        Some(of) => {
+            let allowances = of.shares.into_iter().map(|share| Some(share.allowance)).collect();
+            (allowances, of.threshold_bin, of.slack, of.granted)
+        }
+    };
+    let tiles = allowances.into_iter().enumerate().map(|(index, mut allowance)| {
         if let (Some(points), Some(allowance)) = (&points, &mut allowance) {
             // Every point costs the same; `plan` has made sure that all of them fit.
             allowance.triangles = points[index] as u32 * limits::POINT_COST;
@@ -120,5 +169,5 @@ fn shares(run: &Run, curves: Option<&[GainCurve]>) -> Shares {
             rms_quanta: goal.as_ref().map(|goal| goal.rms_quanta[index]),
         }
     });
-    Shares { tiles: tiles.collect(), triangles }
+    Ok(Shares { tiles: tiles.collect(), threshold_bin, slack, granted })
 }

@@ -1,11 +1,14 @@
 //! From a job's words to one tile's task.
 
+use std::ops::Deref;
+
 use job::{Allocation, Borders, Budget as PointBudget, Edges, Effort, ErrorKey, Job, LastBatch, Method};
 use limits::Allowance;
 use terrain::{LatticePoint, ModuleId, ModuleRect, Post, SeamSides, Side, TileId, TileTin, Vertex};
 use tiling::{Tiling, outer_border_posts, outer_sides};
 use tin::{CostUnit, Frame, Proximity, Rule, Stop, SurveyTask, TileTask};
 
+use crate::CompileError;
 use crate::area::GamingArea;
 use crate::refinement::{Most, Refinement, optimising};
 
@@ -193,14 +196,23 @@ pub(crate) fn side_vertices(tin: &TileTin, side: Side) -> Vec<Vertex> {
 }
 
 /// What a tile inherits: the border points of its lower-ranked neighbours on the sides they share.
-pub(crate) fn inherited<'a>(tiling: &Tiling, tile: TileId, published: impl Fn(TileId) -> &'a TileTin) -> Vec<Vertex> {
-    let inherits = Side::ALL.into_iter().filter(|&side| tiling.inherits(tile, side));
-    let beyond = inherits.filter_map(|side| Some((tiling.beyond(tile, side)?, side)));
-    let mut all: Vec<Vertex> =
-        beyond.flat_map(|(other, side)| side_vertices(published(other), side.opposite())).collect();
+///
+/// # Errors
+/// The first of `published`.
+pub(crate) fn inherited<T: Deref<Target = TileTin>>(
+    tiling: &Tiling,
+    tile: TileId,
+    published: impl Fn(TileId) -> Result<T, CompileError>,
+) -> Result<Vec<Vertex>, CompileError> {
+    let mut all = Vec::new();
+    for side in Side::ALL.into_iter().filter(|&side| tiling.inherits(tile, side)) {
+        if let Some(other) = tiling.beyond(tile, side) {
+            all.extend(side_vertices(&*published(other)?, side.opposite()));
+        }
+    }
     all.sort_unstable();
     all.dedup();
-    all
+    Ok(all)
 }
 
 /// The posts that vertices stand on.

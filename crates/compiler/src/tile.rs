@@ -2,21 +2,22 @@
 
 use std::collections::BTreeSet;
 use std::path::Path;
-use std::sync::Arc;
 
-use database::{Database, DatabaseError, Folder, Manifest, Report, TileRecord};
+use database::{Database, DatabaseError, Folder, MadeFrom, Manifest, Report, Stamp, TileRecord};
 use job::{Edges, Job};
 use terrain::{Post, SeamSides, Side, TileId, TileTin, Vertex};
 
 use crate::assemble::{Assembled, assemble, assemble_tile, read_assembled};
 use crate::build::open;
 use crate::cause::{Cause, made_from};
+use crate::curves::Curves;
 use crate::enforce::enforce;
 use crate::publish::{beginning, publish};
-use crate::refine::{Published, feed_seeds, tile_stamp};
+use crate::refine::{Published, feed_seeds, keep, tile_stamp};
 use crate::refinement::Refinement;
 use crate::report::Findings;
 use crate::run::{Options, Run, Worked};
+use crate::sums::{Adding, Sums};
 use crate::survey::{Shares, allocate};
 use crate::tasks::{inherited, is_surveyed, posts_of, side_vertices, tile_refinement};
 use crate::{CompileError, Event, Progress, Stage};
@@ -69,14 +70,14 @@ pub fn rebuild_tile(
         frozen.extend(is_frozen.then_some(tile));
     }
 
-    let mut assembled = match run.job.modules.edges {
+    let (mut assembled, mut sums) = match run.job.modules.edges {
         // Only what was refined again is published; the rest is read as it is.
         Edges::Constrained => reassemble(&run, &tins, &reached, progress)?,
         // The enforcer counts the whole area, from every point that was selected.
         Edges::Clip(_) => assemble(&run, &tins, progress)?,
     };
-    let enforced = enforce(&run, &tins, &mut assembled, progress)?;
-    let findings = Findings { run: &run, tins: &tins, assembled: &assembled, enforced: &enforced };
+    let enforced = enforce(&run, &tins, &mut assembled, &mut sums, progress)?;
+    let findings = Findings { run: &run, tins: &tins, assembled: &assembled, sums: &sums, enforced: &enforced };
     let mut report = publish(&findings, &shares, &frozen, progress)?;
     let stale = stale(&run, &shares, &tins, &reached)?;
     if 0 < stale {
@@ -94,22 +95,25 @@ fn reassemble(
     tins: &[Published],
     reached: &[(TileId, bool)],
     progress: &mut dyn Progress,
-) -> Result<Vec<Assembled>, CompileError> {
-    let none = vec![Vec::new(); tins.len()];
+) -> Result<(Vec<Assembled>, Sums), CompileError> {
+    let (none, adding) = (vec![Vec::new(); tins.len()], Adding::default());
     let done = run.for_each_tile(Stage::Assemble, progress, |tile| {
-        if reached.iter().any(|&(other, _)| other == tile) {
-            return Ok(Worked::Made(assemble_tile(run, &|index| &tins[index], &none, tile)?, None));
-        }
-        Ok(Worked::Kept(read_assembled(run, tins, tile)?))
+        let is_reached = reached.iter().any(|&(other, _)| other == tile);
+        let (assembled, sums) = match is_reached {
+            true => assemble_tile(run, &|index| tins[index].stamp, &none, tile)?,
+            false => read_assembled(run, tins, tile)?,
+        };
+        adding.add(sums);
+        Ok(if is_reached { Worked::Made(assembled, None) } else { Worked::Kept(assembled) })
     })?;
-    Ok(done.into_iter().map(Worked::into_inner).collect())
+    Ok((done.into_iter().map(Worked::into_inner).collect(), adding.finish()))
 }
 
 /// Tiles other than those of `reached` that a build would refine again: made from other ground than today's.
 fn stale(run: &Run, shares: &Shares, tins: &[Published], reached: &[(TileId, bool)]) -> Result<usize, CompileError> {
     let mut count = 0;
     for (index, &tile) in run.area.tiles.iter().enumerate() {
-        let seeds = seeds(run, tins, tile);
+        let seeds = seeds(run, tins, tile)?;
         let refinement = tile_refinement(run.job, &run.area, tile, &shares.tiles[index], posts_of(&seeds));
         let stamp = tile_stamp(run, &*run.window(tile)?, &refinement, &seeds);
         let is_reached = reached.iter().any(|&(other, _)| other == tile);
@@ -171,12 +175,10 @@ fn is_whole_but(run: &Run, manifest: &Manifest, tile: TileId) -> bool {
 /// The allocation the database was built with, from its published curves.
 fn published_shares(run: &Run, progress: &mut dyn Progress) -> Result<Shares, CompileError> {
     if !is_surveyed(run.job) {
-        return Ok(allocate(run, None, progress));
+        return allocate(run, None, progress);
     }
-    let folder = run.database.folder();
-    let curves = run.area.tiles.iter().map(|&tile| Ok(folder.read_curve(tile)?.1));
-    let curves: Vec<_> = curves.collect::<Result<_, CompileError>>()?;
-    Ok(allocate(run, Some(&curves), progress))
+    let curves = Curves::published(run, |tile| Ok(run.database.folder().read_curve(tile)?.1))?;
+    allocate(run, Some(&curves), progress)
 }
 
 fn published_tins(run: &Run) -> Result<Vec<Published>, CompileError> {
@@ -185,28 +187,42 @@ fn published_tins(run: &Run) -> Result<Vec<Published>, CompileError> {
         let (stamp, tin) = folder.read_tile(tile)?;
         let record = run.previous.as_ref().and_then(|manifest| manifest.tile(tile));
         let made_from = record.and_then(|record| record.made_from.clone());
-        Ok(Published { tin: Arc::new(tin), stamp, made_from, cause: None })
+        Ok(keep(run, tin, stamp, made_from, None))
     };
     run.area.tiles.iter().map(read).collect()
 }
 
 /// What a tile inherits from its lower-ranked neighbours as they are now.
-fn seeds(run: &Run, tins: &[Published], tile: TileId) -> Vec<Vertex> {
-    inherited(&run.area.tiling, tile, |other| &*tins[run.area.tiling.index(other)].tin)
+fn seeds(run: &Run, tins: &[Published], tile: TileId) -> Result<Vec<Vertex>, CompileError> {
+    inherited(&run.area.tiling, tile, |other| run.tin(other, &tins[run.area.tiling.index(other)].stamp))
+}
+
+/// A tile's TIN that is not published yet, and what it was made from.
+struct Refined {
+    tin: TileTin,
+    stamp: Stamp,
+    made_from: MadeFrom,
+}
+
+impl Refined {
+    fn publish(self, run: &Run) -> Result<Published, CompileError> {
+        run.database.write_tile(&self.stamp, &self.tin)?;
+        Ok(keep(run, self.tin, self.stamp, Some(self.made_from), Some(Cause::Other)))
+    }
 }
 
 /// The tile's task as a full build would give it.
-fn refine_whole(run: &Run, shares: &Shares, tins: &[Published], tile: TileId) -> Result<Published, CompileError> {
-    let seeds = seeds(run, tins, tile);
+fn refine_whole(run: &Run, shares: &Shares, tins: &[Published], tile: TileId) -> Result<Refined, CompileError> {
+    let seeds = seeds(run, tins, tile)?;
     let budget = &shares.tiles[run.area.tiling.index(tile)];
     refine_tile(run, &tile_refinement(run.job, &run.area, tile, budget, posts_of(&seeds)), &seeds)
 }
 
-fn refine_tile(run: &Run, refinement: &Refinement, seeds: &[Vertex]) -> Result<Published, CompileError> {
+fn refine_tile(run: &Run, refinement: &Refinement, seeds: &[Vertex]) -> Result<Refined, CompileError> {
     let window = run.window(refinement.task.tile)?;
     let stamp = tile_stamp(run, &window, refinement, seeds);
-    let made_from = Some(made_from(&window, refinement, |builder| feed_seeds(builder, seeds)));
-    Ok(Published { tin: Arc::new(refinement.run(&window, seeds)), stamp, made_from, cause: Some(Cause::Other) })
+    let made_from = made_from(&window, refinement, |builder| feed_seeds(builder, seeds));
+    Ok(Refined { tin: refinement.run(&window, seeds), stamp, made_from })
 }
 
 /// Runs `tile`, with its sides frozen if its border would change. Gives it, and whether it is frozen.
@@ -220,21 +236,20 @@ fn rerun(
     progress.tell(Event::Started(Stage::Refine, tile));
     let index = run.area.tiling.index(tile);
     let whole = refine_whole(run, shares, tins, tile)?;
-    let is_frozen = outgoing(run, &whole.tin) != outgoing(run, &tins[index].tin);
+    let is_frozen = outgoing(run, &whole.tin) != outgoing(run, &*run.tin(tile, &tins[index].stamp)?);
     let done = if is_frozen { refine_frozen(run, shares, tins, tile)? } else { whole };
-    run.database.write_tile(&done.stamp, &done.tin)?;
-    tins[index] = done;
+    tins[index] = done.publish(run)?;
     progress.tell(Event::Done(Stage::Refine, tile));
     Ok(vec![(tile, is_frozen)])
 }
 
 /// The tile's task with every shared side held as it is published.
-fn refine_frozen(run: &Run, shares: &Shares, tins: &[Published], tile: TileId) -> Result<Published, CompileError> {
+fn refine_frozen(run: &Run, shares: &Shares, tins: &[Published], tile: TileId) -> Result<Refined, CompileError> {
     let index = run.area.tiling.index(tile);
-    let mut seeds = seeds(run, tins, tile);
+    let mut seeds = seeds(run, tins, tile)?;
     let mut refinement = tile_refinement(run.job, &run.area, tile, &shares.tiles[index], posts_of(&seeds));
     let task = &mut refinement.task;
-    let own = outgoing(run, &tins[index].tin);
+    let own = outgoing(run, &*run.tin(tile, &tins[index].stamp)?);
     task.kept = posts_of(&own);
     task.kept.retain(|post| !task.inherited.contains(post));
     task.seams = SeamSides::CLOSED;
@@ -264,16 +279,16 @@ fn cascade(
         progress.tell(Event::Started(Stage::Refine, tile));
         let index = tiling.index(tile);
         let done = refine_whole(run, shares, tins, tile)?;
+        let before = run.tin(tile, &tins[index].stamp)?;
         for side in Side::ALL {
             let Some(other) = tiling.beyond(tile, side).filter(|&other| tiling.rank(tile) < tiling.rank(other)) else {
                 continue;
             };
-            if side_vertices(&done.tin, side) != side_vertices(&tins[index].tin, side) {
+            if side_vertices(&done.tin, side) != side_vertices(&before, side) {
                 waiting.insert((tiling.rank(other), other));
             }
         }
-        run.database.write_tile(&done.stamp, &done.tin)?;
-        tins[index] = done;
+        tins[index] = done.publish(run)?;
         reached.push((tile, false));
         progress.tell(Event::Done(Stage::Refine, tile));
     }

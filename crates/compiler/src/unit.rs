@@ -11,14 +11,15 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
-use database::{Database, Held, Lock, Manifest, ManifestState, Share, ShareAllowance, Work};
+use database::{Database, Held, Lock, Manifest, ManifestState, Share, ShareAllowance, Stamp, Work};
 use job::{Edges, Job};
 use limits::Allowance;
 use schedule::Workers;
-use terrain::{LatticePoint, ModuleRect, TileId};
+use terrain::{LatticePoint, ModuleRect, TileId, TileTin};
 
 use crate::assemble::assemble_tile;
 use crate::build::{Built, finish, might_be_fresh, open_with};
+use crate::curves::Curves;
 use crate::publish::beginning;
 use crate::refine::{Published, refine_tile};
 use crate::run::{ALGORITHM_REVISION, Options, Run};
@@ -192,18 +193,15 @@ impl<'a> Session<'a> {
 
     fn allocate(&self) -> Result<database::Fingerprint, CompileError> {
         let run = &self.run;
-        let curve = |&tile: &TileId| {
+        let curve = |tile: TileId| {
             let unit = Unit::Survey(tile);
             match run.database.folder().read_curve(tile) {
                 Ok((stamp, curve)) if Some(stamp.fingerprint) == self.work.marked(&unit.name()) => Ok(curve),
                 _ => Err(self.spoilt(Unit::Allocate, unit)),
             }
         };
-        let curves: Option<Vec<_>> = match is_surveyed(run.job) {
-            true => Some(run.area.tiles.iter().map(curve).collect::<Result<_, _>>()?),
-            false => None,
-        };
-        let shares = allocate(run, curves.as_deref(), &mut Nobody);
+        let curves = is_surveyed(run.job).then(|| Curves::published(run, curve)).transpose()?;
+        let shares = allocate(run, curves.as_ref(), &mut Nobody)?;
         for (&tile, budget) in run.area.tiles.iter().zip(&shares.tiles) {
             self.work.write_share(tile, &to_share(budget))?;
         }
@@ -213,14 +211,7 @@ impl<'a> Session<'a> {
     fn refine(&self, tile: TileId) -> Result<Published, CompileError> {
         let unit = Unit::Refine(tile);
         let share = self.work.read_share(tile).map_err(|_| self.spoilt(unit, Unit::Allocate))?;
-        let tiling = &self.run.area.tiling;
-        let mut lower = BTreeMap::new();
-        for side in terrain::Side::ALL.into_iter().filter(|&side| tiling.inherits(tile, side)) {
-            if let Some(other) = tiling.beyond(tile, side) {
-                lower.insert(other, self.published(unit, other)?);
-            }
-        }
-        let seeds = inherited(tiling, tile, |other| &*lower[&other].tin);
+        let seeds = inherited(&self.run.area.tiling, tile, |other| Ok(self.published(unit, other)?.1))?;
         refine_tile(&self.run, &from_share(&share), &seeds, tile)
     }
 
@@ -228,18 +219,20 @@ impl<'a> Session<'a> {
         let area = &self.run.area;
         let mut near = BTreeMap::new();
         for other in self.around(tile) {
-            near.insert(area.tiling.index(other), self.published(Unit::Assemble(tile), other)?);
+            let (stamp, tin) = self.published(Unit::Assemble(tile), other)?;
+            self.run.tins.keep(stamp, tin);
+            near.insert(area.tiling.index(other), stamp);
         }
         let none: Vec<Vec<LatticePoint>> = vec![Vec::new(); area.tiles.len()];
-        let assembled = assemble_tile(&self.run, &|index| &near[&index], &none, tile)?;
+        let (assembled, _) = assemble_tile(&self.run, &|index| near[&index], &none, tile)?;
         Ok(assembled.file.blake3)
     }
 
-    /// The TIN of a tile that is marked as done.
-    fn published(&self, unit: Unit, tile: TileId) -> Result<Published, CompileError> {
+    /// The TIN of a tile that is marked as done, as it lies on the disk.
+    fn published(&self, unit: Unit, tile: TileId) -> Result<(Stamp, Arc<TileTin>), CompileError> {
         match self.run.database.folder().read_tile(tile) {
             Ok((stamp, tin)) if Some(stamp.fingerprint) == self.work.marked(&Unit::Refine(tile).name()) => {
-                Ok(Published { tin: Arc::new(tin), stamp, made_from: None, cause: None })
+                Ok((stamp, Arc::new(tin)))
             }
             _ => Err(self.spoilt(unit, Unit::Refine(tile))),
         }

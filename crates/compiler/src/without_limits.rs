@@ -7,12 +7,11 @@
 use std::collections::BTreeMap;
 
 use load_modules::{Layout, concatenate};
-use terrain::{
-    LATTICE_PER_POST, ModuleGrid, ModuleId, ModuleRect, ModuleResidual, PostRect, Refusal, SeamSides, Tin, Vertex,
-};
+use terrain::{LATTICE_PER_POST, ModuleGrid, ModuleId, ModuleRect, ModuleResidual, PostRect, SeamSides, Tin, Vertex};
 use tin::{Frame, Stop, TileTask};
 
 use crate::CompileError;
+use crate::bound::RefusedPosts;
 use crate::ground::Window;
 use crate::refine::Published;
 use crate::refinement::{Most, Refinement, optimising};
@@ -23,14 +22,14 @@ use crate::tasks::{posts_of, rule};
 pub(crate) fn without_limits(
     run: &Run,
     own: &Published,
-    refused: &BTreeMap<ModuleId, Vec<Refusal>>,
+    refused: &BTreeMap<ModuleId, RefusedPosts>,
 ) -> Result<Vec<(ModuleId, ModuleResidual)>, CompileError> {
-    let tile = run.area.tiling.modules(own.tin.tile, run.area.grid);
-    let window = run.window(own.tin.tile)?;
-    let parts = parts(&own.tin.tin, run.area.grid, tile);
+    let tile = run.area.tiling.modules(own.tile, run.area.grid);
+    let window = run.window(own.tile)?;
+    let parts = parts(&run.tin(own.tile, &own.stamp)?.tin, run.area.grid, tile);
     let here = tile.iter().zip(&parts).filter_map(|(module, part)| Some((module, part, refused.get(&module)?)));
     Ok(here
-        .map(|(module, part, refusals)| (module, without_limit(run, &window, module, part, refusals.len())))
+        .map(|(module, part, posts)| (module, without_limit(run, &window, module, part, posts.count() as usize)))
         .collect())
 }
 

@@ -22,17 +22,22 @@ const END: &str = "\n}\n";
 /// # Errors
 /// When `value` has a map whose keys are no texts, or is no object.
 pub(crate) fn encode(path: &Path, value: &impl Serialize) -> Result<String, DatabaseError> {
-    let text = serde_json::to_string_pretty(value).map_err(|error| malformed(path, error.to_string()))?;
-    match text.strip_suffix("\n}") {
-        Some(open) => Ok(seal(open)),
-        None => Err(malformed(path, "found a value without keys, expected an object")),
-    }
+    let mut text = serde_json::to_string_pretty(value).map_err(|error| malformed(path, error.to_string()))?;
+    let Some(open) = text.strip_suffix("\n}") else {
+        return Err(malformed(path, "found a value without keys, expected an object"));
+    };
+    // Sealed in place: the report of a large area is a hundred megabytes.
+    let (length, tail) = (open.len(), tail(open));
+    text.truncate(length);
+    text.push_str(&tail);
+    Ok(text)
 }
 
-/// `open` is the text up to its closing brace.
-fn seal(open: &str) -> String {
-    let checksum = Fingerprint::of_bytes(format!("{open}{END}").as_bytes());
-    format!("{open}{BEFORE}{checksum}{AFTER}")
+/// What follows a text that is open, which is the text up to its closing brace.
+fn tail(open: &str) -> String {
+    let mut hasher = blake3::Hasher::new();
+    hasher.update(open.as_bytes()).update(END.as_bytes());
+    format!("{BEFORE}{}{AFTER}", Fingerprint(*hasher.finalize().as_bytes()))
 }
 
 /// The value whose text, in the file at `path`, these bytes are.
@@ -42,11 +47,11 @@ fn seal(open: &str) -> String {
 pub(crate) fn decode<T: DeserializeOwned>(path: &Path, bytes: &[u8]) -> Result<T, DatabaseError> {
     let text = std::str::from_utf8(bytes).map_err(|error| malformed(path, error.to_string()))?;
     let at = text.rfind(BEFORE).ok_or_else(|| malformed(path, "no checksum at the end"))?;
-    let (open, tail) = text.split_at(at);
-    let sealed = seal(open);
-    if sealed != text {
-        let stored = tail[BEFORE.len()..].trim_end_matches(AFTER);
-        let computed = sealed[at + BEFORE.len()..].trim_end_matches(AFTER);
+    let (open, stored) = text.split_at(at);
+    let computed = tail(open);
+    if computed != stored {
+        let stored = stored[BEFORE.len()..].trim_end_matches(AFTER);
+        let computed = computed[BEFORE.len()..].trim_end_matches(AFTER);
         let (found, expected) = (computed.to_string(), stored.to_string());
         return Err(DatabaseError::WrongChecksum { path: path.to_path_buf(), section: "text", found, expected });
     }

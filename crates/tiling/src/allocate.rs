@@ -34,11 +34,14 @@ pub struct Share {
     pub expected: u32,
 }
 
-/// What the surveys say.
-#[derive(Clone, Copy, Debug)]
+/// What the surveys say, the best first.
+///
+/// The curves of a large area do not fit into memory together, so they come in bands: each holds one curve per tile,
+/// row-major, with all its runs on some steps of the ladder, which are higher than those of the next band. A band is
+/// asked for when all before it have been taken.
 pub struct Gains<'a> {
-    /// One curve per tile, row-major; costs in triangles.
-    pub curves: &'a [GainCurve],
+    /// The bands; costs in triangles, or in points where points are shared out.
+    pub bands: &'a mut dyn Iterator<Item = Vec<GainCurve>>,
     /// Tiles from the lowest rank, by row-major place.
     pub by_rank: &'a [usize],
     /// Gains below this step of the ladder are not wanted: the RMS residual asked for is reached without them.
@@ -67,7 +70,7 @@ pub fn allocate_equally(budget: &Budget, tiling: &Tiling) -> Allocation {
 pub fn allocate_globally(budget: &Budget, tiling: &Tiling, gains: Gains) -> Allocation {
     let mut state = State::new(budget, tiling);
     let taken = state.take(gains, budget.area - budget.start_total());
-    let expected = state.expected.clone();
+    let expected = std::mem::take(&mut state.expected);
     let mut totals: Vec<u32> = expected.iter().map(|used| used.iter().sum()).collect();
     if taken.threshold.is_none() {
         // The survey saw no use for the rest; it may be spent anywhere.
@@ -165,24 +168,26 @@ impl<'a> State<'a> {
 
     /// Takes gains from the highest rung down while whole rungs fit into `room`.
     fn take(&mut self, gains: Gains, room: u64) -> Taken {
-        let (mut left, mut next) = (room, vec![0usize; gains.curves.len()]);
-        let mut threshold = None;
-        while let Some(rung) = highest_rung(gains.curves, &next) {
-            if gains.floor.is_some_and(|floor| rung < floor) {
-                return Taken { threshold: gains.floor, left };
-            }
-            let sum = rung_sum(gains.curves, &next, rung);
-            if left < sum && left <= room / SLACK_SHARE {
-                return Taken { threshold: threshold.or(Some(rung)), left };
-            }
-            for &tile in gains.by_rank {
-                let runs = &gains.curves[tile].runs;
-                while let Some(run) = runs.get(next[tile]).filter(|run| run.bin == rung) {
-                    next[tile] += 1;
-                    left -= self.accept_while_permitted(tile, run.module, run.cost, left);
+        let (mut left, mut threshold) = (room, None);
+        for curves in gains.bands {
+            let mut next = vec![0usize; curves.len()];
+            while let Some(rung) = highest_rung(&curves, &next) {
+                if gains.floor.is_some_and(|floor| rung < floor) {
+                    return Taken { threshold: gains.floor, left };
                 }
+                let sum = rung_sum(&curves, &next, rung);
+                if left < sum && left <= room / SLACK_SHARE {
+                    return Taken { threshold: threshold.or(Some(rung)), left };
+                }
+                for &tile in gains.by_rank {
+                    let runs = &curves[tile].runs;
+                    while let Some(run) = runs.get(next[tile]).filter(|run| run.bin == rung) {
+                        next[tile] += 1;
+                        left -= self.accept_while_permitted(tile, run.module, run.cost, left);
+                    }
+                }
+                threshold = Some(rung);
             }
-            threshold = Some(rung);
         }
         Taken { threshold: None, left }
     }
@@ -240,22 +245,23 @@ impl<'a> State<'a> {
     }
 
     fn into_allocation(
-        self,
+        mut self,
         totals: Vec<u32>,
         threshold_bin: Option<i32>,
         granted: &[u32],
         expected: Option<&[Vec<u32>]>,
         slack: u64,
     ) -> Allocation {
+        // What was booked is in `expected`; sharing windows out takes as much memory again.
+        (self.counts, self.windows) = (Vec::new(), Vec::new());
         let quotas = self.window_quotas(expected);
-        let shares = (0..self.tiles.len()).map(|tile| {
-            let reach = &self.tiles[tile];
+        let shares = self.tiles.iter().zip(quotas).enumerate().map(|(tile, (reach, window_room))| {
             let allowance = Allowance {
                 modules: reach.ring,
                 module_room: reach.ring.iter().map(|module| self.module_room(reach, module, granted)).collect(),
                 windows: reach.windows,
                 window_size: (self.budget.windows.rows, self.budget.windows.cols),
-                window_room: quotas[tile].clone(),
+                window_room,
                 triangles: totals[tile],
             };
             let expected = expected.map_or(totals[tile], |expected| expected[tile].iter().sum());
@@ -284,22 +290,20 @@ impl<'a> State<'a> {
     fn window_quotas(&self, expected: Option<&[Vec<u32>]>) -> Vec<Vec<u32>> {
         let windows = &self.budget.windows;
         let start = windows.sums(self.budget.grid, &self.start);
-        let needs: Vec<Vec<u32>> = match expected {
+        let mut quotas: Vec<Vec<u32>> = match expected {
             Some(expected) => (0..self.tiles.len()).map(|tile| self.window_needs(tile, &expected[tile])).collect(),
             None => self.tiles.iter().map(|tile| vec![0; tile.windows.count()]).collect(),
         };
-        let mut needed = vec![0u64; start.len()];
-        let mut weights = vec![0u64; start.len()];
+        let mut needed = vec![0u32; start.len()];
+        let mut weights = vec![0u32; start.len()];
         self.for_each_reach(|tile, local, window, origin| {
-            needed[window] += u64::from(needs[tile][local]);
-            weights[window] += self.weight(tile, origin);
+            needed[window] += quotas[tile][local];
+            weights[window] += self.weight(tile, origin) as u32;
         });
-        let mut quotas: Vec<Vec<u32>> = self.tiles.iter().map(|tile| vec![0; tile.windows.count()]).collect();
         self.for_each_reach(|tile, local, window, origin| {
-            let room = u64::from(self.budget.per_window - start[window]);
-            let rest = room - needed[window];
-            let part = (rest * self.weight(tile, origin)).checked_div(weights[window]).unwrap_or(0);
-            quotas[tile][local] = needs[tile][local] + part as u32;
+            let rest = u64::from(self.budget.per_window - start[window] - needed[window]);
+            let part = (rest * self.weight(tile, origin)).checked_div(u64::from(weights[window])).unwrap_or(0);
+            quotas[tile][local] += part as u32;
         });
         quotas
     }

@@ -12,4 +12,4 @@ pub use budget::{Budget, BudgetFault};
 mod allocate;
 pub use allocate::{Allocation, Gains, Share, allocate_equally, allocate_globally};
 mod points;
-pub use points::{floor_for_rms, points_equally, points_globally};
+pub use points::{SquaresOfArea, points_equally, points_globally};

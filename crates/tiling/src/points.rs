@@ -1,5 +1,7 @@
 //! How many points each tile may select, when a job counts points.
 
+use std::collections::BTreeSet;
+
 use terrain::GainCurve;
 
 use crate::Gains;
@@ -14,41 +16,60 @@ pub fn points_equally(points: u64, tiles: usize) -> Vec<usize> {
 /// whole area would have given it. Curves stand in the order of their tiles and cost one per point; the
 /// last rung is filled in rank order. Nothing below the floor is shared out.
 pub fn points_globally(points: u64, gains: Gains) -> Vec<usize> {
-    let Gains { curves, by_rank, floor } = gains;
-    let mut shares = vec![0usize; curves.len()];
-    let mut next = vec![0usize; curves.len()];
+    let Gains { bands, by_rank, floor } = gains;
+    let mut shares = vec![0usize; by_rank.len()];
     let mut left = points;
-    while 0 < left {
-        let Some(rung) = highest_rung(curves, &next) else { break };
-        if floor.is_some_and(|floor| rung < floor) {
-            return shares;
-        }
-        for &tile in by_rank {
-            let runs = &curves[tile].runs;
-            while let Some(run) = runs.get(next[tile]).filter(|run| run.bin == rung) {
-                let taken = u64::from(run.cost).min(left);
-                shares[tile] += taken as usize;
-                left -= taken;
-                next[tile] += 1;
+    for curves in bands {
+        let mut next = vec![0usize; curves.len()];
+        while let Some(rung) = highest_rung(&curves, &next) {
+            if left == 0 || floor.is_some_and(|floor| rung < floor) {
+                return shares;
+            }
+            for &tile in by_rank {
+                let runs = &curves[tile].runs;
+                while let Some(run) = runs.get(next[tile]).filter(|run| run.bin == rung) {
+                    let taken = u64::from(run.cost).min(left);
+                    shares[tile] += taken as usize;
+                    left -= taken;
+                    next[tile] += 1;
+                }
             }
         }
     }
     // What no survey saw a use for may be spent anywhere.
-    for (share, extra) in shares.iter_mut().zip(points_equally(left, curves.len())) {
+    for (share, extra) in shares.iter_mut().zip(points_equally(left, by_rank.len())) {
         *share += extra;
     }
     shares
 }
 
-/// The highest step of the ladder down to which all gains must be taken for the sums of squares of all tiles to come
-/// down to `goal`; `None` where the surveys never get there.
-pub fn floor_for_rms(curves: &[GainCurve], goal: f64) -> Option<i32> {
-    let mut steps: Vec<i32> = curves.iter().flat_map(|curve| curve.squares.iter().map(|&(step, _)| step)).collect();
-    steps.sort_unstable_by(|a, b| b.cmp(a));
-    steps.dedup();
-    let sum_at = |step: i32| curves.iter().map(|curve| curve.squares_at(step)).sum::<f64>();
-    // Sums fall from step to step, but for rounding in the choice of posts; the first that is low enough will do.
-    steps.into_iter().find(|&step| sum_at(step) <= goal)
+/// Sums of squared residuals of a whole area at steps of the ladder, put together tile by tile.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SquaresOfArea {
+    /// Steps and the sums there, the highest step first.
+    sums: Vec<(i32, f64)>,
+}
+
+impl SquaresOfArea {
+    /// Nothing yet, at the steps that any curve of the area has.
+    pub fn at(steps: &BTreeSet<i32>) -> Self {
+        Self { sums: steps.iter().rev().map(|&step| (step, 0.0)).collect() }
+    }
+
+    /// Adds those of one tile. Tiles come in one order, row-major, so that sums are the same each time.
+    ///
+    /// # Panics
+    /// When no squares were recorded.
+    pub fn add(&mut self, curve: &GainCurve) {
+        self.sums.iter_mut().for_each(|(step, sum)| *sum += curve.squares_at(*step));
+    }
+
+    /// The highest step down to which all gains must be taken for the sum to come down to `goal`; `None` where the
+    /// surveys never get there.
+    pub fn floor_for(&self, goal: f64) -> Option<i32> {
+        // Sums fall from step to step, but for rounding in the choice of posts; the first that is low enough will do.
+        self.sums.iter().find(|&&(_, sum)| sum <= goal).map(|&(step, _)| step)
+    }
 }
 
 /// The highest rung among the next runs of all curves.
@@ -58,6 +79,8 @@ pub(crate) fn highest_rung(curves: &[GainCurve], next: &[usize]) -> Option<i32> 
 
 #[cfg(test)]
 mod tests {
+    use std::iter::once;
+
     use super::*;
     use terrain::{GainRun, ModuleId, TileId};
 
@@ -67,7 +90,14 @@ mod tests {
     }
 
     fn shared(points: u64, curves: &[GainCurve], by_rank: &[usize], floor: Option<i32>) -> Vec<usize> {
-        points_globally(points, Gains { curves, by_rank, floor })
+        let whole = points_globally(points, Gains { bands: &mut once(curves.to_vec()), by_rank, floor });
+        let part = |keep: fn(i32) -> bool| -> Vec<GainCurve> {
+            let of = |curve: &GainCurve| curve.runs.iter().copied().filter(|run| keep(run.bin)).collect();
+            curves.iter().map(|curve| GainCurve { runs: of(curve), ..curve.clone() }).collect()
+        };
+        let mut bands = [part(|bin| 5 < bin), part(|bin| bin == 5), part(|bin| bin < 5)].into_iter();
+        assert_eq!(points_globally(points, Gains { bands: &mut bands, by_rank, floor }), whole, "in bands");
+        whole
     }
 
     #[test]
@@ -83,10 +113,13 @@ mod tests {
             with(0, vec![(i32::MAX, 900.0), (9, 400.0), (2, 100.0)]),
             with(1, vec![(i32::MAX, 500.0), (8, 100.0), (5, 60.0)]),
         ];
-        assert_eq!(floor_for_rms(&curves, 500.0), Some(8));
-        assert_eq!(floor_for_rms(&curves, 460.0), Some(5));
-        assert_eq!(floor_for_rms(&curves, 10.0), None);
-        assert_eq!(floor_for_rms(&curves, 2000.0), Some(i32::MAX));
+        let steps = curves.iter().flat_map(|curve| curve.squares.iter().map(|&(step, _)| step)).collect();
+        let mut squares = SquaresOfArea::at(&steps);
+        curves.iter().for_each(|curve| squares.add(curve));
+        assert_eq!(squares.floor_for(500.0), Some(8));
+        assert_eq!(squares.floor_for(460.0), Some(5));
+        assert_eq!(squares.floor_for(10.0), None);
+        assert_eq!(squares.floor_for(2000.0), Some(i32::MAX));
     }
 
     #[test]

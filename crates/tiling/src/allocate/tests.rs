@@ -1,5 +1,7 @@
 //! Shares must respect every limit whatever the tiles do with them.
 
+use std::iter::once;
+
 use super::*;
 use crate::Order;
 use limits::Windows;
@@ -71,6 +73,28 @@ fn check(budget: &Budget, tiling: &Tiling, allocation: &Allocation) {
     assert!(granted <= budget.pool);
 }
 
+fn gains<'a>(by_rank: &'a [usize], bands: &'a mut dyn Iterator<Item = Vec<GainCurve>>) -> Gains<'a> {
+    Gains { bands, by_rank, floor: None }
+}
+
+#[test]
+fn gains_in_bands_are_shared_out_like_gains_at_once() {
+    let tiling = tiling(Order::Color);
+    let (by_rank, curves) = (ranks(&tiling), curves(&tiling));
+    let mut steps: Vec<i32> = curves.iter().flat_map(|curve| curve.runs.iter().map(|run| run.bin)).collect();
+    steps.sort_unstable_by(|a, b| b.cmp(a));
+    steps.dedup();
+    for (per_module, pool, mean, width) in [(100, 0, 32, 1), (40, 30, 32, 7), (40, 30, 90, 1000), (100, 0, 12, 3)] {
+        let budget = budget(per_module, pool, mean * GRID.count() as u64, 4096);
+        let whole = allocate_globally(&budget, &tiling, gains(&by_rank, &mut once(curves.clone())));
+        let mut bands = steps.chunks(width).map(|steps| {
+            let of = |curve: &GainCurve| curve.runs.iter().copied().filter(|run| steps.contains(&run.bin)).collect();
+            curves.iter().map(|curve| GainCurve { runs: of(curve), ..curve.clone() }).collect()
+        });
+        assert_eq!(allocate_globally(&budget, &tiling, gains(&by_rank, &mut bands)), whole, "{width} steps a band");
+    }
+}
+
 #[test]
 fn shares_respect_every_limit() {
     for order in [Order::Color, Order::Raster] {
@@ -82,7 +106,7 @@ fn shares_respect_every_limit() {
             let budget = budget(per_module, pool, 32 * GRID.count() as u64, per_window);
             assert_eq!(budget.check(), Ok(()));
             check(&budget, &tiling, &allocate_equally(&budget, &tiling));
-            let gains = Gains { curves: &curves, by_rank: &by_rank, floor: None };
+            let gains = Gains { bands: &mut once(curves.clone()), by_rank: &by_rank, floor: None };
             check(&budget, &tiling, &allocate_globally(&budget, &tiling, gains));
         }
     }
@@ -93,7 +117,7 @@ fn rough_ground_is_given_more_than_flat_ground() {
     let tiling = tiling(Order::Color);
     let (by_rank, curves) = (ranks(&tiling), curves(&tiling));
     let budget = budget(100, 0, 32 * GRID.count() as u64, 4096);
-    let allocation = allocate_globally(&budget, &tiling, Gains { curves: &curves, by_rank: &by_rank, floor: None });
+    let allocation = allocate_globally(&budget, &tiling, gains(&by_rank, &mut once(curves)));
     let triangles = |row, col| allocation.shares[tiling.index(TileId { row, col })].allowance.triangles;
     assert!(2 * triangles(2, 2) < triangles(0, 0), "{} {}", triangles(2, 2), triangles(0, 0));
     let total: u64 = allocation.shares.iter().map(|share| u64::from(share.allowance.triangles)).sum();
@@ -106,7 +130,7 @@ fn the_pool_goes_where_it_gains_most() {
     let tiling = tiling(Order::Color);
     let (by_rank, curves) = (ranks(&tiling), curves(&tiling));
     let budget = budget(40, 30, 32 * GRID.count() as u64, 4096);
-    let allocation = allocate_globally(&budget, &tiling, Gains { curves: &curves, by_rank: &by_rank, floor: None });
+    let allocation = allocate_globally(&budget, &tiling, gains(&by_rank, &mut once(curves)));
     let granted: u32 = allocation.granted.iter().map(|&(_, extra)| extra).sum();
     assert_eq!(granted, 30);
     // The steepest load modules lie in the south-west corner.
@@ -120,7 +144,7 @@ fn without_any_gain_the_budget_is_still_there_to_spend() {
         tiling.tiles().map(|tile| GainCurve { tile, runs: Vec::new(), squares: Vec::new() }).collect();
     let budget = budget(100, 0, 32 * GRID.count() as u64, 4096);
     let by_rank = ranks(&tiling);
-    let allocation = allocate_globally(&budget, &tiling, Gains { curves: &none, by_rank: &by_rank, floor: None });
+    let allocation = allocate_globally(&budget, &tiling, gains(&by_rank, &mut once(none)));
     check(&budget, &tiling, &allocation);
     assert!(allocation.shares.iter().all(|share| 1000 < share.allowance.triangles));
 }

@@ -1,0 +1,74 @@
+//! What the report says of an area's residuals and points: sums over its tiles.
+//!
+//! They are added up tile by tile, because the histogram of one takes 74 kB a class. All are whole numbers, so the
+//! order of tiles does not matter.
+
+use std::sync::{Mutex, PoisonError};
+
+use fidelity::{Residuals, Tally};
+
+use crate::measured::sums_of;
+use crate::run::Run;
+use crate::{CompileError, Stage};
+
+/// Of one tile, or of many.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Sums {
+    pub residuals: Residuals,
+    /// Against the sources' own posts.
+    pub at_source: Tally,
+    /// Whether that is of every tile: sources have other posts than the working grid.
+    pub has_source: bool,
+    /// Points per class, each point of the area in one tile.
+    pub points: Vec<u64>,
+    /// Those of them that every build starts from: border points, corners not counted.
+    pub border: u64,
+}
+
+/// Sums that several workers add to.
+#[derive(Default)]
+pub(crate) struct Adding(Mutex<Option<Sums>>);
+
+impl Adding {
+    /// Adds those of one tile.
+    pub fn add(&self, sums: Sums) {
+        let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        match all.as_mut() {
+            None => *all = Some(sums),
+            Some(all) => all.merge(&sums),
+        }
+    }
+
+    /// All of them.
+    pub fn finish(self) -> Sums {
+        self.0.into_inner().unwrap_or_else(PoisonError::into_inner).unwrap_or_default()
+    }
+}
+
+impl Sums {
+    fn merge(&mut self, other: &Sums) {
+        self.residuals.merge(&other.residuals);
+        self.at_source.merge(&other.at_source);
+        self.has_source &= other.has_source;
+        for (sum, points) in self.points.iter_mut().zip(&other.points) {
+            *sum += points;
+        }
+        self.border += other.border;
+    }
+
+    /// Those of every tile as it is published.
+    ///
+    /// # Errors
+    /// When a file cannot be read.
+    pub fn published(run: &Run) -> Result<Sums, CompileError> {
+        let (tiles, adding) = (&run.area.tiles, Adding::default());
+        let folder = run.database.folder();
+        let read = |_: usize, &tile: &terrain::TileId| -> Result<(), CompileError> {
+            adding.add(sums_of(folder.read_measured(tile)?.1));
+            Ok(())
+        };
+        schedule::for_each_independent(tiles, &run.workers, run.stop, read)
+            .map_err(|error| CompileError::from_schedule(Stage::Enforce, tiles, error))?;
+        Ok(adding.finish())
+    }
+}
