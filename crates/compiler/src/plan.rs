@@ -1,13 +1,11 @@
 //! What a job will do and take, before any work.
 
-use job::{Budget as PointBudget, DemSource, Edges, Effort, Job, TileOrder};
+use job::{Edges, Job, TileOrder};
 use terrain::{ModuleRect, PostRect, Side, TileId};
 
 use crate::CompileError;
 use crate::area::GamingArea;
-use crate::ground::KEPT_POSTS_MAX;
-use crate::large::CACHE_BYTES_MAX;
-use crate::refinement::optimising;
+use crate::forecast::{Forecast, forecast};
 use crate::tasks::is_surveyed;
 
 /// A job, planned.
@@ -48,44 +46,6 @@ pub struct PlannedTile {
     pub after: Vec<TileId>,
 }
 
-/// What a build is expected to take. Measured rates of one core at present; other machines differ.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Forecast {
-    /// Memory at most, with two workers.
-    pub memory_bytes: u64,
-    /// The part of it that is there however many workers there are.
-    pub shared_bytes: u64,
-    /// What each worker adds.
-    pub worker_bytes: u64,
-    /// Seconds on one worker.
-    pub seconds: f64,
-    /// Size of the database.
-    pub disk_bytes: u64,
-}
-
-/// Seconds one core needs for a post of the area: heights, weights, residuals.
-const SECONDS_PER_POST: f64 = 60e-9;
-/// The same for a post of the sample terrain.
-const SECONDS_PER_SAMPLE_POST: f64 = 260e-9;
-/// Seconds for a selected point, survey included.
-const SECONDS_PER_POINT: f64 = 3.5e-6;
-/// Bytes of memory for a post of the area: working windows and the decoded source.
-const MEMORY_PER_POST: u64 = 8;
-/// The same for a post of a tile that is worked on, where windows are not kept.
-const MEMORY_PER_POST_IN_WORK: u64 = 24;
-/// Bytes of a raster for a post of the area, about.
-const BYTES_PER_SOURCE_POST: u64 = 4;
-/// Bytes of memory for a triangle, in TINs, load modules and curves.
-const MEMORY_PER_TRIANGLE: u64 = 60;
-/// Bytes of memory for a post and for a triangle of a tile that is being optimised.
-const MEMORY_OPTIMISING: (u64, u64) = (40, 600);
-/// The same for a tile that is only grown.
-const MEMORY_GROWING: (u64, u64) = (2, 100);
-/// Bytes of the program itself.
-const MEMORY_BASE: u64 = 8 << 20;
-/// Bytes on disk for a triangle: tile, load module and curve.
-const DISK_PER_TRIANGLE: u64 = 60;
-
 /// Plans a job; nothing is read but the job.
 ///
 /// # Errors
@@ -123,45 +83,5 @@ fn planned(area: &GamingArea, tile: TileId, ranks: &[usize]) -> PlannedTile {
         modules: tiling.modules(tile, area.grid),
         inherits_from: inherits.filter_map(|side| tiling.beyond(tile, side)).collect(),
         after: tiling.neighbours(tile).into_iter().filter(|&other| tiling.rank(other) < tiling.rank(tile)).collect(),
-    }
-}
-
-fn forecast(job: &Job, area: &GamingArea) -> Forecast {
-    let posts = area.rect.post_count() as u64;
-    let triangles = match (job.tin.budget, job.modules.edges) {
-        (PointBudget::Points(points), _) => area.budget.start_total() + 2 * points,
-        (PointBudget::Limits, Edges::Constrained | Edges::Clip(_)) => area.budget.area,
-    };
-    let per_post = match job.dem.source {
-        DemSource::Sample { .. } => SECONDS_PER_SAMPLE_POST,
-        DemSource::Files { .. } => SECONDS_PER_POST,
-    };
-    let points = triangles as f64 / 2.0;
-    // Measured on the jobs in `configs`, one worker.
-    let per_triangle = match optimising(job).map(|optimising| optimising.effort) {
-        None => 0.0,
-        Some(Effort::Fast) => 6e-6,
-        Some(Effort::Normal) => 35e-6,
-        Some(Effort::Best) => 200e-6,
-    };
-    let (of_post, of_triangle) = if optimising(job).is_some() { MEMORY_OPTIMISING } else { MEMORY_GROWING };
-    let tiles = area.tiles.len() as u64;
-    let heights = |at_once: u64| match job.dem.source {
-        _ if posts <= KEPT_POSTS_MAX as u64 => posts * MEMORY_PER_POST,
-        DemSource::Sample { .. } => posts / tiles * MEMORY_PER_POST_IN_WORK * at_once,
-        // Rasters are held up to a bound and read by window beyond it; how many posts they have is in no job.
-        DemSource::Files { .. } => {
-            posts / tiles * MEMORY_PER_POST_IN_WORK * at_once
-                + (posts * BYTES_PER_SOURCE_POST).min(CACHE_BYTES_MAX + CACHE_BYTES_MAX / 4)
-        }
-    };
-    let worker_bytes = (posts * of_post + triangles * of_triangle) / tiles + heights(1) - heights(0);
-    let shared_bytes = MEMORY_BASE + heights(0) + triangles * MEMORY_PER_TRIANGLE;
-    Forecast {
-        memory_bytes: shared_bytes + worker_bytes * tiles.min(2),
-        shared_bytes,
-        worker_bytes,
-        seconds: posts as f64 * per_post + points * SECONDS_PER_POINT + triangles as f64 * per_triangle,
-        disk_bytes: triangles * DISK_PER_TRIANGLE,
     }
 }

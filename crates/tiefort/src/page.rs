@@ -1,6 +1,6 @@
 //! `report.html`, drawn from what a build left: by `build` itself, and by `report --format html` later.
 
-use compiler::{Product, Wanted, WantedGround, product};
+use compiler::{PAGE_MODULES_MAX, PAGE_POSTS_MAX, Product, Wanted, WantedGround, product};
 use database::{Folder, Report};
 use job::Job;
 use views::{Page, PageSetting, report_html};
@@ -8,15 +8,19 @@ use views::{Page, PageSetting, report_html};
 use crate::failure::Failure;
 use crate::scene::SceneParts;
 
-/// Posts of an area up to which a build draws its ground: 16 bytes a post while it does. Later one can ask for it.
-const POSTS_MAX: usize = 16 << 20;
-
-/// The page of a job that was just built.
+/// The page of a job that was just built: with the ground as long as the area has no more than [`PAGE_POSTS_MAX`] posts
+/// (16 bytes each while it is drawn), with maps as long as it has no more than [`PAGE_MODULES_MAX`] load modules (a
+/// kilobyte each). Later one can ask for them.
 ///
 /// # Errors
 /// When what was published cannot be read back.
 pub fn of_build(folder: &Folder, job: &Job, report: &Report, workers: usize) -> Result<String, Failure> {
-    let small = job.area.grid.area().post_count() <= POSTS_MAX;
+    let grid = job.area.grid;
+    if PAGE_MODULES_MAX < grid.count() {
+        let settings = settings(job);
+        return Ok(report_html(&Page { report, manifest: &folder.manifest()?, settings: &settings, scene: None }));
+    }
+    let small = grid.area().post_count() <= PAGE_POSTS_MAX;
     let ground = if small { WantedGround::Job(job) } else { WantedGround::None };
     let product = product(folder.dir(), &Wanted { part: None, ground, workers })?;
     Ok(page(&product, report))
@@ -26,11 +30,15 @@ pub fn of_build(folder: &Folder, job: &Job, report: &Report, workers: usize) -> 
 pub fn page(product: &Product, report: &Report) -> String {
     let parts = SceneParts::new(product, Some(product.limit_use()), Some(report));
     let scene = parts.scene(product, product.part, &product.modules);
-    let settings: Vec<PageSetting> = product
-        .job
-        .describe()
-        .into_iter()
-        .map(|setting| PageSetting { key: setting.key.to_owned(), value: setting.value, meaning: setting.meaning })
-        .collect();
+    let settings = settings(&product.job);
     report_html(&Page { report, manifest: &product.manifest, settings: &settings, scene: Some(&scene) })
+}
+
+fn settings(job: &Job) -> Vec<PageSetting> {
+    let setting = |setting: job::Setting| PageSetting {
+        key: setting.key.to_owned(),
+        value: setting.value,
+        meaning: setting.meaning,
+    };
+    job.describe().into_iter().map(setting).collect()
 }

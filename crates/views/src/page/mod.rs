@@ -64,15 +64,18 @@ pub fn report_html(page: &Page) -> String {
                 h1 { "Gaming area " (report.area) }
                 p.quiet { (what_it_is(manifest)) }
                 nav {
-                    @for (id, name) in SECTIONS { a href={ "#" (id) } { (name) } }
+                    @for (id, name) in sections(page) { a href={ "#" (id) } { (name) } }
                 }
                 (tables::verdict(report))
                 (headline(page))
                 section id="limits" { h2 { "Limits" } (tables::limits(report)) (tables::advice(report)) }
                 section id="residuals" { h2 { "Residuals" } (tables::residuals(report)) (histograms(page)) }
-                @if let Some(scene) = page.scene {
-                    section id="maps" { h2 { "Maps" } (maps::maps(scene)) }
-                    section id="worst" { h2 { "The worst load modules" } (worst(page, scene)) }
+                @match page.scene {
+                    Some(scene) => {
+                        section id="maps" { h2 { "Maps" } (maps::maps(scene)) }
+                        section id="worst" { h2 { "The worst load modules" } (worst(page, scene)) }
+                    }
+                    None => section id="maps" { h2 { "Maps" } (without_maps()) }
                 }
                 section id="breaches" { h2 { "Breaches" } (tables::breaches(report)) }
                 section id="times" { h2 { "Times" } (tables::stages(report)) }
@@ -92,6 +95,22 @@ const SECTIONS: [(&str, &str); 7] = [
     ("times", "Times"),
     ("made-from", "Made from"),
 ];
+
+/// Those that this page has.
+fn sections(page: &Page) -> impl Iterator<Item = (&'static str, &'static str)> {
+    let has_scene = page.scene.is_some();
+    SECTIONS.into_iter().filter(move |&(id, _)| has_scene || id != "worst")
+}
+
+fn without_maps() -> Markup {
+    html! {
+        p.quiet {
+            "A build draws no maps of an area as large as this, because all its load modules would have to be in "
+            "memory at once. " code { "tiefort render DIR --view density --out map.png" } " draws one, "
+            code { "tiefort report DIR --format html" } " this page with all of them."
+        }
+    }
+}
 
 fn what_it_is(manifest: &Manifest) -> String {
     let area = &manifest.area;

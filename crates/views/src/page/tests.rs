@@ -62,6 +62,13 @@ fn page_of(name: &str, with_ground: bool) -> String {
 }
 
 #[test]
+fn a_page_without_maps_says_how_to_come_by_them() {
+    let page = report_html(&Page { report: &samples::report(), manifest: &manifest("x"), settings: &[], scene: None });
+    assert!(page.contains("tiefort render DIR") && page.contains("tiefort report DIR --format html"));
+    assert!(!page.contains("#worst"), "a link leads nowhere");
+}
+
+#[test]
 fn the_page_is_one_file_that_loads_and_runs_nothing() {
     let page = page_of("fort", true);
     for forbidden in ["http://", "https://", "<script", "<link", "@import", "url(", "onload", "src=\"/"] {
