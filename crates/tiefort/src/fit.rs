@@ -6,18 +6,19 @@ use compiler::Forecast;
 
 use crate::failure::Failure;
 use crate::files;
+use crate::resources::memory_bytes;
 
-/// Refuses a build that will not fit.
+/// Refuses a build with so many workers that will not fit.
 ///
 /// # Errors
 /// When more memory or disk is expected to be needed than is free; both numbers are told.
-pub fn check(forecast: &Forecast, folder: &Path) -> Result<(), Failure> {
+pub fn check(forecast: &Forecast, workers: usize, folder: &Path) -> Result<(), Failure> {
     let needs = [
         (
-            "memory".to_owned(),
-            forecast.memory_bytes,
-            free_memory(),
-            "use more, smaller tiles, or a machine with more memory",
+            format!("memory of {workers} workers"),
+            forecast.shared_bytes + workers as u64 * forecast.worker_bytes,
+            memory_bytes(),
+            "use fewer --workers, or more and smaller tiles",
         ),
         (
             format!("disk of {}", folder.display()),
@@ -34,14 +35,6 @@ pub fn check(forecast: &Forecast, folder: &Path) -> Result<(), Failure> {
         }
     }
     Ok(())
-}
-
-/// Bytes of memory that programs may still take; `None` where the system does not say.
-fn free_memory() -> Option<u64> {
-    let text = std::fs::read_to_string("/proc/meminfo").ok()?;
-    let line = text.lines().find(|line| line.starts_with("MemAvailable:"))?;
-    let kilobytes: u64 = line.split_whitespace().nth(1)?.parse().ok()?;
-    Some(kilobytes << 10)
 }
 
 /// Bytes free on the disk on which `folder` is, or will be.
@@ -72,13 +65,16 @@ mod tests {
             disk_bytes,
         };
         let here = std::env::temp_dir();
-        assert!(check(&forecast(1 << 20, 1 << 10), &here.join("not/there/yet")).is_ok());
-        if free_memory().is_some() {
-            let refused = check(&forecast(1 << 60, 1), &here).unwrap_err().to_string();
-            assert!(refused.contains("memory: ") && refused.contains("--force tries all the same"), "{refused}");
+        assert!(check(&forecast(1 << 20, 1 << 10), 2, &here.join("not/there/yet")).is_ok());
+        if memory_bytes().is_some() {
+            let refused = check(&forecast(1 << 60, 1), 2, &here).unwrap_err().to_string();
+            assert!(
+                refused.contains("memory of 2 workers: ") && refused.contains("--force tries all the same"),
+                "{refused}"
+            );
         }
         if free_disk(&here).is_some() {
-            let refused = check(&forecast(1, 1 << 62), &here).unwrap_err().to_string();
+            let refused = check(&forecast(1, 1 << 62), 2, &here).unwrap_err().to_string();
             assert!(refused.contains("disk of "), "{refused}");
         }
     }

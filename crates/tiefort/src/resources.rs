@@ -47,7 +47,7 @@ fn workers_within(
 }
 
 /// Memory this process may still take: what is available, and what its cgroup and those above it leave.
-fn memory_bytes() -> Option<u64> {
+pub fn memory_bytes() -> Option<u64> {
     let mut least = fs::read_to_string("/proc/meminfo").ok().as_deref().and_then(available);
     for folder in cgroups() {
         let number = |name: &str| fs::read_to_string(folder.join(name)).ok()?.trim().parse::<u64>().ok();

@@ -40,7 +40,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let mut job = Job::load_with(&arguments.job, &compiler::find_area)?;
     job.dem.strict = arguments.run.strict;
     if !arguments.force {
-        fit::check(&compiler::plan(&job)?.forecast, &arguments.run.folder(&job))?;
+        let (workers, _) = arguments.run.workers.for_job(&job);
+        fit::check(&compiler::plan(&job)?.forecast, workers, &arguments.run.folder(&job))?;
     }
     let run = Run::announce(&job, &arguments.run, "building")?;
     run.finish(|listener| {

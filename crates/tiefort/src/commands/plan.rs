@@ -1,6 +1,6 @@
 //! `tiefort plan`: what a build would do, before any work.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use compiler::{Plan, PlannedTile, Played};
@@ -55,6 +55,8 @@ pub struct Arguments {
     force: bool,
 }
 
+/// Workers for which memory is forecast.
+const PLANNED_WORKERS: usize = 2;
 /// Tiles that are played at most.
 const PLAYED_TILES_MAX: u64 = 1 << 20;
 /// Tiles that are listed one by one for a person.
@@ -88,7 +90,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     };
     terminal::print(&text)?;
     if !arguments.force {
-        fit::check(&plan.forecast, Path::new("."))?;
+        let default = PathBuf::from(format!("{}.tdb", job.area.name));
+        fit::check(&plan.forecast, PLANNED_WORKERS, arguments.out.as_ref().unwrap_or(&default))?;
     }
     Ok(Outcome::Sound)
 }

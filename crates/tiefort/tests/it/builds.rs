@@ -4,7 +4,7 @@ use std::fs;
 
 use serde_json::Value;
 
-use crate::scene::Scene;
+use crate::scene::{Scene, everything_below};
 
 /// A scene with `small.toml` built in it.
 fn built() -> Scene {
@@ -99,6 +99,40 @@ fn a_plan_lists_settings_tiles_and_forecast() {
     assert!(!scene.path("small.tdb").exists());
 }
 
+/// The most memory a process has held so far, in bytes; nothing once it has ended, or where the system does not say.
+fn peak_bytes(process: u32) -> Option<u64> {
+    let text = fs::read_to_string(format!("/proc/{process}/status")).ok()?;
+    let line = text.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+    Some(line.trim().strip_suffix(" kB")?.trim().parse::<u64>().ok()? << 10)
+}
+
+#[test]
+fn a_forecast_is_near_what_a_build_takes() {
+    // Within 1.5 on a quiet machine, as `scripts/bench_size.py` measures it; this holds the order of size.
+    const FACTOR: f64 = 2.0;
+    for size in ["4000, 4000", "24000, 24000"] {
+        let scene = Scene::with_job(
+            "small.toml",
+            &[("4000, 4000", size), ("[limits]", "[tin]\nmethod = \"greedy\"\n[limits]")],
+        );
+        let text = scene.run_to(0, &["plan", "job.toml", "--emit", "json"]).stdout;
+        let forecast = &serde_json::from_str::<Value>(&text).unwrap()["forecast"];
+        let mut build = scene.program().args(["build", "job.toml", "--quiet", "--workers", "2"]).spawn().unwrap();
+        let mut peak = None;
+        while build.try_wait().unwrap().is_none() {
+            peak = peak_bytes(build.id()).or(peak);
+            std::thread::sleep(std::time::Duration::from_millis(2));
+        }
+        let database = everything_below(&scene.path("small.tdb"));
+        let disk: usize = database.values().flatten().map(Vec::len).sum();
+        for (what, found) in [("disk_bytes", Some(disk as u64)), ("memory_bytes", peak)] {
+            let (expected, Some(found)) = (forecast[what].as_f64().unwrap(), found) else { continue };
+            let ratio = expected / found as f64;
+            assert!((1.0 / FACTOR..FACTOR).contains(&ratio), "{size}: {what}: {expected} forecast, {found} taken");
+        }
+    }
+}
+
 #[test]
 fn a_pinned_down_residual_that_limits_forbid_is_a_breach() {
     let scene = Scene::with_job("small.toml", &[("[limits]", "[tin]\nmax_residual_m = 0.01\n\n[limits]")]);
@@ -107,6 +141,8 @@ fn a_pinned_down_residual_that_limits_forbid_is_a_breach() {
     scene.run_to(1, &["report", "small.tdb"]);
     scene.run_to(1, &["status", "small.tdb"]);
     scene.run_to(2, &["build", "job.toml", "--strict"]);
+    scene.run_to(2, &["build", "job.toml", "--strict", "--fresh"]);
+    scene.run_to(0, &["verify", "small.tdb"]);
     let breaches: Value = serde_json::from_slice(&fs::read(scene.path("small.tdb/breaches.geojson")).unwrap()).unwrap();
     assert_eq!(breaches["features"][0]["properties"]["kind"], "residual");
 }

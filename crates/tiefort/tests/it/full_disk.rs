@@ -12,6 +12,18 @@ code=$?
 find disk -name '.*' -type f >&2
 exit $code";
 
+/// Asks, on a file system of its own that holds 96 kB, whether a build that takes more is begun.
+const BEFORE_A_BUILD: &str = "
+mkdir disk && mount -t tmpfs -o size=96k tmpfs disk || exit 99
+cp job.toml disk && cd disk || exit 99
+for words in 'plan job.toml' 'build job.toml' 'build job.toml --fresh --out a/b.tdb'; do
+  \"$0\" $words >&2
+  echo \"$words: $?\"
+done
+\"$0\" plan job.toml --force >&2
+echo \"plan --force: $?\"
+ls";
+
 /// Builds where no file may grow beyond 1 kB (two blocks of 512 bytes).
 const SHORT_FILES: &str = "trap '' XFSZ; ulimit -f 2; exec \"$0\" build job.toml --out x.tdb";
 
@@ -30,6 +42,32 @@ fn a_disk_that_is_too_small_is_named_and_nothing_half_written_stays() {
     let said = Said::from(output);
     said.check_error(&["disk/x.tdb", "no space left"]);
     assert!(!said.stderr.contains("disk/x.tdb/."), "a temporary file was left: {}", said.stderr);
+}
+
+#[test]
+fn a_build_that_is_forecast_not_to_fit_is_refused_before_anything_is_written_unless_forced() {
+    let scene = Scene::with_job("small.toml", &[("spacing_m = 25", "spacing_m = 12.5")]);
+    let mut shell = Command::new("unshare");
+    shell.args(["--map-root-user", "--mount", "sh", "-c", BEFORE_A_BUILD, env!("CARGO_BIN_EXE_tiefort")]);
+    let said = match shell.current_dir(scene.path("")).output() {
+        Ok(output) if output.status.code() == Some(0) => Said::from(output),
+        other => {
+            eprintln!("skipped: no small file system can be mounted here: {other:?}");
+            return;
+        }
+    };
+    let lines: Vec<&str> = said.stdout.lines().collect();
+    let expected = [
+        "plan job.toml: 2",
+        "build job.toml: 2",
+        "build job.toml --fresh --out a/b.tdb: 2",
+        "plan --force: 0",
+        "job.toml",
+    ];
+    assert_eq!(lines, expected, "{}", said.stderr);
+    for part in ["error: disk of a/b.tdb: ", " free, expected the ", "--force tries all the same"] {
+        assert!(said.stderr.contains(part), "{part:?} is not in: {}", said.stderr);
+    }
 }
 
 #[cfg(unix)]

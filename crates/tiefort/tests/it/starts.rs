@@ -16,6 +16,30 @@ fn hills(row: usize, col: usize) -> String {
 }
 
 #[test]
+fn a_warning_fails_a_strict_build_only_and_what_it_built_is_whole_all_the_same() {
+    let scene = Scene::new();
+    fs::write(scene.path("here.asc"), grid(0, hills)).unwrap();
+    fs::write(scene.path("away.asc"), grid(90_000, hills)).unwrap();
+    scene.run_to(0, &["init", "here.asc", "--crs", "EPSG:32611", "--out", "job.toml"]);
+    let job = fs::read_to_string(scene.path("job.toml")).unwrap();
+    let here = "{ file = \"here.asc\", crs = \"EPSG:32611\" }";
+    assert!(job.contains(here), "{job}");
+    scene.run_to(0, &["build", "job.toml", "--out", "calm.tdb", "--strict"]);
+    let both = format!("{here}, {}", here.replace("here", "away"));
+    fs::write(scene.path("job.toml"), job.replace(here, &both)).unwrap();
+    let said = scene.run_to(0, &["build", "job.toml", "--out", "warned.tdb"]);
+    assert!(said.stderr.contains("away.asc: it lies outside the area and is not used"), "{}", said.stderr);
+    scene.run_to(2, &["build", "job.toml", "--out", "strict.tdb", "--strict"]);
+    // Nothing has to be done again, and the warning is still there.
+    scene.run_to(2, &["build", "job.toml", "--out", "warned.tdb", "--strict"]);
+    for name in ["warned.tdb", "strict.tdb"] {
+        scene.run_to(0, &["verify", name]);
+        let slm = |name: &str| fs::read(scene.path(&format!("{name}/modules/r00c00.slm"))).unwrap();
+        assert_eq!(slm(name), slm("calm.tdb"), "{name}");
+    }
+}
+
+#[test]
 fn a_job_that_init_writes_builds_at_once() {
     let scene = Scene::new();
     fs::write(scene.path("west.asc"), grid(0, hills)).unwrap();
