@@ -1,10 +1,10 @@
 //! What a build is expected to take, from its job alone.
 //!
-//! The rates are those of one core of a server of 2023: the seconds of processor time of one stage, or the bytes at its
-//! peak, divided by what it goes by. The builds they were measured on have 2501, 5001, 10,001 and 20,001 posts a side
-//! of the sample terrain in tiles of 17 x 17 load modules (`scripts/bench_size.py`); two GeoTIFFs of real terrain, one in
-//! the area's own system and one in degrees; and `configs/paper.toml`. The forecast of each was within a factor of 1.5
-//! of what it took. Other machines differ in time, and jobs that end at a residual take less than their budget.
+//! The rates are those of one core of a server of 2023: the seconds of processor time of one stage, or the bytes at
+//! its peak, divided by what it goes by. The builds they were measured on have 2501, 5001, 10,001 and 20,001 posts a
+//! side of the sample terrain in tiles of 17 x 17 load modules (`scripts/bench_size.py`); two GeoTIFFs of real terrain,
+//! one in the area's own system and one in degrees; and `configs/paper.toml`. The forecast of each was within a factor
+//! of 1.5 of what it took. Other machines differ in time, and jobs that end at a residual take less than their budget.
 
 use job::{Budget as PointBudget, DemSource, Edges, Effort, Job};
 
@@ -46,6 +46,8 @@ const GROW_S: f64 = 0.75e-6;
 const OPTIMISE_S: [f64; 3] = [3.3e-6, 36e-6, 137e-6];
 /// To assemble, measure and report it: as it is, and merged, clipped and brought below limits.
 const ASSEMBLE_S: (f64, f64) = (0.9e-6, 4e-6);
+/// Seconds of a build of hardly anything: the page's pictures, mostly.
+const START_S: f64 = 0.15;
 /// Seconds for a post and for a load module on the page.
 const PAGE_S: (f64, f64) = (100e-9, 5e-6);
 
@@ -146,7 +148,7 @@ fn seconds(job: &Job, size: &Size) -> f64 {
         (false, true) => size.modules as f64 * PAGE_S.1,
         (false, false) => 0.0,
     };
-    posts * window * times + triangles * (survey + GROW_S + optimise + assemble) + page
+    START_S + posts * window * times + triangles * (survey + GROW_S + optimise + assemble) + page
 }
 
 fn disk_bytes(job: &Job, size: &Size) -> u64 {

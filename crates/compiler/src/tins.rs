@@ -9,8 +9,8 @@ use database::{DatabaseError, Folder, Stamp};
 use lru::LruCache;
 use terrain::{Refusal, TileId, TileTin, Vertex};
 
-/// Bytes of TINs that are kept: some 300 tiles of 17 x 17 load modules with the paper's 32 triangles in each.
-pub(crate) const KEPT_BYTES_MAX: usize = 64 << 20;
+/// Bytes of TINs that are kept: some 150 tiles of 17 x 17 load modules with the paper's 32 triangles in each.
+pub(crate) const KEPT_BYTES_MAX: usize = 32 << 20;
 
 /// TINs by tile, for as long as there is room.
 pub(crate) struct Tins {
