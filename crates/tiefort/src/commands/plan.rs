@@ -155,9 +155,13 @@ fn forecast_table(job: &Job, plan: &Plan) -> Table {
     let modules = format!("{} rows, {} columns", grid.rows, grid.cols);
     table.row(["Load modules", &grouped(grid.count() as u64), &modules]);
     table.row(["Triangles", &grouped(plan.budget), &format!("at most, {} before any point", grouped(plan.start))]);
-    table.row(["Memory", &files::bytes_text(forecast.memory_bytes), "about, at its peak"]);
+    table.row(["Memory", &files::bytes_text(forecast.memory_bytes), "about, at its peak with two workers"]);
     table.row(["Disk", &files::bytes_text(forecast.disk_bytes), "about"]);
-    table.row(["Time", &format!("{:.1} s", forecast.seconds), "about"]);
+    let shared = match plan.workers_useful {
+        1 => String::new(),
+        _ => format!(", {:.1} s on two", forecast.seconds / 2.0),
+    };
+    table.row(["Time", &format!("{:.1} s", forecast.seconds), &format!("about, on one core{shared}")]);
     table
 }
 
