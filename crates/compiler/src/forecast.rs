@@ -36,8 +36,11 @@ pub const PAGE_POSTS_MAX: usize = 16 << 20;
 /// Load modules of an area up to which a build draws maps of them on its page.
 pub const PAGE_MODULES_MAX: usize = 1 << 18;
 
-/// Seconds to make the heights and weights of one post: of the sample terrain, and from rasters.
+/// Seconds to make the heights and weights of one post: of the sample terrain at 25 m, and from rasters.
 const WINDOW_S: (f64, f64) = (130e-9, 30e-9);
+/// Seconds for a square metre of sample terrain around a post: its forms are found by place, however few posts there
+/// are to stand on them.
+const SAMPLE_S: f64 = 0.07e-9;
 /// Seconds for a triangle of the budget: to survey, closely and in haste.
 const SURVEY_S: (f64, f64) = (2e-6, 0.8e-6);
 /// To select its point.
@@ -132,7 +135,7 @@ impl Size {
 fn seconds(job: &Job, size: &Size) -> f64 {
     let (posts, triangles) = (size.posts as f64, size.triangles as f64);
     let window = match job.dem.source {
-        DemSource::Sample { .. } => WINDOW_S.0,
+        DemSource::Sample { .. } => WINDOW_S.0 + SAMPLE_S * (job.area.spacing.metres().powi(2) - 625.0),
         DemSource::Files { .. } => WINDOW_S.1,
     };
     // Kept, they are made once for all stages and once for the page; otherwise for each stage: most tiles also for the
