@@ -11,6 +11,15 @@ use crate::resources;
 /// Most workers that may be asked for: each is a thread with a tile's memory.
 const WORKERS_MAX: i64 = 1024;
 
+/// Whom a command answers.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Format {
+    /// For a person
+    Text,
+    /// For a program
+    Json,
+}
+
 /// How many tasks run at once.
 #[derive(Args, Clone, Debug)]
 pub struct Workers {

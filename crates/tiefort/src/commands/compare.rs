@@ -3,14 +3,14 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use compiler::{CompareEvent, CompareGround, CompareMethod, CompareRequest, CompareRow, Comparison, Equivalent, Made};
 use job::{Job, StartMethod};
 use serde_json::{Value, json};
 use terrain::{Post, PostRect};
 use views::{Align, Facets, Image, Look, Panel, Style, Surface, Table, draw_panels, grouped};
 
-use crate::arguments::start_method;
+use crate::arguments::{Format, start_method};
 use crate::failure::{Failure, Outcome};
 use crate::new_folder::NewFolder;
 use crate::signals::Signals;
@@ -73,14 +73,6 @@ pub struct Arguments {
     /// Print the table and errors only
     #[arg(long)]
     quiet: bool,
-}
-
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Format {
-    /// For a person
-    Text,
-    /// For a program
-    Json,
 }
 
 fn method(name: &str) -> Result<CompareMethod, String> {

@@ -2,12 +2,12 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use compiler::{Difference, ModuleDifference, difference};
 use serde_json::{Value, json};
 use views::{Align, Table, grouped};
 
-use crate::arguments::Workers;
+use crate::arguments::{Format, Workers};
 use crate::failure::{Failure, Outcome};
 use crate::figures::Figures;
 use crate::terminal;
@@ -38,14 +38,6 @@ pub struct Arguments {
     format: Format,
     #[command(flatten)]
     workers: Workers,
-}
-
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Format {
-    /// For a person
-    Text,
-    /// For a program
-    Json,
 }
 
 /// Rows of the list, unless all are asked for.

@@ -2,13 +2,13 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use compiler::{Explanation, WantedGround, explain};
 use serde_json::{Value, json};
 use terrain::{ModuleId, RefusedBy, StopReason, TileId};
 use views::{Align, Table, grouped};
 
-use crate::arguments::{Workers, row_col};
+use crate::arguments::{Format, Workers, row_col};
 use crate::failure::{Failure, Outcome};
 use crate::terminal;
 
@@ -40,14 +40,6 @@ pub struct Arguments {
     against: Option<PathBuf>,
     #[command(flatten)]
     workers: Workers,
-}
-
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Format {
-    /// For a person
-    Text,
-    /// For a program
-    Json,
 }
 
 /// Explains.

@@ -2,10 +2,11 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use compiler::{DatabaseFidelity, Sights};
 use serde_json::{Value, json};
 
+use crate::arguments::Format;
 use crate::failure::{Failure, Outcome};
 use crate::{measures, measures_json, terminal};
 
@@ -48,14 +49,6 @@ pub struct Arguments {
 
 /// Most pairs that may be asked for: a few minutes, and a half width below 0.01 %.
 const PAIRS_MAX: i64 = 100_000_000;
-
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Format {
-    /// For a person
-    Text,
-    /// For a program
-    Json,
-}
 
 /// Measures.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
