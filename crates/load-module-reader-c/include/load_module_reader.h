@@ -39,6 +39,9 @@ typedef struct lmr_ground lmr_ground;
 /* Where the bytes of files are kept while an area is open. */
 enum { LMR_ON_DISK = 0, LMR_IN_MEMORY = 1, LMR_MAPPED = 2 };
 
+/* The class of triangles over a hole: no source has a height there, and their heights only close the surface. */
+#define LMR_HOLE_CLASS 255
+
 /* For `reach`: the whole area. */
 #define LMR_ALL UINT32_MAX
 
@@ -51,7 +54,7 @@ typedef struct {
 typedef struct {
     double height_m;
     double normal[3];        /* unit vector out of the ground: east, north, up */
-    uint8_t class_of_ground; /* 0 is the default */
+    uint8_t class_of_ground; /* 0 is the default, LMR_HOLE_CLASS a hole */
 } lmr_sample;
 
 /* Quanta of 1/128 m: x and y from the load module's south-west corner, z above the vertical datum. */

@@ -72,7 +72,7 @@ mod tile_file;
 pub use tile_file::{Bytes, Keep, TileFile};
 mod lookup;
 mod terrain_module;
-pub use terrain_module::{Sample, TerrainModule};
+pub use terrain_module::{HOLE_CLASS, Sample, TerrainModule};
 mod ground;
 pub use ground::{Block, Ground, Sight};
 mod area;

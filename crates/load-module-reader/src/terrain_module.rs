@@ -3,6 +3,9 @@
 use crate::Module;
 use crate::lookup::Lookup;
 
+/// The class of triangles over a hole: no source has a height there, and their heights only close the surface.
+pub const HOLE_CLASS: u8 = 255;
+
 /// The ground at one place.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample {
@@ -10,8 +13,15 @@ pub struct Sample {
     pub height_m: f64,
     /// Unit vector out of the ground: east, north, up.
     pub normal: [f64; 3],
-    /// Class of the ground.
+    /// Class of the ground; [`HOLE_CLASS`] where no source has a height.
     pub class: u8,
+}
+
+impl Sample {
+    /// Whether the place lies over a hole, where no source has a height.
+    pub fn is_hole(&self) -> bool {
+        self.class == HOLE_CLASS
+    }
 }
 
 /// A load module with what finds its triangles by place.

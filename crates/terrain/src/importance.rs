@@ -5,9 +5,14 @@ use crate::{Post, PostRect};
 /// Weights are whole thousandths: weight 8 is 8000.
 pub const THOUSANDTHS: u16 = 1000;
 
+/// The class of holes: posts where no source has a height, and the triangles that lie over them. Classes of a job are
+/// those below it.
+pub const HOLE_CLASS: u8 = 255;
+
 /// Weight (in thousandths, 0 excludes a post from selection) and class at every post of a rectangle.
 ///
-/// Classes are indices into the job's list of classes; class 0 is the default one.
+/// Classes are indices into the job's list of classes; class 0 is the default one, [`HOLE_CLASS`] none of
+/// them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Importance {
     rect: PostRect,

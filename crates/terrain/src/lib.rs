@@ -15,7 +15,7 @@ pub use frame::GridFrame;
 mod dem;
 pub use dem::Dem;
 mod importance;
-pub use importance::{Importance, THOUSANDTHS};
+pub use importance::{HOLE_CLASS, Importance, THOUSANDTHS};
 mod tin;
 pub use tin::{Tin, TinFault, Vertex};
 mod tile;
