@@ -4,7 +4,9 @@ use database::{FileStamp, Fingerprint, FingerprintBuilder, Measured, Stamp, Tile
 use fidelity::{Residuals, Tally};
 use job::{Borders, ClipHeights as JobClipHeights, Edges};
 use load_modules::{ClipHeights, Layout, clip, concatenate};
-use terrain::{LATTICE_PER_POST, LatticePoint, LoadModule, ModuleResidual, Post, PostRect, TileId, Tin, Vertex};
+use terrain::{
+    HOLE_CLASS, LATTICE_PER_POST, LatticePoint, LoadModule, ModuleResidual, Post, PostRect, TileId, Tin, Vertex,
+};
 
 use crate::levels::all_levels;
 use crate::measured::{from_measured, to_measured};
@@ -226,14 +228,15 @@ pub(crate) fn crs(job: &job::Job) -> String {
     format!("EPSG:{}", job.area.epsg)
 }
 
-/// Points by class of the post they stand on, or next south-west of them, and how many of them are border points that
-/// every build starts from.
+/// Points by class of the post they stand on, or next south-west of them, those over holes after the job's classes if
+/// there are any; and how many of them are border points that every build starts from.
 /// A point on a seam counts in the tile that owns the post.
 fn count_points(run: &Run, own: &Tin, removed: &[LatticePoint], importance: &terrain::Importance) -> (Vec<u64>, u64) {
     let (rect, area) = (own.rect, run.area.rect);
     let side = run.area.grid.side_cells * LATTICE_PER_POST;
     let is_regular = run.job.tiles.borders == Borders::Regular;
     let mut points = vec![0; run.job.importance.classes.len()];
+    let holes = points.len();
     let mut border = 0;
     let removed: std::collections::BTreeSet<&LatticePoint> = removed.iter().collect();
     for vertex in own.vertices.iter().filter(|vertex| !removed.contains(&vertex.at)) {
@@ -245,7 +248,13 @@ fn count_points(run: &Run, own: &Tin, removed: &[LatticePoint], importance: &ter
             continue;
         }
         let post = Post::new(at.row.div_euclid(LATTICE_PER_POST), at.col.div_euclid(LATTICE_PER_POST));
-        points[usize::from(importance.class(post))] += 1;
+        match importance.class(post) {
+            HOLE_CLASS => {
+                points.resize(holes + 1, 0);
+                points[holes] += 1;
+            }
+            class => points[usize::from(class)] += 1,
+        }
         let on_line = |rect: PostRect| {
             is_at(at.row, rect.south)
                 || is_at(at.row, rect.north)

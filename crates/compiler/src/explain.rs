@@ -5,11 +5,13 @@ use std::sync::atomic::AtomicBool;
 
 use database::{Folder, TileState, files};
 use fidelity::{Split, best_split};
+use job::HOLE_CLASS_NAME;
 use limits::Windows;
 use schedule::Workers;
 use serde_json::Value;
 use terrain::{
-    Importance, LoadModule, ModuleId, QUANTA_PER_METRE, RefusedBy, Side, StopReason, TileId, TileTin, metres_of_quanta,
+    HOLE_CLASS, Importance, LoadModule, ModuleId, QUANTA_PER_METRE, RefusedBy, Side, StopReason, TileId, TileTin,
+    metres_of_quanta,
 };
 
 use crate::product::{Product, Wanted, WantedGround, product};
@@ -251,9 +253,10 @@ fn fullest_window(product: &Product, sums: &[u32], module: ModuleId) -> Explaine
 }
 
 fn classes(product: &Product, module: &LoadModule) -> Vec<(String, u32)> {
-    let names = product.job.importance.classes.iter();
+    let names = product.job.importance.classes.iter().map(String::as_str).enumerate();
+    let names = names.chain([(usize::from(HOLE_CLASS), HOLE_CLASS_NAME)]);
     let count = |class: usize| module.classes.iter().filter(|&&found| usize::from(found) == class).count() as u32;
-    names.enumerate().map(|(class, name)| (name.clone(), count(class))).filter(|(_, count)| 0 < *count).collect()
+    names.map(|(class, name)| (name.to_owned(), count(class))).filter(|(_, count)| 0 < *count).collect()
 }
 
 fn refused(product: &Product, tin: &TileTin, module: ModuleId) -> Vec<ExplainedRefusal> {

@@ -7,7 +7,7 @@ use database::{
     ReportPool, ReportRefusals, ReportResidual, ReportStops, ReportVoids, Totals,
 };
 use fidelity::{Residuals, Tally};
-use job::Count;
+use job::{Count, HOLE_CLASS_NAME};
 use limits::Windows;
 use terrain::{Breach, BreachKind, BreachPlace, ModuleId, RefusedBy, StopReason, metres_of_quanta};
 
@@ -184,7 +184,15 @@ impl Findings<'_> {
             let points = self.sums.points[index];
             ReportClass { name: name.clone(), posts: tally.posts, points, residual: residual_of(tally) }
         };
-        self.run.job.importance.classes.iter().enumerate().map(class).collect()
+        let names = &self.run.job.importance.classes;
+        let mut classes: Vec<_> = names.iter().enumerate().map(class).collect();
+        let (left, over_holes) = (self.run.ground.voids.left, self.sums.points.get(names.len()));
+        if 0 < left || over_holes.is_some() {
+            // Nothing is known there to measure against.
+            let (points, residual) = (over_holes.copied().unwrap_or(0), residual_of(&nothing));
+            classes.push(ReportClass { name: HOLE_CLASS_NAME.into(), posts: 0, points, residual });
+        }
+        classes
     }
 
     /// Figures of every level, where there are several.

@@ -19,7 +19,7 @@ pub(crate) struct Sums {
     pub at_source: Tally,
     /// Whether that is of every tile: sources have other posts than the working grid.
     pub has_source: bool,
-    /// Points per class, each point of the area in one tile.
+    /// Points per class, each point of the area in one tile; after the job's classes those over holes, if any are.
     pub points: Vec<u64>,
     /// Those of them that every build starts from: border points, corners not counted.
     pub border: u64,
@@ -50,6 +50,7 @@ impl Sums {
         self.residuals.merge(&other.residuals);
         self.at_source.merge(&other.at_source);
         self.has_source &= other.has_source;
+        self.points.resize(self.points.len().max(other.points.len()), 0);
         for (sum, points) in self.points.iter_mut().zip(&other.points) {
             *sum += points;
         }

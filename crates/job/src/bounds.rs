@@ -28,8 +28,8 @@ pub const WEIGHT_MAX: f64 = 65.535;
 /// Importance areas: each is laid over every window of the mask.
 pub const AREAS_MAX: usize = 1000;
 
-/// Classes besides the default one: a class is kept in 8 bits.
-pub const CLASSES_MAX: usize = 255;
+/// Classes besides the default one: a class is kept in 8 bits, and the last number means a hole.
+pub const CLASSES_MAX: usize = 254;
 
 /// Source files: a mosaic of every cell of the Earth is 64,800.
 pub const SOURCES_MAX: usize = 65_536;

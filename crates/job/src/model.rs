@@ -160,11 +160,14 @@ pub struct ImportanceSpec {
     pub default_weight: u16,
     /// Areas in the order of the job file; a later one lies over an earlier one.
     pub areas: Vec<ImportanceArea>,
-    /// Names of the classes; index 0 is the default one, at most 256 in all.
+    /// Names of the classes; index 0 is the default one, at most 255 in all.
     pub classes: Vec<String>,
     /// How the borders between weights are softened.
     pub smooth: Smooth,
 }
+
+/// What the class of holes is called, which no class of a job may be: ground where no source has a height.
+pub const HOLE_CLASS_NAME: &str = "hole";
 
 /// Part of the area with its own weight.
 #[derive(Clone, Debug, PartialEq)]

@@ -11,7 +11,7 @@ mod slope;
 pub use slope::{steep, steep_halo};
 mod smooth;
 
-use terrain::{Dem, GridFrame, Importance, PostRect};
+use terrain::{Dem, GridFrame, HOLE_CLASS, Importance, PostRect};
 
 /// Index of the class of posts that no area claims.
 pub const DEFAULT_CLASS: u8 = 0;
@@ -72,7 +72,7 @@ impl Mask<'_> {
 /// never becomes 0 by rounding.
 ///
 /// # Panics
-/// When `rect` is not inside `area`, or there are more than 256 classes.
+/// When `rect` is not inside `area`, or there are more classes than numbers below [`HOLE_CLASS`].
 pub fn importance(mask: &Mask, area: PostRect, frame: &GridFrame, rect: PostRect) -> Importance {
     assert!(area.contains_rect(&rect), "a window of the mask lies inside the gaming area");
     if mask.is_uniform() {
@@ -88,7 +88,7 @@ pub fn importance(mask: &Mask, area: PostRect, frame: &GridFrame, rect: PostRect
     Importance::new(rect, weights, classes)
 }
 
-/// The same mask with weight 0 at the void posts of `dem`, which therefore are never selected.
+/// The same mask with weight 0 and the class of holes at the void posts of `dem`, which therefore are never selected.
 ///
 /// # Panics
 /// When `dem` does not hold every post of the mask's window.
@@ -100,7 +100,8 @@ pub fn without_voids(importance: Importance, dem: &Dem) -> Importance {
     assert!(dem.rect().contains_rect(&rect), "the window of heights holds the window of the mask");
     let weight = |post| if dem.is_void(post) { 0 } else { importance.weight(post) };
     let weights = posts(rect).map(weight).collect();
-    let classes = posts(rect).map(|post| importance.class(post)).collect();
+    let class = |post| if dem.is_void(post) { HOLE_CLASS } else { importance.class(post) };
+    let classes = posts(rect).map(class).collect();
     Importance::new(rect, weights, classes)
 }
 
@@ -122,7 +123,8 @@ fn claims(mask: &Mask, frame: &GridFrame, rect: PostRect) -> Claims {
     };
     for area in &mask.areas {
         let index = names.iter().position(|&name| name == area.class).expect("every area's class is listed");
-        let class = u8::try_from(index).expect("a mask has at most 256 classes");
+        let class =
+            u8::try_from(index).ok().filter(|&class| class < HOLE_CLASS).expect("a mask has at most 255 classes");
         area.shape.visit_spans(frame, rect, |span| {
             claims.weights[span.clone()].fill(area.weight);
             claims.classes[span].fill(class);

@@ -85,6 +85,12 @@ fn residuals(report: &Report) -> Option<String> {
     residual_row(&mut table, "  all, weighted by posts", all, grouped(report.points.total), &report.residual);
     for class in &report.classes {
         let name = format!("  {}", class.name);
+        if class.posts == 0 {
+            // A hole, or a class that lies nowhere in the area: nothing is measured there.
+            let none = ["-"; 5].map(str::to_owned);
+            table.row([name, "-".to_owned(), grouped(class.points)].into_iter().chain(none));
+            continue;
+        }
         residual_row(&mut table, &name, grouped(class.posts), grouped(class.points), &class.residual);
     }
     if let Some(source) = &report.residual_against_source {

@@ -2,12 +2,14 @@
 
 use std::path::Path;
 
-use terrain::THOUSANDTHS;
+use terrain::{HOLE_CLASS, THOUSANDTHS};
 
 use crate::bounds::{AREAS_MAX, CLASSES_MAX, NAME_CHARS_MAX, SLOPE_PERCENT_MAX, SMOOTH_M_MAX, WEIGHT_MAX};
 use crate::entry::{Entry, Section};
 use crate::files::{Mention, Place};
-use crate::{AreaShape, DemSource, ImportanceArea, ImportanceSpec, JobError, SampleClass, Smooth, WaterSpec};
+use crate::{
+    AreaShape, DemSource, HOLE_CLASS_NAME, ImportanceArea, ImportanceSpec, JobError, SampleClass, Smooth, WaterSpec,
+};
 
 /// What class 0 is called.
 const DEFAULT_CLASS: &str = "default";
@@ -157,10 +159,14 @@ fn class(table: &Section, classes: &mut Vec<String>) -> Result<u8, JobError> {
 }
 
 fn class_index(entry: &Entry, name: &str, classes: &mut Vec<String>) -> Result<u8, JobError> {
+    if name == HOLE_CLASS_NAME {
+        let hint = "ground without heights has the class \"hole\", whatever the job says";
+        return Err(entry.out_of_range_with("another name for a class of the job", hint));
+    }
     let index = classes.iter().position(|class| class == name).unwrap_or_else(|| {
         classes.push(name.to_owned());
         classes.len() - 1
     });
     let most = format!("at most {CLASSES_MAX} classes besides the default one");
-    u8::try_from(index).map_err(|_| entry.out_of_range(most))
+    u8::try_from(index).ok().filter(|&index| index < HOLE_CLASS).ok_or_else(|| entry.out_of_range(most))
 }

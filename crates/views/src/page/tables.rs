@@ -146,7 +146,11 @@ pub(super) fn residuals(report: &Report) -> Markup {
                 th.n { "mean" } th.n { "95 %" } th.n { "99 %" }
             }
             @for class in &report.classes {
-                (row(&class.name, grouped(class.posts), grouped(class.points), &class.residual))
+                @if class.posts == 0 {
+                    tr { td { (&class.name) } td.n { "-" } td.n { (grouped(class.points)) } @for _ in 0..5 { td.n { "-" } } }
+                } @else {
+                    (row(&class.name, grouped(class.posts), grouped(class.points), &class.residual))
+                }
             }
             (row(
                 "overall, weighted by posts",
