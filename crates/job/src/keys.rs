@@ -54,6 +54,7 @@ const TILES: &[Key] = &[
 const LOAD_MODULES: &[Key] = &[
     ("side_m", "side_m = 500"),
     ("border_step_m", "border_step_m = 125"),
+    ("outer_border", "outer_border = \"refined\""),
     ("edges", "edges = \"constrained\""),
     ("clip_heights", "clip_heights = \"coplanar\""),
 ];

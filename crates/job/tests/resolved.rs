@@ -219,7 +219,11 @@ fn every_setting_is_described_with_value_and_meaning() {
             r#"tiles.order = "colour": four colours: most tiles at once"#,
             r#"tiles.borders = "inherit": a tile takes over the border points of its lower-ranked neighbours"#,
             "load_modules.side_m = 500: a side of a load module, 40 cells",
-            "load_modules.border_step_m = 125: between points on the outer border, 10 cells",
+            "load_modules.border_step_m = 125: between points on a fixed outer border, 10 cells",
+            concat!(
+                r#"load_modules.outer_border = "refined": points on the outer border are chosen as others are, "#,
+                "within the limits"
+            ),
             r#"load_modules.edges = "constrained": module lines are edges of the TIN from the start"#,
             r#"limits.count = "triangles": limits count triangles"#,
             "limits.per_load_module = 100: triangles in one load module",

@@ -73,6 +73,10 @@ pub(crate) fn report() -> Report {
             per_4km: ReportPerWindow { max: 4_810, limit: 4_096, over: 140, worst_9x9: 5_600 },
         }),
         residual: residual(2.999),
+        border: Some(database::ReportBorder {
+            at_border: database::ReportPart { posts: 77_000, rms_m: 3.4, max_m: 31.0 },
+            inside: database::ReportPart { posts: 3_823_528, rms_m: 3.2, max_m: 36.5 },
+        }),
         residual_against_source: Some(residual(3.1)),
         classes: vec![class("plains", 2_587_215, 64_939, 0.869), class("mountains", 1_313_410, 28_532, 5.268)],
         levels: vec![],

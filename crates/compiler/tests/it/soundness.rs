@@ -122,8 +122,31 @@ fn limits_that_no_removal_can_meet_are_breaches() {
 }
 
 #[test]
-fn the_outer_border_holds_a_point_every_border_step_and_no_other() {
-    for mode in modes::all().into_iter().step_by(5) {
+fn a_refined_outer_border_is_as_true_as_the_ground_inside() {
+    for method in ["method = \"greedy\"", "effort = \"fast\"", ""] {
+        let border = |kind: &str| {
+            let modules = format!("outer_border = \"{kind}\"");
+            let scene = Scene::new(&Words { modules, tin: method.into(), ..Words::sample() });
+            let report = scene.build("area", 2).report;
+            scene.verify("area");
+            Product::read(&scene.path("area")).check(Edges::Constrained);
+            assert!(report.per_load_module.max <= 100 && report.per_load_module.mean <= 32.0, "{method} {kind}");
+            (report.points.border, report.residual.rms_m, report.border.expect("there is ground inside"))
+        };
+        let (none, rms_m, refined) = border("refined");
+        let (some, fixed_rms_m, fixed) = border("fixed");
+        assert!(none == 0 && 0 < some);
+        assert!(refined.at_border.rms_m < fixed.at_border.rms_m, "{method}: {refined:?} {fixed:?}");
+        assert!(refined.at_border.rms_m < 1.3 * refined.inside.rms_m, "{method}: {refined:?}");
+        assert!(rms_m < fixed_rms_m, "{method}: {rms_m} {fixed_rms_m}");
+    }
+}
+
+#[test]
+fn a_fixed_outer_border_holds_a_point_every_border_step_and_no_other() {
+    for (name, mut words) in modes::all().into_iter().step_by(5) {
+        words.modules += "\nouter_border = \"fixed\"";
+        let mode = (name, words);
         let scene = modes::scene(&mode);
         drop(scene.build("area", 2));
         let product = Product::read(&scene.path("area"));

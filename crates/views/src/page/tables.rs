@@ -4,6 +4,7 @@ use database::{Manifest, Report, ReportResidual};
 use maud::{Markup, html};
 
 use super::{advise, place_text};
+use crate::report::border_in_words;
 use crate::table::grouped;
 
 /// Rows of a long list that the page shows; the files beside it have them all.
@@ -163,6 +164,9 @@ pub(super) fn residuals(report: &Report) -> Markup {
                 "Pooled by points, as the founding paper's Table 2 prints its overall figure: RMS "
                 (format!("{:.3} m", report.overall_point_weighted_rms_m)) "."
             }
+        }
+        @if let Some(border) = &report.border {
+            p.quiet { "Residuals of " (border_in_words(border)) "." }
         }
         @if let Some(accuracy_m) = report.dem_accuracy_m {
             p.quiet { "The source states an accuracy of " (accuracy_m) " m." }
