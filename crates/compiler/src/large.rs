@@ -60,8 +60,9 @@ pub(crate) fn open(
         warnings.append(&mut warnings_of(one.file.frame(), look.range_m, &look.notes));
         accuracy_m = [accuracy_m, one.file.accuracy_m()].into_iter().flatten().reduce(f64::max);
         datums.push((one.named, datum_of(one.named, &one.file)));
+        let lowest_m = look.range_m.map_or(0.0, |(lowest, _)| lowest);
         all.add(Look { notes: Vec::new(), ..look });
-        used.push(index);
+        used.push((index, lowest_m));
     }
     match reaching.as_slice() {
         _ if !used.is_empty() => {}
@@ -72,16 +73,15 @@ pub(crate) fn open(
     drop(datums);
     warnings.extend(judged.warnings);
     let is_alone = judged.shifts.iter().all(Option::is_none) && is_alone(job, area, &reaching, &all)?;
-    for (&index, shift) in used.iter().zip(judged.shifts) {
+    for (&(index, _), shift) in used.iter().zip(judged.shifts) {
         reaching[index].file.set_shift(shift);
     }
     let windows = Windows::new(reaching.into_iter().map(|one| one.file).collect(), CACHE_BYTES_MAX);
     let source = match is_alone {
         true => Source::Window(Box::new(windows)),
         false => {
-            let lowest_m = all.range_m.map_or(0.0, |(lowest, _)| lowest);
             let place = (&crs, &area.frame, area.rect);
-            Source::Wide(Box::new(WideMosaic::new(windows, &used, mosaic_rules(job), place, lowest_m)?))
+            Source::Wide(Box::new(WideMosaic::new(windows, &used, mosaic_rules(job), place)?))
         }
     };
     Ok(Some(Decoded { source, warnings, accuracy_m }))

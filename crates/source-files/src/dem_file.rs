@@ -202,8 +202,8 @@ impl Found {
     fn placed(self, store: &Store, reading: &Reading) -> Result<DemFile, SourceError> {
         let (path, (cols, rows)) = (store.path(), self.size);
         let crs = crs_of(store, self.crs, reading)?;
+        let unit_m = reading.height_unit_m.or(crs.vertical_unit_m()).unwrap_or(1.0);
         let (frame, _) = RasterFrame::new(path, crs, &self.axes, cols, rows)?;
-        let unit_m = reading.height_unit_m.unwrap_or(1.0);
         let mut header = match &self.reader {
             Reader::GeoTiff(tiff) => tiff.header(),
             Reader::Dted(dted) => dted.header(frame),

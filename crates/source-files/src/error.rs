@@ -14,6 +14,12 @@ pub enum SourceError {
     /// The file could not be opened.
     #[error("{path}: {source}")]
     Open { path: PathBuf, source: io::Error },
+    /// The path leads to something that is no regular file.
+    #[error("{path}: it is {found}, expected a file")]
+    NotAFile { path: PathBuf, found: &'static str },
+    /// The file is not what it was when the build began.
+    #[error("{path}: {found} while it was read, expected the file that the build began with")]
+    Changed { path: PathBuf, found: String },
     /// The file could be opened but not read on.
     #[error("{path}: reading stopped: {source}")]
     Read { path: PathBuf, source: io::Error },
@@ -179,6 +185,10 @@ impl SourceError {
         use SourceError::*;
         Some(match self {
             Open { .. } => "check the path and its permissions; paths in a job are relative to the job file",
+            NotAFile { .. } => {
+                "name a file: for a folder those in it, for a pipe or a device a file with what it gives"
+            }
+            Changed { .. } => "leave sources alone during a build; run the same command again",
             Write { .. } => "check that the folder exists, is writable and has room; nothing was left half-written",
             Read { .. } | Truncated { .. } | Malformed { .. } | BrokenChunk { .. } => {
                 "the file is damaged or was not copied whole; fetch it again"
@@ -205,7 +215,9 @@ impl SourceError {
             UnnamedCrs { .. } | LinearUnit { .. } | OtherCrs { .. } => {
                 "project it to the area's system: gdalwarp -t_srs EPSG:… -r bilinear in.tif out.tif, or change area.crs"
             }
-            VerticalUnit { .. } => "say how many metres a unit is: dem.height_unit_m = …",
+            VerticalUnit { .. } => {
+                "say how many metres a unit is: dem.sources = [{ file = \"…\", height_unit_m = 0.3048 }]"
+            }
             NoPosition { .. } | ControlPoints { .. } | Rotated { .. } => {
                 "warp it onto a north-up grid: gdalwarp -r bilinear in.tif out.tif"
             }

@@ -102,12 +102,19 @@ impl Raster {
         Ok(raster)
     }
 
-    /// Makes posts void, by index.
-    pub(crate) fn mark_voids(&mut self, indices: impl Iterator<Item = usize>) {
-        let mut voids = Voids { bits: vec![0; self.window.post_count().div_ceil(64)], ..Voids::default() };
-        indices.for_each(|index| voids.mark(index));
+    /// A window of samples that others have judged: void at the posts `missing`, by index, heights everywhere else.
+    pub(crate) fn joined(
+        header: &Header,
+        window: PostRect,
+        samples: Samples,
+        missing: impl Iterator<Item = usize>,
+        range_m: Option<(f64, f64)>,
+    ) -> Self {
+        let mut voids = Voids { bits: vec![0; window.post_count().div_ceil(64)], ..Voids::default() };
+        missing.for_each(|index| voids.mark(index));
         voids.settled = voids.count == 0;
-        self.voids = voids;
+        let (frame, scale, shift) = (header.frame.clone(), header.scale, header.shift.clone());
+        Self { frame, scale, window, samples, voids, shift, range_m, notes: Vec::new() }
     }
 
     fn check_range(&self, samples: Option<(f64, f64)>) -> Result<(), SourceError> {
