@@ -91,7 +91,9 @@ impl Given {
                 }
                 (Some("height"), GivenShape::Point(at)) => {
                     if height.is_none() {
-                        return Err(wrong(&file.path, &feature, "a height pin without height_m", "height_m in metres"));
+                        let wrong = wrong(&file.path, &feature, "a height pin without height_m", "height_m in metres");
+                        let hint = "say how high: \"properties\": { \"pin\": \"height\", \"height_m\": 712.5 }";
+                        return Err(hinted(wrong, hint));
                     }
                     let at = Lattice::of_area(area).post(&file.path, &feature, at)?;
                     self.posts.push(GivenPost { at, pinned: true, outer: is_on_fixed_border(job, area, at), height });
@@ -111,7 +113,11 @@ impl Given {
                         pin.map_or(format!("a {shape} without pin"), |pin| format!("a {shape} with pin {pin:?}"));
                     let expected =
                         "a point with \"add\", \"forbid\" or \"height\", a polygon with \"importance\" or \"exclude\"";
-                    return Err(wrong(&file.path, &feature, &found, expected));
+                    let hint = match shape {
+                        "point" => "say what the point is for: \"properties\": { \"pin\": \"add\" }",
+                        _ => "say what the polygon is for: \"properties\": { \"pin\": \"importance\", \"factor\": 4 }",
+                    };
+                    return Err(hinted(wrong(&file.path, &feature, &found, expected), hint));
                 }
             }
         }
@@ -329,7 +335,11 @@ fn factor_of(path: &Path, feature: &GivenFeature) -> Result<u32, CompileError> {
         }
         _ => {
             let found = feature.factor.map_or("no factor".to_owned(), |factor| format!("a factor of {factor}"));
-            Err(wrong(path, feature, &found, "factor from 0.001 to 1000; to leave ground out, \"exclude\""))
+            let wrong = wrong(path, feature, &found, "factor from 0.001 to 1000; to leave ground out, \"exclude\"");
+            Err(hinted(
+                wrong,
+                "say how much more it matters: \"properties\": { \"pin\": \"importance\", \"factor\": 4 }",
+            ))
         }
     }
 }
@@ -365,6 +375,16 @@ fn refuse_fixed(
             "another",
         )),
         _ => Ok(()),
+    }
+}
+
+/// `error` with another hint.
+fn hinted(error: CompileError, hint: &str) -> CompileError {
+    match error {
+        CompileError::Impossible { key, found, expected, .. } => {
+            CompileError::Impossible { key, found, expected, hint: hint.into() }
+        }
+        other => other,
     }
 }
 

@@ -19,7 +19,7 @@
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 mod error;
-pub use error::DatabaseError;
+pub use error::{DatabaseError, NotADatabase};
 mod fingerprint;
 pub use fingerprint::{Fingerprint, FingerprintBuilder};
 mod codec;

@@ -40,7 +40,7 @@ pub struct Arguments {
     /// Weighted residual in metres that is still good enough [default: 3 times the RMS residual as built]
     #[arg(long, value_name = "M", value_parser = positive)]
     tolerance: Option<f64>,
-    /// Folder for the three files [default: that of the database]
+    /// Folder for the three files, made where it is not there yet [default: that of the database]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// For a person or a program
@@ -61,6 +61,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let folder = arguments.out.as_ref().unwrap_or(&arguments.database);
     let files = ["inadequate.geojson", "error.png", "density.png"].map(|name| folder.join(name));
     let found = compiler::inadequate(&arguments.database, arguments.tolerance)?;
+    files::make_folder(folder)?;
     files::check_writable(&files[0])?;
     let collection = format!("{:#}\n", geojson(&found));
     files::write_whole(&files[0], |out| std::io::Write::write_all(out, collection.as_bytes()))?;
