@@ -17,6 +17,7 @@ const SECTIONS: [(&str, &[Key]); 8] = [
 
 const AREA: &[Key] = &[
     ("name", "name = \"ntc\""),
+    ("title", "title = \"National Training Center, west\""),
     ("crs", "crs = \"EPSG:32611\""),
     ("origin_m", "origin_m = [505000, 3875000]"),
     ("size_m", "size_m = [50000, 50000]"),

@@ -34,6 +34,8 @@ pub struct Job {
 pub struct Area {
     /// Name of the area: letters, digits, `-`, `_` and `.`, fit for a file name.
     pub name: String,
+    /// What stands above the report's page; the name where the job gives none.
+    pub title: Option<String>,
     /// EPSG code of the projected coordinate system, in metres.
     pub epsg: u32,
     /// East and north of the south-west post, in metres.

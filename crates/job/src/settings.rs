@@ -56,6 +56,9 @@ impl Job {
     fn describe_area(&self, list: &mut List) {
         let area = &self.area;
         list.add("area.name", quoted(&area.name), "name of the area");
+        if let Some(title) = &area.title {
+            list.add("area.title", quoted(title), "what stands above the report's page");
+        }
         list.add("area.crs", quoted(&format!("EPSG:{}", area.epsg)), "projected coordinate system, in metres");
         list.add("area.origin_m", pair(area.origin_m), "east and north of the south-west post");
         let (rows, cols) = (area.grid.rows, area.grid.cols);

@@ -51,6 +51,17 @@ fn the_shortest_job_has_the_documented_defaults() {
 }
 
 #[test]
+fn a_title_is_listed_and_kept_where_it_is_given_and_nowhere_else() {
+    let plain = job(SHORTEST);
+    assert_eq!(plain.area.title, None);
+    assert!(!plain.canonical_text().contains("title"));
+    let titled = job(&SHORTEST.replace("[area]", "[area]\ntitle = \"Fort \\\"Irwin\\\", west – 2026\""));
+    assert_eq!(titled.area.title.as_deref(), Some("Fort \"Irwin\", west – 2026"));
+    assert!(titled.describe().iter().any(|setting| setting.key == "area.title"));
+    assert_eq!(job(&titled.canonical_text()).area, titled.area);
+}
+
+#[test]
 fn the_window_covers_four_kilometres() {
     let sized = |side: u32, step: u32| {
         let size = side * 60;

@@ -1,7 +1,8 @@
 //! A report with something in every part and a small piece of terrain, for the tests of this crate.
 
-use terrain::{LoadModule, ModuleGrid, ModuleId, ModuleResidual, ModuleVertex, Spacing};
+use terrain::{GridFrame, LoadModule, ModuleGrid, ModuleId, ModuleResidual, ModuleVertex, Spacing};
 
+use crate::picture::{Scene, SceneLimits};
 use database::{
     Report, ReportBefore, ReportBound, ReportBreach, ReportClass, ReportLevel, ReportPerModule, ReportPerWindow,
     ReportPlace, ReportPoints, ReportPool, ReportRefusals, ReportResidual, ReportStage, ReportStops, ReportVoids,
@@ -34,6 +35,22 @@ pub(crate) fn modules() -> Vec<LoadModule> {
         }
     };
     GRID.all().iter().map(module).collect()
+}
+
+/// The scene of these load modules, without ground or tiles.
+pub(crate) fn scene<'a>(modules: &'a [LoadModule], limits: &'a SceneLimits) -> Scene<'a> {
+    Scene {
+        name: "x",
+        crs: "EPSG:32611",
+        grid: GRID,
+        frame: GridFrame { origin_east_m: 0.0, origin_north_m: 0.0, spacing: spacing() },
+        part: GRID.all(),
+        modules,
+        ground: None,
+        limits,
+        water: None,
+        tiles: &[],
+    }
 }
 
 pub(crate) fn residual(rms_m: f64) -> ReportResidual {

@@ -7,6 +7,7 @@ use terrain::{Metres, ModuleGrid, QUANTA_PER_METRE, Spacing};
 
 use crate::bounds::{
     CELLS_A_SIDE_MAX, COORDINATE_M_MAX, EPSG_GEOGRAPHIC, EPSG_RANGE, MODULES_MAX, NAME_CHARS_MAX, SIDE_QUANTA_MAX,
+    TITLE_CHARS_MAX,
 };
 use crate::entry::{Entry, Section};
 use crate::{Area, AreaFound, AreaPlace, AreaRequest, ClipHeights, Edges, JobError, Method, ModulesSpec, OuterBorder};
@@ -15,7 +16,7 @@ use crate::{Area, AreaFound, AreaPlace, AreaRequest, ClipHeights, Edges, JobErro
 pub(super) type Find<'a> = dyn FnMut(&AreaRequest, &Entry) -> Result<AreaFound, JobError> + 'a;
 
 pub(super) fn read(area: &Section, modules: &Section, find: &mut Find) -> Result<(Area, ModulesSpec), JobError> {
-    let name = name(area)?;
+    let (name, title) = (name(area)?, title(area)?);
     let epsg = epsg(area)?;
     let place = open_place(area, epsg)?;
     let origin_m = if place.is_none() { origin(area)? } else { [0.0; 2] };
@@ -43,7 +44,7 @@ pub(super) fn read(area: &Section, modules: &Section, find: &mut Find) -> Result
     // What the method asks for is not known yet: `outer_border` decides.
     let outer_border = OuterBorder::Fixed;
     let modules = ModulesSpec { side_m, side_quanta, border_step_m, border_step_cells, outer_border, edges };
-    Ok((Area { name, epsg, origin_m, spacing, grid }, modules))
+    Ok((Area { name, title, epsg, origin_m, spacing, grid }, modules))
 }
 
 /// An area that is to be found, with the key that says so.
@@ -92,6 +93,18 @@ fn name(area: &Section) -> Result<String, JobError> {
         return Err(entry.out_of_range_with(expected, "the database is named after it: NAME.tdb"));
     }
     Ok(name.to_owned())
+}
+
+/// What a page of the area is called: one line of text.
+fn title(area: &Section) -> Result<Option<String>, JobError> {
+    let Some(entry) = area.optional("title") else { return Ok(None) };
+    let expected = format!("a line of 1 to {TITLE_CHARS_MAX} characters");
+    let title = entry.text(&expected)?;
+    let is_line = !title.trim().is_empty() && !title.contains(char::is_control);
+    if !is_line || TITLE_CHARS_MAX < title.chars().count() {
+        return Err(entry.out_of_range_with(expected, "it stands above report.html; leave it out for the area's name"));
+    }
+    Ok(Some(title.to_owned()))
 }
 
 /// The code; `None` for one that is to be found.
