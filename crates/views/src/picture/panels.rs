@@ -51,7 +51,7 @@ pub fn draw_panels(title: &str, eye: &str, panels: &[Panel], style: Style, look:
     let top = GAP + Font::Title.line() + GAP / 2 + Font::Bold.line();
     let notes = wrapped(&notes(eye, look), Font::Plain, whole - 2 * GAP);
     let has_water = panels.iter().any(|panel| panel.surface.has_water());
-    let tints = (style == Style::Shaded).then(|| Tints::new(look.range_m).legends(has_water)).unwrap_or_default();
+    let tints = if style == Style::Shaded { Tints::new(look.range_m).legends(has_water) } else { Default::default() };
     let body = high.max(ABOVE_TINTS + tints.iter().map(|legend| legend.high() + GAP).sum::<i64>()) + GAP;
     let mut image =
         Image::new(whole as usize, (top + body + notes.len() as i64 * Font::Plain.line() + GAP) as usize, WHITE);
