@@ -260,8 +260,8 @@ pub unsafe extern "C" fn lmr_load_level(
 /// Follows the observer.
 ///
 /// # Safety
-/// `ground` is null, or comes from `lmr_load` and is in use nowhere else; `area` is null or comes from `lmr_open`, `why`
-/// is null or `why_size` bytes that may be written.
+/// `ground` is null, or comes from `lmr_load` and is in use nowhere else; `area` is null or comes from `lmr_open`,
+/// `why` is null or `why_size` bytes that may be written.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn lmr_move(
     ground: *mut Ground,
@@ -337,8 +337,8 @@ pub unsafe extern "C" fn lmr_sample_at(ground: *const Ground, east_m: f64, north
 /// Heights at many places.
 ///
 /// # Safety
-/// `ground` is null or comes from `lmr_load`; `places_m` is null or `count` pairs, `heights_m` null or `count` numbers that
-/// may be written; the two do not overlap.
+/// `ground` is null or comes from `lmr_load`; `places_m` is null or `count` pairs, `heights_m` null or `count` numbers
+/// that may be written; the two do not overlap.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn lmr_heights(
     ground: *const Ground,
@@ -365,8 +365,8 @@ pub unsafe extern "C" fn lmr_heights(
 /// Line of sight.
 ///
 /// # Safety
-/// `ground` is null or comes from `lmr_load`; `from_m` and `to_m` are null or three numbers each; `share` is null or may
-/// be written.
+/// `ground` is null or comes from `lmr_load`; `from_m` and `to_m` are null or three numbers each; `share` is null or
+/// may be written.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn lmr_sight(
     ground: *const Ground,
@@ -402,8 +402,8 @@ pub unsafe extern "C" fn lmr_module_count(ground: *const Ground) -> usize {
 /// One load module for drawing.
 ///
 /// # Safety
-/// `ground` is null, or comes from `lmr_load` and is not moved while what is pointed to is used; `module` is null or may
-/// be written.
+/// `ground` is null, or comes from `lmr_load` and is not moved while what is pointed to is used; `module` is null or
+/// may be written.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn lmr_module_at(ground: *const Ground, index: usize, module: *mut Module) -> c_int {
     // SAFETY: the caller's word.

@@ -1,7 +1,7 @@
 /*
  * Asks the C interface everything, with hostile arguments, about load-module files that were damaged on purpose.
  *
- *     fuzz SEEDS WORK FIRST SECONDS [LAST]   files of SEEDS, damaged by the random numbers that FIRST, FIRST + 1, ... begin
+ *     fuzz SEEDS WORK FIRST SECONDS [LAST]   files of SEEDS, damaged by the random numbers of FIRST, FIRST + 1, ...
  *     fuzz FINDINGS WORK                     every file of FINDINGS as it is: what was found once, or made by hand
  *
  * Most damaged files have their checksums made right again, so that what lies behind them is reached. A round that
@@ -150,8 +150,9 @@ static double odd_double(void) {
 }
 
 static void damage_header(unsigned char *file, size_t length) {
-    static const int fields[][2] = {{8, 2},  {10, 2}, {12, 4}, {16, 8}, {24, 4}, {28, 4}, {32, 4}, {36, 4}, {40, 4}, {44, 4},
-                                    {48, 4}, {52, 4}, {56, 4}, {60, 4}, {64, 4}, {68, 4}, {72, 8}, {80, 8}, {88, 2}, {90, 2}};
+    static const int fields[][2] = {{8, 2},  {10, 2}, {12, 4}, {16, 8}, {24, 4}, {28, 4}, {32, 4}, {36, 4}, {40, 4},
+                                    {44, 4}, {48, 4}, {52, 4}, {56, 4}, {60, 4}, {64, 4}, {68, 4}, {72, 8}, {80, 8}, {88, 2},
+                                    {90, 2}};
     if (length < 124) return;
     const int *field = fields[below(sizeof fields / sizeof *fields)];
     if (field[0] == 72 || field[0] == 80) {

@@ -17,7 +17,7 @@ pub const FIXED_HEADER_BYTES: usize = 124;
 const HEADER_BYTES_MAX: u32 = (FIXED_HEADER_BYTES as u32 + 2 * u16::MAX as u32).next_multiple_of(4) + 4;
 /// Cells along a side of the area at most: a thousand times what a job allows.
 const AREA_CELLS_MAX: u32 = 1 << 30;
-/// Metres of the area's south-west corner from the origin of its coordinate system at most: ten times what a job allows.
+/// Metres of the area's south-west corner from the origin of its coordinates at most: ten times what a job allows.
 const ORIGIN_M_MAX: f64 = 1e9;
 
 /// What holds for all load modules of a file. Rows and columns count load modules from the area's south-west.
