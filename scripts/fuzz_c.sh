@@ -18,28 +18,28 @@ compiler=${CC:-gcc}
 build=${CARGO_TARGET_DIR:-target}
 reader=crates/load-module-reader-c
 
-work=$(mktemp -d "$([[ -w /dev/shm ]] && echo /dev/shm || echo /tmp)/fuzz_c.XXXXXX")
-trap 'rm -rf "$work"' EXIT
+scratch=$(mktemp -d "$([[ -w /dev/shm ]] && echo /dev/shm || echo /tmp)/fuzz_c.XXXXXX")
+trap 'rm -rf "$scratch"' EXIT
 
 cargo build -p load-module-reader-c
 if ! "$compiler" -std=gnu99 -O1 -g -Wall -Wextra -Werror -fsanitize=address,undefined -fno-sanitize-recover=undefined \
     -I "$reader/include" "$reader/tests/fuzz.c" "$build/debug/libload_module_reader_c.a" -lpthread -ldl -lm \
-    -o "$work/fuzz"; then
+    -o "$scratch/fuzz"; then
     printf 'skipped: %s has no -fsanitize=address,undefined here, or cannot compile the harness\n' "$compiler" >&2
     exit 1
 fi
 
-mkdir "$work/seeds"
-python3 -B scripts/fuzz_seeds.py FORMAT.md "$work/seeds"
+mkdir "$scratch/seeds"
+python3 -B scripts/fuzz_seeds.py FORMAT.md "$scratch/seeds"
 if [[ -x $build/debug/tiefort ]]; then
     tiefort=$(realpath "$build/debug/tiefort")
-    cp tests/jobs/small.toml "$work/plain.toml"
+    cp tests/jobs/small.toml "$scratch/plain.toml"
     { cat tests/jobs/small.toml; printf '\n[lod]\nlevels = [{ inner_share = 0.5 }, { inner_share = 0.2 }]\n'; } \
-        >"$work/levels.toml"
+        >"$scratch/levels.toml"
     for job in plain levels; do
-        "$tiefort" build "$work/$job.toml" --out "$work/$job.tdb" --quiet --no-html
-        for file in "$work/$job.tdb"/modules/*.slm; do
-            cp "$file" "$work/seeds/$job-${file##*/}"
+        "$tiefort" build "$scratch/$job.toml" --out "$scratch/$job.tdb" --quiet --no-html
+        for file in "$scratch/$job.tdb"/modules/*.slm; do
+            cp "$file" "$scratch/seeds/$job-${file##*/}"
         done
     done
 fi
@@ -48,9 +48,9 @@ fi
 export ASAN_OPTIONS="hard_rss_limit_mb=1024:${ASAN_OPTIONS:-}"
 keep() {
     mkdir -p fuzz/artifacts/c
-    cp -r "$work/seeds" "$work/work/modules" fuzz/artifacts/c/
+    cp -r "$scratch/seeds" "$scratch/trial/modules" fuzz/artifacts/c/
     printf 'found something: its files are in fuzz/artifacts/c\n' >&2
     exit 1
 }
-"$work/fuzz" "$reader/tests/findings" "$work/work" || keep
-"$work/fuzz" "$work/seeds" "$work/work" "$first" "$seconds" || keep
+"$scratch/fuzz" "$reader/tests/findings" "$scratch/trial" || keep
+"$scratch/fuzz" "$scratch/seeds" "$scratch/trial" "$first" "$seconds" || keep

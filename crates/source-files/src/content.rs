@@ -2,7 +2,6 @@
 
 use std::fs::{File, Metadata};
 use std::path::{Path, PathBuf};
-use std::time::SystemTime;
 
 use crate::SourceError;
 
@@ -41,12 +40,24 @@ fn kind_of(data: &Metadata) -> &'static str {
     if data.is_dir() { "a folder" } else { "a device" }
 }
 
+#[cfg(unix)]
+fn modified(data: &Metadata) -> Option<(i64, i64)> {
+    use std::os::unix::fs::MetadataExt;
+    Some((data.mtime(), data.mtime_nsec()))
+}
+
+#[cfg(not(unix))]
+fn modified(_: &Metadata) -> Option<(i64, i64)> {
+    None
+}
+
 /// Which file a path led to, and what it was like, so that a change is seen without reading it again.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FileState {
     path: PathBuf,
     len: u64,
-    modified: Option<SystemTime>,
+    /// When it was last written, in whatever the file system counts; never compared with a clock.
+    modified: Option<(i64, i64)>,
     place: (u64, u64),
 }
 
@@ -57,7 +68,7 @@ impl FileState {
     /// When there is none, or no regular one.
     pub fn of(path: &Path) -> Result<Self, SourceError> {
         let data = regular(path)?;
-        Ok(Self { path: path.into(), len: data.len(), modified: data.modified().ok(), place: place_of(&data) })
+        Ok(Self { path: path.into(), len: data.len(), modified: modified(&data), place: place_of(&data) })
     }
 
     /// Checks that the path still leads to the same file, unchanged.

@@ -226,7 +226,7 @@ impl SourceError {
                 "say how many metres a unit is: dem.sources = [{ file = \"…\", height_unit_m = 0.3048 }]"
             }
             TooFine { .. } => {
-                "its header is wrong; give the right corners: gdal_translate -a_ullr WEST NORTH EAST SOUTH in.tif out.tif"
+                "its header is wrong; write it with the right corners: gdal_translate -a_ullr WEST NORTH EAST SOUTH"
             }
             NoPosition { .. } | ControlPoints { .. } | Rotated { .. } => {
                 "warp it onto a north-up grid: gdalwarp -r bilinear in.tif out.tif"

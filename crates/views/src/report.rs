@@ -109,10 +109,10 @@ fn residuals(report: &Report) -> Option<String> {
     Some(text)
 }
 
-/// Residuals at the outer border of the area and inside.
+/// Residuals of load modules at the outer border of the area, and of those inside.
 pub(crate) fn border_in_words(border: &ReportBorder) -> String {
     let part = |part: &ReportPart| format!("RMS {:.3} m, largest {:.2} m", part.rms_m, part.max_m);
-    format!("load modules at the outer border: {}; inside: {}", part(&border.at_border), part(&border.inside))
+    format!("at the outer border {}; inside {}", part(&border.at_border), part(&border.inside))
 }
 
 fn residual_row(table: &mut Table, name: &str, posts: String, points: String, residual: &ReportResidual) {

@@ -168,7 +168,7 @@ pub(super) fn residuals(report: &Report) -> Markup {
             }
         }
         @if let Some(border) = &report.border {
-            p.quiet { "Residuals of " (border_in_words(border)) "." }
+            p.quiet { "Load modules " (border_in_words(border)) "." }
         }
         @if let Some(accuracy_m) = report.dem_accuracy_m {
             p.quiet { "The source states an accuracy of " (accuracy_m) " m." }
