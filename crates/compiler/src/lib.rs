@@ -20,6 +20,8 @@ mod worker;
 pub use worker::{Sharing, WorkerEnd, work};
 mod plan;
 pub use plan::{Plan, PlannedTile, plan};
+mod foresee;
+pub use foresee::foresee;
 mod forecast;
 pub use forecast::{Forecast, PAGE_MODULES_MAX, PAGE_POSTS_MAX};
 mod played;

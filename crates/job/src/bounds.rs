@@ -37,6 +37,9 @@ pub const SOURCES_MAX: usize = 65_536;
 /// Characters of a name: leaves room in the 255 bytes of a file name for what is put behind it.
 pub const NAME_CHARS_MAX: usize = 100;
 
+/// Characters of a title: a line that a page can show.
+pub const TITLE_CHARS_MAX: usize = 200;
+
 /// Triangles in a load module: its vertices are named by 16 bits.
 pub const PER_MODULE_MAX: u64 = u16::MAX as u64;
 

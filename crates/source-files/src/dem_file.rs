@@ -254,6 +254,10 @@ fn of_bare_rows(store: &Store, start: &[u8], reading: &Reading) -> Result<Found,
         }
     }
     let Some(rows) = hgt::rows(store) else {
+        if hgt::is_named_so(store.name()) {
+            let (path, found, expected) = (store.path().into(), store.len(), hgt::sizes_text());
+            return Err(SourceError::NotHgtSize { path, found, expected });
+        }
         let found = start.iter().take(8).map(|byte| format!("{byte:02x}")).collect::<Vec<_>>().join(" ");
         let found = if found.is_empty() { "nothing".into() } else { found };
         return Err(SourceError::UnknownFormat { path: store.path().into(), found });

@@ -92,6 +92,9 @@ pub enum SourceError {
     /// The file does not say which coordinate system it is in.
     #[error("{path}: no coordinate reference system in the file or in a .prj beside it, expected one")]
     NoCrs { path: PathBuf },
+    /// A file with the name of an HGT tile, of another size.
+    #[error("{path}: found {found} bytes, expected those of an HGT tile: {expected}")]
+    NotHgtSize { path: PathBuf, found: u64, expected: String },
     /// An HGT tile whose name does not say where it lies.
     #[error("{path}: an HGT tile, whose name does not say where it lies, expected one such as N35W117.hgt")]
     NoCorner { path: PathBuf },
@@ -110,6 +113,9 @@ pub enum SourceError {
     /// The file does not say where the raster lies.
     #[error("{path}: no position in the file, expected a tie point and a pixel scale, or a transformation")]
     NoPosition { path: PathBuf },
+    /// Posts lie closer together than any ground is measured.
+    #[error("{path}: its posts are {found} apart, in the units of its coordinate system; expected at least {limit:e}")]
+    TooFine { path: PathBuf, found: String, limit: f64 },
     /// The raster is placed by control points.
     #[error("{path}: placed by {found} control points, expected one tie point and a pixel scale")]
     ControlPoints { path: PathBuf, found: usize },
@@ -199,6 +205,7 @@ impl SourceError {
             ArchiveHolds { .. } => "unpack it and name the raster",
             HeaderAlone { .. } => "name the file of heights; its header is found beside it",
             OtherFormat { .. } | UnknownFormat { .. } => "convert it: gdal_translate in out.tif",
+            NotHgtSize { .. } => "the tile was not copied or unpacked whole, or is of another make; fetch it again",
             NoCorner { .. } => "give its south-west corner: { file = \"x.hgt\", corner = [35, -117] }, latitude first",
             NotTiff { .. } => "DEMs and class rasters are GeoTIFF files; gdal_translate converts other formats",
             TooLarge { .. } => "cut the part you need with gdal_translate -projwin, or tile the file",
@@ -217,6 +224,9 @@ impl SourceError {
             }
             VerticalUnit { .. } => {
                 "say how many metres a unit is: dem.sources = [{ file = \"…\", height_unit_m = 0.3048 }]"
+            }
+            TooFine { .. } => {
+                "its header is wrong; give the right corners: gdal_translate -a_ullr WEST NORTH EAST SOUTH in.tif out.tif"
             }
             NoPosition { .. } | ControlPoints { .. } | Rotated { .. } => {
                 "warp it onto a north-up grid: gdalwarp -r bilinear in.tif out.tif"

@@ -142,12 +142,16 @@ impl Axes {
     pub(crate) fn checked(self, path: &Path) -> Result<Self, SourceError> {
         let Self { first, step } = self;
         let numbers = first.iter().chain(&step);
-        let sane = numbers.clone().all(|number| number.abs() <= PLACE_MAX) && 0.0 < step[0] && step[1] != 0.0;
-        if sane {
-            return Ok(self);
+        let sane = numbers.clone().all(|number| number.abs() <= PLACE_MAX) && 0.0 < step[0];
+        if !sane {
+            let found = format!("at {first:?} with steps of {step:?}");
+            return Err(malformed(path, "the place of the raster", found, "finite metres, and a positive pixel scale"));
         }
-        let found = format!("at {first:?} with steps of {step:?}");
-        Err(malformed(path, "the place of the raster", found, "finite metres, and a positive pixel scale"))
+        if step.iter().any(|step| step.abs() < STEP_MIN) {
+            let (path, found) = (path.into(), format!("{:e} x {:e}", step[0], step[1].abs()));
+            return Err(SourceError::TooFine { path, found, limit: STEP_MIN });
+        }
+        Ok(self)
     }
 }
 
@@ -160,6 +164,9 @@ mod key {
 const USER_DEFINED: u16 = 32767;
 /// Coordinates beyond this (a hundred times around the Earth) are not places.
 const PLACE_MAX: f64 = 4.0e9;
+/// Posts closer than this, in metres or degrees, are not ground: a tenth of a millimetre at the equator. Between posts
+/// at coordinates of millions of metres, a double has room for no much finer step.
+const STEP_MIN: f64 = 1.0e-9;
 /// A shear this small against the spacing moves no post of the largest raster by a hundredth of a post.
 const SHEAR_MAX: f64 = 1.0e-8;
 
@@ -309,4 +316,22 @@ fn transformed(path: &Path, matrix: &[f64]) -> Result<[[f64; 2]; 2], SourceError
 
 fn malformed(path: &Path, what: &str, found: String, expected: &str) -> SourceError {
     SourceError::Malformed { path: path.into(), what: what.into(), found, expected: expected.into() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn posts_closer_than_any_ground_is_measured_are_refused_as_such() {
+        let axes = |step| Axes { first: [500_000.0, 4.0e6], step };
+        for step in [[1.0e-308, -1.0e-308], [25.0, 0.0], [1.0e-12, 1.0]] {
+            let error = axes(step).checked(Path::new("a.tif")).unwrap_err();
+            assert!(matches!(error, SourceError::TooFine { .. }), "{error}");
+        }
+        let error = axes([1.0e-308, -1.0e-308]).checked(Path::new("a.tif")).unwrap_err();
+        assert!(error.to_string().starts_with("a.tif: its posts are 1e-308 x 1e-308 apart"), "{error}");
+        assert!(axes([0.25, -0.25]).checked(Path::new("a.tif")).is_ok());
+        assert!(axes([-1.0, 1.0]).checked(Path::new("a.tif")).unwrap_err().to_string().contains("positive"));
+    }
 }

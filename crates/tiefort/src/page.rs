@@ -19,7 +19,8 @@ pub fn of_build(folder: &Folder, job: &Job, report: &Report, workers: usize) -> 
     if PAGE_MODULES_MAX < grid.count() {
         let settings = settings(job);
         let manifest = &folder.manifest()?;
-        return Ok(seal_page(&report_html(&Page { report, manifest, settings: &settings, scene: None })));
+        let title = job.area.title.as_deref();
+        return Ok(seal_page(&report_html(&Page { title, report, manifest, settings: &settings, scene: None })));
     }
     let small = grid.area().post_count() <= PAGE_POSTS_MAX;
     let ground = if small { WantedGround::Job(job) } else { WantedGround::None };
@@ -34,7 +35,8 @@ pub fn page(product: &Product, report: &Report) -> String {
     let parts = SceneParts::new(product, Some(product.limit_use()), Some(report));
     let scene = parts.scene(product, product.part, &product.modules);
     let settings = settings(&product.job);
-    seal_page(&report_html(&Page { report, manifest: &product.manifest, settings: &settings, scene: Some(&scene) }))
+    let (title, manifest) = (product.job.area.title.as_deref(), &product.manifest);
+    seal_page(&report_html(&Page { title, report, manifest, settings: &settings, scene: Some(&scene) }))
 }
 
 fn settings(job: &Job) -> Vec<PageSetting> {

@@ -3,6 +3,14 @@
 use crate::check;
 
 #[test]
+fn a_title_is_a_line_of_text() {
+    for title in [r#"title = """#, r#"title = "  ""#, r#"title = "a\nb""#] {
+        let line = format!("name = \"ntc\"\n{title}");
+        check("name", &line, &["area.title: found", "expected a line of 1 to 200 characters", "leave it out"]);
+    }
+}
+
+#[test]
 fn names_and_coordinate_systems_are_checked() {
     check(
         "name",
