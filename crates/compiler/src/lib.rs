@@ -68,6 +68,7 @@ pub use built_from::BuiltFrom;
 mod area;
 mod assemble;
 mod bound;
+mod bounds;
 mod census;
 mod coarse;
 mod curves;

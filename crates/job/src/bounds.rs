@@ -74,3 +74,5 @@ pub const DATUM_CHARS_MAX: usize = 64;
 pub const SMOOTH_M_MAX: f64 = 10_000.0;
 /// Slope in percent of a wall nearly upright.
 pub const SLOPE_PERCENT_MAX: f64 = 10_000.0;
+/// Files and folders that a pattern may look at: more than any archive of rasters has, and a few seconds.
+pub const VISITED_MAX: usize = 500_000;

@@ -95,7 +95,9 @@ impl Raster {
             samples.visit_voids(header.nodata, |index| voids.mark(index));
         }
         let scale = header.scale;
-        let range_m = survey.range.map(|(lowest, highest)| (scale.height_m(lowest), scale.height_m(highest)));
+        // A negative scale turns the order around.
+        let heights_m = |(lowest, highest)| (scale.height_m(lowest), scale.height_m(highest));
+        let range_m = survey.range.map(heights_m).map(|(a, b): (f64, f64)| (a.min(b), a.max(b)));
         let shift = header.shift.clone();
         let raster = Self { frame: header.frame.clone(), scale, window, samples, voids, shift, range_m, notes };
         raster.check_range(survey.range)?;

@@ -24,7 +24,9 @@ pub fn of_build(folder: &Folder, job: &Job, report: &Report, workers: usize) -> 
     }
     let small = grid.area().post_count() <= PAGE_POSTS_MAX;
     let ground = if small { WantedGround::Job(job) } else { WantedGround::None };
-    let product = product(folder.dir(), &Wanted { part: None, ground, workers })?;
+    let read = |ground| product(folder.dir(), &Wanted { part: None, ground, workers });
+    // A source may have gone since the build ended, which is finished all the same.
+    let product = read(ground).or_else(|_| read(WantedGround::None))?;
     Ok(page(&product, report))
 }
 
