@@ -281,7 +281,7 @@ fn recompute(
 fn outside(modules: &Modules, bounds: Bounds, residuals: &Residuals) -> Option<String> {
     let largest_m = residual_of(&residuals.total()).max_m;
     let outside_m = |vertex: &terrain::ModuleVertex| bounds.metres_outside(vertex.z);
-    let is_outside = |vertex: &&terrain::ModuleVertex| largest_m + 1.0 < outside_m(*vertex);
+    let is_outside = |vertex: &&terrain::ModuleVertex| largest_m + 1.0 < outside_m(vertex);
     let outside =
         modules.values().flat_map(|module| module.vertices.iter().filter(is_outside).map(move |v| (module.id, v)));
     let (count, worst) = outside.fold((0, None), |(count, worst): (usize, Option<(ModuleId, f64)>), (id, vertex)| {
