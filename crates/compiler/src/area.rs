@@ -40,7 +40,7 @@ impl GamingArea {
         let window = job.limits.window;
         let budget = Budget {
             grid,
-            border_step: job.modules.border_step_cells,
+            border_step: job.outer_step_cells(),
             per_module: job.limits.per_load_module,
             pool: job.limits.pool,
             area: job.limits.area_budget(&grid),
@@ -123,7 +123,7 @@ fn refuse_impossible(job: &Job, budget: &Budget) -> Result<(), CompileError> {
             key: key.into(),
             found,
             expected,
-            hint: "every load module starts from its four corners and the border points of outer sides".into(),
+            hint: "every load module starts from its four corners and the fixed points of outer sides".into(),
         }
     })?;
     refuse_points(job, budget)

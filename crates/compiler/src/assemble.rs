@@ -2,7 +2,7 @@
 
 use database::{FileStamp, Fingerprint, FingerprintBuilder, Measured, Stamp, TileModules};
 use fidelity::{Residuals, Tally};
-use job::{Borders, ClipHeights as JobClipHeights, Edges};
+use job::{Borders, ClipHeights as JobClipHeights, Edges, OuterBorder};
 use load_modules::{ClipHeights, Layout, clip, concatenate};
 use terrain::{
     HOLE_CLASS, LATTICE_PER_POST, LatticePoint, LoadModule, ModuleResidual, Post, PostRect, TileId, Tin, Vertex,
@@ -235,6 +235,7 @@ fn count_points(run: &Run, own: &Tin, removed: &[LatticePoint], importance: &ter
     let (rect, area) = (own.rect, run.area.rect);
     let side = run.area.grid.side_cells * LATTICE_PER_POST;
     let is_regular = run.job.tiles.borders == Borders::Regular;
+    let is_fixed = run.job.modules.outer_border == OuterBorder::Fixed;
     let mut points = vec![0; run.job.importance.classes.len()];
     let holes = points.len();
     let mut border = 0;
@@ -262,7 +263,7 @@ fn count_points(run: &Run, own: &Tin, removed: &[LatticePoint], importance: &ter
                 || is_at(at.col, rect.east)
         };
         let is_corner = at.row % side == 0 && at.col % side == 0;
-        border += u64::from(!is_corner && (on_line(area) || (is_regular && on_line(rect))));
+        border += u64::from(!is_corner && ((is_fixed && on_line(area)) || (is_regular && on_line(rect))));
     }
     (points, border)
 }

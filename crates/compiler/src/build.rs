@@ -5,6 +5,7 @@ use std::path::Path;
 use database::{Database, Folder, Manifest, ManifestState, Previous, Report, TileState};
 use job::Job;
 use schedule::Workers;
+use source_files::FileState;
 
 use crate::area::GamingArea;
 use crate::assemble::assemble;
@@ -54,8 +55,25 @@ pub fn build(job: &Job, folder: &Path, options: &Options, progress: &mut dyn Pro
     finish(run, progress)
 }
 
-/// Every stage of a run that has begun; what is published and fresh is kept.
+/// Every stage of a run that has begun; what is published and fresh is kept. A source that changed meanwhile ends it,
+/// and the database stays incomplete.
 pub(crate) fn finish(run: Run, progress: &mut dyn Progress) -> Result<Built, CompileError> {
+    let states = run.states.clone();
+    let finished = stages(run, progress);
+    // What went wrong may come from it, and then it is the cause to tell.
+    match finished {
+        Err(error) if !error.is_stopped() => Err(changed(&states).err().unwrap_or(error)),
+        finished => finished,
+    }
+}
+
+/// # Errors
+/// When a source is not what it was.
+pub(crate) fn changed(states: &[FileState]) -> Result<(), CompileError> {
+    states.iter().try_for_each(|state| Ok(state.check()?))
+}
+
+fn stages(run: Run, progress: &mut dyn Progress) -> Result<Built, CompileError> {
     let curves = survey(&run, progress)?;
     let mut shares = allocate(&run, curves.as_ref(), progress)?;
     drop(curves);
@@ -90,6 +108,8 @@ pub(crate) fn open_with<'a>(
     let area = GamingArea::new(job)?;
     let workers = Workers::new(options.workers);
     progress.tell(Event::Enter(Stage::Read, 0));
+    // Before anything is read, so that a change in between shows.
+    let states = sources::states(job)?;
     let records = sources::records(job)?;
     let ground = Ground::open(job, &area, &workers, options.stop)?;
     progress.tell(Event::Leave(Stage::Read));
@@ -101,7 +121,7 @@ pub(crate) fn open_with<'a>(
         Previous::Database(manifest) => Some(*manifest),
         Previous::Nothing | Previous::Damaged(_) => None,
     };
-    Ok(Run { job, area, ground, workers, stop: options.stop, database, records, tins: Tins::new(), previous })
+    Ok(Run { job, area, ground, workers, stop: options.stop, database, records, states, tins: Tins::new(), previous })
 }
 
 /// The finished database in `folder`, if a build of `job` would change nothing in it: made from the same job and the

@@ -29,6 +29,18 @@ pub enum CompileError {
         /// What to change.
         hint: String,
     },
+    /// The ground has heights that no source has: a fault of ours.
+    #[error(
+        "heights of the ground run from {:.2} m to {:.2} m, expected them within those of the sources, {:.2} m to \
+        {:.2} m",
+        found_m.0, found_m.1, expected_m.0, expected_m.1
+    )]
+    OutsideSources {
+        /// The lowest and the highest height of a part of the ground, in metres.
+        found_m: (f64, f64),
+        /// The same of all sources under the area.
+        expected_m: (f64, f64),
+    },
     /// A task panicked: a fault of ours.
     #[error("tile {tile} failed in stage {}: {message}", stage.name())]
     Panicked {
@@ -92,6 +104,9 @@ impl CompileError {
             CompileError::Source(error) => error.hint().map(str::to_owned),
             CompileError::Database(error) => error.hint().map(str::to_owned),
             CompileError::Impossible { hint, .. } => Some(hint.clone()),
+            CompileError::OutsideSources { .. } => {
+                Some("this is a fault of the compiler; other rules in dem.voids or dem.resampling may avoid it".into())
+            }
             CompileError::Panicked { .. } => {
                 Some("this is a fault of the compiler; what was published before is intact".to_owned())
             }

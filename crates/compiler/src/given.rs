@@ -5,7 +5,7 @@
 
 use std::path::Path;
 
-use job::{Job, NamedFile, Start, StartMethod};
+use job::{Job, NamedFile, OuterBorder, Start, StartMethod};
 use methods::{
     Boundary, Contours, Diagonal, Distance, Extrema, FowlerLittle, Ground as MethodGround, Impossible, LatticeTin,
     Splitting,
@@ -24,7 +24,7 @@ pub(crate) struct GivenPost {
     pub at: Post,
     /// Whether it is in whatever limits say.
     pub pinned: bool,
-    /// Whether it is on the outer border of the area, which no neighbour shares.
+    /// Whether it is on a fixed outer border of the area, where nothing else is chosen.
     pub outer: bool,
     /// The height it is to have, in quanta; the ground's where none is given.
     pub height: Option<i32>,
@@ -34,6 +34,8 @@ pub(crate) struct GivenPost {
 #[derive(Default)]
 pub(crate) struct Given {
     start: Option<(StartMethod, u64)>,
+    /// Whether the outer border has a point every border step and no others.
+    outer_is_fixed: bool,
     posts: Vec<GivenPost>,
     forbidden: Vec<Post>,
     /// Weights are multiplied by so many thousandths inside polygons; 0 leaves posts out.
@@ -46,7 +48,8 @@ impl Given {
     /// # Errors
     /// When a file cannot be used, or a point of it lies where it may not.
     pub fn open(job: &Job, area: &GamingArea) -> Result<Self, CompileError> {
-        let mut given = Self::default();
+        let outer_is_fixed = job.modules.outer_border == OuterBorder::Fixed;
+        let mut given = Self { outer_is_fixed, ..Self::default() };
         match &job.tin.start {
             Some(Start::Method { method, points }) => given.start = Some((*method, points.unwrap_or(0))),
             Some(Start::File(file)) => {
@@ -72,7 +75,7 @@ impl Given {
             let at = Lattice::of_area(area).post(&file.path, &feature, at)?;
             let height = height_of(&file.path, &feature)?;
             // What stands at a height of its own is fixed, as is a point on the outer border.
-            let outer = is_on_border(area.rect, at);
+            let outer = is_on_fixed_border(job, area, at);
             self.posts.push(GivenPost { at, pinned: outer || height.is_some(), outer, height });
         }
         Ok(())
@@ -84,14 +87,16 @@ impl Given {
             match (feature.pin.as_deref(), feature.shape.clone()) {
                 (Some("add"), GivenShape::Point(at)) => {
                     let at = Lattice::of_area(area).post(&file.path, &feature, at)?;
-                    self.posts.push(GivenPost { at, pinned: true, outer: is_on_border(area.rect, at), height });
+                    self.posts.push(GivenPost { at, pinned: true, outer: is_on_fixed_border(job, area, at), height });
                 }
                 (Some("height"), GivenShape::Point(at)) => {
                     if height.is_none() {
-                        return Err(wrong(&file.path, &feature, "a height pin without height_m", "height_m in metres"));
+                        let wrong = wrong(&file.path, &feature, "a height pin without height_m", "height_m in metres");
+                        let hint = "say how high: \"properties\": { \"pin\": \"height\", \"height_m\": 712.5 }";
+                        return Err(hinted(wrong, hint));
                     }
                     let at = Lattice::of_area(area).post(&file.path, &feature, at)?;
-                    self.posts.push(GivenPost { at, pinned: true, outer: is_on_border(area.rect, at), height });
+                    self.posts.push(GivenPost { at, pinned: true, outer: is_on_fixed_border(job, area, at), height });
                 }
                 (Some("forbid"), GivenShape::Point(at)) => {
                     let at = Lattice::of_area(area).post(&file.path, &feature, at)?;
@@ -108,7 +113,11 @@ impl Given {
                         pin.map_or(format!("a {shape} without pin"), |pin| format!("a {shape} with pin {pin:?}"));
                     let expected =
                         "a point with \"add\", \"forbid\" or \"height\", a polygon with \"importance\" or \"exclude\"";
-                    return Err(wrong(&file.path, &feature, &found, expected));
+                    let hint = match shape {
+                        "point" => "say what the point is for: \"properties\": { \"pin\": \"add\" }",
+                        _ => "say what the polygon is for: \"properties\": { \"pin\": \"importance\", \"factor\": 4 }",
+                    };
+                    return Err(hinted(wrong(&file.path, &feature, &found, expected), hint));
                 }
             }
         }
@@ -170,8 +179,9 @@ impl Given {
             let chosen = chosen(&MethodGround { dem, spacing }, method, share)
                 .map_err(|why| refused("tin.start", method, why))?;
             let known: std::collections::HashSet<Post> = found.iter().map(|post| post.at).collect();
-            // The outer border has its own points.
-            let fresh = chosen.into_iter().filter(|&at| !known.contains(&at) && !is_on_border(area.rect, at));
+            // A fixed outer border has its own points.
+            let is_fixed = |at: Post| self.outer_is_fixed && is_on_border(area.rect, at);
+            let fresh = chosen.into_iter().filter(|&at| !known.contains(&at) && !is_fixed(at));
             found.extend(fresh.map(|at| GivenPost { at, pinned: false, outer: false, height: None }));
         }
         Ok(found)
@@ -233,7 +243,7 @@ pub(crate) fn start_posts(given: &[GivenPost], rect: PostRect, open: terrain::Se
         .collect()
 }
 
-/// Given posts on the outer border of the area.
+/// Given posts on a fixed outer border of the area.
 pub(crate) fn border_posts(given: &[GivenPost]) -> impl Iterator<Item = Post> {
     given.iter().filter(|post| post.outer).map(|post| post.at)
 }
@@ -325,9 +335,18 @@ fn factor_of(path: &Path, feature: &GivenFeature) -> Result<u32, CompileError> {
         }
         _ => {
             let found = feature.factor.map_or("no factor".to_owned(), |factor| format!("a factor of {factor}"));
-            Err(wrong(path, feature, &found, "factor from 0.001 to 1000; to leave ground out, \"exclude\""))
+            let wrong = wrong(path, feature, &found, "factor from 0.001 to 1000; to leave ground out, \"exclude\"");
+            Err(hinted(
+                wrong,
+                "say how much more it matters: \"properties\": { \"pin\": \"importance\", \"factor\": 4 }",
+            ))
         }
     }
+}
+
+/// Whether a post lies on an outer border that has a point every border step and no others chosen.
+fn is_on_fixed_border(job: &Job, area: &GamingArea, at: Post) -> bool {
+    job.modules.outer_border == OuterBorder::Fixed && is_on_border(area.rect, at)
 }
 
 /// Refuses to forbid what is a vertex in any case.
@@ -340,7 +359,7 @@ fn refuse_fixed(
 ) -> Result<(), CompileError> {
     let side = area.grid.side_cells;
     let is_corner = at.row % side == 0 && at.col % side == 0;
-    let step = job.modules.border_step_cells;
+    let step = job.outer_step_cells();
     let on_border = is_on_border(area.rect, at) && at.row % step == 0 && at.col % step == 0;
     match (is_corner, on_border) {
         (true, _) => Err(wrong(
@@ -356,6 +375,16 @@ fn refuse_fixed(
             "another",
         )),
         _ => Ok(()),
+    }
+}
+
+/// `error` with another hint.
+fn hinted(error: CompileError, hint: &str) -> CompileError {
+    match error {
+        CompileError::Impossible { key, found, expected, .. } => {
+            CompileError::Impossible { key, found, expected, hint: hint.into() }
+        }
+        other => other,
     }
 }
 

@@ -10,6 +10,7 @@ use source_files::{VoidSummary, read_polygons};
 use terrain::{Dem, GridFrame, Importance, Post, PostRect, TileId};
 
 use crate::area::GamingArea;
+use crate::bounds::Bounds;
 use crate::census::Census;
 use crate::given::{GamingAreaFrame, Given, GivenPost};
 use crate::large::WHOLE_BYTES_MAX;
@@ -90,11 +91,13 @@ impl Ground {
                 voids: VoidSummary::default(),
                 warnings: Vec::new(),
                 accuracy_m: None,
+                range_m: None,
             },
             DemSource::Files { files, .. } => sources::open(job, area, files, workers, stop, whole_bytes_max)?,
         };
-        let Opened { source, voids, mut warnings, accuracy_m } = opened;
-        let mut relief = Relief { source, frame: area.frame, water: None };
+        let Opened { source, voids, mut warnings, accuracy_m, range_m } = opened;
+        let bounds = range_m.map(Bounds::of_metres);
+        let mut relief = Relief { source, frame: area.frame, water: None, bounds };
         let polygons = match &job.dem.water {
             None => Vec::new(),
             Some(water) => {

@@ -12,7 +12,10 @@ use geometry::Facet;
 use geometry::owned::{PostGrid, visit_residuals};
 use job::{Count, Job};
 use schedule::Workers;
-use terrain::{Dem, Importance, LoadModule, ModuleId, ModuleRect, Post, PostRect, THOUSANDTHS, metres_of_quanta};
+use terrain::{
+    Dem, GridFrame, Importance, LoadModule, ModuleGrid, ModuleId, ModuleRect, Post, PostRect, THOUSANDTHS,
+    metres_of_quanta,
+};
 
 use crate::CompileError;
 use crate::area::GamingArea;
@@ -25,8 +28,12 @@ use crate::verify::{job_of, read_modules};
 pub struct Inadequate {
     /// Name of the area.
     pub area: String,
-    /// EPSG code of its coordinate system.
+    /// Name of its coordinate system.
+    pub crs: String,
+    /// EPSG code of that.
     pub epsg: u32,
+    /// Where its posts lie.
+    pub frame: GridFrame,
     /// East and north of its south-west post, in metres.
     pub origin_m: [f64; 2],
     /// Metres between posts.
@@ -37,9 +44,11 @@ pub struct Inadequate {
     pub tolerance_m: f64,
     /// Weighted residual of each post in metres, row-major from the south; 0 at voids.
     pub residual_m: Vec<f32>,
-    /// Rows and columns of load modules.
-    pub modules: (u32, u32),
-    /// What each load module has of what is counted, row-major.
+    /// Its load modules.
+    pub grid: ModuleGrid,
+    /// What limits count: `triangles` or `polygons`.
+    pub count: &'static str,
+    /// What each load module has of that, row-major.
     pub counts: Vec<u32>,
     /// What it may have.
     pub per_module: u32,
@@ -101,12 +110,18 @@ pub fn inadequate(folder: &Path, tolerance_m: Option<f64>) -> Result<Inadequate,
     let frame = &area.frame;
     Ok(Inadequate {
         area: manifest.area.name.clone(),
+        crs: manifest.area.crs.clone(),
         epsg: job.area.epsg,
         origin_m: [frame.origin_east_m, frame.origin_north_m],
         spacing_m: frame.spacing.metres(),
         rect: area.rect,
         tolerance_m,
-        modules: (area.grid.rows, area.grid.cols),
+        frame: *frame,
+        grid: area.grid,
+        count: match job.limits.count {
+            Count::Triangles => "triangles",
+            Count::Polygons => "polygons",
+        },
         per_module: area.budget.per_module,
         components,
         counts,

@@ -9,7 +9,7 @@ use terrain::{PostRect, TileId};
 
 use crate::area::GamingArea;
 use crate::datums::{datum_of, judge_datums};
-use crate::sources::{Decoded, Source, area_crs, mosaic_rules, nothing_reaches, reading, warnings_of};
+use crate::sources::{Decoded, Source, area_crs, mosaic_rules, nothing_reaches, raised, reading, union, warnings_of};
 use crate::{CompileError, Stage};
 
 /// Bytes that rasters may take under an area and still be decoded whole.
@@ -49,6 +49,7 @@ pub(crate) fn open(
         return Ok(None);
     }
     let (mut used, mut datums, mut accuracy_m, mut all) = (Vec::new(), Vec::new(), None, Look::default());
+    let mut ranges_m = Vec::new();
     for (index, one) in reaching.iter().enumerate() {
         let look = look(one, workers, stop)?;
         if look.voids == look.posts {
@@ -60,8 +61,11 @@ pub(crate) fn open(
         warnings.append(&mut warnings_of(one.file.frame(), look.range_m, &look.notes));
         accuracy_m = [accuracy_m, one.file.accuracy_m()].into_iter().flatten().reduce(f64::max);
         datums.push((one.named, datum_of(one.named, &one.file)));
+        // What is not all void has a range.
+        let range_m = look.range_m.unwrap_or((0.0, 0.0));
+        ranges_m.push(range_m);
         all.add(Look { notes: Vec::new(), ..look });
-        used.push(index);
+        used.push((index, range_m.0));
     }
     match reaching.as_slice() {
         _ if !used.is_empty() => {}
@@ -72,19 +76,21 @@ pub(crate) fn open(
     drop(datums);
     warnings.extend(judged.warnings);
     let is_alone = judged.shifts.iter().all(Option::is_none) && is_alone(job, area, &reaching, &all)?;
-    for (&index, shift) in used.iter().zip(judged.shifts) {
+    let ranges =
+        ranges_m.into_iter().zip(&judged.shifts).map(|(range_m, shift)| raised(range_m, shift.as_ref(), area, &crs));
+    let range_m = ranges.reduce(union);
+    for (&(index, _), shift) in used.iter().zip(judged.shifts) {
         reaching[index].file.set_shift(shift);
     }
     let windows = Windows::new(reaching.into_iter().map(|one| one.file).collect(), CACHE_BYTES_MAX);
     let source = match is_alone {
         true => Source::Window(Box::new(windows)),
         false => {
-            let lowest_m = all.range_m.map_or(0.0, |(lowest, _)| lowest);
             let place = (&crs, &area.frame, area.rect);
-            Source::Wide(Box::new(WideMosaic::new(windows, &used, mosaic_rules(job), place, lowest_m)?))
+            Source::Wide(Box::new(WideMosaic::new(windows, &used, mosaic_rules(job), place)?))
         }
     };
-    Ok(Some(Decoded { source, warnings, accuracy_m }))
+    Ok(Some(Decoded { source, warnings, accuracy_m, range_m }))
 }
 
 /// Whether there is one raster, on the area's own system, whose posts need no projecting and none of which is void.

@@ -52,7 +52,13 @@ pub struct Suggestion {
     pub spacing_m: f64,
     /// Rows and columns of tiles.
     pub tiles: (u32, u32),
+    /// Longitude and latitude of the middle, where the area is a part only: the files are too large for one area, or
+    /// lie too far apart.
+    pub part_around: Option<[f64; 2]>,
 }
+
+/// Width and height of an area that is a part of what there is, in metres, about.
+const PART_M: f64 = 50_000.0;
 
 /// Sides that every job has unless it says otherwise, in metres.
 const SIDE_M: f64 = 500.0;
@@ -77,18 +83,41 @@ pub fn look_at(paths: &[PathBuf], given: Option<&str>) -> Result<Suggestion, Com
         expected: "rasters that an area can be laid into".into(),
         hint,
     };
-    let crs = area_crs(&frames).map_err(|none| impossible(none.found, none.hint))?;
-    let epsg = crs.epsg().expect("systems with a code only are chosen");
+    let none = |none: job::NoArea| impossible(none.found, none.hint);
+    let crs = area_crs(&frames).map_err(none)?;
     let spacing = spacing_for(&frames, &crs);
-    let (origin_m, size_m) =
-        covered(&frames, &crs, spacing, SIDE_M).map_err(|none| impossible(none.found, none.hint))?;
+    let (crs, spacing, (origin_m, size_m), part_around) = match covered(&frames, &crs, spacing, SIDE_M) {
+        Ok(found) => (crs, spacing, found, None),
+        Err(reason) => part(&frames[0]).ok_or(reason).map_err(none)?,
+    };
+    let epsg = crs.epsg().expect("systems with a code only are chosen");
     let modules = size_m.map(|metres| (metres / SIDE_M).round() as u32);
     if modules.iter().any(|&modules| modules < 2) {
         let found = format!("room for {} x {} load modules of {SIDE_M} m", modules[1], modules[0]);
         return Err(impossible(found, "two each way are the least; give more files, or a larger raster".into()));
     }
     let tiles = modules.map(|modules| ((f64::from(modules) / MODULES_A_TILE).round() as u32).clamp(1, modules / 2));
-    Ok(Suggestion { seen, epsg, origin_m, size_m, spacing_m: spacing.metres(), tiles: (tiles[1], tiles[0]) })
+    let (spacing_m, tiles) = (spacing.metres(), (tiles[1], tiles[0]));
+    Ok(Suggestion { seen, epsg, origin_m, size_m, spacing_m, tiles, part_around })
+}
+
+/// System, spacing, origin and size of an area in the middle of a raster, and where that middle is; `None` where the
+/// raster has no room for one.
+#[allow(clippy::type_complexity, reason = "it is taken apart at its only call")]
+fn part(frame: &RasterFrame) -> Option<(Crs, Spacing, ([f64; 2], [f64; 2]), Option<[f64; 2]>)> {
+    // The system of the middle: the zone of a continent's would not reach its sides.
+    let cut = |frame: &RasterFrame, posts: u32| {
+        let (rows, cols) = (frame.rows.min(posts), frame.cols.min(posts));
+        let south_west = frame.place((frame.rows - rows) / 2, (frame.cols - cols) / 2);
+        RasterFrame { south_west, rows, cols, ..frame.clone() }
+    };
+    let middle = cut(frame, 2);
+    let crs = area_crs(std::slice::from_ref(&middle)).ok()?;
+    let spacing = spacing_for(std::slice::from_ref(&middle), &crs);
+    let inner = cut(frame, (PART_M / spacing.metres()).ceil() as u32 + 1);
+    let found = covered(std::slice::from_ref(&inner), &crs, spacing, SIDE_M).ok()?;
+    let around = frame.crs.to(&Crs::wgs84(), middle.south_west)?;
+    Some((crs, spacing, found, Some(around)))
 }
 
 fn open(path: &Path, given: Option<&str>) -> Result<(DemFile, bool), CompileError> {

@@ -6,6 +6,7 @@ use serde_json::{Value, json};
 use terrain::{LatticePoint, TileId};
 
 use crate::assemble::{Assembled, crs};
+use crate::build::changed;
 use crate::refine::Published;
 use crate::report::Findings;
 use crate::run::{ALGORITHM_REVISION, Run};
@@ -63,6 +64,8 @@ pub(crate) fn publish(
         manifest.tile_mut(tile).expect("the manifest lists every tile").removed = removed;
     }
     manifest.totals = findings.totals(&report);
+    // The last moment: from here on the database says that it was made from these files.
+    changed(&run.states)?;
     run.database.finish(&manifest)?;
     progress.tell(Event::Leave(Stage::Publish));
     Ok(report)

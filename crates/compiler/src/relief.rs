@@ -6,6 +6,7 @@ use terrain::{Dem, GridFrame, PostRect};
 
 use crate::CompileError;
 use crate::area::GamingArea;
+use crate::bounds::Bounds;
 use crate::sources::Source;
 use crate::water::Water;
 
@@ -14,6 +15,8 @@ pub(crate) struct Relief {
     pub source: Source,
     pub frame: GridFrame,
     pub water: Option<Water>,
+    /// What heights must lie within before water is level; none for the sample terrain.
+    pub bounds: Option<Bounds>,
 }
 
 impl Relief {
@@ -37,7 +40,7 @@ impl Relief {
     /// # Errors
     /// As [`Relief::dem`].
     pub fn dry(&self, rect: PostRect) -> Result<Dem, CompileError> {
-        Ok(match &self.source {
+        let dem = match &self.source {
             Source::Sample(seed) => sample_terrain::heights(*seed, rect, self.frame.spacing),
             Source::Raster(raster) => raster.resample(&self.frame, rect)?,
             Source::Window(windows) => {
@@ -46,7 +49,9 @@ impl Relief {
             }
             Source::Mosaic(mosaic) => mosaic.resample(rect).dem(),
             Source::Wide(mosaic) => mosaic.resample(rect)?.dem(),
-        })
+        };
+        self.bounds.map_or(Ok(()), |bounds| bounds.hold(dem.range()))?;
+        Ok(dem)
     }
 
     /// Heights and how each came about, where there are several sources; water is level in it.
@@ -59,6 +64,11 @@ impl Relief {
             Source::Wide(mosaic) => mosaic.resample(rect)?,
             Source::Sample(_) | Source::Raster(_) | Source::Window(_) => return Ok(None),
         };
+        let highest = patch.heights.iter().copied().max();
+        if let (Some(bounds), Some(lowest), Some(highest)) = (self.bounds, patch.heights.iter().copied().min(), highest)
+        {
+            bounds.hold((lowest, highest))?;
+        }
         Ok(Some(match &self.water {
             Some(water) => water.flatten_patch(patch),
             None => patch,

@@ -3,13 +3,13 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use database::{
-    Report, ReportBefore, ReportBreach, ReportClass, ReportLevel, ReportPerModule, ReportPerWindow, ReportPoints,
-    ReportPool, ReportRefusals, ReportResidual, ReportStops, ReportVoids, Totals,
+    Report, ReportBefore, ReportBorder, ReportBreach, ReportClass, ReportLevel, ReportPart, ReportPerModule,
+    ReportPerWindow, ReportPoints, ReportPool, ReportRefusals, ReportResidual, ReportStops, ReportVoids, Totals,
 };
 use fidelity::{Residuals, Tally};
 use job::{Count, HOLE_CLASS_NAME};
 use limits::Windows;
-use terrain::{Breach, BreachKind, BreachPlace, ModuleId, RefusedBy, StopReason, metres_of_quanta};
+use terrain::{Breach, BreachKind, BreachPlace, ModuleId, ModuleResidual, RefusedBy, StopReason, metres_of_quanta};
 
 use crate::CompileError;
 use crate::assemble::{Assembled, ModuleNumbers};
@@ -66,6 +66,7 @@ impl Findings<'_> {
             pool: self.pool(&counts),
             before_removals: self.before_removals(),
             residual: residual_of(&total),
+            border: self.border(),
             residual_against_source: run.ground.relief.has_source_posts().then(|| self.at_source(&total)),
             classes: self.classes(residuals),
             levels: self.levels(),
@@ -175,6 +176,19 @@ impl Findings<'_> {
         let limit = self.run.area.budget.per_module;
         let above: u64 = counts.iter().map(|&count| u64::from(count.saturating_sub(limit))).sum();
         ReportPool { size: self.run.area.budget.pool, used: above.min(self.run.area.budget.pool) }
+    }
+
+    /// Load modules at the outer border and the others apart; `None` where there are no others.
+    fn border(&self) -> Option<ReportBorder> {
+        let grid = self.run.area.grid;
+        let at_border = |id: ModuleId| id.row == 0 || id.col == 0 || id.row + 1 == grid.rows || id.col + 1 == grid.cols;
+        let numbers = self.by_module();
+        let part = |wanted: bool| {
+            let modules = grid.all().iter().filter(|&id| at_border(id) == wanted);
+            part_of(modules.map(|id| numbers.get(id).residual))
+        };
+        let inside = part(false);
+        (0 < inside.posts).then(|| ReportBorder { at_border: part(true), inside })
     }
 
     fn classes(&self, residuals: &Residuals) -> Vec<ReportClass> {
@@ -319,16 +333,25 @@ impl Findings<'_> {
 
 /// Figures of one level from those of its load modules.
 fn level_figures<'a>(level: u32, inner_share: f64, modules: impl Iterator<Item = &'a ModuleNumbers>) -> ReportLevel {
-    let (mut triangles, mut posts, mut squares, mut largest) = (0, 0, 0u128, 0);
-    for ModuleNumbers { triangles: own, residual, .. } in modules {
-        triangles += u64::from(*own);
+    let mut triangles = 0;
+    let ReportPart { rms_m, max_m, .. } = part_of(modules.map(|numbers| {
+        triangles += u64::from(numbers.triangles);
+        numbers.residual
+    }));
+    ReportLevel { level, inner_share, triangles, rms_m, max_m }
+}
+
+/// Residuals of some load modules together.
+fn part_of(residuals: impl Iterator<Item = ModuleResidual>) -> ReportPart {
+    let (mut posts, mut squares, mut largest) = (0, 0u128, 0);
+    for residual in residuals {
         posts += u64::from(residual.posts);
         squares += u128::from(residual.sum_squared);
         largest = largest.max(residual.largest);
     }
     let metre = f64::from(terrain::QUANTA_PER_METRE);
     let rms_m = if posts == 0 { 0.0 } else { (squares as f64 / posts as f64).sqrt() / metre };
-    ReportLevel { level, inner_share, triangles, rms_m, max_m: f64::from(largest) / metre }
+    ReportPart { posts, rms_m, max_m: f64::from(largest) / metre }
 }
 
 fn refusals(refused: &Refused) -> ReportRefusals {

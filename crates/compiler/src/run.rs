@@ -6,6 +6,7 @@ use std::sync::atomic::AtomicBool;
 use database::{Database, FingerprintBuilder, Manifest, SourceRecord, Stamp};
 use job::Job;
 use schedule::{Event as Scheduled, RankedTasks, Workers, in_rank_order_observed};
+use source_files::FileState;
 use terrain::{TileId, TileTin};
 
 use crate::area::GamingArea;
@@ -14,7 +15,7 @@ use crate::tins::Tins;
 use crate::{CompileError, Event, Progress, Stage};
 
 /// Rises whenever the result of any stage may change for the same input; a test with golden hashes holds it.
-pub const ALGORITHM_REVISION: u32 = 2;
+pub const ALGORITHM_REVISION: u32 = 3;
 
 /// What a run needs from whoever starts it.
 #[derive(Clone, Copy, Debug)]
@@ -37,6 +38,8 @@ pub(crate) struct Run<'a> {
     pub database: Database,
     /// What the heights and weights are made from.
     pub records: Vec<SourceRecord>,
+    /// What those files were like before they were hashed.
+    pub states: Vec<FileState>,
     /// The TINs that this run has published or read.
     pub tins: Tins,
     /// What `database.json` said before this run.

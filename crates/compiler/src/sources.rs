@@ -7,8 +7,8 @@ use database::{Fingerprint, SourceRecord};
 use job::{AreaShape, DemSource, Job, Resampling, SourceFile, SourceSaid, Start, Voids};
 use schedule::Workers;
 use source_files::{
-    Crs, DemFile, Mosaic, MosaicRules, MosaicVoids, Raster, RasterFrame, Reading, SourceError, VoidPolicy, VoidSummary,
-    WideMosaic, Windows, window_under,
+    Crs, DatumShift, DemFile, FileState, Mosaic, MosaicRules, MosaicVoids, Raster, RasterFrame, Reading, SourceError,
+    VoidPolicy, VoidSummary, WideMosaic, Windows, window_under,
 };
 use terrain::{PostRect, TileId};
 
@@ -36,6 +36,8 @@ pub(crate) struct Opened {
     pub voids: VoidSummary,
     pub warnings: Vec<String>,
     pub accuracy_m: Option<f64>,
+    /// Between what the heights of the sources lie under the area, in metres above the job's datum.
+    pub range_m: Option<(f64, f64)>,
 }
 
 /// What was decoded of one file that is used, or of several.
@@ -44,6 +46,8 @@ pub(crate) struct Decoded<S> {
     pub warnings: Vec<String>,
     /// Vertical accuracy of the least accurate, in metres.
     pub accuracy_m: Option<f64>,
+    /// Lowest and highest height, in metres.
+    pub range_m: Option<(f64, f64)>,
 }
 
 /// Opens, judges and decodes the files of a job.
@@ -58,18 +62,18 @@ pub(crate) fn open(
     stop: &AtomicBool,
     whole_bytes_max: u64,
 ) -> Result<Opened, CompileError> {
-    if let Some(Decoded { source, warnings, accuracy_m }) =
+    let voids = VoidSummary::default();
+    if let Some(Decoded { source, warnings, accuracy_m, range_m }) =
         large::open(job, area, files, (workers, stop), whole_bytes_max)?
     {
-        return Ok(Opened { source, voids: VoidSummary::default(), warnings, accuracy_m });
+        return Ok(Opened { source, voids, warnings, accuracy_m, range_m });
     }
     if let Some((decoded, voids)) = open_alone(job, area, files, workers, stop)? {
-        let Decoded { source, warnings, accuracy_m } = decoded;
-        return Ok(Opened { source: Source::Raster(Box::new(source)), voids, warnings, accuracy_m });
+        let Decoded { source, warnings, accuracy_m, range_m } = decoded;
+        return Ok(Opened { source: Source::Raster(Box::new(source)), voids, warnings, accuracy_m, range_m });
     }
-    let Decoded { source, warnings, accuracy_m } = open_mosaic(job, area, files, workers, stop)?;
-    let voids = VoidSummary::default();
-    Ok(Opened { source: Source::Mosaic(Box::new(source)), voids, warnings, accuracy_m })
+    let Decoded { source, warnings, accuracy_m, range_m } = open_mosaic(job, area, files, workers, stop)?;
+    Ok(Opened { source: Source::Mosaic(Box::new(source)), voids, warnings, accuracy_m, range_m })
 }
 
 /// One raster on the area's own system whose posts need no projecting; `None` where that is not so.
@@ -109,8 +113,8 @@ fn open_alone(
         return Ok(None);
     }
     warnings.append(&mut raster_warnings(&raster));
-    let accuracy_m = opened.accuracy_m();
-    Ok(Some((Decoded { source: raster, warnings, accuracy_m }, voids)))
+    let (accuracy_m, range_m) = (opened.accuracy_m(), raster.range_m());
+    Ok(Some((Decoded { source: raster, warnings, accuracy_m, range_m }, voids)))
 }
 
 fn open_mosaic(
@@ -145,6 +149,11 @@ fn open_mosaic(
     }
     let mut judged = judge_datums(job, area, &datums)?;
     warnings.append(&mut judged.warnings);
+    let ranges = rasters
+        .iter()
+        .zip(&judged.shifts)
+        .filter_map(|(raster, shift)| Some(raised(raster.range_m()?, shift.as_ref(), area, &crs)));
+    let range_m = ranges.reduce(union);
     rasters.iter_mut().zip(judged.shifts).for_each(|(raster, shift)| raster.set_shift(shift));
     if let ([file], true) = (files, rasters.is_empty()) {
         return Err(SourceError::OutsideArea { path: file.path.clone() }.into());
@@ -153,7 +162,18 @@ fn open_mosaic(
         return Err(nothing_reaches());
     }
     let source = Mosaic::new(rasters, mosaic_rules(job), &crs, &area.frame, area.rect)?;
-    Ok(Decoded { source, warnings, accuracy_m })
+    Ok(Decoded { source, warnings, accuracy_m, range_m })
+}
+
+/// A range of heights, once they are brought to another datum.
+pub(crate) fn raised((low, high): (f64, f64), shift: Option<&DatumShift>, area: &GamingArea, crs: &Crs) -> (f64, f64) {
+    let (least, most) = shift.map_or((0.0, 0.0), |shift| shift.range_m(crs, &area.frame, area.rect));
+    (low + least, high + most)
+}
+
+/// The range of what lies in either of two.
+pub(crate) fn union((low, high): (f64, f64), (lower, higher): (f64, f64)) -> (f64, f64) {
+    (low.min(lower), high.max(higher))
 }
 
 pub(crate) fn nothing_reaches() -> CompileError {
@@ -239,37 +259,55 @@ pub(crate) fn decode(
 /// # Errors
 /// When a file cannot be read.
 pub(crate) fn records(job: &Job) -> Result<Vec<SourceRecord>, CompileError> {
-    let mut records = Vec::new();
-    match &job.dem.source {
-        DemSource::Sample { seed } => records.push(record(&format!("sample seed={seed}"), &seed.to_le_bytes())),
-        DemSource::Files { files, .. } => {
-            for file in files {
-                let attribution = file.said.attribution.clone();
-                records.push(SourceRecord { attribution, ..file_record(&file.written, &file.path)? });
-            }
-        }
+    let sample = match &job.dem.source {
+        DemSource::Sample { seed } => Some(record(&format!("sample seed={seed}"), &seed.to_le_bytes())),
+        DemSource::Files { .. } => None,
+    };
+    let files = named_files(job).into_iter().map(|file| {
+        let attribution = file.attribution.map(str::to_owned);
+        Ok(SourceRecord { attribution, ..file_record(file.written, file.path)? })
+    });
+    sample.into_iter().map(Ok).chain(files).collect()
+}
+
+/// What the files of a job are like now, so that one that changes during a build is noticed.
+///
+/// # Errors
+/// When one is not there, or no file.
+pub(crate) fn states(job: &Job) -> Result<Vec<FileState>, CompileError> {
+    named_files(job).into_iter().map(|file| Ok(FileState::of(file.path)?)).collect()
+}
+
+/// A file that a job names.
+struct Named<'a> {
+    written: &'a str,
+    path: &'a Path,
+    attribution: Option<&'a str>,
+}
+
+/// Every file that a job names, in the order of their records.
+fn named_files(job: &Job) -> Vec<Named<'_>> {
+    let mut all = Vec::new();
+    if let DemSource::Files { files, .. } = &job.dem.source {
+        all.extend(files.iter().map(|file| Named {
+            written: &file.written,
+            path: &file.path,
+            attribution: file.said.attribution.as_deref(),
+        }));
     }
-    for geoid in &job.dem.geoids {
-        records.push(file_record(&geoid.file.written, &geoid.file.path)?);
-    }
-    if let Some(water) = &job.dem.water {
-        records.push(file_record(&water.file.written, &water.file.path)?);
-    }
-    if let Some(Start::File(file)) = &job.tin.start {
-        records.push(file_record(&file.written, &file.path)?);
-    }
-    if let Some(file) = &job.tin.pins {
-        records.push(file_record(&file.written, &file.path)?);
-    }
-    for area in &job.importance.areas {
-        match &area.shape {
-            AreaShape::Polygons { file } | AreaShape::RasterValue { file, .. } => {
-                records.push(file_record(&file.written, &file.path)?);
-            }
-            AreaShape::Slope { .. } | AreaShape::Sample(_) => {}
-        }
-    }
-    Ok(records)
+    let geoids = job.dem.geoids.iter().map(|geoid| &geoid.file);
+    let water = job.dem.water.iter().map(|water| &water.file);
+    let start = job.tin.start.iter().filter_map(|start| match start {
+        Start::File(file) => Some(file),
+        Start::Method { .. } => None,
+    });
+    let areas = job.importance.areas.iter().filter_map(|area| match &area.shape {
+        AreaShape::Polygons { file } | AreaShape::RasterValue { file, .. } => Some(file),
+        AreaShape::Slope { .. } | AreaShape::Sample(_) => None,
+    });
+    let others = geoids.chain(water).chain(start).chain(&job.tin.pins).chain(areas);
+    all.extend(others.map(|file| Named { written: &file.written, path: &file.path, attribution: None }));
+    all
 }
 
 /// The record of a file that a build was made from.

@@ -2,7 +2,7 @@
 
 use std::ops::Deref;
 
-use job::{Allocation, Borders, Budget as PointBudget, Edges, Effort, ErrorKey, Job, LastBatch, Method};
+use job::{Allocation, Borders, Budget as PointBudget, Edges, Effort, ErrorKey, Job, LastBatch, Method, OuterBorder};
 use limits::Allowance;
 use terrain::{LatticePoint, ModuleId, ModuleRect, Post, SeamSides, Side, TileId, TileTin, Vertex};
 use tiling::{Tiling, outer_border_posts, outer_sides};
@@ -42,15 +42,21 @@ pub(crate) fn tile_refinement(
 /// The growth of one tile, inheriting `inherited` from its lower-ranked neighbours.
 fn tile_task(job: &Job, area: &GamingArea, tile: TileId, budget: &TileBudget, inherited: Vec<Post>) -> TileTask {
     let rect = area.tiling.rect(tile);
-    let regular = job.tiles.borders == Borders::Regular;
-    let border_sides = if regular { SeamSides::OPEN } else { outer_sides(rect, area.rect) };
-    let seams = if regular { SeamSides::CLOSED } else { area.tiling.owned_sides(tile) };
+    let (border, seams) = match job.tiles.borders {
+        Borders::Regular => {
+            (outer_border_posts(rect, SeamSides::OPEN, job.modules.border_step_cells), SeamSides::CLOSED)
+        }
+        Borders::Inherit => (
+            outer_border_posts(rect, outer_sides(rect, area.rect), job.outer_step_cells()),
+            with_outer_sides(job, area, tile, area.tiling.owned_sides(tile)),
+        ),
+    };
     let points = budget.points;
     TileTask {
         tile,
         rect,
         frame: frame(job, area, tile, budget.allowance.clone()),
-        border: outer_border_posts(rect, border_sides, job.modules.border_step_cells),
+        border,
         inherited,
         kept: Vec::new(),
         start: Vec::new(),
@@ -65,6 +71,17 @@ fn tile_task(job: &Job, area: &GamingArea, tile: TileId, budget: &TileBudget, in
                 false => job.tin.target_rms_m.map(|rms| rms * f64::from(terrain::QUANTA_PER_METRE)),
             },
         },
+    }
+}
+
+/// `sides` of a tile, and those on the outer border where points are chosen there: nothing but limits binds them.
+pub(crate) fn with_outer_sides(job: &Job, area: &GamingArea, tile: TileId, sides: SeamSides) -> SeamSides {
+    match job.modules.outer_border {
+        OuterBorder::Fixed => sides,
+        OuterBorder::Refined => {
+            let outer = outer_sides(area.tiling.rect(tile), area.rect);
+            SeamSides::from_fn(|side| sides.is_open(side) || outer.is_open(side))
+        }
     }
 }
 
@@ -149,7 +166,7 @@ pub(crate) fn survey_task(job: &Job, area: &GamingArea, tile: TileId) -> SurveyT
     let allowance = survey_allowance(area, modules, share(room) as u32);
     let budget = TileBudget { points, allowance: Some(allowance), rms_quanta: None };
     let mut growth = tile_task(job, area, tile, &budget, Vec::new());
-    growth.seams = area.tiling.shared_sides(tile);
+    growth.seams = with_outer_sides(job, area, tile, area.tiling.shared_sides(tile));
     // An RMS of 0 is never reached, but has the sums of squares recorded.
     growth.stop = Stop { points, value: None, rms_quanta: job.tin.target_rms_m.map(|_| 0.0) };
     if let Rule::Batches { .. } = growth.rule {
@@ -158,7 +175,8 @@ pub(crate) fn survey_task(job: &Job, area: &GamingArea, tile: TileId) -> SurveyT
     if let Rule::LargestSquares { guard } = &mut growth.rule {
         *guard = None;
     }
-    SurveyTask { growth, owned: area.tiling.owned_sides(tile), grid: area.grid, cost }
+    let owned = with_outer_sides(job, area, tile, area.tiling.owned_sides(tile));
+    SurveyTask { growth, owned, grid: area.grid, cost }
 }
 
 /// Load modules to their limit (or beyond it by the pool), no windows.

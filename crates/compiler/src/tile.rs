@@ -19,7 +19,7 @@ use crate::report::Findings;
 use crate::run::{Options, Run, Worked};
 use crate::sums::{Adding, Sums};
 use crate::survey::{Shares, allocate};
-use crate::tasks::{inherited, is_surveyed, posts_of, side_vertices, tile_refinement};
+use crate::tasks::{inherited, is_surveyed, posts_of, side_vertices, tile_refinement, with_outer_sides};
 use crate::{CompileError, Event, Progress, Stage};
 
 /// A tile that was run again.
@@ -252,7 +252,7 @@ fn refine_frozen(run: &Run, shares: &Shares, tins: &[Published], tile: TileId) -
     let own = outgoing(run, &*run.tin(tile, &tins[index].stamp)?);
     task.kept = posts_of(&own);
     task.kept.retain(|post| !task.inherited.contains(post));
-    task.seams = SeamSides::CLOSED;
+    task.seams = with_outer_sides(run.job, &run.area, tile, SeamSides::CLOSED);
     if let Some(points) = &mut task.stop.points {
         // Seam points were selected once; load-module corners and regular border points among them never were.
         let side = run.area.grid.side_cells;

@@ -13,6 +13,7 @@ use terrain::{LoadModule, ModuleId, Side};
 
 use crate::CompileError;
 use crate::area::GamingArea;
+use crate::bounds::Bounds;
 use crate::ground::{Ground, Window};
 use crate::recount;
 use crate::report::residual_of;
@@ -251,8 +252,13 @@ fn recompute(
     job.importance.areas.clear();
     let ground = Ground::open(&job, area, &Workers::new(1), &AtomicBool::new(false))?;
     let mut all = Residuals::default();
+    let mut bounds = ground.relief.bounds;
     for &tile in &area.tiles {
         let window = ground.tile(area, tile)?;
+        // Water may lie below any shore, and points may be given any height.
+        let told =
+            window.given.iter().filter_map(|given| given.height).chain([window.dem.range().0, window.dem.range().1]);
+        bounds = bounds.map(|bounds| told.fold(bounds, Bounds::and));
         for (level, modules) in levels.iter().enumerate() {
             let ids = area.tiling.modules(tile, area.grid);
             let mut own: Vec<LoadModule> = ids.iter().filter_map(|module| modules.get(&module).cloned()).collect();
@@ -264,7 +270,31 @@ fn recompute(
             problems.extend(of_level.into_iter().map(|problem| at_level(level, problem)));
         }
     }
+    if let Some(bounds) = bounds {
+        problems.extend(outside(&levels[0], bounds, &all));
+    }
     Ok(all)
+}
+
+/// Vertices that lie outside the heights of the sources by more than the surface misses any post: fitted heights
+/// reach beyond by as much at most.
+fn outside(modules: &Modules, bounds: Bounds, residuals: &Residuals) -> Option<String> {
+    let largest_m = residual_of(&residuals.total()).max_m;
+    let outside_m = |vertex: &terrain::ModuleVertex| bounds.metres_outside(vertex.z);
+    let is_outside = |vertex: &&terrain::ModuleVertex| largest_m + 1.0 < outside_m(vertex);
+    let outside =
+        modules.values().flat_map(|module| module.vertices.iter().filter(is_outside).map(move |v| (module.id, v)));
+    let (count, worst) = outside.fold((0, None), |(count, worst): (usize, Option<(ModuleId, f64)>), (id, vertex)| {
+        let found = (id, outside_m(vertex));
+        (count + 1, Some(worst.filter(|worst| found.1 <= worst.1).unwrap_or(found)))
+    });
+    let (low, high) = bounds.metres();
+    worst.map(|(id, metres)| {
+        format!(
+            "heights: {count} vertices lie outside those of the DEM ({low:.2} m to {high:.2} m), the worst by \
+            {metres:.2} m in load module {id}"
+        )
+    })
 }
 
 /// Load modules, measured just now, whose residuals are not those of a second opinion or of their files.

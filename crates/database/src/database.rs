@@ -273,6 +273,10 @@ fn examine(folder: &Folder, area: &Area) -> Result<Previous, DatabaseError> {
     match fs::metadata(dir) {
         Ok(found) if found.is_dir() => {}
         Ok(_) => return Err(DatabaseError::NotOurFolder { path: dir.to_path_buf(), found: "a file".into() }),
+        Err(_) if dir.is_symlink() => {
+            let found = "a link that leads nowhere".into();
+            return Err(DatabaseError::NotOurFolder { path: dir.to_path_buf(), found });
+        }
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Previous::Nothing),
         Err(source) => return Err(DatabaseError::from_io("open", dir, 0, source)),
     }
@@ -284,7 +288,7 @@ fn examine(folder: &Folder, area: &Area) -> Result<Previous, DatabaseError> {
             manifest.check_area(&folder.path(files::DATABASE), area)?;
             return Ok(Previous::Database(Box::new(manifest)));
         }
-        Err(DatabaseError::Missing { .. }) => None,
+        Err(DatabaseError::Missing { .. } | DatabaseError::NotADatabase { .. }) => None,
         Err(error @ (DatabaseError::WrongChecksum { .. } | DatabaseError::Malformed { .. })) => Some(error),
         Err(error) => return Err(error),
     };

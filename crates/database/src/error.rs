@@ -1,11 +1,14 @@
 //! Why a file of ours could not be written, or not be believed when read.
 
+use std::fmt;
 use std::io::{Error, ErrorKind};
 use std::path::{Path, PathBuf};
 
 use load_module_reader::ReadError;
 use terrain::{LoadModuleFault, ModuleId, TinFault};
 use thiserror::Error as ThisError;
+
+use crate::folder::{MODULES, SURVEY, TILES, WORK, files};
 
 /// Why a file of ours could not be written, or not be believed when read.
 #[derive(Debug, ThisError)]
@@ -43,6 +46,14 @@ pub enum DatabaseError {
     Missing {
         /// The file.
         path: PathBuf,
+    },
+    /// What was named as a database is none.
+    #[error("{}: found {found}, expected the folder of a terrain database", path.display())]
+    NotADatabase {
+        /// What was named.
+        path: PathBuf,
+        /// What it is.
+        found: NotADatabase,
     },
     /// The folder holds something that no build wrote.
     #[error("{}: found {found:?}, expected an empty folder or a terrain database", path.display())]
@@ -190,6 +201,67 @@ pub enum DatabaseError {
     },
 }
 
+/// What lies where a database was looked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum NotADatabase {
+    /// Nothing.
+    Nothing,
+    /// A link whose target is gone.
+    DanglingLink,
+    /// A file whose name is that of a job.
+    Job,
+    /// A file inside a database.
+    PartOfOne,
+    /// Any other file.
+    File,
+    /// A folder that no build made.
+    OtherFolder,
+}
+
+impl NotADatabase {
+    /// What `dir`, in which there is no `database.json`, is; `None` for the folder of a build that has not begun to
+    /// publish.
+    pub(crate) fn of(dir: &Path) -> Option<Self> {
+        let is_unfinished = || [TILES, MODULES, SURVEY, WORK].iter().any(|name| dir.join(name).is_dir());
+        let is_job = || dir.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml"));
+        let is_inside = || dir.parent().is_some_and(|around| around.join(files::DATABASE).is_file());
+        match std::fs::metadata(dir) {
+            Ok(found) if found.is_dir() => (!is_unfinished()).then_some(Self::OtherFolder),
+            Ok(_) if is_job() => Some(Self::Job),
+            Ok(_) if is_inside() => Some(Self::PartOfOne),
+            Ok(_) => Some(Self::File),
+            Err(_) if dir.is_symlink() => Some(Self::DanglingLink),
+            Err(_) => Some(Self::Nothing),
+        }
+    }
+
+    fn hint(self) -> &'static str {
+        match self {
+            Self::Nothing | Self::DanglingLink => {
+                "check the path; `tiefort build JOB.toml` leaves its database in NAME.tdb, NAME being area.name"
+            }
+            Self::Job => {
+                "that is a job; name what `tiefort build` made of it: the folder NAME.tdb, NAME being area.name"
+            }
+            Self::PartOfOne => "name the folder that this file lies in",
+            Self::File => "name the folder that `tiefort build` left, such as ntc.tdb",
+            Self::OtherFolder => "there is no database.json in it; name the folder that `tiefort build` left",
+        }
+    }
+}
+
+impl fmt::Display for NotADatabase {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Nothing => "nothing there",
+            Self::DanglingLink => "a link that leads nowhere",
+            Self::Job => "a job file",
+            Self::PartOfOne | Self::File => "a file",
+            Self::OtherFolder => "another folder",
+        })
+    }
+}
+
 impl DatabaseError {
     /// Sorts what the system said about `path` while we were to `action` ("write `bytes` bytes", 0 if it was no write).
     pub(crate) fn from_io(action: &'static str, path: &Path, bytes: u64, source: Error) -> Self {
@@ -213,6 +285,7 @@ impl DatabaseError {
         Some(match self {
             Self::DiskFull { .. } => "free some space and run the same command again; finished tiles are kept",
             Self::NotWritable { .. } => "choose another folder with --out",
+            Self::NotADatabase { found, .. } => found.hint(),
             Self::NotOurFolder { .. } => "choose another folder with --out, or empty this one",
             Self::NotAFolder { .. } | Self::NotAFile { .. } => {
                 "output never follows a link out of its folder; remove it"

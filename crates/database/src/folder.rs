@@ -9,8 +9,8 @@ use terrain::{GainCurve, LoadModule, TileId, TileTin};
 
 use crate::frame::{FRAME_BYTES, Kind};
 use crate::{
-    DatabaseError, FileStamp, Manifest, Measured, Removals, Report, Stamp, TileModules, Work, codec, curve_file, frame,
-    json, measured_file, removals_file, slm, tile_file,
+    DatabaseError, FileStamp, Manifest, Measured, NotADatabase, Removals, Report, Stamp, TileModules, Work, codec,
+    curve_file, frame, json, measured_file, removals_file, slm, tile_file,
 };
 
 /// Names of files inside the directory.
@@ -96,7 +96,19 @@ impl Folder {
     /// When it is missing, damaged or of another format version.
     pub fn manifest(&self) -> Result<Manifest, DatabaseError> {
         let path = self.path(files::DATABASE);
-        Manifest::decode(&path, &read(&path)?)
+        let bytes = read(&path).map_err(|error| self.without(error))?;
+        Manifest::decode(&path, &bytes)
+    }
+
+    /// What it means that a file which every database has could not be read: `error`, or that this is no database.
+    fn without(&self, error: DatabaseError) -> DatabaseError {
+        let found = if self.path(files::DATABASE).is_file() { None } else { NotADatabase::of(&self.dir) };
+        match (found, &error) {
+            (Some(found), DatabaseError::Missing { .. } | DatabaseError::Io { .. }) => {
+                DatabaseError::NotADatabase { path: self.dir.clone(), found }
+            }
+            _ => error,
+        }
     }
 
     /// What processes that share the directory leave for one another during the run of this name.
@@ -109,7 +121,7 @@ impl Folder {
     /// # Errors
     /// When it is missing or damaged.
     pub fn report(&self) -> Result<Report, DatabaseError> {
-        self.read_json(files::REPORT)
+        self.read_json(files::REPORT).map_err(|error| self.without(error))
     }
 
     /// The TIN of `tile`, and what it was made from.

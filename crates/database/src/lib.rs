@@ -19,7 +19,7 @@
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 mod error;
-pub use error::DatabaseError;
+pub use error::{DatabaseError, NotADatabase};
 mod fingerprint;
 pub use fingerprint::{Fingerprint, FingerprintBuilder};
 mod codec;
@@ -46,9 +46,9 @@ pub use manifest::{
 };
 mod report;
 pub use report::{
-    Report, ReportBefore, ReportBound, ReportBreach, ReportClass, ReportLevel, ReportPerModule, ReportPerWindow,
-    ReportPlace, ReportPoints, ReportPool, ReportRefusals, ReportResidual, ReportStage, ReportStops, ReportTile,
-    ReportVoids,
+    Report, ReportBefore, ReportBorder, ReportBound, ReportBreach, ReportClass, ReportLevel, ReportPart,
+    ReportPerModule, ReportPerWindow, ReportPlace, ReportPoints, ReportPool, ReportRefusals, ReportResidual,
+    ReportStage, ReportStops, ReportTile, ReportVoids,
 };
 mod lock;
 mod publish;

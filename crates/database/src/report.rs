@@ -35,6 +35,9 @@ pub struct Report {
     pub before_removals: Option<ReportBefore>,
     /// Against the working grid, every post counted once.
     pub residual: ReportResidual,
+    /// The same, of load modules at the outer border of the area and of the others apart.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub border: Option<ReportBorder>,
     /// Against the posts of the source DEM.
     pub residual_against_source: Option<ReportResidual>,
     /// The same for each class of the mask, in the job's order.
@@ -160,6 +163,26 @@ pub struct ReportResidual {
     pub p95_m: f64,
     /// 99 of 100 posts are within.
     pub p99_m: f64,
+}
+
+/// Residuals of load modules at the outer border of the area, and of the others.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ReportBorder {
+    /// Of load modules with a side on the outer border.
+    pub at_border: ReportPart,
+    /// Of all others.
+    pub inside: ReportPart,
+}
+
+/// Residuals of a part of the area, in metres.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ReportPart {
+    /// Posts that count.
+    pub posts: u64,
+    /// Root mean square.
+    pub rms_m: f64,
+    /// Largest.
+    pub max_m: f64,
 }
 
 /// One class of the mask.
@@ -344,6 +367,7 @@ mod tests {
             pool: ReportPool::default(),
             before_removals: Some(ReportBefore { removed: 3, ..ReportBefore::default() }),
             residual: ReportResidual { rms_m: 1.1, max_m: 9.0, mean_abs_m: 0.7, p95_m: 2.0, p99_m: 3.3 },
+            border: None,
             residual_against_source: None,
             classes: vec![],
             levels: vec![ReportLevel { level: 1, inner_share: 0.5, triangles: 20, rms_m: 1.5, max_m: 11.25 }],

@@ -140,6 +140,7 @@ pub(crate) fn report() -> Report {
         pool: ReportPool { size: 0, used: 0 },
         before_removals: None,
         residual,
+        border: None,
         residual_against_source: None,
         classes: Vec::new(),
         levels: vec![],

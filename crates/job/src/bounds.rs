@@ -37,6 +37,9 @@ pub const SOURCES_MAX: usize = 65_536;
 /// Characters of a name: leaves room in the 255 bytes of a file name for what is put behind it.
 pub const NAME_CHARS_MAX: usize = 100;
 
+/// Characters of a title: a line that a page can show.
+pub const TITLE_CHARS_MAX: usize = 200;
+
 /// Triangles in a load module: its vertices are named by 16 bits.
 pub const PER_MODULE_MAX: u64 = u16::MAX as u64;
 
@@ -71,3 +74,5 @@ pub const DATUM_CHARS_MAX: usize = 64;
 pub const SMOOTH_M_MAX: f64 = 10_000.0;
 /// Slope in percent of a wall nearly upright.
 pub const SLOPE_PERCENT_MAX: f64 = 10_000.0;
+/// Files and folders that a pattern may look at: more than any archive of rasters has, and a few seconds.
+pub const VISITED_MAX: usize = 500_000;

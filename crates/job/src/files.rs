@@ -9,7 +9,7 @@ use std::fs;
 use std::io::Read;
 use std::path::{Component, Path, PathBuf};
 
-use crate::bounds::{JOB_BYTES_MAX, SOURCES_MAX};
+use crate::bounds::{JOB_BYTES_MAX, SOURCES_MAX, VISITED_MAX};
 use crate::{AreaShape, DemSource, Fault, FindArea, Job, JobError, NamedFile, SourceFile, Start, read};
 
 /// A file that the job mentions: where its name stands in the job, and the fault to tell if it is not there.
@@ -164,6 +164,10 @@ fn check_named(named: &NamedFile, folder: &Path, fault: &Fault) -> Result<(), Jo
             format!("its files are {}/*.tif", named.written.trim_end_matches('/')),
         ));
     }
+    if !data.is_file() {
+        let hint = "a pipe or a device cannot be read twice: copy what it gives into a file".to_owned();
+        return Err(no_such("which is a pipe, a socket or a device", hint));
+    }
     if named.path.is_symlink() {
         let home = named.path.parent().unwrap_or(Path::new("")).to_owned();
         refuse_outside(&named.path, &home, fault)?;
@@ -196,7 +200,8 @@ fn matches_of(written: &str, folder: &Path, fault: &Fault) -> Result<Vec<NamedFi
     let (start, rest) = split_pattern(written);
     let home = folder.join(&start);
     let below = glob::Pattern::escape(&home.to_string_lossy());
-    let pattern = if below.is_empty() { rest } else { Path::new(&below).join(rest) };
+    let pattern = if below.is_empty() { rest.clone() } else { Path::new(&below).join(&rest) };
+    refuse_far(&home, &rest, fault)?;
     let paths = glob::glob_with(&pattern.to_string_lossy(), options).map_err(|error| {
         let (expected, hint) = (format!("a pattern ({})", error.msg), "* is any part of a name, ** any folders".into());
         JobError::OutOfRange(Box::new(Fault { expected, hint, ..fault.clone() }))
@@ -210,6 +215,32 @@ fn matches_of(written: &str, folder: &Path, fault: &Fault) -> Result<Vec<NamedFi
         return Err(JobError::NoSuchFile(Box::new(Fault { found, expected, hint, ..fault.clone() })));
     }
     paths.into_iter().map(|path| matched(path, folder, &home, fault)).collect()
+}
+
+/// Refuses a pattern that would have to look at more files than any folder of rasters holds.
+fn refuse_far(home: &Path, rest: &Path, fault: &Fault) -> Result<(), JobError> {
+    let parts: Vec<Component> = rest.components().collect();
+    let is_deep = parts.iter().any(|part| part.as_os_str() == "**");
+    let depth = if is_deep { usize::MAX } else { parts.len() };
+    let start = if home.as_os_str().is_empty() { Path::new(".") } else { home };
+    let (mut folders, mut seen) = (vec![(start.to_owned(), 1)], 0);
+    while let Some((folder, level)) = folders.pop() {
+        for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+            seen += 1;
+            // Wildcards pass over names that begin with a dot; a link may lead anywhere.
+            let is_below = level < depth && entry.file_type().is_ok_and(|kind| kind.is_dir());
+            if is_below && !entry.file_name().to_string_lossy().starts_with('.') {
+                folders.push((entry.path(), level + 1));
+            }
+        }
+        if VISITED_MAX < seen {
+            let found = format!("{}, below which there are more than {VISITED_MAX} files", fault.found);
+            let expected = format!("a pattern that looks at {VISITED_MAX} files at most");
+            let hint = "begin it with the folder that holds the rasters, such as \"dem/**/*.tif\"".to_owned();
+            return Err(JobError::OutOfRange(Box::new(Fault { found, expected, hint, ..fault.clone() })));
+        }
+    }
+    Ok(())
 }
 
 /// A file that a pattern found, named as the job would name it.

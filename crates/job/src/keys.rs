@@ -17,6 +17,7 @@ const SECTIONS: [(&str, &[Key]); 8] = [
 
 const AREA: &[Key] = &[
     ("name", "name = \"ntc\""),
+    ("title", "title = \"National Training Center, west\""),
     ("crs", "crs = \"EPSG:32611\""),
     ("origin_m", "origin_m = [505000, 3875000]"),
     ("size_m", "size_m = [50000, 50000]"),
@@ -54,6 +55,7 @@ const TILES: &[Key] = &[
 const LOAD_MODULES: &[Key] = &[
     ("side_m", "side_m = 500"),
     ("border_step_m", "border_step_m = 125"),
+    ("outer_border", "outer_border = \"refined\""),
     ("edges", "edges = \"constrained\""),
     ("clip_heights", "clip_heights = \"coplanar\""),
 ];

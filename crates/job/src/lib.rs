@@ -16,8 +16,8 @@ mod model;
 pub use model::{
     Allocation, Area, AreaShape, Borders, Budget, ClipHeights, Count, DemSource, DemSpec, Edges, Effort, ErrorKey,
     HOLE_CLASS_NAME, HeightFit, ImportanceArea, ImportanceSpec, Job, LastBatch, Lattice, LimitsSpec, Method,
-    ModulesSpec, NamedFile, Optimising, Proximity, Resampling, SampleClass, Smooth, SourceEntry, SourceFile,
-    SourceSaid, TileOrder, TilesSpec, TinSpec, Voids, WindowLimit,
+    ModulesSpec, NamedFile, Optimising, OuterBorder, Proximity, Resampling, SampleClass, Smooth, SourceEntry,
+    SourceFile, SourceSaid, TileOrder, TilesSpec, TinSpec, Voids, WindowLimit,
 };
 mod ground;
 pub use ground::{GeoidSpec, WaterSpec};

@@ -34,6 +34,8 @@ pub struct Job {
 pub struct Area {
     /// Name of the area: letters, digits, `-`, `_` and `.`, fit for a file name.
     pub name: String,
+    /// What stands above the report's page; the name where the job gives none.
+    pub title: Option<String>,
     /// EPSG code of the projected coordinate system, in metres.
     pub epsg: u32,
     /// East and north of the south-west post, in metres.
@@ -264,8 +266,19 @@ pub struct ModulesSpec {
     pub border_step_m: f64,
     /// The same in cells of the working grid.
     pub border_step_cells: i32,
+    /// Which points the outer border of the area has.
+    pub outer_border: OuterBorder,
     /// How load modules get their sides.
     pub edges: Edges,
+}
+
+/// Which points the outer border of the area has, beside the corners of load modules.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum OuterBorder {
+    /// Those that the ground asks for, within the limits.
+    Refined,
+    /// One every border step, and no others: areas that are built apart meet there.
+    Fixed,
 }
 
 /// How load modules get their sides.
@@ -452,6 +465,15 @@ pub enum Allocation {
 }
 
 impl Job {
+    /// Cells between the points that every build puts on the outer border; the side of a load module where there are
+    /// only its corners.
+    pub fn outer_step_cells(&self) -> i32 {
+        match self.modules.outer_border {
+            OuterBorder::Refined => self.area.grid.side_cells,
+            OuterBorder::Fixed => self.modules.border_step_cells,
+        }
+    }
+
     /// The folder that paths in the job are relative to.
     pub fn folder(&self) -> &Path {
         self.path.parent().unwrap_or(Path::new(""))

@@ -7,8 +7,8 @@ use terrain::{THOUSANDTHS, metres_of_quanta};
 
 use crate::{
     Allocation, AreaShape, Borders, Budget, ClipHeights, Count, DemSource, Edges, Effort, ErrorKey, GeoidSpec,
-    HeightFit, ImportanceArea, Job, LastBatch, Lattice, LodBorder, LodSpec, Method, Optimising, Resampling,
-    SampleClass, Smooth, SourceEntry, Start, TileOrder, TinSpec, Voids, WaterSpec,
+    HeightFit, ImportanceArea, Job, LastBatch, Lattice, LodBorder, LodSpec, Method, Optimising, OuterBorder,
+    Resampling, SampleClass, Smooth, SourceEntry, Start, TileOrder, TinSpec, Voids, WaterSpec,
 };
 
 /// One setting of a job.
@@ -56,6 +56,9 @@ impl Job {
     fn describe_area(&self, list: &mut List) {
         let area = &self.area;
         list.add("area.name", quoted(&area.name), "name of the area");
+        if let Some(title) = &area.title {
+            list.add("area.title", quoted(title), "what stands above the report's page");
+        }
         list.add("area.crs", quoted(&format!("EPSG:{}", area.epsg)), "projected coordinate system, in metres");
         list.add("area.origin_m", pair(area.origin_m), "east and north of the south-west post");
         let (rows, cols) = (area.grid.rows, area.grid.cols);
@@ -214,8 +217,20 @@ impl Job {
         list.add(
             "load_modules.border_step_m",
             number(modules.border_step_m),
-            format!("between points on the outer border, {steps}"),
+            format!("between points on a fixed outer border, {steps}"),
         );
+        match modules.outer_border {
+            OuterBorder::Refined => list.add(
+                "load_modules.outer_border",
+                quoted("refined"),
+                "points on the outer border are chosen as others are, within the limits",
+            ),
+            OuterBorder::Fixed => list.add(
+                "load_modules.outer_border",
+                quoted("fixed"),
+                "a point every border step and no others, as in an area beside this one",
+            ),
+        }
         match modules.edges {
             Edges::Constrained => list.add(
                 "load_modules.edges",

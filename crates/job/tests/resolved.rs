@@ -51,6 +51,17 @@ fn the_shortest_job_has_the_documented_defaults() {
 }
 
 #[test]
+fn a_title_is_listed_and_kept_where_it_is_given_and_nowhere_else() {
+    let plain = job(SHORTEST);
+    assert_eq!(plain.area.title, None);
+    assert!(!plain.canonical_text().contains("title"));
+    let titled = job(&SHORTEST.replace("[area]", "[area]\ntitle = \"Fort \\\"Irwin\\\", west – 2026\""));
+    assert_eq!(titled.area.title.as_deref(), Some("Fort \"Irwin\", west – 2026"));
+    assert!(titled.describe().iter().any(|setting| setting.key == "area.title"));
+    assert_eq!(job(&titled.canonical_text()).area, titled.area);
+}
+
+#[test]
 fn the_window_covers_four_kilometres() {
     let sized = |side: u32, step: u32| {
         let size = side * 60;
@@ -219,7 +230,11 @@ fn every_setting_is_described_with_value_and_meaning() {
             r#"tiles.order = "colour": four colours: most tiles at once"#,
             r#"tiles.borders = "inherit": a tile takes over the border points of its lower-ranked neighbours"#,
             "load_modules.side_m = 500: a side of a load module, 40 cells",
-            "load_modules.border_step_m = 125: between points on the outer border, 10 cells",
+            "load_modules.border_step_m = 125: between points on a fixed outer border, 10 cells",
+            concat!(
+                r#"load_modules.outer_border = "refined": points on the outer border are chosen as others are, "#,
+                "within the limits"
+            ),
             r#"load_modules.edges = "constrained": module lines are edges of the TIN from the start"#,
             r#"limits.count = "triangles": limits count triangles"#,
             "limits.per_load_module = 100: triangles in one load module",

@@ -1,6 +1,6 @@
 //! Which load modules a point adds triangles to.
 
-use terrain::ModuleId;
+use terrain::{ModuleId, ModuleRect};
 
 /// The load modules a point adds triangles to: two in one, or one on either side of a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -9,6 +9,8 @@ pub enum Charged {
     Inside(ModuleId),
     /// One triangle each.
     Between(ModuleId, ModuleId),
+    /// One triangle: on the outer border of the area, which has a load module on one side only.
+    Beside(ModuleId),
 }
 
 /// The load-module lines of a tile, counted from its south-west corner in whatever steps its owner measures with.
@@ -22,6 +24,8 @@ pub struct ModuleLines {
     pub rows: u32,
     /// Columns of load modules in the tile.
     pub cols: u32,
+    /// Load modules that exist, as far as the tile reaches: beyond the outer border of the area there are none.
+    pub reach: ModuleRect,
 }
 
 impl ModuleLines {
@@ -36,9 +40,17 @@ impl ModuleLines {
         let (row, col) = (row / step, col / step);
         match (is_on_row, is_on_col) {
             (false, false) => Some(Charged::Inside(module(row, col))),
-            (true, false) => Some(Charged::Between(module(row - 1, col), module(row, col))),
-            (false, true) => Some(Charged::Between(module(row, col - 1), module(row, col))),
+            (true, false) => Some(self.between(module(row - 1, col), module(row, col))),
+            (false, true) => Some(self.between(module(row, col - 1), module(row, col))),
             (true, true) => None,
+        }
+    }
+
+    fn between(&self, first: ModuleId, second: ModuleId) -> Charged {
+        match (self.reach.contains(first), self.reach.contains(second)) {
+            (true, false) => Charged::Beside(first),
+            (false, true) => Charged::Beside(second),
+            _ => Charged::Between(first, second),
         }
     }
 
@@ -55,13 +67,16 @@ mod tests {
 
     #[test]
     fn a_point_is_charged_where_it_adds_triangles() {
-        let lines = ModuleLines { side: 20, south_west: ModuleId { row: 3, col: 5 }, rows: 2, cols: 2 };
+        let reach = ModuleRect { south: 2, west: 4, north: 5, east: 8 };
+        let lines = ModuleLines { side: 20, south_west: ModuleId { row: 3, col: 5 }, rows: 2, cols: 2, reach };
         let module = |row, col| ModuleId { row, col };
         assert_eq!(lines.charged(7, 25), Some(Charged::Inside(module(3, 6))));
         assert_eq!(lines.charged(20, 7), Some(Charged::Between(module(3, 5), module(4, 5))));
         assert_eq!(lines.charged(5, 40), Some(Charged::Between(module(3, 6), module(3, 7))));
         assert_eq!(lines.charged(0, 5), Some(Charged::Between(module(2, 5), module(3, 5))));
         assert_eq!(lines.charged(20, 20), None);
+        // The area ends north of row 4.
+        assert_eq!(lines.charged(40, 7), Some(Charged::Beside(module(4, 5))));
         assert!(lines.contain(module(4, 6)) && !lines.contain(module(3, 7)) && !lines.contain(module(2, 5)));
     }
 }

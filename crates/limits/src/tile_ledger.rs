@@ -32,6 +32,7 @@ impl TileLedger {
         match self.lines.charged(row, col)? {
             Charged::Inside(module) => ask(module, POINT_COST),
             Charged::Between(first, second) => ask(first, 1).or_else(|| ask(second, 1)),
+            Charged::Beside(module) => ask(module, 1),
         }
     }
 
@@ -63,6 +64,7 @@ impl TileLedger {
                 book(&mut self.ledger, first, 1);
                 book(&mut self.ledger, second, 1);
             }
+            Some(Charged::Beside(module)) => book(&mut self.ledger, module, 1),
             // Load-module corners are there from the start.
             None => {}
         }
@@ -80,7 +82,7 @@ impl TileLedger {
     /// Whether a point there counts in a load module or window that has more than it may.
     pub fn is_over(&self, row: i32, col: i32) -> bool {
         match self.lines.charged(row, col) {
-            Some(Charged::Inside(module)) => self.ledger.is_over(module),
+            Some(Charged::Inside(module) | Charged::Beside(module)) => self.ledger.is_over(module),
             Some(Charged::Between(first, second)) => self.ledger.is_over(first) || self.ledger.is_over(second),
             None => false,
         }
@@ -91,7 +93,7 @@ impl TileLedger {
         let (module, _) = self.refuses(row, col)?;
         let cost = match self.lines.charged(row, col)? {
             Charged::Inside(_) => POINT_COST,
-            Charged::Between(..) => 1,
+            Charged::Between(..) | Charged::Beside(_) => 1,
         };
         Some(self.ledger.where_to_save(module, cost))
     }

@@ -18,8 +18,13 @@
  *
  * Places are eastings and northings in metres of the area's coordinate system; heights are metres above its
  * vertical datum. Functions that only ask may be called for one ground from many threads at once.
- * Files are checked when they are read: no file, however damaged, makes a function do harm. Only with LMR_MAPPED,
- * a file that another program makes shorter while it is mapped ends this one (SIGBUS).
+ * Files are checked when they are read: no file, however damaged, makes a function do harm, wait for ever, or take
+ * memory for more than the files hold. Only with LMR_MAPPED, a file that another program makes shorter while it is
+ * mapped ends this one (SIGBUS).
+ * Any number may be given as a coordinate, infinite ones and NaN too: where there cannot be ground, nothing is loaded.
+ * A pointer that is NULL (or not aligned as its type asks) is never followed. `why` and `share` may be NULL; without
+ * any other argument that it needs, a function does nothing and answers as on failure: NULL, 0 or LMR_INVALID, with
+ * the reason in `why` where it has one. lmr_close and lmr_unload take NULL and do nothing.
  */
 #ifndef LOAD_MODULE_READER_H
 #define LOAD_MODULE_READER_H
@@ -75,13 +80,14 @@ typedef struct {
 } lmr_module;
 
 /* What lmr_sight answers. */
-enum { LMR_FREE = 0, LMR_HIDDEN = 1, LMR_UNKNOWN = 2 };
+enum { LMR_FREE = 0, LMR_HIDDEN = 1, LMR_UNKNOWN = 2, LMR_INVALID = 3 };
 
 /* Opens a database, or a folder of load-module files. NULL on failure, with the reason in `why` (cut to fit). */
 lmr_area *lmr_open(const char *dir, int keep, char *why, size_t why_size);
 void lmr_close(lmr_area *area);
-void lmr_describe(const lmr_area *area, lmr_frame *frame);
-/* Levels of detail of every load module, 1 or more: 0 is the finest, the last one the coarsest. */
+/* 1, or 0 without area or frame. */
+int lmr_describe(const lmr_area *area, lmr_frame *frame);
+/* Levels of detail of every load module, 1 or more: 0 is the finest, the last one the coarsest. 0 without area. */
 uint32_t lmr_level_count(const lmr_area *area);
 
 /* Loads the 2 * reach + 1 load modules a side around a place, less what lies beyond the area. NULL on failure. */
@@ -89,22 +95,26 @@ lmr_ground *lmr_load(const lmr_area *area, double east_m, double north_m, uint32
 /* The same at another level of detail. */
 lmr_ground *lmr_load_level(const lmr_area *area, double east_m, double north_m, uint32_t reach, uint32_t level,
                            char *why, size_t why_size);
-/* The same level around another place: only what is new is read. 1, or 0 on failure; then the ground is as it was. */
+/* The same level around another place of the same area: only what is new is read. 1, or 0 on failure; then the ground
+ * is as it was. */
 int lmr_move(lmr_ground *ground, const lmr_area *area, double east_m, double north_m, uint32_t reach,
              char *why, size_t why_size);
 void lmr_unload(lmr_ground *ground);
 
-/* 1, or 0 where nothing is loaded. */
+/* 1, or 0 where nothing is loaded, without ground or without a place to write to; then nothing is written. */
 int lmr_height(const lmr_ground *ground, double east_m, double north_m, double *height_m);
 int lmr_sample_at(const lmr_ground *ground, double east_m, double north_m, lmr_sample *sample);
-/* Many heights at once; NaN where nothing is loaded. */
-void lmr_heights(const lmr_ground *ground, const double (*places_m)[2], double *heights_m, size_t count);
-/* Whether the ground stands between two places (east, north, height). LMR_HIDDEN sets `share`: how far along. */
+/* Many heights at once; NaN where nothing is loaded. 1, or 0 without ground, or without lists although count is not 0.
+ * The lists must not overlap. */
+int lmr_heights(const lmr_ground *ground, const double (*places_m)[2], double *heights_m, size_t count);
+/* Whether the ground stands between two places (east, north, height). LMR_HIDDEN sets `share`: how far along.
+ * LMR_UNKNOWN: the line leaves what is loaded first, or a coordinate is not finite or beyond any ground (1e12 m from
+ * the area's corner). LMR_INVALID: ground, from_m or to_m is NULL. */
 int lmr_sight(const lmr_ground *ground, const double from_m[3], const double to_m[3], double *share);
 
-/* Load modules that are loaded, row by row from the south-west. */
+/* Load modules that are loaded, row by row from the south-west. 0 without ground. */
 size_t lmr_module_count(const lmr_ground *ground);
-/* 1, or 0 when there is no such one. */
+/* 1, or 0 when there is no such one, without ground or without a place to write to. */
 int lmr_module_at(const lmr_ground *ground, size_t index, lmr_module *module);
 
 #ifdef __cplusplus

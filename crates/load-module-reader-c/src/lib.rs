@@ -2,17 +2,27 @@
 //!
 //! The one crate of the workspace where `unsafe` may be: every function takes pointers at the caller's word, and files
 //! may be mapped into memory. Nothing is decided here; each function turns its arguments and calls the reader.
+//! A pointer that is null or not aligned is never followed: the function answers as the header says.
 
+use std::borrow::Cow;
 use std::ffi::{CStr, c_char, c_int};
-use std::fs::File;
+use std::fmt::Display;
 use std::path::Path;
 use std::sync::Arc;
 
-use load_module_reader::{Area, Block, Ground, Keep, ReadError, Sight, TileFile, Vertex};
+use load_module_reader::{Area, Block, Ground, Keep, ReadError, Sight, TileFile, Vertex, open_file};
 use memmap2::Mmap;
 
 /// `LMR_ALL`: the whole area.
 const ALL: u32 = u32::MAX;
+/// `LMR_ON_DISK`, `LMR_IN_MEMORY`, `LMR_MAPPED`.
+const ON_DISK: c_int = 0;
+const IN_MEMORY: c_int = 1;
+const MAPPED: c_int = 2;
+/// `LMR_INVALID`.
+const INVALID: c_int = 3;
+/// Places in one call at most: what fits into the memory of any machine.
+const PLACES_MAX: usize = isize::MAX as usize / size_of::<[f64; 2]>();
 
 /// `lmr_frame`.
 #[repr(C)]
@@ -55,20 +65,24 @@ impl AsRef<[u8]> for Mapped {
     }
 }
 
-fn open(dir: &Path, keep: c_int) -> Result<Area, ReadError> {
-    match keep {
-        0 => Area::open(dir, Keep::OnDisk),
-        1 => Area::open(dir, Keep::InMemory),
-        _ => {
-            let files = Area::files_in(dir)?;
-            Area::of_files(files.iter().map(|path| map(path)).collect::<Result<_, _>>()?)
-        }
-    }
+fn open(dir: &Path, keep: c_int) -> Result<Area, String> {
+    let opened = match keep {
+        ON_DISK => Area::open(dir, Keep::OnDisk),
+        IN_MEMORY => Area::open(dir, Keep::InMemory),
+        MAPPED => map_all(dir),
+        _ => return Err(format!("found keep {keep}, expected {ON_DISK} to {MAPPED}")),
+    };
+    opened.map_err(|error| error.to_string())
+}
+
+fn map_all(dir: &Path) -> Result<Area, ReadError> {
+    let files = Area::files_in(dir)?;
+    Area::of_files(files.iter().map(|path| map(path)).collect::<Result<_, _>>()?)
 }
 
 fn map(path: &Path) -> Result<TileFile, ReadError> {
     let unreadable = |source| ReadError::Unreadable { path: path.to_path_buf(), source };
-    let file = File::open(path).map_err(unreadable)?;
+    let file = open_file(path)?;
     // SAFETY: the map is only read, and every byte is checked before it is believed. A file that is made shorter
     // meanwhile ends the process, which the header says; ours are replaced by renaming and never change.
     let map = unsafe { Mmap::map(&file) }.map_err(unreadable)?;
@@ -84,7 +98,7 @@ fn block(area: &Area, place_m: [f64; 2], reach: u32) -> Block {
 ///
 /// # Safety
 /// `why` is null or points to `size` bytes that may be written.
-unsafe fn tell(error: &ReadError, why: *mut c_char, size: usize) {
+unsafe fn tell(error: &dyn Display, why: *mut c_char, size: usize) {
     if why.is_null() || size == 0 {
         return;
     }
@@ -100,15 +114,54 @@ unsafe fn tell(error: &ReadError, why: *mut c_char, size: usize) {
     }
 }
 
+/// What a pointer points to, unless it is null or not aligned.
+///
+/// # Safety
+/// If it is neither, it points to a `T` that lives as long as what is returned is used, and nothing writes to it then.
+unsafe fn given<'a, T>(pointer: *const T) -> Option<&'a T> {
+    // SAFETY: the caller's word, and what is checked first.
+    (!pointer.is_null() && pointer.is_aligned()).then(|| unsafe { &*pointer })
+}
+
+/// The same, for something that the caller has this function write: it may hold anything before.
+///
+/// # Safety
+/// If the pointer is neither null nor unaligned, a `T` may be written there.
+unsafe fn give<T>(pointer: *mut T, value: T) -> c_int {
+    if pointer.is_null() || !pointer.is_aligned() {
+        return 0;
+    }
+    // SAFETY: the caller's word.
+    unsafe { pointer.write(value) };
+    1
+}
+
+/// A path as C has it: any bytes.
+#[cfg(unix)]
+fn path_of(text: &CStr) -> Cow<'_, Path> {
+    use std::os::unix::ffi::OsStrExt;
+    Path::new(std::ffi::OsStr::from_bytes(text.to_bytes())).into()
+}
+
+/// A path as C has it, in UTF-8.
+#[cfg(not(unix))]
+fn path_of(text: &CStr) -> Cow<'_, Path> {
+    std::path::PathBuf::from(&*text.to_string_lossy()).into()
+}
+
 /// Opens a database; see the header.
 ///
 /// # Safety
-/// `dir` is a text ended by a zero, `why` null or `why_size` bytes that may be written.
+/// `dir` is null or a text ended by a zero, `why` null or `why_size` bytes that may be written.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn lmr_open(dir: *const c_char, keep: c_int, why: *mut c_char, why_size: usize) -> *mut Area {
-    // SAFETY: the caller's word.
-    let dir = unsafe { CStr::from_ptr(dir) }.to_string_lossy();
-    match open(Path::new(&*dir), keep) {
+    let opened = if dir.is_null() {
+        Err("found no `dir`, expected the path of a database".to_owned())
+    } else {
+        // SAFETY: the caller's word.
+        open(&path_of(unsafe { CStr::from_ptr(dir) }), keep)
+    };
+    match opened {
         Ok(area) => Box::into_raw(Box::new(area)),
         Err(error) => {
             // SAFETY: the caller's word.
@@ -133,24 +186,26 @@ pub unsafe extern "C" fn lmr_close(area: *mut Area) {
 /// Where load modules lie.
 ///
 /// # Safety
-/// `area` comes from `lmr_open`; `frame` may be written.
+/// `area` is null or comes from `lmr_open`; `frame` is null or may be written.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn lmr_describe(area: *const Area, frame: *mut Frame) {
+pub unsafe extern "C" fn lmr_describe(area: *const Area, frame: *mut Frame) -> c_int {
     // SAFETY: the caller's word.
-    let (area, frame) = unsafe { (&*area, &mut *frame) };
+    let Some(area) = (unsafe { given(area) }) else { return 0 };
     let of = area.frame();
     let [east_m, north_m] = of.origin_m;
-    *frame = Frame { rows: of.rows, cols: of.cols, side_m: of.side_m(), east_m, north_m };
+    let told = Frame { rows: of.rows, cols: of.cols, side_m: of.side_m(), east_m, north_m };
+    // SAFETY: the caller's word.
+    unsafe { give(frame, told) }
 }
 
 /// Levels of detail of every load module.
 ///
 /// # Safety
-/// `area` comes from `lmr_open`.
+/// `area` is null or comes from `lmr_open`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn lmr_level_count(area: *const Area) -> u32 {
     // SAFETY: the caller's word.
-    u32::from(unsafe { &*area }.frame().level_count)
+    unsafe { given(area) }.map_or(0, |area| u32::from(area.frame().level_count))
 }
 
 /// Loads the ground around a place at its finest level.
@@ -173,7 +228,7 @@ pub unsafe extern "C" fn lmr_load(
 /// Loads the ground around a place at a level of detail.
 ///
 /// # Safety
-/// `area` comes from `lmr_open`, `why` is null or `why_size` bytes that may be written.
+/// `area` is null or comes from `lmr_open`, `why` is null or `why_size` bytes that may be written.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn lmr_load_level(
     area: *const Area,
@@ -185,7 +240,11 @@ pub unsafe extern "C" fn lmr_load_level(
     why_size: usize,
 ) -> *mut Ground {
     // SAFETY: the caller's word.
-    let area = unsafe { &*area };
+    let Some(area) = (unsafe { given(area) }) else {
+        // SAFETY: the caller's word.
+        unsafe { tell(&"found no `area`, expected one that is open", why, why_size) };
+        return std::ptr::null_mut();
+    };
     // No area has as many levels as what does not fit.
     let level = u16::try_from(level).unwrap_or(u16::MAX);
     match area.load_level(block(area, [east_m, north_m], reach), level) {
@@ -201,8 +260,8 @@ pub unsafe extern "C" fn lmr_load_level(
 /// Follows the observer.
 ///
 /// # Safety
-/// `ground` comes from `lmr_load` and is used by nobody else now, `area` comes from `lmr_open`, `why` is null or
-/// `why_size` bytes that may be written.
+/// `ground` is null, or comes from `lmr_load` and is in use nowhere else; `area` is null or comes from `lmr_open`,
+/// `why` is null or `why_size` bytes that may be written.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn lmr_move(
     ground: *mut Ground,
@@ -214,14 +273,19 @@ pub unsafe extern "C" fn lmr_move(
     why_size: usize,
 ) -> c_int {
     // SAFETY: the caller's word.
-    let (ground, area) = unsafe { (&mut *ground, &*area) };
+    let (Some(now), Some(area)) = (unsafe { (given(ground), given(area)) }) else {
+        // SAFETY: the caller's word.
+        unsafe { tell(&"found no `ground` or no `area`, expected both", why, why_size) };
+        return 0;
+    };
     let block = block(area, [east_m, north_m], reach);
-    if block == ground.block() {
+    if block == now.block() && area.frame() == now.frame() {
         return 1;
     }
-    match ground.moved(area, block) {
+    match now.moved(area, block) {
         Ok(moved) => {
-            *ground = moved;
+            // SAFETY: the caller's word; `now` is not used again.
+            unsafe { *ground = moved };
             1
         }
         Err(error) => {
@@ -247,59 +311,62 @@ pub unsafe extern "C" fn lmr_unload(ground: *mut Ground) {
 /// Height at a place.
 ///
 /// # Safety
-/// `ground` comes from `lmr_load`; `height_m` may be written.
+/// `ground` is null or comes from `lmr_load`; `height_m` is null or may be written.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn lmr_height(ground: *const Ground, east_m: f64, north_m: f64, height_m: *mut f64) -> c_int {
     // SAFETY: the caller's word.
-    let found = unsafe { &*ground }.height_m([east_m, north_m]);
-    if let Some(found) = found {
-        // SAFETY: the caller's word.
-        unsafe { *height_m = found };
-    }
-    c_int::from(found.is_some())
+    let found = unsafe { given(ground) }.and_then(|ground| ground.height_m([east_m, north_m]));
+    // SAFETY: the caller's word.
+    found.map_or(0, |found| unsafe { give(height_m, found) })
 }
 
 /// Height, normal and class at a place.
 ///
 /// # Safety
-/// `ground` comes from `lmr_load`; `sample` may be written.
+/// `ground` is null or comes from `lmr_load`; `sample` is null or may be written.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn lmr_sample_at(ground: *const Ground, east_m: f64, north_m: f64, sample: *mut Sample) -> c_int {
     // SAFETY: the caller's word.
-    let found = unsafe { &*ground }.sample([east_m, north_m]);
-    if let Some(found) = found {
-        let (height_m, normal, class_of_ground) = (found.height_m, found.normal, found.class);
-        // SAFETY: the caller's word.
-        unsafe { *sample = Sample { height_m, normal, class_of_ground } };
-    }
-    c_int::from(found.is_some())
+    let found = unsafe { given(ground) }.and_then(|ground| ground.sample([east_m, north_m]));
+    let Some(found) = found else { return 0 };
+    let told = Sample { height_m: found.height_m, normal: found.normal, class_of_ground: found.class };
+    // SAFETY: the caller's word.
+    unsafe { give(sample, told) }
 }
 
 /// Heights at many places.
 ///
 /// # Safety
-/// `ground` comes from `lmr_load`; `places_m` are `count` pairs, `heights_m` `count` numbers that may be written.
+/// `ground` is null or comes from `lmr_load`; `places_m` is null or `count` pairs, `heights_m` null or `count` numbers
+/// that may be written; the two do not overlap.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn lmr_heights(
     ground: *const Ground,
     places_m: *const [f64; 2],
     heights_m: *mut f64,
     count: usize,
-) {
+) -> c_int {
+    // SAFETY: the caller's word.
+    let (ground, first, out) = unsafe { (given(ground), given(places_m), given(heights_m)) };
+    let Some(ground) = ground else { return 0 };
     if count == 0 {
-        return;
+        return 1;
+    }
+    if first.is_none() || out.is_none() || PLACES_MAX < count {
+        return 0;
     }
     // SAFETY: the caller's word.
     let (places, heights) =
         unsafe { (std::slice::from_raw_parts(places_m, count), std::slice::from_raw_parts_mut(heights_m, count)) };
-    // SAFETY: the caller's word.
-    unsafe { &*ground }.heights_m(places, heights);
+    ground.heights_m(places, heights);
+    1
 }
 
 /// Line of sight.
 ///
 /// # Safety
-/// `ground` comes from `lmr_load`; `from_m` and `to_m` are three numbers each; `share` is null or may be written.
+/// `ground` is null or comes from `lmr_load`; `from_m` and `to_m` are null or three numbers each; `share` is null or
+/// may be written.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn lmr_sight(
     ground: *const Ground,
@@ -308,13 +375,14 @@ pub unsafe extern "C" fn lmr_sight(
     share: *mut f64,
 ) -> c_int {
     // SAFETY: the caller's word.
-    match unsafe { (&*ground).sight(*from_m, *to_m) } {
+    let (Some(ground), Some(from), Some(to)) = (unsafe { (given(ground), given(from_m), given(to_m)) }) else {
+        return INVALID;
+    };
+    match ground.sight(*from, *to) {
         Sight::Free => 0,
         Sight::Hidden(at) => {
-            if !share.is_null() {
-                // SAFETY: the caller's word.
-                unsafe { *share = at };
-            }
+            // SAFETY: the caller's word.
+            unsafe { give(share, at) };
             1
         }
         Sight::Unknown => 2,
@@ -324,21 +392,22 @@ pub unsafe extern "C" fn lmr_sight(
 /// Load modules that are loaded.
 ///
 /// # Safety
-/// `ground` comes from `lmr_load`.
+/// `ground` is null or comes from `lmr_load`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn lmr_module_count(ground: *const Ground) -> usize {
     // SAFETY: the caller's word.
-    unsafe { &*ground }.modules().len()
+    unsafe { given(ground) }.map_or(0, |ground| ground.modules().len())
 }
 
 /// One load module for drawing.
 ///
 /// # Safety
-/// `ground` comes from `lmr_load` and is not moved while what is pointed to is used; `module` may be written.
+/// `ground` is null, or comes from `lmr_load` and is not moved while what is pointed to is used; `module` is null or
+/// may be written.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn lmr_module_at(ground: *const Ground, index: usize, module: *mut Module) -> c_int {
     // SAFETY: the caller's word.
-    let ground = unsafe { &*ground };
+    let Some(ground) = (unsafe { given(ground) }) else { return 0 };
     let Some(found) = ground.modules().get(index).map(|found| found.module()) else { return 0 };
     let (frame, row, col) = (ground.frame(), found.row, found.col);
     let told = Module {
@@ -353,6 +422,5 @@ pub unsafe extern "C" fn lmr_module_at(ground: *const Ground, index: usize, modu
         triangle_count: found.triangles.len(),
     };
     // SAFETY: the caller's word.
-    unsafe { *module = told };
-    1
+    unsafe { give(module, told) }
 }

@@ -72,22 +72,29 @@ fn library() -> PathBuf {
     found.max_by_key(|path| path.metadata().unwrap().modified().unwrap()).expect("cargo has built the static library")
 }
 
-#[test]
-fn a_program_in_c_gets_right_answers() {
+/// Compiles a program of this folder with some flags of its own; what the compiler says when it cannot.
+fn compile(source: &str, flags: &[&str], program: &Path) -> Result<(), String> {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let folder = tempfile::tempdir().unwrap();
-    let program = folder.path().join("drive");
     let compiler = std::env::var("CC").unwrap_or_else(|_| "cc".into());
     let compiled = Command::new(compiler)
-        .args(["-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-I"])
+        .args(["-Wall", "-Wextra", "-Werror"])
+        .args(flags)
+        .arg("-I")
         .arg(here.join("include"))
-        .arg(here.join("tests/drive.c"))
+        .arg(here.join("tests").join(source))
         .arg(library())
         .args(["-lpthread", "-ldl", "-lm", "-o"])
-        .arg(&program)
+        .arg(program)
         .output()
         .unwrap();
-    assert!(compiled.status.success(), "{}", String::from_utf8_lossy(&compiled.stderr));
+    if compiled.status.success() { Ok(()) } else { Err(String::from_utf8_lossy(&compiled.stderr).into_owned()) }
+}
+
+#[test]
+fn a_program_in_c_gets_right_answers() {
+    let folder = tempfile::tempdir().unwrap();
+    let program = folder.path().join("drive");
+    compile("drive.c", &["-std=c99", "-pedantic"], &program).unwrap();
     for (levels, file) in [("1", worked_example()), ("2", two_levels())] {
         let area = folder.path().join(levels);
         std::fs::create_dir_all(area.join("modules")).unwrap();
@@ -96,4 +103,29 @@ fn a_program_in_c_gets_right_answers() {
         let said = String::from_utf8_lossy(&ran.stdout);
         assert!(ran.status.success() && said == "0 faults\n", "{said}{}", String::from_utf8_lossy(&ran.stderr));
     }
+}
+
+#[test]
+fn damaged_files_and_hostile_arguments_do_no_harm() {
+    let folder = tempfile::tempdir().unwrap();
+    let program = folder.path().join("fuzz");
+    let sanitized = ["-std=gnu99", "-O1", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=undefined"];
+    if let Err(why) = compile("fuzz.c", &sanitized, &program) {
+        eprintln!("skipped the sanitizers, which this compiler has not: {why}");
+        compile("fuzz.c", &["-std=gnu99", "-O1"], &program).unwrap();
+    }
+    let run = |seeds: &Path, more: &[&str]| {
+        let mut command = Command::new(&program);
+        // More memory than this is more than any of these files holds.
+        command.env("ASAN_OPTIONS", "hard_rss_limit_mb=1024").arg(seeds).arg(folder.path().join("work")).args(more);
+        let ran = command.output().unwrap();
+        assert!(ran.status.success(), "{seeds:?} {more:?}: {}", String::from_utf8_lossy(&ran.stderr));
+    };
+    run(&Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/findings"), &[]);
+    let seeds = folder.path().join("seeds");
+    std::fs::create_dir(&seeds).unwrap();
+    std::fs::write(seeds.join("one.slm"), worked_example()).unwrap();
+    std::fs::write(seeds.join("two.slm"), two_levels()).unwrap();
+    let (first, last, seconds) = ("1", "400", "3");
+    run(&seeds, &[first, seconds, last]);
 }

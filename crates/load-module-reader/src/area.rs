@@ -1,5 +1,6 @@
 //! A gaming area opened for a simulator: all its files, of which load modules are taken as they are needed.
 
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -12,8 +13,9 @@ const EXTENSION: &str = "slm";
 #[derive(Debug)]
 pub struct Area {
     files: Vec<TileFile>,
-    /// Place in `files` of each load module's file, row by row; `u32::MAX` where there is none.
-    file_of: Vec<u32>,
+    /// Place in `files` of the file of each load module that is in one, by row and column. As large as what the files
+    /// hold, however large an area their headers promise.
+    file_of: HashMap<[u32; 2], u32>,
     frame: Frame,
 }
 
@@ -54,9 +56,13 @@ impl Frame {
         f64::from(self.side) / f64::from(crate::QUANTA_PER_METRE)
     }
 
-    /// Row and column of the load module under a place, however far outside the area that lies.
+    /// Row and column of the load module under a place, however far outside the area that lies. What is not a number
+    /// lies as far south and west as can be.
     pub fn module_at(&self, [east_m, north_m]: [f64; 2]) -> [i64; 2] {
-        let index = |metres: f64, origin: f64| ((metres - origin) / self.side_m()).floor() as i64;
+        let index = |metres: f64, origin: f64| match ((metres - origin) / self.side_m()).floor() {
+            index if index.is_nan() => i64::MIN,
+            index => index as i64,
+        };
         [index(north_m, self.origin_m[1]), index(east_m, self.origin_m[0])]
     }
 }
@@ -98,17 +104,15 @@ impl Area {
     pub fn of_files(files: Vec<TileFile>) -> Result<Self, ReadError> {
         let Some(first) = files.first() else { return Err(ReadError::NoFiles { path: Path::new("").into() }) };
         let frame = Frame::of(first.header());
-        let mut file_of = vec![u32::MAX; frame.rows as usize * frame.cols as usize];
+        let mut file_of = HashMap::new();
         for (place, file) in (0..).zip(&files) {
             let header = file.header();
             if Frame::of(header) != frame {
                 return Err(ReadError::OtherArea { file: format!("{file:?}"), first: format!("{first:?}") });
             }
-            for row in header.south..header.north {
-                let start = row as usize * frame.cols as usize;
-                let own = &mut file_of[start + header.west as usize..start + header.east as usize];
-                own.fill(place);
-            }
+            let cols = header.west..header.east;
+            file_of
+                .extend((header.south..header.north).flat_map(|row| cols.clone().map(move |col| ([row, col], place))));
         }
         Ok(Self { files, file_of, frame })
     }
@@ -129,7 +133,7 @@ impl Area {
         let reach = i64::from(reach);
         let range = |at: i64, count: u32| {
             let clamped = |edge: i64| edge.clamp(0, i64::from(count)) as u32;
-            (clamped(at - reach), clamped(at.saturating_add(reach + 1)))
+            (clamped(at.saturating_sub(reach)), clamped(at.saturating_add(reach + 1)))
         };
         let ((south, north), (west, east)) = (range(row, self.frame.rows), range(col, self.frame.cols));
         Block { south, west, north: north.max(south), east: east.max(west) }
@@ -155,6 +159,17 @@ impl Area {
         Ground::empty(self.frame.clone(), level).moved(self, block)
     }
 
+    /// Looks whether every load module of a block is in a file, before room is made for any: there are at most as many
+    /// looks as load modules, and one.
+    pub(crate) fn check_holds(&self, block: Block) -> Result<(), ReadError> {
+        if block.count() == 0 {
+            return Ok(());
+        }
+        let places = (block.south..block.north).flat_map(|row| (block.west..block.east).map(move |col| [row, col]));
+        let mut missing = places.filter(|place| !self.file_of.contains_key(place));
+        missing.next().map_or(Ok(()), |[row, col]| Err(ReadError::NoSuchModule { row, col }))
+    }
+
     /// Loads a level of one row of a block; `into` takes each load module with its column.
     pub(crate) fn load_row(
         &self,
@@ -163,11 +178,10 @@ impl Area {
         cols: std::ops::Range<u32>,
         mut into: impl FnMut(u32, Arc<TerrainModule>),
     ) -> Result<(), ReadError> {
-        let start = row as usize * self.frame.cols as usize;
         let mut col = cols.start;
         while col < cols.end {
-            let place = self.file_of[start + col as usize];
-            let Some(file) = self.files.get(place as usize) else {
+            let place = self.file_of.get(&[row, col]);
+            let Some(file) = place.and_then(|&place| self.files.get(place as usize)) else {
                 return Err(ReadError::NoSuchModule { row, col });
             };
             let end = cols.end.min(file.header().east);

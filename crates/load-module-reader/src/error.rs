@@ -141,6 +141,13 @@ pub enum ReadError {
         /// The first one.
         first: String,
     },
+    /// Ground was to be moved over an area that it was not loaded from.
+    OtherGround,
+    /// What should be a file is none, but a pipe, a device or a folder.
+    NotAFile {
+        /// Its path.
+        path: PathBuf,
+    },
     /// The area's load modules have no such level.
     NoSuchLevel {
         /// The level.
@@ -198,6 +205,10 @@ impl fmt::Display for ReadError {
             }
             Self::OtherArea { file, first } => {
                 write!(f, "{file}: found another area than that of {first}, expected files of one area")
+            }
+            Self::OtherGround => f.write_str("found ground of another area, expected the area it was loaded from"),
+            Self::NotAFile { path } => {
+                write!(f, "{}: found a pipe, a device or a folder, expected a file", path.display())
             }
             Self::NoSuchModule { row, col } => write!(f, "load module {row},{col}: found no file that holds it"),
             Self::NoSuchLevel { found, level_count } => {

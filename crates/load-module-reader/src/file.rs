@@ -1,7 +1,9 @@
 //! A whole file: header, index, load modules.
 
+use std::io::Read;
 use std::path::Path;
 
+use crate::tile_file::open_file;
 use crate::{Header, IndexEntry, Module, ReadError, index};
 
 /// Bytes of the longest file that is read: far above any tile, and small enough to hold in memory.
@@ -24,11 +26,14 @@ impl SlmFile {
     pub fn open(path: impl AsRef<Path>) -> Result<Self, ReadError> {
         let path = path.as_ref();
         let unreadable = |source| ReadError::Unreadable { path: path.to_path_buf(), source };
-        let found = std::fs::metadata(path).map_err(unreadable)?.len();
+        let file = open_file(path)?;
+        let found = file.metadata().map_err(unreadable)?.len();
         let parsed = if FILE_BYTES_MAX < found {
             Err(ReadError::TooLarge { found, limit: FILE_BYTES_MAX })
         } else {
-            Self::parse(&std::fs::read(path).map_err(unreadable)?)
+            let mut bytes = Vec::with_capacity(found as usize);
+            file.take(FILE_BYTES_MAX).read_to_end(&mut bytes).map_err(unreadable)?;
+            Self::parse(&bytes)
         };
         parsed.map_err(|fault| ReadError::InFile { path: path.to_path_buf(), fault: Box::new(fault) })
     }

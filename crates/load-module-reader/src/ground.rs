@@ -19,9 +19,10 @@ pub struct Block {
 }
 
 impl Block {
-    /// Load modules inside.
+    /// Load modules inside; none where a side lies beyond the one it faces.
     pub fn count(&self) -> usize {
-        (self.north - self.south) as usize * (self.east - self.west) as usize
+        let (rows, cols) = (self.north.saturating_sub(self.south), self.east.saturating_sub(self.west));
+        (rows as usize).saturating_mul(cols as usize)
     }
 
     fn contains(&self, row: u32, col: u32) -> bool {
@@ -94,8 +95,14 @@ impl Ground {
     /// The same ground, at the same level, for another block: what both hold is kept, only the rest is read.
     ///
     /// # Errors
-    /// When a load module cannot be read, is damaged, or is in no file; this ground is as it was.
+    /// When a load module cannot be read, is damaged, or is in no file, or when this ground is of another area; this
+    /// ground is as it was.
     pub fn moved(&self, area: &Area, block: Block) -> Result<Self, ReadError> {
+        if *area.frame() != self.frame {
+            return Err(ReadError::OtherGround);
+        }
+        area.check_holds(block)?;
+        let block = if block.count() == 0 { Block { north: block.south, east: block.west, ..block } } else { block };
         let mut modules: Vec<Option<Arc<TerrainModule>>> = vec![None; block.count()];
         for row in block.south..block.north {
             let mut col = block.west;
@@ -188,8 +195,13 @@ impl Ground {
     }
 
     /// Whether the ground stands between two places, each an easting, a northing and a height above the vertical
-    /// datum. What only touches the line does not hide it; an end below the ground is hidden.
+    /// datum. What only touches the line does not hide it; an end below the ground is hidden. It is unknown where a
+    /// coordinate is not finite, or lies further than 1e12 m from the area's south-west corner or from height 0, where
+    /// no ground can be. It takes at most as many steps as load modules are crossed.
     pub fn sight(&self, from_m: [f64; 3], to_m: [f64; 3]) -> Sight {
+        if self.is_beyond_any_ground(from_m) || self.is_beyond_any_ground(to_m) {
+            return Sight::Unknown;
+        }
         if self.is_below(from_m) {
             return Sight::Hidden(0.0);
         }
@@ -207,10 +219,10 @@ impl Ground {
             let loaded = inside(row).zip(inside(col)).and_then(|(row, col)| self.module(row, col));
             match loaded {
                 Some(module) => nearest = nearest.min(hidden_at(module.lookup(), self.frame.side, corner, from, to)),
-                None => left_at = left_at.min(entered_at(corner, side, from, to)),
+                None => left_at = entered_at(corner, side, from, to),
             }
-            // What comes later lies further along the line.
-            if nearest.is_finite() || left_at.is_finite() {
+            // What comes later lies further along the line; what is not loaded ends the walk whatever rounding says.
+            if nearest.is_finite() || loaded.is_none() {
                 break;
             }
         }
@@ -220,6 +232,15 @@ impl Ground {
             (false, false) if self.is_below(to_m) => Sight::Hidden(1.0),
             (false, false) => Sight::Free,
         }
+    }
+
+    /// Whether a place is so far away, or no place at all, that nothing can be said of lines to it.
+    fn is_beyond_any_ground(&self, place_m: [f64; 3]) -> bool {
+        // Areas are at most 2^30 cells a side, of at most 512 m: 5.5e11 m.
+        const FAR_M: f64 = 1e12;
+        let [east, north] = self.frame.origin_m;
+        let distances = [place_m[0] - east, place_m[1] - north, place_m[2]];
+        !distances.iter().all(|distance| distance.abs() <= FAR_M)
     }
 
     /// Whether a place lies below the ground, by more than rounding.
@@ -307,5 +328,6 @@ fn entered_at(corner: [f64; 2], side: f64, from: [f64; 3], to: [f64; 3]) -> f64 
             _ => 0.0,
         }
     };
+    // The larger of two numbers one of which is not a number is the other.
     enters(0).max(enters(1)).clamp(0.0, 1.0)
 }

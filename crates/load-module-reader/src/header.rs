@@ -13,6 +13,12 @@ pub const LEVELS_MAX: u16 = 8;
 pub const QUANTA_PER_METRE: u32 = 128;
 /// Bytes of the header before its texts.
 pub const FIXED_HEADER_BYTES: usize = 124;
+/// Bytes of the longest header: two texts of 65,535 bytes, padding, checksum.
+const HEADER_BYTES_MAX: u32 = (FIXED_HEADER_BYTES as u32 + 2 * u16::MAX as u32).next_multiple_of(4) + 4;
+/// Cells along a side of the area at most: a thousand times what a job allows.
+const AREA_CELLS_MAX: u32 = 1 << 30;
+/// Metres of the area's south-west corner from the origin of its coordinates at most: ten times what a job allows.
+const ORIGIN_M_MAX: f64 = 1e9;
 
 /// What holds for all load modules of a file. Rows and columns count load modules from the area's south-west.
 #[derive(Clone, Debug, PartialEq)]
@@ -80,7 +86,10 @@ impl Header {
         check_start(&mut cursor)?;
         let offset = cursor.offset();
         let level_count = cursor.u16()?;
-        let header_length = cursor.u32()? as usize;
+        let header_length = cursor.u32()?;
+        let lengths = (FIXED_HEADER_BYTES as i64 + 4, i64::from(HEADER_BYTES_MAX));
+        cursor.within(offset + 2, "header length", i64::from(header_length), lengths)?;
+        let header_length = header_length as usize;
         let file_length = cursor.u64()?;
         let bytes = file.get(..header_length).ok_or(ReadError::Truncated {
             section: Section::Header,
@@ -99,20 +108,26 @@ impl Header {
 
     /// All after the lengths, up to the end of the header.
     fn parse_fields(level_count: u16, mut cursor: Cursor) -> Result<Self, ReadError> {
-        cursor.take(24)?;
+        cursor.take(12)?;
+        let length = cursor.u32()?;
+        cursor.take(8)?;
         let (tile_row, tile_col) = (cursor.u32()?, cursor.u32()?);
         let (area_rows, area_cols) = (cursor.u32()?, cursor.u32()?);
         let (south, north) = read_range(&mut cursor, area_rows, ["south", "north"])?;
         let (west, east) = read_range(&mut cursor, area_cols, ["west", "east"])?;
         let (side, side_cells, spacing_sixteenths) = read_side(&mut cursor)?;
+        let count_max = i64::from(AREA_CELLS_MAX / side_cells);
+        cursor.within(32, "area rows", i64::from(area_rows), (1, count_max))?;
+        cursor.within(36, "area columns", i64::from(area_cols), (1, count_max))?;
         cursor.expect_u32("quanta per metre", QUANTA_PER_METRE)?;
-        let origin_m = [cursor.metres("origin east")?, cursor.metres("origin north")?];
+        let origin_m = [read_origin(&mut cursor, "origin east")?, read_origin(&mut cursor, "origin north")?];
         let (crs_length, datum_length) = (cursor.u16()?, cursor.u16()?);
         let fingerprint = cursor.array()?;
         let crs = cursor.text(crs_length, "crs")?;
         let vertical_datum = cursor.text(datum_length, "vertical datum")?;
         cursor.padding()?;
         cursor.checksum()?;
+        cursor.expect(12, "header length", i64::from(length), cursor.offset() as i64)?;
         Ok(Self {
             level_count,
             tile_row,
@@ -154,6 +169,17 @@ fn read_range(cursor: &mut Cursor, count: u32, [low, high]: [&'static str; 2]) -
     cursor.within(offset + 4, high, i64::from(end), (1, i64::from(count)))?;
     cursor.within(offset, low, i64::from(first), (0, i64::from(end) - 1))?;
     Ok((first, end))
+}
+
+/// One coordinate of the area's south-west corner.
+fn read_origin(cursor: &mut Cursor, field: &'static str) -> Result<f64, ReadError> {
+    let offset = cursor.offset();
+    let metres = cursor.metres(field)?;
+    let limit = ORIGIN_M_MAX as i64;
+    // In whole metres for the message; what is too large for that becomes the largest number there is.
+    let outwards = if metres < 0.0 { metres.floor() } else { metres.ceil() };
+    cursor.within(offset, field, outwards as i64, (-limit, limit))?;
+    Ok(metres)
 }
 
 /// Side in quanta, side in cells, spacing: three numbers of which the first follows from the others.

@@ -72,13 +72,25 @@ fn read_entry(cursor: &mut Cursor, next: u64, file_length: u64) -> Result<IndexE
     };
     cursor.expect(at, "offset", clamp(entry.offset), clamp(next))?;
     let rest = clamp(file_length - next.min(file_length));
-    cursor.within(at + 8, "length", i64::from(entry.length), (FIXED_MODULE_BYTES as i64 + 4, rest))?;
     cursor.within(at + 12, "vertex count", i64::from(entry.vertex_count), (4, i64::from(u16::MAX)))?;
     cursor.within(at + 16, "triangle count", i64::from(entry.triangle_count), (2, 2 * i64::from(u16::MAX)))?;
+    // A section that cannot be so long is refused before its bytes are read.
+    cursor.within(
+        at + 8,
+        "length",
+        i64::from(entry.length),
+        (FIXED_MODULE_BYTES as i64 + 4, rest.min(longest(&entry))),
+    )?;
     let triangles = i64::from(entry.triangle_count);
     cursor.within(at + 20, "polygon count", i64::from(entry.polygon_count), (1, triangles))?;
     cursor.within(at + 24, "lowest height", i64::from(entry.z_low), (i64::from(i32::MIN), i64::from(entry.z_high)))?;
     Ok(entry)
+}
+
+/// Bytes of the longest section of so many vertices and triangles, all vertices on all sides.
+fn longest(entry: &IndexEntry) -> i64 {
+    let lists = 16 * i64::from(entry.vertex_count) + 7 * i64::from(entry.triangle_count);
+    FIXED_MODULE_BYTES as i64 + lists + 3 + 4
 }
 
 /// For messages: an offset beyond any file is shown as the largest number.

@@ -69,7 +69,7 @@ pub use module::{FIXED_MODULE_BYTES, Module, Residual, Vertex};
 mod file;
 pub use file::{FILE_BYTES_MAX, SlmFile};
 mod tile_file;
-pub use tile_file::{Bytes, Keep, TileFile};
+pub use tile_file::{Bytes, Keep, TileFile, open_file};
 mod lookup;
 mod terrain_module;
 pub use terrain_module::{HOLE_CLASS, Sample, TerrainModule};

@@ -15,6 +15,9 @@ const STEP_BITS: u32 = 12;
 pub(crate) const STEPS: i64 = 1 << STEP_BITS;
 /// Most cells along a side.
 const CELLS_MAX: u32 = 128;
+/// Cells that the rectangles around all triangles may touch at most, for each triangle. Terrain takes about ten; a file
+/// of splinters across the whole square would take thousands, and with them gigabytes and minutes.
+const CELLS_PER_TRIANGLE_MAX: u64 = 64;
 /// Words of a triangle in a list: x and y in one, z in the next, for each corner; then its place in the load module.
 const ENTRY: usize = 7;
 
@@ -35,8 +38,11 @@ type Corners = [[i32; 3]; 3];
 impl Lookup {
     pub(crate) fn new(module: &Module, side: u16) -> Self {
         let cells = (module.triangles.len() as f64).sqrt().ceil().clamp(1.0, f64::from(CELLS_MAX)) as u32;
-        let scale = (u64::from(cells) << 32) / u64::from(side).max(1);
-        let mut lookup = Self { words: Arc::new([]), cells, scale };
+        let mut lookup = Self::of_cells(cells, side);
+        while 1 < lookup.cells && !lookup.is_affordable(module) {
+            lookup = Self::of_cells(lookup.cells / 2, side);
+        }
+        let cells = lookup.cells;
         let first = (cells * cells) as usize + 1;
         let mut words = vec![0; first];
         lookup.visit_cells(module, side, |cell, _, _| words[cell + 1] += ENTRY as u32);
@@ -59,20 +65,35 @@ impl Lookup {
         lookup
     }
 
+    /// No lists yet.
+    fn of_cells(cells: u32, side: u16) -> Self {
+        Self { words: Arc::new([]), cells, scale: (u64::from(cells) << 32) / u64::from(side).max(1) }
+    }
+
+    /// Whether lists of so many cells take a bounded share of memory and time.
+    fn is_affordable(&self, module: &Module) -> bool {
+        let touched = |triangle: &[u16; 3]| {
+            let [[west, east], [south, north]] = self.cells_around(&corners_of(module, *triangle));
+            u64::from(east - west + 1) * u64::from(north - south + 1)
+        };
+        module.triangles.iter().map(touched).sum::<u64>() <= CELLS_PER_TRIANGLE_MAX * module.triangles.len() as u64
+    }
+
+    /// First and last column, first and last row of the cells that the rectangle around a triangle may touch.
+    fn cells_around(&self, corners: &Corners) -> [[u32; 2]; 2] {
+        [0, 1].map(|axis| {
+            let values = || corners.iter().map(|corner| corner[axis]);
+            // A place on a line of cells may be rounded to either side of it.
+            let low = (values().min().unwrap_or(0) - 1).max(0);
+            [self.cell(low), self.cell(values().max().unwrap_or(0) + 1)]
+        })
+    }
+
     /// Calls `each` with every cell that a triangle may touch, the triangle's place and its corners.
     fn visit_cells(&self, module: &Module, side: u16, mut each: impl FnMut(usize, usize, &Corners)) {
         for (index, triangle) in module.triangles.iter().enumerate() {
-            let corners = triangle.map(|v| {
-                let v = &module.vertices[usize::from(v)];
-                [i32::from(v.x), i32::from(v.y), v.z]
-            });
-            let range = |axis: usize| {
-                let values = || corners.iter().map(|corner| corner[axis]);
-                // A place on a line of cells may be rounded to either side of it.
-                let low = (values().min().unwrap_or(0) - 1).max(0);
-                (self.cell(low), self.cell(values().max().unwrap_or(0) + 1))
-            };
-            let ((west, east), (south, north)) = (range(0), range(1));
+            let corners = corners_of(module, *triangle);
+            let [[west, east], [south, north]] = self.cells_around(&corners);
             for row in south..=north {
                 for col in west..=east {
                     if touches(&corners, self.lines(row, side), self.lines(col, side)) {
@@ -81,6 +102,12 @@ impl Lookup {
                 }
             }
         }
+    }
+
+    /// Words in memory.
+    #[cfg(test)]
+    pub(crate) fn word_count(&self) -> usize {
+        self.words.len()
     }
 
     /// The cell of a coordinate in quanta.
@@ -163,6 +190,13 @@ impl Lookup {
             }
         }
     }
+}
+
+fn corners_of(module: &Module, triangle: [u16; 3]) -> Corners {
+    triangle.map(|v| {
+        let v = &module.vertices[usize::from(v)];
+        [i32::from(v.x), i32::from(v.y), v.z]
+    })
 }
 
 #[inline]

@@ -3,7 +3,9 @@
 use std::sync::Arc;
 
 use crate::lookup::STEPS;
-use crate::{Area, Block, Ground, Keep, Module, ReadError, Residual, Sight, TerrainModule, TileFile, Vertex, sample};
+use crate::{
+    Area, Block, Ground, Keep, Module, ReadError, Residual, Sight, SlmFile, TerrainModule, TileFile, Vertex, sample,
+};
 
 const SIDE: u16 = 64_000;
 
@@ -262,4 +264,162 @@ fn files_with_other_levels_are_of_another_area() {
     let open = |name: &str, bytes: Vec<u8>| TileFile::of_bytes(name, Arc::new(bytes)).unwrap();
     let files = vec![open("plain", sample::file()), open("levels", sample::two_levels())];
     assert!(matches!(Area::of_files(files), Err(ReadError::OtherArea { .. })));
+}
+
+#[test]
+fn a_line_of_sight_beyond_any_ground_is_unknown_at_once() {
+    let far = [f64::INFINITY, f64::NEG_INFINITY, f64::NAN, 1e307, -1e307, f64::MAX, 1e155, 1e19, -9.3e18, 1e13];
+    let ground = sample_ground();
+    let [east, north] = [501_510.0, 3_876_010.0];
+    for number in far {
+        for axis in 0..3 {
+            let eye = [east, north, 6.0];
+            let mut place = eye;
+            place[axis] = number;
+            assert_eq!(ground.sight(eye, place), Sight::Unknown, "to {place:?}");
+            assert_eq!(ground.sight(place, eye), Sight::Unknown, "from {place:?}");
+            assert_eq!(ground.sight(place, place.map(|number| -number)), Sight::Unknown, "through {place:?}");
+        }
+        assert_eq!(ground.sight([number; 3], [-number; 3]), Sight::Unknown, "{number}");
+        assert_eq!(ground.height_m([number, north]), None);
+        assert_eq!(ground.sample([east, number]), None);
+        let mut heights = [0.0; 2];
+        ground.heights_m(&[[number, north], [number; 2]], &mut heights);
+        assert!(heights.iter().all(|height_m| height_m.is_nan()));
+    }
+    // As far as ground can be, the line is followed to where it leaves what is loaded.
+    assert_eq!(ground.sight([east, north, 6.0], [east, 9e11, 6.0]), Sight::Unknown);
+    assert!(matches!(ground.sight([east, north, 6.0], [9e11, north, -9e11]), Sight::Hidden(share) if share < 1e-9));
+}
+
+#[test]
+fn no_place_loads_ground_where_none_can_be() {
+    let area = sample_area();
+    for number in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e307, -1e307] {
+        for reach in [0, 7, u32::MAX] {
+            let block = area.block_around([number, 3_876_010.0], reach);
+            assert_eq!(block.count(), 0, "{number}, {reach}");
+            assert_eq!(area.load(block).unwrap().modules().len(), 0);
+        }
+    }
+}
+
+/// The sample with header fields changed, and its checksums made right.
+fn with_header(edits: &[(usize, &[u8])]) -> Vec<u8> {
+    let mut bytes = sample::file();
+    for (at, field) in edits {
+        bytes[*at..*at + field.len()].copy_from_slice(field);
+    }
+    sample::mend_checksums(&mut bytes);
+    bytes
+}
+
+#[test]
+fn an_area_as_large_as_a_header_may_say_takes_no_room_for_what_is_in_no_file() {
+    let most = ((1u32 << 30) / 20).to_le_bytes();
+    let bytes = with_header(&[(32, &most), (36, &most)]);
+    let area = Area::of_files(vec![TileFile::of_bytes("large", Arc::new(bytes)).unwrap()]).unwrap();
+    assert_eq!(area.whole().count(), (1 << 30) / 20 * ((1 << 30) / 20));
+    assert!(matches!(area.load(area.whole()), Err(ReadError::NoSuchModule { row: 0, col: 0 })));
+    let held = Block { south: 2, west: 3, north: 3, east: 5 };
+    let ground = area.load(held).unwrap();
+    assert_eq!(ground.height_m([501_510.0, 3_876_010.0]), Some(5.0));
+    assert_eq!(ground.sight([501_510.0, 3_876_010.0, 6.0], [9e11, 3_876_010.0, 6.0]), Sight::Unknown);
+    for wrong in [Block { north: u32::MAX, ..held }, Block { east: u32::MAX, ..held }] {
+        assert!(matches!(ground.moved(&area, wrong), Err(ReadError::NoSuchModule { .. })));
+    }
+    // Rows without columns, and sides the wrong way round, are nothing.
+    for nothing in [Block { north: u32::MAX, east: 3, ..held }, Block { south: 9, ..held }, Block { east: 1, ..held }] {
+        assert_eq!(ground.moved(&area, nothing).unwrap().modules().len(), 0, "{nothing:?}");
+    }
+}
+
+#[test]
+fn a_header_that_cannot_be_is_refused() {
+    let refused = |edits: &[(usize, &[u8])], expected: &str| {
+        let error = SlmFile::parse(&with_header(edits)).unwrap_err().to_string();
+        assert!(error.contains(expected), "{error:?} does not say {expected:?}");
+    };
+    let one = |at: usize, field: &[u8], expected: &str| refused(&[(at, field)], expected);
+    one(32, &u32::MAX.to_le_bytes(), "found area rows 4294967295, expected 1 to 53687091");
+    one(36, &u32::MAX.to_le_bytes(), "found area columns 4294967295, expected 1 to 53687091");
+    one(56, &[0; 4], "found side 0, expected 1 to 65535");
+    one(60, &[0; 4], "found side in cells 0");
+    one(64, &[0; 4], "found spacing 0");
+    one(64, &u32::MAX.to_le_bytes(), "found spacing 4294967295");
+    one(72, &f64::NAN.to_le_bytes(), "origin east is not a finite number");
+    one(80, &f64::INFINITY.to_le_bytes(), "origin north is not a finite number");
+    one(72, &1e307f64.to_le_bytes(), "found origin east 9223372036854775807, expected -1000000000 to 1000000000");
+    one(80, &(-1e9f64 - 0.5).to_le_bytes(), "found origin north -1000000001");
+    one(12, &u32::MAX.to_le_bytes(), "found header length 4294967295, expected 128 to 131200");
+    one(12, &[0; 4], "found header length 0");
+}
+
+#[test]
+fn a_header_with_bytes_behind_its_fields_is_refused() {
+    // Both the fields and all bytes together end with a right checksum.
+    let good = sample::file();
+    let length = u32::from_le_bytes(good[12..16].try_into().unwrap()) as usize;
+    let mut bytes = good[..length].to_vec();
+    bytes[12..16].copy_from_slice(&(length as u32 + 8).to_le_bytes());
+    let fields = crc32fast::hash(&bytes[..length - 4]);
+    bytes[length - 4..].copy_from_slice(&fields.to_le_bytes());
+    bytes.extend([7; 4]);
+    bytes.extend(crc32fast::hash(&bytes).to_le_bytes());
+    bytes.extend(&good[length..]);
+    let error = SlmFile::parse(&bytes).unwrap_err().to_string();
+    assert!(error.contains("found header length"), "{error}");
+}
+
+#[test]
+fn ground_is_not_moved_over_another_area() {
+    let ground = sample_ground();
+    let other = with_header(&[(72, &1000f64.to_le_bytes())]);
+    let other = Area::of_files(vec![TileFile::of_bytes("other", Arc::new(other)).unwrap()]).unwrap();
+    assert!(matches!(ground.moved(&other, ground.block()), Err(ReadError::OtherGround)));
+}
+
+/// Triangles from the middle of the northern side to each of many vertices on the southern one.
+fn splinters(count: u16) -> Module {
+    let step = SIDE / count;
+    let mut vertices: Vec<Vertex> = (0..=count).map(|i| Vertex { x: i * step, y: 0, z: i32::from(i) }).collect();
+    vertices.extend([0, SIDE / 2, SIDE].map(|x| Vertex { x, y: SIDE, z: 0 }));
+    let [west, top, east] = [count + 1, count + 2, count + 3];
+    let mut triangles: Vec<[u16; 3]> = vec![[0, top, west]];
+    triangles.extend((0..count).map(|i| [i, i + 1, top]));
+    triangles.push([count, east, top]);
+    Module { vertices, classes: vec![3; triangles.len()], polygon_count: 1, triangles, ..rough(1, 1) }
+}
+
+#[test]
+fn splinters_across_a_load_module_take_no_more_room_than_other_triangles() {
+    for count in [100, 16_000, 64_000] {
+        let module = splinters(count);
+        let prepared = TerrainModule::new(module.clone(), SIDE);
+        let words = prepared.lookup().word_count() as u64;
+        assert!(words <= 16_385 + 7 * 64 * u64::from(count + 2), "{count}: {words} words");
+        let mut draw = Draw(3);
+        for _ in 0..50 {
+            let place = [0, 1].map(|_| draw.below(u64::from(SIDE) * STEPS as u64 + 1) as i64);
+            let found = prepared.lookup().height_m(place).expect("some triangle holds every place");
+            let expected = by_search(&module, place.map(|steps| steps as f64 / STEPS as f64));
+            assert!((found - expected).abs() < 1e-3, "{count} at {place:?}: {found}, expected {expected}");
+        }
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn what_is_no_file_is_not_waited_for() {
+    let folder = std::env::temp_dir().join(format!("load-module-reader-pipe-{}", std::process::id()));
+    std::fs::create_dir_all(folder.join("a.slm")).unwrap();
+    std::os::unix::fs::symlink("/dev/zero", folder.join("b.slm")).unwrap();
+    for name in ["a.slm", "b.slm"] {
+        assert!(matches!(SlmFile::open(folder.join(name)), Err(ReadError::NotAFile { .. })), "{name}");
+        for keep in [Keep::OnDisk, Keep::InMemory] {
+            assert!(matches!(TileFile::open(folder.join(name), keep), Err(ReadError::NotAFile { .. })), "{name}");
+        }
+    }
+    assert!(matches!(Area::open(&folder, Keep::OnDisk), Err(ReadError::NotAFile { .. })));
+    std::fs::remove_dir_all(folder).unwrap();
 }

@@ -47,14 +47,14 @@ impl TileFile {
     pub fn open(path: impl AsRef<Path>, keep: Keep) -> Result<Self, ReadError> {
         let path = path.as_ref();
         let unreadable = |source| ReadError::Unreadable { path: path.to_path_buf(), source };
-        let mut file = File::open(path).map_err(unreadable)?;
+        let mut file = open_file(path)?;
         let found = file.metadata().map_err(unreadable)?.len();
         if FILE_BYTES_MAX < found {
             return Err(in_file(path, ReadError::TooLarge { found, limit: FILE_BYTES_MAX }));
         }
         if keep == Keep::InMemory {
             let mut bytes = Vec::with_capacity(found as usize);
-            file.read_to_end(&mut bytes).map_err(unreadable)?;
+            file.take(FILE_BYTES_MAX).read_to_end(&mut bytes).map_err(unreadable)?;
             return Self::of_bytes(path, Arc::new(bytes));
         }
         let start = read_start(&mut file, found).map_err(unreadable)?;
@@ -65,10 +65,14 @@ impl TileFile {
     /// A file whose bytes are at hand already; `name` is for messages.
     ///
     /// # Errors
-    /// When header or index are not as `FORMAT.md` says.
+    /// When header or index are not as `FORMAT.md` says, or the file is too large.
     pub fn of_bytes(name: impl AsRef<Path>, bytes: Bytes) -> Result<Self, ReadError> {
         let path = name.as_ref();
         let whole = (*bytes).as_ref();
+        let found = whole.len() as u64;
+        if FILE_BYTES_MAX < found {
+            return Err(in_file(path, ReadError::TooLarge { found, limit: FILE_BYTES_MAX }));
+        }
         let (header, index) = parse_start(whole, whole.len() as u64).map_err(|fault| in_file(path, fault))?;
         Ok(Self { path: path.to_path_buf(), header, index, source: Source::Bytes(bytes) })
     }
@@ -114,6 +118,18 @@ impl TileFile {
         let modules: Result<Vec<Module>, ReadError> = cols.zip(entries).map(decode).collect();
         modules.map_err(|fault| in_file(&self.path, fault))
     }
+}
+
+/// Opens a file for reading. A pipe would wait for a writer, and a device may have no end.
+///
+/// # Errors
+/// When there is none, or it is not a regular file.
+pub fn open_file(path: &Path) -> Result<File, ReadError> {
+    let unreadable = |source| ReadError::Unreadable { path: path.to_path_buf(), source };
+    if !std::fs::metadata(path).map_err(unreadable)?.is_file() {
+        return Err(ReadError::NotAFile { path: path.to_path_buf() });
+    }
+    File::open(path).map_err(unreadable)
 }
 
 fn in_file(path: &Path, fault: ReadError) -> ReadError {

@@ -111,7 +111,7 @@ impl Account {
     pub fn module_of(&self, at: Place) -> Option<ModuleId> {
         let Books::Limits(ledger) = &self.books else { return None };
         match ledger.charged(at.y, at.x)? {
-            Charged::Inside(module) | Charged::Between(module, _) => Some(module),
+            Charged::Inside(module) | Charged::Between(module, _) | Charged::Beside(module) => Some(module),
         }
     }
 

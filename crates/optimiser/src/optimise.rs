@@ -106,7 +106,7 @@ fn work_on(dem: &Dem, importance: &Importance, start: &Tin, task: &Task, steps: 
     ground.forbid(&task.forbidden);
     let mut held = task.held.clone();
     held.sort_unstable();
-    // What lies on a side that is not open is somebody else's, or the area's outer border.
+    // What lies on a side that is not open is another tile's, or a fixed outer border of the area.
     let hold = |vertex: &TinVertex| {
         let at = Place::of(vertex.at, dem.rect());
         if ground.is_on_closed_side(at) || held.binary_search(&vertex.at).is_ok() {

@@ -111,7 +111,7 @@ pub(crate) fn confined(start: &Tin, caps: Caps, effort: Effort) -> Task {
         window_room: vec![caps.per_window; windows.origins.count()],
         triangles: caps.triangles,
     };
-    let lines = ModuleLines { side: caps.side, south_west: ModuleId { row: 0, col: 0 }, rows, cols };
+    let lines = ModuleLines { side: caps.side, south_west: ModuleId { row: 0, col: 0 }, rows, cols, reach: modules };
     let (low, high) = (LatticePoint::from(rect.south_west()), LatticePoint::from(rect.north_east()));
     let is_outer =
         |at: LatticePoint| at.row == low.row || at.row == high.row || at.col == low.col || at.col == high.col;

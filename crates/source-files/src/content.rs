@@ -1,14 +1,100 @@
-//! The bytes of a source, for its hash: a database says what it was made from.
+//! The bytes of a source, for its hash: a database says what it was made from; and whether it is still that file.
 
-use std::fs::File;
-use std::path::Path;
+use std::fs::{File, Metadata};
+use std::path::{Path, PathBuf};
 
 use crate::SourceError;
 
 /// The file at `path`, whose bytes are read as they are wanted: a source may be larger than the memory there is.
 ///
 /// # Errors
-/// When it cannot be opened.
+/// When it cannot be opened, or is no regular file.
 pub fn content(path: &Path) -> Result<File, SourceError> {
+    regular(path)?;
     File::open(path).map_err(|source| SourceError::Read { path: path.into(), source })
+}
+
+/// What the disk says of a regular file. Nothing is opened: that of a pipe would wait for a writer for ever.
+pub(crate) fn regular(path: &Path) -> Result<Metadata, SourceError> {
+    let data = std::fs::metadata(path).map_err(|source| SourceError::Open { path: path.into(), source })?;
+    if data.is_file() {
+        return Ok(data);
+    }
+    Err(SourceError::NotAFile { path: path.into(), found: kind_of(&data) })
+}
+
+#[cfg(unix)]
+fn kind_of(data: &Metadata) -> &'static str {
+    use std::os::unix::fs::FileTypeExt;
+    let kind = data.file_type();
+    match () {
+        () if kind.is_dir() => "a folder",
+        () if kind.is_fifo() => "a named pipe",
+        () if kind.is_socket() => "a socket",
+        () => "a device",
+    }
+}
+
+#[cfg(not(unix))]
+fn kind_of(data: &Metadata) -> &'static str {
+    if data.is_dir() { "a folder" } else { "a device" }
+}
+
+#[cfg(unix)]
+fn modified(data: &Metadata) -> Option<(i64, i64)> {
+    use std::os::unix::fs::MetadataExt;
+    Some((data.mtime(), data.mtime_nsec()))
+}
+
+#[cfg(not(unix))]
+fn modified(_: &Metadata) -> Option<(i64, i64)> {
+    None
+}
+
+/// Which file a path led to, and what it was like, so that a change is seen without reading it again.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct FileState {
+    path: PathBuf,
+    len: u64,
+    /// When it was last written, in whatever the file system counts; never compared with a clock.
+    modified: Option<(i64, i64)>,
+    place: (u64, u64),
+}
+
+impl FileState {
+    /// Of the file at `path` now.
+    ///
+    /// # Errors
+    /// When there is none, or no regular one.
+    pub fn of(path: &Path) -> Result<Self, SourceError> {
+        let data = regular(path)?;
+        Ok(Self { path: path.into(), len: data.len(), modified: modified(&data), place: place_of(&data) })
+    }
+
+    /// Checks that the path still leads to the same file, unchanged.
+    ///
+    /// # Errors
+    /// [`SourceError::Changed`] when it does not.
+    pub fn check(&self) -> Result<(), SourceError> {
+        let changed = |found: String| Err(SourceError::Changed { path: self.path.clone(), found });
+        match Self::of(&self.path) {
+            Ok(now) if now == *self => Ok(()),
+            Ok(now) if now.place != self.place => changed("replaced by another file".into()),
+            Ok(now) if now.len != self.len => changed(format!("{} bytes long instead of {}", now.len, self.len)),
+            Ok(_) => changed("written to".into()),
+            Err(_) => changed("gone".into()),
+        }
+    }
+}
+
+/// The device and the number of a file on it, where the system has such.
+#[cfg(unix)]
+fn place_of(data: &Metadata) -> (u64, u64) {
+    use std::os::unix::fs::MetadataExt;
+    (data.dev(), data.ino())
+}
+
+#[cfg(not(unix))]
+fn place_of(_: &Metadata) -> (u64, u64) {
+    (0, 0)
 }

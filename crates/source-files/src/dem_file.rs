@@ -202,8 +202,8 @@ impl Found {
     fn placed(self, store: &Store, reading: &Reading) -> Result<DemFile, SourceError> {
         let (path, (cols, rows)) = (store.path(), self.size);
         let crs = crs_of(store, self.crs, reading)?;
+        let unit_m = reading.height_unit_m.or(crs.vertical_unit_m()).unwrap_or(1.0);
         let (frame, _) = RasterFrame::new(path, crs, &self.axes, cols, rows)?;
-        let unit_m = reading.height_unit_m.unwrap_or(1.0);
         let mut header = match &self.reader {
             Reader::GeoTiff(tiff) => tiff.header(),
             Reader::Dted(dted) => dted.header(frame),
@@ -254,6 +254,10 @@ fn of_bare_rows(store: &Store, start: &[u8], reading: &Reading) -> Result<Found,
         }
     }
     let Some(rows) = hgt::rows(store) else {
+        if hgt::is_named_so(store.name()) {
+            let (path, found, expected) = (store.path().into(), store.len(), hgt::sizes_text());
+            return Err(SourceError::NotHgtSize { path, found, expected });
+        }
         let found = start.iter().take(8).map(|byte| format!("{byte:02x}")).collect::<Vec<_>>().join(" ");
         let found = if found.is_empty() { "nothing".into() } else { found };
         return Err(SourceError::UnknownFormat { path: store.path().into(), found });

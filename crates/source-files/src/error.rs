@@ -14,6 +14,12 @@ pub enum SourceError {
     /// The file could not be opened.
     #[error("{path}: {source}")]
     Open { path: PathBuf, source: io::Error },
+    /// The path leads to something that is no regular file.
+    #[error("{path}: it is {found}, expected a file")]
+    NotAFile { path: PathBuf, found: &'static str },
+    /// The file is not what it was when the build began.
+    #[error("{path}: {found} while it was read, expected the file that the build began with")]
+    Changed { path: PathBuf, found: String },
     /// The file could be opened but not read on.
     #[error("{path}: reading stopped: {source}")]
     Read { path: PathBuf, source: io::Error },
@@ -86,6 +92,9 @@ pub enum SourceError {
     /// The file does not say which coordinate system it is in.
     #[error("{path}: no coordinate reference system in the file or in a .prj beside it, expected one")]
     NoCrs { path: PathBuf },
+    /// A file with the name of an HGT tile, of another size.
+    #[error("{path}: found {found} bytes, expected those of an HGT tile: {expected}")]
+    NotHgtSize { path: PathBuf, found: u64, expected: String },
     /// An HGT tile whose name does not say where it lies.
     #[error("{path}: an HGT tile, whose name does not say where it lies, expected one such as N35W117.hgt")]
     NoCorner { path: PathBuf },
@@ -104,6 +113,9 @@ pub enum SourceError {
     /// The file does not say where the raster lies.
     #[error("{path}: no position in the file, expected a tie point and a pixel scale, or a transformation")]
     NoPosition { path: PathBuf },
+    /// Posts lie closer together than any ground is measured.
+    #[error("{path}: its posts are {found} apart, in the units of its coordinate system; expected at least {limit:e}")]
+    TooFine { path: PathBuf, found: String, limit: f64 },
     /// The raster is placed by control points.
     #[error("{path}: placed by {found} control points, expected one tie point and a pixel scale")]
     ControlPoints { path: PathBuf, found: usize },
@@ -179,6 +191,10 @@ impl SourceError {
         use SourceError::*;
         Some(match self {
             Open { .. } => "check the path and its permissions; paths in a job are relative to the job file",
+            NotAFile { .. } => {
+                "name a file: for a folder those in it, for a pipe or a device a file with what it gives"
+            }
+            Changed { .. } => "leave sources alone during a build; run the same command again",
             Write { .. } => "check that the folder exists, is writable and has room; nothing was left half-written",
             Read { .. } | Truncated { .. } | Malformed { .. } | BrokenChunk { .. } => {
                 "the file is damaged or was not copied whole; fetch it again"
@@ -189,6 +205,7 @@ impl SourceError {
             ArchiveHolds { .. } => "unpack it and name the raster",
             HeaderAlone { .. } => "name the file of heights; its header is found beside it",
             OtherFormat { .. } | UnknownFormat { .. } => "convert it: gdal_translate in out.tif",
+            NotHgtSize { .. } => "the tile was not copied or unpacked whole, or is of another make; fetch it again",
             NoCorner { .. } => "give its south-west corner: { file = \"x.hgt\", corner = [35, -117] }, latitude first",
             NotTiff { .. } => "DEMs and class rasters are GeoTIFF files; gdal_translate converts other formats",
             TooLarge { .. } => "cut the part you need with gdal_translate -projwin, or tile the file",
@@ -205,7 +222,12 @@ impl SourceError {
             UnnamedCrs { .. } | LinearUnit { .. } | OtherCrs { .. } => {
                 "project it to the area's system: gdalwarp -t_srs EPSG:… -r bilinear in.tif out.tif, or change area.crs"
             }
-            VerticalUnit { .. } => "say how many metres a unit is: dem.height_unit_m = …",
+            VerticalUnit { .. } => {
+                "say how many metres a unit is: dem.sources = [{ file = \"…\", height_unit_m = 0.3048 }]"
+            }
+            TooFine { .. } => {
+                "its header is wrong; write it with the right corners: gdal_translate -a_ullr WEST NORTH EAST SOUTH"
+            }
             NoPosition { .. } | ControlPoints { .. } | Rotated { .. } => {
                 "warp it onto a north-up grid: gdalwarp -r bilinear in.tif out.tif"
             }

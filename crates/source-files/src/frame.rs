@@ -5,6 +5,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::SourceError;
+use crate::crs::vertical::{FOOT_M, US_FOOT_M, unit_m};
 use crate::crs::{Crs, GeoKeys};
 
 /// Where the posts of a raster lie. Row 0 is the southern one, column 0 the western one.
@@ -141,12 +142,16 @@ impl Axes {
     pub(crate) fn checked(self, path: &Path) -> Result<Self, SourceError> {
         let Self { first, step } = self;
         let numbers = first.iter().chain(&step);
-        let sane = numbers.clone().all(|number| number.abs() <= PLACE_MAX) && 0.0 < step[0] && step[1] != 0.0;
-        if sane {
-            return Ok(self);
+        let sane = numbers.clone().all(|number| number.abs() <= PLACE_MAX) && 0.0 < step[0];
+        if !sane {
+            let found = format!("at {first:?} with steps of {step:?}");
+            return Err(malformed(path, "the place of the raster", found, "finite metres, and a positive pixel scale"));
         }
-        let found = format!("at {first:?} with steps of {step:?}");
-        Err(malformed(path, "the place of the raster", found, "finite metres, and a positive pixel scale"))
+        if step.iter().any(|step| step.abs() < STEP_MIN) {
+            let (path, found) = (path.into(), format!("{:e} x {:e}", step[0], step[1].abs()));
+            return Err(SourceError::TooFine { path, found, limit: STEP_MIN });
+        }
+        Ok(self)
     }
 }
 
@@ -155,8 +160,13 @@ mod key {
     pub const VERTICAL_TYPE: u16 = 4096;
     pub const VERTICAL_UNITS: u16 = 4099;
 }
+/// Code of a GeoKey whose meaning the file spells out by itself.
+const USER_DEFINED: u16 = 32767;
 /// Coordinates beyond this (a hundred times around the Earth) are not places.
 const PLACE_MAX: f64 = 4.0e9;
+/// Posts closer than this, in metres or degrees, are not ground: a tenth of a millimetre at the equator. Between posts
+/// at coordinates of millions of metres, a double has room for no much finer step.
+const STEP_MIN: f64 = 1.0e-9;
 /// A shear this small against the spacing moves no post of the largest raster by a hundredth of a post.
 const SHEAR_MAX: f64 = 1.0e-8;
 
@@ -178,38 +188,64 @@ impl GeoTags {
         self.keys.short(key::RASTER_TYPE) == Some(2)
     }
 
-    /// What samples mean; `height_unit_m` overrides the unit the file states.
-    pub(crate) fn sample_scale(&self, path: &Path, height_unit_m: Option<f64>) -> Result<SampleScale, SourceError> {
-        let number = |role: &str, default: f64| match self.metadata_item(role) {
-            None => Ok(default),
-            Some(text) => text
-                .trim()
-                .parse()
-                .ok()
-                .filter(|value: &f64| value.is_finite())
-                .ok_or_else(|| malformed(path, &format!("the {role} of the samples"), text.into(), "a number")),
+    /// What samples mean; `height_unit_m` overrides the unit the file states, `vertical_unit_m` is that of a compound
+    /// system.
+    pub(crate) fn sample_scale(
+        &self,
+        path: &Path,
+        height_unit_m: Option<f64>,
+        vertical_unit_m: Option<f64>,
+    ) -> Result<SampleScale, SourceError> {
+        let number = |role: &str, default: f64, is_good: fn(f64) -> bool, expected: &str| {
+            let Some(text) = self.metadata_item(role) else { return Ok(default) };
+            let number = text.trim().parse().ok().filter(|&value: &f64| value.is_finite() && is_good(value));
+            number.ok_or_else(|| malformed(path, &format!("the {role} of the samples"), text.into(), expected))
         };
         let unit_m = match height_unit_m {
             Some(unit_m) => unit_m,
-            None => self.vertical_unit_m(path)?,
+            None => self.vertical_unit_m(path, vertical_unit_m)?,
         };
-        Ok(SampleScale { scale: number("scale", 1.0)?, offset: number("offset", 0.0)?, unit_m })
+        let scale = number("scale", 1.0, |scale| scale != 0.0, "a number other than 0")?;
+        Ok(SampleScale { scale, offset: number("offset", 0.0, |_| true, "a number")?, unit_m })
     }
 
-    fn vertical_unit_m(&self, path: &Path) -> Result<f64, SourceError> {
-        const FOOT_M: f64 = 0.3048;
-        const US_FOOT_M: f64 = 1200.0 / 3937.0;
-        let unit = match (self.keys.short(key::VERTICAL_UNITS), self.metadata_item("unittype")) {
-            (None | Some(0), None) | (Some(9001), _) => Ok(1.0),
+    /// The unit of heights: that of the vertical system, and what the file says beside it, which must agree.
+    fn vertical_unit_m(&self, path: &Path, of_compound: Option<f64>) -> Result<f64, SourceError> {
+        let error = |found| SourceError::VerticalUnit { path: path.into(), found };
+        let stated = self.stated_unit_m().transpose().map_err(error)?;
+        let system = match self.keys.short(key::VERTICAL_TYPE) {
+            None | Some(0) => of_compound.map(Ok),
+            Some(USER_DEFINED) => Some(Err("a vertical system of the file's own, without a unit".to_owned())),
+            Some(code) => Some(unit_m(code)),
+        };
+        match (stated, system) {
+            (None, None) => Ok(1.0),
+            (Some(stated), None) => Ok(stated),
+            (None, Some(system)) => system.map_err(error),
+            // Depths stay depths, whatever their unit.
+            (Some(_), Some(Err(found))) if found.contains("downwards") => Err(error(found)),
+            (Some(stated), Some(Err(_))) => Ok(stated),
+            // A survey foot and a foot differ in the sixth digit, and so do writers' digits.
+            (Some(stated), Some(Ok(system))) if (stated - system).abs() <= 1.0e-8 => Ok(system),
+            (Some(stated), Some(Ok(system))) => {
+                Err(error(format!("units of {stated} m, and by their vertical system in units of {system} m")))
+            }
+        }
+    }
+
+    /// The unit that the file states beside any system.
+    fn stated_unit_m(&self) -> Option<Result<f64, String>> {
+        Some(match (self.keys.short(key::VERTICAL_UNITS), self.metadata_item("unittype").map(str::trim)) {
+            (None | Some(0), None | Some("")) => return None,
+            (Some(9001), _) => Ok(1.0),
             (Some(9002), _) => Ok(FOOT_M),
             (Some(9003), _) => Ok(US_FOOT_M),
-            (None | Some(0), Some("" | "m" | "metre" | "meter" | "metres" | "meters")) => Ok(1.0),
+            (None | Some(0), Some("m" | "metre" | "meter" | "metres" | "meters")) => Ok(1.0),
             (None | Some(0), Some("ft" | "foot" | "feet")) => Ok(FOOT_M),
             (None | Some(0), Some("US survey foot" | "us-ft" | "ftUS")) => Ok(US_FOOT_M),
             (None | Some(0), Some(other)) => Err(format!("`{other}`")),
             (Some(code), _) => Err(format!("units of code {code}")),
-        };
-        unit.map_err(|found| SourceError::VerticalUnit { path: path.into(), found })
+        })
     }
 
     /// The text of the first item of GDAL's metadata with this role for band 0.
@@ -280,4 +316,22 @@ fn transformed(path: &Path, matrix: &[f64]) -> Result<[[f64; 2]; 2], SourceError
 
 fn malformed(path: &Path, what: &str, found: String, expected: &str) -> SourceError {
     SourceError::Malformed { path: path.into(), what: what.into(), found, expected: expected.into() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn posts_closer_than_any_ground_is_measured_are_refused_as_such() {
+        let axes = |step| Axes { first: [500_000.0, 4.0e6], step };
+        for step in [[1.0e-308, -1.0e-308], [25.0, 0.0], [1.0e-12, 1.0]] {
+            let error = axes(step).checked(Path::new("a.tif")).unwrap_err();
+            assert!(matches!(error, SourceError::TooFine { .. }), "{error}");
+        }
+        let error = axes([1.0e-308, -1.0e-308]).checked(Path::new("a.tif")).unwrap_err();
+        assert!(error.to_string().starts_with("a.tif: its posts are 1e-308 x 1e-308 apart"), "{error}");
+        assert!(axes([0.25, -0.25]).checked(Path::new("a.tif")).is_ok());
+        assert!(axes([-1.0, 1.0]).checked(Path::new("a.tif")).unwrap_err().to_string().contains("positive"));
+    }
 }

@@ -12,6 +12,7 @@ use crate::chunk::Header;
 use crate::crs::Crs;
 use crate::directory::SampleKind;
 use crate::frame::{Axes, SampleScale};
+use crate::join::union;
 use crate::limits::POSTS_A_SIDE_MAX;
 use crate::samples::Samples;
 use crate::store::Store;
@@ -157,12 +158,30 @@ impl DatumShift {
 
     /// Whether its grids have values in all of an area.
     pub fn covers(&self, area: &Crs, grid: &GridFrame, rect: PostRect) -> bool {
+        self.sampled(area, grid, rect).all(|metres| metres.is_some())
+    }
+
+    /// Between what the metres to be added lie in an area, a metre wider than looked at: geoids bend over kilometres.
+    pub fn range_m(&self, area: &Crs, grid: &GridFrame, rect: PostRect) -> (f64, f64) {
+        let found = self.sampled(area, grid, rect).flatten().map(|metres| (metres - 1.0, metres + 1.0));
+        // Where a grid has no value nothing is added.
+        found.fold((-1.0, 1.0), union)
+    }
+
+    /// What is to be added at places all over an area.
+    fn sampled<'a>(
+        &'a self,
+        area: &'a Crs,
+        grid: &'a GridFrame,
+        rect: PostRect,
+    ) -> impl Iterator<Item = Option<f64>> + 'a {
         const STEPS: i32 = 16;
         let wgs84 = Crs::wgs84();
-        let along = |low: i32, high: i32, step: i32| low + ((high - low) as i64 * i64::from(step) / 16) as i32;
-        (0..=STEPS).flat_map(|row| (0..=STEPS).map(move |col| (row, col))).all(|(row, col)| {
+        let along =
+            |low: i32, high: i32, step: i32| low + ((high - low) as i64 * i64::from(step) / i64::from(STEPS)) as i32;
+        (0..=STEPS).flat_map(|row| (0..=STEPS).map(move |col| (row, col))).map(move |(row, col)| {
             let (row, col) = (along(rect.south, rect.north, row), along(rect.west, rect.east, col));
-            area.to(&wgs84, [grid.east_m(col), grid.north_m(row)]).is_some_and(|place| self.metres(place).is_some())
+            area.to(&wgs84, [grid.east_m(col), grid.north_m(row)]).and_then(|place| self.metres(place))
         })
     }
 

@@ -63,7 +63,7 @@ impl GeoTiff {
         refuse_masks(path, &mut decoder)?;
         let tags = geo_tags(path, &mut decoder)?;
         let (crs, axes) = (crs(tags.keys.crs())?, tags.axes(path)?);
-        let scale = tags.sample_scale(path, height_unit_m)?;
+        let scale = tags.sample_scale(path, height_unit_m, crs.vertical_unit_m())?;
         let (frame, south_first) = RasterFrame::new(path, crs, &axes, layout.cols, layout.rows)?;
         let nodata = nodata(path, &mut decoder)?;
         let chunk_sizes = chunk_sizes(path, &mut decoder, &layout, store.len())?;

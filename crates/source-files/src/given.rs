@@ -52,7 +52,9 @@ pub fn read_given(path: &Path, epsg: u32) -> Result<Vec<GivenFeature>, SourceErr
     let bytes = store.start(GEOJSON_BYTES_MAX)?;
     let text = std::str::from_utf8(&bytes)
         .map_err(|_| fault(path, "the file", "bytes that are not UTF-8 text", "GeoJSON or comma-separated values"))?;
-    let is_json = text.trim_start_matches(['\u{feff}', ' ', '\t', '\r', '\n']).starts_with('{');
+    // Some editors put a byte order mark before UTF-8 text.
+    let text = text.trim_start_matches('\u{feff}');
+    let is_json = text.trim_start().starts_with('{');
     let (features, said) = if is_json { of_json(path, text)? } else { of_table(path, text)? };
     if features.is_empty() {
         return Err(fault(path, "the file", "nothing", "at least one point"));
@@ -180,8 +182,7 @@ fn of_table(path: &Path, text: &str) -> Result<(Vec<GivenFeature>, Option<Crs>),
     let mut lines = text.lines().zip(1..).filter(|(line, _)| !line.trim().is_empty());
     let expected = "a header that names its columns, such as east,north,height_m or lon,lat";
     let (header, _) = lines.next().ok_or_else(|| fault(path, "line 1", "nothing", expected))?;
-    let names: Vec<String> =
-        header.trim_start_matches('\u{feff}').split(',').map(|name| name.trim().to_lowercase()).collect();
+    let names: Vec<String> = header.split(',').map(|name| name.trim().to_lowercase()).collect();
     let column = |known: &[&str]| names.iter().position(|name| known.contains(&name.as_str()));
     let (Some(east), Some(north)) = (column(&EASTS), column(&NORTHS)) else {
         return Err(fault(path, "line 1", format!("{header:?}"), expected));
@@ -231,6 +232,8 @@ mod tests {
         assert_eq!(found[0].shape, GivenShape::Point([505_000.0, 3_875_000.0]));
         assert_eq!((found[0].height_m, found[1].height_m, found[1].place.as_str()), (Some(12.5), None, "line 4"));
         let columns = "a header that names its columns, such as east,north,height_m or lon,lat";
+        let marked = read("a.json", "\u{feff}{\"type\":\"Point\",\"coordinates\":[505000,3875000]}").unwrap();
+        assert_eq!(marked[0].shape, found[0].shape, "a byte order mark is no part of the text");
         check_fault("a,b\n1,2\n", &format!("F: line 1: found \"a,b\", expected {columns}"));
         check_fault("x,y\n1,\n", "F: line 2: found \"\", expected a number for \"y\"");
         check_fault("x,y\n", "F: the file: found nothing, expected at least one point");

@@ -25,6 +25,17 @@ pub(crate) fn rows(store: &Store) -> Option<Rows> {
     })
 }
 
+/// Whether a file is meant to be a tile, by its ending.
+pub(crate) fn is_named_so(name: &str) -> bool {
+    name.len() > 4 && name.to_ascii_lowercase().ends_with(".hgt")
+}
+
+/// The sizes of tiles, in words.
+pub(crate) fn sizes_text() -> String {
+    let texts = SIZES.map(|(cols, rows)| format!("{} ({cols} x {rows} posts)", u64::from(cols * rows) * 2));
+    format!("{} or {}", texts[..texts.len() - 1].join(", "), texts[texts.len() - 1])
+}
+
 /// Places of the posts of a tile of one degree whose south-west post lies at `corner`, in degrees east and north.
 pub(crate) fn axes(rows: &Rows, [east, north]: [f64; 2]) -> Axes {
     let step = [1.0 / f64::from(rows.cols - 1), 1.0 / f64::from(rows.rows - 1)];

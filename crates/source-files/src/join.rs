@@ -47,20 +47,28 @@ pub(crate) fn join(mut rasters: Vec<Raster>) -> Result<(Raster, Vec<Standing>), 
             let at = whole.index(post, whole.extent.shift(*offset));
             if standing < standings[at] {
                 standings[at] = standing;
-                samples.set(at, raster.samples.get(index));
+                // What marks a void is a number in this file only.
+                if standing == Standing::Height {
+                    samples.set(at, raster.samples.get(index));
+                }
             }
         }
     }
+    let range_m = rasters.iter().filter_map(Raster::range_m).reduce(union);
     let first = rasters.remove(0);
     let frame = whole.extent.frame(&first.frame);
     let header = Header { frame, scale: first.scale, kind, nodata: None, shift: first.shift.clone() };
-    let mut raster = Raster::of_samples(&header, whole.window, samples, Vec::new())?;
     let missing = standings.iter().enumerate().filter(|&(_, &standing)| Standing::Void <= standing);
-    raster.mark_voids(missing.map(|(index, _)| index));
+    let raster = Raster::joined(&header, whole.window, samples, missing.map(|(index, _)| index), range_m);
     if raster.voids.count == 0 {
         standings.clear();
     }
     Ok((raster, standings))
+}
+
+/// The range of what lies in either of two.
+pub(crate) fn union((low, high): (f64, f64), (lower, higher): (f64, f64)) -> (f64, f64) {
+    (low.min(lower), high.max(higher))
 }
 
 /// The type that holds samples of several.

@@ -9,7 +9,7 @@ pub mod limits;
 mod error;
 pub use error::SourceError;
 mod content;
-pub use content::content;
+pub use content::{FileState, content};
 mod crs;
 mod store;
 pub use crs::Crs;

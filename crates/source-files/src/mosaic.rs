@@ -9,10 +9,10 @@ use terrain::{Dem, GridFrame, Post, PostRect, QUANTA_PER_METRE};
 
 use crate::crs::Crs;
 use crate::geoid::Shifts;
-use crate::join::{fits, join};
+use crate::join::{fits, join, union};
 use crate::samples::{Sample, each};
 use crate::warp::{Place, Warp};
-use crate::{DemFile, Raster, RasterFrame, SourceError};
+use crate::{DatumShift, DemFile, Raster, RasterFrame, SourceError};
 
 /// How a height between posts comes about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -73,8 +73,15 @@ pub struct Mosaic {
     pub(crate) rules: MosaicRules,
     /// System and grid of the area.
     pub(crate) place: (Crs, GridFrame),
-    /// Height in quanta where no source reaches, when it cannot be that of the nearest edge of one.
-    pub(crate) beyond: Option<i32>,
+    /// Height where no source reaches, when it cannot be that of the nearest edge of one.
+    pub(crate) beyond: Option<Beyond>,
+}
+
+/// A height for ground that no source reaches, and how it comes to the datum that is wanted.
+#[derive(Debug)]
+pub(crate) struct Beyond {
+    pub quanta: f64,
+    pub shift: Option<DatumShift>,
 }
 
 /// Heights of a window and how each stands.
@@ -139,8 +146,7 @@ impl Mosaic {
 
     /// Lowest and highest height of all rasters, in metres.
     pub fn range_m(&self) -> Option<(f64, f64)> {
-        let ranges = self.layers.iter().filter_map(|layer| layer.raster.range_m());
-        ranges.reduce(|(low, high), (lower, higher)| (low.min(lower), high.max(higher)))
+        self.layers.iter().filter_map(|layer| layer.raster.range_m()).reduce(union)
     }
 
     /// Heights at the posts `rect` of the working grid.
@@ -155,6 +161,8 @@ impl Mosaic {
             .iter()
             .map(|layer| layer.raster.shift.as_ref().map(|shift| shift.over(area, grid, rect)))
             .collect();
+        let shift_beyond = self.beyond.as_ref().and_then(|beyond| beyond.shift.as_ref());
+        let shift_beyond = shift_beyond.map(|shift| shift.over(area, grid, rect));
         let mut line = vec![(0.0, Standing::Gap); wide];
         let mut best = vec![Best::default(); wide];
         for (index, row) in (rect.south..=rect.north).enumerate() {
@@ -181,7 +189,10 @@ impl Mosaic {
                 let at = index * wide + col;
                 (patch.heights[at], patch.standings[at]) = match best.result() {
                     Some((quanta, standing)) => (rounded(quanta), standing),
-                    None => (self.beyond(row, rect.west + col as i32), Standing::Gap),
+                    None => {
+                        let post = Post::new(row, rect.west + col as i32);
+                        (self.beyond(post, &shifts, shift_beyond.as_ref()), Standing::Gap)
+                    }
                 };
             }
         }
@@ -189,17 +200,20 @@ impl Mosaic {
     }
 
     /// A height where no source reaches: that of the nearest edge of one, so that the mesh is defined.
-    fn beyond(&self, row: i32, col: i32) -> i32 {
-        if let Some(quanta) = self.beyond {
-            return quanta;
+    fn beyond(&self, post: Post, shifts: &[Option<Shifts>], shift_beyond: Option<&Shifts>) -> i32 {
+        let added = |shifts: Option<&Shifts>| shifts.map_or(0.0, |shifts| shifts.quanta_at(post.row, post.col));
+        if let Some(beyond) = &self.beyond {
+            return rounded(beyond.quanta + added(shift_beyond));
         }
-        let rect = PostRect { south: row, west: col, north: row, east: col };
-        let clamped = self.layers.iter().filter_map(|layer| {
-            let place = layer.warp.over(rect).at(row, col)?;
-            Some((layer, layer.clamped(place)))
+        let rect = PostRect { south: post.row, west: post.col, north: post.row, east: post.col };
+        let clamped = self.layers.iter().zip(shifts).filter_map(|(layer, shifts)| {
+            let place = layer.warp.over(rect).at(post.row, post.col)?;
+            Some((layer, shifts, layer.clamped(place)))
         });
-        let nearest = clamped.min_by_key(|&(_, (_, distance))| distance);
-        nearest.map_or(0, |(layer, (index, _))| rounded(layer.quanta(layer.raster.samples.get(index))))
+        let nearest = clamped.min_by_key(|&(_, _, (_, distance))| distance);
+        nearest.map_or(0, |(layer, shifts, (index, _))| {
+            rounded(layer.quanta(layer.raster.samples.get(index)) + added(shifts.as_ref()))
+        })
     }
 }
 
@@ -373,7 +387,8 @@ impl<T: Sample> View<'_, T> {
         ((near * (unit - up) + far * up) / (unit * unit), standing)
     }
 
-    /// Bilinear where one of the sixteen posts is missing.
+    /// Bilinear where one of the sixteen posts is missing. Never higher or lower than all of them: beside a cliff the
+    /// smooth surface alone swings out to heights that are nowhere.
     fn cubic(&self, corner: Corner, high: usize) -> (f64, Standing) {
         let Corner { row, col, up, right } = corner;
         let inside = 1 <= row && row + 2 < high && 1 <= col && col + 2 < self.wide;
@@ -383,16 +398,17 @@ impl<T: Sample> View<'_, T> {
             return self.bilinear(corner);
         }
         let (across, along) = (keys_weights(right), keys_weights(up));
-        let mut sum = 0.0;
+        let (mut sum, mut lowest, mut highest) = (0.0, f64::INFINITY, f64::NEG_INFINITY);
         for (r, weight_along) in along.iter().enumerate() {
             let mut line = 0.0;
             for (c, weight) in across.iter().enumerate() {
                 let sample: f64 = self.posts[first(r) + c].into();
                 line += weight * sample;
+                (lowest, highest) = (lowest.min(sample), highest.max(sample));
             }
             sum += weight_along * line;
         }
-        (sum, Standing::Height)
+        (sum.clamp(lowest, highest), Standing::Height)
     }
 }
 

@@ -140,6 +140,8 @@ impl Collected<'_> {
     fn add_json(&mut self, bytes: &[u8]) -> Result<Option<Crs>, SourceError> {
         let broken = |reason: String| SourceError::NotGeoJson { path: self.path.into(), reason };
         let text = std::str::from_utf8(bytes).map_err(|_| broken("it is not UTF-8 text".into()))?;
+        // Some editors put a byte order mark before UTF-8 text.
+        let text = text.trim_start_matches('\u{feff}');
         let json: GeoJson = text.parse().map_err(|error: geojson::Error| broken(error.to_string()))?;
         let said = said_in(self.path, &json)?;
         match json {

@@ -95,19 +95,28 @@ impl Raster {
             samples.visit_voids(header.nodata, |index| voids.mark(index));
         }
         let scale = header.scale;
-        let range_m = survey.range.map(|(lowest, highest)| (scale.height_m(lowest), scale.height_m(highest)));
+        // A negative scale turns the order around.
+        let heights_m = |(lowest, highest)| (scale.height_m(lowest), scale.height_m(highest));
+        let range_m = survey.range.map(heights_m).map(|(a, b): (f64, f64)| (a.min(b), a.max(b)));
         let shift = header.shift.clone();
         let raster = Self { frame: header.frame.clone(), scale, window, samples, voids, shift, range_m, notes };
         raster.check_range(survey.range)?;
         Ok(raster)
     }
 
-    /// Makes posts void, by index.
-    pub(crate) fn mark_voids(&mut self, indices: impl Iterator<Item = usize>) {
-        let mut voids = Voids { bits: vec![0; self.window.post_count().div_ceil(64)], ..Voids::default() };
-        indices.for_each(|index| voids.mark(index));
+    /// A window of samples that others have judged: void at the posts `missing`, by index, heights everywhere else.
+    pub(crate) fn joined(
+        header: &Header,
+        window: PostRect,
+        samples: Samples,
+        missing: impl Iterator<Item = usize>,
+        range_m: Option<(f64, f64)>,
+    ) -> Self {
+        let mut voids = Voids { bits: vec![0; window.post_count().div_ceil(64)], ..Voids::default() };
+        missing.for_each(|index| voids.mark(index));
         voids.settled = voids.count == 0;
-        self.voids = voids;
+        let (frame, scale, shift) = (header.frame.clone(), header.scale, header.shift.clone());
+        Self { frame, scale, window, samples, voids, shift, range_m, notes: Vec::new() }
     }
 
     fn check_range(&self, samples: Option<(f64, f64)>) -> Result<(), SourceError> {

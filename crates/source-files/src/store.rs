@@ -3,14 +3,15 @@
 //! Nothing is ever unpacked to the disk, so a name inside an archive leads nowhere.
 
 use std::fs::File;
-use std::io::{Cursor, Read, Seek, SeekFrom};
+use std::io::{BufRead, BufReader, Cursor, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use flate2::read::GzDecoder;
+use flate2::bufread::GzDecoder;
 use zip::ZipArchive;
 
 use crate::SourceError;
+use crate::content::regular;
 use crate::limits::{ARCHIVE_ENTRIES_MAX, UNPACKED_BYTES_MAX};
 
 /// Where the bytes of a source are.
@@ -51,11 +52,7 @@ impl Seek for Handle {
 impl Store {
     /// The file at `path` as it is.
     pub(crate) fn plain(path: &Path) -> Result<Self, SourceError> {
-        let open = |source| SourceError::Open { path: path.into(), source };
-        let data = std::fs::metadata(path).map_err(open)?;
-        if data.is_dir() {
-            return Err(open(std::io::Error::other("it is a folder")));
-        }
+        let data = regular(path)?;
         let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
         Ok(Self { path: path.into(), name, unpacked: None, len: data.len() })
     }
@@ -73,8 +70,14 @@ impl Store {
 
     fn inflated(&self) -> Result<Self, SourceError> {
         let name = self.name.strip_suffix(".gz").unwrap_or(&self.name).to_owned();
-        let bytes = self.unpack(GzDecoder::new(self.handle()?))?;
-        Ok(self.holding(name, bytes))
+        let mut decoder = GzDecoder::new(BufReader::new(self.handle()?));
+        let bytes = self.unpack(&mut decoder)?;
+        // A reader that stops here would miss what somebody appended, a second part of the heights, perhaps.
+        let rest = decoder.into_inner().fill_buf().map_err(|source| self.stopped(source))?.len();
+        match rest {
+            0 => Ok(self.holding(name, bytes)),
+            _ => Err(self.malformed("the gzip file", "more bytes after its end".into(), "one packed file")),
+        }
     }
 
     fn unzipped(&self) -> Result<Self, SourceError> {

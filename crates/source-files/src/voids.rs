@@ -130,13 +130,14 @@ impl Filling {
         self
     }
 
-    /// Relaxes the filled posts towards the mean of their sides: a membrane held by the heights around it.
+    /// Relaxes the filled posts towards the mean of their sides: a membrane held by the heights around it. What is
+    /// not known yet is no height, whatever the file marks it with, and holds nothing.
     fn smooth(mut self) -> Self {
         self.filled.sort_unstable();
         for _ in 0..(self.rings * ROUNDS_PER_RING).min(ROUNDS_MAX) {
             for place in 0..self.filled.len() {
                 let index = self.filled[place];
-                let sides = self.neighbours(index).filter(|&(_, weight)| weight == SIDE);
+                let sides = self.neighbours(index).filter(|&(next, weight)| weight == SIDE && self.known[next]);
                 let (sum, count) = sides
                     .fold((0.0, 0.0), |(sum, count), (next, _)| (sum + f64::from(self.samples[next]), count + 1.0));
                 if 0.0 < count {

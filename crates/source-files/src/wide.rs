@@ -3,12 +3,12 @@
 //! A post comes out the same in every window. Heights between posts depend on the posts around them only; voids are
 //! filled block by block, in blocks that hang on the source's own grid, each seen with the ground around it.
 
-use terrain::{GridFrame, PostRect, quanta_of_metres};
+use terrain::{GridFrame, PostRect, QUANTA_PER_METRE};
 
 use crate::chunk::Header;
 use crate::crs::Crs;
-use crate::join::{Extent, common_kind, fits, offset, shifted};
-use crate::mosaic::{Layer, MARGIN};
+use crate::join::{Extent, common_kind, fits, offset, shifted, union};
+use crate::mosaic::{Beyond, Layer, MARGIN};
 use crate::samples::Samples;
 use crate::warp::Warp;
 use crate::{Mosaic, MosaicRules, Patch, Raster, SourceError, Standing, Windows};
@@ -26,8 +26,8 @@ pub struct WideMosaic {
     rules: MosaicRules,
     area: Crs,
     grid: GridFrame,
-    /// Height in metres of ground that nobody knows and that lies near none: the lowest of all.
-    lowest_m: f64,
+    /// The joint with the lowest height of all, which ground takes that no source reaches.
+    lowest: usize,
 }
 
 /// Files of one grid, as one raster.
@@ -38,39 +38,43 @@ struct Joint {
     members: Vec<(usize, [i32; 2])>,
     warp: Warp,
     posts_per_metre: [f64; 2],
+    /// Height in metres of voids that lie near no height: the lowest of its files, which their type can hold.
+    lowest_m: f64,
 }
 
 impl WideMosaic {
-    /// Of the files at the places `used`, in order of priority, for the area `rect`, in which the lowest height of
-    /// all files is `lowest_m`.
+    /// Of the files at the places `used`, each with its lowest height in metres in the area `rect`, in order of
+    /// priority.
     ///
     /// # Errors
     /// When joined rasters are together too large.
     pub fn new(
         windows: Windows,
-        used: &[usize],
+        used: &[(usize, f64)],
         rules: MosaicRules,
         (area, grid, rect): (&Crs, &GridFrame, PostRect),
-        lowest_m: f64,
     ) -> Result<Self, SourceError> {
         let header = |index: usize| windows.files()[index].header();
         let meaning = |index: usize| (&header(index).frame, (header(index).scale, &header(index).shift));
-        let mut groups: Vec<Vec<usize>> = Vec::new();
-        for &index in used {
+        let mut groups: Vec<Vec<(usize, f64)>> = Vec::new();
+        for &file in used {
             match groups.last_mut() {
-                Some(group) if fits(meaning(group[0]), meaning(index)) => group.push(index),
-                _ => groups.push(vec![index]),
+                Some(group) if fits(meaning(group[0].0), meaning(file.0)) => group.push(file),
+                _ => groups.push(vec![file]),
             }
         }
         let joints = groups.into_iter().map(|group| {
-            let headers: Vec<&Header> = group.iter().map(|&index| header(index)).collect();
+            let headers: Vec<&Header> = group.iter().map(|&(index, _)| header(index)).collect();
+            let lowest_m = group.iter().map(|&(_, lowest_m)| lowest_m).fold(f64::INFINITY, f64::min);
             let (header, shifts) = joined(&headers)?;
             let warp = Warp::new(&header.frame, area, grid);
             let posts_per_metre = warp.posts_per_metre(rect);
-            Ok(Joint { header, members: group.into_iter().zip(shifts).collect(), warp, posts_per_metre })
+            let members = group.into_iter().map(|(index, _)| index).zip(shifts).collect();
+            Ok(Joint { header, members, warp, posts_per_metre, lowest_m })
         });
-        let joints = joints.collect::<Result<_, SourceError>>()?;
-        Ok(Self { windows, joints, rules, area: area.clone(), grid: *grid, lowest_m })
+        let joints = joints.collect::<Result<Vec<_>, SourceError>>()?;
+        let lowest = (0..joints.len()).min_by(|&a, &b| joints[a].lowest_m.total_cmp(&joints[b].lowest_m));
+        Ok(Self { windows, joints, rules, area: area.clone(), grid: *grid, lowest: lowest.unwrap_or(0) })
     }
 
     /// Heights at the posts `rect` of the working grid.
@@ -85,9 +89,12 @@ impl WideMosaic {
             let (warp, posts_per_metre) = (joint.warp.clone(), joint.posts_per_metre);
             layers.push(Layer { raster, standings, warp, posts_per_metre });
         }
-        let beyond = quanta_of_metres(self.lowest_m);
+        let beyond = self.joints.get(self.lowest).map(|joint| Beyond {
+            quanta: joint.lowest_m * f64::from(QUANTA_PER_METRE),
+            shift: joint.header.shift.clone(),
+        });
         let place = (self.area.clone(), self.grid);
-        Ok(Mosaic { layers, rules: self.rules, place, beyond: Some(beyond.unwrap_or(0)) }.resample(rect))
+        Ok(Mosaic { layers, rules: self.rules, place, beyond }.resample(rect))
     }
 
     /// How many strips or tiles were decoded so far, counting each time.
@@ -103,7 +110,7 @@ impl WideMosaic {
         }
         let reach = self.rules.voids.fill_within as i32 + AROUND_POSTS;
         let scale = joint.header.scale;
-        let lowest = (self.lowest_m / scale.unit_m - scale.offset) / scale.scale;
+        let lowest = (joint.lowest_m / scale.unit_m - scale.offset) / scale.scale;
         for block in blocks(window) {
             let cut = block.intersection(&window).expect("blocks touch their window");
             if posts(cut).all(|post| standings[index(window, post)] < Standing::Void) {
@@ -160,21 +167,25 @@ impl Joint {
         }
         let mut samples = Samples::zeroed(self.header.kind, window.post_count());
         let mut standings = vec![Standing::Gap; window.post_count()];
+        let mut range_m = None;
         for &(file, shift) in &self.members {
             let Some(cut) = shifted(windows.files()[file].rect(), shift).intersection(&window) else { continue };
             let raster = windows.read(file, shifted(cut, shift.map(|posts| -posts)))?;
+            range_m = [range_m, raster.range_m()].into_iter().flatten().reduce(union);
             for (from, post) in posts(cut).enumerate() {
                 let standing = if raster.voids.contains(from) { Standing::Void } else { Standing::Height };
                 let at = index(window, post);
                 if standing < standings[at] {
                     standings[at] = standing;
-                    samples.set(at, raster.samples.get(from));
+                    // What marks a void is a number in this file only.
+                    if standing == Standing::Height {
+                        samples.set(at, raster.samples.get(from));
+                    }
                 }
             }
         }
-        let mut raster = Raster::of_samples(&self.header, window, samples, Vec::new())?;
         let missing = standings.iter().enumerate().filter(|&(_, &standing)| Standing::Void <= standing);
-        raster.mark_voids(missing.map(|(index, _)| index));
+        let raster = Raster::joined(&self.header, window, samples, missing.map(|(index, _)| index), range_m);
         if raster.void_count() == 0 {
             standings.clear();
         }

@@ -92,6 +92,11 @@ impl Failure {
         Self { code: signal.unwrap_or(self.code), ..self }
     }
 
+    /// With another hint, where the message holds `part`.
+    pub fn hinted_where(self, part: &str, hint: &str) -> Self {
+        if self.message.contains(part) { Self { hint: Some(hint.into()), ..self } } else { self }
+    }
+
     /// Prints it and gives the exit code.
     pub fn tell(&self) -> ExitCode {
         terminal::tell(&self.to_string());
@@ -103,7 +108,8 @@ impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         // What has no hint of its own is a refusal of the system.
         let fallback = "check the path named above, its permissions, and the room on its disk";
-        write!(f, "error: {}\nhint: {}", self.message, self.hint.as_deref().unwrap_or(fallback))
+        let (message, hint) = (&self.message, self.hint.as_deref().unwrap_or(fallback));
+        write!(f, "error: {}\nhint: {}", terminal::short(message), terminal::short(hint))
     }
 }
 

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use tempfile::NamedTempFile;
 
 use crate::failure::Failure;
+use crate::left_over;
 
 /// Writes a file that appears under its name only when it is whole.
 ///
@@ -28,7 +29,9 @@ pub fn write_whole_or(
     write: impl FnOnce(&mut BufWriter<&fs::File>) -> Result<(), Failure>,
 ) -> Result<(), Failure> {
     let fault = |error: io::Error| Failure::output(path, &error);
-    let file = temporary_beside(path)?;
+    let file = temporary_beside(path, left_over::PREFIX)?;
+    // Others leave it alone while this process lives.
+    let _held = left_over::hold(file.path());
     let mut out = BufWriter::new(file.as_file());
     write(&mut out)?;
     out.flush().map_err(fault)?;
@@ -42,15 +45,17 @@ pub fn write_whole_or(
 /// # Errors
 /// Those of `make`, and when the file cannot be made.
 pub fn make_whole(path: &Path, make: impl FnOnce(&Path) -> Result<(), Failure>) -> Result<(), Failure> {
-    let file = temporary_beside(path)?;
+    // What makes it may lock it in its own way, so this process does not, and none sweeps it by its name.
+    let file = temporary_beside(path, ".tiefort-part-")?;
     make(file.path())?;
     file.persist(path).map_err(|error| Failure::output(path, &error.error))?;
     Ok(())
 }
 
-fn temporary_beside(path: &Path) -> Result<NamedTempFile, Failure> {
+fn temporary_beside(path: &Path, prefix: &str) -> Result<NamedTempFile, Failure> {
+    left_over::sweep(folder_of(path));
     let mut builder = tempfile::Builder::new();
-    builder.prefix(".tiefort-");
+    builder.prefix(prefix);
     // A temporary file is private by default; this one is about to be an ordinary file.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
@@ -62,11 +67,24 @@ fn temporary_beside(path: &Path) -> Result<NamedTempFile, Failure> {
 /// # Errors
 /// When there is one, or it cannot be written.
 pub fn write_new(path: &Path, text: &str) -> Result<(), Failure> {
-    if path.exists() {
-        let message = format!("{}: found a file, expected a name that is free", path.display());
-        return Err(Failure::new(message, "give another name; nothing that is there is ever overwritten"));
+    if left_over::is_taken(path) {
+        let found = if path.is_dir() { "a folder" } else { left_over::named(path) };
+        let message = format!("{}: found {found}, expected a name that is free", path.display());
+        return Err(Failure::new(message, "give another name; a job that is there is never written over"));
     }
     write_whole(path, |out| out.write_all(text.as_bytes()))
+}
+
+/// Makes a folder for files that are to be written, and those around it, where it is not there yet.
+///
+/// # Errors
+/// When it cannot be made, or something else has its name.
+pub fn make_folder(path: &Path) -> Result<(), Failure> {
+    if left_over::is_taken(path) && !path.is_dir() {
+        let message = format!("{}: found {}, expected a folder", path.display(), left_over::named(path));
+        return Err(Failure::new(message, "give the name of a folder; it is made where it is not there yet"));
+    }
+    fs::create_dir_all(path).map_err(|error| Failure::output(path, &error))
 }
 
 /// The folder a file is to appear in.
@@ -82,7 +100,11 @@ pub fn check_writable(path: &Path) -> Result<(), Failure> {
     if path.is_dir() {
         return Err(Failure::new(format!("{}: found a folder, expected a file name", path.display()), "name the file"));
     }
-    let probe = tempfile::Builder::new().prefix(".tiefort-").tempfile_in(folder_of(path));
+    if path.is_symlink() && !path.exists() {
+        let message = format!("{}: found a link that leads nowhere, expected a file name", path.display());
+        return Err(Failure::new(message, "remove the link, or give another name"));
+    }
+    let probe = tempfile::Builder::new().prefix(left_over::PREFIX).tempfile_in(folder_of(path));
     probe.map(drop).map_err(|error| Failure::output(path, &error))
 }
 

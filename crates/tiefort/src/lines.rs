@@ -3,6 +3,8 @@
 use compiler::Event;
 use database::ReportStage;
 
+use crate::terminal;
+
 /// Seconds between lines within a stage.
 const PAUSE_S: f64 = 1.0;
 
@@ -14,19 +16,21 @@ pub struct Lines {
     done: usize,
     kept: usize,
     last_s: f64,
+    begun_s: f64,
 }
 
 impl Lines {
     /// Nothing has happened yet.
     pub fn new(workers: usize) -> Self {
-        Self { workers, tiles: 0, done: 0, kept: 0, last_s: 0.0 }
+        Self { workers, tiles: 0, done: 0, kept: 0, last_s: 0.0, begun_s: 0.0 }
     }
 
     /// The line to print now, if one is due.
     pub fn hear(&mut self, event: &Event, stage_time: Option<&ReportStage>, at_s: f64) -> Option<String> {
         match event {
             Event::Enter(_, tiles) => {
-                (self.tiles, self.done, self.kept, self.last_s) = (*tiles, 0, 0, at_s);
+                (self.tiles, self.done, self.kept) = (*tiles, 0, 0);
+                (self.last_s, self.begun_s) = (at_s, at_s);
                 None
             }
             Event::Done(stage, _) => {
@@ -41,7 +45,7 @@ impl Lines {
                 let (wall_s, cpu_s) = stage_time.map(|time| (time.wall_s, time.cpu_s)).unwrap_or_default();
                 Some(self.end(stage.name(), wall_s, cpu_s))
             }
-            Event::Note(text) => Some(format!("note: {text}")),
+            Event::Note(text) => Some(format!("note: {}", terminal::short(&terminal::plain(text)))),
             Event::Started(..) | Event::Because(..) => None,
         }
     }
@@ -52,7 +56,10 @@ impl Lines {
         }
         self.last_s = at_s;
         let (finished, tiles) = (self.done + self.kept, self.tiles);
-        Some(format!("{stage:<9}{finished:>5} of {tiles} tiles{:>9.1} s", at_s))
+        // What was kept took no time, so the rest is forecast from what was done.
+        let left_s = (at_s - self.begun_s) / self.done as f64 * tiles.saturating_sub(finished) as f64;
+        let left = if left_s.is_finite() { format!(", about {left_s:.0} s left in it") } else { String::new() };
+        Some(format!("{stage:<9}{finished:>5} of {tiles} tiles{at_s:>9.1} s{left}"))
     }
 
     fn end(&self, stage: &str, wall_s: f64, cpu_s: f64) -> String {
@@ -80,7 +87,7 @@ mod tests {
         let done = Event::Done(Stage::Refine, TileId { row: 0, col: 0 });
         let told = (1..=36).filter_map(|step| lines.hear(&done, None, f64::from(step) / 10.0)).collect::<Vec<_>>();
         assert_eq!(told.len(), 3);
-        assert_eq!(told[0], "refine      10 of 36 tiles      1.0 s");
+        assert_eq!(told[0], "refine      10 of 36 tiles      1.0 s, about 3 s left in it");
     }
 
     #[test]

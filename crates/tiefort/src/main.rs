@@ -23,6 +23,7 @@ mod failure;
 mod figures;
 mod files;
 mod fit;
+mod left_over;
 mod lines;
 mod measures;
 mod measures_json;

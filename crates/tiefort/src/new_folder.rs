@@ -7,12 +7,15 @@ use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
 use crate::failure::Failure;
+use crate::left_over;
 
 /// A folder in the making, beside the place where it will appear.
 #[derive(Debug)]
 pub struct NewFolder {
     path: PathBuf,
     making: TempDir,
+    /// Says to other exports that this one lives.
+    _held: Option<fs::File>,
 }
 
 impl NewFolder {
@@ -22,19 +25,22 @@ impl NewFolder {
     /// When something is there already, or the folder around it is missing or not writable.
     pub fn begin(path: &Path) -> Result<Self, Failure> {
         let is_empty = || fs::read_dir(path).is_ok_and(|mut entries| entries.next().is_none());
-        if path.exists() && !is_empty() {
-            let message = format!("{}: found something there, expected a name that is free", path.display());
-            return Err(Failure::new(message, "give another name, or remove it; nothing is ever overwritten"));
+        if left_over::is_taken(path) && (path.is_symlink() || !is_empty()) {
+            let found = left_over::named(path);
+            let message = format!("{}: found {found}, expected a name that is free", path.display());
+            return Err(Failure::new(message, "give another name, or remove it; a folder is never written over"));
         }
         let path = std::path::absolute(path).map_err(|error| Failure::output(path, &error))?;
         let around = path.parent().unwrap_or(Path::new("/"));
+        left_over::sweep(around);
         let mut builder = tempfile::Builder::new();
-        builder.prefix(".tiefort-");
+        builder.prefix(left_over::PREFIX);
         // A temporary folder is private by default; this one is about to be an ordinary one.
         #[cfg(unix)]
         builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o777));
         let making = builder.tempdir_in(around).map_err(|error| Failure::output(&path, &error))?;
-        Ok(Self { path, making })
+        let held = left_over::hold(making.path());
+        Ok(Self { path, making, _held: held })
     }
 
     /// Writes a file of this name, `/` between folders.
@@ -81,6 +87,15 @@ mod tests {
         folder.put("a/b/c.bin", b"c").unwrap();
         folder.finish().unwrap();
         assert_eq!(fs::read(path.join("a/b/c.bin")).unwrap(), b"c");
-        assert!(NewFolder::begin(&path).unwrap_err().to_string().contains("found something there"));
+        assert!(NewFolder::begin(&path).unwrap_err().to_string().contains("found a folder that is not empty"));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_is_not_written_through_even_if_it_leads_nowhere() {
+        let around = tempfile::tempdir().unwrap();
+        let path = around.path().join("out");
+        std::os::unix::fs::symlink(around.path().join("gone"), &path).unwrap();
+        assert!(NewFolder::begin(&path).unwrap_err().to_string().contains("found a link that leads nowhere"));
     }
 }

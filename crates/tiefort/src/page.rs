@@ -19,11 +19,14 @@ pub fn of_build(folder: &Folder, job: &Job, report: &Report, workers: usize) -> 
     if PAGE_MODULES_MAX < grid.count() {
         let settings = settings(job);
         let manifest = &folder.manifest()?;
-        return Ok(seal_page(&report_html(&Page { report, manifest, settings: &settings, scene: None })));
+        let title = job.area.title.as_deref();
+        return Ok(seal_page(&report_html(&Page { title, report, manifest, settings: &settings, scene: None })));
     }
     let small = grid.area().post_count() <= PAGE_POSTS_MAX;
     let ground = if small { WantedGround::Job(job) } else { WantedGround::None };
-    let product = product(folder.dir(), &Wanted { part: None, ground, workers })?;
+    let read = |ground| product(folder.dir(), &Wanted { part: None, ground, workers });
+    // A source may have gone since the build ended, which is finished all the same.
+    let product = read(ground).or_else(|_| read(WantedGround::None))?;
     Ok(page(&product, report))
 }
 
@@ -32,7 +35,8 @@ pub fn page(product: &Product, report: &Report) -> String {
     let parts = SceneParts::new(product, Some(product.limit_use()), Some(report));
     let scene = parts.scene(product, product.part, &product.modules);
     let settings = settings(&product.job);
-    seal_page(&report_html(&Page { report, manifest: &product.manifest, settings: &settings, scene: Some(&scene) }))
+    let (title, manifest) = (product.job.area.title.as_deref(), &product.manifest);
+    seal_page(&report_html(&Page { title, report, manifest, settings: &settings, scene: Some(&scene) }))
 }
 
 fn settings(job: &Job) -> Vec<PageSetting> {

@@ -243,7 +243,8 @@ impl Bars {
             self.bar.set_style(style("{prefix:<9} {spinner} {elapsed}"));
         } else {
             let color = if terminal::wants_color() { ".green" } else { "" };
-            let template = format!("{{prefix:<9}} [{{bar:36{color}}}] {{pos}} of {{len}} tiles  {{elapsed}}");
+            let template =
+                format!("{{prefix:<9}} [{{bar:24{color}}}] {{pos}} of {{len}} tiles  {{elapsed}}, about {{eta}} left");
             self.bar.set_style(style(&template).progress_chars("##."));
             self.bar.set_length(tiles as u64);
         }

@@ -52,7 +52,7 @@ impl From<Built> for Finished {
 }
 
 impl<'a> Run<'a> {
-    /// Announces the run: every setting with its value and meaning.
+    /// Announces the run in a line; with `-v` every setting with its value and meaning, too.
     ///
     /// # Errors
     /// When signals cannot be watched.
@@ -61,9 +61,11 @@ impl<'a> Run<'a> {
         if matches!(run.show(), Show::Progress | Show::Verbose) {
             let (version, workers) = (env!("CARGO_PKG_VERSION"), run.workers);
             let (path, folder) = (job.path.display(), run.folder.display());
-            terminal::tell(&format!("tiefort {version}: {what} {path} into {folder}, {workers} workers\n"));
+            terminal::tell(&format!("tiefort {version}: {what} {path} into {folder}, {workers} workers"));
             remark.iter().for_each(|remark| terminal::tell(&format!("note: {remark}")));
-            terminal::tell(&settings_text(job));
+        }
+        if run.show() == Show::Verbose {
+            terminal::tell(&format!("\n{}", settings_text(job)));
         }
         Ok(run)
     }

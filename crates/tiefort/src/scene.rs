@@ -65,7 +65,14 @@ impl SceneParts {
                 .as_ref()
                 .map(|ground| SceneGround { dem: &ground.dem, residuals: &ground.residuals }),
             limits: &self.limits,
+            water: water(&product.job),
             tiles: &self.tiles,
         }
     }
+}
+
+/// The class of water: what the job gives to its water polygons, or one that is named so.
+pub fn water(job: &job::Job) -> Option<u8> {
+    let named = || job.importance.classes.iter().position(|class| class == "water");
+    job.dem.water.as_ref().map(|water| water.class).or_else(|| named().map(|index| index as u8))
 }

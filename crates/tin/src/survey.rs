@@ -61,7 +61,7 @@ impl Recorder {
         let module = |at: i32| (at / side_cells) as u32;
         let south_west = terrain::ModuleId { row: module(rect.south), col: module(rect.west) };
         let (rows, cols) = (module(rect.cells_high() as i32), module(rect.cells_wide() as i32));
-        let lines = ModuleLines { side: side_cells, south_west, rows, cols };
+        let lines = ModuleLines { side: side_cells, south_west, rows, cols, reach: task.grid.all() };
         Self { rect, lines, owned: task.owned, cost: task.cost, bin: i32::MAX, runs: Vec::new(), squares: Vec::new() }
     }
 
@@ -108,7 +108,11 @@ impl Witness for Recorder {
                 self.runs.push(GainRun { module: first, bin, cost: 1 });
                 self.runs.push(GainRun { module: second, bin, cost: 1 });
             }
-            (Some(Charged::Inside(module) | Charged::Between(_, module)), CostUnit::Points) => {
+            (Some(Charged::Beside(module)), CostUnit::Triangles)
+            | (
+                Some(Charged::Inside(module) | Charged::Between(_, module) | Charged::Beside(module)),
+                CostUnit::Points,
+            ) => {
                 self.runs.push(GainRun { module, bin, cost: 1 });
             }
             (None, _) => {}

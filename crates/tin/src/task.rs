@@ -35,7 +35,8 @@ impl TileTask {
         let Frame::Sides { side_cells, south_west, allowance } = &self.frame else { return None };
         let along = |cells: usize| cells as u32 / *side_cells as u32;
         let (rows, cols) = (along(self.rect.cells_high()), along(self.rect.cells_wide()));
-        let lines = ModuleLines { side: *side_cells, south_west: *south_west, rows, cols };
+        let reach = allowance.modules;
+        let lines = ModuleLines { side: *side_cells, south_west: *south_west, rows, cols, reach };
         let mut ledger = TileLedger::new(lines, allowance.clone());
         let local = |post: &Post| (post.row - self.rect.south, post.col - self.rect.west);
         self.inherited.iter().map(local).for_each(|(row, col)| ledger.inherit(row, col));

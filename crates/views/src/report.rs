@@ -1,7 +1,7 @@
 //! The report as text: what a terrain engineer reads first on top, everything that broke a limit below, no colour,
 //! at most 100 columns.
 
-use database::{Report, ReportBreach, ReportPlace, ReportResidual, ReportStage};
+use database::{Report, ReportBorder, ReportBreach, ReportPart, ReportPlace, ReportResidual, ReportStage};
 
 use crate::table::{Align, Table, grouped};
 
@@ -102,6 +102,9 @@ fn residuals(report: &Report) -> Option<String> {
         text +=
             &format!("  RMS of the classes weighted by points, as the founding paper prints it: {by_points:.3} m\n");
     }
+    if let Some(border) = &report.border {
+        text += &format!("  {}\n", border_in_words(border));
+    }
     if let Some(accuracy_m) = report.dem_accuracy_m {
         text += &format!("  the source states an accuracy of {accuracy_m} m\n");
     }
@@ -110,6 +113,12 @@ fn residuals(report: &Report) -> Option<String> {
         text += &format!("  posts without a height in the source: {voids}, of which {filled} were filled\n");
     }
     Some(text)
+}
+
+/// Residuals of load modules at the outer border of the area, and of those inside.
+pub(crate) fn border_in_words(border: &ReportBorder) -> String {
+    let part = |part: &ReportPart| format!("RMS {:.3} m, largest {:.2} m", part.rms_m, part.max_m);
+    format!("at the outer border {}; inside {}", part(&border.at_border), part(&border.inside))
 }
 
 fn residual_row(table: &mut Table, name: &str, posts: String, points: String, residual: &ReportResidual) {

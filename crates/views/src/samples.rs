@@ -1,7 +1,8 @@
 //! A report with something in every part and a small piece of terrain, for the tests of this crate.
 
-use terrain::{LoadModule, ModuleGrid, ModuleId, ModuleResidual, ModuleVertex, Spacing};
+use terrain::{GridFrame, LoadModule, ModuleGrid, ModuleId, ModuleResidual, ModuleVertex, Spacing};
 
+use crate::picture::{Scene, SceneLimits};
 use database::{
     Report, ReportBefore, ReportBound, ReportBreach, ReportClass, ReportLevel, ReportPerModule, ReportPerWindow,
     ReportPlace, ReportPoints, ReportPool, ReportRefusals, ReportResidual, ReportStage, ReportStops, ReportVoids,
@@ -34,6 +35,22 @@ pub(crate) fn modules() -> Vec<LoadModule> {
         }
     };
     GRID.all().iter().map(module).collect()
+}
+
+/// The scene of these load modules, without ground or tiles.
+pub(crate) fn scene<'a>(modules: &'a [LoadModule], limits: &'a SceneLimits) -> Scene<'a> {
+    Scene {
+        name: "x",
+        crs: "EPSG:32611",
+        grid: GRID,
+        frame: GridFrame { origin_east_m: 0.0, origin_north_m: 0.0, spacing: spacing() },
+        part: GRID.all(),
+        modules,
+        ground: None,
+        limits,
+        water: None,
+        tiles: &[],
+    }
 }
 
 pub(crate) fn residual(rms_m: f64) -> ReportResidual {
@@ -73,6 +90,10 @@ pub(crate) fn report() -> Report {
             per_4km: ReportPerWindow { max: 4_810, limit: 4_096, over: 140, worst_9x9: 5_600 },
         }),
         residual: residual(2.999),
+        border: Some(database::ReportBorder {
+            at_border: database::ReportPart { posts: 77_000, rms_m: 3.4, max_m: 31.0 },
+            inside: database::ReportPart { posts: 3_823_528, rms_m: 3.2, max_m: 36.5 },
+        }),
         residual_against_source: Some(residual(3.1)),
         classes: vec![class("plains", 2_587_215, 64_939, 0.869), class("mountains", 1_313_410, 28_532, 5.268)],
         levels: vec![],

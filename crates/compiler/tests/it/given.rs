@@ -213,10 +213,7 @@ fn what_no_pin_may_be_is_told_with_its_place_in_the_file() {
         &pinned(CONSTRAINED, &[("forbid", 40, 60, "")]),
         "that is a corner of load modules, expected another",
     );
-    check_refused(
-        &pinned(CONSTRAINED, &[("forbid", 0, 65, "")]),
-        "that is a point of the outer border, expected another",
-    );
+    check_refused(&pinned(PAPER, &[("forbid", 0, 65, "")]), "that is a point of the outer border, expected another");
     check_refused(
         &pinned(CONSTRAINED, &[("height", 31, 33, "")]),
         "a height pin without height_m, expected height_m in metres",

@@ -1,6 +1,6 @@
 //! Every mode gives a sound product: no cracks, no T-junctions, exact areas, both identities, limits, true numbers.
 
-use job::{Edges as JobEdges, HeightFit, Job, Lattice, Method, Optimising};
+use job::{Edges as JobEdges, HeightFit, Job, Lattice, Method, Optimising, OuterBorder};
 use terrain::{Dem, Post};
 
 use crate::findings::{check_limits, check_report};
@@ -27,7 +27,7 @@ pub fn check(scene: &Scene, dem: &Dem) {
 }
 
 /// Where vertices may stand: corners of load modules and all that is not optimised on posts, the rest on eighths. At
-/// DEM height stands the outer border, and all that is not fitted.
+/// DEM height stands a fixed outer border, and all that is not fitted.
 #[track_caller]
 fn check_heights(job: &Job, product: &Product, dem: &Dem, edges: Edges) {
     let (is_free, is_fitted) = match job.tin.method {
@@ -36,6 +36,7 @@ fn check_heights(job: &Job, product: &Product, dem: &Dem, edges: Edges) {
         }
         Method::Paper { .. } | Method::Greedy => (false, false),
     };
+    let is_fixed = job.modules.outer_border == OuterBorder::Fixed;
     let step = product.side / i64::from(SIDE_CELLS);
     for (&(row, col), module) in &product.modules {
         for vertex in &module.vertices {
@@ -54,7 +55,8 @@ fn check_heights(job: &Job, product: &Product, dem: &Dem, edges: Edges) {
             let area = dem.rect();
             let is_on_post =
                 (x * i64::from(SIDE_CELLS)) % product.side == 0 && (y * i64::from(SIDE_CELLS)) % product.side == 0;
-            let is_outer = is_on_post
+            let is_outer = is_fixed
+                && is_on_post
                 && on_line != [false; 2]
                 && (post.row == area.south || post.row == area.north || post.col == area.west || post.col == area.east);
             if (!is_fitted && is_on_post) || is_outer {
@@ -122,8 +124,31 @@ fn limits_that_no_removal_can_meet_are_breaches() {
 }
 
 #[test]
-fn the_outer_border_holds_a_point_every_border_step_and_no_other() {
-    for mode in modes::all().into_iter().step_by(5) {
+fn a_refined_outer_border_is_as_true_as_the_ground_inside() {
+    for method in ["effort = \"fast\"", ""] {
+        let border = |kind: &str| {
+            let modules = format!("outer_border = \"{kind}\"");
+            let scene = Scene::new(&Words { modules, tin: method.into(), ..Words::sample() });
+            let report = scene.build("area", 2).report;
+            scene.verify("area");
+            Product::read(&scene.path("area")).check(Edges::Constrained);
+            assert!(report.per_load_module.max <= 100 && report.per_load_module.mean <= 32.0, "{method} {kind}");
+            (report.points.border, report.residual.rms_m, report.border.expect("there is ground inside"))
+        };
+        let (none, rms_m, refined) = border("refined");
+        let (some, fixed_rms_m, fixed) = border("fixed");
+        assert!(none == 0 && 0 < some);
+        assert!(refined.at_border.rms_m < fixed.at_border.rms_m, "{method}: {refined:?} {fixed:?}");
+        assert!(refined.at_border.rms_m < 1.3 * refined.inside.rms_m, "{method}: {refined:?}");
+        assert!(rms_m < fixed_rms_m, "{method}: {rms_m} {fixed_rms_m}");
+    }
+}
+
+#[test]
+fn a_fixed_outer_border_holds_a_point_every_border_step_and_no_other() {
+    for (name, mut words) in modes::all().into_iter().step_by(5) {
+        words.modules += "\nouter_border = \"fixed\"";
+        let mode = (name, words);
         let scene = modes::scene(&mode);
         drop(scene.build("area", 2));
         let product = Product::read(&scene.path("area"));

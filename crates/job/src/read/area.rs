@@ -7,15 +7,16 @@ use terrain::{Metres, ModuleGrid, QUANTA_PER_METRE, Spacing};
 
 use crate::bounds::{
     CELLS_A_SIDE_MAX, COORDINATE_M_MAX, EPSG_GEOGRAPHIC, EPSG_RANGE, MODULES_MAX, NAME_CHARS_MAX, SIDE_QUANTA_MAX,
+    TITLE_CHARS_MAX,
 };
 use crate::entry::{Entry, Section};
-use crate::{Area, AreaFound, AreaPlace, AreaRequest, ClipHeights, Edges, JobError, ModulesSpec};
+use crate::{Area, AreaFound, AreaPlace, AreaRequest, ClipHeights, Edges, JobError, Method, ModulesSpec, OuterBorder};
 
 /// Finds what a job leaves open about its area.
 pub(super) type Find<'a> = dyn FnMut(&AreaRequest, &Entry) -> Result<AreaFound, JobError> + 'a;
 
 pub(super) fn read(area: &Section, modules: &Section, find: &mut Find) -> Result<(Area, ModulesSpec), JobError> {
-    let name = name(area)?;
+    let (name, title) = (name(area)?, title(area)?);
     let epsg = epsg(area)?;
     let place = open_place(area, epsg)?;
     let origin_m = if place.is_none() { origin(area)? } else { [0.0; 2] };
@@ -40,8 +41,10 @@ pub(super) fn read(area: &Section, modules: &Section, find: &mut Find) -> Result
     // A multiple of the spacing, itself one of 1/16 m, so this is whole; and side_cells has checked that it fits.
     let side_quanta = (side_m * f64::from(QUANTA_PER_METRE)) as u16;
     let edges = edges(modules)?;
-    let modules = ModulesSpec { side_m, side_quanta, border_step_m, border_step_cells, edges };
-    Ok((Area { name, epsg, origin_m, spacing, grid }, modules))
+    // What the method asks for is not known yet: `outer_border` decides.
+    let outer_border = OuterBorder::Fixed;
+    let modules = ModulesSpec { side_m, side_quanta, border_step_m, border_step_cells, outer_border, edges };
+    Ok((Area { name, title, epsg, origin_m, spacing, grid }, modules))
 }
 
 /// An area that is to be found, with the key that says so.
@@ -90,6 +93,18 @@ fn name(area: &Section) -> Result<String, JobError> {
         return Err(entry.out_of_range_with(expected, "the database is named after it: NAME.tdb"));
     }
     Ok(name.to_owned())
+}
+
+/// What a page of the area is called: one line of text.
+fn title(area: &Section) -> Result<Option<String>, JobError> {
+    let Some(entry) = area.optional("title") else { return Ok(None) };
+    let expected = format!("a line of 1 to {TITLE_CHARS_MAX} characters");
+    let title = entry.text(&expected)?;
+    let is_line = !title.trim().is_empty() && !title.contains(char::is_control);
+    if !is_line || TITLE_CHARS_MAX < title.chars().count() {
+        return Err(entry.out_of_range_with(expected, "it stands above report.html; leave it out for the area's name"));
+    }
+    Ok(Some(title.to_owned()))
 }
 
 /// The code; `None` for one that is to be found.
@@ -222,6 +237,26 @@ fn grid_of(
     }
     // Both are whole and below 2^24 here.
     Ok(ModuleGrid { rows: rows as u32, cols: cols as u32, side_cells })
+}
+
+/// The outer border: refined, unless the method is the paper's or edges are clipped, which need a fixed one.
+pub(super) fn outer_border(modules: &Section, edges: Edges, method: Method) -> Result<OuterBorder, JobError> {
+    let needs_fixed = match (edges, method) {
+        (Edges::Clip(_), _) => Some("edges = \"clip\""),
+        (Edges::Constrained, Method::Paper { .. }) => Some("method = \"paper\""),
+        (Edges::Constrained, Method::Greedy | Method::Optimised(_)) => None,
+    };
+    let Some(entry) = modules.optional("outer_border") else {
+        return Ok(if needs_fixed.is_some() { OuterBorder::Fixed } else { OuterBorder::Refined });
+    };
+    match (entry.word(&[("refined", OuterBorder::Refined), ("fixed", OuterBorder::Fixed)])?, needs_fixed) {
+        (OuterBorder::Refined, Some(why)) => Err(entry.conflict(
+            why,
+            "outer_border = \"fixed\", a point every border step",
+            "remove it, or use constrained edges and method = \"optimised\" or \"greedy\"",
+        )),
+        (border, _) => Ok(border),
+    }
 }
 
 fn edges(modules: &Section) -> Result<Edges, JobError> {

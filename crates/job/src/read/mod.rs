@@ -57,7 +57,7 @@ pub(crate) fn read<'a>(
 
 fn job_of(sections: &Sections, path: &Path, find: Option<&FindArea>) -> Result<(Job, Vec<Mention>), JobError> {
     let mut mentions = Vec::new();
-    let (area, modules) = area::read(&sections.area, &sections.modules, &mut |request, entry| {
+    let (area, mut modules) = area::read(&sections.area, &sections.modules, &mut |request, entry| {
         let alone = || NoArea {
             found: "an area that only a job file on the disk can have".into(),
             expected: "origin_m and size_m".into(),
@@ -77,6 +77,7 @@ fn job_of(sections: &Sections, path: &Path, find: Option<&FindArea>) -> Result<(
     let limits = limits::read(&sections.limits, &area.grid, modules.side_m)?;
     let given = given::read(&sections.tin, path, &mut mentions)?;
     let tin = tin::read(&sections.tin, &sections.modules, modules.edges, given)?;
+    modules.outer_border = area::outer_border(&sections.modules, modules.edges, tin.method)?;
     let lod = lod::read(&sections.lod)?;
     Ok((Job { path: path.to_owned(), area, dem, importance, tiles, modules, limits, tin, lod }, mentions))
 }

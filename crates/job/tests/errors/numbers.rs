@@ -1,6 +1,16 @@
 //! Names and numbers outside what is possible.
 
-use crate::check;
+use crate::{check, told_of};
+
+#[test]
+fn a_title_is_a_line_of_text() {
+    for title in [r#""""#, r#""  ""#, r#""a\nb""#] {
+        let told = told_of("name", &format!("name = \"ntc\"\ntitle = {title}"));
+        let expected = "expected a line of 1 to 200 characters hint: it stands above report.html; leave it out for the \
+                        area's name";
+        assert!(told.starts_with("a/b.toml:3: area.title: found") && told.ends_with(expected), "{told}");
+    }
+}
 
 #[test]
 fn names_and_coordinate_systems_are_checked() {

@@ -44,8 +44,8 @@ fn unknown_keys_are_told_with_the_nearest_known_one() {
         "spacing_m",
         "spacing = 25",
         &[
-            "a/b.toml:6: area.spacing: found a key that no job has, expected one of name, crs, origin_m,",
-            "size_m, around, cover, spacing_m",
+            "a/b.toml:6: area.spacing: found a key that no job has, expected one of name, title, crs,",
+            "origin_m, size_m, around, cover, spacing_m",
             "hint: did you mean spacing_m?",
         ],
     );

@@ -6,6 +6,7 @@
 
 mod geokeys;
 mod parameters;
+pub(crate) mod vertical;
 mod wkt;
 
 pub(crate) use geokeys::GeoKeys;
@@ -20,6 +21,8 @@ pub struct Crs {
     name: String,
     definition: String,
     remark: Option<String>,
+    /// Metres in a unit of the heights of a compound system.
+    vertical_unit_m: Option<f64>,
     proj: Proj,
 }
 
@@ -62,6 +65,9 @@ impl Crs {
     pub fn from_epsg(code: u32) -> Result<Self, String> {
         let known = u16::try_from(code).ok().and_then(crs_definitions::from_code);
         let known = known.ok_or("a code that is not in the table of systems")?;
+        if known.wkt.starts_with("COMPD_CS") {
+            return wkt::read(known.wkt);
+        }
         // No grid of shifts means none at all: longitude and latitude are taken over as they are.
         let definition = known.proj4.replace(" +nadgrids=@null", "").replace(" +wktext", "");
         // The library knows the scale by this name only.
@@ -104,7 +110,7 @@ impl Crs {
         if !proj.is_normalized_axis() {
             return Err("a system whose axes do not run east and north".into());
         }
-        Ok(Self { epsg, name, definition, remark, proj })
+        Ok(Self { epsg, name, definition, remark, vertical_unit_m: None, proj })
     }
 
     /// Its EPSG code, where it has one.
@@ -125,6 +131,11 @@ impl Crs {
     /// Metres in one unit of its coordinates; `None` for degrees.
     pub fn unit_m(&self) -> Option<f64> {
         (!self.is_geographic()).then(|| self.proj.to_meter())
+    }
+
+    /// Metres in a unit of heights, where it is a compound system, which says so.
+    pub(crate) fn vertical_unit_m(&self) -> Option<f64> {
+        self.vertical_unit_m
     }
 
     /// What a person should know about its datum.

@@ -3,6 +3,7 @@
 
 use super::Crs;
 use super::parameters::{Datum, Method, Parameters, datum_named};
+use super::vertical::unit_m;
 
 /// Longer texts describe no system anybody uses.
 const CHARS_MAX: usize = 1 << 16;
@@ -24,10 +25,33 @@ pub(super) fn read(text: &str) -> Result<Crs, String> {
     }
     let mut parser = Parser { rest: text.trim_start_matches('\u{feff}').trim(), depth: 0 };
     let root = parser.node()?;
-    system(&root)
+    // ESRI's writers put the vertical system behind the other.
+    let mut vertical = root.vertical().map(unit_of_heights);
+    while vertical.is_none() && parser.rest.trim_start().starts_with(',') {
+        parser.rest = parser.rest.trim_start().trim_start_matches(',').trim_start();
+        vertical = parser.node()?.vertical().map(unit_of_heights);
+    }
+    let vertical_unit_m = vertical.transpose()?;
+    Ok(Crs { vertical_unit_m, ..system(&root)? })
+}
+
+/// Metres in a unit of a vertical system.
+fn unit_of_heights(vertical: &Node) -> Result<f64, String> {
+    if let Some(code) = vertical.code().and_then(|code| u16::try_from(code).ok())
+        && let Ok(unit_m) = unit_m(code)
+    {
+        return Ok(unit_m);
+    }
+    let axis = vertical.child("AXIS");
+    let unit = vertical.unit().or_else(|| axis.and_then(Node::unit)).filter(|unit_m| (1.0e-6..=1.0e6).contains(unit_m));
+    unit.ok_or_else(|| "one whose vertical part has no unit".into())
 }
 
 fn system(root: &Node) -> Result<Crs, String> {
+    // By its horizontal part, whatever code the whole has.
+    if matches!(root.keyword.as_str(), "COMPD_CS" | "COMPOUNDCRS") {
+        return system(root.children.first().ok_or("a compound system without parts")?);
+    }
     if let Some(code) = root.code() {
         return Crs::from_epsg(code);
     }
@@ -35,9 +59,7 @@ fn system(root: &Node) -> Result<Crs, String> {
     match root.keyword.as_str() {
         "GEOGCS" => Parameters::geographic(datum(root)?).crs(name),
         "PROJCS" => projected(root)?.crs(name),
-        "COMPD_CS" | "BOUNDCRS" | "COMPOUNDCRS" => {
-            system(root.children.first().ok_or("a compound system without parts")?)
-        }
+        "BOUNDCRS" => system(root.children.first().ok_or("a compound system without parts")?),
         "PROJCRS" | "GEOGCRS" | "GEODCRS" => Err(format!("version 2 of well-known text without a code ({name})")),
         "LOCAL_CS" | "ENGCRS" => Err(format!("a local system ({name})")),
         other => Err(format!("a system of kind {other}")),
@@ -121,6 +143,20 @@ fn datum(geographic: &Node) -> Result<Datum, String> {
 impl Node {
     fn child(&self, keyword: &str) -> Option<&Node> {
         self.children.iter().find(|node| node.keyword == keyword)
+    }
+
+    /// The vertical system: itself, or a part of it.
+    fn vertical(&self) -> Option<&Node> {
+        match self.keyword.as_str() {
+            "VERT_CS" | "VERTCS" | "VERTCRS" | "VERTICALCRS" => Some(self),
+            "COMPD_CS" | "COMPOUNDCRS" | "BOUNDCRS" | "SOURCECRS" => self.children.iter().find_map(Node::vertical),
+            _ => None,
+        }
+    }
+
+    fn unit(&self) -> Option<f64> {
+        let node = self.child("UNIT").or_else(|| self.child("LENGTHUNIT"));
+        node.and_then(|unit| unit.numbers.first().copied())
     }
 
     /// The EPSG code of this very node, not of a part of it.

@@ -11,4 +11,5 @@ mod real_files;
 mod refusals;
 mod resampling;
 mod support;
+mod void_rules;
 mod windows;

@@ -52,6 +52,12 @@ fn polygons(text: &str) -> Result<Vec<Polygon>, SourceError> {
 const RING: &str = "[[500000,4000000],[500100,4000000],[500100,4000100],[500000,4000000]]";
 
 #[test]
+fn a_byte_order_mark_before_geojson_is_no_part_of_it() {
+    let polygon = format!(r#"{{"type":"Polygon","coordinates":[{RING}]}}"#);
+    assert_eq!(polygons(&format!("\u{feff}{polygon}")).unwrap(), polygons(&polygon).unwrap());
+}
+
+#[test]
 fn polygons_are_found_in_every_wrapping() {
     let polygon = format!(r#"{{"type":"Polygon","coordinates":[{RING},{RING}]}}"#);
     let multi = format!(r#"{{"type":"MultiPolygon","coordinates":[[{RING}],[{RING}]]}}"#);

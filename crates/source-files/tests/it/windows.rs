@@ -78,10 +78,11 @@ fn a_look_at_the_chunks_tells_what_the_whole_raster_would() {
     assert_eq!(look.first_void.as_deref(), Some("500020.0, 4000070.0 m"));
 }
 
-fn wide(files: &[DemFile], rules: MosaicRules, grid: &GridFrame, rect: PostRect) -> WideMosaic {
+pub fn wide(files: &[DemFile], rules: MosaicRules, grid: &GridFrame, rect: PostRect) -> WideMosaic {
     let windows = Windows::new(files.to_vec(), 1 << 20);
-    let used: Vec<usize> = (0..files.len()).collect();
-    WideMosaic::new(windows, &used, rules, (&utm(), grid, rect), 0.0).unwrap()
+    let lowest = |file: &DemFile| file.read(file.rect()).unwrap().range_m().map_or(0.0, |(lowest, _)| lowest);
+    let used: Vec<(usize, f64)> = files.iter().map(lowest).enumerate().collect();
+    WideMosaic::new(windows, &used, rules, (&utm(), grid, rect)).unwrap()
 }
 
 #[test]

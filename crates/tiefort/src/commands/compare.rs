@@ -152,7 +152,7 @@ fn draw(found: &Comparison, folder: NewFolder) -> Result<(), Failure> {
     const FROM_SOUTH_WEST: f64 = 45.0;
     const TIMES: f64 = 2.0;
     let spacing_m = [found.spacing_m; 2];
-    let dem = || Panel { label: "DEM".into(), surface: Surface::Posts(&found.dem, spacing_m) };
+    let dem = || Panel { label: "DEM".into(), surface: Surface::Posts(&found.dem, spacing_m, &[]) };
     let look = Look::overlooking(&dem().surface, FROM_SOUTH_WEST, TIMES, WIDE);
     let put = |name: String, image: &Image| {
         let mut bytes = Vec::new();

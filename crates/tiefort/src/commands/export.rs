@@ -67,7 +67,8 @@ pub struct Arguments {
     /// Print errors only
     #[arg(long)]
     quiet: bool,
-    /// The file or folder to write; nothing may be there yet where it is a folder
+    /// The file or folder to write: a file of that name is replaced once the new one is whole; a folder must not exist
+    /// yet, or be empty
     #[arg(long, value_name = "PATH")]
     out: PathBuf,
 }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use compiler::{Component, Inadequate};
 use serde_json::{Value, json};
-use views::{Align, Table, grouped, heat, write_map};
+use views::{Align, Image, Scene, SceneLimits, Table, draw_errors, draw_module_limits, grouped};
 
 use crate::arguments::positive;
 use crate::failure::{Failure, Outcome};
@@ -17,8 +17,8 @@ Examples:
   tiefort inadequate ntc.tdb --tolerance 5 --out maps
 
 Writes inadequate.geojson (each piece of ground with its worst post, area, load modules, what stands in
-the way and what could be done), error.png (weighted residuals, black at twice the tolerance) and
-density.png (triangles or polygons of each load module, black at the limit), north up.
+the way and what could be done), error.png (weighted residuals, darkest at twice the tolerance) and
+density.png (triangles or polygons of each load module, darkest at the limit), each with its scale.
 
 What to do about it goes into a file of pins, GeoJSON, which the job names: [tin] pins = \"pins.geojson\".
 Points with \"pin\": \"add\", \"forbid\", or \"height\" with \"height_m\"; polygons with \"pin\": \"importance\"
@@ -27,8 +27,8 @@ what they bought.";
 
 /// Pieces of ground that the text shows; the file has them all.
 const ROWS_MAX: usize = 10;
-/// Pixels a side of a load module in the map of densities.
-const MODULE_PIXELS: usize = 6;
+/// Pixels along the longer side of a map.
+const MAP_PIXELS: usize = 1400;
 
 /// Arguments of `inadequate`.
 #[derive(Args)]
@@ -40,7 +40,7 @@ pub struct Arguments {
     /// Weighted residual in metres that is still good enough [default: 3 times the RMS residual as built]
     #[arg(long, value_name = "M", value_parser = positive)]
     tolerance: Option<f64>,
-    /// Folder for the three files [default: that of the database]
+    /// Folder for the three files, made where it is not there yet [default: that of the database]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// For a person or a program
@@ -61,14 +61,13 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let folder = arguments.out.as_ref().unwrap_or(&arguments.database);
     let files = ["inadequate.geojson", "error.png", "density.png"].map(|name| folder.join(name));
     let found = compiler::inadequate(&arguments.database, arguments.tolerance)?;
+    files::make_folder(folder)?;
     files::check_writable(&files[0])?;
     let collection = format!("{:#}\n", geojson(&found));
     files::write_whole(&files[0], |out| std::io::Write::write_all(out, collection.as_bytes()))?;
-    let size = (found.rect.posts_high(), found.rect.posts_wide());
-    let darkest = (2.0 * found.tolerance_m) as f32;
-    files::write_whole(&files[1], |out| write_map(out, size, &found.residual_m, |metres| heat(metres / darkest)))?;
-    let (density, size) = density(&found);
-    files::write_whole(&files[2], |out| write_map(out, size, &density, heat))?;
+    for (image, path) in maps(&found).iter().zip(&files[1..]) {
+        files::write_whole(path, |out| image.write_png(out))?;
+    }
     terminal::print(&match arguments.format {
         Format::Text => text(&found, &files),
         Format::Json => collection,
@@ -76,14 +75,27 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     Ok(Outcome::Sound)
 }
 
-/// The share that each load module has of its limit, as squares of pixels.
-fn density(found: &Inadequate) -> (Vec<f32>, (usize, usize)) {
-    let (rows, cols) = (found.modules.0 as usize * MODULE_PIXELS, found.modules.1 as usize * MODULE_PIXELS);
-    let count = |row: usize, col: usize| {
-        found.counts[row / MODULE_PIXELS * found.modules.1 as usize + col / MODULE_PIXELS] as f32
+/// The two maps: of errors, and of what each load module uses of its limit.
+fn maps(found: &Inadequate) -> [Image; 2] {
+    let limits = SceneLimits {
+        count: found.count.to_owned(),
+        modules: found.counts.clone(),
+        per_load_module: found.per_module,
+        ..SceneLimits::default()
     };
-    let share = |row: usize, col: usize| count(row, col) / found.per_module.max(1) as f32;
-    ((0..rows).flat_map(|row| (0..cols).map(move |col| (row, col))).map(|(r, c)| share(r, c)).collect(), (rows, cols))
+    let scene = Scene {
+        name: &found.area,
+        crs: &found.crs,
+        grid: found.grid,
+        frame: found.frame,
+        part: found.grid.all(),
+        modules: &[],
+        ground: None,
+        limits: &limits,
+        water: None,
+        tiles: &[],
+    };
+    [draw_errors(&scene, &found.residual_m, found.tolerance_m, MAP_PIXELS), draw_module_limits(&scene, MAP_PIXELS)]
 }
 
 fn text(found: &Inadequate, files: &[PathBuf; 3]) -> String {

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use compiler::{Seen, Suggestion};
+use job::Job;
 
 use crate::failure::{Failure, Outcome};
 use crate::terminal;
@@ -20,7 +21,8 @@ The job covers the largest rectangle of whole load modules inside the files.";
 #[derive(Args)]
 #[command(after_help = AFTER_HELP)]
 pub struct Arguments {
-    /// Rasters: GeoTIFF, DTED, HGT, Esri ASCII, raw with a .hdr; also in .gz and .zip; in order of priority
+    /// Rasters, or folders of them: GeoTIFF, DTED, HGT, Esri ASCII, raw with a .hdr; also in .gz and .zip; in order of
+    /// priority
     #[arg(value_name = "FILES", required = true)]
     files: Vec<PathBuf>,
     /// Where to write the job; it must not exist yet [default: standard output]
@@ -33,7 +35,22 @@ pub struct Arguments {
 
 /// Writes a job.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
-    let suggestion = compiler::look_at(&arguments.files, arguments.crs.as_deref())?;
+    let files = rasters(&arguments.files)?;
+    let suggestion = compiler::look_at(&files, arguments.crs.as_deref()).map_err(Failure::from);
+    let suggestion = suggestion.map_err(|failure| match arguments.crs {
+        // The hint of a build would tell to write into the job that is about to be made.
+        None => failure.hinted_where("no coordinate reference system", "say what it is: --crs EPSG:32611 (your own)"),
+        Some(_) => failure,
+    })?;
+    let datums = known_datums(&suggestion.seen);
+    if 1 < datums.len() {
+        terminal::tell(&format!(
+            "note: heights are above {}; a build needs a geoid grid to bring them to one: see geoids in the job",
+            datums.join(" and ")
+        ));
+    }
+    let crs = arguments.crs.as_deref();
+    terminal::tell(&found_text(&suggestion, &job_text(&suggestion, Path::new(""), "area", crs)));
     let Some(out) = &arguments.out else {
         terminal::print(&job_text(&suggestion, Path::new(""), "area", arguments.crs.as_deref()))?;
         return Ok(Outcome::Sound);
@@ -46,8 +63,54 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     Ok(Outcome::Sound)
 }
 
+/// The files named, and the rasters directly in the folders named, by name.
+fn rasters(named: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
+    const ENDINGS: [&str; 12] = ["tif", "tiff", "dt0", "dt1", "dt2", "hgt", "asc", "flt", "bil", "img", "zip", "gz"];
+    let mut all = Vec::new();
+    for path in named {
+        if !path.is_dir() {
+            all.push(path.clone());
+            continue;
+        }
+        let entries = std::fs::read_dir(path).map_err(|error| {
+            Failure::new(format!("{}: {error}", path.display()), "check the path and its permissions")
+        })?;
+        let mut inside: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
+        inside.retain(|path| path.is_file() && ENDINGS.contains(&crate::files::extension(path).as_str()));
+        inside.sort();
+        if inside.is_empty() {
+            let message = format!("{}: found a folder without rasters, expected some directly in it", path.display());
+            return Err(Failure::new(message, format!("names of rasters end in .{}", ENDINGS[..9].join(", ."))));
+        }
+        all.append(&mut inside);
+    }
+    Ok(all)
+}
+
+/// What was found, and what a build of it takes: one line, broken where a terminal ends.
+fn found_text(suggestion: &Suggestion, job: &str) -> String {
+    let Suggestion { seen, size_m, spacing_m, part_around, .. } = suggestion;
+    let voids: usize = seen.iter().map(|file| file.voids).sum();
+    let files = if seen.len() == 1 { "1 file".to_owned() } else { format!("{} files", seen.len()) };
+    let [wide, high] = size_m.map(|metres| metres / 1000.0);
+    let voids = if voids == 0 { "no voids".to_owned() } else { format!("{} void posts", views::grouped(voids as u64)) };
+    let datums = known_datums(seen);
+    let datum = if datums.is_empty() { "an unknown datum".to_owned() } else { datums.join(" and ") };
+    let mut text = format!("found {files}: {wide} x {high} km at {spacing_m} m, {voids}, heights above {datum}");
+    if part_around.is_some() {
+        text += "; the area is a part in the middle of the first, see around in the job";
+    }
+    // The job's files need not be found for that, only its numbers.
+    let plan = Job::from_text(job, Path::new("job")).ok().and_then(|job| compiler::plan(&job).ok());
+    if let Some(plan) = plan {
+        let memory = crate::files::bytes_text(plan.forecast.memory_bytes);
+        text += &format!("; a build takes about {:.0} s of one core and {memory}", plan.forecast.seconds.max(1.0));
+    }
+    text
+}
+
 fn job_text(suggestion: &Suggestion, folder: &Path, name: &str, given: Option<&str>) -> String {
-    let Suggestion { seen, epsg, origin_m, size_m, spacing_m, tiles } = suggestion;
+    let Suggestion { seen, epsg, origin_m, size_m, spacing_m, tiles, part_around } = suggestion;
     let modules = size_m.map(|metres| metres / 500.0);
     let mut text = format!(
         "# Written by `tiefort init`. Every line may be changed; `tiefort plan` on this file shows what follows.\n\
@@ -65,6 +128,16 @@ fn job_text(suggestion: &Suggestion, folder: &Path, name: &str, given: Option<&s
         modules[0],
         modules[1],
     );
+    if let Some([longitude, latitude]) = part_around {
+        let instead = format!(
+            "# The files are too large for one area, or lie too far apart: this is the middle of the first.\n\
+             # around = {{ lat = {latitude:.4}, lon = {longitude:.4}, size_km = 50 }}\n\
+             # instead of origin_m and size_m chooses any place.\n\
+             spacing_m = "
+        );
+        text = text.replacen("spacing_m = ", &instead, 1);
+        text = text.replacen(": the largest rectangle that the files cover", ": a part of what the files cover", 1);
+    }
     for file in seen {
         text += &source_text(file, folder, given);
     }
@@ -83,7 +156,8 @@ fn job_text(suggestion: &Suggestion, folder: &Path, name: &str, given: Option<&s
         tiles.0,
         views::grouped((modules[0] * modules[1] * 32.0) as u64),
     );
-    text
+    // Names in headers may hold anything; in a job they stand in comments, where control characters are no TOML.
+    terminal::plain(&text).into_owned()
 }
 
 /// A name that a job may have, made of any.
@@ -159,10 +233,31 @@ fn datum_text(seen: &[Seen]) -> String {
     let first = seen.first().and_then(|file| file.vertical_datum.as_ref());
     match first.filter(|first| seen.iter().all(|file| file.vertical_datum.as_ref() == Some(first))) {
         Some(datum) => format!("vertical_datum = {}\n", quoted(datum)),
+        None if 1 < known_datums(seen).len() => {
+            let datums = known_datums(seen);
+            format!(
+                "vertical_datum = {}\n\
+                 # The files' heights are above {}: a build needs a grid for the way between them.\n\
+                 # geoids = [{{ datum = \"EGM96\", file = \"egm96_15.gtx\" }}]\n",
+                quoted(datums[0]),
+                datums.join(" and "),
+            )
+        }
         None => {
             "# vertical_datum = \"EGM96\"     # the files do not say, or not the same; write it if you know\n".into()
         }
     }
+}
+
+/// The datums that files name, each once.
+fn known_datums(seen: &[Seen]) -> Vec<&str> {
+    let mut known: Vec<&str> = Vec::new();
+    for datum in seen.iter().filter_map(|file| file.vertical_datum.as_deref()) {
+        if !known.contains(&datum) {
+            known.push(datum);
+        }
+    }
+    known
 }
 
 /// The path as a job in `folder` names it.

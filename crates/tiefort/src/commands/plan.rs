@@ -79,6 +79,8 @@ enum Emit {
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let job = Job::load_with(&arguments.job, &compiler::find_area)?;
     let plan = compiler::plan(&job)?;
+    let told = compiler::foresee(&job)?;
+    told.iter().for_each(|note| terminal::tell(&format!("note: {}", terminal::short(note))));
     let played = played(&job, &plan, arguments)?;
     let glue = || Glue::new(&job, &plan, arguments.out.as_deref(), arguments.pack);
     let text = match arguments.emit {

@@ -8,10 +8,11 @@ use compiler::{Product, ProductGround, Wanted, WantedGround, product};
 use load_module_reader::{Area, Keep};
 use serde_json::json;
 use terrain::{ModuleGrid, ModuleRect};
-use views::RESIDUAL_SCALE_M;
+use views::{RESIDUAL_SCALE_M, palette};
 
 use super::overview::Overview;
 use crate::failure::Failure;
+use crate::scene::water;
 
 /// How far the observer sees load modules.
 const VISIBLE_RANGE_M: f64 = 3500.0;
@@ -77,6 +78,8 @@ fn description(product: &Product, area: &Area, overview: &Overview) -> String {
         "coarse_steps": overview.steps,
         "height_m": overview.range_m,
         "residual_scale_m": RESIDUAL_SCALE_M,
+        "palette": palette(),
+        "water": water(&product.job),
         "triangles": totals.triangles,
         "polygons": totals.polygons,
         "classes": product.job.importance.classes,

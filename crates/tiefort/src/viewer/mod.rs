@@ -9,10 +9,12 @@
 //!   /api/dem                               whether the sources are at hand, as JSON; else `why` says why not
 //!   /api/dem/SOUTH/WEST/NORTH/EAST         the posts of such a block (posts.rs)
 //! ```
-//! Blocks are half-open. Everything is little-endian. An answer other than 200 is a sentence for a person.
+//! Blocks are half-open, connections bounded in number and time (connections.rs). Everything is little-endian. An
+//! answer other than 200 is a sentence for a person.
 
 mod area;
 mod block;
+mod connections;
 mod overview;
 mod posts;
 
@@ -60,7 +62,7 @@ pub fn serve(folder: &Path, port: u16) -> Result<(), Failure> {
         let address = listener.local_addr().map_err(refused)?;
         terminal::print(&format!("http://{address}/\n"))?;
         terminal::tell(&format!("tiefort view: {}; open the address above, Ctrl-C ends this", folder.display()));
-        let server = tokio::spawn(axum::serve(listener, routes(viewed, address)).into_future());
+        let server = tokio::spawn(connections::serve(listener, routes(viewed, address)));
         let stopped = tokio::signal::ctrl_c().await;
         // A page may hold its connections open for minutes: they end with the process.
         server.abort();

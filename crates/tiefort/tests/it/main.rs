@@ -10,6 +10,7 @@ mod comparing;
 mod exports;
 mod full_disk;
 mod help;
+mod hints;
 mod measures;
 mod meshes;
 mod raster;

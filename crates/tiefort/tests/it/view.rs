@@ -13,9 +13,10 @@ fn without_the_viewer_the_command_says_how_to_build_it_in() {
 
 #[cfg(feature = "viewer")]
 mod server {
-    use std::io::{BufRead, BufReader, Read, Write};
+    use std::io::{BufRead, BufReader, ErrorKind, Read, Write};
     use std::net::TcpStream;
     use std::process::{Child, Stdio};
+    use std::time::{Duration, Instant};
 
     use serde_json::Value;
 
@@ -104,6 +105,72 @@ mod server {
         assert!(ground["why"].as_str().unwrap().contains("dem.tif"), "{ground}");
         let (status, why) = server.asked("/api/dem/0/0/1/1");
         assert!(status == 409 && String::from_utf8(why).unwrap().contains("dem.tif"));
+    }
+
+    /// Longer than a client may take for its request, on a busy machine.
+    const ENOUGH: Duration = Duration::from_secs(40);
+
+    #[test]
+    fn slow_clients_neither_keep_others_waiting_nor_stay() {
+        let server = served();
+        let begun = |text: &str| {
+            let mut stream = TcpStream::connect(&server.host).unwrap();
+            stream.set_read_timeout(Some(ENOUGH)).unwrap();
+            stream.write_all(text.as_bytes()).unwrap();
+            stream
+        };
+        let texts = ["", "G", "GET / HTTP/1.1\r\nHost: ", "GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nA: "];
+        let mut clients: Vec<TcpStream> = (0..400).map(|i| begun(texts[i % texts.len()])).collect();
+        let start = Instant::now();
+        assert_eq!(server.asked("/api/area").0, 200);
+        assert!(start.elapsed() < Duration::from_secs(3), "an answer after {:?}", start.elapsed());
+        // The newest client sends on, a byte at a time; it is ended as the others are.
+        let last = clients.last_mut().unwrap();
+        last.set_read_timeout(Some(Duration::from_millis(200))).unwrap();
+        let is_open = |stream: &mut TcpStream| {
+            let read = stream.write_all(b"a").and_then(|()| stream.read(&mut [0; 256]));
+            // Nothing to read within the time; an answer, an end or an error is an end.
+            matches!(read, Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut))
+        };
+        while is_open(last) {
+            assert!(start.elapsed() < ENOUGH, "a slow client is still connected");
+        }
+        for client in &mut clients {
+            let mut rest = Vec::new();
+            let waited = matches!(client.read_to_end(&mut rest), Err(error) if error.kind() == ErrorKind::WouldBlock);
+            assert!(!waited, "a client that sends nothing is still connected");
+        }
+    }
+
+    #[test]
+    fn clients_that_do_not_read_make_place_for_others() {
+        let server = served();
+        let ask = || {
+            let mut stream = TcpStream::connect(&server.host).unwrap();
+            // More answers than sockets hold, none of them read.
+            let requests = format!("GET /viewer.js HTTP/1.1\r\nHost: {}\r\n\r\n", server.host).repeat(20);
+            stream.write_all(requests.as_bytes()).unwrap();
+            stream
+        };
+        let clients: Vec<TcpStream> = (0..100).map(|_| ask()).collect();
+        let start = Instant::now();
+        assert_eq!(server.asked("/api/area").0, 200);
+        assert!(start.elapsed() < Duration::from_secs(3), "an answer after {:?}", start.elapsed());
+        drop(clients);
+    }
+
+    #[test]
+    fn a_request_that_is_too_long_is_refused() {
+        let server = served();
+        let mut stream = TcpStream::connect(&server.host).unwrap();
+        stream.set_read_timeout(Some(ENOUGH)).unwrap();
+        let long = "a".repeat(1 << 16);
+        // The server may end the connection before all is sent.
+        let _ = write!(stream, "GET / HTTP/1.1\r\nHost: {}\r\nA: {long}\r\n\r\n", server.host);
+        let mut answer = Vec::new();
+        let _ = stream.read_to_end(&mut answer);
+        assert!(!answer.starts_with(b"HTTP/1.1 200"), "{}", String::from_utf8_lossy(&answer));
+        assert_eq!(server.asked("/api/area").0, 200);
     }
 
     #[test]

@@ -11,7 +11,7 @@ import { Tank } from "./tank.js";
 import { Terrain } from "./terrain.js";
 import { skyBelowHorizon } from "./crack.js";
 
-const SKY = 0x9cc3e6, FOG_M = [4_000, 90_000], EYE_DEGREES = 55, NEAR_M = 1, FAR_M = 500_000;
+const FOG_M = [4_000, 90_000], EYE_DEGREES = 55, NEAR_M = 1, FAR_M = 500_000;
 /** Seconds that one picture may stand for, so that a slow machine drives slowly and not in leaps. */
 const STEP_SECONDS_MAX = 0.25;
 
@@ -22,11 +22,13 @@ async function start() {
   const renderer = new WebGLRenderer({ canvas, antialias: true });
   renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
   const scene = new Scene();
-  scene.background = new Color(SKY);
-  scene.fog = new Fog(SKY, ...FOG_M);
+  // As at the horizon of the server's pictures: blue is water only.
+  const sky = new Color(area.palette.sky.at(-1));
+  scene.background = sky;
+  scene.fog = new Fog(sky, ...FOG_M);
   const sun = new DirectionalLight(0xfff4e0, 2.3);
   sun.position.set(-1, 1.1, -1);
-  scene.add(sun, new HemisphereLight(0xcfe3f5, 0x77705c, 1.4));
+  scene.add(sun, new HemisphereLight(0xf0eee8, 0x77705c, 1.4));
   const camera = new PerspectiveCamera(EYE_DEGREES, 1, NEAR_M, FAR_M);
   const terrain = new Terrain(area);
   const tank = new Tank(terrain, ...startPlace(area));

@@ -55,7 +55,9 @@ export function paint(area, module, surface, mesh, colors) {
   const { points, residuals, triangles } = surface;
   const of = (v) => (byPost ? colorOf.residual(area, residuals[v]) : colorOf.height(area, points[3 * v + 2]));
   const own = byPost || !one ? Array.from({ length: points.length / 3 }, (_, vertex) => light(of(vertex))) : null;
-  triangles.forEach((vertex, i) => attribute.array.set(own ? own[vertex] : one, 3 * i));
+  const water = light(colorOf.water(area));
+  const isWater = (i) => colors === "height" && surface === module.tin && module.classes[Math.floor(i / 3)] === area.water;
+  triangles.forEach((vertex, i) => attribute.array.set(isWater(i) ? water : own ? own[vertex] : one, 3 * i));
   attribute.needsUpdate = true;
 }
 

@@ -63,7 +63,7 @@ impl Histogram {
             let from = self.start + index as f64 * self.step;
             let _ = write!(
                 svg,
-                "<rect x=\"{x:.1}\" y=\"{y:.1}\" width=\"{:.1}\" height=\"{length:.1}\" fill=\"#1d6996\">\
+                "<rect x=\"{x:.1}\" y=\"{y:.1}\" width=\"{:.1}\" height=\"{length:.1}\" class=\"bars\">\
                  <title>{} to {}: {}</title></rect>",
                 (bar - 1.0).max(0.5),
                 number(from),
@@ -72,12 +72,12 @@ impl Histogram {
             );
         }
         let base = TOP + high;
-        let _ = write!(svg, "<path d=\"M{LEFT} {TOP}V{base}H{}\" fill=\"none\" stroke=\"#222\"/>", LEFT + wide);
+        let _ = write!(svg, "<path d=\"M{LEFT} {TOP}V{base}H{}\" class=\"axis\"/>", LEFT + wide);
         for tick in self.ticks() {
             let x = LEFT + (tick - self.start) / self.step * bar;
             let _ = write!(
                 svg,
-                "<path d=\"M{x:.1} {base}v5\" stroke=\"#222\"/>\
+                "<path d=\"M{x:.1} {base}v5\" class=\"axis\"/>\
                  <text x=\"{x:.1}\" y=\"{}\" text-anchor=\"middle\">{}</text>",
                 base + 18.0,
                 number(tick)
@@ -87,7 +87,7 @@ impl Histogram {
             let y = base - share * high;
             let _ = write!(
                 svg,
-                "<path d=\"M{LEFT} {y}h-4\" stroke=\"#222\"/><text x=\"{}\" y=\"{}\" text-anchor=\"end\">{}</text>",
+                "<path d=\"M{LEFT} {y}h-4\" class=\"axis\"/><text x=\"{}\" y=\"{}\" text-anchor=\"end\">{}</text>",
                 LEFT - 7.0,
                 y + 4.0,
                 grouped((share * most as f64).round() as u64)
@@ -97,8 +97,8 @@ impl Histogram {
             let x = LEFT + (at - self.start) / self.step * bar;
             let _ = write!(
                 svg,
-                "<path d=\"M{x:.1} {}V{base}\" stroke=\"#d55e00\" stroke-width=\"2\"/>\
-                 <text x=\"{x:.1}\" y=\"{}\" text-anchor=\"end\" fill=\"#a04000\">{text}</text>",
+                "<path d=\"M{x:.1} {}V{base}\" class=\"limit\"/>\
+                 <text x=\"{x:.1}\" y=\"{}\" text-anchor=\"end\" class=\"limit\">{text}</text>",
                 TOP - 4.0,
                 TOP - 8.0
             );

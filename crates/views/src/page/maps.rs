@@ -1,17 +1,87 @@
-//! Pictures inside the page.
+//! Pictures inside the page: a bare map, with title, scale and legend in letters of the page around it, so that they
+//! are read on a phone as well as on a desk; and a mark over the map for every load module that a table links to.
+
+use std::collections::BTreeSet;
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
+use database::{Report, ReportPlace};
 use maud::{Markup, html};
+use terrain::{ModuleId, ModuleRect};
 
-use crate::picture::{Image, Map, NO_RESIDUAL, RESIDUAL_SCALE_M, Scene, SceneGround, Shown, draw_map, module_pictures};
+use super::place_text;
+use crate::picture::{
+    Drawing, Image, Key, Legend, Map, NO_RESIDUAL, RESIDUAL_SCALE_M, Scene, SceneGround, Shown, drawings, hex,
+    length_text, module_pictures, round_length,
+};
 
 /// Pixels along the longer side of a map.
-const MAP_PIXELS: usize = 780;
+const MAP_PIXELS: usize = 900;
 /// The same of each of the two maps of limits.
-const LIMITS_PIXELS: usize = 560;
+const LIMITS_PIXELS: usize = 640;
 /// Pixels along a picture of one load module.
 const MODULE_PIXELS: usize = 260;
+
+/// Places that the page links to its first map: name of the mark, and the load modules it lies over.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Marks(BTreeSet<(String, [u32; 4])>);
+
+impl Marks {
+    /// Those of the tables, as far as they show them, and of these load modules; none without a scene to draw.
+    pub fn of(report: &Report, scene: Option<&Scene>, worst: &[ModuleId]) -> Self {
+        let Some(scene) = scene else { return Self::default() };
+        let bound = report.bound.iter().take(super::tables::BOUND_ROWS_MAX).map(|bound| bound.place);
+        let breaches = report.breaches.iter().take(super::tables::ROWS_MAX).map(|breach| breach.place);
+        let worst = worst.iter().map(|module| ReportPlace::Module([module.row, module.col]));
+        let places = bound.chain(breaches).chain(worst);
+        let mark = |place| {
+            let id = mark_id(place)?;
+            let ([row, col], [high, wide]) = match place {
+                ReportPlace::Module(at) => (at, [1, 1]),
+                ReportPlace::Window(at) => (at, scene.limits.window),
+                ReportPlace::Area => return None,
+            };
+            Some((id, [row, col, (row + high).min(scene.grid.rows), (col + wide).min(scene.grid.cols)]))
+        };
+        Self(places.filter_map(mark).collect())
+    }
+
+    /// A place as a link to the map, where that has a mark of it.
+    pub fn link(&self, place: ReportPlace) -> Markup {
+        let id = mark_id(place).filter(|id| self.0.iter().any(|(mark, _)| mark == id));
+        let text = place_text(place);
+        html! {
+            @match id {
+                Some(id) => a href={ "#" (id) } title="show it on the map" { (text) },
+                None => (text),
+            }
+        }
+    }
+
+    fn over(&self, scene: &Scene) -> Markup {
+        let [west, south, east, north] = scene.extent_m(scene.part);
+        html! {
+            @for (id, [row, col, end_row, end_col]) in &self.0 {
+                @let rect = ModuleRect { south: *row, west: *col, north: *end_row, east: *end_col };
+                @let [left, bottom, right, top] = scene.extent_m(rect);
+                @let across = |metres: f64| 100.0 * metres / (east - west);
+                @let down = |metres: f64| 100.0 * metres / (north - south);
+                span.mark id=(id) style=(format!(
+                    "left:{:.3}%;top:{:.3}%;width:{:.3}%;height:{:.3}%",
+                    across(left - west), down(north - top), across(right - left), down(top - bottom),
+                )) {}
+            }
+        }
+    }
+}
+
+fn mark_id(place: ReportPlace) -> Option<String> {
+    match place {
+        ReportPlace::Module([row, col]) => Some(format!("module-{row}-{col}")),
+        ReportPlace::Window([row, col]) => Some(format!("window-{row}-{col}")),
+        ReportPlace::Area => None,
+    }
+}
 
 /// A picture as an address that holds all of it.
 pub(crate) fn data_uri(image: &Image) -> String {
@@ -20,39 +90,102 @@ pub(crate) fn data_uri(image: &Image) -> String {
     format!("data:image/png;base64,{}", STANDARD.encode(&bytes))
 }
 
-fn figure(image: &Image, caption: &str) -> Markup {
+fn figure(drawing: &Drawing, caption: &str, over: &Markup) -> Markup {
+    let Drawing { sheet, map, plan } = drawing;
+    let scale_m = round_length(0.3 * plan.metres_per_pixel() * plan.pixels[0] as f64);
+    let scale_share = scale_m / (plan.extent_m[2] - plan.extent_m[0]);
     html! {
-        figure {
-            img src=(data_uri(image)) width=(image.wide()) height=(image.high()) alt=(caption);
-            figcaption { (caption) }
+        figure style=(format!("max-width:{}px", map.wide())) {
+            figcaption { b { (caption) } " " (sheet.subtitle) "." }
+            div.map {
+                img src=(data_uri(map)) width=(map.wide()) height=(map.high()) alt={ (sheet.title) ": " (caption) };
+                (over)
+            }
+            div.scale style=(format!("width:{:.2}%", 100.0 * scale_share)) { (length_text(scale_m)) }
+            @for legend in &sheet.legends { (legend_html(legend)) }
+            p.quiet { "North is up; " (extent_text(drawing)) ". " (sheet.notes) }
         }
     }
 }
 
-/// All maps of the page.
-pub(crate) fn maps(scene: &Scene) -> Markup {
-    let residuals = scene.ground.is_some().then(|| draw_map(scene, Map::Residuals(RESIDUAL_SCALE_M), MAP_PIXELS));
+fn extent_text(drawing: &Drawing) -> String {
+    let ([west, south, east, north], place) = (drawing.plan.extent_m, &drawing.sheet.coordinates);
+    let [east_0, north_0] = place.origin_m;
+    let km = |metres: f64| metres / 1000.0;
+    let crs = if place.crs.is_empty() { String::new() } else { format!(" in {}", place.crs) };
+    let (west, east, south, north) = (km(east_0 + west), km(east_0 + east), km(north_0 + south), km(north_0 + north));
+    format!("from {west} to {east} km east and from {south} to {north} km north{crs}")
+}
+
+fn legend_html(legend: &Legend) -> Markup {
     html! {
-        (figure(
-            &draw_map(scene, Map::Relief(Shown::Tin), MAP_PIXELS),
-            "The compiled surface, as a simulator loads it.",
-        ))
-        @match residuals {
-            Some(image) => (figure(&image, "Where the triangles lie above (blue) and below (red) the ground.")),
-            None => p.quiet {
+        div.legend {
+            @match legend {
+                Legend::Ramp { title, ramp, marks } => {
+                    @let colors: Vec<String> = ramp.0.iter().copied().map(hex).collect();
+                    b { (title) }
+                    div.ramp style={ "background:linear-gradient(to right," (colors.join(",")) ")" } {}
+                    div.marks {
+                        @for (share, text) in marks {
+                            span style=(mark_style(*share)) { (text) }
+                        }
+                    }
+                },
+                Legend::Keys { title, keys } => {
+                    @if !title.is_empty() { b { (title) } }
+                    @for (key, text) in keys { span.key { i style=(key_style(*key)) {} (text) } }
+                },
+                Legend::Lines { title, lines } => { b { (title) ": " } (lines.join(", ")) },
+            }
+        }
+    }
+}
+
+/// Marks at the ends of a scale stand inside it.
+fn mark_style(share: f64) -> String {
+    match share {
+        share if share < 0.04 => format!("left:{:.2}%", 100.0 * share),
+        share if share <= 0.96 => format!("left:{:.2}%;transform:translateX(-50%)", 100.0 * share),
+        share => format!("right:{:.2}%", 100.0 * (1.0 - share).max(0.0)),
+    }
+}
+
+fn key_style(key: Key) -> String {
+    match key {
+        Key::Filled(color) | Key::Crossed(color) => format!("background:{}", hex(color)),
+        Key::Framed(color) => format!("border:3px solid {}", hex(color)),
+        Key::Line(color) => format!("height:2px;background:{}", hex(color)),
+    }
+}
+
+fn figures(scene: &Scene, map: Map, pixels: usize, caption: &str) -> Markup {
+    html! { @for drawing in &drawings(scene, map, pixels) { (figure(drawing, caption, &html! {})) } }
+}
+
+/// The first picture of the page: the surface, with the marks that tables link to.
+pub(super) fn first(scene: &Scene, marks: &Marks) -> Markup {
+    let caption = "The compiled surface, as a simulator loads it.";
+    let drawings = drawings(scene, Map::Relief(Shown::Tin), MAP_PIXELS);
+    html! { @for drawing in &drawings { (figure(drawing, caption, &marks.over(scene))) } }
+}
+
+/// All other maps of the page.
+pub(super) fn maps(scene: &Scene) -> Markup {
+    let per_pixel = scene.plan(MAP_PIXELS).metres_per_pixel();
+    // Those of load modules are known without the ground.
+    let has_residuals = scene.ground.is_some() || scene.frame.spacing.metres() < per_pixel;
+    html! {
+        @if has_residuals {
+            (figures(scene, Map::Residuals(RESIDUAL_SCALE_M), MAP_PIXELS, "How far the triangles lie from the ground."))
+        } @else {
+            p.quiet {
                 "No map of residuals: the ground was not there to be looked at. "
                 code { "tiefort report --format html --against DEM" } " draws it."
-            },
+            }
         }
-        (figure(&draw_map(scene, Map::Density, MAP_PIXELS), "Where the triangles went."))
-        (figure(
-            &draw_map(scene, Map::Limits, LIMITS_PIXELS),
-            "How much of each limit is used: per load module, and in every 4 km window around its middle.",
-        ))
-        (figure(
-            &draw_map(scene, Map::Tiles, MAP_PIXELS),
-            "How the work was cut, and in which order tiles build on each other.",
-        ))
+        (figures(scene, Map::Density, MAP_PIXELS, "Where the triangles went."))
+        div.pair { (figures(scene, Map::Limits, LIMITS_PIXELS, "How much of a limit is used.")) }
+        (figures(scene, Map::Tiles, MAP_PIXELS, "How the work was cut, and in which order tiles build on each other."))
     }
 }
 

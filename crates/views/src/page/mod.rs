@@ -14,10 +14,11 @@ use database::{Manifest, Report};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use terrain::{LoadModule, ModuleId};
 
-use crate::picture::Scene;
+use crate::picture::{RESIDUAL_SCALE_M, Scene};
 use crate::table::grouped;
 
 use charts::Histogram;
+use maps::Marks;
 
 /// One setting of a job, as the page lists it.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -33,6 +34,8 @@ pub struct PageSetting {
 /// What the page is made from.
 #[derive(Clone, Copy, Debug)]
 pub struct Page<'a> {
+    /// What stands above it, if the job says so; otherwise the name of the area.
+    pub title: Option<&'a str>,
     /// What the build found.
     pub report: &'a Report,
     /// What was built, and from what.
@@ -51,35 +54,43 @@ const WORST_COUNT: usize = 10;
 /// The whole page.
 pub fn report_html(page: &Page) -> String {
     let Page { report, manifest, .. } = page;
+    let worst_modules = page.scene.map(worst_modules).unwrap_or_default();
+    let worst_ids: Vec<ModuleId> = worst_modules.iter().map(|module| module.id).collect();
+    let marks = &Marks::of(report, page.scene, &worst_ids);
+    let title = page.title.map_or_else(|| format!("Gaming area {}", report.area), str::to_owned);
     let page = html! {
         (DOCTYPE)
         html lang="en" {
             head {
                 meta charset="utf-8";
                 meta name="viewport" content="width=device-width, initial-scale=1";
-                title { (report.area) ": terrain database" }
+                meta name="color-scheme" content="light dark";
+                title { (title) }
                 style { (PreEscaped(include_str!("style.css"))) }
             }
             body {
-                h1 { "Gaming area " (report.area) }
-                p.quiet { (what_it_is(manifest)) }
+                h1 { (title) }
+                p.quiet { @if page.title.is_some() { "Gaming area " (report.area) ": " } (what_it_is(manifest)) }
+                @if let Some(scene) = page.scene { (maps::first(scene, marks)) }
+                (tables::verdict(report))
                 nav {
                     @for (id, name) in sections(page) { a href={ "#" (id) } { (name) } }
                 }
-                (tables::verdict(report))
                 (headline(page))
-                section id="limits" { h2 { "Limits" } (tables::limits(report)) (tables::advice(report)) }
+                section id="limits" { h2 { "Limits" } (tables::limits(report, marks)) (tables::advice(report)) }
                 section id="residuals" {
                     h2 { "Residuals" } (tables::residuals(report)) (tables::levels(report)) (histograms(page))
                 }
                 @match page.scene {
                     Some(scene) => {
                         section id="maps" { h2 { "Maps" } (maps::maps(scene)) }
-                        section id="worst" { h2 { "The worst load modules" } (worst(page, scene)) }
+                        section id="worst" {
+                            h2 { "The worst load modules" } (worst(page, scene, &worst_modules, marks))
+                        }
                     }
                     None => section id="maps" { h2 { "Maps" } (without_maps()) }
                 }
-                section id="breaches" { h2 { "Breaches" } (tables::breaches(report)) }
+                section id="breaches" { h2 { "Breaches" } (tables::breaches(report, marks)) }
                 section id="times" { h2 { "Times" } (tables::stages(report)) }
                 section id="made-from" { h2 { "Made from" } (tables::sources(manifest)) (settings(page)) }
             }
@@ -225,25 +236,33 @@ fn reach_m(p99_m: f64) -> f64 {
         .unwrap_or(200.0)
 }
 
-fn worst(page: &Page, scene: &Scene) -> Markup {
-    let mean_squares = |module: &LoadModule| match module.residual.posts {
+fn mean_squares(module: &LoadModule) -> f64 {
+    match module.residual.posts {
         0 => 0.0,
         posts => module.residual.sum_squared as f64 / f64::from(posts),
-    };
+    }
+}
+
+/// Those with the largest RMS residual, the largest first.
+fn worst_modules<'a>(scene: &Scene<'a>) -> Vec<&'a LoadModule> {
     let mut order: Vec<&LoadModule> = scene.modules.iter().collect();
     // Stable: of equals the first from the south-west.
     order.sort_by(|a, b| mean_squares(b).total_cmp(&mean_squares(a)));
     order.truncate(WORST_COUNT);
+    order
+}
+
+fn worst(page: &Page, scene: &Scene, modules: &[&LoadModule], marks: &Marks) -> Markup {
     let quanta = f64::from(terrain::QUANTA_PER_METRE);
     html! {
         p {
-            "Those with the largest RMS residual: their triangles, and where these lie above (blue) and below (red) "
-            "the ground, on the scale of the map above."
+            "Those with the largest RMS residual: their triangles, and where the ground lies above them (orange) and "
+            "below (purple), " (RESIDUAL_SCALE_M) " m or more where the colour is darkest."
         }
         div.worst {
-            @for module in order {
+            @for module in modules {
                 article {
-                    h3 { "Load module " (module.id) }
+                    h3 { (marks.link(database::ReportPlace::Module([module.id.row, module.id.col]))) }
                     (maps::module_images(scene, module))
                     p {
                         "RMS " (format!("{:.2}", mean_squares(module).sqrt() / quanta)) " m, largest "
@@ -267,12 +286,11 @@ fn refused_text(report: &Report, module: ModuleId) -> String {
 fn settings(page: &Page) -> Markup {
     html! {
         h3 { "Settings" }
-        table {
-            tr { th { "Key" } th { "Value" } th { "Meaning" } }
+        (tables::table(html! { th { "Key" } th { "Value" } th { "Meaning" } }, html! {
             @for setting in page.settings {
                 tr { td { code { (setting.key) } } td { code { (setting.value) } } td { (setting.meaning) } }
             }
-        }
+        }))
     }
 }
 

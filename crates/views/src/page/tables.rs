@@ -3,11 +3,15 @@
 use database::{Manifest, Report, ReportResidual};
 use maud::{Markup, html};
 
-use super::{advise, place_text};
+use super::advise;
+use super::maps::Marks;
+use crate::report::border_in_words;
 use crate::table::grouped;
 
 /// Rows of a long list that the page shows; the files beside it have them all.
-const ROWS_MAX: usize = 100;
+pub(super) const ROWS_MAX: usize = 100;
+/// The same of places where limits kept posts out.
+pub(super) const BOUND_ROWS_MAX: usize = 25;
 
 pub(super) fn verdict(report: &Report) -> Markup {
     let breaches = report.breaches.len() as u64;
@@ -24,7 +28,12 @@ pub(super) fn verdict(report: &Report) -> Markup {
     }
 }
 
-pub(super) fn limits(report: &Report) -> Markup {
+/// A table that scrolls by itself where it is wider than the screen, and repeats its head where it goes on on paper.
+pub(super) fn table(head: Markup, rows: Markup) -> Markup {
+    html! { div.wide tabindex="0" { table { thead { tr { (head) } } tbody { (rows) } } } }
+}
+
+pub(super) fn limits(report: &Report, marks: &Marks) -> Markup {
     let (modules, windows) = (report.per_load_module, report.per_4km);
     let rows = [
         (
@@ -50,10 +59,10 @@ pub(super) fn limits(report: &Report) -> Markup {
         ),
     ];
     html! {
-        table {
-            tr {
-                th { "Limit, in " (report.count) } th.n { "most used" } th.n { "limit" } th.n { "use" } th.n { "above" }
-            }
+        (table(html! {
+            th { "Limit, in " (report.count) } th.n { "most used" } th.n { "limit" }
+            th.n { "use" } th.n { "above" }
+        }, html! {
             @for (name, used, limit, share, over) in rows {
                 tr {
                     td { code { (name) } } td.n { (used) } td.n { (limit) }
@@ -64,15 +73,15 @@ pub(super) fn limits(report: &Report) -> Markup {
                 td { code { "limits.pool" } } td.n { (grouped(report.pool.used)) } td.n { (grouped(report.pool.size)) }
                 td.n {} td.n {}
             }
-        }
+        }))
         p.quiet { "The fullest 9 x 9 load modules, which bound a 4 km square at any offset, hold "
             (grouped(windows.worst_9x9)) " " (report.count) "." }
-        (bound(report))
+        (bound(report, marks))
     }
 }
 
 /// Where limits were met by refusing posts, and what that cost.
-fn bound(report: &Report) -> Markup {
+fn bound(report: &Report, marks: &Marks) -> Markup {
     let refused = &report.refusals;
     if refused.count == 0 {
         return html! { p { "No limit kept a post out." } };
@@ -87,22 +96,19 @@ fn bound(report: &Report) -> Markup {
             (format!("{:.2} m", refused.largest_m)) "."
         }
         @if !report.bound.is_empty() {
-            table {
-                tr {
-                    th { "Limit" } th { "Where" } th.n { "count" } th.n { "limit" } th.n { "refused" }
-                    th.n { "largest, m" } th.n { "RMS, m" } th.n { "RMS without the limit, m" }
-                }
-                @for bound in report.bound.iter().take(ROWS_MAX / 4) {
+            (table(html! { th { "Limit" } th { "Where" } th.n { "count" } th.n { "limit" } th.n { "refused" }
+                    th.n { "largest, m" } th.n { "RMS, m" } th.n { "RMS without the limit, m" } }, html! {
+                @for bound in report.bound.iter().take(BOUND_ROWS_MAX) {
                     tr {
-                        td { code { (bound.kind) } } td { (place_text(bound.place)) } td.n { (grouped(bound.count)) }
+                        td { code { (bound.kind) } } td { (marks.link(bound.place)) } td.n { (grouped(bound.count)) }
                         td.n { (grouped(bound.limit)) } td.n { (bound.refused) }
                         td.n { (format!("{:.2}", bound.refused_largest_m)) }
                         td.n { (format!("{:.3}", bound.rms_with_m)) }
                         td.n { (format!("{:.3}", bound.rms_without_m)) }
                     }
                 }
-            }
-            (more(report.bound.len(), ROWS_MAX / 4, "report.json"))
+        }))
+            (more(report.bound.len(), BOUND_ROWS_MAX, "report.json"))
         }
     }
 }
@@ -140,11 +146,8 @@ pub(super) fn residuals(report: &Report) -> Markup {
         }
     };
     html! {
-        table {
-            tr {
-                th { "Residuals in metres" } th.n { "posts" } th.n { "points" } th.n { "RMS" } th.n { "largest" }
-                th.n { "mean" } th.n { "95 %" } th.n { "99 %" }
-            }
+        (table(html! { th { "Residuals in metres" } th.n { "posts" } th.n { "points" } th.n { "RMS" } th.n { "largest" }
+                th.n { "mean" } th.n { "95 %" } th.n { "99 %" } }, html! {
             @for class in &report.classes {
                 @if class.posts == 0 {
                     tr { td { (&class.name) } td.n { "-" } td.n { (grouped(class.points)) } @for _ in 0..5 { td.n { "-" } } }
@@ -161,12 +164,15 @@ pub(super) fn residuals(report: &Report) -> Markup {
             @if let Some(source) = &report.residual_against_source {
                 (row("against the source DEM", String::new(), String::new(), source))
             }
-        }
+        }))
         @if 1 < report.classes.len() {
             p.quiet {
                 "Pooled by points, as the founding paper's Table 2 prints its overall figure: RMS "
                 (format!("{:.3} m", report.overall_point_weighted_rms_m)) "."
             }
+        }
+        @if let Some(border) = &report.border {
+            p.quiet { "Load modules " (border_in_words(border)) "." }
         }
         @if let Some(accuracy_m) = report.dem_accuracy_m {
             p.quiet { "The source states an accuracy of " (accuracy_m) " m." }
@@ -186,11 +192,8 @@ pub(super) fn levels(report: &Report) -> Markup {
     html! {
         @if !report.levels.is_empty() {
             h3 { "Levels of detail" }
-            table {
-                tr {
-                    th { "Level" } th.n { "inner vertices" } th.n { "triangles" } th.n { "of level 0" }
-                    th.n { "RMS, m" } th.n { "largest, m" }
-                }
+            (table(html! { th { "Level" } th.n { "inner vertices" } th.n { "triangles" } th.n { "of level 0" }
+                    th.n { "RMS, m" } th.n { "largest, m" } }, html! {
                 @for level in &report.levels {
                     tr {
                         td { (level.level) } td.n { (format!("{} %", 100.0 * level.inner_share)) }
@@ -199,26 +202,24 @@ pub(super) fn levels(report: &Report) -> Markup {
                         td.n { (format!("{:.3}", level.rms_m)) } td.n { (format!("{:.2}", level.max_m)) }
                     }
                 }
-            }
+        }))
             p.quiet { "Limits are about level 0; the others are for what is far away." }
         }
     }
 }
 
-pub(super) fn breaches(report: &Report) -> Markup {
+pub(super) fn breaches(report: &Report, marks: &Marks) -> Markup {
     if report.breaches.is_empty() {
         return html! { p { "None." } };
     }
     html! {
         p { "All of them with their places: " code { "breaches.csv" } ", " code { "breaches.geojson" } "." }
-        table {
-            tr {
-                th { "Limit" } th { "Where" } th.n { "count" } th.n { "limit" } th.n { "excess" } th.n { "refused" }
-                th.n { "RMS, m" } th.n { "RMS without the limit, m" }
-            }
+        (table(html! {
+            th { "Limit" } th { "Where" } th.n { "count" } th.n { "limit" } th.n { "excess" } th.n { "refused" }
+            th.n { "RMS, m" } th.n { "RMS without the limit, m" } }, html! {
             @for breach in report.breaches.iter().take(ROWS_MAX) {
                 tr {
-                    td { code { (breach.kind) } } td { (place_text(breach.place)) }
+                    td { code { (breach.kind) } } td { (marks.link(breach.place)) }
                     @for count in [breach.count, breach.limit, breach.excess] {
                         td.n { (crate::report::amount(breach, count)) }
                     }
@@ -226,7 +227,7 @@ pub(super) fn breaches(report: &Report) -> Markup {
                     td.n { @if let Some(rms_m) = breach.rms_without_m { (format!("{rms_m:.3}")) } }
                 }
             }
-        }
+        }))
         (more(report.breaches.len(), ROWS_MAX, "breaches.csv"))
     }
 }
@@ -236,31 +237,29 @@ pub(super) fn stages(report: &Report) -> Markup {
     let cpu_s: f64 = report.stages.iter().map(|stage| stage.cpu_s).sum();
     html! {
         p.quiet { (format!("{wall_s:.2} s with {} workers.", report.workers)) }
-        table {
-            tr { th { "Stage" } th.n { "wall, s" } th.n { "cpu, s" } th { "share of the time" } }
+        (table(html! { th { "Stage" } th.n { "wall, s" } th.n { "cpu, s" } th { "share of the time" } }, html! {
             @for stage in &report.stages {
                 tr {
                     td { (stage.name) }
                     td.n { (format!("{:.2}", stage.wall_s)) } td.n { (format!("{:.2}", stage.cpu_s)) }
-                    td { span.bar style=(format!("width:{:.1}px", 300.0 * stage.wall_s / wall_s.max(1e-9))) {} }
+                    td.share { span.bar style=(format!("width:{:.1}%", 100.0 * stage.wall_s / wall_s.max(1e-9))) {} }
                 }
             }
             tr { td { b { "all" } } td.n { (format!("{wall_s:.2}")) } td.n { (format!("{cpu_s:.2}")) } td {} }
-        }
+        }))
     }
 }
 
 pub(super) fn sources(manifest: &Manifest) -> Markup {
     html! {
-        table {
-            tr { th { "Source" } th { "BLAKE3 of its content" } th { "Attribution" } }
+        (table(html! { th { "Source" } th { "BLAKE3 of its content" } th { "Attribution" } }, html! {
             @for source in &manifest.sources {
                 tr {
                     td { code { (source.path) } } td { code { (source.blake3.to_string()) } }
                     td { (source.attribution.as_deref().unwrap_or("")) }
                 }
             }
-        }
+        }))
         p.quiet {
             "Algorithm revision " (manifest.algorithm_revision) ", database format " (manifest.format_version) "."
         }

@@ -55,15 +55,28 @@ fn page_of(name: &str, with_ground: bool) -> String {
         modules: &modules,
         ground: with_ground.then_some(SceneGround { dem: &dem, residuals: &residuals }),
         limits: &limits,
+        water: None,
         tiles: &[],
     };
     let settings = [PageSetting { key: "area.name".into(), value: format!("\"{name}\""), meaning: "its name".into() }];
-    report_html(&Page { report: &report, manifest: &manifest(name), settings: &settings, scene: Some(&scene) })
+    report_html(&Page {
+        title: None,
+        report: &report,
+        manifest: &manifest(name),
+        settings: &settings,
+        scene: Some(&scene),
+    })
 }
 
 #[test]
 fn a_page_without_maps_says_how_to_come_by_them() {
-    let page = report_html(&Page { report: &samples::report(), manifest: &manifest("x"), settings: &[], scene: None });
+    let page = report_html(&Page {
+        title: None,
+        report: &samples::report(),
+        manifest: &manifest("x"),
+        settings: &[],
+        scene: None,
+    });
     assert!(page.contains("tiefort render DIR") && page.contains("tiefort report DIR --format html"));
     assert!(!page.contains("#worst"), "a link leads nowhere");
 }
@@ -76,8 +89,8 @@ fn the_page_is_one_file_that_loads_and_runs_nothing() {
     }
     let sources = page.matches("src=\"").count();
     assert_eq!(sources, page.matches("src=\"data:image/png;base64,").count());
-    // Five maps, and two pictures of each of the six load modules.
-    assert_eq!(sources, 5 + 2 * 6);
+    // Six maps (two of them of limits), and two pictures of each of the six load modules.
+    assert_eq!(sources, 6 + 2 * 6);
 }
 
 #[test]
@@ -103,7 +116,7 @@ fn names_from_outside_are_text_and_never_markup() {
 fn a_page_without_ground_says_so() {
     let page = page_of("fort", false);
     assert!(page.contains("No map of residuals") && !page.contains("Posts by residual"));
-    assert_eq!(page.matches("src=\"data:").count(), 4 + 6);
+    assert_eq!(page.matches("src=\"data:").count(), 5 + 6);
 }
 
 #[test]
@@ -119,7 +132,44 @@ fn the_most_that_is_seen_counts_load_modules_that_any_part_of_lies_near() {
         modules: &modules,
         ground: None,
         limits: &limits,
+        water: None,
         tiles: &[],
     };
     assert_eq!(most_seen(&scene), Some((24, ModuleId { row: 0, col: 0 })));
+}
+
+#[test]
+fn the_picture_comes_first_and_the_title_is_that_of_the_job() {
+    let page = page_of("fort", true);
+    assert!(page.find("<img").unwrap() < page.find("class=\"verdict").unwrap());
+    assert!(page.contains("<h1>Gaming area fort</h1>"));
+    let (report, manifest) = (samples::report(), manifest("x"));
+    let titled =
+        Page { title: Some("West & <east>"), report: &report, manifest: &manifest, settings: &[], scene: None };
+    let page = report_html(&titled);
+    assert!(
+        page.contains("<h1>West &amp; &lt;east&gt;</h1>") && page.contains("<title>West &amp; &lt;east&gt;</title>")
+    );
+    assert!(page.contains("Gaming area fort_irwin: "), "its name is still told");
+}
+
+#[test]
+fn every_link_of_the_page_leads_to_a_place_on_it() {
+    let page = page_of("fort", true);
+    let links: Vec<&str> = page.split("href=\"#").skip(1).map(|rest| rest.split('"').next().unwrap()).collect();
+    assert!(links.iter().any(|link| link.starts_with("module-")), "load modules are linked to the map");
+    for link in links {
+        assert_eq!(page.matches(&format!(" id=\"{link}\"")).count(), 1, "{link}");
+    }
+}
+
+#[test]
+fn no_table_makes_a_narrow_screen_scroll_and_every_table_repeats_its_head_on_paper() {
+    let page = page_of("fort", true);
+    let tables = page.matches("<table").count();
+    assert!(5 < tables);
+    assert_eq!(page.matches("<div class=\"wide\" tabindex=\"0\"><table><thead>").count(), tables);
+    for rule in ["overflow-x: auto", "prefers-color-scheme: dark", "table-header-group", "page-break-inside: avoid"] {
+        assert!(page.contains(rule), "{rule}");
+    }
 }

@@ -15,7 +15,10 @@ pub(crate) fn module_pictures(scene: &Scene, module: &LoadModule, pixels: usize)
     let (row, col) = (module.id.row, module.id.col);
     let extent_m = scene.extent_m(ModuleRect { south: row, west: col, north: row + 1, east: col + 1 });
     let plan = Plan::of(extent_m, pixels);
-    let wires = facets_wireframe(&Facets::of_modules([module], scene.grid, scene.frame.spacing), &plan);
+    let wires = facets_wireframe(
+        &Facets::of_modules([module], scene.grid, scene.frame.spacing).with_water([module], scene.water),
+        &plan,
+    );
     let residuals = scene.ground.map(|ground| {
         let (rect, whole) = (scene.grid.posts_of(module.id), ground.dem.rect());
         let dem = ground.dem.window(rect);

@@ -1,8 +1,10 @@
-//! Colours, and the scales that stand for numbers.
+//! Colours, and the scales that stand for numbers: the one palette of pictures, the page and the viewer.
 //!
 //! Every scale is told apart by its lightness, so that it reads the same to the colour-blind and in print: heights and
-//! counts grow lighter or darker all the way, residuals grow darker both ways from white, blue one way, red the other
-//! (the pair that the common kinds of colour blindness keep apart).
+//! counts grow lighter or darker all the way, residuals grow darker both ways from white, purple one way, orange the
+//! other (a pair that the common kinds of colour blindness keep apart). Blue is water and nothing else.
+
+use serde_json::{Value, json};
 
 /// A colour: red, green and blue, as screens show them.
 pub type Color = [u8; 3];
@@ -17,66 +19,103 @@ pub(crate) const NOTHING: Color = [200, 200, 200];
 pub(crate) const BREACH: Color = [213, 94, 0];
 /// What a limit kept from growing; on no scale.
 pub(crate) const BOUND: Color = [230, 159, 0];
+/// Water: the only blue.
+pub(crate) const WATER: Color = [96, 154, 196];
+/// The sky at its top and at the horizon.
+pub(crate) const SKY: [Color; 2] = [[205, 203, 198], [240, 238, 234]];
+/// What distance fades into.
+pub(crate) const HAZE: Color = [228, 226, 220];
 
 /// Colours at equal steps from 0 to 1, blended between.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Ramp(pub &'static [Color]);
 
-/// Heights: from dark green lowlands to white tops.
+/// Heights: from green lowlands over tan to pale tops.
 pub(crate) const HEIGHTS: Ramp = Ramp(&[
-    [70, 112, 104],
-    [104, 140, 112],
-    [146, 166, 122],
-    [184, 186, 138],
-    [208, 198, 156],
-    [222, 210, 180],
-    [236, 228, 208],
-    [250, 248, 242],
+    [84, 122, 78],
+    [112, 146, 90],
+    [146, 168, 106],
+    [178, 184, 124],
+    [200, 192, 142],
+    [214, 202, 162],
+    [228, 218, 192],
+    [246, 241, 230],
 ]);
 
-/// Counts: viridis, from dark to light.
+/// Counts: from nearly white to dark purple.
 pub(crate) const COUNTS: Ramp = Ramp(&[
-    [68, 1, 84],
-    [71, 45, 123],
-    [59, 82, 139],
-    [44, 114, 142],
-    [33, 145, 140],
-    [40, 174, 128],
-    [94, 201, 98],
-    [173, 220, 48],
-    [253, 231, 37],
+    [250, 244, 249],
+    [236, 218, 233],
+    [220, 183, 212],
+    [203, 143, 187],
+    [180, 99, 158],
+    [150, 60, 127],
+    [112, 28, 94],
+    [70, 8, 60],
 ]);
 
-/// Use of a limit: from pale yellow, nothing, to dark blue, all of it.
+/// Use of a limit: from pale yellow, nothing, to dark green, all of it.
 pub(crate) const USE: Ramp = Ramp(&[
-    [255, 255, 217],
-    [237, 248, 177],
-    [199, 233, 180],
-    [127, 205, 187],
-    [65, 182, 196],
-    [29, 145, 192],
-    [34, 94, 168],
-    [37, 52, 148],
-    [8, 29, 88],
+    [255, 255, 229],
+    [247, 252, 185],
+    [217, 240, 163],
+    [173, 221, 142],
+    [120, 198, 121],
+    [65, 171, 93],
+    [35, 132, 67],
+    [0, 104, 55],
+    [0, 69, 41],
 ]);
 
-/// Residuals: blue where the DEM lies below the triangles, white where it lies on them, red above.
+/// How far off, without a side: from nearly white over orange to dark red.
+pub(crate) const ERRORS: Ramp = Ramp(&[
+    [255, 250, 238],
+    [254, 228, 178],
+    [252, 190, 120],
+    [238, 134, 78],
+    [203, 72, 52],
+    [142, 24, 38],
+    [64, 4, 18],
+]);
+
+/// Residuals: purple where the DEM lies below the triangles, white where it lies on them, orange above.
 pub(crate) const RESIDUALS: Ramp = Ramp(&[
-    [5, 48, 97],
-    [33, 102, 172],
-    [67, 147, 195],
-    [146, 197, 222],
-    [209, 229, 240],
+    [64, 0, 75],
+    [118, 42, 131],
+    [153, 112, 171],
+    [194, 165, 207],
+    [231, 212, 232],
     [247, 247, 247],
-    [253, 219, 199],
-    [244, 165, 130],
-    [214, 96, 77],
-    [178, 24, 43],
-    [103, 0, 31],
+    [254, 224, 182],
+    [253, 184, 99],
+    [224, 130, 20],
+    [179, 88, 6],
+    [110, 48, 4],
 ]);
 
-/// Kinds of things without an order: Okabe and Ito's, lightened so that letters read on them.
-pub(crate) const KINDS: [Color; 4] = [[166, 206, 227], [253, 205, 130], [178, 223, 188], [222, 190, 218]];
+/// Kinds of things without an order, light enough for letters to read on them.
+pub(crate) const KINDS: [Color; 4] = [[226, 222, 212], [253, 205, 130], [178, 223, 188], [222, 190, 218]];
+
+/// The palette for programs that draw by themselves, as texts such as `#547a4e`: `heights`, `use`, `errors` and
+/// `residuals` from low to high, `breach`, `water`, `nothing`, and `sky` from its top to the horizon.
+pub fn palette() -> Value {
+    let all = |colors: &[Color]| colors.iter().copied().map(hex).collect::<Vec<_>>();
+    json!({
+        "heights": all(HEIGHTS.0),
+        "use": all(USE.0),
+        "errors": all(ERRORS.0),
+        "residuals": all(RESIDUALS.0),
+        "breach": hex(BREACH),
+        "water": hex(WATER),
+        "nothing": hex(NOTHING),
+        "sky": all(&SKY),
+    })
+}
+
+/// A colour as style sheets write it.
+pub(crate) fn hex([red, green, blue]: Color) -> String {
+    format!("#{red:02x}{green:02x}{blue:02x}")
+}
 
 impl Ramp {
     /// The colour at `share`, which is taken into 0 to 1.
@@ -123,7 +162,7 @@ mod tests {
 
     #[test]
     fn scales_of_heights_counts_and_use_change_their_lightness_one_way() {
-        for ramp in [HEIGHTS, COUNTS, USE] {
+        for ramp in [HEIGHTS, COUNTS, USE, ERRORS] {
             let light: Vec<f64> = ramp.table(65).into_iter().map(lightness).collect();
             let grows = light.is_sorted();
             assert!(grows || light.iter().rev().is_sorted(), "{ramp:?}");
@@ -135,7 +174,43 @@ mod tests {
         let table = RESIDUALS.table(101);
         let light: Vec<f64> = table.iter().copied().map(lightness).collect();
         assert!(light[..=50].is_sorted() && light[50..].iter().rev().is_sorted());
-        assert!((0..50).all(|step| table[step][2] > table[step][0] && table[100 - step][0] > table[100 - step][2]));
+        assert!((0..49).all(|step| table[step][1] < table[step][2] && table[100 - step][2] < table[100 - step][0]));
+    }
+
+    /// Whether one would call it blue: between green and purple, and not grey.
+    fn is_blue(color: Color) -> bool {
+        let [red, green, blue] = color.map(f64::from);
+        let (most, least) = (red.max(green).max(blue), red.min(green).min(blue));
+        let is_grey = most - least < 0.1 * most.max(1.0);
+        // Purple has more red than green, blue has not much more.
+        !is_grey && blue == most && red - green < 0.3 * (most - least)
+    }
+
+    #[test]
+    fn blue_is_water_and_nothing_else() {
+        assert!(is_blue(WATER) && is_blue([67, 147, 195]) && is_blue([59, 82, 139]));
+        let ramps = [HEIGHTS, COUNTS, USE, ERRORS, RESIDUALS].into_iter().flat_map(|ramp| ramp.table(101));
+        let others = [BREACH, BOUND, NOTHING, PALE, SKY[0], SKY[1], HAZE].into_iter().chain(KINDS);
+        for color in ramps.chain(others) {
+            assert!(!is_blue(color), "{color:?}");
+        }
+    }
+
+    #[test]
+    fn land_is_green_or_tan() {
+        for [red, green, blue] in HEIGHTS.table(101) {
+            assert!(blue < green && blue < red.max(green) && 0 < green, "{red} {green} {blue}");
+        }
+    }
+
+    #[test]
+    fn the_palette_of_programs_is_that_of_pictures() {
+        let palette = palette();
+        assert_eq!(palette["water"], "#609ac4");
+        for (name, ramp) in [("heights", HEIGHTS), ("use", USE), ("errors", ERRORS), ("residuals", RESIDUALS)] {
+            let colors: Vec<String> = ramp.0.iter().copied().map(hex).collect();
+            assert_eq!(palette[name], json!(colors), "{name}");
+        }
     }
 
     #[test]

@@ -1,6 +1,10 @@
 //! Triangles to be drawn: of a TIN or of load modules, in metres from the area's south-west post.
 
-use terrain::{LATTICE_PER_POST, LoadModule, ModuleGrid, QUANTA_PER_METRE, Spacing, Tin, metres_of_quanta};
+use std::f64::consts::FRAC_1_SQRT_2;
+
+use terrain::{LATTICE_PER_POST, LoadModule, ModuleGrid, PostRect, QUANTA_PER_METRE, Spacing, Tin, metres_of_quanta};
+
+use super::scene::Scene;
 
 /// Triangles with the places of their corners: east, north and up, in metres.
 ///
@@ -14,6 +18,8 @@ pub struct Facets {
     pub(crate) extent_m: [f64; 4],
     /// Side of the squares whose lines are drawn stronger; `None` where there are none.
     pub(crate) side_m: Option<f64>,
+    /// Whether each triangle is water; empty where none is.
+    pub(crate) water: Vec<bool>,
 }
 
 impl Facets {
@@ -29,7 +35,64 @@ impl Facets {
             corners: tin.triangles.clone(),
             extent_m: [posts(rect.west, 0), posts(rect.south, 1), posts(rect.east, 0), posts(rect.north, 1)],
             side_m: None,
+            water: Vec::new(),
         }
+    }
+
+    /// Those of a scene.
+    pub(crate) fn of_scene(scene: &Scene) -> Self {
+        Self::of_modules(scene.modules, scene.grid, scene.frame.spacing).with_water(scene.modules, scene.water)
+    }
+
+    /// The facets of these load modules, told which of them are water: those of a class.
+    pub(crate) fn with_water<'a>(
+        mut self,
+        modules: impl IntoIterator<Item = &'a LoadModule>,
+        class: Option<u8>,
+    ) -> Self {
+        if let Some(class) = class {
+            self.water = modules.into_iter().flat_map(|module| &module.classes).map(|&of| of == class).collect();
+        }
+        self
+    }
+
+    /// Whether a triangle is water.
+    pub(crate) fn is_water(&self, triangle: usize) -> bool {
+        self.water.get(triangle).is_some_and(|&is_water| is_water)
+    }
+
+    /// Whether any triangle is.
+    pub(crate) fn has_water(&self) -> bool {
+        self.water.contains(&true)
+    }
+
+    /// Which posts of a rectangle lie under water, row by row from the south-west; empty when none does.
+    pub(crate) fn water_posts(&self, rect: PostRect, spacing_m: f64) -> Vec<bool> {
+        if !self.has_water() {
+            return Vec::new();
+        }
+        let mut posts = vec![false; rect.post_count()];
+        let triangles = self.corners.iter().enumerate().filter(|(index, _)| self.is_water(*index));
+        for (_, &corners) in triangles {
+            let [a, b, c] = self.triangle(corners).map(|[x, y, _]| [x / spacing_m, y / spacing_m]);
+            let left = |p: [f64; 2], q: [f64; 2], at: [f64; 2]| {
+                (q[0] - p[0]) * (at[1] - p[1]) - (q[1] - p[1]) * (at[0] - p[0])
+            };
+            let range = |axis: usize, first: i32, last: i32| {
+                let (low, high) = (a[axis].min(b[axis]).min(c[axis]), a[axis].max(b[axis]).max(c[axis]));
+                (low.ceil() as i32).max(first)..=(high.floor() as i32).min(last)
+            };
+            for row in range(1, rect.south, rect.north) {
+                for col in range(0, rect.west, rect.east) {
+                    let at = [f64::from(col), f64::from(row)];
+                    if 0.0 <= left(a, b, at) && 0.0 <= left(b, c, at) && 0.0 <= left(c, a, at) {
+                        let place = (row - rect.south) as usize * rect.posts_wide() + (col - rect.west) as usize;
+                        posts[place] = true;
+                    }
+                }
+            }
+        }
+        posts
     }
 
     /// Those of load modules.
@@ -115,15 +178,41 @@ impl Facets {
     }
 }
 
-/// Where light comes from: the north-west, halfway up, as on maps since Lehmann.
-const LIGHT: [f64; 3] = [-0.5, 0.5, std::f64::consts::FRAC_1_SQRT_2];
+/// Where light comes from, seen from above: south-west, west, north-west (as on maps since Lehmann) and north, each of
+/// length 1; and how much of it. West weighs more than north, so that slopes to the south-west and the north-east,
+/// which light from the north-west alone leaves equal, differ.
+const LIGHTS: [([f64; 2], f64); 4] = [
+    ([-FRAC_1_SQRT_2, -FRAC_1_SQRT_2], 0.9),
+    ([-1.0, 0.0], 1.0),
+    ([-FRAC_1_SQRT_2, FRAC_1_SQRT_2], 1.0),
+    ([0.0, 1.0], 0.5),
+];
+/// Which of them is the main one, and its share.
+const MAIN: (usize, f64) = (2, 0.55);
+/// What is left of the difference in the shade: no slope is darker than one less this.
+const SHADE: f64 = 0.55;
 
 /// How light a slope is that rises so much per metre to the east and to the north: 1 where it is flat.
+///
+/// All lights stand halfway up. After Mark (1992), each counts by how far it shines across the slope, so that it shows
+/// what the others flatten.
 pub(crate) fn light_of(to_east: f64, to_north: f64) -> f32 {
-    let towards = LIGHT[2] - LIGHT[0] * to_east - LIGHT[1] * to_north;
-    let lambert = towards / (1.0 + to_east * to_east + to_north * to_north).sqrt();
-    // Shadows keep a quarter of the light of the sky.
-    (0.25 + 0.75 * lambert.max(0.0) / LIGHT[2]) as f32
+    let squared = to_east * to_east + to_north * to_north;
+    if squared == 0.0 {
+        return 1.0;
+    }
+    let length = (1.0 + squared).sqrt();
+    // As a multiple of the light on flat ground.
+    let lambert = |[x, y]: [f64; 2]| ((1.0 - x * to_east - y * to_north) / length).max(0.0);
+    let (mut sum, mut weights) = (0.0, 0.0);
+    for (direction, weight) in LIGHTS {
+        let across = direction[0] * to_north - direction[1] * to_east;
+        let weight = weight * across * across / squared;
+        sum += weight * lambert(direction);
+        weights += weight;
+    }
+    let light = MAIN.1 * lambert(LIGHTS[MAIN.0].0) + (1.0 - MAIN.1) * sum / weights;
+    (if light < 1.0 { 1.0 - SHADE * (1.0 - light) } else { light }) as f32
 }
 
 /// How light a triangle is whose heights are drawn `times` as large.
@@ -174,6 +263,35 @@ mod tests {
         fn min_place(self, other: Self) -> [Self; 2] {
             if self < other { [self, other] } else { [other, self] }
         }
+    }
+
+    #[test]
+    fn no_shadow_is_black_and_light_from_one_side_alone_flattens_no_slope() {
+        for step in 0..64 {
+            for steep in [0.01, 0.3, 1.0, 3.0, 50.0] {
+                let angle = f64::from(step) * 0.1;
+                let light = light_of(steep * libm::cos(angle), steep * libm::sin(angle));
+                assert!((0.44..=1.6).contains(&light), "{steep} {angle}: {light}");
+            }
+        }
+        // Both lie along the light from the north-west, which would leave them equal.
+        let (north_east, south_west) = (light_of(-0.8, -0.8), light_of(0.8, 0.8));
+        assert!(north_east + 0.03 < south_west, "{south_west} {north_east}");
+        assert!((light_of(1e-9, 1e-9) - 1.0).abs() < 1e-6, "flat ground has no edge in its light");
+    }
+
+    #[test]
+    fn posts_under_water_are_those_of_its_class_and_no_others() {
+        let mut modules = samples::modules();
+        modules[1].classes = vec![3; 4];
+        let facets = Facets::of_modules(&modules, samples::GRID, samples::spacing());
+        let area = samples::GRID.area();
+        assert!(facets.clone().with_water(&modules, None).water_posts(area, 25.0).is_empty());
+        assert!(facets.clone().with_water(&modules, Some(9)).water_posts(area, 25.0).is_empty());
+        let posts = facets.with_water(&modules, Some(3)).water_posts(area, 25.0);
+        let wet = |row: usize, col: usize| posts[row * area.posts_wide() + col];
+        assert!(wet(10, 30) && wet(0, 20) && wet(20, 40) && !wet(10, 19) && !wet(21, 30));
+        assert_eq!(posts.iter().filter(|wet| **wet).count(), 21 * 21);
     }
 
     #[test]

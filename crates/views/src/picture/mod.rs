@@ -11,6 +11,7 @@ mod camera;
 mod closeup;
 mod color;
 mod depth;
+mod errors;
 mod facets;
 mod image;
 mod module_maps;
@@ -27,7 +28,9 @@ mod wireframe;
 
 pub use camera::Camera;
 pub(crate) use closeup::module_pictures;
-pub use color::Color;
+pub(crate) use color::hex;
+pub use color::{Color, palette};
+pub use errors::{draw_errors, draw_module_limits};
 pub use facets::Facets;
 pub use image::Image;
 pub use panels::{Panel, Style, draw_panels};
@@ -35,6 +38,7 @@ pub use perspective::{Drawn, Look, Surface, draw_perspective, draw_wireframe};
 pub use relief::Shown;
 pub use residual_map::RESIDUAL_SCALE_M;
 pub use scene::{NO_RESIDUAL, Scene, SceneGround, SceneLimits, SceneTile};
+pub(crate) use sheet::{Drawing, Key, Legend, length_text, round_length};
 pub use sight::{Eye, Sight, draw_sight};
 
 /// A map of a scene.
@@ -66,15 +70,18 @@ impl Map {
 /// # Panics
 /// When the map needs ground that the scene has not.
 pub fn draw_map(scene: &Scene, map: Map, longest: usize) -> Image {
+    let images: Vec<Image> = drawings(scene, map, longest).iter().map(Drawing::image).collect();
+    Image::beside(&images, 8)
+}
+
+/// The same with what stands around it apart, for a page that writes it in letters of its own.
+pub(crate) fn drawings(scene: &Scene, map: Map, longest: usize) -> Vec<Drawing> {
     match map {
         Map::Relief(shown) => relief::relief(scene, shown, longest),
-        Map::Wireframe => wireframe::wireframe(scene, longest),
-        Map::Residuals(scale_m) => {
-            let ground = scene.ground.expect("residuals are drawn of a scene with its ground");
-            residual_map::residuals(scene, &ground, scale_m, longest)
-        }
-        Map::Density => module_maps::density(scene, longest),
-        Map::Limits => module_maps::limits(scene, longest),
-        Map::Tiles => module_maps::tiles(scene, longest),
+        Map::Wireframe => vec![wireframe::wireframe(scene, longest)],
+        Map::Residuals(scale_m) => vec![residual_map::residuals(scene, scale_m, longest)],
+        Map::Density => vec![module_maps::density(scene, longest)],
+        Map::Limits => module_maps::limits(scene, longest).into(),
+        Map::Tiles => vec![module_maps::tiles(scene, longest)],
     }
 }

@@ -7,14 +7,20 @@ use super::color::{BOUND, BREACH, COUNTS, Color, GREY, INK, KINDS, PALE, USE, WH
 use super::image::Image;
 use super::plan::Plan;
 use super::scene::Scene;
-use super::sheet::{Key, Legend, Sheet, draw_crossed};
+use super::sheet::{Drawing, Key, Legend, Sheet, draw_crossed, round_marks};
 use super::text::{Anchor, Font, write};
 use crate::table::grouped;
 
 /// Triangles per load module.
-pub(crate) fn density(scene: &Scene, longest: usize) -> Image {
+pub(crate) fn density(scene: &Scene, longest: usize) -> Drawing {
     let plan = scene.plan(longest);
-    let counts: Vec<u32> = scene.part.iter().map(|module| scene.limits.modules[scene.grid.index(module)]).collect();
+    // Without what limits count, triangles: of the load modules that are there, which are those of the part.
+    let limits = scene.limits;
+    let is_known = !limits.modules.is_empty();
+    let counts: Vec<u32> = match is_known {
+        true => scene.part.iter().map(|module| limits.modules[scene.grid.index(module)]).collect(),
+        false => scene.modules.iter().map(|module| module.triangles.len() as u32).collect(),
+    };
     let low = counts.iter().copied().min().unwrap_or(0);
     let high = counts.iter().copied().max().unwrap_or(0).max(low + 1);
     let color = |count: u32| COUNTS.at(f64::from(count - low) / f64::from(high - low));
@@ -22,17 +28,16 @@ pub(crate) fn density(scene: &Scene, longest: usize) -> Image {
     for (module, &count) in scene.part.iter().zip(&counts) {
         fill(&mut map, scene, &plan, one(module), color(count));
     }
+    let wide = scene.part.east - scene.part.west;
     label_modules(&mut map, scene, &plan, |module| {
-        let count = scene.limits.modules[scene.grid.index(module)];
+        let count = counts[((module.row - scene.part.south) * wide + module.col - scene.part.west) as usize];
         (count.to_string(), ink_on(color(count)))
     });
-    let marks = [0.0, 0.25, 0.5, 0.75, 1.0].map(|share| {
-        let count = f64::from(low) + share * f64::from(high - low);
-        (share, format!("{count:.0}"))
-    });
+    let marks = round_marks(f64::from(low), f64::from(high)).into_iter();
+    // There are no parts of triangles.
+    let marks = marks.filter(|(_, count)| count.fract() == 0.0).map(|(share, count)| (share, grouped(count as u64)));
     let mean = counts.iter().map(|&count| f64::from(count)).sum::<f64>() / counts.len().max(1) as f64;
-    let coordinates = scene.coordinates();
-    let what = &scene.limits.count;
+    let what = if is_known { limits.count.as_str() } else { "triangles" };
     let sheet = Sheet {
         title: format!("{}: {what} per load module", scene.name),
         subtitle: format!(
@@ -41,32 +46,35 @@ pub(crate) fn density(scene: &Scene, longest: usize) -> Image {
             grouped(counts.iter().map(|&count| u64::from(count)).sum()),
             scene.side_m()
         ),
-        coordinates: &coordinates,
-        legends: vec![Legend::Ramp { title: format!("{what} in a load module"), ramp: COUNTS, marks: marks.into() }],
+        coordinates: scene.coordinates(),
+        legends: vec![Legend::Ramp { title: format!("{what} in a load module"), ramp: COUNTS, marks: marks.collect() }],
         notes: String::new(),
     };
-    sheet.around(&map, &plan)
+    Drawing { sheet, map, plan }
 }
 
 /// How much of both limits is used, side by side: of load modules, and of the windows around every place.
-pub(crate) fn limits(scene: &Scene, longest: usize) -> Image {
-    Image::beside(&[module_limits(scene, longest), window_limits(scene, longest)], 8)
+pub(crate) fn limits(scene: &Scene, longest: usize) -> [Drawing; 2] {
+    [module_limits(scene, longest), window_limits(scene, longest)]
 }
 
 /// The legend of a map of use, with what stands on no scale.
-fn use_legends(limit: u32, what: &str) -> Vec<Legend> {
+fn use_legends(limit: u32, what: &str, is_bound: bool) -> Vec<Legend> {
     let marks = [0.0, 0.25, 0.5, 0.75, 1.0].map(|share: f64| {
         let count = share * f64::from(limit);
         (share, format!("{:.0} %  {}", share * 100.0, grouped(count.round() as u64)))
     });
-    let keys = vec![(Key::Crossed(BREACH), "above: breach".into()), (Key::Framed(BOUND), "posts refused here".into())];
+    let mut keys = vec![(Key::Crossed(BREACH), "above: breach".into())];
+    if is_bound {
+        keys.push((Key::Framed(BOUND), "posts refused here".into()));
+    }
     vec![
         Legend::Ramp { title: format!("Use of the limit: {what}"), ramp: USE, marks: marks.into() },
         Legend::Keys { title: String::new(), keys },
     ]
 }
 
-fn module_limits(scene: &Scene, longest: usize) -> Image {
+pub(crate) fn module_limits(scene: &Scene, longest: usize) -> Drawing {
     let (plan, limits) = (scene.plan(longest), scene.limits);
     let limit = limits.per_load_module;
     let mut map = Image::new(plan.pixels[0], plan.pixels[1], WHITE);
@@ -89,15 +97,14 @@ fn module_limits(scene: &Scene, longest: usize) -> Image {
         (count.to_string(), if limit < count { INK } else { ink_on(USE.at(share)) })
     });
     let most = scene.part.iter().map(|module| limits.modules[scene.grid.index(module)]).max().unwrap_or(0);
-    let coordinates = scene.coordinates();
     let sheet = Sheet {
         title: format!("{}: limit of a load module", scene.name),
         subtitle: format!("{}, at most {most} of {limit} {}, {} above", scene.what(), limits.count, over.len()),
-        coordinates: &coordinates,
-        legends: use_legends(limit, &format!("{} in a load module", limits.count)),
+        coordinates: scene.coordinates(),
+        legends: use_legends(limit, &format!("{} in a load module", limits.count), !limits.bound_modules.is_empty()),
         notes: String::new(),
     };
-    sheet.around(&map, &plan)
+    Drawing { sheet, map, plan }
 }
 
 /// Marks breaches over all else. A few of them are drawn large enough to be found on a map of thousands of squares.
@@ -112,7 +119,7 @@ fn draw_breaches(map: &mut Image, rects: &[[i64; 4]]) {
 }
 
 /// The windows have their middles a load module apart, so each is drawn as one square there.
-fn window_limits(scene: &Scene, longest: usize) -> Image {
+fn window_limits(scene: &Scene, longest: usize) -> Drawing {
     let (plan, limits) = (scene.plan(longest), scene.limits);
     let [rows, cols] = limits.window;
     let origins = ModuleRect { south: 0, west: 0, north: scene.grid.rows - rows + 1, east: scene.grid.cols - cols + 1 };
@@ -135,7 +142,6 @@ fn window_limits(scene: &Scene, longest: usize) -> Image {
         map.outline(plan.rect(middle_of(scene, origin)), 2, BOUND);
     }
     draw_breaches(&mut map, &over);
-    let coordinates = scene.coordinates();
     let (high_m, wide_m) = (f64::from(rows) * scene.side_m(), f64::from(cols) * scene.side_m());
     let size = format!("{} x {} km", wide_m / 1000.0, high_m / 1000.0);
     let sheet = Sheet {
@@ -148,13 +154,17 @@ fn window_limits(scene: &Scene, longest: usize) -> Image {
             limits.count,
             over.len()
         ),
-        coordinates: &coordinates,
-        legends: use_legends(limits.per_window, &format!("{} in a window", limits.count)),
+        coordinates: scene.coordinates(),
+        legends: use_legends(
+            limits.per_window,
+            &format!("{} in a window", limits.count),
+            !limits.bound_windows.is_empty(),
+        ),
         notes: format!(
             "Each square is the middle of a window of {rows} x {cols} load modules; grey: no window's middle."
         ),
     };
-    sheet.around(&map, &plan)
+    Drawing { sheet, map, plan }
 }
 
 /// West, south, east and north of the square in the middle of a window.
@@ -166,11 +176,11 @@ fn middle_of(scene: &Scene, origin: ModuleId) -> [f64; 4] {
     [west, south, west + side_m, south + side_m]
 }
 
-fn one(module: ModuleId) -> ModuleRect {
+pub(crate) fn one(module: ModuleId) -> ModuleRect {
     ModuleRect { south: module.row, west: module.col, north: module.row + 1, east: module.col + 1 }
 }
 
-fn fill(map: &mut Image, scene: &Scene, plan: &Plan, modules: ModuleRect, color: Color) {
+pub(crate) fn fill(map: &mut Image, scene: &Scene, plan: &Plan, modules: ModuleRect, color: Color) {
     map.fill(plan.rect(scene.extent_m(modules)), color);
 }
 
@@ -193,7 +203,7 @@ fn label_modules(map: &mut Image, scene: &Scene, plan: &Plan, label: impl Fn(Mod
 }
 
 /// Which tile lies where, in which order, and how it stands.
-pub(crate) fn tiles(scene: &Scene, longest: usize) -> Image {
+pub(crate) fn tiles(scene: &Scene, longest: usize) -> Drawing {
     let plan = scene.plan(longest);
     let mut map = Image::new(plan.pixels[0], plan.pixels[1], WHITE);
     for tile in scene.tiles {
@@ -210,7 +220,6 @@ pub(crate) fn tiles(scene: &Scene, longest: usize) -> Image {
     let lines = states.map(|(state, name)| format!("{name}: {}", count(*state))).collect();
     let colors = scene.tiles.iter().map(|tile| tile.color).max().map_or(0, |most| most as usize + 1);
     let keys = (0..colors.min(KINDS.len())).map(|color| (Key::Filled(KINDS[color]), format!("turn {}", color + 1)));
-    let coordinates = scene.coordinates();
     let sheet = Sheet {
         title: format!("{}: tiles", scene.name),
         subtitle: format!(
@@ -219,7 +228,7 @@ pub(crate) fn tiles(scene: &Scene, longest: usize) -> Image {
             scene.tiles.len(),
             grouped(scene.grid.count() as u64)
         ),
-        coordinates: &coordinates,
+        coordinates: scene.coordinates(),
         legends: vec![
             Legend::Keys { title: "May be refined at once".into(), keys: keys.collect() },
             Legend::Lines { title: "State".into(), lines },
@@ -228,7 +237,7 @@ pub(crate) fn tiles(scene: &Scene, longest: usize) -> Image {
                 before it); its triangles. Fine lines: load modules."
             .into(),
     };
-    sheet.around(&map, &plan)
+    Drawing { sheet, map, plan }
 }
 
 const STATES: [(TileState, &str); 5] = [
@@ -312,13 +321,13 @@ mod tests {
             modules: &modules,
             ground: None,
             limits: &limits,
+            water: None,
             tiles: &[],
         };
         let plan = scene.plan(300);
-        let image = module_limits(&scene, 300);
-        // The map itself, without its legends.
-        let places = (0..plan.pixels[0]).flat_map(|x| (0..plan.pixels[1]).map(move |y| (x + 92, y + 80)));
-        places.into_iter().any(|(x, y)| y < image.high() && image.pixel(x, y) == color)
+        let image = module_limits(&scene, 300).map;
+        let mut places = (0..plan.pixels[0]).flat_map(|x| (0..plan.pixels[1]).map(move |y| (x, y)));
+        places.any(|(x, y)| image.pixel(x, y) == color)
     }
 
     #[test]

@@ -5,7 +5,7 @@ use super::color::{GREY, INK, WHITE};
 use super::image::Image;
 use super::perspective::{Drawn, Look, Surface, draw_perspective, draw_wireframe};
 use super::relief::Tints;
-use super::sheet::{Legend, draw_scale};
+use super::sheet::draw_scale;
 use super::text::{Anchor, Font, fitted, wrapped, write};
 
 /// How surfaces are drawn.
@@ -50,8 +50,9 @@ pub fn draw_panels(title: &str, eye: &str, panels: &[Panel], style: Style, look:
     let whole = GAP + panels.len() as i64 * (wide + GAP) + LEGEND_WIDE;
     let top = GAP + Font::Title.line() + GAP / 2 + Font::Bold.line();
     let notes = wrapped(&notes(eye, look), Font::Plain, whole - 2 * GAP);
-    let tints: Option<Legend> = (style == Style::Shaded).then(|| Tints::new(look.range_m).legend());
-    let body = high.max(ABOVE_TINTS + tints.as_ref().map_or(0, Legend::high)) + GAP;
+    let has_water = panels.iter().any(|panel| panel.surface.has_water());
+    let tints = if style == Style::Shaded { Tints::new(look.range_m).legends(has_water) } else { Default::default() };
+    let body = high.max(ABOVE_TINTS + tints.iter().map(|legend| legend.high() + GAP).sum::<i64>()) + GAP;
     let mut image =
         Image::new(whole as usize, (top + body + notes.len() as i64 * Font::Plain.line() + GAP) as usize, WHITE);
     let title = fitted(title, Font::Title, whole - 2 * GAP);
@@ -69,8 +70,10 @@ pub fn draw_panels(title: &str, eye: &str, panels: &[Panel], style: Style, look:
         draw_scale(&mut image, [left, top + 76], middle_m, LEGEND_WIDE - 2 * GAP);
         write(&mut image, [left, top + 110], "in the middle", Font::Plain, Anchor::Start, GREY);
     }
-    if let Some(tints) = tints {
-        tints.draw(&mut image, [left, top + ABOVE_TINTS]);
+    let mut below = top + ABOVE_TINTS;
+    for legend in tints {
+        legend.draw(&mut image, [left, below]);
+        below += legend.high() + GAP;
     }
     for (index, line) in notes.iter().enumerate() {
         let place = [GAP, top + body + index as i64 * Font::Plain.line()];
@@ -84,7 +87,7 @@ fn notes(eye: &str, look: &Look) -> String {
     let heights = if look.times == 1.0 { String::new() } else { format!(" Heights are drawn {} times.", look.times) };
     format!(
         "{eye}, looking {:.1}° from north over east, {:.1}° {} the horizon, field of view {field_of_view_degrees}°. \
-         Light from the north-west.{heights}",
+         Light from several directions, most of it from the north-west.{heights}",
         direction_degrees.rem_euclid(360.0),
         pitch_degrees.abs(),
         if pitch_degrees <= 0.0 { "below" } else { "above" },

@@ -6,7 +6,7 @@
 use terrain::{Dem, metres_of_quanta};
 
 use super::camera::{Camera, View};
-use super::color::{Color, GREY, INK, WHITE, lit, mix};
+use super::color::{Color, GREY, HAZE, INK, SKY, WATER, WHITE, lit, mix};
 use super::depth::{Corner, DepthImage};
 use super::facets::{Facets, light_of_triangle};
 use super::image::Image;
@@ -15,8 +15,9 @@ use super::relief::{Tints, lights, range_m};
 /// What stands in a picture.
 #[derive(Clone, Copy, Debug)]
 pub enum Surface<'a> {
-    /// Every post of a DEM, so many metres apart west to east and south to north.
-    Posts(&'a Dem, [f64; 2]),
+    /// Every post of a DEM, so many metres apart west to east and south to north, and which of them lie under water,
+    /// row by row from the south-west; empty where none does.
+    Posts(&'a Dem, [f64; 2], &'a [bool]),
     /// Triangles of a TIN or of load modules.
     Triangles(&'a Facets),
 }
@@ -54,8 +55,6 @@ pub struct Drawn {
     pub middle_m: Option<f64>,
 }
 
-const SKY: [Color; 2] = [[150, 182, 214], [226, 236, 244]];
-const HAZE: Color = [214, 224, 232];
 /// Metres at which haze takes half of a colour, for an extent of one metre.
 const HAZE_HALF: f64 = 2.6;
 const WALL: Color = [150, 140, 128];
@@ -65,7 +64,7 @@ impl Surface<'_> {
     pub fn extent_m(&self) -> [f64; 4] {
         match self {
             Surface::Triangles(facets) => facets.extent_m,
-            Surface::Posts(dem, [x, y]) => {
+            Surface::Posts(dem, [x, y], _) => {
                 let rect = dem.rect();
                 let metres = |posts: i32, spacing_m: &f64| f64::from(posts) * spacing_m;
                 [metres(rect.west, x), metres(rect.south, y), metres(rect.east, x), metres(rect.north, y)]
@@ -73,11 +72,19 @@ impl Surface<'_> {
         }
     }
 
+    /// Whether any of it is water.
+    pub(crate) fn has_water(&self) -> bool {
+        match self {
+            Surface::Triangles(facets) => facets.has_water(),
+            Surface::Posts(.., water) => water.contains(&true),
+        }
+    }
+
     /// Lowest and highest height, in metres.
     pub fn range_m(&self) -> (f64, f64) {
         match self {
             Surface::Triangles(facets) => facets.range_m(),
-            Surface::Posts(dem, _) => range_m(dem),
+            Surface::Posts(dem, ..) => range_m(dem),
         }
     }
 }
@@ -88,7 +95,8 @@ pub fn draw_perspective(surface: &Surface, look: &Look) -> Drawn {
     let mut stage = Stage::new(surface, look, true);
     let half_m = stage.haze_half_m;
     let color = |[height_m, light]: [f64; 2], ahead: f64| {
-        mix(lit(tints.at(height_m), light as f32), HAZE, haze_share(ahead, half_m))
+        let color = if light < 0.0 { WATER } else { lit(tints.at(height_m), light as f32) };
+        mix(color, HAZE, haze_share(ahead, half_m))
     };
     stage.draw(surface, look.times, &color);
     stage.draw_walls(surface, look, |_, ahead| mix(WALL, HAZE, haze_share(ahead, half_m)));
@@ -107,7 +115,7 @@ pub fn draw_wireframe(surface: &Surface, look: &Look) -> Drawn {
             let (thick, ink) = if is_line && facets.side_m.is_some() { (3.0, INK) } else { (2.0, GREY) };
             stage.line(ends.map(place), thick, ink);
         }),
-        Surface::Posts(dem, spacing_m) => stage.draw_grid(dem, *spacing_m, look.times),
+        Surface::Posts(dem, spacing_m, _) => stage.draw_grid(dem, *spacing_m, look.times),
     }
     stage.finish()
 }
@@ -129,6 +137,8 @@ struct Stage {
 
 /// Cells along a side of a block of posts that is drawn at one step.
 const BLOCK: i32 = 64;
+/// Stands for the light on water, which has one colour however it lies.
+const WATER_LIGHT: f64 = -1.0;
 /// Samples that a step of posts may cover: finer ones are not seen.
 const STEP_SAMPLES: f64 = 2.0;
 
@@ -163,8 +173,11 @@ impl Stage {
                 let view = self.view;
                 let turned: Vec<[f64; 3]> =
                     facets.vertices.iter().map(|&[x, y, z]| view.turned([x, y, z * times])).collect();
-                for &corners in &facets.corners {
-                    let light = f64::from(light_of_triangle(facets.triangle(corners), times));
+                for (index, &corners) in facets.corners.iter().enumerate() {
+                    let light = match facets.is_water(index) {
+                        true => WATER_LIGHT,
+                        false => f64::from(light_of_triangle(facets.triangle(corners), times)),
+                    };
                     let corner = |v: u32| {
                         let values = [facets.vertices[v as usize][2], light];
                         Corner { turned: turned[v as usize], values }
@@ -172,13 +185,16 @@ impl Stage {
                     self.depth.triangle(&view, corners.map(corner), color);
                 }
             }
-            Surface::Posts(dem, spacing_m) => self.draw_posts(dem, *spacing_m, times, color),
+            Surface::Posts(dem, spacing_m, water) => {
+                let lights = lights(dem, *spacing_m, times);
+                self.draw_posts(&LitPosts { dem, spacing_m: *spacing_m, times, lights, water }, color);
+            }
         }
     }
 
     /// Blocks of posts, far ones at wider steps with the light of the posts between.
-    fn draw_posts(&mut self, dem: &Dem, spacing_m: [f64; 2], times: f64, color: &impl Fn([f64; 2], f64) -> Color) {
-        let posts = LitPosts { dem, spacing_m, times, lights: lights(dem, spacing_m, times) };
+    fn draw_posts(&mut self, posts: &LitPosts, color: &impl Fn([f64; 2], f64) -> Color) {
+        let LitPosts { dem, spacing_m, times, .. } = *posts;
         let rect = dem.rect();
         for south in (rect.south..rect.north).step_by(BLOCK as usize) {
             for west in (rect.west..rect.east).step_by(BLOCK as usize) {
@@ -190,7 +206,7 @@ impl Stage {
                 let radius = (reach[0] * reach[0] + reach[1] * reach[1] + reach[2] * reach[2]).sqrt() + spacing_m[0];
                 if self.view.may_see(middle, radius) {
                     let step = self.step([x0, y0, x1, y1], middle[2], spacing_m);
-                    self.draw_block(&posts, [south, west, north, east], step, color);
+                    self.draw_block(posts, [south, west, north, east], step, color);
                 }
             }
         }
@@ -231,7 +247,11 @@ impl Stage {
         for &row in &rows[1..] {
             let above: Vec<Corner> = cols.iter().map(|&col| corner(row, col)).collect();
             for i in 1..cols.len() {
-                let [a, b, c, d] = [below[i - 1], below[i], above[i], above[i - 1]];
+                let mut cell = [below[i - 1], below[i], above[i], above[i - 1]];
+                if posts.is_water(row, cols[i]) {
+                    cell.iter_mut().for_each(|corner| corner.values[1] = WATER_LIGHT);
+                }
+                let [a, b, c, d] = cell;
                 self.depth.triangle(&view, [a, b, c], color);
                 self.depth.triangle(&view, [a, c, d], color);
             }
@@ -288,7 +308,7 @@ impl Stage {
                     }
                 });
             }
-            Surface::Posts(dem, spacing_m) => {
+            Surface::Posts(dem, spacing_m, _) => {
                 let rect = dem.rect();
                 let place = |row: i32, col: i32| place_of(dem, *spacing_m, row, col);
                 for col in rect.west..rect.east {
@@ -339,9 +359,16 @@ struct LitPosts<'a> {
     spacing_m: [f64; 2],
     times: f64,
     lights: Vec<f32>,
+    water: &'a [bool],
 }
 
 impl LitPosts<'_> {
+    fn is_water(&self, row: i32, col: i32) -> bool {
+        let rect = self.dem.rect();
+        let place = (row - rect.south) as usize * rect.posts_wide() + (col - rect.west) as usize;
+        self.water.get(place).is_some_and(|&is_water| is_water)
+    }
+
     /// A post with heights as they are drawn.
     fn place(&self, row: i32, col: i32) -> [f64; 3] {
         let [x, y, z] = place_of(self.dem, self.spacing_m, row, col);
@@ -413,10 +440,10 @@ mod tests {
             field_of_view_degrees: 60.0,
         };
         let look = Look { camera, pixels: [240, 135], times: 1.0, range_m: range_m(&dem) };
-        let drawn = draw_perspective(&Surface::Posts(&dem, SPACING_M), &look);
+        let drawn = draw_perspective(&Surface::Posts(&dem, SPACING_M, &[]), &look);
         let empty = hills(1);
         let behind = Camera { direction_degrees: 180.0, ..camera };
-        let sky = draw_perspective(&Surface::Posts(&empty, SPACING_M), &Look { camera: behind, ..look }).image;
+        let sky = draw_perspective(&Surface::Posts(&empty, SPACING_M, &[]), &Look { camera: behind, ..look }).image;
         for x in 0..240 {
             let is_sky = |y: &usize| drawn.image.pixel(x, *y) == sky.pixel(x, *y);
             let ground = (0..135).find(|y| !is_sky(y)).unwrap();
@@ -429,7 +456,7 @@ mod tests {
     fn a_tin_on_every_post_is_seen_as_the_dem_is() {
         let dem = hills(60);
         let facets = Facets::of_tin(&every_post(&dem), SPACING_M);
-        let posts = Surface::Posts(&dem, SPACING_M);
+        let posts = Surface::Posts(&dem, SPACING_M, &[]);
         let look = Look::overlooking(&posts, 30.0, 1.0, 200);
         let of_posts = draw_perspective(&posts, &look);
         let of_facets = draw_perspective(&Surface::Triangles(&facets), &look);
@@ -448,7 +475,7 @@ mod tests {
     #[test]
     fn a_wireframe_has_ink_on_white_and_nothing_else() {
         let dem = hills(40);
-        let posts = Surface::Posts(&dem, SPACING_M);
+        let posts = Surface::Posts(&dem, SPACING_M, &[]);
         let facets = Facets::of_tin(&every_post(&dem), SPACING_M);
         let look = Look::overlooking(&posts, 0.0, 1.0, 160);
         for surface in [posts, Surface::Triangles(&facets)] {

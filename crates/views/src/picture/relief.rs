@@ -2,12 +2,12 @@
 
 use terrain::{Dem, metres_of_quanta};
 
-use super::color::{Color, HEIGHTS, NOTHING, lit};
+use super::color::{Color, HEIGHTS, NOTHING, WATER, lit};
 use super::facets::{Facets, light_of, light_of_triangle};
 use super::image::Image;
 use super::plan::{Plan, Posts, Samples};
 use super::scene::Scene;
-use super::sheet::{Legend, Sheet};
+use super::sheet::{Drawing, Key, Legend, Sheet, round_marks};
 use crate::table::grouped;
 
 /// Heights in the shading are drawn so many times as large as they are, so that plains show their form.
@@ -34,12 +34,15 @@ impl Tints {
     }
 
     pub fn legend(&self) -> Legend {
-        let steps = 4;
-        let marks = (0..=steps).map(|step| {
-            let share = f64::from(step) / f64::from(steps);
-            (share, format!("{:.0} m", self.low_m + share * (self.high_m - self.low_m)))
-        });
-        Legend::Ramp { title: "Height".into(), ramp: HEIGHTS, marks: marks.collect() }
+        let marks = round_marks(self.low_m, self.high_m).into_iter();
+        let marks = marks.map(|(share, metres)| (share, format!("{metres} m"))).collect();
+        Legend::Ramp { title: "Height".into(), ramp: HEIGHTS, marks }
+    }
+
+    /// What a surface has: heights, and water where there is any.
+    pub fn legends(&self, has_water: bool) -> Vec<Legend> {
+        let water = Legend::Keys { title: String::new(), keys: vec![(Key::Filled(WATER), "water".into())] };
+        [Some(self.legend()), has_water.then_some(water)].into_iter().flatten().collect()
     }
 }
 
@@ -57,16 +60,20 @@ pub enum Shown {
 /// Relief of triangles.
 pub(crate) fn facets_relief(facets: &Facets, plan: &Plan, tints: &Tints) -> Image {
     let mut samples = Samples::new(plan);
-    for &corners in &facets.corners {
+    for (index, &corners) in facets.corners.iter().enumerate() {
         let corners = facets.triangle(corners);
         let light = light_of_triangle(corners, SHADING_TIMES);
+        if facets.is_water(index) {
+            plan.cover(corners, |row, col, _| samples.add(row, col, WATER));
+            continue;
+        }
         plan.cover(corners, |row, col, height_m| samples.add(row, col, lit(tints.at(height_m), light)));
     }
     samples.image(NOTHING)
 }
 
-/// Relief of posts.
-pub(crate) fn posts_relief(dem: &Dem, posts: &Posts, plan: &Plan, tints: &Tints) -> Image {
+/// Relief of posts; `water` says which of them lie under water, and is empty where none does.
+pub(crate) fn posts_relief(dem: &Dem, posts: &Posts, plan: &Plan, tints: &Tints, water: &[bool]) -> Image {
     let (wide, lights) = (dem.rect().posts_wide(), lights(dem, posts.spacing_m, SHADING_TIMES));
     let rect = dem.rect();
     let heights: Vec<f32> = (rect.south..=rect.north)
@@ -74,6 +81,11 @@ pub(crate) fn posts_relief(dem: &Dem, posts: &Posts, plan: &Plan, tints: &Tints)
         .collect();
     let mut samples = Samples::new(plan);
     posts.sample(plan, |between| {
+        let nearest = between.post + usize::from(0.5 < between.share[0]) + usize::from(0.5 < between.share[1]) * wide;
+        if water.get(nearest).is_some_and(|&is_water| is_water) {
+            samples.add(between.sample[0], between.sample[1], WATER);
+            return;
+        }
         let height_m = f64::from(between.blend(wide, |post| heights[post]));
         let light = between.blend(wide, |post| lights[post]);
         samples.add(between.sample[0], between.sample[1], lit(tints.at(height_m), light));
@@ -107,32 +119,36 @@ pub(crate) fn range_m(dem: &Dem) -> (f64, f64) {
 }
 
 /// The relief of a scene, its longer side `longest` pixels; the ground only where it is there.
-pub(crate) fn relief(scene: &Scene, shown: Shown, longest: usize) -> Image {
-    let facets = Facets::of_modules(scene.modules, scene.grid, scene.frame.spacing);
+pub(crate) fn relief(scene: &Scene, shown: Shown, longest: usize) -> Vec<Drawing> {
+    let facets = Facets::of_scene(scene);
     let plan = scene.plan(longest);
     let range = scene.ground.map_or_else(|| facets.range_m(), |ground| range_m(ground.dem));
     let tints = Tints::new(range);
-    let coordinates = scene.coordinates();
     let sheet = |title: &str, detail: String| Sheet {
         title: format!("{}: {title}", scene.name),
         subtitle: format!("{}, {detail}", scene.what()),
-        coordinates: &coordinates,
-        legends: vec![tints.legend()],
-        notes: format!("Light from the north-west; heights count {SHADING_TIMES} times in the shading."),
+        coordinates: scene.coordinates(),
+        legends: tints.legends(facets.has_water()),
+        notes: format!(
+            "Light from several directions, most of it from the north-west; heights count {SHADING_TIMES} times in \
+             the shading."
+        ),
     };
     let tin = || {
         let detail = format!("{} triangles", grouped(facets.count() as u64));
-        sheet("relief of the load modules", detail).around(&facets_relief(&facets, &plan, &tints), &plan)
+        let sheet = sheet("relief of the load modules", detail);
+        Drawing { sheet, map: facets_relief(&facets, &plan, &tints), plan }
     };
     let dem = || {
         let ground = scene.ground.expect("whoever asks for the ground has it");
         let detail = format!("posts {} m apart", scene.frame.spacing.metres());
-        let map = posts_relief(ground.dem, &scene.posts(&ground), &plan, &tints);
-        sheet("relief of the DEM", detail).around(&map, &plan)
+        let water = facets.water_posts(ground.dem.rect(), scene.frame.spacing.metres());
+        let map = posts_relief(ground.dem, &scene.posts(&ground), &plan, &tints, &water);
+        Drawing { sheet: sheet("relief of the DEM", detail), map, plan }
     };
     match shown {
-        Shown::Tin => tin(),
-        Shown::Dem => dem(),
-        Shown::Both => Image::beside(&[dem(), tin()], 8),
+        Shown::Tin => vec![tin()],
+        Shown::Dem => vec![dem()],
+        Shown::Both => vec![dem(), tin()],
     }
 }

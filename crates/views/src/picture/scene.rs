@@ -24,6 +24,8 @@ pub struct Scene<'a> {
     pub ground: Option<SceneGround<'a>>,
     /// What limits count, and how much of them is used.
     pub limits: &'a SceneLimits,
+    /// The class of water, where there is one.
+    pub water: Option<u8>,
     /// All tiles of the area, row by row from the south-west.
     pub tiles: &'a [SceneTile],
 }

@@ -63,15 +63,30 @@ pub(crate) struct Coordinates {
 
 /// All that stands around a map.
 #[derive(Clone, Debug)]
-pub(crate) struct Sheet<'a> {
+pub(crate) struct Sheet {
     pub title: String,
     pub subtitle: String,
-    pub coordinates: &'a Coordinates,
+    pub coordinates: Coordinates,
     pub legends: Vec<Legend>,
     pub notes: String,
 }
 
-impl Sheet<'_> {
+/// A map and what stands around it.
+#[derive(Clone, Debug)]
+pub(crate) struct Drawing {
+    pub sheet: Sheet,
+    pub map: Image,
+    pub plan: Plan,
+}
+
+impl Drawing {
+    /// All of it as one picture.
+    pub fn image(&self) -> Image {
+        self.sheet.around(&self.map, &self.plan)
+    }
+}
+
+impl Sheet {
     /// The map with all that stands around it.
     pub fn around(&self, map: &Image, plan: &Plan) -> Image {
         let (map_wide, map_high) = (map.wide() as i64, map.high() as i64);
@@ -89,7 +104,7 @@ impl Sheet<'_> {
         write(&mut image, [GAP, GAP + Font::Title.line()], &subtitle, Font::Plain, Anchor::Start, GREY);
         image.paste(map, LEFT as usize, top as usize);
         image.outline([LEFT - 1, top - 1, map_wide + 2, map_high + 2], 1, INK);
-        draw_axes(&mut image, [LEFT, top], plan, self.coordinates);
+        draw_axes(&mut image, [LEFT, top], plan, &self.coordinates);
         let left = LEFT + map_wide + GAP;
         draw_north(&mut image, [left + 14, top]);
         draw_scale(&mut image, [left + 60, top + 24], plan.metres_per_pixel(), 170);
@@ -205,8 +220,23 @@ fn draw_north(image: &mut Image, [x, y]: [i64; 2]) {
     }
 }
 
+/// Marks of a legend from `low` to `high` at round numbers, three to eight of them: the share of the scale that each
+/// stands at, and the number.
+pub(crate) fn round_marks(low: f64, high: f64) -> Vec<(f64, f64)> {
+    /// Spaces between marks, at most.
+    const SPACES: f64 = 7.0;
+    let length = (high - low).max(1e-3);
+    // Steps in thousandths, so that they are whole numbers and their multiples are exact.
+    let steps = (0..9).flat_map(|power| [1, 2, 5].map(|digit| digit * 10_i64.pow(power)));
+    let step = steps.into_iter().find(|&step| length * 1000.0 <= SPACES * step as f64).unwrap_or(1_000_000_000);
+    let first = (low * 1000.0 / step as f64 - 1e-9).ceil() as i64;
+    let last = (high * 1000.0 / step as f64 + 1e-9).floor() as i64;
+    let value = |index: i64| (index * step) as f64 / 1000.0;
+    (first..=last).map(|index| ((value(index) - low) / length, value(index))).collect()
+}
+
 /// Lengths a scale bar may have, and coordinates may stand apart: 1, 2 or 5 times a power of ten.
-fn round_length(at_most_m: f64) -> f64 {
+pub(crate) fn round_length(at_most_m: f64) -> f64 {
     let mut best = 1.0;
     for power in 0..7 {
         for digit in [1.0, 2.0, 5.0] {
@@ -290,6 +320,20 @@ mod tests {
         }
         assert_eq!(length_text(500.0), "500 m");
         assert_eq!(length_text(20_000.0), "20 km");
+    }
+
+    #[test]
+    fn marks_of_a_legend_are_round_numbers_inside_it() {
+        let values = |low, high| round_marks(low, high).into_iter().map(|(_, value)| value).collect::<Vec<_>>();
+        assert_eq!(values(612.3, 1587.0), [800.0, 1000.0, 1200.0, 1400.0]);
+        assert_eq!(values(0.0, 7.0), [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]);
+        assert_eq!(values(-3.2, 0.4), [-3.0, -2.0, -1.0, 0.0]);
+        assert_eq!(values(0.0, 0.6), [0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6]);
+        assert_eq!(round_marks(0.0, 50.0).last(), Some(&(1.0, 50.0)));
+        for high in 1..2000 {
+            let marks = round_marks(0.0, f64::from(high) * 0.37);
+            assert!((3..=8).contains(&marks.len()) && marks.iter().all(|(share, _)| (0.0..=1.0001).contains(share)));
+        }
     }
 
     #[test]

@@ -3,10 +3,11 @@
 use super::color::{INK, WHITE, mix};
 use super::facets::Facets;
 use super::image::Image;
+use super::module_maps::density;
 use super::plan::Plan;
 use super::relief::{Tints, facets_relief};
 use super::scene::Scene;
-use super::sheet::{Key, Legend, Sheet};
+use super::sheet::{Drawing, Key, Legend, Sheet};
 use crate::table::grouped;
 
 /// The edges of triangles, as strong as there is room for them.
@@ -33,18 +34,45 @@ fn edge_thickness(facets: &Facets, plan: &Plan) -> f64 {
     (side / 14.0).clamp(0.22, 1.1)
 }
 
-/// The wireframe of a scene.
-pub(crate) fn wireframe(scene: &Scene, longest: usize) -> Image {
-    let facets = Facets::of_modules(scene.modules, scene.grid, scene.frame.spacing);
+/// Square pixels to a triangle below which edges would run into one grey.
+const PIXELS_MIN: f64 = 4.0;
+
+/// The wireframe of a scene; where triangles are as small as pixels, how many there are in every load module.
+pub(crate) fn wireframe(scene: &Scene, longest: usize) -> Drawing {
+    let facets = Facets::of_scene(scene);
     let plan = scene.plan(longest);
+    if ((plan.pixels[0] * plan.pixels[1]) as f64) < PIXELS_MIN * facets.count() as f64 {
+        let mut drawing = density(scene, longest);
+        drawing.sheet.notes = "Instead of a wireframe: its triangles would be smaller than pixels. A part of the area \
+                               (--modules) or a larger picture (--size) shows them."
+            .into();
+        return drawing;
+    }
     let map = facets_wireframe(&facets, &plan);
-    let coordinates = scene.coordinates();
     let sheet = Sheet {
         title: format!("{}: wireframe", scene.name),
         subtitle: format!("{}, {} triangles", scene.what(), grouped(facets.count() as u64)),
-        coordinates: &coordinates,
+        coordinates: scene.coordinates(),
         legends: vec![Legend::Keys { title: String::new(), keys: vec![(Key::Line(INK), "edge of a triangle".into())] }],
         notes: "Stronger lines are the sides of load modules, where there is room to tell them apart.".into(),
     };
-    sheet.around(&map, &plan)
+    Drawing { sheet, map, plan }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::scene::SceneLimits;
+    use super::*;
+    use crate::samples;
+
+    #[test]
+    fn triangles_smaller_than_pixels_are_counted_and_not_drawn() {
+        let modules = samples::modules();
+        let limits = SceneLimits { count: "triangles".into(), ..SceneLimits::default() };
+        let scene = samples::scene(&modules, &limits);
+        assert!(wireframe(&scene, 300).sheet.title.ends_with("wireframe"));
+        let drawing = wireframe(&scene, 9);
+        assert!(drawing.sheet.title.ends_with("triangles per load module"), "{}", drawing.sheet.title);
+        assert!(drawing.sheet.notes.contains("--modules"));
+    }
 }

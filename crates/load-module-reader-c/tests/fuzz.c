@@ -1,0 +1,513 @@
+/*
+ * Asks the C interface everything, with hostile arguments, about load-module files that were damaged on purpose.
+ *
+ *     fuzz SEEDS WORK FIRST SECONDS [LAST]   files of SEEDS, damaged by the random numbers of FIRST, FIRST + 1, ...
+ *     fuzz FINDINGS WORK                     every file of FINDINGS as it is: what was found once, or made by hand
+ *
+ * Most damaged files have their checksums made right again, so that what lies behind them is reached. A round that
+ * ends the process, takes longer than a few seconds, or breaks a promise of the header, prints its number; with this
+ * number as FIRST and LAST it is repeated, and its files lie in WORK/modules. scripts/fuzz_c.sh builds and runs this.
+ */
+#include "load_module_reader.h"
+
+#include <dirent.h>
+#include <math.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <time.h>
+#include <unistd.h>
+
+enum { SEEDS_MAX = 64, FILES_MAX = 3, FILE_BYTES = 1 << 20, ROUND_SECONDS = 20, ASKED = 24 };
+
+typedef struct {
+    char name[256];
+    unsigned char *bytes;
+    size_t length;
+} Seed;
+
+static Seed seeds[SEEDS_MAX];
+static size_t seed_count = 0;
+static const char *work;
+static volatile unsigned long long round_now = 0;
+static unsigned long long loaded_count = 0, opened_count = 0;
+
+/* ---- Ending: always with the number of the round. */
+
+static void say_round(void) {
+    char text[64];
+    int length = snprintf(text, sizeof text, "\nround %llu\n", round_now);
+    if (write(2, text, (size_t)length) < 0) _exit(4);
+}
+
+static void ended(int signal_number) {
+    say_round();
+    signal(signal_number, SIG_DFL);
+    raise(signal_number);
+}
+
+#if defined(__SANITIZE_ADDRESS__)
+void __asan_set_death_callback(void (*callback)(void));
+#endif
+
+static void fail(const char *what) {
+    fprintf(stderr, "not so: %s\n", what);
+    abort();
+}
+
+static void expect(int holds, const char *what) {
+    if (!holds) fail(what);
+}
+
+/* ---- Random numbers: SplitMix64. */
+
+static uint64_t state;
+
+static uint64_t draw(void) {
+    uint64_t z = (state += 0x9e3779b97f4a7c15u);
+    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
+    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
+    return z ^ (z >> 31);
+}
+
+static uint64_t below(uint64_t bound) { return bound ? draw() % bound : 0; }
+
+/* ---- Little-endian numbers and checksums. */
+
+static uint32_t word(const unsigned char *at) {
+    return (uint32_t)at[0] | (uint32_t)at[1] << 8 | (uint32_t)at[2] << 16 | (uint32_t)at[3] << 24;
+}
+
+static void put(unsigned char *at, uint64_t value, int bytes) {
+    for (int i = 0; i < bytes; i++) at[i] = (unsigned char)(value >> (8 * i));
+}
+
+static void put_double(unsigned char *at, double value) {
+    uint64_t bits;
+    memcpy(&bits, &value, sizeof bits);
+    put(at, bits, 8);
+}
+
+static uint32_t crc32(const unsigned char *bytes, size_t length) {
+    static uint32_t table[256];
+    if (!table[1]) {
+        for (uint32_t i = 0; i < 256; i++) {
+            uint32_t sum = i;
+            for (int bit = 0; bit < 8; bit++) sum = sum & 1 ? sum >> 1 ^ 0xedb88320u : sum >> 1;
+            table[i] = sum;
+        }
+    }
+    uint32_t sum = UINT32_MAX;
+    for (size_t i = 0; i < length; i++) sum = table[(sum ^ bytes[i]) & 0xff] ^ sum >> 8;
+    return ~sum;
+}
+
+static void seal(unsigned char *file, size_t length, uint64_t from, uint64_t bytes) {
+    if (from > length || bytes > length - from || bytes < 4) return;
+    put(file + from + bytes - 4, crc32(file + from, (size_t)bytes - 4), 4);
+}
+
+/* Load modules times levels, as the header says. */
+static uint64_t entries_of(const unsigned char *file) {
+    uint64_t rows = word(file + 44) - (uint64_t)word(file + 40), cols = word(file + 52) - (uint64_t)word(file + 48);
+    uint64_t levels = (uint64_t)file[10] | (uint64_t)file[11] << 8;
+    if (rows > 4096 || cols > 4096 || levels > 64) return 0;
+    return rows * cols * levels;
+}
+
+static void seal_all(unsigned char *file, size_t length) {
+    if (length < 124) return;
+    uint64_t header = word(file + 12), entries = entries_of(file);
+    seal(file, length, 0, header);
+    seal(file, length, header, 32 * entries + 4);
+    for (uint64_t i = 0; i < entries && header + 32 * i + 32 <= length; i++) {
+        const unsigned char *entry = file + header + 32 * i;
+        seal(file, length, word(entry) | (uint64_t)word(entry + 4) << 32, word(entry + 8));
+    }
+}
+
+/* ---- Damage. */
+
+static uint64_t odd_number(uint64_t now) {
+    static const uint64_t odd[] = {0, 1, 2, 3, 7, 8, 9, 127, 128, 255, 256, 32767, 32768, 65534, 65535, 65536, 131070,
+                                   131071, 0x7fffffff, 0x80000000u, 0xfffffffeu, 0xffffffffu, UINT64_MAX,
+                                   (uint64_t)1 << 63, (uint64_t)1 << 40, (uint64_t)1 << 30};
+    switch (below(5)) {
+        case 0: return now + 1;
+        case 1: return now - 1;
+        case 2: return draw();
+        default: return odd[below(sizeof odd / sizeof *odd)];
+    }
+}
+
+static double odd_double(void) {
+    static const double odd[] = {0, -0.0, 1, -1, 1e-320, 1e-300, 1e9, -1e9, 1e9 + 1, 1e11, 1e12, -1e12, 1e15, 1e18,
+                                 9.3e18, 1e19, 1e38, 1e150, 1e155, -1e155, 1e300, 1e305, 1e307, -1e307, 1.7e308,
+                                 -1.7e308, INFINITY, -INFINITY, NAN};
+    return odd[below(sizeof odd / sizeof *odd)];
+}
+
+static void damage_header(unsigned char *file, size_t length) {
+    static const int fields[][2] = {{8, 2},  {10, 2}, {12, 4}, {16, 8}, {24, 4}, {28, 4}, {32, 4}, {36, 4}, {40, 4},
+                                    {44, 4}, {48, 4}, {52, 4}, {56, 4}, {60, 4}, {64, 4}, {68, 4}, {72, 8}, {80, 8}, {88, 2},
+                                    {90, 2}};
+    if (length < 124) return;
+    const int *field = fields[below(sizeof fields / sizeof *fields)];
+    if (field[0] == 72 || field[0] == 80) {
+        put_double(file + field[0], odd_double());
+    } else {
+        put(file + field[0], odd_number(word(file + field[0])), field[1]);
+    }
+}
+
+/* Makes the area larger, or moves it, or changes its grid: all this may be right. */
+static void stretch(unsigned char *file, size_t length) {
+    if (length < 124) return;
+    switch (below(4)) {
+        case 0: put(file + 32, word(file + 44) + (below(2) ? below(1000) : below((uint64_t)1 << 32)), 4); break;
+        case 1: put(file + 36, word(file + 52) + (below(2) ? below(1000) : below((uint64_t)1 << 32)), 4); break;
+        case 2: put(file + 32, 1 << 20, 4), put(file + 36, 1 << 20, 4); break;
+        default: put_double(file + 72 + 8 * below(2), ((double)below(2000000001) - 1e9) * (below(2) ? 1 : 1e-3));
+    }
+}
+
+static unsigned char *entry_at(unsigned char *file, size_t length) {
+    if (length < 124) return NULL;
+    uint64_t at = word(file + 12) + 32 * below(entries_of(file));
+    return entries_of(file) && at + 32 <= length ? file + at : NULL;
+}
+
+static void damage_entry(unsigned char *file, size_t length) {
+    unsigned char *entry = entry_at(file, length);
+    if (!entry) return;
+    int field = (int)below(7);
+    if (field == 0) put(entry, odd_number(word(entry)), 8);
+    else put(entry + 4 + 4 * field, odd_number(word(entry + 4 + 4 * field)), 4);
+}
+
+/* Gives the vertices of a load module any heights, and tells the index. */
+static void shake_heights(unsigned char *file, size_t length) {
+    unsigned char *entry = entry_at(file, length);
+    if (!entry) return;
+    uint64_t at = word(entry), vertices = word(entry + 12);
+    if (word(entry + 4) || at + 56 + 8 * vertices > length) return;
+    int32_t low = INT32_MAX, high = INT32_MIN;
+    for (uint64_t i = 0; i < vertices; i++) {
+        unsigned char *z = file + at + 56 + 8 * i + 4;
+        if (below(2)) put(z, below(3) ? draw() : (draw() & 1 ? 0x7fffffff : 0x80000000u), 4);
+        int32_t height = (int32_t)word(z);
+        low = height < low ? height : low;
+        high = high < height ? height : high;
+    }
+    put(entry + 24, (uint32_t)low, 4);
+    put(entry + 28, (uint32_t)high, 4);
+}
+
+static void damage_section(unsigned char *file, size_t length) {
+    unsigned char *entry = entry_at(file, length);
+    if (!entry || word(entry + 4)) return;
+    uint64_t at = word(entry), bytes = word(entry + 8);
+    if (at > length || bytes > length - at || bytes < 64) return;
+    for (uint64_t times = 1 + below(3); times; times--) {
+        uint64_t place = at + (below(2) ? below(56) : below(bytes - 8));
+        int width = 1 << below(4);
+        put(file + place, odd_number(word(file + place)), width);
+    }
+}
+
+static size_t damage_length(unsigned char *file, size_t length) {
+    size_t cut = below(2) ? (size_t)below(length + 1) : length - (size_t)below(length < 64 ? length + 1 : 64);
+    if (below(3) == 0 && length + 4096 < FILE_BYTES) {
+        cut = length + (size_t)below(4096);
+        for (size_t i = length; i < cut; i++) file[i] = (unsigned char)draw();
+    }
+    if (below(2) && 124 <= cut) put(file + 16, cut, 8);
+    return cut;
+}
+
+static size_t damage_bytes(unsigned char *file, size_t length) {
+    for (uint64_t times = 1 + below(8); times && length; times--) file[below(length)] ^= (unsigned char)(1 << below(8));
+    if (below(4) == 0 && 16 < length) {
+        size_t from = (size_t)below(length), to = (size_t)below(length), bytes = (size_t)below(length / 4 + 1);
+        if (from + bytes <= length && to + bytes <= length) memmove(file + to, file + from, bytes);
+    }
+    return length;
+}
+
+static size_t damage(unsigned char *file, size_t length) {
+    for (uint64_t times = below(4); times; times--) {
+        switch (below(9)) {
+            case 0: damage_header(file, length); break;
+            case 1: damage_entry(file, length); break;
+            case 2: case 3: damage_section(file, length); break;
+            case 4: case 5: shake_heights(file, length); break;
+            case 6: length = damage_length(file, length); break;
+            case 7: length = damage_bytes(file, length); break;
+            default: stretch(file, length);
+        }
+    }
+    if (below(8)) seal_all(file, length);
+    return length;
+}
+
+/* ---- Questions. */
+
+static double coordinate(double origin, double length) {
+    switch (below(6)) {
+        case 0: return odd_double();
+        case 1: return origin + odd_double();
+        case 2: return origin + (double)below(3) * length / 2;
+        case 3: return origin + (double)(int64_t)draw() / 9.3e18 * 1e4;
+        default: return origin + (double)below(1000001) / 1e6 * length;
+    }
+}
+
+static void ask_sight(const lmr_ground *ground, const lmr_frame *frame, double height) {
+    double wide = frame->side_m * (frame->cols < 20 ? frame->cols : 20);
+    double high = frame->side_m * (frame->rows < 20 ? frame->rows : 20);
+    double ends[2][3];
+    for (int end = 0; end < 2; end++) {
+        ends[end][0] = coordinate(frame->east_m, wide);
+        ends[end][1] = coordinate(frame->north_m, high);
+        ends[end][2] = below(3) ? height + (double)below(2000) - 200 : odd_double();
+    }
+    if (below(8) == 0) memcpy(ends[1], ends[0], sizeof ends[0]);
+    double share = -7;
+    int sight = lmr_sight(ground, ends[0], ends[1], below(8) ? &share : NULL);
+    expect(sight == LMR_FREE || sight == LMR_HIDDEN || sight == LMR_UNKNOWN, "an answer about sight");
+    expect(share == -7 || (sight == LMR_HIDDEN && 0 <= share && share <= 1), "a share between 0 and 1");
+    for (int i = 0; i < 6; i++) {
+        if (!isfinite(ends[i / 3][i % 3])) expect(sight == LMR_UNKNOWN, "nothing is known of places that are none");
+    }
+}
+
+static void ask_places(const lmr_ground *ground, const lmr_frame *frame) {
+    double places[ASKED][2], heights[ASKED];
+    for (int i = 0; i < ASKED; i++) {
+        places[i][0] = coordinate(frame->east_m, frame->side_m * (frame->cols < 20 ? frame->cols : 20));
+        places[i][1] = coordinate(frame->north_m, frame->side_m * (frame->rows < 20 ? frame->rows : 20));
+    }
+    expect(lmr_heights(ground, (const double (*)[2])places, heights, ASKED) == 1, "heights");
+    double last = 0;
+    for (int i = 0; i < ASKED; i++) {
+        double height = 0;
+        lmr_sample sample;
+        int found = lmr_height(ground, places[i][0], places[i][1], &height);
+        expect(found ? height == heights[i] && fabs(height) <= 16777216.01 : isnan(heights[i]), "one height as many");
+        expect(lmr_sample_at(ground, places[i][0], places[i][1], &sample) == found, "a sample where there is a height");
+        if (found) {
+            const double *n = sample.normal;
+            double length = n[0] * n[0] + n[1] * n[1] + n[2] * n[2];
+            expect(sample.height_m == height && fabs(length - 1) < 1e-6 && 0 <= n[2], "a unit vector up");
+            last = height;
+        }
+        ask_sight(ground, frame, last);
+    }
+}
+
+static void draw_modules(const lmr_ground *ground, const lmr_frame *frame) {
+    size_t count = lmr_module_count(ground);
+    lmr_module module;
+    expect(!lmr_module_at(ground, count, &module) && !lmr_module_at(ground, SIZE_MAX, &module), "none behind the last");
+    volatile uint64_t sum = 0;
+    for (size_t i = 0; i < count; i++) {
+        expect(lmr_module_at(ground, i, &module) == 1, "every load module");
+        expect(module.row < frame->rows && module.col < frame->cols, "inside the area");
+        for (size_t v = 0; v < module.vertex_count; v++) {
+            expect(module.vertices[v].x <= frame->side_m * 128 && module.vertices[v].y <= frame->side_m * 128, "inside");
+            sum += (uint64_t)module.vertices[v].z;
+        }
+        for (size_t t = 0; t < module.triangle_count; t++) {
+            for (int c = 0; c < 3; c++) expect(module.triangles[t][c] < module.vertex_count, "an index of a vertex");
+            sum += module.classes[t];
+        }
+    }
+}
+
+/* Every argument that may be missing, missing: nothing is done. */
+static void ask_nothing(const lmr_area *area, lmr_ground *ground) {
+    char why[16];
+    double three[3] = {0, 0, 0}, height = 0, share;
+    const double places[1][2] = {{0, 0}};
+    lmr_frame frame;
+    lmr_sample sample;
+    lmr_module module;
+    void *odd = (char *)three + 1;
+    lmr_close(NULL);
+    lmr_unload(NULL);
+    expect(!lmr_open(NULL, 0, why, sizeof why) && !lmr_open(NULL, 0, NULL, 5) && !lmr_open("", 9, why, 0), "no area");
+    expect(!lmr_describe(NULL, &frame) && !lmr_describe(area, NULL) && !lmr_describe(area, odd), "no frame");
+    expect(!lmr_level_count(NULL) && !lmr_module_count(NULL), "none");
+    expect(!lmr_load(NULL, 0, 0, 0, why, sizeof why) && !lmr_load(NULL, 0, 0, 0, NULL, sizeof why), "no ground");
+    expect(!lmr_load_level(NULL, 0, 0, 0, 0, why, 1) && why[0] == 0, "no ground, and an empty reason");
+    expect(!lmr_move(NULL, area, 0, 0, 0, why, sizeof why) && !lmr_move(ground, NULL, 0, 0, 0, NULL, 3), "no move");
+    expect(!lmr_height(NULL, 0, 0, &height) && !lmr_height(ground, 0, 0, NULL), "no height");
+    expect(!lmr_sample_at(NULL, 0, 0, &sample) && !lmr_sample_at(ground, 0, 0, NULL), "no sample");
+    expect(!lmr_module_at(NULL, 0, &module) && !lmr_module_at(ground, 0, NULL), "no load module");
+    expect(!lmr_heights(NULL, places, &height, 1) && !lmr_heights(ground, NULL, &height, 1), "no heights");
+    if (ground) {
+        expect(!lmr_heights(ground, places, NULL, 1) && !lmr_heights(ground, places, &height, SIZE_MAX), "no room");
+        expect(lmr_heights(ground, NULL, NULL, 0) == 1, "no heights wanted");
+        expect(lmr_sight(ground, NULL, three, &share) == LMR_INVALID, "no eye");
+        expect(lmr_sight(ground, three, NULL, &share) == LMR_INVALID, "no target");
+    }
+    expect(lmr_sight(NULL, three, three, &share) == LMR_INVALID, "no ground");
+}
+
+static uint32_t odd_reach(void) { return below(2) ? (uint32_t)below(9) : below(2) ? LMR_ALL : (uint32_t)odd_number(0); }
+
+static void ask_area(const lmr_area *area, const lmr_area *other) {
+    char why[300];
+    lmr_frame frame;
+    opened_count++;
+    expect(lmr_describe(area, &frame) == 1 && frame.rows && frame.cols && 0 < frame.side_m, "a frame");
+    expect(isfinite(frame.east_m) && isfinite(frame.north_m), "a corner");
+    uint32_t levels = lmr_level_count(area);
+    expect(1 <= levels && levels <= 8, "levels");
+    uint32_t level = below(4) ? (uint32_t)below(levels) : (uint32_t)odd_number(levels);
+    double wide = frame.side_m * frame.cols, high = frame.side_m * frame.rows;
+    lmr_ground *ground = lmr_load_level(area, coordinate(frame.east_m, wide), coordinate(frame.north_m, high),
+                                        odd_reach(), level, why, below(4) ? sizeof why : (size_t)below(20));
+    if (below(2) || !ground) {
+        lmr_unload(ground);
+        ground = lmr_load(area, frame.east_m, frame.north_m, below(2) ? LMR_ALL : 3, why, sizeof why);
+    }
+    ask_nothing(area, ground);
+    for (int moves = 0; ground && moves < 4; moves++) {
+        loaded_count += lmr_module_count(ground);
+        ask_places(ground, &frame);
+        draw_modules(ground, &frame);
+        size_t before = lmr_module_count(ground);
+        if (!lmr_move(ground, other && below(4) == 0 ? other : area, coordinate(frame.east_m, wide),
+                      coordinate(frame.north_m, high), odd_reach(), why, sizeof why)) {
+            expect(lmr_module_count(ground) == before && 0 < strlen(why), "the ground as it was, and a reason");
+        }
+    }
+    lmr_unload(ground);
+}
+
+/* ---- Files. */
+
+static void write_file(const char *path, const unsigned char *bytes, size_t length) {
+    FILE *file = fopen(path, "wb");
+    if (!file || fwrite(bytes, 1, length, file) != length || fclose(file)) {
+        perror(path);
+        exit(2);
+    }
+}
+
+static int by_name(const void *a, const void *b) { return strcmp(((const Seed *)a)->name, ((const Seed *)b)->name); }
+
+static void read_seeds(const char *folder) {
+    DIR *dir = opendir(folder);
+    if (!dir) {
+        perror(folder);
+        exit(2);
+    }
+    for (struct dirent *entry; (entry = readdir(dir)) && seed_count < SEEDS_MAX;) {
+        char path[1024];
+        struct stat stat_of;
+        snprintf(path, sizeof path, "%s/%s", folder, entry->d_name);
+        if (!strstr(entry->d_name, ".slm") || stat(path, &stat_of) || FILE_BYTES / 2 < stat_of.st_size) continue;
+        Seed *seed = &seeds[seed_count++];
+        snprintf(seed->name, sizeof seed->name, "%s", entry->d_name);
+        seed->length = (size_t)stat_of.st_size;
+        seed->bytes = malloc(seed->length + 1);
+        FILE *file = fopen(path, "rb");
+        if (!seed->bytes || !file || fread(seed->bytes, 1, seed->length, file) != seed->length) exit(2);
+        fclose(file);
+    }
+    closedir(dir);
+    qsort(seeds, seed_count, sizeof *seeds, by_name);
+    if (!seed_count) {
+        fprintf(stderr, "%s: found no .slm files\n", folder);
+        exit(2);
+    }
+}
+
+static lmr_area *open_work(void) {
+    char why[300];
+    lmr_area *area = lmr_open(work, (int)below(3), why, sizeof why);
+    expect(area || strlen(why), "an area or a reason");
+    return area;
+}
+
+static void ask_work(void) {
+    lmr_area *area = open_work();
+    lmr_area *other = area && below(4) == 0 ? open_work() : NULL;
+    if (area) ask_area(area, other);
+    else ask_nothing(NULL, NULL);
+    lmr_close(other);
+    lmr_close(area);
+}
+
+/* The place of a file of a round; those that a round does not need are removed. */
+static void path_of(char *path, size_t size, int place) { snprintf(path, size, "%s/modules/%d.slm", work, place); }
+
+static void run_round(unsigned long long number) {
+    static unsigned char file[FILE_BYTES + 16];
+    state = number * 0x2545f4914f6cdd1du + 1;
+    int files = below(4) ? 1 : 1 + (int)below(FILES_MAX);
+    size_t base = (size_t)below(seed_count);
+    for (int place = 0; place < FILES_MAX; place++) {
+        char path[1024];
+        path_of(path, sizeof path, place);
+        if (files <= place) {
+            remove(path);
+            continue;
+        }
+        const Seed *seed = &seeds[place && below(4) == 0 ? below(seed_count) : (base + (size_t)place) % seed_count];
+        memcpy(file, seed->bytes, seed->length);
+        write_file(path, file, damage(file, seed->length));
+    }
+    alarm(ROUND_SECONDS);
+    ask_work();
+    alarm(0);
+}
+
+static void replay(void) {
+    for (size_t i = 0; i < seed_count; i++) {
+        char path[1024];
+        for (int place = 0; place < FILES_MAX; place++) {
+            path_of(path, sizeof path, place);
+            remove(path);
+        }
+        path_of(path, sizeof path, 0);
+        write_file(path, seeds[i].bytes, seeds[i].length);
+        for (round_now = 0; round_now < 40; round_now++) {
+            state = round_now;
+            alarm(ROUND_SECONDS);
+            ask_work();
+            alarm(0);
+        }
+    }
+    printf("%zu files asked, %llu opened, %llu load modules\n", seed_count, opened_count, loaded_count);
+}
+
+int main(int argc, char **argv) {
+    if (argc != 3 && argc != 5 && argc != 6) return 2;
+    signal(SIGALRM, ended);
+    signal(SIGABRT, ended);
+#if defined(__SANITIZE_ADDRESS__)
+    __asan_set_death_callback(say_round);
+#endif
+    work = argv[2];
+    char modules[1024];
+    snprintf(modules, sizeof modules, "%s/modules", work);
+    mkdir(work, 0777);
+    mkdir(modules, 0777);
+    read_seeds(argv[1]);
+    if (argc == 3) {
+        replay();
+        return 0;
+    }
+    unsigned long long first = strtoull(argv[3], NULL, 10);
+    unsigned long long last = argc == 6 ? strtoull(argv[5], NULL, 10) : UINT64_MAX;
+    time_t end = time(NULL) + (time_t)strtoll(argv[4], NULL, 10);
+    for (round_now = first; round_now <= last && time(NULL) < end; round_now++) run_round(round_now);
+    printf("%llu rounds from %llu: %llu times opened, %llu load modules asked\n", round_now - first, first,
+           opened_count, loaded_count);
+    return 0;
+}
