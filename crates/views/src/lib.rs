@@ -14,9 +14,9 @@ mod page;
 pub use page::{Advice, Page, PageSetting, advise, report_html};
 mod picture;
 pub use picture::{
-    Camera, Color, Drawn, Eye, Facets, Image, Look, Map, NO_RESIDUAL, Panel, RESIDUAL_SCALE_M, Scene, SceneGround,
-    SceneLimits, SceneTile, Shown, Sight, Style, Surface, draw_errors, draw_map, draw_module_limits, draw_panels,
-    draw_perspective, draw_sight, draw_wireframe, palette,
+    Camera, Color, Cover, Drawn, Eye, Facets, Image, Look, Map, NO_RESIDUAL, Panel, RESIDUAL_SCALE_M, Scene,
+    SceneGround, SceneLimits, SceneTile, Shown, Sight, Style, Surface, draw_errors, draw_map, draw_module_limits,
+    draw_panels, draw_perspective, draw_sight, draw_wireframe, palette,
 };
 mod table;
 pub use table::{Align, Table, grouped};

@@ -11,8 +11,8 @@ use terrain::{ModuleId, ModuleRect};
 
 use super::place_text;
 use crate::picture::{
-    Drawing, Image, Key, Legend, Map, NO_RESIDUAL, RESIDUAL_SCALE_M, Scene, SceneGround, Shown, drawings, hex,
-    length_text, module_pictures, round_length,
+    Drawing, GREY, Image, Key, Legend, Map, NO_RESIDUAL, NOTHING, RESIDUAL_SCALE_M, Scene, SceneGround, Shown,
+    drawings, hex, length_text, module_pictures, round_length,
 };
 
 /// Pixels along the longer side of a map.
@@ -154,6 +154,10 @@ fn key_style(key: Key) -> String {
     match key {
         Key::Filled(color) | Key::Crossed(color) => format!("background:{}", hex(color)),
         Key::Framed(color) => format!("border:3px solid {}", hex(color)),
+        Key::Hatched => {
+            let (line, ground) = (hex(GREY), hex(NOTHING));
+            format!("background:repeating-linear-gradient(135deg,{ground} 0 3px,{line} 3px 5px)")
+        }
         Key::Line(color) => format!("height:2px;background:{}", hex(color)),
     }
 }

@@ -5,7 +5,7 @@ use maud::{Markup, html};
 
 use super::advise;
 use super::maps::Marks;
-use crate::report::border_in_words;
+use crate::report::{border_in_words, heights_in_words};
 use crate::table::grouped;
 
 /// Rows of a long list that the page shows; the files beside it have them all.
@@ -150,7 +150,12 @@ pub(super) fn residuals(report: &Report) -> Markup {
                 th.n { "mean" } th.n { "95 %" } th.n { "99 %" } }, html! {
             @for class in &report.classes {
                 @if class.posts == 0 {
-                    tr { td { (&class.name) } td.n { "-" } td.n { (grouped(class.points)) } @for _ in 0..5 { td.n { "-" } } }
+                    tr {
+                        td { (&class.name) }
+                        td.n { "-" }
+                        td.n { (grouped(class.points)) }
+                        @for _ in 0..5 { td.n { "-" } }
+                    }
                 } @else {
                     (row(&class.name, grouped(class.posts), grouped(class.points), &class.residual))
                 }
@@ -173,6 +178,9 @@ pub(super) fn residuals(report: &Report) -> Markup {
         }
         @if let Some(border) = &report.border {
             p.quiet { "Load modules " (border_in_words(border)) "." }
+        }
+        @if let Some(heights) = &report.heights {
+            p.quiet { "Surface: " (heights_in_words(heights)) "." }
         }
         @if let Some(accuracy_m) = report.dem_accuracy_m {
             p.quiet { "The source states an accuracy of " (accuracy_m) " m." }

@@ -2,7 +2,9 @@
 
 use std::f64::consts::FRAC_1_SQRT_2;
 
-use terrain::{LATTICE_PER_POST, LoadModule, ModuleGrid, PostRect, QUANTA_PER_METRE, Spacing, Tin, metres_of_quanta};
+use terrain::{
+    Dem, HOLE_CLASS, LATTICE_PER_POST, LoadModule, ModuleGrid, Post, QUANTA_PER_METRE, Spacing, Tin, metres_of_quanta,
+};
 
 use super::scene::Scene;
 
@@ -18,8 +20,20 @@ pub struct Facets {
     pub(crate) extent_m: [f64; 4],
     /// Side of the squares whose lines are drawn stronger; `None` where there are none.
     pub(crate) side_m: Option<f64>,
-    /// Whether each triangle is water; empty where none is.
-    pub(crate) water: Vec<bool>,
+    /// What each triangle lies over; empty where all lie over plain ground.
+    pub(crate) covers: Vec<Cover>,
+}
+
+/// What a triangle or a post lies over.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Cover {
+    /// Ground, which is drawn by its height.
+    #[default]
+    Ground,
+    /// Water.
+    Water,
+    /// A hole: no source has a height there.
+    Hole,
 }
 
 impl Facets {
@@ -35,44 +49,51 @@ impl Facets {
             corners: tin.triangles.clone(),
             extent_m: [posts(rect.west, 0), posts(rect.south, 1), posts(rect.east, 0), posts(rect.north, 1)],
             side_m: None,
-            water: Vec::new(),
+            covers: Vec::new(),
         }
     }
 
     /// Those of a scene.
     pub(crate) fn of_scene(scene: &Scene) -> Self {
-        Self::of_modules(scene.modules, scene.grid, scene.frame.spacing).with_water(scene.modules, scene.water)
+        Self::of_modules(scene.modules, scene.grid, scene.frame.spacing).with_covers(scene.modules, scene.water)
     }
 
-    /// The facets of these load modules, told which of them are water: those of a class.
-    pub(crate) fn with_water<'a>(
+    /// The facets of these load modules, told which of them lie over holes and which over water: those of a class.
+    pub(crate) fn with_covers<'a>(
         mut self,
         modules: impl IntoIterator<Item = &'a LoadModule>,
-        class: Option<u8>,
+        water: Option<u8>,
     ) -> Self {
-        if let Some(class) = class {
-            self.water = modules.into_iter().flat_map(|module| &module.classes).map(|&of| of == class).collect();
-        }
+        let cover = |&class: &u8| match class {
+            HOLE_CLASS => Cover::Hole,
+            class if Some(class) == water => Cover::Water,
+            _ => Cover::Ground,
+        };
+        self.covers = modules.into_iter().flat_map(|module| &module.classes).map(cover).collect();
         self
     }
 
-    /// Whether a triangle is water.
-    pub(crate) fn is_water(&self, triangle: usize) -> bool {
-        self.water.get(triangle).is_some_and(|&is_water| is_water)
+    /// What a triangle lies over.
+    pub(crate) fn cover(&self, triangle: usize) -> Cover {
+        self.covers.get(triangle).copied().unwrap_or_default()
     }
 
-    /// Whether any triangle is.
-    pub(crate) fn has_water(&self) -> bool {
-        self.water.contains(&true)
+    /// Whether any triangle lies over such a thing.
+    pub(crate) fn has(&self, cover: Cover) -> bool {
+        self.covers.contains(&cover)
     }
 
-    /// Which posts of a rectangle lie under water, row by row from the south-west; empty when none does.
-    pub(crate) fn water_posts(&self, rect: PostRect, spacing_m: f64) -> Vec<bool> {
-        if !self.has_water() {
+    /// What the posts of a DEM lie over, row by row from the south-west; empty where all lie over plain ground.
+    pub(crate) fn post_covers(&self, dem: &Dem, spacing_m: f64) -> Vec<Cover> {
+        let rect = dem.rect();
+        if !self.has(Cover::Water) && dem.void_count() == 0 {
             return Vec::new();
         }
-        let mut posts = vec![false; rect.post_count()];
-        let triangles = self.corners.iter().enumerate().filter(|(index, _)| self.is_water(*index));
+        let posts =
+            (rect.south..=rect.north).flat_map(|row| (rect.west..=rect.east).map(move |col| Post::new(row, col)));
+        let cover = |post| if dem.is_void(post) { Cover::Hole } else { Cover::Ground };
+        let mut posts: Vec<Cover> = posts.map(cover).collect();
+        let triangles = self.corners.iter().enumerate().filter(|(index, _)| self.cover(*index) == Cover::Water);
         for (_, &corners) in triangles {
             let [a, b, c] = self.triangle(corners).map(|[x, y, _]| [x / spacing_m, y / spacing_m]);
             let left = |p: [f64; 2], q: [f64; 2], at: [f64; 2]| {
@@ -87,7 +108,7 @@ impl Facets {
                     let at = [f64::from(col), f64::from(row)];
                     if 0.0 <= left(a, b, at) && 0.0 <= left(b, c, at) && 0.0 <= left(c, a, at) {
                         let place = (row - rect.south) as usize * rect.posts_wide() + (col - rect.west) as usize;
-                        posts[place] = true;
+                        posts[place] = Cover::Water;
                     }
                 }
             }
@@ -281,17 +302,26 @@ mod tests {
     }
 
     #[test]
-    fn posts_under_water_are_those_of_its_class_and_no_others() {
+    fn posts_under_water_are_those_of_its_class_and_holes_those_without_a_height() {
         let mut modules = samples::modules();
         modules[1].classes = vec![3; 4];
         let facets = Facets::of_modules(&modules, samples::GRID, samples::spacing());
         let area = samples::GRID.area();
-        assert!(facets.clone().with_water(&modules, None).water_posts(area, 25.0).is_empty());
-        assert!(facets.clone().with_water(&modules, Some(9)).water_posts(area, 25.0).is_empty());
-        let posts = facets.with_water(&modules, Some(3)).water_posts(area, 25.0);
-        let wet = |row: usize, col: usize| posts[row * area.posts_wide() + col];
+        let sound = Dem::from_fn(area, |_| Some(0));
+        assert!(facets.clone().with_covers(&modules, None).post_covers(&sound, 25.0).is_empty());
+        assert!(facets.clone().with_covers(&modules, Some(9)).post_covers(&sound, 25.0).is_empty());
+        let facets = facets.with_covers(&modules, Some(3));
+        let posts = facets.post_covers(&sound, 25.0);
+        let wet = |row: usize, col: usize| posts[row * area.posts_wide() + col] == Cover::Water;
         assert!(wet(10, 30) && wet(0, 20) && wet(20, 40) && !wet(10, 19) && !wet(21, 30));
-        assert_eq!(posts.iter().filter(|wet| **wet).count(), 21 * 21);
+        assert_eq!(posts.iter().filter(|cover| **cover == Cover::Water).count(), 21 * 21);
+        let holed = Dem::from_fn(area, |post| (post.row != 30).then_some(0));
+        let posts = facets.post_covers(&holed, 25.0);
+        assert_eq!(posts.iter().filter(|cover| **cover == Cover::Hole).count(), area.posts_wide());
+        modules[0].classes[2] = HOLE_CLASS;
+        let facets = Facets::of_modules(&modules, samples::GRID, samples::spacing()).with_covers(&modules, None);
+        assert_eq!(facets.covers.iter().filter(|cover| **cover != Cover::Ground).count(), 1);
+        assert_eq!(facets.cover(2), Cover::Hole);
     }
 
     #[test]

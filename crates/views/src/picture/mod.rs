@@ -28,10 +28,10 @@ mod wireframe;
 
 pub use camera::Camera;
 pub(crate) use closeup::module_pictures;
-pub(crate) use color::hex;
 pub use color::{Color, palette};
+pub(crate) use color::{GREY, NOTHING, hex};
 pub use errors::{draw_errors, draw_module_limits};
-pub use facets::Facets;
+pub use facets::{Cover, Facets};
 pub use image::Image;
 pub use panels::{Panel, Style, draw_panels};
 pub use perspective::{Drawn, Look, Surface, draw_perspective, draw_wireframe};

@@ -1,11 +1,11 @@
 //! Pictures of several surfaces from one eye, side by side under one title.
 
 use super::camera::Camera;
-use super::color::{GREY, INK, WHITE};
+use super::color::{GREY, INK, NOTHING, WHITE};
 use super::image::Image;
 use super::perspective::{Drawn, Look, Surface, draw_perspective, draw_wireframe};
 use super::relief::Tints;
-use super::sheet::draw_scale;
+use super::sheet::{Key, draw_scale};
 use super::text::{Anchor, Font, fitted, wrapped, write};
 
 /// How surfaces are drawn.
@@ -50,8 +50,11 @@ pub fn draw_panels(title: &str, eye: &str, panels: &[Panel], style: Style, look:
     let whole = GAP + panels.len() as i64 * (wide + GAP) + LEGEND_WIDE;
     let top = GAP + Font::Title.line() + GAP / 2 + Font::Bold.line();
     let notes = wrapped(&notes(eye, look), Font::Plain, whole - 2 * GAP);
-    let has_water = panels.iter().any(|panel| panel.surface.has_water());
-    let tints = if style == Style::Shaded { Tints::new(look.range_m).legends(has_water) } else { Default::default() };
+    let has = |cover| panels.iter().any(|panel| panel.surface.has(cover));
+    let tints = match style {
+        Style::Shaded => Tints::new(look.range_m).legends(has, Key::Filled(NOTHING)),
+        Style::Wireframe => Default::default(),
+    };
     let body = high.max(ABOVE_TINTS + tints.iter().map(|legend| legend.high() + GAP).sum::<i64>()) + GAP;
     let mut image =
         Image::new(whole as usize, (top + body + notes.len() as i64 * Font::Plain.line() + GAP) as usize, WHITE);

@@ -6,18 +6,18 @@
 use terrain::{Dem, metres_of_quanta};
 
 use super::camera::{Camera, View};
-use super::color::{Color, GREY, HAZE, INK, SKY, WATER, WHITE, lit, mix};
+use super::color::{Color, GREY, HAZE, INK, NOTHING, SKY, WATER, WHITE, lit, mix};
 use super::depth::{Corner, DepthImage};
-use super::facets::{Facets, light_of_triangle};
+use super::facets::{Cover, Facets, light_of_triangle};
 use super::image::Image;
 use super::relief::{Tints, lights, range_m};
 
 /// What stands in a picture.
 #[derive(Clone, Copy, Debug)]
 pub enum Surface<'a> {
-    /// Every post of a DEM, so many metres apart west to east and south to north, and which of them lie under water,
-    /// row by row from the south-west; empty where none does.
-    Posts(&'a Dem, [f64; 2], &'a [bool]),
+    /// Every post of a DEM, so many metres apart west to east and south to north, and what each lies over, row by row
+    /// from the south-west; empty where all lie over plain ground.
+    Posts(&'a Dem, [f64; 2], &'a [Cover]),
     /// Triangles of a TIN or of load modules.
     Triangles(&'a Facets),
 }
@@ -72,11 +72,11 @@ impl Surface<'_> {
         }
     }
 
-    /// Whether any of it is water.
-    pub(crate) fn has_water(&self) -> bool {
+    /// Whether any of it lies over such a thing.
+    pub(crate) fn has(&self, cover: Cover) -> bool {
         match self {
-            Surface::Triangles(facets) => facets.has_water(),
-            Surface::Posts(.., water) => water.contains(&true),
+            Surface::Triangles(facets) => facets.has(cover),
+            Surface::Posts(.., covers) => covers.contains(&cover),
         }
     }
 
@@ -95,7 +95,11 @@ pub fn draw_perspective(surface: &Surface, look: &Look) -> Drawn {
     let mut stage = Stage::new(surface, look, true);
     let half_m = stage.haze_half_m;
     let color = |[height_m, light]: [f64; 2], ahead: f64| {
-        let color = if light < 0.0 { WATER } else { lit(tints.at(height_m), light as f32) };
+        let color = match light {
+            WATER_LIGHT => WATER,
+            HOLE_LIGHT => NOTHING,
+            _ => lit(tints.at(height_m), light as f32),
+        };
         mix(color, HAZE, haze_share(ahead, half_m))
     };
     stage.draw(surface, look.times, &color);
@@ -137,8 +141,9 @@ struct Stage {
 
 /// Cells along a side of a block of posts that is drawn at one step.
 const BLOCK: i32 = 64;
-/// Stands for the light on water, which has one colour however it lies.
+/// Stand for the light on water and on holes, which have one colour however they lie.
 const WATER_LIGHT: f64 = -1.0;
+const HOLE_LIGHT: f64 = -2.0;
 /// Samples that a step of posts may cover: finer ones are not seen.
 const STEP_SAMPLES: f64 = 2.0;
 
@@ -174,9 +179,10 @@ impl Stage {
                 let turned: Vec<[f64; 3]> =
                     facets.vertices.iter().map(|&[x, y, z]| view.turned([x, y, z * times])).collect();
                 for (index, &corners) in facets.corners.iter().enumerate() {
-                    let light = match facets.is_water(index) {
-                        true => WATER_LIGHT,
-                        false => f64::from(light_of_triangle(facets.triangle(corners), times)),
+                    let light = match facets.cover(index) {
+                        Cover::Water => WATER_LIGHT,
+                        Cover::Hole => HOLE_LIGHT,
+                        Cover::Ground => f64::from(light_of_triangle(facets.triangle(corners), times)),
                     };
                     let corner = |v: u32| {
                         let values = [facets.vertices[v as usize][2], light];
@@ -185,9 +191,9 @@ impl Stage {
                     self.depth.triangle(&view, corners.map(corner), color);
                 }
             }
-            Surface::Posts(dem, spacing_m, water) => {
+            Surface::Posts(dem, spacing_m, covers) => {
                 let lights = lights(dem, *spacing_m, times);
-                self.draw_posts(&LitPosts { dem, spacing_m: *spacing_m, times, lights, water }, color);
+                self.draw_posts(&LitPosts { dem, spacing_m: *spacing_m, times, lights, covers }, color);
             }
         }
     }
@@ -248,8 +254,13 @@ impl Stage {
             let above: Vec<Corner> = cols.iter().map(|&col| corner(row, col)).collect();
             for i in 1..cols.len() {
                 let mut cell = [below[i - 1], below[i], above[i], above[i - 1]];
-                if posts.is_water(row, cols[i]) {
-                    cell.iter_mut().for_each(|corner| corner.values[1] = WATER_LIGHT);
+                let light = match posts.cover(row, cols[i]) {
+                    Cover::Ground => None,
+                    Cover::Water => Some(WATER_LIGHT),
+                    Cover::Hole => Some(HOLE_LIGHT),
+                };
+                if let Some(light) = light {
+                    cell.iter_mut().for_each(|corner| corner.values[1] = light);
                 }
                 let [a, b, c, d] = cell;
                 self.depth.triangle(&view, [a, b, c], color);
@@ -359,14 +370,14 @@ struct LitPosts<'a> {
     spacing_m: [f64; 2],
     times: f64,
     lights: Vec<f32>,
-    water: &'a [bool],
+    covers: &'a [Cover],
 }
 
 impl LitPosts<'_> {
-    fn is_water(&self, row: i32, col: i32) -> bool {
+    fn cover(&self, row: i32, col: i32) -> Cover {
         let rect = self.dem.rect();
         let place = (row - rect.south) as usize * rect.posts_wide() + (col - rect.west) as usize;
-        self.water.get(place).is_some_and(|&is_water| is_water)
+        self.covers.get(place).copied().unwrap_or_default()
     }
 
     /// A post with heights as they are drawn.

@@ -2,12 +2,12 @@
 
 use terrain::{Dem, metres_of_quanta};
 
-use super::color::{Color, HEIGHTS, NOTHING, WATER, lit};
-use super::facets::{Facets, light_of, light_of_triangle};
+use super::color::{Color, GREY, HEIGHTS, NOTHING, WATER, lit};
+use super::facets::{Cover, Facets, light_of, light_of_triangle};
 use super::image::Image;
-use super::plan::{Plan, Posts, Samples};
+use super::plan::{Plan, Posts, SAMPLES, Samples};
 use super::scene::Scene;
-use super::sheet::{Drawing, Key, Legend, Sheet, round_marks};
+use super::sheet::{Drawing, HATCH_PIXELS, Key, Legend, Sheet, round_marks};
 use crate::table::grouped;
 
 /// Heights in the shading are drawn so many times as large as they are, so that plains show their form.
@@ -39,10 +39,13 @@ impl Tints {
         Legend::Ramp { title: "Height".into(), ramp: HEIGHTS, marks }
     }
 
-    /// What a surface has: heights, and water where there is any.
-    pub fn legends(&self, has_water: bool) -> Vec<Legend> {
-        let water = Legend::Keys { title: String::new(), keys: vec![(Key::Filled(WATER), "water".into())] };
-        [Some(self.legend()), has_water.then_some(water)].into_iter().flatten().collect()
+    /// What a surface has: heights, and water and holes where `has` says that there are any. Holes look as `hole`.
+    pub fn legends(&self, has: impl Fn(Cover) -> bool, hole: Key) -> Vec<Legend> {
+        let keys = [(Cover::Water, Key::Filled(WATER), "water"), (Cover::Hole, hole, "hole: no height")];
+        let keys: Vec<_> =
+            keys.into_iter().filter(|key| has(key.0)).map(|(_, key, name)| (key, name.to_owned())).collect();
+        let keys = (!keys.is_empty()).then_some(Legend::Keys { title: String::new(), keys });
+        [Some(self.legend()), keys].into_iter().flatten().collect()
     }
 }
 
@@ -62,18 +65,20 @@ pub(crate) fn facets_relief(facets: &Facets, plan: &Plan, tints: &Tints) -> Imag
     let mut samples = Samples::new(plan);
     for (index, &corners) in facets.corners.iter().enumerate() {
         let corners = facets.triangle(corners);
-        let light = light_of_triangle(corners, SHADING_TIMES);
-        if facets.is_water(index) {
-            plan.cover(corners, |row, col, _| samples.add(row, col, WATER));
-            continue;
+        match facets.cover(index) {
+            Cover::Water => plan.cover(corners, |row, col, _| samples.add(row, col, WATER)),
+            Cover::Hole => plan.cover(corners, |row, col, _| samples.add(row, col, hatched(row, col))),
+            Cover::Ground => {
+                let light = light_of_triangle(corners, SHADING_TIMES);
+                plan.cover(corners, |row, col, height_m| samples.add(row, col, lit(tints.at(height_m), light)));
+            }
         }
-        plan.cover(corners, |row, col, height_m| samples.add(row, col, lit(tints.at(height_m), light)));
     }
     samples.image(NOTHING)
 }
 
-/// Relief of posts; `water` says which of them lie under water, and is empty where none does.
-pub(crate) fn posts_relief(dem: &Dem, posts: &Posts, plan: &Plan, tints: &Tints, water: &[bool]) -> Image {
+/// Relief of posts; `covers` says what each of them lies over, and is empty where all lie over plain ground.
+pub(crate) fn posts_relief(dem: &Dem, posts: &Posts, plan: &Plan, tints: &Tints, covers: &[Cover]) -> Image {
     let (wide, lights) = (dem.rect().posts_wide(), lights(dem, posts.spacing_m, SHADING_TIMES));
     let rect = dem.rect();
     let heights: Vec<f32> = (rect.south..=rect.north)
@@ -82,15 +87,23 @@ pub(crate) fn posts_relief(dem: &Dem, posts: &Posts, plan: &Plan, tints: &Tints,
     let mut samples = Samples::new(plan);
     posts.sample(plan, |between| {
         let nearest = between.post + usize::from(0.5 < between.share[0]) + usize::from(0.5 < between.share[1]) * wide;
-        if water.get(nearest).is_some_and(|&is_water| is_water) {
-            samples.add(between.sample[0], between.sample[1], WATER);
-            return;
-        }
-        let height_m = f64::from(between.blend(wide, |post| heights[post]));
-        let light = between.blend(wide, |post| lights[post]);
-        samples.add(between.sample[0], between.sample[1], lit(tints.at(height_m), light));
+        let [row, col] = between.sample;
+        let color = match covers.get(nearest).copied().unwrap_or_default() {
+            Cover::Water => WATER,
+            Cover::Hole => hatched(row, col),
+            Cover::Ground => {
+                let height_m = f64::from(between.blend(wide, |post| heights[post]));
+                lit(tints.at(height_m), between.blend(wide, |post| lights[post]))
+            }
+        };
+        samples.add(row, col, color);
     });
     samples.image(NOTHING)
+}
+
+/// The colour of a hole at a sample of a map: lines from south-west to north-east.
+fn hatched(row: usize, col: usize) -> Color {
+    if (row + col) / SAMPLES % HATCH_PIXELS < 2 { GREY } else { NOTHING }
 }
 
 /// How light every post is, row by row from the south-west, with heights drawn `times` as large.
@@ -128,7 +141,7 @@ pub(crate) fn relief(scene: &Scene, shown: Shown, longest: usize) -> Vec<Drawing
         title: format!("{}: {title}", scene.name),
         subtitle: format!("{}, {detail}", scene.what()),
         coordinates: scene.coordinates(),
-        legends: tints.legends(facets.has_water()),
+        legends: tints.legends(|cover| facets.has(cover), Key::Hatched),
         notes: format!(
             "Light from several directions, most of it from the north-west; heights count {SHADING_TIMES} times in \
              the shading."
@@ -142,8 +155,8 @@ pub(crate) fn relief(scene: &Scene, shown: Shown, longest: usize) -> Vec<Drawing
     let dem = || {
         let ground = scene.ground.expect("whoever asks for the ground has it");
         let detail = format!("posts {} m apart", scene.frame.spacing.metres());
-        let water = facets.water_posts(ground.dem.rect(), scene.frame.spacing.metres());
-        let map = posts_relief(ground.dem, &scene.posts(&ground), &plan, &tints, &water);
+        let covers = facets.post_covers(ground.dem, scene.frame.spacing.metres());
+        let map = posts_relief(ground.dem, &scene.posts(&ground), &plan, &tints, &covers);
         Drawing { sheet: sheet("relief of the DEM", detail), map, plan }
     };
     match shown {

@@ -11,7 +11,7 @@
 //!   notes
 //! ```
 
-use super::color::{Color, GREY, INK, Ramp, WHITE};
+use super::color::{Color, GREY, INK, NOTHING, Ramp, WHITE};
 use super::image::Image;
 use super::plan::Plan;
 use super::text::{Anchor, Font, fitted, wrapped, write};
@@ -39,6 +39,9 @@ pub(crate) enum Legend {
     Lines { title: String, lines: Vec<String> },
 }
 
+/// Pixels from one line of a hatched face to the next.
+pub(crate) const HATCH_PIXELS: usize = 7;
+
 /// How a thing looks on the map.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Key {
@@ -48,6 +51,8 @@ pub(crate) enum Key {
     Framed(Color),
     /// Filled, with a cross over it.
     Crossed(Color),
+    /// Hatched, as holes are.
+    Hatched,
     /// A line.
     Line(Color),
 }
@@ -190,6 +195,15 @@ impl Key {
             }
             Key::Framed(color) => image.outline(rect, 3, color),
             Key::Crossed(color) => draw_crossed(image, rect, color),
+            Key::Hatched => {
+                image.fill(rect, NOTHING);
+                for at in (0..wide + high).step_by(HATCH_PIXELS) {
+                    let (from, to) = ((at - high).max(0), at.min(wide));
+                    let end = |across: i64| [(left + across) as f64, (top + at - across) as f64];
+                    image.line(end(from), end(to), 2.0, GREY);
+                }
+                image.outline(rect, 1, GREY);
+            }
             Key::Line(color) => image.line([left as f64, middle], [(left + wide) as f64, middle], 2.0, color),
         }
     }

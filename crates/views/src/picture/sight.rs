@@ -46,14 +46,14 @@ const PITCH: f64 = -2.0;
 /// When the ground is asked for and the scene has none.
 pub fn draw_sight(scene: &Scene, shown: Shown, style: Style, sight: &Sight, wide: usize) -> Image {
     let facets = Facets::of_scene(scene);
-    let water = scene.ground.map(|ground| facets.water_posts(ground.dem.rect(), scene.frame.spacing.metres()));
+    let covers = scene.ground.map(|ground| facets.post_covers(ground.dem, scene.frame.spacing.metres()));
     let triangles = Surface::Triangles(&facets);
     let tin = || Panel { label: format!("TIN, {} triangles", grouped(facets.count() as u64)), surface: triangles };
     let dem = || {
         let dem = scene.ground.expect("whoever asks for the ground has it").dem;
         let spacing_m = scene.frame.spacing.metres();
         let label = format!("DEM, {} posts {spacing_m} m apart", grouped(dem.rect().post_count() as u64));
-        Panel { label, surface: Surface::Posts(dem, [spacing_m; 2], water.as_deref().unwrap_or_default()) }
+        Panel { label, surface: Surface::Posts(dem, [spacing_m; 2], covers.as_deref().unwrap_or_default()) }
     };
     let panels = match shown {
         Shown::Tin => vec![tin()],
