@@ -89,15 +89,28 @@ pub(crate) fn assemble_tile(
     levels[1..].iter_mut().for_each(|level| drop(fidelity::measure(level, &window.measured(area))));
     let (file, is_new) = publish(run, tile, &layout, fingerprint, &levels)?;
     let counted = count_points(run, &own.tin, &removed[area.tiling.index(tile)], &window.importance);
+    let heights = heights_of(&levels[0]);
     let (modules, coarser) = numbers_of(&levels);
     let mut done = Assembled { file, measured: FileStamp::of(&[]), modules, coarser, is_new };
-    let sums = sums(residuals, at_source, counted);
+    let sums = sums(residuals, at_source, counted, heights);
     done.measured = run.database.write_measured(&stamp, &to_measured(tile, &done, &sums))?;
     Ok((done, sums))
 }
 
-fn sums(residuals: Residuals, at_source: Option<Tally>, (points, border): (Vec<u64>, u64)) -> Sums {
-    Sums { residuals, has_source: at_source.is_some(), at_source: at_source.unwrap_or_default(), points, border }
+fn sums(
+    residuals: Residuals,
+    at_source: Option<Tally>,
+    (points, border): (Vec<u64>, u64),
+    heights: (i32, i32),
+) -> Sums {
+    let (has_source, at_source) = (at_source.is_some(), at_source.unwrap_or_default());
+    Sums { residuals, has_source, at_source, points, border, heights }
+}
+
+/// The lowest and the highest vertex of load modules, in quanta.
+fn heights_of(modules: &[LoadModule]) -> (i32, i32) {
+    let heights = modules.iter().flat_map(|module| &module.vertices).map(|vertex| vertex.z);
+    heights.fold((i32::MAX, i32::MIN), |(low, high), z| (low.min(z), high.max(z)))
 }
 
 /// What a tile's load modules and the numbers of them are made from, and by.
@@ -139,7 +152,7 @@ pub(crate) fn read_assembled(run: &Run, tins: &[Published], tile: TileId) -> Res
     let counted = count_points(run, &own.tin, &[], &window.importance);
     let measured = folder.stamp_file(&folder.measured_path(tile))?;
     let done = Assembled { file, measured, modules, coarser, is_new: false };
-    Ok((done, sums(residuals, at_source, counted)))
+    Ok((done, sums(residuals, at_source, counted, heights_of(&levels[0]))))
 }
 
 /// Numbers of the finest level, and of each of the others.

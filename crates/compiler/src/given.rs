@@ -43,6 +43,11 @@ pub(crate) struct Given {
 }
 
 impl Given {
+    /// Heights that posts are given, in quanta.
+    pub fn heights(&self) -> impl Iterator<Item = i32> {
+        self.posts.iter().filter_map(|given| given.height)
+    }
+
     /// Reads what the job names.
     ///
     /// # Errors
@@ -260,7 +265,7 @@ fn is_on_border(rect: PostRect, post: Post) -> bool {
 fn inside(polygon: &mask::Polygon, area: &GamingAreaFrame, rect: PostRect) -> Vec<bool> {
     let shape = mask::Shape::Polygons(vec![polygon.clone()]);
     let only = mask::Area { class: "inside".into(), weight: THOUSANDTHS, shape };
-    let mask = mask::Mask { default_weight: 0, areas: vec![only], smoothing: mask::Smoothing::None };
+    let mask = mask::Mask { default_weight: 0, areas: vec![only], smoothing: mask::Smoothing::None, over: Vec::new() };
     let found = mask::importance(&mask, area.rect, &area.frame, rect);
     posts(rect).map(|post| 0 < found.weight(post)).collect()
 }

@@ -166,6 +166,12 @@ impl Ground {
         Ok(Window { given, forbidden: self.given.forbidden(area.tiling.rect(tile)), ..window })
     }
 
+    /// What heights lie within: those of the sources, and what the job says itself of water and points.
+    pub fn bounds(&self) -> Option<Bounds> {
+        let told = self.relief.water.iter().flat_map(Water::levels_known).chain(self.given.heights());
+        self.relief.bounds.map(|bounds| told.fold(bounds, Bounds::and))
+    }
+
     /// The ground of one tile, made once where memory allows.
     ///
     /// # Errors

@@ -99,7 +99,8 @@ pub fn inadequate(folder: &Path, tolerance_m: Option<f64>) -> Result<Inadequate,
     let totals = &manifest.totals;
     let rms_m = (totals.residual_sum_squared as f64 / totals.residual_posts.max(1) as f64).sqrt();
     let tolerance_m = tolerance_m.unwrap_or(3.0 * rms_m / f64::from(terrain::QUANTA_PER_METRE));
-    let residual_m = weighted(modules.values(), &area, &window);
+    let heaviest = heaviest(&window.importance, job.dem.water.as_ref().map(|water| water.class));
+    let residual_m = weighted(modules.values(), &area, &window, heaviest);
     let counts: Vec<u32> = modules.values().map(|module| counted(&job, module)).collect();
     let mut refused = BTreeSet::new();
     for &tile in &area.tiles {
@@ -137,9 +138,13 @@ fn counted(job: &Job, module: &LoadModule) -> u32 {
 }
 
 /// The weighted residual of each post: as it is where the ground matters most, in proportion elsewhere.
-fn weighted<'a>(modules: impl Iterator<Item = &'a LoadModule>, area: &GamingArea, window: &Window) -> Vec<f32> {
+fn weighted<'a>(
+    modules: impl Iterator<Item = &'a LoadModule>,
+    area: &GamingArea,
+    window: &Window,
+    heaviest: f64,
+) -> Vec<f32> {
     let Window { dem, importance, .. } = window;
-    let heaviest = heaviest(importance);
     let mut all = vec![0.0; area.rect.post_count()];
     for module in modules {
         let grid = PostGrid::of_module(area.grid, module.id, area.frame.spacing);
@@ -148,7 +153,7 @@ fn weighted<'a>(modules: impl Iterator<Item = &'a LoadModule>, area: &GamingArea
             let (x, y) = (corners.map(|v| i32::from(v.x)), corners.map(|v| i32::from(v.y)));
             visit_residuals(&grid, &Facet::new(x, y, corners.map(|v| v.z)), dem, |post, residual| {
                 if !dem.is_void(post) {
-                    let share = f64::from(importance.weight(post)) / heaviest;
+                    let share = (f64::from(importance.weight(post)) / heaviest).min(1.0);
                     all[index(area.rect, post)] = (metres_of_quanta(residual.abs()) * share) as f32;
                 }
             });
@@ -157,13 +162,21 @@ fn weighted<'a>(modules: impl Iterator<Item = &'a LoadModule>, area: &GamingArea
     all
 }
 
-fn heaviest(importance: &Importance) -> f64 {
+/// The largest weight of any ground; that of water only keeps it level.
+fn heaviest(importance: &Importance, water: Option<u8>) -> f64 {
     if let Some(weight) = importance.uniform_weight() {
         return f64::from(weight.max(1));
     }
     let rect = importance.rect();
-    let rows = (rect.south..=rect.north).filter_map(|row| importance.weights_of_row(row)?.iter().max());
-    f64::from(rows.copied().max().unwrap_or(THOUSANDTHS).max(1))
+    let weight = |(&weight, &class): (&u16, &u8)| (Some(class) != water).then_some(weight);
+    let in_row = |row| -> Option<u16> {
+        let weights = importance.weights_of_row(row)?;
+        match importance.classes_of_row(row) {
+            Some(classes) => weights.iter().zip(classes).filter_map(weight).max(),
+            None => weights.iter().copied().max(),
+        }
+    };
+    f64::from((rect.south..=rect.north).filter_map(in_row).max().unwrap_or(THOUSANDTHS).max(1))
 }
 
 fn index(rect: PostRect, post: Post) -> usize {

@@ -25,6 +25,7 @@ pub(crate) fn to_measured(tile: TileId, assembled: &Assembled, sums: &Sums) -> M
         at_source: sums.has_source.then(|| to_tally(&sums.at_source)),
         points: sums.points.clone(),
         border: sums.border,
+        heights: sums.heights.into(),
     }
 }
 
@@ -54,6 +55,7 @@ pub(crate) fn sums_of(measured: Measured) -> Sums {
         has_source: measured.at_source.is_some(),
         points: measured.points,
         border: measured.border,
+        heights: measured.heights.into(),
     }
 }
 

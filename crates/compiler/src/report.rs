@@ -3,8 +3,9 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use database::{
-    Report, ReportBefore, ReportBorder, ReportBreach, ReportClass, ReportLevel, ReportPart, ReportPerModule,
-    ReportPerWindow, ReportPoints, ReportPool, ReportRefusals, ReportResidual, ReportStops, ReportVoids, Totals,
+    Report, ReportBefore, ReportBorder, ReportBreach, ReportClass, ReportHeights, ReportLevel, ReportPart,
+    ReportPerModule, ReportPerWindow, ReportPoints, ReportPool, ReportRefusals, ReportResidual, ReportStops,
+    ReportVoids, Totals,
 };
 use fidelity::{Residuals, Tally};
 use job::{Count, HOLE_CLASS_NAME};
@@ -67,6 +68,7 @@ impl Findings<'_> {
             before_removals: self.before_removals(),
             residual: residual_of(&total),
             border: self.border(),
+            heights: Some(self.heights()),
             residual_against_source: run.ground.relief.has_source_posts().then(|| self.at_source(&total)),
             classes: self.classes(residuals),
             levels: self.levels(),
@@ -189,6 +191,14 @@ impl Findings<'_> {
         };
         let inside = part(false);
         (0 < inside.posts).then(|| ReportBorder { at_border: part(true), inside })
+    }
+
+    fn heights(&self) -> ReportHeights {
+        let (low, high) = self.sums.heights;
+        let bounds = self.run.ground.bounds();
+        let outside_m = bounds.map_or(0.0, |bounds| bounds.metres_outside(low).max(bounds.metres_outside(high)));
+        let sources_m = bounds.map(|bounds| bounds.metres().into());
+        ReportHeights { surface_m: [low, high].map(metres_of_quanta), sources_m, outside_m }
     }
 
     fn classes(&self, residuals: &Residuals) -> Vec<ReportClass> {

@@ -23,6 +23,8 @@ pub(crate) struct Sums {
     pub points: Vec<u64>,
     /// Those of them that every build starts from: border points, corners not counted.
     pub border: u64,
+    /// The lowest and the highest vertex, in quanta.
+    pub heights: (i32, i32),
 }
 
 /// Sums that several workers add to.
@@ -55,6 +57,7 @@ impl Sums {
             *sum += points;
         }
         self.border += other.border;
+        self.heights = (self.heights.0.min(other.heights.0), self.heights.1.max(other.heights.1));
     }
 
     /// Those of every tile as it is published.

@@ -143,8 +143,7 @@ pub(crate) fn rule(job: &Job, area: &GamingArea) -> Rule {
 /// `max_residual_m` as a weighted value: it holds where the ground matters most, and in proportion elsewhere.
 fn largest_value(job: &Job) -> Option<u64> {
     let quantum = if matches!(job.tin.method, Method::Paper { .. }) { job.tin.residual_quantum } else { 1 };
-    let weights = job.importance.areas.iter().map(|spec| spec.weight);
-    let heaviest = weights.chain([job.importance.default_weight]).max().unwrap_or(0);
+    let heaviest = job.importance.heaviest();
     let units = |metres: f64| (metres * f64::from(terrain::QUANTA_PER_METRE) / f64::from(quantum)).floor();
     job.tin.max_residual_m.map(|metres| u64::from(heaviest) * units(metres) as u64)
 }

@@ -37,6 +37,11 @@ impl Water {
         Self { bodies: bodies.collect(), frame }
     }
 
+    /// Levels that are known, in quanta.
+    pub fn levels_known(&self) -> impl Iterator<Item = i32> {
+        self.bodies.iter().filter_map(|body| body.level)
+    }
+
     /// Whether levels are still to be found in the heights.
     pub fn is_unknown(&self) -> bool {
         self.bodies.iter().any(|body| body.level.is_none())

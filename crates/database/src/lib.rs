@@ -46,7 +46,7 @@ pub use manifest::{
 };
 mod report;
 pub use report::{
-    Report, ReportBefore, ReportBorder, ReportBound, ReportBreach, ReportClass, ReportLevel, ReportPart,
+    Report, ReportBefore, ReportBorder, ReportBound, ReportBreach, ReportClass, ReportHeights, ReportLevel, ReportPart,
     ReportPerModule, ReportPerWindow, ReportPlace, ReportPoints, ReportPool, ReportRefusals, ReportResidual,
     ReportStage, ReportStops, ReportTile, ReportVoids,
 };

@@ -28,6 +28,8 @@ pub struct Measured {
     pub points: Vec<u64>,
     /// Points on the border that every build starts from.
     pub border: u64,
+    /// The lowest and the highest vertex, in quanta.
+    pub heights: [i32; 2],
 }
 
 /// Counts and residual of one load module.
@@ -74,11 +76,12 @@ struct MeasuredOnDisk {
     at_source: Option<MeasuredTally>,
     points: Vec<u64>,
     border: u64,
+    heights: [i32; 2],
 }
 
 /// The bytes of what was measured.
 pub fn encode_measured(stamp: &Stamp, measured: &Measured) -> Vec<u8> {
-    let Measured { tile, modules_file, modules, classes, at_source, points, border } = measured.clone();
+    let Measured { tile, modules_file, modules, classes, at_source, points, border, heights } = measured.clone();
     let on_disk = MeasuredOnDisk {
         tile: (tile.row, tile.col),
         length: modules_file.length,
@@ -88,6 +91,7 @@ pub fn encode_measured(stamp: &Stamp, measured: &Measured) -> Vec<u8> {
         at_source,
         points,
         border,
+        heights,
     };
     frame::seal(Kind::Measured, stamp, &codec::encode(&on_disk))
 }
@@ -99,10 +103,11 @@ pub fn encode_measured(stamp: &Stamp, measured: &Measured) -> Vec<u8> {
 pub fn decode_measured(path: &Path, bytes: &[u8]) -> Result<(Stamp, Measured), DatabaseError> {
     let (stamp, payload) = frame::open(Kind::Measured, path, bytes)?;
     let on_disk: MeasuredOnDisk = codec::decode(payload).map_err(|what| malformed(path, what))?;
-    let MeasuredOnDisk { tile: (row, col), length, blake3, modules, classes, at_source, points, border } = on_disk;
+    let MeasuredOnDisk { tile: (row, col), length, blake3, modules, classes, at_source, points, border, heights } =
+        on_disk;
     let modules_file = FileStamp { length, blake3: Fingerprint(blake3) };
     let tile = TileId { row, col };
-    Ok((stamp, Measured { tile, modules_file, modules, classes, at_source, points, border }))
+    Ok((stamp, Measured { tile, modules_file, modules, classes, at_source, points, border, heights }))
 }
 
 #[cfg(test)]

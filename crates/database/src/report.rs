@@ -38,6 +38,9 @@ pub struct Report {
     /// The same, of load modules at the outer border of the area and of the others apart.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub border: Option<ReportBorder>,
+    /// Heights of the surface, and of the sources under it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub heights: Option<ReportHeights>,
     /// Against the posts of the source DEM.
     pub residual_against_source: Option<ReportResidual>,
     /// The same for each class of the mask, in the job's order.
@@ -172,6 +175,19 @@ pub struct ReportBorder {
     pub at_border: ReportPart,
     /// Of all others.
     pub inside: ReportPart,
+}
+
+/// Heights in metres, lowest and highest.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ReportHeights {
+    /// Of the surface's vertices.
+    pub surface_m: [f64; 2],
+    /// Of the sources under the area, before voids are filled, with the stated level of water; none for the sample
+    /// terrain.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sources_m: Option<[f64; 2]>,
+    /// How far the surface reaches beyond the sources.
+    pub outside_m: f64,
 }
 
 /// Residuals of a part of the area, in metres.
@@ -368,6 +384,7 @@ mod tests {
             before_removals: Some(ReportBefore { removed: 3, ..ReportBefore::default() }),
             residual: ReportResidual { rms_m: 1.1, max_m: 9.0, mean_abs_m: 0.7, p95_m: 2.0, p99_m: 3.3 },
             border: None,
+            heights: None,
             residual_against_source: None,
             classes: vec![],
             levels: vec![ReportLevel { level: 1, inner_share: 0.5, triangles: 20, rms_m: 1.5, max_m: 11.25 }],

@@ -73,6 +73,7 @@ pub(crate) fn measured() -> Measured {
         at_source: Some(tally),
         points: vec![7, 0],
         border: 2,
+        heights: [-5, 1280],
     }
 }
 

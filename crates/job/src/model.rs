@@ -168,6 +168,13 @@ pub struct ImportanceSpec {
     pub smooth: Smooth,
 }
 
+impl ImportanceSpec {
+    /// The largest weight of any ground, in thousandths; water and pins not counted.
+    pub fn heaviest(&self) -> u16 {
+        self.areas.iter().map(|area| area.weight).fold(self.default_weight, u16::max)
+    }
+}
+
 /// What the class of holes is called, which no class of a job may be: ground where no source has a height.
 pub const HOLE_CLASS_NAME: &str = "hole";
 

@@ -44,6 +44,9 @@ pub struct Mask<'a> {
     pub areas: Vec<Area<'a>>,
     /// How weights are mixed.
     pub smoothing: Smoothing,
+    /// Areas over all others, with weights that end where they end: smoothing leaves them out, so that a shore's
+    /// water weighs what water weighs, and its land what land does.
+    pub over: Vec<Area<'a>>,
 }
 
 impl Mask<'_> {
@@ -52,7 +55,7 @@ impl Mask<'_> {
     /// An area may name `default` itself, to give a part of another area back.
     pub fn class_names(&self) -> Vec<&str> {
         let mut names = vec!["default"];
-        for area in &self.areas {
+        for area in self.areas.iter().chain(&self.over) {
             if !names.contains(&area.class.as_str()) {
                 names.push(&area.class);
             }
@@ -62,7 +65,7 @@ impl Mask<'_> {
 
     /// Whether every post of any window weighs the same and is of the default class.
     pub fn is_uniform(&self) -> bool {
-        self.areas.is_empty()
+        self.areas.is_empty() && self.over.is_empty()
     }
 }
 
@@ -85,7 +88,9 @@ pub fn importance(mask: &Mask, area: PostRect, frame: &GridFrame, rect: PostRect
         Smoothing::Binomial7 => smooth::binomial7(&claims.weights, wide, rect),
     };
     let classes = if wide == rect { claims.classes } else { cut(&claims.classes, wide, rect) };
-    Importance::new(rect, weights, classes)
+    let mut claims = Claims { weights, classes };
+    claims.lay(&mask.over, mask, frame, rect);
+    Importance::new(rect, claims.weights, claims.classes)
 }
 
 /// The same mask with weight 0 and the class of holes at the void posts of `dem`, which therefore are never selected.
@@ -109,27 +114,34 @@ fn posts(rect: PostRect) -> impl Iterator<Item = terrain::Post> {
     (rect.south..=rect.north).flat_map(move |row| (rect.west..=rect.east).map(move |col| terrain::Post::new(row, col)))
 }
 
-/// Weight and class of every post of a window, row-major, before smoothing.
+/// Weight and class of every post of a window, row-major.
 struct Claims {
     weights: Vec<u16>,
     classes: Vec<u8>,
 }
 
+impl Claims {
+    /// Lays areas of a mask over what is there.
+    fn lay(&mut self, areas: &[Area], mask: &Mask, frame: &GridFrame, rect: PostRect) {
+        let names = mask.class_names();
+        for area in areas {
+            let index = names.iter().position(|&name| name == area.class).expect("every area's class is listed");
+            let class =
+                u8::try_from(index).ok().filter(|&class| class < HOLE_CLASS).expect("a mask has at most 255 classes");
+            area.shape.visit_spans(frame, rect, |span| {
+                self.weights[span.clone()].fill(area.weight);
+                self.classes[span].fill(class);
+            });
+        }
+    }
+}
+
 fn claims(mask: &Mask, frame: &GridFrame, rect: PostRect) -> Claims {
-    let names = mask.class_names();
     let mut claims = Claims {
         weights: vec![mask.default_weight; rect.post_count()],
         classes: vec![DEFAULT_CLASS; rect.post_count()],
     };
-    for area in &mask.areas {
-        let index = names.iter().position(|&name| name == area.class).expect("every area's class is listed");
-        let class =
-            u8::try_from(index).ok().filter(|&class| class < HOLE_CLASS).expect("a mask has at most 255 classes");
-        area.shape.visit_spans(frame, rect, |span| {
-            claims.weights[span.clone()].fill(area.weight);
-            claims.classes[span].fill(class);
-        });
-    }
+    claims.lay(&mask.areas, mask, frame, rect);
     claims
 }
 

@@ -23,7 +23,7 @@ fn area(class: &str, weight: u16, polygons: Vec<Polygon>) -> Area<'static> {
 }
 
 fn unsmoothed(areas: Vec<Area>, rect: PostRect) -> Importance {
-    importance(&Mask { default_weight: 8000, areas, smoothing: Smoothing::None }, rect, &frame(), rect)
+    importance(&Mask { default_weight: 8000, areas, smoothing: Smoothing::None, over: vec![] }, rect, &frame(), rect)
 }
 
 /// The rows of the classes from north to south, one character a post.
@@ -71,7 +71,7 @@ fn later_areas_win_and_classes_are_counted_as_they_are_named() {
         area("a", 2, vec![polygon(&[&SQUARE])]),
         area("default", 8000, vec![polygon(&[&[[1.0, 2.0], [2.0, 2.0], [2.0, 3.0], [1.0, 3.0]]])]),
     ];
-    let mask = Mask { default_weight: 8000, areas, smoothing: Smoothing::None };
+    let mask = Mask { default_weight: 8000, areas, smoothing: Smoothing::None, over: vec![] };
     assert_eq!(mask.class_names(), ["default", "b", "a"]);
     check_picture(mask.areas, &["1100", "1020", "1220", "1100"]);
 }
@@ -87,7 +87,7 @@ fn corners_far_beyond_any_grid_do_not_overflow() {
 fn excluded_posts_stay_excluded_and_others_never_become_so() {
     let rect = PostRect::of_size(9, 9);
     let areas = vec![area("out", 0, vec![polygon(&[&[[0.0, 0.0], [4.0, 0.0], [4.0, 9.0], [0.0, 9.0]]])])];
-    let mask = Mask { default_weight: 1, areas, smoothing: Smoothing::Binomial7 };
+    let mask = Mask { default_weight: 1, areas, smoothing: Smoothing::Binomial7, over: vec![] };
     let smoothed = importance(&mask, rect, &frame(), rect);
     for post in posts(rect) {
         assert_eq!(smoothed.weight(post), u16::from(4 <= post.col), "{post}");
@@ -146,7 +146,7 @@ fn mask_of(rings: &[Vec<[i64; 2]>], weights: &[u16], smoothing: Smoothing) -> Ma
     };
     let areas = rings.iter().zip(weights).enumerate();
     let areas = areas.map(|(i, (ring, &weight))| area(&i.to_string(), weight, vec![as_polygon(ring)])).collect();
-    Mask { default_weight: 8000, areas, smoothing }
+    Mask { default_weight: 8000, areas, smoothing, over: vec![] }
 }
 
 proptest! {
@@ -178,5 +178,26 @@ proptest! {
         mask.areas.push(Area { class: "overlay".into(), weight: 500, shape: Shape::Members(Box::new(overlay)) });
         let whole = importance(&mask, area, &frame(), area);
         prop_assert_eq!(importance(&mask, area, &frame(), rect), whole.window(rect));
+    }
+}
+
+#[test]
+fn areas_over_all_others_end_sharply_and_soften_nothing() {
+    let rect = PostRect::of_size(9, 9);
+    let half = || polygon(&[&[[0.0, -1.0], [4.0, -1.0], [4.0, 9.0], [0.0, 9.0]]]);
+    let below = vec![area("a", 1000, vec![half()])];
+    let mask = |over| Mask {
+        default_weight: 8000,
+        areas: vec![area("a", 1000, vec![half()])],
+        smoothing: Smoothing::Binomial7,
+        over,
+    };
+    let softened = importance(&Mask { areas: below, ..mask(vec![]) }, rect, &frame(), rect);
+    let square = polygon(&[&[[2.0, 2.0], [6.0, 2.0], [6.0, 6.0], [2.0, 6.0]]]);
+    let laid = importance(&mask(vec![area("b", 60_000, vec![square])]), rect, &frame(), rect);
+    for post in posts(rect) {
+        let is_over = (2..6).contains(&post.row) && (2..6).contains(&post.col);
+        let expected = if is_over { (60_000, 2) } else { (softened.weight(post), softened.class(post)) };
+        assert_eq!((laid.weight(post), laid.class(post)), expected, "{post:?}");
     }
 }

@@ -1,7 +1,9 @@
 //! The report as text: what a terrain engineer reads first on top, everything that broke a limit below, no colour,
 //! at most 100 columns.
 
-use database::{Report, ReportBorder, ReportBreach, ReportPart, ReportPlace, ReportResidual, ReportStage};
+use database::{
+    Report, ReportBorder, ReportBreach, ReportHeights, ReportPart, ReportPlace, ReportResidual, ReportStage,
+};
 
 use crate::table::{Align, Table, grouped};
 
@@ -105,6 +107,9 @@ fn residuals(report: &Report) -> Option<String> {
     if let Some(border) = &report.border {
         text += &format!("  {}\n", border_in_words(border));
     }
+    if let Some(heights) = &report.heights {
+        text += &format!("  {}\n", heights_in_words(heights));
+    }
     if let Some(accuracy_m) = report.dem_accuracy_m {
         text += &format!("  the source states an accuracy of {accuracy_m} m\n");
     }
@@ -119,6 +124,17 @@ fn residuals(report: &Report) -> Option<String> {
 pub(crate) fn border_in_words(border: &ReportBorder) -> String {
     let part = |part: &ReportPart| format!("RMS {:.3} m, largest {:.2} m", part.rms_m, part.max_m);
     format!("at the outer border {}; inside {}", part(&border.at_border), part(&border.inside))
+}
+
+/// Heights of the surface beside those of its sources.
+pub(crate) fn heights_in_words(heights: &ReportHeights) -> String {
+    let range = |[low, high]: [f64; 2]| format!("{low:.2} to {high:.2} m");
+    let surface = format!("heights {}", range(heights.surface_m));
+    match heights.sources_m {
+        None => surface,
+        Some(sources_m) if heights.outside_m == 0.0 => format!("{surface}, sources {}", range(sources_m)),
+        Some(sources_m) => format!("{surface}, sources {}, {:.2} m beyond", range(sources_m), heights.outside_m),
+    }
 }
 
 fn residual_row(table: &mut Table, name: &str, posts: String, points: String, residual: &ReportResidual) {

@@ -94,6 +94,11 @@ pub(crate) fn report() -> Report {
             at_border: database::ReportPart { posts: 77_000, rms_m: 3.4, max_m: 31.0 },
             inside: database::ReportPart { posts: 3_823_528, rms_m: 3.2, max_m: 36.5 },
         }),
+        heights: Some(database::ReportHeights {
+            surface_m: [688.5, 1_903.25],
+            sources_m: Some([690.0, 1_903.5]),
+            outside_m: 1.5,
+        }),
         residual_against_source: Some(residual(3.1)),
         classes: vec![class("plains", 2_587_215, 64_939, 0.869), class("mountains", 1_313_410, 28_532, 5.268)],
         levels: vec![],

@@ -97,7 +97,7 @@ fn water_over_four_tiles_lies_at_one_level_and_is_a_class_of_its_own() {
         assert_eq!(is_water, inside(post), "{post}");
         if is_water {
             depths.push(before.height(post));
-            assert_eq!(found.importance.weight(post), 8000);
+            assert_eq!(found.importance.weight(post), u16::MAX, "as heavy as can be, beside ground of weight 8");
         } else {
             assert_eq!(found.dem.height(post), before.height(post), "{post}");
         }
@@ -107,7 +107,7 @@ fn water_over_four_tiles_lies_at_one_level_and_is_a_class_of_its_own() {
     assert!((88..152).all(|row| found.dem.row(row)[88..152].iter().all(|&height| height == level)));
     let stated = wet("source = \"sample\"\nwater = { file = \"lake.json\", level_m = 12.5, weight = 0 }");
     assert_eq!(stated.dem.height(Post::new(100, 100)), 1600);
-    assert_eq!(stated.importance.weight(Post::new(100, 100)), 0);
+    assert_eq!(stated.importance.weight(Post::new(100, 100)), u16::MAX, "level, whatever it weighs");
 }
 
 #[test]

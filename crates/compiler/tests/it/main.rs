@@ -27,4 +27,5 @@ mod real_ground;
 mod shared;
 mod soundness;
 mod stopped;
+mod water_and_holes;
 mod window_figures;

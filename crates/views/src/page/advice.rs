@@ -21,6 +21,9 @@ pub struct Advice {
 const POINT_COST: u64 = 2;
 /// Use of the mean above which the budget of the area is what ends refinement.
 const SPENT: f64 = 0.985;
+/// RMS residual up to which a class is level rather than true.
+const LEVEL_M: f64 = 0.05;
+
 /// Times that the RMS residual of a class is above that of another, from which on one may want to shift weights.
 const UNEVEN: f64 = 3.0;
 
@@ -155,10 +158,11 @@ fn mean(report: &Report) -> Option<Advice> {
 }
 
 fn importance(report: &Report) -> Option<Advice> {
-    let classes = report.classes.iter().filter(|class| 0 < class.posts);
+    // Level water, and classes that lie nowhere, say nothing of how ground shares its triangles.
+    let classes = report.classes.iter().filter(|class| 0 < class.posts && LEVEL_M < class.residual.rms_m);
     let by_rms = |a: &&database::ReportClass, b: &&database::ReportClass| a.residual.rms_m.total_cmp(&b.residual.rms_m);
     let (best, worst) = (classes.clone().min_by(by_rms)?, classes.max_by(by_rms)?);
-    if worst.residual.rms_m < UNEVEN * best.residual.rms_m.max(0.01) {
+    if worst.residual.rms_m < UNEVEN * best.residual.rms_m {
         return None;
     }
     Some(Advice {
