@@ -130,17 +130,17 @@ fn write_place_tags<K: TiffKind>(
     const PROJECTED: u16 = 1;
     const PIXEL_IS_AREA: u16 = 1;
     const METRE: u16 = 9001;
+    // GeoTIFF 1.1: of 1.0 GDAL drops the vertical system unless told otherwise.
     let mut keys: Vec<[u16; 4]> = vec![
-        [1, 1, 0, 0],
+        [1, 1, 1, 0],
         [1024, 0, 1, PROJECTED],
         [1025, 0, 1, PIXEL_IS_AREA],
         [3072, 0, 1, plan.epsg],
         [3076, 0, 1, METRE],
     ];
     if let (Some(code), "surface") = (vertical_code(plan.product.vertical_datum()), plan.layer) {
-        keys.push([4096, 0, 1, code]);
+        keys.extend([[4096, 0, 1, code], [4099, 0, 1, METRE]]);
     }
-    keys.push([4099, 0, 1, METRE]);
     keys[0][3] = keys.len() as u16 - 1;
     let frame = &plan.product.frame;
     let spacing_m = frame.spacing.metres();

@@ -30,6 +30,7 @@ pub use surface::{GroundHeights, write_residual, write_surface};
 mod gpkg;
 mod gpkg_geometry;
 mod gpkg_index;
+mod gpkg_styles;
 pub use gpkg::write_gpkg;
 mod earth;
 pub use earth::{Datum, Earth};

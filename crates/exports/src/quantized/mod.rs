@@ -1,7 +1,7 @@
 //! Quantized-mesh 1.0 for globes: the triangles themselves at the finest level, cut at the borders of tiles, and a
 //! regular grid of heights for every tile above, up to both roots.
 //!
-//! Tiles have no holes: around what is exported the ground goes on from its border and falls to the lowest height.
+//! Tiles cover their squares: where no source has a height the surface that closes the hole is kept, and around what is exported the ground goes on from its border and falls to the lowest height.
 
 mod clip;
 mod collar;
@@ -40,7 +40,8 @@ pub fn write_quantized_mesh(
     work: &Work,
 ) -> Result<Datum, ExportError> {
     let earth = Earth::new(product, assumed)?;
-    let mesh = Mesh::of(product);
+    // A tile has to cover its square, so holes keep the triangles that close them.
+    let mesh = Mesh::whole(product);
     let globe = Globe::of(product, &mesh, &earth, work)?;
     let heights = || globe.height_m.iter().copied();
     let (low, high) = (heights().fold(f64::INFINITY, f64::min), heights().fold(f64::NEG_INFINITY, f64::max));
