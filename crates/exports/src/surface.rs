@@ -2,13 +2,14 @@
 //!
 //! Heights are those that residuals are measured with: at a post between vertices, rounded to 1/128 m.
 
-use std::io::{Seek, Write};
+use std::io::Write;
 
 use geometry::Facet;
 use geometry::owned::{PostGrid, visit_residuals};
 use terrain::{Dem, HOLE_CLASS, LoadModule, ModuleId, Post, PostRect, metres_of_quanta};
 
-use crate::geotiff::{self, BLOCK};
+use crate::geotiff::{self, BLOCK, Blocks};
+use crate::overviews::{Raster, overviews};
 use crate::{ExportError, Product, Work};
 
 /// Heights of the ground that a database was built from, for the posts of a rectangle.
@@ -18,7 +19,7 @@ pub type GroundHeights<'a> = dyn Fn(PostRect) -> Result<Dem, ExportError> + Sync
 ///
 /// # Errors
 /// When it cannot be written, or the coordinate system has no EPSG code.
-pub fn write_surface(out: &mut (impl Write + Seek), product: &Product, work: &Work) -> Result<(), ExportError> {
+pub fn write_surface(out: &mut impl Write, product: &Product, work: &Work) -> Result<(), ExportError> {
     let level = |rect: PostRect| Ok(Dem::from_fn(rect, |_| Some(0)));
     write(out, product, work, "surface", &level, |residual| -residual)
 }
@@ -28,7 +29,7 @@ pub fn write_surface(out: &mut (impl Write + Seek), product: &Product, work: &Wo
 /// # Errors
 /// When it cannot be written, the ground cannot be read, or the coordinate system has no EPSG code.
 pub fn write_residual(
-    out: &mut (impl Write + Seek),
+    out: &mut impl Write,
     product: &Product,
     ground: &GroundHeights,
     work: &Work,
@@ -37,7 +38,7 @@ pub fn write_residual(
 }
 
 fn write(
-    out: &mut (impl Write + Seek),
+    out: &mut impl Write,
     product: &Product,
     work: &Work,
     layer: &'static str,
@@ -47,13 +48,21 @@ fn write(
     let rect = product.grid.posts_of_rect(product.rect);
     // A residual knows by itself where there is no ground.
     let leaves_holes = layer == "surface";
-    let bands: Vec<i32> = (0..rect.posts_high().div_ceil(BLOCK) as i32).collect();
-    let blocks = work.each("bands of rows", &bands, |&band| {
+    let (wide, high) = (rect.posts_wide(), rect.posts_high());
+    let bands: Vec<i32> = (0..high.div_ceil(BLOCK) as i32).collect();
+    let made = work.each("bands of rows", &bands, |&band| {
         let north = rect.north - band * BLOCK as i32;
         let posts = PostRect { south: rect.south.max(north + 1 - BLOCK as i32), north, ..rect };
-        Ok(geotiff::blocks(&values(product, posts, ground, leaves_holes, &value)?, posts.posts_wide()))
+        let raster = Raster { wide, metres: values(product, posts, ground, leaves_holes, &value)? };
+        // A band has an even number of rows, so its halves are those of the whole.
+        Ok((geotiff::blocks(&raster), raster.halved().metres))
     })?;
-    geotiff::write(out, product, rect, layer, &blocks.concat())
+    let (finest, halves): (Vec<_>, Vec<_>) = made.into_iter().unzip();
+    let mut images = vec![Blocks { wide, high, blocks: finest.concat() }];
+    if BLOCK < wide.max(high) {
+        images.extend(overviews(Raster { wide: wide.div_ceil(2), metres: halves.concat() }, work)?);
+    }
+    geotiff::write(out, product, rect, layer, images)
 }
 
 /// Values in metres at `posts`, row by row from the north.
