@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use super::clip::doubled_area;
-use super::lattice::{Ladder, Node, STEPS, lon_lat};
+use super::lattice::{Ladder, Node, STEPS, height_m, lon_lat};
 use crate::earth::earth_centred;
 use crate::mesh::{cross, dot, minus, unit};
 
@@ -56,12 +56,13 @@ impl Tile {
     }
 
     /// The bytes of its file.
-    pub(crate) fn bytes(&self, ladder: &Ladder) -> Vec<u8> {
+    pub(crate) fn bytes(&self) -> Vec<u8> {
+        let ladder = Ladder::of(&self.nodes);
         let mut bytes = Vec::with_capacity(128 + 10 * self.nodes.len() + 6 * self.triangles.len());
-        self.put_header(&mut bytes, ladder);
+        self.put_header(&mut bytes, &ladder);
         bytes.extend_from_slice(&(self.nodes.len() as u32).to_le_bytes());
         let (west, south) = (self.col * STEPS, self.row * STEPS);
-        let parts: [&dyn Fn(&Node) -> i64; 3] = [&|n| n.x - west, &|n| n.y - south, &|n| n.h];
+        let parts: [&dyn Fn(&Node) -> i64; 3] = [&|n| n.x - west, &|n| n.y - south, &|n| ladder.rung(n.h)];
         for part in parts {
             let mut before = 0;
             for node in &self.nodes {
@@ -80,7 +81,7 @@ impl Tile {
     }
 
     fn put_header(&self, bytes: &mut Vec<u8>, ladder: &Ladder) {
-        let place = |node: &Node| earth_centred(lon_lat(self.level, [node.x, node.y]), ladder.height_m(node.h));
+        let place = |node: &Node| earth_centred(lon_lat(self.level, [node.x, node.y]), height_m(node.h));
         let places: Vec<[f64; 3]> = self.nodes.iter().map(place).collect();
         let end = |pick: fn(f64, f64) -> f64, from: f64| {
             places.iter().fold([from; 3], |end, place| [0, 1, 2].map(|axis| pick(end[axis], place[axis])))
@@ -91,7 +92,7 @@ impl Tile {
         let radius = places.iter().map(distance).fold(0.0, f64::max);
         let mut put = |number: f64| bytes.extend_from_slice(&number.to_le_bytes());
         middle.into_iter().for_each(&mut put);
-        let (foot, top) = (ladder.foot_m as f32, ladder.top_m() as f32);
+        let (foot, top) = (height_m(ladder.low) as f32, height_m(ladder.high) as f32);
         bytes.extend_from_slice(&foot.to_le_bytes());
         bytes.extend_from_slice(&top.to_le_bytes());
         for number in middle.into_iter().chain([radius]).chain(horizon_point(middle, &places)) {
@@ -206,16 +207,18 @@ mod tests {
         let (west, south) = (2 * STEPS, STEPS);
         let square = [
             node(west, south, 0),
-            node(west + STEPS, south, 5),
-            node(west + STEPS, south + STEPS, STEPS),
+            node(west + STEPS, south, 1000),
+            node(west + STEPS, south + STEPS, 102_400),
             node(west, south + STEPS, 0),
         ];
         tile.add(&square);
         assert_eq!(tile.covered(), 1.0);
-        let bytes = tile.bytes(&Ladder::over(0.0, 100.0));
+        let bytes = tile.bytes();
         assert_eq!(bytes.len(), 88 + 4 + 4 * 6 + 4 + 12 + 4 * (4 + 4) + 5 + 8);
         let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
         assert_eq!((word(88), word(116)), (4, 2));
+        // From 0 to 100 m.
+        assert_eq!((word(24), word(28)), (0.0_f32.to_bits(), 100.0_f32.to_bits()));
         // 0 1 2, 0 2 3: each new vertex is a zero.
         let indices: Vec<u16> = bytes[120..132].chunks(2).map(|b| u16::from_le_bytes([b[0], b[1]])).collect();
         assert_eq!(indices, [0, 0, 0, 3, 1, 0]);
