@@ -62,6 +62,10 @@ impl GltfNode {
     }
 }
 
+/// What a view is for, in the numbers of OpenGL: vertices, or indices of them.
+const ARRAY_BUFFER: u32 = 34962;
+const ELEMENT_ARRAY_BUFFER: u32 = 34963;
+
 /// The document and the numbers of a glTF in the making: views of all positions, all normals and all indices.
 #[derive(Default)]
 struct Parts {
@@ -128,14 +132,18 @@ impl Gltf {
         classes.dedup();
         let mut parts = Parts::default();
         self.nodes.iter().for_each(|node| parts.add(node, &classes));
-        const VERTICES: u32 = 34962;
-        const INDICES: u32 = 34963;
         let mut binary = Vec::new();
         let mut views = Vec::new();
-        for (bytes, target) in parts.views.iter().zip([VERTICES, VERTICES, INDICES]) {
-            views.push(json!({
-                "buffer": 0, "byteOffset": binary.len(), "byteLength": bytes.len(), "target": target,
-            }));
+        for (index, bytes) in parts.views.iter().enumerate() {
+            let mut view = json!({ "buffer": 0, "byteOffset": binary.len(), "byteLength": bytes.len() });
+            if index == Parts::INDICES {
+                view["target"] = json!(ELEMENT_ARRAY_BUFFER);
+            } else {
+                view["target"] = json!(ARRAY_BUFFER);
+                // What several accessors share has to say where the next vertex begins.
+                view["byteStride"] = json!(size_of::<[f32; 3]>());
+            }
+            views.push(view);
             binary.extend_from_slice(bytes);
         }
         let document = json!({
@@ -301,6 +309,11 @@ mod tests {
             let (start, length) = (view["byteOffset"].as_u64().unwrap(), view["byteLength"].as_u64().unwrap());
             assert!(start % 4 == 0 && start + length <= binary as u64);
         }
+        // Of the positions of both load modules, of their normals; lists of indices lie close by themselves.
+        assert_eq!(
+            [0, 1, 2].map(|view| document["bufferViews"][view]["byteStride"].as_u64()),
+            [Some(12), Some(12), None]
+        );
     }
 
     #[test]
