@@ -111,11 +111,13 @@ def check(database, arguments, scratch):
 
 
 def with_holes(arguments, scratch):
-    """A database of 18 km x 9 km with a hole in its middle and one at its eastern side."""
+    """A database of 18.5 km x 9 km with two holes inside and one at its eastern side."""
     rows, cols, spacing = 373, 745, 25
     row, col = numpy.mgrid[:rows, :cols]
     heights = 900 + 90 * numpy.sin(row / 31) * numpy.cos(col / 43) + 25 * numpy.sin(row / 7 + col / 11) + col / 10
-    hole = ((row - 150) ** 2 + (col - 300) ** 2 < 70 ** 2) | ((col > 640) & (row > 200) & (row < 290))
+    # One covers a whole square of 4 km.
+    hole = (abs(col - 240) < 90) & (abs(rows - 1 - row - 240) < 90)
+    hole |= ((row - 150) ** 2 + (col - 520) ** 2 < 50 ** 2) | ((col > 640) & (row > 200) & (row < 290))
     lines = [f"ncols {cols}", f"nrows {rows}", "xllcenter 500000", "yllcenter 3900000", f"cellsize {spacing}",
              "NODATA_value -9999"]
     lines += [" ".join(f"{z:.3f}" for z in line) for line in numpy.where(hole, -9999, heights)]
