@@ -39,7 +39,7 @@ pub fn write_3dtiles(product: &Product, assumed: Option<Datum>, put: &Put, work:
     let (low, high) = (heights().fold(f64::INFINITY, f64::min), heights().fold(f64::NEG_INFINITY, f64::max));
     // Without any tile the ground is as good as flat.
     let flat_m = high - low;
-    let tileset = json!({
+    let mut tileset = json!({
         "asset": {
             "version": "1.1",
             "tilesetVersion": "1",
@@ -54,11 +54,18 @@ pub fn write_3dtiles(product: &Product, assumed: Option<Datum>, put: &Put, work:
             "boundingVolume": { "region": region(&scene.layers[0].globe.lon_lat, low, high) },
             "geometricError": flat_m,
             "refine": "REPLACE",
-            "children": children,
         },
     });
+    put_children(&mut tileset["root"], children);
     put("tileset.json", tileset.to_string().as_bytes()).map_err(ExportError::write("tileset.json"))?;
     Ok(earth.datum())
+}
+
+/// Gives a tile its children: the list, where there is one, is not empty.
+fn put_children(tile: &mut Value, children: Vec<Value>) {
+    if !children.is_empty() {
+        tile["children"] = Value::Array(children);
+    }
 }
 
 /// West, south, east and north in radians, lowest and highest height: what a region is in 3D Tiles.
@@ -104,19 +111,20 @@ impl Scene {
             put_node(put, &uri, node.with_groups(&part.triangles, &part.classes))?;
             // What is coarser is never said to be truer, or a viewer would not go on to the finer.
             error_m = error_m.max(layer.error_m(rect));
-            children = vec![json!({
+            let mut level = json!({
                 "boundingVolume": { "box": bounds },
                 "geometricError": error_m,
                 "content": { "uri": uri },
-                "children": children,
-            })];
+            });
+            put_children(&mut level, children);
+            children = vec![level];
         }
         let mut tile = json!({
             "transform": frame.matrix(),
             "boundingVolume": { "box": bounds },
             "geometricError": if self.layers.len() == 1 { coarse.error_m } else { coarse.error_m.max(error_m) },
-            "children": children,
         });
+        put_children(&mut tile, children);
         if !coarse.triangles.is_empty() {
             let uri = format!("squares/{}", square_name(&finest.product, rect, "glb"));
             let classes = vec![0; coarse.triangles.len()];
@@ -275,6 +283,8 @@ mod tests {
         product.modules[0].classes.fill(terrain::HOLE_CLASS);
         let files = written(&product);
         assert_eq!(files.keys().collect::<Vec<_>>(), ["tileset.json"]);
+        let tileset: Value = serde_json::from_slice(&files["tileset.json"]).unwrap();
+        assert!(tileset["root"].get("children").is_none(), "no list of children may be empty");
     }
 
     #[test]

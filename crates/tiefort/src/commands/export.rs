@@ -149,7 +149,7 @@ impl Format {
         match self {
             Format::Modules => "of class 255, as in the database",
             Format::Gpkg => "in the layer triangles, of class hole",
-            Format::Geotiff => "without values",
+            Format::Geotiff => "NaN in the raster",
             Format::QuantizedMesh => "kept, since tiles must be closed; holes.geojson says where they are",
             Format::Ply | Format::Obj | Format::Glb | Format::Openflight | Format::Tiles3d => "left out",
         }
