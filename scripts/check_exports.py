@@ -210,7 +210,7 @@ def check_glb(database, arguments, scratch):
     for node in document["nodes"]:
         row, col = re.fullmatch(r"r(\d+)c(\d+)", node["name"]).groups()
         found[int(row), int(col)] = glb_triangles(document, document["meshes"][node["mesh"]])
-    expect(found == database.ground_modules, f"{len(found)} nodes, each named after its load module, with its triangles")
+    expect(found == database.ground_modules, f"{len(found)} nodes, each a load module by name and triangles")
     places = {tuple(place) for positions in glb_positions(glb.read_bytes()) for place in positions}
     turned = {(x, -z, y) for x, y, z in places}
     expect(turned == database.places, "every vertex at its place, exactly")

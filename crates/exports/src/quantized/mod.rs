@@ -1,8 +1,8 @@
 //! Quantized-mesh 1.0 for globes: the triangles themselves at the finest level, cut at the borders of tiles, and a
 //! regular grid of heights for every tile above, up to both roots.
 //!
-//! Tiles cover their squares: around what is exported the ground goes on from its border and falls to the lowest height,
-//! and where no source has a height the surface that closes the hole is kept; `holes.geojson` says where that is.
+//! Tiles cover their squares: around what is exported the ground goes on from its border and falls to the lowest
+//! height, and where no source has a height the surface that closes the hole is kept; `holes.geojson` says where.
 
 mod clip;
 mod collar;
@@ -31,8 +31,8 @@ const DEGREE_M: f64 = 111_320.0;
 /// Squares of heights along a side of a tile above the finest level.
 const GRID: i64 = 64;
 
-/// Writes `layer.json`, `LEVEL/COLUMN/ROW.terrain` and, where there are holes, `holes.geojson`. `assumed` is what to take heights to be above; else the database
-/// says it. Gives what was done to heights.
+/// Writes `layer.json`, `LEVEL/COLUMN/ROW.terrain` and, where there are holes, `holes.geojson`. `assumed` is what to
+/// take heights to be above; else the database says it. Gives what was done to heights.
 ///
 /// # Errors
 /// When a file cannot be written, heights cannot be brought above the ellipsoid, or the work was asked to stop.
