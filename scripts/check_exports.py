@@ -5,7 +5,8 @@
 
 With --holes a database with holes is built and checked, too. Needs rasterio, rio-cogeo, meshio, geopandas, pyogrio,
 pyproj and numpy; osgconv (Debian's openscenegraph); node with what scripts/exports/package.json names for glTF and
-CesiumJS, and chromium. A reader that is missing is told and skipped, unless --all is given.
+CesiumJS, and chromium; a Python that has QGIS (Debian's python3-qgis). A reader that is missing is told and skipped,
+unless --all is given.
 """
 
 import argparse
@@ -77,6 +78,7 @@ def main():
     parser.add_argument("--holes", action="store_true", help="also build a database with holes and check it")
     parser.add_argument("--tiefort", default="target/release/tiefort")
     parser.add_argument("--node-modules", help="folder that holds node_modules with gltf-validator")
+    parser.add_argument("--qgis-python", help="a Python that has QGIS, to open the GeoPackage with it")
     parser.add_argument("--pictures", help="folder for screenshots of CesiumJS")
     parser.add_argument("--only", help="formats to check, with commas between")
     parser.add_argument("--all", action="store_true", help="a missing reader is a fault")
@@ -138,6 +140,8 @@ def with_holes(arguments, scratch):
         rows = 2
         [limits]
         mean_per_load_module = 32
+        [lod]
+        levels = [{{ inner_share = 0.5 }}, {{ inner_share = 0.2 }}]
         """
     (scratch / "holes.toml").write_text(job)
     out = scratch / "holes.tdb"
@@ -356,6 +360,7 @@ def check_gpkg(database, arguments, scratch):
     whole = database.rows * database.cols * database.side ** 2
     expect(abs(area / whole - 1) < 1e-9, f"triangles cover {area / 1e6:.3f} km2")
     check_styles(path, set(triangles["class"]))
+    check_in_qgis(path, dict(zip(triangles["class"], triangles.class_name)), arguments)
 
 
 def check_styles(path, classes):
@@ -373,6 +378,17 @@ def check_styles(path, classes):
         categories = {int(of.get("value")): of.get("symbol") for of in renderer.iter("category")}
         wanted = classes if name == "triangles" else set()
         expect(set(categories) == wanted and set(categories.values() or symbols) == symbols, f"style of {name}")
+
+
+def check_in_qgis(path, names, arguments):
+    if not arguments.qgis_python:
+        raise Skip("no --qgis-python")
+    layers = ["load_modules", "tiles", "breaches", "triangles"]
+    command = [arguments.qgis_python, str(HERE / "exports" / "qgis_styles.py"), str(path), *layers]
+    found = json.loads(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
+    expect(all(of["loaded"] for of in found.values()), "QGIS takes the style of every layer from the package")
+    wanted = {str(of): [name, "b_diagonal" if of == HOLE else "solid"] for of, name in names.items()}
+    expect(found["triangles"]["classes"] == wanted, f"QGIS names classes and hatches holes {wanted}")
 
 
 def check_openflight(database, arguments, scratch):
