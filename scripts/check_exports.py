@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
 """Exports a terrain database in every format and opens each with a reader that is not ours.
 
-    python3 scripts/check_exports.py DIR [--tiefort target/release/tiefort] [--node-modules DIR]
+    python3 scripts/check_exports.py [DIR...] [--holes] [--tiefort target/release/tiefort] [--node-modules DIR]
 
-Needs rasterio, geopandas, pyogrio, pyproj and numpy; osgconv (Debian's openscenegraph); node with what
-scripts/exports/package.json names for glTF and CesiumJS, and chromium. A reader that is missing is told and skipped,
+With --holes a database with holes is built and checked, too. Needs rasterio, rio-cogeo, meshio, geopandas, pyogrio,
+pyproj and numpy; osgconv (Debian's openscenegraph); node with what scripts/exports/package.json names for glTF and
+CesiumJS, and chromium; a Python that has QGIS (Debian's python3-qgis). A reader that is missing is told and skipped,
 unless --all is given.
 """
 
@@ -13,11 +14,13 @@ import json
 import pathlib
 import re
 import shutil
+import sqlite3
 import struct
 import subprocess
 import sys
 import tempfile
 import time
+import xml.etree.ElementTree as xml
 
 import numpy
 
@@ -25,6 +28,7 @@ sys.path.insert(0, str(pathlib.Path(__file__).parent))
 import read_slm  # noqa: E402
 
 HERE = pathlib.Path(__file__).parent
+HOLE = 255
 faults = []
 
 
@@ -52,40 +56,97 @@ class Database:
         self.origin, self.side = area["origin_m"], area["module_side_m"]
         self.rows, self.cols = area["module_rows"], area["module_cols"]
         self.triangles = sum(len(module["triangles"]) for module in self.modules.values())
-        self.places = set()
+        self.everywhere, self.places, self.of_class, self.ground_modules = set(), set(), {}, {}
         for (row, col), module in self.modules.items():
-            for x, y, z in module["vertices"]:
-                self.places.add((col * self.side + x / 128, row * self.side + y / 128, z / 128))
+            places = [(col * self.side + x / 128, row * self.side + y / 128, z / 128) for x, y, z in module["vertices"]]
+            self.everywhere.update(places)
+            for triangle, number in zip(module["triangles"], module["classes"]):
+                self.of_class[number] = self.of_class.get(number, 0) + 1
+                if number != HOLE:
+                    self.places.update(places[corner] for corner in triangle)
+                    self.ground_modules[row, col] = self.ground_modules.get((row, col), 0) + 1
+        # Of the ground alone, as meshes have it, which leave holes out.
         self.vertices = len(self.places)
         self.heights = [z for _, _, z in self.places]
+        self.holes = self.of_class.get(HOLE, 0)
+        self.ground = self.triangles - self.holes
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("database")
+    parser.add_argument("databases", nargs="*", metavar="DIR")
+    parser.add_argument("--holes", action="store_true", help="also build a database with holes and check it")
     parser.add_argument("--tiefort", default="target/release/tiefort")
     parser.add_argument("--node-modules", help="folder that holds node_modules with gltf-validator")
+    parser.add_argument("--qgis-python", help="a Python that has QGIS, to open the GeoPackage with it")
     parser.add_argument("--pictures", help="folder for screenshots of CesiumJS")
     parser.add_argument("--only", help="formats to check, with commas between")
     parser.add_argument("--all", action="store_true", help="a missing reader is a fault")
     arguments = parser.parse_args()
-    database = Database(arguments.database)
-    print(f"{len(database.modules)} load modules, {database.vertices} vertices, {database.triangles} triangles")
-    only = arguments.only.split(",") if arguments.only else [name for name, _ in CHECKS]
     with tempfile.TemporaryDirectory() as scratch:
         scratch = pathlib.Path(scratch)
-        for name, check in CHECKS:
-            if name not in only:
-                continue
-            print(f"{name}:")
-            try:
-                check(database, arguments, scratch)
-            except Skip as reason:
-                print(f"  skipped: {reason}")
-                if arguments.all:
-                    faults.append(f"{name} was skipped: {reason}")
+        folders = [*arguments.databases, *([with_holes(arguments, scratch)] if arguments.holes else [])]
+        if not folders:
+            parser.error("name a database, or give --holes")
+        for number, folder in enumerate(folders):
+            (scratch / str(number)).mkdir()
+            check(Database(folder), arguments, scratch / str(number))
     print(f"{len(faults)} faults")
     sys.exit(1 if faults else 0)
+
+
+def check(database, arguments, scratch):
+    print(f"{database.folder}: {len(database.modules)} load modules, {database.triangles} triangles, "
+          f"{database.holes} of them over holes, {database.vertices} vertices of the ground")
+    arguments.database = str(database.folder)
+    only = arguments.only.split(",") if arguments.only else [name for name, _ in CHECKS]
+    for name, run in CHECKS:
+        if name not in only:
+            continue
+        print(f"{name}:")
+        try:
+            run(database, arguments, scratch)
+        except Skip as reason:
+            print(f"  skipped: {reason}")
+            if arguments.all:
+                faults.append(f"{name} was skipped: {reason}")
+
+
+def with_holes(arguments, scratch):
+    """A database of 18.5 km x 9 km with two holes inside and one at its eastern side."""
+    rows, cols, spacing = 373, 745, 25
+    row, col = numpy.mgrid[:rows, :cols]
+    heights = 900 + 90 * numpy.sin(row / 31) * numpy.cos(col / 43) + 25 * numpy.sin(row / 7 + col / 11) + col / 10
+    # One covers a whole square of 4 km.
+    hole = (abs(col - 240) < 90) & (abs(rows - 1 - row - 240) < 90)
+    hole |= ((row - 150) ** 2 + (col - 520) ** 2 < 50 ** 2) | ((col > 640) & (row > 200) & (row < 290))
+    lines = [f"ncols {cols}", f"nrows {rows}", "xllcenter 500000", "yllcenter 3900000", f"cellsize {spacing}",
+             "NODATA_value -9999"]
+    lines += [" ".join(f"{z:.3f}" for z in line) for line in numpy.where(hole, -9999, heights)]
+    (scratch / "holes.asc").write_text("\n".join(lines) + "\n")
+    job = f"""
+        [area]
+        name = "holes"
+        crs = "EPSG:32611"
+        origin_m = [500000, 3900000]
+        size_m = [18500, 9000]
+        spacing_m = {spacing}
+        [dem]
+        sources = [{{ file = "holes.asc", crs = "EPSG:32611" }}]
+        vertical_datum = "EGM96"
+        voids = {{ hole = true }}
+        [tiles]
+        columns = 2
+        rows = 2
+        [limits]
+        mean_per_load_module = 32
+        [lod]
+        levels = [{{ inner_share = 0.5 }}, {{ inner_share = 0.2 }}]
+        """
+    (scratch / "holes.toml").write_text(job)
+    out = scratch / "holes.tdb"
+    subprocess.run([arguments.tiefort, "build", str(scratch / "holes.toml"), "--out", str(out), "--quiet"], check=True)
+    return out
 
 
 class Skip(Exception):
@@ -119,25 +180,44 @@ def check_modules(database, arguments, scratch):
 
 
 def check_meshes(database, arguments, scratch):
-    ply = export(arguments, "ply", scratch / "mesh.ply").read_bytes()
-    head, body = ply.split(b"end_header\n", 1)
+    path = export(arguments, "ply", scratch / "mesh.ply")
+    head, body = path.read_bytes().split(b"end_header\n", 1)
     counts = [int(n) for n in re.findall(rb"element \w+ (\d+)", head)]
-    expect(counts == [database.vertices, database.triangles], f"ply has {counts[0]} vertices, {counts[1]} triangles")
+    expect(counts == [database.vertices, database.ground], f"ply has {counts[0]} vertices, {counts[1]} triangles")
     places = numpy.frombuffer(body, "<f4", 3 * counts[0]).reshape(-1, 3).astype(float)
     expect({tuple(place) for place in places} == database.places, "ply: every vertex at its place, exactly")
+    said = {int(of): int(to) - int(first) + 1 for of, first, to in
+            re.findall(rb"comment class (\d+) faces (\d+) to (\d+)", head)}
+    expect(said == {of: count for of, count in database.of_class.items() if of != HOLE}, "ply: faces of each class")
     obj = export(arguments, "obj", scratch / "mesh.obj", "--coordinates", "map").read_text().splitlines()
     places = {tuple(map(float, line.split()[1:])) for line in obj if line.startswith("v ")}
     east, north = database.origin
     expect(places == {(x + east, y + north, z) for x, y, z in database.places}, "obj: every vertex on the map")
-    expect(sum(line.startswith("f ") for line in obj) == database.triangles, "obj: every triangle")
+    expect(sum(line.startswith("f ") for line in obj) == database.ground, "obj: every triangle")
     sidecar = json.loads((scratch / "mesh.ply.json").read_text())
     expect(sidecar["offset_m"] == [*database.origin, 0.0], "the sidecar says where that is")
+    expect(sidecar["hole_triangles_left_out"] == database.holes, f"and that {database.holes} triangles are left out")
+    try:
+        import meshio
+    except ImportError as error:
+        raise Skip(error) from error
+    for path in [scratch / "mesh.ply", scratch / "mesh.obj"]:
+        mesh = meshio.read(path)
+        shape = (len(mesh.points), len(mesh.cells_dict["triangle"]))
+        expect(shape == (database.vertices, database.ground), f"meshio reads {path.name}: {shape}")
 
 
 def check_glb(database, arguments, scratch):
     glb = export(arguments, "glb", scratch / "mesh.glb")
     document, _ = read_glb(glb.read_bytes())
-    expect(document["accessors"][0]["count"] == database.vertices, "glb: every vertex")
+    found = {}
+    for node in document["nodes"]:
+        row, col = re.fullmatch(r"r(\d+)c(\d+)", node["name"]).groups()
+        found[int(row), int(col)] = glb_triangles(document, document["meshes"][node["mesh"]])
+    expect(found == database.ground_modules, f"{len(found)} nodes, each a load module by name and triangles")
+    places = {tuple(place) for positions in glb_positions(glb.read_bytes()) for place in positions}
+    turned = {(x, -z, y) for x, y, z in places}
+    expect(turned == database.places, "every vertex at its place, exactly")
     validate([glb], arguments)
 
 
@@ -157,47 +237,105 @@ def read_glb(data):
     return json.loads(data[20:20 + json_length]), data[28 + json_length:]
 
 
+def glb_triangles(document, mesh):
+    return sum(document["accessors"][primitive["indices"]]["count"] // 3 for primitive in mesh["primitives"])
+
+
 def glb_positions(data):
+    """The vertices of each mesh."""
     document, binary = read_glb(data)
-    accessor = document["accessors"][0]
-    start = document["bufferViews"][accessor["bufferView"]]["byteOffset"]
-    return numpy.frombuffer(binary, "<f4", 3 * accessor["count"], start).reshape(-1, 3).astype(float)
+    for mesh in document["meshes"]:
+        accessor = document["accessors"][mesh["primitives"][0]["attributes"]["POSITION"]]
+        start = document["bufferViews"][accessor["bufferView"]]["byteOffset"] + accessor["byteOffset"]
+        yield numpy.frombuffer(binary, "<f4", 3 * accessor["count"], start).reshape(-1, 3).astype(float)
 
 
 def check_geotiff(database, arguments, scratch):
     try:
         import rasterio
+        from rio_cogeo.cogeo import cog_validate
     except ImportError as error:
         raise Skip(error) from error
     path = export(arguments, "geotiff", scratch / "surface.tif")
+    spacing = database.manifest["area"]["spacing_m"]
     with rasterio.open(path) as raster:
         surface, profile = raster.read(1), raster.profile
         expect(profile["tiled"] and profile["compress"] == "deflate", "tiled and deflated")
         structure = raster.tags(ns="IMAGE_STRUCTURE")
         expect(structure.get("PREDICTOR", "3") == "3", f"predictor 3 ({structure})")
-        code = database.manifest["area"]["crs"].removeprefix("EPSG:")
-        expect(f'"EPSG","{code}"' in raster.crs.to_wkt(), f"rasterio reads EPSG:{code}")
+        check_systems(database, raster.crs.to_wkt())
         expect(numpy.isnan(raster.nodata), "nodata is NaN")
-        spacing = database.manifest["area"]["spacing_m"]
-        checked = 0
-        for x, y, z in database.places:
-            if x % spacing == 0 and y % spacing == 0:
-                row, col = raster.index(x + database.origin[0], y + database.origin[1])
-                checked += surface[row, col] == numpy.float32(z)
-        posts = sum(x % spacing == 0 and y % spacing == 0 for x, y, _ in database.places)
-        expect(checked == posts, f"{posts} vertices on posts have their height at that place")
-        expect(min(database.heights) <= surface.min() and surface.max() <= max(database.heights), "no height beyond")
+        place = {(x, y): raster.index(x + database.origin[0], y + database.origin[1])
+                 for x, y, _ in database.everywhere if x % spacing == 0 and y % spacing == 0}
+        overviews = raster.overviews(1)
+    # A vertex between ground and hole may go with either.
+    either = {(x, y) for x, y, _ in database.places}
+    inside = [at for at in place if at not in either]
+    expect(all(numpy.isnan(surface[place[at]]) for at in inside), f"{len(inside)} vertices inside holes have no height")
+    inside_ground = database.places - edges_of_holes(database)
+    on_posts = [(place[x, y], z) for x, y, z in inside_ground if (x, y) in place]
+    checked = sum(surface[at] == numpy.float32(z) for at, z in on_posts)
+    expect(checked == len(on_posts), f"{checked} vertices on posts have their height at that place")
+    found = surface[~numpy.isnan(surface)]
+    expect(bool(len(found) < surface.size) == bool(database.holes), f"{surface.size - len(found)} posts without height")
+    expect(min(database.heights) <= found.min() and found.max() <= max(database.heights), "no height beyond")
     residual = export(arguments, "geotiff", scratch / "residual.tif", "--layer", "residual")
     with rasterio.open(residual) as raster:
         values = raster.read(1).astype(float)
+        expect(not raster.crs.to_wkt().startswith("COMPD"), "a residual is no height")
         found = values[~numpy.isnan(values)]
         rms, told = numpy.sqrt((found ** 2).mean()), database.report["residual"]["rms_m"]
         expect(abs(rms - told) < 1e-9, f"RMS of the residual raster {rms:.6f} m, in the report {told:.6f} m")
+    for path in [path, residual]:
+        valid, errors, warnings = cog_validate(path, strict=True, quiet=True)
+        expect(valid and not errors and not warnings, f"{path.name} is a Cloud Optimized GeoTIFF {errors + warnings}")
+        check_overviews(path, overviews)
+
+
+def check_systems(database, wkt):
+    import pyproj
+    system = pyproj.CRS.from_wkt(wkt)
+    code = database.manifest["area"]["crs"].removeprefix("EPSG:")
+    expect(f'"EPSG","{code}"' in wkt, f"rasterio reads EPSG:{code}")
+    known = {"EGM96": 5773, "EGM2008": 3855, "NAVD88": 5703}.get(database.manifest["area"]["vertical_datum"])
+    vertical = system.sub_crs_list[1].to_epsg() if system.is_compound else None
+    expect(vertical == known, f"and for heights EPSG:{vertical}")
+
+
+def edges_of_holes(database):
+    """Vertices that ground and hole share."""
+    own = set()
+    for (row, col), module in database.modules.items():
+        for triangle, number in zip(module["triangles"], module["classes"]):
+            for x, y, z in (module["vertices"][v] for v in triangle if number == HOLE):
+                own.add((col * database.side + x / 128, row * database.side + y / 128, z / 128))
+    return own & database.places
+
+
+def check_overviews(path, decimations):
+    """Each is the mean of up to four posts of the one before, those without a value left out."""
+    import rasterio
+    with rasterio.open(path) as raster:
+        before = raster.read(1).astype(float)
+    expect(decimations == [2 ** (i + 1) for i in range(len(decimations))], f"overviews {decimations}")
+    expect(bool(decimations) == (max(before.shape) > 256), "as many as it takes to come to one block")
+    for index in range(len(decimations)):
+        with rasterio.open(path, overview_level=index) as raster:
+            values = raster.read(1).astype(float)
+        high, wide = before.shape
+        padded = numpy.pad(before, ((0, high % 2), (0, wide % 2)), constant_values=numpy.nan)
+        fours = numpy.stack([padded[i::2, j::2] for i in (0, 1) for j in (0, 1)])
+        count = (~numpy.isnan(fours)).sum(0)
+        mean = numpy.where(count == 0, numpy.nan, numpy.nansum(fours, 0) / numpy.maximum(count, 1))
+        same = values.shape == mean.shape and numpy.array_equal(values, mean.astype("f4"), equal_nan=True)
+        expect(same, f"overview {values.shape[1]} x {values.shape[0]} is the mean of what is below it")
+        before = values
 
 
 def check_gpkg(database, arguments, scratch):
     try:
         import geopandas
+        import pyogrio
     except ImportError as error:
         raise Skip(error) from error
     path = export(arguments, "gpkg", scratch / "area.gpkg")
@@ -210,7 +348,9 @@ def check_gpkg(database, arguments, scratch):
     expect(int(layers["load_modules"].triangles.sum()) == database.triangles, "counts add up")
     triangles = geopandas.read_file(path, layer="triangles")
     expect(len(triangles) == database.triangles and bool(triangles.has_z.all()), "triangles: polygons with heights")
-    import pyogrio
+    names = {of["name"] for of in database.report["classes"]} | {"hole"}
+    expect(set(triangles.class_name) <= names, f"triangles: names of classes {sorted(set(triangles.class_name))}")
+    expect(int((triangles.class_name == "hole").sum()) == database.holes, f"{database.holes} of them over holes")
     fast = pyogrio.read_info(path, layer="triangles")["capabilities"]["fast_spatial_filter"]
     east, north = (database.origin[axis] + database.side / 2 for axis in (0, 1))
     near = geopandas.read_file(path, layer="triangles", bbox=(east, north, east + 1, north + 1))
@@ -219,6 +359,36 @@ def check_gpkg(database, arguments, scratch):
     area = triangles.geometry.area.sum()
     whole = database.rows * database.cols * database.side ** 2
     expect(abs(area / whole - 1) < 1e-9, f"triangles cover {area / 1e6:.3f} km2")
+    check_styles(path, set(triangles["class"]))
+    check_in_qgis(path, dict(zip(triangles["class"], triangles.class_name)), arguments)
+
+
+def check_styles(path, classes):
+    """What QGIS reads: a default style for each layer, its symbols and categories at their places."""
+    with sqlite3.connect(path) as package:
+        styles = dict(package.execute("SELECT f_table_name, styleQML FROM layer_styles WHERE useAsDefault"))
+        geometries = {name for name, in package.execute("SELECT table_name FROM gpkg_geometry_columns")}
+        sound = package.execute("PRAGMA integrity_check").fetchone() == ("ok",)
+        broken = package.execute("PRAGMA foreign_key_check").fetchall()
+    expect(sound and not broken, "SQLite finds the package sound")
+    expect(set(styles) == geometries, "a style for every layer")
+    for name, text in styles.items():
+        renderer = xml.fromstring(text).find("renderer-v2")
+        symbols = {symbol.get("name") for symbol in renderer.iter("symbol")}
+        categories = {int(of.get("value")): of.get("symbol") for of in renderer.iter("category")}
+        wanted = classes if name == "triangles" else set()
+        expect(set(categories) == wanted and set(categories.values() or symbols) == symbols, f"style of {name}")
+
+
+def check_in_qgis(path, names, arguments):
+    if not arguments.qgis_python:
+        raise Skip("no --qgis-python")
+    layers = ["load_modules", "tiles", "breaches", "triangles"]
+    command = [arguments.qgis_python, str(HERE / "exports" / "qgis_styles.py"), str(path), *layers]
+    found = json.loads(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
+    expect(all(of["loaded"] for of in found.values()), "QGIS takes the style of every layer from the package")
+    wanted = {str(of): [name, "b_diagonal" if of == HOLE else "solid"] for of, name in names.items()}
+    expect(found["triangles"]["classes"] == wanted, f"QGIS names classes and hatches holes {wanted}")
 
 
 def check_openflight(database, arguments, scratch):
@@ -236,14 +406,13 @@ def check_openflight(database, arguments, scratch):
             places.append(tuple(map(float, line.split()[1:4])))
         elif line.startswith("f "):
             faces += len(line.split()) - 3
-    expect(faces == database.triangles, f"{faces} triangles come out")
+    expect(faces == database.ground, f"{faces} triangles come out")
     places = numpy.array(places)
     # OSG's OBJ writer may turn axes: compare the extents of each axis in any order.
     extents = sorted(numpy.round(places.max(0) - places.min(0), 2))
     own = numpy.array(sorted(database.places))
     expected = sorted(numpy.round(own.max(0) - own.min(0), 2))
     expect(numpy.allclose(extents, expected, atol=0.05), f"bounds {extents}, expected {expected}")
-    import xml.etree.ElementTree as xml
     tree = xml.parse(folder / "area.mft").getroot()
     listed = [tile.get("file") for tile in tree.iter("Tile")]
     there = all((folder / name).exists() for name in listed)
@@ -267,32 +436,27 @@ def check_3dtiles(database, arguments, scratch):
     own, longitude, latitude, pyproj = globe(database)
     tileset = json.loads((folder / "tileset.json").read_text())
     geodetic = pyproj.Transformer.from_crs(4978, 4979, always_xy=True)
-    found, triangles, files, levels, worst = {}, 0, [], [], True
-    for square in tileset["root"]["children"]:
+    found, triangles, worst = {}, 0, check_tileset(folder, tileset)
+    groups = []
+    for square, child in leaves(tileset["root"]):
+        groups.append(folder / child["content"]["uri"])
+        document, _ = read_glb(groups[-1].read_bytes())
+        triangles += sum(glb_triangles(document, mesh) for mesh in document["meshes"])
+        x, y, z = numpy.concatenate(list(glb_positions(groups[-1].read_bytes()))).T
         matrix = numpy.array(square["transform"]).reshape(4, 4).T
-        leaves = square
-        # Coarser levels of detail, one mesh each, stand between a square and its load modules.
-        while "children" in leaves["children"][0]:
-            worst &= leaves["children"][0]["geometricError"] <= leaves["geometricError"]
-            leaves = leaves["children"][0]
-            levels.append(folder / leaves["content"]["uri"])
-        worst &= all(child["geometricError"] <= tileset["geometricError"] for child in leaves["children"])
-        for child in leaves["children"]:
-            path = folder / child["content"]["uri"]
-            files.append(path)
-            document, _ = read_glb(path.read_bytes())
-            for primitive in document["meshes"][0]["primitives"]:
-                triangles += document["accessors"][primitive["indices"]]["count"] // 3
-            x, y, z = glb_positions(path.read_bytes()).T
-            place = matrix @ numpy.array([x, -z, y, numpy.ones_like(x)])
-            lon, lat, height = geodetic.transform(*place[:3])
-            for key in zip(numpy.round(lon, 7), numpy.round(lat, 7), height):
-                found.setdefault(key[:2], []).append(key[2])
-            box = numpy.array(child["boundingVolume"]["box"])
-            local = numpy.array([x, -z, y]).T - box[:3]
-            worst &= bool((numpy.abs(local) <= box[[3, 7, 11]] + 1e-3).all())
-    expect(triangles == database.triangles, f"{triangles} triangles in {len(files)} load modules")
-    expect(worst, "boxes hold their content, errors shrink on the way down")
+        lon, lat, height = geodetic.transform(*(matrix @ numpy.array([x, -z, y, numpy.ones_like(x)]))[:3])
+        for key in zip(numpy.round(lon, 7), numpy.round(lat, 7), height):
+            found.setdefault(key[:2], []).append(key[2])
+        box = numpy.array(child["boundingVolume"]["box"])
+        local = numpy.array([x, -z, y]).T - box[:3]
+        worst &= bool((numpy.abs(local) <= box[[3, 7, 11]] + 1e-3).all())
+    expect(triangles == database.ground, f"{triangles} triangles in {len(groups)} groups of load modules")
+    expect(worst, "boxes hold their content, errors shrink on the way down, no list of children is empty")
+    files = sorted(folder.rglob("*.glb"))
+    listed = {folder / tile["content"]["uri"] for tile in tiles_below(tileset["root"]) if "content" in tile}
+    expect(listed == set(files), f"each of {len(files)} files is in the tileset")
+    km2 = database.rows * database.cols * database.side ** 2 / 1e6
+    expect(len(files) < max(10, km2), f"{len(files)} files for {km2:.0f} km2")
     offsets, missing = [], 0
     for (_, _, z), lon, lat in zip(own, longitude, latitude):
         around = [(lon + i * 1e-7, lat + j * 1e-7) for i in (0, -1, 1) for j in (0, -1, 1)]
@@ -305,25 +469,55 @@ def check_3dtiles(database, arguments, scratch):
     expect(missing == 0, f"every vertex is where PROJ puts it, to a centimetre ({missing} missing)")
     spread = max(offsets) - min(offsets)
     expect(spread < 5, f"heights differ from the database's by {min(offsets):.3f} to {max(offsets):.3f} m")
-    squares = [folder / square["content"]["uri"] for square in tileset["root"]["children"]]
-    validate(squares + levels + files[:100], arguments)
+    validate(files, arguments)
 
 
-def decode_terrain(data):
-    count = struct.unpack_from("<I", data, 88)[0]
-    low, high = struct.unpack_from("<ff", data, 24)
-    folded = numpy.frombuffer(data, "<u2", 3 * count, 92).reshape(3, count).astype(int)
-    u, v, h = numpy.cumsum((folded >> 1) ^ -(folded & 1), axis=1)
-    at = 92 + 6 * count
-    total = struct.unpack_from("<I", data, at)[0]
-    codes = numpy.frombuffer(data, "<u2", 3 * total, at + 4).astype(int)
-    high_water = numpy.concatenate([[0], numpy.cumsum(codes == 0)[:-1]])
-    return u, v, low + h / 32767 * (high - low), (high_water - codes).reshape(-1, 3), (high - low) / 32767
+def tiles_below(tile):
+    yield tile
+    for child in tile.get("children", []):
+        yield from tiles_below(child)
+
+
+def leaves(root):
+    """Every tile without children, and the square it is in."""
+    for square in root["children"]:
+        yield from ((square, tile) for tile in tiles_below(square) if "children" not in tile)
+
+
+def check_tileset(folder, tileset):
+    """What the specification wants of tileset.json, as far as its own validator would look."""
+    sound = tileset["asset"]["version"] == "1.1" and tileset["geometricError"] >= tileset["root"]["geometricError"]
+    for tile in tiles_below(tileset["root"]):
+        [(kind, numbers)] = tile["boundingVolume"].items()
+        sound &= len(numbers) == {"region": 6, "box": 12}[kind] and all(map(numpy.isfinite, numbers))
+        sound &= tile["geometricError"] >= 0 and tile.get("children") != []
+        sound &= all(child["geometricError"] <= tile["geometricError"] for child in tile.get("children", []))
+        sound &= "content" not in tile or (folder / tile["content"]["uri"]).is_file()
+    return sound
+
+
+class Terrain:
+    """A tile of quantized-mesh."""
+
+    def __init__(self, data):
+        *self.centre, self.low, self.high = struct.unpack_from("<dddff", data, 0)
+        *self.sphere, self.radius = struct.unpack_from("<dddd", data, 32)
+        self.horizon = struct.unpack_from("<ddd", data, 64)
+        count = struct.unpack_from("<I", data, 88)[0]
+        folded = numpy.frombuffer(data, "<u2", 3 * count, 92).reshape(3, count).astype(int)
+        self.u, self.v, self.h = numpy.cumsum((folded >> 1) ^ -(folded & 1), axis=1)
+        self.step = (self.high - self.low) / 32767
+        self.height = self.low + self.h * self.step
+        at = 92 + 6 * count
+        total = 3 * struct.unpack_from("<I", data, at)[0]
+        codes = numpy.frombuffer(data, "<u2", total, at + 4).astype(int)
+        high_water = numpy.concatenate([[0], numpy.cumsum(codes == 0)[:-1]])
+        self.triangles = (high_water - codes).reshape(-1, 3)
 
 
 def check_quantized_mesh(database, arguments, scratch):
     folder = export(arguments, "quantized-mesh", scratch / "terrain", *datum(database))
-    own, longitude, latitude, _ = globe(database)
+    own, longitude, latitude, pyproj = globe(database)
     layer = json.loads((folder / "layer.json").read_text())
     level = layer["maxzoom"]
     degrees = 180 / 2 ** level
@@ -335,25 +529,57 @@ def check_quantized_mesh(database, arguments, scratch):
                     listed += (folder / f"{index}/{x}/{y}.terrain").exists()
     files = sum(1 for _ in folder.rglob("*.terrain"))
     expect(listed == files, f"{files} tiles, each listed, up to both roots")
-    places = {}
+    check_headers(folder, pyproj)
+    places, worst = {}, 0
     for path in (folder / str(level)).rglob("*.terrain"):
         x, y = int(path.parent.name), int(path.stem)
-        u, v, height, triangles, rung = decode_terrain(path.read_bytes())
-        for a, b, c in zip(u + x * 32767, v + y * 32767, height):
-            places[a, b] = c
+        tile = Terrain(path.read_bytes())
+        for a, b, c in zip(tile.u + x * 32767, tile.v + y * 32767, tile.height):
+            off = abs(places.setdefault((a, b), (c, tile.step))[0] - c)
+            worst = max(worst, off / max(tile.step, places[a, b][1], 1e-9))
+    expect(worst < 1.01, f"tiles agree on their borders to {worst:.2f} steps of heights")
     step = degrees / 32767
     offsets, missing = [], 0
     for (_, _, z), lon, lat in zip(own, longitude, latitude):
         a, b = (lon + 180) / step, (lat + 90) / step
         near = [(round(a), round(b)), (int(a), int(b)), (int(a) + 1, int(b)), (int(a), int(b) + 1)]
-        height = next((places[key] for key in near if key in places), None)
+        height = next((places[key][0] for key in near if key in places), None)
         if height is None:
             missing += 1
         else:
             offsets.append(height - z)
-    expect(missing == 0, f"every vertex is in a tile ({missing} missing), steps of {rung * 100:.1f} cm up")
+    expect(missing == 0, f"every vertex is in a tile ({missing} missing)")
     spread = max(offsets) - min(offsets)
     expect(spread < 5, f"heights differ from the database's by {min(offsets):.3f} to {max(offsets):.3f} m")
+    holes = folder / "holes.geojson"
+    rings = json.loads(holes.read_text())["features"][0]["geometry"]["coordinates"] if holes.exists() else []
+    expect(len(rings) == database.holes, f"holes.geojson has {len(rings)} triangles over holes")
+
+
+def check_headers(folder, pyproj):
+    """Each tile's header has its own heights; its sphere holds the tile; its horizon point hides no visible vertex."""
+    centred = pyproj.Transformer.from_crs(4979, 4978, always_xy=True)
+    axes = numpy.array([6378137.0, 6378137.0, 6356752.314245179])
+    own, spheres, horizons, count = True, True, True, 0
+    for path in folder.rglob("*.terrain"):
+        tile, count = Terrain(path.read_bytes()), count + 1
+        degrees = 180 / 2 ** int(path.parent.parent.name)
+        own &= tile.h.min() == 0 and tile.h.max() == (32767 if tile.low < tile.high else 0)
+        longitude = (int(path.parent.name) + tile.u / 32767) * degrees - 180
+        latitude = (int(path.stem) + tile.v / 32767) * degrees - 90
+        places = numpy.array(centred.transform(longitude, latitude, tile.height)).T
+        far = numpy.linalg.norm(places - tile.sphere, axis=1)
+        spheres &= bool((far <= tile.radius + tile.step + 0.01).all() and tile.radius < 1.01 * far.max() + 1)
+        # What hides the point hides every vertex: it is higher above the horizon than each, as seen from the middle.
+        point, scaled = numpy.array(tile.horizon), places / axes
+        distance = numpy.maximum(numpy.linalg.norm(scaled, axis=1), 1)
+        away = numpy.linalg.norm(point)
+        cosines = numpy.clip(scaled @ point / numpy.linalg.norm(scaled, axis=1) / away, -1, 1)
+        needed = numpy.arccos(cosines) + numpy.arccos(1 / distance)
+        horizons &= bool(away >= 1 - 1e-12 and (needed <= numpy.arccos(min(1, 1 / away)) + 1e-6).all() or away > 99)
+    expect(own, f"the headers of {count} tiles have each tile's own lowest and highest height")
+    expect(spheres, "their spheres hold them")
+    expect(horizons, "what hides their horizon points hides all of them")
 
 
 def check_cesium(database, arguments, scratch):

@@ -1,12 +1,13 @@
 //! The coarser mesh of a square: two triangles to a load module, over the corners that load modules have anyway; and
 //! how far the ground lies from it, measured exactly.
 
-use terrain::{LoadModule, ModuleRect, QUANTA_PER_METRE};
+use terrain::{HOLE_CLASS, LoadModule, ModuleId, ModuleRect, QUANTA_PER_METRE};
 
 use crate::Product;
 use crate::mesh::Mesh;
 
-/// Corners of the load modules of a square, and the triangles between them.
+/// Corners of the load modules of a square, and the triangles between them; load modules that are holes for more than
+/// half are left out.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Coarse {
     /// Vertices of the mesh, row by row from the south-west.
@@ -28,6 +29,10 @@ impl Coarse {
         }
         let wide = rect.cols() + 1;
         for (row, col) in (0..rect.rows()).flat_map(|row| (0..rect.cols()).map(move |col| (row, col))) {
+            let id = ModuleId { row: rect.south + row, col: rect.west + col };
+            if product.module(id).is_some_and(is_mostly_hole) {
+                continue;
+            }
             let south_west = row * wide + col;
             let (south_east, north_west) = (south_west + 1, south_west + wide);
             let north_east = north_west + 1;
@@ -56,6 +61,20 @@ fn corner_vertex(product: &Product, mesh: &Mesh, row: u32, col: u32) -> u32 {
         }
     }
     unreachable!("the triangles of a load module cover its corners")
+}
+
+/// Whether no source has a height over more than half of a load module.
+fn is_mostly_hole(module: &LoadModule) -> bool {
+    let doubled_area = |triangle: &[u16; 3]| {
+        let [a, b, c] = triangle.map(|v| {
+            let v = module.vertices[usize::from(v)];
+            [i64::from(v.x), i64::from(v.y)]
+        });
+        (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+    };
+    let triangles = module.triangles.iter().zip(&module.classes);
+    let holes: i64 = triangles.filter(|(_, class)| **class == HOLE_CLASS).map(|(own, _)| doubled_area(own)).sum();
+    i64::from(module.side) * i64::from(module.side) < holes
 }
 
 /// Largest distance in quanta between a load module and the two triangles over its corners. Both are flat between
@@ -96,7 +115,7 @@ mod tests {
     #[test]
     fn a_coarse_square_has_two_triangles_to_a_load_module_and_a_measured_error() {
         let product = samples::product();
-        let mesh = Mesh::of(&product);
+        let mesh = Mesh::whole(&product);
         let coarse = Coarse::of(&product, &mesh, product.rect);
         assert_eq!((coarse.vertices.len(), coarse.triangles.len()), (6, 4));
         let places: Vec<[i32; 3]> = coarse.vertices.iter().map(|&v| mesh.vertices[v as usize]).collect();

@@ -1,23 +1,26 @@
-//! GeoTIFF: 32-bit floats in deflated blocks with the predictor for floats, placed by GeoKeys.
+//! GeoTIFF: 32-bit floats in deflated blocks with the predictor for floats, placed by GeoKeys, with coarser images of
+//! the same ground, so that a viewer of the whole does not read the whole.
 
-use std::io::{self, Seek, Write};
+use std::io::Write;
 
 use flate2::Compression;
 use flate2::write::ZlibEncoder;
 use terrain::{Post, PostRect};
-use tiff::encoder::{DirectoryEncoder, Rational, TiffEncoder, TiffKind, TiffKindBig, TiffKindStandard};
-use tiff::tags::{CompressionMethod, ResolutionUnit, SampleFormat, Tag};
-use tiff::{TiffError, TiffResult};
 
+use crate::overviews::Raster;
+use crate::tiff_layout::{self, Image, Value, tag};
 use crate::{ExportError, Product};
 
 /// Posts along a side of a block.
 pub(crate) const BLOCK: usize = 256;
-/// Raw bytes up to which a file is an ordinary TIFF, whose offsets have 32 bits.
-const ORDINARY_BYTES_MAX: u64 = 3 << 30;
 
-/// The deflated blocks of one band of at most [`BLOCK`] rows, from west to east; what lies beyond the raster is NaN.
-pub(crate) fn blocks(values: &[f32], wide: usize) -> Vec<Vec<u8>> {
+/// The deflated blocks of a raster, row by row from the north; what lies beyond the raster is NaN.
+pub(crate) fn blocks(raster: &Raster) -> Vec<Vec<u8>> {
+    raster.metres.chunks(raster.wide * BLOCK).flat_map(|band| blocks_of_band(band, raster.wide)).collect()
+}
+
+/// Those of at most [`BLOCK`] rows, from west to east.
+fn blocks_of_band(values: &[f32], wide: usize) -> Vec<Vec<u8>> {
     let rows: Vec<&[f32]> = values.chunks(wide).collect();
     let block = |west: usize| {
         let mut bytes = Vec::with_capacity(4 * BLOCK * BLOCK);
@@ -51,24 +54,32 @@ fn deflate(bytes: &[u8]) -> Vec<u8> {
     written.expect("writing to memory cannot fail")
 }
 
-/// All of a file but its values.
-struct Plan<'a> {
+/// The blocks of a raster, and how many posts it has west to east and south to north.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Blocks {
+    pub wide: usize,
+    pub high: usize,
+    pub blocks: Vec<Vec<u8>>,
+}
+
+/// What a file says besides its values.
+struct About<'a> {
     product: &'a Product,
     rect: PostRect,
     layer: &'static str,
     epsg: u16,
 }
 
-/// Writes the blocks, row of blocks by row of blocks from the north, with all that describes them.
+/// Writes images of the posts of `rect`, the finest first, with all that describes them.
 ///
 /// # Errors
 /// When it cannot be written, or the coordinate system has no EPSG code that fits a GeoKey.
 pub(crate) fn write(
-    out: &mut (impl Write + Seek),
+    out: &mut impl Write,
     product: &Product,
     rect: PostRect,
     layer: &'static str,
-    blocks: &[Vec<u8>],
+    images: Vec<Blocks>,
 ) -> Result<(), ExportError> {
     let epsg = product.epsg().and_then(|code| u16::try_from(code).ok()).ok_or_else(|| ExportError::Impossible {
         what: "the coordinate system".into(),
@@ -76,90 +87,81 @@ pub(crate) fn write(
         expected: "one with an EPSG code".into(),
         hint: "a GeoTIFF names its system by EPSG code; export a mesh instead".into(),
     })?;
-    let plan = Plan { product, rect, layer, epsg };
-    let written = match rect.post_count() as u64 * 4 <= ORDINARY_BYTES_MAX {
-        true => write_tiff::<TiffKindStandard>(out, &plan, blocks),
-        false => write_tiff::<TiffKindBig>(out, &plan, blocks),
+    let about = About { product, rect, layer, epsg };
+    let image = |(index, image): (usize, Blocks)| {
+        let mut tags = sample_tags(&image, 0 < index);
+        // Where the coarser ones lie follows from the finest.
+        if index == 0 {
+            tags.extend(place_tags(&about));
+        }
+        Image { tags, blocks: image.blocks }
     };
-    written.map_err(|error| match error {
-        TiffError::IoError(source) => ExportError::write(layer)(source),
-        other => ExportError::write(layer)(io::Error::other(other)),
-    })
+    let images: Vec<Image> = images.into_iter().enumerate().map(image).collect();
+    tiff_layout::write(out, &images).map_err(ExportError::write(layer))
 }
 
-fn write_tiff<K: TiffKind>(out: &mut (impl Write + Seek), plan: &Plan, blocks: &[Vec<u8>]) -> TiffResult<()> {
-    let mut tiff = TiffEncoder::<_, K>::new_generic(out)?;
-    let mut directory = tiff.image_directory()?;
-    let (mut offsets, mut sizes) = (Vec::new(), Vec::new());
-    for block in blocks {
-        offsets.push(K::convert_offset(directory.write_data(block.as_slice())?)?);
-        sizes.push(K::convert_offset(block.len() as u64)?);
-    }
-    write_sample_tags(&mut directory, plan)?;
-    directory.write_tag(Tag::TileOffsets, K::convert_slice(&offsets))?;
-    directory.write_tag(Tag::TileByteCounts, K::convert_slice(&sizes))?;
-    write_place_tags(&mut directory, plan)?;
-    directory.finish()
-}
-
-fn write_sample_tags<K: TiffKind>(
-    directory: &mut DirectoryEncoder<'_, impl Write + Seek, K>,
-    plan: &Plan,
-) -> TiffResult<()> {
+fn sample_tags(image: &Blocks, is_overview: bool) -> Vec<(u16, Value)> {
+    const DEFLATE: u16 = 8;
     const BLACK_IS_ZERO: u16 = 1;
+    const TOGETHER: u16 = 1;
     const FLOATS: u16 = 3;
-    directory.write_tag(Tag::ImageWidth, plan.rect.posts_wide() as u32)?;
-    directory.write_tag(Tag::ImageLength, plan.rect.posts_high() as u32)?;
-    directory.write_tag(Tag::BitsPerSample, 32_u16)?;
-    directory.write_tag(Tag::Compression, CompressionMethod::Deflate.to_u16())?;
-    directory.write_tag(Tag::PhotometricInterpretation, BLACK_IS_ZERO)?;
-    directory.write_tag(Tag::SamplesPerPixel, 1_u16)?;
-    directory.write_tag(Tag::XResolution, Rational { n: 1, d: 1 })?;
-    directory.write_tag(Tag::YResolution, Rational { n: 1, d: 1 })?;
-    directory.write_tag(Tag::ResolutionUnit, ResolutionUnit::None.to_u16())?;
-    directory.write_tag(Tag::Predictor, FLOATS)?;
-    directory.write_tag(Tag::TileWidth, BLOCK as u32)?;
-    directory.write_tag(Tag::TileLength, BLOCK as u32)?;
-    directory.write_tag(Tag::SampleFormat, SampleFormat::IEEEFP.to_u16())
+    let short = |number: u16| Value::Shorts(vec![number]);
+    let long = |number: usize| Value::Longs(vec![number as u32]);
+    vec![
+        (tag::SUBFILE_TYPE, long(usize::from(is_overview))),
+        (tag::WIDTH, long(image.wide)),
+        (tag::LENGTH, long(image.high)),
+        (tag::BITS_PER_SAMPLE, short(32)),
+        (tag::COMPRESSION, short(DEFLATE)),
+        (tag::PHOTOMETRIC, short(BLACK_IS_ZERO)),
+        (tag::SAMPLES_PER_PIXEL, short(1)),
+        (tag::PLANAR_CONFIGURATION, short(TOGETHER)),
+        (tag::PREDICTOR, short(FLOATS)),
+        (tag::TILE_WIDTH, long(BLOCK)),
+        (tag::TILE_LENGTH, long(BLOCK)),
+        (tag::SAMPLE_FORMAT, short(FLOATS)),
+        (tag::GDAL_NODATA, Value::Ascii("nan".into())),
+    ]
 }
 
-fn write_place_tags<K: TiffKind>(
-    directory: &mut DirectoryEncoder<'_, impl Write + Seek, K>,
-    plan: &Plan,
-) -> TiffResult<()> {
+fn place_tags(about: &About) -> [(u16, Value); 4] {
+    let frame = &about.product.frame;
+    let spacing_m = frame.spacing.metres();
+    // A post is the centre of its pixel, so the raster's corner lies half a post beyond the north-west post.
+    let [east_m, north_m] = frame.place_m(Post::new(about.rect.north, about.rect.west));
+    let corner = vec![0.0, 0.0, 0.0, east_m - spacing_m / 2.0, north_m + spacing_m / 2.0, 0.0];
+    [
+        (tag::PIXEL_SCALE, Value::Doubles(vec![spacing_m, spacing_m, 0.0])),
+        (tag::TIEPOINT, Value::Doubles(corner)),
+        (tag::GEO_KEYS, Value::Shorts(geo_keys(about).into_flattened())),
+        (tag::GDAL_METADATA, Value::Ascii(metadata(about))),
+    ]
+}
+
+/// The coordinate system: one of heights, too, where these are heights above a datum that has a code.
+fn geo_keys(about: &About) -> Vec<[u16; 4]> {
     const PROJECTED: u16 = 1;
     const PIXEL_IS_AREA: u16 = 1;
     const METRE: u16 = 9001;
+    // GeoTIFF 1.1: of 1.0 GDAL drops the vertical system unless told otherwise.
     let mut keys: Vec<[u16; 4]> = vec![
-        [1, 1, 0, 0],
+        [1, 1, 1, 0],
         [1024, 0, 1, PROJECTED],
         [1025, 0, 1, PIXEL_IS_AREA],
-        [3072, 0, 1, plan.epsg],
+        [3072, 0, 1, about.epsg],
         [3076, 0, 1, METRE],
     ];
-    if let (Some(code), "surface") = (vertical_code(plan.product.vertical_datum()), plan.layer) {
-        keys.push([4096, 0, 1, code]);
+    if let (Some(code), "surface") = (vertical_code(about.product.vertical_datum()), about.layer) {
+        keys.extend([[4096, 0, 1, code], [4099, 0, 1, METRE]]);
     }
-    keys.push([4099, 0, 1, METRE]);
     keys[0][3] = keys.len() as u16 - 1;
-    let frame = &plan.product.frame;
-    let spacing_m = frame.spacing.metres();
-    // A post is the centre of its pixel, so the raster's corner lies half a post beyond the north-west post.
-    let [east_m, north_m] = frame.place_m(Post::new(plan.rect.north, plan.rect.west));
-    let corner = [0.0, 0.0, 0.0, east_m - spacing_m / 2.0, north_m + spacing_m / 2.0, 0.0];
-    directory.write_tag(Tag::ModelPixelScaleTag, &[spacing_m, spacing_m, 0.0][..])?;
-    directory.write_tag(Tag::ModelTiepointTag, &corner[..])?;
-    directory.write_tag(Tag::GeoKeyDirectoryTag, keys.as_flattened())?;
-    directory.write_tag(Tag::Unknown(GDAL_METADATA), &*metadata(plan))?;
-    directory.write_tag(Tag::GdalNodata, "nan")
+    keys
 }
 
-const GDAL_METADATA: u16 = 42112;
-
 /// What the band holds, for GDAL.
-fn metadata(plan: &Plan) -> String {
-    let area = &plan.product.manifest.area;
-    let meaning = match plan.layer {
+fn metadata(about: &About) -> String {
+    let area = &about.product.manifest.area;
+    let meaning = match about.layer {
         "surface" => "height of the compiled surface, metres",
         _ => "height of the ground less that of the compiled surface, metres",
     };
@@ -175,14 +177,23 @@ fn metadata(plan: &Plan) -> String {
     )
 }
 
+/// Names of datums as [`plain_datum`](crate::earth::plain_datum) has them, and the EPSG code of heights above each, in
+/// metres.
+const VERTICAL_CODES: [(&str, u16); 8] = [
+    ("dhhn2016", 7837),
+    ("egm2008", 3855),
+    ("egm84", 5798),
+    ("egm96", 5773),
+    ("evrf2007", 5621),
+    ("evrf2019", 9389),
+    ("msl", 5714),
+    ("navd88", 5703),
+];
+
 /// EPSG code of heights above a datum, where it has one.
 fn vertical_code(datum: &str) -> Option<u16> {
-    match crate::earth::plain_datum(datum).as_str() {
-        "egm96" => Some(5773),
-        "egm2008" => Some(3855),
-        "navd88" => Some(5703),
-        _ => None,
-    }
+    let plain = crate::earth::plain_datum(datum);
+    VERTICAL_CODES.iter().find(|(name, code)| plain == *name || plain == format!("epsg{code}")).map(|(_, code)| *code)
 }
 
 #[cfg(test)]
@@ -190,9 +201,14 @@ mod tests {
     use std::io::Cursor;
 
     use tiff::decoder::{Decoder, DecodingResult};
+    use tiff::tags::Tag;
 
     use super::*;
     use crate::samples;
+
+    fn image(raster: &Raster) -> Blocks {
+        Blocks { wide: raster.wide, high: raster.high(), blocks: blocks(raster) }
+    }
 
     #[test]
     fn values_come_back_from_blocks_as_they_were() {
@@ -200,20 +216,37 @@ mod tests {
         let rect = PostRect::of_size(BLOCK + 3, BLOCK + 5);
         let value = |row: usize, col: usize| (row * 1000 + col) as f32 / 128.0;
         let wide = rect.posts_wide();
-        let bands = [(0, BLOCK), (BLOCK, BLOCK + 3)];
-        let blocks: Vec<Vec<u8>> = bands
-            .into_iter()
-            .flat_map(|(from, to)| {
-                let values: Vec<f32> = (from..to).flat_map(|row| (0..wide).map(move |col| value(row, col))).collect();
-                blocks(&values, wide)
-            })
-            .collect();
-        let mut file = Cursor::new(Vec::new());
-        write(&mut file, &product, rect, "surface", &blocks).unwrap();
-        let mut decoder = Decoder::new(Cursor::new(file.into_inner())).unwrap();
+        let metres = (0..rect.posts_high()).flat_map(|row| (0..wide).map(move |col| value(row, col))).collect();
+        let finest = Raster { wide, metres };
+        let coarser = finest.halved();
+        let mut file = Vec::new();
+        write(&mut file, &product, rect, "surface", vec![image(&finest), image(&coarser)]).unwrap();
+        let mut decoder = Decoder::new(Cursor::new(file)).unwrap();
         assert_eq!(decoder.get_tag_u32(Tag::TileWidth).unwrap(), BLOCK as u32);
-        let DecodingResult::F32(read) = decoder.read_image().unwrap() else { panic!("floats were written") };
-        let expected = (0..rect.posts_high()).flat_map(|row| (0..wide).map(move |col| value(row, col)));
-        assert!(read.into_iter().eq(expected));
+        for expected in [finest, coarser] {
+            let DecodingResult::F32(read) = decoder.read_image().unwrap() else { panic!("floats were written") };
+            assert_eq!(read, expected.metres);
+            let last = !decoder.more_images();
+            assert_eq!(last, decoder.get_tag_u32(Tag::NewSubfileType).unwrap() == 1);
+            if !last {
+                decoder.next_image().unwrap();
+            }
+        }
+    }
+
+    #[test]
+    fn heights_above_a_known_datum_have_a_system_of_their_own_and_residuals_have_none() {
+        let mut product = samples::product();
+        let mut vertical = |datum: &str, layer: &'static str| {
+            product.manifest.area.vertical_datum = datum.into();
+            let keys = geo_keys(&About { product: &product, rect: product.grid.area(), layer, epsg: 32611 });
+            assert!(keys.is_sorted() && usize::from(keys[0][3]) + 1 == keys.len());
+            keys.iter().find(|key| key[0] == 4096).map(|key| key[3])
+        };
+        for (datum, code) in [("EGM 96", Some(5773)), ("NAVD88", Some(5703)), ("EPSG:3855", Some(3855)), ("", None)] {
+            assert_eq!(vertical(datum, "surface"), code, "{datum}");
+        }
+        assert_eq!(vertical("EGM96", "residual"), None);
+        assert_eq!(vertical("ellipsoid", "surface"), None);
     }
 }

@@ -5,9 +5,10 @@
 use std::io::{Result, Write};
 
 use serde_json::{Value, json};
-use terrain::{LATTICE_PER_POST, Tin, metres_of_quanta};
+use terrain::{LATTICE_PER_POST, ModuleId, ModuleRect, Tin, metres_of_quanta};
 
 use crate::mesh::normals;
+use crate::modules::module_name;
 use crate::{Facts, Mesh, Product};
 
 /// Base colours of classes, in order and over again: tell apart by the colour-blind, too.
@@ -22,17 +23,26 @@ pub(crate) const COLOURS: [[f64; 3]; 8] = [
     [0.42, 0.24, 0.38],
 ];
 
-/// A mesh as it goes into a glTF: axes turned, in metres.
+/// Meshes as they go into a glTF, each in a node of its own.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Gltf {
+    /// In order; none without triangles.
+    pub nodes: Vec<GltfNode>,
+    /// What else to tell a reader.
+    pub extras: Value,
+}
+
+/// A mesh as it goes into a glTF: axes turned, in metres.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct GltfNode {
+    /// What a reader shows in its tree: `r0003c0017`, a load module by its row and column.
+    pub name: String,
     /// x east, y up, z south.
     pub positions: Vec<[f32; 3]>,
     /// Unit vectors.
     pub normals: Vec<[f32; 3]>,
     /// Triangles of each class of ground, in order.
     pub groups: Vec<(u8, Vec<[u32; 3]>)>,
-    /// What else to tell a reader.
-    pub extras: Value,
 }
 
 /// Turns east, north, up into glTF's axes.
@@ -41,7 +51,7 @@ pub(crate) fn turned([east, north, up]: [f64; 3]) -> [f32; 3] {
     [east as f32, up as f32, 0.0 - north as f32]
 }
 
-impl Gltf {
+impl GltfNode {
     /// The triangles of `mesh` by class, over vertices that are placed already.
     pub(crate) fn with_groups(mut self, triangles: &[[u32; 3]], classes: &[u8]) -> Self {
         let mut by_class = vec![Vec::new(); 256];
@@ -50,47 +60,97 @@ impl Gltf {
         self.groups = groups.collect();
         self
     }
+}
 
+/// What a view is for, in the numbers of OpenGL: vertices, or indices of them.
+const ARRAY_BUFFER: u32 = 34962;
+const ELEMENT_ARRAY_BUFFER: u32 = 34963;
+
+/// The document and the numbers of a glTF in the making: views of all positions, all normals and all indices.
+#[derive(Default)]
+struct Parts {
+    views: [Vec<u8>; 3],
+    accessors: Vec<Value>,
+    meshes: Vec<Value>,
+    nodes: Vec<Value>,
+}
+
+impl Parts {
+    const POSITIONS: usize = 0;
+    const NORMALS: usize = 1;
+    const INDICES: usize = 2;
+
+    /// Adds an accessor; its number.
+    fn accessor(&mut self, view: usize, start: usize, component: u32, count: usize, kind: &str) -> usize {
+        self.accessors.push(json!({
+            "bufferView": view, "byteOffset": start, "componentType": component, "count": count, "type": kind,
+        }));
+        self.accessors.len() - 1
+    }
+
+    fn vectors(&mut self, view: usize, vectors: &[[f32; 3]]) -> usize {
+        const F32: u32 = 5126;
+        let start = self.views[view].len();
+        let bytes = vectors.as_flattened().iter().flat_map(|number| number.to_le_bytes());
+        self.views[view].extend(bytes);
+        self.accessor(view, start, F32, vectors.len(), "VEC3")
+    }
+
+    fn add(&mut self, node: &GltfNode, materials: &[u8]) {
+        let positions = self.vectors(Self::POSITIONS, &node.positions);
+        let [low, high] = bounds(&node.positions);
+        (self.accessors[positions]["min"], self.accessors[positions]["max"]) = (json!(low), json!(high));
+        let normals = self.vectors(Self::NORMALS, &node.normals);
+        let mut primitives = Vec::with_capacity(node.groups.len());
+        for (class, triangles) in &node.groups {
+            let start = self.views[Self::INDICES].len();
+            let component = put_indices(&mut self.views[Self::INDICES], triangles, node.positions.len());
+            pad(&mut self.views[Self::INDICES], 0);
+            let indices = self.accessor(Self::INDICES, start, component, 3 * triangles.len(), "SCALAR");
+            let material = materials.iter().position(|of| of == class);
+            primitives.push(json!({ "attributes": { "POSITION": positions, "NORMAL": normals }, "indices": indices,
+                                    "material": material, "mode": 4 }));
+        }
+        self.nodes.push(json!({ "name": node.name, "mesh": self.meshes.len() }));
+        self.meshes.push(json!({ "name": node.name, "primitives": primitives }));
+    }
+}
+
+impl Gltf {
     /// The bytes of the binary file.
     pub(crate) fn bytes(&self) -> Vec<u8> {
-        let mut binary = Vec::with_capacity(self.positions.len() * 24);
-        let mut views = Vec::new();
-        let mut accessors = Vec::new();
-        for (place, vectors) in [&self.positions, &self.normals].into_iter().enumerate() {
-            let start = binary.len();
-            vectors.as_flattened().iter().for_each(|number| binary.extend_from_slice(&number.to_le_bytes()));
-            views
-                .push(json!({ "buffer": 0, "byteOffset": start, "byteLength": binary.len() - start, "target": 34962 }));
-            let mut accessor =
-                json!({ "bufferView": place, "componentType": 5126, "count": vectors.len(), "type": "VEC3" });
-            if place == 0 {
-                let [low, high] = bounds(vectors);
-                (accessor["min"], accessor["max"]) = (json!(low), json!(high));
-            }
-            accessors.push(accessor);
-        }
-        let (mut primitives, mut materials) = (Vec::new(), Vec::new());
-        for (class, triangles) in &self.groups {
-            let start = binary.len();
-            let component = put_indices(&mut binary, triangles, self.positions.len());
-            let length = binary.len() - start;
-            pad(&mut binary, 0);
-            views.push(json!({ "buffer": 0, "byteOffset": start, "byteLength": length, "target": 34963 }));
-            let count = 3 * triangles.len();
-            accessors.push(json!({ "bufferView": views.len() - 1, "componentType": component, "count": count,
-                                   "type": "SCALAR" }));
-            primitives.push(json!({ "attributes": { "POSITION": 0, "NORMAL": 1 }, "indices": accessors.len() - 1,
-                                    "material": materials.len(), "mode": 4 }));
-            materials.push(material(*class));
-        }
         let mut asset = json!({ "version": "2.0", "generator": "tiefort" });
         if !self.extras.is_null() {
             asset["extras"] = self.extras.clone();
         }
+        if self.nodes.is_empty() {
+            // No list may be empty.
+            return container(&json!({ "asset": asset, "scene": 0, "scenes": [{ "name": "empty" }] }), &[]);
+        }
+        let mut classes: Vec<u8> = self.nodes.iter().flat_map(|node| &node.groups).map(|(class, _)| *class).collect();
+        classes.sort_unstable();
+        classes.dedup();
+        let mut parts = Parts::default();
+        self.nodes.iter().for_each(|node| parts.add(node, &classes));
+        let mut binary = Vec::new();
+        let mut views = Vec::new();
+        for (index, bytes) in parts.views.iter().enumerate() {
+            let mut view = json!({ "buffer": 0, "byteOffset": binary.len(), "byteLength": bytes.len() });
+            if index == Parts::INDICES {
+                view["target"] = json!(ELEMENT_ARRAY_BUFFER);
+            } else {
+                view["target"] = json!(ARRAY_BUFFER);
+                // What several accessors share has to say where the next vertex begins.
+                view["byteStride"] = json!(size_of::<[f32; 3]>());
+            }
+            views.push(view);
+            binary.extend_from_slice(bytes);
+        }
         let document = json!({
-            "asset": asset, "scene": 0, "scenes": [{ "nodes": [0] }], "nodes": [{ "mesh": 0 }],
-            "meshes": [{ "primitives": primitives }], "materials": materials,
-            "accessors": accessors, "bufferViews": views, "buffers": [{ "byteLength": binary.len() }],
+            "asset": asset, "scene": 0, "scenes": [{ "nodes": (0..parts.nodes.len()).collect::<Vec<_>>() }],
+            "nodes": parts.nodes, "meshes": parts.meshes,
+            "materials": classes.into_iter().map(material).collect::<Vec<_>>(),
+            "accessors": parts.accessors, "bufferViews": views, "buffers": [{ "byteLength": binary.len() }],
         });
         container(&document, &binary)
     }
@@ -133,7 +193,8 @@ fn pad(bytes: &mut Vec<u8>, filler: u8) {
 fn container(document: &Value, binary: &[u8]) -> Vec<u8> {
     let mut json = document.to_string().into_bytes();
     pad(&mut json, b' ');
-    let length = 12 + 8 + json.len() + 8 + binary.len();
+    let numbers = if binary.is_empty() { 0 } else { 8 + binary.len() };
+    let length = 12 + 8 + json.len() + numbers;
     let mut file = Vec::with_capacity(length);
     file.extend_from_slice(b"glTF");
     let mut put = |number: usize| file.extend_from_slice(&(number as u32).to_le_bytes());
@@ -142,28 +203,41 @@ fn container(document: &Value, binary: &[u8]) -> Vec<u8> {
     put(json.len());
     file.extend_from_slice(b"JSON");
     file.extend_from_slice(&json);
-    file.extend_from_slice(&(binary.len() as u32).to_le_bytes());
-    file.extend_from_slice(b"BIN\0");
-    file.extend_from_slice(binary);
+    if !binary.is_empty() {
+        file.extend_from_slice(&(binary.len() as u32).to_le_bytes());
+        file.extend_from_slice(b"BIN\0");
+        file.extend_from_slice(binary);
+    }
     file
 }
 
-/// Writes `mesh` as binary glTF, counted from the south-west corner of what is exported.
+/// Writes `mesh` as binary glTF, counted from the south-west corner of what is exported: a node for each load module,
+/// over vertices of its own. Normals are those of the whole mesh, so that no line shows between two.
 ///
 /// # Errors
 /// Those of `out`.
 pub fn write_glb(out: &mut impl Write, product: &Product, mesh: &Mesh) -> Result<()> {
     let facts = Facts::y_up(product);
+    let positions: Vec<[f32; 3]> = mesh.metres().map(turned).collect();
+    let normals: Vec<[f32; 3]> = mesh.normals().into_iter().map(turned).collect();
+    let node = |id: ModuleId| {
+        let part = mesh.part(product, ModuleRect { south: id.row, west: id.col, north: id.row + 1, east: id.col + 1 });
+        let node = GltfNode {
+            name: module_name(id),
+            positions: part.vertices.iter().map(|&v| positions[v as usize]).collect(),
+            normals: part.vertices.iter().map(|&v| normals[v as usize]).collect(),
+            groups: Vec::new(),
+        };
+        node.with_groups(&part.triangles, &part.classes)
+    };
     let gltf = Gltf {
-        positions: mesh.metres().map(turned).collect(),
-        normals: mesh.normals().into_iter().map(turned).collect(),
-        groups: Vec::new(),
+        nodes: product.rect.iter().map(node).filter(|node| !node.groups.is_empty()).collect(),
         extras: json!({
             "crs": product.crs(), "vertical_datum": product.vertical_datum(), "offset_m": facts.offset_m,
             "axes": facts.axes, "attribution": product.attributions(),
         }),
     };
-    out.write_all(&gltf.with_groups(&mesh.triangles, &mesh.classes).bytes())
+    out.write_all(&gltf.bytes())
 }
 
 /// Where a TIN of a raster's own posts lies.
@@ -193,10 +267,14 @@ pub fn write_tin_glb(out: &mut impl Write, tin: &Tin, place: &TinPlace) -> Resul
         })
         .collect();
     let south_west = [f64::from(tin.rect.west) * dx, f64::from(tin.rect.south) * dy];
-    let gltf = Gltf {
+    let node = GltfNode {
+        name: "tin".into(),
         positions: places.iter().copied().map(turned).collect(),
         normals: normals(&places, &tin.triangles).into_iter().map(turned).collect(),
         groups: vec![(0, tin.triangles.clone())],
+    };
+    let gltf = Gltf {
+        nodes: vec![node],
         extras: json!({
             "crs": place.crs, "axes": "x east, y up, z south",
             "offset_m": [place.origin_m[0] + south_west[0], place.origin_m[1] + south_west[1], 0.0],
@@ -221,8 +299,9 @@ mod tests {
         let binary = word(20 + word(12));
         assert_eq!(28 + word(12) + binary, bytes.len());
         assert_eq!(document["buffers"][0]["byteLength"], binary);
-        assert_eq!(document["accessors"][0]["min"], json!([0.0, 127_000.0 / 128.0, -500.0]));
-        assert_eq!(document["accessors"][0]["max"], json!([1000.0, 1004.0, 0.0]));
+        // Of the western load module; then its normals and two lists of triangles come, then the eastern one.
+        assert_eq!(document["accessors"][0]["min"], json!([0.0, 1000.0, -500.0]));
+        assert_eq!(document["accessors"][4]["max"], json!([1000.0, 1004.0, 0.0]));
         assert_eq!(document["meshes"][0]["primitives"].as_array().unwrap().len(), 2);
         assert_eq!(document["materials"][1]["name"], "class_1");
         assert_eq!(document["asset"]["extras"]["offset_m"][0], 505_000.0);
@@ -230,5 +309,33 @@ mod tests {
             let (start, length) = (view["byteOffset"].as_u64().unwrap(), view["byteLength"].as_u64().unwrap());
             assert!(start % 4 == 0 && start + length <= binary as u64);
         }
+        // Of the positions of both load modules, of their normals; lists of indices lie close by themselves.
+        assert_eq!(
+            [0, 1, 2].map(|view| document["bufferViews"][view]["byteStride"].as_u64()),
+            [Some(12), Some(12), None]
+        );
+    }
+
+    #[test]
+    fn nodes_are_named_after_load_modules_and_holes_are_left_out() {
+        let names = |product: &Product| -> Vec<(String, u64)> {
+            let mut bytes = Vec::new();
+            write_glb(&mut bytes, product, &Mesh::of(product)).unwrap();
+            let length = u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize;
+            let document: Value = serde_json::from_slice(&bytes[20..20 + length]).unwrap();
+            let count = |node: &Value| -> u64 {
+                let primitives = &document["meshes"][node["mesh"].as_u64().unwrap() as usize]["primitives"];
+                let indices = primitives.as_array().unwrap().iter().map(|of| of["indices"].as_u64().unwrap() as usize);
+                indices.map(|of| document["accessors"][of]["count"].as_u64().unwrap() / 3).sum()
+            };
+            let nodes = document["nodes"].as_array().map_or(&[][..], Vec::as_slice);
+            nodes.iter().map(|node| (node["name"].as_str().unwrap().to_owned(), count(node))).collect()
+        };
+        let expected = |counts: &[(&str, u64)]| counts.iter().map(|(name, n)| ((*name).into(), *n)).collect::<Vec<_>>();
+        assert_eq!(names(&samples::product()), expected(&[("r0000c0000", 2), ("r0000c0001", 4)]));
+        let mut product = samples::with_hole();
+        assert_eq!(names(&product), expected(&[("r0000c0000", 2), ("r0000c0001", 2)]));
+        product.modules.iter_mut().for_each(|module| module.classes.fill(terrain::HOLE_CLASS));
+        assert_eq!(names(&product), []);
     }
 }

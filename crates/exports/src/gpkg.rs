@@ -2,14 +2,15 @@
 //!
 //! The one export that opens its file itself, because the library does; it is given a temporary name.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use database::{Report, ReportPlace};
 use rusqlite::{Connection, ToSql, params};
-use terrain::{LoadModule, ModuleRect, QUANTA_PER_METRE, metres_of_quanta};
+use terrain::{HOLE_CLASS, LoadModule, ModuleRect, QUANTA_PER_METRE, metres_of_quanta};
 
 use crate::gpkg_geometry::{polygon, polygon_z};
-use crate::{ExportError, Product, Step, Work, gpkg_index};
+use crate::{ExportError, Product, Step, Work, gpkg_index, gpkg_styles};
 
 /// `GPKG`, and version 1.3 of it.
 const APPLICATION_ID: i32 = 0x4750_4b47;
@@ -73,6 +74,7 @@ const TRIANGLES: Layer = Layer {
         ("module_row", "INTEGER"),
         ("module_col", "INTEGER"),
         ("class", "INTEGER"),
+        ("class_name", "TEXT"),
         ("slope_degrees", "DOUBLE"),
         ("area_m2", "DOUBLE"),
     ],
@@ -104,11 +106,25 @@ pub fn write_gpkg(
     package.add_modules(product).map_err(fault)?;
     package.add_breaches(product, report, window).map_err(fault)?;
     package.add_tiles(product).map_err(fault)?;
-    package.add_triangles(product, work, fault)?;
+    let names: Vec<&str> = report.classes.iter().map(|class| class.name.as_str()).collect();
+    package.add_triangles(product, &names, work, fault)?;
+    gpkg_styles::add(&transaction, &class_values(product, &names)).map_err(fault)?;
     for layer in [MODULES, BREACHES, TILES, TRIANGLES] {
         gpkg_index::add(&transaction, layer.name).map_err(fault)?;
     }
     transaction.commit().map_err(fault)
+}
+
+/// The name of a class of ground, where the job gave it one.
+fn class_name(names: &[&str], class: u8) -> String {
+    let name = names.get(usize::from(class)).map_or_else(|| format!("class {class}"), |name| (*name).to_owned());
+    if class == HOLE_CLASS { "hole".into() } else { name }
+}
+
+/// The name of every class that a triangle has, and its number.
+fn class_values(product: &Product, names: &[&str]) -> BTreeMap<u8, String> {
+    let classes = product.modules.iter().flat_map(|module| &module.classes);
+    classes.map(|&class| (class, class_name(names, class))).collect()
 }
 
 struct Package<'a> {
@@ -226,6 +242,7 @@ impl Package<'_> {
     fn add_triangles(
         &self,
         product: &Product,
+        names: &[&str],
         work: &Work,
         fault: impl Fn(rusqlite::Error) -> ExportError,
     ) -> Result<(), ExportError> {
@@ -235,7 +252,7 @@ impl Package<'_> {
             if work.stop.load(std::sync::atomic::Ordering::Relaxed) {
                 return Err(ExportError::Stopped { what: "load modules", done, total });
             }
-            self.add_triangles_of(&mut add, product, module).map_err(&fault)?;
+            self.add_triangles_of(&mut add, product, names, module).map_err(&fault)?;
             (work.tell)(Step { what: "load modules", done: done + 1, total });
         }
         Ok(())
@@ -245,6 +262,7 @@ impl Package<'_> {
         &self,
         add: &mut rusqlite::Statement,
         product: &Product,
+        names: &[&str],
         module: &LoadModule,
     ) -> rusqlite::Result<()> {
         let [east_m, north_m] = product.corner_m(module.id.row, module.id.col);
@@ -257,8 +275,9 @@ impl Package<'_> {
             let [a, b, c] = corners;
             let normal = crate::mesh::cross(crate::mesh::minus(b, a), crate::mesh::minus(c, a));
             let slope = normal[0].hypot(normal[1]).atan2(normal[2]).to_degrees();
-            let values: [&dyn ToSql; 6] =
-                [&polygon_z(self.srs, corners), &module.id.row, &module.id.col, class, &slope, &(normal[2] / 2.0)];
+            let (geometry, name) = (polygon_z(self.srs, corners), class_name(names, *class));
+            let values: [&dyn ToSql; 7] =
+                [&geometry, &module.id.row, &module.id.col, class, &name, &slope, &(normal[2] / 2.0)];
             add.execute(values)?;
         }
         Ok(())
@@ -285,6 +304,14 @@ mod tests {
     use crate::samples;
 
     #[test]
+    fn classes_have_the_names_of_the_job_and_holes_are_called_so() {
+        let names = ["plain", "road"];
+        let found = class_values(&samples::with_hole(), &names);
+        assert_eq!(found.into_values().collect::<Vec<_>>(), ["plain", "road", "hole"]);
+        assert_eq!(class_name(&names, 7), "class 7");
+    }
+
+    #[test]
     fn a_package_has_its_layers_with_a_feature_for_each_thing() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.gpkg");
@@ -296,13 +323,22 @@ mod tests {
             package.query_row(&format!("SELECT count(*) FROM {layer}"), [], |row| row.get(0)).unwrap()
         };
         assert_eq!([count("load_modules"), count("breaches"), count("tiles"), count("triangles")], [2, 1, 1, 6]);
-        assert_eq!([count("gpkg_contents"), count("gpkg_extensions")], [4, 4]);
+        assert_eq!([count("gpkg_contents"), count("gpkg_extensions"), count("layer_styles")], [5, 4, 4]);
         let found: i64 = package
             .query_row("SELECT count(*) FROM rtree_triangles_geom WHERE 505400 < maxx AND minx < 505490", [], |row| {
                 row.get(0)
             })
             .unwrap();
         assert_eq!((count("rtree_triangles_geom"), found), (6, 2));
+        let styled: i64 = package
+            .query_row(
+                "SELECT count(*) FROM layer_styles JOIN gpkg_geometry_columns ON f_table_name = table_name
+                 AND f_geometry_column = column_name WHERE useAsDefault AND styleQML LIKE '<qgis %'",
+                [],
+                |row| row.get(0),
+            )
+            .unwrap();
+        assert_eq!(styled, 4);
         let id: i32 = package.query_row("PRAGMA application_id", [], |row| row.get(0)).unwrap();
         assert_eq!(id.to_be_bytes(), *b"GPKG");
         let rms: f64 = package.query_row("SELECT rms_m FROM load_modules WHERE col = 0", [], |row| row.get(0)).unwrap();

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::ops::Range;
 
-use terrain::{LoadModule, ModuleId, ModuleRect, ModuleVertex, QUANTA_PER_METRE};
+use terrain::{HOLE_CLASS, LoadModule, ModuleId, ModuleRect, ModuleVertex, QUANTA_PER_METRE};
 
 use crate::Product;
 
@@ -46,8 +46,13 @@ pub(crate) struct Part {
 const EXACT_QUANTA_MAX: i32 = 1 << 24;
 
 impl Mesh {
-    /// All of a product.
+    /// The ground of a product: triangles over holes, where no source has a height, are left out.
     pub fn of(product: &Product) -> Self {
+        Self::whole(product).without_holes()
+    }
+
+    /// All of a product, triangles over holes too.
+    pub(crate) fn whole(product: &Product) -> Self {
         let (side, rect) = (product.side(), product.rect);
         let mut mesh = Self::default();
         let mut shared = HashMap::new();
@@ -60,7 +65,33 @@ impl Mesh {
         mesh
     }
 
-    /// The load modules of `rect`, which `product`, of which this is the mesh, holds.
+    /// The same without triangles over holes, and without the vertices that only these have.
+    fn without_holes(self) -> Self {
+        if !self.classes.contains(&HOLE_CLASS) {
+            return self;
+        }
+        let mut left = Self::default();
+        let mut place_of = vec![u32::MAX; self.vertices.len()];
+        for range in self.starts.windows(2).map(|ends| ends[0]..ends[1]) {
+            left.starts.push(left.triangles.len());
+            for index in range.filter(|&index| self.classes[index] != HOLE_CLASS) {
+                let placed = self.triangles[index].map(|v| {
+                    let place = &mut place_of[v as usize];
+                    if *place == u32::MAX {
+                        *place = left.vertices.len() as u32;
+                        left.vertices.push(self.vertices[v as usize]);
+                    }
+                    *place
+                });
+                left.triangles.push(placed);
+                left.classes.push(self.classes[index]);
+            }
+        }
+        left.starts.push(left.triangles.len());
+        left
+    }
+
+    /// The ground of the load modules of `rect`, which `product`, of which this is the mesh, holds: without holes.
     pub(crate) fn part(&self, product: &Product, rect: ModuleRect) -> Part {
         let mut part = Part::default();
         let mut place_of = HashMap::new();
@@ -69,16 +100,16 @@ impl Mesh {
             let index = (row * product.rect.cols() + col) as usize;
             let own = self.starts[index]..self.starts[index + 1];
             let start = part.triangles.len();
-            for triangle in &self.triangles[own.clone()] {
-                let placed = triangle.map(|v| {
+            for index in own.filter(|&index| self.classes[index] != HOLE_CLASS) {
+                let placed = self.triangles[index].map(|v| {
                     *place_of.entry(v).or_insert_with(|| {
                         part.vertices.push(v);
                         part.vertices.len() as u32 - 1
                     })
                 });
                 part.triangles.push(placed);
+                part.classes.push(self.classes[index]);
             }
-            part.classes.extend_from_slice(&self.classes[own]);
             part.modules.push((id, start..part.triangles.len()));
         }
         part
@@ -181,6 +212,22 @@ mod tests {
             assert_eq!(own.map(|v| part.vertices[v as usize]), *whole);
         }
         assert_eq!(part.modules, [(ModuleId { row: 0, col: 1 }, 0..4)]);
+    }
+
+    #[test]
+    fn triangles_over_holes_and_their_vertices_are_left_out() {
+        let product = samples::with_hole();
+        let whole = Mesh::whole(&product);
+        assert_eq!((whole.vertices.len(), whole.triangles.len()), (7, 6));
+        // The eastern load module, its two western triangles excepted, is a hole, and so is its north-eastern corner.
+        let mesh = Mesh::of(&product);
+        assert_eq!((mesh.vertices.len(), mesh.triangles.len()), (6, 4));
+        assert!(!mesh.classes.contains(&HOLE_CLASS) && mesh.starts == [0, 2, 4]);
+        assert!(mesh.triangles.iter().flatten().all(|&v| (v as usize) < mesh.vertices.len()));
+        for part in [mesh.part(&product, product.rect), whole.part(&product, product.rect)] {
+            assert_eq!((part.vertices.len(), part.triangles.len(), part.classes.len()), (6, 4, 4));
+            assert_eq!(part.modules[1].1, 2..4);
+        }
     }
 
     #[test]

@@ -5,9 +5,14 @@ use terrain::{ModuleId, ModuleRect};
 
 use crate::{ExportError, Product, Put, Work};
 
+/// The name of a load module: `r0012c0034`.
+pub(crate) fn module_name(id: ModuleId) -> String {
+    format!("r{:04}c{:04}", id.row, id.col)
+}
+
 /// The name of a load module's file: `r0012c0034.slm`.
 pub(crate) fn file_name(id: ModuleId, extension: &str) -> String {
-    format!("r{:04}c{:04}.{extension}", id.row, id.col)
+    format!("{}.{extension}", module_name(id))
 }
 
 /// Writes every load module of a product, at all of its levels, as a file of its own: a tile's file that holds one load

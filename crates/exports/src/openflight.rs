@@ -1,7 +1,7 @@
 //! OpenFlight: a file for each 4 km square, one that refers to all of them, and a MetaFlight index.
 //!
 //! All files count from one origin, the south-west corner of what is exported, and say in their headers where it lies;
-//! so they fit together as they are.
+//! so they fit together as they are. Triangles over holes are left out.
 
 use terrain::{ModuleId, ModuleRect};
 
@@ -9,7 +9,7 @@ use crate::earth::Earth;
 use crate::flt_records::{Place, Records};
 use crate::mesh::Mesh;
 use crate::metaflight::{Grid, metaflight};
-use crate::modules::file_name;
+use crate::modules::module_name;
 use crate::{Coordinates, Datum, ExportError, Facts, Product, Put, Work};
 
 /// Side of a square in metres.
@@ -38,7 +38,7 @@ pub fn write_openflight(product: &Product, put: &Put, work: &Work) -> Result<(),
         records.group("square");
         records.push();
         for (id, triangles) in &part.modules {
-            records.object(&file_name(*id, "").replace('.', ""));
+            records.object(&module_name(*id));
             records.push();
             let of_module = part.triangles[triangles.clone()].iter().zip(&part.classes[triangles.clone()]);
             of_module.for_each(|(&triangle, &class)| records.face(triangle, class));

@@ -4,7 +4,8 @@ use std::io::{Result, Write};
 
 use crate::{Coordinates, Facts, Mesh, Product};
 
-/// Writes `mesh` as binary little-endian PLY, the class of each triangle as its property. Coordinates are 32-bit
+/// Writes `mesh` as binary little-endian PLY. Faces have corners only, since readers (meshio is one) take all lists to
+/// lie one behind the other; so triangles come class by class, and comments say which are whose. Coordinates are 32-bit
 /// floats where these are exact, else 64-bit ones. Nothing is buffered here: give it a `BufWriter`.
 ///
 /// # Errors
@@ -17,12 +18,18 @@ pub fn write_ply(out: &mut impl Write, product: &Product, mesh: &Mesh, coordinat
     for line in facts.comments(product) {
         writeln!(out, "comment {line}")?;
     }
+    let mut first = 0;
+    for class in mesh.classes_present() {
+        let end = first + mesh.of_class(class).count();
+        writeln!(out, "comment class {class} faces {first} to {}", end - 1)?;
+        first = end;
+    }
     writeln!(out, "element vertex {}", mesh.vertices.len())?;
     for axis in ["x", "y", "z"] {
         writeln!(out, "property {} {axis}", if short { "float" } else { "double" })?;
     }
     writeln!(out, "element face {}", mesh.triangles.len())?;
-    writeln!(out, "property list uchar int vertex_indices\nproperty uchar class\nend_header")?;
+    writeln!(out, "property list uchar int vertex_indices\nend_header")?;
     for place in mesh.metres() {
         for (metres, offset_m) in place.into_iter().zip(offset) {
             match short {
@@ -31,12 +38,11 @@ pub fn write_ply(out: &mut impl Write, product: &Product, mesh: &Mesh, coordinat
             }
         }
     }
-    for (triangle, class) in mesh.triangles.iter().zip(&mesh.classes) {
+    for triangle in mesh.classes_present().into_iter().flat_map(|class| mesh.of_class(class)) {
         out.write_all(&[3])?;
         for corner in triangle {
             out.write_all(&corner.to_le_bytes())?;
         }
-        out.write_all(&[*class])?;
     }
     Ok(())
 }
@@ -58,7 +64,7 @@ pub fn write_obj(out: &mut impl Write, product: &Product, mesh: &Mesh, coordinat
     }
     for class in mesh.classes_present() {
         writeln!(out, "g class_{class}")?;
-        for ([a, b, c], _) in mesh.triangles.iter().zip(&mesh.classes).filter(|(_, of)| **of == class) {
+        for [a, b, c] in mesh.of_class(class) {
             writeln!(out, "f {} {} {}", a + 1, b + 1, c + 1)?;
         }
     }
@@ -72,6 +78,11 @@ fn offset(facts: &Facts, product: &Product) -> [f64; 3] {
 }
 
 impl Mesh {
+    /// The triangles of a class.
+    fn of_class(&self, class: u8) -> impl Iterator<Item = &[u32; 3]> {
+        self.triangles.iter().zip(&self.classes).filter(move |(_, of)| **of == class).map(|(triangle, _)| triangle)
+    }
+
     /// Every class that a triangle has, in order.
     pub(crate) fn classes_present(&self) -> Vec<u8> {
         let mut present = [false; 256];
@@ -108,7 +119,11 @@ mod tests {
             let mut bytes = Vec::new();
             write_ply(&mut bytes, &product, &mesh, coordinates).unwrap();
             let header = bytes.windows(11).position(|window| window == b"end_header\n").unwrap() + 11;
-            assert_eq!(bytes.len() - header, 7 * vertex_bytes + 6 * 14);
+            assert_eq!(bytes.len() - header, 7 * vertex_bytes + 6 * 13);
+            let text = String::from_utf8_lossy(&bytes[..header]).into_owned();
+            assert!(text.contains("\ncomment class 0 faces 0 to 2\ncomment class 1 faces 3 to 5\n"), "{text}");
+            // Each line of data has the same length, as readers take it that know no other property than corners.
+            assert!(bytes[header + 7 * vertex_bytes..].chunks(13).all(|face| face[0] == 3));
         }
     }
 }

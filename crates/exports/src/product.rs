@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use database::{Folder, Manifest, ManifestState, TileModules};
-use terrain::{GridFrame, LoadModule, ModuleGrid, ModuleId, ModuleRect, TileId};
+use terrain::{GridFrame, HOLE_CLASS, LoadModule, ModuleGrid, ModuleId, ModuleRect, TileId};
 
 use crate::{ExportError, Work};
 
@@ -130,6 +130,11 @@ impl Product {
         let index =
             |rect: ModuleRect| (id.row - rect.south) as usize * rect.cols() as usize + (id.col - rect.west) as usize;
         self.rect.contains(id).then(|| &self.modules[index(self.rect)])
+    }
+
+    /// Triangles over holes, where no source has a height.
+    pub fn hole_triangles(&self) -> usize {
+        self.modules.iter().flat_map(|module| &module.classes).filter(|&&class| class == HOLE_CLASS).count()
     }
 
     /// The coordinate system as the database names it.

@@ -6,7 +6,9 @@ use database::{
     Area, Fingerprint, Manifest, Report, ReportBreach, ReportPerModule, ReportPerWindow, ReportPlace, ReportPoints,
     ReportPool, ReportRefusals, ReportResidual, ReportStops, ReportVoids, TileModules, TileRecord,
 };
-use terrain::{GridFrame, LoadModule, ModuleGrid, ModuleId, ModuleRect, ModuleResidual, ModuleVertex, Spacing, TileId};
+use terrain::{
+    GridFrame, HOLE_CLASS, LoadModule, ModuleGrid, ModuleId, ModuleRect, ModuleResidual, ModuleVertex, Spacing, TileId,
+};
 
 use crate::Product;
 
@@ -53,6 +55,14 @@ pub(crate) fn with_levels() -> Product {
     flat[1].residual.largest = 1200;
     flat.iter().for_each(|module| assert_eq!(module.check(), Ok(())));
     product.coarser = vec![flat];
+    product
+}
+
+/// The same with a hole over the eastern half of the eastern load module.
+pub(crate) fn with_hole() -> Product {
+    let mut product = product();
+    // Triangles 0 (south) and 1 (west) remain ground.
+    product.modules[1].classes = vec![1, 0, HOLE_CLASS, HOLE_CLASS];
     product
 }
 

@@ -84,6 +84,7 @@ pub fn sidecar(product: &Product, mesh: &Mesh, facts: &Facts) -> String {
         "level": product.level,
         "vertices": mesh.vertices.len(),
         "triangles": mesh.triangles.len(),
+        "hole_triangles_left_out": product.hole_triangles(),
         "attribution": product.attributions(),
     });
     format!("{value:#}\n")

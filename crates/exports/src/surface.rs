@@ -2,23 +2,24 @@
 //!
 //! Heights are those that residuals are measured with: at a post between vertices, rounded to 1/128 m.
 
-use std::io::{Seek, Write};
+use std::io::Write;
 
 use geometry::Facet;
 use geometry::owned::{PostGrid, visit_residuals};
-use terrain::{Dem, LoadModule, ModuleId, Post, PostRect, metres_of_quanta};
+use terrain::{Dem, HOLE_CLASS, LoadModule, ModuleId, Post, PostRect, metres_of_quanta};
 
-use crate::geotiff::{self, BLOCK};
+use crate::geotiff::{self, BLOCK, Blocks};
+use crate::overviews::{Raster, overviews};
 use crate::{ExportError, Product, Work};
 
 /// Heights of the ground that a database was built from, for the posts of a rectangle.
 pub type GroundHeights<'a> = dyn Fn(PostRect) -> Result<Dem, ExportError> + Sync + 'a;
 
-/// Writes the height of the compiled surface at every post as a GeoTIFF.
+/// Writes the height of the compiled surface at every post as a GeoTIFF; under holes it is NaN.
 ///
 /// # Errors
 /// When it cannot be written, or the coordinate system has no EPSG code.
-pub fn write_surface(out: &mut (impl Write + Seek), product: &Product, work: &Work) -> Result<(), ExportError> {
+pub fn write_surface(out: &mut impl Write, product: &Product, work: &Work) -> Result<(), ExportError> {
     let level = |rect: PostRect| Ok(Dem::from_fn(rect, |_| Some(0)));
     write(out, product, work, "surface", &level, |residual| -residual)
 }
@@ -28,7 +29,7 @@ pub fn write_surface(out: &mut (impl Write + Seek), product: &Product, work: &Wo
 /// # Errors
 /// When it cannot be written, the ground cannot be read, or the coordinate system has no EPSG code.
 pub fn write_residual(
-    out: &mut (impl Write + Seek),
+    out: &mut impl Write,
     product: &Product,
     ground: &GroundHeights,
     work: &Work,
@@ -37,7 +38,7 @@ pub fn write_residual(
 }
 
 fn write(
-    out: &mut (impl Write + Seek),
+    out: &mut impl Write,
     product: &Product,
     work: &Work,
     layer: &'static str,
@@ -45,13 +46,23 @@ fn write(
     value: impl Fn(i32) -> i32 + Sync,
 ) -> Result<(), ExportError> {
     let rect = product.grid.posts_of_rect(product.rect);
-    let bands: Vec<i32> = (0..rect.posts_high().div_ceil(BLOCK) as i32).collect();
-    let blocks = work.each("bands of rows", &bands, |&band| {
+    // A residual knows by itself where there is no ground.
+    let leaves_holes = layer == "surface";
+    let (wide, high) = (rect.posts_wide(), rect.posts_high());
+    let bands: Vec<i32> = (0..high.div_ceil(BLOCK) as i32).collect();
+    let made = work.each("bands of rows", &bands, |&band| {
         let north = rect.north - band * BLOCK as i32;
         let posts = PostRect { south: rect.south.max(north + 1 - BLOCK as i32), north, ..rect };
-        Ok(geotiff::blocks(&values(product, posts, ground, &value)?, posts.posts_wide()))
+        let raster = Raster { wide, metres: values(product, posts, ground, leaves_holes, &value)? };
+        // A band has an even number of rows, so its halves are those of the whole.
+        Ok((geotiff::blocks(&raster), raster.halved().metres))
     })?;
-    geotiff::write(out, product, rect, layer, &blocks.concat())
+    let (finest, halves): (Vec<_>, Vec<_>) = made.into_iter().unzip();
+    let mut images = vec![Blocks { wide, high, blocks: finest.concat() }];
+    if BLOCK < wide.max(high) {
+        images.extend(overviews(Raster { wide: wide.div_ceil(2), metres: halves.concat() }, work)?);
+    }
+    geotiff::write(out, product, rect, layer, images)
 }
 
 /// Values in metres at `posts`, row by row from the north.
@@ -59,6 +70,7 @@ fn values(
     product: &Product,
     posts: PostRect,
     ground: &GroundHeights,
+    leaves_holes: bool,
     value: &impl Fn(i32) -> i32,
 ) -> Result<Vec<f32>, ExportError> {
     let wide = posts.posts_wide();
@@ -71,7 +83,7 @@ fn values(
     let columns = product.rect.west..product.rect.east;
     for id in rows.flat_map(|row| columns.clone().map(move |col| ModuleId { row, col })) {
         let Some(module) = product.module(id) else { continue };
-        visit(product, module, &dem, |post, residual| {
+        visit(product, module, &dem, leaves_holes, |post, residual| {
             if posts.contains(post) && !dem.is_void(post) {
                 let at = (posts.north - post.row) as usize * wide + (post.col - posts.west) as usize;
                 metres[at] = metres_of_quanta(value(residual)) as f32;
@@ -88,7 +100,7 @@ fn module_rows(product: &Product, posts: PostRect) -> std::ops::RangeInclusive<u
 }
 
 /// Every post that a load module owns, with its residual; on the far sides of what is exported, those on the line too.
-fn visit(product: &Product, module: &LoadModule, dem: &Dem, mut each: impl FnMut(Post, i32)) {
+fn visit(product: &Product, module: &LoadModule, dem: &Dem, leaves_holes: bool, mut each: impl FnMut(Post, i32)) {
     let far = |is_last: bool| is_last.then_some(product.grid.side_cells);
     let posts = PostGrid {
         origin: product.grid.posts_of(module.id).south_west(),
@@ -96,7 +108,10 @@ fn visit(product: &Product, module: &LoadModule, dem: &Dem, mut each: impl FnMut
         far_row: far(module.id.row + 1 == product.rect.north),
         far_col: far(module.id.col + 1 == product.rect.east),
     };
-    for &triangle in &module.triangles {
+    for (&triangle, &class) in module.triangles.iter().zip(&module.classes) {
+        if leaves_holes && class == HOLE_CLASS {
+            continue;
+        }
         let corners = triangle.map(|v| module.vertices[usize::from(v)]);
         let facet = Facet::new(corners.map(|v| i32::from(v.x)), corners.map(|v| i32::from(v.y)), corners.map(|v| v.z));
         visit_residuals(&posts, &facet, dem, &mut each);
@@ -113,7 +128,7 @@ mod tests {
         for product in [samples::product(), samples::eastern()] {
             let rect = product.grid.posts_of_rect(product.rect);
             let level = |rect: PostRect| Ok(Dem::from_fn(rect, |_| Some(0)));
-            let metres = values(&product, rect, &level, &|residual| -residual).unwrap();
+            let metres = values(&product, rect, &level, true, &|residual| -residual).unwrap();
             assert_eq!(metres.len(), rect.post_count());
             assert!(metres.iter().all(|metres| metres.is_finite()));
             // North-west first, south-east last.
@@ -124,11 +139,24 @@ mod tests {
     }
 
     #[test]
+    fn posts_under_holes_have_no_height_and_all_others_have() {
+        let product = samples::with_hole();
+        let rect = product.grid.area();
+        let level = |rect: PostRect| Ok(Dem::from_fn(rect, |_| Some(0)));
+        let metres = values(&product, rect, &level, true, &|residual| -residual).unwrap();
+        let wide = rect.posts_wide();
+        // Row 8 from the south is that of the pit at column 30: ground to its west, a hole to its east.
+        let row = &metres[12 * wide..13 * wide];
+        assert!(row[..30].iter().all(|metres| metres.is_finite()), "{row:?}");
+        assert!(row[31..].iter().all(|metres| metres.is_nan()), "{row:?}");
+    }
+
+    #[test]
     fn a_void_has_no_residual_and_other_posts_have_theirs() {
         let product = samples::product();
         let rect = product.grid.area();
         let ground = |rect: PostRect| Ok(Dem::from_fn(rect, |post| (post.col != 3).then_some(128_640)));
-        let metres = values(&product, rect, &ground, &|residual| residual).unwrap();
+        let metres = values(&product, rect, &ground, false, &|residual| residual).unwrap();
         assert_eq!(metres.iter().filter(|metres| metres.is_nan()).count(), 21);
         assert_eq!(metres[20 * 41], 5.0);
     }

@@ -1,23 +1,25 @@
-//! 3D Tiles 1.1: the area, in it a coarse mesh for each 4 km square, in these the load modules, each in binary glTF.
+//! 3D Tiles 1.1: the area, in it a coarse mesh for each 4 km square, in these groups of load modules, each in binary
+//! glTF. A group is halved until it has no more triangles than a viewer likes to load at once. Triangles over holes are
+//! left out, and in the coarse mesh load modules that are holes for more than half.
 //!
 //! Where load modules have coarser levels, those of a square are a mesh between the two, level by level.
 //! Every square has a frame of its own, so that 32-bit floats are fine to a fraction of a millimetre. A geometric error
-//! is measured: of a square, how far its load modules lie from it; of a level in it and of a load module, the largest
+//! is measured: of a square, how far its load modules lie from it; of a level in it and of a group, the largest
 //! residual.
 
 use serde_json::{Value, json};
-use terrain::{ModuleRect, QUANTA_PER_METRE};
+use terrain::{ModuleId, ModuleRect, QUANTA_PER_METRE};
 
 use crate::coarse::Coarse;
 use crate::earth::Earth;
-use crate::glb::{Gltf, turned};
+use crate::glb::{Gltf, GltfNode, turned};
 use crate::globe::{Globe, LocalFrame};
 use crate::mesh::{Mesh, Part};
-use crate::modules::file_name;
+use crate::modules::module_name;
 use crate::openflight::{square_name, square_side};
 use crate::{Datum, ExportError, Product, Put, Work};
 
-/// Writes `tileset.json`, `squares/*.glb`, `modules/*.glb` and, for coarser levels, `levels/K/*.glb`. `assumed` is what
+/// Writes `tileset.json`, `squares/*.glb`, `groups/*.glb` and, for coarser levels, `levels/K/*.glb`. `assumed` is what
 /// to take heights to be above; else the database says it. Gives what was done to heights.
 ///
 /// # Errors
@@ -25,18 +27,19 @@ use crate::{Datum, ExportError, Product, Put, Work};
 pub fn write_3dtiles(product: &Product, assumed: Option<Datum>, put: &Put, work: &Work) -> Result<Datum, ExportError> {
     let earth = Earth::new(product, assumed)?;
     let layer = |product: Product| {
-        let mesh = Mesh::of(&product);
+        let mesh = Mesh::whole(&product);
         let globe = Globe::of(&product, &mesh, &earth, work)?;
         Ok(Layer { product, mesh, globe })
     };
     let scene = Scene { layers: product.levels().map(layer).collect::<Result<_, ExportError>>()? };
     let squares = product.squares(square_side(product));
-    let children = work.each("squares", &squares, |&rect| scene.square(rect, put))?;
+    let children: Vec<Value> =
+        work.each("squares", &squares, |&rect| scene.square(rect, put))?.into_iter().flatten().collect();
     let heights = || scene.layers.iter().flat_map(|layer| layer.globe.height_m.iter().copied());
     let (low, high) = (heights().fold(f64::INFINITY, f64::min), heights().fold(f64::NEG_INFINITY, f64::max));
     // Without any tile the ground is as good as flat.
     let flat_m = high - low;
-    let tileset = json!({
+    let mut tileset = json!({
         "asset": {
             "version": "1.1",
             "tilesetVersion": "1",
@@ -51,11 +54,18 @@ pub fn write_3dtiles(product: &Product, assumed: Option<Datum>, put: &Put, work:
             "boundingVolume": { "region": region(&scene.layers[0].globe.lon_lat, low, high) },
             "geometricError": flat_m,
             "refine": "REPLACE",
-            "children": children,
         },
     });
+    put_children(&mut tileset["root"], children);
     put("tileset.json", tileset.to_string().as_bytes()).map_err(ExportError::write("tileset.json"))?;
     Ok(earth.datum())
+}
+
+/// Gives a tile its children: the list, where there is one, is not empty.
+fn put_children(tile: &mut Value, children: Vec<Value>) {
+    if !children.is_empty() {
+        tile["children"] = Value::Array(children);
+    }
 }
 
 /// West, south, east and north in radians, lowest and highest height: what a region is in 3D Tiles.
@@ -81,72 +91,98 @@ struct Scene {
 }
 
 impl Scene {
-    /// Writes the files of a square; its tile.
-    fn square(&self, rect: ModuleRect, put: &Put) -> Result<Value, ExportError> {
+    /// Writes the files of a square; its tile, if it has any ground.
+    fn square(&self, rect: ModuleRect, put: &Put) -> Result<Option<Value>, ExportError> {
         let finest = &self.layers[0];
         let coarse = Coarse::of(&finest.product, &finest.mesh, rect);
         let middle = coarse.vertices[coarse.vertices.len() / 2] as usize;
         let frame = LocalFrame::at(finest.globe.lon_lat[middle], finest.globe.height_m[middle]);
         let parts: Vec<Part> = self.layers.iter().map(|layer| layer.mesh.part(&layer.product, rect)).collect();
+        if parts.iter().all(|part| part.triangles.is_empty()) {
+            return Ok(None);
+        }
         let bounds = box_around(self.layers.iter().zip(&parts).flat_map(|(layer, part)| layer.places(&frame, part)));
-        let name = format!("squares/{}", square_name(&finest.product, rect, "glb"));
-        let classes = vec![0; coarse.triangles.len()];
-        let gltf = finest.gltf(&frame, &coarse.vertices).with_groups(&coarse.triangles, &classes);
-        put(&name, &gltf.bytes()).map_err(ExportError::write(&name))?;
-        let mut children = finest.modules(&frame, &parts[0], put)?;
+        let mut children = finest.groups(&frame, rect, put)?;
         let mut error_m = finest.error_m(rect);
         for (layer, part) in self.layers.iter().zip(&parts).skip(1) {
-            let name = format!("levels/{}/{}", layer.product.level, square_name(&layer.product, rect, "glb"));
-            let gltf = layer.gltf(&frame, &part.vertices).with_groups(&part.triangles, &part.classes);
-            put(&name, &gltf.bytes()).map_err(ExportError::write(&name))?;
+            let name = square_name(&layer.product, rect, "glb");
+            let uri = format!("levels/{}/{name}", layer.product.level);
+            let node = layer.node(&frame, group_name(rect), &part.vertices);
+            put_node(put, &uri, node.with_groups(&part.triangles, &part.classes))?;
             // What is coarser is never said to be truer, or a viewer would not go on to the finer.
             error_m = error_m.max(layer.error_m(rect));
-            children = vec![json!({
+            let mut level = json!({
                 "boundingVolume": { "box": bounds },
                 "geometricError": error_m,
-                "content": { "uri": name },
-                "children": children,
-            })];
+                "content": { "uri": uri },
+            });
+            put_children(&mut level, children);
+            children = vec![level];
         }
-        Ok(json!({
+        let mut tile = json!({
             "transform": frame.matrix(),
             "boundingVolume": { "box": bounds },
             "geometricError": if self.layers.len() == 1 { coarse.error_m } else { coarse.error_m.max(error_m) },
-            "content": { "uri": name },
-            "children": children,
-        }))
+        });
+        put_children(&mut tile, children);
+        if !coarse.triangles.is_empty() {
+            let uri = format!("squares/{}", square_name(&finest.product, rect, "glb"));
+            let classes = vec![0; coarse.triangles.len()];
+            let node = finest.node(&frame, group_name(rect), &coarse.vertices);
+            put_node(put, &uri, node.with_groups(&coarse.triangles, &classes))?;
+            tile["content"] = json!({ "uri": uri });
+        }
+        Ok(Some(tile))
     }
 }
 
+/// Triangles that a group of load modules has at most, unless a single one has more.
+const GROUP_TRIANGLES_MAX: usize = 2048;
+
+/// The name of the load modules of a rectangle: the south-west one, and the north-east one if there are several.
+fn group_name(rect: ModuleRect) -> String {
+    let low = ModuleId { row: rect.south, col: rect.west };
+    let high = ModuleId { row: rect.north - 1, col: rect.east - 1 };
+    if low == high { module_name(low) } else { format!("{}_{}", module_name(low), module_name(high)) }
+}
+
+/// The two halves of a rectangle, across its longer side.
+fn halves(rect: ModuleRect) -> [ModuleRect; 2] {
+    if rect.rows() < rect.cols() {
+        let middle = rect.west.midpoint(rect.east);
+        [ModuleRect { east: middle, ..rect }, ModuleRect { west: middle, ..rect }]
+    } else {
+        let middle = rect.south.midpoint(rect.north);
+        [ModuleRect { north: middle, ..rect }, ModuleRect { south: middle, ..rect }]
+    }
+}
+
+fn put_node(put: &Put, name: &str, node: GltfNode) -> Result<(), ExportError> {
+    let nodes = if node.groups.is_empty() { Vec::new() } else { vec![node] };
+    put(name, &Gltf { nodes, ..Gltf::default() }.bytes()).map_err(ExportError::write(name))
+}
+
 impl Layer {
-    /// Writes a file for each load module of a part; their tiles.
-    fn modules(&self, frame: &LocalFrame, part: &Part, put: &Put) -> Result<Vec<Value>, ExportError> {
-        let mut tiles = Vec::with_capacity(part.modules.len());
-        for (id, triangles) in &part.modules {
-            let mut vertices: Vec<u32> = Vec::new();
-            let mut place_of = vec![u32::MAX; part.vertices.len()];
-            let own: Vec<[u32; 3]> = part.triangles[triangles.clone()]
-                .iter()
-                .map(|triangle| {
-                    triangle.map(|v| {
-                        let place = &mut place_of[v as usize];
-                        if *place == u32::MAX {
-                            *place = vertices.len() as u32;
-                            vertices.push(part.vertices[v as usize]);
-                        }
-                        *place
-                    })
-                })
-                .collect();
-            let name = format!("modules/{}", file_name(*id, "glb"));
-            let gltf = self.gltf(frame, &vertices).with_groups(&own, &part.classes[triangles.clone()]);
-            put(&name, &gltf.bytes()).map_err(ExportError::write(&name))?;
-            let residual = self.product.module(*id).map_or(0, |module| module.residual.largest);
-            let places = vertices.iter().map(|&v| frame.local(self.globe.place[v as usize]));
+    /// Writes a file for each group of load modules of a square; their tiles.
+    fn groups(&self, frame: &LocalFrame, square: ModuleRect, put: &Put) -> Result<Vec<Value>, ExportError> {
+        let mut tiles = Vec::new();
+        let mut left = vec![square];
+        while let Some(rect) = left.pop() {
+            let part = self.mesh.part(&self.product, rect);
+            if part.triangles.is_empty() {
+                continue;
+            }
+            if GROUP_TRIANGLES_MAX < part.triangles.len() && 1 < rect.count() {
+                left.extend(halves(rect));
+                continue;
+            }
+            let uri = format!("groups/{}.glb", group_name(rect));
+            let node = self.node(frame, group_name(rect), &part.vertices);
+            put_node(put, &uri, node.with_groups(&part.triangles, &part.classes))?;
             tiles.push(json!({
-                "boundingVolume": { "box": box_around(places) },
-                "geometricError": f64::from(residual) / f64::from(QUANTA_PER_METRE),
-                "content": { "uri": name },
+                "boundingVolume": { "box": box_around(self.places(frame, &part)) },
+                "geometricError": self.error_m(rect),
+                "content": { "uri": uri },
             }));
         }
         Ok(tiles)
@@ -164,13 +200,14 @@ impl Layer {
     }
 
     /// Vertices of the mesh in a frame.
-    fn gltf(&self, frame: &LocalFrame, vertices: &[u32]) -> Gltf {
+    fn node(&self, frame: &LocalFrame, name: String, vertices: &[u32]) -> GltfNode {
         let place = |&v: &u32| turned(frame.local(self.globe.place[v as usize]));
         let normal = |&v: &u32| turned(frame.turned(self.globe.normal[v as usize]));
-        Gltf {
+        GltfNode {
+            name,
             positions: vertices.iter().map(place).collect(),
             normals: vertices.iter().map(normal).collect(),
-            ..Gltf::default()
+            groups: Vec::new(),
         }
     }
 }
@@ -219,15 +256,45 @@ mod tests {
         let tileset: Value = serde_json::from_slice(&files["tileset.json"]).unwrap();
         let square = &tileset["root"]["children"][0];
         let modules = square["children"].as_array().unwrap();
-        assert_eq!(modules.len(), 2);
+        // Both load modules have few triangles: one group.
+        assert_eq!(modules.len(), 1);
+        assert_eq!(modules[0]["content"]["uri"], "groups/r0000c0000_r0000c0001.glb");
         for tile in modules.iter().chain([square]) {
             assert!(files.contains_key(tile["content"]["uri"].as_str().unwrap()), "{tile}");
         }
-        assert_eq!(files.len(), 1 + 1 + 2);
+        assert_eq!(files.len(), 1 + 1 + 1);
         assert!(modules.iter().all(|module| error(module) < error(square)));
         let region = tileset["root"]["boundingVolume"]["region"].as_array().unwrap();
         // Heights above EGM96, whose surface lies some 30 m below the ellipsoid here.
         assert!((960.0..965.0).contains(&region[4].as_f64().unwrap()), "{region:?}");
+    }
+
+    #[test]
+    fn holes_are_left_out_and_a_square_without_ground_is_none() {
+        let mut product = samples::with_hole();
+        let files = written(&product);
+        let whole = written(&samples::product());
+        let group = "groups/r0000c0000_r0000c0001.glb";
+        assert!(files[group].len() < whole[group].len());
+        product.modules[1].classes.fill(terrain::HOLE_CLASS);
+        // Of the group only the western load module is left; the coarse mesh has its two triangles alone.
+        let files = written(&product);
+        assert!(files["squares/r00c00.glb"].len() < whole["squares/r00c00.glb"].len());
+        product.modules[0].classes.fill(terrain::HOLE_CLASS);
+        let files = written(&product);
+        assert_eq!(files.keys().collect::<Vec<_>>(), ["tileset.json"]);
+        let tileset: Value = serde_json::from_slice(&files["tileset.json"]).unwrap();
+        assert!(tileset["root"].get("children").is_none(), "no list of children may be empty");
+    }
+
+    #[test]
+    fn a_rectangle_is_halved_across_its_longer_side() {
+        let rect = ModuleRect { south: 0, west: 8, north: 3, east: 16 };
+        let [west, east] = halves(rect);
+        assert_eq!((west.east, east.west, west.count() + east.count()), (12, 12, rect.count()));
+        let [south, north] = halves(ModuleRect { south: 0, west: 0, north: 3, east: 1 });
+        assert_eq!((south.count(), north.count()), (1, 2));
+        assert_eq!(group_name(rect), "r0000c0008_r0002c0015");
     }
 
     #[test]
@@ -242,7 +309,7 @@ mod tests {
         assert_eq!(error(level), 1200.0 / 128.0);
         let modules = level["children"].as_array().unwrap();
         assert!(modules.iter().all(|module| error(module) < error(level)) && error(level) <= error(square));
-        assert_eq!((modules.len(), files.len()), (2, plain.len() + 1));
+        assert_eq!((modules.len(), files.len()), (1, plain.len() + 1));
         for (name, bytes) in plain.iter().filter(|(name, _)| name.as_str() != "tileset.json") {
             assert!(files[name] == *bytes, "{name}");
         }

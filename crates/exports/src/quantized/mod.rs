@@ -1,10 +1,12 @@
 //! Quantized-mesh 1.0 for globes: the triangles themselves at the finest level, cut at the borders of tiles, and a
 //! regular grid of heights for every tile above, up to both roots.
 //!
-//! Tiles have no holes: around what is exported the ground goes on from its border and falls to the lowest height.
+//! Tiles cover their squares: around what is exported the ground goes on from its border and falls to the lowest
+//! height, and where no source has a height the surface that closes the hole is kept; `holes.geojson` says where.
 
 mod clip;
 mod collar;
+mod holes;
 mod lattice;
 mod tile;
 
@@ -18,7 +20,8 @@ use crate::globe::Globe;
 use crate::mesh::{Mesh, cross, minus, unit};
 use crate::{Datum, ExportError, Product, Put, Work};
 use collar::{Sheet, with_collar};
-use lattice::{Ladder, Node, STEPS, lon_lat, steps, tiles};
+use holes::holes;
+use lattice::{Node, STEPS, height_steps, lon_lat, steps, tiles};
 use tile::Tile;
 
 /// Load modules along a tile of the finest level, about.
@@ -28,8 +31,8 @@ const DEGREE_M: f64 = 111_320.0;
 /// Squares of heights along a side of a tile above the finest level.
 const GRID: i64 = 64;
 
-/// Writes `layer.json` and `LEVEL/COLUMN/ROW.terrain`. `assumed` is what to take heights to be above; else the database
-/// says it. Gives what was done to heights.
+/// Writes `layer.json`, `LEVEL/COLUMN/ROW.terrain` and, where there are holes, `holes.geojson`. `assumed` is what to
+/// take heights to be above; else the database says it. Gives what was done to heights.
 ///
 /// # Errors
 /// When a file cannot be written, heights cannot be brought above the ellipsoid, or the work was asked to stop.
@@ -40,12 +43,13 @@ pub fn write_quantized_mesh(
     work: &Work,
 ) -> Result<Datum, ExportError> {
     let earth = Earth::new(product, assumed)?;
-    let mesh = Mesh::of(product);
+    // A tile has to cover its square, so holes keep the triangles that close them.
+    let mesh = Mesh::whole(product);
     let globe = Globe::of(product, &mesh, &earth, work)?;
     let heights = || globe.height_m.iter().copied();
-    let (low, high) = (heights().fold(f64::INFINITY, f64::min), heights().fold(f64::NEG_INFINITY, f64::max));
+    let foot_m = heights().fold(f64::INFINITY, f64::min).floor();
     let level = finest_level(product.side_m());
-    let mut scene = Scene { product, earth: &earth, ladder: Ladder::over(low, high), level, fall_m: 0.0 };
+    let mut scene = Scene { product, earth: &earth, foot_m, level, fall_m: 0.0 };
     let bounds = scene.bounds(&globe);
     let collar_m = scene.collar_m(&bounds)?;
     let extent_m = f64::from(product.rect.rows().max(product.rect.cols())) * product.side_m();
@@ -53,7 +57,11 @@ pub fn write_quantized_mesh(
     let sheet = with_collar(product, &mesh, &globe, &earth, collar_m, |height_m| scene.fallen(height_m, collar_m))?;
     scene.write_finest(&sheet, &bounds, put, work)?;
     scene.write_grids(&bounds, put, work)?;
-    let layer = scene.layer(&bounds);
+    let holes = holes(&mesh, &globe);
+    if let Some(holes) = &holes {
+        put("holes.geojson", format!("{holes}\n").as_bytes()).map_err(ExportError::write("holes.geojson"))?;
+    }
+    let layer = scene.layer(&bounds, holes.is_some());
     put("layer.json", format!("{layer:#}\n").as_bytes()).map_err(ExportError::write("layer.json"))?;
     Ok(earth.datum())
 }
@@ -100,9 +108,10 @@ fn too_wide(product: &Product) -> ExportError {
 struct Scene<'a> {
     product: &'a Product,
     earth: &'a Earth,
-    ladder: Ladder,
+    /// A whole number of metres below all that is exported: how deep the ground around it falls.
+    foot_m: f64,
     level: u32,
-    /// How far from the border the ground has fallen to the foot of the ladder, metres.
+    /// How far from the border the ground has fallen to that, metres.
     fall_m: f64,
 }
 
@@ -152,7 +161,7 @@ impl Scene<'_> {
         let node = |v: u32| {
             let (place, height_m) = (sheet.lon_lat[v as usize], sheet.height_m[v as usize]);
             let [x, y] = steps(self.level, place);
-            Node { x, y, h: self.ladder.rung(height_m), normal: sheet.normal[v as usize] }
+            Node { x, y, h: height_steps(height_m), normal: sheet.normal[v as usize] }
         };
         let nodes: Vec<Node> = (0..sheet.lon_lat.len() as u32).map(node).collect();
         let (cols, rows) = bounds.tiles(self.level, self.level);
@@ -197,7 +206,7 @@ impl Scene<'_> {
 
     fn put(&self, put: &Put, tile: &Tile, [col, row]: [i64; 2], level: u32) -> Result<(), ExportError> {
         let name = format!("{level}/{col}/{row}.terrain");
-        put(&name, &tile.bytes(&self.ladder)).map_err(ExportError::write(&name))
+        put(&name, &tile.bytes()).map_err(ExportError::write(&name))
     }
 
     /// A tile of heights at the corners of squares, and of normals across them.
@@ -219,7 +228,7 @@ impl Scene<'_> {
             let across = cross(minus(place(i + 1, j), place(i - 1, j)), minus(place(i, j + 1), place(i, j - 1)));
             let level_ground = across == [0.0; 3];
             let normal = if level_ground { directions(samples[index(i, j)])[2] } else { unit(across) };
-            Node { x: at(col, i), y: at(row, j), h: self.ladder.rung(heights[index(i, j)]), normal }
+            Node { x: at(col, i), y: at(row, j), h: height_steps(heights[index(i, j)]), normal }
         };
         let mut tile = Tile::new(level, col, row);
         for (i, j) in (0..GRID).flat_map(|j| (0..GRID).map(move |i| (i, j))) {
@@ -230,19 +239,19 @@ impl Scene<'_> {
 
     /// The height so far outside of a border of this height.
     fn fallen(&self, border_m: f64, outside_m: f64) -> f64 {
-        border_m + (outside_m / self.fall_m).min(1.0) * (self.ladder.foot_m - border_m)
+        border_m + (outside_m / self.fall_m).min(1.0) * (self.foot_m - border_m)
     }
 
     /// Height above the ellipsoid at a longitude and latitude, on what is exported or around it.
     fn height_at(&self, place: [f64; 2]) -> f64 {
         let rect = self.product.rect;
         let (low, high) = (self.product.corner_m(rect.south, rect.west), self.product.corner_m(rect.north, rect.east));
-        let Some(place) = self.earth.place_m(place) else { return self.ladder.foot_m };
+        let Some(place) = self.earth.place_m(place) else { return self.foot_m };
         let beyond = |axis: usize| (low[axis] - place[axis]).max(place[axis] - high[axis]);
         let outside_m = beyond(0).max(beyond(1)).max(0.0);
         // Far away a system may give anything, or nothing.
         if !outside_m.is_finite() || self.fall_m <= outside_m {
-            return self.ladder.foot_m;
+            return self.foot_m;
         }
         let inside = [0, 1].map(|axis| place[axis].clamp(low[axis], high[axis]));
         let height = height_m(self.product, inside).unwrap_or(0.0);
@@ -250,16 +259,17 @@ impl Scene<'_> {
         self.fallen(height + above, outside_m)
     }
 
-    fn layer(&self, bounds: &Bounds) -> Value {
+    fn layer(&self, bounds: &Bounds, has_holes: bool) -> Value {
         let available = |level: u32| {
             let ([first_col, last_col], [first_row, last_row]) = bounds.tiles(self.level, level);
             json!([{ "startX": first_col, "startY": first_row, "endX": last_col, "endY": last_row }])
         };
         let area = &self.product.manifest.area;
+        let of_holes = if has_holes { "; holes are closed, holes.geojson says where" } else { "" };
         json!({
             "tilejson": "2.1.0",
             "name": area.name,
-            "description": format!("from {}; {}", area.crs, self.earth.datum().said()),
+            "description": format!("from {}; {}{of_holes}", area.crs, self.earth.datum().said()),
             "version": "1.0.0",
             "format": "quantized-mesh-1.0",
             "scheme": "tms",

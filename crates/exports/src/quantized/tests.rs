@@ -20,6 +20,17 @@ struct Decoded {
     normals: Vec<[u8; 2]>,
 }
 
+impl Decoded {
+    /// Metres between heights that a vertex may have.
+    fn step_m(&self) -> f64 {
+        (f64::from(self.top_m) - f64::from(self.foot_m)) / STEPS as f64
+    }
+
+    fn height_m(&self, vertex: u32) -> f64 {
+        f64::from(self.foot_m) + self.vertices[vertex as usize][2] as f64 * self.step_m()
+    }
+}
+
 fn decode(bytes: &[u8]) -> Decoded {
     let u16_at = |at: usize| u16::from_le_bytes([bytes[at], bytes[at + 1]]);
     let u32_at = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
@@ -131,14 +142,21 @@ fn check_tiles(files: &BTreeMap<String, Vec<u8>>) {
             .sum();
         assert!((area as f64 / (2 * STEPS * STEPS) as f64 - 1.0).abs() < 1e-3, "{level}/{col}/{row}");
         assert!(tile.vertices.iter().flatten().all(|part| (0..=STEPS).contains(part)));
+        // The header has the tile's own lowest and highest height.
+        let heights = || tile.vertices.iter().map(|vertex| vertex[2]);
+        let highest = if tile.foot_m < tile.top_m { STEPS } else { 0 };
+        assert_eq!((heights().min(), heights().max()), (Some(0), Some(highest)), "{level}/{col}/{row}");
         for (neighbour, mine, theirs, along) in [((level, col + 1, row), 2, 0, 1), ((level, col, row + 1), 3, 1, 0)] {
             let Some(other) = tiles.get(&neighbour) else { continue };
-            let line = |tile: &Decoded, edge: usize| -> Vec<(i64, i64, [u8; 2])> {
-                let nodes = tile.edges[edge].iter().map(|&v| v as usize);
-                nodes.map(|v| (tile.vertices[v][along], tile.vertices[v][2], tile.normals[v])).collect()
+            let line = |tile: &Decoded, edge: usize| -> Vec<(i64, [u8; 2])> {
+                tile.edges[edge].iter().map(|&v| (tile.vertices[v as usize][along], tile.normals[v as usize])).collect()
             };
             assert_eq!(line(tile, mine), line(other, theirs), "{level}/{col}/{row}");
-            assert_eq!((tile.foot_m, tile.top_m), (other.foot_m, other.top_m));
+            for (&own, &their) in tile.edges[mine].iter().zip(&other.edges[theirs]) {
+                let [own_m, their_m] = [tile.height_m(own), other.height_m(their)];
+                let half_steps_m = (tile.step_m() + other.step_m()) / 2.0;
+                assert!((own_m - their_m).abs() <= half_steps_m + 1e-9, "{level}/{col}/{row}: {own_m} {their_m}");
+            }
             compared += 1;
         }
     }
@@ -155,17 +173,39 @@ fn the_finest_tiles_have_the_heights_of_the_load_modules() {
     for (name, bytes) in files.iter().filter(|(name, _)| name.starts_with(&format!("{level}/"))) {
         let (_, col, row) = key(name);
         let tile = decode(bytes);
-        let rung_m = f64::from(tile.top_m - tile.foot_m) / STEPS as f64;
-        for [u, v, h] in tile.vertices {
+        for (index, &[u, v, _]) in (0..).zip(&tile.vertices) {
             let place = earth.place_m(lon_lat(level, [col * STEPS + u, row * STEPS + v])).unwrap();
             let inside = (505_000.0..506_000.0).contains(&place[0]) && (3_875_000.0..3_875_500.0).contains(&place[1]);
             if inside {
-                let height = f64::from(tile.foot_m) + h as f64 * rung_m;
+                let height = tile.height_m(index);
                 let expected = height_m(&product, place).unwrap();
-                assert!((height - expected).abs() < rung_m / 2.0 + 0.02, "{height} {expected}");
+                assert!((height - expected).abs() < tile.step_m() / 2.0 + 0.02, "{height} {expected}");
                 found += 1;
             }
         }
     }
     assert!(3 < found, "{found}");
+}
+
+#[test]
+fn holes_are_closed_and_a_file_beside_the_tiles_says_where() {
+    let product = samples::with_hole();
+    let files = exported(&product);
+    check_tiles(&files);
+    let holes: Value = serde_json::from_slice(&files["holes.geojson"]).unwrap();
+    let triangles = holes["features"][0]["geometry"]["coordinates"].as_array().unwrap();
+    assert_eq!(triangles.len(), 2);
+    let earth = Earth::new(&product, Some(Datum::Ellipsoid)).unwrap();
+    for ring in triangles.iter().map(|polygon| polygon[0].as_array().unwrap()) {
+        assert!(ring.len() == 4 && ring[0] == ring[3]);
+        for place in ring {
+            let at = earth.place_m([place[0].as_f64().unwrap(), place[1].as_f64().unwrap()]).unwrap();
+            // The eastern load module, whose south-west corner is ground.
+            let [east_m, north_m] = [at[0] - 505_500.0, at[1] - 3_875_000.0];
+            assert!((-0.1..500.1).contains(&east_m) && 100.0 < east_m + north_m, "{at:?}");
+        }
+    }
+    let layer: Value = serde_json::from_slice(&files["layer.json"]).unwrap();
+    assert!(layer["description"].as_str().unwrap().contains("holes.geojson"));
+    assert!(!exported(&samples::product()).contains_key("holes.geojson"));
 }

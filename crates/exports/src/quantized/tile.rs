@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use super::clip::doubled_area;
-use super::lattice::{Ladder, Node, STEPS, lon_lat};
+use super::lattice::{Ladder, Node, STEPS, height_m, lon_lat};
 use crate::earth::earth_centred;
 use crate::mesh::{cross, dot, minus, unit};
 
@@ -16,18 +16,28 @@ pub(crate) struct Tile {
     level: u32,
     col: i64,
     row: i64,
+    /// In the order in which triangles first use them.
     nodes: Vec<Node>,
     place_of: HashMap<(i64, i64), u32>,
+    /// Of the nodes that fall on one place of the lattice the lowest, whichever comes first: so neighbours agree.
+    lowest: HashMap<(i64, i64), Node>,
     triangles: Vec<[u32; 3]>,
 }
 
 impl Tile {
     pub(crate) fn new(level: u32, col: i64, row: i64) -> Self {
-        Self { level, col, row, nodes: Vec::new(), place_of: HashMap::new(), triangles: Vec::new() }
+        let (place_of, lowest) = (HashMap::new(), HashMap::new());
+        Self { level, col, row, nodes: Vec::new(), place_of, lowest, triangles: Vec::new() }
     }
 
     /// Adds a convex polygon as a fan; what is thinner than the lattice is left out.
     pub(crate) fn add(&mut self, polygon: &[Node]) {
+        for node in polygon {
+            let lowest = self.lowest.entry((node.x, node.y)).or_insert(*node);
+            if (node.h, node.normal) < (lowest.h, lowest.normal) {
+                *lowest = *node;
+            }
+        }
         for i in 1..polygon.len().saturating_sub(1) {
             let corners = [polygon[0], polygon[i], polygon[i + 1]];
             if 0 < doubled_area(&corners[0], &corners[1], &corners[2]) {
@@ -56,32 +66,34 @@ impl Tile {
     }
 
     /// The bytes of its file.
-    pub(crate) fn bytes(&self, ladder: &Ladder) -> Vec<u8> {
-        let mut bytes = Vec::with_capacity(128 + 10 * self.nodes.len() + 6 * self.triangles.len());
-        self.put_header(&mut bytes, ladder);
-        bytes.extend_from_slice(&(self.nodes.len() as u32).to_le_bytes());
+    pub(crate) fn bytes(&self) -> Vec<u8> {
+        let nodes: Vec<Node> = self.nodes.iter().map(|node| self.lowest[&(node.x, node.y)]).collect();
+        let ladder = Ladder::of(&nodes);
+        let mut bytes = Vec::with_capacity(128 + 10 * nodes.len() + 6 * self.triangles.len());
+        self.put_header(&mut bytes, &nodes, &ladder);
+        bytes.extend_from_slice(&(nodes.len() as u32).to_le_bytes());
         let (west, south) = (self.col * STEPS, self.row * STEPS);
-        let parts: [&dyn Fn(&Node) -> i64; 3] = [&|n| n.x - west, &|n| n.y - south, &|n| n.h];
+        let parts: [&dyn Fn(&Node) -> i64; 3] = [&|n| n.x - west, &|n| n.y - south, &|n| ladder.rung(n.h)];
         for part in parts {
             let mut before = 0;
-            for node in &self.nodes {
+            for node in &nodes {
                 bytes.extend_from_slice(&zigzag(part(node) - before).to_le_bytes());
                 before = part(node);
             }
         }
-        let wide = usize::from(u16::MAX) + 1 < self.nodes.len();
+        let wide = usize::from(u16::MAX) + 1 < nodes.len();
         if wide {
             bytes.resize(bytes.len().next_multiple_of(4), 0);
         }
         self.put_triangles(&mut bytes, wide);
         self.put_edges(&mut bytes, wide);
-        put_normals(&mut bytes, &self.nodes);
+        put_normals(&mut bytes, &nodes);
         bytes
     }
 
-    fn put_header(&self, bytes: &mut Vec<u8>, ladder: &Ladder) {
-        let place = |node: &Node| earth_centred(lon_lat(self.level, [node.x, node.y]), ladder.height_m(node.h));
-        let places: Vec<[f64; 3]> = self.nodes.iter().map(place).collect();
+    fn put_header(&self, bytes: &mut Vec<u8>, nodes: &[Node], ladder: &Ladder) {
+        let place = |node: &Node| earth_centred(lon_lat(self.level, [node.x, node.y]), height_m(node.h));
+        let places: Vec<[f64; 3]> = nodes.iter().map(place).collect();
         let end = |pick: fn(f64, f64) -> f64, from: f64| {
             places.iter().fold([from; 3], |end, place| [0, 1, 2].map(|axis| pick(end[axis], place[axis])))
         };
@@ -91,7 +103,7 @@ impl Tile {
         let radius = places.iter().map(distance).fold(0.0, f64::max);
         let mut put = |number: f64| bytes.extend_from_slice(&number.to_le_bytes());
         middle.into_iter().for_each(&mut put);
-        let (foot, top) = (ladder.foot_m as f32, ladder.top_m() as f32);
+        let (foot, top) = (height_m(ladder.low) as f32, height_m(ladder.high) as f32);
         bytes.extend_from_slice(&foot.to_le_bytes());
         bytes.extend_from_slice(&top.to_le_bytes());
         for number in middle.into_iter().chain([radius]).chain(horizon_point(middle, &places)) {
@@ -206,20 +218,36 @@ mod tests {
         let (west, south) = (2 * STEPS, STEPS);
         let square = [
             node(west, south, 0),
-            node(west + STEPS, south, 5),
-            node(west + STEPS, south + STEPS, STEPS),
+            node(west + STEPS, south, 1000),
+            node(west + STEPS, south + STEPS, 102_400),
             node(west, south + STEPS, 0),
         ];
         tile.add(&square);
         assert_eq!(tile.covered(), 1.0);
-        let bytes = tile.bytes(&Ladder::over(0.0, 100.0));
+        let bytes = tile.bytes();
         assert_eq!(bytes.len(), 88 + 4 + 4 * 6 + 4 + 12 + 4 * (4 + 4) + 5 + 8);
         let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
         assert_eq!((word(88), word(116)), (4, 2));
+        // From 0 to 100 m.
+        assert_eq!((word(24), word(28)), (0.0_f32.to_bits(), 100.0_f32.to_bits()));
         // 0 1 2, 0 2 3: each new vertex is a zero.
         let indices: Vec<u16> = bytes[120..132].chunks(2).map(|b| u16::from_le_bytes([b[0], b[1]])).collect();
         assert_eq!(indices, [0, 0, 0, 3, 1, 0]);
         assert_eq!(word(132), 2);
         assert_eq!(&bytes[136..140], [0, 0, 3, 0]);
+    }
+
+    #[test]
+    fn of_vertices_at_one_place_the_lowest_is_written_whichever_comes_first() {
+        let node = |x, y, h| Node { x, y, h, normal: [0.0, 0.0, 1.0] };
+        let one = [node(0, 0, 5), node(STEPS, 0, 40), node(STEPS, STEPS, 90)];
+        // Thinner than the lattice, and yet it has a say: a neighbour may have more of it.
+        let two = [node(0, 0, 3), node(STEPS, STEPS, 80), node(0, 0, 7)];
+        let (mut tile, mut other) = (Tile::new(3, 0, 0), Tile::new(3, 0, 0));
+        [one, two].iter().for_each(|polygon| tile.add(polygon));
+        [two, one].iter().for_each(|polygon| other.add(polygon));
+        assert_eq!(tile.bytes(), other.bytes());
+        let float = |at: usize| f32::from_le_bytes(tile.bytes()[at..at + 4].try_into().unwrap());
+        assert_eq!([float(24), float(28)], [3.0 / 1024.0, 80.0 / 1024.0]);
     }
 }

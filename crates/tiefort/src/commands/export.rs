@@ -29,7 +29,11 @@ Examples:
 --lod K exports a coarser level, where the job has [lod] levels. Without it files of modules hold all
 levels; 3dtiles puts levels coarser than K between a square of 4 km and its load modules.
 A mesh (ply, obj, glb) is counted in metres from the south-west corner of what is exported; the file
-itself and NAME.json beside it say where that is. Load modules are named ROW,COL from the south-west.
+itself and NAME.json beside it say where that is. Load modules are named ROW,COL from the south-west,
+nodes of a glb r0003c0017. The faces of a ply come class by class; comments in it say which are whose.
+A geotiff is cloud optimised, with overviews; it names the system of its heights where that is known.
+Where no source has a height, rasters have none (NaN) and meshes no triangles; gpkg and modules keep
+these as class 'hole' (255), and quantized-mesh closes them and says where in holes.geojson.
 3dtiles and quantized-mesh want heights above the ellipsoid: they know EGM96 and the ellipsoid, and
 refuse any other datum unless told what to take it for.";
 
@@ -83,9 +87,9 @@ enum Format {
     Obj,
     /// A mesh as binary glTF 2.0
     Glb,
-    /// A raster of the compiled surface, or of its residual
+    /// A Cloud Optimized GeoTIFF of the compiled surface, or of its residual
     Geotiff,
-    /// A GeoPackage for QGIS: load modules, breaches, tiles, triangles
+    /// A GeoPackage for QGIS: load modules, breaches, tiles, triangles, with styles
     Gpkg,
     /// A folder of OpenFlight 16.1 files, one for each 4 km square, and a MetaFlight index
     Openflight,
@@ -137,6 +141,17 @@ impl Format {
             Format::Geotiff => Some("tif"),
             Format::Gpkg => Some("gpkg"),
             Format::Modules | Format::Openflight | Format::Tiles3d | Format::QuantizedMesh => None,
+        }
+    }
+
+    /// What becomes of triangles over holes, where no source has a height.
+    fn of_holes(self) -> &'static str {
+        match self {
+            Format::Modules => "of class 255, as in the database",
+            Format::Gpkg => "in the layer triangles, of class hole",
+            Format::Geotiff => "NaN in the raster",
+            Format::QuantizedMesh => "kept, since tiles must be closed; holes.geojson says where they are",
+            Format::Ply | Format::Obj | Format::Glb | Format::Openflight | Format::Tiles3d => "left out",
         }
     }
 
@@ -243,7 +258,12 @@ fn export(arguments: &Arguments, work: &Work) -> Result<String, Failure> {
             format!(" at level {level}, {} more at levels up to {}", grouped(coarser as u64), level + more)
         }
     };
-    Ok(format!("{said}{modules}, {} triangles{level}", grouped(triangles as u64)))
+    let holes = match product.hole_triangles() {
+        0 => String::new(),
+        1 => format!("1 triangle over a hole is {}\n", arguments.format.of_holes()),
+        count => format!("{} triangles over holes are {}\n", grouped(count as u64), arguments.format.of_holes()),
+    };
+    Ok(format!("{said}{holes}{modules}, {} triangles{level}", grouped(triangles as u64)))
 }
 
 fn write_raster(arguments: &Arguments, product: &Product, work: &Work) -> Result<(), Failure> {

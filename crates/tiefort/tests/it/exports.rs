@@ -36,7 +36,9 @@ fn every_format_is_written_and_the_same_every_time() {
         assert!(bytes == others, "{} differs from run to run", path.display());
     }
     assert_eq!(fs::read_dir(scene.path("one/modules")).unwrap().count(), 64);
-    assert_eq!(fs::read_dir(scene.path("one/tiles/modules")).unwrap().count(), 64);
+    // One square of 4 km, its load modules in groups of at most 2,048 triangles.
+    let groups = fs::read_dir(scene.path("one/tiles/groups")).unwrap().count();
+    assert!((1..=8).contains(&groups), "{groups} groups");
 }
 
 #[test]
@@ -58,7 +60,9 @@ fn residuals_at_every_post_add_up_to_those_of_the_report() {
     let words = ["--format", "geotiff", "--layer", "residual", "--out", "residual.tif", "--quiet"];
     scene.run_to(0, &[&["export", "a.tdb"], &words[..]].concat());
     let file = fs::File::open(scene.path("residual.tif")).unwrap();
-    let image = tiff::decoder::Decoder::new(file).unwrap().read_image().unwrap();
+    let mut decoder = tiff::decoder::Decoder::new(file).unwrap();
+    assert!(!decoder.more_images(), "one block needs no overviews");
+    let image = decoder.read_image().unwrap();
     let tiff::decoder::DecodingResult::F32(residuals) = image else { panic!("residuals are floats") };
     assert_eq!(residuals.len(), 161 * 161);
     let squares: f64 = residuals.iter().map(|&residual| f64::from(residual).powi(2)).sum();
@@ -67,6 +71,66 @@ fn residuals_at_every_post_add_up_to_those_of_the_report() {
     assert!(((squares / residuals.len() as f64).sqrt() - rms_m).abs() < 1e-9);
     let largest = residuals.iter().fold(0.0_f32, |largest, residual| largest.max(residual.abs()));
     assert_eq!(f64::from(largest), report["residual"]["max_m"].as_f64().unwrap());
+}
+
+/// The same database with a hole of 50 x 50 posts.
+fn built_with_a_hole() -> Scene {
+    let changes = [
+        (
+            "source = \"sample\"\nseed = 1",
+            "sources = [{ file = \"holed.asc\", crs = \"EPSG:32611\" }]\nvoids = { hole = true }",
+        ),
+        ("areas = [{ sample = \"mountains\", class = \"mountains\", weight = 1 }]\n", ""),
+    ];
+    let scene = Scene::with_job("small.toml", &changes);
+    let is_hole = |row: i32, col: i32| (50..100).contains(&row) && (60..110).contains(&col);
+    let height = |row: i32, col: i32| 700 + (row * row / 40 + row * col / 30 + 7 * (col % 9)) % 97;
+    let value = |row, col| if is_hole(row, col) { -9999 } else { height(row, col) };
+    let line = |row| (0..161).map(|col| value(row, col).to_string()).collect::<Vec<_>>().join(" ");
+    let lines: Vec<String> = (0..161).map(line).collect();
+    let head = "ncols 161\nnrows 161\nxllcenter 505000\nyllcenter 3875000\ncellsize 25\nNODATA_value -9999\n";
+    fs::write(scene.path("holed.asc"), format!("{head}{}\n", lines.join("\n"))).unwrap();
+    scene.run_to(0, &["build", "job.toml", "--out", "a.tdb", "--quiet"]);
+    scene
+}
+
+#[test]
+fn every_format_leaves_holes_out_or_marks_them_and_says_so() {
+    let scene = built_with_a_hole();
+    let json = |name: &str| -> Value { serde_json::from_slice(&fs::read(scene.path(name)).unwrap()).unwrap() };
+    let left_out = "triangles over holes are left out\n";
+    for (format, name, said) in [
+        ("modules", "modules", "triangles over holes are of class 255"),
+        ("ply", "mesh.ply", left_out),
+        ("obj", "mesh.obj", left_out),
+        ("glb", "mesh.glb", left_out),
+        ("geotiff", "a.tif", "triangles over holes are NaN in the raster"),
+        ("gpkg", "a.gpkg", "triangles over holes are in the layer triangles, of class hole"),
+        ("openflight", "flt", left_out),
+        ("3dtiles", "tiles", left_out),
+        ("quantized-mesh", "terrain", "holes.geojson says where they are"),
+    ] {
+        let mut arguments = vec!["export", "a.tdb", "--format", format, "--out", name];
+        if ["3dtiles", "quantized-mesh"].contains(&format) {
+            arguments.extend(["--assume-datum", "EGM96"]);
+        }
+        let found = scene.run_to(0, &arguments).stderr;
+        assert!(found.contains(said), "{format}: {found}");
+    }
+    let triangles = json("a.tdb/report.json")["triangles"].as_u64().unwrap();
+    let holes =
+        json("terrain/holes.geojson")["features"][0]["geometry"]["coordinates"].as_array().unwrap().len() as u64;
+    for name in ["mesh.ply.json", "mesh.obj.json", "mesh.glb.json"] {
+        let sidecar = json(name);
+        assert_eq!(sidecar["hole_triangles_left_out"], holes, "{name}");
+        assert_eq!(sidecar["triangles"], triangles - holes, "{name}");
+    }
+    let mut decoder = tiff::decoder::Decoder::new(fs::File::open(scene.path("a.tif")).unwrap()).unwrap();
+    let tiff::decoder::DecodingResult::F32(heights) = decoder.read_image().unwrap() else { panic!("floats") };
+    let empty = heights.iter().filter(|height| height.is_nan()).count();
+    // Triangles follow the edge of the hole as well as their number allows.
+    assert!((2200..2800).contains(&empty), "{empty} posts without a height");
+    assert!(heights[75 * 161 + 85].is_nan() && heights[20 * 161 + 20].is_finite());
 }
 
 #[test]
@@ -139,5 +203,5 @@ fn every_format_takes_any_level_that_the_database_has() {
         names.push(child["content"]["uri"].as_str().unwrap().split("/r").next().unwrap().to_owned());
         tile = child;
     }
-    assert_eq!(names, ["squares", "levels/2", "levels/1", "modules"]);
+    assert_eq!(names, ["squares", "levels/2", "levels/1", "groups"]);
 }
