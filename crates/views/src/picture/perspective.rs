@@ -95,9 +95,10 @@ pub fn draw_perspective(surface: &Surface, look: &Look) -> Drawn {
     let mut stage = Stage::new(surface, look, true);
     let half_m = stage.haze_half_m;
     let color = |[height_m, light]: [f64; 2], ahead: f64| {
+        // Between three corners of one light it is that light but for rounding.
         let color = match light {
-            WATER_LIGHT => WATER,
-            HOLE_LIGHT => NOTHING,
+            _ if light < (WATER_LIGHT + HOLE_LIGHT) / 2.0 => NOTHING,
+            _ if light < 0.0 => WATER,
             _ => lit(tints.at(height_m), light as f32),
         };
         mix(color, HAZE, haze_share(ahead, half_m))
@@ -481,6 +482,24 @@ mod tests {
             differing += usize::from((0..3).any(|i| 24 < a[i].abs_diff(b[i])));
         }
         assert!(5000 < inside && differing < inside / 50, "{differing} of {inside}");
+    }
+
+    #[test]
+    fn water_and_holes_have_one_colour_each_however_they_lie() {
+        let dem = hills(60);
+        let surface =
+            |cover: Cover| Facets { covers: vec![cover; 60 * 60 * 2], ..Facets::of_tin(&every_post(&dem), SPACING_M) };
+        let look = Look::overlooking(&Surface::Posts(&dem, SPACING_M, &[]), 30.0, 1.0, 200);
+        for (cover, color) in [(Cover::Water, WATER), (Cover::Hole, NOTHING)] {
+            let image = draw_perspective(&Surface::Triangles(&surface(cover)), &look).image;
+            let is_between =
+                |x: [u8; 3], a: [u8; 3], b: [u8; 3]| (0..3).all(|i| a[i].min(b[i]) <= x[i] && x[i] <= a[i].max(b[i]));
+            // Inside, away from the walls and the sky, only haze lies over it.
+            for (x, y) in (60..140).flat_map(|x| (40..60).map(move |y| (x, y))) {
+                let found = image.pixel(x, y);
+                assert!(is_between(found, color, HAZE), "{cover:?} at {x},{y}: {found:?}");
+            }
+        }
     }
 
     #[test]
