@@ -76,6 +76,7 @@ mod datums;
 mod enforce;
 mod given;
 mod ground;
+mod heights;
 mod large;
 mod mask_of;
 mod measured;

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use source_files::{Crs, DemFile, RasterFrame, Reading, SourceError};
-use terrain::Spacing;
+use terrain::{GridFrame, PostRect, Spacing};
 
 use crate::CompileError;
 use crate::locate::{covered, utm_of};
@@ -99,6 +99,44 @@ pub fn look_at(paths: &[PathBuf], given: Option<&str>) -> Result<Suggestion, Com
     let tiles = modules.map(|modules| ((f64::from(modules) / MODULES_A_TILE).round() as u32).clamp(1, modules / 2));
     let (spacing_m, tiles) = (spacing.metres(), (tiles[1], tiles[0]));
     Ok(Suggestion { seen, epsg, origin_m, size_m, spacing_m, tiles, part_around })
+}
+
+/// The working grid that suits a raster by itself.
+pub(crate) struct SuitingGrid {
+    pub crs: Crs,
+    pub grid: GridFrame,
+    /// Its posts: the largest rectangle inside the raster.
+    pub rect: PostRect,
+}
+
+/// The grid that an area over one raster would have, without load modules: system and spacing are the same, and the
+/// rectangle ends where the raster does, to a 256th of its longer side.
+///
+/// # Errors
+/// When there is no such grid; the hint is a command that makes a raster that needs none.
+pub(crate) fn suiting_grid(frame: &RasterFrame) -> Result<SuitingGrid, CompileError> {
+    const STEPS: u32 = 256;
+    let alone = std::slice::from_ref(frame);
+    let refused = |none: job::NoArea| {
+        let path = frame.path.display();
+        let system = utm_of(alone).ok().and_then(|crs| crs.epsg()).unwrap_or(32611);
+        let hint = format!(
+            "cut a part: gdalwarp -t_srs EPSG:{system} -tr 25 25 -r bilinear -te WEST SOUTH EAST NORTH {path} part.tif"
+        );
+        CompileError::Impossible {
+            key: path.to_string(),
+            found: format!("posts that are not square ones in metres, and {}", none.found),
+            expected: "a raster that can be resampled to such".into(),
+            hint,
+        }
+    };
+    let crs = area_crs(alone).map_err(refused)?;
+    let spacing = spacing_for(alone, &crs);
+    let posts = f64::from((frame.rows.max(frame.cols) / STEPS).max(1));
+    let (origin_m, size_m) = covered(alone, &crs, spacing, spacing.metres() * posts).map_err(refused)?;
+    let [cols, rows] = size_m.map(|metres| (metres / spacing.metres()).round() as usize + 1);
+    let grid = GridFrame { origin_east_m: origin_m[0], origin_north_m: origin_m[1], spacing };
+    Ok(SuitingGrid { crs, grid, rect: PostRect::of_size(rows, cols) })
 }
 
 /// System, spacing, origin and size of an area in the middle of a raster, and where that middle is; `None` where the
