@@ -19,6 +19,7 @@ mod chunk;
 pub use chunk::Chunk;
 mod directory;
 mod geotiff;
+mod unpacked;
 pub use geotiff::GeoTiff;
 mod dem_file;
 mod dted;
