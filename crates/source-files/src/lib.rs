@@ -8,6 +8,7 @@ pub mod limits;
 
 mod error;
 pub use error::SourceError;
+mod beside;
 mod content;
 pub use content::{FileState, content};
 mod crs;
