@@ -95,7 +95,7 @@ fn an_area_is_found_around_a_place_and_over_the_sources() {
     scene.run_to(0, &["build", "cover.toml"]);
     let around = "around = { lat = 35.3, lon = -116.6, size_km = [4, 2.2] }";
     fs::write(scene.path("around.toml"), job(around, "source = \"sample\"")).unwrap();
-    let plan = scene.run_to(0, &["plan", "around.toml"]).stdout;
+    let plan = scene.run_to(0, &["plan", "around.toml", "--out", "b.tdb"]).stdout;
     // The middle is 536367 E, 3906386 N; 2.2 km are five load modules.
     assert!(plan.contains("EPSG:32611") && plan.contains("[4000, 2500]"), "{plan}");
     assert!(plan.contains("534375.00  3905125.00") && plan.contains("35.28"), "corners in both systems: {plan}");
