@@ -10,7 +10,7 @@ use source_files::{DemFile, Mosaic, MosaicRules, MosaicVoids, RasterFrame, Readi
 use terrain::{Dem, Post, PostRect, TileId, quanta_of_metres};
 
 use crate::look::{SuitingGrid, suiting_grid};
-use crate::sources::decode;
+use crate::sources::{decode, warnings_of};
 use crate::{CompileError, Event, Progress, Stage};
 
 /// Rows that are resampled at once.
@@ -20,8 +20,8 @@ const BAND_ROWS: i32 = 256;
 pub(crate) struct Heights {
     pub dem: Arc<Dem>,
     pub frame: RasterFrame,
-    /// What was done to have them, where the raster's own posts would not do.
-    pub note: Option<String>,
+    /// What a person should know about them, and what was done to have them.
+    pub notes: Vec<String>,
 }
 
 impl Heights {
@@ -39,7 +39,7 @@ impl Heights {
         let file = DemFile::open(path, &Reading::AS_IT_SAYS)?;
         let heights = Self::of(&file, &Workers::new(workers), stop)?;
         progress.tell(Event::Leave(Stage::Read));
-        heights.note.iter().for_each(|note| progress.tell(Event::Note(note.clone())));
+        heights.notes.iter().for_each(|note| progress.tell(Event::Note(note.clone())));
         Ok(heights)
     }
 
@@ -52,12 +52,13 @@ impl Heights {
             return resampled(file, &suiting_grid(file.frame())?, workers, stop);
         }
         let mut raster = decode(file, file.rect(), workers, stop)?;
+        let notes = warnings_of(file.frame(), raster.range_m(), raster.notes());
         raster.settle_voids(VoidPolicy::Hole)?;
         let scale = file.sample_scale();
         let dem = Dem::from_fn(file.rect(), |post| {
             raster.sample(post).and_then(|sample| quanta_of_metres(scale.height_m(sample)))
         });
-        Ok(Self { dem: Arc::new(dem), frame: file.frame().clone(), note: None })
+        Ok(Self { dem: Arc::new(dem), frame: file.frame().clone(), notes })
     }
 }
 
@@ -77,6 +78,7 @@ fn resampled(
     let SuitingGrid { crs, grid, rect } = suiting;
     let window = file.window_reaching(crs, grid, *rect).unwrap_or(file.rect());
     let raster = decode(file, window, workers, stop)?;
+    let mut notes = warnings_of(file.frame(), raster.range_m(), raster.notes());
     let voids = MosaicVoids { next_source: false, fill_within: 0 };
     let rules = MosaicRules { resampling: Resampling::Bilinear, feather_m: 0.0, voids };
     let mosaic = Mosaic::new(vec![raster], rules, crs, grid, *rect)?;
@@ -101,7 +103,7 @@ fn resampled(
         cols: rect.posts_wide() as u32,
         rows: rect.posts_high() as u32,
     };
-    let note = Some(format!(
+    notes.push(format!(
         "{}: resampled from {} to {} x {} posts {spacing} m apart in {}",
         frame.path.display(),
         posts_text(file.frame()),
@@ -109,7 +111,7 @@ fn resampled(
         frame.rows,
         frame.crs.name(),
     ));
-    Ok(Heights { dem: Arc::new(dem), frame, note })
+    Ok(Heights { dem: Arc::new(dem), frame, notes })
 }
 
 /// How far the posts of a raster are apart.

@@ -80,6 +80,7 @@ mod heights;
 mod large;
 mod mask_of;
 mod measured;
+mod outlook;
 mod publish;
 mod recount;
 mod refine;

@@ -2,10 +2,11 @@
 
 use std::collections::HashMap;
 use std::path::PathBuf;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
 
 use database::ReportResidual;
+use fidelity::Tally;
 use geometry::WORKING_POSTS_MAX;
 use job::{ErrorKey, Optimising, StartMethod};
 use schedule::{Event as Scheduled, RankedTasks, Workers, in_rank_order_observed};
@@ -156,6 +157,51 @@ pub(crate) fn untiled(request: &TinRequest, dem: &Dem, spacing_m: [f64; 2]) -> R
     job.refined(task, dem.clone(), &[])
 }
 
+/// The residuals of the optimised method on several grounds that share a number of triangles by one threshold of gain;
+/// `None` where there are none.
+///
+/// # Errors
+/// When the grounds are too small or too large.
+pub(crate) fn untiled_together(
+    grounds: &[Dem],
+    triangles: usize,
+    spacing_m: f64,
+    stop: &AtomicBool,
+) -> Result<Option<Tally>, CompileError> {
+    let request = |triangles: usize| TinRequest {
+        dem: PathBuf::new(),
+        method: TinMethod::Optimised(Optimising::default()),
+        points: None,
+        triangles: Some(triangles),
+        max_residual_m: None,
+        rms_m: None,
+        start: None,
+        tiles: (1, 1),
+        workers: 1,
+    };
+    // Two are there before any point, and a point makes two more.
+    let points = triangles.saturating_sub(2 * grounds.len()) / 2;
+    let reach = 4 * points / grounds.len().max(1) + 1;
+    let survey = |dem: &Dem| {
+        let request = request(triangles);
+        let job = TinJob::new(&request, dem, [spacing_m; 2])?;
+        Ok(job.curve(dem, job.tiles[0], reach))
+    };
+    let curves = grounds.iter().map(survey).collect::<Result<Vec<_>, CompileError>>()?;
+    let by_rank: Vec<usize> = (0..grounds.len()).collect();
+    let gains = Gains { bands: &mut std::iter::once(curves), by_rank: &by_rank, floor: None };
+    let shares = points_globally(points as u64, gains);
+    let mut all: Option<Tally> = None;
+    for (dem, share) in grounds.iter().zip(shares) {
+        if stop.load(Ordering::Relaxed) {
+            return Err(CompileError::Stopped { stage: Stage::Survey, done: 0, total: grounds.len() });
+        }
+        let tin = untiled(&request(2 * share + 2), dem, [spacing_m; 2])?.tin;
+        all.get_or_insert_default().merge(&tally_of(dem, &tin));
+    }
+    Ok(all)
+}
+
 /// A request, checked against its raster.
 struct TinJob<'a> {
     request: &'a TinRequest,
@@ -276,26 +322,29 @@ impl<'a> TinJob<'a> {
         let Some(points) = self.points().filter(|_| 1 < self.tiles.len()) else { return Ok(None) };
         progress.tell(Event::Enter(Stage::Survey, self.tiles.len()));
         let reach = 3 * points as usize / self.tiles.len() + 1;
-        let level = geometry::widest_level();
-        // One load module as large as the raster: costs are points, and all are booked to it.
-        let grid = ModuleGrid { rows: 1, cols: 1, side_cells: i32::from(u16::MAX) };
-        let curves = schedule::for_each_independent(&self.tiles, workers, stop, |_, &tile| {
-            let mut growth = self.task(tile, self.tiling.shared_sides(tile), Vec::new(), Some(reach));
-            growth.stop = Stop { points: Some(reach), ..Stop::default() };
-            if let Rule::Batches { .. } = growth.rule {
-                growth.rule = Rule::WorstFirst;
-            }
-            let outer = tiling::outer_sides(growth.rect, self.area());
-            let owned = self.tiling.owned_sides(tile);
-            let owned = SeamSides::from_fn(|side| owned.is_open(side) || outer.is_open(side));
-            let window = dem.window(growth.rect);
-            let importance = weights(&window);
-            let task = SurveyTask { growth, owned, grid, cost: CostUnit::Points };
-            Ok(tin::survey(&window, &importance, &task, level))
-        });
+        let curve = |_, &tile: &TileId| Ok(self.curve(dem, tile, reach));
+        let curves = schedule::for_each_independent(&self.tiles, workers, stop, curve);
         let curves = curves.map_err(|error| CompileError::from_schedule(Stage::Survey, &self.tiles, error))?;
         progress.tell(Event::Leave(Stage::Survey));
         Ok(Some(curves))
+    }
+
+    /// What a tile would gain by so many points.
+    fn curve(&self, dem: &Dem, tile: TileId, reach: usize) -> GainCurve {
+        let mut growth = self.task(tile, self.tiling.shared_sides(tile), Vec::new(), Some(reach));
+        growth.stop = Stop { points: Some(reach), ..Stop::default() };
+        if let Rule::Batches { .. } = growth.rule {
+            growth.rule = Rule::WorstFirst;
+        }
+        let outer = tiling::outer_sides(growth.rect, self.area());
+        let owned = self.tiling.owned_sides(tile);
+        let owned = SeamSides::from_fn(|side| owned.is_open(side) || outer.is_open(side));
+        let window = dem.window(growth.rect);
+        let importance = weights(&window);
+        // One load module as large as the raster: costs are points, and all are booked to it.
+        let grid = ModuleGrid { rows: 1, cols: 1, side_cells: i32::from(u16::MAX) };
+        let task = SurveyTask { growth, owned, grid, cost: CostUnit::Points };
+        tin::survey(&window, &importance, &task, geometry::widest_level())
     }
 
     /// What a tile starts from beside its corners.
