@@ -6,9 +6,7 @@
 
 use std::sync::atomic::AtomicBool;
 
-use source_files::{
-    Crs, DemFile, MosaicRules, MosaicVoids, RasterFrame, Resampling, WideMosaic, Windows, window_reaching,
-};
+use source_files::{Crs, DemFile, MosaicRules, MosaicVoids, RasterFrame, Resampling, WideMosaic, Windows};
 use terrain::{Dem, GridFrame, PostRect};
 
 use crate::CompileError;
@@ -49,11 +47,8 @@ impl Sampled<'_> {
         open: impl Fn(usize) -> Result<DemFile, CompileError>,
     ) -> Result<Option<f64>, CompileError> {
         let windows = self.windows();
-        let reaches = |frame: &RasterFrame| {
-            windows.iter().any(|&window| window_reaching(frame, self.crs, &self.grid, window).is_some())
-        };
         let (mut files, mut used) = (Vec::new(), Vec::new());
-        for index in (0..frames.len()).filter(|&index| reaches(&frames[index])) {
+        for index in self.reaching(frames, &windows) {
             used.push((files.len(), lowest_m[index]));
             files.push(open(index)?);
         }
@@ -76,6 +71,32 @@ impl Sampled<'_> {
         let rms_m =
             |posts: u64, squared: u128| (squared as f64 / posts as f64).sqrt() / f64::from(terrain::QUANTA_PER_METRE);
         Ok(residual.filter(|tally| 0 < tally.posts).map(|tally| MODULE_LINES * rms_m(tally.posts, tally.sum_squared)))
+    }
+
+    /// Places of the rasters that hold a corner, the middle of a side or the middle of a window.
+    fn reaching(&self, frames: &[RasterFrame], windows: &[PostRect]) -> Vec<usize> {
+        let halves = |low: i32, high: i32| [low, low + (high - low) / 2, high];
+        let place = |row: i32, col: i32| [self.grid.east_m(col), self.grid.north_m(row)];
+        let of_window = |window: &PostRect| {
+            let rows = halves(window.south, window.north);
+            let cols = halves(window.west, window.east);
+            rows.map(|row| cols.map(|col| place(row, col)))
+        };
+        let places: Vec<[f64; 2]> = windows.iter().flat_map(of_window).flatten().collect();
+        // Projected once for each system: there may be many thousands of rasters, of few.
+        let mut systems: Vec<(&Crs, Vec<[f64; 2]>)> = Vec::new();
+        let mut found = Vec::new();
+        for (index, frame) in frames.iter().enumerate() {
+            let known = systems.iter().position(|(crs, _)| **crs == frame.crs).unwrap_or_else(|| {
+                let projected = places.iter().filter_map(|&place| self.crs.to(&frame.crs, place)).collect();
+                systems.push((&frame.crs, projected));
+                systems.len() - 1
+            });
+            if systems[known].1.iter().any(|&place| holds(frame, place)) {
+                found.push(index);
+            }
+        }
+        found
     }
 
     /// Windows of whole load modules, spread evenly.
@@ -104,6 +125,17 @@ impl Sampled<'_> {
             .map(|(row, col)| window(row, col))
             .collect()
     }
+}
+
+/// Whether a place in a raster's own system lies in it, or less than a post outside.
+fn holds(frame: &RasterFrame, [mut east, north]: [f64; 2]) -> bool {
+    let [west, south] = frame.south_west;
+    if frame.crs.is_geographic() {
+        let middle = west + frame.spacing[0] * f64::from(frame.cols) / 2.0;
+        east -= 360.0 * ((east - middle) / 360.0).round();
+    }
+    let inside = |posts: f64, count: u32| -1.0 < posts && posts < f64::from(count);
+    inside((east - west) / frame.spacing[0], frame.cols) && inside((north - south) / frame.spacing[1], frame.rows)
 }
 
 #[cfg(test)]

@@ -102,9 +102,11 @@ impl WideMosaic {
         let mut patch =
             Patch { rect, heights: vec![0; rect.post_count()], standings: vec![Standing::Gap; rect.post_count()] };
         for joint in &self.joints {
+            let Some(window) = joint.warp.window(rect, MARGIN) else { continue };
             let places = joint.warp.over(rect);
-            let rects: Vec<PostRect> =
-                joint.members.iter().map(|&(file, shift)| shifted(self.windows.files()[file].rect(), shift)).collect();
+            // Of thousands of files few lie under one rectangle.
+            let rects = joint.members.iter().map(|&(file, shift)| shifted(self.windows.files()[file].rect(), shift));
+            let rects: Vec<PostRect> = rects.filter(|rect| rect.intersection(&window).is_some()).collect();
             let holds = |post: terrain::Post| rects.iter().any(|rect| rect.contains(post));
             for (post, standing) in posts(rect).zip(&mut patch.standings) {
                 if *standing == Standing::Gap

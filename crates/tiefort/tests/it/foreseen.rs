@@ -154,3 +154,23 @@ fn a_place_that_is_a_link_to_nothing_or_below_a_file() {
         assert!(planned.contains(part), "{planned}");
     }
 }
+
+#[cfg(unix)]
+#[test]
+fn a_folder_that_nothing_may_be_made_in() {
+    use std::os::unix::fs::PermissionsExt;
+    let scene = Scene::with_job("raster.toml", &[]);
+    Raster::sound().write(&scene.path("dem.tif"));
+    fs::create_dir(scene.path("closed")).unwrap();
+    let allow = |mode| fs::set_permissions(scene.path("closed"), fs::Permissions::from_mode(mode)).unwrap();
+    allow(0o555);
+    if fs::write(scene.path("closed/probe"), "").is_ok() {
+        eprintln!("skipped: this user may write anywhere");
+        return;
+    }
+    for out in ["closed", "closed/x.tdb"] {
+        let planned = refusal(&scene, &["plan", "job.toml", "--out", out]);
+        assert_eq!(planned, refusal(&scene, &["build", "job.toml", "--out", out]));
+    }
+    allow(0o755);
+}
