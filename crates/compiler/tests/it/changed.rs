@@ -86,15 +86,3 @@ fn a_file_beside_a_source_that_says_how_it_is_read_is_a_part_of_it() {
         });
     }
 }
-
-#[test]
-fn a_header_that_changes_between_two_builds_has_the_second_build_anew() {
-    let scene = scene();
-    drop(scene.build("area", 1));
-    assert!(scene.build("area", 1).is_unchanged);
-    let header = fs::read_to_string(scene.path("dem.hdr")).unwrap();
-    fs::write(scene.path("dem.hdr"), header + "nodata_value 700\n").unwrap();
-    // Posts of 700 m are voids now, which the job does not allow.
-    let error = scene.try_build("area", 1).unwrap_err().to_string();
-    assert!(error.contains("dem.flt") && error.contains("void posts"), "{error}");
-}

@@ -144,3 +144,18 @@ fn heights_above_different_datums_are_not_mixed_and_unknown_ones_are_told() {
     let said = scene.run_to(0, &["build", "job.toml"]).stderr;
     assert!(said.contains("does not say what its heights are measured from"), "{said}");
 }
+
+#[test]
+fn a_file_beside_a_source_that_changes_between_two_builds_is_noticed() {
+    let scene = Scene::new();
+    fs::write(scene.path("a.asc"), grid(0, hills)).unwrap();
+    let system = |zone: u32| fs::write(scene.path("a.prj"), format!("PROJCS[\"x\",AUTHORITY[\"EPSG\",\"326{zone}\"]]"));
+    system(11).unwrap();
+    scene.run_to(0, &["init", "a.asc", "--out", "job.toml"]);
+    scene.run_to(0, &["build", "job.toml"]);
+    let again = scene.run_to(0, &["build", "job.toml"]).stderr;
+    assert!(again.contains("nothing changed"), "{again}");
+    system(12).unwrap();
+    let moved = scene.run_to(2, &["build", "job.toml"]).stderr;
+    assert!(moved.contains("a.asc: it lies outside the area"), "{moved}");
+}
