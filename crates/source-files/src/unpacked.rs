@@ -79,7 +79,7 @@ fn counted(mut unpacked: impl Read, limit: u64) -> (u64, io::Result<()>) {
 }
 
 /// Follows runs of PackBits. Each row is packed by itself (TIFF 6.0, section 9), so none goes beyond its row.
-fn runs(packed: impl Read, promise: Promise) -> Result<(), String> {
+fn runs(packed: impl BufRead, promise: Promise) -> Result<(), String> {
     let mut bytes = packed.bytes();
     let mut next = || bytes.next().transpose().map_err(|error| error.to_string());
     let mut found = 0;
