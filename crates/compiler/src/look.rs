@@ -143,18 +143,11 @@ pub(crate) struct SuitingGrid {
 pub(crate) fn suiting_grid(frame: &RasterFrame) -> Result<SuitingGrid, CompileError> {
     const STEPS: u32 = 256;
     let alone = std::slice::from_ref(frame);
-    let refused = |none: job::NoArea| {
-        let path = frame.path.display();
-        let system = utm_of(alone).ok().and_then(|crs| crs.epsg()).unwrap_or(32611);
-        let hint = format!(
-            "cut a part: gdalwarp -t_srs EPSG:{system} -tr 25 25 -r bilinear -te WEST SOUTH EAST NORTH {path} part.tif"
-        );
-        CompileError::Impossible {
-            key: path.to_string(),
-            found: format!("posts that are not square ones in metres, and {}", none.found),
-            expected: "a raster that can be resampled to such".into(),
-            hint,
-        }
+    let refused = |none: job::NoArea| CompileError::Impossible {
+        key: frame.path.display().to_string(),
+        found: format!("posts that are not square ones in metres, and {}", none.found),
+        expected: "a raster that can be resampled to such".into(),
+        hint: cut_hint(frame),
     };
     let crs = area_crs(alone).map_err(refused)?;
     let spacing = spacing_for(alone, &crs);
@@ -163,6 +156,27 @@ pub(crate) fn suiting_grid(frame: &RasterFrame) -> Result<SuitingGrid, CompileEr
     let [cols, rows] = size_m.map(|metres| (metres / spacing.metres()).round() as usize + 1);
     let grid = GridFrame { origin_east_m: origin_m[0], origin_north_m: origin_m[1], spacing };
     Ok(SuitingGrid { crs, grid, rect: PostRect::of_size(rows, cols) })
+}
+
+/// A command that cuts a part out of the middle of a raster.
+fn cut_hint(frame: &RasterFrame) -> String {
+    /// Degrees to either side.
+    const HALF: f64 = 0.25;
+    let path = frame.path.display();
+    let middle = frame.crs.to(&Crs::wgs84(), frame.place(frame.rows / 2, frame.cols / 2));
+    let zone = middle.and_then(|middle| Some((middle, Crs::utm_at(middle).ok()?.epsg()?)));
+    let Some(([east, north], epsg)) = zone else {
+        return format!("resample a part of it: gdalwarp -t_srs EPSG:32611 -tr 25 25 -r bilinear {path} part.tif");
+    };
+    let [west, south, east, north] = [east - HALF, north - HALF, east + HALF, north + HALF].map(short_degrees);
+    format!(
+        "cut a part, as its middle: gdalwarp -t_srs EPSG:{epsg} -te_srs EPSG:4326 -te {west} {south} {east} {north} \
+         -tr 125 125 -r bilinear {path} part.tif"
+    )
+}
+
+fn short_degrees(degrees: f64) -> f64 {
+    (degrees * 100.0).round() / 100.0
 }
 
 /// System, spacing, origin and size of an area in the middle of a raster, and where that middle is; `None` where the
@@ -178,7 +192,7 @@ fn part(frame: &RasterFrame) -> Option<(Crs, Spacing, ([f64; 2], [f64; 2]), Opti
     let middle = cut(frame, 2);
     let crs = area_crs(std::slice::from_ref(&middle)).ok()?;
     let spacing = spacing_for(std::slice::from_ref(&middle), &crs);
-    let inner = cut(frame, (PART_M / spacing.metres()).ceil() as u32 + 1);
+    let inner = cut(frame, (PART_M / posts_m(std::slice::from_ref(&middle), &crs)).ceil() as u32 + 1);
     let found = covered(std::slice::from_ref(&inner), &crs, spacing, SIDE_M).ok()?;
     let around = frame.crs.to(&Crs::wgs84(), middle.south_west)?;
     Some((crs, spacing, found, Some(around)))

@@ -98,3 +98,23 @@ fn ground_finer_than_the_budget_shows_and_a_grid_finer_than_the_ground_are_remar
     let plain = said(&scene, &["dem.asc"]);
     assert!(!plain.contains("note: "), "{plain}");
 }
+
+#[test]
+fn a_raster_of_the_whole_world_gets_a_job_for_a_part_and_no_mesh_but_a_command() {
+    let scene = Scene::new();
+    let row = (0..360).map(|col| format!("{} ", 100 + col % 7)).collect::<String>() + "\n";
+    let head = "ncols 360\nnrows 120\nxllcenter -179.5\nyllcenter -59.5\ncellsize 1\n";
+    fs::write(scene.path("world.asc"), head.to_owned() + &row.repeat(120)).unwrap();
+    fs::write(scene.path("world.prj"), r#"GEOGCS["WGS 84",AUTHORITY["EPSG","4326"]]"#).unwrap();
+    let found = said(&scene, &["world.asc", "--out", "job.toml"]);
+    assert!(
+        found.contains("the area is a part in the middle of the first") && found.contains("km at 125 m"),
+        "{found}"
+    );
+    assert!(fs::read_to_string(scene.path("job.toml")).unwrap().contains("# around = { lat = "));
+    scene.run_to(0, &["plan", "job.toml"]);
+    let mesh = ["tin", "world.asc", "--points", "100", "--out", "m.ply"];
+    scene.refuses(&mesh, &["world.asc: posts that are not square ones in metres"]);
+    let refused = scene.run_to(2, &mesh).stderr;
+    assert!(refused.contains("-te_srs EPSG:4326 -te ") && refused.contains("world.asc part.tif"), "{refused}");
+}
