@@ -3,10 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use source_files::{Crs, DemFile, RasterFrame, Reading, SourceError};
-use terrain::Spacing;
+use terrain::{GridFrame, PostRect, Spacing};
 
 use crate::CompileError;
 use crate::locate::{covered, utm_of};
+use crate::outlook::Sampled;
 
 /// What a raster is.
 #[derive(Clone, Debug)]
@@ -25,6 +26,8 @@ pub struct Seen {
     pub is_geographic: bool,
     /// Void posts.
     pub voids: usize,
+    /// The value that can only mark voids, where the file has one and does not declare it; its posts count as void.
+    pub undeclared: Option<f64>,
     /// Lowest and highest height in metres; `None` when all posts are void.
     pub range_m: Option<(f64, f64)>,
     /// What it says heights are measured from.
@@ -55,7 +58,19 @@ pub struct Suggestion {
     /// Longitude and latitude of the middle, where the area is a part only: the files are too large for one area, or
     /// lie too far apart.
     pub part_around: Option<[f64; 2]>,
+    /// Metres between posts of the finest raster, about.
+    pub posts_m: f64,
+    /// Triangles of a load module that an area is suggested, on average.
+    pub triangles: u32,
+    /// The RMS residual that these will leave, in metres, from a look at windows of the area; `None` where those have no
+    /// heights.
+    pub rms_m: Option<f64>,
 }
+
+/// Values that mark voids where a file does not say so: no land is as low, and none of 32,767 m is as high.
+const MARKS: [f64; 7] = [-32768.0, -32767.0, -9999.0, -99999.0, 32767.0, f32::MIN as f64, f32::MAX as f64];
+/// Triangles of a load module on average: the founding paper's.
+const TRIANGLES: u32 = 32;
 
 /// Width and height of an area that is a part of what there is, in metres, about.
 const PART_M: f64 = 50_000.0;
@@ -73,9 +88,9 @@ const MODULES_A_TILE: f64 = 17.0;
 pub fn look_at(paths: &[PathBuf], given: Option<&str>) -> Result<Suggestion, CompileError> {
     let (mut seen, mut frames) = (Vec::new(), Vec::new());
     for path in paths {
-        let (file, crs_given) = open(path, given)?;
-        frames.push(file.frame().clone());
-        seen.push(look(&file, crs_given)?);
+        let (found, frame) = look(path, given)?;
+        frames.push(frame);
+        seen.push(found);
     }
     let impossible = |found: String, hint: String| CompileError::Impossible {
         key: "FILES".into(),
@@ -98,7 +113,70 @@ pub fn look_at(paths: &[PathBuf], given: Option<&str>) -> Result<Suggestion, Com
     }
     let tiles = modules.map(|modules| ((f64::from(modules) / MODULES_A_TILE).round() as u32).clamp(1, modules / 2));
     let (spacing_m, tiles) = (spacing.metres(), (tiles[1], tiles[0]));
-    Ok(Suggestion { seen, epsg, origin_m, size_m, spacing_m, tiles, part_around })
+    let posts_m = posts_m(&frames, &crs);
+    let side_cells = (SIDE_M / spacing_m).round() as usize;
+    let sampled = Sampled {
+        crs: &crs,
+        grid: GridFrame { origin_east_m: origin_m[0], origin_north_m: origin_m[1], spacing },
+        rect: PostRect::of_size(modules[1] as usize * side_cells + 1, modules[0] as usize * side_cells + 1),
+        side_cells,
+        triangles: TRIANGLES as usize,
+    };
+    let lowest_m: Vec<f64> = seen.iter().map(|seen| seen.range_m.map_or(0.0, |(low, _)| low)).collect();
+    let rms_m = sampled.rms_m(&frames, &lowest_m, |index| Ok(open(&paths[index], given, seen[index].undeclared)?.0))?;
+    Ok(Suggestion { seen, epsg, origin_m, size_m, spacing_m, tiles, part_around, posts_m, rms_m, triangles: TRIANGLES })
+}
+
+/// The working grid that suits a raster by itself.
+pub(crate) struct SuitingGrid {
+    pub crs: Crs,
+    pub grid: GridFrame,
+    /// Its posts: the largest rectangle inside the raster.
+    pub rect: PostRect,
+}
+
+/// The grid that an area over one raster would have, without load modules: system and spacing are the same, and the
+/// rectangle ends where the raster does, to a 256th of its longer side.
+///
+/// # Errors
+/// When there is no such grid; the hint is a command that makes a raster that needs none.
+pub(crate) fn suiting_grid(frame: &RasterFrame) -> Result<SuitingGrid, CompileError> {
+    const STEPS: u32 = 256;
+    let alone = std::slice::from_ref(frame);
+    let refused = |none: job::NoArea| CompileError::Impossible {
+        key: frame.path.display().to_string(),
+        found: format!("posts that are not square ones in metres, and {}", none.found),
+        expected: "a raster that can be resampled to such".into(),
+        hint: cut_hint(frame),
+    };
+    let crs = area_crs(alone).map_err(refused)?;
+    let spacing = spacing_for(alone, &crs);
+    let posts = f64::from((frame.rows.max(frame.cols) / STEPS).max(1));
+    let (origin_m, size_m) = covered(alone, &crs, spacing, spacing.metres() * posts).map_err(refused)?;
+    let [cols, rows] = size_m.map(|metres| (metres / spacing.metres()).round() as usize + 1);
+    let grid = GridFrame { origin_east_m: origin_m[0], origin_north_m: origin_m[1], spacing };
+    Ok(SuitingGrid { crs, grid, rect: PostRect::of_size(rows, cols) })
+}
+
+/// A command that cuts a part out of the middle of a raster.
+fn cut_hint(frame: &RasterFrame) -> String {
+    /// Degrees to either side.
+    const HALF: f64 = 0.25;
+    let path = frame.path.display();
+    let middle = frame.crs.to(&Crs::wgs84(), frame.place(frame.rows / 2, frame.cols / 2));
+    let zone = middle.and_then(|middle| Some((middle, Crs::utm_at(middle).ok()?.epsg()?)));
+    let Some(([east, north], epsg)) = zone else {
+        return format!("resample a part of it: gdalwarp -t_srs EPSG:32611 -tr 25 25 -r bilinear {path} part.tif");
+    };
+    let [west, south, east, north] = [east - HALF, north - HALF, east + HALF, north + HALF].map(short_degrees);
+    format!(
+        "cut a part, as its middle: gdalwarp -t_srs EPSG:{epsg} -te_srs EPSG:4326 -te {west} {south} {east} {north} \
+         -tr 125 125 -r bilinear {path} part.tif"
+    )
+}
+
+fn short_degrees(degrees: f64) -> f64 {
+    (degrees * 100.0).round() / 100.0
 }
 
 /// System, spacing, origin and size of an area in the middle of a raster, and where that middle is; `None` where the
@@ -114,14 +192,16 @@ fn part(frame: &RasterFrame) -> Option<(Crs, Spacing, ([f64; 2], [f64; 2]), Opti
     let middle = cut(frame, 2);
     let crs = area_crs(std::slice::from_ref(&middle)).ok()?;
     let spacing = spacing_for(std::slice::from_ref(&middle), &crs);
-    let inner = cut(frame, (PART_M / spacing.metres()).ceil() as u32 + 1);
+    let inner = cut(frame, (PART_M / posts_m(std::slice::from_ref(&middle), &crs)).ceil() as u32 + 1);
     let found = covered(std::slice::from_ref(&inner), &crs, spacing, SIDE_M).ok()?;
     let around = frame.crs.to(&Crs::wgs84(), middle.south_west)?;
     Some((crs, spacing, found, Some(around)))
 }
 
-fn open(path: &Path, given: Option<&str>) -> Result<(DemFile, bool), CompileError> {
-    match (DemFile::open(path, &Reading::AS_IT_SAYS), given) {
+/// Opens a raster, in the system `given` where it names none; `nodata` marks its voids where it is said.
+fn open(path: &Path, given: Option<&str>, nodata: Option<f64>) -> Result<(DemFile, bool), CompileError> {
+    let reading = Reading { nodata, ..Reading::AS_IT_SAYS };
+    match (DemFile::open(path, &reading), given) {
         (Ok(file), _) => Ok((file, false)),
         (Err(SourceError::NoCrs { .. }), Some(given)) => {
             let crs = Crs::named(given).map_err(|found| CompileError::Impossible {
@@ -130,18 +210,34 @@ fn open(path: &Path, given: Option<&str>) -> Result<(DemFile, bool), CompileErro
                 expected: "a system that can be computed".into(),
                 hint: "for example --crs EPSG:32611".into(),
             })?;
-            Ok((DemFile::open(path, &Reading { crs: Some(crs), ..Reading::AS_IT_SAYS })?, true))
+            Ok((DemFile::open(path, &Reading { crs: Some(crs), ..reading })?, true))
         }
         (Err(error), _) => Err(error.into()),
     }
 }
 
-fn look(file: &DemFile, crs_given: bool) -> Result<Seen, CompileError> {
-    let frame = file.frame();
+/// Looks at every post of a raster, as a build would read it with the job that is suggested.
+fn look(path: &Path, given: Option<&str>) -> Result<(Seen, RasterFrame), CompileError> {
+    let (mut file, crs_given) = open(path, given, None)?;
+    let all = |file: &DemFile| file.look(file.rect(), &file.chunks_of(file.rect()));
+    let mut found = all(&file);
+    let undeclared = match &found {
+        // One value marks voids: that which the file declares, where it has it.
+        Ok(look) if 0 < look.voids && file.nodata().is_some() => None,
+        Ok(look) => look.range_m.and_then(|range_m| undeclared(&file, range_m)),
+        Err(_) if file.nodata().is_some() => None,
+        // So low or high that no raster may have it.
+        Err(SourceError::HeightOutOfRange { found, .. }) => undeclared(&file, (*found, *found)),
+        Err(_) => None,
+    };
+    if undeclared.is_some() {
+        (file, _) = open(path, given, undeclared)?;
+        found = all(&file);
+    }
+    let (found, frame) = (found?, file.frame());
     let mut notes: Vec<String> = frame.crs.remark().map(str::to_owned).into_iter().collect();
-    let found = file.look(file.rect(), &file.chunks_of(file.rect()))?;
     notes.extend(found.notes.iter().take(3).cloned());
-    Ok(Seen {
+    let seen = Seen {
         path: frame.path.clone(),
         format: file.format(),
         size: (frame.cols, frame.rows),
@@ -149,12 +245,20 @@ fn look(file: &DemFile, crs_given: bool) -> Result<Seen, CompileError> {
         spacing: frame.spacing,
         is_geographic: frame.crs.is_geographic(),
         voids: found.voids,
+        undeclared,
         range_m: found.range_m,
         vertical_datum: file.vertical_datum().map(str::to_owned),
         accuracy_m: file.accuracy_m(),
         notes,
         crs_given,
-    })
+    };
+    Ok((seen, frame.clone()))
+}
+
+/// The usual mark of a void that is the lowest or the highest height of a file.
+fn undeclared(file: &DemFile, (low, high): (f64, f64)) -> Option<f64> {
+    let height_m = |mark: f64| file.sample_scale().height_m(mark);
+    MARKS.into_iter().find(|&mark| (if mark < 0.0 { low } else { high }) == height_m(mark))
 }
 
 /// The rasters' own system where all share one in true metres; else the UTM zone of their middle.
@@ -166,8 +270,8 @@ fn area_crs(frames: &[RasterFrame]) -> Result<Crs, job::NoArea> {
     if shared && metric { Ok(first.clone()) } else { utm_of(frames) }
 }
 
-/// The spacing nearest to that of the finest raster that divides the border step and is a multiple of 1/16 m.
-fn spacing_for(frames: &[RasterFrame], crs: &Crs) -> Spacing {
+/// Metres between posts of the finest raster.
+fn posts_m(frames: &[RasterFrame], crs: &Crs) -> f64 {
     let metres = |frame: &RasterFrame| {
         let (row, col) = (frame.rows / 2, frame.cols / 2);
         let places = [(row, col), (row, col + 1), (row + 1, col)].map(|(row, col)| {
@@ -180,7 +284,12 @@ fn spacing_for(frames: &[RasterFrame], crs: &Crs) -> Spacing {
         // Posts of a degree grid are closer east to west; what lies between the two keeps the detail of both.
         Some((apart(a, b) * apart(a, c)).sqrt())
     };
-    let wanted = frames.iter().filter_map(metres).fold(f64::INFINITY, f64::min);
+    frames.iter().filter_map(metres).fold(f64::INFINITY, f64::min)
+}
+
+/// The spacing nearest to that of the finest raster that divides the border step and is a multiple of 1/16 m.
+fn spacing_for(frames: &[RasterFrame], crs: &Crs) -> Spacing {
+    let wanted = posts_m(frames, crs);
     let fits = |parts: u32| {
         let metres = BORDER_STEP_M / f64::from(parts);
         Spacing::from_metres(metres).filter(|spacing| spacing.metres() * f64::from(parts) == BORDER_STEP_M)

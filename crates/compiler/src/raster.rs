@@ -1,26 +1,26 @@
-//! Without load modules: just a mesh from a raster, on the raster's own posts.
+//! Without load modules: just a mesh from a raster, on the raster's own posts or on those it is resampled to.
 
 use std::collections::HashMap;
 use std::path::PathBuf;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
 
 use database::ReportResidual;
+use fidelity::Tally;
 use geometry::WORKING_POSTS_MAX;
 use job::{ErrorKey, Optimising, StartMethod};
 use schedule::{Event as Scheduled, RankedTasks, Workers, in_rank_order_observed};
-use source_files::{DemFile, RasterFrame, Reading, VoidPolicy};
 use terrain::{
     Dem, GainCurve, Importance, LatticePoint, Metres, ModuleGrid, PostRect, SeamSides, StopReason, THOUSANDTHS, TileId,
-    TileTin, Tin, Vertex, quanta_of_metres,
+    TileTin, Tin, Vertex,
 };
 use tiling::{Gains, Order, Tiling, points_equally, points_globally};
 use tin::{CostUnit, Frame, LastBatch, Proximity, Rule, Stop, SurveyTask, TileTask};
 
 use crate::given::{GivenPost, chosen, posts_of_file, refused, start_posts};
 use crate::ground::Window;
+use crate::heights::Heights;
 use crate::refinement::{Most, Refinement};
-use crate::sources::decode;
 use crate::tasks::{inherited, posts_of};
 use crate::tin_tally::tally_of;
 use crate::{CompileError, Event, Progress, Stage};
@@ -77,9 +77,9 @@ pub struct TinRequest {
 /// A mesh and where it lies.
 #[derive(Clone, Debug)]
 pub struct Mesh {
-    /// Vertices and triangles; rows and columns are the raster's, from its south-west post.
+    /// Vertices and triangles; rows and columns are those of the posts, from the south-west one.
     pub tin: Tin,
-    /// The raster's heights.
+    /// The raster's heights, resampled where its own posts are not square ones in metres.
     pub dem: Arc<Dem>,
     /// Easting of post (0, 0), in metres.
     pub east_m: f64,
@@ -89,7 +89,7 @@ pub struct Mesh {
     pub spacing_m: (f64, f64),
     /// EPSG code of its coordinate reference system.
     pub epsg: Option<u32>,
-    /// Against every post of the raster.
+    /// Against every one of those posts.
     pub residual: ReportResidual,
     /// Vertices.
     pub points: usize,
@@ -102,7 +102,7 @@ pub struct Mesh {
 /// # Errors
 /// When the raster cannot be used, or nothing says when to stop.
 pub fn tin(request: &TinRequest, stop: &AtomicBool, progress: &mut dyn Progress) -> Result<Mesh, CompileError> {
-    let heights = Heights::read(request, stop, progress)?;
+    let heights = Heights::read(&request.dem, request.workers, stop, progress)?;
     let tiles = heights.refine(request, stop, progress)?;
     progress.tell(Event::Enter(Stage::Assemble, 0));
     let exhausted = tiles.iter().any(|tile| tile.stop == StopReason::Exhausted);
@@ -112,29 +112,7 @@ pub fn tin(request: &TinRequest, stop: &AtomicBool, progress: &mut dyn Progress)
     Ok(mesh)
 }
 
-/// A raster's heights, and where they lie.
-pub(crate) struct Heights {
-    pub dem: Arc<Dem>,
-    frame: RasterFrame,
-}
-
 impl Heights {
-    /// Those that a request names.
-    pub fn read(request: &TinRequest, stop: &AtomicBool, progress: &mut dyn Progress) -> Result<Self, CompileError> {
-        let workers = Workers::new(request.workers);
-        progress.tell(Event::Enter(Stage::Read, 0));
-        let file = DemFile::open(&request.dem, &Reading::AS_IT_SAYS)?;
-        file.frame().require_metres()?;
-        let mut raster = decode(&file, file.rect(), &workers, stop)?;
-        raster.settle_voids(VoidPolicy::Hole)?;
-        let scale = file.sample_scale();
-        let dem = Dem::from_fn(file.rect(), |post| {
-            raster.sample(post).and_then(|sample| quanta_of_metres(scale.height_m(sample)))
-        });
-        progress.tell(Event::Leave(Stage::Read));
-        Ok(Self { dem: Arc::new(dem), frame: file.frame().clone() })
-    }
-
     /// The tiles of a request over these heights.
     pub fn refine(
         &self,
@@ -179,6 +157,51 @@ pub(crate) fn untiled(request: &TinRequest, dem: &Dem, spacing_m: [f64; 2]) -> R
     job.refined(task, dem.clone(), &[])
 }
 
+/// The residuals of the optimised method on several grounds that share a number of triangles by one threshold of gain;
+/// `None` where there are none.
+///
+/// # Errors
+/// When the grounds are too small or too large.
+pub(crate) fn untiled_together(
+    grounds: &[Dem],
+    triangles: usize,
+    spacing_m: f64,
+    stop: &AtomicBool,
+) -> Result<Option<Tally>, CompileError> {
+    let request = |triangles: usize| TinRequest {
+        dem: PathBuf::new(),
+        method: TinMethod::Optimised(Optimising::default()),
+        points: None,
+        triangles: Some(triangles),
+        max_residual_m: None,
+        rms_m: None,
+        start: None,
+        tiles: (1, 1),
+        workers: 1,
+    };
+    // Two are there before any point, and a point makes two more.
+    let points = triangles.saturating_sub(2 * grounds.len()) / 2;
+    let reach = 4 * points / grounds.len().max(1) + 1;
+    let survey = |dem: &Dem| {
+        let request = request(triangles);
+        let job = TinJob::new(&request, dem, [spacing_m; 2])?;
+        Ok(job.curve(dem, job.tiles[0], reach))
+    };
+    let curves = grounds.iter().map(survey).collect::<Result<Vec<_>, CompileError>>()?;
+    let by_rank: Vec<usize> = (0..grounds.len()).collect();
+    let gains = Gains { bands: &mut std::iter::once(curves), by_rank: &by_rank, floor: None };
+    let shares = points_globally(points as u64, gains);
+    let mut all: Option<Tally> = None;
+    for (dem, share) in grounds.iter().zip(shares) {
+        if stop.load(Ordering::Relaxed) {
+            return Err(CompileError::Stopped { stage: Stage::Survey, done: 0, total: grounds.len() });
+        }
+        let tin = untiled(&request(2 * share + 2), dem, [spacing_m; 2])?.tin;
+        all.get_or_insert_default().merge(&tally_of(dem, &tin));
+    }
+    Ok(all)
+}
+
 /// A request, checked against its raster.
 struct TinJob<'a> {
     request: &'a TinRequest,
@@ -197,7 +220,7 @@ impl<'a> TinJob<'a> {
         let (rows, cols) = request.tiles;
         let longest =
             (rect.cells_high().div_ceil(rows.max(1) as usize)).max(rect.cells_wide().div_ceil(cols.max(1) as usize));
-        refuse(request, rect, longest, spacing_m)?;
+        refuse(request, rect, longest)?;
         let tiling = Tiling::new(rect, 1, rows, cols, Order::Color);
         let quantum = if request.method == TinMethod::Paper { terrain::QUANTA_PER_METRE as u32 } else { 1 };
         let units = |metres: f64| (metres * f64::from(terrain::QUANTA_PER_METRE) / f64::from(quantum)).floor() as u64;
@@ -299,26 +322,29 @@ impl<'a> TinJob<'a> {
         let Some(points) = self.points().filter(|_| 1 < self.tiles.len()) else { return Ok(None) };
         progress.tell(Event::Enter(Stage::Survey, self.tiles.len()));
         let reach = 3 * points as usize / self.tiles.len() + 1;
-        let level = geometry::widest_level();
-        // One load module as large as the raster: costs are points, and all are booked to it.
-        let grid = ModuleGrid { rows: 1, cols: 1, side_cells: i32::from(u16::MAX) };
-        let curves = schedule::for_each_independent(&self.tiles, workers, stop, |_, &tile| {
-            let mut growth = self.task(tile, self.tiling.shared_sides(tile), Vec::new(), Some(reach));
-            growth.stop = Stop { points: Some(reach), ..Stop::default() };
-            if let Rule::Batches { .. } = growth.rule {
-                growth.rule = Rule::WorstFirst;
-            }
-            let outer = tiling::outer_sides(growth.rect, self.area());
-            let owned = self.tiling.owned_sides(tile);
-            let owned = SeamSides::from_fn(|side| owned.is_open(side) || outer.is_open(side));
-            let window = dem.window(growth.rect);
-            let importance = weights(&window);
-            let task = SurveyTask { growth, owned, grid, cost: CostUnit::Points };
-            Ok(tin::survey(&window, &importance, &task, level))
-        });
+        let curve = |_, &tile: &TileId| Ok(self.curve(dem, tile, reach));
+        let curves = schedule::for_each_independent(&self.tiles, workers, stop, curve);
         let curves = curves.map_err(|error| CompileError::from_schedule(Stage::Survey, &self.tiles, error))?;
         progress.tell(Event::Leave(Stage::Survey));
         Ok(Some(curves))
+    }
+
+    /// What a tile would gain by so many points.
+    fn curve(&self, dem: &Dem, tile: TileId, reach: usize) -> GainCurve {
+        let mut growth = self.task(tile, self.tiling.shared_sides(tile), Vec::new(), Some(reach));
+        growth.stop = Stop { points: Some(reach), ..Stop::default() };
+        if let Rule::Batches { .. } = growth.rule {
+            growth.rule = Rule::WorstFirst;
+        }
+        let outer = tiling::outer_sides(growth.rect, self.area());
+        let owned = self.tiling.owned_sides(tile);
+        let owned = SeamSides::from_fn(|side| owned.is_open(side) || outer.is_open(side));
+        let window = dem.window(growth.rect);
+        let importance = weights(&window);
+        // One load module as large as the raster: costs are points, and all are booked to it.
+        let grid = ModuleGrid { rows: 1, cols: 1, side_cells: i32::from(u16::MAX) };
+        let task = SurveyTask { growth, owned, grid, cost: CostUnit::Points };
+        tin::survey(&window, &importance, &task, geometry::widest_level())
     }
 
     /// What a tile starts from beside its corners.
@@ -396,7 +422,7 @@ impl<'a> TinJob<'a> {
     }
 }
 
-fn refuse(request: &TinRequest, rect: PostRect, longest: usize, spacing_m: [f64; 2]) -> Result<(), CompileError> {
+fn refuse(request: &TinRequest, rect: PostRect, longest: usize) -> Result<(), CompileError> {
     let impossible = |key: &str, found: String, expected: &str, hint: &str| {
         Err(CompileError::Impossible { key: key.into(), found, expected: expected.into(), hint: hint.into() })
     };
@@ -413,7 +439,6 @@ fn refuse(request: &TinRequest, rect: PostRect, longest: usize, spacing_m: [f64;
         let found = format!("{} x {} posts", rect.posts_high(), rect.posts_wide());
         return impossible("DEM", found, "at least 2 x 2 posts", "a mesh needs ground to cover");
     }
-    refuse_spacing(spacing_m)?;
     let corners = (rows as usize + 1) * (cols as usize + 1);
     match request.points {
         Some(points) if points < corners => impossible(
@@ -432,19 +457,6 @@ fn refuse(request: &TinRequest, rect: PostRect, longest: usize, spacing_m: [f64;
         }
         _ => Ok(()),
     }
-}
-
-/// Refuses posts that are farther apart in one direction than in the other.
-pub(crate) fn refuse_spacing(spacing_m: [f64; 2]) -> Result<(), CompileError> {
-    if (spacing_m[0] - spacing_m[1]).abs() <= 1e-6 * spacing_m[0] {
-        return Ok(());
-    }
-    Err(CompileError::Impossible {
-        key: "DEM".into(),
-        found: format!("posts {} m by {} m apart", spacing_m[0], spacing_m[1]),
-        expected: "square posts".into(),
-        hint: "resample it first: gdalwarp -tr 25 25 in.tif out.tif".into(),
-    })
 }
 
 /// Voids are never selected.

@@ -4,7 +4,8 @@ use std::sync::atomic::AtomicBool;
 
 use terrain::StopReason;
 
-use crate::raster::{Heights, Mesh, TinMethod, TinRequest};
+use crate::heights::Heights;
+use crate::raster::{Mesh, TinMethod, TinRequest};
 use crate::{CompileError, Event, Progress, Stage};
 
 /// Makes a mesh for each of `levels`, numbers of vertices that rise.
@@ -22,7 +23,7 @@ pub fn tin_levels(
     progress: &mut dyn Progress,
 ) -> Result<Vec<Mesh>, CompileError> {
     refuse(request, levels)?;
-    let heights = Heights::read(request, stop, progress)?;
+    let heights = Heights::read(&request.dem, request.workers, stop, progress)?;
     if let TinMethod::Optimised(_) = request.method {
         let level = |&points: &usize| {
             let request = TinRequest { points: Some(points), ..request.clone() };

@@ -9,7 +9,7 @@ use terrain::{GainCurve, LoadModule, TileTin};
 
 use crate::folder::{MEASURED, MODULES, SURVEY, TILES, WORK, files};
 use crate::lock::LOCK_NAME;
-use crate::publish::{Durability, is_temporary, remove_left_over, sync, write_atomically};
+use crate::publish::{Durability, check_writable, is_temporary, remove_left_over, sync, write_atomically};
 use crate::{
     Area, DatabaseError, FileStamp, Folder, Lock, Manifest, ManifestState, Measured, Removals, Stamp, TileModules,
     Work, encode_curve, encode_levels, encode_measured, encode_removals, encode_tile, json,
@@ -72,6 +72,22 @@ impl Database {
         database.sweep()?;
         database.remove_work()?;
         Ok((database, previous))
+    }
+
+    /// Whether a database of `area` could be made or gone on with in `dir`, as far as that is known without locking it.
+    /// Nothing is changed.
+    ///
+    /// # Errors
+    /// As [`Database::create_or_open`].
+    pub fn foresee(dir: &Path, area: &Area) -> Result<(), DatabaseError> {
+        examine(&Folder::new(dir), area)?;
+        if dir.exists() {
+            let lock = dir.join(LOCK_NAME);
+            return check_writable(dir).map_err(|source| DatabaseError::from_io("lock", &lock, 0, source));
+        }
+        let absolute = std::path::absolute(dir).unwrap_or_else(|_| dir.to_path_buf());
+        let Some(around) = absolute.ancestors().find(|folder| folder.exists()) else { return Ok(()) };
+        check_writable(around).map_err(|source| DatabaseError::from_io("create", dir, 0, source))
     }
 
     /// The same for one of several processes that share the directory: it keeps builds out and no other process, and

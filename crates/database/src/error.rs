@@ -69,8 +69,8 @@ pub enum DatabaseError {
         /// What should be a folder.
         path: PathBuf,
     },
-    /// A link, or a folder in place of a file, inside the database.
-    #[error("{}: found a link or a folder, expected a file", path.display())]
+    /// A link, a folder or a pipe in place of a file, inside the database.
+    #[error("{}: found a link, a folder or a pipe, expected a file", path.display())]
     NotAFile {
         /// What should be a file.
         path: PathBuf,
@@ -288,7 +288,7 @@ impl DatabaseError {
             Self::NotADatabase { found, .. } => found.hint(),
             Self::NotOurFolder { .. } => "choose another folder with --out, or empty this one",
             Self::NotAFolder { .. } | Self::NotAFile { .. } => {
-                "output never follows a link out of its folder; remove it"
+                "a database has plain files and folders only, and output follows no link out of it; remove it"
             }
             Self::OtherVersion { .. } => "another version of tiefort wrote it; build into another folder with --out",
             Self::OtherArea { .. } => "the folder holds another gaming area; build into another one with --out",

@@ -153,6 +153,7 @@ impl Folder {
 
     fn stamp(&self, kind: Kind, path: &Path) -> Result<Option<Stamp>, DatabaseError> {
         let mut header = Vec::with_capacity(FRAME_BYTES);
+        refuse_pipe(path)?;
         let file = File::open(path).and_then(|file| file.take(FRAME_BYTES as u64).read_to_end(&mut header));
         match file {
             Ok(_) => frame::read_stamp(kind, path, &header).map(Some),
@@ -260,10 +261,19 @@ pub(crate) fn check_stamp(path: &Path, bytes: &[u8], stamp: &FileStamp) -> Resul
 pub(crate) fn read(path: &Path) -> Result<Vec<u8>, DatabaseError> {
     let fault = |source| DatabaseError::from_io("read", path, 0, source);
     let found = std::fs::metadata(path).map_err(fault)?.len();
+    refuse_pipe(path)?;
     if FILE_BYTES_MAX < found {
         return Err(DatabaseError::TooLarge { path: path.to_path_buf(), found, limit: FILE_BYTES_MAX });
     }
     std::fs::read(path).map_err(fault)
+}
+
+/// Refuses what is there and no file: a pipe would wait for a writer, and a device may have no end.
+pub(crate) fn refuse_pipe(path: &Path) -> Result<(), DatabaseError> {
+    match std::fs::metadata(path) {
+        Ok(data) if !data.is_file() => Err(DatabaseError::NotAFile { path: path.to_path_buf() }),
+        _ => Ok(()),
+    }
 }
 
 fn same_tile(path: PathBuf, found: TileId, expected: TileId) -> Result<(), DatabaseError> {

@@ -7,6 +7,7 @@ use std::fs::{File, TryLockError, symlink_metadata};
 use std::path::Path;
 
 use crate::DatabaseError;
+use crate::folder::refuse_pipe;
 
 /// The name of the file that is locked.
 pub(crate) const LOCK_NAME: &str = "lock";
@@ -62,7 +63,8 @@ impl Lock {
 
     /// Who holds the lock of the database in `dir`. Makes no file, and keeps others out for an instant at most.
     pub fn held(dir: &Path) -> Held {
-        let Ok(file) = File::open(dir.join(LOCK_NAME)) else { return Held::Free };
+        let path = dir.join(LOCK_NAME);
+        let Some(file) = refuse_pipe(&path).ok().and_then(|()| File::open(path).ok()) else { return Held::Free };
         if matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)) {
             return Held::Alone;
         }

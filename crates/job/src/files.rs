@@ -5,6 +5,7 @@
 //! So what a job reads can be seen from its text.
 
 use std::collections::BTreeSet;
+use std::ffi::OsStr;
 use std::fs;
 use std::io::Read;
 use std::path::{Component, Path, PathBuf};
@@ -65,6 +66,10 @@ impl Job {
 
 fn text_of(path: &Path) -> Result<String, JobError> {
     let unreadable = |source| JobError::Unreadable { path: path.to_owned(), source };
+    // A pipe would wait for a writer.
+    if fs::metadata(path).is_ok_and(|data| !data.is_file() && !data.is_dir()) {
+        return Err(unreadable(std::io::Error::other("it is a pipe, a socket or a device")));
+    }
     let file = fs::File::open(path).map_err(unreadable)?;
     let mut bytes = Vec::new();
     file.take(JOB_BYTES_MAX + 1).read_to_end(&mut bytes).map_err(unreadable)?;
@@ -195,18 +200,9 @@ fn refuse_outside(path: &Path, home: &Path, fault: &Fault) -> Result<(), JobErro
 
 /// The files that a pattern finds, in the order of their paths.
 fn matches_of(written: &str, folder: &Path, fault: &Fault) -> Result<Vec<NamedFile>, JobError> {
-    let options =
-        glob::MatchOptions { case_sensitive: true, require_literal_separator: true, require_literal_leading_dot: true };
     let (start, rest) = split_pattern(written);
     let home = folder.join(&start);
-    let below = glob::Pattern::escape(&home.to_string_lossy());
-    let pattern = if below.is_empty() { rest.clone() } else { Path::new(&below).join(&rest) };
-    refuse_far(&home, &rest, fault)?;
-    let paths = glob::glob_with(&pattern.to_string_lossy(), options).map_err(|error| {
-        let (expected, hint) = (format!("a pattern ({})", error.msg), "* is any part of a name, ** any folders".into());
-        JobError::OutOfRange(Box::new(Fault { expected, hint, ..fault.clone() }))
-    })?;
-    let mut paths: Vec<PathBuf> = paths.flatten().filter(|path| path.is_file()).collect();
+    let mut paths = matches_below(&home, &rest, VISITED_MAX, fault)?;
     paths.sort();
     if paths.is_empty() {
         let (found, expected) =
@@ -217,30 +213,45 @@ fn matches_of(written: &str, folder: &Path, fault: &Fault) -> Result<Vec<NamedFi
     paths.into_iter().map(|path| matched(path, folder, &home, fault)).collect()
 }
 
-/// Refuses a pattern that would have to look at more files than any folder of rasters holds.
-fn refuse_far(home: &Path, rest: &Path, fault: &Fault) -> Result<(), JobError> {
+/// The files below `home` that match the pattern `rest`. At most `most` files and folders are looked at: no folder of
+/// rasters holds so many. Below `**` links to folders are not followed: in `/proc` they lead to the whole machine again.
+fn matches_below(home: &Path, rest: &Path, most: usize, fault: &Fault) -> Result<Vec<PathBuf>, JobError> {
+    let options =
+        glob::MatchOptions { case_sensitive: true, require_literal_separator: true, require_literal_leading_dot: true };
+    let pattern = glob::Pattern::new(&rest.to_string_lossy()).map_err(|error| {
+        let (expected, hint) = (format!("a pattern ({})", error.msg), "* is any part of a name, ** any folders".into());
+        JobError::OutOfRange(Box::new(Fault { expected, hint, ..fault.clone() }))
+    })?;
     let parts: Vec<Component> = rest.components().collect();
     let is_deep = parts.iter().any(|part| part.as_os_str() == "**");
     let depth = if is_deep { usize::MAX } else { parts.len() };
+    let is_hidden = |name: &OsStr| name.to_string_lossy().starts_with('.');
+    // Wildcards pass over names that begin with a dot.
+    let names_hidden = parts.iter().any(|part| is_hidden(part.as_os_str()));
     let start = if home.as_os_str().is_empty() { Path::new(".") } else { home };
-    let (mut folders, mut seen) = (vec![(start.to_owned(), 1)], 0);
-    while let Some((folder, level)) = folders.pop() {
-        for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+    let (mut folders, mut found, mut seen) = (vec![(PathBuf::new(), 1)], Vec::new(), 0);
+    while let Some((below, level)) = folders.pop() {
+        // One folder alone may hold more than all together may.
+        for entry in fs::read_dir(start.join(&below)).into_iter().flatten().flatten().take(most + 1 - seen) {
             seen += 1;
-            // Wildcards pass over names that begin with a dot; a link may lead anywhere.
-            let is_below = level < depth && entry.file_type().is_ok_and(|kind| kind.is_dir());
-            if is_below && !entry.file_name().to_string_lossy().starts_with('.') {
-                folders.push((entry.path(), level + 1));
+            let (name, path) = (below.join(entry.file_name()), home.join(&below).join(entry.file_name()));
+            let is_folder = if is_deep { entry.file_type().is_ok_and(|kind| kind.is_dir()) } else { path.is_dir() };
+            if is_folder {
+                if level < depth && (names_hidden || !is_hidden(&entry.file_name())) {
+                    folders.push((name, level + 1));
+                }
+            } else if pattern.matches_path_with(&name, options) && path.is_file() {
+                found.push(path);
             }
         }
-        if VISITED_MAX < seen {
-            let found = format!("{}, below which there are more than {VISITED_MAX} files", fault.found);
-            let expected = format!("a pattern that looks at {VISITED_MAX} files at most");
+        if most < seen {
+            let found = format!("{}, below which there are more than {most} files", fault.found);
+            let expected = format!("a pattern that looks at {most} files at most");
             let hint = "begin it with the folder that holds the rasters, such as \"dem/**/*.tif\"".to_owned();
             return Err(JobError::OutOfRange(Box::new(Fault { found, expected, hint, ..fault.clone() })));
         }
     }
-    Ok(())
+    Ok(found)
 }
 
 /// A file that a pattern found, named as the job would name it.
@@ -253,6 +264,39 @@ fn matched(path: PathBuf, folder: &Path, home: &Path, fault: &Fault) -> Result<N
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_pattern_looks_at_so_many_files_and_no_more() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["a", "b", ".hidden"] {
+            fs::create_dir(folder.path().join(name)).unwrap();
+            (0..3).for_each(|file| fs::write(folder.path().join(format!("{name}/{file}.tif")), "").unwrap());
+        }
+        let [key, found, expected, hint] = ["dem.sources[0]", "\"**/*.tif\"", "a file", ""].map(str::to_owned);
+        let fault = Fault { path: "job.toml".into(), line: None, key, found, expected, hint };
+        let found = |rest: &str, most| matches_below(folder.path(), Path::new(rest), most, &fault).map(|all| all.len());
+        // Three folders and three files in each of two of them; what begins with a dot is passed over.
+        assert_eq!(found("**/*.tif", 9).unwrap(), 6);
+        let error = found("**/*.tif", 8).unwrap_err().to_string();
+        assert!(error.contains("below which there are more than 8 files"), "{error}");
+        assert!(found("*.tif", 3).unwrap() == 0 && found("*.tif", 2).is_err());
+        assert!(found("*/*.tif", 9).unwrap() == 6 && found("*/*.tif", 8).is_err());
+        assert_eq!(found("*/.hidden/*.tif", 12).unwrap() + found(".hidden/*.tif", 12).unwrap(), 3);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_double_star_does_not_go_in_a_circle_of_links() {
+        let folder = tempfile::tempdir().unwrap();
+        fs::create_dir_all(folder.path().join("a/b")).unwrap();
+        fs::write(folder.path().join("a/b/1.tif"), "").unwrap();
+        std::os::unix::fs::symlink(folder.path(), folder.path().join("a/b/up")).unwrap();
+        std::os::unix::fs::symlink(folder.path(), folder.path().join("a/up")).unwrap();
+        let [key, found, expected, hint] = ["dem.sources[0]", "\"**/*.tif\"", "a file", ""].map(str::to_owned);
+        let fault = Fault { path: "job.toml".into(), line: None, key, found, expected, hint };
+        let found = matches_below(folder.path(), Path::new("**/*.tif"), 100, &fault).unwrap();
+        assert_eq!(found, [folder.path().join("a/b/1.tif")]);
+    }
 
     #[test]
     fn a_pattern_begins_with_the_folders_before_its_first_wildcard() {

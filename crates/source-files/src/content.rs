@@ -1,17 +1,26 @@
 //! The bytes of a source, for its hash: a database says what it was made from; and whether it is still that file.
 
 use std::fs::{File, Metadata};
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use crate::SourceError;
+use crate::beside::all_beside;
 
-/// The file at `path`, whose bytes are read as they are wanted: a source may be larger than the memory there is.
+/// The bytes of the file at `path`, and after them those of files beside it that say how it is to be read. They are
+/// read as they are wanted: a source may be larger than the memory there is.
 ///
 /// # Errors
-/// When it cannot be opened, or is no regular file.
-pub fn content(path: &Path) -> Result<File, SourceError> {
-    regular(path)?;
-    File::open(path).map_err(|source| SourceError::Read { path: path.into(), source })
+/// When one cannot be opened, or is no regular file.
+pub fn content(path: &Path) -> Result<Box<dyn Read>, SourceError> {
+    let open = |path: &Path| -> Result<File, SourceError> {
+        regular(path)?;
+        File::open(path).map_err(|source| SourceError::Read { path: path.into(), source })
+    };
+    let first: Box<dyn Read> = Box::new(open(path)?);
+    all_beside(path)
+        .iter()
+        .try_fold(first, |all, other| -> Result<Box<dyn Read>, SourceError> { Ok(Box::new(all.chain(open(other)?))) })
 }
 
 /// What the disk says of a regular file. Nothing is opened: that of a pipe would wait for a writer for ever.
@@ -51,7 +60,8 @@ fn modified(_: &Metadata) -> Option<(i64, i64)> {
     None
 }
 
-/// Which file a path led to, and what it was like, so that a change is seen without reading it again.
+/// Which file a path led to, and what it was like, so that a change is seen without reading it again; and the same of
+/// the files beside it that say how it is to be read.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FileState {
     path: PathBuf,
@@ -59,6 +69,7 @@ pub struct FileState {
     /// When it was last written, in whatever the file system counts; never compared with a clock.
     modified: Option<(i64, i64)>,
     place: (u64, u64),
+    beside: Vec<FileState>,
 }
 
 impl FileState {
@@ -67,21 +78,37 @@ impl FileState {
     /// # Errors
     /// When there is none, or no regular one.
     pub fn of(path: &Path) -> Result<Self, SourceError> {
-        let data = regular(path)?;
-        Ok(Self { path: path.into(), len: data.len(), modified: modified(&data), place: place_of(&data) })
+        let beside = all_beside(path).iter().map(|other| Self::alone(other)).collect::<Result<_, _>>()?;
+        Ok(Self { beside, ..Self::alone(path)? })
     }
 
-    /// Checks that the path still leads to the same file, unchanged.
+    fn alone(path: &Path) -> Result<Self, SourceError> {
+        let data = regular(path)?;
+        let (modified, place) = (modified(&data), place_of(&data));
+        Ok(Self { path: path.into(), len: data.len(), modified, place, beside: Vec::new() })
+    }
+
+    /// Checks that the path still leads to the same file, unchanged, and that those beside it are still the same.
     ///
     /// # Errors
     /// [`SourceError::Changed`] when it does not.
     pub fn check(&self) -> Result<(), SourceError> {
+        self.check_alone()?;
+        self.beside.iter().try_for_each(Self::check_alone)?;
+        let is_known = |path: &PathBuf| self.beside.iter().any(|state| state.path == *path);
+        match all_beside(&self.path).into_iter().find(|path| !is_known(path)) {
+            Some(path) => Err(SourceError::Changed { path, found: "put there".into() }),
+            None => Ok(()),
+        }
+    }
+
+    fn check_alone(&self) -> Result<(), SourceError> {
         let changed = |found: String| Err(SourceError::Changed { path: self.path.clone(), found });
-        match Self::of(&self.path) {
-            Ok(now) if now == *self => Ok(()),
+        match Self::alone(&self.path) {
             Ok(now) if now.place != self.place => changed("replaced by another file".into()),
             Ok(now) if now.len != self.len => changed(format!("{} bytes long instead of {}", now.len, self.len)),
-            Ok(_) => changed("written to".into()),
+            Ok(now) if now.modified != self.modified => changed("written to".into()),
+            Ok(_) => Ok(()),
             Err(_) => changed("gone".into()),
         }
     }

@@ -1,9 +1,10 @@
 //! A raster file of any format that is read, told by its content and never by its name's ending.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use terrain::PostRect;
 
+use crate::beside::{RAW_ENDINGS, beside};
 use crate::chunk::{Chunk, Header};
 use crate::crs::Crs;
 use crate::dted::{self, Dted};
@@ -101,6 +102,11 @@ impl DemFile {
     /// Has a mosaic bring its heights to another datum.
     pub fn set_shift(&mut self, shift: Option<DatumShift>) {
         self.header.shift = shift;
+    }
+
+    /// The sample that marks a void post, where one does.
+    pub fn nodata(&self) -> Option<f64> {
+        self.header.nodata
     }
 
     /// The format's name.
@@ -234,8 +240,6 @@ fn of_text(store: &Store) -> Result<Found, SourceError> {
     of_raw(&Store::plain(&data)?, &keys)
 }
 
-const RAW_ENDINGS: [&str; 8] = ["flt", "bil", "bin", "raw", "img", "bsq", "bip", "dem"];
-
 fn of_raw(data: &Store, keys: &Keys) -> Result<Found, SourceError> {
     let rows = keys.rows(data)?;
     let facts = Facts::of("raw grid with a header");
@@ -266,12 +270,6 @@ fn of_bare_rows(store: &Store, start: &[u8], reading: &Reading) -> Result<Found,
     let corner = corner.ok_or_else(|| SourceError::NoCorner { path: store.path().into() })?;
     let (axes, facts) = (hgt::axes(&rows, corner), Facts::of("HGT"));
     Ok(Found { size: (rows.cols, rows.rows), reader: Reader::Rows(rows), axes, facts, crs: Some(Ok(Crs::wgs84())) })
-}
-
-/// The file of the same name with one of some endings.
-fn beside(path: &Path, endings: &[&str]) -> Option<PathBuf> {
-    let mut names = endings.iter().flat_map(|ending| [ending.to_string(), ending.to_uppercase()]);
-    names.find_map(|ending| Some(path.with_extension(ending)).filter(|other| other != path && other.is_file()))
 }
 
 /// The coordinate system: what the job says, else what the file says, else what a `.prj` beside it says.

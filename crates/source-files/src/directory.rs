@@ -10,6 +10,7 @@ use std::path::Path;
 use crate::SourceError;
 use crate::limits::{CHUNK_BYTES_MAX, CHUNKS_MAX, POSTS_A_SIDE_MAX, POSTS_MAX, TAGS_MAX};
 use crate::store::{Handle, Store};
+use crate::unpacked::Packing;
 
 /// Tags whose values decide how the file is decoded.
 mod tag {
@@ -60,8 +61,7 @@ pub(crate) struct Layout {
     pub chunk_rows: u32,
     pub tiled: bool,
     pub sample: SampleKind,
-    /// Whether chunks are stored as they are.
-    pub uncompressed: bool,
+    pub packing: Packing,
 }
 
 impl Layout {
@@ -71,6 +71,14 @@ impl Layout {
 
     pub(crate) fn chunk_count(&self) -> u32 {
         self.chunks_across() * self.rows.div_ceil(self.chunk_rows)
+    }
+
+    /// Rows that a chunk has at least: the last strip may end with the raster, a tile is filled up.
+    pub(crate) fn rows_of(&self, chunk: u32) -> u64 {
+        u64::from(match self.tiled {
+            true => self.chunk_rows,
+            false => self.chunk_rows.min(self.rows - chunk * self.chunk_rows),
+        })
     }
 }
 
@@ -213,7 +221,7 @@ struct Facts<'a> {
 impl Facts<'_> {
     fn layout(&self) -> Result<Layout, SourceError> {
         self.check_colours()?;
-        let uncompressed = self.check_compression()?;
+        let packing = self.packing()?;
         let sample = self.sample()?;
         let cols = self.side(tag::IMAGE_WIDTH, "the width")?;
         let rows = self.side(tag::IMAGE_LENGTH, "the height")?;
@@ -223,7 +231,7 @@ impl Facts<'_> {
             true => (self.side(tag::TILE_WIDTH, "the tile width")?, self.side(tag::TILE_LENGTH, "the tile height")?),
             false => (cols, self.rows_per_strip(rows)?),
         };
-        let layout = Layout { cols, rows, chunk_cols, chunk_rows, tiled, sample, uncompressed };
+        let layout = Layout { cols, rows, chunk_cols, chunk_rows, tiled, sample, packing };
         let posts = u64::from(chunk_cols) * u64::from(chunk_rows);
         self.at_most(posts * sample.bytes(), CHUNK_BYTES_MAX, "bytes in a strip or tile")?;
         let chunks = u64::from(layout.chunks_across()) * u64::from(rows.div_ceil(chunk_rows));
@@ -290,8 +298,7 @@ impl Facts<'_> {
         Err(SourceError::Photometric { path: self.path.into(), found })
     }
 
-    /// Whether chunks are stored as they are.
-    fn check_compression(&self) -> Result<bool, SourceError> {
+    fn packing(&self) -> Result<Packing, SourceError> {
         let code = (self.first)(tag::COMPRESSION).unwrap_or(1);
         let predicted = (self.first)(tag::PREDICTOR).is_some_and(|predictor| predictor != 1);
         match code {
@@ -301,8 +308,11 @@ impl Facts<'_> {
                 found: (self.first)(tag::PREDICTOR).unwrap_or(1).to_string(),
                 expected: "1 (none)".into(),
             }),
-            1 => Ok(true),
-            5 | 8 | 32946 | 32773 | 50000 => Ok(false),
+            1 => Ok(Packing::None),
+            5 => Ok(Packing::Lzw),
+            8 | 32946 => Ok(Packing::Deflate),
+            32773 => Ok(Packing::PackBits),
+            50000 => Ok(Packing::Zstd),
             _ => Err(SourceError::Compression { path: self.path.into(), found: compression_name(code) }),
         }
     }

@@ -4,7 +4,7 @@
 //! number of threads, each with a file handle of its own, and [`GeoTiff::assemble`] puts the chunks of a window
 //! together, southern row first.
 
-use std::io::{BufReader, ErrorKind};
+use std::io::{BufReader, ErrorKind, Read, Seek, SeekFrom};
 use std::path::Path;
 
 use terrain::PostRect;
@@ -19,6 +19,7 @@ use crate::frame::{GeoTags, RasterFrame, SampleScale};
 use crate::limits::{CHUNK_BYTES_MAX, DIRECTORIES_MAX};
 use crate::samples::Samples;
 use crate::store::{Handle, Store};
+use crate::unpacked::{self, Packing, Promise};
 use crate::{Raster, SourceError};
 
 const GDAL_METADATA: Tag = Tag::Unknown(42112);
@@ -33,8 +34,8 @@ pub struct GeoTiff {
     nodata: Option<f64>,
     /// Whether the first stored row is the southern one. Nearly always it is the northern one.
     south_first: bool,
-    /// Bytes of each chunk in the file; 0 where the writer left out a chunk that is all void.
-    chunk_sizes: Vec<u64>,
+    /// Where each chunk begins in the file, and its bytes; 0 where the writer left out a chunk that is all void.
+    chunks: Vec<(u64, u64)>,
     vertical_datum: Option<String>,
 }
 
@@ -66,9 +67,9 @@ impl GeoTiff {
         let scale = tags.sample_scale(path, height_unit_m, crs.vertical_unit_m())?;
         let (frame, south_first) = RasterFrame::new(path, crs, &axes, layout.cols, layout.rows)?;
         let nodata = nodata(path, &mut decoder)?;
-        let chunk_sizes = chunk_sizes(path, &mut decoder, &layout, store.len())?;
+        let chunks = chunks(path, &mut decoder, &layout, store.len())?;
         let vertical_datum = tags.vertical_datum();
-        Ok(Self { store: store.clone(), frame, scale, layout, nodata, south_first, chunk_sizes, vertical_datum })
+        Ok(Self { store: store.clone(), frame, scale, layout, nodata, south_first, chunks, vertical_datum })
     }
 
     /// Where its posts lie.
@@ -135,13 +136,28 @@ impl GeoTiff {
     pub(crate) fn decode_with(&self, decoder: &mut FileDecoder, index: u32) -> Result<Chunk, SourceError> {
         let (stride, south_first) = (self.layout.chunk_cols as usize, self.south_first);
         let chunk = |samples| Chunk { posts: self.posts_of(index), stride, south_first, samples, notes: Vec::new() };
-        if self.chunk_sizes[index as usize] == 0 {
+        let (offset, size) = self.chunks[index as usize];
+        if size == 0 {
             return Ok(chunk(None));
         }
+        self.check_unpacked(index, decoder.inner().get_mut(), (offset, size))?;
         let samples = self.decode_one(decoder, index).map_err(|error| error.to_string());
         let samples = samples.and_then(|samples| self.as_promised(index, samples));
         let samples = samples.map_err(|reason| self.chunk_error(index, reason))?;
         Ok(chunk(Some(samples)))
+    }
+
+    /// Refuses a packed chunk that does not unpack to its rows.
+    fn check_unpacked(&self, index: u32, file: &mut Handle, (offset, size): (u64, u64)) -> Result<(), SourceError> {
+        let layout = &self.layout;
+        if layout.packing == Packing::None {
+            return Ok(());
+        }
+        let row = u64::from(layout.chunk_cols) * layout.sample.bytes();
+        let promise = Promise { row, least: layout.rows_of(index) * row, most: u64::from(layout.chunk_rows) * row };
+        file.seek(SeekFrom::Start(offset)).map_err(|source| self.store.stopped(source))?;
+        let checked = unpacked::check(layout.packing, file.take(size), promise);
+        checked.map_err(|reason| self.chunk_error(index, reason))
     }
 
     /// Decodes whole rows, padding included. Asked to leave the padding out, the decoder reads row by row, which is
@@ -223,7 +239,7 @@ fn decoder(path: &Path, file: Handle) -> Result<FileDecoder, SourceError> {
     limits.intermediate_buffer_size = CHUNK_BYTES_MAX as usize;
     // `read_layout` reads the same handle, and a decoder starts where the handle stands.
     let mut reader = BufReader::new(file);
-    std::io::Seek::rewind(&mut reader).map_err(|source| SourceError::Read { path: path.into(), source })?;
+    reader.rewind().map_err(|source| SourceError::Read { path: path.into(), source })?;
     let decoder = Decoder::new(reader).map_err(|error| directory_error(path, error))?;
     Ok(decoder.with_limits(limits))
 }
@@ -303,13 +319,13 @@ fn nodata(path: &Path, decoder: &mut FileDecoder) -> Result<Option<f64>, SourceE
     number.map(Some)
 }
 
-/// Bytes of each chunk, once all are known to lie inside the file.
-fn chunk_sizes(
+/// Where each chunk begins and its bytes, once all are known to lie inside the file.
+fn chunks(
     path: &Path,
     decoder: &mut FileDecoder,
     layout: &Layout,
     file_size: u64,
-) -> Result<Vec<u64>, SourceError> {
+) -> Result<Vec<(u64, u64)>, SourceError> {
     let (offsets, sizes) = match layout.tiled {
         true => (Tag::TileOffsets, Tag::TileByteCounts),
         false => (Tag::StripOffsets, Tag::StripByteCounts),
@@ -326,10 +342,11 @@ fn chunk_sizes(
             expected: format!("{chunks} of each"),
         });
     }
-    for (chunk, (&offset, &size)) in offsets.iter().zip(&sizes).enumerate() {
-        check_chunk(path, layout, chunk as u32, (offset, size), file_size)?;
+    let chunks: Vec<(u64, u64)> = offsets.into_iter().zip(sizes).collect();
+    for (chunk, &place) in chunks.iter().enumerate() {
+        check_chunk(path, layout, chunk as u32, place, file_size)?;
     }
-    Ok(sizes)
+    Ok(chunks)
 }
 
 fn check_chunk(
@@ -345,12 +362,8 @@ fn check_chunk(
         return Err(SourceError::Truncated { path: path.into(), what, expected: end, found: file_size });
     }
     // The decoder takes as many bytes as it needs, beyond the chunk's end if it must, and they would be another's.
-    let rows = match layout.tiled {
-        true => layout.chunk_rows,
-        false => layout.chunk_rows.min(layout.rows - chunk * layout.chunk_rows),
-    };
-    let needed = u64::from(rows) * u64::from(layout.chunk_cols) * layout.sample.bytes();
-    if layout.uncompressed && 0 < size && size < needed {
+    let needed = layout.rows_of(chunk) * u64::from(layout.chunk_cols) * layout.sample.bytes();
+    if layout.packing == Packing::None && 0 < size && size < needed {
         return Err(SourceError::Malformed {
             path: path.into(),
             what: format!("the length of strip or tile {chunk}"),

@@ -8,6 +8,7 @@ pub mod limits;
 
 mod error;
 pub use error::SourceError;
+mod beside;
 mod content;
 pub use content::{FileState, content};
 mod crs;
@@ -19,6 +20,7 @@ mod chunk;
 pub use chunk::Chunk;
 mod directory;
 mod geotiff;
+mod unpacked;
 pub use geotiff::GeoTiff;
 mod dem_file;
 mod dted;

@@ -333,11 +333,25 @@ impl Layer {
         });
     }
 
-    /// The south-western of the posts around a place, by row and column in the window, and the weights beyond it.
     fn corner(&self, place: [i64; 2]) -> Option<Corner> {
+        Corner::around(place, &self.raster.frame, self.raster.window)
+    }
+}
+
+/// Four posts and the weights of the northern and eastern ones, in 1/65536.
+#[derive(Clone, Copy)]
+pub(crate) struct Corner {
+    row: usize,
+    col: usize,
+    up: f64,
+    right: f64,
+}
+
+impl Corner {
+    /// The south-western of the posts around a place, by row and column in a window, and the weights beyond it.
+    pub(crate) fn around(place: [i64; 2], frame: &RasterFrame, window: PostRect) -> Option<Self> {
         /// How far outside a place may lie and still count as the outermost post: what rounding loses.
         const OUTSIDE_UNITS_MAX: i64 = TAP_UNITS as i64 / 1000 + 16;
-        let window = self.raster.window;
         let split = |units: i64, low: i32, high: i32, count: u32| {
             let last = i64::from(count - 1) * i64::from(TAP_UNITS);
             let inside = -OUTSIDE_UNITS_MAX <= units && units <= last + OUTSIDE_UNITS_MAX;
@@ -347,20 +361,16 @@ impl Layer {
             (inside && i64::from(low) <= near && far <= i64::from(high))
                 .then(|| ((near - i64::from(low)) as usize, weight as f64))
         };
-        let frame = &self.raster.frame;
         let (col, right) = split(place[0], window.west, window.east, frame.cols)?;
         let (row, up) = split(place[1], window.south, window.north, frame.rows)?;
-        Some(Corner { row, col, up, right })
+        Some(Self { row, col, up, right })
     }
-}
 
-/// Four posts and the weights of the northern and eastern ones, in 1/65536.
-#[derive(Clone, Copy)]
-struct Corner {
-    row: usize,
-    col: usize,
-    up: f64,
-    right: f64,
+    /// The posts that a height there is made from, counted from the window's south-west one.
+    pub(crate) fn posts(self) -> PostRect {
+        let (south, west) = (self.row as i32, self.col as i32);
+        PostRect { south, west, north: south + i32::from(0.0 < self.up), east: west + i32::from(0.0 < self.right) }
+    }
 }
 
 /// Samples of one type and how they stand.

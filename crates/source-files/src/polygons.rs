@@ -4,11 +4,12 @@
 //! member or without. Numbers that can only be degrees are taken for longitude and latitude on WGS 84, others that
 //! nothing is said about for metres of the area's system.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use geojson::{FeatureCollection, GeoJson, Geometry, GeometryValue, JsonObject, Position};
 use mask::Polygon;
 
+use crate::beside::beside;
 use crate::crs::Crs;
 use crate::limits::GEOJSON_BYTES_MAX;
 use crate::store::Store;
@@ -72,15 +73,13 @@ fn placed(path: &Path, polygons: Vec<Polygon>, said: Option<Crs>, epsg: u32) -> 
 
 /// The bytes of the index of a Shapefile.
 fn index_beside(path: &Path) -> Result<Option<Vec<u8>>, SourceError> {
-    let names: [PathBuf; 2] = ["shx", "SHX"].map(|ending| path.with_extension(ending));
-    let Some(index) = names.into_iter().find(|name| name.is_file()) else { return Ok(None) };
+    let Some(index) = beside(path, &["shx"]) else { return Ok(None) };
     Store::plain(&index)?.start(GEOJSON_BYTES_MAX).map(Some)
 }
 
 /// The system that a `.prj` beside the file names.
 fn said_beside(path: &Path) -> Result<Option<Crs>, SourceError> {
-    let names: [PathBuf; 2] = ["prj", "PRJ"].map(|ending| path.with_extension(ending));
-    let Some(prj) = names.into_iter().find(|name| name.is_file()) else { return Ok(None) };
+    let Some(prj) = beside(path, &["prj"]) else { return Ok(None) };
     let text = Store::plain(&prj)?.start(1 << 16)?;
     let crs = Crs::from_wkt(&String::from_utf8_lossy(&text));
     crs.map(Some).map_err(|found| SourceError::UnnamedCrs { path: prj, found })

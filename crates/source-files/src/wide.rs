@@ -8,7 +8,7 @@ use terrain::{GridFrame, PostRect, QUANTA_PER_METRE};
 use crate::chunk::Header;
 use crate::crs::Crs;
 use crate::join::{Extent, common_kind, fits, offset, shifted, union};
-use crate::mosaic::{Beyond, Layer, MARGIN};
+use crate::mosaic::{Beyond, Corner, Layer, MARGIN};
 use crate::samples::Samples;
 use crate::warp::Warp;
 use crate::{Mosaic, MosaicRules, Patch, Raster, SourceError, Standing, Windows};
@@ -95,6 +95,30 @@ impl WideMosaic {
         });
         let place = (self.area.clone(), self.grid);
         Ok(Mosaic { layers, rules: self.rules, place, beyond }.resample(rect))
+    }
+
+    /// Which posts of a rectangle some file reaches, from headers alone: a post is a height or a gap.
+    pub fn reached(&self, rect: PostRect) -> Patch {
+        let mut patch =
+            Patch { rect, heights: vec![0; rect.post_count()], standings: vec![Standing::Gap; rect.post_count()] };
+        for joint in &self.joints {
+            let Some(window) = joint.warp.window(rect, MARGIN) else { continue };
+            let places = joint.warp.over(rect);
+            // Of thousands of files few lie under one rectangle.
+            let rects = joint.members.iter().map(|&(file, shift)| shifted(self.windows.files()[file].rect(), shift));
+            let rects: Vec<PostRect> = rects.filter(|rect| rect.intersection(&window).is_some()).collect();
+            let holds = |post: terrain::Post| rects.iter().any(|rect| rect.contains(post));
+            for (post, standing) in posts(rect).zip(&mut patch.standings) {
+                if *standing == Standing::Gap
+                    && let Some(place) = places.at(post.row, post.col)
+                    && let Some(corner) = Corner::around(place, &joint.header.frame, joint.rect())
+                    && posts(corner.posts()).all(holds)
+                {
+                    *standing = Standing::Height;
+                }
+            }
+        }
+        patch
     }
 
     /// How many strips or tiles were decoded so far, counting each time.

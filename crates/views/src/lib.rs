@@ -21,7 +21,7 @@ pub use picture::{
 mod table;
 pub use table::{Align, Table, grouped};
 mod report;
-pub use report::{report_text, stage_table};
+pub use report::{report_text, stage_table, wrapped};
 
 #[cfg(test)]
 mod samples;

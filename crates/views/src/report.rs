@@ -251,7 +251,7 @@ fn warnings(report: &Report) -> Option<String> {
 }
 
 /// `text` in lines of at most `columns` characters, later ones indented; a longer word keeps its line to itself.
-fn wrapped(text: &str, columns: usize) -> Vec<String> {
+pub fn wrapped(text: &str, columns: usize) -> Vec<String> {
     let mut lines = vec![String::new()];
     for word in text.split_whitespace() {
         let line = lines.last_mut().expect("there is always a line");

@@ -15,7 +15,8 @@ use terrain::{Dem, Metres, Post, PostRect, Tin, quanta_of_metres};
 use super::{CompareGround, CompareRequest, Equivalent, Made};
 use crate::area::GamingArea;
 use crate::ground::Ground;
-use crate::raster::{TinRequest, refuse_spacing, untiled};
+use crate::heights::{Heights, has_square_posts};
+use crate::raster::{TinRequest, untiled};
 use crate::sources::{decode, reading};
 use crate::tin_tally::tally_of;
 use crate::{CompileError, TinMethod, TinStart};
@@ -46,9 +47,11 @@ impl Subject {
         match &request.ground {
             CompareGround::Raster(path) => {
                 let file = DemFile::open(path, &Reading::AS_IT_SAYS)?;
-                file.frame().require_metres()?;
-                let rect = windowed(file.rect(), request.window)?;
-                of_file(&file, rect, path.display().to_string(), stop)
+                let name = path.display().to_string();
+                match has_square_posts(file.frame()) {
+                    true => of_file(&file, windowed(file.rect(), request.window)?, name, stop),
+                    false => of_resampled(&file, request.window, &name, stop),
+                }
             }
             CompareGround::Job(job) => of_job(job, request.window, stop),
         }
@@ -119,7 +122,7 @@ fn of_job(job: &Job, window: Option<PostRect>, stop: &AtomicBool) -> Result<Subj
 fn own_posts(job: &Job, area: &GamingArea, file: &SourceFile) -> Result<Option<(DemFile, PostRect)>, CompileError> {
     let opened = DemFile::open(&file.path, &reading(file, false)?)?;
     let frame = opened.frame();
-    if frame.require_epsg(job.area.epsg).is_err() || frame.require_metres().is_err() {
+    if frame.require_epsg(job.area.epsg).is_err() || !has_square_posts(frame) {
         return Ok(None);
     }
     let metres = area.frame.spacing.metres();
@@ -139,13 +142,24 @@ fn own_posts(job: &Job, area: &GamingArea, file: &SourceFile) -> Result<Option<(
     Ok(rect.map(|rect| (opened, rect)))
 }
 
+/// The ground of a raster whose posts are not square ones in metres, on those it is resampled to.
+fn of_resampled(
+    file: &DemFile,
+    window: Option<PostRect>,
+    name: &str,
+    stop: &AtomicBool,
+) -> Result<Subject, CompileError> {
+    let Heights { dem, frame, .. } = Heights::of(file, &Workers::new(1), stop)?;
+    let rect = windowed(dem.rect(), window)?;
+    let name = format!("{name}, resampled to {} m in {}", frame.spacing[0], frame.crs.name());
+    of_heights(rect, Metres(frame.spacing[0]), name, |post| (!dem.is_void(post)).then(|| dem.height(post)))
+}
+
 fn of_file(file: &DemFile, rect: PostRect, name: String, stop: &AtomicBool) -> Result<Subject, CompileError> {
     let mut raster = decode(file, rect, &Workers::new(1), stop)?;
     raster.settle_voids(VoidPolicy::Hole)?;
     let scale = file.sample_scale();
-    let spacing = file.frame().spacing;
-    refuse_spacing(spacing)?;
-    of_heights(rect, Metres(spacing[0]), name, |post| {
+    of_heights(rect, Metres(file.frame().spacing[0]), name, |post| {
         raster.sample(post).and_then(|sample| quanta_of_metres(scale.height_m(sample)))
     })
 }

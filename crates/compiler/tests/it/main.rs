@@ -12,6 +12,7 @@ mod product;
 mod surface;
 
 mod bytes;
+mod changed;
 mod compare;
 mod damage;
 mod difficult_ground;

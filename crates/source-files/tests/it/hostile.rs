@@ -88,19 +88,70 @@ fn an_internal_mask_is_refused_by_name() {
     assert!(error.to_string().contains("voids are given by an internal mask, expected a nodata tag"), "{error}");
 }
 
-#[test]
-fn a_strip_that_inflates_without_end_takes_no_more_than_it_promised() {
-    let folder = Folder::new();
-    let mut bomb = ZlibEncoder::new(Vec::new(), Compression::fast());
-    (0..64).for_each(|_| bomb.write_all(&[0; 1 << 20]).unwrap());
+/// Six heights of 16 bits in one strip that is packed so.
+fn packed(packing: u16, strip: Vec<u8>) -> Vec<u8> {
     let mut tiff = Tiff::of_heights(&[&[1, 2, 3], &[4, 5, 6]]);
-    tiff.samples = bomb.finish().unwrap();
+    tiff.samples = strip;
     let size = tiff.samples.len() as u32;
-    let tiff = tiff.with(259, Values::Short(vec![8])).with(279, Values::Long(vec![size]));
-    let path = folder.write("bomb.tif", &tiff.bytes());
-    if let Ok(raster) = GeoTiff::open(&path, None).and_then(|file| file.read(file.rect())) {
-        assert_eq!(raster.window().post_count(), 6);
-    }
+    tiff.with(259, Values::Short(vec![packing])).with(279, Values::Long(vec![size])).bytes()
+}
+
+#[track_caller]
+fn check_strip(packing: u16, strip: Vec<u8>, expected: &str) {
+    let folder = Folder::new();
+    let path = folder.write("strip.tif", &packed(packing, strip));
+    let error = GeoTiff::open(&path, None).and_then(|file| file.read(file.rect())).unwrap_err().to_string();
+    assert!(error.contains("strip or tile 0 of 1 cannot be decoded") && error.contains(expected), "{error}");
+}
+
+#[test]
+fn a_strip_that_unpacks_far_beyond_its_rows_is_refused_and_not_unpacked() {
+    const DEFLATE: u16 = 8;
+    const LZW: u16 = 5;
+    const ZSTD: u16 = 50000;
+    let zeroes = vec![0; 64 << 20];
+    let mut deflate = ZlibEncoder::new(Vec::new(), Compression::fast());
+    deflate.write_all(&zeroes).unwrap();
+    check_strip(DEFLATE, deflate.finish().unwrap(), "more than the 12 bytes that its rows have");
+    let lzw = weezl::encode::Encoder::with_tiff_size_switch(weezl::BitOrder::Msb, 8).encode(&zeroes).unwrap();
+    check_strip(LZW, lzw, "more than the 12 bytes that its rows have");
+    check_strip(ZSTD, zstd::encode_all(&zeroes[..], 1).unwrap(), "more than the 12 bytes that its rows have");
+}
+
+#[test]
+fn packbits_whose_rows_are_longer_or_shorter_than_the_rasters_are_refused() {
+    const PACKBITS: u16 = 32773;
+    let folder = Folder::new();
+    let sound = [[5, 1, 0, 2, 0, 3, 0], [5, 4, 0, 5, 0, 6, 0]].concat();
+    let path = folder.write("sound.tif", &packed(PACKBITS, sound));
+    let file = GeoTiff::open(&path, None).unwrap();
+    assert_eq!(file.read(file.rect()).unwrap().range_m(), Some((1.0, 6.0)));
+    // As many bytes in all, the first row two bytes longer and the second two shorter.
+    check_strip(PACKBITS, [&[7, 1, 0, 2, 0, 3, 0, 4, 0][..], &[3, 5, 0, 6, 0]].concat(), "row 0 unpacks to 8 bytes");
+    check_strip(PACKBITS, vec![5, 1, 0, 2, 0, 3, 0], "it unpacks to 6 bytes, expected the 12");
+    check_strip(PACKBITS, vec![251, 1, 251, 2, 251, 3], "more than the 12 bytes");
+}
+
+#[test]
+fn bytes_behind_the_end_of_a_gzip_file_are_told() {
+    let folder = Folder::new();
+    let mut whole = GzEncoder::new(Vec::new(), Compression::fast());
+    whole.write_all(&vec![0; 1201 * 1201 * 2]).unwrap();
+    let mut bytes = whole.finish().unwrap();
+    let sound = folder.write("N35W117.hgt.gz", &bytes);
+    assert!(DemFile::open(&sound, &Reading::AS_IT_SAYS).is_ok());
+    bytes.extend(b"more");
+    let error = DemFile::open(&folder.write("N35W118.hgt.gz", &bytes), &Reading::AS_IT_SAYS).unwrap_err().to_string();
+    assert!(error.contains("the gzip file is more bytes after its end, expected one packed file"), "{error}");
+}
+
+#[test]
+fn a_scale_of_nothing_is_refused() {
+    let xml = "<GDALMetadata><Item name=\"SCALE\" sample=\"0\" role=\"scale\">0</Item></GDALMetadata>";
+    let folder = Folder::new();
+    let tiff = Tiff::of_heights(&[&[1, 2, 3], &[4, 5, 6]]).with(42112, Values::Text(xml));
+    let error = GeoTiff::open(&folder.write("flat.tif", &tiff.bytes()), None).unwrap_err().to_string();
+    assert!(error.contains("the scale of the samples is 0, expected a number other than 0"), "{error}");
 }
 
 #[test]

@@ -51,6 +51,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     }
     let crs = arguments.crs.as_deref();
     terminal::tell(&found_text(&suggestion, &job_text(&suggestion, Path::new(""), "area", crs)));
+    remarks(&suggestion).iter().for_each(|remark| terminal::tell(&wrapped(&format!("note: {remark}"))));
     let Some(out) = &arguments.out else {
         terminal::print(&job_text(&suggestion, Path::new(""), "area", arguments.crs.as_deref()))?;
         return Ok(Outcome::Sound);
@@ -87,9 +88,9 @@ fn rasters(named: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
     Ok(all)
 }
 
-/// What was found, and what a build of it takes: one line, broken where a terminal ends.
+/// What was found, and what a build of it takes and leaves: one line, broken where a terminal ends.
 fn found_text(suggestion: &Suggestion, job: &str) -> String {
-    let Suggestion { seen, size_m, spacing_m, part_around, .. } = suggestion;
+    let Suggestion { seen, size_m, spacing_m, part_around, rms_m, triangles, .. } = suggestion;
     let voids: usize = seen.iter().map(|file| file.voids).sum();
     let files = if seen.len() == 1 { "1 file".to_owned() } else { format!("{} files", seen.len()) };
     let [wide, high] = size_m.map(|metres| metres / 1000.0);
@@ -106,11 +107,60 @@ fn found_text(suggestion: &Suggestion, job: &str) -> String {
         let memory = crate::files::bytes_text(plan.forecast.memory_bytes);
         text += &format!("; a build takes about {:.0} s of one core and {memory}", plan.forecast.seconds.max(1.0));
     }
-    text
+    if let Some(rms_m) = rms_m {
+        text += &format!("; {triangles} triangles a load module leave an RMS residual {}", about(*rms_m));
+    }
+    wrapped(&text)
+}
+
+/// A residual in two figures: it is from a look at parts of the area.
+fn about(metres: f64) -> String {
+    match metres {
+        ..0.095 => "below 0.1 m".into(),
+        ..0.995 => format!("of about {metres:.2} m"),
+        ..9.95 => format!("of about {metres:.1} m"),
+        _ => format!("of about {metres:.0} m"),
+    }
+}
+
+/// What a person should think about before a build: ground finer than the budget can show, and a grid finer than the
+/// ground is known.
+fn remarks(suggestion: &Suggestion) -> Vec<String> {
+    /// Posts for a triangle, beyond which more of them change hardly anything.
+    const POSTS_A_TRIANGLE_MAX: f64 = 100.0;
+    /// Spacings for a post of the source, beyond which the grid repeats what the source says.
+    const COARSE: f64 = 1.5;
+    let Suggestion { spacing_m, posts_m, triangles, .. } = suggestion;
+    let cells = (500.0 / spacing_m).powi(2);
+    let mut remarks = Vec::new();
+    let each = cells / f64::from(*triangles);
+    if POSTS_A_TRIANGLE_MAX < each {
+        let coarser = if *spacing_m < 5.0 { 12.5 } else { 25.0 };
+        let times = views::grouped((coarser / spacing_m).powi(2).round() as u64);
+        remarks.push(format!(
+            "{} posts for each triangle: the ground is finer than {triangles} triangles a load module can show; \
+             spacing_m = {coarser} in the job has {times} times fewer posts to work on, or raise per_load_module and \
+             mean_per_load_module",
+            views::grouped(each.round() as u64),
+        ));
+    }
+    if COARSE * spacing_m < *posts_m {
+        remarks.push(format!(
+            "the posts of the source are {posts_m:.0} m apart: the working grid of {spacing_m} m between them tells \
+             nothing new of the ground, and the residual is that against a smooth surface through them"
+        ));
+    }
+    remarks
+}
+
+/// `text` in lines that fit a terminal, the later ones indented.
+fn wrapped(text: &str) -> String {
+    const COLUMNS: usize = 80;
+    views::wrapped(text, COLUMNS).join("\n")
 }
 
 fn job_text(suggestion: &Suggestion, folder: &Path, name: &str, given: Option<&str>) -> String {
-    let Suggestion { seen, epsg, origin_m, size_m, spacing_m, tiles, part_around } = suggestion;
+    let Suggestion { seen, epsg, origin_m, size_m, spacing_m, tiles, part_around, triangles, .. } = suggestion;
     let modules = size_m.map(|metres| metres / 500.0);
     let mut text = format!(
         "# Written by `tiefort init`. Every line may be changed; `tiefort plan` on this file shows what follows.\n\
@@ -147,14 +197,14 @@ fn job_text(suggestion: &Suggestion, folder: &Path, name: &str, given: Option<&s
     text += &format!(
         "\n[tiles]\ncolumns = {}\nrows = {}\n\n[limits]\n\
          per_load_module = 100         # triangles\n\
-         mean_per_load_module = 32     # over the whole area: {} triangles\n\
+         mean_per_load_module = {triangles}     # over the whole area: {} triangles\n\
          per_4km_square = 4096         # in every window of 8 x 8 load modules\n\n\
          [tin]\nmethod = \"optimised\"          # the budget is the limits\n\n\
          # Coarser levels of every load module, for what is far away: the share of inner vertices each keeps.\n\
          # [lod]\n# levels = [{{ inner_share = 0.5 }}, {{ inner_share = 0.2 }}]\n",
         tiles.1,
         tiles.0,
-        views::grouped((modules[0] * modules[1] * 32.0) as u64),
+        views::grouped((modules[0] * modules[1]) as u64 * u64::from(*triangles)),
     );
     // Names in headers may hold anything; in a job they stand in comments, where control characters are no TOML.
     terminal::plain(&text).into_owned()
@@ -174,7 +224,7 @@ fn source_text(seen: &Seen, folder: &Path, given: Option<&str>) -> String {
     if let (true, Some(crs)) = (seen.crs_given, given) {
         keys.push(format!("crs = {}", quoted(crs)));
     }
-    keys.extend(undeclared_void(seen).map(|mark| format!("nodata = {mark}")));
+    keys.extend(seen.undeclared.map(|mark| format!("nodata = {}", exact(mark))));
     let entry = match keys.is_empty() {
         true => path,
         false => format!("{{ file = {path}, {} }}", keys.join(", ")),
@@ -191,8 +241,8 @@ fn source_text(seen: &Seen, folder: &Path, given: Option<&str>) -> String {
         0 => ", no voids".to_owned(),
         voids => format!(", {} void", views::grouped(voids as u64)),
     };
-    if undeclared_void(seen).is_some() {
-        facts += ", whose lowest height can only mark voids";
+    if let Some(mark) = seen.undeclared {
+        facts += &format!(" (those of {}, which can only mark voids)", exact(mark));
     }
     if let Some(accuracy_m) = seen.accuracy_m {
         facts += &format!(", accurate to {accuracy_m} m");
@@ -205,10 +255,9 @@ fn source_text(seen: &Seen, folder: &Path, given: Option<&str>) -> String {
     format!("    # {facts}\n{notes}    {entry},\n")
 }
 
-/// The usual marks of a void, where a file has one for its lowest height and does not declare it.
-fn undeclared_void(seen: &Seen) -> Option<f64> {
-    let (low, _) = seen.range_m?;
-    [-32768.0, -32767.0, -9999.0].into_iter().find(|&mark| low == mark)
+/// A number with all its digits.
+fn exact(number: f64) -> String {
+    if number.fract() == 0.0 && number.abs() < 1.0e9 { format!("{number:.0}") } else { format!("{number:?}") }
 }
 
 fn short(number: f64) -> String {
@@ -217,7 +266,7 @@ fn short(number: f64) -> String {
 }
 
 fn voids_text(seen: &[Seen]) -> String {
-    let voids = seen.iter().any(|file| 0 < file.voids || undeclared_void(file).is_some());
+    let voids = seen.iter().any(|file| 0 < file.voids);
     let next = if 1 < seen.len() { "next_source = true, " } else { "" };
     match voids {
         true => format!(

@@ -79,7 +79,9 @@ enum Emit {
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let job = Job::load_with(&arguments.job, &compiler::find_area)?;
     let plan = compiler::plan(&job)?;
-    let told = compiler::foresee(&job)?;
+    let default = PathBuf::from(format!("{}.tdb", job.area.name));
+    let folder = arguments.out.as_ref().unwrap_or(&default);
+    let told = compiler::foresee(&job, folder)?;
     told.iter().for_each(|note| terminal::tell(&format!("note: {}", terminal::short(note))));
     let played = played(&job, &plan, arguments)?;
     let glue = || Glue::new(&job, &plan, arguments.out.as_deref(), arguments.pack);
@@ -92,8 +94,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     };
     terminal::print(&text)?;
     if !arguments.force {
-        let default = PathBuf::from(format!("{}.tdb", job.area.name));
-        fit::check(&plan.forecast, PLANNED_WORKERS, arguments.out.as_ref().unwrap_or(&default))?;
+        fit::check(&plan.forecast, PLANNED_WORKERS, folder)?;
     }
     Ok(Outcome::Sound)
 }

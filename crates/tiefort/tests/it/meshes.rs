@@ -152,3 +152,43 @@ fn no_effort_makes_more_triangles_than_asked_for() {
         }
     }
 }
+
+#[test]
+fn a_raster_in_degrees_is_resampled_as_init_would_and_a_line_says_to_what() {
+    let scene = Scene::new();
+    Raster::sound().geographic().write(&scene.path("dem.tif"));
+    let arguments = ["tin", "dem.tif", "--points", "200", "--coordinates", "map", "--out", "mesh.obj"];
+    let said = scene.run_to(0, &arguments).stderr;
+    let told = "note: dem.tif: resampled from posts 0.9 x 0.9 seconds apart to ";
+    assert!(said.contains(told) && said.contains(" posts 25 m apart in EPSG:32611"), "{said}");
+    let mesh = fs::read_to_string(scene.path("mesh.obj")).unwrap();
+    let places: Vec<Vec<f64>> = mesh
+        .lines()
+        .filter_map(|line| line.strip_prefix("v "))
+        .map(|place| place.split(' ').map(|number| number.parse().unwrap()).collect())
+        .collect();
+    // The raster covers 116.9 to 116.88 W and 35.08 to 35.1 N: about 1.82 km by 2.22 km.
+    let range = |axis: usize| {
+        let all = places.iter().map(|place| place[axis]);
+        all.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), at| (low.min(at), high.max(at)))
+    };
+    let (west, east) = range(0);
+    let (south, north) = range(1);
+    assert!((509_100.0..509_200.0).contains(&west) && (1750.0..1850.0).contains(&(east - west)), "{west} {east}");
+    assert!((3_881_900.0..3_882_100.0).contains(&south) && (2150.0..2250.0).contains(&(north - south)));
+    let report = scene.run_to(0, &["compare", "dem.tif", "--points", "100"]).stdout;
+    assert!(report.contains("resampled to 25 m in EPSG:32611"), "{report}");
+}
+
+#[test]
+fn a_raster_whose_posts_are_oblong_is_resampled_to_square_ones() {
+    let scene = Scene::new();
+    let row = |row: usize| (0..81).map(|col| format!("{} ", 700 + (row * row + 3 * col) % 97)).collect::<String>();
+    let rows: Vec<String> = (0..81).map(row).collect();
+    let head = "ncols 81\nnrows 81\nxllcenter 506000\nyllcenter 3876000\ndx 20\ndy 30\n";
+    fs::write(scene.path("dem.asc"), format!("{head}{}\n", rows.join("\n"))).unwrap();
+    fs::write(scene.path("dem.prj"), r#"PROJCS["x",AUTHORITY["EPSG","32611"]]"#).unwrap();
+    let said = scene.run_to(0, &["tin", "dem.asc", "--points", "200", "--out", "mesh.ply"]).stderr;
+    let told = "dem.asc: resampled from posts 20 x 30 m apart to 65 x 97 posts 25 m apart in EPSG:32611";
+    assert!(said.contains(told), "{said}");
+}

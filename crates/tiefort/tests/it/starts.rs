@@ -95,7 +95,7 @@ fn an_area_is_found_around_a_place_and_over_the_sources() {
     scene.run_to(0, &["build", "cover.toml"]);
     let around = "around = { lat = 35.3, lon = -116.6, size_km = [4, 2.2] }";
     fs::write(scene.path("around.toml"), job(around, "source = \"sample\"")).unwrap();
-    let plan = scene.run_to(0, &["plan", "around.toml"]).stdout;
+    let plan = scene.run_to(0, &["plan", "around.toml", "--out", "b.tdb"]).stdout;
     // The middle is 536367 E, 3906386 N; 2.2 km are five load modules.
     assert!(plan.contains("EPSG:32611") && plan.contains("[4000, 2500]"), "{plan}");
     assert!(plan.contains("534375.00  3905125.00") && plan.contains("35.28"), "corners in both systems: {plan}");
@@ -143,4 +143,19 @@ fn heights_above_different_datums_are_not_mixed_and_unknown_ones_are_told() {
     fs::write(scene.path("job.toml"), job(above, "")).unwrap();
     let said = scene.run_to(0, &["build", "job.toml"]).stderr;
     assert!(said.contains("does not say what its heights are measured from"), "{said}");
+}
+
+#[test]
+fn a_file_beside_a_source_that_changes_between_two_builds_is_noticed() {
+    let scene = Scene::new();
+    fs::write(scene.path("a.asc"), grid(0, hills)).unwrap();
+    let system = |zone: u32| fs::write(scene.path("a.prj"), format!("PROJCS[\"x\",AUTHORITY[\"EPSG\",\"326{zone}\"]]"));
+    system(11).unwrap();
+    scene.run_to(0, &["init", "a.asc", "--out", "job.toml"]);
+    scene.run_to(0, &["build", "job.toml"]);
+    let again = scene.run_to(0, &["build", "job.toml"]).stderr;
+    assert!(again.contains("nothing changed"), "{again}");
+    system(12).unwrap();
+    let moved = scene.run_to(2, &["build", "job.toml"]).stderr;
+    assert!(moved.contains("a.asc: it lies outside the area"), "{moved}");
 }
