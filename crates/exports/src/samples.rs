@@ -151,6 +151,7 @@ pub(crate) fn report() -> Report {
         before_removals: None,
         residual,
         border: None,
+        heights: None,
         residual_against_source: None,
         classes: Vec::new(),
         levels: vec![],
