@@ -141,6 +141,11 @@ impl From<DatabaseError> for Failure {
     }
 }
 
+/// The exit code after arguments that are none of this program's.
+pub fn wrong_arguments() -> ExitCode {
+    ExitCode::from(FAILED)
+}
+
 /// A panic is told in one line instead of the usual trace: what should have held, and where.
 pub fn report_bugs_in_one_line() {
     std::panic::set_hook(Box::new(|panic| {

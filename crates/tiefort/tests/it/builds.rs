@@ -89,7 +89,7 @@ fn damage_is_found_and_named() {
 fn a_plan_lists_settings_tiles_and_forecast() {
     let scene = Scene::with_job("small.toml", &[]);
     let text = scene.run_to(0, &["plan", "job.toml", "--simulate", "4"]).stdout;
-    for part in ["area.spacing_m", "Load modules", "Memory", "4 workers", "rank  tile"] {
+    for part in ["\n  spacing_m", "Load modules", "Memory", "longest chain", "rank  tile"] {
         assert!(text.contains(part), "{part:?} is not in: {text}");
     }
     let plan: Value = serde_json::from_str(&scene.run_to(0, &["plan", "job.toml", "--emit", "json"]).stdout).unwrap();

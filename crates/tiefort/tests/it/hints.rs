@@ -164,7 +164,7 @@ fn a_plan_refuses_a_raster_that_does_not_cover_the_area() {
 fn a_build_prints_no_settings_unless_asked() {
     let scene = Scene::with_job("small.toml", &[]);
     let said = scene.run_to(0, &["build", "job.toml", "--out", "x.tdb"]).stderr;
-    assert!(!said.contains("limits.per_load_module") && said.contains("into x.tdb"), "{said}");
+    assert!(!said.contains("mean_per_load_module") && said.contains("into x.tdb"), "{said}");
     let said = scene.run_to(0, &["build", "job.toml", "--out", "y.tdb", "-v"]).stderr;
-    assert!(said.contains("limits.per_load_module"), "{said}");
+    assert!(said.contains("mean_per_load_module"), "{said}");
 }

@@ -6,6 +6,7 @@
 mod bad_input;
 mod bad_jobs;
 mod builds;
+mod columns;
 mod comparing;
 mod exports;
 mod full_disk;

@@ -150,7 +150,12 @@ pub(super) fn residuals(report: &Report) -> Markup {
                 th.n { "mean" } th.n { "95 %" } th.n { "99 %" } }, html! {
             @for class in &report.classes {
                 @if class.posts == 0 {
-                    tr { td { (&class.name) } td.n { "-" } td.n { (grouped(class.points)) } @for _ in 0..5 { td.n { "-" } } }
+                    tr {
+                        td { (&class.name) }
+                        td.n { "-" }
+                        td.n { (grouped(class.points)) }
+                        @for _ in 0..5 { td.n { "-" } }
+                    }
                 } @else {
                     (row(&class.name, grouped(class.posts), grouped(class.points), &class.residual))
                 }
