@@ -66,8 +66,15 @@ impl Failure {
 
     /// A file that could not be written.
     pub fn output(path: &Path, source: &io::Error) -> Self {
-        let hint = "check that the folder exists, is writable and has room; nothing was left half-written";
-        Self::new(format!("{}: cannot be written: {source}", path.display()), hint)
+        let hint = match source.kind() {
+            io::ErrorKind::NotADirectory => "a part of the path is a file; name another place",
+            io::ErrorKind::NotFound => "make the folder first, or name another place",
+            _ => "check that the folder exists, is writable and has room; nothing was left half-written",
+        };
+        // A temporary file adds its own name, which is none that was given.
+        let told = source.to_string();
+        let told = told.split_once(" at path \"").map_or(told.as_str(), |(cause, _)| cause);
+        Self::new(format!("{}: cannot be written: {told}", path.display()), hint)
     }
 
     /// We are wrong; what and where was told when it happened.

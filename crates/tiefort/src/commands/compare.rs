@@ -102,6 +102,7 @@ fn window(text: &str) -> Result<PostRect, String> {
 /// Compares.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let request = request(arguments)?;
+    arguments.pictures.as_deref().map_or(Ok(()), NewFolder::check)?;
     let signals = Signals::watch()?;
     let mut watch = Watch { quiet: arguments.quiet, names: Vec::new(), began: Instant::now(), seconds: Vec::new() };
     watch.names = names(&request);

@@ -36,6 +36,8 @@ pub struct Arguments {
 
 /// Writes a job.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
+    // Rasters may take long to look at.
+    arguments.out.as_deref().map_or(Ok(()), crate::files::check_free)?;
     let files = rasters(&arguments.files)?;
     let suggestion = compiler::look_at(&files, arguments.crs.as_deref()).map_err(Failure::from);
     let suggestion = suggestion.map_err(|failure| match arguments.crs {

@@ -177,7 +177,9 @@ enum Frame {
 fn start(text: &str) -> Result<TinStart, String> {
     match files::extension(Path::new(text)).as_str() {
         "csv" | "geojson" | "json" => Ok(TinStart::File(text.into())),
-        _ => start_method(text).map(|(method, points)| TinStart::Method(method, points.unwrap_or(0))),
+        _ => start_method(text)
+            .map(|(method, points)| TinStart::Method(method, points.unwrap_or(0)))
+            .map_err(|error| format!("{error}; or a file whose name ends in .csv or .geojson")),
     }
 }
 

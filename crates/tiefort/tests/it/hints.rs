@@ -52,7 +52,7 @@ fn a_folder_named_as_a_job_is_told_so() {
     let scene = Scene::new();
     fs::create_dir(scene.path("some.tdb")).unwrap();
     for command in ["plan", "build"] {
-        check(&scene, &[command, "some.tdb"], &["some.tdb", "expected a TOML file"], "a job file");
+        check(&scene, &[command, "some.tdb"], &["some.tdb", "expected a job file"], "a job file");
     }
 }
 

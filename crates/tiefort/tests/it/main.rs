@@ -14,6 +14,8 @@ mod help;
 mod hints;
 mod measures;
 mod meshes;
+#[cfg(unix)]
+mod paths;
 mod raster;
 mod scene;
 mod shared;
