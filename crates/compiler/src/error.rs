@@ -101,7 +101,7 @@ impl CompileError {
     /// What could be done about it.
     pub fn hint(&self) -> Option<String> {
         match self {
-            CompileError::Source(error) => error.hint().map(str::to_owned),
+            CompileError::Source(error) => error.hint(),
             CompileError::Database(error) => error.hint().map(str::to_owned),
             CompileError::Impossible { hint, .. } => Some(hint.clone()),
             CompileError::OutsideSources { .. } => {

@@ -27,8 +27,31 @@ pub struct Forecast {
     pub worker_bytes: u64,
     /// Seconds on one worker.
     pub seconds: f64,
+    /// The same by stage.
+    pub stages: StageSeconds,
     /// Size of the database.
     pub disk_bytes: u64,
+}
+
+/// Seconds of the stages that take any, on one worker.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct StageSeconds {
+    /// Every tile alone.
+    pub survey: f64,
+    /// Every tile's TIN.
+    pub refine: f64,
+    /// Load modules.
+    pub assemble: f64,
+    /// The report.
+    pub publish: f64,
+    /// The page, after all stages.
+    pub page: f64,
+}
+
+impl StageSeconds {
+    fn sum(&self) -> f64 {
+        self.survey + self.refine + self.assemble + self.publish + self.page
+    }
 }
 
 /// Posts of an area up to which a build draws its page with the ground in it.
@@ -113,11 +136,13 @@ pub(crate) fn forecast(job: &Job, area: &GamingArea) -> Forecast {
         is_surveyed: is_surveyed(job),
     };
     let (shared_bytes, worker_bytes) = (shared_bytes(job, &size), worker_bytes(job, &size));
+    let stages = stage_seconds(job, &size);
     Forecast {
         memory_bytes: shared_bytes + worker_bytes * size.tiles.min(2),
         shared_bytes,
         worker_bytes,
-        seconds: seconds(job, &size),
+        seconds: stages.sum(),
+        stages,
         disk_bytes: disk_bytes(job, &size),
     }
 }
@@ -132,7 +157,7 @@ impl Size {
     }
 }
 
-fn seconds(job: &Job, size: &Size) -> f64 {
+fn stage_seconds(job: &Job, size: &Size) -> StageSeconds {
     let (posts, triangles) = (size.posts as f64, size.triangles as f64);
     let window = match job.dem.source {
         DemSource::Sample { .. } => WINDOW_S.0 + SAMPLE_S * (job.area.spacing.metres().powi(2) - 625.0),
@@ -140,7 +165,8 @@ fn seconds(job: &Job, size: &Size) -> f64 {
     };
     // Kept, they are made once for all stages and once for the page; otherwise for each stage: most tiles also for the
     // report, which says what limits cost.
-    let times = if size.is_kept { 2.0 } else { 3.0 + f64::from(u8::from(size.is_surveyed)) };
+    let windows = posts * window;
+    let (first, others) = if size.is_kept { (windows, 0.0) } else { (windows, windows) };
     let survey = match (size.is_surveyed, is_surveyed_in_haste(job)) {
         (false, _) => 0.0,
         (true, false) => SURVEY_S.0,
@@ -159,7 +185,14 @@ fn seconds(job: &Job, size: &Size) -> f64 {
         (false, false) => 0.0,
     };
     let levels = job.lod.inner_shares.len() as f64 * LEVEL_S;
-    START_S + posts * window * times + triangles * (survey + GROW_S + optimise + assemble + levels) + page
+    let (surveyed, refined) = if size.is_surveyed { (first, others) } else { (0.0, first) };
+    StageSeconds {
+        survey: surveyed + triangles * survey,
+        refine: refined + triangles * (GROW_S + optimise),
+        assemble: others + triangles * (assemble + levels),
+        publish: others,
+        page: START_S + page + if size.is_kept { windows } else { 0.0 },
+    }
 }
 
 /// Triangles of all coarser levels together, for one of the finest.

@@ -23,7 +23,7 @@ pub use plan::{Plan, PlannedTile, plan};
 mod foresee;
 pub use foresee::foresee;
 mod forecast;
-pub use forecast::{Forecast, PAGE_MODULES_MAX, PAGE_POSTS_MAX};
+pub use forecast::{Forecast, PAGE_MODULES_MAX, PAGE_POSTS_MAX, StageSeconds};
 mod played;
 pub use played::{Costs, Played, TileCosts, play};
 mod locate;

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use database::{Database, DatabaseError, Folder, MadeFrom, Manifest, Report, Stamp, TileRecord};
-use job::{Edges, Job};
+use job::{Edges, Job, deciding_lines};
 use terrain::{Post, SeamSides, Side, TileId, TileTin, Vertex};
 
 use crate::assemble::{Assembled, assemble, assemble_tile, read_assembled};
@@ -142,8 +142,8 @@ fn refuse_unfinished(run: &Run, folder: &Path, tile: TileId) -> Result<Vec<TileI
         return Err(CompileError::Unfinished { path: folder.display().to_string() });
     }
     let job = run.job.canonical_text();
-    if manifest.job != job {
-        let differs = manifest.job.lines().zip(job.lines()).find(|(theirs, ours)| theirs != ours);
+    if !deciding_lines(&manifest.job).eq(deciding_lines(&job)) {
+        let differs = deciding_lines(&manifest.job).zip(deciding_lines(&job)).find(|(theirs, ours)| theirs != ours);
         let difference = differs.map_or_else(
             || "one has more lines than the other".to_owned(),
             |(theirs, ours)| format!("`{theirs}` there, `{ours}` here"),

@@ -312,7 +312,8 @@ fn examine(folder: &Folder, area: &Area) -> Result<Previous, DatabaseError> {
     for path in list(dir)? {
         let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
         if !OURS.contains(&name.as_str()) && !is_temporary(&name) {
-            return Err(DatabaseError::NotOurFolder { path: dir.to_path_buf(), found: name });
+            let found = format!("{name:?} in it");
+            return Err(DatabaseError::NotOurFolder { path: dir.to_path_buf(), found });
         }
     }
     Ok(damage.map_or(Previous::Nothing, Previous::Damaged))

@@ -56,7 +56,7 @@ pub enum DatabaseError {
         found: NotADatabase,
     },
     /// The folder holds something that no build wrote.
-    #[error("{}: found {found:?}, expected an empty folder or a terrain database", path.display())]
+    #[error("{}: found {found}, expected an empty folder or a terrain database", path.display())]
     NotOurFolder {
         /// The folder.
         path: PathBuf,
@@ -286,7 +286,7 @@ impl DatabaseError {
             Self::DiskFull { .. } => "free some space and run the same command again; finished tiles are kept",
             Self::NotWritable { .. } => "choose another folder with --out",
             Self::NotADatabase { found, .. } => found.hint(),
-            Self::NotOurFolder { .. } => "choose another folder with --out, or empty this one",
+            Self::NotOurFolder { .. } => "choose another folder with --out; what is there is left alone",
             Self::NotAFolder { .. } | Self::NotAFile { .. } => {
                 "a database has plain files and folders only, and output follows no link out of it; remove it"
             }

@@ -16,6 +16,16 @@ pub enum JobError {
         /// What the system said.
         source: std::io::Error,
     },
+    /// What is named is no job file.
+    #[error("{path}: found {found}, expected a job file")]
+    NotAJob {
+        /// What was named.
+        path: PathBuf,
+        /// What it is.
+        found: &'static str,
+        /// What to do about it.
+        hint: String,
+    },
     /// The job file is far longer than any job.
     #[error("{path}: found {found} bytes, expected a job file of at most {limit}")]
     TooLong {
@@ -108,7 +118,11 @@ impl JobError {
         let example = "a working job starts with [area] and name, crs, origin_m, size_m, spacing_m";
         match self {
             JobError::Unreadable { .. } => "give the path of a job file, for example configs/ntc.toml".into(),
-            JobError::TooLong { .. } | JobError::NotText { .. } => example.into(),
+            JobError::NotAJob { hint, .. } => hint.clone(),
+            JobError::TooLong { .. } => example.into(),
+            JobError::NotText { path, .. } => {
+                format!("a job is text; for a raster this writes one: tiefort init {} --out mine.toml", path.display())
+            }
             JobError::Syntax { .. } => "texts are quoted: name = \"ntc\"; sections are in brackets: [area]".into(),
             JobError::UnknownKey(fault)
             | JobError::Missing(fault)

@@ -7,7 +7,7 @@
 use std::collections::BTreeSet;
 use std::ffi::OsStr;
 use std::fs;
-use std::io::Read;
+use std::io::{self, Read};
 use std::path::{Component, Path, PathBuf};
 
 use crate::bounds::{JOB_BYTES_MAX, SOURCES_MAX, VISITED_MAX};
@@ -65,6 +65,9 @@ impl Job {
 }
 
 fn text_of(path: &Path) -> Result<String, JobError> {
+    if let Some((found, hint)) = other_than_a_job(path) {
+        return Err(JobError::NotAJob { path: path.to_owned(), found, hint });
+    }
     let unreadable = |source| JobError::Unreadable { path: path.to_owned(), source };
     // A pipe would wait for a writer.
     if fs::metadata(path).is_ok_and(|data| !data.is_file() && !data.is_dir()) {
@@ -77,8 +80,41 @@ fn text_of(path: &Path) -> Result<String, JobError> {
         let found = fs::metadata(path).map_or(bytes.len() as u64, |data| data.len());
         return Err(JobError::TooLong { path: path.to_owned(), found, limit: JOB_BYTES_MAX });
     }
-    String::from_utf8(bytes)
-        .map_err(|error| JobError::NotText { path: path.to_owned(), after: error.utf8_error().valid_up_to() })
+    let text = String::from_utf8(bytes)
+        .map_err(|error| JobError::NotText { path: path.to_owned(), after: error.utf8_error().valid_up_to() })?;
+    if text.trim_start().starts_with('{') {
+        let hint = "a job is TOML: a line [area], below it name = \"ntc\" and so on".to_owned();
+        return Err(JobError::NotAJob { path: path.to_owned(), found: "JSON", hint });
+    }
+    Ok(text)
+}
+
+/// What is at `path`, where that cannot be a job, and a hint. Nothing is opened: that of a pipe would wait for ever.
+fn other_than_a_job(path: &Path) -> Option<(&'static str, String)> {
+    let example = || "give the path of a job file, for example configs/ntc.toml".to_owned();
+    let data = match fs::metadata(path) {
+        Ok(data) => data,
+        Err(_) if path.is_symlink() => return Some(("a link that leads nowhere", example())),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => {
+            let hint = "check the path; for a raster this writes a job: tiefort init dem.tif --out mine.toml";
+            return Some(("nothing there", hint.to_owned()));
+        }
+        // Opening it says why.
+        Err(_) => return None,
+    };
+    if data.is_dir() && path.join("database.json").is_file() {
+        let hint = "name the job it was built from; `tiefort report` and `tiefort status` read a database".to_owned();
+        return Some(("the folder of a terrain database", hint));
+    }
+    match (data.is_dir(), data.is_file(), data.len()) {
+        (true, ..) => Some(("a folder", example())),
+        (_, true, 0) => Some(("an empty file", "`tiefort init dem.tif` writes a job for a raster".to_owned())),
+        (_, true, _) => None,
+        _ => Some((
+            "a pipe, a socket or a device",
+            "paths in a job begin at the folder it lies in: copy it into a file".to_owned(),
+        )),
+    }
 }
 
 /// Whether a name is a pattern.

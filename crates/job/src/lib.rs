@@ -35,4 +35,4 @@ mod files;
 mod keys;
 mod read;
 mod settings;
-pub use settings::Setting;
+pub use settings::{Setting, deciding_lines};

@@ -22,6 +22,12 @@ pub struct Setting {
     pub meaning: String,
 }
 
+/// The lines of a [canonical text](Job::canonical_text) that decide what is built: all but the title, which only stands
+/// above the report's page.
+pub fn deciding_lines(canonical: &str) -> impl Iterator<Item = &str> {
+    canonical.lines().filter(|line| !line.starts_with("title = "))
+}
+
 impl Job {
     /// Every setting of the job with its value and meaning, defaults included, in the order of the sections.
     pub fn describe(&self) -> Vec<Setting> {

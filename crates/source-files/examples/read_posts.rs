@@ -14,7 +14,7 @@ fn main() -> std::io::Result<()> {
     let path = std::env::args().nth(1).expect("give the path of a raster");
     let crs = std::env::args().nth(2).map(|name| Crs::named(&name).expect("a coordinate system"));
     match read(Path::new(&path), &Reading { crs, ..Reading::AS_IT_SAYS }) {
-        Err(error) => eprintln!("refused: {error}\nhint: {}", error.hint().unwrap_or("none")),
+        Err(error) => eprintln!("refused: {error}\nhint: {}", error.hint().unwrap_or_else(|| "none".into())),
         Ok((file, raster, seconds)) => {
             let (frame, scale) = (file.frame(), file.sample_scale());
             eprintln!(

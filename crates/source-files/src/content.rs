@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use crate::SourceError;
 use crate::beside::all_beside;
+use crate::error::{A_DANGLING_LINK, A_DATABASE, A_FOLDER};
 
 /// The bytes of the file at `path`, and after them those of files beside it that say how it is to be read. They are
 /// read as they are wanted: a source may be larger than the memory there is.
@@ -25,11 +26,14 @@ pub fn content(path: &Path) -> Result<Box<dyn Read>, SourceError> {
 
 /// What the disk says of a regular file. Nothing is opened: that of a pipe would wait for a writer for ever.
 pub(crate) fn regular(path: &Path) -> Result<Metadata, SourceError> {
-    let data = std::fs::metadata(path).map_err(|source| SourceError::Open { path: path.into(), source })?;
-    if data.is_file() {
-        return Ok(data);
+    let not_a_file = |found| SourceError::NotAFile { path: path.into(), found };
+    match std::fs::metadata(path) {
+        Ok(data) if data.is_file() => Ok(data),
+        Ok(data) if data.is_dir() && path.join("database.json").is_file() => Err(not_a_file(A_DATABASE)),
+        Ok(data) => Err(not_a_file(kind_of(&data))),
+        Err(_) if path.is_symlink() => Err(not_a_file(A_DANGLING_LINK)),
+        Err(source) => Err(SourceError::Open { path: path.into(), source }),
     }
-    Err(SourceError::NotAFile { path: path.into(), found: kind_of(&data) })
 }
 
 #[cfg(unix)]
@@ -37,7 +41,7 @@ fn kind_of(data: &Metadata) -> &'static str {
     use std::os::unix::fs::FileTypeExt;
     let kind = data.file_type();
     match () {
-        () if kind.is_dir() => "a folder",
+        () if kind.is_dir() => A_FOLDER,
         () if kind.is_fifo() => "a named pipe",
         () if kind.is_socket() => "a socket",
         () => "a device",
@@ -46,7 +50,7 @@ fn kind_of(data: &Metadata) -> &'static str {
 
 #[cfg(not(unix))]
 fn kind_of(data: &Metadata) -> &'static str {
-    if data.is_dir() { "a folder" } else { "a device" }
+    if data.is_dir() { A_FOLDER } else { "a device" }
 }
 
 #[cfg(unix)]

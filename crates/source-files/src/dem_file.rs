@@ -8,6 +8,7 @@ use crate::beside::{RAW_ENDINGS, beside};
 use crate::chunk::{Chunk, Header};
 use crate::crs::Crs;
 use crate::dted::{self, Dted};
+use crate::error::A_JOB;
 use crate::frame::{Axes, Facts};
 use crate::geotiff::{FileDecoder, GeoTiff};
 use crate::rows::Rows;
@@ -248,7 +249,12 @@ fn of_raw(data: &Store, keys: &Keys) -> Result<Found, SourceError> {
 
 /// Bytes without a mark of their own: described by a header beside them, or an HGT tile.
 fn of_bare_rows(store: &Store, start: &[u8], reading: &Reading) -> Result<Found, SourceError> {
+    if store.len() == 0 {
+        return Err(SourceError::Empty { path: store.path().into() });
+    }
     if let Some(name) = known_but_not_read(start) {
+        let is_job = store.path().extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml"));
+        let name = if is_job { A_JOB } else { name };
         return Err(SourceError::OtherFormat { path: store.path().into(), found: name });
     }
     if let Some(header) = (!store.is_packed()).then(|| beside(store.path(), &["hdr"])).flatten() {
@@ -263,7 +269,6 @@ fn of_bare_rows(store: &Store, start: &[u8], reading: &Reading) -> Result<Found,
             return Err(SourceError::NotHgtSize { path, found, expected });
         }
         let found = start.iter().take(8).map(|byte| format!("{byte:02x}")).collect::<Vec<_>>().join(" ");
-        let found = if found.is_empty() { "nothing".into() } else { found };
         return Err(SourceError::UnknownFormat { path: store.path().into(), found });
     };
     let corner = reading.corner.or_else(|| hgt::corner_in(store.name()));

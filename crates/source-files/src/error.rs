@@ -1,7 +1,7 @@
 //! Why a source could not be used: one variant per cause, each with the file, what was found and what was expected.
 
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use terrain::Side;
 use thiserror::Error;
@@ -17,6 +17,9 @@ pub enum SourceError {
     /// The path leads to something that is no regular file.
     #[error("{path}: it is {found}, expected a file")]
     NotAFile { path: PathBuf, found: &'static str },
+    /// There is nothing in the file.
+    #[error("{path}: an empty file, expected a raster")]
+    Empty { path: PathBuf },
     /// The file is not what it was when the build began.
     #[error("{path}: {found} while it was read, expected the file that the build began with")]
     Changed { path: PathBuf, found: String },
@@ -187,13 +190,42 @@ pub enum SourceError {
 
 impl SourceError {
     /// What could be done about it, in one sentence, where there is something to say.
-    pub fn hint(&self) -> Option<&'static str> {
+    pub fn hint(&self) -> Option<String> {
+        self.command().or_else(|| self.words().map(str::to_owned))
+    }
+
+    /// The command that makes a file that is read of one that is not, as it is to be typed.
+    fn command(&self) -> Option<String> {
+        use SourceError::*;
+        let (words, path) = match self {
+            OtherFormat { path, found } if !found.contains("not a raster") => ("convert it: gdal_translate", path),
+            Compression { path, .. } => ("rewrite it: gdal_translate -co COMPRESS=DEFLATE", path),
+            SampleFormat { path, .. } => ("rewrite it: gdal_translate -ot Float32", path),
+            Bands { path, .. } => ("choose the band of heights: gdal_translate -b 1", path),
+            Photometric { path, .. } => ("rewrite it: gdal_translate -co PHOTOMETRIC=MINISBLACK", path),
+            InternalMask { path } => ("write the mask into the heights: gdalwarp -dstnodata -9999", path),
+            NotFullRaster { path } | TiffFeature { path, .. } => ("rewrite it: gdal_translate", path),
+            Geographic { path, .. } => ("project it, to your own zone: gdalwarp -t_srs EPSG:32611 -r bilinear", path),
+            NoPosition { path } | ControlPoints { path, .. } | Rotated { path, .. } => {
+                ("warp it onto a north-up grid: gdalwarp -r bilinear", path)
+            }
+            NotClasses { path, .. } => ("rewrite it: gdal_translate -ot Byte", path),
+            _ => return None,
+        };
+        Some(format!("{words} {} out.tif", for_gdal(path)))
+    }
+
+    fn words(&self) -> Option<&'static str> {
         use SourceError::*;
         Some(match self {
             Open { .. } => "check the path and its permissions; paths in a job are relative to the job file",
-            NotAFile { .. } => {
-                "name a file: for a folder those in it, for a pipe or a device a file with what it gives"
+            NotAFile { found: A_DATABASE, .. } => {
+                "name a raster; `tiefort export --format geotiff` makes one of a database"
             }
+            NotAFile { found: A_FOLDER, .. } => "name the files in it",
+            NotAFile { found: A_DANGLING_LINK, .. } => "remove the link, or mend where it leads",
+            NotAFile { .. } => "it cannot be read twice: copy what it gives into a file",
+            Empty { .. } => "the file was not copied or unpacked whole; fetch it again",
             Changed { .. } => "leave sources alone during a build; run the same command again",
             Write { .. } => "check that the folder exists, is writable and has room; nothing was left half-written",
             Read { .. } | Truncated { .. } | Malformed { .. } | BrokenChunk { .. } => {
@@ -204,21 +236,16 @@ impl SourceError {
             }
             ArchiveHolds { .. } => "unpack it and name the raster",
             HeaderAlone { .. } => "name the file of heights; its header is found beside it",
-            OtherFormat { .. } | UnknownFormat { .. } => "convert it: gdal_translate in out.tif",
+            OtherFormat { found: A_JOB, .. } => "name a raster, such as those in dem.sources of the job",
+            OtherFormat { .. } => "name a raster; if it was fetched from the web, look at what came instead",
+            UnknownFormat { .. } => "look at it with gdalinfo; what that knows, gdal_translate makes a GeoTIFF of",
             NotHgtSize { .. } => "the tile was not copied or unpacked whole, or is of another make; fetch it again",
             NoCorner { .. } => "give its south-west corner: { file = \"x.hgt\", corner = [35, -117] }, latitude first",
             NotTiff { .. } => "DEMs and class rasters are GeoTIFF files; gdal_translate converts other formats",
             TooLarge { .. } => "cut the part you need with gdal_translate -projwin, or tile the file",
-            Compression { .. } => "rewrite it: gdal_translate -co COMPRESS=DEFLATE in.tif out.tif",
-            SampleFormat { .. } => "rewrite it: gdal_translate -ot Float32 in.tif out.tif",
-            Bands { .. } => "choose the band of heights: gdal_translate -b 1 in.tif out.tif",
-            Photometric { .. } => "rewrite it: gdal_translate -co PHOTOMETRIC=MINISBLACK in.tif out.tif",
-            InternalMask { .. } => "write the mask into the heights: gdalwarp -dstnodata -9999 in.tif out.tif",
-            NotFullRaster { .. } | TiffFeature { .. } => "rewrite it: gdal_translate in.tif out.tif",
             NoCrs { .. } => {
                 "say what it is: dem.sources = [{ file = \"…\", crs = \"EPSG:…\" }], or put a .prj beside it"
             }
-            Geographic { .. } => "project it: gdalwarp -t_srs EPSG:32611 -r bilinear in.tif out.tif (your own zone)",
             UnnamedCrs { .. } | LinearUnit { .. } | OtherCrs { .. } => {
                 "project it to the area's system: gdalwarp -t_srs EPSG:… -r bilinear in.tif out.tif, or change area.crs"
             }
@@ -227,9 +254,6 @@ impl SourceError {
             }
             TooFine { .. } => {
                 "its header is wrong; write it with the right corners: gdal_translate -a_ullr WEST NORTH EAST SOUTH"
-            }
-            NoPosition { .. } | ControlPoints { .. } | Rotated { .. } => {
-                "warp it onto a north-up grid: gdalwarp -r bilinear in.tif out.tif"
             }
             OutsideArea { .. } => "check area.crs and area.origin_m, and the file's own coordinate system",
             NotCovered { .. } => "move area.origin_m, make area.size_m smaller, or give a DEM that reaches farther",
@@ -245,7 +269,6 @@ impl SourceError {
             Infinite { .. } | HeightOutOfRange { .. } => {
                 "mark such posts as void: gdal_translate -a_nodata … ; if heights are not metres set dem.height_unit_m"
             }
-            NotClasses { .. } => "rewrite it: gdal_translate -ot Byte classes.tif out.tif",
             NotGeoJson { .. } => "give GeoJSON, a Shapefile or a GeoPackage; from others: ogr2ogr out.geojson in.…",
             NotPolygons { .. } | NoPolygons { .. } => "give polygons: ogr2ogr -where \"OGR_GEOMETRY='POLYGON'\" …",
             Ring { .. } => "repair it: ogr2ogr -makevalid out.geojson in.geojson",
@@ -253,8 +276,29 @@ impl SourceError {
             PolygonCrs { .. } => {
                 "project it: ogr2ogr -t_srs EPSG:… -lco RFC7946=NO out.geojson in.geojson (with the area's code)"
             }
+            // All others have a command instead.
+            _ => return None,
         })
     }
+}
+
+/// What a path may lead to instead of a raster, in words that a hint goes by.
+pub(crate) const A_FOLDER: &str = "a folder";
+pub(crate) const A_DATABASE: &str = "the folder of a terrain database";
+pub(crate) const A_DANGLING_LINK: &str = "a link that leads nowhere";
+pub(crate) const A_JOB: &str = "a job file, not a raster";
+
+/// `path` as GDAL opens it and a shell takes it: packed files through the virtual systems it has for them.
+fn for_gdal(path: &Path) -> String {
+    let ending = path.extension().map(|ending| ending.to_string_lossy().to_lowercase()).unwrap_or_default();
+    let system = match ending.as_str() {
+        "gz" => "/vsigzip/",
+        "zip" => "/vsizip/",
+        _ => "",
+    };
+    let name = format!("{system}{}", path.display());
+    let is_plain = |c: char| c.is_alphanumeric() || "/._-+,:@%".contains(c);
+    if name.chars().all(is_plain) { name } else { format!("'{}'", name.replace('\'', "'\\''")) }
 }
 
 fn sides(missing: &[(Side, f64)]) -> String {
@@ -267,4 +311,22 @@ fn sides(missing: &[(Side, f64)]) -> String {
     let parts: Vec<String> =
         missing.iter().map(|(side, metres)| format!("{metres:.1} m on its {} side", name(side))).collect();
     parts.join(" and ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_hint_with_a_command_names_the_file_as_it_is_to_be_typed() {
+        let hint = |path: &str| SourceError::OtherFormat { path: path.into(), found: "a USGS DEM" }.hint();
+        let check = |path, named: &str| {
+            assert_eq!(hint(path), Some(format!("convert it: gdal_translate {named} out.tif")));
+        };
+        check("dem/ranges.dem", "dem/ranges.dem");
+        check("a b.dem", "'a b.dem'");
+        check("it's.dem", "'it'\\''s.dem'");
+        check("SainteHelens.dem.gz", "/vsigzip/SainteHelens.dem.gz");
+        check("x.zip", "/vsizip/x.zip");
+    }
 }

@@ -43,6 +43,23 @@ impl Board {
         let rows = self.marks.chunks(self.columns as usize).rev();
         rows.map(|row| row.iter().map(char::to_string).collect::<Vec<_>>().join(" ")).collect()
     }
+
+    /// The board with a character for each square of so many tiles a side, counted from the south-west: the first of
+    /// `order` that one of them has.
+    pub fn coarser(&self, side: u32, order: &[char]) -> Self {
+        let (rows, columns) = (self.rows.div_ceil(side), self.columns.div_ceil(side));
+        let rank = |mark: char| order.iter().position(|&known| known == mark).unwrap_or(order.len());
+        let mut coarse = Self::new(rows, columns);
+        coarse.marks.fill(' ');
+        for (place, &mark) in self.marks.iter().enumerate() {
+            let (row, col) = (place / self.columns as usize, place % self.columns as usize);
+            let into = &mut coarse.marks[row / side as usize * columns as usize + col / side as usize];
+            if *into == ' ' || rank(mark) < rank(*into) {
+                *into = mark;
+            }
+        }
+        coarse
+    }
 }
 
 #[cfg(test)]
@@ -69,5 +86,14 @@ mod tests {
         assert_eq!(board.lines(), [". . #", "= o ."]);
         board.hear(&Event::Enter(Stage::Assemble, 6));
         assert_eq!(board.lines(), [". . .", ". . ."]);
+    }
+
+    #[test]
+    fn a_coarser_board_shows_the_mark_that_matters_most_in_each_square() {
+        let mut board = Board::new(3, 4);
+        for (row, col, mark) in [(0, 0, '#'), (1, 1, '!'), (0, 2, '#'), (1, 2, '#'), (0, 3, '#'), (1, 3, '#')] {
+            board.mark(TileId { row, col }, mark);
+        }
+        assert_eq!(board.coarser(2, &['!', '.', '#']).lines(), [". .", "! #"]);
     }
 }

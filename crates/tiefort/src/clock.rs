@@ -41,6 +41,13 @@ impl Moment {
     }
 }
 
+/// What `work` gives, and how long it took, as a row of this name.
+pub fn timed<T>(name: &str, work: impl FnOnce() -> T) -> (T, ReportStage) {
+    let begun = Moment::now();
+    let made = work();
+    (made, begun.elapsed(name))
+}
+
 impl StageClock {
     /// Starts now.
     pub fn start() -> Self {

@@ -66,8 +66,15 @@ impl Failure {
 
     /// A file that could not be written.
     pub fn output(path: &Path, source: &io::Error) -> Self {
-        let hint = "check that the folder exists, is writable and has room; nothing was left half-written";
-        Self::new(format!("{}: cannot be written: {source}", path.display()), hint)
+        let hint = match source.kind() {
+            io::ErrorKind::NotADirectory => "a part of the path is a file; name another place",
+            io::ErrorKind::NotFound => "make the folder first, or name another place",
+            _ => "check that the folder exists, is writable and has room; nothing was left half-written",
+        };
+        // A temporary file adds its own name, which is none that was given.
+        let told = source.to_string();
+        let told = told.split_once(" at path \"").map_or(told.as_str(), |(cause, _)| cause);
+        Self::new(format!("{}: cannot be written: {told}", path.display()), hint)
     }
 
     /// We are wrong; what and where was told when it happened.
@@ -139,6 +146,11 @@ impl From<DatabaseError> for Failure {
         let code = if error.is_transient() { TRY_LATER } else { FAILED };
         Self { message: error.to_string(), hint: error.hint().map(str::to_owned), code }
     }
+}
+
+/// The exit code after arguments that are none of this program's.
+pub fn wrong_arguments() -> ExitCode {
+    ExitCode::from(FAILED)
 }
 
 /// A panic is told in one line instead of the usual trace: what should have held, and where.

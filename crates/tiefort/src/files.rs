@@ -29,7 +29,7 @@ pub fn write_whole_or(
     write: impl FnOnce(&mut BufWriter<&fs::File>) -> Result<(), Failure>,
 ) -> Result<(), Failure> {
     let fault = |error: io::Error| Failure::output(path, &error);
-    let file = temporary_beside(path, left_over::PREFIX)?;
+    let file = temporary_beside(path)?;
     // Others leave it alone while this process lives.
     let _held = left_over::hold(file.path());
     let mut out = BufWriter::new(file.as_file());
@@ -45,17 +45,23 @@ pub fn write_whole_or(
 /// # Errors
 /// Those of `make`, and when the file cannot be made.
 pub fn make_whole(path: &Path, make: impl FnOnce(&Path) -> Result<(), Failure>) -> Result<(), Failure> {
-    // What makes it may lock it in its own way, so this process does not, and none sweeps it by its name.
-    let file = temporary_beside(path, ".tiefort-part-")?;
-    make(file.path())?;
-    file.persist(path).map_err(|error| Failure::output(path, &error.error))?;
-    Ok(())
+    let fault = |error: io::Error| Failure::output(path, &error);
+    refuse_special(path)?;
+    left_over::sweep(folder_of(path));
+    // In a folder of its own, which this process holds: what makes the file may lock it in its own way, and put others
+    // beside it.
+    let folder = tempfile::Builder::new().prefix(left_over::PREFIX).tempdir_in(folder_of(path)).map_err(fault)?;
+    let _held = left_over::hold(folder.path());
+    let file = folder.path().join(path.file_name().unwrap_or("part".as_ref()));
+    make(&file)?;
+    fs::rename(&file, path).map_err(fault)
 }
 
-fn temporary_beside(path: &Path, prefix: &str) -> Result<NamedTempFile, Failure> {
+fn temporary_beside(path: &Path) -> Result<NamedTempFile, Failure> {
+    refuse_special(path)?;
     left_over::sweep(folder_of(path));
     let mut builder = tempfile::Builder::new();
-    builder.prefix(prefix);
+    builder.prefix(left_over::PREFIX);
     // A temporary file is private by default; this one is about to be an ordinary file.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
@@ -67,12 +73,32 @@ fn temporary_beside(path: &Path, prefix: &str) -> Result<NamedTempFile, Failure>
 /// # Errors
 /// When there is one, or it cannot be written.
 pub fn write_new(path: &Path, text: &str) -> Result<(), Failure> {
+    check_free(path)?;
+    write_whole(path, |out| out.write_all(text.as_bytes()))
+}
+
+/// Whether a text file can be made where there is none yet, asked before long work.
+///
+/// # Errors
+/// When there is one, or its folder is missing or not writable.
+pub fn check_free(path: &Path) -> Result<(), Failure> {
     if left_over::is_taken(path) {
         let found = if path.is_dir() { "a folder" } else { left_over::named(path) };
         let message = format!("{}: found {found}, expected a name that is free", path.display());
         return Err(Failure::new(message, "give another name; a job that is there is never written over"));
     }
-    write_whole(path, |out| out.write_all(text.as_bytes()))
+    check_writable(path)
+}
+
+/// Refuses to put a file in the place of a pipe, a socket or a device: what is renamed into place would replace it.
+fn refuse_special(path: &Path) -> Result<(), Failure> {
+    match fs::metadata(path) {
+        Ok(found) if !found.is_file() && !found.is_dir() => {
+            let message = format!("{}: found a pipe, a socket or a device, expected a file name", path.display());
+            Err(Failure::new(message, "name a file that is to be made or replaced"))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// Makes a folder for files that are to be written, and those around it, where it is not there yet.
@@ -98,8 +124,10 @@ fn folder_of(path: &Path) -> &Path {
 /// When the folder is missing or not writable, or `path` is a folder.
 pub fn check_writable(path: &Path) -> Result<(), Failure> {
     if path.is_dir() {
-        return Err(Failure::new(format!("{}: found a folder, expected a file name", path.display()), "name the file"));
+        let hint = format!("name the file, such as {}", path.join("NAME").display());
+        return Err(Failure::new(format!("{}: found a folder, expected a file name", path.display()), hint));
     }
+    refuse_special(path)?;
     if path.is_symlink() && !path.exists() {
         let message = format!("{}: found a link that leads nowhere, expected a file name", path.display());
         return Err(Failure::new(message, "remove the link, or give another name"));
@@ -160,6 +188,23 @@ mod tests {
         {
             assert_eq!(bytes_text(bytes), text);
         }
+    }
+
+    #[test]
+    fn what_a_killed_process_leaves_of_a_file_in_the_making_is_swept_as_all_else() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.gpkg");
+        make_whole(&path, |file| {
+            let making = file.parent().unwrap();
+            let name = making.file_name().unwrap().to_str().unwrap();
+            assert!(making.parent() == Some(folder.path()) && name.starts_with(left_over::PREFIX), "{name}");
+            assert_eq!(name.len(), left_over::PREFIX.len() + 6, "{name} is none of those that are swept");
+            assert!(left_over::hold(making).is_none(), "it is not held");
+            fs::write(file, "whole").map_err(|error| Failure::output(file, &error))
+        })
+        .unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"whole");
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
     }
 
     #[test]

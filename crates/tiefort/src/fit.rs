@@ -54,6 +54,7 @@ fn free_disk(_: &Path) -> Option<u64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use compiler::StageSeconds;
 
     #[test]
     fn what_no_machine_has_is_refused_with_both_numbers_and_what_all_have_is_not() {
@@ -62,6 +63,7 @@ mod tests {
             shared_bytes: memory_bytes,
             worker_bytes: 0,
             seconds: 1.0,
+            stages: StageSeconds::default(),
             disk_bytes,
         };
         let here = std::env::temp_dir();

@@ -53,7 +53,8 @@ pub fn named(path: &Path) -> &'static str {
         (true, false) => "a link that leads nowhere",
         (true, true) => "a link",
         _ if path.is_dir() => "a folder that is not empty",
-        _ => "a file",
+        _ if path.is_file() => "a file",
+        _ => "a pipe, a socket or a device",
     }
 }
 

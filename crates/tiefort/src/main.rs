@@ -18,6 +18,7 @@ mod commands;
 mod costs;
 mod end_table;
 mod engines;
+mod estimate;
 mod events;
 mod failure;
 mod figures;
@@ -43,6 +44,7 @@ use std::process::ExitCode;
 use std::sync::LazyLock;
 
 use clap::Parser;
+use views::COLUMNS_MAX;
 
 use commands::Command;
 
@@ -73,7 +75,7 @@ static LONG_VERSION: LazyLock<String> = LazyLock::new(|| {
 
 /// Turns elevation rasters into a gaming area: a seamless terrain database of load modules within polygon limits.
 #[derive(Parser)]
-#[command(version, long_version = LONG_VERSION.as_str(), max_term_width = 100, after_help = AFTER_HELP)]
+#[command(version, long_version = LONG_VERSION.as_str(), max_term_width = COLUMNS_MAX, after_help = AFTER_HELP)]
 struct Cli {
     #[command(subcommand)]
     command: Command,
@@ -81,8 +83,16 @@ struct Cli {
 
 fn main() -> ExitCode {
     failure::report_bugs_in_one_line();
-    // Wrong arguments end here, with exit code 2.
-    let cli = Cli::parse();
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) if error.use_stderr() => {
+            // In this program's own lines: what was typed may be long, and hold what a terminal would obey.
+            terminal::tell(&terminal::short(&error.render().to_string()));
+            return failure::wrong_arguments();
+        }
+        // Help and version.
+        Err(error) => error.exit(),
+    };
     let outcome = std::panic::catch_unwind(|| cli.command.run());
     match outcome {
         Ok(Ok(outcome)) => outcome.into(),

@@ -24,12 +24,7 @@ impl NewFolder {
     /// # Errors
     /// When something is there already, or the folder around it is missing or not writable.
     pub fn begin(path: &Path) -> Result<Self, Failure> {
-        let is_empty = || fs::read_dir(path).is_ok_and(|mut entries| entries.next().is_none());
-        if left_over::is_taken(path) && (path.is_symlink() || !is_empty()) {
-            let found = left_over::named(path);
-            let message = format!("{}: found {found}, expected a name that is free", path.display());
-            return Err(Failure::new(message, "give another name, or remove it; a folder is never written over"));
-        }
+        Self::check(path)?;
         let path = std::path::absolute(path).map_err(|error| Failure::output(path, &error))?;
         let around = path.parent().unwrap_or(Path::new("/"));
         left_over::sweep(around);
@@ -41,6 +36,20 @@ impl NewFolder {
         let making = builder.tempdir_in(around).map_err(|error| Failure::output(&path, &error))?;
         let held = left_over::hold(making.path());
         Ok(Self { path, making, _held: held })
+    }
+
+    /// Whether a folder may appear at `path`, asked before long work.
+    ///
+    /// # Errors
+    /// When something is there already.
+    pub fn check(path: &Path) -> Result<(), Failure> {
+        let is_empty = || fs::read_dir(path).is_ok_and(|mut entries| entries.next().is_none());
+        if left_over::is_taken(path) && (path.is_symlink() || !is_empty()) {
+            let found = left_over::named(path);
+            let message = format!("{}: found {found}, expected a name that is free", path.display());
+            return Err(Failure::new(message, "give another name, or remove it; a folder is never written over"));
+        }
+        Ok(())
     }
 
     /// Writes a file of this name, `/` between folders.

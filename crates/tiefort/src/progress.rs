@@ -9,9 +9,11 @@ use std::thread::JoinHandle;
 use compiler::{Event, Progress, Stage};
 use database::{ReportStage, ReportTile};
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
+use views::fold;
 
 use crate::board::{Board, LEGEND};
 use crate::clock::StageClock;
+use crate::estimate::Estimate;
 use crate::events;
 use crate::lines::Lines;
 use crate::terminal;
@@ -88,15 +90,17 @@ struct Heard {
 
 impl Listener {
     /// Starts the reporter thread for a run of `workers` on `tiles` = (rows, columns).
-    pub fn start(show: Show, tiles: (u32, u32), workers: usize) -> Self {
+    pub fn start(show: Show, tiles: (u32, u32), workers: usize, estimate: Estimate) -> Self {
         let (sender, receiver) = channel();
         let display = match show {
             Show::Nothing => None,
             Show::Json => Some(Display::Json),
             Show::Verbose => Some(Display::Log(events::event_text)),
-            Show::JsonLog => Some(Display::Log(|event, time, at_s| events::event_json(event, time, at_s).to_string())),
-            Show::Progress if terminal::is_watched() => Some(Display::Bars(Box::new(Bars::new(tiles, workers)))),
-            Show::Progress => Some(Display::Lines(Lines::new(workers))),
+            Show::JsonLog => Some(Display::JsonLog),
+            Show::Progress if terminal::is_watched() => {
+                Some(Display::Bars(Box::new(Bars::new(tiles, Lines::new(workers, estimate)))))
+            }
+            Show::Progress => Some(Display::Lines(Box::new(Lines::new(workers, estimate)))),
         };
         let reporter = display.map(|display| std::thread::spawn(move || report(receiver, display)));
         Self {
@@ -172,8 +176,9 @@ impl Progress for Listener {
 
 enum Display {
     Json,
+    JsonLog,
     Log(fn(&Event, Option<&ReportStage>, f64) -> String),
-    Lines(Lines),
+    Lines(Box<Lines>),
     Bars(Box<Bars>),
 }
 
@@ -181,6 +186,7 @@ fn report(receiver: Receiver<Heard>, mut display: Display) {
     for Heard { event, stage_time, at_s } in receiver {
         match &mut display {
             Display::Json => events::print_line(&events::event_json(&event, stage_time.as_ref(), at_s)),
+            Display::JsonLog => terminal::tell_json(&events::event_json(&event, stage_time.as_ref(), at_s)),
             Display::Log(line) => terminal::tell(&line(&event, stage_time.as_ref(), at_s)),
             Display::Lines(lines) => {
                 if let Some(line) = lines.hear(&event, stage_time.as_ref(), at_s) {
@@ -205,11 +211,10 @@ struct Bars {
 }
 
 impl Bars {
-    fn new((rows, columns): (u32, u32), workers: usize) -> Self {
+    fn new((rows, columns): (u32, u32), lines: Lines) -> Self {
         let all = MultiProgress::with_draw_target(ProgressDrawTarget::stderr_with_hz(REDRAWS_HZ));
         let bar = all.add(ProgressBar::no_length().with_style(style("{prefix:<9} {spinner} {elapsed}")));
-        let mut bars =
-            Self { all, bar, board: Board::new(rows, columns), board_rows: Vec::new(), lines: Lines::new(workers) };
+        let mut bars = Self { all, bar, board: Board::new(rows, columns), board_rows: Vec::new(), lines };
         if 1 < rows * columns && rows <= BOARD_MAX.0 && columns <= BOARD_MAX.1 {
             bars.board_rows = (0..=rows).map(|_| bars.all.add(ProgressBar::no_length())).collect();
             bars.board_rows.iter().for_each(|row| row.set_style(style("  {msg}")));
@@ -230,21 +235,22 @@ impl Bars {
             self.draw_board();
         }
         let line = self.lines.hear(event, stage_time, at_s);
+        self.bar.set_message(self.lines.left(at_s));
         if let (Some(line), Event::Leave(_) | Event::Note(_)) = (line, event) {
-            // Fails when the terminal is gone; there is nobody to tell then.
-            let _ = self.all.println(line);
+            // Fails when the terminal is gone; there is no one to tell then.
+            let _ = self.all.println(fold(&line, 2));
         }
     }
 
     fn enter(&mut self, stage: &'static str, tiles: usize) {
         self.bar.set_prefix(stage);
-        self.bar.reset();
+        // The time that has passed is the whole build's, as what is left.
+        self.bar.set_position(0);
         if tiles == 0 {
-            self.bar.set_style(style("{prefix:<9} {spinner} {elapsed}"));
+            self.bar.set_style(style("{prefix:<9} {spinner} {elapsed}{msg}"));
         } else {
             let color = if terminal::wants_color() { ".green" } else { "" };
-            let template =
-                format!("{{prefix:<9}} [{{bar:24{color}}}] {{pos}} of {{len}} tiles  {{elapsed}}, about {{eta}} left");
+            let template = format!("{{prefix:<9}} [{{bar:24{color}}}] {{pos}} of {{len}} tiles  {{elapsed}}{{msg}}");
             self.bar.set_style(style(&template).progress_chars("##."));
             self.bar.set_length(tiles as u64);
         }

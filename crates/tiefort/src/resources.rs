@@ -93,12 +93,14 @@ fn above(root: &Path, below: &Path) -> Vec<PathBuf> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use compiler::StageSeconds;
 
     const FORECAST: Forecast = Forecast {
         memory_bytes: 300 << 20,
         shared_bytes: 100 << 20,
         worker_bytes: 100 << 20,
         seconds: 1.0,
+        stages: StageSeconds { survey: 0.0, refine: 1.0, assemble: 0.0, publish: 0.0, page: 0.0 },
         disk_bytes: 1,
     };
 

@@ -3,19 +3,21 @@
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use compiler::{Built, CompileError, Options};
-use database::{Database, Lease, Report, files};
+use compiler::{Built, CompileError, Options, Plan, Stage};
+use database::{Database, Lease, Report, ReportStage, files};
 use job::Job;
 use serde_json::json;
 use views::{Align, BreachPlaces, Table, breaches_csv, breaches_geojson};
 
 use crate::arguments::{Log, RunArguments};
+use crate::clock::timed;
 use crate::end_table::{End, end_table};
+use crate::estimate::Estimate;
 use crate::events;
 use crate::failure::{Failure, Outcome};
 use crate::progress::{Listener, Show, Times};
 use crate::signals::{self, Signals};
-use crate::{page, terminal};
+use crate::{lines, page, terminal};
 
 /// A run of the compiler on a job, as a person follows it.
 #[derive(Debug)]
@@ -26,6 +28,8 @@ pub struct Run<'a> {
     workers: usize,
     /// Whether other processes do the rest: then there is no board to show, and every tile is told.
     is_part: bool,
+    /// What is forecast of it; none where the job cannot be planned, which the run itself says.
+    plan: Option<Plan>,
     signals: Signals,
     /// What a process that shares the directory holds, to be given up if it has to end.
     lease: Arc<Mutex<Option<Lease>>>,
@@ -86,7 +90,8 @@ impl<'a> Run<'a> {
     fn new(job: &'a Job, arguments: &'a RunArguments, is_part: bool) -> Result<(Self, Option<String>), Failure> {
         let (workers, remark) = arguments.workers.for_job(job);
         let (folder, signals) = (arguments.folder(job), Signals::watch()?);
-        Ok((Self { job, arguments, folder, workers, is_part, signals, lease: Arc::default() }, remark))
+        let plan = compiler::plan(job).ok();
+        Ok((Self { job, arguments, folder, workers, is_part, plan, signals, lease: Arc::default() }, remark))
     }
 
     /// Where the database lies.
@@ -113,7 +118,11 @@ impl<'a> Run<'a> {
         work: impl FnOnce(&mut Listener) -> Result<T, CompileError>,
     ) -> Result<(T, Times), Failure> {
         let tiles = (self.job.tiles.rows, self.job.tiles.columns);
-        let mut listener = Listener::start(self.show(), tiles, self.workers);
+        let estimate = match &self.plan {
+            Some(plan) => Estimate::of_build(plan, self.workers),
+            None => Estimate::of_one_stage(Stage::Refine),
+        };
+        let mut listener = Listener::start(self.show(), tiles, self.workers, estimate);
         let (place, lease) = (listener.place(), Arc::clone(&self.lease));
         self.signals.end_in_time(move || {
             // Others may have what is given up at once; if that fails, the lease expires.
@@ -147,6 +156,7 @@ impl<'a> Run<'a> {
     /// When the report cannot be written.
     pub fn conclude(&self, finished: Finished, times: Times) -> Result<Outcome, Failure> {
         let Finished { mut report, database, tiles, is_unchanged } = finished;
+        let mut drawn: Option<ReportStage> = None;
         if !is_unchanged {
             report.stages = times.stages;
             report.tiles = times.tiles;
@@ -162,7 +172,9 @@ impl<'a> Run<'a> {
             database.write_json(files::REPORT, &report)?;
             // With the report other processes take the build for done; so nothing that takes long comes before this.
             database.remove_work()?;
-            self.write_page(&database, &report)?;
+            let (written, page) = timed("page", || self.write_page(&database, &report));
+            written?;
+            drawn = (!self.arguments.no_html).then_some(page);
         }
         let outcome = self.judge(&report);
         match self.show() {
@@ -174,11 +186,10 @@ impl<'a> Run<'a> {
                 "unchanged": is_unchanged,
                 "report": report,
             })),
-            Show::JsonLog => terminal::tell(
-                &json!({ "event": "end", "exit_code": outcome.code(), "unchanged": is_unchanged,
-                         "database": self.folder.display().to_string(), "at_s": times.seconds })
-                .to_string(),
-            ),
+            Show::JsonLog => {
+                terminal::tell_json(&json!({ "event": "end", "exit_code": outcome.code(), "unchanged": is_unchanged,
+                         "database": self.folder.display().to_string(), "at_s": times.seconds }))
+            }
             Show::Progress | Show::Verbose if is_unchanged => terminal::tell(&format!(
                 "nothing changed: all {} tiles in {} are fresh, so nothing was done ({:.2} s)",
                 self.job.tiles.rows * self.job.tiles.columns,
@@ -186,7 +197,11 @@ impl<'a> Run<'a> {
                 times.seconds
             )),
             Show::Progress | Show::Verbose => {
-                let end = End { report: &report, tiles: &tiles, folder: &self.folder, seconds: times.seconds };
+                let seconds = times.seconds + drawn.as_ref().map_or(0.0, |page| page.wall_s);
+                drawn.iter().for_each(|page| terminal::tell(&lines::end_line(page, "", self.workers)));
+                // The report was on the disk before its page was drawn, so only this table has the page's time.
+                report.stages.extend(drawn);
+                let end = End { report: &report, tiles: &tiles, folder: &self.folder, seconds };
                 terminal::tell(&end_table(&end));
             }
         }
@@ -226,21 +241,26 @@ impl<'a> Run<'a> {
     }
 }
 
-/// Every setting of `job`, a line each: key, value, meaning.
+/// Every setting of `job` by the section of the job file it stands in: key, value, meaning.
 pub fn settings_text(job: &Job) -> String {
     /// Columns of a value that its meaning still lines up behind.
-    const VALUE_COLUMNS: usize = 36;
-    let mut table = Table::new(&[Align::Left, Align::Left, Align::Left]);
+    const VALUE_COLUMNS: usize = 18;
+    let mut sections: Vec<(&str, Table)> = Vec::new();
     for setting in job.describe() {
+        let (section, key) = setting.key.split_once('.').unwrap_or(("", setting.key));
+        if sections.last().is_none_or(|(last, _)| *last != section) {
+            sections.push((section, Table::new(&[Align::Left, Align::Left, Align::Left])));
+        }
+        let (_, table) = sections.last_mut().expect("one was just added if there was none");
         if setting.value.chars().count() <= VALUE_COLUMNS {
-            table.row([setting.key, &setting.value, &setting.meaning]);
+            table.row([key, &setting.value, &setting.meaning]);
         } else {
             // A long value would push all meanings to the right.
-            table.row([setting.key, "", &setting.meaning]);
+            table.row([key, "", &setting.meaning]);
             table.row(["", "", &format!("= {}", setting.value)]);
         }
     }
-    table.text(2)
+    sections.iter().map(|(section, table)| format!("  [{section}]\n{}", table.text(2))).collect()
 }
 
 /// Where the load modules and windows of `job` lie.

@@ -4,7 +4,13 @@ use std::borrow::Cow;
 use std::io::{ErrorKind, IsTerminal, Write, stderr, stdout};
 use std::path::Path;
 
+use serde_json::Value;
+use views::fold;
+
 use crate::failure::Failure;
+
+/// How far a line goes on to the right of where it began.
+const HANG: usize = 2;
 
 /// Prints data to stdout. A reader that has gone away (`| head`) has seen enough, so that is no failure.
 ///
@@ -18,10 +24,16 @@ pub fn print(text: &str) -> Result<(), Failure> {
     }
 }
 
-/// Tells a person something, in whole lines on stderr. Nobody may be listening; the work goes on all the same.
+/// Tells a person something, in whole lines on stderr, as wide as a terminal. If stderr is closed, the work goes on all
+/// the same.
 pub fn tell(text: &str) {
     let line_end = if text.ends_with('\n') { "" } else { "\n" };
-    let _ = stderr().lock().write_all(format!("{}{line_end}", plain(text)).as_bytes());
+    let _ = stderr().lock().write_all(format!("{}{line_end}", fold(&plain(text), HANG)).as_bytes());
+}
+
+/// Tells a program something, in one line on stderr.
+pub fn tell_json(value: &Value) {
+    let _ = stderr().lock().write_all(format!("{value}\n").as_bytes());
 }
 
 /// `text` with control characters written out, as `\u{1b}`: what files and jobs say is data, and a terminal would obey

@@ -19,9 +19,9 @@ pub use picture::{
     draw_panels, draw_perspective, draw_sight, draw_wireframe, palette,
 };
 mod table;
-pub use table::{Align, Table, grouped};
+pub use table::{Align, COLUMNS_MAX, Table, fold, grouped};
 mod report;
-pub use report::{report_text, stage_table, wrapped};
+pub use report::{report_text, stage_table};
 
 #[cfg(test)]
 mod samples;

@@ -1,4 +1,9 @@
-//! Columns that line up, without colour, and numbers a person can read.
+//! Columns that line up, without colour, and numbers a person can read; lines as wide as a terminal.
+
+/// Columns of an ordinary terminal, and of a page printed from it: no line is wider, single words apart.
+pub const COLUMNS_MAX: usize = 80;
+/// Columns that a text in a table's last column needs to be read; below that it goes on under its row.
+const CELL_COLUMNS_MIN: usize = 20;
 
 /// On which side a column lines up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -32,20 +37,96 @@ impl Table {
         self.rows.push(cells);
     }
 
-    /// The lines, each with `indent` spaces before it and none at its end.
+    /// The lines, each with `indent` spaces before it and none at its end. A text in the last column that would end
+    /// beyond [`COLUMNS_MAX`] goes on below itself.
     pub fn text(&self, indent: usize) -> String {
         let width = |column: usize| self.rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);
         let widths: Vec<usize> = (0..self.columns.len()).map(width).collect();
+        let before = indent + widths.iter().rev().skip(1).map(|width| width + 2).sum::<usize>();
+        // Where the other columns leave too little, it is read under them.
+        let hang = if before + CELL_COLUMNS_MIN <= COLUMNS_MAX { before } else { indent + 4 };
         let mut text = String::new();
         for row in &self.rows {
             let cells = row.iter().zip(&self.columns).zip(&widths);
-            let padded: Vec<String> = cells.map(|((cell, align), &width)| pad(cell, *align, width)).collect();
-            text += " ".repeat(indent).as_str();
-            text += padded.join("  ").trim_end();
+            let mut cells: Vec<String> = cells.map(|((cell, align), &width)| pad(cell, *align, width)).collect();
+            let mut line = " ".repeat(indent);
+            if self.columns.last() == Some(&Align::Left)
+                && let Some(last) = cells.pop()
+            {
+                line += &cells.iter().map(|cell| format!("{cell}  ")).collect::<String>();
+                line = fill(line, last.trim_end(), hang);
+            } else {
+                line += &cells.join("  ");
+            }
+            text += line.trim_end();
             text.push('\n');
         }
         text
     }
+}
+
+/// `text` with every line that is wider than [`COLUMNS_MAX`] broken between words; what follows stands `hang` columns
+/// to the right of where the line began. A word that is wider, such as a path, keeps its width.
+pub fn fold(text: &str, hang: usize) -> String {
+    let mut folded = String::with_capacity(text.len() + text.len() / 16);
+    for line in text.split_inclusive('\n') {
+        let (line, end) = line.strip_suffix('\n').map_or((line, ""), |line| (line, "\n"));
+        if line.chars().count() <= COLUMNS_MAX {
+            folded += line;
+        } else {
+            let words = line.trim_start_matches(' ');
+            let indent = line.len() - words.len();
+            folded += &fill(" ".repeat(indent), words, indent + hang);
+        }
+        folded += end;
+    }
+    folded
+}
+
+/// `begun` and the words of `text` after it, in lines as wide as may be; later ones begin after `hang` spaces.
+fn fill(mut begun: String, text: &str, hang: usize) -> String {
+    let mut columns = begun.chars().count();
+    let mut is_first = true;
+    for word in words(text) {
+        let width = word.chars().count();
+        let gap = usize::from(!is_first);
+        // A word that is too wide for any line is no better on the next.
+        if COLUMNS_MAX < columns + gap + width && hang < columns && hang + width <= COLUMNS_MAX {
+            begun.truncate(begun.trim_end().len());
+            begun += "\n";
+            begun += &" ".repeat(hang);
+            (columns, is_first) = (hang, true);
+        }
+        if !is_first {
+            begun.push(' ');
+            columns += 1;
+        }
+        begun += word;
+        columns += width;
+        // Spaces in a row are no words to begin a line with.
+        is_first = width == 0 && columns == hang;
+    }
+    begun
+}
+
+/// The words of `text`, a number and its unit as one, so that no line begins with "m".
+fn words(text: &str) -> Vec<&str> {
+    const UNITS: [&str; 10] = ["m", "km", "s", "min", "h", "%", "kB", "MB", "GB", "posts"];
+    let is_unit = |word: &str| UNITS.contains(&word.trim_end_matches([',', ';', ':', '.', ')']));
+    let mut words: Vec<&str> = Vec::new();
+    let mut start = 0;
+    let mut follows_number = false;
+    for word in text.split(' ') {
+        let end = start + word.len();
+        match words.last_mut() {
+            // Both and the space between them.
+            Some(number) if follows_number && is_unit(word) => *number = &text[start - 1 - number.len()..end],
+            _ => words.push(word),
+        }
+        follows_number = word.ends_with(|c: char| c.is_ascii_digit());
+        start = end + 1;
+    }
+    words
 }
 
 fn pad(cell: &str, align: Align, width: usize) -> String {
@@ -78,6 +159,33 @@ mod tests {
             assert_eq!(grouped(number), expected);
         }
         assert_eq!(grouped(u64::MAX), "18,446,744,073,709,551,615");
+    }
+
+    #[test]
+    fn a_wide_line_is_broken_between_words_and_a_wide_word_is_not() {
+        let line = "error: ".to_owned() + &"word ".repeat(20) + "end";
+        let folded = fold(&line, 2);
+        assert_eq!(folded.split_whitespace().collect::<Vec<_>>(), line.split_whitespace().collect::<Vec<_>>());
+        assert!(folded.lines().all(|line| line.chars().count() <= COLUMNS_MAX), "{folded}");
+        assert_eq!(folded.lines().skip(1).filter(|line| !line.starts_with("  word")).count(), 0, "{folded}");
+        let line = format!("{}reaches at 1.904 m: and more", "a word ".repeat(9));
+        assert!(fold(&line, 2).ends_with("\n  1.904 m: and more"), "{}", fold(&line, 2));
+        let path = "/a".repeat(60);
+        assert_eq!(fold(&format!("error: {path}: found nothing there\n"), 2).lines().count(), 2);
+        assert_eq!(fold("a  b\n\nc\n", 2), "a  b\n\nc\n");
+    }
+
+    #[test]
+    fn a_wide_last_cell_goes_on_below_itself_or_where_there_is_room() {
+        let mut table = Table::new(&[Align::Left, Align::Left]);
+        table.row(["key", &"meaning ".repeat(20)]);
+        let text = table.text(2);
+        assert!(text.lines().skip(1).all(|line| line.starts_with("       meaning")), "{text}");
+        assert!(text.lines().all(|line| line.chars().count() <= COLUMNS_MAX), "{text}");
+        table.row(["k".repeat(70).as_str(), "x"]);
+        let text = table.text(2);
+        assert!(text.lines().skip(1).take(2).all(|line| line.starts_with("      meaning")), "{text}");
+        assert!(text.lines().all(|line| line.chars().count() <= COLUMNS_MAX), "{text}");
     }
 
     #[test]

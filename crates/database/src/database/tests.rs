@@ -106,7 +106,7 @@ fn a_directory_that_is_not_ours_is_refused_and_left_alone() {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("thesis.tex"), b"").unwrap();
     let error = Database::create_or_open(folder.path(), &samples::area()).unwrap_err();
-    assert!(matches!(&error, DatabaseError::NotOurFolder { found, .. } if found == "thesis.tex"), "{error}");
+    assert!(matches!(&error, DatabaseError::NotOurFolder { found, .. } if found == "\"thesis.tex\" in it"), "{error}");
     assert!(error.hint().is_some());
     assert_eq!(list(folder.path()).unwrap().len(), 1);
     let file = folder.path().join("thesis.tex");

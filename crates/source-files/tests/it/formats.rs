@@ -218,7 +218,7 @@ fn a_geographic_tiff_is_read_and_one_in_an_archive_too() {
 
 #[test]
 fn what_is_no_raster_is_told_by_its_content() {
-    refused("a.tif", b"", "it begins with nothing");
+    refused("a.tif", b"", "an empty file");
     refused("a.tif", b"\x01\x02\x03", "it begins with 01 02 03");
     refused("a.tif", b"<html><body>not found</body></html>", "a page of HTML or XML");
     refused("a.img", b"EHFA_HEADER_TAG\0", "an ERDAS Imagine file");

@@ -16,7 +16,8 @@ Examples:
   tiefort build desert.toml --out /data/desert.tdb --workers 8 --strict
   tiefort build ntc.toml --json > events.jsonl
 
-A build that was stopped goes on where it stopped when the same command is run again.";
+A build that was stopped goes on where it stopped when the same command is run
+again.";
 
 /// Arguments of `build`.
 #[derive(Args)]

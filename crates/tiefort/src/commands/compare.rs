@@ -8,7 +8,7 @@ use compiler::{CompareEvent, CompareGround, CompareMethod, CompareRequest, Compa
 use job::{Job, StartMethod};
 use serde_json::{Value, json};
 use terrain::{Post, PostRect};
-use views::{Align, Facets, Image, Look, Panel, Style, Surface, Table, draw_panels, grouped};
+use views::{Align, Facets, Image, Look, Panel, Style, Surface, Table, draw_panels, fold, grouped};
 
 use crate::arguments::{Format, start_method};
 use crate::failure::{Failure, Outcome};
@@ -26,20 +26,24 @@ Examples:
   tiefort compare mine.toml        on the raster of a job, cut to its area
 
 Methods:
-  vip            very important points, every post of the border first (Chen and Guevara);
-                 vip-vertical, vip-corners and vip-extend are variants
+  vip            very important points, every post of the border first (Chen and
+                 Guevara); vip-vertical, vip-corners and vip-extend are variants
   highlow        peaks and pits, whose number is the ground's; highlow-plateau
-  lattice        a grid of every 16th post, then the worst post of each failing triangle (LATTICETIN)
+  lattice        a grid of every 16th post, then the worst post of each failing
+                 triangle (LATTICETIN)
   fowler-little  ridges and channels, then the worst posts (Fowler and Little)
   hierarchical   triangles split into three (De Floriani); hierarchical-best
-  earlier        one post for each region of residuals, edges along the ground (Polis and McKeown, 1992)
-  regular        the densest regular grid of so many points; simnet: every 125 m; simnet-best
+  earlier        one post for each region of residuals, edges along the ground
+                 (Polis and McKeown, 1992)
+  regular        the densest regular grid of so many points; simnet: every 125 m;
+                 simnet-best
   contour        contour lines as edges
   iterative      the founding paper's
   optimised      that of tiefort
 
-Equivalent points of a method: the fewest with which the iterative TIN has a smaller RMS residual.
-All methods work on the raster's own posts and see no importance; all points count, corners too.";
+Equivalent points of a method: the fewest with which the iterative TIN has a
+smaller RMS residual. All methods work on the raster's own posts and see no
+importance; all points count, corners too.";
 
 /// Most numbers of points in one table.
 const NUMBERS_MAX: usize = 20;
@@ -98,6 +102,7 @@ fn window(text: &str) -> Result<PostRect, String> {
 /// Compares.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let request = request(arguments)?;
+    arguments.pictures.as_deref().map_or(Ok(()), NewFolder::check)?;
     let signals = Signals::watch()?;
     let mut watch = Watch { quiet: arguments.quiet, names: Vec::new(), began: Instant::now(), seconds: Vec::new() };
     watch.names = names(&request);
@@ -228,11 +233,11 @@ fn names(request: &CompareRequest) -> Vec<String> {
 
 fn text(found: &Comparison, seconds: &[f64]) -> String {
     use Align::{Left, Right};
-    let mut table = Table::new(&[Left, Right, Right, Right, Right, Right, Right, Right, Right]);
-    table.row(["method", "points", "triangles", "RMS m", "max m", "mean m", "equivalent", "covers", "s"]);
+    let mut table = Table::new(&[Left, Right, Right, Right, Right, Right, Right, Right]);
+    table.row(["method", "points", "triangles", "RMS m", "max m", "mean m", "equivalent", "s"]);
     for (row, seconds) in found.rows.iter().zip(seconds) {
         if let Ok(made) = &row.made {
-            table.row(cells(row.method, made, found.posts, *seconds));
+            table.row(cells(row.method, made, *seconds));
         }
     }
     let (rows, cols) = found.size;
@@ -244,10 +249,10 @@ fn text(found: &Comparison, seconds: &[f64]) -> String {
         format!("Methods on {}: {rows} rows, {cols} columns, {posts}, {} m apart", found.ground, found.spacing_m);
     let notes: String = found.rows.iter().filter_map(|row| note(row, found.posts)).collect();
     let gap = if notes.is_empty() { "" } else { "\n" };
-    format!("{head}\n\n{}{gap}{notes}", table.text(0))
+    fold(&format!("{head}\n\n{}{gap}{notes}", table.text(0)), 2)
 }
 
-fn cells(method: CompareMethod, made: &Made, posts: u64, seconds: f64) -> [String; 9] {
+fn cells(method: CompareMethod, made: &Made, seconds: f64) -> [String; 8] {
     let residual = &made.residual;
     [
         method.name(),
@@ -261,7 +266,6 @@ fn cells(method: CompareMethod, made: &Made, posts: u64, seconds: f64) -> [Strin
             Equivalent::MoreThan(points) => format!("> {}", grouped(points as u64)),
             Equivalent::None => "-".into(),
         },
-        format!("{:.1} %", 100.0 * made.covered as f64 / posts as f64),
         format!("{seconds:.2}"),
     ]
 }
@@ -282,7 +286,8 @@ fn note(row: &CompareRow, posts: u64) -> Option<String> {
         let (forced, points) = (grouped(forced.points as u64), grouped(points));
         return Some(format!("{name}: {forced} of its {points} points are the border; {iterative}\n"));
     }
-    let covers = format!("covers {} of {} posts", grouped(made.covered), grouped(posts));
+    let percent = 100.0 * made.covered as f64 / posts as f64;
+    let covers = format!("covers {} of {} posts ({percent:.1} %)", grouped(made.covered), grouped(posts));
     (made.covered < posts).then(|| format!("{name}: {covers}; its residuals are theirs, so they are not comparable\n"))
 }
 

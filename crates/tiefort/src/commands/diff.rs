@@ -17,8 +17,8 @@ Examples:
   tiefort diff before.tdb after.tdb
   tiefort diff before.tdb after.tdb --format json | jq '.changed[].module'
 
-\"apart\" is how far the two surfaces lie apart at most, at posts of the working grid.
-Exit codes: 0 all load modules alike; 1 some differ; 2 nothing to compare.";
+\"apart\" is how far the two surfaces lie apart at most, at posts of the working
+grid. Exit codes: 0 all load modules alike; 1 some differ; 2 nothing to compare.";
 
 /// Arguments of `diff`.
 #[derive(Args)]
@@ -62,12 +62,14 @@ fn text(found: &Difference, figures: &Figures, rows: usize) -> String {
         _ => format!("{changed} of {modules} load modules differ.\n"),
     };
     if !found.settings.is_empty() {
+        text += "\nsettings\n";
         let mut table = Table::new(&[Align::Left, Align::Left, Align::Left]);
-        table.row(["setting", "A", "B"]);
         for setting in &found.settings {
-            table.row([&setting.key, &setting.values[0], &setting.values[1]]);
+            // Each value on a line of its own: a list of sources is longer than any column.
+            table.row([setting.key.as_str(), "A", &setting.values[0]]);
+            table.row(["", "B", &setting.values[1]]);
         }
-        text += &format!("\n{}", table.text(0));
+        text += &table.text(2);
     }
     if found.changed.is_empty() {
         return text;

@@ -6,7 +6,7 @@ use clap::Args;
 use compiler::{Explanation, WantedGround, explain};
 use serde_json::{Value, json};
 use terrain::{ModuleId, RefusedBy, StopReason, TileId};
-use views::{Align, Table, grouped};
+use views::{Align, Table, fold, grouped};
 
 use crate::arguments::{Format, Workers, row_col};
 use crate::failure::{Failure, Outcome};
@@ -17,8 +17,9 @@ Examples:
   tiefort explain ntc.tdb 42,17
   tiefort explain ntc.tdb 42,17 --format json | jq .one_more
 
-A point adds two triangles. What one more would buy is the best split of one triangle at one post,
-its height chosen for the least squared residuals; nothing else moves.
+A point adds two triangles. What one more would buy is the best split of one
+triangle at one post, its height chosen for the least squared residuals; nothing
+else moves.
 
 Exit codes: 0 explained; 2 no such load module, or no database to read.";
 
@@ -62,7 +63,7 @@ fn text(found: &Explanation) -> String {
     text += &refused_text(found);
     text += "\n";
     text += &one_more_text(found);
-    text
+    fold(&text, 2)
 }
 
 fn counts(found: &Explanation) -> Table {

@@ -26,16 +26,19 @@ Examples:
   tiefort export ntc.tdb --format geotiff --layer residual --out residual.tif
   tiefort export ntc.tdb --format 3dtiles --assume-datum EGM96 --out ntc_3dtiles
 
---lod K exports a coarser level, where the job has [lod] levels. Without it files of modules hold all
-levels; 3dtiles puts levels coarser than K between a square of 4 km and its load modules.
-A mesh (ply, obj, glb) is counted in metres from the south-west corner of what is exported; the file
-itself and NAME.json beside it say where that is. Load modules are named ROW,COL from the south-west,
-nodes of a glb r0003c0017. The faces of a ply come class by class; comments in it say which are whose.
-A geotiff is cloud optimised, with overviews; it names the system of its heights where that is known.
-Where no source has a height, rasters have none (NaN) and meshes no triangles; gpkg and modules keep
-these as class 'hole' (255), and quantized-mesh closes them and says where in holes.geojson.
-3dtiles and quantized-mesh want heights above the ellipsoid: they know EGM96 and the ellipsoid, and
-refuse any other datum unless told what to take it for.";
+--lod K exports a coarser level, where the job has [lod] levels. Without it
+files of modules hold all levels; 3dtiles puts levels coarser than K between a
+square of 4 km and its load modules. A mesh (ply, obj, glb) is counted in metres
+from the south-west corner of what is exported; the file itself and NAME.json
+beside it say where that is. Load modules are named ROW,COL from the south-west,
+nodes of a glb r0003c0017. The faces of a ply come class by class; comments in
+it say which are whose. A geotiff is cloud optimised, with overviews; it names
+the system of its heights where that is known. Where no source has a height,
+rasters have none (NaN) and meshes no triangles; gpkg and modules keep these as
+class 'hole' (255), and quantized-mesh closes them and says where in
+holes.geojson. 3dtiles and quantized-mesh want heights above the ellipsoid: they
+know EGM96 and the ellipsoid, and refuse any other datum unless told what to
+take it for.";
 
 /// Arguments of `export`.
 #[derive(Args)]

@@ -13,15 +13,17 @@ use crate::{measures, measures_json, terminal};
 const AFTER_HELP: &str = "\
 Examples:
   tiefort fidelity ntc.tdb
-  tiefort fidelity desert.tdb --against dem/desert.tif      against a raster of your own
+  tiefort fidelity desert.tdb --against desert.tif    against a raster of your own
   tiefort fidelity ntc.tdb --format json | jq .line_of_sight.agreement
 
-Every figure stands beside that of the regular grid over the same posts with about as many triangles.
-Line of sight: pairs of places 200 m to 4,000 m apart, eyes and targets 2.5 m above each ground;
+Every figure stands beside that of the regular grid over the same posts with
+about as many triangles. Line of sight: pairs of places 200 m to 4,000 m apart,
+eyes and targets 2.5 m above each ground;
 does the TIN show what the DEM shows? Slope, normals and trafficability (classes of 15, 30 and 45 %):
-central differences at inner posts. Cover: posts 2 m below a line between two places within 100 m.
-Drainage: posts that drain more than 500 others. Hausdorff: nearest places in space, both ways.
-Registration: up to 8 posts aside. Seams: bends on lines between load modules.
+central differences at inner posts. Cover: posts 2 m below a line between two
+places within 100 m. Drainage: posts that drain more than 500 others. Hausdorff:
+nearest places in space, both ways. Registration: up to 8 posts aside. Seams:
+bends on lines between load modules.
 
 Exit codes: 0 measured; 2 nothing to measure, or no ground to measure against.";
 

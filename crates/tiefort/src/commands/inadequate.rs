@@ -1,11 +1,12 @@
 //! `tiefort inadequate`: where the TIN is not good enough, and what could be done.
 
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use compiler::{Component, Inadequate};
 use serde_json::{Value, json};
-use views::{Align, Image, Scene, SceneLimits, Table, draw_errors, draw_module_limits, grouped};
+use views::{Align, Image, Scene, SceneLimits, Table, draw_errors, draw_module_limits, fold, grouped};
 
 use crate::arguments::positive;
 use crate::failure::{Failure, Outcome};
@@ -16,13 +17,15 @@ Examples:
   tiefort inadequate ntc.tdb
   tiefort inadequate ntc.tdb --tolerance 5 --out maps
 
-Writes inadequate.geojson (each piece of ground with its worst post, area, load modules, what stands in
-the way and what could be done), error.png (weighted residuals, darkest at twice the tolerance) and
-density.png (triangles or polygons of each load module, darkest at the limit), each with its scale.
+Writes inadequate.geojson (each piece of ground with its worst post, area, load
+modules, what stands in the way and what could be done), error.png (weighted
+residuals, darkest at twice the tolerance) and density.png (triangles or
+polygons of each load module, darkest at the limit), each with its scale.
 
-What to do about it goes into a file of pins, GeoJSON, which the job names: [tin] pins = \"pins.geojson\".
-Points with \"pin\": \"add\", \"forbid\", or \"height\" with \"height_m\"; polygons with \"pin\": \"importance\"
-and \"factor\", or \"exclude\". The next build renews the tiles that the pins reach, and `tiefort diff` says
+What to do about it goes into a file of pins, GeoJSON, which the job names:
+[tin] pins = \"pins.geojson\". Points with \"pin\": \"add\", \"forbid\", or \"height\"
+with \"height_m\"; polygons with \"pin\": \"importance\" and \"factor\", or \"exclude\".
+The next build renews the tiles that the pins reach, and `tiefort diff` says
 what they bought.";
 
 /// Pieces of ground that the text shows; the file has them all.
@@ -109,27 +112,36 @@ fn text(found: &Inadequate, files: &[PathBuf; 3]) -> String {
         found.tolerance_m
     );
     if !all.is_empty() {
-        let mut table = Table::new(&[Align::Right, Align::Right, Align::Right, Align::Right, Align::Left, Align::Left]);
-        table.row(["posts", "worst m", "east", "north", "stands in the way", "what could be done"]);
+        let mut table = Table::new(&[Align::Right, Align::Right, Align::Right, Align::Right, Align::Left]);
+        table.row(["posts", "worst m", "east", "north", "stands in the way"]);
         all.iter().take(ROWS_MAX).for_each(|component| table.row(row(found, component)));
         text += &format!("\n{}", table.text(0));
         let more = all.len().saturating_sub(ROWS_MAX);
         text += &if more == 0 { String::new() } else { format!("and {} more\n", grouped(more as u64)) };
+        text += "\nwhat could be done\n";
+        // The same for all that one limit stands in the way of.
+        let told: BTreeSet<(&str, &str)> = all.iter().take(ROWS_MAX).map(|one| (blocked_by(one), one.action)).collect();
+        let mut table = Table::new(&[Align::Left, Align::Left]);
+        told.into_iter().for_each(|(limit, action)| table.row([limit, action]));
+        text += &table.text(2);
     }
     let names: Vec<String> = files.iter().map(|path| path.display().to_string()).collect();
-    text + &format!("\nwritten: {}\n", names.join(", "))
+    fold(&format!("{text}\nwritten: {}\n", names.join(", ")), 2)
 }
 
-fn row(found: &Inadequate, component: &Component) -> [String; 6] {
+/// What stands in the way first.
+fn blocked_by(component: &Component) -> &'static str {
+    component.blocked_by.first().map_or("nothing", |limit| limit.trim_start_matches("limits."))
+}
+
+fn row(found: &Inadequate, component: &Component) -> [String; 5] {
     let [east, north] = place(found, component.worst.row, component.worst.col);
-    let blocked = component.blocked_by.first().map_or("nothing", |limit| limit.trim_start_matches("limits."));
     [
         grouped(component.posts),
         format!("{:.2}", component.largest_m),
         format!("{east:.0}"),
         format!("{north:.0}"),
-        blocked.into(),
-        component.action.into(),
+        blocked_by(component).into(),
     ]
 }
 

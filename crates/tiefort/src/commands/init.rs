@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use compiler::{Seen, Suggestion};
 use job::Job;
+use views::fold;
 
 use crate::failure::{Failure, Outcome};
 use crate::terminal;
@@ -35,6 +36,8 @@ pub struct Arguments {
 
 /// Writes a job.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
+    // Rasters may take long to look at.
+    arguments.out.as_deref().map_or(Ok(()), crate::files::check_free)?;
     let files = rasters(&arguments.files)?;
     let suggestion = compiler::look_at(&files, arguments.crs.as_deref()).map_err(Failure::from);
     let suggestion = suggestion.map_err(|failure| match arguments.crs {
@@ -51,7 +54,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     }
     let crs = arguments.crs.as_deref();
     terminal::tell(&found_text(&suggestion, &job_text(&suggestion, Path::new(""), "area", crs)));
-    remarks(&suggestion).iter().for_each(|remark| terminal::tell(&wrapped(&format!("note: {remark}"))));
+    remarks(&suggestion).iter().for_each(|remark| terminal::tell(&format!("note: {remark}")));
     let Some(out) = &arguments.out else {
         terminal::print(&job_text(&suggestion, Path::new(""), "area", arguments.crs.as_deref()))?;
         return Ok(Outcome::Sound);
@@ -110,7 +113,7 @@ fn found_text(suggestion: &Suggestion, job: &str) -> String {
     if let Some(rms_m) = rms_m {
         text += &format!("; {triangles} triangles a load module leave an RMS residual {}", about(*rms_m));
     }
-    wrapped(&text)
+    text
 }
 
 /// A residual in two figures: it is from a look at parts of the area.
@@ -153,34 +156,31 @@ fn remarks(suggestion: &Suggestion) -> Vec<String> {
     remarks
 }
 
-/// `text` in lines that fit a terminal, the later ones indented.
-fn wrapped(text: &str) -> String {
-    const COLUMNS: usize = 80;
-    views::wrapped(text, COLUMNS).join("\n")
-}
-
 fn job_text(suggestion: &Suggestion, folder: &Path, name: &str, given: Option<&str>) -> String {
     let Suggestion { seen, epsg, origin_m, size_m, spacing_m, tiles, part_around, triangles, .. } = suggestion;
     let modules = size_m.map(|metres| metres / 500.0);
     let mut text = format!(
-        "# Written by `tiefort init`. Every line may be changed; `tiefort plan` on this file shows what follows.\n\
+        "# Written by `tiefort init`. Every line may be changed;\n\
+         # `tiefort plan` on this file shows what follows.\n\
          \n[area]\nname = \"{}\"\n\
          crs = \"EPSG:{epsg}\"{}\n\
          origin_m = [{}, {}]  # east and north of the south-west post\n\
-         size_m = [{}, {}]  # {} x {} load modules: the largest rectangle that the files cover\n\
+         # {} x {} load modules: the largest rectangle that the files cover\n\
+         size_m = [{}, {}]\n\
          spacing_m = {spacing_m}  # of the working grid; it divides 125 m\n\n[dem]\nsources = [\n",
         plain_name(name),
         if (32601..=32760).contains(epsg) { "  # the UTM zone of the files' middle, or their own" } else { "" },
         origin_m[0],
         origin_m[1],
-        size_m[0],
-        size_m[1],
         modules[0],
         modules[1],
+        size_m[0],
+        size_m[1],
     );
     if let Some([longitude, latitude]) = part_around {
         let instead = format!(
-            "# The files are too large for one area, or lie too far apart: this is the middle of the first.\n\
+            "# The files are too large for one area, or lie too far apart: this is the\n\
+             # middle of the first.\n\
              # around = {{ lat = {latitude:.4}, lon = {longitude:.4}, size_km = 50 }}\n\
              # instead of origin_m and size_m chooses any place.\n\
              spacing_m = "
@@ -200,7 +200,8 @@ fn job_text(suggestion: &Suggestion, folder: &Path, name: &str, given: Option<&s
          mean_per_load_module = {triangles}     # over the whole area: {} triangles\n\
          per_4km_square = 4096         # in every window of 8 x 8 load modules\n\n\
          [tin]\nmethod = \"optimised\"          # the budget is the limits\n\n\
-         # Coarser levels of every load module, for what is far away: the share of inner vertices each keeps.\n\
+         # Coarser levels of every load module, for what is far away: the share of\n\
+         # inner vertices that each keeps.\n\
          # [lod]\n# levels = [{{ inner_share = 0.5 }}, {{ inner_share = 0.2 }}]\n",
         tiles.1,
         tiles.0,
@@ -251,8 +252,14 @@ fn source_text(seen: &Seen, folder: &Path, given: Option<&str>) -> String {
         Some(datum) => format!(", heights above {datum}"),
         None => ", heights above an unknown datum".to_owned(),
     };
-    let notes: String = seen.notes.iter().map(|note| format!("    # {}\n", note.replace('\n', " "))).collect();
-    format!("    # {facts}\n{notes}    {entry},\n")
+    let notes: String = seen.notes.iter().map(|note| comment(note)).collect();
+    format!("{}{notes}    {entry},\n", comment(&facts))
+}
+
+/// `text` as a comment above a source, in lines as wide as a terminal.
+fn comment(text: &str) -> String {
+    let line = format!("    # {}", text.split_whitespace().collect::<Vec<_>>().join(" "));
+    fold(&line, 0).replace("\n    ", "\n    # ") + "\n"
 }
 
 /// A number with all its digits.
@@ -270,7 +277,8 @@ fn voids_text(seen: &[Seen]) -> String {
     let next = if 1 < seen.len() { "next_source = true, " } else { "" };
     match voids {
         true => format!(
-            "# Small voids are filled from around them, larger ones have no weight; \"fail\" would refuse both.\n\
+            "# Small voids are filled from around them, larger ones have no weight;\n\
+             # \"fail\" would refuse both.\n\
              voids = {{ {next}fill_within_posts = 8, hole = true }}\n"
         ),
         false => "voids = \"fail\"                # there are none\n".to_owned(),
@@ -292,9 +300,7 @@ fn datum_text(seen: &[Seen]) -> String {
                 datums.join(" and "),
             )
         }
-        None => {
-            "# vertical_datum = \"EGM96\"     # the files do not say, or not the same; write it if you know\n".into()
-        }
+        None => "# vertical_datum = \"EGM96\"   # the files do not say or differ; write it if known\n".into(),
     }
 }
 

@@ -2,12 +2,14 @@
 
 mod build;
 mod compare;
+mod completions;
 mod diff;
 mod explain;
 mod export;
 mod fidelity;
 mod inadequate;
 mod init;
+mod man;
 mod plan;
 mod render;
 mod report;
@@ -65,6 +67,10 @@ pub enum Command {
     Tin(tin::Arguments),
     /// Compare methods on a raster: points, residuals, equivalent points, times
     Compare(compare::Arguments),
+    /// Print what makes a shell complete the words of this program
+    Completions(completions::Arguments),
+    /// Print the manual page of a command, or write all of them
+    Man(man::Arguments),
 }
 
 impl Command {
@@ -93,6 +99,8 @@ impl Command {
             Command::Sample(arguments) => sample::run(&arguments),
             Command::Tin(arguments) => tin::run(&arguments),
             Command::Compare(arguments) => compare::run(&arguments),
+            Command::Completions(arguments) => completions::run(&arguments),
+            Command::Man(arguments) => man::run(&arguments),
         }
     }
 }

@@ -6,7 +6,7 @@ use clap::{Args, ValueEnum};
 use compiler::{Plan, PlannedTile, Played};
 use job::Job;
 use serde_json::{Value, json};
-use views::{Align, Table, grouped};
+use views::{Align, Table, fold, grouped};
 
 use crate::arguments::rows_by_columns;
 use crate::engines::{self, Glue};
@@ -17,14 +17,16 @@ const AFTER_HELP: &str = "\
 Examples:
   tiefort plan configs/ntc.toml
   tiefort plan configs/ntc.toml --simulate 1,2,16
-  tiefort plan configs/ntc.toml --simulate 1,100,10000 --tiles 6x6,100x100,1000x1000
+  tiefort plan configs/ntc.toml --simulate 1,100,10000 --tiles 6x6,1000x1000
   tiefort plan configs/ntc.toml --emit json | jq .forecast
-  tiefort plan configs/ntc.toml --emit ninja --out /data/ntc.tdb > build.ninja && ninja
-  tiefort plan configs/ntc.toml --emit slurm --out /share/ntc.tdb > ntc.sh && bash ntc.sh
-  tiefort plan configs/ntc.toml --emit dask --out /share/ntc.tdb > ntc.py && python3 ntc.py scheduler:8786
+  tiefort plan ntc.toml --emit ninja --out ntc.tdb > build.ninja && ninja
+  tiefort plan ntc.toml --emit slurm --out /share/ntc.tdb > ntc.sh && bash ntc.sh
+  tiefort plan ntc.toml --emit dask --out /share/ntc.tdb > ntc.py \\
+      && python3 ntc.py scheduler:8786
 
-A simulation takes what tiles cost from the report of a database that was built from this job, and forecasts it where
-there is none. Tiles that touch never run at once, so at most a quarter of them does: choose 10 to 32 tiles for each
+A simulation takes what tiles cost from the report of a database that was built
+from this job, and forecasts it where there is none. Tiles that touch never run
+at once, so at most a quarter of them does: choose 10 to 32 tiles for each
 worker.";
 
 /// Arguments of `plan`.
@@ -90,7 +92,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         Some(Emit::Ninja) => engines::ninja(&glue()?),
         Some(Emit::Slurm) => engines::slurm(&glue()?),
         Some(Emit::Dask) => engines::dask(&glue()?),
-        None => plan_text(&job, &plan, &played),
+        None => fold(&plan_text(&job, &plan, &played), 2),
     };
     terminal::print(&text)?;
     if !arguments.force {
@@ -134,13 +136,13 @@ fn plan_text(job: &Job, plan: &Plan, played: &[Played]) -> String {
 
 fn played_table(played: &[Played]) -> Table {
     let mut table = Table::new(&[Align::Right; 8]);
-    table.row(["tiles", "area", "workers", "time", "busy", "longest chain", "at once", "coordinator"]);
+    table.row(["tiles", "area", "workers", "time", "busy", "longest chain", "at once", "memory"]);
     for run in played {
         let (rows, columns) = run.tiles;
         table.row([
             format!("{rows} x {columns}"),
             format!("{} x", grouped(run.area_times.round() as u64)),
-            format!("{} workers", grouped(run.workers as u64)),
+            grouped(run.workers as u64),
             format!("{:.1} s", run.seconds),
             format!("{:.1} %", 100.0 * run.busy),
             format!("{:.1} s", run.longest_chain_s),

@@ -16,14 +16,17 @@ use crate::scene::SceneParts;
 const AFTER_HELP: &str = "\
 Examples:
   tiefort render ntc.tdb --view relief --out relief.png
-  tiefort render ntc.tdb --view residual --modules 20,30..29,44 --out residual.png
-  tiefort render ntc.tdb --view perspective --out over.png              all of it, DEM beside TIN
-  tiefort render ntc.tdb --view perspective --eye 521000,3893000,60 --direction 45 --out from.png
-  tiefort render ntc.tdb --view wireframe --eye 521000,3893000 --of tin --out wires.png
+  tiefort render ntc.tdb --view residual --modules 20,30..29,44 --out part.png
+  tiefort render ntc.tdb --view perspective --out over.png    all, DEM beside TIN
+  tiefort render ntc.tdb --view perspective --eye 521000,3893000,60 \\
+      --direction 45 --out from.png
+  tiefort render ntc.tdb --view wireframe --eye 521000,3893000 --of tin \\
+      --out wires.png
 
-Maps have north up. A perspective without --eye overlooks all load modules asked for; so does a
-wireframe with --direction. DEM and TIN are drawn from one eye under one light.
-Residuals are DEM less TIN. Rows and columns count from the south-west corner, row first.";
+Maps have north up. A perspective without --eye overlooks all load modules asked
+for; so does a wireframe with --direction. DEM and TIN are drawn from one eye
+under one light. Residuals are DEM less TIN. Rows and columns count from the
+south-west corner, row first.";
 
 /// Arguments of `render`.
 #[derive(Args)]

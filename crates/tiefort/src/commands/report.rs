@@ -14,7 +14,7 @@ const AFTER_HELP: &str = "\
 Examples:
   tiefort report ntc.tdb
   tiefort report ntc.tdb --format json | jq '.breaches[].where'
-  tiefort report ntc.tdb --format html > report.html      one file, with maps; a build leaves it in DIR, too
+  tiefort report ntc.tdb --format html > report.html    one file, with maps
 
 Exit codes: 0 all limits met; 1 with breaches; 2 no report to read.";
 

@@ -11,7 +11,8 @@ use crate::{arguments, files};
 const AFTER_HELP: &str = "\
 Examples:
   tiefort sample --out sample.tif
-  tiefort sample --posts 1001 --spacing 30 --seed 7 --classes classes.tif --out dem.tif
+  tiefort sample --posts 1001 --spacing 30 --seed 7 --out dem.tif \\
+      --classes classes.tif
 
 The same seed gives the same terrain on any machine.";
 

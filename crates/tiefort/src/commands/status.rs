@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use compiler::{Status, TileProgress};
 use database::{Held, Manifest};
-use views::grouped;
+use views::{fold, grouped};
 
 use crate::board::Board;
 use crate::failure::{Failure, Outcome};
@@ -15,7 +15,8 @@ const AFTER_HELP: &str = "\
 Examples:
   tiefort status ntc.tdb
 
-Exit codes: 0 complete, all limits met; 1 complete, with breaches; 2 incomplete; 75 being built right now.";
+Exit codes: 0 complete, all limits met; 1 complete, with breaches; 2 incomplete;
+75 being built right now.";
 
 /// Arguments of `status`.
 #[derive(Args)]
@@ -25,6 +26,11 @@ pub struct Arguments {
     #[arg(value_name = "DIR")]
     database: PathBuf,
 }
+
+/// Tiles side by side that fit a terminal, two columns each.
+const BOARD_COLUMNS_MAX: u32 = 38;
+/// Characters by how much they matter where one stands for several tiles.
+const ORDER: [char; 5] = ['.', '!', 'f', 'o', '#'];
 
 /// Every state of a tile, its character and its name.
 const STATES: [(TileProgress, char, &str); 5] = [
@@ -65,10 +71,14 @@ fn status_text(status: &Status) -> String {
     for &(tile, progress) in tiles {
         board.mark(tile, mark(progress));
     }
-    for line in board.lines() {
+    let side = area.tile_cols.div_ceil(BOARD_COLUMNS_MAX).max(1);
+    for line in board.coarser(side, &ORDER).lines() {
         text += &format!("  {line}\n");
     }
     text += "\n";
+    if 1 < side {
+        text += &format!("  each character is {side} x {side} tiles: the least done of them\n");
+    }
     for (state, mark, name) in STATES {
         let count = tiles.iter().filter(|(_, progress)| *progress == state).count();
         if 0 < count {
@@ -79,7 +89,7 @@ fn status_text(status: &Status) -> String {
         let (points, triangles) = (grouped(totals.points), grouped(totals.triangles));
         text += &format!("\n{triangles} triangles, {points} points, {} breaches\n", grouped(totals.breaches));
     }
-    text
+    fold(&text, 2)
 }
 
 fn mark(state: TileProgress) -> char {

@@ -15,8 +15,9 @@ Examples:
   tiefort tile configs/ntc.toml 2,3
   tiefort tile configs/ntc.toml 2,3 --release-borders
 
-0,0 is the south-west tile. When the tile's border points come out as they were, nothing else changes. Otherwise its
-sides are held as the neighbours have them and the tile is marked frozen, until a build makes it whole.";
+0,0 is the south-west tile. When the tile's border points come out as they were,
+nothing else changes. Otherwise its sides are held as the neighbours have them
+and the tile is marked frozen, until a build makes it whole.";
 
 /// Arguments of `tile`.
 #[derive(Args)]

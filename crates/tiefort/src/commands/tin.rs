@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::PoisonError;
 
 use clap::{ArgGroup, Args, ValueEnum};
-use compiler::{Fidelity, Mesh, Sights, TinMethod, TinRequest, TinStart};
+use compiler::{Fidelity, Mesh, Sights, Stage, TinMethod, TinRequest, TinStart};
 use exports::TinPlace;
 use job::Optimising;
 use serde_json::{Value, json};
@@ -12,6 +12,7 @@ use terrain::StopReason;
 use views::{Align, Coordinates, MeshPlace, Table, grouped};
 
 use crate::arguments::{Workers, positive, rows_by_columns, start_method};
+use crate::estimate::Estimate;
 use crate::failure::{Failure, Outcome};
 use crate::progress::{Listener, Show};
 use crate::signals::{self, Signals};
@@ -21,25 +22,34 @@ const AFTER_HELP: &str = "\
 Examples:
   tiefort tin dem.tif --points 76500 --out mesh.ply
   tiefort tin dem.tif --max-residual 2 --method greedy --key max --out mesh.obj
-  tiefort tin dem.tif --points 5000 --start vip:1000 --method paper --out mesh.ply
-  tiefort tin dem.tif --points 5000 --start surveyed.csv --out mesh.ply      columns east,north,height_m
-  tiefort tin dem.tif --points 5000 --measure --out mesh.ply      every measure of fidelity, too
+  tiefort tin dem.tif --points 5000 --start vip:900 --method paper --out mesh.ply
+  tiefort tin dem.tif --points 5000 --start surveyed.csv --out mesh.ply
+  tiefort tin dem.tif --points 5000 --measure --out mesh.ply    measures it, too
   tiefort tin dem.tif --levels 1000,2500,5000 --method paper --out mesh.ply
-  tiefort tin dem.tif --rms 1.5 --tiles 6x6 --workers 8 --coordinates map --out mesh.ply
+  tiefort tin dem.tif --rms 1.5 --tiles 6x6 --coordinates map --out mesh.ply
 
-The first of --points (or --triangles), --max-residual and --rms that is reached ends it.
---levels writes one mesh for each number of vertices: mesh-1000.ply, mesh-2500.ply and so on.
-With paper and greedy each is the beginning of one sequence of posts, and holds all vertices of the
-smaller ones. With optimised, whose vertices move, each is made anew, with vertices of its own.
-Coordinates are metres from the south-west post (Blender, MeshLab); with --coordinates map they are
-eastings and northings in 64 bits (QGIS).";
+A file of points to start from has the columns east,north,height_m.
+
+The first of --points (or --triangles), --max-residual and --rms that is reached
+ends it. --levels writes one mesh for each number of vertices: mesh-1000.ply,
+mesh-2500.ply and so on. With paper and greedy each is the beginning of one
+sequence of posts, and holds all vertices of the smaller ones. With optimised,
+whose vertices move, each is made anew, with vertices of its own. Coordinates
+are metres from the south-west post (Blender, MeshLab); with --coordinates map
+they are eastings and northings in 64 bits (QGIS).";
 
 /// Arguments that say when to stop: at least one is given.
 const ENDS: [&str; 5] = ["points", "triangles", "max_residual", "rms", "levels"];
 
+/// One line of all five ends would be wider than a terminal.
+const USAGE: &str = "\
+tiefort tin [OPTIONS] --out <FILE> <END> <DEM>
+  where END is --points <N>|--triangles <N>|--max-residual <M>|--rms <R>
+  or --levels <N,N…>";
+
 /// Arguments of `tin`.
 #[derive(Args)]
-#[command(after_help = AFTER_HELP)]
+#[command(after_help = AFTER_HELP, override_usage = USAGE)]
 #[command(group = ArgGroup::new("end").args(ENDS).required(true).multiple(true))]
 pub struct Arguments {
     /// The raster of heights
@@ -167,7 +177,9 @@ enum Frame {
 fn start(text: &str) -> Result<TinStart, String> {
     match files::extension(Path::new(text)).as_str() {
         "csv" | "geojson" | "json" => Ok(TinStart::File(text.into())),
-        _ => start_method(text).map(|(method, points)| TinStart::Method(method, points.unwrap_or(0))),
+        _ => start_method(text)
+            .map(|(method, points)| TinStart::Method(method, points.unwrap_or(0)))
+            .map_err(|error| format!("{error}; or a file whose name ends in .csv or .geojson")),
     }
 }
 
@@ -191,7 +203,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         (false, true) => Show::Nothing,
         (false, false) => Show::Progress,
     };
-    let mut listener = Listener::start(show, arguments.tiles, request.workers);
+    let mut listener = Listener::start(show, arguments.tiles, request.workers, Estimate::of_one_stage(Stage::Refine));
     let place = listener.place();
     signals.end_in_time(move || signals::stopped(&place.lock().unwrap_or_else(PoisonError::into_inner).words()));
     let levels: Vec<usize> = arguments.levels.iter().map(|&points| points as usize).collect();

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use views::grouped;
+use views::{fold, grouped};
 
 use crate::failure::{Failure, Outcome};
 use crate::terminal;
@@ -11,7 +11,7 @@ use crate::terminal;
 const AFTER_HELP: &str = "\
 Examples:
   tiefort verify ntc.tdb
-  tiefort verify desert.tdb --dem dem/desert.tif      measure residuals against this raster, too
+  tiefort verify desert.tdb --dem desert.tif    measure residuals against it, too
 
 Exit codes: 0 sound; 2 damaged, each problem on a line of its own.";
 
@@ -45,6 +45,6 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         let (rms_m, max_m, p99_m) = (residual.rms_m, residual.max_m, residual.p99_m);
         text += &format!("residual: RMS {rms_m:.3} m, 99 % within {p99_m:.2} m, largest {max_m:.2} m\n");
     }
-    terminal::print(&text)?;
+    terminal::print(&fold(&text, 2))?;
     Ok(if verdict.problems.is_empty() { Outcome::Sound } else { Outcome::Damaged })
 }

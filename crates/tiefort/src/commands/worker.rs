@@ -14,13 +14,15 @@ use crate::terminal;
 
 const AFTER_HELP: &str = "\
 Examples:
-  tiefort worker configs/ntc.toml --out /share/ntc.tdb        on every host, as often as it has cores
+  tiefort worker ntc.toml --out /share/ntc.tdb    on every host, one for each core
 
-Start it any number of times, on any hosts that share the folder, at any time. Each takes tiles that are ready and that
-nobody else is working on, until the build is done; one of them publishes it. Any of them may be killed: what it was
+Start it any number of times, on any hosts that share the folder, at any time.
+Each takes tiles that are ready and that nobody else is working on, until the
+build is done; one of them publishes it. Any of them may be killed: what it was
 working on is done by another once its lease is over. Clocks need not agree.
 
-Exit codes: 0 done; 1 published, with breaches; 2 failed; 75 a build or another job is at work in the folder.";
+Exit codes: 0 done; 1 published, with breaches; 2 failed; 75 a build or another
+job is at work in the folder.";
 
 /// What a worker waits for when nothing is ready.
 const PAUSE: Duration = Duration::from_millis(200);

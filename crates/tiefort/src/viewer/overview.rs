@@ -1,7 +1,8 @@
 //! What the page knows of the whole area: heights on a coarse grid, and counts and residuals of every load module.
 //!
 //! As bytes: heights in metres (f32), row by row from the south-west; then of each load module triangles, polygons
-//! (u32 each), root mean square and largest residual in metres (f32 each; not a number without posts).
+//! (u32 each), root mean square and largest residual in metres (f32 each; not a number without posts); then the class
+//! at each height (u8).
 
 use load_module_reader::{Area, Block, Module, QUANTA_PER_METRE, ReadError};
 
@@ -15,6 +16,7 @@ pub struct Overview {
     /// Lowest and highest vertex, metres.
     pub range_m: [f64; 2],
     heights: Vec<f32>,
+    classes: Vec<u8>,
     figures: Vec<u8>,
 }
 
@@ -28,7 +30,8 @@ impl Overview {
         let heights = |steps: &u64| (u64::from(rows) * steps + 1) * (u64::from(cols) * steps + 1);
         let steps = [4, 2].into_iter().find(|steps| heights(steps) <= HEIGHTS_MAX).unwrap_or(1) as u32;
         let no_range = [f64::INFINITY, f64::NEG_INFINITY];
-        let mut overview = Self { steps, range_m: no_range, heights: Vec::new(), figures: Vec::new() };
+        let mut overview =
+            Self { steps, range_m: no_range, heights: Vec::new(), classes: Vec::new(), figures: Vec::new() };
         for row in 0..rows {
             overview.add_row(area, row, row + 1 == rows)?;
         }
@@ -46,7 +49,10 @@ impl Overview {
             let north = frame.origin_m[1] + f64::from(row * self.steps + line) * step_m;
             let places =
                 (0..=frame.cols * self.steps).map(|step| [frame.origin_m[0] + f64::from(step) * step_m, north]);
-            self.heights.extend(places.map(|place| ground.height_m(place).unwrap_or(f64::NAN) as f32));
+            for sample in places.map(|place| ground.sample(place)) {
+                self.heights.push(sample.as_ref().map_or(f64::NAN, |sample| sample.height_m) as f32);
+                self.classes.push(sample.map_or(u8::MAX, |sample| sample.class));
+            }
         }
         Ok(())
     }
@@ -68,6 +74,7 @@ impl Overview {
     pub fn bytes(&self) -> Vec<u8> {
         let mut bytes: Vec<u8> = self.heights.iter().flat_map(|height| height.to_le_bytes()).collect();
         bytes.extend(&self.figures);
+        bytes.extend(&self.classes);
         bytes
     }
 }

@@ -31,7 +31,7 @@ fn a_missing_raster() {
 
 #[test]
 fn a_missing_job() {
-    Scene::new().refuses(&BUILD, &["job.toml", "expected a TOML file"]);
+    Scene::new().refuses(&BUILD, &["job.toml", "expected a job file"]);
 }
 
 #[test]

@@ -89,7 +89,7 @@ fn damage_is_found_and_named() {
 fn a_plan_lists_settings_tiles_and_forecast() {
     let scene = Scene::with_job("small.toml", &[]);
     let text = scene.run_to(0, &["plan", "job.toml", "--simulate", "4"]).stdout;
-    for part in ["area.spacing_m", "Load modules", "Memory", "4 workers", "rank  tile"] {
+    for part in ["\n  spacing_m", "Load modules", "Memory", "longest chain", "rank  tile"] {
         assert!(text.contains(part), "{part:?} is not in: {text}");
     }
     let plan: Value = serde_json::from_str(&scene.run_to(0, &["plan", "job.toml", "--emit", "json"]).stdout).unwrap();
@@ -145,4 +145,28 @@ fn a_pinned_down_residual_that_limits_forbid_is_a_breach() {
     scene.run_to(0, &["verify", "small.tdb"]);
     let breaches: Value = serde_json::from_slice(&fs::read(scene.path("small.tdb/breaches.geojson")).unwrap()).unwrap();
     assert_eq!(breaches["features"][0]["properties"]["kind"], "residual");
+}
+
+#[test]
+fn another_title_is_the_same_job_and_no_tile_is_made_again() {
+    let scene = Scene::with_job("small.toml", &[]);
+    scene.run_to(0, &["build", "job.toml", "--quiet", "--out", "x.tdb"]);
+    let job = fs::read_to_string(scene.path("job.toml")).unwrap();
+    let titled = |title: &str| job.replacen("name = \"small\"", &format!("name = \"small\"\ntitle = \"{title}\""), 1);
+    let page_of = || fs::read_to_string(scene.path("x.tdb/report.html")).unwrap();
+    fs::write(scene.path("job.toml"), titled("First of May")).unwrap();
+    // A tile may be run again though the database knows no title yet.
+    scene.run_to(0, &["tile", "job.toml", "0,0", "--out", "x.tdb"]);
+    assert!(page_of().contains("First of May"));
+    fs::write(scene.path("job.toml"), titled("Second of May")).unwrap();
+    let said = scene.run_to(0, &["build", "job.toml", "--out", "x.tdb"]).stderr;
+    assert!(said.contains("0 built, 4 kept"), "{said}");
+    assert!(page_of().contains("Second of May"));
+    let said = scene.run_to(0, &["build", "job.toml", "--out", "x.tdb"]).stderr;
+    assert!(said.contains("nothing changed"), "{said}");
+    scene.run_to(0, &["verify", "x.tdb"]);
+    // Any other setting is another job.
+    fs::write(scene.path("job.toml"), titled("Second of May").replace("pool = 0", "pool = 1") + "pool = 9\n").unwrap();
+    let said = scene.run_to(2, &["tile", "job.toml", "0,0", "--out", "x.tdb"]);
+    said.check_error(&["another job", "pool = 9"]);
 }

@@ -2,7 +2,7 @@
 
 use crate::scene::Scene;
 
-const COMMANDS: [&str; 19] = [
+const COMMANDS: [&str; 21] = [
     "build",
     "tile",
     "plan",
@@ -22,6 +22,8 @@ const COMMANDS: [&str; 19] = [
     "tin",
     "compare",
     "init",
+    "completions",
+    "man",
 ];
 
 #[test]

@@ -52,7 +52,7 @@ fn a_folder_named_as_a_job_is_told_so() {
     let scene = Scene::new();
     fs::create_dir(scene.path("some.tdb")).unwrap();
     for command in ["plan", "build"] {
-        check(&scene, &[command, "some.tdb"], &["some.tdb", "expected a TOML file"], "a job file");
+        check(&scene, &[command, "some.tdb"], &["some.tdb", "expected a job file"], "a job file");
     }
 }
 
@@ -166,7 +166,7 @@ fn a_plan_refuses_a_raster_that_does_not_cover_the_area() {
 fn a_build_prints_no_settings_unless_asked() {
     let scene = Scene::with_job("small.toml", &[]);
     let said = scene.run_to(0, &["build", "job.toml", "--out", "x.tdb"]).stderr;
-    assert!(!said.contains("limits.per_load_module") && said.contains("into x.tdb"), "{said}");
+    assert!(!said.contains("mean_per_load_module") && said.contains("into x.tdb"), "{said}");
     let said = scene.run_to(0, &["build", "job.toml", "--out", "y.tdb", "-v"]).stderr;
-    assert!(said.contains("limits.per_load_module"), "{said}");
+    assert!(said.contains("mean_per_load_module"), "{said}");
 }

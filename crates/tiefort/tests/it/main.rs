@@ -6,6 +6,7 @@
 mod bad_input;
 mod bad_jobs;
 mod builds;
+mod columns;
 mod comparing;
 mod exports;
 mod foreseen;
@@ -16,6 +17,8 @@ mod measures;
 mod meshes;
 mod odd_files;
 mod outlook;
+#[cfg(unix)]
+mod paths;
 mod raster;
 mod scene;
 mod shared;

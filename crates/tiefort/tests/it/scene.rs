@@ -19,7 +19,10 @@ pub struct Scene {
 pub struct Said {
     pub code: Option<i32>,
     pub stdout: String,
+    /// With every message in one line.
     pub stderr: String,
+    /// As it was printed.
+    pub printed: String,
 }
 
 impl Scene {
@@ -103,7 +106,9 @@ pub fn everything_below(folder: &Path) -> BTreeMap<PathBuf, Option<Vec<u8>>> {
 impl Said {
     pub fn from(output: Output) -> Self {
         let text = |bytes| String::from_utf8(bytes).expect("the program speaks UTF-8");
-        Self { code: output.status.code(), stdout: text(output.stdout), stderr: text(output.stderr) }
+        let printed = text(output.stderr);
+        // A line that was broken goes on two columns to the right.
+        Self { code: output.status.code(), stdout: text(output.stdout), stderr: printed.replace("\n  ", " "), printed }
     }
 
     /// The error is one paragraph with all of `parts`, then a hint, and no trace of Rust.

@@ -55,7 +55,8 @@ fn a_job_that_init_writes_builds_at_once() {
         "origin_m = [506000, 3876000]",
         "size_m = [4000, 2000]",
         "{ file = \"east.asc\", crs = \"EPSG:32611\" },",
-        "# Esri ASCII grid, EPSG:32611, 81 x 81 posts, 25 x 25 m, 700 to 796 m, 3 void, heights above an unknown datum",
+        "# Esri ASCII grid, EPSG:32611, 81 x 81 posts, 25 x 25 m, 700 to 796 m, 3\n",
+        "    # void, heights above an unknown datum\n",
         "voids = { next_source = true, fill_within_posts = 8, hole = true }",
     ] {
         assert!(job.contains(line), "{line} is not in:\n{job}");

@@ -84,7 +84,7 @@ fn interrupted(scene: &Scene, signal: &str) -> Said {
     let code = child.wait().unwrap().code();
     let mut stderr = String::new();
     child.stderr.take().unwrap().read_to_string(&mut stderr).unwrap();
-    Said { code, stdout: String::new(), stderr }
+    Said { code, stdout: String::new(), printed: stderr.clone(), stderr }
 }
 
 #[cfg(unix)]

@@ -79,9 +79,12 @@ mod server {
         assert_eq!((&area["rows"], &area["cols"]), (&8.into(), &8.into()));
         let steps = area["coarse_steps"].as_u64().unwrap() as usize;
         let (_, overview) = server.asked("/api/overview");
-        assert_eq!(overview.len(), 4 * (8 * steps + 1).pow(2) + 16 * 64);
+        let places = (8 * steps + 1).pow(2);
+        assert_eq!(overview.len(), 4 * places + 16 * 64 + places);
+        // The class at each height, by which water is blue far away and on the map, too: all of it is mountains here.
+        assert!(overview[overview.len() - places..].iter().all(|&class| class == 1));
         let triangles = |place: usize| {
-            let at = overview.len() - 16 * (64 - place);
+            let at = overview.len() - places - 16 * (64 - place);
             u32::from_le_bytes(overview[at..at + 4].try_into().unwrap())
         };
         assert_eq!(u64::from((0..64).map(triangles).sum::<u32>()), area["triangles"].as_u64().unwrap());

@@ -63,7 +63,7 @@ export function paint(area, module, surface, mesh, colors) {
 
 /** The whole area on its coarse grid; `cut` leaves out load modules that are drawn finely. */
 export function coarseMesh(area) {
-  const { wide, high, heights } = area.coarse, step = area.side_m / area.coarse_steps;
+  const { wide, high, heights, isWater } = area.coarse, step = area.side_m / area.coarse_steps;
   const positions = new Float32Array(3 * wide * high);
   for (let row = 0, i = 0; row < high; row++) {
     for (let col = 0; col < wide; col++, i++) {
@@ -79,7 +79,8 @@ export function coarseMesh(area) {
       const [row, col] = [Math.floor(i / wide), i % wide].map((place) => Math.floor(place / steps));
       const figures = area.figures(Math.min(row, area.rows - 1), Math.min(col, area.cols - 1));
       const value = { limits: figures.count, residuals: figures.rms }[colors] ?? heights[i];
-      color.array.set(light(colorOf[colors](area, value)), 3 * i);
+      const found = colors === "height" && isWater(i) ? colorOf.water(area) : colorOf[colors](area, value);
+      color.array.set(light(found), 3 * i);
     }
     color.needsUpdate = true;
   };

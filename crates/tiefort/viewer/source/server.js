@@ -9,14 +9,18 @@ async function answer(path) {
   return response;
 }
 
-/** What the area is, with its overview: heights on a coarse grid, figures of every load module. */
+/** What the area is, with its overview: heights and water on a coarse grid, figures of every load module. */
 export async function readArea() {
   const area = await (await answer("/api/area")).json();
   const bytes = await (await answer("/api/overview")).arrayBuffer();
   const [wide, high] = [area.cols * area.coarse_steps + 1, area.rows * area.coarse_steps + 1];
   area.corner = [Math.floor(area.rows / 2), Math.floor(area.cols / 2)];
-  area.coarse = { wide, high, heights: new Float32Array(bytes, 0, wide * high) };
-  const words = new Uint32Array(bytes, 4 * wide * high), metres = new Float32Array(bytes, 4 * wide * high);
+  const classes = new Uint8Array(bytes, bytes.byteLength - wide * high);
+  const heights = new Float32Array(bytes, 0, wide * high);
+  area.coarse = { wide, high, heights, isWater: (i) => classes[i] === area.water };
+  // What comes after them, the classes, fills no whole words.
+  const part = [4 * wide * high, 4 * area.rows * area.cols];
+  const words = new Uint32Array(bytes, ...part), metres = new Float32Array(bytes, ...part);
   const figures = (index) => {
     const [triangles, polygons] = [words[4 * index], words[4 * index + 1]];
     const count = area.limits.count === "triangles" ? triangles : polygons;

@@ -83,14 +83,15 @@ impl Histogram {
                 number(tick)
             );
         }
-        for share in [0.5, 1.0] {
-            let y = base - share * high;
+        for count in round_counts(most) {
+            let y = base - count as f64 / most as f64 * high;
             let _ = write!(
                 svg,
-                "<path d=\"M{LEFT} {y}h-4\" class=\"axis\"/><text x=\"{}\" y=\"{}\" text-anchor=\"end\">{}</text>",
+                "<path d=\"M{LEFT} {y:.1}h-4\" class=\"axis\"/>\
+                 <text x=\"{}\" y=\"{:.1}\" text-anchor=\"end\">{}</text>",
                 LEFT - 7.0,
                 y + 4.0,
-                grouped((share * most as f64).round() as u64)
+                grouped(count)
             );
         }
         if let Some((at, text)) = &self.mark {
@@ -131,6 +132,13 @@ impl Histogram {
     }
 }
 
+/// Round numbers up to `most`: at least one, at most four.
+fn round_counts(most: u64) -> Vec<u64> {
+    let steps = (0..19).flat_map(|power| [1, 2, 5].map(|digit| digit * 10_u64.pow(power)));
+    let step = steps.into_iter().find(|step| most / step <= 4).unwrap_or(most);
+    (1..=most / step).map(|index| index * step).collect()
+}
+
 /// A number without needless digits.
 fn number(value: f64) -> String {
     let text = format!("{value:.3}");
@@ -155,6 +163,11 @@ mod tests {
     fn ticks_are_round_and_a_few() {
         let histogram = Histogram::of_counts(&[3; 7], 100, "x");
         assert_eq!(histogram.ticks(), [0.0, 20.0, 40.0, 60.0, 80.0, 100.0]);
+        for (most, counts) in
+            [(1, &[1][..]), (7, &[2, 4, 6]), (1160, &[500, 1000]), (419_198, &[100_000, 200_000, 300_000, 400_000])]
+        {
+            assert_eq!(round_counts(most), counts);
+        }
         assert_eq!(number(-0.0), "0");
         assert_eq!(number(0.25), "0.25");
     }

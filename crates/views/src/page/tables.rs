@@ -260,14 +260,14 @@ pub(super) fn stages(report: &Report) -> Markup {
 
 pub(super) fn sources(manifest: &Manifest) -> Markup {
     html! {
-        (table(html! { th { "Source" } th { "BLAKE3 of its content" } th { "Attribution" } }, html! {
+        div.stack { (table(html! { th { "Source" } th { "BLAKE3 of its content" } th { "Attribution" } }, html! {
             @for source in &manifest.sources {
                 tr {
                     td { code { (source.path) } } td { code { (source.blake3.to_string()) } }
                     td { (source.attribution.as_deref().unwrap_or("")) }
                 }
             }
-        }))
+        })) }
         p.quiet {
             "Algorithm revision " (manifest.algorithm_revision) ", database format " (manifest.format_version) "."
         }

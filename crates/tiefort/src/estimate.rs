@@ -1,0 +1,160 @@
+//! How long a run still takes: what its stages are forecast to take, set right by what they have taken so far.
+
+use compiler::{Event, Plan, Stage};
+
+/// Seconds of measuring that a forecast is worth: machines differ, and the first tiles may be the quick ones.
+const TRUST_S: f64 = 1.0;
+
+/// Listens to a run and says what is left of it.
+#[derive(Debug)]
+pub struct Estimate {
+    /// Forecast seconds of each stage on one worker, those still to come and the current one.
+    stages: Vec<(Stage, f64)>,
+    /// What comes after the last stage.
+    after_s: f64,
+    /// Seconds that one of the forecast takes, before anything is measured; `None` where nothing is forecast.
+    pace: Option<f64>,
+    /// When the first of these stages began.
+    begun_s: Option<f64>,
+    /// Tiles of the current stage: all, worked on, kept.
+    tiles: (usize, usize, usize),
+    /// Share of tiles that the last stage by tiles worked on; what is kept takes no time, in later stages neither.
+    share: f64,
+    /// Forecast seconds of what was worked on.
+    worked_s: f64,
+}
+
+impl Estimate {
+    /// That of a build on so many workers.
+    pub fn of_build(plan: &Plan, workers: usize) -> Self {
+        let seconds = plan.forecast.stages;
+        let stages = [
+            (Stage::Survey, seconds.survey),
+            (Stage::Refine, seconds.refine),
+            (Stage::Assemble, seconds.assemble),
+            (Stage::Publish, seconds.publish),
+        ];
+        let at_once = workers.min(plan.workers_useful).max(1);
+        Self { after_s: seconds.page, pace: Some(1.0 / at_once as f64), ..Self::new(stages.to_vec()) }
+    }
+
+    /// That of a run of which nothing is forecast and one stage takes nearly all of the time.
+    pub fn of_one_stage(stage: Stage) -> Self {
+        Self::new(vec![(stage, 1.0)])
+    }
+
+    fn new(stages: Vec<(Stage, f64)>) -> Self {
+        Self { stages, after_s: 0.0, pace: None, begun_s: None, tiles: (0, 0, 0), share: 1.0, worked_s: 0.0 }
+    }
+
+    /// Takes note of what happened, so many seconds after the start.
+    pub fn hear(&mut self, event: &Event, at_s: f64) {
+        match event {
+            Event::Enter(stage, tiles) => {
+                self.tiles = (*tiles, 0, 0);
+                if self.seconds(*stage).is_some() && self.begun_s.is_none() {
+                    self.begun_s = Some(at_s);
+                }
+                // What was to come before it did not come.
+                if let Some(at) = self.stages.iter().position(|(known, _)| known == stage) {
+                    self.stages.drain(..at);
+                }
+            }
+            Event::Done(stage, _) => {
+                self.tiles.1 += 1;
+                self.worked_s += self.seconds(*stage).unwrap_or(0.0) / self.tiles.0.max(1) as f64;
+            }
+            Event::Kept(..) => self.tiles.2 += 1,
+            Event::Leave(stage) => {
+                let (all, done, _) = self.tiles;
+                if 0 < all {
+                    self.share = done as f64 / all as f64;
+                } else {
+                    self.worked_s += self.seconds(*stage).unwrap_or(0.0);
+                }
+                self.stages.retain(|(known, _)| known != stage);
+                self.tiles = (0, 0, 0);
+            }
+            Event::Started(..) | Event::Because(..) | Event::Note(_) => {}
+        }
+    }
+
+    /// Seconds that are left; `None` where there is nothing to tell them from.
+    pub fn left_s(&self, at_s: f64) -> Option<f64> {
+        let passed_s = at_s - self.begun_s?;
+        let pace = match self.pace {
+            Some(pace) => (passed_s + TRUST_S) / (self.worked_s + TRUST_S / pace),
+            None if 0.0 < self.worked_s => passed_s / self.worked_s,
+            None => return None,
+        };
+        let (all, done, kept) = self.tiles;
+        let mut share = self.share;
+        let mut left_s = self.after_s;
+        for (place, (_, seconds)) in self.stages.iter().enumerate() {
+            let is_current = place == 0 && 0 < all;
+            if is_current && 0 < done + kept {
+                share = done as f64 / (done + kept) as f64;
+            }
+            let open = if is_current { all.saturating_sub(done + kept) as f64 / all as f64 } else { 1.0 };
+            left_s += seconds * share * open;
+        }
+        Some(left_s * pace)
+    }
+
+    fn seconds(&self, stage: Stage) -> Option<f64> {
+        self.stages.iter().find(|(known, _)| *known == stage).map(|(_, seconds)| *seconds)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use terrain::TileId;
+
+    const TILE: TileId = TileId { row: 0, col: 0 };
+
+    fn build() -> Estimate {
+        let stages = vec![(Stage::Survey, 10.0), (Stage::Refine, 80.0), (Stage::Assemble, 10.0)];
+        Estimate { pace: Some(0.5), after_s: 2.0, ..Estimate::new(stages) }
+    }
+
+    #[test]
+    fn what_is_left_is_that_of_the_whole_build_and_follows_the_pace_so_far() {
+        let mut estimate = build();
+        estimate.hear(&Event::Enter(Stage::Read, 0), 0.0);
+        assert_eq!(estimate.left_s(1.0), None);
+        estimate.hear(&Event::Leave(Stage::Read), 5.0);
+        estimate.hear(&Event::Enter(Stage::Survey, 10), 5.0);
+        // Nothing is measured yet: 102 forecast seconds on two workers.
+        assert_eq!(estimate.left_s(5.0), Some(51.0));
+        for _ in 0..10 {
+            estimate.hear(&Event::Done(Stage::Survey, TILE), 15.0);
+        }
+        estimate.hear(&Event::Leave(Stage::Survey), 15.0);
+        estimate.hear(&Event::Enter(Stage::Refine, 10), 15.0);
+        // It took 10 s instead of 5.
+        let left_s = estimate.left_s(15.0).unwrap();
+        assert!(80.0 < left_s && left_s < 92.0, "{left_s}");
+    }
+
+    #[test]
+    fn what_is_kept_takes_no_time_in_later_stages_neither() {
+        let mut estimate = build();
+        estimate.hear(&Event::Enter(Stage::Survey, 10), 0.0);
+        for _ in 0..10 {
+            estimate.hear(&Event::Kept(Stage::Survey, TILE), 0.0);
+        }
+        estimate.hear(&Event::Leave(Stage::Survey), 0.0);
+        estimate.hear(&Event::Enter(Stage::Refine, 10), 0.0);
+        assert!(estimate.left_s(0.0).unwrap() <= 1.0, "only the page is left");
+    }
+
+    #[test]
+    fn without_a_forecast_the_stage_itself_tells_once_a_tile_is_done() {
+        let mut estimate = Estimate::of_one_stage(Stage::Refine);
+        estimate.hear(&Event::Enter(Stage::Refine, 4), 1.0);
+        assert_eq!(estimate.left_s(2.0), None);
+        estimate.hear(&Event::Done(Stage::Refine, TILE), 3.0);
+        assert_eq!(estimate.left_s(3.0), Some(6.0));
+    }
+}
