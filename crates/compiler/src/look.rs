@@ -62,8 +62,8 @@ pub struct Suggestion {
     pub posts_m: f64,
     /// Triangles of a load module that an area is suggested, on average.
     pub triangles: u32,
-    /// The RMS residual that these will leave, in metres, from a look at windows of the area; `None` where those have no
-    /// heights.
+    /// The RMS residual that these will leave, in metres, from a look at windows of the area; `None` where those have
+    /// no heights.
     pub rms_m: Option<f64>,
 }
 

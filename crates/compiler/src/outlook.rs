@@ -1,8 +1,8 @@
 //! The residual that a budget will leave, before any build: from some windows spread over the area.
 //!
-//! Each window is resampled as a build would, and surveyed; their budget is shared out by one threshold of gain, as that
-//! of tiles is, and each is refined and optimised with its share. Module lines, which are edges in a build, are not: what
-//! they cost is in [`MODULE_LINES`], measured.
+//! Each window is resampled as a build would, and surveyed; their budget is shared out by one threshold of gain, as
+//! that of tiles is, and each is refined and optimised with its share. Module lines, which are edges in a build, are
+//! not: what they cost is in [`MODULE_LINES`], measured.
 
 use std::sync::atomic::AtomicBool;
 

@@ -250,7 +250,8 @@ fn matches_of(written: &str, folder: &Path, fault: &Fault) -> Result<Vec<NamedFi
 }
 
 /// The files below `home` that match the pattern `rest`. At most `most` files and folders are looked at: no folder of
-/// rasters holds so many. Below `**` links to folders are not followed: in `/proc` they lead to the whole machine again.
+/// rasters holds so many. Below `**` links to folders are not followed: in `/proc` they lead to the whole machine
+/// again.
 fn matches_below(home: &Path, rest: &Path, most: usize, fault: &Fault) -> Result<Vec<PathBuf>, JobError> {
     let options =
         glob::MatchOptions { case_sensitive: true, require_literal_separator: true, require_literal_leading_dot: true };

@@ -14,11 +14,12 @@
 
 mod model;
 pub use model::{
-    Allocation, Area, AreaShape, Borders, Budget, ClipHeights, Count, DemSource, DemSpec, Edges, Effort, ErrorKey,
-    HOLE_CLASS_NAME, HeightFit, ImportanceArea, ImportanceSpec, Job, LastBatch, Lattice, LimitsSpec, Method,
-    ModulesSpec, NamedFile, Optimising, OuterBorder, Proximity, Resampling, SampleClass, Smooth, SourceEntry,
-    SourceFile, SourceSaid, TileOrder, TilesSpec, TinSpec, Voids, WindowLimit,
+    Allocation, Area, Borders, Budget, ClipHeights, Count, DemSource, DemSpec, Edges, Effort, ErrorKey, HeightFit, Job,
+    LastBatch, Lattice, LimitsSpec, Method, ModulesSpec, NamedFile, Optimising, OuterBorder, Proximity, Resampling,
+    SourceEntry, SourceFile, SourceSaid, TileOrder, TilesSpec, TinSpec, Voids, WindowLimit,
 };
+mod importance;
+pub use importance::{AreaShape, HOLE_CLASS_NAME, ImportanceArea, ImportanceSpec, SampleClass, Smooth};
 mod ground;
 pub use ground::{GeoidSpec, WaterSpec};
 mod lod;

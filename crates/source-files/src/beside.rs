@@ -1,4 +1,5 @@
-//! Files beside a source that say how it is to be read, found by its name: they are a part of what a build is made from.
+//! Files beside a source that say how it is to be read, found by its name: they are a part of what a build is made
+//! from.
 
 use std::path::{Path, PathBuf};
 
