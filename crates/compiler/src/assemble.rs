@@ -2,12 +2,13 @@
 
 use database::{FileStamp, Fingerprint, FingerprintBuilder, Measured, Stamp, TileModules};
 use fidelity::{Residuals, Tally};
-use job::{Borders, ClipHeights as JobClipHeights, Edges, OuterBorder};
+use job::{Borders, ClipHeights as JobClipHeights, Edges, Job, OuterBorder};
 use load_modules::{ClipHeights, Layout, clip, concatenate};
 use terrain::{
     HOLE_CLASS, LATTICE_PER_POST, LatticePoint, LoadModule, ModuleResidual, Post, PostRect, TileId, Tin, Vertex,
 };
 
+use crate::area::GamingArea;
 use crate::levels::all_levels;
 use crate::measured::{from_measured, to_measured};
 use crate::refine::Published;
@@ -64,7 +65,7 @@ pub(crate) fn assemble_tile(
     tile: TileId,
 ) -> Result<(Assembled, Sums), CompileError> {
     let area = &run.area;
-    let fingerprint = modules_fingerprint(run, stamps, removed, tile);
+    let fingerprint = modules_fingerprint(run.job, area, stamps, removed, tile);
     let stamp = measured_stamp(run, fingerprint);
     if let Some(kept) = kept(run, &stamp, tile) {
         return Ok(kept);
@@ -190,18 +191,24 @@ pub(crate) fn points_around(
 }
 
 /// Of all that the load modules of a tile are made from.
-fn modules_fingerprint(run: &Run, stamps: &StampOf, removed: &[Vec<LatticePoint>], tile: TileId) -> Fingerprint {
-    let mut builder = FingerprintBuilder::new("modules").text(&format!("{:?}", run.job.modules));
-    if 1 < run.job.lod.level_count() {
-        builder = builder.text(&format!("{:?}", run.job.lod));
+pub(crate) fn modules_fingerprint(
+    job: &Job,
+    area: &GamingArea,
+    stamps: &StampOf,
+    removed: &[Vec<LatticePoint>],
+    tile: TileId,
+) -> Fingerprint {
+    let mut builder = FingerprintBuilder::new("modules").text(&format!("{:?}", job.modules));
+    if 1 < job.lod.level_count() {
+        builder = builder.text(&format!("{:?}", job.lod));
     }
-    let mut reach = match run.job.modules.edges {
+    let mut reach = match job.modules.edges {
         Edges::Constrained => Vec::new(),
-        Edges::Clip(_) => run.area.tiling.neighbours(tile),
+        Edges::Clip(_) => area.tiling.neighbours(tile),
     };
     reach.push(tile);
     for other in reach {
-        let index = run.area.tiling.index(other);
+        let index = area.tiling.index(other);
         builder = builder.fingerprint(stamps(index).fingerprint).number(removed[index].len() as u64);
         for point in &removed[index] {
             builder = builder.number(u64::from(point.row as u32) << 32 | u64::from(point.col as u32));
@@ -237,7 +244,7 @@ fn publish(
 }
 
 /// The area's coordinate reference system, as files name it.
-pub(crate) fn crs(job: &job::Job) -> String {
+pub(crate) fn crs(job: &Job) -> String {
     format!("EPSG:{}", job.area.epsg)
 }
 

@@ -45,22 +45,31 @@ pub(crate) fn made_from(
     refinement: &Refinement,
     borders: impl FnOnce(FingerprintBuilder) -> FingerprintBuilder,
 ) -> MadeFrom {
-    let brief = |builder: FingerprintBuilder| builder.finish().to_string()[..16].to_owned();
     let begin = || FingerprintBuilder::new("part");
     let task = &refinement.task;
-    let rules = format!(
-        "{:?} {:?} {:?} {:?} {:?} {:?}",
-        task.rule, task.stop.value, task.seams, task.border, task.kept, refinement.optimising
-    );
     let allowance = format!("{:?} {:?} {:?}", task.frame, task.stop.points, task.stop.rms_quanta);
     MadeFrom {
         heights: brief(begin().heights(&window.dem)),
         weights: brief(begin().importance(&window.importance)),
         given: window.given_in_words().map(|given| brief(begin().text(&given))).unwrap_or_default(),
-        rules: brief(begin().text(&rules)),
+        rules: rules(refinement),
         allowance: brief(begin().text(&allowance)),
         borders: brief(borders(begin())),
     }
+}
+
+/// What the job says of selecting and optimising in a tile, as its record names it.
+pub(crate) fn rules(refinement: &Refinement) -> String {
+    let task = &refinement.task;
+    let rules = format!(
+        "{:?} {:?} {:?} {:?} {:?} {:?}",
+        task.rule, task.stop.value, task.seams, task.border, task.kept, refinement.optimising
+    );
+    brief(FingerprintBuilder::new("part").text(&rules))
+}
+
+fn brief(builder: FingerprintBuilder) -> String {
+    builder.finish().to_string()[..16].to_owned()
 }
 
 /// Why a tile is refined whose inputs are `stamp` and `parts`, given how the stamp of its published file was read.

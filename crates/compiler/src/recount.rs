@@ -7,7 +7,7 @@
 
 use std::collections::BTreeMap;
 
-use terrain::{Dem, LoadModule, ModuleGrid, ModuleId, ModuleResidual, Post, Spacing};
+use terrain::{Dem, Importance, LoadModule, ModuleGrid, ModuleId, ModuleResidual, Post, Spacing};
 
 /// A corner: east, north, height.
 type Corner = (u16, u16, i32);
@@ -87,71 +87,126 @@ fn edges(module: &LoadModule) -> Result<BTreeMap<(Corner, Corner), u32>, String>
 /// The residual of a load module at the posts it owns, post by post: each in the triangle that holds it, or would if
 /// it were moved a little east and still less north (inwards at the area's far sides), interpolated in 128 bits.
 pub(crate) fn residual(module: &LoadModule, dem: &Dem, grid: ModuleGrid, spacing: Spacing) -> ModuleResidual {
-    let (rect, area) = (grid.posts_of(module.id), grid.area());
-    let quanta = spacing.quanta_per_post();
-    // Posts of a load module, as it counts its quanta.
-    let south_west = Post::new(module.id.row as i32 * grid.side_cells, module.id.col as i32 * grid.side_cells);
     let mut residual = ModuleResidual::default();
-    for triangle in &module.triangles {
-        let corners = triangle.map(|index| {
-            let vertex = module.vertices[usize::from(index)];
-            [i128::from(vertex.x), i128::from(vertex.y), i128::from(vertex.z)]
-        });
-        let span = |axis: usize, from: i32, low: i32, high: i32| {
-            let (least, most) = corners.iter().fold((i128::MAX, i128::MIN), |(least, most), corner| {
-                (least.min(corner[axis]), most.max(corner[axis]))
-            });
-            let first = from + (least / i128::from(quanta)) as i32;
-            let last = from + (most / i128::from(quanta)) as i32;
-            first.max(low)..=last.min(high)
-        };
-        for row in span(1, south_west.row, rect.south, rect.north) {
-            for col in span(0, south_west.col, rect.west, rect.east) {
-                let post = Post::new(row, col);
-                let at = [(col - south_west.col) * quanta, (row - south_west.row) * quanta].map(i128::from);
-                let inwards = [if col == area.east { -1 } else { 1 }, if row == area.north { -1 } else { 1 }];
-                if dem.is_void(post) {
-                    continue;
-                }
-                if let Some(size) = height_above(&corners, at, inwards, dem.height(post)).map(i32::unsigned_abs) {
-                    residual.posts += 1;
-                    residual.largest = residual.largest.max(size);
-                    residual.sum_abs += u64::from(size);
-                    residual.sum_squared += u64::from(size) * u64::from(size);
-                }
+    for number in 0..module.triangles.len() {
+        posts_in(module, number, grid, spacing, |post, corners, at| {
+            if dem.is_void(post) {
+                return;
             }
-        }
+            let size = height_above(corners, at, dem.height(post)).unsigned_abs();
+            residual.posts += 1;
+            residual.largest = residual.largest.max(size);
+            residual.sum_abs += u64::from(size);
+            residual.sum_squared += u64::from(size) * u64::from(size);
+        });
     }
     residual
 }
 
-/// How far a height stands above a triangle that holds its place, rounded to the nearest quantum, halves outwards.
-fn height_above(corners: &[[i128; 3]; 3], at: [i128; 2], inwards: [i128; 2], height: i32) -> Option<i32> {
-    let side = |from: [i128; 3], to: [i128; 3]| {
-        let (east, north) = (to[0] - from[0], to[1] - from[1]);
-        let left = east * (at[1] - from[1]) - north * (at[0] - from[0]);
-        (left, (left, -north * inwards[0], east * inwards[1]) > (0, 0, 0))
+/// The posts that a triangle of a load module owns: `each` takes the post, the triangle's corners, and the post's place
+/// among them.
+fn posts_in(
+    module: &LoadModule,
+    number: usize,
+    grid: ModuleGrid,
+    spacing: Spacing,
+    mut each: impl FnMut(Post, &[[i128; 3]; 3], [i128; 2]),
+) {
+    let (rect, area) = (grid.posts_of(module.id), grid.area());
+    let quanta = spacing.quanta_per_post();
+    // Posts of a load module, as it counts its quanta.
+    let south_west = Post::new(module.id.row as i32 * grid.side_cells, module.id.col as i32 * grid.side_cells);
+    let corners = module.triangles[number].map(|index| {
+        let vertex = module.vertices[usize::from(index)];
+        [i128::from(vertex.x), i128::from(vertex.y), i128::from(vertex.z)]
+    });
+    let span = |axis: usize, from: i32, low: i32, high: i32| {
+        let (least, most) = corners
+            .iter()
+            .fold((i128::MAX, i128::MIN), |(least, most), corner| (least.min(corner[axis]), most.max(corner[axis])));
+        let first = from + (least / i128::from(quanta)) as i32;
+        let last = from + (most / i128::from(quanta)) as i32;
+        first.max(low)..=last.min(high)
     };
-    let [a, b, c] = *corners;
-    let [(of_a, in_a), (of_b, in_b), (of_c, in_c)] = [side(b, c), side(c, a), side(a, b)];
-    if !(in_a && in_b && in_c) {
-        return None;
+    for row in span(1, south_west.row, rect.south, rect.north) {
+        for col in span(0, south_west.col, rect.west, rect.east) {
+            let at = [(col - south_west.col) * quanta, (row - south_west.row) * quanta].map(i128::from);
+            let inwards = [if col == area.east { -1 } else { 1 }, if row == area.north { -1 } else { 1 }];
+            if holds(&corners, at, inwards) {
+                each(Post::new(row, col), &corners, at);
+            }
+        }
     }
-    let whole = of_a + of_b + of_c;
-    let above = i128::from(height) * whole - (a[2] * of_a + b[2] * of_b + c[2] * of_c);
-    Some((above.signum() * ((2 * above.abs() + whole) / (2 * whole))) as i32)
 }
 
-/// The largest sum of `counts`, row by row, over any window of `rows` x `columns` load modules, cut to the area: added
-/// up one by one.
-pub(crate) fn fullest_window(grid: ModuleGrid, counts: &[u32], rows: u32, columns: u32) -> u64 {
+/// Twice the area left of each side of a triangle as seen from a place, opposite to each corner.
+fn weights(corners: &[[i128; 3]; 3], at: [i128; 2]) -> [i128; 3] {
+    let left =
+        |from: [i128; 3], to: [i128; 3]| (to[0] - from[0]) * (at[1] - from[1]) - (to[1] - from[1]) * (at[0] - from[0]);
+    let [a, b, c] = *corners;
+    [left(b, c), left(c, a), left(a, b)]
+}
+
+/// Whether a triangle holds a place, or would if it were moved a little inwards.
+fn holds(corners: &[[i128; 3]; 3], at: [i128; 2], inwards: [i128; 2]) -> bool {
+    let [a, b, c] = *corners;
+    let mut sides = weights(corners, at).into_iter().zip([(b, c), (c, a), (a, b)]);
+    sides.all(|(left, (from, to))| {
+        let (east, north) = (to[0] - from[0], to[1] - from[1]);
+        (left, -north * inwards[0], east * inwards[1]) > (0, 0, 0)
+    })
+}
+
+/// How far a height stands above a triangle that holds its place, rounded to the nearest quantum, halves outwards.
+fn height_above(corners: &[[i128; 3]; 3], at: [i128; 2], height: i32) -> i32 {
+    let weights = weights(corners, at);
+    let whole: i128 = weights.iter().sum();
+    let plane: i128 = corners.iter().zip(weights).map(|(corner, weight)| corner[2] * weight).sum();
+    let above = i128::from(height) * whole - plane;
+    (above.signum() * ((2 * above.abs() + whole) / (2 * whole))) as i32
+}
+
+/// The sum of `counts`, row by row, over every window of `rows` x `columns` load modules, cut to the area: added up
+/// one by one. Windows are named by their south-west load module.
+pub(crate) fn windows(
+    grid: ModuleGrid,
+    counts: &[u32],
+    rows: u32,
+    columns: u32,
+) -> impl Iterator<Item = (ModuleId, u64)> + '_ {
     let (rows, columns) = (rows.min(grid.rows), columns.min(grid.cols));
-    let at = |row: u32, col: u32| u64::from(counts[(row * grid.cols + col) as usize]);
-    let sum = |south: u32, west: u32| -> u64 {
+    let at = move |row: u32, col: u32| u64::from(counts[(row * grid.cols + col) as usize]);
+    let sum = move |south: u32, west: u32| -> u64 {
         (south..south + rows).map(|row| (west..west + columns).map(|col| at(row, col)).sum::<u64>()).sum()
     };
-    let origins = (0..=grid.rows - rows).flat_map(|south| (0..=grid.cols - columns).map(move |west| (south, west)));
-    origins.map(|(south, west)| sum(south, west)).max().unwrap_or(0)
+    let origins = (0..=grid.rows - rows).flat_map(move |row| (0..=grid.cols - columns).map(move |col| (row, col)));
+    origins.map(move |(row, col)| (ModuleId { row, col }, sum(row, col)))
+}
+
+/// The first triangle of each load module whose class is not that of most of the posts it holds, the smaller one where
+/// two have as many. One that holds none has the class of a post beside its centroid, and is not looked at.
+pub(crate) fn differing_classes(
+    modules: &[LoadModule],
+    mask: &Importance,
+    grid: ModuleGrid,
+    spacing: Spacing,
+) -> Vec<String> {
+    let differing = |module: &LoadModule| {
+        let number = (0..module.triangles.len()).find(|&number| {
+            let class = class_of(module, number, mask, grid, spacing);
+            class.is_some_and(|class| class != module.classes[number])
+        })?;
+        let (id, class) = (module.id, module.classes[number]);
+        Some(format!("load module {id}: triangle {number} has class {class}, the ground under it has another"))
+    };
+    modules.iter().filter_map(differing).collect()
+}
+
+fn class_of(module: &LoadModule, number: usize, mask: &Importance, grid: ModuleGrid, spacing: Spacing) -> Option<u8> {
+    let mut counts = [0u32; 256];
+    posts_in(module, number, grid, spacing, |post, _, _| counts[usize::from(mask.class(post))] += 1);
+    let most = counts.iter().copied().max().filter(|&most| 0 < most)?;
+    counts.iter().position(|&count| count == most).map(|class| class as u8)
 }
 
 /// What is wrong with the load modules of a grid and where they meet, a sentence each.
@@ -301,14 +356,14 @@ mod tests {
         assert_eq!(sum(|part| part.sum_abs), sizes.iter().map(|size| size.unsigned_abs()).sum::<u64>());
         assert_eq!(sum(|part| part.sum_squared), sizes.iter().map(|size| (size * size) as u64).sum::<u64>());
         let half = [[0, 0, 0], [4, 0, 0], [0, 4, 2]];
-        assert_eq!(height_above(&half, [1, 1], [1, 1], 1), Some(1));
-        assert_eq!(height_above(&half, [1, 1], [1, 1], 0), Some(-1));
+        assert_eq!([1, 0].map(|height| height_above(&half, [1, 1], height)), [1, -1]);
     }
 
     #[test]
-    fn the_fullest_window_is_added_up_one_by_one() {
+    fn windows_are_added_up_one_by_one() {
         let grid = ModuleGrid { rows: 2, cols: 3, side_cells: 4 };
-        assert_eq!(fullest_window(grid, &[1, 2, 3, 4, 5, 6], 2, 2), 16);
-        assert_eq!(fullest_window(grid, &[1, 2, 3, 4, 5, 6], 8, 8), 21);
+        let sums = |rows, columns| windows(grid, &[1, 2, 3, 4, 5, 6], rows, columns).map(|(_, sum)| sum);
+        assert_eq!(sums(2, 2).collect::<Vec<_>>(), [12, 16]);
+        assert_eq!(sums(8, 8).collect::<Vec<_>>(), [21]);
     }
 }

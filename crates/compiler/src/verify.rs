@@ -1,12 +1,19 @@
 //! Re-reads a database and believes nothing it says: files, TINs, load modules, sides, identities, limits.
 
+mod entries;
+mod exceeded;
+mod figures;
+mod made_from;
+mod opened;
+mod tins;
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-use database::{Folder, Manifest, ManifestState, ReportResidual};
+use database::{Folder, Manifest, ManifestState, Report, ReportResidual, files};
 use fidelity::Residuals;
-use job::{Count, DemSource, Edges, Job, LodBorder, SourceEntry, SourceFile, SourceSaid};
+use job::{DemSource, Edges, Job, LodBorder, SourceEntry, SourceFile, SourceSaid};
 use limits::{polygons_of, triangles_of};
 use schedule::Workers;
 use terrain::{LoadModule, ModuleId, Side};
@@ -23,6 +30,8 @@ use crate::report::residual_of;
 pub struct Verdict {
     /// What is wrong, a sentence each; empty when the database is sound.
     pub problems: Vec<String>,
+    /// What could not be checked, and why, a sentence each.
+    pub unchecked: Vec<String>,
     /// Files whose content was checked against its checksums and stamps.
     pub checked_files: usize,
     /// Load modules whose triangles, sides and counts were checked.
@@ -43,6 +52,10 @@ pub fn verify(folder: &Path, dem: Option<&Path>) -> Result<Verdict, CompileError
         return Ok(verdict);
     }
     let folder = Folder::new(folder);
+    verdict.problems = entries::leading_out(&manifest);
+    if !verdict.problems.is_empty() {
+        return Ok(verdict);
+    }
     let damage = folder.verify(&manifest)?;
     verdict.checked_files = listed(&manifest);
     verdict.problems.extend(damage.iter().map(|damage| format!("{}: {}", damage.path.display(), damage.error)));
@@ -50,20 +63,100 @@ pub fn verify(folder: &Path, dem: Option<&Path>) -> Result<Verdict, CompileError
         return Ok(verdict);
     }
     let (job, area) = job_of(&manifest, folder.dir())?;
-    let levels = read_levels(&folder, &area, job.lod.level_count())?;
-    let modules = &levels[0];
-    verdict.checked_modules = modules.len();
-    verdict.problems.extend(check_levels(&job, &area, &levels));
-    // With constrained edges no limit is ever exceeded; with clipped ones only where a breach says so.
-    if job.modules.edges == Edges::Constrained || manifest.totals.breaches == 0 {
-        verdict.problems.extend(check_limits(&job, &area, modules));
+    verdict.problems = entries::problems(&manifest, &job, &area);
+    if !verdict.problems.is_empty() {
+        return Ok(verdict);
     }
-    verdict.problems.extend(check_totals(&manifest, modules));
+    let opened = opened::open(&folder, &job, &area)?;
+    let levels = &opened.levels;
+    verdict.checked_modules = levels[0].len();
+    verdict.problems.extend(check_levels(&job, &area, levels));
+    verdict.problems.extend(opened.problems);
+    // Only load modules that are sound in themselves are held against anything else.
+    if verdict.problems.is_empty() {
+        check_sums(
+            &Whole { folder: &folder, manifest: &manifest, job: &job, area: &area },
+            levels,
+            &mut verdict,
+            |tins| made_from::problems(&manifest, &job, &area, tins, &opened.fingerprints),
+        )?;
+    }
     if let Some(dem) = dem {
-        let residuals = recompute(job, &area, dem, &levels, &mut verdict.problems)?;
+        let report = folder.report().ok();
+        let residuals = recompute(job, &area, dem, levels, report.as_ref(), &mut verdict)?;
         verdict.residual = Some(residual_of(&residuals.total()));
     }
     Ok(verdict)
+}
+
+/// A database and its job.
+struct Whole<'a> {
+    folder: &'a Folder,
+    manifest: &'a Manifest,
+    job: &'a Job,
+    area: &'a GamingArea,
+}
+
+/// Everything that is counted over many load modules: TINs, limits, totals, the report.
+fn check_sums(
+    whole: &Whole,
+    levels: &[Modules],
+    verdict: &mut Verdict,
+    made_from: impl FnOnce(&tins::OfTins) -> (Vec<String>, Vec<String>),
+) -> Result<(), CompileError> {
+    let &Whole { folder, manifest, job, area } = whole;
+    let modules = &levels[0];
+    let tins = tins::check(folder, manifest, job, area, modules)?;
+    verdict.problems.extend(tins.problems.iter().cloned());
+    verdict.problems.extend(levels.iter().flat_map(|modules| figures::impossible(area, modules)));
+    verdict.problems.extend(check_polygons(job, levels));
+    if !verdict.problems.is_empty() {
+        return Ok(());
+    }
+    let (problems, unchecked) = made_from(&tins);
+    verdict.problems.extend(problems);
+    verdict.unchecked.extend(unchecked);
+    let report = if folder.path(files::REPORT).exists() { Some(folder.report()?) } else { None };
+    let counts = exceeded::counts(job, area, modules);
+    let mut exceeded = exceeded::of_counts(area, &counts);
+    verdict.problems.extend(exceeded::wrong_states(manifest, area, &exceeded));
+    let total = figures::Total::of(modules.values().map(|module| module.residual));
+    exceeded.extend(exceeded::of_residuals(job, &total));
+    let (problems, unchecked) = exceeded::check(folder, job, report.as_ref(), &exceeded);
+    verdict.problems.extend(problems);
+    verdict.unchecked.extend(unchecked);
+    verdict.problems.extend(figures::differing_totals(manifest, area, modules, (&counts, &exceeded), &tins));
+    let measured = figures::measured(folder, manifest, area, levels, &tins);
+    verdict.problems.extend(measured.problems);
+    if let Some(report) = &report {
+        let of_files = (&counts[..], &tins, measured.sums.as_ref());
+        verdict.problems.extend(figures::differing_report(report, job, area, levels, of_files));
+        verdict.unchecked.extend(unchecked_figures(report));
+    }
+    Ok(())
+}
+
+/// What a report says that no file of the database shows.
+fn unchecked_figures(report: &Report) -> Option<String> {
+    let is_of_other_ground = report.warnings.iter().any(|warning| warning.contains("made from other ground"));
+    is_of_other_ground.then(|| "residuals in report.json: it says that tiles were made from other ground".to_owned())
+}
+
+/// Polygons of load modules that nothing cut: every triangle is one.
+fn check_polygons(job: &Job, levels: &[Modules]) -> Vec<String> {
+    let mut problems = Vec::new();
+    let first = usize::from(job.modules.edges != Edges::Constrained);
+    for (level, modules) in levels.iter().enumerate().skip(first) {
+        let wrong = modules.values().filter(|module| module.polygon_count as usize != module.triangles.len());
+        problems.extend(wrong.map(|module| {
+            let (id, polygons, triangles) = (module.id, module.polygon_count, module.triangles.len());
+            at_level(
+                level,
+                format!("load module {id}: {polygons} polygons, and each of its {triangles} triangles is one"),
+            )
+        }));
+    }
+    problems
 }
 
 fn listed(manifest: &Manifest) -> usize {
@@ -98,20 +191,6 @@ pub(crate) fn read_modules(folder: &Folder, area: &GamingArea) -> Result<Modules
     for &tile in &area.tiles {
         let (_, modules) = folder.read_modules(tile)?;
         all.extend(modules.into_iter().map(|module| (module.id, module)));
-    }
-    Ok(all)
-}
-
-/// The same at every level, the finest first; a level that is not in all files lacks load modules, and one that the job
-/// does not want comes after the others.
-fn read_levels(folder: &Folder, area: &GamingArea, level_count: usize) -> Result<Vec<Modules>, CompileError> {
-    let mut all = vec![BTreeMap::new(); level_count];
-    for &tile in &area.tiles {
-        let (_, levels) = folder.read_levels(tile)?;
-        all.resize_with(all.len().max(levels.len()), BTreeMap::new);
-        for (own, modules) in all.iter_mut().zip(levels) {
-            own.extend(modules.into_iter().map(|module| (module.id, module)));
-        }
     }
     Ok(all)
 }
@@ -167,7 +246,10 @@ fn check_modules(area: &GamingArea, modules: &Modules) -> Vec<String> {
         let north = modules.get(&ModuleId { row: module.row + 1, ..module });
         for (other, side) in [(east, Side::East), (north, Side::North)] {
             if other.is_some_and(|other| side_of(found, side) != side_of(other, side.opposite())) {
-                problems.push(format!("load module {module}: its {side:?} side differs from its neighbour's: a crack"));
+                problems.push(format!(
+                    "load module {module}: its {} side differs from its neighbour's: a crack",
+                    if side == Side::East { "eastern" } else { "northern" }
+                ));
             }
         }
     }
@@ -200,57 +282,30 @@ fn side_of(module: &LoadModule, side: Side) -> Vec<(u16, i32)> {
     vertices.map(along).collect()
 }
 
-/// Counts against every limit, from the load modules themselves.
-fn check_limits(job: &Job, area: &GamingArea, modules: &Modules) -> Vec<String> {
-    let count = |module: &LoadModule| match job.limits.count {
-        Count::Triangles => module.triangles.len() as u32,
-        Count::Polygons => module.polygon_count,
-    };
-    let counts: Vec<u32> = area.grid.all().iter().map(|module| modules.get(&module).map_or(0, count)).collect();
-    let budget = &area.budget;
-    let mut problems = Vec::new();
-    let above: u64 = counts.iter().map(|&count| u64::from(count.saturating_sub(budget.per_module))).sum();
-    if budget.pool < above {
-        problems.push(format!("load modules: {above} triangles above the limit, the pool has {}", budget.pool));
-    }
-    let worst = recount::fullest_window(budget.grid, &counts, budget.windows.rows, budget.windows.cols);
-    if u64::from(budget.per_window) < worst {
-        problems.push(format!("windows: {worst} triangles in one, the limit is {}", budget.per_window));
-    }
-    let total: u64 = counts.iter().map(|&count| u64::from(count)).sum();
-    if budget.area < total {
-        problems.push(format!("area: {total} triangles, the limit is {}", budget.area));
-    }
-    problems
-}
-
-fn check_totals(manifest: &Manifest, modules: &Modules) -> Vec<String> {
-    let sum = |of: fn(&LoadModule) -> u64| modules.values().map(of).sum::<u64>();
-    let totals = &manifest.totals;
-    let pairs = [
-        ("triangles", sum(|module| module.triangles.len() as u64), totals.triangles),
-        ("polygons", sum(|module| u64::from(module.polygon_count)), totals.polygons),
-        ("posts", sum(|module| u64::from(module.residual.posts)), totals.residual_posts),
-        ("sum of squared residuals", sum(|module| module.residual.sum_squared), totals.residual_sum_squared),
-    ];
-    let differing = pairs.iter().filter(|(_, found, listed)| found != listed);
-    differing.map(|(what, found, listed)| format!("{what}: {found} in the files, {listed} in database.json")).collect()
-}
-
 /// Residuals against a DEM, load module by load module; those that disagree with the files are problems.
 fn recompute(
     mut job: Job,
     area: &GamingArea,
     dem: &Path,
     levels: &[Modules],
-    problems: &mut Vec<String>,
+    report: Option<&Report>,
+    verdict: &mut Verdict,
 ) -> Result<Residuals, CompileError> {
     let written = dem.display().to_string();
     let said = SourceSaid::default();
     let files = vec![SourceFile { written: written.clone(), path: dem.into(), said: said.clone() }];
     job.dem.source = DemSource::Files { written: vec![SourceEntry { name: written, said }], files };
-    job.importance.areas.clear();
-    let ground = Ground::open(&job, area, &Workers::new(1), &AtomicBool::new(false))?;
+    let open = |job: &Job| Ground::open(job, area, &Workers::new(1), &AtomicBool::new(false));
+    // The files of areas of importance may be gone, and then nothing is known of classes.
+    let (ground, has_classes) = match open(&job) {
+        Ok(ground) => (ground, true),
+        Err(_) => {
+            job.importance.areas.clear();
+            verdict.unchecked.push("classes: the files that importance.areas names cannot be read".into());
+            (open(&job)?, false)
+        }
+    };
+    let problems = &mut verdict.problems;
     let mut all = Residuals::default();
     let mut bounds = ground.relief.bounds;
     for &tile in &area.tiles {
@@ -266,12 +321,19 @@ fn recompute(
             if level == 0 {
                 all.merge(&residuals);
             }
-            let of_level = differing_residuals(&own, modules, &window, area);
+            let mut of_level = differing_residuals(&own, modules, &window, area);
+            if has_classes {
+                of_level.extend(recount::differing_classes(&own, &window.importance, area.grid, area.frame.spacing));
+            }
             problems.extend(of_level.into_iter().map(|problem| at_level(level, problem)));
         }
     }
     if let Some(bounds) = bounds {
         problems.extend(outside(&levels[0], bounds, &all));
+    }
+    if let Some(report) = report {
+        let classes = if has_classes { &job.importance.classes[..] } else { &[] };
+        problems.extend(figures::differing_residuals(report, &all, classes));
     }
     Ok(all)
 }

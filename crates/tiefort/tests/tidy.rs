@@ -52,6 +52,7 @@ const ARROWS: [(&str, &[&str]); 22] = [
         "compiler",
         &[
             "terrain",
+            "load-module-reader",
             "geometry",
             "limits",
             "mask",

@@ -31,6 +31,7 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let verdict = compiler::verify(&arguments.database, arguments.dem.as_deref())?;
     let mut text: String = verdict.problems.iter().map(|problem| format!("{problem}\n")).collect();
+    text += &verdict.unchecked.iter().map(|what| format!("not checked: {what}\n")).collect::<String>();
     let checked = format!(
         "{} files and {} load modules checked",
         grouped(verdict.checked_files as u64),
