@@ -226,6 +226,16 @@ impl Folder {
         json::decode(&path, &read(&path)?)
     }
 
+    /// The text of a file of this name, which has no form of ours.
+    ///
+    /// # Errors
+    /// When the file is missing or no text.
+    pub fn read_text(&self, name: &str) -> Result<String, DatabaseError> {
+        let path = self.path(name);
+        let text = String::from_utf8(read(&path)?);
+        text.map_err(|error| DatabaseError::Malformed { path, section: "text", what: error.to_string() })
+    }
+
     /// How a file looks now.
     ///
     /// # Errors

@@ -126,7 +126,7 @@ pub(crate) fn check(
     }));
     for (name, read) in [(files::BREACHES, geojson as Reading), (files::BREACHES_CSV, csv)] {
         // A person may have taken it away; one that lies there has the bytes that the report says.
-        let Ok(text) = std::fs::read_to_string(folder.path(name)) else { continue };
+        let Ok(text) = folder.read_text(name) else { continue };
         if report.files.contains_key(name)
             && !read(&text).into_iter().eq(report.breaches.iter().map(exceeded_of).map(Some))
         {
