@@ -285,6 +285,16 @@ fn understated_polygons_of_clipped_load_modules_are_told() {
     check("clip", &table);
 }
 
+#[test]
+fn breaches_that_are_left_out_or_altered_are_told() {
+    let table: [(&str, Alter, Alter, &str); 3] = [
+        ("a breach", nothing, |f| drop(f.report.breaches.pop()), "and report.json lists no such breach"),
+        ("its count", nothing, |f| f.report.breaches[0].count += 1, "lists a breach that is not there"),
+        ("its excess", nothing, |f| f.report.breaches[0].excess += 1, "which is not their difference"),
+    ];
+    check("clip", &table);
+}
+
 fn fewer_polygons(forged: &mut Forged) {
     for module in forged.modules.iter_mut().flat_map(|(_, levels)| &mut levels[0]) {
         module.polygon_count = module.polygon_count.min(8);
