@@ -3,21 +3,20 @@
 use std::path::Path;
 
 use database::{Database, Folder, Manifest, ManifestState, Previous, Report, TileState};
+use ground::{GamingArea, Ground};
 use job::Job;
 use schedule::Workers;
 use source_files::FileState;
 
-use crate::area::GamingArea;
 use crate::assemble::assemble;
 use crate::enforce::enforce;
-use crate::ground::Ground;
 use crate::publish::{beginning, database_area, publish};
 use crate::refine::refine;
 use crate::report::Findings;
 use crate::run::{ALGORITHM_REVISION, Options, Run};
 use crate::survey::{allocate, survey};
 use crate::tins::Tins;
-use crate::{CompileError, Event, Progress, Stage, sources};
+use crate::{CompileError, Event, Progress, Stage};
 
 /// A finished build.
 #[derive(Debug)]
@@ -109,8 +108,8 @@ pub(crate) fn open_with<'a>(
     let workers = Workers::new(options.workers);
     progress.tell(Event::Enter(Stage::Read, 0));
     // Before anything is read, so that a change in between shows.
-    let states = sources::states(job)?;
-    let records = sources::records(job)?;
+    let states = ground::states(job)?;
+    let records = ground::records(job)?;
     let ground = Ground::open(job, &area, &workers, options.stop)?;
     progress.tell(Event::Leave(Stage::Read));
     for warning in &ground.warnings {
@@ -133,7 +132,7 @@ fn unchanged(job: &Job, folder: &Path, progress: &mut dyn Progress) -> Result<Op
     }
     GamingArea::new(job)?;
     progress.tell(Event::Enter(Stage::Read, 0));
-    let records = sources::records(job)?;
+    let records = ground::records(job)?;
     let (database, _) = Database::create_or_open(folder, &database_area(job))?;
     // Looked at again, now that nobody else can change it.
     let manifest = there.manifest()?;

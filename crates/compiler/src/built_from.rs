@@ -4,11 +4,11 @@ use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
 use database::{Folder, ManifestState};
+use ground::Ground;
 use schedule::Workers;
 use terrain::{Dem, PostRect};
 
 use crate::CompileError;
-use crate::ground::Ground;
 use crate::measures::choose_ground;
 use crate::verify::job_of;
 

@@ -3,9 +3,9 @@
 use std::fmt;
 
 use database::{DatabaseError, FingerprintBuilder, MadeFrom, Stamp, TileRecord, TileState};
+use ground::Window;
 use terrain::TileId;
 
-use crate::ground::Window;
 use crate::refinement::Refinement;
 use crate::run::{ALGORITHM_REVISION, Run};
 

@@ -112,9 +112,7 @@ pub fn explain(
 ) -> Result<Explanation, CompileError> {
     let wanted = Wanted { part: None, ground, workers };
     let (product, no_ground) = match product(folder, &wanted) {
-        Err(error @ (CompileError::Impossible { .. } | CompileError::Source(_)))
-            if matches!(ground, WantedGround::Recorded) =>
-        {
+        Err(error) if error.is_of_the_job() && matches!(ground, WantedGround::Recorded) => {
             let without = product(folder, &Wanted { ground: WantedGround::None, ..wanted })?;
             (without, Some(error.to_string()))
         }

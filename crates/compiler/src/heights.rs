@@ -5,12 +5,12 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
+use ground::{decode, warnings_of};
 use schedule::Workers;
 use source_files::{DemFile, Mosaic, MosaicRules, MosaicVoids, RasterFrame, Reading, Resampling, VoidPolicy};
 use terrain::{Dem, Post, PostRect, TileId, quanta_of_metres};
 
 use crate::look::{SuitingGrid, suiting_grid};
-use crate::sources::{decode, warnings_of};
 use crate::{CompileError, Event, Progress, Stage};
 
 /// Rows that are resampled at once.

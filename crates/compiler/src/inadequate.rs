@@ -10,6 +10,7 @@ use std::sync::atomic::AtomicBool;
 use database::{Folder, ManifestState};
 use geometry::Facet;
 use geometry::owned::{PostGrid, visit_residuals};
+use ground::{GamingArea, Ground, Window};
 use job::{Count, Job};
 use schedule::Workers;
 use terrain::{
@@ -18,8 +19,6 @@ use terrain::{
 };
 
 use crate::CompileError;
-use crate::area::GamingArea;
-use crate::ground::{Ground, Window};
 use crate::measures::{choose_ground, locate_weights};
 use crate::verify::{job_of, read_modules};
 

@@ -2,11 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
+use ground::{covered, utm_of};
 use source_files::{Crs, DemFile, RasterFrame, Reading, SourceError};
 use terrain::{GridFrame, PostRect, Spacing};
 
 use crate::CompileError;
-use crate::locate::{covered, utm_of};
 use crate::outlook::Sampled;
 
 /// What a raster is.

@@ -5,12 +5,11 @@ use std::sync::atomic::AtomicBool;
 
 use database::{Fingerprint, Folder, Manifest, ManifestState, SourceRecord, Totals};
 use fidelity::{DemGround, Measures, ResidualFigures, Triangles, regular_grid};
+use ground::{GamingArea, Ground, Window};
 use job::{AreaShape, DemSource, Job, NamedFile, SourceEntry, SourceFile, SourceSaid, Voids};
 use schedule::Workers;
 use terrain::{Dem, Importance, Metres, QUANTA_PER_METRE};
 
-use crate::area::GamingArea;
-use crate::ground::{Ground, Window};
 use crate::verify::{job_of, read_modules};
 use crate::{CompileError, Mesh};
 

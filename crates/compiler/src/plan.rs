@@ -1,10 +1,10 @@
 //! What a job will do and take, before any work.
 
+use ground::GamingArea;
 use job::{Edges, Job, TileOrder};
 use terrain::{ModuleRect, PostRect, Side, TileId};
 
 use crate::CompileError;
-use crate::area::GamingArea;
 use crate::forecast::{Forecast, forecast};
 use crate::tasks::is_surveyed;
 

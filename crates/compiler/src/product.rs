@@ -6,12 +6,11 @@ use std::sync::atomic::AtomicBool;
 
 use database::{Folder, Manifest, ManifestState};
 use fidelity::each_residual;
+use ground::{GamingArea, Ground, Window};
 use job::{Count, Job};
 use schedule::Workers;
 use terrain::{Dem, GridFrame, LoadModule, ModuleGrid, ModuleRect, Post, PostRect, TileId};
 
-use crate::area::GamingArea;
-use crate::ground::{Ground, Window};
 use crate::measures::choose_ground;
 use crate::plan::{PlannedTile, planned_tiles};
 use crate::verify::job_of;

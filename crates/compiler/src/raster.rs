@@ -8,6 +8,7 @@ use std::sync::{Arc, OnceLock};
 use database::ReportResidual;
 use fidelity::Tally;
 use geometry::WORKING_POSTS_MAX;
+use ground::{GivenPost, Window, chosen, posts_of_file, refused, start_posts};
 use job::{ErrorKey, Optimising, StartMethod};
 use schedule::{Event as Scheduled, RankedTasks, Workers, in_rank_order_observed};
 use terrain::{
@@ -17,8 +18,6 @@ use terrain::{
 use tiling::{Gains, Order, Tiling, points_equally, points_globally};
 use tin::{CostUnit, Frame, LastBatch, Proximity, Rule, Stop, SurveyTask, TileTask};
 
-use crate::given::{GivenPost, chosen, posts_of_file, refused, start_posts};
-use crate::ground::Window;
 use crate::heights::Heights;
 use crate::refinement::{Most, Refinement};
 use crate::tasks::{inherited, posts_of};

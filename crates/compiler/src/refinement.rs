@@ -1,13 +1,11 @@
 //! One tile's refinement: grown to its budget, or grown beyond it and optimised.
 
+use ground::{GivenPost, Window, border_posts, start_posts};
 use job::{Effort, HeightFit, Job, Lattice, Method, Optimising};
 use limits::Allowance;
 use optimiser::{Budget, Optimised, Task, fill, optimise, overshoot};
 use terrain::{Dem, LatticePoint, Post, PostRect, THOUSANDTHS, TileTin, Tin, Vertex};
 use tin::{Frame, Rule, Stop, TileTask};
-
-use crate::given::{GivenPost, border_posts, start_posts};
-use crate::ground::Window;
 
 /// Room in a window of load modules while a tile is grown beyond its budget.
 const NO_LIMIT: u32 = u32::MAX / 4;

@@ -4,13 +4,12 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use database::{Database, FingerprintBuilder, Manifest, SourceRecord, Stamp};
+use ground::{GamingArea, Ground, Window};
 use job::Job;
 use schedule::{Event as Scheduled, RankedTasks, Workers, in_rank_order_observed};
 use source_files::FileState;
 use terrain::{TileId, TileTin};
 
-use crate::area::GamingArea;
-use crate::ground::{Ground, Window};
 use crate::tins::Tins;
 use crate::{CompileError, Event, Progress, Stage};
 
@@ -118,7 +117,7 @@ impl Run<'_> {
 
     /// The ground of a tile.
     pub fn window(&self, tile: TileId) -> Result<Arc<Window>, CompileError> {
-        self.ground.tile(&self.area, tile)
+        Ok(self.ground.tile(&self.area, tile)?)
     }
 
     /// A stamp of this revision for inputs that `feed` adds to a window's.

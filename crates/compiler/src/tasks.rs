@@ -2,6 +2,7 @@
 
 use std::ops::Deref;
 
+use ground::GamingArea;
 use job::{Allocation, Borders, Budget as PointBudget, Edges, Effort, ErrorKey, Job, LastBatch, Method, OuterBorder};
 use limits::Allowance;
 use terrain::{LatticePoint, ModuleId, ModuleRect, Post, SeamSides, Side, TileId, TileTin, Vertex};
@@ -9,7 +10,6 @@ use tiling::{Tiling, outer_border_posts, outer_sides};
 use tin::{CostUnit, Frame, Proximity, Rule, Stop, SurveyTask, TileTask};
 
 use crate::CompileError;
-use crate::area::GamingArea;
 use crate::refinement::{Most, Refinement, optimising};
 
 /// A survey looks this many times further than an equal share.

@@ -6,15 +6,13 @@ use std::sync::atomic::AtomicBool;
 
 use database::{Folder, Manifest, ManifestState, ReportResidual};
 use fidelity::Residuals;
+use ground::{Bounds, GamingArea, Ground, Window};
 use job::{Count, DemSource, Edges, Job, LodBorder, SourceEntry, SourceFile, SourceSaid};
 use limits::{polygons_of, triangles_of};
 use schedule::Workers;
 use terrain::{LoadModule, ModuleId, Side};
 
 use crate::CompileError;
-use crate::area::GamingArea;
-use crate::bounds::Bounds;
-use crate::ground::{Ground, Window};
 use crate::recount;
 use crate::report::residual_of;
 

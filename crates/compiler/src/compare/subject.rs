@@ -6,6 +6,7 @@ use std::sync::atomic::AtomicBool;
 
 use fidelity::Tally;
 use geometry::WORKING_POSTS_MAX;
+use ground::{GamingArea, Ground, decode, reading};
 use job::{DemSource, Job, SourceFile};
 use methods::Ground as MethodGround;
 use schedule::Workers;
@@ -13,11 +14,8 @@ use source_files::{DemFile, Reading, VoidPolicy};
 use terrain::{Dem, Metres, Post, PostRect, Tin, quanta_of_metres};
 
 use super::{CompareGround, CompareRequest, Equivalent, Made};
-use crate::area::GamingArea;
-use crate::ground::Ground;
 use crate::heights::{Heights, has_square_posts};
 use crate::raster::{TinRequest, untiled};
-use crate::sources::{decode, reading};
 use crate::tin_tally::tally_of;
 use crate::{CompileError, TinMethod, TinStart};
 

@@ -4,6 +4,7 @@
 //! failed stay in `KEPT`.
 
 use compiler::CompileError;
+use ground::GroundError;
 use terrain::Dem;
 
 use crate::modes::write_polygon;
@@ -130,7 +131,7 @@ fn run(seed: u64) -> bool {
             check(&scene, &dem);
             true
         }
-        Err(CompileError::Impossible { .. }) => {
+        Err(CompileError::Impossible { .. } | CompileError::Ground(GroundError::Impossible { .. })) => {
             let error = scene.try_build("area", 1).expect_err("a build that the plan refuses");
             assert!(error.hint().is_some() && !scene.path("area").exists(), "{error}");
             false

@@ -138,7 +138,7 @@ fn request(arguments: &Arguments) -> Result<CompareRequest, Failure> {
 }
 
 fn load(path: &Path) -> Result<Job, Failure> {
-    Ok(Job::load_with(path, &compiler::find_area)?)
+    Ok(Job::load_with(path, &ground::find_area)?)
 }
 
 /// When no method could make the points it was asked for, that is an error.

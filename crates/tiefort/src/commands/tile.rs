@@ -38,7 +38,7 @@ pub struct Arguments {
 
 /// Re-runs the tile.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
-    let mut job = Job::load_with(&arguments.job, &compiler::find_area)?;
+    let mut job = Job::load_with(&arguments.job, &ground::find_area)?;
     job.dem.strict = arguments.run.strict;
     check_tile(&job, arguments.tile)?;
     let what = format!("re-running tile {},{} of", arguments.tile.row, arguments.tile.col);

@@ -4,12 +4,12 @@ use job::{Job, Voids};
 use source_files::{Patch, SourceError, Standing, VoidSummary};
 use terrain::PostRect;
 
-use crate::CompileError;
+use crate::GroundError;
 use crate::area::GamingArea;
 
 /// How many posts of the area stand how, and where there is nothing.
 #[derive(Clone)]
-pub(crate) struct Census {
+pub struct Census {
     pub filled: usize,
     pub void: usize,
     pub gap: usize,
@@ -67,10 +67,10 @@ impl Census {
     ///
     /// # Errors
     /// When ground is missing and the job wants none to be.
-    pub fn judge(&self, job: &Job, area: &GamingArea) -> Result<VoidSummary, CompileError> {
+    pub fn judge(&self, job: &Job, area: &GamingArea) -> Result<VoidSummary, GroundError> {
         let of = area.rect.post_count();
         if self.gap + self.void == of {
-            return Err(CompileError::Impossible {
+            return Err(GroundError::Impossible {
                 key: "dem.sources".into(),
                 found: "no height in the whole area".into(),
                 expected: "heights in some of it at least".into(),

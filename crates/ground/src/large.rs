@@ -7,15 +7,15 @@ use schedule::Workers;
 use source_files::{DemFile, Look, SourceError, WideMosaic, Windows, window_under};
 use terrain::{PostRect, TileId};
 
+use crate::GroundError;
 use crate::area::GamingArea;
 use crate::datums::{datum_of, judge_datums};
-use crate::sources::{Decoded, Source, area_crs, mosaic_rules, nothing_reaches, raised, reading, union, warnings_of};
-use crate::{CompileError, Stage};
+use crate::source::{Decoded, Source, area_crs, mosaic_rules, nothing_reaches, raised, reading, union, warnings_of};
 
 /// Bytes that rasters may take under an area and still be decoded whole.
-pub(crate) const WHOLE_BYTES_MAX: u64 = 96 << 20;
+pub const WHOLE_BYTES_MAX: u64 = 96 << 20;
 /// Bytes of decoded strips and tiles that are kept otherwise: two rows of tiles of an area 40,001 posts wide.
-pub(crate) const CACHE_BYTES_MAX: u64 = 128 << 20;
+pub const CACHE_BYTES_MAX: u64 = 128 << 20;
 
 /// What a job names, opened, with the part that lies under the area.
 struct Reaching<'a> {
@@ -28,13 +28,13 @@ struct Reaching<'a> {
 ///
 /// # Errors
 /// When one cannot be used for this area.
-pub(crate) fn open(
+pub fn open(
     job: &Job,
     area: &GamingArea,
     files: &[SourceFile],
     (workers, stop): (&Workers, &AtomicBool),
     whole_bytes_max: u64,
-) -> Result<Option<Decoded<Source>>, CompileError> {
+) -> Result<Option<Decoded<Source>>, GroundError> {
     // A system that cannot be computed is enough for a raster in that very system, held whole.
     let Ok(crs) = area_crs(job) else { return Ok(None) };
     let (mut reaching, mut warnings) = (Vec::new(), Vec::new());
@@ -94,7 +94,7 @@ pub(crate) fn open(
 }
 
 /// Whether there is one raster, on the area's own system, whose posts need no projecting and none of which is void.
-fn is_alone(job: &Job, area: &GamingArea, reaching: &[Reaching], look: &Look) -> Result<bool, CompileError> {
+fn is_alone(job: &Job, area: &GamingArea, reaching: &[Reaching], look: &Look) -> Result<bool, GroundError> {
     let [one] = reaching else { return Ok(false) };
     if job.dem.resampling == Resampling::Cubic || one.file.frame().require_epsg(job.area.epsg).is_err() {
         return Ok(false);
@@ -115,15 +115,15 @@ fn is_alone(job: &Job, area: &GamingArea, reaching: &[Reaching], look: &Look) ->
 }
 
 /// Looks at every post of a raster under the area, on all workers.
-fn look(one: &Reaching, workers: &Workers, stop: &AtomicBool) -> Result<Look, CompileError> {
+fn look(one: &Reaching, workers: &Workers, stop: &AtomicBool) -> Result<Look, GroundError> {
     const PARTS_A_WORKER: usize = 16;
     let chunks = one.file.chunks_of(one.window);
     let parts: Vec<&[u32]> = chunks.chunks(chunks.len().div_ceil(PARTS_A_WORKER * workers.count()).max(1)).collect();
     let looks = schedule::for_each_independent(&parts, workers, stop, |_, part| {
-        one.file.look(one.window, part).map_err(CompileError::from)
+        one.file.look(one.window, part).map_err(GroundError::from)
     });
     let nowhere = vec![TileId { row: 0, col: 0 }; parts.len()];
-    let looks = looks.map_err(|error| CompileError::from_schedule(Stage::Read, &nowhere, error))?;
+    let looks = looks.map_err(|error| GroundError::from_schedule(&nowhere, error))?;
     let mut all = Look::default();
     looks.into_iter().for_each(|look| all.add(look));
     Ok(all)

@@ -6,16 +6,21 @@ use schedule::RankedTasks;
 use terrain::{GridFrame, ModuleGrid, PostRect, TileId};
 use tiling::{Budget, BudgetFault, Order, Tiling};
 
-use crate::CompileError;
+use crate::GroundError;
 
 /// The gaming area of a job, divided.
-pub(crate) struct GamingArea {
+pub struct GamingArea {
+    /// Its load modules.
     pub grid: ModuleGrid,
+    /// Its posts.
     pub rect: PostRect,
+    /// Where its posts lie.
     pub frame: GridFrame,
+    /// Its tiles and their ranks.
     pub tiling: Tiling,
     /// Every tile, row-major; tasks are numbered by place in it.
     pub tiles: Vec<TileId>,
+    /// What the limits leave it.
     pub budget: Budget,
 }
 
@@ -24,7 +29,7 @@ impl GamingArea {
     ///
     /// # Errors
     /// When the limits leave no room for the initial points, or keys contradict each other.
-    pub fn new(job: &Job) -> Result<Self, CompileError> {
+    pub fn new(job: &Job) -> Result<Self, GroundError> {
         let grid = job.area.grid;
         refuse_sizes(job)?;
         let order = match job.tiles.order {
@@ -69,10 +74,10 @@ impl GamingArea {
 }
 
 /// Sizes that no tile can be refined at.
-fn refuse_sizes(job: &Job) -> Result<(), CompileError> {
+fn refuse_sizes(job: &Job) -> Result<(), GroundError> {
     let grid = job.area.grid;
     if grid.side_cells < 2 {
-        return Err(CompileError::Impossible {
+        return Err(GroundError::Impossible {
             key: "area.spacing_m".into(),
             found: format!("{}, one cell to a load module", job.area.spacing.metres()),
             expected: "at least two cells along a side".into(),
@@ -82,7 +87,7 @@ fn refuse_sizes(job: &Job) -> Result<(), CompileError> {
     let longest = |modules: u32, tiles: u32| modules.div_ceil(tiles) as usize * grid.side_cells as usize;
     let cells = longest(grid.rows, job.tiles.rows).max(longest(grid.cols, job.tiles.columns));
     if geometry::WORKING_POSTS_MAX <= cells {
-        return Err(CompileError::Impossible {
+        return Err(GroundError::Impossible {
             key: "tiles".into(),
             found: format!("{} x {}, which makes tiles of {cells} cells a side", job.tiles.rows, job.tiles.columns),
             expected: format!("tiles below {} cells a side", geometry::WORKING_POSTS_MAX),
@@ -92,9 +97,9 @@ fn refuse_sizes(job: &Job) -> Result<(), CompileError> {
     Ok(())
 }
 
-fn refuse_impossible(job: &Job, budget: &Budget) -> Result<(), CompileError> {
+fn refuse_impossible(job: &Job, budget: &Budget) -> Result<(), GroundError> {
     if job.tiles.borders == Borders::Regular && job.modules.edges == Edges::Constrained {
-        return Err(CompileError::Impossible {
+        return Err(GroundError::Impossible {
             key: "tiles.borders".into(),
             found: "\"regular\" beside edges = \"constrained\"".into(),
             expected: "\"inherit\", or edges = \"clip\"".into(),
@@ -119,7 +124,7 @@ fn refuse_impossible(job: &Job, budget: &Budget) -> Result<(), CompileError> {
                 format!("at least {:.2}", start as f64 / budget.grid.count() as f64),
             ),
         };
-        CompileError::Impossible {
+        GroundError::Impossible {
             key: key.into(),
             found,
             expected,
@@ -130,13 +135,13 @@ fn refuse_impossible(job: &Job, budget: &Budget) -> Result<(), CompileError> {
 }
 
 /// Points of constrained edges cost exactly two triangles each, so too many are known before any work.
-fn refuse_points(job: &Job, budget: &Budget) -> Result<(), CompileError> {
+fn refuse_points(job: &Job, budget: &Budget) -> Result<(), GroundError> {
     let (PointBudget::Points(points), Edges::Constrained) = (job.tin.budget, job.modules.edges) else { return Ok(()) };
     let room = (budget.area - budget.start_total()) / u64::from(limits::POINT_COST);
     if points <= room {
         return Ok(());
     }
-    Err(CompileError::Impossible {
+    Err(GroundError::Impossible {
         key: "tin.points".into(),
         found: format!("{points}, which need more triangles than mean_per_load_module leaves"),
         expected: format!("at most {room}"),

@@ -4,17 +4,17 @@ use fidelity::{SourcePosts, Tally, residuals_at_source};
 use source_files::{Patch, Raster, RasterFrame};
 use terrain::{Dem, GridFrame, PostRect};
 
-use crate::CompileError;
+use crate::GroundError;
 use crate::area::GamingArea;
 use crate::bounds::Bounds;
-use crate::sources::Source;
+use crate::source::Source;
 use crate::water::Water;
 
 /// The heights of an area.
-pub(crate) struct Relief {
-    pub source: Source,
-    pub frame: GridFrame,
-    pub water: Option<Water>,
+pub struct Relief {
+    pub(crate) source: Source,
+    pub(crate) frame: GridFrame,
+    pub(crate) water: Option<Water>,
     /// What heights must lie within before water is level; none for the sample terrain.
     pub bounds: Option<Bounds>,
 }
@@ -24,7 +24,7 @@ impl Relief {
     ///
     /// # Errors
     /// When the source has no heights there, or cannot be read any more.
-    pub fn dem(&self, rect: PostRect) -> Result<Dem, CompileError> {
+    pub fn dem(&self, rect: PostRect) -> Result<Dem, GroundError> {
         if let Some(patch) = self.patch(rect)? {
             return Ok(patch.dem());
         }
@@ -39,7 +39,7 @@ impl Relief {
     ///
     /// # Errors
     /// As [`Relief::dem`].
-    pub fn dry(&self, rect: PostRect) -> Result<Dem, CompileError> {
+    pub fn dry(&self, rect: PostRect) -> Result<Dem, GroundError> {
         let dem = match &self.source {
             Source::Sample(seed) => sample_terrain::heights(*seed, rect, self.frame.spacing),
             Source::Raster(raster) => raster.resample(&self.frame, rect)?,
@@ -58,7 +58,7 @@ impl Relief {
     ///
     /// # Errors
     /// As [`Relief::dem`].
-    pub fn patch(&self, rect: PostRect) -> Result<Option<Patch>, CompileError> {
+    pub fn patch(&self, rect: PostRect) -> Result<Option<Patch>, GroundError> {
         let patch = match &self.source {
             Source::Mosaic(mosaic) => mosaic.resample(rect),
             Source::Wide(mosaic) => mosaic.resample(rect)?,
@@ -90,7 +90,7 @@ impl Relief {
         modules: &[terrain::LoadModule],
         area: &GamingArea,
         tile: PostRect,
-    ) -> Result<Option<Tally>, CompileError> {
+    ) -> Result<Option<Tally>, GroundError> {
         match &self.source {
             Source::Raster(raster) => Ok(self.residuals_at(modules, area, raster)),
             Source::Window(windows) => {

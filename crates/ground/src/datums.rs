@@ -5,16 +5,17 @@ use std::sync::Arc;
 use job::{Job, SourceFile};
 use source_files::{Crs, DatumShift, DemFile, Geoid};
 
-use crate::CompileError;
+use crate::GroundError;
 use crate::area::GamingArea;
+use crate::source::area_crs;
 
 /// What the heights of a file are measured from: as the job says, else as the file does.
-pub(crate) fn datum_of(file: &SourceFile, opened: &DemFile) -> Option<String> {
+pub fn datum_of(file: &SourceFile, opened: &DemFile) -> Option<String> {
     file.said.vertical_datum.clone().or_else(|| opened.vertical_datum().map(str::to_owned))
 }
 
 /// How each source's heights become those of the datum that is wanted, and what a person should know.
-pub(crate) struct Datums {
+pub struct Datums {
     /// In the order of the sources; `None` where they are as wanted, or nobody knows.
     pub shifts: Vec<Option<DatumShift>>,
     pub warnings: Vec<String>,
@@ -24,11 +25,11 @@ pub(crate) struct Datums {
 ///
 /// # Errors
 /// When a source is above another datum than is wanted and the job names no grid for the way, or a grid cannot be used.
-pub(crate) fn judge_datums(
+pub fn judge_datums(
     job: &Job,
     area: &GamingArea,
     datums: &[(&SourceFile, Option<String>)],
-) -> Result<Datums, CompileError> {
+) -> Result<Datums, GroundError> {
     let known = datums.iter().find_map(|(_, datum)| datum.clone());
     let mut found = Datums { shifts: vec![None; datums.len()], warnings: Vec::new() };
     let Some(wanted) = job.dem.vertical_datum.clone().or(known) else { return Ok(found) };
@@ -61,12 +62,12 @@ struct Grids<'a> {
 }
 
 impl Grids<'_> {
-    fn shift(&mut self, file: &SourceFile, from: &str, to: &str) -> Result<DatumShift, CompileError> {
+    fn shift(&mut self, file: &SourceFile, from: &str, to: &str) -> Result<DatumShift, GroundError> {
         let (from_grid, to_grid) = (self.grid(file, from, (from, to))?, self.grid(file, to, (from, to))?);
         let shift = DatumShift { from: plain_datum(from), to: plain_datum(to), from_grid, to_grid };
-        let crs = crate::sources::area_crs(self.job)?;
+        let crs = area_crs(self.job)?;
         if !shift.covers(&crs, &self.area.frame, self.area.rect) {
-            return Err(CompileError::Impossible {
+            return Err(GroundError::Impossible {
                 key: "dem.geoids".into(),
                 found: format!("grids that do not reach all of the area, from {from} to {to}"),
                 expected: "grids that cover it".into(),
@@ -82,7 +83,7 @@ impl Grids<'_> {
         file: &SourceFile,
         datum: &str,
         (from, to): (&str, &str),
-    ) -> Result<Option<Arc<Geoid>>, CompileError> {
+    ) -> Result<Option<Arc<Geoid>>, GroundError> {
         let plain = plain_datum(datum);
         if plain.contains("ellipsoid") {
             return Ok(None);
@@ -91,7 +92,7 @@ impl Grids<'_> {
             return Ok(Some(grid.clone()));
         }
         let Some(spec) = self.job.dem.geoids.iter().find(|geoid| plain_datum(&geoid.datum) == plain) else {
-            return Err(CompileError::Impossible {
+            return Err(GroundError::Impossible {
                 key: "dem.vertical_datum".into(),
                 found: format!("heights of {} above {from}, where {to} is wanted", file.written),
                 expected: format!("one datum, or a geoid grid of {datum} to convert with"),
@@ -109,9 +110,9 @@ impl Grids<'_> {
 }
 
 /// The southernmost and northernmost latitude of the area, in degrees.
-fn latitudes(job: &Job, area: &GamingArea) -> Result<(f64, f64), CompileError> {
+fn latitudes(job: &Job, area: &GamingArea) -> Result<(f64, f64), GroundError> {
     const STEPS: i32 = 32;
-    let (crs, wgs84) = (crate::sources::area_crs(job)?, Crs::wgs84());
+    let (crs, wgs84) = (area_crs(job)?, Crs::wgs84());
     let along = |low: i32, high: i32, step: i32| low + (i64::from(high - low) * i64::from(step) / 32) as i32;
     let rect = area.rect;
     let places = (0..=STEPS).flat_map(|step| {

@@ -5,11 +5,11 @@
 
 use terrain::QUANTA_PER_METRE;
 
-use crate::CompileError;
+use crate::GroundError;
 
 /// The lowest and the highest height that any source has under the area, in quanta, as whole numbers around it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Bounds {
+pub struct Bounds {
     lowest: i32,
     highest: i32,
 }
@@ -41,13 +41,13 @@ impl Bounds {
     /// Refuses heights that reach beyond.
     ///
     /// # Errors
-    /// [`CompileError::OutsideSources`]: then this program is wrong, not the job.
-    pub fn hold(self, (lowest, highest): (i32, i32)) -> Result<(), CompileError> {
+    /// [`GroundError::OutsideSources`]: then this program is wrong, not the job.
+    pub fn hold(self, (lowest, highest): (i32, i32)) -> Result<(), GroundError> {
         if self.lowest <= lowest && highest <= self.highest {
             return Ok(());
         }
         let found_m = (metres(lowest.into()), metres(highest.into()));
-        Err(CompileError::OutsideSources { found_m, expected_m: self.metres() })
+        Err(GroundError::OutsideSources { found_m, expected_m: self.metres() })
     }
 }
 

@@ -4,7 +4,7 @@ use job::{AreaFound, AreaPlace, AreaRequest, Job, NoArea, SourceFile};
 use source_files::{Crs, DemFile, RasterFrame};
 use terrain::Spacing;
 
-use crate::sources::reading;
+use crate::source::reading;
 
 /// Load modules looked at, at most, for the largest rectangle that is covered.
 const MODULES_MAX: usize = 1 << 22;
@@ -99,7 +99,7 @@ fn around(request: &AreaRequest, place: [f64; 2], size_m: [f64; 2]) -> Result<Ar
 ///
 /// # Errors
 /// When there are none, or none lies in a zone.
-pub(crate) fn utm_of(frames: &[RasterFrame]) -> Result<Crs, NoArea> {
+pub fn utm_of(frames: &[RasterFrame]) -> Result<Crs, NoArea> {
     let wgs84 = Crs::wgs84();
     let middles = frames.iter().filter_map(|frame| {
         let [a, b] = [frame.place(0, 0), frame.place(frame.rows - 1, frame.cols - 1)];
@@ -167,7 +167,7 @@ impl Footprints<'_> {
 ///
 /// # Errors
 /// When not even one load module is covered, or the rasters lie too far apart to look at everything between.
-pub(crate) fn covered(
+pub fn covered(
     frames: &[RasterFrame],
     crs: &Crs,
     spacing: Spacing,

@@ -14,12 +14,12 @@ use source_files::{GivenFeature, GivenShape, RasterFrame, read_given};
 use terrain::{Dem, Importance, Metres, Post, PostRect, THOUSANDTHS, TileId, quanta_of_metres};
 use tin::StartPost;
 
-use crate::CompileError;
+use crate::GroundError;
 use crate::area::GamingArea;
 
 /// A post that the job gives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct GivenPost {
+pub struct GivenPost {
     /// Where.
     pub at: Post,
     /// Whether it is in whatever limits say.
@@ -32,7 +32,7 @@ pub(crate) struct GivenPost {
 
 /// What a job gives for its whole area.
 #[derive(Default)]
-pub(crate) struct Given {
+pub struct Given {
     start: Option<(StartMethod, u64)>,
     /// Whether the outer border has a point every border step and no others.
     outer_is_fixed: bool,
@@ -52,7 +52,7 @@ impl Given {
     ///
     /// # Errors
     /// When a file cannot be used, or a point of it lies where it may not.
-    pub fn open(job: &Job, area: &GamingArea) -> Result<Self, CompileError> {
+    pub fn open(job: &Job, area: &GamingArea) -> Result<Self, GroundError> {
         let outer_is_fixed = job.modules.outer_border == OuterBorder::Fixed;
         let mut given = Self { outer_is_fixed, ..Self::default() };
         match &job.tin.start {
@@ -72,7 +72,7 @@ impl Given {
         Ok(given)
     }
 
-    fn add_start(&mut self, job: &Job, area: &GamingArea, file: &NamedFile) -> Result<(), CompileError> {
+    fn add_start(&mut self, job: &Job, area: &GamingArea, file: &NamedFile) -> Result<(), GroundError> {
         for feature in read_given(&file.path, job.area.epsg)? {
             let GivenShape::Point(at) = feature.shape else {
                 return Err(wrong(&file.path, &feature, "a polygon", "points to start from"));
@@ -86,7 +86,7 @@ impl Given {
         Ok(())
     }
 
-    fn add_pins(&mut self, job: &Job, area: &GamingArea, file: &NamedFile) -> Result<(), CompileError> {
+    fn add_pins(&mut self, job: &Job, area: &GamingArea, file: &NamedFile) -> Result<(), GroundError> {
         for feature in read_given(&file.path, job.area.epsg)? {
             let height = height_of(&file.path, &feature)?;
             match (feature.pin.as_deref(), feature.shape.clone()) {
@@ -127,7 +127,7 @@ impl Given {
             }
         }
         if let Some(both) = self.posts.iter().find(|post| post.pinned && self.forbidden.contains(&post.at)) {
-            return Err(CompileError::Impossible {
+            return Err(GroundError::Impossible {
                 key: format!("tin.pins: {}", file.written),
                 found: format!("a point to add and a point to forbid at post {}", both.at),
                 expected: "one of the two".into(),
@@ -174,7 +174,7 @@ impl Given {
     ///
     /// # Errors
     /// When the method to start from cannot make the tile's share of points.
-    pub fn of_tile(&self, area: &GamingArea, tile: TileId, dem: &Dem) -> Result<Vec<GivenPost>, CompileError> {
+    pub fn of_tile(&self, area: &GamingArea, tile: TileId, dem: &Dem) -> Result<Vec<GivenPost>, GroundError> {
         let rect = area.tiling.rect(tile);
         let mut found: Vec<GivenPost> = self.posts.iter().copied().filter(|post| rect.contains(post.at)).collect();
         if let Some((method, points)) = self.start {
@@ -194,7 +194,7 @@ impl Given {
 }
 
 /// Where an area lies: what polygons need to be told of it.
-pub(crate) struct GamingAreaFrame {
+pub struct GamingAreaFrame {
     /// Its posts.
     pub rect: PostRect,
     /// Its place.
@@ -202,7 +202,7 @@ pub(crate) struct GamingAreaFrame {
 }
 
 /// The posts that a method chooses on a window, in its order, corners left out.
-pub(crate) fn chosen(ground: &MethodGround, method: StartMethod, points: usize) -> Result<Vec<Post>, Impossible> {
+pub fn chosen(ground: &MethodGround, method: StartMethod, points: usize) -> Result<Vec<Post>, Impossible> {
     let rect = ground.dem.rect();
     // Four of a method's points are the corners, which every tile has.
     let count = (points + 4).min(rect.post_count());
@@ -224,8 +224,8 @@ pub(crate) fn chosen(ground: &MethodGround, method: StartMethod, points: usize) 
 }
 
 /// What a method says no to, as an error of the key or argument that asks it.
-pub(crate) fn refused(key: &str, method: StartMethod, why: Impossible) -> CompileError {
-    CompileError::Impossible {
+pub fn refused(key: &str, method: StartMethod, why: Impossible) -> GroundError {
+    GroundError::Impossible {
         key: format!("{key}, method {}", method.name()),
         found: why.found,
         expected: why.expected,
@@ -234,7 +234,7 @@ pub(crate) fn refused(key: &str, method: StartMethod, why: Impossible) -> Compil
 }
 
 /// Of a tile's given posts those that it starts from, in their order: not those that its neighbours choose.
-pub(crate) fn start_posts(given: &[GivenPost], rect: PostRect, open: terrain::SeamSides) -> Vec<StartPost> {
+pub fn start_posts(given: &[GivenPost], rect: PostRect, open: terrain::SeamSides) -> Vec<StartPost> {
     let is_closed = |at: Post| {
         (at.row == rect.south && !open.south)
             || (at.row == rect.north && !open.north)
@@ -249,7 +249,7 @@ pub(crate) fn start_posts(given: &[GivenPost], rect: PostRect, open: terrain::Se
 }
 
 /// Given posts on a fixed outer border of the area.
-pub(crate) fn border_posts(given: &[GivenPost]) -> impl Iterator<Item = Post> {
+pub fn border_posts(given: &[GivenPost]) -> impl Iterator<Item = Post> {
     given.iter().filter(|post| post.outer).map(|post| post.at)
 }
 
@@ -287,7 +287,7 @@ impl Lattice {
     }
 
     /// The post nearest to the place of a feature, which must lie among them.
-    fn post(&self, path: &Path, feature: &GivenFeature, at: [f64; 2]) -> Result<Post, CompileError> {
+    fn post(&self, path: &Path, feature: &GivenFeature, at: [f64; 2]) -> Result<Post, GroundError> {
         let [col, row] = [0, 1].map(|axis| ((at[axis] - self.origin_m[axis]) / self.spacing_m).round());
         let fits = |v: f64| (-1e9..=1e9).contains(&v);
         let post = (fits(row) && fits(col)).then(|| Post::new(row as i32, col as i32));
@@ -303,8 +303,8 @@ impl Lattice {
 ///
 /// # Errors
 /// When the file cannot be used, or a point of it lies outside the raster.
-pub(crate) fn posts_of_file(path: &Path, frame: &RasterFrame, rect: PostRect) -> Result<Vec<GivenPost>, CompileError> {
-    let epsg = frame.crs.epsg().ok_or_else(|| CompileError::Impossible {
+pub fn posts_of_file(path: &Path, frame: &RasterFrame, rect: PostRect) -> Result<Vec<GivenPost>, GroundError> {
+    let epsg = frame.crs.epsg().ok_or_else(|| GroundError::Impossible {
         key: "--start".into(),
         found: "a raster whose coordinate system has no EPSG code".into(),
         expected: "one that places in a file can be brought to".into(),
@@ -324,7 +324,7 @@ pub(crate) fn posts_of_file(path: &Path, frame: &RasterFrame, rect: PostRect) ->
     Ok(posts)
 }
 
-fn height_of(path: &Path, feature: &GivenFeature) -> Result<Option<i32>, CompileError> {
+fn height_of(path: &Path, feature: &GivenFeature) -> Result<Option<i32>, GroundError> {
     let Some(metres) = feature.height_m else { return Ok(None) };
     let quanta = quanta_of_metres(metres);
     let found = || wrong(path, feature, &format!("a height of {metres} m"), "a height that terrain can have");
@@ -332,7 +332,7 @@ fn height_of(path: &Path, feature: &GivenFeature) -> Result<Option<i32>, Compile
 }
 
 /// The factor of an importance pin, in thousandths.
-fn factor_of(path: &Path, feature: &GivenFeature) -> Result<u32, CompileError> {
+fn factor_of(path: &Path, feature: &GivenFeature) -> Result<u32, GroundError> {
     const FACTOR_MAX: f64 = 1000.0;
     match feature.factor.map(|factor| (factor * f64::from(THOUSANDTHS)).round()) {
         Some(thousandths) if (1.0..=FACTOR_MAX * f64::from(THOUSANDTHS)).contains(&thousandths) => {
@@ -361,7 +361,7 @@ fn refuse_fixed(
     file: &NamedFile,
     feature: &GivenFeature,
     at: Post,
-) -> Result<(), CompileError> {
+) -> Result<(), GroundError> {
     let side = area.grid.side_cells;
     let is_corner = at.row % side == 0 && at.col % side == 0;
     let step = job.outer_step_cells();
@@ -384,17 +384,17 @@ fn refuse_fixed(
 }
 
 /// `error` with another hint.
-fn hinted(error: CompileError, hint: &str) -> CompileError {
+fn hinted(error: GroundError, hint: &str) -> GroundError {
     match error {
-        CompileError::Impossible { key, found, expected, .. } => {
-            CompileError::Impossible { key, found, expected, hint: hint.into() }
+        GroundError::Impossible { key, found, expected, .. } => {
+            GroundError::Impossible { key, found, expected, hint: hint.into() }
         }
         other => other,
     }
 }
 
-fn wrong(path: &Path, feature: &GivenFeature, found: &str, expected: &str) -> CompileError {
-    CompileError::Impossible {
+fn wrong(path: &Path, feature: &GivenFeature, found: &str, expected: &str) -> GroundError {
+    GroundError::Impossible {
         key: format!("{}: {}", path.display(), feature.place),
         found: found.into(),
         expected: expected.into(),

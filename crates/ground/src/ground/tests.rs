@@ -28,13 +28,13 @@ fn write_raster(folder: &Path) {
     write_heights(&folder.join("dem.tif"), &frame, rect, 32611, heights).unwrap();
 }
 
-fn open(job: &Job, whole_bytes_max: u64) -> Result<(GamingArea, Ground), CompileError> {
+fn open(job: &Job, whole_bytes_max: u64) -> Result<(GamingArea, Ground), GroundError> {
     let area = GamingArea::new(job).unwrap();
     let ground = Ground::open_within(job, &area, (&Workers::new(2), &AtomicBool::new(false)), whole_bytes_max)?;
     Ok((area, ground))
 }
 
-fn message(result: Result<(GamingArea, Ground), CompileError>) -> String {
+fn message(result: Result<(GamingArea, Ground), GroundError>) -> String {
     match result {
         Ok(_) => panic!("this job is refused"),
         Err(error) => format!("{error}; hint: {}", error.hint().unwrap_or_default()),

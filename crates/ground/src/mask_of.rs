@@ -7,21 +7,21 @@ use mask::{Mask, Polygon, Shape, Smoothing};
 use source_files::{ClassRaster, read_polygons};
 use terrain::THOUSANDTHS;
 
-use crate::CompileError;
+use crate::GroundError;
 use crate::area::GamingArea;
 use crate::relief::Relief;
 
 /// The first thing that went wrong where nothing could be returned.
 #[derive(Clone, Default)]
-pub(crate) struct Fault(Arc<Mutex<Option<CompileError>>>);
+pub struct Fault(Arc<Mutex<Option<GroundError>>>);
 
 impl Fault {
-    fn put(&self, error: CompileError) {
+    fn put(&self, error: GroundError) {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
     }
 
     /// What went wrong, if anything did.
-    pub fn take(&self) -> Result<(), CompileError> {
+    pub fn take(&self) -> Result<(), GroundError> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).take().map_or(Ok(()), Err)
     }
 }
@@ -40,7 +40,7 @@ fn water_weight(job: &Job, spec: &WaterSpec) -> u16 {
 }
 
 /// What a mask is opened for.
-pub(crate) struct Opening<'a> {
+pub struct Opening<'a> {
     pub job: &'a Job,
     pub area: &'a GamingArea,
     pub relief: &'a Arc<Relief>,
@@ -52,7 +52,7 @@ impl Opening<'_> {
     ///
     /// # Errors
     /// When a file cannot be used.
-    pub fn mask(&self, water: Vec<Polygon>) -> Result<Mask<'static>, CompileError> {
+    pub fn mask(&self, water: Vec<Polygon>) -> Result<Mask<'static>, GroundError> {
         let (job, classes) = (self.job, &self.job.importance.classes);
         let mut areas = Vec::new();
         for spec in &job.importance.areas {
@@ -71,7 +71,7 @@ impl Opening<'_> {
         Ok(Mask { default_weight: job.importance.default_weight, areas, smoothing, over: water.into_iter().collect() })
     }
 
-    fn shape(&self, spec: &ImportanceArea) -> Result<Shape<'static>, CompileError> {
+    fn shape(&self, spec: &ImportanceArea) -> Result<Shape<'static>, GroundError> {
         let (epsg, frame) = (self.job.area.epsg, self.area.frame);
         Ok(match &spec.shape {
             AreaShape::Polygons { file } => Shape::Polygons(read_polygons(&file.path, epsg)?),

@@ -16,15 +16,17 @@ use crate::given::{GamingAreaFrame, Given, GivenPost};
 use crate::large::WHOLE_BYTES_MAX;
 use crate::mask_of::{Fault, Opening};
 use crate::relief::Relief;
-use crate::sources::{Opened, Source};
+use crate::source::Source;
+use crate::sources::Opened;
 use crate::water::{Soundings, Water};
-use crate::{CompileError, Stage, sources, water};
+use crate::{GroundError, sources, water};
 
 /// Posts of an area up to which the windows of tiles are kept between stages (7 bytes a post).
-pub(crate) const KEPT_POSTS_MAX: usize = 16 << 20;
+pub const KEPT_POSTS_MAX: usize = 16 << 20;
 
 /// Where heights and weights come from.
-pub(crate) struct Ground {
+pub struct Ground {
+    /// Heights before any weight.
     pub relief: Arc<Relief>,
     mask: Mask<'static>,
     /// What went wrong in a part of the mask that reads files or heights on demand.
@@ -43,8 +45,10 @@ pub(crate) struct Ground {
 }
 
 /// The ground of a rectangle of posts.
-pub(crate) struct Window {
+pub struct Window {
+    /// Heights.
     pub dem: Dem,
+    /// Weights and classes.
     pub importance: Importance,
     /// Posts that the job gives, of a tile's own window; none of any other.
     pub given: Vec<GivenPost>,
@@ -74,17 +78,17 @@ impl Ground {
     ///
     /// # Errors
     /// When a file cannot be used for this area.
-    pub fn open(job: &Job, area: &GamingArea, workers: &Workers, stop: &AtomicBool) -> Result<Self, CompileError> {
+    pub fn open(job: &Job, area: &GamingArea, workers: &Workers, stop: &AtomicBool) -> Result<Self, GroundError> {
         Self::open_within(job, area, (workers, stop), WHOLE_BYTES_MAX)
     }
 
     /// The same, where rasters that take more than `whole_bytes_max` bytes are read by window.
-    pub(crate) fn open_within(
+    pub fn open_within(
         job: &Job,
         area: &GamingArea,
         (workers, stop): (&Workers, &AtomicBool),
         whole_bytes_max: u64,
-    ) -> Result<Self, CompileError> {
+    ) -> Result<Self, GroundError> {
         let opened = match &job.dem.source {
             DemSource::Sample { seed } => Opened {
                 source: Source::Sample(*seed),
@@ -126,8 +130,8 @@ impl Ground {
         area: &GamingArea,
         workers: &Workers,
         stop: &AtomicBool,
-    ) -> Result<(), CompileError> {
-        let of_tile = |_: usize, &tile: &TileId| -> Result<Census, CompileError> {
+    ) -> Result<(), GroundError> {
+        let of_tile = |_: usize, &tile: &TileId| -> Result<Census, GroundError> {
             let Some(patch) = self.relief.patch(area.tiling.rect(tile))? else { return Ok(Census::new()) };
             let census = Census::of(&patch, area.rect);
             if let Some(kept) = &self.kept {
@@ -140,7 +144,7 @@ impl Ground {
         // A census is some kilobytes, so those of a large area are added up as they come.
         for tiles in area.tiles.chunks(1 << 10) {
             let parts = schedule::for_each_independent(tiles, workers, stop, of_tile)
-                .map_err(|error| CompileError::from_schedule(Stage::Read, tiles, error))?;
+                .map_err(|error| GroundError::from_schedule(tiles, error))?;
             parts.iter().for_each(|part| census.add(part));
         }
         self.voids = census.judge(job, area)?;
@@ -153,7 +157,7 @@ impl Ground {
     }
 
     /// Weights and classes as the job and its pins have them.
-    fn with_importance(&self, dem: Dem) -> Result<Window, CompileError> {
+    fn with_importance(&self, dem: Dem) -> Result<Window, GroundError> {
         let importance = mask::importance(&self.mask, self.rect, &self.frame, dem.rect());
         self.fault.take()?;
         let place = GamingAreaFrame { rect: self.rect, frame: self.frame };
@@ -161,7 +165,7 @@ impl Ground {
         Ok(Window { dem, importance, given: Vec::new(), forbidden: Vec::new() })
     }
 
-    fn with_given(&self, area: &GamingArea, tile: TileId, window: Window) -> Result<Window, CompileError> {
+    fn with_given(&self, area: &GamingArea, tile: TileId, window: Window) -> Result<Window, GroundError> {
         let given = self.given.of_tile(area, tile, &window.dem)?;
         Ok(Window { given, forbidden: self.given.forbidden(area.tiling.rect(tile)), ..window })
     }
@@ -176,7 +180,7 @@ impl Ground {
     ///
     /// # Errors
     /// When the source has no heights there.
-    pub fn tile(&self, area: &GamingArea, tile: TileId) -> Result<Arc<Window>, CompileError> {
+    pub fn tile(&self, area: &GamingArea, tile: TileId) -> Result<Arc<Window>, GroundError> {
         let rect = area.tiling.rect(tile);
         let fresh = || self.with_given(area, tile, self.window(rect)?).map(Arc::new);
         let Some(kept) = &self.kept else { return fresh() };
@@ -193,7 +197,7 @@ impl Ground {
     ///
     /// # Errors
     /// When the source has no heights there.
-    pub fn around(&self, area: &GamingArea, tile: TileId, halo: i32) -> Result<Window, CompileError> {
+    pub fn around(&self, area: &GamingArea, tile: TileId, halo: i32) -> Result<Window, GroundError> {
         let wide = area.tiling.rect(tile).grown(halo);
         let rect = wide.intersection(&self.rect).expect("a tile lies inside the area");
         let mut near = area.tiling.neighbours(tile);
@@ -218,7 +222,7 @@ impl Ground {
     ///
     /// # Errors
     /// When the source has no heights there.
-    pub fn window(&self, rect: PostRect) -> Result<Window, CompileError> {
+    pub fn window(&self, rect: PostRect) -> Result<Window, GroundError> {
         self.with_importance(self.relief.dem(rect)?)
     }
 }
@@ -261,16 +265,16 @@ fn find_levels(
     area: &GamingArea,
     workers: &Workers,
     stop: &AtomicBool,
-) -> Result<Option<String>, CompileError> {
+) -> Result<Option<String>, GroundError> {
     let Some(water) = relief.water.as_ref().filter(|water| water.is_unknown()) else { return Ok(None) };
     let tiles: Vec<TileId> = area.tiles.iter().copied().filter(|&tile| water.reaches(area.tiling.rect(tile))).collect();
     let mut all = Soundings::new();
     for tiles in tiles.chunks(1 << 10) {
-        let sound = |_: usize, &tile: &TileId| -> Result<Soundings, CompileError> {
+        let sound = |_: usize, &tile: &TileId| -> Result<Soundings, GroundError> {
             Ok(water.sound(&relief.dry(area.tiling.rect(tile))?, area.rect))
         };
         let parts = schedule::for_each_independent(tiles, workers, stop, sound)
-            .map_err(|error| CompileError::from_schedule(Stage::Read, tiles, error))?;
+            .map_err(|error| GroundError::from_schedule(tiles, error))?;
         parts.into_iter().for_each(|part| water::add(&mut all, part));
     }
     let without = relief.water.as_mut().map_or(0, |water| water.level(&all));

@@ -11,7 +11,7 @@ use source_files::{Patch, Standing};
 use terrain::{Dem, GridFrame, Post, PostRect};
 
 /// Bodies of water, and their levels once they are known.
-pub(crate) struct Water {
+pub struct Water {
     bodies: Vec<Body>,
     frame: GridFrame,
 }
@@ -24,7 +24,7 @@ struct Body {
 }
 
 /// How often each height occurs in each body, within one tile or several.
-pub(crate) type Soundings = BTreeMap<usize, BTreeMap<i32, u64>>;
+pub type Soundings = BTreeMap<usize, BTreeMap<i32, u64>>;
 
 impl Water {
     /// Of the polygons that reach into the area.
@@ -133,7 +133,7 @@ fn median(counts: &BTreeMap<i32, u64>) -> Option<i32> {
 }
 
 /// Adds what another tile counted.
-pub(crate) fn add(all: &mut Soundings, other: Soundings) {
+pub fn add(all: &mut Soundings, other: Soundings) {
     for (body, counts) in other {
         let sums = all.entry(body).or_default();
         counts.into_iter().for_each(|(height, count)| *sums.entry(height).or_default() += count);
