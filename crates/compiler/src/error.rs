@@ -136,11 +136,7 @@ impl CompileError {
     }
 
     /// The error of a stage's tasks, whose numbers are the row-major places of `tiles`.
-    pub(crate) fn from_schedule<R>(
-        stage: Stage,
-        tiles: &[TileId],
-        error: ScheduleError<R, CompileError>,
-    ) -> CompileError {
+    pub fn from_schedule<R>(stage: Stage, tiles: &[TileId], error: ScheduleError<R, CompileError>) -> CompileError {
         match error {
             ScheduleError::Failed { error, .. } => error,
             ScheduleError::Panicked { task, message } => CompileError::Panicked { stage, tile: tiles[task], message },

@@ -7,7 +7,7 @@ pub use progress::{Event, Progress, Stage};
 mod error;
 pub use error::CompileError;
 mod run;
-pub use run::{ALGORITHM_REVISION, Options};
+pub use run::{ALGORITHM_REVISION, Options, run_name};
 mod cause;
 pub use cause::Cause;
 mod build;
@@ -19,7 +19,7 @@ pub use unit::{Unit, UnitEnd, perform};
 mod worker;
 pub use worker::{Sharing, WorkerEnd, work};
 mod plan;
-pub use plan::{Plan, PlannedTile, plan};
+pub use plan::{Plan, PlannedTile, plan, planned_tiles};
 mod foresee;
 pub use foresee::foresee;
 mod forecast;
@@ -29,10 +29,6 @@ pub use played::{Costs, Played, TileCosts, play};
 mod levels;
 mod look;
 pub use look::{Seen, Suggestion, look_at};
-mod status;
-pub use status::{Status, TileProgress, status};
-mod verify;
-pub use verify::{Verdict, verify};
 mod raster;
 pub use raster::{Mesh, TinMethod, TinRequest, TinStart, tin};
 mod sample;
@@ -45,23 +41,6 @@ pub use compare::{
     CompareEvent, CompareGround, CompareMethod, CompareRequest, CompareRow, Comparison, Equivalent, Forced, Impossible,
     Made, compare,
 };
-mod inadequate;
-pub use inadequate::{Component, Inadequate, inadequate};
-mod measures;
-pub use fidelity::{
-    Cover, Distances, Drainage, GRADES, Hausdorff, LineOfSight, Measures, MeshForm, Registration, ResidualFigures,
-    SeamVisibility, SlopeClasses, SlopeDifference,
-};
-pub use measures::{BuiltResidual, ClassResidual, DatabaseFidelity, Fidelity, Sights, fidelity, measure};
-
-mod product;
-pub use product::{LimitUse, NO_RESIDUAL, Product, ProductGround, Wanted, WantedGround, product};
-mod explain;
-pub use explain::{ExplainedRefusal, ExplainedWindow, Explanation, OneMore, explain};
-mod difference;
-pub use difference::{Difference, ModuleDifference, SettingDifference, difference};
-mod built_from;
-pub use built_from::BuiltFrom;
 
 mod assemble;
 mod bound;
@@ -72,10 +51,10 @@ mod heights;
 mod measured;
 mod outlook;
 mod publish;
-mod recount;
 mod refine;
 mod refinement;
 mod report;
+pub use report::residual_of;
 mod sums;
 mod survey;
 mod tasks;

@@ -378,7 +378,7 @@ fn refusals(refused: &Refused) -> ReportRefusals {
 }
 
 /// A tally as the report gives it.
-pub(crate) fn residual_of(tally: &Tally) -> ReportResidual {
+pub fn residual_of(tally: &Tally) -> ReportResidual {
     if tally.posts == 0 {
         return ReportResidual::default();
     }

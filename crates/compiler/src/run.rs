@@ -134,3 +134,12 @@ impl Run<'_> {
         Stamp { algorithm_revision: ALGORITHM_REVISION, fingerprint: feed(builder).finish() }
     }
 }
+
+/// What a run is called in `work/`: equal for all processes that build the same from the same.
+pub fn run_name(job: &str, sources: &[SourceRecord], revision: u32) -> String {
+    let mut builder = FingerprintBuilder::new("run").text(job).number(u64::from(revision));
+    for source in sources {
+        builder = builder.text(&source.path).fingerprint(source.blake3);
+    }
+    builder.finish().to_string()[..16].to_owned()
+}

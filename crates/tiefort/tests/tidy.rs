@@ -18,13 +18,16 @@ const FILE_LINES_WITH_TESTS_MAX: usize = 800;
 /// Characters of a line of code.
 const COLUMNS_MAX: usize = 120;
 
+/// Crates whose integration tests use one that lies above them, to read back what they made.
+const TESTS_READ_BACK: [(&str, &str); 1] = [("compiler", "inspect")];
+
 /// Libraries that would break a promise elsewhere: threads, serialisation, arguments, the terminal, the clock.
 const OWNED_LIBRARIES: [(&str, &[&str]); 11] = [
     ("rayon", &["schedule"]),
     ("crossbeam", &["schedule"]),
     ("serde", &["database"]),
     ("bincode", &["database"]),
-    ("serde_json", &["database", "compiler", "views", "exports", "tiefort"]),
+    ("serde_json", &["database", "compiler", "inspect", "views", "exports", "tiefort"]),
     ("clap", &["tiefort"]),
     ("indicatif", &["tiefort"]),
     ("cpu-time", &["tiefort"]),
@@ -246,7 +249,8 @@ fn every_arrow_points_down() {
     }
     for (name, manifest) in manifests() {
         for to in layers.uses(&manifest, "dev-dependencies") {
-            if layers.layer(&name) <= layers.layer(&to) {
+            let reads_back = (name.as_str(), to.as_str());
+            if layers.layer(&name) <= layers.layer(&to) && !TESTS_READ_BACK.contains(&reads_back) {
                 faults.push(format!("tests of {name} lie no higher than {to}"));
             }
         }

@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use compiler::{Wanted, WantedGround, product};
 use database::{Folder, Report};
+use inspect::{Wanted, WantedGround, product};
 
 use crate::arguments::Workers;
 use crate::failure::{Failure, Outcome};

@@ -4,11 +4,12 @@ use std::path::{Path, PathBuf};
 use std::sync::PoisonError;
 
 use clap::{ArgGroup, Args, ValueEnum};
-use compiler::{Fidelity, Mesh, Sights, Stage, TinMethod, TinRequest, TinStart};
+use compiler::{Mesh, Stage, TinMethod, TinRequest, TinStart};
 use exports::TinPlace;
+use inspect::{Fidelity, Sights};
 use job::Optimising;
 use serde_json::{Value, json};
-use terrain::StopReason;
+use terrain::{Metres, StopReason};
 use views::{Align, Coordinates, MeshPlace, Table, grouped};
 
 use crate::arguments::{Workers, positive, rows_by_columns, start_method};
@@ -217,7 +218,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     for (mesh, out) in meshes.iter().zip(&outs) {
         write(mesh, kind, arguments, out)?;
     }
-    let measure = |mesh: &Mesh| arguments.measure.then(|| compiler::measure(mesh, Sights::USUAL));
+    let measure = |mesh: &Mesh| {
+        arguments.measure.then(|| inspect::measure(&mesh.tin, &mesh.dem, Metres(mesh.spacing_m.0), Sights::USUAL))
+    };
     let measured: Vec<Option<Fidelity>> = meshes.iter().map(measure).collect();
     match show {
         Show::Nothing => {}

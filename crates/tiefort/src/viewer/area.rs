@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use axum::body::Bytes;
-use compiler::{Product, ProductGround, Wanted, WantedGround, product};
+use inspect::{Product, ProductGround, Wanted, WantedGround, product};
 use load_module_reader::{Area, Keep};
 use serde_json::json;
 use terrain::{ModuleGrid, ModuleRect};

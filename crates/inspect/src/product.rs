@@ -4,6 +4,7 @@
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
+use compiler::{CompileError, PlannedTile, Stage, planned_tiles};
 use database::{Folder, Manifest, ManifestState};
 use fidelity::each_residual;
 use ground::{GamingArea, Ground, Window};
@@ -12,9 +13,7 @@ use schedule::Workers;
 use terrain::{Dem, GridFrame, LoadModule, ModuleGrid, ModuleRect, Post, PostRect, TileId};
 
 use crate::measures::choose_ground;
-use crate::plan::{PlannedTile, planned_tiles};
 use crate::verify::job_of;
-use crate::{CompileError, Stage};
 
 /// What is wanted of a database.
 #[derive(Clone, Copy, Debug)]

@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
+use compiler::CompileError;
 use fidelity::each_residual;
 use terrain::{Dem, Importance, LoadModule, ModuleId, QUANTA_PER_METRE};
 
-use crate::CompileError;
 use crate::product::{Product, Wanted, WantedGround, product};
 
 /// What differs between two databases.

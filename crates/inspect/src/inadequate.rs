@@ -7,6 +7,7 @@ use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
+use compiler::CompileError;
 use database::{Folder, ManifestState};
 use geometry::Facet;
 use geometry::owned::{PostGrid, visit_residuals};
@@ -18,7 +19,6 @@ use terrain::{
     metres_of_quanta,
 };
 
-use crate::CompileError;
 use crate::measures::{choose_ground, locate_weights};
 use crate::verify::{job_of, read_modules};
 

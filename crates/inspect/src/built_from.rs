@@ -3,12 +3,12 @@
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
+use compiler::CompileError;
 use database::{Folder, ManifestState};
 use ground::Ground;
 use schedule::Workers;
 use terrain::{Dem, PostRect};
 
-use crate::CompileError;
 use crate::measures::choose_ground;
 use crate::verify::job_of;
 

@@ -3,15 +3,15 @@
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
+use compiler::CompileError;
 use database::{Fingerprint, Folder, Manifest, ManifestState, SourceRecord, Totals};
 use fidelity::{DemGround, Measures, ResidualFigures, Triangles, regular_grid};
 use ground::{GamingArea, Ground, Window};
 use job::{AreaShape, DemSource, Job, NamedFile, SourceEntry, SourceFile, SourceSaid, Voids};
 use schedule::Workers;
-use terrain::{Dem, Importance, Metres, QUANTA_PER_METRE};
+use terrain::{Dem, Importance, Metres, QUANTA_PER_METRE, Tin};
 
 use crate::verify::{job_of, read_modules};
-use crate::{CompileError, Mesh};
 
 /// Which pairs of places a line of sight is tried between.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -121,11 +121,11 @@ pub fn fidelity(folder: &Path, against: Option<&Path>, sights: Sights) -> Result
     Ok(DatabaseFidelity { area: manifest.area.name, against, residual, measures, no_classes })
 }
 
-/// Measures a mesh against the raster it was made from.
-pub fn measure(mesh: &Mesh, sights: Sights) -> Fidelity {
-    let triangles = &Triangles::of_tin(&mesh.tin);
-    let (polygons, spacing) = (triangles.count() as u64, Metres(mesh.spacing_m.0));
-    compare(&Subject { dem: &mesh.dem, triangles, polygons, spacing, classes: None }, sights, None)
+/// Measures a mesh against the raster it was made from, whose posts are so far apart.
+pub fn measure(tin: &Tin, dem: &Dem, spacing: Metres, sights: Sights) -> Fidelity {
+    let triangles = &Triangles::of_tin(tin);
+    let polygons = triangles.count() as u64;
+    compare(&Subject { dem, triangles, polygons, spacing, classes: None }, sights, None)
 }
 
 /// What is measured.

@@ -3,10 +3,9 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use database::{FingerprintBuilder, Folder, Held, Lock, Manifest, ManifestState, SourceRecord, TileRecord, TileState};
+use compiler::{CompileError, run_name};
+use database::{Folder, Held, Lock, Manifest, ManifestState, TileRecord, TileState};
 use terrain::TileId;
-
-use crate::CompileError;
 
 /// How one tile stands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -87,13 +86,4 @@ fn under_way(folder: &Folder, record: &TileRecord) -> TileProgress {
         Some(before) if folder.check_file(&path, &before).is_ok() => TileProgress::Earlier,
         _ => TileProgress::Done,
     }
-}
-
-/// What a run is called in `work/`: equal for all processes that build the same from the same.
-pub(crate) fn run_name(job: &str, sources: &[SourceRecord], revision: u32) -> String {
-    let mut builder = FingerprintBuilder::new("run").text(job).number(u64::from(revision));
-    for source in sources {
-        builder = builder.text(&source.path).fingerprint(source.blake3);
-    }
-    builder.finish().to_string()[..16].to_owned()
 }

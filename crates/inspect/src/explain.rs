@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
+use compiler::{CompileError, Stage};
 use database::{Folder, TileState, files};
 use fidelity::{Split, best_split};
 use job::HOLE_CLASS_NAME;
@@ -15,7 +16,6 @@ use terrain::{
 };
 
 use crate::product::{Product, Wanted, WantedGround, product};
-use crate::{CompileError, Stage};
 
 /// Everything there is to know about one load module.
 #[derive(Clone, Debug, PartialEq)]

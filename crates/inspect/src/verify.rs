@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
+use compiler::{CompileError, residual_of};
 use database::{Folder, Manifest, ManifestState, ReportResidual};
 use fidelity::Residuals;
 use ground::{Bounds, GamingArea, Ground, Window};
@@ -12,9 +13,7 @@ use limits::{polygons_of, triangles_of};
 use schedule::Workers;
 use terrain::{LoadModule, ModuleId, Side};
 
-use crate::CompileError;
 use crate::recount;
-use crate::report::residual_of;
 
 /// What a verification found.
 #[derive(Clone, Debug, Default)]
