@@ -27,36 +27,22 @@ pub use forecast::{Forecast, PAGE_MODULES_MAX, PAGE_POSTS_MAX, StageSeconds};
 mod played;
 pub use played::{Costs, Played, TileCosts, play};
 mod levels;
-mod look;
-pub use look::{Seen, Suggestion, look_at};
-mod raster;
-pub use raster::{Mesh, TinMethod, TinRequest, TinStart, tin};
-mod sample;
-pub use sample::sample;
-mod tin_levels;
-mod tin_tally;
-pub use tin_levels::tin_levels;
-mod compare;
-pub use compare::{
-    CompareEvent, CompareGround, CompareMethod, CompareRequest, CompareRow, Comparison, Equivalent, Forced, Impossible,
-    Made, compare,
-};
 
 mod assemble;
 mod bound;
 mod coarse;
 mod curves;
 mod enforce;
-mod heights;
 mod measured;
-mod outlook;
 mod publish;
 mod refine;
 mod refinement;
+pub use refinement::{Most, Refinement};
 mod report;
 pub use report::residual_of;
 mod sums;
 mod survey;
 mod tasks;
+pub use tasks::{inherited, posts_of};
 mod tins;
 mod without_limits;

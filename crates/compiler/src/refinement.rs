@@ -12,7 +12,7 @@ const NO_LIMIT: u32 = u32::MAX / 4;
 
 /// What is to be done for one tile.
 #[derive(Clone, Debug)]
-pub(crate) struct Refinement {
+pub struct Refinement {
     /// What to select, within which budget.
     pub task: TileTask,
     /// How what is selected is then optimised, if it is.
@@ -23,7 +23,7 @@ pub(crate) struct Refinement {
 
 /// Where there are no load modules, the most a mesh may have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Most {
+pub enum Most {
     /// What the task says.
     AsTask,
     /// So many triangles.

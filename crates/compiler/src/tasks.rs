@@ -216,7 +216,7 @@ pub(crate) fn side_vertices(tin: &TileTin, side: Side) -> Vec<Vertex> {
 ///
 /// # Errors
 /// The first of `published`.
-pub(crate) fn inherited<T: Deref<Target = TileTin>>(
+pub fn inherited<T: Deref<Target = TileTin>>(
     tiling: &Tiling,
     tile: TileId,
     published: impl Fn(TileId) -> Result<T, CompileError>,
@@ -236,6 +236,6 @@ pub(crate) fn inherited<T: Deref<Target = TileTin>>(
 ///
 /// # Panics
 /// When one stands between posts: seam vertices never do.
-pub(crate) fn posts_of(vertices: &[Vertex]) -> Vec<Post> {
+pub fn posts_of(vertices: &[Vertex]) -> Vec<Post> {
     vertices.iter().map(|vertex| vertex.at.post().expect("seam vertices stand on posts")).collect()
 }

@@ -19,7 +19,7 @@ const FILE_LINES_WITH_TESTS_MAX: usize = 800;
 const COLUMNS_MAX: usize = 120;
 
 /// Crates whose integration tests use one that lies above them, to read back what they made.
-const TESTS_READ_BACK: [(&str, &str); 1] = [("compiler", "inspect")];
+const TESTS_READ_BACK: [(&str, &str); 2] = [("compiler", "inspect"), ("compiler", "workbench")];
 
 /// Libraries that would break a promise elsewhere: threads, serialisation, arguments, the terminal, the clock.
 const OWNED_LIBRARIES: [(&str, &[&str]); 11] = [

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
 
+use compiler::{CompileError, Event, Most, Progress, Refinement, Stage, inherited, posts_of};
 use database::ReportResidual;
 use fidelity::Tally;
 use geometry::WORKING_POSTS_MAX;
@@ -19,10 +20,7 @@ use tiling::{Gains, Order, Tiling, points_equally, points_globally};
 use tin::{CostUnit, Frame, LastBatch, Proximity, Rule, Stop, SurveyTask, TileTask};
 
 use crate::heights::Heights;
-use crate::refinement::{Most, Refinement};
-use crate::tasks::{inherited, posts_of};
 use crate::tin_tally::tally_of;
-use crate::{CompileError, Event, Progress, Stage};
 
 /// The paper's proximity test: metres across, metres in height.
 const PROXIMITY_M: (f64, u32) = (300.0, 20);
@@ -133,7 +131,7 @@ impl Heights {
     pub fn mesh(&self, tin: Tin, stop: StopReason) -> Mesh {
         Mesh {
             points: tin.vertices.len(),
-            residual: crate::report::residual_of(&tally_of(&self.dem, &tin)),
+            residual: compiler::residual_of(&tally_of(&self.dem, &tin)),
             tin,
             dem: Arc::clone(&self.dem),
             east_m: self.frame.south_west[0],

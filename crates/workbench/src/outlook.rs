@@ -6,10 +6,10 @@
 
 use std::sync::atomic::AtomicBool;
 
+use compiler::CompileError;
 use source_files::{Crs, DemFile, MosaicRules, MosaicVoids, RasterFrame, Resampling, WideMosaic, Windows};
 use terrain::{Dem, GridFrame, PostRect};
 
-use crate::CompileError;
 use crate::raster::untiled_together;
 
 /// Windows in a row and in a column, at most: a hill in a plain is not to be missed.

@@ -4,6 +4,7 @@ use std::collections::{HashMap, VecDeque};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
+use compiler::CompileError;
 use fidelity::Tally;
 use geometry::WORKING_POSTS_MAX;
 use ground::{GamingArea, Ground, decode, reading};
@@ -17,7 +18,7 @@ use super::{CompareGround, CompareRequest, Equivalent, Made};
 use crate::heights::{Heights, has_square_posts};
 use crate::raster::{TinRequest, untiled};
 use crate::tin_tally::tally_of;
-use crate::{CompileError, TinMethod, TinStart};
+use crate::{TinMethod, TinStart};
 
 /// When a TIN is good enough.
 #[derive(Clone, Copy, Debug)]

@@ -1,5 +1,6 @@
 //! The methods by name, and what each is asked for.
 
+use compiler::CompileError;
 use job::{Optimising, StartMethod};
 use methods::{
     Boundary, Contours, Diagonal, Distance, Extrema, FowlerLittle, Ground, Impossible, LatticeTin, Splitting,
@@ -7,7 +8,7 @@ use methods::{
 use terrain::{Metres, PostRect, Tin};
 
 use super::subject::{Subject, Until};
-use crate::{CompileError, TinMethod, TinStart};
+use crate::{TinMethod, TinStart};
 
 /// Metres between the points of the regular grid of SIMNET.
 const SIMNET_M: Metres = Metres(125.0);

@@ -2,10 +2,9 @@
 
 use std::path::Path;
 
+use compiler::CompileError;
 use source_files::{write_classes, write_heights};
 use terrain::{GridFrame, PostRect, Spacing};
-
-use crate::CompileError;
 
 /// Writes the sample terrain as a GeoTIFF, and its classes as another where asked for; `size` is rows and columns of
 /// posts, and no more than a band of rows is ever held.

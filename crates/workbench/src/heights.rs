@@ -5,13 +5,13 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
+use compiler::{CompileError, Event, Progress, Stage};
 use ground::{decode, warnings_of};
 use schedule::Workers;
 use source_files::{DemFile, Mosaic, MosaicRules, MosaicVoids, RasterFrame, Reading, Resampling, VoidPolicy};
 use terrain::{Dem, Post, PostRect, TileId, quanta_of_metres};
 
-use crate::look::{SuitingGrid, suiting_grid};
-use crate::{CompileError, Event, Progress, Stage};
+use crate::suiting::{SuitingGrid, suiting_grid};
 
 /// Rows that are resampled at once.
 const BAND_ROWS: i32 = 256;

@@ -11,6 +11,7 @@ mod subject;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use compiler::{CompileError, Stage};
 use fidelity::Tally;
 use job::Job;
 use terrain::{Dem, PostRect, Tin};
@@ -18,7 +19,6 @@ use terrain::{Dem, PostRect, Tin};
 pub use choose::CompareMethod;
 pub use methods::Impossible;
 
-use crate::{CompileError, Stage};
 use curve::Curve;
 use subject::Subject;
 

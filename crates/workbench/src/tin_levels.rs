@@ -2,11 +2,11 @@
 
 use std::sync::atomic::AtomicBool;
 
+use compiler::{CompileError, Event, Progress, Stage};
 use terrain::StopReason;
 
 use crate::heights::Heights;
 use crate::raster::{Mesh, TinMethod, TinRequest};
-use crate::{CompileError, Event, Progress, Stage};
 
 /// Makes a mesh for each of `levels`, numbers of vertices that rise.
 ///

@@ -1,11 +1,12 @@
 //! The iterative method's residual after every point.
 
+use compiler::CompileError;
 use fidelity::Tally;
 use terrain::QUANTA_PER_METRE;
 
 use super::Equivalent;
 use super::subject::{Subject, Until};
-use crate::{CompileError, TinMethod};
+use crate::TinMethod;
 
 /// Sums of squared residuals of the iterative TIN, from its corners on.
 pub(super) struct Curve {
