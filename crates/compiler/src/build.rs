@@ -6,14 +6,13 @@ use database::{Database, Folder, Manifest, ManifestState, Previous, Report, Tile
 use ground::{GamingArea, Ground};
 use job::Job;
 use schedule::Workers;
-use source_files::FileState;
 
 use crate::assemble::assemble;
 use crate::enforce::enforce;
 use crate::publish::{beginning, database_area, publish};
 use crate::refine::refine;
 use crate::report::Findings;
-use crate::run::{ALGORITHM_REVISION, Options, Run};
+use crate::run::{ALGORITHM_REVISION, Options, Run, changed};
 use crate::survey::{allocate, survey};
 use crate::tins::Tins;
 use crate::{CompileError, Event, Progress, Stage};
@@ -64,12 +63,6 @@ pub(crate) fn finish(run: Run, progress: &mut dyn Progress) -> Result<Built, Com
         Err(error) if !error.is_stopped() => Err(changed(&states).err().unwrap_or(error)),
         finished => finished,
     }
-}
-
-/// # Errors
-/// When a source is not what it was.
-pub(crate) fn changed(states: &[FileState]) -> Result<(), CompileError> {
-    states.iter().try_for_each(|state| Ok(state.check()?))
 }
 
 fn stages(run: Run, progress: &mut dyn Progress) -> Result<Built, CompileError> {

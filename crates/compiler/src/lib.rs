@@ -29,6 +29,7 @@ pub use played::{Costs, Played, TileCosts, play};
 mod levels;
 
 mod assemble;
+mod assembled;
 mod bound;
 mod coarse;
 mod curves;
@@ -37,6 +38,7 @@ mod measured;
 mod publish;
 mod refine;
 mod refinement;
+mod refused;
 pub use refinement::{Most, Refinement};
 mod report;
 pub use report::residual_of;

@@ -6,9 +6,9 @@ use database::{FingerprintBuilder, MadeFrom, Stamp};
 use ground::Window;
 use terrain::{ModuleId, StopReason, TileId, TileTin, Vertex};
 
-use crate::bound::{RefusedPosts, by_module};
 use crate::cause::{Cause, cause, made_from, summary};
 use crate::refinement::Refinement;
+use crate::refused::{RefusedPosts, by_module};
 use crate::run::{Run, Worked};
 use crate::survey::Shares;
 use crate::tasks::{TileBudget, inherited, posts_of, tile_refinement};

@@ -143,3 +143,11 @@ pub fn run_name(job: &str, sources: &[SourceRecord], revision: u32) -> String {
     }
     builder.finish().to_string()[..16].to_owned()
 }
+
+/// Whether the files of a job are still what they were, or which is not.
+///
+/// # Errors
+/// When a source is not what it was.
+pub(crate) fn changed(states: &[FileState]) -> Result<(), CompileError> {
+    states.iter().try_for_each(|state| Ok(state.check()?))
+}

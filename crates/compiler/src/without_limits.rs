@@ -12,9 +12,9 @@ use terrain::{LATTICE_PER_POST, ModuleGrid, ModuleId, ModuleRect, ModuleResidual
 use tin::{Frame, Stop, TileTask};
 
 use crate::CompileError;
-use crate::bound::RefusedPosts;
 use crate::refine::Published;
 use crate::refinement::{Most, Refinement, optimising};
+use crate::refused::RefusedPosts;
 use crate::run::Run;
 use crate::tasks::{posts_of, rule};
 

@@ -4,7 +4,7 @@ use compiler::CompileError;
 use fidelity::Tally;
 use terrain::QUANTA_PER_METRE;
 
-use super::Equivalent;
+use super::made::Equivalent;
 use super::subject::{Subject, Until};
 use crate::TinMethod;
 

@@ -6,30 +6,20 @@
 
 mod choose;
 mod curve;
+mod made;
 mod subject;
 
-use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use compiler::{CompileError, Stage};
-use fidelity::Tally;
-use job::Job;
-use terrain::{Dem, PostRect, Tin};
+use terrain::{Dem, PostRect};
 
 pub use choose::CompareMethod;
+pub use made::{CompareGround, Equivalent, Forced, Made};
 pub use methods::Impossible;
 
 use curve::Curve;
 use subject::Subject;
-
-/// What to compare methods on.
-#[derive(Clone, Debug)]
-pub enum CompareGround {
-    /// The posts of a raster.
-    Raster(PathBuf),
-    /// The ground of a job: its one raster's own posts, or else its working grid.
-    Job(Box<Job>),
-}
 
 /// Methods to compare.
 #[derive(Clone, Debug)]
@@ -70,45 +60,6 @@ pub struct CompareRow {
     pub made: Result<Made, Impossible>,
 }
 
-/// What a method made.
-#[derive(Clone, Debug)]
-pub struct Made {
-    /// The TIN.
-    pub tin: Tin,
-    /// Its vertices.
-    pub points: usize,
-    /// Its triangles.
-    pub triangles: usize,
-    /// Posts it covers: all of the ground but for HIGHLOW.
-    pub covered: u64,
-    /// Residuals at the posts it covers.
-    pub residual: Tally,
-    /// How many points of the iterative method do as well.
-    pub equivalent: Equivalent,
-    /// Of a method that forces border posts: how many, and what the iterative method makes of as many points less.
-    pub forced: Option<Forced>,
-}
-
-/// How many points of the iterative method have a smaller RMS residual.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Equivalent {
-    /// So many, and no fewer.
-    Points(usize),
-    /// More than it has when no residual is left by its own measure.
-    MoreThan(usize),
-    /// The method does not cover the ground, or it is the iterative method.
-    None,
-}
-
-/// Border posts a method takes whether they help or not.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Forced {
-    /// How many.
-    pub points: usize,
-    /// RMS residual, in metres, of the iterative method without so many points; none where fewer than corners are left.
-    pub iterative_rms_m: Option<f64>,
-}
-
 /// The table.
 #[derive(Clone, Debug)]
 pub struct Comparison {
@@ -136,7 +87,7 @@ pub fn compare(
     stop: &AtomicBool,
     tell: &mut dyn FnMut(CompareEvent),
 ) -> Result<Comparison, CompileError> {
-    let subject = Subject::open(request, stop)?;
+    let subject = Subject::open(&request.ground, request.window, stop)?;
     let mut rows = planned(&request.methods, &request.points);
     tell(CompareEvent::Read(rows.len()));
     let total = rows.len();

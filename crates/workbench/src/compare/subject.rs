@@ -14,7 +14,7 @@ use schedule::Workers;
 use source_files::{DemFile, Reading, VoidPolicy};
 use terrain::{Dem, Metres, Post, PostRect, Tin, quanta_of_metres};
 
-use super::{CompareGround, CompareRequest, Equivalent, Made};
+use super::made::{CompareGround, Equivalent, Made};
 use crate::heights::{Heights, has_square_posts};
 use crate::raster::{TinRequest, untiled};
 use crate::tin_tally::tally_of;
@@ -42,17 +42,17 @@ impl Subject {
     ///
     /// # Errors
     /// When it cannot be read, or is too large or too small.
-    pub fn open(request: &CompareRequest, stop: &AtomicBool) -> Result<Self, CompileError> {
-        match &request.ground {
+    pub fn open(ground: &CompareGround, window: Option<PostRect>, stop: &AtomicBool) -> Result<Self, CompileError> {
+        match ground {
             CompareGround::Raster(path) => {
                 let file = DemFile::open(path, &Reading::AS_IT_SAYS)?;
                 let name = path.display().to_string();
                 match has_square_posts(file.frame()) {
-                    true => of_file(&file, windowed(file.rect(), request.window)?, name, stop),
-                    false => of_resampled(&file, request.window, &name, stop),
+                    true => of_file(&file, windowed(file.rect(), window)?, name, stop),
+                    false => of_resampled(&file, window, &name, stop),
                 }
             }
-            CompareGround::Job(job) => of_job(job, request.window, stop),
+            CompareGround::Job(job) => of_job(job, window, stop),
         }
     }
 
