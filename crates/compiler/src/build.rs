@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use database::{Database, Folder, Manifest, ManifestState, Previous, Report, TileState};
+use database::{Database, Folder, Manifest, ManifestState, Previous, Report, TileState, Work};
 use ground::{GamingArea, Ground};
 use job::Job;
 use schedule::Workers;
@@ -31,6 +31,8 @@ pub struct Built {
     pub is_unchanged: bool,
     /// The database, still locked.
     pub database: Database,
+    /// What the processes of a shared run left for one another, to be swept once the report is there.
+    pub work: Option<Work>,
 }
 
 /// Builds the database of a job in `folder`, or brings the one there up to date.
@@ -77,7 +79,7 @@ fn stages(run: Run, progress: &mut dyn Progress) -> Result<Built, CompileError> 
     let findings = Findings { run: &run, tins: &tins, assembled: &assembled, sums: &sums, enforced: &enforced };
     let report = publish(&findings, &shares, &[], progress)?;
     let rebuilt = tins.iter().filter(|tile| tile.cause.is_some()).count();
-    Ok(Built { report, kept: tins.len() - rebuilt, rebuilt, is_unchanged: false, database: run.database })
+    Ok(Built { report, kept: tins.len() - rebuilt, rebuilt, is_unchanged: false, database: run.database, work: None })
 }
 
 /// Everything a run stands on: the plan, the sources, the locked database. Nothing is changed yet.
@@ -135,7 +137,7 @@ fn unchanged(job: &Job, folder: &Path, progress: &mut dyn Progress) -> Result<Op
     match report {
         Ok(report) if is_fresh => {
             let kept = manifest.tiles.len();
-            Ok(Some(Built { report, kept, rebuilt: 0, is_unchanged: true, database }))
+            Ok(Some(Built { report, kept, rebuilt: 0, is_unchanged: true, database, work: None }))
         }
         _ => Ok(None),
     }

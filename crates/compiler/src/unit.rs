@@ -246,7 +246,8 @@ impl<'a> Session<'a> {
     /// Declares the database complete, after whatever is still to be done.
     pub fn publish(self, progress: &mut dyn Progress) -> Result<Built, CompileError> {
         self.run.database.sweep()?;
-        finish(self.run, progress)
+        let built = finish(self.run, progress)?;
+        Ok(Built { work: Some(self.work), ..built })
     }
 }
 
