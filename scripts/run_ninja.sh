@@ -19,7 +19,10 @@ tell "local build done"
 setsid ninja -C "$scratch" -j 2 > "$scratch/log" 2>&1 &
 ninja=$!
 sleep "${KILL_AFTER_S:-2}"
-if kill -KILL -- "-$ninja" 2> /dev/null; then tell "ninja and its tasks killed"; fi
+# Ninja gives every task a process group of its own, so the session tells which are its.
+mapfile -t started < <(sed 's/^\([0-9]*\) .*) [A-Z] [0-9]* [0-9]* \([0-9]*\) .*/\2 \1/' /proc/[0-9]*/stat 2> /dev/null |
+    sed -n "s/^$ninja //p")
+if kill -KILL "${started[@]}" 2> /dev/null; then tell "ninja and its tasks killed"; fi
 wait "$ninja" || true
 "$tiefort" status "$scratch/ninja.tdb" || true
 ninja -C "$scratch" -j 2 | tail -1

@@ -4,39 +4,16 @@ use database::{FileStamp, Fingerprint, FingerprintBuilder, Measured, Stamp, Tile
 use fidelity::{Residuals, Tally};
 use job::{Borders, ClipHeights as JobClipHeights, Edges, Job, OuterBorder};
 use load_modules::{ClipHeights, Layout, clip, concatenate};
-use terrain::{
-    HOLE_CLASS, LATTICE_PER_POST, LatticePoint, LoadModule, ModuleResidual, Post, PostRect, TileId, Tin, Vertex,
-};
+use terrain::{HOLE_CLASS, LATTICE_PER_POST, LatticePoint, LoadModule, Post, PostRect, TileId, Tin, Vertex};
 
-use crate::area::GamingArea;
+use crate::assembled::{Assembled, ModuleNumbers};
 use crate::levels::all_levels;
 use crate::measured::{from_measured, to_measured};
 use crate::refine::Published;
 use crate::run::{ALGORITHM_REVISION, Run, Worked};
 use crate::sums::{Adding, Sums};
 use crate::{CompileError, Progress, Stage};
-
-/// What whole-area stages know of one tile's load modules: numbers only.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Assembled {
-    pub file: FileStamp,
-    /// The file of what follows.
-    pub measured: FileStamp,
-    /// Per load module of the tile, row by row.
-    pub modules: Vec<ModuleNumbers>,
-    /// The same of every level beside the finest.
-    pub coarser: Vec<Vec<ModuleNumbers>>,
-    /// Whether the file was written by this run.
-    pub is_new: bool,
-}
-
-/// Counts and residual of one load module.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct ModuleNumbers {
-    pub triangles: u32,
-    pub polygons: u32,
-    pub residual: ModuleResidual,
-}
+use ground::GamingArea;
 
 /// What the published TIN of a tile was made from, by the tile's place.
 pub(crate) type StampOf<'a> = dyn Fn(usize) -> Stamp + Sync + 'a;
@@ -191,7 +168,7 @@ pub(crate) fn points_around(
 }
 
 /// Of all that the load modules of a tile are made from.
-pub(crate) fn modules_fingerprint(
+pub fn modules_fingerprint(
     job: &Job,
     area: &GamingArea,
     stamps: &StampOf,

@@ -2,22 +2,20 @@
 
 use std::path::Path;
 
-use database::{Database, Folder, Manifest, ManifestState, Previous, Report, TileState};
+use database::{Database, Folder, Manifest, ManifestState, Previous, Report, TileState, Work};
+use ground::{GamingArea, Ground};
 use job::Job;
 use schedule::Workers;
-use source_files::FileState;
 
-use crate::area::GamingArea;
 use crate::assemble::assemble;
 use crate::enforce::enforce;
-use crate::ground::Ground;
 use crate::publish::{beginning, database_area, publish};
 use crate::refine::refine;
 use crate::report::Findings;
-use crate::run::{ALGORITHM_REVISION, Options, Run};
+use crate::run::{ALGORITHM_REVISION, Options, Run, changed};
 use crate::survey::{allocate, survey};
 use crate::tins::Tins;
-use crate::{CompileError, Event, Progress, Stage, sources};
+use crate::{CompileError, Event, Progress, Stage};
 
 /// A finished build.
 #[derive(Debug)]
@@ -33,6 +31,8 @@ pub struct Built {
     pub is_unchanged: bool,
     /// The database, still locked.
     pub database: Database,
+    /// What the processes of a shared run left for one another, to be swept once the report is there.
+    pub work: Option<Work>,
 }
 
 /// Builds the database of a job in `folder`, or brings the one there up to date.
@@ -67,12 +67,6 @@ pub(crate) fn finish(run: Run, progress: &mut dyn Progress) -> Result<Built, Com
     }
 }
 
-/// # Errors
-/// When a source is not what it was.
-pub(crate) fn changed(states: &[FileState]) -> Result<(), CompileError> {
-    states.iter().try_for_each(|state| Ok(state.check()?))
-}
-
 fn stages(run: Run, progress: &mut dyn Progress) -> Result<Built, CompileError> {
     let curves = survey(&run, progress)?;
     let mut shares = allocate(&run, curves.as_ref(), progress)?;
@@ -85,7 +79,7 @@ fn stages(run: Run, progress: &mut dyn Progress) -> Result<Built, CompileError> 
     let findings = Findings { run: &run, tins: &tins, assembled: &assembled, sums: &sums, enforced: &enforced };
     let report = publish(&findings, &shares, &[], progress)?;
     let rebuilt = tins.iter().filter(|tile| tile.cause.is_some()).count();
-    Ok(Built { report, kept: tins.len() - rebuilt, rebuilt, is_unchanged: false, database: run.database })
+    Ok(Built { report, kept: tins.len() - rebuilt, rebuilt, is_unchanged: false, database: run.database, work: None })
 }
 
 /// Everything a run stands on: the plan, the sources, the locked database. Nothing is changed yet.
@@ -109,8 +103,8 @@ pub(crate) fn open_with<'a>(
     let workers = Workers::new(options.workers);
     progress.tell(Event::Enter(Stage::Read, 0));
     // Before anything is read, so that a change in between shows.
-    let states = sources::states(job)?;
-    let records = sources::records(job)?;
+    let states = ground::states(job)?;
+    let records = ground::records(job)?;
     let ground = Ground::open(job, &area, &workers, options.stop)?;
     progress.tell(Event::Leave(Stage::Read));
     for warning in &ground.warnings {
@@ -133,7 +127,7 @@ fn unchanged(job: &Job, folder: &Path, progress: &mut dyn Progress) -> Result<Op
     }
     GamingArea::new(job)?;
     progress.tell(Event::Enter(Stage::Read, 0));
-    let records = sources::records(job)?;
+    let records = ground::records(job)?;
     let (database, _) = Database::create_or_open(folder, &database_area(job))?;
     // Looked at again, now that nobody else can change it.
     let manifest = there.manifest()?;
@@ -143,7 +137,7 @@ fn unchanged(job: &Job, folder: &Path, progress: &mut dyn Progress) -> Result<Op
     match report {
         Ok(report) if is_fresh => {
             let kept = manifest.tiles.len();
-            Ok(Some(Built { report, kept, rebuilt: 0, is_unchanged: true, database }))
+            Ok(Some(Built { report, kept, rebuilt: 0, is_unchanged: true, database, work: None }))
         }
         _ => Ok(None),
     }

@@ -3,9 +3,9 @@
 use std::fmt;
 
 use database::{DatabaseError, FingerprintBuilder, MadeFrom, Stamp, TileRecord, TileState};
+use ground::Window;
 use terrain::TileId;
 
-use crate::ground::Window;
 use crate::refinement::Refinement;
 use crate::run::{ALGORITHM_REVISION, Run};
 
@@ -59,7 +59,7 @@ pub(crate) fn made_from(
 }
 
 /// What the job says of selecting and optimising in a tile, as its record names it.
-pub(crate) fn rules(refinement: &Refinement) -> String {
+pub fn rules(refinement: &Refinement) -> String {
     let task = &refinement.task;
     let rules = format!(
         "{:?} {:?} {:?} {:?} {:?} {:?}",

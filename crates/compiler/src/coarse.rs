@@ -1,10 +1,9 @@
 //! A tile seen on every second post: a quarter of the ground to look at, for a survey that only has to tell how tiles
 //! compare.
 
+use ground::Window;
 use terrain::{Dem, Importance, ModuleGrid, Post, PostRect};
 use tin::{Frame, SurveyTask, TileTask};
-
-use crate::ground::Window;
 
 /// The window and the survey on every second post; `None` where load modules do not begin and end on such posts.
 pub(crate) fn coarse(window: &Window, task: &SurveyTask) -> Option<(Window, SurveyTask)> {

@@ -9,7 +9,8 @@ use job::{Count, Edges};
 use load_modules::{Layout, Removal, RemovalGround, halo_posts, propose_removals};
 use terrain::{LatticePoint, ModuleId, Post, TileId};
 
-use crate::assemble::{Assembled, ModuleNumbers, assemble_tile, points_around};
+use crate::assemble::{assemble_tile, points_around};
+use crate::assembled::{Assembled, ModuleNumbers};
 use crate::refine::Published;
 use crate::run::{Run, Worked};
 use crate::sums::Sums;

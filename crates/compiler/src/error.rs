@@ -1,6 +1,7 @@
 //! Why a run ended without a result.
 
 use database::DatabaseError;
+use ground::GroundError;
 use schedule::ScheduleError;
 use source_files::SourceError;
 use terrain::TileId;
@@ -11,9 +12,9 @@ use crate::Stage;
 /// Why a run ended without a result.
 #[derive(Debug, Error)]
 pub enum CompileError {
-    /// A raster or a file of polygons cannot be used.
+    /// The job has no ground: a raster or a file cannot be used, or the job asks for what cannot be.
     #[error(transparent)]
-    Source(#[from] SourceError),
+    Ground(#[from] GroundError),
     /// The database cannot be read or written.
     #[error(transparent)]
     Database(#[from] DatabaseError),
@@ -28,18 +29,6 @@ pub enum CompileError {
         expected: String,
         /// What to change.
         hint: String,
-    },
-    /// The ground has heights that no source has: a fault of ours.
-    #[error(
-        "heights of the ground run from {:.2} m to {:.2} m, expected them within those of the sources, {:.2} m to \
-        {:.2} m",
-        found_m.0, found_m.1, expected_m.0, expected_m.1
-    )]
-    OutsideSources {
-        /// The lowest and the highest height of a part of the ground, in metres.
-        found_m: (f64, f64),
-        /// The same of all sources under the area.
-        expected_m: (f64, f64),
     },
     /// A task panicked: a fault of ours.
     #[error("tile {tile} failed in stage {}: {message}", stage.name())]
@@ -97,16 +86,19 @@ pub enum CompileError {
     },
 }
 
+impl From<SourceError> for CompileError {
+    fn from(error: SourceError) -> Self {
+        CompileError::Ground(error.into())
+    }
+}
+
 impl CompileError {
     /// What could be done about it.
     pub fn hint(&self) -> Option<String> {
         match self {
-            CompileError::Source(error) => error.hint(),
+            CompileError::Ground(error) => error.hint(),
             CompileError::Database(error) => error.hint().map(str::to_owned),
             CompileError::Impossible { hint, .. } => Some(hint.clone()),
-            CompileError::OutsideSources { .. } => {
-                Some("this is a fault of the compiler; other rules in dem.voids or dem.resampling may avoid it".into())
-            }
             CompileError::Panicked { .. } => {
                 Some("this is a fault of the compiler; what was published before is intact".to_owned())
             }
@@ -134,15 +126,17 @@ impl CompileError {
 
     /// Whether the run ended because it was asked to.
     pub fn is_stopped(&self) -> bool {
-        matches!(self, CompileError::Stopped { .. })
+        matches!(self, CompileError::Stopped { .. } | CompileError::Ground(GroundError::Stopped { .. }))
+    }
+
+    /// Whether the job, or a file that it names, is at fault.
+    pub fn is_of_the_job(&self) -> bool {
+        use GroundError::{Impossible, Source};
+        matches!(self, CompileError::Impossible { .. } | CompileError::Ground(Impossible { .. } | Source(_)))
     }
 
     /// The error of a stage's tasks, whose numbers are the row-major places of `tiles`.
-    pub(crate) fn from_schedule<R>(
-        stage: Stage,
-        tiles: &[TileId],
-        error: ScheduleError<R, CompileError>,
-    ) -> CompileError {
+    pub fn from_schedule<R>(stage: Stage, tiles: &[TileId], error: ScheduleError<R, CompileError>) -> CompileError {
         match error {
             ScheduleError::Failed { error, .. } => error,
             ScheduleError::Panicked { task, message } => CompileError::Panicked { stage, tile: tiles[task], message },

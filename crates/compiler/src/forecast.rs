@@ -6,12 +6,10 @@
 //! one in the area's own system and one in degrees; and `configs/paper.toml`. The forecast of each was within a factor
 //! of 1.5 of what it took. Other machines differ in time, and jobs that end at a residual take less than their budget.
 
+use ground::{CACHE_BYTES_MAX, GamingArea, KEPT_POSTS_MAX};
 use job::{Budget as PointBudget, DemSource, Edges, Effort, Job, LodBorder};
 
-use crate::area::GamingArea;
 use crate::curves::BAND_BYTES_MAX;
-use crate::ground::KEPT_POSTS_MAX;
-use crate::large::CACHE_BYTES_MAX;
 use crate::refinement::optimising;
 use crate::tasks::{is_surveyed, is_surveyed_in_haste};
 use crate::tins::KEPT_BYTES_MAX;

@@ -1,10 +1,10 @@
 //! Coarser levels of a tile's load modules, as the job wants them.
 
+use ground::Window;
 use job::{LodBorder, Method};
 use load_modules::{Layout, LevelGround, LevelSides, Levels, coarser_levels};
 use terrain::LoadModule;
 
-use crate::ground::Window;
 use crate::run::Run;
 
 /// Every level of a tile's load modules, beginning with the finest, which is given.

@@ -4,8 +4,10 @@ use database::{FileStamp, Measured, MeasuredModule, MeasuredTally};
 use fidelity::{Residuals, Tally};
 use terrain::{ModuleResidual, TileId};
 
-use crate::assemble::{Assembled, ModuleNumbers};
-use crate::sums::Sums;
+use crate::assembled::{Assembled, ModuleNumbers};
+use crate::run::Run;
+use crate::sums::{Adding, Sums};
+use crate::{CompileError, Stage};
 
 /// What is kept of a tile's load modules.
 pub(crate) fn to_measured(tile: TileId, assembled: &Assembled, sums: &Sums) -> Measured {
@@ -47,8 +49,26 @@ pub(crate) fn from_measured(measured: Measured, count: usize, file: FileStamp) -
     (done, sums_of(measured))
 }
 
+impl Sums {
+    /// Those of every tile as it is published.
+    ///
+    /// # Errors
+    /// When a file cannot be read.
+    pub(crate) fn published(run: &Run) -> Result<Sums, CompileError> {
+        let (tiles, adding) = (&run.area.tiles, Adding::default());
+        let folder = run.database.folder();
+        let read = |_: usize, &tile: &terrain::TileId| -> Result<(), CompileError> {
+            adding.add(sums_of(folder.read_measured(tile)?.1));
+            Ok(())
+        };
+        schedule::for_each_independent(tiles, &run.workers, run.stop, read)
+            .map_err(|error| CompileError::from_schedule(Stage::Enforce, tiles, error))?;
+        Ok(adding.finish())
+    }
+}
+
 /// What was kept of a tile's residuals and points.
-pub(crate) fn sums_of(measured: Measured) -> Sums {
+pub fn sums_of(measured: Measured) -> Sums {
     Sums {
         residuals: Residuals { classes: measured.classes.iter().map(from_tally).collect() },
         at_source: measured.at_source.as_ref().map(from_tally).unwrap_or_default(),

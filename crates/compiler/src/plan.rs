@@ -1,10 +1,10 @@
 //! What a job will do and take, before any work.
 
+use ground::GamingArea;
 use job::{Edges, Job, TileOrder};
 use terrain::{ModuleRect, PostRect, Side, TileId};
 
 use crate::CompileError;
-use crate::area::GamingArea;
 use crate::forecast::{Forecast, forecast};
 use crate::tasks::is_surveyed;
 
@@ -66,7 +66,7 @@ pub fn plan(job: &Job) -> Result<Plan, CompileError> {
 }
 
 /// Every tile of an area, row by row from the south-west.
-pub(crate) fn planned_tiles(area: &GamingArea) -> Vec<PlannedTile> {
+pub fn planned_tiles(area: &GamingArea) -> Vec<PlannedTile> {
     let mut ranks = vec![0; area.tiles.len()];
     area.by_rank().into_iter().enumerate().for_each(|(rank, index)| ranks[index] = rank);
     area.tiles.iter().map(|&tile| planned(area, tile, &ranks)).collect()

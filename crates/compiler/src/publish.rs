@@ -5,17 +5,17 @@ use job::Job;
 use serde_json::{Value, json};
 use terrain::{LatticePoint, TileId};
 
-use crate::assemble::{Assembled, crs};
-use crate::build::changed;
+use crate::assemble::crs;
+use crate::assembled::Assembled;
 use crate::refine::Published;
 use crate::report::Findings;
-use crate::run::{ALGORITHM_REVISION, Run};
+use crate::run::{ALGORITHM_REVISION, Run, changed};
 use crate::survey::Shares;
 use crate::tasks::is_surveyed;
 use crate::{CompileError, Event, Progress, Stage};
 
 /// The area as the database knows it.
-pub(crate) fn database_area(job: &Job) -> Area {
+pub fn database_area(job: &Job) -> Area {
     let grid = job.area.grid;
     Area {
         name: job.area.name.clone(),

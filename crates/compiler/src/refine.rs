@@ -3,12 +3,12 @@
 use std::sync::{Arc, OnceLock};
 
 use database::{FingerprintBuilder, MadeFrom, Stamp};
+use ground::Window;
 use terrain::{ModuleId, StopReason, TileId, TileTin, Vertex};
 
-use crate::bound::{RefusedPosts, by_module};
 use crate::cause::{Cause, cause, made_from, summary};
-use crate::ground::Window;
 use crate::refinement::Refinement;
+use crate::refused::{RefusedPosts, by_module};
 use crate::run::{Run, Worked};
 use crate::survey::Shares;
 use crate::tasks::{TileBudget, inherited, posts_of, tile_refinement};

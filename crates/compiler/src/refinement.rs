@@ -1,20 +1,18 @@
 //! One tile's refinement: grown to its budget, or grown beyond it and optimised.
 
+use ground::{GivenPost, Window, border_posts, start_posts};
 use job::{Effort, HeightFit, Job, Lattice, Method, Optimising};
 use limits::Allowance;
 use optimiser::{Budget, Optimised, Task, fill, optimise, overshoot};
 use terrain::{Dem, LatticePoint, Post, PostRect, THOUSANDTHS, TileTin, Tin, Vertex};
 use tin::{Frame, Rule, Stop, TileTask};
 
-use crate::given::{GivenPost, border_posts, start_posts};
-use crate::ground::Window;
-
 /// Room in a window of load modules while a tile is grown beyond its budget.
 const NO_LIMIT: u32 = u32::MAX / 4;
 
 /// What is to be done for one tile.
 #[derive(Clone, Debug)]
-pub(crate) struct Refinement {
+pub struct Refinement {
     /// What to select, within which budget.
     pub task: TileTask,
     /// How what is selected is then optimised, if it is.
@@ -25,7 +23,7 @@ pub(crate) struct Refinement {
 
 /// Where there are no load modules, the most a mesh may have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Most {
+pub enum Most {
     /// What the task says.
     AsTask,
     /// So many triangles.

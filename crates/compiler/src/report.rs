@@ -13,10 +13,11 @@ use limits::Windows;
 use terrain::{Breach, BreachKind, BreachPlace, ModuleId, ModuleResidual, RefusedBy, StopReason, metres_of_quanta};
 
 use crate::CompileError;
-use crate::assemble::{Assembled, ModuleNumbers};
-use crate::bound::{RefusedPosts, bound, of_area};
+use crate::assembled::{Assembled, ModuleNumbers};
+use crate::bound::{bound, of_area};
 use crate::enforce::{ByModule, Enforced, counted};
 use crate::refine::Published;
+use crate::refused::RefusedPosts;
 use crate::run::Run;
 use crate::sums::Sums;
 
@@ -378,7 +379,7 @@ fn refusals(refused: &Refused) -> ReportRefusals {
 }
 
 /// A tally as the report gives it.
-pub(crate) fn residual_of(tally: &Tally) -> ReportResidual {
+pub fn residual_of(tally: &Tally) -> ReportResidual {
     if tally.posts == 0 {
         return ReportResidual::default();
     }

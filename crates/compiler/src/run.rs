@@ -4,13 +4,12 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use database::{Database, FingerprintBuilder, Manifest, SourceRecord, Stamp};
+use ground::{GamingArea, Ground, Window};
 use job::Job;
 use schedule::{Event as Scheduled, RankedTasks, Workers, in_rank_order_observed};
 use source_files::FileState;
 use terrain::{TileId, TileTin};
 
-use crate::area::GamingArea;
-use crate::ground::{Ground, Window};
 use crate::tins::Tins;
 use crate::{CompileError, Event, Progress, Stage};
 
@@ -118,7 +117,7 @@ impl Run<'_> {
 
     /// The ground of a tile.
     pub fn window(&self, tile: TileId) -> Result<Arc<Window>, CompileError> {
-        self.ground.tile(&self.area, tile)
+        Ok(self.ground.tile(&self.area, tile)?)
     }
 
     /// A stamp of this revision for inputs that `feed` adds to a window's.
@@ -134,4 +133,21 @@ impl Run<'_> {
         }
         Stamp { algorithm_revision: ALGORITHM_REVISION, fingerprint: feed(builder).finish() }
     }
+}
+
+/// What a run is called in `work/`: equal for all processes that build the same from the same.
+pub fn run_name(job: &str, sources: &[SourceRecord], revision: u32) -> String {
+    let mut builder = FingerprintBuilder::new("run").text(job).number(u64::from(revision));
+    for source in sources {
+        builder = builder.text(&source.path).fingerprint(source.blake3);
+    }
+    builder.finish().to_string()[..16].to_owned()
+}
+
+/// Whether the files of a job are still what they were, or which is not.
+///
+/// # Errors
+/// When a source is not what it was.
+pub(crate) fn changed(states: &[FileState]) -> Result<(), CompileError> {
+    states.iter().try_for_each(|state| Ok(state.check()?))
 }

@@ -7,13 +7,10 @@ use std::sync::{Mutex, PoisonError};
 
 use fidelity::{Residuals, Tally};
 
-use crate::measured::sums_of;
-use crate::run::Run;
-use crate::{CompileError, Stage};
-
 /// Of one tile, or of many.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Sums {
+pub struct Sums {
+    /// Against the working grid, by class of ground.
     pub residuals: Residuals,
     /// Against the sources' own posts.
     pub at_source: Tally,
@@ -29,7 +26,7 @@ pub(crate) struct Sums {
 
 /// Sums that several workers add to.
 #[derive(Default)]
-pub(crate) struct Adding(Mutex<Option<Sums>>);
+pub struct Adding(Mutex<Option<Sums>>);
 
 impl Adding {
     /// Adds those of one tile.
@@ -58,21 +55,5 @@ impl Sums {
         }
         self.border += other.border;
         self.heights = (self.heights.0.min(other.heights.0), self.heights.1.max(other.heights.1));
-    }
-
-    /// Those of every tile as it is published.
-    ///
-    /// # Errors
-    /// When a file cannot be read.
-    pub fn published(run: &Run) -> Result<Sums, CompileError> {
-        let (tiles, adding) = (&run.area.tiles, Adding::default());
-        let folder = run.database.folder();
-        let read = |_: usize, &tile: &terrain::TileId| -> Result<(), CompileError> {
-            adding.add(sums_of(folder.read_measured(tile)?.1));
-            Ok(())
-        };
-        schedule::for_each_independent(tiles, &run.workers, run.stop, read)
-            .map_err(|error| CompileError::from_schedule(Stage::Enforce, tiles, error))?;
-        Ok(adding.finish())
     }
 }

@@ -2,6 +2,7 @@
 
 use std::ops::Deref;
 
+use ground::GamingArea;
 use job::{Allocation, Borders, Budget as PointBudget, Edges, Effort, ErrorKey, Job, LastBatch, Method, OuterBorder};
 use limits::Allowance;
 use terrain::{LatticePoint, ModuleId, ModuleRect, Post, SeamSides, Side, TileId, TileTin, Vertex};
@@ -9,7 +10,6 @@ use tiling::{Tiling, outer_border_posts, outer_sides};
 use tin::{CostUnit, Frame, Proximity, Rule, Stop, SurveyTask, TileTask};
 
 use crate::CompileError;
-use crate::area::GamingArea;
 use crate::refinement::{Most, Refinement, optimising};
 
 /// A survey looks this many times further than an equal share.
@@ -20,15 +20,17 @@ const SURVEY_REACH_OF_FAST: u64 = 2;
 const SURVEY_REACH_TO_RMS: u64 = 5;
 
 /// What one tile may spend.
-pub(crate) struct TileBudget {
+pub struct TileBudget {
+    /// Points to select, where those are counted.
     pub points: Option<usize>,
+    /// Triangles it may spend, with constrained edges.
     pub allowance: Option<Allowance>,
     /// RMS residual (quanta) that is good enough for this tile, where the area's is shared out.
     pub rms_quanta: Option<f64>,
 }
 
 /// The refinement of one tile, optimised if the job says so.
-pub(crate) fn tile_refinement(
+pub fn tile_refinement(
     job: &Job,
     area: &GamingArea,
     tile: TileId,
@@ -100,7 +102,7 @@ fn frame(job: &Job, area: &GamingArea, tile: TileId, allowance: Option<Allowance
 
 /// Whether what a tile may spend depends on what it would gain: a budget shared out globally. Clipped edges without
 /// a number of points have no budget to share, only an end to reach.
-pub(crate) fn is_surveyed(job: &Job) -> bool {
+pub fn is_surveyed(job: &Job) -> bool {
     let has_budget = job.tin.budget != PointBudget::Limits || job.modules.edges == Edges::Constrained;
     job.tin.allocation == Allocation::Global && has_budget
 }
@@ -216,7 +218,7 @@ pub(crate) fn side_vertices(tin: &TileTin, side: Side) -> Vec<Vertex> {
 ///
 /// # Errors
 /// The first of `published`.
-pub(crate) fn inherited<T: Deref<Target = TileTin>>(
+pub fn inherited<T: Deref<Target = TileTin>>(
     tiling: &Tiling,
     tile: TileId,
     published: impl Fn(TileId) -> Result<T, CompileError>,
@@ -236,6 +238,6 @@ pub(crate) fn inherited<T: Deref<Target = TileTin>>(
 ///
 /// # Panics
 /// When one stands between posts: seam vertices never do.
-pub(crate) fn posts_of(vertices: &[Vertex]) -> Vec<Post> {
+pub fn posts_of(vertices: &[Vertex]) -> Vec<Post> {
     vertices.iter().map(|vertex| vertex.at.post().expect("seam vertices stand on posts")).collect()
 }

@@ -7,7 +7,8 @@ use database::{Database, DatabaseError, Folder, MadeFrom, Manifest, Report, Stam
 use job::{Edges, Job, deciding_lines};
 use terrain::{Post, SeamSides, Side, TileId, TileTin, Vertex};
 
-use crate::assemble::{Assembled, assemble, assemble_tile, read_assembled};
+use crate::assemble::{assemble, assemble_tile, read_assembled};
+use crate::assembled::Assembled;
 use crate::build::open;
 use crate::cause::{Cause, made_from};
 use crate::curves::Curves;

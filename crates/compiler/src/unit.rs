@@ -22,8 +22,7 @@ use crate::build::{Built, finish, might_be_fresh, open_with};
 use crate::curves::Curves;
 use crate::publish::beginning;
 use crate::refine::{Published, refine_tile};
-use crate::run::{ALGORITHM_REVISION, Options, Run};
-use crate::status::run_name;
+use crate::run::{ALGORITHM_REVISION, Options, Run, run_name};
 use crate::survey::{allocate, survey_tile};
 use crate::tasks::{TileBudget, inherited, is_surveyed};
 use crate::{CompileError, Event, Progress, Stage};
@@ -247,7 +246,8 @@ impl<'a> Session<'a> {
     /// Declares the database complete, after whatever is still to be done.
     pub fn publish(self, progress: &mut dyn Progress) -> Result<Built, CompileError> {
         self.run.database.sweep()?;
-        finish(self.run, progress)
+        let built = finish(self.run, progress)?;
+        Ok(Built { work: Some(self.work), ..built })
     }
 }
 

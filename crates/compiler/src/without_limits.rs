@@ -6,15 +6,15 @@
 
 use std::collections::BTreeMap;
 
+use ground::Window;
 use load_modules::{Layout, concatenate};
 use terrain::{LATTICE_PER_POST, ModuleGrid, ModuleId, ModuleRect, ModuleResidual, PostRect, SeamSides, Tin, Vertex};
 use tin::{Frame, Stop, TileTask};
 
 use crate::CompileError;
-use crate::bound::RefusedPosts;
-use crate::ground::Window;
 use crate::refine::Published;
 use crate::refinement::{Most, Refinement, optimising};
+use crate::refused::RefusedPosts;
 use crate::run::Run;
 use crate::tasks::{posts_of, rule};
 

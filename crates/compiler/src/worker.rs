@@ -67,6 +67,7 @@ pub fn work(
         sharing,
         session,
         units: 0,
+        job: job.canonical_text(),
     };
     loop {
         if options.stop.load(std::sync::atomic::Ordering::Relaxed) {
@@ -78,7 +79,12 @@ pub fn work(
             worker.session.work.sweep();
             return Ok(WorkerEnd { units: worker.units, published: None });
         }
-        match worker.next()? {
+        let next = match worker.next() {
+            // It was published and swept meanwhile.
+            Err(_) if worker.is_published() => continue,
+            next => next?,
+        };
+        match next {
             Some((Unit::Publish, lease)) => return worker.publish(&lease, progress),
             Some((unit, lease)) => worker.perform(unit, lease, progress)?,
             None => (sharing.wait)(sharing.pause),
@@ -93,15 +99,20 @@ struct Worker<'a, 'b> {
     /// Units that were not done when last looked at.
     open: Vec<Unit>,
     units: usize,
+    /// The job as the database names it.
+    job: String,
 }
 
 impl Worker<'_, '_> {
-    /// Whether somebody has finished the build and reported on it.
+    /// Whether the build was finished and reported on, by any process. A build of another job begins in the folder only
+    /// after that.
     fn is_published(&self) -> bool {
         let folder = self.session.run.database.folder();
-        let complete = |manifest: database::Manifest| manifest.state == ManifestState::Complete;
         let is_swept = || self.session.standing == Standing::UnderWay && !self.session.work.path().exists();
-        folder.manifest().is_ok_and(complete) && (folder.report().is_ok() || is_swept())
+        folder.manifest().is_ok_and(|manifest| {
+            let is_complete = manifest.state == ManifestState::Complete;
+            manifest.job != self.job || is_complete && (folder.report().is_ok() || is_swept())
+        })
     }
 
     /// A unit that is ready and now ours; the last one once all others are done.

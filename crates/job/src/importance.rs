@@ -58,7 +58,7 @@ pub enum AreaShape {
         /// Radius in millimetres over which slopes are averaged first.
         smooth_mm: u32,
     },
-    /// Posts of a class of the sample terrain (only with [`DemSource::Sample`]).
+    /// Posts of a class of the sample terrain (only with [`crate::DemSource::Sample`]).
     Sample(SampleClass),
 }
 

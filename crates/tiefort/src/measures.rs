@@ -1,6 +1,6 @@
 //! Every measure of a surface beside those of the regular grid, in words: what `fidelity` and `tin --measure` share.
 
-use compiler::{Fidelity, LineOfSight, Measures, ResidualFigures};
+use inspect::{Fidelity, LineOfSight, Measures, ResidualFigures};
 use views::{Align, Table, grouped};
 
 /// All measures as lines: what, of the surface, of the grid, and what it means.
@@ -172,14 +172,14 @@ fn degrees(angle: f64) -> String {
 
 #[cfg(test)]
 mod tests {
-    use compiler::SlopeDifference;
+    use inspect::SlopeDifference;
     use serde_json::Value;
 
     use super::*;
 
     fn figures() -> Measures {
         Measures {
-            residual: compiler::ResidualFigures { posts: 9, rms_m: 1.25, max_m: 4.0, ..Default::default() },
+            residual: inspect::ResidualFigures { posts: 9, rms_m: 1.25, max_m: 4.0, ..Default::default() },
             line_of_sight: LineOfSight { visible: 280, hidden: 650, false_visible: 50, false_hidden: 20, left_out: 0 },
             slope: SlopeDifference { posts: 4000, rms_degrees: 2.406, ..Default::default() },
             slope_classes: Default::default(),
@@ -188,7 +188,7 @@ mod tests {
             cover: Default::default(),
             registration: None,
             seams: None,
-            mesh: compiler::MeshForm { triangles: 32_000, ..Default::default() },
+            mesh: inspect::MeshForm { triangles: 32_000, ..Default::default() },
         }
     }
 

@@ -1,7 +1,7 @@
 //! Every measure of a surface beside those of the regular grid, for a program: shares from 0 to 1, `null` where nothing
 //! was there to measure.
 
-use compiler::{
+use inspect::{
     ClassResidual, Cover, Distances, Drainage, Fidelity, Hausdorff, LineOfSight, Measures, MeshForm, Registration,
     ResidualFigures, SeamVisibility, SlopeClasses, SlopeDifference,
 };
@@ -87,7 +87,7 @@ fn slope(found: &SlopeDifference) -> Value {
 fn slope_classes(found: &SlopeClasses) -> Value {
     let share = |share: f64| where_any(0 < found.total(), share);
     json!({
-        "from_grade": [0.0, compiler::GRADES[0], compiler::GRADES[1], compiler::GRADES[2]],
+        "from_grade": [0.0, inspect::GRADES[0], inspect::GRADES[1], inspect::GRADES[2]],
         "posts_by_class_on_dem_and_tin": found.posts,
         "agreement": share(found.agreement()),
         "gentler_on_tin": share(found.gentler()),

@@ -1,7 +1,8 @@
 //! `report.html`, drawn from what a build left: by `build` itself, and by `report --format html` later.
 
-use compiler::{PAGE_MODULES_MAX, PAGE_POSTS_MAX, Product, Wanted, WantedGround, product};
+use compiler::{PAGE_MODULES_MAX, PAGE_POSTS_MAX};
 use database::{Folder, Report, seal_page};
+use inspect::{Product, Wanted, WantedGround, product};
 use job::Job;
 use views::{Page, PageSetting, report_html};
 

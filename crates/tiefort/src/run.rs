@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use compiler::{Built, CompileError, Options, Plan, Stage};
-use database::{Database, Lease, Report, ReportStage, files};
+use database::{Database, Lease, Report, ReportStage, Work, files};
 use job::Job;
 use serde_json::json;
 use views::{Align, BreachPlaces, Table, breaches_csv, breaches_geojson};
@@ -42,6 +42,8 @@ pub struct Finished {
     pub report: Report,
     /// The database, still locked.
     pub database: Database,
+    /// What the processes of a shared run left for one another.
+    pub work: Option<Work>,
     /// Which tiles were built and which kept, in words.
     pub tiles: String,
     /// Whether nothing had to be done, so that the report is the one of the build before.
@@ -51,7 +53,8 @@ pub struct Finished {
 impl From<Built> for Finished {
     fn from(built: Built) -> Self {
         let tiles = format!("{} built, {} kept", built.rebuilt, built.kept);
-        Self { report: built.report, database: built.database, tiles, is_unchanged: built.is_unchanged }
+        let Built { report, database, work, is_unchanged, .. } = built;
+        Self { report, database, work, tiles, is_unchanged }
     }
 }
 
@@ -155,7 +158,7 @@ impl<'a> Run<'a> {
     /// # Errors
     /// When the report cannot be written.
     pub fn conclude(&self, finished: Finished, times: Times) -> Result<Outcome, Failure> {
-        let Finished { mut report, database, tiles, is_unchanged } = finished;
+        let Finished { mut report, database, work, tiles, is_unchanged } = finished;
         let mut drawn: Option<ReportStage> = None;
         if !is_unchanged {
             report.stages = times.stages;
@@ -170,8 +173,11 @@ impl<'a> Run<'a> {
                 report.files.insert(name.to_owned(), stamp);
             }
             database.write_json(files::REPORT, &report)?;
-            // With the report other processes take the build for done; so nothing that takes long comes before this.
-            database.remove_work()?;
+            // With the report other processes take the build for done; so nothing that takes long comes before this. Of a
+            // build of another job that has begun already nothing is removed.
+            if let Some(work) = &work {
+                work.sweep();
+            }
             let (written, page) = timed("page", || self.write_page(&database, &report));
             written?;
             drawn = (!self.arguments.no_html).then_some(page);

@@ -1,7 +1,7 @@
 //! From a database that was read back to what pictures and reports are drawn from.
 
-use compiler::{LimitUse, Product};
 use database::{Report, ReportPlace, TileState};
+use inspect::{LimitUse, Product};
 use terrain::{LoadModule, ModuleId, ModuleRect};
 use views::{Scene, SceneGround, SceneLimits, SceneTile};
 

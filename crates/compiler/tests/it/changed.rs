@@ -53,7 +53,7 @@ fn check(stage: Stage, expected: &[&str], act: impl FnOnce(&Scene)) {
     assert!(expected.iter().all(|part| message.contains(part)), "{message}");
     assert!(error.hint().is_some_and(|hint| hint.contains("leave sources alone")), "{:?}", error.hint());
     drop(progress);
-    assert!(!compiler::status(&scene.path("area")).unwrap().is_complete());
+    assert!(!inspect::status(&scene.path("area")).unwrap().is_complete());
     write_grid(&scene.path(""));
     drop(scene.build("area", 1));
     assert_same(&scene.product("undisturbed"), &scene.product("area"), "sources as they were");

@@ -3,10 +3,10 @@
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-use compiler::{
+use terrain::{Post, PostRect};
+use workbench::{
     CompareGround, CompareMethod, CompareRequest, CompareRow, Comparison, Equivalent, TinMethod, TinRequest,
 };
-use terrain::{Post, PostRect};
 
 use crate::real_ground::data;
 use crate::scene::{Scene, Silent, Words};
@@ -18,7 +18,7 @@ fn method(name: &str) -> CompareMethod {
 fn compare(ground: CompareGround, window: Option<PostRect>, methods: &[&str], points: &[usize]) -> Comparison {
     let methods = methods.iter().map(|name| method(name)).collect();
     let request = CompareRequest { ground, window, methods, points: points.to_vec(), strict: false };
-    compiler::compare(&request, &AtomicBool::new(false), &mut |_| ()).unwrap()
+    workbench::compare(&request, &AtomicBool::new(false), &mut |_| ()).unwrap()
 }
 
 /// The 460 x 376 posts of the desert that the project's figures were measured on.
@@ -100,7 +100,7 @@ fn equivalent_points_are_the_fewest_whose_iterative_tin_is_better() {
                 tiles: (1, 1),
                 workers: 1,
             };
-            compiler::tin(&request, &AtomicBool::new(false), &mut Silent).unwrap().residual.rms_m
+            workbench::tin(&request, &AtomicBool::new(false), &mut Silent).unwrap().residual.rms_m
         };
         let theirs = made.residual.rms_m();
         assert!(iterative(points) < theirs, "{} points", points);
@@ -110,7 +110,7 @@ fn equivalent_points_are_the_fewest_whose_iterative_tin_is_better() {
 
 fn sample(path: &Path) {
     let spacing = terrain::Spacing::from_metres(25.0).unwrap();
-    compiler::sample(3, (161, 161), spacing, path, None).unwrap();
+    workbench::sample(3, (161, 161), spacing, path, None).unwrap();
 }
 
 #[test]
@@ -134,7 +134,7 @@ fn every_method_makes_a_row_on_any_ground_and_says_why_where_it_cannot() {
     assert!(few.rows[1].made.is_ok());
     let methods = vec![method("vip")];
     let strict = CompareRequest { ground: ground(), window, methods, points: vec![100], strict: true };
-    let refused = compiler::compare(&strict, &AtomicBool::new(false), &mut |_| ()).unwrap_err();
+    let refused = workbench::compare(&strict, &AtomicBool::new(false), &mut |_| ()).unwrap_err();
     assert_eq!(refused.to_string(), "vip: 100 points, expected 356 to 8000 points");
 }
 
@@ -144,6 +144,6 @@ fn a_window_outside_the_ground_is_refused() {
     let ground = CompareGround::Job(Box::new(scene.job.clone()));
     let window = Some(PostRect::new(Post::new(0, 0), Post::new(9, 201)));
     let request = CompareRequest { ground, window, methods: vec![method("regular")], points: vec![9], strict: false };
-    let refused = compiler::compare(&request, &AtomicBool::new(false), &mut |_| ()).unwrap_err();
+    let refused = workbench::compare(&request, &AtomicBool::new(false), &mut |_| ()).unwrap_err();
     assert!(refused.to_string().ends_with("expected a part of the 181 rows and 201 columns there are"), "{refused}");
 }

@@ -33,7 +33,7 @@ fn check(folders: &[&str], damage: impl Fn(&Path)) {
         let mut tried = 0;
         for name in names {
             damage(&scene.path("area").join(name));
-            let problems = compiler::verify(&scene.path("area"), None).unwrap().problems;
+            let problems = inspect::verify(&scene.path("area"), None).unwrap().problems;
             let file = name.file_name().unwrap().to_string_lossy().into_owned();
             assert!(problems.iter().any(|problem| problem.contains(&file)), "{kind}, {file}: {problems:?}");
             drop(scene.build("area", 2));
@@ -86,7 +86,7 @@ fn files_of_two_tiles_that_changed_places_are_named_and_made_again() {
         let (one, other) = (fs::read(path("r00c00")).unwrap(), fs::read(path("r01c01")).unwrap());
         fs::write(path("r00c00"), other).unwrap();
         fs::write(path("r01c01"), one).unwrap();
-        let problems = compiler::verify(&scene.path("area"), None).unwrap().problems;
+        let problems = inspect::verify(&scene.path("area"), None).unwrap().problems;
         assert!(problems.iter().any(|problem| problem.contains(&format!("r00c00.{kind}"))), "{problems:?}");
         drop(scene.build("area", 2));
         assert_same(&sound, &scene.product("area"), folder);
@@ -101,7 +101,7 @@ fn a_damaged_manifest_is_an_error_of_verify_and_the_next_build_writes_it_again()
     let text = fs::read_to_string(&path).unwrap();
     for damaged in [String::new(), text[..text.len() / 2].to_owned(), text.replacen("\"tiles\"", "\"tails\"", 1)] {
         fs::write(&path, damaged).unwrap();
-        let error = compiler::verify(&scene.path("area"), None).unwrap_err();
+        let error = inspect::verify(&scene.path("area"), None).unwrap_err();
         assert!(error.to_string().contains("database.json"), "{error}");
         drop(scene.build("area", 2));
         assert_same(&sound, &scene.product("area"), "database.json");

@@ -1,8 +1,8 @@
 //! Ground that is flat, has holes, is excluded, or has fewer posts than points are asked for.
 
-use compiler::{TinMethod, TinRequest};
 use job::{ErrorKey, Optimising};
 use terrain::{Dem, Post, PostRect, StopReason};
+use workbench::{TinMethod, TinRequest};
 
 use crate::modes::write_polygon;
 use crate::product::{Edges, Product};
@@ -125,7 +125,7 @@ fn a_mesh_of_more_points_than_posts_is_every_post() {
                 tiles,
                 workers: 2,
             };
-            let mesh = compiler::tin(&request, &false.into(), &mut Silent).unwrap();
+            let mesh = workbench::tin(&request, &false.into(), &mut Silent).unwrap();
             mesh.tin.check().unwrap();
             let sums = sums_of_tin(&mesh.tin, &dem);
             assert_eq!(mesh.stop, StopReason::Exhausted, "{method:?} {tiles:?}");
@@ -243,7 +243,7 @@ fn voids_of_a_mesh_are_no_vertices_and_in_no_statistic() {
             tiles,
             workers: 2,
         };
-        let mesh = compiler::tin(&request, &false.into(), &mut Silent).unwrap();
+        let mesh = workbench::tin(&request, &false.into(), &mut Silent).unwrap();
         mesh.tin.check().unwrap();
         assert_eq!(mesh.points, mesh.tin.vertices.len());
         let corners = (tiles.0 + 1) * (tiles.1 + 1);

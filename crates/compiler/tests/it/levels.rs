@@ -147,13 +147,13 @@ fn residuals_of_every_level_are_those_against_the_ground() {
         &ground(),
     );
     drop(scene.build("area", 2));
-    let verdict = compiler::verify(&scene.path("area"), Some(&scene.path("dem.tif"))).unwrap();
+    let verdict = inspect::verify(&scene.path("area"), Some(&scene.path("dem.tif"))).unwrap();
     assert_eq!(verdict.problems, [""; 0]);
     // Against other ground all levels differ.
     let mut other = ground();
     other = terrain::Dem::from_fn(other.rect(), |post| Some(other.height(post) + post.row % 3));
     scene.replace_dem(&other);
-    let verdict = compiler::verify(&scene.path("area"), Some(&scene.path("dem.tif"))).unwrap();
+    let verdict = inspect::verify(&scene.path("area"), Some(&scene.path("dem.tif"))).unwrap();
     for level in ["load module 2,2: its residuals", "level 1: load module 2,2: its", "level 2: load module 2,2: its"] {
         assert!(verdict.problems.iter().any(|problem| problem.starts_with(level)), "{level}: {:?}", verdict.problems);
     }
@@ -224,7 +224,7 @@ fn verify_finds_levels_that_do_not_fit_together_and_those_that_are_not_in_the_jo
         told.job = told.job.replace(before, after);
         assert_ne!(told.job, manifest.job);
         built.database.finish(&told).unwrap();
-        compiler::verify(&scene.path("area"), None).unwrap().problems
+        inspect::verify(&scene.path("area"), None).unwrap().problems
     };
     let torn = problems("border = \"own\"", "border = \"full\"");
     let crack = "load module 0,0: its edges on the eastern side at level 0 are not its neighbour's at level 2: a crack";

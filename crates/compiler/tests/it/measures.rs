@@ -3,9 +3,10 @@
 use std::collections::BTreeMap;
 use std::fs;
 
-use compiler::{CompileError, DatabaseFidelity, MeshForm, Sights};
+use compiler::CompileError;
 use database::Folder;
 use fidelity::{DemGround, Triangles};
+use inspect::{DatabaseFidelity, MeshForm, Sights};
 use terrain::{Dem, LatticePoint, Metres, Post, Tin, Vertex};
 
 use crate::scene::{Scene, Words, sample_dem, tile, write_dem};
@@ -26,7 +27,7 @@ fn built(words: &Words) -> (Scene, Dem) {
 
 fn measured(scene: &Scene, against: Option<&str>) -> Result<DatabaseFidelity, CompileError> {
     let against = against.map(|name| scene.path(name));
-    compiler::fidelity(&scene.path("area"), against.as_deref(), SIGHTS)
+    inspect::fidelity(&scene.path("area"), against.as_deref(), SIGHTS)
 }
 
 /// All load modules welded into one TIN, by equal places.
@@ -69,7 +70,7 @@ fn load_modules_are_measured_as_the_one_tin_they_make_up() {
     assert_eq!(found.measures.tin, welded);
     let sight = welded.line_of_sight;
     assert!(sight.pairs() == 3000 && 0.8 < sight.agreement() && sight.agreement() < 1.0, "{sight:?}");
-    let built = compiler::verify(&scene.path("area"), Some(&scene.path("dem.tif"))).unwrap().residual.unwrap();
+    let built = inspect::verify(&scene.path("area"), Some(&scene.path("dem.tif"))).unwrap().residual.unwrap();
     assert_eq!([found.residual.rms_m, found.residual.max_m], [built.rms_m, built.max_m]);
     let residual = found.measures.tin.residual;
     assert_eq!(

@@ -118,7 +118,7 @@ fn a_tile_whose_border_would_change_is_frozen_until_the_next_build() {
         scene.replace_dem(&with_spikes(&ground(), middle(changed)));
         assert_eq!(scene.tile("area", changed, false), (vec![changed], true), "{name}");
 
-        let status = compiler::status(&scene.path("area")).unwrap();
+        let status = inspect::status(&scene.path("area")).unwrap();
         assert!(status.is_complete() && status.frozen() == [changed], "{name}: {:?}", status.frozen());
         assert_eq!(status.manifest.tile(changed).unwrap().state, TileState::Frozen);
         scene.verify("area");
@@ -128,12 +128,12 @@ fn a_tile_whose_border_would_change_is_frozen_until_the_next_build() {
 
         // It stays frozen while others are run again.
         assert_eq!(scene.tile("area", tile(2, 2), false), (vec![tile(2, 2)], false), "{name}");
-        assert_eq!(compiler::status(&scene.path("area")).unwrap().frozen(), [changed], "{name}");
+        assert_eq!(inspect::status(&scene.path("area")).unwrap().frozen(), [changed], "{name}");
 
         let built = scene.build("area", 2);
         assert!(1 <= built.rebuilt && built.rebuilt < 9, "{name}: {} tiles refined", built.rebuilt);
         drop(built);
-        assert!(compiler::status(&scene.path("area")).unwrap().frozen().is_empty(), "{name}");
+        assert!(inspect::status(&scene.path("area")).unwrap().frozen().is_empty(), "{name}");
         drop(scene.build("fresh", 2));
         assert_same(&scene.product("fresh"), &scene.product("area"), name);
     }

@@ -4,6 +4,7 @@
 //! failed stay in `KEPT`.
 
 use compiler::CompileError;
+use ground::GroundError;
 use terrain::Dem;
 
 use crate::modes::write_polygon;
@@ -84,6 +85,7 @@ fn words(draw: &mut Draw) -> Words {
     let tiles = (draw.within(1, size.0 / 2), draw.within(1, size.1 / 2));
     let clip = draw.below(2) == 0;
     let heights = draw.one_of(&["coplanar", "dem"]);
+    let outer_border = draw.one_of(&["", "outer_border = \"fixed\""]);
     let weight = draw.one_of(&[0, 0, 1, 8]);
     let smooth = draw.one_of(&["none", "binomial-7"]);
     let area = format!("areas = [{{ file = \"area.geojson\", class = \"area\", weight = {weight} }}]");
@@ -93,7 +95,7 @@ fn words(draw: &mut Draw) -> Words {
         tiles,
         order: format!("order = \"{}\"\nborders = \"{borders}\"", draw.one_of(&["colour", "raster"])),
         importance: format!("default = 2\nsmooth = \"{smooth}\"\n{}", if draw.below(2) == 0 { "" } else { &area }),
-        modules: if clip { format!("edges = \"clip\"\nclip_heights = \"{heights}\"") } else { String::new() },
+        modules: if clip { format!("edges = \"clip\"\nclip_heights = \"{heights}\"") } else { outer_border.into() },
         limits: limits(draw, size),
         tin: tin(draw, clip),
         ..Words::raster()
@@ -130,7 +132,7 @@ fn run(seed: u64) -> bool {
             check(&scene, &dem);
             true
         }
-        Err(CompileError::Impossible { .. }) => {
+        Err(CompileError::Impossible { .. } | CompileError::Ground(GroundError::Impossible { .. })) => {
             let error = scene.try_build("area", 1).expect_err("a build that the plan refuses");
             assert!(error.hint().is_some() && !scene.path("area").exists(), "{error}");
             false

@@ -84,7 +84,7 @@ fn the_desert_is_sound_as_true_as_specified_and_the_same_for_one_worker_and_two(
         tree
     });
     assert_same(&trees[0], &trees[1], "one worker and two");
-    let verdict = compiler::verify(&folder.path().join("one"), Some(&path)).unwrap();
+    let verdict = inspect::verify(&folder.path().join("one"), Some(&path)).unwrap();
     assert!(verdict.problems.is_empty(), "{:?}", verdict.problems);
     assert_eq!((verdict.checked_modules, verdict.checked_files), (51 * 51, 4 * 36 + 1));
     check_band(verdict.residual.unwrap().rms_m, 0.82);
@@ -138,7 +138,7 @@ fn the_alps_are_sound_in_both_kinds_of_edges() {
     let spent = built.report.triangles as f64 / (32.0 * 99.0 * 99.0);
     assert!((0.97..=1.0).contains(&spent), "{spent} of the budget is spent");
     drop(built);
-    let verdict = compiler::verify(&folder.path().join("constrained"), Some(&path)).unwrap();
+    let verdict = inspect::verify(&folder.path().join("constrained"), Some(&path)).unwrap();
     assert!(verdict.problems.is_empty(), "{:?}", verdict.problems);
 
     let paper = [
@@ -148,7 +148,7 @@ fn the_alps_are_sound_in_both_kinds_of_edges() {
     let (built, _) = build(&job("alps.toml", &paper), &folder.path().join("clip"), 2);
     assert_eq!(built.report.points.selected + removed(&built), 74_978);
     drop(built);
-    let verdict = compiler::verify(&folder.path().join("clip"), None).unwrap();
+    let verdict = inspect::verify(&folder.path().join("clip"), None).unwrap();
     assert!(verdict.problems.is_empty(), "{:?}", verdict.problems);
 }
 

@@ -156,7 +156,7 @@ impl Scene {
 
     #[track_caller]
     pub fn verify(&self, folder: &str) {
-        let verdict = compiler::verify(&self.path(folder), None).unwrap();
+        let verdict = inspect::verify(&self.path(folder), None).unwrap();
         assert!(verdict.problems.is_empty(), "{}", verdict.problems.join("\n"));
     }
 }

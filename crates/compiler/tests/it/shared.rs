@@ -1,10 +1,13 @@
 //! Processes that share a directory: units of work in any order, workers side by side, the bytes of a build.
 
 use std::cell::Cell;
+use std::path::Path;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 use compiler::{CompileError, Options, Sharing, Unit, UnitEnd};
+use database::Lease;
+use job::Job;
 use terrain::TileId;
 
 use crate::modes;
@@ -79,6 +82,66 @@ fn a_published_tile_that_is_damaged_takes_its_mark_back() {
     built.database.remove_work().unwrap();
     drop(built);
     assert_same(&scene.product("alone"), &scene.product("area"), "after damage");
+}
+
+/// Two jobs of one area, whose bytes differ.
+fn two_jobs() -> [Scene; 2] {
+    let equal = "method = \"greedy\"\nallocation = \"equal\"";
+    [equal, ""].map(|tin| Scene::new(&Words { tin: tin.into(), ..Words::sample() }))
+}
+
+/// Does units of one job's work in another's folder.
+fn perform_in(folder: &Path, job: &Job, units: &[Unit]) -> UnitEnd {
+    let options = Options { workers: 1, fresh: false, stop: &AtomicBool::new(false) };
+    compiler::perform(job, folder, units, &options, &mut Silent).unwrap()
+}
+
+/// All units but the surveys of a job in a folder, its report, and `before_sweeping` before its work is swept.
+fn finish_in(folder: &Path, job: &Job, before_sweeping: impl FnOnce()) {
+    perform_in(folder, job, &[Unit::Allocate]);
+    tiles().into_iter().for_each(|tile| drop(perform_in(folder, job, &[Unit::Refine(tile)])));
+    tiles().into_iter().for_each(|tile| drop(perform_in(folder, job, &[Unit::Assemble(tile)])));
+    let UnitEnd::Published(built) = perform_in(folder, job, &[Unit::Publish]) else { panic!("not published") };
+    built.database.write_json(database::files::REPORT, &built.report).unwrap();
+    before_sweeping();
+    built.work.as_ref().unwrap().sweep();
+}
+
+fn survey_in(folder: &Path, job: &Job) {
+    tiles().into_iter().for_each(|tile| drop(perform_in(folder, job, &[Unit::Survey(tile)])));
+}
+
+#[test]
+fn a_build_of_another_job_that_begins_as_one_ends_keeps_its_work() {
+    let [first, next] = two_jobs();
+    let folder = first.path("area");
+    drop(next.build("area", 2));
+    finish_in(&folder, &first.job, || survey_in(&folder, &next.job));
+    finish_in(&folder, &next.job, || ());
+    assert_same(&next.product("area"), &first.product("area"), "the second job");
+    first.verify("area");
+}
+
+#[test]
+fn a_worker_that_was_slow_while_its_build_ended_and_another_began_does_no_harm() {
+    let [first, next] = two_jobs();
+    let folder = first.path("area");
+    drop(next.build("area", 2));
+    let is_first = Cell::new(true);
+    let now = || {
+        if is_first.replace(false) {
+            finish_in(&folder, &first.job, || survey_in(&folder, &next.job));
+        }
+        Duration::ZERO
+    };
+    let (wait, holding) = (|_: Duration| {}, |_: Option<Lease>| {});
+    let second = Duration::from_secs(1);
+    let sharing = Sharing { name: "slow", lease: second, pause: second, now: &now, wait: &wait, holding: &holding };
+    let options = Options { workers: 1, fresh: false, stop: &AtomicBool::new(false) };
+    let end = compiler::work(&first.job, &folder, &options, &sharing, &mut Silent).unwrap();
+    assert!(end.units == 0 && end.published.is_none(), "{end:?}");
+    finish_in(&folder, &next.job, || ());
+    assert_same(&next.product("area"), &first.product("area"), "the second job");
 }
 
 #[test]

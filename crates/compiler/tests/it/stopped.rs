@@ -2,7 +2,8 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use compiler::{CompileError, Event, Progress, Sights, Stage};
+use compiler::{CompileError, Event, Progress, Stage};
+use inspect::Sights;
 
 use crate::modes;
 use crate::scene::{Scene, Words, assert_same, sample_dem, tile};
@@ -33,11 +34,11 @@ fn build_and_stop(scene: &Scene, stage: Stage, tiles: usize, workers: usize) {
     let error = scene.build_watched("area", workers, &flag, &mut progress).expect_err("the build was stopped");
     assert!(error.is_stopped() && error.hint().is_some(), "{error}");
     assert!(error.to_string().contains(stage.name()), "{error}");
-    let status = compiler::status(&scene.path("area")).unwrap();
+    let status = inspect::status(&scene.path("area")).unwrap();
     assert!(!status.is_complete() && status.held == database::Held::Free);
-    let verdict = compiler::verify(&scene.path("area"), None).unwrap();
+    let verdict = inspect::verify(&scene.path("area"), None).unwrap();
     assert!(verdict.problems.iter().any(|problem| problem.contains("incomplete")), "{:?}", verdict.problems);
-    let measured = compiler::fidelity(&scene.path("area"), None, Sights::USUAL);
+    let measured = inspect::fidelity(&scene.path("area"), None, Sights::USUAL);
     assert!(matches!(measured, Err(CompileError::Unfinished { .. })), "{measured:?}");
 }
 
@@ -88,7 +89,7 @@ fn a_stopped_update_is_incomplete_until_a_build_ends_it() {
     // One tile among others of two different DEMs would open cracks.
     let error = scene.try_tile("area", tile(0, 0), false).expect_err("no whole database to go on from");
     assert!(error.to_string().contains("incomplete") && error.hint().is_some(), "{error}");
-    assert!(!compiler::status(&scene.path("area")).unwrap().is_complete());
+    assert!(!inspect::status(&scene.path("area")).unwrap().is_complete());
     drop(scene.build("area", 2));
     drop(scene.build("fresh", 2));
     assert_same(&scene.product("fresh"), &scene.product("area"), "the update");
@@ -100,8 +101,8 @@ fn a_second_build_of_a_folder_at_work_is_told_to_try_again() {
     let first = scene.build("area", 1);
     let error = scene.try_build("area", 1).unwrap_err();
     assert!(error.is_transient() && error.hint().is_some(), "{error}");
-    assert_eq!(compiler::status(&scene.path("area")).unwrap().held, database::Held::Alone);
+    assert_eq!(inspect::status(&scene.path("area")).unwrap().held, database::Held::Alone);
     drop(first);
-    assert_eq!(compiler::status(&scene.path("area")).unwrap().held, database::Held::Free);
+    assert_eq!(inspect::status(&scene.path("area")).unwrap().held, database::Held::Free);
     drop(scene.build("area", 1));
 }

@@ -1,10 +1,10 @@
 //! The figures of ALGORITHMS 2.12, 4.4 and 6.10 on the 460 x 376 window of the real desert, residuals within a fifth.
 
-use compiler::{TinMethod, TinRequest};
 use fidelity::{PostHeights, Triangles};
 use job::ErrorKey;
 use terrain::{Dem, Importance, Metres, Post, PostRect, SeamSides, THOUSANDTHS, TileId, Tin};
 use tin::{Frame, LastBatch, Proximity, Rule, Stop, TileTask};
+use workbench::{TinMethod, TinRequest};
 
 use crate::real_ground::{data, read_dem};
 use crate::scene::{Silent, write_dem};
@@ -132,7 +132,7 @@ fn a_mesh_from_a_raster_is_that_of_the_method_and_tiles_cost_little() {
             tiles,
             workers,
         };
-        let mesh = compiler::tin(&request, &false.into(), &mut Silent).unwrap();
+        let mesh = workbench::tin(&request, &false.into(), &mut Silent).unwrap();
         mesh.tin.check().unwrap();
         let sums = sums_of_tin(&mesh.tin, &dem);
         assert!((mesh.residual.rms_m - sums.rms_m()).abs() < 1e-9, "{method:?} {tiles:?}");

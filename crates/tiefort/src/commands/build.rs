@@ -38,7 +38,7 @@ pub struct Arguments {
 
 /// Builds.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
-    let mut job = Job::load_with(&arguments.job, &compiler::find_area)?;
+    let mut job = Job::load_with(&arguments.job, &ground::find_area)?;
     job.dem.strict = arguments.run.strict;
     if !arguments.force {
         let (workers, _) = arguments.run.workers.for_job(&job);

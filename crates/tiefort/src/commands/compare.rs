@@ -4,11 +4,11 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::Args;
-use compiler::{CompareEvent, CompareGround, CompareMethod, CompareRequest, CompareRow, Comparison, Equivalent, Made};
 use job::{Job, StartMethod};
 use serde_json::{Value, json};
 use terrain::{Post, PostRect};
 use views::{Align, Facets, Image, Look, Panel, Style, Surface, Table, draw_panels, fold, grouped};
+use workbench::{CompareEvent, CompareGround, CompareMethod, CompareRequest, CompareRow, Comparison, Equivalent, Made};
 
 use crate::arguments::{Format, start_method};
 use crate::failure::{Failure, Outcome};
@@ -106,7 +106,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let signals = Signals::watch()?;
     let mut watch = Watch { quiet: arguments.quiet, names: Vec::new(), began: Instant::now(), seconds: Vec::new() };
     watch.names = names(&request);
-    let found = compiler::compare(&request, signals.stop(), &mut |event| watch.hear(event));
+    let found = workbench::compare(&request, signals.stop(), &mut |event| watch.hear(event));
     let found = found.map_err(|error| Failure::of_compiler(&error, signals.exit_code()))?;
     refuse_all(&found)?;
     if let Some(folder) = &arguments.pictures {
@@ -138,7 +138,7 @@ fn request(arguments: &Arguments) -> Result<CompareRequest, Failure> {
 }
 
 fn load(path: &Path) -> Result<Job, Failure> {
-    Ok(Job::load_with(path, &compiler::find_area)?)
+    Ok(Job::load_with(path, &ground::find_area)?)
 }
 
 /// When no method could make the points it was asked for, that is an error.

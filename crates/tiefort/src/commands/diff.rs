@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use compiler::{Difference, ModuleDifference, difference};
+use inspect::{Difference, ModuleDifference, difference};
 use serde_json::{Value, json};
 use views::{Align, Table, grouped};
 

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use compiler::{Explanation, WantedGround, explain};
+use inspect::{Explanation, WantedGround, explain};
 use serde_json::{Value, json};
 use terrain::{ModuleId, RefusedBy, StopReason, TileId};
 use views::{Align, Table, fold, grouped};

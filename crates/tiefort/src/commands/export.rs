@@ -3,9 +3,10 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use compiler::{BuiltFrom, CompileError};
+use compiler::CompileError;
 use database::Folder;
 use exports::{Block, Coordinates, Datum, ExportError, Facts, Levels, Mesh, Product, Work};
+use inspect::BuiltFrom;
 use job::Job;
 use terrain::{ModuleId, PostRect};
 use views::grouped;

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use compiler::{DatabaseFidelity, Sights};
+use inspect::{DatabaseFidelity, Sights};
 use serde_json::{Value, json};
 
 use crate::arguments::Format;
@@ -55,7 +55,7 @@ const PAIRS_MAX: i64 = 100_000_000;
 /// Measures.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let sights = Sights { pairs: arguments.pairs, seed: arguments.seed };
-    let found = compiler::fidelity(&arguments.database, arguments.against.as_deref(), sights)?;
+    let found = inspect::fidelity(&arguments.database, arguments.against.as_deref(), sights)?;
     terminal::print(&match arguments.format {
         Format::Text => text(&found),
         Format::Json => format!("{:#}\n", to_json(&found, sights)),

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use compiler::{Component, Inadequate};
+use inspect::{Component, Inadequate};
 use serde_json::{Value, json};
 use views::{Align, Image, Scene, SceneLimits, Table, draw_errors, draw_module_limits, fold, grouped};
 
@@ -63,7 +63,7 @@ enum Format {
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let folder = arguments.out.as_ref().unwrap_or(&arguments.database);
     let files = ["inadequate.geojson", "error.png", "density.png"].map(|name| folder.join(name));
-    let found = compiler::inadequate(&arguments.database, arguments.tolerance)?;
+    let found = inspect::inadequate(&arguments.database, arguments.tolerance)?;
     files::make_folder(folder)?;
     files::check_writable(&files[0])?;
     let collection = format!("{:#}\n", geojson(&found));

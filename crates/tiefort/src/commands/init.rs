@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use compiler::{Seen, Suggestion};
 use job::Job;
 use views::fold;
+use workbench::{Seen, Suggestion};
 
 use crate::failure::{Failure, Outcome};
 use crate::terminal;
@@ -39,7 +39,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     // Rasters may take long to look at.
     arguments.out.as_deref().map_or(Ok(()), crate::files::check_free)?;
     let files = rasters(&arguments.files)?;
-    let suggestion = compiler::look_at(&files, arguments.crs.as_deref()).map_err(Failure::from);
+    let suggestion = workbench::look_at(&files, arguments.crs.as_deref()).map_err(Failure::from);
     let suggestion = suggestion.map_err(|failure| match arguments.crs {
         // The hint of a build would tell to write into the job that is about to be made.
         None => failure.hinted_where("no coordinate reference system", "say what it is: --crs EPSG:32611 (your own)"),

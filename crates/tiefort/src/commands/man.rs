@@ -74,7 +74,8 @@ fn page(command: &Command) -> Result<Vec<u8>, Failure> {
 }
 
 fn sections(command: &Command, page: &mut Vec<u8>) -> io::Result<()> {
-    let man = Man::new(command.clone()).title(full_name(command));
+    let man =
+        Man::new(command.clone()).title(full_name(command)).source(concat!("tiefort ", env!("CARGO_PKG_VERSION")));
     man.render_title(page)?;
     man.render_name_section(page)?;
     man.render_synopsis_section(page)?;

@@ -79,7 +79,7 @@ enum Emit {
 
 /// Plans.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
-    let job = Job::load_with(&arguments.job, &compiler::find_area)?;
+    let job = Job::load_with(&arguments.job, &ground::find_area)?;
     let plan = compiler::plan(&job)?;
     let default = PathBuf::from(format!("{}.tdb", job.area.name));
     let folder = arguments.out.as_ref().unwrap_or(&default);
@@ -174,7 +174,7 @@ fn corner_table(job: &Job) -> Table {
     let mut table = Table::new(&[Align::Left, Align::Right, Align::Right, Align::Right, Align::Right]);
     let system = format!("EPSG:{}", job.area.epsg);
     table.row(["Corners", &format!("{system} east"), "north", "WGS 84 latitude", "longitude"]);
-    for corner in compiler::corners(job) {
+    for corner in ground::corners(job) {
         let [east_m, north_m] = corner.place_m.map(|metres| format!("{metres:.2}"));
         let degrees = corner.lon_lat.map(|[longitude, latitude]| [latitude, longitude]);
         let [latitude, longitude] = match degrees {
@@ -220,7 +220,7 @@ fn json_text(job: &Job, plan: &Plan, played: &[Played]) -> String {
         .collect();
     let tiles: Vec<Value> = by_rank(plan).into_iter().map(tile_json).collect();
     let forecast = &plan.forecast;
-    let corners: Vec<Value> = compiler::corners(job)
+    let corners: Vec<Value> = ground::corners(job)
         .iter()
         .map(|corner| json!({ "name": corner.name, "place_m": corner.place_m, "lon_lat": corner.lon_lat }))
         .collect();

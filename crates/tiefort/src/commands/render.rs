@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use compiler::{Product, Wanted, WantedGround, product};
 use database::Folder;
+use inspect::{Product, Wanted, WantedGround, product};
 use terrain::{LoadModule, ModuleId, ModuleRect};
 use views::{Eye, Image, Map, RESIDUAL_SCALE_M, Shown, Sight, Style, draw_map, draw_sight};
 

@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use compiler::{CompileError, Wanted, WantedGround, product};
 use database::{Folder, Report};
+use inspect::{Wanted, WantedGround, product};
 
 use crate::arguments::Workers;
 use crate::failure::{Failure, Outcome};
@@ -68,7 +68,7 @@ fn html(arguments: &Arguments, report: &Report) -> Result<String, Failure> {
     let ground = arguments.against.as_deref().map_or(WantedGround::Recorded, WantedGround::Raster);
     let wanted = Wanted { part: None, ground, workers: arguments.workers.count() };
     let product = match product(&arguments.database, &wanted) {
-        Err(error @ (CompileError::Impossible { .. } | CompileError::Source(_))) if arguments.against.is_none() => {
+        Err(error) if error.is_of_the_job() && arguments.against.is_none() => {
             terminal::tell(&format!("note: {error}; the page is drawn without it\nhint: --against DEM names it\n"));
             product(&arguments.database, &Wanted { ground: WantedGround::None, ..wanted })?
         }

@@ -56,6 +56,6 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         files::check_writable(path)?;
     }
     let size = (rows.unwrap_or(*posts) as usize, *posts as usize);
-    compiler::sample(*seed, size, *spacing, out, classes.as_deref())?;
+    workbench::sample(*seed, size, *spacing, out, classes.as_deref())?;
     Ok(Outcome::Sound)
 }

@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use compiler::{Status, TileProgress};
 use database::{Held, Manifest};
+use inspect::{Status, TileProgress};
 use views::{fold, grouped};
 
 use crate::board::Board;
@@ -43,7 +43,7 @@ const STATES: [(TileProgress, char, &str); 5] = [
 
 /// Tells the status.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
-    let status = compiler::status(&arguments.database)?;
+    let status = inspect::status(&arguments.database)?;
     terminal::print(&status_text(&status))?;
     let missing = status.tiles.iter().any(|(_, progress)| *progress == TileProgress::Missing);
     let complete = status.is_complete() && !missing;

@@ -62,7 +62,7 @@ enum StageName {
 
 /// Does it.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
-    let job = Job::load_with(&arguments.job, &compiler::find_area)?;
+    let job = Job::load_with(&arguments.job, &ground::find_area)?;
     let units = units(&job, arguments)?;
     let names: Vec<String> = units.iter().map(|unit| unit.name()).collect();
     let run = Run::announce_briefly(&job, &arguments.run, &names.join(" "))?;

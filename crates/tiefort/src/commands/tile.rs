@@ -38,7 +38,7 @@ pub struct Arguments {
 
 /// Re-runs the tile.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
-    let mut job = Job::load_with(&arguments.job, &compiler::find_area)?;
+    let mut job = Job::load_with(&arguments.job, &ground::find_area)?;
     job.dem.strict = arguments.run.strict;
     check_tile(&job, arguments.tile)?;
     let what = format!("re-running tile {},{} of", arguments.tile.row, arguments.tile.col);
@@ -49,7 +49,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         let names: Vec<String> = rebuilt.rebuilt.iter().map(TileId::to_string).collect();
         let frozen = if rebuilt.frozen { "; frozen: a build makes it whole" } else { "" };
         let tiles = format!("{} built{frozen}", names.join(", "));
-        Ok(Finished { report: rebuilt.report, database: rebuilt.database, tiles, is_unchanged: false })
+        Ok(Finished { report: rebuilt.report, database: rebuilt.database, work: None, tiles, is_unchanged: false })
     })
 }
 

@@ -4,12 +4,14 @@ use std::path::{Path, PathBuf};
 use std::sync::PoisonError;
 
 use clap::{ArgGroup, Args, ValueEnum};
-use compiler::{Fidelity, Mesh, Sights, Stage, TinMethod, TinRequest, TinStart};
+use compiler::Stage;
 use exports::TinPlace;
+use inspect::{Fidelity, Sights};
 use job::Optimising;
 use serde_json::{Value, json};
-use terrain::StopReason;
+use terrain::{Metres, StopReason};
 use views::{Align, Coordinates, MeshPlace, Table, grouped};
+use workbench::{Mesh, TinMethod, TinRequest, TinStart};
 
 use crate::arguments::{Workers, positive, rows_by_columns, start_method};
 use crate::estimate::Estimate;
@@ -208,8 +210,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     signals.end_in_time(move || signals::stopped(&place.lock().unwrap_or_else(PoisonError::into_inner).words()));
     let levels: Vec<usize> = arguments.levels.iter().map(|&points| points as usize).collect();
     let meshed = match levels.is_empty() {
-        true => compiler::tin(&request, signals.stop(), &mut listener).map(|mesh| vec![mesh]),
-        false => compiler::tin_levels(&request, &levels, signals.stop(), &mut listener),
+        true => workbench::tin(&request, signals.stop(), &mut listener).map(|mesh| vec![mesh]),
+        false => workbench::tin_levels(&request, &levels, signals.stop(), &mut listener),
     };
     let seconds = listener.finish().seconds;
     signals.tell_once(|| {});
@@ -217,7 +219,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     for (mesh, out) in meshes.iter().zip(&outs) {
         write(mesh, kind, arguments, out)?;
     }
-    let measure = |mesh: &Mesh| arguments.measure.then(|| compiler::measure(mesh, Sights::USUAL));
+    let measure = |mesh: &Mesh| {
+        arguments.measure.then(|| inspect::measure(&mesh.tin, &mesh.dem, Metres(mesh.spacing_m.0), Sights::USUAL))
+    };
     let measured: Vec<Option<Fidelity>> = meshes.iter().map(measure).collect();
     match show {
         Show::Nothing => {}

@@ -29,7 +29,7 @@ pub struct Arguments {
 
 /// Verifies.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
-    let verdict = compiler::verify(&arguments.database, arguments.dem.as_deref())?;
+    let verdict = inspect::verify(&arguments.database, arguments.dem.as_deref())?;
     let mut text: String = verdict.problems.iter().map(|problem| format!("{problem}\n")).collect();
     text += &verdict.unchecked.iter().map(|what| format!("not checked: {what}\n")).collect::<String>();
     let checked = format!(

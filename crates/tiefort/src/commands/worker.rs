@@ -44,7 +44,7 @@ pub struct Arguments {
 
 /// Works.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
-    let job = Job::load_with(&arguments.job, &compiler::find_area)?;
+    let job = Job::load_with(&arguments.job, &ground::find_area)?;
     let run = Run::announce_briefly(&job, &arguments.run, "worker")?;
     let (name, start) = (name(), Instant::now());
     let lease = Duration::from_secs(arguments.lease);

@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use axum::body::Bytes;
-use compiler::{Product, ProductGround, Wanted, WantedGround, product};
+use inspect::{Product, ProductGround, Wanted, WantedGround, product};
 use load_module_reader::{Area, Keep};
 use serde_json::json;
-use terrain::{ModuleGrid, ModuleRect};
+use terrain::{HOLE_CLASS, ModuleGrid, ModuleRect};
 use views::{RESIDUAL_SCALE_M, palette};
 
 use super::overview::Overview;
@@ -80,6 +80,7 @@ fn description(product: &Product, area: &Area, overview: &Overview) -> String {
         "residual_scale_m": RESIDUAL_SCALE_M,
         "palette": palette(),
         "water": water(&product.job),
+        "hole": HOLE_CLASS,
         "triangles": totals.triangles,
         "polygons": totals.polygons,
         "classes": product.job.importance.classes,

@@ -3,7 +3,7 @@
 //! As bytes: heights of all posts of the block, its four border lines included, in metres (f32), row by row from the
 //! south-west; then the residual of each, DEM less triangles (f32; not a number at voids).
 
-use compiler::{NO_RESIDUAL, ProductGround, Wanted, WantedGround, product};
+use inspect::{NO_RESIDUAL, ProductGround, Wanted, WantedGround, product};
 use load_module_reader::{Block, QUANTA_PER_METRE};
 use terrain::{ModuleRect, Post};
 

@@ -13,7 +13,11 @@ const known = (area, stops, share) => (Number.isNaN(share) ? numbers(area.palett
 
 /** Red, green, blue from 0 to 1 as screens have them. */
 export const colorOf = {
-  water: (area) => numbers(area.palette.water),
+  /** Of what lies over the ground or in its place: water and holes; undefined for ground. */
+  cover: (area, ofClass) => {
+    if (ofClass === area.hole) return numbers(area.palette.nothing);
+    return ofClass === area.water ? numbers(area.palette.water) : undefined;
+  },
   height: (area, metres) =>
     known(area, area.palette.heights, (metres - area.height_m[0]) / (area.height_m[1] - area.height_m[0] || 1)),
   limits: (area, count) =>

@@ -150,7 +150,8 @@ function pick(view, x, y) {
   scene.add(view.outline);
   const normal = [hit.face.normal.x, -hit.face.normal.z, hit.face.normal.y];
   const isTin = surface === module.tin;
-  const className = isTin ? area.classes[module.classes[number]] ?? module.classes[number] : undefined;
+  const ofClass = isTin ? module.classes[number] : undefined;
+  const className = ofClass === area.hole ? "hole" : (area.classes[ofClass] ?? ofClass);
   const residual = isTin ? undefined : surface.residuals[nearest(surface, number, place)];
   const { row: ownRow, col: ownCol, level } = module;
   view.picked = { row: ownRow, col: ownCol, level, place, triangle: { number, normal, className, residual } };

@@ -18,9 +18,9 @@ export class SmallMap {
     this.repaint("height");
   }
 
-  /** Paints the area anew: shaded heights and water, or a square for each load module. */
+  /** Paints the area anew: shaded heights, water and holes, or a square for each load module. */
   repaint(colors) {
-    const { area, ground } = this, { wide, high, heights, isWater } = area.coarse;
+    const { area, ground } = this, { wide, high, heights, classes } = area.coarse;
     const byModule = colors !== "height";
     [ground.width, ground.height] = byModule ? [area.cols, area.rows] : [wide - 1, high - 1];
     const picture = new ImageData(ground.width, ground.height);
@@ -36,7 +36,7 @@ export class SmallMap {
           // Light from the north-west.
           const slope = (heights[place + 1] - heights[place] + heights[place] - heights[place + wide]) / step;
           const shade = Math.min(Math.max(0.9 + slope, 0.45), 1.25);
-          const flat = isWater(place) ? colorOf.water(area) : colorOf.height(area, heights[place]);
+          const flat = colorOf.cover(area, classes[place]) ?? colorOf.height(area, heights[place]);
           color = flat.map((part) => part * shade);
         }
         picture.data.set([...bytes(color), 255], at);

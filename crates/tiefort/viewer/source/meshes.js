@@ -55,15 +55,21 @@ export function paint(area, module, surface, mesh, colors) {
   const { points, residuals, triangles } = surface;
   const of = (v) => (byPost ? colorOf.residual(area, residuals[v]) : colorOf.height(area, points[3 * v + 2]));
   const own = byPost || !one ? Array.from({ length: points.length / 3 }, (_, vertex) => light(of(vertex))) : null;
-  const water = light(colorOf.water(area));
-  const isWater = (i) => colors === "height" && surface === module.tin && module.classes[Math.floor(i / 3)] === area.water;
-  triangles.forEach((vertex, i) => attribute.array.set(isWater(i) ? water : own ? own[vertex] : one, 3 * i));
+  const covers = {};
+  if (colors === "height" && surface === module.tin) {
+    for (const of of new Set(module.classes)) {
+      const color = colorOf.cover(area, of);
+      if (color) covers[of] = light(color);
+    }
+  }
+  const cover = (i) => covers[module.classes[Math.floor(i / 3)]];
+  triangles.forEach((vertex, i) => attribute.array.set(cover(i) ?? (own ? own[vertex] : one), 3 * i));
   attribute.needsUpdate = true;
 }
 
 /** The whole area on its coarse grid; `cut` leaves out load modules that are drawn finely. */
 export function coarseMesh(area) {
-  const { wide, high, heights, isWater } = area.coarse, step = area.side_m / area.coarse_steps;
+  const { wide, high, heights, classes } = area.coarse, step = area.side_m / area.coarse_steps;
   const positions = new Float32Array(3 * wide * high);
   for (let row = 0, i = 0; row < high; row++) {
     for (let col = 0; col < wide; col++, i++) {
@@ -79,7 +85,8 @@ export function coarseMesh(area) {
       const [row, col] = [Math.floor(i / wide), i % wide].map((place) => Math.floor(place / steps));
       const figures = area.figures(Math.min(row, area.rows - 1), Math.min(col, area.cols - 1));
       const value = { limits: figures.count, residuals: figures.rms }[colors] ?? heights[i];
-      const found = colors === "height" && isWater(i) ? colorOf.water(area) : colorOf[colors](area, value);
+      const cover = colors === "height" ? colorOf.cover(area, classes[i]) : undefined;
+      const found = cover ?? colorOf[colors](area, value);
       color.array.set(light(found), 3 * i);
     }
     color.needsUpdate = true;

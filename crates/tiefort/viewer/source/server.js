@@ -9,7 +9,7 @@ async function answer(path) {
   return response;
 }
 
-/** What the area is, with its overview: heights and water on a coarse grid, figures of every load module. */
+/** What the area is, with its overview: heights and classes on a coarse grid, figures of every load module. */
 export async function readArea() {
   const area = await (await answer("/api/area")).json();
   const bytes = await (await answer("/api/overview")).arrayBuffer();
@@ -17,7 +17,7 @@ export async function readArea() {
   area.corner = [Math.floor(area.rows / 2), Math.floor(area.cols / 2)];
   const classes = new Uint8Array(bytes, bytes.byteLength - wide * high);
   const heights = new Float32Array(bytes, 0, wide * high);
-  area.coarse = { wide, high, heights, isWater: (i) => classes[i] === area.water };
+  area.coarse = { wide, high, heights, classes };
   // What comes after them, the classes, fills no whole words.
   const part = [4 * wide * high, 4 * area.rows * area.cols];
   const words = new Uint32Array(bytes, ...part), metres = new Float32Array(bytes, ...part);

@@ -1,0 +1,170 @@
+//! The ground of a job from every side: by tile, by window, whole; with water, slopes and other datums.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
+use std::path::Path;
+
+use source_files::write_heights;
+use tempfile::TempDir;
+use terrain::{Post, Spacing};
+
+use super::*;
+
+/// 6 x 6 load modules of 500 m in 2 x 2 tiles, every 12.5 m.
+fn job(folder: &Path, dem: &str, importance: &str) -> Job {
+    let text = format!(
+        "[area]\nname = \"a\"\ncrs = \"EPSG:32611\"\norigin_m = [505000, 3875000]\nsize_m = [3000, 3000]\n\
+         spacing_m = 12.5\n[dem]\n{dem}\n[importance]\n{importance}\n[tiles]\nrows = 2\ncolumns = 2\n"
+    );
+    Job::from_text(&text, &folder.join("job.toml")).unwrap()
+}
+
+/// A raster of the sample terrain every 25 m, 500 m larger than the area on each side.
+fn write_raster(folder: &Path) {
+    let spacing = Spacing::from_metres(25.0).unwrap();
+    let frame = GridFrame { origin_east_m: 504_500.0, origin_north_m: 3_874_500.0, spacing };
+    let rect = PostRect::of_size(161, 161);
+    let heights = |band| sample_terrain::heights(1, band, spacing);
+    write_heights(&folder.join("dem.tif"), &frame, rect, 32611, heights).unwrap();
+}
+
+fn open(job: &Job, whole_bytes_max: u64) -> Result<(GamingArea, Ground), GroundError> {
+    let area = GamingArea::new(job).unwrap();
+    let ground = Ground::open_within(job, &area, (&Workers::new(2), &AtomicBool::new(false)), whole_bytes_max)?;
+    Ok((area, ground))
+}
+
+fn message(result: Result<(GamingArea, Ground), GroundError>) -> String {
+    match result {
+        Ok(_) => panic!("this job is refused"),
+        Err(error) => format!("{error}; hint: {}", error.hint().unwrap_or_default()),
+    }
+}
+
+/// Every post of every tile against the same post of the whole area.
+fn check_tiles(area: &GamingArea, ground: &Ground) -> Window {
+    let whole = ground.window(area.rect).unwrap();
+    for &tile in &area.tiles {
+        let part = ground.window(area.tiling.rect(tile)).unwrap();
+        let rect = part.dem.rect();
+        for row in rect.south..=rect.north {
+            assert_eq!(part.dem.row(row), &whole.dem.row(row)[rect.west as usize..=rect.east as usize], "row {row}");
+            for post in (rect.west..=rect.east).map(|col| Post::new(row, col)) {
+                let of = |window: &Window| (window.importance.weight(post), window.importance.class(post));
+                assert_eq!(of(&part), of(&whole), "tile {tile} at {post}");
+            }
+        }
+    }
+    whole
+}
+
+#[test]
+fn a_raster_read_by_window_is_the_same_ground_as_one_read_whole() {
+    let folder = TempDir::new().unwrap();
+    write_raster(folder.path());
+    let job = job(folder.path(), "sources = [\"dem.tif\"]", "");
+    let (area, whole) = open(&job, u64::MAX).unwrap();
+    let (_, by_window) = open(&job, 0).unwrap();
+    assert!(matches!(whole.relief.source, Source::Raster(_)) && matches!(by_window.relief.source, Source::Window(_)));
+    assert_eq!(check_tiles(&area, &by_window).dem, check_tiles(&area, &whole).dem);
+    assert_eq!(by_window.warnings, whole.warnings);
+}
+
+/// A square lake of 800 m over the middle of the area, where four tiles meet.
+fn write_lake(folder: &Path) {
+    let [west, south] = [506_100.0, 3_876_100.0];
+    let [east, north] = [west + 800.0, south + 800.0];
+    let ring = format!("[[{west},{south}],[{east},{south}],[{east},{north}],[{west},{north}],[{west},{south}]]");
+    std::fs::write(folder.join("lake.json"), format!(r#"{{"type":"Polygon","coordinates":[{ring}]}}"#)).unwrap();
+}
+
+#[test]
+fn water_over_four_tiles_lies_at_one_level_and_is_a_class_of_its_own() {
+    let folder = TempDir::new().unwrap();
+    write_lake(folder.path());
+    let dry = open(&job(folder.path(), "source = \"sample\"", "smooth = \"none\""), 0).unwrap().1;
+    let wet = |water: &str| {
+        let (area, ground) = open(&job(folder.path(), water, "default = 8\nsmooth = \"none\""), 0).unwrap();
+        check_tiles(&area, &ground)
+    };
+    let found = wet("source = \"sample\"\nwater = \"lake.json\"");
+    // West and south of the area's origin by 1100 m: posts 88 to 151 each way lie inside.
+    let inside = |post: Post| (88..152).contains(&post.row) && (88..152).contains(&post.col);
+    let before = dry.window(found.dem.rect()).unwrap().dem;
+    let mut depths: Vec<i32> = Vec::new();
+    for post in (0..=240).flat_map(|row| (0..=240).map(move |col| Post::new(row, col))) {
+        let is_water = found.importance.class(post) == 1;
+        assert_eq!(is_water, inside(post), "{post}");
+        if is_water {
+            depths.push(before.height(post));
+            assert_eq!(found.importance.weight(post), u16::MAX, "as heavy as can be, beside ground of weight 8");
+        } else {
+            assert_eq!(found.dem.height(post), before.height(post), "{post}");
+        }
+    }
+    depths.sort_unstable();
+    let level = depths[(depths.len() - 1) / 2];
+    assert!((88..152).all(|row| found.dem.row(row)[88..152].iter().all(|&height| height == level)));
+    let stated = wet("source = \"sample\"\nwater = { file = \"lake.json\", level_m = 12.5, weight = 0 }");
+    assert_eq!(stated.dem.height(Post::new(100, 100)), 1600);
+    assert_eq!(stated.importance.weight(Post::new(100, 100)), u16::MAX, "level, whatever it weighs");
+}
+
+#[test]
+fn steep_ground_is_the_same_from_every_tile_and_matches_a_plain_count() {
+    let folder = TempDir::new().unwrap();
+    let steep =
+        "smooth = \"none\"\nareas = [{ slope_above_percent = 15, smooth_m = 50, class = \"steep\", weight = 2 }]";
+    let (area, ground) = open(&job(folder.path(), "source = \"sample\"", steep), 0).unwrap();
+    let whole = check_tiles(&area, &ground);
+    let metres = |row: i32, col: i32| f64::from(whole.dem.height(Post::new(row, col))) / 128.0;
+    let percent = |row: i32, col: i32| {
+        let ends = |at: i32| ((at - 1).max(0), (at + 1).min(240));
+        let ((south, north), (west, east)) = (ends(row), ends(col));
+        let across = (metres(row, east) - metres(row, west)) / (12.5 * f64::from(east - west));
+        let along = (metres(north, col) - metres(south, col)) / (12.5 * f64::from(north - south));
+        100.0 * across.hypot(along)
+    };
+    let mut counts = [0, 0];
+    for (row, col) in (0..=240).step_by(3).flat_map(|row| (0..=240).step_by(3).map(move |col| (row, col))) {
+        let near = |at: i32| (at - 4).max(0)..=(at + 4).min(240);
+        let slopes: Vec<f64> =
+            near(row).flat_map(|r| near(col).map(move |c| (r, c))).map(|(r, c)| percent(r, c)).collect();
+        let mean = slopes.iter().sum::<f64>() / slopes.len() as f64;
+        let class = whole.importance.class(Post::new(row, col));
+        counts[usize::from(class)] += 1;
+        assert!((mean - 15.0).abs() < 0.01 || (15.0 < mean) == (class == 1), "{row},{col}: {mean} %");
+    }
+    assert!(counts.iter().all(|&count| 20 < count), "{counts:?} posts of each class");
+}
+
+/// A worldwide grid of half degrees that says `height_m` everywhere.
+fn write_geoid(path: &Path, height_m: f32) {
+    let mut bytes: Vec<u8> = [-90.0, -180.0, 0.5, 0.5_f64].iter().flat_map(|number| number.to_be_bytes()).collect();
+    bytes.extend([361_i32, 720].iter().flat_map(|count| count.to_be_bytes()));
+    bytes.extend((0..361 * 720).flat_map(|_| height_m.to_be_bytes()));
+    std::fs::write(path, bytes).unwrap();
+}
+
+#[test]
+fn heights_come_to_another_datum_by_the_grids_that_the_job_names_and_not_without() {
+    let folder = TempDir::new().unwrap();
+    write_raster(folder.path());
+    write_geoid(&folder.path().join("egm96.gtx"), -30.5);
+    write_geoid(&folder.path().join("egm2008.gtx"), -31.25);
+    let dem = |wanted: &str, geoids: &str| {
+        let sources = "sources = [{ file = \"dem.tif\", vertical_datum = \"EGM96\" }]";
+        let dem = format!("{sources}\nvertical_datum = \"{wanted}\"\ngeoids = [{geoids}]");
+        open(&job(folder.path(), &dem, ""), u64::MAX)
+    };
+    let (egm96, egm2008) =
+        ("{ datum = \"EGM 96\", file = \"egm96.gtx\" }", "{ datum = \"EGM2008\", file = \"egm2008.gtx\" }");
+    let heights = |found: (GamingArea, Ground)| check_tiles(&found.0, &found.1).dem.row(77).to_vec();
+    let as_they_are = heights(dem("EGM96", "").unwrap());
+    let off = |metres: f64| -> Vec<i32> { as_they_are.iter().map(|height| height + (metres * 128.0) as i32).collect() };
+    assert_eq!(heights(dem("ellipsoid", egm96).unwrap()), off(-30.5));
+    assert_eq!(heights(dem("EGM2008", &format!("{egm96}, {egm2008}")).unwrap()), off(0.75));
+    let refused = message(dem("EGM2008", egm2008));
+    assert!(refused.contains("heights of dem.tif above EGM96, where EGM2008 is wanted"), "{refused}");
+    assert!(refused.contains("a geoid grid of EGM96 to convert with"), "{refused}");
+}

@@ -1,0 +1,32 @@
+//! From a job's sources to its ground: where the area lies, and windows of its heights and weights on demand.
+//!
+//! [`Ground::open`] opens and judges all that a job names; [`foresee`] judges what headers tell.
+
+mod error;
+pub use error::GroundError;
+mod area;
+pub use area::GamingArea;
+mod bounds;
+pub use bounds::Bounds;
+mod given;
+pub use given::{Given, GivenPost, border_posts, chosen, posts_of_file, refused, start_posts};
+mod ground;
+pub use self::ground::{Ground, KEPT_POSTS_MAX, Window};
+mod large;
+pub use large::CACHE_BYTES_MAX;
+mod relief;
+pub use relief::Relief;
+mod source;
+pub use source::{decode, reading, warnings_of};
+mod records;
+pub use records::{records, states};
+mod locate;
+pub use locate::{Corner, corners, covered, find_area, utm_of};
+mod foresee;
+pub use foresee::foresee;
+
+mod census;
+mod datums;
+mod mask_of;
+mod sources;
+mod water;

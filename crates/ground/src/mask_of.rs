@@ -1,0 +1,122 @@
+//! The importance mask of a job: polygons, class rasters and slopes, opened.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use job::{AreaShape, DemSource, ImportanceArea, Job, Smooth, WaterSpec};
+use mask::{Mask, Polygon, Shape, Smoothing};
+use source_files::{ClassRaster, read_polygons};
+use terrain::THOUSANDTHS;
+
+use crate::GroundError;
+use crate::area::GamingArea;
+use crate::relief::Relief;
+
+/// The first thing that went wrong where nothing could be returned.
+#[derive(Clone, Default)]
+pub struct Fault(Arc<Mutex<Option<GroundError>>>);
+
+impl Fault {
+    fn put(&self, error: GroundError) {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
+    }
+
+    /// What went wrong, if anything did.
+    pub fn take(&self) -> Result<(), GroundError> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).take().map_or(Ok(()), Err)
+    }
+}
+
+/// How many times as much as the heaviest ground water weighs.
+///
+/// Where water is level it has no residual, so the weight costs points along its shore only. Measured under a mean of
+/// 32 triangles, on a sea coast and on 60 lakes laid on slopes: of 120,018 water posts 3,360 lay more than 0.5 m off
+/// their level at 1 time, 211 at 8 times and none at 32, for 0.2 and 1 % more RMS residual on land.
+const WATER_TIMES: u16 = 32;
+
+/// The weight at which water lies level, in thousandths, unless the job's own is larger; weights end at 65.535.
+fn water_weight(job: &Job, spec: &WaterSpec) -> u16 {
+    let heaviest = job.importance.heaviest().max(THOUSANDTHS / WATER_TIMES);
+    heaviest.saturating_mul(WATER_TIMES).max(spec.weight.unwrap_or(0))
+}
+
+/// What a mask is opened for.
+pub struct Opening<'a> {
+    pub job: &'a Job,
+    pub area: &'a GamingArea,
+    pub relief: &'a Arc<Relief>,
+    pub fault: &'a Fault,
+}
+
+impl Opening<'_> {
+    /// The mask, with `water` over everything else.
+    ///
+    /// # Errors
+    /// When a file cannot be used.
+    pub fn mask(&self, water: Vec<Polygon>) -> Result<Mask<'static>, GroundError> {
+        let (job, classes) = (self.job, &self.job.importance.classes);
+        let mut areas = Vec::new();
+        for spec in &job.importance.areas {
+            let (class, weight) = (classes[usize::from(spec.class)].clone(), spec.weight);
+            areas.push(mask::Area { class, weight, shape: self.shape(spec)? });
+        }
+        let water = job.dem.water.as_ref().map(|spec| mask::Area {
+            class: classes[usize::from(spec.class)].clone(),
+            weight: water_weight(job, spec),
+            shape: Shape::Polygons(water),
+        });
+        let smoothing = match job.importance.smooth {
+            Smooth::Binomial7 => Smoothing::Binomial7,
+            Smooth::None => Smoothing::None,
+        };
+        Ok(Mask { default_weight: job.importance.default_weight, areas, smoothing, over: water.into_iter().collect() })
+    }
+
+    fn shape(&self, spec: &ImportanceArea) -> Result<Shape<'static>, GroundError> {
+        let (epsg, frame) = (self.job.area.epsg, self.area.frame);
+        Ok(match &spec.shape {
+            AreaShape::Polygons { file } => Shape::Polygons(read_polygons(&file.path, epsg)?),
+            AreaShape::RasterValue { file, value } => {
+                let raster = ClassRaster::open(&file.path, epsg, &frame, self.area.rect)?;
+                let fault = self.fault.clone();
+                // A value beyond 32 bits is in no class raster.
+                let value = i32::try_from(*value).ok();
+                Shape::Members(Box::new(move |rect| {
+                    let none = || vec![false; rect.post_count()];
+                    let Some(value) = value else { return none() };
+                    raster.members(&frame, rect, value).unwrap_or_else(|error| {
+                        fault.put(error.into());
+                        none()
+                    })
+                }))
+            }
+            AreaShape::Slope { above, smooth_mm } => self.steep(*above, *smooth_mm),
+            AreaShape::Sample(job::SampleClass::Mountains) => {
+                let seed = match &self.job.dem.source {
+                    DemSource::Sample { seed } => *seed,
+                    DemSource::Files { .. } => sample_terrain::DEFAULT_SEED,
+                };
+                Shape::Members(Box::new(move |rect| {
+                    let classes = sample_terrain::classes(seed, rect, frame.spacing);
+                    classes.into_iter().map(|class| class == sample_terrain::MOUNTAIN).collect()
+                }))
+            }
+        })
+    }
+
+    /// Ground steeper than so much. Each window is decided from the heights around it, so two tiles agree on a seam.
+    fn steep(&self, above: u32, smooth_mm: u32) -> Shape<'static> {
+        let (relief, fault, area) = (self.relief.clone(), self.fault.clone(), self.area.rect);
+        let spacing = self.area.frame.spacing;
+        let radius = (f64::from(smooth_mm) / 1000.0 / spacing.metres()).round() as i32;
+        Shape::Members(Box::new(move |rect| {
+            let around = rect.grown(mask::steep_halo(radius)).intersection(&area).expect("a window lies in the area");
+            match relief.dem(around) {
+                Ok(dem) => mask::steep(&dem, rect, spacing, radius, above),
+                Err(error) => {
+                    fault.put(error);
+                    vec![false; rect.post_count()]
+                }
+            }
+        }))
+    }
+}

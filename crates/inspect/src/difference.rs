@@ -1,0 +1,137 @@
+//! Two databases of one area, compared load module by load module.
+
+use std::path::Path;
+
+use compiler::CompileError;
+use fidelity::each_residual;
+use terrain::{Dem, Importance, LoadModule, ModuleId, QUANTA_PER_METRE};
+
+use crate::product::{Product, Wanted, WantedGround, product};
+
+/// What differs between two databases.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Difference {
+    /// Load modules that each has.
+    pub modules: usize,
+    /// Those that differ, in row order.
+    pub changed: Vec<ModuleDifference>,
+    /// Settings that differ.
+    pub settings: Vec<SettingDifference>,
+    /// Triangles of each.
+    pub triangles: [u64; 2],
+    /// RMS residual of each against its own ground, in metres.
+    pub rms_m: [f64; 2],
+}
+
+/// A load module before and after.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ModuleDifference {
+    /// Which.
+    pub module: ModuleId,
+    /// Triangles of each.
+    pub triangles: [u32; 2],
+    /// Convex polygons of each.
+    pub polygons: [u32; 2],
+    /// RMS residual of each, in metres.
+    pub rms_m: [f64; 2],
+    /// Largest residual of each, in metres.
+    pub largest_m: [f64; 2],
+    /// How far the two surfaces lie apart at most, at posts, in metres; 0 where only triangles or classes differ.
+    pub apart_m: f64,
+}
+
+/// A setting that differs; empty where one has it not.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SettingDifference {
+    /// The key with its section.
+    pub key: String,
+    /// Both values.
+    pub values: [String; 2],
+}
+
+/// Compares two finished databases.
+///
+/// # Errors
+/// When one is missing, unfinished or damaged, or they are not of the same ground.
+pub fn difference(first: &Path, second: &Path, workers: usize) -> Result<Difference, CompileError> {
+    let wanted = Wanted { part: None, ground: WantedGround::None, workers };
+    let (first_is, second_is) = (product(first, &wanted)?, product(second, &wanted)?);
+    check_same_ground(&first_is, &second_is, second)?;
+    let pairs = first_is.modules.iter().zip(&second_is.modules);
+    let changed = pairs.filter(|(a, b)| a != b).map(|(a, b)| module_difference(&first_is, a, b)).collect();
+    Ok(Difference {
+        modules: first_is.modules.len(),
+        changed,
+        settings: settings(&first_is, &second_is),
+        triangles: [&first_is, &second_is].map(|product| product.manifest.totals.triangles),
+        rms_m: [&first_is, &second_is].map(|product| {
+            let totals = product.manifest.totals;
+            rms_m(totals.residual_sum_squared, totals.residual_posts)
+        }),
+    })
+}
+
+/// Whether load modules of both cover the same squares at the same posts; names and tiles may differ.
+fn check_same_ground(first: &Product, second: &Product, path: &Path) -> Result<(), CompileError> {
+    let (mut area, other) = (first.manifest.area.clone(), &second.manifest.area);
+    (area.name, area.vertical_datum) = (other.name.clone(), other.vertical_datum.clone());
+    (area.tile_rows, area.tile_cols) = (other.tile_rows, other.tile_cols);
+    let Some((key, expected, found)) = area.difference(other) else { return Ok(()) };
+    Err(CompileError::Impossible {
+        key: format!("{}: {key}", path.display()),
+        found,
+        expected,
+        hint: "load modules can be compared where both databases divide the same ground alike".into(),
+    })
+}
+
+fn module_difference(product: &Product, a: &LoadModule, b: &LoadModule) -> ModuleDifference {
+    let rms = |module: &LoadModule| rms_m(module.residual.sum_squared, u64::from(module.residual.posts));
+    let largest = |module: &LoadModule| f64::from(module.residual.largest) / f64::from(QUANTA_PER_METRE);
+    ModuleDifference {
+        module: a.id,
+        triangles: [a, b].map(|module| module.triangles.len() as u32),
+        polygons: [a, b].map(|module| module.polygon_count),
+        rms_m: [rms(a), rms(b)],
+        largest_m: [largest(a), largest(b)],
+        apart_m: f64::from(apart(product, a, b)) / f64::from(QUANTA_PER_METRE),
+    }
+}
+
+/// How far two surfaces lie apart at most, in quanta: the difference of their residuals against any ground, such as
+/// flat one.
+fn apart(product: &Product, a: &LoadModule, b: &LoadModule) -> u32 {
+    let rect = product.grid.posts_of(a.id);
+    let flat = Dem::from_fn(rect, |_| Some(0));
+    let mask = Importance::uniform(rect, terrain::THOUSANDTHS);
+    let ground = fidelity::Ground { dem: &flat, mask: &mask, grid: product.grid, spacing: product.frame.spacing };
+    let wide = rect.posts_wide();
+    let mut heights = vec![0; rect.post_count()];
+    let place = |post: terrain::Post| (post.row - rect.south) as usize * wide + (post.col - rect.west) as usize;
+    each_residual(a, &ground, |post, residual| heights[place(post)] = residual);
+    let mut most = 0;
+    each_residual(b, &ground, |post, residual| most = most.max(heights[place(post)].abs_diff(residual)));
+    most
+}
+
+fn rms_m(squares: u64, posts: u64) -> f64 {
+    (squares as f64 / posts.max(1) as f64).sqrt() / f64::from(QUANTA_PER_METRE)
+}
+
+/// Settings that differ, in the order of the first, then those that only the second has.
+fn settings(first: &Product, second: &Product) -> Vec<SettingDifference> {
+    let (before, after) = (first.job.describe(), second.job.describe());
+    let value = |list: &[job::Setting], key: &str| {
+        list.iter().find(|setting| setting.key == key).map_or(String::new(), |setting| setting.value.clone())
+    };
+    let new = after.iter().filter(|setting| before.iter().all(|known| known.key != setting.key));
+    before
+        .iter()
+        .chain(new)
+        .map(|setting| SettingDifference {
+            key: setting.key.to_owned(),
+            values: [value(&before, setting.key), value(&after, setting.key)],
+        })
+        .filter(|setting| setting.values[0] != setting.values[1])
+        .collect()
+}

@@ -1,0 +1,284 @@
+//! One load module, explained: what it holds, what was refused there and why, what one more point would buy.
+
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+
+use compiler::{CompileError, Stage};
+use database::{Folder, TileState, files};
+use fidelity::{Split, best_split};
+use job::HOLE_CLASS_NAME;
+use limits::Windows;
+use schedule::Workers;
+use serde_json::Value;
+use terrain::{
+    HOLE_CLASS, Importance, LoadModule, ModuleId, QUANTA_PER_METRE, RefusedBy, Side, StopReason, TileId, TileTin,
+    metres_of_quanta,
+};
+
+use crate::product::{Product, Wanted, WantedGround, product};
+
+/// Everything there is to know about one load module.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Explanation {
+    /// Which.
+    pub module: ModuleId,
+    /// West, south, east and north of it in metres of the area's system.
+    pub extent_m: [f64; 4],
+    /// The tile it belongs to, how that stands, and why it stopped selecting.
+    pub tile: (TileId, TileState, StopReason),
+    /// Triangles that the tile's points were charged, and the most it was allowed, where it was.
+    pub tile_triangles: (u32, Option<u64>),
+    /// What limits count: `triangles` or `polygons`.
+    pub count_of: String,
+    /// Triangles and convex polygons.
+    pub triangles: u32,
+    /// Convex polygons.
+    pub polygons: u32,
+    /// Vertices inside, and on the southern, eastern, northern and western side, its corners included.
+    pub vertices_inside: u32,
+    /// See there.
+    pub vertices_on_sides: [u32; 4],
+    /// What limits count here, and the limit of a load module.
+    pub count: (u32, u32),
+    /// Triangles granted above the limit, from the pool.
+    pub granted: u64,
+    /// The fullest window that holds it.
+    pub window: ExplainedWindow,
+    /// Triangles by class of the ground under them, classes without any left out.
+    pub classes: Vec<(String, u32)>,
+    /// RMS, mean absolute and largest residual in metres, and posts.
+    pub residual_m: [f64; 3],
+    /// Posts measured.
+    pub posts: u32,
+    /// Of every level, the finest first: triangles, RMS and largest residual in metres; none where there is only one.
+    pub levels: Vec<(u32, f64, f64)>,
+    /// Its place among all load modules by RMS residual, the worst being 1, and how many there are.
+    pub place: (usize, usize),
+    /// Posts that were refused here, largest residual first.
+    pub refused: Vec<ExplainedRefusal>,
+    /// What one more point would buy; `None` without ground to look at, or where it would buy nothing.
+    pub one_more: Option<OneMore>,
+    /// Why there is no ground to look at.
+    pub no_ground: Option<String>,
+}
+
+/// The fullest window around a load module.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ExplainedWindow {
+    /// Its south-west load module.
+    pub origin: ModuleId,
+    /// Its rows and columns of load modules.
+    pub size: [u32; 2],
+    /// What is counted in it.
+    pub count: u32,
+    /// What is allowed.
+    pub limit: u32,
+}
+
+/// A post that a limit kept out.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ExplainedRefusal {
+    /// East and north, in metres.
+    pub place_m: [f64; 2],
+    /// How far the ground lay from the triangles when it was refused, in metres.
+    pub residual_m: f64,
+    /// Which limit.
+    pub by: RefusedBy,
+}
+
+/// What one more point, two triangles, would buy.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OneMore {
+    /// East and north of the best place for it, in metres.
+    pub place_m: [f64; 2],
+    /// How far it would stand above the triangle that is there, in metres.
+    pub raised_m: f64,
+    /// RMS residual of the load module then, in metres.
+    pub rms_after_m: f64,
+    /// Place of this gain among those of all load modules, the largest being 1.
+    pub place: usize,
+}
+
+/// Explains one load module of a finished database.
+///
+/// # Errors
+/// When there is no such load module, or the database is missing, unfinished or damaged. Without the ground it was
+/// built from it is explained without what only the ground can tell, unless the ground is a raster that was named.
+pub fn explain(
+    folder: &Path,
+    module: ModuleId,
+    ground: WantedGround,
+    workers: usize,
+) -> Result<Explanation, CompileError> {
+    let wanted = Wanted { part: None, ground, workers };
+    let (product, no_ground) = match product(folder, &wanted) {
+        Err(error) if error.is_of_the_job() && matches!(ground, WantedGround::Recorded) => {
+            let without = product(folder, &Wanted { ground: WantedGround::None, ..wanted })?;
+            (without, Some(error.to_string()))
+        }
+        found => (found?, None),
+    };
+    check_inside(module, &product)?;
+    let folder = Folder::new(folder);
+    let planned = product.tiles.iter().find(|tile| tile.modules.contains(module)).expect("tiles cover the area");
+    let (_, tin) = folder.read_tile(planned.tile)?;
+    let allocation = folder.read_json(files::ALLOCATION)?;
+    let splits = splits(&product, workers)?;
+    let levels = levels(&folder, planned.tile, module)?;
+    Ok(Explanation { no_ground, levels, ..explained(&product, module, &tin, &allocation, splits.as_deref()) })
+}
+
+fn check_inside(module: ModuleId, product: &Product) -> Result<(), CompileError> {
+    let (rows, cols) = (product.grid.rows, product.grid.cols);
+    if module.row < rows && module.col < cols {
+        return Ok(());
+    }
+    Err(CompileError::Impossible {
+        key: "load module".into(),
+        found: module.to_string(),
+        expected: format!("a row from 0 to {} and a column from 0 to {}", rows - 1, cols - 1),
+        hint: "rows come first and both count from the south-west".into(),
+    })
+}
+
+/// The best split of every load module, row by row, where there is ground to split on.
+fn splits(product: &Product, workers: usize) -> Result<Option<Vec<Option<Split>>>, CompileError> {
+    let Some(found) = &product.ground else { return Ok(None) };
+    let mask = Importance::uniform(found.dem.rect(), terrain::THOUSANDTHS);
+    let ground = fidelity::Ground { dem: &found.dem, mask: &mask, grid: product.grid, spacing: product.frame.spacing };
+    let rows: Vec<&[LoadModule]> = product.modules.chunks(product.grid.cols as usize).collect();
+    let (workers, stop) = (Workers::new(workers), AtomicBool::new(false));
+    let of_row = |_: usize, row: &&[LoadModule]| -> Result<Vec<Option<Split>>, CompileError> {
+        Ok(row.iter().map(|module| best_split(module, &ground)).collect())
+    };
+    let done = schedule::for_each_independent(&rows, &workers, &stop, of_row).map_err(|error| {
+        CompileError::from_schedule(Stage::Read, &vec![TileId { row: 0, col: 0 }; rows.len()], error)
+    })?;
+    Ok(Some(done.into_iter().flatten().collect()))
+}
+
+fn explained(
+    product: &Product,
+    id: ModuleId,
+    tin: &TileTin,
+    allocation: &Value,
+    splits: Option<&[Option<Split>]>,
+) -> Explanation {
+    let module = &product.modules[product.grid.index(id)];
+    let state = product.manifest.tile(tin.tile).map_or(TileState::Missing, |record| record.state);
+    let limit_use = product.limit_use();
+    let limits = &product.job.limits;
+    let on_sides = Side::ALL.map(|side| module.side_vertices(side).len() as u32);
+    let squares = |module: &LoadModule| mean_squares(module.residual.sum_squared as f64, module);
+    let worse = product.modules.iter().filter(|other| squares(module) < squares(other)).count();
+    let residual = module.residual;
+    let metre = f64::from(QUANTA_PER_METRE);
+    let side_m = product.job.modules.side_m;
+    let (west, south) = (
+        product.frame.origin_east_m + f64::from(id.col) * side_m,
+        product.frame.origin_north_m + f64::from(id.row) * side_m,
+    );
+    Explanation {
+        module: id,
+        extent_m: [west, south, west + side_m, south + side_m],
+        tile: (tin.tile, state, tin.stop),
+        tile_triangles: (tin.triangles_charged, allowed(allocation, tin.tile)),
+        count_of: match limits.count {
+            job::Count::Triangles => "triangles".into(),
+            job::Count::Polygons => "polygons".into(),
+        },
+        triangles: module.triangles.len() as u32,
+        polygons: module.polygon_count,
+        vertices_inside: (module.vertices.len() - module.border_vertex_count()) as u32,
+        vertices_on_sides: on_sides,
+        count: (limit_use.modules[product.grid.index(id)], limits.per_load_module),
+        granted: granted(allocation, id),
+        window: fullest_window(product, &limit_use.windows, id),
+        classes: classes(product, module),
+        residual_m: [
+            squares(module).sqrt() / metre,
+            residual.sum_abs as f64 / f64::from(residual.posts.max(1)) / metre,
+            f64::from(residual.largest) / metre,
+        ],
+        posts: residual.posts,
+        place: (worse + 1, product.modules.len()),
+        refused: refused(product, tin, id),
+        one_more: splits.and_then(|splits| one_more(product, splits, module)),
+        no_ground: None,
+        levels: Vec::new(),
+    }
+}
+
+/// Triangles, RMS and largest residual of every level of a load module, where there are several.
+fn levels(folder: &Folder, tile: TileId, id: ModuleId) -> Result<Vec<(u32, f64, f64)>, CompileError> {
+    let (_, levels) = folder.read_levels(tile)?;
+    if levels.len() == 1 {
+        return Ok(Vec::new());
+    }
+    let metre = f64::from(QUANTA_PER_METRE);
+    let figures = |module: &LoadModule| {
+        let rms = mean_squares(module.residual.sum_squared as f64, module).sqrt();
+        (module.triangles.len() as u32, rms / metre, f64::from(module.residual.largest) / metre)
+    };
+    Ok(levels.iter().flatten().filter(|module| module.id == id).map(figures).collect())
+}
+
+fn mean_squares(squares: f64, module: &LoadModule) -> f64 {
+    squares / f64::from(module.residual.posts.max(1))
+}
+
+/// The triangles that a tile was allowed.
+fn allowed(allocation: &Value, tile: TileId) -> Option<u64> {
+    let tiles = allocation["tiles"].as_array()?;
+    tiles.iter().find(|entry| entry["row"] == tile.row && entry["col"] == tile.col)?["triangles"].as_u64()
+}
+
+/// The triangles that a load module was granted above its limit.
+fn granted(allocation: &Value, module: ModuleId) -> u64 {
+    let entries = allocation["granted"].as_array().map_or(&[] as &[Value], |entries| entries);
+    let entry = entries.iter().find(|entry| entry["row"] == module.row && entry["col"] == module.col);
+    entry.and_then(|entry| entry["triangles"].as_u64()).unwrap_or(0)
+}
+
+fn fullest_window(product: &Product, sums: &[u32], module: ModuleId) -> ExplainedWindow {
+    let limit = product.job.limits.window;
+    let windows = Windows::of_size(product.grid, limit.rows, limit.cols);
+    let counts = windows.origins.iter().zip(sums);
+    let around = counts.filter(|(origin, _)| windows.modules_of(*origin).contains(module));
+    let (origin, &count) =
+        around.reduce(|fullest, next| if fullest.1 < next.1 { next } else { fullest }).expect("windows cover the area");
+    ExplainedWindow { origin, size: [windows.rows, windows.cols], count, limit: limit.limit }
+}
+
+fn classes(product: &Product, module: &LoadModule) -> Vec<(String, u32)> {
+    let names = product.job.importance.classes.iter().map(String::as_str).enumerate();
+    let names = names.chain([(usize::from(HOLE_CLASS), HOLE_CLASS_NAME)]);
+    let count = |class: usize| module.classes.iter().filter(|&&found| usize::from(found) == class).count() as u32;
+    names.map(|(class, name)| (name.to_owned(), count(class))).filter(|(_, count)| 0 < *count).collect()
+}
+
+fn refused(product: &Product, tin: &TileTin, module: ModuleId) -> Vec<ExplainedRefusal> {
+    let here = tin.refused.iter().filter(|refusal| refusal.module == module);
+    let mut refused: Vec<ExplainedRefusal> = here
+        .map(|refusal| ExplainedRefusal {
+            place_m: product.frame.place_m(refusal.post),
+            residual_m: metres_of_quanta(refusal.residual as i32),
+            by: refusal.by,
+        })
+        .collect();
+    refused.sort_by(|a, b| b.residual_m.total_cmp(&a.residual_m));
+    refused
+}
+
+fn one_more(product: &Product, splits: &[Option<Split>], module: &LoadModule) -> Option<OneMore> {
+    let split = splits[product.grid.index(module.id)]?;
+    let larger = splits.iter().flatten().filter(|other| split.squares_saved < other.squares_saved).count();
+    let left = (module.residual.sum_squared as f64 - split.squares_saved).max(0.0);
+    let metre = f64::from(QUANTA_PER_METRE);
+    Some(OneMore {
+        place_m: product.frame.place_m(split.post),
+        raised_m: split.raised / metre,
+        rms_after_m: mean_squares(left, module).sqrt() / metre,
+        place: larger + 1,
+    })
+}

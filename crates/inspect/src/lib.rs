@@ -1,0 +1,24 @@
+//! What reads a finished database back and changes nothing in it: whether it is sound, how true, why it is as it is.
+
+mod status;
+pub use status::{Status, TileProgress, status};
+mod verify;
+pub use verify::{Verdict, verify};
+mod inadequate;
+pub use inadequate::{Component, Inadequate, inadequate};
+mod measures;
+pub use fidelity::{
+    Cover, Distances, Drainage, GRADES, Hausdorff, LineOfSight, Measures, MeshForm, Registration, ResidualFigures,
+    SeamVisibility, SlopeClasses, SlopeDifference,
+};
+pub use measures::{BuiltResidual, ClassResidual, DatabaseFidelity, Fidelity, Sights, fidelity, measure};
+mod product;
+pub use product::{LimitUse, NO_RESIDUAL, Product, ProductGround, Wanted, WantedGround, product};
+mod explain;
+pub use explain::{ExplainedRefusal, ExplainedWindow, Explanation, OneMore, explain};
+mod difference;
+pub use difference::{Difference, ModuleDifference, SettingDifference, difference};
+mod built_from;
+pub use built_from::BuiltFrom;
+
+mod recount;

@@ -1,0 +1,89 @@
+//! How far a database is, from what lies in its directory: nothing is believed that the files do not bear out.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+
+use compiler::{CompileError, run_name};
+use database::{Folder, Held, Lock, Manifest, ManifestState, TileRecord, TileState};
+use terrain::TileId;
+
+/// How one tile stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum TileProgress {
+    /// Published, by the last finished build or by the one under way.
+    Done,
+    /// Published, with a limit that could not be met.
+    OverLimit,
+    /// Published, its sides held as its neighbours have them.
+    Frozen,
+    /// Published by the build before; the one under way has not replaced it yet, and may keep it.
+    Earlier,
+    /// Not published, or its file is gone.
+    Missing,
+}
+
+/// How a database stands.
+#[derive(Clone, Debug)]
+pub struct Status {
+    /// Its `database.json`.
+    pub manifest: Manifest,
+    /// Who is at work on it now.
+    pub held: Held,
+    /// Every tile, row by row.
+    pub tiles: Vec<(TileId, TileProgress)>,
+}
+
+impl Status {
+    /// Whether every file belongs to one finished build.
+    pub fn is_complete(&self) -> bool {
+        self.manifest.state == ManifestState::Complete
+    }
+
+    /// Tiles that are frozen: a build makes them whole.
+    pub fn frozen(&self) -> Vec<TileId> {
+        let is_frozen = |record: &&TileRecord| record.state == TileState::Frozen;
+        self.manifest.tiles.iter().filter(is_frozen).map(TileRecord::tile).collect()
+    }
+}
+
+/// Reads how a database stands, without touching it.
+///
+/// # Errors
+/// When there is none, or its `database.json` cannot be read.
+pub fn status(folder: &Path) -> Result<Status, CompileError> {
+    let folder = Folder::new(folder);
+    let manifest = folder.manifest()?;
+    let held = Lock::held(folder.dir());
+    let complete = manifest.state == ManifestState::Complete;
+    let work = folder.work(&run_name(&manifest.job, &manifest.sources, manifest.algorithm_revision));
+    let marked: BTreeSet<String> = work.all_marked().into_iter().collect();
+    let progress = |record: &TileRecord| match complete {
+        true => finished(&folder, record),
+        false if marked.contains(&format!("refine-{}", record.tile())) => TileProgress::Done,
+        false => under_way(&folder, record),
+    };
+    let tiles = manifest.tiles.iter().map(|record| (record.tile(), progress(record))).collect();
+    Ok(Status { manifest, held, tiles })
+}
+
+fn finished(folder: &Folder, record: &TileRecord) -> TileProgress {
+    let tile = record.tile();
+    let paths = [folder.tile_path(tile), folder.modules_path(tile)];
+    match record.state {
+        _ if !paths.iter().all(|path| path.exists()) => TileProgress::Missing,
+        TileState::Done => TileProgress::Done,
+        TileState::OverLimit => TileProgress::OverLimit,
+        TileState::Frozen => TileProgress::Frozen,
+        TileState::Failed | TileState::Missing => TileProgress::Missing,
+    }
+}
+
+/// A file with the bytes of the last finished build is that build's; any other is of the one under way.
+fn under_way(folder: &Folder, record: &TileRecord) -> TileProgress {
+    let path = folder.tile_path(record.tile());
+    match record.tin {
+        _ if folder.read_tile(record.tile()).is_err() => TileProgress::Missing,
+        Some(before) if folder.check_file(&path, &before).is_ok() => TileProgress::Earlier,
+        _ => TileProgress::Done,
+    }
+}

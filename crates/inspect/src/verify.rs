@@ -1,0 +1,372 @@
+//! Re-reads a database and believes nothing it says: files, TINs, load modules, sides, identities, limits.
+
+mod entries;
+mod exceeded;
+mod figures;
+mod made_from;
+mod opened;
+mod tins;
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+
+use compiler::{CompileError, residual_of};
+use database::{Folder, Manifest, ManifestState, Report, ReportResidual, files};
+use fidelity::Residuals;
+use ground::{Bounds, GamingArea, Ground, Window};
+use job::{DemSource, Edges, Job, LodBorder, SourceEntry, SourceFile, SourceSaid};
+use limits::{polygons_of, triangles_of};
+use schedule::Workers;
+use terrain::{LoadModule, ModuleId, Side};
+
+use crate::recount;
+
+/// What a verification found.
+#[derive(Clone, Debug, Default)]
+pub struct Verdict {
+    /// What is wrong, a sentence each; empty when the database is sound.
+    pub problems: Vec<String>,
+    /// What could not be checked, and why, a sentence each.
+    pub unchecked: Vec<String>,
+    /// Files whose content was checked against its checksums and stamps.
+    pub checked_files: usize,
+    /// Load modules whose triangles, sides and counts were checked.
+    pub checked_modules: usize,
+    /// Residuals recomputed against a DEM, when one was given.
+    pub residual: Option<ReportResidual>,
+}
+
+/// Re-reads every file of a database and checks what a simulator relies on; with `dem`, recomputes residuals.
+///
+/// # Errors
+/// When there is no database, or `dem` cannot be used for its area. Damage is not an error but a problem.
+pub fn verify(folder: &Path, dem: Option<&Path>) -> Result<Verdict, CompileError> {
+    let manifest = Folder::new(folder).manifest()?;
+    let mut verdict = Verdict::default();
+    if manifest.state != ManifestState::Complete {
+        verdict.problems.push("database.json: incomplete: a build began and has not ended".into());
+        return Ok(verdict);
+    }
+    let folder = Folder::new(folder);
+    verdict.problems = entries::leading_out(&manifest);
+    if !verdict.problems.is_empty() {
+        return Ok(verdict);
+    }
+    let damage = folder.verify(&manifest)?;
+    verdict.checked_files = listed(&manifest);
+    verdict.problems.extend(damage.iter().map(|damage| format!("{}: {}", damage.path.display(), damage.error)));
+    if !verdict.problems.is_empty() {
+        return Ok(verdict);
+    }
+    let (job, area) = job_of(&manifest, folder.dir())?;
+    verdict.problems = entries::problems(&manifest, &job, &area);
+    if !verdict.problems.is_empty() {
+        return Ok(verdict);
+    }
+    let opened = opened::open(&folder, &job, &area)?;
+    let levels = &opened.levels;
+    verdict.checked_modules = levels[0].len();
+    verdict.problems.extend(check_levels(&job, &area, levels));
+    verdict.problems.extend(opened.problems);
+    // Only load modules that are sound in themselves are held against anything else.
+    if verdict.problems.is_empty() {
+        check_sums(
+            &Whole { folder: &folder, manifest: &manifest, job: &job, area: &area },
+            levels,
+            &mut verdict,
+            |tins| made_from::problems(&manifest, &job, &area, tins, &opened.fingerprints),
+        )?;
+    }
+    if let Some(dem) = dem {
+        let report = folder.report().ok();
+        let residuals = recompute(job, &area, dem, levels, report.as_ref(), &mut verdict)?;
+        verdict.residual = Some(residual_of(&residuals.total()));
+    }
+    Ok(verdict)
+}
+
+/// A database and its job.
+struct Whole<'a> {
+    folder: &'a Folder,
+    manifest: &'a Manifest,
+    job: &'a Job,
+    area: &'a GamingArea,
+}
+
+/// Everything that is counted over many load modules: TINs, limits, totals, the report.
+fn check_sums(
+    whole: &Whole,
+    levels: &[Modules],
+    verdict: &mut Verdict,
+    made_from: impl FnOnce(&tins::OfTins) -> (Vec<String>, Vec<String>),
+) -> Result<(), CompileError> {
+    let &Whole { folder, manifest, job, area } = whole;
+    let modules = &levels[0];
+    let tins = tins::check(folder, manifest, job, area, modules)?;
+    verdict.problems.extend(tins.problems.iter().cloned());
+    verdict.problems.extend(levels.iter().flat_map(|modules| figures::impossible(area, modules)));
+    verdict.problems.extend(check_polygons(job, levels));
+    if !verdict.problems.is_empty() {
+        return Ok(());
+    }
+    let (problems, unchecked) = made_from(&tins);
+    verdict.problems.extend(problems);
+    verdict.unchecked.extend(unchecked);
+    let report = if folder.path(files::REPORT).exists() { Some(folder.report()?) } else { None };
+    let counts = exceeded::counts(job, area, modules);
+    let mut exceeded = exceeded::of_counts(area, &counts);
+    verdict.problems.extend(exceeded::wrong_states(manifest, area, &exceeded));
+    let total = figures::Total::of(modules.values().map(|module| module.residual));
+    exceeded.extend(exceeded::of_residuals(job, &total));
+    let (problems, unchecked) = exceeded::check(folder, job, report.as_ref(), &exceeded);
+    verdict.problems.extend(problems);
+    verdict.unchecked.extend(unchecked);
+    verdict.problems.extend(figures::differing_totals(manifest, area, modules, (&counts, &exceeded), &tins));
+    let measured = figures::measured(folder, manifest, area, levels, &tins);
+    verdict.problems.extend(measured.problems);
+    if let Some(report) = &report {
+        let of_files = (&counts[..], &tins, measured.sums.as_ref());
+        verdict.problems.extend(figures::differing_report(report, job, area, levels, of_files));
+        verdict.unchecked.extend(unchecked_figures(report));
+    }
+    Ok(())
+}
+
+/// What a report says that no file of the database shows.
+fn unchecked_figures(report: &Report) -> Option<String> {
+    let is_of_other_ground = report.warnings.iter().any(|warning| warning.contains("made from other ground"));
+    is_of_other_ground.then(|| "residuals in report.json: it says that tiles were made from other ground".to_owned())
+}
+
+/// Polygons of load modules that nothing cut: every triangle is one.
+fn check_polygons(job: &Job, levels: &[Modules]) -> Vec<String> {
+    let mut problems = Vec::new();
+    let first = usize::from(job.modules.edges != Edges::Constrained);
+    for (level, modules) in levels.iter().enumerate().skip(first) {
+        let wrong = modules.values().filter(|module| module.polygon_count as usize != module.triangles.len());
+        problems.extend(wrong.map(|module| {
+            let (id, polygons, triangles) = (module.id, module.polygon_count, module.triangles.len());
+            at_level(
+                level,
+                format!("load module {id}: {polygons} polygons, and each of its {triangles} triangles is one"),
+            )
+        }));
+    }
+    problems
+}
+
+fn listed(manifest: &Manifest) -> usize {
+    let of_tile = |tile: &database::TileRecord| {
+        [&tile.tin, &tile.slm, &tile.measured, &tile.curve, &tile.removed]
+            .map(Option::is_some)
+            .iter()
+            .filter(|&&there| there)
+            .count()
+    };
+    manifest.tiles.iter().map(of_tile).sum::<usize>() + manifest.files.len()
+}
+
+/// The job a database was built from, as it says itself.
+pub(crate) fn job_of(manifest: &Manifest, folder: &Path) -> Result<(Job, GamingArea), CompileError> {
+    let job = Job::from_text(&manifest.job, folder).map_err(|error| CompileError::Impossible {
+        key: "database.json: job".into(),
+        found: error.to_string(),
+        expected: "a job this version reads".into(),
+        hint: "the database was written by another version; build it again".into(),
+    })?;
+    let area = GamingArea::new(&job)?;
+    Ok((job, area))
+}
+
+/// Load modules by place.
+type Modules = BTreeMap<ModuleId, LoadModule>;
+
+/// All load modules by place, at their finest level, checked one by one as they are decoded.
+pub(crate) fn read_modules(folder: &Folder, area: &GamingArea) -> Result<Modules, CompileError> {
+    let mut all = BTreeMap::new();
+    for &tile in &area.tiles {
+        let (_, modules) = folder.read_modules(tile)?;
+        all.extend(modules.into_iter().map(|module| (module.id, module)));
+    }
+    Ok(all)
+}
+
+/// Every level on its own, then how they fit together.
+fn check_levels(job: &Job, area: &GamingArea, levels: &[Modules]) -> Vec<String> {
+    let mut problems = Vec::new();
+    let (found, expected) = (levels.len(), job.lod.level_count());
+    if expected < found {
+        problems.push(format!("load modules: {found} levels in a file, the job has {expected}"));
+    }
+    for (level, modules) in levels.iter().enumerate() {
+        let own = [check_modules(area, modules), recount::problems(area.grid, modules)].concat();
+        problems.extend(own.into_iter().map(|problem| at_level(level, problem)));
+        if 0 < level {
+            problems.extend(check_coarser(level, modules, &levels[level - 1]));
+        }
+    }
+    if job.lod.border == LodBorder::Full && problems.is_empty() {
+        problems.extend(recount::problems_between(area.grid, levels));
+    }
+    problems
+}
+
+fn at_level(level: usize, problem: String) -> String {
+    if level == 0 { problem } else { format!("level {level}: {problem}") }
+}
+
+/// A coarser level holds no place that the finer one lacks.
+fn check_coarser(level: usize, modules: &Modules, finer: &Modules) -> Vec<String> {
+    let is_new = |module: &&LoadModule| {
+        let known: BTreeSet<(u16, u16)> =
+            finer.get(&module.id).into_iter().flat_map(|finer| &finer.vertices).map(|v| (v.y, v.x)).collect();
+        module.vertices.iter().any(|v| !known.contains(&(v.y, v.x)))
+    };
+    let new = modules.values().filter(is_new);
+    new.map(|module| format!("level {level}: load module {}: a vertex that the finer level has not", module.id))
+        .collect()
+}
+
+fn check_modules(area: &GamingArea, modules: &Modules) -> Vec<String> {
+    let mut problems = Vec::new();
+    for module in area.grid.all().iter() {
+        let Some(found) = modules.get(&module) else {
+            problems.push(format!("load module {module}: missing"));
+            continue;
+        };
+        if let Err(fault) = found.check() {
+            problems.push(format!("load module {module}: {fault}"));
+        }
+        problems.extend(check_identities(found));
+        let east = modules.get(&ModuleId { col: module.col + 1, ..module });
+        let north = modules.get(&ModuleId { row: module.row + 1, ..module });
+        for (other, side) in [(east, Side::East), (north, Side::North)] {
+            if other.is_some_and(|other| side_of(found, side) != side_of(other, side.opposite())) {
+                problems.push(format!(
+                    "load module {module}: its {} side differs from its neighbour's: a crack",
+                    if side == Side::East { "eastern" } else { "northern" }
+                ));
+            }
+        }
+    }
+    problems
+}
+
+/// Both identities of every load module, from edges counted anew.
+fn check_identities(module: &LoadModule) -> Option<String> {
+    let border = module.border_vertex_count();
+    let inner = module.vertices.len() - border;
+    let triangles = module.triangles.len();
+    let expected = triangles_of(inner, border);
+    if triangles != expected {
+        return Some(format!("load module {}: {triangles} triangles, expected {expected}", module.id));
+    }
+    // Every triangle has three edges; those inside the square are shared by two.
+    let inner_edges = (3 * triangles - border) / 2;
+    let polygons = polygons_of(inner, inner_edges);
+    let count = module.polygon_count as usize;
+    (polygons < count).then(|| format!("load module {}: {count} polygons, expected at most {polygons}", module.id))
+}
+
+/// What a load module holds on a side: place along it and height.
+fn side_of(module: &LoadModule, side: Side) -> Vec<(u16, i32)> {
+    let vertices = module.side_vertices(side).into_iter().map(|index| module.vertices[usize::from(index)]);
+    let along = |vertex: terrain::ModuleVertex| match side {
+        Side::South | Side::North => (vertex.x, vertex.z),
+        Side::East | Side::West => (vertex.y, vertex.z),
+    };
+    vertices.map(along).collect()
+}
+
+/// Residuals against a DEM, load module by load module; those that disagree with the files are problems.
+fn recompute(
+    mut job: Job,
+    area: &GamingArea,
+    dem: &Path,
+    levels: &[Modules],
+    report: Option<&Report>,
+    verdict: &mut Verdict,
+) -> Result<Residuals, CompileError> {
+    let written = dem.display().to_string();
+    let said = SourceSaid::default();
+    let files = vec![SourceFile { written: written.clone(), path: dem.into(), said: said.clone() }];
+    job.dem.source = DemSource::Files { written: vec![SourceEntry { name: written, said }], files };
+    let open = |job: &Job| Ground::open(job, area, &Workers::new(1), &AtomicBool::new(false));
+    // The files of areas of importance may be gone, and then nothing is known of classes.
+    let (ground, has_classes) = match open(&job) {
+        Ok(ground) => (ground, true),
+        Err(_) => {
+            job.importance.areas.clear();
+            verdict.unchecked.push("classes: the files that importance.areas names cannot be read".into());
+            (open(&job)?, false)
+        }
+    };
+    let problems = &mut verdict.problems;
+    let mut all = Residuals::default();
+    let mut bounds = ground.relief.bounds;
+    for &tile in &area.tiles {
+        let window = ground.tile(area, tile)?;
+        // Water may lie below any shore, and points may be given any height.
+        let told =
+            window.given.iter().filter_map(|given| given.height).chain([window.dem.range().0, window.dem.range().1]);
+        bounds = bounds.map(|bounds| told.fold(bounds, Bounds::and));
+        for (level, modules) in levels.iter().enumerate() {
+            let ids = area.tiling.modules(tile, area.grid);
+            let mut own: Vec<LoadModule> = ids.iter().filter_map(|module| modules.get(&module).cloned()).collect();
+            let residuals = fidelity::measure(&mut own, &window.measured(area));
+            if level == 0 {
+                all.merge(&residuals);
+            }
+            let mut of_level = differing_residuals(&own, modules, &window, area);
+            if has_classes {
+                of_level.extend(recount::differing_classes(&own, &window.importance, area.grid, area.frame.spacing));
+            }
+            problems.extend(of_level.into_iter().map(|problem| at_level(level, problem)));
+        }
+    }
+    if let Some(bounds) = bounds {
+        problems.extend(outside(&levels[0], bounds, &all));
+    }
+    if let Some(report) = report {
+        let classes = if has_classes { &job.importance.classes[..] } else { &[] };
+        problems.extend(figures::differing_residuals(report, &all, classes));
+    }
+    Ok(all)
+}
+
+/// Vertices that lie outside the heights of the sources by more than the surface misses any post: fitted heights
+/// reach beyond by as much at most.
+fn outside(modules: &Modules, bounds: Bounds, residuals: &Residuals) -> Option<String> {
+    let largest_m = residual_of(&residuals.total()).max_m;
+    let outside_m = |vertex: &terrain::ModuleVertex| bounds.metres_outside(vertex.z);
+    let is_outside = |vertex: &&terrain::ModuleVertex| largest_m + 1.0 < outside_m(vertex);
+    let outside =
+        modules.values().flat_map(|module| module.vertices.iter().filter(is_outside).map(move |v| (module.id, v)));
+    let (count, worst) = outside.fold((0, None), |(count, worst): (usize, Option<(ModuleId, f64)>), (id, vertex)| {
+        let found = (id, outside_m(vertex));
+        (count + 1, Some(worst.filter(|worst| found.1 <= worst.1).unwrap_or(found)))
+    });
+    let (low, high) = bounds.metres();
+    worst.map(|(id, metres)| {
+        format!(
+            "heights: {count} vertices lie outside those of the DEM ({low:.2} m to {high:.2} m), the worst by \
+            {metres:.2} m in load module {id}"
+        )
+    })
+}
+
+/// Load modules, measured just now, whose residuals are not those of a second opinion or of their files.
+fn differing_residuals(own: &[LoadModule], listed: &Modules, window: &Window, area: &GamingArea) -> Vec<String> {
+    let recounted =
+        |module: &LoadModule| recount::residual(module, &window.dem, area.grid, area.frame.spacing) == module.residual;
+    let doubtful = own.iter().filter(|module| !recounted(module)).map(|module| {
+        format!("load module {}: two ways to measure its residuals against this DEM disagree", module.id)
+    });
+    let differs = |module: &&LoadModule| listed[&module.id].residual != module.residual;
+    let wrong = own
+        .iter()
+        .filter(differs)
+        .map(|module| format!("load module {}: its residuals against this DEM are not those in its file", module.id));
+    doubtful.chain(wrong).collect()
+}

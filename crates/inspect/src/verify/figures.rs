@@ -1,0 +1,373 @@
+//! Sums over the load modules, added up again in 128 bits, against what `measured/`, `database.json` and the report
+//! say.
+
+use database::{Folder, Manifest, Measured, MeasuredModule, MeasuredTally, Report, ReportResidual};
+use fidelity::Residuals;
+use job::{Count, Job};
+use terrain::{LoadModule, ModuleId, ModuleResidual, QUANTA_PER_METRE, StopReason, metres_of_quanta};
+
+use super::Modules;
+use super::exceeded::Exceeded;
+use super::tins::OfTins;
+use crate::recount;
+use compiler::residual_of;
+use compiler::sums_of;
+use compiler::{Adding, Sums};
+use ground::GamingArea;
+
+/// Residuals of many load modules together. Nothing that a file can hold makes them wrap.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Total {
+    pub posts: u128,
+    pub largest: u32,
+    pub sum_abs: u128,
+    pub sum_squared: u128,
+}
+
+impl Total {
+    pub fn of(residuals: impl Iterator<Item = ModuleResidual>) -> Self {
+        residuals.fold(Self::default(), |sum, one| Self {
+            posts: sum.posts + u128::from(one.posts),
+            largest: sum.largest.max(one.largest),
+            sum_abs: sum.sum_abs + u128::from(one.sum_abs),
+            sum_squared: sum.sum_squared + u128::from(one.sum_squared),
+        })
+    }
+
+    fn of_tallies(tallies: &[MeasuredTally]) -> Self {
+        tallies.iter().fold(Self::default(), |sum, one| Self {
+            posts: sum.posts + u128::from(one.posts),
+            largest: sum.largest.max(one.largest),
+            sum_abs: sum.sum_abs + u128::from(one.sum_abs),
+            sum_squared: sum.sum_squared.saturating_add(squares(one)),
+        })
+    }
+
+    pub fn max_m(&self) -> f64 {
+        f64::from(self.largest) / f64::from(QUANTA_PER_METRE)
+    }
+
+    pub fn rms_m(&self) -> f64 {
+        self.per_post(self.sum_squared).sqrt() / f64::from(QUANTA_PER_METRE)
+    }
+
+    fn per_post(&self, sum: u128) -> f64 {
+        if self.posts == 0 { 0.0 } else { sum as f64 / self.posts as f64 }
+    }
+}
+
+fn squares(tally: &MeasuredTally) -> u128 {
+    let [high, low] = tally.sum_squared.map(u128::from);
+    high << 64 | low
+}
+
+/// Statistics of load modules that no residuals of that many posts have.
+pub(crate) fn impossible(area: &GamingArea, modules: &Modules) -> Vec<String> {
+    let is_possible = |module: &LoadModule| {
+        let ModuleResidual { posts, largest, sum_abs, sum_squared } = module.residual;
+        let owned = area.grid.posts_of(module.id).post_count() as u128;
+        u128::from(posts) <= owned && is_possible(posts.into(), largest, sum_abs.into(), sum_squared.into())
+    };
+    let wrong = modules.values().filter(|module| !is_possible(module));
+    wrong.map(|module| format!("load module {}: no residuals have the sums in its file", module.id)).collect()
+}
+
+/// Whether `posts` numbers up to `largest` can have these sums.
+fn is_possible(posts: u128, largest: u32, sum_abs: u128, sum_squared: u128) -> bool {
+    let largest = u128::from(largest);
+    largest <= sum_abs
+        && sum_abs <= posts.saturating_mul(largest)
+        && largest * largest <= sum_squared
+        && sum_squared <= largest.saturating_mul(sum_abs)
+        && sum_abs <= sum_squared
+}
+
+/// What was measured of every tile, where it agrees with the load modules.
+pub(crate) struct OfMeasured {
+    /// Their sums; absent where something is wrong.
+    pub sums: Option<Sums>,
+    pub problems: Vec<String>,
+}
+
+/// Reads what was measured and holds it against load modules and TINs.
+pub(crate) fn measured(
+    folder: &Folder,
+    manifest: &Manifest,
+    area: &GamingArea,
+    levels: &[Modules],
+    tins: &OfTins,
+) -> OfMeasured {
+    let (mut problems, adding) = (Vec::new(), Adding::default());
+    for (record, &points) in manifest.tiles.iter().zip(&tins.points) {
+        let tile = record.tile();
+        let read = match folder.read_measured(tile) {
+            Ok((_, read)) => read,
+            Err(error) => {
+                problems.push(error.to_string());
+                continue;
+            }
+        };
+        let ids: Vec<ModuleId> = area.tiling.modules(tile, area.grid).iter().collect();
+        let of_tile: Vec<&LoadModule> =
+            levels.iter().flat_map(|level| ids.iter().filter_map(|id| level.get(id))).collect();
+        let wrong = differing(&read, record.slm, &of_tile, ids.len(), points);
+        problems.extend(wrong.into_iter().map(|what| format!("measured/{tile}.sums: {what}")));
+        if problems.is_empty() {
+            adding.add(sums_of(read));
+        }
+    }
+    OfMeasured { sums: problems.is_empty().then(|| adding.finish()), problems }
+}
+
+fn differing(
+    read: &Measured,
+    slm: Option<database::FileStamp>,
+    modules: &[&LoadModule],
+    finest: usize,
+    points: u64,
+) -> Vec<&'static str> {
+    let mut problems = Vec::new();
+    if Some(read.modules_file) != slm {
+        problems.push("was measured of another load-module file");
+    }
+    if !read.modules.iter().copied().eq(modules.iter().map(|module| numbers(module))) {
+        problems.push("its numbers of load modules are not those of the load-module file");
+    }
+    let finest = &modules[..finest.min(modules.len())];
+    let tallies = read.classes.iter().chain(&read.at_source);
+    if Total::of_tallies(&read.classes) != Total::of(finest.iter().map(|module| module.residual)) {
+        problems.push("its residuals by class do not add up to those of the load modules");
+    }
+    let is_sound = |tally: &MeasuredTally| {
+        let bins: u128 = tally.bins.iter().map(|&(_, posts)| u128::from(posts)).sum();
+        let sums = is_possible(tally.posts.into(), tally.largest, tally.sum_abs.into(), squares(tally));
+        bins == u128::from(tally.posts) && sums && tally.sum.unsigned_abs() <= tally.sum_abs
+    };
+    if !tallies.into_iter().all(is_sound) {
+        problems.push("no residuals have the sums and the histogram that it has");
+    }
+    if read.points.iter().map(|&points| u128::from(points)).sum::<u128>() != u128::from(points) {
+        problems.push("its points by class do not add up to those of the TIN");
+    }
+    let heights = || finest.iter().flat_map(|module| &module.vertices).map(|vertex| vertex.z);
+    if Some(read.heights[0]) != heights().min() || Some(read.heights[1]) != heights().max() {
+        problems.push("its lowest and highest vertex are not those of the load modules");
+    }
+    problems
+}
+
+fn numbers(module: &LoadModule) -> MeasuredModule {
+    let ModuleResidual { posts, largest, sum_abs, sum_squared } = module.residual;
+    let (triangles, polygons) = (module.triangles.len() as u32, module.polygon_count);
+    MeasuredModule { triangles, polygons, posts, largest, sum_abs, sum_squared }
+}
+
+/// Totals of `database.json` that are not those of the files.
+pub(crate) fn differing_totals(
+    manifest: &Manifest,
+    area: &GamingArea,
+    modules: &Modules,
+    (counts, exceeded): (&[u32], &[Exceeded]),
+    tins: &OfTins,
+) -> Vec<String> {
+    let residual = Total::of(modules.values().map(|module| module.residual));
+    let sum = |of: fn(&LoadModule) -> u128| modules.values().map(of).sum::<u128>();
+    let over = counts.iter().filter(|&&count| area.budget.per_module < count).count();
+    let totals = &manifest.totals;
+    let pairs = [
+        ("points", tins.points.iter().map(|&points| u128::from(points)).sum(), totals.points),
+        ("triangles", sum(|module| module.triangles.len() as u128), totals.triangles),
+        ("polygons", sum(|module| u128::from(module.polygon_count)), totals.polygons),
+        ("load modules above the limit", over as u128, totals.modules_over),
+        ("limits exceeded", exceeded.len() as u128, totals.breaches),
+        ("refused posts", tins.refused.iter().map(|&count| u128::from(count)).sum(), totals.refused),
+        ("posts", residual.posts, totals.residual_posts),
+        ("largest residual", residual.largest.into(), totals.residual_largest),
+        ("sum of absolute residuals", residual.sum_abs, totals.residual_sum_abs),
+        ("sum of squared residuals", residual.sum_squared, totals.residual_sum_squared),
+    ];
+    let differing = pairs.into_iter().filter(|&(_, found, listed)| found != u128::from(listed));
+    differing.map(|(what, found, listed)| format!("{what}: {found} in the files, {listed} in database.json")).collect()
+}
+
+/// Numbers of the report that are not those of the files, by key.
+pub(crate) fn differing_report(
+    report: &Report,
+    job: &Job,
+    area: &GamingArea,
+    levels: &[Modules],
+    (counts, tins, sums): (&[u32], &OfTins, Option<&Sums>),
+) -> Vec<String> {
+    let mut figures = Figures::default();
+    of_counts(&mut figures, report, job, area, &levels[0], counts);
+    of_points(&mut figures, report, area, tins);
+    of_levels(&mut figures, report, job, levels);
+    let is_of_other_ground = report.warnings.iter().any(|warning| warning.contains("made from other ground"));
+    if let Some(sums) = sums.filter(|_| !is_of_other_ground) {
+        of_residuals(&mut figures, report, job, area, &levels[0], sums);
+    }
+    let mut problems = figures.problems();
+    if report.area != job.area.name {
+        problems.push(format!("report.json: area is \"{}\", the job's is \"{}\"", report.area, job.area.name));
+    }
+    let word = match job.limits.count {
+        Count::Triangles => "triangles",
+        Count::Polygons => "polygons",
+    };
+    if report.count != word {
+        problems.push(format!("report.json: count is \"{}\", the job's is \"{word}\"", report.count));
+    }
+    problems
+}
+
+/// Residuals of the report, overall and of these classes, that are not those measured now.
+pub(crate) fn differing_residuals(report: &Report, measured: &Residuals, classes: &[String]) -> Vec<String> {
+    let mut figures = Figures::default();
+    figures.residual("residual", &residual_of(&measured.total()), &report.residual);
+    for ((name, tally), listed) in classes.iter().zip(&measured.classes).zip(&report.classes) {
+        figures.residual(&format!("residual of class \"{name}\""), &residual_of(tally), &listed.residual);
+    }
+    figures.problems()
+}
+
+/// Keys, what the files say, what the report says.
+#[derive(Default)]
+struct Figures(Vec<(String, f64, f64)>);
+
+impl Figures {
+    /// Counts below 2^53 are compared as they are.
+    fn count(&mut self, key: &str, found: impl TryInto<u64>, listed: u64) {
+        let found = found.try_into().unwrap_or(u64::MAX);
+        self.number(key, found as f64, listed as f64);
+    }
+
+    fn number(&mut self, key: &str, found: f64, listed: f64) {
+        self.0.push((key.to_owned(), found, listed));
+    }
+
+    fn residual(&mut self, key: &str, found: &ReportResidual, listed: &ReportResidual) {
+        let pairs = [
+            ("rms_m", found.rms_m, listed.rms_m),
+            ("max_m", found.max_m, listed.max_m),
+            ("mean_abs_m", found.mean_abs_m, listed.mean_abs_m),
+            ("p95_m", found.p95_m, listed.p95_m),
+            ("p99_m", found.p99_m, listed.p99_m),
+        ];
+        pairs.into_iter().for_each(|(name, found, listed)| self.number(&format!("{key}.{name}"), found, listed));
+    }
+
+    fn problems(self) -> Vec<String> {
+        // Quotients and roots may differ in their last digits where they are written in another order.
+        let differ = |found: f64, listed: f64| {
+            let is_near = (found - listed).abs() <= 1e-9 * (1.0 + found.abs());
+            !is_near
+        };
+        let wrong = self.0.into_iter().filter(|&(_, found, listed)| differ(found, listed));
+        wrong.map(|(key, found, listed)| format!("report.json: {key} is {listed}, the files say {found}")).collect()
+    }
+}
+
+fn of_counts(figures: &mut Figures, report: &Report, job: &Job, area: &GamingArea, modules: &Modules, counts: &[u32]) {
+    let budget = &area.budget;
+    let limit = u64::from(budget.per_module);
+    let all: u64 = counts.iter().map(|&count| u64::from(count)).sum();
+    let over = |count: &&u32| limit < u64::from(**count);
+    let above: u64 = counts.iter().map(|&count| u64::from(count).saturating_sub(limit)).sum();
+    figures.count("triangles", modules.values().map(|m| m.triangles.len() as u64).sum::<u64>(), report.triangles);
+    figures.count("polygons", modules.values().map(|m| u64::from(m.polygon_count)).sum::<u64>(), report.polygons);
+    let listed = &report.per_load_module;
+    figures.number("per_load_module.mean", all as f64 / counts.len() as f64, listed.mean);
+    figures.number("per_load_module.mean_limit", job.limits.mean_per_load_module, listed.mean_limit);
+    figures.count("per_load_module.max", counts.iter().copied().max().unwrap_or(0), listed.max);
+    figures.count("per_load_module.limit", limit, listed.limit);
+    figures.count("per_load_module.over", counts.iter().filter(over).count(), listed.over);
+    let windows = |rows: u32, cols: u32| recount::windows(area.grid, counts, rows, cols).map(|(_, count)| count);
+    let (rows, cols) = (budget.windows.rows, budget.windows.cols);
+    let window_limit = u64::from(budget.per_window);
+    let listed = &report.per_4km;
+    figures.count("per_4km.max", windows(rows, cols).max().unwrap_or(0), listed.max);
+    figures.count("per_4km.limit", window_limit, listed.limit);
+    figures.count("per_4km.over", windows(rows, cols).filter(|&count| window_limit < count).count(), listed.over);
+    figures.count("per_4km.worst_9x9", windows(rows + 1, cols + 1).max().unwrap_or(0), listed.worst_9x9);
+    figures.count("pool.size", budget.pool, report.pool.size);
+    figures.count("pool.used", above.min(budget.pool), report.pool.used);
+}
+
+fn of_points(figures: &mut Figures, report: &Report, area: &GamingArea, tins: &OfTins) {
+    let total: u64 = tins.points.iter().sum();
+    let corner = u64::from(area.grid.rows + 1) * u64::from(area.grid.cols + 1);
+    figures.count("points.total", total, report.points.total);
+    figures.count("points.corner", corner, report.points.corner);
+    figures.count("points.border", tins.border, report.points.border);
+    figures.count("points.selected", total.saturating_sub(corner + tins.border), report.points.selected);
+    let [by_module, by_window, by_reservation] = tins.refused;
+    let listed = &report.refusals;
+    figures.count("refusals.count", tins.refused.iter().sum::<u64>(), listed.count);
+    figures.count("refusals.by_module", by_module, listed.by_module);
+    figures.count("refusals.by_window", by_window, listed.by_window);
+    figures.count("refusals.by_reservation", by_reservation, listed.by_reservation);
+    figures.number("refusals.largest_m", metres_of_quanta(tins.refused_largest as i32), listed.largest_m);
+    let stopped = |reason| tins.stops.iter().filter(|&&stop| stop == reason).count();
+    figures.count("stops.budget_spent", stopped(StopReason::BudgetSpent), report.stops.budget_spent);
+    figures.count("stops.residual_reached", stopped(StopReason::ResidualReached), report.stops.residual_reached);
+    figures.count("stops.rms_reached", stopped(StopReason::RmsReached), report.stops.rms_reached);
+    figures.count("stops.exhausted", stopped(StopReason::Exhausted), report.stops.exhausted);
+}
+
+fn of_levels(figures: &mut Figures, report: &Report, job: &Job, levels: &[Modules]) {
+    let wanted = if job.lod.inner_shares.is_empty() { 0 } else { levels.len() };
+    figures.count("number of levels", wanted, report.levels.len() as u64);
+    let shares = std::iter::once(1.0).chain(job.lod.inner_shares.iter().copied());
+    for ((at, listed), (modules, share)) in report.levels.iter().enumerate().zip(levels.iter().zip(shares)) {
+        let key = |name: &str| format!("levels[{at}].{name}");
+        let total = Total::of(modules.values().map(|module| module.residual));
+        let triangles: u64 = modules.values().map(|module| module.triangles.len() as u64).sum();
+        figures.count(&key("level"), at, listed.level.into());
+        figures.number(&key("inner_share"), share, listed.inner_share);
+        figures.count(&key("triangles"), triangles, listed.triangles);
+        figures.number(&key("rms_m"), total.rms_m(), listed.rms_m);
+        figures.number(&key("max_m"), total.max_m(), listed.max_m);
+    }
+}
+
+fn of_residuals(figures: &mut Figures, report: &Report, job: &Job, area: &GamingArea, modules: &Modules, sums: &Sums) {
+    let total = sums.residuals.total();
+    figures.residual("residual", &residual_of(&total), &report.residual);
+    if let (Some(listed), true) = (&report.residual_against_source, sums.has_source) {
+        figures.residual("residual_against_source", &residual_of(&sums.at_source), listed);
+    }
+    if let Some(listed) = &report.border {
+        let grid = area.grid;
+        let is_outer = |id: ModuleId| id.row == 0 || id.col == 0 || id.row + 1 == grid.rows || id.col + 1 == grid.cols;
+        for (name, wanted, listed) in [("at_border", true, &listed.at_border), ("inside", false, &listed.inside)] {
+            let part = modules.values().filter(|module| is_outer(module.id) == wanted);
+            let part = Total::of(part.map(|module| module.residual));
+            figures.count(&format!("border.{name}.posts"), part.posts, listed.posts);
+            figures.number(&format!("border.{name}.rms_m"), part.rms_m(), listed.rms_m);
+            figures.number(&format!("border.{name}.max_m"), part.max_m(), listed.max_m);
+        }
+    }
+    if let Some(listed) = &report.heights {
+        let (low, high) = sums.heights;
+        figures.number("heights.surface_m[0]", metres_of_quanta(low), listed.surface_m[0]);
+        figures.number("heights.surface_m[1]", metres_of_quanta(high), listed.surface_m[1]);
+    }
+    let (mut squares, mut points) = (0.0, 0.0);
+    for (at, name) in job.importance.classes.iter().enumerate() {
+        let tally = sums.residuals.classes.get(at).cloned().unwrap_or_default();
+        let own = sums.points.get(at).copied().unwrap_or(0);
+        if 0 < tally.posts {
+            squares += own as f64 * tally.rms_m() * tally.rms_m();
+            points += own as f64;
+        }
+        let Some(listed) = report.classes.get(at).filter(|listed| listed.name == *name) else {
+            figures.count(&format!("number of classes named \"{name}\""), 1u64, 0);
+            continue;
+        };
+        figures.count(&format!("classes[{at}].posts"), tally.posts, listed.posts);
+        figures.count(&format!("classes[{at}].points"), own, listed.points);
+        figures.residual(&format!("classes[{at}].residual"), &residual_of(&tally), &listed.residual);
+    }
+    let weighted: f64 = if points == 0.0 { 0.0 } else { f64::sqrt(squares / points) };
+    figures.number("overall_point_weighted_rms_m", weighted, report.overall_point_weighted_rms_m);
+}

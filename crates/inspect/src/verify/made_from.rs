@@ -1,0 +1,74 @@
+//! What tiles say that they were made from, as far as it follows from the job and from other tiles.
+
+use database::{Fingerprint, Manifest, TileState};
+use job::{Edges, Job};
+use limits::Allowance;
+use terrain::ModuleRect;
+
+use super::tins::OfTins;
+use compiler::ALGORITHM_REVISION;
+use compiler::modules_fingerprint;
+use compiler::rules;
+use compiler::{TileBudget, tile_refinement};
+use ground::GamingArea;
+
+/// Load-module files whose fingerprint is not that of the TINs and the job, and, second, what was not checked.
+pub(crate) fn problems(
+    manifest: &Manifest,
+    job: &Job,
+    area: &GamingArea,
+    tins: &OfTins,
+    found: &[Fingerprint],
+) -> (Vec<String>, Vec<String>) {
+    let (mut problems, mut unchecked) = (Vec::new(), Vec::new());
+    if manifest.algorithm_revision != ALGORITHM_REVISION {
+        let revision = manifest.algorithm_revision;
+        unchecked.push(format!(
+            "fingerprints: algorithm revision {revision} made them, this program has {ALGORITHM_REVISION}"
+        ));
+        return (problems, unchecked);
+    }
+    let mut thinned = 0;
+    for (&tile, found) in area.tiles.iter().zip(found) {
+        let near = area.tiling.neighbours(tile);
+        let is_thinned = near.iter().any(|&other| !tins.removed[area.tiling.index(other)].is_empty());
+        // A tile that a removal does not reach keeps the name it had in an earlier round.
+        if is_thinned && matches!(job.modules.edges, Edges::Clip(_)) {
+            thinned += 1;
+            continue;
+        }
+        let expected = modules_fingerprint(job, area, &|index| tins.stamps[index], &tins.removed, tile);
+        if *found != expected {
+            problems.push(format!("modules/{tile}.slm: its fingerprint is not that of its TIN and its job"));
+        }
+    }
+    problems.extend(other_rules(manifest, job, area));
+    if 0 < thinned {
+        unchecked.push(format!("fingerprints of {thinned} files in modules/: points were taken out around them"));
+    }
+    (problems, unchecked)
+}
+
+/// Tiles whose points were selected by other rules than the job's. Frozen ones keep points that a build would choose.
+fn other_rules(manifest: &Manifest, job: &Job, area: &GamingArea) -> Vec<String> {
+    let mut problems = Vec::new();
+    for record in manifest.tiles.iter().filter(|record| record.state != TileState::Frozen) {
+        let tile = record.tile();
+        // Rules are those of a tile whatever it may spend and inherit.
+        let nothing = ModuleRect { south: 0, west: 0, north: 0, east: 0 };
+        let allowance = Allowance {
+            modules: nothing,
+            module_room: Vec::new(),
+            windows: nothing,
+            window_size: (0, 0),
+            window_room: Vec::new(),
+            triangles: 0,
+        };
+        let budget = TileBudget { points: None, allowance: Some(allowance), rms_quanta: None };
+        let expected = rules(&tile_refinement(job, area, tile, &budget, Vec::new()));
+        if record.made_from.as_ref().is_some_and(|made_from| made_from.rules != expected) {
+            problems.push(format!("database.json: tile {tile} was selected by other rules than those of its job"));
+        }
+    }
+    problems
+}

@@ -1,0 +1,108 @@
+//! The load-module files as a simulator opens them, with `load-module-reader`; each header against the job.
+
+use std::collections::BTreeMap;
+
+use database::{DatabaseError, Fingerprint, Folder};
+use job::Job;
+use load_module_reader::{Header, Module, SlmFile};
+use terrain::{HOLE_CLASS, LoadModule, ModuleId, ModuleResidual, ModuleVertex, TileId};
+
+use super::Modules;
+use compiler::CompileError;
+use compiler::database_area;
+use ground::GamingArea;
+
+/// What the load-module files of a database hold.
+pub(crate) struct Opened {
+    /// Load modules by level, the finest first: as many as the job has, or as a file has where those are more.
+    pub levels: Vec<Modules>,
+    /// What each tile's file says that it was made from.
+    pub fingerprints: Vec<Fingerprint>,
+    /// Headers and classes that are not as the job says.
+    pub problems: Vec<String>,
+}
+
+/// Opens the file of every tile.
+///
+/// # Errors
+/// When one cannot be read.
+pub(crate) fn open(folder: &Folder, job: &Job, area: &GamingArea) -> Result<Opened, CompileError> {
+    let mut opened = Opened {
+        levels: vec![BTreeMap::new(); job.lod.level_count()],
+        fingerprints: Vec::with_capacity(area.tiles.len()),
+        problems: Vec::new(),
+    };
+    for &tile in &area.tiles {
+        let path = folder.modules_path(tile);
+        let file = SlmFile::open(&path)
+            .map_err(|fault| DatabaseError::Modules { path: path.clone(), fault: Box::new(fault) })?;
+        let header = file.header();
+        let differing = differing(header, job, area, tile);
+        opened.problems.extend(differing.into_iter().map(|what| format!("modules/{tile}.slm: {what}")));
+        opened.fingerprints.push(Fingerprint(header.fingerprint));
+        let count = opened.levels.len().max(usize::from(header.level_count));
+        opened.levels.resize_with(count, BTreeMap::new);
+        for (level, modules) in (0..header.level_count).zip(&mut opened.levels) {
+            for module in file.level(level).unwrap_or(&[]) {
+                opened.problems.extend(unknown_class(module, job.importance.classes.len()));
+                let module = load_module(module, header.side);
+                modules.insert(module.id, module);
+            }
+        }
+    }
+    Ok(opened)
+}
+
+/// Fields of a header that are not as the job says.
+fn differing(header: &Header, job: &Job, area: &GamingArea, tile: TileId) -> Vec<String> {
+    let (grid, rect) = (area.grid, area.tiling.modules(tile, area.grid));
+    let told = database_area(job);
+    let side = i64::from(grid.side_cells) * i64::from(area.frame.spacing.quanta_per_post());
+    let metres = |[east, north]: [f64; 2]| format!("{east} m east, {north} m north");
+    let text = |number: u32| number.to_string();
+    let fields = [
+        ("tile row", text(header.tile_row), text(tile.row)),
+        ("tile column", text(header.tile_col), text(tile.col)),
+        ("area rows", text(header.area_rows), text(grid.rows)),
+        ("area columns", text(header.area_cols), text(grid.cols)),
+        ("south", text(header.south), text(rect.south)),
+        ("north", text(header.north), text(rect.north)),
+        ("west", text(header.west), text(rect.west)),
+        ("east", text(header.east), text(rect.east)),
+        ("side", header.side.to_string(), side.to_string()),
+        ("side in cells", text(header.side_cells), grid.side_cells.to_string()),
+        ("spacing", text(header.spacing_sixteenths), text(area.frame.spacing.sixteenths())),
+        ("origin", metres(header.origin_m), metres(told.origin_m)),
+        ("crs", format!("\"{}\"", header.crs), format!("\"{}\"", told.crs)),
+        ("vertical datum", format!("\"{}\"", header.vertical_datum), format!("\"{}\"", told.vertical_datum)),
+    ];
+    let wrong = fields.into_iter().filter(|(_, found, expected)| found != expected);
+    wrong.map(|(field, found, expected)| format!("its header says {field} {found}, the job {expected}")).collect()
+}
+
+/// The first triangle whose class the job does not have.
+fn unknown_class(module: &Module, count: usize) -> Option<String> {
+    let is_unknown = |&class: &u8| class != HOLE_CLASS && count <= usize::from(class);
+    let triangle = module.classes.iter().position(is_unknown)?;
+    let (row, col, class) = (module.row, module.col, module.classes[triangle]);
+    let text = format!("load module {row},{col}: triangle {triangle} has class {class}, the job has {count}");
+    Some(super::at_level(usize::from(module.level), text))
+}
+
+fn load_module(module: &Module, side: u16) -> LoadModule {
+    let residual = &module.residual;
+    LoadModule {
+        id: ModuleId { row: module.row, col: module.col },
+        side,
+        vertices: module.vertices.iter().map(|v| ModuleVertex { y: v.y, x: v.x, z: v.z }).collect(),
+        triangles: module.triangles.clone(),
+        classes: module.classes.clone(),
+        polygon_count: module.polygon_count,
+        residual: ModuleResidual {
+            posts: residual.posts,
+            largest: residual.largest,
+            sum_abs: residual.sum_abs,
+            sum_squared: residual.sum_squared,
+        },
+    }
+}

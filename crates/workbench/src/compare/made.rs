@@ -1,0 +1,55 @@
+//! What methods are compared on, and what one made.
+
+use std::path::PathBuf;
+
+use fidelity::Tally;
+use job::Job;
+use terrain::Tin;
+
+/// What to compare methods on.
+#[derive(Clone, Debug)]
+pub enum CompareGround {
+    /// The posts of a raster.
+    Raster(PathBuf),
+    /// The ground of a job: its one raster's own posts, or else its working grid.
+    Job(Box<Job>),
+}
+
+/// What a method made.
+#[derive(Clone, Debug)]
+pub struct Made {
+    /// The TIN.
+    pub tin: Tin,
+    /// Its vertices.
+    pub points: usize,
+    /// Its triangles.
+    pub triangles: usize,
+    /// Posts it covers: all of the ground but for HIGHLOW.
+    pub covered: u64,
+    /// Residuals at the posts it covers.
+    pub residual: Tally,
+    /// How many points of the iterative method do as well.
+    pub equivalent: Equivalent,
+    /// Of a method that forces border posts: how many, and what the iterative method makes of as many points less.
+    pub forced: Option<Forced>,
+}
+
+/// How many points of the iterative method have a smaller RMS residual.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Equivalent {
+    /// So many, and no fewer.
+    Points(usize),
+    /// More than it has when no residual is left by its own measure.
+    MoreThan(usize),
+    /// The method does not cover the ground, or it is the iterative method.
+    None,
+}
+
+/// Border posts a method takes whether they help or not.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Forced {
+    /// How many.
+    pub points: usize,
+    /// RMS residual, in metres, of the iterative method without so many points; none where fewer than corners are left.
+    pub iterative_rms_m: Option<f64>,
+}

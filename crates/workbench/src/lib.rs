@@ -1,0 +1,21 @@
+//! Meshes without a job: from a raster alone, at several levels, and one method beside another; and a first look at
+//! rasters, which suggests a job.
+
+mod raster;
+pub use raster::{Mesh, TinMethod, TinRequest, TinStart, tin};
+mod tin_levels;
+pub use tin_levels::tin_levels;
+mod compare;
+pub use compare::{
+    CompareEvent, CompareGround, CompareMethod, CompareRequest, CompareRow, Comparison, Equivalent, Forced, Impossible,
+    Made, compare,
+};
+mod look;
+pub use look::{Seen, Suggestion, look_at};
+mod sample;
+pub use sample::sample;
+
+mod heights;
+mod outlook;
+mod suiting;
+mod tin_tally;

@@ -1,0 +1,210 @@
+//! A first look at rasters: what they are, and the area, grid and tiles that suit them.
+
+use std::path::{Path, PathBuf};
+
+use compiler::CompileError;
+use ground::covered;
+use source_files::{Crs, DemFile, RasterFrame, Reading, SourceError};
+use terrain::{GridFrame, PostRect, Spacing};
+
+use crate::outlook::Sampled;
+use crate::suiting::{area_crs, posts_m, spacing_for};
+
+/// What a raster is.
+#[derive(Clone, Debug)]
+pub struct Seen {
+    /// The file.
+    pub path: PathBuf,
+    /// Its format's name.
+    pub format: &'static str,
+    /// Columns and rows of posts.
+    pub size: (u32, u32),
+    /// Name of its coordinate system.
+    pub crs: String,
+    /// Between posts, in the system's units, east then north.
+    pub spacing: [f64; 2],
+    /// Whether those units are degrees.
+    pub is_geographic: bool,
+    /// Void posts.
+    pub voids: usize,
+    /// The value that can only mark voids, where the file has one and does not declare it; its posts count as void.
+    pub undeclared: Option<f64>,
+    /// Lowest and highest height in metres; `None` when all posts are void.
+    pub range_m: Option<(f64, f64)>,
+    /// What it says heights are measured from.
+    pub vertical_datum: Option<String>,
+    /// Vertical accuracy that it states, in metres.
+    pub accuracy_m: Option<f64>,
+    /// Damage that does not keep it from being read, and doubts about its datum.
+    pub notes: Vec<String>,
+    /// Whether the system was given to it, because it names none.
+    pub crs_given: bool,
+}
+
+/// An area that suits some rasters.
+#[derive(Clone, Debug)]
+pub struct Suggestion {
+    /// What each raster is, in the order given.
+    pub seen: Vec<Seen>,
+    /// EPSG code of the area's system.
+    pub epsg: u32,
+    /// East and north of the south-west post, in metres.
+    pub origin_m: [f64; 2],
+    /// Width and height in metres.
+    pub size_m: [f64; 2],
+    /// Metres between posts of the working grid.
+    pub spacing_m: f64,
+    /// Rows and columns of tiles.
+    pub tiles: (u32, u32),
+    /// Longitude and latitude of the middle, where the area is a part only: the files are too large for one area, or
+    /// lie too far apart.
+    pub part_around: Option<[f64; 2]>,
+    /// Metres between posts of the finest raster, about.
+    pub posts_m: f64,
+    /// Triangles of a load module that an area is suggested, on average.
+    pub triangles: u32,
+    /// The RMS residual that these will leave, in metres, from a look at windows of the area; `None` where those have
+    /// no heights.
+    pub rms_m: Option<f64>,
+}
+
+/// Values that mark voids where a file does not say so: no land is as low, and none of 32,767 m is as high.
+const MARKS: [f64; 7] = [-32768.0, -32767.0, -9999.0, -99999.0, 32767.0, f32::MIN as f64, f32::MAX as f64];
+/// Triangles of a load module on average: the founding paper's.
+const TRIANGLES: u32 = 32;
+
+/// Width and height of an area that is a part of what there is, in metres, about.
+const PART_M: f64 = 50_000.0;
+
+/// Side of a load module that every job has unless it says otherwise, in metres.
+const SIDE_M: f64 = 500.0;
+/// Load modules along a side of a tile, about: the founding paper's.
+const MODULES_A_TILE: f64 = 17.0;
+
+/// Looks at rasters and finds the area that suits them. `given` is the system of those that name none.
+///
+/// # Errors
+/// When one cannot be read, or not even two load modules each way fit inside them.
+pub fn look_at(paths: &[PathBuf], given: Option<&str>) -> Result<Suggestion, CompileError> {
+    let (mut seen, mut frames) = (Vec::new(), Vec::new());
+    for path in paths {
+        let (found, frame) = look(path, given)?;
+        frames.push(frame);
+        seen.push(found);
+    }
+    let impossible = |found: String, hint: String| CompileError::Impossible {
+        key: "FILES".into(),
+        found,
+        expected: "rasters that an area can be laid into".into(),
+        hint,
+    };
+    let none = |none: job::NoArea| impossible(none.found, none.hint);
+    let crs = area_crs(&frames).map_err(none)?;
+    let spacing = spacing_for(&frames, &crs);
+    let (crs, spacing, (origin_m, size_m), part_around) = match covered(&frames, &crs, spacing, SIDE_M) {
+        Ok(found) => (crs, spacing, found, None),
+        Err(reason) => part(&frames[0]).ok_or(reason).map_err(none)?,
+    };
+    let epsg = crs.epsg().expect("systems with a code only are chosen");
+    let modules = size_m.map(|metres| (metres / SIDE_M).round() as u32);
+    if modules.iter().any(|&modules| modules < 2) {
+        let found = format!("room for {} x {} load modules of {SIDE_M} m", modules[1], modules[0]);
+        return Err(impossible(found, "two each way are the least; give more files, or a larger raster".into()));
+    }
+    let tiles = modules.map(|modules| ((f64::from(modules) / MODULES_A_TILE).round() as u32).clamp(1, modules / 2));
+    let (spacing_m, tiles) = (spacing.metres(), (tiles[1], tiles[0]));
+    let posts_m = posts_m(&frames, &crs);
+    let side_cells = (SIDE_M / spacing_m).round() as usize;
+    let sampled = Sampled {
+        crs: &crs,
+        grid: GridFrame { origin_east_m: origin_m[0], origin_north_m: origin_m[1], spacing },
+        rect: PostRect::of_size(modules[1] as usize * side_cells + 1, modules[0] as usize * side_cells + 1),
+        side_cells,
+        triangles: TRIANGLES as usize,
+    };
+    let lowest_m: Vec<f64> = seen.iter().map(|seen| seen.range_m.map_or(0.0, |(low, _)| low)).collect();
+    let rms_m = sampled.rms_m(&frames, &lowest_m, |index| Ok(open(&paths[index], given, seen[index].undeclared)?.0))?;
+    Ok(Suggestion { seen, epsg, origin_m, size_m, spacing_m, tiles, part_around, posts_m, rms_m, triangles: TRIANGLES })
+}
+
+/// System, spacing, origin and size of an area in the middle of a raster, and where that middle is; `None` where the
+/// raster has no room for one.
+#[allow(clippy::type_complexity, reason = "it is taken apart at its only call")]
+fn part(frame: &RasterFrame) -> Option<(Crs, Spacing, ([f64; 2], [f64; 2]), Option<[f64; 2]>)> {
+    // The system of the middle: the zone of a continent's would not reach its sides.
+    let cut = |frame: &RasterFrame, posts: u32| {
+        let (rows, cols) = (frame.rows.min(posts), frame.cols.min(posts));
+        let south_west = frame.place((frame.rows - rows) / 2, (frame.cols - cols) / 2);
+        RasterFrame { south_west, rows, cols, ..frame.clone() }
+    };
+    let middle = cut(frame, 2);
+    let crs = area_crs(std::slice::from_ref(&middle)).ok()?;
+    let spacing = spacing_for(std::slice::from_ref(&middle), &crs);
+    let inner = cut(frame, (PART_M / posts_m(std::slice::from_ref(&middle), &crs)).ceil() as u32 + 1);
+    let found = covered(std::slice::from_ref(&inner), &crs, spacing, SIDE_M).ok()?;
+    let around = frame.crs.to(&Crs::wgs84(), middle.south_west)?;
+    Some((crs, spacing, found, Some(around)))
+}
+
+/// Opens a raster, in the system `given` where it names none; `nodata` marks its voids where it is said.
+fn open(path: &Path, given: Option<&str>, nodata: Option<f64>) -> Result<(DemFile, bool), CompileError> {
+    let reading = Reading { nodata, ..Reading::AS_IT_SAYS };
+    match (DemFile::open(path, &reading), given) {
+        (Ok(file), _) => Ok((file, false)),
+        (Err(SourceError::NoCrs { .. }), Some(given)) => {
+            let crs = Crs::named(given).map_err(|found| CompileError::Impossible {
+                key: "--crs".into(),
+                found: format!("{given}: {found}"),
+                expected: "a system that can be computed".into(),
+                hint: "for example --crs EPSG:32611".into(),
+            })?;
+            Ok((DemFile::open(path, &Reading { crs: Some(crs), ..reading })?, true))
+        }
+        (Err(error), _) => Err(error.into()),
+    }
+}
+
+/// Looks at every post of a raster, as a build would read it with the job that is suggested.
+fn look(path: &Path, given: Option<&str>) -> Result<(Seen, RasterFrame), CompileError> {
+    let (mut file, crs_given) = open(path, given, None)?;
+    let all = |file: &DemFile| file.look(file.rect(), &file.chunks_of(file.rect()));
+    let mut found = all(&file);
+    let undeclared = match &found {
+        // One value marks voids: that which the file declares, where it has it.
+        Ok(look) if 0 < look.voids && file.nodata().is_some() => None,
+        Ok(look) => look.range_m.and_then(|range_m| undeclared(&file, range_m)),
+        Err(_) if file.nodata().is_some() => None,
+        // So low or high that no raster may have it.
+        Err(SourceError::HeightOutOfRange { found, .. }) => undeclared(&file, (*found, *found)),
+        Err(_) => None,
+    };
+    if undeclared.is_some() {
+        (file, _) = open(path, given, undeclared)?;
+        found = all(&file);
+    }
+    let (found, frame) = (found?, file.frame());
+    let mut notes: Vec<String> = frame.crs.remark().map(str::to_owned).into_iter().collect();
+    notes.extend(found.notes.iter().take(3).cloned());
+    let seen = Seen {
+        path: frame.path.clone(),
+        format: file.format(),
+        size: (frame.cols, frame.rows),
+        crs: frame.crs.name().to_owned(),
+        spacing: frame.spacing,
+        is_geographic: frame.crs.is_geographic(),
+        voids: found.voids,
+        undeclared,
+        range_m: found.range_m,
+        vertical_datum: file.vertical_datum().map(str::to_owned),
+        accuracy_m: file.accuracy_m(),
+        notes,
+        crs_given,
+    };
+    Ok((seen, frame.clone()))
+}
+
+/// The usual mark of a void that is the lowest or the highest height of a file.
+fn undeclared(file: &DemFile, (low, high): (f64, f64)) -> Option<f64> {
+    let height_m = |mark: f64| file.sample_scale().height_m(mark);
+    MARKS.into_iter().find(|&mark| (if mark < 0.0 { low } else { high }) == height_m(mark))
+}
