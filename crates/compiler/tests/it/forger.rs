@@ -116,7 +116,7 @@ fn forged(scene: &Scene, parts: &Forged, alter: Alter, after: Alter) -> Vec<Stri
     parts.follow();
     after(&mut parts);
     parts.seal(scene, "area");
-    compiler::verify(&scene.path("area"), None).unwrap().problems
+    inspect::verify(&scene.path("area"), None).unwrap().problems
 }
 
 fn nothing(_: &mut Forged) {}
@@ -198,7 +198,7 @@ fn altered_manifests_are_told() {
     let mut parts = Forged::open(&scene.path("area"));
     parts.manifest.files.insert("../outside.json".into(), FileStamp::of(b"{}"));
     parts.seal(&scene, "area");
-    let problems = compiler::verify(&scene.path("area"), None).unwrap().problems;
+    let problems = inspect::verify(&scene.path("area"), None).unwrap().problems;
     assert_eq!(problems, ["database.json: lists a file \"../outside.json\", which leads out of the folder"]);
 }
 
@@ -271,7 +271,7 @@ fn all_tiles_of_another_job_are_told() {
         record.curve = own.curve;
     }
     parts.seal(&scene, "area");
-    let problems = compiler::verify(&scene.path("area"), None).unwrap().problems;
+    let problems = inspect::verify(&scene.path("area"), None).unwrap().problems;
     let expected = "database.json: tile r00c00 was selected by other rules than those of its job";
     assert!(problems.iter().any(|problem| problem == expected), "{problems:#?}");
 }
