@@ -173,8 +173,8 @@ impl<'a> Run<'a> {
                 report.files.insert(name.to_owned(), stamp);
             }
             database.write_json(files::REPORT, &report)?;
-            // With the report other processes take the build for done; so nothing that takes long comes before this. Of a
-            // build of another job that has begun already nothing is removed.
+            // With the report other processes take the build for done; so nothing that takes long comes before this.
+            // Of a build of another job that has begun already nothing is removed.
             if let Some(work) = &work {
                 work.sweep();
             }
