@@ -6,6 +6,7 @@ mod figures;
 mod made_from;
 mod opened;
 mod tins;
+mod total;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -117,7 +118,7 @@ fn check_sums(
     let counts = exceeded::counts(job, area, modules);
     let mut exceeded = exceeded::of_counts(area, &counts);
     verdict.problems.extend(exceeded::wrong_states(manifest, area, &exceeded));
-    let total = figures::Total::of(modules.values().map(|module| module.residual));
+    let total = total::Total::of(modules.values().map(|module| module.residual));
     exceeded.extend(exceeded::of_residuals(job, &total));
     let (problems, unchecked) = exceeded::check(folder, job, report.as_ref(), &exceeded);
     verdict.problems.extend(problems);

@@ -7,7 +7,7 @@ use terrain::{LoadModule, ModuleId};
 
 use super::Modules;
 use super::entries::state_word;
-use super::figures::Total;
+use super::total::Total;
 use crate::recount;
 use ground::GamingArea;
 

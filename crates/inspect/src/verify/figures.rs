@@ -4,62 +4,17 @@
 use database::{Folder, Manifest, Measured, MeasuredModule, MeasuredTally, Report, ReportResidual};
 use fidelity::Residuals;
 use job::{Count, Job};
-use terrain::{LoadModule, ModuleId, ModuleResidual, QUANTA_PER_METRE, StopReason, metres_of_quanta};
+use terrain::{LoadModule, ModuleId, ModuleResidual, StopReason, metres_of_quanta};
 
 use super::Modules;
 use super::exceeded::Exceeded;
 use super::tins::OfTins;
+use super::total::{Total, squares};
 use crate::recount;
 use compiler::residual_of;
 use compiler::sums_of;
 use compiler::{Adding, Sums};
 use ground::GamingArea;
-
-/// Residuals of many load modules together. Nothing that a file can hold makes them wrap.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Total {
-    pub posts: u128,
-    pub largest: u32,
-    pub sum_abs: u128,
-    pub sum_squared: u128,
-}
-
-impl Total {
-    pub fn of(residuals: impl Iterator<Item = ModuleResidual>) -> Self {
-        residuals.fold(Self::default(), |sum, one| Self {
-            posts: sum.posts + u128::from(one.posts),
-            largest: sum.largest.max(one.largest),
-            sum_abs: sum.sum_abs + u128::from(one.sum_abs),
-            sum_squared: sum.sum_squared + u128::from(one.sum_squared),
-        })
-    }
-
-    fn of_tallies(tallies: &[MeasuredTally]) -> Self {
-        tallies.iter().fold(Self::default(), |sum, one| Self {
-            posts: sum.posts + u128::from(one.posts),
-            largest: sum.largest.max(one.largest),
-            sum_abs: sum.sum_abs + u128::from(one.sum_abs),
-            sum_squared: sum.sum_squared.saturating_add(squares(one)),
-        })
-    }
-
-    pub fn max_m(&self) -> f64 {
-        f64::from(self.largest) / f64::from(QUANTA_PER_METRE)
-    }
-
-    pub fn rms_m(&self) -> f64 {
-        self.per_post(self.sum_squared).sqrt() / f64::from(QUANTA_PER_METRE)
-    }
-
-    fn per_post(&self, sum: u128) -> f64 {
-        if self.posts == 0 { 0.0 } else { sum as f64 / self.posts as f64 }
-    }
-}
-
-fn squares(tally: &MeasuredTally) -> u128 {
-    let [high, low] = tally.sum_squared.map(u128::from);
-    high << 64 | low
-}
 
 /// Statistics of load modules that no residuals of that many posts have.
 pub(crate) fn impossible(area: &GamingArea, modules: &Modules) -> Vec<String> {
