@@ -1,19 +1,20 @@
 //! Load modules of every tile, their residuals and counts.
 
-use database::{FileStamp, Fingerprint, FingerprintBuilder, Measured, Stamp, TileModules};
+use database::{FileStamp, Measured, TileModules};
+use engine::{Artifact, Fingerprint, Key, Outcome, Stamp, keep_or_make};
 use fidelity::{Residuals, Tally};
 use job::{Borders, ClipHeights as JobClipHeights, Edges, Job, OuterBorder};
 use load_modules::{ClipHeights, Layout, clip, concatenate};
 use terrain::{HOLE_CLASS, LATTICE_PER_POST, LatticePoint, LoadModule, Post, PostRect, TileId, Tin, Vertex};
 
 use crate::assembled::{Assembled, ModuleNumbers};
+use crate::keys;
 use crate::levels::all_levels;
 use crate::measured::{from_measured, to_measured};
 use crate::refine::Published;
-use crate::run::{ALGORITHM_REVISION, Run, Worked};
+use crate::run::{ALGORITHM_REVISION, Run};
 use crate::sums::{Adding, Sums};
 use crate::{CompileError, Progress, Stage};
-use ground::GamingArea;
 
 /// What the published TIN of a tile was made from, by the tile's place.
 pub(crate) type StampOf<'a> = dyn Fn(usize) -> Stamp + Sync + 'a;
@@ -26,11 +27,12 @@ pub(crate) fn assemble(
 ) -> Result<(Vec<Assembled>, Sums), CompileError> {
     let (none, adding) = (vec![Vec::new(); tins.len()], Adding::default());
     let done = run.for_each_tile(Stage::Assemble, progress, |tile| {
-        let (assembled, sums) = assemble_tile(run, &|index| tins[index].stamp, &none, tile)?;
-        adding.add(sums);
-        Ok(if assembled.is_new { Worked::Made(assembled, None) } else { Worked::Kept(assembled) })
+        Ok(assemble_tile(run, &|index| tins[index].stamp, &none, tile)?.map(|(assembled, sums)| {
+            adding.add(sums);
+            assembled
+        }))
     })?;
-    Ok((done.into_iter().map(Worked::into_inner).collect(), adding.finish()))
+    Ok((done.into_iter().map(Outcome::into_inner).collect(), adding.finish()))
 }
 
 /// Assembles, measures and publishes one tile, without the points that `removed` lists per tile; or keeps what is
@@ -40,13 +42,51 @@ pub(crate) fn assemble_tile(
     stamps: &StampOf,
     removed: &[Vec<LatticePoint>],
     tile: TileId,
-) -> Result<(Assembled, Sums), CompileError> {
-    let area = &run.area;
-    let fingerprint = modules_fingerprint(run.job, area, stamps, removed, tile);
-    let stamp = measured_stamp(run, fingerprint);
-    if let Some(kept) = kept(run, &stamp, tile) {
-        return Ok(kept);
+) -> Result<Outcome<(Assembled, Sums)>, CompileError> {
+    let modules = keys::modules(run.job, &run.area, stamps, removed, tile).fingerprint();
+    keep_or_make(&Assembling { run, stamps, removed, tile, modules }, ALGORITHM_REVISION)
+}
+
+/// A tile's load modules and what is measured of them, as the engine asks for them.
+struct Assembling<'a> {
+    run: &'a Run<'a>,
+    stamps: &'a StampOf<'a>,
+    removed: &'a [Vec<LatticePoint>],
+    tile: TileId,
+    /// Of all that the load modules are made from.
+    modules: Fingerprint,
+}
+
+impl Artifact for Assembling<'_> {
+    type Output = (Assembled, Sums);
+    type Error = CompileError;
+
+    fn key(&self) -> Key {
+        keys::measured(self.run, self.modules)
     }
+
+    fn published(&self) -> Result<Option<Stamp>, CompileError> {
+        Ok(self.run.database.folder().measured_stamp(self.tile)?)
+    }
+
+    fn read(&self, _key: &Key, _stamp: &Stamp) -> Option<(Assembled, Sums)> {
+        let (area, folder, tile) = (&self.run.area, self.run.database.folder(), self.tile);
+        let (_, measured) = folder.read_measured(tile).ok()?;
+        let count = area.tiling.modules(tile, area.grid).count();
+        let is_whole = |measured: &Measured| measured.modules.len() == count * self.run.job.lod.level_count();
+        folder.check_file(&folder.modules_path(tile), &measured.modules_file).ok().filter(|()| is_whole(&measured))?;
+        let file = folder.stamp_file(&folder.measured_path(tile)).ok()?;
+        Some(from_measured(measured, count, file))
+    }
+
+    fn make(&self, _key: &Key, stamp: &Stamp) -> Result<(Assembled, Sums), CompileError> {
+        make(self, stamp)
+    }
+}
+
+fn make(assembling: &Assembling, stamp: &Stamp) -> Result<(Assembled, Sums), CompileError> {
+    let Assembling { run, stamps, removed, tile, modules: fingerprint } = *assembling;
+    let area = &run.area;
     let window = run.window(tile)?;
     let layout = Layout { grid: area.grid, modules: area.tiling.modules(tile, area.grid), spacing: area.frame.spacing };
     let own = run.tin(tile, &stamps(area.tiling.index(tile)))?;
@@ -65,13 +105,13 @@ pub(crate) fn assemble_tile(
     let at_source = run.ground.relief.residuals_at_source(&modules, area, area.tiling.rect(tile))?;
     let mut levels = all_levels(run, modules, &layout, &window);
     levels[1..].iter_mut().for_each(|level| drop(fidelity::measure(level, &window.measured(area))));
-    let (file, is_new) = publish(run, tile, &layout, fingerprint, &levels)?;
+    let file = publish(run, tile, &layout, fingerprint, &levels)?;
     let counted = count_points(run, &own.tin, &removed[area.tiling.index(tile)], &window.importance);
     let heights = heights_of(&levels[0]);
     let (modules, coarser) = numbers_of(&levels);
-    let mut done = Assembled { file, measured: FileStamp::of(&[]), modules, coarser, is_new };
+    let mut done = Assembled { file, measured: FileStamp::of(&[]), modules, coarser };
     let sums = sums(residuals, at_source, counted, heights);
-    done.measured = run.database.write_measured(&stamp, &to_measured(tile, &done, &sums))?;
+    done.measured = run.database.write_measured(stamp, &to_measured(tile, &done, &sums))?;
     Ok((done, sums))
 }
 
@@ -91,33 +131,6 @@ fn heights_of(modules: &[LoadModule]) -> (i32, i32) {
     heights.fold((i32::MAX, i32::MIN), |(low, high), z| (low.min(z), high.max(z)))
 }
 
-/// What a tile's load modules and the numbers of them are made from, and by.
-fn measured_stamp(run: &Run, modules: Fingerprint) -> Stamp {
-    let mut builder = FingerprintBuilder::new("measured")
-        .fingerprint(modules)
-        .number(run.job.importance.classes.len() as u64)
-        .text(&format!("{:?}", run.job.tiles.borders));
-    if run.ground.relief.has_posts_between() {
-        for record in &run.records {
-            builder = builder.fingerprint(record.blake3);
-        }
-    }
-    Stamp { algorithm_revision: ALGORITHM_REVISION, fingerprint: builder.finish() }
-}
-
-/// The published load modules of a tile, if they and the numbers of them are fresh and undamaged.
-fn kept(run: &Run, stamp: &Stamp, tile: TileId) -> Option<(Assembled, Sums)> {
-    let folder = run.database.folder();
-    let (found, measured) = folder.read_measured(tile).ok()?;
-    let area = &run.area;
-    let count = area.tiling.modules(tile, area.grid).count();
-    let is_whole = |measured: &Measured| measured.modules.len() == count * run.job.lod.level_count();
-    let is_fresh = found == *stamp && is_whole(&measured);
-    folder.check_file(&folder.modules_path(tile), &measured.modules_file).ok().filter(|()| is_fresh)?;
-    let file = folder.stamp_file(&folder.measured_path(tile)).ok()?;
-    Some(from_measured(measured, count, file))
-}
-
 /// The published load modules of a tile as they are: their own numbers, and residuals against today's ground.
 pub(crate) fn read_assembled(run: &Run, tins: &[Published], tile: TileId) -> Result<(Assembled, Sums), CompileError> {
     let (area, folder, window) = (&run.area, run.database.folder(), run.window(tile)?);
@@ -129,7 +142,7 @@ pub(crate) fn read_assembled(run: &Run, tins: &[Published], tile: TileId) -> Res
     let own = run.tin(tile, &tins[area.tiling.index(tile)].stamp)?;
     let counted = count_points(run, &own.tin, &[], &window.importance);
     let measured = folder.stamp_file(&folder.measured_path(tile))?;
-    let done = Assembled { file, measured, modules, coarser, is_new: false };
+    let done = Assembled { file, measured, modules, coarser };
     Ok((done, sums(residuals, at_source, counted, heights_of(&levels[0]))))
 }
 
@@ -167,33 +180,6 @@ pub(crate) fn points_around(
     Ok(all)
 }
 
-/// Of all that the load modules of a tile are made from.
-pub fn modules_fingerprint(
-    job: &Job,
-    area: &GamingArea,
-    stamps: &StampOf,
-    removed: &[Vec<LatticePoint>],
-    tile: TileId,
-) -> Fingerprint {
-    let mut builder = FingerprintBuilder::new("modules").text(&format!("{:?}", job.modules));
-    if 1 < job.lod.level_count() {
-        builder = builder.text(&format!("{:?}", job.lod));
-    }
-    let mut reach = match job.modules.edges {
-        Edges::Constrained => Vec::new(),
-        Edges::Clip(_) => area.tiling.neighbours(tile),
-    };
-    reach.push(tile);
-    for other in reach {
-        let index = area.tiling.index(other);
-        builder = builder.fingerprint(stamps(index).fingerprint).number(removed[index].len() as u64);
-        for point in &removed[index] {
-            builder = builder.number(u64::from(point.row as u32) << 32 | u64::from(point.col as u32));
-        }
-    }
-    builder.finish()
-}
-
 /// Writes the file of a tile's load modules, unless the very same bytes lie there.
 fn publish(
     run: &Run,
@@ -201,7 +187,7 @@ fn publish(
     layout: &Layout,
     fingerprint: Fingerprint,
     levels: &[Vec<LoadModule>],
-) -> Result<(FileStamp, bool), CompileError> {
+) -> Result<FileStamp, CompileError> {
     let header = TileModules {
         tile,
         grid: layout.grid,
@@ -215,9 +201,9 @@ fn publish(
     let stamp = FileStamp::of(&bytes);
     let folder = run.database.folder();
     if folder.check_file(&folder.modules_path(tile), &stamp).is_ok() {
-        return Ok((stamp, false));
+        return Ok(stamp);
     }
-    Ok((run.database.write_modules(&header, levels)?, true))
+    Ok(run.database.write_modules(&header, levels)?)
 }
 
 /// The area's coordinate reference system, as files name it.

@@ -13,8 +13,6 @@ pub(crate) struct Assembled {
     pub modules: Vec<ModuleNumbers>,
     /// The same of every level beside the finest.
     pub coarser: Vec<Vec<ModuleNumbers>>,
-    /// Whether the file was written by this run.
-    pub is_new: bool,
 }
 
 /// Counts and residual of one load module.

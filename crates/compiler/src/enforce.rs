@@ -5,6 +5,7 @@
 
 use std::collections::BTreeSet;
 
+use engine::Outcome;
 use job::{Count, Edges};
 use load_modules::{Layout, Removal, RemovalGround, halo_posts, propose_removals};
 use terrain::{LatticePoint, ModuleId, Post, TileId};
@@ -12,7 +13,7 @@ use terrain::{LatticePoint, ModuleId, Post, TileId};
 use crate::assemble::{assemble_tile, points_around};
 use crate::assembled::{Assembled, ModuleNumbers};
 use crate::refine::Published;
-use crate::run::{Run, Worked};
+use crate::run::Run;
 use crate::sums::Sums;
 use crate::{CompileError, Event, Progress, Stage};
 
@@ -57,10 +58,10 @@ pub(crate) fn enforce(
         let reached = take_out(run, &picked, &mut enforced.removed);
         let again = run.for_each_tile(Stage::Enforce, progress, |tile| {
             if !reached.contains(&tile) {
-                return Ok(Worked::Kept(None));
+                return Ok(Outcome::Kept(None));
             }
-            let (again, _) = assemble_tile(run, &|index| tins[index].stamp, &enforced.removed, tile)?;
-            Ok(Worked::Made(Some(again), None))
+            let again = assemble_tile(run, &|index| tins[index].stamp, &enforced.removed, tile)?;
+            Ok(again.map(|(again, _)| Some(again)))
         })?;
         for (slot, fresh) in assembled.iter_mut().zip(again) {
             if let Some(fresh) = fresh.into_inner() {

@@ -1,6 +1,7 @@
 //! Why a run ended without a result.
 
 use database::DatabaseError;
+use engine::StoreError;
 use ground::GroundError;
 use schedule::ScheduleError;
 use source_files::SourceError;
@@ -84,6 +85,12 @@ pub enum CompileError {
         /// The first line that differs.
         difference: String,
     },
+}
+
+impl From<StoreError> for CompileError {
+    fn from(error: StoreError) -> Self {
+        CompileError::Database(error.into())
+    }
 }
 
 impl From<SourceError> for CompileError {

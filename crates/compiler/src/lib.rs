@@ -9,7 +9,8 @@ pub use error::CompileError;
 mod run;
 pub use run::{ALGORITHM_REVISION, Options, run_name};
 mod cause;
-pub use cause::{Cause, rules};
+mod keys;
+pub use keys::{modules as modules_key, rules};
 mod build;
 pub use build::{Built, build};
 mod tile;
@@ -29,7 +30,6 @@ pub use played::{Costs, Played, TileCosts, play};
 mod levels;
 
 mod assemble;
-pub use assemble::modules_fingerprint;
 mod assembled;
 mod bound;
 mod coarse;

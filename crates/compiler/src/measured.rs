@@ -45,7 +45,7 @@ pub(crate) fn from_measured(measured: Measured, count: usize, file: FileStamp) -
     };
     let mut levels = measured.modules.chunks(count.max(1)).map(|level| level.iter().map(module).collect());
     let (modules, coarser) = (levels.next().unwrap_or_default(), levels.collect());
-    let done = Assembled { file: measured.modules_file, measured: file, modules, coarser, is_new: false };
+    let done = Assembled { file: measured.modules_file, measured: file, modules, coarser };
     (done, sums_of(measured))
 }
 

@@ -2,14 +2,16 @@
 
 use std::sync::{Arc, OnceLock};
 
-use database::{FingerprintBuilder, MadeFrom, Stamp};
+use database::{TileRecord, TileState};
+use engine::{Artifact, Before, Cause, Key, Outcome, Parts, Stamp, keep_or_make};
 use ground::Window;
 use terrain::{ModuleId, StopReason, TileId, TileTin, Vertex};
 
-use crate::cause::{Cause, cause, made_from, summary};
+use crate::cause::{FROZEN, summary};
+use crate::keys;
 use crate::refinement::Refinement;
 use crate::refused::{RefusedPosts, by_module};
-use crate::run::{Run, Worked};
+use crate::run::{ALGORITHM_REVISION, Run};
 use crate::survey::Shares;
 use crate::tasks::{TileBudget, inherited, posts_of, tile_refinement};
 use crate::{CompileError, Event, Progress, Stage};
@@ -24,16 +26,17 @@ pub(crate) struct Published {
     /// What limits kept out, by load module, in ascending order.
     pub refused: Vec<(ModuleId, RefusedPosts)>,
     /// The same by parts; unknown where an earlier build did not say.
-    pub made_from: Option<MadeFrom>,
+    pub made_from: Option<Parts>,
     /// Why this run made it, if it did.
     pub cause: Option<Cause>,
 }
 
 impl Published {
-    /// Of a TIN that is published with this stamp.
-    pub fn new(tin: &TileTin, stamp: Stamp, made_from: Option<MadeFrom>, cause: Option<Cause>) -> Self {
+    /// Of a TIN that is published with this stamp, kept for the next that asks for it.
+    pub fn keep(run: &Run, tin: TileTin, stamp: Stamp, made_from: Option<Parts>) -> Self {
         let (tile, stop, refused) = (tin.tile, tin.stop, by_module(&tin.refused));
-        Self { tile, stamp, stop, refused, made_from, cause }
+        run.tins.keep(stamp, Arc::new(tin));
+        Self { tile, stamp, stop, refused, made_from, cause: None }
     }
 }
 
@@ -46,14 +49,8 @@ pub(crate) fn refine(run: &Run, shares: &Shares, progress: &mut dyn Progress) ->
             run.tin(other, &slot.expect("lower-ranked neighbours are published first").stamp)
         };
         let index = run.area.tiling.index(tile);
-        let done = refine_tile(run, &shares.tiles[index], &inherited(&run.area.tiling, tile, published)?, tile)?;
-        let cause = done.cause.clone();
-        assert!(slots[index].set(done).is_ok(), "each tile is refined once");
-        Ok(match cause {
-            None => Worked::Kept(()),
-            Some(Cause::New) => Worked::Made((), None),
-            Some(cause) => Worked::Made((), Some(cause.to_string())),
-        })
+        let done = refine_tile(run, &shares.tiles[index], inherited(&run.area.tiling, tile, published)?, tile)?;
+        Ok(done.map(|done| assert!(slots[index].set(done).is_ok(), "each tile is refined once")))
     })?;
     let tins = slots.into_iter().map(|slot| slot.into_inner().expect("every tile was refined"));
     let tins: Vec<Published> = tins.collect();
@@ -69,73 +66,75 @@ pub(crate) fn refine(run: &Run, shares: &Shares, progress: &mut dyn Progress) ->
 pub(crate) fn refine_tile(
     run: &Run,
     budget: &TileBudget,
-    seeds: &[Vertex],
+    seeds: Vec<Vertex>,
     tile: TileId,
-) -> Result<Published, CompileError> {
-    let refinement = tile_refinement(run.job, &run.area, tile, budget, posts_of(seeds));
-    let window = run.window(tile)?;
-    refine_or_keep(run, &window, &refinement, seeds)
+) -> Result<Outcome<Published>, CompileError> {
+    let done = keep_or_make(&Refining::new(run, budget, seeds, tile)?, ALGORITHM_REVISION)?;
+    Ok(match done {
+        Outcome::Kept(tin) => Outcome::Kept(tin),
+        Outcome::Made(tin, cause) => Outcome::Made(Published { cause: Some(cause.clone()), ..tin }, cause),
+    })
 }
 
-/// Keeps a tile that was made from the same inputs, and refines any other.
-fn refine_or_keep(
-    run: &Run,
-    window: &Window,
-    refinement: &Refinement,
-    seeds: &[Vertex],
-) -> Result<Published, CompileError> {
-    let stamp = tile_stamp(run, window, refinement, seeds);
-    let tile = refinement.task.tile;
-    let parts = made_from(window, refinement, |builder| feed_seeds(builder, seeds));
-    let folder = run.database.folder();
-    let published = folder.tile_stamp(tile);
-    if matches!(published, Ok(Some(found)) if found == stamp)
-        && let Ok((_, tin)) = folder.read_tile(tile)
-    {
-        return Ok(keep(run, tin, stamp, Some(parts), None));
+/// A tile's TIN, as the engine asks for it.
+pub(crate) struct Refining<'a> {
+    run: &'a Run<'a>,
+    window: Arc<Window>,
+    pub refinement: Refinement,
+    /// The border points that it inherits or keeps.
+    pub seeds: Vec<Vertex>,
+}
+
+impl<'a> Refining<'a> {
+    /// As a build refines it.
+    pub fn new(run: &'a Run, budget: &TileBudget, seeds: Vec<Vertex>, tile: TileId) -> Result<Self, CompileError> {
+        let refinement = tile_refinement(run.job, &run.area, tile, budget, posts_of(&seeds));
+        Ok(Self { run, window: run.window(tile)?, refinement, seeds })
     }
-    let cause = cause(run, tile, &published, &stamp, &parts);
-    let tin = refinement.run(window, seeds);
-    run.database.write_tile(&stamp, &tin)?;
-    Ok(keep(run, tin, stamp, Some(parts), Some(cause)))
-}
 
-/// A TIN that is published with this stamp, kept for whoever asks for it next.
-pub(crate) fn keep(
-    run: &Run,
-    tin: TileTin,
-    stamp: Stamp,
-    made_from: Option<MadeFrom>,
-    cause: Option<Cause>,
-) -> Published {
-    let published = Published::new(&tin, stamp, made_from, cause);
-    run.tins.keep(stamp, Arc::new(tin));
-    published
-}
-
-/// What a tile's TIN is made from.
-pub(crate) fn tile_stamp(run: &Run, window: &Window, refinement: &Refinement, seeds: &[Vertex]) -> Stamp {
-    run.stamp("tile", window, |builder| feed(builder, refinement, seeds))
-}
-
-fn feed(builder: FingerprintBuilder, refinement: &Refinement, seeds: &[Vertex]) -> FingerprintBuilder {
-    let task = &refinement.task;
-    let builder = builder
-        .text(&format!("{:?} {:?} {:?} {:?}", task.rule, task.stop, task.seams, refinement.optimising))
-        .text(&format!("{:?}", task.frame))
-        .text(&format!("{:?} {:?}", task.border, task.kept));
-    feed_seeds(builder, seeds)
-}
-
-/// The border points that a tile inherits or keeps.
-pub(crate) fn feed_seeds(builder: FingerprintBuilder, seeds: &[Vertex]) -> FingerprintBuilder {
-    let mut builder = builder.number(seeds.len() as u64);
-    for seed in seeds {
-        builder = builder.number(pack(seed.at.row, seed.at.col)).number(u64::from(seed.height as u32));
+    fn tile(&self) -> TileId {
+        self.refinement.task.tile
     }
-    builder
+
+    /// The TIN.
+    pub fn refine(&self) -> TileTin {
+        self.refinement.run(&self.window, &self.seeds)
+    }
+
+    /// Publishes it.
+    pub fn publish(&self, tin: TileTin, key: &Key, stamp: &Stamp) -> Result<Published, CompileError> {
+        self.run.database.write_tile(stamp, &tin)?;
+        Ok(Published::keep(self.run, tin, *stamp, Some(key.parts())))
+    }
 }
 
-fn pack(row: i32, col: i32) -> u64 {
-    u64::from(row as u32) << 32 | u64::from(col as u32)
+impl Artifact for Refining<'_> {
+    type Output = Published;
+    type Error = CompileError;
+
+    fn key(&self) -> Key {
+        keys::tin(&self.window, &self.refinement, &self.seeds)
+    }
+
+    fn published(&self) -> Result<Option<Stamp>, CompileError> {
+        Ok(self.run.database.folder().tile_stamp(self.tile())?)
+    }
+
+    fn read(&self, key: &Key, stamp: &Stamp) -> Option<Published> {
+        let (_, tin) = self.run.database.folder().read_tile(self.tile()).ok()?;
+        Some(Published::keep(self.run, tin, *stamp, Some(key.parts())))
+    }
+
+    fn before(&self, found: &Stamp) -> Before {
+        let record = self.run.previous.as_ref().and_then(|manifest| manifest.tile(self.tile()));
+        match record.filter(|record| record.fingerprint == Some(found.fingerprint)) {
+            Some(TileRecord { state: TileState::Frozen, .. }) => Before::Provisional(FROZEN),
+            Some(TileRecord { made_from: Some(parts), .. }) => Before::Parts(parts.clone()),
+            _ => Before::Unknown,
+        }
+    }
+
+    fn make(&self, key: &Key, stamp: &Stamp) -> Result<Published, CompileError> {
+        self.publish(self.refine(), key, stamp)
+    }
 }

@@ -3,7 +3,8 @@
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use database::{Database, FingerprintBuilder, Manifest, SourceRecord, Stamp};
+use database::{Database, Manifest, SourceRecord};
+use engine::{Cause, FingerprintBuilder, Outcome, Stamp};
 use ground::{GamingArea, Ground, Window};
 use job::Job;
 use schedule::{Event as Scheduled, RankedTasks, Workers, in_rank_order_observed};
@@ -45,30 +46,14 @@ pub(crate) struct Run<'a> {
     pub previous: Option<Manifest>,
 }
 
-/// How a stage dealt with one tile.
-pub(crate) enum Worked<R> {
-    /// It was done now; and why, where something was there before.
-    Made(R, Option<String>),
-    /// What was published is fresh.
-    Kept(R),
-}
-
-impl<R> Worked<R> {
-    pub fn into_inner(self) -> R {
-        match self {
-            Worked::Made(result, _) | Worked::Kept(result) => result,
-        }
-    }
-}
-
 impl Run<'_> {
     /// Runs one task per tile in any order, and tells about each.
     pub fn for_each_tile<R: Send>(
         &self,
         stage: Stage,
         progress: &mut dyn Progress,
-        task: impl Fn(TileId) -> Result<Worked<R>, CompileError> + Sync,
-    ) -> Result<Vec<Worked<R>>, CompileError> {
+        task: impl Fn(TileId) -> Result<Outcome<R>, CompileError> + Sync,
+    ) -> Result<Vec<Outcome<R>>, CompileError> {
         let alone = vec![Vec::new(); self.area.tiles.len()];
         let ranks: Vec<usize> = (0..alone.len()).collect();
         self.walk(stage, &RankedTasks::new(&ranks, &alone), progress, task)
@@ -79,8 +64,8 @@ impl Run<'_> {
         &self,
         stage: Stage,
         progress: &mut dyn Progress,
-        task: impl Fn(TileId) -> Result<Worked<R>, CompileError> + Sync,
-    ) -> Result<Vec<Worked<R>>, CompileError> {
+        task: impl Fn(TileId) -> Result<Outcome<R>, CompileError> + Sync,
+    ) -> Result<Vec<Outcome<R>>, CompileError> {
         self.walk(stage, &self.area.ranked_tasks(), progress, task)
     }
 
@@ -89,18 +74,22 @@ impl Run<'_> {
         stage: Stage,
         plan: &RankedTasks,
         progress: &mut dyn Progress,
-        task: impl Fn(TileId) -> Result<Worked<R>, CompileError> + Sync,
-    ) -> Result<Vec<Worked<R>>, CompileError> {
+        task: impl Fn(TileId) -> Result<Outcome<R>, CompileError> + Sync,
+    ) -> Result<Vec<Outcome<R>>, CompileError> {
         let tiles = &self.area.tiles;
         progress.tell(Event::Enter(stage, tiles.len()));
-        let observe = |event: Scheduled<Worked<R>>| {
-            if let Scheduled::Done(index, Worked::Made(_, Some(why))) = &event {
-                progress.tell(Event::Because(stage, tiles[*index], why.clone()));
+        let observe = |event: Scheduled<Outcome<R>>| {
+            // Of what other stages make nothing is written down by parts.
+            if let Scheduled::Done(index, Outcome::Made(_, cause)) = &event
+                && stage == Stage::Refine
+                && *cause != Cause::New
+            {
+                progress.tell(Event::Because(stage, tiles[*index], cause.to_string()));
             }
             progress.tell(match event {
                 Scheduled::Started(index) => Event::Started(stage, tiles[index]),
-                Scheduled::Done(index, Worked::Made(..)) => Event::Done(stage, tiles[index]),
-                Scheduled::Done(index, Worked::Kept(_)) => Event::Kept(stage, tiles[index]),
+                Scheduled::Done(index, Outcome::Made(..)) => Event::Done(stage, tiles[index]),
+                Scheduled::Done(index, Outcome::Kept(_)) => Event::Kept(stage, tiles[index]),
             });
         };
         let run = |index: usize| task(tiles[index]);
@@ -118,20 +107,6 @@ impl Run<'_> {
     /// The ground of a tile.
     pub fn window(&self, tile: TileId) -> Result<Arc<Window>, CompileError> {
         Ok(self.ground.tile(&self.area, tile)?)
-    }
-
-    /// A stamp of this revision for inputs that `feed` adds to a window's.
-    pub fn stamp(
-        &self,
-        purpose: &str,
-        window: &Window,
-        feed: impl FnOnce(FingerprintBuilder) -> FingerprintBuilder,
-    ) -> Stamp {
-        let mut builder = FingerprintBuilder::new(purpose).heights(&window.dem).importance(&window.importance);
-        if let Some(given) = window.given_in_words() {
-            builder = builder.text(&given);
-        }
-        Stamp { algorithm_revision: ALGORITHM_REVISION, fingerprint: feed(builder).finish() }
     }
 }
 

@@ -2,7 +2,8 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use database::{FingerprintBuilder, Stamp};
+use engine::{Artifact, Key, Outcome, Stamp, keep_or_make};
+use ground::Window;
 use job::{Budget as PointBudget, Edges};
 use terrain::{GainCurve, ModuleId, TileId};
 use tiling::{Gains, allocate_equally, allocate_globally, points_equally, points_globally};
@@ -10,8 +11,9 @@ use tin::SurveyTask;
 
 use crate::coarse::coarse;
 use crate::curves::{Curves, Profile};
+use crate::keys;
 use crate::refinement::{give, optimising};
-use crate::run::{Run, Worked};
+use crate::run::{ALGORITHM_REVISION, Run};
 use crate::tasks::{TileBudget, is_surveyed, is_surveyed_in_haste, survey_task};
 use crate::{CompileError, Event, Progress, Stage};
 
@@ -43,19 +45,15 @@ pub(crate) fn survey<'a>(run: &'a Run, progress: &mut dyn Progress) -> Result<Op
     }
     let profile = Mutex::new(Profile::default());
     run.for_each_tile(Stage::Survey, progress, |tile| {
-        let (_, worked) = survey_tile(run, tile)?;
-        let (Worked::Made(curve, _) | Worked::Kept(curve)) = &worked;
-        profile.lock().unwrap_or_else(PoisonError::into_inner).add(curve);
-        Ok(match worked {
-            Worked::Made(_, why) => Worked::Made((), why),
-            Worked::Kept(_) => Worked::Kept(()),
-        })
+        Ok(survey_tile(run, tile)?.map(|(_, curve)| {
+            profile.lock().unwrap_or_else(PoisonError::into_inner).add(&curve);
+        }))
     })?;
     Ok(Some(Curves::new(run, profile.into_inner().unwrap_or_else(PoisonError::into_inner))))
 }
 
 /// Surveys a tile, or keeps what is published and fresh; with the stamp of what it is made from.
-pub(crate) fn survey_tile(run: &Run, tile: TileId) -> Result<(Stamp, Worked<GainCurve>), CompileError> {
+pub(crate) fn survey_tile(run: &Run, tile: TileId) -> Result<Outcome<(Stamp, GainCurve)>, CompileError> {
     let (window, mut task) = (run.window(tile)?, survey_task(run.job, &run.area, tile));
     let is_given = !window.given.is_empty();
     if is_given {
@@ -66,23 +64,38 @@ pub(crate) fn survey_tile(run: &Run, tile: TileId) -> Result<(Stamp, Worked<Gain
         Some((window, task)) => (window, task),
         None => (&*window, &task),
     };
-    let stamp = run.stamp("survey", window, |builder| feed(builder, task));
-    if run.database.folder().curve_stamp(tile).ok().flatten() == Some(stamp)
-        && let Ok((_, curve)) = run.database.folder().read_curve(tile)
-    {
-        return Ok((stamp, Worked::Kept(curve)));
-    }
-    let curve = tin::survey(&window.dem, &window.importance, task, geometry::widest_level());
-    run.database.write_curve(&stamp, &curve)?;
-    Ok((stamp, Worked::Made(curve, None)))
+    keep_or_make(&Surveying { run, window, task }, ALGORITHM_REVISION)
 }
 
-fn feed(builder: FingerprintBuilder, task: &SurveyTask) -> FingerprintBuilder {
-    let growth = &task.growth;
-    builder
-        .text(&format!("{:?} {:?} {:?} {:?}", growth.rule, growth.stop, task.owned, task.cost))
-        .text(&format!("{:?}", growth.frame))
-        .text(&format!("{:?}", growth.border))
+/// A tile's gain curve, as the engine asks for it.
+struct Surveying<'a> {
+    run: &'a Run<'a>,
+    window: &'a Window,
+    task: &'a SurveyTask,
+}
+
+impl Artifact for Surveying<'_> {
+    type Output = (Stamp, GainCurve);
+    type Error = CompileError;
+
+    fn key(&self) -> Key {
+        keys::curve(self.window, self.task)
+    }
+
+    fn published(&self) -> Result<Option<Stamp>, CompileError> {
+        Ok(self.run.database.folder().curve_stamp(self.task.growth.tile)?)
+    }
+
+    fn read(&self, _key: &Key, _stamp: &Stamp) -> Option<(Stamp, GainCurve)> {
+        self.run.database.folder().read_curve(self.task.growth.tile).ok()
+    }
+
+    fn make(&self, _key: &Key, stamp: &Stamp) -> Result<(Stamp, GainCurve), CompileError> {
+        let Self { run, window, task } = *self;
+        let curve = tin::survey(&window.dem, &window.importance, task, geometry::widest_level());
+        run.database.write_curve(stamp, &curve)?;
+        Ok((*stamp, curve))
+    }
 }
 
 /// Shares out points and triangles; without curves equally, with them by one threshold.

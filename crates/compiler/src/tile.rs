@@ -3,24 +3,23 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use database::{Database, DatabaseError, Folder, MadeFrom, Manifest, Report, Stamp, TileRecord};
+use database::{Database, DatabaseError, Folder, Manifest, Report, TileRecord};
+use engine::{Artifact, Cause, Outcome};
 use job::{Edges, Job, deciding_lines};
 use terrain::{Post, SeamSides, Side, TileId, TileTin, Vertex};
 
 use crate::assemble::{assemble, assemble_tile, read_assembled};
 use crate::assembled::Assembled;
 use crate::build::open;
-use crate::cause::{Cause, made_from};
 use crate::curves::Curves;
 use crate::enforce::enforce;
 use crate::publish::{beginning, publish};
-use crate::refine::{Published, feed_seeds, keep, tile_stamp};
-use crate::refinement::Refinement;
+use crate::refine::{Published, Refining};
 use crate::report::Findings;
-use crate::run::{Options, Run, Worked};
+use crate::run::{ALGORITHM_REVISION, Options, Run};
 use crate::sums::{Adding, Sums};
 use crate::survey::{Shares, allocate};
-use crate::tasks::{inherited, is_surveyed, posts_of, side_vertices, tile_refinement, with_outer_sides};
+use crate::tasks::{inherited, is_surveyed, posts_of, side_vertices, with_outer_sides};
 use crate::{CompileError, Event, Progress, Stage};
 
 /// A tile that was run again.
@@ -100,23 +99,23 @@ fn reassemble(
     let (none, adding) = (vec![Vec::new(); tins.len()], Adding::default());
     let done = run.for_each_tile(Stage::Assemble, progress, |tile| {
         let is_reached = reached.iter().any(|&(other, _)| other == tile);
-        let (assembled, sums) = match is_reached {
+        let done = match is_reached {
             true => assemble_tile(run, &|index| tins[index].stamp, &none, tile)?,
-            false => read_assembled(run, tins, tile)?,
+            false => Outcome::Kept(read_assembled(run, tins, tile)?),
         };
-        adding.add(sums);
-        Ok(if is_reached { Worked::Made(assembled, None) } else { Worked::Kept(assembled) })
+        Ok(done.map(|(assembled, sums)| {
+            adding.add(sums);
+            assembled
+        }))
     })?;
-    Ok((done.into_iter().map(Worked::into_inner).collect(), adding.finish()))
+    Ok((done.into_iter().map(Outcome::into_inner).collect(), adding.finish()))
 }
 
 /// Tiles other than those of `reached` that a build would refine again: made from other ground than today's.
 fn stale(run: &Run, shares: &Shares, tins: &[Published], reached: &[(TileId, bool)]) -> Result<usize, CompileError> {
     let mut count = 0;
     for (index, &tile) in run.area.tiles.iter().enumerate() {
-        let seeds = seeds(run, tins, tile)?;
-        let refinement = tile_refinement(run.job, &run.area, tile, &shares.tiles[index], posts_of(&seeds));
-        let stamp = tile_stamp(run, &*run.window(tile)?, &refinement, &seeds);
+        let stamp = as_built(run, shares, tins, tile)?.key().stamp(ALGORITHM_REVISION);
         let is_reached = reached.iter().any(|&(other, _)| other == tile);
         count += usize::from(!is_reached && stamp != tins[index].stamp);
     }
@@ -188,7 +187,7 @@ fn published_tins(run: &Run) -> Result<Vec<Published>, CompileError> {
         let (stamp, tin) = folder.read_tile(tile)?;
         let record = run.previous.as_ref().and_then(|manifest| manifest.tile(tile));
         let made_from = record.and_then(|record| record.made_from.clone());
-        Ok(keep(run, tin, stamp, made_from, None))
+        Ok(Published::keep(run, tin, stamp, made_from))
     };
     run.area.tiles.iter().map(read).collect()
 }
@@ -198,32 +197,16 @@ fn seeds(run: &Run, tins: &[Published], tile: TileId) -> Result<Vec<Vertex>, Com
     inherited(&run.area.tiling, tile, |other| run.tin(other, &tins[run.area.tiling.index(other)].stamp))
 }
 
-/// A tile's TIN that is not published yet, and what it was made from.
-struct Refined {
-    tin: TileTin,
-    stamp: Stamp,
-    made_from: MadeFrom,
+/// The tile's TIN as a full build would refine it.
+fn as_built<'a>(run: &'a Run, shares: &Shares, tins: &[Published], tile: TileId) -> Result<Refining<'a>, CompileError> {
+    Refining::new(run, &shares.tiles[run.area.tiling.index(tile)], seeds(run, tins, tile)?, tile)
 }
 
-impl Refined {
-    fn publish(self, run: &Run) -> Result<Published, CompileError> {
-        run.database.write_tile(&self.stamp, &self.tin)?;
-        Ok(keep(run, self.tin, self.stamp, Some(self.made_from), Some(Cause::Other)))
-    }
-}
-
-/// The tile's task as a full build would give it.
-fn refine_whole(run: &Run, shares: &Shares, tins: &[Published], tile: TileId) -> Result<Refined, CompileError> {
-    let seeds = seeds(run, tins, tile)?;
-    let budget = &shares.tiles[run.area.tiling.index(tile)];
-    refine_tile(run, &tile_refinement(run.job, &run.area, tile, budget, posts_of(&seeds)), &seeds)
-}
-
-fn refine_tile(run: &Run, refinement: &Refinement, seeds: &[Vertex]) -> Result<Refined, CompileError> {
-    let window = run.window(refinement.task.tile)?;
-    let stamp = tile_stamp(run, &window, refinement, seeds);
-    let made_from = made_from(&window, refinement, |builder| feed_seeds(builder, seeds));
-    Ok(Refined { tin: refinement.run(&window, seeds), stamp, made_from })
+/// Publishes a TIN in place of the one that was there.
+fn publish_again(refining: &Refining, tin: TileTin) -> Result<Published, CompileError> {
+    let key = refining.key();
+    let published = refining.publish(tin, &key, &key.stamp(ALGORITHM_REVISION))?;
+    Ok(Published { cause: Some(Cause::Other), ..published })
 }
 
 /// Runs `tile`, with its sides frozen if its border would change. Gives it, and whether it is frozen.
@@ -236,24 +219,25 @@ fn rerun(
 ) -> Result<Vec<(TileId, bool)>, CompileError> {
     progress.tell(Event::Started(Stage::Refine, tile));
     let index = run.area.tiling.index(tile);
-    let whole = refine_whole(run, shares, tins, tile)?;
-    let is_frozen = outgoing(run, &whole.tin) != outgoing(run, &*run.tin(tile, &tins[index].stamp)?);
-    let done = if is_frozen { refine_frozen(run, shares, tins, tile)? } else { whole };
-    tins[index] = done.publish(run)?;
+    let mut refining = as_built(run, shares, tins, tile)?;
+    let mut tin = refining.refine();
+    let before = outgoing(run, &*run.tin(tile, &tins[index].stamp)?);
+    let is_frozen = outgoing(run, &tin) != before;
+    if is_frozen {
+        freeze(run, &mut refining, before);
+        tin = refining.refine();
+    }
+    tins[index] = publish_again(&refining, tin)?;
     progress.tell(Event::Done(Stage::Refine, tile));
     Ok(vec![(tile, is_frozen)])
 }
 
-/// The tile's task with every shared side held as it is published.
-fn refine_frozen(run: &Run, shares: &Shares, tins: &[Published], tile: TileId) -> Result<Refined, CompileError> {
-    let index = run.area.tiling.index(tile);
-    let mut seeds = seeds(run, tins, tile)?;
-    let mut refinement = tile_refinement(run.job, &run.area, tile, &shares.tiles[index], posts_of(&seeds));
-    let task = &mut refinement.task;
-    let own = outgoing(run, &*run.tin(tile, &tins[index].stamp)?);
+/// Has every shared side of a tile held as it is published: with the border points `own`.
+fn freeze(run: &Run, refining: &mut Refining, own: Vec<Vertex>) {
+    let task = &mut refining.refinement.task;
     task.kept = posts_of(&own);
     task.kept.retain(|post| !task.inherited.contains(post));
-    task.seams = with_outer_sides(run.job, &run.area, tile, SeamSides::CLOSED);
+    task.seams = with_outer_sides(run.job, &run.area, task.tile, SeamSides::CLOSED);
     if let Some(points) = &mut task.stop.points {
         // Seam points were selected once; load-module corners and regular border points among them never were.
         let side = run.area.grid.side_cells;
@@ -261,8 +245,7 @@ fn refine_frozen(run: &Run, shares: &Shares, tins: &[Published], tile: TileId) -
         let selected = task.kept.iter().filter(|post| !is_corner(post) && !task.border.contains(post)).count();
         *points = points.saturating_sub(selected);
     }
-    seeds.extend(own);
-    refine_tile(run, &refinement, &seeds)
+    refining.seeds.extend(own);
 }
 
 /// Runs `tile` and every higher-ranked tile that a changed border reaches, in rank order.
@@ -279,17 +262,18 @@ fn cascade(
     while let Some((_, tile)) = waiting.pop_first() {
         progress.tell(Event::Started(Stage::Refine, tile));
         let index = tiling.index(tile);
-        let done = refine_whole(run, shares, tins, tile)?;
+        let refining = as_built(run, shares, tins, tile)?;
+        let done = refining.refine();
         let before = run.tin(tile, &tins[index].stamp)?;
         for side in Side::ALL {
             let Some(other) = tiling.beyond(tile, side).filter(|&other| tiling.rank(tile) < tiling.rank(other)) else {
                 continue;
             };
-            if side_vertices(&done.tin, side) != side_vertices(&before, side) {
+            if side_vertices(&done, side) != side_vertices(&before, side) {
                 waiting.insert((tiling.rank(other), other));
             }
         }
-        tins[index] = done.publish(run)?;
+        tins[index] = publish_again(&refining, done)?;
         reached.push((tile, false));
         progress.tell(Event::Done(Stage::Refine, tile));
     }

@@ -11,7 +11,8 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
-use database::{Database, Held, Lock, Manifest, ManifestState, Share, ShareAllowance, Stamp, Work};
+use database::{Database, Folder, Lock, Manifest, ManifestState, Share, ShareAllowance, Work};
+use engine::{Fingerprint, Held, Outcome, Stamp};
 use job::{Edges, Job};
 use limits::Allowance;
 use schedule::Workers;
@@ -92,7 +93,7 @@ impl<'a> Session<'a> {
         options: &Options<'a>,
         progress: &mut dyn Progress,
     ) -> Result<Self, CompileError> {
-        let is_shared = Lock::held(folder) == Held::Shared;
+        let is_shared = Lock::held(&Folder::new(folder)) == Held::Shared;
         let run = open_with(job, options, progress, |area| Database::join(folder, area))?;
         let canonical = job.canonical_text();
         let is_ours = |manifest: &&Manifest| {
@@ -162,7 +163,7 @@ impl<'a> Session<'a> {
 
     /// Does a unit that is not the last, and marks it as done. A panic in it is an error that names the tile.
     pub fn perform(&self, unit: Unit, progress: &mut dyn Progress) -> Result<(), CompileError> {
-        let missing = self.needs(unit).into_iter().find(|&need| self.work.marked(&need.name()).is_none());
+        let missing = self.needs(unit).into_iter().find(|&need| self.work.marks().marked(&need.name()).is_none());
         if let Some(need) = missing {
             return Err(CompileError::NotReady { unit: unit.name(), needs: need.name() });
         }
@@ -181,21 +182,21 @@ impl<'a> Session<'a> {
 
     fn make(&self, unit: Unit) -> Result<(), CompileError> {
         let fingerprint = match unit {
-            Unit::Survey(tile) => survey_tile(&self.run, tile)?.0.fingerprint,
+            Unit::Survey(tile) => survey_tile(&self.run, tile)?.into_inner().0.fingerprint,
             Unit::Allocate => self.allocate()?,
-            Unit::Refine(tile) => self.refine(tile)?.stamp.fingerprint,
+            Unit::Refine(tile) => self.refine(tile)?.into_inner().stamp.fingerprint,
             Unit::Assemble(tile) => self.assemble(tile)?,
             Unit::Publish => unreachable!("publishing ends the session"),
         };
-        Ok(self.work.mark(&unit.name(), fingerprint)?)
+        Ok(self.work.marks().mark(&unit.name(), fingerprint)?)
     }
 
-    fn allocate(&self) -> Result<database::Fingerprint, CompileError> {
+    fn allocate(&self) -> Result<Fingerprint, CompileError> {
         let run = &self.run;
         let curve = |tile: TileId| {
             let unit = Unit::Survey(tile);
             match run.database.folder().read_curve(tile) {
-                Ok((stamp, curve)) if Some(stamp.fingerprint) == self.work.marked(&unit.name()) => Ok(curve),
+                Ok((stamp, curve)) if Some(stamp.fingerprint) == self.work.marks().marked(&unit.name()) => Ok(curve),
                 _ => Err(self.spoilt(Unit::Allocate, unit)),
             }
         };
@@ -204,17 +205,17 @@ impl<'a> Session<'a> {
         for (&tile, budget) in run.area.tiles.iter().zip(&shares.tiles) {
             self.work.write_share(tile, &to_share(budget))?;
         }
-        Ok(database::Fingerprint::of_bytes(b"allocated"))
+        Ok(Fingerprint::of_bytes(b"allocated"))
     }
 
-    fn refine(&self, tile: TileId) -> Result<Published, CompileError> {
+    fn refine(&self, tile: TileId) -> Result<Outcome<Published>, CompileError> {
         let unit = Unit::Refine(tile);
         let share = self.work.read_share(tile).map_err(|_| self.spoilt(unit, Unit::Allocate))?;
         let seeds = inherited(&self.run.area.tiling, tile, |other| Ok(self.published(unit, other)?.1))?;
-        refine_tile(&self.run, &from_share(&share), &seeds, tile)
+        refine_tile(&self.run, &from_share(&share), seeds, tile)
     }
 
-    fn assemble(&self, tile: TileId) -> Result<database::Fingerprint, CompileError> {
+    fn assemble(&self, tile: TileId) -> Result<Fingerprint, CompileError> {
         let area = &self.run.area;
         let mut near = BTreeMap::new();
         for other in self.around(tile) {
@@ -223,14 +224,14 @@ impl<'a> Session<'a> {
             near.insert(area.tiling.index(other), stamp);
         }
         let none: Vec<Vec<LatticePoint>> = vec![Vec::new(); area.tiles.len()];
-        let (assembled, _) = assemble_tile(&self.run, &|index| near[&index], &none, tile)?;
+        let (assembled, _) = assemble_tile(&self.run, &|index| near[&index], &none, tile)?.into_inner();
         Ok(assembled.file.blake3)
     }
 
     /// The TIN of a tile that is marked as done, as it lies on the disk.
     fn published(&self, unit: Unit, tile: TileId) -> Result<(Stamp, Arc<TileTin>), CompileError> {
         match self.run.database.folder().read_tile(tile) {
-            Ok((stamp, tin)) if Some(stamp.fingerprint) == self.work.marked(&Unit::Refine(tile).name()) => {
+            Ok((stamp, tin)) if Some(stamp.fingerprint) == self.work.marks().marked(&Unit::Refine(tile).name()) => {
                 Ok((stamp, Arc::new(tin)))
             }
             _ => Err(self.spoilt(unit, Unit::Refine(tile))),
@@ -239,7 +240,7 @@ impl<'a> Session<'a> {
 
     /// Takes back the mark of a unit whose result is not what it was, so that it is done again.
     fn spoilt(&self, unit: Unit, need: Unit) -> CompileError {
-        self.work.unmark(&need.name());
+        self.work.marks().unmark(&need.name());
         CompileError::NotReady { unit: unit.name(), needs: need.name() }
     }
 

@@ -8,7 +8,8 @@ use std::collections::BTreeSet;
 use std::path::Path;
 use std::time::Duration;
 
-use database::{Claim, Lease, Leases, ManifestState};
+use database::ManifestState;
+use engine::{Claim, Lease, Leases};
 use job::Job;
 
 use crate::build::Built;
@@ -108,7 +109,7 @@ impl Worker<'_, '_> {
     /// after that.
     fn is_published(&self) -> bool {
         let folder = self.session.run.database.folder();
-        let is_swept = || self.session.standing == Standing::UnderWay && !self.session.work.path().exists();
+        let is_swept = || self.session.standing == Standing::UnderWay && !self.session.work.is_there();
         folder.manifest().is_ok_and(|manifest| {
             let is_complete = manifest.state == ManifestState::Complete;
             manifest.job != self.job || is_complete && (folder.report().is_ok() || is_swept())
@@ -117,7 +118,7 @@ impl Worker<'_, '_> {
 
     /// A unit that is ready and now ours; the last one once all others are done.
     fn next(&mut self) -> Result<Option<(Unit, Lease)>, CompileError> {
-        let marked: BTreeSet<String> = self.session.work.all_marked().into_iter().collect();
+        let marked: BTreeSet<String> = self.session.work.marks().all().into_iter().collect();
         let is_done = |unit: &Unit| marked.contains(&unit.name());
         self.open.retain(|unit| !is_done(unit));
         let mut ready: Vec<Unit> = match self.open.is_empty() {
@@ -130,7 +131,7 @@ impl Worker<'_, '_> {
         for unit in ready {
             if let Claim::Ours(lease, _) = self.leases.claim(&unit.name(), (self.sharing.now)())? {
                 // It may have been done between the look at the marks and the claim.
-                if self.session.work.marked(&unit.name()).is_none() {
+                if self.session.work.marks().marked(&unit.name()).is_none() {
                     return Ok(Some((unit, lease)));
                 }
             }

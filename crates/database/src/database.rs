@@ -1,18 +1,17 @@
 //! A database's directory, for writing: made or found, locked, and never half-written.
 
-use std::fs;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
+use engine::{Durability, Entry, LockKind, Stamp, check_writable, is_temporary, remove_all};
 use serde::Serialize;
 use terrain::{GainCurve, LoadModule, TileTin};
 
 use crate::folder::{MEASURED, MODULES, SURVEY, TILES, WORK, files};
 use crate::lock::LOCK_NAME;
-use crate::publish::{Durability, check_writable, is_temporary, remove_left_over, sync, write_atomically};
 use crate::{
-    Area, DatabaseError, FileStamp, Folder, Lock, Manifest, ManifestState, Measured, Removals, Stamp, TileModules,
-    Work, encode_curve, encode_levels, encode_measured, encode_removals, encode_tile, json,
+    Area, DatabaseError, FileStamp, Folder, Lock, Manifest, ManifestState, Measured, Removals, TileModules, Work,
+    encode_curve, encode_levels, encode_measured, encode_removals, encode_tile, json,
 };
 
 /// The folders of a database that stay.
@@ -59,16 +58,8 @@ impl Database {
     /// # Errors
     /// When the directory holds anything that is not ours, a database of another format version or area, or a link in
     /// place of a folder; when another build holds the lock; when it cannot be written to. Nothing is changed then.
-    pub fn create_or_open(dir: &Path, area: &Area) -> Result<(Self, Previous), DatabaseError> {
-        // Looked at before the lock is made, so that nothing is put into a directory that is not ours.
-        let folder = Folder::new(dir);
-        examine(&folder, area)?;
-        fs::create_dir_all(dir).map_err(|source| DatabaseError::from_io("create", dir, 0, source))?;
-        let lock = Lock::acquire(dir)?;
-        // Looked at again, now that nobody else can change it.
-        let previous = examine(&folder, area)?;
-        FOLDERS.iter().try_for_each(|name| make_folder(&folder.path(name)))?;
-        let database = Self { folder, _lock: lock };
+    pub fn create_or_open(folder: impl Into<Folder>, area: &Area) -> Result<(Self, Previous), DatabaseError> {
+        let (database, previous) = Self::open(folder.into(), area, LockKind::Alone)?;
         database.sweep()?;
         database.remove_work()?;
         Ok((database, previous))
@@ -95,13 +86,19 @@ impl Database {
     ///
     /// # Errors
     /// As [`Database::create_or_open`].
-    pub fn join(dir: &Path, area: &Area) -> Result<(Self, Previous), DatabaseError> {
-        let folder = Folder::new(dir);
+    pub fn join(folder: impl Into<Folder>, area: &Area) -> Result<(Self, Previous), DatabaseError> {
+        Self::open(folder.into(), area, LockKind::Shared)
+    }
+
+    fn open(folder: Folder, area: &Area, kind: LockKind) -> Result<(Self, Previous), DatabaseError> {
+        // Looked at before the lock is made, so that nothing is put into a directory that is not ours.
         examine(&folder, area)?;
-        fs::create_dir_all(dir).map_err(|source| DatabaseError::from_io("create", dir, 0, source))?;
-        let lock = Lock::share(dir)?;
+        let dir = folder.dir();
+        folder.store().make_folders(dir).map_err(|source| DatabaseError::from_io("create", dir, 0, source))?;
+        let lock = Lock::take(&folder, kind)?;
+        // Looked at again, now that nobody else can change it.
         let previous = examine(&folder, area)?;
-        FOLDERS.iter().try_for_each(|name| make_folder(&folder.path(name)))?;
+        FOLDERS.iter().try_for_each(|name| make_folder(&folder, &folder.path(name)))?;
         Ok((Self { folder, _lock: lock }, previous))
     }
 
@@ -110,8 +107,14 @@ impl Database {
     /// # Errors
     /// When a folder cannot be listed, or a file in it not removed.
     pub fn sweep(&self) -> Result<(), DatabaseError> {
-        remove_left_over(self.folder.dir())?;
-        FOLDERS.iter().try_for_each(|name| remove_left_over(&self.folder.path(name)))
+        self.remove_left_over(self.folder.dir())?;
+        FOLDERS.iter().try_for_each(|name| self.remove_left_over(&self.folder.path(name)))
+    }
+
+    /// Removes temporary files that a killed run left in one of its folders.
+    fn remove_left_over(&self, folder: &Path) -> Result<(), DatabaseError> {
+        let is_left = |path: &&PathBuf| path.file_name().is_some_and(|name| is_temporary(&name.to_string_lossy()));
+        self.folder.list(folder)?.iter().filter(is_left).try_for_each(|path| self.remove_if_there(path))
     }
 
     /// What processes that share the directory leave for one another during the run of this name.
@@ -120,10 +123,10 @@ impl Database {
     /// When its folders cannot be made.
     pub fn work(&self, run: &str) -> Result<Work, DatabaseError> {
         let work = self.folder.path(WORK);
-        make_folder(&work)?;
-        make_folder(&work.join(run))?;
+        make_folder(&self.folder, &work)?;
+        make_folder(&self.folder, &work.join(run))?;
         for name in Work::FOLDERS {
-            make_folder(&work.join(run).join(name))?;
+            make_folder(&self.folder, &work.join(run).join(name))?;
         }
         Ok(self.folder.work(run))
     }
@@ -134,8 +137,8 @@ impl Database {
     /// When something cannot be removed.
     pub fn remove_work(&self) -> Result<(), DatabaseError> {
         let path = self.folder.path(WORK);
-        check_folder(&path)?;
-        match fs::remove_dir_all(&path) {
+        check_folder(&self.folder, &path)?;
+        match remove_all(&**self.folder.store(), &path) {
             Err(source) if source.kind() != ErrorKind::NotFound => {
                 Err(DatabaseError::from_io("remove", &path, 0, source))
             }
@@ -153,7 +156,7 @@ impl Database {
     /// # Errors
     /// When the file cannot be written; the one before it is then still there.
     pub fn write_tile(&self, stamp: &Stamp, tile: &TileTin) -> Result<FileStamp, DatabaseError> {
-        publish(&self.folder.tile_path(tile.tile), &encode_tile(stamp, tile))
+        self.publish(&self.folder.tile_path(tile.tile), &encode_tile(stamp, tile))
     }
 
     /// Publishes the list of what was removed from a tile.
@@ -161,7 +164,7 @@ impl Database {
     /// # Errors
     /// As [`Database::write_tile`].
     pub fn write_removals(&self, stamp: &Stamp, removals: &Removals) -> Result<FileStamp, DatabaseError> {
-        publish(&self.folder.removals_path(removals.tile), &encode_removals(stamp, removals))
+        self.publish(&self.folder.removals_path(removals.tile), &encode_removals(stamp, removals))
     }
 
     /// Publishes a tile's load modules at every level, the finest first.
@@ -172,7 +175,7 @@ impl Database {
     /// # Panics
     /// As [`encode_levels`].
     pub fn write_modules(&self, tile: &TileModules, levels: &[Vec<LoadModule>]) -> Result<FileStamp, DatabaseError> {
-        publish(&self.folder.modules_path(tile.tile), &encode_levels(tile, levels))
+        self.publish(&self.folder.modules_path(tile.tile), &encode_levels(tile, levels))
     }
 
     /// Publishes what was measured of a tile's load modules.
@@ -180,7 +183,7 @@ impl Database {
     /// # Errors
     /// As [`Database::write_tile`].
     pub fn write_measured(&self, stamp: &Stamp, measured: &Measured) -> Result<FileStamp, DatabaseError> {
-        publish(&self.folder.measured_path(measured.tile), &encode_measured(stamp, measured))
+        self.publish(&self.folder.measured_path(measured.tile), &encode_measured(stamp, measured))
     }
 
     /// Publishes a tile's gain curve.
@@ -188,7 +191,7 @@ impl Database {
     /// # Errors
     /// As [`Database::write_tile`].
     pub fn write_curve(&self, stamp: &Stamp, curve: &GainCurve) -> Result<FileStamp, DatabaseError> {
-        publish(&self.folder.curve_path(curve.tile), &encode_curve(stamp, curve))
+        self.publish(&self.folder.curve_path(curve.tile), &encode_curve(stamp, curve))
     }
 
     /// Publishes a value, which must be an object, as checksummed JSON under one of the names of [`files`].
@@ -197,7 +200,7 @@ impl Database {
     /// As [`Database::write_tile`]; also when `value` is not an object.
     pub fn write_json(&self, name: &str, value: &impl Serialize) -> Result<FileStamp, DatabaseError> {
         let path = self.folder.path(name);
-        publish(&path, json::encode(&path, value)?.as_bytes())
+        self.publish(&path, json::encode(&path, value)?.as_bytes())
     }
 
     /// Publishes bytes of another format under one of the names of [`files`].
@@ -205,7 +208,7 @@ impl Database {
     /// # Errors
     /// As [`Database::write_tile`].
     pub fn write_bytes(&self, name: &str, bytes: &[u8]) -> Result<FileStamp, DatabaseError> {
-        publish(&self.folder.path(name), bytes)
+        self.publish(&self.folder.path(name), bytes)
     }
 
     /// Removes a file by its name inside the directory, if it is there.
@@ -213,7 +216,7 @@ impl Database {
     /// # Errors
     /// When it cannot be removed.
     pub fn remove(&self, name: &str) -> Result<(), DatabaseError> {
-        remove_if_there(&self.folder.path(name))
+        self.remove_if_there(&self.folder.path(name))
     }
 
     /// Removes everything a build has made, for a fresh start. Whoever reads meanwhile finds no `database.json`.
@@ -225,8 +228,8 @@ impl Database {
         REPORTS.iter().try_for_each(|name| self.remove(name))?;
         for name in FOLDERS {
             let folder = self.folder.path(name);
-            for path in list(&folder)? {
-                remove_if_there(&path)?;
+            for path in self.folder.list(&folder)? {
+                self.remove_if_there(&path)?;
             }
         }
         Ok(())
@@ -243,7 +246,7 @@ impl Database {
     pub fn begin(&self, manifest: &Manifest) -> Result<(), DatabaseError> {
         assert_eq!(manifest.state, ManifestState::Incomplete, "a build begins incomplete");
         // Where there is no database yet, losing this file loses nothing, so it need not wait for the disk.
-        let first = !self.folder.path(files::DATABASE).exists();
+        let first = self.folder.store().entry(&self.folder.path(files::DATABASE)).is_err();
         self.write_manifest(manifest, if first { Durability::Later } else { Durability::Now })?;
         REPORTS.iter().try_for_each(|name| self.remove(name))
     }
@@ -258,46 +261,55 @@ impl Database {
     pub fn finish(&self, manifest: &Manifest) -> Result<(), DatabaseError> {
         assert_eq!(manifest.state, ManifestState::Complete, "a build ends complete");
         let paths: Vec<PathBuf> = self.folder.listed_files(manifest).into_iter().map(|(path, _)| path).collect();
-        if let Some(path) = paths.iter().find(|path| !path.exists()) {
+        let store = self.folder.store();
+        if let Some(path) = paths.iter().find(|path| store.entry(path).is_err()) {
             return Err(DatabaseError::Missing { path: path.clone() });
         }
-        sync(self.folder.dir(), &paths, &FOLDERS.map(|name| self.folder.path(name)))?;
+        let (dir, folders) = (self.folder.dir(), FOLDERS.map(|name| self.folder.path(name)));
+        store.sync(dir, &paths, &folders).map_err(|source| DatabaseError::from_io("sync", dir, 0, source))?;
         self.write_manifest(manifest, Durability::Now)
     }
 
     fn write_manifest(&self, manifest: &Manifest, durability: Durability) -> Result<(), DatabaseError> {
         let path = self.folder.path(files::DATABASE);
-        write_atomically(&path, manifest.encode(&path)?.as_bytes(), durability)
+        self.write(&path, manifest.encode(&path)?.as_bytes(), durability)
     }
-}
 
-fn publish(path: &Path, bytes: &[u8]) -> Result<FileStamp, DatabaseError> {
-    write_atomically(path, bytes, Durability::Later)?;
-    Ok(FileStamp::of(bytes))
-}
+    fn publish(&self, path: &Path, bytes: &[u8]) -> Result<FileStamp, DatabaseError> {
+        self.write(path, bytes, Durability::Later)?;
+        Ok(FileStamp::of(bytes))
+    }
 
-fn remove_if_there(path: &Path) -> Result<(), DatabaseError> {
-    match fs::remove_file(path) {
-        Err(source) if source.kind() != ErrorKind::NotFound => Err(DatabaseError::from_io("remove", path, 0, source)),
-        _ => Ok(()),
+    fn write(&self, path: &Path, bytes: &[u8], durability: Durability) -> Result<(), DatabaseError> {
+        let written = self.folder.store().replace(path, bytes, durability);
+        written.map_err(|source| DatabaseError::from_io("write", path, bytes.len() as u64, source))
+    }
+
+    fn remove_if_there(&self, path: &Path) -> Result<(), DatabaseError> {
+        match self.folder.store().remove(path) {
+            Err(source) if source.kind() != ErrorKind::NotFound => {
+                Err(DatabaseError::from_io("remove", path, 0, source))
+            }
+            _ => Ok(()),
+        }
     }
 }
 
 /// Whether a database of `area` may be built in `folder`, and what is there. Changes nothing.
 fn examine(folder: &Folder, area: &Area) -> Result<Previous, DatabaseError> {
     let dir = folder.dir();
-    match fs::metadata(dir) {
-        Ok(found) if found.is_dir() => {}
-        Ok(_) => return Err(DatabaseError::NotOurFolder { path: dir.to_path_buf(), found: "a file".into() }),
-        Err(_) if dir.is_symlink() => {
-            let found = "a link that leads nowhere".into();
-            return Err(DatabaseError::NotOurFolder { path: dir.to_path_buf(), found });
+    let not_ours = |found: &str| DatabaseError::NotOurFolder { path: dir.to_path_buf(), found: found.into() };
+    match folder.store().target(dir) {
+        Ok(Entry::Folder) => {}
+        Ok(Entry::File(_) | Entry::Other) => return Err(not_ours("a file")),
+        Err(_) if matches!(folder.store().entry(dir), Ok(Entry::Other)) => {
+            return Err(not_ours("a link that leads nowhere"));
         }
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Previous::Nothing),
         Err(source) => return Err(DatabaseError::from_io("open", dir, 0, source)),
     }
     for name in FOLDERS {
-        check_folder(&folder.path(name))?;
+        check_folder(folder, &folder.path(name))?;
     }
     let damage = match folder.manifest() {
         Ok(manifest) => {
@@ -309,44 +321,31 @@ fn examine(folder: &Folder, area: &Area) -> Result<Previous, DatabaseError> {
         Err(error) => return Err(error),
     };
     // Without a manifest to trust, nothing may lie there that a build does not make itself.
-    for path in list(dir)? {
+    for path in folder.list(dir)? {
         let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
         if !OURS.contains(&name.as_str()) && !is_temporary(&name) {
-            let found = format!("{name:?} in it");
-            return Err(DatabaseError::NotOurFolder { path: dir.to_path_buf(), found });
+            return Err(not_ours(&format!("{name:?} in it")));
         }
     }
     Ok(damage.map_or(Previous::Nothing, Previous::Damaged))
 }
 
 /// Makes a folder inside the database, unless it is there.
-fn make_folder(path: &Path) -> Result<(), DatabaseError> {
-    match fs::create_dir(path) {
+fn make_folder(folder: &Folder, path: &Path) -> Result<(), DatabaseError> {
+    match folder.store().make_folder(path) {
         Err(source) if source.kind() != ErrorKind::AlreadyExists => {
             Err(DatabaseError::from_io("create", path, 0, source))
         }
-        _ => check_folder(path),
+        _ => check_folder(folder, path),
     }
 }
 
 /// A folder of ours is a real one: output never follows a link out of the directory.
-fn check_folder(path: &Path) -> Result<(), DatabaseError> {
-    match fs::symlink_metadata(path) {
-        Ok(found) if !found.is_dir() => Err(DatabaseError::NotAFolder { path: path.to_path_buf() }),
+fn check_folder(folder: &Folder, path: &Path) -> Result<(), DatabaseError> {
+    match folder.store().entry(path) {
+        Ok(Entry::File(_) | Entry::Other) => Err(DatabaseError::NotAFolder { path: path.to_path_buf() }),
         _ => Ok(()),
     }
-}
-
-/// What lies in a folder, by name; nothing when there is no folder.
-pub(crate) fn list(folder: &Path) -> Result<Vec<PathBuf>, DatabaseError> {
-    let fault = |source| DatabaseError::from_io("list", folder, 0, source);
-    let entries = match fs::read_dir(folder) {
-        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Vec::new()),
-        entries => entries.map_err(fault)?,
-    };
-    let mut paths = entries.map(|entry| Ok(entry.map_err(fault)?.path())).collect::<Result<Vec<_>, _>>()?;
-    paths.sort();
-    Ok(paths)
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@ use std::fmt;
 use std::io::{Error, ErrorKind};
 use std::path::{Path, PathBuf};
 
+use engine::StoreError;
 use load_module_reader::ReadError;
 use terrain::{LoadModuleFault, ModuleId, TinFault};
 use thiserror::Error as ThisError;
@@ -259,6 +260,12 @@ impl fmt::Display for NotADatabase {
             Self::PartOfOne | Self::File => "a file",
             Self::OtherFolder => "another folder",
         })
+    }
+}
+
+impl From<StoreError> for DatabaseError {
+    fn from(error: StoreError) -> Self {
+        Self::from_io(error.action, &error.path, error.bytes, error.source)
     }
 }
 

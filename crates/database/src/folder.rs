@@ -1,9 +1,9 @@
 //! A database's directory, for reading: names, and what the files say.
 
-use std::fs::File;
-use std::io::Read;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
+use engine::{Disk, Entry, Store};
 use serde::de::DeserializeOwned;
 use terrain::{GainCurve, LoadModule, TileId, TileTin};
 
@@ -44,15 +44,32 @@ pub(crate) const WORK: &str = "work";
 const FILE_BYTES_MAX: u64 = codec::PAYLOAD_BYTES_MAX + FRAME_BYTES as u64;
 
 /// The directory of a database, to read from. Holds no file open and no lock.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug)]
 pub struct Folder {
+    store: Arc<dyn Store>,
     dir: PathBuf,
+}
+
+impl<T: Into<PathBuf>> From<T> for Folder {
+    fn from(dir: T) -> Self {
+        Self::new(dir)
+    }
 }
 
 impl Folder {
     /// The database in `dir`, whether or not it is there yet.
     pub fn new(dir: impl Into<PathBuf>) -> Self {
-        Self { dir: dir.into() }
+        Self::stored(Arc::new(Disk), dir)
+    }
+
+    /// The same in another store than the system's files.
+    pub fn stored(store: Arc<dyn Store>, dir: impl Into<PathBuf>) -> Self {
+        Self { store, dir: dir.into() }
+    }
+
+    /// Where its files lie.
+    pub fn store(&self) -> &Arc<dyn Store> {
+        &self.store
     }
 
     /// The directory.
@@ -96,13 +113,17 @@ impl Folder {
     /// When it is missing, damaged or of another format version.
     pub fn manifest(&self) -> Result<Manifest, DatabaseError> {
         let path = self.path(files::DATABASE);
-        let bytes = read(&path).map_err(|error| self.without(error))?;
+        let bytes = self.read(&path).map_err(|error| self.without(error))?;
         Manifest::decode(&path, &bytes)
     }
 
     /// What it means that a file which every database has could not be read: `error`, or that this is no database.
     fn without(&self, error: DatabaseError) -> DatabaseError {
-        let found = if self.path(files::DATABASE).is_file() { None } else { NotADatabase::of(&self.dir) };
+        let found = if matches!(self.store.target(&self.path(files::DATABASE)), Ok(Entry::File(_))) {
+            None
+        } else {
+            NotADatabase::of(&self.dir)
+        };
         match (found, &error) {
             (Some(found), DatabaseError::Missing { .. } | DatabaseError::Io { .. }) => {
                 DatabaseError::NotADatabase { path: self.dir.clone(), found }
@@ -113,7 +134,7 @@ impl Folder {
 
     /// What processes that share the directory leave for one another during the run of this name.
     pub fn work(&self, run: &str) -> Work {
-        Work::new(self.path(WORK).join(run))
+        Work::new(Arc::clone(&self.store), self.path(WORK).join(run))
     }
 
     /// What `report.json` says.
@@ -130,7 +151,7 @@ impl Folder {
     /// When the file is missing, damaged or of another tile.
     pub fn read_tile(&self, tile: TileId) -> Result<(Stamp, TileTin), DatabaseError> {
         let path = self.tile_path(tile);
-        let (stamp, read) = tile_file::decode_tile(&path, &read(&path)?)?;
+        let (stamp, read) = tile_file::decode_tile(&path, &self.read(&path)?)?;
         same_tile(path, read.tile, tile)?;
         Ok((stamp, read))
     }
@@ -151,12 +172,19 @@ impl Folder {
         self.stamp(Kind::Curve, &self.curve_path(tile))
     }
 
+    /// What was measured of the load modules of `tile` was made from this, by its header alone; `None` when there is
+    /// none.
+    ///
+    /// # Errors
+    /// When the header cannot be read or is damaged.
+    pub fn measured_stamp(&self, tile: TileId) -> Result<Option<Stamp>, DatabaseError> {
+        self.stamp(Kind::Measured, &self.measured_path(tile))
+    }
+
     fn stamp(&self, kind: Kind, path: &Path) -> Result<Option<Stamp>, DatabaseError> {
-        let mut header = Vec::with_capacity(FRAME_BYTES);
-        refuse_pipe(path)?;
-        let file = File::open(path).and_then(|file| file.take(FRAME_BYTES as u64).read_to_end(&mut header));
-        match file {
-            Ok(_) => frame::read_stamp(kind, path, &header).map(Some),
+        refuse_other(&*self.store, path)?;
+        match self.store.read_start(path, FRAME_BYTES) {
+            Ok(header) => frame::read_stamp(kind, path, &header).map(Some),
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),
             Err(source) => Err(DatabaseError::from_io("read", path, 0, source)),
         }
@@ -168,7 +196,7 @@ impl Folder {
     /// When the file is missing, damaged or of another tile.
     pub fn read_removals(&self, tile: TileId) -> Result<(Stamp, Removals), DatabaseError> {
         let path = self.removals_path(tile);
-        let (stamp, read) = removals_file::decode_removals(&path, &read(&path)?)?;
+        let (stamp, read) = removals_file::decode_removals(&path, &self.read(&path)?)?;
         same_tile(path, read.tile, tile)?;
         Ok((stamp, read))
     }
@@ -179,7 +207,7 @@ impl Folder {
     /// When the file is missing, damaged or of another tile, or a load module is unsound.
     pub fn read_levels(&self, tile: TileId) -> Result<(TileModules, Vec<Vec<LoadModule>>), DatabaseError> {
         let path = self.modules_path(tile);
-        let (header, levels) = slm::decode_levels(&path, &read(&path)?)?;
+        let (header, levels) = slm::decode_levels(&path, &self.read(&path)?)?;
         same_tile(path, header.tile, tile)?;
         Ok((header, levels))
     }
@@ -190,7 +218,7 @@ impl Folder {
     /// When the file is missing, damaged or of another tile, or a load module is unsound.
     pub fn read_modules(&self, tile: TileId) -> Result<(TileModules, Vec<LoadModule>), DatabaseError> {
         let path = self.modules_path(tile);
-        let (header, modules) = slm::decode_modules(&path, &read(&path)?)?;
+        let (header, modules) = slm::decode_modules(&path, &self.read(&path)?)?;
         same_tile(path, header.tile, tile)?;
         Ok((header, modules))
     }
@@ -201,7 +229,7 @@ impl Folder {
     /// When the file is missing, damaged or of another tile.
     pub fn read_measured(&self, tile: TileId) -> Result<(Stamp, Measured), DatabaseError> {
         let path = self.measured_path(tile);
-        let (stamp, read) = measured_file::decode_measured(&path, &read(&path)?)?;
+        let (stamp, read) = measured_file::decode_measured(&path, &self.read(&path)?)?;
         same_tile(path, read.tile, tile)?;
         Ok((stamp, read))
     }
@@ -212,7 +240,7 @@ impl Folder {
     /// When the file is missing, damaged or of another tile.
     pub fn read_curve(&self, tile: TileId) -> Result<(Stamp, GainCurve), DatabaseError> {
         let path = self.curve_path(tile);
-        let (stamp, read) = curve_file::decode_curve(&path, &read(&path)?)?;
+        let (stamp, read) = curve_file::decode_curve(&path, &self.read(&path)?)?;
         same_tile(path, read.tile, tile)?;
         Ok((stamp, read))
     }
@@ -223,7 +251,7 @@ impl Folder {
     /// When the file is missing or damaged, or holds something else.
     pub fn read_json<T: DeserializeOwned>(&self, name: &str) -> Result<T, DatabaseError> {
         let path = self.path(name);
-        json::decode(&path, &read(&path)?)
+        json::decode(&path, &self.read(&path)?)
     }
 
     /// The text of a file of this name, which has no form of ours.
@@ -232,7 +260,7 @@ impl Folder {
     /// When the file is missing or no text.
     pub fn read_text(&self, name: &str) -> Result<String, DatabaseError> {
         let path = self.path(name);
-        let text = String::from_utf8(read(&path)?);
+        let text = String::from_utf8(self.read(&path)?);
         text.map_err(|error| DatabaseError::Malformed { path, section: "text", what: error.to_string() })
     }
 
@@ -241,7 +269,7 @@ impl Folder {
     /// # Errors
     /// When it cannot be read.
     pub fn stamp_file(&self, path: &Path) -> Result<FileStamp, DatabaseError> {
-        Ok(FileStamp::of(&read(path)?))
+        Ok(FileStamp::of(&self.read(path)?))
     }
 
     /// Whether the file of this name has the bytes that `stamp` promises.
@@ -249,7 +277,20 @@ impl Folder {
     /// # Errors
     /// When it is missing, or its length or content differs.
     pub fn check_file(&self, path: &Path, stamp: &FileStamp) -> Result<(), DatabaseError> {
-        check_stamp(path, &read(path)?, stamp)
+        check_stamp(path, &self.read(path)?, stamp)
+    }
+
+    /// All of one of its files.
+    pub(crate) fn read(&self, path: &Path) -> Result<Vec<u8>, DatabaseError> {
+        read(&*self.store, path)
+    }
+
+    /// What lies in one of its folders, by name; nothing when there is no folder.
+    pub(crate) fn list(&self, folder: &Path) -> Result<Vec<PathBuf>, DatabaseError> {
+        match self.store.list(folder) {
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(Vec::new()),
+            listed => listed.map_err(|source| DatabaseError::from_io("list", folder, 0, source)),
+        }
     }
 }
 
@@ -268,20 +309,22 @@ pub(crate) fn check_stamp(path: &Path, bytes: &[u8], stamp: &FileStamp) -> Resul
 }
 
 /// All of a file, unless it is longer than any of ours.
-pub(crate) fn read(path: &Path) -> Result<Vec<u8>, DatabaseError> {
+pub(crate) fn read(store: &dyn Store, path: &Path) -> Result<Vec<u8>, DatabaseError> {
     let fault = |source| DatabaseError::from_io("read", path, 0, source);
-    let found = std::fs::metadata(path).map_err(fault)?.len();
-    refuse_pipe(path)?;
+    let found = match store.target(path).map_err(fault)? {
+        Entry::File(bytes) => bytes,
+        Entry::Folder | Entry::Other => return Err(DatabaseError::NotAFile { path: path.to_path_buf() }),
+    };
     if FILE_BYTES_MAX < found {
         return Err(DatabaseError::TooLarge { path: path.to_path_buf(), found, limit: FILE_BYTES_MAX });
     }
-    std::fs::read(path).map_err(fault)
+    store.read(path).map_err(fault)
 }
 
 /// Refuses what is there and no file: a pipe would wait for a writer, and a device may have no end.
-pub(crate) fn refuse_pipe(path: &Path) -> Result<(), DatabaseError> {
-    match std::fs::metadata(path) {
-        Ok(data) if !data.is_file() => Err(DatabaseError::NotAFile { path: path.to_path_buf() }),
+pub(crate) fn refuse_other(store: &dyn Store, path: &Path) -> Result<(), DatabaseError> {
+    match store.target(path) {
+        Ok(Entry::Folder | Entry::Other) => Err(DatabaseError::NotAFile { path: path.to_path_buf() }),
         _ => Ok(()),
     }
 }

@@ -13,22 +13,15 @@
 
 use std::path::Path;
 
+use engine::{Fingerprint, Stamp};
+
+use crate::DatabaseError;
 use crate::codec::PAYLOAD_BYTES_MAX;
-use crate::{DatabaseError, Fingerprint};
 
 /// Bytes before the payload.
 pub(crate) const FRAME_BYTES: usize = 64;
 /// Version of the private files.
 const VERSION: u32 = 1;
-
-/// What a published result was made by and from: fresh while both are what they would be today.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Stamp {
-    /// Rises whenever an algorithm's results may change.
-    pub algorithm_revision: u32,
-    /// Of all inputs.
-    pub fingerprint: Fingerprint,
-}
 
 /// What a framed file holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

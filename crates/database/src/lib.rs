@@ -18,13 +18,12 @@
 // A test that unwraps says by its line what failed.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+/// What files are stamped with.
+pub use engine::{Fingerprint, Stamp};
 mod error;
 pub use error::{DatabaseError, NotADatabase};
-mod fingerprint;
-pub use fingerprint::{Fingerprint, FingerprintBuilder};
 mod codec;
 mod frame;
-pub use frame::Stamp;
 mod tile_file;
 pub use tile_file::{decode_tile, encode_tile};
 mod curve_file;
@@ -42,7 +41,7 @@ mod page;
 pub use page::seal_page;
 mod manifest;
 pub use manifest::{
-    Area, FORMAT_VERSION, FileStamp, MadeFrom, Manifest, ManifestState, SourceRecord, TileRecord, TileState, Totals,
+    Area, FORMAT_VERSION, FileStamp, Manifest, ManifestState, SourceRecord, TileRecord, TileState, Totals,
 };
 mod report;
 pub use report::{
@@ -51,11 +50,7 @@ pub use report::{
     ReportStage, ReportStops, ReportTile, ReportVoids,
 };
 mod lock;
-mod publish;
-pub use lock::{Held, Lock};
-pub use publish::Writing;
-mod leases;
-pub use leases::{Claim, Lease, Leases};
+pub use lock::Lock;
 mod work;
 pub use work::{Share, ShareAllowance, Work};
 mod folder;

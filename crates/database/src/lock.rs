@@ -3,30 +3,19 @@
 //! The lock is the system's, on the file `lock`; the file itself means nothing and stays. Removing it would let one
 //! process hold the removed file and another a new one of the same name.
 
-use std::fs::{File, TryLockError, symlink_metadata};
 use std::path::Path;
 
-use crate::DatabaseError;
-use crate::folder::refuse_pipe;
+use engine::{Entry, Guard, Held, LockKind};
+
+use crate::{DatabaseError, Folder};
 
 /// The name of the file that is locked.
 pub(crate) const LOCK_NAME: &str = "lock";
 
-/// Who holds the lock of a database.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Held {
-    /// Nobody.
-    Free,
-    /// Processes that share the directory.
-    Shared,
-    /// One build.
-    Alone,
-}
-
 /// Held as long as this value lives; the system frees it when the process ends, however it ends.
 #[derive(Debug)]
 pub struct Lock {
-    _file: File,
+    _guard: Box<dyn Guard>,
 }
 
 impl Lock {
@@ -35,44 +24,29 @@ impl Lock {
     /// # Errors
     /// [`DatabaseError::Locked`] when another build holds it; others when the file cannot be made.
     pub fn acquire(dir: &Path) -> Result<Self, DatabaseError> {
-        Self::take(dir, File::try_lock)
+        Self::take(&Folder::new(dir), LockKind::Alone)
     }
 
-    /// Takes a share of the lock, without waiting: any number of processes may hold one, and no build beside them.
+    /// Takes it alone, or a share of it: any number of processes may hold one, and no build beside them.
     ///
     /// # Errors
     /// As [`Lock::acquire`].
-    pub fn share(dir: &Path) -> Result<Self, DatabaseError> {
-        Self::take(dir, File::try_lock_shared)
-    }
-
-    fn take(dir: &Path, lock: fn(&File) -> Result<(), TryLockError>) -> Result<Self, DatabaseError> {
-        let path = dir.join(LOCK_NAME);
-        let fault = |source| DatabaseError::from_io("lock", &path, 0, source);
+    pub(crate) fn take(folder: &Folder, kind: LockKind) -> Result<Self, DatabaseError> {
+        let (path, store) = (folder.path(LOCK_NAME), folder.store());
         // A link would have a file made wherever it leads.
-        if symlink_metadata(&path).is_ok_and(|found| !found.is_file()) {
+        if matches!(store.entry(&path), Ok(Entry::Folder | Entry::Other)) {
             return Err(DatabaseError::NotAFile { path });
         }
-        let file = File::options().create(true).append(true).open(&path).map_err(fault)?;
-        match lock(&file) {
-            Ok(()) => Ok(Self { _file: file }),
-            Err(TryLockError::WouldBlock) => Err(DatabaseError::Locked { path: dir.to_path_buf() }),
-            Err(TryLockError::Error(source)) => Err(fault(source)),
+        match store.lock(&path, kind) {
+            Ok(Some(guard)) => Ok(Self { _guard: guard }),
+            Ok(None) => Err(DatabaseError::Locked { path: folder.dir().to_path_buf() }),
+            Err(source) => Err(DatabaseError::from_io("lock", &path, 0, source)),
         }
     }
 
-    /// Who holds the lock of the database in `dir`. Makes no file, and keeps others out for an instant at most.
-    pub fn held(dir: &Path) -> Held {
-        let path = dir.join(LOCK_NAME);
-        let Some(file) = refuse_pipe(&path).ok().and_then(|()| File::open(path).ok()) else { return Held::Free };
-        if matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)) {
-            return Held::Alone;
-        }
-        let _ = file.unlock();
-        match file.try_lock() {
-            Err(TryLockError::WouldBlock) => Held::Shared,
-            _ => Held::Free,
-        }
+    /// Who holds the lock of a database. Makes no file, and keeps others out for an instant at most.
+    pub fn held(folder: &Folder) -> Held {
+        folder.store().held(&folder.path(LOCK_NAME))
     }
 }
 
@@ -90,20 +64,23 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let first = Lock::acquire(folder.path()).unwrap();
         let error = Lock::acquire(folder.path()).unwrap_err();
-        assert_eq!(Lock::held(folder.path()), Held::Alone);
-        assert!(Lock::share(folder.path()).unwrap_err().is_transient());
+        assert_eq!(Lock::held(&Folder::new(folder.path())), Held::Alone);
+        assert!(Lock::take(&Folder::new(folder.path()), LockKind::Shared).unwrap_err().is_transient());
         assert!(error.is_transient());
         assert!(error.to_string().starts_with(&folder.path().display().to_string()));
         drop(first);
-        assert_eq!(Lock::held(folder.path()), Held::Free);
+        assert_eq!(Lock::held(&Folder::new(folder.path())), Held::Free);
         Lock::acquire(folder.path()).unwrap();
     }
 
     #[test]
     fn many_may_share_it_and_none_has_it_alone_meanwhile() {
         let folder = tempfile::tempdir().unwrap();
-        let shares = [Lock::share(folder.path()).unwrap(), Lock::share(folder.path()).unwrap()];
-        assert_eq!(Lock::held(folder.path()), Held::Shared);
+        let shares = [
+            Lock::take(&Folder::new(folder.path()), LockKind::Shared).unwrap(),
+            Lock::take(&Folder::new(folder.path()), LockKind::Shared).unwrap(),
+        ];
+        assert_eq!(Lock::held(&Folder::new(folder.path())), Held::Shared);
         assert!(Lock::acquire(folder.path()).unwrap_err().is_transient());
         drop(shares);
         Lock::acquire(folder.path()).unwrap();

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use engine::Parts;
 use serde::{Deserialize, Serialize};
 use terrain::TileId;
 
@@ -118,7 +119,7 @@ pub struct TileRecord {
     pub fingerprint: Option<Fingerprint>,
     /// The same by parts, so that a later build can say what changed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub made_from: Option<MadeFrom>,
+    pub made_from: Option<Parts>,
     /// Its file in `tiles/`.
     pub tin: Option<FileStamp>,
     /// Its list of removals in `tiles/`, in clip mode.
@@ -156,24 +157,6 @@ impl TileRecord {
     pub fn tile(&self) -> TileId {
         TileId { row: self.row, col: self.col }
     }
-}
-
-/// What a tile was made from, each part as the first 16 hexadecimal digits of its fingerprint.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct MadeFrom {
-    /// The heights of its window.
-    pub heights: String,
-    /// The weights and classes of its window.
-    pub weights: String,
-    /// The points that the job gives for it: what it starts from, pins.
-    #[serde(default, skip_serializing_if = "String::is_empty")]
-    pub given: String,
-    /// What the job says of selecting and optimising, and the places of its border.
-    pub rules: String,
-    /// What it may spend.
-    pub allowance: String,
-    /// The border points it inherits.
-    pub borders: String,
 }
 
 /// How a tile stands.

@@ -3,12 +3,11 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
+use engine::is_temporary;
 use serde::Deserialize;
 
-use crate::database::list;
-use crate::folder::{MEASURED, MODULES, SURVEY, TILES, check_stamp, files, read};
+use crate::folder::{MEASURED, MODULES, SURVEY, TILES, check_stamp, files};
 use crate::page::check_page;
-use crate::publish::is_temporary;
 use crate::{DatabaseError, FileStamp, Folder, Manifest, curve_file, measured_file, removals_file, slm, tile_file};
 
 /// One file that is not as it should be.
@@ -48,7 +47,7 @@ impl Folder {
         let listed = self.listed_files(manifest);
         let mut damage = Vec::new();
         for (path, stamp) in &listed {
-            if let Err(error) = check_listed(path, stamp) {
+            if let Err(error) = self.check_listed(path, stamp) {
                 damage.push(Damage { path: path.clone(), error });
             }
         }
@@ -56,7 +55,7 @@ impl Folder {
         damage.extend(self.damage_of_reports());
         let known: BTreeSet<PathBuf> = listed.into_iter().map(|(path, _)| path).collect();
         for name in [TILES, MODULES, MEASURED, SURVEY] {
-            for path in list(&self.path(name))? {
+            for path in self.list(&self.path(name))? {
                 let temporary = path.file_name().is_some_and(|name| is_temporary(&name.to_string_lossy()));
                 if !known.contains(&path) && !temporary {
                     damage.push(Damage { path: path.clone(), error: DatabaseError::NotListed { path } });
@@ -75,10 +74,28 @@ impl Folder {
         let listed = self.listed_files(manifest);
         let mut files = 0;
         for name in [TILES, MODULES, MEASURED, SURVEY] {
-            files += list(&self.path(name))?.len();
+            files += self.list(&self.path(name))?.len();
         }
         let is_whole = |(path, stamp): &(PathBuf, FileStamp)| self.check_file(path, stamp).is_ok();
         Ok(files == listed.len() && listed.iter().all(is_whole) && self.damage_of_reports().is_empty())
+    }
+
+    /// Decodes first, because that names the section; a file that decodes may still be another than the one listed.
+    fn check_listed(&self, path: &Path, stamp: &FileStamp) -> Result<(), DatabaseError> {
+        let bytes = self.read(path)?;
+        match path.extension().and_then(|extension| extension.to_str()) {
+            Some("tin") => {
+                let (_, tile) = tile_file::decode_tile(path, &bytes)?;
+                let unsound = |fault| DatabaseError::UnsoundTin { path: path.to_path_buf(), fault };
+                tile.tin.check().map_err(unsound)?;
+            }
+            Some("slm") => drop(slm::decode_modules(path, &bytes)?),
+            Some("sums") => drop(measured_file::decode_measured(path, &bytes)?),
+            Some("curve") => drop(curve_file::decode_curve(path, &bytes)?),
+            Some("removed") => drop(removals_file::decode_removals(path, &bytes)?),
+            _ => {}
+        }
+        check_stamp(path, &bytes, stamp)
     }
 
     /// Reports that are not as they were written: `report.json` by its own checksum, the breaches by what it says of
@@ -89,7 +106,7 @@ impl Folder {
             Err(error) => (Beside::default(), Err(error)),
         };
         let page = self.path(files::REPORT_HTML);
-        let page = read(&page).and_then(|bytes| check_page(&page, &bytes));
+        let page = self.read(&page).and_then(|bytes| check_page(&page, &bytes));
         let listed = beside.files.iter().filter(|(name, _)| BREACHES.contains(&name.as_str()));
         let breaches = listed.map(|(name, stamp)| (name.as_str(), self.check_file(&self.path(name), stamp)));
         let found = |(name, checked)| match checked {
@@ -108,22 +125,4 @@ const BREACHES: [&str; 2] = [files::BREACHES, files::BREACHES_CSV];
 struct Beside {
     #[serde(default)]
     files: BTreeMap<String, FileStamp>,
-}
-
-/// Decodes first, because that names the section; a file that decodes may still be another than the one listed.
-fn check_listed(path: &Path, stamp: &FileStamp) -> Result<(), DatabaseError> {
-    let bytes = read(path)?;
-    match path.extension().and_then(|extension| extension.to_str()) {
-        Some("tin") => {
-            let (_, tile) = tile_file::decode_tile(path, &bytes)?;
-            let unsound = |fault| DatabaseError::UnsoundTin { path: path.to_path_buf(), fault };
-            tile.tin.check().map_err(unsound)?;
-        }
-        Some("slm") => drop(slm::decode_modules(path, &bytes)?),
-        Some("sums") => drop(measured_file::decode_measured(path, &bytes)?),
-        Some("curve") => drop(curve_file::decode_curve(path, &bytes)?),
-        Some("removed") => drop(removals_file::decode_removals(path, &bytes)?),
-        _ => {}
-    }
-    check_stamp(path, &bytes, stamp)
 }

@@ -7,16 +7,16 @@
 //! ```
 //! RUN names what the run is made from, so marks of another job or of other sources are never looked at.
 
-use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::Duration;
 
+use engine::{Durability, Leases, Marks, Store, remove_all};
 use serde::{Deserialize, Serialize};
 use terrain::TileId;
 
 use crate::folder::read;
-use crate::publish::{Durability, is_temporary, write_atomically};
-use crate::{DatabaseError, Fingerprint, Leases, json};
+use crate::{DatabaseError, json};
 
 const LEASES: &str = "leases";
 const DONE: &str = "done";
@@ -25,7 +25,9 @@ const SHARES: &str = "shares";
 /// The work folder of one run.
 #[derive(Clone, Debug)]
 pub struct Work {
+    store: Arc<dyn Store>,
     folder: PathBuf,
+    marks: Marks,
 }
 
 /// What one tile may spend, as processes hand it to one another.
@@ -60,8 +62,9 @@ impl Work {
     /// The folders in it.
     pub(crate) const FOLDERS: [&'static str; 3] = [LEASES, DONE, SHARES];
 
-    pub(crate) fn new(folder: PathBuf) -> Self {
-        Self { folder }
+    pub(crate) fn new(store: Arc<dyn Store>, folder: PathBuf) -> Self {
+        let marks = Marks::new(Arc::clone(&store), folder.join(DONE));
+        Self { store, folder, marks }
     }
 
     /// Removes the folder once the build is published, and the one of all runs if no other is left there. Any number of
@@ -70,50 +73,28 @@ impl Work {
         /// What another process takes meanwhile ends a try.
         const TRIES: usize = 5;
         for _ in 0..TRIES {
-            if fs::remove_dir_all(&self.folder).is_ok() || !self.folder.exists() {
+            if remove_all(&*self.store, &self.folder).is_ok() || !self.is_there() {
                 break;
             }
         }
         if let Some(all) = self.folder.parent() {
-            let _ = fs::remove_dir(all);
+            let _ = self.store.remove_folder(all);
         }
     }
 
     /// The leases, for the process that calls itself `holder`.
     pub fn leases(&self, holder: &str, expiry: Duration) -> Leases {
-        Leases::new(self.folder.join(LEASES), holder, expiry)
+        Leases::new(Arc::clone(&self.store), self.folder.join(LEASES), holder, expiry)
     }
 
-    /// Marks a unit of work, such as `refine-r02c03`, as done.
-    ///
-    /// # Errors
-    /// When the mark cannot be written.
-    pub fn mark(&self, unit: &str, fingerprint: Fingerprint) -> Result<(), DatabaseError> {
-        write_atomically(&self.done_path(unit), format!("{fingerprint}\n").as_bytes(), Durability::Later)
+    /// What is done.
+    pub fn marks(&self) -> &Marks {
+        &self.marks
     }
 
-    /// The fingerprint of what was published when a unit of work was done; `None` while it is not.
-    pub fn marked(&self, unit: &str) -> Option<Fingerprint> {
-        Fingerprint::from_hex(fs::read_to_string(self.done_path(unit)).ok()?.trim_end())
-    }
-
-    /// Takes a mark back: what was published turned out to be damaged.
-    pub fn unmark(&self, unit: &str) {
-        // If it cannot be removed, whoever trusts it finds the damage again.
-        let _ = fs::remove_file(self.done_path(unit));
-    }
-
-    /// Every unit of work that is marked, by name.
-    pub fn all_marked(&self) -> Vec<String> {
-        let entries = fs::read_dir(self.folder.join(DONE)).into_iter().flatten().flatten();
-        let names = entries.map(|entry| entry.file_name().to_string_lossy().into_owned());
-        let mut names: Vec<String> = names.filter(|name| !is_temporary(name)).collect();
-        names.sort();
-        names
-    }
-
-    fn done_path(&self, unit: &str) -> PathBuf {
-        self.folder.join(DONE).join(unit)
+    /// Whether the folder is there: it is swept away once the build is published.
+    pub fn is_there(&self) -> bool {
+        self.store.entry(&self.folder).is_ok()
     }
 
     /// Hands over what a tile may spend.
@@ -122,7 +103,9 @@ impl Work {
     /// When it cannot be written.
     pub fn write_share(&self, tile: TileId, share: &Share) -> Result<(), DatabaseError> {
         let path = self.share_path(tile);
-        write_atomically(&path, json::encode(&path, share)?.as_bytes(), Durability::Later)
+        let text = json::encode(&path, share)?;
+        let written = self.store.replace(&path, text.as_bytes(), Durability::Later);
+        written.map_err(|source| DatabaseError::from_io("write", &path, text.len() as u64, source))
     }
 
     /// What a tile may spend.
@@ -131,7 +114,7 @@ impl Work {
     /// When nobody has said so yet, or the file is damaged.
     pub fn read_share(&self, tile: TileId) -> Result<Share, DatabaseError> {
         let path = self.share_path(tile);
-        json::decode(&path, &read(&path)?)
+        json::decode(&path, &read(&*self.store, &path)?)
     }
 
     fn share_path(&self, tile: TileId) -> PathBuf {
@@ -154,17 +137,17 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let (database, _) = Database::join(&folder.path().join("a.tdb"), &samples::area()).unwrap();
         let work = database.work("run").unwrap();
-        assert_eq!(work.marked("refine-r00c01"), None);
+        assert_eq!(work.marks().marked("refine-r00c01"), None);
         let fingerprint = samples::stamp().fingerprint;
-        work.mark("refine-r00c01", fingerprint).unwrap();
-        assert_eq!(work.marked("refine-r00c01"), Some(fingerprint));
-        assert_eq!(work.all_marked(), ["refine-r00c01"]);
-        assert_eq!(database.work("other run").unwrap().marked("refine-r00c01"), None);
+        work.marks().mark("refine-r00c01", fingerprint).unwrap();
+        assert_eq!(work.marks().marked("refine-r00c01"), Some(fingerprint));
+        assert_eq!(work.marks().all(), ["refine-r00c01"]);
+        assert_eq!(database.work("other run").unwrap().marks().marked("refine-r00c01"), None);
         let share = Share { points: Some(7), rms_quanta: Some(0.1 + 0.2), allowance: None };
         work.write_share(samples::TILE, &share).unwrap();
         assert_eq!(work.read_share(samples::TILE).unwrap(), share);
-        work.unmark("refine-r00c01");
-        assert_eq!(work.marked("refine-r00c01"), None);
+        work.marks().unmark("refine-r00c01");
+        assert_eq!(work.marks().marked("refine-r00c01"), None);
         database.remove_work().unwrap();
         assert!(!work.path().exists() && work.read_share(samples::TILE).is_err());
     }
@@ -175,7 +158,7 @@ mod tests {
         let (database, _) = Database::join(&folder.path().join("a.tdb"), &samples::area()).unwrap();
         let (work, other) = (database.work("run").unwrap(), database.work("other run").unwrap());
         let fingerprint = samples::stamp().fingerprint;
-        (0..50).for_each(|unit| work.mark(&format!("unit-{unit}"), fingerprint).unwrap());
+        (0..50).for_each(|unit| work.marks().mark(&format!("unit-{unit}"), fingerprint).unwrap());
         std::thread::scope(|scope| (0..4).for_each(|_| drop(scope.spawn(|| work.sweep()))));
         assert!(!work.path().exists() && other.path().exists());
         other.sweep();

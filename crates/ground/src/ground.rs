@@ -57,15 +57,6 @@ pub struct Window {
 }
 
 impl Window {
-    /// What the job gives or forbids here; `None` where it does neither.
-    pub fn given_in_words(&self) -> Option<String> {
-        match (&self.given[..], &self.forbidden[..]) {
-            ([], []) => None,
-            (given, []) => Some(format!("{given:?}")),
-            (given, forbidden) => Some(format!("{given:?}, not {forbidden:?}")),
-        }
-    }
-
     /// What load modules of this rectangle are measured against.
     pub fn measured(&self, area: &GamingArea) -> fidelity::Ground<'_> {
         let spacing = area.frame.spacing;

@@ -12,6 +12,8 @@ mod given;
 pub use given::{Given, GivenPost, border_posts, chosen, posts_of_file, refused, start_posts};
 mod ground;
 pub use self::ground::{Ground, KEPT_POSTS_MAX, Window};
+mod key;
+pub use key::feed_post;
 mod large;
 pub use large::CACHE_BYTES_MAX;
 mod relief;

@@ -4,7 +4,8 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use compiler::{CompileError, run_name};
-use database::{Folder, Held, Lock, Manifest, ManifestState, TileRecord, TileState};
+use database::{Folder, Lock, Manifest, ManifestState, TileRecord, TileState};
+use engine::Held;
 use terrain::TileId;
 
 /// How one tile stands.
@@ -53,10 +54,10 @@ impl Status {
 pub fn status(folder: &Path) -> Result<Status, CompileError> {
     let folder = Folder::new(folder);
     let manifest = folder.manifest()?;
-    let held = Lock::held(folder.dir());
+    let held = Lock::held(&folder);
     let complete = manifest.state == ManifestState::Complete;
     let work = folder.work(&run_name(&manifest.job, &manifest.sources, manifest.algorithm_revision));
-    let marked: BTreeSet<String> = work.all_marked().into_iter().collect();
+    let marked: BTreeSet<String> = work.marks().all().into_iter().collect();
     let progress = |record: &TileRecord| match complete {
         true => finished(&folder, record),
         false if marked.contains(&format!("refine-{}", record.tile())) => TileProgress::Done,

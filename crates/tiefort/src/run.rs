@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use compiler::{Built, CompileError, Options, Plan, Stage};
-use database::{Database, Lease, Report, ReportStage, Work, files};
+use database::{Database, Report, ReportStage, Work, files};
+use engine::Lease;
 use job::Job;
 use serde_json::json;
 use views::{Align, BreachPlaces, Table, breaches_csv, breaches_geojson};

@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use database::Writing;
+use engine::Writing;
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
 

@@ -1,5 +1,7 @@
 //! Tests of a whole directory.
 
+use std::fs;
+
 use super::*;
 use crate::{TileState, samples};
 
@@ -98,7 +100,7 @@ fn opening_again_finds_the_database_and_removes_what_was_left_over() {
     assert!(matches!(previous, Previous::Database(found) if *found == manifest));
     assert!(left_over.iter().all(|path| !path.exists()));
     database.clear().unwrap();
-    assert!(list(&dir.join("tiles")).unwrap().is_empty() && !dir.join("database.json").exists());
+    assert!(fs::read_dir(dir.join("tiles")).unwrap().next().is_none() && !dir.join("database.json").exists());
 }
 
 #[test]
@@ -108,7 +110,7 @@ fn a_directory_that_is_not_ours_is_refused_and_left_alone() {
     let error = Database::create_or_open(folder.path(), &samples::area()).unwrap_err();
     assert!(matches!(&error, DatabaseError::NotOurFolder { found, .. } if found == "\"thesis.tex\" in it"), "{error}");
     assert!(error.hint().is_some());
-    assert_eq!(list(folder.path()).unwrap().len(), 1);
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
     let file = folder.path().join("thesis.tex");
     assert!(matches!(Database::create_or_open(&file, &samples::area()), Err(DatabaseError::NotOurFolder { .. })));
 }
@@ -198,4 +200,43 @@ fn a_fresh_build_of_the_same_values_has_the_same_bytes() {
         fs::read(folder.path().join(files::DATABASE)).unwrap()
     });
     assert_eq!(texts[0], texts[1]);
+}
+
+#[test]
+fn only_our_own_temporary_files_are_removed() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path().join("a.tdb");
+    let (database, _) = Database::create_or_open(&dir, &samples::area()).unwrap();
+    let before = fs::read_dir(&dir).unwrap().count();
+    for name in [".tiefort-abc.part", ".tiefort-abc", "other.part"] {
+        fs::write(dir.join(name), b"").unwrap();
+    }
+    database.sweep().unwrap();
+    assert!(!dir.join(".tiefort-abc.part").exists());
+    assert_eq!(fs::read_dir(&dir).unwrap().count(), before + 2);
+}
+
+#[test]
+fn a_folder_that_is_gone_is_an_error_with_the_path() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path().join("a.tdb");
+    let (database, _) = Database::create_or_open(&dir, &samples::area()).unwrap();
+    fs::remove_dir(dir.join("tiles")).unwrap();
+    let error = database.write_tile(&samples::stamp(), &samples::tile()).unwrap_err().to_string();
+    let path = database.folder().tile_path(samples::TILE);
+    assert!(error.starts_with(&format!("{}: cannot write: ", path.display())), "{error}");
+    assert!(!error.contains(".tiefort-"), "{error}");
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_is_named_as_such() {
+    use std::io::Write;
+    let path = Path::new("/dev/full");
+    let Ok(mut full) = fs::File::options().write(true).open(path) else {
+        eprintln!("skipped: no /dev/full on this system");
+        return;
+    };
+    let source = full.write_all(b"x").unwrap_err();
+    assert!(matches!(DatabaseError::from_io("write", path, 1, source), DatabaseError::DiskFull { .. }));
 }

@@ -7,7 +7,7 @@ use terrain::ModuleRect;
 
 use super::tins::OfTins;
 use compiler::ALGORITHM_REVISION;
-use compiler::modules_fingerprint;
+use compiler::modules_key;
 use compiler::rules;
 use compiler::{TileBudget, tile_refinement};
 use ground::GamingArea;
@@ -37,7 +37,8 @@ pub(crate) fn problems(
             thinned += 1;
             continue;
         }
-        let expected = modules_fingerprint(job, area, &|index| tins.stamps[index], &tins.removed, tile);
+        let key = modules_key(job, area, &|index| tins.stamps[index], &tins.removed, tile);
+        let expected = key.fingerprint();
         if *found != expected {
             problems.push(format!("modules/{tile}.slm: its fingerprint is not that of its TIN and its job"));
         }
@@ -66,7 +67,7 @@ fn other_rules(manifest: &Manifest, job: &Job, area: &GamingArea) -> Vec<String>
         };
         let budget = TileBudget { points: None, allowance: Some(allowance), rms_quanta: None };
         let expected = rules(&tile_refinement(job, area, tile, &budget, Vec::new()));
-        if record.made_from.as_ref().is_some_and(|made_from| made_from.rules != expected) {
+        if record.made_from.as_ref().is_some_and(|parts| parts.get("rules") != Some(&expected)) {
             problems.push(format!("database.json: tile {tile} was selected by other rules than those of its job"));
         }
     }

@@ -3,7 +3,8 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use database::{Held, Manifest};
+use database::Manifest;
+use engine::Held;
 use inspect::{Status, TileProgress};
 use views::{fold, grouped};
 

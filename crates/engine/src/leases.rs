@@ -9,12 +9,12 @@
 //! and comes back does no harm, because every task is idempotent; leases save work, they do not make results right.
 
 use std::collections::BTreeMap;
-use std::fs::{self, File};
-use std::io::{ErrorKind, Write};
+use std::io::ErrorKind;
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::Duration;
 
-use crate::DatabaseError;
+use crate::{Store, StoreError};
 
 /// What a lease says whose holder has given up.
 const FREE: &[u8] = b"free\n";
@@ -22,6 +22,7 @@ const FREE: &[u8] = b"free\n";
 /// The leases of one run, as one process sees them.
 #[derive(Debug)]
 pub struct Leases {
+    store: Arc<dyn Store>,
     folder: PathBuf,
     holder: String,
     expiry: Duration,
@@ -48,37 +49,38 @@ pub enum Claim {
 /// A lease that is ours until it goes unrenewed for too long.
 #[derive(Clone, Debug)]
 pub struct Lease {
+    store: Arc<dyn Store>,
     path: PathBuf,
     holder: String,
 }
 
 impl Leases {
     /// The leases in `folder` for the process that calls itself `holder`, a name that no other process has.
-    pub(crate) fn new(folder: PathBuf, holder: &str, expiry: Duration) -> Self {
-        Self { folder, holder: holder.to_owned(), expiry, seen: BTreeMap::new() }
+    pub fn new(store: Arc<dyn Store>, folder: PathBuf, holder: &str, expiry: Duration) -> Self {
+        Self { store, folder, holder: holder.to_owned(), expiry, seen: BTreeMap::new() }
     }
 
     /// Asks for the lease of `what` at the time `now` of this process's own clock.
     ///
     /// # Errors
     /// When the folder cannot be read or written.
-    pub fn claim(&mut self, what: &str, now: Duration) -> Result<Claim, DatabaseError> {
+    pub fn claim(&mut self, what: &str, now: Duration) -> Result<Claim, StoreError> {
         let mut number = self.seen.get(what).map_or(0, |seen| seen.number);
         loop {
             let path = self.folder.join(format!("{what}.{number}"));
-            let fault = |source| DatabaseError::from_io("write", &path, 0, source);
-            match File::options().write(true).create_new(true).open(&path) {
-                Ok(mut file) => {
-                    file.write_all(format!("{} 0\n", self.holder).as_bytes()).map_err(fault)?;
-                    return Ok(Claim::Ours(Lease { path, holder: self.holder.clone() }, 0 < number));
+            let content = format!("{} 0\n", self.holder);
+            match self.store.create_new(&path, content.as_bytes()) {
+                Ok(()) => {
+                    let lease = Lease { store: Arc::clone(&self.store), path, holder: self.holder.clone() };
+                    return Ok(Claim::Ours(lease, 0 < number));
                 }
                 // The folder is gone: somebody has published the build.
                 Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Claim::Held),
                 Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
-                Err(error) => return Err(fault(error)),
+                Err(error) => return Err(StoreError::new("write", &path, content.len(), error)),
             }
-            let has_successor = self.folder.join(format!("{what}.{}", number + 1)).exists();
-            if !has_successor && !self.is_over(what, number, fs::read(&path).unwrap_or_default(), now) {
+            let has_successor = self.store.entry(&self.folder.join(format!("{what}.{}", number + 1))).is_ok();
+            if !has_successor && !self.is_over(what, number, self.store.read(&path).unwrap_or_default(), now) {
                 return Ok(Claim::Held);
             }
             number += 1;
@@ -104,7 +106,7 @@ impl Lease {
     ///
     /// # Errors
     /// When the file cannot be written, or is gone because somebody has published the build.
-    pub fn renew(&self, count: u64) -> Result<(), DatabaseError> {
+    pub fn renew(&self, count: u64) -> Result<(), StoreError> {
         self.write(format!("{} {count}\n", self.holder).as_bytes())
     }
 
@@ -112,22 +114,32 @@ impl Lease {
     ///
     /// # Errors
     /// As [`Lease::renew`].
-    pub fn give_up(self) -> Result<(), DatabaseError> {
+    pub fn give_up(self) -> Result<(), StoreError> {
         self.write(FREE)
     }
 
-    fn write(&self, content: &[u8]) -> Result<(), DatabaseError> {
-        let fault = |source| DatabaseError::from_io("write", &self.path, content.len() as u64, source);
-        let mut file = File::options().write(true).truncate(true).open(&self.path).map_err(fault)?;
-        file.write_all(content).map_err(fault)
+    fn write(&self, content: &[u8]) -> Result<(), StoreError> {
+        let written = self.store.overwrite(&self.path, content);
+        written.map_err(|source| StoreError::new("write", &self.path, content.len(), source))
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Memory;
 
     const EXPIRY: Duration = Duration::from_secs(10);
+
+    fn store() -> Arc<dyn Store> {
+        let store = Memory::new();
+        store.make_folders("leases".as_ref()).unwrap();
+        Arc::new(store)
+    }
+
+    fn leases(store: &Arc<dyn Store>, name: &str) -> Leases {
+        Leases::new(Arc::clone(store), "leases".into(), name, EXPIRY)
+    }
 
     fn seconds(count: u64) -> Duration {
         Duration::from_secs(count)
@@ -148,8 +160,8 @@ mod tests {
 
     #[test]
     fn one_of_two_gets_it_and_a_renewed_lease_never_expires() {
-        let folder = tempfile::tempdir().unwrap();
-        let [mut one, mut two] = ["one", "two"].map(|name| Leases::new(folder.path().into(), name, EXPIRY));
+        let store = store();
+        let [mut one, mut two] = ["one", "two"].map(|name| leases(&store, name));
         let lease = ours(one.claim("refine-r00c00", seconds(5)).unwrap());
         // The other's clock is a year ahead, which means nothing.
         for step in 0..20 {
@@ -160,9 +172,8 @@ mod tests {
 
     #[test]
     fn a_silent_holder_loses_it_to_exactly_one_other() {
-        let folder = tempfile::tempdir().unwrap();
-        let [mut dead, mut two, mut three] =
-            ["dead", "two", "three"].map(|name| Leases::new(folder.path().into(), name, EXPIRY));
+        let store = store();
+        let [mut dead, mut two, mut three] = ["dead", "two", "three"].map(|name| leases(&store, name));
         ours(dead.claim("refine-r00c00", seconds(0)).unwrap());
         assert!(is_held(&mut two, 100) && is_held(&mut three, 500));
         assert!(is_held(&mut two, 109) && is_held(&mut three, 509));
@@ -174,8 +185,8 @@ mod tests {
 
     #[test]
     fn what_is_given_up_is_free_at_once() {
-        let folder = tempfile::tempdir().unwrap();
-        let [mut one, mut two] = ["one", "two"].map(|name| Leases::new(folder.path().into(), name, EXPIRY));
+        let store = store();
+        let [mut one, mut two] = ["one", "two"].map(|name| leases(&store, name));
         let lease = ours(one.claim("refine-r00c00", seconds(0)).unwrap());
         assert!(is_held(&mut two, 0));
         lease.give_up().unwrap();
@@ -185,8 +196,8 @@ mod tests {
 
     #[test]
     fn where_the_folder_is_gone_nothing_is_free() {
-        let folder = tempfile::tempdir().unwrap();
-        let mut one = Leases::new(folder.path().join("gone"), "one", EXPIRY);
+        let store = store();
+        let mut one = Leases::new(store, "gone".into(), "one", EXPIRY);
         assert!(is_held(&mut one, 0));
     }
 }

@@ -6,7 +6,6 @@
 use std::fmt;
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
-use terrain::{Dem, Importance, Post, PostRect};
 
 /// Bytes collected before they are hashed: long enough for the hash to use all its lanes.
 const BLOCK_BYTES: usize = 1 << 16;
@@ -111,43 +110,69 @@ impl FingerprintBuilder {
         self
     }
 
-    /// Adds a window of heights: where it lies, every height, which posts are void.
+    /// Adds a whole number that may be negative.
     #[must_use]
-    pub fn heights(mut self, dem: &Dem) -> Self {
-        let rect = dem.rect();
-        self.begin(b'h', rect.post_count());
-        self.rect(rect);
-        for row in rect.south..=rect.north {
-            self.put_all(dem.row(row), |height| height.to_le_bytes());
+    pub fn signed(self, number: i64) -> Self {
+        self.number(number as u64)
+    }
+
+    /// Adds a number, bit by bit.
+    #[must_use]
+    pub fn real(self, number: f64) -> Self {
+        self.number(number.to_bits())
+    }
+
+    /// Adds which of several cases it is.
+    #[must_use]
+    pub fn case(mut self, case: u8) -> Self {
+        self.begin(b'c', 1);
+        self.put(&[case]);
+        self
+    }
+
+    /// Adds what may be absent.
+    #[must_use]
+    pub fn maybe<T>(self, value: Option<T>, add: impl FnOnce(Self, T) -> Self) -> Self {
+        match value {
+            None => self.case(0),
+            Some(value) => add(self.case(1), value),
         }
-        self.put(&(dem.void_count() as u64).to_le_bytes());
-        if 0 < dem.void_count() {
-            self.put_posts(rect, |post| u8::from(dem.is_void(post)));
+    }
+
+    /// Adds a list: how many there are, then each.
+    #[must_use]
+    pub fn list<T>(self, values: impl ExactSizeIterator<Item = T>, add: impl Fn(Self, T) -> Self) -> Self {
+        let counted = self.number(values.len() as u64);
+        values.fold(counted, add)
+    }
+
+    /// Adds rows of values, as long as the first says, one after the other.
+    #[must_use]
+    pub fn rows<'a, T: Copy + 'a, const N: usize>(
+        mut self,
+        rows: impl ExactSizeIterator<Item = &'a [T]>,
+        to_bytes: impl Fn(T) -> [u8; N],
+    ) -> Self {
+        self.begin(b'r', rows.len());
+        for row in rows {
+            self.block.extend_from_slice(&(row.len() as u64).to_le_bytes());
+            self.block.extend(row.iter().flat_map(|&value| to_bytes(value)));
+            self.flush_full();
         }
         self
     }
 
-    /// Adds a window of weights and classes: where it lies, every weight, every class.
+    /// Adds `count` bytes, made one by one.
     #[must_use]
-    pub fn importance(mut self, importance: &Importance) -> Self {
-        let rect = importance.rect();
-        self.begin(b'i', rect.post_count());
-        self.rect(rect);
-        match importance.uniform_weight() {
-            Some(weight) => {
-                self.put(b"u");
-                self.put(&weight.to_le_bytes());
-            }
-            None => {
-                self.put(b"v");
-                for row in rect.south..=rect.north {
-                    if let Some(weights) = importance.weights_of_row(row) {
-                        self.put_all(weights, |weight| weight.to_le_bytes());
-                    }
-                }
-            }
+    pub fn stream(mut self, count: usize, mut bytes: impl Iterator<Item = u8>) -> Self {
+        self.begin(b's', count);
+        let mut left = count;
+        while 0 < left {
+            let now = left.min(BLOCK_BYTES);
+            self.block.extend(bytes.by_ref().take(now));
+            self.flush_full();
+            left -= now;
         }
-        self.put_posts(rect, |post| importance.class(post));
         self
     }
 
@@ -161,24 +186,6 @@ impl FingerprintBuilder {
     fn begin(&mut self, kind: u8, length: usize) {
         self.put(&[kind]);
         self.put(&(length as u64).to_le_bytes());
-    }
-
-    fn rect(&mut self, rect: PostRect) {
-        for line in [rect.south, rect.west, rect.north, rect.east] {
-            self.put(&line.to_le_bytes());
-        }
-    }
-
-    fn put_posts(&mut self, rect: PostRect, value: impl Fn(Post) -> u8) {
-        for row in rect.south..=rect.north {
-            self.block.extend((rect.west..=rect.east).map(|col| value(Post::new(row, col))));
-            self.flush_full();
-        }
-    }
-
-    fn put_all<T: Copy, const N: usize>(&mut self, values: &[T], to_bytes: impl Fn(T) -> [u8; N]) {
-        self.block.extend(values.iter().flat_map(|&value| to_bytes(value)));
-        self.flush_full();
     }
 
     fn put(&mut self, bytes: &[u8]) {
@@ -212,31 +219,29 @@ mod tests {
     }
 
     #[test]
-    fn every_height_counts_and_so_does_its_place() {
-        let rect = PostRect::of_size(200, 300);
-        let dem = |odd: Post| Dem::from_fn(rect, |post| Some(if post == odd { 1 } else { 0 }));
-        let flat = builder().heights(&dem(Post::new(-1, -1))).finish();
-        for odd in [Post::new(0, 0), Post::new(100, 17), Post::new(199, 299)] {
-            assert_ne!(flat, builder().heights(&dem(odd)).finish());
-        }
-        let moved = Dem::from_fn(PostRect::new(Post::new(1, 0), Post::new(200, 299)), |_| Some(0));
-        assert_ne!(flat, builder().heights(&moved).finish());
-        let holed = Dem::from_fn(rect, |post| (post != Post::new(5, 5)).then_some(0));
-        assert_ne!(flat, builder().heights(&holed).finish());
+    fn every_value_of_long_rows_counts() {
+        let rows = |odd: usize| {
+            let mut values = vec![7i32; 60_000];
+            values[odd] = 8;
+            builder().rows(values.chunks(300), i32::to_le_bytes).finish()
+        };
+        let all = [rows(0), rows(30_017), rows(59_999)];
+        assert!(all[0] != all[1] && all[1] != all[2] && all[0] != all[2]);
+        let flat = [7i32; 600];
+        assert_ne!(
+            builder().rows(flat.chunks(300), i32::to_le_bytes).finish(),
+            builder().rows(flat.chunks(200), i32::to_le_bytes).finish()
+        );
+        let stream = |odd: usize| builder().stream(200_000, (0..200_000).map(|at| u8::from(at == odd))).finish();
+        assert_ne!(stream(199_999), stream(200_000));
     }
 
     #[test]
-    fn every_weight_and_class_counts() {
-        let rect = PostRect::of_size(9, 9);
-        let mask = |weight, class| {
-            let (mut weights, mut classes) = (vec![8000; 81], vec![0; 81]);
-            (weights[40], classes[40]) = (weight, class);
-            builder().importance(&Importance::new(rect, weights, classes)).finish()
-        };
-        let uniform = builder().importance(&Importance::uniform(rect, 8000)).finish();
-        assert_eq!(mask(8000, 0), uniform);
-        assert_ne!(mask(1000, 0), uniform);
-        assert_ne!(mask(8000, 1), uniform);
+    fn what_is_absent_differs_from_every_value() {
+        let maybe = |value: Option<u64>| builder().maybe(value, FingerprintBuilder::number).finish();
+        assert!(maybe(None) != maybe(Some(0)) && maybe(Some(0)) != maybe(Some(1)));
+        let list = |values: &[u64]| builder().list(values.iter(), |b, &value| b.number(value)).number(3).finish();
+        assert_ne!(list(&[1, 2]), list(&[1, 2, 3]));
     }
 
     #[test]
@@ -250,8 +255,8 @@ mod tests {
     /// Changing what is hashed, or how, makes every published tile stale: do it knowingly.
     #[test]
     fn fingerprints_do_not_change_between_versions() {
-        let dem = Dem::from_fn(PostRect::of_size(3, 3), |post| Some(post.row * 10 + post.col));
-        let fingerprint = builder().number(1).heights(&dem).importance(&Importance::uniform(dem.rect(), 8000)).finish();
-        assert_eq!(&fingerprint.to_string()[..16], "603f85bcf120cf26");
+        let values = [1i32, 2, 3, 4];
+        let fingerprint = builder().number(1).case(2).text("a").rows(values.chunks(2), i32::to_le_bytes).finish();
+        assert_eq!(&fingerprint.to_string()[..16], "e543bbcd54a81e1d");
     }
 }

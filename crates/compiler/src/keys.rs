@@ -1,0 +1,202 @@
+//! What tiles are made from beside their ground, taken apart field by field: a new field does not compile until it is
+//! decided whether it counts.
+
+use engine::{Fingerprint, FingerprintBuilder, Key, Part};
+use ground::{GamingArea, Window, feed_post};
+use job::{Borders, ClipHeights, Edges, Job, LodBorder, LodSpec, ModulesSpec, OuterBorder};
+use limits::Allowance;
+use terrain::{LatticePoint, ModuleGrid, ModuleId, ModuleRect, SeamSides, TileId, Vertex};
+use tin::{CostUnit, Frame, LastBatch, Proximity, Rule, Stop, SurveyTask, TileTask};
+
+use crate::assemble::StampOf;
+use crate::refinement::{Most, Refinement};
+use crate::run::Run;
+
+/// What the job says of selecting and optimising, and the places of a tile's border.
+const RULES: Part = Part { name: "rules", changed: "what the job says of selecting changed" };
+/// What a tile may spend.
+const ALLOWANCE: Part = Part { name: "allowance", changed: "its allowance moved" };
+/// The border points that it inherits.
+const BORDERS: Part = Part { name: "borders", changed: "a neighbour's border changed" };
+/// How load modules are cut.
+const CUT: Part = Part { name: "cut", changed: "how load modules are cut changed" };
+/// The TINs that load modules are cut from.
+const TINS: Part = Part { name: "tins", changed: "a TIN changed" };
+/// The load modules that were measured.
+const MODULES: Part = Part { name: "modules", changed: "the load modules changed" };
+/// How they are measured.
+const MEASURE: Part = Part { name: "measure", changed: "what is measured changed" };
+
+/// Of a tile's TIN.
+pub(crate) fn tin(window: &Window, refinement: &Refinement, seeds: &[Vertex]) -> Key {
+    window
+        .key("tile")
+        .part(RULES, |part| feed_rules(part, refinement))
+        .part(ALLOWANCE, |part| feed_allowance(part, &refinement.task))
+        .part(BORDERS, |part| part.list(seeds.iter(), feed_vertex))
+}
+
+/// What the job says of selecting and optimising in a tile, as its record names it.
+pub fn rules(refinement: &Refinement) -> String {
+    let key = Key::new("tile").part(RULES, |part| feed_rules(part, refinement));
+    key.parts().remove(RULES.name).unwrap_or_default()
+}
+
+/// Of a tile's gain curve.
+pub(crate) fn curve(window: &Window, task: &SurveyTask) -> Key {
+    let SurveyTask { growth, owned, grid, cost } = task;
+    let ModuleGrid { rows, cols, side_cells } = *grid;
+    let unit = match cost {
+        CostUnit::Triangles => 0,
+        CostUnit::Points => 1,
+    };
+    window
+        .key("survey")
+        .part(RULES, |part| {
+            let part = feed_sides(feed_growth(part, growth), *owned).case(unit);
+            part.number(rows.into()).number(cols.into()).signed(side_cells.into())
+        })
+        .part(ALLOWANCE, |part| feed_allowance(part, growth))
+}
+
+/// Of a tile's load modules, from TINs without the points that `removed` lists per tile.
+pub fn modules(job: &Job, area: &GamingArea, stamps: &StampOf, removed: &[Vec<LatticePoint>], tile: TileId) -> Key {
+    let mut reach = match job.modules.edges {
+        Edges::Constrained => Vec::new(),
+        Edges::Clip(_) => area.tiling.neighbours(tile),
+    };
+    reach.push(tile);
+    let places: Vec<usize> = reach.into_iter().map(|other| area.tiling.index(other)).collect();
+    Key::new("modules")
+        .part(CUT, |part| {
+            let part = feed_modules(part, &job.modules);
+            part.maybe((1 < job.lod.level_count()).then_some(&job.lod), feed_levels)
+        })
+        .part(TINS, |part| {
+            part.list(places.into_iter(), |part, place| {
+                part.fingerprint(stamps(place).fingerprint).list(removed[place].iter(), feed_point)
+            })
+        })
+}
+
+/// Of what was measured of a tile's load modules.
+pub(crate) fn measured(run: &Run, modules: Fingerprint) -> Key {
+    let is_regular = match run.job.tiles.borders {
+        Borders::Inherit => 0,
+        Borders::Regular => 1,
+    };
+    // Beside the ground of the tile's own window, which its TIN is made from.
+    let between = if run.ground.relief.has_posts_between() { &run.records[..] } else { &[] };
+    Key::new("measured").known(MODULES, modules).part(MEASURE, |part| {
+        let part = part.number(run.job.importance.classes.len() as u64).case(is_regular);
+        part.list(between.iter(), |part, record| part.fingerprint(record.blake3))
+    })
+}
+
+fn feed_rules(builder: FingerprintBuilder, refinement: &Refinement) -> FingerprintBuilder {
+    let Refinement { task, optimising, most } = refinement;
+    let builder = feed_growth(builder, task).list(task.kept.iter(), feed_post);
+    let builder = builder.maybe(*optimising, |builder, optimising| {
+        let job::Optimising { effort, height_fit, lattice } = optimising;
+        let effort = match effort {
+            job::Effort::Fast => 0,
+            job::Effort::Normal => 1,
+            job::Effort::Best => 2,
+        };
+        let height_fit = match height_fit {
+            job::HeightFit::Squares => 0,
+            job::HeightFit::SquaresKeepCrests => 1,
+            job::HeightFit::Off => 2,
+        };
+        let lattice = match lattice {
+            job::Lattice::Eighth => 0,
+            job::Lattice::Post => 1,
+        };
+        builder.case(effort).case(height_fit).case(lattice)
+    });
+    match most {
+        Most::AsTask => builder.case(0),
+        Most::Triangles(triangles) => builder.case(1).number(*triangles as u64),
+    }
+}
+
+/// What tiles have in common. What one inherits and starts from is fed as its borders and with its window.
+fn feed_growth(builder: FingerprintBuilder, task: &TileTask) -> FingerprintBuilder {
+    let TileTask { tile: _, rect: _, frame: _, border, inherited: _, kept: _, start: _, seams, rule, stop } = task;
+    let Stop { points: _, value, rms_quanta: _ } = stop;
+    let builder = match rule {
+        Rule::WorstFirst => builder.case(0),
+        Rule::LargestSquares { guard } => builder.case(1).maybe(*guard, FingerprintBuilder::number),
+        Rule::Batches { residual_quantum, proximity, last_batch } => {
+            let last_batch = match last_batch {
+                LastBatch::Truncate => 0,
+                LastBatch::Finish => 1,
+            };
+            let builder = builder.case(2).number((*residual_quantum).into()).case(last_batch);
+            builder.maybe(*proximity, |builder, Proximity { posts, quanta }| builder.real(posts).number(quanta.into()))
+        }
+    };
+    feed_sides(builder.maybe(*value, FingerprintBuilder::number), *seams).list(border.iter(), feed_post)
+}
+
+fn feed_allowance(builder: FingerprintBuilder, task: &TileTask) -> FingerprintBuilder {
+    let Stop { points, value: _, rms_quanta } = task.stop;
+    let builder = builder.maybe(points, |builder, points| builder.number(points as u64));
+    let builder = builder.maybe(rms_quanta, FingerprintBuilder::real);
+    match &task.frame {
+        Frame::Plain => builder.case(0),
+        Frame::Corners { side_cells } => builder.case(1).signed((*side_cells).into()),
+        Frame::Sides { side_cells, south_west: ModuleId { row, col }, allowance } => {
+            let Allowance { modules, module_room, windows, window_size: (high, wide), window_room, triangles } =
+                allowance;
+            let builder = builder.case(2).signed((*side_cells).into()).number((*row).into()).number((*col).into());
+            let builder = feed_module_rect(feed_module_rect(builder, *modules), *windows);
+            let builder = builder.number((*high).into()).number((*wide).into()).number((*triangles).into());
+            builder.rows([&module_room[..], &window_room[..]].into_iter(), u32::to_le_bytes)
+        }
+    }
+}
+
+fn feed_modules(builder: FingerprintBuilder, modules: &ModulesSpec) -> FingerprintBuilder {
+    let ModulesSpec { side_m, side_quanta, border_step_m, border_step_cells, outer_border, edges } = modules;
+    let outer_border = match outer_border {
+        OuterBorder::Refined => 0,
+        OuterBorder::Fixed => 1,
+    };
+    let edges = match edges {
+        Edges::Constrained => 0,
+        Edges::Clip(ClipHeights::Coplanar) => 1,
+        Edges::Clip(ClipHeights::Dem) => 2,
+    };
+    let builder = builder.real(*side_m).number((*side_quanta).into()).real(*border_step_m);
+    builder.signed((*border_step_cells).into()).case(outer_border).case(edges)
+}
+
+fn feed_levels(builder: FingerprintBuilder, lod: &LodSpec) -> FingerprintBuilder {
+    let LodSpec { inner_shares, border } = lod;
+    let border = match border {
+        LodBorder::Full => 0,
+        LodBorder::Own => 1,
+    };
+    builder.list(inner_shares.iter(), |builder, share| builder.real(*share)).case(border)
+}
+
+fn feed_sides(builder: FingerprintBuilder, sides: SeamSides) -> FingerprintBuilder {
+    let SeamSides { south, east, north, west } = sides;
+    [south, east, north, west].into_iter().fold(builder, |builder, is_open| builder.case(u8::from(is_open)))
+}
+
+fn feed_module_rect(builder: FingerprintBuilder, rect: ModuleRect) -> FingerprintBuilder {
+    let ModuleRect { south, west, north, east } = rect;
+    [south, west, north, east].into_iter().fold(builder, |builder, line| builder.number(line.into()))
+}
+
+fn feed_point(builder: FingerprintBuilder, point: &LatticePoint) -> FingerprintBuilder {
+    let LatticePoint { row, col } = *point;
+    builder.signed(row.into()).signed(col.into())
+}
+
+fn feed_vertex(builder: FingerprintBuilder, vertex: &Vertex) -> FingerprintBuilder {
+    let Vertex { at, height } = vertex;
+    feed_point(builder, at).signed((*height).into())
+}
