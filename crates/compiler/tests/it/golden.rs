@@ -4,9 +4,9 @@ use std::fs;
 use std::path::PathBuf;
 
 use compiler::ALGORITHM_REVISION;
-use database::{
-    Fingerprint, FingerprintBuilder, Folder, Stamp, TileModules, encode_levels, encode_removals, encode_tile,
-};
+use database::{Fingerprint, Folder, Stamp, TileModules, encode_levels, encode_removals, encode_tile};
+
+use engine::FingerprintBuilder;
 
 use crate::modes;
 

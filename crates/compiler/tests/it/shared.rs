@@ -6,7 +6,7 @@ use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 use compiler::{CompileError, Options, Sharing, Unit, UnitEnd};
-use database::Lease;
+use engine::Lease;
 use job::Job;
 use terrain::TileId;
 

@@ -35,7 +35,7 @@ fn build_and_stop(scene: &Scene, stage: Stage, tiles: usize, workers: usize) {
     assert!(error.is_stopped() && error.hint().is_some(), "{error}");
     assert!(error.to_string().contains(stage.name()), "{error}");
     let status = inspect::status(&scene.path("area")).unwrap();
-    assert!(!status.is_complete() && status.held == database::Held::Free);
+    assert!(!status.is_complete() && status.held == engine::Held::Free);
     let verdict = inspect::verify(&scene.path("area"), None).unwrap();
     assert!(verdict.problems.iter().any(|problem| problem.contains("incomplete")), "{:?}", verdict.problems);
     let measured = inspect::fidelity(&scene.path("area"), None, Sights::USUAL);
@@ -101,8 +101,8 @@ fn a_second_build_of_a_folder_at_work_is_told_to_try_again() {
     let first = scene.build("area", 1);
     let error = scene.try_build("area", 1).unwrap_err();
     assert!(error.is_transient() && error.hint().is_some(), "{error}");
-    assert_eq!(inspect::status(&scene.path("area")).unwrap().held, database::Held::Alone);
+    assert_eq!(inspect::status(&scene.path("area")).unwrap().held, engine::Held::Alone);
     drop(first);
-    assert_eq!(inspect::status(&scene.path("area")).unwrap().held, database::Held::Free);
+    assert_eq!(inspect::status(&scene.path("area")).unwrap().held, engine::Held::Free);
     drop(scene.build("area", 1));
 }
