@@ -1,4 +1,4 @@
-//! What the compiler cannot check: who may use whom, sizes, headers, leftovers.
+//! What the compiler cannot check: who may use whom, sizes, headers, leftovers, links.
 //!
 //! It reads the project as text, and trusts rustfmt: a function ends at the brace below the line it begins on.
 
@@ -240,6 +240,22 @@ fn both_tables_list_the_crates_of_the_workspace() {
 }
 
 #[test]
+fn the_drawing_of_the_layers_is_the_table_from_the_top_down() {
+    let layers = Layers::read();
+    let text = fs::read_to_string(root().join("crates/ARCHITECTURE.md")).unwrap();
+    let drawing = text.lines().skip_while(|line| *line != "## Layers").skip_while(|line| *line != "```text").skip(1);
+    let rows = drawing.take_while(|line| *line != "```").map(|line| line.split_whitespace().collect::<Vec<_>>());
+    let mut drawn: Vec<Vec<&str>> = rows.collect();
+    drawn.iter_mut().for_each(|row| row.sort_unstable());
+    drawn.reverse();
+    let mut listed: Vec<Vec<&str>> = vec![Vec::new(); drawn.len()];
+    for (name, &layer) in &layers.of {
+        listed.get_mut(layer).expect("as many rows as layers").push(name);
+    }
+    assert_eq!(drawn, listed);
+}
+
+#[test]
 fn every_arrow_points_down() {
     let layers = Layers::read();
     let mut faults = Vec::new();
@@ -393,6 +409,78 @@ fn nothing_is_left_over() {
         for (place, line) in text.program().iter().enumerate() {
             let found = BANNED_IN_PROGRAMS.iter().filter(|word| code_of(line).contains(*word) && !allowed(word));
             faults.extend(found.map(|word| text.at(place, word)));
+        }
+    }
+    expect_none(faults);
+}
+
+/// Endings of programs that documents name by their paths.
+const PROGRAMS: [&str; 6] = [".rs", ".py", ".sh", ".c", ".mjs", ".js"];
+
+/// The lines of a document outside blocks of code, with their places.
+fn prose(text: &Text) -> impl Iterator<Item = (usize, &str)> {
+    let mut is_code = false;
+    let outside = move |(_, line): &(usize, &str)| {
+        let is_fence = line.trim_start().starts_with("```");
+        is_code ^= is_fence;
+        !is_code && !is_fence
+    };
+    text.lines.iter().map(String::as_str).enumerate().filter(outside)
+}
+
+/// Where the links of a line lead.
+fn links(line: &str) -> impl Iterator<Item = &str> {
+    line.split("](").skip(1).filter_map(|rest| rest.split(')').next())
+}
+
+fn documents() -> Vec<Text> {
+    let mut texts = texts();
+    texts.retain(|text| text.path.extension().is_some_and(|ending| ending == "md"));
+    texts
+}
+
+#[test]
+fn links_of_documents_lead_to_files_that_exist() {
+    let mut faults = Vec::new();
+    for text in documents() {
+        let folder = root().join(text.path.parent().unwrap());
+        for (place, line) in prose(&text) {
+            let files = links(line).filter(|link| !link.contains("://") && !link.starts_with('#'));
+            let lost = files.filter(|link| !folder.join(link.split('#').next().unwrap()).exists());
+            faults.extend(lost.map(|link| text.at(place, format!("{link} is not there"))));
+        }
+    }
+    expect_none(faults);
+}
+
+#[test]
+fn programs_that_documents_name_exist() {
+    let mut faults = Vec::new();
+    for text in documents() {
+        for (place, line) in prose(&text) {
+            let quoted = line.split('`').skip(1).step_by(2);
+            let named = quoted.filter(|word| word.contains('/') && PROGRAMS.iter().any(|end| word.ends_with(end)));
+            let lost = named.filter(|word| !["", "crates"].iter().any(|from| root().join(from).join(word).exists()));
+            faults.extend(lost.map(|word| text.at(place, format!("{word} is not there"))));
+        }
+    }
+    expect_none(faults);
+}
+
+#[test]
+fn every_decision_stands_in_the_index_under_its_number() {
+    let folder = root().join("docs/decisions");
+    let index = fs::read_to_string(folder.join("README.md")).unwrap();
+    let mut faults = Vec::new();
+    let names = fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
+    let mut names: Vec<String> = names.filter(|name| name != "README.md").collect();
+    names.sort();
+    for (name, number) in names.iter().zip(1..) {
+        let page = fs::read_to_string(folder.join(name)).unwrap();
+        let title = page.lines().next().unwrap_or_default().trim_start_matches("# ");
+        let row = format!("- [{number:04}]({name}) {title}");
+        if index.lines().filter(|line| *line == row).count() != 1 {
+            faults.push(format!("docs/decisions/README.md: found no line of its own `{row}`"));
         }
     }
     expect_none(faults);
