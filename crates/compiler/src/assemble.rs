@@ -8,16 +8,13 @@ use load_modules::{ClipHeights, Layout, clip, concatenate};
 use terrain::{HOLE_CLASS, LATTICE_PER_POST, LatticePoint, LoadModule, Post, PostRect, TileId, Tin, Vertex};
 
 use crate::assembled::{Assembled, ModuleNumbers};
-use crate::keys;
+use crate::keys::{self, StampOf};
 use crate::levels::all_levels;
 use crate::measured::{from_measured, to_measured};
 use crate::refine::Published;
 use crate::run::{ALGORITHM_REVISION, Run};
 use crate::sums::{Adding, Sums};
 use crate::{CompileError, Progress, Stage};
-
-/// What the published TIN of a tile was made from, by the tile's place.
-pub(crate) type StampOf<'a> = dyn Fn(usize) -> Stamp + Sync + 'a;
 
 /// Assembles every tile.
 pub(crate) fn assemble(

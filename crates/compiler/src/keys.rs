@@ -1,16 +1,18 @@
 //! What tiles are made from beside their ground, taken apart field by field: a new field does not compile until it is
 //! decided whether it counts.
 
-use engine::{Fingerprint, FingerprintBuilder, Key, Part};
+use engine::{Fingerprint, FingerprintBuilder, Key, Part, Stamp};
 use ground::{GamingArea, Window, feed_post};
 use job::{Borders, ClipHeights, Edges, Job, LodBorder, LodSpec, ModulesSpec, OuterBorder};
 use limits::Allowance;
 use terrain::{LatticePoint, ModuleGrid, ModuleId, ModuleRect, SeamSides, TileId, Vertex};
 use tin::{CostUnit, Frame, LastBatch, Proximity, Rule, Stop, SurveyTask, TileTask};
 
-use crate::assemble::StampOf;
 use crate::refinement::{Most, Refinement};
 use crate::run::Run;
+
+/// What the published TIN of a tile was made from, by the tile's place.
+pub(crate) type StampOf<'a> = dyn Fn(usize) -> Stamp + Sync + 'a;
 
 /// What the job says of selecting and optimising, and the places of a tile's border.
 const RULES: Part = Part { name: "rules", changed: "what the job says of selecting changed" };

@@ -7,8 +7,8 @@ use engine::{Durability, Entry, LockKind, Stamp, check_writable, is_temporary, r
 use serde::Serialize;
 use terrain::{GainCurve, LoadModule, TileTin};
 
-use crate::folder::{MEASURED, MODULES, SURVEY, TILES, WORK, files};
 use crate::lock::LOCK_NAME;
+use crate::names::{MEASURED, MODULES, SURVEY, TILES, WORK, files};
 use crate::{
     Area, DatabaseError, FileStamp, Folder, Lock, Manifest, ManifestState, Measured, Removals, TileModules, Work,
     encode_curve, encode_levels, encode_measured, encode_removals, encode_tile, json,

@@ -9,7 +9,7 @@ use load_module_reader::ReadError;
 use terrain::{LoadModuleFault, ModuleId, TinFault};
 use thiserror::Error as ThisError;
 
-use crate::folder::{MODULES, SURVEY, TILES, WORK, files};
+use crate::names::{MODULES, SURVEY, TILES, WORK, files};
 
 /// Why a file of ours could not be written, or not be believed when read.
 #[derive(Debug, ThisError)]

@@ -8,40 +8,12 @@ use serde::de::DeserializeOwned;
 use terrain::{GainCurve, LoadModule, TileId, TileTin};
 
 use crate::frame::{FRAME_BYTES, Kind};
+use crate::names::{MEASURED, MODULES, SURVEY, TILES, WORK, files};
+use crate::read::{check_stamp, read, refuse_other};
 use crate::{
-    DatabaseError, FileStamp, Manifest, Measured, NotADatabase, Removals, Report, Stamp, TileModules, Work, codec,
-    curve_file, frame, json, measured_file, removals_file, slm, tile_file,
+    DatabaseError, FileStamp, Manifest, Measured, NotADatabase, Removals, Report, Stamp, TileModules, Work, curve_file,
+    frame, json, measured_file, removals_file, slm, tile_file,
 };
-
-/// Names of files inside the directory.
-pub mod files {
-    /// What is there; written last.
-    pub const DATABASE: &str = "database.json";
-    /// What a run found.
-    pub const REPORT: &str = "report.json";
-    /// The same for a browser.
-    pub const REPORT_HTML: &str = "report.html";
-    /// Limits that could not be met, on a map.
-    pub const BREACHES: &str = "breaches.geojson";
-    /// The same as a table.
-    pub const BREACHES_CSV: &str = "breaches.csv";
-    /// What each tile may spend.
-    pub const ALLOCATION: &str = "survey/allocation.json";
-}
-
-/// Folder of the tiles' TINs.
-pub(crate) const TILES: &str = "tiles";
-/// Folder of the load modules.
-pub(crate) const MODULES: &str = "modules";
-/// Folder of what was measured of them.
-pub(crate) const MEASURED: &str = "measured";
-/// Folder of the survey.
-pub(crate) const SURVEY: &str = "survey";
-/// Folder of leases and marks, gone at the end of a build.
-pub(crate) const WORK: &str = "work";
-
-/// Bytes of the longest file that is read: the longest payload and its frame.
-const FILE_BYTES_MAX: u64 = codec::PAYLOAD_BYTES_MAX + FRAME_BYTES as u64;
 
 /// The directory of a database, to read from. Holds no file open and no lock.
 #[derive(Clone, Debug)]
@@ -291,41 +263,6 @@ impl Folder {
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(Vec::new()),
             listed => listed.map_err(|source| DatabaseError::from_io("list", folder, 0, source)),
         }
-    }
-}
-
-/// Whether `bytes`, read from `path`, are those that `stamp` promises.
-pub(crate) fn check_stamp(path: &Path, bytes: &[u8], stamp: &FileStamp) -> Result<(), DatabaseError> {
-    let (path, section) = (path.to_path_buf(), "whole file, against database.json");
-    let found = FileStamp::of(bytes);
-    if found.length != stamp.length {
-        return Err(DatabaseError::WrongLength { path, section, found: found.length, expected: stamp.length });
-    }
-    if found.blake3 != stamp.blake3 {
-        let (found, expected) = (found.blake3.to_string(), stamp.blake3.to_string());
-        return Err(DatabaseError::WrongChecksum { path, section, found, expected });
-    }
-    Ok(())
-}
-
-/// All of a file, unless it is longer than any of ours.
-pub(crate) fn read(store: &dyn Store, path: &Path) -> Result<Vec<u8>, DatabaseError> {
-    let fault = |source| DatabaseError::from_io("read", path, 0, source);
-    let found = match store.target(path).map_err(fault)? {
-        Entry::File(bytes) => bytes,
-        Entry::Folder | Entry::Other => return Err(DatabaseError::NotAFile { path: path.to_path_buf() }),
-    };
-    if FILE_BYTES_MAX < found {
-        return Err(DatabaseError::TooLarge { path: path.to_path_buf(), found, limit: FILE_BYTES_MAX });
-    }
-    store.read(path).map_err(fault)
-}
-
-/// Refuses what is there and no file: a pipe would wait for a writer, and a device may have no end.
-pub(crate) fn refuse_other(store: &dyn Store, path: &Path) -> Result<(), DatabaseError> {
-    match store.target(path) {
-        Ok(Entry::Folder | Entry::Other) => Err(DatabaseError::NotAFile { path: path.to_path_buf() }),
-        _ => Ok(()),
     }
 }
 

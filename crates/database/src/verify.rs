@@ -6,8 +6,9 @@ use std::path::{Path, PathBuf};
 use engine::is_temporary;
 use serde::Deserialize;
 
-use crate::folder::{MEASURED, MODULES, SURVEY, TILES, check_stamp, files};
+use crate::names::{MEASURED, MODULES, SURVEY, TILES, files};
 use crate::page::check_page;
+use crate::read::check_stamp;
 use crate::{DatabaseError, FileStamp, Folder, Manifest, curve_file, measured_file, removals_file, slm, tile_file};
 
 /// One file that is not as it should be.

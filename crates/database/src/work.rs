@@ -15,7 +15,7 @@ use engine::{Durability, Leases, Marks, Store, remove_all};
 use serde::{Deserialize, Serialize};
 use terrain::TileId;
 
-use crate::folder::read;
+use crate::read::read;
 use crate::{DatabaseError, json};
 
 const LEASES: &str = "leases";

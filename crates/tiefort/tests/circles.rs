@@ -12,11 +12,6 @@ use std::path::Path;
 
 /// Circles that are still there: a crate, and the files that reach each other. The list may only become shorter.
 const KNOWN: &[(&str, &str)] = &[
-    (
-        "database",
-        "curve_file error folder frame json leases manifest measured_file publish removals_file report slm tile_file \
-        work",
-    ),
     ("exports", "geotiff overviews"),
     ("geometry", "scan scan/squares"),
     ("job", "files read"),

@@ -25,7 +25,7 @@ const TESTS_READ_BACK: [(&str, &str); 2] = [("compiler", "inspect"), ("compiler"
 const OWNED_LIBRARIES: [(&str, &[&str]); 11] = [
     ("rayon", &["schedule"]),
     ("crossbeam", &["schedule"]),
-    ("serde", &["database"]),
+    ("serde", &["engine", "database"]),
     ("bincode", &["database"]),
     ("serde_json", &["database", "compiler", "inspect", "views", "exports", "tiefort"]),
     ("clap", &["tiefort"]),
@@ -65,7 +65,10 @@ const OWNED_WORDS: [(&str, &[&str]); 10] = [
     ("std::env::", &["tiefort"]),
     ("thread::spawn", &["schedule", "tiefort"]),
     ("thread::scope", &["schedule"]),
-    ("std::fs", &["tiefort", "database", "source-files", "job", "load-module-reader", "load-module-reader-c"]),
+    (
+        "std::fs",
+        &["tiefort", "engine", "database", "source-files", "job", "load-module-reader", "load-module-reader-c"],
+    ),
 ];
 
 /// Where functions are tables of cases, longer than code may be: a row for every message of the job reader.

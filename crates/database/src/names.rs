@@ -1,0 +1,28 @@
+//! Names of files and folders inside a database's directory.
+
+/// Names of files inside the directory.
+pub mod files {
+    /// What is there; written last.
+    pub const DATABASE: &str = "database.json";
+    /// What a run found.
+    pub const REPORT: &str = "report.json";
+    /// The same for a browser.
+    pub const REPORT_HTML: &str = "report.html";
+    /// Limits that could not be met, on a map.
+    pub const BREACHES: &str = "breaches.geojson";
+    /// The same as a table.
+    pub const BREACHES_CSV: &str = "breaches.csv";
+    /// What each tile may spend.
+    pub const ALLOCATION: &str = "survey/allocation.json";
+}
+
+/// Folder of the tiles' TINs.
+pub(crate) const TILES: &str = "tiles";
+/// Folder of the load modules.
+pub(crate) const MODULES: &str = "modules";
+/// Folder of what was measured of them.
+pub(crate) const MEASURED: &str = "measured";
+/// Folder of the survey.
+pub(crate) const SURVEY: &str = "survey";
+/// Folder of leases and marks, gone at the end of a build.
+pub(crate) const WORK: &str = "work";
