@@ -1,7 +1,5 @@
 //! A whole gaming area, on one page.
 
-use std::path::Path;
-
 use database::{Database, Folder, Manifest, ManifestState, Previous, Report, TileState, Work};
 use ground::{GamingArea, Ground};
 use job::Job;
@@ -40,7 +38,13 @@ pub struct Built {
 /// # Errors
 /// When the job cannot be met by any build, a source cannot be used, or the database cannot be written; what
 /// was published before stays as it is.
-pub fn build(job: &Job, folder: &Path, options: &Options, progress: &mut dyn Progress) -> Result<Built, CompileError> {
+pub fn build(
+    job: &Job,
+    folder: impl Into<Folder>,
+    options: &Options,
+    progress: &mut dyn Progress,
+) -> Result<Built, CompileError> {
+    let folder = &folder.into();
     if !options.fresh
         && let Some(built) = unchanged(job, folder, progress)?
     {
@@ -85,7 +89,7 @@ fn stages(run: Run, progress: &mut dyn Progress) -> Result<Built, CompileError> 
 /// Everything a run stands on: the plan, the sources, the locked database. Nothing is changed yet.
 pub(crate) fn open<'a>(
     job: &'a Job,
-    folder: &Path,
+    folder: &Folder,
     options: &Options<'a>,
     progress: &mut dyn Progress,
 ) -> Result<Run<'a>, CompileError> {
@@ -120,15 +124,14 @@ pub(crate) fn open_with<'a>(
 
 /// The finished database in `folder`, if a build of `job` would change nothing in it: made from the same job and the
 /// same sources by the same revision, every tile whole, every file with its bytes. Nothing is decoded for that.
-fn unchanged(job: &Job, folder: &Path, progress: &mut dyn Progress) -> Result<Option<Built>, CompileError> {
-    let there = Folder::new(folder);
+fn unchanged(job: &Job, there: &Folder, progress: &mut dyn Progress) -> Result<Option<Built>, CompileError> {
     if !there.manifest().is_ok_and(|manifest| might_be_fresh(&manifest, job)) {
         return Ok(None);
     }
     GamingArea::new(job)?;
     progress.tell(Event::Enter(Stage::Read, 0));
     let records = ground::records(job)?;
-    let (database, _) = Database::create_or_open(folder, &database_area(job))?;
+    let (database, _) = Database::create_or_open(there, &database_area(job))?;
     // Looked at again, now that nobody else can change it.
     let manifest = there.manifest()?;
     let report = there.report();

@@ -1,7 +1,6 @@
 //! One tile again: the same task, and what its changed border reaches.
 
 use std::collections::BTreeSet;
-use std::path::Path;
 
 use database::{Database, DatabaseError, Folder, Manifest, Report, TileRecord};
 use engine::{Artifact, Cause, Outcome};
@@ -44,14 +43,15 @@ pub struct Rebuilt {
 /// As `build`; when there is no such tile, no finished database, or it was built from another job.
 pub fn rebuild_tile(
     job: &Job,
-    folder: &Path,
+    folder: impl Into<Folder>,
     tile: TileId,
     release_borders: bool,
     options: &Options,
     progress: &mut dyn Progress,
 ) -> Result<Rebuilt, CompileError> {
     // Nothing is created where there is nothing to go on from.
-    Folder::new(folder).manifest()?;
+    let folder = &folder.into();
+    folder.manifest()?;
     let run = open(job, folder, options, progress)?;
     let mut frozen = refuse_unfinished(&run, folder, tile)?;
     let shares = published_shares(&run, progress)?;
@@ -123,7 +123,7 @@ fn stale(run: &Run, shares: &Shares, tins: &[Published], reached: &[(TileId, boo
 }
 
 /// Tiles that are frozen already; a refusal when there is nothing whole to go on from.
-fn refuse_unfinished(run: &Run, folder: &Path, tile: TileId) -> Result<Vec<TileId>, CompileError> {
+fn refuse_unfinished(run: &Run, folder: &Folder, tile: TileId) -> Result<Vec<TileId>, CompileError> {
     let tiling = &run.area.tiling;
     if !tiling.contains(tile) {
         return Err(CompileError::Impossible {
@@ -139,7 +139,7 @@ fn refuse_unfinished(run: &Run, folder: &Path, tile: TileId) -> Result<Vec<TileI
     };
     // A build that was stopped may have left tiles of two different grounds side by side.
     if manifest.state != database::ManifestState::Complete && !is_whole_but(run, manifest, tile) {
-        return Err(CompileError::Unfinished { path: folder.display().to_string() });
+        return Err(CompileError::Unfinished { path: folder.dir().display().to_string() });
     }
     let job = run.job.canonical_text();
     if !deciding_lines(&manifest.job).eq(deciding_lines(&job)) {
@@ -148,7 +148,7 @@ fn refuse_unfinished(run: &Run, folder: &Path, tile: TileId) -> Result<Vec<TileI
             || "one has more lines than the other".to_owned(),
             |(theirs, ours)| format!("`{theirs}` there, `{ours}` here"),
         );
-        return Err(CompileError::OtherJob { path: folder.display().to_string(), difference });
+        return Err(CompileError::OtherJob { path: folder.dir().display().to_string(), difference });
     }
     let is_frozen = |record: &&database::TileRecord| record.state == database::TileState::Frozen;
     Ok(manifest.tiles.iter().filter(is_frozen).map(database::TileRecord::tile).collect())

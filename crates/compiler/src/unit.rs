@@ -8,7 +8,6 @@
 //! makes what is not, so whatever went wrong before, the result is that of a build.
 
 use std::collections::BTreeMap;
-use std::path::Path;
 use std::sync::Arc;
 
 use database::{Database, Folder, Lock, Manifest, ManifestState, Share, ShareAllowance, Work};
@@ -89,11 +88,11 @@ impl<'a> Session<'a> {
     /// Joins the build of `job` in `folder`, or begins it.
     pub fn join(
         job: &'a Job,
-        folder: &Path,
+        folder: &Folder,
         options: &Options<'a>,
         progress: &mut dyn Progress,
     ) -> Result<Self, CompileError> {
-        let is_shared = Lock::held(&Folder::new(folder)) == Held::Shared;
+        let is_shared = Lock::held(folder) == Held::Shared;
         let run = open_with(job, options, progress, |area| Database::join(folder, area))?;
         let canonical = job.canonical_text();
         let is_ours = |manifest: &&Manifest| {
@@ -109,7 +108,7 @@ impl<'a> Session<'a> {
                 if there.report().is_ok() { Standing::Finished } else { Standing::Unreported }
             }
             None if is_shared && run.previous.as_ref().is_some_and(is_under_way) => {
-                return Err(CompileError::OtherRun { path: folder.display().to_string() });
+                return Err(CompileError::OtherRun { path: folder.dir().display().to_string() });
             }
             _ => {
                 run.database.begin(&beginning(&run))?;
@@ -165,7 +164,8 @@ impl<'a> Session<'a> {
     pub fn perform(&self, unit: Unit, progress: &mut dyn Progress) -> Result<(), CompileError> {
         let missing = self.needs(unit).into_iter().find(|&need| self.work.marks().marked(&need.name()).is_none());
         if let Some(need) = missing {
-            return Err(CompileError::NotReady { unit: unit.name(), needs: need.name() });
+            // A mark that a computer without power has left empty is there, but says nothing.
+            return Err(self.spoilt(unit, need));
         }
         let (stage, tile) = unit.stage();
         if let Some(tile) = tile {
@@ -269,12 +269,12 @@ pub enum UnitEnd {
 /// As a build; [`CompileError::NotReady`] when what one needs is not done yet, which is worth trying again.
 pub fn perform(
     job: &Job,
-    folder: &Path,
+    folder: impl Into<Folder>,
     units: &[Unit],
     options: &Options,
     progress: &mut dyn Progress,
 ) -> Result<UnitEnd, CompileError> {
-    let session = Session::join(job, folder, options, progress)?;
+    let session = Session::join(job, &folder.into(), options, progress)?;
     if session.standing == Standing::Finished {
         return Ok(UnitEnd::Finished);
     }

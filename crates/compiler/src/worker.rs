@@ -5,10 +5,9 @@
 //! process that was only slow. No clock is looked at here: the caller says what time it is.
 
 use std::collections::BTreeSet;
-use std::path::Path;
 use std::time::Duration;
 
-use database::ManifestState;
+use database::{Folder, ManifestState};
 use engine::{Claim, Lease, Leases};
 use job::Job;
 
@@ -52,12 +51,12 @@ const RENEWALS: u32 = 4;
 /// As a build. What other workers do is not affected.
 pub fn work(
     job: &Job,
-    folder: &Path,
+    folder: impl Into<Folder>,
     options: &Options,
     sharing: &Sharing,
     progress: &mut dyn Progress,
 ) -> Result<WorkerEnd, CompileError> {
-    let session = Session::join(job, folder, options, progress)?;
+    let session = Session::join(job, &folder.into(), options, progress)?;
     if session.standing == Standing::Finished {
         session.work.sweep();
         return Ok(WorkerEnd { units: 0, published: None });
@@ -118,7 +117,7 @@ impl Worker<'_, '_> {
 
     /// A unit that is ready and now ours; the last one once all others are done.
     fn next(&mut self) -> Result<Option<(Unit, Lease)>, CompileError> {
-        let marked: BTreeSet<String> = self.session.work.marks().all().into_iter().collect();
+        let marked: BTreeSet<String> = self.session.work.marks().all()?.into_iter().collect();
         let is_done = |unit: &Unit| marked.contains(&unit.name());
         self.open.retain(|unit| !is_done(unit));
         let mut ready: Vec<Unit> = match self.open.is_empty() {

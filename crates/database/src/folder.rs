@@ -22,9 +22,21 @@ pub struct Folder {
     dir: PathBuf,
 }
 
-impl<T: Into<PathBuf>> From<T> for Folder {
-    fn from(dir: T) -> Self {
+impl From<&Path> for Folder {
+    fn from(dir: &Path) -> Self {
         Self::new(dir)
+    }
+}
+
+impl From<&PathBuf> for Folder {
+    fn from(dir: &PathBuf) -> Self {
+        Self::new(dir)
+    }
+}
+
+impl From<&Folder> for Folder {
+    fn from(folder: &Folder) -> Self {
+        folder.clone()
     }
 }
 

@@ -141,7 +141,7 @@ mod tests {
         let fingerprint = samples::stamp().fingerprint;
         work.marks().mark("refine-r00c01", fingerprint).unwrap();
         assert_eq!(work.marks().marked("refine-r00c01"), Some(fingerprint));
-        assert_eq!(work.marks().all(), ["refine-r00c01"]);
+        assert_eq!(work.marks().all().unwrap(), ["refine-r00c01"]);
         assert_eq!(database.work("other run").unwrap().marks().marked("refine-r00c01"), None);
         let share = Share { points: Some(7), rms_quanta: Some(0.1 + 0.2), allowance: None };
         work.write_share(samples::TILE, &share).unwrap();

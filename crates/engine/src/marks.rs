@@ -1,5 +1,6 @@
 //! Which units of work are done, among processes that share a store.
 
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -40,11 +41,17 @@ impl Marks {
         let _ = self.store.remove(&self.path(unit));
     }
 
-    /// Every unit of work that is marked, by ascending name.
-    pub fn all(&self) -> Vec<String> {
-        let paths = self.store.list(&self.folder).unwrap_or_default();
+    /// Every unit of work that is marked, by ascending name; none once the folder is swept away.
+    ///
+    /// # Errors
+    /// When the folder cannot be listed.
+    pub fn all(&self) -> Result<Vec<String>, StoreError> {
+        let paths = match self.store.list(&self.folder) {
+            Err(error) if error.kind() == ErrorKind::NotFound => Vec::new(),
+            listed => listed.map_err(|source| StoreError::new("list", &self.folder, 0, source))?,
+        };
         let name = |path: &Path| path.file_name().map(|name| name.to_string_lossy().into_owned());
-        paths.iter().filter_map(|path| name(path)).filter(|name| !is_temporary(name)).collect()
+        Ok(paths.iter().filter_map(|path| name(path)).filter(|name| !is_temporary(name)).collect())
     }
 
     fn path(&self, unit: &str) -> PathBuf {

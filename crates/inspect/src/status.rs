@@ -57,7 +57,7 @@ pub fn status(folder: &Path) -> Result<Status, CompileError> {
     let held = Lock::held(&folder);
     let complete = manifest.state == ManifestState::Complete;
     let work = folder.work(&run_name(&manifest.job, &manifest.sources, manifest.algorithm_revision));
-    let marked: BTreeSet<String> = work.marks().all().into_iter().collect();
+    let marked: BTreeSet<String> = work.marks().all()?.into_iter().collect();
     let progress = |record: &TileRecord| match complete {
         true => finished(&folder, record),
         false if marked.contains(&format!("refine-{}", record.tile())) => TileProgress::Done,

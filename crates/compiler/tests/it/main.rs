@@ -27,6 +27,7 @@ mod random_jobs;
 mod read_back;
 mod real_ground;
 mod shared;
+mod simulated;
 mod soundness;
 mod stopped;
 mod water_and_holes;
