@@ -149,7 +149,9 @@ impl Worker<'_, '_> {
             Err(CompileError::NotReady { .. }) => {
                 // What it builds on was damaged, and is made again first.
                 self.open = self.session.units();
-                Ok(lease.give_up()?)
+                // Where this cannot be said, because the build was published meanwhile or otherwise, it expires.
+                let _ = lease.give_up();
+                Ok(())
             }
             // Whoever published the build has swept away what this process was writing.
             Err(_) if self.is_published() => Ok(()),

@@ -1,6 +1,6 @@
 //! A database's directory, for writing: made or found, locked, and never half-written.
 
-use std::io::ErrorKind;
+use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 
 use engine::{Durability, Entry, LockKind, Stamp, check_writable, is_temporary, remove_all};
@@ -122,12 +122,16 @@ impl Database {
     /// # Errors
     /// When its folders cannot be made.
     pub fn work(&self, run: &str) -> Result<Work, DatabaseError> {
-        let work = self.folder.path(WORK);
-        make_folder(&self.folder, &work)?;
-        make_folder(&self.folder, &work.join(run))?;
-        for name in Work::FOLDERS {
-            make_folder(&self.folder, &work.join(run).join(name))?;
-        }
+        let (work, own) = (self.folder.path(WORK), self.folder.path(WORK).join(run));
+        let inside = Work::FOLDERS.map(|name| own.join(name));
+        let folders: Vec<&PathBuf> = [&work, &own].into_iter().chain(&inside).collect();
+        let make = |path: &&PathBuf| match self.folder.store().make_folder(path) {
+            Err(error) if error.kind() != ErrorKind::AlreadyExists => Err(error),
+            _ => Ok(()),
+        };
+        again(|| folders.iter().try_for_each(make))
+            .map_err(|source| DatabaseError::from_io("create", &own, 0, source))?;
+        folders.into_iter().try_for_each(|path| check_folder(&self.folder, path))?;
         Ok(self.folder.work(run))
     }
 
@@ -281,7 +285,7 @@ impl Database {
     }
 
     fn write(&self, path: &Path, bytes: &[u8], durability: Durability) -> Result<(), DatabaseError> {
-        let written = self.folder.store().replace(path, bytes, durability);
+        let written = again(|| self.folder.store().replace(path, bytes, durability));
         written.map_err(|source| DatabaseError::from_io("write", path, bytes.len() as u64, source))
     }
 
@@ -328,6 +332,19 @@ fn examine(folder: &Folder, area: &Area) -> Result<Previous, DatabaseError> {
         }
     }
     Ok(damage.map_or(Previous::Nothing, Previous::Damaged))
+}
+
+/// Does what fails where another process sweeps up at the same moment, and takes a temporary file or a folder of
+/// `work/` away: once more, a few times.
+fn again<R>(mut done: impl FnMut() -> io::Result<R>) -> io::Result<R> {
+    const TRIES: usize = 5;
+    for _ in 1..TRIES {
+        match done() {
+            Err(error) if error.kind() == ErrorKind::NotFound => {}
+            done => return done,
+        }
+    }
+    done()
 }
 
 /// Makes a folder inside the database, unless it is there.

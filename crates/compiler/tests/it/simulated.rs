@@ -99,24 +99,20 @@ fn finish(end: compiler::WorkerEnd) {
     }
 }
 
-/// All that the runs of a campaign stand on.
-struct Kits {
-    kits: Vec<Kit>,
-    other: Kit,
-}
+/// All that the runs of a campaign stand on: jobs of several kinds, each with another one of the same area.
+struct Kits(Vec<[Kit; 2]>);
 
 impl Kits {
     fn new() -> Self {
         let small = |size, tiles, tin: &str| Words { size, tiles, tin: tin.into(), ..Words::sample() };
         let clip = "edges = \"clip\"".to_owned();
-        let paper = "method = \"paper\"\npoints = 60";
         let words = [
             small((4, 4), (2, 2), "method = \"greedy\"\nallocation = \"equal\""),
             small((2, 6), (1, 3), "method = \"greedy\"\nallocation = \"global\""),
-            Words { modules: clip, ..small((4, 2), (2, 1), paper) },
+            Words { modules: clip, ..small((4, 2), (2, 1), "method = \"paper\"\npoints = 60") },
         ];
-        let other = Words { dem: "source = \"sample\"\nseed = 2".into(), ..words[0].clone() };
-        Self { kits: words.iter().map(Kit::new).collect(), other: Kit::new(&other) }
+        let other = |words: &Words| Words { dem: "source = \"sample\"\nseed = 2".into(), ..words.clone() };
+        Self(words.iter().map(|words| [Kit::new(words), Kit::new(&other(words))]).collect())
     }
 }
 
@@ -132,7 +128,7 @@ struct Told {
 /// One run.
 fn simulate(kits: &Kits, seed: u64) -> Result<Told, String> {
     let mut random = fastrand::Rng::with_seed(seed);
-    let kit = &kits.kits[random.usize(..kits.kits.len())];
+    let [kit, other] = &kits.0[random.usize(..kits.0.len())];
     let workers = random.usize(1..=5);
     let rate = |random: &mut fastrand::Rng| [0, 30, 100, 400][random.usize(..4)];
     let faults = match random.u8(..4) {
@@ -148,7 +144,7 @@ fn simulate(kits: &Kits, seed: u64) -> Result<Told, String> {
     let is_calm = faults == Faults { stall: faults.stall, ..Faults::default() };
     let world = World::new(random.u64(..), workers, faults);
     match random.u8(..4) {
-        0 => put(world.memory(), &kits.other.files),
+        0 => put(world.memory(), &other.files),
         1 => put(world.memory(), &half(&kit.files, &mut random)),
         _ => {}
     }
@@ -157,7 +153,7 @@ fn simulate(kits: &Kits, seed: u64) -> Result<Told, String> {
     let (told, stop) = (Mutex::new(Told::default()), AtomicBool::new(false));
     std::thread::scope(|scope| {
         for at in 0..workers {
-            let job = if stranger && at == 0 { &kits.other.scene.job } else { &kit.scene.job };
+            let job = if stranger && at == 0 { &other.scene.job } else { &kit.scene.job };
             let process =
                 Process { faulty: world.worker(at), job, builds: builder && at == 1, told: &told, stop: &stop };
             scope.spawn(move || process.run(at));
