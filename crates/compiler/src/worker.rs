@@ -56,18 +56,42 @@ pub fn work(
     sharing: &Sharing,
     progress: &mut dyn Progress,
 ) -> Result<WorkerEnd, CompileError> {
-    let session = Session::join(job, &folder.into(), options, progress)?;
+    let (folder, mut units) = (folder.into(), 0);
+    loop {
+        let session = Session::join(job, &folder, options, progress)?;
+        match share(session, options, sharing, progress)? {
+            Shift::Ended(end) => return Ok(WorkerEnd { units: units + end.units, ..end }),
+            Shift::Swept(done) => units += done,
+        }
+    }
+}
+
+/// How a worker's part in a build ended.
+enum Shift {
+    /// The build is published.
+    Ended(WorkerEnd),
+    /// Another process published it and swept up while a third one, which had looked at the folder just before, began
+    /// it again. So many units were done.
+    Swept(usize),
+}
+
+fn share(
+    session: Session,
+    options: &Options,
+    sharing: &Sharing,
+    progress: &mut dyn Progress,
+) -> Result<Shift, CompileError> {
     if session.standing == Standing::Finished {
         session.work.sweep();
-        return Ok(WorkerEnd { units: 0, published: None });
+        return Ok(Shift::Ended(WorkerEnd { units: 0, published: None }));
     }
     let mut worker = Worker {
         open: if session.standing == Standing::UnderWay { session.units() } else { Vec::new() },
         leases: session.work.leases(sharing.name, sharing.lease),
         sharing,
+        job: session.run.job.canonical_text(),
         session,
         units: 0,
-        job: job.canonical_text(),
     };
     loop {
         if options.stop.load(std::sync::atomic::Ordering::Relaxed) {
@@ -77,15 +101,16 @@ pub fn work(
         if worker.is_published() {
             // Whoever published may have been ended before it swept up.
             worker.session.work.sweep();
-            return Ok(WorkerEnd { units: worker.units, published: None });
+            return Ok(Shift::Ended(WorkerEnd { units: worker.units, published: None }));
         }
         let next = match worker.next() {
+            _ if !worker.session.work.is_there() && !worker.is_published() => return Ok(Shift::Swept(worker.units)),
             // It was published and swept meanwhile.
             Err(_) if worker.is_published() => continue,
             next => next?,
         };
         match next {
-            Some((Unit::Publish, lease)) => return worker.publish(&lease, progress),
+            Some((Unit::Publish, lease)) => return Ok(Shift::Ended(worker.publish(&lease, progress)?)),
             Some((unit, lease)) => worker.perform(unit, lease, progress)?,
             None => (sharing.wait)(sharing.pause),
         }
@@ -154,7 +179,7 @@ impl Worker<'_, '_> {
                 Ok(())
             }
             // Whoever published the build has swept away what this process was writing.
-            Err(_) if self.is_published() => Ok(()),
+            Err(_) if self.is_published() || !self.session.work.is_there() => Ok(()),
             Err(error) => {
                 // Others may have it at once; if that cannot be said either, the lease expires.
                 let _ = lease.give_up();
