@@ -51,6 +51,8 @@ struct State {
 struct Worker {
     is_dead: bool,
     has_left: bool,
+    /// Whether it has gone on since it was last given the turn.
+    is_at_work: bool,
     /// Until when it waits.
     until: Duration,
 }
@@ -151,7 +153,18 @@ impl Faulty {
 
     fn turn<'a>(&self, state: MutexGuard<'a, State>) -> MutexGuard<'a, State> {
         let is_others = |state: &mut State| state.turn != self.worker;
-        self.world.turn.wait_while(state, is_others).unwrap_or_else(PoisonError::into_inner)
+        let mut state = self.world.turn.wait_while(state, is_others).unwrap_or_else(PoisonError::into_inner);
+        state.workers[self.worker].is_at_work = true;
+        state
+    }
+
+    /// Gives the turn to another, unless it was given to this one before it came to ask for it.
+    fn pass_on(&self, state: &mut State) {
+        if state.turn == self.worker && state.workers[self.worker].is_at_work {
+            state.workers[self.worker].is_at_work = false;
+            state.pass_on();
+            self.world.turn.notify_all();
+        }
     }
 
     /// Lets others go on, and says what becomes of the next operation once it is this one's turn again.
@@ -160,10 +173,7 @@ impl Faulty {
         if state.workers[self.worker].is_dead {
             return Err(dead());
         }
-        if state.turn == self.worker {
-            state.pass_on();
-            self.world.turn.notify_all();
-        }
+        self.pass_on(&mut state);
         let mut state = self.turn(state);
         // It may have ended while it waited.
         if state.workers[self.worker].is_dead {
@@ -175,8 +185,7 @@ impl Faulty {
         if state.happens(faults.stall) {
             let passes = Duration::from_millis(state.random.u64(..STALL_MAX.as_millis() as u64));
             state.workers[self.worker].until = state.now + passes;
-            state.pass_on();
-            self.world.turn.notify_all();
+            self.pass_on(&mut state);
             state = self.turn(state);
             if state.workers[self.worker].is_dead {
                 return Err(dead());
@@ -235,10 +244,7 @@ impl Clock for Faulty {
             return;
         }
         state.workers[self.worker].until = state.now + time;
-        if state.turn == self.worker {
-            state.pass_on();
-            self.world.turn.notify_all();
-        }
+        self.pass_on(&mut state);
         drop(self.turn(state));
     }
 }

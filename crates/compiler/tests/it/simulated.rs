@@ -295,7 +295,7 @@ fn the_campaign_finds_nothing() {
 #[test]
 fn the_same_seed_gives_the_same_run() {
     let kits = Kits::new();
-    for seed in 0..20 {
+    for seed in 0..60 {
         let [one, two] = [simulate(&kits, seed), simulate(&kits, seed)]
             .map(|run| run.map(|told| (told.faults, told.processes, told.errors)));
         assert_eq!(one, two, "seed {seed}");
