@@ -5,9 +5,10 @@
 //! process that was only slow. No clock is looked at here: the caller says what time it is.
 
 use std::collections::BTreeSet;
+use std::io::ErrorKind;
 use std::time::Duration;
 
-use database::{Folder, ManifestState};
+use database::{DatabaseError, Folder, ManifestState};
 use engine::{Claim, Lease, Leases};
 use job::Job;
 
@@ -140,6 +141,13 @@ impl Worker<'_, '_> {
         })
     }
 
+    /// Whether an error says that what processes leave for one another was swept away. It may be there again already.
+    fn is_swept(&self, error: &CompileError) -> bool {
+        let Some(all) = self.session.work.path().parent() else { return false };
+        matches!(error, CompileError::Database(DatabaseError::Io { path, source, .. })
+            if source.kind() == ErrorKind::NotFound && path.starts_with(all))
+    }
+
     /// A unit that is ready and now ours; the last one once all others are done.
     fn next(&mut self) -> Result<Option<(Unit, Lease)>, CompileError> {
         let marked: BTreeSet<String> = self.session.work.marks().all()?.into_iter().collect();
@@ -179,7 +187,7 @@ impl Worker<'_, '_> {
                 Ok(())
             }
             // Whoever published the build has swept away what this process was writing.
-            Err(_) if self.is_published() || !self.session.work.is_there() => Ok(()),
+            Err(error) if self.is_published() || self.is_swept(&error) => Ok(()),
             Err(error) => {
                 // Others may have it at once; if that cannot be said either, the lease expires.
                 let _ = lease.give_up();

@@ -33,7 +33,8 @@ pub const STALL_MAX: Duration = Duration::from_secs(120);
 pub struct World {
     memory: Memory,
     state: Mutex<State>,
-    turn: Condvar,
+    /// One for each worker.
+    turns: Vec<Condvar>,
 }
 
 #[derive(Debug)]
@@ -79,9 +80,10 @@ impl World {
     pub fn new(seed: u64, workers: usize, faults: Faults) -> Arc<Self> {
         let mut random = Rng::with_seed(seed);
         let turn = random.usize(..workers);
+        let turns = (0..workers).map(|_| Condvar::new()).collect();
         let workers = vec![Worker::default(); workers];
         let state = State { random, faults, now: Duration::ZERO, turn, workers, count: 0 };
-        Arc::new(Self { memory: Memory::new(), state: Mutex::new(state), turn: Condvar::new() })
+        Arc::new(Self { memory: Memory::new(), state: Mutex::new(state), turns })
     }
 
     /// The store of one of its workers.
@@ -147,13 +149,13 @@ impl Faulty {
     pub fn leave(&self) {
         let mut state = self.turn(self.world.state());
         state.workers[self.worker].has_left = true;
-        state.pass_on();
-        self.world.turn.notify_all();
+        self.pass_on(&mut state);
     }
 
     fn turn<'a>(&self, state: MutexGuard<'a, State>) -> MutexGuard<'a, State> {
         let is_others = |state: &mut State| state.turn != self.worker;
-        let mut state = self.world.turn.wait_while(state, is_others).unwrap_or_else(PoisonError::into_inner);
+        let mut state =
+            self.world.turns[self.worker].wait_while(state, is_others).unwrap_or_else(PoisonError::into_inner);
         state.workers[self.worker].is_at_work = true;
         state
     }
@@ -163,7 +165,7 @@ impl Faulty {
         if state.turn == self.worker && state.workers[self.worker].is_at_work {
             state.workers[self.worker].is_at_work = false;
             state.pass_on();
-            self.world.turn.notify_all();
+            self.world.turns[state.turn].notify_one();
         }
     }
 

@@ -13,7 +13,7 @@ use database::{Folder, files};
 use engine::{Clock, Durability, Faults, Faulty, Memory, Store, World};
 use job::Job;
 
-use crate::scene::{Scene, Silent, Words};
+use crate::scene::{Scene, Silent, Words, sample_dem};
 
 /// Where the database lies.
 const DIR: &str = "/share/area.tdb";
@@ -35,8 +35,10 @@ struct Kit {
 }
 
 impl Kit {
-    fn new(words: &Words) -> Self {
-        let (scene, memory) = (Scene::new(words), Memory::new());
+    fn new(words: &Words, seed: u64) -> Self {
+        // Made once, so that a run need not make it again.
+        let dem = sample_dem(words.grid(), seed);
+        let (scene, memory) = (Scene::on(words, &dem), Memory::new());
         work(&scene.job, &memory).unwrap();
         let files = memory.all(Path::new(DIR));
         Self { scene, files }
@@ -104,15 +106,14 @@ struct Kits(Vec<[Kit; 2]>);
 
 impl Kits {
     fn new() -> Self {
-        let small = |size, tiles, tin: &str| Words { size, tiles, tin: tin.into(), ..Words::sample() };
+        let small = |size, tiles, tin: &str| Words { size, tiles, tin: tin.into(), ..Words::raster() };
         let clip = "edges = \"clip\"".to_owned();
         let words = [
             small((4, 4), (2, 2), "method = \"greedy\"\nallocation = \"equal\""),
             small((2, 6), (1, 3), "method = \"greedy\"\nallocation = \"global\""),
             Words { modules: clip, ..small((4, 2), (2, 1), "method = \"paper\"\npoints = 60") },
         ];
-        let other = |words: &Words| Words { dem: "source = \"sample\"\nseed = 2".into(), ..words.clone() };
-        Self(words.iter().map(|words| [Kit::new(words), Kit::new(&other(words))]).collect())
+        Self(words.iter().map(|words| [1, 2].map(|seed| Kit::new(words, seed))).collect())
     }
 }
 
