@@ -1,0 +1,50 @@
+//! Residuals of many load modules together, in 128 bits.
+
+use database::MeasuredTally;
+use terrain::{ModuleResidual, QUANTA_PER_METRE};
+
+/// Residuals of many load modules together. Nothing that a file can hold makes them wrap.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Total {
+    pub posts: u128,
+    pub largest: u32,
+    pub sum_abs: u128,
+    pub sum_squared: u128,
+}
+
+impl Total {
+    pub fn of(residuals: impl Iterator<Item = ModuleResidual>) -> Self {
+        residuals.fold(Self::default(), |sum, one| Self {
+            posts: sum.posts + u128::from(one.posts),
+            largest: sum.largest.max(one.largest),
+            sum_abs: sum.sum_abs + u128::from(one.sum_abs),
+            sum_squared: sum.sum_squared + u128::from(one.sum_squared),
+        })
+    }
+
+    pub fn of_tallies(tallies: &[MeasuredTally]) -> Self {
+        tallies.iter().fold(Self::default(), |sum, one| Self {
+            posts: sum.posts + u128::from(one.posts),
+            largest: sum.largest.max(one.largest),
+            sum_abs: sum.sum_abs + u128::from(one.sum_abs),
+            sum_squared: sum.sum_squared.saturating_add(squares(one)),
+        })
+    }
+
+    pub fn max_m(&self) -> f64 {
+        f64::from(self.largest) / f64::from(QUANTA_PER_METRE)
+    }
+
+    pub fn rms_m(&self) -> f64 {
+        self.per_post(self.sum_squared).sqrt() / f64::from(QUANTA_PER_METRE)
+    }
+
+    fn per_post(&self, sum: u128) -> f64 {
+        if self.posts == 0 { 0.0 } else { sum as f64 / self.posts as f64 }
+    }
+}
+
+pub(crate) fn squares(tally: &MeasuredTally) -> u128 {
+    let [high, low] = tally.sum_squared.map(u128::from);
+    high << 64 | low
+}
