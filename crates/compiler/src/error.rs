@@ -2,6 +2,7 @@
 
 use database::DatabaseError;
 use ground::GroundError;
+use product::ProductError;
 use schedule::ScheduleError;
 use source_files::SourceError;
 use terrain::TileId;
@@ -70,12 +71,6 @@ pub enum CompileError {
         /// What the system said.
         found: String,
     },
-    /// The database is in the middle of a build.
-    #[error("{path}: incomplete, expected a database that a build has finished")]
-    Unfinished {
-        /// The database.
-        path: String,
-    },
     /// The database was made for another job.
     #[error("{path}: built from another job than this one, expected the same job: {difference}")]
     OtherJob {
@@ -89,6 +84,15 @@ pub enum CompileError {
 impl From<SourceError> for CompileError {
     fn from(error: SourceError) -> Self {
         CompileError::Ground(error.into())
+    }
+}
+
+impl From<ProductError> for CompileError {
+    fn from(error: ProductError) -> Self {
+        match error {
+            ProductError::Database(error) => CompileError::Database(error),
+            ProductError::Ground(error) => CompileError::Ground(error),
+        }
     }
 }
 
@@ -108,9 +112,6 @@ impl CompileError {
             }
             CompileError::NotReady { .. } => Some("try again when it is, or run `tiefort build`".to_owned()),
             CompileError::NoThread { .. } => Some("use fewer --workers".to_owned()),
-            CompileError::Unfinished { .. } => {
-                Some("run `tiefort build` first, which goes on from what is there".to_owned())
-            }
             CompileError::OtherJob { .. } => Some("run `tiefort build` first, which rebuilds what changed".to_owned()),
         }
     }
@@ -127,12 +128,6 @@ impl CompileError {
     /// Whether the run ended because it was asked to.
     pub fn is_stopped(&self) -> bool {
         matches!(self, CompileError::Stopped { .. } | CompileError::Ground(GroundError::Stopped { .. }))
-    }
-
-    /// Whether the job, or a file that it names, is at fault.
-    pub fn is_of_the_job(&self) -> bool {
-        use GroundError::{Impossible, Source};
-        matches!(self, CompileError::Impossible { .. } | CompileError::Ground(Impossible { .. } | Source(_)))
     }
 
     /// The error of a stage's tasks, whose numbers are the row-major places of `tiles`.

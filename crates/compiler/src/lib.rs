@@ -19,7 +19,7 @@ pub use unit::{Unit, UnitEnd, perform};
 mod worker;
 pub use worker::{Sharing, WorkerEnd, work};
 mod plan;
-pub use plan::{Plan, PlannedTile, plan, planned_tiles};
+pub use plan::{Plan, plan};
 mod foresee;
 pub use foresee::foresee;
 mod forecast;

@@ -140,7 +140,7 @@ fn refuse_unfinished(run: &Run, folder: &Path, tile: TileId) -> Result<Vec<TileI
     };
     // A build that was stopped may have left tiles of two different grounds side by side.
     if manifest.state != database::ManifestState::Complete && !is_whole_but(run, manifest, tile) {
-        return Err(CompileError::Unfinished { path: folder.display().to_string() });
+        return Err(DatabaseError::Unfinished { path: folder.to_path_buf() }.into());
     }
     let job = run.job.canonical_text();
     if !deciding_lines(&manifest.job).eq(deciding_lines(&job)) {

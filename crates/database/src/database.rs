@@ -248,7 +248,7 @@ impl Database {
         REPORTS.iter().try_for_each(|name| self.remove(name))
     }
 
-    /// Says that the build is complete, once every file it lists is on the disk.
+    /// Says that the build is complete, once every file it lists and every report is on the disk.
     ///
     /// # Errors
     /// When a listed file is missing or anything cannot be written.
@@ -261,6 +261,8 @@ impl Database {
         if let Some(path) = paths.iter().find(|path| !path.exists()) {
             return Err(DatabaseError::Missing { path: path.clone() });
         }
+        let reports = REPORTS.iter().map(|name| self.folder.path(name)).filter(|path| path.exists());
+        let paths: Vec<PathBuf> = paths.into_iter().chain(reports).collect();
         sync(self.folder.dir(), &paths, &FOLDERS.map(|name| self.folder.path(name)))?;
         self.write_manifest(manifest, Durability::Now)
     }

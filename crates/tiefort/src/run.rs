@@ -4,8 +4,9 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use compiler::{Built, CompileError, Options, Plan, Stage};
-use database::{Database, Lease, Report, ReportStage, Work, files};
+use database::{Database, Folder, Lease, Report, ReportStage, Work, files};
 use job::Job;
+use product::{Opened, Product, Wanted, WantedGround};
 use serde_json::json;
 use views::{Align, BreachPlaces, Table, breaches_csv, breaches_geojson};
 
@@ -17,7 +18,7 @@ use crate::events;
 use crate::failure::{Failure, Outcome};
 use crate::progress::{Listener, Show, Times};
 use crate::signals::{self, Signals};
-use crate::{lines, page, terminal};
+use crate::{lines, terminal};
 
 /// A run of the compiler on a job, as a person follows it.
 #[derive(Debug)]
@@ -221,9 +222,25 @@ impl<'a> Run<'a> {
             database.remove(files::REPORT_HTML)?;
             return Ok(());
         }
-        let page = page::of_build(database.folder(), self.job, report, self.arguments.workers.count())?;
+        let page = self.page(database.folder(), report)?;
         database.write_bytes(files::REPORT_HTML, page.as_bytes())?;
         Ok(())
+    }
+
+    /// With the ground and with maps as far as the area is not too large for them.
+    fn page(&self, folder: &Folder, report: &Report) -> Result<String, Failure> {
+        let opened = Opened::open(folder.dir())?;
+        let grid = opened.area.grid;
+        if compiler::PAGE_MODULES_MAX < grid.count() {
+            return Ok(product::page_without_maps(&opened, report));
+        }
+        let workers = self.arguments.workers.count();
+        let read = |ground| Product::of(&opened, &Wanted { part: None, ground, workers });
+        let is_small = grid.area().post_count() <= compiler::PAGE_POSTS_MAX;
+        let ground = if is_small { WantedGround::Job(self.job) } else { WantedGround::None };
+        // A source may have gone since the build ended, which is finished all the same.
+        let product = read(ground).or_else(|_| read(WantedGround::None))?;
+        Ok(product::page(&product, report))
     }
 
     fn show(&self) -> Show {
