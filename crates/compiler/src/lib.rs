@@ -4,6 +4,8 @@
 
 mod progress;
 pub use progress::{Event, Progress, Stage};
+mod clock;
+pub use clock::{Clock, Stopwatch};
 mod error;
 pub use error::CompileError;
 mod run;

@@ -13,7 +13,7 @@ use crate::build::open;
 use crate::cause::{Cause, made_from};
 use crate::curves::Curves;
 use crate::enforce::enforce;
-use crate::publish::{beginning, publish};
+use crate::publish::{beginning, prepare, publish};
 use crate::refine::{Published, feed_seeds, keep, tile_stamp};
 use crate::refinement::Refinement;
 use crate::report::Findings;
@@ -21,12 +21,12 @@ use crate::run::{Options, Run, Worked};
 use crate::sums::{Adding, Sums};
 use crate::survey::{Shares, allocate};
 use crate::tasks::{inherited, is_surveyed, posts_of, side_vertices, tile_refinement, with_outer_sides};
-use crate::{CompileError, Event, Progress, Stage};
+use crate::{CompileError, Event, Progress, Stage, Stopwatch};
 
 /// A tile that was run again.
 #[derive(Debug)]
 pub struct Rebuilt {
-    /// What was found in the whole area; stages empty as in a build.
+    /// What was found in the whole area, as in a build.
     pub report: Report,
     /// Whether the tile's sides are held as its neighbours have them, until a full build.
     pub frozen: bool,
@@ -51,6 +51,7 @@ pub fn rebuild_tile(
     options: &Options,
     progress: &mut dyn Progress,
 ) -> Result<Rebuilt, CompileError> {
+    let progress = &mut Stopwatch::start(options.clock, progress);
     // Nothing is created where there is nothing to go on from.
     Folder::new(folder).manifest()?;
     let run = open(job, folder, options, progress)?;
@@ -79,15 +80,16 @@ pub fn rebuild_tile(
     };
     let enforced = enforce(&run, &tins, &mut assembled, &mut sums, progress)?;
     let findings = Findings { run: &run, tins: &tins, assembled: &assembled, sums: &sums, enforced: &enforced };
-    let mut report = publish(&findings, &shares, &frozen, progress)?;
+    let mut ready = prepare(&findings, &shares, &frozen, progress)?;
     let stale = stale(&run, &shares, &tins, &reached)?;
     if 0 < stale {
-        report
-            .warnings
-            .push(format!("{stale} other tiles were made from other ground or borders; a build renews them"));
+        let warning = format!("{stale} other tiles were made from other ground or borders; a build renews them");
+        ready.report.warnings.push(warning);
     }
+    drop((shares, tins, assembled, sums, enforced));
+    let (report, database) = publish(run, ready, progress)?;
     let rebuilt = reached.iter().map(|&(tile, _)| tile).collect();
-    Ok(Rebuilt { report, frozen: frozen.contains(&tile), rebuilt, database: run.database })
+    Ok(Rebuilt { report, frozen: frozen.contains(&tile), rebuilt, database })
 }
 
 /// Assembles the tiles that were refined again and reads the others as they are published.

@@ -16,5 +16,7 @@ pub use built_from::BuiltFrom;
 pub use views::NO_RESIDUAL;
 mod scene;
 pub use scene::{SceneParts, water};
+mod breaches;
+pub use breaches::breaches;
 mod page;
 pub use page::{page, page_without_maps};

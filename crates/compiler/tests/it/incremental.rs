@@ -197,7 +197,8 @@ fn another_area_is_refused_and_nothing_is_touched() {
     ] {
         let job = Job::from_text(&change.text(), &scene.path("job.toml")).unwrap();
         for fresh in [false, true] {
-            let options = compiler::Options { workers: 1, fresh, stop: &false.into() };
+            let stop = false.into();
+            let options = compiler::Options { fresh, ..crate::scene::options(1, &stop) };
             let error = compiler::build(&job, &scene.path("area"), &options, &mut crate::scene::Silent).unwrap_err();
             assert!(error.to_string().contains(key) && error.hint().is_some(), "{error}");
         }

@@ -7,7 +7,7 @@ use terrain::{Dem, Post, TileId};
 
 use crate::modes;
 use crate::product::Product;
-use crate::scene::{Draw, SIDE_CELLS, Scene, Words, assert_same, differing, sample_dem, tile};
+use crate::scene::{Draw, SIDE_CELLS, Scene, Words, assert_same, differing, options, sample_dem, tile};
 
 /// Equal allocation: what a tile may spend does not depend on what the DEM of another holds, so a tile that is run
 /// again can have the bytes of a fresh build. With a survey the fresh build would share its budget anew.
@@ -224,9 +224,15 @@ fn running_a_tile_again_is_refused_where_there_is_nothing_to_go_on_from() {
     let error = scene.try_tile("area", tile(3, 0), false).unwrap_err();
     assert!(error.to_string().contains("3,0"), "{error}");
     let other = Scene::on(&Words { limits: "per_load_module = 60".into(), ..words }, &ground());
-    let options = compiler::Options { workers: 1, fresh: false, stop: &std::sync::atomic::AtomicBool::new(false) };
     let folder = scene.path("area");
-    let run = compiler::rebuild_tile(&other.job, &folder, tile(0, 0), false, &options, &mut crate::scene::Silent);
+    let run = compiler::rebuild_tile(
+        &other.job,
+        &folder,
+        tile(0, 0),
+        false,
+        &options(1, &false.into()),
+        &mut crate::scene::Silent,
+    );
     let error = run.unwrap_err();
     assert!(error.to_string().contains("per_load_module = 60"), "{error}");
     assert_same(&before, &scene.product("area"), "refused");

@@ -1,0 +1,226 @@
+//! A clock as a parameter, and where the time of a run went: by stage and by tile.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use database::{ReportStage, ReportTile};
+use terrain::TileId;
+
+use crate::{Event, Progress, Stage};
+
+/// Name of the row for time that no stage accounts for.
+const BETWEEN: &str = "between";
+/// Seconds below which that row says nothing.
+const BETWEEN_S_MIN: f64 = 0.01;
+
+/// What time it is.
+pub trait Clock {
+    /// Time since any beginning that stays the same.
+    fn wall(&self) -> Duration;
+
+    /// Processor time of all threads since any beginning; nothing where it is not known.
+    fn cpu(&self) -> Duration {
+        Duration::ZERO
+    }
+}
+
+impl<F: Fn() -> Duration> Clock for F {
+    fn wall(&self) -> Duration {
+        self()
+    }
+}
+
+/// Passes on what a run tells, and takes the time of its stages and tiles from a clock.
+pub struct Stopwatch<'a> {
+    clock: &'a dyn Clock,
+    listener: &'a mut dyn Progress,
+    /// Up to when time is accounted for: on the clock, and of processors.
+    until: [Duration; 2],
+    /// In the order in which they first began.
+    stages: Vec<ReportStage>,
+    between: ReportStage,
+    /// Stages that have not ended, the innermost last, and what they had taken before this time.
+    open: Vec<(Stage, ReportStage)>,
+    /// When each tile at work began.
+    begun: BTreeMap<(Stage, TileId), Duration>,
+    /// Seconds of each tile, by stage.
+    tiles: BTreeMap<TileId, BTreeMap<String, f64>>,
+}
+
+impl<'a> Stopwatch<'a> {
+    /// Starts now.
+    pub fn start(clock: &'a dyn Clock, listener: &'a mut dyn Progress) -> Self {
+        Self {
+            until: [clock.wall(), clock.cpu()],
+            clock,
+            listener,
+            stages: Vec::new(),
+            between: nothing(BETWEEN),
+            open: Vec::new(),
+            begun: BTreeMap::new(),
+            tiles: BTreeMap::new(),
+        }
+    }
+
+    /// What every stage has taken up to now, a stage that is entered more than once in one row, one inside another not
+    /// counted to the outer one; last what no stage accounts for, if it is worth a row.
+    pub fn stages(&mut self) -> Vec<ReportStage> {
+        self.account();
+        let between = Some(&self.between).filter(|between| BETWEEN_S_MIN <= between.wall_s);
+        self.stages.iter().chain(between).cloned().collect()
+    }
+
+    /// What every tile that was worked on has taken up to now.
+    pub fn tiles(&self) -> Vec<ReportTile> {
+        let tile = |(tile, seconds): (&TileId, &BTreeMap<String, f64>)| ReportTile {
+            tile: [tile.row, tile.col],
+            seconds: seconds.clone(),
+        };
+        self.tiles.iter().map(tile).collect()
+    }
+
+    /// Gives the time that has passed to the innermost open stage.
+    fn account(&mut self) {
+        let now = [self.clock.wall(), self.clock.cpu()];
+        let [wall, cpu] = [0, 1].map(|which| now[which].saturating_sub(self.until[which]).as_secs_f64());
+        self.until = now;
+        let row = match self.open.last() {
+            Some(&(stage, _)) => self.row(stage),
+            None => &mut self.between,
+        };
+        row.wall_s += wall;
+        row.cpu_s += cpu;
+    }
+
+    fn row(&mut self, stage: Stage) -> &mut ReportStage {
+        let known = self.stages.iter().position(|row| row.name == stage.name());
+        let at = known.unwrap_or_else(|| {
+            self.stages.push(nothing(stage.name()));
+            self.stages.len() - 1
+        });
+        &mut self.stages[at]
+    }
+
+    fn enter(&mut self, stage: Stage) {
+        self.account();
+        let before = self.row(stage).clone();
+        self.open.push((stage, before));
+    }
+
+    /// What the stage has taken this time; `None` if it never began.
+    fn leave(&mut self, stage: Stage) -> Option<ReportStage> {
+        self.account();
+        let at = self.open.iter().rposition(|(open, _)| *open == stage)?;
+        let (_, before) = self.open.remove(at);
+        let ReportStage { name, wall_s, cpu_s } = self.row(stage).clone();
+        Some(ReportStage { name, wall_s: wall_s - before.wall_s, cpu_s: cpu_s - before.cpu_s })
+    }
+
+    fn end_tile(&mut self, stage: Stage, tile: TileId) {
+        if let Some(begun) = self.begun.remove(&(stage, tile)) {
+            let seconds = self.tiles.entry(tile).or_default().entry(stage.name().to_owned()).or_default();
+            *seconds += self.clock.wall().saturating_sub(begun).as_secs_f64();
+        }
+    }
+}
+
+impl Progress for Stopwatch<'_> {
+    fn tell(&mut self, event: Event) {
+        match event {
+            Event::Enter(stage, _) => self.enter(stage),
+            Event::Leave(stage) => {
+                if let Some(time) = self.leave(stage) {
+                    self.listener.took(time);
+                }
+            }
+            Event::Started(stage, tile) => {
+                self.begun.insert((stage, tile), self.clock.wall());
+            }
+            Event::Kept(stage, tile) => {
+                self.begun.remove(&(stage, tile));
+            }
+            Event::Done(stage, tile) => self.end_tile(stage, tile),
+            Event::Because(..) | Event::Note(_) => {}
+        }
+        self.listener.tell(event);
+    }
+}
+
+fn nothing(name: &str) -> ReportStage {
+    ReportStage { name: name.to_owned(), wall_s: 0.0, cpu_s: 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::cell::Cell;
+
+    use super::*;
+
+    /// Remembers what stages took.
+    #[derive(Default)]
+    struct Heard(Vec<ReportStage>);
+
+    impl Progress for Heard {
+        fn tell(&mut self, _event: Event) {}
+
+        fn took(&mut self, time: ReportStage) {
+            self.0.push(time);
+        }
+    }
+
+    fn rows(stages: &[ReportStage]) -> Vec<(&str, f64)> {
+        stages.iter().map(|stage| (&*stage.name, stage.wall_s)).collect()
+    }
+
+    /// Tells events a second apart.
+    fn told(events: &[Event]) -> (Vec<ReportStage>, Vec<ReportTile>, Vec<ReportStage>) {
+        let (now, mut heard) = (Cell::new(Duration::from_secs(7)), Heard::default());
+        let clock = || now.get();
+        let mut stopwatch = Stopwatch::start(&clock, &mut heard);
+        for event in events {
+            now.set(now.get() + Duration::from_secs(1));
+            stopwatch.tell(event.clone());
+        }
+        let (stages, tiles) = (stopwatch.stages(), stopwatch.tiles());
+        (stages, tiles, heard.0)
+    }
+
+    #[test]
+    fn a_stage_that_is_entered_twice_is_one_row_and_each_time_is_told() {
+        use Stage::{Assemble, Enforce, Read};
+        let visits = [Read, Assemble, Enforce, Assemble];
+        let events = visits.map(|stage| [Event::Enter(stage, 4), Event::Leave(stage)]).concat();
+        let (stages, _, heard) = told(&events);
+        assert_eq!(rows(&stages), [("read", 1.0), ("assemble", 2.0), ("enforce", 1.0), (BETWEEN, 4.0)]);
+        assert_eq!(rows(&heard), [("read", 1.0), ("assemble", 1.0), ("enforce", 1.0), ("assemble", 1.0)]);
+    }
+
+    #[test]
+    fn a_stage_inside_another_is_not_counted_to_it_and_an_open_one_counts_up_to_now() {
+        let (publish, page) = (Stage::Publish, Stage::Page);
+        let events = [Event::Enter(publish, 0), Event::Enter(page, 0), Event::Leave(page), Event::Note(String::new())];
+        let (stages, _, heard) = told(&events);
+        assert_eq!(rows(&stages), [("publish", 2.0), ("page", 1.0), (BETWEEN, 1.0)]);
+        assert_eq!(rows(&heard), [("page", 1.0)]);
+    }
+
+    #[test]
+    fn a_stage_that_never_began_has_no_end() {
+        let (stages, _, heard) = told(&[Event::Leave(Stage::Refine)]);
+        assert_eq!((rows(&stages), heard.len()), (vec![(BETWEEN, 1.0)], 0));
+    }
+
+    #[test]
+    fn a_tile_has_the_seconds_of_the_stages_that_worked_on_it() {
+        let [one, other] = [0, 1].map(|row| TileId { row, col: 3 });
+        let events = [
+            Event::Started(Stage::Refine, one),
+            Event::Started(Stage::Refine, other),
+            Event::Kept(Stage::Refine, other),
+            Event::Done(Stage::Refine, one),
+        ];
+        let (_, tiles, _) = told(&events);
+        let seconds = BTreeMap::from([("refine".to_owned(), 3.0)]);
+        assert_eq!(tiles, [ReportTile { tile: [0, 3], seconds }]);
+    }
+}
