@@ -51,7 +51,10 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         let message = "found --against with a report that draws nothing, expected --format html";
         return Err(Failure::new(message, "leave --against out, or add --format html"));
     }
-    let report = Folder::new(&arguments.database).report()?;
+    let folder = Folder::new(&arguments.database);
+    // A build that was ended just before its end may have left a report.
+    folder.finished()?;
+    let report = folder.report()?;
     let text = match arguments.format {
         Format::Json => {
             serde_json::to_string_pretty(&report).expect("a report that was read from JSON is JSON again") + "\n"
