@@ -44,7 +44,7 @@ pub struct Stopwatch<'a> {
     /// When each tile at work began.
     begun: BTreeMap<(Stage, TileId), Duration>,
     /// Seconds of each tile, by stage.
-    tiles: BTreeMap<TileId, BTreeMap<String, f64>>,
+    tiles: BTreeMap<[u32; 2], BTreeMap<String, f64>>,
 }
 
 impl<'a> Stopwatch<'a> {
@@ -62,21 +62,14 @@ impl<'a> Stopwatch<'a> {
         }
     }
 
-    /// What every stage has taken up to now, a stage that is entered more than once in one row, one inside another not
-    /// counted to the outer one; last what no stage accounts for, if it is worth a row.
-    pub fn stages(&mut self) -> Vec<ReportStage> {
+    /// What every stage and tile has taken up to now. A stage that is entered more than once has one row, and what one
+    /// inside another takes is not counted to the outer one; the last row is what no stage accounts for, if it is worth
+    /// one.
+    pub fn times(&mut self) -> (Vec<ReportStage>, Vec<ReportTile>) {
         self.account();
         let between = Some(&self.between).filter(|between| BETWEEN_S_MIN <= between.wall_s);
-        self.stages.iter().chain(between).cloned().collect()
-    }
-
-    /// What every tile that was worked on has taken up to now.
-    pub fn tiles(&self) -> Vec<ReportTile> {
-        let tile = |(tile, seconds): (&TileId, &BTreeMap<String, f64>)| ReportTile {
-            tile: [tile.row, tile.col],
-            seconds: seconds.clone(),
-        };
-        self.tiles.iter().map(tile).collect()
+        let tile = |(&tile, seconds): (_, &BTreeMap<_, _>)| ReportTile { tile, seconds: seconds.clone() };
+        (self.stages.iter().chain(between).cloned().collect(), self.tiles.iter().map(tile).collect())
     }
 
     /// Gives the time that has passed to the innermost open stage.
@@ -94,44 +87,35 @@ impl<'a> Stopwatch<'a> {
 
     fn row(&mut self, stage: Stage) -> &mut ReportStage {
         let known = self.stages.iter().position(|row| row.name == stage.name());
-        let at = known.unwrap_or_else(|| {
+        let at = known.unwrap_or(self.stages.len());
+        if known.is_none() {
             self.stages.push(nothing(stage.name()));
-            self.stages.len() - 1
-        });
+        }
         &mut self.stages[at]
     }
 
-    fn enter(&mut self, stage: Stage) {
-        self.account();
-        let before = self.row(stage).clone();
-        self.open.push((stage, before));
-    }
-
-    /// What the stage has taken this time; `None` if it never began.
+    /// What the stage that ends has taken this time; `None` if it never began.
     fn leave(&mut self, stage: Stage) -> Option<ReportStage> {
-        self.account();
         let at = self.open.iter().rposition(|(open, _)| *open == stage)?;
         let (_, before) = self.open.remove(at);
-        let ReportStage { name, wall_s, cpu_s } = self.row(stage).clone();
-        Some(ReportStage { name, wall_s: wall_s - before.wall_s, cpu_s: cpu_s - before.cpu_s })
-    }
-
-    fn end_tile(&mut self, stage: Stage, tile: TileId) {
-        if let Some(begun) = self.begun.remove(&(stage, tile)) {
-            let seconds = self.tiles.entry(tile).or_default().entry(stage.name().to_owned()).or_default();
-            *seconds += self.clock.wall().saturating_sub(begun).as_secs_f64();
-        }
+        let mut passed = self.row(stage).clone();
+        passed.wall_s -= before.wall_s;
+        passed.cpu_s -= before.cpu_s;
+        Some(passed)
     }
 }
 
 impl Progress for Stopwatch<'_> {
     fn tell(&mut self, event: Event) {
         match event {
-            Event::Enter(stage, _) => self.enter(stage),
+            Event::Enter(stage, _) => {
+                self.account();
+                let before = self.row(stage).clone();
+                self.open.push((stage, before));
+            }
             Event::Leave(stage) => {
-                if let Some(time) = self.leave(stage) {
-                    self.listener.took(time);
-                }
+                self.account();
+                self.leave(stage).into_iter().for_each(|time| self.listener.took(time));
             }
             Event::Started(stage, tile) => {
                 self.begun.insert((stage, tile), self.clock.wall());
@@ -139,7 +123,13 @@ impl Progress for Stopwatch<'_> {
             Event::Kept(stage, tile) => {
                 self.begun.remove(&(stage, tile));
             }
-            Event::Done(stage, tile) => self.end_tile(stage, tile),
+            Event::Done(stage, tile) => {
+                if let Some(begun) = self.begun.remove(&(stage, tile)) {
+                    let stages = self.tiles.entry([tile.row, tile.col]).or_default();
+                    let passed = self.clock.wall().saturating_sub(begun);
+                    *stages.entry(stage.name().to_owned()).or_default() += passed.as_secs_f64();
+                }
+            }
             Event::Because(..) | Event::Note(_) => {}
         }
         self.listener.tell(event);
@@ -181,7 +171,7 @@ mod tests {
             now.set(now.get() + Duration::from_secs(1));
             stopwatch.tell(event.clone());
         }
-        let (stages, tiles) = (stopwatch.stages(), stopwatch.tiles());
+        let (stages, tiles) = stopwatch.times();
         (stages, tiles, heard.0)
     }
 

@@ -5,7 +5,6 @@ use database::{Area, Database, FileStamp, Manifest, ManifestState, Removals, Rep
 use job::Job;
 use product::{Opened, Product, Wanted, WantedGround};
 use serde_json::{Value, json};
-use source_files::FileState;
 use terrain::{LatticePoint, TileId};
 
 use crate::assemble::crs;
@@ -83,23 +82,22 @@ pub(crate) fn prepare(
 pub(crate) fn publish(run: Run, ready: Ready, progress: &mut Stopwatch) -> Result<(Report, Database), CompileError> {
     let Ready { mut report, manifest } = ready;
     let work = run.database.folder().work(&run_name(&manifest.job, &run.records, ALGORITHM_REVISION));
-    let (job, workers, page) = (run.job, run.workers.count(), run.page);
     // The page opens the ground by itself: there is no room for it twice.
-    let (database, states) = kept_of(run);
+    drop((run.ground, run.tins));
+    let (job, database) = (run.job, run.database);
 
     // The last moment: from here on everything says that it was made from these files.
-    changed(&states)?;
-    report.stages = progress.stages();
-    report.tiles = progress.tiles();
+    changed(&run.states)?;
+    (report.stages, report.tiles) = progress.times();
     for (name, text) in product::breaches(job, &report) {
         let stamp = database.write_bytes(name, text.as_bytes())?;
         report.files.insert(name.to_owned(), stamp);
     }
     database.write_json(files::REPORT, &report)?;
-    if page {
+    if run.page {
         progress.tell(Event::Enter(Stage::Page, 0));
         let opened = Opened::of(database.folder().clone(), manifest.clone())?;
-        database.write_bytes(files::REPORT_HTML, draw(&opened, job, &report, workers)?.as_bytes())?;
+        database.write_bytes(files::REPORT_HTML, draw(&opened, job, &report, run.workers.count())?.as_bytes())?;
         progress.tell(Event::Leave(Stage::Page));
     } else {
         // That of an earlier build would tell of another one.
@@ -110,14 +108,8 @@ pub(crate) fn publish(run: Run, ready: Ready, progress: &mut Stopwatch) -> Resul
     // Of a build of another job that has begun already nothing is removed.
     work.sweep();
     // What came after the report was written is known now.
-    report.stages = progress.stages();
+    (report.stages, report.tiles) = progress.times();
     Ok((report, database))
-}
-
-/// What of a run is needed to its end; the memory of all else is given back.
-fn kept_of(run: Run) -> (Database, Vec<FileState>) {
-    let Run { database, states, .. } = run;
-    (database, states)
 }
 
 /// The page: with the ground as long as the area has no more than [`PAGE_POSTS_MAX`] posts (16 bytes each while it is
