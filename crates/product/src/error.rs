@@ -2,8 +2,6 @@
 
 use database::DatabaseError;
 use ground::GroundError;
-use schedule::ScheduleError;
-use terrain::TileId;
 use thiserror::Error;
 
 /// Why a finished database could not be read back.
@@ -27,16 +25,6 @@ impl ProductError {
     ) -> Self {
         let (key, found, expected) = (key.into(), found.into(), expected.into());
         GroundError::Impossible { key, found, expected, hint: hint.to_owned() }.into()
-    }
-
-    /// The error of tasks whose numbers are the places of `tiles`.
-    pub(crate) fn from_schedule<R>(tiles: &[TileId], error: ScheduleError<R, Self>) -> Self {
-        Self::Ground(match error {
-            ScheduleError::Failed { error, .. } => return error,
-            ScheduleError::Panicked { task, message } => GroundError::Panicked { tile: tiles[task], message },
-            ScheduleError::Stopped { done, tasks } => GroundError::Stopped { done: done.len(), total: tasks },
-            ScheduleError::NoThread { message, .. } => GroundError::NoThread { found: message },
-        })
     }
 
     /// Whether it can be read without its ground: a file that it was built from is at fault.

@@ -6,7 +6,7 @@ use std::sync::atomic::AtomicBool;
 
 use database::{Folder, Manifest};
 use fidelity::each_residual;
-use ground::{GamingArea, Ground, PlannedTile, Window, planned_tiles};
+use ground::{GamingArea, Ground, GroundError, PlannedTile, Window, planned_tiles};
 use job::{Count, Job};
 use schedule::Workers;
 use terrain::{Dem, GridFrame, LoadModule, ModuleGrid, ModuleRect, Post, PostRect, TileId};
@@ -108,7 +108,7 @@ impl Product {
         let read =
             |_: usize, &tile: &TileId| read_tile(folder, area, ground.as_ref().map(|(ground, _)| ground), part, tile);
         let pieces = schedule::for_each_independent(&tiles, &workers, &stop, read)
-            .map_err(|error| ProductError::from_schedule(&tiles, error))?;
+            .map_err(|error| GroundError::from_schedule(&tiles, error))?;
         let (modules, pieces): (Vec<_>, Vec<_>) = pieces.into_iter().map(|piece| (piece.modules, piece.ground)).unzip();
         let mut modules: Vec<LoadModule> = modules.into_iter().flatten().collect();
         modules.sort_by_key(|module| module.id);
