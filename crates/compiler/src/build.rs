@@ -138,7 +138,7 @@ fn unchanged(job: &Job, folder: &Path, progress: &mut dyn Progress) -> Result<Op
     let is_fresh = might_be_fresh(&manifest, job) && manifest.sources == records && there.verify_bytes(&manifest)?;
     progress.tell(Event::Leave(Stage::Read));
     match report {
-        Ok(report) if is_fresh => {
+        Ok(report) if is_fresh && !report.outdated => {
             let kept = manifest.tiles.len();
             Ok(Some(Built { report, kept, rebuilt: 0, is_unchanged: true, database }))
         }

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use database::{Database, DatabaseError, Folder, MadeFrom, Manifest, Report, Stamp, TileRecord};
+use database::{Database, DatabaseError, Folder, MadeFrom, Manifest, ManifestState, Report, Stamp, TileRecord};
 use job::{Edges, Job, deciding_lines};
 use terrain::{Post, SeamSides, Side, TileId, TileTin, Vertex};
 
@@ -17,7 +17,7 @@ use crate::publish::{beginning, prepare, publish};
 use crate::refine::{Published, feed_seeds, keep, tile_stamp};
 use crate::refinement::Refinement;
 use crate::report::Findings;
-use crate::run::{Options, Run, Worked};
+use crate::run::{ALGORITHM_REVISION, Options, Run, Worked};
 use crate::sums::{Adding, Sums};
 use crate::survey::{Shares, allocate};
 use crate::tasks::{inherited, is_surveyed, posts_of, side_vertices, tile_refinement, with_outer_sides};
@@ -56,6 +56,7 @@ pub fn rebuild_tile(
     Folder::new(folder).manifest()?;
     let run = open(job, folder, options, progress)?;
     let mut frozen = refuse_unfinished(&run, folder, tile)?;
+    let is_outdated = is_outdated(&run);
     let shares = published_shares(&run, progress)?;
     let mut tins = published_tins(&run)?;
     run.database.begin(&beginning(&run))?;
@@ -81,6 +82,7 @@ pub fn rebuild_tile(
     let enforced = enforce(&run, &tins, &mut assembled, &mut sums, progress)?;
     let findings = Findings { run: &run, tins: &tins, assembled: &assembled, sums: &sums, enforced: &enforced };
     let mut ready = prepare(&findings, &shares, &frozen, progress)?;
+    ready.report.outdated = is_outdated;
     let stale = stale(&run, &shares, &tins, &reached)?;
     if 0 < stale {
         let warning = format!("{stale} other tiles were made from other ground or borders; a build renews them");
@@ -125,6 +127,17 @@ fn stale(run: &Run, shares: &Shares, tins: &[Published], reached: &[(TileId, boo
     Ok(count)
 }
 
+/// Whether no build has made the database from what there is now: then one may change tiles that this run does not.
+fn is_outdated(run: &Run) -> bool {
+    let is_of_now = |manifest: &Manifest| {
+        manifest.state == ManifestState::Complete
+            && manifest.algorithm_revision == ALGORITHM_REVISION
+            && manifest.sources == run.records
+    };
+    let was_outdated = run.database.folder().report().map_or(true, |report| report.outdated);
+    was_outdated || !run.previous.as_ref().is_some_and(is_of_now)
+}
+
 /// Tiles that are frozen already; a refusal when there is nothing whole to go on from.
 fn refuse_unfinished(run: &Run, folder: &Path, tile: TileId) -> Result<Vec<TileId>, CompileError> {
     let tiling = &run.area.tiling;
@@ -141,7 +154,7 @@ fn refuse_unfinished(run: &Run, folder: &Path, tile: TileId) -> Result<Vec<TileI
         return Err(DatabaseError::Missing { path }.into());
     };
     // A build that was stopped may have left tiles of two different grounds side by side.
-    if manifest.state != database::ManifestState::Complete && !is_whole_but(run, manifest, tile) {
+    if manifest.state != ManifestState::Complete && !is_whole_but(run, manifest, tile) {
         return Err(DatabaseError::Unfinished { path: folder.to_path_buf() }.into());
     }
     let job = run.job.canonical_text();

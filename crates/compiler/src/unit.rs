@@ -95,7 +95,9 @@ impl<'a> Session<'a> {
         let is_finished = match run.previous.as_ref().filter(is_ours) {
             Some(manifest) if manifest.state == ManifestState::Incomplete => false,
             Some(manifest)
-                if might_be_fresh(manifest, job) && there.verify_bytes(manifest)? && there.report().is_ok() =>
+                if might_be_fresh(manifest, job)
+                    && there.verify_bytes(manifest)?
+                    && there.report().is_ok_and(|report| !report.outdated) =>
             {
                 true
             }

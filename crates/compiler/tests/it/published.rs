@@ -158,7 +158,7 @@ fn a_finished_database_whose_report_is_gone_gets_it_again_from_any_process() {
     drop(scene.build("area", 1));
     let expected = timeless(&complete(&scene, "area", false));
     for is_shared in [false, true] {
-        fs::remove_file(scene.path("area").join(files::REPORT)).unwrap();
+        scene.forget_report("area");
         if is_shared {
             let stop = AtomicBool::new(false);
             let units = [Unit::Publish];

@@ -155,6 +155,12 @@ impl Scene {
             .collect()
     }
 
+    /// Takes the report away, so that the next build walks through every stage, whatever has changed.
+    #[track_caller]
+    pub fn forget_report(&self, folder: &str) {
+        fs::remove_file(self.path(folder).join(database::files::REPORT)).unwrap();
+    }
+
     #[track_caller]
     pub fn verify(&self, folder: &str) {
         let verdict = inspect::verify(&self.path(folder), None).unwrap();
