@@ -31,6 +31,7 @@ import time
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 PRODUCT = ("tiles", "modules", "measured", "survey", "database.json")
+REPORTS = ("report.json", "report.html", "breaches.geojson", "breaches.csv")
 
 
 class Failed(Exception):
@@ -111,6 +112,8 @@ def check_status(scene, name, before, after, tiles):
     if code in (0, 1):
         whole = [wanted for wanted in (before, after) if wanted is not None and wanted == there]
         expect(whole, "status says complete, and the bytes are of no finished build")
+        lacking = [report for report in REPORTS if not (database / report).exists()]
+        expect(not lacking, f"status says complete, and there is no {lacking}")
         return "complete"
     expect(code == 2 and "incomplete" in out, f"status ended with {code}: {out}{err}")
     for row, marks in enumerate(reversed(rows)):
@@ -119,7 +122,7 @@ def check_status(scene, name, before, after, tiles):
             if mark == "#":
                 expect(there.get(file) == after[file], f"{file} is called done and is not")
             elif mark == "o":
-                # A build may have been killed between its last file and its report: then it is the build before.
+                # A build may have been killed between its last file and `database.json`: then it is the build before.
                 known = [after[file], *([before[file]] if before else [])]
                 expect(there.get(file) in known, f"{file} is not of the build before")
             else:

@@ -1,25 +1,25 @@
 //! A whole gaming area, on one page.
 
-use database::{Database, Folder, Manifest, ManifestState, Previous, Report, TileState, Work};
+use database::{Database, Folder, Manifest, ManifestState, Previous, Report, TileState};
 use ground::{GamingArea, Ground};
 use job::Job;
 use schedule::Workers;
 
 use crate::assemble::assemble;
 use crate::enforce::enforce;
-use crate::publish::{beginning, database_area, publish};
+use crate::publish::{beginning, database_area, prepare, publish};
 use crate::refine::refine;
 use crate::report::Findings;
 use crate::run::{ALGORITHM_REVISION, Options, Run, changed};
 use crate::survey::{allocate, survey};
 use crate::tins::Tins;
-use crate::{CompileError, Event, Progress, Stage};
+use crate::{CompileError, Event, Progress, Stage, Stopwatch};
 
 /// A finished build.
 #[derive(Debug)]
 pub struct Built {
-    /// What was found; its stages are empty until whoever holds the clock fills them in, unless nothing was done: then
-    /// it is the report of the build before.
+    /// What was found, as `report.json` says it, with the times of the very end in addition; if nothing was done, it is
+    /// the report of the build before.
     pub report: Report,
     /// Tiles that were published before and are still fresh.
     pub kept: usize,
@@ -29,11 +29,9 @@ pub struct Built {
     pub is_unchanged: bool,
     /// The database, still locked.
     pub database: Database,
-    /// What the processes of a shared run left for one another, to be swept once the report is there.
-    pub work: Option<Work>,
 }
 
-/// Builds the database of a job in `folder`, or brings the one there up to date.
+/// Builds the database of a job in `folder`, or brings the one there up to date: complete, with its report and page.
 ///
 /// # Errors
 /// When the job cannot be met by any build, a source cannot be used, or the database cannot be written; what
@@ -44,7 +42,7 @@ pub fn build(
     options: &Options,
     progress: &mut dyn Progress,
 ) -> Result<Built, CompileError> {
-    let folder = &folder.into();
+    let (folder, progress) = (&folder.into(), &mut Stopwatch::start(options.clock, progress));
     if !options.fresh
         && let Some(built) = unchanged(job, folder, progress)?
     {
@@ -61,7 +59,7 @@ pub fn build(
 
 /// Every stage of a run that has begun; what is published and fresh is kept. A source that changed meanwhile ends it,
 /// and the database stays incomplete.
-pub(crate) fn finish(run: Run, progress: &mut dyn Progress) -> Result<Built, CompileError> {
+pub(crate) fn finish(run: Run, progress: &mut Stopwatch) -> Result<Built, CompileError> {
     let states = run.states.clone();
     let finished = stages(run, progress);
     // What went wrong may come from it, and then it is the cause to tell.
@@ -71,7 +69,7 @@ pub(crate) fn finish(run: Run, progress: &mut dyn Progress) -> Result<Built, Com
     }
 }
 
-fn stages(run: Run, progress: &mut dyn Progress) -> Result<Built, CompileError> {
+fn stages(run: Run, progress: &mut Stopwatch) -> Result<Built, CompileError> {
     let curves = survey(&run, progress)?;
     let mut shares = allocate(&run, curves.as_ref(), progress)?;
     drop(curves);
@@ -81,9 +79,12 @@ fn stages(run: Run, progress: &mut dyn Progress) -> Result<Built, CompileError> 
     let enforced = enforce(&run, &tins, &mut assembled, &mut sums, progress)?;
 
     let findings = Findings { run: &run, tins: &tins, assembled: &assembled, sums: &sums, enforced: &enforced };
-    let report = publish(&findings, &shares, &[], progress)?;
+    let ready = prepare(&findings, &shares, &[], progress)?;
     let rebuilt = tins.iter().filter(|tile| tile.cause.is_some()).count();
-    Ok(Built { report, kept: tins.len() - rebuilt, rebuilt, is_unchanged: false, database: run.database, work: None })
+    let kept = tins.len() - rebuilt;
+    drop((shares, tins, assembled, sums, enforced));
+    let (report, database) = publish(run, ready, progress)?;
+    Ok(Built { report, kept, rebuilt, is_unchanged: false, database })
 }
 
 /// Everything a run stands on: the plan, the sources, the locked database. Nothing is changed yet.
@@ -119,7 +120,8 @@ pub(crate) fn open_with<'a>(
         Previous::Database(manifest) => Some(*manifest),
         Previous::Nothing | Previous::Damaged(_) => None,
     };
-    Ok(Run { job, area, ground, workers, stop: options.stop, database, records, states, tins: Tins::new(), previous })
+    let Options { page, stop, .. } = *options;
+    Ok(Run { job, area, ground, workers, page, stop, database, records, states, tins: Tins::new(), previous })
 }
 
 /// The finished database in `folder`, if a build of `job` would change nothing in it: made from the same job and the
@@ -138,9 +140,9 @@ fn unchanged(job: &Job, there: &Folder, progress: &mut dyn Progress) -> Result<O
     let is_fresh = might_be_fresh(&manifest, job) && manifest.sources == records && there.verify_bytes(&manifest)?;
     progress.tell(Event::Leave(Stage::Read));
     match report {
-        Ok(report) if is_fresh => {
+        Ok(report) if is_fresh && !report.outdated => {
             let kept = manifest.tiles.len();
-            Ok(Some(Built { report, kept, rebuilt: 0, is_unchanged: true, database, work: None }))
+            Ok(Some(Built { report, kept, rebuilt: 0, is_unchanged: true, database }))
         }
         _ => Ok(None),
     }

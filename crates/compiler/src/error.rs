@@ -3,6 +3,7 @@
 use database::DatabaseError;
 use engine::StoreError;
 use ground::GroundError;
+use product::ProductError;
 use schedule::ScheduleError;
 use source_files::SourceError;
 use terrain::TileId;
@@ -71,12 +72,6 @@ pub enum CompileError {
         /// What the system said.
         found: String,
     },
-    /// The database is in the middle of a build.
-    #[error("{path}: incomplete, expected a database that a build has finished")]
-    Unfinished {
-        /// The database.
-        path: String,
-    },
     /// The database was made for another job.
     #[error("{path}: built from another job than this one, expected the same job: {difference}")]
     OtherJob {
@@ -99,6 +94,15 @@ impl From<SourceError> for CompileError {
     }
 }
 
+impl From<ProductError> for CompileError {
+    fn from(error: ProductError) -> Self {
+        match error {
+            ProductError::Database(error) => CompileError::Database(error),
+            ProductError::Ground(error) => CompileError::Ground(error),
+        }
+    }
+}
+
 impl CompileError {
     /// What could be done about it.
     pub fn hint(&self) -> Option<String> {
@@ -115,9 +119,6 @@ impl CompileError {
             }
             CompileError::NotReady { .. } => Some("try again when it is, or run `tiefort build`".to_owned()),
             CompileError::NoThread { .. } => Some("use fewer --workers".to_owned()),
-            CompileError::Unfinished { .. } => {
-                Some("run `tiefort build` first, which goes on from what is there".to_owned())
-            }
             CompileError::OtherJob { .. } => Some("run `tiefort build` first, which rebuilds what changed".to_owned()),
         }
     }
@@ -134,12 +135,6 @@ impl CompileError {
     /// Whether the run ended because it was asked to.
     pub fn is_stopped(&self) -> bool {
         matches!(self, CompileError::Stopped { .. } | CompileError::Ground(GroundError::Stopped { .. }))
-    }
-
-    /// Whether the job, or a file that it names, is at fault.
-    pub fn is_of_the_job(&self) -> bool {
-        use GroundError::{Impossible, Source};
-        matches!(self, CompileError::Impossible { .. } | CompileError::Ground(Impossible { .. } | Source(_)))
     }
 
     /// The error of a stage's tasks, whose numbers are the row-major places of `tiles`.

@@ -4,6 +4,10 @@
 
 mod progress;
 pub use progress::{Event, Progress, Stage};
+mod clock;
+pub use clock::Stopwatch;
+/// What time it is.
+pub use engine::Clock;
 mod error;
 pub use error::CompileError;
 mod run;
@@ -20,7 +24,7 @@ pub use unit::{Unit, UnitEnd, perform};
 mod worker;
 pub use worker::{Sharing, WorkerEnd, work};
 mod plan;
-pub use plan::{Plan, PlannedTile, plan, planned_tiles};
+pub use plan::{Plan, plan};
 mod foresee;
 pub use foresee::foresee;
 mod forecast;

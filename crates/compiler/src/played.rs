@@ -58,7 +58,7 @@ impl Costs {
     pub fn forecast(plan: &Plan) -> Self {
         let end = |at: fn(TileId) -> u32| plan.tiles.iter().map(|tile| at(tile.tile) + 1).max().unwrap_or(1);
         let posts: f64 = plan.tiles.iter().map(|tile| tile.rect.post_count() as f64).sum();
-        let seconds = |tile: &crate::PlannedTile| plan.forecast.seconds * tile.rect.post_count() as f64 / posts;
+        let seconds = |tile: &ground::PlannedTile| plan.forecast.seconds * tile.rect.post_count() as f64 / posts;
         // Shares of the stages as on the jobs in `configs`.
         let cost = |seconds: f64| TileCosts {
             survey_s: if plan.is_surveyed { 0.12 * seconds } else { 0.0 },

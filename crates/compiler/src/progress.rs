@@ -1,5 +1,6 @@
-//! What a run tells while it runs. No clock here: whoever listens may look at one.
+//! What a run tells while it runs.
 
+use database::ReportStage;
 use terrain::TileId;
 
 /// The stages of a build, in order.
@@ -17,8 +18,10 @@ pub enum Stage {
     Assemble,
     /// Clip mode: the least valuable points make room where a limit is exceeded.
     Enforce,
-    /// The database is declared complete.
+    /// The report is written, and the database is declared complete.
     Publish,
+    /// Inside of that: the report's page is drawn.
+    Page,
 }
 
 impl Stage {
@@ -32,6 +35,7 @@ impl Stage {
             Stage::Assemble => "assemble",
             Stage::Enforce => "enforce",
             Stage::Publish => "publish",
+            Stage::Page => "page",
         }
     }
 }
@@ -59,4 +63,7 @@ pub enum Event {
 pub trait Progress {
     /// Called on the thread that runs the build, in order; must return at once.
     fn tell(&mut self, event: Event);
+
+    /// What the stage that is about to be left has taken this time; told just before it is left.
+    fn took(&mut self, _time: ReportStage) {}
 }

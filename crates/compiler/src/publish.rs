@@ -1,18 +1,21 @@
-//! The manifest: before anything changes, and when everything is there.
+//! The manifest before anything changes; and the last stage: breaches, the report, its page, and the manifest when
+//! everything is there.
 
-use database::{Area, FileStamp, Manifest, ManifestState, Removals, Report, TileState, files};
+use database::{Area, Database, FileStamp, Manifest, ManifestState, Removals, Report, TileState, files};
 use job::Job;
+use product::{Opened, Product, Wanted, WantedGround};
 use serde_json::{Value, json};
 use terrain::{LatticePoint, TileId};
 
 use crate::assemble::crs;
 use crate::assembled::Assembled;
+use crate::forecast::{PAGE_MODULES_MAX, PAGE_POSTS_MAX};
 use crate::refine::Published;
 use crate::report::Findings;
-use crate::run::{ALGORITHM_REVISION, Run, changed};
+use crate::run::{ALGORITHM_REVISION, Run, changed, run_name};
 use crate::survey::Shares;
 use crate::tasks::is_surveyed;
-use crate::{CompileError, Event, Progress, Stage};
+use crate::{CompileError, Event, Progress, Stage, Stopwatch};
 
 /// The area as the database knows it.
 pub fn database_area(job: &Job) -> Area {
@@ -43,13 +46,20 @@ pub(crate) fn beginning(run: &Run) -> Manifest {
     manifest
 }
 
-/// Declares the database complete; `frozen` lists tiles whose sides are held as their neighbours have them.
-pub(crate) fn publish(
+/// What the last stage publishes.
+pub(crate) struct Ready {
+    pub report: Report,
+    manifest: Manifest,
+}
+
+/// Begins the last stage: puts together what is to be published, of which little is on the disk yet. `frozen` lists
+/// tiles whose sides are held as their neighbours have them.
+pub(crate) fn prepare(
     findings: &Findings,
     shares: &Shares,
     frozen: &[TileId],
     progress: &mut dyn Progress,
-) -> Result<Report, CompileError> {
+) -> Result<Ready, CompileError> {
     progress.tell(Event::Enter(Stage::Publish, 0));
     let run = findings.run;
     let report = findings.report()?;
@@ -64,11 +74,58 @@ pub(crate) fn publish(
         manifest.tile_mut(tile).expect("the manifest lists every tile").removed = removed;
     }
     manifest.totals = findings.totals(&report);
-    // The last moment: from here on the database says that it was made from these files.
+    Ok(Ready { report, manifest })
+}
+
+/// Ends the last stage. What a run leaves is written in this order, so that a database is complete only with all of it:
+/// breaches, the report, its page, the manifest.
+pub(crate) fn publish(run: Run, ready: Ready, progress: &mut Stopwatch) -> Result<(Report, Database), CompileError> {
+    let Ready { mut report, manifest } = ready;
+    let work = run.database.folder().work(&run_name(&manifest.job, &run.records, ALGORITHM_REVISION));
+    // The page opens the ground by itself: there is no room for it twice.
+    drop((run.ground, run.tins));
+    let (job, database) = (run.job, run.database);
+
+    // The last moment: from here on everything says that it was made from these files.
     changed(&run.states)?;
-    run.database.finish(&manifest)?;
+    (report.stages, report.tiles) = progress.times();
+    for (name, text) in product::breaches(job, &report) {
+        let stamp = database.write_bytes(name, text.as_bytes())?;
+        report.files.insert(name.to_owned(), stamp);
+    }
+    database.write_json(files::REPORT, &report)?;
+    if run.page {
+        progress.tell(Event::Enter(Stage::Page, 0));
+        let opened = Opened::of(database.folder().clone(), manifest.clone())?;
+        database.write_bytes(files::REPORT_HTML, draw(&opened, job, &report, run.workers.count())?.as_bytes())?;
+        progress.tell(Event::Leave(Stage::Page));
+    } else {
+        // That of an earlier build would tell of another one.
+        database.remove(files::REPORT_HTML)?;
+    }
+    database.finish(&manifest)?;
     progress.tell(Event::Leave(Stage::Publish));
-    Ok(report)
+    // Of a build of another job that has begun already nothing is removed.
+    work.sweep();
+    // What came after the report was written is known now.
+    (report.stages, report.tiles) = progress.times();
+    Ok((report, database))
+}
+
+/// The page: with the ground as long as the area has no more than [`PAGE_POSTS_MAX`] posts (16 bytes each while it is
+/// drawn), with maps as long as it has no more than [`PAGE_MODULES_MAX`] load modules (a kilobyte each). Later one can
+/// ask for them.
+fn draw(opened: &Opened, job: &Job, report: &Report, workers: usize) -> Result<String, CompileError> {
+    let grid = opened.area.grid;
+    if PAGE_MODULES_MAX < grid.count() {
+        return Ok(product::page_without_maps(opened, report));
+    }
+    let read = |ground| Product::of(opened, &Wanted { part: None, ground, workers });
+    let is_small = grid.area().post_count() <= PAGE_POSTS_MAX;
+    let ground = if is_small { WantedGround::Job(job) } else { WantedGround::None };
+    // A source may have gone meanwhile, and nothing else needs it any more.
+    let product = read(ground).or_else(|_| read(WantedGround::None))?;
+    Ok(product::page(&product, report))
 }
 
 fn state_of(run: &Run, report: &Report, tile: TileId, is_frozen: bool) -> TileState {

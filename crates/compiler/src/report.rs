@@ -84,6 +84,7 @@ impl Findings<'_> {
             bound,
             stops: self.stops(),
             warnings: run.ground.warnings.clone(),
+            outdated: false,
             tiles: Vec::new(),
             files: BTreeMap::new(),
         })

@@ -12,20 +12,31 @@ use source_files::FileState;
 use terrain::{TileId, TileTin};
 
 use crate::tins::Tins;
-use crate::{CompileError, Event, Progress, Stage};
+use crate::{Clock, CompileError, Event, Progress, Stage};
 
 /// Rises whenever the result of any stage may change for the same input; a test with golden hashes holds it.
 pub const ALGORITHM_REVISION: u32 = 5;
 
 /// What a run needs from whoever starts it.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub struct Options<'a> {
     /// Tiles at once.
     pub workers: usize,
     /// Start over, whatever is published.
     pub fresh: bool,
+    /// Whether the report's page is drawn; without it, that of an earlier build goes.
+    pub page: bool,
     /// Raised to ask the run to stop after the tiles in progress.
     pub stop: &'a AtomicBool,
+    /// What time it is.
+    pub clock: &'a dyn Clock,
+}
+
+impl<'a> Options<'a> {
+    /// Those of a build that goes on from what is there, on so many workers.
+    pub fn new(workers: usize, stop: &'a AtomicBool, clock: &'a dyn Clock) -> Self {
+        Self { workers, fresh: false, page: true, stop, clock }
+    }
 }
 
 /// Everything a stage may look at.
@@ -34,6 +45,7 @@ pub(crate) struct Run<'a> {
     pub area: GamingArea,
     pub ground: Ground,
     pub workers: Workers,
+    pub page: bool,
     pub stop: &'a AtomicBool,
     pub database: Database,
     /// What the heights and weights are made from.

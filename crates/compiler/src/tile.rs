@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use database::{Database, DatabaseError, Folder, Manifest, Report, TileRecord};
+use database::{Database, DatabaseError, Folder, Manifest, ManifestState, Report, TileRecord};
 use engine::{Artifact, Cause, Outcome};
 use job::{Edges, Job, deciding_lines};
 use terrain::{Post, SeamSides, Side, TileId, TileTin, Vertex};
@@ -12,19 +12,19 @@ use crate::assembled::Assembled;
 use crate::build::open;
 use crate::curves::Curves;
 use crate::enforce::enforce;
-use crate::publish::{beginning, publish};
+use crate::publish::{beginning, prepare, publish};
 use crate::refine::{Published, Refining};
 use crate::report::Findings;
 use crate::run::{ALGORITHM_REVISION, Options, Run};
 use crate::sums::{Adding, Sums};
 use crate::survey::{Shares, allocate};
 use crate::tasks::{inherited, is_surveyed, posts_of, side_vertices, with_outer_sides};
-use crate::{CompileError, Event, Progress, Stage};
+use crate::{CompileError, Event, Progress, Stage, Stopwatch};
 
 /// A tile that was run again.
 #[derive(Debug)]
 pub struct Rebuilt {
-    /// What was found in the whole area; stages empty as in a build.
+    /// What was found in the whole area, as in a build.
     pub report: Report,
     /// Whether the tile's sides are held as its neighbours have them, until a full build.
     pub frozen: bool,
@@ -49,11 +49,13 @@ pub fn rebuild_tile(
     options: &Options,
     progress: &mut dyn Progress,
 ) -> Result<Rebuilt, CompileError> {
+    let progress = &mut Stopwatch::start(options.clock, progress);
     // Nothing is created where there is nothing to go on from.
     let folder = &folder.into();
     folder.manifest()?;
     let run = open(job, folder, options, progress)?;
     let mut frozen = refuse_unfinished(&run, folder, tile)?;
+    let is_outdated = is_outdated(&run);
     let shares = published_shares(&run, progress)?;
     let mut tins = published_tins(&run)?;
     run.database.begin(&beginning(&run))?;
@@ -78,15 +80,17 @@ pub fn rebuild_tile(
     };
     let enforced = enforce(&run, &tins, &mut assembled, &mut sums, progress)?;
     let findings = Findings { run: &run, tins: &tins, assembled: &assembled, sums: &sums, enforced: &enforced };
-    let mut report = publish(&findings, &shares, &frozen, progress)?;
+    let mut ready = prepare(&findings, &shares, &frozen, progress)?;
+    ready.report.outdated = is_outdated;
     let stale = stale(&run, &shares, &tins, &reached)?;
     if 0 < stale {
-        report
-            .warnings
-            .push(format!("{stale} other tiles were made from other ground or borders; a build renews them"));
+        let warning = format!("{stale} other tiles were made from other ground or borders; a build renews them");
+        ready.report.warnings.push(warning);
     }
+    drop((shares, tins, assembled, sums, enforced));
+    let (report, database) = publish(run, ready, progress)?;
     let rebuilt = reached.iter().map(|&(tile, _)| tile).collect();
-    Ok(Rebuilt { report, frozen: frozen.contains(&tile), rebuilt, database: run.database })
+    Ok(Rebuilt { report, frozen: frozen.contains(&tile), rebuilt, database })
 }
 
 /// Assembles the tiles that were refined again and reads the others as they are published.
@@ -122,6 +126,17 @@ fn stale(run: &Run, shares: &Shares, tins: &[Published], reached: &[(TileId, boo
     Ok(count)
 }
 
+/// Whether no build has made the database from what there is now: then one may change tiles that this run does not.
+fn is_outdated(run: &Run) -> bool {
+    let is_of_now = |manifest: &Manifest| {
+        manifest.state == ManifestState::Complete
+            && manifest.algorithm_revision == ALGORITHM_REVISION
+            && manifest.sources == run.records
+    };
+    let was_outdated = run.database.folder().report().map_or(true, |report| report.outdated);
+    was_outdated || !run.previous.as_ref().is_some_and(is_of_now)
+}
+
 /// Tiles that are frozen already; a refusal when there is nothing whole to go on from.
 fn refuse_unfinished(run: &Run, folder: &Folder, tile: TileId) -> Result<Vec<TileId>, CompileError> {
     let tiling = &run.area.tiling;
@@ -138,8 +153,8 @@ fn refuse_unfinished(run: &Run, folder: &Folder, tile: TileId) -> Result<Vec<Til
         return Err(DatabaseError::Missing { path }.into());
     };
     // A build that was stopped may have left tiles of two different grounds side by side.
-    if manifest.state != database::ManifestState::Complete && !is_whole_but(run, manifest, tile) {
-        return Err(CompileError::Unfinished { path: folder.dir().display().to_string() });
+    if manifest.state != ManifestState::Complete && !is_whole_but(run, manifest, tile) {
+        return Err(DatabaseError::Unfinished { path: folder.dir().to_path_buf() }.into());
     }
     let job = run.job.canonical_text();
     if !deciding_lines(&manifest.job).eq(deciding_lines(&job)) {

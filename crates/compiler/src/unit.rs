@@ -25,7 +25,7 @@ use crate::refine::{Published, refine_tile};
 use crate::run::{ALGORITHM_REVISION, Options, Run, run_name};
 use crate::survey::{allocate, survey_tile};
 use crate::tasks::{TileBudget, inherited, is_surveyed};
-use crate::{CompileError, Event, Progress, Stage};
+use crate::{CompileError, Event, Progress, Stage, Stopwatch};
 
 /// One unit of work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -66,22 +66,12 @@ impl Unit {
     }
 }
 
-/// How a shared directory stood when a process came to it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Standing {
-    /// Complete, fresh and reported on.
-    Finished,
-    /// Complete and fresh, but whoever published it was ended before it wrote the report.
-    Unreported,
-    /// Being built.
-    UnderWay,
-}
-
 /// A process's part in a build that several processes share.
 pub(crate) struct Session<'a> {
     pub run: Run<'a>,
     pub work: Work,
-    pub standing: Standing,
+    /// Whether it was complete and fresh when this process came to it.
+    pub is_finished: bool,
 }
 
 impl<'a> Session<'a> {
@@ -102,25 +92,26 @@ impl<'a> Session<'a> {
         };
         let is_under_way = |manifest: &Manifest| manifest.state == ManifestState::Incomplete;
         let there = run.database.folder();
-        let standing = match run.previous.as_ref().filter(is_ours) {
-            Some(manifest) if manifest.state == ManifestState::Incomplete => Standing::UnderWay,
-            Some(manifest) if might_be_fresh(manifest, job) && there.verify_bytes(manifest)? => {
-                if there.report().is_ok() { Standing::Finished } else { Standing::Unreported }
+        let is_finished = match run.previous.as_ref().filter(is_ours) {
+            Some(manifest) if manifest.state == ManifestState::Incomplete => false,
+            Some(manifest)
+                if might_be_fresh(manifest, job)
+                    && there.verify_bytes(manifest)?
+                    && there.report().is_ok_and(|report| !report.outdated) =>
+            {
+                true
             }
             None if is_shared && run.previous.as_ref().is_some_and(is_under_way) => {
                 return Err(CompileError::OtherRun { path: folder.dir().display().to_string() });
             }
             _ => {
                 run.database.begin(&beginning(&run))?;
-                Standing::UnderWay
+                false
             }
         };
         let name = run_name(&canonical, &run.records, ALGORITHM_REVISION);
-        let work = match standing {
-            Standing::Finished => there.work(&name),
-            Standing::Unreported | Standing::UnderWay => run.database.work(&name)?,
-        };
-        Ok(Self { run, work, standing })
+        let work = if is_finished { there.work(&name) } else { run.database.work(&name)? };
+        Ok(Self { run, work, is_finished })
     }
 
     /// Every unit but the last, in an order in which one process could do them.
@@ -245,10 +236,9 @@ impl<'a> Session<'a> {
     }
 
     /// Declares the database complete, after whatever is still to be done.
-    pub fn publish(self, progress: &mut dyn Progress) -> Result<Built, CompileError> {
+    pub fn publish(self, progress: &mut Stopwatch) -> Result<Built, CompileError> {
         self.run.database.sweep()?;
-        let built = finish(self.run, progress)?;
-        Ok(Built { work: Some(self.work), ..built })
+        finish(self.run, progress)
     }
 }
 
@@ -274,17 +264,16 @@ pub fn perform(
     options: &Options,
     progress: &mut dyn Progress,
 ) -> Result<UnitEnd, CompileError> {
+    let progress = &mut Stopwatch::start(options.clock, progress);
     let session = Session::join(job, &folder.into(), options, progress)?;
-    if session.standing == Standing::Finished {
+    if session.is_finished {
         return Ok(UnitEnd::Finished);
     }
     for &unit in units {
         if unit == Unit::Publish {
             return Ok(UnitEnd::Published(Box::new(session.publish(progress)?)));
         }
-        if session.standing == Standing::UnderWay {
-            session.perform(unit, progress)?;
-        }
+        session.perform(unit, progress)?;
     }
     Ok(UnitEnd::Done)
 }

@@ -2,7 +2,7 @@
 //!
 //! Which units are ready follows from marks; who does which from leases. A tile is ready once every lower-ranked tile
 //! that touches it is done, so two tiles that touch are never at work at once, unless a lease has expired under a
-//! process that was only slow. No clock is looked at here: the caller says what time it is.
+//! process that was only slow.
 
 use std::collections::BTreeSet;
 use std::io::ErrorKind;
@@ -14,8 +14,8 @@ use job::Job;
 
 use crate::build::Built;
 use crate::run::Options;
-use crate::unit::{Session, Standing, Unit};
-use crate::{CompileError, Event, Progress, Stage};
+use crate::unit::{Session, Unit};
+use crate::{Clock, CompileError, Event, Progress, Stage, Stopwatch};
 
 /// How a worker shares a directory with others.
 #[derive(Clone, Copy)]
@@ -26,8 +26,6 @@ pub struct Sharing<'a> {
     pub lease: Duration,
     /// How long to wait when nothing is ready.
     pub pause: Duration,
-    /// The time of this process's own clock, from any beginning.
-    pub now: &'a dyn Fn() -> Duration,
     /// Waits.
     pub wait: &'a dyn Fn(Duration),
     /// Told which lease is held, to be given up if the process has to end.
@@ -58,6 +56,7 @@ pub fn work(
     progress: &mut dyn Progress,
 ) -> Result<WorkerEnd, CompileError> {
     let (folder, mut units) = (folder.into(), 0);
+    let progress = &mut Stopwatch::start(options.clock, progress);
     loop {
         let session = Session::join(job, &folder, options, progress)?;
         match share(session, options, sharing, progress)? {
@@ -80,15 +79,16 @@ fn share(
     session: Session,
     options: &Options,
     sharing: &Sharing,
-    progress: &mut dyn Progress,
+    progress: &mut Stopwatch,
 ) -> Result<Shift, CompileError> {
-    if session.standing == Standing::Finished {
+    if session.is_finished {
         session.work.sweep();
         return Ok(Shift::Ended(WorkerEnd { units: 0, published: None }));
     }
     let mut worker = Worker {
-        open: if session.standing == Standing::UnderWay { session.units() } else { Vec::new() },
+        open: session.units(),
         leases: session.work.leases(sharing.name, sharing.lease),
+        clock: options.clock,
         sharing,
         job: session.run.job.canonical_text(),
         session,
@@ -121,6 +121,7 @@ fn share(
 struct Worker<'a, 'b> {
     session: Session<'a>,
     sharing: &'b Sharing<'b>,
+    clock: &'b dyn Clock,
     leases: Leases,
     /// Units that were not done when last looked at.
     open: Vec<Unit>,
@@ -130,15 +131,10 @@ struct Worker<'a, 'b> {
 }
 
 impl Worker<'_, '_> {
-    /// Whether the build was finished and reported on, by any process. A build of another job begins in the folder only
-    /// after that.
+    /// Whether the build was finished, by any process. A build of another job begins in the folder only after that.
     fn is_published(&self) -> bool {
-        let folder = self.session.run.database.folder();
-        let is_swept = || self.session.standing == Standing::UnderWay && !self.session.work.is_there();
-        folder.manifest().is_ok_and(|manifest| {
-            let is_complete = manifest.state == ManifestState::Complete;
-            manifest.job != self.job || is_complete && (folder.report().is_ok() || is_swept())
-        })
+        let manifest = self.session.run.database.folder().manifest();
+        manifest.is_ok_and(|manifest| manifest.job != self.job || manifest.state == ManifestState::Complete)
     }
 
     /// Whether an error says that what processes leave for one another was swept away. It may be there again already.
@@ -161,7 +157,7 @@ impl Worker<'_, '_> {
         let places = ready.len().max(1);
         ready.rotate_left(self.sharing.name.bytes().fold(0, |sum, byte| (sum * 31 + usize::from(byte)) % places));
         for unit in ready {
-            if let Claim::Ours(lease, _) = self.leases.claim(&unit.name(), (self.sharing.now)())? {
+            if let Claim::Ours(lease, _) = self.leases.claim(&unit.name(), self.clock.wall())? {
                 // It may have been done between the look at the marks and the claim.
                 if self.session.work.marks().marked(&unit.name()).is_none() {
                     return Ok(Some((unit, lease)));
@@ -196,7 +192,7 @@ impl Worker<'_, '_> {
         }
     }
 
-    fn publish(self, lease: &Lease, progress: &mut dyn Progress) -> Result<WorkerEnd, CompileError> {
+    fn publish(self, lease: &Lease, progress: &mut Stopwatch) -> Result<WorkerEnd, CompileError> {
         let Self { session, sharing, units, .. } = self;
         progress.tell(Event::Note("every tile is done: publishing".into()));
         let built = hold(sharing, lease, || session.publish(progress))?;

@@ -255,7 +255,7 @@ impl Database {
         REPORTS.iter().try_for_each(|name| self.remove(name))
     }
 
-    /// Says that the build is complete, once every file it lists is on the disk.
+    /// Says that the build is complete, once every file it lists and every report is on the disk.
     ///
     /// # Errors
     /// When a listed file is missing or anything cannot be written.
@@ -269,6 +269,8 @@ impl Database {
         if let Some(path) = paths.iter().find(|path| store.entry(path).is_err()) {
             return Err(DatabaseError::Missing { path: path.clone() });
         }
+        let reports = REPORTS.iter().map(|name| self.folder.path(name)).filter(|path| store.entry(path).is_ok());
+        let paths: Vec<PathBuf> = paths.iter().cloned().chain(reports).collect();
         let (dir, folders) = (self.folder.dir(), FOLDERS.map(|name| self.folder.path(name)));
         store.sync(dir, &paths, &folders).map_err(|source| DatabaseError::from_io("sync", dir, 0, source))?;
         self.write_manifest(manifest, Durability::Now)

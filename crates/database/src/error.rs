@@ -48,6 +48,12 @@ pub enum DatabaseError {
         /// The file.
         path: PathBuf,
     },
+    /// The database is in the middle of a build.
+    #[error("{}: incomplete, expected a database that a build has finished", path.display())]
+    Unfinished {
+        /// The database.
+        path: PathBuf,
+    },
     /// What was named as a database is none.
     #[error("{}: found {found}, expected the folder of a terrain database", path.display())]
     NotADatabase {
@@ -292,6 +298,7 @@ impl DatabaseError {
         Some(match self {
             Self::DiskFull { .. } => "free some space and run the same command again; finished tiles are kept",
             Self::NotWritable { .. } => "choose another folder with --out",
+            Self::Unfinished { .. } => "run `tiefort build` first, which goes on from what is there",
             Self::NotADatabase { found, .. } => found.hint(),
             Self::NotOurFolder { .. } => "choose another folder with --out; what is there is left alone",
             Self::NotAFolder { .. } | Self::NotAFile { .. } => {

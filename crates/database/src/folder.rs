@@ -11,8 +11,8 @@ use crate::frame::{FRAME_BYTES, Kind};
 use crate::names::{MEASURED, MODULES, SURVEY, TILES, WORK, files};
 use crate::read::{check_stamp, read, refuse_other};
 use crate::{
-    DatabaseError, FileStamp, Manifest, Measured, NotADatabase, Removals, Report, Stamp, TileModules, Work, curve_file,
-    frame, json, measured_file, removals_file, slm, tile_file,
+    DatabaseError, FileStamp, Manifest, ManifestState, Measured, NotADatabase, Removals, Report, Stamp, TileModules,
+    Work, curve_file, frame, json, measured_file, removals_file, slm, tile_file,
 };
 
 /// The directory of a database, to read from. Holds no file open and no lock.
@@ -99,6 +99,18 @@ impl Folder {
         let path = self.path(files::DATABASE);
         let bytes = self.read(&path).map_err(|error| self.without(error))?;
         Manifest::decode(&path, &bytes)
+    }
+
+    /// What `database.json` says of a database that a build has finished.
+    ///
+    /// # Errors
+    /// As [`Folder::manifest`]; also when a build has not finished it.
+    pub fn finished(&self) -> Result<Manifest, DatabaseError> {
+        let manifest = self.manifest()?;
+        match manifest.state {
+            ManifestState::Complete => Ok(manifest),
+            ManifestState::Incomplete => Err(DatabaseError::Unfinished { path: self.dir.clone() }),
+        }
     }
 
     /// What it means that a file which every database has could not be read: `error`, or that this is no database.

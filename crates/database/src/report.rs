@@ -64,6 +64,9 @@ pub struct Report {
     pub stops: ReportStops,
     /// What else a reader should know, a sentence each.
     pub warnings: Vec<String>,
+    /// Whether only some tiles were made again since what all are made from had changed: a build may change others.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub outdated: bool,
     /// What each tile took, where it was worked on in this run.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub tiles: Vec<ReportTile>,
@@ -405,6 +408,7 @@ mod tests {
             }],
             stops: ReportStops { budget_spent: 35, exhausted: 1, ..ReportStops::default() },
             warnings: vec!["one tile is frozen".into()],
+            outdated: false,
             tiles: vec![ReportTile { tile: [0, 1], seconds: BTreeMap::from([("refine".into(), 0.5)]) }],
             files: BTreeMap::from([("breaches.geojson".into(), FileStamp::of(b"{}"))]),
         }

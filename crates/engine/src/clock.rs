@@ -2,16 +2,19 @@
 
 use std::time::Duration;
 
-/// A clock. Everything that tells or compares times is given one.
-pub trait Clock: Sync {
-    /// Time since any beginning; never less than before.
-    fn now(&self) -> Duration;
+/// What time it is.
+pub trait Clock {
+    /// Time since any beginning that stays the same.
+    fn wall(&self) -> Duration;
 
-    /// Processor time that this process has taken, where that is known.
-    fn processor(&self) -> Option<Duration> {
-        None
+    /// Processor time of all threads since any beginning; nothing where it is not known.
+    fn cpu(&self) -> Duration {
+        Duration::ZERO
     }
+}
 
-    /// Returns after so much time.
-    fn wait(&self, time: Duration);
+impl<F: Fn() -> Duration> Clock for F {
+    fn wall(&self) -> Duration {
+        self()
+    }
 }

@@ -152,6 +152,17 @@ impl Faulty {
         self.pass_on(&mut state);
     }
 
+    /// Goes on after so much time.
+    pub fn wait(&self, time: Duration) {
+        let mut state = self.world.state();
+        if state.workers[self.worker].is_dead {
+            return;
+        }
+        state.workers[self.worker].until = state.now + time;
+        self.pass_on(&mut state);
+        drop(self.turn(state));
+    }
+
     fn turn<'a>(&self, state: MutexGuard<'a, State>) -> MutexGuard<'a, State> {
         let is_others = |state: &mut State| state.turn != self.worker;
         let mut state =
@@ -236,18 +247,8 @@ impl Faulty {
 }
 
 impl Clock for Faulty {
-    fn now(&self) -> Duration {
+    fn wall(&self) -> Duration {
         self.world.state().now
-    }
-
-    fn wait(&self, time: Duration) {
-        let mut state = self.world.state();
-        if state.workers[self.worker].is_dead {
-            return;
-        }
-        state.workers[self.worker].until = state.now + time;
-        self.pass_on(&mut state);
-        drop(self.turn(state));
     }
 }
 

@@ -10,12 +10,6 @@ pub enum ExportError {
     /// The database cannot be read.
     #[error(transparent)]
     Database(#[from] DatabaseError),
-    /// The database is in the middle of a build.
-    #[error("{path}: incomplete, expected a database that a build has finished")]
-    Unfinished {
-        /// The database.
-        path: String,
-    },
     /// What was asked for is not in the database.
     #[error("{what}: found {found}, expected {expected}")]
     Impossible {
@@ -77,7 +71,6 @@ impl ExportError {
     pub fn hint(&self) -> Option<String> {
         match self {
             Self::Database(error) => error.hint().map(str::to_owned),
-            Self::Unfinished { .. } => Some("run `tiefort build` first, which goes on from what is there".into()),
             Self::Impossible { hint, .. } => Some(hint.clone()),
             Self::Ground { hint, .. } => hint.clone(),
             Self::Write { .. } => Some("check that there is room and that the folder is writable".into()),

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use database::{Folder, Manifest, ManifestState, TileModules};
+use database::{Folder, Manifest, TileModules};
 use terrain::{GridFrame, HOLE_CLASS, LoadModule, ModuleGrid, ModuleId, ModuleRect, TileId};
 
 use crate::{ExportError, Work};
@@ -55,10 +55,7 @@ impl Product {
     /// When the database is missing, unfinished or damaged, or has no such load modules or levels.
     pub fn read(folder: &Path, block: Option<Block>, wanted: Levels, work: &Work) -> Result<Self, ExportError> {
         let folder = Folder::new(folder);
-        let manifest = folder.manifest()?;
-        if manifest.state != ManifestState::Complete {
-            return Err(ExportError::Unfinished { path: folder.dir().display().to_string() });
-        }
+        let manifest = folder.finished()?;
         let rect = rect_of(&manifest, block)?;
         let ids: Vec<TileId> = manifest.tiles.iter().map(database::TileRecord::tile).collect();
         let read = work.each("tiles read", &ids, |&tile| {

@@ -139,6 +139,7 @@ pub(crate) fn report() -> Report {
         area: "sample".into(),
         workers: 1,
         stages: Vec::new(),
+        outdated: false,
         tiles: Vec::new(),
         files: BTreeMap::new(),
         points: ReportPoints { selected: 0, border: 0, corner: 6, total: 7 },

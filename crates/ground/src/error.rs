@@ -77,12 +77,13 @@ impl GroundError {
     }
 
     /// The error of tasks whose numbers are the places of `tiles`.
-    pub(crate) fn from_schedule<R>(tiles: &[TileId], error: ScheduleError<R, GroundError>) -> GroundError {
-        match error {
-            ScheduleError::Failed { error, .. } => error,
+    pub fn from_schedule<R, E: From<GroundError>>(tiles: &[TileId], error: ScheduleError<R, E>) -> E {
+        let error = match error {
+            ScheduleError::Failed { error, .. } => return error,
             ScheduleError::Panicked { task, message } => GroundError::Panicked { tile: tiles[task], message },
             ScheduleError::Stopped { done, tasks } => GroundError::Stopped { done: done.len(), total: tasks },
             ScheduleError::NoThread { message, .. } => GroundError::NoThread { found: message },
-        }
+        };
+        error.into()
     }
 }

@@ -6,6 +6,8 @@ mod error;
 pub use error::GroundError;
 mod area;
 pub use area::GamingArea;
+mod planned;
+pub use planned::{PlannedTile, planned_tiles};
 mod bounds;
 pub use bounds::Bounds;
 mod given;

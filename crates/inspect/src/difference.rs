@@ -4,9 +4,8 @@ use std::path::Path;
 
 use compiler::CompileError;
 use fidelity::each_residual;
+use product::{Product, Wanted, WantedGround};
 use terrain::{Dem, Importance, LoadModule, ModuleId, QUANTA_PER_METRE};
-
-use crate::product::{Product, Wanted, WantedGround, product};
 
 /// What differs between two databases.
 #[derive(Clone, Debug, PartialEq)]
@@ -55,7 +54,7 @@ pub struct SettingDifference {
 /// When one is missing, unfinished or damaged, or they are not of the same ground.
 pub fn difference(first: &Path, second: &Path, workers: usize) -> Result<Difference, CompileError> {
     let wanted = Wanted { part: None, ground: WantedGround::None, workers };
-    let (first_is, second_is) = (product(first, &wanted)?, product(second, &wanted)?);
+    let (first_is, second_is) = (Product::read(first, &wanted)?, Product::read(second, &wanted)?);
     check_same_ground(&first_is, &second_is, second)?;
     let pairs = first_is.modules.iter().zip(&second_is.modules);
     let changed = pairs.filter(|(a, b)| a != b).map(|(a, b)| module_difference(&first_is, a, b)).collect();

@@ -8,14 +8,13 @@ use database::{Folder, TileState, files};
 use fidelity::{Split, best_split};
 use job::HOLE_CLASS_NAME;
 use limits::Windows;
+use product::{Product, Wanted, WantedGround};
 use schedule::Workers;
 use serde_json::Value;
 use terrain::{
     HOLE_CLASS, Importance, LoadModule, ModuleId, QUANTA_PER_METRE, RefusedBy, Side, StopReason, TileId, TileTin,
     metres_of_quanta,
 };
-
-use crate::product::{Product, Wanted, WantedGround, product};
 
 /// Everything there is to know about one load module.
 #[derive(Clone, Debug, PartialEq)]
@@ -111,9 +110,9 @@ pub fn explain(
     workers: usize,
 ) -> Result<Explanation, CompileError> {
     let wanted = Wanted { part: None, ground, workers };
-    let (product, no_ground) = match product(folder, &wanted) {
-        Err(error) if error.is_of_the_job() && matches!(ground, WantedGround::Recorded) => {
-            let without = product(folder, &Wanted { ground: WantedGround::None, ..wanted })?;
+    let (product, no_ground) = match Product::read(folder, &wanted) {
+        Err(error) if error.is_of_the_ground() && matches!(ground, WantedGround::Recorded) => {
+            let without = Product::read(folder, &Wanted { ground: WantedGround::None, ..wanted })?;
             (without, Some(error.to_string()))
         }
         found => (found?, None),

@@ -8,19 +8,18 @@ use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
 use compiler::CompileError;
-use database::{Folder, ManifestState};
 use geometry::Facet;
 use geometry::owned::{PostGrid, visit_residuals};
 use ground::{GamingArea, Ground, Window};
 use job::{Count, Job};
+use product::{Opened, choose_ground, locate_weights};
 use schedule::Workers;
 use terrain::{
     Dem, GridFrame, Importance, LoadModule, ModuleGrid, ModuleId, ModuleRect, Post, PostRect, THOUSANDTHS,
     metres_of_quanta,
 };
 
-use crate::measures::{choose_ground, locate_weights};
-use crate::verify::{job_of, read_modules};
+use crate::verify::read_modules;
 
 /// Where a database is not good enough.
 #[derive(Clone, Debug)]
@@ -84,12 +83,7 @@ pub struct Component {
 /// # Errors
 /// When the database is missing, unfinished or damaged, or the ground it was built from cannot be found.
 pub fn inadequate(folder: &Path, tolerance_m: Option<f64>) -> Result<Inadequate, CompileError> {
-    let folder = Folder::new(folder);
-    let manifest = folder.manifest()?;
-    if manifest.state != ManifestState::Complete {
-        return Err(CompileError::Unfinished { path: folder.dir().display().to_string() });
-    }
-    let (mut job, area) = job_of(&manifest, folder.dir())?;
+    let Opened { folder, manifest, mut job, area } = Opened::open(folder)?;
     choose_ground(&mut job, &manifest, folder.dir(), None)?;
     locate_weights(&mut job, &manifest, folder.dir())?;
     let ground = Ground::open(&job, &area, &Workers::new(1), &AtomicBool::new(false))?;

@@ -12,13 +12,9 @@ pub use fidelity::{
     SeamVisibility, SlopeClasses, SlopeDifference,
 };
 pub use measures::{BuiltResidual, ClassResidual, DatabaseFidelity, Fidelity, Sights, fidelity, measure};
-mod product;
-pub use product::{LimitUse, NO_RESIDUAL, Product, ProductGround, Wanted, WantedGround, product};
 mod explain;
 pub use explain::{ExplainedRefusal, ExplainedWindow, Explanation, OneMore, explain};
 mod difference;
 pub use difference::{Difference, ModuleDifference, SettingDifference, difference};
-mod built_from;
-pub use built_from::BuiltFrom;
 
 mod recount;

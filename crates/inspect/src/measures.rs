@@ -1,17 +1,17 @@
 //! Fidelity of a finished database or of a plain mesh, always beside the regular grid of as many triangles.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
 use compiler::CompileError;
-use database::{Fingerprint, Folder, Manifest, ManifestState, SourceRecord, Totals};
+use database::{Folder, Totals};
 use fidelity::{DemGround, Measures, ResidualFigures, Triangles, regular_grid};
 use ground::{GamingArea, Ground, Window};
-use job::{AreaShape, DemSource, Job, NamedFile, SourceEntry, SourceFile, SourceSaid, Voids};
+use product::{Opened, choose_ground, locate_weights};
 use schedule::Workers;
 use terrain::{Dem, Importance, Metres, QUANTA_PER_METRE, Tin};
 
-use crate::verify::{job_of, read_modules};
+use crate::verify::read_modules;
 
 /// Which pairs of places a line of sight is tried between.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -89,12 +89,7 @@ pub struct BuiltResidual {
 /// # Errors
 /// When the database is missing, unfinished or damaged, or the ground cannot be found or used.
 pub fn fidelity(folder: &Path, against: Option<&Path>, sights: Sights) -> Result<DatabaseFidelity, CompileError> {
-    let folder = Folder::new(folder);
-    let manifest = folder.manifest()?;
-    if manifest.state != ManifestState::Complete {
-        return Err(CompileError::Unfinished { path: folder.dir().display().to_string() });
-    }
-    let (mut job, area) = job_of(&manifest, folder.dir())?;
+    let Opened { folder, manifest, mut job, area } = Opened::open(folder)?;
     // No point that was given changes a figure, and weights do not; classes do.
     (job.tin.start, job.tin.pins) = (None, None);
     let against = choose_ground(&mut job, &manifest, folder.dir(), against)?;
@@ -181,86 +176,6 @@ fn triangles_of(folder: &Folder, area: &GamingArea) -> Result<(Triangles, u64), 
     }
     let polygons = modules.values().map(|module| u64::from(module.polygon_count)).sum();
     Ok((Triangles::of_modules(modules.values(), area.grid, area.frame.spacing), polygons))
-}
-
-/// Points the job at the ground to measure against, and gives its name. What is void in a raster of one's own choice
-/// is left out.
-pub(crate) fn choose_ground(
-    job: &mut Job,
-    manifest: &Manifest,
-    folder: &Path,
-    against: Option<&Path>,
-) -> Result<String, CompileError> {
-    let water = job.dem.water.as_mut().map(|water| &mut water.file);
-    let shaping = job.dem.geoids.iter_mut().map(|geoid| &mut geoid.file).chain(water);
-    locate(shaping, manifest, folder)?;
-    if let Some(path) = against {
-        let (written, said) = (path.display().to_string(), SourceSaid::default());
-        let files = vec![SourceFile { written: written.clone(), path: path.into(), said: said.clone() }];
-        job.dem.source = DemSource::Files { written: vec![SourceEntry { name: written.clone(), said }], files };
-        job.dem.voids = Voids::Hole;
-        return Ok(written);
-    }
-    match &mut job.dem.source {
-        DemSource::Sample { seed } => Ok(format!("the sample terrain, seed {seed}")),
-        DemSource::Files { files, .. } => {
-            for (index, file) in files.iter_mut().enumerate() {
-                file.path = find_source(manifest.sources.get(index), folder)?;
-            }
-            let names: Vec<String> = files.iter().map(|file| file.path.display().to_string()).collect();
-            Ok(names.join(", "))
-        }
-    }
-}
-
-/// Points names at the files that a database was built from.
-fn locate<'a>(
-    files: impl Iterator<Item = &'a mut NamedFile>,
-    manifest: &Manifest,
-    folder: &Path,
-) -> Result<(), CompileError> {
-    for file in files {
-        let record = manifest.sources.iter().find(|record| record.path == file.written);
-        file.path = find_source(record, folder)?;
-    }
-    Ok(())
-}
-
-/// Points the job at the files that say what ground weighs; what tiles started from changes nothing any more.
-pub(crate) fn locate_weights(job: &mut Job, manifest: &Manifest, folder: &Path) -> Result<(), CompileError> {
-    job.tin.start = None;
-    let named = job.importance.areas.iter_mut().filter_map(|area| match &mut area.shape {
-        AreaShape::Polygons { file } | AreaShape::RasterValue { file, .. } => Some(file),
-        AreaShape::Slope { .. } | AreaShape::Sample(_) => None,
-    });
-    locate(named.chain(job.tin.pins.as_mut()), manifest, folder)
-}
-
-/// A raster a database was built from. Its path is written as the job has it, and the job may have lain anywhere; but
-/// its content is known, so any file with that content is the one.
-fn find_source(record: Option<&SourceRecord>, folder: &Path) -> Result<PathBuf, CompileError> {
-    let missing = |found: String| CompileError::Impossible {
-        key: folder.join(database::files::DATABASE).display().to_string(),
-        found,
-        expected: "the raster the database was built from".into(),
-        hint: "name the raster to measure against: --against FILE".into(),
-    };
-    let Some(record) = record else { return Err(missing("no source".into())) };
-    let beside = std::path::absolute(folder).ok().and_then(|folder| folder.parent().map(Path::to_path_buf));
-    let here = PathBuf::from(&record.path);
-    let places: Vec<PathBuf> = beside.iter().map(|folder| folder.join(&record.path)).chain([here]).collect();
-    let mut other = None;
-    for place in &places {
-        match source_files::content(place).map(Fingerprint::of_reader) {
-            Ok(Ok(content)) if content == record.blake3 => return Ok(place.clone()),
-            Ok(_) => other = Some(place),
-            Err(_) => {}
-        }
-    }
-    Err(missing(match other {
-        Some(place) => format!("{}, whose content has changed since the build", place.display()),
-        None => format!("the source {:?}, which is neither beside the database nor here", record.path),
-    }))
 }
 
 fn built_residual(totals: &Totals) -> BuiltResidual {

@@ -18,6 +18,7 @@ use fidelity::Residuals;
 use ground::{Bounds, GamingArea, Ground, Window};
 use job::{DemSource, Edges, Job, LodBorder, SourceEntry, SourceFile, SourceSaid};
 use limits::{polygons_of, triangles_of};
+use product::Opened;
 use schedule::Workers;
 use terrain::{LoadModule, ModuleId, Side};
 
@@ -60,7 +61,7 @@ pub fn verify(folder: &Path, dem: Option<&Path>) -> Result<Verdict, CompileError
     if !verdict.problems.is_empty() {
         return Ok(verdict);
     }
-    let (job, area) = job_of(&manifest, folder.dir())?;
+    let Opened { folder, manifest, job, area } = Opened::of(folder, manifest)?;
     verdict.problems = entries::problems(&manifest, &job, &area);
     if !verdict.problems.is_empty() {
         return Ok(verdict);
@@ -166,18 +167,6 @@ fn listed(manifest: &Manifest) -> usize {
             .count()
     };
     manifest.tiles.iter().map(of_tile).sum::<usize>() + manifest.files.len()
-}
-
-/// The job a database was built from, as it says itself.
-pub(crate) fn job_of(manifest: &Manifest, folder: &Path) -> Result<(Job, GamingArea), CompileError> {
-    let job = Job::from_text(&manifest.job, folder).map_err(|error| CompileError::Impossible {
-        key: "database.json: job".into(),
-        found: error.to_string(),
-        expected: "a job this version reads".into(),
-        hint: "the database was written by another version; build it again".into(),
-    })?;
-    let area = GamingArea::new(&job)?;
-    Ok((job, area))
 }
 
 /// Load modules by place.

@@ -23,7 +23,7 @@ fn measured(plan: &Plan, report: &Report) -> Option<Costs> {
     let known: BTreeMap<[u32; 2], &BTreeMap<String, f64>> =
         report.tiles.iter().map(|tile| (tile.tile, &tile.seconds)).collect();
     let of_stage = |stage: &str| -> Vec<Option<f64>> {
-        let seconds = |tile: &compiler::PlannedTile| known.get(&[tile.tile.row, tile.tile.col])?.get(stage).copied();
+        let seconds = |tile: &ground::PlannedTile| known.get(&[tile.tile.row, tile.tile.col])?.get(stage).copied();
         plan.tiles.iter().map(seconds).collect()
     };
     let refine = filled(&of_stage("refine"))?;

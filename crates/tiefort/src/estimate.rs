@@ -10,8 +10,6 @@ const TRUST_S: f64 = 1.0;
 pub struct Estimate {
     /// Forecast seconds of each stage on one worker, those still to come and the current one.
     stages: Vec<(Stage, f64)>,
-    /// What comes after the last stage.
-    after_s: f64,
     /// Seconds that one of the forecast takes, before anything is measured; `None` where nothing is forecast.
     pace: Option<f64>,
     /// When the first of these stages began.
@@ -33,9 +31,10 @@ impl Estimate {
             (Stage::Refine, seconds.refine),
             (Stage::Assemble, seconds.assemble),
             (Stage::Publish, seconds.publish),
+            (Stage::Page, seconds.page),
         ];
         let at_once = workers.min(plan.workers_useful).max(1);
-        Self { after_s: seconds.page, pace: Some(1.0 / at_once as f64), ..Self::new(stages.to_vec()) }
+        Self { pace: Some(1.0 / at_once as f64), ..Self::new(stages.to_vec()) }
     }
 
     /// That of a run of which nothing is forecast and one stage takes nearly all of the time.
@@ -44,7 +43,7 @@ impl Estimate {
     }
 
     fn new(stages: Vec<(Stage, f64)>) -> Self {
-        Self { stages, after_s: 0.0, pace: None, begun_s: None, tiles: (0, 0, 0), share: 1.0, worked_s: 0.0 }
+        Self { stages, pace: None, begun_s: None, tiles: (0, 0, 0), share: 1.0, worked_s: 0.0 }
     }
 
     /// Takes note of what happened, so many seconds after the start.
@@ -89,14 +88,15 @@ impl Estimate {
         };
         let (all, done, kept) = self.tiles;
         let mut share = self.share;
-        let mut left_s = self.after_s;
-        for (place, (_, seconds)) in self.stages.iter().enumerate() {
+        let mut left_s = 0.0;
+        for (place, (stage, seconds)) in self.stages.iter().enumerate() {
             let is_current = place == 0 && 0 < all;
             if is_current && 0 < done + kept {
                 share = done as f64 / (done + kept) as f64;
             }
             let open = if is_current { all.saturating_sub(done + kept) as f64 / all as f64 } else { 1.0 };
-            left_s += seconds * share * open;
+            // The page shows kept tiles, too.
+            left_s += seconds * open * if *stage == Stage::Page { 1.0 } else { share };
         }
         Some(left_s * pace)
     }
@@ -114,8 +114,8 @@ mod tests {
     const TILE: TileId = TileId { row: 0, col: 0 };
 
     fn build() -> Estimate {
-        let stages = vec![(Stage::Survey, 10.0), (Stage::Refine, 80.0), (Stage::Assemble, 10.0)];
-        Estimate { pace: Some(0.5), after_s: 2.0, ..Estimate::new(stages) }
+        let stages = vec![(Stage::Survey, 10.0), (Stage::Refine, 80.0), (Stage::Assemble, 10.0), (Stage::Page, 2.0)];
+        Estimate { pace: Some(0.5), ..Estimate::new(stages) }
     }
 
     #[test]
@@ -146,7 +146,7 @@ mod tests {
         }
         estimate.hear(&Event::Leave(Stage::Survey), 0.0);
         estimate.hear(&Event::Enter(Stage::Refine, 10), 0.0);
-        assert!(estimate.left_s(0.0).unwrap() <= 1.0, "only the page is left");
+        assert_eq!(estimate.left_s(0.0), Some(1.0), "only the page is left");
     }
 
     #[test]

@@ -9,6 +9,7 @@ use compiler::CompileError;
 use database::DatabaseError;
 use exports::ExportError;
 use job::JobError;
+use product::ProductError;
 
 use crate::terminal;
 
@@ -129,6 +130,12 @@ impl From<JobError> for Failure {
 impl From<CompileError> for Failure {
     fn from(error: CompileError) -> Self {
         Self::of_compiler(&error, None)
+    }
+}
+
+impl From<ProductError> for Failure {
+    fn from(error: ProductError) -> Self {
+        CompileError::from(error).into()
     }
 }
 

@@ -1,23 +1,21 @@
 //! Turns what a run tells into something to look at, on a thread of its own, so that the run never waits for a
 //! terminal.
 
-use std::collections::BTreeMap;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 
 use compiler::{Event, Progress, Stage};
-use database::{ReportStage, ReportTile};
+use database::ReportStage;
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use views::fold;
 
 use crate::board::{Board, LEGEND};
-use crate::clock::StageClock;
+use crate::clock::SystemClock;
 use crate::estimate::Estimate;
 use crate::events;
 use crate::lines::Lines;
 use crate::terminal;
-use terrain::TileId;
 
 /// Largest board that is drawn, in rows and columns of tiles: it has to fit an ordinary terminal.
 const BOARD_MAX: (u32, u32) = (18, 38);
@@ -68,15 +66,13 @@ impl Place {
     }
 }
 
-/// Listens to a run: keeps the time of its stages and passes everything on to the reporter thread.
+/// Listens to a run and passes everything on to the reporter thread.
 #[derive(Debug)]
 pub struct Listener {
-    clock: StageClock,
+    clock: SystemClock,
     place: Arc<Mutex<Place>>,
-    /// When each tile at work began.
-    begun: BTreeMap<(Stage, TileId), f64>,
-    /// Seconds of each tile, by stage.
-    tiles: BTreeMap<TileId, BTreeMap<String, f64>>,
+    /// What the stage that is about to end has taken.
+    took: Option<ReportStage>,
     sender: Option<Sender<Heard>>,
     reporter: Option<JoinHandle<()>>,
 }
@@ -90,7 +86,7 @@ struct Heard {
 
 impl Listener {
     /// Starts the reporter thread for a run of `workers` on `tiles` = (rows, columns).
-    pub fn start(show: Show, tiles: (u32, u32), workers: usize, estimate: Estimate) -> Self {
+    pub fn start(show: Show, tiles: (u32, u32), workers: usize, estimate: Estimate, clock: SystemClock) -> Self {
         let (sender, receiver) = channel();
         let display = match show {
             Show::Nothing => None,
@@ -103,14 +99,7 @@ impl Listener {
             Show::Progress => Some(Display::Lines(Box::new(Lines::new(workers, estimate)))),
         };
         let reporter = display.map(|display| std::thread::spawn(move || report(receiver, display)));
-        Self {
-            clock: StageClock::start(),
-            place: Arc::default(),
-            begun: BTreeMap::new(),
-            tiles: BTreeMap::new(),
-            sender: reporter.is_some().then_some(sender),
-            reporter,
-        }
+        Self { clock, place: Arc::default(), took: None, sender: reporter.is_some().then_some(sender), reporter }
     }
 
     /// Where the run is, as it goes on.
@@ -118,59 +107,29 @@ impl Listener {
         Arc::clone(&self.place)
     }
 
-    fn time_tile(&mut self, event: &Event) {
-        match event {
-            Event::Started(stage, tile) => {
-                self.begun.insert((*stage, *tile), self.clock.seconds());
-            }
-            Event::Kept(stage, tile) => {
-                self.begun.remove(&(*stage, *tile));
-            }
-            Event::Done(stage, tile) => {
-                if let Some(begun_s) = self.begun.remove(&(*stage, *tile)) {
-                    let seconds = self.tiles.entry(*tile).or_default().entry(stage.name().to_owned()).or_default();
-                    *seconds += self.clock.seconds() - begun_s;
-                }
-            }
-            _ => {}
-        }
-    }
-
-    /// Waits until everything is shown; the times of stages and tiles, and seconds since the start.
-    pub fn finish(mut self) -> Times {
+    /// Waits until everything is shown.
+    pub fn finish(mut self) {
         self.sender = None;
         if let Some(reporter) = self.reporter.take() {
             // A reporter that panicked has said so; the work does not depend on it.
             let _ = reporter.join();
         }
-        let seconds = self.clock.seconds();
-        let tile =
-            |(tile, seconds): (TileId, BTreeMap<String, f64>)| ReportTile { tile: [tile.row, tile.col], seconds };
-        Times { stages: self.clock.stages(), tiles: self.tiles.into_iter().map(tile).collect(), seconds }
     }
-}
-
-/// Where the time of a run went.
-#[derive(Debug)]
-pub struct Times {
-    /// By stage.
-    pub stages: Vec<ReportStage>,
-    /// By tile that was worked on.
-    pub tiles: Vec<ReportTile>,
-    /// In all.
-    pub seconds: f64,
 }
 
 impl Progress for Listener {
     fn tell(&mut self, event: Event) {
-        let stage_time = self.clock.hear(&event);
-        self.time_tile(&event);
+        let stage_time = if matches!(event, Event::Leave(_)) { self.took.take() } else { None };
         self.place.lock().unwrap_or_else(PoisonError::into_inner).hear(&event);
         if let Some(sender) = &self.sender {
             let at_s = self.clock.seconds();
             // Fails only when the reporter is gone, which must not stop the work.
             let _ = sender.send(Heard { event, stage_time, at_s });
         }
+    }
+
+    fn took(&mut self, time: ReportStage) {
+        self.took = Some(time);
     }
 }
 

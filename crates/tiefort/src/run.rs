@@ -1,24 +1,24 @@
-//! What `build` and `tile` share: the announcement, listening, and the end, with its report.
+//! What all commands that build share: the announcement, listening, and showing what came of it.
 
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use compiler::{Built, CompileError, Options, Plan, Stage};
-use database::{Database, Report, ReportStage, Work, files};
+use database::Report;
 use engine::Lease;
 use job::Job;
 use serde_json::json;
-use views::{Align, BreachPlaces, Table, breaches_csv, breaches_geojson};
+use views::{Align, Table};
 
 use crate::arguments::{Log, RunArguments};
-use crate::clock::timed;
+use crate::clock::SystemClock;
 use crate::end_table::{End, end_table};
 use crate::estimate::Estimate;
 use crate::events;
 use crate::failure::{Failure, Outcome};
-use crate::progress::{Listener, Show, Times};
+use crate::progress::{Listener, Show};
 use crate::signals::{self, Signals};
-use crate::{lines, page, terminal};
+use crate::terminal;
 
 /// A run of the compiler on a job, as a person follows it.
 #[derive(Debug)]
@@ -27,6 +27,7 @@ pub struct Run<'a> {
     arguments: &'a RunArguments,
     folder: PathBuf,
     workers: usize,
+    clock: SystemClock,
     /// Whether other processes do the rest: then there is no board to show, and every tile is told.
     is_part: bool,
     /// What is forecast of it; none where the job cannot be planned, which the run itself says.
@@ -36,15 +37,11 @@ pub struct Run<'a> {
     lease: Arc<Mutex<Option<Lease>>>,
 }
 
-/// What came of a run, before times are known.
+/// What came of a run.
 #[derive(Debug)]
 pub struct Finished {
-    /// Its report, without stages.
+    /// Its report.
     pub report: Report,
-    /// The database, still locked.
-    pub database: Database,
-    /// What the processes of a shared run left for one another.
-    pub work: Option<Work>,
     /// Which tiles were built and which kept, in words.
     pub tiles: String,
     /// Whether nothing had to be done, so that the report is the one of the build before.
@@ -54,8 +51,7 @@ pub struct Finished {
 impl From<Built> for Finished {
     fn from(built: Built) -> Self {
         let tiles = format!("{} built, {} kept", built.rebuilt, built.kept);
-        let Built { report, database, work, is_unchanged, .. } = built;
-        Self { report, database, work, tiles, is_unchanged }
+        Self { report: built.report, tiles, is_unchanged: built.is_unchanged }
     }
 }
 
@@ -92,10 +88,11 @@ impl<'a> Run<'a> {
     }
 
     fn new(job: &'a Job, arguments: &'a RunArguments, is_part: bool) -> Result<(Self, Option<String>), Failure> {
+        let clock = SystemClock::start();
         let (workers, remark) = arguments.workers.for_job(job);
         let (folder, signals) = (arguments.folder(job), Signals::watch()?);
         let plan = compiler::plan(job).ok();
-        Ok((Self { job, arguments, folder, workers, is_part, plan, signals, lease: Arc::default() }, remark))
+        Ok((Self { job, arguments, folder, workers, clock, is_part, plan, signals, lease: Arc::default() }, remark))
     }
 
     /// Where the database lies.
@@ -105,7 +102,13 @@ impl<'a> Run<'a> {
 
     /// What the compiler is told.
     pub fn options(&self, fresh: bool) -> Options<'_> {
-        Options { workers: self.workers, fresh, stop: self.signals.stop() }
+        let page = !self.arguments.no_html;
+        Options { fresh, page, ..Options::new(self.workers, self.signals.stop(), &self.clock) }
+    }
+
+    /// The clock of this run.
+    pub fn clock(&self) -> &SystemClock {
+        &self.clock
     }
 
     /// Keeps in mind which lease this process holds.
@@ -113,20 +116,17 @@ impl<'a> Run<'a> {
         *self.lease.lock().unwrap_or_else(PoisonError::into_inner) = lease;
     }
 
-    /// Runs `work` while someone listens; what it gives, and where the time went.
+    /// Runs `work` while someone listens, and gives what it gives.
     ///
     /// # Errors
     /// Why the compiler ended early.
-    pub fn listen<T>(
-        &self,
-        work: impl FnOnce(&mut Listener) -> Result<T, CompileError>,
-    ) -> Result<(T, Times), Failure> {
+    pub fn listen<T>(&self, work: impl FnOnce(&mut Listener) -> Result<T, CompileError>) -> Result<T, Failure> {
         let tiles = (self.job.tiles.rows, self.job.tiles.columns);
         let estimate = match &self.plan {
             Some(plan) => Estimate::of_build(plan, self.workers),
             None => Estimate::of_one_stage(Stage::Refine),
         };
-        let mut listener = Listener::start(self.show(), tiles, self.workers, estimate);
+        let mut listener = Listener::start(self.show(), tiles, self.workers, estimate, self.clock);
         let (place, lease) = (listener.place(), Arc::clone(&self.lease));
         self.signals.end_in_time(move || {
             // Others may have what is given up at once; if that fails, the lease expires.
@@ -135,55 +135,27 @@ impl<'a> Run<'a> {
             signals::stopped(&place.lock().unwrap_or_else(PoisonError::into_inner).words())
         });
         let worked = work(&mut listener);
-        let times = listener.finish();
+        listener.finish();
         // From here on this thread says how the process ends.
         self.signals.tell_once(|| {});
-        let worked = worked.map_err(|error| Failure::of_compiler(&error, self.signals.exit_code()))?;
-        Ok((worked, times))
+        worked.map_err(|error| Failure::of_compiler(&error, self.signals.exit_code()))
     }
 
-    /// Runs `work` while someone listens, then writes the report and tells the end.
+    /// Runs `work` while someone listens, then shows what came of it.
     ///
     /// # Errors
-    /// Why the compiler ended early, or the report could not be written.
+    /// Why the compiler ended early.
     pub fn finish(
         &self,
         work: impl FnOnce(&mut Listener) -> Result<Finished, CompileError>,
     ) -> Result<Outcome, Failure> {
-        let (finished, times) = self.listen(work)?;
-        self.conclude(finished, times)
+        Ok(self.conclude(&self.listen(work)?))
     }
 
-    /// Writes the report of a run, unless nothing was done, and tells the end.
-    ///
-    /// # Errors
-    /// When the report cannot be written.
-    pub fn conclude(&self, finished: Finished, times: Times) -> Result<Outcome, Failure> {
-        let Finished { mut report, database, work, tiles, is_unchanged } = finished;
-        let mut drawn: Option<ReportStage> = None;
-        if !is_unchanged {
-            report.stages = times.stages;
-            report.tiles = times.tiles;
-            let places = places(self.job);
-            let breaches = [
-                (files::BREACHES, breaches_geojson(&report, &places)),
-                (files::BREACHES_CSV, breaches_csv(&report, &places)),
-            ];
-            for (name, text) in breaches {
-                let stamp = database.write_bytes(name, text.as_bytes())?;
-                report.files.insert(name.to_owned(), stamp);
-            }
-            database.write_json(files::REPORT, &report)?;
-            // With the report other processes take the build for done; so nothing that takes long comes before this.
-            // Of a build of another job that has begun already nothing is removed.
-            if let Some(work) = &work {
-                work.sweep();
-            }
-            let (written, page) = timed("page", || self.write_page(&database, &report));
-            written?;
-            drawn = (!self.arguments.no_html).then_some(page);
-        }
-        let outcome = self.judge(&report);
+    /// Shows what came of a run, and judges it.
+    pub fn conclude(&self, finished: &Finished) -> Outcome {
+        let Finished { report, tiles, is_unchanged } = finished;
+        let (outcome, seconds) = (self.judge(report), self.clock.seconds());
         match self.show() {
             Show::Nothing => {}
             Show::Json => events::print_line(&json!({
@@ -195,36 +167,18 @@ impl<'a> Run<'a> {
             })),
             Show::JsonLog => {
                 terminal::tell_json(&json!({ "event": "end", "exit_code": outcome.code(), "unchanged": is_unchanged,
-                         "database": self.folder.display().to_string(), "at_s": times.seconds }))
+                         "database": self.folder.display().to_string(), "at_s": seconds }))
             }
-            Show::Progress | Show::Verbose if is_unchanged => terminal::tell(&format!(
-                "nothing changed: all {} tiles in {} are fresh, so nothing was done ({:.2} s)",
+            Show::Progress | Show::Verbose if *is_unchanged => terminal::tell(&format!(
+                "nothing changed: all {} tiles in {} are fresh, so nothing was done ({seconds:.2} s)",
                 self.job.tiles.rows * self.job.tiles.columns,
                 self.folder.display(),
-                times.seconds
             )),
             Show::Progress | Show::Verbose => {
-                let seconds = times.seconds + drawn.as_ref().map_or(0.0, |page| page.wall_s);
-                drawn.iter().for_each(|page| terminal::tell(&lines::end_line(page, "", self.workers)));
-                // The report was on the disk before its page was drawn, so only this table has the page's time.
-                report.stages.extend(drawn);
-                let end = End { report: &report, tiles: &tiles, folder: &self.folder, seconds };
-                terminal::tell(&end_table(&end));
+                terminal::tell(&end_table(&End { report, tiles, folder: &self.folder, seconds }));
             }
         }
-        Ok(outcome)
-    }
-
-    /// The report for people to look at, beside `report.json`.
-    fn write_page(&self, database: &Database, report: &Report) -> Result<(), Failure> {
-        if self.arguments.no_html {
-            // That of an earlier build would tell of another one.
-            database.remove(files::REPORT_HTML)?;
-            return Ok(());
-        }
-        let page = page::of_build(database.folder(), self.job, report, self.arguments.workers.count())?;
-        database.write_bytes(files::REPORT_HTML, page.as_bytes())?;
-        Ok(())
+        outcome
     }
 
     fn show(&self) -> Show {
@@ -268,16 +222,4 @@ pub fn settings_text(job: &Job) -> String {
         }
     }
     sections.iter().map(|(section, table)| format!("  [{section}]\n{}", table.text(2))).collect()
-}
-
-/// Where the load modules and windows of `job` lie.
-fn places(job: &Job) -> BreachPlaces {
-    let (area, window) = (&job.area, &job.limits.window);
-    BreachPlaces {
-        origin_m: area.origin_m,
-        module_side_m: job.modules.side_m,
-        modules: [area.grid.rows, area.grid.cols],
-        window: [window.rows, window.cols],
-        epsg: area.epsg,
-    }
 }

@@ -118,6 +118,7 @@ pub(crate) fn report() -> Report {
         ],
         stops: ReportStops { budget_spent: 35, exhausted: 1, ..ReportStops::default() },
         warnings: vec!["tile r01c02 is frozen; a build makes it whole".into()],
+        outdated: false,
         tiles: Vec::new(),
         files: std::collections::BTreeMap::new(),
     }

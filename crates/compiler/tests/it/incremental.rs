@@ -65,7 +65,6 @@ fn nothing_changed_means_nothing_done_and_no_stage_but_reading() {
         let scene = Scene::on(&words, &sample_dem(words.grid(), 1));
         let built = scene.build("area", 2);
         let report = built.report.clone();
-        built.database.write_json(database::files::REPORT, &report).unwrap();
         drop(built);
         let before = crate::scene::tree(&scene.path("area"));
         let mut heard = Heard::default();
@@ -81,6 +80,7 @@ fn nothing_changed_means_nothing_done_and_no_stage_but_reading() {
 fn without_its_report_a_finished_database_is_walked_through_again() {
     let scene = Scene::new(&Words::sample());
     drop(scene.build("area", 2));
+    scene.forget_report("area");
     let again = scene.build("area", 2);
     assert_eq!((again.is_unchanged, again.kept, again.rebuilt), (false, 9, 0));
 }
@@ -197,7 +197,8 @@ fn another_area_is_refused_and_nothing_is_touched() {
     ] {
         let job = Job::from_text(&change.text(), &scene.path("job.toml")).unwrap();
         for fresh in [false, true] {
-            let options = compiler::Options { workers: 1, fresh, stop: &false.into() };
+            let stop = false.into();
+            let options = compiler::Options { fresh, ..crate::scene::options(1, &stop) };
             let error = compiler::build(&job, &scene.path("area"), &options, &mut crate::scene::Silent).unwrap_err();
             assert!(error.to_string().contains(key) && error.hint().is_some(), "{error}");
         }

@@ -5,7 +5,7 @@ use database::Folder;
 use job::Method;
 use terrain::{LoadModule, ModuleGrid, Side, TileId};
 
-use crate::scene::{Scene, Words, assert_same, sample_dem, tile};
+use crate::scene::{Scene, Words, assert_same, options, sample_dem, tile};
 
 const SHARES: [f64; 2] = [0.5, 0.2];
 
@@ -190,8 +190,7 @@ fn levels_are_added_to_and_taken_from_an_area_without_refining_it() {
     drop(without.build("area", 2));
     let before = without.product("area");
     let folder = without.path("area");
-    let options = compiler::Options { workers: 2, fresh: false, stop: &false.into() };
-    let built = compiler::build(&scene.job, &folder, &options, &mut crate::scene::Silent).unwrap();
+    let built = compiler::build(&scene.job, &folder, &options(2, &false.into()), &mut crate::scene::Silent).unwrap();
     assert!(matches!(scene.job.tin.method, Method::Optimised(_)));
     assert_eq!(built.report.levels.len(), 3);
     drop(built);

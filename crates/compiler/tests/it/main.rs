@@ -23,6 +23,7 @@ mod incremental;
 mod levels;
 mod measures;
 mod one_tile_again;
+mod published;
 mod random_jobs;
 mod read_back;
 mod real_ground;

@@ -7,7 +7,7 @@ use terrain::{Dem, Post, TileId};
 
 use crate::modes;
 use crate::product::Product;
-use crate::scene::{Draw, SIDE_CELLS, Scene, Words, assert_same, differing, sample_dem, tile};
+use crate::scene::{Draw, SIDE_CELLS, Scene, Words, assert_same, differing, options, sample_dem, tile};
 
 /// Equal allocation: what a tile may spend does not depend on what the DEM of another holds, so a tile that is run
 /// again can have the bytes of a fresh build. With a survey the fresh build would share its budget anew.
@@ -170,6 +170,27 @@ fn with_a_survey_released_borders_are_sound_and_the_next_build_makes_them_whole(
 }
 
 #[test]
+fn until_a_build_has_renewed_the_rest_none_says_that_nothing_changed() {
+    let words = Words::raster();
+    let scene = Scene::on(&words, &ground());
+    drop(scene.build("area", 2));
+    scene.tile("area", tile(2, 2), false);
+    assert!(scene.build("area", 2).is_unchanged, "a tile of the same ground changes nothing for others");
+    scene.replace_dem(&with_hill(&ground(), middle(tile(1, 0))));
+    // The second one finds a database of the new ground's files, in which the first one has left old tiles.
+    for again in [tile(1, 0), tile(2, 2)] {
+        scene.tile("area", again, true);
+        assert!(database::Folder::new(scene.path("area")).report().unwrap().outdated, "{again}");
+    }
+    let built = scene.build("area", 2);
+    assert!(!built.is_unchanged && !built.report.outdated);
+    drop(built);
+    assert!(scene.build("area", 2).is_unchanged);
+    drop(scene.build("fresh", 2));
+    assert_same(&scene.product("fresh"), &scene.product("area"), "after the next build");
+}
+
+#[test]
 fn a_tile_that_chooses_no_border_is_never_frozen() {
     for (name, words) in words().into_iter().take(2) {
         // Tile 1,1 has the highest rank of 3 x 3: all its sides are its neighbours'.
@@ -224,9 +245,15 @@ fn running_a_tile_again_is_refused_where_there_is_nothing_to_go_on_from() {
     let error = scene.try_tile("area", tile(3, 0), false).unwrap_err();
     assert!(error.to_string().contains("3,0"), "{error}");
     let other = Scene::on(&Words { limits: "per_load_module = 60".into(), ..words }, &ground());
-    let options = compiler::Options { workers: 1, fresh: false, stop: &std::sync::atomic::AtomicBool::new(false) };
     let folder = scene.path("area");
-    let run = compiler::rebuild_tile(&other.job, &folder, tile(0, 0), false, &options, &mut crate::scene::Silent);
+    let run = compiler::rebuild_tile(
+        &other.job,
+        &folder,
+        tile(0, 0),
+        false,
+        &options(1, &false.into()),
+        &mut crate::scene::Silent,
+    );
     let error = run.unwrap_err();
     assert!(error.to_string().contains("per_load_module = 60"), "{error}");
     assert_same(&before, &scene.product("area"), "refused");

@@ -1,7 +1,7 @@
 //! A finished database read back for pictures, explained, and compared with another.
 
-use compiler::CompileError;
-use inspect::{NO_RESIDUAL, Product, Wanted, WantedGround, difference, explain, product};
+use inspect::{difference, explain};
+use product::{NO_RESIDUAL, Product, ProductError, ProductGround, Wanted, WantedGround};
 use terrain::{Dem, ModuleId, ModuleRect, Post};
 
 use crate::scene::{Scene, Words, sample_dem};
@@ -10,8 +10,8 @@ fn words() -> Words {
     Words { size: (6, 8), tiles: (2, 2), ..Words::raster() }
 }
 
-fn read(scene: &Scene, part: Option<ModuleRect>) -> Result<Product, CompileError> {
-    product(&scene.path("area"), &Wanted { part, ground: WantedGround::Recorded, workers: 2 })
+fn read(scene: &Scene, part: Option<ModuleRect>) -> Result<Product, ProductError> {
+    Product::read(&scene.path("area"), &Wanted { part, ground: WantedGround::Recorded, workers: 2 })
 }
 
 #[test]
@@ -43,7 +43,7 @@ fn a_part_is_the_same_as_that_part_of_the_whole() {
     assert_eq!(part.modules, inside);
     let (whole, part) = (whole.ground.unwrap(), part.ground.unwrap());
     assert_eq!(part.dem, whole.dem.window(part.dem.rect()));
-    let at = |of: &inspect::ProductGround, post: Post| {
+    let at = |of: &ProductGround, post: Post| {
         let rect = of.dem.rect();
         of.residuals[(post.row - rect.south) as usize * rect.posts_wide() + (post.col - rect.west) as usize]
     };

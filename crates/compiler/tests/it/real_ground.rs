@@ -2,13 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
-use compiler::{Built, Options};
+use compiler::Built;
 use job::{Edges as JobEdges, Job};
 use terrain::{Dem, Post, PostRect, quanta_of_metres};
 
 use crate::findings::{check_limits, check_report};
 use crate::product::{Edges, Product};
-use crate::scene::{Silent, assert_same, tree};
+use crate::scene::{Silent, assert_same, options, tree};
 use crate::surface::sums_of_product;
 
 /// A file of the shared terrain; says aloud when it is not there.
@@ -48,8 +48,7 @@ fn job(name: &str, changes: &[(&str, &str)]) -> Job {
 
 /// Builds a job in `folder` and checks all that can be checked without its DEM.
 fn build(job: &Job, folder: &Path, workers: usize) -> (Built, Product) {
-    let options = Options { workers, fresh: false, stop: &false.into() };
-    let built = compiler::build(job, folder, &options, &mut Silent).unwrap();
+    let built = compiler::build(job, folder, &options(workers, &false.into()), &mut Silent).unwrap();
     let edges = match job.modules.edges {
         JobEdges::Constrained => Edges::Constrained,
         JobEdges::Clip(_) => Edges::Clipped,

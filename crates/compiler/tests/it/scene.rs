@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
+use std::time::Duration;
 
 use compiler::{Built, CompileError, Event, Options, Progress, Rebuilt};
 use job::Job;
@@ -122,7 +123,7 @@ impl Scene {
         stop: &AtomicBool,
         progress: &mut dyn Progress,
     ) -> Result<Built, CompileError> {
-        compiler::build(&self.job, &self.path(folder), &Options { workers, fresh: false, stop }, progress)
+        compiler::build(&self.job, &self.path(folder), &options(workers, stop), progress)
     }
 
     /// Builds, and gives what was found; the database is unlocked.
@@ -132,8 +133,8 @@ impl Scene {
     }
 
     pub fn try_tile(&self, folder: &str, tile: TileId, release_borders: bool) -> Result<Rebuilt, CompileError> {
-        let options = Options { workers: 2, fresh: false, stop: &AtomicBool::new(false) };
-        compiler::rebuild_tile(&self.job, &self.path(folder), tile, release_borders, &options, &mut Silent)
+        let stop = AtomicBool::new(false);
+        compiler::rebuild_tile(&self.job, &self.path(folder), tile, release_borders, &options(2, &stop), &mut Silent)
     }
 
     /// Runs one tile again, and gives which tiles were refined and whether it is frozen.
@@ -152,6 +153,12 @@ impl Scene {
                 !name.starts_with("report.") && name != "breaches.geojson" && name != "lock"
             })
             .collect()
+    }
+
+    /// Takes the report away, so that the next build walks through every stage, whatever has changed.
+    #[track_caller]
+    pub fn forget_report(&self, folder: &str) {
+        fs::remove_file(self.path(folder).join(database::files::REPORT)).unwrap();
     }
 
     #[track_caller]
@@ -208,6 +215,11 @@ pub fn write_dem(path: &Path, dem: &Dem) {
 /// The sample terrain of a grid.
 pub fn sample_dem(grid: ModuleGrid, seed: u64) -> Dem {
     sample_terrain::heights(seed, grid.area(), spacing())
+}
+
+/// A run without a page and without times: drawing takes longer than most of these builds.
+pub fn options(workers: usize, stop: &AtomicBool) -> Options<'_> {
+    Options { page: false, ..Options::new(workers, stop, &|| Duration::ZERO) }
 }
 
 /// Listens to nothing.

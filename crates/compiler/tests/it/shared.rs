@@ -5,17 +5,16 @@ use std::path::Path;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
-use compiler::{CompileError, Options, Sharing, Unit, UnitEnd};
+use compiler::{CompileError, Event, Options, Progress, Sharing, Stage, Unit, UnitEnd};
 use engine::Lease;
 use job::Job;
 use terrain::TileId;
 
 use crate::modes;
-use crate::scene::{Scene, Silent, Words, assert_same, sample_dem, tile};
+use crate::scene::{Scene, Silent, Words, assert_same, options, sample_dem, tile};
 
 fn perform(scene: &Scene, units: &[Unit]) -> Result<UnitEnd, CompileError> {
-    let options = Options { workers: 1, fresh: false, stop: &AtomicBool::new(false) };
-    compiler::perform(&scene.job, &scene.path("area"), units, &options, &mut Silent)
+    compiler::perform(&scene.job, &scene.path("area"), units, &options(1, &false.into()), &mut Silent)
 }
 
 fn tiles() -> Vec<TileId> {
@@ -38,8 +37,7 @@ fn by_units(scene: &Scene, surveys: bool) {
     }
     tiles().into_iter().for_each(|tile| assert!(perform(scene, &[Unit::Assemble(tile)]).is_ok()));
     let end = perform(scene, &[Unit::Publish]).unwrap();
-    let UnitEnd::Published(built) = end else { panic!("not published: {end:?}") };
-    built.database.remove_work().unwrap();
+    assert!(matches!(end, UnitEnd::Published(_)), "not published: {end:?}");
 }
 
 #[test]
@@ -78,9 +76,7 @@ fn a_published_tile_that_is_damaged_takes_its_mark_back() {
     assert!(error.is_transient() && error.to_string().contains("refine-r00c00"), "{error}");
     perform(&scene, &[Unit::Refine(tile(0, 0)), Unit::Refine(tile(0, 1))]).unwrap();
     // Publishing makes whatever is missing.
-    let UnitEnd::Published(built) = perform(&scene, &[Unit::Publish]).unwrap() else { panic!("not published") };
-    built.database.remove_work().unwrap();
-    drop(built);
+    assert!(matches!(perform(&scene, &[Unit::Publish]).unwrap(), UnitEnd::Published(_)));
     assert_same(&scene.product("alone"), &scene.product("area"), "after damage");
 }
 
@@ -92,19 +88,28 @@ fn two_jobs() -> [Scene; 2] {
 
 /// Does units of one job's work in another's folder.
 fn perform_in(folder: &Path, job: &Job, units: &[Unit]) -> UnitEnd {
-    let options = Options { workers: 1, fresh: false, stop: &AtomicBool::new(false) };
-    compiler::perform(job, folder, units, &options, &mut Silent).unwrap()
+    compiler::perform(job, folder, units, &options(1, &false.into()), &mut Silent).unwrap()
 }
 
-/// All units but the surveys of a job in a folder, its report, and `before_sweeping` before its work is swept.
-fn finish_in(folder: &Path, job: &Job, before_sweeping: impl FnOnce()) {
+/// Does something when a stage ends.
+struct When<F: FnMut()>(Stage, F);
+
+impl<F: FnMut()> Progress for When<F> {
+    fn tell(&mut self, event: Event) {
+        if event == Event::Leave(self.0) {
+            self.1();
+        }
+    }
+}
+
+/// All units but the surveys of a job in a folder, and `before_sweeping` before its work is swept.
+fn finish_in(folder: &Path, job: &Job, before_sweeping: impl FnMut()) {
     perform_in(folder, job, &[Unit::Allocate]);
     tiles().into_iter().for_each(|tile| drop(perform_in(folder, job, &[Unit::Refine(tile)])));
     tiles().into_iter().for_each(|tile| drop(perform_in(folder, job, &[Unit::Assemble(tile)])));
-    let UnitEnd::Published(built) = perform_in(folder, job, &[Unit::Publish]) else { panic!("not published") };
-    built.database.write_json(database::files::REPORT, &built.report).unwrap();
-    before_sweeping();
-    built.work.as_ref().unwrap().sweep();
+    let (stop, mut hook) = (AtomicBool::new(false), When(Stage::Publish, before_sweeping));
+    let end = compiler::perform(job, folder, &[Unit::Publish], &options(1, &stop), &mut hook).unwrap();
+    assert!(matches!(end, UnitEnd::Published(_)), "{end:?}");
 }
 
 fn survey_in(folder: &Path, job: &Job) {
@@ -127,19 +132,21 @@ fn a_worker_that_was_slow_while_its_build_ended_and_another_began_does_no_harm()
     let [first, next] = two_jobs();
     let folder = first.path("area");
     drop(next.build("area", 2));
-    let is_first = Cell::new(true);
-    let now = || {
-        if is_first.replace(false) {
+    // It has read its ground and joined when it looks at the clock for its first lease.
+    let (has_read, is_first) = (Cell::new(false), Cell::new(true));
+    let clock = || {
+        if has_read.get() && is_first.replace(false) {
             finish_in(&folder, &first.job, || survey_in(&folder, &next.job));
         }
         Duration::ZERO
     };
     let (wait, holding) = (|_: Duration| {}, |_: Option<Lease>| {});
     let second = Duration::from_secs(1);
-    let sharing = Sharing { name: "slow", lease: second, pause: second, now: &now, wait: &wait, holding: &holding };
-    let options = Options { workers: 1, fresh: false, stop: &AtomicBool::new(false) };
-    let end = compiler::work(&first.job, &folder, &options, &sharing, &mut Silent).unwrap();
-    assert!(end.units == 0 && end.published.is_none(), "{end:?}");
+    let sharing = Sharing { name: "slow", lease: second, pause: second, wait: &wait, holding: &holding };
+    let (stop, mut read) = (AtomicBool::new(false), When(Stage::Read, || has_read.set(true)));
+    let options = Options { clock: &clock, ..options(1, &stop) };
+    let end = compiler::work(&first.job, &folder, &options, &sharing, &mut read).unwrap();
+    assert!(!is_first.get() && end.units == 0 && end.published.is_none(), "{end:?}");
     finish_in(&folder, &next.job, || ());
     assert_same(&next.product("area"), &first.product("area"), "the second job");
 }
@@ -156,19 +163,15 @@ fn workers_side_by_side_give_the_bytes_of_a_build() {
             name,
             lease: Duration::from_secs(3600),
             pause: Duration::from_millis(1),
-            now: &|| clock.get(),
             wait: &|pause| {
                 clock.set(clock.get() + pause);
                 std::thread::yield_now();
             },
             holding: &|_| {},
         };
-        let options = Options { workers: 1, fresh: false, stop: &stop };
+        let time = || clock.get();
+        let options = Options { clock: &time, ..options(1, &stop) };
         let end = compiler::work(&scene.job, &scene.path("area"), &options, &sharing, &mut Silent).unwrap();
-        if let Some(built) = &end.published {
-            built.database.write_json(database::files::REPORT, &built.report).unwrap();
-            built.database.remove_work().unwrap();
-        }
         (end.units, end.published.is_some())
     };
     let ends = std::thread::scope(|scope| {

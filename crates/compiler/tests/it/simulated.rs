@@ -69,36 +69,24 @@ impl Kit {
 fn work(job: &Job, memory: &Memory) -> Result<(), CompileError> {
     let folder = Folder::stored(Arc::new(memory.clone()), DIR);
     let (stop, waits) = (AtomicBool::new(false), std::cell::Cell::new(0));
-    let options = Options { workers: 1, fresh: false, stop: &stop };
+    // Every look at the time is an hour later, so leases of the dead are over at once.
+    let hours = std::cell::Cell::new(0);
+    let clock = || {
+        hours.set(hours.get() + 1);
+        Duration::from_secs(3600 * hours.get())
+    };
+    let options = Options { page: false, ..Options::new(1, &stop, &clock) };
     let sharing = Sharing {
         name: "last",
         lease: LEASE,
         pause: Duration::ZERO,
-        // Every look at the time is an hour later, so leases of the dead are over at once.
-        now: &hourly(),
         wait: &|_| {
             waits.set(waits.get() + 1);
             stop.store(1000 < waits.get(), Ordering::Relaxed);
         },
         holding: &|_| (),
     };
-    finish(compiler::work(job, folder, &options, &sharing, &mut Silent)?);
-    Ok(())
-}
-
-fn hourly() -> impl Fn() -> Duration {
-    let hours = std::cell::Cell::new(0);
-    move || {
-        hours.set(hours.get() + 1);
-        Duration::from_secs(3600 * hours.get())
-    }
-}
-
-fn finish(end: compiler::WorkerEnd) {
-    if let Some(built) = end.published {
-        let _ = built.database.write_json(files::REPORT, &built.report);
-        built.work.iter().for_each(database::Work::sweep);
-    }
+    compiler::work(job, folder, &options, &sharing, &mut Silent).map(drop)
 }
 
 /// All that the runs of a campaign stand on: jobs of several kinds, each with another one of the same area.
@@ -210,29 +198,25 @@ impl Process<'_> {
 
     fn wait(&self, time: Duration) {
         self.faulty.wait(time);
-        if TIME_MAX < self.faulty.now() {
+        if TIME_MAX < self.faulty.wall() {
             self.stop.store(true, Ordering::Relaxed);
         }
     }
 
     fn work(&self, name: &str) -> Result<(), CompileError> {
         let folder = Folder::stored(Arc::new(self.faulty.clone()), DIR);
-        let options = Options { workers: 1, fresh: false, stop: self.stop };
+        let options = Options { page: false, ..Options::new(1, self.stop, &self.faulty) };
         if self.builds {
-            let built = compiler::build(self.job, folder, &options, &mut Silent)?;
-            built.database.write_json(files::REPORT, &built.report)?;
-            return Ok(());
+            return compiler::build(self.job, folder, &options, &mut Silent).map(drop);
         }
         let sharing = Sharing {
             name,
             lease: LEASE,
             pause: Duration::from_secs(1),
-            now: &|| self.faulty.now(),
             wait: &|pause| self.wait(pause),
             holding: &|_| (),
         };
-        finish(compiler::work(self.job, folder, &options, &sharing, &mut Silent)?);
-        Ok(())
+        compiler::work(self.job, folder, &options, &sharing, &mut Silent).map(drop)
     }
 }
 

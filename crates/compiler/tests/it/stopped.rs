@@ -3,6 +3,7 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use compiler::{CompileError, Event, Progress, Stage};
+use database::DatabaseError;
 use inspect::Sights;
 
 use crate::modes;
@@ -39,7 +40,7 @@ fn build_and_stop(scene: &Scene, stage: Stage, tiles: usize, workers: usize) {
     let verdict = inspect::verify(&scene.path("area"), None).unwrap();
     assert!(verdict.problems.iter().any(|problem| problem.contains("incomplete")), "{:?}", verdict.problems);
     let measured = inspect::fidelity(&scene.path("area"), None, Sights::USUAL);
-    assert!(matches!(measured, Err(CompileError::Unfinished { .. })), "{measured:?}");
+    assert!(matches!(measured, Err(CompileError::Database(DatabaseError::Unfinished { .. }))), "{measured:?}");
 }
 
 #[test]

@@ -3,7 +3,8 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use inspect::{Explanation, WantedGround, explain};
+use inspect::{Explanation, explain};
+use product::WantedGround;
 use serde_json::{Value, json};
 use terrain::{ModuleId, RefusedBy, StopReason, TileId};
 use views::{Align, Table, fold, grouped};

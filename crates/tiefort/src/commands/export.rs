@@ -6,8 +6,8 @@ use clap::{Args, ValueEnum};
 use compiler::CompileError;
 use database::Folder;
 use exports::{Block, Coordinates, Datum, ExportError, Facts, Levels, Mesh, Product, Work};
-use inspect::BuiltFrom;
 use job::Job;
+use product::BuiltFrom;
 use terrain::{ModuleId, PostRect};
 use views::grouped;
 
@@ -276,7 +276,7 @@ fn write_raster(arguments: &Arguments, product: &Product, work: &Work) -> Result
     }
     let ground = BuiltFrom::open(&arguments.database, arguments.against.as_deref())?;
     let fault = |error: CompileError| ExportError::Ground { message: error.to_string(), hint: error.hint() };
-    let heights = |rect: PostRect| ground.heights(rect).map_err(fault);
+    let heights = |rect: PostRect| ground.heights(rect).map_err(|error| fault(error.into()));
     files::write_whole_or(&arguments.out, |out| Ok(exports::write_residual(out, product, &heights, work)?))
 }
 

@@ -3,7 +3,8 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use compiler::{Plan, PlannedTile, Played};
+use compiler::{Plan, Played};
+use ground::PlannedTile;
 use job::Job;
 use serde_json::{Value, json};
 use views::{Align, Table, fold, grouped};

@@ -4,14 +4,13 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use database::Folder;
-use inspect::{Product, Wanted, WantedGround, product};
+use product::{Product, SceneParts, Wanted, WantedGround};
 use terrain::{LoadModule, ModuleId, ModuleRect};
 use views::{Eye, Image, Map, RESIDUAL_SCALE_M, Shown, Sight, Style, draw_map, draw_sight};
 
 use crate::arguments::{Workers, positive};
 use crate::failure::{Failure, Outcome};
 use crate::files;
-use crate::scene::SceneParts;
 
 const AFTER_HELP: &str = "\
 Examples:
@@ -121,7 +120,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         },
         workers: arguments.workers.count(),
     };
-    let product = product(&arguments.database, &wanted)?;
+    let product = Product::read(&arguments.database, &wanted)?;
     let image = draw(arguments, &product, reads_all)?;
     files::write_whole(&arguments.out, |out| image.write_png(out))?;
     Ok(Outcome::Sound)

@@ -4,11 +4,11 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use database::{Folder, Report};
-use inspect::{Wanted, WantedGround, product};
+use product::{Product, Wanted, WantedGround};
 
 use crate::arguments::Workers;
 use crate::failure::{Failure, Outcome};
-use crate::{page, terminal};
+use crate::terminal;
 
 const AFTER_HELP: &str = "\
 Examples:
@@ -51,7 +51,10 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         let message = "found --against with a report that draws nothing, expected --format html";
         return Err(Failure::new(message, "leave --against out, or add --format html"));
     }
-    let report = Folder::new(&arguments.database).report()?;
+    let folder = Folder::new(&arguments.database);
+    // A build that was ended just before its end may have left a report.
+    folder.finished()?;
+    let report = folder.report()?;
     let text = match arguments.format {
         Format::Json => {
             serde_json::to_string_pretty(&report).expect("a report that was read from JSON is JSON again") + "\n"
@@ -67,12 +70,12 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
 fn html(arguments: &Arguments, report: &Report) -> Result<String, Failure> {
     let ground = arguments.against.as_deref().map_or(WantedGround::Recorded, WantedGround::Raster);
     let wanted = Wanted { part: None, ground, workers: arguments.workers.count() };
-    let product = match product(&arguments.database, &wanted) {
-        Err(error) if error.is_of_the_job() && arguments.against.is_none() => {
+    let product = match Product::read(&arguments.database, &wanted) {
+        Err(error) if error.is_of_the_ground() && arguments.against.is_none() => {
             terminal::tell(&format!("note: {error}; the page is drawn without it\nhint: --against DEM names it\n"));
-            product(&arguments.database, &Wanted { ground: WantedGround::None, ..wanted })?
+            Product::read(&arguments.database, &Wanted { ground: WantedGround::None, ..wanted })?
         }
         found => found?,
     };
-    Ok(page::page(&product, report))
+    Ok(product::page(&product, report))
 }

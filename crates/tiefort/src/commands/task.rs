@@ -66,10 +66,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let units = units(&job, arguments)?;
     let names: Vec<String> = units.iter().map(|unit| unit.name()).collect();
     let run = Run::announce_briefly(&job, &arguments.run, &names.join(" "))?;
-    let (end, times) =
-        run.listen(|listener| compiler::perform(&job, run.folder(), &units, &run.options(false), listener))?;
+    let end = run.listen(|listener| compiler::perform(&job, run.folder(), &units, &run.options(false), listener))?;
     match end {
-        UnitEnd::Published(built) => run.conclude(Finished::from(*built), times),
+        UnitEnd::Published(built) => Ok(run.conclude(&Finished::from(*built))),
         UnitEnd::Done | UnitEnd::Finished => Ok(Outcome::Sound),
     }
 }

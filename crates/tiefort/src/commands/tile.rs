@@ -49,7 +49,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         let names: Vec<String> = rebuilt.rebuilt.iter().map(TileId::to_string).collect();
         let frozen = if rebuilt.frozen { "; frozen: a build makes it whole" } else { "" };
         let tiles = format!("{} built{frozen}", names.join(", "));
-        Ok(Finished { report: rebuilt.report, database: rebuilt.database, work: None, tiles, is_unchanged: false })
+        Ok(Finished { report: rebuilt.report, tiles, is_unchanged: false })
     })
 }
 

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::PoisonError;
 
 use clap::{ArgGroup, Args, ValueEnum};
-use compiler::Stage;
+use compiler::{Stage, Stopwatch};
 use exports::TinPlace;
 use inspect::{Fidelity, Sights};
 use job::Optimising;
@@ -14,6 +14,7 @@ use views::{Align, Coordinates, MeshPlace, Table, grouped};
 use workbench::{Mesh, TinMethod, TinRequest, TinStart};
 
 use crate::arguments::{Workers, positive, rows_by_columns, start_method};
+use crate::clock::SystemClock;
 use crate::estimate::Estimate;
 use crate::failure::{Failure, Outcome};
 use crate::progress::{Listener, Show};
@@ -205,15 +206,18 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         (false, true) => Show::Nothing,
         (false, false) => Show::Progress,
     };
-    let mut listener = Listener::start(show, arguments.tiles, request.workers, Estimate::of_one_stage(Stage::Refine));
+    let (clock, estimate) = (SystemClock::start(), Estimate::of_one_stage(Stage::Refine));
+    let mut listener = Listener::start(show, arguments.tiles, request.workers, estimate, clock);
     let place = listener.place();
     signals.end_in_time(move || signals::stopped(&place.lock().unwrap_or_else(PoisonError::into_inner).words()));
     let levels: Vec<usize> = arguments.levels.iter().map(|&points| points as usize).collect();
+    let mut watched = Stopwatch::start(&clock, &mut listener);
     let meshed = match levels.is_empty() {
-        true => workbench::tin(&request, signals.stop(), &mut listener).map(|mesh| vec![mesh]),
-        false => workbench::tin_levels(&request, &levels, signals.stop(), &mut listener),
+        true => workbench::tin(&request, signals.stop(), &mut watched).map(|mesh| vec![mesh]),
+        false => workbench::tin_levels(&request, &levels, signals.stop(), &mut watched),
     };
-    let seconds = listener.finish().seconds;
+    listener.finish();
+    let seconds = clock.seconds();
     signals.tell_once(|| {});
     let meshes = meshed.map_err(|error| Failure::of_compiler(&error, signals.exit_code()))?;
     for (mesh, out) in meshes.iter().zip(&outs) {

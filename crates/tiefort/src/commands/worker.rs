@@ -1,10 +1,10 @@
 //! `tiefort worker`: one of any number of processes that build a database in a shared folder.
 
 use std::path::PathBuf;
-use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use clap::Args;
-use compiler::{Sharing, WorkerEnd};
+use compiler::{Clock, Sharing, WorkerEnd};
 use job::Job;
 
 use crate::arguments::RunArguments;
@@ -46,21 +46,20 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let job = Job::load_with(&arguments.job, &ground::find_area)?;
     let run = Run::announce_briefly(&job, &arguments.run, "worker")?;
-    let (name, start) = (name(), Instant::now());
+    let name = name();
     let lease = Duration::from_secs(arguments.lease);
     let sharing = Sharing {
         name: &name,
         lease,
         pause: PAUSE.min(lease / 4),
-        now: &|| start.elapsed(),
         wait: &|pause| std::thread::sleep(pause),
         holding: &|lease| run.hold(lease),
     };
-    let (end, times) = run.listen(|listener| {
+    let end = run.listen(|listener| {
         loop {
             // Those that begin at once may find each other half-way; a build or another job stays longer.
             match compiler::work(&job, run.folder(), &run.options(false), &sharing, listener) {
-                Err(error) if error.is_transient() && start.elapsed() < lease => (sharing.wait)(PAUSE),
+                Err(error) if error.is_transient() && run.clock().wall() < lease => (sharing.wait)(PAUSE),
                 worked => return worked,
             }
         }
@@ -69,7 +68,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     match published {
         Some(built) => {
             let tiles = format!("done by workers; this one did {units} units of work and published");
-            run.conclude(Finished { tiles, ..Finished::from(*built) }, times)
+            Ok(run.conclude(&Finished { tiles, ..Finished::from(*built) }))
         }
         None => {
             if !arguments.run.quiet {

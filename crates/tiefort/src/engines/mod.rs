@@ -135,7 +135,7 @@ fn tasks(plan: &Plan, pack: usize) -> Vec<Task> {
 
 /// Tiles in groups: those of a group wait for earlier groups only, so any of them may share a task.
 fn levels(plan: &Plan) -> Vec<Vec<TileId>> {
-    let mut by_rank: Vec<&compiler::PlannedTile> = plan.tiles.iter().collect();
+    let mut by_rank: Vec<&ground::PlannedTile> = plan.tiles.iter().collect();
     by_rank.sort_by_key(|tile| tile.rank);
     let mut level_of: BTreeMap<TileId, usize> = BTreeMap::new();
     let mut levels: Vec<Vec<TileId>> = Vec::new();
@@ -148,7 +148,7 @@ fn levels(plan: &Plan) -> Vec<Vec<TileId>> {
     levels
 }
 
-fn planned(plan: &Plan, tile: TileId) -> &compiler::PlannedTile {
+fn planned(plan: &Plan, tile: TileId) -> &ground::PlannedTile {
     let place = plan.tiles.binary_search_by_key(&(tile.row, tile.col), |tile| (tile.tile.row, tile.tile.col));
     &plan.tiles[place.expect("a plan lists every tile, row by row")]
 }

@@ -4,15 +4,14 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use axum::body::Bytes;
-use inspect::{Product, ProductGround, Wanted, WantedGround, product};
 use load_module_reader::{Area, Keep};
+use product::{Product, ProductGround, Wanted, WantedGround, water};
 use serde_json::json;
 use terrain::{HOLE_CLASS, ModuleGrid, ModuleRect};
 use views::{RESIDUAL_SCALE_M, palette};
 
 use super::overview::Overview;
 use crate::failure::Failure;
-use crate::scene::water;
 
 /// How far the observer sees load modules.
 const VISIBLE_RANGE_M: f64 = 3500.0;
@@ -40,7 +39,7 @@ impl Viewed {
     /// When the database is unfinished, damaged or missing.
     pub fn open(folder: &Path) -> Result<Self, Failure> {
         let first = ModuleRect { south: 0, west: 0, north: 1, east: 1 };
-        let product = product(folder, &Wanted { part: Some(first), ground: WantedGround::None, workers: 1 })?;
+        let product = Product::read(folder, &Wanted { part: Some(first), ground: WantedGround::None, workers: 1 })?;
         let damaged = |error| Failure::new(error, "`tiefort verify` says what is damaged, `tiefort build` mends it");
         let area = Area::open(folder, Keep::OnDisk).map_err(damaged)?;
         let overview = Overview::read(&area).map_err(damaged)?;

@@ -3,8 +3,8 @@
 //! As bytes: heights of all posts of the block, its four border lines included, in metres (f32), row by row from the
 //! south-west; then the residual of each, DEM less triangles (f32; not a number at voids).
 
-use inspect::{NO_RESIDUAL, ProductGround, Wanted, WantedGround, product};
 use load_module_reader::{Block, QUANTA_PER_METRE};
+use product::{NO_RESIDUAL, Product, ProductGround, Wanted, WantedGround};
 use terrain::{ModuleRect, Post};
 
 use super::area::Viewed;
@@ -48,6 +48,6 @@ fn read(viewed: &Viewed) -> Result<ProductGround, String> {
         return Err(format!("the area has {posts} posts, and the viewer holds at most {POSTS_MAX}"));
     }
     let wanted = Wanted { part: None, ground: WantedGround::Recorded, workers: 2 };
-    let product = product(&viewed.folder, &wanted).map_err(|error| error.to_string())?;
+    let product = Product::read(&viewed.folder, &wanted).map_err(|error| error.to_string())?;
     product.ground.ok_or_else(|| "the database names no ground".into())
 }

@@ -1,6 +1,8 @@
 //! From a job to a database and back to words.
 
 use std::fs;
+use std::io::{BufRead, BufReader};
+use std::process::Stdio;
 
 use serde_json::Value;
 
@@ -47,6 +49,27 @@ fn the_report_has_the_keys_of_the_contract() {
     }
     let breaches: Value = serde_json::from_slice(&fs::read(scene.path("small.tdb/breaches.geojson")).unwrap()).unwrap();
     assert_eq!(breaches["features"], serde_json::json!([]));
+}
+
+#[test]
+fn a_build_killed_while_its_page_is_drawn_is_no_database_until_the_next_one() {
+    let scene = Scene::with_job("small.toml", &[]);
+    scene.run_to(0, &["build", "job.toml", "--out", "undisturbed.tdb", "--quiet"]);
+    let mut build = scene.program();
+    build.args(["build", "job.toml", "--log", "json"]).stderr(Stdio::piped());
+    let mut build = build.spawn().unwrap();
+    let mut lines = BufReader::new(build.stderr.take().unwrap()).lines().map_while(Result::ok);
+    assert!(lines.any(|line| line.contains("\"enter\"") && line.contains("\"page\"")), "no page was drawn");
+    build.kill().unwrap();
+    build.wait().unwrap();
+    assert!(scene.path("small.tdb/report.json").exists());
+    let told = scene.run_to(2, &["status", "small.tdb"]).stdout;
+    assert!(told.contains("incomplete") && told.contains("done: 4"), "{told}");
+    scene.refuses(&["report", "small.tdb"], &["small.tdb", "incomplete"]);
+    scene.run_to(0, &["build", "job.toml", "--quiet"]);
+    scene.run_to(0, &["verify", "small.tdb"]);
+    let manifest = |name: &str| fs::read(scene.path(name).join("database.json")).unwrap();
+    assert!(manifest("small.tdb") == manifest("undisturbed.tdb") && scene.path("small.tdb/report.html").exists());
 }
 
 #[test]

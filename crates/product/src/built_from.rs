@@ -3,14 +3,11 @@
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-use compiler::CompileError;
-use database::{Folder, ManifestState};
 use ground::Ground;
 use schedule::Workers;
 use terrain::{Dem, PostRect};
 
-use crate::measures::choose_ground;
-use crate::verify::job_of;
+use crate::{Opened, ProductError, choose_ground};
 
 /// Heights of a finished database's ground.
 pub struct BuiltFrom {
@@ -23,13 +20,8 @@ impl BuiltFrom {
     ///
     /// # Errors
     /// When the database is missing, unfinished or damaged, or the ground cannot be found or used.
-    pub fn open(folder: &Path, against: Option<&Path>) -> Result<Self, CompileError> {
-        let folder = Folder::new(folder);
-        let manifest = folder.manifest()?;
-        if manifest.state != ManifestState::Complete {
-            return Err(CompileError::Unfinished { path: folder.dir().display().to_string() });
-        }
-        let (mut job, area) = job_of(&manifest, folder.dir())?;
+    pub fn open(folder: &Path, against: Option<&Path>) -> Result<Self, ProductError> {
+        let Opened { folder, manifest, mut job, area } = Opened::open(folder)?;
         // Nothing that is compared with heights depends on weights.
         job.importance.areas.clear();
         let name = choose_ground(&mut job, &manifest, folder.dir(), against)?;
@@ -46,7 +38,7 @@ impl BuiltFrom {
     ///
     /// # Errors
     /// When the source has no heights there.
-    pub fn heights(&self, rect: PostRect) -> Result<Dem, CompileError> {
+    pub fn heights(&self, rect: PostRect) -> Result<Dem, ProductError> {
         Ok(self.ground.window(rect)?.dem)
     }
 }

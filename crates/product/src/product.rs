@@ -4,16 +4,15 @@
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-use compiler::{CompileError, PlannedTile, Stage, planned_tiles};
-use database::{Folder, Manifest, ManifestState};
+use database::{Folder, Manifest};
 use fidelity::each_residual;
-use ground::{GamingArea, Ground, Window};
+use ground::{GamingArea, Ground, GroundError, PlannedTile, Window, planned_tiles};
 use job::{Count, Job};
 use schedule::Workers;
 use terrain::{Dem, GridFrame, LoadModule, ModuleGrid, ModuleRect, Post, PostRect, TileId};
+use views::NO_RESIDUAL;
 
-use crate::measures::choose_ground;
-use crate::verify::job_of;
+use crate::{Opened, ProductError, choose_ground};
 
 /// What is wanted of a database.
 #[derive(Clone, Copy, Debug)]
@@ -71,9 +70,6 @@ pub struct ProductGround {
     pub name: String,
 }
 
-/// Stands for the residual of a void.
-pub const NO_RESIDUAL: i32 = i32::MIN;
-
 /// Counts held against limits.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LimitUse {
@@ -86,6 +82,47 @@ pub struct LimitUse {
 }
 
 impl Product {
+    /// Reads a finished database. The heights of the part are held at once, 8 bytes a post.
+    ///
+    /// # Errors
+    /// When it is missing, unfinished or damaged, or the ground is wanted and cannot be found or used.
+    pub fn read(folder: &Path, wanted: &Wanted) -> Result<Self, ProductError> {
+        Self::of(&Opened::open(folder)?, wanted)
+    }
+
+    /// The same of a database that is open.
+    ///
+    /// # Errors
+    /// As [`Product::read`].
+    pub fn of(opened: &Opened, wanted: &Wanted) -> Result<Self, ProductError> {
+        let Opened { folder, manifest, job, area } = opened;
+        let part = wanted.part.unwrap_or(area.grid.all());
+        check_part(part, area)?;
+        let (workers, stop) = (Workers::new(wanted.workers), AtomicBool::new(false));
+        let ground = match open_ground(opened, wanted.ground)? {
+            Some((job, name)) => Some((Ground::open(&job, area, &workers, &stop)?, name)),
+            None => None,
+        };
+        let meets = |tile: &TileId| meet(area.tiling.modules(*tile, area.grid), part).is_some();
+        let tiles: Vec<TileId> = area.tiles.iter().copied().filter(meets).collect();
+        let read =
+            |_: usize, &tile: &TileId| read_tile(folder, area, ground.as_ref().map(|(ground, _)| ground), part, tile);
+        let pieces = schedule::for_each_independent(&tiles, &workers, &stop, read)
+            .map_err(|error| GroundError::from_schedule(&tiles, error))?;
+        let (modules, pieces): (Vec<_>, Vec<_>) = pieces.into_iter().map(|piece| (piece.modules, piece.ground)).unzip();
+        let mut modules: Vec<LoadModule> = modules.into_iter().flatten().collect();
+        modules.sort_by_key(|module| module.id);
+        check_complete(&modules, part, folder)?;
+        let rect = area.grid.posts_of_rect(part);
+        let ground = ground.map(|(_, name)| {
+            let pieces: Vec<Piece> = pieces.into_iter().flatten().collect();
+            join(&pieces, rect, name)
+        });
+        let (manifest, job) = (manifest.clone(), job.clone());
+        let (grid, frame, tiles) = (area.grid, area.frame, planned_tiles(area));
+        Ok(Self { manifest, job, grid, frame, tiles, part, modules, ground })
+    }
+
     /// What limits count, in every load module and window.
     ///
     /// # Panics
@@ -103,50 +140,9 @@ impl Product {
     }
 }
 
-/// Reads a finished database. The heights of the part are held at once, 8 bytes a post.
-///
-/// # Errors
-/// When it is missing, unfinished or damaged, or the ground is wanted and cannot be found or used.
-pub fn product(folder: &Path, wanted: &Wanted) -> Result<Product, CompileError> {
-    let folder = Folder::new(folder);
-    let manifest = folder.manifest()?;
-    if manifest.state != ManifestState::Complete {
-        return Err(CompileError::Unfinished { path: folder.dir().display().to_string() });
-    }
-    let (job, area) = job_of(&manifest, folder.dir())?;
-    let part = wanted.part.unwrap_or(area.grid.all());
-    check_part(part, &area)?;
-    let (workers, stop) = (Workers::new(wanted.workers), AtomicBool::new(false));
-    let ground = match open_ground(&job, &manifest, folder.dir(), wanted.ground)? {
-        Some((job, name)) => Some((Ground::open(&job, &area, &workers, &stop)?, name)),
-        None => None,
-    };
-    let tiles: Vec<TileId> =
-        area.tiles.iter().copied().filter(|&tile| meet(area.tiling.modules(tile, area.grid), part).is_some()).collect();
-    let read =
-        |_: usize, &tile: &TileId| read_tile(&folder, &area, ground.as_ref().map(|(ground, _)| ground), part, tile);
-    let pieces = schedule::for_each_independent(&tiles, &workers, &stop, read)
-        .map_err(|error| CompileError::from_schedule(Stage::Read, &tiles, error))?;
-    let (modules, pieces): (Vec<_>, Vec<_>) = pieces.into_iter().map(|piece| (piece.modules, piece.ground)).unzip();
-    let mut modules: Vec<LoadModule> = modules.into_iter().flatten().collect();
-    modules.sort_by_key(|module| module.id);
-    check_complete(&modules, part, &folder)?;
-    let rect = area.grid.posts_of_rect(part);
-    let ground = ground.map(|(_, name)| {
-        let pieces: Vec<Piece> = pieces.into_iter().flatten().collect();
-        join(&pieces, rect, name)
-    });
-    let planned = planned_tiles(&area);
-    Ok(Product { manifest, job, grid: area.grid, frame: area.frame, tiles: planned, part, modules, ground })
-}
-
 /// The job that names the ground, and what the ground is called.
-fn open_ground(
-    job: &Job,
-    manifest: &Manifest,
-    folder: &Path,
-    wanted: WantedGround,
-) -> Result<Option<(Job, String)>, CompileError> {
+fn open_ground(opened: &Opened, wanted: WantedGround) -> Result<Option<(Job, String)>, ProductError> {
+    let Opened { folder, manifest, job, .. } = opened;
     let mut job = match wanted {
         WantedGround::None => return Ok(None),
         WantedGround::Job(job) => job.clone(),
@@ -156,35 +152,35 @@ fn open_ground(
     job.importance.areas.clear();
     let name = match wanted {
         WantedGround::Job(job) => job.area.name.clone(),
-        WantedGround::Raster(path) => choose_ground(&mut job, manifest, folder, Some(path))?,
-        _ => choose_ground(&mut job, manifest, folder, None)?,
+        WantedGround::Raster(path) => choose_ground(&mut job, manifest, folder.dir(), Some(path))?,
+        _ => choose_ground(&mut job, manifest, folder.dir(), None)?,
     };
     Ok(Some((job, name)))
 }
 
-fn check_part(part: ModuleRect, area: &GamingArea) -> Result<(), CompileError> {
+fn check_part(part: ModuleRect, area: &GamingArea) -> Result<(), ProductError> {
     let (rows, cols) = (area.grid.rows, area.grid.cols);
     if part.south < part.north && part.west < part.east && part.north <= rows && part.east <= cols {
         return Ok(());
     }
-    Err(CompileError::Impossible {
-        key: "load modules".into(),
-        found: format!("{},{} to {},{}", part.south, part.west, i64::from(part.north) - 1, i64::from(part.east) - 1),
-        expected: format!("rows from 0 to {} and columns from 0 to {}", rows - 1, cols - 1),
-        hint: "rows come first and both count from the south-west".into(),
-    })
+    Err(ProductError::impossible(
+        "load modules",
+        format!("{},{} to {},{}", part.south, part.west, i64::from(part.north) - 1, i64::from(part.east) - 1),
+        format!("rows from 0 to {} and columns from 0 to {}", rows - 1, cols - 1),
+        "rows come first and both count from the south-west",
+    ))
 }
 
-fn check_complete(modules: &[LoadModule], part: ModuleRect, folder: &Folder) -> Result<(), CompileError> {
+fn check_complete(modules: &[LoadModule], part: ModuleRect, folder: &Folder) -> Result<(), ProductError> {
     if modules.len() == part.count() {
         return Ok(());
     }
-    Err(CompileError::Impossible {
-        key: folder.dir().display().to_string(),
-        found: format!("{} load modules in its files", modules.len()),
-        expected: format!("{}", part.count()),
-        hint: "the database is damaged: `tiefort verify` says where, `tiefort build --fresh` makes it anew".into(),
-    })
+    Err(ProductError::impossible(
+        folder.dir().display().to_string(),
+        format!("{} load modules in its files", modules.len()),
+        format!("{}", part.count()),
+        "the database is damaged: `tiefort verify` says where, `tiefort build --fresh` makes it anew",
+    ))
 }
 
 /// What two rectangles have in common.
@@ -216,7 +212,7 @@ fn read_tile(
     ground: Option<&Ground>,
     part: ModuleRect,
     tile: TileId,
-) -> Result<TilePiece, CompileError> {
+) -> Result<TilePiece, ProductError> {
     let (_, mut modules) = folder.read_modules(tile)?;
     modules.retain(|module| part.contains(module.id));
     let inside = meet(area.tiling.modules(tile, area.grid), part).expect("only tiles of the part are read");

@@ -1,9 +1,11 @@
 //! From a database that was read back to what pictures and reports are drawn from.
 
 use database::{Report, ReportPlace, TileState};
-use inspect::{LimitUse, Product};
+use job::{Count, Job};
 use terrain::{LoadModule, ModuleId, ModuleRect};
 use views::{Scene, SceneGround, SceneLimits, SceneTile};
+
+use crate::{LimitUse, Product};
 
 /// What a scene borrows besides the product itself.
 #[derive(Debug)]
@@ -29,8 +31,8 @@ impl SceneParts {
         }
         let limits = SceneLimits {
             count: match limits.count {
-                job::Count::Triangles => "triangles".into(),
-                job::Count::Polygons => "polygons".into(),
+                Count::Triangles => "triangles".into(),
+                Count::Polygons => "polygons".into(),
             },
             modules: use_of.modules,
             per_load_module: limits.per_load_module,
@@ -72,7 +74,7 @@ impl SceneParts {
 }
 
 /// The class of water: what the job gives to its water polygons, or one that is named so.
-pub fn water(job: &job::Job) -> Option<u8> {
+pub fn water(job: &Job) -> Option<u8> {
     let named = || job.importance.classes.iter().position(|class| class == "water");
     job.dem.water.as_ref().map(|water| water.class).or_else(|| named().map(|index| index as u8))
 }

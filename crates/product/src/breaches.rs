@@ -1,0 +1,18 @@
+//! The breaches of a report as files for maps and for tables.
+
+use database::{Report, files};
+use job::Job;
+use views::{BreachPlaces, breaches_csv, breaches_geojson};
+
+/// Names and texts of the files that list the breaches of `report`, whose job this is.
+pub fn breaches(job: &Job, report: &Report) -> [(&'static str, String); 2] {
+    let (area, window) = (&job.area, &job.limits.window);
+    let places = BreachPlaces {
+        origin_m: area.origin_m,
+        module_side_m: job.modules.side_m,
+        modules: [area.grid.rows, area.grid.cols],
+        window: [window.rows, window.cols],
+        epsg: area.epsg,
+    };
+    [(files::BREACHES, breaches_geojson(report, &places)), (files::BREACHES_CSV, breaches_csv(report, &places))]
+}

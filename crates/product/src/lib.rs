@@ -1,0 +1,22 @@
+//! A finished database read back, and how it is shown: load modules, the ground under them, residuals, the page.
+//!
+//! [`Opened`] is the one way to open a finished database with its job.
+
+mod error;
+pub use error::ProductError;
+mod opened;
+pub use opened::Opened;
+mod sources;
+pub use sources::{choose_ground, locate_weights};
+mod product;
+pub use product::{LimitUse, Product, ProductGround, Wanted, WantedGround};
+mod built_from;
+pub use built_from::BuiltFrom;
+/// Stands for the residual of a void.
+pub use views::NO_RESIDUAL;
+mod scene;
+pub use scene::{SceneParts, water};
+mod breaches;
+pub use breaches::breaches;
+mod page;
+pub use page::{page, page_without_maps};
