@@ -1,6 +1,6 @@
 //! A whole gaming area, on one page.
 
-use database::{Database, Folder, Manifest, ManifestState, Previous, Report, TileState};
+use database::{Area, Database, Folder, Manifest, ManifestState, Report, SourceRecord, TileState};
 use ground::{GamingArea, Ground};
 use job::Job;
 use schedule::Workers;
@@ -94,15 +94,18 @@ pub(crate) fn open<'a>(
     options: &Options<'a>,
     progress: &mut dyn Progress,
 ) -> Result<Run<'a>, CompileError> {
-    open_with(job, options, progress, |area| Database::create_or_open(folder, area))
+    open_with(job, options, progress, |area, _| {
+        let (database, previous) = Database::create_or_open(folder, area)?;
+        Ok((database, previous.manifest()))
+    })
 }
 
-/// The same, with the database locked by `lock`.
+/// The same, with the database as `lock` takes it, and what `database.json` said.
 pub(crate) fn open_with<'a>(
     job: &'a Job,
     options: &Options<'a>,
     progress: &mut dyn Progress,
-    lock: impl FnOnce(&database::Area) -> Result<(Database, Previous), database::DatabaseError>,
+    lock: impl FnOnce(&Area, &[SourceRecord]) -> Result<(Database, Option<Manifest>), CompileError>,
 ) -> Result<Run<'a>, CompileError> {
     let area = GamingArea::new(job)?;
     let workers = Workers::new(options.workers);
@@ -115,11 +118,7 @@ pub(crate) fn open_with<'a>(
     for warning in &ground.warnings {
         progress.tell(Event::Note(warning.clone()));
     }
-    let (database, previous) = lock(&database_area(job))?;
-    let previous = match previous {
-        Previous::Database(manifest) => Some(*manifest),
-        Previous::Nothing | Previous::Damaged(_) => None,
-    };
+    let (database, previous) = lock(&database_area(job), &records)?;
     let Options { page, stop, .. } = *options;
     Ok(Run { job, area, ground, workers, page, stop, database, records, states, tins: Tins::new(), previous })
 }
@@ -136,20 +135,25 @@ fn unchanged(job: &Job, there: &Folder, progress: &mut dyn Progress) -> Result<O
     let (database, _) = Database::create_or_open(there, &database_area(job))?;
     // Looked at again, now that nobody else can change it.
     let manifest = there.manifest()?;
-    let report = there.report();
-    let is_fresh = might_be_fresh(&manifest, job) && manifest.sources == records && there.verify_bytes(&manifest)?;
+    let fresh = fresh(there, &manifest, job, &records)?;
     progress.tell(Event::Leave(Stage::Read));
-    match report {
-        Ok(report) if is_fresh && !report.outdated => {
-            let kept = manifest.tiles.len();
-            Ok(Some(Built { report, kept, rebuilt: 0, is_unchanged: true, database }))
-        }
-        _ => Ok(None),
-    }
+    let built = |report| Built { report, kept: manifest.tiles.len(), rebuilt: 0, is_unchanged: true, database };
+    Ok(fresh.map(built))
+}
+
+/// The report of a database in which a build of `job` from these sources would change nothing.
+pub(crate) fn fresh(
+    there: &Folder,
+    manifest: &Manifest,
+    job: &Job,
+    records: &[SourceRecord],
+) -> Result<Option<Report>, CompileError> {
+    let is_fresh = might_be_fresh(manifest, job) && manifest.sources == records && there.verify_bytes(manifest)?;
+    Ok(there.report().ok().filter(|report| is_fresh && !report.outdated))
 }
 
 /// Whether a manifest is of a finished build of `job` by this revision, as far as it says itself.
-pub(crate) fn might_be_fresh(manifest: &Manifest, job: &Job) -> bool {
+fn might_be_fresh(manifest: &Manifest, job: &Job) -> bool {
     manifest.state == ManifestState::Complete
         && manifest.algorithm_revision == ALGORITHM_REVISION
         && manifest.job == job.canonical_text()

@@ -39,6 +39,7 @@ mod bound;
 mod coarse;
 mod curves;
 mod enforce;
+mod enter;
 mod measured;
 pub use measured::sums_of;
 mod publish;

@@ -1,7 +1,7 @@
 //! The manifest before anything changes; and the last stage: breaches, the report, its page, and the manifest when
 //! everything is there.
 
-use database::{Area, Database, FileStamp, Manifest, ManifestState, Removals, Report, TileState, files};
+use database::{Area, Database, FileStamp, Manifest, ManifestState, Removals, Report, SourceRecord, TileState, files};
 use job::Job;
 use product::{Opened, Product, Wanted, WantedGround};
 use serde_json::{Value, json};
@@ -35,12 +35,17 @@ pub fn database_area(job: &Job) -> Area {
     }
 }
 
-/// A manifest of a build that has not published anything yet.
+/// A manifest of a run that has not published anything yet.
 pub(crate) fn beginning(run: &Run) -> Manifest {
-    let mut manifest = Manifest::new(database_area(run.job), run.job.canonical_text(), ALGORITHM_REVISION);
-    manifest.sources = run.records.clone();
+    beginning_of(run.job, &run.records, run.previous.as_ref())
+}
+
+/// The same of any build of `job` from these sources.
+pub(crate) fn beginning_of(job: &Job, records: &[SourceRecord], previous: Option<&Manifest>) -> Manifest {
+    let mut manifest = Manifest::new(database_area(job), job.canonical_text(), ALGORITHM_REVISION);
+    manifest.sources = records.to_vec();
     // What was there before, by its bytes: while the build is under way, these files are not its own yet.
-    if let Some(previous) = &run.previous {
+    if let Some(previous) = previous {
         manifest.tiles.clone_from(&previous.tiles);
     }
     manifest

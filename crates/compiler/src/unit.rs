@@ -10,17 +10,17 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use database::{Database, Folder, Lock, Manifest, ManifestState, Share, ShareAllowance, Work};
-use engine::{Fingerprint, Held, Outcome, Stamp};
+use database::{Folder, Share, ShareAllowance, Work};
+use engine::{Fingerprint, Outcome, Stamp};
 use job::{Edges, Job};
 use limits::Allowance;
 use schedule::Workers;
 use terrain::{LatticePoint, ModuleRect, TileId, TileTin};
 
 use crate::assemble::assemble_tile;
-use crate::build::{Built, finish, might_be_fresh, open_with};
+use crate::build::{Built, finish, open_with};
 use crate::curves::Curves;
-use crate::publish::beginning;
+use crate::enter::enter;
 use crate::refine::{Published, refine_tile};
 use crate::run::{ALGORITHM_REVISION, Options, Run, run_name};
 use crate::survey::{allocate, survey_tile};
@@ -82,35 +82,14 @@ impl<'a> Session<'a> {
         options: &Options<'a>,
         progress: &mut dyn Progress,
     ) -> Result<Self, CompileError> {
-        let is_shared = Lock::held(folder) == Held::Shared;
-        let run = open_with(job, options, progress, |area| Database::join(folder, area))?;
-        let canonical = job.canonical_text();
-        let is_ours = |manifest: &&Manifest| {
-            manifest.job == canonical
-                && manifest.algorithm_revision == ALGORITHM_REVISION
-                && manifest.sources == run.records
-        };
-        let is_under_way = |manifest: &Manifest| manifest.state == ManifestState::Incomplete;
-        let there = run.database.folder();
-        let is_finished = match run.previous.as_ref().filter(is_ours) {
-            Some(manifest) if manifest.state == ManifestState::Incomplete => false,
-            Some(manifest)
-                if might_be_fresh(manifest, job)
-                    && there.verify_bytes(manifest)?
-                    && there.report().is_ok_and(|report| !report.outdated) =>
-            {
-                true
-            }
-            None if is_shared && run.previous.as_ref().is_some_and(is_under_way) => {
-                return Err(CompileError::OtherRun { path: folder.dir().display().to_string() });
-            }
-            _ => {
-                run.database.begin(&beginning(&run))?;
-                false
-            }
-        };
-        let name = run_name(&canonical, &run.records, ALGORITHM_REVISION);
-        let work = if is_finished { there.work(&name) } else { run.database.work(&name)? };
+        let mut is_finished = false;
+        let run = open_with(job, options, progress, |area, records| {
+            let entered = enter(job, records, folder, area, options.clock)?;
+            is_finished = entered.is_finished;
+            Ok((entered.database, Some(entered.manifest)))
+        })?;
+        let name = run_name(&job.canonical_text(), &run.records, ALGORITHM_REVISION);
+        let work = if is_finished { run.database.folder().work(&name) } else { run.database.work(&name)? };
         Ok(Self { run, work, is_finished })
     }
 

@@ -26,8 +26,6 @@ pub struct Sharing<'a> {
     pub lease: Duration,
     /// How long to wait when nothing is ready.
     pub pause: Duration,
-    /// Waits.
-    pub wait: &'a dyn Fn(Duration),
     /// Told which lease is held, to be given up if the process has to end.
     pub holding: &'a (dyn Fn(Option<Lease>) + Sync),
 }
@@ -55,35 +53,11 @@ pub fn work(
     sharing: &Sharing,
     progress: &mut dyn Progress,
 ) -> Result<WorkerEnd, CompileError> {
-    let (folder, mut units) = (folder.into(), 0);
     let progress = &mut Stopwatch::start(options.clock, progress);
-    loop {
-        let session = Session::join(job, &folder, options, progress)?;
-        match share(session, options, sharing, progress)? {
-            Shift::Ended(end) => return Ok(WorkerEnd { units: units + end.units, ..end }),
-            Shift::Swept(done) => units += done,
-        }
-    }
-}
-
-/// How a worker's part in a build ended.
-enum Shift {
-    /// The build is published.
-    Ended(WorkerEnd),
-    /// Another process published it and swept up while a third one, which had looked at the folder just before, began
-    /// it again. So many units were done.
-    Swept(usize),
-}
-
-fn share(
-    session: Session,
-    options: &Options,
-    sharing: &Sharing,
-    progress: &mut Stopwatch,
-) -> Result<Shift, CompileError> {
+    let session = Session::join(job, &folder.into(), options, progress)?;
     if session.is_finished {
         session.work.sweep();
-        return Ok(Shift::Ended(WorkerEnd { units: 0, published: None }));
+        return Ok(WorkerEnd { units: 0, published: None });
     }
     let mut worker = Worker {
         open: session.units(),
@@ -102,18 +76,17 @@ fn share(
         if worker.is_published() {
             // Whoever published may have been ended before it swept up.
             worker.session.work.sweep();
-            return Ok(Shift::Ended(WorkerEnd { units: worker.units, published: None }));
+            return Ok(WorkerEnd { units: worker.units, published: None });
         }
         let next = match worker.next() {
-            _ if !worker.session.work.is_there() && !worker.is_published() => return Ok(Shift::Swept(worker.units)),
             // It was published and swept meanwhile.
             Err(_) if worker.is_published() => continue,
             next => next?,
         };
         match next {
-            Some((Unit::Publish, lease)) => return Ok(Shift::Ended(worker.publish(&lease, progress)?)),
+            Some((Unit::Publish, lease)) => return worker.publish(&lease, progress),
             Some((unit, lease)) => worker.perform(unit, lease, progress)?,
-            None => (sharing.wait)(sharing.pause),
+            None => options.clock.wait(sharing.pause),
         }
     }
 }

@@ -51,6 +51,16 @@ pub enum Previous {
     Damaged(DatabaseError),
 }
 
+impl Previous {
+    /// What `database.json` said, if it can be believed.
+    pub fn manifest(self) -> Option<Manifest> {
+        match self {
+            Previous::Database(manifest) => Some(*manifest),
+            Previous::Nothing | Previous::Damaged(_) => None,
+        }
+    }
+}
+
 impl Database {
     /// Makes the directory, or opens it to go on with the database of `area` in it. Locks it, makes the folders and
     /// removes what a killed run left half-written.

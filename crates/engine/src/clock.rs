@@ -11,6 +11,11 @@ pub trait Clock {
     fn cpu(&self) -> Duration {
         Duration::ZERO
     }
+
+    /// Returns after so much time.
+    fn wait(&self, time: Duration) {
+        std::thread::sleep(time);
+    }
 }
 
 impl<F: Fn() -> Duration> Clock for F {

@@ -152,17 +152,6 @@ impl Faulty {
         self.pass_on(&mut state);
     }
 
-    /// Goes on after so much time.
-    pub fn wait(&self, time: Duration) {
-        let mut state = self.world.state();
-        if state.workers[self.worker].is_dead {
-            return;
-        }
-        state.workers[self.worker].until = state.now + time;
-        self.pass_on(&mut state);
-        drop(self.turn(state));
-    }
-
     fn turn<'a>(&self, state: MutexGuard<'a, State>) -> MutexGuard<'a, State> {
         let is_others = |state: &mut State| state.turn != self.worker;
         let mut state =
@@ -249,6 +238,16 @@ impl Faulty {
 impl Clock for Faulty {
     fn wall(&self) -> Duration {
         self.world.state().now
+    }
+
+    fn wait(&self, time: Duration) {
+        let mut state = self.world.state();
+        if state.workers[self.worker].is_dead {
+            return;
+        }
+        state.workers[self.worker].until = state.now + time;
+        self.pass_on(&mut state);
+        drop(self.turn(state));
     }
 }
 

@@ -98,7 +98,7 @@ fn a_report_does_not_depend_on_who_asks_for_the_build() {
     assert!(matches!(end, UnitEnd::Published(_)), "{end:?}");
 
     let second = Duration::from_secs(1);
-    let sharing = Sharing { name: "one", lease: second, pause: second, wait: &|_| {}, holding: &|_| {} };
+    let sharing = Sharing { name: "one", lease: second, pause: second, holding: &|_| {} };
     let end = compiler::work(&scene.job, &scene.path("worker"), &options(1, &stop), &sharing, &mut Silent).unwrap();
     assert!(end.published.is_some(), "{end:?}");
 

@@ -6,7 +6,6 @@ use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 use compiler::{CompileError, Event, Options, Progress, Sharing, Stage, Unit, UnitEnd};
-use engine::Lease;
 use job::Job;
 use terrain::TileId;
 
@@ -116,19 +115,28 @@ fn survey_in(folder: &Path, job: &Job) {
     tiles().into_iter().for_each(|tile| drop(perform_in(folder, job, &[Unit::Survey(tile)])));
 }
 
+/// Whether a build of another job that would begin in the folder now is told to try again.
+#[track_caller]
+fn is_kept_out(folder: &Path, job: &Job) {
+    let survey = [Unit::Survey(tile(0, 0))];
+    let error = compiler::perform(job, folder, &survey, &options(1, &false.into()), &mut Silent).unwrap_err();
+    assert!(error.is_transient() && error.to_string().contains("other processes"), "{error}");
+}
+
 #[test]
-fn a_build_of_another_job_that_begins_as_one_ends_keeps_its_work() {
+fn a_build_of_another_job_begins_once_one_has_ended() {
     let [first, next] = two_jobs();
     let folder = first.path("area");
     drop(next.build("area", 2));
-    finish_in(&folder, &first.job, || survey_in(&folder, &next.job));
+    finish_in(&folder, &first.job, || is_kept_out(&folder, &next.job));
+    survey_in(&folder, &next.job);
     finish_in(&folder, &next.job, || ());
     assert_same(&next.product("area"), &first.product("area"), "the second job");
     first.verify("area");
 }
 
 #[test]
-fn a_worker_that_was_slow_while_its_build_ended_and_another_began_does_no_harm() {
+fn as_long_as_a_slow_worker_is_there_no_build_of_another_job_begins() {
     let [first, next] = two_jobs();
     let folder = first.path("area");
     drop(next.build("area", 2));
@@ -136,17 +144,18 @@ fn a_worker_that_was_slow_while_its_build_ended_and_another_began_does_no_harm()
     let (has_read, is_first) = (Cell::new(false), Cell::new(true));
     let clock = || {
         if has_read.get() && is_first.replace(false) {
-            finish_in(&folder, &first.job, || survey_in(&folder, &next.job));
+            finish_in(&folder, &first.job, || ());
+            is_kept_out(&folder, &next.job);
         }
         Duration::ZERO
     };
-    let (wait, holding) = (|_: Duration| {}, |_: Option<Lease>| {});
     let second = Duration::from_secs(1);
-    let sharing = Sharing { name: "slow", lease: second, pause: second, wait: &wait, holding: &holding };
+    let sharing = Sharing { name: "slow", lease: second, pause: second, holding: &|_| {} };
     let (stop, mut read) = (AtomicBool::new(false), When(Stage::Read, || has_read.set(true)));
     let options = Options { clock: &clock, ..options(1, &stop) };
     let end = compiler::work(&first.job, &folder, &options, &sharing, &mut read).unwrap();
     assert!(!is_first.get() && end.units == 0 && end.published.is_none(), "{end:?}");
+    survey_in(&folder, &next.job);
     finish_in(&folder, &next.job, || ());
     assert_same(&next.product("area"), &first.product("area"), "the second job");
 }
@@ -157,20 +166,10 @@ fn workers_side_by_side_give_the_bytes_of_a_build() {
     let scene = Scene::on(&words, &sample_dem(words.grid(), 1));
     drop(scene.build("alone", 2));
     let work = |name: &str| {
-        let clock = Cell::new(Duration::ZERO);
         let stop = AtomicBool::new(false);
-        let sharing = Sharing {
-            name,
-            lease: Duration::from_secs(3600),
-            pause: Duration::from_millis(1),
-            wait: &|pause| {
-                clock.set(clock.get() + pause);
-                std::thread::yield_now();
-            },
-            holding: &|_| {},
-        };
-        let time = || clock.get();
-        let options = Options { clock: &time, ..options(1, &stop) };
+        let sharing =
+            Sharing { name, lease: Duration::from_secs(3600), pause: Duration::from_millis(1), holding: &|_| {} };
+        let options = options(1, &stop);
         let end = compiler::work(&scene.job, &scene.path("area"), &options, &sharing, &mut Silent).unwrap();
         (end.units, end.published.is_some())
     };

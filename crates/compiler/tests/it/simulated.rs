@@ -1,6 +1,7 @@
 //! Workers that share a store which fails, tears, delays and forgets, and that are ended at any step: whatever
 //! happens, the build ends in the bytes of an undisturbed one. A run depends on nothing but its seed.
 
+use std::cell::Cell;
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
@@ -61,31 +62,42 @@ impl Kit {
             return Some(format!("files {there:?}, expected {expected:?}"));
         }
         let differs = expected.iter().find(|path| found[*path] != self.files[*path]);
-        differs.map(|path| format!("{} has other bytes", path.display()))
+        differs.map(|path| {
+            let [found, expected] =
+                [&found, &self.files].map(|files| String::from_utf8_lossy(&files[path]).into_owned());
+            let line: Vec<_> =
+                found.lines().zip(expected.lines()).filter(|(found, expected)| found != expected).collect();
+            format!("{} has other bytes, first {line:?}", path.display())
+        })
+    }
+}
+
+/// A clock on which an hour passes between any two looks, and that is tired of waiting after a thousand.
+struct Hourly<'a> {
+    hours: &'a Cell<u64>,
+    stop: &'a AtomicBool,
+}
+
+impl Clock for Hourly<'_> {
+    fn wall(&self) -> Duration {
+        self.hours.set(self.hours.get() + 1);
+        Duration::from_secs(3600 * self.hours.get())
+    }
+
+    fn wait(&self, _time: Duration) {
+        self.hours.set(self.hours.get() + 1);
+        self.stop.store(100_000 < self.hours.get(), Ordering::Relaxed);
     }
 }
 
 /// A worker without others on a store without faults.
 fn work(job: &Job, memory: &Memory) -> Result<(), CompileError> {
     let folder = Folder::stored(Arc::new(memory.clone()), DIR);
-    let (stop, waits) = (AtomicBool::new(false), std::cell::Cell::new(0));
     // Every look at the time is an hour later, so leases of the dead are over at once.
-    let hours = std::cell::Cell::new(0);
-    let clock = || {
-        hours.set(hours.get() + 1);
-        Duration::from_secs(3600 * hours.get())
-    };
+    let (stop, hours) = (AtomicBool::new(false), Cell::new(0));
+    let clock = Hourly { hours: &hours, stop: &stop };
     let options = Options { page: false, ..Options::new(1, &stop, &clock) };
-    let sharing = Sharing {
-        name: "last",
-        lease: LEASE,
-        pause: Duration::ZERO,
-        wait: &|_| {
-            waits.set(waits.get() + 1);
-            stop.store(1000 < waits.get(), Ordering::Relaxed);
-        },
-        holding: &|_| (),
-    };
+    let sharing = Sharing { name: "last", lease: LEASE, pause: Duration::ZERO, holding: &|_| () };
     compiler::work(job, folder, &options, &sharing, &mut Silent).map(drop)
 }
 
@@ -196,27 +208,27 @@ impl Process<'_> {
         self.faulty.leave();
     }
 
+    fn work(&self, name: &str) -> Result<(), CompileError> {
+        let folder = Folder::stored(Arc::new(self.faulty.clone()), DIR);
+        let options = Options { page: false, ..Options::new(1, self.stop, self) };
+        if self.builds {
+            return compiler::build(self.job, folder, &options, &mut Silent).map(drop);
+        }
+        let sharing = Sharing { name, lease: LEASE, pause: Duration::from_secs(1), holding: &|_| () };
+        compiler::work(self.job, folder, &options, &sharing, &mut Silent).map(drop)
+    }
+}
+
+impl Clock for Process<'_> {
+    fn wall(&self) -> Duration {
+        self.faulty.wall()
+    }
+
     fn wait(&self, time: Duration) {
         self.faulty.wait(time);
         if TIME_MAX < self.faulty.wall() {
             self.stop.store(true, Ordering::Relaxed);
         }
-    }
-
-    fn work(&self, name: &str) -> Result<(), CompileError> {
-        let folder = Folder::stored(Arc::new(self.faulty.clone()), DIR);
-        let options = Options { page: false, ..Options::new(1, self.stop, &self.faulty) };
-        if self.builds {
-            return compiler::build(self.job, folder, &options, &mut Silent).map(drop);
-        }
-        let sharing = Sharing {
-            name,
-            lease: LEASE,
-            pause: Duration::from_secs(1),
-            wait: &|pause| self.wait(pause),
-            holding: &|_| (),
-        };
-        compiler::work(self.job, folder, &options, &sharing, &mut Silent).map(drop)
     }
 }
 

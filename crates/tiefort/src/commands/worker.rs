@@ -48,18 +48,12 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let run = Run::announce_briefly(&job, &arguments.run, "worker")?;
     let name = name();
     let lease = Duration::from_secs(arguments.lease);
-    let sharing = Sharing {
-        name: &name,
-        lease,
-        pause: PAUSE.min(lease / 4),
-        wait: &|pause| std::thread::sleep(pause),
-        holding: &|lease| run.hold(lease),
-    };
+    let sharing = Sharing { name: &name, lease, pause: PAUSE.min(lease / 4), holding: &|lease| run.hold(lease) };
     let end = run.listen(|listener| {
         loop {
             // Those that begin at once may find each other half-way; a build or another job stays longer.
             match compiler::work(&job, run.folder(), &run.options(false), &sharing, listener) {
-                Err(error) if error.is_transient() && run.clock().wall() < lease => (sharing.wait)(PAUSE),
+                Err(error) if error.is_transient() && run.clock().wall() < lease => run.clock().wait(PAUSE),
                 worked => return worked,
             }
         }
