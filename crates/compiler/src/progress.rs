@@ -38,6 +38,20 @@ impl Stage {
             Stage::Page => "page",
         }
     }
+
+    /// What it makes, in a few words.
+    pub fn meaning(self) -> &'static str {
+        match self {
+            Stage::Read => "Heights and weights, ready to be asked",
+            Stage::Survey => "What more points would gain, tile by tile",
+            Stage::Allocate => "What each tile may spend",
+            Stage::Refine => "The TINs of tiles",
+            Stage::Assemble => "The load modules of tiles",
+            Stage::Enforce => "Room where a limit is exceeded",
+            Stage::Publish => "All that is left, and the report",
+            Stage::Page => "The report's page",
+        }
+    }
 }
 
 /// One thing that happened.

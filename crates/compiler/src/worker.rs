@@ -13,8 +13,9 @@ use engine::{Claim, Lease, Leases};
 use job::Job;
 
 use crate::build::Built;
+use crate::order::Unit;
 use crate::run::Options;
-use crate::unit::{Session, Unit};
+use crate::unit::Session;
 use crate::{Clock, CompileError, Event, Progress, Stage, Stopwatch};
 
 /// How a worker shares a directory with others.
@@ -84,7 +85,7 @@ pub fn work(
             next => next?,
         };
         match next {
-            Some((Unit::Publish, lease)) => return worker.publish(&lease, progress),
+            Some((Unit { stage: Stage::Publish, .. }, lease)) => return worker.publish(&lease, progress),
             Some((unit, lease)) => worker.perform(unit, lease, progress)?,
             None => options.clock.wait(sharing.pause),
         }
@@ -120,19 +121,19 @@ impl Worker<'_, '_> {
     /// A unit that is ready and now ours; the last one once all others are done.
     fn next(&mut self) -> Result<Option<(Unit, Lease)>, CompileError> {
         let marked: BTreeSet<String> = self.session.work.marks().all()?.into_iter().collect();
-        let is_done = |unit: &Unit| marked.contains(&unit.name());
+        let is_done = |unit: &Unit| marked.contains(&unit.to_string());
         self.open.retain(|unit| !is_done(unit));
         let mut ready: Vec<Unit> = match self.open.is_empty() {
-            true => vec![Unit::Publish],
+            true => vec![Unit::whole(Stage::Publish)],
             false => self.open.iter().copied().filter(|&unit| self.session.needs(unit).iter().all(is_done)).collect(),
         };
         // Workers begin at different places, so that they rarely ask for the same lease.
         let places = ready.len().max(1);
         ready.rotate_left(self.sharing.name.bytes().fold(0, |sum, byte| (sum * 31 + usize::from(byte)) % places));
         for unit in ready {
-            if let Claim::Ours(lease, _) = self.leases.claim(&unit.name(), self.clock.wall())? {
+            if let Claim::Ours(lease, _) = self.leases.claim(&unit.to_string(), self.clock.wall())? {
                 // It may have been done between the look at the marks and the claim.
-                if self.session.work.marks().marked(&unit.name()).is_none() {
+                if self.session.work.marks().marked(&unit.to_string()).is_none() {
                     return Ok(Some((unit, lease)));
                 }
             }

@@ -92,8 +92,9 @@ fn a_report_does_not_depend_on_who_asks_for_the_build() {
     let stop = AtomicBool::new(false);
     let tiles = [tile(0, 0), tile(0, 1), tile(1, 0), tile(1, 1)];
     let [surveys, refines, assembles] =
-        [Unit::Survey as fn(_) -> _, Unit::Refine, Unit::Assemble].map(|unit| tiles.map(unit).to_vec());
-    let units = [surveys, vec![Unit::Allocate], refines, assembles, vec![Unit::Publish]].concat();
+        [Stage::Survey, Stage::Refine, Stage::Assemble].map(|stage| tiles.map(|tile| Unit::of(stage, tile)).to_vec());
+    let units =
+        [surveys, vec![Unit::whole(Stage::Allocate)], refines, assembles, vec![Unit::whole(Stage::Publish)]].concat();
     let end = compiler::perform(&scene.job, &scene.path("units"), &units, &options(1, &stop), &mut Silent).unwrap();
     assert!(matches!(end, UnitEnd::Published(_)), "{end:?}");
 
@@ -139,7 +140,9 @@ fn a_build_that_ends_at_any_step_of_publishing_is_whole_after_the_next() {
             if units {
                 let stop = AtomicBool::new(false);
                 let whole = Options::new(2, &stop, &|| Duration::ZERO);
-                let end = compiler::perform(&scene.job, there.dir(), &[Unit::Publish], &whole, &mut Silent).unwrap();
+                let end =
+                    compiler::perform(&scene.job, there.dir(), &[Unit::whole(Stage::Publish)], &whole, &mut Silent)
+                        .unwrap();
                 assert!(matches!(end, UnitEnd::Published(_)), "{step}: {end:?}");
             } else {
                 let again = build_with_page(&scene, "area", &mut Silent);
@@ -161,7 +164,7 @@ fn a_finished_database_whose_report_is_gone_gets_it_again_from_any_process() {
         scene.forget_report("area");
         if is_shared {
             let stop = AtomicBool::new(false);
-            let units = [Unit::Publish];
+            let units = [Unit::whole(Stage::Publish)];
             let end = compiler::perform(&scene.job, &scene.path("area"), &units, &options(1, &stop), &mut Silent);
             assert!(matches!(end, Ok(UnitEnd::Published(_))), "{end:?}");
         } else {

@@ -26,16 +26,16 @@ fn tiles() -> Vec<TileId> {
 #[track_caller]
 fn by_units(scene: &Scene, surveys: bool) {
     if surveys {
-        tiles().into_iter().rev().for_each(|tile| assert!(perform(scene, &[Unit::Survey(tile)]).is_ok()));
+        tiles().into_iter().rev().for_each(|tile| assert!(perform(scene, &[Unit::of(Stage::Survey, tile)]).is_ok()));
     }
-    perform(scene, &[Unit::Allocate]).unwrap();
+    perform(scene, &[Unit::whole(Stage::Allocate)]).unwrap();
     for tile in tiles() {
-        perform(scene, &[Unit::Refine(tile)]).unwrap();
+        perform(scene, &[Unit::of(Stage::Refine, tile)]).unwrap();
         // Once more does no harm.
-        perform(scene, &[Unit::Refine(tile)]).unwrap();
+        perform(scene, &[Unit::of(Stage::Refine, tile)]).unwrap();
     }
-    tiles().into_iter().for_each(|tile| assert!(perform(scene, &[Unit::Assemble(tile)]).is_ok()));
-    let end = perform(scene, &[Unit::Publish]).unwrap();
+    tiles().into_iter().for_each(|tile| assert!(perform(scene, &[Unit::of(Stage::Assemble, tile)]).is_ok()));
+    let end = perform(scene, &[Unit::whole(Stage::Publish)]).unwrap();
     assert!(matches!(end, UnitEnd::Published(_)), "not published: {end:?}");
 }
 
@@ -56,9 +56,9 @@ fn units_of_work_one_by_one_give_the_bytes_of_a_build() {
 fn a_unit_whose_needs_are_not_done_is_worth_trying_again() {
     let scene = Scene::new(&Words::sample());
     for (units, needs) in [
-        (vec![Unit::Allocate], "survey-r00c00"),
-        (vec![Unit::Refine(tile(0, 0))], "allocate"),
-        (vec![Unit::Assemble(tile(0, 0))], "refine-r00c00"),
+        (vec![Unit::whole(Stage::Allocate)], "survey-r00c00"),
+        (vec![Unit::of(Stage::Refine, tile(0, 0))], "allocate"),
+        (vec![Unit::of(Stage::Assemble, tile(0, 0))], "refine-r00c00"),
     ] {
         let error = perform(&scene, &units).unwrap_err();
         assert!(error.is_transient() && error.to_string().contains(needs), "{error}");
@@ -69,13 +69,17 @@ fn a_unit_whose_needs_are_not_done_is_worth_trying_again() {
 fn a_published_tile_that_is_damaged_takes_its_mark_back() {
     let scene = Scene::new(&Words { tin: "method = \"greedy\"\nallocation = \"equal\"".into(), ..Words::sample() });
     drop(scene.build("alone", 2));
-    perform(&scene, &[Unit::Allocate, Unit::Refine(tile(0, 0)), Unit::Refine(tile(0, 2))]).unwrap();
+    perform(
+        &scene,
+        &[Unit::whole(Stage::Allocate), Unit::of(Stage::Refine, tile(0, 0)), Unit::of(Stage::Refine, tile(0, 2))],
+    )
+    .unwrap();
     std::fs::write(scene.path("area/tiles/r00c00.tin"), b"spoilt").unwrap();
-    let error = perform(&scene, &[Unit::Refine(tile(0, 1))]).unwrap_err();
+    let error = perform(&scene, &[Unit::of(Stage::Refine, tile(0, 1))]).unwrap_err();
     assert!(error.is_transient() && error.to_string().contains("refine-r00c00"), "{error}");
-    perform(&scene, &[Unit::Refine(tile(0, 0)), Unit::Refine(tile(0, 1))]).unwrap();
+    perform(&scene, &[Unit::of(Stage::Refine, tile(0, 0)), Unit::of(Stage::Refine, tile(0, 1))]).unwrap();
     // Publishing makes whatever is missing.
-    assert!(matches!(perform(&scene, &[Unit::Publish]).unwrap(), UnitEnd::Published(_)));
+    assert!(matches!(perform(&scene, &[Unit::whole(Stage::Publish)]).unwrap(), UnitEnd::Published(_)));
     assert_same(&scene.product("alone"), &scene.product("area"), "after damage");
 }
 
@@ -103,22 +107,22 @@ impl<F: FnMut()> Progress for When<F> {
 
 /// All units but the surveys of a job in a folder, and `before_sweeping` before its work is swept.
 fn finish_in(folder: &Path, job: &Job, before_sweeping: impl FnMut()) {
-    perform_in(folder, job, &[Unit::Allocate]);
-    tiles().into_iter().for_each(|tile| drop(perform_in(folder, job, &[Unit::Refine(tile)])));
-    tiles().into_iter().for_each(|tile| drop(perform_in(folder, job, &[Unit::Assemble(tile)])));
+    perform_in(folder, job, &[Unit::whole(Stage::Allocate)]);
+    tiles().into_iter().for_each(|tile| drop(perform_in(folder, job, &[Unit::of(Stage::Refine, tile)])));
+    tiles().into_iter().for_each(|tile| drop(perform_in(folder, job, &[Unit::of(Stage::Assemble, tile)])));
     let (stop, mut hook) = (AtomicBool::new(false), When(Stage::Publish, before_sweeping));
-    let end = compiler::perform(job, folder, &[Unit::Publish], &options(1, &stop), &mut hook).unwrap();
+    let end = compiler::perform(job, folder, &[Unit::whole(Stage::Publish)], &options(1, &stop), &mut hook).unwrap();
     assert!(matches!(end, UnitEnd::Published(_)), "{end:?}");
 }
 
 fn survey_in(folder: &Path, job: &Job) {
-    tiles().into_iter().for_each(|tile| drop(perform_in(folder, job, &[Unit::Survey(tile)])));
+    tiles().into_iter().for_each(|tile| drop(perform_in(folder, job, &[Unit::of(Stage::Survey, tile)])));
 }
 
 /// Whether a build of another job that would begin in the folder now is told to try again.
 #[track_caller]
 fn is_kept_out(folder: &Path, job: &Job) {
-    let survey = [Unit::Survey(tile(0, 0))];
+    let survey = [Unit::of(Stage::Survey, tile(0, 0))];
     let error = compiler::perform(job, folder, &survey, &options(1, &false.into()), &mut Silent).unwrap_err();
     assert!(error.is_transient() && error.to_string().contains("other processes"), "{error}");
 }
@@ -189,7 +193,7 @@ fn workers_side_by_side_give_the_bytes_of_a_build() {
 fn a_build_and_a_worker_keep_out_of_each_others_way() {
     let scene = Scene::new(&Words::sample());
     let built = scene.build("area", 1);
-    let error = perform(&scene, &[Unit::Survey(tile(0, 0))]).unwrap_err();
+    let error = perform(&scene, &[Unit::of(Stage::Survey, tile(0, 0))]).unwrap_err();
     assert!(error.is_transient(), "{error}");
     drop(built);
 }

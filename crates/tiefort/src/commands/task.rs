@@ -2,8 +2,9 @@
 
 use std::path::PathBuf;
 
+use clap::builder::PossibleValue;
 use clap::{Args, ValueEnum};
-use compiler::{Unit, UnitEnd};
+use compiler::{ORDER, Stage, Unit, UnitEnd, is_of_tiles};
 use job::Job;
 use terrain::TileId;
 
@@ -46,25 +47,33 @@ pub struct Arguments {
 }
 
 /// A stage that engines run.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum StageName {
-    /// What more points would gain, tile by tile
-    Survey,
-    /// What each tile may spend
-    Allocate,
-    /// The TINs of tiles
-    Refine,
-    /// The load modules of tiles
-    Assemble,
-    /// All that is left, and the report
-    Publish,
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct StageName(Stage);
+
+impl ValueEnum for StageName {
+    fn value_variants<'a>() -> &'a [Self] {
+        const ALL: [StageName; ORDER.len()] = {
+            let mut all = [StageName(Stage::Publish); ORDER.len()];
+            let mut at = 0;
+            while at < ORDER.len() {
+                all[at] = StageName(ORDER[at]);
+                at += 1;
+            }
+            all
+        };
+        &ALL
+    }
+
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        Some(PossibleValue::new(self.0.name()).help(self.0.meaning()))
+    }
 }
 
 /// Does it.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let job = Job::load_with(&arguments.job, &ground::find_area)?;
     let units = units(&job, arguments)?;
-    let names: Vec<String> = units.iter().map(|unit| unit.name()).collect();
+    let names: Vec<String> = units.iter().map(Unit::to_string).collect();
     let run = Run::announce_briefly(&job, &arguments.run, &names.join(" "))?;
     let end = run.listen(|listener| compiler::perform(&job, run.folder(), &units, &run.options(false), listener))?;
     match end {
@@ -74,27 +83,17 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
 }
 
 fn units(job: &Job, arguments: &Arguments) -> Result<Vec<Unit>, Failure> {
-    let Arguments { stage, tiles, .. } = arguments;
-    let name = stage.to_possible_value().map(|value| value.get_name().to_owned()).unwrap_or_default();
-    let alone = |unit: Unit| match tiles.is_empty() {
-        true => Ok(vec![unit]),
-        false => {
-            let message = format!("{name}: found a tile, expected none");
+    let (stage, tiles) = (arguments.stage.0, &arguments.tiles);
+    match (is_of_tiles(stage), tiles.is_empty()) {
+        (true, false) => tiles.iter().map(|&tile| check_tile(job, tile).map(|()| Unit::of(stage, tile))).collect(),
+        (true, true) => {
+            let message = format!("{}: found no tile, expected ROW,COL at least once", stage.name());
+            Err(Failure::new(message, "`tiefort plan` lists the tiles in the order of their ranks"))
+        }
+        (false, true) => Ok(vec![Unit::whole(stage)]),
+        (false, false) => {
+            let message = format!("{}: found a tile, expected none", stage.name());
             Err(Failure::new(message, "allocate and publish are of the whole area"))
         }
-    };
-    let of_tiles = |unit: fn(TileId) -> Unit| {
-        if tiles.is_empty() {
-            let message = format!("{name}: found no tile, expected ROW,COL at least once");
-            return Err(Failure::new(message, "`tiefort plan` lists the tiles in the order of their ranks"));
-        }
-        tiles.iter().map(|&tile| check_tile(job, tile).map(|()| unit(tile))).collect()
-    };
-    match stage {
-        StageName::Survey => of_tiles(Unit::Survey),
-        StageName::Allocate => alone(Unit::Allocate),
-        StageName::Refine => of_tiles(Unit::Refine),
-        StageName::Assemble => of_tiles(Unit::Assemble),
-        StageName::Publish => alone(Unit::Publish),
     }
 }
