@@ -12,7 +12,7 @@ use crate::{Clock, CompileError};
 
 /// How often a process asks that wants to begin a build, and how long it waits in between: others that come at the same
 /// moment stand in its way for an instant only.
-const TRIES: usize = 50;
+const TRIES: usize = 100;
 const PAUSE: Duration = Duration::from_millis(20);
 
 /// A database that this process shares.
@@ -42,8 +42,15 @@ pub(crate) fn enter(
         manifest.job == canonical && manifest.algorithm_revision == ALGORITHM_REVISION && manifest.sources == records
     };
     let is_under_way = |manifest: &Manifest| is_ours(manifest) && manifest.state == ManifestState::Incomplete;
-    for _ in 0..TRIES {
-        let (database, previous) = Database::join(folder, area)?;
+    for tries_left in (0..TRIES).rev() {
+        let (database, previous) = match Database::join(folder, area) {
+            // By another process that begins it, or by a build, which stays longer.
+            Err(DatabaseError::Locked { .. }) if 0 < tries_left => {
+                clock.wait(PAUSE);
+                continue;
+            }
+            joined => joined?,
+        };
         if let Previous::Database(manifest) = previous {
             let is_finished = fresh(database.folder(), &manifest, job, records)?.is_some();
             if is_finished || is_under_way(&manifest) {

@@ -202,7 +202,7 @@ impl Process<'_> {
             error.into_iter().for_each(|error| *told.errors.entry(error).or_default() += 1);
             drop(told);
             self.faulty.begin_again();
-            self.wait(Duration::from_secs(5));
+            self.wait(Duration::from_secs(20));
             again += usize::from(!is_transient);
         }
         self.faulty.leave();
@@ -214,7 +214,7 @@ impl Process<'_> {
         if self.builds {
             return compiler::build(self.job, folder, &options, &mut Silent).map(drop);
         }
-        let sharing = Sharing { name, lease: LEASE, pause: Duration::from_secs(1), holding: &|_| () };
+        let sharing = Sharing { name, lease: LEASE, pause: Duration::from_secs(5), holding: &|_| () };
         compiler::work(self.job, folder, &options, &sharing, &mut Silent).map(drop)
     }
 }
@@ -256,8 +256,8 @@ fn half(files: &Files, random: &mut fastrand::Rng) -> Files {
 fn campaign(seeds: std::ops::Range<u64>) {
     let (kits, mut all, mut failed) = (Kits::new(), Told::default(), Vec::new());
     for seed in seeds.clone() {
-        if std::env::var_os("TIEFORT_TELL").is_some() {
-            eprintln!("seed {seed}");
+        if seed != seeds.start && (seed - seeds.start) % 1000 == 0 {
+            println!("{} runs, {} failed", seed - seeds.start, failed.len());
         }
         match simulate(&kits, seed) {
             Ok(told) => {
