@@ -127,8 +127,8 @@ mod tests {
     fn segments(most: usize) -> impl Strategy<Value = Vec<Segment>> {
         let place = (-300i32..300, -300i32..300).prop_map(|(row, col)| Place::new(row, col));
         let near = (-20i32..20, -20i32..20);
-        let segment = (place, near)
-            .prop_map(|(a, (north, east))| Segment { a, b: Place::new(a.row + north, a.col + east) });
+        let segment =
+            (place, near).prop_map(|(a, (north, east))| Segment { a, b: Place::new(a.row + north, a.col + east) });
         proptest::collection::vec(segment, 0..most)
     }
 

@@ -42,6 +42,8 @@ pub enum Flaw {
     Gap,
     /// A line that crosses itself.
     SelfCrossing,
+    /// Two ways of one storey that cross without a shared vertex.
+    CrossingUnjoined,
     /// A ring that crosses itself.
     BowTie,
     /// A ring whose ends do not meet.
@@ -127,6 +129,7 @@ impl Flaw {
             Flaw::DoubledInPart => "part of it is a copy of another",
             Flaw::Gap => "an end misses another way by less than a metre",
             Flaw::SelfCrossing => "it crosses itself",
+            Flaw::CrossingUnjoined => "it crosses another way without a shared vertex",
             Flaw::BowTie => "a ring crosses itself",
             Flaw::UnclosedRing => "a ring is not closed",
             Flaw::HoleOutside => "a hole lies outside every outer ring",

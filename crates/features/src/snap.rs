@@ -96,8 +96,7 @@ fn bend(lines: &mut [Vec<Place>], segments: &[Segment], owners: &[Owner], pixels
     // A segment passes its pixels in the order of its own direction, which both axes follow.
     let along = |&(number, pixel): &(u32, u32)| {
         let segment = &segments[number as usize];
-        let ([east, north], [to_east, to_north]) =
-            (segment.a.to(segment.b), segment.a.to(pixels[pixel as usize]));
+        let ([east, north], [to_east, to_north]) = (segment.a.to(segment.b), segment.a.to(pixels[pixel as usize]));
         (number, to_east * east.signum() + to_north * north.signum(), pixel)
     };
     hits.sort_unstable_by_key(along);
@@ -112,7 +111,8 @@ fn bend(lines: &mut [Vec<Place>], segments: &[Segment], owners: &[Owner], pixels
         let mut new = Vec::with_capacity(old.len() + 4);
         for (vertex, &place) in old.iter().enumerate() {
             new.push(place);
-            while let Some((_, pixel)) = hits.next_if(|(number, _)| *number == first + vertex as u32 && *number < last) {
+            while let Some((_, pixel)) = hits.next_if(|(number, _)| *number == first + vertex as u32 && *number < last)
+            {
                 new.push(pixels[pixel as usize]);
             }
         }
