@@ -28,3 +28,15 @@ mod mend;
 pub use mend::{Area, Mended, Way, mend};
 mod round;
 pub use round::{Outline, Rounded, round};
+mod network;
+pub use network::{Chain, Edge, Network, Node, WayOf};
+mod smooth;
+pub use smooth::smooth;
+mod sweep;
+pub use sweep::Pin;
+mod decks;
+pub use decks::{Clearances, Water};
+mod grade;
+pub use grade::{GradeOptions, grade, pins};
+#[cfg(test)]
+mod scenes;
