@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use crate::clean::Notes;
-use crate::mend::{Area, Way};
+use crate::ways::{Area, Way};
 use crate::{Flaw, Place, Remark, Remedy, Site};
 
 /// Segments of features in a load module: many times what its triangles could follow, and few enough to round them

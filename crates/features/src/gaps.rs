@@ -4,8 +4,8 @@ use std::collections::HashMap;
 
 use crate::clean::{NEAR_M, Notes};
 use crate::exact::Segment;
-use crate::mend::Way;
 use crate::quarters::places_near;
+use crate::ways::Way;
 use crate::{FeatureLattice, Flaw, Kind, Place, Remark, Remedy, Storey};
 
 /// Rounds of joining: the second is for ends that were moved to where a third one waits.

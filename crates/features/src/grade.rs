@@ -59,7 +59,7 @@ pub fn pins(network: &Network, ways: &[Way]) -> Vec<Pin> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scenes::{network, way};
+    use crate::samples::{network, way};
     use crate::{Flaw, Network, Source};
 
     fn metres(quanta: i32) -> f64 {

@@ -6,33 +6,8 @@ use crate::clean::{Cleaned, Notes, clean, leave_out_spikes, leave_out_spikes_of_
 use crate::clip::Extent;
 use crate::crowd::leave_out_crowds;
 use crate::rings::{assemble, close, doubled_area};
-use crate::{
-    Feature, FeatureId, FeatureLattice, Flaw, Form, Place, Position, Remark, Remedy, Shape, Site, Traits, gaps,
-};
-
-/// A line of a feature on the lattice.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Way {
-    /// What it is.
-    pub traits: Traits,
-    /// Its places, at least two, no two neighbours equal.
-    pub places: Vec<Place>,
-    /// Heights its source gives to some of its places, in quanta, sorted.
-    pub heights: Vec<(Place, i32)>,
-    /// Which feature it comes from.
-    pub id: FeatureId,
-}
-
-/// A polygon of a feature on the lattice, before it is split into simple rings.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Area {
-    /// What it is.
-    pub traits: Traits,
-    /// Closed walks, their first place not repeated, and whether they are meant as holes.
-    pub walks: Vec<(Vec<Place>, bool)>,
-    /// Which feature it comes from.
-    pub id: FeatureId,
-}
+use crate::ways::{Area, Way};
+use crate::{Feature, FeatureLattice, Flaw, Form, Place, Position, Remark, Remedy, Shape, Site, gaps};
 
 /// What is left of features after mending, in an order of their content.
 #[derive(Clone, Debug, PartialEq)]
@@ -204,7 +179,7 @@ fn leave_out_copies(mended: &mut Mended, lattice: FeatureLattice) {
 mod tests {
     use super::*;
     use crate::snap::touch_at_vertices_only;
-    use crate::{Numbering, Rounded, Source, round, sort_out};
+    use crate::{FeatureId, Numbering, Rounded, Source, round, sort_out};
     use proptest::prelude::*;
     use terrain::{Post, PostRect, Spacing};
 

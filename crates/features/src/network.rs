@@ -261,7 +261,7 @@ fn neighbours(nodes: usize, edges: &[Edge]) -> (Vec<u32>, Vec<(u32, u32)>) {
 
 #[cfg(test)]
 mod tests {
-    use crate::scenes::{network, way};
+    use crate::samples::{network, way};
     use crate::{Flaw, Network};
 
     #[track_caller]

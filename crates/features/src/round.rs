@@ -6,9 +6,10 @@ use std::collections::BTreeMap;
 use crate::clean::Notes;
 use crate::exact::Segment;
 use crate::gaps::family;
-use crate::mend::{Mended, Way};
+use crate::mend::Mended;
 use crate::rings::{Ring, simple_rings};
 use crate::snap::{Meeting, snap_round};
+use crate::ways::Way;
 use crate::{FeatureId, Flaw, Place, Remark, Remedy, Site, Storey, Traits};
 
 /// A polygon whose rings are simple and touch one another at vertices only.

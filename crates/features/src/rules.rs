@@ -106,13 +106,14 @@ pub struct Sorted {
 
 /// Says what each feature is: the first of `rules` that matches decides, then the built-in table.
 pub fn sort_out(sources: Vec<Source>, rules: &[Rule]) -> Sorted {
+    let built_in = |source: &Source| source.kind.or_else(|| table::kind_of(&source.tags));
     let kind_of = |source: &Source| -> (Option<usize>, Option<Kind>) {
         let rule = rules.iter().position(|rule| rule.matches(source));
         let kind = match rule.map(|rule| rules[rule].kind) {
             Some(RuleKind::None) => None,
             Some(RuleKind::Is(kind)) => Some(kind),
-            Some(RuleKind::AsBuiltIn) => Some(table::kind_of(source).unwrap_or(Kind::Breakline)),
-            None => table::kind_of(source),
+            Some(RuleKind::AsBuiltIn) => Some(built_in(source).unwrap_or(Kind::Breakline)),
+            None => built_in(source),
         };
         (rule, kind)
     };

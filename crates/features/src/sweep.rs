@@ -158,7 +158,7 @@ pub(crate) fn remark_steep(network: &Network, heights: &[i32], remarks: &mut Vec
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scenes::{network, way};
+    use crate::samples::{network, way};
     use proptest::prelude::*;
 
     /// Least rise between any two nodes, by Floyd and Warshall: the slow reference.
@@ -197,13 +197,12 @@ mod tests {
             let ground: Vec<Option<i32>> = (0..network.nodes.len()).map(|node| heights[node % 64]).collect();
             let swept = sweep(&network, &ground, &[], &mut Vec::new());
             let paths = all_paths(&network);
-            let count = network.nodes.len();
             let known: Vec<(usize, i64)> =
                 ground.iter().enumerate().filter_map(|(node, h)| Some((node, i64::from((*h)?)))).collect();
-            for t in 0..count {
+            for (t, found) in swept.heights.iter().enumerate() {
                 let above = known.iter().map(|(s, h)| h + paths[*s][t]).min().unwrap();
                 let below = known.iter().map(|(s, h)| h - paths[*s][t]).max().unwrap();
-                prop_assert_eq!(i64::from(swept.heights[t]), (above + below).div_euclid(2));
+                prop_assert_eq!(i64::from(*found), (above + below).div_euclid(2));
             }
             for edge in &network.edges {
                 let rise = (swept.heights[edge.a as usize] - swept.heights[edge.b as usize]).abs();

@@ -1,7 +1,5 @@
 //! The built-in table: which tags make which kind, and what a kind is unless a rule says otherwise.
 
-use crate::Source;
-
 /// What a feature is. The order is that of the table: the first is the highest, and keeps its height where two meet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Kind {
@@ -169,22 +167,20 @@ pub fn rows() -> impl Iterator<Item = (&'static str, &'static [&'static str], Ki
     MATCHES.into_iter()
 }
 
-/// The kind of a feature by the built-in table: the first row that matches.
-pub fn kind_of(feature: &Source) -> Option<Kind> {
-    let matches = |&(key, values, _): &Match| feature.tag(key).is_some_and(|value| values.contains(&value));
-    feature.kind.or_else(|| MATCHES.into_iter().find(matches).map(|(_, _, kind)| kind))
+/// The kind of a feature with these tags by the built-in table: the first row that matches.
+pub fn kind_of(tags: &[(String, String)]) -> Option<Kind> {
+    let has = |key: &str, values: &[&str]| tags.iter().any(|(name, value)| name == key && values.contains(&&**value));
+    MATCHES.into_iter().find(|(key, values, _)| has(key, values)).map(|(_, _, kind)| kind)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{FeatureId, Numbering, Shape};
 
     #[track_caller]
     fn check(tags: &[(&str, &str)], expected: Option<Kind>) {
-        let tags = tags.iter().map(|(key, value)| (key.to_string(), value.to_string())).collect();
-        let id = FeatureId { source: 0, numbering: Numbering::Way, number: 1 };
-        assert_eq!(kind_of(&Source { id, tags, kind: None, shape: Shape::Line(Vec::new()) }), expected);
+        let tags: Vec<_> = tags.iter().map(|(key, value)| (key.to_string(), value.to_string())).collect();
+        assert_eq!(kind_of(&tags), expected);
     }
 
     #[test]
