@@ -3,7 +3,7 @@
 //! A point inside a load module adds two triangles and one on its side adds one, whatever else the TIN holds, because
 //! triangles = 2 V + B - 2. So the count is exact for what features put there, and a lower bound for their module.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 
 use crate::clean::Notes;
 use crate::forms::{Formed, form};
@@ -35,6 +35,15 @@ impl Step {
             Step::NoBench => Grant { most: grant.most.min(Form::StripAlways), ..grant },
             Step::NoStrip => Grant { most: Form::Line, ..grant },
             Step::Out => Grant { out: true, ..grant },
+        }
+    }
+
+    /// Whether a feature that asks for a form has anything to lose by it.
+    fn concerns(self, form: Form) -> bool {
+        match self {
+            Step::NoBench => form == Form::Bench,
+            Step::NoStrip => !matches!(form, Form::Line | Form::Polygon),
+            _ => true,
         }
     }
 
@@ -104,6 +113,7 @@ pub fn reserve(
     let mut grants = graded.grants.clone();
     let mut remarks = Vec::new();
     let mut reached: BTreeMap<(i32, i32), (usize, u16)> = BTreeMap::new();
+    let forms: HashMap<FeatureId, Form> = graded.network.ways.iter().map(|way| (way.id, way.traits.form)).collect();
     loop {
         let mut formed = form(&Graded { grants: &grants, ..*graded }, strands, site);
         let cost = cost(&formed, site);
@@ -114,7 +124,7 @@ pub fn reserve(
         let over: BTreeMap<(i32, i32), u32> = cost.iter().filter_map(surplus).collect();
         let mut changed = false;
         for (module, features) in features_of(&formed, site, &over) {
-            let crowd = Crowd { features, surplus: over[&module], site };
+            let crowd = Crowd { features, surplus: over[&module], site, forms: &forms };
             let reached = reached.entry(module).or_insert((0, u16::MAX));
             changed |= degrade(&crowd, reached, &mut grants, &mut remarks);
         }
@@ -141,6 +151,8 @@ struct Crowd<'a> {
     features: Vec<Member>,
     surplus: u32,
     site: &'a Site,
+    /// The form each travelled way asks for; all others are lines.
+    forms: &'a HashMap<FeatureId, Form>,
 }
 
 fn features_of(formed: &Formed, site: &Site, modules: &BTreeMap<(i32, i32), u32>) -> BTreeMap<(i32, i32), Vec<Member>> {
@@ -187,24 +199,25 @@ fn degrade(crowd: &Crowd, reached: &mut (usize, u16), grants: &mut Grants, remar
             });
             reached.1 = if members.is_empty() { class } else { class + 1 };
         }
-        if apply(*step, &members, crowd.site, grants, remarks) {
+        if apply(*step, &members, crowd, grants, remarks) {
             return true;
         }
     }
     // What came into the load module while the ladder was used, because a higher class made room for it.
     let late: Vec<Member> = crowd.features.iter().filter(|member| !grants.of(member.id).out).copied().collect();
-    apply(Step::Out, &late, crowd.site, grants, remarks)
+    apply(Step::Out, &late, crowd, grants, remarks)
 }
 
 /// Leaves less to some features; whether any of them had more.
-fn apply(step: Step, members: &[Member], site: &Site, grants: &mut Grants, remarks: &mut Vec<Remark>) -> bool {
+fn apply(step: Step, members: &[Member], crowd: &Crowd, grants: &mut Grants, remarks: &mut Vec<Remark>) -> bool {
     let mut changed = false;
     for member in members {
+        let form = crowd.forms.get(&member.id).copied().unwrap_or(Form::Line);
         let (before, after) = (grants.of(member.id), step.apply(grants.of(member.id)));
-        if before != after {
+        if before != after && step.concerns(form) {
             grants.set(member.id, after);
             changed = true;
-            let mut notes = Notes { id: member.id, lattice: site.lattice, remarks };
+            let mut notes = Notes { id: member.id, lattice: crowd.site.lattice, remarks };
             notes.write_at(member.place, Flaw::OverShare, step.remedy());
         }
     }
@@ -259,6 +272,8 @@ mod tests {
             tight.formed.remarks.iter().all(|remark| remark.flaw == Flaw::OverShare && !remark.remedy.leaves_out())
         );
         assert!(tight.formed.remarks.iter().any(|remark| remark.id == id(2)));
+        let benches = tight.formed.remarks.iter().filter(|remark| remark.remedy == Remedy::BecameStrip);
+        assert_eq!(benches.count(), 0, "what was no bench does not become a strip");
     }
 
     #[test]

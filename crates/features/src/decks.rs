@@ -75,7 +75,7 @@ pub(crate) fn raise_sagging_ends(network: &Network, ground: &mut [Option<i32>], 
         ];
         for (&end, &inside) in ends {
             if network.nodes[end as usize].on_ground {
-                raise_bank(network, ground, &bank(network, end, inside, back), &mut raised);
+                raise_bank(ground, &bank(network, end, inside, back), &mut raised);
             }
         }
     }
@@ -110,8 +110,7 @@ fn bank(network: &Network, end: u32, inside: u32, back: i32) -> Vec<(u32, i32)> 
     }
 }
 
-fn raise_bank(network: &Network, ground: &[Option<i32>], stations: &[(u32, i32)], raised: &mut Vec<(u32, i32)>) {
-    debug_assert!(!network.nodes.is_empty());
+fn raise_bank(ground: &[Option<i32>], stations: &[(u32, i32)], raised: &mut Vec<(u32, i32)>) {
     let height = |at: usize| ground[stations[at].0 as usize];
     let Some(end) = height(0) else { return };
     let (mut top, mut allowed) = (None, 0);

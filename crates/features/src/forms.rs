@@ -157,8 +157,8 @@ fn centrelines(network: &Network, pieces: &[Piece], wide: &[Wide], heights: &[i3
     lines
 }
 
-/// Whose height a place has: a toe's last, for it only follows the ground; else the highest class's.
-type Decided = BTreeMap<Place, (bool, u16, Role, i32)>;
+/// Whose height a place has: the least of rank, class, role and height.
+type Decided = BTreeMap<Place, (Role, u16, Role, i32)>;
 
 /// Rounds all lines together, decides the height of each point, and leaves out what lies in a strip of higher class.
 fn assemble(lines: Vec<Strand>, faces: &[Face], site: &Site, remarks: &mut Vec<Remark>) -> Formed {
@@ -173,7 +173,7 @@ fn assemble(lines: Vec<Strand>, faces: &[Face], site: &Site, remarks: &mut Vec<R
     let mut heights: Decided = BTreeMap::new();
     for ((line, places), own) in lines.iter().zip(&rounded).zip(&own) {
         for (&place, &height) in places.iter().zip(own) {
-            let mine = (line.role == Role::Toe, line.class, line.role, height);
+            let mine = (line.role.max(Role::Centre), line.class, line.role, height);
             heights.entry(place).and_modify(|height| *height = mine.min(*height)).or_insert(mine);
         }
     }

@@ -154,7 +154,7 @@ pub fn shore(outline: &Outline, level: i32) -> Vec<Strand> {
 ///
 /// `line` are edges of the river inside the outline, with the heights of their ends.
 pub fn banks(outline: &Outline, line: &[([Place; 2], [i32; 2])]) -> Vec<Strand> {
-    strands(outline, Role::Shore, &|place, _| nearest_height(line, place).unwrap_or(0))
+    strands(outline, Role::Bank, &|place, _| nearest_height(line, place).unwrap_or(0))
 }
 
 /// An outline whose heights are those of the ground.

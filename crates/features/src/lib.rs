@@ -77,9 +77,7 @@ pub use dams::split_at_dams;
 mod lakes;
 pub use lakes::{Lake, Waters, banks, level, outline_only, shore};
 mod parts;
-pub use parts::{
-    Line, breaklines, channels, dams, flowing, have_line, lakes_along, lines_inside, remark_vanished, travelled, water,
-};
+pub use parts::{Line, breaklines, channels, dams, flowing, have_line, lakes_along, lines_inside, travelled, water};
 
 // Forms and what they cost.
 mod thin;

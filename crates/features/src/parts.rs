@@ -1,14 +1,13 @@
 //! What each stage hands to the next: which ways are travelled, which flow, where lakes lie along rivers.
 
-use std::collections::{BTreeSet, HashMap, HashSet};
+use std::collections::{HashMap, HashSet};
 
-use crate::clean::Notes;
 use crate::decks::Water;
 use crate::lakes::Waters;
 use crate::rings::encloses;
 use crate::rivers::Fallen;
 use crate::strand::{Role, Strand};
-use crate::{Flaw, Kind, Network, Outline, Place, Remark, Remedy, Rounded, Site, Storey, Way};
+use crate::{Kind, Network, Outline, Place, Rounded, Site, Storey, Way};
 
 /// Edges of a river with the heights of their ends.
 pub type Line = Vec<([Place; 2], [i32; 2])>;
@@ -80,7 +79,7 @@ pub fn water(strands: &[Strand]) -> Vec<Water> {
     let mut water = Vec::new();
     for strand in strands {
         let kind = match strand.role {
-            Role::Channel => Kind::River,
+            Role::Channel | Role::Bank => Kind::River,
             Role::Shore => Kind::Lake,
             _ => continue,
         };
@@ -183,14 +182,4 @@ pub fn lakes_along(outlines: &[Outline], waters: &Waters, rivers: &Network, site
         }
     }
     levels
-}
-
-/// Remarks for ways of which nothing is in the ground because others have all of their stretches.
-pub fn remark_vanished(network: &Network, remarks: &mut Vec<Remark>) {
-    let present: BTreeSet<u32> = network.edges.iter().map(|edge| edge.way).collect();
-    for (number, way) in network.ways.iter().enumerate() {
-        if !present.contains(&(number as u32)) {
-            Notes { id: way.id, lattice: network.lattice, remarks }.write_of(None, Flaw::Doubled, Remedy::LeftOut);
-        }
-    }
 }

@@ -2,17 +2,22 @@
 
 use crate::{FeatureId, Grants, Network, Place};
 
-/// What an edge of the TIN is to its feature. The order breaks ties between features of one class.
+/// What an edge of the TIN is to its feature.
+///
+/// Where two have a place in common, what is travelled keeps its height, by class; then the order decides, so that a
+/// shore stays level where a river meets it, and a toe, which only follows the ground, comes last.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Role {
     /// Part of the outline of a strip or a junction.
     Side,
     /// A centreline.
     Centre,
+    /// The outline of level water.
+    Shore,
     /// The middle of a river or stream.
     Channel,
-    /// The outline of water.
-    Shore,
+    /// The outline of a river.
+    Bank,
     /// A line a job names.
     Breakline,
     /// Where the slope of a bench meets the ground.

@@ -100,7 +100,7 @@ fn check(whole: &Whole, most: u32) {
     // A lake's shore is level, but where a road crosses it.
     let height: HashMap<Place, i32> = formed.points.iter().copied().collect();
     let mut others: BTreeSet<Place> = BTreeSet::new();
-    for edge in formed.edges.iter().filter(|edge| edge.role != Role::Shore) {
+    for edge in formed.edges.iter().filter(|edge| edge.role < Role::Shore) {
         others.extend([edge.a, edge.b].map(|end| formed.points[end as usize].0));
     }
     // A dam makes two levels of one feature.
