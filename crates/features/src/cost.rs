@@ -124,7 +124,9 @@ pub fn reserve(
         let over: BTreeMap<(i32, i32), u32> = cost.iter().filter_map(surplus).collect();
         let mut changed = false;
         for (module, features) in features_of(&formed, site, &over) {
-            let crowd = Crowd { features, surplus: over[&module], site, forms: &forms };
+            let surplus = over[&module];
+            let is_far = triangles_max(module) < surplus;
+            let crowd = Crowd { features, surplus, is_far, site, forms: &forms };
             let reached = reached.entry(module).or_insert((0, u16::MAX));
             changed |= degrade(&crowd, reached, &mut grants, &mut remarks);
         }
@@ -136,20 +138,25 @@ pub fn reserve(
     }
 }
 
+/// Parts of a triangle in which shares of features are counted.
+const PARTS: u32 = 120;
+
 /// A feature in one load module.
 #[derive(Clone, Copy)]
 struct Member {
     class: u16,
     id: FeatureId,
     place: Place,
-    /// About how many triangles it takes there.
-    triangles: u32,
+    /// How many triangles it takes there, in 120ths: a point of several features is shared among its edges.
+    parts: u32,
 }
 
 /// The features of a load module that gives too much.
 struct Crowd<'a> {
     features: Vec<Member>,
     surplus: u32,
+    /// Whether it gives more than twice its share: then a step is taken for all classes at once.
+    is_far: bool,
     site: &'a Site,
     /// The form each travelled way asks for; all others are lines.
     forms: &'a HashMap<FeatureId, Form>,
@@ -157,14 +164,16 @@ struct Crowd<'a> {
 
 fn features_of(formed: &Formed, site: &Site, modules: &BTreeMap<(i32, i32), u32>) -> BTreeMap<(i32, i32), Vec<Member>> {
     let mut features: BTreeMap<(i32, i32), BTreeMap<(u16, FeatureId), Member>> = BTreeMap::new();
+    let mut degree = vec![0; formed.points.len()];
+    formed.edges.iter().flat_map(|edge| [edge.a, edge.b]).for_each(|point| degree[point as usize] += 1);
     for edge in &formed.edges {
         for point in [edge.a, edge.b] {
             let place = formed.points[point as usize].0;
             for (module, triangles) in modules_of(place, site) {
                 if modules.contains_key(&module) {
-                    let member = Member { class: edge.class, id: edge.id, place, triangles: 0 };
+                    let member = Member { class: edge.class, id: edge.id, place, parts: 0 };
                     let of = features.entry(module).or_default().entry((edge.class, edge.id)).or_insert(member);
-                    of.triangles += triangles;
+                    of.parts += PARTS * triangles / degree[point as usize];
                 }
             }
         }
@@ -174,11 +183,15 @@ fn features_of(formed: &Formed, site: &Site, modules: &BTreeMap<(i32, i32), u32>
 
 /// Takes the features of one load module down by one step of one class; false when nothing is left to take.
 fn degrade(crowd: &Crowd, reached: &mut (usize, u16), grants: &mut Grants, remarks: &mut Vec<Remark>) -> bool {
+    let mut changed = false;
     while let Some(step) = LADDER.get(reached.0) {
         // The next class upwards at this step: numbers fall as classes rise.
         let below = crowd.features.iter().map(|member| member.class).filter(|class| *class < reached.1).max();
         let Some(class) = below else {
             *reached = (reached.0 + 1, u16::MAX);
+            if changed {
+                return true;
+            }
             continue;
         };
         reached.1 = class;
@@ -190,16 +203,17 @@ fn degrade(crowd: &Crowd, reached: &mut (usize, u16), grants: &mut Grants, remar
             .collect();
         if *step == Step::Out {
             // No more than has to be, the smallest first; the next round asks again.
-            members.sort_by_key(|member| (member.triangles, member.place, member.id));
+            members.sort_by_key(|member| (member.parts, member.place, member.id));
             let mut gone = 0;
             members.retain(|member| {
-                let needed = gone < crowd.surplus;
-                gone += member.triangles;
+                let needed = gone < PARTS * crowd.surplus;
+                gone += member.parts;
                 needed
             });
             reached.1 = if members.is_empty() { class } else { class + 1 };
         }
-        if apply(*step, &members, crowd, grants, remarks) {
+        changed |= apply(*step, &members, crowd, grants, remarks);
+        if changed && (!crowd.is_far || *step == Step::Out) {
             return true;
         }
     }

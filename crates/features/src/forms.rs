@@ -445,7 +445,8 @@ mod tests {
         #![proptest_config(ProptestConfig::with_cases(150))]
         #[test]
         fn whatever_the_network_edges_touch_at_points_only_in_any_order_of_features(
-            lines in proptest::collection::vec((0usize..7, proptest::collection::vec((40..160i32, 40..160i32), 2..5)), 1..10)
+            lines in proptest::collection::vec(
+                (0usize..7, proptest::collection::vec((40..160i32, 40..160i32), 2..5)), 1..10)
         ) {
             let ground = |east: f64, north: f64| 0.4 * north + 0.03 * (east - 20.0) * (east - 20.0);
             let sources = network_of(&lines);

@@ -46,7 +46,7 @@ mod snap;
 pub use snap::{Meeting, snap_round, touch_at_vertices_only};
 mod clean;
 mod crowd;
-pub use crowd::SEGMENTS_PER_MODULE_MAX;
+pub use crowd::STATIONS_PER_MODULE_MAX;
 mod gaps;
 mod rings;
 pub use rings::{Ring, doubled_area, encloses};

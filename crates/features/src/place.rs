@@ -8,8 +8,8 @@ use terrain::Spacing;
 /// Most lattice steps between neighbouring posts.
 pub const STEPS_PER_POST_MAX: i32 = 64;
 
-/// Farthest coordinate of a place, in steps: differences, doubled, stay within 32 bits.
-pub const COORDINATE_MAX: i32 = 1 << 29;
+/// Farthest coordinate of a place, in steps: products of differences, in half steps, stay within 64 bits.
+pub const COORDINATE_MAX: i32 = 1 << 28;
 
 /// A place on the feature lattice, in steps from the area's south-west post.
 ///

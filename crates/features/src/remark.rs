@@ -54,7 +54,7 @@ pub enum Flaw {
     NoOuterRing,
     /// A line where a polygon is needed, or the other way round.
     WrongShape,
-    /// More segments in a load module than can be worked on.
+    /// More stations in a load module than can be worked on.
     Crowded,
     /// Two pins on one place that disagree.
     PinsDisagree,
@@ -135,7 +135,7 @@ impl Flaw {
             Flaw::HoleOutside => "a hole lies outside every outer ring",
             Flaw::NoOuterRing => "it has no outer ring",
             Flaw::WrongShape => "its shape does not suit its kind",
-            Flaw::Crowded => "a load module holds more segments than can be worked on",
+            Flaw::Crowded => "its load module holds more than can be worked on",
             Flaw::PinsDisagree => "two pinned heights disagree at one place",
             Flaw::RoadOverRiver => "a road crosses a river without a bridge",
             Flaw::FlowsUphill => "it is drawn uphill",

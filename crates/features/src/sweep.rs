@@ -209,8 +209,8 @@ mod tests {
                 prop_assert!(rise <= edge.rise_max);
             }
             // No profile can be closer than half of the worst contradiction.
-            let worst = known.iter().flat_map(|(s, h)| known.iter().map(|(t, g)| h - g - paths[*s][*t]).collect::<Vec<_>>())
-                .max().unwrap().max(0);
+            let pairs = known.iter().flat_map(|one| known.iter().map(move |other| (one, other)));
+            let worst = pairs.map(|((s, h), (t, g))| h - g - paths[*s][*t]).max().unwrap().max(0);
             let farthest = known.iter().map(|(t, h)| (i64::from(swept.heights[*t]) - h).abs()).max().unwrap();
             prop_assert!(farthest <= (worst + 1) / 2 + 1, "{} beyond {}", farthest, worst);
         }
@@ -239,7 +239,7 @@ mod tests {
             let torn = pins.iter().any(|one| pins.iter().any(|other| {
                 paths[one.node as usize][other.node as usize] < i64::from(one.height - other.height)
             }));
-            prop_assert_eq!(0 < exceeded.count(), torn, "the grade is exceeded where pins contradict it, and only there");
+            prop_assert_eq!(0 < exceeded.count(), torn, "the grade is exceeded where pins contradict it only");
         }
     }
 }
