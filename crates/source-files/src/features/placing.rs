@@ -184,7 +184,11 @@ impl Placing {
         self.lies_over(&extent);
         let Some(turned) = self.turned(&extent) else { return self.count_one_outside() };
         let mut placed = Vec::new();
-        for mut part in shape.parts {
+        let parts: Vec<Part> = shape.parts.into_iter().filter_map(|part| self.sound(&id, part)).collect();
+        if parts.is_empty() {
+            return;
+        }
+        for mut part in parts {
             if turned != 0.0 {
                 part.turn(turned);
             }
@@ -201,6 +205,40 @@ impl Placing {
         }
         let heights = if shape.has_heights { self.heights(&id, &placed) } else { None };
         self.keep(id, tags, placed, heights);
+    }
+
+    /// A part that has enough vertices, its rings closed.
+    fn sound(&mut self, id: &str, part: Part) -> Option<Part> {
+        let at = part.runs().iter().flatten().next().and_then(|vertex| self.at(vertex));
+        match part {
+            Part::Line(line) if line.len() < 2 => {
+                self.remark(id, at, format!("a line of {}", counted(line.len())), LEFT_OUT);
+                None
+            }
+            Part::Line(line) => Some(Part::Line(line)),
+            Part::Polygon(rings) => {
+                let mut sound = Vec::with_capacity(rings.len());
+                for (index, mut ring) in rings.into_iter().enumerate() {
+                    if let (Some(&first), Some(last)) = (ring.first(), ring.last())
+                        && first[..2] != last[..2]
+                    {
+                        self.remark(id, at, "a ring whose last vertex is not its first".into(), "closed");
+                        ring.push(first);
+                    }
+                    if ring.len() < 4 {
+                        let found = format!("a ring of {}, the last being the first", counted(ring.len()));
+                        self.remark(id, at, found, if index == 0 { LEFT_OUT } else { "the hole left out" });
+                        // Without its outer ring there is nothing to have holes.
+                        if index == 0 {
+                            return None;
+                        }
+                    } else {
+                        sound.push(ring);
+                    }
+                }
+                Some(Part::Polygon(sound))
+            }
+        }
     }
 
     fn count_one_outside(&mut self) {
@@ -351,6 +389,10 @@ impl Part {
         };
         runs.iter_mut().flatten().for_each(|vertex| vertex[0] += by);
     }
+}
+
+fn counted(vertices: usize) -> String {
+    format!("{vertices} {}", if vertices == 1 { "vertex" } else { "vertices" })
 }
 
 fn height_m(vertex: &Vertex, unit_m: f64) -> Option<f64> {

@@ -115,6 +115,28 @@ fn a_feature_off_the_earth_is_left_out_and_the_others_are_still_in_degrees() {
 }
 
 #[test]
+fn rings_are_closed_and_those_of_too_few_vertices_left_out() {
+    let open = "[[500000,3870000],[500900,3870000],[500900,3870900]]";
+    let flat = "[[500000,3870000],[500900,3870000],[500000,3870000]]";
+    let polygon = |rings: &str| format!(r#"{{"type":"Polygon","coordinates":[{rings}]}}"#);
+    let one = r#"{"type":"MultiLineString","coordinates":[[[500000,3870000]],[]]}"#;
+    let hole = format!("{SQUARE},{flat}");
+    let file = json(&[(&polygon(open), ""), (&polygon(flat), ""), (&polygon(&hole), ""), (one, "")]);
+    let found: Vec<_> = file.features.iter().map(|feature| sizes(feature).0).collect();
+    assert_eq!(found, [vec![4], vec![4]]);
+    assert_eq!(
+        remarks(&file),
+        [
+            "roads.geojson#0: a ring whose last vertex is not its first (closed)",
+            "roads.geojson#1: a ring of 3 vertices, the last being the first (left out)",
+            "roads.geojson#2: a ring of 3 vertices, the last being the first (the hole left out)",
+            "roads.geojson#3: a line of 1 vertex (left out)",
+            "roads.geojson#3: a line of 0 vertices (left out)",
+        ]
+    );
+}
+
+#[test]
 fn degrees_counted_eastward_all_round_are_the_same_places() {
     let file = json(&[(LINE, ""), (r#"{"type":"LineString","coordinates":[[243,35],[243.009,35]]}"#, "")]);
     let VectorShape::Line(a) = &file.features[0].shape else { panic!("expected a line") };
