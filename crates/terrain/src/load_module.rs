@@ -81,8 +81,8 @@ impl std::fmt::Display for LoadModuleFault {
                 write!(f, "triangles cover {found} half squares of a quantum, expected {expected}")
             }
             Self::Crack([a, b]) => {
-                write!(f, "the edge from {},{} to {},{} (quanta east, north) is not shared by two", a.x, a.y, b.x, b.y)?;
-                f.write_str(" triangles")
+                let (from, to) = (format!("{},{}", a.x, a.y), format!("{},{}", b.x, b.y));
+                write!(f, "the edge {from} to {to} (quanta east, north) is not shared by two triangles")
             }
         }
     }
