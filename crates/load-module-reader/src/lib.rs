@@ -57,26 +57,34 @@
 // A test that unwraps says by its line what failed.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+mod format;
+pub use format::{
+    FILE_BYTES_MAX, FIXED_HEADER_BYTES, FIXED_MODULE_BYTES, INDEX_ENTRY_BYTES, LEVELS_MAX, MAGIC, QUANTA_PER_METRE,
+    VERSION,
+};
 mod error;
 pub use error::{ReadError, Section};
 mod bytes;
 mod header;
-pub use header::{FIXED_HEADER_BYTES, Header, LEVELS_MAX, MAGIC, QUANTA_PER_METRE, VERSION};
+pub use header::Header;
 mod index;
-pub use index::{INDEX_ENTRY_BYTES, IndexEntry};
+pub use index::IndexEntry;
 mod module;
-pub use module::{FIXED_MODULE_BYTES, Module, Residual, Vertex};
-mod file;
-pub use file::{FILE_BYTES_MAX, SlmFile};
+pub use module::{Module, Residual, Vertex};
 mod tile_file;
 pub use tile_file::{Bytes, Keep, TileFile, open_file};
+mod file;
+pub use file::SlmFile;
 mod lookup;
 mod terrain_module;
 pub use terrain_module::{HOLE_CLASS, Sample, TerrainModule};
+mod frame;
+pub use frame::{Block, Frame};
 mod ground;
-pub use ground::{Block, Ground, Sight};
+pub use ground::{Ground, Sight};
 mod area;
-pub use area::{Area, Frame};
+pub use area::Area;
+mod load;
 
 #[cfg(test)]
 mod sample;

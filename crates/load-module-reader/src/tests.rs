@@ -162,7 +162,8 @@ fn a_line_of_sight_agrees_with_small_steps() {
     let module = rough(9, 7);
     let mut file = sample_ground();
     let prepared = Arc::new(TerrainModule::new(module.clone(), SIDE));
-    file = file.with_modules(vec![Arc::clone(&prepared), prepared]);
+    let block = file.block();
+    file = file.with_modules(block, vec![Arc::clone(&prepared), prepared]);
     let [east, north] = [501_500.0, 3_876_000.25];
     let mut draw = Draw(11);
     let (mut hidden, mut free) = (0, 0);

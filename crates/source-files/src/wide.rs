@@ -7,9 +7,9 @@ use terrain::{GridFrame, PostRect, QUANTA_PER_METRE};
 
 use crate::chunk::Header;
 use crate::crs::Crs;
-use crate::join::{Extent, common_kind, fits, offset, shifted, union};
+use crate::join::{Extent, common_kind, fits, offset, shifted};
 use crate::mosaic::{Beyond, Corner, Layer, MARGIN};
-use crate::samples::Samples;
+use crate::samples::{Samples, union};
 use crate::warp::Warp;
 use crate::{Mosaic, MosaicRules, Patch, Raster, SourceError, Standing, Windows};
 

@@ -10,7 +10,7 @@ use database::DatabaseError;
 use exports::ExportError;
 use job::JobError;
 
-use crate::terminal;
+use crate::terminal::{self, NotPrinted};
 
 /// How a command ended that did its work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -117,6 +117,12 @@ impl fmt::Display for Failure {
         let fallback = "check the path named above, its permissions, and the room on its disk";
         let (message, hint) = (&self.message, self.hint.as_deref().unwrap_or(fallback));
         write!(f, "error: {}\nhint: {}", terminal::short(message), terminal::short(hint))
+    }
+}
+
+impl From<NotPrinted> for Failure {
+    fn from(NotPrinted(error): NotPrinted) -> Self {
+        Self::output(Path::new("stdout"), &error)
     }
 }
 

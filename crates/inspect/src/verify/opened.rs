@@ -7,7 +7,7 @@ use job::Job;
 use load_module_reader::{Header, Module, SlmFile};
 use terrain::{HOLE_CLASS, LoadModule, ModuleId, ModuleResidual, ModuleVertex, TileId};
 
-use super::Modules;
+use super::modules::{Modules, at_level};
 use compiler::CompileError;
 use compiler::database_area;
 use ground::GamingArea;
@@ -86,7 +86,7 @@ fn unknown_class(module: &Module, count: usize) -> Option<String> {
     let triangle = module.classes.iter().position(is_unknown)?;
     let (row, col, class) = (module.row, module.col, module.classes[triangle]);
     let text = format!("load module {row},{col}: triangle {triangle} has class {class}, the job has {count}");
-    Some(super::at_level(usize::from(module.level), text))
+    Some(at_level(usize::from(module.level), text))
 }
 
 fn load_module(module: &Module, side: u16) -> LoadModule {

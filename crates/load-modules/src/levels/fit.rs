@@ -3,9 +3,8 @@
 //! The normal equations couple vertices that share a triangle; conjugate gradients solve them, always in the same
 //! order of operations, so the heights are the same on every machine.
 
-use super::is_inside;
 use super::posts::Posts;
-use super::sheet::Sheet;
+use super::sheet::{Sheet, is_inside};
 
 /// Added to every vertex's own coefficient: a vertex that hardly any post asks for stays where it was.
 const DAMPING: f64 = 0.01;

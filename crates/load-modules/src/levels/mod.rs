@@ -15,11 +15,12 @@ mod sides;
 #[cfg(test)]
 mod tests;
 
-use terrain::{Dem, Importance, LoadModule, ModuleResidual, ModuleVertex, Side};
+use terrain::{Importance, LoadModule, ModuleResidual, ModuleVertex, Side};
 
 use crate::{Layout, classes, pieces};
+pub use posts::LevelGround;
 use posts::Posts;
-use sheet::Sheet;
+use sheet::{Sheet, is_inside};
 
 /// Which levels a load module gets beside the finest.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,15 +40,6 @@ pub enum LevelSides {
     Full,
     /// Each side keeps its share, its ends always.
     Own,
-}
-
-/// What levels are fitted to.
-#[derive(Clone, Copy, Debug)]
-pub struct LevelGround<'a> {
-    /// Heights at all posts of the load module; voids count nothing.
-    pub dem: &'a Dem,
-    /// Weights and classes of the same posts.
-    pub mask: &'a Importance,
 }
 
 /// The levels of a load module, one for each share, from fine to coarse. Residuals are left empty.
@@ -79,10 +71,6 @@ pub fn coarser_levels(finest: &LoadModule, layout: &Layout, levels: &Levels, gro
 /// So many of `count`, rounded half up.
 fn share_of(count: usize, share: f64) -> usize {
     (count as f64 * share).round() as usize
-}
-
-fn is_inside(vertex: ModuleVertex, side: u16) -> bool {
-    0 < vertex.x && vertex.x < side && 0 < vertex.y && vertex.y < side
 }
 
 /// The vertices triangulated, those inside at fitted heights.

@@ -16,6 +16,11 @@ pub(super) struct Sheet {
     pub stars: Vec<Vec<u32>>,
 }
 
+/// Whether a vertex lies on no side of a load module.
+pub(super) fn is_inside(vertex: ModuleVertex, side: u16) -> bool {
+    0 < vertex.x && vertex.x < side && 0 < vertex.y && vertex.y < side
+}
+
 /// Where a vertex lies, for exact questions.
 pub(super) fn place(vertex: ModuleVertex) -> LatticePoint {
     LatticePoint::new(i32::from(vertex.y), i32::from(vertex.x))

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use terrain::{ModuleGrid, ModuleRect, Post, PostRect, Spacing};
+use terrain::{Dem, ModuleGrid, ModuleRect, Post, PostRect, Spacing};
 
 use super::*;
 use crate::sheets::{Draw, assert_sides_are_shared, constrained, points, posts, side_list};

@@ -55,7 +55,7 @@ impl Plan {
             let [x, y] = self.at([x, y]);
             [x * SAMPLES as f64 - 0.5, y * SAMPLES as f64 - 0.5, z]
         });
-        let [dx, dy] = super::facets::slope(scaled);
+        let [dx, dy] = slope(scaled);
         let [low, middle, top] = by_row(scaled);
         let [lowest, highest] =
             [f64::min, f64::max].map(|pick| pick(pick(corners[0][2], corners[1][2]), corners[2][2]));
@@ -76,6 +76,17 @@ impl Plan {
             row += 1.0;
         }
     }
+}
+
+/// How much the plane through three corners rises per metre to the east and to the north; 0 without an area.
+pub(crate) fn slope([a, b, c]: [[f64; 3]; 3]) -> [f64; 2] {
+    let to = |p: [f64; 3]| [p[0] - a[0], p[1] - a[1], p[2] - a[2]];
+    let (b, c) = (to(b), to(c));
+    let doubled = b[0] * c[1] - c[0] * b[1];
+    if doubled == 0.0 {
+        return [0.0, 0.0];
+    }
+    [(b[2] * c[1] - c[2] * b[1]) / doubled, (b[0] * c[2] - c[0] * b[2]) / doubled]
 }
 
 /// Corners from the topmost row to the lowest.
