@@ -141,29 +141,18 @@ fn visit(module: &LoadModule, ground: &Ground, mut each: impl FnMut(terrain::Pos
 mod tests {
     use terrain::{ModuleId, ModuleVertex, Post, PostRect};
 
+    use fastrand::Rng;
+
     use super::*;
 
     const GRID: ModuleGrid = ModuleGrid { rows: 2, cols: 3, side_cells: 20 };
 
-    /// SplitMix64.
-    struct Draw(u64);
-
-    impl Draw {
-        fn below(&mut self, bound: u32) -> u32 {
-            self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-            let mut z = self.0;
-            z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-            z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-            ((z ^ (z >> 31)) % u64::from(bound)) as u32
-        }
-    }
-
     /// A load module over random vertices, `step` quanta apart at least, some on its sides.
-    fn random_module(id: ModuleId, spacing: Spacing, step: u32, draw: &mut Draw) -> LoadModule {
+    fn random_module(id: ModuleId, spacing: Spacing, step: u32, draw: &mut Rng) -> LoadModule {
         let side = (GRID.side_cells * spacing.quanta_per_post()) as u32;
         let mut places: Vec<_> = [(0, 0), (0, side), (side, 0), (side, side)].to_vec();
         for i in 0..17 {
-            let mut place = || draw.below(side / step + 1) * step;
+            let mut place = || draw.u32(..=side / step) * step;
             places.push(if i % 4 == 0 { (place(), 0) } else { (place(), place()) });
             places.push(if i % 4 == 0 { (side, place()) } else { (place(), place()) });
         }
@@ -172,7 +161,7 @@ mod tests {
         let points: Vec<_> = places.iter().map(|&(y, x)| Post::new(y as i32, x as i32)).collect();
         let triangles: Vec<_> = mesh::delaunay(&points).into_iter().map(|t| t.map(|v| v as u16)).collect();
         let mut vertex = |(y, x): (u32, u32)| {
-            let z = draw.below(100_000) as i32 - 50_000;
+            let z = draw.i32(-50_000..50_000);
             ModuleVertex { y: y as u16, x: x as u16, z }
         };
         LoadModule {
@@ -231,12 +220,12 @@ mod tests {
     /// The scan and the search agree, in every sum and bin, and each module's figures add up to the whole.
     #[track_caller]
     fn check(seed: u64, voids: bool, classes: bool, sixteenths: u32, step: u32) {
-        let mut draw = Draw(seed);
+        let mut draw = Rng::with_seed(seed);
         let spacing = Spacing::from_sixteenths(sixteenths).unwrap();
         let window = GRID.area().grown(3);
-        let dem = Dem::from_fn(window, |_| (!voids || 0 < draw.below(9)).then(|| draw.below(100_000) as i32 - 50_000));
+        let dem = Dem::from_fn(window, |_| (!voids || 0 < draw.u32(..9)).then(|| draw.i32(-50_000..50_000)));
         let mask = if classes {
-            let classes = (0..window.post_count()).map(|_| draw.below(4) as u8).collect();
+            let classes = (0..window.post_count()).map(|_| draw.u8(..4)).collect();
             Importance::new(window, vec![1000; window.post_count()], classes)
         } else {
             Importance::uniform(window, 1000)
