@@ -3,6 +3,7 @@
 
 use std::io::Write;
 
+use source_files::plain_datum;
 use terrain::{Post, PostRect};
 
 use crate::blocks::{BLOCK, Blocks};
@@ -124,7 +125,7 @@ fn metadata(about: &About) -> String {
     )
 }
 
-/// Names of datums as [`plain_datum`](crate::earth::plain_datum) has them, and the EPSG code of heights above each, in
+/// Names of datums as [`plain_datum`] has them, and the EPSG code of heights above each, in
 /// metres.
 const VERTICAL_CODES: [(&str, u16); 8] = [
     ("dhhn2016", 7837),
@@ -139,7 +140,7 @@ const VERTICAL_CODES: [(&str, u16); 8] = [
 
 /// EPSG code of heights above a datum, where it has one.
 fn vertical_code(datum: &str) -> Option<u16> {
-    let plain = crate::earth::plain_datum(datum);
+    let plain = plain_datum(datum);
     VERTICAL_CODES.iter().find(|(name, code)| plain == *name || plain == format!("epsg{code}")).map(|(_, code)| *code)
 }
 

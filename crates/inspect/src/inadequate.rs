@@ -253,7 +253,7 @@ impl Seen<'_> {
     /// The limits that are used up around a component: a point more costs two of what they count.
     fn blocked_by(&self, modules: &[ModuleId], was_refused: bool) -> Vec<&'static str> {
         let budget = &self.area.budget;
-        let is_full = |count: u64, limit: u64| limit < count + u64::from(limits::POINT_COST);
+        let is_full = |count: u64, limit: u64| limit < count + u64::from(terrain::POINT_COST);
         let count = |module: ModuleId| u64::from(self.counts[self.area.grid.index(module)]);
         let mut found = Vec::new();
         if modules.iter().any(|&module| is_full(count(module), u64::from(budget.per_module))) {

@@ -1,7 +1,7 @@
 //! What the mesh has and what it may have.
 
-use limits::{Charged, POINT_COST, TileLedger};
-use terrain::{ModuleId, ModuleRect, RefusedBy};
+use limits::{Charged, TileLedger};
+use terrain::{ModuleId, ModuleRect, POINT_COST, RefusedBy};
 
 use crate::hold::Hold;
 use crate::place::{PER_POST, Place};

@@ -18,7 +18,7 @@ mod frame;
 pub use frame::{RasterFrame, SampleScale};
 mod geoid;
 mod void_posts;
-pub use geoid::{DatumShift, Geoid};
+pub use geoid::{DatumShift, Geoid, plain_datum};
 mod chunk;
 pub use chunk::Chunk;
 mod directory;

@@ -5,8 +5,8 @@
 //! keep an equal part of their room free for each side they inherit; windows that several tiles can reach
 //! are divided into quotas. Every sum over tiles then respects every limit.
 
-use limits::{Allowance, POINT_COST};
-use terrain::{GainCurve, ModuleId, ModuleRect, Side};
+use limits::Allowance;
+use terrain::{GainCurve, ModuleId, ModuleRect, POINT_COST, Side};
 
 use crate::gains::{Gains, highest_rung};
 use crate::{Budget, Tiling};
