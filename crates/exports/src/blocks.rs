@@ -1,10 +1,7 @@
 //! A raster as deflated blocks with the predictor for floats, and the same for coarser and coarser images of it: each
 //! post of one the mean of up to four, of those that have a value.
 
-use std::io::Write;
-
-use flate2::Compression;
-use flate2::write::ZlibEncoder;
+use source_files::geotiff_parts::{deflate, put_predicted};
 
 use crate::{ExportError, Work};
 
@@ -63,24 +60,6 @@ fn blocks_of_band(values: &[f32], wide: usize) -> Vec<Vec<u8>> {
         deflate(&bytes)
     };
     (0..wide).step_by(BLOCK).map(block).collect()
-}
-
-/// TIFF's predictor 3: the bytes of a row by significance, highest first, each as the step from the one before.
-fn put_predicted(bytes: &mut Vec<u8>, row: &[f32]) {
-    let mut before = 0;
-    for byte in 0..4 {
-        for value in row {
-            let next = value.to_be_bytes()[byte];
-            bytes.push(next.wrapping_sub(before));
-            before = next;
-        }
-    }
-}
-
-fn deflate(bytes: &[u8]) -> Vec<u8> {
-    let mut encoder = ZlibEncoder::new(Vec::new(), Compression::default());
-    let written = encoder.write_all(bytes).and_then(|()| encoder.finish());
-    written.expect("writing to memory cannot fail")
 }
 
 /// The blocks of a raster, and how many posts it has west to east and south to north.

@@ -3,8 +3,9 @@
 
 use std::io::Write;
 
+use source_files::geotiff_parts::{VERTICAL_UNIT, projected_keys, scale_and_tie_point};
 use source_files::plain_datum;
-use terrain::{Post, PostRect};
+use terrain::PostRect;
 
 use crate::blocks::{BLOCK, Blocks};
 use crate::tiff_layout::{self, Image, Value, tag};
@@ -73,14 +74,10 @@ fn sample_tags(image: &Blocks, is_overview: bool) -> Vec<(u16, Value)> {
 }
 
 fn place_tags(about: &About) -> [(u16, Value); 4] {
-    let frame = &about.product.frame;
-    let spacing_m = frame.spacing.metres();
-    // A post is the centre of its pixel, so the raster's corner lies half a post beyond the north-west post.
-    let [east_m, north_m] = frame.place_m(Post::new(about.rect.north, about.rect.west));
-    let corner = vec![0.0, 0.0, 0.0, east_m - spacing_m / 2.0, north_m + spacing_m / 2.0, 0.0];
+    let (scale, tie_point) = scale_and_tie_point(&about.product.frame, about.rect);
     [
-        (tag::PIXEL_SCALE, Value::Doubles(vec![spacing_m, spacing_m, 0.0])),
-        (tag::TIEPOINT, Value::Doubles(corner)),
+        (tag::PIXEL_SCALE, Value::Doubles(scale.to_vec())),
+        (tag::TIEPOINT, Value::Doubles(tie_point.to_vec())),
         (tag::GEO_KEYS, Value::Shorts(geo_keys(about).into_flattened())),
         (tag::GDAL_METADATA, Value::Ascii(metadata(about))),
     ]
@@ -88,19 +85,11 @@ fn place_tags(about: &About) -> [(u16, Value); 4] {
 
 /// The coordinate system: one of heights, too, where these are heights above a datum that has a code.
 fn geo_keys(about: &About) -> Vec<[u16; 4]> {
-    const PROJECTED: u16 = 1;
-    const PIXEL_IS_AREA: u16 = 1;
-    const METRE: u16 = 9001;
     // GeoTIFF 1.1: of 1.0 GDAL drops the vertical system unless told otherwise.
-    let mut keys: Vec<[u16; 4]> = vec![
-        [1, 1, 1, 0],
-        [1024, 0, 1, PROJECTED],
-        [1025, 0, 1, PIXEL_IS_AREA],
-        [3072, 0, 1, about.epsg],
-        [3076, 0, 1, METRE],
-    ];
+    let mut keys = vec![[1, 1, 1, 0]];
+    keys.extend(projected_keys(about.epsg));
     if let (Some(code), "surface") = (vertical_code(about.product.vertical_datum()), about.layer) {
-        keys.extend([[4096, 0, 1, code], [4099, 0, 1, METRE]]);
+        keys.extend([[4096, 0, 1, code], VERTICAL_UNIT]);
     }
     keys[0][3] = keys.len() as u16 - 1;
     keys

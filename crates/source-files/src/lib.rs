@@ -57,5 +57,6 @@ mod shapefile;
 pub use polygons::read_polygons;
 mod given;
 pub use given::{GivenFeature, GivenShape, read_given};
+pub mod geotiff_parts;
 mod write;
 pub use write::{write_classes, write_heights};

@@ -13,7 +13,7 @@ pub use compare::{
 mod look;
 pub use look::{Seen, Suggestion, look_at};
 mod sample;
-pub use sample::sample;
+pub use sample::Sample;
 
 mod heights;
 mod outlook;
