@@ -8,7 +8,7 @@ use crate::tally::{Residuals, Tally, bin};
 
 /// The ground that load modules are measured against.
 #[derive(Clone, Copy, Debug)]
-pub struct Ground<'a> {
+pub struct Reference<'a> {
     /// Heights at all posts of the load modules; voids are skipped.
     pub dem: &'a Dem,
     /// Classes of the same posts. Weights are not used: every post counts once.
@@ -24,7 +24,7 @@ pub struct Ground<'a> {
 ///
 /// # Panics
 /// When the windows of `ground` do not hold all posts of the load modules.
-pub fn measure(modules: &mut [LoadModule], ground: &Ground) -> Residuals {
+pub fn measure(modules: &mut [LoadModule], ground: &Reference) -> Residuals {
     let mut all = Residuals::default();
     for module in modules {
         module.residual = count(module, ground, &mut all);
@@ -36,7 +36,7 @@ pub fn measure(modules: &mut [LoadModule], ground: &Ground) -> Residuals {
 ///
 /// # Panics
 /// When the windows of `ground` do not hold all posts of the load module.
-pub fn residuals(module: &LoadModule, ground: &Ground) -> Residuals {
+pub fn residuals(module: &LoadModule, ground: &Reference) -> Residuals {
     let mut all = Residuals::default();
     count(module, ground, &mut all);
     all
@@ -47,7 +47,7 @@ pub fn residuals(module: &LoadModule, ground: &Ground) -> Residuals {
 ///
 /// # Panics
 /// When the window of `ground` does not hold all posts of the load module.
-pub fn each_residual(module: &LoadModule, ground: &Ground, mut each: impl FnMut(terrain::Post, i32)) {
+pub fn each_residual(module: &LoadModule, ground: &Reference, mut each: impl FnMut(terrain::Post, i32)) {
     let whole = ground.dem.void_count() == 0;
     visit(module, ground, |post, residual| {
         if whole || !ground.dem.is_void(post) {
@@ -56,7 +56,7 @@ pub fn each_residual(module: &LoadModule, ground: &Ground, mut each: impl FnMut(
     });
 }
 
-fn count(module: &LoadModule, ground: &Ground, all: &mut Residuals) -> ModuleResidual {
+fn count(module: &LoadModule, ground: &Reference, all: &mut Residuals) -> ModuleResidual {
     let rect = ground.grid.posts_of(module.id);
     assert!(ground.dem.rect().contains_rect(&rect), "the DEM window holds load module {}", module.id);
     assert!(ground.mask.rect().contains_rect(&rect), "the mask window holds load module {}", module.id);
@@ -115,7 +115,7 @@ impl Sums {
 /// Calls `each` with every post that one triangle of a load module owns and its residual, voids included.
 pub(crate) fn visit_triangle(
     module: &LoadModule,
-    ground: &Ground,
+    ground: &Reference,
     triangle: [u16; 3],
     each: impl FnMut(terrain::Post, i32),
 ) {
@@ -130,7 +130,7 @@ fn facet(module: &LoadModule, triangle: [u16; 3]) -> Facet {
 }
 
 #[inline(always)]
-fn visit(module: &LoadModule, ground: &Ground, mut each: impl FnMut(terrain::Post, i32)) {
+fn visit(module: &LoadModule, ground: &Reference, mut each: impl FnMut(terrain::Post, i32)) {
     let posts = PostGrid::of_module(ground.grid, module.id, ground.spacing);
     for &triangle in &module.triangles {
         visit_residuals(&posts, &facet(module, triangle), ground.dem, &mut each);
@@ -176,7 +176,7 @@ mod tests {
     }
 
     /// The residual at `post`, from the one triangle that holds it after the shift, in 128 bits.
-    fn residual_by_search(module: &LoadModule, ground: &Ground, post: Post) -> Option<i32> {
+    fn residual_by_search(module: &LoadModule, ground: &Reference, post: Post) -> Option<i32> {
         let (rect, area, q) = (ground.grid.posts_of(module.id), ground.grid.area(), ground.spacing.quanta_per_post());
         let (x, y) = (i128::from((post.col - rect.west) * q), i128::from((post.row - rect.south) * q));
         let east = if post.col == area.east { -1 } else { 1 };
@@ -198,7 +198,7 @@ mod tests {
         })
     }
 
-    fn by_search(modules: &[LoadModule], ground: &Ground) -> Residuals {
+    fn by_search(modules: &[LoadModule], ground: &Reference) -> Residuals {
         let mut all = Residuals::default();
         let area = ground.grid.area();
         for post in posts(area) {
@@ -230,7 +230,7 @@ mod tests {
         } else {
             Importance::uniform(window, 1000)
         };
-        let ground = Ground { dem: &dem, mask: &mask, grid: GRID, spacing };
+        let ground = Reference { dem: &dem, mask: &mask, grid: GRID, spacing };
         let mut modules: Vec<_> = GRID.all().iter().map(|id| random_module(id, spacing, step, &mut draw)).collect();
         modules.iter().for_each(|module| assert_eq!(module.check(), Ok(()), "seed {seed}"));
         let found = measure(&mut modules, &ground);

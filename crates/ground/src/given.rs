@@ -7,8 +7,7 @@ use std::path::Path;
 
 use job::{Job, NamedFile, OuterBorder, Start, StartMethod};
 use methods::{
-    Boundary, Contours, Diagonal, Distance, Extrema, FowlerLittle, Ground as MethodGround, Impossible, LatticeTin,
-    Splitting,
+    Boundary, Contours, DemWindow, Diagonal, Distance, Extrema, FowlerLittle, Impossible, LatticeTin, Splitting,
 };
 use source_files::{GivenFeature, GivenShape, RasterFrame, read_given};
 use terrain::{Dem, Importance, Metres, Post, PostRect, THOUSANDTHS, TileId, quanta_of_metres};
@@ -181,8 +180,8 @@ impl Given {
             let modules = area.tiling.modules(tile, area.grid).count() as u64;
             let share = (points * modules).div_ceil(area.grid.count() as u64) as usize;
             let spacing = Metres(area.frame.spacing.metres());
-            let chosen = chosen(&MethodGround { dem, spacing }, method, share)
-                .map_err(|why| refused("tin.start", method, why))?;
+            let chosen =
+                chosen(&DemWindow { dem, spacing }, method, share).map_err(|why| refused("tin.start", method, why))?;
             let known: std::collections::HashSet<Post> = found.iter().map(|post| post.at).collect();
             // A fixed outer border has its own points.
             let is_fixed = |at: Post| self.outer_is_fixed && is_on_border(area.rect, at);
@@ -202,7 +201,7 @@ pub struct GamingAreaFrame {
 }
 
 /// The posts that a method chooses on a window, in its order, corners left out.
-pub fn chosen(ground: &MethodGround, method: StartMethod, points: usize) -> Result<Vec<Post>, Impossible> {
+pub fn chosen(ground: &DemWindow, method: StartMethod, points: usize) -> Result<Vec<Post>, Impossible> {
     let rect = ground.dem.rect();
     // Four of a method's points are the corners, which every tile has.
     let count = (points + 4).min(rect.post_count());

@@ -8,7 +8,7 @@ use std::hint::black_box;
 use std::time::Instant;
 
 use fastrand::Rng;
-use load_module_reader::{Area, Ground, Keep, ReadError, Sight};
+use load_module_reader::{Area, Keep, LoadedGround, ReadError, Sight};
 
 /// Seconds this thread has run, or else seconds on the clock.
 fn seconds(start: Instant) -> f64 {
@@ -59,7 +59,7 @@ fn load_blocks(area: &Area) -> Result<(), ReadError> {
     Ok(())
 }
 
-fn heights(area: &Area, ground: &Ground, queries: usize) {
+fn heights(area: &Area, ground: &LoadedGround, queries: usize) {
     let (mut draw, size, origin) = (Rng::with_seed(2), size_m(area), area.frame().origin_m);
     let random: Vec<[f64; 2]> =
         (0..queries).map(|_| [0, 1].map(|axis| origin[axis] + size[axis] * draw.f64())).collect();
@@ -93,7 +93,7 @@ fn heights(area: &Area, ground: &Ground, queries: usize) {
     }
 }
 
-fn sights(area: &Area, ground: &Ground, queries: usize) {
+fn sights(area: &Area, ground: &LoadedGround, queries: usize) {
     let (mut draw, size, origin) = (Rng::with_seed(3), size_m(area), area.frame().origin_m);
     let mut place = || [0, 1].map(|axis| origin[axis] + size[axis] * (0.1 + 0.8 * draw.f64()));
     let pairs: Vec<[[f64; 3]; 2]> = (0..queries)

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use crate::{Block, Frame, Keep, ReadError, TerrainModule, TileFile};
+use crate::{AreaFrame, Block, Keep, ReadError, TerrainModule, TileFile};
 
 /// Extension of load-module files.
 const EXTENSION: &str = "slm";
@@ -16,7 +16,7 @@ pub struct Area {
     /// Place in `files` of the file of each load module that is in one, by row and column. As large as what the files
     /// hold, however large an area their headers promise.
     file_of: HashMap<[u32; 2], u32>,
-    frame: Frame,
+    frame: AreaFrame,
 }
 
 impl Area {
@@ -55,11 +55,11 @@ impl Area {
     /// When there are none, or they do not belong to one area.
     pub fn of_files(files: Vec<TileFile>) -> Result<Self, ReadError> {
         let Some(first) = files.first() else { return Err(ReadError::NoFiles { path: Path::new("").into() }) };
-        let frame = Frame::of(first.header());
+        let frame = AreaFrame::of(first.header());
         let mut file_of = HashMap::new();
         for (place, file) in (0..).zip(&files) {
             let header = file.header();
-            if Frame::of(header) != frame {
+            if AreaFrame::of(header) != frame {
                 return Err(ReadError::OtherArea { file: format!("{file:?}"), first: format!("{first:?}") });
             }
             let cols = header.west..header.east;
@@ -70,7 +70,7 @@ impl Area {
     }
 
     /// Where load modules lie.
-    pub fn frame(&self) -> &Frame {
+    pub fn frame(&self) -> &AreaFrame {
         &self.frame
     }
 

@@ -4,7 +4,7 @@ use crate::{Header, QUANTA_PER_METRE};
 
 /// Where load modules lie.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Frame {
+pub struct AreaFrame {
     /// Rows of load modules in the area.
     pub rows: u32,
     /// Columns of load modules in the area.
@@ -21,7 +21,7 @@ pub struct Frame {
     pub vertical_datum: String,
 }
 
-impl Frame {
+impl AreaFrame {
     pub(crate) fn of(header: &Header) -> Self {
         Self {
             rows: header.area_rows,

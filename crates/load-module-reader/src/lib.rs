@@ -6,7 +6,8 @@
 //! what is returned is sound, and anything else is a [`ReadError`].
 //!
 //! [`Area`] opens all files of a database and reads only their headers and indexes. [`Area::load`] brings a [`Block`]
-//! of load modules into memory as [`Ground`], and [`Ground::moved`] follows the observer and reads only what is new.
+//! of load modules into memory as [`LoadedGround`], and [`LoadedGround::moved`] follows the observer and reads only
+//! what is new.
 //! A query takes constant expected time. [`SlmFile`] is the plain way to read one whole file.
 //! Where load modules have several levels of detail, all of this is about the finest, and [`Area::load_level`] brings
 //! in another.
@@ -79,9 +80,9 @@ mod lookup;
 mod terrain_module;
 pub use terrain_module::{HOLE_CLASS, Sample, TerrainModule};
 mod frame;
-pub use frame::{Block, Frame};
-mod ground;
-pub use ground::{Ground, Sight};
+pub use frame::{AreaFrame, Block};
+mod loaded_ground;
+pub use loaded_ground::{LoadedGround, Sight};
 mod area;
 pub use area::Area;
 mod load;

@@ -2,14 +2,14 @@
 
 use std::sync::Arc;
 
-use crate::{Area, Block, Ground, ReadError, TerrainModule};
+use crate::{Area, Block, LoadedGround, ReadError, TerrainModule};
 
 impl Area {
     /// Loads a block, ready to be asked.
     ///
     /// # Errors
     /// When a load module cannot be read, is damaged, or is in no file.
-    pub fn load(&self, block: Block) -> Result<Ground, ReadError> {
+    pub fn load(&self, block: Block) -> Result<LoadedGround, ReadError> {
         self.load_level(block, 0)
     }
 
@@ -17,16 +17,16 @@ impl Area {
     ///
     /// # Errors
     /// When there is no such level, or a load module cannot be read, is damaged, or is in no file.
-    pub fn load_level(&self, block: Block, level: u16) -> Result<Ground, ReadError> {
+    pub fn load_level(&self, block: Block, level: u16) -> Result<LoadedGround, ReadError> {
         let level_count = self.frame().level_count;
         if level_count <= level {
             return Err(ReadError::NoSuchLevel { found: level, level_count });
         }
-        Ground::empty(self.frame().clone(), level).moved(self, block)
+        LoadedGround::empty(self.frame().clone(), level).moved(self, block)
     }
 }
 
-impl Ground {
+impl LoadedGround {
     /// The same ground, at the same level, for another block: what both hold is kept, only the rest is read.
     ///
     /// # Errors

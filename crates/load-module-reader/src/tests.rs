@@ -6,7 +6,8 @@ use fastrand::Rng;
 
 use crate::lookup::STEPS;
 use crate::{
-    Area, Block, Ground, Keep, Module, ReadError, Residual, Sight, SlmFile, TerrainModule, TileFile, Vertex, sample,
+    Area, Block, Keep, LoadedGround, Module, ReadError, Residual, Sight, SlmFile, TerrainModule, TileFile, Vertex,
+    sample,
 };
 
 const SIDE: u16 = 64_000;
@@ -97,7 +98,7 @@ fn sample_area() -> Area {
 }
 
 /// Both load modules of the sample: 2,3 is level at 5 m, 2,4 a pit whose bottom lies below zero.
-fn sample_ground() -> Ground {
+fn sample_ground() -> LoadedGround {
     sample_area().load(Block { south: 2, west: 3, north: 3, east: 5 }).unwrap()
 }
 

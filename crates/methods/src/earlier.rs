@@ -12,7 +12,7 @@ use geometry::{Facet, orient};
 use mesh::constrained_delaunay;
 use terrain::{Dem, Post, Tin};
 
-use crate::ground::{Ground, Impossible, RING, beside, posts_of, tin_of, within};
+use crate::dem_window::{DemWindow, Impossible, RING, beside, posts_of, tin_of, within};
 
 /// Nearest points to which edges are tried.
 const NEAREST: usize = 24;
@@ -21,7 +21,7 @@ const NEAREST: usize = 24;
 ///
 /// # Errors
 /// When the window has not so many posts, or fewer than its corners are asked for.
-pub fn earlier(ground: &Ground, points: usize) -> Result<Tin, Impossible> {
+pub fn earlier(ground: &DemWindow, points: usize) -> Result<Tin, Impossible> {
     let (dem, rect) = (ground.dem, ground.dem.rect());
     within(rect, points)?;
     let mut posts = rect.corners().to_vec();

@@ -7,7 +7,7 @@ use std::collections::HashSet;
 
 use terrain::{Dem, Post, Tin};
 
-use crate::ground::{Ground, Impossible, RING, beside, inner_posts, is_on_border, tin_of};
+use crate::dem_window::{DemWindow, Impossible, RING, beside, inner_posts, is_on_border, tin_of};
 
 /// What counts as a peak or a pit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -22,7 +22,7 @@ pub enum Extrema {
 ///
 /// # Errors
 /// When they make no triangle.
-pub fn highlow(ground: &Ground, extrema: Extrema) -> Result<Tin, Impossible> {
+pub fn highlow(ground: &DemWindow, extrema: Extrema) -> Result<Tin, Impossible> {
     let posts = match extrema {
         Extrema::Strict => {
             let all = inner_posts(ground.dem.rect());

@@ -350,7 +350,7 @@ impl<'a> TinJob<'a> {
             let is_here = |post: &&GivenPost| dem.rect().contains(post.at);
             return Ok(self.given.iter().filter(is_here).copied().collect());
         };
-        let ground = methods::Ground { dem, spacing: self.spacing };
+        let ground = methods::DemWindow { dem, spacing: self.spacing };
         let share = points.div_ceil(self.tiles.len());
         let posts = chosen(&ground, method, share).map_err(|why| refused("--start", method, why))?;
         Ok(posts.into_iter().map(|at| GivenPost { at, pinned: false, outer: false, height: None }).collect())

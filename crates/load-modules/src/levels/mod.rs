@@ -8,9 +8,9 @@
 
 mod fit;
 mod flip;
+mod level_mesh;
 mod posts;
 mod rank;
-mod sheet;
 mod sides;
 #[cfg(test)]
 mod tests;
@@ -18,9 +18,9 @@ mod tests;
 use terrain::{Importance, LoadModule, ModuleResidual, ModuleVertex, Side};
 
 use crate::{Layout, classes, pieces};
+use level_mesh::{LevelMesh, is_inside};
 pub use posts::LevelGround;
 use posts::Posts;
-use sheet::{Sheet, is_inside};
 
 /// Which levels a load module gets beside the finest.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -74,10 +74,10 @@ fn share_of(count: usize, share: f64) -> usize {
 }
 
 /// The vertices triangulated, those inside at fitted heights.
-fn fitted(vertices: Vec<ModuleVertex>, side: u16, flips: bool, posts: &Posts) -> Sheet {
+fn fitted(vertices: Vec<ModuleVertex>, side: u16, flips: bool, posts: &Posts) -> LevelMesh {
     /// Flips ask for other heights, and these for other flips; a third round hardly changes anything.
     const ROUNDS: usize = 2;
-    let mut sheet = Sheet::delaunay(vertices, posts);
+    let mut sheet = LevelMesh::delaunay(vertices, posts);
     fit::fit_heights(&mut sheet, side, posts);
     for _ in 0..ROUNDS {
         if !flips || flip::flip_all(&mut sheet, posts) == 0 {
@@ -89,7 +89,7 @@ fn fitted(vertices: Vec<ModuleVertex>, side: u16, flips: bool, posts: &Posts) ->
 }
 
 /// The load module that a sheet is.
-fn load_module(finest: &LoadModule, sheet: Sheet, layout: &Layout, mask: &Importance) -> LoadModule {
+fn load_module(finest: &LoadModule, sheet: LevelMesh, layout: &Layout, mask: &Importance) -> LoadModule {
     let (vertices, triangles) = sheet.into_lists();
     let mut module = LoadModule {
         id: finest.id,

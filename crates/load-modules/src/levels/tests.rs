@@ -155,7 +155,7 @@ fn a_vertex_goes_when_a_triangulation_without_it_is_the_closest_of_all() {
         for &gone in &order {
             let without = |v: u16| -> u128 {
                 let rest = left.iter().filter(|&&u| u != v).map(|&u| module.vertices[usize::from(u)]);
-                Sheet::delaunay(rest.collect(), &near).squares.iter().sum()
+                LevelMesh::delaunay(rest.collect(), &near).squares.iter().sum()
             };
             let best = inner.iter().filter(|v| left.contains(v)).min_by_key(|&&v| (without(v), v));
             assert_eq!(Some(&gone), best, "seed {seed}");
@@ -215,6 +215,6 @@ fn ground_without_weight_and_a_load_module_without_inner_vertices_have_levels_to
     let bare = finest[0].vertices.iter().copied().filter(|v| !is_inside(*v, finest[0].side)).collect();
     let ground = LevelGround { dem: &dem, mask: &mask };
     let near = Posts::new(finest[0].id, &layout, &ground);
-    let bare = load_module(&finest[0], Sheet::delaunay(bare, &near), &layout, &mask);
+    let bare = load_module(&finest[0], LevelMesh::delaunay(bare, &near), &layout, &mask);
     assert_eq!(coarser_levels(&bare, &layout, &Levels { flips: false, ..wanted }, &ground), [bare.clone(), bare]);
 }

@@ -3,7 +3,7 @@
 use terrain::{Dem, Post};
 
 use super::surface::{Flags, Kind, channel_candidates, is_higher, kind, ridge_candidates, sectors};
-use crate::ground::{RING, beside, inner_posts, is_on_border, posts_of};
+use crate::dem_window::{RING, beside, inner_posts, is_on_border, posts_of};
 
 /// Posts that a line of leftover candidates has at least.
 const LEFTOVER_POSTS_MIN: usize = 5;

@@ -26,9 +26,9 @@ pub(crate) fn data_uri(image: &Image) -> String {
 }
 
 fn figure(drawing: &Drawing, caption: &str, over: &Markup) -> Markup {
-    let Drawing { sheet, map, plan } = drawing;
-    let scale_m = round_length(0.3 * plan.metres_per_pixel() * plan.pixels[0] as f64);
-    let scale_share = scale_m / (plan.extent_m[2] - plan.extent_m[0]);
+    let Drawing { sheet, map, map_extent } = drawing;
+    let scale_m = round_length(0.3 * map_extent.metres_per_pixel() * map_extent.pixels[0] as f64);
+    let scale_share = scale_m / (map_extent.extent_m[2] - map_extent.extent_m[0]);
     html! {
         figure style=(format!("max-width:{}px", map.wide())) {
             figcaption { b { (caption) } " " (sheet.subtitle) "." }
@@ -44,7 +44,7 @@ fn figure(drawing: &Drawing, caption: &str, over: &Markup) -> Markup {
 }
 
 fn extent_text(drawing: &Drawing) -> String {
-    let ([west, south, east, north], place) = (drawing.plan.extent_m, &drawing.sheet.coordinates);
+    let ([west, south, east, north], place) = (drawing.map_extent.extent_m, &drawing.sheet.coordinates);
     let [east_0, north_0] = place.origin_m;
     let km = |metres: f64| metres / 1000.0;
     let crs = if place.crs.is_empty() { String::new() } else { format!(" in {}", place.crs) };
@@ -110,7 +110,7 @@ pub(super) fn first(scene: &Scene, marks: &Marks) -> Markup {
 
 /// All other maps of the page.
 pub(super) fn maps(scene: &Scene) -> Markup {
-    let per_pixel = scene.plan(MAP_PIXELS).metres_per_pixel();
+    let per_pixel = scene.map_extent(MAP_PIXELS).metres_per_pixel();
     // Those of load modules are known without the ground.
     let has_residuals = scene.ground.is_some() || scene.frame.spacing.metres() < per_pixel;
     html! {

@@ -6,7 +6,7 @@ use terrain::{
     Dem, HOLE_CLASS, LATTICE_PER_POST, LoadModule, ModuleGrid, Post, QUANTA_PER_METRE, Spacing, Tin, metres_of_quanta,
 };
 
-use super::plan::slope;
+use super::map_extent::slope;
 use super::scene::Scene;
 
 /// Triangles with the places of their corners: east, north and up, in metres.

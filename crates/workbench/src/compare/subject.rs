@@ -9,7 +9,7 @@ use fidelity::Tally;
 use geometry::WORKING_POSTS_MAX;
 use ground::{GamingArea, Ground, decode, reading};
 use job::{DemSource, Job, SourceFile};
-use methods::Ground as MethodGround;
+use methods::DemWindow;
 use schedule::Workers;
 use source_files::{DemFile, Reading, VoidPolicy};
 use terrain::{Dem, Metres, Post, PostRect, Tin, quanta_of_metres};
@@ -57,8 +57,8 @@ impl Subject {
     }
 
     /// As methods want it.
-    pub fn ground(&self) -> MethodGround<'_> {
-        MethodGround { dem: &self.dem, spacing: self.spacing }
+    pub fn ground(&self) -> DemWindow<'_> {
+        DemWindow { dem: &self.dem, spacing: self.spacing }
     }
 
     /// Posts with a height.

@@ -8,14 +8,14 @@ pub const TOLERANCE_M: f64 = 10.0;
 
 /// A window of the DEM and the metres between its posts.
 #[derive(Clone, Copy, Debug)]
-pub struct Ground<'a> {
+pub struct DemWindow<'a> {
     /// Heights; voids are never chosen, but for corners.
     pub dem: &'a Dem,
     /// Metres between posts.
     pub spacing: Metres,
 }
 
-impl Ground<'_> {
+impl DemWindow<'_> {
     /// Quanta between posts.
     pub(crate) fn spacing_quanta(&self) -> f64 {
         self.spacing.0 * f64::from(QUANTA_PER_METRE)

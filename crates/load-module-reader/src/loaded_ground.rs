@@ -3,12 +3,12 @@
 use std::sync::Arc;
 
 use crate::lookup::{Lookup, STEPS};
-use crate::{Block, Frame, QUANTA_PER_METRE, Sample, TerrainModule};
+use crate::{AreaFrame, Block, QUANTA_PER_METRE, Sample, TerrainModule};
 
 /// A block of load modules, loaded. It holds no file open and may be asked from many threads.
 #[derive(Clone, Debug)]
-pub struct Ground {
-    frame: Frame,
+pub struct LoadedGround {
+    frame: AreaFrame,
     level: u16,
     block: Block,
     /// Row by row from the south-west.
@@ -30,9 +30,9 @@ pub enum Sight {
     Unknown,
 }
 
-impl Ground {
+impl LoadedGround {
     /// Nothing loaded yet.
-    pub(crate) fn empty(frame: Frame, level: u16) -> Self {
+    pub(crate) fn empty(frame: AreaFrame, level: u16) -> Self {
         let side_steps = i64::from(frame.side) * STEPS;
         let block = Block { south: 0, west: 0, north: 0, east: 0 };
         Self { frame, level, block, modules: Vec::new(), lookups: Vec::new(), side_steps }
@@ -49,7 +49,7 @@ impl Ground {
     }
 
     /// Where load modules lie.
-    pub fn frame(&self) -> &Frame {
+    pub fn frame(&self) -> &AreaFrame {
         &self.frame
     }
 
@@ -101,8 +101,9 @@ impl Ground {
         self.lookups[index].height_m(place)
     }
 
-    /// Heights at many places at once, in `heights_m`, NaN where nothing is loaded: what [`Ground::height_m`] gives for
-    /// each, but faster for places far apart, because memory is asked for several of them before the first is needed.
+    /// Heights at many places at once, in `heights_m`, NaN where nothing is loaded: what [`LoadedGround::height_m`]
+    /// gives for each, but faster for places far apart, because memory is asked for several of them before the first is
+    /// needed.
     ///
     /// # Panics
     /// When the two lists differ in length.
