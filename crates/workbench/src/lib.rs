@@ -1,8 +1,8 @@
 //! Meshes without a job: from a raster alone, at several levels, and one method beside another; and a first look at
 //! rasters, which suggests a job.
 
-mod raster;
-pub use raster::{Mesh, TinMethod, TinRequest, TinStart, tin};
+mod mesh;
+pub use mesh::{Mesh, TinMethod, TinRequest, TinStart, tin};
 mod tin_levels;
 pub use tin_levels::tin_levels;
 mod compare;
@@ -18,4 +18,4 @@ pub use sample::Sample;
 mod heights;
 mod outlook;
 mod suiting;
-mod tin_tally;
+mod tally;

@@ -16,8 +16,8 @@ use terrain::{Dem, Metres, Post, PostRect, Tin, quanta_of_metres};
 
 use super::made::{CompareGround, Equivalent, Made};
 use crate::heights::{Heights, has_square_posts};
-use crate::raster::{TinRequest, untiled};
-use crate::tin_tally::tally_of;
+use crate::mesh::{TinRequest, untiled};
+use crate::tally::tally_of;
 use crate::{TinMethod, TinStart};
 
 /// When a TIN is good enough.

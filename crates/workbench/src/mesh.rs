@@ -20,7 +20,7 @@ use tiling::{Gains, Order, Tiling, points_equally, points_globally};
 use tin::{CostUnit, Frame, LastBatch, Proximity, Rule, Stop, SurveyTask, TileTask};
 
 use crate::heights::Heights;
-use crate::tin_tally::tally_of;
+use crate::tally::tally_of;
 
 /// The paper's proximity test: metres across, metres in height.
 const PROXIMITY_M: (f64, u32) = (300.0, 20);
