@@ -201,7 +201,7 @@ mod tests {
     fn by_search(modules: &[LoadModule], ground: &Reference) -> Residuals {
         let mut all = Residuals::default();
         let area = ground.grid.area();
-        for post in posts(area) {
+        for post in area.posts() {
             let module_of = |v: i32, far: u32| (v / ground.grid.side_cells).min(far as i32 - 1) as u32;
             let id = ModuleId { row: module_of(post.row, GRID.rows), col: module_of(post.col, GRID.cols) };
             let module = &modules[GRID.index(id)];
@@ -211,10 +211,6 @@ mod tests {
             }
         }
         all
-    }
-
-    fn posts(rect: PostRect) -> impl Iterator<Item = Post> {
-        (rect.south..=rect.north).flat_map(move |row| (rect.west..=rect.east).map(move |col| Post::new(row, col)))
     }
 
     /// The scan and the search agree, in every sum and bin, and each module's figures add up to the whole.
@@ -245,7 +241,7 @@ mod tests {
             merged.merge(&own);
         }
         assert_eq!(merged, found);
-        let counted = posts(GRID.area()).filter(|&post| !dem.is_void(post)).count();
+        let counted = GRID.area().posts().filter(|&post| !dem.is_void(post)).count();
         assert_eq!(found.total().posts, counted as u64);
     }
 

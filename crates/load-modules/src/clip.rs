@@ -204,7 +204,7 @@ mod tests {
     use terrain::{ModuleGrid, ModuleRect, Spacing};
 
     use super::*;
-    use crate::sheets::{assert_sides_are_shared, points, posts, side_list};
+    use crate::sheets::{assert_sides_are_shared, points, side_list};
 
     fn whole(grid: ModuleGrid, spacing_m: f64) -> Layout {
         Layout { grid, modules: grid.all(), spacing: Spacing::from_metres(spacing_m).unwrap() }
@@ -217,7 +217,7 @@ mod tests {
     /// Classes in bands that no load module line follows.
     fn mask(layout: &Layout) -> Importance {
         let area = layout.grid.area();
-        let classes = posts(area).map(|post| ((post.row + 2 * post.col) / 17 % 3) as u8).collect();
+        let classes = area.posts().map(|post| ((post.row + 2 * post.col) / 17 % 3) as u8).collect();
         Importance::new(area, vec![1000; area.post_count()], classes)
     }
 

@@ -237,7 +237,7 @@ mod tests {
     use terrain::{LoadModule, ModuleGrid, ModuleRect, Spacing};
 
     use super::*;
-    use crate::sheets::{points, posts};
+    use crate::sheets::points;
     use crate::{ClipHeights, clip};
 
     const GRID: ModuleGrid = ModuleGrid { rows: 4, cols: 4, side_cells: 20 };
@@ -249,7 +249,7 @@ mod tests {
     fn ground_of(seed: u64) -> (Dem, Importance) {
         let (mut draw, area) = (Rng::with_seed(seed), GRID.area());
         let dem = Dem::from_fn(area, |_| (0 < draw.u32(..40)).then(|| draw.i32(0..60_000)));
-        let weights = posts(area).map(|post| if post.row < 30 { 8000 } else { 1000 }).collect();
+        let weights = area.posts().map(|post| if post.row < 30 { 8000 } else { 1000 }).collect();
         (dem, Importance::new(area, weights, vec![0; area.post_count()]))
     }
 

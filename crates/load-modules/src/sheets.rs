@@ -14,7 +14,7 @@ pub(crate) fn points(grid: ModuleGrid, border_step: i32, count: usize, seed: u64
     let mut draw = Rng::with_seed(seed);
     let area = grid.area();
     let mut places = std::collections::BTreeSet::new();
-    for post in posts(area) {
+    for post in area.posts() {
         let on = |step: i32| post.row % step == 0 && post.col % step == 0;
         let outer = post.row == 0 || post.col == 0 || post.row == area.north || post.col == area.east;
         if on(grid.side_cells) || outer && on(border_step) {
@@ -26,10 +26,6 @@ pub(crate) fn points(grid: ModuleGrid, border_step: i32, count: usize, seed: u64
         places.insert(Post::new(inner(area.north, &mut draw), inner(area.east, &mut draw)));
     }
     places.into_iter().map(|post| Vertex { at: post.into(), height: draw.i32(-9_000..51_000) }).collect()
-}
-
-pub(crate) fn posts(rect: PostRect) -> impl Iterator<Item = Post> {
-    (rect.south..=rect.north).flat_map(move |row| (rect.west..=rect.east).map(move |col| Post::new(row, col)))
 }
 
 /// The places along a side and the heights there.

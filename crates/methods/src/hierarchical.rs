@@ -186,7 +186,7 @@ mod tests {
             let tin = all.cut(points);
             let on_edges = tin.vertices.iter().filter(|vertex| {
                 let post = vertex.at.post().unwrap();
-                crate::dem_window::is_on_border(rect, post) || post.row == post.col
+                rect.has_on_border(post) || post.row == post.col
             });
             assert_eq!(on_edges.count(), 4, "no vertex but the corners is on the border or the diagonal");
             let edges: Vec<_> = tin.triangles.iter().flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)]).collect();

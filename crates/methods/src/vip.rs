@@ -8,7 +8,7 @@ use std::cmp::Ordering;
 
 use terrain::{Dem, Post, PostRect, Tin};
 
-use crate::dem_window::{DemWindow, Impossible, inner_posts, is_on_border, posts_of, within};
+use crate::dem_window::{DemWindow, Impossible, inner_posts, within};
 use crate::growing::delaunay_tin;
 
 /// How far a post stands from the line between two opposite neighbours.
@@ -49,11 +49,12 @@ pub fn vip(ground: &DemWindow, points: usize, distance: Distance, boundary: Boun
     let (dem, rect) = (ground.dem, ground.dem.rect());
     within(rect, points)?;
     let forced: Vec<Post> = match boundary {
-        Boundary::ForceAll => posts_of(rect).filter(|&post| is_on_border(rect, post)).collect(),
+        Boundary::ForceAll => rect.posts().filter(|&post| rect.has_on_border(post)).collect(),
         Boundary::Extend | Boundary::CornersOnly => rect.corners().to_vec(),
     };
-    let mut ranked: Vec<(f64, Post)> = posts_of(rect)
-        .filter(|&post| boundary == Boundary::Extend || !is_on_border(rect, post))
+    let mut ranked: Vec<(f64, Post)> = rect
+        .posts()
+        .filter(|&post| boundary == Boundary::Extend || !rect.has_on_border(post))
         .filter(|post| !dem.is_void(*post) && !rect.corners().contains(post))
         .map(|post| (importance(ground, post, distance), post))
         .collect();

@@ -57,8 +57,7 @@ impl Geoid {
         if !self.window.contains(post) {
             return None;
         }
-        let (row, col) = (post.row - self.window.south, post.col - self.window.west);
-        let index = row as usize * self.window.posts_wide() + col as usize;
+        let index = self.window.index(post);
         (!self.voids.contains(index)).then(|| self.scale.height_m(self.samples.get(index)))
     }
 }

@@ -257,9 +257,7 @@ impl Patch {
         if self.standings.iter().all(|&standing| standing <= Standing::Filled) {
             return Dem::from_rows(self.rect, &self.heights);
         }
-        let index = |post: Post| {
-            (post.row - self.rect.south) as usize * self.rect.posts_wide() + (post.col - self.rect.west) as usize
-        };
+        let index = |post: Post| self.rect.index(post);
         let known = |post| self.standings[index(post)] <= Standing::Filled;
         let mut dem = Dem::from_fn(self.rect, |post| known(post).then(|| self.heights[index(post)]));
         dem.fill_voids(|post| self.heights[index(post)]);

@@ -147,8 +147,7 @@ impl Raster {
     /// When `post` lies outside the window.
     pub fn sample(&self, post: Post) -> Option<f64> {
         assert!(self.window.contains(post), "post {post} lies outside the window");
-        let (row, col) = (post.row - self.window.south, post.col - self.window.west);
-        let index = row as usize * self.window.posts_wide() + col as usize;
+        let index = self.window.index(post);
         (!self.voids.contains(index)).then(|| self.samples.get(index))
     }
 

@@ -6,7 +6,7 @@ use fastrand::Rng;
 use terrain::{Dem, ModuleGrid, ModuleRect, Post, PostRect, Spacing};
 
 use super::*;
-use crate::sheets::{assert_sides_are_shared, constrained, points, posts, side_list};
+use crate::sheets::{assert_sides_are_shared, constrained, points, side_list};
 use crate::{ClipHeights, clip, concatenate};
 
 const SHARES: [f64; 2] = [0.5, 0.2];
@@ -141,7 +141,7 @@ fn a_vertex_goes_when_a_triangulation_without_it_is_the_closest_of_all() {
         let layout = layout();
         let mut draw = Rng::with_seed(seed);
         let area = layout.grid.area();
-        let weights = posts(area).map(|_| 500 * draw.u16(..5)).collect();
+        let weights = area.posts().map(|_| 500 * draw.u16(..5)).collect();
         let mask = Importance::new(area, weights, vec![0; area.post_count()]);
         let mut dem = Dem::from_fn(area, |post| (post.row % 9 != 4).then(|| (post.row * post.col * 37) % 4001));
         dem.fill_voids(|_| 900_000);

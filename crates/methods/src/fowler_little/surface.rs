@@ -61,7 +61,7 @@ impl Flags {
     }
 
     fn index(&self, post: Post) -> usize {
-        (post.row - self.rect.south) as usize * self.rect.posts_wide() + (post.col - self.rect.west) as usize
+        self.rect.index(post)
     }
 
     /// What it says of a post; no of those outside.
@@ -94,7 +94,7 @@ pub fn channel_candidates(dem: &Dem) -> Flags {
     let turned = Dem::from_fn(rect, |post| Some(-dem.height(over(post))));
     let found = candidates(dem, &turned);
     let mut flags = Flags::none(rect);
-    for post in crate::dem_window::posts_of(rect) {
+    for post in rect.posts() {
         flags.set(post, found.holds(over(post)) && !dem.is_void(post));
     }
     flags
@@ -102,7 +102,7 @@ pub fn channel_candidates(dem: &Dem) -> Flags {
 
 fn candidates(dem: &Dem, heights: &Dem) -> Flags {
     let mut flags = Flags::none(dem.rect());
-    for post in crate::dem_window::posts_of(dem.rect()) {
+    for post in dem.rect().posts() {
         flags.set(post, is_ridge_candidate(heights, post));
     }
     flags

@@ -108,7 +108,7 @@ impl Facets {
                 for col in range(0, rect.west, rect.east) {
                     let at = [f64::from(col), f64::from(row)];
                     if 0.0 <= left(a, b, at) && 0.0 <= left(b, c, at) && 0.0 <= left(c, a, at) {
-                        let place = (row - rect.south) as usize * rect.posts_wide() + (col - rect.west) as usize;
+                        let place = rect.index(Post::new(row, col));
                         posts[place] = Cover::Water;
                     }
                 }
