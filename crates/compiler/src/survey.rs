@@ -174,7 +174,7 @@ fn shares(run: &Run, curves: Option<&Curves>) -> Result<Shares, CompileError> {
     let tiles = allowances.into_iter().enumerate().map(|(index, mut allowance)| {
         if let (Some(points), Some(allowance)) = (&points, &mut allowance) {
             // Every point costs the same; `plan` has made sure that all of them fit.
-            allowance.triangles = points[index] as u32 * limits::POINT_COST;
+            allowance.triangles = points[index] as u32 * terrain::POINT_COST;
         }
         TileBudget {
             points: points.as_ref().map(|points| points[index]),

@@ -35,7 +35,7 @@ pub use measured_file::{Measured, MeasuredModule, MeasuredTally, decode_measured
 mod slm;
 /// Version of the load-module files.
 pub use load_module_reader::VERSION as MODULES_FORMAT_VERSION;
-pub use slm::{TileModules, decode_levels, decode_modules, encode_levels, encode_modules};
+pub use slm::{TileModules, decode_levels, decode_modules, encode_levels, encode_modules, load_module};
 mod json;
 mod page;
 pub use page::seal_page;

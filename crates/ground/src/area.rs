@@ -137,7 +137,7 @@ fn refuse_impossible(job: &Job, budget: &Budget) -> Result<(), GroundError> {
 /// Points of constrained edges cost exactly two triangles each, so too many are known before any work.
 fn refuse_points(job: &Job, budget: &Budget) -> Result<(), GroundError> {
     let (PointBudget::Points(points), Edges::Constrained) = (job.tin.budget, job.modules.edges) else { return Ok(()) };
-    let room = (budget.area - budget.start_total()) / u64::from(limits::POINT_COST);
+    let room = (budget.area - budget.start_total()) / u64::from(terrain::POINT_COST);
     if points <= room {
         return Ok(());
     }

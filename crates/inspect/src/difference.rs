@@ -103,7 +103,7 @@ fn apart(product: &Product, a: &LoadModule, b: &LoadModule) -> u32 {
     let rect = product.grid.posts_of(a.id);
     let flat = Dem::from_fn(rect, |_| Some(0));
     let mask = Importance::uniform(rect, terrain::THOUSANDTHS);
-    let ground = fidelity::Ground { dem: &flat, mask: &mask, grid: product.grid, spacing: product.frame.spacing };
+    let ground = fidelity::Reference { dem: &flat, mask: &mask, grid: product.grid, spacing: product.frame.spacing };
     let wide = rect.posts_wide();
     let mut heights = vec![0; rect.post_count()];
     let place = |post: terrain::Post| (post.row - rect.south) as usize * wide + (post.col - rect.west) as usize;

@@ -144,7 +144,8 @@ fn check_inside(module: ModuleId, product: &Product) -> Result<(), CompileError>
 fn splits(product: &Product, workers: usize) -> Result<Option<Vec<Option<Split>>>, CompileError> {
     let Some(found) = &product.ground else { return Ok(None) };
     let mask = Importance::uniform(found.dem.rect(), terrain::THOUSANDTHS);
-    let ground = fidelity::Ground { dem: &found.dem, mask: &mask, grid: product.grid, spacing: product.frame.spacing };
+    let ground =
+        fidelity::Reference { dem: &found.dem, mask: &mask, grid: product.grid, spacing: product.frame.spacing };
     let rows: Vec<&[LoadModule]> = product.modules.chunks(product.grid.cols as usize).collect();
     let (workers, stop) = (Workers::new(workers), AtomicBool::new(false));
     let of_row = |_: usize, row: &&[LoadModule]| -> Result<Vec<Option<Split>>, CompileError> {

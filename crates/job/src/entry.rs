@@ -8,7 +8,7 @@ use std::path::Path;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use crate::{Fault, JobError, keys};
+use crate::{Fault, JobError, NamedFile, keys};
 
 /// A job file as text, with its path.
 #[derive(Clone, Copy)]
@@ -161,6 +161,16 @@ impl<'a> Entry<'a> {
     /// The value as text.
     pub fn text(&self, expected: &str) -> Result<&'a str, JobError> {
         self.value.get_ref().as_str().ok_or_else(|| self.wrong_kind(expected))
+    }
+
+    /// The file that the value names, relative to the folder of the job.
+    pub fn file(&self, job: &Path) -> Result<NamedFile, JobError> {
+        let written = self.text("the path of a file")?;
+        if written.is_empty() || written.contains('\0') {
+            return Err(self.out_of_range("the path of a file, relative to the job file"));
+        }
+        let folder = job.parent().unwrap_or(Path::new(""));
+        Ok(NamedFile { written: written.to_owned(), path: folder.join(written) })
     }
 
     /// The value as yes or no.

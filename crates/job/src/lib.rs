@@ -12,11 +12,13 @@
 //! arithmetic of limits beyond their ranges (whether they can be met is `plan`'s).
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+mod named_file;
+pub use named_file::NamedFile;
 mod model;
 pub use model::{
     Allocation, Area, Borders, Budget, ClipHeights, Count, DemSource, DemSpec, Edges, Effort, ErrorKey, HeightFit, Job,
-    LastBatch, Lattice, LimitsSpec, Method, ModulesSpec, NamedFile, Optimising, OuterBorder, Proximity, Resampling,
-    SourceEntry, SourceFile, SourceSaid, TileOrder, TilesSpec, TinSpec, Voids, WindowLimit,
+    LastBatch, Lattice, LimitsSpec, Method, ModulesSpec, Optimising, OuterBorder, Proximity, Resampling, SourceEntry,
+    SourceFile, SourceSaid, TileOrder, TilesSpec, TinSpec, Voids, WindowLimit,
 };
 mod importance;
 pub use importance::{AreaShape, HOLE_CLASS_NAME, ImportanceArea, ImportanceSpec, SampleClass, Smooth};
@@ -34,6 +36,7 @@ mod bounds;
 mod entry;
 mod files;
 mod keys;
+mod load;
 mod read;
 mod settings;
 pub use settings::{Setting, deciding_lines};

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use terrain::{ModuleGrid, Spacing};
 
-use crate::{GeoidSpec, ImportanceSpec, LodSpec, Start, WaterSpec};
+use crate::{GeoidSpec, ImportanceSpec, LodSpec, NamedFile, Start, WaterSpec};
 
 /// All a run needs, as the job file says it, defaults filled in.
 #[derive(Clone, Debug, PartialEq)]
@@ -130,16 +130,6 @@ pub struct SourceSaid {
     pub vertical_datum: Option<String>,
     /// Whom to thank, or the licence.
     pub attribution: Option<String>,
-}
-
-/// A file that the job names.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct NamedFile {
-    /// As written in the job, or as the job would write a file that a pattern found: for messages and provenance, so
-    /// that no output depends on where the job lies.
-    pub written: String,
-    /// Where it is: the folder of the job file joined with `written`.
-    pub path: PathBuf,
 }
 
 /// What to do about posts without a height.

@@ -104,14 +104,10 @@ pub fn without_voids(importance: Importance, dem: &Dem) -> Importance {
     let rect = importance.rect();
     assert!(dem.rect().contains_rect(&rect), "the window of heights holds the window of the mask");
     let weight = |post| if dem.is_void(post) { 0 } else { importance.weight(post) };
-    let weights = posts(rect).map(weight).collect();
+    let weights = rect.posts().map(weight).collect();
     let class = |post| if dem.is_void(post) { HOLE_CLASS } else { importance.class(post) };
-    let classes = posts(rect).map(class).collect();
+    let classes = rect.posts().map(class).collect();
     Importance::new(rect, weights, classes)
-}
-
-fn posts(rect: PostRect) -> impl Iterator<Item = terrain::Post> {
-    (rect.south..=rect.north).flat_map(move |row| (rect.west..=rect.east).map(move |col| terrain::Post::new(row, col)))
 }
 
 /// Weight and class of every post of a window, row-major.

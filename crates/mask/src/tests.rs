@@ -89,7 +89,7 @@ fn excluded_posts_stay_excluded_and_others_never_become_so() {
     let areas = vec![area("out", 0, vec![polygon(&[&[[0.0, 0.0], [4.0, 0.0], [4.0, 9.0], [0.0, 9.0]]])])];
     let mask = Mask { default_weight: 1, areas, smoothing: Smoothing::Binomial7, over: vec![] };
     let smoothed = importance(&mask, rect, &frame(), rect);
-    for post in posts(rect) {
+    for post in rect.posts() {
         assert_eq!(smoothed.weight(post), u16::from(4 <= post.col), "{post}");
     }
 }
@@ -100,7 +100,7 @@ fn voids_weigh_nothing() {
     let hole = Post::new(1, 2);
     let dem = Dem::from_fn(rect, |post| (post != hole).then_some(5));
     let mask = without_voids(Importance::uniform(rect, 8000), &dem);
-    assert!(posts(rect).all(|post| mask.weight(post) == if post == hole { 0 } else { 8000 }));
+    assert!(rect.posts().all(|post| mask.weight(post) == if post == hole { 0 } else { 8000 }));
 }
 
 /// Crossing number with rational crossings, post by post: the plain definition.
@@ -160,7 +160,7 @@ proptest! {
         let found = importance(&mask, rect, &frame(), rect);
         let last_ring = |post| (0..rings.len()).rev().find(|&i| inside(&rings[i], post));
         let own = |post| last_ring(post).map_or(8000, |i| weights[i]);
-        for post in posts(rect) {
+        for post in rect.posts() {
             prop_assert_eq!(usize::from(found.class(post)), last_ring(post).map_or(0, |i| i + 1));
             prop_assert_eq!(found.weight(post), smoothed_naively(own, rect, post), "at {}", post);
         }
@@ -174,7 +174,7 @@ proptest! {
     ) {
         let area = PostRect::of_size(22, 22);
         let mut mask = mask_of(&rings, &weights, Smoothing::Binomial7);
-        let overlay = |rect: PostRect| posts(rect).map(|post| (post.row * 7 + post.col * 3) % 5 == 0).collect();
+        let overlay = |rect: PostRect| rect.posts().map(|post| (post.row * 7 + post.col * 3) % 5 == 0).collect();
         mask.areas.push(Area { class: "overlay".into(), weight: 500, shape: Shape::Members(Box::new(overlay)) });
         let whole = importance(&mask, area, &frame(), area);
         prop_assert_eq!(importance(&mask, area, &frame(), rect), whole.window(rect));
@@ -195,7 +195,7 @@ fn areas_over_all_others_end_sharply_and_soften_nothing() {
     let softened = importance(&Mask { areas: below, ..mask(vec![]) }, rect, &frame(), rect);
     let square = polygon(&[&[[2.0, 2.0], [6.0, 2.0], [6.0, 6.0], [2.0, 6.0]]]);
     let laid = importance(&mask(vec![area("b", 60_000, vec![square])]), rect, &frame(), rect);
-    for post in posts(rect) {
+    for post in rect.posts() {
         let is_over = (2..6).contains(&post.row) && (2..6).contains(&post.col);
         let expected = if is_over { (60_000, 2) } else { (softened.weight(post), softened.class(post)) };
         assert_eq!((laid.weight(post), laid.class(post)), expected, "{post:?}");

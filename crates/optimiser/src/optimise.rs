@@ -5,16 +5,16 @@ use terrain::{Dem, Importance, LATTICE_PER_POST, Refusal, StopReason, Tin, Verte
 use crate::account::Account;
 use crate::exchange::{Exchange, Terms, Tools};
 use crate::flips::flip_all;
-use crate::ground::Ground;
 use crate::hold::Hold;
 use crate::insertion::Insertion;
 use crate::place::{PER_POST, Place, Shape};
 use crate::queue::Queue;
 use crate::removal::Removal;
-use crate::sheet::{Layout, NONE, Sheet, Star};
 use crate::sweep::{Mover, Steps};
 use crate::task::{Effort, Lattice, Task};
 use crate::thin::{Shears, Until, thin};
+use crate::tile_mesh::{Layout, NONE, Star, TileMesh};
+use crate::weighted_heights::WeightedHeights;
 
 /// A TIN made truer.
 #[derive(Clone, Debug)]
@@ -102,7 +102,7 @@ pub fn fill(dem: &Dem, importance: &Importance, start: &Tin, task: &Task) -> Opt
 fn work_on(dem: &Dem, importance: &Importance, start: &Tin, task: &Task, steps: impl Fn(&mut Work)) -> Optimised {
     assert_eq!(dem.rect(), start.rect, "the TIN covers the window");
     assert_eq!(dem.rect(), importance.rect(), "heights and weights cover the same posts");
-    let mut ground = Ground::new(dem, importance, task.open, task.height_fit);
+    let mut ground = WeightedHeights::new(dem, importance, task.open, task.height_fit);
     ground.forbid(&task.forbidden);
     let mut held = task.held.clone();
     held.sort_unstable();
@@ -116,7 +116,7 @@ fn work_on(dem: &Dem, importance: &Importance, start: &Tin, task: &Task, steps: 
         }
     };
     let layout = Layout { line_step: task.line_step.map(|posts| posts * PER_POST), hold: &hold };
-    let sheet = Sheet::new(&ground, start, &layout);
+    let sheet = TileMesh::new(&ground, start, &layout);
     let account = Account::new(&task.budget, &sheet);
     let mut work = Work {
         sheet,
@@ -134,7 +134,7 @@ fn work_on(dem: &Dem, importance: &Importance, start: &Tin, task: &Task, steps: 
 
 /// Everything the steps work with.
 struct Work<'a, 'g> {
-    sheet: Sheet<'g>,
+    sheet: TileMesh<'g>,
     account: Account,
     task: &'a Task,
     mover: Mover,
@@ -250,7 +250,7 @@ impl Work<'_, '_> {
     /// gains, since nothing is judged before its turn.
     fn fill_by_squares(&mut self) {
         let mut queue = Queue::default();
-        let squares = |sheet: &Sheet, triangle: u32| sheet.triangles[triangle as usize].squares;
+        let squares = |sheet: &TileMesh, triangle: u32| sheet.triangles[triangle as usize].squares;
         (0..self.sheet.triangles.len() as u32)
             .for_each(|triangle| queue.enter(triangle, squares(&self.sheet, triangle)));
         let mut star = Star::default();

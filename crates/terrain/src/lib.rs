@@ -17,7 +17,7 @@ pub use dem::Dem;
 mod importance;
 pub use importance::{HOLE_CLASS, Importance, THOUSANDTHS};
 mod tin;
-pub use tin::{Tin, TinFault, Vertex};
+pub use tin::{POINT_COST, Tin, TinFault, Vertex};
 mod tile;
 pub use tile::{ModuleGrid, ModuleId, ModuleRect, SeamSides, Side, TileId};
 mod curve;

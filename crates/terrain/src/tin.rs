@@ -26,6 +26,9 @@ pub struct Tin {
     pub triangles: Vec<[u32; 3]>,
 }
 
+/// Triangles any point adds in all: two inside a load module, or one on each side of a line.
+pub const POINT_COST: u32 = 2;
+
 /// What is wrong with a TIN.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum TinFault {

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
+use exports::Coordinates;
 use job::{Job, StartMethod};
 use terrain::TileId;
 
@@ -108,6 +109,24 @@ pub fn rows_by_columns(text: &str) -> Result<(u32, u32), String> {
     match pair {
         Some((rows, columns)) if 0 < rows && 0 < columns => Ok((rows, columns)),
         _ => Err("expected ROWSxCOLUMNS, such as 6x6".into()),
+    }
+}
+
+/// What the coordinates of a mesh are counted from.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum MeshOrigin {
+    /// The south-west corner of what is written
+    Local,
+    /// The map's origin
+    Map,
+}
+
+impl From<MeshOrigin> for Coordinates {
+    fn from(origin: MeshOrigin) -> Self {
+        match origin {
+            MeshOrigin::Local => Coordinates::Local,
+            MeshOrigin::Map => Coordinates::Map,
+        }
     }
 }
 

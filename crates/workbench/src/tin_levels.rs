@@ -6,7 +6,7 @@ use compiler::{CompileError, Event, Progress, Stage};
 use terrain::StopReason;
 
 use crate::heights::Heights;
-use crate::raster::{Mesh, TinMethod, TinRequest};
+use crate::mesh::{Mesh, TinMethod, TinRequest};
 
 /// Makes a mesh for each of `levels`, numbers of vertices that rise.
 ///

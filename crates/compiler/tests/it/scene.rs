@@ -11,7 +11,7 @@ use job::Job;
 use tempfile::TempDir;
 use terrain::{Dem, GridFrame, ModuleGrid, Spacing, TileId};
 
-pub const EPSG: u32 = 32_611;
+pub const EPSG: u16 = 32_611;
 pub const ORIGIN_M: [f64; 2] = [505_000.0, 3_875_000.0];
 /// Cells along a side of a load module: 500 m at 25 m.
 pub const SIDE_CELLS: i32 = 20;
@@ -209,7 +209,8 @@ pub fn frame() -> GridFrame {
 }
 
 pub fn write_dem(path: &Path, dem: &Dem) {
-    source_files::write_heights(path, &frame(), dem.rect(), EPSG, |band| dem.window(band)).unwrap();
+    let mut file = std::fs::File::create(path).unwrap();
+    source_files::write_heights(&mut file, &frame(), dem.rect(), EPSG, |band| dem.window(band)).unwrap();
 }
 
 /// The sample terrain of a grid.

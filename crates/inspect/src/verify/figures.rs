@@ -6,8 +6,8 @@ use fidelity::Residuals;
 use job::{Count, Job};
 use terrain::{LoadModule, ModuleId, ModuleResidual, StopReason, metres_of_quanta};
 
-use super::Modules;
 use super::exceeded::Exceeded;
+use super::modules::Modules;
 use super::tins::OfTins;
 use super::total::{Total, squares};
 use crate::recount;

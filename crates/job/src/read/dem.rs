@@ -51,7 +51,7 @@ fn geoids(dem: &Section, job: &Path, mentions: &mut Vec<Mention>) -> Result<Vec<
         }
         let file = table.required("file", "the path of a geoid grid")?;
         mentions.push(Mention { place: Place::Geoid(geoids.len()), fault: file.fault("a geoid grid") });
-        geoids.push(GeoidSpec { datum, file: super::named_file(&file, job)? });
+        geoids.push(GeoidSpec { datum, file: file.file(job)? });
     }
     Ok(geoids)
 }
@@ -111,10 +111,10 @@ fn sources(entry: &Entry, job: &Path, unit_m: Option<f64>, mentions: &mut Vec<Me
 /// A path, or a table with a path and what is to be known about it.
 fn source_entry(item: &Entry, job: &Path) -> Result<(NamedFile, SourceSaid), JobError> {
     if !item.is_table() {
-        return Ok((super::named_file(item, job)?, SourceSaid::default()));
+        return Ok((item.file(job)?, SourceSaid::default()));
     }
     let table = item.table()?;
-    let file = super::named_file(&table.required("file", "the path of a raster")?, job)?;
+    let file = table.required("file", "the path of a raster")?.file(job)?;
     let text = |key: &str, expected: &str, chars_max: usize| match table.optional(key) {
         None => Ok(None),
         Some(entry) => {

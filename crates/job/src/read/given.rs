@@ -19,7 +19,7 @@ pub(super) fn read(
 
 fn file(entry: &Entry, job: &Path, place: Place, mentions: &mut Vec<Mention>) -> Result<NamedFile, JobError> {
     mentions.push(Mention { place, fault: entry.fault("a file") });
-    super::named_file(entry, job)
+    entry.file(job)
 }
 
 fn start(entry: &Entry, job: &Path, mentions: &mut Vec<Mention>) -> Result<Start, JobError> {

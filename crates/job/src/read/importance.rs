@@ -83,7 +83,7 @@ fn shape(item: &Entry, table: &Section, dem: &DemSource, job: &Path) -> Result<A
         },
         (None, Some(raster), None) => {
             let value = table.required("value", VALUE)?.signed(VALUE)?;
-            Ok(AreaShape::RasterValue { file: super::named_file(&raster, job)?, value })
+            Ok(AreaShape::RasterValue { file: raster.file(job)?, value })
         }
         (None, None, Some(sample)) => sample_class(&sample, dem),
         _ => Err(JobError::Conflict(item.fault(
@@ -116,11 +116,11 @@ pub(super) fn water(
     let Some(entry) = dem.optional("water") else { return Ok(None) };
     mentions.push(Mention { place: Place::Water, fault: entry.fault("a file of polygons") });
     if !entry.is_table() {
-        let (file, class) = (super::named_file(&entry, job)?, class_index(&entry, WATER_CLASS, &mut spec.classes)?);
+        let (file, class) = (entry.file(job)?, class_index(&entry, WATER_CLASS, &mut spec.classes)?);
         return Ok(Some(WaterSpec { file, level_m: None, class, weight: None }));
     }
     let table = entry.table()?;
-    let file = super::named_file(&table.required("file", "the path of a file of polygons")?, job)?;
+    let file = table.required("file", "the path of a file of polygons")?.file(job)?;
     let expected = format!("a height in metres within {LEVEL_M_MAX} of 0");
     let level = table.optional("level_m").map(|level| level.number_in(-LEVEL_M_MAX..=LEVEL_M_MAX, &expected));
     let class = match table.optional("class") {
@@ -132,7 +132,7 @@ pub(super) fn water(
 }
 
 fn polygons(entry: &Entry, job: &Path) -> Result<AreaShape, JobError> {
-    Ok(AreaShape::Polygons { file: super::named_file(entry, job)? })
+    Ok(AreaShape::Polygons { file: entry.file(job)? })
 }
 
 fn sample_class(entry: &Entry, dem: &DemSource) -> Result<AreaShape, JobError> {

@@ -2,10 +2,11 @@
 
 use std::collections::BTreeSet;
 
-use terrain::{ModuleGrid, ModuleRect, Post, PostRect, Spacing};
+use fastrand::Rng;
+use terrain::{Dem, ModuleGrid, ModuleRect, Post, PostRect, Spacing};
 
 use super::*;
-use crate::sheets::{Draw, assert_sides_are_shared, constrained, points, posts, side_list};
+use crate::sheets::{assert_sides_are_shared, constrained, points, side_list};
 use crate::{ClipHeights, clip, concatenate};
 
 const SHARES: [f64; 2] = [0.5, 0.2];
@@ -138,9 +139,9 @@ fn thinned_sides_are_equal_at_equal_levels_and_keep_their_share() {
 fn a_vertex_goes_when_a_triangulation_without_it_is_the_closest_of_all() {
     for seed in 0..4 {
         let layout = layout();
-        let mut draw = Draw(seed);
+        let mut draw = Rng::with_seed(seed);
         let area = layout.grid.area();
-        let weights = posts(area).map(|_| 500 * draw.below(5) as u16).collect();
+        let weights = area.posts().map(|_| 500 * draw.u16(..5)).collect();
         let mask = Importance::new(area, weights, vec![0; area.post_count()]);
         let mut dem = Dem::from_fn(area, |post| (post.row % 9 != 4).then(|| (post.row * post.col * 37) % 4001));
         dem.fill_voids(|_| 900_000);
@@ -154,7 +155,7 @@ fn a_vertex_goes_when_a_triangulation_without_it_is_the_closest_of_all() {
         for &gone in &order {
             let without = |v: u16| -> u128 {
                 let rest = left.iter().filter(|&&u| u != v).map(|&u| module.vertices[usize::from(u)]);
-                Sheet::delaunay(rest.collect(), &near).squares.iter().sum()
+                LevelMesh::delaunay(rest.collect(), &near).squares.iter().sum()
             };
             let best = inner.iter().filter(|v| left.contains(v)).min_by_key(|&&v| (without(v), v));
             assert_eq!(Some(&gone), best, "seed {seed}");
@@ -214,6 +215,6 @@ fn ground_without_weight_and_a_load_module_without_inner_vertices_have_levels_to
     let bare = finest[0].vertices.iter().copied().filter(|v| !is_inside(*v, finest[0].side)).collect();
     let ground = LevelGround { dem: &dem, mask: &mask };
     let near = Posts::new(finest[0].id, &layout, &ground);
-    let bare = load_module(&finest[0], Sheet::delaunay(bare, &near), &layout, &mask);
+    let bare = load_module(&finest[0], LevelMesh::delaunay(bare, &near), &layout, &mask);
     assert_eq!(coarser_levels(&bare, &layout, &Levels { flips: false, ..wanted }, &ground), [bare.clone(), bare]);
 }

@@ -10,10 +10,10 @@ use inspect::{Fidelity, Sights};
 use job::Optimising;
 use serde_json::{Value, json};
 use terrain::{Metres, StopReason};
-use views::{Align, Coordinates, MeshPlace, Table, grouped};
+use views::{Align, Table, grouped};
 use workbench::{Mesh, TinMethod, TinRequest, TinStart};
 
-use crate::arguments::{Workers, positive, rows_by_columns, start_method};
+use crate::arguments::{MeshOrigin, Workers, positive, rows_by_columns, start_method};
 use crate::clock::SystemClock;
 use crate::estimate::Estimate;
 use crate::failure::{Failure, Outcome};
@@ -102,8 +102,8 @@ pub struct Arguments {
     #[arg(long, value_enum)]
     lattice: Option<Lattice>,
     /// What coordinates are counted from
-    #[arg(long, value_enum, default_value_t = Frame::Local)]
-    coordinates: Frame,
+    #[arg(long, value_enum, default_value_t = MeshOrigin::Local)]
+    coordinates: MeshOrigin,
     /// Measure the mesh against the raster, beside a regular grid, as `tiefort fidelity` does
     #[arg(long, conflicts_with = "quiet")]
     measure: bool,
@@ -166,14 +166,6 @@ enum Lattice {
     Eighth,
     /// On posts
     Post,
-}
-
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Frame {
-    /// The south-west post
-    Local,
-    /// The map's origin
-    Map,
 }
 
 /// Reads the name of a file of points, or as [`start_method`].
@@ -320,7 +312,7 @@ fn kind(arguments: &Arguments) -> Result<Kind, Failure> {
     match files::extension(&arguments.out).as_str() {
         "ply" => Ok(Kind::Ply),
         "obj" => Ok(Kind::Obj),
-        "glb" if arguments.coordinates == Frame::Map => {
+        "glb" if arguments.coordinates == MeshOrigin::Map => {
             let message = "found --coordinates map with a .glb, which has no room for map coordinates";
             Err(Failure::new(message, "leave --coordinates out, or write .ply or .obj"))
         }
@@ -411,24 +403,16 @@ fn optimising(arguments: &Arguments) -> Optimising {
 }
 
 fn write(mesh: &Mesh, kind: Kind, arguments: &Arguments, out: &Path) -> Result<(), Failure> {
-    let place = MeshPlace {
-        east_m: mesh.east_m,
-        north_m: mesh.north_m,
+    let place = TinPlace {
+        origin_m: [mesh.east_m, mesh.north_m],
         spacing_m: [mesh.spacing_m.0, mesh.spacing_m.1],
-        epsg: mesh.epsg,
+        crs: mesh.epsg.map(|code| format!("EPSG:{code}")),
     };
-    let coordinates = match arguments.coordinates {
-        Frame::Local => Coordinates::Local,
-        Frame::Map => Coordinates::Map,
-    };
+    let coordinates = arguments.coordinates.into();
     files::write_whole(out, |out| match kind {
-        Kind::Ply => views::write_ply(out, &mesh.tin, &place, coordinates),
-        Kind::Obj => views::write_obj(out, &mesh.tin, &place, coordinates),
-        Kind::Glb => {
-            let crs = mesh.epsg.map(|code| format!("EPSG:{code}"));
-            let origin_m = [mesh.east_m, mesh.north_m];
-            exports::write_tin_glb(out, &mesh.tin, &TinPlace { origin_m, spacing_m: place.spacing_m, crs })
-        }
+        Kind::Ply => exports::write_tin_ply(out, &mesh.tin, &place, coordinates),
+        Kind::Obj => exports::write_tin_obj(out, &mesh.tin, &place, coordinates),
+        Kind::Glb => exports::write_tin_glb(out, &mesh.tin, &place),
     })
 }
 

@@ -9,15 +9,15 @@ use fidelity::Tally;
 use geometry::WORKING_POSTS_MAX;
 use ground::{GamingArea, Ground, decode, reading};
 use job::{DemSource, Job, SourceFile};
-use methods::Ground as MethodGround;
+use methods::DemWindow;
 use schedule::Workers;
 use source_files::{DemFile, Reading, VoidPolicy};
 use terrain::{Dem, Metres, Post, PostRect, Tin, quanta_of_metres};
 
 use super::made::{CompareGround, Equivalent, Made};
 use crate::heights::{Heights, has_square_posts};
-use crate::raster::{TinRequest, untiled};
-use crate::tin_tally::tally_of;
+use crate::mesh::{TinRequest, untiled};
+use crate::tally::tally_of;
 use crate::{TinMethod, TinStart};
 
 /// When a TIN is good enough.
@@ -57,8 +57,8 @@ impl Subject {
     }
 
     /// As methods want it.
-    pub fn ground(&self) -> MethodGround<'_> {
-        MethodGround { dem: &self.dem, spacing: self.spacing }
+    pub fn ground(&self) -> DemWindow<'_> {
+        DemWindow { dem: &self.dem, spacing: self.spacing }
     }
 
     /// Posts with a height.

@@ -3,41 +3,12 @@
 use std::sync::Arc;
 
 use crate::lookup::{Lookup, STEPS};
-use crate::{Area, Frame, QUANTA_PER_METRE, ReadError, Sample, TerrainModule};
-
-/// A half-open rectangle of load modules.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Block {
-    /// First row.
-    pub south: u32,
-    /// First column.
-    pub west: u32,
-    /// One past the last row.
-    pub north: u32,
-    /// One past the last column.
-    pub east: u32,
-}
-
-impl Block {
-    /// Load modules inside; none where a side lies beyond the one it faces.
-    pub fn count(&self) -> usize {
-        let (rows, cols) = (self.north.saturating_sub(self.south), self.east.saturating_sub(self.west));
-        (rows as usize).saturating_mul(cols as usize)
-    }
-
-    fn contains(&self, row: u32, col: u32) -> bool {
-        self.south <= row && row < self.north && self.west <= col && col < self.east
-    }
-
-    fn index(&self, row: u32, col: u32) -> usize {
-        (row - self.south) as usize * (self.east - self.west) as usize + (col - self.west) as usize
-    }
-}
+use crate::{AreaFrame, Block, QUANTA_PER_METRE, Sample, TerrainModule};
 
 /// A block of load modules, loaded. It holds no file open and may be asked from many threads.
 #[derive(Clone, Debug)]
-pub struct Ground {
-    frame: Frame,
+pub struct LoadedGround {
+    frame: AreaFrame,
     level: u16,
     block: Block,
     /// Row by row from the south-west.
@@ -59,9 +30,9 @@ pub enum Sight {
     Unknown,
 }
 
-impl Ground {
+impl LoadedGround {
     /// Nothing loaded yet.
-    pub(crate) fn empty(frame: Frame, level: u16) -> Self {
+    pub(crate) fn empty(frame: AreaFrame, level: u16) -> Self {
         let side_steps = i64::from(frame.side) * STEPS;
         let block = Block { south: 0, west: 0, north: 0, east: 0 };
         Self { frame, level, block, modules: Vec::new(), lookups: Vec::new(), side_steps }
@@ -78,7 +49,7 @@ impl Ground {
     }
 
     /// Where load modules lie.
-    pub fn frame(&self) -> &Frame {
+    pub fn frame(&self) -> &AreaFrame {
         &self.frame
     }
 
@@ -92,41 +63,10 @@ impl Ground {
         self.block.contains(row, col).then(|| &*self.modules[self.block.index(row, col)])
     }
 
-    /// The same ground, at the same level, for another block: what both hold is kept, only the rest is read.
-    ///
-    /// # Errors
-    /// When a load module cannot be read, is damaged, or is in no file, or when this ground is of another area; this
-    /// ground is as it was.
-    pub fn moved(&self, area: &Area, block: Block) -> Result<Self, ReadError> {
-        if *area.frame() != self.frame {
-            return Err(ReadError::OtherGround);
-        }
-        area.check_holds(block)?;
-        let block = if block.count() == 0 { Block { north: block.south, east: block.west, ..block } } else { block };
-        let mut modules: Vec<Option<Arc<TerrainModule>>> = vec![None; block.count()];
-        for row in block.south..block.north {
-            let mut col = block.west;
-            while col < block.east {
-                if self.block.contains(row, col) {
-                    modules[block.index(row, col)] = Some(Arc::clone(&self.modules[self.block.index(row, col)]));
-                    col += 1;
-                    continue;
-                }
-                // Up to what is loaded already, all at once.
-                let known = (col..block.east).find(|&col| self.block.contains(row, col)).unwrap_or(block.east);
-                area.load_row(self.level, row, col..known, |col, module| {
-                    modules[block.index(row, col)] = Some(module)
-                })?;
-                col = known;
-            }
-        }
-        Ok(Self { block, ..self.clone() }.with_modules(modules.into_iter().flatten().collect()))
-    }
-
-    /// The same block with other load modules in it.
-    pub(crate) fn with_modules(self, modules: Vec<Arc<TerrainModule>>) -> Self {
+    /// Another block, with its load modules.
+    pub(crate) fn with_modules(self, block: Block, modules: Vec<Arc<TerrainModule>>) -> Self {
         let lookups = modules.iter().map(|module| module.lookup().clone()).collect();
-        Self { modules, lookups, ..self }
+        Self { block, modules, lookups, ..self }
     }
 
     /// The load module under a place, by its place in `modules`, and the place in it in steps. The far sides of the
@@ -161,8 +101,9 @@ impl Ground {
         self.lookups[index].height_m(place)
     }
 
-    /// Heights at many places at once, in `heights_m`, NaN where nothing is loaded: what [`Ground::height_m`] gives for
-    /// each, but faster for places far apart, because memory is asked for several of them before the first is needed.
+    /// Heights at many places at once, in `heights_m`, NaN where nothing is loaded: what [`LoadedGround::height_m`]
+    /// gives for each, but faster for places far apart, because memory is asked for several of them before the first is
+    /// needed.
     ///
     /// # Panics
     /// When the two lists differ in length.

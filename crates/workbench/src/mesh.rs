@@ -20,7 +20,7 @@ use tiling::{Gains, Order, Tiling, points_equally, points_globally};
 use tin::{CostUnit, Frame, LastBatch, Proximity, Rule, Stop, SurveyTask, TileTask};
 
 use crate::heights::Heights;
-use crate::tin_tally::tally_of;
+use crate::tally::tally_of;
 
 /// The paper's proximity test: metres across, metres in height.
 const PROXIMITY_M: (f64, u32) = (300.0, 20);
@@ -350,7 +350,7 @@ impl<'a> TinJob<'a> {
             let is_here = |post: &&GivenPost| dem.rect().contains(post.at);
             return Ok(self.given.iter().filter(is_here).copied().collect());
         };
-        let ground = methods::Ground { dem, spacing: self.spacing };
+        let ground = methods::DemWindow { dem, spacing: self.spacing };
         let share = points.div_ceil(self.tiles.len());
         let posts = chosen(&ground, method, share).map_err(|why| refused("--start", method, why))?;
         Ok(posts.into_iter().map(|at| GivenPost { at, pinned: false, outer: false, height: None }).collect())
