@@ -12,7 +12,7 @@ use database::{Folder, ManifestState};
 use geometry::Facet;
 use geometry::owned::{PostGrid, visit_residuals};
 use ground::{GamingArea, Ground, Window};
-use job::{Count, Job};
+use job::{Choice, Count, Job};
 use schedule::Workers;
 use terrain::{
     Dem, GridFrame, Importance, LoadModule, ModuleGrid, ModuleId, ModuleRect, Post, PostRect, THOUSANDTHS,
@@ -118,10 +118,7 @@ pub fn inadequate(folder: &Path, tolerance_m: Option<f64>) -> Result<Inadequate,
         tolerance_m,
         frame: *frame,
         grid: area.grid,
-        count: match job.limits.count {
-            Count::Triangles => "triangles",
-            Count::Polygons => "polygons",
-        },
+        count: job.limits.count.name(),
         per_module: area.budget.per_module,
         components,
         counts,

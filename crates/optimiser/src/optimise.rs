@@ -1,6 +1,6 @@
 //! The order of the steps.
 
-use terrain::{Dem, Importance, LATTICE_PER_POST, Refusal, StopReason, Tin, Vertex as TinVertex};
+use terrain::{Dem, Effort, Importance, LATTICE_PER_POST, Lattice, Refusal, StopReason, Tin, Vertex as TinVertex};
 
 use crate::account::Account;
 use crate::exchange::{Exchange, Terms, Tools};
@@ -13,7 +13,7 @@ use crate::queue::Queue;
 use crate::removal::Removal;
 use crate::sheet::{Layout, NONE, Sheet, Star};
 use crate::sweep::{Mover, Steps};
-use crate::task::{Effort, Lattice, Task};
+use crate::task::Task;
 use crate::thin::{Shears, Until, thin};
 
 /// A TIN made truer.

@@ -1,6 +1,6 @@
 //! Single steps: each does what it says it gains, and keeps every post once.
 
-use terrain::{Dem, Importance, PostRect, SeamSides};
+use terrain::{Dem, Effort, HeightFit, Importance, PostRect, SeamSides};
 
 use crate::account::Account;
 use crate::exchange::{Exchange, Terms, Tools};
@@ -13,7 +13,7 @@ use crate::removal::Removal;
 use crate::scene::{Caps, confined, even, grid, patchy, rough, spent};
 use crate::sheet::{Layout, NONE, Sheet};
 use crate::sweep::{Mover, Steps};
-use crate::task::{Budget, Effort, HeightFit};
+use crate::task::Budget;
 use crate::thin::{Shears, Until, is_dearer, thin};
 
 const RECT: PostRect = PostRect { south: 7, west: -3, north: 67, east: 77 };

@@ -2,6 +2,7 @@
 
 use database::{Report, ReportPlace, TileState};
 use inspect::{LimitUse, Product};
+use job::Choice;
 use terrain::{LoadModule, ModuleId, ModuleRect};
 use views::{Scene, SceneGround, SceneLimits, SceneTile};
 
@@ -28,10 +29,7 @@ impl SceneParts {
             }
         }
         let limits = SceneLimits {
-            count: match limits.count {
-                job::Count::Triangles => "triangles".into(),
-                job::Count::Polygons => "polygons".into(),
-            },
+            count: limits.count.name().into(),
             modules: use_of.modules,
             per_load_module: limits.per_load_module,
             window: use_of.window,

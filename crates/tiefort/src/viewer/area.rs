@@ -5,6 +5,7 @@ use std::sync::OnceLock;
 
 use axum::body::Bytes;
 use inspect::{Product, ProductGround, Wanted, WantedGround, product};
+use job::Choice;
 use load_module_reader::{Area, Keep};
 use serde_json::json;
 use terrain::{HOLE_CLASS, ModuleGrid, ModuleRect};
@@ -85,7 +86,7 @@ fn description(product: &Product, area: &Area, overview: &Overview) -> String {
         "polygons": totals.polygons,
         "classes": product.job.importance.classes,
         "limits": {
-            "count": match limits.count { job::Count::Triangles => "triangles", job::Count::Polygons => "polygons" },
+            "count": limits.count.name(),
             "per_load_module": limits.per_load_module,
             "mean_per_load_module": limits.mean_per_load_module,
             "window": { "rows": window.rows, "cols": window.cols, "limit": window.limit },

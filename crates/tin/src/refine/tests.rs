@@ -5,11 +5,11 @@ use std::collections::BTreeMap;
 use geometry::{levels_available, rounded, visit_posts, widest_level};
 use limits::{Allowance, Windows};
 use mesh::{Lines, Mesh};
-use terrain::{ModuleGrid, ModuleId, ModuleRect, Post, PostRect, SeamSides, TileId};
+use terrain::{LastBatch, ModuleGrid, ModuleId, ModuleRect, Post, PostRect, SeamSides, TileId};
 
 use super::*;
 use crate::proximity::is_near;
-use crate::{Frame, LastBatch, Proximity};
+use crate::{Frame, Proximity};
 
 struct Random(u64);
 
