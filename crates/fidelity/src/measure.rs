@@ -139,7 +139,7 @@ fn visit(module: &LoadModule, ground: &Reference, mut each: impl FnMut(terrain::
 
 #[cfg(test)]
 mod tests {
-    use terrain::{ModuleId, ModuleVertex, Post, PostRect};
+    use terrain::{ModuleId, ModuleVertex, Post};
 
     use fastrand::Rng;
 

@@ -5,7 +5,7 @@
 
 use std::path::Path;
 
-use job::{Job, NamedFile, OuterBorder, Start, StartMethod};
+use job::{Choice, Job, NamedFile, OuterBorder, Start, StartMethod};
 use methods::{
     Boundary, Contours, DemWindow, Diagonal, Distance, Extrema, FowlerLittle, Impossible, LatticeTin, Splitting,
 };
@@ -257,7 +257,7 @@ pub fn border_posts(given: &[GivenPost]) -> impl Iterator<Item = Post> {
 fn inside(polygon: &mask::Polygon, area: &GamingAreaFrame, rect: PostRect) -> Vec<bool> {
     let shape = mask::Shape::Polygons(vec![polygon.clone()]);
     let only = mask::Area { class: "inside".into(), weight: THOUSANDTHS, shape };
-    let mask = mask::Mask { default_weight: 0, areas: vec![only], smoothing: mask::Smoothing::None, over: Vec::new() };
+    let mask = mask::Mask { default_weight: 0, areas: vec![only], smooth: terrain::Smooth::None, over: Vec::new() };
     let found = mask::importance(&mask, area.rect, &area.frame, rect);
     rect.posts().map(|post| 0 < found.weight(post)).collect()
 }

@@ -6,7 +6,7 @@ use std::sync::atomic::AtomicBool;
 use compiler::{CompileError, Stage};
 use database::{Folder, TileState, files};
 use fidelity::{Split, best_split};
-use job::HOLE_CLASS_NAME;
+use job::{Choice, HOLE_CLASS_NAME};
 use limits::Windows;
 use product::{Product, Wanted, WantedGround};
 use schedule::Workers;
@@ -183,10 +183,7 @@ fn explained(
         extent_m: [west, south, west + side_m, south + side_m],
         tile: (tin.tile, state, tin.stop),
         tile_triangles: (tin.triangles_charged, allowed(allocation, tin.tile)),
-        count_of: match limits.count {
-            job::Count::Triangles => "triangles".into(),
-            job::Count::Polygons => "polygons".into(),
-        },
+        count_of: limits.count.name().into(),
         triangles: module.triangles.len() as u32,
         polygons: module.polygon_count,
         vertices_inside: (module.vertices.len() - module.border_vertex_count()) as u32,

@@ -11,7 +11,7 @@ use compiler::CompileError;
 use geometry::Facet;
 use geometry::owned::{PostGrid, visit_residuals};
 use ground::{GamingArea, Ground, Window};
-use job::{Count, Job};
+use job::{Choice, Count, Job};
 use product::{Opened, choose_ground, locate_weights};
 use schedule::Workers;
 use terrain::{
@@ -112,10 +112,7 @@ pub fn inadequate(folder: &Path, tolerance_m: Option<f64>) -> Result<Inadequate,
         tolerance_m,
         frame: *frame,
         grid: area.grid,
-        count: match job.limits.count {
-            Count::Triangles => "triangles",
-            Count::Polygons => "polygons",
-        },
+        count: job.limits.count.name(),
         per_module: area.budget.per_module,
         components,
         counts,

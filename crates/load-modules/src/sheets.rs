@@ -3,9 +3,7 @@
 use std::collections::BTreeMap;
 
 use fastrand::Rng;
-use terrain::{
-    LatticePoint, LoadModule, ModuleGrid, ModuleId, ModuleRect, ModuleVertex, Post, PostRect, Side, Tin, Vertex,
-};
+use terrain::{LatticePoint, LoadModule, ModuleGrid, ModuleId, ModuleRect, ModuleVertex, Post, Side, Tin, Vertex};
 
 use crate::Layout;
 

@@ -7,7 +7,7 @@
 //! the budget first and thinned by what each vertex is truly worth.
 
 mod task;
-pub use task::{Budget, Effort, HeightFit, Lattice, Task};
+pub use task::{Budget, Task};
 mod optimise;
 pub use optimise::{Optimised, fill, optimise, overshoot};
 

@@ -1,6 +1,6 @@
 //! The order of the steps.
 
-use terrain::{Dem, Importance, LATTICE_PER_POST, Refusal, StopReason, Tin, Vertex as TinVertex};
+use terrain::{Dem, Effort, Importance, LATTICE_PER_POST, Lattice, Refusal, StopReason, Tin, Vertex as TinVertex};
 
 use crate::account::Account;
 use crate::exchange::{Exchange, Terms, Tools};
@@ -11,7 +11,7 @@ use crate::place::{PER_POST, Place, Shape};
 use crate::queue::Queue;
 use crate::removal::Removal;
 use crate::sweep::{Mover, Steps};
-use crate::task::{Effort, Lattice, Task};
+use crate::task::Task;
 use crate::thin::{Shears, Until, thin};
 use crate::tile_mesh::{Layout, NONE, Star, TileMesh};
 use crate::weighted_heights::WeightedHeights;

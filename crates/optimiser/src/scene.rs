@@ -2,11 +2,11 @@
 
 use limits::{Allowance, ModuleLines, TileLedger, Windows};
 use terrain::{
-    Dem, Importance, LatticePoint, ModuleGrid, ModuleId, ModuleRect, Post, PostRect, SeamSides, THOUSANDTHS, Tin,
-    Vertex,
+    Dem, Effort, HeightFit, Importance, Lattice, LatticePoint, ModuleGrid, ModuleId, ModuleRect, Post, PostRect,
+    SeamSides, THOUSANDTHS, Tin, Vertex,
 };
 
-use crate::task::{Budget, Effort, HeightFit, Lattice, Task};
+use crate::task::{Budget, Task};
 
 /// A number from 0 to 1 that a place decides.
 fn noise(row: i32, col: i32, seed: u64) -> f64 {

@@ -1,6 +1,6 @@
 //! Single steps: each does what it says it gains, and keeps every post once.
 
-use terrain::{Dem, Importance, PostRect, SeamSides};
+use terrain::{Dem, Effort, HeightFit, Importance, PostRect, SeamSides};
 
 use crate::account::Account;
 use crate::exchange::{Exchange, Terms, Tools};
@@ -11,7 +11,7 @@ use crate::place::PER_POST;
 use crate::removal::Removal;
 use crate::scene::{Caps, confined, even, grid, patchy, rough, spent};
 use crate::sweep::{Mover, Steps};
-use crate::task::{Budget, Effort, HeightFit};
+use crate::task::Budget;
 use crate::thin::{Shears, Until, is_dearer, thin};
 use crate::tile_mesh::{Layout, NONE, TileMesh};
 use crate::weighted_heights::WeightedHeights;

@@ -3,12 +3,11 @@
 use std::ops::Range;
 
 use geometry::is_ridge_candidate;
-use terrain::{Dem, Importance, Post, SeamSides, THOUSANDTHS};
+use terrain::{Dem, HeightFit, Importance, Post, SeamSides, THOUSANDTHS};
 
 use crate::hold::Hold;
 use crate::moments::{Moments, Walk};
 use crate::place::{PER_POST, Place};
-use crate::task::HeightFit;
 
 /// Heights, weights and their moments.
 pub(crate) struct WeightedHeights<'a> {

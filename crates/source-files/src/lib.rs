@@ -42,7 +42,7 @@ mod join;
 pub use join::Standing;
 mod mosaic;
 mod warp;
-pub use mosaic::{Mosaic, MosaicRules, MosaicVoids, Patch, Resampling, window_reaching};
+pub use mosaic::{Mosaic, MosaicRules, MosaicVoids, Patch, window_reaching};
 mod chunk_cache;
 mod geoid_file;
 mod windows;

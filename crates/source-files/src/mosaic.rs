@@ -5,7 +5,7 @@
 //! working grid is decided by itself, so it does not depend on the window asked for.
 
 use geometry::resample::{TAP_UNITS, rounded};
-use terrain::{Dem, GridFrame, Post, PostRect, QUANTA_PER_METRE};
+use terrain::{Dem, GridFrame, Post, PostRect, QUANTA_PER_METRE, Resampling};
 
 use crate::crs::Crs;
 use crate::geoid::Shifts;
@@ -13,15 +13,6 @@ use crate::join::{Standing, fits, join};
 use crate::samples::{Sample, each, union};
 use crate::warp::{Place, Warp};
 use crate::{DatumShift, DemFile, Raster, RasterFrame, SourceError};
-
-/// How a height between posts comes about.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Resampling {
-    /// From the four posts around it.
-    Bilinear,
-    /// From the sixteen posts around it, where all have heights: a smooth surface through the posts.
-    Cubic,
-}
 
 /// What becomes of voids in a mosaic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

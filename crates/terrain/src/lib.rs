@@ -26,5 +26,7 @@ mod refined;
 pub use refined::{Refusal, RefusedBy, StopReason, TileTin};
 mod load_module;
 pub use load_module::{LoadModule, LoadModuleFault, ModuleResidual, ModuleVertex};
+mod choices;
+pub use choices::{Effort, HeightFit, LastBatch, Lattice, LodBorder, Resampling, Smooth, TileOrder};
 mod breach;
 pub use breach::{Breach, BreachKind, BreachPlace};

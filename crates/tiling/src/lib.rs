@@ -4,7 +4,7 @@
 //! Limits are shared out before any tile is refined, so no tile needs to know what another spends.
 
 mod tiling;
-pub use tiling::{Order, Tiling};
+pub use tiling::Tiling;
 mod border;
 pub use border::{outer_border_posts, outer_sides};
 mod budget;

@@ -9,7 +9,7 @@
 //! on its own would be compiled for the oldest processor and call each lane operation.
 
 mod task;
-pub use task::{Frame, LastBatch, Proximity, Rule, StartPost, Stop, TileTask};
+pub use task::{Frame, Proximity, Rule, StartPost, Stop, TileTask};
 mod refine;
 pub use refine::refine;
 mod prefix;

@@ -1,7 +1,7 @@
 //! What `refine` is asked to do for one tile.
 
 use limits::{Allowance, ModuleLines, TileLedger};
-use terrain::{ModuleId, Post, PostRect, SeamSides, TileId};
+use terrain::{LastBatch, ModuleId, Post, PostRect, SeamSides, TileId};
 
 /// Everything about one tile's refinement but the ground itself.
 #[derive(Clone, Debug, PartialEq)]
@@ -111,15 +111,6 @@ pub struct Proximity {
     pub posts: f64,
     /// Vertical reach in quanta.
     pub quanta: u32,
-}
-
-/// What the paper's last pass does with more candidates than points left.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LastBatch {
-    /// Takes the first in row order: exactly as many points as asked for.
-    Truncate,
-    /// Takes all of them.
-    Finish,
 }
 
 /// When a tile stops selecting, whichever comes first; it also stops when its allowance is spent or

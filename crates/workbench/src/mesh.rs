@@ -13,11 +13,11 @@ use ground::{GivenPost, Window, chosen, posts_of_file, refused, start_posts};
 use job::{ErrorKey, Optimising, StartMethod};
 use schedule::{Event as Scheduled, RankedTasks, Workers, in_rank_order_observed};
 use terrain::{
-    Dem, GainCurve, Importance, LatticePoint, Metres, ModuleGrid, PostRect, SeamSides, StopReason, THOUSANDTHS, TileId,
-    TileTin, Tin, Vertex,
+    Dem, GainCurve, Importance, LastBatch, LatticePoint, Metres, ModuleGrid, PostRect, SeamSides, StopReason,
+    THOUSANDTHS, TileId, TileOrder, TileTin, Tin, Vertex,
 };
-use tiling::{Gains, Order, Tiling, points_equally, points_globally};
-use tin::{CostUnit, Frame, LastBatch, Proximity, Rule, Stop, SurveyTask, TileTask};
+use tiling::{Gains, Tiling, points_equally, points_globally};
+use tin::{CostUnit, Frame, Proximity, Rule, Stop, SurveyTask, TileTask};
 
 use crate::heights::Heights;
 use crate::tally::tally_of;
@@ -218,7 +218,7 @@ impl<'a> TinJob<'a> {
         let longest =
             (rect.cells_high().div_ceil(rows.max(1) as usize)).max(rect.cells_wide().div_ceil(cols.max(1) as usize));
         refuse(request, rect, longest)?;
-        let tiling = Tiling::new(rect, 1, rows, cols, Order::Color);
+        let tiling = Tiling::new(rect, 1, rows, cols, TileOrder::Color);
         let quantum = if request.method == TinMethod::Paper { terrain::QUANTA_PER_METRE as u32 } else { 1 };
         let units = |metres: f64| (metres * f64::from(terrain::QUANTA_PER_METRE) / f64::from(quantum)).floor() as u64;
         let value = request.max_residual_m.map(|metres| u64::from(THOUSANDTHS) * units(metres));

@@ -7,8 +7,8 @@
 use std::sync::atomic::AtomicBool;
 
 use compiler::CompileError;
-use source_files::{Crs, DemFile, MosaicRules, MosaicVoids, RasterFrame, Resampling, WideMosaic, Windows};
-use terrain::{Dem, GridFrame, PostRect};
+use source_files::{Crs, DemFile, MosaicRules, MosaicVoids, RasterFrame, WideMosaic, Windows};
+use terrain::{Dem, GridFrame, PostRect, Resampling};
 
 use crate::mesh::untiled_together;
 

@@ -256,7 +256,7 @@ fn half(files: &Files, random: &mut fastrand::Rng) -> Files {
 fn campaign(seeds: std::ops::Range<u64>) {
     let (kits, mut all, mut failed) = (Kits::new(), Told::default(), Vec::new());
     for seed in seeds.clone() {
-        if seed != seeds.start && (seed - seeds.start) % 1000 == 0 {
+        if seed != seeds.start && (seed - seeds.start).is_multiple_of(1000) {
             println!("{} runs, {} failed", seed - seeds.start, failed.len());
         }
         match simulate(&kits, seed) {

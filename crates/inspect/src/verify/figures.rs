@@ -3,7 +3,7 @@
 
 use database::{Folder, Manifest, Measured, MeasuredModule, MeasuredTally, Report, ReportResidual};
 use fidelity::Residuals;
-use job::{Count, Job};
+use job::{Choice, Job};
 use terrain::{LoadModule, ModuleId, ModuleResidual, StopReason, metres_of_quanta};
 
 use super::exceeded::Exceeded;
@@ -165,10 +165,7 @@ pub(crate) fn differing_report(
     if report.area != job.area.name {
         problems.push(format!("report.json: area is \"{}\", the job's is \"{}\"", report.area, job.area.name));
     }
-    let word = match job.limits.count {
-        Count::Triangles => "triangles",
-        Count::Polygons => "polygons",
-    };
+    let word = job.limits.count.name();
     if report.count != word {
         problems.push(format!("report.json: count is \"{}\", the job's is \"{word}\"", report.count));
     }

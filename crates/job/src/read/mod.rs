@@ -63,12 +63,12 @@ fn job_of(sections: &Sections, path: &Path, find: Option<&FindArea>) -> Result<(
             expected: "origin_m and size_m".into(),
             hint: "give numbers, or a job file".into(),
         };
-        let find = find.ok_or_else(|| alone().at(entry))?;
+        let find = find.ok_or_else(|| entry.no_area(alone()))?;
         let files = match request.place {
             AreaPlace::CoverDem => files_of(&sections.dem, path)?,
             AreaPlace::Around { .. } => Vec::new(),
         };
-        find(request, &files).map_err(|none| none.at(entry))
+        find(request, &files).map_err(|none| entry.no_area(none))
     })?;
     let mut dem = dem::read(&sections.dem, path, &mut mentions)?;
     let mut importance = importance::read(&sections.importance, &dem.source, path, &mut mentions)?;

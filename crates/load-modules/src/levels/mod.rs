@@ -15,7 +15,7 @@ mod sides;
 #[cfg(test)]
 mod tests;
 
-use terrain::{Importance, LoadModule, ModuleResidual, ModuleVertex, Side};
+use terrain::{Importance, LoadModule, LodBorder, ModuleResidual, ModuleVertex, Side};
 
 use crate::{Layout, classes, pieces};
 use level_mesh::{LevelMesh, is_inside};
@@ -28,18 +28,9 @@ pub struct Levels<'a> {
     /// For each, the share of the finest level's inner vertices that it keeps; falling, between 0 and 1.
     pub inner_shares: &'a [f64],
     /// What becomes of the vertices on the sides.
-    pub sides: LevelSides,
+    pub border: LodBorder,
     /// Whether edges leave Delaunay where the other diagonal has smaller squared residuals.
     pub flips: bool,
-}
-
-/// What becomes of the vertices on the sides.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LevelSides {
-    /// All of them stay.
-    Full,
-    /// Each side keeps its share, its ends always.
-    Own,
 }
 
 /// The levels of a load module, one for each share, from fine to coarse. Residuals are left empty.
@@ -58,7 +49,7 @@ pub fn coarser_levels(finest: &LoadModule, layout: &Layout, levels: &Levels, gro
     let level = |(&share, kept): (&f64, usize)| {
         let mut stays = vec![true; finest.vertices.len()];
         gone[..inner.len() - kept].iter().for_each(|&v| stays[usize::from(v)] = false);
-        if levels.sides == LevelSides::Own {
+        if levels.border == LodBorder::Own {
             sides.thin(share, &mut stays);
         }
         let vertices = (finest.vertices.iter().zip(&stays)).filter(|(_, stays)| **stays).map(|(&vertex, _)| vertex);

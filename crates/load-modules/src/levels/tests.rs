@@ -72,12 +72,12 @@ fn squares(module: &LoadModule, posts: &Posts) -> u128 {
 }
 
 /// Checks every load module of every level and gives them.
-fn check(sides: LevelSides, flips: bool, clipped: bool, seed: u64) -> Vec<Vec<LoadModule>> {
+fn check(border: LodBorder, flips: bool, clipped: bool, seed: u64) -> Vec<Vec<LoadModule>> {
     let layout = layout();
     let (dem, mask) = (hills(layout.grid.area()), Importance::uniform(layout.grid.area(), 1000));
     let make = if clipped { clipped_modules } else { constrained_modules };
     let finest = make(&layout, &dem, &mask, seed);
-    let wanted = Levels { inner_shares: &SHARES, sides, flips };
+    let wanted = Levels { inner_shares: &SHARES, border, flips };
     let levels = all_levels(&finest, &layout, &wanted, &dem, &mask);
     for (at, fine) in finest.iter().enumerate() {
         let inner = inner_places(fine);
@@ -98,7 +98,7 @@ fn check(sides: LevelSides, flips: bool, clipped: bool, seed: u64) -> Vec<Vec<Lo
 #[test]
 fn neighbours_at_any_two_levels_list_equal_sides() {
     for (flips, clipped, seed) in [(false, false, 1), (true, false, 2), (false, true, 3), (true, true, 4)] {
-        let levels = check(LevelSides::Full, flips, clipped, seed);
+        let levels = check(LodBorder::Full, flips, clipped, seed);
         let rect = ModuleRect { south: 0, west: 0, north: 3, east: 3 };
         for fine in &levels {
             for coarse in &levels {
@@ -118,7 +118,7 @@ fn neighbours_at_any_two_levels_list_equal_sides() {
 #[test]
 fn thinned_sides_are_equal_at_equal_levels_and_keep_their_share() {
     for (clipped, seed) in [(false, 5), (true, 6)] {
-        let levels = check(LevelSides::Own, true, clipped, seed);
+        let levels = check(LodBorder::Own, true, clipped, seed);
         for level in &levels {
             assert_sides_are_shared(level, ModuleRect { south: 0, west: 0, north: 3, east: 3 });
         }
@@ -166,7 +166,7 @@ fn a_vertex_goes_when_a_triangulation_without_it_is_the_closest_of_all() {
 
 #[test]
 fn no_other_height_of_an_inner_vertex_fits_better() {
-    let levels = check(LevelSides::Full, true, false, 7);
+    let levels = check(LodBorder::Full, true, false, 7);
     let layout = layout();
     let (dem, mask) = (hills(layout.grid.area()), Importance::uniform(layout.grid.area(), 1000));
     let ground = LevelGround { dem: &dem, mask: &mask };
@@ -187,7 +187,7 @@ fn no_other_height_of_an_inner_vertex_fits_better() {
 #[test]
 fn coarser_levels_lie_further_from_the_ground_and_flips_bring_them_closer() {
     let total = |flips: bool, level: usize| -> u128 {
-        let levels = check(LevelSides::Full, flips, false, 8);
+        let levels = check(LodBorder::Full, flips, false, 8);
         let layout = layout();
         let (dem, mask) = (hills(layout.grid.area()), Importance::uniform(layout.grid.area(), 1000));
         let ground = LevelGround { dem: &dem, mask: &mask };
@@ -205,7 +205,7 @@ fn ground_without_weight_and_a_load_module_without_inner_vertices_have_levels_to
     let (dem, mask) = (hills(area), Importance::new(area, vec![0; area.post_count()], vec![0; area.post_count()]));
     let finest = constrained_modules(&layout, &dem, &mask, 9);
     let weighted = constrained_modules(&layout, &dem, &Importance::uniform(area, 1000), 9);
-    let wanted = Levels { inner_shares: &SHARES, sides: LevelSides::Full, flips: true };
+    let wanted = Levels { inner_shares: &SHARES, border: LodBorder::Full, flips: true };
     let uniform = Importance::uniform(area, 1000);
     // Where nothing has a weight, all posts count the same.
     assert_eq!(

@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use source_files::{Crs, DemFile, Mosaic, MosaicRules, MosaicVoids, Patch, Reading, Resampling, SourceError, Standing};
-use terrain::{GridFrame, Post, PostRect};
+use source_files::{Crs, DemFile, Mosaic, MosaicRules, MosaicVoids, Patch, Reading, SourceError, Standing};
+use terrain::{GridFrame, Post, PostRect, Resampling};
 
 use crate::support::{Folder, Tiff, Values, grid};
 

@@ -6,11 +6,11 @@ use fastrand::Rng;
 use geometry::{levels_available, rounded, visit_posts, widest_level};
 use limits::{Allowance, Windows};
 use mesh::{Lines, Mesh};
-use terrain::{ModuleGrid, ModuleId, ModuleRect, Post, PostRect, SeamSides, TileId};
+use terrain::{LastBatch, ModuleGrid, ModuleId, ModuleRect, Post, PostRect, SeamSides, TileId};
 
 use super::*;
 use crate::proximity::is_near;
-use crate::{Frame, LastBatch, Proximity};
+use crate::{Frame, Proximity};
 
 /// Hills with plateaus: coarse steps, so that equal residuals are common.
 fn hills(rect: PostRect, seed: u64, step: i32) -> Dem {

@@ -1,7 +1,7 @@
 //! The methods by name, and what each is asked for.
 
 use compiler::CompileError;
-use job::{Optimising, StartMethod};
+use job::{Choice, Optimising, StartMethod};
 use methods::{
     Boundary, Contours, DemWindow, Diagonal, Distance, Extrema, FowlerLittle, Impossible, LatticeTin, Splitting,
 };
