@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use fastrand::Rng;
 use terrain::{
-    LatticePoint, LoadModule, ModuleGrid, ModuleId, ModuleRect, ModuleVertex, Post, PostRect, Side, Tin, Vertex,
+    LatticePoint, LoadModule, ModuleGrid, ModuleId, ModuleRect, ModuleVertex, Post, Side, Tin, Vertex,
 };
 
 use crate::Layout;
