@@ -43,8 +43,8 @@ pub fn write_heights(
     write(out, &Head { grid, rect, epsg, kind: Kind::Heights }, strip)
 }
 
-/// Writes classes at the posts `rect` of `grid` as a GeoTIFF; `classes` gives those of a band, row-major from the south,
-/// as [`write_heights`] asks for heights.
+/// Writes classes at the posts `rect` of `grid` as a GeoTIFF; `classes` gives those of a band, row-major from the
+/// south, as [`write_heights`] asks for heights.
 ///
 /// # Errors
 /// As [`write_heights`].
