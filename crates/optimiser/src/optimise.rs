@@ -384,9 +384,14 @@ impl Work<'_, '_> {
         let all = 0..self.sheet.vertices.len() as u32;
         let mut homeless: Vec<u32> = all.filter(|&vertex| !self.has_place(vertex, Shape::Sound)).collect();
         // Once its neighbours stand on the lattice, a vertex finds a place or can go; a place between triangles of any
-        // shape is the last resort.
-        homeless.retain(|&vertex| !self.has_place(vertex, Shape::Sound) && !self.take_out(vertex));
-        homeless.retain(|&vertex| !self.has_place(vertex, Shape::Upright) && !self.take_out(vertex));
+        // shape is the last resort but one, and room made by a neighbour that goes the last.
+        while !homeless.is_empty() {
+            homeless.retain(|&vertex| !self.has_place(vertex, Shape::Sound) && !self.take_out(vertex));
+            homeless.retain(|&vertex| !self.has_place(vertex, Shape::Upright) && !self.take_out(vertex));
+            if homeless.first().is_some_and(|&vertex| !self.make_room(vertex)) {
+                break;
+            }
+        }
         assert!(homeless.is_empty(), "{} vertices have no place on the lattice and cannot go", homeless.len());
         self.fill_up();
     }
@@ -394,6 +399,13 @@ impl Work<'_, '_> {
     /// Whether a vertex stands on the final lattice now, or is gone.
     fn has_place(&mut self, vertex: u32, shape: Shape) -> bool {
         !self.sheet.is_vertex(vertex) || self.mover.snap(&mut self.sheet, vertex, shape)
+    }
+
+    /// Takes out one of the vertices around another, if one can go.
+    fn make_room(&mut self, vertex: u32) -> bool {
+        let mut star = Star::default();
+        self.sheet.star(vertex, &mut star);
+        star.ring.iter().any(|&beside| self.take_out(beside))
     }
 
     /// Takes a vertex out, if that leaves a valid mesh.
