@@ -86,8 +86,9 @@ impl Artifact for Surveying<'_> {
         Ok(self.run.database.folder().curve_stamp(self.task.growth.tile)?)
     }
 
-    fn read(&self, _key: &Key, _stamp: &Stamp) -> Option<(Stamp, GainCurve)> {
-        self.run.database.folder().read_curve(self.task.growth.tile).ok()
+    fn read(&self, _key: &Key) -> Option<(Stamp, (Stamp, GainCurve))> {
+        let read = self.run.database.folder().read_curve(self.task.growth.tile).ok()?;
+        Some((read.0, read))
     }
 
     fn make(&self, _key: &Key, stamp: &Stamp) -> Result<(Stamp, GainCurve), CompileError> {

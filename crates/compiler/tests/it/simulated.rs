@@ -111,9 +111,18 @@ impl Kits {
         let words = [
             small((4, 4), (2, 2), "method = \"greedy\"\nallocation = \"equal\""),
             small((2, 6), (1, 3), "method = \"greedy\"\nallocation = \"global\""),
-            Words { modules: clip, ..small((4, 2), (2, 1), "method = \"paper\"\npoints = 60") },
+            Words { modules: clip.clone(), ..small((4, 2), (2, 1), "method = \"paper\"\npoints = 60") },
+            Words {
+                modules: clip,
+                limits: "per_load_module = 30\npool = 0\nmean_per_load_module = 28".into(),
+                ..small((4, 2), (2, 1), "method = \"paper\"\npoints = 90")
+            },
         ];
-        Self(words.iter().map(|words| [1, 2].map(|seed| Kit::new(words, seed))).collect())
+        let kits: Vec<[Kit; 2]> = words.iter().map(|words| [1, 2].map(|seed| Kit::new(words, seed))).collect();
+        let has_removals =
+            |kit: &Kit| kit.files.keys().any(|path| path.extension().is_some_and(|end| end == "removed"));
+        assert!(has_removals(&kits[3][0]), "points make room in the last kit");
+        Self(kits)
     }
 }
 

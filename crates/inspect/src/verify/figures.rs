@@ -56,7 +56,7 @@ pub(crate) fn measured(
     for (record, &points) in manifest.tiles.iter().zip(&tins.points) {
         let tile = record.tile();
         let read = match folder.read_measured(tile) {
-            Ok((_, read)) => read,
+            Ok((.., read)) => read,
             Err(error) => {
                 problems.push(error.to_string());
                 continue;
