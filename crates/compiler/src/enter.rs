@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use database::{Area, Database, DatabaseError, Folder, Manifest, ManifestState, Previous, SourceRecord};
+use database::{Area, Database, DatabaseError, Folder, Manifest, ManifestState, SourceRecord};
 use job::Job;
 
 use crate::build::fresh;
@@ -51,16 +51,16 @@ pub(crate) fn enter(
             }
             joined => joined?,
         };
-        if let Previous::Database(manifest) = previous {
+        if let Some(manifest) = previous {
             let is_finished = fresh(database.folder(), &manifest, job, records)?.is_some();
             if is_finished || is_under_way(&manifest) {
-                return Ok(Entered { database, manifest: *manifest, is_finished });
+                return Ok(Entered { database, manifest, is_finished });
             }
         }
         drop(database);
         match Database::create_or_open(folder, area) {
-            Ok((_, Previous::Database(manifest))) if is_under_way(&manifest) => {}
-            Ok((database, previous)) => database.begin(&beginning_of(job, records, previous.manifest().as_ref()))?,
+            Ok((_, Some(manifest))) if is_under_way(&manifest) => {}
+            Ok((database, previous)) => database.begin(&beginning_of(job, records, previous.as_ref()))?,
             Err(DatabaseError::Locked { .. }) => clock.wait(PAUSE),
             Err(error) => return Err(error.into()),
         }

@@ -59,7 +59,7 @@ mod names;
 pub use names::files;
 mod database;
 mod read;
-pub use database::{Database, Previous};
+pub use database::Database;
 mod verify;
 pub use verify::Damage;
 

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use compiler::CompileError;
 use fidelity::each_residual;
+use ground::GroundError;
 use product::{Product, Wanted, WantedGround};
 use terrain::{Dem, Importance, LoadModule, ModuleId, QUANTA_PER_METRE};
 
@@ -76,12 +77,13 @@ fn check_same_ground(first: &Product, second: &Product, path: &Path) -> Result<(
     (area.name, area.vertical_datum) = (other.name.clone(), other.vertical_datum.clone());
     (area.tile_rows, area.tile_cols) = (other.tile_rows, other.tile_cols);
     let Some((key, expected, found)) = area.difference(other) else { return Ok(()) };
-    Err(CompileError::Impossible {
+    Err(GroundError::Impossible {
         key: format!("{}: {key}", path.display()),
         found,
         expected,
         hint: "load modules can be compared where both databases divide the same ground alike".into(),
-    })
+    }
+    .into())
 }
 
 fn module_difference(product: &Product, a: &LoadModule, b: &LoadModule) -> ModuleDifference {

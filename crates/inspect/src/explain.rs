@@ -6,6 +6,7 @@ use std::sync::atomic::AtomicBool;
 use compiler::{CompileError, Stage};
 use database::{Folder, TileState, files};
 use fidelity::{Split, best_split};
+use ground::GroundError;
 use job::{Choice, HOLE_CLASS_NAME};
 use limits::Windows;
 use product::{Product, Wanted, WantedGround};
@@ -132,12 +133,13 @@ fn check_inside(module: ModuleId, product: &Product) -> Result<(), CompileError>
     if module.row < rows && module.col < cols {
         return Ok(());
     }
-    Err(CompileError::Impossible {
+    Err(GroundError::Impossible {
         key: "load module".into(),
         found: module.to_string(),
         expected: format!("a row from 0 to {} and a column from 0 to {}", rows - 1, cols - 1),
         hint: "rows come first and both count from the south-west".into(),
-    })
+    }
+    .into())
 }
 
 /// The best split of every load module, row by row, where there is ground to split on.

@@ -29,6 +29,22 @@ pub struct TileTask {
 }
 
 impl TileTask {
+    /// Of a tile without load modules that nothing else is said of: closed sides, no points given, no end.
+    pub fn plain(tile: TileId, rect: PostRect, rule: Rule) -> Self {
+        Self {
+            tile,
+            rect,
+            frame: Frame::Plain,
+            border: Vec::new(),
+            inherited: Vec::new(),
+            kept: Vec::new(),
+            start: Vec::new(),
+            seams: SeamSides::CLOSED,
+            rule,
+            stop: Stop::default(),
+        }
+    }
+
     /// What the tile may spend, in posts from its south-west post, with room taken for inherited points and kept ones
     /// paid for; `None` where there are no limits.
     pub fn ledger(&self) -> Option<TileLedger> {

@@ -3,6 +3,7 @@
 use std::sync::atomic::AtomicBool;
 
 use compiler::{CompileError, Event, Progress, Stage};
+use ground::GroundError;
 use terrain::StopReason;
 
 use crate::heights::Heights;
@@ -69,5 +70,5 @@ fn refuse(request: &TinRequest, levels: &[usize]) -> Result<(), CompileError> {
 }
 
 fn impossible(found: String, expected: String, hint: &str) -> CompileError {
-    CompileError::Impossible { key: "--levels".into(), found, expected, hint: hint.into() }
+    GroundError::Impossible { key: "--levels".into(), found, expected, hint: hint.into() }.into()
 }

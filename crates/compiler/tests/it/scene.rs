@@ -7,6 +7,7 @@ use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 use compiler::{Built, CompileError, Event, Options, Progress, Rebuilt};
+use engine::Clock;
 use job::Job;
 use tempfile::TempDir;
 use terrain::{Dem, GridFrame, ModuleGrid, Spacing, TileId};
@@ -220,7 +221,33 @@ pub fn sample_dem(grid: ModuleGrid, seed: u64) -> Dem {
 
 /// A run without a page and without times: drawing takes longer than most of these builds.
 pub fn options(workers: usize, stop: &AtomicBool) -> Options<'_> {
-    Options { page: false, ..Options::new(workers, stop, &|| Duration::ZERO) }
+    Options { page: false, ..Options::new(workers, stop, &Still) }
+}
+
+/// A clock that stands still.
+pub struct Still;
+
+impl Clock for Still {
+    fn wall(&self) -> Duration {
+        Duration::ZERO
+    }
+
+    fn wait(&self, time: Duration) {
+        std::thread::sleep(time);
+    }
+}
+
+/// A clock that a test sets.
+pub struct SetBy<F>(pub F);
+
+impl<F: Fn() -> Duration> Clock for SetBy<F> {
+    fn wall(&self) -> Duration {
+        self.0()
+    }
+
+    fn wait(&self, time: Duration) {
+        std::thread::sleep(time);
+    }
 }
 
 /// Listens to nothing.

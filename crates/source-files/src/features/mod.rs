@@ -15,16 +15,13 @@ mod nest;
 pub(crate) mod osm;
 mod packages;
 mod placing;
-mod raw;
+pub(crate) mod raw;
 mod shapes;
-mod well_known;
+pub(crate) mod well_known;
 
 pub use clip::Extent;
 pub use formats::{feature_layers, is_feature_file};
 pub use model::{BUILT_IN_KEYS, FeatureFile, Remark, Tags, VectorFeature, VectorShape, Vertices, Wanted};
-
-pub(crate) use raw::{Part, RawShape};
-pub(crate) use well_known::geometry;
 
 use std::path::Path;
 
