@@ -5,13 +5,14 @@ use std::path::{Path, PathBuf};
 
 use engine::{Durability, Entry, LockKind, Stamp, check_writable, is_temporary, remove_all};
 use serde::Serialize;
-use terrain::{GainCurve, LoadModule, TileTin};
+use terrain::{GainCurve, LoadModule, TileFeatures, TileTin};
 
 use crate::lock::LOCK_NAME;
 use crate::names::{MEASURED, MODULES, SURVEY, TILES, WORK, files};
 use crate::{
-    Area, DatabaseError, FileStamp, Folder, Lock, Manifest, ManifestState, Measured, Removals, TileModules, Work,
-    encode_curve, encode_levels, encode_measured, encode_removals, encode_tile, json,
+    Area, AreaLevel, DatabaseError, FileStamp, Folder, Lock, Manifest, ManifestState, Measured, Profile, Removals,
+    TileModules, Work, encode_curve, encode_level, encode_levels, encode_lines, encode_measured, encode_profile,
+    encode_removals, encode_tile, json,
 };
 
 /// The folders of a database that stay.
@@ -185,6 +186,30 @@ impl Database {
     /// As [`Database::write_tile`].
     pub fn write_curve(&self, stamp: &Stamp, curve: &GainCurve) -> Result<FileStamp, DatabaseError> {
         self.publish(&self.folder.curve_path(curve.tile), &encode_curve(stamp, curve))
+    }
+
+    /// Publishes what the ground is along the features of a tile.
+    ///
+    /// # Errors
+    /// As [`Database::write_tile`].
+    pub fn write_profile(&self, stamp: &Stamp, profile: &Profile) -> Result<FileStamp, DatabaseError> {
+        self.publish(&self.folder.profile_path(profile.tile), &encode_profile(stamp, profile))
+    }
+
+    /// Publishes what features put into a tile.
+    ///
+    /// # Errors
+    /// As [`Database::write_tile`].
+    pub fn write_lines(&self, stamp: &Stamp, features: &TileFeatures) -> Result<FileStamp, DatabaseError> {
+        self.publish(&self.folder.lines_path(features.tile), &encode_lines(stamp, features))
+    }
+
+    /// Publishes what features of the area came to.
+    ///
+    /// # Errors
+    /// As [`Database::write_tile`].
+    pub fn write_level(&self, stamp: &Stamp, level: &AreaLevel) -> Result<FileStamp, DatabaseError> {
+        self.publish(&self.folder.path(files::LEVEL), &encode_level(stamp, level))
     }
 
     /// Publishes a value, which must be an object, as checksummed JSON under one of the names of [`files`].

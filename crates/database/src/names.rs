@@ -14,6 +14,8 @@ pub mod files {
     pub const BREACHES_CSV: &str = "breaches.csv";
     /// What each tile may spend.
     pub const ALLOCATION: &str = "survey/allocation.json";
+    /// What features of the area came to: their heights, their cost, what was mended.
+    pub const LEVEL: &str = "survey/features.level";
 }
 
 /// Folder of the tiles' TINs.
