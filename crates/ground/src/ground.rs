@@ -3,17 +3,19 @@
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, OnceLock};
 
+use database::Folder;
 use job::{DemSource, Job};
 use mask::Mask;
 use schedule::Workers;
 use source_files::{VoidSummary, read_polygons};
-use terrain::{Dem, GridFrame, Importance, Post, PostRect, TileId};
+use terrain::{Dem, GridFrame, Importance, Post, PostRect, TileFeatures, TileId};
 
 use crate::area::GamingArea;
 use crate::bounds::Bounds;
 use crate::census::Census;
 use crate::given::{GamingAreaFrame, Given, GivenPost};
 use crate::large::WHOLE_BYTES_MAX;
+use crate::lines::Lines;
 use crate::mask_of::{Fault, Opening};
 use crate::relief::Relief;
 use crate::source::Source;
@@ -34,6 +36,7 @@ pub struct Ground {
     rect: PostRect,
     frame: GridFrame,
     kept: Option<Vec<OnceLock<Arc<Window>>>>,
+    lines: OnceLock<Lines>,
     /// Points that the job gives.
     pub given: Given,
     /// Voids of the source under the area.
@@ -45,6 +48,7 @@ pub struct Ground {
 }
 
 /// The ground of a rectangle of posts.
+#[derive(Clone)]
 pub struct Window {
     /// Heights.
     pub dem: Dem,
@@ -107,7 +111,8 @@ impl Ground {
         let keep = area.rect.post_count() <= KEPT_POSTS_MAX;
         let kept = keep.then(|| area.tiles.iter().map(|_| OnceLock::new()).collect());
         let (rect, frame, given) = (area.rect, area.frame, Given::open(job, area)?);
-        let mut ground = Self { relief, mask, fault, rect, frame, kept, given, voids, warnings, accuracy_m };
+        let lines = OnceLock::new();
+        let mut ground = Self { relief, mask, fault, rect, frame, kept, lines, given, voids, warnings, accuracy_m };
         if !ground.relief.has_source_posts() {
             ground.take_census(job, area, workers, stop)?;
         }
@@ -167,20 +172,39 @@ impl Ground {
         self.relief.bounds.map(|bounds| told.fold(bounds, Bounds::and))
     }
 
-    /// The ground of one tile, made once where memory allows.
+    /// From now on, features are burned into every window but natural ones, as `folder` has them.
+    pub fn burn_in(&self, folder: &Folder, area: &GamingArea) {
+        self.lines.get_or_init(|| Lines::new(folder, area, self.kept.is_some()));
+    }
+
+    /// What features put into a tile; nothing before they are burned in.
+    ///
+    /// # Errors
+    /// When the file that says it cannot be read.
+    pub fn features(&self, tile: TileId) -> Result<Arc<TileFeatures>, GroundError> {
+        self.lines.get().map_or_else(|| Ok(Arc::new(TileFeatures::none(tile))), |lines| lines.features(tile))
+    }
+
+    /// The ground of one tile, made once where memory allows: natural, with features burned in if there are any.
+    ///
+    /// # Errors
+    /// When the source has no heights there, or features cannot be read.
+    pub fn tile(&self, area: &GamingArea, tile: TileId) -> Result<Arc<Window>, GroundError> {
+        let Some(lines) = self.lines.get() else { return self.natural_tile(area, tile) };
+        kept_or(lines.kept(area.tiling.index(tile)), || {
+            // Points that the job gives are looked up in what they are given for.
+            let window = lines.burn(Window::clone(&*self.natural_tile(area, tile)?))?;
+            self.with_given(area, tile, window)
+        })
+    }
+
+    /// The same without features.
     ///
     /// # Errors
     /// When the source has no heights there.
-    pub fn tile(&self, area: &GamingArea, tile: TileId) -> Result<Arc<Window>, GroundError> {
-        let rect = area.tiling.rect(tile);
-        let fresh = || self.with_given(area, tile, self.window(rect)?).map(Arc::new);
-        let Some(kept) = &self.kept else { return fresh() };
-        let slot = &kept[area.tiling.index(tile)];
-        if let Some(window) = slot.get() {
-            return Ok(window.clone());
-        }
-        let window = fresh()?;
-        Ok(slot.get_or_init(|| window).clone())
+    pub fn natural_tile(&self, area: &GamingArea, tile: TileId) -> Result<Arc<Window>, GroundError> {
+        let slot = self.kept.as_ref().map(|kept| &kept[area.tiling.index(tile)]);
+        kept_or(slot, || self.with_given(area, tile, self.natural(area.tiling.rect(tile))?))
     }
 
     /// The ground of a tile and of `halo` posts around it, put together from the windows of its neighbours, which
@@ -209,13 +233,38 @@ impl Ground {
         Ok(Window { dem, importance: join_importance(&parts, rect), given: Vec::new(), forbidden: Vec::new() })
     }
 
-    /// The ground of any rectangle of the area.
+    /// The ground of any rectangle of the area, with features burned in if there are any.
+    ///
+    /// # Errors
+    /// When the source has no heights there, or features cannot be read.
+    pub fn window(&self, rect: PostRect) -> Result<Window, GroundError> {
+        let natural = self.natural(rect)?;
+        match self.lines.get() {
+            Some(lines) => lines.burn(natural),
+            None => Ok(natural),
+        }
+    }
+
+    /// The ground of any rectangle of the area without features.
     ///
     /// # Errors
     /// When the source has no heights there.
-    pub fn window(&self, rect: PostRect) -> Result<Window, GroundError> {
+    pub fn natural(&self, rect: PostRect) -> Result<Window, GroundError> {
         self.with_importance(self.relief.dem(rect)?)
     }
+}
+
+/// What a slot holds, made if it is empty; made each time where there is no slot.
+pub(crate) fn kept_or(
+    slot: Option<&OnceLock<Arc<Window>>>,
+    make: impl FnOnce() -> Result<Window, GroundError>,
+) -> Result<Arc<Window>, GroundError> {
+    let Some(slot) = slot else { return make().map(Arc::new) };
+    if let Some(window) = slot.get() {
+        return Ok(window.clone());
+    }
+    let window = Arc::new(make()?);
+    Ok(slot.get_or_init(|| window).clone())
 }
 
 /// Whether a halo never reaches beyond a tile.
