@@ -24,6 +24,8 @@ pub use model::{
 pub use terrain::{Effort, HeightFit, LastBatch, Lattice, LodBorder, Resampling, Smooth, TileOrder};
 mod importance;
 pub use importance::{AreaShape, HOLE_CLASS_NAME, ImportanceArea, ImportanceSpec, SampleClass};
+mod features_spec;
+pub use features_spec::{FeatureSource, FeaturesSpec, HeightsFrom};
 mod ground;
 pub use ground::{GeoidSpec, WaterSpec};
 mod lod;
@@ -48,3 +50,4 @@ mod read;
 mod sections;
 mod settings;
 pub use settings::{Setting, deciding_lines};
+mod settings_features;

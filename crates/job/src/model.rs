@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use terrain::{Effort, HeightFit, LastBatch, Lattice, ModuleGrid, Resampling, Spacing, TileOrder};
 
-use crate::{GeoidSpec, ImportanceSpec, LodSpec, NamedFile, Start, WaterSpec};
+use crate::{FeaturesSpec, GeoidSpec, ImportanceSpec, LodSpec, NamedFile, Start, WaterSpec};
 
 /// All a run needs, as the job file says it, defaults filled in.
 #[derive(Clone, Debug, PartialEq)]
@@ -17,6 +17,8 @@ pub struct Job {
     pub dem: DemSpec,
     /// Where ground matters more.
     pub importance: ImportanceSpec,
+    /// Roads, rivers and lakes that become parts of the ground; none where the job has no such section.
+    pub features: Option<FeaturesSpec>,
     /// How the work is cut.
     pub tiles: TilesSpec,
     /// What the product is cut into.

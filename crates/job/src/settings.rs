@@ -9,7 +9,7 @@ use terrain::{THOUSANDTHS, metres_of_quanta};
 
 use crate::{
     AreaShape, Budget, Choice, DemSource, Edges, GeoidSpec, ImportanceArea, Job, LodSpec, Method, Optimising,
-    Resampling, SourceEntry, Start, TinSpec, Voids, WaterSpec, key,
+    Resampling, SourceEntry, Start, TinSpec, Voids, WaterSpec, key, settings_features,
 };
 
 /// One setting of a job.
@@ -36,6 +36,7 @@ impl Job {
         self.describe_area(&mut list);
         self.describe_dem(&mut list);
         self.describe_importance(&mut list);
+        self.features.iter().for_each(|features| settings_features::describe(features, &mut list));
         self.describe_tiles(&mut list);
         self.describe_modules(&mut list);
         self.describe_limits(&mut list);
@@ -257,16 +258,16 @@ fn water_level(water: &WaterSpec) -> &'static str {
 }
 
 /// The settings so far.
-struct List(Vec<Setting>);
+pub(crate) struct List(Vec<Setting>);
 
 impl List {
     /// A setting that means the same in every run.
-    fn add(&mut self, key: &'static str, value: String) {
+    pub(crate) fn add(&mut self, key: &'static str, value: String) {
         self.say(key, value, meaning(key));
     }
 
     /// A setting, and what it comes to in this run.
-    fn add_with(&mut self, key: &'static str, value: String, here: impl Display) {
+    pub(crate) fn add_with(&mut self, key: &'static str, value: String, here: impl Display) {
         self.say(key, value, format!("{}: {here}", meaning(key)));
     }
 
@@ -286,7 +287,7 @@ fn meaning(name: &str) -> &'static str {
 }
 
 /// A number as TOML, the shortest that reads back the same: 500 for 500.0, 31.25, 1e-7.
-fn number(value: f64) -> String {
+pub(crate) fn number(value: f64) -> String {
     let value = value + 0.0; // so that -0 is written as 0
     if value.fract() == 0.0 && value.abs() < 1.0e15 { format!("{value:.0}") } else { format!("{value:?}") }
 }
@@ -301,7 +302,7 @@ fn weight(thousandths: u16) -> String {
 }
 
 /// A text as a TOML basic string.
-fn quoted(text: &str) -> String {
+pub(crate) fn quoted(text: &str) -> String {
     let mut out = String::from("\"");
     for c in text.chars() {
         match c {
@@ -328,7 +329,7 @@ fn source_text(SourceEntry { name, said }: &SourceEntry) -> String {
     }
 }
 
-fn counted(count: usize, noun: &str) -> String {
+pub(crate) fn counted(count: usize, noun: &str) -> String {
     if count == 1 { format!("1 {noun}") } else { format!("{count} {noun}s") }
 }
 

@@ -1,0 +1,110 @@
+//! What a job says about roads, rivers and lakes that become parts of the ground.
+
+use std::path::PathBuf;
+
+use features::{GradeOptions, Kind, Rule, RuleKind, table};
+
+use crate::{ImportanceSpec, NamedFile};
+
+/// Roads, rivers and lakes that become parts of the ground.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FeaturesSpec {
+    /// Where they come from; their order decides nothing.
+    pub sources: Vec<FeatureSource>,
+    /// Tried in order, before the built-in ones.
+    pub rules: Vec<Rule>,
+    /// Of a load module's limit, what features may take.
+    pub share_max: f64,
+    /// What decks keep clear of, and how far back their banks may sag, in quanta.
+    pub options: GradeOptions,
+}
+
+/// Where features come from.
+#[derive(Clone, Debug, PartialEq)]
+pub enum FeatureSource {
+    /// Those that the built-in terrain brings (only with [`crate::DemSource::Sample`]).
+    Sample,
+    /// A file of lines and polygons.
+    File {
+        /// The file.
+        file: NamedFile,
+        /// Its layer, where it has several.
+        layer: Option<String>,
+        /// The kind of its features, where no tag of theirs says it.
+        kind: Option<Kind>,
+    },
+}
+
+/// Where the heights of features come from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum HeightsFrom {
+    /// The DEM.
+    Dem,
+    /// The features' own vertices.
+    Feature,
+}
+
+impl FeaturesSpec {
+    /// The files, each once, in the order of their entries.
+    pub fn files(&self) -> Vec<&NamedFile> {
+        let mut files: Vec<&NamedFile> = Vec::new();
+        for source in &self.sources {
+            let FeatureSource::File { file, .. } = source else { continue };
+            let path: &PathBuf = &file.path;
+            if !files.iter().any(|other| other.path == *path) {
+                files.push(file);
+            }
+        }
+        files
+    }
+
+    /// Keys of tags that rules look at, sorted, each once.
+    pub fn keys(&self) -> Vec<&str> {
+        let mut keys: Vec<&str> = self.rules.iter().flat_map(|rule| &rule.tags).map(|(key, _)| key.as_str()).collect();
+        keys.sort_unstable();
+        keys.dedup();
+        keys
+    }
+
+    /// Names of the classes that features may get, in the table's order: of each kind those that rules name, then its
+    /// own. They follow from the job alone, so that a number of a class does not change with what the files hold.
+    pub fn classes(&self) -> Vec<String> {
+        let mut classes: Vec<String> = Vec::new();
+        let mut add = |name: &str| {
+            if !classes.iter().any(|class| class == name) {
+                classes.push(name.to_owned());
+            }
+        };
+        for kind in Kind::ALL {
+            self.rules
+                .iter()
+                .filter(|rule| kind_of(rule) == Some(kind))
+                .filter_map(|rule| rule.class.as_deref())
+                .for_each(&mut add);
+            add(kind.name());
+        }
+        classes
+    }
+
+    /// All classes: those of the ground, as in [`ImportanceSpec::classes`], then those of features that are not among
+    /// them, at most 255 together.
+    pub fn classes_after(&self, ground: &ImportanceSpec) -> Vec<String> {
+        let mut all = ground.classes.clone();
+        all.extend(self.classes().into_iter().filter(|class| !ground.classes.contains(class)));
+        all
+    }
+}
+
+/// The kind of what a rule matches: its own, or the highest that the built-in table has for its tags.
+fn kind_of(rule: &Rule) -> Option<Kind> {
+    match rule.kind {
+        RuleKind::None => None,
+        RuleKind::Is(kind) => Some(kind),
+        RuleKind::AsBuiltIn => {
+            let built_in = |key: &str, value: &str| table::kind_of(&[(key.to_owned(), value.to_owned())]);
+            let kinds =
+                rule.tags.iter().flat_map(|(key, values)| values.iter().filter_map(|value| built_in(key, value)));
+            Some(kinds.min().unwrap_or(Kind::Breakline))
+        }
+    }
+}
