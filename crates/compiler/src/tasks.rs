@@ -186,7 +186,7 @@ fn survey_allowance(area: &GamingArea, modules: ModuleRect, triangles: u32) -> A
         east: (modules.east + 1).min(area.grid.cols),
     };
     let cap = area.budget.per_module.saturating_add(u32::try_from(area.budget.pool).unwrap_or(u32::MAX));
-    let room = |module| cap - limits::start_triangles(area.grid, module, area.budget.border_step);
+    let room = |module| cap.saturating_sub(area.budget.start_of(module));
     Allowance {
         modules: ring,
         module_room: ring.iter().map(room).collect(),

@@ -15,6 +15,8 @@ pub struct AreaLevel {
     /// Triangles that features take of a load module and class: the load module's place in the area, row-major; the
     /// class of the job; triangles. In ascending order.
     pub cost: Vec<(u32, u8, u32)>,
+    /// Triangles that features take of a load module, counted exactly, by its place. Those that take none are left out.
+    pub reserved: Vec<(u32, u32)>,
     /// Edges of the TIN as lines of their features.
     pub lines: Vec<FeatureLine>,
     /// What was mended, degraded or left out.
@@ -114,6 +116,7 @@ mod tests {
         let level = AreaLevel {
             tiles: vec![FileStamp::of(b"one"), FileStamp::of(b"other")],
             cost: vec![(0, 3, 12), (7, 2, 1)],
+            reserved: vec![(0, 12), (7, 1)],
             lines: vec![FeatureLine {
                 feature: "way/12".into(),
                 class: 3,

@@ -1,12 +1,12 @@
 //! All features of one area, in the order in which things are decided: what they are and where they run, then, with the
 //! heights of the DEM at every station, how high they lie and what they put into the ground.
 
-use std::collections::HashSet;
+use std::collections::{BTreeMap, HashSet};
 
 use crate::pieces::moved;
 use crate::rules::Sorted;
 use crate::{
-    Bed, Flaw, GradeOptions, Graded, Grants, Network, Outline, Place, Remark, Reserved, Rule, Site, Source, Strand,
+    Bed, Cost, FeatureId, Flaw, GradeOptions, Graded, Grants, Network, Outline, Place, Remark, Reserved, Rule, Site, Source, Strand,
     Waters, Way, banks, breaklines, channels, dams, fall, flowing, grade, have_line, lakes_along, level, lines_inside,
     mend, outline_only, pins, reserve, round, shore, sides, sort_out, split_at_dams, travelled, water,
 };
@@ -41,7 +41,23 @@ pub struct Levelled {
     pub remarks: Vec<Remark>,
 }
 
+/// What features may take.
+pub trait Room {
+    /// Triangles of a load module (row, column).
+    fn of(&self, module: (i32, i32)) -> u32;
+
+    /// Leaves less to load modules where this is too much for several of them together; false when it is not. It must
+    /// end: sooner or later nothing is left to take.
+    fn narrow(&mut self, cost: &Cost) -> bool;
+}
+
 impl AreaFeatures {
+    /// What each feature on the lattice is.
+    pub fn traits_by_id(&self) -> BTreeMap<FeatureId, Traits> {
+        let ways = self.ways.iter().map(|way| (way.id, way.traits));
+        ways.chain(self.outlines.iter().map(|outline| (outline.id, outline.traits))).collect()
+    }
+
     /// Sorts out, mends and rounds features, and finds where the DEM has to be asked.
     pub fn of(sources: Vec<Source>, rules: &[Rule], site: Site) -> Self {
         let Sorted { features, matched, by_kind: _, mut remarks } = sort_out(sources, rules);
@@ -93,8 +109,8 @@ impl AreaFeatures {
         all
     }
 
-    /// Decides all heights, and forms features so that they take no more triangles of a load module (row, column) than
-    /// `triangles_max` says. `ground` has the height of the DEM at each of the stations, in quanta.
+    /// Decides all heights, and forms features so that they take no more triangles than there is room for. `ground` has
+    /// the height of the DEM at each of the stations, in quanta.
     ///
     /// # Panics
     /// When there is not one height, or none, for each station.
@@ -102,7 +118,7 @@ impl AreaFeatures {
         &self,
         ground: &[Option<i32>],
         options: GradeOptions,
-        triangles_max: &dyn Fn((i32, i32)) -> u32,
+        room: &mut dyn Room,
     ) -> Levelled {
         assert_eq!(self.stations.len(), ground.len(), "the DEM was asked at every station");
         let at = |place: Place| self.stations.binary_search(&place).ok().and_then(|found| ground[found]);
@@ -117,7 +133,10 @@ impl AreaFeatures {
         let beside: Vec<[i32; 2]> = self.road_sides.iter().zip(&heights).map(beside).collect();
         let grants = Grants::default();
         let graded = Graded { network: roads, heights: &heights, beside: &beside, grants: &grants };
-        let mut reserved = reserve(&graded, &strands, &self.site, triangles_max);
+        let mut reserved = reserve(&graded, &strands, &self.site, &|module| room.of(module));
+        while room.narrow(&reserved.cost) {
+            reserved = reserve(&graded, &strands, &self.site, &|module| room.of(module));
+        }
         remarks.append(&mut reserved.formed.remarks);
         // What lies beyond the area is counted, not listed.
         remarks.retain(|remark| remark.flaw != Flaw::Outside);
@@ -180,10 +199,22 @@ mod tests {
     use crate::Role;
     use crate::samples::{check, ground_at, site, way};
 
+    struct Thousand;
+
+    impl Room for Thousand {
+        fn of(&self, _module: (i32, i32)) -> u32 {
+            1000
+        }
+
+        fn narrow(&mut self, _cost: &Cost) -> bool {
+            false
+        }
+    }
+
     fn levelled(sources: Vec<Source>, metres: impl Fn(f64, f64) -> f64) -> Levelled {
         let all = AreaFeatures::of(sources, &[], site());
         let ground: Vec<Option<i32>> = all.stations().iter().map(|place| ground_at(*place, &metres)).collect();
-        let levelled = all.level(&ground, GradeOptions::USUAL, &|_| 1000);
+        let levelled = all.level(&ground, GradeOptions::USUAL, &mut Thousand);
         check(&levelled.reserved.formed);
         levelled
     }

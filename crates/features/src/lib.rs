@@ -98,7 +98,7 @@ pub use cost::{Cost, Reserved, cost, reserve};
 
 // All of it, in its order.
 mod area;
-pub use area::{AreaFeatures, Levelled};
+pub use area::{AreaFeatures, Levelled, Room};
 
 #[cfg(test)]
 mod samples;

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use features::{GradeOptions, Kind, Rule, RuleKind, table};
+use features::{GradeOptions, Kind, Rule};
 
 use crate::{ImportanceSpec, NamedFile};
 
@@ -69,21 +69,7 @@ impl FeaturesSpec {
     /// Names of the classes that features may get, in the table's order: of each kind those that rules name, then its
     /// own. They follow from the job alone, so that a number of a class does not change with what the files hold.
     pub fn classes(&self) -> Vec<String> {
-        let mut classes: Vec<String> = Vec::new();
-        let mut add = |name: &str| {
-            if !classes.iter().any(|class| class == name) {
-                classes.push(name.to_owned());
-            }
-        };
-        for kind in Kind::ALL {
-            self.rules
-                .iter()
-                .filter(|rule| kind_of(rule) == Some(kind))
-                .filter_map(|rule| rule.class.as_deref())
-                .for_each(&mut add);
-            add(kind.name());
-        }
-        classes
+        features::class_names(&self.rules)
     }
 
     /// All classes: those of the ground, as in [`ImportanceSpec::classes`], then those of features that are not among
@@ -92,19 +78,5 @@ impl FeaturesSpec {
         let mut all = ground.classes.clone();
         all.extend(self.classes().into_iter().filter(|class| !ground.classes.contains(class)));
         all
-    }
-}
-
-/// The kind of what a rule matches: its own, or the highest that the built-in table has for its tags.
-fn kind_of(rule: &Rule) -> Option<Kind> {
-    match rule.kind {
-        RuleKind::None => None,
-        RuleKind::Is(kind) => Some(kind),
-        RuleKind::AsBuiltIn => {
-            let built_in = |key: &str, value: &str| table::kind_of(&[(key.to_owned(), value.to_owned())]);
-            let kinds =
-                rule.tags.iter().flat_map(|(key, values)| values.iter().filter_map(|value| built_in(key, value)));
-            Some(kinds.min().unwrap_or(Kind::Breakline))
-        }
     }
 }

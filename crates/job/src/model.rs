@@ -31,6 +31,16 @@ pub struct Job {
     pub lod: LodSpec,
 }
 
+impl Job {
+    /// Names of the classes of triangles, by number: those of the ground, then those of features.
+    pub fn class_names(&self) -> Vec<String> {
+        match &self.features {
+            Some(features) => features.classes_after(&self.importance),
+            None => self.importance.classes.clone(),
+        }
+    }
+}
+
 /// The gaming area and its working grid.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Area {
