@@ -13,6 +13,7 @@ pub use optimise::{Optimised, fill, optimise, overshoot};
 
 mod account;
 mod curve;
+mod ears;
 mod exchange;
 mod flips;
 mod form;
@@ -20,6 +21,7 @@ mod ground;
 mod hold;
 mod insertion;
 mod moments;
+mod parts;
 mod patch;
 mod place;
 mod queue;
@@ -29,7 +31,12 @@ mod sheet;
 mod sweep;
 mod tenants;
 mod thin;
+mod weave;
 
+#[cfg(test)]
+mod feature_scene;
+#[cfg(test)]
+mod feature_tests;
 #[cfg(test)]
 mod scene;
 #[cfg(test)]

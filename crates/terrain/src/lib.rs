@@ -18,6 +18,8 @@ mod importance;
 pub use importance::{HOLE_CLASS, Importance, THOUSANDTHS};
 mod tin;
 pub use tin::{Tin, TinFault, Vertex};
+mod features;
+pub use features::{FEATURE_STEPS_MAX, Features, SideSpan};
 mod tile;
 pub use tile::{ModuleGrid, ModuleId, ModuleRect, SeamSides, Side, TileId};
 mod curve;

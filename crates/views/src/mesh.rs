@@ -7,7 +7,7 @@
 
 use std::io::{Result, Write};
 
-use terrain::{LATTICE_PER_POST, QUANTA_PER_METRE, Tin, Vertex, metres_of_quanta};
+use terrain::{QUANTA_PER_METRE, Tin, Vertex, metres_of_quanta};
 
 /// Where a TIN's lattice lies on the ground.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,9 +32,9 @@ pub enum Coordinates {
 }
 
 impl MeshPlace {
-    /// East, north and up of `vertex` in metres, from `origin`.
-    fn position(&self, vertex: &Vertex, origin: [f64; 2]) -> [f64; 3] {
-        let posts = |lattice: i32| f64::from(lattice) / f64::from(LATTICE_PER_POST);
+    /// East, north and up of a vertex of `tin` in metres, from `origin`.
+    fn position(&self, tin: &Tin, vertex: &Vertex, origin: [f64; 2]) -> [f64; 3] {
+        let posts = |lattice: i32| f64::from(lattice) / f64::from(tin.steps_per_post);
         let east_m = self.east_m - origin[0] + posts(vertex.at.col) * self.spacing_m[0];
         let north_m = self.north_m - origin[1] + posts(vertex.at.row) * self.spacing_m[1];
         [east_m, north_m, metres_of_quanta(vertex.height)]
@@ -85,7 +85,7 @@ pub fn write_ply(out: &mut impl Write, tin: &Tin, place: &MeshPlace, coordinates
     }
     writeln!(out, "element face {}\nproperty list uchar int vertex_indices\nend_header", tin.triangles.len())?;
     for vertex in &tin.vertices {
-        for metres in place.position(vertex, origin) {
+        for metres in place.position(tin, vertex, origin) {
             match coordinates {
                 Coordinates::Local => out.write_all(&(metres as f32).to_le_bytes())?,
                 Coordinates::Map => out.write_all(&metres.to_le_bytes())?,
@@ -111,7 +111,7 @@ pub fn write_obj(out: &mut impl Write, tin: &Tin, place: &MeshPlace, coordinates
         writeln!(out, "# {line}")?;
     }
     for vertex in &tin.vertices {
-        let [x, y, z] = place.position(vertex, origin);
+        let [x, y, z] = place.position(tin, vertex, origin);
         // The shortest digits that read back as the same number.
         writeln!(out, "v {x} {y} {z}")?;
     }
@@ -135,7 +135,7 @@ mod tests {
         let mut vertices: Vec<_> = rect.corners().into_iter().enumerate().map(corner).collect();
         vertices.push(Vertex { at: LatticePoint::new(41, 25), height: -1 });
         let triangles = vec![[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]];
-        Tin { rect, vertices, triangles }
+        Tin::new(rect, vertices, triangles)
     }
 
     /// Header and body of the PLY.

@@ -13,7 +13,7 @@ use ground::{GivenPost, Window, chosen, posts_of_file, refused, start_posts};
 use job::{ErrorKey, Optimising, StartMethod};
 use schedule::{Event as Scheduled, RankedTasks, Workers, in_rank_order_observed};
 use terrain::{
-    Dem, GainCurve, Importance, LatticePoint, Metres, ModuleGrid, PostRect, SeamSides, StopReason, THOUSANDTHS, TileId,
+    Dem, GainCurve, Importance, Metres, ModuleGrid, PostRect, SeamSides, StopReason, THOUSANDTHS, TileId,
     TileTin, Tin, Vertex,
 };
 use tiling::{Gains, Order, Tiling, points_equally, points_globally};
@@ -294,6 +294,7 @@ impl<'a> TinJob<'a> {
             kept: Vec::new(),
             start: Vec::new(),
             seams: SeamSides::from_fn(|side| seams.is_open(side) || outer.is_open(side)),
+            barred: Vec::new(),
             rule: self.rule.clone(),
             stop: Stop {
                 points,
@@ -466,11 +467,11 @@ fn join(rect: PostRect, tiles: &[TileTin]) -> Tin {
     if let [only] = tiles {
         return only.tin.clone();
     }
-    let mut joined = Tin { rect, vertices: Vec::new(), triangles: Vec::new() };
+    let mut joined = Tin::new(rect, Vec::new(), Vec::new());
     let mut on_lines = HashMap::new();
     for tile in tiles {
         let part = &tile.tin;
-        let (low, high) = (LatticePoint::from(part.rect.south_west()), LatticePoint::from(part.rect.north_east()));
+        let (low, high) = (part.place_of(part.rect.south_west()), part.place_of(part.rect.north_east()));
         let mut place = |vertex: &Vertex| {
             let at = vertex.at;
             let mut fresh = || {
