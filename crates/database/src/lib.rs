@@ -35,7 +35,7 @@ pub use measured_file::{Measured, MeasuredModule, MeasuredTally, decode_measured
 mod slm;
 /// Version of the load-module files.
 pub use load_module_reader::VERSION as MODULES_FORMAT_VERSION;
-pub use slm::{TileModules, decode_levels, decode_modules, encode_levels, encode_modules};
+pub use slm::{TileModules, decode_levels, decode_modules, encode_levels, encode_modules, load_module};
 mod json;
 mod page;
 pub use page::seal_page;
@@ -59,7 +59,7 @@ mod names;
 pub use names::files;
 mod database;
 mod read;
-pub use database::{Database, Previous};
+pub use database::Database;
 mod verify;
 pub use verify::Damage;
 

@@ -202,7 +202,8 @@ fn tile_of(header: &Header) -> TileModules {
     }
 }
 
-fn load_module(module: &Module, side: u16) -> LoadModule {
+/// A load module as the reader gives it, whose square has sides of `side` quanta.
+pub fn load_module(module: &Module, side: u16) -> LoadModule {
     let residual = &module.residual;
     LoadModule {
         id: ModuleId { row: module.row, col: module.col },

@@ -5,9 +5,9 @@
 
 use std::collections::BTreeMap;
 
-use terrain::{Features, LatticePoint, ModuleGrid, ModuleId, ModuleRect, Post};
+use terrain::{Features, LatticePoint, ModuleGrid, ModuleId, ModuleRect, POINT_COST, Post};
 
-use crate::{Allowance, Charged, ModuleLines, POINT_COST};
+use crate::{Allowance, Charged, ModuleLines};
 
 /// Triangles that features add to each load module, by load module.
 pub type FeatureCost = BTreeMap<ModuleId, u32>;

@@ -10,7 +10,7 @@ pub use windows::Windows;
 mod lines;
 pub use lines::{Charged, ModuleLines};
 mod ledger;
-pub use ledger::{Allowance, Ledger, POINT_COST};
+pub use ledger::{Allowance, Ledger};
 mod features;
 pub use features::{FeatureCost, ShortOf, Shortfall, feature_cost};
 mod tile_ledger;

@@ -10,7 +10,7 @@ use std::fmt::Display;
 use std::path::Path;
 use std::sync::Arc;
 
-use load_module_reader::{Area, Block, Ground, Keep, ReadError, Sight, TileFile, Vertex, open_file};
+use load_module_reader::{Area, Block, Keep, LoadedGround, ReadError, Sight, TileFile, Vertex, open_file};
 use memmap2::Mmap;
 
 /// `LMR_ALL`: the whole area.
@@ -26,7 +26,7 @@ const PLACES_MAX: usize = isize::MAX as usize / size_of::<[f64; 2]>();
 
 /// `lmr_frame`.
 #[repr(C)]
-pub struct Frame {
+pub struct AreaFrame {
     rows: u32,
     cols: u32,
     side_m: f64,
@@ -188,12 +188,12 @@ pub unsafe extern "C" fn lmr_close(area: *mut Area) {
 /// # Safety
 /// `area` is null or comes from `lmr_open`; `frame` is null or may be written.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn lmr_describe(area: *const Area, frame: *mut Frame) -> c_int {
+pub unsafe extern "C" fn lmr_describe(area: *const Area, frame: *mut AreaFrame) -> c_int {
     // SAFETY: the caller's word.
     let Some(area) = (unsafe { given(area) }) else { return 0 };
     let of = area.frame();
     let [east_m, north_m] = of.origin_m;
-    let told = Frame { rows: of.rows, cols: of.cols, side_m: of.side_m(), east_m, north_m };
+    let told = AreaFrame { rows: of.rows, cols: of.cols, side_m: of.side_m(), east_m, north_m };
     // SAFETY: the caller's word.
     unsafe { give(frame, told) }
 }
@@ -220,7 +220,7 @@ pub unsafe extern "C" fn lmr_load(
     reach: u32,
     why: *mut c_char,
     why_size: usize,
-) -> *mut Ground {
+) -> *mut LoadedGround {
     // SAFETY: the caller's word.
     unsafe { lmr_load_level(area, east_m, north_m, reach, 0, why, why_size) }
 }
@@ -238,7 +238,7 @@ pub unsafe extern "C" fn lmr_load_level(
     level: u32,
     why: *mut c_char,
     why_size: usize,
-) -> *mut Ground {
+) -> *mut LoadedGround {
     // SAFETY: the caller's word.
     let Some(area) = (unsafe { given(area) }) else {
         // SAFETY: the caller's word.
@@ -264,7 +264,7 @@ pub unsafe extern "C" fn lmr_load_level(
 /// `why` is null or `why_size` bytes that may be written.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn lmr_move(
-    ground: *mut Ground,
+    ground: *mut LoadedGround,
     area: *const Area,
     east_m: f64,
     north_m: f64,
@@ -301,7 +301,7 @@ pub unsafe extern "C" fn lmr_move(
 /// # Safety
 /// `ground` is null, or comes from `lmr_load` and is not used again.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn lmr_unload(ground: *mut Ground) {
+pub unsafe extern "C" fn lmr_unload(ground: *mut LoadedGround) {
     if !ground.is_null() {
         // SAFETY: it came from a box, and the caller gives it back.
         drop(unsafe { Box::from_raw(ground) });
@@ -313,7 +313,12 @@ pub unsafe extern "C" fn lmr_unload(ground: *mut Ground) {
 /// # Safety
 /// `ground` is null or comes from `lmr_load`; `height_m` is null or may be written.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn lmr_height(ground: *const Ground, east_m: f64, north_m: f64, height_m: *mut f64) -> c_int {
+pub unsafe extern "C" fn lmr_height(
+    ground: *const LoadedGround,
+    east_m: f64,
+    north_m: f64,
+    height_m: *mut f64,
+) -> c_int {
     // SAFETY: the caller's word.
     let found = unsafe { given(ground) }.and_then(|ground| ground.height_m([east_m, north_m]));
     // SAFETY: the caller's word.
@@ -325,7 +330,12 @@ pub unsafe extern "C" fn lmr_height(ground: *const Ground, east_m: f64, north_m:
 /// # Safety
 /// `ground` is null or comes from `lmr_load`; `sample` is null or may be written.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn lmr_sample_at(ground: *const Ground, east_m: f64, north_m: f64, sample: *mut Sample) -> c_int {
+pub unsafe extern "C" fn lmr_sample_at(
+    ground: *const LoadedGround,
+    east_m: f64,
+    north_m: f64,
+    sample: *mut Sample,
+) -> c_int {
     // SAFETY: the caller's word.
     let found = unsafe { given(ground) }.and_then(|ground| ground.sample([east_m, north_m]));
     let Some(found) = found else { return 0 };
@@ -341,7 +351,7 @@ pub unsafe extern "C" fn lmr_sample_at(ground: *const Ground, east_m: f64, north
 /// that may be written; the two do not overlap.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn lmr_heights(
-    ground: *const Ground,
+    ground: *const LoadedGround,
     places_m: *const [f64; 2],
     heights_m: *mut f64,
     count: usize,
@@ -369,7 +379,7 @@ pub unsafe extern "C" fn lmr_heights(
 /// may be written.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn lmr_sight(
-    ground: *const Ground,
+    ground: *const LoadedGround,
     from_m: *const [f64; 3],
     to_m: *const [f64; 3],
     share: *mut f64,
@@ -394,7 +404,7 @@ pub unsafe extern "C" fn lmr_sight(
 /// # Safety
 /// `ground` is null or comes from `lmr_load`.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn lmr_module_count(ground: *const Ground) -> usize {
+pub unsafe extern "C" fn lmr_module_count(ground: *const LoadedGround) -> usize {
     // SAFETY: the caller's word.
     unsafe { given(ground) }.map_or(0, |ground| ground.modules().len())
 }
@@ -405,7 +415,7 @@ pub unsafe extern "C" fn lmr_module_count(ground: *const Ground) -> usize {
 /// `ground` is null, or comes from `lmr_load` and is not moved while what is pointed to is used; `module` is null or
 /// may be written.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn lmr_module_at(ground: *const Ground, index: usize, module: *mut Module) -> c_int {
+pub unsafe extern "C" fn lmr_module_at(ground: *const LoadedGround, index: usize, module: *mut Module) -> c_int {
     // SAFETY: the caller's word.
     let Some(ground) = (unsafe { given(ground) }) else { return 0 };
     let Some(found) = ground.modules().get(index).map(|found| found.module()) else { return 0 };

@@ -1,10 +1,7 @@
 //! The index: where each load module lies, and what one needs to know before reading it.
 
 use crate::bytes::{Cursor, check_section};
-use crate::{FIXED_MODULE_BYTES, Header, ReadError, Section};
-
-/// Bytes of one entry of the index.
-pub const INDEX_ENTRY_BYTES: usize = 32;
+use crate::{FIXED_MODULE_BYTES, Header, INDEX_ENTRY_BYTES, ReadError, Section};
 
 /// Where one level of a load module lies in the file, and its size.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

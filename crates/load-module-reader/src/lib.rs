@@ -6,7 +6,8 @@
 //! what is returned is sound, and anything else is a [`ReadError`].
 //!
 //! [`Area`] opens all files of a database and reads only their headers and indexes. [`Area::load`] brings a [`Block`]
-//! of load modules into memory as [`Ground`], and [`Ground::moved`] follows the observer and reads only what is new.
+//! of load modules into memory as [`LoadedGround`], and [`LoadedGround::moved`] follows the observer and reads only
+//! what is new.
 //! A query takes constant expected time. [`SlmFile`] is the plain way to read one whole file.
 //! Where load modules have several levels of detail, all of this is about the finest, and [`Area::load_level`] brings
 //! in another.
@@ -57,26 +58,34 @@
 // A test that unwraps says by its line what failed.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+mod format;
+pub use format::{
+    FILE_BYTES_MAX, FIXED_HEADER_BYTES, FIXED_MODULE_BYTES, INDEX_ENTRY_BYTES, LEVELS_MAX, MAGIC, QUANTA_PER_METRE,
+    VERSION,
+};
 mod error;
 pub use error::{ReadError, Section};
 mod bytes;
 mod header;
-pub use header::{FIXED_HEADER_BYTES, Header, LEVELS_MAX, MAGIC, QUANTA_PER_METRE, VERSION};
+pub use header::Header;
 mod index;
-pub use index::{INDEX_ENTRY_BYTES, IndexEntry};
+pub use index::IndexEntry;
 mod module;
-pub use module::{FIXED_MODULE_BYTES, Module, Residual, Vertex};
-mod file;
-pub use file::{FILE_BYTES_MAX, SlmFile};
+pub use module::{Module, Residual, Vertex};
 mod tile_file;
 pub use tile_file::{Bytes, Keep, TileFile, open_file};
+mod file;
+pub use file::SlmFile;
 mod lookup;
 mod terrain_module;
 pub use terrain_module::{HOLE_CLASS, Sample, TerrainModule};
-mod ground;
-pub use ground::{Block, Ground, Sight};
+mod frame;
+pub use frame::{AreaFrame, Block};
+mod loaded_ground;
+pub use loaded_ground::{LoadedGround, Sight};
 mod area;
-pub use area::{Area, Frame};
+pub use area::Area;
+mod load;
 
 #[cfg(test)]
 mod sample;

@@ -1,10 +1,7 @@
 //! One load module: its section decoded, and every promise of the format checked.
 
 use crate::bytes::{Cursor, check_section};
-use crate::{Header, IndexEntry, QUANTA_PER_METRE, ReadError, Section};
-
-/// Bytes of a load module's section before its vertices.
-pub const FIXED_MODULE_BYTES: usize = 56;
+use crate::{FIXED_MODULE_BYTES, Header, IndexEntry, QUANTA_PER_METRE, ReadError, Section};
 
 /// A vertex, in quanta of 1/128 m from the load module's south-west corner. It lies in memory as C would have it.
 #[repr(C)]

@@ -3,11 +3,11 @@
 use crate::form::Form;
 use crate::patch::Patch;
 use crate::place::Place;
-use crate::sheet::Sheet;
+use crate::tile_mesh::TileMesh;
 
 /// Appends triangles that fill a simple counter-clockwise polygon, the best formed first; `false` where the polygon is
 /// not simple. Every simple polygon has two ears, so one is always found.
-pub(crate) fn fill_by_ears(sheet: &Sheet, polygon: &[u32], patch: &mut Patch) -> bool {
+pub(crate) fn fill_by_ears(sheet: &TileMesh, polygon: &[u32], patch: &mut Patch) -> bool {
     let mut left = polygon.to_vec();
     while 3 <= left.len() {
         let ears = (0..left.len()).filter_map(|i| Some((form_of_ear(sheet, &left, i)?, i)));
@@ -28,7 +28,7 @@ fn corners_of(polygon: &[u32], i: usize) -> [u32; 3] {
 
 /// Area by the square of the longest side, where corner `i` with its neighbours is a triangle that holds no other
 /// corner.
-fn form_of_ear(sheet: &Sheet, polygon: &[u32], i: usize) -> Option<f64> {
+fn form_of_ear(sheet: &TileMesh, polygon: &[u32], i: usize) -> Option<f64> {
     let corners = corners_of(polygon, i);
     let [a, b, c] = sheet.places(corners);
     let area = Place::orient(a, b, c);

@@ -4,12 +4,13 @@ use std::collections::BTreeMap;
 
 use limits::{Shortfall, feature_cost};
 use terrain::{
-    Dem, Features, Importance, LatticePoint, ModuleGrid, ModuleId, ModuleRect, Post, PostRect, Side, SideSpan, Tin,
+    Dem, Effort, Features, Importance, LatticePoint, ModuleGrid, ModuleId, ModuleRect, Post, PostRect, Side, SideSpan,
+    Tin,
 };
 
 use crate::feature_scene::{Draft, Draw, STEPS, crowded, missing, mixed};
 use crate::scene::{Caps, confined, even, free, grid, rough};
-use crate::{Budget, Effort, Optimised, Task, optimise};
+use crate::{Budget, Optimised, Task, optimise};
 
 const RECT: PostRect = PostRect { south: 0, west: 0, north: 60, east: 80 };
 const SIDE: i32 = 20;

@@ -7,7 +7,7 @@
 //! the budget first and thinned by what each vertex is truly worth.
 
 mod task;
-pub use task::{Budget, Effort, HeightFit, Lattice, Task};
+pub use task::{Budget, Task};
 mod optimise;
 pub use optimise::{Optimised, fill, optimise, overshoot};
 
@@ -17,7 +17,6 @@ mod ears;
 mod exchange;
 mod flips;
 mod form;
-mod ground;
 mod hold;
 mod insertion;
 mod moments;
@@ -27,11 +26,12 @@ mod place;
 mod queue;
 mod refit;
 mod removal;
-mod sheet;
 mod sweep;
 mod tenants;
 mod thin;
+mod tile_mesh;
 mod weave;
+mod weighted_heights;
 
 #[cfg(test)]
 mod feature_scene;

@@ -2,10 +2,10 @@
 
 use terrain::{Tin, Vertex as TinVertex};
 
-use crate::ground::Ground;
 use crate::hold::Hold;
 use crate::place::Place;
-use crate::sheet::{NONE, Vertex};
+use crate::tile_mesh::{NONE, Vertex};
+use crate::weighted_heights::WeightedHeights;
 
 /// Which vertices are held, and where lines run.
 pub(crate) struct Layout<'a> {
@@ -17,13 +17,13 @@ pub(crate) struct Layout<'a> {
 
 impl Layout<'_> {
     /// What lies on a line may only move along it.
-    pub fn line_hold(&self, ground: &Ground, at: Place) -> Hold {
+    pub fn line_hold(&self, ground: &WeightedHeights, at: Place) -> Hold {
         line_hold(ground, self.line_step, at)
     }
 }
 
 /// What lies on a line may only move along it.
-pub(crate) fn line_hold(ground: &Ground, line_step: Option<i32>, at: Place) -> Hold {
+pub(crate) fn line_hold(ground: &WeightedHeights, line_step: Option<i32>, at: Place) -> Hold {
     let far = ground.far();
     let is_line = |at: i32, far: i32| match line_step {
         Some(step) => at % step == 0,
@@ -45,7 +45,7 @@ pub(crate) struct Parts {
 
 impl Parts {
     /// Those of a TIN without features.
-    pub fn of(ground: &Ground, tin: &Tin, layout: &Layout) -> Self {
+    pub fn of(ground: &WeightedHeights, tin: &Tin, layout: &Layout) -> Self {
         let vertex = |vertex: &TinVertex| {
             let at = Place::of(vertex.at, tin.rect, tin.steps_per_post);
             let hold = layout.line_hold(ground, at).and((layout.hold)(at));

@@ -8,11 +8,11 @@ use geometry::Canonical;
 use mesh::constrained_delaunay;
 use terrain::{Features, LatticePoint, PostRect};
 
-use crate::ground::Ground;
 use crate::hold::Hold;
 use crate::parts::{Layout, Parts};
 use crate::place::{PER_POST, Place};
-use crate::sheet::{NONE, Vertex};
+use crate::tile_mesh::{NONE, Vertex};
+use crate::weighted_heights::WeightedHeights;
 
 /// Posts nearer to a feature than so many steps go.
 const NEAR: i32 = PER_POST / 2;
@@ -31,7 +31,7 @@ impl Canonical for Place {
 /// # Panics
 /// When a vertex of a feature lies outside the tile.
 pub(crate) fn weave(
-    ground: &Ground,
+    ground: &WeightedHeights,
     grown: Parts,
     features: &Features,
     rect: PostRect,

@@ -1,4 +1,4 @@
-//! Others' formats in: rasters of heights and classes, polygons; and GeoTIFF out.
+//! Others' formats in: rasters of heights and classes, polygons, roads and rivers; and GeoTIFF out.
 //!
 //! Rows are turned here, once: whatever the file's order, row 0 is the southern one from here on. A file is judged
 //! before anything is allocated for it: [`DemFile::open`] tells broken, unsupported and too large apart, and every
@@ -16,6 +16,9 @@ mod store;
 pub use crs::Crs;
 mod frame;
 pub use frame::{RasterFrame, SampleScale};
+mod geoid;
+mod void_posts;
+pub use geoid::{DatumShift, Geoid, plain_datum};
 mod chunk;
 pub use chunk::Chunk;
 mod directory;
@@ -36,12 +39,12 @@ pub use voids::{VoidPolicy, VoidSummary};
 mod resample;
 pub use resample::window_under;
 mod join;
+pub use join::Standing;
 mod mosaic;
 mod warp;
-pub use mosaic::{Mosaic, MosaicRules, MosaicVoids, Patch, Resampling, Standing, window_reaching};
-mod geoid;
-pub use geoid::{DatumShift, Geoid};
+pub use mosaic::{Mosaic, MosaicRules, MosaicVoids, Patch, window_reaching};
 mod chunk_cache;
+mod geoid_file;
 mod windows;
 pub use windows::{Look, Windows};
 mod wide;
@@ -52,7 +55,13 @@ mod geopackage;
 mod polygons;
 mod shapefile;
 pub use polygons::read_polygons;
+mod features;
+pub use features::{
+    BUILT_IN_KEYS, Extent, FeatureFile, Remark, Tags, VectorFeature, VectorShape, Vertices, Wanted, feature_layers,
+    is_feature_file, read_features,
+};
 mod given;
 pub use given::{GivenFeature, GivenShape, read_given};
+pub mod geotiff_parts;
 mod write;
 pub use write::{write_classes, write_heights};

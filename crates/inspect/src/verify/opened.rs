@@ -2,12 +2,12 @@
 
 use std::collections::BTreeMap;
 
-use database::{DatabaseError, Fingerprint, Folder};
+use database::{DatabaseError, Fingerprint, Folder, load_module};
 use job::Job;
 use load_module_reader::{Header, Module, SlmFile};
-use terrain::{HOLE_CLASS, LoadModule, ModuleId, ModuleResidual, ModuleVertex, TileId};
+use terrain::{HOLE_CLASS, TileId};
 
-use super::Modules;
+use super::modules::{Modules, at_level};
 use compiler::CompileError;
 use compiler::database_area;
 use ground::GamingArea;
@@ -86,23 +86,5 @@ fn unknown_class(module: &Module, count: usize) -> Option<String> {
     let triangle = module.classes.iter().position(is_unknown)?;
     let (row, col, class) = (module.row, module.col, module.classes[triangle]);
     let text = format!("load module {row},{col}: triangle {triangle} has class {class}, the job has {count}");
-    Some(super::at_level(usize::from(module.level), text))
-}
-
-fn load_module(module: &Module, side: u16) -> LoadModule {
-    let residual = &module.residual;
-    LoadModule {
-        id: ModuleId { row: module.row, col: module.col },
-        side,
-        vertices: module.vertices.iter().map(|v| ModuleVertex { y: v.y, x: v.x, z: v.z }).collect(),
-        triangles: module.triangles.clone(),
-        classes: module.classes.clone(),
-        polygon_count: module.polygon_count,
-        residual: ModuleResidual {
-            posts: residual.posts,
-            largest: residual.largest,
-            sum_abs: residual.sum_abs,
-            sum_squared: residual.sum_squared,
-        },
-    }
+    Some(at_level(usize::from(module.level), text))
 }

@@ -10,13 +10,13 @@ use database::{Folder, Manifest, Stamp};
 use job::{Borders, ClipHeights as JobClipHeights, Edges, Job, OuterBorder};
 use load_modules::{ClipHeights, Layout, clip};
 use terrain::{
-    Importance, LatticePoint, LoadModule, ModuleId, ModuleVertex, RefusedBy, StopReason, TileId,
-    TileTin, Vertex,
+    Importance, LatticePoint, LoadModule, ModuleId, ModuleVertex, RefusedBy, StopReason, TileId, TileTin, Vertex,
 };
 
-use super::Modules;
 use compiler::CompileError;
 use ground::GamingArea;
+
+use super::modules::Modules;
 
 /// What the TINs of an area add up to.
 #[derive(Default)]

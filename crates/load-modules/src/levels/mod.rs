@@ -8,18 +8,19 @@
 
 mod fit;
 mod flip;
+mod level_mesh;
 mod posts;
 mod rank;
-mod sheet;
 mod sides;
 #[cfg(test)]
 mod tests;
 
-use terrain::{Dem, Importance, LoadModule, ModuleResidual, ModuleVertex, Side};
+use terrain::{Importance, LoadModule, LodBorder, ModuleResidual, ModuleVertex, Side};
 
 use crate::{Layout, classes, pieces};
+use level_mesh::{LevelMesh, is_inside};
+pub use posts::LevelGround;
 use posts::Posts;
-use sheet::Sheet;
 
 /// Which levels a load module gets beside the finest.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,7 +28,7 @@ pub struct Levels<'a> {
     /// For each, the share of the finest level's inner vertices that it keeps; falling, between 0 and 1.
     pub inner_shares: &'a [f64],
     /// What becomes of the vertices on the sides.
-    pub sides: LevelSides,
+    pub border: LodBorder,
     /// Whether edges leave Delaunay where the other diagonal has smaller squared residuals.
     pub flips: bool,
     /// What each level keeps of the features, as long as `inner_shares`, or nothing at all; a coarser one keeps no more
@@ -51,24 +52,6 @@ impl LevelFeatures {
     }
 }
 
-/// What becomes of the vertices on the sides.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LevelSides {
-    /// All of them stay.
-    Full,
-    /// Each side keeps its share, its ends always.
-    Own,
-}
-
-/// What levels are fitted to.
-#[derive(Clone, Copy, Debug)]
-pub struct LevelGround<'a> {
-    /// Heights at all posts of the load module; voids count nothing.
-    pub dem: &'a Dem,
-    /// Weights and classes of the same posts.
-    pub mask: &'a Importance,
-}
-
 /// The levels of a load module, one for each share, from fine to coarse. Residuals are left empty.
 ///
 /// # Panics
@@ -88,7 +71,7 @@ pub fn coarser_levels(finest: &LoadModule, layout: &Layout, levels: &Levels, gro
     let level = |level: usize| {
         let mut stays = vec![true; finest.vertices.len()];
         gone[..inner.len() - kept[level]].iter().for_each(|&v| stays[usize::from(v)] = false);
-        if levels.sides == LevelSides::Own {
+        if levels.border == LodBorder::Own {
             sides.thin(levels.inner_shares[level], &mut stays);
         }
         features(level).all_vertices().for_each(|v| stays[usize::from(v)] = true);
@@ -103,12 +86,8 @@ fn share_of(count: usize, share: f64) -> usize {
     (count as f64 * share).round() as usize
 }
 
-fn is_inside(vertex: ModuleVertex, side: u16) -> bool {
-    0 < vertex.x && vertex.x < side && 0 < vertex.y && vertex.y < side
-}
-
 /// The vertices that stay triangulated, those inside at fitted heights unless they belong to features.
-fn fitted(finest: &LoadModule, stays: &[bool], features: &LevelFeatures, flips: bool, posts: &Posts) -> Sheet {
+fn fitted(finest: &LoadModule, stays: &[bool], features: &LevelFeatures, flips: bool, posts: &Posts) -> LevelMesh {
     /// Flips ask for other heights, and these for other flips; a third round hardly changes anything.
     const ROUNDS: usize = 2;
     let staying: Vec<usize> = (0..stays.len()).filter(|&v| stays[v]).collect();
@@ -117,7 +96,7 @@ fn fitted(finest: &LoadModule, stays: &[bool], features: &LevelFeatures, flips: 
     let edges: Vec<[u16; 2]> = features.edges.iter().map(|ends| ends.map(number)).collect();
     let mut is_free: Vec<bool> = vertices.iter().map(|&vertex| is_inside(vertex, finest.side)).collect();
     features.all_vertices().for_each(|v| is_free[usize::from(number(v))] = false);
-    let mut sheet = Sheet::keeping(vertices, &edges, posts);
+    let mut sheet = LevelMesh::keeping(vertices, &edges, posts);
     fit::fit_heights(&mut sheet, &is_free, posts);
     for _ in 0..ROUNDS {
         if !flips || flip::flip_all(&mut sheet, posts) == 0 {
@@ -129,7 +108,7 @@ fn fitted(finest: &LoadModule, stays: &[bool], features: &LevelFeatures, flips: 
 }
 
 /// The load module that a sheet is.
-fn load_module(finest: &LoadModule, sheet: Sheet, layout: &Layout, mask: &Importance) -> LoadModule {
+fn load_module(finest: &LoadModule, sheet: LevelMesh, layout: &Layout, mask: &Importance) -> LoadModule {
     let (vertices, triangles) = sheet.into_lists();
     let mut module = LoadModule {
         id: finest.id,

@@ -1,0 +1,18 @@
+//! The numbers of the format: what a file begins with, how long its parts are, and what it may hold at most.
+
+/// The first eight bytes of every load-module file; a transfer as text damages them.
+pub const MAGIC: [u8; 8] = *b"\x89SLM\r\n\x1a\n";
+/// The version of the format that this crate reads.
+pub const VERSION: u16 = 1;
+/// Levels of detail in a file at most.
+pub const LEVELS_MAX: u16 = 8;
+/// Quanta in a metre, of coordinates and heights alike.
+pub const QUANTA_PER_METRE: u32 = 128;
+/// Bytes of the header before its texts.
+pub const FIXED_HEADER_BYTES: usize = 124;
+/// Bytes of one entry of the index.
+pub const INDEX_ENTRY_BYTES: usize = 32;
+/// Bytes of a load module's section before its vertices.
+pub const FIXED_MODULE_BYTES: usize = 56;
+/// Bytes of the longest file that is read: far above any tile, and small enough to hold in memory.
+pub const FILE_BYTES_MAX: u64 = 1 << 30;

@@ -1,0 +1,274 @@
+//! Load modules held in memory around an observer: heights, normals, classes, lines of sight.
+
+use std::sync::Arc;
+
+use crate::lookup::{Lookup, STEPS};
+use crate::{AreaFrame, Block, QUANTA_PER_METRE, Sample, TerrainModule};
+
+/// A block of load modules, loaded. It holds no file open and may be asked from many threads.
+#[derive(Clone, Debug)]
+pub struct LoadedGround {
+    frame: AreaFrame,
+    level: u16,
+    block: Block,
+    /// Row by row from the south-west.
+    modules: Vec<Arc<TerrainModule>>,
+    /// What finds their triangles, side by side so that a query reads it at once.
+    lookups: Vec<Lookup>,
+    /// Steps of 1/4096 of a quantum along the side of a load module.
+    side_steps: i64,
+}
+
+/// What stands between two places.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Sight {
+    /// Nothing does.
+    Free,
+    /// The ground does, for the first time so far along the line: 0 at its beginning, 1 at its end.
+    Hidden(f64),
+    /// The line leaves what is loaded, and nothing stands in its way before.
+    Unknown,
+}
+
+impl LoadedGround {
+    /// Nothing loaded yet.
+    pub(crate) fn empty(frame: AreaFrame, level: u16) -> Self {
+        let side_steps = i64::from(frame.side) * STEPS;
+        let block = Block { south: 0, west: 0, north: 0, east: 0 };
+        Self { frame, level, block, modules: Vec::new(), lookups: Vec::new(), side_steps }
+    }
+
+    /// The level of detail that is loaded; 0 is the finest.
+    pub fn level(&self) -> u16 {
+        self.level
+    }
+
+    /// The block that is loaded.
+    pub fn block(&self) -> Block {
+        self.block
+    }
+
+    /// Where load modules lie.
+    pub fn frame(&self) -> &AreaFrame {
+        &self.frame
+    }
+
+    /// The load modules, row by row from the south-west.
+    pub fn modules(&self) -> &[Arc<TerrainModule>] {
+        &self.modules
+    }
+
+    /// The load module at (`row`, `col`) of the area, if it is loaded.
+    pub fn module(&self, row: u32, col: u32) -> Option<&TerrainModule> {
+        self.block.contains(row, col).then(|| &*self.modules[self.block.index(row, col)])
+    }
+
+    /// Another block, with its load modules.
+    pub(crate) fn with_modules(self, block: Block, modules: Vec<Arc<TerrainModule>>) -> Self {
+        let lookups = modules.iter().map(|module| module.lookup().clone()).collect();
+        Self { block, modules, lookups, ..self }
+    }
+
+    /// The load module under a place, by its place in `modules`, and the place in it in steps. The far sides of the
+    /// area belong to it.
+    #[inline]
+    fn locate(&self, [east_m, north_m]: [f64; 2]) -> Option<(usize, [i64; 2])> {
+        let (col, x) = self.steps(east_m - self.frame.origin_m[0], self.frame.cols)?;
+        let (row, y) = self.steps(north_m - self.frame.origin_m[1], self.frame.rows)?;
+        self.block.contains(row, col).then(|| (self.block.index(row, col), [x, y]))
+    }
+
+    /// The row or column of load modules at a distance from the area's side, and the steps from there.
+    #[inline]
+    fn steps(&self, metres: f64, count: u32) -> Option<(u32, i64)> {
+        let steps = metres * (f64::from(QUANTA_PER_METRE) * STEPS as f64) + 0.5;
+        let end = self.side_steps * i64::from(count);
+        // Far outside, or not a number: nowhere.
+        if !(0.0 <= steps && steps < end as f64 + 1.0) {
+            return None;
+        }
+        let steps = steps as i64;
+        // A quotient of floats may be off by one at a line; either load module has the line.
+        let index = ((steps as f64 / self.side_steps as f64) as i64).min(i64::from(count) - 1);
+        Some((index as u32, (steps - index * self.side_steps).clamp(0, self.side_steps)))
+    }
+
+    /// Height of the ground at an easting and northing, in metres above the vertical datum; `None` where nothing is
+    /// loaded.
+    #[inline]
+    pub fn height_m(&self, place_m: [f64; 2]) -> Option<f64> {
+        let (index, place) = self.locate(place_m)?;
+        self.lookups[index].height_m(place)
+    }
+
+    /// Heights at many places at once, in `heights_m`, NaN where nothing is loaded: what [`LoadedGround::height_m`]
+    /// gives for each, but faster for places far apart, because memory is asked for several of them before the first is
+    /// needed.
+    ///
+    /// # Panics
+    /// When the two lists differ in length.
+    pub fn heights_m(&self, places_m: &[[f64; 2]], heights_m: &mut [f64]) {
+        const AT_ONCE: usize = 32;
+        assert_eq!(places_m.len(), heights_m.len(), "one height for each place");
+        for (places, heights) in places_m.chunks(AT_ONCE).zip(heights_m.chunks_mut(AT_ONCE)) {
+            let mut located = [None; AT_ONCE];
+            places.iter().zip(&mut located).for_each(|(&place, located)| *located = self.locate(place));
+            let mut lists: [&[u32]; AT_ONCE] = [&[]; AT_ONCE];
+            for (list, located) in lists.iter_mut().zip(&located) {
+                if let Some((index, place)) = *located {
+                    *list = self.lookups[index].list(place);
+                }
+            }
+            // Asks for the memory of all lists before the first is searched.
+            let touched = lists.iter().map(|list| list.get(list.len() / 2).copied().unwrap_or(0));
+            std::hint::black_box(touched.fold(0, std::ops::BitXor::bitxor));
+            for ((height, list), located) in heights.iter_mut().zip(lists).zip(located) {
+                *height = located.and_then(|(_, place)| Lookup::height_in(list, place)).unwrap_or(f64::NAN);
+            }
+        }
+    }
+
+    /// Height, normal and class of the ground at an easting and northing; `None` where nothing is loaded. On an edge
+    /// it is that of one of the triangles beside it.
+    pub fn sample(&self, place_m: [f64; 2]) -> Option<Sample> {
+        let (index, place) = self.locate(place_m)?;
+        self.modules[index].sample(place)
+    }
+
+    /// Whether the ground stands between two places, each an easting, a northing and a height above the vertical
+    /// datum. What only touches the line does not hide it; an end below the ground is hidden. It is unknown where a
+    /// coordinate is not finite, or lies further than 1e12 m from the area's south-west corner or from height 0, where
+    /// no ground can be. It takes at most as many steps as load modules are crossed.
+    pub fn sight(&self, from_m: [f64; 3], to_m: [f64; 3]) -> Sight {
+        if self.is_beyond_any_ground(from_m) || self.is_beyond_any_ground(to_m) {
+            return Sight::Unknown;
+        }
+        if self.is_below(from_m) {
+            return Sight::Hidden(0.0);
+        }
+        let quanta = |place: [f64; 3]| {
+            let metre = f64::from(QUANTA_PER_METRE);
+            let (east, north) = (place[0] - self.frame.origin_m[0], place[1] - self.frame.origin_m[1]);
+            [east * metre, north * metre, place[2] * metre]
+        };
+        let (from, to) = (quanta(from_m), quanta(to_m));
+        let side = f64::from(self.frame.side);
+        let (mut nearest, mut left_at) = (f64::INFINITY, f64::INFINITY);
+        for [row, col] in self.modules_along(from, to) {
+            let corner = [col as f64 * side, row as f64 * side];
+            let inside = |index: i64| u32::try_from(index).ok();
+            let loaded = inside(row).zip(inside(col)).and_then(|(row, col)| self.module(row, col));
+            match loaded {
+                Some(module) => nearest = nearest.min(hidden_at(module.lookup(), self.frame.side, corner, from, to)),
+                None => left_at = entered_at(corner, side, from, to),
+            }
+            // What comes later lies further along the line; what is not loaded ends the walk whatever rounding says.
+            if nearest.is_finite() || loaded.is_none() {
+                break;
+            }
+        }
+        match (nearest <= left_at && nearest.is_finite(), left_at.is_finite()) {
+            (true, _) => Sight::Hidden(nearest),
+            (false, true) => Sight::Unknown,
+            (false, false) if self.is_below(to_m) => Sight::Hidden(1.0),
+            (false, false) => Sight::Free,
+        }
+    }
+
+    /// Whether a place is so far away, or no place at all, that nothing can be said of lines to it.
+    fn is_beyond_any_ground(&self, place_m: [f64; 3]) -> bool {
+        // Areas are at most 2^30 cells a side, of at most 512 m: 5.5e11 m.
+        const FAR_M: f64 = 1e12;
+        let [east, north] = self.frame.origin_m;
+        let distances = [place_m[0] - east, place_m[1] - north, place_m[2]];
+        !distances.iter().all(|distance| distance.abs() <= FAR_M)
+    }
+
+    /// Whether a place lies below the ground, by more than rounding.
+    fn is_below(&self, place_m: [f64; 3]) -> bool {
+        const ROUNDING_M: f64 = 1e-6;
+        self.height_m([place_m[0], place_m[1]]).is_some_and(|height_m| place_m[2] + ROUNDING_M < height_m)
+    }
+
+    /// Rows and columns of the load modules under a line in quanta, from its beginning, where nothing else is between.
+    fn modules_along(&self, from: [f64; 3], to: [f64; 3]) -> impl Iterator<Item = [i64; 2]> {
+        let side = f64::from(self.frame.side);
+        let last = [i64::from(self.frame.cols) - 1, i64::from(self.frame.rows) - 1];
+        // The far sides of the area belong to it.
+        let index = |quanta: f64, axis: usize| {
+            let index = (quanta / side).floor() as i64;
+            if quanta == (last[axis] + 1) as f64 * side { last[axis] } else { index }
+        };
+        let mut at = [index(from[0], 0), index(from[1], 1)];
+        let end = [index(to[0], 0), index(to[1], 1)];
+        let step = [0, 1].map(|axis| (end[axis] - at[axis]).signum());
+        let mut left = [0, 1].map(|axis| (end[axis] - at[axis]).unsigned_abs());
+        let mut is_first = true;
+        std::iter::from_fn(move || {
+            if std::mem::take(&mut is_first) {
+                return Some([at[1], at[0]]);
+            }
+            if left == [0, 0] {
+                return None;
+            }
+            // Share of the line at which the next line of load modules is crossed, east or west and north or south.
+            let crossing = |axis: usize| {
+                let line = if 0 < step[axis] { at[axis] + 1 } else { at[axis] };
+                (line as f64 * side - from[axis]) / (to[axis] - from[axis])
+            };
+            let axis = match (left[0], left[1]) {
+                (0, _) => 1,
+                (_, 0) => 0,
+                _ => usize::from(crossing(1) < crossing(0)),
+            };
+            at[axis] += step[axis];
+            left[axis] -= 1;
+            Some([at[1], at[0]])
+        })
+    }
+}
+
+/// Where along a line the triangles of a load module first rise above it; infinity when they do not.
+fn hidden_at(lookup: &Lookup, side: u16, corner: [f64; 2], from: [f64; 3], to: [f64; 3]) -> f64 {
+    let local = |place: [f64; 3]| [place[0] - corner[0], place[1] - corner[1]];
+    let (start, end) = (local(from), local(to));
+    let along = [end[0] - start[0], end[1] - start[1]];
+    let length_squared = along[0] * along[0] + along[1] * along[1];
+    let mut nearest = f64::INFINITY;
+    if length_squared == 0.0 {
+        return nearest;
+    }
+    // Between two edges the ground is straight, so it is enough to look where an edge is crossed.
+    lookup.edges_along(side, start, end, |edge| {
+        let edge = edge.map(|place| place.map(f64::from));
+        let seen = edge.map(|place| {
+            let (dx, dy) = (place[0] - start[0], place[1] - start[1]);
+            (along[0] * dy - along[1] * dx, along[0] * dx + along[1] * dy)
+        });
+        let [(left_a, ahead_a), (left_b, ahead_b)] = seen;
+        if (0.0 < left_a) == (0.0 < left_b) && (left_a < 0.0) == (left_b < 0.0) || left_a == left_b {
+            return;
+        }
+        let share = left_a / (left_a - left_b);
+        let at = (ahead_a + share * (ahead_b - ahead_a)) / length_squared;
+        let height = edge[0][2] + share * (edge[1][2] - edge[0][2]);
+        if (0.0..=1.0).contains(&at) && from[2] + at * (to[2] - from[2]) < height {
+            nearest = nearest.min(at);
+        }
+    });
+    nearest
+}
+
+/// Where along a line a load module is entered.
+fn entered_at(corner: [f64; 2], side: f64, from: [f64; 3], to: [f64; 3]) -> f64 {
+    let enters = |axis: usize| {
+        let (low, high) = (corner[axis], corner[axis] + side);
+        match from[axis] {
+            at if at < low => (low - at) / (to[axis] - at),
+            at if high < at => (high - at) / (to[axis] - at),
+            _ => 0.0,
+        }
+    };
+    // The larger of two numbers one of which is not a number is the other.
+    enters(0).max(enters(1)).clamp(0.0, 1.0)
+}

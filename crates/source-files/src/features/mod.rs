@@ -1,0 +1,48 @@
+//! Roads, rivers, lakes and other lines and polygons: from OpenStreetMap data, GeoPackages, Shapefiles and GeoJSON,
+//! in metres of the area's system.
+//!
+//! Features are read as they are: nothing is mended here. They are cut at the bounds that the caller names, one load
+//! module beyond the area, so that memory is bounded by what lies in the area; inside, every vertex of the file is
+//! kept, so what meets in the file meets here. What cannot be read is left out and told, feature by feature; only a
+//! file that cannot be read at all is an error.
+
+mod clip;
+mod columns;
+mod formats;
+mod json;
+mod model;
+mod nest;
+pub(crate) mod osm;
+mod packages;
+mod placing;
+pub(crate) mod raw;
+mod shapes;
+pub(crate) mod well_known;
+
+pub use clip::Extent;
+pub use formats::{feature_layers, is_feature_file};
+pub use model::{BUILT_IN_KEYS, FeatureFile, Remark, Tags, VectorFeature, VectorShape, Vertices, Wanted};
+
+use std::path::Path;
+
+use crate::SourceError;
+use formats::Format;
+
+/// Reads the lines and polygons of the file at `path` that lie inside the bounds.
+///
+/// # Errors
+/// When it is none of the formats, is broken, too large, or in a coordinate system that cannot be brought to the
+/// area's, or when it has several layers and none is named. Features that cannot be used are no error.
+pub fn read_features(path: &Path, wanted: &Wanted) -> Result<FeatureFile, SourceError> {
+    let (store, format) = formats::open(path)?;
+    if let (Some(layer), true) = (wanted.layer, format != Format::GeoPackage) {
+        let (found, expected) = (format!("the layer `{layer}` named"), "no layer: only GeoPackages have some".into());
+        return Err(SourceError::Layer { path: path.into(), found, expected });
+    }
+    match format {
+        Format::OpenStreetMap => osm::read(&store, wanted),
+        Format::GeoPackage => packages::read(path, wanted),
+        Format::Shapefile => shapes::read(&store, wanted),
+        Format::GeoJson => json::read(&store, wanted),
+    }
+}

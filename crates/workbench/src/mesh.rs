@@ -1,0 +1,482 @@
+//! Without load modules: just a mesh from a raster, on the raster's own posts or on those it is resampled to.
+
+use std::collections::HashMap;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, OnceLock};
+
+use compiler::{CompileError, Event, Most, Progress, Refinement, Stage, inherited, posts_of};
+use database::ReportResidual;
+use fidelity::Tally;
+use geometry::WORKING_POSTS_MAX;
+use ground::{GivenPost, GroundError, Window, chosen, posts_of_file, refused, start_posts};
+use job::{ErrorKey, Optimising, StartMethod};
+use schedule::{Event as Scheduled, RankedTasks, Workers, in_rank_order_observed};
+use terrain::{
+    Dem, GainCurve, Importance, LastBatch, Metres, ModuleGrid, PostRect, SeamSides, StopReason, THOUSANDTHS, TileId,
+    TileOrder, TileTin, Tin, Vertex,
+};
+use tiling::{Gains, Tiling, points_equally, points_globally};
+use tin::{CostUnit, Proximity, Rule, Stop, SurveyTask, TileTask};
+
+use crate::heights::Heights;
+use crate::tally::tally_of;
+
+/// The paper's proximity test: metres across, metres in height.
+const PROXIMITY_M: (f64, u32) = (300.0, 20);
+
+/// Which post comes next.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TinMethod {
+    /// The best of ours.
+    Optimised(Optimising),
+    /// The founding paper's passes.
+    Paper,
+    /// One post at a time: the worst of all, or the worst of the triangle with the largest sum of squares.
+    Greedy {
+        /// Which of the two.
+        key: ErrorKey,
+    },
+}
+
+/// What a mesh starts from beside the corners of its tiles.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum TinStart {
+    /// So many points of a method in all.
+    Method(StartMethod, usize),
+    /// The points of a file; those with a height are fixed at it.
+    File(PathBuf),
+}
+
+/// A mesh to make from a raster.
+#[derive(Clone, Debug)]
+pub struct TinRequest {
+    /// The raster.
+    pub dem: PathBuf,
+    /// Which post comes next.
+    pub method: TinMethod,
+    /// Vertices at most, corners included.
+    pub points: Option<usize>,
+    /// Triangles at most; of the optimised method, and instead of `points`.
+    pub triangles: Option<usize>,
+    /// Largest residual to accept, in metres.
+    pub max_residual_m: Option<f64>,
+    /// RMS residual to reach, in metres.
+    pub rms_m: Option<f64>,
+    /// What tiles start from beside their corners.
+    pub start: Option<TinStart>,
+    /// Rows and columns of tiles.
+    pub tiles: (u32, u32),
+    /// Tiles at once.
+    pub workers: usize,
+}
+
+/// A mesh and where it lies.
+#[derive(Clone, Debug)]
+pub struct Mesh {
+    /// Vertices and triangles; rows and columns are those of the posts, from the south-west one.
+    pub tin: Tin,
+    /// The raster's heights, resampled where its own posts are not square ones in metres.
+    pub dem: Arc<Dem>,
+    /// Easting of post (0, 0), in metres.
+    pub east_m: f64,
+    /// Northing of post (0, 0), in metres.
+    pub north_m: f64,
+    /// Metres between posts, to the east and to the north.
+    pub spacing_m: (f64, f64),
+    /// EPSG code of its coordinate reference system.
+    pub epsg: Option<u32>,
+    /// Against every one of those posts.
+    pub residual: ReportResidual,
+    /// Vertices.
+    pub points: usize,
+    /// Why selection ended: that of the tile that stopped for want of posts, if any did.
+    pub stop: StopReason,
+}
+
+/// Makes a mesh from a raster, untiled or in tiles with matching borders.
+///
+/// # Errors
+/// When the raster cannot be used, or nothing says when to stop.
+pub fn tin(request: &TinRequest, stop: &AtomicBool, progress: &mut dyn Progress) -> Result<Mesh, CompileError> {
+    let heights = Heights::read(&request.dem, request.workers, stop, progress)?;
+    let tiles = heights.refine(request, stop, progress)?;
+    progress.tell(Event::Enter(Stage::Assemble, 0));
+    let exhausted = tiles.iter().any(|tile| tile.stop == StopReason::Exhausted);
+    let stop = if exhausted { StopReason::Exhausted } else { tiles[0].stop };
+    let mesh = heights.mesh(join(heights.dem.rect(), &tiles), stop);
+    progress.tell(Event::Leave(Stage::Assemble));
+    Ok(mesh)
+}
+
+impl Heights {
+    /// The tiles of a request over these heights.
+    pub fn refine(
+        &self,
+        request: &TinRequest,
+        stop: &AtomicBool,
+        progress: &mut dyn Progress,
+    ) -> Result<Vec<TileTin>, CompileError> {
+        let workers = Workers::new(request.workers);
+        let mut job = TinJob::new(request, &self.dem, self.frame.spacing)?;
+        if let Some(TinStart::File(path)) = &request.start {
+            job.given = posts_of_file(path, &self.frame, self.dem.rect())?;
+            job.refuse_given()?;
+        }
+        let curves = job.survey(&self.dem, &workers, stop, progress)?;
+        job.refine(&self.dem, curves, &workers, stop, progress)
+    }
+
+    /// A TIN over them as a mesh.
+    pub fn mesh(&self, tin: Tin, stop: StopReason) -> Mesh {
+        Mesh {
+            points: tin.vertices.len(),
+            residual: compiler::residual_of(&tally_of(&self.dem, &tin)),
+            tin,
+            dem: Arc::clone(&self.dem),
+            east_m: self.frame.south_west[0],
+            north_m: self.frame.south_west[1],
+            spacing_m: (self.frame.spacing[0], self.frame.spacing[1]),
+            epsg: self.frame.crs.epsg(),
+            stop,
+        }
+    }
+}
+
+/// The TIN of one tile without load modules, over all of `dem`.
+///
+/// # Errors
+/// When the request does not fit the ground.
+pub(crate) fn untiled(request: &TinRequest, dem: &Dem, spacing_m: [f64; 2]) -> Result<TileTin, CompileError> {
+    let job = TinJob::new(request, dem, spacing_m)?;
+    let tile = job.tiles[0];
+    let task = job.task(tile, SeamSides::CLOSED, Vec::new(), job.points().map(|points| points as usize));
+    job.refined(task, dem.clone(), &[])
+}
+
+/// The residuals of the optimised method on several grounds that share a number of triangles by one threshold of gain;
+/// `None` where there are none.
+///
+/// # Errors
+/// When the grounds are too small or too large.
+pub(crate) fn untiled_together(
+    grounds: &[Dem],
+    triangles: usize,
+    spacing_m: f64,
+    stop: &AtomicBool,
+) -> Result<Option<Tally>, CompileError> {
+    let request = |triangles: usize| TinRequest {
+        dem: PathBuf::new(),
+        method: TinMethod::Optimised(Optimising::default()),
+        points: None,
+        triangles: Some(triangles),
+        max_residual_m: None,
+        rms_m: None,
+        start: None,
+        tiles: (1, 1),
+        workers: 1,
+    };
+    // Two are there before any point, and a point makes two more.
+    let points = triangles.saturating_sub(2 * grounds.len()) / 2;
+    let reach = 4 * points / grounds.len().max(1) + 1;
+    let survey = |dem: &Dem| {
+        let request = request(triangles);
+        let job = TinJob::new(&request, dem, [spacing_m; 2])?;
+        Ok(job.curve(dem, job.tiles[0], reach))
+    };
+    let curves = grounds.iter().map(survey).collect::<Result<Vec<_>, CompileError>>()?;
+    let by_rank: Vec<usize> = (0..grounds.len()).collect();
+    let gains = Gains { bands: &mut std::iter::once(curves), by_rank: &by_rank, floor: None };
+    let shares = points_globally(points as u64, gains);
+    let mut all: Option<Tally> = None;
+    for (dem, share) in grounds.iter().zip(shares) {
+        if stop.load(Ordering::Relaxed) {
+            return Err(CompileError::Stopped { stage: Stage::Survey, done: 0, total: grounds.len() });
+        }
+        let tin = untiled(&request(2 * share + 2), dem, [spacing_m; 2])?.tin;
+        all.get_or_insert_default().merge(&tally_of(dem, &tin));
+    }
+    Ok(all)
+}
+
+/// A request, checked against its raster.
+struct TinJob<'a> {
+    request: &'a TinRequest,
+    tiling: Tiling,
+    tiles: Vec<TileId>,
+    spacing: Metres,
+    rule: Rule,
+    value: Option<u64>,
+    /// Points of a file to start from.
+    given: Vec<GivenPost>,
+}
+
+impl<'a> TinJob<'a> {
+    fn new(request: &'a TinRequest, dem: &Dem, spacing_m: [f64; 2]) -> Result<Self, CompileError> {
+        let rect = dem.rect();
+        let (rows, cols) = request.tiles;
+        let longest =
+            (rect.cells_high().div_ceil(rows.max(1) as usize)).max(rect.cells_wide().div_ceil(cols.max(1) as usize));
+        refuse(request, rect, longest)?;
+        let tiling = Tiling::new(rect, 1, rows, cols, TileOrder::Color);
+        let quantum = if request.method == TinMethod::Paper { terrain::QUANTA_PER_METRE as u32 } else { 1 };
+        let units = |metres: f64| (metres * f64::from(terrain::QUANTA_PER_METRE) / f64::from(quantum)).floor() as u64;
+        let value = request.max_residual_m.map(|metres| u64::from(THOUSANDTHS) * units(metres));
+        let rule = match request.method {
+            TinMethod::Greedy { key: ErrorKey::Max } => Rule::WorstFirst,
+            // A residual to reach is reached by worst posts; sums of squares alone would go past it.
+            TinMethod::Optimised(_) | TinMethod::Greedy { key: ErrorKey::Sse }
+                if value.is_some() && request.points.is_none() && request.triangles.is_none() =>
+            {
+                Rule::WorstFirst
+            }
+            TinMethod::Optimised(_) | TinMethod::Greedy { key: ErrorKey::Sse } => Rule::LargestSquares { guard: value },
+            TinMethod::Paper => Rule::Batches {
+                residual_quantum: quantum,
+                proximity: Some(Proximity {
+                    posts: PROXIMITY_M.0 / spacing_m[0],
+                    quanta: PROXIMITY_M.1 * terrain::QUANTA_PER_METRE as u32,
+                }),
+                last_batch: LastBatch::Truncate,
+            },
+        };
+        let tiles = tiling.tiles().collect();
+        Ok(Self { request, tiling, tiles, spacing: Metres(spacing_m[0]), rule, value, given: Vec::new() })
+    }
+
+    /// Refuses more points to start from than there may be.
+    fn refuse_given(&self) -> Result<(), CompileError> {
+        match self.points() {
+            Some(points) if (points as usize) < self.given.len() => Err(GroundError::Impossible {
+                key: "--start".into(),
+                found: format!("{} points", self.given.len()),
+                expected: format!("at most {points}, those asked for but for the corners of tiles"),
+                hint: "ask for more --points, or start from fewer".into(),
+            }
+            .into()),
+            _ => Ok(()),
+        }
+    }
+
+    /// Points to select in all: those asked for less the corners of tiles.
+    fn points(&self) -> Option<u64> {
+        let corners = u64::from(self.tiling.rows() + 1) * u64::from(self.tiling.cols() + 1);
+        let start = 2 * self.tiles.len();
+        // No point makes more than two triangles, in its tile or on both sides of a line.
+        let triangles = self.request.triangles.map(|triangles| (triangles.saturating_sub(start) / 2) as u64);
+        self.request.points.map(|points| (points as u64).saturating_sub(corners)).or(triangles)
+    }
+
+    /// What is to be done for a tile; optimised where it is grown by squares and the method says so.
+    fn refinement(&self, task: TileTask) -> Refinement {
+        let optimising = match (self.request.method, &task.rule) {
+            (TinMethod::Optimised(optimising), Rule::LargestSquares { .. }) => Some(optimising),
+            _ => None,
+        };
+        // Alone, a tile's border makes one triangle a point, and the number asked for is met exactly.
+        let most = match self.request.triangles {
+            Some(triangles) if self.tiles.len() == 1 => Most::Triangles(triangles),
+            _ => Most::AsTask,
+        };
+        Refinement { task, optimising, most }
+    }
+
+    fn task(&self, tile: TileId, seams: SeamSides, inherited: Vec<terrain::Post>, points: Option<usize>) -> TileTask {
+        let by_squares = matches!(self.rule, Rule::LargestSquares { .. });
+        let rect = self.tiling.rect(tile);
+        // The raster's own border is nobody else's: its posts are ordinary candidates.
+        let outer = tiling::outer_sides(rect, self.area());
+        TileTask {
+            inherited,
+            seams: SeamSides::from_fn(|side| seams.is_open(side) || outer.is_open(side)),
+            stop: Stop {
+                points,
+                value: if by_squares { None } else { self.value },
+                rms_quanta: self.request.rms_m.map(|rms| rms * f64::from(terrain::QUANTA_PER_METRE)),
+            },
+            ..TileTask::plain(tile, rect, self.rule.clone())
+        }
+    }
+
+    fn area(&self) -> PostRect {
+        let last = self.tiles[self.tiles.len() - 1];
+        PostRect::new(self.tiling.rect(self.tiles[0]).south_west(), self.tiling.rect(last).north_east())
+    }
+
+    /// With several tiles and a number of points, what each would gain.
+    fn survey(
+        &self,
+        dem: &Dem,
+        workers: &Workers,
+        stop: &AtomicBool,
+        progress: &mut dyn Progress,
+    ) -> Result<Option<Vec<GainCurve>>, CompileError> {
+        let Some(points) = self.points().filter(|_| 1 < self.tiles.len()) else { return Ok(None) };
+        progress.tell(Event::Enter(Stage::Survey, self.tiles.len()));
+        let reach = 3 * points as usize / self.tiles.len() + 1;
+        let curve = |_, &tile: &TileId| Ok(self.curve(dem, tile, reach));
+        let curves = schedule::for_each_independent(&self.tiles, workers, stop, curve);
+        let curves = curves.map_err(|error| CompileError::from_schedule(Stage::Survey, &self.tiles, error))?;
+        progress.tell(Event::Leave(Stage::Survey));
+        Ok(Some(curves))
+    }
+
+    /// What a tile would gain by so many points.
+    fn curve(&self, dem: &Dem, tile: TileId, reach: usize) -> GainCurve {
+        let mut growth = self.task(tile, self.tiling.shared_sides(tile), Vec::new(), Some(reach));
+        growth.stop = Stop { points: Some(reach), ..Stop::default() };
+        if let Rule::Batches { .. } = growth.rule {
+            growth.rule = Rule::WorstFirst;
+        }
+        let outer = tiling::outer_sides(growth.rect, self.area());
+        let owned = self.tiling.owned_sides(tile);
+        let owned = SeamSides::from_fn(|side| owned.is_open(side) || outer.is_open(side));
+        let window = dem.window(growth.rect);
+        let importance = weights(&window);
+        // One load module as large as the raster: costs are points, and all are booked to it.
+        let grid = ModuleGrid { rows: 1, cols: 1, side_cells: i32::from(u16::MAX) };
+        let task = SurveyTask { growth, owned, grid, cost: CostUnit::Points };
+        tin::survey(&window, &importance, &task, geometry::widest_level())
+    }
+
+    /// What a tile starts from beside its corners.
+    fn start(&self, dem: &Dem) -> Result<Vec<GivenPost>, CompileError> {
+        let &Some(TinStart::Method(method, points)) = &self.request.start else {
+            let is_here = |post: &&GivenPost| dem.rect().contains(post.at);
+            return Ok(self.given.iter().filter(is_here).copied().collect());
+        };
+        let ground = methods::DemWindow { dem, spacing: self.spacing };
+        let share = points.div_ceil(self.tiles.len());
+        let posts = chosen(&ground, method, share).map_err(|why| refused("--start", method, why))?;
+        Ok(posts.into_iter().map(|at| GivenPost { at, pinned: false, outer: false, height: None }).collect())
+    }
+
+    /// A tile's TIN, from what it starts from. All vertices count, so it starts from no more than its share, and that
+    /// leaves fewer to select; fixed points are in whatever the share is.
+    fn refined(&self, mut task: TileTask, dem: Dem, seeds: &[Vertex]) -> Result<TileTin, CompileError> {
+        let mut given = self.start(&dem)?;
+        let fixed = given.iter().filter(|post| post.pinned).count();
+        let mut left = task.stop.points.unwrap_or(usize::MAX).saturating_sub(fixed);
+        given.retain(|post| {
+            let has_room = post.pinned || 0 < left;
+            left -= usize::from(!post.pinned && has_room);
+            has_room
+        });
+        let started = start_posts(&given, task.rect, task.seams).iter().filter(|start| !start.pinned).count();
+        task.stop.points = task.stop.points.map(|points| points.saturating_sub(started));
+        let window = Window { importance: weights(&dem), dem, given, forbidden: Vec::new() };
+        Ok(self.refinement(task).run(&window, seeds))
+    }
+
+    fn refine(
+        &self,
+        dem: &Dem,
+        curves: Option<Vec<GainCurve>>,
+        workers: &Workers,
+        stop: &AtomicBool,
+        progress: &mut dyn Progress,
+    ) -> Result<Vec<TileTin>, CompileError> {
+        let ranks: Vec<_> = self.tiles.iter().map(|&tile| self.tiling.rank(tile)).collect();
+        let around =
+            |&tile: &TileId| self.tiling.neighbours(tile).iter().map(|&other| self.tiling.index(other)).collect();
+        let plan = RankedTasks::new(&ranks, &self.tiles.iter().map(around).collect::<Vec<Vec<usize>>>());
+        let mut by_rank: Vec<usize> = (0..self.tiles.len()).collect();
+        by_rank.sort_by_key(|&index| ranks[index]);
+        let shares = self.points().map(|points| match curves {
+            Some(curves) => {
+                points_globally(points, Gains { bands: &mut std::iter::once(curves), by_rank: &by_rank, floor: None })
+            }
+            None => points_equally(points, self.tiles.len()),
+        });
+        let slots: Vec<OnceLock<TileTin>> = self.tiles.iter().map(|_| OnceLock::new()).collect();
+        progress.tell(Event::Enter(Stage::Refine, self.tiles.len()));
+        let task = |index: usize| {
+            let tile = self.tiles[index];
+            let published = |other: TileId| {
+                Ok(slots[self.tiling.index(other)].get().expect("lower-ranked neighbours are published first"))
+            };
+            let seeds = inherited(&self.tiling, tile, published)?;
+            let points = shares.as_ref().map(|shares| shares[index]);
+            let task = self.task(tile, self.tiling.owned_sides(tile), posts_of(&seeds), points);
+            let window = dem.window(task.rect);
+            let done = self.refined(task, window, &seeds)?;
+            assert!(slots[index].set(done).is_ok(), "each tile is refined once");
+            Ok(())
+        };
+        let observe = |event: Scheduled<()>| match event {
+            Scheduled::Started(index) => progress.tell(Event::Started(Stage::Refine, self.tiles[index])),
+            Scheduled::Done(index, ()) => progress.tell(Event::Done(Stage::Refine, self.tiles[index])),
+        };
+        in_rank_order_observed(&plan, workers, stop, task, observe)
+            .map_err(|error| CompileError::from_schedule(Stage::Refine, &self.tiles, error))?;
+        progress.tell(Event::Leave(Stage::Refine));
+        Ok(slots.into_iter().map(|slot| slot.into_inner().expect("every tile was refined")).collect())
+    }
+}
+
+fn refuse(request: &TinRequest, rect: PostRect, longest: usize) -> Result<(), CompileError> {
+    let impossible = |key: &str, found: String, expected: &str, hint: &str| {
+        Err(GroundError::Impossible { key: key.into(), found, expected: expected.into(), hint: hint.into() }.into())
+    };
+    let (rows, cols) = request.tiles;
+    if rows == 0 || cols == 0 || rect.cells_high() < rows as usize || rect.cells_wide() < cols as usize {
+        let found = format!("{rows}x{cols} for {} x {} posts", rect.posts_high(), rect.posts_wide());
+        return impossible("--tiles", found, "at least one row and column, and a cell for each", "try --tiles 6x6");
+    }
+    if WORKING_POSTS_MAX <= longest {
+        let found = format!("tiles of {longest} cells");
+        return impossible("--tiles", found, "tiles below 16384 cells a side", "ask for more tiles");
+    }
+    if rect.posts_wide() < 2 || rect.posts_high() < 2 {
+        let found = format!("{} x {} posts", rect.posts_high(), rect.posts_wide());
+        return impossible("DEM", found, "at least 2 x 2 posts", "a mesh needs ground to cover");
+    }
+    let corners = (rows as usize + 1) * (cols as usize + 1);
+    match request.points {
+        Some(points) if points < corners => impossible(
+            "--points",
+            points.to_string(),
+            &format!("at least the {corners} corners of tiles"),
+            "corners of tiles are vertices of every mesh",
+        ),
+        None if [request.max_residual_m, request.rms_m, request.triangles.map(|_| 0.0)].iter().all(Option::is_none) => {
+            impossible(
+                "--points",
+                "nothing that says when to stop".into(),
+                "--points, --triangles, --max-residual or --rms",
+                "for example --points 5000",
+            )
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Voids are never selected.
+fn weights(dem: &Dem) -> Importance {
+    mask::without_voids(Importance::uniform(dem.rect(), THOUSANDTHS), dem)
+}
+
+/// Tiles put together: points on shared lines are equal, so they are one vertex.
+fn join(rect: PostRect, tiles: &[TileTin]) -> Tin {
+    if let [only] = tiles {
+        return only.tin.clone();
+    }
+    let mut joined = Tin::new(rect, Vec::new(), Vec::new());
+    let mut on_lines = HashMap::new();
+    for tile in tiles {
+        let part = &tile.tin;
+        let (low, high) = (part.place_of(part.rect.south_west()), part.place_of(part.rect.north_east()));
+        let mut place = |vertex: &Vertex| {
+            let at = vertex.at;
+            let mut fresh = || {
+                joined.vertices.push(*vertex);
+                joined.vertices.len() as u32 - 1
+            };
+            let is_on_line = at.row == low.row || at.row == high.row || at.col == low.col || at.col == high.col;
+            if is_on_line { *on_lines.entry(at).or_insert_with(fresh) } else { fresh() }
+        };
+        let places: Vec<u32> = part.vertices.iter().map(&mut place).collect();
+        joined.triangles.extend(part.triangles.iter().map(|corners| corners.map(|v| places[v as usize])));
+    }
+    joined
+}
