@@ -5,7 +5,7 @@ use engine::{Artifact, Fingerprint, Key, Outcome, Stamp, keep_or_make};
 use fidelity::{Residuals, Tally};
 use job::{Borders, ClipHeights as JobClipHeights, Edges, Job, OuterBorder};
 use load_modules::{ClipHeights, Layout, clip, concatenate};
-use terrain::{HOLE_CLASS, LATTICE_PER_POST, LatticePoint, LoadModule, Post, PostRect, TileId, Tin, Vertex};
+use terrain::{HOLE_CLASS, LatticePoint, LoadModule, Post, PostRect, TileId, Tin, Vertex};
 
 use crate::assembled::{Assembled, ModuleNumbers};
 use crate::keys::{self, StampOf};
@@ -212,7 +212,8 @@ pub(crate) fn crs(job: &Job) -> String {
 /// A point on a seam counts in the tile that owns the post.
 fn count_points(run: &Run, own: &Tin, removed: &[LatticePoint], importance: &terrain::Importance) -> (Vec<u64>, u64) {
     let (rect, area) = (own.rect, run.area.rect);
-    let side = run.area.grid.side_cells * LATTICE_PER_POST;
+    let steps = own.steps_per_post;
+    let side = run.area.grid.side_cells * steps;
     let is_regular = run.job.tiles.borders == Borders::Regular;
     let is_fixed = run.job.modules.outer_border == OuterBorder::Fixed;
     let mut points = vec![0; run.job.importance.classes.len()];
@@ -221,13 +222,13 @@ fn count_points(run: &Run, own: &Tin, removed: &[LatticePoint], importance: &ter
     let removed: std::collections::BTreeSet<&LatticePoint> = removed.iter().collect();
     for vertex in own.vertices.iter().filter(|vertex| !removed.contains(&vertex.at)) {
         let at = vertex.at;
-        let is_at = |place: i32, line: i32| place == line * LATTICE_PER_POST;
+        let is_at = |place: i32, line: i32| place == line * steps;
         let beyond = (is_at(at.row, rect.north) && rect.north != area.north)
             || (is_at(at.col, rect.east) && rect.east != area.east);
         if beyond {
             continue;
         }
-        let post = Post::new(at.row.div_euclid(LATTICE_PER_POST), at.col.div_euclid(LATTICE_PER_POST));
+        let post = Post::new(at.row.div_euclid(steps), at.col.div_euclid(steps));
         match importance.class(post) {
             HOLE_CLASS => {
                 points.resize(holes + 1, 0);

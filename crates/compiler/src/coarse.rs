@@ -14,7 +14,8 @@ pub(crate) fn coarse(window: &Window, task: &SurveyTask) -> Option<(Window, Surv
     }
     let rect = half_rect(growth.rect);
     let frame = Frame::Sides { side_cells: side_cells / 2, south_west: *south_west, allowance: allowance.clone() };
-    let growth = TileTask { rect, frame, border: half_posts(&growth.border), ..growth.clone() };
+    let (border, barred) = (half_posts(&growth.border), half_posts(&growth.barred));
+    let growth = TileTask { rect, frame, border, barred, ..growth.clone() };
     let grid = ModuleGrid { side_cells: side_cells / 2, ..task.grid };
     Some((half_window(window, rect), SurveyTask { growth, grid, ..task.clone() }))
 }

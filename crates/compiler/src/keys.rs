@@ -124,7 +124,8 @@ fn feed_rules(builder: FingerprintBuilder, refinement: &Refinement) -> Fingerpri
 
 /// What tiles have in common. What one inherits and starts from is fed as its borders and with its window.
 fn feed_growth(builder: FingerprintBuilder, task: &TileTask) -> FingerprintBuilder {
-    let TileTask { tile: _, rect: _, frame: _, border, inherited: _, kept: _, start: _, seams, rule, stop } = task;
+    let TileTask { tile: _, rect: _, frame: _, border, inherited: _, kept: _, start: _, seams, barred, rule, stop } =
+        task;
     let Stop { points: _, value, rms_quanta: _ } = stop;
     let builder = match rule {
         Rule::WorstFirst => builder.case(0),
@@ -138,7 +139,9 @@ fn feed_growth(builder: FingerprintBuilder, task: &TileTask) -> FingerprintBuild
             builder.maybe(*proximity, |builder, Proximity { posts, quanta }| builder.real(posts).number(quanta.into()))
         }
     };
-    feed_sides(builder.maybe(*value, FingerprintBuilder::number), *seams).list(border.iter(), feed_post)
+    let builder = feed_sides(builder.maybe(*value, FingerprintBuilder::number), *seams).list(border.iter(), feed_post);
+    // Tiles without features keep the keys they had before there were any.
+    if barred.is_empty() { builder } else { builder.list(barred.iter(), feed_post) }
 }
 
 fn feed_allowance(builder: FingerprintBuilder, task: &TileTask) -> FingerprintBuilder {

@@ -18,6 +18,7 @@ pub(crate) fn all_levels(run: &Run, finest: Vec<LoadModule>, layout: &Layout, wi
         inner_shares: &lod.inner_shares,
         border: lod.border,
         flips: matches!(run.job.tin.method, Method::Optimised(_)),
+        features: &[],
     };
     let ground = LevelGround { dem: &window.dem, mask: &window.importance };
     levels.resize_with(lod.level_count(), Vec::new);

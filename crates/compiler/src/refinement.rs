@@ -4,7 +4,7 @@ use ground::{GivenPost, Window, border_posts, start_posts};
 use job::{Effort, Job, Method, Optimising};
 use limits::Allowance;
 use optimiser::{Budget, Optimised, Task, fill, optimise, overshoot};
-use terrain::{Dem, LatticePoint, Post, PostRect, THOUSANDTHS, TileTin, Tin, Vertex};
+use terrain::{Dem, Features, LatticePoint, Post, PostRect, THOUSANDTHS, TileTin, Tin, Vertex};
 use tin::{Frame, Rule, Stop, TileTask};
 
 /// Room in a window of load modules while a tile is grown beyond its budget.
@@ -118,6 +118,7 @@ impl Refinement {
         let Rule::LargestSquares { guard } = task.rule else { unreachable!("what is optimised is grown by squares") };
         Task {
             held,
+            features: Features::default(),
             open: task.seams,
             line_step: match task.frame {
                 Frame::Sides { side_cells, .. } => Some(side_cells),
@@ -134,7 +135,7 @@ impl Refinement {
     }
 
     fn join(&self, grown: TileTin, optimised: Optimised) -> TileTin {
-        let Optimised { tin, spent, refused, stop } = optimised;
+        let Optimised { tin, spent, refused, stop, left_out: _, short: _ } = optimised;
         TileTin {
             tin,
             residuals: Vec::new(),

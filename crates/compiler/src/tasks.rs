@@ -63,6 +63,7 @@ fn tile_task(job: &Job, area: &GamingArea, tile: TileId, budget: &TileBudget, in
         kept: Vec::new(),
         start: Vec::new(),
         seams,
+        barred: Vec::new(),
         rule: rule(job, area),
         stop: Stop {
             points,
@@ -199,7 +200,7 @@ fn survey_allowance(area: &GamingArea, modules: ModuleRect, triangles: u32) -> A
 
 /// The vertices a tile's TIN has on one of its sides, in canonical order.
 pub(crate) fn side_vertices(tin: &TileTin, side: Side) -> Vec<Vertex> {
-    let (low, high) = (LatticePoint::from(tin.tin.rect.south_west()), LatticePoint::from(tin.tin.rect.north_east()));
+    let (low, high) = (tin.tin.place_of(tin.tin.rect.south_west()), tin.tin.place_of(tin.tin.rect.north_east()));
     let on_side = |at: LatticePoint| match side {
         Side::South => at.row == low.row,
         Side::East => at.col == high.col,

@@ -45,7 +45,7 @@ pub(crate) fn tile() -> TileTin {
     }];
     let tile = TileTin {
         tile: TILE,
-        tin: Tin { rect, vertices, triangles: vec![[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]] },
+        tin: Tin::new(rect, vertices, vec![[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]]),
         initial_count: 4,
         residuals: vec![12_805],
         triangles_charged: 4,

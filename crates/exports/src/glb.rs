@@ -5,7 +5,7 @@
 use std::io::{Result, Write};
 
 use serde_json::{Value, json};
-use terrain::{LATTICE_PER_POST, ModuleId, ModuleRect, Tin, metres_of_quanta};
+use terrain::{ModuleId, ModuleRect, Tin, metres_of_quanta};
 
 use crate::mesh::normals;
 use crate::modules::module_name;
@@ -250,7 +250,7 @@ pub fn write_tin_glb(out: &mut impl Write, tin: &Tin, place: &TinPlace) -> Resul
         .vertices
         .iter()
         .map(|vertex| {
-            let posts = |lattice: i32, from: i32| f64::from(lattice) / f64::from(LATTICE_PER_POST) - f64::from(from);
+            let posts = |lattice: i32, from: i32| f64::from(lattice) / f64::from(tin.steps_per_post) - f64::from(from);
             let (row, col) = (posts(vertex.at.row, tin.rect.south), posts(vertex.at.col, tin.rect.west));
             [col * dx, row * dy, metres_of_quanta(vertex.height)]
         })

@@ -11,5 +11,7 @@ mod lines;
 pub use lines::{Charged, ModuleLines};
 mod ledger;
 pub use ledger::{Allowance, Ledger};
+mod features;
+pub use features::{FeatureCost, ShortOf, Shortfall, feature_cost};
 mod tile_ledger;
 pub use tile_ledger::TileLedger;

@@ -13,7 +13,10 @@ use crate::pieces::{Corner, Pieces};
 /// When the TIN is not that of the tile, or a triangle crosses a module line.
 pub fn concatenate(tin: &Tin, layout: &Layout, mask: &Importance) -> Vec<LoadModule> {
     assert_eq!(tin.rect, layout.grid.posts_of_rect(layout.modules), "the TIN covers the load modules of its tile");
-    let side = layout.side_lattice();
+    let side = layout.grid.side_cells * tin.steps_per_post;
+    let quanta_per_post = layout.spacing.quanta_per_post();
+    assert_eq!(quanta_per_post % tin.steps_per_post, 0, "a step of the TIN's lattice is a whole number of quanta");
+    let step = i64::from(quanta_per_post / tin.steps_per_post);
     let mut pieces = vec![Pieces::default(); layout.modules.count()];
     for triangle in &tin.triangles {
         let corners = triangle.map(|v| tin.vertices[v as usize]);
@@ -23,7 +26,6 @@ pub fn concatenate(tin: &Tin, layout: &Layout, mask: &Importance) -> Vec<LoadMod
         let inside = |v: i32, module: i32| (0..=side).contains(&(v - module * side));
         let whole = |at: LatticePoint| inside(at.row, row) && inside(at.col, col);
         assert!(corners.iter().all(|v| whole(v.at)), "no triangle crosses a side of load module {row},{col}");
-        let step = i64::from(layout.spacing.quanta_per_lattice_step());
         let local = |v: i32, module: i32| i64::from(v - module * side) * step;
         pieces[slot].push(corners.map(|v| Corner::new(local(v.at.row, row), local(v.at.col, col), v.height, false)));
     }
@@ -88,7 +90,7 @@ mod tests {
         let layout = layout();
         let rect = layout.grid.posts_of_rect(layout.modules);
         let vertices = rect.corners().map(|post| Vertex { at: post.into(), height: 0 }).to_vec();
-        let tin = Tin { rect, vertices, triangles: vec![[0, 1, 2], [0, 2, 3]] };
+        let tin = Tin::new(rect, vertices, vec![[0, 1, 2], [0, 2, 3]]);
         concatenate(&tin, &layout, &Importance::uniform(rect, 1000));
     }
 

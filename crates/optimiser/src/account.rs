@@ -1,6 +1,6 @@
 //! What the mesh has and what it may have.
 
-use limits::{Charged, TileLedger};
+use limits::{Charged, ShortOf, Shortfall, TileLedger};
 use terrain::{ModuleId, ModuleRect, POINT_COST, RefusedBy};
 
 use crate::hold::Hold;
@@ -154,6 +154,18 @@ impl Account {
     /// Whether taking a vertex out brings something nearer to its limit that is over it.
     pub fn relieves(&self, vertex: &Vertex) -> bool {
         matches!(&self.books, Books::Limits(ledger) if ledger.is_over(vertex.at.y, vertex.at.x))
+    }
+
+    /// What is exceeded: the whole, load modules, windows.
+    pub fn short(&self) -> Vec<Shortfall> {
+        match &self.books {
+            Books::Total { most, left, .. } => {
+                let of = |count: i64| u32::try_from(count.max(0)).unwrap_or(u32::MAX);
+                let short = Shortfall { of: ShortOf::Tile, needed: of(*most - *left), room: of(*most) };
+                if *left < 0 { vec![short] } else { Vec::new() }
+            }
+            Books::Limits(ledger) => ledger.counts().short(),
+        }
     }
 
     /// Triangles spent so far.

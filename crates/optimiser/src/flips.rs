@@ -63,8 +63,8 @@ fn find(sheet: &TileMesh, edge: u32, least: f64, patch: &mut Patch) -> bool {
     let (c, d) = (sheet.apex(edge), sheet.apex(twin));
     let (first, second) = ([a, d, c], [d, b, c]);
     let (at_first, at_second) = (sheet.places(first), sheet.places(second));
-    let is_sound = |[a, b, c]: [Place; 3]| Shape::Sound.admits(a, b, c);
-    if !is_sound(at_first) || !is_sound(at_second) || sheet.is_constrained(a, b) {
+    let is_sound = |corners: [u32; 3], [a, b, c]: [Place; 3]| Shape::Sound.admits(a, b, c) || sheet.is_eased(corners);
+    if !is_sound(first, at_first) || !is_sound(second, at_second) || sheet.is_constrained(a, b) {
         return false;
     }
     let moments = &sheet.ground.moments;

@@ -13,12 +13,14 @@ pub use optimise::{Optimised, fill, optimise, overshoot};
 
 mod account;
 mod curve;
+mod ears;
 mod exchange;
 mod flips;
 mod form;
 mod hold;
 mod insertion;
 mod moments;
+mod parts;
 mod patch;
 mod place;
 mod queue;
@@ -28,8 +30,13 @@ mod sweep;
 mod tenants;
 mod thin;
 mod tile_mesh;
+mod weave;
 mod weighted_heights;
 
+#[cfg(test)]
+mod feature_scene;
+#[cfg(test)]
+mod feature_tests;
 #[cfg(test)]
 mod scene;
 #[cfg(test)]

@@ -13,8 +13,8 @@ use ground::{GivenPost, GroundError, Window, chosen, posts_of_file, refused, sta
 use job::{ErrorKey, Optimising, StartMethod};
 use schedule::{Event as Scheduled, RankedTasks, Workers, in_rank_order_observed};
 use terrain::{
-    Dem, GainCurve, Importance, LastBatch, LatticePoint, Metres, ModuleGrid, PostRect, SeamSides, StopReason,
-    THOUSANDTHS, TileId, TileOrder, TileTin, Tin, Vertex,
+    Dem, GainCurve, Importance, LastBatch, Metres, ModuleGrid, PostRect, SeamSides, StopReason, THOUSANDTHS, TileId,
+    TileOrder, TileTin, Tin, Vertex,
 };
 use tiling::{Gains, Tiling, points_equally, points_globally};
 use tin::{CostUnit, Proximity, Rule, Stop, SurveyTask, TileTask};
@@ -461,11 +461,11 @@ fn join(rect: PostRect, tiles: &[TileTin]) -> Tin {
     if let [only] = tiles {
         return only.tin.clone();
     }
-    let mut joined = Tin { rect, vertices: Vec::new(), triangles: Vec::new() };
+    let mut joined = Tin::new(rect, Vec::new(), Vec::new());
     let mut on_lines = HashMap::new();
     for tile in tiles {
         let part = &tile.tin;
-        let (low, high) = (LatticePoint::from(part.rect.south_west()), LatticePoint::from(part.rect.north_east()));
+        let (low, high) = (part.place_of(part.rect.south_west()), part.place_of(part.rect.north_east()));
         let mut place = |vertex: &Vertex| {
             let at = vertex.at;
             let mut fresh = || {

@@ -2,9 +2,7 @@
 
 use std::f64::consts::FRAC_1_SQRT_2;
 
-use terrain::{
-    Dem, HOLE_CLASS, LATTICE_PER_POST, LoadModule, ModuleGrid, Post, QUANTA_PER_METRE, Spacing, Tin, metres_of_quanta,
-};
+use terrain::{Dem, HOLE_CLASS, LoadModule, ModuleGrid, Post, QUANTA_PER_METRE, Spacing, Tin, metres_of_quanta};
 
 use super::map_extent::slope;
 use super::scene::Scene;
@@ -40,7 +38,7 @@ pub enum Cover {
 impl Facets {
     /// Those of a TIN whose posts are `spacing_m` apart, west to east and south to north.
     pub fn of_tin(tin: &Tin, spacing_m: [f64; 2]) -> Self {
-        let metres = |lattice: i32, axis: usize| f64::from(lattice) / f64::from(LATTICE_PER_POST) * spacing_m[axis];
+        let metres = |lattice: i32, axis: usize| f64::from(lattice) / f64::from(tin.steps_per_post) * spacing_m[axis];
         let vertices = tin.vertices.iter();
         let vertices = vertices.map(|v| [metres(v.at.col, 0), metres(v.at.row, 1), metres_of_quanta(v.height)]);
         let posts = |count: i32, axis: usize| f64::from(count) * spacing_m[axis];

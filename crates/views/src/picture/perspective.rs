@@ -439,7 +439,7 @@ mod tests {
         let cells = (0..rect.cells_high() as u32)
             .flat_map(|row| (0..rect.cells_wide() as u32).map(move |col| row * wide + col));
         let triangles = cells.flat_map(|a| [[a, a + 1, a + wide + 1], [a, a + wide + 1, a + wide]]).collect();
-        Tin { rect, vertices: vertices.collect(), triangles }
+        Tin::new(rect, vertices.collect(), triangles)
     }
 
     #[test]
