@@ -40,7 +40,8 @@ pub(crate) fn assemble_tile(
     removed: &[Vec<LatticePoint>],
     tile: TileId,
 ) -> Result<Outcome<(Assembled, Sums)>, CompileError> {
-    let modules = keys::modules(run.job, &run.area, stamps, removed, tile).fingerprint();
+    let features = run.tile_features(tile)?;
+    let modules = keys::modules(run.job, &run.area, stamps, removed, &features).fingerprint();
     keep_or_make(&Assembling { run, stamps, removed, tile, modules }, ALGORITHM_REVISION)
 }
 
@@ -216,7 +217,7 @@ fn count_points(run: &Run, own: &Tin, removed: &[LatticePoint], importance: &ter
     let side = run.area.grid.side_cells * steps;
     let is_regular = run.job.tiles.borders == Borders::Regular;
     let is_fixed = run.job.modules.outer_border == OuterBorder::Fixed;
-    let mut points = vec![0; run.job.importance.classes.len()];
+    let mut points = vec![0; run.job.class_names().len()];
     let holes = points.len();
     let mut border = 0;
     let removed: std::collections::BTreeSet<&LatticePoint> = removed.iter().collect();

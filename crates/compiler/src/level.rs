@@ -15,9 +15,9 @@ use crate::run::{ALGORITHM_REVISION, Run};
 use crate::{CompileError, Event, Progress, Stage};
 
 /// Decides all heights of features, or keeps what is published and fresh.
-pub(crate) fn level(run: &Run, progress: &mut dyn Progress) -> Result<AreaLevel, CompileError> {
+pub(crate) fn level(run: &Run, progress: &mut dyn Progress) -> Result<(FileStamp, AreaLevel), CompileError> {
     progress.tell(Event::Enter(Stage::Level, 0));
-    let level = level_area(run)?.into_inner().1;
+    let level = level_area(run)?.into_inner();
     progress.tell(Event::Leave(Stage::Level));
     Ok(level)
 }
@@ -57,7 +57,8 @@ impl Artifact for Levelling<'_> {
         let folder = self.run.database.folder();
         let (stamp, file, level) = folder.read_level().ok()?;
         let tiles = &self.run.area.tiles;
-        let is_whole = |(&tile, stamp): (&TileId, &FileStamp)| folder.check_file(&folder.lines_path(tile), stamp).is_ok();
+        let is_whole =
+            |(&tile, stamp): (&TileId, &FileStamp)| folder.check_file(&folder.lines_path(tile), stamp).is_ok();
         let has_all = level.tiles.len() == tiles.len() && tiles.iter().zip(&level.tiles).all(is_whole);
         has_all.then_some((stamp, (file, level)))
     }

@@ -33,7 +33,10 @@ mod forecast;
 pub use forecast::{Forecast, PAGE_MODULES_MAX, PAGE_POSTS_MAX, StageSeconds};
 mod played;
 pub use played::{Costs, Played, TileCosts, play};
+mod level;
 mod levels;
+mod pieces;
+mod profile;
 
 mod assemble;
 mod assembled;

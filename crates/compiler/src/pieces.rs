@@ -9,6 +9,7 @@ use terrain::{
     FeatureSurface, Features, LatticePoint, ModuleId, PostRect, Side, SideSpan, SurfaceGround, TileFeatures, TileId,
     Vertex,
 };
+use tiling::{outer_border_posts, outer_sides};
 
 use crate::profile::ReadFeatures;
 use crate::run::Run;
@@ -23,7 +24,13 @@ pub(crate) fn pieces(run: &Run, features: &features::AreaFeatures, formed: &Form
     cutting.decks(&formed.decks);
     cutting.slopes(formed);
     let Cutting { area, pieces, .. } = cutting;
-    pieces.into_iter().map(|piece| { let rect = area.tiling.rect(piece.features.tile); piece.finish(rect) }).collect()
+    pieces
+        .into_iter()
+        .map(|piece| {
+            let rect = area.tiling.rect(piece.features.tile);
+            piece.finish(rect)
+        })
+        .collect()
 }
 
 /// The job's number of each class of features.
@@ -243,7 +250,20 @@ pub(crate) fn area_level(run: &Run, read: &ReadFeatures, levelled: &Levelled, ti
         }
     };
     let remarks = read.vectors.remarks.iter().cloned().chain(levelled.remarks.iter().map(told)).collect();
-    AreaLevel { tiles, cost, lines: lines(run, read, &levelled.reserved.formed, &classes), remarks }
+    let reserved = reserved(run, levelled, read.features.site.lattice.steps_per_post());
+    AreaLevel { tiles, cost, reserved, lines: lines(run, read, &levelled.reserved.formed, &classes), remarks }
+}
+
+/// Triangles that features add to each load module, whatever else it holds.
+fn reserved(run: &Run, levelled: &Levelled, steps: i32) -> Vec<(u32, u32)> {
+    let (area, job) = (&run.area, run.job);
+    let points = levelled.reserved.formed.points.iter();
+    let kept =
+        Features { steps_per_post: steps, vertices: points.copied().map(vertex).collect(), ..Features::default() };
+    let mut border = outer_border_posts(area.rect, outer_sides(area.rect, area.rect), job.outer_step_cells());
+    border.sort_unstable();
+    let cost = limits::feature_cost(&kept, area.grid, &border);
+    cost.into_iter().map(|(module, triangles)| (area.grid.index(module) as u32, triangles)).collect()
 }
 
 /// Edges as lines of their features.

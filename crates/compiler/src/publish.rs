@@ -166,6 +166,21 @@ fn fill(
     record.tin = Some(folder.stamp_file(&folder.tile_path(tile))?);
     record.slm = Some(assembled.file);
     record.curve = if has_curve { Some(folder.stamp_file(&folder.curve_path(tile))?) } else { None };
+    fill_features(run, manifest, tile)
+}
+
+/// What features put into a tile, and the ground along them; nothing of an earlier job is left where there are none.
+fn fill_features(run: &Run, manifest: &mut Manifest, tile: TileId) -> Result<(), CompileError> {
+    let folder = run.database.folder();
+    let Some(settled) = &run.level else {
+        run.database.remove(&format!("survey/{tile}.profile"))?;
+        run.database.remove(&format!("survey/{tile}.lines"))?;
+        return Ok(run.database.remove(files::LEVEL)?);
+    };
+    let record = manifest.tile_mut(tile).expect("the manifest lists every tile");
+    record.profile = Some(folder.stamp_file(&folder.profile_path(tile))?);
+    record.lines = Some(settled.level.tiles[run.area.tiling.index(tile)]);
+    manifest.files.insert(files::LEVEL.to_owned(), settled.file);
     Ok(())
 }
 

@@ -19,6 +19,8 @@ pub struct Refinement {
     pub optimising: Option<Optimising>,
     /// What the finished mesh may have where there are no load modules.
     pub most: Most,
+    /// Vertices and edges that it keeps whatever it is refined to.
+    pub features: Features,
 }
 
 /// Where there are no load modules, the most a mesh may have.
@@ -118,7 +120,7 @@ impl Refinement {
         let Rule::LargestSquares { guard } = task.rule else { unreachable!("what is optimised is grown by squares") };
         Task {
             held,
-            features: Features::default(),
+            features: self.features.clone(),
             open: task.seams,
             line_step: match task.frame {
                 Frame::Sides { side_cells, .. } => Some(side_cells),

@@ -207,7 +207,7 @@ impl Findings<'_> {
             let points = self.sums.points[index];
             ReportClass { name: name.clone(), posts: tally.posts, points, residual: residual_of(tally) }
         };
-        let names = &self.run.job.importance.classes;
+        let names = &self.run.job.class_names();
         let mut classes: Vec<_> = names.iter().enumerate().map(class).collect();
         let (left, over_holes) = (self.run.ground.voids.left, self.sums.points.get(names.len()));
         if 0 < left || over_holes.is_some() {

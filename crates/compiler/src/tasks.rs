@@ -5,7 +5,7 @@ use std::ops::Deref;
 use ground::GamingArea;
 use job::{Allocation, Borders, Budget as PointBudget, Edges, Effort, ErrorKey, Job, Method, OuterBorder};
 use limits::Allowance;
-use terrain::{LatticePoint, ModuleId, ModuleRect, Post, SeamSides, Side, TileId, TileTin, Vertex};
+use terrain::{Features, LatticePoint, ModuleId, ModuleRect, Post, SeamSides, Side, TileId, TileTin, Vertex};
 use tiling::{Tiling, outer_border_posts, outer_sides};
 use tin::{CostUnit, Frame, Proximity, Rule, Stop, SurveyTask, TileTask};
 
@@ -36,9 +36,11 @@ pub fn tile_refinement(
     tile: TileId,
     budget: &TileBudget,
     inherited: Vec<Post>,
+    features: &Features,
 ) -> Refinement {
-    let task = tile_task(job, area, tile, budget, inherited);
-    Refinement { task, optimising: optimising(job), most: Most::AsTask }
+    let barred = features.barred_posts(area.tiling.rect(tile));
+    let task = TileTask { barred, ..tile_task(job, area, tile, budget, inherited) };
+    Refinement { task, optimising: optimising(job), most: Most::AsTask, features: features.clone() }
 }
 
 /// The growth of one tile, inheriting `inherited` from its lower-ranked neighbours.
@@ -149,7 +151,7 @@ fn largest_value(job: &Job) -> Option<u64> {
 }
 
 /// The survey of one tile: all it would select if it were alone.
-pub(crate) fn survey_task(job: &Job, area: &GamingArea, tile: TileId) -> SurveyTask {
+pub(crate) fn survey_task(job: &Job, area: &GamingArea, tile: TileId, features: &Features) -> SurveyTask {
     let modules = area.tiling.modules(tile, area.grid);
     let reach = match optimising(job) {
         Some(_) if job.tin.target_rms_m.is_some() => SURVEY_REACH_TO_RMS,
@@ -166,6 +168,7 @@ pub(crate) fn survey_task(job: &Job, area: &GamingArea, tile: TileId) -> SurveyT
     let budget = TileBudget { points, allowance: Some(allowance), rms_quanta: None };
     let mut growth = tile_task(job, area, tile, &budget, Vec::new());
     growth.seams = with_outer_sides(job, area, tile, area.tiling.shared_sides(tile));
+    growth.barred = features.barred_posts(growth.rect);
     // An RMS of 0 is never reached, but has the sums of squares recorded.
     growth.stop = Stop { points, value: None, rms_quanta: job.tin.target_rms_m.map(|_| 0.0) };
     if let Rule::Batches { .. } = growth.rule {
@@ -212,19 +215,30 @@ pub(crate) fn side_vertices(tin: &TileTin, side: Side) -> Vec<Vertex> {
     found
 }
 
-/// What a tile inherits: the border points of its lower-ranked neighbours on the sides they share.
+/// The vertices on one side of a TIN that stand on posts and are none of features, in canonical order.
+pub(crate) fn seam_points(tin: &TileTin, side: Side, features: &Features) -> Vec<Vertex> {
+    let found = side_vertices(tin, side).into_iter().filter_map(|vertex| {
+        let post = tin.tin.post_at(vertex.at)?;
+        (!features.has_post(post)).then(|| Vertex { at: post.into(), ..vertex })
+    });
+    found.collect()
+}
+
+/// What a tile inherits: the border points of its lower-ranked neighbours on the sides they share, but for vertices of
+/// `features`, which all of them have from the start.
 ///
 /// # Errors
 /// The first of `published`.
 pub fn inherited<T: Deref<Target = TileTin>>(
     tiling: &Tiling,
     tile: TileId,
+    features: &Features,
     published: impl Fn(TileId) -> Result<T, CompileError>,
 ) -> Result<Vec<Vertex>, CompileError> {
     let mut all = Vec::new();
     for side in Side::ALL.into_iter().filter(|&side| tiling.inherits(tile, side)) {
         if let Some(other) = tiling.beyond(tile, side) {
-            all.extend(side_vertices(&*published(other)?, side.opposite()));
+            all.extend(seam_points(&*published(other)?, side.opposite(), features));
         }
     }
     all.sort_unstable();

@@ -10,7 +10,7 @@ use terrain::{Post, SeamSides, Side, TileId, TileTin, Vertex};
 
 use crate::assemble::{assemble, assemble_tile, read_assembled};
 use crate::assembled::Assembled;
-use crate::build::open;
+use crate::build::{decide_features, open};
 use crate::curves::Curves;
 use crate::enforce::enforce;
 use crate::publish::{beginning, prepare, publish};
@@ -54,9 +54,10 @@ pub fn rebuild_tile(
     // Nothing is created where there is nothing to go on from.
     let folder = &folder.into();
     folder.manifest()?;
-    let run = open(job, folder, options, progress)?;
+    let mut run = open(job, folder, options, progress)?;
     let mut frozen = refuse_unfinished(&run, folder, tile)?;
     let is_outdated = is_outdated(&run);
+    decide_features(&mut run, progress)?;
     let shares = published_shares(&run, progress)?;
     let mut tins = published_tins(&run)?;
     run.database.begin(&beginning(&run))?;
@@ -211,7 +212,9 @@ fn published_tins(run: &Run) -> Result<Vec<Published>, CompileError> {
 
 /// What a tile inherits from its lower-ranked neighbours as they are now.
 fn seeds(run: &Run, tins: &[Published], tile: TileId) -> Result<Vec<Vertex>, CompileError> {
-    inherited(&run.area.tiling, tile, |other| run.tin(other, &tins[run.area.tiling.index(other)].stamp))
+    let features = run.tile_features(tile)?;
+    let published = |other| run.tin(other, &tins[run.area.tiling.index(other)].stamp);
+    inherited(&run.area.tiling, tile, &features.kept, published)
 }
 
 /// The tile's TIN as a full build would refine it.

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 
 use ground::Window;
 use load_modules::{Layout, concatenate};
-use terrain::{ModuleGrid, ModuleId, ModuleRect, ModuleResidual, Tin, Vertex};
+use terrain::{Features, ModuleGrid, ModuleId, ModuleRect, ModuleResidual, Tin, Vertex};
 use tin::{Stop, TileTask};
 
 use crate::CompileError;
@@ -47,7 +47,7 @@ fn without_limit(run: &Run, window: &Window, module: ModuleId, part: &Tin, extra
     let tile = run.area.tiling.tile_of_module(module, run.area.grid);
     let stop = Stop { points: Some(points + extra), ..Stop::default() };
     let task = TileTask { inherited, stop, ..TileTask::plain(tile, rect, rule(run.job, &run.area)) };
-    let refinement = Refinement { task, optimising, most: Most::AsTask };
+    let refinement = Refinement { task, optimising, most: Most::AsTask, features: Features::default() };
     let tin = match optimising {
         Some(optimising) => refinement.fill(&window, optimising, part),
         None => refinement.run(&window, &sides).tin,

@@ -23,6 +23,19 @@ pub struct AreaLevel {
     pub remarks: Vec<FeatureRemark>,
 }
 
+impl AreaLevel {
+    /// Triangles that features take of each of `count` load modules, row-major.
+    pub fn reserved_of(&self, count: usize) -> Vec<u32> {
+        let mut reserved = vec![0; count];
+        for &(place, triangles) in &self.reserved {
+            if let Some(of) = reserved.get_mut(place as usize) {
+                *of = triangles;
+            }
+        }
+        reserved
+    }
+}
+
 /// A run of edges of one feature, all of one role.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FeatureLine {

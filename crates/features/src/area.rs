@@ -6,9 +6,10 @@ use std::collections::{BTreeMap, HashSet};
 use crate::pieces::moved;
 use crate::rules::Sorted;
 use crate::{
-    Bed, Cost, FeatureId, Flaw, GradeOptions, Graded, Grants, Network, Outline, Place, Remark, Reserved, Rule, Site, Source, Strand,
-    Waters, Way, banks, breaklines, channels, dams, fall, flowing, grade, have_line, lakes_along, level, lines_inside,
-    mend, outline_only, pins, reserve, round, shore, sides, sort_out, split_at_dams, travelled, water,
+    Bed, Cost, FeatureId, Flaw, GradeOptions, Graded, Grants, Network, Outline, Place, Remark, Reserved, Rule, Site,
+    Source, Strand, Traits, Waters, Way, banks, breaklines, channels, dams, fall, flowing, grade, have_line,
+    lakes_along, level, lines_inside, mend, outline_only, pins, reserve, round, shore, sides, sort_out, split_at_dams,
+    travelled, water,
 };
 
 /// Features on the lattice of an area, before their heights are known.
@@ -52,6 +53,37 @@ pub trait Room {
 }
 
 impl AreaFeatures {
+    /// Gives all that they are made of, word by word: equal words, equal features.
+    pub fn feed(&self, word: &mut dyn FnMut(i64)) {
+        let place = |Place { row, col }: Place, word: &mut dyn FnMut(i64)| {
+            word(row.into());
+            word(col.into());
+        };
+        let Self { site, ways, outlines, .. } = self;
+        word(site.lattice.steps_per_post().into());
+        word(ways.len() as i64);
+        for Way { traits, places, heights, id: _ } in ways {
+            traits.feed(word);
+            word(places.len() as i64);
+            places.iter().for_each(|&at| place(at, word));
+            word(heights.len() as i64);
+            for &(at, height) in heights {
+                place(at, word);
+                word(height.into());
+            }
+        }
+        word(outlines.len() as i64);
+        for Outline { traits, rings, id: _ } in outlines {
+            traits.feed(word);
+            word(rings.len() as i64);
+            for ring in rings {
+                word(ring.hole.into());
+                word(ring.places.len() as i64);
+                ring.places.iter().for_each(|&at| place(at, word));
+            }
+        }
+    }
+
     /// What each feature on the lattice is.
     pub fn traits_by_id(&self) -> BTreeMap<FeatureId, Traits> {
         let ways = self.ways.iter().map(|way| (way.id, way.traits));
@@ -114,12 +146,7 @@ impl AreaFeatures {
     ///
     /// # Panics
     /// When there is not one height, or none, for each station.
-    pub fn level(
-        &self,
-        ground: &[Option<i32>],
-        options: GradeOptions,
-        room: &mut dyn Room,
-    ) -> Levelled {
+    pub fn level(&self, ground: &[Option<i32>], options: GradeOptions, room: &mut dyn Room) -> Levelled {
         assert_eq!(self.stations.len(), ground.len(), "the DEM was asked at every station");
         let at = |place: Place| self.stations.binary_search(&place).ok().and_then(|found| ground[found]);
         let mut remarks = self.remarks.clone();

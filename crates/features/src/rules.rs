@@ -94,6 +94,30 @@ pub struct Traits {
     pub pins: bool,
 }
 
+impl Traits {
+    /// Gives all that they are, word by word.
+    pub(crate) fn feed(&self, word: &mut dyn FnMut(i64)) {
+        let Traits { class, kind, storey, width, grade_ppm, form, level, pins } = *self;
+        let (storey, layer) = match storey {
+            Storey::Ground => (0, 0),
+            Storey::Deck(layer) => (1, layer),
+            Storey::Tunnel(layer) => (2, layer),
+        };
+        let form = match form {
+            Form::Line => 0,
+            Form::Strip => 1,
+            Form::StripAlways => 2,
+            Form::Bench => 3,
+            Form::Polygon => 4,
+        };
+        let kind = Kind::ALL.iter().position(|other| *other == kind).unwrap_or(Kind::ALL.len()) as i64;
+        let numbers = [class.into(), kind, storey, layer.into(), width.into(), grade_ppm.into(), form, pins.into()];
+        numbers.into_iter().for_each(&mut *word);
+        word(level.is_some().into());
+        word(level.unwrap_or(0).into());
+    }
+}
+
 /// A feature whose kind is known.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Feature {

@@ -1,5 +1,6 @@
 //! Why there is no ground.
 
+use database::DatabaseError;
 use schedule::ScheduleError;
 use source_files::SourceError;
 use terrain::TileId;

@@ -77,6 +77,23 @@ impl Ground {
         Self::open_within(job, area, (workers, stop), WHOLE_BYTES_MAX)
     }
 
+    /// The ground of a finished database in `folder`, with the features that it has burned in.
+    ///
+    /// # Errors
+    /// As [`Ground::open`].
+    pub fn open_built(
+        job: &Job,
+        area: &GamingArea,
+        (workers, stop): (&Workers, &AtomicBool),
+        folder: &Folder,
+    ) -> Result<Self, GroundError> {
+        let ground = Self::open(job, area, workers, stop)?;
+        if job.features.is_some() {
+            ground.burn_in(folder, area);
+        }
+        Ok(ground)
+    }
+
     /// The same, where rasters that take more than `whole_bytes_max` bytes are read by window.
     pub fn open_within(
         job: &Job,

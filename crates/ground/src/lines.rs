@@ -55,9 +55,8 @@ impl Lines {
         let rect = window.dem.rect();
         // The window of one tile, mostly; its neighbours then add nothing that it does not have.
         let whole = self.tiles.iter().find(|(_, tile)| tile.contains_rect(&rect));
-        let burn = |window, &(tile, of): &(TileId, PostRect)| {
-            Ok(burn(window, &*self.features(tile)?, of, self.spacing))
-        };
+        let burn =
+            |window, &(tile, of): &(TileId, PostRect)| Ok(burn(window, &*self.features(tile)?, of, self.spacing));
         match whole {
             Some(tile) => burn(window, tile),
             None => self.tiles.iter().filter(|(_, tile)| tile.intersection(&rect).is_some()).try_fold(window, burn),

@@ -250,7 +250,8 @@ fn fullest_window(product: &Product, sums: &[u32], module: ModuleId) -> Explaine
 }
 
 fn classes(product: &Product, module: &LoadModule) -> Vec<(String, u32)> {
-    let names = product.job.importance.classes.iter().map(String::as_str).enumerate();
+    let all = product.job.class_names();
+    let names = all.iter().map(String::as_str).enumerate();
     let names = names.chain([(usize::from(HOLE_CLASS), HOLE_CLASS_NAME)]);
     let count = |class: usize| module.classes.iter().filter(|&&found| usize::from(found) == class).count() as u32;
     names.map(|(class, name)| (name.to_owned(), count(class))).filter(|(_, count)| 0 < *count).collect()

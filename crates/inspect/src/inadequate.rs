@@ -86,7 +86,7 @@ pub fn inadequate(folder: &Path, tolerance_m: Option<f64>) -> Result<Inadequate,
     let Opened { folder, manifest, mut job, area } = Opened::open(folder)?;
     choose_ground(&mut job, &manifest, folder.dir(), None)?;
     locate_weights(&mut job, &manifest, folder.dir())?;
-    let ground = Ground::open(&job, &area, &Workers::new(1), &AtomicBool::new(false))?;
+    let ground = Ground::open_built(&job, &area, (&Workers::new(1), &AtomicBool::new(false)), &folder)?;
     let window = ground.window(area.rect)?;
     let modules = read_modules(&folder, &area)?;
     let totals = &manifest.totals;

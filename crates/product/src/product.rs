@@ -100,7 +100,7 @@ impl Product {
         check_part(part, area)?;
         let (workers, stop) = (Workers::new(wanted.workers), AtomicBool::new(false));
         let ground = match open_ground(opened, wanted.ground)? {
-            Some((job, name)) => Some((Ground::open(&job, area, &workers, &stop)?, name)),
+            Some((job, name)) => Some((Ground::open_built(&job, area, (&workers, &stop), folder)?, name)),
             None => None,
         };
         let meets = |tile: &TileId| meet(area.tiling.modules(*tile, area.grid), part).is_some();

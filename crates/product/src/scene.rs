@@ -72,6 +72,6 @@ impl SceneParts {
 
 /// The class of water: what the job gives to its water polygons, or one that is named so.
 pub fn water(job: &Job) -> Option<u8> {
-    let named = || job.importance.classes.iter().position(|class| class == "water");
+    let named = || job.class_names().iter().position(|class| class == "water");
     job.dem.water.as_ref().map(|water| water.class).or_else(|| named().map(|index| index as u8))
 }

@@ -45,6 +45,13 @@ impl Features {
         self.vertices.is_empty() && self.spans.is_empty()
     }
 
+    /// Whether a vertex stands on a post.
+    pub fn has_post(&self, post: Post) -> bool {
+        let at = LatticePoint::new(post.row * self.steps_per_post, post.col * self.steps_per_post);
+        // In canonical order, as tiles have them.
+        self.vertices.binary_search_by_key(&at, |vertex| vertex.at).is_ok()
+    }
+
     /// Those of the tile that covers `rect`: what lies inside or on its sides. A line that two tiles share gives both
     /// the same vertices and edges; `spans` are taken as they are.
     pub fn within(&self, rect: PostRect) -> Self {

@@ -13,8 +13,8 @@ use ground::{GivenPost, GroundError, Window, chosen, posts_of_file, refused, sta
 use job::{ErrorKey, Optimising, StartMethod};
 use schedule::{Event as Scheduled, RankedTasks, Workers, in_rank_order_observed};
 use terrain::{
-    Dem, GainCurve, Importance, LastBatch, Metres, ModuleGrid, PostRect, SeamSides, StopReason, THOUSANDTHS, TileId,
-    TileOrder, TileTin, Tin, Vertex,
+    Dem, Features, GainCurve, Importance, LastBatch, Metres, ModuleGrid, PostRect, SeamSides, StopReason, THOUSANDTHS,
+    TileId, TileOrder, TileTin, Tin, Vertex,
 };
 use tiling::{Gains, Tiling, points_equally, points_globally};
 use tin::{CostUnit, Proximity, Rule, Stop, SurveyTask, TileTask};
@@ -278,7 +278,7 @@ impl<'a> TinJob<'a> {
             Some(triangles) if self.tiles.len() == 1 => Most::Triangles(triangles),
             _ => Most::AsTask,
         };
-        Refinement { task, optimising, most }
+        Refinement { task, optimising, most, features: Features::default() }
     }
 
     fn task(&self, tile: TileId, seams: SeamSides, inherited: Vec<terrain::Post>, points: Option<usize>) -> TileTask {
@@ -395,7 +395,7 @@ impl<'a> TinJob<'a> {
             let published = |other: TileId| {
                 Ok(slots[self.tiling.index(other)].get().expect("lower-ranked neighbours are published first"))
             };
-            let seeds = inherited(&self.tiling, tile, published)?;
+            let seeds = inherited(&self.tiling, tile, &Features::default(), published)?;
             let points = shares.as_ref().map(|shares| shares[index]);
             let task = self.task(tile, self.tiling.owned_sides(tile), posts_of(&seeds), points);
             let window = dem.window(task.rect);

@@ -305,7 +305,7 @@ fn of_residuals(figures: &mut Figures, report: &Report, job: &Job, area: &Gaming
         figures.number("heights.surface_m[1]", metres_of_quanta(high), listed.surface_m[1]);
     }
     let (mut squares, mut points) = (0.0, 0.0);
-    for (at, name) in job.importance.classes.iter().enumerate() {
+    for (at, name) in job.class_names().iter().enumerate() {
         let tally = sums.residuals.classes.get(at).cloned().unwrap_or_default();
         let own = sums.points.get(at).copied().unwrap_or(0);
         if 0 < tally.posts {

@@ -44,7 +44,7 @@ pub(crate) fn open(folder: &Folder, job: &Job, area: &GamingArea) -> Result<Open
         opened.levels.resize_with(count, BTreeMap::new);
         for (level, modules) in (0..header.level_count).zip(&mut opened.levels) {
             for module in file.level(level).unwrap_or(&[]) {
-                opened.problems.extend(unknown_class(module, job.importance.classes.len()));
+                opened.problems.extend(unknown_class(module, job.class_names().len()));
                 let module = load_module(module, header.side);
                 modules.insert(module.id, module);
             }

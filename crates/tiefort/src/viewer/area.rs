@@ -83,7 +83,7 @@ fn description(product: &Product, area: &Area, overview: &Overview) -> String {
         "hole": HOLE_CLASS,
         "triangles": totals.triangles,
         "polygons": totals.polygons,
-        "classes": product.job.importance.classes,
+        "classes": product.job.class_names(),
         "limits": {
             "count": limits.count.name(),
             "per_load_module": limits.per_load_module,
