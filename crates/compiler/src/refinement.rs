@@ -3,12 +3,15 @@
 use ground::{GivenPost, Window, border_posts, start_posts};
 use job::{Effort, Job, Method, Optimising};
 use limits::Allowance;
-use optimiser::{Budget, Optimised, Task, fill, optimise, overshoot};
-use terrain::{Dem, Features, LatticePoint, Post, PostRect, THOUSANDTHS, TileTin, Tin, Vertex};
+use optimiser::{Budget, Optimised, Task, fill, optimise, overshoot, weave_in};
+use terrain::{Dem, Features, HeightFit, Lattice, LatticePoint, Post, PostRect, THOUSANDTHS, TileTin, Tin, Vertex};
 use tin::{Frame, Rule, Stop, TileTask};
 
 /// Room in a window of load modules while a tile is grown beyond its budget.
 const NO_LIMIT: u32 = u32::MAX / 4;
+
+/// How features come into a TIN that is not optimised.
+const PLAIN: Optimising = Optimising { effort: Effort::Fast, height_fit: HeightFit::Off, lattice: Lattice::Post };
 
 /// What is to be done for one tile.
 #[derive(Clone, Debug)]
@@ -65,7 +68,16 @@ impl Refinement {
             }
             tin::refine(&with_heights(&window.dem, seeds), &window.importance, task, level)
         };
-        let Some(optimising) = self.optimising else { return grown(&self.task) };
+        let Some(optimising) = self.optimising else {
+            let grown = grown(&self.task);
+            if self.features.is_empty() {
+                return grown;
+            }
+            // Every vertex where it grew, with features among them.
+            let task = self.optimisation(PLAIN, grown.initial_count, &window.forbidden);
+            let woven = weave_in(&window.dem, &window.importance, &grown.tin, &task);
+            return self.join(grown, woven);
+        };
         let grown = grown(&self.beyond_budget(optimising));
         let task = self.optimisation(optimising, grown.initial_count, &window.forbidden);
         let optimised = optimise(&window.dem, &window.importance, &grown.tin, &task);
@@ -117,7 +129,10 @@ impl Refinement {
                 Budget::Vertices(task.stop.points.map_or(NO_LIMIT as usize, |points| points + initial as usize))
             }
         };
-        let Rule::LargestSquares { guard } = task.rule else { unreachable!("what is optimised is grown by squares") };
+        let guard = match task.rule {
+            Rule::LargestSquares { guard } => guard,
+            Rule::WorstFirst | Rule::Batches { .. } => None,
+        };
         Task {
             held,
             features: self.features.clone(),

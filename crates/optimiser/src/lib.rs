@@ -9,7 +9,7 @@
 mod task;
 pub use task::{Budget, Task};
 mod optimise;
-pub use optimise::{Optimised, fill, optimise, overshoot};
+pub use optimise::{Optimised, fill, optimise, overshoot, weave_in};
 
 mod account;
 mod curve;

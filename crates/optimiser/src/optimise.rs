@@ -107,6 +107,18 @@ pub fn fill(dem: &Dem, importance: &Importance, start: &Tin, task: &Task) -> Opt
     })
 }
 
+/// Puts features into a TIN and leaves the rest of it alone, but for what they displace and what is then over a limit.
+///
+/// # Panics
+/// As [`optimise`].
+pub fn weave_in(dem: &Dem, importance: &Importance, start: &Tin, task: &Task) -> Optimised {
+    work_on(dem, importance, start, task, |work| {
+        work.thin_to_goal();
+        work.meet_limits();
+        work.sheet.round_heights();
+    })
+}
+
 fn work_on(dem: &Dem, importance: &Importance, start: &Tin, task: &Task, steps: impl Fn(&mut Work)) -> Optimised {
     assert_eq!(dem.rect(), start.rect, "the TIN covers the window");
     assert_eq!(dem.rect(), importance.rect(), "heights and weights cover the same posts");
