@@ -1,0 +1,9 @@
+//! Roads, rivers and lakes in small areas of known ground: what must hold of each is asked of the load modules, through
+//! the reader for simulators, and of what `level` published.
+
+mod drawing;
+
+mod bytes;
+mod refused;
+mod roads;
+mod water;
