@@ -161,7 +161,11 @@ impl AreaFeatures {
         let grants = Grants::default();
         let graded = Graded { network: roads, heights: &heights, beside: &beside, grants: &grants };
         let mut reserved = reserve(&graded, &strands, &self.site, &|module| room.of(module));
+        // What was degraded before stays so.
         while room.narrow(&reserved.cost) {
+            let before = reserved.formed.remarks.into_iter().filter(|remark| remark.flaw == Flaw::OverShare);
+            remarks.extend(before);
+            let graded = Graded { grants: &reserved.grants, ..graded };
             reserved = reserve(&graded, &strands, &self.site, &|module| room.of(module));
         }
         remarks.append(&mut reserved.formed.remarks);
