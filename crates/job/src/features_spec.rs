@@ -1,8 +1,6 @@
 //! What a job says about roads, rivers and lakes that become parts of the ground.
 
-use std::path::PathBuf;
-
-use features::{GradeOptions, Kind, Rule, RuleKind, table};
+use features::{GradeOptions, Kind, Rule};
 
 use crate::{ImportanceSpec, NamedFile};
 
@@ -30,7 +28,7 @@ pub enum FeatureSource {
         file: NamedFile,
         /// Its layer, where it has several.
         layer: Option<String>,
-        /// The kind of its features, where no tag of theirs says it.
+        /// The kind of its features, whatever their tags say; rules come first.
         kind: Option<Kind>,
     },
 }
@@ -50,8 +48,7 @@ impl FeaturesSpec {
         let mut files: Vec<&NamedFile> = Vec::new();
         for source in &self.sources {
             let FeatureSource::File { file, .. } = source else { continue };
-            let path: &PathBuf = &file.path;
-            if !files.iter().any(|other| other.path == *path) {
+            if !files.iter().any(|other| other.path == file.path) {
                 files.push(file);
             }
         }
@@ -66,45 +63,11 @@ impl FeaturesSpec {
         keys
     }
 
-    /// Names of the classes that features may get, in the table's order: of each kind those that rules name, then its
-    /// own. They follow from the job alone, so that a number of a class does not change with what the files hold.
-    pub fn classes(&self) -> Vec<String> {
-        let mut classes: Vec<String> = Vec::new();
-        let mut add = |name: &str| {
-            if !classes.iter().any(|class| class == name) {
-                classes.push(name.to_owned());
-            }
-        };
-        for kind in Kind::ALL {
-            self.rules
-                .iter()
-                .filter(|rule| kind_of(rule) == Some(kind))
-                .filter_map(|rule| rule.class.as_deref())
-                .for_each(&mut add);
-            add(kind.name());
-        }
-        classes
-    }
-
     /// All classes: those of the ground, as in [`ImportanceSpec::classes`], then those of features that are not among
-    /// them, at most 255 together.
+    /// them, at most 255 together. They follow from the job alone.
     pub fn classes_after(&self, ground: &ImportanceSpec) -> Vec<String> {
         let mut all = ground.classes.clone();
-        all.extend(self.classes().into_iter().filter(|class| !ground.classes.contains(class)));
+        all.extend(features::class_names(&self.rules).into_iter().filter(|class| !ground.classes.contains(class)));
         all
-    }
-}
-
-/// The kind of what a rule matches: its own, or the highest that the built-in table has for its tags.
-fn kind_of(rule: &Rule) -> Option<Kind> {
-    match rule.kind {
-        RuleKind::None => None,
-        RuleKind::Is(kind) => Some(kind),
-        RuleKind::AsBuiltIn => {
-            let built_in = |key: &str, value: &str| table::kind_of(&[(key.to_owned(), value.to_owned())]);
-            let kinds =
-                rule.tags.iter().flat_map(|(key, values)| values.iter().filter_map(|value| built_in(key, value)));
-            Some(kinds.min().unwrap_or(Kind::Breakline))
-        }
     }
 }
