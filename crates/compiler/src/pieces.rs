@@ -38,7 +38,7 @@ fn classes_of(run: &Run) -> Vec<u8> {
     let names = run.job.class_names();
     let spec = run.job.features.as_ref().expect("a stage of jobs with features");
     let number = |class: &String| names.iter().position(|name| name == class).expect("a job has its features' classes");
-    spec.classes().iter().map(|class| number(class) as u8).collect()
+    features::class_names(&spec.rules).iter().map(|class| number(class) as u8).collect()
 }
 
 /// A tile's features while they are put together.

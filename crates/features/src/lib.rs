@@ -29,6 +29,8 @@ pub use remark::{Flaw, Remark, Remedy};
 pub mod table;
 pub use table::{Form, Kind};
 mod lengths;
+mod overview;
+pub use overview::{IdleRule, Overview, OverviewRow, RowOrigin, overview};
 mod rules;
 pub use rules::{Feature, Rule, RuleKind, Sorted, Storey, Traits, class_names, nearest_tags, sort_out};
 

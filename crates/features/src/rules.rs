@@ -40,7 +40,7 @@ pub struct Rule {
 
 impl Rule {
     /// The first kind that what it matches may have; `None` where that is left out.
-    fn first_kind(&self) -> Option<Kind> {
+    pub(crate) fn first_kind(&self) -> Option<Kind> {
         match self.kind {
             RuleKind::None => None,
             RuleKind::Is(kind) => Some(kind),
@@ -55,7 +55,7 @@ impl Rule {
         }
     }
 
-    fn matches(&self, feature: &Source) -> bool {
+    pub(crate) fn matches(&self, feature: &Source) -> bool {
         self.tags.iter().all(|(key, values)| {
             feature.tag(key).is_some_and(|found| values.is_empty() || values.iter().any(|value| value == found))
         })
@@ -189,7 +189,7 @@ pub fn class_names(rules: &[Rule]) -> Vec<String> {
     names
 }
 
-fn class_name(rule: Option<&Rule>, kind: Kind) -> &str {
+pub(crate) fn class_name(rule: Option<&Rule>, kind: Kind) -> &str {
     rule.and_then(|rule| rule.class.as_deref()).unwrap_or(kind.name())
 }
 

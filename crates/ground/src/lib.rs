@@ -31,6 +31,8 @@ mod records;
 pub use records::{records, states};
 mod locate;
 pub use locate::{Corner, corners, covered, find_area, utm_of};
+mod features_seen;
+pub use features_seen::{FeatureRow, FeatureTable, FeaturesSeen, SourceSeen, feature_table, features_in};
 mod foresee;
 pub use foresee::foresee;
 

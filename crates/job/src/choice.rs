@@ -96,14 +96,14 @@ impl<T> Word<T> {
 
 /// Kinds, with what the built-in table says of each.
 const KINDS: [Word<Kind>; 11] = [
-    Word::new("motorway", Kind::Motorway, "motorways and trunk roads: 12 m wide, at most 6 %, a strip"),
-    Word::new("primary", Kind::Primary, "primary to tertiary roads: 7 m wide, at most 10 %, a strip"),
-    Word::new("minor", Kind::Minor, "streets and other small roads: 5 m wide, at most 15 %, a strip"),
-    Word::new("track", Kind::Track, "tracks: 3 m wide, at most 25 %, a line"),
-    Word::new("rail", Kind::Rail, "railways: 5 m wide, at most 3 %, a strip"),
-    Word::new("runway", Kind::Runway, "runways, taxiways and aprons: 45 m wide, at most 2 %, a strip"),
-    Word::new("river", Kind::River, "rivers and canals: 10 m wide, falling, a line, or the polygon of its banks"),
-    Word::new("stream", Kind::Stream, "streams, ditches and drains: 1 m wide, falling, a line"),
+    Word::new("motorway", Kind::Motorway, "motorways and trunk roads: 12 m wide, at most 6 %, form auto"),
+    Word::new("primary", Kind::Primary, "primary to tertiary roads: 7 m wide, at most 10 %, form auto"),
+    Word::new("minor", Kind::Minor, "streets and other small roads: 5 m wide, at most 15 %, form auto"),
+    Word::new("track", Kind::Track, "tracks: 3 m wide, at most 25 %, form line"),
+    Word::new("rail", Kind::Rail, "railways: 5 m wide, at most 3 %, form auto"),
+    Word::new("runway", Kind::Runway, "runways, taxiways and aprons: 45 m wide, at most 2 %, form auto"),
+    Word::new("river", Kind::River, "rivers and canals: 10 m wide, falling, form line, or the polygon of its banks"),
+    Word::new("stream", Kind::Stream, "streams, ditches and drains: 1 m wide, falling, form line"),
     Word::new("lake", Kind::Lake, "lakes and reservoirs: level, a polygon"),
     Word::new("dam", Kind::Dam, "dams and weirs: they split water and stay ground"),
     Word::new("breakline", Kind::Breakline, "lines that become edges of the TIN, as high as the ground or as they say"),

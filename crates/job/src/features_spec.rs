@@ -1,7 +1,5 @@
 //! What a job says about roads, rivers and lakes that become parts of the ground.
 
-use std::path::PathBuf;
-
 use features::{GradeOptions, Kind, Rule};
 
 use crate::{ImportanceSpec, NamedFile};
@@ -30,7 +28,7 @@ pub enum FeatureSource {
         file: NamedFile,
         /// Its layer, where it has several.
         layer: Option<String>,
-        /// The kind of its features, where no tag of theirs says it.
+        /// The kind of its features, whatever their tags say; rules come first.
         kind: Option<Kind>,
     },
 }
@@ -50,8 +48,7 @@ impl FeaturesSpec {
         let mut files: Vec<&NamedFile> = Vec::new();
         for source in &self.sources {
             let FeatureSource::File { file, .. } = source else { continue };
-            let path: &PathBuf = &file.path;
-            if !files.iter().any(|other| other.path == *path) {
+            if !files.iter().any(|other| other.path == file.path) {
                 files.push(file);
             }
         }
@@ -66,17 +63,11 @@ impl FeaturesSpec {
         keys
     }
 
-    /// Names of the classes that features may get, in the table's order: of each kind those that rules name, then its
-    /// own. They follow from the job alone, so that a number of a class does not change with what the files hold.
-    pub fn classes(&self) -> Vec<String> {
-        features::class_names(&self.rules)
-    }
-
     /// All classes: those of the ground, as in [`ImportanceSpec::classes`], then those of features that are not among
-    /// them, at most 255 together.
+    /// them, at most 255 together. They follow from the job alone.
     pub fn classes_after(&self, ground: &ImportanceSpec) -> Vec<String> {
         let mut all = ground.classes.clone();
-        all.extend(self.classes().into_iter().filter(|class| !ground.classes.contains(class)));
+        all.extend(features::class_names(&self.rules).into_iter().filter(|class| !ground.classes.contains(class)));
         all
     }
 }

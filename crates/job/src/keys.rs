@@ -119,6 +119,7 @@ pub(crate) fn hint_for_key(place: &str, found: &str) -> String {
 pub(crate) fn hint_for_section(found: &str) -> String {
     match (found, section_of("", found)) {
         ("sample", _) => "the sample terrain is chosen by source = \"sample\" and seed in [dem]".to_owned(),
+        ("roads" | "rivers" | "lakes" | "vectors", _) => "[features] names files of roads, rivers and lakes".to_owned(),
         ("workers" | "out", _) => format!("give it on the command line: --{found}"),
         (_, Some(name)) => format!("did you mean {found} in [{name}]?"),
         _ => match nearest(found, &section_names()) {

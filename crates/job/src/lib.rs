@@ -21,6 +21,7 @@ pub use model::{
     TilesSpec, TinSpec, Voids, WindowLimit,
 };
 // What a stage takes as it is.
+pub use features::Kind as FeatureKind;
 pub use terrain::{Effort, HeightFit, LastBatch, Lattice, LodBorder, Resampling, Smooth, TileOrder};
 mod importance;
 pub use importance::{AreaShape, HOLE_CLASS_NAME, ImportanceArea, ImportanceSpec, SampleClass};

@@ -299,7 +299,7 @@ const FEATURE_SOURCES: &[Key] = &[
         .line("the name of a layer of a GeoPackage", LAYER_CHARS_MAX)
         .otherwise("its only one")
         .example("{ file = \"hydro.gpkg\", layer = \"rivers\" }"),
-    Key::new("kind", "the kind of its features")
+    Key::new("kind", "the kind of its features, whatever their tags say; rules come first")
         .words::<Kind>()
         .otherwise("as rules and tags say")
         .example("{ file = \"lakes.shp\", kind = \"lake\" }"),

@@ -90,7 +90,8 @@ fn meanings_of_kinds_say_the_widths_and_grades_of_the_built_in_table() {
             percent => says(format!("at most {percent} %")),
         }
         match kind.form_default() {
-            Form::Strip => says("a strip".into()),
+            Form::Strip => says("form auto".into()),
+            Form::Line if kind.width_default() != 0 => says("form line".into()),
             Form::Polygon => says("a polygon".into()),
             _ => {}
         }
@@ -106,7 +107,7 @@ fn classes_of_features_follow_from_the_job_in_the_tables_order() {
     let job = job(&format!("{importance}[features]\nsources = [\"sample\"]\n{rules}"));
     let features = job.features.unwrap();
     let all = "motorway primary minor trail track tram rail runway river m stream lake dam fence breakline";
-    assert_eq!(features.classes().join(" "), all);
+    assert_eq!(features::class_names(&features.rules).join(" "), all);
     // The mountains have one of them, so that there is one class of that name.
     let ground = "default m motorway primary minor trail track tram rail runway river stream lake dam fence breakline";
     assert_eq!(features.classes_after(&job.importance).join(" "), ground);

@@ -1,6 +1,6 @@
 //! Keys and words that no job has, that are missing, or of the wrong kind.
 
-use crate::check;
+use crate::{check, check_part};
 
 #[test]
 fn text_that_is_not_toml_is_told_with_line_and_column() {
@@ -76,6 +76,7 @@ fn unknown_keys_are_told_with_the_nearest_known_one() {
             "hint: did you mean [importance]?",
         ],
     );
+    check_part("[importance]", "[roads]", "hint: [features] names files of roads, rivers and lakes");
     check(
         "pool",
         "proximity_m = [300, 20]",

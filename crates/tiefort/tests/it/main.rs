@@ -9,6 +9,7 @@ mod builds;
 mod columns;
 mod comparing;
 mod exports;
+mod features;
 mod foreseen;
 mod full_disk;
 mod help;
