@@ -12,7 +12,8 @@ cd "$(dirname "${BASH_SOURCE[0]}")/../fuzz"
 seconds=${1:-600}
 shift || true
 targets=("$@")
-[[ ${#targets[@]} -gt 0 ]] || targets=(geotiff rasters raw polygons geoid pins module_file tile_file manifest job)
+all=(geotiff rasters raw polygons vectors geoid pins module_file tile_file manifest job)
+[[ ${#targets[@]} -gt 0 ]] || targets=("${all[@]}")
 
 host=$(rustc -vV | sed -n 's/^host: //p')
 build=${CARGO_TARGET_DIR:-target}/fuzz
@@ -35,6 +36,7 @@ seed() {
         raw) endings=(hdr) ;;
         polygons) endings=(geojson shp gpkg) ;;
         pins) endings=(geojson csv) ;;
+        vectors) endings=(pbf geojson shp gpkg) ;;
         *) endings=(gtx) ;;
     esac
     for ending in "${endings[@]}"; do

@@ -9,12 +9,13 @@ use crate::chunk::{Chunk, Header};
 use crate::crs::Crs;
 use crate::dted::{self, Dted};
 use crate::error::A_JOB;
+use crate::features::OSM_MARK;
 use crate::frame::{Axes, Facts};
 use crate::geotiff::{FileDecoder, GeoTiff};
 use crate::rows::Rows;
 use crate::store::Store;
 use crate::text_grid::{self, AsciiGrid, Keys};
-use crate::{DatumShift, Raster, RasterFrame, SampleScale, SourceError, hgt};
+use crate::{DatumShift, Raster, RasterFrame, SampleScale, SourceError, hgt, shapefile};
 
 /// How a file is to be read, where that is not as the file itself says.
 #[derive(Clone, Debug)]
@@ -297,7 +298,7 @@ fn crs_of(store: &Store, own: Option<Result<Crs, String>>, reading: &Reading) ->
 }
 
 /// Formats that people have heights in and that are not read, by how they begin.
-fn known_but_not_read(start: &[u8]) -> Option<&'static str> {
+pub(crate) fn known_but_not_read(start: &[u8]) -> Option<&'static str> {
     const MARKS: [(&[u8], &str); 14] = [
         (b"EHFA_HEADER_TAG", "an ERDAS Imagine file"),
         (b"\x89HDF\r\n", "an HDF5 or netCDF 4 file"),
@@ -316,6 +317,12 @@ fn known_but_not_read(start: &[u8]) -> Option<&'static str> {
     ];
     if let Some((_, name)) = MARKS.iter().find(|(mark, _)| start.starts_with(mark)) {
         return Some(name);
+    }
+    if start.starts_with(&shapefile::MARK) {
+        return Some("a Shapefile of features, not a raster");
+    }
+    if start.get(4..).is_some_and(|start| start.starts_with(OSM_MARK)) {
+        return Some("OpenStreetMap features, not a raster");
     }
     let text = String::from_utf8_lossy(start);
     let text = text.trim_start();

@@ -183,6 +183,18 @@ pub enum SourceError {
     /// The file names another coordinate system than the area's.
     #[error("{path}: coordinates are in {found}, which cannot be brought to the area's EPSG:{expected}")]
     PolygonCrs { path: PathBuf, found: String, expected: u32 },
+    // Features.
+    /// The file is in none of the formats that features are read from.
+    #[error(
+        "{path}: {found}, which is not read as features; \
+        expected OpenStreetMap (.osm.pbf), a GeoPackage, a Shapefile or GeoJSON"
+    )]
+    NotFeatures { path: PathBuf, found: String },
+    /// The layer that is named is not there, or none is named where there are several.
+    #[error("{path}: {found}; expected {expected}")]
+    Layer { path: PathBuf, found: String, expected: String },
+
+    // Points and polygons of a job.
     /// A point or polygon that somebody gives is not one.
     #[error("{path}: {place}: found {found}, expected {expected}")]
     Given { path: PathBuf, place: String, found: String, expected: String },
@@ -191,7 +203,7 @@ pub enum SourceError {
 impl SourceError {
     /// What could be done about it, in one sentence, where there is something to say.
     pub fn hint(&self) -> Option<String> {
-        self.command().or_else(|| self.words().map(str::to_owned))
+        self.command().or_else(|| self.words_on_features().or_else(|| self.words()).map(str::to_owned))
     }
 
     /// The command that makes a file that is read of one that is not, as it is to be typed.
@@ -210,9 +222,43 @@ impl SourceError {
                 ("warp it onto a north-up grid: gdalwarp -r bilinear", path)
             }
             NotClasses { path, .. } => ("rewrite it: gdal_translate -ot Byte", path),
+            NotFeatures { path, found } if found.contains("OpenStreetMap data") => {
+                return Some(format!(
+                    "rewrite it: osmium cat -o out.osm.pbf {}",
+                    for_a_shell(&path.display().to_string())
+                ));
+            }
             _ => return None,
         };
         Some(format!("{words} {} out.tif", for_gdal(path)))
+    }
+
+    /// Hints about files of lines and polygons.
+    fn words_on_features(&self) -> Option<&'static str> {
+        use SourceError::*;
+        let has = |found: &str, words: &[&str]| words.iter().any(|word| found.contains(word));
+        Some(match self {
+            NotFeatures { found, .. } => match found.as_str() {
+                found if has(found, &["raster"]) => {
+                    "rasters of heights go into dem.sources; features come from files of lines and polygons"
+                }
+                found if has(found, &["an empty file"]) => "the file was not copied or unpacked whole; fetch it again",
+                found if has(found, &["archive", "gzip", "bzip2 file"]) => "unpack it and name the file in it",
+                found if has(found, &["Shapefile"]) => "name the .shp; the others are found beside it",
+                _ => "name a file of lines or polygons; ogr2ogr makes a GeoPackage of most others",
+            },
+            Layer { .. } => "name a layer: sources = [{ file = \"…\", layer = \"…\" }]; ogrinfo lists them",
+            OtherFormat { found, .. } if has(found, &["features"]) => {
+                "name a raster here; files of lines and polygons go into features.sources"
+            }
+            TooLarge { what, .. } if has(what, &["block"]) => {
+                "no extract of OpenStreetMap has such blocks: the file is damaged; fetch it again"
+            }
+            TooLarge { what: "bytes" | "features (or more)", .. } => {
+                "cut the part you need: ogr2ogr -spat WEST SOUTH EAST NORTH out.gpkg in.…"
+            }
+            _ => return None,
+        })
     }
 
     fn words(&self) -> Option<&'static str> {
@@ -296,9 +342,13 @@ fn for_gdal(path: &Path) -> String {
         "zip" => "/vsizip/",
         _ => "",
     };
-    let name = format!("{system}{}", path.display());
+    for_a_shell(&format!("{system}{}", path.display()))
+}
+
+/// A word as a shell takes it.
+fn for_a_shell(name: &str) -> String {
     let is_plain = |c: char| c.is_alphanumeric() || "/._-+,:@%".contains(c);
-    if name.chars().all(is_plain) { name } else { format!("'{}'", name.replace('\'', "'\\''")) }
+    if name.chars().all(is_plain) { name.to_owned() } else { format!("'{}'", name.replace('\'', "'\\''")) }
 }
 
 fn sides(missing: &[(Side, f64)]) -> String {

@@ -1,4 +1,4 @@
-//! Others' formats in: rasters of heights and classes, polygons; and GeoTIFF out.
+//! Others' formats in: rasters of heights and classes, polygons, roads and rivers; and GeoTIFF out.
 //!
 //! Rows are turned here, once: whatever the file's order, row 0 is the southern one from here on. A file is judged
 //! before anything is allocated for it: [`DemFile::open`] tells broken, unsupported and too large apart, and every
@@ -52,6 +52,11 @@ mod geopackage;
 mod polygons;
 mod shapefile;
 pub use polygons::read_polygons;
+mod features;
+pub use features::{
+    BUILT_IN_KEYS, Extent, FeatureFile, Remark, Tags, VectorFeature, VectorShape, Vertices, Wanted, feature_layers,
+    is_feature_file, read_features,
+};
 mod given;
 pub use given::{GivenFeature, GivenShape, read_given};
 mod write;

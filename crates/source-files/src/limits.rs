@@ -26,3 +26,15 @@ pub const HEIGHT_M_MAX: f64 = 131_071.0;
 pub const LAYERS_MAX: usize = 1000;
 /// Features of a layer of a GeoPackage: its polygons are held in memory.
 pub const ROWS_MAX: u64 = 1 << 22;
+/// Bytes of the head of a block of OpenStreetMap data: the format's own limit.
+pub const OSM_HEAD_BYTES_MAX: u64 = 64 << 10;
+/// Bytes of a block of OpenStreetMap data, packed or unpacked: the format's own limit.
+pub const OSM_BLOCK_BYTES_MAX: u64 = 32 << 20;
+/// Texts, and groups, of a block of OpenStreetMap data: blocks hold 8000 things, each with some tens of tags at most.
+pub const OSM_STRINGS_MAX: usize = 1 << 20;
+/// Things about features that are told one by one; what comes after them is counted.
+pub const REMARKS_MAX: usize = 10_000;
+/// Rings of one polygon: which lies in which is found by comparing them.
+pub const RINGS_MAX: usize = 1 << 14;
+/// Bytes of a Shapefile's shapes, and of its table: both are held in memory while features are read.
+pub const SHAPEFILE_BYTES_MAX: u64 = 512 << 20;

@@ -72,13 +72,13 @@ fn placed(path: &Path, polygons: Vec<Polygon>, said: Option<Crs>, epsg: u32) -> 
 }
 
 /// The bytes of the index of a Shapefile.
-fn index_beside(path: &Path) -> Result<Option<Vec<u8>>, SourceError> {
+pub(crate) fn index_beside(path: &Path) -> Result<Option<Vec<u8>>, SourceError> {
     let Some(index) = beside(path, &["shx"]) else { return Ok(None) };
     Store::plain(&index)?.start(GEOJSON_BYTES_MAX).map(Some)
 }
 
 /// The system that a `.prj` beside the file names.
-fn said_beside(path: &Path) -> Result<Option<Crs>, SourceError> {
+pub(crate) fn said_beside(path: &Path) -> Result<Option<Crs>, SourceError> {
     let Some(prj) = beside(path, &["prj"]) else { return Ok(None) };
     let text = Store::plain(&prj)?.start(1 << 16)?;
     let crs = Crs::from_wkt(&String::from_utf8_lossy(&text));
@@ -100,9 +100,6 @@ pub(crate) fn projected(
     crs: &Crs,
     epsg: u32,
 ) -> Result<Vec<Polygon>, SourceError> {
-    /// Pieces of a side, at most.
-    const PIECES_MAX: f64 = 1000.0;
-    let piece = if crs.is_geographic() { 0.005 } else { 500.0 };
     let outside = |found: String| SourceError::PolygonCrs { path: path.into(), found, expected: epsg };
     let area = Crs::from_epsg(epsg).map_err(&outside)?;
     let ring = |ring: &Vec<[f64; 2]>| {
@@ -110,8 +107,7 @@ pub(crate) fn projected(
         let next = ring.iter().skip(1).map(Some).chain([None]);
         for (&from, to) in ring.iter().zip(next) {
             let to = to.copied().unwrap_or(from);
-            let longest = (to[0] - from[0]).abs().max((to[1] - from[1]).abs());
-            let pieces = (longest / piece).ceil().clamp(1.0, PIECES_MAX) as u32;
+            let pieces = pieces_of(crs, from, to);
             for step in 0..pieces {
                 let share = f64::from(step) / f64::from(pieces);
                 let place = [0, 1].map(|axis| from[axis] + share * (to[axis] - from[axis]));
@@ -124,6 +120,15 @@ pub(crate) fn projected(
     let of_polygon =
         |polygon: Polygon| Ok(Polygon { rings: polygon.rings.iter().map(ring).collect::<Result<_, SourceError>>()? });
     polygons.into_iter().map(of_polygon).collect()
+}
+
+/// Into how many pieces a side is cut before it is brought from `crs` to another system.
+pub(crate) fn pieces_of(crs: &Crs, from: [f64; 2], to: [f64; 2]) -> u32 {
+    /// Pieces of a side, at most.
+    const PIECES_MAX: f64 = 1000.0;
+    let piece = if crs.is_geographic() { 0.005 } else { 500.0 };
+    let longest = (to[0] - from[0]).abs().max((to[1] - from[1]).abs());
+    (longest / piece).ceil().clamp(1.0, PIECES_MAX) as u32
 }
 
 /// Polygons found so far.

@@ -1,7 +1,7 @@
-//! Polygons from a Shapefile: the `.shp` alone, its attributes are not looked at.
+//! Shapes from a Shapefile: the records of the `.shp`, without their attributes.
 //!
 //! Read here and not by a library, because the numbers of parts and points in a record have to be held against the
-//! bytes that are there before anything is allocated for them, and because nothing else of the format is needed.
+//! bytes that are there before anything is allocated for them, and because little else of the format is needed.
 
 use crate::SourceError;
 use crate::store::Store;
@@ -9,34 +9,78 @@ use crate::store::Store;
 /// How every one begins.
 pub(crate) const MARK: [u8; 4] = [0, 0, 0x27, 0x0a];
 const HEADER_BYTES: usize = 100;
+/// Numbers below it stand for none (Esri's description, page 2).
+const NO_DATA: f64 = -1.0e38;
 
-/// The rings of each polygon, in the file's own coordinates. `index` holds the bytes of the `.shx` beside it, where
-/// there is one: files that were written over hold leftovers that only the index tells from records.
-pub(crate) fn rings(store: &Store, bytes: &[u8], index: Option<&[u8]>) -> Result<Vec<Vec<Vec<[f64; 2]>>>, SourceError> {
+/// What a record holds, in the file's own coordinates. A height that is not given is NaN.
+#[derive(Debug)]
+pub(crate) enum Shape {
+    /// A record may be empty.
+    Nothing,
+    Lines {
+        lines: Vec<Vec<[f64; 3]>>,
+        has_heights: bool,
+    },
+    /// Outer rings and holes, in whatever order.
+    Rings {
+        rings: Vec<Vec<[f64; 3]>>,
+        has_heights: bool,
+    },
+    Other(&'static str),
+}
+
+/// The shape of each record. `index` holds the bytes of the `.shx` beside it, where there is one: files that were
+/// written over hold leftovers that only the index tells from records.
+pub(crate) fn shapes<'a>(
+    store: &'a Store,
+    bytes: &'a [u8],
+    index: Option<&[u8]>,
+) -> Result<impl Iterator<Item = Result<Shape, SourceError>> + use<'a>, SourceError> {
     let places = match index.and_then(|index| index.get(HEADER_BYTES..)) {
         Some(entries) => entries.chunks_exact(8).map(|entry| 2 * big(&entry[..4])).collect(),
         None => in_sequence(store, bytes)?,
     };
+    Ok(places.into_iter().map(move |at| shape(store, bytes, at)))
+}
+
+/// The rings of each polygon, for readers of polygons only.
+pub(crate) fn rings(store: &Store, bytes: &[u8], index: Option<&[u8]>) -> Result<Vec<Vec<Vec<[f64; 2]>>>, SourceError> {
     let mut polygons = Vec::new();
-    for at in places {
-        let record = part(store, bytes, at + 8, 2 * big(&part(store, bytes, at, 8)?[4..]))?;
-        match whole(store, record, 0)? {
-            // A record may be empty.
-            0 => {}
-            // Plain, with heights, with measures: the places come first in all three.
-            5 | 15 | 25 => polygons.push(polygon(store, record)?),
-            1 | 11 | 21 => return Err(other(store, "Point")),
-            3 | 13 | 23 => return Err(other(store, "PolyLine")),
-            8 | 18 | 28 => return Err(other(store, "MultiPoint")),
-            _ => return Err(other(store, "shape of some other kind")),
+    let refused = |found| Err(SourceError::NotPolygons { path: store.path().into(), found });
+    for shape in shapes(store, bytes, index)? {
+        match shape? {
+            Shape::Nothing => {}
+            Shape::Rings { rings, .. } => {
+                let flat = |ring: Vec<[f64; 3]>| ring.into_iter().map(|[east, north, _]| [east, north]).collect();
+                polygons.push(rings.into_iter().map(flat).collect());
+            }
+            Shape::Lines { .. } => return refused("PolyLine"),
+            Shape::Other(found) => return refused(found),
         }
     }
     Ok(polygons)
 }
 
+fn shape(store: &Store, bytes: &[u8], at: usize) -> Result<Shape, SourceError> {
+    let record = part(store, bytes, at + 8, 2 * big(&part(store, bytes, at, 8)?[4..]))?;
+    let kind = whole(store, record, 0)?;
+    // Plain, with heights, with measures: the places come first in all three, then the heights.
+    let has_heights = matches!(kind, 13 | 15);
+    Ok(match kind {
+        0 => Shape::Nothing,
+        3 | 13 | 23 => Shape::Lines { lines: runs(store, record, has_heights)?, has_heights },
+        5 | 15 | 25 => Shape::Rings { rings: runs(store, record, has_heights)?, has_heights },
+        1 | 11 | 21 => Shape::Other("Point"),
+        8 | 18 | 28 => Shape::Other("MultiPoint"),
+        _ => Shape::Other("shape of some other kind"),
+    })
+}
+
 /// Where records begin when one follows the other.
 fn in_sequence(store: &Store, bytes: &[u8]) -> Result<Vec<usize>, SourceError> {
     let (mut places, mut at) = (Vec::new(), HEADER_BYTES);
+    // A header that is cut short has no records, and is no Shapefile.
+    part(store, bytes, 0, HEADER_BYTES)?;
     while at < bytes.len() {
         places.push(at);
         at += 8 + 2 * big(&part(store, bytes, at, 8)?[4..]);
@@ -49,30 +93,36 @@ fn big(bytes: &[u8]) -> usize {
     bytes.iter().fold(0, |number, &byte| number << 8 | usize::from(byte))
 }
 
-fn other(store: &Store, found: &'static str) -> SourceError {
-    SourceError::NotPolygons { path: store.path().into(), found }
-}
-
-fn polygon(store: &Store, record: &[u8]) -> Result<Vec<Vec<[f64; 2]>>, SourceError> {
+fn runs(store: &Store, record: &[u8], has_heights: bool) -> Result<Vec<Vec<[f64; 3]>>, SourceError> {
     let (parts, points) = (whole(store, record, 36)? as usize, whole(store, record, 40)? as usize);
     let starts = part(store, record, 44, parts.saturating_mul(4))?;
-    let places = part(store, record, 44 + starts.len(), points.saturating_mul(16))?;
+    let places_at = 44 + starts.len();
+    let places = part(store, record, places_at, points.saturating_mul(16))?;
     let number = |bytes: &[u8]| f64::from_le_bytes(bytes.try_into().expect("eight bytes were cut"));
-    let places: Vec<[f64; 2]> = places.chunks_exact(16).map(|xy| [number(&xy[..8]), number(&xy[8..])]).collect();
+    let mut vertices: Vec<[f64; 3]> =
+        places.chunks_exact(16).map(|xy| [number(&xy[..8]), number(&xy[8..]), f64::NAN]).collect();
+    if has_heights {
+        // Their range goes before them.
+        let heights = part(store, record, places_at + places.len() + 16, points.saturating_mul(8))?;
+        let given = heights.chunks_exact(8).map(number);
+        for (vertex, height) in vertices.iter_mut().zip(given) {
+            vertex[2] = if height < NO_DATA { f64::NAN } else { height };
+        }
+    }
     let mut starts: Vec<usize> = starts
         .chunks_exact(4)
         .map(|start| u32::from_le_bytes([start[0], start[1], start[2], start[3]]) as usize)
         .collect();
     starts.push(points);
-    let ring = |pair: &[usize]| match places.get(pair[0]..pair[1]) {
-        Some(ring) => Ok(ring.to_vec()),
+    let run = |pair: &[usize]| match vertices.get(pair[0]..pair[1]) {
+        Some(run) => Ok(run.to_vec()),
         None => Err(store.malformed(
-            "a polygon",
-            format!("a ring from point {} to {}", pair[0], pair[1]),
+            "a record",
+            format!("a part from point {} to {}", pair[0], pair[1]),
             "points there are",
         )),
     };
-    starts.windows(2).map(ring).collect()
+    starts.windows(2).map(run).collect()
 }
 
 /// An unsigned number of four bytes, the lowest first.

@@ -1,20 +1,9 @@
 //! Real files, where the folder of shared terrain exists.
 
-use std::path::PathBuf;
-
 use source_files::{Crs, DemFile, GeoTiff, Reading, SourceError};
 use terrain::{Post, PostRect};
 
-use crate::support::read;
-
-fn data(file: &str) -> Option<PathBuf> {
-    let default = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data").to_string();
-    let path = PathBuf::from(std::env::var("TIEFORT_DATA").unwrap_or(default)).join(file);
-    if !path.exists() {
-        eprintln!("skipped: {} is not there", path.display());
-    }
-    path.exists().then_some(path)
-}
+use crate::support::{data, read};
 
 #[test]
 fn every_way_of_storing_the_same_crop_gives_the_same_posts() {

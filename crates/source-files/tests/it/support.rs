@@ -153,3 +153,13 @@ pub fn grid(east_m: f64, north_m: f64, spacing_m: f64) -> GridFrame {
     let spacing = Spacing::from_metres(spacing_m).unwrap();
     GridFrame { origin_east_m: east_m, origin_north_m: north_m, spacing }
 }
+
+/// A file of the shared terrain data, where that is there.
+pub fn data(file: &str) -> Option<PathBuf> {
+    let default = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data").to_string();
+    let path = PathBuf::from(std::env::var("TIEFORT_DATA").unwrap_or(default)).join(file);
+    if !path.exists() {
+        eprintln!("skipped: {} is not there", path.display());
+    }
+    path.exists().then_some(path)
+}

@@ -1,0 +1,119 @@
+//! Attributes: the table beside a Shapefile (`.dbf`), and tags that GDAL packs into one column.
+
+use crate::SourceError;
+use crate::store::Store;
+
+/// The rows of a table: each the name and the text of every column that holds something.
+pub(super) struct Table {
+    columns: Vec<Column>,
+    row_bytes: usize,
+    rows: Vec<u8>,
+    is_utf8: bool,
+}
+
+struct Column {
+    name: String,
+    is_logical: bool,
+    is_text: bool,
+    bytes: std::ops::Range<usize>,
+}
+
+impl Table {
+    /// Reads the table in `bytes`; `encoding` is what a `.cpg` beside it says.
+    pub(super) fn read(store: &Store, bytes: Vec<u8>, encoding: Option<&str>) -> Result<Self, SourceError> {
+        let short = |what: &str, expected: usize| SourceError::Truncated {
+            path: store.path().into(),
+            what: what.into(),
+            expected: expected as u64,
+            found: bytes.len() as u64,
+        };
+        let head = bytes.get(..32).ok_or_else(|| short("the head of the table", 32))?;
+        let row_count = u32::from_le_bytes([head[4], head[5], head[6], head[7]]) as usize;
+        let rows_at = usize::from(u16::from_le_bytes([head[8], head[9]]));
+        let row_bytes = usize::from(u16::from_le_bytes([head[10], head[11]]));
+        // GDAL writes UTF-8 without a mark in the table itself; all others are near enough to Latin-1.
+        let is_utf8 = encoding.is_some_and(|name| {
+            let name = name.trim().to_ascii_uppercase();
+            name == "UTF-8" || name == "UTF8" || name == "65001"
+        });
+        let (mut columns, mut at) = (Vec::new(), 1);
+        let described = bytes.get(32..rows_at).ok_or_else(|| short("the columns of the table", rows_at))?;
+        for field in described.chunks_exact(32).take_while(|field| field[0] != 0x0d) {
+            let name = field[..11].split(|&byte| byte == 0).next().unwrap_or_default();
+            let name = decoded(name, is_utf8);
+            let end = at + usize::from(field[16]);
+            columns.push(Column { name, is_logical: field[11] == b'L', is_text: field[11] == b'C', bytes: at..end });
+            at = end;
+        }
+        if row_bytes < at {
+            let found = format!("columns of {at} bytes in rows of {row_bytes}");
+            return Err(store.malformed("the table", found, "columns that fit into a row"));
+        }
+        let end = rows_at.saturating_add(row_count.saturating_mul(row_bytes));
+        let rows = bytes.get(rows_at..end).ok_or_else(|| short("the rows of the table", end))?.to_vec();
+        Ok(Self { columns, row_bytes, rows, is_utf8 })
+    }
+
+    /// The columns of a row that hold something, and whether the row is marked as deleted; `None` beyond the last.
+    pub(super) fn row(&self, index: usize) -> Option<(Vec<(&str, String)>, bool)> {
+        let row = self.rows.get(index.checked_mul(self.row_bytes)?..)?.get(..self.row_bytes)?;
+        let text = |column: &Column| {
+            let bytes = &row[column.bytes.clone()];
+            let bytes = bytes.split(|&byte| byte == 0).next().unwrap_or_default();
+            let text = decoded(bytes, self.is_utf8);
+            let text = if column.is_text { text.trim_end() } else { text.trim() };
+            match (column.is_logical, text) {
+                (_, "") => None,
+                (true, "T" | "t" | "Y" | "y") => Some("true".into()),
+                (true, "F" | "f" | "N" | "n") => Some("false".into()),
+                (true, _) => None,
+                // Stars fill a number that its column had no room for.
+                (false, text) if !column.is_text && text.starts_with('*') => None,
+                (false, text) => Some(text.to_owned()),
+            }
+        };
+        let columns = self.columns.iter().filter_map(|column| Some((column.name.as_str(), text(column)?)));
+        Some((columns.collect(), row[0] == b'*'))
+    }
+}
+
+fn decoded(bytes: &[u8], is_utf8: bool) -> String {
+    match std::str::from_utf8(bytes) {
+        Ok(text) if is_utf8 || text.is_ascii() => text.to_owned(),
+        _ if is_utf8 => String::from_utf8_lossy(bytes).into_owned(),
+        _ => bytes.iter().map(|&byte| char::from(byte)).collect(),
+    }
+}
+
+/// GDAL gives the tags of OpenStreetMap that have no column of their own as one text, `"bridge"=>"yes","layer"=>"1"`.
+/// They are tags like the others.
+const PACKED_TAGS: &str = "other_tags";
+
+/// Attributes with the tags that one of them packs, unless the text is something else.
+pub(super) fn with_packed_tags<'t>(all: impl IntoIterator<Item = (&'t str, &'t str)>) -> Vec<(&'t str, &'t str)> {
+    let mut tags = Vec::new();
+    for (key, value) in all {
+        match (key == PACKED_TAGS).then(|| packed(value)).flatten() {
+            Some(mut unpacked) => tags.append(&mut unpacked),
+            None => tags.push((key, value)),
+        }
+    }
+    tags
+}
+
+fn packed(text: &str) -> Option<Vec<(&str, &str)>> {
+    let inner = text.trim().strip_prefix('"')?.strip_suffix('"')?;
+    inner.split("\",\"").map(|pair| pair.split_once("\"=>\"")).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tags_that_are_packed_into_one_text_are_tags_of_their_own() {
+        let tags = [("name", "a"), ("other_tags", r#""bridge"=>"yes","layer"=>"1""#)];
+        assert_eq!(with_packed_tags(tags), [("name", "a"), ("bridge", "yes"), ("layer", "1")]);
+        assert_eq!(with_packed_tags([("other_tags", "none")]), [("other_tags", "none")]);
+    }
+}

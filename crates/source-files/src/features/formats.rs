@@ -1,0 +1,106 @@
+//! Which format a file of features is in, by how it begins.
+
+use std::path::Path;
+
+use super::osm;
+use crate::dem_file::known_but_not_read;
+use crate::store::Store;
+use crate::{SourceError, geopackage, shapefile};
+
+/// Formats that are read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Format {
+    OpenStreetMap,
+    GeoPackage,
+    Shapefile,
+    GeoJson,
+}
+
+/// Whether the file at `path` begins as one of the formats of features does; `false` where it cannot be read.
+pub fn is_feature_file(path: &Path) -> bool {
+    open(path).is_ok()
+}
+
+/// The layers of features in the GeoPackage at `path`; none where it is a file of another format.
+///
+/// # Errors
+/// When the file is none of the formats of features, or is broken.
+pub fn feature_layers(path: &Path) -> Result<Vec<String>, SourceError> {
+    match open(path)?.1 {
+        Format::GeoPackage => geopackage::layer_names(path),
+        _ => Ok(Vec::new()),
+    }
+}
+
+/// Opens a file of features; gzipped GeoJSON is unpacked.
+pub(super) fn open(path: &Path) -> Result<(Store, Format), SourceError> {
+    let store = Store::plain(path)?;
+    let start = store.start(512)?;
+    if start.starts_with(geopackage::MARK) {
+        return Ok((store, Format::GeoPackage));
+    }
+    if start.starts_with(&shapefile::MARK) {
+        let ending = path.extension().unwrap_or_default();
+        return match ending.eq_ignore_ascii_case("shx") {
+            false => Ok((store, Format::Shapefile)),
+            true => Err(refused(path, "the index of a Shapefile")),
+        };
+    }
+    if start.get(4..).is_some_and(|start| start.starts_with(osm::MARK)) {
+        return Ok((store, Format::OpenStreetMap));
+    }
+    if start.starts_with(&[0x1f, 0x8b]) {
+        let unpacked = Store::open(path)?;
+        let start = unpacked.start(512)?;
+        return match is_json(&start) {
+            true => Ok((unpacked, Format::GeoJson)),
+            false => Err(refused(path, &format!("a gzip file of {}", name_of(path, &start)))),
+        };
+    }
+    if is_json(&start) {
+        return Ok((store, Format::GeoJson));
+    }
+    Err(refused(path, &name_of(path, &start)))
+}
+
+fn refused(path: &Path, found: &str) -> SourceError {
+    SourceError::NotFeatures { path: path.into(), found: found.into() }
+}
+
+/// Some editors put a byte order mark before UTF-8 text.
+fn is_json(start: &[u8]) -> bool {
+    let start = start.strip_prefix("\u{feff}".as_bytes()).unwrap_or(start);
+    start.trim_ascii_start().starts_with(b"{")
+}
+
+/// What a file is that is not read.
+fn name_of(path: &Path, start: &[u8]) -> String {
+    const MARKS: [(&[u8], &str); 8] = [
+        (b"II\x2a\0", "a GeoTIFF raster"),
+        (b"MM\0\x2a", "a GeoTIFF raster"),
+        (b"II\x2b\0", "a GeoTIFF raster"),
+        (b"MM\0\x2b", "a GeoTIFF raster"),
+        (b"UHL1", "a DTED raster"),
+        (b"PK\x03\x04", "a zip archive"),
+        (b"BZh", "a bzip2 file"),
+        (b"fgb\x03", "a FlatGeobuf file"),
+    ];
+    let ending = path.extension().map(|ending| ending.to_string_lossy().to_lowercase()).unwrap_or_default();
+    let text = String::from_utf8_lossy(start);
+    let known = MARKS.iter().find(|(mark, _)| start.starts_with(mark)).map(|&(_, name)| name);
+    match ending.as_str() {
+        _ if start.is_empty() => "an empty file".into(),
+        _ if known.is_some() => known.unwrap_or_default().into(),
+        _ if text.contains("<osm") => "OpenStreetMap data as XML".into(),
+        _ if text.trim_start().starts_with('<') => "a file of XML (KML, GML or GPX, perhaps)".into(),
+        "pbf" => format!("a .pbf file that begins with {} and is no OpenStreetMap data", hexadecimal(start)),
+        "dbf" => "the table of a Shapefile".into(),
+        "hgt" | "asc" | "flt" | "dt0" | "dt1" | "dt2" => format!("a raster (.{ending})"),
+        _ => known_but_not_read(start)
+            .map_or_else(|| format!("a file that begins with {}", hexadecimal(start)), str::to_owned),
+    }
+}
+
+fn hexadecimal(start: &[u8]) -> String {
+    start.iter().take(8).map(|byte| format!("{byte:02x}")).collect::<Vec<_>>().join(" ")
+}

@@ -1,0 +1,313 @@
+//! OpenStreetMap data in protocol buffers (`.osm.pbf`).
+//!
+//! Ways name their nodes and relations their ways, so the file is gone through several times: all blocks for the nodes
+//! near the area, blocks of relations for the multipolygons that are wanted, blocks of ways for those with a node near
+//! the area, and, for what those need from farther away, the few blocks whose ids reach that far. What is kept is
+//! bounded by what lies near the area, not by the file. A way that crosses the area without a node near it is not
+//! seen: its segment would be longer than [`SEGMENT_M_MAX`], and segments that long are cut.
+
+mod assemble;
+mod block;
+mod frames;
+mod kinds;
+mod nodes;
+mod shapes;
+mod wire;
+
+use std::collections::HashSet;
+use std::sync::Arc;
+
+use super::placing::{LEFT_OUT, Placing, Texts};
+use super::{FeatureFile, Tags, Wanted};
+use crate::SourceError;
+use crate::crs::Crs;
+use crate::store::Store;
+use assemble::Role;
+use block::{Block, Contents, Demands, MemberKind, OFF_THE_EARTH, Way};
+pub(crate) use frames::MARK;
+use frames::{Frame, FrameKind, Frames};
+use nodes::Nodes;
+use wire::Fault;
+
+/// Longer segments are no road or river but a node in the wrong place. Nodes up to this far from the area are kept.
+const SEGMENT_M_MAX: f64 = 20_000.0;
+/// Whom to name (Open Database License, section 4.3).
+const ATTRIBUTION: &str = "(c) OpenStreetMap contributors, ODbL 1.0";
+/// Ways without a node near the area that are looked at for whether their nodes are in the file at all.
+const LOST_MAX: usize = 100_000;
+
+/// A way near the area, or a member of a relation that is.
+#[derive(Debug)]
+struct KeptWay {
+    id: i64,
+    /// Empty where only a relation wants it.
+    tags: Tags,
+    nodes: Box<[i64]>,
+    /// Whether some of its nodes are not near the area.
+    reaches_out: bool,
+    is_wanted: bool,
+}
+
+/// A multipolygon relation that is wanted.
+#[derive(Debug)]
+struct KeptRelation {
+    id: i64,
+    tags: Tags,
+    members: Vec<(Role, i64)>,
+}
+
+/// A file on its way to features.
+struct Reader<'a> {
+    frames: Frames<'a>,
+    blocks: Vec<(Frame, Contents)>,
+    keys: &'a [&'a str],
+    nodes: Nodes,
+    texts: Texts,
+    ways: Vec<KeptWay>,
+    /// Wanted ways that have no node near the area: their first nodes, as far as they are looked at.
+    lost: Vec<(i64, i64)>,
+    far_ways: u64,
+}
+
+pub(super) fn read(store: &Store, wanted: &Wanted) -> Result<FeatureFile, SourceError> {
+    let mut placing = Placing::new(store.path(), wanted, Some(Crs::wgs84()))?;
+    let mut reader = Reader {
+        frames: Frames::open(store)?,
+        blocks: Vec::new(),
+        keys: wanted.keys,
+        // Sines of latitudes are not computed where segments are measured, so some more is kept.
+        nodes: Nodes::new(placing.within(1.25 * SEGMENT_M_MAX)),
+        texts: Texts::default(),
+        ways: Vec::new(),
+        lost: Vec::new(),
+        far_ways: 0,
+    };
+    reader.survey(store)?;
+    let mut relations = reader.relations()?;
+    reader.near_ways(&relations, &mut placing)?;
+    let all = relations.len();
+    reader.keep_reached(&mut relations)?;
+    reader.far_nodes()?;
+    placing.lies_over(&reader.nodes.lies);
+    placing.count_outside((all - relations.len()) as u64);
+    reader.tell_lost(&mut placing);
+    let Reader { nodes, ways, .. } = reader;
+    shapes::place(&nodes, ways, relations, &mut placing);
+    Ok(placing.finish(Some(ATTRIBUTION)))
+}
+
+impl<'a> Reader<'a> {
+    /// Goes through all blocks: what each holds, and where nodes near the area lie.
+    fn survey(&mut self, store: &Store) -> Result<(), SourceError> {
+        let mut way = Way::default();
+        let mut has_places_on_ways = false;
+        for frame in self.frames.list()? {
+            match frame.kind {
+                FrameKind::Other => {}
+                FrameKind::Header => {
+                    let demands = self.frames.with_bytes(&frame, Demands::read)?;
+                    if let Some(name) = demands.required.iter().find(|name| !KNOWN.contains(&name.as_str())) {
+                        let found = format!("OpenStreetMap data that asks its readers for `{name}`");
+                        return Err(SourceError::NotFeatures { path: store.path().into(), found });
+                    }
+                    has_places_on_ways = demands.has_places_on_ways;
+                }
+                FrameKind::Data => {
+                    let nodes = &mut self.nodes;
+                    let contents = self.frames.with_bytes(&frame, |bytes| {
+                        let block = Block::read(bytes)?;
+                        if has_places_on_ways {
+                            block.ways(&mut way, |way| {
+                                way.nodes.iter().zip(&way.places).for_each(|(&id, &place)| nodes.see(id, place));
+                                Ok::<_, Fault>(())
+                            })?;
+                        }
+                        block.contents(|id, place| nodes.see(id, place))
+                    })?;
+                    self.blocks.push((frame, contents));
+                }
+            }
+        }
+        self.nodes.sort();
+        Ok(())
+    }
+
+    /// The multipolygon relations with a wanted key.
+    fn relations(&mut self) -> Result<Vec<KeptRelation>, SourceError> {
+        let Self { frames, blocks, keys, texts, .. } = self;
+        let mut kept = Vec::new();
+        for (frame, _) in blocks.iter().filter(|(_, contents)| contents.relations) {
+            frames.with_bytes(frame, |bytes| {
+                let block = Block::read(bytes)?;
+                let is_wanted = wanted_texts(&block, keys);
+                let mut known = KnownTexts::of(&block);
+                block.relations(|relation| {
+                    let is_multipolygon = relation
+                        .tags
+                        .iter()
+                        .any(|&(key, value)| block.texts[key] == b"type" && block.texts[value] == b"multipolygon");
+                    if !is_multipolygon || !relation.tags.iter().any(|&(key, _)| is_wanted[key]) {
+                        return Ok::<_, Fault>(());
+                    }
+                    let role = |text: &[u8]| if text == b"inner" { Role::Inner } else { Role::Outer };
+                    let ways = relation.members.iter().filter(|(kind, ..)| *kind == MemberKind::Way);
+                    let members = ways.map(|&(_, id, text)| (role(block.texts[text]), id)).collect();
+                    kept.push(KeptRelation {
+                        id: relation.id,
+                        tags: known.tags(&block, &relation.tags, texts),
+                        members,
+                    });
+                    Ok(())
+                })
+            })?;
+        }
+        kept.sort_by_key(|relation: &KeptRelation| relation.id);
+        kept.dedup_by_key(|relation| relation.id);
+        Ok(kept)
+    }
+
+    /// Keeps ways with a node near the area that are wanted, by themselves or by a relation.
+    fn near_ways(&mut self, relations: &[KeptRelation], placing: &mut Placing) -> Result<(), SourceError> {
+        let members = member_ids(relations);
+        let Self { frames, blocks, keys, nodes, texts, ways, lost, far_ways, .. } = self;
+        let mut way = Way::default();
+        for (frame, _) in blocks.iter().filter(|(_, contents)| contents.ways.is_some()) {
+            frames.with_bytes(frame, |bytes| {
+                let block = Block::read(bytes)?;
+                let is_wanted_text = wanted_texts(&block, keys);
+                let mut known = KnownTexts::of(&block);
+                block.ways(&mut way, |way| {
+                    let is_wanted = way.tags.iter().any(|&(key, _)| is_wanted_text[key]);
+                    if !is_wanted && members.binary_search(&way.id).is_err() {
+                        return Ok::<_, Fault>(());
+                    }
+                    let near = way.nodes.iter().filter(|&&node| nodes.is_near(node)).count();
+                    if 0 < near {
+                        let tags = if is_wanted { known.tags(&block, &way.tags, texts) } else { Tags::new() };
+                        let (reaches_out, nodes) = (near < way.nodes.len(), way.nodes.as_slice().into());
+                        ways.push(KeptWay { id: way.id, tags, nodes, reaches_out, is_wanted });
+                    } else if is_wanted {
+                        *far_ways += 1;
+                        match way.nodes.first() {
+                            Some(&node) if lost.len() < LOST_MAX => lost.push((way.id, node)),
+                            Some(_) => {}
+                            None => placing.remark(&format!("way/{}", way.id), None, "no nodes".into(), LEFT_OUT),
+                        }
+                    }
+                    Ok(())
+                })
+            })?;
+        }
+        sort_ways(ways);
+        Ok(())
+    }
+
+    /// Lets go of relations without a way near the area, and fetches the other ways of those that have one.
+    fn keep_reached(&mut self, relations: &mut Vec<KeptRelation>) -> Result<(), SourceError> {
+        let Self { frames, blocks, ways, .. } = self;
+        let is_kept = |id: i64| ways.binary_search_by_key(&id, |way| way.id).is_ok();
+        relations.retain(|relation| relation.members.is_empty() || relation.members.iter().any(|(_, id)| is_kept(*id)));
+        let mut missing = member_ids(relations);
+        missing.retain(|&id| !is_kept(id));
+        let mut way = Way::default();
+        for (frame, contents) in blocks.iter() {
+            if !contents.ways.is_some_and(|range| reaches(&missing, range)) {
+                continue;
+            }
+            frames.with_bytes(frame, |bytes| {
+                Block::read(bytes)?.ways(&mut way, |way| {
+                    if missing.binary_search(&way.id).is_ok() {
+                        let nodes = way.nodes.as_slice().into();
+                        let tags = Tags::new();
+                        ways.push(KeptWay { id: way.id, tags, nodes, reaches_out: true, is_wanted: false });
+                    }
+                    Ok::<_, Fault>(())
+                })
+            })?;
+        }
+        sort_ways(ways);
+        Ok(())
+    }
+
+    /// Finds the nodes of kept ways that are not near the area.
+    fn far_nodes(&mut self) -> Result<(), SourceError> {
+        let Self { frames, blocks, nodes, ways, lost, .. } = self;
+        let of_ways = ways.iter().filter(|way| way.reaches_out).flat_map(|way| way.nodes.iter().copied());
+        let of_ways = of_ways.filter(|&id| !nodes.is_near(id));
+        let mut missing: Vec<i64> = of_ways.chain(lost.iter().map(|&(_, node)| node)).collect();
+        missing.sort_unstable();
+        missing.dedup();
+        for (frame, contents) in blocks.iter() {
+            if !contents.nodes.is_some_and(|range| reaches(&missing, range)) {
+                continue;
+            }
+            frames.with_bytes(frame, |bytes| {
+                Block::read(bytes)?.nodes(|id, place| {
+                    if missing.binary_search(&id).is_ok() {
+                        nodes.keep(id, place);
+                    }
+                })
+            })?;
+        }
+        nodes.sort();
+        Ok(())
+    }
+
+    /// Tells ways that lie nowhere; others without a node near the area are only counted.
+    fn tell_lost(&mut self, placing: &mut Placing) {
+        for &(way, node) in &self.lost {
+            let found = match self.nodes.place(node) {
+                None => format!("its first node ({node}) is not in the file, and none of its others near the area"),
+                Some(OFF_THE_EARTH) => format!("its node {node} is not on the Earth"),
+                Some(_) => continue,
+            };
+            placing.remark(&format!("way/{way}"), None, found, LEFT_OUT);
+        }
+        placing.count_outside(self.far_ways);
+    }
+}
+
+/// What a file may demand of its readers here.
+const KNOWN: [&str; 2] = ["OsmSchema-V0.6", "DenseNodes"];
+
+fn member_ids(relations: &[KeptRelation]) -> Vec<i64> {
+    let mut ids: Vec<i64> = relations.iter().flat_map(|relation| relation.members.iter().map(|(_, id)| *id)).collect();
+    ids.sort_unstable();
+    ids.dedup();
+    ids
+}
+
+/// In the order of their numbers. Of a way that a file has twice, one is kept, whichever comes first.
+fn sort_ways(ways: &mut Vec<KeptWay>) {
+    ways.sort_by(|a, b| (a.id, &a.nodes).cmp(&(b.id, &b.nodes)));
+    ways.dedup_by_key(|way| way.id);
+}
+
+/// Whether some of the sorted ids lie in a range.
+fn reaches(ids: &[i64], [least, most]: [i64; 2]) -> bool {
+    ids.get(ids.partition_point(|&id| id < least)).is_some_and(|&id| id <= most)
+}
+
+/// Which texts of a block are wanted keys.
+fn wanted_texts(block: &Block, keys: &[&str]) -> Vec<bool> {
+    let keys: HashSet<&[u8]> = keys.iter().map(|key| key.as_bytes()).collect();
+    block.texts.iter().map(|text| keys.contains(text)).collect()
+}
+
+/// The texts of a block that have been kept so far.
+struct KnownTexts(Vec<Option<Arc<str>>>);
+
+impl KnownTexts {
+    fn of(block: &Block) -> Self {
+        Self(vec![None; block.texts.len()])
+    }
+
+    fn tags(&mut self, block: &Block, tags: &[(usize, usize)], texts: &mut Texts) -> Tags {
+        let mut text = |index: usize| {
+            self.0[index].get_or_insert_with(|| texts.keep(&String::from_utf8_lossy(block.texts[index]))).clone()
+        };
+        let mut tags: Tags = tags.iter().map(|&(key, value)| (text(key), text(value))).collect();
+        tags.sort_unstable();
+        tags
+    }
+}

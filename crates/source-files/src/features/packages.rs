@@ -1,0 +1,128 @@
+//! Lines and polygons from a layer of a GeoPackage, with its columns as tags.
+
+use std::path::Path;
+
+use rusqlite::Row;
+use rusqlite::types::ValueRef;
+
+use super::clip::Vertex;
+use super::columns::with_packed_tags;
+use super::placing::{LEFT_OUT, Placing, RawFeature, Texts, look_like_degrees};
+use super::well_known::geometry;
+use super::{FeatureFile, Wanted};
+use crate::SourceError;
+use crate::crs::Crs;
+use crate::geopackage::{Package, Table};
+
+/// Features whose places say whether a layer without a system is in degrees.
+const LOOKED_AT: usize = 1000;
+
+pub(super) fn read(path: &Path, wanted: &Wanted) -> Result<FeatureFile, SourceError> {
+    let package = Package::open(path)?;
+    let table = chosen(path, &package, wanted.layer)?;
+    let said = match package.crs(table.srs)? {
+        Some(crs) => Some(crs),
+        None => looks(path, &package, &table)?.then(Crs::wgs84),
+    };
+    let mut placing = Placing::new(path, wanted, said)?;
+    let file = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    let (name, mut texts) = (format!("{file}:{}", table.name), Texts::default());
+    let columns = Columns::of(path, &package, &table)?;
+    let mut count = 0_u64;
+    // The row's own number goes first, so that it has a name even where no column is the key.
+    package.rows(&table, "rowid, *", |row| {
+        count += 1;
+        let at = |index: usize| row.get_ref(index).map_err(|error| package.broken(error));
+        let number = if let ValueRef::Integer(number) = at(0)? { number } else { count.cast_signed() };
+        let id = format!("{name}#{number}");
+        let shape = match at(1 + columns.geometry)? {
+            // A feature without a geometry is legal and adds nothing.
+            ValueRef::Null => return Ok(()),
+            ValueRef::Blob(blob) => geometry(blob),
+            _ => Err("a geometry that is none".into()),
+        };
+        match shape {
+            Ok(shape) => {
+                let said = columns.said(row).map_err(|error| package.broken(error))?;
+                let tags = with_packed_tags(said.iter().map(|(key, value)| (*key, value.as_str())));
+                placing.place(RawFeature { id, tags: texts.tags(tags), shape });
+            }
+            Err(found) => placing.remark(&id, None, found, LEFT_OUT),
+        }
+        Ok(())
+    })?;
+    Ok(placing.finish(None))
+}
+
+/// Columns of a layer and where they stand in a row.
+struct Columns {
+    geometry: usize,
+    others: Vec<(usize, String)>,
+}
+
+impl Columns {
+    fn of(path: &Path, package: &Package, table: &Table) -> Result<Self, SourceError> {
+        let mut others = package.columns(table)?;
+        let Some(index) = others.iter().position(|(_, name)| name.eq_ignore_ascii_case(&table.column)) else {
+            let (what, found) = ("the GeoPackage".into(), format!("no column `{}` in `{}`", table.column, table.name));
+            let expected = "the column of geometries that it lists".into();
+            return Err(SourceError::Malformed { path: path.into(), what, found, expected });
+        };
+        Ok(Self { geometry: others.remove(index).0, others })
+    }
+
+    /// The columns of a row that hold something, as texts.
+    fn said(&self, row: &Row) -> rusqlite::Result<Vec<(&str, String)>> {
+        let mut said = Vec::new();
+        for (index, name) in &self.others {
+            let text = match row.get_ref(1 + index)? {
+                ValueRef::Integer(number) => number.to_string(),
+                ValueRef::Real(number) => number.to_string(),
+                ValueRef::Text(text) => String::from_utf8_lossy(text).into_owned(),
+                ValueRef::Null | ValueRef::Blob(_) => continue,
+            };
+            said.push((name.as_str(), text));
+        }
+        Ok(said)
+    }
+}
+
+/// The layer that is named, or the only one that holds anything.
+fn chosen(path: &Path, package: &Package, layer: Option<&str>) -> Result<Table, SourceError> {
+    let tables = package.tables()?;
+    let listed =
+        |tables: &[Table]| tables.iter().map(|table| format!("`{}`", table.name)).collect::<Vec<_>>().join(", ");
+    let refused = |found: String, expected: String| SourceError::Layer { path: path.into(), found, expected };
+    if let Some(name) = layer {
+        let expected = format!("one of {}", listed(&tables));
+        let found = tables.into_iter().find(|table| table.name == name);
+        return found.ok_or_else(|| refused(format!("the layer `{name}` named"), expected));
+    }
+    let (mut filled, mut empty) = (Vec::new(), Vec::new());
+    for table in tables {
+        if package.has_rows(&table)? { filled.push(table) } else { empty.push(table) }
+    }
+    if 1 < filled.len() {
+        let found = format!("{} layers: {}", filled.len(), listed(&filled));
+        return Err(refused(found, "one of them named".into()));
+    }
+    // Where there is nothing in any layer, there is nothing in whichever is read.
+    filled.into_iter().chain(empty).next().ok_or_else(|| refused("no layer of features".into(), "one".into()))
+}
+
+/// Whether the first places of a layer look like degrees.
+fn looks(path: &Path, package: &Package, table: &Table) -> Result<bool, SourceError> {
+    let columns = Columns::of(path, package, table)?;
+    let (mut vertices, mut count): (Vec<Vertex>, _) = (Vec::new(), 0);
+    package.rows(table, "*", |row| {
+        count += 1;
+        match row.get_ref(columns.geometry) {
+            Ok(ValueRef::Blob(blob)) if count <= LOOKED_AT => {
+                vertices.extend(geometry(blob).iter().flat_map(|shape| shape.vertices()).take(LOOKED_AT));
+            }
+            _ => {}
+        }
+        Ok(())
+    })?;
+    Ok(look_like_degrees(vertices.iter()))
+}

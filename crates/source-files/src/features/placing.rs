@@ -1,0 +1,429 @@
+//! From a file's coordinates to those of the area: what is not on the Earth is left out, what is far away is cut off
+//! before it is projected, and what is left is cut at the bounds.
+
+use std::collections::HashSet;
+use std::path::Path;
+use std::sync::Arc;
+
+use super::clip::{self, Extent, Vertex};
+use super::{FeatureFile, Remark, Tags, VectorFeature, VectorShape, Vertices, Wanted};
+use crate::SourceError;
+use crate::crs::Crs;
+use crate::limits::{HEIGHT_M_MAX, REMARKS_MAX};
+use crate::polygons::pieces_of;
+
+/// A feature in its file's coordinates.
+#[derive(Debug)]
+pub(super) struct RawFeature {
+    pub id: String,
+    pub tags: Tags,
+    pub shape: RawShape,
+}
+
+/// Where a feature lies, in its file's coordinates.
+#[derive(Debug, Default)]
+pub(crate) struct RawShape {
+    /// Whether the file gives heights. Those that it does not give are NaN.
+    pub has_heights: bool,
+    pub parts: Vec<Part>,
+    /// Something in it that is neither a line nor a polygon.
+    pub other: Option<&'static str>,
+}
+
+/// A line, or a polygon: its outer ring, then its holes.
+#[derive(Debug)]
+pub(crate) enum Part {
+    Line(Vec<Vertex>),
+    Polygon(Vec<Vec<Vertex>>),
+}
+
+impl Part {
+    fn runs(&self) -> &[Vec<Vertex>] {
+        match self {
+            Part::Line(line) => std::slice::from_ref(line),
+            Part::Polygon(rings) => rings,
+        }
+    }
+}
+
+impl RawShape {
+    pub(super) fn vertices(&self) -> impl Iterator<Item = &Vertex> {
+        self.parts.iter().flat_map(Part::runs).flatten()
+    }
+}
+
+/// Texts that are the same, kept once.
+#[derive(Debug, Default)]
+pub(super) struct Texts(HashSet<Arc<str>>);
+
+impl Texts {
+    pub(super) fn keep(&mut self, text: &str) -> Arc<str> {
+        if let Some(kept) = self.0.get(text) {
+            return kept.clone();
+        }
+        let kept: Arc<str> = text.into();
+        self.0.insert(kept.clone());
+        kept
+    }
+
+    /// Tags in the order that features have them.
+    pub(super) fn tags<'t>(&mut self, all: impl IntoIterator<Item = (&'t str, &'t str)>) -> Tags {
+        let mut tags: Tags = all.into_iter().map(|(key, value)| (self.keep(key), self.keep(value))).collect();
+        tags.sort();
+        tags
+    }
+}
+
+/// Whether most places can only be degrees; what nothing is said about is taken for WGS 84 then.
+pub(super) fn look_like_degrees<'v>(vertices: impl Iterator<Item = &'v Vertex>) -> bool {
+    let is_degrees = |[east, north, _]: &Vertex| east.abs() <= 360.0 && north.abs() <= 90.0;
+    let (all, degrees) =
+        vertices.fold((0_u64, 0_u64), |(all, degrees), vertex| (all + 1, degrees + u64::from(is_degrees(vertex))));
+    all < 2 * degrees
+}
+
+/// Brings features to the area.
+pub(super) struct Placing {
+    area: Crs,
+    bounds: Extent,
+    /// The file's system.
+    source: Crs,
+    is_same: bool,
+    /// What of the file's coordinates is projected at all.
+    near: Extent,
+    /// Where the features of the file lie, in its coordinates.
+    lies: Extent,
+    height_unit_m: f64,
+    remarks_beyond: u64,
+    file: FeatureFile,
+}
+
+impl Placing {
+    /// For a file in the system `said`, or in the area's own.
+    pub(super) fn new(path: &Path, wanted: &Wanted, said: Option<Crs>) -> Result<Self, SourceError> {
+        let refused = |found: String| SourceError::PolygonCrs { path: path.into(), found, expected: wanted.epsg };
+        let area = Crs::from_epsg(wanted.epsg).map_err(refused)?;
+        let source = said.unwrap_or_else(|| area.clone());
+        let is_same = source == area;
+        let near = if is_same { wanted.bounds } else { seen_in(&area, &source, &wanted.bounds) };
+        let height_unit_m = source.vertical_unit_m().unwrap_or(1.0);
+        let mut file = FeatureFile::default();
+        file.notes.extend(source.remark().filter(|_| !is_same).map(|remark| format!("{}: {remark}", source.name())));
+        Ok(Self {
+            area,
+            bounds: wanted.bounds,
+            source,
+            is_same,
+            near,
+            lies: Extent::NOTHING,
+            height_unit_m,
+            remarks_beyond: 0,
+            file,
+        })
+    }
+
+    /// What of the file's coordinates lies within `metres` of the bounds.
+    pub(super) fn within(&self, metres: f64) -> Extent {
+        let bounds = self.bounds.grown(metres);
+        if self.is_same { bounds } else { seen_in(&self.area, &self.source, &bounds) }
+    }
+
+    /// Tells where things of the file lie that are not placed.
+    pub(super) fn lies_over(&mut self, extent: &Extent) {
+        if !extent.is_empty() {
+            self.lies.hold([extent.east[0], extent.north[0]]);
+            self.lies.hold([extent.east[1], extent.north[1]]);
+        }
+    }
+
+    /// Counts features that are not placed because they lie outside.
+    pub(super) fn count_outside(&mut self, count: u64) {
+        self.file.found += count;
+        self.file.outside += count;
+    }
+
+    /// Counts a feature that is left out before it is placed.
+    pub(super) fn count_left_out(&mut self) {
+        self.file.found += 1;
+    }
+
+    /// Where a vertex of the file lies, for remarks.
+    pub(super) fn at(&self, vertex: &Vertex) -> Option<[f64; 2]> {
+        let place = [vertex[0], vertex[1]];
+        if self.is_same { Some(place) } else { self.source.to(&self.area, place) }
+    }
+
+    pub(super) fn note(&mut self, note: String) {
+        self.file.notes.push(note);
+    }
+
+    pub(super) fn remark(&mut self, id: &str, at: Option<[f64; 2]>, found: String, done: &'static str) {
+        if self.file.remarks.len() < REMARKS_MAX {
+            self.file.remarks.push(Remark { id: id.into(), at, found, done });
+        } else {
+            self.remarks_beyond += 1;
+        }
+    }
+
+    /// Places a feature.
+    pub(super) fn place(&mut self, feature: RawFeature) {
+        let RawFeature { id, tags, shape } = feature;
+        if let Some(other) = shape.other {
+            let done = if shape.parts.is_empty() { "left out" } else { "left out, its lines and polygons kept" };
+            self.remark(&id, None, format!("a {other}, where lines and polygons are read"), done);
+        }
+        if shape.parts.is_empty() {
+            return;
+        }
+        self.file.found += 1;
+        if let Some(vertex) = shape.vertices().find(|vertex| !self.is_on_earth(vertex)) {
+            let found = format!("a vertex at {}, {}, which is not on the Earth", vertex[0], vertex[1]);
+            return self.remark(&id, None, found, LEFT_OUT);
+        }
+        let extent = Extent::around(shape.vertices().map(|&[east, north, _]| [east, north]));
+        self.lies_over(&extent);
+        let Some(turned) = self.turned(&extent) else { return self.count_one_outside() };
+        let mut placed = Vec::new();
+        let parts: Vec<Part> = shape.parts.into_iter().filter_map(|part| self.sound(&id, part)).collect();
+        if parts.is_empty() {
+            return;
+        }
+        for mut part in parts {
+            if turned != 0.0 {
+                part.turn(turned);
+            }
+            match self.part(part) {
+                Some(mut shapes) => placed.append(&mut shapes),
+                None => {
+                    let found = "a vertex that the area's coordinate system cannot express".into();
+                    return self.remark(&id, None, found, LEFT_OUT);
+                }
+            }
+        }
+        if placed.is_empty() {
+            return self.count_one_outside();
+        }
+        let heights = if shape.has_heights { self.heights(&id, &placed) } else { None };
+        self.keep(id, tags, placed, heights);
+    }
+
+    /// A part that has enough vertices, its rings closed.
+    fn sound(&mut self, id: &str, part: Part) -> Option<Part> {
+        let at = part.runs().iter().flatten().next().and_then(|vertex| self.at(vertex));
+        match part {
+            Part::Line(line) if line.len() < 2 => {
+                self.remark(id, at, format!("a line of {}", counted(line.len())), LEFT_OUT);
+                None
+            }
+            Part::Line(line) => Some(Part::Line(line)),
+            Part::Polygon(rings) => {
+                let mut sound = Vec::with_capacity(rings.len());
+                for (index, mut ring) in rings.into_iter().enumerate() {
+                    if let (Some(&first), Some(last)) = (ring.first(), ring.last())
+                        && first[..2] != last[..2]
+                    {
+                        self.remark(id, at, "a ring whose last vertex is not its first".into(), "closed");
+                        ring.push(first);
+                    }
+                    if ring.len() < 4 {
+                        let found = format!("a ring of {}, the last being the first", counted(ring.len()));
+                        self.remark(id, at, found, if index == 0 { LEFT_OUT } else { "the hole left out" });
+                        // Without its outer ring there is nothing to have holes.
+                        if index == 0 {
+                            return None;
+                        }
+                    } else {
+                        sound.push(ring);
+                    }
+                }
+                Some(Part::Polygon(sound))
+            }
+        }
+    }
+
+    fn count_one_outside(&mut self) {
+        self.file.outside += 1;
+    }
+
+    /// Whether numbers can be a place at all.
+    fn is_on_earth(&self, &[east, north, _]: &Vertex) -> bool {
+        match self.source.is_geographic() {
+            true => east.abs() <= 540.0 && north.abs() <= 90.0,
+            false => east.abs() <= PLACE_MAX && north.abs() <= PLACE_MAX,
+        }
+    }
+
+    /// By how many degrees of longitude a feature is to be turned so that it meets what is near, mostly none.
+    fn turned(&self, extent: &Extent) -> Option<f64> {
+        let turns: &[f64] = if self.source.is_geographic() { &[0.0, -360.0, 360.0] } else { &[0.0] };
+        let turned =
+            |&by: &f64| self.near.meets(&Extent { east: extent.east.map(|east| east + by), north: extent.north });
+        turns.iter().copied().find(|by| turned(by))
+    }
+
+    /// What of a part lies inside the bounds; `None` where it cannot be projected.
+    fn part(&self, part: Part) -> Option<Vec<Part>> {
+        match part {
+            Part::Line(line) => {
+                let mut pieces = Vec::new();
+                for piece in clip::line(line, &self.near) {
+                    pieces.extend(clip::line(self.projected(piece)?, &self.bounds).into_iter().map(Part::Line));
+                }
+                Some(pieces)
+            }
+            Part::Polygon(rings) => {
+                let mut kept = Vec::with_capacity(rings.len());
+                for (index, ring) in rings.into_iter().enumerate() {
+                    let cut = match clip::ring(ring, &self.near) {
+                        Some(ring) => clip::ring(self.projected(ring)?, &self.bounds),
+                        None => None,
+                    };
+                    match cut {
+                        Some(ring) => kept.push(ring),
+                        // Without its outer ring there is nothing to have holes.
+                        None if index == 0 => return Some(Vec::new()),
+                        None => {}
+                    }
+                }
+                Some(vec![Part::Polygon(kept)])
+            }
+        }
+    }
+
+    /// Vertices in the area's system. Long segments get vertices between, since what is straight in one system is not
+    /// in the other; they lie at the same places whichever way the segment is digitised.
+    fn projected(&self, vertices: Vec<Vertex>) -> Option<Vec<Vertex>> {
+        if self.is_same {
+            return Some(vertices);
+        }
+        let mut placed = Vec::with_capacity(vertices.len());
+        for (index, &vertex) in vertices.iter().enumerate() {
+            if 0 < index {
+                let before = vertices[index - 1];
+                let pieces = pieces_of(&self.source, [before[0], before[1]], [vertex[0], vertex[1]]);
+                for step in 1..pieces {
+                    placed.push(self.one_projected(between(before, vertex, step, pieces))?);
+                }
+            }
+            placed.push(self.one_projected(vertex)?);
+        }
+        Some(placed)
+    }
+
+    fn one_projected(&self, [east, north, height]: Vertex) -> Option<Vertex> {
+        let [east, north] = self.source.to(&self.area, [east, north])?;
+        Some([east, north, height])
+    }
+
+    /// The unit of the heights of a feature that has some; tells those that are no heights.
+    fn heights(&mut self, id: &str, parts: &[Part]) -> Option<f64> {
+        let unit_m = self.height_unit_m;
+        let all = parts.iter().flat_map(Part::runs).flatten();
+        let wrong: Vec<Vertex> = all.clone().filter(|vertex| height_m(vertex, unit_m).is_none()).copied().collect();
+        let count = all.count();
+        if let Some(first) = wrong.first() {
+            let found = format!("{} of {count} heights that are none, the first {}", wrong.len(), first[2]);
+            self.remark(id, Some([first[0], first[1]]), found, "left without a height there");
+        }
+        (wrong.len() < count).then_some(unit_m)
+    }
+
+    fn keep(&mut self, id: String, tags: Tags, mut parts: Vec<Part>, unit_m: Option<f64>) {
+        let vertices = |run: Vec<Vertex>| Vertices {
+            heights_m: unit_m.map_or_else(Vec::new, |unit_m| run.iter().map(|v| height_m(v, unit_m)).collect()),
+            places: run.into_iter().map(|[east, north, _]| [east, north]).collect(),
+        };
+        let shape = |part: Part| match part {
+            Part::Line(line) => VectorShape::Line(vertices(line)),
+            Part::Polygon(rings) => VectorShape::Polygon(rings.into_iter().map(vertices).collect()),
+        };
+        if parts.len() == 1 {
+            let shape = shape(parts.remove(0));
+            return self.file.features.push(VectorFeature { id, tags, shape });
+        }
+        for (part, number) in parts.into_iter().zip(1..) {
+            let id = format!("{id}.{number}");
+            self.file.features.push(VectorFeature { id, tags: tags.clone(), shape: shape(part) });
+        }
+    }
+
+    /// What was placed, with a word where that is nothing.
+    pub(super) fn finish(mut self, attribution: Option<&'static str>) -> FeatureFile {
+        if 0 < self.remarks_beyond {
+            self.file.notes.push(format!("{} more remarks about single features", self.remarks_beyond));
+        }
+        if self.file.found == 0 {
+            self.file.notes.push("no line or polygon in the file".into());
+        } else if self.file.features.is_empty() && 0 < self.file.outside {
+            let (lies, bounds) = (self.text(&self.source, &self.lies), self.text(&self.area, &self.bounds));
+            let place = if self.lies.is_empty() { "nowhere on the Earth".into() } else { lies };
+            let found = self.file.found;
+            self.file.notes.push(format!(
+                "none of its {found} lines and polygons lies inside the area: they lie {place}; the area and one load \
+                module round it {bounds}"
+            ));
+        }
+        self.file.features.shrink_to_fit();
+        self.file.attribution = attribution;
+        self.file
+    }
+
+    fn text(&self, crs: &Crs, Extent { east, north }: &Extent) -> String {
+        let digits = if crs.is_geographic() { 4 } else { 0 };
+        let numbers = [east[0], north[0], east[1], north[1]].map(|number| format!("{number:.digits$}"));
+        let [west, south, east, north] = numbers;
+        format!("from {west}, {south} to {east}, {north} ({})", crs.name())
+    }
+}
+
+/// What is done with a feature that cannot be used.
+pub(super) const LEFT_OUT: &str = "left out";
+/// Metres, or feet, that no coordinate on the Earth exceeds in any system.
+const PLACE_MAX: f64 = 4.0e8;
+
+impl Part {
+    fn turn(&mut self, by: f64) {
+        let runs = match self {
+            Part::Line(line) => std::slice::from_mut(line),
+            Part::Polygon(rings) => rings,
+        };
+        runs.iter_mut().flatten().for_each(|vertex| vertex[0] += by);
+    }
+}
+
+fn counted(vertices: usize) -> String {
+    format!("{vertices} {}", if vertices == 1 { "vertex" } else { "vertices" })
+}
+
+fn height_m(vertex: &Vertex, unit_m: f64) -> Option<f64> {
+    let height_m = vertex[2] * unit_m;
+    (height_m.abs() <= HEIGHT_M_MAX).then_some(height_m)
+}
+
+fn between(from: Vertex, to: Vertex, step: u32, pieces: u32) -> Vertex {
+    let (from, to, step) = if to[..2] < from[..2] { (to, from, pieces - step) } else { (from, to, step) };
+    let share = f64::from(step) / f64::from(pieces);
+    [0, 1, 2].map(|axis| from[axis] + share * (to[axis] - from[axis]))
+}
+
+/// A rectangle of the system `from` as it lies in another: the one round its border, with some more, or everywhere
+/// where a part of it cannot be expressed.
+fn seen_in(from: &Crs, to: &Crs, extent: &Extent) -> Extent {
+    const STEPS: u32 = 32;
+    let mut seen = Extent::NOTHING;
+    for step in 0..=STEPS {
+        let share = f64::from(step) / f64::from(STEPS);
+        let along = |side: [f64; 2]| side[0] + share * (side[1] - side[0]);
+        for side in 0..2 {
+            for place in [[along(extent.east), extent.north[side]], [extent.east[side], along(extent.north)]] {
+                match from.to(to, place) {
+                    Some(place) => seen.hold(place),
+                    None => return Extent::ALL,
+                }
+            }
+        }
+    }
+    // Sides bend between the places that were looked at.
+    let widest = (seen.east[1] - seen.east[0]).max(seen.north[1] - seen.north[0]);
+    seen.grown(0.05 * widest)
+}

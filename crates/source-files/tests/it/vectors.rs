@@ -1,0 +1,376 @@
+//! Lines and polygons from GeoPackages, Shapefiles and GeoJSON, and files that are none of these.
+
+use std::path::{Path, PathBuf};
+
+use source_files::{
+    DemFile, Extent, FeatureFile, Reading, SourceError, VectorFeature, VectorShape, Wanted, feature_layers,
+    is_feature_file, read_features,
+};
+
+use crate::pbf::header;
+use crate::support::{Folder, Tiff};
+
+/// Ten kilometres a side in UTM zone 11.
+const BOUNDS: Extent = Extent { east: [495_000.0, 505_000.0], north: [3_868_000.0, 3_878_000.0] };
+const WANTED: Wanted = Wanted { epsg: 32611, bounds: BOUNDS, layer: None, keys: &[] };
+
+#[track_caller]
+fn read(path: &Path) -> FeatureFile {
+    read_features(path, &WANTED).unwrap()
+}
+
+fn ids(file: &FeatureFile) -> Vec<&str> {
+    file.features.iter().map(|feature| feature.id.as_str()).collect()
+}
+
+fn remarks(file: &FeatureFile) -> Vec<String> {
+    file.remarks.iter().map(|remark| format!("{}: {} ({})", remark.id, remark.found, remark.done)).collect()
+}
+
+fn tags(feature: &VectorFeature) -> Vec<(&str, &str)> {
+    feature.tags.iter().map(|(key, value)| (key.as_ref(), value.as_ref())).collect()
+}
+
+/// The number of vertices of the line, or of each ring, and the heights of the first.
+fn sizes(feature: &VectorFeature) -> (Vec<usize>, Vec<Option<f64>>) {
+    match &feature.shape {
+        VectorShape::Line(line) => (vec![line.places.len()], line.heights_m.clone()),
+        VectorShape::Polygon(rings) => {
+            (rings.iter().map(|ring| ring.places.len()).collect(), rings[0].heights_m.clone())
+        }
+    }
+}
+
+fn json(features: &[(&str, &str)]) -> FeatureFile {
+    let feature = |(geometry, properties): &(&str, &str)| {
+        format!(r#"{{"type":"Feature","geometry":{geometry},"properties":{{{properties}}}}}"#)
+    };
+    let features = features.iter().map(feature).collect::<Vec<_>>().join(",");
+    let folder = Folder::new();
+    let text = format!(r#"{{"type":"FeatureCollection","features":[{features}]}}"#);
+    read(&folder.write("roads.geojson", text.as_bytes()))
+}
+
+const LINE: &str = r#"{"type":"LineString","coordinates":[[-117,35],[-116.991,35]]}"#;
+const SQUARE: &str = "[[500000,3870000],[500900,3870000],[500900,3870900],[500000,3870000]]";
+const HOLE: &str = "[[500500,3870100],[500600,3870100],[500600,3870200],[500500,3870100]]";
+
+#[test]
+fn geojson_is_read_in_every_wrapping_with_its_properties_as_texts() {
+    let properties = r#""name":"a","lanes":2,"width":3.5,"oneway":true,"nothing":null,"list":[1,2]"#;
+    let packed = r#""other_tags":"\"bridge\"=>\"yes\"""#;
+    let properties = &format!("{properties},{packed}");
+    let multi = r#"{"type":"MultiLineString","coordinates":[[[-117,35],[-116.99,35]],[[-117,35.01],[-117,35.02]]]}"#;
+    let point = r#"{"type":"Point","coordinates":[-117,35]}"#;
+    let collection = format!(r#"{{"type":"GeometryCollection","geometries":[{LINE},{point}]}}"#);
+    let file = json(&[(LINE, properties), ("null", ""), (multi, ""), (&collection, ""), (point, "")]);
+    let expected = ["roads.geojson#0", "roads.geojson#2.1", "roads.geojson#2.2", "roads.geojson#3"];
+    assert_eq!((ids(&file), file.found, file.outside), (expected.to_vec(), 3, 0));
+    let expected =
+        [("bridge", "yes"), ("lanes", "2"), ("list", "[1,2]"), ("name", "a"), ("oneway", "true"), ("width", "3.5")];
+    assert_eq!(tags(&file.features[0]), expected);
+    // Half a kilometre at most between the vertices of a straight line in degrees.
+    assert_eq!(sizes(&file.features[0]), (vec![3], vec![]));
+    assert_eq!(
+        remarks(&file),
+        [
+            "roads.geojson#3: a Point, where lines and polygons are read (left out, its lines and polygons kept)",
+            "roads.geojson#4: a Point, where lines and polygons are read (left out)"
+        ]
+    );
+}
+
+#[test]
+fn polygons_in_the_areas_metres_keep_their_holes_and_heights() {
+    let polygon = format!(r#"{{"type":"Polygon","coordinates":[{SQUARE},{HOLE}]}}"#);
+    let multi = format!(r#"{{"type":"MultiPolygon","coordinates":[[{SQUARE}],[{HOLE}]]}}"#);
+    let high = r#"{"type":"LineString","coordinates":[[500000,3870000,7],[500010,3870000],[500020,3870000,9.5]]}"#;
+    let file = json(&[(&polygon, ""), (&multi, ""), (high, "")]);
+    let found: Vec<_> = file.features.iter().map(sizes).collect();
+    let heights = vec![Some(7.0), None, Some(9.5)];
+    assert_eq!(found, [(vec![4, 4], vec![]), (vec![4], vec![]), (vec![4], vec![]), (vec![3], heights)]);
+    let expected = "roads.geojson#2: 1 of 3 heights that are none, the first NaN (left without a height there)";
+    assert_eq!(remarks(&file), [expected]);
+}
+
+#[test]
+fn an_empty_collection_is_told_and_no_error() {
+    let file = json(&[]);
+    assert_eq!((file.features.len(), file.notes), (0, vec!["no line or polygon in the file".to_owned()]));
+}
+
+#[test]
+fn a_feature_off_the_earth_is_left_out_and_the_others_are_still_in_degrees() {
+    let off = r#"{"type":"LineString","coordinates":[[-117,35],[-117,95]]}"#;
+    let nowhere = r#"{"type":"LineString","coordinates":[[-117,35],[-117]]}"#;
+    let file = json(&[(LINE, ""), (off, ""), (nowhere, "")]);
+    assert_eq!(ids(&file), ["roads.geojson#0"]);
+    assert_eq!(
+        remarks(&file),
+        [
+            "roads.geojson#1: a vertex at -117, 95, which is not on the Earth (left out)",
+            "roads.geojson#2: a vertex at -117, NaN, which is not on the Earth (left out)",
+        ]
+    );
+}
+
+#[test]
+fn rings_are_closed_and_those_of_too_few_vertices_left_out() {
+    let open = "[[500000,3870000],[500900,3870000],[500900,3870900]]";
+    let flat = "[[500000,3870000],[500900,3870000],[500000,3870000]]";
+    let polygon = |rings: &str| format!(r#"{{"type":"Polygon","coordinates":[{rings}]}}"#);
+    let one = r#"{"type":"MultiLineString","coordinates":[[[500000,3870000]],[]]}"#;
+    let hole = format!("{SQUARE},{flat}");
+    let file = json(&[(&polygon(open), ""), (&polygon(flat), ""), (&polygon(&hole), ""), (one, "")]);
+    let found: Vec<_> = file.features.iter().map(|feature| sizes(feature).0).collect();
+    assert_eq!(found, [vec![4], vec![4]]);
+    assert_eq!(
+        remarks(&file),
+        [
+            "roads.geojson#0: a ring whose last vertex is not its first (closed)",
+            "roads.geojson#1: a ring of 3 vertices, the last being the first (left out)",
+            "roads.geojson#2: a ring of 3 vertices, the last being the first (the hole left out)",
+            "roads.geojson#3: a line of 1 vertex (left out)",
+            "roads.geojson#3: a line of 0 vertices (left out)",
+        ]
+    );
+}
+
+#[test]
+fn degrees_counted_eastward_all_round_are_the_same_places() {
+    let file = json(&[(LINE, ""), (r#"{"type":"LineString","coordinates":[[243,35],[243.009,35]]}"#, "")]);
+    let VectorShape::Line(a) = &file.features[0].shape else { panic!("expected a line") };
+    let VectorShape::Line(b) = &file.features[1].shape else { panic!("expected a line") };
+    let off = a.places.as_flattened().iter().zip(b.places.as_flattened()).map(|(a, b)| (a - b).abs());
+    assert!(off.fold(0.0, f64::max) < 1.0e-6, "{a:?} {b:?}");
+}
+
+#[test]
+fn features_elsewhere_are_counted_and_where_they_lie_is_told() {
+    let file = json(&[(r#"{"type":"LineString","coordinates":[[8,47],[8.5,47.25]]}"#, "")]);
+    assert_eq!((file.features.len(), file.found, file.outside), (0, 1, 1));
+    assert!(file.notes[0].contains("they lie from 8.0000, 47.0000 to 8.5000, 47.2500 (EPSG:4326)"), "{:?}", file.notes);
+    // Over all the Earth, where the area's system expresses nothing any more.
+    let round = r#"{"type":"LineString","coordinates":[[-179,35],[-90,-80],[0,35],[90,80],[179,-35],[-117,35]]}"#;
+    let file = json(&[(round, "")]);
+    assert_eq!((file.outside, remarks(&file)), (0, vec![]));
+    let VectorShape::Line(line) = &file.features[0].shape else { panic!("expected a line") };
+    assert!(line.places.len() < 30, "only what is near is projected");
+}
+
+/// A GeoPackage geometry: mark, flags, no box, then well-known binary.
+fn blob(kind: u32, runs: &[&[&[f64]]]) -> Vec<u8> {
+    let mut bytes = b"GP\0\x01\0\0\0\0\x01".to_vec();
+    bytes.extend(kind.to_le_bytes());
+    if kind % 1000 != 2 {
+        bytes.extend((runs.len() as u32).to_le_bytes());
+    }
+    for run in runs {
+        bytes.extend((run.len() as u32).to_le_bytes());
+        bytes.extend(run.iter().copied().flatten().flat_map(|number| number.to_le_bytes()));
+    }
+    bytes
+}
+
+fn package(folder: &Folder, layers: &[(&str, &[Vec<u8>])]) -> PathBuf {
+    let path = folder.path("hydro.gpkg");
+    let database = rusqlite::Connection::open(&path).unwrap();
+    let tables =
+        "CREATE TABLE gpkg_spatial_ref_sys (srs_id INTEGER, organization TEXT, organization_coordsys_id INTEGER);
+        CREATE TABLE gpkg_geometry_columns (table_name TEXT, column_name TEXT, srs_id INTEGER);
+        INSERT INTO gpkg_spatial_ref_sys VALUES (4326, 'EPSG', 4326), (7, 'epsg', 32611);";
+    database.execute_batch(tables).unwrap();
+    for (name, blobs) in layers {
+        database.execute("INSERT INTO gpkg_geometry_columns VALUES (?1, 'geom', 7)", [name]).unwrap();
+        let columns = "fid INTEGER PRIMARY KEY, geom BLOB, waterway TEXT, lanes INTEGER, width REAL, photo BLOB";
+        database.execute_batch(&format!("CREATE TABLE \"{name}\" ({columns})")).unwrap();
+        for blob in *blobs {
+            let insert = format!("INSERT INTO \"{name}\" (geom, waterway, lanes, width) VALUES (?1, 'river', 2, 2.5)");
+            database.execute(&insert, [blob]).unwrap();
+        }
+    }
+    path
+}
+
+const RUN: &[&[f64]] = &[&[500_000.0, 3.87e6, 5.0], &[500_100.0, 3.87e6, f64::NAN], &[500_200.0, 3.87e6, 1.0e9]];
+
+#[test]
+fn a_geopackage_gives_lines_with_heights_and_columns_as_tags() {
+    let folder = Folder::new();
+    let flat: &[&[f64]] = &[&[500_000.0, 3.87e6], &[500_100.0, 3.87e6], &[500_200.0, 3.871e6]];
+    let measured: &[&[f64]] = &[&[500_000.0, 3.87e6, 1.0], &[500_100.0, 3.87e6, 2.0]];
+    let short = blob(2, &[flat])[..40].to_vec();
+    let point = [&blob(1, &[])[..13], &[0; 16]].concat();
+    let rivers = [blob(1002, &[RUN]), blob(2, &[flat]), blob(2002, &[measured]), short, point];
+    let path = package(&folder, &[("rivers", &rivers), ("empty", &[])]);
+    let file = read(&path);
+    assert_eq!(ids(&file), ["hydro.gpkg:rivers#1", "hydro.gpkg:rivers#2", "hydro.gpkg:rivers#3"]);
+    assert_eq!(tags(&file.features[0]), [("lanes", "2"), ("waterway", "river"), ("width", "2.5")]);
+    assert_eq!(sizes(&file.features[0]), (vec![3], vec![Some(5.0), None, None]));
+    assert_eq!((sizes(&file.features[1]), sizes(&file.features[2])), ((vec![3], vec![]), (vec![2], vec![])));
+    assert_eq!(
+        remarks(&file),
+        [
+            "hydro.gpkg:rivers#1: 2 of 3 heights that are none, the first NaN (left without a height there)",
+            "hydro.gpkg:rivers#4: a geometry that is cut short (left out)",
+            "hydro.gpkg:rivers#5: a Point, where lines and polygons are read (left out)",
+        ]
+    );
+}
+
+#[test]
+fn of_several_layers_one_is_to_be_named() {
+    let folder = Folder::new();
+    let lines = [blob(1002, &[RUN])];
+    let path = package(&folder, &[("rivers", &lines), ("lakes", &lines), ("none", &[])]);
+    let refused = |layer| {
+        let error = read_features(&path, &Wanted { layer, ..WANTED }).unwrap_err();
+        (error.to_string().replace(&path.display().to_string(), "F"), error.hint().unwrap())
+    };
+    assert_eq!(refused(None).0, "F: 2 layers: `rivers`, `lakes`; expected one of them named");
+    assert!(refused(None).1.contains("layer = "));
+    let expected = "F: the layer `roads` named; expected one of `rivers`, `lakes`, `none`";
+    assert_eq!(refused(Some("roads")).0, expected);
+    let named = read_features(&path, &Wanted { layer: Some("lakes"), ..WANTED }).unwrap();
+    assert_eq!(ids(&named), ["hydro.gpkg:lakes#1"]);
+    assert_eq!(feature_layers(&path).unwrap(), ["rivers", "lakes", "none"]);
+    let json = folder.write("a.geojson", LINE.as_bytes());
+    assert!(matches!(read_features(&json, &Wanted { layer: Some("x"), ..WANTED }), Err(SourceError::Layer { .. })));
+    assert_eq!((ids(&read(&json)), feature_layers(&json).unwrap().len()), (vec!["a.geojson#0"], 0));
+}
+
+#[test]
+fn a_geopackage_without_features_is_told_and_one_without_layers_refused() {
+    let folder = Folder::new();
+    let file = read(&package(&folder, &[("rivers", &[])]));
+    assert_eq!((file.features.len(), file.notes), (0, vec!["no line or polygon in the file".to_owned()]));
+    let folder = Folder::new();
+    let error = read_features(&package(&folder, &[]), &WANTED).unwrap_err();
+    assert!(error.to_string().ends_with("no layer of features; expected one"), "{error}");
+}
+
+#[test]
+fn a_column_whose_name_is_no_text_is_no_panic() {
+    let folder = Folder::new();
+    let path = package(&folder, &[("rivers", &[blob(1002, &[RUN])])]);
+    let bytes = std::fs::read(&path).unwrap();
+    let at = bytes.windows(10).position(|window| window == b"lanes INTE").unwrap();
+    let file = read(&folder.write("hydro.gpkg", &[&bytes[..at], b"\xffanes", &bytes[at + 5..]].concat()));
+    assert_eq!(tags(&file.features[0])[1..], [("width", "2.5"), ("\u{fffd}anes", "2")]);
+}
+
+/// A record of a Shapefile, whose parts begin at some points.
+fn record(kind: u32, starts: &[u32], points: &[[f64; 3]]) -> Vec<u8> {
+    let mut record: Vec<u8> = kind.to_le_bytes().to_vec();
+    record.extend([0; 32]);
+    record.extend((starts.len() as u32).to_le_bytes());
+    record.extend((points.len() as u32).to_le_bytes());
+    record.extend(starts.iter().flat_map(|start| start.to_le_bytes()));
+    record.extend(points.iter().flat_map(|point| [point[0].to_le_bytes(), point[1].to_le_bytes()].concat()));
+    if kind == 13 {
+        record.extend([0; 16]);
+        record.extend(points.iter().flat_map(|point| point[2].to_le_bytes()));
+    }
+    let head = [1_u32.to_be_bytes(), (record.len() as u32 / 2).to_be_bytes()].concat();
+    [head, record].concat()
+}
+
+/// A table of one text, one number and one truth.
+fn table(rows: &[&str]) -> Vec<u8> {
+    let column = |name: &str, kind: u8, size: u8| {
+        let mut column = name.as_bytes().to_vec();
+        column.resize(11, 0);
+        column.push(kind);
+        column.resize(16, 0);
+        column.push(size);
+        column.resize(32, 0);
+        column
+    };
+    let columns = [column("highway", b'C', 6), column("lanes", b'N', 3), column("oneway", b'L', 1), vec![13]].concat();
+    let mut head = vec![3, 126, 1, 1];
+    head.extend((rows.len() as u32).to_le_bytes());
+    head.extend((32 + columns.len() as u16).to_le_bytes());
+    head.extend(11_u16.to_le_bytes());
+    head.resize(32, 0);
+    [head, columns, rows.concat().into_bytes()].concat()
+}
+
+fn shapefile(records: &[Vec<u8>]) -> Vec<u8> {
+    let mut bytes = vec![0, 0, 0x27, 0x0a];
+    bytes.resize(100, 0);
+    [bytes, records.concat()].concat()
+}
+
+#[test]
+fn a_shapefile_gives_lines_with_heights_and_its_table_as_tags() {
+    let folder = Folder::new();
+    let points: Vec<[f64; 3]> = RUN.iter().map(|place| [place[0], place[1], 7.0]).collect();
+    let lines =
+        [record(13, &[0], &points), record(3, &[0], &points), record(3, &[0], &points), record(3, &[0], &points)];
+    let path = folder.write("roads.shp", &shapefile(&lines));
+    let bare = read(&path);
+    assert_eq!((bare.features.len(), bare.notes.len()), (4, 1));
+    assert!(bare.notes[0].contains("no table (.dbf) beside it"), "{:?}", bare.notes);
+    folder.write("roads.DBF", &table(&[" track   2T", "*gone    1F", " \u{e9}    ***?"]));
+    folder.write("roads.cpg", b"UTF-8\n");
+    let file = read(&path);
+    assert_eq!(ids(&file), ["roads.shp#0", "roads.shp#2", "roads.shp#3"]);
+    assert_eq!(tags(&file.features[0]), [("highway", "track"), ("lanes", "2"), ("oneway", "true")]);
+    assert_eq!(tags(&file.features[1]), [("highway", "\u{e9}")]);
+    assert_eq!(sizes(&file.features[0]), (vec![3], vec![Some(7.0); 3]));
+    assert_eq!(remarks(&file), ["roads.shp#3: no row in the table (read without attributes)"]);
+    for end in 32..folder.path("roads.DBF").metadata().unwrap().len() as usize {
+        let whole = table(&[" track   2T", "*gone    1F", " \u{e9}    ***?"]);
+        folder.write("roads.DBF", &whole[..end]);
+        assert!(matches!(read_features(&path, &WANTED), Err(SourceError::Truncated { .. })), "cut at {end}");
+    }
+}
+
+#[test]
+fn rings_of_a_shapefile_are_polygons_with_their_holes() {
+    let folder = Folder::new();
+    let square = |west: f64, side: f64| {
+        let corners = [[0.0, 0.0], [0.0, side], [side, side], [side, 0.0], [0.0, 0.0]];
+        corners.map(|[east, north]| [500_000.0 + west + east, 3.87e6 + west + north, 0.0])
+    };
+    let rings = [square(0.0, 100.0), square(10.0, 50.0), square(20.0, 5.0), square(200.0, 5.0)].concat();
+    let path = folder.write("lakes.shp", &shapefile(&[record(5, &[0, 5, 10, 15], &rings)]));
+    let found: Vec<Vec<usize>> = read(&path).features.iter().map(|feature| sizes(feature).0).collect();
+    assert_eq!(found, [vec![5, 5], vec![5], vec![5]]);
+}
+
+#[test]
+fn what_is_no_file_of_features_is_refused_by_name() {
+    let folder = Folder::new();
+    let refused = |name: &str, bytes: &[u8]| {
+        let path = folder.write(name, bytes);
+        assert!(name == "a.json" || !is_feature_file(&path), "{name}");
+        let error = read_features(&path, &WANTED).unwrap_err();
+        (error.to_string(), error.hint().unwrap())
+    };
+    let (message, hint) = refused("dem.tif", &Tiff::of_heights(&[&[1, 2], &[3, 4]]).bytes());
+    assert!(message.contains("a GeoTIFF raster, which is not read as features; expected OpenStreetMap"), "{message}");
+    assert!(hint.contains("dem.sources"), "{hint}");
+    let (message, hint) = refused("a.osm", b"<?xml version='1.0'?>\n<osm version='0.6'>");
+    assert!(message.contains("OpenStreetMap data as XML"), "{message}");
+    assert!(hint.starts_with("rewrite it: osmium cat -o out.osm.pbf "), "{hint}");
+    assert!(refused("a.kml", b"<kml>").0.contains("a file of XML (KML, GML or GPX, perhaps)"));
+    assert!(refused("a.zip", b"PK\x03\x04").1.contains("unpack it"));
+    assert!(refused("a.dbf", &table(&[])).1.contains("name the .shp"));
+    assert!(refused("a.pbf", b"1234567890").0.contains("begins with 31 32 33 34 35 36 37 38"));
+    assert!(refused("empty.gpkg", b"").1.contains("fetch it again"));
+    assert!(refused("a.json", b"{\"type\": \"Topology\"}").0.contains("neither a Shapefile, a GeoPackage nor GeoJSON"));
+}
+
+#[test]
+fn a_file_of_features_is_no_raster() {
+    let folder = Folder::new();
+    let shp = shapefile(&[record(3, &[0], &[])]);
+    for (name, bytes) in [("a.osm.pbf", header(&[])), ("a.shp", shp), ("a.geojson", LINE.into())] {
+        let path = folder.write(name, &bytes);
+        assert!(is_feature_file(&path), "{name}");
+        let error = DemFile::open(&path, &Reading::AS_IT_SAYS).unwrap_err();
+        assert!(error.to_string().contains("not a raster"), "{error}");
+        assert!(error.hint().unwrap().contains("name a raster"), "{error}");
+    }
+}
