@@ -5,7 +5,9 @@ use engine::{Artifact, Fingerprint, Key, Outcome, Stamp, keep_or_make};
 use fidelity::{Residuals, Tally};
 use job::{Borders, ClipHeights as JobClipHeights, Edges, Job, OuterBorder};
 use load_modules::{ClipHeights, Layout, clip, concatenate};
-use terrain::{HOLE_CLASS, LATTICE_PER_POST, LatticePoint, LoadModule, Post, PostRect, TileId, Tin, Vertex};
+use terrain::{
+    HOLE_CLASS, LATTICE_PER_POST, LatticePoint, LoadModule, ModuleCounts, Post, PostRect, TileId, Tin, Vertex,
+};
 
 use crate::assembled::{Assembled, ModuleNumbers};
 use crate::keys::{self, StampOf};
@@ -150,11 +152,8 @@ fn numbers_of(levels: &[Vec<LoadModule>]) -> (Vec<ModuleNumbers>, Vec<Vec<Module
 }
 
 fn numbers(module: &LoadModule) -> ModuleNumbers {
-    ModuleNumbers {
-        triangles: module.triangles.len() as u32,
-        polygons: module.polygon_count,
-        residual: module.residual,
-    }
+    let ModuleCounts { triangles, polygons } = module.counts();
+    ModuleNumbers { triangles, polygons, residual: module.residual }
 }
 
 /// The points in and around a tile that clipping needs.

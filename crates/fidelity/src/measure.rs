@@ -139,7 +139,7 @@ fn visit(module: &LoadModule, ground: &Ground, mut each: impl FnMut(terrain::Pos
 
 #[cfg(test)]
 mod tests {
-    use terrain::{ModuleId, ModuleVertex, Post, PostRect};
+    use terrain::{Decks, ModuleId, ModuleVertex, Post, PostRect};
 
     use super::*;
 
@@ -183,6 +183,7 @@ mod tests {
             polygon_count: triangles.len() as u32,
             triangles,
             residual: ModuleResidual::default(),
+            decks: Decks::default(),
         }
     }
 

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use terrain::{ModuleGrid, Spacing};
+use terrain::{LoadModule, ModuleGrid, Spacing};
 
 use crate::{GeoidSpec, ImportanceSpec, LodSpec, Start, WaterSpec};
 
@@ -263,6 +263,17 @@ pub enum Count {
     Triangles,
     /// Convex polygons, as clipping leaves them.
     Polygons,
+}
+
+impl Count {
+    /// What a load module has of that: all that is compared with a limit is counted here, decks too.
+    pub fn of(self, module: &LoadModule) -> u32 {
+        let counts = module.counts();
+        match self {
+            Self::Triangles => counts.triangles,
+            Self::Polygons => counts.polygons,
+        }
+    }
 }
 
 /// How posts are chosen.

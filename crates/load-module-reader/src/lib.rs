@@ -61,23 +61,30 @@ mod error;
 pub use error::{ReadError, Section};
 mod bytes;
 mod header;
-pub use header::{FIXED_HEADER_BYTES, Header, LEVELS_MAX, MAGIC, QUANTA_PER_METRE, VERSION};
+pub use header::{FIXED_HEADER_BYTES, Header, LEVELS_MAX, MAGIC, QUANTA_PER_METRE, VERSION, VERSION_WITHOUT_DECKS};
+mod layout;
+pub use layout::{FIXED_DECKS_BYTES, FIXED_MODULE_BYTES, HOLE_CLASS, Vertex};
 mod index;
-pub use index::{INDEX_ENTRY_BYTES, IndexEntry};
+pub use index::{DECK_ENTRY_BYTES, DecksEntry, INDEX_ENTRY_BYTES, IndexEntry};
+mod decks;
+pub use decks::Decks;
 mod module;
-pub use module::{FIXED_MODULE_BYTES, Module, Residual, Vertex};
+pub use module::{Module, Residual};
 mod file;
 pub use file::{FILE_BYTES_MAX, SlmFile};
 mod tile_file;
 pub use tile_file::{Bytes, Keep, TileFile, open_file};
 mod lookup;
 mod terrain_module;
-pub use terrain_module::{HOLE_CLASS, Sample, TerrainModule};
+pub use terrain_module::{Sample, TerrainModule};
 mod ground;
+mod sight;
 pub use ground::{Block, Ground, Sight};
 mod area;
 pub use area::{Area, Frame};
 
+#[cfg(test)]
+mod deck_tests;
 #[cfg(test)]
 mod sample;
 #[cfg(test)]

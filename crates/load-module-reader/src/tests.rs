@@ -4,16 +4,17 @@ use std::sync::Arc;
 
 use crate::lookup::STEPS;
 use crate::{
-    Area, Block, Ground, Keep, Module, ReadError, Residual, Sight, SlmFile, TerrainModule, TileFile, Vertex, sample,
+    Area, Block, Decks, Ground, Keep, Module, ReadError, Residual, Sight, SlmFile, TerrainModule, TileFile, Vertex,
+    sample,
 };
 
-const SIDE: u16 = 64_000;
+pub(crate) const SIDE: u16 = 64_000;
 
 /// SplitMix64.
-struct Draw(u64);
+pub(crate) struct Draw(pub u64);
 
 impl Draw {
-    fn below(&mut self, bound: u64) -> u64 {
+    pub(crate) fn below(&mut self, bound: u64) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -23,7 +24,7 @@ impl Draw {
 }
 
 /// A load module over `n` x `n` squares whose inner corners are shaken, each cut along one diagonal or the other.
-fn rough(n: u16, seed: u64) -> Module {
+pub(crate) fn rough(n: u16, seed: u64) -> Module {
     let mut draw = Draw(seed);
     let step = SIDE / n;
     let mut vertices = Vec::new();
@@ -61,6 +62,7 @@ fn rough(n: u16, seed: u64) -> Module {
         sides: Default::default(),
         polygon_count,
         residual,
+        decks: Decks::default(),
     }
 }
 

@@ -19,7 +19,6 @@ const KNOWN: &[(&str, &str)] = &[
     ("load-module-reader", "area ground"),
     ("load-module-reader", "bytes error header"),
     ("load-module-reader", "file tile_file"),
-    ("load-module-reader", "index module"),
     ("load-modules", "levels levels/posts levels/sheet"),
     ("source-files", "chunk dem_file dted geoid geotiff hgt join mosaic raster resample rows text_grid warp"),
     ("source-files", "crs crs/geokeys crs/parameters"),

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use database::{DatabaseError, Fingerprint, Folder};
 use job::Job;
-use load_module_reader::{Header, Module, SlmFile};
-use terrain::{HOLE_CLASS, LoadModule, ModuleId, ModuleResidual, ModuleVertex, TileId};
+use load_module_reader::{Header, Module, SlmFile, Vertex};
+use terrain::{Decks, HOLE_CLASS, LoadModule, ModuleId, ModuleResidual, ModuleVertex, TileId};
 
 use super::Modules;
 use compiler::CompileError;
@@ -80,21 +80,25 @@ fn differing(header: &Header, job: &Job, area: &GamingArea, tile: TileId) -> Vec
     wrong.map(|(field, found, expected)| format!("its header says {field} {found}, the job {expected}")).collect()
 }
 
-/// The first triangle whose class the job does not have.
+/// The first triangle of the ground, or else of decks, whose class the job does not have.
 fn unknown_class(module: &Module, count: usize) -> Option<String> {
     let is_unknown = |&class: &u8| class != HOLE_CLASS && count <= usize::from(class);
-    let triangle = module.classes.iter().position(is_unknown)?;
-    let (row, col, class) = (module.row, module.col, module.classes[triangle]);
-    let text = format!("load module {row},{col}: triangle {triangle} has class {class}, the job has {count}");
+    let of = |what: &str, classes: &[u8]| {
+        let triangle = classes.iter().position(is_unknown)?;
+        Some(format!("{what} {triangle} has class {}, the job has {count}", classes[triangle]))
+    };
+    let what = of("triangle", &module.classes).or_else(|| of("triangle of decks", &module.decks.classes))?;
+    let text = format!("load module {},{}: {what}", module.row, module.col);
     Some(super::at_level(usize::from(module.level), text))
 }
 
 fn load_module(module: &Module, side: u16) -> LoadModule {
     let residual = &module.residual;
+    let vertices = |of: &[Vertex]| of.iter().map(|v| ModuleVertex { y: v.y, x: v.x, z: v.z }).collect();
     LoadModule {
         id: ModuleId { row: module.row, col: module.col },
         side,
-        vertices: module.vertices.iter().map(|v| ModuleVertex { y: v.y, x: v.x, z: v.z }).collect(),
+        vertices: vertices(&module.vertices),
         triangles: module.triangles.clone(),
         classes: module.classes.clone(),
         polygon_count: module.polygon_count,
@@ -103,6 +107,11 @@ fn load_module(module: &Module, side: u16) -> LoadModule {
             largest: residual.largest,
             sum_abs: residual.sum_abs,
             sum_squared: residual.sum_squared,
+        },
+        decks: Decks {
+            vertices: vertices(&module.decks.vertices),
+            triangles: module.decks.triangles.clone(),
+            classes: module.decks.classes.clone(),
         },
     }
 }

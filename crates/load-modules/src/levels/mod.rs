@@ -111,6 +111,7 @@ fn load_module(finest: &LoadModule, sheet: Sheet, layout: &Layout, mask: &Import
         vertices,
         classes: Vec::new(),
         residual: ModuleResidual::default(),
+        decks: finest.decks.clone(),
     };
     module.classes = classes::of_triangles(&module, layout, mask);
     let sides = 3 * module.triangles.len();
