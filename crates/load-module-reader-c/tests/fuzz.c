@@ -201,9 +201,11 @@ static void damage_entry(unsigned char *file, size_t length) {
 /* Gives all decks of a load module one height, any, which keeps them in order, and tells the index. */
 static void shake_decks(unsigned char *file, size_t length, unsigned char *entry) {
     uint64_t at = word(entry) + (uint64_t)word(entry + 8), bytes = deck_bytes(file, entry);
+    /* What is written may lie over the entry itself. */
+    uint64_t vertices = word(entry + 32);
     if (!bytes || at > length || bytes > length - at) return;
-    uint32_t z = below(3) ? (uint32_t)draw() : word(file + word(entry) + 60) + (uint32_t)below(4096);
-    for (uint64_t i = 0; i < word(entry + 32); i++) put(file + at + 20 + 8 * i + 4, z, 4);
+    uint32_t z = below(3) ? (uint32_t)draw() : word(entry + 28) + (uint32_t)below(4096);
+    for (uint64_t i = 0; i < vertices; i++) put(file + at + 20 + 8 * i + 4, z, 4);
     put(entry + 40, z, 4);
     put(entry + 44, z, 4);
 }
