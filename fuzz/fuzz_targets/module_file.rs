@@ -6,8 +6,8 @@ use std::path::Path;
 use libfuzzer_sys::fuzz_target;
 use load_module_reader::{DECK_ENTRY_BYTES, DecksEntry, INDEX_ENTRY_BYTES, SlmFile, VERSION};
 
-/// The same with right checksums of the header, the index, each section and its decks, as far as the lengths in the file say where
-/// those are: they stand in the way of everything behind them.
+/// The same with right checksums of the header, the index, each section and its decks, as far as the lengths in the
+/// file say where those are: they stand in the way of everything behind them.
 fn with_checksums(bytes: &[u8]) -> Vec<u8> {
     let mut bytes = bytes.to_vec();
     let word = |bytes: &[u8], at: usize| -> usize {

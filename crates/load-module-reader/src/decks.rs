@@ -5,8 +5,8 @@ use crate::{HOLE_CLASS, Header, IndexEntry, ReadError, Section, Vertex};
 
 /// The decks above the ground of a load module, as one mesh; without decks all lists are empty.
 ///
-/// They cover what they cover: a place may lie under no deck, or under several. A deck that crosses the line between two
-/// load modules is cut there, and both have the same vertices on it.
+/// They cover what they cover: a place may lie under no deck, or under several. A deck that crosses the line between
+/// two load modules is cut there, and both have the same vertices on it.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Decks {
     /// Sorted by y, then x, then z; each a corner of some triangle.

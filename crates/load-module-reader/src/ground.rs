@@ -203,8 +203,8 @@ impl Ground {
         self.deck_below(index, place, ceiling_m).map_or(ground, |deck| Some(ground.map_or(deck, |m| m.max(deck))))
     }
 
-    /// [`Ground::height_below_m`] at many places at once, each an easting, a northing and a ceiling, in `heights_m`, NaN
-    /// where there is none.
+    /// [`Ground::height_below_m`] at many places at once, each an easting, a northing and a ceiling, in `heights_m`,
+    /// NaN where there is none.
     ///
     /// # Panics
     /// When the two lists differ in length.
@@ -253,8 +253,8 @@ impl Ground {
 
     /// Whether the ground or a deck stands between two places, each an easting, a northing and a height above the
     /// vertical datum. What only touches the line does not hide it; an end below the ground is hidden. Decks have no
-    /// thickness: a line passes over and under them, and is hidden where it goes through one; a place at the height of a
-    /// deck stands on it, and is not seen from below. It is unknown where a
+    /// thickness: a line passes over and under them, and is hidden where it goes through one; a place at the height of
+    /// a deck stands on it, and is not seen from below. It is unknown where a
     /// coordinate is not finite, or lies further than 1e12 m from the area's south-west corner or from height 0, where
     /// no ground can be. It takes at most as many steps as load modules are crossed.
     pub fn sight(&self, from_m: [f64; 3], to_m: [f64; 3]) -> Sight {

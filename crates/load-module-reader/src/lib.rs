@@ -7,8 +7,8 @@
 //!
 //! [`Area`] opens all files of a database and reads only their headers and indexes. [`Area::load`] brings a [`Block`]
 //! of load modules into memory as [`Ground`], and [`Ground::moved`] follows the observer and reads only what is new.
-//! Decks of bridges hang above the ground: [`Ground::height_m`] is that of the ground, [`Ground::height_below_m`] that of
-//! the topmost of ground and decks not above a ceiling, for vehicles that drive over a bridge and under it.
+//! Decks of bridges hang above the ground: [`Ground::height_m`] is that of the ground, [`Ground::height_below_m`] that
+//! of the topmost of ground and decks not above a ceiling, for vehicles that drive over a bridge and under it.
 //! A query takes constant expected time. [`SlmFile`] is the plain way to read one whole file.
 //! Where load modules have several levels of detail, all of this is about the finest, and [`Area::load_level`] brings
 //! in another.
@@ -85,8 +85,6 @@ pub use ground::{Block, Ground, Sight};
 mod area;
 pub use area::{Area, Frame};
 
-#[cfg(test)]
-mod deck_tests;
 #[cfg(test)]
 mod sample;
 #[cfg(test)]

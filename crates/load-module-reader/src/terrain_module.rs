@@ -70,7 +70,8 @@ impl TerrainModule {
         Some(Sample::of(&corners, height_m, class, false))
     }
 
-    /// The same of the topmost of ground and decks that is not above a ceiling. A deck that touches the ground lies on it.
+    /// The same of the topmost of ground and decks that is not above a ceiling. A deck that touches the ground lies on
+    /// it.
     pub(crate) fn sample_below(&self, place: [i64; 2], ceiling_m: f64) -> Option<Sample> {
         let ground = self.sample(place).filter(|ground| ground.height_m <= ceiling_m);
         let all = self.decks.iter().flat_map(|decks| decks.triangles(place));

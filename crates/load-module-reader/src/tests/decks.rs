@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::tests::{Draw, SIDE, rough};
+use super::{Draw, SIDE, rough};
 use crate::{Area, Block, Decks, Ground, Keep, Module, Sample, Sight, TerrainModule, TileFile, Vertex, sample};
 
 const BLOCK: Block = Block { south: 2, west: 3, north: 3, east: 5 };

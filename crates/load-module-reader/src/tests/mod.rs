@@ -1,5 +1,7 @@
 //! Tests of what is asked of the ground, against slow and obvious answers.
 
+mod decks;
+
 use std::sync::Arc;
 
 use crate::lookup::STEPS;
@@ -8,13 +10,13 @@ use crate::{
     sample,
 };
 
-pub(crate) const SIDE: u16 = 64_000;
+const SIDE: u16 = 64_000;
 
 /// SplitMix64.
-pub(crate) struct Draw(pub u64);
+struct Draw(u64);
 
 impl Draw {
-    pub(crate) fn below(&mut self, bound: u64) -> u64 {
+    fn below(&mut self, bound: u64) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -24,7 +26,7 @@ impl Draw {
 }
 
 /// A load module over `n` x `n` squares whose inner corners are shaken, each cut along one diagonal or the other.
-pub(crate) fn rough(n: u16, seed: u64) -> Module {
+fn rough(n: u16, seed: u64) -> Module {
     let mut draw = Draw(seed);
     let step = SIDE / n;
     let mut vertices = Vec::new();
