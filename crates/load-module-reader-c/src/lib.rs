@@ -4,14 +4,18 @@
 //! may be mapped into memory. Nothing is decided here; each function turns its arguments and calls the reader.
 //! A pointer that is null or not aligned is never followed: the function answers as the header says.
 
+mod values;
+
 use std::borrow::Cow;
 use std::ffi::{CStr, c_char, c_int};
 use std::fmt::Display;
 use std::path::Path;
 use std::sync::Arc;
 
-use load_module_reader::{Area, Block, Ground, Keep, ReadError, Sight, TileFile, Vertex, open_file};
+use load_module_reader::{Area, Block, Ground, Keep, ReadError, Sight, TileFile, open_file};
 use memmap2::Mmap;
+
+use crate::values::{Decks, Frame, Module, Sample, Surface};
 
 /// `LMR_ALL`: the whole area.
 const ALL: u32 = u32::MAX;
@@ -23,57 +27,6 @@ const MAPPED: c_int = 2;
 const INVALID: c_int = 3;
 /// Bytes of a list at most: what fits into the memory of any machine.
 const BYTES_MAX: usize = isize::MAX as usize;
-
-/// `lmr_frame`.
-#[repr(C)]
-pub struct Frame {
-    rows: u32,
-    cols: u32,
-    side_m: f64,
-    east_m: f64,
-    north_m: f64,
-}
-
-/// `lmr_sample`.
-#[repr(C)]
-pub struct Sample {
-    height_m: f64,
-    normal: [f64; 3],
-    class_of_ground: u8,
-}
-
-/// `lmr_surface`.
-#[repr(C)]
-pub struct Surface {
-    height_m: f64,
-    normal: [f64; 3],
-    class_of_surface: u8,
-    is_deck: u8,
-}
-
-/// `lmr_decks`.
-#[repr(C)]
-pub struct Decks {
-    vertices: *const Vertex,
-    vertex_count: usize,
-    triangles: *const [u16; 3],
-    classes: *const u8,
-    triangle_count: usize,
-}
-
-/// `lmr_module`.
-#[repr(C)]
-pub struct Module {
-    row: u32,
-    col: u32,
-    east_m: f64,
-    north_m: f64,
-    vertices: *const Vertex,
-    vertex_count: usize,
-    triangles: *const [u16; 3],
-    classes: *const u8,
-    triangle_count: usize,
-}
 
 /// The bytes of a mapped file.
 struct Mapped(Mmap);
@@ -411,8 +364,8 @@ pub unsafe extern "C" fn lmr_heights(
 /// Heights of the topmost surfaces not above a ceiling, at many places.
 ///
 /// # Safety
-/// `ground` is null or comes from `lmr_load`; `places_m` is null or `count` triples, `heights_m` null or `count` numbers
-/// that may be written; the two do not overlap.
+/// `ground` is null or comes from `lmr_load`; `places_m` is null or `count` triples, `heights_m` null or `count`
+/// numbers that may be written; the two do not overlap.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn lmr_heights_below(
     ground: *const Ground,
