@@ -68,14 +68,13 @@ impl Artifact for Assembling<'_> {
         Ok(self.run.database.folder().measured_stamp(self.tile)?)
     }
 
-    fn read(&self, _key: &Key, _stamp: &Stamp) -> Option<(Assembled, Sums)> {
+    fn read(&self, _key: &Key) -> Option<(Stamp, (Assembled, Sums))> {
         let (area, folder, tile) = (&self.run.area, self.run.database.folder(), self.tile);
-        let (_, measured) = folder.read_measured(tile).ok()?;
+        let (stamp, file, measured) = folder.read_measured(tile).ok()?;
         let count = area.tiling.modules(tile, area.grid).count();
         let is_whole = |measured: &Measured| measured.modules.len() == count * self.run.job.lod.level_count();
         folder.check_file(&folder.modules_path(tile), &measured.modules_file).ok().filter(|()| is_whole(&measured))?;
-        let file = folder.stamp_file(&folder.measured_path(tile)).ok()?;
-        Some(from_measured(measured, count, file))
+        Some((stamp, from_measured(measured, count, file)))
     }
 
     fn make(&self, _key: &Key, stamp: &Stamp) -> Result<(Assembled, Sums), CompileError> {

@@ -94,10 +94,7 @@ pub(crate) fn open<'a>(
     options: &Options<'a>,
     progress: &mut dyn Progress,
 ) -> Result<Run<'a>, CompileError> {
-    open_with(job, options, progress, |area, _| {
-        let (database, previous) = Database::create_or_open(folder, area)?;
-        Ok((database, previous.manifest()))
-    })
+    open_with(job, options, progress, |area, _| Ok(Database::create_or_open(folder, area)?))
 }
 
 /// The same, with the database as `lock` takes it, and what `database.json` said.

@@ -142,6 +142,19 @@ mod tests {
         }
     }
 
+    /// A clock that is set by hand.
+    struct Hand<'a>(&'a Cell<Duration>);
+
+    impl Clock for Hand<'_> {
+        fn wall(&self) -> Duration {
+            self.0.get()
+        }
+
+        fn wait(&self, time: Duration) {
+            self.0.set(self.0.get() + time);
+        }
+    }
+
     fn rows(stages: &[ReportStage]) -> Vec<(&str, f64)> {
         stages.iter().map(|stage| (&*stage.name, stage.wall_s)).collect()
     }
@@ -149,7 +162,7 @@ mod tests {
     /// Tells events a second apart.
     fn told(events: &[Event]) -> (Vec<ReportStage>, Vec<ReportTile>, Vec<ReportStage>) {
         let (now, mut heard) = (Cell::new(Duration::from_secs(7)), Heard::default());
-        let clock = || now.get();
+        let clock = Hand(&now);
         let mut stopwatch = Stopwatch::start(&clock, &mut heard);
         for event in events {
             now.set(now.get() + Duration::from_secs(1));

@@ -70,7 +70,7 @@ pub(crate) fn enforce(
         }
     }
     if enforced.before.is_some() {
-        *sums = Sums::published(run)?;
+        *sums = Sums::published(run, assembled)?;
     }
     Ok(enforced)
 }

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use database::{Area, Database, DatabaseError, Folder, Manifest, ManifestState, Previous, SourceRecord};
+use database::{Area, Database, DatabaseError, Folder, Manifest, ManifestState, SourceRecord};
 use job::Job;
 
 use crate::build::fresh;
@@ -12,7 +12,7 @@ use crate::{Clock, CompileError};
 
 /// How often a process asks that wants to begin a build, and how long it waits in between: others that come at the same
 /// moment stand in its way for an instant only.
-const TRIES: usize = 50;
+const TRIES: usize = 100;
 const PAUSE: Duration = Duration::from_millis(20);
 
 /// A database that this process shares.
@@ -42,18 +42,25 @@ pub(crate) fn enter(
         manifest.job == canonical && manifest.algorithm_revision == ALGORITHM_REVISION && manifest.sources == records
     };
     let is_under_way = |manifest: &Manifest| is_ours(manifest) && manifest.state == ManifestState::Incomplete;
-    for _ in 0..TRIES {
-        let (database, previous) = Database::join(folder, area)?;
-        if let Previous::Database(manifest) = previous {
+    for tries_left in (0..TRIES).rev() {
+        let (database, previous) = match Database::join(folder, area) {
+            // By another process that begins it, or by a build, which stays longer.
+            Err(DatabaseError::Locked { .. }) if 0 < tries_left => {
+                clock.wait(PAUSE);
+                continue;
+            }
+            joined => joined?,
+        };
+        if let Some(manifest) = previous {
             let is_finished = fresh(database.folder(), &manifest, job, records)?.is_some();
             if is_finished || is_under_way(&manifest) {
-                return Ok(Entered { database, manifest: *manifest, is_finished });
+                return Ok(Entered { database, manifest, is_finished });
             }
         }
         drop(database);
         match Database::create_or_open(folder, area) {
-            Ok((_, Previous::Database(manifest))) if is_under_way(&manifest) => {}
-            Ok((database, previous)) => database.begin(&beginning_of(job, records, previous.manifest().as_ref()))?,
+            Ok((_, Some(manifest))) if is_under_way(&manifest) => {}
+            Ok((database, previous)) => database.begin(&beginning_of(job, records, previous.as_ref()))?,
             Err(DatabaseError::Locked { .. }) => clock.wait(PAUSE),
             Err(error) => return Err(error.into()),
         }

@@ -20,18 +20,6 @@ pub enum CompileError {
     /// The database cannot be read or written.
     #[error(transparent)]
     Database(#[from] DatabaseError),
-    /// The job asks for what cannot be.
-    #[error("{key}: {found}, expected {expected}")]
-    Impossible {
-        /// Key of the job, or the argument.
-        key: String,
-        /// What was found.
-        found: String,
-        /// What would do.
-        expected: String,
-        /// What to change.
-        hint: String,
-    },
     /// A task panicked: a fault of ours.
     #[error("tile {tile} failed in stage {}: {message}", stage.name())]
     Panicked {
@@ -109,7 +97,6 @@ impl CompileError {
         match self {
             CompileError::Ground(error) => error.hint(),
             CompileError::Database(error) => error.hint().map(str::to_owned),
-            CompileError::Impossible { hint, .. } => Some(hint.clone()),
             CompileError::Panicked { .. } => {
                 Some("this is a fault of the compiler; what was published before is intact".to_owned())
             }

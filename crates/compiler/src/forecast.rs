@@ -7,7 +7,7 @@
 //! of 1.5 of what it took. Other machines differ in time, and jobs that end at a residual take less than their budget.
 
 use ground::{CACHE_BYTES_MAX, GamingArea, KEPT_POSTS_MAX};
-use job::{Budget as PointBudget, DemSource, Edges, Effort, Job, LodBorder};
+use job::{Budget as PointBudget, Choice, DemSource, Edges, Job, LodBorder};
 
 use crate::curves::BAND_BYTES_MAX;
 use crate::refinement::optimising;
@@ -66,8 +66,6 @@ const SAMPLE_S: f64 = 0.07e-9;
 const SURVEY_S: (f64, f64) = (2e-6, 0.8e-6);
 /// To select its point.
 const GROW_S: f64 = 0.75e-6;
-/// To optimise it, by effort: fast, normal, best.
-const OPTIMISE_S: [f64; 3] = [3.3e-6, 36e-6, 137e-6];
 /// To assemble, measure and report it: as it is, and merged, clipped and brought below limits.
 const ASSEMBLE_S: (f64, f64) = (0.9e-6, 4e-6);
 /// Seconds for a triangle of the finest level to make one coarser level of its load module.
@@ -170,12 +168,7 @@ fn stage_seconds(job: &Job, size: &Size) -> StageSeconds {
         (true, false) => SURVEY_S.0,
         (true, true) => SURVEY_S.1,
     };
-    let optimise = match optimising(job).map(|optimising| optimising.effort) {
-        None => 0.0,
-        Some(Effort::Fast) => OPTIMISE_S[0],
-        Some(Effort::Normal) => OPTIMISE_S[1],
-        Some(Effort::Best) => OPTIMISE_S[2],
-    };
+    let optimise = optimising(job).map_or(0.0, |optimising| optimising.effort.word().cost.seconds() * 1e-6);
     let assemble = if matches!(job.modules.edges, Edges::Clip(_)) { ASSEMBLE_S.1 } else { ASSEMBLE_S.0 };
     let page = match (size.has_ground_on_page(), size.has_maps_on_page()) {
         (true, _) => posts * PAGE_S.0,

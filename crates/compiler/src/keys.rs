@@ -5,8 +5,8 @@ use engine::{Fingerprint, FingerprintBuilder, Key, Part, Stamp};
 use ground::{GamingArea, Window, feed_post};
 use job::{Borders, ClipHeights, Edges, Job, LodBorder, LodSpec, ModulesSpec, OuterBorder};
 use limits::Allowance;
-use terrain::{LatticePoint, ModuleGrid, ModuleId, ModuleRect, SeamSides, TileId, Vertex};
-use tin::{CostUnit, Frame, LastBatch, Proximity, Rule, Stop, SurveyTask, TileTask};
+use terrain::{LastBatch, LatticePoint, ModuleGrid, ModuleId, ModuleRect, SeamSides, TileId, Vertex};
+use tin::{CostUnit, Frame, Proximity, Rule, Stop, SurveyTask, TileTask};
 
 use crate::refinement::{Most, Refinement};
 use crate::run::Run;

@@ -1,8 +1,8 @@
 //! Coarser levels of a tile's load modules, as the job wants them.
 
 use ground::Window;
-use job::{LodBorder, Method};
-use load_modules::{Layout, LevelGround, LevelSides, Levels, coarser_levels};
+use job::Method;
+use load_modules::{Layout, LevelGround, Levels, coarser_levels};
 use terrain::LoadModule;
 
 use crate::run::Run;
@@ -16,10 +16,7 @@ pub(crate) fn all_levels(run: &Run, finest: Vec<LoadModule>, layout: &Layout, wi
     }
     let wanted = Levels {
         inner_shares: &lod.inner_shares,
-        sides: match lod.border {
-            LodBorder::Full => LevelSides::Full,
-            LodBorder::Own => LevelSides::Own,
-        },
+        border: lod.border,
         flips: matches!(run.job.tin.method, Method::Optimised(_)),
     };
     let ground = LevelGround { dem: &window.dem, mask: &window.importance };

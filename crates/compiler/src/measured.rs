@@ -5,6 +5,7 @@ use fidelity::{Residuals, Tally};
 use terrain::{ModuleResidual, TileId};
 
 use crate::assembled::{Assembled, ModuleNumbers};
+use crate::order::Unit;
 use crate::run::Run;
 use crate::sums::{Adding, Sums};
 use crate::{CompileError, Stage};
@@ -50,15 +51,21 @@ pub(crate) fn from_measured(measured: Measured, count: usize, file: FileStamp) -
 }
 
 impl Sums {
-    /// Those of every tile as it is published.
+    /// Those of every tile as `assembled` says that it is published.
     ///
     /// # Errors
-    /// When a file cannot be read.
-    pub(crate) fn published(run: &Run) -> Result<Sums, CompileError> {
+    /// When a file cannot be read; [`CompileError::NotReady`] when another process has changed it since.
+    pub(crate) fn published(run: &Run, assembled: &[Assembled]) -> Result<Sums, CompileError> {
         let (tiles, adding) = (&run.area.tiles, Adding::default());
         let folder = run.database.folder();
-        let read = |_: usize, &tile: &terrain::TileId| -> Result<(), CompileError> {
-            adding.add(sums_of(folder.read_measured(tile)?.1));
+        let read = |place: usize, &tile: &terrain::TileId| -> Result<(), CompileError> {
+            let (_, file, measured) = folder.read_measured(tile)?;
+            if file != assembled[place].measured {
+                let [unit, needs] =
+                    [Unit::whole(Stage::Publish), Unit::of(Stage::Assemble, tile)].map(|unit| unit.to_string());
+                return Err(CompileError::NotReady { unit, needs });
+            }
+            adding.add(sums_of(measured));
             Ok(())
         };
         schedule::for_each_independent(tiles, &run.workers, run.stop, read)

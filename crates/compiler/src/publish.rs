@@ -110,7 +110,6 @@ pub(crate) fn publish(run: Run, ready: Ready, progress: &mut Stopwatch) -> Resul
     }
     database.finish(&manifest)?;
     progress.tell(Event::Leave(Stage::Publish));
-    // Of a build of another job that has begun already nothing is removed.
     work.sweep();
     // What came after the report was written is known now.
     (report.stages, report.tiles) = progress.times();
@@ -178,10 +177,7 @@ fn publish_removals(
     removed: &[LatticePoint],
 ) -> Result<Option<FileStamp>, CompileError> {
     if removed.is_empty() {
-        let path = run.database.folder().removals_path(tile);
-        if path.exists() {
-            run.database.remove(&format!("tiles/{tile}.removed"))?;
-        }
+        run.database.remove(&format!("tiles/{tile}.removed"))?;
         return Ok(None);
     }
     let removals = Removals { tile, points: removed.to_vec() };

@@ -120,9 +120,9 @@ impl Artifact for Refining<'_> {
         Ok(self.run.database.folder().tile_stamp(self.tile())?)
     }
 
-    fn read(&self, key: &Key, stamp: &Stamp) -> Option<Published> {
-        let (_, tin) = self.run.database.folder().read_tile(self.tile()).ok()?;
-        Some(Published::keep(self.run, tin, *stamp, Some(key.parts())))
+    fn read(&self, key: &Key) -> Option<(Stamp, Published)> {
+        let (stamp, tin) = self.run.database.folder().read_tile(self.tile()).ok()?;
+        Some((stamp, Published::keep(self.run, tin, stamp, Some(key.parts()))))
     }
 
     fn before(&self, found: &Stamp) -> Before {

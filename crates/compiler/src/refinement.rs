@@ -1,7 +1,7 @@
 //! One tile's refinement: grown to its budget, or grown beyond it and optimised.
 
 use ground::{GivenPost, Window, border_posts, start_posts};
-use job::{Effort, HeightFit, Job, Lattice, Method, Optimising};
+use job::{Effort, Job, Method, Optimising};
 use limits::Allowance;
 use optimiser::{Budget, Optimised, Task, fill, optimise, overshoot};
 use terrain::{Dem, LatticePoint, Post, PostRect, THOUSANDTHS, TileTin, Tin, Vertex};
@@ -77,7 +77,7 @@ impl Refinement {
 
     /// The growth, with room to thin from.
     fn beyond_budget(&self, optimising: Optimising) -> TileTask {
-        let times = overshoot(effort(optimising));
+        let times = overshoot(optimising.effort);
         let more = |count: usize| (count as f64 * times) as usize;
         let mut task = self.task.clone();
         if let Frame::Sides { allowance, .. } = &mut task.frame {
@@ -124,16 +124,9 @@ impl Refinement {
                 Frame::Plain | Frame::Corners { .. } => None,
             },
             budget,
-            effort: effort(optimising),
-            height_fit: match optimising.height_fit {
-                HeightFit::Squares => optimiser::HeightFit::Squares,
-                HeightFit::SquaresKeepCrests => optimiser::HeightFit::SquaresKeepCrests,
-                HeightFit::Off => optimiser::HeightFit::Off,
-            },
-            lattice: match optimising.lattice {
-                Lattice::Eighth => optimiser::Lattice::Eighth,
-                Lattice::Post => optimiser::Lattice::Post,
-            },
+            effort: optimising.effort,
+            height_fit: optimising.height_fit,
+            lattice: optimising.lattice,
             rms_quanta: task.stop.rms_quanta,
             forbidden: forbidden.to_vec(),
             largest_quanta: guard.map(|value| value as f64 / f64::from(THOUSANDTHS)),
@@ -161,14 +154,6 @@ pub(crate) fn give(task: &mut TileTask, given: &[GivenPost], rect: PostRect) {
     task.border.extend(outer);
     let pinned = task.start.iter().filter(|start| start.pinned).count();
     task.stop.points = task.stop.points.map(|points| points.saturating_sub(pinned));
-}
-
-fn effort(optimising: Optimising) -> optimiser::Effort {
-    match optimising.effort {
-        Effort::Fast => optimiser::Effort::Fast,
-        Effort::Normal => optimiser::Effort::Normal,
-        Effort::Best => optimiser::Effort::Best,
-    }
 }
 
 /// The DEM with the heights of the seeds.

@@ -8,7 +8,7 @@ use database::{
     ReportVoids, Totals,
 };
 use fidelity::{Residuals, Tally};
-use job::{Count, HOLE_CLASS_NAME};
+use job::{Choice, HOLE_CLASS_NAME};
 use limits::Windows;
 use terrain::{Breach, BreachKind, BreachPlace, ModuleId, ModuleResidual, RefusedBy, StopReason, metres_of_quanta};
 
@@ -57,10 +57,7 @@ impl Findings<'_> {
             workers: run.workers.count() as u32,
             stages: Vec::new(),
             points,
-            count: match run.job.limits.count {
-                Count::Triangles => "triangles".into(),
-                Count::Polygons => "polygons".into(),
-            },
+            count: run.job.limits.count.name().into(),
             triangles: sum(|numbers| numbers.triangles),
             polygons: sum(|numbers| numbers.polygons),
             per_load_module: self.per_module(&counts),

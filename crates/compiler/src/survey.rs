@@ -86,8 +86,9 @@ impl Artifact for Surveying<'_> {
         Ok(self.run.database.folder().curve_stamp(self.task.growth.tile)?)
     }
 
-    fn read(&self, _key: &Key, _stamp: &Stamp) -> Option<(Stamp, GainCurve)> {
-        self.run.database.folder().read_curve(self.task.growth.tile).ok()
+    fn read(&self, _key: &Key) -> Option<(Stamp, (Stamp, GainCurve))> {
+        let read = self.run.database.folder().read_curve(self.task.growth.tile).ok()?;
+        Some((read.0, read))
     }
 
     fn make(&self, _key: &Key, stamp: &Stamp) -> Result<(Stamp, GainCurve), CompileError> {
@@ -174,7 +175,7 @@ fn shares(run: &Run, curves: Option<&Curves>) -> Result<Shares, CompileError> {
     let tiles = allowances.into_iter().enumerate().map(|(index, mut allowance)| {
         if let (Some(points), Some(allowance)) = (&points, &mut allowance) {
             // Every point costs the same; `plan` has made sure that all of them fit.
-            allowance.triangles = points[index] as u32 * limits::POINT_COST;
+            allowance.triangles = points[index] as u32 * terrain::POINT_COST;
         }
         TileBudget {
             points: points.as_ref().map(|points| points[index]),

@@ -3,7 +3,7 @@
 use std::ops::Deref;
 
 use ground::GamingArea;
-use job::{Allocation, Borders, Budget as PointBudget, Edges, Effort, ErrorKey, Job, LastBatch, Method, OuterBorder};
+use job::{Allocation, Borders, Budget as PointBudget, Edges, Effort, ErrorKey, Job, Method, OuterBorder};
 use limits::Allowance;
 use terrain::{LatticePoint, ModuleId, ModuleRect, Post, SeamSides, Side, TileId, TileTin, Vertex};
 use tiling::{Tiling, outer_border_posts, outer_sides};
@@ -134,10 +134,7 @@ pub(crate) fn rule(job: &Job, area: &GamingArea) -> Rule {
                 posts: proximity.horizontal_m / area.frame.spacing.metres(),
                 quanta: (proximity.vertical_m * f64::from(terrain::QUANTA_PER_METRE)).round() as u32,
             }),
-            last_batch: match last_batch {
-                LastBatch::Truncate => tin::LastBatch::Truncate,
-                LastBatch::Finish => tin::LastBatch::Finish,
-            },
+            last_batch,
         },
     }
 }

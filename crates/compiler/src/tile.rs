@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 
 use database::{Database, DatabaseError, Folder, Manifest, ManifestState, Report, TileRecord};
 use engine::{Artifact, Cause, Outcome};
+use ground::GroundError;
 use job::{Edges, Job, deciding_lines};
 use terrain::{Post, SeamSides, Side, TileId, TileTin, Vertex};
 
@@ -141,12 +142,13 @@ fn is_outdated(run: &Run) -> bool {
 fn refuse_unfinished(run: &Run, folder: &Folder, tile: TileId) -> Result<Vec<TileId>, CompileError> {
     let tiling = &run.area.tiling;
     if !tiling.contains(tile) {
-        return Err(CompileError::Impossible {
+        return Err(GroundError::Impossible {
             key: "ROW,COL".into(),
             found: format!("{},{}", tile.row, tile.col),
             expected: format!("a row below {} and a column below {}", tiling.rows(), tiling.cols()),
             hint: "rows count from the south, columns from the west, both from 0".into(),
-        });
+        }
+        .into());
     }
     let Some(manifest) = &run.previous else {
         let path = run.database.folder().path(database::files::DATABASE);

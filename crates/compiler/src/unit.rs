@@ -67,8 +67,7 @@ impl<'a> Session<'a> {
     pub fn perform(&self, unit: Unit, progress: &mut dyn Progress) -> Result<(), CompileError> {
         let missing = self.needs(unit).into_iter().find(|&need| self.work.marks().marked(&need.to_string()).is_none());
         if let Some(need) = missing {
-            // A mark that a computer without power has left empty is there, but says nothing.
-            return Err(self.spoilt(unit, need));
+            return Err(not_ready(unit, need));
         }
         let Unit { stage, tile } = unit;
         if let Some(tile) = tile {
@@ -148,7 +147,7 @@ impl<'a> Session<'a> {
     /// Takes back the mark of a unit whose result is not what it was, so that it is done again.
     fn spoilt(&self, unit: Unit, need: Unit) -> CompileError {
         self.work.marks().unmark(&need.to_string());
-        CompileError::NotReady { unit: unit.to_string(), needs: need.to_string() }
+        not_ready(unit, need)
     }
 
     /// Declares the database complete, after whatever is still to be done.
@@ -156,6 +155,10 @@ impl<'a> Session<'a> {
         self.run.database.sweep()?;
         finish(self.run, progress)
     }
+}
+
+fn not_ready(unit: Unit, need: Unit) -> CompileError {
+    CompileError::NotReady { unit: unit.to_string(), needs: need.to_string() }
 }
 
 /// What came of a unit of work.

@@ -8,8 +8,8 @@ use std::collections::BTreeMap;
 
 use ground::Window;
 use load_modules::{Layout, concatenate};
-use terrain::{LATTICE_PER_POST, ModuleGrid, ModuleId, ModuleRect, ModuleResidual, PostRect, SeamSides, Tin, Vertex};
-use tin::{Frame, Stop, TileTask};
+use terrain::{LATTICE_PER_POST, ModuleGrid, ModuleId, ModuleRect, ModuleResidual, PostRect, Tin, Vertex};
+use tin::{Stop, TileTask};
 
 use crate::CompileError;
 use crate::refine::Published;
@@ -44,18 +44,9 @@ fn without_limit(run: &Run, window: &Window, module: ModuleId, part: &Tin, extra
         Some(_) => (Vec::new(), part.vertices.len()),
         None => (posts_of(&sides), inner.len()),
     };
-    let task = TileTask {
-        tile: run.area.tiling.tile_of_module(module, run.area.grid),
-        rect,
-        frame: Frame::Plain,
-        border: Vec::new(),
-        inherited,
-        kept: Vec::new(),
-        start: Vec::new(),
-        seams: SeamSides::CLOSED,
-        rule: rule(run.job, &run.area),
-        stop: Stop { points: Some(points + extra), ..Stop::default() },
-    };
+    let tile = run.area.tiling.tile_of_module(module, run.area.grid);
+    let stop = Stop { points: Some(points + extra), ..Stop::default() };
+    let task = TileTask { inherited, stop, ..TileTask::plain(tile, rect, rule(run.job, &run.area)) };
     let refinement = Refinement { task, optimising, most: Most::AsTask };
     let tin = match optimising {
         Some(optimising) => refinement.fill(&window, optimising, part),

@@ -5,10 +5,9 @@
 //! process that was only slow.
 
 use std::collections::BTreeSet;
-use std::io::ErrorKind;
 use std::time::Duration;
 
-use database::{DatabaseError, Folder, ManifestState};
+use database::{Folder, ManifestState};
 use engine::{Claim, Lease, Leases};
 use job::Job;
 
@@ -65,7 +64,6 @@ pub fn work(
         leases: session.work.leases(sharing.name, sharing.lease),
         clock: options.clock,
         sharing,
-        job: session.run.job.canonical_text(),
         session,
         units: 0,
     };
@@ -100,22 +98,13 @@ struct Worker<'a, 'b> {
     /// Units that were not done when last looked at.
     open: Vec<Unit>,
     units: usize,
-    /// The job as the database names it.
-    job: String,
 }
 
 impl Worker<'_, '_> {
-    /// Whether the build was finished, by any process. A build of another job begins in the folder only after that.
+    /// Whether the build was finished, by any process. Another one cannot begin in the folder while this one shares it.
     fn is_published(&self) -> bool {
         let manifest = self.session.run.database.folder().manifest();
-        manifest.is_ok_and(|manifest| manifest.job != self.job || manifest.state == ManifestState::Complete)
-    }
-
-    /// Whether an error says that what processes leave for one another was swept away. It may be there again already.
-    fn is_swept(&self, error: &CompileError) -> bool {
-        let Some(all) = self.session.work.path().parent() else { return false };
-        matches!(error, CompileError::Database(DatabaseError::Io { path, source, .. })
-            if source.kind() == ErrorKind::NotFound && path.starts_with(all))
+        manifest.is_ok_and(|manifest| manifest.state == ManifestState::Complete)
     }
 
     /// A unit that is ready and now ours; the last one once all others are done.
@@ -143,7 +132,7 @@ impl Worker<'_, '_> {
 
     fn perform(&mut self, unit: Unit, lease: Lease, progress: &mut dyn Progress) -> Result<(), CompileError> {
         let session = &self.session;
-        let done = self.holding(&lease, || session.perform(unit, progress));
+        let done = hold(self.sharing, &lease, || session.perform(unit, progress));
         match done {
             Ok(()) => {
                 self.units += 1;
@@ -157,7 +146,7 @@ impl Worker<'_, '_> {
                 Ok(())
             }
             // Whoever published the build has swept away what this process was writing.
-            Err(error) if self.is_published() || self.is_swept(&error) => Ok(()),
+            Err(_) if self.is_published() => Ok(()),
             Err(error) => {
                 // Others may have it at once; if that cannot be said either, the lease expires.
                 let _ = lease.give_up();
@@ -171,10 +160,6 @@ impl Worker<'_, '_> {
         progress.tell(Event::Note("every tile is done: publishing".into()));
         let built = hold(sharing, lease, || session.publish(progress))?;
         Ok(WorkerEnd { units: units + 1, published: Some(Box::new(built)) })
-    }
-
-    fn holding<R>(&self, lease: &Lease, work: impl FnOnce() -> R) -> R {
-        hold(self.sharing, lease, work)
     }
 }
 

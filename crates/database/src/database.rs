@@ -40,35 +40,14 @@ pub struct Database {
     _lock: Lock,
 }
 
-/// What was in the directory before.
-#[derive(Debug)]
-pub enum Previous {
-    /// Nothing, or the beginnings of a build that was broken off before it wrote `database.json`.
-    Nothing,
-    /// A database of the same area.
-    Database(Box<Manifest>),
-    /// A database whose `database.json` is damaged. Its other files tell by themselves what they were made from.
-    Damaged(DatabaseError),
-}
-
-impl Previous {
-    /// What `database.json` said, if it can be believed.
-    pub fn manifest(self) -> Option<Manifest> {
-        match self {
-            Previous::Database(manifest) => Some(*manifest),
-            Previous::Nothing | Previous::Damaged(_) => None,
-        }
-    }
-}
-
 impl Database {
-    /// Makes the directory, or opens it to go on with the database of `area` in it. Locks it, makes the folders and
-    /// removes what a killed run left half-written.
+    /// Makes the directory, or opens it to go on with the database of `area` in it; with what `database.json` says, if
+    /// it is there and can be believed. Locks it, makes the folders and removes what a killed run left half-written.
     ///
     /// # Errors
     /// When the directory holds anything that is not ours, a database of another format version or area, or a link in
     /// place of a folder; when another build holds the lock; when it cannot be written to. Nothing is changed then.
-    pub fn create_or_open(folder: impl Into<Folder>, area: &Area) -> Result<(Self, Previous), DatabaseError> {
+    pub fn create_or_open(folder: impl Into<Folder>, area: &Area) -> Result<(Self, Option<Manifest>), DatabaseError> {
         let (database, previous) = Self::open(folder.into(), area, LockKind::Alone)?;
         database.sweep()?;
         database.remove_work()?;
@@ -96,11 +75,11 @@ impl Database {
     ///
     /// # Errors
     /// As [`Database::create_or_open`].
-    pub fn join(folder: impl Into<Folder>, area: &Area) -> Result<(Self, Previous), DatabaseError> {
+    pub fn join(folder: impl Into<Folder>, area: &Area) -> Result<(Self, Option<Manifest>), DatabaseError> {
         Self::open(folder.into(), area, LockKind::Shared)
     }
 
-    fn open(folder: Folder, area: &Area, kind: LockKind) -> Result<(Self, Previous), DatabaseError> {
+    fn open(folder: Folder, area: &Area, kind: LockKind) -> Result<(Self, Option<Manifest>), DatabaseError> {
         // Looked at before the lock is made, so that nothing is put into a directory that is not ours.
         examine(&folder, area)?;
         let dir = folder.dir();
@@ -311,8 +290,9 @@ impl Database {
     }
 }
 
-/// Whether a database of `area` may be built in `folder`, and what is there. Changes nothing.
-fn examine(folder: &Folder, area: &Area) -> Result<Previous, DatabaseError> {
+/// Whether a database of `area` may be built in `folder`, and what `database.json` says, if it is there and can be
+/// believed. Changes nothing.
+fn examine(folder: &Folder, area: &Area) -> Result<Option<Manifest>, DatabaseError> {
     let dir = folder.dir();
     let not_ours = |found: &str| DatabaseError::NotOurFolder { path: dir.to_path_buf(), found: found.into() };
     match folder.store().target(dir) {
@@ -321,21 +301,22 @@ fn examine(folder: &Folder, area: &Area) -> Result<Previous, DatabaseError> {
         Err(_) if matches!(folder.store().entry(dir), Ok(Entry::Other)) => {
             return Err(not_ours("a link that leads nowhere"));
         }
-        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Previous::Nothing),
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
         Err(source) => return Err(DatabaseError::from_io("open", dir, 0, source)),
     }
     for name in FOLDERS {
         check_folder(folder, &folder.path(name))?;
     }
-    let damage = match folder.manifest() {
+    match folder.manifest() {
         Ok(manifest) => {
             manifest.check_area(&folder.path(files::DATABASE), area)?;
-            return Ok(Previous::Database(Box::new(manifest)));
+            return Ok(Some(manifest));
         }
-        Err(DatabaseError::Missing { .. } | DatabaseError::NotADatabase { .. }) => None,
-        Err(error @ (DatabaseError::WrongChecksum { .. } | DatabaseError::Malformed { .. })) => Some(error),
+        // Where it is damaged, other files tell by themselves what they were made from.
+        Err(DatabaseError::Missing { .. } | DatabaseError::NotADatabase { .. }) => {}
+        Err(DatabaseError::WrongChecksum { .. } | DatabaseError::Malformed { .. }) => {}
         Err(error) => return Err(error),
-    };
+    }
     // Without a manifest to trust, nothing may lie there that a build does not make itself.
     for path in folder.list(dir)? {
         let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
@@ -343,7 +324,7 @@ fn examine(folder: &Folder, area: &Area) -> Result<Previous, DatabaseError> {
             return Err(not_ours(&format!("{name:?} in it")));
         }
     }
-    Ok(damage.map_or(Previous::Nothing, Previous::Damaged))
+    Ok(None)
 }
 
 /// Does what fails where another process sweeps up at the same moment, and takes a temporary file or a folder of

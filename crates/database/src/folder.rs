@@ -219,15 +219,16 @@ impl Folder {
         Ok((header, modules))
     }
 
-    /// What was measured of the load modules of `tile`, and what those were made from.
+    /// What was measured of the load modules of `tile`, what those were made from, and the bytes that say so.
     ///
     /// # Errors
     /// When the file is missing, damaged or of another tile.
-    pub fn read_measured(&self, tile: TileId) -> Result<(Stamp, Measured), DatabaseError> {
+    pub fn read_measured(&self, tile: TileId) -> Result<(Stamp, FileStamp, Measured), DatabaseError> {
         let path = self.measured_path(tile);
-        let (stamp, read) = measured_file::decode_measured(&path, &self.read(&path)?)?;
+        let bytes = self.read(&path)?;
+        let (stamp, read) = measured_file::decode_measured(&path, &bytes)?;
         same_tile(path, read.tile, tile)?;
-        Ok((stamp, read))
+        Ok((stamp, FileStamp::of(&bytes), read))
     }
 
     /// The gain curve of `tile`, and what it was made from.

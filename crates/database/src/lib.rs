@@ -37,7 +37,7 @@ mod slm;
 pub use load_module_reader::{
     VERSION as MODULES_FORMAT_VERSION, VERSION_WITHOUT_DECKS as MODULES_FORMAT_VERSION_WITHOUT_DECKS,
 };
-pub use slm::{TileModules, decode_levels, decode_modules, encode_levels, encode_modules};
+pub use slm::{TileModules, decode_levels, decode_modules, encode_levels, encode_modules, load_module};
 mod json;
 mod page;
 pub use page::seal_page;
@@ -61,7 +61,7 @@ mod names;
 pub use names::files;
 mod database;
 mod read;
-pub use database::{Database, Previous};
+pub use database::Database;
 mod verify;
 pub use verify::Damage;
 

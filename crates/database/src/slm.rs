@@ -245,7 +245,8 @@ fn tile_of(header: &Header) -> TileModules {
     }
 }
 
-fn load_module(module: &Module, side: u16) -> LoadModule {
+/// A load module as the reader gives it, whose square has sides of `side` quanta.
+pub fn load_module(module: &Module, side: u16) -> LoadModule {
     let residual = &module.residual;
     let vertices = |of: &[Vertex]| of.iter().map(|v| ModuleVertex { y: v.y, x: v.x, z: v.z }).collect();
     LoadModule {

@@ -21,8 +21,8 @@ pub trait Artifact {
     /// When what is there is damaged.
     fn published(&self) -> Result<Option<Stamp>, Self::Error>;
 
-    /// The published one, if it is whole and was made from this.
-    fn read(&self, key: &Key, stamp: &Stamp) -> Option<Self::Output>;
+    /// The published one if it is whole, and what it was made from: it may have been replaced since that was asked.
+    fn read(&self, key: &Key) -> Option<(Stamp, Self::Output)>;
 
     /// What an earlier run wrote down of the published one, whose stamp was found.
     fn before(&self, _found: &Stamp) -> Before {
@@ -83,7 +83,8 @@ pub fn keep_or_make<A: Artifact>(artifact: &A, revision: u32) -> Result<Outcome<
     let stamp = key.stamp(revision);
     let published = artifact.published();
     if matches!(published, Ok(Some(found)) if found == stamp)
-        && let Some(kept) = artifact.read(&key, &stamp)
+        && let Some((found, kept)) = artifact.read(&key)
+        && found == stamp
     {
         return Ok(Outcome::Kept(kept));
     }
@@ -128,6 +129,8 @@ mod tests {
     struct Shelf {
         published: RefCell<Option<(Stamp, Parts, u64)>>,
         is_damaged: Cell<bool>,
+        /// What another process publishes before this one reads.
+        replaced: RefCell<Option<(Stamp, Parts, u64)>>,
         says_from_what: bool,
     }
 
@@ -143,9 +146,13 @@ mod tests {
             Ok(self.shelf.published.borrow().as_ref().map(|(stamp, ..)| *stamp))
         }
 
-        fn read(&self, _key: &Key, _stamp: &Stamp) -> Option<u64> {
+        fn read(&self, _key: &Key) -> Option<(Stamp, u64)> {
+            // Another process may replace it between the two looks.
+            if let Some(other) = self.shelf.replaced.take() {
+                *self.shelf.published.borrow_mut() = Some(other);
+            }
             let published = self.shelf.published.borrow();
-            published.as_ref().filter(|_| !self.shelf.is_damaged.get()).map(|(.., square)| *square)
+            published.as_ref().filter(|_| !self.shelf.is_damaged.get()).map(|(stamp, _, square)| (*stamp, *square))
         }
 
         fn before(&self, _found: &Stamp) -> Before {
@@ -172,6 +179,17 @@ mod tests {
         shelf.is_damaged.set(true);
         assert_eq!(ask(4, 2), Outcome::Made(16, Cause::Damaged("its content cannot be read".into())));
         assert_eq!(ask(4, 2), Outcome::Kept(16));
+    }
+
+    #[test]
+    fn what_is_replaced_between_asking_and_reading_is_not_kept() {
+        let shelf = Shelf::default();
+        let of = |of| Square { of, shelf: &shelf };
+        keep_or_make(&of(5), 1).unwrap();
+        let other = shelf.published.take();
+        keep_or_make(&of(3), 1).unwrap();
+        shelf.replaced.replace(other);
+        assert_eq!(keep_or_make(&of(3), 1).unwrap().into_inner(), 9);
     }
 
     #[test]

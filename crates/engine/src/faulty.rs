@@ -19,7 +19,7 @@ pub struct Faults {
     pub error: u32,
     /// A worker is ended, in the middle of what it was writing.
     pub death: u32,
-    /// A worker stands still for up to [`STALL_MAX`].
+    /// A worker stands still, for up to two minutes.
     pub stall: u32,
     /// The computer of all of them loses its power: what was not synced may be lost or torn.
     pub power: u32,

@@ -29,10 +29,15 @@ impl Marks {
         written.map_err(|source| StoreError::new("write", &path, text.len(), source))
     }
 
-    /// The fingerprint of what was published when a unit of work was done; `None` while it is not.
+    /// The fingerprint of what was published when a unit of work was done; `None` while it is not. A mark that says
+    /// nothing, as a computer leaves it that lost its power, is none and goes.
     pub fn marked(&self, unit: &str) -> Option<Fingerprint> {
-        let text = String::from_utf8(self.store.read(&self.path(unit)).ok()?).ok()?;
-        Fingerprint::from_hex(text.trim_end())
+        let bytes = self.store.read(&self.path(unit)).ok()?;
+        let said = std::str::from_utf8(&bytes).ok().and_then(|text| Fingerprint::from_hex(text.trim_end()));
+        if said.is_none() {
+            self.unmark(unit);
+        }
+        said
     }
 
     /// Takes a mark back: what was published turned out to be damaged.

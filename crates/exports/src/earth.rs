@@ -1,7 +1,7 @@
 //! From the area's coordinate system to the globe: longitude and latitude, heights above the ellipsoid, and places
 //! counted from the middle of the Earth.
 
-use source_files::Crs;
+use source_files::{Crs, plain_datum};
 
 use crate::{ExportError, Product};
 
@@ -34,11 +34,6 @@ impl Datum {
             Self::Above(metres) => format!("{metres} m were added to heights, as told"),
         }
     }
-}
-
-/// A datum's name without what people write differently: `EGM 96` is `egm96`.
-pub(crate) fn plain_datum(name: &str) -> String {
-    name.chars().filter(char::is_ascii_alphanumeric).collect::<String>().to_ascii_lowercase()
 }
 
 /// Half the longest axis of WGS 84's ellipsoid, in metres.

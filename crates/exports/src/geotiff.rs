@@ -3,64 +3,13 @@
 
 use std::io::Write;
 
-use flate2::Compression;
-use flate2::write::ZlibEncoder;
-use terrain::{Post, PostRect};
+use source_files::geotiff_parts::{VERTICAL_UNIT, projected_keys, scale_and_tie_point};
+use source_files::plain_datum;
+use terrain::PostRect;
 
-use crate::overviews::Raster;
+use crate::blocks::{BLOCK, Blocks};
 use crate::tiff_layout::{self, Image, Value, tag};
 use crate::{ExportError, Product};
-
-/// Posts along a side of a block.
-pub(crate) const BLOCK: usize = 256;
-
-/// The deflated blocks of a raster, row by row from the north; what lies beyond the raster is NaN.
-pub(crate) fn blocks(raster: &Raster) -> Vec<Vec<u8>> {
-    raster.metres.chunks(raster.wide * BLOCK).flat_map(|band| blocks_of_band(band, raster.wide)).collect()
-}
-
-/// Those of at most [`BLOCK`] rows, from west to east.
-fn blocks_of_band(values: &[f32], wide: usize) -> Vec<Vec<u8>> {
-    let rows: Vec<&[f32]> = values.chunks(wide).collect();
-    let block = |west: usize| {
-        let mut bytes = Vec::with_capacity(4 * BLOCK * BLOCK);
-        for index in 0..BLOCK {
-            let mut row = [f32::NAN; BLOCK];
-            if let Some(part) = rows.get(index).map(|row| &row[west..wide.min(west + BLOCK)]) {
-                row[..part.len()].copy_from_slice(part);
-            }
-            put_predicted(&mut bytes, &row);
-        }
-        deflate(&bytes)
-    };
-    (0..wide).step_by(BLOCK).map(block).collect()
-}
-
-/// TIFF's predictor 3: the bytes of a row by significance, highest first, each as the step from the one before.
-fn put_predicted(bytes: &mut Vec<u8>, row: &[f32]) {
-    let mut before = 0;
-    for byte in 0..4 {
-        for value in row {
-            let next = value.to_be_bytes()[byte];
-            bytes.push(next.wrapping_sub(before));
-            before = next;
-        }
-    }
-}
-
-fn deflate(bytes: &[u8]) -> Vec<u8> {
-    let mut encoder = ZlibEncoder::new(Vec::new(), Compression::default());
-    let written = encoder.write_all(bytes).and_then(|()| encoder.finish());
-    written.expect("writing to memory cannot fail")
-}
-
-/// The blocks of a raster, and how many posts it has west to east and south to north.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Blocks {
-    pub wide: usize,
-    pub high: usize,
-    pub blocks: Vec<Vec<u8>>,
-}
 
 /// What a file says besides its values.
 struct About<'a> {
@@ -125,14 +74,10 @@ fn sample_tags(image: &Blocks, is_overview: bool) -> Vec<(u16, Value)> {
 }
 
 fn place_tags(about: &About) -> [(u16, Value); 4] {
-    let frame = &about.product.frame;
-    let spacing_m = frame.spacing.metres();
-    // A post is the centre of its pixel, so the raster's corner lies half a post beyond the north-west post.
-    let [east_m, north_m] = frame.place_m(Post::new(about.rect.north, about.rect.west));
-    let corner = vec![0.0, 0.0, 0.0, east_m - spacing_m / 2.0, north_m + spacing_m / 2.0, 0.0];
+    let (scale, tie_point) = scale_and_tie_point(&about.product.frame, about.rect);
     [
-        (tag::PIXEL_SCALE, Value::Doubles(vec![spacing_m, spacing_m, 0.0])),
-        (tag::TIEPOINT, Value::Doubles(corner)),
+        (tag::PIXEL_SCALE, Value::Doubles(scale.to_vec())),
+        (tag::TIEPOINT, Value::Doubles(tie_point.to_vec())),
         (tag::GEO_KEYS, Value::Shorts(geo_keys(about).into_flattened())),
         (tag::GDAL_METADATA, Value::Ascii(metadata(about))),
     ]
@@ -140,19 +85,11 @@ fn place_tags(about: &About) -> [(u16, Value); 4] {
 
 /// The coordinate system: one of heights, too, where these are heights above a datum that has a code.
 fn geo_keys(about: &About) -> Vec<[u16; 4]> {
-    const PROJECTED: u16 = 1;
-    const PIXEL_IS_AREA: u16 = 1;
-    const METRE: u16 = 9001;
     // GeoTIFF 1.1: of 1.0 GDAL drops the vertical system unless told otherwise.
-    let mut keys: Vec<[u16; 4]> = vec![
-        [1, 1, 1, 0],
-        [1024, 0, 1, PROJECTED],
-        [1025, 0, 1, PIXEL_IS_AREA],
-        [3072, 0, 1, about.epsg],
-        [3076, 0, 1, METRE],
-    ];
+    let mut keys = vec![[1, 1, 1, 0]];
+    keys.extend(projected_keys(about.epsg));
     if let (Some(code), "surface") = (vertical_code(about.product.vertical_datum()), about.layer) {
-        keys.extend([[4096, 0, 1, code], [4099, 0, 1, METRE]]);
+        keys.extend([[4096, 0, 1, code], VERTICAL_UNIT]);
     }
     keys[0][3] = keys.len() as u16 - 1;
     keys
@@ -177,7 +114,7 @@ fn metadata(about: &About) -> String {
     )
 }
 
-/// Names of datums as [`plain_datum`](crate::earth::plain_datum) has them, and the EPSG code of heights above each, in
+/// Names of datums as [`plain_datum`] has them, and the EPSG code of heights above each, in
 /// metres.
 const VERTICAL_CODES: [(&str, u16); 8] = [
     ("dhhn2016", 7837),
@@ -192,7 +129,7 @@ const VERTICAL_CODES: [(&str, u16); 8] = [
 
 /// EPSG code of heights above a datum, where it has one.
 fn vertical_code(datum: &str) -> Option<u16> {
-    let plain = crate::earth::plain_datum(datum);
+    let plain = plain_datum(datum);
     VERTICAL_CODES.iter().find(|(name, code)| plain == *name || plain == format!("epsg{code}")).map(|(_, code)| *code)
 }
 
@@ -204,6 +141,7 @@ mod tests {
     use tiff::tags::Tag;
 
     use super::*;
+    use crate::blocks::{Raster, blocks};
     use crate::samples;
 
     fn image(raster: &Raster) -> Blocks {

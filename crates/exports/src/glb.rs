@@ -9,7 +9,7 @@ use terrain::{LATTICE_PER_POST, ModuleId, ModuleRect, Tin, metres_of_quanta};
 
 use crate::mesh::normals;
 use crate::modules::module_name;
-use crate::{Facts, Mesh, Product};
+use crate::{Facts, Mesh, Product, TinPlace};
 
 /// Base colours of classes, in order and over again: tell apart by the colour-blind, too.
 pub(crate) const COLOURS: [[f64; 3]; 8] = [
@@ -238,17 +238,6 @@ pub fn write_glb(out: &mut impl Write, product: &Product, mesh: &Mesh) -> Result
         }),
     };
     out.write_all(&gltf.bytes())
-}
-
-/// Where a TIN of a raster's own posts lies.
-#[derive(Clone, Debug, PartialEq)]
-pub struct TinPlace {
-    /// East and north of post (0, 0), in metres.
-    pub origin_m: [f64; 2],
-    /// Metres between posts, west to east and south to north.
-    pub spacing_m: [f64; 2],
-    /// The coordinate system, where it is known.
-    pub crs: Option<String>,
 }
 
 /// Writes a TIN as binary glTF, counted from its south-west post.

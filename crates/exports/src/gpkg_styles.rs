@@ -82,7 +82,8 @@ fn symbol(name: &str, fill: &str, color: &str, outline: &str) -> String {
     )
 }
 
-fn escaped(text: &str) -> String {
+/// A text inside XML.
+pub(crate) fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 

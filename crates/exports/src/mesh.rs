@@ -133,7 +133,7 @@ impl Mesh {
     }
 
     /// East, north and up of each vertex in metres from the mesh's south-west corner.
-    pub(crate) fn metres(&self) -> impl Iterator<Item = [f64; 3]> {
+    pub(crate) fn metres(&self) -> impl ExactSizeIterator<Item = [f64; 3]> {
         self.vertices.iter().map(|vertex| vertex.map(|quanta| f64::from(quanta) / f64::from(QUANTA_PER_METRE)))
     }
 

@@ -2,6 +2,7 @@
 
 use crate::Product;
 use crate::flt_records::Place;
+use crate::gpkg_styles::escaped;
 
 /// How squares divide what is exported.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -79,8 +80,4 @@ fn files(grid: &Grid) -> String {
         format!("      <Tile row=\"{row}\" col=\"{col}\" file=\"squares/r{r:02}c{c:02}.flt\"/>\n")
     };
     cells.map(line).collect()
-}
-
-fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }

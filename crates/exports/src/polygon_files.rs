@@ -12,39 +12,17 @@ use crate::{Coordinates, Facts, Mesh, Product};
 /// Those of `out`.
 pub fn write_ply(out: &mut impl Write, product: &Product, mesh: &Mesh, coordinates: Coordinates) -> Result<()> {
     let facts = Facts::z_up(product, coordinates);
-    let offset = offset(&facts, product);
-    let short = coordinates == Coordinates::Local && mesh.fits_floats();
-    writeln!(out, "ply\nformat binary_little_endian 1.0")?;
-    for line in facts.comments(product) {
-        writeln!(out, "comment {line}")?;
-    }
+    let is_short = coordinates == Coordinates::Local && mesh.fits_floats();
+    let mut comments = facts.comments(product);
     let mut first = 0;
     for class in mesh.classes_present() {
         let end = first + mesh.of_class(class).count();
-        writeln!(out, "comment class {class} faces {first} to {}", end - 1)?;
+        comments.push(format!("class {class} faces {first} to {}", end - 1));
         first = end;
     }
-    writeln!(out, "element vertex {}", mesh.vertices.len())?;
-    for axis in ["x", "y", "z"] {
-        writeln!(out, "property {} {axis}", if short { "float" } else { "double" })?;
-    }
-    writeln!(out, "element face {}", mesh.triangles.len())?;
-    writeln!(out, "property list uchar int vertex_indices\nend_header")?;
-    for place in mesh.metres() {
-        for (metres, offset_m) in place.into_iter().zip(offset) {
-            match short {
-                true => out.write_all(&(metres as f32).to_le_bytes())?,
-                false => out.write_all(&(metres + offset_m).to_le_bytes())?,
-            }
-        }
-    }
-    for triangle in mesh.classes_present().into_iter().flat_map(|class| mesh.of_class(class)) {
-        out.write_all(&[3])?;
-        for corner in triangle {
-            out.write_all(&corner.to_le_bytes())?;
-        }
-    }
-    Ok(())
+    let triangles = mesh.classes_present().into_iter().flat_map(|class| mesh.of_class(class));
+    let ply = Ply { comments: &comments, is_short, face_count: mesh.triangles.len() };
+    put_ply(out, &ply, metres(mesh, product, &facts), triangles)
 }
 
 /// Writes `mesh` as OBJ, the triangles of each class as a group. Nothing is buffered here: give it a `BufWriter`.
@@ -53,28 +31,73 @@ pub fn write_ply(out: &mut impl Write, product: &Product, mesh: &Mesh, coordinat
 /// Those of `out`.
 pub fn write_obj(out: &mut impl Write, product: &Product, mesh: &Mesh, coordinates: Coordinates) -> Result<()> {
     let facts = Facts::z_up(product, coordinates);
-    let offset = offset(&facts, product);
-    for line in facts.comments(product) {
-        writeln!(out, "# {line}")?;
-    }
-    for place in mesh.metres() {
-        let [x, y, z] = [0, 1, 2].map(|axis| place[axis] + offset[axis]);
-        // The shortest digits that read back as the same number.
-        writeln!(out, "v {x} {y} {z}")?;
-    }
+    put_obj_vertices(out, &facts.comments(product), metres(mesh, product, &facts))?;
     for class in mesh.classes_present() {
         writeln!(out, "g class_{class}")?;
-        for [a, b, c] in mesh.of_class(class) {
-            writeln!(out, "f {} {} {}", a + 1, b + 1, c + 1)?;
-        }
+        put_obj_faces(out, mesh.of_class(class))?;
     }
     Ok(())
 }
 
-/// What to add to coordinates from the mesh's south-west corner.
-fn offset(facts: &Facts, product: &Product) -> [f64; 3] {
-    let local = Facts::z_up(product, Coordinates::Local).offset_m;
-    [0, 1, 2].map(|axis| local[axis] - facts.offset_m[axis])
+/// Coordinates of the vertices as the file has them.
+fn metres<'a>(mesh: &'a Mesh, product: &Product, facts: &Facts) -> impl ExactSizeIterator<Item = [f64; 3]> + use<'a> {
+    let corner_m = Facts::z_up(product, Coordinates::Local).offset_m;
+    // What to add to coordinates from the mesh's south-west corner.
+    let offset = [0, 1, 2].map(|axis| corner_m[axis] - facts.offset_m[axis]);
+    mesh.metres().map(move |place| [0, 1, 2].map(|axis| place[axis] + offset[axis]))
+}
+
+/// What a PLY says in its header beside its vertices.
+pub(crate) struct Ply<'a> {
+    /// A line each.
+    pub comments: &'a [String],
+    /// Whether coordinates are 32-bit floats, else 64-bit ones.
+    pub is_short: bool,
+    pub face_count: usize,
+}
+
+/// A binary little-endian PLY.
+pub(crate) fn put_ply<'a>(
+    out: &mut impl Write,
+    ply: &Ply,
+    vertices: impl ExactSizeIterator<Item = [f64; 3]>,
+    triangles: impl Iterator<Item = &'a [u32; 3]>,
+) -> Result<()> {
+    writeln!(out, "ply\nformat binary_little_endian 1.0")?;
+    ply.comments.iter().try_for_each(|line| writeln!(out, "comment {line}"))?;
+    writeln!(out, "element vertex {}", vertices.len())?;
+    for axis in ["x", "y", "z"] {
+        writeln!(out, "property {} {axis}", if ply.is_short { "float" } else { "double" })?;
+    }
+    writeln!(out, "element face {}", ply.face_count)?;
+    writeln!(out, "property list uchar int vertex_indices\nend_header")?;
+    for metres in vertices.flatten() {
+        match ply.is_short {
+            true => out.write_all(&(metres as f32).to_le_bytes())?,
+            false => out.write_all(&metres.to_le_bytes())?,
+        }
+    }
+    for triangle in triangles {
+        out.write_all(&[3])?;
+        triangle.iter().try_for_each(|corner| out.write_all(&corner.to_le_bytes()))?;
+    }
+    Ok(())
+}
+
+/// The beginning of an OBJ, up to its faces.
+pub(crate) fn put_obj_vertices(
+    out: &mut impl Write,
+    comments: &[String],
+    mut vertices: impl Iterator<Item = [f64; 3]>,
+) -> Result<()> {
+    comments.iter().try_for_each(|line| writeln!(out, "# {line}"))?;
+    // The shortest digits that read back as the same number.
+    vertices.try_for_each(|[x, y, z]| writeln!(out, "v {x} {y} {z}"))
+}
+
+/// Faces of an OBJ, which counts vertices from one.
+pub(crate) fn put_obj_faces<'a>(out: &mut impl Write, triangles: impl Iterator<Item = &'a [u32; 3]>) -> Result<()> {
+    triangles.into_iter().try_for_each(|[a, b, c]| writeln!(out, "f {} {} {}", a + 1, b + 1, c + 1))
 }
 
 impl Mesh {

@@ -8,8 +8,8 @@ use geometry::Facet;
 use geometry::owned::{PostGrid, visit_residuals};
 use terrain::{Dem, HOLE_CLASS, LoadModule, ModuleId, Post, PostRect, metres_of_quanta};
 
-use crate::geotiff::{self, BLOCK, Blocks};
-use crate::overviews::{Raster, overviews};
+use crate::blocks::{BLOCK, Blocks, Raster, blocks, overviews};
+use crate::geotiff;
 use crate::{ExportError, Product, Work};
 
 /// Heights of the ground that a database was built from, for the posts of a rectangle.
@@ -55,7 +55,7 @@ fn write(
         let posts = PostRect { south: rect.south.max(north + 1 - BLOCK as i32), north, ..rect };
         let raster = Raster { wide, metres: values(product, posts, ground, leaves_holes, &value)? };
         // A band has an even number of rows, so its halves are those of the whole.
-        Ok((geotiff::blocks(&raster), raster.halved().metres))
+        Ok((blocks(&raster), raster.halved().metres))
     })?;
     let (finest, halves): (Vec<_>, Vec<_>) = made.into_iter().unzip();
     let mut images = vec![Blocks { wide, high, blocks: finest.concat() }];

@@ -31,7 +31,7 @@ pub fn write_3dtiles(product: &Product, assumed: Option<Datum>, put: &Put, work:
         let globe = Globe::of(&product, &mesh, &earth, work)?;
         Ok(Layer { product, mesh, globe })
     };
-    let scene = Scene { layers: product.levels().map(layer).collect::<Result<_, ExportError>>()? };
+    let scene = Layers { layers: product.levels().map(layer).collect::<Result<_, ExportError>>()? };
     let squares = product.squares(square_side(product));
     let children: Vec<Value> =
         work.each("squares", &squares, |&rect| scene.square(rect, put))?.into_iter().flatten().collect();
@@ -86,11 +86,11 @@ struct Layer {
 }
 
 /// All levels, from fine to coarse.
-struct Scene {
+struct Layers {
     layers: Vec<Layer>,
 }
 
-impl Scene {
+impl Layers {
     /// Writes the files of a square; its tile, if it has any ground.
     fn square(&self, rect: ModuleRect, put: &Put) -> Result<Option<Value>, ExportError> {
         let finest = &self.layers[0];

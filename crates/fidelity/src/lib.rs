@@ -11,7 +11,7 @@
 mod tally;
 pub use tally::{Residuals, Tally};
 mod measure;
-pub use measure::{Ground, each_residual, measure, residuals};
+pub use measure::{Reference, each_residual, measure, residuals};
 mod split;
 pub use split::{Split, best_split};
 mod source;

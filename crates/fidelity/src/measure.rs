@@ -8,7 +8,7 @@ use crate::tally::{Residuals, Tally, bin};
 
 /// The ground that load modules are measured against.
 #[derive(Clone, Copy, Debug)]
-pub struct Ground<'a> {
+pub struct Reference<'a> {
     /// Heights at all posts of the load modules; voids are skipped.
     pub dem: &'a Dem,
     /// Classes of the same posts. Weights are not used: every post counts once.
@@ -24,7 +24,7 @@ pub struct Ground<'a> {
 ///
 /// # Panics
 /// When the windows of `ground` do not hold all posts of the load modules.
-pub fn measure(modules: &mut [LoadModule], ground: &Ground) -> Residuals {
+pub fn measure(modules: &mut [LoadModule], ground: &Reference) -> Residuals {
     let mut all = Residuals::default();
     for module in modules {
         module.residual = count(module, ground, &mut all);
@@ -36,7 +36,7 @@ pub fn measure(modules: &mut [LoadModule], ground: &Ground) -> Residuals {
 ///
 /// # Panics
 /// When the windows of `ground` do not hold all posts of the load module.
-pub fn residuals(module: &LoadModule, ground: &Ground) -> Residuals {
+pub fn residuals(module: &LoadModule, ground: &Reference) -> Residuals {
     let mut all = Residuals::default();
     count(module, ground, &mut all);
     all
@@ -47,7 +47,7 @@ pub fn residuals(module: &LoadModule, ground: &Ground) -> Residuals {
 ///
 /// # Panics
 /// When the window of `ground` does not hold all posts of the load module.
-pub fn each_residual(module: &LoadModule, ground: &Ground, mut each: impl FnMut(terrain::Post, i32)) {
+pub fn each_residual(module: &LoadModule, ground: &Reference, mut each: impl FnMut(terrain::Post, i32)) {
     let whole = ground.dem.void_count() == 0;
     visit(module, ground, |post, residual| {
         if whole || !ground.dem.is_void(post) {
@@ -56,7 +56,7 @@ pub fn each_residual(module: &LoadModule, ground: &Ground, mut each: impl FnMut(
     });
 }
 
-fn count(module: &LoadModule, ground: &Ground, all: &mut Residuals) -> ModuleResidual {
+fn count(module: &LoadModule, ground: &Reference, all: &mut Residuals) -> ModuleResidual {
     let rect = ground.grid.posts_of(module.id);
     assert!(ground.dem.rect().contains_rect(&rect), "the DEM window holds load module {}", module.id);
     assert!(ground.mask.rect().contains_rect(&rect), "the mask window holds load module {}", module.id);
@@ -115,7 +115,7 @@ impl Sums {
 /// Calls `each` with every post that one triangle of a load module owns and its residual, voids included.
 pub(crate) fn visit_triangle(
     module: &LoadModule,
-    ground: &Ground,
+    ground: &Reference,
     triangle: [u16; 3],
     each: impl FnMut(terrain::Post, i32),
 ) {
@@ -130,7 +130,7 @@ fn facet(module: &LoadModule, triangle: [u16; 3]) -> Facet {
 }
 
 #[inline(always)]
-fn visit(module: &LoadModule, ground: &Ground, mut each: impl FnMut(terrain::Post, i32)) {
+fn visit(module: &LoadModule, ground: &Reference, mut each: impl FnMut(terrain::Post, i32)) {
     let posts = PostGrid::of_module(ground.grid, module.id, ground.spacing);
     for &triangle in &module.triangles {
         visit_residuals(&posts, &facet(module, triangle), ground.dem, &mut each);
@@ -139,31 +139,20 @@ fn visit(module: &LoadModule, ground: &Ground, mut each: impl FnMut(terrain::Pos
 
 #[cfg(test)]
 mod tests {
-    use terrain::{Decks, ModuleId, ModuleVertex, Post, PostRect};
+    use terrain::{Decks, ModuleId, ModuleVertex, Post};
+
+    use fastrand::Rng;
 
     use super::*;
 
     const GRID: ModuleGrid = ModuleGrid { rows: 2, cols: 3, side_cells: 20 };
 
-    /// SplitMix64.
-    struct Draw(u64);
-
-    impl Draw {
-        fn below(&mut self, bound: u32) -> u32 {
-            self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-            let mut z = self.0;
-            z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-            z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-            ((z ^ (z >> 31)) % u64::from(bound)) as u32
-        }
-    }
-
     /// A load module over random vertices, `step` quanta apart at least, some on its sides.
-    fn random_module(id: ModuleId, spacing: Spacing, step: u32, draw: &mut Draw) -> LoadModule {
+    fn random_module(id: ModuleId, spacing: Spacing, step: u32, draw: &mut Rng) -> LoadModule {
         let side = (GRID.side_cells * spacing.quanta_per_post()) as u32;
         let mut places: Vec<_> = [(0, 0), (0, side), (side, 0), (side, side)].to_vec();
         for i in 0..17 {
-            let mut place = || draw.below(side / step + 1) * step;
+            let mut place = || draw.u32(..=side / step) * step;
             places.push(if i % 4 == 0 { (place(), 0) } else { (place(), place()) });
             places.push(if i % 4 == 0 { (side, place()) } else { (place(), place()) });
         }
@@ -172,7 +161,7 @@ mod tests {
         let points: Vec<_> = places.iter().map(|&(y, x)| Post::new(y as i32, x as i32)).collect();
         let triangles: Vec<_> = mesh::delaunay(&points).into_iter().map(|t| t.map(|v| v as u16)).collect();
         let mut vertex = |(y, x): (u32, u32)| {
-            let z = draw.below(100_000) as i32 - 50_000;
+            let z = draw.i32(-50_000..50_000);
             ModuleVertex { y: y as u16, x: x as u16, z }
         };
         LoadModule {
@@ -188,7 +177,7 @@ mod tests {
     }
 
     /// The residual at `post`, from the one triangle that holds it after the shift, in 128 bits.
-    fn residual_by_search(module: &LoadModule, ground: &Ground, post: Post) -> Option<i32> {
+    fn residual_by_search(module: &LoadModule, ground: &Reference, post: Post) -> Option<i32> {
         let (rect, area, q) = (ground.grid.posts_of(module.id), ground.grid.area(), ground.spacing.quanta_per_post());
         let (x, y) = (i128::from((post.col - rect.west) * q), i128::from((post.row - rect.south) * q));
         let east = if post.col == area.east { -1 } else { 1 };
@@ -210,10 +199,10 @@ mod tests {
         })
     }
 
-    fn by_search(modules: &[LoadModule], ground: &Ground) -> Residuals {
+    fn by_search(modules: &[LoadModule], ground: &Reference) -> Residuals {
         let mut all = Residuals::default();
         let area = ground.grid.area();
-        for post in posts(area) {
+        for post in area.posts() {
             let module_of = |v: i32, far: u32| (v / ground.grid.side_cells).min(far as i32 - 1) as u32;
             let id = ModuleId { row: module_of(post.row, GRID.rows), col: module_of(post.col, GRID.cols) };
             let module = &modules[GRID.index(id)];
@@ -225,24 +214,20 @@ mod tests {
         all
     }
 
-    fn posts(rect: PostRect) -> impl Iterator<Item = Post> {
-        (rect.south..=rect.north).flat_map(move |row| (rect.west..=rect.east).map(move |col| Post::new(row, col)))
-    }
-
     /// The scan and the search agree, in every sum and bin, and each module's figures add up to the whole.
     #[track_caller]
     fn check(seed: u64, voids: bool, classes: bool, sixteenths: u32, step: u32) {
-        let mut draw = Draw(seed);
+        let mut draw = Rng::with_seed(seed);
         let spacing = Spacing::from_sixteenths(sixteenths).unwrap();
         let window = GRID.area().grown(3);
-        let dem = Dem::from_fn(window, |_| (!voids || 0 < draw.below(9)).then(|| draw.below(100_000) as i32 - 50_000));
+        let dem = Dem::from_fn(window, |_| (!voids || 0 < draw.u32(..9)).then(|| draw.i32(-50_000..50_000)));
         let mask = if classes {
-            let classes = (0..window.post_count()).map(|_| draw.below(4) as u8).collect();
+            let classes = (0..window.post_count()).map(|_| draw.u8(..4)).collect();
             Importance::new(window, vec![1000; window.post_count()], classes)
         } else {
             Importance::uniform(window, 1000)
         };
-        let ground = Ground { dem: &dem, mask: &mask, grid: GRID, spacing };
+        let ground = Reference { dem: &dem, mask: &mask, grid: GRID, spacing };
         let mut modules: Vec<_> = GRID.all().iter().map(|id| random_module(id, spacing, step, &mut draw)).collect();
         modules.iter().for_each(|module| assert_eq!(module.check(), Ok(()), "seed {seed}"));
         let found = measure(&mut modules, &ground);
@@ -257,7 +242,7 @@ mod tests {
             merged.merge(&own);
         }
         assert_eq!(merged, found);
-        let counted = posts(GRID.area()).filter(|&post| !dem.is_void(post)).count();
+        let counted = GRID.area().posts().filter(|&post| !dem.is_void(post)).count();
         assert_eq!(found.total().posts, counted as u64);
     }
 

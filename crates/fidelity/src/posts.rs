@@ -125,7 +125,7 @@ mod tests {
 
     use super::*;
     use crate::scene::{full_tin, grid, module_of, random_tin};
-    use crate::{Ground, measure};
+    use crate::{Reference, measure};
 
     #[test]
     fn residuals_at_posts_equal_those_that_load_modules_count() {
@@ -144,7 +144,7 @@ mod tests {
         let mut dem = Dem::from_fn(area, |post| (post.col != 7).then_some(post.row * 31 % 1009));
         dem.fill_voids(|_| 5);
         let mask = terrain::Importance::uniform(area, 1000);
-        let exact = measure(&mut modules, &Ground { dem: &dem, mask: &mask, grid: grid(2, 3), spacing }).total();
+        let exact = measure(&mut modules, &Reference { dem: &dem, mask: &mask, grid: grid(2, 3), spacing }).total();
         let posts = PostHeights::of_dem(&dem, area);
         let tin = PostHeights::of_triangles(&Triangles::of_modules(&modules, grid(2, 3), spacing), &posts);
         assert_eq!(residuals_at_posts(&posts, &tin), exact);

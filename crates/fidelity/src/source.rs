@@ -27,7 +27,7 @@ pub fn residuals_at_source(modules: &[LoadModule], grid: ModuleGrid, spacing: Sp
         let cols = inside(source.south_west[0], source.step[0], west, side, module.id.col + 1 == grid.cols);
         let rows = inside(source.south_west[1], source.step[1], south, side, module.id.row + 1 == grid.rows);
         let Some(posts) = posts(rows, cols).and_then(|posts| posts.intersection(&source.window)) else { continue };
-        let ground = Ground { module, source, posts, corner: [west, south] };
+        let ground = PostsInModule { module, source, posts, corner: [west, south] };
         ground.count(&mut tally);
     }
     tally
@@ -46,14 +46,14 @@ fn posts((south, north): (f64, f64), (west, east): (f64, f64)) -> Option<PostRec
 }
 
 /// One load module and the source posts in it.
-struct Ground<'a> {
+struct PostsInModule<'a> {
     module: &'a LoadModule,
     source: &'a SourcePosts<'a>,
     posts: PostRect,
     corner: [f64; 2],
 }
 
-impl Ground<'_> {
+impl PostsInModule<'_> {
     fn count(&self, tally: &mut Tally) {
         let wide = self.posts.posts_wide();
         // Heights in quanta by post; NaN where there is none, or where the post is counted already.

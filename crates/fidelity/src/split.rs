@@ -12,7 +12,7 @@
 
 use terrain::{LoadModule, Post};
 
-use crate::Ground;
+use crate::Reference;
 use crate::measure::visit_triangle;
 
 /// The best way to spend one more point, which adds two triangles.
@@ -30,7 +30,7 @@ pub struct Split {
 ///
 /// # Panics
 /// When the window of `ground` does not hold all posts of the load module.
-pub fn best_split(module: &LoadModule, ground: &Ground) -> Option<Split> {
+pub fn best_split(module: &LoadModule, ground: &Reference) -> Option<Split> {
     let mut best: Option<Split> = None;
     let whole = ground.dem.void_count() == 0;
     let mut posts: Vec<(Post, [f64; 3], f64)> = Vec::new();
@@ -67,7 +67,7 @@ struct Shares {
 }
 
 impl Shares {
-    fn new(module: &LoadModule, ground: &Ground, triangle: [u16; 3]) -> Self {
+    fn new(module: &LoadModule, ground: &Reference, triangle: [u16; 3]) -> Self {
         let corners = triangle.map(|v| {
             let vertex = module.vertices[usize::from(v)];
             [f64::from(vertex.x), f64::from(vertex.y)]
@@ -116,7 +116,7 @@ mod tests {
         let dem = Dem::from_fn(GRID.area(), |post| Some(height(post)));
         let mask = Importance::uniform(GRID.area(), 1000);
         let spacing = Spacing::from_sixteenths(400).unwrap();
-        let ground = Ground { dem: &dem, mask: &mask, grid: GRID, spacing };
+        let ground = Reference { dem: &dem, mask: &mask, grid: GRID, spacing };
         let squares = crate::residuals(&two_triangles(), &ground).total().sum_squared as f64;
         (best_split(&two_triangles(), &ground), squares)
     }

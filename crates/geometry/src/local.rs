@@ -102,6 +102,8 @@ impl LocalRect {
 
 #[cfg(test)]
 mod tests {
+    use fastrand::Rng;
+
     use super::*;
 
     #[test]
@@ -113,14 +115,10 @@ mod tests {
 
     #[test]
     fn the_packed_in_circle_test_agrees_with_the_exact_one() {
-        let mut state = 1u64;
-        let mut next = move |below: u64| {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            ((state >> 33) % below) as i32
-        };
+        let mut draw = Rng::with_seed(1);
         for side in [4, 20, 16_384] {
             for _ in 0..4000 {
-                let mut posts = [(); 4].map(|()| Post::new(next(side), next(side)));
+                let mut posts = [(); 4].map(|()| Post::new(draw.i32(0..side), draw.i32(0..side)));
                 if crate::orient(posts[0], posts[1], posts[2]) < 0 {
                     posts.swap(0, 1);
                 }

@@ -273,18 +273,10 @@ impl Division {
 
 #[cfg(test)]
 mod tests {
+    use fastrand::Rng;
     use terrain::PostRect;
 
     use super::*;
-
-    /// SplitMix64.
-    fn draw(state: &mut u64) -> u64 {
-        *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = *state;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
 
     /// Whether the facet holds the post after the shift, asked of the three half planes one by one.
     fn owns(grid: &PostGrid, facet: &Facet, row: i32, col: i32) -> bool {
@@ -314,16 +306,16 @@ mod tests {
 
     #[test]
     fn owned_posts_are_those_of_the_shifted_triangle() {
-        let mut seed = 5;
+        let mut draw = Rng::with_seed(5);
         for round in 0..6000 {
             let (posts, units) = (8, [1, 2, 7, 3200][round % 4]);
             let far = |on: bool| on.then_some(posts);
             let (far_row, far_col) = (far(round % 3 == 0), far(round % 5 == 0));
             let grid = PostGrid { origin: Post::new(0, 0), units_per_post: units, far_row, far_col };
             // A third of the coordinates fall on posts, so edges and corners on posts are common.
-            let mut place = || match draw(&mut seed) % 3 {
-                0 => (draw(&mut seed) % (posts as u64 + 1)) as i32 * units,
-                _ => (draw(&mut seed) % (posts * units + 1) as u64) as i32,
+            let mut place = || match draw.u8(..3) {
+                0 => draw.i32(0..=posts) * units,
+                _ => draw.i32(0..=posts * units),
             };
             let (mut x, mut y) = ([0; 3].map(|_| place()), [0; 3].map(|_| place()));
             if Facet::new(x, y, [0; 3]).den < 0 {
@@ -354,14 +346,14 @@ mod tests {
 
     #[test]
     fn residuals_are_those_of_a_wide_division() {
-        let mut seed = 9;
+        let mut draw = Rng::with_seed(9);
         let rect = PostRect::new(Post::new(30, 70), Post::new(50, 90));
-        let dem = Dem::from_fn(rect, |_| Some((draw(&mut seed) % 400_000) as i32 - 200_000));
+        let dem = Dem::from_fn(rect, |_| Some(draw.i32(-200_000..200_000)));
         for round in 0..400 {
             let units = [1, 25, 3200][round % 3];
-            let mut place = || (draw(&mut seed) % (20 * units as u64 + 1)) as i32;
+            let mut place = || draw.i32(0..=20 * units);
             let (x, y) = ([0; 3].map(|_| place()), [0; 3].map(|_| place()));
-            let z = [0; 3].map(|_| (draw(&mut seed) % 400_000) as i32 - 200_000);
+            let z = [0; 3].map(|_| draw.i32(-200_000..200_000));
             let facet = Facet::new(x, y, z);
             if facet.den <= 0 {
                 continue;

@@ -1,10 +1,10 @@
 //! What follows from a job before any height is read: grids, tiles, ranks, the budget.
 
-use job::{Borders, Budget as PointBudget, Edges, Job, TileOrder};
+use job::{Borders, Budget as PointBudget, Edges, Job};
 use limits::Windows;
 use schedule::RankedTasks;
 use terrain::{GridFrame, ModuleGrid, PostRect, TileId};
-use tiling::{Budget, BudgetFault, Order, Tiling};
+use tiling::{Budget, BudgetFault, Tiling};
 
 use crate::GroundError;
 
@@ -32,11 +32,8 @@ impl GamingArea {
     pub fn new(job: &Job) -> Result<Self, GroundError> {
         let grid = job.area.grid;
         refuse_sizes(job)?;
-        let order = match job.tiles.order {
-            TileOrder::Color => Order::Color,
-            TileOrder::Raster => Order::Raster,
-        };
-        let tiling = Tiling::new(grid.area(), grid.side_cells, job.tiles.rows, job.tiles.columns, order);
+        let job::TilesSpec { rows, columns, order, .. } = job.tiles;
+        let tiling = Tiling::new(grid.area(), grid.side_cells, rows, columns, order);
         let frame = GridFrame {
             origin_east_m: job.area.origin_m[0],
             origin_north_m: job.area.origin_m[1],
@@ -137,7 +134,7 @@ fn refuse_impossible(job: &Job, budget: &Budget) -> Result<(), GroundError> {
 /// Points of constrained edges cost exactly two triangles each, so too many are known before any work.
 fn refuse_points(job: &Job, budget: &Budget) -> Result<(), GroundError> {
     let (PointBudget::Points(points), Edges::Constrained) = (job.tin.budget, job.modules.edges) else { return Ok(()) };
-    let room = (budget.area - budget.start_total()) / u64::from(limits::POINT_COST);
+    let room = (budget.area - budget.start_total()) / u64::from(terrain::POINT_COST);
     if points <= room {
         return Ok(());
     }

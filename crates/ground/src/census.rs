@@ -32,7 +32,7 @@ impl Census {
         let (mut census, rect) = (Self::new(), patch.rect);
         for row in rect.south + i32::from(area.south < rect.south)..=rect.north {
             for col in rect.west + i32::from(area.west < rect.west)..=rect.east {
-                let index = (row - rect.south) as usize * rect.posts_wide() + (col - rect.west) as usize;
+                let index = rect.index(terrain::Post::new(row, col));
                 let part = (row - area.south) as usize * MAP_ROWS / area.posts_high() * MAP_COLS
                     + (col - area.west) as usize * MAP_COLS / area.posts_wide();
                 census.parts[part].1 += 1;

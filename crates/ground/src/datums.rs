@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use job::{Job, SourceFile};
-use source_files::{Crs, DatumShift, DemFile, Geoid};
+use source_files::{Crs, DatumShift, DemFile, Geoid, plain_datum};
 
 use crate::GroundError;
 use crate::area::GamingArea;
@@ -47,11 +47,6 @@ pub fn judge_datums(
         }
     }
     Ok(found)
-}
-
-/// A datum's name without what people write differently: `EGM 96` is `egm96`.
-fn plain_datum(name: &str) -> String {
-    name.chars().filter(char::is_ascii_alphanumeric).collect::<String>().to_ascii_lowercase()
 }
 
 /// The grids of a job, each read once.

@@ -5,10 +5,9 @@
 
 use std::path::Path;
 
-use job::{Job, NamedFile, OuterBorder, Start, StartMethod};
+use job::{Choice, Job, NamedFile, OuterBorder, Start, StartMethod};
 use methods::{
-    Boundary, Contours, Diagonal, Distance, Extrema, FowlerLittle, Ground as MethodGround, Impossible, LatticeTin,
-    Splitting,
+    Boundary, Contours, DemWindow, Diagonal, Distance, Extrema, FowlerLittle, Impossible, LatticeTin, Splitting,
 };
 use source_files::{GivenFeature, GivenShape, RasterFrame, read_given};
 use terrain::{Dem, Importance, Metres, Post, PostRect, THOUSANDTHS, TileId, quanta_of_metres};
@@ -153,7 +152,7 @@ impl Given {
             return importance;
         }
         let rect = importance.rect();
-        let mut weights: Vec<u32> = posts(rect).map(|post| u32::from(importance.weight(post))).collect();
+        let mut weights: Vec<u32> = rect.posts().map(|post| u32::from(importance.weight(post))).collect();
         for (polygon, factor) in &self.factors {
             let inside = inside(polygon, area, rect);
             for (weight, _) in weights.iter_mut().zip(inside).filter(|(_, inside)| *inside) {
@@ -163,10 +162,11 @@ impl Given {
                 *weight = scaled.clamp(least, u64::from(u16::MAX)) as u32;
             }
         }
-        let weights = posts(rect)
+        let weights = rect
+            .posts()
             .zip(weights)
             .map(|(post, weight)| if self.forbidden.binary_search(&post).is_ok() { 0 } else { weight as u16 });
-        let classes = posts(rect).map(|post| importance.class(post)).collect();
+        let classes = rect.posts().map(|post| importance.class(post)).collect();
         Importance::new(rect, weights.collect(), classes)
     }
 
@@ -181,11 +181,11 @@ impl Given {
             let modules = area.tiling.modules(tile, area.grid).count() as u64;
             let share = (points * modules).div_ceil(area.grid.count() as u64) as usize;
             let spacing = Metres(area.frame.spacing.metres());
-            let chosen = chosen(&MethodGround { dem, spacing }, method, share)
-                .map_err(|why| refused("tin.start", method, why))?;
+            let chosen =
+                chosen(&DemWindow { dem, spacing }, method, share).map_err(|why| refused("tin.start", method, why))?;
             let known: std::collections::HashSet<Post> = found.iter().map(|post| post.at).collect();
             // A fixed outer border has its own points.
-            let is_fixed = |at: Post| self.outer_is_fixed && is_on_border(area.rect, at);
+            let is_fixed = |at: Post| self.outer_is_fixed && area.rect.has_on_border(at);
             let fresh = chosen.into_iter().filter(|&at| !known.contains(&at) && !is_fixed(at));
             found.extend(fresh.map(|at| GivenPost { at, pinned: false, outer: false, height: None }));
         }
@@ -202,7 +202,7 @@ pub struct GamingAreaFrame {
 }
 
 /// The posts that a method chooses on a window, in its order, corners left out.
-pub fn chosen(ground: &MethodGround, method: StartMethod, points: usize) -> Result<Vec<Post>, Impossible> {
+pub fn chosen(ground: &DemWindow, method: StartMethod, points: usize) -> Result<Vec<Post>, Impossible> {
     let rect = ground.dem.rect();
     // Four of a method's points are the corners, which every tile has.
     let count = (points + 4).min(rect.post_count());
@@ -253,21 +253,13 @@ pub fn border_posts(given: &[GivenPost]) -> impl Iterator<Item = Post> {
     given.iter().filter(|post| post.outer).map(|post| post.at)
 }
 
-fn posts(rect: PostRect) -> impl Iterator<Item = Post> {
-    (rect.south..=rect.north).flat_map(move |row| (rect.west..=rect.east).map(move |col| Post::new(row, col)))
-}
-
-fn is_on_border(rect: PostRect, post: Post) -> bool {
-    post.row == rect.south || post.row == rect.north || post.col == rect.west || post.col == rect.east
-}
-
 /// Whether each post of a window lies inside a polygon, row-major.
 fn inside(polygon: &mask::Polygon, area: &GamingAreaFrame, rect: PostRect) -> Vec<bool> {
     let shape = mask::Shape::Polygons(vec![polygon.clone()]);
     let only = mask::Area { class: "inside".into(), weight: THOUSANDTHS, shape };
-    let mask = mask::Mask { default_weight: 0, areas: vec![only], smoothing: mask::Smoothing::None, over: Vec::new() };
+    let mask = mask::Mask { default_weight: 0, areas: vec![only], smooth: terrain::Smooth::None, over: Vec::new() };
     let found = mask::importance(&mask, area.rect, &area.frame, rect);
-    posts(rect).map(|post| 0 < found.weight(post)).collect()
+    rect.posts().map(|post| 0 < found.weight(post)).collect()
 }
 
 /// Posts in metres of a map.
@@ -351,7 +343,7 @@ fn factor_of(path: &Path, feature: &GivenFeature) -> Result<u32, GroundError> {
 
 /// Whether a post lies on an outer border that has a point every border step and no others chosen.
 fn is_on_fixed_border(job: &Job, area: &GamingArea, at: Post) -> bool {
-    job.modules.outer_border == OuterBorder::Fixed && is_on_border(area.rect, at)
+    job.modules.outer_border == OuterBorder::Fixed && area.rect.has_on_border(at)
 }
 
 /// Refuses to forbid what is a vertex in any case.
@@ -365,7 +357,7 @@ fn refuse_fixed(
     let side = area.grid.side_cells;
     let is_corner = at.row % side == 0 && at.col % side == 0;
     let step = job.outer_step_cells();
-    let on_border = is_on_border(area.rect, at) && at.row % step == 0 && at.col % step == 0;
+    let on_border = area.rect.has_on_border(at) && at.row % step == 0 && at.col % step == 0;
     match (is_corner, on_border) {
         (true, _) => Err(wrong(
             &file.path,

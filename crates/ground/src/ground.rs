@@ -58,9 +58,9 @@ pub struct Window {
 
 impl Window {
     /// What load modules of this rectangle are measured against.
-    pub fn measured(&self, area: &GamingArea) -> fidelity::Ground<'_> {
+    pub fn measured(&self, area: &GamingArea) -> fidelity::Reference<'_> {
         let spacing = area.frame.spacing;
-        fidelity::Ground { dem: &self.dem, mask: &self.importance, grid: area.grid, spacing }
+        fidelity::Reference { dem: &self.dem, mask: &self.importance, grid: area.grid, spacing }
     }
 }
 

@@ -41,7 +41,7 @@ fn feed_heights(builder: FingerprintBuilder, dem: &Dem) -> FingerprintBuilder {
     let builder = feed_rect(builder, rect).rows(rows, i32::to_le_bytes).number(dem.void_count() as u64);
     match dem.void_count() {
         0 => builder,
-        _ => builder.stream(rect.post_count(), posts(rect).map(|post| u8::from(dem.is_void(post)))),
+        _ => builder.stream(rect.post_count(), rect.posts().map(|post| u8::from(dem.is_void(post)))),
     }
 }
 
@@ -60,10 +60,6 @@ fn feed_given(builder: FingerprintBuilder, given: &GivenPost) -> FingerprintBuil
     let GivenPost { at, pinned, outer, height } = given;
     let builder = feed_post(builder, at).case(u8::from(*pinned)).case(u8::from(*outer));
     builder.maybe(*height, |builder, height| builder.signed(height.into()))
-}
-
-fn posts(rect: PostRect) -> impl Iterator<Item = Post> {
-    (rect.south..=rect.north).flat_map(move |row| (rect.west..=rect.east).map(move |col| Post::new(row, col)))
 }
 
 #[cfg(test)]

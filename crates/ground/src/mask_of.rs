@@ -2,8 +2,8 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use job::{AreaShape, DemSource, ImportanceArea, Job, Smooth, WaterSpec};
-use mask::{Mask, Polygon, Shape, Smoothing};
+use job::{AreaShape, DemSource, ImportanceArea, ImportanceSpec, Job, WaterSpec};
+use mask::{Mask, Polygon, Shape};
 use source_files::{ClassRaster, read_polygons};
 use terrain::THOUSANDTHS;
 
@@ -64,11 +64,8 @@ impl Opening<'_> {
             weight: water_weight(job, spec),
             shape: Shape::Polygons(water),
         });
-        let smoothing = match job.importance.smooth {
-            Smooth::Binomial7 => Smoothing::Binomial7,
-            Smooth::None => Smoothing::None,
-        };
-        Ok(Mask { default_weight: job.importance.default_weight, areas, smoothing, over: water.into_iter().collect() })
+        let ImportanceSpec { default_weight, smooth, .. } = job.importance;
+        Ok(Mask { default_weight, areas, smooth, over: water.into_iter().collect() })
     }
 
     fn shape(&self, spec: &ImportanceArea) -> Result<Shape<'static>, GroundError> {

@@ -2,7 +2,7 @@
 
 use std::sync::atomic::AtomicBool;
 
-use job::{Job, Resampling, SourceFile, SourceSaid, Voids};
+use job::{Job, SourceFile, SourceSaid, Voids};
 use schedule::Workers;
 use source_files::{
     Crs, DatumShift, DemFile, Mosaic, MosaicRules, MosaicVoids, Raster, RasterFrame, Reading, WideMosaic, Windows,
@@ -63,10 +63,7 @@ pub fn mosaic_rules(job: &Job) -> MosaicRules {
         Voids::Fail | Voids::Hole => 0,
     };
     MosaicRules {
-        resampling: match job.dem.resampling {
-            Resampling::Bilinear => source_files::Resampling::Bilinear,
-            Resampling::Cubic => source_files::Resampling::Cubic,
-        },
+        resampling: job.dem.resampling,
         feather_m: job.dem.feather_m,
         voids: MosaicVoids { next_source: job.dem.next_source, fill_within },
     }

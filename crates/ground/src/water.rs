@@ -103,8 +103,7 @@ impl Water {
     pub fn flatten(&self, dem: Dem) -> Dem {
         let rect = dem.rect();
         let Some(levels) = self.levels(rect) else { return dem };
-        let level =
-            |post: Post| levels[(post.row - rect.south) as usize * rect.posts_wide() + (post.col - rect.west) as usize];
+        let level = |post: Post| levels[rect.index(post)];
         let mut flat = Dem::from_fn(rect, |post| level(post).or((!dem.is_void(post)).then(|| dem.height(post))));
         flat.fill_voids(|post| dem.height(post));
         flat

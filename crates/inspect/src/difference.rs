@@ -4,6 +4,7 @@ use std::path::Path;
 
 use compiler::CompileError;
 use fidelity::each_residual;
+use ground::GroundError;
 use product::{Product, Wanted, WantedGround};
 use terrain::{Dem, Importance, LoadModule, ModuleId, QUANTA_PER_METRE};
 
@@ -76,12 +77,13 @@ fn check_same_ground(first: &Product, second: &Product, path: &Path) -> Result<(
     (area.name, area.vertical_datum) = (other.name.clone(), other.vertical_datum.clone());
     (area.tile_rows, area.tile_cols) = (other.tile_rows, other.tile_cols);
     let Some((key, expected, found)) = area.difference(other) else { return Ok(()) };
-    Err(CompileError::Impossible {
+    Err(GroundError::Impossible {
         key: format!("{}: {key}", path.display()),
         found,
         expected,
         hint: "load modules can be compared where both databases divide the same ground alike".into(),
-    })
+    }
+    .into())
 }
 
 fn module_difference(product: &Product, a: &LoadModule, b: &LoadModule) -> ModuleDifference {
@@ -103,7 +105,7 @@ fn apart(product: &Product, a: &LoadModule, b: &LoadModule) -> u32 {
     let rect = product.grid.posts_of(a.id);
     let flat = Dem::from_fn(rect, |_| Some(0));
     let mask = Importance::uniform(rect, terrain::THOUSANDTHS);
-    let ground = fidelity::Ground { dem: &flat, mask: &mask, grid: product.grid, spacing: product.frame.spacing };
+    let ground = fidelity::Reference { dem: &flat, mask: &mask, grid: product.grid, spacing: product.frame.spacing };
     let wide = rect.posts_wide();
     let mut heights = vec![0; rect.post_count()];
     let place = |post: terrain::Post| (post.row - rect.south) as usize * wide + (post.col - rect.west) as usize;

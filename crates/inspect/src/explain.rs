@@ -6,7 +6,8 @@ use std::sync::atomic::AtomicBool;
 use compiler::{CompileError, Stage};
 use database::{Folder, TileState, files};
 use fidelity::{Split, best_split};
-use job::HOLE_CLASS_NAME;
+use ground::GroundError;
+use job::{Choice, HOLE_CLASS_NAME};
 use limits::Windows;
 use product::{Product, Wanted, WantedGround};
 use schedule::Workers;
@@ -132,19 +133,21 @@ fn check_inside(module: ModuleId, product: &Product) -> Result<(), CompileError>
     if module.row < rows && module.col < cols {
         return Ok(());
     }
-    Err(CompileError::Impossible {
+    Err(GroundError::Impossible {
         key: "load module".into(),
         found: module.to_string(),
         expected: format!("a row from 0 to {} and a column from 0 to {}", rows - 1, cols - 1),
         hint: "rows come first and both count from the south-west".into(),
-    })
+    }
+    .into())
 }
 
 /// The best split of every load module, row by row, where there is ground to split on.
 fn splits(product: &Product, workers: usize) -> Result<Option<Vec<Option<Split>>>, CompileError> {
     let Some(found) = &product.ground else { return Ok(None) };
     let mask = Importance::uniform(found.dem.rect(), terrain::THOUSANDTHS);
-    let ground = fidelity::Ground { dem: &found.dem, mask: &mask, grid: product.grid, spacing: product.frame.spacing };
+    let ground =
+        fidelity::Reference { dem: &found.dem, mask: &mask, grid: product.grid, spacing: product.frame.spacing };
     let rows: Vec<&[LoadModule]> = product.modules.chunks(product.grid.cols as usize).collect();
     let (workers, stop) = (Workers::new(workers), AtomicBool::new(false));
     let of_row = |_: usize, row: &&[LoadModule]| -> Result<Vec<Option<Split>>, CompileError> {
@@ -182,10 +185,7 @@ fn explained(
         extent_m: [west, south, west + side_m, south + side_m],
         tile: (tin.tile, state, tin.stop),
         tile_triangles: (tin.triangles_charged, allowed(allocation, tin.tile)),
-        count_of: match limits.count {
-            job::Count::Triangles => "triangles".into(),
-            job::Count::Polygons => "polygons".into(),
-        },
+        count_of: limits.count.name().into(),
         triangles: module.counts().triangles,
         polygons: module.counts().polygons,
         vertices_inside: (module.vertices.len() - module.border_vertex_count()) as u32,

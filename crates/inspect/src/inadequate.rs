@@ -11,7 +11,7 @@ use compiler::CompileError;
 use geometry::Facet;
 use geometry::owned::{PostGrid, visit_residuals};
 use ground::{GamingArea, Ground, Window};
-use job::Count;
+use job::Choice;
 use product::{Opened, choose_ground, locate_weights};
 use schedule::Workers;
 use terrain::{
@@ -112,10 +112,7 @@ pub fn inadequate(folder: &Path, tolerance_m: Option<f64>) -> Result<Inadequate,
         tolerance_m,
         frame: *frame,
         grid: area.grid,
-        count: match job.limits.count {
-            Count::Triangles => "triangles",
-            Count::Polygons => "polygons",
-        },
+        count: job.limits.count.name(),
         per_module: area.budget.per_module,
         components,
         counts,
@@ -140,7 +137,7 @@ fn weighted<'a>(
             visit_residuals(&grid, &Facet::new(x, y, corners.map(|v| v.z)), dem, |post, residual| {
                 if !dem.is_void(post) {
                     let share = (f64::from(importance.weight(post)) / heaviest).min(1.0);
-                    all[index(area.rect, post)] = (metres_of_quanta(residual.abs()) * share) as f32;
+                    all[area.rect.index(post)] = (metres_of_quanta(residual.abs()) * share) as f32;
                 }
             });
         }
@@ -165,10 +162,6 @@ fn heaviest(importance: &Importance, water: Option<u8>) -> f64 {
     f64::from((rect.south..=rect.north).filter_map(in_row).max().unwrap_or(THOUSANDTHS).max(1))
 }
 
-fn index(rect: PostRect, post: Post) -> usize {
-    (post.row - rect.south) as usize * rect.posts_wide() + (post.col - rect.west) as usize
-}
-
 /// All that components are found in.
 struct Seen<'a> {
     area: &'a GamingArea,
@@ -181,13 +174,13 @@ struct Seen<'a> {
 impl Seen<'_> {
     fn components(&self, tolerance_m: f64) -> Vec<Component> {
         let rect = self.area.rect;
-        let above = |post: Post| tolerance_m < f64::from(self.residual_m[index(rect, post)]);
+        let above = |post: Post| tolerance_m < f64::from(self.residual_m[rect.index(post)]);
         let mut met = vec![false; rect.post_count()];
         let mut found = Vec::new();
         let posts =
             (rect.south..=rect.north).flat_map(|row| (rect.west..=rect.east).map(move |col| Post::new(row, col)));
         for post in posts.filter(|&post| above(post)) {
-            if std::mem::replace(&mut met[index(rect, post)], true) {
+            if std::mem::replace(&mut met[rect.index(post)], true) {
                 continue;
             }
             let mut posts = vec![post];
@@ -197,7 +190,7 @@ impl Seen<'_> {
                 for (rows, cols) in [(-1, -1), (-1, 0), (-1, 1), (0, -1), (0, 1), (1, -1), (1, 0), (1, 1)] {
                     let beside = Post::new(at.row + rows, at.col + cols);
                     let fresh = rect.contains(beside) && above(beside);
-                    if fresh && !std::mem::replace(&mut met[index(rect, beside)], true) {
+                    if fresh && !std::mem::replace(&mut met[rect.index(beside)], true) {
                         posts.push(beside);
                     }
                 }
@@ -211,7 +204,7 @@ impl Seen<'_> {
 
     fn component(&self, posts: &[Post]) -> Component {
         let rect = self.area.rect;
-        let residual = |post: Post| f64::from(self.residual_m[index(rect, post)]);
+        let residual = |post: Post| f64::from(self.residual_m[rect.index(post)]);
         let worst = posts.iter().copied().reduce(|a, b| if residual(a) < residual(b) { b } else { a });
         let worst = worst.expect("a component has posts");
         let modules: BTreeSet<ModuleId> = posts.iter().map(|&post| self.module_of(post)).collect();
@@ -240,7 +233,7 @@ impl Seen<'_> {
     /// The limits that are used up around a component: a point more costs two of what they count.
     fn blocked_by(&self, modules: &[ModuleId], was_refused: bool) -> Vec<&'static str> {
         let budget = &self.area.budget;
-        let is_full = |count: u64, limit: u64| limit < count + u64::from(limits::POINT_COST);
+        let is_full = |count: u64, limit: u64| limit < count + u64::from(terrain::POINT_COST);
         let count = |module: ModuleId| u64::from(self.counts[self.area.grid.index(module)]);
         let mut found = Vec::new();
         if modules.iter().any(|&module| is_full(count(module), u64::from(budget.per_module))) {

@@ -6,7 +6,7 @@ use std::sync::atomic::AtomicBool;
 use compiler::CompileError;
 use database::{Folder, Totals};
 use fidelity::{DemGround, Measures, ResidualFigures, Triangles, regular_grid};
-use ground::{GamingArea, Ground, Window};
+use ground::{GamingArea, Ground, GroundError, Window};
 use product::{Opened, choose_ground, locate_weights};
 use schedule::Workers;
 use terrain::{Dem, Importance, Metres, QUANTA_PER_METRE, Tin};
@@ -100,12 +100,13 @@ pub fn fidelity(folder: &Path, against: Option<&Path>, sights: Sights) -> Result
     let ground = Ground::open(&job, &area, &Workers::new(1), &AtomicBool::new(false))?;
     let Window { dem, importance, .. } = ground.window(area.rect)?;
     if dem.void_count() == area.rect.post_count() {
-        return Err(CompileError::Impossible {
+        return Err(GroundError::Impossible {
             key: against,
             found: "no height anywhere in the area of the database".into(),
             expected: "a raster that covers at least a part of it".into(),
             hint: "`tiefort status` says where the area lies".into(),
-        });
+        }
+        .into());
     }
     let (triangles, polygons) = triangles_of(&folder, &area)?;
     let residual = built_residual(&manifest.totals);
@@ -167,12 +168,13 @@ fn triangles_of(folder: &Folder, area: &GamingArea) -> Result<(Triangles, u64), 
     let modules = read_modules(folder, area)?;
     let missing = area.grid.all().iter().find(|module| !modules.contains_key(module));
     if let Some(module) = missing {
-        return Err(CompileError::Impossible {
+        return Err(GroundError::Impossible {
             key: folder.dir().display().to_string(),
             found: format!("no load module {module} in its files"),
             expected: format!("all {} of the area", area.grid.count()),
             hint: "the database is damaged: `tiefort verify` says where, `tiefort build --fresh` makes it anew".into(),
-        });
+        }
+        .into());
     }
     let polygons = modules.values().map(|module| u64::from(module.polygon_count)).sum();
     Ok((Triangles::of_modules(modules.values(), area.grid, area.frame.spacing), polygons))

@@ -4,6 +4,7 @@ mod entries;
 mod exceeded;
 mod figures;
 mod made_from;
+mod modules;
 mod opened;
 mod tins;
 mod total;
@@ -23,6 +24,7 @@ use schedule::Workers;
 use terrain::{LoadModule, ModuleId, Side};
 
 use crate::recount;
+use modules::{Modules, at_level};
 
 /// What a verification found.
 #[derive(Clone, Debug, Default)]
@@ -169,9 +171,6 @@ fn listed(manifest: &Manifest) -> usize {
     manifest.tiles.iter().map(of_tile).sum::<usize>() + manifest.files.len()
 }
 
-/// Load modules by place.
-type Modules = BTreeMap<ModuleId, LoadModule>;
-
 /// All load modules by place, at their finest level, checked one by one as they are decoded.
 pub(crate) fn read_modules(folder: &Folder, area: &GamingArea) -> Result<Modules, CompileError> {
     let mut all = BTreeMap::new();
@@ -200,10 +199,6 @@ fn check_levels(job: &Job, area: &GamingArea, levels: &[Modules]) -> Vec<String>
         problems.extend(recount::problems_between(area.grid, levels));
     }
     problems
-}
-
-fn at_level(level: usize, problem: String) -> String {
-    if level == 0 { problem } else { format!("level {level}: {problem}") }
 }
 
 /// A coarser level holds no place that the finer one lacks.

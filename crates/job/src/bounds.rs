@@ -58,14 +58,33 @@ pub const RESIDUAL_M_MAX: f64 = 131_071.0;
 /// The side of the window that the third limit speaks of, in metres.
 pub const WINDOW_M: f64 = 4000.0;
 
-/// Tiles a side when the job does not say: the paper's.
-pub const TILES_DEFAULT: u32 = 6;
-
 /// EPSG codes: those below are datums and units, those above are other registries'.
 pub const EPSG_RANGE: std::ops::RangeInclusive<u32> = 1024..=32_766;
 
 /// Geographic coordinate systems that DEMs come in; a few of many, so that the common mistake has a clear message.
 pub const EPSG_GEOGRAPHIC: [u32; 13] = [4326, 4979, 4258, 4269, 4267, 4283, 4322, 4490, 4612, 4617, 4674, 6318, 7844];
+
+/// Kilometres a side of an area around a place: half around the Earth.
+pub const AROUND_KM_MAX: f64 = 20_000.0;
+/// Metres in a unit of height: a micrometre to a kilometre.
+pub const HEIGHT_UNIT_M: std::ops::RangeInclusive<f64> = 1.0e-6..=1.0e3;
+/// No water on Earth lies farther from the level of the sea.
+pub const LEVEL_M_MAX: f64 = 10_000.0;
+/// Load modules that a tile is at least wide, unless it spans the area.
+pub const MODULES_PER_TILE_MIN: u32 = 2;
+/// Metres of a step in which residuals are compared.
+pub const QUANTUM_M_MAX: f64 = 1000.0;
+/// RMS residual to aim at, about a hundredth of a quantum: heights are rounded to 1/128 m, so a smaller one means none
+/// at all.
+pub const RMS_M_MIN: f64 = 1.0e-4;
+/// Seeds of the built-in terrain: those that TOML can write.
+pub const SEED_MAX: u64 = i64::MAX as u64;
+/// Characters of an attribution.
+pub const THANKS_CHARS_MAX: usize = 1000;
+/// Characters of a coordinate system spelled out.
+pub const WKT_CHARS_MAX: usize = 1 << 16;
+/// A square is two triangles: no load module has fewer.
+pub const TRIANGLES_MIN: u64 = 2;
 /// Geoid grids of a job: there are not that many vertical datums.
 pub const GEOIDS_MAX: usize = 16;
 /// Characters of the name of a vertical datum.

@@ -8,7 +8,8 @@ use std::path::Path;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use crate::{Fault, JobError, keys};
+use crate::key::whole_text;
+use crate::{Choice, Fault, JobError, NamedFile, NoArea, Values, keys};
 
 /// A job file as text, with its path.
 #[derive(Clone, Copy)]
@@ -86,8 +87,53 @@ impl<'a> Section<'a> {
     ///
     /// # Errors
     /// When the job has none.
-    pub fn required(&self, key: &str, expected: &str) -> Result<Entry<'a>, JobError> {
-        self.optional(key).ok_or_else(|| self.missing(key, expected, &keys::example(&self.key(key))))
+    pub fn required(&self, key: &str) -> Result<Entry<'a>, JobError> {
+        let name = self.key(key);
+        self.optional(key).ok_or_else(|| self.missing(key, &keys::expected(&name), &keys::example(&name)))
+    }
+
+    /// The value of `key`, or the one that holds where a job leaves it out.
+    fn or_usual<T>(
+        &self,
+        key: &str,
+        read: fn(&Entry<'a>) -> Result<T, JobError>,
+        usual: fn(&str) -> Option<T>,
+    ) -> Result<T, JobError> {
+        let usual = || usual(keys::usual_text(&self.key(key))).expect("what holds is a value of its key");
+        self.optional(key).map_or_else(|| Ok(usual()), |entry| read(&entry))
+    }
+
+    /// The whole number of `key`, as [`Entry::whole`], or its usual one.
+    pub fn whole(&self, key: &str) -> Result<u64, JobError> {
+        self.or_usual(key, Entry::whole, |text| text.parse().ok())
+    }
+
+    /// As [`Section::whole`], of a key whose range fits 32 bits.
+    pub fn whole_u32(&self, key: &str) -> Result<u32, JobError> {
+        self.whole(key).map(in_32_bits)
+    }
+
+    /// The number of `key`, as [`Entry::number`], or its usual one.
+    pub fn number(&self, key: &str) -> Result<f64, JobError> {
+        self.or_usual(key, Entry::number, |text| text.parse().ok())
+    }
+
+    /// Two numbers, or the usual ones.
+    pub fn pair(&self, key: &str) -> Result<[f64; 2], JobError> {
+        self.or_usual(key, Entry::pair, |text| {
+            let (first, second) = text.strip_prefix('[')?.strip_suffix(']')?.split_once(", ")?;
+            Some([first.parse().ok()?, second.parse().ok()?])
+        })
+    }
+
+    /// Yes or no, or its usual one.
+    pub fn flag(&self, key: &str) -> Result<bool, JobError> {
+        self.or_usual(key, Entry::flag, |text| text.parse().ok())
+    }
+
+    /// One of some words, or the usual one.
+    pub fn word<T: Choice + Clone>(&self, key: &str) -> Result<T, JobError> {
+        self.or_usual(key, Entry::word, |name| T::named(name).cloned())
     }
 
     /// The error that `key` is missing here.
@@ -142,6 +188,13 @@ impl<'a> Entry<'a> {
         JobError::OutOfRange(Box::new(Fault { hint: hint.into(), ..*self.fault(expected) }))
     }
 
+    /// The error that there is no area that the value asks for.
+    pub fn no_area(&self, none: NoArea) -> JobError {
+        let fault = self.fault(none.expected);
+        let found = format!("{}: {}", fault.found, none.found);
+        JobError::OutOfRange(Box::new(Fault { found, hint: none.hint, ..*fault }))
+    }
+
     /// The error that the value does not go with another key.
     pub fn conflict(&self, beside: &str, expected: &str, hint: &str) -> JobError {
         let mut fault = self.fault(expected);
@@ -158,70 +211,104 @@ impl<'a> Entry<'a> {
         JobError::Unsupported(fault)
     }
 
+    /// What the value may be.
+    pub fn expected(&self) -> String {
+        keys::expected(&self.key)
+    }
+
     /// The value as text.
-    pub fn text(&self, expected: &str) -> Result<&'a str, JobError> {
-        self.value.get_ref().as_str().ok_or_else(|| self.wrong_kind(expected))
+    pub fn text(&self) -> Result<&'a str, JobError> {
+        self.value.get_ref().as_str().ok_or_else(|| self.wrong_kind(&self.expected()))
+    }
+
+    /// The value as text of at most the characters of its key, and none that is `refused`.
+    pub fn prose(&self, refused: fn(char) -> bool) -> Result<String, JobError> {
+        let text = self.text()?;
+        let Some(Values::Line(_, most)) = keys::key(&self.key).map(|key| &key.values) else {
+            unreachable!("{} is a line of text", self.key)
+        };
+        let is_good = !text.trim().is_empty() && text.chars().count() <= *most && !text.contains(refused);
+        if is_good { Ok(text.to_owned()) } else { Err(self.out_of_range(self.expected())) }
+    }
+
+    /// The file that the value names, relative to the folder of the job.
+    pub fn file(&self, job: &Path) -> Result<NamedFile, JobError> {
+        let written = self.text()?;
+        if written.is_empty() || written.contains('\0') {
+            return Err(self.out_of_range("the path of a file, relative to the job file"));
+        }
+        let folder = job.parent().unwrap_or(Path::new(""));
+        Ok(NamedFile { written: written.to_owned(), path: folder.join(written) })
     }
 
     /// The value as yes or no.
     pub fn flag(&self) -> Result<bool, JobError> {
-        self.value.get_ref().as_bool().ok_or_else(|| self.wrong_kind("true or false"))
+        self.value.get_ref().as_bool().ok_or_else(|| self.wrong_kind(&self.expected()))
     }
 
-    /// The value as a finite number; a whole number will do.
-    pub fn number(&self, expected: &str) -> Result<f64, JobError> {
+    /// The value as a finite number in the range of its key, if it has one; a whole number will do.
+    pub fn number(&self) -> Result<f64, JobError> {
+        let number = self.finite()?;
+        match keys::key(&self.key).map(|key| &key.values) {
+            Some(Values::Number(_, range)) if !range.contains(&number) => Err(self.out_of_range(self.expected())),
+            _ => Ok(number),
+        }
+    }
+
+    fn finite(&self) -> Result<f64, JobError> {
+        let expected = self.expected();
         let text = match self.value.get_ref() {
             DeValue::Float(float) => float.as_str(),
             DeValue::Integer(integer) if integer.radix() == 10 => integer.as_str(),
-            _ => return Err(self.wrong_kind(expected)),
+            _ => return Err(self.wrong_kind(&expected)),
         };
         let finite = text.parse::<f64>().ok().filter(|number| number.is_finite());
         finite.ok_or_else(|| self.out_of_range(format!("a finite number: {expected}")))
     }
 
-    /// The value as a finite number in a range.
-    pub fn number_in(&self, range: RangeInclusive<f64>, expected: &str) -> Result<f64, JobError> {
-        let number = self.number(expected)?;
-        if range.contains(&number) { Ok(number) } else { Err(self.out_of_range(expected)) }
+    /// The value as a whole number in the range of its key.
+    pub fn whole(&self) -> Result<u64, JobError> {
+        match keys::key(&self.key).map(|key| &key.values) {
+            Some(Values::Whole(what, range)) => self.whole_in(range, what),
+            _ => unreachable!("{} is a whole number", self.key),
+        }
+    }
+
+    /// As [`Entry::whole`], of a key whose range fits 32 bits.
+    pub fn whole_u32(&self) -> Result<u32, JobError> {
+        self.whole().map(in_32_bits)
     }
 
     /// The value as a whole number in a range.
-    pub fn whole(&self, range: RangeInclusive<u64>, what: &str) -> Result<u64, JobError> {
-        let expected = format!("{what}, a whole number from {} to {}", range.start(), range.end());
+    pub fn whole_in(&self, range: &RangeInclusive<u64>, what: &str) -> Result<u64, JobError> {
+        let expected = whole_text(what, range);
         let DeValue::Integer(integer) = self.value.get_ref() else { return Err(self.wrong_kind(&expected)) };
         let number = u64::from_str_radix(integer.as_str(), integer.radix()).ok();
         number.filter(|number| range.contains(number)).ok_or_else(|| self.out_of_range(expected))
     }
 
-    /// The value as a whole number that fits 32 bits, in a range.
-    pub fn whole_u32(&self, range: RangeInclusive<u32>, what: &str) -> Result<u32, JobError> {
-        let number = self.whole(u64::from(*range.start())..=u64::from(*range.end()), what)?;
-        Ok(u32::try_from(number).expect("the range ends within 32 bits"))
-    }
-
     /// The value as a whole number of either sign.
-    pub fn signed(&self, what: &str) -> Result<i64, JobError> {
-        let expected = format!("{what}, a whole number");
+    pub fn signed(&self) -> Result<i64, JobError> {
+        let expected = self.expected();
         let DeValue::Integer(integer) = self.value.get_ref() else { return Err(self.wrong_kind(&expected)) };
         let number = i64::from_str_radix(integer.as_str(), integer.radix()).ok();
         number.ok_or_else(|| self.out_of_range(expected))
     }
 
     /// The value as two numbers.
-    pub fn pair(&self, expected: &str) -> Result<[f64; 2], JobError> {
-        match self.list(expected)?.as_slice() {
-            [first, second] => Ok([first.number(expected)?, second.number(expected)?]),
-            _ => Err(self.wrong_kind(expected)),
+    pub fn pair(&self) -> Result<[f64; 2], JobError> {
+        match self.list()?.as_slice() {
+            [first, second] => Ok([first.number()?, second.number()?]),
+            _ => Err(self.wrong_kind(&self.expected())),
         }
     }
 
     /// The value as one of some words.
-    pub fn word<T: Copy>(&self, words: &[(&str, T)]) -> Result<T, JobError> {
-        let names: Vec<&str> = words.iter().map(|(name, _)| *name).collect();
-        let expected = names.iter().map(|name| format!("\"{name}\"")).collect::<Vec<_>>().join(" or ");
-        let found = self.text(&expected)?;
-        words.iter().find(|(name, _)| *name == found).map(|(_, meant)| *meant).ok_or_else(|| {
-            let mut fault = self.fault(expected);
+    pub fn word<T: Choice + Clone>(&self) -> Result<T, JobError> {
+        let found = self.text()?;
+        T::named(found).cloned().ok_or_else(|| {
+            let names: Vec<&str> = T::WORDS.iter().map(|word| word.name).collect();
+            let mut fault = self.fault(self.expected());
             if let Some(name) = keys::nearest(found, &names) {
                 fault.hint = format!("did you mean \"{name}\"?");
             }
@@ -230,8 +317,8 @@ impl<'a> Entry<'a> {
     }
 
     /// The items of a list.
-    pub fn list(&self, expected: &str) -> Result<Vec<Entry<'a>>, JobError> {
-        let items = self.value.get_ref().as_array().ok_or_else(|| self.wrong_kind(expected))?;
+    pub fn list(&self) -> Result<Vec<Entry<'a>>, JobError> {
+        let items = self.value.get_ref().as_array().ok_or_else(|| self.wrong_kind(&self.expected()))?;
         let item = |(index, value): (usize, &'a Spanned<DeValue<'a>>)| Entry {
             document: self.document,
             key: format!("{}[{index}]", self.key),
@@ -276,6 +363,11 @@ pub(crate) fn check_sections<'a>(document: Document<'a>, root: &'a DeTable<'a>) 
         expected: format!("one of [{}]", known.join("], [")),
         hint: keys::hint_for_section(found),
     })))
+}
+
+/// A number whose range ends within 32 bits.
+pub(crate) fn in_32_bits(number: u64) -> u32 {
+    u32::try_from(number).expect("the range ends within 32 bits")
 }
 
 fn kind(value: &DeValue) -> &'static str {

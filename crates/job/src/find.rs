@@ -4,8 +4,7 @@
 
 use terrain::Spacing;
 
-use crate::entry::Entry;
-use crate::{JobError, SourceFile};
+use crate::SourceFile;
 
 /// An area that is to be found.
 #[derive(Clone, Debug, PartialEq)]
@@ -60,13 +59,3 @@ pub struct NoArea {
 
 /// Finds an area; the files are those of `dem.sources`, patterns expanded, where it is to cover them.
 pub type FindArea<'a> = dyn Fn(&AreaRequest, &[SourceFile]) -> Result<AreaFound, NoArea> + 'a;
-
-impl NoArea {
-    /// The error at the key that asks for the area.
-    pub(crate) fn at(self, entry: &Entry) -> JobError {
-        let mut fault = entry.fault(self.expected);
-        fault.found = format!("{}: {}", fault.found, self.found);
-        fault.hint = self.hint;
-        JobError::OutOfRange(fault)
-    }
-}

@@ -36,22 +36,3 @@ pub enum StartMethod {
     /// Contour lines.
     Contour,
 }
-
-impl StartMethod {
-    /// All, by the names they have in a job and on the command line.
-    pub const NAMED: [(&'static str, Self); 8] = [
-        ("vip", Self::Vip),
-        ("highlow", Self::HighLow),
-        ("lattice", Self::Lattice),
-        ("fowler-little", Self::FowlerLittle),
-        ("hierarchical", Self::Hierarchical),
-        ("earlier", Self::Earlier),
-        ("regular", Self::Regular),
-        ("contour", Self::Contour),
-    ];
-
-    /// Its name.
-    pub fn name(self) -> &'static str {
-        Self::NAMED.iter().find(|&&(_, method)| method == self).map_or("", |&(name, _)| name)
-    }
-}

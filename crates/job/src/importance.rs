@@ -1,5 +1,7 @@
 //! What a job says about where ground matters more.
 
+use terrain::Smooth;
+
 use crate::NamedFile;
 
 /// Where ground matters more.
@@ -67,13 +69,4 @@ pub enum AreaShape {
 pub enum SampleClass {
     /// Mountain blocks.
     Mountains,
-}
-
-/// How the borders between weights are softened.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Smooth {
-    /// The separable 7-tap binomial.
-    Binomial7,
-    /// Not at all.
-    None,
 }

@@ -12,18 +12,22 @@
 //! arithmetic of limits beyond their ranges (whether they can be met is `plan`'s).
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+mod named_file;
+pub use named_file::NamedFile;
 mod model;
 pub use model::{
-    Allocation, Area, Borders, Budget, ClipHeights, Count, DemSource, DemSpec, Edges, Effort, ErrorKey, HeightFit, Job,
-    LastBatch, Lattice, LimitsSpec, Method, ModulesSpec, NamedFile, Optimising, OuterBorder, Proximity, Resampling,
-    SourceEntry, SourceFile, SourceSaid, TileOrder, TilesSpec, TinSpec, Voids, WindowLimit,
+    Allocation, Area, Borders, Budget, ClipHeights, Count, DemSource, DemSpec, Edges, ErrorKey, Job, LimitsSpec,
+    Method, MethodName, ModulesSpec, Optimising, OuterBorder, Proximity, SourceEntry, SourceFile, SourceSaid,
+    TilesSpec, TinSpec, Voids, WindowLimit,
 };
+// What a stage takes as it is.
+pub use terrain::{Effort, HeightFit, LastBatch, Lattice, LodBorder, Resampling, Smooth, TileOrder};
 mod importance;
-pub use importance::{AreaShape, HOLE_CLASS_NAME, ImportanceArea, ImportanceSpec, SampleClass, Smooth};
+pub use importance::{AreaShape, HOLE_CLASS_NAME, ImportanceArea, ImportanceSpec, SampleClass};
 mod ground;
 pub use ground::{GeoidSpec, WaterSpec};
 mod lod;
-pub use lod::{LodBorder, LodSpec};
+pub use lod::LodSpec;
 mod given;
 pub use given::{Start, StartMethod};
 mod find;
@@ -31,9 +35,16 @@ pub use find::{AreaFound, AreaPlace, AreaRequest, FindArea, NoArea};
 mod error;
 pub use error::{Fault, JobError};
 mod bounds;
+mod choice;
+pub use choice::{Choice, Cost, Word};
+mod key;
+pub use key::{Key, KeyTable, Usual, Values};
+mod keys;
+pub use keys::{key, key_tables, usual, usual_text};
 mod entry;
 mod files;
-mod keys;
+mod load;
 mod read;
+mod sections;
 mod settings;
 pub use settings::{Setting, deciding_lines};

@@ -1,5 +1,7 @@
 //! Levels of detail, as a job asks for them.
 
+use terrain::LodBorder;
+
 /// Coarser levels of load modules.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LodSpec {
@@ -8,15 +10,6 @@ pub struct LodSpec {
     pub inner_shares: Vec<f64>,
     /// What becomes of the vertices on the sides.
     pub border: LodBorder,
-}
-
-/// What becomes of the vertices on the sides of a load module at coarser levels.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LodBorder {
-    /// All of them stay: neighbours fit together at any two levels.
-    Full,
-    /// A level keeps its share of each side's: neighbours fit together at the same level.
-    Own,
 }
 
 impl LodSpec {

@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use terrain::{LoadModule, ModuleGrid, Spacing};
+use terrain::{Effort, HeightFit, LastBatch, Lattice, LoadModule, ModuleGrid, Resampling, Spacing, TileOrder};
 
-use crate::{GeoidSpec, ImportanceSpec, LodSpec, Start, WaterSpec};
+use crate::{GeoidSpec, ImportanceSpec, LodSpec, NamedFile, Start, WaterSpec};
 
 /// All a run needs, as the job file says it, defaults filled in.
 #[derive(Clone, Debug, PartialEq)]
@@ -69,15 +69,6 @@ pub struct DemSpec {
     pub strict: bool,
 }
 
-/// How a height between posts of a source comes about.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Resampling {
-    /// From the four posts around it.
-    Bilinear,
-    /// From the sixteen posts around it.
-    Cubic,
-}
-
 /// The built-in terrain or files.
 #[derive(Clone, Debug, PartialEq)]
 pub enum DemSource {
@@ -132,16 +123,6 @@ pub struct SourceSaid {
     pub attribution: Option<String>,
 }
 
-/// A file that the job names.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct NamedFile {
-    /// As written in the job, or as the job would write a file that a pattern found: for messages and provenance, so
-    /// that no output depends on where the job lies.
-    pub written: String,
-    /// Where it is: the folder of the job file joined with `written`.
-    pub path: PathBuf,
-}
-
 /// What to do about posts without a height.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Voids {
@@ -166,15 +147,6 @@ pub struct TilesSpec {
     pub order: TileOrder,
     /// What a tile finds on its sides.
     pub borders: Borders,
-}
-
-/// What the rank of a tile is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum TileOrder {
-    /// (colour, row, column) with four colours: most tiles at once.
-    Color,
-    /// (row, column): a wave front.
-    Raster,
 }
 
 /// What a tile finds on its sides.
@@ -315,8 +287,19 @@ pub enum Method {
     Optimised(Optimising),
 }
 
+/// The methods, without what each of them may be told besides.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MethodName {
+    /// [`Method::Optimised`].
+    Optimised,
+    /// [`Method::Paper`].
+    Paper,
+    /// [`Method::Greedy`].
+    Greedy,
+}
+
 /// What the optimised method may do for a lower residual.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Optimising {
     /// How much work it does.
     pub effort: Effort,
@@ -326,41 +309,6 @@ pub struct Optimising {
     pub lattice: Lattice,
 }
 
-/// How much work the optimised method does.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Effort {
-    /// Chosen posts are moved and their edges flipped.
-    Fast,
-    /// More posts are chosen than the limits allow, then thinned and exchanged.
-    #[default]
-    Normal,
-    /// More still, grown and thinned in turns.
-    Best,
-}
-
-/// Which vertices leave the height of the DEM. Those on the outer border of an area and the corners of tiles never
-/// do.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum HeightFit {
-    /// All that may: each stands where squared residuals are least.
-    Squares,
-    /// All that may but those on crests, which fitted heights would shave.
-    #[default]
-    SquaresKeepCrests,
-    /// None.
-    Off,
-}
-
-/// Where vertices stand; those on lines between tiles stand on posts either way.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Lattice {
-    /// On eighths of a post.
-    #[default]
-    Eighth,
-    /// On posts.
-    Post,
-}
-
 /// A post this near a vertex both ways is left out of a batch. Both bounds are inclusive.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Proximity {
@@ -368,15 +316,6 @@ pub struct Proximity {
     pub horizontal_m: f64,
     /// In height, in metres.
     pub vertical_m: f64,
-}
-
-/// What becomes of a batch that exceeds the budget.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LastBatch {
-    /// The budget is met exactly, in row order.
-    Truncate,
-    /// The batch goes in whole.
-    Finish,
 }
 
 /// What makes a post worth a point.
@@ -404,6 +343,17 @@ pub enum Allocation {
     Equal,
     /// By what a survey of all tiles says they gain.
     Global,
+}
+
+impl Method {
+    /// Its name.
+    pub fn name(self) -> MethodName {
+        match self {
+            Method::Paper { .. } => MethodName::Paper,
+            Method::Greedy => MethodName::Greedy,
+            Method::Optimised(_) => MethodName::Optimised,
+        }
+    }
 }
 
 impl Job {

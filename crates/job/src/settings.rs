@@ -3,12 +3,13 @@
 //! One list serves both the announcement at the start of a run and the canonical text in `database.json`, so the two
 //! cannot disagree. The canonical text is itself a job: reading it gives the same settings again.
 
+use std::fmt::Display;
+
 use terrain::{THOUSANDTHS, metres_of_quanta};
 
 use crate::{
-    Allocation, AreaShape, Borders, Budget, ClipHeights, Count, DemSource, Edges, Effort, ErrorKey, GeoidSpec,
-    HeightFit, ImportanceArea, Job, LastBatch, Lattice, LodBorder, LodSpec, Method, Optimising, OuterBorder,
-    Resampling, SampleClass, Smooth, SourceEntry, Start, TileOrder, TinSpec, Voids, WaterSpec,
+    AreaShape, Budget, Choice, DemSource, Edges, GeoidSpec, ImportanceArea, Job, LodSpec, Method, Optimising,
+    Resampling, SourceEntry, Start, TinSpec, Voids, WaterSpec, key,
 };
 
 /// One setting of a job.
@@ -61,70 +62,58 @@ impl Job {
 
     fn describe_area(&self, list: &mut List) {
         let area = &self.area;
-        list.add("area.name", quoted(&area.name), "name of the area");
+        list.add("area.name", quoted(&area.name));
         if let Some(title) = &area.title {
-            list.add("area.title", quoted(title), "what stands above the report's page");
+            list.add("area.title", quoted(title));
         }
-        list.add("area.crs", quoted(&format!("EPSG:{}", area.epsg)), "projected coordinate system, in metres");
-        list.add("area.origin_m", pair(area.origin_m), "east and north of the south-west post");
+        list.add("area.crs", quoted(&format!("EPSG:{}", area.epsg)));
+        list.add("area.origin_m", pair(area.origin_m));
         let (rows, cols) = (area.grid.rows, area.grid.cols);
-        list.add(
-            "area.size_m",
-            pair(area.size_m()),
-            format!("{cols} x {rows} load modules, west to east x south to north"),
-        );
+        list.add_with("area.size_m", pair(area.size_m()), format!("{cols} x {rows} load modules"));
         let posts = area.grid.area();
-        let meaning = format!("working grid of {} x {} posts", posts.posts_wide(), posts.posts_high());
-        list.add("area.spacing_m", number(area.spacing.metres()), meaning);
+        let size = format!("{} x {} posts", posts.posts_wide(), posts.posts_high());
+        list.add_with("area.spacing_m", number(area.spacing.metres()), size);
     }
 
     fn describe_dem(&self, list: &mut List) {
         match &self.dem.source {
-            DemSource::Sample { seed } => {
-                list.add("dem.source", quoted("sample"), "the built-in basin-and-range terrain");
-                list.add("dem.seed", seed.to_string(), "which one of its terrains");
+            source @ DemSource::Sample { seed } => {
+                list.choice("dem.source", source);
+                list.add("dem.seed", seed.to_string());
             }
             DemSource::Files { written, files } => {
                 let names: Vec<String> = written.iter().map(source_text).collect();
-                let meaning = format!("{} in order of priority", counted(files.len(), "raster"));
-                list.add("dem.sources", format!("[{}]", names.join(", ")), meaning);
+                list.add_with("dem.sources", format!("[{}]", names.join(", ")), counted(files.len(), "raster"));
             }
         }
         if let Some(datum) = &self.dem.vertical_datum {
-            list.add("dem.vertical_datum", quoted(datum), "what heights are measured from");
+            list.add("dem.vertical_datum", quoted(datum));
         }
         self.describe_voids(list);
         if self.dem.resampling == Resampling::Cubic {
-            list.add("dem.resampling", quoted("cubic"), "heights between posts come from sixteen of them");
+            list.choice("dem.resampling", &self.dem.resampling);
         }
         if 0.0 < self.dem.feather_m {
-            let meaning = "metres over which a source fades into the next";
-            list.add("dem.feather_m", number(self.dem.feather_m), meaning);
+            list.add("dem.feather_m", number(self.dem.feather_m));
         }
         if !self.dem.geoids.is_empty() {
             let grid = |geoid: &GeoidSpec| {
                 format!("{{ datum = {}, file = {} }}", quoted(&geoid.datum), quoted(&geoid.file.written))
             };
             let grids: Vec<String> = self.dem.geoids.iter().map(grid).collect();
-            let meaning = "heights of vertical datums above the ellipsoid, for converting";
-            list.add("dem.geoids", format!("[{}]", grids.join(", ")), meaning);
+            list.add("dem.geoids", format!("[{}]", grids.join(", ")));
         }
         if let Some(water) = &self.dem.water {
-            let (value, meaning) = self.water_text(water);
-            list.add("dem.water", value, meaning);
+            list.add_with("dem.water", self.water_text(water), water_level(water));
         }
     }
 
-    fn water_text(&self, water: &WaterSpec) -> (String, &'static str) {
+    fn water_text(&self, water: &WaterSpec) -> String {
         let mut keys = vec![format!("file = {}", quoted(&water.file.written))];
         keys.extend(water.level_m.map(|level_m| format!("level_m = {}", number(level_m))));
         keys.push(format!("class = {}", quoted(&self.importance.classes[usize::from(water.class)])));
         keys.extend(water.weight.map(|thousandths| format!("weight = {}", weight(thousandths))));
-        let meaning = match water.level_m {
-            Some(_) => "water lies at one level",
-            None => "each body of water lies level, at the median of its heights",
-        };
-        (format!("{{ {} }}", keys.join(", ")), meaning)
+        format!("{{ {} }}", keys.join(", "))
     }
 
     fn describe_voids(&self, list: &mut List) {
@@ -148,27 +137,23 @@ impl Job {
                 (table(&format!("fill_within_posts = {posts}, hole = true")), filled(posts) + "; others are holes")
             }
         };
-        list.add("dem.voids", value, meaning);
+        list.say("dem.voids", value, meaning);
     }
 
     fn describe_importance(&self, list: &mut List) {
         let importance = &self.importance;
-        let excluded = if importance.default_weight == 0 { ": no post is chosen there" } else { "" };
-        let meaning = format!("weight of every post that no area holds{excluded}");
-        list.add("importance.default", weight(importance.default_weight), meaning);
-        let areas: Vec<String> = importance.areas.iter().map(|area| self.area_text(area)).collect();
-        let meaning = if areas.is_empty() {
-            "all ground matters the same".to_owned()
-        } else {
-            format!("{} with a weight of their own, later ones over earlier ones", counted(areas.len(), "area"))
-        };
-        list.add("importance.areas", format!("[{}]", areas.join(", ")), meaning);
-        match importance.smooth {
-            Smooth::Binomial7 => {
-                list.add("importance.smooth", quoted("binomial-7"), "weights are softened across 7 x 7 posts")
-            }
-            Smooth::None => list.add("importance.smooth", quoted("none"), "weights change from post to post"),
+        let default = weight(importance.default_weight);
+        match importance.default_weight {
+            0 => list.add_with("importance.default", default, "no post is chosen there"),
+            _ => list.add("importance.default", default),
         }
+        let areas: Vec<String> = importance.areas.iter().map(|area| self.area_text(area)).collect();
+        let text = format!("[{}]", areas.join(", "));
+        match areas.is_empty() {
+            true => list.say("importance.areas", text, "all ground matters the same"),
+            false => list.add_with("importance.areas", text, counted(areas.len(), "area")),
+        }
+        list.choice("importance.smooth", &importance.smooth);
     }
 
     fn area_text(&self, area: &ImportanceArea) -> String {
@@ -179,7 +164,7 @@ impl Job {
                 let [above, smooth_m] = [above, smooth_mm].map(|thousandths| number(f64::from(*thousandths) / 1000.0));
                 format!("slope_above_percent = {above}, smooth_m = {smooth_m}")
             }
-            AreaShape::Sample(SampleClass::Mountains) => "sample = \"mountains\"".to_owned(),
+            AreaShape::Sample(class) => format!("sample = {}", quoted(class.name())),
         };
         let class = quoted(&self.importance.classes[usize::from(area.class)]);
         format!("{{ {shape}, class = {class}, weight = {} }}", weight(area.weight))
@@ -189,129 +174,63 @@ impl Job {
         let tiles = &self.tiles;
         let tall = share(self.area.grid.rows, tiles.rows);
         let wide = share(self.area.grid.cols, tiles.columns);
-        list.add(
-            "tiles.columns",
-            tiles.columns.to_string(),
-            format!("tiles west to east, each {wide} load modules wide"),
-        );
-        list.add("tiles.rows", tiles.rows.to_string(), format!("tiles south to north, each {tall} load modules high"));
-        match tiles.order {
-            TileOrder::Color => list.add("tiles.order", quoted("colour"), "four colours: most tiles at once"),
-            TileOrder::Raster => list.add("tiles.order", quoted("raster"), "row by row: a wave front of tiles"),
-        }
-        match tiles.borders {
-            Borders::Inherit => list.add(
-                "tiles.borders",
-                quoted("inherit"),
-                "a tile takes over the border points of its lower-ranked neighbours",
-            ),
-            Borders::Regular => {
-                list.add("tiles.borders", quoted("regular"), "seams hold a point every border step, no others")
-            }
-        }
+        let columns = format!("tiles west to east, each {wide} load modules wide");
+        list.say("tiles.columns", tiles.columns.to_string(), columns);
+        let rows = format!("tiles south to north, each {tall} load modules high");
+        list.say("tiles.rows", tiles.rows.to_string(), rows);
+        list.choice("tiles.order", &tiles.order);
+        list.choice("tiles.borders", &tiles.borders);
     }
 
     fn describe_modules(&self, list: &mut List) {
         let modules = &self.modules;
-        let cells = self.area.grid.side_cells;
-        list.add(
-            "load_modules.side_m",
-            number(modules.side_m),
-            format!("a side of a load module, {}", counted(cells as usize, "cell")),
-        );
-        let steps = counted(modules.border_step_cells as usize, "cell");
-        list.add(
-            "load_modules.border_step_m",
-            number(modules.border_step_m),
-            format!("between points on a fixed outer border, {steps}"),
-        );
-        match modules.outer_border {
-            OuterBorder::Refined => list.add(
-                "load_modules.outer_border",
-                quoted("refined"),
-                "points on the outer border are chosen as others are, within the limits",
-            ),
-            OuterBorder::Fixed => list.add(
-                "load_modules.outer_border",
-                quoted("fixed"),
-                "a point every border step and no others, as in an area beside this one",
-            ),
-        }
-        match modules.edges {
-            Edges::Constrained => list.add(
-                "load_modules.edges",
-                quoted("constrained"),
-                "module lines are edges of the TIN from the start",
-            ),
-            Edges::Clip(heights) => {
-                list.add("load_modules.edges", quoted("clip"), "triangles are cut at module lines after merging");
-                let (word, meaning) = match heights {
-                    ClipHeights::Coplanar => ("coplanar", "pieces of a triangle keep its plane"),
-                    ClipHeights::Dem => ("dem", "cut vertices take the height of the DEM"),
-                };
-                list.add("load_modules.clip_heights", quoted(word), meaning);
-            }
+        let cells = |count: i32| counted(count as usize, "cell");
+        list.add_with("load_modules.side_m", number(modules.side_m), cells(self.area.grid.side_cells));
+        let step = number(modules.border_step_m);
+        list.add_with("load_modules.border_step_m", step, cells(modules.border_step_cells));
+        list.choice("load_modules.outer_border", &modules.outer_border);
+        list.choice("load_modules.edges", &modules.edges);
+        if let Edges::Clip(heights) = &modules.edges {
+            list.choice("load_modules.clip_heights", heights);
         }
     }
 
     fn describe_limits(&self, list: &mut List) {
         let limits = &self.limits;
-        let (count, unit) = match limits.count {
-            Count::Triangles => ("triangles", "triangles"),
-            Count::Polygons => ("polygons", "convex polygons"),
-        };
-        list.add("limits.count", quoted(count), format!("limits count {unit}"));
-        list.add("limits.per_load_module", limits.per_load_module.to_string(), format!("{unit} in one load module"));
-        list.add("limits.pool", limits.pool.to_string(), format!("{unit} above that in the whole area together"));
-        let budget = limits.area_budget(&self.area.grid);
-        list.add(
-            "limits.mean_per_load_module",
-            number(limits.mean_per_load_module),
-            format!("{unit} on average, {budget} in the whole area"),
-        );
+        list.choice("limits.count", &limits.count);
+        list.add("limits.per_load_module", limits.per_load_module.to_string());
+        list.add("limits.pool", limits.pool.to_string());
+        let budget = format!("{} in the whole area", limits.area_budget(&self.area.grid));
+        list.add_with("limits.mean_per_load_module", number(limits.mean_per_load_module), budget);
         let (rows, cols, side_m) = (limits.window.rows, limits.window.cols, self.modules.side_m);
         let (high, wide) = (f64::from(rows) * side_m, f64::from(cols) * side_m);
-        list.add(
-            "limits.per_4km_square",
-            limits.window.limit.to_string(),
-            format!("{unit} in every window of {rows} x {cols} load modules ({high} m x {wide} m)"),
-        );
+        let window = format!("{rows} x {cols} of them ({high} m x {wide} m)");
+        list.add_with("limits.per_4km_square", limits.window.limit.to_string(), window);
     }
 
     fn describe_tin(&self, list: &mut List) {
         let tin = &self.tin;
-        let (method, meaning) = match tin.method {
-            Method::Paper { .. } => ("paper", "largest residual first, in batches"),
-            Method::Greedy => ("greedy", "one worst post at a time"),
-            Method::Optimised(_) => ("optimised", "lowest RMS residual under the limits"),
-        };
-        list.add("tin.method", quoted(method), meaning);
+        list.choice("tin.method", &tin.method.name());
         if let Budget::Points(points) = tin.budget {
-            list.add("tin.points", points.to_string(), "selected points in the whole area");
+            list.add("tin.points", points.to_string());
         }
-        match tin.key {
-            ErrorKey::Max => list.add("tin.key", quoted("max"), "a post is worth its weighted residual"),
-            ErrorKey::Sse => list.add("tin.key", quoted("sse"), "a triangle is worth its weighted squared residuals"),
-        }
-        match tin.allocation {
-            Allocation::Equal => list.add("tin.allocation", quoted("equal"), "every tile gets the same share"),
-            Allocation::Global => {
-                list.add("tin.allocation", quoted("global"), "tiles share by what a survey says they gain")
+        list.choice("tin.key", &tin.key);
+        list.choice("tin.allocation", &tin.allocation);
+        match tin.method {
+            Method::Optimised(Optimising { effort, height_fit, lattice }) => {
+                list.choice("tin.effort", &effort);
+                list.choice("tin.height_fit", &height_fit);
+                list.choice("tin.lattice", &lattice);
+            }
+            Method::Greedy | Method::Paper { .. } => {
+                let metres = number(metres_of_quanta(tin.residual_quantum as i32));
+                let meaning = format!("residuals are compared in steps of {metres} m");
+                list.say("tin.residual_quantum_m", metres, meaning);
             }
         }
-        if let Method::Optimised(optimising) = tin.method {
-            describe_optimising(optimising, list);
-        } else {
-            let metres = number(metres_of_quanta(tin.residual_quantum as i32));
-            let meaning = format!("residuals are compared in steps of {metres} m");
-            list.add("tin.residual_quantum_m", metres, meaning);
-        }
         self.describe_batches(list);
-        if let Some(metres) = tin.max_residual_m {
-            list.add("tin.max_residual_m", number(metres), "choosing ends when no residual is larger");
-        }
-        if let Some(metres) = tin.target_rms_m {
-            list.add("tin.target_rms_m", number(metres), "choosing ends at this RMS residual over the area");
+        for (key, metres) in [("tin.max_residual_m", tin.max_residual_m), ("tin.target_rms_m", tin.target_rms_m)] {
+            metres.into_iter().for_each(|metres| list.add(key, number(metres)));
         }
         describe_given(tin, list);
     }
@@ -322,48 +241,48 @@ impl Job {
             Some(near) => {
                 let (horizontal, vertical) = (near.horizontal_m, near.vertical_m);
                 let meaning = format!("a post within {horizontal} m and {vertical} m of height of a vertex waits");
-                list.add("tin.proximity_m", pair([horizontal, vertical]), meaning);
+                list.say("tin.proximity_m", pair([horizontal, vertical]), meaning);
             }
-            None => list.add("tin.proximity", "false".to_owned(), "no post waits for being near a vertex"),
+            None => list.say("tin.proximity", "false".to_owned(), "no post waits for being near a vertex"),
         }
-        match last_batch {
-            LastBatch::Truncate => {
-                list.add("tin.last_batch", quoted("truncate"), "the last batch is cut to meet the points")
-            }
-            LastBatch::Finish => list.add("tin.last_batch", quoted("finish"), "the last batch goes in whole"),
-        }
+        list.choice("tin.last_batch", &last_batch);
     }
 }
 
-fn describe_optimising(optimising: Optimising, list: &mut List) {
-    let (effort, meaning) = match optimising.effort {
-        Effort::Fast => ("fast", "chosen posts are moved, edges flipped: half the paper's RMS residual"),
-        Effort::Normal => ("normal", "more posts are chosen, thinned, exchanged: a fifth below fast, 6 times as long"),
-        Effort::Best => ("best", "more still, grown and thinned in turns: 4 % below normal, 5 times as long"),
-    };
-    list.add("tin.effort", quoted(effort), meaning);
-    let (heights, meaning) = match optimising.height_fit {
-        HeightFit::Squares => ("l2", "vertices stand where squared residuals are least"),
-        HeightFit::SquaresKeepCrests => {
-            ("l2_keep_crests", "vertices stand where squared residuals are least, crests at DEM height")
-        }
-        HeightFit::Off => ("off", "vertices stand at DEM height"),
-    };
-    list.add("tin.height_fit", quoted(heights), meaning);
-    let (lattice, meaning) = match optimising.lattice {
-        Lattice::Eighth => ("eighth", "vertices stand on eighths of a post, those on lines between tiles on posts"),
-        Lattice::Post => ("post", "vertices stand on posts"),
-    };
-    list.add("tin.lattice", quoted(lattice), meaning);
+fn water_level(water: &WaterSpec) -> &'static str {
+    match water.level_m {
+        Some(_) => "all at one level",
+        None => "each at the median of its heights",
+    }
 }
 
 /// The settings so far.
 struct List(Vec<Setting>);
 
 impl List {
-    fn add(&mut self, key: &'static str, value: String, meaning: impl Into<String>) {
+    /// A setting that means the same in every run.
+    fn add(&mut self, key: &'static str, value: String) {
+        self.say(key, value, meaning(key));
+    }
+
+    /// A setting, and what it comes to in this run.
+    fn add_with(&mut self, key: &'static str, value: String, here: impl Display) {
+        self.say(key, value, format!("{}: {here}", meaning(key)));
+    }
+
+    /// A setting of some words.
+    fn choice<T: Choice>(&mut self, key: &'static str, value: &T) {
+        let word = value.word();
+        self.say(key, quoted(word.name), word.text());
+    }
+
+    fn say(&mut self, key: &'static str, value: String, meaning: impl Into<String>) {
         self.0.push(Setting { key, value, meaning: meaning.into() });
     }
+}
+
+fn meaning(name: &str) -> &'static str {
+    key(name).map_or("", |key| key.meaning)
 }
 
 /// A number as TOML, the shortest that reads back the same: 500 for 500.0, 31.25, 1e-7.
@@ -422,18 +341,16 @@ fn share(modules: u32, tiles: u32) -> String {
 /// Points that the job gives.
 fn describe_given(tin: &TinSpec, list: &mut List) {
     match &tin.start {
-        Some(Start::File(file)) => list.add("tin.start", quoted(&file.written), "points that tiles start from"),
+        Some(Start::File(file)) => list.add("tin.start", quoted(&file.written)),
         Some(Start::Method { method, points }) => {
-            let name = quoted(method.name());
             let points = points.map_or(String::new(), |points| format!(", points = {points}"));
-            let meaning = "tiles start from what that method chooses";
-            list.add("tin.start", format!("{{ method = {name}{points} }}"), meaning);
+            let text = format!("{{ method = {}{points} }}", quoted(method.name()));
+            list.add_with("tin.start", text, method.word().meaning);
         }
         None => {}
     }
     if let Some(file) = &tin.pins {
-        let meaning = "points to add and to leave out, heights, and ground that matters more or less";
-        list.add("tin.pins", quoted(&file.written), meaning);
+        list.add("tin.pins", quoted(&file.written));
     }
 }
 
@@ -444,17 +361,13 @@ fn describe_lod(lod: &LodSpec, list: &mut List) {
     }
     let levels: Vec<String> =
         lod.inner_shares.iter().map(|&share| format!("{{ inner_share = {} }}", number(share))).collect();
-    let meaning =
-        format!("{} beside the finest, with this share of its inner vertices", counted(levels.len(), "level"));
-    list.add("lod.levels", format!("[{}]", levels.join(", ")), meaning);
-    match lod.border {
-        LodBorder::Full => {
-            list.add("lod.border", quoted("full"), "levels keep all vertices on sides: any two fit together")
-        }
-        LodBorder::Own => {
-            list.add("lod.border", quoted("own"), "levels keep their share on sides, too: equal levels fit together")
-        }
-    }
+    let text = format!("[{}]", levels.join(", "));
+    list.add_with(
+        "lod.levels",
+        text,
+        format!("{}, with this share of its inner vertices", counted(levels.len(), "level")),
+    );
+    list.choice("lod.border", &lod.border);
 }
 
 #[cfg(test)]

@@ -1,9 +1,6 @@
 //! What one tile may spend, and the ledger that never lets it spend more.
 
-use terrain::{ModuleId, ModuleRect, RefusedBy};
-
-/// Triangles any point adds in all: two inside a load module, or one on each side of a line.
-pub const POINT_COST: u32 = 2;
+use terrain::{ModuleId, ModuleRect, POINT_COST, RefusedBy};
 
 /// Triangles one tile may add to its start, by load module, by window and in all.
 ///

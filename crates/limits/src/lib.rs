@@ -10,6 +10,6 @@ pub use windows::Windows;
 mod lines;
 pub use lines::{Charged, ModuleLines};
 mod ledger;
-pub use ledger::{Allowance, Ledger, POINT_COST};
+pub use ledger::{Allowance, Ledger};
 mod tile_ledger;
 pub use tile_ledger::TileLedger;

@@ -1,8 +1,8 @@
 //! The ledger of one tile, by place: what a point there is charged to, asked and booked in one go.
 
-use terrain::{ModuleId, ModuleRect, RefusedBy};
+use terrain::{ModuleId, ModuleRect, POINT_COST, RefusedBy};
 
-use crate::{Allowance, Charged, Ledger, ModuleLines, POINT_COST};
+use crate::{Allowance, Charged, Ledger, ModuleLines};
 
 /// What a tile spends on points, by where they stand.
 #[derive(Clone, Debug)]

@@ -12,10 +12,10 @@ use std::fmt::Display;
 use std::path::Path;
 use std::sync::Arc;
 
-use load_module_reader::{Area, Block, Ground, Keep, ReadError, Sight, TileFile, open_file};
+use load_module_reader::{Area, Block, Keep, LoadedGround, ReadError, Sight, TileFile, open_file};
 use memmap2::Mmap;
 
-use crate::values::{Decks, Frame, Module, Sample, Surface};
+use crate::values::{AreaFrame, Decks, Module, Sample, Surface};
 
 /// `LMR_ALL`: the whole area.
 const ALL: u32 = u32::MAX;
@@ -160,12 +160,12 @@ pub unsafe extern "C" fn lmr_close(area: *mut Area) {
 /// # Safety
 /// `area` is null or comes from `lmr_open`; `frame` is null or may be written.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn lmr_describe(area: *const Area, frame: *mut Frame) -> c_int {
+pub unsafe extern "C" fn lmr_describe(area: *const Area, frame: *mut AreaFrame) -> c_int {
     // SAFETY: the caller's word.
     let Some(area) = (unsafe { given(area) }) else { return 0 };
     let of = area.frame();
     let [east_m, north_m] = of.origin_m;
-    let told = Frame { rows: of.rows, cols: of.cols, side_m: of.side_m(), east_m, north_m };
+    let told = AreaFrame { rows: of.rows, cols: of.cols, side_m: of.side_m(), east_m, north_m };
     // SAFETY: the caller's word.
     unsafe { give(frame, told) }
 }
@@ -192,7 +192,7 @@ pub unsafe extern "C" fn lmr_load(
     reach: u32,
     why: *mut c_char,
     why_size: usize,
-) -> *mut Ground {
+) -> *mut LoadedGround {
     // SAFETY: the caller's word.
     unsafe { lmr_load_level(area, east_m, north_m, reach, 0, why, why_size) }
 }
@@ -210,7 +210,7 @@ pub unsafe extern "C" fn lmr_load_level(
     level: u32,
     why: *mut c_char,
     why_size: usize,
-) -> *mut Ground {
+) -> *mut LoadedGround {
     // SAFETY: the caller's word.
     let Some(area) = (unsafe { given(area) }) else {
         // SAFETY: the caller's word.
@@ -236,7 +236,7 @@ pub unsafe extern "C" fn lmr_load_level(
 /// `why` is null or `why_size` bytes that may be written.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn lmr_move(
-    ground: *mut Ground,
+    ground: *mut LoadedGround,
     area: *const Area,
     east_m: f64,
     north_m: f64,
@@ -273,7 +273,7 @@ pub unsafe extern "C" fn lmr_move(
 /// # Safety
 /// `ground` is null, or comes from `lmr_load` and is not used again.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn lmr_unload(ground: *mut Ground) {
+pub unsafe extern "C" fn lmr_unload(ground: *mut LoadedGround) {
     if !ground.is_null() {
         // SAFETY: it came from a box, and the caller gives it back.
         drop(unsafe { Box::from_raw(ground) });
@@ -285,7 +285,12 @@ pub unsafe extern "C" fn lmr_unload(ground: *mut Ground) {
 /// # Safety
 /// `ground` is null or comes from `lmr_load`; `height_m` is null or may be written.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn lmr_height(ground: *const Ground, east_m: f64, north_m: f64, height_m: *mut f64) -> c_int {
+pub unsafe extern "C" fn lmr_height(
+    ground: *const LoadedGround,
+    east_m: f64,
+    north_m: f64,
+    height_m: *mut f64,
+) -> c_int {
     // SAFETY: the caller's word.
     let found = unsafe { given(ground) }.and_then(|ground| ground.height_m([east_m, north_m]));
     // SAFETY: the caller's word.
@@ -297,7 +302,12 @@ pub unsafe extern "C" fn lmr_height(ground: *const Ground, east_m: f64, north_m:
 /// # Safety
 /// `ground` is null or comes from `lmr_load`; `sample` is null or may be written.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn lmr_sample_at(ground: *const Ground, east_m: f64, north_m: f64, sample: *mut Sample) -> c_int {
+pub unsafe extern "C" fn lmr_sample_at(
+    ground: *const LoadedGround,
+    east_m: f64,
+    north_m: f64,
+    sample: *mut Sample,
+) -> c_int {
     // SAFETY: the caller's word.
     let found = unsafe { given(ground) }.and_then(|ground| ground.sample([east_m, north_m]));
     let Some(found) = found else { return 0 };
@@ -312,7 +322,7 @@ pub unsafe extern "C" fn lmr_sample_at(ground: *const Ground, east_m: f64, north
 /// `ground` is null or comes from `lmr_load`; `height_m` is null or may be written.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn lmr_height_below(
-    ground: *const Ground,
+    ground: *const LoadedGround,
     east_m: f64,
     north_m: f64,
     ceiling_m: f64,
@@ -330,7 +340,7 @@ pub unsafe extern "C" fn lmr_height_below(
 /// `ground` is null or comes from `lmr_load`; `surface` is null or may be written.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn lmr_surface_below(
-    ground: *const Ground,
+    ground: *const LoadedGround,
     east_m: f64,
     north_m: f64,
     ceiling_m: f64,
@@ -352,13 +362,13 @@ pub unsafe extern "C" fn lmr_surface_below(
 /// that may be written; the two do not overlap.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn lmr_heights(
-    ground: *const Ground,
+    ground: *const LoadedGround,
     places_m: *const [f64; 2],
     heights_m: *mut f64,
     count: usize,
 ) -> c_int {
     // SAFETY: the caller's word.
-    unsafe { fill(ground, places_m, heights_m, count, Ground::heights_m) }
+    unsafe { fill(ground, places_m, heights_m, count, LoadedGround::heights_m) }
 }
 
 /// Heights of the topmost surfaces not above a ceiling, at many places.
@@ -368,13 +378,13 @@ pub unsafe extern "C" fn lmr_heights(
 /// numbers that may be written; the two do not overlap.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn lmr_heights_below(
-    ground: *const Ground,
+    ground: *const LoadedGround,
     places_m: *const [f64; 3],
     heights_m: *mut f64,
     count: usize,
 ) -> c_int {
     // SAFETY: the caller's word.
-    unsafe { fill(ground, places_m, heights_m, count, Ground::heights_below_m) }
+    unsafe { fill(ground, places_m, heights_m, count, LoadedGround::heights_below_m) }
 }
 
 /// Asks for a height at each of many places.
@@ -382,11 +392,11 @@ pub unsafe extern "C" fn lmr_heights_below(
 /// # Safety
 /// As of the two functions above.
 unsafe fn fill<T>(
-    ground: *const Ground,
+    ground: *const LoadedGround,
     places_m: *const T,
     heights_m: *mut f64,
     count: usize,
-    ask: fn(&Ground, &[T], &mut [f64]),
+    ask: fn(&LoadedGround, &[T], &mut [f64]),
 ) -> c_int {
     // SAFETY: the caller's word.
     let (ground, first, out) = unsafe { (given(ground), given(places_m), given(heights_m)) };
@@ -411,7 +421,7 @@ unsafe fn fill<T>(
 /// may be written.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn lmr_sight(
-    ground: *const Ground,
+    ground: *const LoadedGround,
     from_m: *const [f64; 3],
     to_m: *const [f64; 3],
     share: *mut f64,
@@ -436,7 +446,7 @@ pub unsafe extern "C" fn lmr_sight(
 /// # Safety
 /// `ground` is null or comes from `lmr_load`.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn lmr_module_count(ground: *const Ground) -> usize {
+pub unsafe extern "C" fn lmr_module_count(ground: *const LoadedGround) -> usize {
     // SAFETY: the caller's word.
     unsafe { given(ground) }.map_or(0, |ground| ground.modules().len())
 }
@@ -447,7 +457,7 @@ pub unsafe extern "C" fn lmr_module_count(ground: *const Ground) -> usize {
 /// `ground` is null, or comes from `lmr_load` and is not moved while what is pointed to is used; `module` is null or
 /// may be written.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn lmr_module_at(ground: *const Ground, index: usize, module: *mut Module) -> c_int {
+pub unsafe extern "C" fn lmr_module_at(ground: *const LoadedGround, index: usize, module: *mut Module) -> c_int {
     // SAFETY: the caller's word.
     let Some(ground) = (unsafe { given(ground) }) else { return 0 };
     let Some(found) = ground.modules().get(index).map(|found| found.module()) else { return 0 };
@@ -473,7 +483,7 @@ pub unsafe extern "C" fn lmr_module_at(ground: *const Ground, index: usize, modu
 /// `ground` is null, or comes from `lmr_load` and is not moved while what is pointed to is used; `decks` is null or may
 /// be written.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn lmr_decks_at(ground: *const Ground, index: usize, decks: *mut Decks) -> c_int {
+pub unsafe extern "C" fn lmr_decks_at(ground: *const LoadedGround, index: usize, decks: *mut Decks) -> c_int {
     // SAFETY: the caller's word.
     let Some(ground) = (unsafe { given(ground) }) else { return 0 };
     let Some(found) = ground.modules().get(index).map(|found| &found.module().decks) else { return 0 };

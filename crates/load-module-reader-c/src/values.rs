@@ -4,7 +4,7 @@ use load_module_reader::Vertex;
 
 /// `lmr_frame`.
 #[repr(C)]
-pub struct Frame {
+pub struct AreaFrame {
     pub(crate) rows: u32,
     pub(crate) cols: u32,
     pub(crate) side_m: f64,

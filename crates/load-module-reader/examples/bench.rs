@@ -7,20 +7,8 @@
 use std::hint::black_box;
 use std::time::Instant;
 
-use load_module_reader::{Area, Ground, Keep, ReadError, Sight};
-
-/// SplitMix64.
-struct Draw(u64);
-
-impl Draw {
-    fn unit(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        (z ^ (z >> 31)) as f64 / u64::MAX as f64
-    }
-}
+use fastrand::Rng;
+use load_module_reader::{Area, Keep, LoadedGround, ReadError, Sight};
 
 /// Seconds this thread has run, or else seconds on the clock.
 fn seconds(start: Instant) -> f64 {
@@ -53,10 +41,10 @@ fn size_m(area: &Area) -> [f64; 2] {
 
 /// 15 x 15 load modules around random places; each timing loads a whole block anew.
 fn load_blocks(area: &Area) -> Result<(), ReadError> {
-    let (mut draw, size, origin) = (Draw(1), size_m(area), area.frame().origin_m);
+    let (mut draw, size, origin) = (Rng::with_seed(1), size_m(area), area.frame().origin_m);
     let mut times = Vec::new();
     for _ in 0..50 {
-        let place = [0, 1].map(|axis| origin[axis] + size[axis] * (0.1 + 0.8 * draw.unit()));
+        let place = [0, 1].map(|axis| origin[axis] + size[axis] * (0.1 + 0.8 * draw.f64()));
         let block = area.block_around(place, 7);
         let start = Instant::now();
         black_box(area.load(block)?);
@@ -71,16 +59,16 @@ fn load_blocks(area: &Area) -> Result<(), ReadError> {
     Ok(())
 }
 
-fn heights(area: &Area, ground: &Ground, queries: usize) {
-    let (mut draw, size, origin) = (Draw(2), size_m(area), area.frame().origin_m);
+fn heights(area: &Area, ground: &LoadedGround, queries: usize) {
+    let (mut draw, size, origin) = (Rng::with_seed(2), size_m(area), area.frame().origin_m);
     let random: Vec<[f64; 2]> =
-        (0..queries).map(|_| [0, 1].map(|axis| origin[axis] + size[axis] * draw.unit())).collect();
+        (0..queries).map(|_| [0, 1].map(|axis| origin[axis] + size[axis] * draw.f64())).collect();
     // A drive from the south-west to the north-east, a query every 5 cm or so.
     let drive: Vec<[f64; 2]> =
         (0..queries).map(|i| [0, 1].map(|axis| origin[axis] + size[axis] * i as f64 / queries as f64)).collect();
     // What a simulator asks: anywhere within 3.5 km of the observer.
     let around: Vec<[f64; 2]> = (0..queries)
-        .map(|_| [0, 1].map(|axis| origin[axis] + size[axis] / 2.0 + 7000.0 * (draw.unit() - 0.5)))
+        .map(|_| [0, 1].map(|axis| origin[axis] + size[axis] / 2.0 + 7000.0 * (draw.f64() - 0.5)))
         .collect();
     let clock = Instant::now();
     for (name, places) in [("random places of the area", &random), ("around an observer", &around), ("a drive", &drive)]
@@ -105,9 +93,9 @@ fn heights(area: &Area, ground: &Ground, queries: usize) {
     }
 }
 
-fn sights(area: &Area, ground: &Ground, queries: usize) {
-    let (mut draw, size, origin) = (Draw(3), size_m(area), area.frame().origin_m);
-    let mut place = || [0, 1].map(|axis| origin[axis] + size[axis] * (0.1 + 0.8 * draw.unit()));
+fn sights(area: &Area, ground: &LoadedGround, queries: usize) {
+    let (mut draw, size, origin) = (Rng::with_seed(3), size_m(area), area.frame().origin_m);
+    let mut place = || [0, 1].map(|axis| origin[axis] + size[axis] * (0.1 + 0.8 * draw.f64()));
     let pairs: Vec<[[f64; 3]; 2]> = (0..queries)
         .map(|_| {
             let (a, b) = (place(), place());

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use crate::{Block, Ground, Header, Keep, ReadError, TerrainModule, TileFile};
+use crate::{AreaFrame, Block, Keep, ReadError, TerrainModule, TileFile};
 
 /// Extension of load-module files.
 const EXTENSION: &str = "slm";
@@ -16,55 +16,7 @@ pub struct Area {
     /// Place in `files` of the file of each load module that is in one, by row and column. As large as what the files
     /// hold, however large an area their headers promise.
     file_of: HashMap<[u32; 2], u32>,
-    frame: Frame,
-}
-
-/// Where load modules lie.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Frame {
-    /// Rows of load modules in the area.
-    pub rows: u32,
-    /// Columns of load modules in the area.
-    pub cols: u32,
-    /// Levels of every load module: 0 is the finest, the last one the coarsest.
-    pub level_count: u16,
-    /// Side of a load module in quanta of 1/128 m.
-    pub side: u16,
-    /// Easting and northing of the area's south-west corner, metres.
-    pub origin_m: [f64; 2],
-    /// The coordinate system, such as `EPSG:32611`.
-    pub crs: String,
-    /// What heights are above; empty when unknown.
-    pub vertical_datum: String,
-}
-
-impl Frame {
-    fn of(header: &Header) -> Self {
-        Self {
-            rows: header.area_rows,
-            cols: header.area_cols,
-            level_count: header.level_count,
-            side: header.side,
-            origin_m: header.origin_m,
-            crs: header.crs.clone(),
-            vertical_datum: header.vertical_datum.clone(),
-        }
-    }
-
-    /// Side of a load module in metres.
-    pub fn side_m(&self) -> f64 {
-        f64::from(self.side) / f64::from(crate::QUANTA_PER_METRE)
-    }
-
-    /// Row and column of the load module under a place, however far outside the area that lies. What is not a number
-    /// lies as far south and west as can be.
-    pub fn module_at(&self, [east_m, north_m]: [f64; 2]) -> [i64; 2] {
-        let index = |metres: f64, origin: f64| match ((metres - origin) / self.side_m()).floor() {
-            index if index.is_nan() => i64::MIN,
-            index => index as i64,
-        };
-        [index(north_m, self.origin_m[1]), index(east_m, self.origin_m[0])]
-    }
+    frame: AreaFrame,
 }
 
 impl Area {
@@ -103,11 +55,11 @@ impl Area {
     /// When there are none, or they do not belong to one area.
     pub fn of_files(files: Vec<TileFile>) -> Result<Self, ReadError> {
         let Some(first) = files.first() else { return Err(ReadError::NoFiles { path: Path::new("").into() }) };
-        let frame = Frame::of(first.header());
+        let frame = AreaFrame::of(first.header());
         let mut file_of = HashMap::new();
         for (place, file) in (0..).zip(&files) {
             let header = file.header();
-            if Frame::of(header) != frame {
+            if AreaFrame::of(header) != frame {
                 return Err(ReadError::OtherArea { file: format!("{file:?}"), first: format!("{first:?}") });
             }
             let cols = header.west..header.east;
@@ -118,7 +70,7 @@ impl Area {
     }
 
     /// Where load modules lie.
-    pub fn frame(&self) -> &Frame {
+    pub fn frame(&self) -> &AreaFrame {
         &self.frame
     }
 
@@ -137,26 +89,6 @@ impl Area {
         };
         let ((south, north), (west, east)) = (range(row, self.frame.rows), range(col, self.frame.cols));
         Block { south, west, north: north.max(south), east: east.max(west) }
-    }
-
-    /// Loads a block, ready to be asked.
-    ///
-    /// # Errors
-    /// When a load module cannot be read, is damaged, or is in no file.
-    pub fn load(&self, block: Block) -> Result<Ground, ReadError> {
-        self.load_level(block, 0)
-    }
-
-    /// Loads a block at a level of detail; 0 is the finest.
-    ///
-    /// # Errors
-    /// When there is no such level, or a load module cannot be read, is damaged, or is in no file.
-    pub fn load_level(&self, block: Block, level: u16) -> Result<Ground, ReadError> {
-        let level_count = self.frame.level_count;
-        if level_count <= level {
-            return Err(ReadError::NoSuchLevel { found: level, level_count });
-        }
-        Ground::empty(self.frame.clone(), level).moved(self, block)
     }
 
     /// Looks whether every load module of a block is in a file, before room is made for any: there are at most as many

@@ -4,10 +4,7 @@ use std::io::Read;
 use std::path::Path;
 
 use crate::tile_file::open_file;
-use crate::{Header, IndexEntry, Module, ReadError, index};
-
-/// Bytes of the longest file that is read: far above any tile, and small enough to hold in memory.
-pub const FILE_BYTES_MAX: u64 = 1 << 30;
+use crate::{FILE_BYTES_MAX, Header, IndexEntry, Module, ReadError, index};
 
 /// All load modules of one tile, decoded and checked.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,20 +1,10 @@
 //! The header: which tile, on which grid, in which frame.
 
 use crate::bytes::{Cursor, check_section};
-use crate::{ReadError, Section};
+use crate::{
+    FIXED_HEADER_BYTES, LEVELS_MAX, MAGIC, QUANTA_PER_METRE, ReadError, Section, VERSION, VERSION_WITHOUT_DECKS,
+};
 
-/// The first eight bytes of every load-module file; a transfer as text damages them.
-pub const MAGIC: [u8; 8] = *b"\x89SLM\r\n\x1a\n";
-/// The newest version of the format that this crate reads: of files with decks.
-pub const VERSION: u16 = 2;
-/// The version of files without decks.
-pub const VERSION_WITHOUT_DECKS: u16 = 1;
-/// Levels of detail in a file at most.
-pub const LEVELS_MAX: u16 = 8;
-/// Quanta in a metre, of coordinates and heights alike.
-pub const QUANTA_PER_METRE: u32 = 128;
-/// Bytes of the header before its texts.
-pub const FIXED_HEADER_BYTES: usize = 124;
 /// Bytes of the longest header: two texts of 65,535 bytes, padding, checksum.
 const HEADER_BYTES_MAX: u32 = (FIXED_HEADER_BYTES as u32 + 2 * u16::MAX as u32).next_multiple_of(4) + 4;
 /// Cells along a side of the area at most: a thousand times what a job allows.

@@ -1,12 +1,10 @@
 //! The index: where each load module lies, and what one needs to know before reading it.
 
 use crate::bytes::{Cursor, check_section};
-use crate::{FIXED_DECKS_BYTES, FIXED_MODULE_BYTES, Header, ReadError, Section, VERSION_WITHOUT_DECKS};
-
-/// Bytes of one entry of the index in a file without decks.
-pub const INDEX_ENTRY_BYTES: usize = 32;
-/// Bytes that follow in each entry of a file with decks.
-pub const DECK_ENTRY_BYTES: usize = 16;
+use crate::{
+    DECK_ENTRY_BYTES, FIXED_DECKS_BYTES, FIXED_MODULE_BYTES, Header, INDEX_ENTRY_BYTES, ReadError, Section,
+    VERSION_WITHOUT_DECKS,
+};
 
 /// Where one level of a load module lies in the file, and its size.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -6,9 +6,11 @@
 //! what is returned is sound, and anything else is a [`ReadError`].
 //!
 //! [`Area`] opens all files of a database and reads only their headers and indexes. [`Area::load`] brings a [`Block`]
-//! of load modules into memory as [`Ground`], and [`Ground::moved`] follows the observer and reads only what is new.
-//! Decks of bridges hang above the ground: [`Ground::height_m`] is that of the ground, [`Ground::height_below_m`] that
-//! of the topmost of ground and decks not above a ceiling, for vehicles that drive over a bridge and under it.
+//! of load modules into memory as [`LoadedGround`], and [`LoadedGround::moved`] follows the observer and reads only
+//! what is new.
+//! Decks of bridges hang above the ground: [`LoadedGround::height_m`] is that of the ground,
+//! [`LoadedGround::height_below_m`] that of the topmost of ground and decks not above a ceiling, for vehicles that drive
+//! over a bridge and under it.
 //! A query takes constant expected time. [`SlmFile`] is the plain way to read one whole file.
 //! Where load modules have several levels of detail, all of this is about the finest, and [`Area::load_level`] brings
 //! in another.
@@ -59,31 +61,39 @@
 // A test that unwraps says by its line what failed.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+mod format;
+pub use format::{
+    DECK_ENTRY_BYTES, FILE_BYTES_MAX, FIXED_DECKS_BYTES, FIXED_HEADER_BYTES, FIXED_MODULE_BYTES, HOLE_CLASS,
+    INDEX_ENTRY_BYTES, LEVELS_MAX, MAGIC, QUANTA_PER_METRE, VERSION, VERSION_WITHOUT_DECKS,
+};
 mod error;
 pub use error::{ReadError, Section};
 mod bytes;
 mod header;
-pub use header::{FIXED_HEADER_BYTES, Header, LEVELS_MAX, MAGIC, QUANTA_PER_METRE, VERSION, VERSION_WITHOUT_DECKS};
-mod layout;
-pub use layout::{FIXED_DECKS_BYTES, FIXED_MODULE_BYTES, HOLE_CLASS, Vertex};
+pub use header::Header;
+mod vertex;
+pub use vertex::Vertex;
 mod index;
-pub use index::{DECK_ENTRY_BYTES, DecksEntry, INDEX_ENTRY_BYTES, IndexEntry};
+pub use index::{DecksEntry, IndexEntry};
 mod decks;
 pub use decks::Decks;
 mod module;
 pub use module::{Module, Residual};
-mod file;
-pub use file::{FILE_BYTES_MAX, SlmFile};
 mod tile_file;
 pub use tile_file::{Bytes, Keep, TileFile, open_file};
+mod file;
+pub use file::SlmFile;
 mod lookup;
 mod terrain_module;
 pub use terrain_module::{Sample, TerrainModule};
-mod ground;
+mod frame;
+pub use frame::{AreaFrame, Block};
+mod loaded_ground;
 mod sight;
-pub use ground::{Block, Ground, Sight};
+pub use loaded_ground::{LoadedGround, Sight};
 mod area;
-pub use area::{Area, Frame};
+pub use area::Area;
+mod load;
 
 #[cfg(test)]
 mod sample;

@@ -71,7 +71,7 @@ fn file_of(levels: &[[Shape; 2]], decks: &[Option<DeckShape>]) -> Vec<u8> {
     let header_length = (FIXED_HEADER_BYTES + CRS.len() + DATUM.len()).next_multiple_of(4) + 4;
     let level = |(level, shapes): (u32, &[Shape; 2])| [module(3, level, shapes[0]), module(4, level, shapes[1])];
     let sections: Vec<Vec<u8>> = (0..).zip(levels).flat_map(level).collect();
-    let place = |i: usize| (if i % 2 == 0 { 3 } else { 4 }, (i / 2) as u32);
+    let place = |i: usize| (if i.is_multiple_of(2) { 3 } else { 4 }, (i / 2) as u32);
     let shapes: Vec<Option<DeckShape>> = (0..sections.len()).map(|i| decks.get(i).copied().flatten()).collect();
     let parts: Vec<Vec<u8>> = shapes
         .iter()

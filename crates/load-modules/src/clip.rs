@@ -200,10 +200,11 @@ fn centre_lies_in([a, b, c]: [LatticePoint; 3], area: PostRect) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use fastrand::Rng;
     use terrain::{ModuleGrid, ModuleRect, Spacing};
 
     use super::*;
-    use crate::sheets::{Draw, assert_sides_are_shared, points, posts, side_list};
+    use crate::sheets::{assert_sides_are_shared, points, side_list};
 
     fn whole(grid: ModuleGrid, spacing_m: f64) -> Layout {
         Layout { grid, modules: grid.all(), spacing: Spacing::from_metres(spacing_m).unwrap() }
@@ -216,7 +217,7 @@ mod tests {
     /// Classes in bands that no load module line follows.
     fn mask(layout: &Layout) -> Importance {
         let area = layout.grid.area();
-        let classes = posts(area).map(|post| ((post.row + 2 * post.col) / 17 % 3) as u8).collect();
+        let classes = area.posts().map(|post| ((post.row + 2 * post.col) / 17 % 3) as u8).collect();
         Importance::new(area, vec![1000; area.post_count()], classes)
     }
 
@@ -259,7 +260,7 @@ mod tests {
     /// Corners and outer border of 2 x 3 load modules of 4000 cells, and small clusters far from each other, some
     /// beside a module line: edges between clusters run so close that their crossings round together.
     fn clusters(grid: ModuleGrid, seed: u64) -> Vec<Vertex> {
-        let (mut draw, area) = (Draw(seed), grid.area());
+        let (mut draw, area) = (Rng::with_seed(seed), grid.area());
         let mut places = std::collections::BTreeSet::new();
         for row in (0..=area.north).step_by(grid.side_cells as usize) {
             for col in (0..=area.east).step_by(grid.side_cells as usize) {
@@ -267,16 +268,16 @@ mod tests {
             }
         }
         for i in 0..14 {
-            let at = |far: i32, draw: &mut Draw| 10 + draw.below(far as u32 - 20) as i32;
+            let at = |far: i32, draw: &mut Rng| draw.i32(10..far - 10);
             let (row, mut col) = (at(area.north, &mut draw), at(area.east, &mut draw));
             if i % 2 == 0 {
                 col = grid.side_cells - 3;
             }
-            for _ in 0..2 + draw.below(9) {
-                places.insert(Post::new(row + draw.below(5) as i32, col + draw.below(7) as i32));
+            for _ in 0..2 + draw.u32(..9) {
+                places.insert(Post::new(row + draw.i32(0..5), col + draw.i32(0..7)));
             }
         }
-        places.into_iter().map(|post| Vertex { at: post.into(), height: draw.below(999) as i32 }).collect()
+        places.into_iter().map(|post| Vertex { at: post.into(), height: draw.i32(0..999) }).collect()
     }
 
     #[test]

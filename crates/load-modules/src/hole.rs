@@ -44,24 +44,24 @@ fn apex(ring: &[LatticePoint], start: usize, end: usize) -> usize {
 
 #[cfg(test)]
 mod tests {
+    use fastrand::Rng;
     use std::collections::BTreeSet;
 
     use terrain::Post;
 
     use super::*;
-    use crate::sheets::Draw;
 
     #[test]
     fn filling_a_hole_gives_the_triangulation_without_the_point() {
         for seed in 0..300 {
-            let mut draw = Draw(seed);
+            let mut draw = Rng::with_seed(seed);
             // Small grids, so that co-circular points are the rule.
-            let side = 3 + draw.below(8) as i32;
-            let share = 3 + draw.below(13);
+            let side = 3 + draw.i32(0..8);
+            let share = 3 + draw.u32(..13);
             let corner = |v: i32| v == 0 || v == side;
             let all = (0..=side).flat_map(|row| (0..=side).map(move |col| Post::new(row, col)));
             let points: Vec<LatticePoint> = all
-                .filter(|post| corner(post.row) && corner(post.col) || draw.below(16) < share)
+                .filter(|post| corner(post.row) && corner(post.col) || draw.u32(..16) < share)
                 .map(LatticePoint::from)
                 .collect();
             let triangles = mesh::delaunay(&points);

@@ -21,6 +21,6 @@ mod hole;
 mod removals;
 pub use removals::{Freed, Removal, RemovalGround, propose_removals};
 mod levels;
-pub use levels::{LevelGround, LevelSides, Levels, coarser_levels};
+pub use levels::{LevelGround, Levels, coarser_levels};
 #[cfg(test)]
 mod sheets;

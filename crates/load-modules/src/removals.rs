@@ -231,12 +231,13 @@ impl Stars {
 
 #[cfg(test)]
 mod tests {
+    use fastrand::Rng;
     use std::collections::BTreeSet;
 
     use terrain::{LoadModule, ModuleGrid, ModuleRect, Spacing};
 
     use super::*;
-    use crate::sheets::{Draw, points, posts};
+    use crate::sheets::points;
     use crate::{ClipHeights, clip};
 
     const GRID: ModuleGrid = ModuleGrid { rows: 4, cols: 4, side_cells: 20 };
@@ -246,9 +247,9 @@ mod tests {
     }
 
     fn ground_of(seed: u64) -> (Dem, Importance) {
-        let (mut draw, area) = (Draw(seed), GRID.area());
-        let dem = Dem::from_fn(area, |_| (0 < draw.below(40)).then(|| draw.below(60_000) as i32));
-        let weights = posts(area).map(|post| if post.row < 30 { 8000 } else { 1000 }).collect();
+        let (mut draw, area) = (Rng::with_seed(seed), GRID.area());
+        let dem = Dem::from_fn(area, |_| (0 < draw.u32(..40)).then(|| draw.i32(0..60_000)));
+        let weights = area.posts().map(|post| if post.row < 30 { 8000 } else { 1000 }).collect();
         (dem, Importance::new(area, weights, vec![0; area.post_count()]))
     }
 

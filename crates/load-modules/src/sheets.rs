@@ -2,31 +2,17 @@
 
 use std::collections::BTreeMap;
 
-use terrain::{
-    LatticePoint, LoadModule, ModuleGrid, ModuleId, ModuleRect, ModuleVertex, Post, PostRect, Side, Tin, Vertex,
-};
+use fastrand::Rng;
+use terrain::{LatticePoint, LoadModule, ModuleGrid, ModuleId, ModuleRect, ModuleVertex, Post, Side, Tin, Vertex};
 
 use crate::Layout;
 
-/// SplitMix64: the same numbers on any machine.
-pub(crate) struct Draw(pub(crate) u64);
-
-impl Draw {
-    pub(crate) fn below(&mut self, bound: u32) -> u32 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) % u64::from(bound)) as u32
-    }
-}
-
 /// Corners of all load modules, points every `border_step` posts on the outer border, and `count` random posts.
 pub(crate) fn points(grid: ModuleGrid, border_step: i32, count: usize, seed: u64) -> Vec<Vertex> {
-    let mut draw = Draw(seed);
+    let mut draw = Rng::with_seed(seed);
     let area = grid.area();
     let mut places = std::collections::BTreeSet::new();
-    for post in posts(area) {
+    for post in area.posts() {
         let on = |step: i32| post.row % step == 0 && post.col % step == 0;
         let outer = post.row == 0 || post.col == 0 || post.row == area.north || post.col == area.east;
         if on(grid.side_cells) || outer && on(border_step) {
@@ -34,14 +20,10 @@ pub(crate) fn points(grid: ModuleGrid, border_step: i32, count: usize, seed: u64
         }
     }
     for _ in 0..count {
-        let inner = |far: i32, draw: &mut Draw| 1 + draw.below(far as u32 - 1) as i32;
+        let inner = |far: i32, draw: &mut Rng| draw.i32(1..far);
         places.insert(Post::new(inner(area.north, &mut draw), inner(area.east, &mut draw)));
     }
-    places.into_iter().map(|post| Vertex { at: post.into(), height: draw.below(60_000) as i32 - 9_000 }).collect()
-}
-
-pub(crate) fn posts(rect: PostRect) -> impl Iterator<Item = Post> {
-    (rect.south..=rect.north).flat_map(move |row| (rect.west..=rect.east).map(move |col| Post::new(row, col)))
+    places.into_iter().map(|post| Vertex { at: post.into(), height: draw.i32(-9_000..51_000) }).collect()
 }
 
 /// The places along a side and the heights there.
@@ -72,7 +54,7 @@ pub(crate) fn assert_sides_are_shared(modules: &[LoadModule], rect: ModuleRect) 
 
 /// A TIN over the load modules of a tile: each square triangulated on its own over shared sides.
 pub(crate) fn constrained(layout: &Layout, seed: u64) -> Tin {
-    let mut draw = Draw(seed);
+    let mut draw = Rng::with_seed(seed);
     let rect = layout.grid.posts_of_rect(layout.modules);
     let side = layout.side_lattice();
     let (low, high) = (LatticePoint::from(rect.south_west()), LatticePoint::from(rect.north_east()));
@@ -83,7 +65,7 @@ pub(crate) fn constrained(layout: &Layout, seed: u64) -> Tin {
         }
     }
     for i in 0..90 {
-        let mut within = |low: i32, high: i32| low + draw.below((high - low + 1) as u32) as i32;
+        let mut within = |low: i32, high: i32| draw.i32(low..=high);
         let (mut row, mut col) = (within(low.row, high.row), within(low.col, high.col));
         // A third on module lines, and those on whole posts.
         if i % 3 == 0 {
@@ -95,7 +77,7 @@ pub(crate) fn constrained(layout: &Layout, seed: u64) -> Tin {
         }
         places.insert(LatticePoint::new(row, col));
     }
-    let vertices: Vec<_> = places.iter().map(|&at| Vertex { at, height: draw.below(9000) as i32 - 4000 }).collect();
+    let vertices: Vec<_> = places.iter().map(|&at| Vertex { at, height: draw.i32(-4000..5000) }).collect();
     let mut triangles = Vec::new();
     for id in layout.modules.iter() {
         let square = layout.grid.posts_of(id);

@@ -11,27 +11,16 @@ mod slope;
 pub use slope::{steep, steep_halo};
 mod smooth;
 
-use terrain::{Dem, GridFrame, HOLE_CLASS, Importance, PostRect};
+use terrain::{Dem, GridFrame, HOLE_CLASS, Importance, PostRect, Smooth};
 
 /// Index of the class of posts that no area claims.
 pub const DEFAULT_CLASS: u8 = 0;
 
-/// How weights of neighbouring posts are mixed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Smoothing {
-    /// Not at all: every post has the weight of its class.
-    None,
-    /// The separable 7-tap binomial \[1 6 15 20 15 6 1\]/64, clamped at the borders of the area.
-    Binomial7,
-}
-
-impl Smoothing {
-    /// How many posts around a window decide its weights.
-    pub fn halo(self) -> i32 {
-        match self {
-            Smoothing::None => 0,
-            Smoothing::Binomial7 => smooth::REACH,
-        }
+/// How many posts around a window decide its weights.
+fn halo(smooth: Smooth) -> i32 {
+    match smooth {
+        Smooth::None => 0,
+        Smooth::Binomial7 => smooth::REACH,
     }
 }
 
@@ -43,7 +32,7 @@ pub struct Mask<'a> {
     /// Areas with a class and a weight of their own.
     pub areas: Vec<Area<'a>>,
     /// How weights are mixed.
-    pub smoothing: Smoothing,
+    pub smooth: Smooth,
     /// Areas over all others, with weights that end where they end: smoothing leaves them out, so that a shore's
     /// water weighs what water weighs, and its land what land does.
     pub over: Vec<Area<'a>>,
@@ -81,11 +70,11 @@ pub fn importance(mask: &Mask, area: PostRect, frame: &GridFrame, rect: PostRect
     if mask.is_uniform() {
         return Importance::uniform(rect, mask.default_weight);
     }
-    let wide = rect.grown(mask.smoothing.halo()).intersection(&area).expect("a window lies inside the area");
+    let wide = rect.grown(halo(mask.smooth)).intersection(&area).expect("a window lies inside the area");
     let claims = claims(mask, frame, wide);
-    let weights = match mask.smoothing {
-        Smoothing::None => claims.weights,
-        Smoothing::Binomial7 => smooth::binomial7(&claims.weights, wide, rect),
+    let weights = match mask.smooth {
+        Smooth::None => claims.weights,
+        Smooth::Binomial7 => smooth::binomial7(&claims.weights, wide, rect),
     };
     let classes = if wide == rect { claims.classes } else { cut(&claims.classes, wide, rect) };
     let mut claims = Claims { weights, classes };
@@ -104,14 +93,10 @@ pub fn without_voids(importance: Importance, dem: &Dem) -> Importance {
     let rect = importance.rect();
     assert!(dem.rect().contains_rect(&rect), "the window of heights holds the window of the mask");
     let weight = |post| if dem.is_void(post) { 0 } else { importance.weight(post) };
-    let weights = posts(rect).map(weight).collect();
+    let weights = rect.posts().map(weight).collect();
     let class = |post| if dem.is_void(post) { HOLE_CLASS } else { importance.class(post) };
-    let classes = posts(rect).map(class).collect();
+    let classes = rect.posts().map(class).collect();
     Importance::new(rect, weights, classes)
-}
-
-fn posts(rect: PostRect) -> impl Iterator<Item = terrain::Post> {
-    (rect.south..=rect.north).flat_map(move |row| (rect.west..=rect.east).map(move |col| terrain::Post::new(row, col)))
 }
 
 /// Weight and class of every post of a window, row-major.

@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use proptest::prelude::*;
-use terrain::{Post, Spacing};
+use terrain::{Post, Smooth, Spacing};
 
 use super::*;
 
@@ -23,7 +23,7 @@ fn area(class: &str, weight: u16, polygons: Vec<Polygon>) -> Area<'static> {
 }
 
 fn unsmoothed(areas: Vec<Area>, rect: PostRect) -> Importance {
-    importance(&Mask { default_weight: 8000, areas, smoothing: Smoothing::None, over: vec![] }, rect, &frame(), rect)
+    importance(&Mask { default_weight: 8000, areas, smooth: Smooth::None, over: vec![] }, rect, &frame(), rect)
 }
 
 /// The rows of the classes from north to south, one character a post.
@@ -71,7 +71,7 @@ fn later_areas_win_and_classes_are_counted_as_they_are_named() {
         area("a", 2, vec![polygon(&[&SQUARE])]),
         area("default", 8000, vec![polygon(&[&[[1.0, 2.0], [2.0, 2.0], [2.0, 3.0], [1.0, 3.0]]])]),
     ];
-    let mask = Mask { default_weight: 8000, areas, smoothing: Smoothing::None, over: vec![] };
+    let mask = Mask { default_weight: 8000, areas, smooth: Smooth::None, over: vec![] };
     assert_eq!(mask.class_names(), ["default", "b", "a"]);
     check_picture(mask.areas, &["1100", "1020", "1220", "1100"]);
 }
@@ -87,9 +87,9 @@ fn corners_far_beyond_any_grid_do_not_overflow() {
 fn excluded_posts_stay_excluded_and_others_never_become_so() {
     let rect = PostRect::of_size(9, 9);
     let areas = vec![area("out", 0, vec![polygon(&[&[[0.0, 0.0], [4.0, 0.0], [4.0, 9.0], [0.0, 9.0]]])])];
-    let mask = Mask { default_weight: 1, areas, smoothing: Smoothing::Binomial7, over: vec![] };
+    let mask = Mask { default_weight: 1, areas, smooth: Smooth::Binomial7, over: vec![] };
     let smoothed = importance(&mask, rect, &frame(), rect);
-    for post in posts(rect) {
+    for post in rect.posts() {
         assert_eq!(smoothed.weight(post), u16::from(4 <= post.col), "{post}");
     }
 }
@@ -100,7 +100,7 @@ fn voids_weigh_nothing() {
     let hole = Post::new(1, 2);
     let dem = Dem::from_fn(rect, |post| (post != hole).then_some(5));
     let mask = without_voids(Importance::uniform(rect, 8000), &dem);
-    assert!(posts(rect).all(|post| mask.weight(post) == if post == hole { 0 } else { 8000 }));
+    assert!(rect.posts().all(|post| mask.weight(post) == if post == hole { 0 } else { 8000 }));
 }
 
 /// Crossing number with rational crossings, post by post: the plain definition.
@@ -139,14 +139,14 @@ prop_compose! {
     }
 }
 
-fn mask_of(rings: &[Vec<[i64; 2]>], weights: &[u16], smoothing: Smoothing) -> Mask<'static> {
+fn mask_of(rings: &[Vec<[i64; 2]>], weights: &[u16], smooth: Smooth) -> Mask<'static> {
     let as_polygon = |ring: &Vec<[i64; 2]>| {
         let corners: Vec<[f64; 2]> = ring.iter().map(|corner| corner.map(|c| c as f64)).collect();
         polygon(&[&corners])
     };
     let areas = rings.iter().zip(weights).enumerate();
     let areas = areas.map(|(i, (ring, &weight))| area(&i.to_string(), weight, vec![as_polygon(ring)])).collect();
-    Mask { default_weight: 8000, areas, smoothing, over: vec![] }
+    Mask { default_weight: 8000, areas, smooth, over: vec![] }
 }
 
 proptest! {
@@ -156,11 +156,11 @@ proptest! {
         weights in prop::collection::vec(prop_oneof![Just(0_u16), Just(65535), 0..9000_u16], 3),
     ) {
         let rect = PostRect::of_size(20, 22);
-        let mask = mask_of(&rings, &weights, Smoothing::Binomial7);
+        let mask = mask_of(&rings, &weights, Smooth::Binomial7);
         let found = importance(&mask, rect, &frame(), rect);
         let last_ring = |post| (0..rings.len()).rev().find(|&i| inside(&rings[i], post));
         let own = |post| last_ring(post).map_or(8000, |i| weights[i]);
-        for post in posts(rect) {
+        for post in rect.posts() {
             prop_assert_eq!(usize::from(found.class(post)), last_ring(post).map_or(0, |i| i + 1));
             prop_assert_eq!(found.weight(post), smoothed_naively(own, rect, post), "at {}", post);
         }
@@ -173,8 +173,8 @@ proptest! {
         rect in window(22),
     ) {
         let area = PostRect::of_size(22, 22);
-        let mut mask = mask_of(&rings, &weights, Smoothing::Binomial7);
-        let overlay = |rect: PostRect| posts(rect).map(|post| (post.row * 7 + post.col * 3) % 5 == 0).collect();
+        let mut mask = mask_of(&rings, &weights, Smooth::Binomial7);
+        let overlay = |rect: PostRect| rect.posts().map(|post| (post.row * 7 + post.col * 3) % 5 == 0).collect();
         mask.areas.push(Area { class: "overlay".into(), weight: 500, shape: Shape::Members(Box::new(overlay)) });
         let whole = importance(&mask, area, &frame(), area);
         prop_assert_eq!(importance(&mask, area, &frame(), rect), whole.window(rect));
@@ -189,13 +189,13 @@ fn areas_over_all_others_end_sharply_and_soften_nothing() {
     let mask = |over| Mask {
         default_weight: 8000,
         areas: vec![area("a", 1000, vec![half()])],
-        smoothing: Smoothing::Binomial7,
+        smooth: Smooth::Binomial7,
         over,
     };
     let softened = importance(&Mask { areas: below, ..mask(vec![]) }, rect, &frame(), rect);
     let square = polygon(&[&[[2.0, 2.0], [6.0, 2.0], [6.0, 6.0], [2.0, 6.0]]]);
     let laid = importance(&mask(vec![area("b", 60_000, vec![square])]), rect, &frame(), rect);
-    for post in posts(rect) {
+    for post in rect.posts() {
         let is_over = (2..6).contains(&post.row) && (2..6).contains(&post.col);
         let expected = if is_over { (60_000, 2) } else { (softened.weight(post), softened.class(post)) };
         assert_eq!((laid.weight(post), laid.class(post)), expected, "{post:?}");

@@ -146,35 +146,17 @@ impl Neighbours {
 mod tests {
     use std::collections::BTreeSet;
 
+    use fastrand::Rng;
     use geometry::in_circle;
     use terrain::{LatticePoint, Post};
 
     use super::*;
 
-    /// A small generator (SplitMix64): the same numbers on any machine.
-    struct Draw(u64);
-
-    impl Draw {
-        fn below(&mut self, bound: usize) -> usize {
-            self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-            let mut z = self.0;
-            z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-            z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-            ((z ^ (z >> 31)) % bound as u64) as usize
-        }
-
-        fn shuffle<T>(&mut self, items: &mut [T]) {
-            for i in (1..items.len()).rev() {
-                items.swap(i, self.below(i + 1));
-            }
-        }
-
-        /// About `share` of 16 of the posts of a square, its corners included.
-        fn subset(&mut self, side: i32, share: usize) -> Vec<Post> {
-            let corner = |v: i32| v == 0 || v == side - 1;
-            let all = (0..side).flat_map(|row| (0..side).map(move |col| Post::new(row, col)));
-            all.filter(|p| corner(p.row) && corner(p.col) || self.below(16) < share).collect()
-        }
+    /// About `share` of 16 of the posts of a square, its corners included.
+    fn subset(draw: &mut Rng, side: i32, share: usize) -> Vec<Post> {
+        let corner = |v: i32| v == 0 || v == side - 1;
+        let all = (0..side).flat_map(|row| (0..side).map(move |col| Post::new(row, col)));
+        all.filter(|p| corner(p.row) && corner(p.col) || draw.usize(..16) < share).collect()
     }
 
     fn edges(points: &[Post]) -> BTreeSet<(Post, Post)> {
@@ -207,8 +189,8 @@ mod tests {
 
     #[test]
     fn every_order_of_insertion_gives_one_edge_set() {
-        let mut draw = Draw(1);
-        let mut points = draw.subset(13, 9);
+        let mut draw = Rng::with_seed(1);
+        let mut points = subset(&mut draw, 13, 9);
         let expected = edges(&points);
         for _ in 0..200 {
             draw.shuffle(&mut points);
@@ -219,13 +201,13 @@ mod tests {
     #[test]
     fn every_circle_is_empty_and_fanned_from_its_smallest_point() {
         for seed in 0..40 {
-            check(&Draw(seed).subset(13, 3 + seed as usize % 14), 2 * 12 * 12);
+            check(&subset(&mut Rng::with_seed(seed), 13, 3 + seed as usize % 14), 2 * 12 * 12);
         }
     }
 
     #[test]
     fn a_full_grid_has_no_other_diagonals_than_south_west_to_north_east() {
-        let points = Draw(0).subset(9, 16);
+        let points = subset(&mut Rng::with_seed(0), 9, 16);
         check(&points, 2 * 8 * 8);
         assert!(edges(&points).iter().all(|(a, b)| a.row == b.row || a.col <= b.col));
     }
@@ -235,7 +217,7 @@ mod tests {
         let offsets = [(0, 5), (3, 4), (4, 3), (5, 0), (4, -3), (3, -4), (0, -5), (-3, -4), (-4, -3), (-5, 0), (-4, 3)];
         let mut points: Vec<_> = offsets.iter().map(|&(row, col)| Post::new(row, col)).collect();
         points.push(Post::new(-3, 4));
-        let mut draw = Draw(7);
+        let mut draw = Rng::with_seed(7);
         for _ in 0..50 {
             draw.shuffle(&mut points);
             let smallest = points.iter().position(|&p| p == Post::new(-5, 0)).unwrap() as u32;
@@ -265,13 +247,14 @@ mod tests {
     #[test]
     fn coordinates_near_two_to_the_thirty_are_exact() {
         let far = (1 << 30) - 13;
-        let points: Vec<_> = Draw(3).subset(13, 8).iter().map(|p| Post::new(p.row + far, p.col + far)).collect();
+        let points: Vec<_> =
+            subset(&mut Rng::with_seed(3), 13, 8).iter().map(|p| Post::new(p.row + far, p.col + far)).collect();
         check(&points, 2 * 12 * 12);
         let mut spread = points;
         spread.push(Post::new(0, far));
         spread.push(Post::new(far, 0));
         let edges_of_spread = edges(&spread);
-        Draw(4).shuffle(&mut spread);
+        Rng::with_seed(4).shuffle(&mut spread);
         assert_eq!(edges(&spread), edges_of_spread);
     }
 

@@ -10,7 +10,7 @@ use std::collections::HashMap;
 use mesh::constrained_delaunay;
 use terrain::{Post, QUANTA_PER_METRE, Tin};
 
-use crate::ground::{Ground, Impossible, tin_of, tolerance, within};
+use crate::dem_window::{DemWindow, Impossible, tin_of, tolerance, within};
 use crate::polyline::tolerances;
 use lines::{Levels, Line, contours};
 
@@ -37,7 +37,7 @@ const TOLERANCE_POSTS_OF_FEW: f64 = 2.0;
 ///
 /// # Errors
 /// When a number is not possible.
-pub fn contour_tin(ground: &Ground, which: Contours, line_tolerance_m: Option<f64>) -> Result<Tin, Impossible> {
+pub fn contour_tin(ground: &DemWindow, which: Contours, line_tolerance_m: Option<f64>) -> Result<Tin, Impossible> {
     let posts = if matches!(which, Contours::Points(_)) { TOLERANCE_POSTS_OF_FEW } else { TOLERANCE_POSTS };
     let line_tolerance_m = tolerance(line_tolerance_m.unwrap_or(ground.spacing.0 * posts))?;
     match which {
@@ -54,7 +54,7 @@ pub fn contour_tin(ground: &Ground, which: Contours, line_tolerance_m: Option<f6
 }
 
 /// Bisects the interval: the finest that makes no more than `points`.
-fn of_points(ground: &Ground, points: usize, line_tolerance_m: f64) -> Result<Tin, Impossible> {
+fn of_points(ground: &DemWindow, points: usize, line_tolerance_m: f64) -> Result<Tin, Impossible> {
     within(ground.dem.rect(), points)?;
     let (lowest, highest) = ground.dem.range();
     // At the widest interval, no line is left.
@@ -81,12 +81,12 @@ fn of_points(ground: &Ground, points: usize, line_tolerance_m: f64) -> Result<Ti
 }
 
 /// The TIN of some levels, unless it has more than `most` points.
-fn within_points(ground: &Ground, levels: Levels, line_tolerance_m: f64, most: usize) -> Option<Tin> {
+fn within_points(ground: &DemWindow, levels: Levels, line_tolerance_m: f64, most: usize) -> Option<Tin> {
     let pieces = Pieces::of(ground, levels, line_tolerance_m);
     (pieces.posts.len() <= most).then(|| pieces.tin(ground)).filter(|tin| tin.vertices.len() <= most)
 }
 
-fn of_levels(ground: &Ground, levels: Levels, line_tolerance_m: f64) -> Tin {
+fn of_levels(ground: &DemWindow, levels: Levels, line_tolerance_m: f64) -> Tin {
     Pieces::of(ground, levels, line_tolerance_m).tin(ground)
 }
 
@@ -101,7 +101,7 @@ struct Pieces {
 }
 
 impl Pieces {
-    fn of(ground: &Ground, levels: Levels, line_tolerance_m: f64) -> Self {
+    fn of(ground: &DemWindow, levels: Levels, line_tolerance_m: f64) -> Self {
         let corners = ground.dem.rect().corners();
         let mut pieces = Self { posts: corners.to_vec(), levels: vec![None; 4], edges: Vec::new() };
         let mut index_of: HashMap<Post, u32> = corners.into_iter().zip(0..).collect();
@@ -123,7 +123,7 @@ impl Pieces {
     }
 
     /// The constrained triangulation, with a point in the middle of each flat triangle that has room for one.
-    fn tin(mut self, ground: &Ground) -> Tin {
+    fn tin(mut self, ground: &DemWindow) -> Tin {
         let (triangles, _) = constrained_delaunay(&self.posts, &self.edges);
         let mut medial: Vec<Post> = triangles.iter().filter_map(|&triangle| self.medial(ground, triangle)).collect();
         if medial.is_empty() {
@@ -137,7 +137,7 @@ impl Pieces {
     }
 
     /// The post nearest to the middle of a triangle whose corners are on one level, if it lies inside.
-    fn medial(&self, ground: &Ground, triangle: [u32; 3]) -> Option<Post> {
+    fn medial(&self, ground: &DemWindow, triangle: [u32; 3]) -> Option<Post> {
         let [a, b, c] = triangle.map(|v| self.levels[v as usize]);
         if a.is_none() || a != b || b != c {
             return None;
@@ -153,7 +153,7 @@ impl Pieces {
 }
 
 /// The posts nearest to the points of a line that are kept.
-fn simplified(ground: &Ground, line: &Line, line_tolerance_m: f64) -> Vec<Post> {
+fn simplified(ground: &DemWindow, line: &Line, line_tolerance_m: f64) -> Vec<Post> {
     let spacing = ground.spacing.0;
     let metres: Vec<_> = line.points.iter().map(|point| [point.col * spacing, point.row * spacing, 0.0]).collect();
     let kept = line.points.iter().zip(tolerances(&metres)).filter(|&(_, below)| line_tolerance_m < below);

@@ -12,7 +12,7 @@ use geometry::{Facet, orient};
 use mesh::constrained_delaunay;
 use terrain::{Dem, Post, Tin};
 
-use crate::ground::{Ground, Impossible, RING, beside, posts_of, tin_of, within};
+use crate::dem_window::{DemWindow, Impossible, RING, beside, tin_of, within};
 
 /// Nearest points to which edges are tried.
 const NEAREST: usize = 24;
@@ -21,7 +21,7 @@ const NEAREST: usize = 24;
 ///
 /// # Errors
 /// When the window has not so many posts, or fewer than its corners are asked for.
-pub fn earlier(ground: &Ground, points: usize) -> Result<Tin, Impossible> {
+pub fn earlier(ground: &DemWindow, points: usize) -> Result<Tin, Impossible> {
     let (dem, rect) = (ground.dem, ground.dem.rect());
     within(rect, points)?;
     let mut posts = rect.corners().to_vec();
@@ -58,7 +58,7 @@ fn worst_of_regions(dem: &Dem, posts: &[Post], triangles: &[[u32; 3]]) -> Vec<Po
     }
     let stands_out = |residual: i32| largest <= 2 * residual.unsigned_abs();
     let mut found: Vec<(Reverse<u32>, Post)> = Vec::new();
-    for post in posts_of(rect) {
+    for post in rect.posts() {
         let sign = residuals[place(post)].signum();
         if !stands_out(residuals[place(post)]) {
             continue;

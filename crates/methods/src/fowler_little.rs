@@ -12,7 +12,7 @@ use std::collections::HashSet;
 
 use terrain::{Dem, Post, QUANTA_PER_METRE, Tin, metres_of_quanta};
 
-use crate::ground::{Ground, Impossible, TOLERANCE_M, tolerance, within};
+use crate::dem_window::{DemWindow, Impossible, TOLERANCE_M, tolerance, within};
 use crate::growing::Growing;
 use crate::polyline::{Point, tolerances};
 
@@ -39,7 +39,7 @@ impl FowlerLittle {
 ///
 /// # Errors
 /// When a number is negative, or fewer points than corners are asked for.
-pub fn fowler_little(ground: &Ground, how: &FowlerLittle) -> Result<Tin, Impossible> {
+pub fn fowler_little(ground: &DemWindow, how: &FowlerLittle) -> Result<Tin, Impossible> {
     let rect = ground.dem.rect();
     how.points.map_or(Ok(()), |points| within(rect, points))?;
     let usual = if how.points.is_some() { 0.0 } else { TOLERANCE_M };
@@ -66,7 +66,7 @@ pub fn fowler_little(ground: &Ground, how: &FowlerLittle) -> Result<Tin, Impossi
 }
 
 /// Posts on lines, by row and column, and the tolerance below which each is kept.
-fn kept_below(ground: &Ground, chains: &[Vec<Post>]) -> Vec<(Post, f64)> {
+fn kept_below(ground: &DemWindow, chains: &[Vec<Post>]) -> Vec<(Post, f64)> {
     let mut all: Vec<(Post, f64)> =
         chains.iter().flat_map(|chain| chain.iter().copied().zip(tolerances(&in_metres(ground, chain)))).collect();
     // A post on several lines is kept as long as one of them keeps it.
@@ -81,7 +81,7 @@ fn above(posts: Vec<(Post, f64)>, tolerance_m: f64) -> Vec<Post> {
 
 /// At most `most` posts: lines simplified by the smallest tolerance that leaves so few, or, where their ends alone are
 /// more, the ends of the lines with the largest relief.
-fn most_significant(ground: &Ground, mut chains: Vec<Vec<Post>>, most: usize) -> Vec<Post> {
+fn most_significant(ground: &DemWindow, mut chains: Vec<Vec<Post>>, most: usize) -> Vec<Post> {
     chains.sort_by(|a, b| relief(ground.dem, b).cmp(&relief(ground.dem, a)).then(a.cmp(b)));
     let mut ends = HashSet::new();
     let too_many = |chain: &Vec<Post>| {
@@ -106,7 +106,7 @@ fn relief(dem: &Dem, chain: &[Post]) -> i32 {
     heights().max().unwrap_or(0) - heights().min().unwrap_or(0)
 }
 
-fn in_metres(ground: &Ground, chain: &[Post]) -> Vec<Point> {
+fn in_metres(ground: &DemWindow, chain: &[Post]) -> Vec<Point> {
     let spacing = ground.spacing.0;
     let point = |&post: &Post| {
         [f64::from(post.col) * spacing, f64::from(post.row) * spacing, metres_of_quanta(ground.dem.height(post))]

@@ -7,7 +7,7 @@ use geometry::{LocalPost, Surface, rounded, visit_posts};
 use mesh::{Lines, Mesh};
 use terrain::{Dem, Post, Tin};
 
-use crate::ground::tin_of;
+use crate::dem_window::tin_of;
 
 /// Residual in quanta, the post it is at; larger residuals first, then posts by row and column.
 pub(crate) type Worst = (u32, Reverse<LocalPost>);

@@ -14,7 +14,7 @@ use std::collections::BinaryHeap;
 use geometry::{Facet, LocalPost, Surface, rounded, visit_posts};
 use terrain::{Dem, Post, Tin};
 
-use crate::ground::{Ground, Impossible, tin_of, within};
+use crate::dem_window::{DemWindow, Impossible, tin_of, within};
 
 /// Worst posts of a triangle among which the best is looked for.
 const TRIED: usize = 16;
@@ -56,7 +56,7 @@ type Entry = (u32, Reverse<LocalPost>, Reverse<u32>);
 ///
 /// # Errors
 /// When no leaf is left that can be split: `points` are out of reach.
-pub fn hierarchical<'a>(ground: &Ground<'a>, points: usize, how: Splitting) -> Result<Hierarchy<'a>, Impossible> {
+pub fn hierarchical<'a>(ground: &DemWindow<'a>, points: usize, how: Splitting) -> Result<Hierarchy<'a>, Impossible> {
     let (dem, rect) = (ground.dem, ground.dem.rect());
     within(rect, points)?;
     let posts = rect.corners().map(|corner| LocalPost::of(corner, rect)).to_vec();
@@ -186,7 +186,7 @@ mod tests {
             let tin = all.cut(points);
             let on_edges = tin.vertices.iter().filter(|vertex| {
                 let post = vertex.at.post().unwrap();
-                crate::ground::is_on_border(rect, post) || post.row == post.col
+                rect.has_on_border(post) || post.row == post.col
             });
             assert_eq!(on_edges.count(), 4, "no vertex but the corners is on the border or the diagonal");
             let edges: Vec<_> = tin.triangles.iter().flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)]).collect();

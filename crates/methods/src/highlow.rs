@@ -7,7 +7,7 @@ use std::collections::HashSet;
 
 use terrain::{Dem, Post, Tin};
 
-use crate::ground::{Ground, Impossible, RING, beside, inner_posts, is_on_border, tin_of};
+use crate::dem_window::{DemWindow, Impossible, RING, beside, inner_posts, tin_of};
 
 /// What counts as a peak or a pit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -22,7 +22,7 @@ pub enum Extrema {
 ///
 /// # Errors
 /// When they make no triangle.
-pub fn highlow(ground: &Ground, extrema: Extrema) -> Result<Tin, Impossible> {
+pub fn highlow(ground: &DemWindow, extrema: Extrema) -> Result<Tin, Impossible> {
     let posts = match extrema {
         Extrema::Strict => {
             let all = inner_posts(ground.dem.rect());
@@ -70,7 +70,7 @@ fn plateaus(dem: &Dem) -> Vec<Post> {
             next += 1;
         }
         flat.sort_unstable();
-        let is_whole = !flat.iter().any(|&post| is_on_border(rect, post) || dem.is_void(post));
+        let is_whole = !flat.iter().any(|&post| rect.has_on_border(post) || dem.is_void(post));
         if is_whole && is_extreme(dem, &flat) {
             found.push(most_central(&flat));
         }
@@ -106,7 +106,7 @@ mod tests {
         assert!(matches!(tin.check(), Err(terrain::TinFault::AreaMissing(covered, whole)) if covered < whole));
         let (posts, _) = crate::squares::of_tin(&dem, &tin);
         assert!(0 < posts && posts < dem.rect().post_count() as u64);
-        assert!(tin.vertices.iter().all(|vertex| !is_on_border(dem.rect(), vertex.at.post().unwrap())));
+        assert!(tin.vertices.iter().all(|vertex| !dem.rect().has_on_border(vertex.at.post().unwrap())));
     }
 
     #[test]

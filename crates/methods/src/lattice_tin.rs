@@ -2,7 +2,7 @@
 
 use terrain::{Post, PostRect, QUANTA_PER_METRE, Tin};
 
-use crate::ground::{Ground, Impossible, TOLERANCE_M, tolerance, within};
+use crate::dem_window::{DemWindow, Impossible, TOLERANCE_M, tolerance, within};
 use crate::growing::Growing;
 
 /// How the grid is refined.
@@ -30,7 +30,7 @@ impl LatticeTin {
 ///
 /// # Errors
 /// When the first grid has more points than asked for, or a number is negative.
-pub fn lattice_tin(ground: &Ground, how: &LatticeTin) -> Result<Tin, Impossible> {
+pub fn lattice_tin(ground: &DemWindow, how: &LatticeTin) -> Result<Tin, Impossible> {
     let rect = ground.dem.rect();
     if how.step < 1 {
         return Err(Impossible::new(format!("a step of {} posts", how.step), "1 or more", "the usual step is 16"));

@@ -13,8 +13,8 @@
 //! One function each: a window of the DEM and a target in, a TIN out. Vertices stand on posts at the DEM's height, in
 //! the order in which they were chosen where there is one; equals go by row, then column.
 
-mod ground;
-pub use ground::{Ground, Impossible, TOLERANCE_M};
+mod dem_window;
+pub use dem_window::{DemWindow, Impossible, TOLERANCE_M};
 mod growing;
 mod vip;
 pub use vip::{Boundary, Distance, vip};

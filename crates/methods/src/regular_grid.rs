@@ -3,7 +3,7 @@
 use geometry::{Facet, rounded};
 use terrain::{Dem, Metres, Post, PostRect, Tin};
 
-use crate::ground::{Ground, Impossible, tin_of};
+use crate::dem_window::{DemWindow, Impossible, tin_of};
 use crate::lattice_tin::{lattice, lines};
 
 /// Which diagonal cuts a cell of the grid.
@@ -34,7 +34,7 @@ pub fn step_of_points(rect: PostRect, points: usize) -> i32 {
 ///
 /// # Errors
 /// When `step` is below 1.
-pub fn regular_grid(ground: &Ground, step: i32, diagonal: Diagonal) -> Result<Tin, Impossible> {
+pub fn regular_grid(ground: &DemWindow, step: i32, diagonal: Diagonal) -> Result<Tin, Impossible> {
     if step < 1 {
         return Err(Impossible::new(format!("a step of {step} posts"), "1 or more", "at 30 m the usual step is 4"));
     }

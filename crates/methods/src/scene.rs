@@ -2,7 +2,7 @@
 
 use terrain::{Dem, Metres, Post, PostRect, Tin};
 
-use crate::Ground;
+use crate::DemWindow;
 
 /// Heights of `rows` x `cols` posts, in quanta.
 pub fn dem(rows: usize, cols: usize, mut height: impl FnMut(Post) -> i32) -> Dem {
@@ -10,8 +10,8 @@ pub fn dem(rows: usize, cols: usize, mut height: impl FnMut(Post) -> i32) -> Dem
 }
 
 /// The ground of a window, its posts 25 m apart.
-pub fn ground(dem: &Dem) -> Ground<'_> {
-    Ground { dem, spacing: Metres(25.0) }
+pub fn ground(dem: &Dem) -> DemWindow<'_> {
+    DemWindow { dem, spacing: Metres(25.0) }
 }
 
 /// Metres as quanta.

@@ -8,7 +8,7 @@ use std::cmp::Ordering;
 
 use terrain::{Dem, Post, PostRect, Tin};
 
-use crate::ground::{Ground, Impossible, inner_posts, is_on_border, posts_of, within};
+use crate::dem_window::{DemWindow, Impossible, inner_posts, within};
 use crate::growing::delaunay_tin;
 
 /// How far a post stands from the line between two opposite neighbours.
@@ -45,15 +45,16 @@ impl Boundary {
 ///
 /// # Errors
 /// When `boundary` forces more, or there are fewer posts to choose from.
-pub fn vip(ground: &Ground, points: usize, distance: Distance, boundary: Boundary) -> Result<Tin, Impossible> {
+pub fn vip(ground: &DemWindow, points: usize, distance: Distance, boundary: Boundary) -> Result<Tin, Impossible> {
     let (dem, rect) = (ground.dem, ground.dem.rect());
     within(rect, points)?;
     let forced: Vec<Post> = match boundary {
-        Boundary::ForceAll => posts_of(rect).filter(|&post| is_on_border(rect, post)).collect(),
+        Boundary::ForceAll => rect.posts().filter(|&post| rect.has_on_border(post)).collect(),
         Boundary::Extend | Boundary::CornersOnly => rect.corners().to_vec(),
     };
-    let mut ranked: Vec<(f64, Post)> = posts_of(rect)
-        .filter(|&post| boundary == Boundary::Extend || !is_on_border(rect, post))
+    let mut ranked: Vec<(f64, Post)> = rect
+        .posts()
+        .filter(|&post| boundary == Boundary::Extend || !rect.has_on_border(post))
         .filter(|post| !dem.is_void(*post) && !rect.corners().contains(post))
         .map(|post| (importance(ground, post, distance), post))
         .collect();
@@ -73,7 +74,7 @@ fn by_importance(a: &(f64, Post), b: &(f64, Post)) -> Ordering {
 }
 
 /// How far a post stands out, summed over four directions, in quanta.
-fn importance(ground: &Ground, post: Post, distance: Distance) -> f64 {
+fn importance(ground: &DemWindow, post: Post, distance: Distance) -> f64 {
     let straight = ground.spacing_quanta();
     let diagonal = straight * std::f64::consts::SQRT_2;
     [((0, 1), straight), ((1, 1), diagonal), ((1, 0), straight), ((1, -1), diagonal)]

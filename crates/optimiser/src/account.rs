@@ -1,12 +1,12 @@
 //! What the mesh has and what it may have.
 
-use limits::{Charged, POINT_COST, TileLedger};
-use terrain::{ModuleId, ModuleRect, RefusedBy};
+use limits::{Charged, TileLedger};
+use terrain::{ModuleId, ModuleRect, POINT_COST, RefusedBy};
 
 use crate::hold::Hold;
 use crate::place::{PER_POST, Place};
-use crate::sheet::{NONE, Sheet, Vertex};
 use crate::task::Budget;
+use crate::tile_mesh::{NONE, TileMesh, Vertex};
 
 /// The budget as it is spent and refunded, and what was lent beyond it for a while.
 pub(crate) struct Account {
@@ -28,7 +28,7 @@ enum Books {
 
 impl Account {
     /// The account of a sheet as it stands; it may be overdrawn.
-    pub fn new(budget: &Budget, sheet: &Sheet) -> Self {
+    pub fn new(budget: &Budget, sheet: &TileMesh) -> Self {
         let books = match budget {
             Budget::Triangles(most) => {
                 Books::Total { cost: (2, 1), most: *most as i64, left: *most as i64 - sheet.triangle_count as i64 }

@@ -4,9 +4,9 @@ use crate::account::Account;
 use crate::insertion::{Found, Insertion};
 use crate::queue::Queue;
 use crate::removal::Removal;
-use crate::sheet::{NONE, Sheet, Vertex};
 use crate::tenants::Tenants;
 use crate::thin::is_dearer;
+use crate::tile_mesh::{NONE, TileMesh, Vertex};
 
 /// Part of its gain that an insertion may have lost since it was judged.
 const LOST: f64 = 0.02;
@@ -45,7 +45,7 @@ impl Exchange {
     /// One round of at most `most` insertions. Gives how many there were.
     pub fn round(
         &mut self,
-        sheet: &mut Sheet,
+        sheet: &mut TileMesh,
         account: &mut Account,
         terms: Terms,
         most: usize,
@@ -77,7 +77,7 @@ impl Exchange {
 
     /// Gives triangles of at least `least` squares a vertex where limits have refused one, in exchange for the vertex
     /// that explains least of those which stand in its way. Nothing else is judged, so this costs next to nothing.
-    pub fn relieve(&mut self, sheet: &mut Sheet, account: &mut Account, least: f64, tools: &mut Tools) {
+    pub fn relieve(&mut self, sheet: &mut TileMesh, account: &mut Account, least: f64, tools: &mut Tools) {
         self.grow(sheet);
         let live = (0..sheet.triangles.len() as u32).filter(|&triangle| sheet.is_live(triangle));
         let squares = |triangle: u32| sheet.triangles[triangle as usize].squares;
@@ -106,7 +106,7 @@ impl Exchange {
         self.removals.peek().map(|(_, worth)| -worth)
     }
 
-    fn judge_all(&mut self, sheet: &mut Sheet, terms: Terms, tools: &mut Tools) {
+    fn judge_all(&mut self, sheet: &mut TileMesh, terms: Terms, tools: &mut Tools) {
         (self.removals, self.insertions, self.tenants) = (Queue::default(), Queue::default(), None);
         self.grow(sheet);
         if terms == Terms::OneForOne {
@@ -135,13 +135,13 @@ impl Exchange {
         sheet.vertices.iter_mut().for_each(|vertex| vertex.is_stirred = false);
     }
 
-    fn grow(&mut self, sheet: &Sheet) {
+    fn grow(&mut self, sheet: &TileMesh) {
         self.costs.resize(sheet.vertices.len(), None);
         self.gains.resize(sheet.triangles.len(), 0.0);
         self.judged.resize(sheet.triangles.len(), [NONE; 3]);
     }
 
-    fn judge_triangle(&mut self, sheet: &mut Sheet, triangle: u32, tools: &mut Tools) {
+    fn judge_triangle(&mut self, sheet: &mut TileMesh, triangle: u32, tools: &mut Tools) {
         let found = tools.insertion.find(sheet, triangle);
         found.inspect(|found| sheet.drop_vertex(found.vertex));
         let gain = found.map_or(0.0, |found| found.gain);
@@ -157,7 +157,7 @@ impl Exchange {
     /// Gives whether the vertex went; it does not if it has become dearer.
     fn remove(
         &mut self,
-        sheet: &mut Sheet,
+        sheet: &mut TileMesh,
         account: &mut Account,
         vertex: u32,
         before: f64,
@@ -182,7 +182,7 @@ impl Exchange {
     /// Gives whether a vertex was inserted.
     fn insert(
         &mut self,
-        sheet: &mut Sheet,
+        sheet: &mut TileMesh,
         account: &mut Account,
         terms: Terms,
         (triangle, before): (u32, f64),
@@ -224,7 +224,7 @@ impl Exchange {
     /// way, if the guest explains more. Gives whether one went.
     fn make_room(
         &mut self,
-        sheet: &mut Sheet,
+        sheet: &mut TileMesh,
         account: &mut Account,
         guest: &Vertex,
         (triangle, gain): (u32, f64),
@@ -249,10 +249,10 @@ impl Exchange {
     }
 
     /// Judges again what a change has touched: its vertices, and the triangles around them.
-    fn judge_around(&mut self, sheet: &mut Sheet, vertices: &[u32], tools: &mut Tools) {
+    fn judge_around(&mut self, sheet: &mut TileMesh, vertices: &[u32], tools: &mut Tools) {
         self.grow(sheet);
         let mut triangles: Vec<u32> = Vec::new();
-        let mut star = crate::sheet::Star::default();
+        let mut star = crate::tile_mesh::Star::default();
         for &vertex in vertices {
             sheet.vertices[vertex as usize].is_stirred = true;
             let cost = tools.removal.find(sheet, vertex);

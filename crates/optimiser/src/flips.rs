@@ -3,7 +3,7 @@
 use crate::form::{Form, squares};
 use crate::patch::Patch;
 use crate::place::{Place, Shape};
-use crate::sheet::{NONE, Sheet, next, previous};
+use crate::tile_mesh::{NONE, TileMesh, next, previous};
 
 /// Passes at most; hardly any mesh needs more than six.
 const PASSES_MAX: usize = 10;
@@ -13,7 +13,7 @@ const LEAST_GAIN: f64 = 1e-4;
 const LEAST_SHARE: f64 = 0.02;
 
 /// Flips edges near stirred vertices, until none gains; stirs what it touches. Gives the flips.
-pub(crate) fn flip_all(sheet: &mut Sheet) -> usize {
+pub(crate) fn flip_all(sheet: &mut TileMesh) -> usize {
     let mut patch = Patch::default();
     let least = LEAST_SHARE * sheet.squares() / sheet.triangle_count as f64;
     let is_stirred = |corner: u32| sheet.vertices.get(corner as usize).is_some_and(|vertex| vertex.is_stirred);
@@ -46,14 +46,14 @@ pub(crate) fn flip_all(sheet: &mut Sheet) -> usize {
 
 /// Whether an inner edge, looked at from its lower side only, has an active triangle beside it.
 #[inline(always)]
-fn is_active(sheet: &Sheet, edge: u32, active: &[bool]) -> bool {
+fn is_active(sheet: &TileMesh, edge: u32, active: &[bool]) -> bool {
     let twin = sheet.twin(edge);
     twin != NONE && edge < twin && (active[(edge >> 2) as usize] || active[(twin >> 2) as usize])
 }
 
 /// Fills `patch` with the flip of an inner edge, if that is valid and gains.
 #[inline(always)]
-fn find(sheet: &Sheet, edge: u32, least: f64, patch: &mut Patch) -> bool {
+fn find(sheet: &TileMesh, edge: u32, least: f64, patch: &mut Patch) -> bool {
     let twin = sheet.twin(edge);
     let old = sheet.triangles[(edge >> 2) as usize].squares + sheet.triangles[(twin >> 2) as usize].squares;
     if old <= least {

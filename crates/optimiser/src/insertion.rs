@@ -6,7 +6,7 @@ use crate::moments::Sums;
 use crate::patch::Patch;
 use crate::place::{Place, Shape};
 use crate::refit::Fit;
-use crate::sheet::{NONE, Sheet, next, previous};
+use crate::tile_mesh::{NONE, TileMesh, next, previous};
 
 /// Triangles one insertion may rewrite.
 const REACH_MAX: usize = 14;
@@ -55,7 +55,7 @@ impl Insertion {
     /// The gain of a new vertex in `triangle`; its patch is then ready to be applied, and the vertex has to be dropped
     /// if it is not. `None` where nothing can be inserted.
     #[inline(always)]
-    pub fn find(&mut self, sheet: &mut Sheet, triangle: u32) -> Option<Found> {
+    pub fn find(&mut self, sheet: &mut TileMesh, triangle: u32) -> Option<Found> {
         let corners = sheet.triangles[triangle as usize].corners;
         let places = sheet.places(corners);
         let (_, at) = sheet.ground.worst(places, sheet.heights(corners))?;
@@ -73,7 +73,7 @@ impl Insertion {
     }
 
     /// The edge a place lies on, if any, and what holds a vertex there.
-    fn classify(&self, sheet: &Sheet, triangle: u32, places: [Place; 3], at: Place) -> Option<(Option<u32>, Hold)> {
+    fn classify(&self, sheet: &TileMesh, triangle: u32, places: [Place; 3], at: Place) -> Option<(Option<u32>, Hold)> {
         let mut on_edge = None;
         for k in 0..3 {
             let side = Place::orient(places[k], places[(k + 1) % 3], at);
@@ -88,7 +88,7 @@ impl Insertion {
     }
 
     /// Splits the triangle, flips around the new vertex, fits heights. Gives the gain.
-    fn split(&mut self, sheet: &Sheet, triangle: u32, on_edge: Option<u32>, vertex: u32) -> Option<f64> {
+    fn split(&mut self, sheet: &TileMesh, triangle: u32, on_edge: Option<u32>, vertex: u32) -> Option<f64> {
         let record = &sheet.vertices[vertex as usize];
         let guest = Guest { at: record.at, height: record.height, vertex };
         self.patch.clear();
@@ -120,7 +120,7 @@ impl Insertion {
 
     /// The triangle between the new vertex and an edge seen from inside.
     #[inline(always)]
-    fn push_face(&mut self, sheet: &Sheet, guest: Guest, edge: u32) {
+    fn push_face(&mut self, sheet: &TileMesh, guest: Guest, edge: u32) {
         let (from, to) = sheet.ends(edge);
         let (a, b) = (sheet.at(from), sheet.at(to));
         let moments = &sheet.ground.moments;
@@ -129,7 +129,7 @@ impl Insertion {
     }
 
     /// Takes neighbours in while the flip of the edge to them gains.
-    fn flip_around(&mut self, sheet: &Sheet, guest: Guest) {
+    fn flip_around(&mut self, sheet: &TileMesh, guest: Guest) {
         const TRIES_MAX: usize = 60;
         let mut index = 0;
         for _ in 0..TRIES_MAX {
@@ -146,7 +146,7 @@ impl Insertion {
     }
 
     #[inline(always)]
-    fn flipped(&self, sheet: &Sheet, guest: Guest, face: &Face) -> Option<[Face; 2]> {
+    fn flipped(&self, sheet: &TileMesh, guest: Guest, face: &Face) -> Option<[Face; 2]> {
         let beyond = face.twin >> 2;
         if face.twin == NONE
             || REACH_MAX <= self.patch.old.len()
@@ -173,7 +173,7 @@ impl Insertion {
         (first.squares + second.squares < old * (1.0 - LEAST_FLIP_GAIN)).then_some([first, second])
     }
 
-    fn fill_patch(&mut self, sheet: &Sheet, guest: Guest) {
+    fn fill_patch(&mut self, sheet: &TileMesh, guest: Guest) {
         for face in &self.faces {
             let corners = [guest.vertex, face.from, face.to];
             self.patch.new.push((corners, Form::new(&face.all(), sheet.places(corners))));
@@ -188,7 +188,7 @@ impl Insertion {
 
 impl Face {
     #[inline(always)]
-    fn new(sheet: &Sheet, guest: Guest, (from, to): (u32, u32), twin: u32, sums: [Sums; 3]) -> Self {
+    fn new(sheet: &TileMesh, guest: Guest, (from, to): (u32, u32), twin: u32, sums: [Sums; 3]) -> Self {
         let mut face = Self { from, to, twin, sums, squares: 0.0 };
         let (a, b) = (&sheet.vertices[from as usize], &sheet.vertices[to as usize]);
         let corners = [guest.at, a.at, b.at];

@@ -7,7 +7,7 @@
 //! the budget first and thinned by what each vertex is truly worth.
 
 mod task;
-pub use task::{Budget, Effort, HeightFit, Lattice, Task};
+pub use task::{Budget, Task};
 mod optimise;
 pub use optimise::{Optimised, fill, optimise, overshoot};
 
@@ -16,7 +16,6 @@ mod curve;
 mod exchange;
 mod flips;
 mod form;
-mod ground;
 mod hold;
 mod insertion;
 mod moments;
@@ -25,10 +24,11 @@ mod place;
 mod queue;
 mod refit;
 mod removal;
-mod sheet;
 mod sweep;
 mod tenants;
 mod thin;
+mod tile_mesh;
+mod weighted_heights;
 
 #[cfg(test)]
 mod scene;

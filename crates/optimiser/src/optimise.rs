@@ -1,20 +1,20 @@
 //! The order of the steps.
 
-use terrain::{Dem, Importance, LATTICE_PER_POST, Refusal, StopReason, Tin, Vertex as TinVertex};
+use terrain::{Dem, Effort, Importance, LATTICE_PER_POST, Lattice, Refusal, StopReason, Tin, Vertex as TinVertex};
 
 use crate::account::Account;
 use crate::exchange::{Exchange, Terms, Tools};
 use crate::flips::flip_all;
-use crate::ground::Ground;
 use crate::hold::Hold;
 use crate::insertion::Insertion;
 use crate::place::{PER_POST, Place, Shape};
 use crate::queue::Queue;
 use crate::removal::Removal;
-use crate::sheet::{Layout, NONE, Sheet, Star};
 use crate::sweep::{Mover, Steps};
-use crate::task::{Effort, Lattice, Task};
+use crate::task::Task;
 use crate::thin::{Shears, Until, thin};
+use crate::tile_mesh::{Layout, NONE, Star, TileMesh};
+use crate::weighted_heights::WeightedHeights;
 
 /// A TIN made truer.
 #[derive(Clone, Debug)]
@@ -102,7 +102,7 @@ pub fn fill(dem: &Dem, importance: &Importance, start: &Tin, task: &Task) -> Opt
 fn work_on(dem: &Dem, importance: &Importance, start: &Tin, task: &Task, steps: impl Fn(&mut Work)) -> Optimised {
     assert_eq!(dem.rect(), start.rect, "the TIN covers the window");
     assert_eq!(dem.rect(), importance.rect(), "heights and weights cover the same posts");
-    let mut ground = Ground::new(dem, importance, task.open, task.height_fit);
+    let mut ground = WeightedHeights::new(dem, importance, task.open, task.height_fit);
     ground.forbid(&task.forbidden);
     let mut held = task.held.clone();
     held.sort_unstable();
@@ -116,7 +116,7 @@ fn work_on(dem: &Dem, importance: &Importance, start: &Tin, task: &Task, steps: 
         }
     };
     let layout = Layout { line_step: task.line_step.map(|posts| posts * PER_POST), hold: &hold };
-    let sheet = Sheet::new(&ground, start, &layout);
+    let sheet = TileMesh::new(&ground, start, &layout);
     let account = Account::new(&task.budget, &sheet);
     let mut work = Work {
         sheet,
@@ -134,7 +134,7 @@ fn work_on(dem: &Dem, importance: &Importance, start: &Tin, task: &Task, steps: 
 
 /// Everything the steps work with.
 struct Work<'a, 'g> {
-    sheet: Sheet<'g>,
+    sheet: TileMesh<'g>,
     account: Account,
     task: &'a Task,
     mover: Mover,
@@ -250,7 +250,7 @@ impl Work<'_, '_> {
     /// gains, since nothing is judged before its turn.
     fn fill_by_squares(&mut self) {
         let mut queue = Queue::default();
-        let squares = |sheet: &Sheet, triangle: u32| sheet.triangles[triangle as usize].squares;
+        let squares = |sheet: &TileMesh, triangle: u32| sheet.triangles[triangle as usize].squares;
         (0..self.sheet.triangles.len() as u32)
             .for_each(|triangle| queue.enter(triangle, squares(&self.sheet, triangle)));
         let mut star = Star::default();
@@ -384,9 +384,14 @@ impl Work<'_, '_> {
         let all = 0..self.sheet.vertices.len() as u32;
         let mut homeless: Vec<u32> = all.filter(|&vertex| !self.has_place(vertex, Shape::Sound)).collect();
         // Once its neighbours stand on the lattice, a vertex finds a place or can go; a place between triangles of any
-        // shape is the last resort.
-        homeless.retain(|&vertex| !self.has_place(vertex, Shape::Sound) && !self.take_out(vertex));
-        homeless.retain(|&vertex| !self.has_place(vertex, Shape::Upright) && !self.take_out(vertex));
+        // shape is the last resort but one, and room made by a neighbour that goes the last.
+        while !homeless.is_empty() {
+            homeless.retain(|&vertex| !self.has_place(vertex, Shape::Sound) && !self.take_out(vertex));
+            homeless.retain(|&vertex| !self.has_place(vertex, Shape::Upright) && !self.take_out(vertex));
+            if homeless.first().is_some_and(|&vertex| !self.make_room(vertex)) {
+                break;
+            }
+        }
         assert!(homeless.is_empty(), "{} vertices have no place on the lattice and cannot go", homeless.len());
         self.fill_up();
     }
@@ -394,6 +399,13 @@ impl Work<'_, '_> {
     /// Whether a vertex stands on the final lattice now, or is gone.
     fn has_place(&mut self, vertex: u32, shape: Shape) -> bool {
         !self.sheet.is_vertex(vertex) || self.mover.snap(&mut self.sheet, vertex, shape)
+    }
+
+    /// Takes out one of the vertices around another, if one can go.
+    fn make_room(&mut self, vertex: u32) -> bool {
+        let mut star = Star::default();
+        self.sheet.star(vertex, &mut star);
+        star.ring.iter().any(|&beside| self.take_out(beside))
     }
 
     /// Takes a vertex out, if that leaves a valid mesh.

@@ -2,7 +2,7 @@
 
 use crate::form::Form;
 use crate::moments::Sums;
-use crate::sheet::{NONE, Sheet, Triangle};
+use crate::tile_mesh::{NONE, TileMesh, Triangle};
 
 /// A change in one place: triangles that go, triangles that come over the same outline, heights that move.
 #[derive(Default)]
@@ -33,7 +33,7 @@ impl Patch {
     }
 }
 
-impl Sheet<'_> {
+impl TileMesh<'_> {
     /// Carries out a change and stirs everything it touches.
     pub fn apply(&mut self, patch: &mut Patch) {
         self.cut_out(patch);

@@ -1,7 +1,7 @@
 //! Fitting a few neighbouring heights at once, everything around them held.
 
 use crate::patch::Patch;
-use crate::sheet::{NONE, Sheet, next, previous};
+use crate::tile_mesh::{NONE, TileMesh, next, previous};
 
 /// Heights fitted at once, at most.
 pub(crate) const HEIGHTS_MAX: usize = 20;
@@ -21,7 +21,7 @@ impl Fit {
     /// Fits the heights of `patch.refit` as they will be after the patch; fills `patch.rise` and gives the squares
     /// gained. Too many heights are left alone.
     #[inline(always)]
-    pub fn refit(&mut self, sheet: &Sheet, patch: &mut Patch) -> f64 {
+    pub fn refit(&mut self, sheet: &TileMesh, patch: &mut Patch) -> f64 {
         patch.rise.clear();
         patch.rise.resize(patch.refit.len(), 0.0);
         if HEIGHTS_MAX < patch.refit.len() {
@@ -32,7 +32,7 @@ impl Fit {
         self.solve(&mut patch.rise)
     }
 
-    fn set_up(&mut self, sheet: &Sheet, patch: &Patch) {
+    fn set_up(&mut self, sheet: &TileMesh, patch: &Patch) {
         let n = patch.refit.len();
         if self.place.len() < sheet.vertices.len() {
             self.place.resize(sheet.vertices.len(), 0);
@@ -59,7 +59,7 @@ impl Fit {
 
     /// Adds the triangles around unknown `i` that stay.
     #[inline(always)]
-    fn add_around(&mut self, sheet: &Sheet, patch: &Patch, i: usize, vertex: u32) {
+    fn add_around(&mut self, sheet: &TileMesh, patch: &Patch, i: usize, vertex: u32) {
         let entry = sheet.vertices[vertex as usize].edge;
         if entry == NONE {
             return;

@@ -6,7 +6,7 @@ use crate::moments::Sums;
 use crate::patch::Patch;
 use crate::place::{Place, Shape};
 use crate::refit::Fit;
-use crate::sheet::{Sheet, Star};
+use crate::tile_mesh::{Star, TileMesh};
 
 /// Corners of a hole, at most.
 const CORNERS_MAX: usize = 13;
@@ -24,7 +24,7 @@ pub(crate) struct Removal {
 impl Removal {
     /// What removing a vertex costs in squares; its patch is then ready to be applied. `None` where it cannot go.
     #[inline(always)]
-    pub fn find(&mut self, sheet: &Sheet, vertex: u32) -> Option<f64> {
+    pub fn find(&mut self, sheet: &TileMesh, vertex: u32) -> Option<f64> {
         let record = &sheet.vertices[vertex as usize];
         if !sheet.is_vertex(vertex) || record.hold.is_fixed() {
             return None;
@@ -50,7 +50,7 @@ impl Removal {
     }
 
     /// Where in the ring the line runs on through a vertex on it.
-    fn ends_of_line(&self, sheet: &Sheet, hold: Hold, at: Place) -> Option<(usize, usize)> {
+    fn ends_of_line(&self, sheet: &TileMesh, hold: Hold, at: Place) -> Option<(usize, usize)> {
         let is_next = |&vertex: &u32| {
             let other = &sheet.vertices[vertex as usize];
             (hold.has(Hold::COLUMN) && other.hold.has(Hold::COLUMN) && other.at.x == at.x)
@@ -90,7 +90,7 @@ impl Hole {
     /// Appends the triangles that fill a counter-clockwise polygon with the fewest squares, and gives these; `None`
     /// where it has no valid triangulation or too many corners.
     #[inline(always)]
-    fn fill(&mut self, sheet: &Sheet, polygon: &[u32], patch: &mut Patch) -> Option<f64> {
+    fn fill(&mut self, sheet: &TileMesh, polygon: &[u32], patch: &mut Patch) -> Option<f64> {
         let n = polygon.len();
         if n < 3 {
             return Some(0.0);

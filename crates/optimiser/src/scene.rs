@@ -2,11 +2,11 @@
 
 use limits::{Allowance, ModuleLines, TileLedger, Windows};
 use terrain::{
-    Dem, Importance, LatticePoint, ModuleGrid, ModuleId, ModuleRect, Post, PostRect, SeamSides, THOUSANDTHS, Tin,
-    Vertex,
+    Dem, Effort, HeightFit, Importance, Lattice, LatticePoint, ModuleGrid, ModuleId, ModuleRect, Post, PostRect,
+    SeamSides, THOUSANDTHS, Tin, Vertex,
 };
 
-use crate::task::{Budget, Effort, HeightFit, Lattice, Task};
+use crate::task::{Budget, Task};
 
 /// A number from 0 to 1 that a place decides.
 fn noise(row: i32, col: i32, seed: u64) -> f64 {
@@ -169,7 +169,7 @@ pub(crate) fn measured(tin: &Tin, dem: &Dem) -> (f64, f64) {
                 let part = [cross(at[1], at[2], p), cross(at[2], at[0], p), cross(at[0], at[1], p)];
                 if part.iter().all(|&part| 0.0 <= part) {
                     let height: f64 = (0..3).map(|i| part[i] / area * f64::from(corners[i].height)).sum();
-                    let place = (row - rect.south) as usize * rect.posts_wide() + (col - rect.west) as usize;
+                    let place = rect.index(Post::new(row, col));
                     residuals[place] = Some(f64::from(dem.height(Post::new(row, col))) - height);
                 }
             }

@@ -1,33 +1,33 @@
 //! Single steps: each does what it says it gains, and keeps every post once.
 
-use terrain::{Dem, Importance, PostRect, SeamSides};
+use terrain::{Dem, Effort, HeightFit, Importance, PostRect, SeamSides};
 
 use crate::account::Account;
 use crate::exchange::{Exchange, Terms, Tools};
 use crate::flips::flip_all;
-use crate::ground::Ground;
 use crate::hold::Hold;
 use crate::insertion::Insertion;
 use crate::place::PER_POST;
 use crate::removal::Removal;
 use crate::scene::{Caps, confined, even, grid, patchy, rough, spent};
-use crate::sheet::{Layout, NONE, Sheet};
 use crate::sweep::{Mover, Steps};
-use crate::task::{Budget, Effort, HeightFit};
+use crate::task::Budget;
 use crate::thin::{Shears, Until, is_dearer, thin};
+use crate::tile_mesh::{Layout, NONE, TileMesh};
+use crate::weighted_heights::WeightedHeights;
 
 const RECT: PostRect = PostRect { south: 7, west: -3, north: 67, east: 77 };
 const STEPS: Steps = Steps { inner: 1, pattern: false };
 
 /// Runs a test on rough ground under a grid of lines every 20 posts, with even and with patchy weights.
-fn with_sheet(test: impl Fn(&mut Sheet, &Dem)) {
+fn with_sheet(test: impl Fn(&mut TileMesh, &Dem)) {
     for seed in [1, 2, 3] {
         let dem = rough(RECT, seed);
         for importance in [even(RECT), patchy(RECT, seed)] {
-            let ground = Ground::new(&dem, &importance, SeamSides::CLOSED, HeightFit::Squares);
+            let ground = WeightedHeights::new(&dem, &importance, SeamSides::CLOSED, HeightFit::Squares);
             let hold = |_: &terrain::Vertex| Hold::FREE;
             let layout = Layout { line_step: Some(20 * PER_POST), hold: &hold };
-            let mut sheet = Sheet::new(&ground, &grid(&dem, 4), &layout);
+            let mut sheet = TileMesh::new(&ground, &grid(&dem, 4), &layout);
             test(&mut sheet, &dem);
             assert_eq!(sheet.fault(), None);
         }
@@ -35,7 +35,7 @@ fn with_sheet(test: impl Fn(&mut Sheet, &Dem)) {
 }
 
 /// Posts that all triangles own together, by the rows of each, and by the sums of each.
-fn owned(sheet: &Sheet) -> (Vec<u32>, f64) {
+fn owned(sheet: &TileMesh) -> (Vec<u32>, f64) {
     let mut owners = vec![0; RECT.post_count()];
     let mut count = 0.0;
     for record in sheet.triangles.iter().filter(|record| record.corners[0] != NONE) {
@@ -50,10 +50,10 @@ fn owned(sheet: &Sheet) -> (Vec<u32>, f64) {
 fn every_post_is_owned_once_after_every_kind_of_change() {
     let dem = rough(RECT, 9);
     let importance = even(RECT);
-    let ground = Ground::new(&dem, &importance, SeamSides::OPEN, HeightFit::Squares);
+    let ground = WeightedHeights::new(&dem, &importance, SeamSides::OPEN, HeightFit::Squares);
     let hold = |_: &terrain::Vertex| Hold::FREE;
-    let mut sheet = Sheet::new(&ground, &grid(&dem, 4), &Layout { line_step: None, hold: &hold });
-    let check = |sheet: &Sheet, step: &str| {
+    let mut sheet = TileMesh::new(&ground, &grid(&dem, 4), &Layout { line_step: None, hold: &hold });
+    let check = |sheet: &TileMesh, step: &str| {
         let (owners, count) = owned(sheet);
         assert!(owners.iter().all(|&owners| owners == 1), "{step}");
         assert_eq!(count, RECT.post_count() as f64, "{step}");
@@ -92,13 +92,13 @@ fn whoever_comes_where_a_limit_is_met_takes_somebodys_place() {
     for (per_module, per_window) in [(full, NO_LIMIT), (NO_LIMIT, 4 * full)] {
         let caps = Caps { per_module, per_window, ..no_limit };
         let task = confined(&start, caps, Effort::Normal);
-        let ground = Ground::new(&dem, &importance, SeamSides::CLOSED, HeightFit::Squares);
+        let ground = WeightedHeights::new(&dem, &importance, SeamSides::CLOSED, HeightFit::Squares);
         let hold = |vertex: &terrain::Vertex| match task.held.contains(&vertex.at) {
             true => Hold::PLACE.and(Hold::HEIGHT),
             false => Hold::FREE,
         };
         let layout = Layout { line_step: Some(SIDE * PER_POST), hold: &hold };
-        let mut sheet = Sheet::new(&ground, &start, &layout);
+        let mut sheet = TileMesh::new(&ground, &start, &layout);
         let mut account = Account::new(&task.budget, &sheet);
         let before = sheet.squares();
         let (mut removal, mut insertion) = (Removal::default(), Insertion::default());
@@ -185,7 +185,7 @@ fn a_cost_below_zero_is_not_put_back_for_ever() {
 fn a_triangle_without_posts_is_exactly_nothing() {
     let dem = rough(RECT, 4);
     let importance: Importance = patchy(RECT, 4);
-    let ground = Ground::new(&dem, &importance, SeamSides::OPEN, HeightFit::Squares);
+    let ground = WeightedHeights::new(&dem, &importance, SeamSides::OPEN, HeightFit::Squares);
     let place = crate::place::Place::new;
     let thin = [place(1000, 1010), place(3400, 1012), place(1001, 1020)];
     assert_eq!(ground.moments.triangle(thin), crate::moments::Sums::default());

@@ -11,7 +11,7 @@ use crate::hold::Hold;
 use crate::moments::Sums;
 use crate::place::{PER_POST, Place, Shape};
 use crate::refit::DAMPING;
-use crate::sheet::{Sheet, Star, Vertex, next};
+use crate::tile_mesh::{Star, TileMesh, Vertex, next};
 
 /// Relative and absolute damping of steps in the plane.
 const PLANE_DAMPING: (f64, f64) = (0.01, 0.02);
@@ -88,7 +88,7 @@ impl Mover {
     }
 
     /// Moves every vertex once, or every stirred one. Gives the squares gained.
-    pub fn sweep(&mut self, sheet: &mut Sheet, only_stirred: bool) -> f64 {
+    pub fn sweep(&mut self, sheet: &mut TileMesh, only_stirred: bool) -> f64 {
         self.stirring = STIRRING_SHARE * sheet.squares() / sheet.triangle_count as f64;
         let mut gain = 0.0;
         for vertex in 0..sheet.vertices.len() as u32 {
@@ -101,7 +101,7 @@ impl Mover {
     }
 
     /// Sweeps over all vertices, each followed by flips.
-    pub fn sweep_and_flip(&mut self, sheet: &mut Sheet, sweeps: usize) {
+    pub fn sweep_and_flip(&mut self, sheet: &mut TileMesh, sweeps: usize) {
         for _ in 0..sweeps {
             sheet.stir_all();
             self.sweep(sheet, false);
@@ -111,7 +111,7 @@ impl Mover {
 
     /// Moves one vertex to a better place, if there is one, and to its best height. Gives the squares gained.
     #[inline(always)]
-    pub fn relax(&mut self, sheet: &mut Sheet, vertex: u32) -> f64 {
+    pub fn relax(&mut self, sheet: &mut TileMesh, vertex: u32) -> f64 {
         let record = sheet.vertices[vertex as usize];
         if record.hold.has(Hold::PLACE) {
             return 0.0;
@@ -153,7 +153,7 @@ impl Mover {
     }
 
     /// Moves one vertex to the DEM's height at a place of one's own choice; `false` where it may not stand there.
-    pub fn put(&mut self, sheet: &mut Sheet, vertex: u32, at: Place) -> bool {
+    pub fn put(&mut self, sheet: &mut TileMesh, vertex: u32, at: Place) -> bool {
         let record = sheet.vertices[vertex as usize];
         let strays = || held_to_line(at, record.at, record.hold) != at;
         if record.hold.is_fixed() || strays() || sheet.ground.is_forbidden(at) {
@@ -173,7 +173,7 @@ impl Mover {
     /// `false` where there is none.
     ///
     /// The normal equations say in which order the places are promising, and the first few valid ones are tried.
-    pub fn snap(&mut self, sheet: &mut Sheet, vertex: u32, shape: Shape) -> bool {
+    pub fn snap(&mut self, sheet: &mut TileMesh, vertex: u32, shape: Shape) -> bool {
         let record = sheet.vertices[vertex as usize];
         let step = self.step(sheet, &record);
         if record.hold.is_fixed() || (record.at.x % step == 0 && record.at.y % step == 0) {
@@ -203,7 +203,7 @@ impl Mover {
     }
 
     /// Fills `ranked` with the lattice places around a vertex, the most promising first.
-    fn rank_places(&mut self, sheet: &Sheet, vertex: u32, step: i32) {
+    fn rank_places(&mut self, sheet: &TileMesh, vertex: u32, step: i32) {
         const RINGS: i32 = 2;
         let record = sheet.vertices[vertex as usize];
         let plane = self.normal(sheet, vertex).plane();
@@ -223,14 +223,14 @@ impl Mover {
     }
 
     #[inline(always)]
-    fn step(&self, sheet: &Sheet, record: &Vertex) -> i32 {
+    fn step(&self, sheet: &TileMesh, record: &Vertex) -> i32 {
         let (at, far) = (record.at, sheet.ground.far());
         let is_on_border = at.x == 0 || at.y == 0 || at.x == far.x || at.y == far.y;
         if is_on_border { PER_POST } else { self.steps.inner }
     }
 
     #[inline(always)]
-    fn look_around(&mut self, sheet: &Sheet) {
+    fn look_around(&mut self, sheet: &TileMesh) {
         self.around.clear();
         self.hub = None;
         let look = |&vertex: &u32| (sheet.at(vertex), sheet.vertices[vertex as usize].height);
@@ -264,7 +264,7 @@ impl Mover {
     }
 
     #[inline(always)]
-    fn normal(&self, sheet: &Sheet, vertex: u32) -> Normal {
+    fn normal(&self, sheet: &TileMesh, vertex: u32) -> Normal {
         let record = &sheet.vertices[vertex as usize];
         let crest = record.hold.has(Hold::CREST).then(|| sheet.ground.slope(record.at));
         let mut normal = Normal::default();
@@ -290,7 +290,7 @@ impl Mover {
         normal
     }
 
-    fn find_candidates(&mut self, sheet: &Sheet, record: &Vertex, normal: &Normal) {
+    fn find_candidates(&mut self, sheet: &TileMesh, record: &Vertex, normal: &Normal) {
         let step = self.step(sheet, record);
         let (from, hold) = (record.at, record.hold);
         if let Some((dx, dy)) = normal.step(hold) {
@@ -316,13 +316,13 @@ impl Mover {
     }
 
     #[inline(always)]
-    fn sum_rims(&mut self, sheet: &Sheet) {
+    fn sum_rims(&mut self, sheet: &TileMesh) {
         self.rims.clear();
         self.rims.extend(self.star.edges.iter().map(|&edge| sheet.sums_of(next(edge))));
     }
 
     #[inline(always)]
-    fn sum_spokes(&mut self, sheet: &Sheet, at: Place) {
+    fn sum_spokes(&mut self, sheet: &TileMesh, at: Place) {
         if self.hub != Some(at) {
             self.spokes.clear();
             self.spokes.extend(self.around.iter().map(|&(to, _)| sheet.ground.moments.edge(at, to)));
@@ -338,7 +338,7 @@ impl Mover {
 
     /// What comes of standing at a valid place, at the best height there.
     #[inline(always)]
-    fn stand(&mut self, sheet: &Sheet, at: Place, height: f64, hold: Hold) -> Stand {
+    fn stand(&mut self, sheet: &TileMesh, at: Place, height: f64, hold: Hold) -> Stand {
         self.sum_spokes(sheet, at);
         let height = if hold.has(Hold::CREST) { sheet.ground.height(at) } else { height };
         let mut all = Hinge::default();
@@ -355,7 +355,7 @@ impl Mover {
 
     /// Puts the vertex where it is to stand.
     #[inline(always)]
-    fn settle(&mut self, sheet: &mut Sheet, vertex: u32, stand: Stand) {
+    fn settle(&mut self, sheet: &mut TileMesh, vertex: u32, stand: Stand) {
         let record = &mut sheet.vertices[vertex as usize];
         record.height = stand.height;
         let moved = record.at != stand.at;
@@ -458,7 +458,7 @@ fn held_to_line(to: Place, from: Place, hold: Hold) -> Place {
     Place::new(if hold.has(Hold::COLUMN) { from.x } else { to.x }, if hold.has(Hold::ROW) { from.y } else { to.y })
 }
 
-fn is_inside(sheet: &Sheet, at: Place) -> bool {
+fn is_inside(sheet: &TileMesh, at: Place) -> bool {
     let far = sheet.ground.far();
     0 <= at.x && 0 <= at.y && at.x <= far.x && at.y <= far.y
 }

@@ -1,38 +1,7 @@
 //! What the optimiser is asked to do.
 
 use limits::TileLedger;
-use terrain::{LatticePoint, Post, SeamSides};
-
-/// How much time to spend on one tile.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Effort {
-    /// Moves and flips only.
-    Fast,
-    /// From twice the budget, thinned by true cost, and exchange.
-    Normal,
-    /// As normal from three times the budget, and cycles of growing and thinning.
-    Best,
-}
-
-/// How heights are chosen.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum HeightFit {
-    /// Least squares everywhere.
-    Squares,
-    /// Least squares, but vertices at ridges stand at the DEM's height, so that crests keep hiding what they hide.
-    SquaresKeepCrests,
-    /// Every vertex stands at the DEM's height.
-    Off,
-}
-
-/// Where finished vertices stand.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Lattice {
-    /// On eighths of a post; on the tile's border, on posts.
-    Eighth,
-    /// On posts.
-    Post,
-}
+use terrain::{Effort, HeightFit, Lattice, LatticePoint, Post, SeamSides};
 
 /// What the finished mesh may have.
 #[derive(Clone, Debug)]

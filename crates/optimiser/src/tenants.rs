@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use terrain::{ModuleId, ModuleRect};
 
 use crate::account::Account;
-use crate::sheet::{NONE, Sheet};
+use crate::tile_mesh::{NONE, TileMesh};
 
 /// Vertices by load module; one on a line stands in the first of the two beside it.
 #[derive(Default)]
@@ -15,7 +15,7 @@ pub(crate) struct Tenants {
 
 impl Tenants {
     /// All vertices of a sheet that may go.
-    pub fn new(account: &Account, sheet: &Sheet) -> Self {
+    pub fn new(account: &Account, sheet: &TileMesh) -> Self {
         let mut tenants = Self::default();
         for (vertex, record) in sheet.vertices.iter().enumerate() {
             if record.edge != NONE && !record.hold.is_fixed() {
@@ -26,7 +26,7 @@ impl Tenants {
     }
 
     /// Enters a vertex that has come.
-    pub fn enter(&mut self, account: &Account, sheet: &Sheet, vertex: u32) {
+    pub fn enter(&mut self, account: &Account, sheet: &TileMesh, vertex: u32) {
         if let Some(module) = account.module_of(sheet.at(vertex)) {
             self.by_module.entry(module).or_default().push(vertex);
         }

@@ -1,10 +1,10 @@
 //! Whole runs: what they promise of any mesh they are given.
 
 use proptest::prelude::*;
-use terrain::{Dem, Importance, Post, PostRect};
+use terrain::{Dem, Effort, HeightFit, Importance, Lattice, Post, PostRect};
 
+use crate::optimise;
 use crate::scene::{Caps, confined, even, free, grid, measured, patchy, rough, spent};
-use crate::{Effort, HeightFit, Lattice, optimise};
 
 const RECT: PostRect = PostRect { south: 0, west: 0, north: 80, east: 120 };
 

@@ -4,8 +4,8 @@ use crate::account::Account;
 use crate::patch::Patch;
 use crate::queue::Queue;
 use crate::removal::Removal;
-use crate::sheet::Sheet;
 use crate::sweep::Mover;
+use crate::tile_mesh::TileMesh;
 
 /// A vertex whose surroundings have changed and that became dearer by this part is put back and waits its turn again.
 pub(crate) const DEARER: f64 = 0.02;
@@ -38,7 +38,7 @@ pub(crate) struct Shears<'a> {
 }
 
 /// Removes vertices, the cheapest first; each time the vertices around the hole move at once.
-pub(crate) fn thin(sheet: &mut Sheet, account: &mut Account, until: Until, shears: Shears) {
+pub(crate) fn thin(sheet: &mut TileMesh, account: &mut Account, until: Until, shears: Shears) {
     let Shears { removal, mover, largest } = shears;
     let mut queue = Queue::default();
     let mut is_stale = vec![false; sheet.vertices.len()];
@@ -114,7 +114,7 @@ fn is_done(account: &Account, until: Until, squares: f64) -> bool {
 }
 
 /// Whether the triangles of a patch leave a larger weighted residual somewhere.
-fn leaves_more_than(largest: f64, sheet: &Sheet, patch: &Patch) -> bool {
+fn leaves_more_than(largest: f64, sheet: &TileMesh, patch: &Patch) -> bool {
     let worst = |corners: [u32; 3]| sheet.ground.worst(sheet.places(corners), sheet.heights(corners));
     patch.new.iter().any(|&(corners, _)| worst(corners).is_some_and(|(residual, _)| largest < residual))
 }

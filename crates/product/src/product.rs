@@ -227,7 +227,7 @@ fn measured(modules: &[LoadModule], window: Window, area: &GamingArea, part: Mod
     let mut residuals = vec![NO_RESIDUAL; rect.post_count()];
     // Posts on the northern and eastern side of the part have no owner in it, unless they lie on the area's border.
     let grid = ModuleGrid { rows: part.north, cols: part.east, side_cells: area.grid.side_cells };
-    let measured = fidelity::Ground { grid, ..window.measured(area) };
+    let measured = fidelity::Reference { grid, ..window.measured(area) };
     for module in modules {
         each_residual(module, &measured, |post, residual| residuals[place(rect, post)] = residual);
     }

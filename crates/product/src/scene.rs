@@ -1,7 +1,7 @@
 //! From a database that was read back to what pictures and reports are drawn from.
 
 use database::{Report, ReportPlace, TileState};
-use job::{Count, Job};
+use job::{Choice, Job};
 use terrain::{LoadModule, ModuleId, ModuleRect};
 use views::{Scene, SceneGround, SceneLimits, SceneTile};
 
@@ -30,10 +30,7 @@ impl SceneParts {
             }
         }
         let limits = SceneLimits {
-            count: match limits.count {
-                Count::Triangles => "triangles".into(),
-                Count::Polygons => "polygons".into(),
-            },
+            count: limits.count.name().into(),
             modules: use_of.modules,
             per_load_module: limits.per_load_module,
             window: use_of.window,

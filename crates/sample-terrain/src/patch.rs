@@ -39,7 +39,7 @@ impl Block {
 
     /// Heights in metres at the posts of a patch, row-major.
     pub(crate) fn heights_m(&self, posts: Posts<'_>) -> Vec<f32> {
-        let mut ground: Vec<Ground> = lie(&self.nodes, posts).iter().map(Ground::new).collect();
+        let mut ground: Vec<PostGround> = lie(&self.nodes, posts).iter().map(PostGround::new).collect();
         let mut blend = Blend::of_size(posts.count());
         for (number, octave) in self.octaves.iter().enumerate() {
             octave.blend(posts, &mut blend);
@@ -47,7 +47,7 @@ impl Block {
                 place.cut(number, crest);
             }
         }
-        let mut heights_m: Vec<f32> = ground.iter().map(Ground::height_m).collect();
+        let mut heights_m: Vec<f32> = ground.iter().map(PostGround::height_m).collect();
         for playa in &self.playas {
             playa.fill(self.corner_m, posts, &mut heights_m);
         }
@@ -94,7 +94,7 @@ fn spline(place_m: f32) -> (usize, [f32; 4]) {
 
 /// The ground at one post while drainage is being cut into it.
 #[derive(Clone, Copy, Debug)]
-struct Ground {
+struct PostGround {
     /// Alluvial surface, in metres.
     alluvium_m: f32,
     /// Bedrock above the alluvial surface, in metres; below 0 on fans and in basins.
@@ -107,7 +107,7 @@ struct Ground {
     room: f32,
 }
 
-impl Ground {
+impl PostGround {
     fn new(lie: &Lie) -> Self {
         Self {
             alluvium_m: lie.alluvium_m(),

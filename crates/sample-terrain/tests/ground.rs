@@ -1,5 +1,6 @@
 //! What the sample terrain promises: one ground for every window, and ground that looks like basin and range.
 
+use fastrand::Rng;
 use sample_terrain::{DEFAULT_SEED, HIGHEST_M, LOWEST_M, MOUNTAIN, PLAIN, classes, height_m, heights};
 use terrain::{Dem, Post, PostRect, Spacing, metres_of_quanta};
 
@@ -14,12 +15,6 @@ fn rect(south: i32, west: i32, rows: i32, cols: i32) -> PostRect {
     PostRect::new(Post::new(south, west), Post::new(south + (rows - 1), west + (cols - 1)))
 }
 
-/// A small linear congruential generator: the windows tried are the same in every run.
-fn draw(state: &mut u64, below: u64) -> i32 {
-    *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-    ((*state >> 33) % below) as i32
-}
-
 /// The default seed's 50 km area, at 50 m.
 fn area() -> (PostRect, Dem, Vec<u8>) {
     let rect = PostRect::of_size(1001, 1001);
@@ -32,16 +27,12 @@ fn golden_rects() -> [PostRect; 3] {
 
 #[test]
 fn overlapping_windows_agree_on_the_posts_they_share() {
-    let mut state = 7;
+    let mut draw = Rng::with_seed(7);
     for round in 0..12 {
-        let (south, west) = (draw(&mut state, 4_000) - 2_000, draw(&mut state, 4_000) - 2_000);
-        let one = rect(south, west, 1 + draw(&mut state, 200), 1 + draw(&mut state, 200));
-        let other = rect(
-            south - draw(&mut state, 100),
-            west - draw(&mut state, 100),
-            100 + draw(&mut state, 150),
-            100 + draw(&mut state, 150),
-        );
+        let (south, west) = (draw.i32(0..4_000) - 2_000, draw.i32(0..4_000) - 2_000);
+        let one = rect(south, west, 1 + draw.i32(0..200), 1 + draw.i32(0..200));
+        let other =
+            rect(south - draw.i32(0..100), west - draw.i32(0..100), 100 + draw.i32(0..150), 100 + draw.i32(0..150));
         let shared = one.intersection(&other).expect("the other window reaches the first one's corner");
         let (a, b) = (heights(3, one, spacing(25.0)), heights(3, other, spacing(25.0)));
         assert_eq!(a.window(shared), b.window(shared), "round {round}: {one:?} and {other:?}");

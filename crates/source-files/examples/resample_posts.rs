@@ -7,8 +7,8 @@ use std::io::Write;
 use std::path::Path;
 use std::time::Instant;
 
-use source_files::{Crs, DemFile, Mosaic, MosaicRules, MosaicVoids, Reading, Resampling, Standing};
-use terrain::{GridFrame, Post, PostRect, Spacing};
+use source_files::{Crs, DemFile, Mosaic, MosaicRules, MosaicVoids, Reading, Standing};
+use terrain::{GridFrame, Post, PostRect, Resampling, Spacing};
 
 fn main() -> std::io::Result<()> {
     let words: Vec<String> = std::env::args().skip(1).collect();

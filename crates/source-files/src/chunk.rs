@@ -18,6 +18,9 @@ pub(crate) struct Header {
     pub shift: Option<DatumShift>,
 }
 
+/// Where the posts of a raster lie, what its samples are, and how they come to the datum that is wanted.
+pub(crate) type Meaning<'a> = (&'a RasterFrame, (SampleScale, &'a Option<DatumShift>));
+
 /// One strip or tile, or a run of rows or columns, decoded.
 #[derive(Debug)]
 pub struct Chunk {

@@ -9,7 +9,7 @@ use crate::chunk::{Chunk, Header};
 use crate::crs::Crs;
 use crate::dted::{self, Dted};
 use crate::error::A_JOB;
-use crate::features::OSM_MARK;
+use crate::features::osm::frames::MARK as OSM_MARK;
 use crate::frame::{Axes, Facts};
 use crate::geotiff::{FileDecoder, GeoTiff};
 use crate::rows::Rows;

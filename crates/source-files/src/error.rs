@@ -26,9 +26,6 @@ pub enum SourceError {
     /// The file could be opened but not read on.
     #[error("{path}: reading stopped: {source}")]
     Read { path: PathBuf, source: io::Error },
-    /// The file could not be written.
-    #[error("{path}: writing stopped: {source}")]
-    Write { path: PathBuf, source: io::Error },
 
     // The file is broken.
     /// The first bytes are not those of a TIFF.
@@ -273,7 +270,6 @@ impl SourceError {
             NotAFile { .. } => "it cannot be read twice: copy what it gives into a file",
             Empty { .. } => "the file was not copied or unpacked whole; fetch it again",
             Changed { .. } => "leave sources alone during a build; run the same command again",
-            Write { .. } => "check that the folder exists, is writable and has room; nothing was left half-written",
             Read { .. } | Truncated { .. } | Malformed { .. } | BrokenChunk { .. } => {
                 "the file is damaged or was not copied whole; fetch it again"
             }

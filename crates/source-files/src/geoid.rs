@@ -1,64 +1,33 @@
 //! Geoid grids: how far the zero of a vertical datum lies above the ellipsoid, by longitude and latitude.
 //!
-//! A grid of NOAA's `.gtx` kind, or a raster in degrees. Heights change from one datum to another by the difference
-//! of two grids; heights above the ellipsoid need one.
+//! Heights change from one datum to another by the difference of two grids; heights above the ellipsoid need one.
 
-use std::path::Path;
 use std::sync::Arc;
 
 use terrain::{GridFrame, Post, PostRect, QUANTA_PER_METRE};
 
-use crate::chunk::Header;
+use crate::RasterFrame;
 use crate::crs::Crs;
-use crate::directory::SampleKind;
-use crate::frame::{Axes, SampleScale};
-use crate::join::union;
-use crate::limits::POSTS_A_SIDE_MAX;
-use crate::samples::Samples;
-use crate::store::Store;
-use crate::{DemFile, Raster, RasterFrame, Reading, SourceError};
-
-/// Bytes before the values of a `.gtx` grid: south, west, steps north and east; rows and columns.
-const GTX_HEADER: u64 = 40;
-/// What marks a post without a value there.
-const GTX_VOID: f64 = -88.8888;
-/// No geoid lies farther from the ellipsoid, in metres.
-const GEOID_M_MAX: f64 = 200.0;
+use crate::frame::SampleScale;
+use crate::samples::{Samples, union};
+use crate::void_posts::VoidPosts;
 
 /// Heights of a datum's zero above the ellipsoid, as far as they were read.
 #[derive(Debug)]
 pub struct Geoid {
-    raster: Raster,
+    /// In degrees.
+    pub(crate) frame: RasterFrame,
+    pub(crate) scale: SampleScale,
+    /// The posts that were read.
+    pub(crate) window: PostRect,
+    pub(crate) samples: Samples,
+    pub(crate) voids: VoidPosts,
 }
 
 impl Geoid {
-    /// Reads the rows of the grid at `path` between two latitudes.
-    ///
-    /// # Errors
-    /// When it is no such grid, or has no row there.
-    pub fn read(path: &Path, south: f64, north: f64) -> Result<Self, SourceError> {
-        let store = Store::open(path)?;
-        let start = store.start(GTX_HEADER)?;
-        let raster = match Gtx::judged(&store, &start) {
-            Some(gtx) => gtx.read(&store, south, north)?,
-            None => {
-                let reading = Reading { crs: Some(Crs::wgs84()), ..Reading::AS_IT_SAYS };
-                let file = DemFile::open(path, &reading)?;
-                file.read(rows_between(file.frame(), south, north)?)?
-            }
-        };
-        match raster.range_m() {
-            Some((low, high)) if -GEOID_M_MAX <= low && high <= GEOID_M_MAX => Ok(Self { raster }),
-            found => {
-                let found = found.map_or("nothing".into(), |(low, high)| format!("{low} to {high} m"));
-                Err(store.malformed("the geoid grid", found, "heights within 200 m of the ellipsoid"))
-            }
-        }
-    }
-
     /// The height of the datum's zero above the ellipsoid, in metres; `None` where the grid has none.
     pub fn height_m(&self, [east, north]: [f64; 2]) -> Option<f64> {
-        let frame = self.raster.frame();
+        let frame = &self.frame;
         let cols = i64::from(frame.cols);
         let around = 360.0 / frame.spacing[0];
         let is_global = around - 1.5 <= cols as f64;
@@ -69,7 +38,7 @@ impl Geoid {
         let corner = |up: i64, right: i64| {
             let col = if is_global { (col + right) % (around.round() as i64).min(cols) } else { col + right };
             let post = Post::new(i32::try_from(row + up).ok()?, i32::try_from(col).ok()?);
-            if self.raster.window().contains(post) { self.raster.height_m(post) } else { None }
+            self.at(post)
         };
         let (right, up) = (x - x.floor(), y - y.floor());
         // A post without weight is not looked at: it may lie beyond the grid.
@@ -82,58 +51,26 @@ impl Geoid {
             false => row_at(0),
         }
     }
+
+    /// The height at a post; `None` where the grid has none, or was not read.
+    fn at(&self, post: Post) -> Option<f64> {
+        if !self.window.contains(post) {
+            return None;
+        }
+        let index = self.window.index(post);
+        (!self.voids.contains(index)).then(|| self.scale.height_m(self.samples.get(index)))
+    }
 }
 
-/// The rows of a raster in degrees from one latitude to another, with two around them.
-fn rows_between(frame: &RasterFrame, south: f64, north: f64) -> Result<PostRect, SourceError> {
-    let row = |latitude: f64| (latitude - frame.south_west[1]) / frame.spacing[1];
-    let (first, last) = (row(south).floor() - 2.0, row(north).ceil() + 2.0);
-    let (first, last) = (first.max(0.0), last.min(f64::from(frame.rows - 1)));
-    if last < first {
-        return Err(SourceError::OutsideArea { path: frame.path.clone() });
-    }
-    Ok(PostRect { south: first as i32, west: 0, north: last as i32, east: frame.cols as i32 - 1 })
-}
-
-/// The header of a `.gtx` grid.
-struct Gtx {
-    south_west: [f64; 2],
-    step: [f64; 2],
-    cols: u32,
-    rows: u32,
-}
-
-impl Gtx {
-    /// The header, if the numbers are those of such a grid and the file is as long as they say: it has no mark.
-    fn judged(store: &Store, start: &[u8]) -> Option<Self> {
-        let number = |at: usize| Some(f64::from_be_bytes(start.get(at..at + 8)?.try_into().ok()?));
-        let count = |at: usize| Some(u32::from_be_bytes(start.get(at..at + 4)?.try_into().ok()?));
-        let (south_west, step) = ([number(8)?, number(0)?], [number(24)?, number(16)?]);
-        let (rows, cols) = (count(32)?, count(36)?);
-        let sides = [rows, cols].iter().all(|&side| 2 <= side && u64::from(side) <= POSTS_A_SIDE_MAX);
-        let posts = u64::from(rows) * u64::from(cols);
-        let bytes = posts.checked_mul(4).and_then(|bytes| bytes.checked_add(GTX_HEADER));
-        let place = south_west[1].abs() <= 90.0 && south_west[0].abs() <= 360.0;
-        let steps = step.iter().all(|&step| 0.0 < step && step <= 10.0);
-        (sides && bytes == Some(store.len()) && place && steps).then_some(Self { south_west, step, cols, rows })
-    }
-
-    fn read(&self, store: &Store, south: f64, north: f64) -> Result<Raster, SourceError> {
-        let axes = Axes { first: self.south_west, step: self.step };
-        let (frame, _) = RasterFrame::new(store.path(), Crs::wgs84(), &axes, self.cols, self.rows)?;
-        let window = rows_between(&frame, south, north)?;
-        let (at, row_bytes) = (GTX_HEADER + window.south as u64 * u64::from(self.cols) * 4, self.cols as usize * 4);
-        let bytes = store.bytes_at(&mut store.handle()?, at, row_bytes * window.posts_high())?;
-        let samples = Samples::from_bytes(SampleKind::F32, true, &bytes);
-        let (scale, kind, nodata) = (SampleScale::METRES, SampleKind::F32, Some(GTX_VOID));
-        Raster::of_samples(&Header { frame, scale, kind, nodata, shift: None }, window, samples, Vec::new())
-    }
+/// A datum's name without what people write differently: `EGM 96` is `egm96`.
+pub fn plain_datum(name: &str) -> String {
+    name.chars().filter(char::is_ascii_alphanumeric).collect::<String>().to_ascii_lowercase()
 }
 
 /// How heights above one datum become heights above another.
 #[derive(Clone, Debug)]
 pub struct DatumShift {
-    /// The datums' names, for comparing.
+    /// The datums' names, as [`plain_datum`] has them.
     pub from: String,
     /// As `from`.
     pub to: String,

@@ -10,7 +10,8 @@ use rusqlite::{Connection, OpenFlags, OptionalExtension, Row};
 
 use crate::SourceError;
 use crate::crs::Crs;
-use crate::features::{Part, RawShape, geometry};
+use crate::features::raw::{Part, RawShape};
+use crate::features::well_known::geometry;
 use crate::limits::{LAYERS_MAX, ROWS_MAX};
 
 /// How every one begins.

@@ -2,13 +2,23 @@
 
 use terrain::{Post, PostRect};
 
-use crate::chunk::Header;
+use crate::chunk::{Header, Meaning};
 use crate::directory::SampleKind;
-use crate::samples::Samples;
-use crate::{DatumShift, Raster, RasterFrame, SampleScale, SourceError, Standing};
+use crate::samples::{Samples, union};
+use crate::{Raster, RasterFrame, SourceError};
 
-/// Where the posts of a raster lie, what its samples are, and how they come to the datum that is wanted.
-pub(crate) type Meaning<'a> = (&'a RasterFrame, (SampleScale, &'a Option<DatumShift>));
+/// Whether a post has a height, and of which kind; a blend is the worst of its posts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Standing {
+    /// As the source has it.
+    Height,
+    /// Filled in from around a void.
+    Filled,
+    /// A void of a source.
+    Void,
+    /// In no source.
+    Gap,
+}
 
 /// Whether a raster continues another's grid: same system, spacing and meaning of samples, whole posts apart.
 pub(crate) fn fits((a, first): Meaning, (b, other): Meaning) -> bool {
@@ -64,11 +74,6 @@ pub(crate) fn join(mut rasters: Vec<Raster>) -> Result<(Raster, Vec<Standing>), 
         standings.clear();
     }
     Ok((raster, standings))
-}
-
-/// The range of what lies in either of two.
-pub(crate) fn union((low, high): (f64, f64), (lower, higher): (f64, f64)) -> (f64, f64) {
-    (low.min(lower), high.max(higher))
 }
 
 /// The type that holds samples of several.

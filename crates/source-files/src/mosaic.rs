@@ -5,23 +5,14 @@
 //! working grid is decided by itself, so it does not depend on the window asked for.
 
 use geometry::resample::{TAP_UNITS, rounded};
-use terrain::{Dem, GridFrame, Post, PostRect, QUANTA_PER_METRE};
+use terrain::{Dem, GridFrame, Post, PostRect, QUANTA_PER_METRE, Resampling};
 
 use crate::crs::Crs;
 use crate::geoid::Shifts;
-use crate::join::{fits, join, union};
-use crate::samples::{Sample, each};
+use crate::join::{Standing, fits, join};
+use crate::samples::{Sample, each, union};
 use crate::warp::{Place, Warp};
 use crate::{DatumShift, DemFile, Raster, RasterFrame, SourceError};
-
-/// How a height between posts comes about.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Resampling {
-    /// From the four posts around it.
-    Bilinear,
-    /// From the sixteen posts around it, where all have heights: a smooth surface through the posts.
-    Cubic,
-}
 
 /// What becomes of voids in a mosaic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,19 +32,6 @@ pub struct MosaicRules {
     pub feather_m: f64,
     /// What becomes of voids.
     pub voids: MosaicVoids,
-}
-
-/// Whether a post has a height, and of which kind; a blend is the worst of its posts.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Standing {
-    /// As the source has it.
-    Height,
-    /// Filled in from around a void.
-    Filled,
-    /// A void of a source.
-    Void,
-    /// In no source.
-    Gap,
 }
 
 /// Files of one grid, as one raster.
@@ -270,9 +248,7 @@ impl Patch {
         if self.standings.iter().all(|&standing| standing <= Standing::Filled) {
             return Dem::from_rows(self.rect, &self.heights);
         }
-        let index = |post: Post| {
-            (post.row - self.rect.south) as usize * self.rect.posts_wide() + (post.col - self.rect.west) as usize
-        };
+        let index = |post: Post| self.rect.index(post);
         let known = |post| self.standings[index(post)] <= Standing::Filled;
         let mut dem = Dem::from_fn(self.rect, |post| known(post).then(|| self.heights[index(post)]));
         dem.fill_voids(|post| self.heights[index(post)]);

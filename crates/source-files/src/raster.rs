@@ -4,11 +4,11 @@ use std::sync::Arc;
 
 use terrain::{Post, PostRect};
 
-use crate::chunk::{Chunk, Header};
+use crate::chunk::{Chunk, Header, Meaning};
 use crate::frame::{RasterFrame, SampleScale};
-use crate::join::Meaning;
 use crate::limits::HEIGHT_M_MAX;
 use crate::samples::Samples;
+use crate::void_posts::VoidPosts;
 use crate::{DatumShift, SourceError};
 
 /// The posts of a window of a raster. Posts are counted from the south-west post of the whole raster.
@@ -18,43 +18,11 @@ pub struct Raster {
     pub(crate) scale: SampleScale,
     pub(crate) window: PostRect,
     pub(crate) samples: Samples,
-    pub(crate) voids: Voids,
+    pub(crate) voids: VoidPosts,
     /// How its heights become those above the datum that is wanted.
     pub(crate) shift: Option<DatumShift>,
     range_m: Option<(f64, f64)>,
     notes: Vec<String>,
-}
-
-/// Which posts of a window are void.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Voids {
-    /// One bit per post, row-major; empty when none is void.
-    bits: Vec<u64>,
-    pub count: usize,
-    /// Whether void posts hold a height that keeps the mesh defined.
-    pub settled: bool,
-}
-
-impl Voids {
-    pub(crate) fn contains(&self, index: usize) -> bool {
-        !self.bits.is_empty() && self.bits[index / 64] >> (index % 64) & 1 == 1
-    }
-
-    fn mark(&mut self, index: usize) {
-        self.bits[index / 64] |= 1 << (index % 64);
-        self.count += 1;
-    }
-
-    pub(crate) fn clear(&mut self) {
-        *self = Voids { settled: true, ..Voids::default() };
-    }
-
-    /// Indices of the void posts, ascending.
-    pub(crate) fn iter(&self) -> impl Iterator<Item = usize> {
-        let words = self.bits.iter().enumerate().filter(|&(_, &word)| word != 0);
-        words
-            .flat_map(|(place, &word)| (0..64).filter(move |bit| word >> bit & 1 == 1).map(move |bit| place * 64 + bit))
-    }
 }
 
 impl Raster {
@@ -89,9 +57,11 @@ impl Raster {
         notes: Vec<String>,
     ) -> Result<Self, SourceError> {
         let survey = samples.survey(header.nodata);
-        let mut voids = Voids { settled: survey.voids == 0, ..Voids::default() };
-        if 0 < survey.voids {
-            voids.bits = vec![0; window.post_count().div_ceil(64)];
+        let mut voids = VoidPosts::default();
+        if survey.voids == 0 {
+            voids.clear();
+        } else {
+            voids = VoidPosts::among(window.post_count());
             samples.visit_voids(header.nodata, |index| voids.mark(index));
         }
         let scale = header.scale;
@@ -112,7 +82,7 @@ impl Raster {
         missing: impl Iterator<Item = usize>,
         range_m: Option<(f64, f64)>,
     ) -> Self {
-        let mut voids = Voids { bits: vec![0; window.post_count().div_ceil(64)], ..Voids::default() };
+        let mut voids = VoidPosts::among(window.post_count());
         missing.for_each(|index| voids.mark(index));
         voids.settled = voids.count == 0;
         let (frame, scale, shift) = (header.frame.clone(), header.scale, header.shift.clone());
@@ -177,8 +147,7 @@ impl Raster {
     /// When `post` lies outside the window.
     pub fn sample(&self, post: Post) -> Option<f64> {
         assert!(self.window.contains(post), "post {post} lies outside the window");
-        let (row, col) = (post.row - self.window.south, post.col - self.window.west);
-        let index = row as usize * self.window.posts_wide() + col as usize;
+        let index = self.window.index(post);
         (!self.voids.contains(index)).then(|| self.samples.get(index))
     }
 

@@ -77,6 +77,11 @@ pub(crate) struct Survey {
     pub range: Option<(f64, f64)>,
 }
 
+/// The range of what lies in either of two.
+pub(crate) fn union((low, high): (f64, f64), (lower, higher): (f64, f64)) -> (f64, f64) {
+    (low.min(lower), high.max(higher))
+}
+
 impl Samples {
     pub(crate) fn zeroed(kind: SampleKind, count: usize) -> Self {
         match kind {

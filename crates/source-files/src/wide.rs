@@ -7,9 +7,9 @@ use terrain::{GridFrame, PostRect, QUANTA_PER_METRE};
 
 use crate::chunk::Header;
 use crate::crs::Crs;
-use crate::join::{Extent, common_kind, fits, offset, shifted, union};
+use crate::join::{Extent, common_kind, fits, offset, shifted};
 use crate::mosaic::{Beyond, Corner, Layer, MARGIN};
-use crate::samples::Samples;
+use crate::samples::{Samples, union};
 use crate::warp::Warp;
 use crate::{Mosaic, MosaicRules, Patch, Raster, SourceError, Standing, Windows};
 
@@ -108,11 +108,11 @@ impl WideMosaic {
             let rects = joint.members.iter().map(|&(file, shift)| shifted(self.windows.files()[file].rect(), shift));
             let rects: Vec<PostRect> = rects.filter(|rect| rect.intersection(&window).is_some()).collect();
             let holds = |post: terrain::Post| rects.iter().any(|rect| rect.contains(post));
-            for (post, standing) in posts(rect).zip(&mut patch.standings) {
+            for (post, standing) in rect.posts().zip(&mut patch.standings) {
                 if *standing == Standing::Gap
                     && let Some(place) = places.at(post.row, post.col)
                     && let Some(corner) = Corner::around(place, &joint.header.frame, joint.rect())
-                    && posts(corner.posts()).all(holds)
+                    && corner.posts().posts().all(holds)
                 {
                     *standing = Standing::Height;
                 }
@@ -137,7 +137,7 @@ impl WideMosaic {
         let lowest = (joint.lowest_m / scale.unit_m - scale.offset) / scale.scale;
         for block in blocks(window) {
             let cut = block.intersection(&window).expect("blocks touch their window");
-            if posts(cut).all(|post| standings[index(window, post)] < Standing::Void) {
+            if cut.posts().all(|post| standings[window.index(post)] < Standing::Void) {
                 continue;
             }
             let around = block.grown(reach).intersection(&joint.rect()).expect("a block lies in its raster");
@@ -148,8 +148,8 @@ impl WideMosaic {
                     near_standings[index] = Standing::Filled;
                 }
             }
-            for post in posts(cut) {
-                let (at, from) = (index(window, post), index(around, post));
+            for post in cut.posts() {
+                let (at, from) = (window.index(post), around.index(post));
                 if Standing::Void <= standings[at] {
                     standings[at] = near_standings[from];
                     raster.samples.set(at, if is_known { near.samples.get(from) } else { lowest });
@@ -196,9 +196,9 @@ impl Joint {
             let Some(cut) = shifted(windows.files()[file].rect(), shift).intersection(&window) else { continue };
             let raster = windows.read(file, shifted(cut, shift.map(|posts| -posts)))?;
             range_m = [range_m, raster.range_m()].into_iter().flatten().reduce(union);
-            for (from, post) in posts(cut).enumerate() {
+            for (from, post) in cut.posts().enumerate() {
                 let standing = if raster.voids.contains(from) { Standing::Void } else { Standing::Height };
-                let at = index(window, post);
+                let at = window.index(post);
                 if standing < standings[at] {
                     standings[at] = standing;
                     // What marks a void is a number in this file only.
@@ -215,14 +215,6 @@ impl Joint {
         }
         Ok((raster, standings))
     }
-}
-
-fn posts(rect: PostRect) -> impl Iterator<Item = terrain::Post> {
-    (rect.south..=rect.north).flat_map(move |row| (rect.west..=rect.east).map(move |col| terrain::Post::new(row, col)))
-}
-
-fn index(rect: PostRect, post: terrain::Post) -> usize {
-    (post.row - rect.south) as usize * rect.posts_wide() + (post.col - rect.west) as usize
 }
 
 /// The blocks that touch a window.

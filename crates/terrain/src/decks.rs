@@ -36,6 +36,20 @@ pub enum DeckFault {
     HoleClass(usize),
 }
 
+impl std::fmt::Display for DeckFault {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Inconsistent => f.write_str("lists that belong together differ in length, or are too long"),
+            Self::VertexOutside(vertex) => write!(f, "vertex {vertex} lies beyond a side"),
+            Self::VertexUnused(vertex) => write!(f, "vertex {vertex} is the corner of no triangle"),
+            Self::NotCanonical => f.write_str("vertices or triangles are out of order, or listed twice"),
+            Self::NoSuchVertex(triangle) => write!(f, "triangle {triangle} names a vertex that is not there"),
+            Self::NotCounterClockwise(triangle) => write!(f, "triangle {triangle} is clockwise or upright"),
+            Self::HoleClass(triangle) => write!(f, "triangle {triangle} has the class of holes"),
+        }
+    }
+}
+
 impl Decks {
     /// Decks in canonical order from triangles in any, each with its corners and its class. Equal corners are joined,
     /// and of triangles with the same corners the one of the lowest class stays.

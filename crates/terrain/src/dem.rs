@@ -104,7 +104,7 @@ impl Dem {
     }
 
     fn bit(&self, post: Post) -> usize {
-        (post.row - self.rect.south) as usize * self.rect.posts_wide() + (post.col - self.rect.west) as usize
+        self.rect.index(post)
     }
 
     fn mark_void(&mut self, post: Post) {

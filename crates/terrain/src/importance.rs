@@ -80,7 +80,7 @@ impl Importance {
 
     fn index(&self, post: Post) -> usize {
         debug_assert!(self.rect.contains(post), "post {post} lies outside the mask window");
-        (post.row - self.rect.south) as usize * self.rect.posts_wide() + (post.col - self.rect.west) as usize
+        self.rect.index(post)
     }
 
     /// A copy of part of this window.

@@ -73,7 +73,21 @@ pub enum LoadModuleFault {
 
 impl std::fmt::Display for LoadModuleFault {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{self:?}")
+        match self {
+            Self::NoSuchVertex(triangle) => write!(f, "triangle {triangle} names a vertex that is not there"),
+            Self::VertexOutside(vertex) => write!(f, "vertex {vertex} lies beyond a side"),
+            Self::NotCounterClockwise(triangle) => write!(f, "triangle {triangle} is clockwise or has no area"),
+            Self::NotCanonical => f.write_str("vertices or triangles are out of order, or listed twice"),
+            Self::Inconsistent => f.write_str("lists that belong together differ in length"),
+            Self::AreaMissing(found, expected) => {
+                write!(f, "triangles cover {found} half squares of a quantum, expected {expected}")
+            }
+            Self::Crack([a, b]) => {
+                let (from, to) = (format!("{},{}", a.x, a.y), format!("{},{}", b.x, b.y));
+                write!(f, "the edge {from} to {to} (quanta east, north) is not shared by two triangles")
+            }
+            Self::InDecks(fault) => write!(f, "decks: {fault}"),
+        }
     }
 }
 

@@ -107,6 +107,23 @@ impl PostRect {
         self.south <= post.row && post.row <= self.north && self.west <= post.col && post.col <= self.east
     }
 
+    /// Every post, row by row from the south-west.
+    pub fn posts(&self) -> impl Iterator<Item = Post> + use<> {
+        let Self { south, west, north, east } = *self;
+        (south..=north).flat_map(move |row| (west..=east).map(move |col| Post::new(row, col)))
+    }
+
+    /// Place of a post that lies inside among [`PostRect::posts`].
+    #[inline]
+    pub fn index(&self, post: Post) -> usize {
+        (post.row - self.south) as usize * self.posts_wide() + (post.col - self.west) as usize
+    }
+
+    /// Whether a post of it lies on a border line.
+    pub fn has_on_border(&self, post: Post) -> bool {
+        post.row == self.south || post.row == self.north || post.col == self.west || post.col == self.east
+    }
+
     /// Whether all of `other` lies inside.
     pub fn contains_rect(&self, other: &PostRect) -> bool {
         self.contains(other.south_west()) && self.contains(other.north_east())

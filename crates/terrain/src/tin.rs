@@ -26,6 +26,9 @@ pub struct Tin {
     pub triangles: Vec<[u32; 3]>,
 }
 
+/// Triangles any point adds in all: two inside a load module, or one on each side of a line.
+pub const POINT_COST: u32 = 2;
+
 /// What is wrong with a TIN.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum TinFault {
@@ -45,7 +48,21 @@ pub enum TinFault {
 
 impl std::fmt::Display for TinFault {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{self:?}")
+        let place = |at: &LatticePoint| format!("{},{}", at.row, at.col);
+        match self {
+            Self::NoSuchVertex(triangle) => write!(f, "triangle {triangle} names a vertex that is not there"),
+            Self::VertexOutside(vertex) => write!(f, "vertex {vertex} lies outside the tile"),
+            Self::NotCounterClockwise(triangle) => write!(f, "triangle {triangle} is clockwise or has no area"),
+            Self::EdgeUsedTwice([a, b]) => {
+                write!(f, "two triangles lie on one side of the edge {} to {} (row, column)", place(a), place(b))
+            }
+            Self::Crack([a, b]) => {
+                write!(f, "the edge {} to {} (row, column) is not shared by two triangles", place(a), place(b))
+            }
+            Self::AreaMissing(found, expected) => {
+                write!(f, "triangles cover {found} half squares of a step, expected {expected}")
+            }
+        }
     }
 }
 

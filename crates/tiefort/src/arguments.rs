@@ -2,8 +2,10 @@
 
 use std::path::PathBuf;
 
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
-use job::{Job, StartMethod};
+use exports::Coordinates;
+use job::{Choice, Job, StartMethod};
 use terrain::TileId;
 
 use crate::resources;
@@ -111,6 +113,24 @@ pub fn rows_by_columns(text: &str) -> Result<(u32, u32), String> {
     }
 }
 
+/// What the coordinates of a mesh are counted from.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum MeshOrigin {
+    /// The south-west corner of what is written
+    Local,
+    /// The map's origin
+    Map,
+}
+
+impl From<MeshOrigin> for Coordinates {
+    fn from(origin: MeshOrigin) -> Self {
+        match origin {
+            MeshOrigin::Local => Coordinates::Local,
+            MeshOrigin::Map => Coordinates::Map,
+        }
+    }
+}
+
 /// Reads a finite number above zero.
 ///
 /// # Errors
@@ -125,9 +145,8 @@ pub fn positive(text: &str) -> Result<f64, String> {
 /// Reads `METHOD:N`, or `METHOD` alone of one whose number is the ground's choice.
 pub fn start_method(text: &str) -> Result<(StartMethod, Option<usize>), String> {
     let (name, points) = text.split_once(':').map_or((text, None), |(name, points)| (name, Some(points)));
-    let found = StartMethod::NAMED.iter().find(|(known, _)| *known == name).map(|&(_, method)| method);
-    let names = || StartMethod::NAMED.map(|(name, _)| name).join(", ");
-    let method = found.ok_or_else(|| format!("expected METHOD:N with one of {}", names()))?;
+    let method =
+        *StartMethod::named(name).ok_or_else(|| format!("expected METHOD:N with one of {}", start_methods()))?;
     match (method, points) {
         (StartMethod::HighLow, None) => Ok((method, None)),
         (StartMethod::HighLow, Some(_)) => Err("expected highlow alone: it takes all peaks and pits".into()),
@@ -137,6 +156,18 @@ pub fn start_method(text: &str) -> Result<(StartMethod, Option<usize>), String> 
             Ok((method, Some(points)))
         }
     }
+}
+
+/// The names of the methods that a mesh can start from.
+pub fn start_methods() -> String {
+    StartMethod::WORDS.iter().map(|word| word.name).collect::<Vec<_>>().join(", ")
+}
+
+/// Reads one of the words of a job's setting; help lists them with their meanings.
+pub fn choice<T: Choice + Clone + Send + Sync>() -> impl TypedValueParser<Value = T> {
+    let words = T::WORDS.iter().map(|word| PossibleValue::new(word.name).help(word.text()));
+    PossibleValuesParser::new(words)
+        .map(|name| T::named(&name).expect("only words of the setting are possible").clone())
 }
 
 #[cfg(test)]

@@ -1,5 +1,6 @@
 //! The clock of this machine.
 
+use std::thread;
 use std::time::{Duration, Instant};
 
 use compiler::Clock;
@@ -31,5 +32,9 @@ impl Clock for SystemClock {
 
     fn cpu(&self) -> Duration {
         self.cpu.elapsed()
+    }
+
+    fn wait(&self, time: Duration) {
+        thread::sleep(time);
     }
 }

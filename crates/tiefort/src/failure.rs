@@ -11,7 +11,7 @@ use exports::ExportError;
 use job::JobError;
 use product::ProductError;
 
-use crate::terminal;
+use crate::terminal::{self, NotPrinted};
 
 /// How a command ended that did its work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -118,6 +118,12 @@ impl fmt::Display for Failure {
         let fallback = "check the path named above, its permissions, and the room on its disk";
         let (message, hint) = (&self.message, self.hint.as_deref().unwrap_or(fallback));
         write!(f, "error: {}\nhint: {}", terminal::short(message), terminal::short(hint))
+    }
+}
+
+impl From<NotPrinted> for Failure {
+    fn from(NotPrinted(error): NotPrinted) -> Self {
+        Self::output(Path::new("stdout"), &error)
     }
 }
 

@@ -9,7 +9,7 @@ use tempfile::NamedTempFile;
 use crate::failure::Failure;
 use crate::left_over;
 
-/// Writes a file that appears under its name only when it is whole.
+/// Writes a file that appears under its name only when it is whole, and on the disk.
 ///
 /// # Errors
 /// When it cannot be written; what lay there before is then still there.
@@ -36,6 +36,7 @@ pub fn write_whole_or(
     write(&mut out)?;
     out.flush().map_err(fault)?;
     drop(out);
+    file.as_file().sync_all().map_err(fault)?;
     file.persist(path).map_err(|error| fault(error.error))?;
     Ok(())
 }

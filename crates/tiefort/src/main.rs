@@ -35,6 +35,8 @@ mod run;
 mod signals;
 mod steps;
 mod terminal;
+#[cfg(test)]
+mod tests;
 #[cfg(feature = "viewer")]
 mod viewer;
 
@@ -97,17 +99,5 @@ fn main() -> ExitCode {
         Ok(Ok(outcome)) => outcome.into(),
         Ok(Err(failure)) => failure.tell(),
         Err(_) => failure::Failure::bug().tell(),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use clap::CommandFactory;
-
-    use super::*;
-
-    #[test]
-    fn the_arguments_of_all_commands_are_consistent() {
-        Cli::command().debug_assert();
     }
 }

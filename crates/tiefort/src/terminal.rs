@@ -1,25 +1,26 @@
 //! The two streams: data to stdout, everything else to stderr.
 
 use std::borrow::Cow;
-use std::io::{ErrorKind, IsTerminal, Write, stderr, stdout};
-use std::path::Path;
+use std::io::{self, ErrorKind, IsTerminal, Write, stderr, stdout};
 
 use serde_json::Value;
 use views::fold;
 
-use crate::failure::Failure;
-
 /// How far a line goes on to the right of where it began.
 const HANG: usize = 2;
+
+/// Why data did not go to stdout.
+#[derive(Debug)]
+pub struct NotPrinted(pub io::Error);
 
 /// Prints data to stdout. A reader that has gone away (`| head`) has seen enough, so that is no failure.
 ///
 /// # Errors
 /// When stdout cannot be written to for another reason, such as a full disk.
-pub fn print(text: &str) -> Result<(), Failure> {
+pub fn print(text: &str) -> Result<(), NotPrinted> {
     let mut out = stdout().lock();
     match out.write_all(plain(text).as_bytes()).and_then(|()| out.flush()) {
-        Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(Failure::output(Path::new("stdout"), &error)),
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(NotPrinted(error)),
         _ => Ok(()),
     }
 }

@@ -5,10 +5,10 @@
 //! keep an equal part of their room free for each side they inherit; windows that several tiles can reach
 //! are divided into quotas. Every sum over tiles then respects every limit.
 
-use limits::{Allowance, POINT_COST};
-use terrain::{GainCurve, ModuleId, ModuleRect, Side};
+use limits::Allowance;
+use terrain::{GainCurve, ModuleId, ModuleRect, POINT_COST, Side};
 
-use crate::points::highest_rung;
+use crate::gains::{Gains, highest_rung};
 use crate::{Budget, Tiling};
 
 /// How the area's budget was shared out.
@@ -32,20 +32,6 @@ pub struct Share {
     pub allowance: Allowance,
     /// What the survey expects it to spend; equal to the whole share without one.
     pub expected: u32,
-}
-
-/// What the surveys say, the best first.
-///
-/// The curves of a large area do not fit into memory together, so they come in bands: each holds one curve per tile,
-/// row-major, with all its runs on some steps of the ladder, which are higher than those of the next band. A band is
-/// asked for when all before it have been taken.
-pub struct Gains<'a> {
-    /// The bands; costs in triangles, or in points where points are shared out.
-    pub bands: &'a mut dyn Iterator<Item = Vec<GainCurve>>,
-    /// Tiles from the lowest rank, by row-major place.
-    pub by_rank: &'a [usize],
-    /// Gains below this step of the ladder are not wanted: the RMS residual asked for is reached without them.
-    pub floor: Option<i32>,
 }
 
 /// Part of the budget that may be left over rather than cut a rung in two.

@@ -98,7 +98,7 @@ impl Budget {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Order;
+    use terrain::TileOrder;
 
     fn budget(per_module: u32, area: u64, per_window: u32) -> Budget {
         let grid = ModuleGrid { rows: 10, cols: 10, side_cells: 20 };
@@ -120,7 +120,7 @@ mod tests {
     #[test]
     fn only_load_modules_at_inherited_sides_count_them() {
         let budget = budget(100, 3200, 4096);
-        let tiling = Tiling::new(budget.grid.area(), 20, 2, 2, Order::Color);
+        let tiling = Tiling::new(budget.grid.area(), 20, 2, 2, TileOrder::Color);
         let inherited = |row, col| budget.inherited_sides(&tiling, ModuleId { row, col });
         // Tile 0,0 ranks first and inherits nothing; tile 1,1 ranks last and inherits two sides.
         assert_eq!((inherited(4, 4), inherited(5, 5), inherited(9, 9), inherited(0, 5)), (0, 2, 0, 1));

@@ -4,12 +4,14 @@
 //! Limits are shared out before any tile is refined, so no tile needs to know what another spends.
 
 mod tiling;
-pub use tiling::{Order, Tiling};
+pub use tiling::Tiling;
 mod border;
 pub use border::{outer_border_posts, outer_sides};
 mod budget;
 pub use budget::{Budget, BudgetFault};
+mod gains;
+pub use gains::Gains;
 mod allocate;
-pub use allocate::{Allocation, Gains, Share, allocate_equally, allocate_globally};
+pub use allocate::{Allocation, Share, allocate_equally, allocate_globally};
 mod points;
 pub use points::{SquaresOfArea, points_equally, points_globally};

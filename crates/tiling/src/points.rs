@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use terrain::GainCurve;
 
-use crate::Gains;
+use crate::gains::{Gains, highest_rung};
 
 /// `points` shared equally; the remainder goes to the first tiles in row-major order.
 pub fn points_equally(points: u64, tiles: usize) -> Vec<usize> {
@@ -70,11 +70,6 @@ impl SquaresOfArea {
         // Sums fall from step to step, but for rounding in the choice of posts; the first that is low enough will do.
         self.sums.iter().find(|&&(_, sum)| sum <= goal).map(|&(step, _)| step)
     }
-}
-
-/// The highest rung among the next runs of all curves.
-pub(crate) fn highest_rung(curves: &[GainCurve], next: &[usize]) -> Option<i32> {
-    curves.iter().zip(next).filter_map(|(curve, &at)| Some(curve.runs.get(at)?.bin)).max()
 }
 
 #[cfg(test)]

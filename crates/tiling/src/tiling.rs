@@ -1,22 +1,13 @@
 //! The grid of tiles: lines, ranks, neighbours.
 
-use terrain::{ModuleGrid, ModuleRect, Post, PostRect, SeamSides, Side, TileId};
-
-/// The order in which tiles are ranked.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Order {
-    /// By four colours, then row and column: a quarter of the tiles can run at once.
-    Color,
-    /// By row and column: a wave front.
-    Raster,
-}
+use terrain::{ModuleGrid, ModuleRect, Post, PostRect, SeamSides, Side, TileId, TileOrder};
 
 /// A grid of tiles that share the lines of posts between them.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Tiling {
     row_lines: Vec<i32>,
     col_lines: Vec<i32>,
-    order: Order,
+    order: TileOrder,
 }
 
 impl Tiling {
@@ -25,7 +16,7 @@ impl Tiling {
     ///
     /// # Panics
     /// When `step` does not divide the area or a tile would be empty.
-    pub fn new(area: PostRect, step: i32, rows: u32, cols: u32, order: Order) -> Self {
+    pub fn new(area: PostRect, step: i32, rows: u32, cols: u32, order: TileOrder) -> Self {
         let lines = |first: i32, cells: usize, tiles: u32| -> Vec<i32> {
             let steps = cells / step as usize;
             assert!(cells.is_multiple_of(step as usize), "tile lines lie on whole steps");
@@ -89,8 +80,8 @@ impl Tiling {
     /// Colour of a tile: tiles of one colour share neither side nor corner. 0 for all in raster order.
     pub fn color(&self, tile: TileId) -> u32 {
         match self.order {
-            Order::Color => 2 * (tile.row % 2) + tile.col % 2,
-            Order::Raster => 0,
+            TileOrder::Color => 2 * (tile.row % 2) + tile.col % 2,
+            TileOrder::Raster => 0,
         }
     }
 
@@ -146,7 +137,7 @@ mod tests {
 
     fn paper() -> (Tiling, ModuleGrid) {
         let grid = ModuleGrid { rows: 100, cols: 100, side_cells: 20 };
-        (Tiling::new(grid.area(), 20, 6, 6, Order::Color), grid)
+        (Tiling::new(grid.area(), 20, 6, 6, TileOrder::Color), grid)
     }
 
     #[test]
@@ -169,7 +160,7 @@ mod tests {
     #[test]
     fn every_seam_has_exactly_one_owner() {
         let grid = ModuleGrid { rows: 12, cols: 15, side_cells: 4 };
-        for order in [Order::Color, Order::Raster] {
+        for order in [TileOrder::Color, TileOrder::Raster] {
             let tiling = Tiling::new(grid.area(), 4, 3, 4, order);
             for tile in tiling.tiles() {
                 for side in Side::ALL {
@@ -198,7 +189,7 @@ mod tests {
     #[test]
     fn lines_of_tiles_without_load_modules_lie_on_posts() {
         let area = PostRect::of_size(1979, 1979);
-        let tiling = Tiling::new(area, 1, 6, 6, Order::Color);
+        let tiling = Tiling::new(area, 1, 6, 6, TileOrder::Color);
         assert_eq!(tiling.rect(TileId { row: 5, col: 5 }).north_east(), area.north_east());
         assert_eq!(tiling.rect(TileId { row: 1, col: 0 }).south, 330);
     }

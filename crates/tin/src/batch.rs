@@ -6,13 +6,13 @@
 
 use fearless_simd::Simd;
 use geometry::LocalPost;
-use terrain::StopReason;
+use terrain::{LastBatch, StopReason};
 
 use crate::criterion::{Criterion, Largest};
 use crate::growth::{Growth, RunningSquares};
 use crate::proximity::NearVertices;
 use crate::queue::Queue;
-use crate::task::{LastBatch, Proximity, Stop};
+use crate::task::{Proximity, Stop};
 
 /// How passes choose.
 pub(crate) struct Passes {

@@ -3,15 +3,15 @@
 use fearless_simd::Simd;
 use geometry::LocalPost;
 
-use crate::ground::Ground;
+use crate::weighted_surface::WeightedSurface;
 
 /// Keys order triangles; 0 is worth nothing.
 pub(crate) trait Criterion: Copy {
     /// The key of a triangle.
-    fn key<S: Simd>(self, ground: &Ground<S>, corners: [LocalPost; 3]) -> u64;
+    fn key<S: Simd>(self, ground: &WeightedSurface<S>, corners: [LocalPost; 3]) -> u64;
 
     /// The post to insert when the triangle of this key is on top.
-    fn post<S: Simd>(self, ground: &Ground<S>, corners: [LocalPost; 3], key: u64) -> LocalPost;
+    fn post<S: Simd>(self, ground: &WeightedSurface<S>, corners: [LocalPost; 3], key: u64) -> LocalPost;
 
     /// The key of a triangle whose best permitted post has value `value`.
     fn key_when_confined(self, key: u64, value: u64) -> u64;
@@ -29,12 +29,12 @@ pub(crate) struct Largest;
 
 impl Criterion for Largest {
     #[inline(always)]
-    fn key<S: Simd>(self, ground: &Ground<S>, corners: [LocalPost; 3]) -> u64 {
+    fn key<S: Simd>(self, ground: &WeightedSurface<S>, corners: [LocalPost; 3]) -> u64 {
         ground.largest_value(corners)
     }
 
     #[inline(always)]
-    fn post<S: Simd>(self, ground: &Ground<S>, corners: [LocalPost; 3], key: u64) -> LocalPost {
+    fn post<S: Simd>(self, ground: &WeightedSurface<S>, corners: [LocalPost; 3], key: u64) -> LocalPost {
         ground.first_of_value(corners, key)
     }
 
@@ -58,12 +58,12 @@ pub(crate) struct Squares;
 
 impl Criterion for Squares {
     #[inline(always)]
-    fn key<S: Simd>(self, ground: &Ground<S>, corners: [LocalPost; 3]) -> u64 {
+    fn key<S: Simd>(self, ground: &WeightedSurface<S>, corners: [LocalPost; 3]) -> u64 {
         ground.weighted_squares(corners).to_bits()
     }
 
     #[inline(always)]
-    fn post<S: Simd>(self, ground: &Ground<S>, corners: [LocalPost; 3], _key: u64) -> LocalPost {
+    fn post<S: Simd>(self, ground: &WeightedSurface<S>, corners: [LocalPost; 3], _key: u64) -> LocalPost {
         ground.first_of_value(corners, ground.largest_value(corners))
     }
 

@@ -1,8 +1,8 @@
 //! Which posts the limits still permit.
 
 use geometry::LocalPost;
-use limits::{POINT_COST, TileLedger};
-use terrain::{ModuleId, RefusedBy};
+use limits::TileLedger;
+use terrain::{ModuleId, POINT_COST, RefusedBy};
 
 /// What stands between a post and the TIN.
 pub(crate) enum Gate {

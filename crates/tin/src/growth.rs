@@ -7,15 +7,15 @@ use terrain::{PostRect, StopReason};
 
 use crate::criterion::Criterion;
 use crate::gate::Gate;
-use crate::ground::Ground;
 use crate::queue::{Queue, Top};
 use crate::sequence::{Sequence, Witness};
 use crate::task::Stop;
+use crate::weighted_surface::WeightedSurface;
 
 /// Everything a run changes.
 pub(crate) struct Growth<'a, S: Simd> {
     pub tile: PostRect,
-    pub ground: Ground<'a, S>,
+    pub ground: WeightedSurface<'a, S>,
     pub mesh: Mesh,
     pub gate: Gate,
     pub sequence: Sequence,
@@ -132,7 +132,7 @@ impl RunningSquares {
 
     /// Accounts for the triangles the last insertion wrote.
     #[inline(always)]
-    pub fn update<S: Simd>(&mut self, ground: &Ground<S>, mesh: &Mesh) {
+    pub fn update<S: Simd>(&mut self, ground: &WeightedSurface<S>, mesh: &Mesh) {
         self.of_triangle.resize(mesh.triangles().len(), 0.0);
         for &triangle in mesh.star() {
             let squares = ground.plain_squares(mesh.triangles()[triangle as usize].corners);

@@ -9,7 +9,7 @@
 //! on its own would be compiled for the oldest processor and call each lane operation.
 
 mod task;
-pub use task::{Frame, LastBatch, Proximity, Rule, StartPost, Stop, TileTask};
+pub use task::{Frame, Proximity, Rule, StartPost, Stop, TileTask};
 mod refine;
 pub use refine::refine;
 mod prefix;
@@ -22,9 +22,9 @@ pub use ladder::{gain_at_bin, ladder_bin};
 mod batch;
 mod criterion;
 mod gate;
-mod ground;
 mod growth;
 mod proximity;
 mod queue;
 mod sequence;
 mod start;
+mod weighted_surface;

@@ -6,11 +6,11 @@ use terrain::{Dem, Importance, StopReason, TileTin, Tin, Vertex};
 
 use crate::batch::Passes;
 use crate::criterion::{Largest, Squares};
-use crate::ground::Ground;
 use crate::growth::Growth;
 use crate::sequence::{Nobody, Sequence, Witness};
 use crate::start::{Start, candidates};
 use crate::task::{Rule, Stop, TileTask};
+use crate::weighted_surface::WeightedSurface;
 
 /// Refines one tile: its initial points, then the posts that `task.rule` selects until it has to stop.
 ///
@@ -48,7 +48,7 @@ pub(crate) fn grow<S: Simd>(
         Rule::Batches { residual_quantum, .. } => residual_quantum,
         Rule::WorstFirst | Rule::LargestSquares { .. } => 1,
     };
-    let ground = Ground::new(simd, dem, importance, candidates(task.rect, task.seams), unit);
+    let ground = WeightedSurface::new(simd, dem, importance, candidates(task.rect, task.seams), unit);
     let sequence = Sequence { refused: start.refused, ..Sequence::default() };
     let mut growth = Growth { tile: task.rect, ground, mesh: start.mesh, gate: start.gate, sequence };
     let stop = match &task.rule {

@@ -1,7 +1,7 @@
 //! What `refine` is asked to do for one tile.
 
 use limits::{Allowance, ModuleLines, TileLedger};
-use terrain::{ModuleId, Post, PostRect, SeamSides, TileId};
+use terrain::{LastBatch, ModuleId, Post, PostRect, SeamSides, TileId};
 
 /// Everything about one tile's refinement but the ground itself.
 #[derive(Clone, Debug, PartialEq)]
@@ -29,6 +29,22 @@ pub struct TileTask {
 }
 
 impl TileTask {
+    /// Of a tile without load modules that nothing else is said of: closed sides, no points given, no end.
+    pub fn plain(tile: TileId, rect: PostRect, rule: Rule) -> Self {
+        Self {
+            tile,
+            rect,
+            frame: Frame::Plain,
+            border: Vec::new(),
+            inherited: Vec::new(),
+            kept: Vec::new(),
+            start: Vec::new(),
+            seams: SeamSides::CLOSED,
+            rule,
+            stop: Stop::default(),
+        }
+    }
+
     /// What the tile may spend, in posts from its south-west post, with room taken for inherited points and kept ones
     /// paid for; `None` where there are no limits.
     pub fn ledger(&self) -> Option<TileLedger> {
@@ -111,15 +127,6 @@ pub struct Proximity {
     pub posts: f64,
     /// Vertical reach in quanta.
     pub quanta: u32,
-}
-
-/// What the paper's last pass does with more candidates than points left.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LastBatch {
-    /// Takes the first in row order: exactly as many points as asked for.
-    Truncate,
-    /// Takes all of them.
-    Finish,
 }
 
 /// When a tile stops selecting, whichever comes first; it also stops when its allowance is spent or

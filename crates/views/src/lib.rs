@@ -1,4 +1,4 @@
-//! What people look at: pictures, the report as text and as a page, breaches on a map, meshes for viewers.
+//! What people look at: pictures, the report as text and as a page, breaches on a map.
 //!
 //! Pure: values in, bytes or text out. Nothing here opens a file, reads a clock or asks what the terminal can do;
 //! delete this crate and the load modules still come out the same.
@@ -6,8 +6,6 @@
 // A test that unwraps says by its line what failed.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
-mod mesh;
-pub use mesh::{Coordinates, MeshPlace, write_obj, write_ply};
 mod breaches;
 pub use breaches::{BreachPlaces, breaches_csv, breaches_geojson};
 mod page;

@@ -8,8 +8,8 @@ use std::sync::atomic::AtomicBool;
 use compiler::{CompileError, Event, Progress, Stage};
 use ground::{decode, warnings_of};
 use schedule::Workers;
-use source_files::{DemFile, Mosaic, MosaicRules, MosaicVoids, RasterFrame, Reading, Resampling, VoidPolicy};
-use terrain::{Dem, Post, PostRect, TileId, quanta_of_metres};
+use source_files::{DemFile, Mosaic, MosaicRules, MosaicVoids, RasterFrame, Reading, VoidPolicy};
+use terrain::{Dem, Post, PostRect, Resampling, TileId, quanta_of_metres};
 
 use crate::suiting::{SuitingGrid, suiting_grid};
 

@@ -1,8 +1,8 @@
 //! Meshes without a job: from a raster alone, at several levels, and one method beside another; and a first look at
 //! rasters, which suggests a job.
 
-mod raster;
-pub use raster::{Mesh, TinMethod, TinRequest, TinStart, tin};
+mod mesh;
+pub use mesh::{Mesh, TinMethod, TinRequest, TinStart, tin};
 mod tin_levels;
 pub use tin_levels::tin_levels;
 mod compare;
@@ -13,9 +13,9 @@ pub use compare::{
 mod look;
 pub use look::{Seen, Suggestion, look_at};
 mod sample;
-pub use sample::sample;
+pub use sample::Sample;
 
 mod heights;
 mod outlook;
 mod suiting;
-mod tin_tally;
+mod tally;

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use compiler::CompileError;
-use ground::covered;
+use ground::{GroundError, covered};
 use source_files::{Crs, DemFile, RasterFrame, Reading, SourceError};
 use terrain::{GridFrame, PostRect, Spacing};
 
@@ -92,11 +92,14 @@ pub fn look_at(paths: &[PathBuf], given: Option<&str>) -> Result<Suggestion, Com
         frames.push(frame);
         seen.push(found);
     }
-    let impossible = |found: String, hint: String| CompileError::Impossible {
-        key: "FILES".into(),
-        found,
-        expected: "rasters that an area can be laid into".into(),
-        hint,
+    let impossible = |found: String, hint: String| {
+        GroundError::Impossible {
+            key: "FILES".into(),
+            found,
+            expected: "rasters that an area can be laid into".into(),
+            hint,
+        }
+        .into()
     };
     let none = |none: job::NoArea| impossible(none.found, none.hint);
     let crs = area_crs(&frames).map_err(none)?;
@@ -152,7 +155,7 @@ fn open(path: &Path, given: Option<&str>, nodata: Option<f64>) -> Result<(DemFil
     match (DemFile::open(path, &reading), given) {
         (Ok(file), _) => Ok((file, false)),
         (Err(SourceError::NoCrs { .. }), Some(given)) => {
-            let crs = Crs::named(given).map_err(|found| CompileError::Impossible {
+            let crs = Crs::named(given).map_err(|found| GroundError::Impossible {
                 key: "--crs".into(),
                 found: format!("{given}: {found}"),
                 expected: "a system that can be computed".into(),

@@ -7,10 +7,10 @@
 use std::sync::atomic::AtomicBool;
 
 use compiler::CompileError;
-use source_files::{Crs, DemFile, MosaicRules, MosaicVoids, RasterFrame, Resampling, WideMosaic, Windows};
-use terrain::{Dem, GridFrame, PostRect};
+use source_files::{Crs, DemFile, MosaicRules, MosaicVoids, RasterFrame, WideMosaic, Windows};
+use terrain::{Dem, GridFrame, PostRect, Resampling};
 
-use crate::raster::untiled_together;
+use crate::mesh::untiled_together;
 
 /// Windows in a row and in a column, at most: a hill in a plain is not to be missed.
 const WINDOWS_A_SIDE: usize = 12;

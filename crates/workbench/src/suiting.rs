@@ -1,7 +1,7 @@
 //! The system, the spacing and the grid that suit rasters by themselves.
 
 use compiler::CompileError;
-use ground::{covered, utm_of};
+use ground::{GroundError, covered, utm_of};
 use source_files::{Crs, RasterFrame};
 use terrain::{GridFrame, PostRect, Spacing};
 
@@ -24,7 +24,7 @@ pub(crate) struct SuitingGrid {
 pub(crate) fn suiting_grid(frame: &RasterFrame) -> Result<SuitingGrid, CompileError> {
     const STEPS: u32 = 256;
     let alone = std::slice::from_ref(frame);
-    let refused = |none: job::NoArea| CompileError::Impossible {
+    let refused = |none: job::NoArea| GroundError::Impossible {
         key: frame.path.display().to_string(),
         found: format!("posts that are not square ones in metres, and {}", none.found),
         expected: "a raster that can be resampled to such".into(),

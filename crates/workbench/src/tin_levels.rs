@@ -3,10 +3,11 @@
 use std::sync::atomic::AtomicBool;
 
 use compiler::{CompileError, Event, Progress, Stage};
+use ground::GroundError;
 use terrain::StopReason;
 
 use crate::heights::Heights;
-use crate::raster::{Mesh, TinMethod, TinRequest};
+use crate::mesh::{Mesh, TinMethod, TinRequest};
 
 /// Makes a mesh for each of `levels`, numbers of vertices that rise.
 ///
@@ -69,5 +70,5 @@ fn refuse(request: &TinRequest, levels: &[usize]) -> Result<(), CompileError> {
 }
 
 fn impossible(found: String, expected: String, hint: &str) -> CompileError {
-    CompileError::Impossible { key: "--levels".into(), found, expected, hint: hint.into() }
+    GroundError::Impossible { key: "--levels".into(), found, expected, hint: hint.into() }.into()
 }

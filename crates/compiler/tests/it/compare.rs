@@ -110,7 +110,8 @@ fn equivalent_points_are_the_fewest_whose_iterative_tin_is_better() {
 
 fn sample(path: &Path) {
     let spacing = terrain::Spacing::from_metres(25.0).unwrap();
-    workbench::sample(3, (161, 161), spacing, path, None).unwrap();
+    let sample = workbench::Sample { seed: 3, size: (161, 161), spacing };
+    sample.write_heights(&mut std::fs::File::create(path).unwrap()).unwrap();
 }
 
 #[test]

@@ -29,7 +29,11 @@ impl Forged {
             report: folder.report().unwrap(),
             tins: tiles.iter().map(|&tile| folder.read_tile(tile).unwrap()).collect(),
             modules: tiles.iter().map(|&tile| folder.read_levels(tile).unwrap()).collect(),
-            measured: tiles.iter().map(|&tile| folder.read_measured(tile).unwrap()).collect(),
+            measured: tiles
+                .iter()
+                .map(|&tile| folder.read_measured(tile).unwrap())
+                .map(|(stamp, _, measured)| (stamp, measured))
+                .collect(),
             manifest,
         }
     }

@@ -9,7 +9,7 @@ use std::time::Duration;
 use compiler::{Event, Options, Progress, Sharing, Stage, Unit, UnitEnd};
 use database::{Folder, Report, files};
 
-use crate::scene::{Scene, Silent, Words, assert_same, options, sample_dem, tile};
+use crate::scene::{Scene, SetBy, Silent, Still, Words, assert_same, options, sample_dem, tile};
 
 /// Four tiles from a raster.
 fn scene() -> Scene {
@@ -50,10 +50,10 @@ fn complete(scene: &Scene, folder: &str, has_page: bool) -> Report {
 /// Builds with a page and a clock that goes on by a second whenever it is looked at.
 fn build_with_page(scene: &Scene, folder: &str, progress: &mut dyn Progress) -> compiler::Built {
     let (now, stop) = (Cell::new(0), AtomicBool::new(false));
-    let clock = || {
+    let clock = SetBy(|| {
         now.set(now.get() + 1);
         Duration::from_secs(now.get())
-    };
+    });
     compiler::build(&scene.job, &scene.path(folder), &Options::new(2, &stop, &clock), progress).unwrap()
 }
 
@@ -139,7 +139,7 @@ fn a_build_that_ends_at_any_step_of_publishing_is_whole_after_the_next() {
             assert!(verdict.problems.iter().any(|problem| problem.contains("incomplete")), "{step}: {verdict:?}");
             if units {
                 let stop = AtomicBool::new(false);
-                let whole = Options::new(2, &stop, &|| Duration::ZERO);
+                let whole = Options::new(2, &stop, &Still);
                 let end =
                     compiler::perform(&scene.job, there.dir(), &[Unit::whole(Stage::Publish)], &whole, &mut Silent)
                         .unwrap();

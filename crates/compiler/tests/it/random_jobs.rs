@@ -132,7 +132,7 @@ fn run(seed: u64) -> bool {
             check(&scene, &dem);
             true
         }
-        Err(CompileError::Impossible { .. } | CompileError::Ground(GroundError::Impossible { .. })) => {
+        Err(CompileError::Ground(GroundError::Impossible { .. })) => {
             let error = scene.try_build("area", 1).expect_err("a build that the plan refuses");
             assert!(error.hint().is_some() && !scene.path("area").exists(), "{error}");
             false

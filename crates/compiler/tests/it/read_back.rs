@@ -45,7 +45,7 @@ fn a_part_is_the_same_as_that_part_of_the_whole() {
     assert_eq!(part.dem, whole.dem.window(part.dem.rect()));
     let at = |of: &ProductGround, post: Post| {
         let rect = of.dem.rect();
-        of.residuals[(post.row - rect.south) as usize * rect.posts_wide() + (post.col - rect.west) as usize]
+        of.residuals[rect.index(post)]
     };
     let own = part.dem.rect();
     for row in own.south..own.north {

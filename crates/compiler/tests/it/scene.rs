@@ -7,11 +7,12 @@ use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 use compiler::{Built, CompileError, Event, Options, Progress, Rebuilt};
+use engine::Clock;
 use job::Job;
 use tempfile::TempDir;
 use terrain::{Dem, GridFrame, ModuleGrid, Spacing, TileId};
 
-pub const EPSG: u32 = 32_611;
+pub const EPSG: u16 = 32_611;
 pub const ORIGIN_M: [f64; 2] = [505_000.0, 3_875_000.0];
 /// Cells along a side of a load module: 500 m at 25 m.
 pub const SIDE_CELLS: i32 = 20;
@@ -209,7 +210,8 @@ pub fn frame() -> GridFrame {
 }
 
 pub fn write_dem(path: &Path, dem: &Dem) {
-    source_files::write_heights(path, &frame(), dem.rect(), EPSG, |band| dem.window(band)).unwrap();
+    let mut file = std::fs::File::create(path).unwrap();
+    source_files::write_heights(&mut file, &frame(), dem.rect(), EPSG, |band| dem.window(band)).unwrap();
 }
 
 /// The sample terrain of a grid.
@@ -219,7 +221,33 @@ pub fn sample_dem(grid: ModuleGrid, seed: u64) -> Dem {
 
 /// A run without a page and without times: drawing takes longer than most of these builds.
 pub fn options(workers: usize, stop: &AtomicBool) -> Options<'_> {
-    Options { page: false, ..Options::new(workers, stop, &|| Duration::ZERO) }
+    Options { page: false, ..Options::new(workers, stop, &Still) }
+}
+
+/// A clock that stands still.
+pub struct Still;
+
+impl Clock for Still {
+    fn wall(&self) -> Duration {
+        Duration::ZERO
+    }
+
+    fn wait(&self, time: Duration) {
+        std::thread::sleep(time);
+    }
+}
+
+/// A clock that a test sets.
+pub struct SetBy<F>(pub F);
+
+impl<F: Fn() -> Duration> Clock for SetBy<F> {
+    fn wall(&self) -> Duration {
+        self.0()
+    }
+
+    fn wait(&self, time: Duration) {
+        std::thread::sleep(time);
+    }
 }
 
 /// Listens to nothing.

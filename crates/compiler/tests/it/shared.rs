@@ -10,7 +10,7 @@ use job::Job;
 use terrain::TileId;
 
 use crate::modes;
-use crate::scene::{Scene, Silent, Words, assert_same, options, sample_dem, tile};
+use crate::scene::{Scene, SetBy, Silent, Words, assert_same, options, sample_dem, tile};
 
 fn perform(scene: &Scene, units: &[Unit]) -> Result<UnitEnd, CompileError> {
     compiler::perform(&scene.job, &scene.path("area"), units, &options(1, &false.into()), &mut Silent)
@@ -156,6 +156,7 @@ fn as_long_as_a_slow_worker_is_there_no_build_of_another_job_begins() {
     let second = Duration::from_secs(1);
     let sharing = Sharing { name: "slow", lease: second, pause: second, holding: &|_| {} };
     let (stop, mut read) = (AtomicBool::new(false), When(Stage::Read, || has_read.set(true)));
+    let clock = SetBy(clock);
     let options = Options { clock: &clock, ..options(1, &stop) };
     let end = compiler::work(&first.job, &folder, &options, &sharing, &mut read).unwrap();
     assert!(!is_first.get() && end.units == 0 && end.published.is_none(), "{end:?}");

@@ -111,9 +111,18 @@ impl Kits {
         let words = [
             small((4, 4), (2, 2), "method = \"greedy\"\nallocation = \"equal\""),
             small((2, 6), (1, 3), "method = \"greedy\"\nallocation = \"global\""),
-            Words { modules: clip, ..small((4, 2), (2, 1), "method = \"paper\"\npoints = 60") },
+            Words { modules: clip.clone(), ..small((4, 2), (2, 1), "method = \"paper\"\npoints = 60") },
+            Words {
+                modules: clip,
+                limits: "per_load_module = 30\npool = 0\nmean_per_load_module = 28".into(),
+                ..small((4, 2), (2, 1), "method = \"paper\"\npoints = 90")
+            },
         ];
-        Self(words.iter().map(|words| [1, 2].map(|seed| Kit::new(words, seed))).collect())
+        let kits: Vec<[Kit; 2]> = words.iter().map(|words| [1, 2].map(|seed| Kit::new(words, seed))).collect();
+        let has_removals =
+            |kit: &Kit| kit.files.keys().any(|path| path.extension().is_some_and(|end| end == "removed"));
+        assert!(has_removals(&kits[3][0]), "points make room in the last kit");
+        Self(kits)
     }
 }
 
@@ -202,7 +211,7 @@ impl Process<'_> {
             error.into_iter().for_each(|error| *told.errors.entry(error).or_default() += 1);
             drop(told);
             self.faulty.begin_again();
-            self.wait(Duration::from_secs(5));
+            self.wait(Duration::from_secs(20));
             again += usize::from(!is_transient);
         }
         self.faulty.leave();
@@ -214,7 +223,7 @@ impl Process<'_> {
         if self.builds {
             return compiler::build(self.job, folder, &options, &mut Silent).map(drop);
         }
-        let sharing = Sharing { name, lease: LEASE, pause: Duration::from_secs(1), holding: &|_| () };
+        let sharing = Sharing { name, lease: LEASE, pause: Duration::from_secs(5), holding: &|_| () };
         compiler::work(self.job, folder, &options, &sharing, &mut Silent).map(drop)
     }
 }
@@ -256,8 +265,8 @@ fn half(files: &Files, random: &mut fastrand::Rng) -> Files {
 fn campaign(seeds: std::ops::Range<u64>) {
     let (kits, mut all, mut failed) = (Kits::new(), Told::default(), Vec::new());
     for seed in seeds.clone() {
-        if std::env::var_os("TIEFORT_TELL").is_some() {
-            eprintln!("seed {seed}");
+        if seed != seeds.start && (seed - seeds.start).is_multiple_of(1000) {
+            println!("{} runs, {} failed", seed - seeds.start, failed.len());
         }
         match simulate(&kits, seed) {
             Ok(told) => {

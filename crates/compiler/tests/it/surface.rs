@@ -71,7 +71,7 @@ pub fn sums_of_tin(tin: &Tin, dem: &Dem) -> Sums {
         let triangle = [0, 1, 2].map(|k| (posts[k].col.into(), posts[k].row.into(), corners[k].height.into()));
         for post in (south..=north.unwrap()).flat_map(|row| (west..=east.unwrap()).map(move |col| Post::new(row, col)))
         {
-            let index = (post.row - rect.south) as usize * rect.posts_wide() + (post.col - rect.west) as usize;
+            let index = rect.index(post);
             let at = (i64::from(post.col), i64::from(post.row));
             if !done[index] && contains(&triangle, at) {
                 done[index] = true;

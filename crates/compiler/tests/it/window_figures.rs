@@ -2,8 +2,8 @@
 
 use fidelity::{PostHeights, Triangles};
 use job::ErrorKey;
-use terrain::{Dem, Importance, Metres, Post, PostRect, SeamSides, THOUSANDTHS, TileId, Tin};
-use tin::{Frame, LastBatch, Proximity, Rule, Stop, TileTask};
+use terrain::{Dem, Importance, LastBatch, Metres, Post, PostRect, SeamSides, THOUSANDTHS, TileId, Tin};
+use tin::{Frame, Proximity, Rule, Stop, TileTask};
 use workbench::{TinMethod, TinRequest};
 
 use crate::real_ground::{data, read_dem};

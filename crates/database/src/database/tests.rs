@@ -97,7 +97,7 @@ fn opening_again_finds_the_database_and_removes_what_was_left_over() {
     let left_over = [dir.join(".tiefort-x.part"), dir.join("tiles/.tiefort-y.part")];
     left_over.iter().for_each(|path| fs::write(path, b"half").unwrap());
     let (database, previous) = Database::create_or_open(&dir, &samples::area()).unwrap();
-    assert!(matches!(previous, Previous::Database(found) if *found == manifest));
+    assert_eq!(previous, Some(manifest));
     assert!(left_over.iter().all(|path| !path.exists()));
     database.clear().unwrap();
     assert!(fs::read_dir(dir.join("tiles")).unwrap().next().is_none() && !dir.join("database.json").exists());
@@ -141,7 +141,7 @@ fn a_damaged_manifest_can_be_built_over_but_only_among_our_own_files() {
     text[40] ^= 1;
     fs::write(&path, text).unwrap();
     let (database, previous) = Database::create_or_open(&dir, &samples::area()).unwrap();
-    assert!(matches!(previous, Previous::Damaged(_)));
+    assert_eq!(previous, None);
     drop(database);
     fs::write(dir.join("notes.txt"), b"").unwrap();
     assert!(matches!(Database::create_or_open(&dir, &samples::area()), Err(DatabaseError::NotOurFolder { .. })));
@@ -151,7 +151,7 @@ fn a_damaged_manifest_can_be_built_over_but_only_among_our_own_files() {
 fn two_builds_in_one_directory_exclude_each_other() {
     let folder = tempfile::tempdir().unwrap();
     let (_first, previous) = Database::create_or_open(folder.path(), &samples::area()).unwrap();
-    assert!(matches!(previous, Previous::Nothing));
+    assert_eq!(previous, None);
     let error = Database::create_or_open(folder.path(), &samples::area()).unwrap_err();
     assert!(error.is_transient(), "{error}");
 }

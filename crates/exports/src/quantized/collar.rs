@@ -7,7 +7,7 @@ use crate::{ExportError, Product};
 
 /// Triangles over vertices on the globe.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Sheet {
+pub(crate) struct GlobeMesh {
     /// Longitude and latitude in degrees.
     pub lon_lat: Vec<[f64; 2]>,
     /// Metres above the ellipsoid.
@@ -30,8 +30,8 @@ pub(crate) fn with_collar(
     earth: &Earth,
     collar_m: f64,
     outer_m: impl Fn(f64) -> f64,
-) -> Result<Sheet, ExportError> {
-    let mut sheet = Sheet {
+) -> Result<GlobeMesh, ExportError> {
+    let mut sheet = GlobeMesh {
         lon_lat: globe.lon_lat.clone(),
         height_m: globe.height_m.clone(),
         normal: globe.normal.clone(),

@@ -19,7 +19,7 @@ use crate::earth::{Earth, directions, earth_centred};
 use crate::globe::Globe;
 use crate::mesh::{Mesh, cross, minus, unit};
 use crate::{Datum, ExportError, Product, Put, Work};
-use collar::{Sheet, with_collar};
+use collar::{GlobeMesh, with_collar};
 use holes::holes;
 use lattice::{Node, STEPS, height_steps, lon_lat, steps, tiles};
 use tile::Tile;
@@ -49,7 +49,7 @@ pub fn write_quantized_mesh(
     let heights = || globe.height_m.iter().copied();
     let foot_m = heights().fold(f64::INFINITY, f64::min).floor();
     let level = finest_level(product.side_m());
-    let mut scene = Scene { product, earth: &earth, foot_m, level, fall_m: 0.0 };
+    let mut scene = TileInputs { product, earth: &earth, foot_m, level, fall_m: 0.0 };
     let bounds = scene.bounds(&globe);
     let collar_m = scene.collar_m(&bounds)?;
     let extent_m = f64::from(product.rect.rows().max(product.rect.cols())) * product.side_m();
@@ -105,7 +105,7 @@ fn too_wide(product: &Product) -> ExportError {
     }
 }
 
-struct Scene<'a> {
+struct TileInputs<'a> {
     product: &'a Product,
     earth: &'a Earth,
     /// A whole number of metres below all that is exported: how deep the ground around it falls.
@@ -115,7 +115,7 @@ struct Scene<'a> {
     fall_m: f64,
 }
 
-impl Scene<'_> {
+impl TileInputs<'_> {
     fn bounds(&self, globe: &Globe) -> Bounds {
         let places: Vec<[i64; 2]> = globe.lon_lat.iter().map(|&place| steps(self.level, place)).collect();
         let range = |axis: usize| {
@@ -157,7 +157,7 @@ impl Scene<'_> {
     }
 
     /// The tiles that hold the triangles themselves.
-    fn write_finest(&self, sheet: &Sheet, bounds: &Bounds, put: &Put, work: &Work) -> Result<(), ExportError> {
+    fn write_finest(&self, sheet: &GlobeMesh, bounds: &Bounds, put: &Put, work: &Work) -> Result<(), ExportError> {
         let node = |v: u32| {
             let (place, height_m) = (sheet.lon_lat[v as usize], sheet.height_m[v as usize]);
             let [x, y] = steps(self.level, place);

@@ -3,7 +3,7 @@
 
 use fearless_simd::{Simd, i32x8, i32x16, prelude::*};
 
-use super::IOTA;
+use super::lanes::IOTA;
 use crate::{Facet, Surface};
 
 macro_rules! largest_in_box {

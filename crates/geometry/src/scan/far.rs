@@ -7,7 +7,7 @@ use std::ops::ControlFlow;
 
 use fearless_simd::{Simd, f64x8, i32x16, prelude::*};
 
-use super::IOTA;
+use super::lanes::IOTA;
 use crate::{Facet, LocalPost, Spans, Surface};
 
 /// Looks at `|n|` of 16 posts at a time. A trait rather than a closure: closures that several callers

@@ -7,6 +7,7 @@
 
 mod boxes;
 mod far;
+mod lanes;
 mod near;
 mod squares;
 mod visit;
@@ -17,27 +18,12 @@ use fearless_simd::Simd;
 
 use crate::{Facet, LocalPost, Surface};
 
+pub use lanes::rounded;
 pub use squares::squares_sum;
 pub use visit::{visit_owned, visit_posts};
 
 /// Largest `den * relief` for which 32-bit lanes are exact.
 const NARROW_LIMIT: i64 = 1 << 31;
-
-/// Lane numbers.
-const IOTA: [i32; 16] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
-
-/// `numerator / den`, rounded half up (numerators are absolute values).
-#[inline(always)]
-pub fn rounded(numerator: u64, den: u64) -> u64 {
-    if numerator <= u64::from(u32::MAX) && den <= u64::from(u32::MAX) {
-        // One 32-bit division is several times faster than a 64-bit one.
-        let (n, d) = (numerator as u32, den as u32);
-        let quotient = n / d;
-        return u64::from(quotient) + u64::from(d - n % d <= n % d);
-    }
-    let quotient = numerator / den;
-    quotient + u64::from(den - numerator % den <= numerator % den)
-}
 
 /// Largest `|n|` over the candidate posts of the closed triangle.
 #[inline(always)]

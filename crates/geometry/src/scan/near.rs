@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 
 use fearless_simd::{Simd, i32x16, prelude::*};
 
-use super::IOTA;
+use super::lanes::IOTA;
 use crate::{Facet, LocalPost, Spans, Surface};
 
 /// Plane numerators of a row, 16 posts at a time.

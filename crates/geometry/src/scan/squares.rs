@@ -7,7 +7,8 @@
 
 use fearless_simd::{Simd, f64x8, i32x8, i32x16, prelude::*};
 
-use super::{IOTA, rounded, visit::OwnedSpans};
+use super::lanes::{IOTA, rounded};
+use super::visit::{OwnedSpans, visit_owned};
 use crate::{Facet, Surface};
 
 /// Largest `den` for which the reciprocal rounds exactly.
@@ -189,7 +190,7 @@ impl<S: Simd> Rounding<S> {
 /// The same sum by one division per post, for triangles beyond the reciprocal's proof.
 fn squares_sum_by_division(surface: &Surface, facet: &Facet) -> f64 {
     let mut sum = 0u128;
-    super::visit_owned(surface, facet, |_, numerator| {
+    visit_owned(surface, facet, |_, numerator| {
         let residual = u128::from(rounded(numerator, facet.den as u64));
         sum += residual * residual;
     });

@@ -25,7 +25,7 @@ fn write_raster(folder: &Path) {
     let frame = GridFrame { origin_east_m: 504_500.0, origin_north_m: 3_874_500.0, spacing };
     let rect = PostRect::of_size(161, 161);
     let heights = |band| sample_terrain::heights(1, band, spacing);
-    write_heights(&folder.join("dem.tif"), &frame, rect, 32611, heights).unwrap();
+    write_heights(&mut std::fs::File::create(folder.join("dem.tif")).unwrap(), &frame, rect, 32611, heights).unwrap();
 }
 
 fn open(job: &Job, whole_bytes_max: u64) -> Result<(GamingArea, Ground), GroundError> {

@@ -5,8 +5,8 @@ use job::{Edges, Job};
 use serde_json::Value;
 use terrain::{LoadModule, ModuleId};
 
-use super::Modules;
 use super::entries::state_word;
+use super::modules::Modules;
 use super::total::Total;
 use crate::recount;
 use ground::GamingArea;

@@ -3,11 +3,11 @@
 
 use database::{Folder, Manifest, Measured, MeasuredModule, MeasuredTally, Report, ReportResidual};
 use fidelity::Residuals;
-use job::{Count, Job};
+use job::{Choice, Job};
 use terrain::{LoadModule, ModuleCounts, ModuleId, ModuleResidual, StopReason, metres_of_quanta};
 
-use super::Modules;
 use super::exceeded::Exceeded;
+use super::modules::Modules;
 use super::tins::OfTins;
 use super::total::{Total, squares};
 use crate::recount;
@@ -56,7 +56,7 @@ pub(crate) fn measured(
     for (record, &points) in manifest.tiles.iter().zip(&tins.points) {
         let tile = record.tile();
         let read = match folder.read_measured(tile) {
-            Ok((_, read)) => read,
+            Ok((.., read)) => read,
             Err(error) => {
                 problems.push(error.to_string());
                 continue;
@@ -165,10 +165,7 @@ pub(crate) fn differing_report(
     if report.area != job.area.name {
         problems.push(format!("report.json: area is \"{}\", the job's is \"{}\"", report.area, job.area.name));
     }
-    let word = match job.limits.count {
-        Count::Triangles => "triangles",
-        Count::Polygons => "polygons",
-    };
+    let word = job.limits.count.name();
     if report.count != word {
         problems.push(format!("report.json: count is \"{}\", the job's is \"{word}\"", report.count));
     }

@@ -2,12 +2,12 @@
 
 use std::collections::BTreeMap;
 
-use database::{DatabaseError, Fingerprint, Folder};
+use database::{DatabaseError, Fingerprint, Folder, load_module};
 use job::Job;
-use load_module_reader::{Header, Module, SlmFile, Vertex};
-use terrain::{Decks, HOLE_CLASS, LoadModule, ModuleId, ModuleResidual, ModuleVertex, TileId};
+use load_module_reader::{Header, Module, SlmFile};
+use terrain::{HOLE_CLASS, TileId};
 
-use super::Modules;
+use super::modules::{Modules, at_level};
 use compiler::CompileError;
 use compiler::database_area;
 use ground::GamingArea;
@@ -89,29 +89,5 @@ fn unknown_class(module: &Module, count: usize) -> Option<String> {
     };
     let what = of("triangle", &module.classes).or_else(|| of("triangle of decks", &module.decks.classes))?;
     let text = format!("load module {},{}: {what}", module.row, module.col);
-    Some(super::at_level(usize::from(module.level), text))
-}
-
-fn load_module(module: &Module, side: u16) -> LoadModule {
-    let residual = &module.residual;
-    let vertices = |of: &[Vertex]| of.iter().map(|v| ModuleVertex { y: v.y, x: v.x, z: v.z }).collect();
-    LoadModule {
-        id: ModuleId { row: module.row, col: module.col },
-        side,
-        vertices: vertices(&module.vertices),
-        triangles: module.triangles.clone(),
-        classes: module.classes.clone(),
-        polygon_count: module.polygon_count,
-        residual: ModuleResidual {
-            posts: residual.posts,
-            largest: residual.largest,
-            sum_abs: residual.sum_abs,
-            sum_squared: residual.sum_squared,
-        },
-        decks: Decks {
-            vertices: vertices(&module.decks.vertices),
-            triangles: module.decks.triangles.clone(),
-            classes: module.decks.classes.clone(),
-        },
-    }
+    Some(at_level(usize::from(module.level), text))
 }

@@ -14,9 +14,10 @@ use terrain::{
     TileTin, Vertex,
 };
 
-use super::Modules;
 use compiler::CompileError;
 use ground::GamingArea;
+
+use super::modules::Modules;
 
 /// What the TINs of an area add up to.
 #[derive(Default)]

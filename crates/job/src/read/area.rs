@@ -6,11 +6,11 @@
 use terrain::{Metres, ModuleGrid, QUANTA_PER_METRE, Spacing};
 
 use crate::bounds::{
-    CELLS_A_SIDE_MAX, COORDINATE_M_MAX, EPSG_GEOGRAPHIC, EPSG_RANGE, MODULES_MAX, NAME_CHARS_MAX, SIDE_QUANTA_MAX,
-    TITLE_CHARS_MAX,
+    AROUND_KM_MAX, CELLS_A_SIDE_MAX, COORDINATE_M_MAX, EPSG_GEOGRAPHIC, EPSG_RANGE, MODULES_MAX, NAME_CHARS_MAX,
+    SIDE_QUANTA_MAX,
 };
 use crate::entry::{Entry, Section};
-use crate::{Area, AreaFound, AreaPlace, AreaRequest, ClipHeights, Edges, JobError, Method, ModulesSpec, OuterBorder};
+use crate::{Area, AreaFound, AreaPlace, AreaRequest, Edges, JobError, Method, ModulesSpec, OuterBorder};
 
 /// Finds what a job leaves open about its area.
 pub(super) type Find<'a> = dyn FnMut(&AreaRequest, &Entry) -> Result<AreaFound, JobError> + 'a;
@@ -21,8 +21,8 @@ pub(super) fn read(area: &Section, modules: &Section, find: &mut Find) -> Result
     let place = open_place(area, epsg)?;
     let origin_m = if place.is_none() { origin(area)? } else { [0.0; 2] };
     let (spacing_entry, spacing) = spacing(area)?;
-    let border_step_m = length(modules, "border_step_m", 125.0)?;
-    let side_m = length(modules, "side_m", 500.0)?;
+    let border_step_m = length(modules, "border_step_m")?;
+    let side_m = length(modules, "side_m")?;
     let border_step_cells = border_step_cells(&spacing_entry, spacing, border_step_m)?;
     let side_cells = side_cells(modules, spacing, side_m, border_step_m)?;
     let (epsg, origin_m, grid) = match (place, epsg) {
@@ -34,7 +34,7 @@ pub(super) fn read(area: &Section, modules: &Section, find: &mut Find) -> Result
         (None, Some(epsg)) => (epsg, origin_m, grid(area, spacing, side_cells, side_m)?),
         (None, None) => {
             let hint = "\"auto\" goes with around = { lat = 35.3, lon = -116.6, size_km = 50 } or cover = \"dem\"";
-            let entry = area.required("crs", "")?;
+            let entry = area.required("crs")?;
             return Err(entry.conflict("origin_m", "a system for these metres, as \"EPSG:32611\"", hint));
         }
     };
@@ -59,23 +59,19 @@ fn open_place<'a>(area: &Section<'a>, epsg: Option<u32>) -> Result<Option<(Entry
         (Some(entry), Some(_), _) => Err(either(&entry, "cover")),
         (Some(entry), None, Some(key)) | (None, Some(entry), Some(key)) => Err(either(&entry, key)),
         (None, Some(entry), None) => {
-            entry.word(&[("dem", ())])?;
-            Ok(Some((entry, AreaPlace::CoverDem)))
+            let place = entry.word()?;
+            Ok(Some((entry, place)))
         }
         (Some(entry), None, None) => {
             let table = entry.table()?;
-            let number = |key, expected: &str| table.required(key, expected)?.number(expected);
-            let lat = "degrees of latitude, south negative";
-            let lon = "degrees of longitude, west negative";
-            let (latitude, longitude) = (number("lat", lat)?, number("lon", lon)?);
+            let (latitude, longitude) = (table.required("lat")?.number()?, table.required("lon")?.number()?);
             if 90.0 < latitude.abs() || 360.0 < longitude.abs() || (epsg.is_none() && 84.0 < latitude.abs()) {
                 return Err(entry.out_of_range("a latitude within 90 (UTM: 84) and a longitude within 360 degrees"));
             }
-            let expected = "kilometres a side, or [east to west, north to south]";
-            let size = table.required("size_km", expected)?;
-            let size_km = if size.is_list() { size.pair(expected)? } else { [size.number(expected)?; 2] };
-            if size_km.iter().any(|&km| !(0.0 < km && km <= 20_000.0)) {
-                return Err(size.out_of_range("above 0 and at most 20000 kilometres"));
+            let size = table.required("size_km")?;
+            let size_km = if size.is_list() { size.pair()? } else { [size.number()?; 2] };
+            if size_km.iter().any(|&km| !(0.0 < km && km <= AROUND_KM_MAX)) {
+                return Err(size.out_of_range(size.expected()));
             }
             let size_m = size_km.map(|km| km * 1000.0);
             Ok(Some((entry, AreaPlace::Around { latitude, longitude, size_m })))
@@ -84,13 +80,12 @@ fn open_place<'a>(area: &Section<'a>, epsg: Option<u32>) -> Result<Option<(Entry
 }
 
 fn name(area: &Section) -> Result<String, JobError> {
-    let expected = format!("1 to {NAME_CHARS_MAX} letters, digits, '-', '_' or '.', beginning with a letter or digit");
-    let entry = area.required("name", &expected)?;
-    let name = entry.text(&expected)?;
+    let entry = area.required("name")?;
+    let name = entry.text()?;
     let good = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_' | '.');
     let begins = name.starts_with(|c: char| c.is_ascii_alphanumeric());
     if !begins || !name.chars().all(good) || NAME_CHARS_MAX < name.len() {
-        return Err(entry.out_of_range_with(expected, "the database is named after it: NAME.tdb"));
+        return Err(entry.out_of_range_with(entry.expected(), "the database is named after it: NAME.tdb"));
     }
     Ok(name.to_owned())
 }
@@ -98,28 +93,22 @@ fn name(area: &Section) -> Result<String, JobError> {
 /// What a page of the area is called: one line of text.
 fn title(area: &Section) -> Result<Option<String>, JobError> {
     let Some(entry) = area.optional("title") else { return Ok(None) };
-    let expected = format!("a line of 1 to {TITLE_CHARS_MAX} characters");
-    let title = entry.text(&expected)?;
-    let is_line = !title.trim().is_empty() && !title.contains(char::is_control);
-    if !is_line || TITLE_CHARS_MAX < title.chars().count() {
-        return Err(entry.out_of_range_with(expected, "it stands above report.html; leave it out for the area's name"));
-    }
-    Ok(Some(title.to_owned()))
+    entry.prose(char::is_control).map(Some)
 }
 
 /// The code; `None` for one that is to be found.
 fn epsg(area: &Section) -> Result<Option<u32>, JobError> {
-    let expected = "a projected coordinate system in metres, as \"EPSG:32611\"";
     let hint = "UTM zone 11 north on WGS 84 is EPSG:32611, zone 32 north EPSG:32632";
-    let entry = area.required("crs", expected)?;
-    if entry.text(expected)? == "auto" {
+    let entry = area.required("crs")?;
+    let text = entry.text()?;
+    if text == "auto" {
         return Ok(None);
     }
-    let digits = entry.text(expected)?.strip_prefix("EPSG:").filter(|code| code.bytes().all(|b| b.is_ascii_digit()));
+    let digits = text.strip_prefix("EPSG:").filter(|code| code.bytes().all(|b| b.is_ascii_digit()));
     let code = digits.and_then(|digits| digits.parse().ok()).filter(|code| EPSG_RANGE.contains(code));
-    let code = code.ok_or_else(|| entry.out_of_range_with(expected, hint))?;
+    let code = code.ok_or_else(|| entry.out_of_range_with(entry.expected(), hint))?;
     if EPSG_GEOGRAPHIC.contains(&code) {
-        let mut fault = entry.fault(expected);
+        let mut fault = entry.fault(entry.expected());
         fault.hint = hint.to_owned();
         fault.found += ", which is in degrees";
         return Err(JobError::OutOfRange(fault));
@@ -128,37 +117,34 @@ fn epsg(area: &Section) -> Result<Option<u32>, JobError> {
 }
 
 fn origin(area: &Section) -> Result<[f64; 2], JobError> {
-    let expected = "[east, north] of the south-west post in metres";
-    let entry = area.required("origin_m", expected)?;
-    let origin = entry.pair(expected)?;
+    let entry = area.required("origin_m")?;
+    let origin = entry.pair()?;
     if origin.iter().any(|metres| COORDINATE_M_MAX < metres.abs()) {
-        return Err(entry.out_of_range(format!("{expected}, each within {COORDINATE_M_MAX:e} m of 0")));
+        return Err(entry.out_of_range(format!("{}, each within {COORDINATE_M_MAX:e} m of 0", entry.expected())));
     }
     Ok(origin)
 }
 
 fn spacing<'a>(area: &Section<'a>) -> Result<(Entry<'a>, Spacing), JobError> {
-    let expected = "metres between posts, a positive multiple of 1/16 m";
     let hint = "25 divides the usual border step of 125 m; a DEM of any other spacing is resampled to it";
-    let entry = area.required("spacing_m", expected)?;
-    let spacing = Spacing::from_metres(entry.number(expected)?);
-    let spacing = spacing.ok_or_else(|| entry.out_of_range_with(expected, hint))?;
+    let entry = area.required("spacing_m")?;
+    let spacing = Spacing::from_metres(entry.number()?);
+    let spacing = spacing.ok_or_else(|| entry.out_of_range_with(entry.expected(), hint))?;
     Ok((entry, spacing))
 }
 
-/// A length that has a default: positive, and no longer than the largest side of a load module.
-fn length(modules: &Section, key: &str, default: f64) -> Result<f64, JobError> {
-    let Some(entry) = modules.optional(key) else { return Ok(default) };
-    let metres = entry.number("a positive number of metres")?;
+/// A length: positive, and no longer than the largest side of a load module.
+fn length(modules: &Section, key: &str) -> Result<f64, JobError> {
+    let metres = modules.number(key)?;
     let longest = f64::from(SIDE_QUANTA_MAX) / f64::from(QUANTA_PER_METRE);
-    if metres <= 0.0 {
-        return Err(entry.out_of_range("a positive number of metres"));
+    match modules.optional(key) {
+        Some(entry) if metres <= 0.0 => Err(entry.out_of_range(entry.expected())),
+        Some(entry) if longest < metres => {
+            let hint = "a load module has 16-bit coordinates of 1/128 m: 500 m is 64,000 of them";
+            Err(entry.out_of_range_with(entry.expected(), hint))
+        }
+        _ => Ok(metres),
     }
-    if longest < metres {
-        let hint = "a load module has 16-bit coordinates of 1/128 m: 500 m is 64,000 of them";
-        return Err(entry.out_of_range_with(format!("at most {SIDE_QUANTA_MAX}/128 m"), hint));
-    }
-    Ok(metres)
 }
 
 fn border_step_cells(entry: &Entry, spacing: Spacing, border_step_m: f64) -> Result<i32, JobError> {
@@ -200,9 +186,8 @@ fn side_cells(modules: &Section, spacing: Spacing, side_m: f64, border_step_m: f
 }
 
 fn grid(area: &Section, spacing: Spacing, side_cells: i32, side_m: f64) -> Result<ModuleGrid, JobError> {
-    let expected = "[width, height] of the area in metres";
-    let entry = area.required("size_m", expected)?;
-    let size_m = entry.pair(expected)?;
+    let entry = area.required("size_m")?;
+    let size_m = entry.pair()?;
     grid_of(&entry, size_m, spacing, side_cells, side_m)
 }
 
@@ -249,7 +234,7 @@ pub(super) fn outer_border(modules: &Section, edges: Edges, method: Method) -> R
     let Some(entry) = modules.optional("outer_border") else {
         return Ok(if needs_fixed.is_some() { OuterBorder::Fixed } else { OuterBorder::Refined });
     };
-    match (entry.word(&[("refined", OuterBorder::Refined), ("fixed", OuterBorder::Fixed)])?, needs_fixed) {
+    match (entry.word()?, needs_fixed) {
         (OuterBorder::Refined, Some(why)) => Err(entry.conflict(
             why,
             "outer_border = \"fixed\", a point every border step",
@@ -260,18 +245,10 @@ pub(super) fn outer_border(modules: &Section, edges: Edges, method: Method) -> R
 }
 
 fn edges(modules: &Section) -> Result<Edges, JobError> {
-    let clip = match modules.optional("edges") {
-        Some(entry) => entry.word(&[("constrained", false), ("clip", true)])?,
-        None => false,
-    };
-    let heights = modules.optional("clip_heights");
-    match (clip, heights) {
-        (true, Some(entry)) => {
-            Ok(Edges::Clip(entry.word(&[("coplanar", ClipHeights::Coplanar), ("dem", ClipHeights::Dem)])?))
-        }
-        (true, None) => Ok(Edges::Clip(ClipHeights::Coplanar)),
-        (false, None) => Ok(Edges::Constrained),
-        (false, Some(entry)) => Err(entry.conflict(
+    match (modules.word("edges")?, modules.optional("clip_heights")) {
+        (Edges::Clip(_), _) => Ok(Edges::Clip(modules.word("clip_heights")?)),
+        (Edges::Constrained, None) => Ok(Edges::Constrained),
+        (Edges::Constrained, Some(entry)) => Err(entry.conflict(
             "edges = \"constrained\"",
             "no clip_heights, since nothing is clipped",
             "remove it, or write edges = \"clip\"",

@@ -2,7 +2,6 @@
 
 use std::path::Path;
 
-use crate::bounds::COUNT_MAX;
 use crate::entry::{Entry, Section};
 use crate::files::{Mention, Place};
 use crate::{JobError, NamedFile, Start, StartMethod};
@@ -19,7 +18,7 @@ pub(super) fn read(
 
 fn file(entry: &Entry, job: &Path, place: Place, mentions: &mut Vec<Mention>) -> Result<NamedFile, JobError> {
     mentions.push(Mention { place, fault: entry.fault("a file") });
-    super::named_file(entry, job)
+    entry.file(job)
 }
 
 fn start(entry: &Entry, job: &Path, mentions: &mut Vec<Mention>) -> Result<Start, JobError> {
@@ -27,7 +26,7 @@ fn start(entry: &Entry, job: &Path, mentions: &mut Vec<Mention>) -> Result<Start
         return file(entry, job, Place::Start, mentions).map(Start::File);
     }
     let table = entry.table()?;
-    let method = table.required("method", "the name of a method")?.word(&StartMethod::NAMED)?;
+    let method = table.required("method")?.word()?;
     let points = match (method, table.optional("points")) {
         (StartMethod::HighLow, None) => None,
         (StartMethod::HighLow, Some(points)) => {
@@ -38,7 +37,7 @@ fn start(entry: &Entry, job: &Path, mentions: &mut Vec<Mention>) -> Result<Start
             let hint = "points = 1000: so many in the whole area";
             return Err(table.missing("points", "a number of points to start from", hint));
         }
-        (_, Some(points)) => Some(points.whole(1..=COUNT_MAX, "a number of points in the whole area")?),
+        (_, Some(points)) => Some(points.whole()?),
     };
     Ok(Start::Method { method, points })
 }

@@ -4,19 +4,15 @@ use std::path::Path;
 
 use terrain::{HOLE_CLASS, THOUSANDTHS};
 
-use crate::bounds::{AREAS_MAX, CLASSES_MAX, NAME_CHARS_MAX, SLOPE_PERCENT_MAX, SMOOTH_M_MAX, WEIGHT_MAX};
+use crate::bounds::{AREAS_MAX, CLASSES_MAX, SLOPE_PERCENT_MAX, WEIGHT_MAX};
 use crate::entry::{Entry, Section};
 use crate::files::{Mention, Place};
-use crate::{
-    AreaShape, DemSource, HOLE_CLASS_NAME, ImportanceArea, ImportanceSpec, JobError, SampleClass, Smooth, WaterSpec,
-};
+use crate::{AreaShape, DemSource, HOLE_CLASS_NAME, ImportanceArea, ImportanceSpec, JobError, WaterSpec};
 
 /// What class 0 is called.
 const DEFAULT_CLASS: &str = "default";
 /// What the class of water is called, unless the job says otherwise.
 const WATER_CLASS: &str = "water";
-/// No water on Earth lies farther from the level of the sea.
-const LEVEL_M_MAX: f64 = 10_000.0;
 
 pub(super) fn read(
     importance: &Section,
@@ -24,16 +20,14 @@ pub(super) fn read(
     job: &Path,
     mentions: &mut Vec<Mention>,
 ) -> Result<ImportanceSpec, JobError> {
-    let default_weight = importance.optional("default").map_or(Ok(THOUSANDTHS), |entry| weight(&entry))?;
-    let smooth = match importance.optional("smooth") {
-        Some(entry) => entry.word(&[("binomial-7", Smooth::Binomial7), ("none", Smooth::None)])?,
-        None => Smooth::Binomial7,
-    };
+    let usual = importance.number("default")? * f64::from(THOUSANDTHS);
+    let default_weight = importance.optional("default").map_or(Ok(usual as u16), |entry| weight(&entry))?;
+    let smooth = importance.word("smooth")?;
     let mut spec = ImportanceSpec { default_weight, areas: vec![], classes: vec![DEFAULT_CLASS.to_owned()], smooth };
     let Some(areas) = importance.optional("areas") else { return Ok(spec) };
-    let items = areas.list("a list of areas, each { file = … } or { raster = …, value = … } or { sample = … }")?;
+    let items = areas.list()?;
     if AREAS_MAX < items.len() {
-        return Err(areas.out_of_range(format!("at most {AREAS_MAX} areas")));
+        return Err(areas.out_of_range(areas.expected()));
     }
     for item in &items {
         let table = item.table()?;
@@ -43,25 +37,22 @@ pub(super) fn read(
             mentions.push(Mention { place: Place::ImportanceArea(spec.areas.len()), fault });
         }
         let class = class(&table, &mut spec.classes)?;
-        let entry = table.required("weight", "a weight from 0 to 65.535")?;
-        spec.areas.push(ImportanceArea { shape, class, weight: weight(&entry)? });
+        spec.areas.push(ImportanceArea { shape, class, weight: weight(&table.required("weight")?)? });
     }
     Ok(spec)
 }
 
 /// A weight in thousandths.
 fn weight(entry: &Entry) -> Result<u16, JobError> {
-    let expected = format!("a weight from 0 to {WEIGHT_MAX}, in whole thousandths");
-    let thousandths = entry.number_in(0.0..=WEIGHT_MAX, &expected)? * f64::from(THOUSANDTHS);
+    let weight = entry.number()?;
+    let thousandths = weight * f64::from(THOUSANDTHS);
     // A decimal such as 0.001 is not exact in binary; what is meant is plain within a millionth.
     const SLACK: f64 = 1.0e-6;
-    if SLACK < (thousandths - thousandths.round()).abs() {
-        return Err(entry.out_of_range(expected));
+    if !(0.0..=WEIGHT_MAX).contains(&weight) || SLACK < (thousandths - thousandths.round()).abs() {
+        return Err(entry.out_of_range(entry.expected()));
     }
     Ok(thousandths.round() as u16)
 }
-
-const VALUE: &str = "the value of the class in the raster";
 
 fn shape(item: &Entry, table: &Section, dem: &DemSource, job: &Path) -> Result<AreaShape, JobError> {
     let (file, raster) = (table.optional("file"), table.optional("raster"));
@@ -82,8 +73,8 @@ fn shape(item: &Entry, table: &Section, dem: &DemSource, job: &Path) -> Result<A
             None => polygons(&file, job),
         },
         (None, Some(raster), None) => {
-            let value = table.required("value", VALUE)?.signed(VALUE)?;
-            Ok(AreaShape::RasterValue { file: super::named_file(&raster, job)?, value })
+            let value = table.required("value")?.signed()?;
+            Ok(AreaShape::RasterValue { file: raster.file(job)?, value })
         }
         (None, None, Some(sample)) => sample_class(&sample, dem),
         _ => Err(JobError::Conflict(item.fault(
@@ -95,14 +86,11 @@ fn shape(item: &Entry, table: &Section, dem: &DemSource, job: &Path) -> Result<A
 
 /// Ground steeper than so much, on the mean of what lies within a radius.
 fn slope(above: &Entry, table: &Section) -> Result<AreaShape, JobError> {
-    let percent = format!("a slope in percent, above 0 and at most {SLOPE_PERCENT_MAX}, in whole thousandths");
-    let thousandths = (above.number(&percent)? * 1000.0).round();
+    let thousandths = (above.number()? * 1000.0).round();
     if !(1.0 <= thousandths && thousandths <= SLOPE_PERCENT_MAX * 1000.0) {
-        return Err(above.out_of_range(percent));
+        return Err(above.out_of_range(above.expected()));
     }
-    let expected = format!("metres from 0 to {SMOOTH_M_MAX}");
-    let smooth = table.required("smooth_m", &expected)?;
-    let millimetres = (smooth.number_in(0.0..=SMOOTH_M_MAX, &expected)? * 1000.0).round();
+    let millimetres = (table.required("smooth_m")?.number()? * 1000.0).round();
     Ok(AreaShape::Slope { above: thousandths as u32, smooth_mm: millimetres as u32 })
 }
 
@@ -116,27 +104,26 @@ pub(super) fn water(
     let Some(entry) = dem.optional("water") else { return Ok(None) };
     mentions.push(Mention { place: Place::Water, fault: entry.fault("a file of polygons") });
     if !entry.is_table() {
-        let (file, class) = (super::named_file(&entry, job)?, class_index(&entry, WATER_CLASS, &mut spec.classes)?);
+        let (file, class) = (entry.file(job)?, class_index(&entry, WATER_CLASS, &mut spec.classes)?);
         return Ok(Some(WaterSpec { file, level_m: None, class, weight: None }));
     }
     let table = entry.table()?;
-    let file = super::named_file(&table.required("file", "the path of a file of polygons")?, job)?;
-    let expected = format!("a height in metres within {LEVEL_M_MAX} of 0");
-    let level = table.optional("level_m").map(|level| level.number_in(-LEVEL_M_MAX..=LEVEL_M_MAX, &expected));
+    let file = table.required("file")?.file(job)?;
+    let level_m = table.optional("level_m").map(|level| level.number()).transpose()?;
     let class = match table.optional("class") {
         Some(_) => class(&table, &mut spec.classes)?,
         None => class_index(&entry, WATER_CLASS, &mut spec.classes)?,
     };
     let weight = table.optional("weight").map(|entry| weight(&entry)).transpose()?;
-    Ok(Some(WaterSpec { file, level_m: level.transpose()?, class, weight }))
+    Ok(Some(WaterSpec { file, level_m, class, weight }))
 }
 
 fn polygons(entry: &Entry, job: &Path) -> Result<AreaShape, JobError> {
-    Ok(AreaShape::Polygons { file: super::named_file(entry, job)? })
+    Ok(AreaShape::Polygons { file: entry.file(job)? })
 }
 
 fn sample_class(entry: &Entry, dem: &DemSource) -> Result<AreaShape, JobError> {
-    let class = entry.word(&[("mountains", SampleClass::Mountains)])?;
+    let class = entry.word()?;
     match dem {
         DemSource::Sample { .. } => Ok(AreaShape::Sample(class)),
         DemSource::Files { .. } => Err(entry.conflict(
@@ -149,13 +136,8 @@ fn sample_class(entry: &Entry, dem: &DemSource) -> Result<AreaShape, JobError> {
 
 /// The index of the area's class; a name not met before gets the next one.
 fn class(table: &Section, classes: &mut Vec<String>) -> Result<u8, JobError> {
-    let expected = format!("the name of a class, 1 to {NAME_CHARS_MAX} characters");
-    let entry = table.required("class", &expected)?;
-    let name = entry.text(&expected)?;
-    if name.trim().is_empty() || NAME_CHARS_MAX < name.chars().count() || name.chars().any(char::is_control) {
-        return Err(entry.out_of_range(expected));
-    }
-    class_index(&entry, name, classes)
+    let entry = table.required("class")?;
+    class_index(&entry, &entry.prose(char::is_control)?, classes)
 }
 
 fn class_index(entry: &Entry, name: &str, classes: &mut Vec<String>) -> Result<u8, JobError> {

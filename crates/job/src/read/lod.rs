@@ -2,7 +2,7 @@
 
 use crate::bounds::COARSER_LEVELS_MAX;
 use crate::entry::{Entry, Section};
-use crate::{JobError, LodBorder, LodSpec};
+use crate::{JobError, LodSpec};
 
 pub(super) fn read(lod: &Section) -> Result<LodSpec, JobError> {
     let inner_shares = lod.optional("levels").map_or(Ok(Vec::new()), |entry| inner_shares(&entry))?;
@@ -11,26 +11,23 @@ pub(super) fn read(lod: &Section) -> Result<LodSpec, JobError> {
             let hint = "it says what coarser levels keep of the sides: add levels, or leave it out";
             return Err(entry.conflict("no levels", "a job without this key", hint));
         }
-        Some(entry) => entry.word(&[("full", LodBorder::Full), ("own", LodBorder::Own)])?,
-        None => LodBorder::Full,
+        _ => lod.word("border")?,
     };
     Ok(LodSpec { inner_shares, border })
 }
 
 fn inner_shares(levels: &Entry) -> Result<Vec<f64>, JobError> {
-    let expected = format!("a list of at most {COARSER_LEVELS_MAX} levels, each coarser than the one before");
-    let entries = levels.list(&expected)?;
+    let entries = levels.list()?;
     if COARSER_LEVELS_MAX < entries.len() {
         let hint = "the finest level is always there and is not listed";
-        return Err(levels.out_of_range_with(expected, hint));
+        return Err(levels.out_of_range_with(levels.expected(), hint));
     }
     let mut shares: Vec<f64> = Vec::new();
     for entry in entries {
-        let expected = "the share of inner vertices that the level keeps, above 0 and below 1";
-        let share = entry.table()?.required("inner_share", expected)?;
-        let number = share.number(expected)?;
+        let share = entry.table()?.required("inner_share")?;
+        let number = share.number()?;
         if number <= 0.0 || 1.0 <= number {
-            return Err(share.out_of_range(expected));
+            return Err(share.out_of_range(share.expected()));
         }
         if let Some(&finer) = shares.last().filter(|&&finer| finer <= number) {
             let expected = format!("less than {finer}, the share of the level before");

@@ -13,9 +13,9 @@ use std::path::Path;
 
 use toml::de::DeTable;
 
-use crate::entry::{Document, Entry, Section, check_sections};
+use crate::entry::{Document, Section, check_sections};
 use crate::files::Mention;
-use crate::{AreaPlace, DemSource, FindArea, Job, JobError, NamedFile, NoArea, SourceFile, files};
+use crate::{AreaPlace, DemSource, FindArea, Job, JobError, NoArea, SourceFile, files};
 
 /// The sections of a job file, their keys known.
 struct Sections<'a> {
@@ -63,12 +63,12 @@ fn job_of(sections: &Sections, path: &Path, find: Option<&FindArea>) -> Result<(
             expected: "origin_m and size_m".into(),
             hint: "give numbers, or a job file".into(),
         };
-        let find = find.ok_or_else(|| alone().at(entry))?;
+        let find = find.ok_or_else(|| entry.no_area(alone()))?;
         let files = match request.place {
             AreaPlace::CoverDem => files_of(&sections.dem, path)?,
             AreaPlace::Around { .. } => Vec::new(),
         };
-        find(request, &files).map_err(|none| none.at(entry))
+        find(request, &files).map_err(|none| entry.no_area(none))
     })?;
     let mut dem = dem::read(&sections.dem, path, &mut mentions)?;
     let mut importance = importance::read(&sections.importance, &dem.source, path, &mut mentions)?;
@@ -99,14 +99,4 @@ fn syntax(document: Document, error: &toml::de::Error) -> JobError {
     let column = 1 + before.chars().rev().take_while(|c| *c != '\n').count();
     let message = error.message().lines().next().unwrap_or("unreadable").to_owned();
     JobError::Syntax { path: document.path.to_owned(), line: 1 + before.matches('\n').count(), column, message }
-}
-
-/// The file that `entry` names, relative to the folder of the job.
-fn named_file(entry: &Entry, job: &Path) -> Result<NamedFile, JobError> {
-    let written = entry.text("the path of a file")?;
-    if written.is_empty() || written.contains('\0') {
-        return Err(entry.out_of_range("the path of a file, relative to the job file"));
-    }
-    let folder = job.parent().unwrap_or(Path::new(""));
-    Ok(NamedFile { written: written.to_owned(), path: folder.join(written) })
 }

@@ -2,12 +2,9 @@
 
 use terrain::ModuleGrid;
 
-use crate::bounds::{TILES_DEFAULT, TILES_MAX};
-use crate::entry::Section;
-use crate::{Borders, JobError, TileOrder, TilesSpec};
-
-/// Load modules a tile is at least wide, unless it spans the area.
-const MODULES_PER_TILE_MIN: u32 = 2;
+use crate::bounds::{MODULES_PER_TILE_MIN, TILES_MAX};
+use crate::entry::{Section, in_32_bits};
+use crate::{JobError, TilesSpec};
 
 pub(super) fn read(tiles: &Section, grid: &ModuleGrid) -> Result<TilesSpec, JobError> {
     let rows = along(tiles, "rows", grid.rows)?;
@@ -17,25 +14,22 @@ pub(super) fn read(tiles: &Section, grid: &ModuleGrid) -> Result<TilesSpec, JobE
     {
         return Err(entry.out_of_range(format!("at most {TILES_MAX} tiles, rows times columns")));
     }
-    let order = match tiles.optional("order") {
-        Some(entry) => entry.word(&[("colour", TileOrder::Color), ("raster", TileOrder::Raster)])?,
-        None => TileOrder::Color,
-    };
-    let words = [("inherit", Some(Borders::Inherit)), ("regular", Some(Borders::Regular)), ("line", None)];
-    let borders = match tiles.optional("borders") {
-        Some(entry) => {
-            let known = entry.word(&words)?;
-            known.ok_or_else(|| entry.unsupported("\"inherit\" or \"regular\"", "\"inherit\" is the usual one"))?
+    match tiles.optional("borders") {
+        Some(entry) if entry.text()? == "line" => {
+            Err(entry.unsupported(&entry.expected(), "\"inherit\" is the usual one"))
         }
-        None => Borders::Inherit,
-    };
-    Ok(TilesSpec { rows, columns, order, borders })
+        _ => Ok(TilesSpec { rows, columns, order: tiles.word("order")?, borders: tiles.word("borders")? }),
+    }
 }
 
 /// How many tiles there are along one side of the area: as the job says, or the usual number, fewer where they
 /// would be too narrow.
 fn along(tiles: &Section, key: &str, modules: u32) -> Result<u32, JobError> {
     let most = (modules / MODULES_PER_TILE_MIN).max(1);
-    let Some(entry) = tiles.optional(key) else { return Ok(TILES_DEFAULT.min(most)) };
-    entry.whole_u32(1..=most, &format!("tiles of {modules} load modules, at least two each"))
+    match tiles.optional(key) {
+        Some(entry) => entry
+            .whole_in(&(1..=most.into()), &format!("tiles of {modules} load modules, at least two each"))
+            .map(in_32_bits),
+        None => tiles.whole_u32(key).map(|usual| usual.min(most)),
+    }
 }

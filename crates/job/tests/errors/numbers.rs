@@ -6,8 +6,8 @@ use crate::{check, told_of};
 fn a_title_is_a_line_of_text() {
     for title in [r#""""#, r#""  ""#, r#""a\nb""#] {
         let told = told_of("name", &format!("name = \"ntc\"\ntitle = {title}"));
-        let expected = "expected a line of 1 to 200 characters hint: it stands above report.html; leave it out for the \
-                        area's name";
+        let expected = "expected a line of text, 1 to 200 characters hint: for example title = \"National Training \
+                        Center, west\"";
         assert!(told.starts_with("a/b.toml:3: area.title: found") && told.ends_with(expected), "{told}");
     }
 }
@@ -46,7 +46,7 @@ fn names_and_coordinate_systems_are_checked() {
         r#"crs = "EPSG:4326""#,
         &[
             r#"a/b.toml:3: area.crs: found "EPSG:4326", which is in degrees, expected a projected coordinate"#,
-            r#"system in metres, as "EPSG:32611""#,
+            r#"system in metres, as "EPSG:32611", or "auto" with around or cover"#,
             "hint: UTM zone 11 north on WGS 84 is EPSG:32611, zone 32 north EPSG:32632",
         ],
     );
@@ -55,7 +55,7 @@ fn names_and_coordinate_systems_are_checked() {
         r#"crs = "UTM 11N""#,
         &[
             r#"a/b.toml:3: area.crs: found "UTM 11N", expected a projected coordinate system in metres, as"#,
-            r#""EPSG:32611""#,
+            r#""EPSG:32611", or "auto" with around or cover"#,
             "hint: UTM zone 11 north on WGS 84 is EPSG:32611, zone 32 north EPSG:32632",
         ],
     );
@@ -64,7 +64,7 @@ fn names_and_coordinate_systems_are_checked() {
         r#"crs = "EPSG:99""#,
         &[
             r#"a/b.toml:3: area.crs: found "EPSG:99", expected a projected coordinate system in metres, as"#,
-            r#""EPSG:32611""#,
+            r#""EPSG:32611", or "auto" with around or cover"#,
             "hint: UTM zone 11 north on WGS 84 is EPSG:32611, zone 32 north EPSG:32632",
         ],
     );
@@ -73,7 +73,7 @@ fn names_and_coordinate_systems_are_checked() {
         r#"source = "sample"
 vertical_datum = " ""#,
         &[
-            r#"a/b.toml:9: dem.vertical_datum: found " ", expected a name such as "EGM96", at most 64 characters"#,
+            r#"a/b.toml:9: dem.vertical_datum: found " ", expected a name such as "EGM96", 1 to 64 characters"#,
             r#"hint: for example vertical_datum = "EGM96""#,
         ],
     );
@@ -139,7 +139,7 @@ fn numbers_that_are_not_finite_are_refused() {
         "side_m = 1e999",
         &[
             "a/b.toml:14: load_modules.side_m: found 1e999, expected a finite number: a positive number of",
-            "metres",
+            "metres, at most 65535/128",
             "hint: for example side_m = 500",
         ],
     );
@@ -210,7 +210,7 @@ fn zero_negative_and_huge_sizes_are_refused() {
         "side_m",
         "side_m = 0",
         &[
-            "a/b.toml:14: load_modules.side_m: found 0, expected a positive number of metres",
+            "a/b.toml:14: load_modules.side_m: found 0, expected a positive number of metres, at most 65535/128",
             "hint: for example side_m = 500",
         ],
     );
@@ -218,7 +218,7 @@ fn zero_negative_and_huge_sizes_are_refused() {
         "side_m",
         "side_m = -500",
         &[
-            "a/b.toml:14: load_modules.side_m: found -500, expected a positive number of metres",
+            "a/b.toml:14: load_modules.side_m: found -500, expected a positive number of metres, at most 65535/128",
             "hint: for example side_m = 500",
         ],
     );
@@ -226,7 +226,7 @@ fn zero_negative_and_huge_sizes_are_refused() {
         "side_m",
         "border_step_m = 0",
         &[
-            "a/b.toml:14: load_modules.border_step_m: found 0, expected a positive number of metres",
+            "a/b.toml:14: load_modules.border_step_m: found 0, expected a positive number of metres, at most 65535/128",
             "hint: for example border_step_m = 125",
         ],
     );
@@ -234,7 +234,7 @@ fn zero_negative_and_huge_sizes_are_refused() {
         "side_m",
         "side_m = 1000",
         &[
-            "a/b.toml:14: load_modules.side_m: found 1000, expected at most 65535/128 m",
+            "a/b.toml:14: load_modules.side_m: found 1000, expected a positive number of metres, at most 65535/128",
             "hint: a load module has 16-bit coordinates of 1/128 m: 500 m is 64,000 of them",
         ],
     );

@@ -35,7 +35,7 @@ seed = 3"#,
         "source",
         "sources = []",
         &[
-            "a/b.toml:8: dem.sources: found [], expected 1 to 65536 paths or patterns",
+            "a/b.toml:8: dem.sources: found [], expected a list of 1 to 65536 paths and patterns of rasters",
             r#"hint: for example sources = ["dem/*.tif"]"#,
         ],
     );
@@ -260,7 +260,7 @@ points = 9
 proximity_m = false"#,
         &[
             "a/b.toml:20: tin.proximity_m: found the truth value false, expected [horizontal, vertical] in",
-            "metres, neither negative",
+            "metres, neither negative nor above 131071",
             "hint: for example proximity_m = [300, 20]",
         ],
     );

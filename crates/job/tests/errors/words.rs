@@ -150,7 +150,7 @@ fn missing_keys_are_told_with_an_example() {
         "",
         &[
             "a/b.toml:1: area.crs: found nothing, expected a projected coordinate system in metres, as",
-            r#""EPSG:32611""#,
+            r#""EPSG:32611", or "auto" with around or cover"#,
             r#"hint: for example crs = "EPSG:32611""#,
         ],
     );
@@ -202,7 +202,7 @@ fn missing_keys_are_told_with_an_example() {
         r#"areas = [{ raster = "c.tif", class = "m", weight = 1 }]"#,
         &[
             "a/b.toml:10: importance.areas[0].value: found nothing, expected the value of the class in the",
-            "raster",
+            "raster, a whole number",
             r#"hint: for example { raster = "class.tif", value = 3, class = "mountains", weight = 1 }"#,
         ],
     );
@@ -219,7 +219,8 @@ fn missing_keys_are_told_with_an_example() {
         "default",
         r#"areas = [{ sample = "mountains", class = "m" }]"#,
         &[
-            "a/b.toml:10: importance.areas[0].weight: found nothing, expected a weight from 0 to 65.535",
+            "a/b.toml:10: importance.areas[0].weight: found nothing, expected a weight from 0 to 65.535,",
+            "in whole thousandths",
             "hint: for example weight = 1; 0 excludes posts from selection",
         ],
     );
@@ -301,8 +302,8 @@ fn values_of_the_wrong_type_are_told_as_written() {
         "source",
         r#"sources = "dem.tif""#,
         &[
-            r#"a/b.toml:8: dem.sources: found the text "dem.tif", expected a list of paths and patterns of"#,
-            "rasters",
+            r#"a/b.toml:8: dem.sources: found the text "dem.tif", expected a list of 1 to 65536 paths and"#,
+            "patterns of rasters",
             r#"hint: for example sources = ["dem/*.tif"]"#,
         ],
     );
@@ -310,8 +311,9 @@ fn values_of_the_wrong_type_are_told_as_written() {
         "default",
         r#"areas = { sample = "mountains" }"#,
         &[
-            r#"a/b.toml:10: importance.areas: found the table { sample = "mountains" }, expected a list of areas,"#,
-            "each { file = … } or { raster = …, value = … } or { sample = … }",
+            r#"a/b.toml:10: importance.areas: found the table { sample = "mountains" }, expected a list of at most"#,
+            "1000 areas, each { file = … } or { raster = …, value = … } or { sample = … } or",
+            "{ slope_above_percent = … }",
             r#"hint: for example areas = [{ file = "mountains.geojson", class = "mountains", weight = 1 }]"#,
         ],
     );

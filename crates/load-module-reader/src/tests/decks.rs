@@ -2,14 +2,16 @@
 
 use std::sync::Arc;
 
-use super::{Draw, SIDE, rough};
-use crate::{Area, Block, Decks, Ground, Keep, Module, Sample, Sight, TerrainModule, TileFile, Vertex, sample};
+use fastrand::Rng;
+
+use super::{SIDE, rough};
+use crate::{Area, Block, Decks, Keep, LoadedGround, Module, Sample, Sight, TerrainModule, TileFile, Vertex, sample};
 
 const BLOCK: Block = Block { south: 2, west: 3, north: 3, east: 5 };
 /// South-west corner of load module 2,3.
 const CORNER: [f64; 2] = [501_500.0, 3_876_000.25];
 
-fn sample_ground() -> Ground {
+fn sample_ground() -> LoadedGround {
     let file = TileFile::of_bytes("sample", Arc::new(sample::with_decks())).unwrap();
     Area::of_files(vec![file]).unwrap().load(BLOCK).unwrap()
 }
@@ -129,12 +131,12 @@ fn every_damage_of_a_file_with_decks_is_found_when_it_is_paged() {
 
 /// Triangles anywhere above a rough load module, some of them above others.
 fn with_random_decks(count: u16, seed: u64) -> Module {
-    let mut draw = Draw(seed);
+    let mut draw = Rng::with_seed(seed);
     let mut decks = Decks::default();
     while decks.triangles.len() < usize::from(count) {
         let mut vertex = || {
-            let [x, y] = [0, 1].map(|_| draw.below(u64::from(SIDE) + 1) as u16);
-            Vertex { x, y, z: draw.below(40_000) as i32 }
+            let [x, y] = [0, 1].map(|_| draw.u16(..=SIDE));
+            Vertex { x, y, z: draw.i32(0..40_000) }
         };
         let [a, b, c] = [vertex(), vertex(), vertex()];
         let [ax, ay, bx, by, cx, cy] = [a.x, a.y, b.x, b.y, c.x, c.y].map(i64::from);
@@ -142,7 +144,7 @@ fn with_random_decks(count: u16, seed: u64) -> Module {
         if 0 < (bx - ax) * (cy - ay) - (by - ay) * (cx - ax) {
             decks.vertices.extend([a, b, c]);
             decks.triangles.push([first, first + 1, first + 2]);
-            decks.classes.push(draw.below(9) as u8);
+            decks.classes.push(draw.u8(..9));
         }
     }
     Module { decks, ..rough(9, seed) }
@@ -161,12 +163,12 @@ fn heights_below_a_ceiling_equal_those_of_a_search_through_all_decks() {
     for (count, seed) in [(1, 1), (7, 2), (60, 3), (500, 4)] {
         let module = with_random_decks(count, seed);
         let prepared = Arc::new(TerrainModule::new(module.clone(), SIDE));
-        let ground = sample_ground().with_modules(vec![Arc::clone(&prepared), prepared]);
-        let mut draw = Draw(seed);
+        let ground = sample_ground().with_modules(BLOCK, vec![Arc::clone(&prepared), prepared]);
+        let mut draw = Rng::with_seed(seed);
         let mut asked = Vec::new();
         for _ in 0..500 {
-            let place = [0, 1].map(|_| draw.below(u64::from(SIDE)) as f64);
-            let ceiling_m = draw.below(400) as f64;
+            let place = [0, 1].map(|_| f64::from(draw.u16(..SIDE)));
+            let ceiling_m = f64::from(draw.u16(..400));
             let held = module.decks.triangles.iter().filter_map(|&triangle| {
                 let [a, b, c] = corners(&module.decks, triangle);
                 let shares = [left(b, c, place), left(c, a, place), left(a, b, place)];
@@ -221,13 +223,13 @@ fn lines_of_sight_end_where_they_go_through_a_deck() {
     let bare = Module { decks: Decks::default(), ..module.clone() };
     let ground = |module: Module| {
         let prepared = Arc::new(TerrainModule::new(module, SIDE));
-        sample_ground().with_modules(vec![Arc::clone(&prepared), prepared])
+        sample_ground().with_modules(BLOCK, vec![Arc::clone(&prepared), prepared])
     };
     let (bridged, bare) = (ground(module.clone()), ground(bare));
-    let mut draw = Draw(17);
+    let mut draw = Rng::with_seed(17);
     let (mut through_decks, mut free) = (0, 0);
     for _ in 0..2000 {
-        let mut end = || [0, 1, 2].map(|axis| draw.below(if axis < 2 { 64_000 } else { 40_000 }) as f64);
+        let mut end = || [0, 1, 2].map(|axis| f64::from(draw.u16(..if axis < 2 { 64_000 } else { 40_000 })));
         let (from, to) = (end(), end());
         let world = |p: [f64; 3]| [at(p[0], p[1])[0], at(p[0], p[1])[1], p[2] / 128.0];
         let of_ground = match bare.sight(world(from), world(to)) {
@@ -270,14 +272,14 @@ fn no_line_slips_through_where_triangles_of_a_deck_meet() {
     decks.classes = vec![1; decks.triangles.len()];
     let module = Module { decks, ..rough(1, 1) };
     let prepared = Arc::new(TerrainModule::new(module, SIDE));
-    let ground = sample_ground().with_modules(vec![Arc::clone(&prepared), prepared]);
-    let mut draw = Draw(23);
+    let ground = sample_ground().with_modules(BLOCK, vec![Arc::clone(&prepared), prepared]);
+    let mut draw = Rng::with_seed(23);
     for _ in 0..3000 {
         // Places on vertices and edges, so that lines run along edges and through vertices.
-        let mut place = || [0, 1].map(|_| (4000 * (1 + draw.below(14))) as f64);
+        let mut place = || [0, 1].map(|_| f64::from(4000 * (1 + draw.u32(..14))));
         let (a, b) = (place(), place());
         let world = |[x, y]: [f64; 2], up: f64| [at(x, y)[0], at(x, y)[1], up];
-        let (over, under) = (world(a, 470.0 + draw.below(9) as f64), world(b, 460.0 - draw.below(90) as f64));
+        let (over, under) = (world(a, 470.0 + f64::from(draw.u8(..9))), world(b, 460.0 - f64::from(draw.u8(..90))));
         assert!(matches!(ground.sight(over, under), Sight::Hidden(share) if 0.0 < share), "{a:?} {b:?}");
         assert!(matches!(ground.sight(under, over), Sight::Hidden(share) if 0.0 < share), "{b:?} {a:?}");
         assert_eq!(ground.sight(over, world(b, 470.0)), Sight::Free);

@@ -4,30 +4,19 @@ mod decks;
 
 use std::sync::Arc;
 
+use fastrand::Rng;
+
 use crate::lookup::STEPS;
 use crate::{
-    Area, Block, Decks, Ground, Keep, Module, ReadError, Residual, Sight, SlmFile, TerrainModule, TileFile, Vertex,
-    sample,
+    Area, Block, Decks, Keep, LoadedGround, Module, ReadError, Residual, Sight, SlmFile, TerrainModule, TileFile,
+    Vertex, sample,
 };
 
 const SIDE: u16 = 64_000;
 
-/// SplitMix64.
-struct Draw(u64);
-
-impl Draw {
-    fn below(&mut self, bound: u64) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        (z ^ (z >> 31)) % bound
-    }
-}
-
 /// A load module over `n` x `n` squares whose inner corners are shaken, each cut along one diagonal or the other.
 fn rough(n: u16, seed: u64) -> Module {
-    let mut draw = Draw(seed);
+    let mut draw = Rng::with_seed(seed);
     let step = SIDE / n;
     let mut vertices = Vec::new();
     for row in 0..=n {
@@ -35,10 +24,10 @@ fn rough(n: u16, seed: u64) -> Module {
             let mut shaken = |index: u16| match index {
                 0 => 0,
                 _ if index == n => SIDE,
-                _ => index * step + draw.below(u64::from(step / 2)) as u16 - step / 4,
+                _ => index * step + draw.u16(..step / 2) - step / 4,
             };
             let (x, y) = (shaken(col), shaken(row));
-            vertices.push(Vertex { x, y, z: draw.below(20_000) as i32 });
+            vertices.push(Vertex { x, y, z: draw.i32(0..20_000) });
         }
     }
     let mut triangles = Vec::new();
@@ -46,7 +35,7 @@ fn rough(n: u16, seed: u64) -> Module {
         for col in 0..n {
             let at = |row: u16, col: u16| row * (n + 1) + col;
             let [a, b, c, d] = [at(row, col), at(row, col + 1), at(row + 1, col + 1), at(row + 1, col)];
-            match draw.below(2) {
+            match draw.u8(..2) {
                 0 => triangles.extend([[a, b, c], [a, c, d]]),
                 _ => triangles.extend([[a, b, d], [b, c, d]]),
             }
@@ -92,9 +81,9 @@ fn heights_equal_those_of_a_search_through_all_triangles() {
     for (n, seed) in [(1, 1), (2, 2), (5, 3), (13, 4), (40, 5)] {
         let module = rough(n, seed);
         let prepared = TerrainModule::new(module.clone(), SIDE);
-        let mut draw = Draw(seed);
+        let mut draw = Rng::with_seed(seed);
         for _ in 0..2000 {
-            let place = [0, 1].map(|_| draw.below(u64::from(SIDE) * STEPS as u64 + 1) as i64);
+            let place = [0, 1].map(|_| draw.i64(0..=i64::from(SIDE) * STEPS));
             let found = prepared.lookup().height_m(place).expect("some triangle holds every place");
             let expected = by_search(&module, place.map(|steps| steps as f64 / STEPS as f64));
             assert!((found - expected).abs() < 1e-6, "seed {seed} at {place:?}: {found}, expected {expected}");
@@ -112,7 +101,7 @@ fn sample_area() -> Area {
 }
 
 /// Both load modules of the sample: 2,3 is level at 5 m, 2,4 a pit whose bottom lies below zero.
-fn sample_ground() -> Ground {
+fn sample_ground() -> LoadedGround {
     sample_area().load(Block { south: 2, west: 3, north: 3, east: 5 }).unwrap()
 }
 
@@ -166,14 +155,15 @@ fn a_line_of_sight_agrees_with_small_steps() {
     let module = rough(9, 7);
     let mut file = sample_ground();
     let prepared = Arc::new(TerrainModule::new(module.clone(), SIDE));
-    file = file.with_modules(vec![Arc::clone(&prepared), prepared]);
+    let block = file.block();
+    file = file.with_modules(block, vec![Arc::clone(&prepared), prepared]);
     let [east, north] = [501_500.0, 3_876_000.25];
-    let mut draw = Draw(11);
+    let mut draw = Rng::with_seed(11);
     let (mut hidden, mut free) = (0, 0);
     for _ in 0..400 {
-        let mut place = || [0, 1].map(|_| draw.below(500_000) as f64 / 1000.0);
+        let mut place = || [0, 1].map(|_| f64::from(draw.u32(..500_000)) / 1000.0);
         let (from, to) = (place(), place());
-        let (up, over) = (draw.below(160) as f64, draw.below(160) as f64);
+        let (up, over) = (f64::from(draw.u32(..160)), f64::from(draw.u32(..160)));
         let at = |share: f64| {
             let local = [0, 1].map(|axis| from[axis] + share * (to[axis] - from[axis]));
             let ground = by_search(&module, local.map(|metres| metres * 128.0));
@@ -402,9 +392,9 @@ fn splinters_across_a_load_module_take_no_more_room_than_other_triangles() {
         let prepared = TerrainModule::new(module.clone(), SIDE);
         let words = prepared.lookup().word_count() as u64;
         assert!(words <= 16_385 + 7 * 64 * u64::from(count + 2), "{count}: {words} words");
-        let mut draw = Draw(3);
+        let mut draw = Rng::with_seed(3);
         for _ in 0..50 {
-            let place = [0, 1].map(|_| draw.below(u64::from(SIDE) * STEPS as u64 + 1) as i64);
+            let place = [0, 1].map(|_| draw.i64(0..=i64::from(SIDE) * STEPS));
             let found = prepared.lookup().height_m(place).expect("some triangle holds every place");
             let expected = by_search(&module, place.map(|steps| steps as f64 / STEPS as f64));
             assert!((found - expected).abs() < 1e-3, "{count} at {place:?}: {found}, expected {expected}");

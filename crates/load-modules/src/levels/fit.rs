@@ -3,9 +3,8 @@
 //! The normal equations couple vertices that share a triangle; conjugate gradients solve them, always in the same
 //! order of operations, so the heights are the same on every machine.
 
-use super::is_inside;
+use super::level_mesh::{LevelMesh, is_inside};
 use super::posts::Posts;
-use super::sheet::Sheet;
 
 /// Added to every vertex's own coefficient: a vertex that hardly any post asks for stays where it was.
 const DAMPING: f64 = 0.01;
@@ -23,7 +22,7 @@ struct Element {
 }
 
 /// Moves the vertices inside to the heights that fit best, rounded to quanta, and brings squares up to date.
-pub(super) fn fit_heights(sheet: &mut Sheet, side: u16, posts: &Posts) {
+pub(super) fn fit_heights(sheet: &mut LevelMesh, side: u16, posts: &Posts) {
     let is_free: Vec<bool> = sheet.vertices.iter().map(|&vertex| is_inside(vertex, side)).collect();
     if !is_free.contains(&true) {
         return;
@@ -42,7 +41,7 @@ pub(super) fn fit_heights(sheet: &mut Sheet, side: u16, posts: &Posts) {
 }
 
 /// How low and how high a vertex may go: as far again as the load module's vertices lie apart.
-fn relief(sheet: &Sheet) -> (f64, f64) {
+fn relief(sheet: &LevelMesh) -> (f64, f64) {
     let heights = || sheet.vertices.iter().map(|vertex| vertex.z);
     let (low, high) = (heights().min().unwrap_or(0), heights().max().unwrap_or(0));
     let (low, high) = (f64::from(low), f64::from(high));
@@ -50,7 +49,7 @@ fn relief(sheet: &Sheet) -> (f64, f64) {
 }
 
 /// The products of shares under a triangle; adds the residuals times the shares to `pull`.
-fn element(sheet: &Sheet, corners: [u16; 3], posts: &Posts, pull: &mut [f64]) -> Element {
+fn element(sheet: &LevelMesh, corners: [u16; 3], posts: &Posts, pull: &mut [f64]) -> Element {
     let mut element = Element { corners, own: [0.0; 3], other: [0.0; 3] };
     let mut sums = [0.0; 3];
     posts.each_share(sheet.corners(corners), |shares, residual, weight| {

@@ -2,8 +2,8 @@
 
 use geometry::orient;
 
+use super::level_mesh::{LevelMesh, from_corner, place};
 use super::posts::Posts;
-use super::sheet::{Sheet, from_corner, place};
 
 /// Passes at most; hardly any mesh needs more than four.
 const PASSES_MAX: usize = 10;
@@ -11,7 +11,7 @@ const PASSES_MAX: usize = 10;
 const LEAST_GAIN: u128 = 10_000;
 
 /// Flips edges until none gains, in passes over the triangles; gives the flips. Sides stay.
-pub(super) fn flip_all(sheet: &mut Sheet, posts: &Posts) -> usize {
+pub(super) fn flip_all(sheet: &mut LevelMesh, posts: &Posts) -> usize {
     let mut total = 0;
     // Where neither triangle of an edge has changed since it was looked at, it would be found the same again.
     let mut active = vec![true; sheet.triangles.len()];
@@ -38,7 +38,7 @@ pub(super) fn flip_all(sheet: &mut Sheet, posts: &Posts) -> usize {
 }
 
 /// The triangle beside the edge of triangle `t` from its corner `k` to the next, where its number is the higher one.
-fn beside(sheet: &Sheet, t: usize, k: usize) -> Option<usize> {
+fn beside(sheet: &LevelMesh, t: usize, k: usize) -> Option<usize> {
     let triangle = sheet.triangles[t];
     let other = sheet.beside(t as u32, triangle[k], triangle[(k + 1) % 3]);
     other.map(|u| u as usize).filter(|&u| t < u)
@@ -55,7 +55,7 @@ fn beside(sheet: &Sheet, t: usize, k: usize) -> Option<usize> {
 ///       \ /              \|/
 ///        d                d
 /// ```
-fn flip(sheet: &mut Sheet, (t, k): (u32, usize), u: u32, posts: &Posts) -> bool {
+fn flip(sheet: &mut LevelMesh, (t, k): (u32, usize), u: u32, posts: &Posts) -> bool {
     let triangle = sheet.triangles[t as usize];
     let (a, b, c) = (triangle[k], triangle[(k + 1) % 3], triangle[(k + 2) % 3]);
     // Beside the edge seen from its end: b, a, d.
@@ -75,7 +75,7 @@ fn flip(sheet: &mut Sheet, (t, k): (u32, usize), u: u32, posts: &Posts) -> bool 
 }
 
 /// Counter-clockwise, with a doubled area of a quarter of a square post.
-fn is_sound(sheet: &Sheet, triangle: [u16; 3], posts: &Posts) -> bool {
+fn is_sound(sheet: &LevelMesh, triangle: [u16; 3], posts: &Posts) -> bool {
     let [a, b, c] = sheet.corners(triangle).map(place);
     let area = orient(a, b, c);
     0 < area && posts.step() * posts.step() <= 4 * area

@@ -8,18 +8,19 @@
 
 mod fit;
 mod flip;
+mod level_mesh;
 mod posts;
 mod rank;
-mod sheet;
 mod sides;
 #[cfg(test)]
 mod tests;
 
-use terrain::{Dem, Importance, LoadModule, ModuleResidual, ModuleVertex, Side};
+use terrain::{Importance, LoadModule, LodBorder, ModuleResidual, ModuleVertex, Side};
 
 use crate::{Layout, classes, pieces};
+use level_mesh::{LevelMesh, is_inside};
+pub use posts::LevelGround;
 use posts::Posts;
-use sheet::Sheet;
 
 /// Which levels a load module gets beside the finest.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,27 +28,9 @@ pub struct Levels<'a> {
     /// For each, the share of the finest level's inner vertices that it keeps; falling, between 0 and 1.
     pub inner_shares: &'a [f64],
     /// What becomes of the vertices on the sides.
-    pub sides: LevelSides,
+    pub border: LodBorder,
     /// Whether edges leave Delaunay where the other diagonal has smaller squared residuals.
     pub flips: bool,
-}
-
-/// What becomes of the vertices on the sides.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LevelSides {
-    /// All of them stay.
-    Full,
-    /// Each side keeps its share, its ends always.
-    Own,
-}
-
-/// What levels are fitted to.
-#[derive(Clone, Copy, Debug)]
-pub struct LevelGround<'a> {
-    /// Heights at all posts of the load module; voids count nothing.
-    pub dem: &'a Dem,
-    /// Weights and classes of the same posts.
-    pub mask: &'a Importance,
 }
 
 /// The levels of a load module, one for each share, from fine to coarse. Residuals are left empty.
@@ -66,7 +49,7 @@ pub fn coarser_levels(finest: &LoadModule, layout: &Layout, levels: &Levels, gro
     let level = |(&share, kept): (&f64, usize)| {
         let mut stays = vec![true; finest.vertices.len()];
         gone[..inner.len() - kept].iter().for_each(|&v| stays[usize::from(v)] = false);
-        if levels.sides == LevelSides::Own {
+        if levels.border == LodBorder::Own {
             sides.thin(share, &mut stays);
         }
         let vertices = (finest.vertices.iter().zip(&stays)).filter(|(_, stays)| **stays).map(|(&vertex, _)| vertex);
@@ -81,15 +64,11 @@ fn share_of(count: usize, share: f64) -> usize {
     (count as f64 * share).round() as usize
 }
 
-fn is_inside(vertex: ModuleVertex, side: u16) -> bool {
-    0 < vertex.x && vertex.x < side && 0 < vertex.y && vertex.y < side
-}
-
 /// The vertices triangulated, those inside at fitted heights.
-fn fitted(vertices: Vec<ModuleVertex>, side: u16, flips: bool, posts: &Posts) -> Sheet {
+fn fitted(vertices: Vec<ModuleVertex>, side: u16, flips: bool, posts: &Posts) -> LevelMesh {
     /// Flips ask for other heights, and these for other flips; a third round hardly changes anything.
     const ROUNDS: usize = 2;
-    let mut sheet = Sheet::delaunay(vertices, posts);
+    let mut sheet = LevelMesh::delaunay(vertices, posts);
     fit::fit_heights(&mut sheet, side, posts);
     for _ in 0..ROUNDS {
         if !flips || flip::flip_all(&mut sheet, posts) == 0 {
@@ -101,7 +80,7 @@ fn fitted(vertices: Vec<ModuleVertex>, side: u16, flips: bool, posts: &Posts) ->
 }
 
 /// The load module that a sheet is.
-fn load_module(finest: &LoadModule, sheet: Sheet, layout: &Layout, mask: &Importance) -> LoadModule {
+fn load_module(finest: &LoadModule, sheet: LevelMesh, layout: &Layout, mask: &Importance) -> LoadModule {
     let (vertices, triangles) = sheet.into_lists();
     let mut module = LoadModule {
         id: finest.id,

@@ -4,8 +4,16 @@ use geometry::Facet;
 use geometry::owned::{OwnedRows, PostGrid, visit_residuals};
 use terrain::{Dem, Importance, ModuleId, ModuleVertex, Post};
 
-use super::LevelGround;
 use crate::Layout;
+
+/// What levels are fitted to.
+#[derive(Clone, Copy, Debug)]
+pub struct LevelGround<'a> {
+    /// Heights at all posts of the load module; voids count nothing.
+    pub dem: &'a Dem,
+    /// Weights and classes of the same posts.
+    pub mask: &'a Importance,
+}
 
 /// The posts of one load module.
 pub(super) struct Posts<'a> {

@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 
 use terrain::ModuleVertex;
 
+use super::level_mesh::{LevelMesh, place};
 use super::posts::Posts;
-use super::sheet::{Sheet, place};
 use crate::hole::fill;
 
 /// The first `count` of the `inner` vertices to go: each time the one whose removal adds least to the squared
@@ -14,7 +14,7 @@ pub(super) fn removal_order(vertices: &[ModuleVertex], inner: &[u16], count: usi
     if count == 0 {
         return Vec::new();
     }
-    let mut sheet = Sheet::delaunay(vertices.to_vec(), posts);
+    let mut sheet = LevelMesh::delaunay(vertices.to_vec(), posts);
     let mut costs: Vec<Option<i128>> = vec![None; vertices.len()];
     let mut queue = BTreeSet::new();
     for &v in inner {
@@ -43,7 +43,7 @@ pub(super) fn removal_order(vertices: &[ModuleVertex], inner: &[u16], count: usi
 }
 
 /// What the squared residuals gain when an inner vertex goes; may be negative.
-fn cost(sheet: &Sheet, v: u16, posts: &Posts) -> i128 {
+fn cost(sheet: &LevelMesh, v: u16, posts: &Posts) -> i128 {
     let before: u128 = sheet.stars[usize::from(v)].iter().map(|&triangle| sheet.squares[triangle as usize]).sum();
     let filling = filling(sheet, &sheet.ring(v));
     let after: u128 = filling.into_iter().map(|triangle| posts.squares(sheet.corners(triangle))).sum();
@@ -51,7 +51,7 @@ fn cost(sheet: &Sheet, v: u16, posts: &Posts) -> i128 {
 }
 
 /// The triangles that Delaunay has inside a ring once its centre is gone.
-fn filling(sheet: &Sheet, ring: &[u16]) -> Vec<[u16; 3]> {
+fn filling(sheet: &LevelMesh, ring: &[u16]) -> Vec<[u16; 3]> {
     let places: Vec<_> = ring.iter().map(|&v| place(sheet.vertices[usize::from(v)])).collect();
     fill(&places).into_iter().map(|triangle| triangle.map(|i| ring[i])).collect()
 }

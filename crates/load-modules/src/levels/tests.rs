@@ -2,10 +2,11 @@
 
 use std::collections::BTreeSet;
 
-use terrain::{ModuleGrid, ModuleRect, Post, PostRect, Spacing};
+use fastrand::Rng;
+use terrain::{Dem, ModuleGrid, ModuleRect, Post, PostRect, Spacing};
 
 use super::*;
-use crate::sheets::{Draw, assert_sides_are_shared, constrained, points, posts, side_list};
+use crate::sheets::{assert_sides_are_shared, constrained, points, side_list};
 use crate::{ClipHeights, clip, concatenate};
 
 const SHARES: [f64; 2] = [0.5, 0.2];
@@ -71,12 +72,12 @@ fn squares(module: &LoadModule, posts: &Posts) -> u128 {
 }
 
 /// Checks every load module of every level and gives them.
-fn check(sides: LevelSides, flips: bool, clipped: bool, seed: u64) -> Vec<Vec<LoadModule>> {
+fn check(border: LodBorder, flips: bool, clipped: bool, seed: u64) -> Vec<Vec<LoadModule>> {
     let layout = layout();
     let (dem, mask) = (hills(layout.grid.area()), Importance::uniform(layout.grid.area(), 1000));
     let make = if clipped { clipped_modules } else { constrained_modules };
     let finest = make(&layout, &dem, &mask, seed);
-    let wanted = Levels { inner_shares: &SHARES, sides, flips };
+    let wanted = Levels { inner_shares: &SHARES, border, flips };
     let levels = all_levels(&finest, &layout, &wanted, &dem, &mask);
     for (at, fine) in finest.iter().enumerate() {
         let inner = inner_places(fine);
@@ -97,7 +98,7 @@ fn check(sides: LevelSides, flips: bool, clipped: bool, seed: u64) -> Vec<Vec<Lo
 #[test]
 fn neighbours_at_any_two_levels_list_equal_sides() {
     for (flips, clipped, seed) in [(false, false, 1), (true, false, 2), (false, true, 3), (true, true, 4)] {
-        let levels = check(LevelSides::Full, flips, clipped, seed);
+        let levels = check(LodBorder::Full, flips, clipped, seed);
         let rect = ModuleRect { south: 0, west: 0, north: 3, east: 3 };
         for fine in &levels {
             for coarse in &levels {
@@ -117,7 +118,7 @@ fn neighbours_at_any_two_levels_list_equal_sides() {
 #[test]
 fn thinned_sides_are_equal_at_equal_levels_and_keep_their_share() {
     for (clipped, seed) in [(false, 5), (true, 6)] {
-        let levels = check(LevelSides::Own, true, clipped, seed);
+        let levels = check(LodBorder::Own, true, clipped, seed);
         for level in &levels {
             assert_sides_are_shared(level, ModuleRect { south: 0, west: 0, north: 3, east: 3 });
         }
@@ -138,9 +139,9 @@ fn thinned_sides_are_equal_at_equal_levels_and_keep_their_share() {
 fn a_vertex_goes_when_a_triangulation_without_it_is_the_closest_of_all() {
     for seed in 0..4 {
         let layout = layout();
-        let mut draw = Draw(seed);
+        let mut draw = Rng::with_seed(seed);
         let area = layout.grid.area();
-        let weights = posts(area).map(|_| 500 * draw.below(5) as u16).collect();
+        let weights = area.posts().map(|_| 500 * draw.u16(..5)).collect();
         let mask = Importance::new(area, weights, vec![0; area.post_count()]);
         let mut dem = Dem::from_fn(area, |post| (post.row % 9 != 4).then(|| (post.row * post.col * 37) % 4001));
         dem.fill_voids(|_| 900_000);
@@ -154,7 +155,7 @@ fn a_vertex_goes_when_a_triangulation_without_it_is_the_closest_of_all() {
         for &gone in &order {
             let without = |v: u16| -> u128 {
                 let rest = left.iter().filter(|&&u| u != v).map(|&u| module.vertices[usize::from(u)]);
-                Sheet::delaunay(rest.collect(), &near).squares.iter().sum()
+                LevelMesh::delaunay(rest.collect(), &near).squares.iter().sum()
             };
             let best = inner.iter().filter(|v| left.contains(v)).min_by_key(|&&v| (without(v), v));
             assert_eq!(Some(&gone), best, "seed {seed}");
@@ -165,7 +166,7 @@ fn a_vertex_goes_when_a_triangulation_without_it_is_the_closest_of_all() {
 
 #[test]
 fn no_other_height_of_an_inner_vertex_fits_better() {
-    let levels = check(LevelSides::Full, true, false, 7);
+    let levels = check(LodBorder::Full, true, false, 7);
     let layout = layout();
     let (dem, mask) = (hills(layout.grid.area()), Importance::uniform(layout.grid.area(), 1000));
     let ground = LevelGround { dem: &dem, mask: &mask };
@@ -186,7 +187,7 @@ fn no_other_height_of_an_inner_vertex_fits_better() {
 #[test]
 fn coarser_levels_lie_further_from_the_ground_and_flips_bring_them_closer() {
     let total = |flips: bool, level: usize| -> u128 {
-        let levels = check(LevelSides::Full, flips, false, 8);
+        let levels = check(LodBorder::Full, flips, false, 8);
         let layout = layout();
         let (dem, mask) = (hills(layout.grid.area()), Importance::uniform(layout.grid.area(), 1000));
         let ground = LevelGround { dem: &dem, mask: &mask };
@@ -204,7 +205,7 @@ fn ground_without_weight_and_a_load_module_without_inner_vertices_have_levels_to
     let (dem, mask) = (hills(area), Importance::new(area, vec![0; area.post_count()], vec![0; area.post_count()]));
     let finest = constrained_modules(&layout, &dem, &mask, 9);
     let weighted = constrained_modules(&layout, &dem, &Importance::uniform(area, 1000), 9);
-    let wanted = Levels { inner_shares: &SHARES, sides: LevelSides::Full, flips: true };
+    let wanted = Levels { inner_shares: &SHARES, border: LodBorder::Full, flips: true };
     let uniform = Importance::uniform(area, 1000);
     // Where nothing has a weight, all posts count the same.
     assert_eq!(
@@ -214,6 +215,6 @@ fn ground_without_weight_and_a_load_module_without_inner_vertices_have_levels_to
     let bare = finest[0].vertices.iter().copied().filter(|v| !is_inside(*v, finest[0].side)).collect();
     let ground = LevelGround { dem: &dem, mask: &mask };
     let near = Posts::new(finest[0].id, &layout, &ground);
-    let bare = load_module(&finest[0], Sheet::delaunay(bare, &near), &layout, &mask);
+    let bare = load_module(&finest[0], LevelMesh::delaunay(bare, &near), &layout, &mask);
     assert_eq!(coarser_levels(&bare, &layout, &Levels { flips: false, ..wanted }, &ground), [bare.clone(), bare]);
 }

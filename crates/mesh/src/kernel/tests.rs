@@ -2,23 +2,10 @@
 
 use std::collections::BTreeSet;
 
-use super::*;
+use fastrand::Rng;
 use terrain::{Post, PostRect};
 
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, end: usize) -> usize {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 33) as usize % end
-    }
-
-    fn shuffle<T>(&mut self, items: &mut [T]) {
-        for i in (1..items.len()).rev() {
-            items.swap(i, self.below(i + 1));
-        }
-    }
-}
+use super::*;
 
 fn edges(mesh: &Mesh) -> BTreeSet<(LocalPost, LocalPost)> {
     let of = |t: &Triangle| [0, 1, 2].map(|i| (t.corners[i], t.corners[(i + 1) % 3]));
@@ -64,7 +51,7 @@ fn check(mesh: &Mesh, tile: PostRect) {
 #[test]
 fn any_order_of_insertion_gives_the_same_edges() {
     let tile = PostRect::of_size(13, 13);
-    let mut random = Random(7);
+    let mut random = Rng::with_seed(7);
     let mut posts: Vec<LocalPost> = (0..169).map(|i| LocalPost::new(i / 13, i % 13)).collect();
     random.shuffle(&mut posts);
     posts.truncate(90);
@@ -85,9 +72,9 @@ fn any_order_of_insertion_gives_the_same_edges() {
 fn no_edge_crosses_a_line() {
     let tile = PostRect::of_size(25, 37);
     let mut mesh = Mesh::new(tile, Lines::every(12));
-    let mut random = Random(3);
+    let mut random = Rng::with_seed(3);
     for _ in 0..400 {
-        insert(&mut mesh, LocalPost::new(random.below(25) as i32, random.below(37) as i32));
+        insert(&mut mesh, LocalPost::new(random.i32(0..25), random.i32(0..37)));
     }
     check(&mesh, tile);
     for (a, b) in edges(&mesh) {

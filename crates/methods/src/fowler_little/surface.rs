@@ -3,7 +3,7 @@
 use geometry::is_ridge_candidate;
 use terrain::{Dem, Post, PostRect};
 
-use crate::ground::{RING, beside};
+use crate::dem_window::{RING, beside};
 
 /// What the ring of eight around a post says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -61,7 +61,7 @@ impl Flags {
     }
 
     fn index(&self, post: Post) -> usize {
-        (post.row - self.rect.south) as usize * self.rect.posts_wide() + (post.col - self.rect.west) as usize
+        self.rect.index(post)
     }
 
     /// What it says of a post; no of those outside.
@@ -94,7 +94,7 @@ pub fn channel_candidates(dem: &Dem) -> Flags {
     let turned = Dem::from_fn(rect, |post| Some(-dem.height(over(post))));
     let found = candidates(dem, &turned);
     let mut flags = Flags::none(rect);
-    for post in crate::ground::posts_of(rect) {
+    for post in rect.posts() {
         flags.set(post, found.holds(over(post)) && !dem.is_void(post));
     }
     flags
@@ -102,7 +102,7 @@ pub fn channel_candidates(dem: &Dem) -> Flags {
 
 fn candidates(dem: &Dem, heights: &Dem) -> Flags {
     let mut flags = Flags::none(dem.rect());
-    for post in crate::ground::posts_of(dem.rect()) {
+    for post in dem.rect().posts() {
         flags.set(post, is_ridge_candidate(heights, post));
     }
     flags
@@ -139,7 +139,7 @@ mod tests {
     fn a_valley_has_its_channel_and_a_roof_its_ridge() {
         let channel: Vec<Post> = (1..8).map(|row| Post::new(row, 4)).collect();
         let inner = |flags: &Flags| -> Vec<Post> {
-            crate::ground::inner_posts(flags.rect()).filter(|&post| flags.holds(post)).collect()
+            crate::dem_window::inner_posts(flags.rect()).filter(|&post| flags.holds(post)).collect()
         };
         let valley = scene::dem(9, 9, |post| 3 * post.row + 20 * (post.col - 4).abs());
         assert_eq!(inner(&channel_candidates(&valley)), channel);

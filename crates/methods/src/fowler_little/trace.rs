@@ -3,7 +3,7 @@
 use terrain::{Dem, Post};
 
 use super::surface::{Flags, Kind, channel_candidates, is_higher, kind, ridge_candidates, sectors};
-use crate::ground::{RING, beside, inner_posts, is_on_border, posts_of};
+use crate::dem_window::{RING, beside, inner_posts};
 
 /// Posts that a line of leftover candidates has at least.
 const LEFTOVER_POSTS_MIN: usize = 5;
@@ -40,7 +40,7 @@ impl Walk<'_> {
     fn from(&self, pass: Post, first: Post, traced: &Flags) -> Vec<Post> {
         let mut chain = vec![pass, first];
         let mut at = first;
-        while !traced.holds(at) && (self.rising || !is_on_border(self.dem.rect(), at)) {
+        while !traced.holds(at) && (self.rising || !self.dem.rect().has_on_border(at)) {
             let Some(next) = self.next(at) else { break };
             chain.push(next);
             at = next;
@@ -65,7 +65,7 @@ impl Walk<'_> {
 /// Lines of candidates that no walk has met, thinned to one post across.
 fn leftovers(candidates: &Flags, traced: &Flags) -> Vec<Vec<Post>> {
     let mut left = Flags::none(candidates.rect());
-    for post in posts_of(candidates.rect()) {
+    for post in candidates.rect().posts() {
         left.set(post, candidates.holds(post) && !traced.holds(post));
     }
     thin(&mut left);
@@ -76,7 +76,7 @@ fn leftovers(candidates: &Flags, traced: &Flags) -> Vec<Vec<Post>> {
 ///
 /// Zhang and Suen, "A fast parallel algorithm for thinning digital patterns" (CACM 27, 1984).
 fn thin(flags: &mut Flags) {
-    let posts: Vec<Post> = posts_of(flags.rect()).filter(|&post| flags.holds(post)).collect();
+    let posts: Vec<Post> = flags.rect().posts().filter(|&post| flags.holds(post)).collect();
     let mut left = posts;
     loop {
         let before = left.len();
@@ -111,7 +111,7 @@ fn lines(flags: &Flags) -> Vec<Vec<Post>> {
     let around = |post: Post| RING.map(|step| beside(post, step)).into_iter().filter(|&other| flags.holds(other));
     let mut used = Flags::none(flags.rect());
     let mut found = Vec::new();
-    let all: Vec<Post> = posts_of(flags.rect()).filter(|&post| flags.holds(post)).collect();
+    let all: Vec<Post> = flags.rect().posts().filter(|&post| flags.holds(post)).collect();
     let is_end = |post: &Post| around(*post).count() != 2;
     let ends = all.iter().filter(|post| is_end(post));
     let rest = all.iter().filter(|post| !is_end(post));
@@ -156,7 +156,7 @@ mod tests {
         let all = chains(&dem);
         let reaches = |post: Post| all.iter().any(|chain| chain.last() == Some(&post));
         assert!(reaches(Post::new(10, 10)) && reaches(Post::new(10, 30)), "{all:?}");
-        let to_border = all.iter().filter(|chain| chain.last().is_some_and(|&end| is_on_border(dem.rect(), end)));
+        let to_border = all.iter().filter(|chain| chain.last().is_some_and(|&end| dem.rect().has_on_border(end)));
         assert!(2 <= to_border.count());
         let touch = |pair: &[Post]| (pair[0].row - pair[1].row).abs() <= 1 && (pair[0].col - pair[1].col).abs() <= 1;
         assert!(all.iter().all(|chain| chain.windows(2).all(touch)));
@@ -165,7 +165,7 @@ mod tests {
     #[test]
     fn a_broad_bar_is_thinned_to_a_line_of_one_post() {
         let mut flags = Flags::none(terrain::PostRect::of_size(15, 40));
-        for post in posts_of(flags.rect()) {
+        for post in flags.rect().posts() {
             flags.set(post, (6..=8).contains(&post.row) && (5..35).contains(&post.col));
         }
         thin(&mut flags);
@@ -185,7 +185,7 @@ mod tests {
         flags.set(Post::new(5, 9), true);
         assert_eq!(lines(&flags).iter().filter(|line| 4 <= line.len()).count(), 3, "{:?}", lines(&flags));
         let mut ring = Flags::none(terrain::PostRect::of_size(9, 9));
-        for post in posts_of(ring.rect()) {
+        for post in ring.rect().posts() {
             ring.set(post, (post.row - 4).abs() + (post.col - 4).abs() == 3);
         }
         assert_eq!(lines(&ring).iter().map(Vec::len).collect::<Vec<_>>(), [12]);

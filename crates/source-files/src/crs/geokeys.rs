@@ -1,7 +1,7 @@
 //! The coordinate system that the GeoKeys of a TIFF name or spell out.
 
-use super::Crs;
 use super::parameters::{Datum, Method, Parameters};
+use super::system::Crs;
 
 /// The key directory and the numbers that it points to.
 #[derive(Clone, Debug, Default)]

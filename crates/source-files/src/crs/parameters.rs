@@ -1,6 +1,6 @@
 //! A system spelled out: method, parameters, ellipsoid, datum; and the PROJ definition of it.
 
-use super::Crs;
+use super::system::Crs;
 
 /// How a system projects, or that it does not.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -64,7 +64,7 @@ impl Parameters {
     /// The system; one that has a code of its own gets it, so that it is recognised as the same.
     pub fn crs(&self, name: &str) -> Result<Crs, String> {
         if let Some(code) = self.code() {
-            return Crs::from_epsg(code);
+            return Crs::horizontal(code);
         }
         let name = if name.is_empty() { "a system of its own".to_owned() } else { name.to_owned() };
         Crs::new(format!("{} {}", self.projection(), self.ellipsoid()), name, None)

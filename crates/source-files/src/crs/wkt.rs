@@ -1,8 +1,8 @@
 //! Well-known text of coordinate systems, version 1, in the dialects of ESRI and GDAL; of version 2, only what names
 //! a code.
 
-use super::Crs;
 use super::parameters::{Datum, Method, Parameters, datum_named};
+use super::system::Crs;
 use super::vertical::unit_m;
 
 /// Longer texts describe no system anybody uses.
@@ -32,7 +32,7 @@ pub(super) fn read(text: &str) -> Result<Crs, String> {
         vertical = parser.node()?.vertical().map(unit_of_heights);
     }
     let vertical_unit_m = vertical.transpose()?;
-    Ok(Crs { vertical_unit_m, ..system(&root)? })
+    Ok(system(&root)?.with_vertical_unit(vertical_unit_m))
 }
 
 /// Metres in a unit of a vertical system.
@@ -53,7 +53,7 @@ fn system(root: &Node) -> Result<Crs, String> {
         return system(root.children.first().ok_or("a compound system without parts")?);
     }
     if let Some(code) = root.code() {
-        return Crs::from_epsg(code);
+        return Crs::horizontal(code);
     }
     let name = root.texts.first().map_or("", String::as_str);
     match root.keyword.as_str() {

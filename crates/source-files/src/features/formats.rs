@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::osm;
+use super::osm::frames::MARK;
 use crate::dem_file::known_but_not_read;
 use crate::store::Store;
 use crate::{SourceError, geopackage, shapefile};
@@ -46,7 +46,7 @@ pub(super) fn open(path: &Path) -> Result<(Store, Format), SourceError> {
             true => Err(refused(path, "the index of a Shapefile")),
         };
     }
-    if start.get(4..).is_some_and(|start| start.starts_with(osm::MARK)) {
+    if start.get(4..).is_some_and(|start| start.starts_with(MARK)) {
         return Ok((store, Format::OpenStreetMap));
     }
     if start.starts_with(&[0x1f, 0x8b]) {

@@ -4,8 +4,9 @@ use geojson::{Feature, GeoJson, Geometry, GeometryValue, JsonValue, Position};
 
 use super::clip::Vertex;
 use super::columns::with_packed_tags;
-use super::placing::{Part, Placing, RawFeature, RawShape, Texts, look_like_degrees};
-use super::{FeatureFile, Wanted, file_name};
+use super::model::{FeatureFile, Wanted, file_name};
+use super::placing::{Placing, Texts, look_like_degrees};
+use super::raw::{Part, RawFeature, RawShape};
 use crate::SourceError;
 use crate::crs::Crs;
 use crate::limits::GEOJSON_BYTES_MAX;

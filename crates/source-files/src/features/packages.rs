@@ -7,9 +7,10 @@ use rusqlite::types::ValueRef;
 
 use super::clip::Vertex;
 use super::columns::with_packed_tags;
-use super::placing::{LEFT_OUT, Placing, RawFeature, Texts, look_like_degrees};
+use super::model::{FeatureFile, Wanted};
+use super::placing::{LEFT_OUT, Placing, Texts, look_like_degrees};
+use super::raw::RawFeature;
 use super::well_known::geometry;
-use super::{FeatureFile, Wanted};
 use crate::SourceError;
 use crate::crs::Crs;
 use crate::geopackage::{Package, Table};

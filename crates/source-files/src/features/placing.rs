@@ -6,51 +6,12 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::clip::{self, Extent, Vertex};
-use super::{FeatureFile, Remark, Tags, VectorFeature, VectorShape, Vertices, Wanted};
+use super::model::{FeatureFile, Remark, Tags, VectorFeature, VectorShape, Vertices, Wanted};
+use super::raw::{Part, RawFeature};
 use crate::SourceError;
 use crate::crs::Crs;
 use crate::limits::{HEIGHT_M_MAX, REMARKS_MAX};
 use crate::polygons::pieces_of;
-
-/// A feature in its file's coordinates.
-#[derive(Debug)]
-pub(super) struct RawFeature {
-    pub id: String,
-    pub tags: Tags,
-    pub shape: RawShape,
-}
-
-/// Where a feature lies, in its file's coordinates.
-#[derive(Debug, Default)]
-pub(crate) struct RawShape {
-    /// Whether the file gives heights. Those that it does not give are NaN.
-    pub has_heights: bool,
-    pub parts: Vec<Part>,
-    /// Something in it that is neither a line nor a polygon.
-    pub other: Option<&'static str>,
-}
-
-/// A line, or a polygon: its outer ring, then its holes.
-#[derive(Debug)]
-pub(crate) enum Part {
-    Line(Vec<Vertex>),
-    Polygon(Vec<Vec<Vertex>>),
-}
-
-impl Part {
-    fn runs(&self) -> &[Vec<Vertex>] {
-        match self {
-            Part::Line(line) => std::slice::from_ref(line),
-            Part::Polygon(rings) => rings,
-        }
-    }
-}
-
-impl RawShape {
-    pub(super) fn vertices(&self) -> impl Iterator<Item = &Vertex> {
-        self.parts.iter().flat_map(Part::runs).flatten()
-    }
-}
 
 /// Texts that are the same, kept once.
 #[derive(Debug, Default)]

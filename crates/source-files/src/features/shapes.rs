@@ -2,9 +2,10 @@
 
 use super::clip::Vertex;
 use super::columns::{Table, with_packed_tags};
+use super::model::{FeatureFile, Wanted, file_name};
 use super::nest;
-use super::placing::{LEFT_OUT, Part, Placing, RawFeature, RawShape, Texts, look_like_degrees};
-use super::{FeatureFile, Wanted, file_name};
+use super::placing::{LEFT_OUT, Placing, Texts, look_like_degrees};
+use super::raw::{Part, RawFeature, RawShape};
 use crate::SourceError;
 use crate::beside::beside;
 use crate::crs::Crs;

@@ -1,7 +1,7 @@
 //! Geometries as GeoPackages store them: a header with a box around each, then well-known binary.
 
 use super::clip::Vertex;
-use super::placing::{Part, RawShape};
+use super::raw::{Part, RawShape};
 
 /// The lines and polygons of a geometry.
 ///

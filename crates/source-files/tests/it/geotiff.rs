@@ -1,5 +1,7 @@
 //! What is read from sound files, and that what is written comes back.
 
+use std::fs::File;
+
 use source_files::{GeoTiff, VoidPolicy, write_classes, write_heights};
 use terrain::{Dem, Post, PostRect};
 
@@ -100,13 +102,11 @@ fn heights_written_come_back_to_the_quantum() {
     // Wide enough for three strips of it.
     let rect = PostRect::new(Post::new(-3, 5), Post::new(500, 1400));
     let (grid, whole) = (grid(500_000.0, 4_000_000.0, 31.25), rough(rect, false));
-    write_heights(&path, &grid, rect, 32611, |band| whole.window(band)).unwrap();
+    write_heights(&mut File::create(&path).unwrap(), &grid, rect, 32611, |band| whole.window(band)).unwrap();
     let raster = read(&path).unwrap();
     assert_eq!(raster.frame().crs.epsg().unwrap(), 32611);
     assert_eq!(raster.frame().south_west, grid.place_m(rect.south_west()));
     assert_eq!(raster.resample(&grid, rect).unwrap(), whole);
-    let leftover = std::fs::read_dir(path.parent().unwrap()).unwrap().count();
-    assert_eq!(leftover, 1, "only the file itself is left");
 }
 
 #[test]
@@ -114,7 +114,8 @@ fn voids_written_come_back_as_voids() {
     let folder = Folder::new();
     let (rect, grid) = (PostRect::of_size(40, 50), grid(0.0, 0.0, 25.0));
     let whole = rough(rect, true);
-    write_heights(&folder.path("dem.tif"), &grid, rect, 32611, |band| whole.window(band)).unwrap();
+    write_heights(&mut File::create(folder.path("dem.tif")).unwrap(), &grid, rect, 32611, |band| whole.window(band))
+        .unwrap();
     let mut raster = read(&folder.path("dem.tif")).unwrap();
     assert_eq!(raster.settle_voids(VoidPolicy::Hole).unwrap().left, whole.void_count());
     let dem = raster.resample(&grid, rect).unwrap();
@@ -136,18 +137,8 @@ fn classes_written_come_back() {
             .flat_map(|row| (band.west..=band.east).map(move |col| class(Post::new(row, col))))
             .collect()
     };
-    write_classes(&folder.path("class.tif"), &grid, rect, 32611, classes).unwrap();
+    write_classes(&mut File::create(folder.path("class.tif")).unwrap(), &grid, rect, 32611, classes).unwrap();
     let raster = read(&folder.path("class.tif")).unwrap();
     assert_eq!(raster.sample(Post::new(29, 19)), Some(f64::from(class(Post::new(29, 19)))));
     assert_eq!(raster.sample(Post::new(0, 7)), Some(7.0));
-}
-
-#[test]
-fn a_file_that_cannot_be_written_leaves_nothing() {
-    let folder = Folder::new();
-    let path = folder.path("no such folder/dem.tif");
-    let rect = PostRect::of_size(2, 2);
-    let error = write_heights(&path, &grid(0.0, 0.0, 25.0), rect, 32611, |band| rough(band, false)).unwrap_err();
-    assert!(error.to_string().contains("no such folder"), "{error}");
-    assert!(!path.exists());
 }

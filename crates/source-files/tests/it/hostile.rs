@@ -18,7 +18,14 @@ fn deflated(folder: &Folder) -> Vec<u8> {
     let rect = PostRect::of_size(9, 7);
     let path = folder.path("good.tif");
     let heights = |band| Dem::from_fn(band, |post| Some(post.row * 1000 + post.col * 77));
-    write_heights(&path, &grid(500_000.0, 4_000_000.0, 25.0), rect, 32611, heights).unwrap();
+    write_heights(
+        &mut std::fs::File::create(&path).unwrap(),
+        &grid(500_000.0, 4_000_000.0, 25.0),
+        rect,
+        32611,
+        heights,
+    )
+    .unwrap();
     std::fs::read(path).unwrap()
 }
 

@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use source_files::{Crs, DemFile, Mosaic, MosaicRules, MosaicVoids, Patch, Reading, Resampling, SourceError, Standing};
-use terrain::{GridFrame, Post, PostRect};
+use source_files::{Crs, DemFile, Mosaic, MosaicRules, MosaicVoids, Patch, Reading, SourceError, Standing};
+use terrain::{GridFrame, Post, PostRect, Resampling};
 
 use crate::support::{Folder, Tiff, Values, grid};
 
@@ -115,7 +115,7 @@ fn shift(patch: &Patch, truth: &[f64]) -> [f64; 2] {
     let (mut a, mut b) = ([[0.0; 2]; 2], [0.0; 2]);
     for row in rect.south + 1..rect.north {
         for col in rect.west + 1..rect.east {
-            let index = (row - rect.south) as usize * rect.posts_wide() + (col - rect.west) as usize;
+            let index = rect.index(Post::new(row, col));
             assert_eq!(patch.standings[index], Standing::Height, "{row},{col}");
             let slope = [
                 (expected(row, col + 1) - expected(row, col - 1)) / 2.0,
@@ -186,7 +186,7 @@ pub fn raster(
 }
 
 pub fn metres(patch: &Patch, row: i32, col: i32) -> (f64, Standing) {
-    let index = (row - patch.rect.south) as usize * patch.rect.posts_wide() + (col - patch.rect.west) as usize;
+    let index = patch.rect.index(Post::new(row, col));
     (f64::from(patch.heights[index]) / 128.0, patch.standings[index])
 }
 

@@ -1,9 +1,7 @@
 //! Every rule for voids on voids of every width: what marks a void never becomes a height, nor part of one.
 
-use source_files::{
-    DemFile, MosaicRules, MosaicVoids, Patch, Raster, Resampling, SourceError, Standing, VoidPolicy, window_under,
-};
-use terrain::{GridFrame, PostRect};
+use source_files::{DemFile, MosaicRules, MosaicVoids, Patch, Raster, SourceError, Standing, VoidPolicy, window_under};
+use terrain::{GridFrame, PostRect, Resampling};
 
 use crate::mosaics::{PLAIN, mosaic, open};
 use crate::support::{Folder, Tiff, Values, grid};

@@ -1,7 +1,7 @@
 //! Rasters read by window: the same posts as read whole, each chunk decoded once while there is room.
 
-use source_files::{Crs, DemFile, MosaicRules, MosaicVoids, Resampling, Standing, WideMosaic, Windows};
-use terrain::{GridFrame, Post, PostRect};
+use source_files::{Crs, DemFile, MosaicRules, MosaicVoids, Standing, WideMosaic, Windows};
+use terrain::{GridFrame, Post, PostRect, Resampling};
 
 use crate::mosaics::{PLAIN, mosaic, open, raster, utm, write_ascii, write_dted, write_hgt, write_raw, write_tiff};
 use crate::support::{Folder, grid};

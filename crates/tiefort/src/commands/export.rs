@@ -5,13 +5,13 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use compiler::CompileError;
 use database::Folder;
-use exports::{Block, Coordinates, Datum, ExportError, Facts, Levels, Mesh, Product, Work};
+use exports::{Block, Datum, ExportError, Facts, Levels, Mesh, Product, Work};
 use job::Job;
 use product::BuiltFrom;
 use terrain::{ModuleId, PostRect};
 use views::grouped;
 
-use crate::arguments::{Workers, row_col};
+use crate::arguments::{MeshOrigin, Workers, row_col};
 use crate::failure::{Failure, Outcome};
 use crate::new_folder::NewFolder;
 use crate::signals::Signals;
@@ -58,8 +58,8 @@ pub struct Arguments {
     #[arg(long, value_name = "K")]
     lod: Option<usize>,
     /// What coordinates are counted from; for ply and obj only
-    #[arg(long, value_enum, default_value_t = Frame::Local)]
-    coordinates: Frame,
+    #[arg(long, value_enum, default_value_t = MeshOrigin::Local)]
+    coordinates: MeshOrigin,
     /// What the raster holds; for geotiff only [default: surface]
     #[arg(long, value_enum)]
     layer: Option<Layer>,
@@ -110,14 +110,6 @@ enum Layer {
     Surface,
     /// Height of the ground less that of the surface
     Residual,
-}
-
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Frame {
-    /// The south-west corner of what is exported
-    Local,
-    /// The map's origin
-    Map,
 }
 
 fn block(text: &str) -> Result<Block, String> {
@@ -184,7 +176,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
 
 /// Refuses what cannot be, before any work.
 fn check(arguments: &Arguments) -> Result<(), Failure> {
-    if arguments.coordinates == Frame::Map && !matches!(arguments.format, Format::Ply | Format::Obj) {
+    if arguments.coordinates == MeshOrigin::Map && !matches!(arguments.format, Format::Ply | Format::Obj) {
         let message = "found --coordinates map with a format that has no room for map coordinates, expected ply or obj";
         return Err(Failure::new(message, "leave --coordinates out; NAME.json beside the file says where it lies"));
     }
@@ -289,10 +281,7 @@ fn write_package(arguments: &Arguments, product: &Product, work: &Work) -> Resul
 
 fn write_mesh(arguments: &Arguments, product: &Product) -> Result<(), Failure> {
     let mesh = Mesh::of(product);
-    let coordinates = match arguments.coordinates {
-        Frame::Local => Coordinates::Local,
-        Frame::Map => Coordinates::Map,
-    };
+    let coordinates = arguments.coordinates.into();
     let facts = match arguments.format {
         Format::Glb => Facts::y_up(product),
         _ => Facts::z_up(product, coordinates),

@@ -196,16 +196,18 @@ fn job_text(suggestion: &Suggestion, folder: &Path, name: &str, given: Option<&s
     text += &datum_text(seen);
     text += &format!(
         "\n[tiles]\ncolumns = {}\nrows = {}\n\n[limits]\n\
-         per_load_module = 100         # triangles\n\
+         per_load_module = {}         # triangles\n\
          mean_per_load_module = {triangles}     # over the whole area: {} triangles\n\
-         per_4km_square = 4096         # in every window of 8 x 8 load modules\n\n\
+         per_4km_square = {}         # in every window of 8 x 8 load modules\n\n\
          [tin]\nmethod = \"optimised\"          # the budget is the limits\n\n\
          # Coarser levels of every load module, for what is far away: the share of\n\
          # inner vertices that each keeps.\n\
          # [lod]\n# levels = [{{ inner_share = 0.5 }}, {{ inner_share = 0.2 }}]\n",
         tiles.1,
         tiles.0,
+        job::usual_text("limits.per_load_module"),
         views::grouped((modules[0] * modules[1]) as u64 * u64::from(*triangles)),
+        job::usual_text("limits.per_4km_square"),
     );
     // Names in headers may hold anything; in a job they stand in comments, where control characters are no TOML.
     terminal::plain(&text).into_owned()

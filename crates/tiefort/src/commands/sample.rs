@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use terrain::Spacing;
+use workbench::Sample;
 
 use crate::failure::{Failure, Outcome};
 use crate::{arguments, files};
@@ -56,6 +57,10 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         files::check_writable(path)?;
     }
     let size = (rows.unwrap_or(*posts) as usize, *posts as usize);
-    workbench::sample(*seed, size, *spacing, out, classes.as_deref())?;
+    let sample = Sample { seed: *seed, size, spacing: *spacing };
+    files::write_whole(out, |out| sample.write_heights(out))?;
+    if let Some(path) = classes {
+        files::write_whole(path, |out| sample.write_classes(out))?;
+    }
     Ok(Outcome::Sound)
 }

@@ -3,17 +3,17 @@
 use std::path::{Path, PathBuf};
 use std::sync::PoisonError;
 
-use clap::{ArgGroup, Args, ValueEnum};
+use clap::{ArgGroup, Args};
 use compiler::{Stage, Stopwatch};
 use exports::TinPlace;
 use inspect::{Fidelity, Sights};
-use job::Optimising;
+use job::{Effort, ErrorKey, HeightFit, Lattice, MethodName, Optimising};
 use serde_json::{Value, json};
 use terrain::{Metres, StopReason};
-use views::{Align, Coordinates, MeshPlace, Table, grouped};
+use views::{Align, Table, grouped};
 use workbench::{Mesh, TinMethod, TinRequest, TinStart};
 
-use crate::arguments::{Workers, positive, rows_by_columns, start_method};
+use crate::arguments::{MeshOrigin, Workers, choice, positive, rows_by_columns, start_method, start_methods};
 use crate::clock::SystemClock;
 use crate::estimate::Estimate;
 use crate::failure::{Failure, Outcome};
@@ -79,31 +79,26 @@ pub struct Arguments {
     /// Root mean square of the residuals in metres
     #[arg(long, value_name = "R", value_parser = positive)]
     rms: Option<f64>,
-    /// Start from points of another method (vip, highlow, lattice, fowler-little, hierarchical, earlier, regular,
-    /// contour) and improve what it makes; or from those of a file (.csv, .geojson), fixed where they have a height
-    #[arg(long, value_name = "METHOD:N|FILE", value_parser = start)]
+    #[arg(long, value_name = "METHOD:N|FILE", value_parser = start, help = start_help())]
     start: Option<TinStart>,
     /// Refine so many rows and columns of tiles at once, their borders matched
     #[arg(long, value_name = "ROWSxCOLUMNS", default_value = "1x1", value_parser = rows_by_columns)]
     tiles: (u32, u32),
-    /// How posts are chosen
-    #[arg(long, value_enum, default_value_t = Method::Optimised)]
-    method: Method,
+    #[arg(long, value_parser = choice::<MethodName>(), default_value = job::usual_text("tin.method"))]
+    #[arg(help = meaning("tin.method"))]
+    method: MethodName,
     /// What makes a post worth a point; for --method greedy only
-    #[arg(long, value_enum)]
-    key: Option<Key>,
-    /// How much work is done for a lower residual; for --method optimised only [default: normal]
-    #[arg(long, value_enum)]
+    #[arg(long, value_parser = choice::<ErrorKey>())]
+    key: Option<ErrorKey>,
+    #[arg(long, value_parser = choice::<Effort>(), help = of_optimised("tin.effort"))]
     effort: Option<Effort>,
-    /// Which vertices leave the height of the raster; for --method optimised only [default: l2_keep_crests]
-    #[arg(long, value_name = "FIT", value_enum)]
+    #[arg(long, value_name = "FIT", value_parser = choice::<HeightFit>(), help = of_optimised("tin.height_fit"))]
     height_fit: Option<HeightFit>,
-    /// Where vertices stand; for --method optimised only [default: eighth]
-    #[arg(long, value_enum)]
+    #[arg(long, value_parser = choice::<Lattice>(), help = of_optimised("tin.lattice"))]
     lattice: Option<Lattice>,
     /// What coordinates are counted from
-    #[arg(long, value_enum, default_value_t = Frame::Local)]
-    coordinates: Frame,
+    #[arg(long, value_enum, default_value_t = MeshOrigin::Local)]
+    coordinates: MeshOrigin,
     /// Measure the mesh against the raster, beside a regular grid, as `tiefort fidelity` does
     #[arg(long, conflicts_with = "quiet")]
     measure: bool,
@@ -120,62 +115,6 @@ pub struct Arguments {
     out: PathBuf,
 }
 
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Method {
-    /// Lowest RMS residual
-    Optimised,
-    /// The founding paper's: batches of posts of the largest residual
-    Paper,
-    /// One worst post at a time
-    Greedy,
-}
-
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Key {
-    /// Its own residual
-    Max,
-    /// The squared residuals in its triangle
-    Sse,
-}
-
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Effort {
-    /// Chosen posts are moved and their edges flipped: half the RMS residual of greedy selection
-    Fast,
-    /// More points are chosen than asked for, then thinned and exchanged: a fifth less, 4 times as long
-    Normal,
-    /// More points still, grown and thinned in turns: 4 % less again, 5 times as long
-    Best,
-}
-
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum HeightFit {
-    /// All: each stands where squared residuals are least
-    #[value(name = "l2")]
-    Squares,
-    /// All but those on crests
-    #[value(name = "l2_keep_crests")]
-    SquaresKeepCrests,
-    /// None
-    Off,
-}
-
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Lattice {
-    /// On eighths of a post
-    Eighth,
-    /// On posts
-    Post,
-}
-
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Frame {
-    /// The south-west post
-    Local,
-    /// The map's origin
-    Map,
-}
-
 /// Reads the name of a file of points, or as [`start_method`].
 fn start(text: &str) -> Result<TinStart, String> {
     match files::extension(Path::new(text)).as_str() {
@@ -184,6 +123,26 @@ fn start(text: &str) -> Result<TinStart, String> {
             .map(|(method, points)| TinStart::Method(method, points.unwrap_or(0)))
             .map_err(|error| format!("{error}; or a file whose name ends in .csv or .geojson")),
     }
+}
+
+fn start_help() -> String {
+    format!(
+        "Start from points of another method ({}) and improve what it makes; or from those of a file (.csv, .geojson), \
+         fixed where they have a height",
+        start_methods()
+    )
+}
+
+/// What a key of a job means, as help begins.
+fn meaning(key: &str) -> String {
+    let text = job::key(key).map_or("", |key| key.meaning);
+    let first = text.chars().next().into_iter().flat_map(char::to_uppercase);
+    first.chain(text.chars().skip(1)).collect()
+}
+
+/// The same of a key of the optimised method.
+fn of_optimised(key: &str) -> String {
+    format!("{}; for --method optimised only [default: {}]", meaning(key), job::usual_text(key))
 }
 
 /// A kind of file a mesh is written to.
@@ -320,7 +279,7 @@ fn kind(arguments: &Arguments) -> Result<Kind, Failure> {
     match files::extension(&arguments.out).as_str() {
         "ply" => Ok(Kind::Ply),
         "obj" => Ok(Kind::Obj),
-        "glb" if arguments.coordinates == Frame::Map => {
+        "glb" if arguments.coordinates == MeshOrigin::Map => {
             let message = "found --coordinates map with a .glb, which has no room for map coordinates";
             Err(Failure::new(message, "leave --coordinates out, or write .ply or .obj"))
         }
@@ -350,13 +309,13 @@ fn request(arguments: &Arguments) -> Result<TinRequest, Failure> {
 }
 
 fn method(arguments: &Arguments) -> Result<TinMethod, Failure> {
-    if arguments.method != Method::Optimised {
+    if arguments.method != MethodName::Optimised {
         refuse_flags_of_optimised(arguments)?;
     }
     match (arguments.method, arguments.key) {
-        (Method::Greedy, key) => Ok(TinMethod::Greedy { key: job_key(key.unwrap_or(Key::Max)) }),
-        (Method::Optimised, None) => Ok(TinMethod::Optimised(optimising(arguments))),
-        (Method::Paper, None) => Ok(TinMethod::Paper),
+        (MethodName::Greedy, key) => Ok(TinMethod::Greedy { key: key.unwrap_or(ErrorKey::Max) }),
+        (MethodName::Optimised, None) => Ok(TinMethod::Optimised(optimising(arguments))),
+        (MethodName::Paper, None) => Ok(TinMethod::Paper),
         (_, Some(_)) => {
             let message = "found --key with another method than greedy, expected the method's own";
             Err(Failure::new(message, "leave --key out, or add --method greedy"))
@@ -379,56 +338,27 @@ fn refuse_flags_of_optimised(arguments: &Arguments) -> Result<(), Failure> {
     Err(Failure::new(message, format!("leave {flag} out, or add --method optimised")))
 }
 
-fn job_key(key: Key) -> job::ErrorKey {
-    match key {
-        Key::Max => job::ErrorKey::Max,
-        Key::Sse => job::ErrorKey::Sse,
-    }
-}
-
 /// The flags given, over a job's defaults.
 fn optimising(arguments: &Arguments) -> Optimising {
     let usual = Optimising::default();
-    let effort = |effort| match effort {
-        Effort::Fast => job::Effort::Fast,
-        Effort::Normal => job::Effort::Normal,
-        Effort::Best => job::Effort::Best,
-    };
-    let height_fit = |height_fit| match height_fit {
-        HeightFit::Squares => job::HeightFit::Squares,
-        HeightFit::SquaresKeepCrests => job::HeightFit::SquaresKeepCrests,
-        HeightFit::Off => job::HeightFit::Off,
-    };
-    let lattice = |lattice| match lattice {
-        Lattice::Eighth => job::Lattice::Eighth,
-        Lattice::Post => job::Lattice::Post,
-    };
     Optimising {
-        effort: arguments.effort.map_or(usual.effort, effort),
-        height_fit: arguments.height_fit.map_or(usual.height_fit, height_fit),
-        lattice: arguments.lattice.map_or(usual.lattice, lattice),
+        effort: arguments.effort.unwrap_or(usual.effort),
+        height_fit: arguments.height_fit.unwrap_or(usual.height_fit),
+        lattice: arguments.lattice.unwrap_or(usual.lattice),
     }
 }
 
 fn write(mesh: &Mesh, kind: Kind, arguments: &Arguments, out: &Path) -> Result<(), Failure> {
-    let place = MeshPlace {
-        east_m: mesh.east_m,
-        north_m: mesh.north_m,
+    let place = TinPlace {
+        origin_m: [mesh.east_m, mesh.north_m],
         spacing_m: [mesh.spacing_m.0, mesh.spacing_m.1],
-        epsg: mesh.epsg,
+        crs: mesh.epsg.map(|code| format!("EPSG:{code}")),
     };
-    let coordinates = match arguments.coordinates {
-        Frame::Local => Coordinates::Local,
-        Frame::Map => Coordinates::Map,
-    };
+    let coordinates = arguments.coordinates.into();
     files::write_whole(out, |out| match kind {
-        Kind::Ply => views::write_ply(out, &mesh.tin, &place, coordinates),
-        Kind::Obj => views::write_obj(out, &mesh.tin, &place, coordinates),
-        Kind::Glb => {
-            let crs = mesh.epsg.map(|code| format!("EPSG:{code}"));
-            let origin_m = [mesh.east_m, mesh.north_m];
-            exports::write_tin_glb(out, &mesh.tin, &TinPlace { origin_m, spacing_m: place.spacing_m, crs })
-        }
+        Kind::Ply => exports::write_tin_ply(out, &mesh.tin, &place, coordinates),
+        Kind::Obj => exports::write_tin_obj(out, &mesh.tin, &place, coordinates),
+        Kind::Glb => exports::write_tin_glb(out, &mesh.tin, &place),
     })
 }
 

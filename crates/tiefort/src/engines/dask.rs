@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::Glue;
+use super::glue::Glue;
 
 const BODY: &str = r#"
 

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use super::{Glue, shell_word};
+use super::glue::{Glue, shell_word};
 
 /// The build file.
 pub fn ninja(glue: &Glue) -> String {

@@ -7,7 +7,7 @@
 
 use std::fmt::Write;
 
-use super::{Glue, shell_word};
+use super::glue::{Glue, shell_word};
 
 const HEAD: &str = r#"
 # How often a task is tried while what it needs is not done yet, and the seconds in between.

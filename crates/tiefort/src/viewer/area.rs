@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use axum::body::Bytes;
+use job::Choice;
 use load_module_reader::{Area, Keep};
 use product::{Product, ProductGround, Wanted, WantedGround, water};
 use serde_json::json;
@@ -84,7 +85,7 @@ fn description(product: &Product, area: &Area, overview: &Overview) -> String {
         "polygons": totals.polygons,
         "classes": product.job.importance.classes,
         "limits": {
-            "count": match limits.count { job::Count::Triangles => "triangles", job::Count::Polygons => "polygons" },
+            "count": limits.count.name(),
             "per_load_module": limits.per_load_module,
             "mean_per_load_module": limits.mean_per_load_module,
             "window": { "rows": window.rows, "cols": window.cols, "limit": window.limit },

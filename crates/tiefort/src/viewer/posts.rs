@@ -24,7 +24,7 @@ pub fn bytes(viewed: &Viewed, block: Block) -> Result<Vec<u8>, String> {
     let metres = |quanta: i32| quanta as f32 / QUANTA_PER_METRE as f32;
     let posts = (rect.south..=rect.north).flat_map(|row| (rect.west..=rect.east).map(move |col| Post::new(row, col)));
     let residual = |post: Post| {
-        let place = (post.row - whole.south) as usize * whole.posts_wide() + (post.col - whole.west) as usize;
+        let place = whole.index(post);
         match ground.residuals[place] {
             NO_RESIDUAL => f32::NAN,
             quanta => metres(quanta),

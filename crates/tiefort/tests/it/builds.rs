@@ -8,16 +8,9 @@ use serde_json::Value;
 
 use crate::scene::{Scene, everything_below};
 
-/// A scene with `small.toml` built in it.
-fn built() -> Scene {
-    let scene = Scene::with_job("small.toml", &[]);
-    scene.run_to(0, &["build", "job.toml", "--quiet"]);
-    scene
-}
-
 #[test]
 fn a_database_is_reported_on_verified_and_complete() {
-    let scene = built();
+    let scene = Scene::built();
     let status = scene.run_to(0, &["status", "small.tdb"]).stdout;
     assert!(status.contains("complete") && status.contains("# #\n  # #") && status.contains("done: 4"), "{status}");
     let report = scene.run_to(0, &["report", "small.tdb"]).stdout;
@@ -31,7 +24,7 @@ fn a_database_is_reported_on_verified_and_complete() {
 
 #[test]
 fn the_report_has_the_keys_of_the_contract() {
-    let scene = built();
+    let scene = Scene::built();
     let report: Value =
         serde_json::from_str(&scene.run_to(0, &["report", "small.tdb", "--format", "json"]).stdout).unwrap();
     for pointer in "/area /workers /stages/0/name /stages/0/wall_s /stages/0/cpu_s /points/selected /points/border
@@ -74,7 +67,7 @@ fn a_build_killed_while_its_page_is_drawn_is_no_database_until_the_next_one() {
 
 #[test]
 fn a_second_build_keeps_every_tile_and_a_fresh_one_none() {
-    let scene = built();
+    let scene = Scene::built();
     let database = fs::read(scene.path("small.tdb/database.json")).unwrap();
     let again = scene.run_to(0, &["build", "job.toml"]);
     assert!(again.stderr.contains("nothing changed: all 4 tiles"), "{}", again.stderr);
@@ -85,7 +78,7 @@ fn a_second_build_keeps_every_tile_and_a_fresh_one_none() {
 
 #[test]
 fn a_tile_is_run_again_and_changes_nothing() {
-    let scene = built();
+    let scene = Scene::built();
     let modules = |scene: &Scene| fs::read(scene.path("small.tdb/modules/r01c01.slm")).unwrap();
     let before = modules(&scene);
     let said = scene.run_to(0, &["tile", "job.toml", "1,1"]);
@@ -96,7 +89,7 @@ fn a_tile_is_run_again_and_changes_nothing() {
 
 #[test]
 fn damage_is_found_and_named() {
-    let scene = built();
+    let scene = Scene::built();
     let path = scene.path("small.tdb/modules/r00c01.slm");
     let mut bytes = fs::read(&path).unwrap();
     let middle = bytes.len() / 2;

@@ -26,6 +26,13 @@ pub struct Said {
 }
 
 impl Scene {
+    /// A folder with `small.tdb`: 8 x 8 load modules in 2 x 2 tiles of the sample terrain.
+    pub fn built() -> Self {
+        let scene = Self::with_job("small.toml", &[]);
+        scene.run_to(0, &["build", "job.toml", "--quiet"]);
+        scene
+    }
+
     pub fn new() -> Self {
         Self { folder: tempfile::tempdir().unwrap() }
     }
@@ -127,4 +134,9 @@ impl Said {
             assert!(!stderr.contains(rust), "found {rust:?} in: {stderr}");
         }
     }
+}
+
+/// Height of a post of hilly ground, in metres, as a text grid has it.
+pub fn hills(row: usize, col: usize) -> String {
+    format!("{}", 700 + (row * row + 3 * col * row) % 97)
 }

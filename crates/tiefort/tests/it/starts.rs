@@ -2,17 +2,13 @@
 
 use std::fs;
 
-use crate::scene::Scene;
+use crate::scene::{Scene, hills};
 
 /// An ASCII grid of 81 x 81 posts at 25 m, its south-west post `east` m from 506000 E; `row` counts from the north.
 fn grid(east: usize, height: impl Fn(usize, usize) -> String) -> String {
     let head = format!("ncols 81\nnrows 81\nxllcenter {}\nyllcenter 3876000\ncellsize 25\n", 506_000 + east);
     let row = |row: usize| (0..81).map(|col| height(row, col) + " ").collect::<String>() + "\n";
     head + &(0..81).map(row).collect::<String>()
-}
-
-fn hills(row: usize, col: usize) -> String {
-    format!("{}", 700 + (row * row + 3 * col * row) % 97)
 }
 
 #[test]

@@ -7,13 +7,6 @@ use serde_json::Value;
 use crate::raster::Raster;
 use crate::scene::Scene;
 
-/// A folder with `small.tdb`: 8 x 8 load modules in 2 x 2 tiles of the sample terrain.
-fn built() -> Scene {
-    let scene = Scene::with_job("small.toml", &[]);
-    scene.run_to(0, &["build", "job.toml", "--quiet"]);
-    scene
-}
-
 /// Width and height of a PNG.
 fn size(scene: &Scene, name: &str) -> (u32, u32) {
     let bytes = fs::read(scene.path(name)).unwrap();
@@ -24,7 +17,7 @@ fn size(scene: &Scene, name: &str) -> (u32, u32) {
 
 #[test]
 fn every_view_is_a_picture_and_the_same_each_time() {
-    let scene = built();
+    let scene = Scene::built();
     let views = ["relief", "perspective", "wireframe", "residual", "density", "limits", "tiles"];
     for view in views {
         for out in ["a.png", "b.png"] {
@@ -42,7 +35,7 @@ fn every_view_is_a_picture_and_the_same_each_time() {
 
 #[test]
 fn a_part_of_the_area_is_drawn_alone_from_any_eye() {
-    let scene = built();
+    let scene = Scene::built();
     let part = ["--modules", "2,3..3,6", "--size", "300", "--out", "a.png"];
     for more in [
         &["--view", "residual", "--scale", "2"][..],
@@ -67,7 +60,7 @@ fn a_part_of_the_area_is_drawn_alone_from_any_eye() {
 
 #[test]
 fn a_build_leaves_a_page_that_report_prints_again() {
-    let scene = built();
+    let scene = Scene::built();
     let page = fs::read_to_string(scene.path("small.tdb/report.html")).unwrap();
     assert!(page.starts_with("<!DOCTYPE html>") && page.contains("Posts by residual"));
     let said = scene.run_to(0, &["report", "small.tdb", "--format", "html"]);
@@ -80,7 +73,7 @@ fn a_build_leaves_a_page_that_report_prints_again() {
 
 #[test]
 fn a_load_module_is_explained_by_numbers_that_add_up() {
-    let scene = built();
+    let scene = Scene::built();
     let said = scene.run_to(0, &["explain", "small.tdb", "3,4"]);
     for part in ["Load module 3,4", "of the limit of 100", "in the fullest window", "One more point, two triangles"] {
         assert!(said.stdout.contains(part), "{part:?} is not in: {}", said.stdout);
@@ -98,7 +91,7 @@ fn a_load_module_is_explained_by_numbers_that_add_up() {
 
 #[test]
 fn a_database_differs_from_another_one_where_their_load_modules_do() {
-    let scene = built();
+    let scene = Scene::built();
     let said = scene.run_to(0, &["diff", "small.tdb", "small.tdb"]);
     assert_eq!(said.stdout, "All 64 load modules are alike.\n");
     let text = fs::read_to_string(scene.path("job.toml")).unwrap();

@@ -3,9 +3,8 @@
 use std::iter::once;
 
 use super::*;
-use crate::Order;
 use limits::Windows;
-use terrain::{GainRun, ModuleGrid, TileId};
+use terrain::{GainRun, ModuleGrid, TileId, TileOrder};
 
 const GRID: ModuleGrid = ModuleGrid { rows: 20, cols: 22, side_cells: 20 };
 
@@ -13,7 +12,7 @@ fn budget(per_module: u32, pool: u64, area: u64, per_window: u32) -> Budget {
     Budget { grid: GRID, border_step: 5, per_module, pool, area, per_window, windows: Windows::new(GRID, 8) }
 }
 
-fn tiling(order: Order) -> Tiling {
+fn tiling(order: TileOrder) -> Tiling {
     Tiling::new(GRID.area(), 20, 3, 3, order)
 }
 
@@ -79,7 +78,7 @@ fn gains<'a>(by_rank: &'a [usize], bands: &'a mut dyn Iterator<Item = Vec<GainCu
 
 #[test]
 fn gains_in_bands_are_shared_out_like_gains_at_once() {
-    let tiling = tiling(Order::Color);
+    let tiling = tiling(TileOrder::Color);
     let (by_rank, curves) = (ranks(&tiling), curves(&tiling));
     let mut steps: Vec<i32> = curves.iter().flat_map(|curve| curve.runs.iter().map(|run| run.bin)).collect();
     steps.sort_unstable_by(|a, b| b.cmp(a));
@@ -97,7 +96,7 @@ fn gains_in_bands_are_shared_out_like_gains_at_once() {
 
 #[test]
 fn shares_respect_every_limit() {
-    for order in [Order::Color, Order::Raster] {
+    for order in [TileOrder::Color, TileOrder::Raster] {
         let tiling = tiling(order);
         let (by_rank, curves) = (ranks(&tiling), curves(&tiling));
         for (per_module, pool, per_window) in
@@ -114,7 +113,7 @@ fn shares_respect_every_limit() {
 
 #[test]
 fn rough_ground_is_given_more_than_flat_ground() {
-    let tiling = tiling(Order::Color);
+    let tiling = tiling(TileOrder::Color);
     let (by_rank, curves) = (ranks(&tiling), curves(&tiling));
     let budget = budget(100, 0, 32 * GRID.count() as u64, 4096);
     let allocation = allocate_globally(&budget, &tiling, gains(&by_rank, &mut once(curves)));
@@ -127,7 +126,7 @@ fn rough_ground_is_given_more_than_flat_ground() {
 
 #[test]
 fn the_pool_goes_where_it_gains_most() {
-    let tiling = tiling(Order::Color);
+    let tiling = tiling(TileOrder::Color);
     let (by_rank, curves) = (ranks(&tiling), curves(&tiling));
     let budget = budget(40, 30, 32 * GRID.count() as u64, 4096);
     let allocation = allocate_globally(&budget, &tiling, gains(&by_rank, &mut once(curves)));
@@ -139,7 +138,7 @@ fn the_pool_goes_where_it_gains_most() {
 
 #[test]
 fn without_any_gain_the_budget_is_still_there_to_spend() {
-    let tiling = tiling(Order::Color);
+    let tiling = tiling(TileOrder::Color);
     let none: Vec<GainCurve> =
         tiling.tiles().map(|tile| GainCurve { tile, runs: Vec::new(), squares: Vec::new() }).collect();
     let budget = budget(100, 0, 32 * GRID.count() as u64, 4096);

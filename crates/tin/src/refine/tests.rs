@@ -2,31 +2,23 @@
 
 use std::collections::BTreeMap;
 
+use fastrand::Rng;
 use geometry::{levels_available, rounded, visit_posts, widest_level};
 use limits::{Allowance, Windows};
 use mesh::{Lines, Mesh};
-use terrain::{ModuleGrid, ModuleId, ModuleRect, Post, PostRect, SeamSides, TileId};
+use terrain::{LastBatch, ModuleGrid, ModuleId, ModuleRect, Post, PostRect, SeamSides, TileId};
 
 use super::*;
 use crate::proximity::is_near;
-use crate::{Frame, LastBatch, Proximity};
-
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, end: u64) -> u64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 33) % end
-    }
-}
+use crate::{Frame, Proximity};
 
 /// Hills with plateaus: coarse steps, so that equal residuals are common.
 fn hills(rect: PostRect, seed: u64, step: i32) -> Dem {
-    let mut random = Random(seed);
+    let mut random = Rng::with_seed(seed);
     let bumps: Vec<(i32, i32, i32, i32)> = (0..12)
         .map(|_| {
-            let mut next = |end| random.below(end) as i32;
-            (next(rect.posts_high() as u64), next(rect.posts_wide() as u64), 3 + next(20), next(30_000) - 9000)
+            let mut next = |end| random.i32(0..end);
+            (next(rect.posts_high() as i32), next(rect.posts_wide() as i32), 3 + next(20), next(30_000) - 9000)
         })
         .collect();
     Dem::from_fn(rect, |post| {

@@ -1,6 +1,7 @@
 //! What to change in a job when limits bind: named policies, each with the numbers that it would need.
 
 use database::{Report, ReportBound, ReportPlace};
+use terrain::POINT_COST;
 
 use crate::table::grouped;
 
@@ -17,8 +18,6 @@ pub struct Advice {
     pub effect: String,
 }
 
-/// Triangles that a point adds.
-const POINT_COST: u64 = 2;
 /// Use of the mean above which the budget of the area is what ends refinement.
 const SPENT: f64 = 0.985;
 /// RMS residual up to which a class is level rather than true.
@@ -67,7 +66,7 @@ fn module_limit(report: &Report) -> Option<Advice> {
     let bound = of_kind(report, "per_load_module");
     let worst = bound.iter().max_by_key(|bound| bound.refused)?;
     let refused: u64 = bound.iter().map(|bound| u64::from(bound.refused)).sum();
-    let enough = worst.count + POINT_COST * u64::from(worst.refused);
+    let enough = worst.count + u64::from(POINT_COST) * u64::from(worst.refused);
     Some(Advice {
         policy: "raise-module-limit",
         found: format!(
@@ -83,7 +82,7 @@ fn module_limit(report: &Report) -> Option<Advice> {
             "Would let them all in, at {POINT_COST} {} each: {} more. There, the RMS residual is {:.2} m and would be \
              {:.2} m; the largest residual kept out is {:.2} m.",
             report.count,
-            grouped(POINT_COST * refused),
+            grouped(u64::from(POINT_COST) * refused),
             worst.rms_with_m,
             worst.rms_without_m,
             bound.iter().map(|bound| bound.refused_largest_m).fold(0.0, f64::max)
@@ -108,7 +107,7 @@ fn pool(report: &Report) -> Option<Advice> {
             report.count,
             grouped(report.pool.size - report.pool.used)
         ),
-        change: format!("limits.pool = {}", report.pool.size + POINT_COST * refused),
+        change: format!("limits.pool = {}", report.pool.size + u64::from(POINT_COST) * refused),
         effect: "Lets the worst load modules exceed their limit by as many together, and no other.".into(),
     })
 }
@@ -127,7 +126,7 @@ fn window_limit(report: &Report) -> Option<Advice> {
             place_text(worst.place)
         ),
         // Windows overlap, and a post is booked to one of them; so the worst alone says what is about enough.
-        change: format!("limits.per_4km_square = {}", worst.count + POINT_COST * u64::from(worst.refused)),
+        change: format!("limits.per_4km_square = {}", worst.count + u64::from(POINT_COST) * u64::from(worst.refused)),
         effect: format!(
             "About enough for the worst window: there, the RMS residual is {:.2} m and would be {:.2} m. Fewer {} next \
              to it would make room as well: give ground that matters less a lower weight.",

@@ -1,15 +1,11 @@
 //! Pictures inside the page: a bare map, with title, scale and legend in letters of the page around it, so that they
-//! are read on a phone as well as on a desk; and a mark over the map for every load module that a table links to.
-
-use std::collections::BTreeSet;
+//! are read on a phone as well as on a desk.
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
-use database::{Report, ReportPlace};
 use maud::{Markup, html};
-use terrain::{ModuleId, ModuleRect};
 
-use super::place_text;
+use super::marks::Marks;
 use crate::picture::{
     Drawing, GREY, Image, Key, Legend, Map, NO_RESIDUAL, NOTHING, RESIDUAL_SCALE_M, Scene, SceneGround, Shown,
     drawings, hex, length_text, module_pictures, round_length,
@@ -22,67 +18,6 @@ const LIMITS_PIXELS: usize = 640;
 /// Pixels along a picture of one load module.
 const MODULE_PIXELS: usize = 260;
 
-/// Places that the page links to its first map: name of the mark, and the load modules it lies over.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Marks(BTreeSet<(String, [u32; 4])>);
-
-impl Marks {
-    /// Those of the tables, as far as they show them, and of these load modules; none without a scene to draw.
-    pub fn of(report: &Report, scene: Option<&Scene>, worst: &[ModuleId]) -> Self {
-        let Some(scene) = scene else { return Self::default() };
-        let bound = report.bound.iter().take(super::tables::BOUND_ROWS_MAX).map(|bound| bound.place);
-        let breaches = report.breaches.iter().take(super::tables::ROWS_MAX).map(|breach| breach.place);
-        let worst = worst.iter().map(|module| ReportPlace::Module([module.row, module.col]));
-        let places = bound.chain(breaches).chain(worst);
-        let mark = |place| {
-            let id = mark_id(place)?;
-            let ([row, col], [high, wide]) = match place {
-                ReportPlace::Module(at) => (at, [1, 1]),
-                ReportPlace::Window(at) => (at, scene.limits.window),
-                ReportPlace::Area => return None,
-            };
-            Some((id, [row, col, (row + high).min(scene.grid.rows), (col + wide).min(scene.grid.cols)]))
-        };
-        Self(places.filter_map(mark).collect())
-    }
-
-    /// A place as a link to the map, where that has a mark of it.
-    pub fn link(&self, place: ReportPlace) -> Markup {
-        let id = mark_id(place).filter(|id| self.0.iter().any(|(mark, _)| mark == id));
-        let text = place_text(place);
-        html! {
-            @match id {
-                Some(id) => a href={ "#" (id) } title="show it on the map" { (text) },
-                None => (text),
-            }
-        }
-    }
-
-    fn over(&self, scene: &Scene) -> Markup {
-        let [west, south, east, north] = scene.extent_m(scene.part);
-        html! {
-            @for (id, [row, col, end_row, end_col]) in &self.0 {
-                @let rect = ModuleRect { south: *row, west: *col, north: *end_row, east: *end_col };
-                @let [left, bottom, right, top] = scene.extent_m(rect);
-                @let across = |metres: f64| 100.0 * metres / (east - west);
-                @let down = |metres: f64| 100.0 * metres / (north - south);
-                span.mark id=(id) style=(format!(
-                    "left:{:.3}%;top:{:.3}%;width:{:.3}%;height:{:.3}%",
-                    across(left - west), down(north - top), across(right - left), down(top - bottom),
-                )) {}
-            }
-        }
-    }
-}
-
-fn mark_id(place: ReportPlace) -> Option<String> {
-    match place {
-        ReportPlace::Module([row, col]) => Some(format!("module-{row}-{col}")),
-        ReportPlace::Window([row, col]) => Some(format!("window-{row}-{col}")),
-        ReportPlace::Area => None,
-    }
-}
-
 /// A picture as an address that holds all of it.
 pub(crate) fn data_uri(image: &Image) -> String {
     let mut bytes = Vec::new();
@@ -91,9 +26,9 @@ pub(crate) fn data_uri(image: &Image) -> String {
 }
 
 fn figure(drawing: &Drawing, caption: &str, over: &Markup) -> Markup {
-    let Drawing { sheet, map, plan } = drawing;
-    let scale_m = round_length(0.3 * plan.metres_per_pixel() * plan.pixels[0] as f64);
-    let scale_share = scale_m / (plan.extent_m[2] - plan.extent_m[0]);
+    let Drawing { sheet, map, map_extent } = drawing;
+    let scale_m = round_length(0.3 * map_extent.metres_per_pixel() * map_extent.pixels[0] as f64);
+    let scale_share = scale_m / (map_extent.extent_m[2] - map_extent.extent_m[0]);
     html! {
         figure style=(format!("max-width:{}px", map.wide())) {
             figcaption { b { (caption) } " " (sheet.subtitle) "." }
@@ -109,7 +44,7 @@ fn figure(drawing: &Drawing, caption: &str, over: &Markup) -> Markup {
 }
 
 fn extent_text(drawing: &Drawing) -> String {
-    let ([west, south, east, north], place) = (drawing.plan.extent_m, &drawing.sheet.coordinates);
+    let ([west, south, east, north], place) = (drawing.map_extent.extent_m, &drawing.sheet.coordinates);
     let [east_0, north_0] = place.origin_m;
     let km = |metres: f64| metres / 1000.0;
     let crs = if place.crs.is_empty() { String::new() } else { format!(" in {}", place.crs) };
@@ -175,7 +110,7 @@ pub(super) fn first(scene: &Scene, marks: &Marks) -> Markup {
 
 /// All other maps of the page.
 pub(super) fn maps(scene: &Scene) -> Markup {
-    let per_pixel = scene.plan(MAP_PIXELS).metres_per_pixel();
+    let per_pixel = scene.map_extent(MAP_PIXELS).metres_per_pixel();
     // Those of load modules are known without the ground.
     let has_residuals = scene.ground.is_some() || scene.frame.spacing.metres() < per_pixel;
     html! {

@@ -5,6 +5,7 @@
 mod advice;
 mod charts;
 mod maps;
+mod marks;
 mod tables;
 
 pub(crate) use advice::place_text;
@@ -18,7 +19,7 @@ use crate::picture::{RESIDUAL_SCALE_M, Scene};
 use crate::table::grouped;
 
 use charts::Histogram;
-use maps::Marks;
+use marks::Marks;
 
 /// One setting of a job, as the page lists it.
 #[derive(Clone, Debug, PartialEq, Eq)]

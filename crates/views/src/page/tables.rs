@@ -4,14 +4,9 @@ use database::{Manifest, Report, ReportResidual};
 use maud::{Markup, html};
 
 use super::advise;
-use super::maps::Marks;
+use super::marks::{BOUND_ROWS_MAX, Marks, ROWS_MAX};
 use crate::report::{border_in_words, heights_in_words};
 use crate::table::grouped;
-
-/// Rows of a long list that the page shows; the files beside it have them all.
-pub(super) const ROWS_MAX: usize = 100;
-/// The same of places where limits kept posts out.
-pub(super) const BOUND_ROWS_MAX: usize = 25;
 
 pub(super) fn verdict(report: &Report) -> Markup {
     let breaches = report.breaches.len() as u64;

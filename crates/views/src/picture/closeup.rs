@@ -4,20 +4,20 @@ use terrain::{LoadModule, ModuleRect};
 
 use super::facets::Facets;
 use super::image::Image;
-use super::plan::Plan;
+use super::map_extent::MapExtent;
 use super::residual_map::residual_map;
 use super::scene::{Scene, SceneGround};
 use super::wireframe::facets_wireframe;
-use super::{RESIDUAL_SCALE_M, plan::Posts};
+use super::{RESIDUAL_SCALE_M, map_extent::Posts};
 
 /// The wireframe of a load module and its residuals, where the scene has its ground.
 pub(crate) fn module_pictures(scene: &Scene, module: &LoadModule, pixels: usize) -> (Image, Option<Image>) {
     let (row, col) = (module.id.row, module.id.col);
     let extent_m = scene.extent_m(ModuleRect { south: row, west: col, north: row + 1, east: col + 1 });
-    let plan = Plan::of(extent_m, pixels);
+    let map_extent = MapExtent::of(extent_m, pixels);
     let wires = facets_wireframe(
         &Facets::of_modules([module], scene.grid, scene.frame.spacing).with_covers([module], scene.water),
-        &plan,
+        &map_extent,
     );
     let residuals = scene.ground.map(|ground| {
         let (rect, whole) = (scene.grid.posts_of(module.id), ground.dem.rect());
@@ -28,7 +28,7 @@ pub(crate) fn module_pictures(scene: &Scene, module: &LoadModule, pixels: usize)
         };
         let residuals: Vec<i32> = (rect.south..=rect.north).flat_map(line).copied().collect();
         let posts = Posts { rect, spacing_m: [scene.frame.spacing.metres(); 2] };
-        residual_map(&SceneGround { dem: &dem, residuals: &residuals }, &posts, &plan, RESIDUAL_SCALE_M)
+        residual_map(&SceneGround { dem: &dem, residuals: &residuals }, &posts, &map_extent, RESIDUAL_SCALE_M)
     });
     (wires, residuals)
 }

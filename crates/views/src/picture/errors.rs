@@ -9,21 +9,21 @@ use super::sheet::{Drawing, Legend, Sheet, round_marks};
 /// Draws the weighted residual of every post of a scene in metres, given row by row from the south-west, on a scale
 /// that ends at twice what is still good enough. Where a pixel holds several posts it shows the largest.
 pub fn draw_errors(scene: &Scene, residual_m: &[f32], tolerance_m: f64, longest: usize) -> Image {
-    let (plan, rect, spacing_m) = (scene.plan(longest), scene.grid.area(), scene.frame.spacing.metres());
-    let mut largest = vec![f32::NEG_INFINITY; plan.pixels[0] * plan.pixels[1]];
+    let (map_extent, rect, spacing_m) = (scene.map_extent(longest), scene.grid.area(), scene.frame.spacing.metres());
+    let mut largest = vec![f32::NEG_INFINITY; map_extent.pixels[0] * map_extent.pixels[1]];
     // The pixels of a post: those that the square around it reaches, and one at least.
     let pixels = |at: i32, axis: usize| {
         let [near, far] = [-0.5, 0.5].map(|half| (f64::from(at) + half) * spacing_m);
-        let [a, b] = [plan.at([near; 2])[axis], plan.at([far; 2])[axis]];
+        let [a, b] = [map_extent.at([near; 2])[axis], map_extent.at([far; 2])[axis]];
         let (first, last) = (a.min(b).round().max(0.0) as usize, a.max(b).round().max(0.0) as usize);
-        let first = first.min(plan.pixels[axis] - 1);
-        first..last.clamp(first + 1, plan.pixels[axis].max(first + 1))
+        let first = first.min(map_extent.pixels[axis] - 1);
+        first..last.clamp(first + 1, map_extent.pixels[axis].max(first + 1))
     };
     for (row, line) in (rect.south..=rect.north).zip(residual_m.chunks(rect.posts_wide())) {
         for (col, &metres) in (rect.west..=rect.east).zip(line) {
             for y in pixels(row, 1) {
                 for x in pixels(col, 0) {
-                    let pixel = &mut largest[y * plan.pixels[0] + x];
+                    let pixel = &mut largest[y * map_extent.pixels[0] + x];
                     *pixel = pixel.max(metres);
                 }
             }
@@ -31,7 +31,7 @@ pub fn draw_errors(scene: &Scene, residual_m: &[f32], tolerance_m: f64, longest:
     }
     let end_m = 2.0 * tolerance_m.max(1e-3);
     let color = |&metres: &f32| if metres.is_finite() { ERRORS.at(f64::from(metres) / end_m) } else { NOTHING };
-    let map = Image::of(plan.pixels[0], plan.pixels[1], largest.iter().map(color).collect());
+    let map = Image::of(map_extent.pixels[0], map_extent.pixels[1], largest.iter().map(color).collect());
     let worst_m = residual_m.iter().copied().fold(0.0, f32::max);
     let marks = round_marks(0.0, end_m).into_iter().map(|(share, metres)| (share, format!("{metres} m")));
     let sheet = Sheet {
@@ -43,7 +43,7 @@ pub fn draw_errors(scene: &Scene, residual_m: &[f32], tolerance_m: f64, longest:
                 shows the largest of its posts; the scale ends at twice what is good enough."
             .into(),
     };
-    Drawing { sheet, map, plan }.image()
+    Drawing { sheet, map, map_extent }.image()
 }
 
 /// Draws how much of its limit every load module uses.

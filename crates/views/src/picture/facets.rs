@@ -6,6 +6,7 @@ use terrain::{
     Dem, HOLE_CLASS, LATTICE_PER_POST, LoadModule, ModuleGrid, Post, QUANTA_PER_METRE, Spacing, Tin, metres_of_quanta,
 };
 
+use super::map_extent::slope;
 use super::scene::Scene;
 
 /// Triangles with the places of their corners: east, north and up, in metres.
@@ -107,7 +108,7 @@ impl Facets {
                 for col in range(0, rect.west, rect.east) {
                     let at = [f64::from(col), f64::from(row)];
                     if 0.0 <= left(a, b, at) && 0.0 <= left(b, c, at) && 0.0 <= left(c, a, at) {
-                        let place = (row - rect.south) as usize * rect.posts_wide() + (col - rect.west) as usize;
+                        let place = rect.index(Post::new(row, col));
                         posts[place] = Cover::Water;
                     }
                 }
@@ -240,17 +241,6 @@ pub(crate) fn light_of(to_east: f64, to_north: f64) -> f32 {
 pub(crate) fn light_of_triangle([a, b, c]: [[f64; 3]; 3], times: f64) -> f32 {
     let [to_east, to_north] = slope([a, b, c]);
     light_of(to_east * times, to_north * times)
-}
-
-/// How much the plane through three corners rises per metre to the east and to the north; 0 without an area.
-pub(crate) fn slope([a, b, c]: [[f64; 3]; 3]) -> [f64; 2] {
-    let to = |p: [f64; 3]| [p[0] - a[0], p[1] - a[1], p[2] - a[2]];
-    let (b, c) = (to(b), to(c));
-    let doubled = b[0] * c[1] - c[0] * b[1];
-    if doubled == 0.0 {
-        return [0.0, 0.0];
-    }
-    [(b[2] * c[1] - c[2] * b[1]) / doubled, (b[0] * c[2] - c[0] * b[2]) / doubled]
 }
 
 #[cfg(test)]

@@ -1,9 +1,9 @@
 //! Pictures of terrain, drawn here: shaded, from above and in perspective, and maps of what was built.
 //!
 //! ```text
-//!   Scene ─► plan (metres to pixels) ─► relief, residual_map, wireframe, module_maps ─┐
-//!   Surface, Camera ─► depth (nearer covers) ─► perspective ─► panels                ├─► sheet ─► Image ─► PNG
-//!                                                      titles, scales, legends ◄─────┘
+//!   Scene ─► map_extent ─► relief, residual_map, wireframe, module_maps ─┐
+//!   Surface, Camera ─► depth (nearer covers) ─► perspective ─► panels    ├─► sheet ─► Image ─► PNG
+//!                                          titles, scales, legends ◄─────┘
 //! ```
 //! Pictures are pure: the same ground gives the same bytes, on any machine. What is absent: threads, files, clocks.
 
@@ -14,10 +14,10 @@ mod depth;
 mod errors;
 mod facets;
 mod image;
+mod map_extent;
 mod module_maps;
 mod panels;
 mod perspective;
-mod plan;
 mod relief;
 mod residual_map;
 mod scene;

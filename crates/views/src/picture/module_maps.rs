@@ -5,7 +5,7 @@ use terrain::{ModuleId, ModuleRect, TileId};
 
 use super::color::{BOUND, BREACH, COUNTS, Color, GREY, INK, KINDS, PALE, USE, WHITE, ink_on};
 use super::image::Image;
-use super::plan::Plan;
+use super::map_extent::MapExtent;
 use super::scene::Scene;
 use super::sheet::{Drawing, Key, Legend, Sheet, draw_crossed, round_marks};
 use super::text::{Anchor, Font, write};
@@ -13,7 +13,7 @@ use crate::table::grouped;
 
 /// Triangles per load module.
 pub(crate) fn density(scene: &Scene, longest: usize) -> Drawing {
-    let plan = scene.plan(longest);
+    let map_extent = scene.map_extent(longest);
     // Without what limits count, triangles: of the load modules that are there, which are those of the part.
     let limits = scene.limits;
     let is_known = !limits.modules.is_empty();
@@ -24,12 +24,12 @@ pub(crate) fn density(scene: &Scene, longest: usize) -> Drawing {
     let low = counts.iter().copied().min().unwrap_or(0);
     let high = counts.iter().copied().max().unwrap_or(0).max(low + 1);
     let color = |count: u32| COUNTS.at(f64::from(count - low) / f64::from(high - low));
-    let mut map = Image::new(plan.pixels[0], plan.pixels[1], WHITE);
+    let mut map = Image::new(map_extent.pixels[0], map_extent.pixels[1], WHITE);
     for (module, &count) in scene.part.iter().zip(&counts) {
-        fill(&mut map, scene, &plan, one(module), color(count));
+        fill(&mut map, scene, &map_extent, one(module), color(count));
     }
     let wide = scene.part.east - scene.part.west;
-    label_modules(&mut map, scene, &plan, |module| {
+    label_modules(&mut map, scene, &map_extent, |module| {
         let count = counts[((module.row - scene.part.south) * wide + module.col - scene.part.west) as usize];
         (count.to_string(), ink_on(color(count)))
     });
@@ -50,7 +50,7 @@ pub(crate) fn density(scene: &Scene, longest: usize) -> Drawing {
         legends: vec![Legend::Ramp { title: format!("{what} in a load module"), ramp: COUNTS, marks: marks.collect() }],
         notes: String::new(),
     };
-    Drawing { sheet, map, plan }
+    Drawing { sheet, map, map_extent }
 }
 
 /// How much of both limits is used, side by side: of load modules, and of the windows around every place.
@@ -75,23 +75,23 @@ fn use_legends(limit: u32, what: &str, is_bound: bool) -> Vec<Legend> {
 }
 
 pub(crate) fn module_limits(scene: &Scene, longest: usize) -> Drawing {
-    let (plan, limits) = (scene.plan(longest), scene.limits);
+    let (map_extent, limits) = (scene.map_extent(longest), scene.limits);
     let limit = limits.per_load_module;
-    let mut map = Image::new(plan.pixels[0], plan.pixels[1], WHITE);
+    let mut map = Image::new(map_extent.pixels[0], map_extent.pixels[1], WHITE);
     let mut over = Vec::new();
     for module in scene.part.iter() {
         let count = limits.modules[scene.grid.index(module)];
         if limit < count {
-            over.push(plan.rect(scene.extent_m(one(module))));
+            over.push(map_extent.rect(scene.extent_m(one(module))));
         } else {
-            fill(&mut map, scene, &plan, one(module), USE.at(f64::from(count) / f64::from(limit)));
+            fill(&mut map, scene, &map_extent, one(module), USE.at(f64::from(count) / f64::from(limit)));
         }
     }
     for &module in limits.bound_modules.iter().filter(|module| scene.part.contains(**module)) {
-        frame(&mut map, scene, &plan, one(module));
+        frame(&mut map, scene, &map_extent, one(module));
     }
     draw_breaches(&mut map, &over);
-    label_modules(&mut map, scene, &plan, |module| {
+    label_modules(&mut map, scene, &map_extent, |module| {
         let count = limits.modules[scene.grid.index(module)];
         let share = f64::from(count) / f64::from(limit);
         (count.to_string(), if limit < count { INK } else { ink_on(USE.at(share)) })
@@ -104,7 +104,7 @@ pub(crate) fn module_limits(scene: &Scene, longest: usize) -> Drawing {
         legends: use_legends(limit, &format!("{} in a load module", limits.count), !limits.bound_modules.is_empty()),
         notes: String::new(),
     };
-    Drawing { sheet, map, plan }
+    Drawing { sheet, map, map_extent }
 }
 
 /// Marks breaches over all else. A few of them are drawn large enough to be found on a map of thousands of squares.
@@ -120,15 +120,15 @@ fn draw_breaches(map: &mut Image, rects: &[[i64; 4]]) {
 
 /// The windows have their middles a load module apart, so each is drawn as one square there.
 fn window_limits(scene: &Scene, longest: usize) -> Drawing {
-    let (plan, limits) = (scene.plan(longest), scene.limits);
+    let (map_extent, limits) = (scene.map_extent(longest), scene.limits);
     let [rows, cols] = limits.window;
     let origins = ModuleRect { south: 0, west: 0, north: scene.grid.rows - rows + 1, east: scene.grid.cols - cols + 1 };
-    let mut map = Image::new(plan.pixels[0], plan.pixels[1], PALE);
+    let mut map = Image::new(map_extent.pixels[0], map_extent.pixels[1], PALE);
     let (mut most, mut over) = (0, Vec::new());
     for (origin, &count) in origins.iter().zip(&limits.windows) {
-        let rect = plan.rect(middle_of(scene, origin));
-        let seen = rect[0] < plan.pixels[0] as i64 && 0 < rect[0] + rect[2];
-        if !(seen && rect[1] < plan.pixels[1] as i64 && 0 < rect[1] + rect[3]) {
+        let rect = map_extent.rect(middle_of(scene, origin));
+        let seen = rect[0] < map_extent.pixels[0] as i64 && 0 < rect[0] + rect[2];
+        if !(seen && rect[1] < map_extent.pixels[1] as i64 && 0 < rect[1] + rect[3]) {
             continue;
         }
         most = most.max(count);
@@ -139,7 +139,7 @@ fn window_limits(scene: &Scene, longest: usize) -> Drawing {
         }
     }
     for &origin in &limits.bound_windows {
-        map.outline(plan.rect(middle_of(scene, origin)), 2, BOUND);
+        map.outline(map_extent.rect(middle_of(scene, origin)), 2, BOUND);
     }
     draw_breaches(&mut map, &over);
     let (high_m, wide_m) = (f64::from(rows) * scene.side_m(), f64::from(cols) * scene.side_m());
@@ -164,7 +164,7 @@ fn window_limits(scene: &Scene, longest: usize) -> Drawing {
             "Each square is the middle of a window of {rows} x {cols} load modules; grey: no window's middle."
         ),
     };
-    Drawing { sheet, map, plan }
+    Drawing { sheet, map, map_extent }
 }
 
 /// West, south, east and north of the square in the middle of a window.
@@ -180,22 +180,22 @@ pub(crate) fn one(module: ModuleId) -> ModuleRect {
     ModuleRect { south: module.row, west: module.col, north: module.row + 1, east: module.col + 1 }
 }
 
-pub(crate) fn fill(map: &mut Image, scene: &Scene, plan: &Plan, modules: ModuleRect, color: Color) {
-    map.fill(plan.rect(scene.extent_m(modules)), color);
+pub(crate) fn fill(map: &mut Image, scene: &Scene, map_extent: &MapExtent, modules: ModuleRect, color: Color) {
+    map.fill(map_extent.rect(scene.extent_m(modules)), color);
 }
 
-fn frame(map: &mut Image, scene: &Scene, plan: &Plan, modules: ModuleRect) {
-    map.outline(plan.rect(scene.extent_m(modules)), 2, BOUND);
+fn frame(map: &mut Image, scene: &Scene, map_extent: &MapExtent, modules: ModuleRect) {
+    map.outline(map_extent.rect(scene.extent_m(modules)), 2, BOUND);
 }
 
 /// Writes into every load module, where there is room for it.
-fn label_modules(map: &mut Image, scene: &Scene, plan: &Plan, label: impl Fn(ModuleId) -> (String, Color)) {
-    let side = scene.side_m() / plan.metres_per_pixel();
+fn label_modules(map: &mut Image, scene: &Scene, map_extent: &MapExtent, label: impl Fn(ModuleId) -> (String, Color)) {
+    let side = scene.side_m() / map_extent.metres_per_pixel();
     if side < 44.0 {
         return;
     }
     for module in scene.part.iter() {
-        let [left, top, wide, high] = plan.rect(scene.extent_m(one(module)));
+        let [left, top, wide, high] = map_extent.rect(scene.extent_m(one(module)));
         let (text, ink) = label(module);
         let place = [left + wide / 2, top + high / 2 - Font::Plain.line() / 2];
         write(map, place, &text, Font::Plain, Anchor::Middle, ink);
@@ -204,14 +204,14 @@ fn label_modules(map: &mut Image, scene: &Scene, plan: &Plan, label: impl Fn(Mod
 
 /// Which tile lies where, in which order, and how it stands.
 pub(crate) fn tiles(scene: &Scene, longest: usize) -> Drawing {
-    let plan = scene.plan(longest);
-    let mut map = Image::new(plan.pixels[0], plan.pixels[1], WHITE);
+    let map_extent = scene.map_extent(longest);
+    let mut map = Image::new(map_extent.pixels[0], map_extent.pixels[1], WHITE);
     for tile in scene.tiles {
-        fill(&mut map, scene, &plan, tile.modules, KINDS[tile.color as usize % KINDS.len()]);
+        fill(&mut map, scene, &map_extent, tile.modules, KINDS[tile.color as usize % KINDS.len()]);
     }
-    draw_module_lines(&mut map, scene, &plan);
+    draw_module_lines(&mut map, scene, &map_extent);
     for tile in scene.tiles {
-        let rect = plan.rect(scene.extent_m(tile.modules));
+        let rect = map_extent.rect(scene.extent_m(tile.modules));
         map.outline([rect[0], rect[1], rect[2] + 1, rect[3] + 1], 2, INK);
         label_tile(&mut map, scene, rect, tile);
     }
@@ -237,7 +237,7 @@ pub(crate) fn tiles(scene: &Scene, longest: usize) -> Drawing {
                 before it); its triangles. Fine lines: load modules."
             .into(),
     };
-    Drawing { sheet, map, plan }
+    Drawing { sheet, map, map_extent }
 }
 
 const STATES: [(TileState, &str); 5] = [
@@ -248,12 +248,12 @@ const STATES: [(TileState, &str); 5] = [
     (TileState::Missing, "missing"),
 ];
 
-fn draw_module_lines(map: &mut Image, scene: &Scene, plan: &Plan) {
-    if scene.side_m() / plan.metres_per_pixel() < 4.0 {
+fn draw_module_lines(map: &mut Image, scene: &Scene, map_extent: &MapExtent) {
+    if scene.side_m() / map_extent.metres_per_pixel() < 4.0 {
         return;
     }
     for module in scene.part.iter() {
-        let [left, top, wide, high] = plan.rect(scene.extent_m(one(module)));
+        let [left, top, wide, high] = map_extent.rect(scene.extent_m(one(module)));
         for x in left..left + wide {
             map.blend(x, top, GREY, 0.35);
         }
@@ -324,9 +324,9 @@ mod tests {
             water: None,
             tiles: &[],
         };
-        let plan = scene.plan(300);
+        let map_extent = scene.map_extent(300);
         let image = module_limits(&scene, 300).map;
-        let mut places = (0..plan.pixels[0]).flat_map(|x| (0..plan.pixels[1]).map(move |y| (x, y)));
+        let mut places = (0..map_extent.pixels[0]).flat_map(|x| (0..map_extent.pixels[1]).map(move |y| (x, y)));
         places.any(|(x, y)| image.pixel(x, y) == color)
     }
 

@@ -377,7 +377,7 @@ struct LitPosts<'a> {
 impl LitPosts<'_> {
     fn cover(&self, row: i32, col: i32) -> Cover {
         let rect = self.dem.rect();
-        let place = (row - rect.south) as usize * rect.posts_wide() + (col - rect.west) as usize;
+        let place = rect.index(terrain::Post::new(row, col));
         self.covers.get(place).copied().unwrap_or_default()
     }
 

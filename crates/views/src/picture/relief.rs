@@ -5,7 +5,7 @@ use terrain::{Dem, metres_of_quanta};
 use super::color::{Color, GREY, HEIGHTS, NOTHING, WATER, lit};
 use super::facets::{Cover, Facets, light_of, light_of_triangle};
 use super::image::Image;
-use super::plan::{Plan, Posts, SAMPLES, Samples};
+use super::map_extent::{MapExtent, Posts, SAMPLES, Samples};
 use super::scene::Scene;
 use super::sheet::{Drawing, HATCH_PIXELS, Key, Legend, Sheet, round_marks};
 use crate::table::grouped;
@@ -61,16 +61,16 @@ pub enum Shown {
 }
 
 /// Relief of triangles.
-pub(crate) fn facets_relief(facets: &Facets, plan: &Plan, tints: &Tints) -> Image {
-    let mut samples = Samples::new(plan);
+pub(crate) fn facets_relief(facets: &Facets, map_extent: &MapExtent, tints: &Tints) -> Image {
+    let mut samples = Samples::new(map_extent);
     for (index, &corners) in facets.corners.iter().enumerate() {
         let corners = facets.triangle(corners);
         match facets.cover(index) {
-            Cover::Water => plan.cover(corners, |row, col, _| samples.add(row, col, WATER)),
-            Cover::Hole => plan.cover(corners, |row, col, _| samples.add(row, col, hatched(row, col))),
+            Cover::Water => map_extent.cover(corners, |row, col, _| samples.add(row, col, WATER)),
+            Cover::Hole => map_extent.cover(corners, |row, col, _| samples.add(row, col, hatched(row, col))),
             Cover::Ground => {
                 let light = light_of_triangle(corners, SHADING_TIMES);
-                plan.cover(corners, |row, col, height_m| samples.add(row, col, lit(tints.at(height_m), light)));
+                map_extent.cover(corners, |row, col, height_m| samples.add(row, col, lit(tints.at(height_m), light)));
             }
         }
     }
@@ -78,14 +78,14 @@ pub(crate) fn facets_relief(facets: &Facets, plan: &Plan, tints: &Tints) -> Imag
 }
 
 /// Relief of posts; `covers` says what each of them lies over, and is empty where all lie over plain ground.
-pub(crate) fn posts_relief(dem: &Dem, posts: &Posts, plan: &Plan, tints: &Tints, covers: &[Cover]) -> Image {
+pub(crate) fn posts_relief(dem: &Dem, posts: &Posts, map_extent: &MapExtent, tints: &Tints, covers: &[Cover]) -> Image {
     let (wide, lights) = (dem.rect().posts_wide(), lights(dem, posts.spacing_m, SHADING_TIMES));
     let rect = dem.rect();
     let heights: Vec<f32> = (rect.south..=rect.north)
         .flat_map(|row| dem.row(row).iter().map(|&quanta| metres_of_quanta(quanta) as f32))
         .collect();
-    let mut samples = Samples::new(plan);
-    posts.sample(plan, |between| {
+    let mut samples = Samples::new(map_extent);
+    posts.sample(map_extent, |between| {
         let nearest = between.post + usize::from(0.5 < between.share[0]) + usize::from(0.5 < between.share[1]) * wide;
         let [row, col] = between.sample;
         let color = match covers.get(nearest).copied().unwrap_or_default() {
@@ -134,7 +134,7 @@ pub(crate) fn range_m(dem: &Dem) -> (f64, f64) {
 /// The relief of a scene, its longer side `longest` pixels; the ground only where it is there.
 pub(crate) fn relief(scene: &Scene, shown: Shown, longest: usize) -> Vec<Drawing> {
     let facets = Facets::of_scene(scene);
-    let plan = scene.plan(longest);
+    let map_extent = scene.map_extent(longest);
     let range = scene.ground.map_or_else(|| facets.range_m(), |ground| range_m(ground.dem));
     let tints = Tints::new(range);
     let sheet = |title: &str, detail: String| Sheet {
@@ -150,14 +150,14 @@ pub(crate) fn relief(scene: &Scene, shown: Shown, longest: usize) -> Vec<Drawing
     let tin = || {
         let detail = format!("{} triangles", grouped(facets.count() as u64));
         let sheet = sheet("relief of the load modules", detail);
-        Drawing { sheet, map: facets_relief(&facets, &plan, &tints), plan }
+        Drawing { sheet, map: facets_relief(&facets, &map_extent, &tints), map_extent }
     };
     let dem = || {
         let ground = scene.ground.expect("whoever asks for the ground has it");
         let detail = format!("posts {} m apart", scene.frame.spacing.metres());
         let covers = facets.post_covers(ground.dem, scene.frame.spacing.metres());
-        let map = posts_relief(ground.dem, &scene.posts(&ground), &plan, &tints, &covers);
-        Drawing { sheet: sheet("relief of the DEM", detail), map, plan }
+        let map = posts_relief(ground.dem, &scene.posts(&ground), &map_extent, &tints, &covers);
+        Drawing { sheet: sheet("relief of the DEM", detail), map, map_extent }
     };
     match shown {
         Shown::Tin => vec![tin()],

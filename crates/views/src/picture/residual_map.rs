@@ -4,8 +4,8 @@ use terrain::{ModuleResidual, QUANTA_PER_METRE};
 
 use super::color::{ERRORS, NOTHING, RESIDUALS, lit};
 use super::image::Image;
+use super::map_extent::{MapExtent, Posts, SAMPLES};
 use super::module_maps::{fill, one};
-use super::plan::{Plan, Posts, SAMPLES};
 use super::relief::lights;
 use super::scene::{NO_RESIDUAL, Scene, SceneGround};
 use super::sheet::{Drawing, Key, Legend, Sheet, round_marks};
@@ -14,17 +14,17 @@ use super::sheet::{Drawing, Key, Legend, Sheet, round_marks};
 pub const RESIDUAL_SCALE_M: f64 = 5.0;
 
 /// The mean residual under every pixel, over a faint relief.
-pub(crate) fn residual_map(ground: &SceneGround, posts: &Posts, plan: &Plan, scale_m: f64) -> Image {
+pub(crate) fn residual_map(ground: &SceneGround, posts: &Posts, map_extent: &MapExtent, scale_m: f64) -> Image {
     let wide = ground.dem.rect().posts_wide();
     let lights = lights(ground.dem, posts.spacing_m, 1.0);
-    let mut sums = vec![(0.0_f32, 0.0_f32, 0_u32); plan.pixels[0] * plan.pixels[1]];
-    posts.sample(plan, |between| {
+    let mut sums = vec![(0.0_f32, 0.0_f32, 0_u32); map_extent.pixels[0] * map_extent.pixels[1]];
+    posts.sample(map_extent, |between| {
         let around = [between.post, between.post + 1, between.post + wide, between.post + wide + 1];
         if around.iter().any(|&post| ground.residuals[post] == NO_RESIDUAL) {
             return;
         }
         let [row, col] = between.sample;
-        let sum = &mut sums[row / SAMPLES * plan.pixels[0] + col / SAMPLES];
+        let sum = &mut sums[row / SAMPLES * map_extent.pixels[0] + col / SAMPLES];
         sum.0 += between.blend(wide, |post| ground.residuals[post] as f32);
         sum.1 += between.blend(wide, |post| lights[post]);
         sum.2 += 1;
@@ -40,7 +40,7 @@ pub(crate) fn residual_map(ground: &SceneGround, posts: &Posts, plan: &Plan, sca
         // A hint of the ground, so that one finds one's way.
         lit(color, 1.0 + (light / count as f32 - 1.0).clamp(-0.6, 0.0) * 0.35)
     };
-    Image::of(plan.pixels[0], plan.pixels[1], sums.iter().map(color).collect())
+    Image::of(map_extent.pixels[0], map_extent.pixels[1], sums.iter().map(color).collect())
 }
 
 pub(crate) fn residual_legend(scale_m: f64) -> Legend {
@@ -64,12 +64,12 @@ pub(crate) fn residual_legend(scale_m: f64) -> Legend {
 /// # Panics
 /// When the posts are to be shown and the scene has no ground.
 pub(crate) fn residuals(scene: &Scene, scale_m: f64, longest: usize) -> Drawing {
-    let plan = scene.plan(longest);
-    if scene.frame.spacing.metres() < plan.metres_per_pixel() {
-        return rms_by_module(scene, scale_m, plan);
+    let map_extent = scene.map_extent(longest);
+    if scene.frame.spacing.metres() < map_extent.metres_per_pixel() {
+        return rms_by_module(scene, scale_m, map_extent);
     }
     let ground = scene.ground.expect("residuals of posts are drawn of a scene with its ground");
-    let map = residual_map(&ground, &scene.posts(&ground), &plan, scale_m);
+    let map = residual_map(&ground, &scene.posts(&ground), &map_extent, scale_m);
     let sheet = Sheet {
         title: format!("{}: residuals", scene.name),
         subtitle: format!("{}, {}", scene.what(), figures(&of_scene(scene))),
@@ -81,19 +81,19 @@ pub(crate) fn residuals(scene: &Scene, scale_m: f64, longest: usize) -> Drawing 
         notes: format!(
             "Orange: the ground lies above the triangles; purple: below. Every pixel is the mean of the \
              {0:.1} x {0:.1} m under it; the scale is the same in every picture unless it is asked for.",
-            plan.metres_per_pixel()
+            map_extent.metres_per_pixel()
         ),
     };
-    Drawing { sheet, map, plan }
+    Drawing { sheet, map, map_extent }
 }
 
 /// RMS residual of every load module.
-fn rms_by_module(scene: &Scene, scale_m: f64, plan: Plan) -> Drawing {
+fn rms_by_module(scene: &Scene, scale_m: f64, map_extent: MapExtent) -> Drawing {
     let all = of_scene(scene);
-    let mut map = Image::new(plan.pixels[0], plan.pixels[1], NOTHING);
+    let mut map = Image::new(map_extent.pixels[0], map_extent.pixels[1], NOTHING);
     for (module, residual) in scene.part.iter().zip(&all) {
         if let Some(rms_m) = rms_m(residual) {
-            fill(&mut map, scene, &plan, one(module), ERRORS.at(rms_m / scale_m));
+            fill(&mut map, scene, &map_extent, one(module), ERRORS.at(rms_m / scale_m));
         }
     }
     let mut marks: Vec<(f64, String)> =
@@ -116,7 +116,7 @@ fn rms_by_module(scene: &Scene, scale_m: f64, plan: Plan) -> Drawing {
             scene.frame.spacing.metres()
         ),
     };
-    Drawing { sheet, map, plan }
+    Drawing { sheet, map, map_extent }
 }
 
 /// Residuals of the load modules of a scene: measured against its ground where there is one, which may be another than
@@ -182,7 +182,7 @@ mod tests {
         let scene = samples::scene(&modules, &limits);
         let drawing = residuals(&scene, 5.0, 30);
         for (module, metres) in scene.part.iter().zip(0..) {
-            let [left, top, wide, high] = drawing.plan.rect(scene.extent_m(one(module)));
+            let [left, top, wide, high] = drawing.map_extent.rect(scene.extent_m(one(module)));
             let color = drawing.map.pixel((left + wide / 2) as usize, (top + high / 2) as usize);
             assert_eq!(color, ERRORS.at(f64::from(metres) / 5.0), "{module}");
         }

@@ -2,7 +2,7 @@
 
 use terrain::{Dem, GridFrame, LoadModule, ModuleGrid, ModuleId, ModuleRect, TileId};
 
-use super::plan::{Plan, Posts};
+use super::map_extent::{MapExtent, Posts};
 use super::sheet::Coordinates;
 
 /// A finished area, or a part of it.
@@ -63,7 +63,7 @@ pub struct SceneLimits {
     pub bound_windows: Vec<ModuleId>,
 }
 
-/// A tile as a plan shows it.
+/// A tile as a map shows it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SceneTile {
     /// Which.
@@ -89,9 +89,9 @@ impl Scene<'_> {
         [modules.west, modules.south, modules.east, modules.north].map(|line| f64::from(line) * self.side_m())
     }
 
-    /// The plan of the part that is looked at.
-    pub(crate) fn plan(&self, longest: usize) -> Plan {
-        Plan::of(self.extent_m(self.part), longest)
+    /// The extent of the part that is looked at.
+    pub(crate) fn map_extent(&self, longest: usize) -> MapExtent {
+        MapExtent::of(self.extent_m(self.part), longest)
     }
 
     pub(crate) fn coordinates(&self) -> Coordinates {

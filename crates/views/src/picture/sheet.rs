@@ -13,7 +13,7 @@
 
 use super::color::{Color, GREY, INK, NOTHING, Ramp, WHITE};
 use super::image::Image;
-use super::plan::Plan;
+use super::map_extent::MapExtent;
 use super::text::{Anchor, Font, fitted, wrapped, write};
 
 /// Pixels between things.
@@ -81,19 +81,19 @@ pub(crate) struct Sheet {
 pub(crate) struct Drawing {
     pub sheet: Sheet,
     pub map: Image,
-    pub plan: Plan,
+    pub map_extent: MapExtent,
 }
 
 impl Drawing {
     /// All of it as one picture.
     pub fn image(&self) -> Image {
-        self.sheet.around(&self.map, &self.plan)
+        self.sheet.around(&self.map, &self.map_extent)
     }
 }
 
 impl Sheet {
     /// The map with all that stands around it.
-    pub fn around(&self, map: &Image, plan: &Plan) -> Image {
+    pub fn around(&self, map: &Image, map_extent: &MapExtent) -> Image {
         let (map_wide, map_high) = (map.wide() as i64, map.high() as i64);
         let wide = LEFT + map_wide + GAP + LEGEND_WIDE;
         let top = GAP + Font::Title.line() + Font::Plain.line() + GAP;
@@ -109,10 +109,10 @@ impl Sheet {
         write(&mut image, [GAP, GAP + Font::Title.line()], &subtitle, Font::Plain, Anchor::Start, GREY);
         image.paste(map, LEFT as usize, top as usize);
         image.outline([LEFT - 1, top - 1, map_wide + 2, map_high + 2], 1, INK);
-        draw_axes(&mut image, [LEFT, top], plan, &self.coordinates);
+        draw_axes(&mut image, [LEFT, top], map_extent, &self.coordinates);
         let left = LEFT + map_wide + GAP;
         draw_north(&mut image, [left + 14, top]);
-        draw_scale(&mut image, [left + 60, top + 24], plan.metres_per_pixel(), 170);
+        draw_scale(&mut image, [left + 60, top + 24], map_extent.metres_per_pixel(), 170);
         let mut y = top + 90;
         for legend in &self.legends {
             legend.draw(&mut image, [left, y]);
@@ -282,10 +282,10 @@ pub(crate) fn draw_scale(image: &mut Image, [left, top]: [i64; 2], metres_per_pi
 }
 
 /// Ticks with eastings below and northings left of the map, in kilometres.
-fn draw_axes(image: &mut Image, [left, top]: [i64; 2], plan: &Plan, coordinates: &Coordinates) {
-    let step = round_length(260.0 * plan.metres_per_pixel()).max(1.0);
+fn draw_axes(image: &mut Image, [left, top]: [i64; 2], map_extent: &MapExtent, coordinates: &Coordinates) {
+    let step = round_length(260.0 * map_extent.metres_per_pixel()).max(1.0);
     let [east_0, north_0] = coordinates.origin_m;
-    let [west, south, east, north] = plan.extent_m;
+    let [west, south, east, north] = map_extent.extent_m;
     let decimals = if step < 10.0 {
         3
     } else if step < 100.0 {
@@ -295,24 +295,24 @@ fn draw_axes(image: &mut Image, [left, top]: [i64; 2], plan: &Plan, coordinates:
     } else {
         0
     };
-    let bottom = top + plan.pixels[1] as i64;
+    let bottom = top + map_extent.pixels[1] as i64;
     for east_m in ticks(east_0 + west, east_0 + east, step) {
-        let x = left + plan.at([east_m - east_0, south])[0].round() as i64;
+        let x = left + map_extent.at([east_m - east_0, south])[0].round() as i64;
         image.fill([x, bottom, 1, 7], INK);
         let text = format!("{:.decimals$}", east_m / 1000.0);
         let half = Font::Plain.width(&text) / 2;
-        let x = x.clamp(left + half - 30, left + plan.pixels[0] as i64 - half + 30);
+        let x = x.clamp(left + half - 30, left + map_extent.pixels[0] as i64 - half + 30);
         write(image, [x, bottom + 8], &text, Font::Plain, Anchor::Middle, INK);
     }
     for north_m in ticks(north_0 + south, north_0 + north, step) {
-        let y = top + plan.at([west, north_m - north_0])[1].round() as i64;
+        let y = top + map_extent.at([west, north_m - north_0])[1].round() as i64;
         image.fill([left - 8, y, 7, 1], INK);
         let text = format!("{:.decimals$}", north_m / 1000.0);
         write(image, [left - 11, y - Font::Plain.line() / 2], &text, Font::Plain, Anchor::End, INK);
     }
     let unit = if coordinates.crs.is_empty() { "km".into() } else { format!("km, {}", coordinates.crs) };
-    let place = [left + plan.pixels[0] as i64, bottom + 8 + Font::Plain.line()];
-    write(image, place, &fitted(&unit, Font::Plain, plan.pixels[0] as i64), Font::Plain, Anchor::End, GREY);
+    let place = [left + map_extent.pixels[0] as i64, bottom + 8 + Font::Plain.line()];
+    write(image, place, &fitted(&unit, Font::Plain, map_extent.pixels[0] as i64), Font::Plain, Anchor::End, GREY);
 }
 
 /// The multiples of `step` from `low` to `high`.

@@ -3,23 +3,23 @@
 use super::color::{INK, WHITE, mix};
 use super::facets::Facets;
 use super::image::Image;
+use super::map_extent::MapExtent;
 use super::module_maps::density;
-use super::plan::Plan;
 use super::relief::{Tints, facets_relief};
 use super::scene::Scene;
 use super::sheet::{Drawing, Key, Legend, Sheet};
 use crate::table::grouped;
 
 /// The edges of triangles, as strong as there is room for them.
-pub(crate) fn facets_wireframe(facets: &Facets, plan: &Plan) -> Image {
-    let relief = facets_relief(facets, plan, &Tints::new(facets.range_m()));
-    let (wide, high) = (plan.pixels[0], plan.pixels[1]);
+pub(crate) fn facets_wireframe(facets: &Facets, map_extent: &MapExtent) -> Image {
+    let relief = facets_relief(facets, map_extent, &Tints::new(facets.range_m()));
+    let (wide, high) = (map_extent.pixels[0], map_extent.pixels[1]);
     let faint = (0..wide * high).map(|place| mix(relief.pixel(place % wide, place / wide), WHITE, 0.55)).collect();
     let mut image = Image::of(wide, high, faint);
-    let thick = edge_thickness(facets, plan);
-    let side_pixels = facets.side_m.map_or(0.0, |side_m| side_m / plan.metres_per_pixel());
-    // A whole number is the middle of a pixel to a line, and its border to a plan.
-    let place = |[x, y, _]: [f64; 3]| plan.at([x, y]).map(|at| at - 0.5);
+    let thick = edge_thickness(facets, map_extent);
+    let side_pixels = facets.side_m.map_or(0.0, |side_m| side_m / map_extent.metres_per_pixel());
+    // A whole number is the middle of a pixel to a line, and its border to a map.
+    let place = |[x, y, _]: [f64; 3]| map_extent.at([x, y]).map(|at| at - 0.5);
     facets.each_edge(|ends, is_line| {
         let is_strong = is_line && 12.0 <= side_pixels;
         image.line(place(ends[0]), place(ends[1]), if is_strong { thick + 0.8 } else { thick }, INK);
@@ -28,8 +28,8 @@ pub(crate) fn facets_wireframe(facets: &Facets, plan: &Plan) -> Image {
 }
 
 /// Thinner where triangles are few pixels wide, so that many of them are grey and not black.
-fn edge_thickness(facets: &Facets, plan: &Plan) -> f64 {
-    let pixels = (plan.pixels[0] * plan.pixels[1]) as f64;
+fn edge_thickness(facets: &Facets, map_extent: &MapExtent) -> f64 {
+    let pixels = (map_extent.pixels[0] * map_extent.pixels[1]) as f64;
     let side = (2.0 * pixels / facets.count().max(1) as f64).sqrt();
     (side / 14.0).clamp(0.22, 1.1)
 }
@@ -40,15 +40,15 @@ const PIXELS_MIN: f64 = 4.0;
 /// The wireframe of a scene; where triangles are as small as pixels, how many there are in every load module.
 pub(crate) fn wireframe(scene: &Scene, longest: usize) -> Drawing {
     let facets = Facets::of_scene(scene);
-    let plan = scene.plan(longest);
-    if ((plan.pixels[0] * plan.pixels[1]) as f64) < PIXELS_MIN * facets.count() as f64 {
+    let map_extent = scene.map_extent(longest);
+    if ((map_extent.pixels[0] * map_extent.pixels[1]) as f64) < PIXELS_MIN * facets.count() as f64 {
         let mut drawing = density(scene, longest);
         drawing.sheet.notes = "Instead of a wireframe: its triangles would be smaller than pixels. A part of the area \
                                (--modules) or a larger picture (--size) shows them."
             .into();
         return drawing;
     }
-    let map = facets_wireframe(&facets, &plan);
+    let map = facets_wireframe(&facets, &map_extent);
     let sheet = Sheet {
         title: format!("{}: wireframe", scene.name),
         subtitle: format!("{}, {} triangles", scene.what(), grouped(facets.count() as u64)),
@@ -56,7 +56,7 @@ pub(crate) fn wireframe(scene: &Scene, longest: usize) -> Drawing {
         legends: vec![Legend::Keys { title: String::new(), keys: vec![(Key::Line(INK), "edge of a triangle".into())] }],
         notes: "Stronger lines are the sides of load modules, where there is room to tell them apart.".into(),
     };
-    Drawing { sheet, map, plan }
+    Drawing { sheet, map, map_extent }
 }
 
 #[cfg(test)]

@@ -1,9 +1,9 @@
 //! The methods by name, and what each is asked for.
 
 use compiler::CompileError;
-use job::{Optimising, StartMethod};
+use job::{Choice, Optimising, StartMethod};
 use methods::{
-    Boundary, Contours, Diagonal, Distance, Extrema, FowlerLittle, Ground, Impossible, LatticeTin, Splitting,
+    Boundary, Contours, DemWindow, Diagonal, Distance, Extrema, FowlerLittle, Impossible, LatticeTin, Splitting,
 };
 use terrain::{Metres, PostRect, Tin};
 
@@ -129,7 +129,7 @@ impl CompareMethod {
         }
     }
 
-    fn simple(self, ground: &Ground, points: usize) -> Result<Tin, Impossible> {
+    fn simple(self, ground: &DemWindow, points: usize) -> Result<Tin, Impossible> {
         let grid = |step, diagonal| methods::regular_grid(ground, step, diagonal);
         match self {
             Vip { distance, boundary } => methods::vip(ground, points, distance, boundary),

@@ -12,6 +12,7 @@ mod subject;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use compiler::{CompileError, Stage};
+use ground::GroundError;
 use terrain::{Dem, PostRect};
 
 pub use choose::CompareMethod;
@@ -116,12 +117,13 @@ pub fn compare(
 /// Makes an error of a row without a TIN.
 fn refuse(row: &CompareRow) -> Result<(), CompileError> {
     let Err(why) = &row.made else { return Ok(()) };
-    Err(CompileError::Impossible {
+    Err(GroundError::Impossible {
         key: row.method.name(),
         found: why.found.clone(),
         expected: why.expected.clone(),
         hint: why.hint.clone(),
-    })
+    }
+    .into())
 }
 
 /// The rows to make: what no number of points is chosen for comes once, at the end.

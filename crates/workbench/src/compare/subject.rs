@@ -7,17 +7,17 @@ use std::sync::atomic::AtomicBool;
 use compiler::CompileError;
 use fidelity::Tally;
 use geometry::WORKING_POSTS_MAX;
-use ground::{GamingArea, Ground, decode, reading};
+use ground::{GamingArea, Ground, GroundError, decode, reading};
 use job::{DemSource, Job, SourceFile};
-use methods::Ground as MethodGround;
+use methods::DemWindow;
 use schedule::Workers;
 use source_files::{DemFile, Reading, VoidPolicy};
 use terrain::{Dem, Metres, Post, PostRect, Tin, quanta_of_metres};
 
 use super::made::{CompareGround, Equivalent, Made};
 use crate::heights::{Heights, has_square_posts};
-use crate::raster::{TinRequest, untiled};
-use crate::tin_tally::tally_of;
+use crate::mesh::{TinRequest, untiled};
+use crate::tally::tally_of;
 use crate::{TinMethod, TinStart};
 
 /// When a TIN is good enough.
@@ -57,8 +57,8 @@ impl Subject {
     }
 
     /// As methods want it.
-    pub fn ground(&self) -> MethodGround<'_> {
-        MethodGround { dem: &self.dem, spacing: self.spacing }
+    pub fn ground(&self) -> DemWindow<'_> {
+        DemWindow { dem: &self.dem, spacing: self.spacing }
     }
 
     /// Posts with a height.
@@ -173,12 +173,13 @@ fn of_heights(
     let own = PostRect::of_size(rect.posts_high(), rect.posts_wide());
     let mut dem = Dem::from_fn(own, |post| height(Post::new(rect.south + post.row, rect.west + post.col)));
     if dem.void_count() == own.post_count() {
-        return Err(CompileError::Impossible {
+        return Err(GroundError::Impossible {
             key: name,
             found: "no height anywhere".into(),
             expected: "ground to compare on".into(),
             hint: "choose another window".into(),
-        });
+        }
+        .into());
     }
     fill(&mut dem);
     Ok(Subject { dem, spacing, name })
@@ -210,7 +211,7 @@ fn fill(dem: &mut Dem) {
 fn windowed(rect: PostRect, window: Option<PostRect>) -> Result<PostRect, CompileError> {
     let (rows, cols) = (rect.posts_high(), rect.posts_wide());
     let impossible = |key: &str, found: String, expected: String, hint: &str| {
-        Err(CompileError::Impossible { key: key.into(), found, expected, hint: hint.into() })
+        Err(GroundError::Impossible { key: key.into(), found, expected, hint: hint.into() }.into())
     };
     let cut = match window {
         None => rect,

@@ -1,6 +1,6 @@
 //! Which closed ways of OpenStreetMap stand for an area: the format has lines only, and tags tell.
 
-use crate::features::Tags;
+use crate::features::model::Tags;
 
 /// What a closed way with a key stands for.
 enum Closed {

@@ -8,7 +8,8 @@
 
 mod assemble;
 mod block;
-mod frames;
+pub(crate) mod frames;
+mod kept;
 mod kinds;
 mod nodes;
 mod shapes;
@@ -17,44 +18,23 @@ mod wire;
 use std::collections::HashSet;
 use std::sync::Arc;
 
+use super::model::{FeatureFile, Tags, Wanted};
 use super::placing::{LEFT_OUT, Placing, Texts};
-use super::{FeatureFile, Tags, Wanted};
 use crate::SourceError;
 use crate::crs::Crs;
 use crate::store::Store;
 use assemble::Role;
 use block::{Block, Contents, Demands, MemberKind, OFF_THE_EARTH, Way};
-pub(crate) use frames::MARK;
+
 use frames::{Frame, FrameKind, Frames};
+use kept::{KeptRelation, KeptWay, SEGMENT_M_MAX};
 use nodes::Nodes;
 use wire::Fault;
 
-/// Longer segments are no road or river but a node in the wrong place. Nodes up to this far from the area are kept.
-const SEGMENT_M_MAX: f64 = 20_000.0;
 /// Whom to name (Open Database License, section 4.3).
 const ATTRIBUTION: &str = "(c) OpenStreetMap contributors, ODbL 1.0";
 /// Ways without a node near the area that are looked at for whether their nodes are in the file at all.
 const LOST_MAX: usize = 100_000;
-
-/// A way near the area, or a member of a relation that is.
-#[derive(Debug)]
-struct KeptWay {
-    id: i64,
-    /// Empty where only a relation wants it.
-    tags: Tags,
-    nodes: Box<[i64]>,
-    /// Whether some of its nodes are not near the area.
-    reaches_out: bool,
-    is_wanted: bool,
-}
-
-/// A multipolygon relation that is wanted.
-#[derive(Debug)]
-struct KeptRelation {
-    id: i64,
-    tags: Tags,
-    members: Vec<(Role, i64)>,
-}
 
 /// A file on its way to features.
 struct Reader<'a> {

@@ -4,13 +4,14 @@ use std::collections::HashSet;
 
 use super::assemble::{NodeRing, Role, rings};
 use super::block::OFF_THE_EARTH;
+use super::kept::{KeptRelation, KeptWay, SEGMENT_M_MAX};
 use super::kinds::is_area;
 use super::nodes::{Nodes, degrees};
-use super::{KeptRelation, KeptWay, SEGMENT_M_MAX};
-use crate::features::Tags;
 use crate::features::clip::Vertex;
+use crate::features::model::Tags;
 use crate::features::nest::{Nested, nested};
-use crate::features::placing::{LEFT_OUT, Part, Placing, RawFeature, RawShape};
+use crate::features::placing::{LEFT_OUT, Placing};
+use crate::features::raw::{Part, RawFeature, RawShape};
 use crate::limits::RINGS_MAX;
 
 /// Places relations, then ways.

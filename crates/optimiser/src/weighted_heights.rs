@@ -3,15 +3,14 @@
 use std::ops::Range;
 
 use geometry::is_ridge_candidate;
-use terrain::{Dem, Importance, Post, SeamSides, THOUSANDTHS};
+use terrain::{Dem, HeightFit, Importance, Post, SeamSides, THOUSANDTHS};
 
 use crate::hold::Hold;
 use crate::moments::{Moments, Walk};
 use crate::place::{PER_POST, Place};
-use crate::task::HeightFit;
 
 /// Heights, weights and their moments.
-pub(crate) struct Ground<'a> {
+pub(crate) struct WeightedHeights<'a> {
     pub moments: Moments,
     dem: &'a Dem,
     importance: &'a Importance,
@@ -24,7 +23,7 @@ pub(crate) struct Ground<'a> {
     forbidden: &'a [Post],
 }
 
-impl<'a> Ground<'a> {
+impl<'a> WeightedHeights<'a> {
     pub fn new(dem: &'a Dem, importance: &'a Importance, open: SeamSides, fit: HeightFit) -> Self {
         let rect = dem.rect();
         let far = Place::new(rect.cells_wide() as i32 * PER_POST, rect.cells_high() as i32 * PER_POST);
@@ -180,7 +179,7 @@ impl<'a> Ground<'a> {
 }
 
 #[cfg(test)]
-impl Ground<'_> {
+impl WeightedHeights<'_> {
     /// Visits the posts that a triangle owns.
     pub fn visit_owned(&self, corners: [Place; 3], mut visit: impl FnMut(i32, i32)) {
         rows(self.far, corners, |row, cols| cols.for_each(|col| visit(row, col)));

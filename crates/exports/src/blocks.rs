@@ -1,6 +1,8 @@
-//! Coarser images of a raster: each post the mean of up to four, of those that have a value.
+//! A raster as deflated blocks with the predictor for floats, and the same for coarser and coarser images of it: each
+//! post of one the mean of up to four, of those that have a value.
 
-use crate::geotiff::{BLOCK, Blocks, blocks};
+use source_files::geotiff_parts::{deflate, put_predicted};
+
 use crate::{ExportError, Work};
 
 /// Values row by row from the north; NaN where there is none.
@@ -33,6 +35,39 @@ impl Raster {
         }
         Self { wide: self.wide.div_ceil(2), metres }
     }
+}
+
+/// Posts along a side of a block.
+pub(crate) const BLOCK: usize = 256;
+
+/// The deflated blocks of a raster, row by row from the north; what lies beyond the raster is NaN.
+pub(crate) fn blocks(raster: &Raster) -> Vec<Vec<u8>> {
+    raster.metres.chunks(raster.wide * BLOCK).flat_map(|band| blocks_of_band(band, raster.wide)).collect()
+}
+
+/// Those of at most [`BLOCK`] rows, from west to east.
+fn blocks_of_band(values: &[f32], wide: usize) -> Vec<Vec<u8>> {
+    let rows: Vec<&[f32]> = values.chunks(wide).collect();
+    let block = |west: usize| {
+        let mut bytes = Vec::with_capacity(4 * BLOCK * BLOCK);
+        for index in 0..BLOCK {
+            let mut row = [f32::NAN; BLOCK];
+            if let Some(part) = rows.get(index).map(|row| &row[west..wide.min(west + BLOCK)]) {
+                row[..part.len()].copy_from_slice(part);
+            }
+            put_predicted(&mut bytes, &row);
+        }
+        deflate(&bytes)
+    };
+    (0..wide).step_by(BLOCK).map(block).collect()
+}
+
+/// The blocks of a raster, and how many posts it has west to east and south to north.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Blocks {
+    pub wide: usize,
+    pub high: usize,
+    pub blocks: Vec<Vec<u8>>,
 }
 
 /// The blocks of `raster`, and of coarser and coarser ones until one block holds a whole raster.

@@ -4,10 +4,10 @@ use terrain::{PostRect, Tin, Vertex as TinVertex};
 
 use crate::curve::along_curve;
 use crate::form::Form;
-use crate::ground::Ground;
 use crate::hold::Hold;
 use crate::moments::Sums;
 use crate::place::Place;
+use crate::weighted_heights::WeightedHeights;
 
 /// No edge, no vertex, no triangle.
 pub(crate) const NONE: u32 = u32::MAX;
@@ -74,8 +74,8 @@ pub(crate) struct Layout<'a> {
 }
 
 /// The mesh of a tile.
-pub(crate) struct Sheet<'a> {
-    pub ground: &'a Ground<'a>,
+pub(crate) struct TileMesh<'a> {
+    pub ground: &'a WeightedHeights<'a>,
     pub vertices: Vec<Vertex>,
     pub triangles: Vec<Triangle>,
     pub forms: Vec<Form>,
@@ -88,9 +88,9 @@ pub(crate) struct Sheet<'a> {
     line_step: Option<i32>,
 }
 
-impl<'a> Sheet<'a> {
+impl<'a> TileMesh<'a> {
     /// The sheet of a TIN, in an order in which neighbours in space are neighbours in memory.
-    pub fn new(ground: &'a Ground<'a>, tin: &Tin, layout: &Layout) -> Self {
+    pub fn new(ground: &'a WeightedHeights<'a>, tin: &Tin, layout: &Layout) -> Self {
         let mut sheet = Self {
             ground,
             vertices: Vec::new(),

@@ -6,7 +6,7 @@ use super::posts::Posts;
 use crate::pieces::smallest_first;
 
 /// The triangles of one load module, each vertex with those around it.
-pub(super) struct Sheet {
+pub(super) struct LevelMesh {
     pub vertices: Vec<ModuleVertex>,
     /// Counter-clockwise; those that were replaced are in no star.
     pub triangles: Vec<[u16; 3]>,
@@ -16,12 +16,17 @@ pub(super) struct Sheet {
     pub stars: Vec<Vec<u32>>,
 }
 
+/// Whether a vertex lies on no side of a load module.
+pub(super) fn is_inside(vertex: ModuleVertex, side: u16) -> bool {
+    0 < vertex.x && vertex.x < side && 0 < vertex.y && vertex.y < side
+}
+
 /// Where a vertex lies, for exact questions.
 pub(super) fn place(vertex: ModuleVertex) -> LatticePoint {
     LatticePoint::new(i32::from(vertex.y), i32::from(vertex.x))
 }
 
-impl Sheet {
+impl LevelMesh {
     /// The canonical Delaunay triangulation of vertices in canonical order.
     pub fn delaunay(vertices: Vec<ModuleVertex>, posts: &Posts) -> Self {
         let places: Vec<_> = vertices.iter().map(|&vertex| place(vertex)).collect();

@@ -9,18 +9,18 @@ use compiler::{CompileError, Event, Most, Progress, Refinement, Stage, inherited
 use database::ReportResidual;
 use fidelity::Tally;
 use geometry::WORKING_POSTS_MAX;
-use ground::{GivenPost, Window, chosen, posts_of_file, refused, start_posts};
+use ground::{GivenPost, GroundError, Window, chosen, posts_of_file, refused, start_posts};
 use job::{ErrorKey, Optimising, StartMethod};
 use schedule::{Event as Scheduled, RankedTasks, Workers, in_rank_order_observed};
 use terrain::{
-    Dem, GainCurve, Importance, LatticePoint, Metres, ModuleGrid, PostRect, SeamSides, StopReason, THOUSANDTHS, TileId,
-    TileTin, Tin, Vertex,
+    Dem, GainCurve, Importance, LastBatch, LatticePoint, Metres, ModuleGrid, PostRect, SeamSides, StopReason,
+    THOUSANDTHS, TileId, TileOrder, TileTin, Tin, Vertex,
 };
-use tiling::{Gains, Order, Tiling, points_equally, points_globally};
-use tin::{CostUnit, Frame, LastBatch, Proximity, Rule, Stop, SurveyTask, TileTask};
+use tiling::{Gains, Tiling, points_equally, points_globally};
+use tin::{CostUnit, Proximity, Rule, Stop, SurveyTask, TileTask};
 
 use crate::heights::Heights;
-use crate::tin_tally::tally_of;
+use crate::tally::tally_of;
 
 /// The paper's proximity test: metres across, metres in height.
 const PROXIMITY_M: (f64, u32) = (300.0, 20);
@@ -218,7 +218,7 @@ impl<'a> TinJob<'a> {
         let longest =
             (rect.cells_high().div_ceil(rows.max(1) as usize)).max(rect.cells_wide().div_ceil(cols.max(1) as usize));
         refuse(request, rect, longest)?;
-        let tiling = Tiling::new(rect, 1, rows, cols, Order::Color);
+        let tiling = Tiling::new(rect, 1, rows, cols, TileOrder::Color);
         let quantum = if request.method == TinMethod::Paper { terrain::QUANTA_PER_METRE as u32 } else { 1 };
         let units = |metres: f64| (metres * f64::from(terrain::QUANTA_PER_METRE) / f64::from(quantum)).floor() as u64;
         let value = request.max_residual_m.map(|metres| u64::from(THOUSANDTHS) * units(metres));
@@ -247,12 +247,13 @@ impl<'a> TinJob<'a> {
     /// Refuses more points to start from than there may be.
     fn refuse_given(&self) -> Result<(), CompileError> {
         match self.points() {
-            Some(points) if (points as usize) < self.given.len() => Err(CompileError::Impossible {
+            Some(points) if (points as usize) < self.given.len() => Err(GroundError::Impossible {
                 key: "--start".into(),
                 found: format!("{} points", self.given.len()),
                 expected: format!("at most {points}, those asked for but for the corners of tiles"),
                 hint: "ask for more --points, or start from fewer".into(),
-            }),
+            }
+            .into()),
             _ => Ok(()),
         }
     }
@@ -286,20 +287,14 @@ impl<'a> TinJob<'a> {
         // The raster's own border is nobody else's: its posts are ordinary candidates.
         let outer = tiling::outer_sides(rect, self.area());
         TileTask {
-            tile,
-            rect,
-            frame: Frame::Plain,
-            border: Vec::new(),
             inherited,
-            kept: Vec::new(),
-            start: Vec::new(),
             seams: SeamSides::from_fn(|side| seams.is_open(side) || outer.is_open(side)),
-            rule: self.rule.clone(),
             stop: Stop {
                 points,
                 value: if by_squares { None } else { self.value },
                 rms_quanta: self.request.rms_m.map(|rms| rms * f64::from(terrain::QUANTA_PER_METRE)),
             },
+            ..TileTask::plain(tile, rect, self.rule.clone())
         }
     }
 
@@ -350,7 +345,7 @@ impl<'a> TinJob<'a> {
             let is_here = |post: &&GivenPost| dem.rect().contains(post.at);
             return Ok(self.given.iter().filter(is_here).copied().collect());
         };
-        let ground = methods::Ground { dem, spacing: self.spacing };
+        let ground = methods::DemWindow { dem, spacing: self.spacing };
         let share = points.div_ceil(self.tiles.len());
         let posts = chosen(&ground, method, share).map_err(|why| refused("--start", method, why))?;
         Ok(posts.into_iter().map(|at| GivenPost { at, pinned: false, outer: false, height: None }).collect())
@@ -421,7 +416,7 @@ impl<'a> TinJob<'a> {
 
 fn refuse(request: &TinRequest, rect: PostRect, longest: usize) -> Result<(), CompileError> {
     let impossible = |key: &str, found: String, expected: &str, hint: &str| {
-        Err(CompileError::Impossible { key: key.into(), found, expected: expected.into(), hint: hint.into() })
+        Err(GroundError::Impossible { key: key.into(), found, expected: expected.into(), hint: hint.into() }.into())
     };
     let (rows, cols) = request.tiles;
     if rows == 0 || cols == 0 || rect.cells_high() < rows as usize || rect.cells_wide() < cols as usize {

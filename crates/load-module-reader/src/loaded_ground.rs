@@ -4,41 +4,12 @@ use std::sync::Arc;
 
 use crate::lookup::{Lookup, STEPS};
 use crate::sight::{Line, crossed_at, entered_at, hidden_at};
-use crate::{Area, Frame, QUANTA_PER_METRE, ReadError, Sample, TerrainModule};
-
-/// A half-open rectangle of load modules.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Block {
-    /// First row.
-    pub south: u32,
-    /// First column.
-    pub west: u32,
-    /// One past the last row.
-    pub north: u32,
-    /// One past the last column.
-    pub east: u32,
-}
-
-impl Block {
-    /// Load modules inside; none where a side lies beyond the one it faces.
-    pub fn count(&self) -> usize {
-        let (rows, cols) = (self.north.saturating_sub(self.south), self.east.saturating_sub(self.west));
-        (rows as usize).saturating_mul(cols as usize)
-    }
-
-    fn contains(&self, row: u32, col: u32) -> bool {
-        self.south <= row && row < self.north && self.west <= col && col < self.east
-    }
-
-    fn index(&self, row: u32, col: u32) -> usize {
-        (row - self.south) as usize * (self.east - self.west) as usize + (col - self.west) as usize
-    }
-}
+use crate::{AreaFrame, Block, QUANTA_PER_METRE, Sample, TerrainModule};
 
 /// A block of load modules, loaded. It holds no file open and may be asked from many threads.
 #[derive(Clone, Debug)]
-pub struct Ground {
-    frame: Frame,
+pub struct LoadedGround {
+    frame: AreaFrame,
     level: u16,
     block: Block,
     /// Row by row from the south-west.
@@ -62,9 +33,9 @@ pub enum Sight {
     Unknown,
 }
 
-impl Ground {
+impl LoadedGround {
     /// Nothing loaded yet.
-    pub(crate) fn empty(frame: Frame, level: u16) -> Self {
+    pub(crate) fn empty(frame: AreaFrame, level: u16) -> Self {
         let side_steps = i64::from(frame.side) * STEPS;
         let block = Block { south: 0, west: 0, north: 0, east: 0 };
         Self { frame, level, block, modules: Vec::new(), lookups: Vec::new(), decks: Vec::new(), side_steps }
@@ -81,7 +52,7 @@ impl Ground {
     }
 
     /// Where load modules lie.
-    pub fn frame(&self) -> &Frame {
+    pub fn frame(&self) -> &AreaFrame {
         &self.frame
     }
 
@@ -95,44 +66,13 @@ impl Ground {
         self.block.contains(row, col).then(|| &*self.modules[self.block.index(row, col)])
     }
 
-    /// The same ground, at the same level, for another block: what both hold is kept, only the rest is read.
-    ///
-    /// # Errors
-    /// When a load module cannot be read, is damaged, or is in no file, or when this ground is of another area; this
-    /// ground is as it was.
-    pub fn moved(&self, area: &Area, block: Block) -> Result<Self, ReadError> {
-        if *area.frame() != self.frame {
-            return Err(ReadError::OtherGround);
-        }
-        area.check_holds(block)?;
-        let block = if block.count() == 0 { Block { north: block.south, east: block.west, ..block } } else { block };
-        let mut modules: Vec<Option<Arc<TerrainModule>>> = vec![None; block.count()];
-        for row in block.south..block.north {
-            let mut col = block.west;
-            while col < block.east {
-                if self.block.contains(row, col) {
-                    modules[block.index(row, col)] = Some(Arc::clone(&self.modules[self.block.index(row, col)]));
-                    col += 1;
-                    continue;
-                }
-                // Up to what is loaded already, all at once.
-                let known = (col..block.east).find(|&col| self.block.contains(row, col)).unwrap_or(block.east);
-                area.load_row(self.level, row, col..known, |col, module| {
-                    modules[block.index(row, col)] = Some(module)
-                })?;
-                col = known;
-            }
-        }
-        Ok(Self { block, ..self.clone() }.with_modules(modules.into_iter().flatten().collect()))
-    }
-
-    /// The same block with other load modules in it.
-    pub(crate) fn with_modules(self, modules: Vec<Arc<TerrainModule>>) -> Self {
+    /// Another block, with its load modules.
+    pub(crate) fn with_modules(self, block: Block, modules: Vec<Arc<TerrainModule>>) -> Self {
         let lookups = modules.iter().map(|module| module.lookup().clone()).collect();
         let has_decks = modules.iter().any(|module| module.decks().is_some());
         let of_decks = modules.iter().filter(|_| has_decks).map(|module| module.decks().cloned());
         let decks = of_decks.collect();
-        Self { modules, lookups, decks, ..self }
+        Self { block, modules, lookups, decks, ..self }
     }
 
     /// The load module under a place, by its place in `modules`, and the place in it in steps. The far sides of the
@@ -167,8 +107,9 @@ impl Ground {
         self.lookups[index].height_m(place)
     }
 
-    /// Heights at many places at once, in `heights_m`, NaN where nothing is loaded: what [`Ground::height_m`] gives for
-    /// each, but faster for places far apart, because memory is asked for several of them before the first is needed.
+    /// Heights at many places at once, in `heights_m`, NaN where nothing is loaded: what [`LoadedGround::height_m`]
+    /// gives for each, but faster for places far apart, because memory is asked for several of them before the first is
+    /// needed.
     ///
     /// # Panics
     /// When the two lists differ in length.
@@ -203,7 +144,7 @@ impl Ground {
         self.deck_below(index, place, ceiling_m).map_or(ground, |deck| Some(ground.map_or(deck, |m| m.max(deck))))
     }
 
-    /// [`Ground::height_below_m`] at many places at once, each an easting, a northing and a ceiling, in `heights_m`,
+    /// [`LoadedGround::height_below_m`] at many places at once, each an easting, a northing and a ceiling, in `heights_m`,
     /// NaN where there is none.
     ///
     /// # Panics
@@ -216,8 +157,7 @@ impl Ground {
             on_ground.iter_mut().zip(places).for_each(|(on_ground, &[east, north, _])| *on_ground = [east, north]);
             self.heights_m(&on_ground[..places.len()], heights);
             for (&[east, north, ceiling_m], height_m) in places.iter().zip(heights) {
-                let is_above = !(*height_m <= ceiling_m);
-                *height_m = if is_above { f64::NAN } else { *height_m };
+                *height_m = if *height_m <= ceiling_m { *height_m } else { f64::NAN };
                 if self.decks.is_empty() {
                     continue;
                 }
@@ -238,7 +178,7 @@ impl Ground {
     }
 
     /// Height, normal and class of the topmost of ground and decks that is not above `ceiling_m`, as
-    /// [`Ground::height_below_m`] finds it. Where a deck touches the ground it is the deck.
+    /// [`LoadedGround::height_below_m`] finds it. Where a deck touches the ground it is the deck.
     pub fn sample_below(&self, place_m: [f64; 2], ceiling_m: f64) -> Option<Sample> {
         let (index, place) = self.locate(place_m)?;
         self.modules[index].sample_below(place, ceiling_m)

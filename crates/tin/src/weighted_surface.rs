@@ -9,7 +9,7 @@ use terrain::{Dem, Importance, THOUSANDTHS};
 const BLOCK: usize = 16;
 
 /// The ground of one tile as selection sees it. A value is weight (thousandths) x rounded residual.
-pub(crate) struct Ground<'a, S: Simd> {
+pub(crate) struct WeightedSurface<'a, S: Simd> {
     simd: S,
     surface: Surface<'a>,
     everywhere: Surface<'a>,
@@ -23,7 +23,7 @@ enum Weights<'a> {
     Varying { importance: &'a Importance, blocks: Vec<(u16, u16)>, blocks_wide: usize },
 }
 
-impl<'a, S: Simd> Ground<'a, S> {
+impl<'a, S: Simd> WeightedSurface<'a, S> {
     /// The ground of a window, candidates confined to `candidates`.
     pub fn new(simd: S, dem: &'a Dem, importance: &'a Importance, candidates: LocalRect, unit: u32) -> Self {
         assert_eq!(dem.rect(), importance.rect(), "heights and weights cover the same posts");

@@ -13,15 +13,15 @@ pub(crate) const SAMPLES: usize = 3;
 
 /// A rectangle of ground and the pixels it is drawn on.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Plan {
+pub(crate) struct MapExtent {
     /// West, south, east and north, in metres from the area's south-west post.
     pub extent_m: [f64; 4],
     /// Pixels across and down.
     pub pixels: [usize; 2],
 }
 
-impl Plan {
-    /// The plan of an extent whose longer side is `longest` pixels.
+impl MapExtent {
+    /// The extent whose longer side is `longest` pixels.
     pub fn of(extent_m: [f64; 4], longest: usize) -> Self {
         let (wide_m, high_m) = (extent_m[2] - extent_m[0], extent_m[3] - extent_m[1]);
         let per_metre = longest as f64 / wide_m.max(high_m);
@@ -55,7 +55,7 @@ impl Plan {
             let [x, y] = self.at([x, y]);
             [x * SAMPLES as f64 - 0.5, y * SAMPLES as f64 - 0.5, z]
         });
-        let [dx, dy] = super::facets::slope(scaled);
+        let [dx, dy] = slope(scaled);
         let [low, middle, top] = by_row(scaled);
         let [lowest, highest] =
             [f64::min, f64::max].map(|pick| pick(pick(corners[0][2], corners[1][2]), corners[2][2]));
@@ -78,6 +78,17 @@ impl Plan {
     }
 }
 
+/// How much the plane through three corners rises per metre to the east and to the north; 0 without an area.
+pub(crate) fn slope([a, b, c]: [[f64; 3]; 3]) -> [f64; 2] {
+    let to = |p: [f64; 3]| [p[0] - a[0], p[1] - a[1], p[2] - a[2]];
+    let (b, c) = (to(b), to(c));
+    let doubled = b[0] * c[1] - c[0] * b[1];
+    if doubled == 0.0 {
+        return [0.0, 0.0];
+    }
+    [(b[2] * c[1] - c[2] * b[1]) / doubled, (b[0] * c[2] - c[0] * b[2]) / doubled]
+}
+
 /// Corners from the topmost row to the lowest.
 fn by_row([mut a, mut b, mut c]: [[f64; 3]; 3]) -> [[f64; 3]; 3] {
     if b[1] < a[1] {
@@ -97,7 +108,7 @@ fn crossing(from: [f64; 3], to: [f64; 3], row: f64) -> f64 {
     if from[1] == to[1] { from[0] } else { from[0] + (row - from[1]) * ((to[0] - from[0]) / (to[1] - from[1])) }
 }
 
-/// Sums of colours at the samples of a plan.
+/// Sums of colours at the samples of a map.
 pub(crate) struct Samples {
     pixels: [usize; 2],
     sums: Vec<[u16; 3]>,
@@ -105,9 +116,9 @@ pub(crate) struct Samples {
 }
 
 impl Samples {
-    pub fn new(plan: &Plan) -> Self {
-        let count = plan.pixels[0] * plan.pixels[1];
-        Self { pixels: plan.pixels, sums: vec![[0; 3]; count], counts: vec![0; count] }
+    pub fn new(map_extent: &MapExtent) -> Self {
+        let count = map_extent.pixels[0] * map_extent.pixels[1];
+        Self { pixels: map_extent.pixels, sums: vec![[0; 3]; count], counts: vec![0; count] }
     }
 
     /// Adds the colour of a sample.
@@ -161,10 +172,10 @@ impl Between {
 }
 
 impl Posts {
-    /// Calls `visit` with every sample of a plan that lies between posts.
-    pub fn sample(&self, plan: &Plan, mut visit: impl FnMut(Between)) {
-        let [west, south, east, north] = plan.extent_m;
-        let [across, down] = plan.pixels.map(|pixels| pixels * SAMPLES);
+    /// Calls `visit` with every sample of a map that lies between posts.
+    pub fn sample(&self, map_extent: &MapExtent, mut visit: impl FnMut(Between)) {
+        let [west, south, east, north] = map_extent.extent_m;
+        let [across, down] = map_extent.pixels.map(|pixels| pixels * SAMPLES);
         let middle = |index: usize, count: usize| (index as f64 + 0.5) / count as f64;
         let columns: Vec<Option<(usize, f32)>> = (0..across)
             .map(|col| {
@@ -199,19 +210,19 @@ fn place(at: f64, first: i32, last: i32) -> Option<(usize, f32)> {
 mod tests {
     use super::*;
 
-    fn plan() -> Plan {
-        Plan::of([0.0, 0.0, 40.0, 20.0], 40)
+    fn map_extent() -> MapExtent {
+        MapExtent::of([0.0, 0.0, 40.0, 20.0], 40)
     }
 
     #[test]
     fn triangles_share_the_samples_out_exactly_once() {
-        // A fan around a point off every sample, over the whole plan.
+        // A fan around a point off every sample, over the whole map.
         let corners = [[0.0, 0.0], [13.7, 0.0], [40.0, 0.0], [40.0, 20.0], [21.1, 20.0], [0.0, 20.0], [0.0, 9.9]];
         let middle = [17.3, 11.1, 5.0];
         let mut counts = vec![0; 40 * 20 * SAMPLES * SAMPLES];
         for (i, &[x, y]) in corners.iter().enumerate() {
             let [next_x, next_y] = corners[(i + 1) % corners.len()];
-            plan().cover([middle, [x, y, 1.0], [next_x, next_y, 2.0]], |row, col, height| {
+            map_extent().cover([middle, [x, y, 1.0], [next_x, next_y, 2.0]], |row, col, height| {
                 counts[row * 40 * SAMPLES + col] += 1;
                 assert!((1.0..=5.0).contains(&height));
             });
@@ -222,7 +233,7 @@ mod tests {
     #[test]
     fn a_triangle_beyond_the_plan_is_cut_to_it() {
         let mut count = 0;
-        plan().cover([[-1e6, -1e6, 0.0], [1e6, -1e6, 0.0], [0.0, 1e6, 0.0]], |row, col, _| {
+        map_extent().cover([[-1e6, -1e6, 0.0], [1e6, -1e6, 0.0], [0.0, 1e6, 0.0]], |row, col, _| {
             assert!(row < 20 * SAMPLES && col < 40 * SAMPLES);
             count += 1;
         });
@@ -235,7 +246,7 @@ mod tests {
         let posts = Posts { rect, spacing_m: [2.0, 2.0] };
         let value = |post: usize| (post % 21) as f32 * 3.0 + (post / 21) as f32 * 5.0;
         let mut count = 0;
-        posts.sample(&plan(), |between| {
+        posts.sample(&map_extent(), |between| {
             let [row, col] = between.sample;
             let (east_m, north_m) = ((col as f64 + 0.5) / 3.0, 20.0 - (row as f64 + 0.5) / 3.0);
             let expected = (east_m / 2.0 - 1.0) * 3.0 + (north_m / 2.0 - 2.0) * 5.0;

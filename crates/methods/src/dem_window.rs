@@ -8,14 +8,14 @@ pub const TOLERANCE_M: f64 = 10.0;
 
 /// A window of the DEM and the metres between its posts.
 #[derive(Clone, Copy, Debug)]
-pub struct Ground<'a> {
+pub struct DemWindow<'a> {
     /// Heights; voids are never chosen, but for corners.
     pub dem: &'a Dem,
     /// Metres between posts.
     pub spacing: Metres,
 }
 
-impl Ground<'_> {
+impl DemWindow<'_> {
     /// Quanta between posts.
     pub(crate) fn spacing_quanta(&self) -> f64 {
         self.spacing.0 * f64::from(QUANTA_PER_METRE)
@@ -69,19 +69,9 @@ pub(crate) fn tin_of(dem: &Dem, posts: &[Post], triangles: Vec<[u32; 3]>) -> Tin
     Tin { rect: dem.rect(), vertices: posts.iter().map(vertex).collect(), triangles }
 }
 
-/// All posts of a rectangle, by row and column.
-pub(crate) fn posts_of(rect: PostRect) -> impl Iterator<Item = Post> {
-    (rect.south..=rect.north).flat_map(move |row| (rect.west..=rect.east).map(move |col| Post::new(row, col)))
-}
-
 /// The posts of a rectangle that are not on its border lines, by row and column.
 pub(crate) fn inner_posts(rect: PostRect) -> impl Iterator<Item = Post> {
     (rect.south + 1..rect.north).flat_map(move |row| (rect.west + 1..rect.east).map(move |col| Post::new(row, col)))
-}
-
-/// Whether a post is on a border line.
-pub(crate) fn is_on_border(rect: PostRect, post: Post) -> bool {
-    post.row == rect.south || post.row == rect.north || post.col == rect.west || post.col == rect.east
 }
 
 /// The eight posts around one, counter-clockwise from the east, as steps in (row, col).

@@ -1,0 +1,265 @@
+//! Bridges and tunnels: straight between their ends, free of what runs below, and never touching the ground.
+
+use crate::clean::Notes;
+use crate::exact::Segment;
+use crate::quarters::segment_pairs;
+use crate::sweep::{Swept, highest};
+use crate::{Flaw, Kind, Network, Place, Remark, Remedy, Storey};
+
+/// What a deck keeps clear of, in quanta above it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Clearances {
+    /// Over roads and runways.
+    pub road: i32,
+    /// Over railways.
+    pub rail: i32,
+    /// Over rivers, streams and lakes.
+    pub water: i32,
+}
+
+impl Clearances {
+    /// 4.5 m over roads, 6 m over railways, 1 m over water.
+    pub const USUAL: Self = Self { road: 4 * 128 + 64, rail: 6 * 128, water: 128 };
+
+    fn over(&self, kind: Kind) -> i32 {
+        match kind {
+            Kind::Rail => self.rail,
+            kind if kind.is_travelled() => self.road,
+            Kind::River | Kind::Stream | Kind::Lake => self.water,
+            _ => 0,
+        }
+    }
+}
+
+/// A piece of water that a deck may cross, with the heights of its ends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Water {
+    /// Its ends.
+    pub ends: [Place; 2],
+    /// Heights of its ends, in quanta.
+    pub heights: [i32; 2],
+    /// River, stream or lake.
+    pub kind: Kind,
+}
+
+/// A deck or a tunnel between two stations on the ground, or in the air where it forks.
+pub(crate) struct Passage {
+    pub nodes: Vec<u32>,
+    pub edges: Vec<u32>,
+    pub is_deck: bool,
+}
+
+/// All decks and tunnels of a network.
+pub(crate) fn passages(network: &Network) -> Vec<Passage> {
+    let picked = |edge: u32| !network.is_ground(edge);
+    let is_deck = |edge: u32| matches!(network.traits(edge).storey, Storey::Deck(_));
+    let follows = |node: u32| match network.beside(node) {
+        [(_, one), (_, other)] => !network.nodes[node as usize].on_ground && is_deck(*one) == is_deck(*other),
+        _ => false,
+    };
+    let runs = network.runs(&picked, &follows).into_iter();
+    runs.map(|(nodes, edges)| Passage { is_deck: is_deck(edges[0]), nodes, edges }).collect()
+}
+
+/// Raises the ends of decks to the top of banks that sag before them, and with them the stations between.
+///
+/// A DEM sags before the bridge begins where it falls more steeply than the way may: the deck then rests on the
+/// highest station up to `back` quanta behind its end from which the ground falls so, if the way runs on from there
+/// within its grade. A way that comes down a hillside within its grade, or a hillside without end, is no such bank.
+pub(crate) fn raise_sagging_ends(network: &Network, ground: &mut [Option<i32>], back: i32) {
+    let mut raised: Vec<(u32, i32)> = Vec::new();
+    for passage in passages(network).iter().filter(|passage| passage.is_deck) {
+        let ends = [
+            (&passage.nodes[0], &passage.nodes[1]),
+            (&passage.nodes[passage.nodes.len() - 1], &passage.nodes[passage.nodes.len() - 2]),
+        ];
+        for (&end, &inside) in ends {
+            if network.nodes[end as usize].on_ground {
+                raise_bank(ground, &bank(network, end, inside, back), &mut raised);
+            }
+        }
+    }
+    for (node, height) in raised {
+        let ground = &mut ground[node as usize];
+        *ground = ground.map(|ground| ground.max(height));
+    }
+}
+
+/// Stations back along the way from the end of a deck, each with what the way may rise from the one before.
+fn bank(network: &Network, end: u32, inside: u32, back: i32) -> Vec<(u32, i32)> {
+    let (mut stations, mut gone, mut before, mut at) = (vec![(end, 0)], 0, inside, end);
+    loop {
+        let came = network.nodes[before as usize].place.to(network.nodes[at as usize].place);
+        let class = |edge: u32| network.traits(edge).class;
+        let came_class = network.beside(at).iter().find(|(next, _)| *next == before).map(|(_, edge)| class(*edge));
+        // Straight on, on a way of the same class if there is one.
+        let onward = network.beside(at).iter().filter(|(next, edge)| *next != before && network.is_ground(*edge));
+        let onward = onward.max_by_key(|(next, edge)| {
+            let [east, north] = network.nodes[at as usize].place.to(network.nodes[*next as usize].place);
+            let length = f64::from(network.edges[*edge as usize].length.max(1));
+            let straight = (came[0] * east + came[1] * north) as f64 / length;
+            (Some(class(*edge)) == came_class, (straight * 16.0) as i64, std::cmp::Reverse(*edge))
+        });
+        let Some(&(next, edge)) = onward else { return stations };
+        gone += network.edges[edge as usize].length;
+        if back < gone || stations.iter().any(|(node, _)| *node == next) {
+            return stations;
+        }
+        stations.push((next, network.edges[edge as usize].rise_max));
+        (before, at) = (at, next);
+    }
+}
+
+fn raise_bank(ground: &[Option<i32>], stations: &[(u32, i32)], raised: &mut Vec<(u32, i32)>) {
+    let height = |at: usize| ground[stations[at].0 as usize];
+    let Some(end) = height(0) else { return };
+    let (mut top, mut allowed) = (None, 0);
+    for (at, station) in stations.iter().enumerate().skip(1) {
+        allowed += station.1;
+        let Some(here) = height(at) else { break };
+        let falls = allowed < here - end;
+        let runs_on = match stations.get(at + 1) {
+            Some(next) => height(at + 1).is_some_and(|beyond| beyond - here <= next.1),
+            None => height(at - 1).is_some_and(|before| here - before <= station.1),
+        };
+        if falls && runs_on && top.is_none_or(|(_, height)| height < here) {
+            top = Some((at, here));
+        }
+    }
+    if let Some((top, height)) = top {
+        raised.extend(stations[..top].iter().map(|(node, _)| (*node, height)));
+    }
+}
+
+/// Heights inside decks and tunnels: straight between their ends, in shares of what their edges may rise, so that
+/// rounding never breaks the grade.
+pub(crate) fn straighten(network: &Network, costs: &[i32], heights: &mut [i32]) {
+    for passage in passages(network) {
+        let (first, last) = (passage.nodes[0], passage.nodes[passage.nodes.len() - 1]);
+        let (from, to) = (i64::from(heights[first as usize]), i64::from(heights[last as usize]));
+        let all: i64 = passage.edges.iter().map(|edge| i64::from(costs[*edge as usize])).sum();
+        let mut gone = 0;
+        for (&node, &edge) in passage.nodes[1..passage.nodes.len() - 1].iter().zip(&passage.edges) {
+            gone += i64::from(costs[edge as usize]);
+            heights[node as usize] = (from + ((to - from) * gone).div_euclid(all.max(1))) as i32;
+        }
+    }
+}
+
+/// Where a deck crosses something below: the passage, how much is missing, and where.
+struct Crossing {
+    passage: u32,
+    edge: u32,
+    place: Place,
+    lack: i32,
+}
+
+/// Raises decks clear of what they cross as far as the grade allows; what is left is written down.
+pub(crate) fn clear(
+    network: &Network,
+    swept: &mut Swept,
+    water: &[Water],
+    clearances: Clearances,
+    remarks: &mut Vec<Remark>,
+) {
+    let decks = passages(network);
+    if !decks.iter().any(|passage| passage.is_deck) {
+        return;
+    }
+    let pairs = crossing_pairs(network, &decks, water);
+    // The second round is for decks whose road below was raised with them.
+    for _ in 0..2 {
+        let lacks = lacks(network, &swept.heights, &pairs, water, clearances);
+        let mut needed: Vec<i32> = vec![i32::MIN / 2; network.nodes.len()];
+        for crossing in &lacks {
+            let nodes = &decks[crossing.passage as usize].nodes;
+            for &end in [nodes[0], nodes[nodes.len() - 1]].iter() {
+                let raised = (swept.heights[end as usize] + crossing.lack).min(swept.most[end as usize]);
+                needed[end as usize] = needed[end as usize].max(raised);
+            }
+        }
+        let least = highest(network, &swept.costs, needed);
+        for (height, least) in swept.heights.iter_mut().zip(least) {
+            *height = (*height).max(least);
+        }
+        straighten(network, &swept.costs, &mut swept.heights);
+    }
+    for crossing in lacks(network, &swept.heights, &pairs, water, clearances) {
+        let id = network.ways[network.edges[crossing.edge as usize].way as usize].id;
+        let flaw = Flaw::ClearanceLacks { quanta: crossing.lack };
+        Notes { id, lattice: network.lattice, remarks }.write_at(crossing.place, flaw, Remedy::LeftAsItIs);
+    }
+}
+
+/// A deck's passage and edge, and what it crosses: an edge, or a piece of water counted on from the edges.
+type Pair = (u32, u32, u32, Place);
+
+fn crossing_pairs(network: &Network, decks: &[Passage], water: &[Water]) -> Vec<Pair> {
+    let mut passage_of = vec![u32::MAX; network.edges.len()];
+    for (number, passage) in decks.iter().enumerate().filter(|(_, passage)| passage.is_deck) {
+        passage.edges.iter().for_each(|edge| passage_of[*edge as usize] = number as u32);
+    }
+    let edges = network.edges.len() as u32;
+    let mut segments: Vec<Segment> = (0..edges).map(|edge| network.segment(edge)).collect();
+    segments.extend(water.iter().map(|water| Segment { a: water.ends[0], b: water.ends[1] }));
+    let layer = |number: u32| match (number < edges).then(|| network.traits(number).storey) {
+        Some(Storey::Deck(layer)) => layer.max(1),
+        Some(Storey::Tunnel(layer)) => layer.min(-1),
+        _ => 0,
+    };
+    let mut pairs: Vec<Pair> = Vec::new();
+    segment_pairs(&segments, &mut |one, other| {
+        for (deck, below) in [(one, other), (other, one)] {
+            if edges <= deck || passage_of[deck as usize] == u32::MAX || layer(deck) <= layer(below) {
+                continue;
+            }
+            let meets = |a: u32, b: u32| {
+                let (a, b) = (&network.edges[a as usize], &network.edges[b as usize]);
+                a.a == b.a || a.a == b.b || a.b == b.a || a.b == b.b
+            };
+            if below < edges && meets(deck, below) {
+                continue;
+            }
+            if let Some(place) = segments[deck as usize].crossing(&segments[below as usize]) {
+                pairs.push((passage_of[deck as usize], deck, below, place));
+            }
+        }
+    });
+    pairs.sort_unstable();
+    pairs.dedup();
+    pairs
+}
+
+fn lacks(network: &Network, heights: &[i32], pairs: &[Pair], water: &[Water], clearances: Clearances) -> Vec<Crossing> {
+    let edges = network.edges.len() as u32;
+    let of_edge = |edge: u32| {
+        let Segment { a, b } = network.segment(edge);
+        let ends = &network.edges[edge as usize];
+        ([a, b], [heights[ends.a as usize], heights[ends.b as usize]])
+    };
+    let mut lacks = Vec::new();
+    for &(passage, edge, below, place) in pairs {
+        let (ends, levels, kind) = if below < edges {
+            let (ends, levels) = of_edge(below);
+            (ends, levels, network.traits(below).kind)
+        } else {
+            let water = &water[(below - edges) as usize];
+            (water.ends, water.heights, water.kind)
+        };
+        let (deck_ends, deck_levels) = of_edge(edge);
+        let deck = between(deck_ends, deck_levels, place);
+        let lack = between(ends, levels, place) + clearances.over(kind) - deck;
+        if 0 < lack {
+            lacks.push(Crossing { passage, edge, place, lack });
+        }
+    }
+    lacks
+}
+
+/// The height at a place on or beside a segment, in quanta.
+pub(crate) fn between(ends: [Place; 2], heights: [i32; 2], place: Place) -> i32 {
+    let ([east, north], [to_east, to_north]) = (ends[0].to(ends[1]), ends[0].to(place));
+    let whole = i128::from(ends[0].squared_to(ends[1])).max(1);
+    let along = i128::from(east * to_east + north * to_north).clamp(0, whole);
+    heights[0] + (i128::from(heights[1] - heights[0]) * along).div_euclid(whole) as i32
+}

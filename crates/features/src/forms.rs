@@ -1,0 +1,458 @@
+//! What features are in the TIN: points with heights, edges to keep, faces with a class, and decks above.
+//!
+//! Strips, lines, outlines and channels are rounded to the lattice once more, together, so that any two of them touch
+//! at shared points or not at all; where two had different heights at a point, the higher class keeps its own.
+
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+
+use crate::clean::Notes;
+use crate::decks::between;
+use crate::exact::Segment;
+use crate::pieces::{Grant, Piece, pieces};
+use crate::rings::encloses;
+use crate::room::share_out;
+use crate::snap::snap_round;
+use crate::strand::{Graded, Role, Strand};
+use crate::strips::{Face, Room, Wide, wide_segments};
+use crate::thin::{Station, Tolerance, thin};
+use crate::toes::toes;
+use crate::{FeatureId, Flaw, Form, Network, Place, Remark, Remedy, Site};
+
+/// A line inside a strip is worth a remark from this length on, in quanta: below it, it only ends at the strip's edge.
+const CUT_LENGTH_MIN: i64 = 30 * 128;
+
+/// An edge the TIN has to keep.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FormedEdge {
+    /// Its lesser end, in [`Formed::points`].
+    pub a: u32,
+    /// Its other end.
+    pub b: u32,
+    /// What it is.
+    pub role: Role,
+    /// Its class.
+    pub class: u16,
+    /// Which feature it comes from.
+    pub id: FeatureId,
+}
+
+/// All that features put into the ground.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Formed {
+    /// Points with their heights in quanta, by place.
+    pub points: Vec<(Place, i32)>,
+    /// Edges between them, by their ends: no two cross, and no point lies inside one.
+    pub edges: Vec<FormedEdge>,
+    /// Strips and junctions on the ground, by class.
+    pub faces: Vec<Face>,
+    /// The surfaces of decks.
+    pub decks: Vec<Face>,
+    /// What was changed.
+    pub remarks: Vec<Remark>,
+}
+
+/// Forms a network and all other strands together.
+pub fn form(graded: &Graded, strands: &[Strand], site: &Site) -> Formed {
+    let Graded { network, heights, beside, grants } = *graded;
+    let mut remarks = Vec::new();
+    let shared = shared_places(network, strands);
+    let stays = |place: Place| shared.contains(&place);
+    let pieces = pieces(network, heights, beside, site, &stays, grants);
+    remark_narrow(network, &pieces, &mut remarks);
+    let mut wide = wide_segments(&pieces);
+    let all = share_out(network, &pieces, &mut wide, heights, &mut remarks);
+    let toes = toes(graded, &pieces, &wide, &all);
+    let (decks, faces): (Vec<Face>, Vec<Face>) = all.into_iter().partition(|face| face.is_deck);
+    let mut lines = outlines(&faces);
+    lines.extend(toes);
+    lines.extend(centrelines(network, &pieces, &wide, heights));
+    lines.extend(strands.iter().filter_map(|strand| thinned(strand, grants.of(strand.id), site, &stays)));
+    lines.sort_by(|a, b| (a.class, a.role, &a.stations, a.id).cmp(&(b.class, b.role, &b.stations, b.id)));
+    let mut formed = assemble(lines, &faces, site, &mut remarks);
+    (formed.faces, formed.decks) = (faces, decks);
+    formed.faces.sort_by(|a, b| (a.class, &a.corners).cmp(&(b.class, &b.corners)));
+    formed.decks.sort_by(|a, b| (a.class, &a.corners).cmp(&(b.class, &b.corners)));
+    formed.remarks = remarks;
+    Remark::sort(&mut formed.remarks);
+    formed
+}
+
+/// Places that two strands have, or a strand and the network: thinning leaves them to both.
+fn shared_places(network: &Network, strands: &[Strand]) -> BTreeSet<Place> {
+    let mut uses: HashMap<Place, u32> = network.nodes.iter().map(|node| (node.place, 1)).collect();
+    let mut shared = BTreeSet::new();
+    for strand in strands {
+        let open = if strand.stations.first() == strand.stations.last() { 1 } else { 0 };
+        for (place, _) in &strand.stations[open..] {
+            let count = uses.entry(*place).or_insert(0);
+            *count += 1;
+            if 1 < *count {
+                shared.insert(*place);
+            }
+        }
+    }
+    shared
+}
+
+/// A strand with the stations it needs, or nothing where it is left out. A channel keeps the stations beside a shared
+/// place too: where it passes below a road, only what lies between them is missing.
+fn thinned(strand: &Strand, grant: Grant, site: &Site, shared: &dyn Fn(Place) -> bool) -> Option<Strand> {
+    let keeps = |at: usize| strand.stations.get(at).is_some_and(|(place, _)| shared(*place));
+    let station = |(at, &(place, height)): (usize, &(Place, i32))| {
+        let beside = strand.role == Role::Channel && (keeps(at + 1) || (0 < at && keeps(at - 1)));
+        Station { place, height, stays: site.on_line(place) || shared(place) || beside }
+    };
+    let stations: Vec<Station> = strand.stations.iter().enumerate().map(station).collect();
+    let kept = thin(&stations, Tolerance::USUAL.times(grant.tolerance), 0, site.lattice);
+    let stations = kept.iter().map(|at| strand.stations[*at as usize]).collect();
+    (!grant.out).then_some(Strand { stations, ..strand.clone() })
+}
+
+fn remark_narrow(network: &Network, pieces: &[Piece], remarks: &mut Vec<Remark>) {
+    for piece in pieces {
+        let asks = matches!(piece.traits.form, Form::Strip | Form::StripAlways | Form::Bench);
+        let narrow = piece.traits.width < crate::pieces::STRIP_STEPS_MIN * network.lattice.quanta_per_step();
+        if asks && narrow {
+            let place = network.nodes[piece.nodes[0] as usize].place;
+            let mut notes = Notes { id: piece.id(network, 0), lattice: network.lattice, remarks };
+            notes.write_at(place, Flaw::TooNarrow, Remedy::BecameLine);
+        }
+    }
+    // A feature in many pieces is told once.
+    let mut told = BTreeSet::new();
+    remarks.retain(|remark| remark.flaw != Flaw::TooNarrow || told.insert(remark.id));
+}
+
+fn outlines(faces: &[Face]) -> Vec<Strand> {
+    let outline = |face: &Face| Strand {
+        role: Role::Side,
+        class: face.class,
+        id: face.id,
+        stations: face.corners.iter().chain(face.corners.first()).copied().collect(),
+    };
+    faces.iter().map(outline).collect()
+}
+
+/// The centrelines of what is no strip, as long as it goes.
+fn centrelines(network: &Network, pieces: &[Piece], wide: &[Wide], heights: &[i32]) -> Vec<Strand> {
+    let strips: BTreeSet<(u32, u32)> =
+        wide.iter().filter(|of| of.room != Room::None).map(|of| (of.piece, of.segment)).collect();
+    let mut lines: Vec<Strand> = Vec::new();
+    for (number, piece) in pieces.iter().enumerate().filter(|(_, piece)| !piece.is_deck()) {
+        let mut open = false;
+        for (segment, nodes) in piece.nodes.windows(2).enumerate() {
+            let is_line = !strips.contains(&(number as u32, segment as u32));
+            let [a, b] = [nodes[0], nodes[1]].map(|node| (network.nodes[node as usize].place, heights[node as usize]));
+            let id = piece.id(network, segment);
+            let goes_on = open && lines.last().is_some_and(|line| line.id == id);
+            if is_line && !goes_on {
+                lines.push(Strand { role: Role::Centre, class: piece.traits.class, id, stations: vec![a] });
+            }
+            if let Some(line) = lines.last_mut().filter(|_| is_line) {
+                line.stations.push(b);
+            }
+            open = is_line;
+        }
+    }
+    lines
+}
+
+/// Whose height a place has: the least of rank, class, role and height.
+type Decided = BTreeMap<Place, (Role, u16, Role, i32)>;
+
+/// Rounds all lines together, decides the height of each point, and leaves out what lies in a strip of higher class.
+fn assemble(lines: Vec<Strand>, faces: &[Face], site: &Site, remarks: &mut Vec<Remark>) -> Formed {
+    let mut rounded: Vec<Vec<Place>> =
+        lines.iter().map(|line| line.stations.iter().map(|(place, _)| *place).collect()).collect();
+    let mut hot = Vec::new();
+    for ends in rounded.iter().flat_map(|line| line.windows(2)) {
+        site.crossings(Segment { a: ends[0], b: ends[1] }, &mut |place| hot.push(place));
+    }
+    snap_round(&mut rounded, &hot);
+    let own: Vec<Vec<i32>> = lines.iter().zip(&rounded).map(|(line, places)| heights_along(line, places)).collect();
+    let mut heights: Decided = BTreeMap::new();
+    for ((line, places), own) in lines.iter().zip(&rounded).zip(&own) {
+        for (&place, &height) in places.iter().zip(own) {
+            let mine = (line.role.max(Role::Centre), line.class, line.role, height);
+            heights.entry(place).and_modify(|height| *height = mine.min(*height)).or_insert(mine);
+        }
+    }
+    let inside = Inside::new(faces, &lines, &rounded);
+    let mut edges: BTreeMap<(Place, Place), (u16, Role, FeatureId)> = BTreeMap::new();
+    for (number, (line, places)) in lines.iter().zip(&rounded).enumerate() {
+        let mut cut = 0;
+        for (at, ends) in places.windows(2).enumerate() {
+            let passes = |at: usize| line.role == Role::Channel && heights[&places[at]].3 != own[number][at];
+            if inside.covers(number, ends[0], ends[1]) {
+                cut += site.lattice.length(ends[0], ends[1]);
+            } else if !passes(at) && !passes(at + 1) {
+                let key = (ends[0].min(ends[1]), ends[0].max(ends[1]));
+                let mine = (line.class, line.role, line.id);
+                edges.entry(key).and_modify(|edge| *edge = mine.min(*edge)).or_insert(mine);
+            }
+            let above = passes(at) && (at == 0 || !passes(at - 1));
+            if above {
+                let road = heights[&places[at]].2 <= Role::Centre;
+                let (flaw, remedy) =
+                    if road { (Flaw::RoadOverRiver, Remedy::Culvert) } else { (Flaw::Overlap, Remedy::Cut) };
+                Notes { id: line.id, lattice: site.lattice, remarks }.write_at(places[at], flaw, remedy);
+            }
+        }
+        if line.role == Role::Centre && CUT_LENGTH_MIN < cut {
+            let mut notes = Notes { id: line.id, lattice: site.lattice, remarks };
+            notes.write_at(places[0], Flaw::Overlap, Remedy::Cut);
+        }
+    }
+    collect(heights, edges)
+}
+
+/// Numbers the points that edges use.
+fn collect(heights: Decided, edges: BTreeMap<(Place, Place), (u16, Role, FeatureId)>) -> Formed {
+    let used: BTreeSet<Place> = edges.keys().flat_map(|(a, b)| [*a, *b]).collect();
+    let points: Vec<(Place, i32)> = used.iter().map(|place| (*place, heights[place].3)).collect();
+    let number = |place: Place| points.partition_point(|(other, _)| *other < place) as u32;
+    let edges = edges
+        .into_iter()
+        .map(|((a, b), (class, role, id))| FormedEdge { a: number(a), b: number(b), role, class, id })
+        .collect();
+    Formed { points, edges, faces: Vec::new(), decks: Vec::new(), remarks: Vec::new() }
+}
+
+/// A line's own heights at the places it has after rounding: what is new lies between its stations.
+fn heights_along(line: &Strand, places: &[Place]) -> Vec<i32> {
+    let mut heights = Vec::with_capacity(places.len());
+    let mut at = 0;
+    for &place in places {
+        if line.stations.get(at + 1).is_some_and(|(next, _)| *next == place) && !heights.is_empty() {
+            at += 1;
+        }
+        let (here, next) = (line.stations[at], line.stations[(at + 1).min(line.stations.len() - 1)]);
+        heights.push(between([here.0, next.0], [here.1, next.1], place));
+    }
+    heights
+}
+
+/// Which places lie in which strips, after rounding.
+struct Inside {
+    /// Rings in half steps, with their class and the number of their line.
+    rings: Vec<(Vec<Place>, u16, usize)>,
+    /// Rings by cells of the plane.
+    cells: HashMap<(i32, i32), Vec<u32>>,
+    /// The rings each edge of a ring belongs to.
+    own: HashMap<(Place, Place), Vec<u32>>,
+    /// What each line is: its class and whether it is an outline.
+    lines: Vec<(u16, bool)>,
+}
+
+/// Half steps of a cell's side.
+const CELL: i32 = 256;
+
+impl Inside {
+    fn new(faces: &[Face], lines: &[Strand], rounded: &[Vec<Place>]) -> Self {
+        let of_line = |line: &Strand| (line.class, line.role == Role::Side);
+        let mut inside = Self {
+            rings: Vec::with_capacity(faces.len()),
+            cells: HashMap::new(),
+            own: HashMap::new(),
+            lines: lines.iter().map(of_line).collect(),
+        };
+        for (number, (line, places)) in lines.iter().zip(rounded).enumerate() {
+            if line.role != Role::Side {
+                continue;
+            }
+            let ring = inside.rings.len() as u32;
+            for ends in places.windows(2) {
+                inside.own.entry((ends[0].min(ends[1]), ends[0].max(ends[1]))).or_default().push(ring);
+            }
+            let doubled: Vec<Place> =
+                places[1..].iter().map(|place| Place::new(2 * place.row, 2 * place.col)).collect();
+            let span = |of: fn(&Place) -> i32| {
+                let (low, high) = (doubled.iter().map(of).min(), doubled.iter().map(of).max());
+                low.unwrap_or(0).div_euclid(CELL)..=high.unwrap_or(0).div_euclid(CELL)
+            };
+            for row in span(|place| place.row) {
+                for col in span(|place| place.col) {
+                    inside.cells.entry((row, col)).or_default().push(ring);
+                }
+            }
+            inside.rings.push((doubled, line.class, number));
+        }
+        inside
+    }
+
+    /// Whether an edge of a line lies inside a strip that keeps its place against it.
+    fn covers(&self, line: usize, a: Place, b: Place) -> bool {
+        let middle = Place::new(a.row + b.row, a.col + b.col);
+        let Some(near) = self.cells.get(&(middle.row.div_euclid(CELL), middle.col.div_euclid(CELL))) else {
+            return false;
+        };
+        let own = self.own.get(&(a.min(b), a.max(b)));
+        let (class, is_side) = self.lines[line];
+        near.iter().any(|ring| {
+            let (places, ring_class, ring_line) = &self.rings[*ring as usize];
+            let keeps = *ring_class < class || (*ring_class == class && (!is_side || *ring_line < line));
+            keeps && !own.is_some_and(|own| own.contains(ring)) && encloses(places, middle)
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::samples::{formed, site, way};
+    use proptest::prelude::*;
+
+    #[test]
+    fn a_bench_meets_the_ground_beyond_both_of_its_edges() {
+        let road = way(1, "highway=primary", &[(10.0, 10.0), (40.0, 10.0)]);
+        let ground = |_: f64, north: f64| north * 2.0;
+        let formed = crate::samples::formed_as(vec![road], ground, Form::Bench);
+        let of_toe =
+            |point: u32| formed.edges.iter().any(|edge| edge.role == Role::Toe && (edge.a == point || edge.b == point));
+        let toes: Vec<_> = (0..formed.points.len() as u32).filter(|point| of_toe(*point)).collect();
+        assert_eq!(toes.len(), 4);
+        for point in toes {
+            let (place, height) = formed.points[point as usize];
+            let ground = crate::samples::ground_at(place, &ground).unwrap();
+            assert!((height - ground).abs() < 10, "{height} {ground}");
+        }
+    }
+
+    fn roles(formed: &Formed, role: Role) -> usize {
+        formed.edges.iter().filter(|edge| edge.role == role).count()
+    }
+
+    /// Both corners of a strip at a station have one height.
+    #[track_caller]
+    fn check_level_across(formed: &Formed) {
+        let height = |place: Place| formed.points.iter().find(|(other, _)| *other == place).map(|(_, height)| *height);
+        for face in formed.faces.iter().filter(|face| face.wide.is_some() && face.corners.len() == 4) {
+            for (one, other) in [(0, 3), (1, 2)] {
+                let (one, other) = (face.corners[one], face.corners[other]);
+                assert_eq!(one.1, other.1);
+                assert_eq!((height(one.0), height(other.0)), (Some(one.1), Some(other.1)));
+            }
+        }
+    }
+
+    #[test]
+    fn a_road_across_a_side_slope_is_a_strip_level_across_and_a_line_on_flat_ground() {
+        let road = way(1, "highway=primary", &[(10.0, 10.0), (90.0, 10.0)]);
+        let slope = formed(vec![road.clone()], |_, north| north * 3.0);
+        check_level_across(&slope);
+        assert_eq!(roles(&slope, Role::Centre), 0);
+        // A station at each end and one on the module line between: two faces.
+        assert_eq!((slope.faces.len(), slope.points.len()), (2, 6));
+        let flat = formed(vec![road], |_, _| 7.0);
+        assert_eq!((roles(&flat, Role::Centre), flat.faces.len(), flat.points.len()), (2, 0, 3));
+    }
+
+    #[test]
+    fn the_form_changes_at_stations() {
+        let road = way(1, "highway=primary", &[(10.0, 10.0), (90.0, 10.0)]);
+        let formed =
+            formed(vec![road], |east, north| if east < 55.0 { 0.0 } else { (east - 54.0).min(30.0) * (north - 10.0) });
+        check_level_across(&formed);
+        assert!(0 < roles(&formed, Role::Centre) && !formed.faces.is_empty());
+    }
+
+    #[test]
+    fn a_junction_on_a_slope_is_a_polygon_at_one_height() {
+        let sources = vec![
+            way(1, "highway=primary", &[(10.0, 20.0), (40.0, 20.0)]),
+            way(2, "highway=primary", &[(25.0, 20.0), (25.0, 45.0)]),
+        ];
+        let formed = formed(sources, |east, north| north + east);
+        check_level_across(&formed);
+        let junctions: Vec<&Face> = formed.faces.iter().filter(|face| face.wide.is_none()).collect();
+        assert_eq!(junctions.len(), 1);
+        let height = junctions[0].corners[0].1;
+        assert!(junctions[0].corners.iter().all(|corner| corner.1 == height));
+    }
+
+    #[test]
+    fn a_hairpin_stays_within_its_mitres() {
+        let sources =
+            vec![way(1, "highway=primary", &[(10.0, 20.0), (30.0, 20.0), (30.3, 20.5), (30.0, 21.0), (10.0, 23.0)])];
+        let formed = formed(sources, |east, north| 0.5 * north + 0.2 * east);
+        check_level_across(&formed);
+        let tip = site().lattice.place_of([30.3, 20.5]).unwrap();
+        let farthest = formed.points.iter().map(|(place, _)| place.col - tip.col).max().unwrap();
+        assert!(f64::from(farthest) * site().lattice.metres_per_step() < 14.0 + 1.0);
+    }
+
+    #[test]
+    fn of_two_carriageways_that_overlap_the_lower_class_gives_way() {
+        let sources = vec![
+            way(1, "highway=motorway", &[(10.0, 20.0), (40.0, 20.0)]),
+            way(2, "highway=primary", &[(10.0, 20.8), (40.0, 20.8)]),
+        ];
+        let formed = formed(sources, |_, north| 2.0 * north);
+        check_level_across(&formed);
+        let told: Vec<_> = formed.remarks.iter().map(|remark| (remark.id.number, remark.remedy)).collect();
+        assert_eq!(told, [(2, Remedy::Narrowed)]);
+        let motorway = formed.faces.iter().filter(|face| face.class == 0).count();
+        assert_eq!((motorway, formed.faces.len()), (1, 2));
+    }
+
+    #[test]
+    fn a_stream_passes_below_a_road_in_a_culvert() {
+        let sources = vec![
+            way(1, "highway=primary", &[(10.0, 20.0), (40.0, 20.0)]),
+            way(2, "waterway=stream", &[(25.0, 10.0), (25.0, 30.0)]),
+        ];
+        let formed =
+            formed(sources, |east, north| if (24.0..26.0).contains(&east) { 10.0 } else { 30.0 } + north * 0.1);
+        let told: Vec<_> =
+            formed.remarks.iter().map(|remark| (remark.id.number, &remark.flaw, remark.remedy)).collect();
+        assert_eq!(told, [(2, &Flaw::RoadOverRiver, Remedy::Culvert)]);
+        assert!(0 < roles(&formed, Role::Channel));
+    }
+
+    #[test]
+    fn a_deck_is_no_part_of_the_ground() {
+        let sources = vec![
+            way(1, "highway=primary", &[(10.0, 20.0), (20.0, 20.0)]),
+            way(2, "highway=primary bridge=yes", &[(20.0, 20.0), (40.0, 20.0)]),
+            way(3, "highway=primary", &[(40.0, 20.0), (45.0, 20.0)]),
+            way(4, "highway=primary", &[(30.0, 10.0), (30.0, 30.0)]),
+        ];
+        let formed = formed(sources, |_, north| 0.2 * north);
+        assert!(!formed.decks.is_empty() && formed.decks.iter().all(|deck| deck.id.number == 2));
+        assert!(formed.edges.iter().all(|edge| edge.id.number != 2));
+    }
+
+    type Drawn = (usize, Vec<(i32, i32)>);
+
+    fn network_of(lines: &[Drawn]) -> Vec<crate::Source> {
+        let tags = [
+            "highway=motorway",
+            "highway=primary",
+            "highway=service",
+            "highway=track",
+            "waterway=stream",
+            "highway=primary bridge=yes",
+            "railway=rail",
+        ];
+        let way_of = |(number, (tag, line)): (usize, &Drawn)| {
+            let line: Vec<(f64, f64)> = line.iter().map(|(x, y)| (f64::from(*x) / 4.0, f64::from(*y) / 4.0)).collect();
+            way(number as i64, tags[*tag], &line)
+        };
+        lines.iter().enumerate().map(way_of).collect()
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(150))]
+        #[test]
+        fn whatever_the_network_edges_touch_at_points_only_in_any_order_of_features(
+            lines in proptest::collection::vec(
+                (0usize..7, proptest::collection::vec((40..160i32, 40..160i32), 2..5)), 1..10)
+        ) {
+            let ground = |east: f64, north: f64| 0.4 * north + 0.03 * (east - 20.0) * (east - 20.0);
+            let sources = network_of(&lines);
+            let there = formed(sources.clone(), ground);
+            let back = formed(sources.into_iter().rev().collect(), ground);
+            prop_assert_eq!(there, back);
+        }
+    }
+}

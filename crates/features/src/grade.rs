@@ -1,0 +1,188 @@
+//! Heights of roads, railways and runways: one decision for the whole network.
+
+use crate::decks::{Clearances, Water, clear, raise_sagging_ends, straighten};
+use crate::smooth::smooth;
+use crate::sweep::{Pin, remark_steep, sweep};
+use crate::{Network, Remark, Way};
+
+/// What may be asked of the heights of a network.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct GradeOptions {
+    /// What decks keep clear of.
+    pub clearances: Clearances,
+    /// Quanta back along the way in which the bank of a deck may sag.
+    pub bank: i32,
+}
+
+impl GradeOptions {
+    /// The usual clearances, and banks that sag up to 100 m back.
+    pub const USUAL: Self = Self { clearances: Clearances::USUAL, bank: 100 * 128 };
+}
+
+/// A height in quanta for every node of a network of ways that are travelled.
+///
+/// `ground` is the DEM at every node (`None` without one there), `pins` are hard, and decks keep clear of `water`.
+pub fn grade(
+    network: &Network,
+    ground: &[Option<i32>],
+    pins: &[Pin],
+    water: &[Water],
+    options: GradeOptions,
+    remarks: &mut Vec<Remark>,
+) -> Vec<i32> {
+    assert_eq!(network.nodes.len(), ground.len(), "every node has a height of the ground, or none");
+    let resting: Vec<Option<i32>> =
+        network.nodes.iter().zip(ground).map(|(node, ground)| ground.filter(|_| node.on_ground)).collect();
+    let mut resting = smooth(network, &resting);
+    raise_sagging_ends(network, &mut resting, options.bank);
+    let mut swept = sweep(network, &resting, pins, remarks);
+    straighten(network, &swept.costs, &mut swept.heights);
+    clear(network, &mut swept, water, options.clearances, remarks);
+    remark_steep(network, &swept.heights, remarks);
+    Remark::sort(remarks);
+    swept.heights
+}
+
+/// Pins of a network: heights that features give to vertices of ways whose rule says so.
+pub fn pins(network: &Network, ways: &[Way]) -> Vec<Pin> {
+    let mut pins = Vec::new();
+    for (place, height) in ways.iter().filter(|way| way.traits.pins).flat_map(|way| &way.heights) {
+        let first = network.nodes.partition_point(|node| node.place < *place);
+        let here = network.nodes[first..].iter().take_while(|node| node.place == *place);
+        pins.extend(here.enumerate().map(|(at, _)| Pin { node: (first + at) as u32, height: *height }));
+    }
+    pins.sort_unstable();
+    pins.dedup();
+    pins
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::samples::{network, way};
+    use crate::{Flaw, Network, Source};
+
+    fn metres(quanta: i32) -> f64 {
+        terrain::metres_of_quanta(quanta)
+    }
+
+    /// The heights of a scene in metres, by place in posts (east, north), and its remarks.
+    #[track_caller]
+    fn heights(sources: Vec<Source>, ground: impl Fn(f64, f64) -> f64) -> (Network, Vec<i32>, Vec<Remark>) {
+        let (network, ground, mut remarks) = network(sources, ground);
+        let heights = grade(&network, &ground, &[], &[], GradeOptions::USUAL, &mut remarks);
+        for edge in &network.edges {
+            let rise = (heights[edge.a as usize] - heights[edge.b as usize]).abs();
+            assert!(rise <= edge.rise_max, "a grade is exceeded");
+        }
+        (network, heights, remarks)
+    }
+
+    fn at(network: &Network, heights: &[i32], east: f64, north: f64, on_ground: bool) -> f64 {
+        let place = network.lattice.place_of([east, north]).unwrap();
+        let node = network.nodes.iter().position(|node| node.place == place && node.on_ground == on_ground);
+        metres(heights[node.expect("a station stands there")])
+    }
+
+    #[test]
+    fn a_road_on_gentle_ground_lies_on_it() {
+        let road = way(1, "highway=primary", &[(10.0, 10.0), (40.0, 10.0)]);
+        let (network, found, _) = heights(vec![road], |east, _| east * 0.5);
+        for node in [12.0, 20.0, 37.0] {
+            assert_eq!(at(&network, &found, node, 10.0, true), node * 0.5);
+        }
+    }
+
+    #[test]
+    fn a_road_over_a_step_shares_cut_and_fill() {
+        let road = way(1, "highway=primary", &[(10.0, 10.0), (90.0, 10.0)]);
+        let (network, found, _) = heights(vec![road], |east, _| if east < 50.0 { 0.0 } else { 20.0 });
+        let (low, high) = (at(&network, &found, 49.0, 10.0, true), at(&network, &found, 50.0, 10.0, true));
+        assert!((low + high - 20.0).abs() < 0.1, "{low} {high}");
+        assert!((high - low - 1.0).abs() < 0.05);
+    }
+
+    fn bridge(tags: &str) -> Vec<Source> {
+        vec![
+            way(1, "highway=primary", &[(10.0, 20.0), (40.0, 20.0)]),
+            way(2, tags, &[(40.0, 20.0), (60.0, 20.0)]),
+            way(3, "highway=primary", &[(60.0, 20.0), (90.0, 20.0)]),
+        ]
+    }
+
+    /// A gorge between 40 and 60, 30 m deep, whose banks sag over four posts.
+    fn gorge(east: f64, _: f64) -> f64 {
+        let inside = 10.0 - (east - 50.0).abs();
+        100.0 - ((inside + 4.0).max(0.0) / 4.0).min(1.0) * 30.0
+    }
+
+    #[test]
+    fn a_bridge_over_a_gorge_rests_on_the_top_of_its_sagging_banks() {
+        let (network, found, _) = heights(bridge("highway=primary bridge=yes"), gorge);
+        for place in [40.0, 60.0] {
+            assert!(99.0 < at(&network, &found, place, 20.0, true));
+        }
+        assert!(99.0 < at(&network, &found, 50.0, 20.0, false));
+    }
+
+    #[test]
+    fn a_road_that_comes_down_to_its_bridge_stays_down() {
+        let valley = |east: f64, _: f64| (east - 50.0).abs() * 0.8;
+        let (network, found, _) = heights(bridge("highway=primary bridge=yes"), valley);
+        assert!(at(&network, &found, 40.0, 20.0, true) < 8.6);
+    }
+
+    #[test]
+    fn a_tunnel_joins_its_ends_and_knows_nothing_of_the_hill() {
+        let hill = |east: f64, _: f64| if 41.0 < east && east < 59.0 { 300.0 } else { 50.0 };
+        let (network, found, _) = heights(bridge("highway=primary tunnel=yes"), hill);
+        assert_eq!(at(&network, &found, 40.0, 20.0, true), 50.0);
+        assert_eq!(at(&network, &found, 50.0, 20.0, false), 50.0);
+    }
+
+    #[test]
+    fn a_deck_is_raised_clear_of_a_railway_and_the_approaches_with_it() {
+        let mut sources = bridge("highway=primary bridge=yes");
+        sources.push(way(4, "railway=rail", &[(50.0, 5.0), (50.0, 35.0)]));
+        let (network, found, remarks) = heights(sources, |_, _| 10.0);
+        assert!(16.0 <= at(&network, &found, 40.0, 20.0, true));
+        assert_eq!(at(&network, &found, 50.0, 20.0, true), 10.0);
+        assert!((at(&network, &found, 36.0, 20.0, true) - 12.0).abs() < 0.1, "the approach falls by its grade");
+        assert!(remarks.is_empty());
+    }
+
+    #[test]
+    fn clearance_that_pins_forbid_is_written_down() {
+        let mut sources = bridge("highway=primary bridge=yes");
+        sources.push(way(4, "highway=track", &[(50.0, 5.0), (50.0, 35.0)]));
+        let (network, ground, mut remarks) = network(sources, |_, _| 10.0);
+        let place = network.lattice.place_of([40.0, 20.0]).unwrap();
+        let node = network.nodes.iter().position(|node| node.place == place).unwrap() as u32;
+        let pins = [Pin { node, height: 1280 }, Pin { node: node + 1, height: 1280 }];
+        let height = grade(&network, &ground, &pins[..1], &[], GradeOptions::USUAL, &mut remarks)[node as usize];
+        assert_eq!(height, 1280);
+        // The other end went up alone, twice, so three quarters of the clearance are there.
+        assert!(
+            matches!(remarks[0].flaw, Flaw::ClearanceLacks { quanta } if 100 < quanta && quanta < 200),
+            "{remarks:?}"
+        );
+    }
+
+    #[test]
+    fn two_pins_on_one_junction_that_disagree_are_written_down() {
+        let (network, ground, mut remarks) = network(bridge("highway=primary"), |_, _| 10.0);
+        let pins = [Pin { node: 10, height: 1000 }, Pin { node: 10, height: 2000 }];
+        let found = grade(&network, &ground, &pins, &[], GradeOptions::USUAL, &mut remarks);
+        assert_eq!(found[10], 1000);
+        assert_eq!(remarks[0].flaw, Flaw::PinsDisagree);
+    }
+
+    #[test]
+    fn pins_too_steep_for_the_grade_exceed_it_between_them_and_it_is_written_down() {
+        let (network, ground, mut remarks) = network(bridge("highway=primary"), |_, _| 10.0);
+        let pins = [Pin { node: 10, height: 0 }, Pin { node: 14, height: 2560 }];
+        let found = grade(&network, &ground, &pins, &[], GradeOptions::USUAL, &mut remarks);
+        assert_eq!((found[10], found[14]), (0, 2560));
+        assert!(matches!(remarks[0].flaw, Flaw::PinsTooSteep { grade_ppm } if 500_000 <= grade_ppm));
+    }
+}

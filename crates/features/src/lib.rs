@@ -1,0 +1,100 @@
+//! Roads, rivers and lakes as parts of the ground: from tags and positions to points and edges a TIN has to keep.
+//!
+//! The crate knows no file, no raster and no coordinate system. Positions come in posts of the working grid; every
+//! place that is decided is one of the [`FeatureLattice`], every height a whole number of quanta; and nothing depends
+//! on the order in which features come, or on anything but their content. What is wrong with a feature never stops
+//! anything: it is mended or left out, and each time a [`Remark`] says so. In the order of use:
+//!
+//! ```text
+//! sort_out(Vec<Source>, &[Rule]) -> Sorted          kinds, classes, widths, grades
+//! mend(Vec<Feature>, &Site) -> Mended               ways and areas on the lattice, cut at the area's border
+//! round(Mended, &Site) -> Rounded                   stations; lines touch at shared vertices or not at all
+//! split_at_dams(rounded.outlines, &rounded.ways) -> Vec<Outline>
+//! Network::of(&travelled(&rounded), ..), Network::of(&flowing(&rounded), ..)
+//! level(&outlines, &shores, ..) -> Waters           lakes; then lakes_along(..) -> levels for the rivers
+//! fall(&rivers, Bed, ..) -> Fallen                  rivers; channels(..), shore(..), banks(..) -> Vec<Strand>
+//! grade(&roads, &ground, &pins, &water(&strands), GradeOptions, ..) -> Vec<i32>
+//! reserve(&Graded, &strands, &Site, &triangles_max) -> Reserved
+//!     .formed: Formed { points, edges, faces, decks, remarks }, .cost: triangles by load module and class
+//! ```
+//!
+//! The DEM comes in as values: at every `network.nodes[..].place`, at both [`sides`] of each, at the lower bank of
+//! rivers, and at every place of the rings of outlines.
+
+// From tags to what a feature is.
+mod source;
+pub use source::{FeatureId, Member, Numbering, Position, Shape, Source};
+mod remark;
+pub use remark::{Flaw, Remark, Remedy};
+pub mod table;
+pub use table::{Form, Kind};
+mod lengths;
+mod rules;
+pub use rules::{Feature, Rule, RuleKind, Sorted, Storey, Traits, nearest_tags, sort_out};
+
+// Onto the lattice.
+mod place;
+pub use place::{COORDINATE_MAX, FeatureLattice, Place, STEPS_PER_POST_MAX};
+mod exact;
+pub use exact::Segment;
+mod clip;
+pub use clip::Extent;
+mod site;
+pub use site::Site;
+mod quarters;
+mod snap;
+pub use snap::{Meeting, snap_round, touch_at_vertices_only};
+mod clean;
+mod crowd;
+pub use crowd::STATIONS_PER_MODULE_MAX;
+mod gaps;
+mod rings;
+pub use rings::{Ring, doubled_area, encloses};
+mod ways;
+pub use ways::{Area, Way};
+mod mend;
+pub use mend::{Mended, mend};
+mod round;
+pub use round::{Outline, Rounded, round};
+
+// Heights.
+mod network;
+pub use network::{Chain, Edge, Network, Node, WayOf};
+mod smooth;
+pub use smooth::smooth;
+mod sweep;
+pub use sweep::Pin;
+mod decks;
+pub use decks::{Clearances, Water};
+mod grade;
+pub use grade::{GradeOptions, grade, pins};
+mod flow;
+mod isotonic;
+mod rivers;
+pub use rivers::{Bed, Fallen, fall};
+mod dams;
+pub use dams::split_at_dams;
+mod lakes;
+pub use lakes::{Lake, Waters, banks, level, outline_only, shore};
+mod parts;
+pub use parts::{Line, breaklines, channels, dams, flowing, have_line, lakes_along, lines_inside, travelled, water};
+
+// Forms and what they cost.
+mod thin;
+pub use thin::{Station, Tolerance, thin};
+mod pieces;
+pub use pieces::{FALL_MIN, Grant, Grants, Piece, STRIP_STEPS_MIN, sides};
+mod strips;
+pub use strips::Face;
+mod strand;
+pub use strand::{Graded, Role, Strand};
+mod room;
+mod toes;
+pub use toes::{CUT_RUN, FILL_RUN, reach_max};
+mod forms;
+pub use forms::{Formed, FormedEdge, form};
+mod cost;
+pub use cost::{Cost, Reserved, cost, reserve};
+
+#[cfg(test)]
+mod samples;

@@ -1,0 +1,172 @@
+//! Chains cut into pieces whose stations are thinned, each segment of which is a line or a strip.
+
+use std::collections::HashMap;
+
+use crate::thin::{Station, Tolerance, thin};
+use crate::{FeatureId, Form, Network, Place, Site, Storey, Traits};
+
+/// The ground falls more than this across a strip, in quanta, where it pays: 0.5 m.
+pub const FALL_MIN: i32 = 64;
+
+/// Steps of the lattice below which a strip is a line.
+pub const STRIP_STEPS_MIN: i32 = 4;
+
+/// What the cost of features leaves to one of them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Grant {
+    /// How many times the usual tolerance it is thinned with: 1, 2 or 4.
+    pub tolerance: u8,
+    /// The most it may be: a bench, a strip or a line.
+    pub most: Form,
+    /// Whether it is left out.
+    pub out: bool,
+}
+
+impl Grant {
+    /// As asked for.
+    pub const ALL: Self = Self { tolerance: 1, most: Form::Bench, out: false };
+}
+
+/// What the cost of features leaves to each of them.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Grants {
+    less: HashMap<FeatureId, Grant>,
+}
+
+impl Grants {
+    /// What a feature may be.
+    pub fn of(&self, id: FeatureId) -> Grant {
+        self.less.get(&id).copied().unwrap_or(Grant::ALL)
+    }
+
+    /// Leaves less to a feature.
+    pub fn set(&mut self, id: FeatureId, grant: Grant) {
+        self.less.insert(id, grant);
+    }
+}
+
+/// Thinned stations of one chain.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Piece {
+    /// What it is.
+    pub traits: Traits,
+    /// Nodes of the network, in order.
+    pub nodes: Vec<u32>,
+    /// Of each segment, the edge of the network it begins with.
+    pub edges: Vec<u32>,
+    /// Of each segment, whether it is a strip.
+    pub strips: Vec<bool>,
+    /// Whether it has slopes.
+    pub bench: bool,
+}
+
+impl Piece {
+    /// The feature a segment comes from.
+    pub fn id(&self, network: &Network, segment: usize) -> FeatureId {
+        network.ways[network.edges[self.edges[segment] as usize].way as usize].id
+    }
+
+    /// Whether it is a deck.
+    pub fn is_deck(&self) -> bool {
+        matches!(self.traits.storey, Storey::Deck(_))
+    }
+}
+
+/// Where a way has its left and right edge at each node, half its width aside: what `profile` asks the DEM for beside
+/// the node itself. Nodes at which no way is wide have their own place twice.
+pub fn sides(network: &Network) -> Vec<[Place; 2]> {
+    let mut sides: Vec<[Place; 2]> = network.nodes.iter().map(|node| [node.place; 2]).collect();
+    for chain in network.chains() {
+        let half = f64::from(chain.traits.width) / (2.0 * f64::from(network.lattice.quanta_per_step()));
+        let place = |at: usize| network.nodes[chain.nodes[at] as usize].place;
+        for (at, &node) in chain.nodes.iter().enumerate() {
+            let [east, north] = place(at.saturating_sub(1)).to(place((at + 1).min(chain.nodes.len() - 1)));
+            let [east, north] = [east as f64, north as f64];
+            let length = (east * east + north * north).sqrt().max(1.0);
+            let aside = |sign: f64| moved(place(at), -sign * half * north / length, sign * half * east / length);
+            // Where ways meet, the widest one says how wide.
+            let here = [aside(1.0), aside(-1.0)];
+            let wider = sides[node as usize][0].squared_to(sides[node as usize][1]) < here[0].squared_to(here[1]);
+            if wider {
+                sides[node as usize] = here;
+            }
+        }
+    }
+    sides
+}
+
+/// A place moved by steps east and north, rounded half up.
+pub(crate) fn moved(place: Place, east: f64, north: f64) -> Place {
+    let rounded = |start: i32, by: f64| start + (by + 0.5).floor() as i32;
+    Place::new(rounded(place.row, north), rounded(place.col, east))
+}
+
+/// Cuts a network into pieces. `beside` is the ground at both sides of each node, in quanta; `shared` says
+/// which places others use, so that they stay; `grants` says what their cost leaves to them.
+pub fn pieces(
+    network: &Network,
+    heights: &[i32],
+    beside: &[[i32; 2]],
+    site: &Site,
+    shared: &dyn Fn(Place) -> bool,
+    grants: &Grants,
+) -> Vec<Piece> {
+    let grant = |edge: u32| grants.of(network.ways[network.edges[edge as usize].way as usize].id);
+    let picked = |edge: u32| !grant(edge).out && !matches!(network.traits(edge).storey, Storey::Tunnel(_));
+    let follows = |node: u32| match network.beside(node) {
+        [(_, one), (_, other)] => {
+            network.traits(*one) == network.traits(*other) && grant(*one) == grant(*other) && picked(*one)
+        }
+        _ => false,
+    };
+    let fall = |node: u32| (beside[node as usize][0] - beside[node as usize][1]).abs();
+    let runs = network.runs(&picked, &follows).into_iter();
+    runs.map(|(nodes, edges)| {
+        let traits = *network.traits(edges[0]);
+        let grant = grant(edges[0]);
+        let station = |node: &u32| {
+            let place = network.nodes[*node as usize].place;
+            Station { place, height: heights[*node as usize], stays: site.on_line(place) || shared(place) }
+        };
+        let stations: Vec<Station> = nodes.iter().map(station).collect();
+        let kept = thin(&stations, Tolerance::USUAL.times(grant.tolerance), traits.grade_ppm, network.lattice);
+        let form = form_of(&traits, grant, network);
+        let strip = |pair: &[u32]| match form {
+            Form::Strip => (pair[0]..=pair[1]).any(|at| FALL_MIN < fall(nodes[at as usize])),
+            form => matches!(form, Form::StripAlways | Form::Bench),
+        };
+        let mut strips: Vec<bool> = kept.windows(2).map(strip).collect();
+        fill_short_gaps(&mut strips);
+        Piece {
+            traits,
+            strips,
+            nodes: kept.iter().map(|at| nodes[*at as usize]).collect(),
+            edges: kept[..kept.len() - 1].iter().map(|at| edges[*at as usize]).collect(),
+            bench: form == Form::Bench,
+        }
+    })
+    .collect()
+}
+
+/// The form a way may have: the lesser of what it asks for and what it is granted; decks are always wide.
+fn form_of(traits: &Traits, grant: Grant, network: &Network) -> Form {
+    if traits.width < STRIP_STEPS_MIN * network.lattice.quanta_per_step() {
+        return Form::Line;
+    }
+    if matches!(traits.storey, Storey::Deck(_)) {
+        return Form::StripAlways;
+    }
+    match (traits.form, grant.most) {
+        (Form::Polygon, _) | (_, Form::Line) | (Form::Line, _) => Form::Line,
+        (Form::Bench, Form::Bench) => Form::Bench,
+        (Form::Strip, _) => Form::Strip,
+        (Form::Bench | Form::StripAlways, _) => Form::StripAlways,
+    }
+}
+
+/// A single segment of line between two of strip is a strip too.
+fn fill_short_gaps(strips: &mut [bool]) {
+    for at in 1..strips.len().saturating_sub(1) {
+        strips[at] |= strips[at - 1] && strips[at + 1];
+    }
+}

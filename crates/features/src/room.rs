@@ -1,0 +1,105 @@
+//! Who gets the room where strips overlap: the higher class; the other becomes narrower, then a line.
+
+use std::collections::BTreeSet;
+
+use crate::clean::Notes;
+use crate::exact::Segment;
+use crate::pieces::Piece;
+use crate::quarters::segment_pairs;
+use crate::strips::{Face, Room, Wide, faces};
+use crate::{Flaw, Network, Place, Remark, Remedy};
+
+/// Rounds of narrowing: each takes a strip that overlaps from whole to half or from half to none.
+const ROUNDS: usize = 4;
+
+/// The faces of all strips after overlaps are resolved, and what is left of each strip.
+pub(crate) fn share_out(
+    network: &Network,
+    pieces: &[Piece],
+    wide: &mut [Wide],
+    heights: &[i32],
+    remarks: &mut Vec<Remark>,
+) -> Vec<Face> {
+    let mut found = faces(network, pieces, wide, heights);
+    for _ in 0..ROUNDS {
+        let losers = losers(network, pieces, wide, &found);
+        if losers.is_empty() {
+            break;
+        }
+        for &loser in &losers {
+            let of = &mut wide[loser as usize];
+            of.room = if of.room == Room::Whole { Room::Half } else { Room::None };
+        }
+        found = faces(network, pieces, wide, heights);
+    }
+    let mut told = BTreeSet::new();
+    for of in wide.iter().filter(|of| of.room != Room::Whole) {
+        let id = pieces[of.piece as usize].id(network, of.segment as usize);
+        let remedy = if of.room == Room::Half { Remedy::Narrowed } else { Remedy::BecameLine };
+        if told.insert((id, remedy)) {
+            let place = network.nodes[of.a as usize].place;
+            Notes { id, lattice: network.lattice, remarks }.write_at(place, Flaw::Overlap, remedy);
+        }
+    }
+    found
+}
+
+/// The part a segment of an outline or of a line belongs to.
+struct Part<'a> {
+    /// What decides between two: the class, then what lies farther south-west.
+    rank: (u16, Place),
+    nodes: &'a [u32],
+    /// The face; none for the centreline of a line, which nothing makes narrower.
+    face: Option<u32>,
+}
+
+fn losers(network: &Network, pieces: &[Piece], wide: &[Wide], found: &[Face]) -> BTreeSet<u32> {
+    let (mut segments, mut owners, mut parts): (Vec<Segment>, Vec<u32>, Vec<Part>) = Default::default();
+    for (number, face) in found.iter().enumerate().filter(|(_, face)| !face.is_deck) {
+        let places = face.places();
+        let least = places.iter().min().copied().unwrap_or(Place::new(0, 0));
+        for at in 0..places.len() {
+            segments.push(Segment { a: places[at], b: places[(at + 1) % places.len()] });
+            owners.push(parts.len() as u32);
+        }
+        parts.push(Part { rank: (face.class, least), nodes: &face.nodes, face: Some(number as u32) });
+    }
+    let is_wide: BTreeSet<(u32, u32)> =
+        wide.iter().filter(|of| of.room != Room::None).map(|of| (of.piece, of.segment)).collect();
+    for (number, piece) in pieces.iter().enumerate().filter(|(_, piece)| !piece.is_deck()) {
+        for (segment, nodes) in piece.nodes.windows(2).enumerate() {
+            if !is_wide.contains(&(number as u32, segment as u32)) {
+                let [a, b] = [nodes[0], nodes[1]].map(|node| network.nodes[node as usize].place);
+                segments.push(Segment { a, b });
+                owners.push(parts.len() as u32);
+                parts.push(Part { rank: (piece.traits.class, a.min(b)), nodes, face: None });
+            }
+        }
+    }
+    let mut losers = BTreeSet::new();
+    segment_pairs(&segments, &mut |one, other| {
+        let (s, t) = (&segments[one as usize], &segments[other as usize]);
+        let (p, q) = (&parts[owners[one as usize] as usize], &parts[owners[other as usize] as usize]);
+        if p.nodes.iter().any(|node| q.nodes.contains(node)) || s.crossing(t).is_none() {
+            return;
+        }
+        let (winner, loser) = if p.rank < q.rank { (p, q) } else { (q, p) };
+        // A line of lower class is cut where it lies in a strip; that costs nobody room.
+        if let (Some(face), true) = (loser.face, winner.face.is_some() || winner.rank.0 < loser.rank.0) {
+            losers.extend(wide_of(&found[face as usize], wide));
+        }
+    });
+    losers
+}
+
+/// The strip segments that make a face: its own, or those that meet in a junction.
+fn wide_of(face: &Face, wide: &[Wide]) -> Vec<u32> {
+    match face.wide {
+        Some(own) => vec![own],
+        None => {
+            let meets =
+                |of: &Wide| of.room != Room::None && face.nodes.iter().any(|node| of.a == *node || of.b == *node);
+            (0..wide.len() as u32).filter(|number| meets(&wide[*number as usize])).collect()
+        }
+    }
+}

@@ -1,0 +1,74 @@
+//! Where features are worked on: the lattice, the border at which they are cut, and the lines that cut the ground.
+
+use terrain::{PostRect, Spacing};
+
+use crate::clip::Extent;
+use crate::exact::Segment;
+use crate::{FeatureLattice, Place};
+
+/// The area as features see it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Site {
+    /// The lattice of every place.
+    pub lattice: FeatureLattice,
+    /// The area's border plus one load module: features are cut here.
+    pub extent: Extent,
+    /// Posts from one load-module line to the next; line 0 is the area's southern and western border.
+    pub module_posts: i32,
+    /// Posts from one tile line to the next.
+    pub tile_posts: i32,
+}
+
+impl Site {
+    /// The site of an area of posts.
+    pub fn new(spacing: Spacing, area: PostRect, module_posts: i32, tile_posts: i32) -> Self {
+        let lattice = FeatureLattice::of(spacing);
+        let area = area.grown(module_posts);
+        let [south, west, north, east] =
+            [area.south, area.west, area.north, area.east].map(|posts| posts * lattice.steps_per_post());
+        let extent = Extent { south_west: Place::new(south, west), north_east: Place::new(north, east) };
+        Self { lattice, extent, module_posts, tile_posts }
+    }
+
+    /// Steps between load-module lines and between tile lines.
+    fn line_steps(&self) -> [i32; 2] {
+        [self.module_posts, self.tile_posts].map(|posts| posts * self.lattice.steps_per_post())
+    }
+
+    /// Whether a place lies on a tile line or a load-module line.
+    pub fn on_line(&self, place: Place) -> bool {
+        self.line_steps().iter().any(|steps| place.row % steps == 0 || place.col % steps == 0)
+    }
+
+    /// The load module (row, column) that holds a place; those west and south of the area are negative.
+    pub fn module_of(&self, place: Place) -> (i32, i32) {
+        let steps = self.line_steps()[0];
+        (place.row.div_euclid(steps), place.col.div_euclid(steps))
+    }
+
+    /// Calls `found` with the place of each tile and load-module line that a segment crosses between its ends.
+    pub fn crossings(&self, segment: Segment, found: &mut impl FnMut(Place)) {
+        let [east, north] = segment.a.to(segment.b);
+        for steps in self.line_steps() {
+            for (start, end, length, rows) in
+                [(segment.a.col, segment.b.col, east, false), (segment.a.row, segment.b.row, north, true)]
+            {
+                let first = start.min(end).div_euclid(steps) + 1;
+                for line in (first..).map(|number| i64::from(number) * i64::from(steps)) {
+                    if i64::from(start.max(end)) <= line {
+                        break;
+                    }
+                    let numerator = i128::from((line - i64::from(start)) * length.signum());
+                    let mut place = segment.at(numerator, i128::from(length.abs()));
+                    // Exact on the line; only the other axis is rounded.
+                    if rows {
+                        place.row = line as i32
+                    } else {
+                        place.col = line as i32
+                    }
+                    found(place);
+                }
+            }
+        }
+    }
+}
