@@ -4,8 +4,8 @@ use database::{FileStamp, Measured, TileModules};
 use engine::{Artifact, Fingerprint, Key, Outcome, Stamp, keep_or_make};
 use fidelity::{Residuals, Tally};
 use job::{Borders, ClipHeights as JobClipHeights, Edges, Job, OuterBorder};
-use load_modules::{ClipHeights, Layout, clip, concatenate};
-use terrain::{HOLE_CLASS, LatticePoint, LoadModule, Post, PostRect, TileId, Tin, Vertex};
+use load_modules::{ClipHeights, Layout, clip, concatenate, cut_decks};
+use terrain::{HOLE_CLASS, LatticePoint, LoadModule, ModuleCounts, Post, PostRect, TileId, Tin, Vertex};
 
 use crate::assembled::{Assembled, ModuleNumbers};
 use crate::keys::{self, StampOf};
@@ -98,6 +98,9 @@ fn make(assembling: &Assembling, stamp: &Stamp) -> Result<(Assembled, Sums), Com
             clip(&points, &layout, heights, &window.importance)
         }
     };
+    let features = run.tile_features(tile)?;
+    let decks = cut_decks(&features.decks, features.kept.steps_per_post, &layout);
+    modules.iter_mut().zip(decks).for_each(|(module, decks)| module.decks = decks);
     let residuals = fidelity::measure(&mut modules, &window.measured(area));
     let at_source = run.ground.relief.residuals_at_source(&modules, area, area.tiling.rect(tile))?;
     let mut levels = all_levels(run, modules, &layout, &window);
@@ -150,11 +153,8 @@ fn numbers_of(levels: &[Vec<LoadModule>]) -> (Vec<ModuleNumbers>, Vec<Vec<Module
 }
 
 fn numbers(module: &LoadModule) -> ModuleNumbers {
-    ModuleNumbers {
-        triangles: module.triangles.len() as u32,
-        polygons: module.polygon_count,
-        residual: module.residual,
-    }
+    let ModuleCounts { triangles, polygons } = module.counts();
+    ModuleNumbers { triangles, polygons, residual: module.residual }
 }
 
 /// The points in and around a tile that clipping needs.

@@ -9,7 +9,7 @@ use limits::start_triangles;
 use terrain::{ModuleId, TileId};
 
 use crate::keys;
-use crate::pieces::{area_level, pieces};
+use crate::pieces::{area_level, pieces, reserved};
 use crate::profile::{ReadFeatures, profile_tile};
 use crate::run::{ALGORITHM_REVISION, Run};
 use crate::{CompileError, Event, Progress, Stage};
@@ -66,11 +66,12 @@ impl Artifact for Levelling<'_> {
     fn make(&self, _key: &Key, stamp: &Stamp) -> Result<(FileStamp, AreaLevel), CompileError> {
         let Self { run, read, spec, ground } = *self;
         let levelled = read.features.level(ground, spec.options, &mut Shares::new(run, spec));
-        let tiles = pieces(run, &read.features, &levelled.reserved.formed)
-            .iter()
-            .map(|piece| Ok(run.database.write_lines(stamp, piece)?))
-            .collect::<Result<Vec<FileStamp>, CompileError>>()?;
-        let level = area_level(run, read, &levelled, tiles);
+        let pieces = pieces(run, &read.features, &levelled.reserved.formed);
+        let mut level = area_level(run, read, &levelled);
+        level.reserved = reserved(run, &levelled.reserved.formed, &pieces);
+        for piece in &pieces {
+            level.tiles.push(run.database.write_lines(stamp, piece)?);
+        }
         Ok((run.database.write_level(stamp, &level)?, level))
     }
 }

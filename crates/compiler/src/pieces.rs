@@ -2,11 +2,12 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
-use database::{AreaLevel, FeatureLine, FeatureRemark, FileStamp, LineRole};
+use database::{AreaLevel, FeatureLine, FeatureRemark, LineRole};
 use features::{Face, FeatureId, Formed, FormedEdge, Levelled, Place, Remark, Role, Surface};
 use ground::{GamingArea, slope_reach};
+use load_modules::{Layout, cut_decks};
 use terrain::{
-    FeatureSurface, Features, LatticePoint, ModuleId, PostRect, Side, SideSpan, SurfaceGround, TileFeatures, TileId,
+    FeatureSurface, Features, LATTICE_PER_POST, LatticePoint, ModuleId, PostRect, Side, SideSpan, SurfaceGround, TileFeatures, TileId,
     Vertex,
 };
 use tiling::{outer_border_posts, outer_sides};
@@ -224,7 +225,7 @@ fn spans(surfaces: &[FeatureSurface], rect: PostRect, steps: i32) -> Vec<SideSpa
 }
 
 /// What is told of the whole area.
-pub(crate) fn area_level(run: &Run, read: &ReadFeatures, levelled: &Levelled, tiles: Vec<FileStamp>) -> AreaLevel {
+pub(crate) fn area_level(run: &Run, read: &ReadFeatures, levelled: &Levelled) -> AreaLevel {
     let (grid, classes) = (run.area.grid, classes_of(run));
     let mut cost: Vec<(u32, u8, u32)> = Vec::new();
     for (&(row, col), of) in &levelled.reserved.cost {
@@ -250,19 +251,27 @@ pub(crate) fn area_level(run: &Run, read: &ReadFeatures, levelled: &Levelled, ti
         }
     };
     let remarks = read.vectors.remarks.iter().cloned().chain(levelled.remarks.iter().map(told)).collect();
-    let reserved = reserved(run, levelled, read.features.site.lattice.steps_per_post());
-    AreaLevel { tiles, cost, reserved, lines: lines(run, read, &levelled.reserved.formed, &classes), remarks }
+    let lines = lines(run, read, &levelled.reserved.formed, &classes);
+    AreaLevel { tiles: Vec::new(), cost, reserved: Vec::new(), lines, remarks }
 }
 
-/// Triangles that features add to each load module, whatever else it holds.
-fn reserved(run: &Run, levelled: &Levelled, steps: i32) -> Vec<(u32, u32)> {
+/// Triangles that features add to each load module, whatever else it holds, by its place: of the ground, and decks.
+pub(crate) fn reserved(run: &Run, formed: &Formed, pieces: &[TileFeatures]) -> Vec<(u32, u32)> {
     let (area, job) = (&run.area, run.job);
-    let points = levelled.reserved.formed.points.iter();
-    let kept =
-        Features { steps_per_post: steps, vertices: points.copied().map(vertex).collect(), ..Features::default() };
+    let steps_per_post = pieces.first().map_or(LATTICE_PER_POST, |piece| piece.kept.steps_per_post);
+    let vertices = formed.points.iter().copied().map(vertex).collect();
+    let kept = Features { steps_per_post, vertices, ..Features::default() };
     let mut border = outer_border_posts(area.rect, outer_sides(area.rect, area.rect), job.outer_step_cells());
     border.sort_unstable();
-    let cost = limits::feature_cost(&kept, area.grid, &border);
+    let mut cost = limits::feature_cost(&kept, area.grid, &border);
+    for piece in pieces.iter().filter(|piece| !piece.decks.is_empty()) {
+        let modules = area.tiling.modules(piece.tile, area.grid);
+        let layout = Layout { grid: area.grid, modules, spacing: area.frame.spacing };
+        let decks = cut_decks(&piece.decks, piece.kept.steps_per_post, &layout);
+        for (module, decks) in modules.iter().zip(decks).filter(|(_, decks)| !decks.is_empty()) {
+            *cost.entry(module).or_insert(0) += decks.triangles.len() as u32;
+        }
+    }
     cost.into_iter().map(|(module, triangles)| (area.grid.index(module) as u32, triangles)).collect()
 }
 

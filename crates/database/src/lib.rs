@@ -40,7 +40,9 @@ mod measured_file;
 pub use measured_file::{Measured, MeasuredModule, MeasuredTally, decode_measured, encode_measured};
 mod slm;
 /// Version of the load-module files.
-pub use load_module_reader::VERSION as MODULES_FORMAT_VERSION;
+pub use load_module_reader::{
+    VERSION as MODULES_FORMAT_VERSION, VERSION_WITHOUT_DECKS as MODULES_FORMAT_VERSION_WITHOUT_DECKS,
+};
 pub use slm::{TileModules, decode_levels, decode_modules, encode_levels, encode_modules, load_module};
 mod json;
 mod page;

@@ -46,7 +46,8 @@ pub(crate) struct Part {
 const EXACT_QUANTA_MAX: i32 = 1 << 24;
 
 impl Mesh {
-    /// The ground of a product: triangles over holes, where no source has a height, are left out.
+    /// The ground of a product: triangles over holes, where no source has a height, are left out. Decks are no part of
+    /// the ground and in no export yet but that of single load modules.
     pub fn of(product: &Product) -> Self {
         Self::whole(product).without_holes()
     }

@@ -7,7 +7,8 @@ use database::{
     ReportPool, ReportRefusals, ReportResidual, ReportStops, ReportVoids, TileModules, TileRecord,
 };
 use terrain::{
-    GridFrame, HOLE_CLASS, LoadModule, ModuleGrid, ModuleId, ModuleRect, ModuleResidual, ModuleVertex, Spacing, TileId,
+    Decks, GridFrame, HOLE_CLASS, LoadModule, ModuleGrid, ModuleId, ModuleRect, ModuleResidual, ModuleVertex, Spacing,
+    TileId,
 };
 
 use crate::Product;
@@ -102,6 +103,7 @@ fn modules() -> Vec<LoadModule> {
         classes: vec![0, 1],
         polygon_count: 2,
         residual: ModuleResidual { posts: 400, largest: 300, sum_abs: 25_600, sum_squared: 3_276_800 },
+        decks: Decks::default(),
     };
     let east = LoadModule {
         id: ModuleId { row: 0, col: 1 },
@@ -117,6 +119,7 @@ fn modules() -> Vec<LoadModule> {
         classes: vec![1, 0, 0, 1],
         polygon_count: 4,
         residual: ModuleResidual { posts: 441, largest: 128, sum_abs: 12_800, sum_squared: 1_638_400 },
+        decks: Decks::default(),
     };
     [&west, &east].iter().for_each(|module| assert_eq!(module.check(), Ok(())));
     vec![west, east]

@@ -1,6 +1,8 @@
 //! Ground for tests: random TINs, load modules cut from them, and slow, obvious answers.
 
-use terrain::{Dem, LatticePoint, LoadModule, ModuleGrid, ModuleId, ModuleResidual, ModuleVertex, Post, PostRect};
+use terrain::{
+    Decks, Dem, LatticePoint, LoadModule, ModuleGrid, ModuleId, ModuleResidual, ModuleVertex, Post, PostRect,
+};
 use terrain::{Spacing, Tin, Vertex};
 
 use crate::draw::Draw;
@@ -89,6 +91,7 @@ pub fn module_of(tin: &Tin, id: ModuleId, spacing: Spacing) -> LoadModule {
         polygon_count: triangles.len() as u32,
         triangles,
         residual: ModuleResidual::default(),
+        decks: Decks::default(),
     }
 }
 

@@ -186,8 +186,8 @@ fn explained(
         tile: (tin.tile, state, tin.stop),
         tile_triangles: (tin.triangles_charged, allowed(allocation, tin.tile)),
         count_of: limits.count.name().into(),
-        triangles: module.triangles.len() as u32,
-        polygons: module.polygon_count,
+        triangles: module.counts().triangles,
+        polygons: module.counts().polygons,
         vertices_inside: (module.vertices.len() - module.border_vertex_count()) as u32,
         vertices_on_sides: on_sides,
         count: (limit_use.modules[product.grid.index(id)], limits.per_load_module),
@@ -217,7 +217,7 @@ fn levels(folder: &Folder, tile: TileId, id: ModuleId) -> Result<Vec<(u32, f64, 
     let metre = f64::from(QUANTA_PER_METRE);
     let figures = |module: &LoadModule| {
         let rms = mean_squares(module.residual.sum_squared as f64, module).sqrt();
-        (module.triangles.len() as u32, rms / metre, f64::from(module.residual.largest) / metre)
+        (module.counts().triangles, rms / metre, f64::from(module.residual.largest) / metre)
     };
     Ok(levels.iter().flatten().filter(|module| module.id == id).map(figures).collect())
 }

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use terrain::{Effort, HeightFit, LastBatch, Lattice, ModuleGrid, Resampling, Spacing, TileOrder};
+use terrain::{Effort, HeightFit, LastBatch, Lattice, LoadModule, ModuleGrid, Resampling, Spacing, TileOrder};
 
 use crate::{FeaturesSpec, GeoidSpec, ImportanceSpec, LodSpec, NamedFile, Start, WaterSpec};
 
@@ -247,6 +247,17 @@ pub enum Count {
     Triangles,
     /// Convex polygons, as clipping leaves them.
     Polygons,
+}
+
+impl Count {
+    /// What a load module has of that: all that is compared with a limit is counted here, decks too.
+    pub fn of(self, module: &LoadModule) -> u32 {
+        let counts = module.counts();
+        match self {
+            Self::Triangles => counts.triangles,
+            Self::Polygons => counts.polygons,
+        }
+    }
 }
 
 /// How posts are chosen.

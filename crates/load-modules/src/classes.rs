@@ -45,7 +45,7 @@ fn most_common(facet: &Facet, posts: &PostGrid, mask: &Importance, offset: usize
 
 #[cfg(test)]
 mod tests {
-    use terrain::{ModuleGrid, ModuleId, ModuleResidual, ModuleVertex, PostRect, Spacing};
+    use terrain::{Decks, ModuleGrid, ModuleId, ModuleResidual, ModuleVertex, PostRect, Spacing};
 
     use super::*;
 
@@ -64,6 +64,7 @@ mod tests {
             classes: vec![0, 0],
             polygon_count: 2,
             residual: ModuleResidual::default(),
+            decks: Decks::default(),
         };
         let mask = Importance::new(PostRect::of_size(5, 5), vec![1000; 25], classes.concat());
         assert_eq!(of_triangles(&module, &layout, &mask), expected);

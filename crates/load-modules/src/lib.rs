@@ -12,6 +12,8 @@ mod layout;
 pub use layout::Layout;
 mod classes;
 mod concatenate;
+mod decks;
+pub use decks::cut_decks;
 mod pieces;
 pub use concatenate::concatenate;
 mod clip;

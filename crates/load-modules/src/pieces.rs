@@ -9,7 +9,7 @@
 //! the square stays covered once, and only the coplanarity of that load module's pieces is given up.
 
 use limits::{polygons_of, triangles_of};
-use terrain::{Importance, LoadModule, ModuleId, ModuleResidual, ModuleVertex, Post};
+use terrain::{Decks, Importance, LoadModule, ModuleId, ModuleResidual, ModuleVertex, Post};
 
 use crate::{Layout, classes};
 
@@ -81,6 +81,7 @@ impl Pieces {
             classes: Vec::new(),
             polygon_count: 0,
             residual: ModuleResidual::default(),
+            decks: Decks::default(),
         };
         let sides = self.fan(&corners, &mut module).unwrap_or_else(|| triangulate_afresh(&mut module));
         module.triangles.sort_unstable();

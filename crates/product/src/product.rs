@@ -7,7 +7,7 @@ use std::sync::atomic::AtomicBool;
 use database::{Folder, Manifest};
 use fidelity::each_residual;
 use ground::{GamingArea, Ground, GroundError, PlannedTile, Window, planned_tiles};
-use job::{Count, Job};
+use job::Job;
 use schedule::Workers;
 use terrain::{Dem, GridFrame, LoadModule, ModuleGrid, ModuleRect, Post, PostRect, TileId};
 use views::NO_RESIDUAL;
@@ -129,11 +129,7 @@ impl Product {
     /// When only a part was read.
     pub fn limit_use(&self) -> LimitUse {
         assert_eq!(self.part, self.grid.all(), "windows are counted over the whole area");
-        let count = |module: &LoadModule| match self.job.limits.count {
-            Count::Triangles => module.triangles.len() as u32,
-            Count::Polygons => module.polygon_count,
-        };
-        let modules: Vec<u32> = self.modules.iter().map(count).collect();
+        let modules: Vec<u32> = self.modules.iter().map(|module| self.job.limits.count.of(module)).collect();
         let window = self.job.limits.window;
         let windows = limits::Windows::of_size(self.grid, window.rows, window.cols);
         LimitUse { windows: windows.sums(self.grid, &modules), modules, window: [windows.rows, windows.cols] }

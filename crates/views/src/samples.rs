@@ -1,6 +1,6 @@
 //! A report with something in every part and a small piece of terrain, for the tests of this crate.
 
-use terrain::{GridFrame, LoadModule, ModuleGrid, ModuleId, ModuleResidual, ModuleVertex, Spacing};
+use terrain::{Decks, GridFrame, LoadModule, ModuleGrid, ModuleId, ModuleResidual, ModuleVertex, Spacing};
 
 use crate::picture::{Scene, SceneLimits};
 use database::{
@@ -32,6 +32,7 @@ pub(crate) fn modules() -> Vec<LoadModule> {
             classes: vec![0; 4],
             polygon_count: 4,
             residual: ModuleResidual::default(),
+            decks: Decks::default(),
         }
     };
     GRID.all().iter().map(module).collect()

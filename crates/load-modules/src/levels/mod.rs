@@ -118,6 +118,7 @@ fn load_module(finest: &LoadModule, sheet: LevelMesh, layout: &Layout, mask: &Im
         vertices,
         classes: Vec::new(),
         residual: ModuleResidual::default(),
+        decks: finest.decks.clone(),
     };
     module.classes = classes::of_triangles(&module, layout, mask);
     let sides = 3 * module.triangles.len();

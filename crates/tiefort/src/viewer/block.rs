@@ -23,6 +23,7 @@ pub fn bytes(viewed: &Viewed, block: Block, level: u16) -> Result<Vec<u8>, Strin
     Ok(out)
 }
 
+/// The ground alone: decks are not drawn yet.
 fn write(module: &Module, out: &mut Vec<u8>) {
     let sides = [0, 1, 2, 3].map(|side: usize| module.sides[side].len() as u32);
     let (vertices, triangles) = (module.vertices.len() as u32, module.triangles.len() as u32);
@@ -47,7 +48,7 @@ fn write(module: &Module, out: &mut Vec<u8>) {
 
 #[cfg(test)]
 mod tests {
-    use load_module_reader::{Residual, Vertex};
+    use load_module_reader::{Decks, Residual, Vertex};
 
     use super::*;
 
@@ -64,6 +65,7 @@ mod tests {
             sides: [vec![0, 1], vec![1, 3], vec![2, 3], vec![0, 2]],
             polygon_count: 1,
             residual: Residual { posts: 4, largest: 256, sum_abs: 256, sum_squared: 65536 },
+            decks: Decks::default(),
         };
         let mut out = Vec::new();
         write(&module, &mut out);

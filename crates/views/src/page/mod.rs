@@ -190,7 +190,7 @@ fn most_seen(scene: &Scene) -> Option<(u64, ModuleId)> {
         .flat_map(|row| (-reach..=reach).map(move |col| (row, col)))
         .filter(|&(row, col)| gap(row) * gap(row) + gap(col) * gap(col) <= VISIBLE_M * VISIBLE_M)
         .collect();
-    let counts: Vec<u64> = scene.modules.iter().map(|module| module.triangles.len() as u64).collect();
+    let counts: Vec<u64> = scene.modules.iter().map(|module| u64::from(module.counts().triangles)).collect();
     let (rows, cols) = (i64::from(scene.grid.rows), i64::from(scene.grid.cols));
     let seen = |module: ModuleId| -> u64 {
         let places = offsets.iter().map(|(row, col)| (i64::from(module.row) + row, i64::from(module.col) + col));
