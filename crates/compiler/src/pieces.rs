@@ -7,8 +7,8 @@ use features::{Face, FeatureId, Formed, FormedEdge, Levelled, Place, Remark, Rol
 use ground::{GamingArea, slope_reach};
 use load_modules::{Layout, cut_decks};
 use terrain::{
-    FeatureSurface, Features, LATTICE_PER_POST, LatticePoint, ModuleId, PostRect, Side, SideSpan, SurfaceGround, TileFeatures, TileId,
-    Vertex,
+    FeatureSurface, Features, LATTICE_PER_POST, LatticePoint, ModuleId, PostRect, Side, SideSpan, SurfaceGround,
+    TileFeatures, TileId, Vertex,
 };
 use tiling::{outer_border_posts, outer_sides};
 

@@ -181,10 +181,12 @@ mod tests {
         assert!(2 <= west.len() && west == east, "{west:?} {east:?}");
         let step = 25 * 128 / 64;
         let places: Vec<(i64, i64)> = ring.iter().map(|(row, col, _)| (i64::from(*row), i64::from(*col))).collect();
-        let doubled: i64 = (0..4).map(|at| {
-            let ((y0, x0), (y1, x1)) = (places[at], places[(at + 1) % 4]);
-            (x0 * y1 - x1 * y0) * step * step
-        }).sum();
+        let doubled: i64 = (0..4)
+            .map(|at| {
+                let ((y0, x0), (y1, x1)) = (places[at], places[(at + 1) % 4]);
+                (x0 * y1 - x1 * y0) * step * step
+            })
+            .sum();
         assert!((area(&cut) - doubled).abs() < doubled / 1000, "{} {doubled}", area(&cut));
     }
 
