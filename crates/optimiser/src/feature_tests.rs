@@ -12,10 +12,10 @@ use crate::feature_scene::{Draft, Draw, STEPS, crowded, missing, mixed};
 use crate::scene::{Caps, confined, even, free, grid, rough};
 use crate::{Budget, Optimised, Task, optimise};
 
-const RECT: PostRect = PostRect { south: 0, west: 0, north: 60, east: 80 };
-const SIDE: i32 = 20;
-const GRID: ModuleGrid = ModuleGrid { rows: 3, cols: 4, side_cells: SIDE };
-const EFFORTS: [Effort; 3] = [Effort::Fast, Effort::Normal, Effort::Best];
+pub(crate) const RECT: PostRect = PostRect { south: 0, west: 0, north: 60, east: 80 };
+pub(crate) const SIDE: i32 = 20;
+pub(crate) const GRID: ModuleGrid = ModuleGrid { rows: 3, cols: 4, side_cells: SIDE };
+pub(crate) const EFFORTS: [Effort; 3] = [Effort::Fast, Effort::Normal, Effort::Best];
 
 fn sloped(seed: u64) -> Dem {
     let noise = rough(RECT, seed);
@@ -23,7 +23,7 @@ fn sloped(seed: u64) -> Dem {
 }
 
 /// A task under limits that hold for features and all else together, and what features alone exceed.
-fn task_with(start: &Tin, features: Features, caps: Caps, effort: Effort) -> (Task, Vec<Shortfall>) {
+pub(crate) fn task_with(start: &Tin, features: Features, caps: Caps, effort: Effort) -> (Task, Vec<Shortfall>) {
     let mut task = confined(start, caps, effort);
     let border: Vec<Post> = task.held.iter().filter_map(|at| at.post()).collect();
     let cost = feature_cost(&features, GRID, &border);
@@ -35,7 +35,7 @@ fn task_with(start: &Tin, features: Features, caps: Caps, effort: Effort) -> (Ta
 }
 
 /// Triangles of each load module but the two of a bare square, and those of its held border: by their centres alone.
-fn counted(tin: &Tin, task: &Task) -> BTreeMap<ModuleId, u32> {
+pub(crate) fn counted(tin: &Tin, task: &Task) -> BTreeMap<ModuleId, u32> {
     let mut count: BTreeMap<ModuleId, i64> = GRID.all().iter().map(|module| (module, -2)).collect();
     let line = i64::from(SIDE * tin.steps_per_post);
     for triangle in &tin.triangles {
@@ -57,7 +57,7 @@ fn counted(tin: &Tin, task: &Task) -> BTreeMap<ModuleId, u32> {
 }
 
 #[track_caller]
-fn assert_kept(done: &Optimised, task: &Task) {
+pub(crate) fn assert_kept(done: &Optimised, task: &Task) {
     assert_eq!(done.tin.check(), Ok(()));
     assert!(done.left_out.is_empty(), "{:?}", done.left_out);
     assert_eq!(done.tin.steps_per_post, STEPS);

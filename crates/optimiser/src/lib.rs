@@ -34,6 +34,8 @@ mod weave;
 mod weighted_heights;
 
 #[cfg(test)]
+mod feature_cases;
+#[cfg(test)]
 mod feature_scene;
 #[cfg(test)]
 mod feature_tests;

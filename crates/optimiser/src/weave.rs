@@ -50,7 +50,7 @@ pub(crate) fn weave(
         (vertex.hold.is_fixed() || !goes) && places.binary_search(&vertex.at).is_err()
     };
     let mut vertices: Vec<Vertex> = grown.vertices.into_iter().filter(stays).collect();
-    let fixed: Vec<Place> = fixed_places(&vertices);
+    let fixed: Vec<Place> = fixed_places(&vertices, &places);
     vertices.extend(features.vertices.iter().zip(&places).map(|(vertex, &at)| Vertex {
         at,
         height: f64::from(vertex.height) - ground.level(),
@@ -80,10 +80,11 @@ pub(crate) fn weave(
     (Parts { vertices, triangles, kept }, left_out)
 }
 
-/// Places of vertices that stay where they are, in ascending order.
-fn fixed_places(vertices: &[Vertex]) -> Vec<Place> {
+/// Places of vertices that stay where they are, those of features among them, in ascending order.
+fn fixed_places(vertices: &[Vertex], places: &[Place]) -> Vec<Place> {
     let mut fixed: Vec<Place> =
         vertices.iter().filter(|vertex| vertex.hold.is_fixed()).map(|vertex| vertex.at).collect();
+    fixed.extend(places);
     fixed.sort_unstable();
     fixed
 }
