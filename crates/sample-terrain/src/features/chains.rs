@@ -1,0 +1,232 @@
+//! Where exactly a road runs: the cheapest path on nodes 100 m apart in a strip of ground along its chain, smoothed.
+//!
+//! Every coarse node belongs to the nearest road, so that no two roads look for their way on the same ground and none
+//! crosses another; around a junction the ground is shared out by direction.
+
+use std::collections::BTreeMap;
+
+use super::ground::{Ground, NODES, Node, SIDE, STEP_M, place};
+use super::line::{self, Place};
+use super::roads::{CELL, COARSE, Chain, Class, Roads, WIDE, node_of};
+use super::search::{Cost, least_cost_path, step_cost};
+
+/// Coarse nodes on either side of a road on which it may run.
+const STRIP: usize = 2;
+/// Metres from its coarse nodes to which a road may come.
+pub(super) const REACH_M: f64 = 1_500.0;
+/// No road.
+const NONE: u32 = u32::MAX;
+
+/// The moves from a node: eight to its neighbours, eight between these, as a knight in chess moves.
+const MOVES: [(i64, i64); 16] = [
+    (1, 0),
+    (2, 1),
+    (1, 1),
+    (1, 2),
+    (0, 1),
+    (-1, 2),
+    (-1, 1),
+    (-2, 1),
+    (-1, 0),
+    (-2, -1),
+    (-1, -1),
+    (-1, -2),
+    (0, -1),
+    (1, -2),
+    (1, -1),
+    (2, -1),
+];
+
+/// To which chain each coarse node of a cell belongs.
+pub(super) struct Strips {
+    cell: (i64, i64),
+    owner: Vec<u32>,
+    /// At the ends of chains: the chains and the nodes they go to first.
+    arms: BTreeMap<usize, Vec<(u32, usize)>>,
+}
+
+impl Strips {
+    pub(super) fn of(cell: (i64, i64), chains: &[Chain]) -> Self {
+        let mut owner = vec![NONE; WIDE * WIDE];
+        let mut arms: BTreeMap<usize, Vec<(u32, usize)>> = BTreeMap::new();
+        for (number, Chain { nodes, .. }) in chains.iter().enumerate() {
+            let last = nodes.len() - 1;
+            nodes[1..last].iter().for_each(|&at| owner[at] = number as u32);
+            arms.entry(nodes[0]).or_default().push((number as u32, nodes[1]));
+            arms.entry(nodes[last]).or_default().push((number as u32, nodes[last - 1]));
+        }
+        for _ in 0..STRIP {
+            let before = owner.clone();
+            for at in (0..WIDE * WIDE).filter(|at| before[*at] == NONE && !arms.contains_key(at)) {
+                let (col, row) = (at % WIDE, at / WIDE);
+                let rows = row.saturating_sub(1)..=(row + 1).min(WIDE - 1);
+                let near = rows.flat_map(|row| {
+                    (col.saturating_sub(1)..=(col + 1).min(WIDE - 1)).map(move |col| row * WIDE + col)
+                });
+                owner[at] = near.map(|near| before[near]).min().unwrap_or(NONE);
+            }
+        }
+        Self { cell, owner, arms }
+    }
+
+    /// Whether a chain may use a node of the ground.
+    fn may_use(&self, chain: u32, node: Node) -> bool {
+        let inside = (node.0 - self.cell.0 * CELL, node.1 - self.cell.1 * CELL);
+        if inside.0 <= 0 || inside.1 <= 0 || CELL <= inside.0 || CELL <= inside.1 {
+            return false;
+        }
+        let half = COARSE / 2;
+        let at = ((inside.1 + half) / COARSE) as usize * WIDE + ((inside.0 + half) / COARSE) as usize;
+        let Some(arms) = self.arms.get(&at) else { return self.owner[at] == chain };
+        // Around a junction: the arm that points most nearly to the node.
+        let middle = node_of(self.cell, at);
+        let (east, north) = (node.0 - middle.0, node.1 - middle.1);
+        let nearest = arms.iter().max_by_key(|(number, to)| {
+            let to = node_of(self.cell, *to);
+            let arm = (to.0 - middle.0, to.1 - middle.1);
+            let along = arm.0 * east + arm.1 * north;
+            // Diagonal arms are longer by the root of two.
+            let is_diagonal = arm.0 * arm.1 != 0;
+            (along * if is_diagonal { 707 } else { 1000 }, std::cmp::Reverse(*number))
+        });
+        (east, north) == (0, 0) || nearest.is_some_and(|(number, _)| *number == chain)
+    }
+}
+
+/// Ground that one chain may use, as a rectangle of nodes.
+struct Strip {
+    corner: Node,
+    wide: usize,
+    /// Metres; not a number where the chain may not go.
+    height_m: Vec<f32>,
+    is_wash: Vec<bool>,
+}
+
+impl Strip {
+    fn of(ground: &mut Ground, strips: &Strips, number: u32, chain: &Chain) -> Self {
+        let nodes: Vec<Node> = chain.nodes.iter().map(|&at| node_of(strips.cell, at)).collect();
+        let margin = COARSE * (STRIP as i64 + 1);
+        let span = |axis: fn(&Node) -> i64| {
+            let low = nodes.iter().map(axis).fold(i64::MAX, i64::min);
+            low - margin..=nodes.iter().map(axis).fold(i64::MIN, i64::max) + margin
+        };
+        let (easts, norths) = (span(|node| node.0), span(|node| node.1));
+        let wide = (easts.end() - easts.start() + 1) as usize;
+        let count = wide * (norths.end() - norths.start() + 1) as usize;
+        let (mut height_m, mut is_wash) = (vec![f32::NAN; count], vec![false; count]);
+        let mut squares = BTreeMap::new();
+        let all = norths.clone().flat_map(|north| easts.clone().map(move |east| (east, north)));
+        for (at, node) in all.enumerate().filter(|(_, node)| strips.may_use(number, *node)) {
+            let of = (node.0.div_euclid(SIDE), node.1.div_euclid(SIDE));
+            let (square, washes) = squares.entry(of).or_insert_with(|| (ground.square(of), ground.washes(of)));
+            let inside = node.1.rem_euclid(SIDE) as usize * NODES + node.0.rem_euclid(SIDE) as usize;
+            let is_end = nodes.first() == Some(&node) || nodes.last() == Some(&node);
+            if !square.is_playa(inside) || is_end {
+                (height_m[at], is_wash[at]) = (square.height_m[inside], washes.drawn[inside]);
+            }
+        }
+        Self { corner: (*easts.start(), *norths.start()), wide, height_m, is_wash }
+    }
+
+    fn at(&self, node: Node) -> usize {
+        (node.1 - self.corner.1) as usize * self.wide + (node.0 - self.corner.0) as usize
+    }
+
+    /// The cheapest way from one node to another.
+    fn path(&self, from: Node, to: Node, style: Style) -> Option<Vec<Node>> {
+        let goal = self.at(to);
+        let rows = self.height_m.len() / self.wide;
+        let path = least_cost_path(self.height_m.len(), self.at(from), |at| at == goal, |at, beside| {
+            let (col, row) = ((at % self.wide) as i64, (at / self.wide) as i64);
+            for (east, north) in MOVES {
+                let (col, row) = (col + east, row + north);
+                if col < 0 || row < 0 || self.wide as i64 <= col || rows as i64 <= row {
+                    continue;
+                }
+                let next = row as usize * self.wide + col as usize;
+                if let Some(cost) = self.cost(at, next, (east, north), style) {
+                    beside.push((next, cost));
+                }
+            }
+        })?;
+        let node = |at: usize| (self.corner.0 + (at % self.wide) as i64, self.corner.1 + (at / self.wide) as i64);
+        Some(path.into_iter().map(node).collect())
+    }
+
+    fn cost(&self, at: usize, next: usize, (east, north): (i64, i64), style: Style) -> Option<Cost> {
+        let (from_m, to_m) = (self.height_m[at], self.height_m[next]);
+        if to_m.is_nan() {
+            return None;
+        }
+        let length_m = STEP_M * ((east * east + north * north) as f64).sqrt();
+        let mut rises = vec![f64::from(to_m - from_m)];
+        if east.abs() + north.abs() == 3 {
+            // The middle of a knight's move lies between two nodes.
+            let by = |east: i64, north: i64| at.wrapping_add_signed((north * self.wide as i64 + east) as isize);
+            let (a, b) = if east.abs() == 2 { ((east / 2, 0), (east / 2, north)) } else { ((0, north / 2), (east, north / 2)) };
+            let middle_m = 0.5 * (self.height_m[by(a.0, a.1)] + self.height_m[by(b.0, b.1)]);
+            if middle_m.is_nan() {
+                return None;
+            }
+            rises = vec![f64::from(middle_m - from_m), f64::from(to_m - middle_m)];
+        }
+        let part_m = length_m / rises.len() as f64;
+        let mut cost = 0.0;
+        for rise_m in rises {
+            let over = (rise_m.abs() / part_m - style.grade_max).max(0.0);
+            cost += step_cost(part_m, rise_m, style.grade) * (1.0 + 40.0 * over / style.grade_max);
+        }
+        let times = if self.is_wash[next] { 2.5 } else { 1.0 };
+        Some((cost * times) as Cost)
+    }
+}
+
+/// How closely a road follows the ground.
+#[derive(Clone, Copy)]
+struct Style {
+    /// Grade that costs as much as the way itself.
+    grade: f64,
+    /// Grade above which every step is dear.
+    grade_max: f64,
+    /// Metres aside by which lattice lines are straightened.
+    aside_m: f64,
+    /// Metres that corners are cut.
+    cut_m: f64,
+    /// Metres between vertices.
+    apart_m: f64,
+}
+
+impl Style {
+    fn of(class: Class) -> Self {
+        match class {
+            Class::Primary | Class::Secondary => {
+                Self { grade: 0.03, grade_max: 0.06, aside_m: 70.0, cut_m: 350.0, apart_m: 40.0 }
+            }
+            Class::Minor => Self { grade: 0.05, grade_max: 0.10, aside_m: 45.0, cut_m: 150.0, apart_m: 30.0 },
+            Class::Track => Self { grade: 0.10, grade_max: 0.13, aside_m: 20.0, cut_m: 60.0, apart_m: 15.0 },
+        }
+    }
+}
+
+/// The line of a chain, the first and last places at its end nodes.
+pub(super) fn lay(ground: &mut Ground, strips: &Strips, number: usize, chain: &Chain) -> Vec<Place> {
+    let style = Style::of(chain.class);
+    let strip = Strip::of(ground, strips, number as u32, chain);
+    // Through a gate the way runs straight.
+    let mut inner = &chain.nodes[..];
+    if Roads::is_gate(inner[0]) && 3 < inner.len() {
+        inner = &inner[1..];
+    }
+    if Roads::is_gate(inner[inner.len() - 1]) && 3 < inner.len() {
+        inner = &inner[..inner.len() - 1];
+    }
+    let nodes: Vec<Node> = inner.iter().map(|&at| node_of(strips.cell, at)).collect();
+    let path = strip.path(nodes[0], nodes[nodes.len() - 1], style).unwrap_or(nodes);
+    let end = |at: usize| place(node_of(strips.cell, at));
+    let mut line = vec![end(chain.nodes[0])];
+    line.extend(path.into_iter().map(place));
+    line.push(end(chain.nodes[chain.nodes.len() - 1]));
+    line.dedup();
+    let line = line::round_corners(&line::thin(&line, style.aside_m), style.cut_m, 3);
+    line::without_loops(&line::space_out(&line, style.apart_m))
+}
