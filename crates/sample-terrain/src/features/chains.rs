@@ -5,6 +5,8 @@
 
 use std::collections::BTreeMap;
 
+use crate::noise::Stream;
+
 use super::ground::{Ground, NODES, Node, SIDE, STEP_M, place};
 use super::line::{self, Place};
 use super::roads::{CELL, COARSE, Chain, Class, Roads, WIDE, node_of};
@@ -14,6 +16,12 @@ use super::search::{Cost, least_cost_path, step_cost};
 const STRIP: usize = 2;
 /// Metres from its coarse nodes to which a road may come.
 pub(super) const REACH_M: f64 = 1_500.0;
+/// How uneven the cost of open ground is, so that roads wind on plains.
+const UNEVEN: f32 = 0.5;
+/// What it costs to go through a wash, in times of what it does beside it.
+const WASH: f32 = 2.5;
+/// Seed layer of what ground costs.
+const LAYER: u64 = 63;
 /// No road.
 const NONE: u32 = u32::MAX;
 
@@ -99,7 +107,8 @@ struct Strip {
     wide: usize,
     /// Metres; not a number where the chain may not go.
     height_m: Vec<f32>,
-    is_wash: Vec<bool>,
+    /// What it costs there, in times of what it does elsewhere.
+    times: Vec<f32>,
 }
 
 impl Strip {
@@ -113,7 +122,8 @@ impl Strip {
         let (easts, norths) = (span(|node| node.0), span(|node| node.1));
         let wide = (easts.end() - easts.start() + 1) as usize;
         let count = wide * (norths.end() - norths.start() + 1) as usize;
-        let (mut height_m, mut is_wash) = (vec![f32::NAN; count], vec![false; count]);
+        let (mut height_m, mut times) = (vec![f32::NAN; count], vec![1.0; count]);
+        let stream = Stream::new(ground.seed, LAYER);
         let mut squares = BTreeMap::new();
         let all = norths.clone().flat_map(|north| easts.clone().map(move |east| (east, north)));
         for (at, node) in all.enumerate().filter(|(_, node)| strips.may_use(number, *node)) {
@@ -122,10 +132,13 @@ impl Strip {
             let inside = node.1.rem_euclid(SIDE) as usize * NODES + node.0.rem_euclid(SIDE) as usize;
             let is_end = nodes.first() == Some(&node) || nodes.last() == Some(&node);
             if !square.is_playa(inside) || is_end {
-                (height_m[at], is_wash[at]) = (square.height_m[inside], washes.drawn[inside]);
+                height_m[at] = square.height_m[inside];
+                let [east_m, north_m] = place(node);
+                let chance = stream.noise(east_m / 1_100.0, north_m / 1_100.0) as f32;
+                times[at] = (1.0 + UNEVEN * chance).max(0.5) * if washes.drawn[inside] { WASH } else { 1.0 };
             }
         }
-        Self { corner: (*easts.start(), *norths.start()), wide, height_m, is_wash }
+        Self { corner: (*easts.start(), *norths.start()), wide, height_m, times }
     }
 
     fn at(&self, node: Node) -> usize {
@@ -159,7 +172,8 @@ impl Strip {
             return None;
         }
         let length_m = STEP_M * ((east * east + north * north) as f64).sqrt();
-        let mut rises = vec![f64::from(to_m - from_m)];
+        let mut rises = [f64::from(to_m - from_m), 0.0];
+        let mut parts = 1;
         if east.abs() + north.abs() == 3 {
             // The middle of a knight's move lies between two nodes.
             let by = |east: i64, north: i64| at.wrapping_add_signed((north * self.wide as i64 + east) as isize);
@@ -168,16 +182,16 @@ impl Strip {
             if middle_m.is_nan() {
                 return None;
             }
-            rises = vec![f64::from(middle_m - from_m), f64::from(to_m - middle_m)];
+            rises = [f64::from(middle_m - from_m), f64::from(to_m - middle_m)];
+            parts = 2;
         }
-        let part_m = length_m / rises.len() as f64;
+        let part_m = length_m / parts as f64;
         let mut cost = 0.0;
-        for rise_m in rises {
+        for &rise_m in &rises[..parts] {
             let over = (rise_m.abs() / part_m - style.grade_max).max(0.0);
             cost += step_cost(part_m, rise_m, style.grade) * (1.0 + 40.0 * over / style.grade_max);
         }
-        let times = if self.is_wash[next] { 2.5 } else { 1.0 };
-        Some((cost * times) as Cost)
+        Some((cost * f64::from(self.times[next])) as Cost)
     }
 }
 

@@ -98,7 +98,7 @@ impl Ground {
             return washes.clone();
         }
         let square = self.square(number);
-        let washes = Rc::new(Washes::of(&square, &self.region, number));
+        let washes = Rc::new(Washes::of(&square, &self.region, self.seed, number));
         self.washes.insert(number, washes.clone());
         washes
     }

@@ -23,7 +23,10 @@ pub(super) fn outline(ground: &mut Ground, playa: &Playa) -> Option<Vec<Place>> 
     open.extend(ring[1..].iter().chain(&[ring[0], start]));
     open.dedup();
     let mut smooth = line::space_out(&line::round_corners(&line::relax(&open, 2), 60.0, 1), 50.0);
+    // The closing leg would be taken for a loop.
+    smooth.pop();
     smooth = line::without_loops(&smooth);
+    smooth.push(smooth[0]);
     (4 <= smooth.len()).then_some(smooth)
 }
 

@@ -115,12 +115,14 @@ pub(super) fn without_loops(line: &[Place]) -> Vec<Place> {
     kept
 }
 
-/// The part of a line between two distances in metres from its first place.
+/// The part of a line between two distances in metres from its first place, its ends exactly there.
 pub(super) fn part(line: &[Place], from_m: f64, to_m: f64) -> Vec<Place> {
+    const SHORT_M: f64 = 10.0;
     let (mut gone_m, mut kept) = (0.0, vec![place_at(line, from_m)]);
     for leg in line.windows(2) {
         gone_m += distance(leg[0], leg[1]);
-        if from_m < gone_m && gone_m < to_m {
+        // No leg shorter than a few metres.
+        if from_m + SHORT_M < gone_m && gone_m < to_m - SHORT_M {
             kept.push(leg[1]);
         }
     }

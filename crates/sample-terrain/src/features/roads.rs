@@ -21,8 +21,10 @@ pub(super) const WIDE: usize = 161;
 
 /// Nodes between places that want a road.
 const WANT: usize = 20;
+/// Such places a side of a cell.
+const WANTS: usize = (WIDE - 1) / WANT;
 /// Nodes from a road within which no place wants another.
-const NEAR: usize = 4;
+const NEAR: usize = 5;
 /// Nodes that the two joints of a place's roads lie apart.
 const APART: usize = 9;
 /// Times the cost of the first way for the second one to be worth it.
@@ -80,11 +82,19 @@ impl Roads {
         let mut roads = Self::without(&ground.region, &playas, cell);
         roads.lay_highways(ground);
         let wants = Stream::new(ground.seed, LAYERS[1]);
-        for row in 0..(WIDE - 1) / WANT {
-            for col in 0..(WIDE - 1) / WANT {
-                let square = (cell.0 * 8 + col as i64, cell.1 * 8 + row as i64);
-                roads.lay_wanted(row * WANT, col * WANT, wants.pair(square.0, square.1));
+        let squares = || (0..WANTS).flat_map(|row| (0..WANTS).map(move |col| (row, col)));
+        for (row, col) in squares() {
+            if let Some(saddle) = roads.lowest_saddle(row * WANT, col * WANT) {
+                roads.lay_wanted(saddle, Class::Track, true);
             }
+        }
+        for (row, col) in squares() {
+            let (right, up) = wants.pair(cell.0 * WANTS as i64 + col as i64, cell.1 * WANTS as i64 + row as i64);
+            let drawn = |share: f64| ((0.5 + 0.35 * share) * WANT as f64) as usize;
+            let place = (row * WANT + drawn(up)) * WIDE + col * WANT + drawn(right);
+            let is_camp = roads.bedrock_m[place] < -20.0;
+            let class = if is_camp && 0.0 < right + up { Class::Minor } else { Class::Track };
+            roads.lay_wanted(place, class, is_camp);
         }
         roads
     }
@@ -132,32 +142,29 @@ impl Roads {
         }
     }
 
-    /// Roads to what a square of nodes wants most.
-    fn lay_wanted(&mut self, south: usize, west: usize, (right, up): (f64, f64)) {
-        let inside = (south + 2..south + WANT - 1).flat_map(|row| (west + 2..west + WANT - 1).map(move |col| (row, col)));
-        let open = inside.map(|(row, col)| row * WIDE + col).filter(|&at| !self.is_closed[at] && is_well_inside(at));
-        let saddles = open.clone().filter(|&at| 40.0 < self.bedrock_m[at] && self.is_saddle(at));
-        let lowest = saddles.reduce(|low, at| if self.height_m[at] < self.height_m[low] { at } else { low });
-        let drawn = |share: f64| ((0.5 + 0.35 * share) * WANT as f64) as usize;
-        let hashed = (south + drawn(up)) * WIDE + west + drawn(right);
-        let wanted = lowest.unwrap_or(hashed);
+    /// The lowest saddle of the mountains in a square of nodes.
+    fn lowest_saddle(&self, south: usize, west: usize) -> Option<usize> {
+        let span = |from: usize| from + 2..from + WANT - 1;
+        let inside = span(south).flat_map(|row| span(west).map(move |col| row * WIDE + col));
+        let saddles = inside.filter(|&at| is_well_inside(at) && 40.0 < self.bedrock_m[at] && self.is_saddle(at));
+        saddles.reduce(|low, at| if self.height_m[at] < self.height_m[low] { at } else { low })
+    }
+
+    /// A road from a place that wants one to the nearest, and another on if it is to lead through.
+    fn lay_wanted(&mut self, wanted: usize, class: Class, leads_through: bool) {
         if self.is_closed[wanted] || !is_well_inside(wanted) || self.is_road_near(wanted, NEAR) {
             return;
         }
-        let is_camp = self.bedrock_m[wanted] < -20.0;
-        let class = if is_camp && 0.0 < right + up { Class::Minor } else { Class::Track };
         let style = Style { class, grade: 0.06, reuse: 1.0 };
         let Some(first) = self.path(wanted, &|at| self.is_road(at), &|_| 1.0, style) else { return };
         let joint = first[first.len() - 1];
         self.link(&first, class);
-        if is_camp || lowest.is_some() {
-            let is_far = |at: usize| APART <= apart(at, joint);
+        if leads_through {
             let beside = |at: usize| {
                 let is_beside = first.iter().skip(1).any(|&other| apart(at, other) < 3);
                 if is_beside && 1 < apart(at, wanted) { 8.0 } else { 1.0 }
             };
-            let style = Style { class: Class::Track, ..style };
-            let goal = |at: usize| self.is_road(at) && is_far(at) && !first.contains(&at);
+            let goal = |at: usize| self.is_road(at) && APART <= apart(at, joint) && !first.contains(&at);
             let Some(second) = self.path(wanted, &goal, &beside, style) else { return };
             if second.len() as f64 <= DETOUR * first.len() as f64 + 25.0 {
                 self.link(&second, Class::Track);

@@ -6,6 +6,9 @@ use std::collections::BinaryHeap;
 /// Hundredths of a metre on level, open ground.
 pub(super) type Cost = u64;
 
+/// Bits for the number of a node: costs keep 40, which are ten million kilometres.
+const NODE_BITS: u32 = 24;
+
 /// The cheapest path from `start` to a node that is a goal, both included; of equal ones, that through lower numbers.
 ///
 /// `beside` pushes the neighbours of a node with what it costs to go there.
@@ -15,11 +18,15 @@ pub(super) fn least_cost_path(
     is_goal: impl Fn(usize) -> bool,
     beside: impl Fn(usize, &mut Vec<(usize, Cost)>),
 ) -> Option<Vec<usize>> {
+    assert!(count <= 1 << NODE_BITS, "{count} nodes have numbers of {NODE_BITS} bits");
     let (mut costs, mut from) = (vec![Cost::MAX; count], vec![usize::MAX; count]);
     let (mut heap, mut neighbours) = (BinaryHeap::new(), Vec::new());
+    // Cost and node in one number, which compares fast.
+    let entry = |cost: Cost, at: usize| Reverse(cost << NODE_BITS | at as u64);
     costs[start] = 0;
-    heap.push(Reverse((0, start)));
-    while let Some(Reverse((cost, at))) = heap.pop() {
+    heap.push(entry(0, start));
+    while let Some(Reverse(first)) = heap.pop() {
+        let (cost, at) = (first >> NODE_BITS, (first & ((1 << NODE_BITS) - 1)) as usize);
         if costs[at] < cost {
             continue;
         }
@@ -37,7 +44,7 @@ pub(super) fn least_cost_path(
             let next_cost = cost + step;
             if next_cost < costs[next] {
                 (costs[next], from[next]) = (next_cost, at);
-                heap.push(Reverse((next_cost, next)));
+                heap.push(entry(next_cost, next));
             }
         }
     }

@@ -7,23 +7,35 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
+use crate::noise::Stream;
 use crate::region::Region;
 
 use super::ground::{NODES, Node, SIDE, Square, place};
 use super::line::{self, Place};
 
 /// Hundredths of a square kilometre that have to drain to a place before a wash is drawn there.
-const DRAWN: u32 = 420;
-/// What comes in through a gate: enough that the wash goes on.
-const COMES_IN: u32 = 450;
+const DRAWN: u32 = 280;
+/// What comes in through a gate that lies in a valley: enough that the wash goes on.
+const COMES_IN: u32 = 300;
+/// What comes in through another one.
+const SEEPS_IN: u32 = 60;
 /// Metres below the saddle around it from which on a basin keeps its water.
-const BASIN_M: f32 = 7.0;
+const BASIN_M: f32 = 8.0;
 /// Slope of the land across a border from which on water crosses it.
-const SLOPE_MIN: f32 = 0.004;
-/// Steps on either side of a gate that are higher.
+const SLOPE_MIN: f32 = 0.003;
+/// Steps of the border in which there is one gate at most.
+const STRETCH: usize = 13;
+/// Steps on either side of a valley that are higher.
 const VALLEY: usize = 5;
 /// Metres by which a valley lies below what is beside it.
 const VALLEY_M: f32 = 1.5;
+/// How much is added to and taken from heights to make plains uneven, in metres.
+const UNEVEN_M: f64 = 2.5;
+/// Steps inside the border over which the rim falls, and metres a step.
+const RIM: usize = 4;
+const RIM_M: f32 = 6.0;
+/// Seed layer of uneven ground.
+const LAYER: u64 = 62;
 /// No node.
 const NONE: u32 = u32::MAX;
 
@@ -46,23 +58,23 @@ pub(super) struct Washes {
 }
 
 impl Washes {
-    pub(super) fn of(square: &Square, region: &Region, number: (i64, i64)) -> Self {
+    pub(super) fn of(square: &Square, region: &Region, seed: u64, number: (i64, i64)) -> Self {
+        let gates = gates(square, region, number);
+        let height_m = bed_m(square, &gates, seed, number);
         let mut out: Vec<usize> = (0..NODES * NODES).filter(|&at| square.is_playa(at)).collect();
         let mut areas = vec![1; NODES * NODES];
-        for (at, comes_in) in gates(square, region, number) {
-            if comes_in {
-                areas[at] = COMES_IN;
-            } else {
-                out.push(at);
+        for gate in &gates {
+            match gate.comes_in {
+                Some(area) => areas[gate.at] = area,
+                None => out.push(gate.at),
             }
         }
-        let lowest = (0..NODES * NODES).filter(|&at| is_inside(at)).reduce(|low, at| {
-            if square.height_m[at] < square.height_m[low] { at } else { low }
-        });
-        out.extend(lowest.filter(|_| out.is_empty()));
-        let first = Flow::to(&out, &square.height_m);
-        out.extend(first.basins(&square.height_m));
-        let flow = Flow::to(&out, &square.height_m);
+        if out.is_empty() {
+            let inside = (0..NODES * NODES).filter(|&at| 0 < steps_inside(at));
+            out.extend(inside.reduce(|low, at| if height_m[at] < height_m[low] { at } else { low }));
+        }
+        out.extend(Flow::to(&out, &height_m).basins(&height_m));
+        let flow = Flow::to(&out, &height_m);
         for &at in flow.order.iter().rev() {
             if flow.next[at as usize] != NONE {
                 areas[flow.next[at as usize] as usize] += areas[at as usize];
@@ -73,9 +85,15 @@ impl Washes {
     }
 }
 
-/// The places of a square's border through which washes run, and whether they come in.
-fn gates(square: &Square, region: &Region, number: (i64, i64)) -> Vec<(usize, bool)> {
-    let last = NODES - 1;
+/// A place of a square's border through which water runs.
+struct Gate {
+    at: usize,
+    /// What comes in; nothing where it goes out.
+    comes_in: Option<u32>,
+}
+
+/// The gates of a square: in each stretch of its border its lowest place; a wash runs in where that is a valley.
+fn gates(square: &Square, region: &Region, number: (i64, i64)) -> Vec<Gate> {
     type Side = (fn(usize) -> usize, usize, f32);
     let sides: [Side; 4] = [
         (|step| step, 1, -1.0),
@@ -86,32 +104,57 @@ fn gates(square: &Square, region: &Region, number: (i64, i64)) -> Vec<(usize, bo
     let mut gates = Vec::new();
     for (at, axis, outward) in sides {
         let height_m = |step: usize| square.height_m[at(step)];
-        for step in VALLEY + 1..last - VALLEY {
-            let is_valley = (1..=VALLEY).all(|by| {
-                height_m(step) <= height_m(step + by) && height_m(step) < height_m(step - by)
-            });
-            let rises = |by: fn(usize, usize) -> usize| {
-                (1..=VALLEY).map(|steps| height_m(by(step, steps))).fold(f32::MIN, f32::max) - height_m(step)
-            };
-            if !is_valley || rises(|a, b| a + b) < VALLEY_M || rises(|a, b| a - b) < VALLEY_M {
-                continue;
-            }
+        let lowest = |from: usize, to: usize| {
+            (from..to).reduce(|low, step| if height_m(step) < height_m(low) { step } else { low }).unwrap_or(from)
+        };
+        let mut before = 0;
+        for from in (STRETCH / 2..NODES - STRETCH).step_by(STRETCH) {
+            let step = lowest(from, from + STRETCH);
             let [east_m, north_m] = place(node_of(at(step), number));
             let fall = -outward * region.slope(east_m, north_m, 800.0)[axis];
-            if SLOPE_MIN < fall.abs() && !square.is_playa(at(step)) {
-                gates.push((at(step), fall < 0.0));
+            if fall.abs() < SLOPE_MIN || square.is_playa(at(step)) || step < before + VALLEY {
+                continue;
             }
+            let rises = |to: usize| height_m(to) - height_m(step);
+            let is_valley = lowest(step - VALLEY, step + VALLEY + 1) == step
+                && VALLEY_M < (1..=VALLEY).map(|by| rises(step + by)).fold(0.0, f32::max)
+                && VALLEY_M < (1..=VALLEY).map(|by| rises(step - by)).fold(0.0, f32::max);
+            let comes_in = if is_valley { COMES_IN } else { SEEPS_IN };
+            gates.push(Gate { at: at(step), comes_in: (fall < 0.0).then_some(comes_in) });
+            before = step;
         }
     }
     gates
+}
+
+/// The ground as water finds it: a little uneven, so that washes wind on plains, and with a rim along the border
+/// between gates, so that they do not run along it.
+fn bed_m(square: &Square, gates: &[Gate], seed: u64, number: (i64, i64)) -> Vec<f32> {
+    let stream = Stream::new(seed, LAYER);
+    let mut bed_m = square.height_m.clone();
+    for (at, bed_m) in bed_m.iter_mut().enumerate().filter(|&(at, _)| !square.is_playa(at)) {
+        let [east_m, north_m] = place(node_of(at, number));
+        *bed_m += (UNEVEN_M * stream.noise(east_m / 610.0, north_m / 610.0)) as f32;
+        let near_gate = |gate: &Gate| {
+            let (cols, rows) = ((gate.at % NODES).abs_diff(at % NODES), (gate.at / NODES).abs_diff(at / NODES));
+            cols.max(rows) <= RIM
+        };
+        let steps = steps_inside(at);
+        if steps < RIM && !gates.iter().any(near_gate) {
+            *bed_m += RIM_M * (RIM - steps) as f32;
+        }
+    }
+    bed_m
 }
 
 fn node_of(at: usize, number: (i64, i64)) -> Node {
     (number.0 * SIDE + (at % NODES) as i64, number.1 * SIDE + (at / NODES) as i64)
 }
 
-fn is_inside(at: usize) -> bool {
-    (1..NODES - 1).contains(&(at % NODES)) && (1..NODES - 1).contains(&(at / NODES))
+/// Steps from a node to the nearest border of its square.
+fn steps_inside(at: usize) -> usize {
+    let (col, row) = (at % NODES, at / NODES);
+    col.min(row).min(NODES - 1 - col).min(NODES - 1 - row)
 }
 
 /// The up to eight nodes beside a node.
@@ -142,19 +185,20 @@ impl Flow {
         let mut is_seen = vec![false; count];
         let mut heap = BinaryHeap::new();
         // Ground lies above 0, where the order of bits is that of heights.
-        let key = |level_m: f32| level_m.to_bits();
+        let entry = |level_m: f32, at: usize| Reverse(u64::from(level_m.to_bits()) << 32 | at as u64);
         for &at in out {
             if !std::mem::replace(&mut is_seen[at], true) {
                 flow.level_m[at] = height_m[at];
-                heap.push(Reverse((key(height_m[at]), at as u32)));
+                heap.push(entry(height_m[at], at));
             }
         }
-        while let Some(Reverse((_, at))) = heap.pop() {
+        while let Some(Reverse(first)) = heap.pop() {
+            let at = first as u32;
             flow.order.push(at);
             for other in beside(at as usize).filter(|&other| !std::mem::replace(&mut is_seen[other], true)) {
                 let level_m = height_m[other].max(flow.level_m[at as usize]);
                 (flow.next[other], flow.level_m[other]) = (at, level_m);
-                heap.push(Reverse((key(level_m), other as u32)));
+                heap.push(entry(level_m, other));
             }
         }
         flow
