@@ -16,8 +16,6 @@ use super::search::{Cost, least_cost_path, step_cost};
 const STRIP: usize = 2;
 /// Metres from its coarse nodes to which a road may come.
 pub(super) const REACH_M: f64 = 1_500.0;
-/// How uneven the cost of open ground is, so that roads wind on plains.
-const UNEVEN: f32 = 0.5;
 /// What it costs to go through a wash, in times of what it does beside it.
 const WASH: f32 = 2.5;
 /// Seed layer of what ground costs.
@@ -123,7 +121,7 @@ impl Strip {
         let wide = (easts.end() - easts.start() + 1) as usize;
         let count = wide * (norths.end() - norths.start() + 1) as usize;
         let (mut height_m, mut times) = (vec![f32::NAN; count], vec![1.0; count]);
-        let stream = Stream::new(ground.seed, LAYER);
+        let (stream, uneven) = (Stream::new(ground.seed, LAYER), Style::of(chain.class).uneven);
         let mut squares = BTreeMap::new();
         let all = norths.clone().flat_map(|north| easts.clone().map(move |east| (east, north)));
         for (at, node) in all.enumerate().filter(|(_, node)| strips.may_use(number, *node)) {
@@ -135,7 +133,7 @@ impl Strip {
                 height_m[at] = square.height_m[inside];
                 let [east_m, north_m] = place(node);
                 let chance = stream.noise(east_m / 1_100.0, north_m / 1_100.0) as f32;
-                times[at] = (1.0 + UNEVEN * chance).max(0.5) * if washes.drawn[inside] { WASH } else { 1.0 };
+                times[at] = (1.0 + uneven * chance).max(0.5) * if washes.drawn[inside] { WASH } else { 1.0 };
             }
         }
         Self { corner: (*easts.start(), *norths.start()), wide, height_m, times }
@@ -202,6 +200,8 @@ struct Style {
     grade: f64,
     /// Grade above which every step is dear.
     grade_max: f64,
+    /// How uneven the cost of open ground is, so that roads wind on plains.
+    uneven: f32,
     /// Metres aside by which lattice lines are straightened.
     aside_m: f64,
     /// Metres that corners are cut.
@@ -214,10 +214,10 @@ impl Style {
     fn of(class: Class) -> Self {
         match class {
             Class::Primary | Class::Secondary => {
-                Self { grade: 0.03, grade_max: 0.06, aside_m: 70.0, cut_m: 350.0, apart_m: 40.0 }
+                Self { grade: 0.03, grade_max: 0.06, uneven: 0.2, aside_m: 110.0, cut_m: 500.0, apart_m: 40.0 }
             }
-            Class::Minor => Self { grade: 0.05, grade_max: 0.10, aside_m: 45.0, cut_m: 150.0, apart_m: 30.0 },
-            Class::Track => Self { grade: 0.10, grade_max: 0.13, aside_m: 20.0, cut_m: 60.0, apart_m: 15.0 },
+            Class::Minor => Self { grade: 0.05, grade_max: 0.10, uneven: 0.4, aside_m: 45.0, cut_m: 150.0, apart_m: 30.0 },
+            Class::Track => Self { grade: 0.10, grade_max: 0.13, uneven: 0.5, aside_m: 20.0, cut_m: 60.0, apart_m: 15.0 },
         }
     }
 }

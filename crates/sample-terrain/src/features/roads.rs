@@ -29,8 +29,8 @@ const NEAR: usize = 5;
 const APART: usize = 9;
 /// Times the cost of the first way for the second one to be worth it.
 const DETOUR: f64 = 2.5;
-/// Seed layers: of gates, and of wanted places.
-const LAYERS: [u64; 2] = [60, 61];
+/// Seed layers: of gates, and of wanted places, in two rounds.
+const LAYERS: [u64; 3] = [60, 61, 64];
 
 /// What a road is, the lowest first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -81,19 +81,19 @@ impl Roads {
         let playas = ground.playas((corner[0], corner[1]), (side_m, side_m));
         let mut roads = Self::without(&ground.region, &playas, cell);
         roads.lay_highways(ground);
-        let wants = Stream::new(ground.seed, LAYERS[1]);
         let squares = || (0..WANTS).flat_map(|row| (0..WANTS).map(move |col| (row, col)));
         for (row, col) in squares() {
             if let Some(saddle) = roads.lowest_saddle(row * WANT, col * WANT) {
                 roads.lay_wanted(saddle, Class::Track, true);
             }
         }
-        for (row, col) in squares() {
+        let rounds = [1, 2].map(|round| Stream::new(ground.seed, LAYERS[round]));
+        for (wants, (row, col)) in rounds.iter().flat_map(|wants| squares().map(move |square| (wants, square))) {
             let (right, up) = wants.pair(cell.0 * WANTS as i64 + col as i64, cell.1 * WANTS as i64 + row as i64);
             let drawn = |share: f64| ((0.5 + 0.35 * share) * WANT as f64) as usize;
             let place = (row * WANT + drawn(up)) * WIDE + col * WANT + drawn(right);
             let is_camp = roads.bedrock_m[place] < -20.0;
-            let class = if is_camp && 0.0 < right + up { Class::Minor } else { Class::Track };
+            let class = if is_camp { Class::Minor } else { Class::Track };
             roads.lay_wanted(place, class, is_camp);
         }
         roads

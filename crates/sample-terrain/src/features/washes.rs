@@ -24,7 +24,7 @@ const BASIN_M: f32 = 8.0;
 /// Slope of the land across a border from which on water crosses it.
 const SLOPE_MIN: f32 = 0.003;
 /// Steps of the border in which there is one gate at most.
-const STRETCH: usize = 13;
+const STRETCH: usize = 17;
 /// Steps on either side of a valley that are higher.
 const VALLEY: usize = 5;
 /// Metres by which a valley lies below what is beside it.
@@ -109,17 +109,19 @@ fn gates(square: &Square, region: &Region, number: (i64, i64)) -> Vec<Gate> {
         };
         let mut before = 0;
         for from in (STRETCH / 2..NODES - STRETCH).step_by(STRETCH) {
-            let step = lowest(from, from + STRETCH);
+            let step = lowest(from, (from + STRETCH).min(NODES - 1 - VALLEY));
             let [east_m, north_m] = place(node_of(at(step), number));
             let fall = -outward * region.slope(east_m, north_m, 800.0)[axis];
             if fall.abs() < SLOPE_MIN || square.is_playa(at(step)) || step < before + VALLEY {
                 continue;
             }
             let rises = |to: usize| height_m(to) - height_m(step);
+            // On plains what drains to a stretch of border is a wash; in mountains only a valley has one.
+            let is_plain = region.lie(east_m, north_m).bedrock_m() < 0.0;
             let is_valley = lowest(step - VALLEY, step + VALLEY + 1) == step
                 && VALLEY_M < (1..=VALLEY).map(|by| rises(step + by)).fold(0.0, f32::max)
                 && VALLEY_M < (1..=VALLEY).map(|by| rises(step - by)).fold(0.0, f32::max);
-            let comes_in = if is_valley { COMES_IN } else { SEEPS_IN };
+            let comes_in = if is_plain || is_valley { COMES_IN } else { SEEPS_IN };
             gates.push(Gate { at: at(step), comes_in: (fall < 0.0).then_some(comes_in) });
             before = step;
         }
