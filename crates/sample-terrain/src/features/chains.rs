@@ -75,6 +75,35 @@ impl Strips {
         Self { cell, owner, arms }
     }
 
+    /// The direction in which a chain leaves the node at one of its ends, as steps east and north, where the road runs
+    /// on through it into another chain.
+    ///
+    /// Of all chains that meet there, the two of the highest classes that lie most nearly in line do so.
+    fn heading(&self, chains: &[Chain], chain: u32, end: usize) -> Option<[f64; 2]> {
+        let arms = self.arms.get(&end)?;
+        let (east, north) = node_of(self.cell, end);
+        let arm = |to: usize| {
+            let to = node_of(self.cell, to);
+            (to.0 - east, to.1 - north)
+        };
+        let pairs = arms.iter().enumerate().flat_map(|(number, a)| arms[number + 1..].iter().map(move |b| (a, b)));
+        let (a, b) = pairs.max_by_key(|(a, b)| {
+            let (one, other) = (chains[a.0 as usize].class, chains[b.0 as usize].class);
+            let (to_a, to_b) = (arm(a.1), arm(b.1));
+            let opposed = -(to_a.0 * to_b.0 + to_a.1 * to_b.1);
+            (0 < opposed, one.min(other), one.max(other), opposed)
+        })?;
+        let (to_a, to_b) = (arm(a.1), arm(b.1));
+        let through = [(to_a.0 - to_b.0) as f64, (to_a.1 - to_b.1) as f64];
+        let is_straight = to_a.0 * to_b.0 + to_a.1 * to_b.1 < 0;
+        // A chain may begin and end at one node.
+        match (is_straight, a.0 == chain, b.0 == chain) {
+            (true, true, false) => Some(through),
+            (true, false, true) => Some(through.map(|axis| -axis)),
+            _ => None,
+        }
+    }
+
     /// Whether a chain may use a node of the ground.
     fn may_use(&self, chain: u32, node: Node) -> bool {
         let inside = (node.0 - self.cell.0 * CELL, node.1 - self.cell.1 * CELL);
@@ -206,6 +235,8 @@ struct Style {
     aside_m: f64,
     /// Metres that corners are cut.
     cut_m: f64,
+    /// Metres that it runs straight on both sides of a node at which others join it.
+    through_m: f64,
     /// Metres between vertices.
     apart_m: f64,
 }
@@ -214,33 +245,48 @@ impl Style {
     fn of(class: Class) -> Self {
         match class {
             Class::Primary | Class::Secondary => {
-                Self { grade: 0.03, grade_max: 0.06, uneven: 0.2, aside_m: 110.0, cut_m: 500.0, apart_m: 40.0 }
+                Self { grade: 0.03, grade_max: 0.06, uneven: 0.2, aside_m: 110.0, cut_m: 500.0, through_m: 220.0, apart_m: 40.0 }
             }
-            Class::Minor => Self { grade: 0.05, grade_max: 0.10, uneven: 0.4, aside_m: 45.0, cut_m: 150.0, apart_m: 30.0 },
-            Class::Track => Self { grade: 0.10, grade_max: 0.13, uneven: 0.5, aside_m: 20.0, cut_m: 60.0, apart_m: 15.0 },
+            Class::Minor => Self { grade: 0.05, grade_max: 0.10, uneven: 0.4, aside_m: 45.0, cut_m: 150.0, through_m: 120.0, apart_m: 30.0 },
+            Class::Track => Self { grade: 0.10, grade_max: 0.13, uneven: 0.5, aside_m: 20.0, cut_m: 60.0, through_m: 60.0, apart_m: 15.0 },
         }
     }
 }
 
 /// The line of a chain, the first and last places at its end nodes.
-pub(super) fn lay(ground: &mut Ground, strips: &Strips, number: usize, chain: &Chain) -> Vec<Place> {
+pub(super) fn lay(ground: &mut Ground, strips: &Strips, chains: &[Chain], number: usize) -> Vec<Place> {
+    let chain = &chains[number];
     let style = Style::of(chain.class);
     let strip = Strip::of(ground, strips, number as u32, chain);
+    let ends = [chain.nodes[0], chain.nodes[chain.nodes.len() - 1]];
     // Through a gate the way runs straight.
-    let mut inner = &chain.nodes[..];
-    if Roads::is_gate(inner[0]) && 3 < inner.len() {
-        inner = &inner[1..];
-    }
-    if Roads::is_gate(inner[inner.len() - 1]) && 3 < inner.len() {
-        inner = &inner[..inner.len() - 1];
-    }
+    let is_long = 4 < chain.nodes.len();
+    let [first, last] = ends.map(|end| usize::from(is_long && Roads::is_gate(end)));
+    let inner = &chain.nodes[first..chain.nodes.len() - last];
     let nodes: Vec<Node> = inner.iter().map(|&at| node_of(strips.cell, at)).collect();
     let path = strip.path(nodes[0], nodes[nodes.len() - 1], style).unwrap_or(nodes);
-    let end = |at: usize| place(node_of(strips.cell, at));
-    let mut line = vec![end(chain.nodes[0])];
-    line.extend(path.into_iter().map(place));
-    line.push(end(chain.nodes[chain.nodes.len() - 1]));
-    line.dedup();
-    let line = line::round_corners(&line::thin(&line, style.aside_m), style.cut_m, 3);
+    let mut line: Vec<Place> = path.into_iter().map(place).collect();
+    let mut tips = [None, None];
+    for (tip, end) in tips.iter_mut().zip(ends) {
+        line.reverse();
+        let at = place(node_of(strips.cell, end));
+        if let Some(heading) = strips.heading(chains, number as u32, end) {
+            lead(&mut line, at, heading, style.through_m);
+        }
+        *tip = Some(at).filter(|at| line.last() != Some(at));
+    }
+    let mut whole: Vec<Place> = tips[0].into_iter().collect();
+    whole.extend(line::thin(&line, style.aside_m));
+    whole.extend(tips[1]);
+    let line = line::round_corners(&whole, style.cut_m, 3);
     line::without_loops(&line::space_out(&line, style.apart_m))
+}
+
+/// Leads the end of a line to a place `through_m` metres before `at`, from where it goes straight there.
+fn lead(line: &mut Vec<Place>, at: Place, heading: [f64; 2], through_m: f64) {
+    let is_near = |place: &Place| line::distance(*place, at) < 1.5 * through_m;
+    let Some(last) = line.iter().rposition(|place| !is_near(place)) else { return };
+    line.truncate(last + 1);
+    let share = through_m / line::distance([0.0; 2], heading);
+    line.push([at[0] + share * heading[0], at[1] + share * heading[1]]);
 }

@@ -103,7 +103,7 @@ fn add_roads(ground: &mut Ground, cell: (i64, i64), rect: Rect, found: &mut Vec<
         if !rect.widened(chains::REACH_M).touches(&nodes) {
             continue;
         }
-        let line = chains::lay(ground, &strips, number, chain);
+        let line = chains::lay(ground, &strips, &chains, number);
         for (part, way) in bridges::cut(ground, line, chain.class).into_iter().enumerate() {
             if rect.touches(&way.line) {
                 let mut tags = match chain.class {

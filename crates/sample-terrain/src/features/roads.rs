@@ -26,7 +26,9 @@ const WANTS: usize = (WIDE - 1) / WANT;
 /// Nodes from a road within which no place wants another.
 const NEAR: usize = 5;
 /// Nodes that the two joints of a place's roads lie apart.
-const APART: usize = 9;
+const APART: usize = 12;
+/// Nodes beside the first road to a place on which the second one is dear.
+const BESIDE: usize = 4;
 /// Times the cost of the first way for the second one to be worth it.
 const DETOUR: f64 = 2.5;
 /// Seed layers: of gates, and of wanted places, in two rounds.
@@ -161,7 +163,10 @@ impl Roads {
         self.link(&first, class);
         if leads_through {
             let beside = |at: usize| {
-                let is_beside = first.iter().skip(1).any(|&other| apart(at, other) < 3);
+                if first[1..].contains(&at) {
+                    return 1_000.0;
+                }
+                let is_beside = first[1..].iter().any(|&other| apart(at, other) < BESIDE);
                 if is_beside && 1 < apart(at, wanted) { 8.0 } else { 1.0 }
             };
             let goal = |at: usize| self.is_road(at) && APART <= apart(at, joint) && !first.contains(&at);
