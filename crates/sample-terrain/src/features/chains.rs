@@ -18,6 +18,8 @@ const STRIP: usize = 2;
 pub(super) const REACH_M: f64 = 1_500.0;
 /// What it costs to go through a wash, in times of what it does beside it.
 const WASH: f32 = 2.5;
+/// Coarse nodes ahead to which roads other than tracks point where they run through a junction.
+const AHEAD: usize = 4;
 /// Seed layer of what ground costs.
 const LAYER: u64 = 63;
 /// No road.
@@ -82,18 +84,21 @@ impl Strips {
     fn heading(&self, chains: &[Chain], chain: u32, end: usize) -> Option<[f64; 2]> {
         let arms = self.arms.get(&end)?;
         let (east, north) = node_of(self.cell, end);
-        let arm = |to: usize| {
-            let to = node_of(self.cell, to);
+        let arm = |&(number, first): &(u32, usize)| {
+            let Chain { class, nodes } = &chains[number as usize];
+            let ahead = if *class == Class::Track { 1 } else { AHEAD.min(nodes.len() - 1) };
+            let is_forward = nodes[0] == end && nodes[1] == first;
+            let to = node_of(self.cell, if is_forward { nodes[ahead] } else { nodes[nodes.len() - 1 - ahead] });
             (to.0 - east, to.1 - north)
         };
         let pairs = arms.iter().enumerate().flat_map(|(number, a)| arms[number + 1..].iter().map(move |b| (a, b)));
         let (a, b) = pairs.max_by_key(|(a, b)| {
             let (one, other) = (chains[a.0 as usize].class, chains[b.0 as usize].class);
-            let (to_a, to_b) = (arm(a.1), arm(b.1));
+            let (to_a, to_b) = (arm(a), arm(b));
             let opposed = -(to_a.0 * to_b.0 + to_a.1 * to_b.1);
             (0 < opposed, one.min(other), one.max(other), opposed)
         })?;
-        let (to_a, to_b) = (arm(a.1), arm(b.1));
+        let (to_a, to_b) = (arm(a), arm(b));
         let through = [(to_a.0 - to_b.0) as f64, (to_a.1 - to_b.1) as f64];
         let is_straight = to_a.0 * to_b.0 + to_a.1 * to_b.1 < 0;
         // A chain may begin and end at one node.
