@@ -1,28 +1,40 @@
-//! Prints the features of the built-in terrain as lines of text, or draws them as an SVG with `--svg`.
-//! `cargo run -p sample-terrain --example map -- 1 0 0 50000 50000`
+//! Prints the features of the built-in terrain that touch a rectangle, and how long they took, for a look at them:
+//! `cargo run -p sample-terrain --example map -- [seed [west south east north]] > features.geojsonl`, one GeoJSON
+//! feature a line, in metres from the terrain's origin.
 
 use std::time::Instant;
 
-use sample_terrain::{SampleShape, features, heights};
-use terrain::{PostRect, Post, Spacing};
-use std::io::Write;
+use sample_terrain::{DEFAULT_SEED, SampleFeature, SampleShape, features};
 
 fn main() {
-    let n: Vec<f64> = std::env::args().skip(1).map(|a| a.parse().unwrap()).collect();
-    let t = Instant::now();
-    let found = features(n[0] as u64, n[1], n[2], n[3], n[4]);
-    eprintln!("{} features in {:?}", found.len(), t.elapsed());
-    for f in &found {
-        let tags: Vec<String> = f.tags.iter().map(|(k,v)| format!("{k}={v}")).collect();
-        let pts = match &f.shape { SampleShape::Line(l) => l.clone(), SampleShape::Polygon(r) => r[0].clone() };
-        let pts: Vec<String> = pts.iter().map(|p| format!("{:.3} {:.3}", p[0], p[1])).collect();
-        println!("{}|{}|{}", f.id, tags.join(","), pts.join(","));
-    }
-    if n.len() > 5 {
-        let m = n[5];
-        let r = PostRect::new(Post::new((n[2]/m) as i32, (n[1]/m) as i32), Post::new((n[4]/m) as i32, (n[3]/m) as i32));
-        let dem = heights(n[0] as u64, r, Spacing::from_metres(m).unwrap());
-        let mut f = std::io::BufWriter::new(std::fs::File::create("/tmp/sample/dem.bin").unwrap());
-        for row in r.south..=r.north { for h in dem.row(row) { f.write_all(&h.to_le_bytes()).unwrap(); } }
-    }
+    let arguments: Vec<f64> = std::env::args().skip(1).filter_map(|argument| argument.parse().ok()).collect();
+    let seed = arguments.first().map_or(DEFAULT_SEED, |seed| *seed as u64);
+    let rect = match arguments[..] {
+        [_, west_m, south_m, east_m, north_m] => [west_m, south_m, east_m, north_m],
+        _ => [0.0, 0.0, 50_000.0, 50_000.0],
+    };
+    let start = Instant::now();
+    let found = features(seed, rect[0], rect[1], rect[2], rect[3]);
+    eprintln!("{} features in {:.0} ms", found.len(), start.elapsed().as_secs_f64() * 1000.0);
+    found.iter().for_each(|feature| println!("{}", line_of(feature)));
+}
+
+fn line_of(feature: &SampleFeature) -> String {
+    let places = |line: &[[f64; 2]]| {
+        let places: Vec<String> = line.iter().map(|place| format!("[{:.2},{:.2}]", place[0], place[1])).collect();
+        format!("[{}]", places.join(","))
+    };
+    let (shape, coordinates) = match &feature.shape {
+        SampleShape::Line(line) => ("LineString", places(line)),
+        SampleShape::Polygon(rings) => {
+            let rings: Vec<String> = rings.iter().map(|ring| places(ring)).collect();
+            ("Polygon", format!("[{}]", rings.join(",")))
+        }
+    };
+    let tags: Vec<String> = feature.tags.iter().map(|(key, value)| format!(r#""{key}":"{value}""#)).collect();
+    format!(
+        r#"{{"type":"Feature","id":{},"properties":{{{}}},"geometry":{{"type":"{shape}","coordinates":{coordinates}}}}}"#,
+        feature.id,
+        tags.join(",")
+    )
 }

@@ -15,6 +15,8 @@ const NODES_BEYOND: usize = 3;
 const WASHES_M: [f32; OCTAVES] = [0.0, 4.5, 3.5, 1.2];
 /// Height in metres of fan lobes at canyon mouths.
 const LOBE_M: f32 = 14.0;
+/// Octaves of rough ground: those that posts 100 m apart can show.
+const ROUGH_OCTAVES: usize = 2;
 
 /// No ground is lower than this, in metres.
 pub(crate) const LOWEST_M: f32 = 300.0;
@@ -37,9 +39,9 @@ impl Block {
         Self { corner_m, nodes: nodes(region, corner_m, BLOCK_M), octaves, playas }
     }
 
-    /// A wider square of ground without playas and without its finest drainage: what features are laid out on.
+    /// A wider square of ground without playas and without its finer drainage: what features are laid out on.
     pub(crate) fn rough(seed: u64, region: &Region, corner_m: (f64, f64), side_m: f64) -> Self {
-        let octaves = octaves(seed, region, corner_m, side_m, OCTAVES - 1);
+        let octaves = octaves(seed, region, corner_m, side_m, ROUGH_OCTAVES);
         Self { corner_m, nodes: nodes(region, corner_m, side_m), octaves, playas: Vec::new() }
     }
 

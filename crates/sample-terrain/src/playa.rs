@@ -80,11 +80,7 @@ impl Playa {
     }
 
     /// Search cells of playas that may come within `beyond_m` metres of a rectangle of ground.
-    pub(crate) fn cells(
-        corner_m: (f64, f64),
-        size_m: (f64, f64),
-        beyond_m: f64,
-    ) -> impl Iterator<Item = (i64, i64)> {
+    pub(crate) fn cells(corner_m: (f64, f64), size_m: (f64, f64), beyond_m: f64) -> impl Iterator<Item = (i64, i64)> {
         let cells = move |from_m: f64, size_m: f64| {
             let margin_m = SEARCH_M + RADIUS_M_MAX + beyond_m;
             ((from_m - margin_m) / CELL_M).floor() as i64..=((from_m + size_m + margin_m) / CELL_M).floor() as i64

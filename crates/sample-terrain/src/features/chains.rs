@@ -18,6 +18,8 @@ const STRIP: usize = 2;
 pub(super) const REACH_M: f64 = 1_500.0;
 /// What it costs to go through a wash, in times of what it does beside it.
 const WASH: f32 = 2.5;
+/// Slope of the ground up to which a way may be straightened freely.
+const EVEN: f64 = 0.05;
 /// Coarse nodes ahead to which roads other than tracks point where they run through a junction.
 const AHEAD: usize = 4;
 /// Seed layer of what ground costs.
@@ -68,9 +70,8 @@ impl Strips {
             for at in (0..WIDE * WIDE).filter(|at| before[*at] == NONE && !arms.contains_key(at)) {
                 let (col, row) = (at % WIDE, at / WIDE);
                 let rows = row.saturating_sub(1)..=(row + 1).min(WIDE - 1);
-                let near = rows.flat_map(|row| {
-                    (col.saturating_sub(1)..=(col + 1).min(WIDE - 1)).map(move |col| row * WIDE + col)
-                });
+                let near = rows
+                    .flat_map(|row| (col.saturating_sub(1)..=(col + 1).min(WIDE - 1)).map(move |col| row * WIDE + col));
                 owner[at] = near.map(|near| before[near]).min().unwrap_or(NONE);
             }
         }
@@ -181,21 +182,39 @@ impl Strip {
     fn path(&self, from: Node, to: Node, style: Style) -> Option<Vec<Node>> {
         let goal = self.at(to);
         let rows = self.height_m.len() / self.wide;
-        let path = least_cost_path(self.height_m.len(), self.at(from), |at| at == goal, |at, beside| {
-            let (col, row) = ((at % self.wide) as i64, (at / self.wide) as i64);
-            for (east, north) in MOVES {
-                let (col, row) = (col + east, row + north);
-                if col < 0 || row < 0 || self.wide as i64 <= col || rows as i64 <= row {
-                    continue;
+        let path = least_cost_path(
+            self.height_m.len(),
+            self.at(from),
+            |at| at == goal,
+            |at, beside| {
+                let (col, row) = ((at % self.wide) as i64, (at / self.wide) as i64);
+                for (east, north) in MOVES {
+                    let (col, row) = (col + east, row + north);
+                    if col < 0 || row < 0 || self.wide as i64 <= col || rows as i64 <= row {
+                        continue;
+                    }
+                    let next = row as usize * self.wide + col as usize;
+                    if let Some(cost) = self.cost(at, next, (east, north), style) {
+                        beside.push((next, cost));
+                    }
                 }
-                let next = row as usize * self.wide + col as usize;
-                if let Some(cost) = self.cost(at, next, (east, north), style) {
-                    beside.push((next, cost));
-                }
-            }
-        })?;
+            },
+        )?;
         let node = |at: usize| (self.corner.0 + (at % self.wide) as i64, self.corner.1 + (at / self.wide) as i64);
         Some(path.into_iter().map(node).collect())
+    }
+
+    /// Slope of the ground around a node, rise over run; 1 beside ground where the chain may not go.
+    fn slope(&self, node: Node) -> f64 {
+        let at = self.at(node);
+        let rise_m = |by: usize, steps: usize| {
+            let beside = [at.wrapping_sub(steps * by), at + steps * by];
+            let rises =
+                beside.map(|other| self.height_m.get(other).map_or(f32::NAN, |m| (m - self.height_m[at]).abs()));
+            if rises.iter().any(|rise| rise.is_nan()) { STEP_M } else { f64::from(rises[0].max(rises[1])) }
+        };
+        let all = [1, self.wide].into_iter().flat_map(|by| [1, 2].map(|steps| rise_m(by, steps)));
+        all.fold(0.0, f64::max) / STEP_M
     }
 
     fn cost(&self, at: usize, next: usize, (east, north): (i64, i64), style: Style) -> Option<Cost> {
@@ -209,7 +228,8 @@ impl Strip {
         if east.abs() + north.abs() == 3 {
             // The middle of a knight's move lies between two nodes.
             let by = |east: i64, north: i64| at.wrapping_add_signed((north * self.wide as i64 + east) as isize);
-            let (a, b) = if east.abs() == 2 { ((east / 2, 0), (east / 2, north)) } else { ((0, north / 2), (east, north / 2)) };
+            let (a, b) =
+                if east.abs() == 2 { ((east / 2, 0), (east / 2, north)) } else { ((0, north / 2), (east, north / 2)) };
             let middle_m = 0.5 * (self.height_m[by(a.0, a.1)] + self.height_m[by(b.0, b.1)]);
             if middle_m.is_nan() {
                 return None;
@@ -249,11 +269,33 @@ struct Style {
 impl Style {
     fn of(class: Class) -> Self {
         match class {
-            Class::Primary | Class::Secondary => {
-                Self { grade: 0.03, grade_max: 0.06, uneven: 0.2, aside_m: 110.0, cut_m: 500.0, through_m: 220.0, apart_m: 40.0 }
-            }
-            Class::Minor => Self { grade: 0.05, grade_max: 0.10, uneven: 0.4, aside_m: 45.0, cut_m: 150.0, through_m: 120.0, apart_m: 30.0 },
-            Class::Track => Self { grade: 0.10, grade_max: 0.13, uneven: 0.5, aside_m: 20.0, cut_m: 60.0, through_m: 60.0, apart_m: 15.0 },
+            Class::Primary | Class::Secondary => Self {
+                grade: 0.03,
+                grade_max: 0.06,
+                uneven: 0.2,
+                aside_m: 110.0,
+                cut_m: 500.0,
+                through_m: 220.0,
+                apart_m: 40.0,
+            },
+            Class::Minor => Self {
+                grade: 0.05,
+                grade_max: 0.10,
+                uneven: 0.4,
+                aside_m: 45.0,
+                cut_m: 150.0,
+                through_m: 120.0,
+                apart_m: 30.0,
+            },
+            Class::Track => Self {
+                grade: 0.10,
+                grade_max: 0.13,
+                uneven: 0.5,
+                aside_m: 40.0,
+                cut_m: 60.0,
+                through_m: 60.0,
+                apart_m: 15.0,
+            },
         }
     }
 }
@@ -270,7 +312,9 @@ pub(super) fn lay(ground: &mut Ground, strips: &Strips, chains: &[Chain], number
     let inner = &chain.nodes[first..chain.nodes.len() - last];
     let nodes: Vec<Node> = inner.iter().map(|&at| node_of(strips.cell, at)).collect();
     let path = strip.path(nodes[0], nodes[nodes.len() - 1], style).unwrap_or(nodes);
-    let mut line: Vec<Place> = path.into_iter().map(place).collect();
+    // On steep ground a way keeps closely to where it was found.
+    let aside_m = |node: Node| style.aside_m * (EVEN / strip.slope(node).max(EVEN)).max(0.15);
+    let mut line: Vec<(Place, f64)> = path.into_iter().map(|node| (place(node), aside_m(node))).collect();
     let mut tips = [None, None];
     for (tip, end) in tips.iter_mut().zip(ends) {
         line.reverse();
@@ -278,20 +322,21 @@ pub(super) fn lay(ground: &mut Ground, strips: &Strips, chains: &[Chain], number
         if let Some(heading) = strips.heading(chains, number as u32, end) {
             lead(&mut line, at, heading, style.through_m);
         }
-        *tip = Some(at).filter(|at| line.last() != Some(at));
+        *tip = Some(at).filter(|at| line[line.len() - 1].0 != *at);
     }
     let mut whole: Vec<Place> = tips[0].into_iter().collect();
-    whole.extend(line::thin(&line, style.aside_m));
+    let (line, aside_m): (Vec<Place>, Vec<f64>) = line.into_iter().unzip();
+    whole.extend(line::thin(&line, &aside_m));
     whole.extend(tips[1]);
     let line = line::round_corners(&whole, style.cut_m, 3);
     line::without_loops(&line::space_out(&line, style.apart_m))
 }
 
 /// Leads the end of a line to a place `through_m` metres before `at`, from where it goes straight there.
-fn lead(line: &mut Vec<Place>, at: Place, heading: [f64; 2], through_m: f64) {
-    let is_near = |place: &Place| line::distance(*place, at) < 1.5 * through_m;
-    let Some(last) = line.iter().rposition(|place| !is_near(place)) else { return };
+fn lead(line: &mut Vec<(Place, f64)>, at: Place, heading: [f64; 2], through_m: f64) {
+    let is_near = |place: Place| line::distance(place, at) < 1.5 * through_m;
+    let Some(last) = line.iter().rposition(|(place, _)| !is_near(*place)) else { return };
     line.truncate(last + 1);
     let share = through_m / line::distance([0.0; 2], heading);
-    line.push([at[0] + share * heading[0], at[1] + share * heading[1]]);
+    line.push(([at[0] + share * heading[0], at[1] + share * heading[1]], f64::MAX));
 }

@@ -108,9 +108,7 @@ impl Ground {
     pub(super) fn playas(&mut self, corner_m: (f64, f64), size_m: (f64, f64)) -> Vec<Playa> {
         let stream = Playa::stream(self.seed);
         let found: Vec<Playa> = Playa::cells(corner_m, size_m, RADIUS_M_MAX)
-            .filter_map(|cell| {
-                *self.playas.entry(cell).or_insert_with(|| Playa::find(&self.region, stream, cell))
-            })
+            .filter_map(|cell| *self.playas.entry(cell).or_insert_with(|| Playa::find(&self.region, stream, cell)))
             .collect();
         let covers = |other: &Playa, playa: &Playa| {
             let rank = |playa: &Playa| (playa.level_m, playa.cell);

@@ -13,9 +13,8 @@ const AREA_M2_MIN: f64 = 60_000.0;
 /// The outline of a playa's floor, counter-clockwise, its first place repeated; `None` where it is too small.
 pub(super) fn outline(ground: &mut Ground, playa: &Playa) -> Option<Vec<Place>> {
     let depths = Depths::of(ground, playa);
-    let ring = depths.rings().into_iter().map(|ring| (doubled_area(&ring), ring)).reduce(|a, b| {
-        if a.0 < b.0 { b } else { a }
-    });
+    let ring =
+        depths.rings().into_iter().map(|ring| (doubled_area(&ring), ring)).reduce(|a, b| if a.0 < b.0 { b } else { a });
     let (_, ring) = ring.filter(|(doubled, _)| 2.0 * AREA_M2_MIN <= *doubled)?;
     // A ring is smoothed as a line that begins in the middle of a leg, and closed again.
     let start = between(ring[0], ring[1], 0.5);
@@ -56,7 +55,8 @@ impl Depths {
             let square = squares.entry(number).or_insert_with(|| ground.square(number));
             let raw_m = square.raw_m[node.1.rem_euclid(SIDE) as usize * NODES + node.0.rem_euclid(SIDE) as usize];
             let at = place(node);
-            let is_lake = playa.is_near(at) && !higher.iter().any(|other| other.is_near(at) && raw_m < other.level_m as f32);
+            let is_lake =
+                playa.is_near(at) && !higher.iter().any(|other| other.is_near(at) && raw_m < other.level_m as f32);
             let depth_m = playa.level_m as f32 - raw_m;
             metres.push(if is_lake { depth_m } else { depth_m.min(-0.5) });
         }

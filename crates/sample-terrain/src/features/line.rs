@@ -17,15 +17,15 @@ pub(super) fn length(line: &[Place]) -> f64 {
     line.windows(2).map(|leg| distance(leg[0], leg[1])).sum()
 }
 
-/// Leaves out what lies within `aside_m` of the rest (Douglas and Peucker).
-pub(super) fn thin(line: &[Place], aside_m: f64) -> Vec<Place> {
+/// Leaves out each place that lies within its `aside_m` metres of the rest (Douglas and Peucker).
+pub(super) fn thin(line: &[Place], aside_m: &[f64]) -> Vec<Place> {
     let mut kept = vec![false; line.len()];
     let mut spans = vec![(0, line.len() - 1)];
     while let Some((first, last)) = spans.pop() {
         (kept[first], kept[last]) = (true, true);
-        let aside = |&at: &usize| aside_of(line[at], line[first], line[last]);
-        let farthest = (first + 1..last).map(|at| (aside(&at), at)).reduce(|a, b| if a.0 < b.0 { b } else { a });
-        if let Some((_, at)) = farthest.filter(|(aside, _)| aside_m < *aside) {
+        let aside = |at: usize| aside_of(line[at], line[first], line[last]) / aside_m[at];
+        let farthest = (first + 1..last).map(|at| (aside(at), at)).reduce(|a, b| if a.0 < b.0 { b } else { a });
+        if let Some((_, at)) = farthest.filter(|(aside, _)| 1.0 < *aside) {
             spans.extend([(first, at), (at, last)]);
         }
     }
@@ -96,7 +96,7 @@ pub(super) fn crossing([a, b]: [Place; 2], [c, d]: [Place; 2]) -> Option<(f64, f
 /// Takes out loops: where a line crosses itself, it goes straight on.
 pub(super) fn without_loops(line: &[Place]) -> Vec<Place> {
     /// Legs over which a loop is looked for.
-    const LEGS: usize = 200;
+    const LEGS: usize = 80;
     let mut kept: Vec<Place> = Vec::with_capacity(line.len());
     for &place in line {
         if let Some(&last) = kept.last() {

@@ -316,5 +316,8 @@ fn gate(seed: u64, region: &Region, is_row: bool, line: i64, (along, half): (i64
         let (chance, _) = stream.pair(line * 1024 + node as i64, along * 2 + i64::from(is_row));
         around + 0.2 * chance as f32
     };
-    (first..=first + 60).map(|node| (score(node), node)).reduce(|a, b| if b.0 < a.0 { b } else { a }).map_or(first, |a| a.1)
+    (first..=first + 60)
+        .map(|node| (score(node), node))
+        .reduce(|a, b| if b.0 < a.0 { b } else { a })
+        .map_or(first, |a| a.1)
 }

@@ -14,9 +14,9 @@ use super::ground::{NODES, Node, SIDE, Square, place};
 use super::line::{self, Place};
 
 /// Hundredths of a square kilometre that have to drain to a place before a wash is drawn there.
-const DRAWN: u32 = 280;
+const DRAWN: u32 = 200;
 /// What comes in through a gate that lies in a valley: enough that the wash goes on.
-const COMES_IN: u32 = 300;
+const COMES_IN: u32 = 220;
 /// What comes in through another one.
 const SEEPS_IN: u32 = 60;
 /// Metres below the saddle around it from which on a basin keeps its water.
@@ -163,10 +163,8 @@ fn steps_inside(at: usize) -> usize {
 fn beside(at: usize) -> impl Iterator<Item = usize> {
     let (col, row) = (at % NODES, at / NODES);
     let rows = row.saturating_sub(1)..=(row + 1).min(NODES - 1);
-    rows.flat_map(move |row| {
-        (col.saturating_sub(1)..=(col + 1).min(NODES - 1)).map(move |col| row * NODES + col)
-    })
-    .filter(move |&other| other != at)
+    rows.flat_map(move |row| (col.saturating_sub(1)..=(col + 1).min(NODES - 1)).map(move |col| row * NODES + col))
+        .filter(move |&other| other != at)
 }
 
 /// Where the water of every node goes: over the lowest saddles to one of the ways out.
