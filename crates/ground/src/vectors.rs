@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use database::FeatureRemark;
 use features::{AreaFeatures, FeatureId, Numbering, Position, Shape, Site, Source};
-use job::{FeatureSource, FeaturesSpec, Job};
+use job::{DemSource, FeatureSource, FeaturesSpec, Job};
+use sample_terrain::SampleShape;
 use source_files::{BUILT_IN_KEYS, Extent, FeatureFile, VectorFeature, VectorShape, Vertices, Wanted};
 use terrain::GridFrame;
 
@@ -61,7 +62,31 @@ impl Vectors {
         of_source.and_then(|names| names.get(usize::try_from(id.number).ok()?)).map_or("?", String::as_str)
     }
 
-    fn add_sample(&mut self, _job: &Job, _area: &GamingArea) {}
+    fn add_sample(&mut self, job: &Job, area: &GamingArea) {
+        let DemSource::Sample { seed } = job.dem.source else { return };
+        let reach = bounds(area, [0.0; 2]);
+        let found = sample_terrain::features(seed, reach.east[0], reach.north[0], reach.east[1], reach.north[1]);
+        let at_post = GridFrame { origin_east_m: 0.0, origin_north_m: 0.0, spacing: area.frame.spacing };
+        self.files.push(FeaturesRead {
+            name: "sample".into(),
+            found: found.len() as u64,
+            outside: 0,
+            attribution: None,
+        });
+        let (source, mut names) = (self.names.len() as u32, Vec::new());
+        for feature in found {
+            let line = |places: &[[f64; 2]]| places.iter().map(|place| position(*place, None, &at_post)).collect();
+            let shape = match &feature.shape {
+                SampleShape::Line(places) => Shape::Line(line(places)),
+                SampleShape::Polygon(rings) => Shape::Polygon(rings.iter().map(|ring| line(ring)).collect()),
+            };
+            let tags = feature.tags.iter().map(|(key, value)| (key.to_string(), value.to_string())).collect();
+            let id = FeatureId { source, numbering: Numbering::Row, number: names.len() as i64 };
+            names.push(format!("sample/{}", feature.id));
+            self.sources.push(Source { id, tags, kind: None, shape });
+        }
+        self.names.push(names);
+    }
 
     fn add_file(
         &mut self,
