@@ -2,6 +2,7 @@
 //! the reader for simulators, and of what `level` published.
 
 mod drawing;
+pub use drawing::{Drawn, geojson, line, polygon};
 
 mod bytes;
 mod refused;
