@@ -1,7 +1,7 @@
 //! What the features of a job are, before any height is looked at: the table of kinds that results, what each of its
 //! rows holds, and what of each file lies in the area.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use features::{FeatureId, Form, Kind, Numbering, OverviewRow, RowOrigin, Rule, Shape, Source, overview};
@@ -79,17 +79,10 @@ pub struct FeaturesSeen {
 pub fn feature_table(job: &Job) -> Result<Option<FeatureTable>, GroundError> {
     let Some(spec) = &job.features else { return Ok(None) };
     let (mut seen, mut notes, mut all) = (Vec::new(), Vec::new(), Vec::new());
-    for (number, source) in (0..).zip(&spec.sources) {
-        let FeatureSource::File { file, layer, kind } = source else { continue };
-        let name = match layer {
-            Some(layer) => format!("{}, layer {layer}", file.written),
-            None => file.written.clone(),
-        };
-        let read = read_features(&file.path, &wanted(job, layer.as_deref(), &keys(spec)))?;
-        notes.extend(read.notes.iter().map(|note| format!("{name}: {note}")));
-        let FeatureFile { found, outside, remarks, features, .. } = read;
-        seen.push((number, SourceSeen { name, found, outside, without_kind: 0, remarks: remarks.len() }));
-        all.extend(features.into_iter().map(|feature| source_of(feature, number, *kind)));
+    for (number, read) in read_sources(job, spec)? {
+        notes.extend(read.notes);
+        seen.push((number, read.seen));
+        all.extend(read.sources);
     }
     let overview = overview(&all, &spec.rules);
     for (number, seen) in &mut seen {
@@ -109,6 +102,32 @@ pub fn feature_table(job: &Job) -> Result<Option<FeatureTable>, GroundError> {
     }));
     let rows = overview.rows.iter().map(|row| row_text(row, &spec.rules)).collect();
     Ok(Some(FeatureTable { rows, sources: seen.into_iter().map(|(_, seen)| seen).collect(), notes }))
+}
+
+/// A source of a job, read.
+struct ReadSource {
+    seen: SourceSeen,
+    notes: Vec<String>,
+    sources: Vec<Source>,
+}
+
+/// Reads the files of a job's features, each with the number of its source.
+fn read_sources(job: &Job, spec: &FeaturesSpec) -> Result<Vec<(u32, ReadSource)>, GroundError> {
+    let mut all = Vec::new();
+    for (number, source) in (0..).zip(&spec.sources) {
+        let FeatureSource::File { file, layer, kind } = source else { continue };
+        let name = match layer {
+            Some(layer) => format!("{}, layer {layer}", file.written),
+            None => file.written.clone(),
+        };
+        let read = read_features(&file.path, &wanted(job, layer.as_deref(), &keys(spec)))?;
+        let FeatureFile { found, outside, remarks, features, notes, .. } = read;
+        let notes = notes.iter().map(|note| format!("{name}: {note}")).collect();
+        let seen = SourceSeen { name, found, outside, without_kind: 0, remarks: remarks.len() };
+        let sources = features.into_iter().map(|feature| source_of(feature, number, *kind)).collect();
+        all.push((number, ReadSource { seen, notes, sources }));
+    }
+    Ok(all)
 }
 
 /// What of the file at `path` lies in an area from `origin_m`, `size_m` large, by the built-in table alone.
@@ -165,8 +184,7 @@ fn source_of(feature: VectorFeature, source: u32, kind: Option<Kind>) -> Source 
 /// Keys of the tags of some features, sorted, and no more than a line of them.
 fn columns<'a>(features: impl Iterator<Item = &'a Source>) -> String {
     const SHOWN: usize = 8;
-    let keys: std::collections::BTreeSet<&str> =
-        features.flat_map(|feature| feature.tags.iter().map(|(key, _)| key.as_str())).collect();
+    let keys: BTreeSet<&str> = features.flat_map(|feature| feature.tags.iter().map(|(key, _)| key.as_str())).collect();
     let shown: Vec<&str> = keys.iter().copied().take(SHOWN).collect();
     match keys.len() {
         0 => "they have none".to_owned(),
@@ -309,10 +327,8 @@ mod tests {
         let table = table_of("sources = [\"p.geojson\"]", &[]).unwrap();
         assert_eq!(
             table.notes,
-            [
-                "p.geojson: its features in the area have no kind by their tags (fid, level) and are left out, 1 in all; \
-              name one, as { file = \"…\", kind = \"track\" }, or write a rule"
-            ]
+            ["p.geojson: its features in the area have no kind by their tags (fid, level) and are left out, 1 in \
+              all; name one, as { file = \"…\", kind = \"track\" }, or write a rule"]
         );
         let said = table_of("sources = [{ file = \"p.geojson\", kind = \"rail\" }]", &[]).unwrap();
         assert_eq!(rows(&said), ["rail|rail|1|tag or 5 m|3 %|auto|sources that say so"]);

@@ -134,8 +134,8 @@ fn what_would_undo_features_is_refused_beside_them() {
         "source",
         "source = \"sample\"\nwater = \"lakes.gpkg\"\n[features]\nsources = [\"r.gpkg\"]",
         &[
-            r#"a/b.toml:9: dem.water: found "lakes.gpkg" beside [features], expected no water in [dem], since lakes of"#,
-            "features lie level by rules of their own",
+            r#"a/b.toml:9: dem.water: found "lakes.gpkg" beside [features], expected no water in [dem], since lakes"#,
+            "of features lie level by rules of their own",
             r#"hint: move the file: sources = [{ file = "lakes.gpkg", kind = "lake" }] in [features]"#,
         ],
     );
@@ -160,7 +160,7 @@ fn clipped_edges_beside_features_are_refused_with_a_method_that_could_clip() {
     let error = job::Job::from_text(text, std::path::Path::new("a.toml")).unwrap_err();
     assert_eq!(
         crate::told(&error),
-        "a.toml:12: load_modules.edges: found \"clip\" beside [features], expected \"constrained\", since clipping would \
-         cut the edges of features hint: remove edges, or leave [features] out"
+        "a.toml:12: load_modules.edges: found \"clip\" beside [features], expected \"constrained\", since clipping \
+         would cut the edges of features hint: remove edges, or leave [features] out"
     );
 }

@@ -17,9 +17,17 @@ pub(super) enum Format {
     GeoJson,
 }
 
-/// Whether the file at `path` begins as one of the formats of features does; `false` where it cannot be read.
+/// Whether the file at `path` begins as one of the formats of features does; `false` where it cannot be read. Not all
+/// JSON is GeoJSON: that names what it holds early on.
 pub fn is_feature_file(path: &Path) -> bool {
-    open(path).is_ok()
+    const LOOKED_AT: u64 = 1 << 16;
+    const NAMES: [&[u8]; 3] = [b"\"FeatureCollection\"", b"\"Feature\"", b"\"coordinates\""];
+    match open(path) {
+        Ok((store, Format::GeoJson)) => store
+            .start(LOOKED_AT)
+            .is_ok_and(|start| NAMES.iter().any(|name| start.windows(name.len()).any(|window| window == *name))),
+        other => other.is_ok(),
+    }
 }
 
 /// Whom to name beside anything drawn from the file at `path`, where its format says so.

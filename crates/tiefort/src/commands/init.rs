@@ -43,9 +43,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     arguments.out.as_deref().map_or(Ok(()), crate::files::check_free)?;
     let (vectors, files): (Vec<PathBuf>, Vec<PathBuf>) =
         named_files(&arguments.files)?.into_iter().partition(|path| workbench::is_feature_file(path));
-    if files.is_empty() {
-        let found = if vectors.len() == 1 { "a file" } else { "files" };
-        let message = format!("FILES: found {found} of roads, rivers or lakes and no raster, expected one at least");
+    if let ([first, ..], []) = (vectors.as_slice(), files.as_slice()) {
+        let path = first.display();
+        let message = format!("{path}: found a file of roads, rivers or lakes, expected a raster beside it");
         return Err(Failure::new(message, "name a raster of heights too, as dem.tif: area and ground come from it"));
     }
     let crs = arguments.crs.as_deref();
