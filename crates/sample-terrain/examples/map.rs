@@ -32,9 +32,7 @@ fn line_of(feature: &SampleFeature) -> String {
         }
     };
     let tags: Vec<String> = feature.tags.iter().map(|(key, value)| format!(r#""{key}":"{value}""#)).collect();
-    format!(
-        r#"{{"type":"Feature","id":{},"properties":{{{}}},"geometry":{{"type":"{shape}","coordinates":{coordinates}}}}}"#,
-        feature.id,
-        tags.join(",")
-    )
+    let properties = tags.join(",");
+    let geometry = format!(r#"{{"type":"{shape}","coordinates":{coordinates}}}"#);
+    format!(r#"{{"type":"Feature","id":{},"properties":{{{properties}}},"geometry":{geometry}}}"#, feature.id)
 }

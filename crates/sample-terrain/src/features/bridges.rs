@@ -1,6 +1,7 @@
 //! Bridges: highways are cut where they cross the largest washes.
 
-use super::ground::{Ground, SIDE, cells};
+use super::ground::Ground;
+use super::lattice::{SIDE, cells};
 use super::line::{self, Place, crossing, distance};
 use super::roads::Class;
 

@@ -7,7 +7,8 @@ use std::collections::BTreeMap;
 
 use crate::noise::Stream;
 
-use super::ground::{Ground, NODES, Node, SIDE, STEP_M, place};
+use super::ground::Ground;
+use super::lattice::{NODES, Node, SIDE, STEP_M, place};
 use super::line::{self, Place};
 use super::roads::{CELL, COARSE, Chain, Class, Roads, WIDE, node_of};
 use super::search::{Cost, least_cost_path, step_cost};

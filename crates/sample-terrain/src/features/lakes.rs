@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 
 use crate::playa::Playa;
 
-use super::ground::{Ground, NODES, Node, SIDE, STEP_M, cells, place};
+use super::ground::Ground;
+use super::lattice::{NODES, Node, SIDE, STEP_M, cells, place};
 use super::line::{self, Place, between};
 
 /// Square metres below which a playa is no lake.

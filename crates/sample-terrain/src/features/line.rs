@@ -146,3 +146,42 @@ pub(super) fn place_at(line: &[Place], along_m: f64) -> Place {
     }
     line[line.len() - 1]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_that_crosses_itself_goes_straight_on() {
+        let loops = [[0.0, 0.0], [10.0, 0.0], [10.0, 5.0], [5.0, 5.0], [5.0, -5.0]];
+        assert_eq!(without_loops(&loops), [[0.0, 0.0], [5.0, 0.0], [5.0, -5.0]]);
+        let open = [[0.0, 0.0], [10.0, 0.0], [10.0, 5.0], [5.0, 5.0], [5.0, 1.0]];
+        assert_eq!(without_loops(&open), open);
+    }
+
+    #[test]
+    fn thinning_keeps_what_lies_farther_aside_than_it_may() {
+        let line = [[0.0, 0.0], [10.0, 3.0], [20.0, 0.0], [30.0, 3.0], [40.0, 0.0]];
+        assert_eq!(thin(&line, &[4.0; 5]), [[0.0, 0.0], [40.0, 0.0]]);
+        assert_eq!(thin(&line, &[4.0, 2.0, 4.0, 4.0, 4.0]), [[0.0, 0.0], [10.0, 3.0], [40.0, 0.0]]);
+    }
+
+    #[test]
+    fn rounding_and_spacing_out_keep_both_ends() {
+        let line = [[0.0, 0.0], [100.0, 0.0], [100.0, 100.0]];
+        let round = round_corners(&line, 40.0, 3);
+        assert_eq!((round[0], round[round.len() - 1]), (line[0], line[2]));
+        assert!(round.iter().all(|place| distance(*place, [100.0, 0.0]) > 5.0), "the corner is cut");
+        let spaced = space_out(&round, 30.0);
+        assert_eq!((spaced[0], spaced[spaced.len() - 1]), (line[0], line[2]));
+        assert!(spaced.windows(2).all(|leg| 14.9 < distance(leg[0], leg[1])));
+    }
+
+    #[test]
+    fn a_part_of_a_line_ends_where_it_is_cut() {
+        let line = [[0.0, 0.0], [100.0, 0.0], [100.0, 100.0]];
+        assert_eq!(part(&line, 50.0, 150.0), [[50.0, 0.0], [100.0, 0.0], [100.0, 50.0]]);
+        assert_eq!(part(&line, 0.0, 200.0), line);
+        assert_eq!(place_at(&line, 130.0), [100.0, 30.0]);
+    }
+}

@@ -1,22 +1,25 @@
 //! Roads, washes and lakes of the built-in terrain: pure functions of the seed and the place, as the ground is.
 //!
 //! ```text
-//! ground   heights every 100 m, in squares of 12.8 km       lakes   floors of playas
-//! washes   each square drained to playas and gates          roads   the network of a cell of 64 km, every 400 m
-//! bridges  highways cut where they cross a large wash       chains  where each road runs, every 100 m, smoothed
+//! lattice  nodes every 100 m, in squares of 12.8 km     ground  heights and washes of squares that are asked for
+//! washes   each square drained to playas and gates      lakes   floors of playas
+//! roads    the network of a cell of 64 km, every 400 m  chains  where each road runs, every 100 m, smoothed
+//! bridges  highways cut where they cross a large wash
 //! ```
 
 mod bridges;
 mod chains;
 mod ground;
 mod lakes;
+mod lattice;
 mod line;
 mod roads;
 mod search;
 mod washes;
 
 use chains::Strips;
-use ground::{Ground, SIDE, cells};
+use ground::Ground;
+use lattice::{SIDE, cells};
 use line::Place;
 use roads::{CELL, Class, Roads};
 
@@ -56,8 +59,8 @@ enum Family {
 /// are `waterway = stream` and playas `natural = water`, both `intermittent`. Roads share vertices where they meet;
 /// roads and washes share none.
 ///
-/// Roads are laid out for cells of 64 km, so a small rectangle costs some 40 ms and 50 km x 50 km six times that. A
-/// rectangle without a size, or with one that is no number, has no features.
+/// Roads are laid out for cells of 64 km, so a small rectangle costs nearly 0.1 s and 50 km x 50 km about 0.3 s on one
+/// core of 2.3 GHz. A rectangle without a size, or with one that is no number, has no features.
 pub fn features(seed: u64, west_m: f64, south_m: f64, east_m: f64, north_m: f64) -> Vec<SampleFeature> {
     let rect = Rect { low: [west_m, south_m], high: [east_m, north_m] };
     if !(west_m < east_m && south_m < north_m && (east_m - west_m + north_m - south_m).is_finite()) {
@@ -99,7 +102,7 @@ fn add_roads(ground: &mut Ground, cell: (i64, i64), rect: Rect, found: &mut Vec<
     let chains = roads.chains();
     let strips = Strips::of(cell, &chains);
     for (number, chain) in chains.iter().enumerate() {
-        let nodes: Vec<Place> = chain.nodes.iter().map(|&at| ground::place(roads::node_of(cell, at))).collect();
+        let nodes: Vec<Place> = chain.nodes.iter().map(|&at| lattice::place(roads::node_of(cell, at))).collect();
         if !rect.widened(chains::REACH_M).touches(&nodes) {
             continue;
         }
@@ -151,15 +154,14 @@ impl Rect {
         line.windows(2).any(|leg| {
             // What is left of the leg between each pair of sides.
             let (mut from, mut to) = (0.0_f64, 1.0_f64);
-            for axis in 0..2 {
-                let (start, rise) = (leg[0][axis], leg[1][axis] - leg[0][axis]);
-                let (low, high) = (self.low[axis] - start, self.high[axis] - start);
-                if rise == 0.0 {
-                    if 0.0 < low || high < 0.0 {
+            let axes = leg[0].into_iter().zip(leg[1]).zip(self.low.into_iter().zip(self.high));
+            for ((start, end), (low, high)) in axes {
+                if start == end {
+                    if start < low || high < start {
                         return false;
                     }
                 } else {
-                    let (near, far) = (low / rise, high / rise);
+                    let (near, far) = ((low - start) / (end - start), (high - start) / (end - start));
                     (from, to) = (from.max(near.min(far)), to.min(near.max(far)));
                 }
             }

@@ -9,7 +9,8 @@ use crate::noise::Stream;
 use crate::playa::Playa;
 use crate::region::Region;
 
-use super::ground::{Ground, Node, STEP_M, place};
+use super::ground::Ground;
+use super::lattice::{Node, STEP_M, place};
 use super::search::{Cost, least_cost_path, step_cost};
 
 /// Steps of the lattice of the ground a side of a cell.

@@ -10,7 +10,7 @@ use std::collections::BinaryHeap;
 use crate::noise::Stream;
 use crate::region::Region;
 
-use super::ground::{NODES, Node, SIDE, Square, place};
+use super::lattice::{NODES, Node, SIDE, Square, place};
 use super::line::{self, Place};
 
 /// Hundredths of a square kilometre that have to drain to a place before a wash is drawn there.
@@ -73,15 +73,19 @@ impl Washes {
             let inside = (0..NODES * NODES).filter(|&at| 0 < steps_inside(at));
             out.extend(inside.reduce(|low, at| if height_m[at] < height_m[low] { at } else { low }));
         }
-        out.extend(Flow::to(&out, &height_m).basins(&height_m));
-        let flow = Flow::to(&out, &height_m);
+        let mut flow = Flow::to(&out, &height_m);
+        let basins = flow.basins(&height_m);
+        if !basins.is_empty() {
+            out.extend(basins);
+            flow = Flow::to(&out, &height_m);
+        }
         for &at in flow.order.iter().rev() {
             if flow.next[at as usize] != NONE {
                 areas[flow.next[at as usize] as usize] += areas[at as usize];
             }
         }
         let drawn: Vec<bool> = areas.iter().map(|&area| DRAWN <= area).collect();
-        Self { reaches: reaches(&flow, &areas, &drawn, number), drawn }
+        Self { reaches: reaches(square, &flow, &areas, &drawn, number), drawn }
     }
 }
 
@@ -231,8 +235,14 @@ impl Flow {
 }
 
 /// The stretches between springs, confluences and mouths.
-fn reaches(flow: &Flow, areas: &[u32], drawn: &[bool], number: (i64, i64)) -> Vec<Reach> {
-    let next = |at: usize| (flow.next[at] != NONE).then_some(flow.next[at] as usize);
+fn reaches(square: &Square, flow: &Flow, areas: &[u32], drawn: &[bool], number: (i64, i64)) -> Vec<Reach> {
+    // A wash ends well inside its playa, because the shore is smoothed.
+    let deeper = |at: usize| {
+        let is_deeper = |&other: &usize| square.is_playa(other) && square.raw_m[other] < square.raw_m[at];
+        let deeper = beside(at).filter(is_deeper).filter(|_| drawn[at] && square.is_playa(at));
+        deeper.reduce(|low, other| if square.raw_m[other] < square.raw_m[low] { other } else { low })
+    };
+    let next = |at: usize| if flow.next[at] == NONE { deeper(at) } else { Some(flow.next[at] as usize) };
     let mut comes_in = vec![0_u8; drawn.len()];
     for at in (0..drawn.len()).filter(|&at| drawn[at]) {
         if let Some(next) = next(at) {
