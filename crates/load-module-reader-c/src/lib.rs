@@ -487,18 +487,6 @@ pub unsafe extern "C" fn lmr_decks_at(ground: *const LoadedGround, index: usize,
     // SAFETY: the caller's word.
     let Some(ground) = (unsafe { given(ground) }) else { return 0 };
     let Some(found) = ground.modules().get(index).map(|found| &found.module().decks) else { return 0 };
-    let told = Decks {
-        vertices: start(&found.vertices),
-        vertex_count: found.vertices.len(),
-        triangles: start(&found.triangles),
-        classes: start(&found.classes),
-        triangle_count: found.triangles.len(),
-    };
     // SAFETY: the caller's word.
-    unsafe { give(decks, told) }
-}
-
-/// Where a list begins; null for an empty one.
-fn start<T>(list: &[T]) -> *const T {
-    if list.is_empty() { std::ptr::null() } else { list.as_ptr() }
+    unsafe { give(decks, Decks::of(found)) }
 }

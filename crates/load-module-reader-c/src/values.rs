@@ -39,6 +39,24 @@ pub struct Decks {
     pub(crate) triangle_count: usize,
 }
 
+impl Decks {
+    /// Those of a load module, which outlives what is pointed to.
+    pub(crate) fn of(decks: &load_module_reader::Decks) -> Self {
+        Self {
+            vertices: start(&decks.vertices),
+            vertex_count: decks.vertices.len(),
+            triangles: start(&decks.triangles),
+            classes: start(&decks.classes),
+            triangle_count: decks.triangles.len(),
+        }
+    }
+}
+
+/// Where a list begins; null for an empty one.
+fn start<T>(list: &[T]) -> *const T {
+    if list.is_empty() { std::ptr::null() } else { list.as_ptr() }
+}
+
 /// `lmr_module`.
 #[repr(C)]
 pub struct Module {

@@ -9,8 +9,8 @@
 //! of load modules into memory as [`LoadedGround`], and [`LoadedGround::moved`] follows the observer and reads only
 //! what is new.
 //! Decks of bridges hang above the ground: [`LoadedGround::height_m`] is that of the ground,
-//! [`LoadedGround::height_below_m`] that of the topmost of ground and decks not above a ceiling, for vehicles that drive
-//! over a bridge and under it.
+//! [`LoadedGround::height_below_m`] that of the topmost of ground and decks not above a ceiling, for vehicles that
+//! drive over a bridge and under it.
 //! A query takes constant expected time. [`SlmFile`] is the plain way to read one whole file.
 //! Where load modules have several levels of detail, all of this is about the finest, and [`Area::load_level`] brings
 //! in another.

@@ -144,8 +144,8 @@ impl LoadedGround {
         self.deck_below(index, place, ceiling_m).map_or(ground, |deck| Some(ground.map_or(deck, |m| m.max(deck))))
     }
 
-    /// [`LoadedGround::height_below_m`] at many places at once, each an easting, a northing and a ceiling, in `heights_m`,
-    /// NaN where there is none.
+    /// [`LoadedGround::height_below_m`] at many places at once, each an easting, a northing and a ceiling, in
+    /// `heights_m`, NaN where there is none.
     ///
     /// # Panics
     /// When the two lists differ in length.
