@@ -4,8 +4,11 @@ use database::{FileStamp, Measured, TileModules};
 use engine::{Artifact, Fingerprint, Key, Outcome, Stamp, keep_or_make};
 use fidelity::{Residuals, Tally};
 use job::{Borders, ClipHeights as JobClipHeights, Edges, Job, OuterBorder};
-use load_modules::{ClipHeights, Layout, clip, concatenate, cut_decks};
-use terrain::{HOLE_CLASS, LatticePoint, LoadModule, ModuleCounts, Post, PostRect, TileId, Tin, Vertex};
+use load_modules::{ClipHeights, Face, Faces, Layout, clip, concatenate, cut_decks};
+use terrain::{
+    FeatureSurface, HOLE_CLASS, LatticePoint, LoadModule, ModuleCounts, Post, PostRect, TileFeatures, TileId, Tin,
+    Vertex,
+};
 
 use crate::assembled::{Assembled, ModuleNumbers};
 use crate::keys::{self, StampOf};
@@ -87,8 +90,10 @@ fn make(assembling: &Assembling, stamp: &Stamp) -> Result<(Assembled, Sums), Com
     let window = run.window(tile)?;
     let layout = Layout { grid: area.grid, modules: area.tiling.modules(tile, area.grid), spacing: area.frame.spacing };
     let own = run.tin(tile, &stamps(area.tiling.index(tile)))?;
+    let features = run.tile_features(tile)?;
+    let faces = faces(&features);
     let mut modules = match run.job.modules.edges {
-        Edges::Constrained => concatenate(&own.tin, &layout, &window.importance),
+        Edges::Constrained => concatenate(&own.tin, &layout, &window.importance, faces.as_ref()),
         Edges::Clip(heights) => {
             let points = points_around(run, stamps, removed, tile)?;
             let heights = match heights {
@@ -98,12 +103,11 @@ fn make(assembling: &Assembling, stamp: &Stamp) -> Result<(Assembled, Sums), Com
             clip(&points, &layout, heights, &window.importance)
         }
     };
-    let features = run.tile_features(tile)?;
     let decks = cut_decks(&features.decks, features.kept.steps_per_post, &layout);
     modules.iter_mut().zip(decks).for_each(|(module, decks)| module.decks = decks);
     let residuals = fidelity::measure(&mut modules, &window.measured(area));
     let at_source = run.ground.relief.residuals_at_source(&modules, area, area.tiling.rect(tile))?;
-    let mut levels = all_levels(run, modules, &layout, &window);
+    let mut levels = all_levels(run, modules, (&layout, &window), (&features.kept, faces.as_ref()));
     levels[1..].iter_mut().for_each(|level| drop(fidelity::measure(level, &window.measured(area))));
     let file = publish(run, tile, &layout, fingerprint, &levels)?;
     let counted = count_points(run, &own.tin, &removed[area.tiling.index(tile)], &window.importance);
@@ -113,6 +117,15 @@ fn make(assembling: &Assembling, stamp: &Stamp) -> Result<(Assembled, Sums), Com
     let sums = sums(residuals, at_source, counted, heights);
     done.measured = run.database.write_measured(stamp, &to_measured(tile, &done, &sums))?;
     Ok((done, sums))
+}
+
+/// Ground that has the class of a feature; nothing where there is none.
+fn faces(features: &TileFeatures) -> Option<Faces> {
+    let same = |a: &FeatureSurface, b: &FeatureSurface| (a.class, a.ground, a.body) == (b.class, b.ground, b.body);
+    let ring = |surface: &FeatureSurface| surface.ring.iter().map(|vertex| vertex.at).collect();
+    let face = |body: &[FeatureSurface]| Face { class: body[0].class, rings: body.iter().map(ring).collect() };
+    let all: Vec<Face> = features.surfaces.chunk_by(same).map(face).collect();
+    (!all.is_empty()).then(|| Faces::new(&all, features.kept.steps_per_post))
 }
 
 fn sums(
