@@ -5,7 +5,7 @@ use std::fs;
 
 use database::{AreaLevel, Folder, LineRole};
 use features::Kind;
-use load_module_reader::{Area, Block, Keep, LoadedGround};
+use load_module_reader::{Area, Block, Keep, LoadedGround, Module, SlmFile};
 use terrain::{Dem, LatticePoint, TileFeatures, TileId, Tin, quanta_of_metres};
 
 use crate::scene::{EPSG, ORIGIN_M, SIDE_CELLS, Scene, Words};
@@ -101,6 +101,8 @@ pub struct Laid {
     pub level: AreaLevel,
     pub tiles: Vec<(TileFeatures, Tin)>,
     pub ground: LoadedGround,
+    /// Load modules at their finest level, as the reader for simulators has them.
+    modules: Vec<Module>,
     classes: Vec<String>,
 }
 
@@ -113,7 +115,9 @@ impl Laid {
         let grid = area.grid;
         let ground = read.load(Block { south: 0, west: 0, north: grid.rows, east: grid.cols }).unwrap();
         let (_, _, level) = folder.read_level().unwrap();
-        Self { level, tiles: area.tiles.iter().map(of).collect(), ground, classes: scene.job.class_names() }
+        let file = |&tile: &TileId| SlmFile::open(folder.modules_path(tile)).unwrap().modules().to_vec();
+        let modules = area.tiles.iter().flat_map(file).collect();
+        Self { modules, level, tiles: area.tiles.iter().map(of).collect(), ground, classes: scene.job.class_names() }
     }
 
     /// The height of the load modules at a place, in metres.
@@ -127,6 +131,26 @@ impl Laid {
     pub fn class(&self, (east, north): At) -> &str {
         let sample = self.ground.sample([ORIGIN_M[0] + east, ORIGIN_M[1] + north]).unwrap();
         &self.classes[usize::from(sample.class)]
+    }
+
+    /// Heights in quanta of all vertices of triangles of a kind's class.
+    pub fn heights_of(&self, kind: Kind) -> BTreeSet<i32> {
+        let class = self.classes.iter().position(|name| name == kind.name()).unwrap() as u8;
+        let mut heights = BTreeSet::new();
+        for module in &self.modules {
+            for (triangle, of) in module.triangles.iter().zip(&module.classes) {
+                if *of == class {
+                    heights.extend(triangle.map(|v| module.vertices[usize::from(v)].z));
+                }
+            }
+        }
+        heights
+    }
+
+    /// The topmost of ground and decks not above a ceiling, in metres.
+    #[track_caller]
+    pub fn height_below(&self, (east, north): At, ceiling: f64) -> f64 {
+        self.ground.height_below_m([ORIGIN_M[0] + east, ORIGIN_M[1] + north], ceiling).unwrap()
     }
 
     /// Lines of a role, of the classes of a kind.

@@ -60,7 +60,10 @@ fn a_bridge_leaves_the_ground_below_it_alone_and_its_approaches_stay_up() {
     let bottom = (1000.0, 700.0);
     assert!((with.height(bottom) - without.height(bottom)).abs() < 3.0, "the gorge stays open");
     assert!(590.0 < with.height((905.0, 700.0)), "{}", with.height((905.0, 700.0)));
-    assert!(with.tiles.iter().any(|(features, _)| !features.decks.is_empty()), "there is a deck");
+    // Over the bridge, and under it.
+    let (over, under) = (with.height_below(bottom, 1000.0), with.height_below(bottom, 580.0));
+    assert!(590.0 < over && (under - with.height(bottom)).abs() < 0.02, "{over} {under}");
+    assert_eq!(with.height_below((1000.0, 760.0), 1000.0), with.height((1000.0, 760.0)));
 }
 
 #[test]

@@ -48,6 +48,7 @@ fn a_lake_over_four_tiles_with_an_island_is_level_and_no_shore_lies_below_it() {
         assert!((laid.height(at) - level).abs() < 1.0 / 64.0, "{at:?}: {} and {level}", laid.height(at));
         assert_eq!(laid.class(at), "lake");
     }
+    assert_eq!(laid.heights_of(Kind::Lake).len(), 1, "all vertices of the lake have one height");
     for at in [(660.0, 1000.0), (1400.0, 1000.0), (1000.0, 1340.0)] {
         assert!(level - 0.02 <= laid.height(at), "{at:?} lies below the lake");
     }
