@@ -87,7 +87,7 @@ fn make(assembling: &Assembling, stamp: &Stamp) -> Result<(Assembled, Sums), Com
     let layout = Layout { grid: area.grid, modules: area.tiling.modules(tile, area.grid), spacing: area.frame.spacing };
     let own = run.tin(tile, &stamps(area.tiling.index(tile)))?;
     let mut modules = match run.job.modules.edges {
-        Edges::Constrained => concatenate(&own.tin, &layout, &window.importance),
+        Edges::Constrained => concatenate(&own.tin, &layout, &window.importance, None),
         Edges::Clip(heights) => {
             let points = points_around(run, stamps, removed, tile)?;
             let heights = match heights {

@@ -54,7 +54,7 @@ fn without_limit(run: &Run, window: &Window, module: ModuleId, part: &Tin, extra
     };
     let here = ModuleRect { south: module.row, west: module.col, north: module.row + 1, east: module.col + 1 };
     let layout = Layout { grid: run.area.grid, modules: here, spacing: run.area.frame.spacing };
-    let mut modules = concatenate(&tin, &layout, &window.importance);
+    let mut modules = concatenate(&tin, &layout, &window.importance, None);
     fidelity::measure(&mut modules, &window.measured(&run.area));
     modules[0].residual
 }

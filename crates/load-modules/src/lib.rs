@@ -20,7 +20,9 @@ pub use clip::{ClipHeights, clip, halo_posts};
 mod hole;
 mod removals;
 pub use removals::{Freed, Removal, RemovalGround, propose_removals};
+mod faces;
 mod levels;
+pub use faces::{Face, Faces};
 pub use levels::{LevelFeatures, LevelGround, Levels, coarser_levels};
 #[cfg(test)]
 mod sheets;

@@ -17,7 +17,7 @@ mod tests;
 
 use terrain::{Importance, LoadModule, LodBorder, ModuleResidual, ModuleVertex, Side};
 
-use crate::{Layout, classes, pieces};
+use crate::{Faces, Layout, classes, pieces};
 use level_mesh::{LevelMesh, is_inside};
 pub use posts::LevelGround;
 use posts::Posts;
@@ -33,20 +33,22 @@ pub struct Levels<'a> {
     pub flips: bool,
     /// What each level keeps of the features, as long as `inner_shares`, or nothing at all; a coarser one keeps no more
     /// than a finer one.
-    pub features: &'a [LevelFeatures],
+    pub features: &'a [LevelFeatures<'a>],
 }
 
 /// What a level keeps of roads, rivers and shores, by places in the list of the finest level's vertices.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct LevelFeatures {
+pub struct LevelFeatures<'a> {
     /// Vertices that stay where and as high as they are, those of `edges` and beside them those on a side that belong
     /// to an edge in the load module next to it.
     pub vertices: Vec<u16>,
     /// Edges that stay.
     pub edges: Vec<[u16; 2]>,
+    /// What gives its triangles classes before the mask does.
+    pub faces: Option<&'a Faces>,
 }
 
-impl LevelFeatures {
+impl LevelFeatures<'_> {
     fn all_vertices(&self) -> impl Iterator<Item = u16> {
         self.vertices.iter().copied().chain(self.edges.iter().flatten().copied())
     }
@@ -76,7 +78,7 @@ pub fn coarser_levels(finest: &LoadModule, layout: &Layout, levels: &Levels, gro
         }
         features(level).all_vertices().for_each(|v| stays[usize::from(v)] = true);
         let sheet = fitted(finest, &stays, features(level), levels.flips, &posts);
-        load_module(finest, sheet, layout, ground.mask)
+        load_module(finest, sheet, layout, (ground.mask, features(level).faces))
     };
     (0..count).map(level).collect()
 }
@@ -108,7 +110,12 @@ fn fitted(finest: &LoadModule, stays: &[bool], features: &LevelFeatures, flips: 
 }
 
 /// The load module that a sheet is.
-fn load_module(finest: &LoadModule, sheet: LevelMesh, layout: &Layout, mask: &Importance) -> LoadModule {
+fn load_module(
+    finest: &LoadModule,
+    sheet: LevelMesh,
+    layout: &Layout,
+    (mask, faces): (&Importance, Option<&Faces>),
+) -> LoadModule {
     let (vertices, triangles) = sheet.into_lists();
     let mut module = LoadModule {
         id: finest.id,
@@ -119,7 +126,7 @@ fn load_module(finest: &LoadModule, sheet: LevelMesh, layout: &Layout, mask: &Im
         classes: Vec::new(),
         residual: ModuleResidual::default(),
     };
-    module.classes = classes::of_triangles(&module, layout, mask);
+    module.classes = classes::of_triangles(&module, layout, mask, faces);
     let sides = 3 * module.triangles.len();
     pieces::assert_sound(&module, sides);
     module
