@@ -5,7 +5,7 @@ use std::ops::Deref;
 use ground::GamingArea;
 use job::{Allocation, Borders, Budget as PointBudget, Edges, Effort, ErrorKey, Job, Method, OuterBorder};
 use limits::Allowance;
-use terrain::{Features, LatticePoint, ModuleId, ModuleRect, Post, SeamSides, Side, TileId, TileTin, Vertex};
+use terrain::{Features, ModuleId, ModuleRect, Post, SeamSides, Side, TileId, TileTin, Vertex};
 use tiling::{Tiling, outer_border_posts, outer_sides};
 use tin::{CostUnit, Frame, Proximity, Rule, Stop, SurveyTask, TileTask};
 
@@ -201,27 +201,31 @@ fn survey_allowance(area: &GamingArea, modules: ModuleRect, triangles: u32) -> A
     }
 }
 
-/// The vertices a tile's TIN has on one of its sides, in canonical order.
-pub(crate) fn side_vertices(tin: &TileTin, side: Side) -> Vec<Vertex> {
-    let (low, high) = (tin.tin.place_of(tin.tin.rect.south_west()), tin.tin.place_of(tin.tin.rect.north_east()));
-    let on_side = |at: LatticePoint| match side {
-        Side::South => at.row == low.row,
-        Side::East => at.col == high.col,
-        Side::North => at.row == high.row,
-        Side::West => at.col == low.col,
+/// The border points a tile's TIN has on one of its sides, in canonical order: vertices on posts, counted in eighths
+/// whatever lattice the TIN stands on. Vertices of features between posts both tiles have from the features.
+fn side_vertices(tin: &TileTin, side: Side) -> Vec<Vertex> {
+    let rect = tin.tin.rect;
+    let on_side = |post: Post| match side {
+        Side::South => post.row == rect.south,
+        Side::East => post.col == rect.east,
+        Side::North => post.row == rect.north,
+        Side::West => post.col == rect.west,
     };
-    let mut found: Vec<Vertex> = tin.tin.vertices.iter().copied().filter(|vertex| on_side(vertex.at)).collect();
+    let on_post = |vertex: &Vertex| {
+        let post = tin.tin.post_at(vertex.at).filter(|&post| on_side(post))?;
+        Some(Vertex { at: post.into(), height: vertex.height })
+    };
+    let mut found: Vec<Vertex> = tin.tin.vertices.iter().filter_map(on_post).collect();
     found.sort_unstable();
     found
 }
 
 /// The vertices on one side of a TIN that stand on posts and are none of features, in canonical order.
 pub(crate) fn seam_points(tin: &TileTin, side: Side, features: &Features) -> Vec<Vertex> {
-    let found = side_vertices(tin, side).into_iter().filter_map(|vertex| {
-        let post = tin.tin.post_at(vertex.at)?;
-        (!features.has_post(post)).then(|| Vertex { at: post.into(), ..vertex })
-    });
-    found.collect()
+    let is_of_feature = |vertex: &Vertex| vertex.at.post().is_some_and(|post| features.has_post(post));
+    let mut found = side_vertices(tin, side);
+    found.retain(|vertex| !is_of_feature(vertex));
+    found
 }
 
 /// What a tile inherits: the border points of its lower-ranked neighbours on the sides they share, but for vertices of
@@ -252,4 +256,33 @@ pub fn inherited<T: Deref<Target = TileTin>>(
 /// When one stands between posts: seam vertices never do.
 pub fn posts_of(vertices: &[Vertex]) -> Vec<Post> {
     vertices.iter().map(|vertex| vertex.at.post().expect("seam vertices stand on posts")).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use terrain::{LatticePoint, PostRect, StopReason, Tin};
+
+    use super::*;
+
+    #[test]
+    fn border_points_are_handed_on_in_eighths_and_features_between_posts_are_not() {
+        let vertex = |row: i32, col: i32, height: i32| Vertex { at: LatticePoint::new(row, col), height };
+        let rect = PostRect { south: 2, west: 1, north: 4, east: 5 };
+        let vertices = vec![vertex(256, 320, 5), vertex(256, 64, 1), vertex(256, 128, 2), vertex(256, 150, 3)];
+        let tin = Tin { steps_per_post: 64, ..Tin::new(rect, vertices, Vec::new()) };
+        let tin = TileTin {
+            tile: TileId { row: 0, col: 0 },
+            tin,
+            initial_count: 0,
+            residuals: Vec::new(),
+            triangles_charged: 0,
+            refused: Vec::new(),
+            stop: StopReason::Exhausted,
+        };
+        let north = [vertex(32, 8, 1), vertex(32, 16, 2), vertex(32, 40, 5)];
+        assert_eq!(side_vertices(&tin, Side::North), north);
+        assert_eq!(side_vertices(&tin, Side::East), north[2..]);
+        assert_eq!(side_vertices(&tin, Side::South), []);
+        assert_eq!(posts_of(&north), [Post::new(4, 1), Post::new(4, 2), Post::new(4, 5)]);
+    }
 }

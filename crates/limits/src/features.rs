@@ -7,32 +7,10 @@ use std::collections::BTreeMap;
 
 use terrain::{Features, LatticePoint, ModuleGrid, ModuleId, ModuleRect, POINT_COST, Post};
 
-use crate::{Allowance, Charged, ModuleLines};
+use crate::{Allowance, Charged, ModuleLines, ShortOf, Shortfall};
 
 /// Triangles that features add to each load module, by load module.
 pub type FeatureCost = BTreeMap<ModuleId, u32>;
-
-/// An allowance that features alone exceed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Shortfall {
-    /// Whose allowance.
-    pub of: ShortOf,
-    /// Triangles that features take there.
-    pub needed: u32,
-    /// Triangles that there are.
-    pub room: u32,
-}
-
-/// Whose allowance falls short.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum ShortOf {
-    /// A load module's.
-    Module(ModuleId),
-    /// That of the window with this south-west load module.
-    Window(ModuleId),
-    /// That of the whole tile.
-    Tile,
-}
 
 /// What features cost in the load modules of `grid`. `border` are the posts that the outer border starts with, in
 /// ascending order: a vertex on one of them costs nothing more.

@@ -4,9 +4,10 @@ use limits::{Charged, ShortOf, Shortfall, TileLedger};
 use terrain::{ModuleId, ModuleRect, POINT_COST, RefusedBy};
 
 use crate::hold::Hold;
+use crate::parts::{NONE, Vertex};
 use crate::place::{PER_POST, Place};
 use crate::task::Budget;
-use crate::tile_mesh::{NONE, TileMesh, Vertex};
+use crate::tile_mesh::TileMesh;
 
 /// The budget as it is spent and refunded, and what was lent beyond it for a while.
 pub(crate) struct Account {

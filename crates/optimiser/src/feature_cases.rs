@@ -104,7 +104,8 @@ fn an_edge_that_cannot_be_kept_is_told_and_every_other_is_there() {
         features.vertices.push(terrain::Vertex { at: LatticePoint::new(row, col), height: 7 });
         features.vertices.len() as u32 - 1
     };
-    // One crosses an edge that comes before it, one a line of load modules; one runs through the end of another and is there in two pieces.
+    // One crosses an edge that comes before it, one a line of load modules; one runs through the end of another and is
+    // there in two pieces.
     let crossing = [vertex(600, 600), vertex(601, 1200)];
     let beyond = [vertex(LINE - 40, 50), vertex(LINE + 40, 51)];
     let through = [vertex(80, 100), vertex(120, 100)];

@@ -43,17 +43,22 @@ pub(crate) fn counted(tin: &Tin, task: &Task) -> BTreeMap<ModuleId, u32> {
         let of = |pick: fn(&LatticePoint) -> i32| {
             (corners.iter().map(|at| i64::from(pick(at))).sum::<i64>() / (3 * line)) as u32
         };
-        *count.get_mut(&ModuleId { row: of(|at| at.row), col: of(|at| at.col) }).unwrap() += 1;
+        *count
+            .get_mut(&ModuleId { row: of(|at| at.row), col: of(|at| at.col) })
+            .expect("triangles lie in load modules") += 1;
     }
     for post in task.held.iter().filter_map(|at| at.post()) {
         let is_corner = post.row % SIDE == 0 && post.col % SIDE == 0;
         let module = |v: i32, last: u32| (v / SIDE).min(last as i32 - 1) as u32;
         if !is_corner {
             let module = ModuleId { row: module(post.row, GRID.rows), col: module(post.col, GRID.cols) };
-            *count.get_mut(&module).unwrap() -= 1;
+            *count.get_mut(&module).expect("held posts lie in load modules") -= 1;
         }
     }
-    count.into_iter().map(|(module, count)| (module, u32::try_from(count).unwrap())).collect()
+    count
+        .into_iter()
+        .map(|(module, count)| (module, u32::try_from(count).expect("a load module has two triangles at least")))
+        .collect()
 }
 
 #[track_caller]
@@ -90,7 +95,7 @@ fn every_edge_and_every_vertex_of_features_is_in_the_tin_at_every_effort_and_lim
         let dem = if seed % 2 == 0 { rough(RECT, seed) } else { sloped(seed) };
         let features = mixed(RECT, SIDE, seed).features(&dem);
         assert!(40 < features.edges.len(), "{} edges", features.edges.len());
-        let dearest = feature_cost(&features, GRID, &[]).into_values().max().unwrap();
+        let dearest = feature_cost(&features, GRID, &[]).into_values().max().expect("features cost something");
         for effort in EFFORTS {
             // A fast tile is not thinned: it is grown within its budget.
             let start = grid(&dem, if effort == Effort::Fast { 10 } else { 4 });
@@ -169,7 +174,7 @@ fn the_order_in_which_features_are_given_changes_no_bit() {
     draw.shuffle(&mut order);
     let mut other = features.clone();
     other.vertices = order.iter().map(|&v| features.vertices[v as usize]).collect();
-    let place = |v: u32| order.iter().position(|&w| w == v).unwrap() as u32;
+    let place = |v: u32| order.iter().position(|&w| w == v).expect("the order names all") as u32;
     other.edges = features.edges.iter().map(|&[a, b]| [place(b), place(a)]).collect();
     draw.shuffle(&mut other.edges);
     assert_eq!(done(other), expected);

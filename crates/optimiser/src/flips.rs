@@ -1,9 +1,10 @@
 //! Flips: the other diagonal of two triangles, where it fits the ground better.
 
 use crate::form::{Form, squares};
+use crate::parts::NONE;
 use crate::patch::Patch;
 use crate::place::{Place, Shape};
-use crate::tile_mesh::{NONE, TileMesh, next, previous};
+use crate::tile_mesh::{TileMesh, next, previous};
 
 /// Passes at most; hardly any mesh needs more than six.
 const PASSES_MAX: usize = 10;

@@ -3,10 +3,11 @@
 use crate::form::{Form, squares};
 use crate::hold::Hold;
 use crate::moments::Sums;
+use crate::parts::NONE;
 use crate::patch::Patch;
 use crate::place::{Place, Shape};
 use crate::refit::Fit;
-use crate::tile_mesh::{NONE, TileMesh, next, previous};
+use crate::tile_mesh::{TileMesh, next, previous};
 
 /// Triangles one insertion may rewrite.
 const REACH_MAX: usize = 14;

@@ -8,14 +8,14 @@ use crate::exchange::{Exchange, Terms, Tools};
 use crate::flips::flip_all;
 use crate::hold::Hold;
 use crate::insertion::Insertion;
-use crate::parts::{Layout, Parts};
+use crate::parts::{Layout, NONE, Parts};
 use crate::place::{PER_POST, Place, Shape};
 use crate::queue::Queue;
 use crate::removal::Removal;
 use crate::sweep::{Mover, Steps};
 use crate::task::Task;
 use crate::thin::{Shears, Until, thin};
-use crate::tile_mesh::{NONE, Star, TileMesh};
+use crate::tile_mesh::{Star, TileMesh};
 use crate::weave::weave;
 use crate::weighted_heights::WeightedHeights;
 
@@ -439,20 +439,17 @@ impl Work<'_, '_> {
 
     /// Takes a vertex out, if that leaves a valid mesh.
     fn take_out(&mut self, vertex: u32) -> bool {
-        if self.removal.find(&self.sheet, vertex).is_none() {
-            return false;
-        }
-        self.account.refund(&self.sheet.vertices[vertex as usize]);
-        self.sheet.apply(&mut self.removal.patch);
-        self.sheet.drop_vertex(vertex);
-        true
+        let can_go = self.removal.find(&self.sheet, vertex).is_some();
+        can_go && self.let_go(vertex)
     }
 
     /// Takes a vertex out whatever the triangles look like that fill its place.
     fn force_out(&mut self, vertex: u32) -> bool {
-        if !self.removal.find_by_force(&self.sheet, vertex) {
-            return false;
-        }
+        self.removal.find_by_force(&self.sheet, vertex) && self.let_go(vertex)
+    }
+
+    /// Takes a vertex out as the removal has found it.
+    fn let_go(&mut self, vertex: u32) -> bool {
         self.account.refund(&self.sheet.vertices[vertex as usize]);
         self.sheet.apply(&mut self.removal.patch);
         self.sheet.drop_vertex(vertex);

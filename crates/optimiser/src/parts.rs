@@ -4,8 +4,23 @@ use terrain::{Tin, Vertex as TinVertex};
 
 use crate::hold::Hold;
 use crate::place::Place;
-use crate::tile_mesh::{NONE, Vertex};
 use crate::weighted_heights::WeightedHeights;
+
+/// No edge, no vertex, no triangle.
+pub(crate) const NONE: u32 = u32::MAX;
+
+/// One vertex.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Vertex {
+    pub at: Place,
+    /// In quanta above the ground's level.
+    pub height: f64,
+    /// An edge that leaves it; [`NONE`] once it is gone.
+    pub edge: u32,
+    pub hold: Hold,
+    /// Whether something near it changed since this was last asked.
+    pub is_stirred: bool,
+}
 
 /// Which vertices are held, and where lines run.
 pub(crate) struct Layout<'a> {

@@ -50,8 +50,8 @@ impl Removal {
         Some(new - self.fit.refit(sheet, &mut self.patch) - old)
     }
 
-    /// Removing a vertex whatever the shapes of the triangles that fill its hole; its patch is then ready to be applied.
-    /// `false` where it is given.
+    /// Removing a vertex whatever the shapes of the triangles that fill its hole; its patch is then ready to be
+    /// applied. `false` where it is given.
     pub fn find_by_force(&mut self, sheet: &TileMesh, vertex: u32) -> bool {
         let record = &sheet.vertices[vertex as usize];
         if !sheet.is_vertex(vertex) || record.hold.is_fixed() {

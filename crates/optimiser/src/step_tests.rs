@@ -7,14 +7,14 @@ use crate::exchange::{Exchange, Terms, Tools};
 use crate::flips::flip_all;
 use crate::hold::Hold;
 use crate::insertion::Insertion;
-use crate::parts::{Layout, Parts};
+use crate::parts::{Layout, NONE, Parts};
 use crate::place::{PER_POST, Place};
 use crate::removal::Removal;
 use crate::scene::{Caps, confined, even, grid, patchy, rough, spent};
 use crate::sweep::{Mover, Steps};
 use crate::task::Budget;
 use crate::thin::{Shears, Until, is_dearer, thin};
-use crate::tile_mesh::{NONE, TileMesh};
+use crate::tile_mesh::TileMesh;
 use crate::weighted_heights::WeightedHeights;
 
 const RECT: PostRect = PostRect { south: 7, west: -3, north: 67, east: 77 };

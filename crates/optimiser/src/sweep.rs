@@ -9,9 +9,10 @@ use crate::flips::flip_all;
 use crate::form::{Form, Hinge};
 use crate::hold::Hold;
 use crate::moments::Sums;
+use crate::parts::Vertex;
 use crate::place::{PER_POST, Place, Shape};
 use crate::refit::DAMPING;
-use crate::tile_mesh::{Star, TileMesh, Vertex, next};
+use crate::tile_mesh::{Star, TileMesh, next};
 
 /// Relative and absolute damping of steps in the plane.
 const PLANE_DAMPING: (f64, f64) = (0.01, 0.02);

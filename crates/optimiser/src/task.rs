@@ -21,8 +21,8 @@ pub struct Task {
     pub held: Vec<LatticePoint>,
     /// Posts that no vertex may come nearer to than to any other post, in ascending order; candidates they are none.
     pub forbidden: Vec<Post>,
-    /// Vertices and edges that the TIN has to keep, those of the tile only. What the budget permits comes on top of them
-    /// where it is one of limits, and counts them where it is a number.
+    /// Vertices and edges that the TIN has to keep, those of the tile only. What the budget permits comes on top of
+    /// them where it is one of limits, and counts them where it is a number.
     pub features: Features,
     /// Sides on which vertices may be chosen; those on the others are held, too.
     pub open: SeamSides,

@@ -6,25 +6,9 @@ use crate::curve::along_curve;
 use crate::form::Form;
 use crate::hold::Hold;
 use crate::moments::Sums;
-use crate::parts::{Parts, line_hold};
+use crate::parts::{NONE, Parts, Vertex, line_hold};
 use crate::place::{Place, is_eased};
 use crate::weighted_heights::WeightedHeights;
-
-/// No edge, no vertex, no triangle.
-pub(crate) const NONE: u32 = u32::MAX;
-
-/// One vertex.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Vertex {
-    pub at: Place,
-    /// In quanta above the ground's level.
-    pub height: f64,
-    /// An edge that leaves it; [`NONE`] once it is gone.
-    pub edge: u32,
-    pub hold: Hold,
-    /// Whether something near it changed since this was last asked.
-    pub is_stirred: bool,
-}
 
 /// One triangle, counter-clockwise. An edge is `4 * triangle + corner it leaves`.
 #[derive(Clone, Copy, Debug)]

@@ -9,9 +9,8 @@ use mesh::constrained_delaunay;
 use terrain::{Features, LatticePoint, PostRect};
 
 use crate::hold::Hold;
-use crate::parts::{Layout, Parts};
+use crate::parts::{Layout, NONE, Parts, Vertex};
 use crate::place::{PER_POST, Place};
-use crate::tile_mesh::{NONE, Vertex};
 use crate::weighted_heights::WeightedHeights;
 
 /// Posts nearer to a feature than so many steps go.
