@@ -68,18 +68,20 @@ pub fn units(stage: Stage, job: &Job, area: &GamingArea) -> Vec<Unit> {
 /// The units that one needs done.
 pub fn needs(unit: Unit, job: &Job, area: &GamingArea) -> Vec<Unit> {
     let all = |stage| units(stage, job, area);
+    // Features are part of the ground of every later stage, so each of them waits where that has to be decided again.
+    let and_level = |needs: Vec<Unit>| all(Stage::Level).into_iter().chain(needs).collect();
     match (unit.stage, unit.tile) {
         (Stage::Level, _) => all(Stage::Profile),
         (Stage::Survey, _) => all(Stage::Level),
-        (Stage::Allocate, _) => all(Stage::Level).into_iter().chain(all(Stage::Survey)).collect(),
+        (Stage::Allocate, _) => and_level(all(Stage::Survey)),
         (Stage::Refine, Some(tile)) => {
             let lower = |other: &TileId| area.tiling.rank(*other) < area.tiling.rank(tile);
             let neighbours = area.tiling.neighbours(tile).into_iter().filter(lower);
             let inherited = neighbours.map(|other| Unit::of(Stage::Refine, other));
-            all(Stage::Allocate).into_iter().chain(inherited).collect()
+            and_level(all(Stage::Allocate).into_iter().chain(inherited).collect())
         }
         (Stage::Assemble, Some(tile)) => {
-            around(tile, job, area).into_iter().map(|other| Unit::of(Stage::Refine, other)).collect()
+            and_level(around(tile, job, area).into_iter().map(|other| Unit::of(Stage::Refine, other)).collect())
         }
         (Stage::Publish, _) => all(Stage::Assemble),
         _ => Vec::new(),
