@@ -348,7 +348,7 @@ mod tests {
             "{note}"
         );
         assert_eq!((table.sources[0].found, table.sources[0].outside), (1, 1));
-        for (text, told) in [("{\"type\":", "found"), ("", "found an empty file"), ("PK\x03\x04", "a zip archive")] {
+        for (text, told) in [("{\"type\":", "nor GeoJSON"), ("", "an empty file"), ("PK\x03\x04", "a zip archive")] {
             let error = table_of("sources = [\"b.geojson\"]", &[("b.geojson", text)]).unwrap_err();
             assert!(error.contains("b.geojson") && error.contains(told), "{error}");
         }

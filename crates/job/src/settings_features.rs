@@ -3,7 +3,7 @@
 use features::{Clearances, Rule, RuleKind};
 use terrain::metres_of_quanta;
 
-use crate::settings::{List, counted, number, quoted};
+use crate::setting_list::{List, counted, number, quoted};
 use crate::{Choice, FeatureSource, FeaturesSpec};
 
 pub(crate) fn describe(features: &FeaturesSpec, list: &mut List) {
