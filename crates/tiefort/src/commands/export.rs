@@ -32,8 +32,8 @@ files of modules hold all levels; 3dtiles puts levels coarser than K between a
 square of 4 km and its load modules. A mesh (ply, obj, glb) is counted in metres
 from the south-west corner of what is exported; the file itself and NAME.json
 beside it say where that is. Load modules are named ROW,COL from the south-west,
-nodes of a glb r0003c0017. Classes are materials (glb, 3dtiles, openflight),
-groups with NAME.mtl beside them (obj), attributes (gpkg); the faces of a ply come
+nodes of a glb r0003c0017. Classes are materials (glb, 3dtiles, openflight; obj
+with NAME.mtl) or attributes (gpkg); the faces of a ply come
 class by class, and comments in it say which are whose. Decks of bridges are
 meshes of their own, named decks; geotiff and quantized-mesh hold the ground
 alone. A geotiff is cloud optimised, with overviews; it names
