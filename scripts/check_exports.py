@@ -276,6 +276,10 @@ def datum(database):
     return [] if database.manifest["area"]["vertical_datum"] == "EGM96" else ["--assume-datum", "EGM96"]
 
 
+def with_decks(module):
+    return {"decks": {"vertices": [], "triangles": [], "classes": []}, **module}
+
+
 def check_modules(database, arguments, scratch):
     folder = export(arguments, "modules", scratch / "modules")
     files = sorted(folder.glob("*.slm"))
@@ -283,7 +287,9 @@ def check_modules(database, arguments, scratch):
     same = 0
     for path in files:
         _, levels = read_slm.parse(path.read_bytes())
-        same += levels == database.levels[levels[0]["row"], levels[0]["column"]]
+        # A file of one load module without decks is of version 1, and says nothing of them.
+        expected = database.levels[levels[0]["row"], levels[0]["column"]]
+        same += [with_decks(of) for of in levels] == [with_decks(of) for of in expected]
     expect(same == len(files), "each holds its load module as it is in the database, at every level")
     shutil.rmtree(folder)
 
