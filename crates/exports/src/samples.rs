@@ -36,6 +36,7 @@ pub(crate) fn product() -> Product {
     manifest.tiles = vec![TileRecord::missing(tile)];
     Product {
         manifest,
+        class_names: Vec::new(),
         grid: GRID,
         frame,
         rect,
@@ -64,6 +65,23 @@ pub(crate) fn with_hole() -> Product {
     let mut product = product();
     // Triangles 0 (south) and 1 (west) remain ground.
     product.modules[1].classes = vec![1, 0, HOLE_CLASS, HOLE_CLASS];
+    product
+}
+
+/// The same with a motorway on the ground, and a bridge with that class over the line between both load modules.
+pub(crate) fn with_bridge() -> Product {
+    let mut product = product();
+    product.class_names = ["default", "motorway", "track"].map(str::to_owned).to_vec();
+    let vertex = |x, y, z| ModuleVertex { y, x, z };
+    let square = |[west, east]: [u16; 2], [low, high]: [i32; 2], class| {
+        let south = [vertex(west, 30_000, low), vertex(east, 30_000, high)];
+        let north = [vertex(east, 30_640, high), vertex(west, 30_640, low)];
+        [([south[0], south[1], north[0]], class), ([south[0], north[0], north[1]], class)]
+    };
+    product.modules[0].decks = Decks::of_triangles(square([60_000, 64_000], [129_024, 129_152], 1));
+    let over = square([0, 9000], [129_152, 129_280], 1).into_iter().chain(square([0, 9000], [130_000, 130_128], 2));
+    product.modules[1].decks = Decks::of_triangles(over);
+    product.modules.iter().for_each(|module| assert_eq!(module.check(), Ok(())));
     product
 }
 

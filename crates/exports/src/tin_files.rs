@@ -10,7 +10,7 @@ use std::io::{Result, Write};
 use terrain::{QUANTA_PER_METRE, Tin, metres_of_quanta};
 
 use crate::Coordinates;
-use crate::polygon_files::{Ply, put_obj_faces, put_obj_vertices, put_ply};
+use crate::polygon_files::{Ply, put_obj_comments, put_obj_faces, put_obj_vertices, put_ply};
 
 /// Where a TIN of a raster's own posts lies.
 #[derive(Clone, Debug, PartialEq)]
@@ -77,7 +77,8 @@ pub fn write_tin_ply(out: &mut impl Write, tin: &Tin, place: &TinPlace, coordina
 /// Those of `out`.
 pub fn write_tin_obj(out: &mut impl Write, tin: &Tin, place: &TinPlace, coordinates: Coordinates) -> Result<()> {
     let zero_m = place.zero_m(tin, coordinates);
-    put_obj_vertices(out, &place.comments(zero_m, coordinates), place.metres(tin, zero_m))?;
+    put_obj_comments(out, &place.comments(zero_m, coordinates))?;
+    put_obj_vertices(out, place.metres(tin, zero_m))?;
     put_obj_faces(out, tin.triangles.iter())
 }
 

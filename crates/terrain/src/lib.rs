@@ -36,5 +36,7 @@ mod load_module;
 pub use load_module::{LoadModule, LoadModuleFault, ModuleCounts, ModuleResidual};
 mod choices;
 pub use choices::{Effort, HeightFit, LastBatch, Lattice, LodBorder, Resampling, Smooth, TileOrder};
+mod class_colors;
+pub use class_colors::named_class_color;
 mod breach;
 pub use breach::{Breach, BreachKind, BreachPlace};

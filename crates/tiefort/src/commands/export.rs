@@ -32,8 +32,11 @@ files of modules hold all levels; 3dtiles puts levels coarser than K between a
 square of 4 km and its load modules. A mesh (ply, obj, glb) is counted in metres
 from the south-west corner of what is exported; the file itself and NAME.json
 beside it say where that is. Load modules are named ROW,COL from the south-west,
-nodes of a glb r0003c0017. The faces of a ply come class by class; comments in
-it say which are whose. A geotiff is cloud optimised, with overviews; it names
+nodes of a glb r0003c0017. Classes are materials (glb, 3dtiles, openflight; obj
+with NAME.mtl) or attributes (gpkg); the faces of a ply come
+class by class, and comments in it say which are whose. Decks of bridges are
+meshes of their own, named decks; geotiff and quantized-mesh hold the ground
+alone. A geotiff is cloud optimised, with overviews; it names
 the system of its heights where that is known. Where no source has a height,
 rasters have none (NaN) and meshes no triangles; gpkg and modules keep these as
 class 'hole' (255), and quantized-mesh closes them and says where in
@@ -93,7 +96,7 @@ enum Format {
     Glb,
     /// A Cloud Optimized GeoTIFF of the compiled surface, or of its residual
     Geotiff,
-    /// A GeoPackage for QGIS: load modules, breaches, tiles, triangles, with styles
+    /// A GeoPackage for QGIS: load modules, breaches, tiles, triangles, decks, with styles
     Gpkg,
     /// A folder of OpenFlight 16.1 files, one for each 4 km square, and a MetaFlight index
     Openflight,
@@ -148,6 +151,21 @@ impl Format {
             Format::Geotiff => "NaN in the raster",
             Format::QuantizedMesh => "kept, since tiles must be closed; holes.geojson says where they are",
             Format::Ply | Format::Obj | Format::Glb | Format::Openflight | Format::Tiles3d => "left out",
+        }
+    }
+
+    /// Whether it has room for the ground alone, and decks are left out.
+    fn is_without_decks(self) -> bool {
+        matches!(self, Format::Geotiff | Format::QuantizedMesh)
+    }
+
+    /// What becomes of decks of bridges.
+    fn of_decks(self) -> &'static str {
+        match self {
+            Format::Modules => "in the files of their load modules",
+            Format::Gpkg => "in the layer decks",
+            Format::Geotiff | Format::QuantizedMesh => "left out: there is room for the ground alone",
+            Format::Ply | Format::Obj | Format::Glb | Format::Openflight | Format::Tiles3d => "meshes of their own",
         }
     }
 
@@ -241,12 +259,13 @@ fn export(arguments: &Arguments, work: &Work) -> Result<String, Failure> {
         folder.finish()?;
     }
     let triangles: usize = product.modules.iter().map(|module| module.triangles.len()).sum();
+    let triangles = triangles + if arguments.format.is_without_decks() { 0 } else { product.deck_triangles() };
     let modules = match product.modules.len() {
         1 => "1 load module".to_owned(),
         count => format!("{} load modules", grouped(count as u64)),
     };
     let said = said.map(|datum| format!("{}\n", datum.said())).unwrap_or_default();
-    let coarser: usize = product.coarser.iter().flatten().map(|module| module.triangles.len()).sum();
+    let coarser: usize = product.coarser.iter().flatten().map(|module| module.counts().triangles as usize).sum();
     let level = match (product.level, product.coarser.len()) {
         (0, 0) => String::new(),
         (level, 0) => format!(" at level {level}"),
@@ -259,7 +278,11 @@ fn export(arguments: &Arguments, work: &Work) -> Result<String, Failure> {
         1 => format!("1 triangle over a hole is {}\n", arguments.format.of_holes()),
         count => format!("{} triangles over holes are {}\n", grouped(count as u64), arguments.format.of_holes()),
     };
-    Ok(format!("{said}{holes}{modules}, {} triangles{level}", grouped(triangles as u64)))
+    let decks = match product.deck_triangles() {
+        0 => String::new(),
+        count => format!("{} triangles of decks are {}\n", grouped(count as u64), arguments.format.of_decks()),
+    };
+    Ok(format!("{said}{holes}{decks}{modules}, {} triangles{level}", grouped(triangles as u64)))
 }
 
 fn write_raster(arguments: &Arguments, product: &Product, work: &Work) -> Result<(), Failure> {
@@ -286,11 +309,17 @@ fn write_mesh(arguments: &Arguments, product: &Product) -> Result<(), Failure> {
         Format::Glb => Facts::y_up(product),
         _ => Facts::z_up(product, coordinates),
     };
+    let materials = exports::obj_materials(product, &mesh).filter(|_| arguments.format == Format::Obj);
+    let beside_it = arguments.out.with_extension("mtl");
+    let library = materials.as_ref().and(beside_it.file_name()).map(|name| name.to_string_lossy().into_owned());
     files::write_whole(&arguments.out, |out| match arguments.format {
-        Format::Obj => exports::write_obj(out, product, &mesh, coordinates),
+        Format::Obj => exports::write_obj(out, product, &mesh, coordinates, library.as_deref()),
         Format::Glb => exports::write_glb(out, product, &mesh),
         _ => exports::write_ply(out, product, &mesh, coordinates),
     })?;
+    if let Some(text) = materials {
+        files::write_whole(&beside_it, |out| std::io::Write::write_all(out, text.as_bytes()))?;
+    }
     let mut beside = arguments.out.clone().into_os_string();
     beside.push(".json");
     let text = exports::sidecar(product, &mesh, &facts);
