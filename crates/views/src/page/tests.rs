@@ -56,6 +56,7 @@ fn page_of(name: &str, with_ground: bool) -> String {
         ground: with_ground.then_some(SceneGround { dem: &dem, residuals: &residuals }),
         limits: &limits,
         water: None,
+        features: None,
         tiles: &[],
     };
     let settings = [PageSetting { key: "area.name".into(), value: format!("\"{name}\""), meaning: "its name".into() }];
@@ -133,6 +134,7 @@ fn the_most_that_is_seen_counts_load_modules_that_any_part_of_lies_near() {
         ground: None,
         limits: &limits,
         water: None,
+        features: None,
         tiles: &[],
     };
     assert_eq!(most_seen(&scene), Some((24, ModuleId { row: 0, col: 0 })));
