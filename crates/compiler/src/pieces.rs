@@ -258,7 +258,7 @@ pub(crate) fn area_level(run: &Run, read: &ReadFeatures, levelled: &Levelled, ti
         cost,
         reserved,
         lines: lines(run, read, formed, &classes),
-        strips: strips(&read.features, &formed.surfaces, &classes, run.area.rect),
+        strips: strips(&read.features, formed, &classes, run.area.rect),
         decks: decks(run, read, &formed.decks, &classes),
         remarks,
     }

@@ -3,63 +3,55 @@
 use std::collections::BTreeMap;
 
 use database::StripFigures;
-use features::{AreaFeatures, FeatureLattice, Place, Role, Surface};
-use terrain::{Post, PostRect};
+use features::{AreaFeatures, Face, FeatureLattice, Formed, Place};
+use terrain::PostRect;
 
 /// Figures of strips by class in an area that covers `rect`; `classes` are the job's numbers of the features' classes.
-/// Of strips across the area's border those are counted that have their first corner inside.
-pub(crate) fn strips(
-    features: &AreaFeatures,
-    surfaces: &[Surface],
-    classes: &[u8],
-    rect: PostRect,
-) -> Vec<StripFigures> {
-    let (traits, site) = (features.traits_by_id(), &features.site);
-    let steps = site.lattice.steps_per_post();
-    let inside = |surface: &&Surface| {
-        let Place { row, col } = surface.ring[0].0;
-        rect.contains(Post::new(row.div_euclid(steps), col.div_euclid(steps)))
-    };
+/// Features are cut one load module outside of it; strips are counted whose middle lies inside.
+pub(crate) fn strips(features: &AreaFeatures, formed: &Formed, classes: &[u8], rect: PostRect) -> Vec<StripFigures> {
+    let (traits, lattice) = (features.traits_by_id(), features.site.lattice);
     let mut figures: BTreeMap<u8, StripFigures> = BTreeMap::new();
-    for surface in surfaces.iter().filter(|surface| surface.role == Role::Side).filter(inside) {
-        let Some(strip) = Strip::of(&surface.ring) else { continue };
-        let class = classes[usize::from(surface.class)];
+    for face in formed.faces.iter().filter(|face| is_inside(face, lattice, rect)) {
+        let Some(strip) = Strip::of(face, &formed.points) else { continue };
+        let class = classes[usize::from(face.class)];
         let of = figures.entry(class).or_insert(StripFigures { class, ..StripFigures::default() });
-        let grade_ppm = traits.get(&surface.id).map_or(0, |traits| traits.grade_ppm);
+        let grade_ppm = traits.get(&face.id).map_or(0, |traits| traits.grade_ppm);
         of.pieces += 1;
-        of.length_m += strip.length(site.lattice);
-        of.steeper += u64::from(strip.is_steeper(grade_ppm, site.lattice));
+        of.length_m += strip.length(lattice);
+        of.steeper += u64::from(strip.is_steeper(grade_ppm, lattice));
         of.fall_max = of.fall_max.max(strip.fall());
     }
     figures.into_values().collect()
 }
 
-/// A piece of a strip: two corners at its end, then two at its beginning.
+fn is_inside(face: &Face, lattice: FeatureLattice, rect: PostRect) -> bool {
+    let within = |of: fn(&Place) -> i32, low: i32, high: i32| {
+        let sum: i64 = face.corners.iter().map(|(place, _)| i64::from(of(place))).sum();
+        let line = |posts: i32| i64::from(posts) * i64::from(lattice.steps_per_post()) * face.corners.len() as i64;
+        line(low) <= sum && sum <= line(high)
+    };
+    within(|place| place.row, rect.south, rect.north) && within(|place| place.col, rect.west, rect.east)
+}
+
+/// A piece of a strip from one station to the next: right and left at its end, then left and right at its beginning,
+/// with the heights that the TIN has there.
 struct Strip([(Place, i32); 4]);
 
 impl Strip {
-    /// Of a ring of four corners, or of one to which rounding has added some on its sides. Triangles are junctions.
-    fn of(ring: &[(Place, i32)]) -> Option<Self> {
-        let mut ring = ring.to_vec();
-        while 4 < ring.len() {
-            let area = |at: usize| {
-                let [before, here, after] = [at + ring.len() - 1, at, at + 1].map(|at| ring[at % ring.len()].0);
-                let ([bx, by], [cx, cy]) = (before.to(here), before.to(after));
-                (bx * cy - by * cx).abs()
-            };
-            let flattest = (0..ring.len()).min_by_key(|&at| area(at))?;
-            ring.remove(flattest);
-        }
-        ring.try_into().ok().map(Self)
+    /// Of a face of four corners that are all in the TIN; all others are junctions, or cut by a higher class.
+    fn of(face: &Face, points: &[(Place, i32)]) -> Option<Self> {
+        let [right_from, right_to, left_to, left_from] = face.corners[..] else { return None };
+        let height = |corner: (Place, i32)| {
+            let found = points.binary_search_by_key(&corner.0, |(place, _)| *place).ok()?;
+            Some(points[found])
+        };
+        Some(Self([height(right_to)?, height(left_to)?, height(left_from)?, height(right_from)?]))
     }
 
     /// The largest difference in height across it, at either end, in quanta.
     fn fall(&self) -> u32 {
         let [a, b, c, d] = self.0.map(|(_, height)| height);
-        let across =
-            |pairs: [[i32; 2]; 2]| pairs.map(|[one, other]| one.abs_diff(other)).into_iter().max().unwrap_or(0);
-        // Where the ring begins is known but for rounding; a junction is level, whichever way it is taken.
-        across([[a, b], [c, d]]).min(across([[b, c], [d, a]]))
+        a.abs_diff(b).max(c.abs_diff(d))
     }
 
     /// The middles of its ends, doubled, and twice its rise between them.
@@ -98,27 +90,23 @@ mod tests {
     }
 
     /// Eastwards, 128 steps long and 16 wide, from one height to another.
-    fn ring(from: i32, to: i32) -> Vec<(Place, i32)> {
+    fn strip(from: i32, to: i32) -> Strip {
         let at = |row, col, height| (Place::new(row, col), height);
-        vec![at(0, 128, to), at(16, 128, to), at(16, 0, from), at(0, 0, from)]
+        Strip([at(0, 128, to), at(16, 128, to), at(16, 0, from), at(0, 0, from)])
     }
 
     #[test]
     fn a_strip_has_its_length_and_no_fall_and_is_steep_beyond_its_grade() {
-        let strip = Strip::of(&ring(0, 640)).unwrap();
+        let strip = strip(0, 640);
         assert_eq!((strip.length(lattice()), strip.fall()), (50.0, 0));
         assert!(!strip.is_steeper(100_000, lattice()) && strip.is_steeper(99_000, lattice()));
         assert!(!strip.is_steeper(0, lattice()), "without a greatest grade nothing is too steep");
     }
 
     #[test]
-    fn a_corner_that_is_lower_than_the_other_is_a_fall_and_one_on_a_side_is_none() {
-        let mut fallen = ring(0, 640);
-        fallen[1].1 -= 7;
-        assert_eq!(Strip::of(&fallen).unwrap().fall(), 7);
-        let mut longer = ring(0, 640);
-        longer.insert(2, (Place::new(17, 60), 300));
-        assert_eq!(Strip::of(&longer).unwrap().fall(), 0);
-        assert!(Strip::of(&longer[..3]).is_none());
+    fn a_corner_that_is_lower_than_the_one_across_is_a_fall() {
+        let mut fallen = strip(0, 640);
+        fallen.0[1].1 -= 7;
+        assert_eq!(fallen.fall(), 7);
     }
 }

@@ -111,13 +111,13 @@ fn lengths(level: &AreaLevel, class: u8, extent_m: [f64; 4]) -> ReportFeatureCla
     let of_class = || level.lines.iter().filter(move |line| line.class == class);
     let km = |roles: &[LineRole]| {
         let lines = of_class().filter(|line| roles.contains(&line.role));
-        lines.flat_map(|line| edges(line, extent_m)).map(|[a, b]| length_m(a, b)).sum::<f64>() / 1000.0
+        sum_km(lines.flat_map(|line| edges(line, extent_m)).map(|[a, b]| length_m(a, b)))
     };
     let strips = level.strips.iter().filter(|strips| strips.class == class);
     ReportFeatureClass {
         name: String::new(),
         line_km: km(&[LineRole::Centre, LineRole::Breakline]),
-        strip_km: strips.map(|strips| strips.length_m).sum::<f64>() / 1000.0,
+        strip_km: sum_km(strips.map(|strips| strips.length_m)),
         channel_km: km(&[LineRole::Channel]),
         lakes: lakes(of_class(), extent_m),
         deck_polygons: level.decks.iter().filter(|deck| deck.class == class).count() as u64,
@@ -231,6 +231,11 @@ fn edges(line: &FeatureLine, [west, south, east, north]: [f64; 4]) -> impl Itera
         west <= x && x <= east && south <= y && y <= north
     };
     line.vertices.windows(2).map(|pair| [pair[0], pair[1]]).filter(inside)
+}
+
+/// Kilometres of lengths in metres. The sum of none is 0, without a sign.
+fn sum_km(metres: impl Iterator<Item = f64>) -> f64 {
+    metres.fold(0.0, |sum, metres| sum + metres) / 1000.0
 }
 
 fn length_m(a: [f64; 3], b: [f64; 3]) -> f64 {
