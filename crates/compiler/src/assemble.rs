@@ -2,7 +2,8 @@
 
 use database::{FileStamp, Measured, TileModules};
 use engine::{Artifact, Fingerprint, Key, Outcome, Stamp, keep_or_make};
-use fidelity::{Residuals, Tally};
+use fidelity::{FeatureFigures, Residuals, Tally};
+use ground::Window;
 use job::{Borders, ClipHeights as JobClipHeights, Edges, Job, OuterBorder};
 use load_modules::{ClipHeights, Face, Faces, Layout, clip, concatenate, cut_decks};
 use terrain::{
@@ -74,7 +75,10 @@ impl Artifact for Assembling<'_> {
         let (area, folder, tile) = (&self.run.area, self.run.database.folder(), self.tile);
         let (stamp, file, measured) = folder.read_measured(tile).ok()?;
         let count = area.tiling.modules(tile, area.grid).count();
-        let is_whole = |measured: &Measured| measured.modules.len() == count * self.run.job.lod.level_count();
+        let (levels, has_features) = (self.run.job.lod.level_count(), self.run.level.is_some());
+        let is_whole = |measured: &Measured| {
+            measured.modules.len() == count * levels && measured.features.is_some() == has_features
+        };
         folder.check_file(&folder.modules_path(tile), &measured.modules_file).ok().filter(|()| is_whole(&measured))?;
         Some((stamp, from_measured(measured, count, file)))
     }
@@ -107,6 +111,7 @@ fn make(assembling: &Assembling, stamp: &Stamp) -> Result<(Assembled, Sums), Com
     modules.iter_mut().zip(decks).for_each(|(module, decks)| module.decks = decks);
     let residuals = fidelity::measure(&mut modules, &window.measured(area));
     let at_source = run.ground.relief.residuals_at_source(&modules, area, area.tiling.rect(tile))?;
+    let figures = feature_figures(run, tile, (&own.tin, &modules), &window)?;
     let mut levels = all_levels(run, modules, (&layout, &window), (&features.kept, faces.as_ref()));
     levels[1..].iter_mut().for_each(|level| drop(fidelity::measure(level, &window.measured(area))));
     let file = publish(run, tile, &layout, fingerprint, &levels)?;
@@ -114,7 +119,7 @@ fn make(assembling: &Assembling, stamp: &Stamp) -> Result<(Assembled, Sums), Com
     let heights = heights_of(&levels[0]);
     let (modules, coarser) = numbers_of(&levels);
     let mut done = Assembled { file, measured: FileStamp::of(&[]), modules, coarser };
-    let sums = sums(residuals, at_source, counted, heights);
+    let sums = Sums { features: figures, ..sums(residuals, at_source, counted, heights) };
     done.measured = run.database.write_measured(stamp, &to_measured(tile, &done, &sums))?;
     Ok((done, sums))
 }
@@ -135,7 +140,22 @@ fn sums(
     heights: (i32, i32),
 ) -> Sums {
     let (has_source, at_source) = (at_source.is_some(), at_source.unwrap_or_default());
-    Sums { residuals, has_source, at_source, points, border, heights }
+    Sums { residuals, has_source, at_source, points, border, heights, features: None }
+}
+
+/// How true a tile is to its features, in jobs with some.
+fn feature_figures(
+    run: &Run,
+    tile: TileId,
+    (tin, modules): (&Tin, &[LoadModule]),
+    window: &Window,
+) -> Result<Option<FeatureFigures>, CompileError> {
+    if run.level.is_none() {
+        return Ok(None);
+    }
+    let (features, area) = (run.tile_features(tile)?, &run.area);
+    let ground = window.measured(area);
+    Ok(Some(FeatureFigures::of((tin, modules), &features, &ground, &window.featured, area.rect)))
 }
 
 /// The lowest and the highest vertex of load modules, in quanta.
@@ -154,9 +174,10 @@ pub(crate) fn read_assembled(run: &Run, tins: &[Published], tile: TileId) -> Res
     let at_source = run.ground.relief.residuals_at_source(&levels[0], area, area.tiling.rect(tile))?;
     let own = run.tin(tile, &tins[area.tiling.index(tile)].stamp)?;
     let counted = count_points(run, &own.tin, &[], &window.importance);
+    let features = feature_figures(run, tile, (&own.tin, &levels[0]), &window)?;
     let measured = folder.stamp_file(&folder.measured_path(tile))?;
     let done = Assembled { file, measured, modules, coarser };
-    Ok((done, sums(residuals, at_source, counted, heights_of(&levels[0]))))
+    Ok((done, Sums { features, ..sums(residuals, at_source, counted, heights_of(&levels[0])) }))
 }
 
 /// Numbers of the finest level, and of each of the others.

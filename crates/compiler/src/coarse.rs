@@ -49,5 +49,11 @@ fn half_window(window: &Window, rect: PostRect) -> Window {
             Importance::new(rect, posts.map(weight).collect(), vec![0; rect.post_count()])
         }
     };
-    Window { dem: Dem::from_row_fn(rect, every_second), importance, given: Vec::new(), forbidden: Vec::new() }
+    Window {
+        dem: Dem::from_row_fn(rect, every_second),
+        importance,
+        given: Vec::new(),
+        forbidden: Vec::new(),
+        featured: Vec::new(),
+    }
 }

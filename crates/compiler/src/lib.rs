@@ -55,6 +55,7 @@ mod refused;
 pub use refinement::{Most, Refinement};
 mod report;
 pub use report::residual_of;
+mod strips;
 mod sums;
 pub use sums::{Adding, Sums};
 mod survey;

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
-use database::{AreaLevel, FeatureLine, FeatureRemark, LineRole};
+use database::{AreaLevel, FeatureFace, FeatureLine, FeatureRemark, LineRole};
 use features::{Face, FeatureId, Formed, FormedEdge, Levelled, Place, Remark, Role, Surface};
 use ground::{GamingArea, slope_reach};
 use load_modules::{Layout, cut_decks};
@@ -14,6 +14,7 @@ use tiling::{outer_border_posts, outer_sides};
 
 use crate::profile::ReadFeatures;
 use crate::run::Run;
+use crate::strips::strips;
 
 /// What features put into each tile, row-major.
 pub(crate) fn pieces(run: &Run, features: &features::AreaFeatures, formed: &Formed) -> Vec<TileFeatures> {
@@ -251,8 +252,36 @@ pub(crate) fn area_level(run: &Run, read: &ReadFeatures, levelled: &Levelled) ->
         }
     };
     let remarks = read.vectors.remarks.iter().cloned().chain(levelled.remarks.iter().map(told)).collect();
-    let lines = lines(run, read, &levelled.reserved.formed, &classes);
-    AreaLevel { tiles: Vec::new(), cost, reserved: Vec::new(), lines, remarks }
+    let formed = &levelled.reserved.formed;
+    AreaLevel {
+        tiles: Vec::new(),
+        cost,
+        reserved: Vec::new(),
+        lines: lines(run, read, formed, &classes),
+        strips: strips(&read.features, formed, &classes, run.area.rect),
+        decks: decks(run, read, &formed.decks, &classes),
+        remarks,
+    }
+}
+
+/// The surfaces of bridges as people ask for them.
+fn decks(run: &Run, read: &ReadFeatures, decks: &[Face], classes: &[u8]) -> Vec<FeatureFace> {
+    let metres = metres_of(run, read);
+    let face = |deck: &Face| FeatureFace {
+        feature: read.vectors.name(deck.id).to_owned(),
+        class: classes[usize::from(deck.class)],
+        ring: deck.corners.iter().map(|&corner| metres(corner)).collect(),
+    };
+    decks.iter().map(face).collect()
+}
+
+/// Easting, northing and height of a place, in metres.
+fn metres_of(run: &Run, read: &ReadFeatures) -> impl Fn((Place, i32)) -> [f64; 3] {
+    let (lattice, frame) = (read.features.site.lattice, run.area.frame);
+    move |(place, height)| {
+        let [east, north] = lattice.posts_of(place).map(|posts| posts * frame.spacing.metres());
+        [frame.origin_east_m + east, frame.origin_north_m + north, terrain::metres_of_quanta(height)]
+    }
 }
 
 /// Triangles that features add to each load module, whatever else it holds, by its place: of the ground, and decks.
@@ -281,12 +310,8 @@ fn lines(run: &Run, read: &ReadFeatures, formed: &Formed, classes: &[u8]) -> Vec
     for edge in &formed.edges {
         groups.entry((edge.id, edge.role, edge.class)).or_default().push(edge);
     }
-    let (lattice, frame) = (read.features.site.lattice, run.area.frame);
-    let metres = |point: u32| {
-        let (place, height) = formed.points[point as usize];
-        let [east, north] = lattice.posts_of(place).map(|posts| posts * frame.spacing.metres());
-        [frame.origin_east_m + east, frame.origin_north_m + north, terrain::metres_of_quanta(height)]
-    };
+    let to_metres = metres_of(run, read);
+    let metres = |point: u32| to_metres(formed.points[point as usize]);
     let traits = read.features.traits_by_id();
     let mut lines = Vec::new();
     for ((id, role, class), edges) in groups {

@@ -36,7 +36,7 @@ pub(crate) fn without_limits(
 fn without_limit(run: &Run, window: &Window, module: ModuleId, part: &Tin, extra: usize) -> ModuleResidual {
     let rect = part.rect;
     let (dem, importance) = (window.dem.window(rect), window.importance.window(rect));
-    let window = Window { dem, importance, given: Vec::new(), forbidden: Vec::new() };
+    let window = Window { dem, importance, given: Vec::new(), forbidden: Vec::new(), featured: Vec::new() };
     let (sides, inner): (Vec<Vertex>, Vec<Vertex>) = part.vertices.iter().partition(|vertex| is_on_side(part, vertex));
     let optimising = optimising(run.job);
     // What is filled has its sides already and counts all vertices; what is selected starts from its sides.

@@ -18,9 +18,10 @@ use crate::{
 /// The folders of a database that stay.
 const FOLDERS: [&str; 4] = [TILES, MODULES, MEASURED, SURVEY];
 /// What is written beside a finished build.
-const REPORTS: [&str; 4] = [files::REPORT, files::REPORT_HTML, files::BREACHES, files::BREACHES_CSV];
+const REPORTS: [&str; 6] =
+    [files::REPORT, files::REPORT_HTML, files::BREACHES, files::BREACHES_CSV, files::FEATURES, files::FEATURES_GPKG];
 /// What may lie in a database's directory and makes a directory without `database.json` ours.
-const OURS: [&str; 11] = [
+const OURS: [&str; 13] = [
     LOCK_NAME,
     TILES,
     MODULES,
@@ -32,6 +33,8 @@ const OURS: [&str; 11] = [
     files::REPORT_HTML,
     files::BREACHES,
     files::BREACHES_CSV,
+    files::FEATURES,
+    files::FEATURES_GPKG,
 ];
 
 /// A database to write to: by this process alone, or by all that have joined it.

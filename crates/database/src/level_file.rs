@@ -19,6 +19,10 @@ pub struct AreaLevel {
     pub reserved: Vec<(u32, u32)>,
     /// Edges of the TIN as lines of their features.
     pub lines: Vec<FeatureLine>,
+    /// What was found of strips, by class in ascending order.
+    pub strips: Vec<StripFigures>,
+    /// The surfaces of bridges.
+    pub decks: Vec<FeatureFace>,
     /// What was mended, degraded or left out.
     pub remarks: Vec<FeatureRemark>,
 }
@@ -51,6 +55,32 @@ pub struct FeatureLine {
     pub grade_max_ppm: u32,
     /// Easting, northing and height of its vertices, in metres.
     pub vertices: Vec<[f64; 3]>,
+}
+
+/// What was found of the strips of a class.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct StripFigures {
+    /// The class, a number of the job's.
+    pub class: u8,
+    /// Pieces from one station to the next.
+    pub pieces: u64,
+    /// Metres along their middles.
+    pub length_m: f64,
+    /// Pieces steeper than the greatest grade by more than a quantum of height.
+    pub steeper: u64,
+    /// The largest difference in height between left and right, in quanta.
+    pub fall_max: u32,
+}
+
+/// A polygon of a feature.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FeatureFace {
+    /// The feature, as its file names it.
+    pub feature: String,
+    /// Its class, a number of the job's.
+    pub class: u8,
+    /// Easting, northing and height of its corners, in metres; the first is not repeated.
+    pub ring: Vec<[f64; 3]>,
 }
 
 /// What a line of edges is to its feature.
@@ -138,6 +168,8 @@ mod tests {
                 grade_max_ppm: 250_000,
                 vertices: vec![[500_000.5, 4_000_000.0, 12.25]],
             }],
+            strips: vec![StripFigures { class: 3, pieces: 2, length_m: 12.5, steeper: 1, fall_max: 9 }],
+            decks: vec![FeatureFace { feature: "way/13".into(), class: 3, ring: vec![[1.0, 2.0, 3.0]] }],
             remarks: vec![FeatureRemark {
                 feature: "way/12".into(),
                 at_m: Some([1.0, 2.0]),

@@ -33,11 +33,13 @@ pub use profile_file::{Profile, decode_profile, encode_profile};
 mod lines_file;
 pub use lines_file::{decode_lines, encode_lines};
 mod level_file;
-pub use level_file::{AreaLevel, FeatureLine, FeatureRemark, LineRole, decode_level, encode_level};
+pub use level_file::{
+    AreaLevel, FeatureFace, FeatureLine, FeatureRemark, LineRole, StripFigures, decode_level, encode_level,
+};
 mod removals_file;
 pub use removals_file::{Removals, decode_removals, encode_removals};
 mod measured_file;
-pub use measured_file::{Measured, MeasuredModule, MeasuredTally, decode_measured, encode_measured};
+pub use measured_file::{Measured, MeasuredFeatures, MeasuredModule, MeasuredTally, decode_measured, encode_measured};
 mod slm;
 /// Version of the load-module files.
 pub use load_module_reader::{
@@ -50,6 +52,10 @@ pub use page::seal_page;
 mod manifest;
 pub use manifest::{
     Area, FORMAT_VERSION, FileStamp, Manifest, ManifestState, SourceRecord, TileRecord, TileState, Totals,
+};
+mod report_features;
+pub use report_features::{
+    ReportFeatureChecks, ReportFeatureClass, ReportFeatureCost, ReportFeatureRemarks, ReportFeatures,
 };
 mod report;
 pub use report::{

@@ -74,6 +74,7 @@ pub(crate) fn measured() -> Measured {
         points: vec![7, 0],
         border: 2,
         heights: [-5, 1280],
+        features: None,
     }
 }
 

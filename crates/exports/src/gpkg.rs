@@ -20,12 +20,13 @@ const VERSION: i32 = 10_300;
 /// When the layers are said to have changed: the same database gives the same file.
 const CHANGED: &str = "1970-01-01T00:00:00.000Z";
 
-/// A layer: its name, what it shows, its columns, whether its geometry has heights.
-struct Layer {
-    name: &'static str,
-    description: &'static str,
-    columns: &'static [(&'static str, &'static str)],
-    has_z: bool,
+/// A layer: its name, what it shows, its columns, the kind of its geometry, and whether that has heights.
+pub(crate) struct Layer {
+    pub name: &'static str,
+    pub description: &'static str,
+    pub columns: &'static [(&'static str, &'static str)],
+    pub geometry: &'static str,
+    pub has_z: bool,
 }
 
 const MODULES: Layer = Layer {
@@ -44,6 +45,7 @@ const MODULES: Layer = Layer {
         ("lowest_m", "DOUBLE"),
         ("highest_m", "DOUBLE"),
     ],
+    geometry: "POLYGON",
     has_z: false,
 };
 const BREACHES: Layer = Layer {
@@ -61,12 +63,14 @@ const BREACHES: Layer = Layer {
         ("rms_with_m", "DOUBLE"),
         ("rms_without_m", "DOUBLE"),
     ],
+    geometry: "POLYGON",
     has_z: false,
 };
 const TILES: Layer = Layer {
     name: "tiles",
     description: "tiles, the units of work",
     columns: &[("row", "INTEGER"), ("col", "INTEGER"), ("state", "TEXT")],
+    geometry: "POLYGON",
     has_z: false,
 };
 const TRIANGLES: Layer = Layer {
@@ -80,6 +84,7 @@ const TRIANGLES: Layer = Layer {
         ("slope_degrees", "DOUBLE"),
         ("area_m2", "DOUBLE"),
     ],
+    geometry: "POLYGON",
     has_z: true,
 };
 
@@ -107,7 +112,7 @@ pub fn write_gpkg(
     connection.execute_batch("PRAGMA journal_mode = OFF; PRAGMA synchronous = OFF;").map_err(fault)?;
     let transaction = connection.transaction().map_err(fault)?;
     let package = Package { connection: &transaction, srs: product.epsg().map_or(-1, |code| code as i32) };
-    package.describe(product).map_err(fault)?;
+    package.describe(product.crs()).map_err(fault)?;
     package.add_modules(product).map_err(fault)?;
     package.add_breaches(product, report, window).map_err(fault)?;
     package.add_tiles(product).map_err(fault)?;
@@ -146,15 +151,15 @@ struct Triangles<'a> {
     classes: &'a [u8],
 }
 
-struct Package<'a> {
-    connection: &'a Connection,
+pub(crate) struct Package<'a> {
+    pub connection: &'a Connection,
     /// The coordinate system as the package numbers it.
-    srs: i32,
+    pub srs: i32,
 }
 
 impl Package<'_> {
     /// The tables that every package has, and the coordinate system.
-    fn describe(&self, product: &Product) -> rusqlite::Result<()> {
+    pub fn describe(&self, crs: &str) -> rusqlite::Result<()> {
         self.connection
             .execute_batch(&format!("PRAGMA application_id = {APPLICATION_ID}; PRAGMA user_version = {VERSION};"))?;
         self.connection.execute_batch(include_str!("gpkg.sql"))?;
@@ -167,17 +172,17 @@ impl Package<'_> {
         if ![-1, 0, 4326].contains(&self.srs) {
             let known = u16::try_from(self.srs).ok().and_then(crs_definitions::from_code);
             let definition = known.map_or("undefined", |known| known.wkt);
-            add.execute(params![product.crs(), self.srs, "EPSG", self.srs, definition])?;
+            add.execute(params![crs, self.srs, "EPSG", self.srs, definition])?;
         }
         Ok(())
     }
 
     /// Makes the table of a layer and lists it; the statement that adds a feature: geometry first, then its columns.
-    fn begin(&self, layer: &Layer, extent: Extent) -> rusqlite::Result<rusqlite::Statement<'_>> {
-        let Layer { name, description, columns, has_z } = layer;
+    pub fn begin(&self, layer: &Layer, extent: Extent) -> rusqlite::Result<rusqlite::Statement<'_>> {
+        let Layer { name, description, columns, geometry, has_z } = layer;
         let declared: String = columns.iter().map(|(name, kind)| format!(", {name} {kind}")).collect();
         self.connection.execute_batch(&format!(
-            "CREATE TABLE {name} (fid INTEGER PRIMARY KEY AUTOINCREMENT NOT NULL, geom POLYGON{declared});"
+            "CREATE TABLE {name} (fid INTEGER PRIMARY KEY AUTOINCREMENT NOT NULL, geom {geometry}{declared});"
         ))?;
         let [west, south, east, north] = extent;
         self.connection.execute(
@@ -185,8 +190,8 @@ impl Package<'_> {
             params![name, description, CHANGED, west, south, east, north, self.srs],
         )?;
         self.connection.execute(
-            "INSERT INTO gpkg_geometry_columns VALUES (?1, 'geom', 'POLYGON', ?2, ?3, 0)",
-            params![name, self.srs, i32::from(*has_z)],
+            "INSERT INTO gpkg_geometry_columns VALUES (?1, 'geom', ?2, ?3, ?4, 0)",
+            params![name, geometry, self.srs, i32::from(*has_z)],
         )?;
         let names: String = columns.iter().map(|(name, _)| format!(", {name}")).collect();
         let places: String = (2..2 + columns.len()).map(|place| format!(", ?{place}")).collect();
@@ -305,7 +310,7 @@ impl Package<'_> {
             let [a, b, c] = corners;
             let normal = crate::mesh::cross(crate::mesh::minus(b, a), crate::mesh::minus(c, a));
             let slope = normal[0].hypot(normal[1]).atan2(normal[2]).to_degrees();
-            let (geometry, name) = (polygon_z(self.srs, corners), class_name(names, *class));
+            let (geometry, name) = (polygon_z(self.srs, &corners), class_name(names, *class));
             let values: [&dyn ToSql; 7] = [&geometry, &id.row, &id.col, class, &name, &slope, &(normal[2] / 2.0)];
             add.execute(values)?;
         }

@@ -35,7 +35,14 @@ pub fn burn(window: Window, features: &TileFeatures, tile: PostRect, spacing: Sp
     let Burning { rect, heights, class_of, .. } = burning;
     let importance = importance(&window.importance, rect, &class_of);
     let dem = Dem::from_fn(rect, |post| heights[rect.index(post)]);
-    Window { dem, importance, ..window }
+    let is_changed =
+        |post: &Post| dem.is_void(*post) != window.dem.is_void(*post) || dem.height(*post) != window.dem.height(*post);
+    let changed = rect.posts().filter(|post| class_of[rect.index(*post)].is_some() || is_changed(post));
+    // What the features of another tile changed stays changed.
+    let mut featured: Vec<Post> = window.featured.iter().copied().chain(changed).collect();
+    featured.sort_unstable();
+    featured.dedup();
+    Window { dem, importance, featured, ..window }
 }
 
 /// Posts on features weigh nothing and have the class of the feature.
@@ -291,7 +298,7 @@ mod tests {
         let rect = PostRect::new(Post::new(0, 0), Post::new(20, 20));
         let dem = Dem::from_fn(rect, height);
         let importance = Importance::uniform(rect, 1000);
-        Window { dem, importance, given: Vec::new(), forbidden: Vec::new() }
+        Window { dem, importance, given: Vec::new(), forbidden: Vec::new(), featured: Vec::new() }
     }
 
     /// A vertex at posts (row, column) and a height.
@@ -350,6 +357,8 @@ mod tests {
         let height = |row| window.dem.height(Post::new(row, 10));
         assert_eq!(height(11), 1280 + rounded(1280.0 / 1.5));
         assert_eq!((height(9), height(8), height(7)), (640, 0, 0));
+        let featured = |row| window.featured.contains(&Post::new(row, 10));
+        assert_eq!((featured(9), featured(8), featured(11), featured(17)), (true, false, true, false));
         assert_eq!(height(17), 12_800);
     }
 

@@ -58,6 +58,8 @@ pub struct Window {
     pub given: Vec<GivenPost>,
     /// Posts of such a window that it forbids.
     pub forbidden: Vec<Post>,
+    /// Posts that features lie on, or whose heights they have changed; in ascending order.
+    pub featured: Vec<Post>,
 }
 
 impl Window {
@@ -175,7 +177,7 @@ impl Ground {
         self.fault.take()?;
         let place = GamingAreaFrame { rect: self.rect, frame: self.frame };
         let importance = mask::without_voids(self.given.weigh(importance, &place), &dem);
-        Ok(Window { dem, importance, given: Vec::new(), forbidden: Vec::new() })
+        Ok(Window { dem, importance, given: Vec::new(), forbidden: Vec::new(), featured: Vec::new() })
     }
 
     fn with_given(&self, area: &GamingArea, tile: TileId, window: Window) -> Result<Window, GroundError> {
@@ -247,7 +249,8 @@ impl Ground {
                 heights[to as usize..][..cols.len()].copy_from_slice(part);
             }
         });
-        Ok(Window { dem, importance: join_importance(&parts, rect), given: Vec::new(), forbidden: Vec::new() })
+        let importance = join_importance(&parts, rect);
+        Ok(Window { dem, importance, given: Vec::new(), forbidden: Vec::new(), featured: Vec::new() })
     }
 
     /// The ground of any rectangle of the area, with features burned in if there are any.

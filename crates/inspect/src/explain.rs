@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
+use crate::explained_features::{ExplainedFeatures, explained_features};
 use compiler::{CompileError, Stage};
 use database::{Folder, TileState, files};
 use fidelity::{Split, best_split};
@@ -60,6 +61,8 @@ pub struct Explanation {
     pub one_more: Option<OneMore>,
     /// Why there is no ground to look at.
     pub no_ground: Option<String>,
+    /// Roads and water here, in jobs with some.
+    pub features: Option<ExplainedFeatures>,
 }
 
 /// The fullest window around a load module.
@@ -205,6 +208,7 @@ fn explained(
         one_more: splits.and_then(|splits| one_more(product, splits, module)),
         no_ground: None,
         levels: Vec::new(),
+        features: explained_features(product, id, [west, south, west + side_m, south + side_m]),
     }
 }
 

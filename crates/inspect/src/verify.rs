@@ -2,6 +2,7 @@
 
 mod entries;
 mod exceeded;
+mod features;
 mod figures;
 mod made_from;
 mod modules;
@@ -118,6 +119,7 @@ fn check_sums(
     verdict.problems.extend(problems);
     verdict.unchecked.extend(unchecked);
     let report = if folder.path(files::REPORT).exists() { Some(folder.report()?) } else { None };
+    verdict.problems.extend(features::check(folder, manifest, job, area, modules, report.as_ref())?);
     let counts = exceeded::counts(job, area, modules);
     let mut exceeded = exceeded::of_counts(area, &counts);
     verdict.problems.extend(exceeded::wrong_states(manifest, area, &exceeded));

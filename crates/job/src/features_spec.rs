@@ -63,11 +63,16 @@ impl FeaturesSpec {
         keys
     }
 
+    /// Names of the classes that features may have, in the order of the table of kinds.
+    pub fn classes(&self) -> Vec<String> {
+        features::class_names(&self.rules)
+    }
+
     /// All classes: those of the ground, as in [`ImportanceSpec::classes`], then those of features that are not among
     /// them, at most 255 together. They follow from the job alone.
     pub fn classes_after(&self, ground: &ImportanceSpec) -> Vec<String> {
         let mut all = ground.classes.clone();
-        all.extend(features::class_names(&self.rules).into_iter().filter(|class| !ground.classes.contains(class)));
+        all.extend(self.classes().into_iter().filter(|class| !ground.classes.contains(class)));
         all
     }
 }

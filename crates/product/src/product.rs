@@ -4,7 +4,7 @@
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-use database::{Folder, Manifest};
+use database::{AreaLevel, FeatureRemark, Folder, Manifest};
 use fidelity::each_residual;
 use ground::{GamingArea, Ground, GroundError, PlannedTile, Window, planned_tiles};
 use job::Job;
@@ -12,7 +12,7 @@ use schedule::Workers;
 use terrain::{Dem, GridFrame, LoadModule, ModuleGrid, ModuleRect, Post, PostRect, TileId};
 use views::NO_RESIDUAL;
 
-use crate::{Opened, ProductError, choose_ground};
+use crate::{Opened, ProductError, choose_ground, read_told};
 
 /// What is wanted of a database.
 #[derive(Clone, Copy, Debug)]
@@ -57,6 +57,8 @@ pub struct Product {
     pub modules: Vec<LoadModule>,
     /// The ground under them, if it was wanted.
     pub ground: Option<ProductGround>,
+    /// What features of the area came to, and all remarks on them; nothing of jobs without any.
+    pub features: Option<(AreaLevel, Vec<FeatureRemark>)>,
 }
 
 /// The ground under a part of a database.
@@ -120,7 +122,8 @@ impl Product {
         });
         let (manifest, job) = (manifest.clone(), job.clone());
         let (grid, frame, tiles) = (area.grid, area.frame, planned_tiles(area));
-        Ok(Self { manifest, job, grid, frame, tiles, part, modules, ground })
+        let features = read_told(opened)?.map(|(level, told)| (level, told.remarks));
+        Ok(Self { manifest, job, grid, frame, tiles, part, modules, ground, features })
     }
 
     /// What limits count, in every load module and window.

@@ -364,7 +364,8 @@ impl<'a> TinJob<'a> {
         });
         let started = start_posts(&given, task.rect, task.seams).iter().filter(|start| !start.pinned).count();
         task.stop.points = task.stop.points.map(|points| points.saturating_sub(started));
-        let window = Window { importance: weights(&dem), dem, given, forbidden: Vec::new() };
+        let (importance, forbidden, featured) = (weights(&dem), Vec::new(), Vec::new());
+        let window = Window { importance, dem, given, forbidden, featured };
         Ok(self.refinement(task).run(&window, seeds))
     }
 

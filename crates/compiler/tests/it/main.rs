@@ -32,5 +32,6 @@ mod shared;
 mod simulated;
 mod soundness;
 mod stopped;
+mod told_features;
 mod water_and_holes;
 mod window_figures;

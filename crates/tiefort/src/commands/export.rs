@@ -5,9 +5,9 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use compiler::CompileError;
 use database::Folder;
-use exports::{Block, Datum, ExportError, Facts, Levels, Mesh, Product, Work};
+use exports::{Block, Datum, ExportError, Facts, FeatureLayers, Levels, Mesh, Product, Work};
 use job::Job;
-use product::BuiltFrom;
+use product::{BuiltFrom, Opened, read_told};
 use terrain::{ModuleId, PostRect};
 use views::grouped;
 
@@ -98,6 +98,8 @@ enum Format {
     Geotiff,
     /// A GeoPackage for QGIS: load modules, breaches, tiles, triangles, decks, with styles
     Gpkg,
+    /// A GeoPackage of roads, rivers and lakes as they are in the ground, and what was mended, degraded or left out
+    Features,
     /// A folder of OpenFlight 16.1 files, one for each 4 km square, and a MetaFlight index
     Openflight,
     /// A folder of 3D Tiles 1.1, for globes
@@ -138,7 +140,7 @@ impl Format {
             Format::Obj => Some("obj"),
             Format::Glb => Some("glb"),
             Format::Geotiff => Some("tif"),
-            Format::Gpkg => Some("gpkg"),
+            Format::Gpkg | Format::Features => Some("gpkg"),
             Format::Modules | Format::Openflight | Format::Tiles3d | Format::QuantizedMesh => None,
         }
     }
@@ -148,6 +150,7 @@ impl Format {
         match self {
             Format::Modules => "of class 255, as in the database",
             Format::Gpkg => "in the layer triangles, of class hole",
+            Format::Features => "in none of its layers",
             Format::Geotiff => "NaN in the raster",
             Format::QuantizedMesh => "kept, since tiles must be closed; holes.geojson says where they are",
             Format::Ply | Format::Obj | Format::Glb | Format::Openflight | Format::Tiles3d => "left out",
@@ -163,7 +166,7 @@ impl Format {
     fn of_decks(self) -> &'static str {
         match self {
             Format::Modules => "in the files of their load modules",
-            Format::Gpkg => "in the layer decks",
+            Format::Gpkg | Format::Features => "in the layer decks",
             Format::Geotiff | Format::QuantizedMesh => "left out: there is room for the ground alone",
             Format::Ply | Format::Obj | Format::Glb | Format::Openflight | Format::Tiles3d => "meshes of their own",
         }
@@ -214,11 +217,10 @@ fn check(arguments: &Arguments) -> Result<(), Failure> {
     let Some(expected) = arguments.format.extension() else { return Ok(()) };
     let found = files::extension(&arguments.out);
     if found != expected {
+        let name = arguments.format.to_possible_value();
+        let format = name.as_ref().map_or("", |name| name.get_name());
         let message = format!("{}: found the extension {found:?}, expected {expected:?}", arguments.out.display());
-        return Err(Failure::new(
-            message,
-            format!("--format {expected} writes one file whose name ends in .{expected}"),
-        ));
+        return Err(Failure::new(message, format!("--format {format} writes one file whose name ends in .{expected}")));
     }
     files::check_writable(&arguments.out)
 }
@@ -243,6 +245,7 @@ fn export(arguments: &Arguments, work: &Work) -> Result<String, Failure> {
         Format::Ply | Format::Obj | Format::Glb => write_mesh(arguments, &product)?,
         Format::Geotiff => write_raster(arguments, &product, work)?,
         Format::Gpkg => write_package(arguments, &product, work)?,
+        Format::Features => write_features(arguments)?,
         _ => {}
     }
     let mut said = None;
@@ -300,6 +303,25 @@ fn write_package(arguments: &Arguments, product: &Product, work: &Work) -> Resul
     let job = Job::from_text(&product.manifest.job, &arguments.database)?;
     let window = [job.limits.window.rows, job.limits.window.cols];
     files::make_whole(&arguments.out, |path| Ok(exports::write_gpkg(path, product, &report, window, work)?))
+}
+
+fn write_features(arguments: &Arguments) -> Result<(), Failure> {
+    let opened = Opened::open(&arguments.database)?;
+    let Some((level, told)) = read_told(&opened)? else {
+        let message = "found --format features with a database without roads and water, expected one with some";
+        return Err(Failure::new(message, "[features] in a job names their files"));
+    };
+    let area = &opened.manifest.area;
+    let ([west, south], [wide, high]) = (area.origin_m, area.size_m);
+    let remarks: Vec<_> = told.remarks.iter().map(|remark| (views::outcome(remark), remark)).collect();
+    let layers = FeatureLayers {
+        crs: &area.crs,
+        extent_m: [west, south, west + wide, south + high],
+        classes: &opened.job.class_names(),
+        level: &level,
+        remarks: &remarks,
+    };
+    files::make_whole(&arguments.out, |path| Ok(exports::write_features_gpkg(path, &layers)?))
 }
 
 fn write_mesh(arguments: &Arguments, product: &Product) -> Result<(), Failure> {

@@ -13,6 +13,7 @@ mod color;
 mod depth;
 mod errors;
 mod facets;
+mod features;
 mod image;
 mod map_extent;
 mod module_maps;
@@ -32,6 +33,7 @@ pub use color::{Color, palette};
 pub(crate) use color::{GREY, NOTHING, hex};
 pub use errors::{draw_errors, draw_module_limits};
 pub use facets::{Cover, Facets};
+pub use features::SceneFeatures;
 pub use image::Image;
 pub use panels::{Panel, Style, draw_panels};
 pub use perspective::{Drawn, Look, Surface, draw_perspective, draw_wireframe};
@@ -56,6 +58,8 @@ pub enum Map {
     Limits,
     /// Tiles, their order and state.
     Tiles,
+    /// Roads and water, and what became of them.
+    Features,
 }
 
 impl Map {
@@ -83,5 +87,6 @@ pub(crate) fn drawings(scene: &Scene, map: Map, longest: usize) -> Vec<Drawing> 
         Map::Density => vec![module_maps::density(scene, longest)],
         Map::Limits => module_maps::limits(scene, longest).into(),
         Map::Tiles => vec![module_maps::tiles(scene, longest)],
+        Map::Features => vec![features::feature_map(scene, longest)],
     }
 }

@@ -322,6 +322,7 @@ mod tests {
             ground: None,
             limits: &limits,
             water: None,
+            features: None,
             tiles: &[],
         };
         let map_extent = scene.map_extent(300);

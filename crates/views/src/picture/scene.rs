@@ -2,6 +2,7 @@
 
 use terrain::{Dem, GridFrame, LoadModule, ModuleGrid, ModuleId, ModuleRect, TileId};
 
+use super::features::SceneFeatures;
 use super::map_extent::{MapExtent, Posts};
 use super::sheet::Coordinates;
 
@@ -26,6 +27,8 @@ pub struct Scene<'a> {
     pub limits: &'a SceneLimits,
     /// The class of water, where there is one.
     pub water: Option<u8>,
+    /// Roads and water, where there are any.
+    pub features: Option<SceneFeatures<'a>>,
     /// All tiles of the area, row by row from the south-west.
     pub tiles: &'a [SceneTile],
 }
