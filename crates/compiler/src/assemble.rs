@@ -96,8 +96,10 @@ fn make(assembling: &Assembling, stamp: &Stamp) -> Result<(Assembled, Sums), Com
     let own = run.tin(tile, &stamps(area.tiling.index(tile)))?;
     let features = run.tile_features(tile)?;
     let faces = faces(&features);
+    // What is no feature has the class that the ground has without any.
+    let natural = run.ground.natural_tile(area, tile)?;
     let mut modules = match run.job.modules.edges {
-        Edges::Constrained => concatenate(&own.tin, &layout, &window.importance, faces.as_ref()),
+        Edges::Constrained => concatenate(&own.tin, &layout, &natural.importance, faces.as_ref()),
         Edges::Clip(heights) => {
             let points = points_around(run, stamps, removed, tile)?;
             let heights = match heights {
@@ -112,7 +114,8 @@ fn make(assembling: &Assembling, stamp: &Stamp) -> Result<(Assembled, Sums), Com
     let residuals = fidelity::measure(&mut modules, &window.measured(area));
     let at_source = run.ground.relief.residuals_at_source(&modules, area, area.tiling.rect(tile))?;
     let figures = feature_figures(run, tile, (&own.tin, &modules), &window)?;
-    let mut levels = all_levels(run, modules, (&layout, &window), (&features.kept, faces.as_ref()));
+    let mut levels =
+        all_levels(run, modules, (&layout, &window.dem, &natural.importance), (&features.kept, faces.as_ref()));
     levels[1..].iter_mut().for_each(|level| drop(fidelity::measure(level, &window.measured(area))));
     let file = publish(run, tile, &layout, fingerprint, &levels)?;
     let counted = count_points(run, &own.tin, &removed[area.tiling.index(tile)], &window.importance);

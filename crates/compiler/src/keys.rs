@@ -48,7 +48,12 @@ pub(crate) fn tin(window: &Window, refinement: &Refinement, seeds: &[Vertex]) ->
     // Tiles without features keep the keys they had before there were any.
     match refinement.features.is_empty() {
         true => key,
-        false => key.part(FEATURES, |part| feed_features(part, &refinement.features)),
+        false => key.part(FEATURES, |part| {
+            let part = feed_features(part, &refinement.features);
+            part.list(refinement.lakes.iter(), |part, rings| {
+                part.list(rings.iter(), |part, ring| part.list(ring.iter(), feed_vertex))
+            })
+        }),
     }
 }
 
@@ -185,7 +190,7 @@ pub(crate) fn measured(run: &Run, modules: Fingerprint) -> Key {
 }
 
 fn feed_rules(builder: FingerprintBuilder, refinement: &Refinement) -> FingerprintBuilder {
-    let Refinement { task, optimising, most, features: _ } = refinement;
+    let Refinement { task, optimising, most, features: _, lakes: _ } = refinement;
     let builder = feed_growth(builder, task).list(task.kept.iter(), feed_post);
     let builder = builder.maybe(*optimising, |builder, optimising| {
         let job::Optimising { effort, height_fit, lattice } = optimising;

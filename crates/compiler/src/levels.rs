@@ -2,10 +2,9 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use ground::Window;
 use job::Method;
 use load_modules::{Faces, Layout, LevelFeatures, LevelGround, Levels, coarser_levels};
-use terrain::{Features, LoadModule};
+use terrain::{Dem, Features, Importance, LoadModule};
 
 use crate::run::Run;
 
@@ -13,7 +12,7 @@ use crate::run::Run;
 pub(crate) fn all_levels(
     run: &Run,
     finest: Vec<LoadModule>,
-    (layout, window): (&Layout, &Window),
+    (layout, dem, mask): (&Layout, &Dem, &Importance),
     (features, faces): (&Features, Option<&Faces>),
 ) -> Vec<Vec<LoadModule>> {
     let lod = &run.job.lod;
@@ -22,7 +21,7 @@ pub(crate) fn all_levels(
         return levels;
     }
     let kept = Kept::new(features, layout);
-    let ground = LevelGround { dem: &window.dem, mask: &window.importance };
+    let ground = LevelGround { dem, mask };
     levels.resize_with(lod.level_count(), Vec::new);
     for place in 0..levels[0].len() {
         let of_level = LevelFeatures { faces, ..kept.of(&levels[0][place]) };

@@ -91,7 +91,7 @@ impl<'a> Refining<'a> {
     /// As a build refines it.
     pub fn new(run: &'a Run, budget: &TileBudget, seeds: Vec<Vertex>, tile: TileId) -> Result<Self, CompileError> {
         let features = run.tile_features(tile)?;
-        let refinement = tile_refinement(run.job, &run.area, tile, budget, posts_of(&seeds), &features.kept);
+        let refinement = tile_refinement(run.job, &run.area, tile, budget, posts_of(&seeds), &features);
         Ok(Self { run, window: run.window(tile)?, refinement, seeds })
     }
 

@@ -24,6 +24,8 @@ pub struct Refinement {
     pub most: Most,
     /// Vertices and edges that it keeps whatever it is refined to.
     pub features: Features,
+    /// Rings of level water, those of one body together: what lies inside has its height.
+    pub lakes: Vec<Vec<Vec<Vertex>>>,
 }
 
 /// Where there are no load modules, the most a mesh may have.
@@ -47,6 +49,12 @@ impl Refinement {
     /// Refines the tile. `seeds` are the vertices it inherits or keeps, at the heights they were published with,
     /// whatever the DEM says today.
     pub fn run(&self, window: &Window, seeds: &[Vertex]) -> TileTin {
+        let mut tin = self.run_as_given(window, seeds);
+        lay_level(&mut tin.tin, &self.lakes);
+        tin
+    }
+
+    fn run_as_given(&self, window: &Window, seeds: &[Vertex]) -> TileTin {
         if window.given.is_empty() {
             return self.run_given(window, seeds);
         }
@@ -162,6 +170,34 @@ impl Refinement {
             ..grown
         }
     }
+}
+
+/// Puts vertices inside level water at its height: posts there weigh nothing, so nothing else holds them.
+fn lay_level(tin: &mut Tin, lakes: &[Vec<Vec<Vertex>>]) {
+    for rings in lakes {
+        let Some(level) = rings.first().and_then(|ring| ring.first()).map(|vertex| vertex.height) else { continue };
+        let rows = || rings.iter().flatten().map(|vertex| vertex.at.row);
+        let (Some(south), Some(north)) = (rows().min(), rows().max()) else { continue };
+        let near = tin.vertices.iter_mut().filter(|vertex| (south..=north).contains(&vertex.at.row));
+        for vertex in near.filter(|vertex| lies_inside(rings, vertex.at)) {
+            vertex.height = level;
+        }
+    }
+}
+
+/// Whether a place lies inside an odd number of rings; one on a ring may be either.
+fn lies_inside(rings: &[Vec<Vertex>], at: LatticePoint) -> bool {
+    let crossed = |(a, b): (LatticePoint, LatticePoint)| {
+        let (low, high) = if a.row < b.row { (a, b) } else { (b, a) };
+        let [rise, run] = [high.row - low.row, high.col - low.col].map(i64::from);
+        let [up, along] = [at.row - low.row, at.col - low.col].map(i64::from);
+        low.row <= at.row && at.row < high.row && along * rise < up * run
+    };
+    let edges = rings.iter().flat_map(|ring| {
+        let next = ring.iter().cycle().skip(1);
+        ring.iter().zip(next).map(|(a, b)| (a.at, b.at))
+    });
+    edges.filter(|&edge| crossed(edge)).count() % 2 == 1
 }
 
 /// Adds what a job gives to a tile's task: points on the area's border to its border, others to what it starts from.

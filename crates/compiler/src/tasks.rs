@@ -5,7 +5,7 @@ use std::ops::Deref;
 use ground::GamingArea;
 use job::{Allocation, Borders, Budget as PointBudget, Edges, Effort, ErrorKey, Job, Method, OuterBorder};
 use limits::Allowance;
-use terrain::{Features, ModuleId, ModuleRect, Post, SeamSides, Side, TileId, TileTin, Vertex};
+use terrain::{Features, ModuleId, ModuleRect, Post, SeamSides, Side, TileFeatures, TileId, TileTin, Vertex};
 use tiling::{Tiling, outer_border_posts, outer_sides};
 use tin::{CostUnit, Frame, Proximity, Rule, Stop, SurveyTask, TileTask};
 
@@ -36,11 +36,12 @@ pub fn tile_refinement(
     tile: TileId,
     budget: &TileBudget,
     inherited: Vec<Post>,
-    features: &Features,
+    features: &TileFeatures,
 ) -> Refinement {
-    let barred = features.barred_posts(area.tiling.rect(tile));
+    let barred = features.kept.barred_posts(area.tiling.rect(tile));
     let task = TileTask { barred, ..tile_task(job, area, tile, budget, inherited) };
-    Refinement { task, optimising: optimising(job), most: Most::AsTask, features: features.clone() }
+    let lakes = features.lakes().map(|rings| rings.iter().map(|surface| surface.ring.clone()).collect()).collect();
+    Refinement { task, optimising: optimising(job), most: Most::AsTask, features: features.kept.clone(), lakes }
 }
 
 /// The growth of one tile, inheriting `inherited` from its lower-ranked neighbours.

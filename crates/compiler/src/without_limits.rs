@@ -47,7 +47,8 @@ fn without_limit(run: &Run, window: &Window, module: ModuleId, part: &Tin, extra
     let tile = run.area.tiling.tile_of_module(module, run.area.grid);
     let stop = Stop { points: Some(points + extra), ..Stop::default() };
     let task = TileTask { inherited, stop, ..TileTask::plain(tile, rect, rule(run.job, &run.area)) };
-    let refinement = Refinement { task, optimising, most: Most::AsTask, features: Features::default() };
+    let refinement =
+        Refinement { task, optimising, most: Most::AsTask, features: Features::default(), lakes: Vec::new() };
     let tin = match optimising {
         Some(optimising) => refinement.fill(&window, optimising, part),
         None => refinement.run(&window, &sides).tin,

@@ -48,6 +48,12 @@ impl TileFeatures {
         Self { tile, kept: Features::default(), surfaces: Vec::new(), slopes: Vec::new(), decks: Vec::new() }
     }
 
+    /// Bodies of level water, each with its rings.
+    pub fn lakes(&self) -> impl Iterator<Item = &[FeatureSurface]> {
+        let same = |a: &FeatureSurface, b: &FeatureSurface| (a.class, a.ground, a.body) == (b.class, b.ground, b.body);
+        self.surfaces.chunk_by(same).filter(|rings| rings[0].ground == SurfaceGround::Lake)
+    }
+
     /// Whether there is nothing that changes the ground or lies above it.
     pub fn is_empty(&self) -> bool {
         let Self { tile: _, kept, surfaces, slopes, decks } = self;

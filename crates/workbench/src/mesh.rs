@@ -278,7 +278,7 @@ impl<'a> TinJob<'a> {
             Some(triangles) if self.tiles.len() == 1 => Most::Triangles(triangles),
             _ => Most::AsTask,
         };
-        Refinement { task, optimising, most, features: Features::default() }
+        Refinement { task, optimising, most, features: Features::default(), lakes: Vec::new() }
     }
 
     fn task(&self, tile: TileId, seams: SeamSides, inherited: Vec<terrain::Post>, points: Option<usize>) -> TileTask {

@@ -83,7 +83,7 @@ fn other_rules(folder: &Folder, manifest: &Manifest, job: &Job, area: &GamingAre
         };
         let budget = TileBudget { points: None, allowance: Some(allowance), rms_quanta: None };
         let Ok(features) = tile_features(job, folder, tile) else { continue };
-        let expected = rules(&tile_refinement(job, area, tile, &budget, Vec::new(), &features.kept));
+        let expected = rules(&tile_refinement(job, area, tile, &budget, Vec::new(), &features));
         if record.made_from.as_ref().is_some_and(|parts| parts.get("rules") != Some(&expected)) {
             problems.push(format!("database.json: tile {tile} was selected by other rules than those of its job"));
         }
