@@ -30,7 +30,7 @@ pub struct FeatureRow {
     pub class: String,
     /// Tags that it takes, and where the row comes from.
     pub from: String,
-    /// Where the width comes from.
+    /// Its width where no tag of a feature says it, or that of the rule.
     pub width: String,
     /// The greatest grade, or what holds instead.
     pub grade: String,
@@ -242,15 +242,14 @@ fn row_text(row: &OverviewRow, rules: &[Rule]) -> FeatureRow {
     }
 }
 
-/// Where the width of a kind comes from.
+/// The width of a rule, or that of the kind where no tag says it.
 fn width_text(kind: Kind, of_rule: Option<f64>) -> String {
     let usual = kind.width_default() / terrain::QUANTA_PER_METRE;
     match (of_rule, kind) {
         (Some(metres), _) => format!("{metres} m"),
         (None, Kind::Lake | Kind::Dam | Kind::Breakline) => "-".to_owned(),
-        (None, Kind::Runway) => format!("tag, {usual} or 20 m"),
-        (None, kind) if kind.has_lanes() => format!("tag, lanes or {usual} m"),
-        (None, _) => format!("tag or {usual} m"),
+        (None, Kind::Runway) => format!("{usual}, 20 m"),
+        (None, _) => format!("{usual} m"),
     }
 }
 
@@ -299,10 +298,8 @@ mod tests {
     fn the_table_of_kinds_counts_what_lies_in_the_area_and_tells_what_lies_outside() {
         let rule = "{ where = { surface = \"sand\" }, class = \"sandy\", width_m = 3.5, grade_max_percent = 20 }";
         let table = table_of(&format!("sources = [\"r.geojson\"]\nrules = [{rule}]"), &[]).unwrap();
-        let expected = [
-            "track|sandy|1|3.5 m|20 %|line|rule 0: surface = sand",
-            "track|track|1|tag or 3 m|25 %|line|highway = track",
-        ];
+        let expected =
+            ["track|sandy|1|3.5 m|20 %|line|rule 0: surface = sand", "track|track|1|3 m|25 %|line|highway = track"];
         assert_eq!(rows(&table), expected);
         let seen = &table.sources[0];
         assert_eq!((seen.name.as_str(), seen.found, seen.outside, seen.without_kind), ("r.geojson", 4, 1, 1));
@@ -331,7 +328,7 @@ mod tests {
               all; name one, as { file = \"…\", kind = \"track\" }, or write a rule"]
         );
         let said = table_of("sources = [{ file = \"p.geojson\", kind = \"rail\" }]", &[]).unwrap();
-        assert_eq!(rows(&said), ["rail|rail|1|tag or 5 m|3 %|auto|sources that say so"]);
+        assert_eq!(rows(&said), ["rail|rail|1|5 m|3 %|auto|sources that say so"]);
         assert_eq!(said.notes, [""; 0]);
     }
 

@@ -4,6 +4,9 @@ use ground::FeatureTable;
 use serde_json::{Value, json};
 use views::{Align, Table, grouped};
 
+/// What goes before the widths of the table.
+const WIDTHS: &str = "Tags of width and lanes go before these widths, but not before those of rules.";
+
 /// The two tables.
 pub fn tables_text(features: &FeatureTable) -> String {
     let mut sources = Table::new(&[Align::Left, Align::Right, Align::Right, Align::Right, Align::Right]);
@@ -19,7 +22,7 @@ pub fn tables_text(features: &FeatureTable) -> String {
         let count = grouped(row.count as u64);
         rows.row([&row.kind, &row.class, &count, &row.width, &row.grade, &row.form, &row.from].map(String::as_str));
     }
-    format!("{}\n{}", sources.text(0), rows.text(0))
+    format!("{}\n{}{WIDTHS}\n", sources.text(0), rows.text(0))
 }
 
 /// The same for a program.

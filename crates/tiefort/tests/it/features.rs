@@ -99,9 +99,9 @@ fn init_writes_a_section_of_features_that_plan_reads() {
         "roads.json 5 1 1 0",
         "water.gpkg, layer lakes 2 1 0 0",
         "lake lake 2 - level polygon sources that say so",
-        "primary primary 1 tag, lanes or 7 m 10 % auto highway = primary, secondary,",
-        "track track 2 tag or 3 m 25 % line highway = track",
-        "features.share_max 0.5",
+        "primary primary 1 7 m 10 % auto highway = primary, secondary,",
+        "track track 2 3 m 25 % line highway = track",
+        "share_max 0.5",
     ] {
         assert!(flat(&plan).contains(row), "{row} is not in:\n{plan}");
     }
