@@ -3,8 +3,6 @@
 use database::Report;
 use terrain::named_class_color;
 
-use crate::Product;
-
 /// Base colours of classes whose names say nothing of their colour, in order and over again: told apart by the
 /// colour-blind, too.
 const COLOURS: [[f64; 3]; 8] = [
@@ -25,9 +23,9 @@ pub(crate) struct Classes<'a> {
 }
 
 impl<'a> Classes<'a> {
-    /// Those that the report of a product's database lists.
-    pub(crate) fn of(product: &'a Product) -> Self {
-        Self { names: &product.class_names }
+    /// Classes with these names.
+    pub(crate) fn named(names: &'a [String]) -> Self {
+        Self { names }
     }
 
     /// The name of a class, where a job has several: a single one needs none.

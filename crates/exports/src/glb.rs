@@ -248,7 +248,7 @@ pub fn write_glb(out: &mut impl Write, product: &Product, mesh: &Mesh) -> Result
     let gltf = Gltf {
         nodes: product.rect.iter().map(of_module).filter(|node| !node.groups.is_empty()).collect(),
         decks: product.rect.iter().map(of_decks).filter(|node| !node.groups.is_empty()).collect(),
-        classes: Classes::of(product),
+        classes: product.classes(),
         extras: json!({
             "crs": product.crs(), "vertical_datum": product.vertical_datum(), "offset_m": facts.offset_m,
             "axes": facts.axes, "attribution": product.attributions(),

@@ -5,7 +5,6 @@
 
 use terrain::{ModuleId, ModuleRect};
 
-use crate::classes::Classes;
 use crate::earth::Earth;
 use crate::flt_records::{Face, Place, Records};
 use crate::mesh::{Mesh, Part};
@@ -64,7 +63,7 @@ pub fn write_openflight(product: &Product, put: &Put, work: &Work) -> Result<(),
 
 /// The faces of each load module as an object: of its ground, or of its decks, whose vertices begin at this one.
 fn put_objects(records: &mut Records, product: &Product, part: &Part, decks_from: Option<u32>) {
-    let (classes, first) = (Classes::of(product), decks_from.unwrap_or(0));
+    let (classes, first) = (product.classes(), decks_from.unwrap_or(0));
     records.push();
     for (id, triangles) in &part.modules {
         if decks_from.is_some() && triangles.is_empty() {

@@ -2,7 +2,6 @@
 
 use std::io::{Result, Write};
 
-use crate::classes::Classes;
 use crate::{Coordinates, Facts, Mesh, Product};
 
 /// Writes `mesh` as binary little-endian PLY. Faces have corners only, since readers (meshio is one) take all lists to
@@ -16,7 +15,7 @@ pub fn write_ply(out: &mut impl Write, product: &Product, mesh: &Mesh, coordinat
     let facts = Facts::z_up(product, coordinates);
     let is_short = coordinates == Coordinates::Local && mesh.fits_floats();
     let mut comments = facts.comments(product);
-    let (groups, classes) = (mesh.groups(), Classes::of(product));
+    let (groups, classes) = (mesh.groups(), product.classes());
     let mut first = 0;
     for &group in &groups {
         let end = first + mesh.of_group(group).count();
@@ -45,7 +44,7 @@ pub fn write_obj(
 ) -> Result<()> {
     let facts = Facts::z_up(product, coordinates);
     let mut comments = facts.comments(product);
-    let (groups, classes) = (mesh.groups(), Classes::of(product));
+    let (groups, classes) = (mesh.groups(), product.classes());
     let named = groups.iter().filter(|group| !group.is_deck && classes.name(group.class).is_some());
     comments.extend(named.map(|group| format!("class {} {}", group.class, classes.word(group.class))));
     put_obj_comments(out, &comments)?;
@@ -71,7 +70,7 @@ pub fn write_obj(
 /// The text of a library of materials for an OBJ, one for each class; `None` where all is ground of one class, which
 /// needs none.
 pub fn obj_materials(product: &Product, mesh: &Mesh) -> Option<String> {
-    let (groups, classes) = (mesh.groups(), Classes::of(product));
+    let (groups, classes) = (mesh.groups(), product.classes());
     let mut present: Vec<u8> = groups.iter().map(|group| group.class).collect();
     present.sort_unstable();
     present.dedup();

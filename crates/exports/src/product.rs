@@ -5,7 +5,7 @@ use std::path::Path;
 use database::{Folder, Manifest, TileModules};
 use terrain::{GridFrame, HOLE_CLASS, LoadModule, ModuleGrid, ModuleId, ModuleRect, TileId};
 
-use crate::classes::names_in;
+use crate::classes::{Classes, names_in};
 use crate::{ExportError, Work};
 
 /// A block of load modules by its south-west and north-east one, both inside.
@@ -146,6 +146,11 @@ impl Product {
     /// Triangles of decks of bridges.
     pub fn deck_triangles(&self) -> usize {
         self.modules.iter().map(|module| module.decks.triangles.len()).sum()
+    }
+
+    /// The classes of the job, by name and colour.
+    pub(crate) fn classes(&self) -> Classes<'_> {
+        Classes::named(&self.class_names)
     }
 
     /// The coordinate system as the database names it.

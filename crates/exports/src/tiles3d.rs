@@ -11,7 +11,6 @@
 use serde_json::{Value, json};
 use terrain::{ModuleRect, QUANTA_PER_METRE};
 
-use crate::classes::Classes;
 use crate::coarse::Coarse;
 use crate::earth::Earth;
 use crate::glb::{Gltf, GltfNode, turned};
@@ -182,7 +181,7 @@ impl Layer {
         Gltf {
             nodes: nodes(group_name(rect), &parts.ground),
             decks: nodes(deck_name(rect), &parts.decks),
-            classes: Classes::of(&self.product),
+            classes: self.product.classes(),
             ..Gltf::default()
         }
     }
