@@ -15,7 +15,10 @@ use crate::scene::{EPSG, ORIGIN_M, Scene, Words};
 fn write_features(folder: &Path) {
     let place = |&(east, north): &(f64, f64)| json!([ORIGIN_M[0] + east, ORIGIN_M[1] + north]);
     let places = |places: &[(f64, f64)]| places.iter().map(place).collect::<Vec<Value>>();
-    let feature = |tags: Value, kind: &str, coordinates: Value| json!({ "type": "Feature", "properties": tags, "geometry": { "type": kind, "coordinates": coordinates } });
+    let feature = |tags: Value, kind: &str, coordinates: Value| {
+        let geometry = json!({ "type": kind, "coordinates": coordinates });
+        json!({ "type": "Feature", "properties": tags, "geometry": geometry })
+    };
     let line = |tags: Value, of: &[(f64, f64)]| feature(tags, "LineString", json!(places(of)));
     let track = [(300.0, 1800.0), (700.0, 1500.0), (650.0, 1200.0)];
     let ring = [(1150.0, 1150.0), (1450.0, 1200.0), (1400.0, 1500.0), (1200.0, 1450.0), (1150.0, 1150.0)];

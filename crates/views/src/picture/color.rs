@@ -118,8 +118,8 @@ pub(crate) const RESIDUALS: Ramp = Ramp(&[
 pub(crate) const KINDS: [Color; 4] = [[226, 222, 212], [253, 205, 130], [178, 223, 188], [222, 190, 218]];
 
 /// The palette for programs that draw by themselves, as texts such as `#547a4e`: `heights`, `use`, `errors` and
-/// `residuals` from low to high, `breach`, `water`, `nothing`, `sky` from its top to the horizon, and of `features` each
-/// class by its name.
+/// `residuals` from low to high, `breach`, `water`, `nothing`, `sky` from its top to the horizon, and of `features`
+/// each class by its name.
 pub fn palette() -> Value {
     let all = |colors: &[Color]| colors.iter().copied().map(hex).collect::<Vec<_>>();
     let features: serde_json::Map<String, Value> =

@@ -13,6 +13,7 @@ mod color;
 mod depth;
 mod errors;
 mod facets;
+mod feature_map;
 mod features;
 mod image;
 mod map_extent;
@@ -33,13 +34,12 @@ pub use color::{Color, palette};
 pub(crate) use color::{GREY, NOTHING, hex};
 pub use errors::{draw_errors, draw_module_limits};
 pub use facets::{Cover, Facets};
-pub use features::SceneFeatures;
 pub use image::Image;
 pub use panels::{Panel, Style, draw_panels};
 pub use perspective::{Drawn, Look, Surface, draw_perspective, draw_wireframe};
 pub use relief::Shown;
 pub use residual_map::RESIDUAL_SCALE_M;
-pub use scene::{NO_RESIDUAL, Scene, SceneGround, SceneLimits, SceneTile};
+pub use scene::{NO_RESIDUAL, Scene, SceneFeatures, SceneGround, SceneLimits, SceneTile};
 pub(crate) use sheet::{Drawing, Key, Legend, length_text, round_length};
 pub use sight::{Eye, Sight, draw_sight};
 
@@ -87,6 +87,6 @@ pub(crate) fn drawings(scene: &Scene, map: Map, longest: usize) -> Vec<Drawing> 
         Map::Density => vec![module_maps::density(scene, longest)],
         Map::Limits => module_maps::limits(scene, longest).into(),
         Map::Tiles => vec![module_maps::tiles(scene, longest)],
-        Map::Features => vec![features::feature_map(scene, longest)],
+        Map::Features => vec![feature_map::feature_map(scene, longest)],
     }
 }
