@@ -10,7 +10,8 @@ use terrain::{ModuleId, TileId};
 
 use crate::keys;
 use crate::pieces::{area_level, pieces, reserved};
-use crate::profile::{ReadFeatures, profile_tile};
+use crate::profile::profile_tile;
+use crate::read_features::ReadFeatures;
 use crate::run::{ALGORITHM_REVISION, Run};
 use crate::{CompileError, Event, Progress, Stage};
 

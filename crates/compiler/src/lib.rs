@@ -37,6 +37,7 @@ mod level;
 mod levels;
 mod pieces;
 mod profile;
+mod read_features;
 
 mod assemble;
 mod assembled;

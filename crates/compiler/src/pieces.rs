@@ -12,7 +12,7 @@ use terrain::{
 };
 use tiling::{outer_border_posts, outer_sides};
 
-use crate::profile::ReadFeatures;
+use crate::read_features::ReadFeatures;
 use crate::run::Run;
 use crate::strips::strips;
 

@@ -11,7 +11,7 @@ use schedule::{Event as Scheduled, RankedTasks, Workers, in_rank_order_observed}
 use source_files::FileState;
 use terrain::{TileFeatures, TileId, TileTin};
 
-use crate::profile::ReadFeatures;
+use crate::read_features::ReadFeatures;
 use crate::tins::Tins;
 use crate::{Clock, CompileError, Event, Progress, Stage};
 

@@ -8,7 +8,7 @@ use std::collections::HashMap;
 use terrain::{Dem, FeatureSurface, HOLE_CLASS, Importance, LatticePoint, Post, PostRect, SurfaceGround, TileFeatures};
 use terrain::{Spacing, Vertex};
 
-use crate::ground::Window;
+use crate::window::Window;
 
 /// Run over rise of a slope that was cut.
 const CUT_RUN: f64 = 1.5;

@@ -8,12 +8,12 @@ use job::{DemSource, Job};
 use mask::Mask;
 use schedule::Workers;
 use source_files::{VoidSummary, read_polygons};
-use terrain::{Dem, GridFrame, Importance, Post, PostRect, TileFeatures, TileId};
+use terrain::{Dem, GridFrame, Importance, PostRect, TileFeatures, TileId};
 
 use crate::area::GamingArea;
 use crate::bounds::Bounds;
 use crate::census::Census;
-use crate::given::{GamingAreaFrame, Given, GivenPost};
+use crate::given::{GamingAreaFrame, Given};
 use crate::large::WHOLE_BYTES_MAX;
 use crate::lines::Lines;
 use crate::mask_of::{Fault, Opening};
@@ -21,6 +21,7 @@ use crate::relief::Relief;
 use crate::source::Source;
 use crate::sources::Opened;
 use crate::water::{Soundings, Water};
+use crate::window::Window;
 use crate::{GroundError, sources, water};
 
 /// Posts of an area up to which the windows of tiles are kept between stages (7 bytes a post).
@@ -45,29 +46,6 @@ pub struct Ground {
     pub accuracy_m: Option<f64>,
     /// What a person should know about the sources.
     pub warnings: Vec<String>,
-}
-
-/// The ground of a rectangle of posts.
-#[derive(Clone)]
-pub struct Window {
-    /// Heights.
-    pub dem: Dem,
-    /// Weights and classes.
-    pub importance: Importance,
-    /// Posts that the job gives, of a tile's own window; none of any other.
-    pub given: Vec<GivenPost>,
-    /// Posts of such a window that it forbids.
-    pub forbidden: Vec<Post>,
-    /// Posts that features lie on, or whose heights they have changed; in ascending order.
-    pub featured: Vec<Post>,
-}
-
-impl Window {
-    /// What load modules of this rectangle are measured against.
-    pub fn measured(&self, area: &GamingArea) -> fidelity::Reference<'_> {
-        let spacing = area.frame.spacing;
-        fidelity::Reference { dem: &self.dem, mask: &self.importance, grid: area.grid, spacing }
-    }
 }
 
 impl Ground {

@@ -4,7 +4,7 @@ use engine::{FingerprintBuilder, Key, Part};
 use terrain::{Dem, Importance, Post, PostRect};
 
 use crate::given::GivenPost;
-use crate::ground::Window;
+use crate::window::Window;
 
 /// Heights of a window, and which of them are void.
 const HEIGHTS: Part = Part { name: "heights", changed: "its heights changed" };

@@ -10,7 +10,7 @@ use terrain::{PostRect, Spacing, TileFeatures, TileId};
 use crate::GroundError;
 use crate::area::GamingArea;
 use crate::burn::burn;
-use crate::ground::Window;
+use crate::window::Window;
 
 /// Tiles whose features are kept in memory at most.
 const TILES_MAX: NonZeroUsize = NonZeroUsize::new(64).expect("64 is not 0");

@@ -9,7 +9,9 @@
 mod task;
 pub use task::{Budget, Task};
 mod optimise;
-pub use optimise::{Optimised, fill, optimise, overshoot, weave_in};
+pub use optimise::{Optimised, fill, optimise, weave_in};
+mod recipe;
+pub use recipe::overshoot;
 
 mod account;
 mod curve;

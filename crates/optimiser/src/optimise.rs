@@ -1,7 +1,7 @@
 //! The order of the steps.
 
 use limits::Shortfall;
-use terrain::{Dem, Effort, Importance, LATTICE_PER_POST, Lattice, LatticePoint, Refusal, StopReason, Tin};
+use terrain::{Dem, Importance, LATTICE_PER_POST, Lattice, LatticePoint, Refusal, StopReason, Tin};
 
 use crate::account::Account;
 use crate::exchange::{Exchange, Terms, Tools};
@@ -11,6 +11,7 @@ use crate::insertion::Insertion;
 use crate::parts::{Layout, NONE, Parts};
 use crate::place::{PER_POST, Place, Shape};
 use crate::queue::Queue;
+use crate::recipe::Recipe;
 use crate::removal::Removal;
 use crate::sweep::{Mover, Steps};
 use crate::task::Task;
@@ -50,39 +51,6 @@ const IDLE_SHARE: usize = 1000;
 const RELIEVED_FROM: f64 = 25.0;
 /// How far a cycle grows beyond the budget.
 const CYCLE_SHARE: f64 = 0.2;
-
-/// What an effort does.
-struct Recipe {
-    /// How many times its budget the TIN has before it is optimised.
-    overshoot: f64,
-    /// Times the budget to thin to, one after the other.
-    stages: &'static [f64],
-    /// Sweeps once the budget is met.
-    sweeps: usize,
-    /// Rounds of exchange at most.
-    rounds: usize,
-    /// Cycles of growing and thinning.
-    cycles: usize,
-    /// Sweeps on the final lattice.
-    last_sweeps: usize,
-}
-
-impl Recipe {
-    fn of(effort: Effort) -> Self {
-        match effort {
-            Effort::Fast => Self { overshoot: 1.0, stages: &[], sweeps: 3, rounds: 0, cycles: 0, last_sweeps: 0 },
-            Effort::Normal => Self { overshoot: 2.0, stages: &[1.0], sweeps: 2, rounds: 10, cycles: 0, last_sweeps: 2 },
-            Effort::Best => {
-                Self { overshoot: 3.0, stages: &[2.0, 1.5, 1.2, 1.0], sweeps: 2, rounds: 10, cycles: 8, last_sweeps: 4 }
-            }
-        }
-    }
-}
-
-/// How many times its budget a TIN should have before it is optimised.
-pub fn overshoot(effort: Effort) -> f64 {
-    Recipe::of(effort).overshoot
-}
 
 /// Makes a TIN truer within its budget.
 ///

@@ -21,6 +21,7 @@ mod outlook;
 #[cfg(unix)]
 mod paths;
 mod raster;
+mod roads_and_water;
 mod scene;
 mod shared;
 mod starts;

@@ -1,4 +1,4 @@
-//! A ground that is a function, features drawn on it in metres from the area's south-west corner, and what came of them.
+//! A ground that is a function, features drawn on it in metres from its south-west corner, and what came of them.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
