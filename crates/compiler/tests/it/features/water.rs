@@ -29,6 +29,18 @@ fn a_river_on_noisy_ground_falls_all_the_way() {
 }
 
 #[test]
+fn streams_that_end_at_one_place_both_fall_to_it() {
+    let basin = |east: f64, _: f64| 400.0 + 0.03 * (east - 1000.0).abs();
+    let drawn = [
+        line("waterway=stream", &[(100.0, 800.0), (1000.0, 820.0)]),
+        line("waterway=stream", &[(1900.0, 850.0), (1000.0, 820.0)]),
+    ];
+    let laid = Drawing::new(basin, &drawn).built();
+    assert_eq!(laid.lines(Kind::Stream, LineRole::Channel).len(), 2, "no line runs through the place they end at");
+    never_rises(&laid, Kind::Stream);
+}
+
+#[test]
 fn rivers_that_meet_go_on_at_one_height() {
     let drawn = [
         line("waterway=river", &[(300.0, 1900.0), (1000.0, 1000.0), (1000.0, 50.0)]),
