@@ -1,8 +1,8 @@
 //! What features cost in triangles, counted before any tile is refined, and what becomes of those that cost too much.
 //!
 //! A deck has as many triangles at most as it has corners. On the ground, a point inside a load module adds two
-//! triangles and one on its side adds one, whatever else the TIN holds, because triangles = 2 V + B - 2. So the count is
-//! exact for what features put there, and a lower bound for their module.
+//! triangles and one on its side adds one, whatever else the TIN holds, because triangles = 2 V + B - 2. So the count
+//! is exact for what features put there, and a lower bound for their module.
 
 use std::collections::{BTreeMap, HashMap};
 
