@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
 """Exports a terrain database in every format and opens each with a reader that is not ours.
 
-    python3 scripts/check_exports.py [DIR...] [--holes] [--tiefort target/release/tiefort] [--node-modules DIR]
+    python3 scripts/check_exports.py [DIR...] [--holes] [--bridge] [--tiefort PROGRAM] [--node-modules DIR]
 
-With --holes a database with holes is built and checked, too. Needs rasterio, rio-cogeo, meshio, geopandas, pyogrio,
-pyproj and numpy; osgconv (Debian's openscenegraph); node with what scripts/exports/package.json names for glTF and
-CesiumJS, and chromium; a Python that has QGIS (Debian's python3-qgis). A reader that is missing is told and skipped,
-unless --all is given.
+With --holes a database with holes is built and checked, too, with --bridge one with a bridge over a valley. PROGRAM is
+target/release/tiefort unless said. Needs rasterio, rio-cogeo, meshio, geopandas, pyogrio, pyproj and numpy; osgconv
+(Debian's openscenegraph); node with what scripts/exports/package.json names for glTF and CesiumJS, and chromium; a
+Python that has QGIS (Debian's python3-qgis). A reader that is missing is told and skipped, unless --all is given.
 """
 
 import argparse
@@ -21,6 +21,7 @@ import sys
 import tempfile
 import time
 import xml.etree.ElementTree as xml
+import zlib
 
 import numpy
 
@@ -65,6 +66,15 @@ class Database:
                 if number != HOLE:
                     self.places.update(places[corner] for corner in triangle)
                     self.ground_modules[row, col] = self.ground_modules.get((row, col), 0) + 1
+        self.deck_places, self.deck_modules, self.deck_of_class = set(), {}, {}
+        for (row, col), module in self.modules.items():
+            decks = module.get("decks", {"vertices": [], "triangles": [], "classes": []})
+            places = ((col * self.side + x / 128, row * self.side + y / 128, z / 128) for x, y, z in decks["vertices"])
+            self.deck_places.update(places)
+            for number in decks["classes"]:
+                self.deck_of_class[number] = self.deck_of_class.get(number, 0) + 1
+                self.deck_modules[row, col] = self.deck_modules.get((row, col), 0) + 1
+        self.decks = sum(self.deck_modules.values())
         # Of the ground alone, as meshes have it, which leave holes out.
         self.vertices = len(self.places)
         self.heights = [z for _, _, z in self.places]
@@ -76,6 +86,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("databases", nargs="*", metavar="DIR")
     parser.add_argument("--holes", action="store_true", help="also build a database with holes and check it")
+    parser.add_argument("--bridge", action="store_true", help="also build a database with a bridge and check it")
     parser.add_argument("--tiefort", default="target/release/tiefort")
     parser.add_argument("--node-modules", help="folder that holds node_modules with gltf-validator")
     parser.add_argument("--qgis-python", help="a Python that has QGIS, to open the GeoPackage with it")
@@ -86,8 +97,9 @@ def main():
     with tempfile.TemporaryDirectory() as scratch:
         scratch = pathlib.Path(scratch)
         folders = [*arguments.databases, *([with_holes(arguments, scratch)] if arguments.holes else [])]
+        folders += [with_bridge(arguments, scratch)] if arguments.bridge else []
         if not folders:
-            parser.error("name a database, or give --holes")
+            parser.error("name a database, or give --holes or --bridge")
         for number, folder in enumerate(folders):
             (scratch / str(number)).mkdir()
             check(Database(folder), arguments, scratch / str(number))
@@ -149,6 +161,103 @@ def with_holes(arguments, scratch):
     return out
 
 
+# In metres from the corner of the area.
+BRIDGE = {"west": 3600, "east": 4400, "south": 3010, "north": 3022, "height": 903}
+
+
+def with_bridge(arguments, scratch):
+    """A database of 8 km x 6 km with a road, a river in a valley, and a bridge with which the road crosses it."""
+    rows, cols, spacing = 241, 321, 25
+    row, col = numpy.mgrid[:rows, :cols]
+    east = col * spacing
+    heights = 900 + 0.5 * numpy.sin(row / 9) - 60 * numpy.clip(1 - abs(east - 4000) / 350, 0, 1)
+    lines = [f"ncols {cols}", f"nrows {rows}", "xllcenter 500000", "yllcenter 3900000", f"cellsize {spacing}",
+             "NODATA_value -9999"]
+    lines += [" ".join(f"{z:.3f}" for z in line) for line in heights]
+    (scratch / "valley.asc").write_text("\n".join(lines) + "\n")
+
+    def polygon(name, west, south, east, north):
+        ring = [[500000 + x, 3900000 + y] for x, y in [(west, south), (east, south), (east, north), (west, north)]]
+        geometry = {"type": "Polygon", "coordinates": [[*ring, ring[0]]]}
+        crs = {"type": "name", "properties": {"name": "EPSG:32611"}}
+        (scratch / name).write_text(json.dumps({"type": "FeatureCollection", "crs": crs, "features": [
+            {"type": "Feature", "properties": {}, "geometry": geometry}]}))
+
+    polygon("road.geojson", 200, 2960, 7800, 3060)
+    polygon("river.geojson", 3940, 200, 4060, 5800)
+    job = f"""
+        [area]
+        name = "bridge"
+        crs = "EPSG:32611"
+        origin_m = [500000, 3900000]
+        size_m = [8000, 6000]
+        spacing_m = {spacing}
+        [dem]
+        sources = [{{ file = "valley.asc", crs = "EPSG:32611" }}]
+        vertical_datum = "EGM96"
+        [importance]
+        areas = [{{ file = "river.geojson", class = "river", weight = 1 }},
+                 {{ file = "road.geojson", class = "motorway", weight = 1 }}]
+        [limits]
+        mean_per_load_module = 32
+        [lod]
+        levels = [{{ inner_share = 0.5 }}]
+        """
+    (scratch / "bridge.toml").write_text(job)
+    out = scratch / "bridge.tdb"
+    subprocess.run([arguments.tiefort, "build", str(scratch / "bridge.toml"), "--out", str(out), "--quiet"], check=True)
+    names = [of["name"] for of in json.loads((out / "report.json").read_text())["classes"]]
+    for path in sorted((out / "modules").glob("*.slm")):
+        data = add_bridge(path.read_bytes(), names.index("motorway"))
+        read_slm.parse(data)
+        path.write_bytes(data)
+    return out
+
+
+def add_bridge(data, of_class):
+    """The same file of version 1 with the bridge in it, as one of version 2 where it holds any of it (FORMAT.md)."""
+    header, modules = read_slm.parse(data)
+    decks = [bridge_in(module, header["side"], of_class) for module in modules]
+    if not any(decks):
+        return data
+    (length,) = struct.unpack_from("<I", data, 12)
+    offset = length + 48 * len(modules) + 4
+    index, sections = b"", b""
+    for number, (module, (vertices, triangles)) in enumerate(zip(modules, [deck or ([], []) for deck in decks])):
+        start, size, *rest = read_slm.ENTRY.unpack_from(data, length + 32 * number)
+        heights = [z for _, _, z in vertices] or [0]
+        index += read_slm.ENTRY.pack(offset + len(sections), size, *rest)
+        index += read_slm.DECK_ENTRY.pack(len(vertices), len(triangles), min(heights), max(heights))
+        sections += data[start:start + size]
+        if vertices:
+            part = read_slm.DECKS.pack(module["row"], module["column"], module["level"], len(vertices), len(triangles))
+            part += b"".join(struct.pack("<HHi", *vertex) for vertex in vertices)
+            part += b"".join(struct.pack("<3H", *triangle) for triangle in triangles)
+            part += bytes([of_class] * len(triangles))
+            sections += sealed(part + bytes(-len(part) % 4))
+    head = bytearray(data[:length - 4])
+    struct.pack_into("<H", head, 8, 2)
+    struct.pack_into("<Q", head, 16, offset + len(sections))
+    return sealed(bytes(head)) + sealed(index) + sections
+
+
+def sealed(part):
+    return part + struct.pack("<I", zlib.crc32(part))
+
+
+def bridge_in(module, side, of_class):
+    """The part of the bridge in a load module, in quanta: vertices and triangles; None where there is none."""
+    west, east, south, north = (128 * BRIDGE[edge] for edge in ["west", "east", "south", "north"])
+    corner = [module["column"] * side, module["row"] * side]
+    xs = [max(west, corner[0]), min(east, corner[0] + side)]
+    if xs[0] >= xs[1] or not corner[1] <= south < north <= corner[1] + side:
+        return None
+    # A little higher in the middle, the same on both sides of a line between load modules.
+    height = {x: 128 * BRIDGE["height"] + min(x - west, east - x) // 100 for x in xs}
+    vertices = [(x - corner[0], y - corner[1], height[x]) for y in (south, north) for x in xs]
+    return vertices, [(0, 1, 3), (0, 3, 2)]
+
+
 class Skip(Exception):
     pass
 
@@ -167,6 +276,10 @@ def datum(database):
     return [] if database.manifest["area"]["vertical_datum"] == "EGM96" else ["--assume-datum", "EGM96"]
 
 
+def with_decks(module):
+    return {"decks": {"vertices": [], "triangles": [], "classes": []}, **module}
+
+
 def check_modules(database, arguments, scratch):
     folder = export(arguments, "modules", scratch / "modules")
     files = sorted(folder.glob("*.slm"))
@@ -174,7 +287,9 @@ def check_modules(database, arguments, scratch):
     same = 0
     for path in files:
         _, levels = read_slm.parse(path.read_bytes())
-        same += levels == database.levels[levels[0]["row"], levels[0]["column"]]
+        # A file of one load module without decks is of version 1, and says nothing of them.
+        expected = database.levels[levels[0]["row"], levels[0]["column"]]
+        same += [with_decks(of) for of in levels] == [with_decks(of) for of in expected]
     expect(same == len(files), "each holds its load module as it is in the database, at every level")
     shutil.rmtree(folder)
 
@@ -183,17 +298,28 @@ def check_meshes(database, arguments, scratch):
     path = export(arguments, "ply", scratch / "mesh.ply")
     head, body = path.read_bytes().split(b"end_header\n", 1)
     counts = [int(n) for n in re.findall(rb"element \w+ (\d+)", head)]
-    expect(counts == [database.vertices, database.ground], f"ply has {counts[0]} vertices, {counts[1]} triangles")
+    shape = [database.vertices + len(database.deck_places), database.ground + database.decks]
+    expect(counts == shape, f"ply has {counts[0]} vertices, {counts[1]} triangles")
     places = numpy.frombuffer(body, "<f4", 3 * counts[0]).reshape(-1, 3).astype(float)
-    expect({tuple(place) for place in places} == database.places, "ply: every vertex at its place, exactly")
-    said = {int(of): int(to) - int(first) + 1 for of, first, to in
-            re.findall(rb"comment class (\d+) faces (\d+) to (\d+)", head)}
+    everywhere = database.places | database.deck_places
+    expect({tuple(place) for place in places} == everywhere, "ply: every vertex at its place, exactly")
+
+    def said_of(kind):
+        found = re.findall(b"comment " + kind + rb"class (\d+) faces (\d+) to (\d+)", head)
+        return {int(of): int(to) - int(first) + 1 for of, first, to in found}
+
+    said = said_of(b"")
+    expect(said_of(b"decks ") == database.deck_of_class, f"ply: faces of decks of each class {database.deck_of_class}")
     expect(said == {of: count for of, count in database.of_class.items() if of != HOLE}, "ply: faces of each class")
     obj = export(arguments, "obj", scratch / "mesh.obj", "--coordinates", "map").read_text().splitlines()
     places = {tuple(map(float, line.split()[1:])) for line in obj if line.startswith("v ")}
     east, north = database.origin
-    expect(places == {(x + east, y + north, z) for x, y, z in database.places}, "obj: every vertex on the map")
-    expect(sum(line.startswith("f ") for line in obj) == database.ground, "obj: every triangle")
+    expect(places == {(x + east, y + north, z) for x, y, z in everywhere}, "obj: every vertex on the map")
+    expect(sum(line.startswith("f ") for line in obj) == database.ground + database.decks, "obj: every triangle")
+    expect(("o decks" in obj) == bool(database.decks), "obj: decks, where there are any, are an object of their own")
+    library, used = scratch / "mesh.mtl", {line for line in obj if line.startswith("usemtl ")}
+    made = re.findall(r"newmtl (.*)", library.read_text()) if library.exists() else []
+    expect(used == {f"usemtl {name}" for name in made}, f"obj: materials {made}")
     sidecar = json.loads((scratch / "mesh.ply.json").read_text())
     expect(sidecar["offset_m"] == [*database.origin, 0.0], "the sidecar says where that is")
     expect(sidecar["hole_triangles_left_out"] == database.holes, f"and that {database.holes} triangles are left out")
@@ -203,21 +329,28 @@ def check_meshes(database, arguments, scratch):
         raise Skip(error) from error
     for path in [scratch / "mesh.ply", scratch / "mesh.obj"]:
         mesh = meshio.read(path)
-        shape = (len(mesh.points), len(mesh.cells_dict["triangle"]))
-        expect(shape == (database.vertices, database.ground), f"meshio reads {path.name}: {shape}")
+        found = [len(mesh.points), len(mesh.cells_dict["triangle"])]
+        expect(found == shape, f"meshio reads {path.name}: {found}")
 
 
 def check_glb(database, arguments, scratch):
     glb = export(arguments, "glb", scratch / "mesh.glb")
     document, _ = read_glb(glb.read_bytes())
-    found = {}
+    found = {"": {}, "decks_": {}}
     for node in document["nodes"]:
-        row, col = re.fullmatch(r"r(\d+)c(\d+)", node["name"]).groups()
-        found[int(row), int(col)] = glb_triangles(document, document["meshes"][node["mesh"]])
-    expect(found == database.ground_modules, f"{len(found)} nodes, each a load module by name and triangles")
+        if "children" in node:
+            expect(node["name"] == "decks" and len(node["children"]) == len(database.deck_modules), "a node of decks")
+            continue
+        kind, row, col = re.fullmatch(r"(|decks_)r(\d+)c(\d+)", node["name"]).groups()
+        found[kind][int(row), int(col)] = glb_triangles(document, document["meshes"][node["mesh"]])
+    expect(found[""] == database.ground_modules, f"{len(found[''])} nodes, each a load module by name and triangles")
+    expect(found["decks_"] == database.deck_modules, f"{len(found['decks_'])} nodes of decks likewise")
+    named = {of["name"] for of in database.report["classes"]} - {"hole"}
+    materials = [of["name"].removeprefix("decks_") for of in document["materials"]]
+    expect(len(named) < 2 or set(materials) <= named, f"materials have the names of classes {materials}")
     places = {tuple(place) for positions in glb_positions(glb.read_bytes()) for place in positions}
     turned = {(x, -z, y) for x, y, z in places}
-    expect(turned == database.places, "every vertex at its place, exactly")
+    expect(turned == database.places | database.deck_places, "every vertex at its place, exactly")
     validate([glb], arguments)
 
 
@@ -345,7 +478,13 @@ def check_gpkg(database, arguments, scratch):
     expect(layers["load_modules"].crs.to_epsg() == code, f"in EPSG:{code}")
     expect(len(layers["tiles"]) == len(database.manifest["tiles"]), "tiles: a feature for each")
     expect(len(layers["breaches"]) == len(database.report["breaches"]), "breaches: a feature for each")
-    expect(int(layers["load_modules"].triangles.sum()) == database.triangles, "counts add up")
+    expect(int(layers["load_modules"].triangles.sum()) == database.triangles + database.decks, "counts add up")
+    if database.decks:
+        decks = geopandas.read_file(path, layer="decks")
+        expect(len(decks) == database.decks and bool(decks.has_z.all()), f"decks: {len(decks)} polygons with heights")
+        expect(dict(decks["class"].value_counts()) == database.deck_of_class, "decks: of their classes")
+    listed = {name for name, *_ in pyogrio.list_layers(path)}
+    expect(("decks" in listed) == bool(database.decks), "a layer decks where there are any")
     triangles = geopandas.read_file(path, layer="triangles")
     expect(len(triangles) == database.triangles and bool(triangles.has_z.all()), "triangles: polygons with heights")
     names = {of["name"] for of in database.report["classes"]} | {"hole"}
@@ -359,7 +498,7 @@ def check_gpkg(database, arguments, scratch):
     area = triangles.geometry.area.sum()
     whole = database.rows * database.cols * database.side ** 2
     expect(abs(area / whole - 1) < 1e-9, f"triangles cover {area / 1e6:.3f} km2")
-    check_styles(path, set(triangles["class"]))
+    check_styles(path, set(triangles["class"]) | set(database.deck_of_class))
     check_in_qgis(path, dict(zip(triangles["class"], triangles.class_name)), arguments)
 
 
@@ -376,7 +515,7 @@ def check_styles(path, classes):
         renderer = xml.fromstring(text).find("renderer-v2")
         symbols = {symbol.get("name") for symbol in renderer.iter("symbol")}
         categories = {int(of.get("value")): of.get("symbol") for of in renderer.iter("category")}
-        wanted = classes if name == "triangles" else set()
+        wanted = classes if name in ("triangles", "decks") else set()
         expect(set(categories) == wanted and set(categories.values() or symbols) == symbols, f"style of {name}")
 
 
@@ -406,11 +545,11 @@ def check_openflight(database, arguments, scratch):
             places.append(tuple(map(float, line.split()[1:4])))
         elif line.startswith("f "):
             faces += len(line.split()) - 3
-    expect(faces == database.ground, f"{faces} triangles come out")
+    expect(faces == database.ground + database.decks, f"{faces} triangles come out, {database.decks} of decks")
     places = numpy.array(places)
     # OSG's OBJ writer may turn axes: compare the extents of each axis in any order.
     extents = sorted(numpy.round(places.max(0) - places.min(0), 2))
-    own = numpy.array(sorted(database.places))
+    own = numpy.array(sorted(database.places | database.deck_places))
     expected = sorted(numpy.round(own.max(0) - own.min(0), 2))
     expect(numpy.allclose(extents, expected, atol=0.05), f"bounds {extents}, expected {expected}")
     tree = xml.parse(folder / "area.mft").getroot()
@@ -419,13 +558,13 @@ def check_openflight(database, arguments, scratch):
     expect(there and len(listed) == len(squares), "the index lists each file")
 
 
-def globe(database):
-    """The places of all vertices on the globe, by PROJ, with the offset of heights that tiefort chose."""
+def globe(database, places):
+    """Places of the database on the globe, by PROJ, with the offset of heights that tiefort chose."""
     try:
         import pyproj
     except ImportError as error:
         raise Skip(error) from error
-    own = numpy.array(sorted(database.places))
+    own = numpy.array(sorted(places))
     to = pyproj.Transformer.from_crs(database.manifest["area"]["crs"], 4326, always_xy=True)
     longitude, latitude = to.transform(own[:, 0] + database.origin[0], own[:, 1] + database.origin[1])
     return own, numpy.array(longitude), numpy.array(latitude), pyproj
@@ -433,7 +572,7 @@ def globe(database):
 
 def check_3dtiles(database, arguments, scratch):
     folder = export(arguments, "3dtiles", scratch / "3dtiles", *datum(database))
-    own, longitude, latitude, pyproj = globe(database)
+    own, longitude, latitude, pyproj = globe(database, database.places | database.deck_places)
     tileset = json.loads((folder / "tileset.json").read_text())
     geodetic = pyproj.Transformer.from_crs(4978, 4979, always_xy=True)
     found, triangles, worst = {}, 0, check_tileset(folder, tileset)
@@ -450,7 +589,8 @@ def check_3dtiles(database, arguments, scratch):
         box = numpy.array(child["boundingVolume"]["box"])
         local = numpy.array([x, -z, y]).T - box[:3]
         worst &= bool((numpy.abs(local) <= box[[3, 7, 11]] + 1e-3).all())
-    expect(triangles == database.ground, f"{triangles} triangles in {len(groups)} groups of load modules")
+    expected = database.ground + database.decks
+    expect(triangles == expected, f"{triangles} triangles in {len(groups)} groups of load modules")
     expect(worst, "boxes hold their content, errors shrink on the way down, no list of children is empty")
     files = sorted(folder.rglob("*.glb"))
     listed = {folder / tile["content"]["uri"] for tile in tiles_below(tileset["root"]) if "content" in tile}
@@ -517,7 +657,7 @@ class Terrain:
 
 def check_quantized_mesh(database, arguments, scratch):
     folder = export(arguments, "quantized-mesh", scratch / "terrain", *datum(database))
-    own, longitude, latitude, pyproj = globe(database)
+    own, longitude, latitude, pyproj = globe(database, database.places)
     layer = json.loads((folder / "layer.json").read_text())
     level = layer["maxzoom"]
     degrees = 180 / 2 ** level
@@ -586,7 +726,7 @@ def check_cesium(database, arguments, scratch):
     """Heights at the middle of triangles, taken as ellipsoidal so that PROJ alone says where they are."""
     if not arguments.node_modules or not shutil.which("chromium"):
         raise Skip("no --node-modules with cesium and puppeteer-core, or no chromium")
-    pyproj = globe(database)[3]
+    pyproj = globe(database, database.places)[3]
     to = pyproj.Transformer.from_crs(database.manifest["area"]["crs"], 4326, always_xy=True)
     modules = list(database.modules.items())
     places = []

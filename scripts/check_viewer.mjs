@@ -87,23 +87,40 @@ async function serve() {
 
 /** Triangles and polygons of every load module, from headers and indexes; `levels` has those of every level. */
 function readCounts(modules) {
-  const area = { levels: [] };
+  const area = { levels: [], decks: [] };
   for (const name of readdirSync(modules).filter((name) => name.endsWith(".slm"))) {
     const file = readFileSync(join(modules, name));
     const word = (at) => file.readUInt32LE(at);
     [area.rows, area.cols, area.side] = [word(32), word(36), word(56) / 128];
     area.origin = [file.readDoubleLE(72), file.readDoubleLE(80)];
+    const entry = file.readUInt16LE(8) === 1 ? 32 : 48;
     let at = word(12);
     for (let level = 0; level < file.readUInt16LE(10); level++) {
       const counts = (area.levels[level] ??= new Map());
       for (let row = word(40); row < word(44); row++) {
-        for (let col = word(48); col < word(52); col++, at += 32) {
-          counts.set(row * area.cols + col, { triangles: word(at + 16), polygons: word(at + 20) });
+        for (let col = word(48); col < word(52); col++, at += entry) {
+          // Decks count as the ground does.
+          const decks = entry === 32 ? 0 : word(at + 36);
+          if (0 < decks && level === 0) area.decks.push(deckIn(file, at, area, row, col));
+          counts.set(row * area.cols + col, { triangles: word(at + 16) + decks, polygons: word(at + 20) + decks });
         }
       }
     }
   }
   return { ...area, counts: area.levels[0] };
+}
+
+/** Middle and height of the first triangle of a load module's decks, whose entry in the index is at `at`. */
+function deckIn(file, at, { side, origin }, row, col) {
+  const start = Number(file.readBigUInt64LE(at)) + file.readUInt32LE(at + 8) + 20;
+  const triangles = start + 8 * file.readUInt32LE(at + 32), middle = [0, 0, 0];
+  for (let corner = 0; corner < 3; corner++) {
+    const vertex = start + 8 * file.readUInt16LE(triangles + 2 * corner);
+    middle[0] += file.readUInt16LE(vertex) / 128 / 3;
+    middle[1] += file.readUInt16LE(vertex + 2) / 128 / 3;
+    middle[2] += file.readInt32LE(vertex + 4) / 128 / 3;
+  }
+  return [origin[0] + col * side + middle[0], origin[1] + row * side + middle[1], middle[2]];
 }
 
 async function check() {
@@ -134,6 +151,7 @@ async function check() {
   await shown(page);
   await touched(page);
   await flown(page);
+  if (0 < own.decks.length) await bridged(page);
   expect(failed.length === 0, `every answer was whole ${failed.slice(0, 3)}`);
   expect(asked.every((url) => url.startsWith(address) || url.startsWith("data:")), "nothing was asked of anybody else");
   expect(said.length === 0, `no error in the console ${said.slice(0, 3)}`);
@@ -317,6 +335,39 @@ async function flown(page) {
   await settled(page);
   await whole(page, "in flight");
   await picture(page, "flight");
+}
+
+/** The tank stands on the highest deck where it is put there, and drives under it where it comes from beside it. */
+async function bridged(page) {
+  const above = async ([east, north, height]) => {
+    await open(page, `east=${east}&north=${north}&heading=90&range=1000`);
+    const found = await state(page);
+    return { deck: found, off: found.height - height };
+  };
+  const range = [...own.decks].sort((a, b) => a[0] - b[0]), place = range[Math.floor(range.length / 2)];
+  const { deck, off } = await above(place);
+  expect(deck.isOnDeck && Math.abs(off) < 0.2, `the tank stands on a deck, ${off.toFixed(2)} m off`);
+  await picture(page, "on-deck");
+  await page.keyboard.down("KeyW");
+  await page.waitForFunction(`150 < window.tiefort.state().driven`, { timeout: 120_000 });
+  await page.keyboard.up("KeyW");
+  const along = await state(page);
+  expect(along.isOnDeck, `and drives on along it, at ${along.height.toFixed(1)} m`);
+  await open(page, `east=${place[0]}&north=${place[1] - 80}&heading=0&range=1000`);
+  await picture(page, "before-deck");
+  let [under, onDeck] = [null, 0];
+  await page.keyboard.down("KeyW");
+  for (let now = await state(page); now.driven < 160; now = await state(page)) {
+    onDeck += now.isOnDeck ? 1 : 0;
+    if (under === null && 78 < now.driven) {
+      under = now;
+      await picture(page, "under-deck");
+    }
+    await pause(20);
+  }
+  await page.keyboard.up("KeyW");
+  const below = place[2] - under.height;
+  expect(onDeck === 0 && 3 < below, `and another drives under it, ${below.toFixed(1)} m below`);
 }
 
 async function picture(page, name) {

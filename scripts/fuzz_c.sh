@@ -4,9 +4,10 @@
 #
 #     scripts/fuzz_c.sh [SECONDS [FIRST]]
 #
-# Seeds are the worked example of FORMAT.md at one to eight levels, and the tiles of a small job, with and without
-# levels, if target/debug/tiefort is built. What fails prints its round: `fuzz SEEDS WORK ROUND 60 ROUND` repeats it;
-# its files are kept in fuzz/artifacts/c; those that were found and mended become files of
+# Seeds are the worked examples of FORMAT.md, without a deck and with one, at one to eight levels, and the tiles of a
+# small job, with and without levels, if target/debug/tiefort is built. What fails prints its round:
+# `fuzz SEEDS WORK ROUND 60 ROUND` repeats it; its files are kept in fuzz/artifacts/c; those that were found and mended
+# become files of
 # crates/load-module-reader-c/tests/findings, which this asks about first, and `cargo test` does, too.
 # Rust's code is not instrumented: the sanitizers see every allocation, every leak and all that C does with answers.
 set -euo pipefail

@@ -1,11 +1,13 @@
 #!/usr/bin/env python3
-"""Reads a load-module file, as FORMAT.md describes it: prints a summary, or everything as JSON.
+"""Reads a load-module file, as FORMAT.md describes it: prints a summary, everything as JSON, or the heights at a place.
 
     python3 scripts/read_slm.py ntc.tdb/modules/r00c00.slm
     python3 scripts/read_slm.py --json ntc.tdb/modules/r00c00.slm
+    python3 scripts/read_slm.py --at 505250 3875250 ntc.tdb/modules/r00c00.slm
+    python3 scripts/read_slm.py --at 505250 3875250 --ceiling 1005 ntc.tdb/modules/r00c00.slm
 
 Written from that page alone, with nothing but the standard library, to show that the page is enough.
-Exit codes: 0 read, 2 damaged or unreadable.
+Exit codes: 0 read, 1 nothing at that place, 2 damaged or unreadable.
 """
 
 import argparse
@@ -16,10 +18,12 @@ import sys
 import zlib
 
 MAGIC = b"\x89SLM\r\n\x1a\n"
-VERSION = 1
+VERSIONS = [1, 2]
 FIXED_HEADER_BYTES = 124
 ENTRY = struct.Struct("<QIIIIii")
+DECK_ENTRY = struct.Struct("<IIii")
 SECTION = struct.Struct("<IIIIII4HIIQQ")
+DECKS = struct.Struct("<IIIII")
 SIDES = ["south", "east", "north", "west"]
 
 
@@ -52,15 +56,25 @@ def parse(data):
     (south, north), (west, east) = header["rows"], header["columns"]
     places = [(row, column) for row in range(south, north) for column in range(west, east)]
     places = [(level, place) for level in range(header["levels"]) for place in places]
-    index_length = ENTRY.size * len(places) + 4
+    has_decks = header["version"] == 2
+    each = ENTRY.size + (DECK_ENTRY.size if has_decks else 0)
+    index_length = each * len(places) + 4
     index = checked(data, header_length, index_length, "index")
     end = header_length + index_length
     modules = []
-    for (level, place), entry in zip(places, ENTRY.iter_unpack(index)):
+    for number, (level, place) in enumerate(places):
+        entry = ENTRY.unpack_from(index, each * number)
         expect(entry[0] == end, "index", f"load module {place} begins at {entry[0]}, expected {end}")
-        modules.append(parse_module(data, header["side"], level, place, entry))
+        module = parse_module(data, header["side"], level, place, entry)
         end += entry[1]
+        if has_decks:
+            deck_entry = DECK_ENTRY.unpack_from(index, each * number + ENTRY.size)
+            module["decks"], length = parse_decks(data, header["side"], level, place, deck_entry, end)
+            end += length
+        modules.append(module)
     expect(end == len(data), "index", f"sections end at {end} of a file of {len(data)}")
+    any_decks = any(module.get("decks", {}).get("triangles") for module in modules)
+    expect(any_decks == has_decks, "index", "found no decks in a file of version 2")
     return header, modules
 
 
@@ -69,7 +83,7 @@ def parse_header(data):
     expect(FIXED_HEADER_BYTES <= len(data), part, f"found {len(data)} bytes, expected {FIXED_HEADER_BYTES} or more")
     expect(data[:8] == MAGIC, part, f"found {data[:8].hex(' ')}, expected {MAGIC.hex(' ')}")
     version, levels, length, file_length = struct.unpack_from("<HHIQ", data, 8)
-    expect(version == VERSION, part, f"found version {version}, expected {VERSION}")
+    expect(version in VERSIONS, part, f"found version {version}, expected one of {VERSIONS}")
     expect(FIXED_HEADER_BYTES + 4 <= length, part, f"found header length {length}")
     body = checked(data, 0, length, part)
     expect(1 <= levels <= 8, part, f"found {levels} levels, expected 1 to 8")
@@ -92,6 +106,7 @@ def parse_header(data):
     except UnicodeDecodeError as error:
         raise Damaged(f"{part}: {error}") from error
     return {
+        "version": version,
         "levels": levels,
         "tile": [tile_row, tile_column],
         "area_modules": [area_rows, area_columns],
@@ -144,6 +159,37 @@ def parse_module(data, side, level, place, entry):
     }
 
 
+def parse_decks(data, side, level, place, entry, start):
+    """The decks of a load module, and the bytes of their part, which begins at `start`."""
+    vertex_count, triangle_count, lowest, highest = entry
+    if vertex_count == 0:
+        expect(entry == (0, 0, 0, 0), "index", f"found decks {entry} of load module {place}")
+        return {"vertices": [], "triangles": [], "classes": []}, 0
+    part = f"decks of load module {place[0]},{place[1]}" + (f" at level {level}" if level else "")
+    expect(3 <= vertex_count <= 65535 and 1 <= triangle_count <= 131070, part, f"found counts {entry[:2]}")
+    triangles_at = DECKS.size + 8 * vertex_count
+    classes_at = triangles_at + 6 * triangle_count
+    end = classes_at + triangle_count
+    length = padded(end) + 4
+    body = checked(data, start, length, part)
+    found = DECKS.unpack_from(body)
+    expect(found == (*place, level, vertex_count, triangle_count), part, f"found {found}")
+    expect(not any(body[end:]), part, "padding is not zero")
+    vertices = list(struct.iter_unpack("<HHi", body[DECKS.size : triangles_at]))
+    triangles = list(struct.iter_unpack("<3H", body[triangles_at:classes_at]))
+    classes = list(body[classes_at:end])
+    places = [(y, x, z) for x, y, z in vertices]
+    expect(all(max(x, y) <= side for x, y, _ in vertices), part, "a vertex lies outside the square")
+    expect(all(a < b for a, b in zip(places, places[1:])), part, "vertices are not sorted")
+    heights = (min(z for _, _, z in vertices), max(z for _, _, z in vertices))
+    expect(heights == (lowest, highest), part, f"found heights {heights}, expected {(lowest, highest)}")
+    doubled_area(triangles, vertices, part)
+    used = {corner for triangle in triangles for corner in triangle}
+    expect(used == set(range(vertex_count)), part, "a vertex belongs to no triangle")
+    expect(max(classes) < 255, part, "a deck has the class of holes")
+    return {"vertices": vertices, "triangles": triangles, "classes": classes}, length
+
+
 def check_vertices(vertices, side, heights, part):
     places = [(y, x) for x, y, _ in vertices]
     expect(all(max(place) <= side for place in places), part, "a vertex lies outside the square")
@@ -153,6 +199,12 @@ def check_vertices(vertices, side, heights, part):
 
 
 def check_triangles(triangles, vertices, side, part):
+    total = doubled_area(triangles, vertices, part)
+    expect(total == 2 * side * side, part, f"found doubled area {total}, expected {2 * side * side}")
+
+
+def doubled_area(triangles, vertices, part):
+    """Of all triangles, each counter-clockwise and in order."""
     total = 0
     for triangle in triangles:
         expect(max(triangle) < len(vertices), part, f"triangle {triangle} names a vertex of {len(vertices)}")
@@ -162,7 +214,7 @@ def check_triangles(triangles, vertices, side, part):
         expect(0 < doubled, part, f"triangle {triangle} is not counter-clockwise")
         total += doubled
     expect(all(a < b for a, b in zip(triangles, triangles[1:])), part, "triangles are not sorted")
-    expect(total == 2 * side * side, part, f"found doubled area {total}, expected {2 * side * side}")
+    return total
 
 
 def check_sides(sides, vertices, side, part):
@@ -175,6 +227,34 @@ def check_sides(sides, vertices, side, part):
     for name, found in sides.items():
         expected = [index for index, (x, y, _) in enumerate(vertices) if lies_on[name](x, y)]
         expect(found == expected, part, f"found {name}ern side {found}, expected {expected}")
+
+
+def surfaces_at(header, modules, east, north):
+    """What lies at a place, at the finest level: (height in metres, class, "ground" or "deck"), the ground first."""
+    place = [(metres - origin) * 128 for metres, origin in zip((east, north), header["origin_m"])]
+    found = []
+    for module in modules:
+        x, y = place[0] - module["column"] * header["side"], place[1] - module["row"] * header["side"]
+        if module["level"] or not (0 <= x <= header["side"] and 0 <= y <= header["side"]) or found:
+            continue
+        ground = [(height, kind, "ground") for height, kind in heights_in(module, x, y)][:1]
+        found = ground + [(height, kind, "deck") for height, kind in heights_in(module.get("decks"), x, y)]
+    return found
+
+
+def heights_in(mesh, x, y):
+    """Height in metres and class of every triangle of a mesh that holds a place in quanta."""
+    for triangle, kind in zip(mesh["triangles"], mesh["classes"]) if mesh else []:
+        a, b, c = (mesh["vertices"][corner] for corner in triangle)
+        shares = [(q[0] - p[0]) * (y - p[1]) - (q[1] - p[1]) * (x - p[0]) for p, q in ((b, c), (c, a), (a, b))]
+        if min(shares) >= 0:
+            yield sum(share * corner[2] for share, corner in zip(shares, (a, b, c))) / sum(shares) / 128, kind
+
+
+def surface_below(header, modules, east, north, ceiling=math.inf):
+    """The topmost of ground and decks at a place that is not above a height in metres; a deck before ground."""
+    below = [surface for surface in surfaces_at(header, modules, east, north) if surface[0] <= ceiling]
+    return max(below, key=lambda surface: (surface[0], surface[2] == "deck"), default=None)
 
 
 def summary(header, modules):
@@ -191,6 +271,9 @@ def summary(header, modules):
         f"polygons       {sum(module['polygons'] for module in finest)}",
         f"rms residual   {rms(finest)}",
     ]
+    decks = [len(module["decks"]["triangles"]) for module in finest if "decks" in module]
+    if decks:
+        lines.append(f"decks          {sum(decks)} triangles in {sum(map(bool, decks))} load modules")
     for level in range(1, header["levels"]):
         own = [module for module in modules if module["level"] == level]
         count = sum(len(module["triangles"]) for module in own)
@@ -208,6 +291,8 @@ def main():
     arguments = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     arguments.add_argument("file", help="a file of modules/, such as ntc.tdb/modules/r00c00.slm")
     arguments.add_argument("--json", action="store_true", help="print everything as JSON")
+    arguments.add_argument("--at", nargs=2, type=float, metavar=("EAST", "NORTH"), help="print heights at a place, m")
+    arguments.add_argument("--ceiling", type=float, default=math.inf, help="with --at: only what is not above, m")
     options = arguments.parse_args()
     try:
         with open(options.file, "rb") as file:
@@ -216,6 +301,12 @@ def main():
         reason = error.strerror if isinstance(error, OSError) else error
         print(f"{options.file}: {reason}", file=sys.stderr)
         return 2
+    if options.at:
+        ground = next(iter(surfaces_at(header, modules, *options.at)), None)
+        topmost = surface_below(header, modules, *options.at, options.ceiling)
+        for name, surface in [("ground", ground), ("topmost", topmost)]:
+            print(f"{name:14} {'{:.3f} m, class {}, {}'.format(*surface) if surface else 'none'}")
+        return 0 if topmost else 1
     print(json.dumps({"header": header, "modules": modules}) if options.json else summary(header, modules))
     return 0
 

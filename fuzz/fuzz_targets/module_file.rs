@@ -4,10 +4,10 @@
 use std::path::Path;
 
 use libfuzzer_sys::fuzz_target;
-use load_module_reader::{INDEX_ENTRY_BYTES, SlmFile};
+use load_module_reader::{DECK_ENTRY_BYTES, DecksEntry, INDEX_ENTRY_BYTES, SlmFile, VERSION};
 
-/// The same with right checksums of the header, the index and each section, as far as the lengths in the file say where
-/// those are: they stand in the way of everything behind them.
+/// The same with right checksums of the header, the index, each section and its decks, as far as the lengths in the
+/// file say where those are: they stand in the way of everything behind them.
 fn with_checksums(bytes: &[u8]) -> Vec<u8> {
     let mut bytes = bytes.to_vec();
     let word = |bytes: &[u8], at: usize| -> usize {
@@ -19,10 +19,18 @@ fn with_checksums(bytes: &[u8]) -> Vec<u8> {
     let columns = word(&bytes, 52).saturating_sub(word(&bytes, 48));
     let levels = word(&bytes, 8) >> 16;
     let entries = rows.saturating_mul(columns).saturating_mul(levels);
-    let index = header.saturating_add(entries.saturating_mul(INDEX_ENTRY_BYTES)).saturating_add(4);
-    for entry in (header..index.min(bytes.len())).step_by(INDEX_ENTRY_BYTES) {
+    let has_decks = word(&bytes, 8) & 0xffff == usize::from(VERSION);
+    let entry_bytes = INDEX_ENTRY_BYTES + if has_decks { DECK_ENTRY_BYTES } else { 0 };
+    let index = header.saturating_add(entries.saturating_mul(entry_bytes)).saturating_add(4);
+    for entry in (header..index.min(bytes.len())).step_by(entry_bytes) {
         let (offset, length) = (word(&bytes, entry), word(&bytes, entry + 8));
-        seal(&mut bytes, offset, offset.saturating_add(length));
+        let end = offset.saturating_add(length);
+        seal(&mut bytes, offset, end);
+        let [vertex_count, triangle_count] = [32, 36].map(|at| word(&bytes, entry + at).min(1 << 17) as u32);
+        if has_decks {
+            let decks = DecksEntry { vertex_count, triangle_count, ..DecksEntry::default() };
+            seal(&mut bytes, end, end.saturating_add(decks.length() as usize));
+        }
     }
     seal(&mut bytes, header, index);
     seal(&mut bytes, 0, header);
@@ -31,7 +39,7 @@ fn with_checksums(bytes: &[u8]) -> Vec<u8> {
 
 /// Puts the checksum of what is before them into the last four bytes of a section.
 fn seal(bytes: &mut [u8], from: usize, to: usize) {
-    if from + 4 <= to && to <= bytes.len() {
+    if from.saturating_add(4) <= to && to <= bytes.len() {
         let sum = crc32fast::hash(&bytes[from..to - 4]);
         bytes[to - 4..to].copy_from_slice(&sum.to_le_bytes());
     }

@@ -2,10 +2,14 @@
 
 use database::{FileStamp, Measured, TileModules};
 use engine::{Artifact, Fingerprint, Key, Outcome, Stamp, keep_or_make};
-use fidelity::{Residuals, Tally};
+use fidelity::{FeatureFigures, Residuals, Tally};
+use ground::Window;
 use job::{Borders, ClipHeights as JobClipHeights, Edges, Job, OuterBorder};
-use load_modules::{ClipHeights, Layout, clip, concatenate};
-use terrain::{HOLE_CLASS, LATTICE_PER_POST, LatticePoint, LoadModule, Post, PostRect, TileId, Tin, Vertex};
+use load_modules::{ClipHeights, Face, Faces, Layout, clip, concatenate, cut_decks};
+use terrain::{
+    FeatureSurface, HOLE_CLASS, LatticePoint, LoadModule, ModuleCounts, Post, PostRect, TileFeatures, TileId, Tin,
+    Vertex,
+};
 
 use crate::assembled::{Assembled, ModuleNumbers};
 use crate::keys::{self, StampOf};
@@ -40,7 +44,8 @@ pub(crate) fn assemble_tile(
     removed: &[Vec<LatticePoint>],
     tile: TileId,
 ) -> Result<Outcome<(Assembled, Sums)>, CompileError> {
-    let modules = keys::modules(run.job, &run.area, stamps, removed, tile).fingerprint();
+    let features = run.tile_features(tile)?;
+    let modules = keys::modules(run.job, &run.area, stamps, removed, &features).fingerprint();
     keep_or_make(&Assembling { run, stamps, removed, tile, modules }, ALGORITHM_REVISION)
 }
 
@@ -70,7 +75,10 @@ impl Artifact for Assembling<'_> {
         let (area, folder, tile) = (&self.run.area, self.run.database.folder(), self.tile);
         let (stamp, file, measured) = folder.read_measured(tile).ok()?;
         let count = area.tiling.modules(tile, area.grid).count();
-        let is_whole = |measured: &Measured| measured.modules.len() == count * self.run.job.lod.level_count();
+        let (levels, has_features) = (self.run.job.lod.level_count(), self.run.level.is_some());
+        let is_whole = |measured: &Measured| {
+            measured.modules.len() == count * levels && measured.features.is_some() == has_features
+        };
         folder.check_file(&folder.modules_path(tile), &measured.modules_file).ok().filter(|()| is_whole(&measured))?;
         Some((stamp, from_measured(measured, count, file)))
     }
@@ -86,8 +94,12 @@ fn make(assembling: &Assembling, stamp: &Stamp) -> Result<(Assembled, Sums), Com
     let window = run.window(tile)?;
     let layout = Layout { grid: area.grid, modules: area.tiling.modules(tile, area.grid), spacing: area.frame.spacing };
     let own = run.tin(tile, &stamps(area.tiling.index(tile)))?;
+    let features = run.tile_features(tile)?;
+    let faces = faces(&features);
+    // What is no feature has the class that the ground has without any.
+    let natural = run.ground.natural_tile(area, tile)?;
     let mut modules = match run.job.modules.edges {
-        Edges::Constrained => concatenate(&own.tin, &layout, &window.importance),
+        Edges::Constrained => concatenate(&own.tin, &layout, &natural.importance, faces.as_ref()),
         Edges::Clip(heights) => {
             let points = points_around(run, stamps, removed, tile)?;
             let heights = match heights {
@@ -97,18 +109,31 @@ fn make(assembling: &Assembling, stamp: &Stamp) -> Result<(Assembled, Sums), Com
             clip(&points, &layout, heights, &window.importance)
         }
     };
+    let decks = cut_decks(&features.decks, features.kept.steps_per_post, &layout);
+    modules.iter_mut().zip(decks).for_each(|(module, decks)| module.decks = decks);
     let residuals = fidelity::measure(&mut modules, &window.measured(area));
     let at_source = run.ground.relief.residuals_at_source(&modules, area, area.tiling.rect(tile))?;
-    let mut levels = all_levels(run, modules, &layout, &window);
+    let figures = feature_figures(run, tile, (&own.tin, &modules), &window)?;
+    let mut levels =
+        all_levels(run, modules, (&layout, &window.dem, &natural.importance), (&features.kept, faces.as_ref()));
     levels[1..].iter_mut().for_each(|level| drop(fidelity::measure(level, &window.measured(area))));
     let file = publish(run, tile, &layout, fingerprint, &levels)?;
     let counted = count_points(run, &own.tin, &removed[area.tiling.index(tile)], &window.importance);
     let heights = heights_of(&levels[0]);
     let (modules, coarser) = numbers_of(&levels);
     let mut done = Assembled { file, measured: FileStamp::of(&[]), modules, coarser };
-    let sums = sums(residuals, at_source, counted, heights);
+    let sums = Sums { features: figures, ..sums(residuals, at_source, counted, heights) };
     done.measured = run.database.write_measured(stamp, &to_measured(tile, &done, &sums))?;
     Ok((done, sums))
+}
+
+/// Ground that has the class of a feature; nothing where there is none.
+fn faces(features: &TileFeatures) -> Option<Faces> {
+    let same = |a: &FeatureSurface, b: &FeatureSurface| (a.class, a.ground, a.body) == (b.class, b.ground, b.body);
+    let ring = |surface: &FeatureSurface| surface.ring.iter().map(|vertex| vertex.at).collect();
+    let face = |body: &[FeatureSurface]| Face { class: body[0].class, rings: body.iter().map(ring).collect() };
+    let all: Vec<Face> = features.surfaces.chunk_by(same).map(face).collect();
+    (!all.is_empty()).then(|| Faces::new(&all, features.kept.steps_per_post))
 }
 
 fn sums(
@@ -118,7 +143,22 @@ fn sums(
     heights: (i32, i32),
 ) -> Sums {
     let (has_source, at_source) = (at_source.is_some(), at_source.unwrap_or_default());
-    Sums { residuals, has_source, at_source, points, border, heights }
+    Sums { residuals, has_source, at_source, points, border, heights, features: None }
+}
+
+/// How true a tile is to its features, in jobs with some.
+fn feature_figures(
+    run: &Run,
+    tile: TileId,
+    (tin, modules): (&Tin, &[LoadModule]),
+    window: &Window,
+) -> Result<Option<FeatureFigures>, CompileError> {
+    if run.level.is_none() {
+        return Ok(None);
+    }
+    let (features, area) = (run.tile_features(tile)?, &run.area);
+    let ground = window.measured(area);
+    Ok(Some(FeatureFigures::of((tin, modules), &features, &ground, &window.featured, area.rect)))
 }
 
 /// The lowest and the highest vertex of load modules, in quanta.
@@ -137,9 +177,10 @@ pub(crate) fn read_assembled(run: &Run, tins: &[Published], tile: TileId) -> Res
     let at_source = run.ground.relief.residuals_at_source(&levels[0], area, area.tiling.rect(tile))?;
     let own = run.tin(tile, &tins[area.tiling.index(tile)].stamp)?;
     let counted = count_points(run, &own.tin, &[], &window.importance);
+    let features = feature_figures(run, tile, (&own.tin, &levels[0]), &window)?;
     let measured = folder.stamp_file(&folder.measured_path(tile))?;
     let done = Assembled { file, measured, modules, coarser };
-    Ok((done, sums(residuals, at_source, counted, heights_of(&levels[0]))))
+    Ok((done, Sums { features, ..sums(residuals, at_source, counted, heights_of(&levels[0])) }))
 }
 
 /// Numbers of the finest level, and of each of the others.
@@ -149,11 +190,8 @@ fn numbers_of(levels: &[Vec<LoadModule>]) -> (Vec<ModuleNumbers>, Vec<Vec<Module
 }
 
 fn numbers(module: &LoadModule) -> ModuleNumbers {
-    ModuleNumbers {
-        triangles: module.triangles.len() as u32,
-        polygons: module.polygon_count,
-        residual: module.residual,
-    }
+    let ModuleCounts { triangles, polygons } = module.counts();
+    ModuleNumbers { triangles, polygons, residual: module.residual }
 }
 
 /// The points in and around a tile that clipping needs.
@@ -212,22 +250,23 @@ pub(crate) fn crs(job: &Job) -> String {
 /// A point on a seam counts in the tile that owns the post.
 fn count_points(run: &Run, own: &Tin, removed: &[LatticePoint], importance: &terrain::Importance) -> (Vec<u64>, u64) {
     let (rect, area) = (own.rect, run.area.rect);
-    let side = run.area.grid.side_cells * LATTICE_PER_POST;
+    let steps = own.steps_per_post;
+    let side = run.area.grid.side_cells * steps;
     let is_regular = run.job.tiles.borders == Borders::Regular;
     let is_fixed = run.job.modules.outer_border == OuterBorder::Fixed;
-    let mut points = vec![0; run.job.importance.classes.len()];
+    let mut points = vec![0; run.job.class_names().len()];
     let holes = points.len();
     let mut border = 0;
     let removed: std::collections::BTreeSet<&LatticePoint> = removed.iter().collect();
     for vertex in own.vertices.iter().filter(|vertex| !removed.contains(&vertex.at)) {
         let at = vertex.at;
-        let is_at = |place: i32, line: i32| place == line * LATTICE_PER_POST;
+        let is_at = |place: i32, line: i32| place == line * steps;
         let beyond = (is_at(at.row, rect.north) && rect.north != area.north)
             || (is_at(at.col, rect.east) && rect.east != area.east);
         if beyond {
             continue;
         }
-        let post = Post::new(at.row.div_euclid(LATTICE_PER_POST), at.col.div_euclid(LATTICE_PER_POST));
+        let post = Post::new(at.row.div_euclid(steps), at.col.div_euclid(steps));
         match importance.class(post) {
             HOLE_CLASS => {
                 points.resize(holes + 1, 0);

@@ -1,5 +1,7 @@
 //! A whole gaming area, on one page.
 
+use std::sync::OnceLock;
+
 use database::{Area, Database, Folder, Manifest, ManifestState, Report, SourceRecord, TileState};
 use ground::{GamingArea, Ground};
 use job::Job;
@@ -7,6 +9,8 @@ use schedule::Workers;
 
 use crate::assemble::assemble;
 use crate::enforce::enforce;
+use crate::level::level;
+use crate::profile::profile;
 use crate::publish::{beginning, database_area, prepare, publish};
 use crate::refine::refine;
 use crate::report::Findings;
@@ -69,7 +73,8 @@ pub(crate) fn finish(run: Run, progress: &mut Stopwatch) -> Result<Built, Compil
     }
 }
 
-fn stages(run: Run, progress: &mut Stopwatch) -> Result<Built, CompileError> {
+fn stages(mut run: Run, progress: &mut Stopwatch) -> Result<Built, CompileError> {
+    decide_features(&mut run, progress)?;
     let curves = survey(&run, progress)?;
     let mut shares = allocate(&run, curves.as_ref(), progress)?;
     drop(curves);
@@ -85,6 +90,17 @@ fn stages(run: Run, progress: &mut Stopwatch) -> Result<Built, CompileError> {
     drop((shares, tins, assembled, sums, enforced));
     let (report, database) = publish(run, ready, progress)?;
     Ok(Built { report, kept, rebuilt, is_unchanged: false, database })
+}
+
+/// How high roads, rivers and lakes lie, where there are any: from here on they are part of the ground.
+pub(crate) fn decide_features(run: &mut Run, progress: &mut dyn Progress) -> Result<(), CompileError> {
+    if run.job.features.is_none() {
+        return Ok(());
+    }
+    profile(run, progress)?;
+    let (file, level) = level(run, progress)?;
+    run.settle(file, level);
+    Ok(())
 }
 
 /// Everything a run stands on: the plan, the sources, the locked database. Nothing is changed yet.
@@ -117,7 +133,21 @@ pub(crate) fn open_with<'a>(
     }
     let (database, previous) = lock(&database_area(job), &records)?;
     let Options { page, stop, .. } = *options;
-    Ok(Run { job, area, ground, workers, page, stop, database, records, states, tins: Tins::new(), previous })
+    Ok(Run {
+        job,
+        area,
+        ground,
+        workers,
+        page,
+        stop,
+        database,
+        records,
+        states,
+        tins: Tins::new(),
+        previous,
+        read: OnceLock::new(),
+        level: None,
+    })
 }
 
 /// The finished database in `folder`, if a build of `job` would change nothing in it: made from the same job and the

@@ -14,7 +14,8 @@ pub(crate) fn coarse(window: &Window, task: &SurveyTask) -> Option<(Window, Surv
     }
     let rect = half_rect(growth.rect);
     let frame = Frame::Sides { side_cells: side_cells / 2, south_west: *south_west, allowance: allowance.clone() };
-    let growth = TileTask { rect, frame, border: half_posts(&growth.border), ..growth.clone() };
+    let (border, barred) = (half_posts(&growth.border), half_posts(&growth.barred));
+    let growth = TileTask { rect, frame, border, barred, ..growth.clone() };
     let grid = ModuleGrid { side_cells: side_cells / 2, ..task.grid };
     Some((half_window(window, rect), SurveyTask { growth, grid, ..task.clone() }))
 }
@@ -48,5 +49,11 @@ fn half_window(window: &Window, rect: PostRect) -> Window {
             Importance::new(rect, posts.map(weight).collect(), vec![0; rect.post_count()])
         }
     };
-    Window { dem: Dem::from_row_fn(rect, every_second), importance, given: Vec::new(), forbidden: Vec::new() }
+    Window {
+        dem: Dem::from_row_fn(rect, every_second),
+        importance,
+        given: Vec::new(),
+        forbidden: Vec::new(),
+        featured: Vec::new(),
+    }
 }

@@ -2,10 +2,15 @@
 //! decided whether it counts.
 
 use engine::{Fingerprint, FingerprintBuilder, Key, Part, Stamp};
+use features::{AreaFeatures, Clearances, GradeOptions, Place};
 use ground::{GamingArea, Window, feed_post};
-use job::{Borders, ClipHeights, Edges, Job, LodBorder, LodSpec, ModulesSpec, OuterBorder};
+use job::{Borders, ClipHeights, Edges, FeaturesSpec, Job, LodBorder, LodSpec, ModulesSpec, OuterBorder};
 use limits::Allowance;
-use terrain::{LastBatch, LatticePoint, ModuleGrid, ModuleId, ModuleRect, SeamSides, TileId, Vertex};
+use terrain::{
+    FeatureSurface, Features, LastBatch, LatticePoint, ModuleGrid, ModuleId, ModuleRect, SeamSides, Side, SideSpan,
+    SurfaceGround, TileFeatures, Vertex,
+};
+use tiling::Budget;
 use tin::{CostUnit, Frame, Proximity, Rule, Stop, SurveyTask, TileTask};
 
 use crate::refinement::{Most, Refinement};
@@ -24,6 +29,10 @@ const BORDERS: Part = Part { name: "borders", changed: "a neighbour's border cha
 const CUT: Part = Part { name: "cut", changed: "how load modules are cut changed" };
 /// The TINs that load modules are cut from.
 const TINS: Part = Part { name: "tins", changed: "a TIN changed" };
+/// What roads, rivers and lakes put into it.
+const FEATURES: Part = Part { name: "features", changed: "roads, rivers or lakes in it changed" };
+/// The ground along features.
+const PROFILES: Part = Part { name: "profiles", changed: "the ground along roads, rivers or lakes changed" };
 /// The load modules that were measured.
 const MODULES: Part = Part { name: "modules", changed: "the load modules changed" };
 /// How they are measured.
@@ -31,11 +40,84 @@ const MEASURE: Part = Part { name: "measure", changed: "what is measured changed
 
 /// Of a tile's TIN.
 pub(crate) fn tin(window: &Window, refinement: &Refinement, seeds: &[Vertex]) -> Key {
-    window
+    let key = window
         .key("tile")
         .part(RULES, |part| feed_rules(part, refinement))
         .part(ALLOWANCE, |part| feed_allowance(part, &refinement.task))
-        .part(BORDERS, |part| part.list(seeds.iter(), feed_vertex))
+        .part(BORDERS, |part| part.list(seeds.iter(), feed_vertex));
+    // Tiles without features keep the keys they had before there were any.
+    match refinement.features.is_empty() {
+        true => key,
+        false => key.part(FEATURES, |part| {
+            let part = feed_features(part, &refinement.features);
+            part.list(refinement.lakes.iter(), |part, rings| {
+                part.list(rings.iter(), |part, ring| part.list(ring.iter(), feed_vertex))
+            })
+        }),
+    }
+}
+
+/// Of the ground along the features of a tile.
+pub(crate) fn profile(window: &Window, steps: i32, stations: impl ExactSizeIterator<Item = Place>) -> Key {
+    window.key("profile").part(FEATURES, |part| {
+        part.signed(steps.into()).list(stations, |part, Place { row, col }| part.signed(row.into()).signed(col.into()))
+    })
+}
+
+/// Of what features of the area come to: where they run, the ground there, and what they may take.
+pub(crate) fn level(run: &Run, spec: &FeaturesSpec, features: &AreaFeatures, ground: &[Option<i32>]) -> Key {
+    let Budget { grid, border_step, per_module, pool: _, area, per_window, windows, reserved: _ } = &run.area.budget;
+    let ModuleGrid { rows, cols, side_cells } = *grid;
+    // What sources and rules come to is in the features; the names of features are those of the files.
+    let FeaturesSpec { sources: _, rules: _, share_max, options } = spec;
+    let GradeOptions { clearances: Clearances { road, rail, water }, bank } = *options;
+    let files = spec.files();
+    let files = run.records.iter().filter(|record| files.iter().any(|file| file.written == record.path));
+    let files: Vec<Fingerprint> = files.map(|record| record.blake3).collect();
+    let mut words = Vec::new();
+    features.feed(&mut |word| words.push(word));
+    Key::new("level")
+        .part(RULES, |part| {
+            let part = part.list(run.job.class_names().iter(), |part, name| part.text(name)).real(*share_max);
+            [road, rail, water, bank].into_iter().fold(part, |part, quanta| part.signed(quanta.into()))
+        })
+        .part(ALLOWANCE, |part| {
+            let part = part.number(rows.into()).number(cols.into()).signed(side_cells.into());
+            let part = part.signed((*border_step).into()).number((*per_module).into()).number(*area);
+            part.number((*per_window).into()).number(windows.rows.into()).number(windows.cols.into())
+        })
+        .part(FEATURES, |part| {
+            let part = part.list(files.into_iter(), FingerprintBuilder::fingerprint);
+            part.rows(std::iter::once(&words[..]), i64::to_le_bytes)
+        })
+        .part(PROFILES, |part| {
+            part.list(ground.iter(), |part, height| part.maybe(*height, |part, height| part.signed(height.into())))
+        })
+}
+
+fn feed_features(builder: FingerprintBuilder, features: &Features) -> FingerprintBuilder {
+    let Features { steps_per_post, vertices, edges, spans } = features;
+    let builder = builder.signed((*steps_per_post).into()).list(vertices.iter(), feed_vertex);
+    let builder = builder.list(edges.iter(), |builder, [a, b]| builder.number((*a).into()).number((*b).into()));
+    builder.list(spans.iter(), |builder, SideSpan { side, from, to }| {
+        let side = Side::ALL.iter().position(|other| other == side).unwrap_or(0) as u8;
+        builder.case(side).signed((*from).into()).signed((*to).into())
+    })
+}
+
+/// Classes of the ground inside features, and decks above it; their edges are in the TIN.
+fn feed_surfaces(builder: FingerprintBuilder, features: &TileFeatures) -> FingerprintBuilder {
+    let TileFeatures { tile: _, kept: _, surfaces, slopes: _, decks } = features;
+    let feed = |builder: FingerprintBuilder, surface: &FeatureSurface| {
+        let FeatureSurface { class, ground, body, ring } = surface;
+        let ground = match ground {
+            SurfaceGround::Road => 0,
+            SurfaceGround::Lake => 1,
+            SurfaceGround::River => 2,
+        };
+        builder.case(*class).case(ground).number((*body).into()).list(ring.iter(), feed_vertex)
+    };
+    builder.list(surfaces.iter(), feed).list(decks.iter(), feed)
 }
 
 /// What the job says of selecting and optimising in a tile, as its record names it.
@@ -62,14 +144,21 @@ pub(crate) fn curve(window: &Window, task: &SurveyTask) -> Key {
 }
 
 /// Of a tile's load modules, from TINs without the points that `removed` lists per tile.
-pub fn modules(job: &Job, area: &GamingArea, stamps: &StampOf, removed: &[Vec<LatticePoint>], tile: TileId) -> Key {
+pub fn modules(
+    job: &Job,
+    area: &GamingArea,
+    stamps: &StampOf,
+    removed: &[Vec<LatticePoint>],
+    features: &TileFeatures,
+) -> Key {
+    let tile = features.tile;
     let mut reach = match job.modules.edges {
         Edges::Constrained => Vec::new(),
         Edges::Clip(_) => area.tiling.neighbours(tile),
     };
     reach.push(tile);
     let places: Vec<usize> = reach.into_iter().map(|other| area.tiling.index(other)).collect();
-    Key::new("modules")
+    let key = Key::new("modules")
         .part(CUT, |part| {
             let part = feed_modules(part, &job.modules);
             part.maybe((1 < job.lod.level_count()).then_some(&job.lod), feed_levels)
@@ -78,7 +167,12 @@ pub fn modules(job: &Job, area: &GamingArea, stamps: &StampOf, removed: &[Vec<La
             part.list(places.into_iter(), |part, place| {
                 part.fingerprint(stamps(place).fingerprint).list(removed[place].iter(), feed_point)
             })
-        })
+        });
+    // Load modules without features keep the keys they had before there were any.
+    match features.surfaces.is_empty() && features.decks.is_empty() {
+        true => key,
+        false => key.part(FEATURES, |part| feed_surfaces(part, features)),
+    }
 }
 
 /// Of what was measured of a tile's load modules.
@@ -90,13 +184,13 @@ pub(crate) fn measured(run: &Run, modules: Fingerprint) -> Key {
     // Beside the ground of the tile's own window, which its TIN is made from.
     let between = if run.ground.relief.has_posts_between() { &run.records[..] } else { &[] };
     Key::new("measured").known(MODULES, modules).part(MEASURE, |part| {
-        let part = part.number(run.job.importance.classes.len() as u64).case(is_regular);
+        let part = part.number(run.job.class_names().len() as u64).case(is_regular);
         part.list(between.iter(), |part, record| part.fingerprint(record.blake3))
     })
 }
 
 fn feed_rules(builder: FingerprintBuilder, refinement: &Refinement) -> FingerprintBuilder {
-    let Refinement { task, optimising, most } = refinement;
+    let Refinement { task, optimising, most, features: _, lakes: _ } = refinement;
     let builder = feed_growth(builder, task).list(task.kept.iter(), feed_post);
     let builder = builder.maybe(*optimising, |builder, optimising| {
         let job::Optimising { effort, height_fit, lattice } = optimising;
@@ -124,7 +218,8 @@ fn feed_rules(builder: FingerprintBuilder, refinement: &Refinement) -> Fingerpri
 
 /// What tiles have in common. What one inherits and starts from is fed as its borders and with its window.
 fn feed_growth(builder: FingerprintBuilder, task: &TileTask) -> FingerprintBuilder {
-    let TileTask { tile: _, rect: _, frame: _, border, inherited: _, kept: _, start: _, seams, rule, stop } = task;
+    let TileTask { tile: _, rect: _, frame: _, border, inherited: _, kept: _, start: _, seams, barred, rule, stop } =
+        task;
     let Stop { points: _, value, rms_quanta: _ } = stop;
     let builder = match rule {
         Rule::WorstFirst => builder.case(0),
@@ -138,7 +233,9 @@ fn feed_growth(builder: FingerprintBuilder, task: &TileTask) -> FingerprintBuild
             builder.maybe(*proximity, |builder, Proximity { posts, quanta }| builder.real(posts).number(quanta.into()))
         }
     };
-    feed_sides(builder.maybe(*value, FingerprintBuilder::number), *seams).list(border.iter(), feed_post)
+    let builder = feed_sides(builder.maybe(*value, FingerprintBuilder::number), *seams).list(border.iter(), feed_post);
+    // Tiles without features keep the keys they had before there were any.
+    if barred.is_empty() { builder } else { builder.list(barred.iter(), feed_post) }
 }
 
 fn feed_allowance(builder: FingerprintBuilder, task: &TileTask) -> FingerprintBuilder {

@@ -1,7 +1,8 @@
 //! Between what a build knows of a tile's load modules and the file that keeps it.
 
-use database::{FileStamp, Measured, MeasuredModule, MeasuredTally};
-use fidelity::{Residuals, Tally};
+use database::{FileStamp, Measured, MeasuredModule};
+use fidelity::Residuals;
+use product::{from_features, from_tally, to_features, to_tally};
 use terrain::{ModuleResidual, TileId};
 
 use crate::assembled::{Assembled, ModuleNumbers};
@@ -29,6 +30,7 @@ pub(crate) fn to_measured(tile: TileId, assembled: &Assembled, sums: &Sums) -> M
         points: sums.points.clone(),
         border: sums.border,
         heights: sums.heights.into(),
+        features: sums.features.as_ref().map(to_features),
     }
 }
 
@@ -83,38 +85,6 @@ pub fn sums_of(measured: Measured) -> Sums {
         points: measured.points,
         border: measured.border,
         heights: measured.heights.into(),
-    }
-}
-
-fn to_tally(tally: &Tally) -> MeasuredTally {
-    MeasuredTally {
-        posts: tally.posts,
-        sum: tally.sum,
-        sum_abs: tally.sum_abs,
-        sum_squared: [(tally.sum_squared >> 64) as u64, tally.sum_squared as u64],
-        largest: tally.largest,
-        bins: tally.filled_bins().collect(),
-    }
-}
-
-fn from_tally(tally: &MeasuredTally) -> Tally {
-    let [high, low] = tally.sum_squared.map(u128::from);
-    let mut sums = Tally::default().with_bins(tally.bins.iter().copied());
-    (sums.posts, sums.sum, sums.sum_abs) = (tally.posts, tally.sum, tally.sum_abs);
-    (sums.sum_squared, sums.largest) = (high << 64 | low, tally.largest);
-    sums
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_tally_survives_being_kept() {
-        let mut tally = Tally::default();
-        [3, -4, 5000, 0, -128, i32::MAX].into_iter().for_each(|residual| tally.add(residual));
-        tally.sum_squared += 1 << 70;
-        assert_eq!(from_tally(&to_tally(&tally)), tally);
-        assert_eq!(from_tally(&to_tally(&Tally::default())), Tally::default());
+        features: measured.features.as_ref().map(from_features),
     }
 }

@@ -8,6 +8,10 @@ use terrain::TileId;
 pub enum Stage {
     /// Rasters and vectors are opened, decoded and judged.
     Read,
+    /// The ground along features, every tile alone.
+    Profile,
+    /// How high features lie, over the whole area.
+    Level,
     /// Every tile alone: what would more points gain?
     Survey,
     /// The whole area's budget is shared out.
@@ -29,6 +33,8 @@ impl Stage {
     pub fn name(self) -> &'static str {
         match self {
             Stage::Read => "read",
+            Stage::Profile => "profile",
+            Stage::Level => "level",
             Stage::Survey => "survey",
             Stage::Allocate => "allocate",
             Stage::Refine => "refine",
@@ -43,6 +49,8 @@ impl Stage {
     pub fn meaning(self) -> &'static str {
         match self {
             Stage::Read => "Heights and weights, ready to be asked",
+            Stage::Profile => "The ground along roads and water, tile by tile",
+            Stage::Level => "How high roads and water lie",
             Stage::Survey => "What more points would gain, tile by tile",
             Stage::Allocate => "What each tile may spend",
             Stage::Refine => "The TINs of tiles",

@@ -3,7 +3,7 @@
 
 use database::{Area, Database, FileStamp, Manifest, ManifestState, Removals, Report, SourceRecord, TileState, files};
 use job::Job;
-use product::{Opened, Product, Wanted, WantedGround};
+use product::{Opened, Product, Told, Wanted, WantedGround};
 use serde_json::{Value, json};
 use terrain::{LatticePoint, TileId};
 
@@ -55,6 +55,8 @@ pub(crate) fn beginning_of(job: &Job, records: &[SourceRecord], previous: Option
 pub(crate) struct Ready {
     pub report: Report,
     manifest: Manifest,
+    /// What is told of features, in jobs with some.
+    told: Option<Told>,
 }
 
 /// Begins the last stage: puts together what is to be published, of which little is on the disk yet. `frozen` lists
@@ -67,7 +69,9 @@ pub(crate) fn prepare(
 ) -> Result<Ready, CompileError> {
     progress.tell(Event::Enter(Stage::Publish, 0));
     let run = findings.run;
-    let report = findings.report()?;
+    let mut report = findings.report()?;
+    let told = findings.told();
+    report.features = told.as_ref().map(|told| told.report.clone());
     let mut manifest = beginning(run);
     manifest.state = ManifestState::Complete;
     let allocation = run.database.write_json(files::ALLOCATION, &allocation_json(run, shares))?;
@@ -79,13 +83,13 @@ pub(crate) fn prepare(
         manifest.tile_mut(tile).expect("the manifest lists every tile").removed = removed;
     }
     manifest.totals = findings.totals(&report);
-    Ok(Ready { report, manifest })
+    Ok(Ready { report, manifest, told })
 }
 
 /// Ends the last stage. What a run leaves is written in this order, so that a database is complete only with all of it:
 /// breaches, the report, its page, the manifest.
 pub(crate) fn publish(run: Run, ready: Ready, progress: &mut Stopwatch) -> Result<(Report, Database), CompileError> {
-    let Ready { mut report, manifest } = ready;
+    let Ready { mut report, manifest, told } = ready;
     let work = run.database.folder().work(&run_name(&manifest.job, &run.records, ALGORITHM_REVISION));
     // The page opens the ground by itself: there is no room for it twice.
     drop((run.ground, run.tins));
@@ -94,7 +98,12 @@ pub(crate) fn publish(run: Run, ready: Ready, progress: &mut Stopwatch) -> Resul
     // The last moment: from here on everything says that it was made from these files.
     changed(&run.states)?;
     (report.stages, report.tiles) = progress.times();
-    for (name, text) in product::breaches(job, &report) {
+    let of_features = told.map(|told| product::features_file(job, &told.remarks));
+    if of_features.is_none() {
+        // Those of an earlier job.
+        database.remove(files::FEATURES)?;
+    }
+    for (name, text) in product::breaches(job, &report).into_iter().chain(of_features) {
         let stamp = database.write_bytes(name, text.as_bytes())?;
         report.files.insert(name.to_owned(), stamp);
     }
@@ -166,6 +175,21 @@ fn fill(
     record.tin = Some(folder.stamp_file(&folder.tile_path(tile))?);
     record.slm = Some(assembled.file);
     record.curve = if has_curve { Some(folder.stamp_file(&folder.curve_path(tile))?) } else { None };
+    fill_features(run, manifest, tile)
+}
+
+/// What features put into a tile, and the ground along them; nothing of an earlier job is left where there are none.
+fn fill_features(run: &Run, manifest: &mut Manifest, tile: TileId) -> Result<(), CompileError> {
+    let folder = run.database.folder();
+    let Some(settled) = &run.level else {
+        run.database.remove(&format!("survey/{tile}.profile"))?;
+        run.database.remove(&format!("survey/{tile}.lines"))?;
+        return Ok(run.database.remove(files::LEVEL)?);
+    };
+    let record = manifest.tile_mut(tile).expect("the manifest lists every tile");
+    record.profile = Some(folder.stamp_file(&folder.profile_path(tile))?);
+    record.lines = Some(settled.level.tiles[run.area.tiling.index(tile)]);
+    manifest.files.insert(files::LEVEL.to_owned(), settled.file);
     Ok(())
 }
 

@@ -49,7 +49,9 @@ pub(crate) fn refine(run: &Run, shares: &Shares, progress: &mut dyn Progress) ->
             run.tin(other, &slot.expect("lower-ranked neighbours are published first").stamp)
         };
         let index = run.area.tiling.index(tile);
-        let done = refine_tile(run, &shares.tiles[index], inherited(&run.area.tiling, tile, published)?, tile)?;
+        let features = run.tile_features(tile)?;
+        let seeds = inherited(&run.area.tiling, tile, &features.kept, published)?;
+        let done = refine_tile(run, &shares.tiles[index], seeds, tile)?;
         Ok(done.map(|done| assert!(slots[index].set(done).is_ok(), "each tile is refined once")))
     })?;
     let tins = slots.into_iter().map(|slot| slot.into_inner().expect("every tile was refined"));
@@ -88,7 +90,8 @@ pub(crate) struct Refining<'a> {
 impl<'a> Refining<'a> {
     /// As a build refines it.
     pub fn new(run: &'a Run, budget: &TileBudget, seeds: Vec<Vertex>, tile: TileId) -> Result<Self, CompileError> {
-        let refinement = tile_refinement(run.job, &run.area, tile, budget, posts_of(&seeds));
+        let features = run.tile_features(tile)?;
+        let refinement = tile_refinement(run.job, &run.area, tile, budget, posts_of(&seeds), &features);
         Ok(Self { run, window: run.window(tile)?, refinement, seeds })
     }
 

@@ -3,12 +3,15 @@
 use ground::{GivenPost, Window, border_posts, start_posts};
 use job::{Effort, Job, Method, Optimising};
 use limits::Allowance;
-use optimiser::{Budget, Optimised, Task, fill, optimise, overshoot};
-use terrain::{Dem, LatticePoint, Post, PostRect, THOUSANDTHS, TileTin, Tin, Vertex};
+use optimiser::{Budget, Optimised, Task, fill, optimise, overshoot, weave_in};
+use terrain::{Dem, Features, HeightFit, Lattice, LatticePoint, Post, PostRect, THOUSANDTHS, TileTin, Tin, Vertex};
 use tin::{Frame, Rule, Stop, TileTask};
 
 /// Room in a window of load modules while a tile is grown beyond its budget.
 const NO_LIMIT: u32 = u32::MAX / 4;
+
+/// How features come into a TIN that is not optimised.
+const PLAIN: Optimising = Optimising { effort: Effort::Fast, height_fit: HeightFit::Off, lattice: Lattice::Post };
 
 /// What is to be done for one tile.
 #[derive(Clone, Debug)]
@@ -19,6 +22,10 @@ pub struct Refinement {
     pub optimising: Option<Optimising>,
     /// What the finished mesh may have where there are no load modules.
     pub most: Most,
+    /// Vertices and edges that it keeps whatever it is refined to.
+    pub features: Features,
+    /// Rings of level water, those of one body together: what lies inside has its height.
+    pub lakes: Vec<Vec<Vec<Vertex>>>,
 }
 
 /// Where there are no load modules, the most a mesh may have.
@@ -42,6 +49,12 @@ impl Refinement {
     /// Refines the tile. `seeds` are the vertices it inherits or keeps, at the heights they were published with,
     /// whatever the DEM says today.
     pub fn run(&self, window: &Window, seeds: &[Vertex]) -> TileTin {
+        let mut tin = self.run_as_given(window, seeds);
+        lay_level(&mut tin.tin, &self.lakes);
+        tin
+    }
+
+    fn run_as_given(&self, window: &Window, seeds: &[Vertex]) -> TileTin {
         if window.given.is_empty() {
             return self.run_given(window, seeds);
         }
@@ -63,7 +76,16 @@ impl Refinement {
             }
             tin::refine(&with_heights(&window.dem, seeds), &window.importance, task, level)
         };
-        let Some(optimising) = self.optimising else { return grown(&self.task) };
+        let Some(optimising) = self.optimising else {
+            let grown = grown(&self.task);
+            if self.features.is_empty() {
+                return grown;
+            }
+            // Every vertex where it grew, with features among them.
+            let task = self.optimisation(PLAIN, grown.initial_count, &window.forbidden);
+            let woven = weave_in(&window.dem, &window.importance, &grown.tin, &task);
+            return self.join(grown, woven);
+        };
         let grown = grown(&self.beyond_budget(optimising));
         let task = self.optimisation(optimising, grown.initial_count, &window.forbidden);
         let optimised = optimise(&window.dem, &window.importance, &grown.tin, &task);
@@ -115,9 +137,13 @@ impl Refinement {
                 Budget::Vertices(task.stop.points.map_or(NO_LIMIT as usize, |points| points + initial as usize))
             }
         };
-        let Rule::LargestSquares { guard } = task.rule else { unreachable!("what is optimised is grown by squares") };
+        let guard = match task.rule {
+            Rule::LargestSquares { guard } => guard,
+            Rule::WorstFirst | Rule::Batches { .. } => None,
+        };
         Task {
             held,
+            features: self.features.clone(),
             open: task.seams,
             line_step: match task.frame {
                 Frame::Sides { side_cells, .. } => Some(side_cells),
@@ -134,7 +160,7 @@ impl Refinement {
     }
 
     fn join(&self, grown: TileTin, optimised: Optimised) -> TileTin {
-        let Optimised { tin, spent, refused, stop } = optimised;
+        let Optimised { tin, spent, refused, stop, left_out: _, short: _ } = optimised;
         TileTin {
             tin,
             residuals: Vec::new(),
@@ -144,6 +170,34 @@ impl Refinement {
             ..grown
         }
     }
+}
+
+/// Puts vertices inside level water at its height: posts there weigh nothing, so nothing else holds them.
+fn lay_level(tin: &mut Tin, lakes: &[Vec<Vec<Vertex>>]) {
+    for rings in lakes {
+        let Some(level) = rings.first().and_then(|ring| ring.first()).map(|vertex| vertex.height) else { continue };
+        let rows = || rings.iter().flatten().map(|vertex| vertex.at.row);
+        let (Some(south), Some(north)) = (rows().min(), rows().max()) else { continue };
+        let near = tin.vertices.iter_mut().filter(|vertex| (south..=north).contains(&vertex.at.row));
+        for vertex in near.filter(|vertex| lies_inside(rings, vertex.at)) {
+            vertex.height = level;
+        }
+    }
+}
+
+/// Whether a place lies inside an odd number of rings; one on a ring may be either.
+fn lies_inside(rings: &[Vec<Vertex>], at: LatticePoint) -> bool {
+    let crossed = |(a, b): (LatticePoint, LatticePoint)| {
+        let (low, high) = if a.row < b.row { (a, b) } else { (b, a) };
+        let [rise, run] = [high.row - low.row, high.col - low.col].map(i64::from);
+        let [up, along] = [at.row - low.row, at.col - low.col].map(i64::from);
+        low.row <= at.row && at.row < high.row && along * rise < up * run
+    };
+    let edges = rings.iter().flat_map(|ring| {
+        let next = ring.iter().cycle().skip(1);
+        ring.iter().zip(next).map(|(a, b)| (a.at, b.at))
+    });
+    edges.filter(|&edge| crossed(edge)).count() % 2 == 1
 }
 
 /// Adds what a job gives to a tile's task: points on the area's border to its border, others to what it starts from.

@@ -10,6 +10,7 @@ use database::{
 use fidelity::{Residuals, Tally};
 use job::{Choice, HOLE_CLASS_NAME};
 use limits::Windows;
+use product::Told;
 use terrain::{Breach, BreachKind, BreachPlace, ModuleId, ModuleResidual, RefusedBy, StopReason, metres_of_quanta};
 
 use crate::CompileError;
@@ -69,6 +70,7 @@ impl Findings<'_> {
             heights: Some(self.heights()),
             residual_against_source: run.ground.relief.has_source_posts().then(|| self.at_source(&total)),
             classes: self.classes(residuals),
+            features: None,
             levels: self.levels(),
             overall_point_weighted_rms_m: self.point_weighted_rms_m(residuals),
             dem_accuracy_m: run.ground.accuracy_m,
@@ -85,6 +87,12 @@ impl Findings<'_> {
             tiles: Vec::new(),
             files: BTreeMap::new(),
         })
+    }
+
+    /// What is told of features, in jobs with some.
+    pub fn told(&self) -> Option<Told> {
+        let (settled, figures) = (self.run.level.as_ref()?, self.sums.features.as_ref()?);
+        Some(product::told(self.run.job, &self.run.area, &settled.level, figures))
     }
 
     fn stops(&self) -> ReportStops {
@@ -207,7 +215,7 @@ impl Findings<'_> {
             let points = self.sums.points[index];
             ReportClass { name: name.clone(), posts: tally.posts, points, residual: residual_of(tally) }
         };
-        let names = &self.run.job.importance.classes;
+        let names = &self.run.job.class_names();
         let mut classes: Vec<_> = names.iter().enumerate().map(class).collect();
         let (left, over_holes) = (self.run.ground.voids.left, self.sums.points.get(names.len()));
         if 0 < left || over_holes.is_some() {

@@ -1,16 +1,17 @@
 //! One run: a job, its ground, its database, its workers; and how a stage goes through the tiles.
 
-use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, OnceLock};
 
-use database::{Database, Manifest, SourceRecord};
+use database::{AreaLevel, Database, FileStamp, Manifest, SourceRecord};
 use engine::{Cause, FingerprintBuilder, Outcome, Stamp};
 use ground::{GamingArea, Ground, Window};
 use job::Job;
 use schedule::{Event as Scheduled, RankedTasks, Workers, in_rank_order_observed};
 use source_files::FileState;
-use terrain::{TileId, TileTin};
+use terrain::{TileFeatures, TileId, TileTin};
 
+use crate::read_features::ReadFeatures;
 use crate::tins::Tins;
 use crate::{Clock, CompileError, Event, Progress, Stage};
 
@@ -56,6 +57,16 @@ pub(crate) struct Run<'a> {
     pub tins: Tins,
     /// What `database.json` said before this run.
     pub previous: Option<Manifest>,
+    /// Roads, rivers and lakes, once they were asked for.
+    pub read: OnceLock<Arc<ReadFeatures>>,
+    /// What they came to, once that is decided.
+    pub level: Option<Settled>,
+}
+
+/// What features came to, and the file that says so.
+pub(crate) struct Settled {
+    pub file: FileStamp,
+    pub level: AreaLevel,
 }
 
 impl Run<'_> {
@@ -114,6 +125,31 @@ impl Run<'_> {
     /// The TIN of a tile that is published with this stamp.
     pub fn tin(&self, tile: TileId, stamp: &Stamp) -> Result<Arc<TileTin>, CompileError> {
         Ok(self.tins.get(self.database.folder(), tile, stamp)?)
+    }
+
+    /// The features of a job that has some, read when they are first asked for.
+    ///
+    /// # Errors
+    /// When a file of them cannot be read at all.
+    pub fn features(&self) -> Result<Arc<ReadFeatures>, CompileError> {
+        if let Some(read) = self.read.get() {
+            return Ok(read.clone());
+        }
+        let read = ReadFeatures::open(self.job, &self.area)?.expect("a stage of jobs with features");
+        Ok(self.read.get_or_init(|| Arc::new(read)).clone())
+    }
+
+    /// From now on, features are part of the ground, and what they take of the limits is taken.
+    pub fn settle(&mut self, file: FileStamp, level: AreaLevel) {
+        self.area.budget.reserved = level.reserved_of(self.area.grid.count());
+        self.ground.burn_in(self.database.folder(), &self.area);
+        self.read = OnceLock::new();
+        self.level = Some(Settled { file, level });
+    }
+
+    /// What features put into a tile; nothing in jobs without them.
+    pub fn tile_features(&self, tile: TileId) -> Result<Arc<TileFeatures>, CompileError> {
+        Ok(self.ground.features(tile)?)
     }
 
     /// The ground of a tile.

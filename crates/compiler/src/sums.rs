@@ -5,7 +5,7 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use fidelity::{Residuals, Tally};
+use fidelity::{FeatureFigures, Residuals, Tally};
 
 /// Of one tile, or of many.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -22,6 +22,8 @@ pub struct Sums {
     pub border: u64,
     /// The lowest and the highest vertex, in quanta.
     pub heights: (i32, i32),
+    /// What was found of features, in jobs with some.
+    pub features: Option<FeatureFigures>,
 }
 
 /// Sums that several workers add to.
@@ -54,6 +56,11 @@ impl Sums {
             *sum += points;
         }
         self.border += other.border;
+        match (&mut self.features, &other.features) {
+            (Some(mine), Some(others)) => mine.merge(others),
+            (mine @ None, Some(others)) => *mine = Some(others.clone()),
+            (_, None) => {}
+        }
         self.heights = (self.heights.0.min(other.heights.0), self.heights.1.max(other.heights.1));
     }
 }

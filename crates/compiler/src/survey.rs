@@ -54,7 +54,8 @@ pub(crate) fn survey<'a>(run: &'a Run, progress: &mut dyn Progress) -> Result<Op
 
 /// Surveys a tile, or keeps what is published and fresh; with the stamp of what it is made from.
 pub(crate) fn survey_tile(run: &Run, tile: TileId) -> Result<Outcome<(Stamp, GainCurve)>, CompileError> {
-    let (window, mut task) = (run.window(tile)?, survey_task(run.job, &run.area, tile));
+    let features = run.tile_features(tile)?;
+    let (window, mut task) = (run.window(tile)?, survey_task(run.job, &run.area, tile, &features.kept));
     let is_given = !window.given.is_empty();
     if is_given {
         give(&mut task.growth, &window.given, window.dem.rect());

@@ -5,7 +5,7 @@ use std::ops::Deref;
 use ground::GamingArea;
 use job::{Allocation, Borders, Budget as PointBudget, Edges, Effort, ErrorKey, Job, Method, OuterBorder};
 use limits::Allowance;
-use terrain::{LatticePoint, ModuleId, ModuleRect, Post, SeamSides, Side, TileId, TileTin, Vertex};
+use terrain::{Features, ModuleId, ModuleRect, Post, SeamSides, Side, TileFeatures, TileId, TileTin, Vertex};
 use tiling::{Tiling, outer_border_posts, outer_sides};
 use tin::{CostUnit, Frame, Proximity, Rule, Stop, SurveyTask, TileTask};
 
@@ -36,9 +36,12 @@ pub fn tile_refinement(
     tile: TileId,
     budget: &TileBudget,
     inherited: Vec<Post>,
+    features: &TileFeatures,
 ) -> Refinement {
-    let task = tile_task(job, area, tile, budget, inherited);
-    Refinement { task, optimising: optimising(job), most: Most::AsTask }
+    let barred = features.kept.barred_posts(area.tiling.rect(tile));
+    let task = TileTask { barred, ..tile_task(job, area, tile, budget, inherited) };
+    let lakes = features.lakes().map(|rings| rings.iter().map(|surface| surface.ring.clone()).collect()).collect();
+    Refinement { task, optimising: optimising(job), most: Most::AsTask, features: features.kept.clone(), lakes }
 }
 
 /// The growth of one tile, inheriting `inherited` from its lower-ranked neighbours.
@@ -63,6 +66,7 @@ fn tile_task(job: &Job, area: &GamingArea, tile: TileId, budget: &TileBudget, in
         kept: Vec::new(),
         start: Vec::new(),
         seams,
+        barred: Vec::new(),
         rule: rule(job, area),
         stop: Stop {
             points,
@@ -148,7 +152,7 @@ fn largest_value(job: &Job) -> Option<u64> {
 }
 
 /// The survey of one tile: all it would select if it were alone.
-pub(crate) fn survey_task(job: &Job, area: &GamingArea, tile: TileId) -> SurveyTask {
+pub(crate) fn survey_task(job: &Job, area: &GamingArea, tile: TileId, features: &Features) -> SurveyTask {
     let modules = area.tiling.modules(tile, area.grid);
     let reach = match optimising(job) {
         Some(_) if job.tin.target_rms_m.is_some() => SURVEY_REACH_TO_RMS,
@@ -165,6 +169,7 @@ pub(crate) fn survey_task(job: &Job, area: &GamingArea, tile: TileId) -> SurveyT
     let budget = TileBudget { points, allowance: Some(allowance), rms_quanta: None };
     let mut growth = tile_task(job, area, tile, &budget, Vec::new());
     growth.seams = with_outer_sides(job, area, tile, area.tiling.shared_sides(tile));
+    growth.barred = features.barred_posts(growth.rect);
     // An RMS of 0 is never reached, but has the sums of squares recorded.
     growth.stop = Stop { points, value: None, rms_quanta: job.tin.target_rms_m.map(|_| 0.0) };
     if let Rule::Batches { .. } = growth.rule {
@@ -186,7 +191,7 @@ fn survey_allowance(area: &GamingArea, modules: ModuleRect, triangles: u32) -> A
         east: (modules.east + 1).min(area.grid.cols),
     };
     let cap = area.budget.per_module.saturating_add(u32::try_from(area.budget.pool).unwrap_or(u32::MAX));
-    let room = |module| cap - limits::start_triangles(area.grid, module, area.budget.border_step);
+    let room = |module| cap.saturating_sub(area.budget.start_of(module));
     Allowance {
         modules: ring,
         module_room: ring.iter().map(room).collect(),
@@ -197,33 +202,48 @@ fn survey_allowance(area: &GamingArea, modules: ModuleRect, triangles: u32) -> A
     }
 }
 
-/// The vertices a tile's TIN has on one of its sides, in canonical order.
-pub(crate) fn side_vertices(tin: &TileTin, side: Side) -> Vec<Vertex> {
-    let (low, high) = (LatticePoint::from(tin.tin.rect.south_west()), LatticePoint::from(tin.tin.rect.north_east()));
-    let on_side = |at: LatticePoint| match side {
-        Side::South => at.row == low.row,
-        Side::East => at.col == high.col,
-        Side::North => at.row == high.row,
-        Side::West => at.col == low.col,
+/// The border points a tile's TIN has on one of its sides, in canonical order: vertices on posts, counted in eighths
+/// whatever lattice the TIN stands on. Vertices of features between posts both tiles have from the features.
+fn side_vertices(tin: &TileTin, side: Side) -> Vec<Vertex> {
+    let rect = tin.tin.rect;
+    let on_side = |post: Post| match side {
+        Side::South => post.row == rect.south,
+        Side::East => post.col == rect.east,
+        Side::North => post.row == rect.north,
+        Side::West => post.col == rect.west,
     };
-    let mut found: Vec<Vertex> = tin.tin.vertices.iter().copied().filter(|vertex| on_side(vertex.at)).collect();
+    let on_post = |vertex: &Vertex| {
+        let post = tin.tin.post_at(vertex.at).filter(|&post| on_side(post))?;
+        Some(Vertex { at: post.into(), height: vertex.height })
+    };
+    let mut found: Vec<Vertex> = tin.tin.vertices.iter().filter_map(on_post).collect();
     found.sort_unstable();
     found
 }
 
-/// What a tile inherits: the border points of its lower-ranked neighbours on the sides they share.
+/// The vertices on one side of a TIN that stand on posts and are none of features, in canonical order.
+pub(crate) fn seam_points(tin: &TileTin, side: Side, features: &Features) -> Vec<Vertex> {
+    let is_of_feature = |vertex: &Vertex| vertex.at.post().is_some_and(|post| features.has_post(post));
+    let mut found = side_vertices(tin, side);
+    found.retain(|vertex| !is_of_feature(vertex));
+    found
+}
+
+/// What a tile inherits: the border points of its lower-ranked neighbours on the sides they share, but for vertices of
+/// `features`, which all of them have from the start.
 ///
 /// # Errors
 /// The first of `published`.
 pub fn inherited<T: Deref<Target = TileTin>>(
     tiling: &Tiling,
     tile: TileId,
+    features: &Features,
     published: impl Fn(TileId) -> Result<T, CompileError>,
 ) -> Result<Vec<Vertex>, CompileError> {
     let mut all = Vec::new();
     for side in Side::ALL.into_iter().filter(|&side| tiling.inherits(tile, side)) {
         if let Some(other) = tiling.beyond(tile, side) {
-            all.extend(side_vertices(&*published(other)?, side.opposite()));
+            all.extend(seam_points(&*published(other)?, side.opposite(), features));
         }
     }
     all.sort_unstable();
@@ -237,4 +257,33 @@ pub fn inherited<T: Deref<Target = TileTin>>(
 /// When one stands between posts: seam vertices never do.
 pub fn posts_of(vertices: &[Vertex]) -> Vec<Post> {
     vertices.iter().map(|vertex| vertex.at.post().expect("seam vertices stand on posts")).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use terrain::{LatticePoint, PostRect, StopReason, Tin};
+
+    use super::*;
+
+    #[test]
+    fn border_points_are_handed_on_in_eighths_and_features_between_posts_are_not() {
+        let vertex = |row: i32, col: i32, height: i32| Vertex { at: LatticePoint::new(row, col), height };
+        let rect = PostRect { south: 2, west: 1, north: 4, east: 5 };
+        let vertices = vec![vertex(256, 320, 5), vertex(256, 64, 1), vertex(256, 128, 2), vertex(256, 150, 3)];
+        let tin = Tin { steps_per_post: 64, ..Tin::new(rect, vertices, Vec::new()) };
+        let tin = TileTin {
+            tile: TileId { row: 0, col: 0 },
+            tin,
+            initial_count: 0,
+            residuals: Vec::new(),
+            triangles_charged: 0,
+            refused: Vec::new(),
+            stop: StopReason::Exhausted,
+        };
+        let north = [vertex(32, 8, 1), vertex(32, 16, 2), vertex(32, 40, 5)];
+        assert_eq!(side_vertices(&tin, Side::North), north);
+        assert_eq!(side_vertices(&tin, Side::East), north[2..]);
+        assert_eq!(side_vertices(&tin, Side::South), []);
+        assert_eq!(posts_of(&north), [Post::new(4, 1), Post::new(4, 2), Post::new(4, 5)]);
+    }
 }

@@ -10,7 +10,7 @@ use terrain::{Post, SeamSides, Side, TileId, TileTin, Vertex};
 
 use crate::assemble::{assemble, assemble_tile, read_assembled};
 use crate::assembled::Assembled;
-use crate::build::open;
+use crate::build::{decide_features, open};
 use crate::curves::Curves;
 use crate::enforce::enforce;
 use crate::publish::{beginning, prepare, publish};
@@ -19,7 +19,7 @@ use crate::report::Findings;
 use crate::run::{ALGORITHM_REVISION, Options, Run};
 use crate::sums::{Adding, Sums};
 use crate::survey::{Shares, allocate};
-use crate::tasks::{inherited, is_surveyed, posts_of, side_vertices, with_outer_sides};
+use crate::tasks::{inherited, is_surveyed, posts_of, seam_points, with_outer_sides};
 use crate::{CompileError, Event, Progress, Stage, Stopwatch};
 
 /// A tile that was run again.
@@ -54,9 +54,10 @@ pub fn rebuild_tile(
     // Nothing is created where there is nothing to go on from.
     let folder = &folder.into();
     folder.manifest()?;
-    let run = open(job, folder, options, progress)?;
+    let mut run = open(job, folder, options, progress)?;
     let mut frozen = refuse_unfinished(&run, folder, tile)?;
     let is_outdated = is_outdated(&run);
+    decide_features(&mut run, progress)?;
     let shares = published_shares(&run, progress)?;
     let mut tins = published_tins(&run)?;
     run.database.begin(&beginning(&run))?;
@@ -211,7 +212,9 @@ fn published_tins(run: &Run) -> Result<Vec<Published>, CompileError> {
 
 /// What a tile inherits from its lower-ranked neighbours as they are now.
 fn seeds(run: &Run, tins: &[Published], tile: TileId) -> Result<Vec<Vertex>, CompileError> {
-    inherited(&run.area.tiling, tile, |other| run.tin(other, &tins[run.area.tiling.index(other)].stamp))
+    let features = run.tile_features(tile)?;
+    let published = |other| run.tin(other, &tins[run.area.tiling.index(other)].stamp);
+    inherited(&run.area.tiling, tile, &features.kept, published)
 }
 
 /// The tile's TIN as a full build would refine it.
@@ -238,8 +241,8 @@ fn rerun(
     let index = run.area.tiling.index(tile);
     let mut refining = as_built(run, shares, tins, tile)?;
     let mut tin = refining.refine();
-    let before = outgoing(run, &*run.tin(tile, &tins[index].stamp)?);
-    let is_frozen = outgoing(run, &tin) != before;
+    let before = outgoing(run, &*run.tin(tile, &tins[index].stamp)?)?;
+    let is_frozen = outgoing(run, &tin)? != before;
     if is_frozen {
         freeze(run, &mut refining, before);
         tin = refining.refine();
@@ -282,11 +285,13 @@ fn cascade(
         let refining = as_built(run, shares, tins, tile)?;
         let done = refining.refine();
         let before = run.tin(tile, &tins[index].stamp)?;
+        let features = run.tile_features(tile)?;
+        let points = |tin: &TileTin, side: Side| seam_points(tin, side, &features.kept);
         for side in Side::ALL {
             let Some(other) = tiling.beyond(tile, side).filter(|&other| tiling.rank(tile) < tiling.rank(other)) else {
                 continue;
             };
-            if side_vertices(&done, side) != side_vertices(&before, side) {
+            if points(&done, side) != points(&before, side) {
                 waiting.insert((tiling.rank(other), other));
             }
         }
@@ -298,11 +303,12 @@ fn cascade(
 }
 
 /// The border points a tile hands to its higher-ranked neighbours.
-fn outgoing(run: &Run, tin: &TileTin) -> Vec<Vertex> {
+fn outgoing(run: &Run, tin: &TileTin) -> Result<Vec<Vertex>, CompileError> {
     let owned = run.area.tiling.owned_sides(tin.tile);
     let sides = Side::ALL.into_iter().filter(|&side| owned.is_open(side));
-    let mut all: Vec<Vertex> = sides.flat_map(|side| side_vertices(tin, side)).collect();
+    let features = run.tile_features(tin.tile)?;
+    let mut all: Vec<Vertex> = sides.flat_map(|side| seam_points(tin, side, &features.kept)).collect();
     all.sort_unstable();
     all.dedup();
-    all
+    Ok(all)
 }

@@ -84,7 +84,7 @@ mod tests {
     fn tin(col: u32) -> Arc<TileTin> {
         Arc::new(TileTin {
             tile: TileId { row: 0, col },
-            tin: Tin { rect: PostRect::of_size(3, 3), vertices: Vec::new(), triangles: Vec::new() },
+            tin: Tin::new(PostRect::of_size(3, 3), Vec::new(), Vec::new()),
             initial_count: 0,
             residuals: vec![0; 1000],
             triangles_charged: 0,

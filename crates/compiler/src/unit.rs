@@ -18,7 +18,9 @@ use crate::assemble::assemble_tile;
 use crate::build::{Built, finish, open_with};
 use crate::curves::Curves;
 use crate::enter::enter;
+use crate::level::level_area;
 use crate::order::{ORDER, Unit, around, needs, units};
+use crate::profile::profile_tile;
 use crate::refine::{Published, refine_tile};
 use crate::run::{ALGORITHM_REVISION, Options, Run, run_name};
 use crate::survey::{allocate, survey_tile};
@@ -64,12 +66,15 @@ impl<'a> Session<'a> {
     }
 
     /// Does a unit that is not the last, and marks it as done. A panic in it is an error that names the tile.
-    pub fn perform(&self, unit: Unit, progress: &mut dyn Progress) -> Result<(), CompileError> {
+    pub fn perform(&mut self, unit: Unit, progress: &mut dyn Progress) -> Result<(), CompileError> {
         let missing = self.needs(unit).into_iter().find(|&need| self.work.marks().marked(&need.to_string()).is_none());
         if let Some(need) = missing {
             return Err(not_ready(unit, need));
         }
         let Unit { stage, tile } = unit;
+        if !matches!(stage, Stage::Profile | Stage::Level) {
+            self.take_features(unit)?;
+        }
         if let Some(tile) = tile {
             progress.tell(Event::Started(stage, tile));
         }
@@ -84,6 +89,8 @@ impl<'a> Session<'a> {
 
     fn make(&self, unit: Unit) -> Result<(), CompileError> {
         let fingerprint = match (unit.stage, unit.tile) {
+            (Stage::Profile, Some(tile)) => profile_tile(&self.run, tile)?.into_inner().0.blake3,
+            (Stage::Level, None) => level_area(&self.run)?.into_inner().0.blake3,
             (Stage::Survey, Some(tile)) => survey_tile(&self.run, tile)?.into_inner().0.fingerprint,
             (Stage::Allocate, None) => self.allocate()?,
             (Stage::Refine, Some(tile)) => self.refine(tile)?.into_inner().stamp.fingerprint,
@@ -91,6 +98,22 @@ impl<'a> Session<'a> {
             _ => unreachable!("{unit} is no unit that a process does by itself"),
         };
         Ok(self.work.marks().mark(&unit.to_string(), fingerprint)?)
+    }
+
+    /// Takes over what features came to, where there are any, as another unit has published it.
+    fn take_features(&mut self, unit: Unit) -> Result<(), CompileError> {
+        if self.run.job.features.is_none() || self.run.level.is_some() {
+            return Ok(());
+        }
+        let level = Unit::whole(Stage::Level);
+        let marked = self.work.marks().marked(&level.to_string());
+        match self.run.database.folder().read_level() {
+            Ok((_, file, read)) if Some(file.blake3) == marked => {
+                self.run.settle(file, read);
+                Ok(())
+            }
+            _ => Err(self.spoilt(unit, level)),
+        }
     }
 
     fn allocate(&self) -> Result<Fingerprint, CompileError> {
@@ -115,7 +138,9 @@ impl<'a> Session<'a> {
     fn refine(&self, tile: TileId) -> Result<Outcome<Published>, CompileError> {
         let unit = Unit::of(Stage::Refine, tile);
         let share = self.work.read_share(tile).map_err(|_| self.spoilt(unit, Unit::whole(Stage::Allocate)))?;
-        let seeds = inherited(&self.run.area.tiling, tile, |other| Ok(self.published(unit, other)?.1))?;
+        let features = self.run.tile_features(tile)?;
+        let published = |other| Ok(self.published(unit, other)?.1);
+        let seeds = inherited(&self.run.area.tiling, tile, &features.kept, published)?;
         refine_tile(&self.run, &from_share(&share), seeds, tile)
     }
 
@@ -184,7 +209,7 @@ pub fn perform(
     progress: &mut dyn Progress,
 ) -> Result<UnitEnd, CompileError> {
     let progress = &mut Stopwatch::start(options.clock, progress);
-    let session = Session::join(job, &folder.into(), options, progress)?;
+    let mut session = Session::join(job, &folder.into(), options, progress)?;
     if session.is_finished {
         return Ok(UnitEnd::Finished);
     }

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 
 use ground::Window;
 use load_modules::{Layout, concatenate};
-use terrain::{LATTICE_PER_POST, ModuleGrid, ModuleId, ModuleRect, ModuleResidual, PostRect, Tin, Vertex};
+use terrain::{Features, ModuleGrid, ModuleId, ModuleRect, ModuleResidual, Tin, Vertex};
 use tin::{Stop, TileTask};
 
 use crate::CompileError;
@@ -36,8 +36,8 @@ pub(crate) fn without_limits(
 fn without_limit(run: &Run, window: &Window, module: ModuleId, part: &Tin, extra: usize) -> ModuleResidual {
     let rect = part.rect;
     let (dem, importance) = (window.dem.window(rect), window.importance.window(rect));
-    let window = Window { dem, importance, given: Vec::new(), forbidden: Vec::new() };
-    let (sides, inner): (Vec<Vertex>, Vec<Vertex>) = part.vertices.iter().partition(|vertex| is_on_side(vertex, rect));
+    let window = Window { dem, importance, given: Vec::new(), forbidden: Vec::new(), featured: Vec::new() };
+    let (sides, inner): (Vec<Vertex>, Vec<Vertex>) = part.vertices.iter().partition(|vertex| is_on_side(part, vertex));
     let optimising = optimising(run.job);
     // What is filled has its sides already and counts all vertices; what is selected starts from its sides.
     let (inherited, points) = match optimising {
@@ -47,29 +47,30 @@ fn without_limit(run: &Run, window: &Window, module: ModuleId, part: &Tin, extra
     let tile = run.area.tiling.tile_of_module(module, run.area.grid);
     let stop = Stop { points: Some(points + extra), ..Stop::default() };
     let task = TileTask { inherited, stop, ..TileTask::plain(tile, rect, rule(run.job, &run.area)) };
-    let refinement = Refinement { task, optimising, most: Most::AsTask };
+    let refinement =
+        Refinement { task, optimising, most: Most::AsTask, features: Features::default(), lakes: Vec::new() };
     let tin = match optimising {
         Some(optimising) => refinement.fill(&window, optimising, part),
         None => refinement.run(&window, &sides).tin,
     };
     let here = ModuleRect { south: module.row, west: module.col, north: module.row + 1, east: module.col + 1 };
     let layout = Layout { grid: run.area.grid, modules: here, spacing: run.area.frame.spacing };
-    let mut modules = concatenate(&tin, &layout, &window.importance);
+    let mut modules = concatenate(&tin, &layout, &window.importance, None);
     fidelity::measure(&mut modules, &window.measured(&run.area));
     modules[0].residual
 }
 
-fn is_on_side(vertex: &Vertex, rect: PostRect) -> bool {
-    let step = |at: i32| at * LATTICE_PER_POST;
-    let at = vertex.at;
+fn is_on_side(tin: &Tin, vertex: &Vertex) -> bool {
+    let (rect, at) = (tin.rect, vertex.at);
+    let step = |at: i32| at * tin.steps_per_post;
     [rect.south, rect.north].map(step).contains(&at.row) || [rect.west, rect.east].map(step).contains(&at.col)
 }
 
 /// The parts of a tile's TIN that are its load modules, row by row.
 fn parts(tin: &Tin, grid: ModuleGrid, tile: ModuleRect) -> Vec<Tin> {
-    let empty = |id| Tin { rect: grid.posts_of(id), vertices: Vec::new(), triangles: Vec::new() };
+    let empty = |id| Tin { rect: grid.posts_of(id), vertices: Vec::new(), triangles: Vec::new(), ..*tin };
     let mut parts: Vec<Tin> = tile.iter().map(empty).collect();
-    let side = i64::from(grid.side_cells * LATTICE_PER_POST);
+    let side = i64::from(grid.side_cells * tin.steps_per_post);
     for triangle in &tin.triangles {
         let corners = triangle.map(|v| tin.vertices[v as usize]);
         let thirds = |v: [i32; 3]| (v.into_iter().map(i64::from).sum::<i64>() / (3 * side)) as u32;

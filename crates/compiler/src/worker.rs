@@ -131,7 +131,7 @@ impl Worker<'_, '_> {
     }
 
     fn perform(&mut self, unit: Unit, lease: Lease, progress: &mut dyn Progress) -> Result<(), CompileError> {
-        let session = &self.session;
+        let session = &mut self.session;
         let done = hold(self.sharing, &lease, || session.perform(unit, progress));
         match done {
             Ok(()) => {

@@ -34,6 +34,19 @@ pub(crate) fn decode<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, String> {
     options().deserialize(bytes).map_err(|error| error.to_string())
 }
 
+/// The value whose bytes begin these, and what follows it, if anything does.
+///
+/// # Errors
+/// What is wrong with the bytes, in words.
+pub(crate) fn decode_two<A: DeserializeOwned, B: DeserializeOwned>(bytes: &[u8]) -> Result<(A, Option<B>), String> {
+    let mut rest = bytes;
+    let first = options()
+        .allow_trailing_bytes()
+        .deserialize_from(&mut rest)
+        .map_err(|error: bincode::Error| error.to_string())?;
+    Ok((first, if rest.is_empty() { None } else { Some(decode(rest)?) }))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -47,6 +60,13 @@ mod tests {
     fn an_absurd_length_is_an_error_and_no_allocation() {
         assert!(decode::<Vec<u64>>(&[255; 8]).is_err());
         assert!(decode::<Vec<u64>>(&[255, 255, 255, 255, 255, 0, 0, 0, 1]).is_err());
+    }
+
+    #[test]
+    fn a_second_value_is_there_or_not() {
+        assert_eq!(decode_two::<u16, u8>(&[7, 0]), Ok((7, None)));
+        assert_eq!(decode_two::<u16, u8>(&[7, 0, 9]), Ok((7, Some(9))));
+        assert!(decode_two::<u16, u8>(&[7, 0, 9, 9]).is_err() && decode_two::<u16, u8>(&[7]).is_err());
     }
 
     #[test]

@@ -5,21 +5,23 @@ use std::path::{Path, PathBuf};
 
 use engine::{Durability, Entry, LockKind, Stamp, check_writable, is_temporary, remove_all};
 use serde::Serialize;
-use terrain::{GainCurve, LoadModule, TileTin};
+use terrain::{GainCurve, LoadModule, TileFeatures, TileTin};
 
 use crate::lock::LOCK_NAME;
 use crate::names::{MEASURED, MODULES, SURVEY, TILES, WORK, files};
 use crate::{
-    Area, DatabaseError, FileStamp, Folder, Lock, Manifest, ManifestState, Measured, Removals, TileModules, Work,
-    encode_curve, encode_levels, encode_measured, encode_removals, encode_tile, json,
+    Area, AreaLevel, DatabaseError, FileStamp, Folder, Lock, Manifest, ManifestState, Measured, Profile, Removals,
+    TileModules, Work, encode_curve, encode_level, encode_levels, encode_lines, encode_measured, encode_profile,
+    encode_removals, encode_tile, json,
 };
 
 /// The folders of a database that stay.
 const FOLDERS: [&str; 4] = [TILES, MODULES, MEASURED, SURVEY];
 /// What is written beside a finished build.
-const REPORTS: [&str; 4] = [files::REPORT, files::REPORT_HTML, files::BREACHES, files::BREACHES_CSV];
+const REPORTS: [&str; 6] =
+    [files::REPORT, files::REPORT_HTML, files::BREACHES, files::BREACHES_CSV, files::FEATURES, files::FEATURES_GPKG];
 /// What may lie in a database's directory and makes a directory without `database.json` ours.
-const OURS: [&str; 11] = [
+const OURS: [&str; 13] = [
     LOCK_NAME,
     TILES,
     MODULES,
@@ -31,6 +33,8 @@ const OURS: [&str; 11] = [
     files::REPORT_HTML,
     files::BREACHES,
     files::BREACHES_CSV,
+    files::FEATURES,
+    files::FEATURES_GPKG,
 ];
 
 /// A database to write to: by this process alone, or by all that have joined it.
@@ -185,6 +189,30 @@ impl Database {
     /// As [`Database::write_tile`].
     pub fn write_curve(&self, stamp: &Stamp, curve: &GainCurve) -> Result<FileStamp, DatabaseError> {
         self.publish(&self.folder.curve_path(curve.tile), &encode_curve(stamp, curve))
+    }
+
+    /// Publishes what the ground is along the features of a tile.
+    ///
+    /// # Errors
+    /// As [`Database::write_tile`].
+    pub fn write_profile(&self, stamp: &Stamp, profile: &Profile) -> Result<FileStamp, DatabaseError> {
+        self.publish(&self.folder.profile_path(profile.tile), &encode_profile(stamp, profile))
+    }
+
+    /// Publishes what features put into a tile.
+    ///
+    /// # Errors
+    /// As [`Database::write_tile`].
+    pub fn write_lines(&self, stamp: &Stamp, features: &TileFeatures) -> Result<FileStamp, DatabaseError> {
+        self.publish(&self.folder.lines_path(features.tile), &encode_lines(stamp, features))
+    }
+
+    /// Publishes what features of the area came to.
+    ///
+    /// # Errors
+    /// As [`Database::write_tile`].
+    pub fn write_level(&self, stamp: &Stamp, level: &AreaLevel) -> Result<FileStamp, DatabaseError> {
+        self.publish(&self.folder.path(files::LEVEL), &encode_level(stamp, level))
     }
 
     /// Publishes a value, which must be an object, as checksummed JSON under one of the names of [`files`].

@@ -5,14 +5,15 @@ use std::sync::Arc;
 
 use engine::{Disk, Entry, Store};
 use serde::de::DeserializeOwned;
-use terrain::{GainCurve, LoadModule, TileId, TileTin};
+use terrain::{GainCurve, LoadModule, TileFeatures, TileId, TileTin};
 
 use crate::frame::{FRAME_BYTES, Kind};
 use crate::names::{MEASURED, MODULES, SURVEY, TILES, WORK, files};
 use crate::read::{check_stamp, read, refuse_other};
 use crate::{
-    DatabaseError, FileStamp, Manifest, ManifestState, Measured, NotADatabase, Removals, Report, Stamp, TileModules,
-    Work, curve_file, frame, json, measured_file, removals_file, slm, tile_file,
+    AreaLevel, DatabaseError, FileStamp, Manifest, ManifestState, Measured, NotADatabase, Profile, Removals, Report,
+    Stamp, TileModules, Work, curve_file, frame, json, level_file, lines_file, measured_file, profile_file,
+    removals_file, slm, tile_file,
 };
 
 /// The directory of a database, to read from. Holds no file open and no lock.
@@ -84,6 +85,16 @@ impl Folder {
     /// Where what was measured of the load modules of `tile` lies.
     pub fn measured_path(&self, tile: TileId) -> PathBuf {
         self.path(&format!("{MEASURED}/{tile}.sums"))
+    }
+
+    /// Where the ground along the features of `tile` lies.
+    pub fn profile_path(&self, tile: TileId) -> PathBuf {
+        self.path(&format!("{SURVEY}/{tile}.profile"))
+    }
+
+    /// Where what features put into `tile` lies.
+    pub fn lines_path(&self, tile: TileId) -> PathBuf {
+        self.path(&format!("{SURVEY}/{tile}.lines"))
     }
 
     /// Where the gain curve of `tile` lies.
@@ -228,6 +239,57 @@ impl Folder {
         let bytes = self.read(&path)?;
         let (stamp, read) = measured_file::decode_measured(&path, &bytes)?;
         same_tile(path, read.tile, tile)?;
+        Ok((stamp, FileStamp::of(&bytes), read))
+    }
+
+    /// What the profile of `tile` was made from, by its header alone; `None` when there is none.
+    ///
+    /// # Errors
+    /// When the header cannot be read or is damaged.
+    pub fn profile_stamp(&self, tile: TileId) -> Result<Option<Stamp>, DatabaseError> {
+        self.stamp(Kind::Profile, &self.profile_path(tile))
+    }
+
+    /// What the features' heights were made from, by its header alone; `None` when there are none.
+    ///
+    /// # Errors
+    /// When the header cannot be read or is damaged.
+    pub fn level_stamp(&self) -> Result<Option<Stamp>, DatabaseError> {
+        self.stamp(Kind::Level, &self.path(files::LEVEL))
+    }
+
+    /// The ground along the features of `tile`, what it was made from, and the bytes that say so.
+    ///
+    /// # Errors
+    /// When the file is missing, damaged or of another tile.
+    pub fn read_profile(&self, tile: TileId) -> Result<(Stamp, FileStamp, Profile), DatabaseError> {
+        let path = self.profile_path(tile);
+        let bytes = self.read(&path)?;
+        let (stamp, read) = profile_file::decode_profile(&path, &bytes)?;
+        same_tile(path, read.tile, tile)?;
+        Ok((stamp, FileStamp::of(&bytes), read))
+    }
+
+    /// What features put into `tile`, and the bytes that say so.
+    ///
+    /// # Errors
+    /// When the file is missing, damaged or of another tile.
+    pub fn read_lines(&self, tile: TileId) -> Result<(FileStamp, TileFeatures), DatabaseError> {
+        let path = self.lines_path(tile);
+        let bytes = self.read(&path)?;
+        let (_, read) = lines_file::decode_lines(&path, &bytes)?;
+        same_tile(path, read.tile, tile)?;
+        Ok((FileStamp::of(&bytes), read))
+    }
+
+    /// What features of the area came to, what it was made from, and the bytes that say so.
+    ///
+    /// # Errors
+    /// When the file is missing or damaged.
+    pub fn read_level(&self) -> Result<(Stamp, FileStamp, AreaLevel), DatabaseError> {
+        let path = self.path(files::LEVEL);
+        let bytes = self.read(&path)?;
+        let (stamp, read) = level_file::decode_level(&path, &bytes)?;
         Ok((stamp, FileStamp::of(&bytes), read))
     }
 

@@ -30,6 +30,9 @@ pub(crate) enum Kind {
     Curve,
     Removals,
     Measured,
+    Profile,
+    Lines,
+    Level,
 }
 
 impl Kind {
@@ -39,6 +42,9 @@ impl Kind {
             Kind::Curve => *b"\x89CRV\r\n\x1a\n",
             Kind::Removals => *b"\x89REM\r\n\x1a\n",
             Kind::Measured => *b"\x89SUM\r\n\x1a\n",
+            Kind::Profile => *b"\x89PRO\r\n\x1a\n",
+            Kind::Lines => *b"\x89LIN\r\n\x1a\n",
+            Kind::Level => *b"\x89LEV\r\n\x1a\n",
         }
     }
 }

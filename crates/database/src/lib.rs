@@ -28,13 +28,23 @@ mod tile_file;
 pub use tile_file::{decode_tile, encode_tile};
 mod curve_file;
 pub use curve_file::{decode_curve, encode_curve};
+mod profile_file;
+pub use profile_file::{Profile, decode_profile, encode_profile};
+mod lines_file;
+pub use lines_file::{decode_lines, encode_lines};
+mod level_file;
+pub use level_file::{
+    AreaLevel, FeatureFace, FeatureLine, FeatureRemark, LineRole, StripFigures, decode_level, encode_level,
+};
 mod removals_file;
 pub use removals_file::{Removals, decode_removals, encode_removals};
 mod measured_file;
-pub use measured_file::{Measured, MeasuredModule, MeasuredTally, decode_measured, encode_measured};
+pub use measured_file::{Measured, MeasuredFeatures, MeasuredModule, MeasuredTally, decode_measured, encode_measured};
 mod slm;
 /// Version of the load-module files.
-pub use load_module_reader::VERSION as MODULES_FORMAT_VERSION;
+pub use load_module_reader::{
+    VERSION as MODULES_FORMAT_VERSION, VERSION_WITHOUT_DECKS as MODULES_FORMAT_VERSION_WITHOUT_DECKS,
+};
 pub use slm::{TileModules, decode_levels, decode_modules, encode_levels, encode_modules, load_module};
 mod json;
 mod page;
@@ -42,6 +52,10 @@ pub use page::seal_page;
 mod manifest;
 pub use manifest::{
     Area, FORMAT_VERSION, FileStamp, Manifest, ManifestState, SourceRecord, TileRecord, TileState, Totals,
+};
+mod report_features;
+pub use report_features::{
+    ReportFeatureChecks, ReportFeatureClass, ReportFeatureCost, ReportFeatureRemarks, ReportFeatures,
 };
 mod report;
 pub use report::{

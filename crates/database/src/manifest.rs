@@ -133,6 +133,12 @@ pub struct TileRecord {
     /// Its file in `survey/`; absent where nothing is surveyed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub curve: Option<FileStamp>,
+    /// What the ground is along features, in `survey/`; absent without features.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub profile: Option<FileStamp>,
+    /// What features put into it, in `survey/`; absent without features.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lines: Option<FileStamp>,
 }
 
 impl TileRecord {
@@ -150,6 +156,8 @@ impl TileRecord {
             slm: None,
             measured: None,
             curve: None,
+            profile: None,
+            lines: None,
         }
     }
 

@@ -30,6 +30,27 @@ pub struct Measured {
     pub border: u64,
     /// The lowest and the highest vertex, in quanta.
     pub heights: [i32; 2],
+    /// What was found of features, in jobs with some.
+    pub features: Option<MeasuredFeatures>,
+}
+
+/// What was found of the features of a tile.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct MeasuredFeatures {
+    /// Steps between posts, in which `missing` is counted.
+    pub steps_per_post: i32,
+    /// Edges that the TIN has to keep, those on a line that two tiles share in one of them.
+    pub edges: u64,
+    /// Those that it lacks: row and column of one end, then of the other.
+    pub missing: Vec<[i32; 4]>,
+    /// How far any vertex in a lake lies from its level, in quanta.
+    pub lake_spread: u32,
+    /// Posts outside water within a post of a lake.
+    pub shore_posts: u64,
+    /// Those of them below its level.
+    pub shore_below: u64,
+    /// Residuals outside features and their slopes.
+    pub outside: MeasuredTally,
 }
 
 /// Counts and residual of one load module.
@@ -81,7 +102,8 @@ struct MeasuredOnDisk {
 
 /// The bytes of what was measured.
 pub fn encode_measured(stamp: &Stamp, measured: &Measured) -> Vec<u8> {
-    let Measured { tile, modules_file, modules, classes, at_source, points, border, heights } = measured.clone();
+    let Measured { tile, modules_file, modules, classes, at_source, points, border, heights, features } =
+        measured.clone();
     let on_disk = MeasuredOnDisk {
         tile: (tile.row, tile.col),
         length: modules_file.length,
@@ -93,7 +115,12 @@ pub fn encode_measured(stamp: &Stamp, measured: &Measured) -> Vec<u8> {
         border,
         heights,
     };
-    frame::seal(Kind::Measured, stamp, &codec::encode(&on_disk))
+    let mut bytes = codec::encode(&on_disk);
+    // Files of jobs without features are as they were before there were any.
+    if let Some(features) = features {
+        bytes.extend(codec::encode(&features));
+    }
+    frame::seal(Kind::Measured, stamp, &bytes)
 }
 
 /// What was measured, whose file, at `path`, has these bytes.
@@ -102,12 +129,13 @@ pub fn encode_measured(stamp: &Stamp, measured: &Measured) -> Vec<u8> {
 /// When the file is not as it was written.
 pub fn decode_measured(path: &Path, bytes: &[u8]) -> Result<(Stamp, Measured), DatabaseError> {
     let (stamp, payload) = frame::open(Kind::Measured, path, bytes)?;
-    let on_disk: MeasuredOnDisk = codec::decode(payload).map_err(|what| malformed(path, what))?;
+    let (on_disk, features): (MeasuredOnDisk, Option<MeasuredFeatures>) =
+        codec::decode_two(payload).map_err(|what| malformed(path, what))?;
     let MeasuredOnDisk { tile: (row, col), length, blake3, modules, classes, at_source, points, border, heights } =
         on_disk;
     let modules_file = FileStamp { length, blake3: Fingerprint(blake3) };
     let tile = TileId { row, col };
-    Ok((stamp, Measured { tile, modules_file, modules, classes, at_source, points, border, heights }))
+    Ok((stamp, Measured { tile, modules_file, modules, classes, at_source, points, border, heights, features }))
 }
 
 #[cfg(test)]
@@ -122,5 +150,10 @@ mod tests {
         let bytes = encode_measured(&samples::stamp(), &measured);
         assert_eq!(decode_measured(path, &bytes).unwrap(), (samples::stamp(), measured));
         samples::check_every_damage(&bytes, |bytes| decode_measured(path, bytes).is_err());
+        let features = MeasuredFeatures { edges: 7, missing: vec![[1, -2, 3, 4]], ..MeasuredFeatures::default() };
+        let with = Measured { features: Some(features), ..samples::measured() };
+        let longer = encode_measured(&samples::stamp(), &with);
+        assert_eq!(decode_measured(path, &longer).unwrap(), (samples::stamp(), with));
+        assert!(bytes.len() < longer.len());
     }
 }

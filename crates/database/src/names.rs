@@ -12,8 +12,14 @@ pub mod files {
     pub const BREACHES: &str = "breaches.geojson";
     /// The same as a table.
     pub const BREACHES_CSV: &str = "breaches.csv";
+    /// What was mended, degraded or left out of roads, rivers and lakes, on a map.
+    pub const FEATURES: &str = "features.geojson";
+    /// Roads, rivers and lakes as they are in the ground, as layers.
+    pub const FEATURES_GPKG: &str = "features.gpkg";
     /// What each tile may spend.
     pub const ALLOCATION: &str = "survey/allocation.json";
+    /// What features of the area came to: their heights, their cost, what was mended.
+    pub const LEVEL: &str = "survey/features.level";
 }
 
 /// Folder of the tiles' TINs.

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 use terrain::{Breach, BreachKind, BreachPlace, ModuleId};
 
-use crate::FileStamp;
+use crate::{FileStamp, ReportFeatures};
 
 /// The content of `report.json`; its keys are a contract. Every number is finite.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -45,6 +45,9 @@ pub struct Report {
     pub residual_against_source: Option<ReportResidual>,
     /// The same for each class of the mask, in the job's order.
     pub classes: Vec<ReportClass>,
+    /// Roads, rivers and lakes, where the job has any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub features: Option<ReportFeatures>,
     /// Levels of detail, the finest first; none where there is only that one.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub levels: Vec<ReportLevel>,
@@ -390,6 +393,7 @@ mod tests {
             heights: None,
             residual_against_source: None,
             classes: vec![],
+            features: None,
             levels: vec![ReportLevel { level: 1, inner_share: 0.5, triangles: 20, rms_m: 1.5, max_m: 11.25 }],
             overall_point_weighted_rms_m: 1.1,
             dem_accuracy_m: Some(2.5),

@@ -1,7 +1,7 @@
 //! Small values for the tests of this crate.
 
 use terrain::{
-    GainCurve, GainRun, GridFrame, LatticePoint, LoadModule, ModuleGrid, ModuleId, ModuleRect, ModuleResidual,
+    Decks, GainCurve, GainRun, GridFrame, LatticePoint, LoadModule, ModuleGrid, ModuleId, ModuleRect, ModuleResidual,
     ModuleVertex, Post, PostRect, Refusal, RefusedBy, Spacing, StopReason, TileId, TileTin, Tin, Vertex,
 };
 
@@ -45,7 +45,7 @@ pub(crate) fn tile() -> TileTin {
     }];
     let tile = TileTin {
         tile: TILE,
-        tin: Tin { rect, vertices, triangles: vec![[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]] },
+        tin: Tin::new(rect, vertices, vec![[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]]),
         initial_count: 4,
         residuals: vec![12_805],
         triangles_charged: 4,
@@ -74,6 +74,7 @@ pub(crate) fn measured() -> Measured {
         points: vec![7, 0],
         border: 2,
         heights: [-5, 1280],
+        features: None,
     }
 }
 
@@ -118,6 +119,7 @@ pub(crate) fn modules() -> Vec<LoadModule> {
         classes: vec![0, 1],
         polygon_count: 2,
         residual: ModuleResidual { posts: 400, largest: 300, sum_abs: 25_600, sum_squared: 3_276_800 },
+        decks: Decks::default(),
     };
     let east = LoadModule {
         id: ModuleId { row: 2, col: 4 },
@@ -133,6 +135,7 @@ pub(crate) fn modules() -> Vec<LoadModule> {
         classes: vec![1, 0, 0, 1],
         polygon_count: 4,
         residual: ModuleResidual { posts: 399, largest: 128, sum_abs: 12_800, sum_squared: 1_638_400 },
+        decks: Decks::default(),
     };
     [&west, &east].iter().for_each(|module| assert_eq!(module.check(), Ok(())));
     vec![west, east]
@@ -150,6 +153,27 @@ pub(crate) fn levels() -> Vec<Vec<LoadModule>> {
     let coarse: Vec<_> = fine.iter().map(flat).collect();
     coarse.iter().for_each(|module| assert_eq!(module.check(), Ok(())));
     vec![fine, coarse.clone(), coarse]
+}
+
+/// The same levels with decks: a bridge of three triangles that hangs over the line between both load modules, and
+/// another that crosses above it in the eastern one; at the coarsest level there are none.
+pub(crate) fn levels_with_decks() -> Vec<Vec<LoadModule>> {
+    let mut levels = levels();
+    let vertex = |x, y, z| ModuleVertex { y, x, z };
+    let bridge = |[west, east]: [u16; 2], y: u16, z: i32, class| {
+        let [a, b] = [vertex(west, y, z), vertex(east, y, z)];
+        let [c, d] = [vertex(east, y + 700, z + 1), vertex(west, y + 700, z + 1)];
+        [([a, b, c], class), ([a, c, d], class)]
+    };
+    let south = |x: [u16; 2]| bridge(x, 30_000, 129_024, 1);
+    let west = Decks::of_triangles(south([60_000, 64_000]));
+    let east = Decks::of_triangles(south([0, 9000]).into_iter().chain(bridge([0, 64_000], 30_100, 129_664, 254)));
+    for modules in &mut levels[..2] {
+        (modules[0].decks, modules[1].decks) = (west.clone(), east.clone());
+        modules.iter().for_each(|module| assert_eq!(module.check(), Ok(())));
+    }
+    levels[1][0].decks = Decks::default();
+    levels
 }
 
 pub(crate) fn area() -> Area {

@@ -3,10 +3,11 @@
 use std::path::Path;
 
 use load_module_reader::{
-    FIXED_HEADER_BYTES, Header, INDEX_ENTRY_BYTES, LEVELS_MAX, MAGIC, Module, QUANTA_PER_METRE, SlmFile, VERSION,
+    DECK_ENTRY_BYTES, FIXED_HEADER_BYTES, Header, INDEX_ENTRY_BYTES, LEVELS_MAX, MAGIC, Module, QUANTA_PER_METRE,
+    SlmFile, VERSION, VERSION_WITHOUT_DECKS, Vertex,
 };
 use terrain::{
-    GridFrame, LoadModule, ModuleGrid, ModuleId, ModuleRect, ModuleResidual, ModuleVertex, Side, Spacing, TileId,
+    Decks, GridFrame, LoadModule, ModuleGrid, ModuleId, ModuleRect, ModuleResidual, ModuleVertex, Side, Spacing, TileId,
 };
 
 use crate::{DatabaseError, Fingerprint};
@@ -45,7 +46,8 @@ pub fn encode_modules(tile: &TileModules, modules: &[LoadModule]) -> Vec<u8> {
     encode(tile, &[modules])
 }
 
-/// The bytes of the file that holds these levels of a tile's load modules, the finest first.
+/// The bytes of the file that holds these levels of a tile's load modules, the finest first: of format version 2 if any
+/// of them has decks, else of version 1.
 ///
 /// # Panics
 /// When there are none or more than eight, or the load modules of one are not exactly those of the tile, row by row
@@ -59,7 +61,10 @@ fn encode(tile: &TileModules, levels: &[&[LoadModule]]) -> Vec<u8> {
     let level_count = u16::try_from(levels.len()).ok().filter(|count| (1..=LEVELS_MAX).contains(count));
     let level_count = level_count.expect("a tile's file holds one level or a few");
     let header_length = (FIXED_HEADER_BYTES + tile.crs.len() + tile.vertical_datum.len()).next_multiple_of(4) + 4;
-    let index_length = levels.len() * tile.modules.count() * INDEX_ENTRY_BYTES + 4;
+    let has_decks = levels.iter().any(|modules| modules.iter().any(|module| !module.decks.is_empty()));
+    let version = if has_decks { VERSION } else { VERSION_WITHOUT_DECKS };
+    let entry_bytes = INDEX_ENTRY_BYTES + if has_decks { DECK_ENTRY_BYTES } else { 0 };
+    let index_length = levels.len() * tile.modules.count() * entry_bytes + 4;
     let mut index = Vec::with_capacity(index_length);
     let mut sections = Vec::new();
     for (level, modules) in (0..).zip(levels) {
@@ -73,20 +78,24 @@ fn encode(tile: &TileModules, levels: &[&[LoadModule]]) -> Vec<u8> {
             put_module(&mut sections, module, level);
             let offset = (header_length + index_length + start) as u64;
             put_entry(&mut index, module, offset, (sections.len() - start) as u32);
+            if has_decks {
+                put_deck_entry(&mut index, &module.decks);
+                put_decks(&mut sections, module, level);
+            }
         }
     }
     put_checksum(&mut index, 0);
     let file_length = header_length + index.len() + sections.len();
     let mut file = Vec::with_capacity(file_length);
-    put_header(&mut file, tile, level_count, header_length as u32, file_length as u64);
+    put_header(&mut file, tile, [version, level_count], header_length as u32, file_length as u64);
     file.extend_from_slice(&index);
     file.extend_from_slice(&sections);
     file
 }
 
-fn put_header(file: &mut Vec<u8>, tile: &TileModules, level_count: u16, header_length: u32, file_length: u64) {
+fn put_header(file: &mut Vec<u8>, tile: &TileModules, start: [u16; 2], header_length: u32, file_length: u64) {
     file.extend_from_slice(&MAGIC);
-    put_u16s(file, [VERSION, level_count]);
+    put_u16s(file, start);
     put_u32s(file, [header_length]);
     file.extend_from_slice(&file_length.to_le_bytes());
     put_u32s(file, [tile.tile.row, tile.tile.col, tile.grid.rows, tile.grid.cols]);
@@ -108,10 +117,23 @@ fn put_header(file: &mut Vec<u8>, tile: &TileModules, level_count: u16, header_l
 fn put_entry(index: &mut Vec<u8>, module: &LoadModule, offset: u64, length: u32) {
     index.extend_from_slice(&offset.to_le_bytes());
     put_u32s(index, [length, module.vertices.len() as u32, module.triangles.len() as u32, module.polygon_count]);
-    let heights = || module.vertices.iter().map(|vertex| vertex.z);
-    for height in [heights().min(), heights().max()] {
-        index.extend_from_slice(&height.expect("a load module has at least its corners").to_le_bytes());
-    }
+    let heights = heights(&module.vertices).expect("a load module has at least its corners");
+    heights.iter().for_each(|height| index.extend_from_slice(&height.to_le_bytes()));
+}
+
+/// What the entry of a load module says of its decks: zeros where it has none.
+fn put_deck_entry(index: &mut Vec<u8>, decks: &Decks) {
+    put_u32s(index, [decks.vertices.len() as u32, decks.triangles.len() as u32]);
+    heights(&decks.vertices)
+        .unwrap_or_default()
+        .iter()
+        .for_each(|height| index.extend_from_slice(&height.to_le_bytes()));
+}
+
+/// Lowest and highest of some vertices.
+fn heights(vertices: &[ModuleVertex]) -> Option<[i32; 2]> {
+    let heights = || vertices.iter().map(|vertex| vertex.z);
+    Some([heights().min()?, heights().max()?])
 }
 
 fn put_module(file: &mut Vec<u8>, module: &LoadModule, level: u32) {
@@ -125,16 +147,37 @@ fn put_module(file: &mut Vec<u8>, module: &LoadModule, level: u32) {
     put_u32s(file, [residual.posts, residual.largest]);
     file.extend_from_slice(&residual.sum_abs.to_le_bytes());
     file.extend_from_slice(&residual.sum_squared.to_le_bytes());
-    for vertex in &module.vertices {
-        put_u16s(file, [vertex.x, vertex.y]);
-        file.extend_from_slice(&vertex.z.to_le_bytes());
-    }
+    put_vertices(file, &module.vertices);
     put_u16s(file, module.triangles.iter().flatten().copied());
     put_u16s(file, sides.iter().flatten().copied());
     assert_eq!(module.classes.len(), module.triangles.len(), "load module {} has a class per triangle", module.id);
     file.extend_from_slice(&module.classes);
     pad(file, start);
     put_checksum(file, start);
+}
+
+/// The part of a load module's decks, where it has any.
+fn put_decks(file: &mut Vec<u8>, module: &LoadModule, level: u32) {
+    let decks = &module.decks;
+    if decks.is_empty() {
+        return;
+    }
+    let start = file.len();
+    put_u32s(file, [module.id.row, module.id.col, level]);
+    put_u32s(file, [decks.vertices.len() as u32, decks.triangles.len() as u32]);
+    put_vertices(file, &decks.vertices);
+    put_u16s(file, decks.triangles.iter().flatten().copied());
+    assert_eq!(decks.classes.len(), decks.triangles.len(), "decks of load module {} have a class each", module.id);
+    file.extend_from_slice(&decks.classes);
+    pad(file, start);
+    put_checksum(file, start);
+}
+
+fn put_vertices(file: &mut Vec<u8>, vertices: &[ModuleVertex]) {
+    for vertex in vertices {
+        put_u16s(file, [vertex.x, vertex.y]);
+        file.extend_from_slice(&vertex.z.to_le_bytes());
+    }
 }
 
 fn put_u16s(file: &mut Vec<u8>, values: impl IntoIterator<Item = u16>) {
@@ -205,10 +248,11 @@ fn tile_of(header: &Header) -> TileModules {
 /// A load module as the reader gives it, whose square has sides of `side` quanta.
 pub fn load_module(module: &Module, side: u16) -> LoadModule {
     let residual = &module.residual;
+    let vertices = |of: &[Vertex]| of.iter().map(|v| ModuleVertex { y: v.y, x: v.x, z: v.z }).collect();
     LoadModule {
         id: ModuleId { row: module.row, col: module.col },
         side,
-        vertices: module.vertices.iter().map(|v| ModuleVertex { y: v.y, x: v.x, z: v.z }).collect(),
+        vertices: vertices(&module.vertices),
         triangles: module.triangles.clone(),
         classes: module.classes.clone(),
         polygon_count: module.polygon_count,
@@ -217,6 +261,11 @@ pub fn load_module(module: &Module, side: u16) -> LoadModule {
             largest: residual.largest,
             sum_abs: residual.sum_abs,
             sum_squared: residual.sum_squared,
+        },
+        decks: Decks {
+            vertices: vertices(&module.decks.vertices),
+            triangles: module.decks.triangles.clone(),
+            classes: module.decks.classes.clone(),
         },
     }
 }
@@ -247,6 +296,28 @@ mod tests {
         assert_eq!(decode(&bytes).unwrap(), (tile.clone(), levels[0].clone()));
         assert_eq!(encode_levels(&tile, &levels[..1]), encode_modules(&tile, &levels[0]));
         samples::check_every_damage(&bytes, |bytes| decode_levels(path, bytes).is_err());
+    }
+
+    #[test]
+    fn decks_survive_their_file_of_version_2() {
+        let (tile, levels) = (samples::tile_modules(), samples::levels_with_decks());
+        let bytes = encode_levels(&tile, &levels);
+        let path = Path::new("r00c01.slm");
+        assert_eq!(bytes[8..10], [2, 0]);
+        assert_eq!(decode_levels(path, &bytes).unwrap(), (tile.clone(), levels.clone()));
+        samples::check_every_damage(&bytes, |bytes| decode_levels(path, bytes).is_err());
+    }
+
+    #[test]
+    fn a_file_without_decks_is_of_version_1() {
+        let (tile, mut levels) = (samples::tile_modules(), samples::levels_with_decks());
+        levels.iter_mut().flatten().for_each(|module| module.decks = Decks::default());
+        let bytes = encode_levels(&tile, &levels);
+        assert_eq!(bytes[8..10], [1, 0]);
+        assert_eq!(bytes, encode_levels(&tile, &samples::levels()));
+        // What version 1 has always been.
+        let hash = Fingerprint::of_bytes(&bytes).to_string();
+        assert_eq!(hash, "b633fa11294810a26baa848d8ef4f709b4835895eff5d5a09c6527039973e18c");
     }
 
     #[test]

@@ -4,8 +4,8 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 use terrain::{
-    LATTICE_PER_POST, LatticePoint, ModuleId, Post, PostRect, Refusal, RefusedBy, StopReason, TileId, TileTin, Tin,
-    Vertex,
+    FEATURE_STEPS_MAX, LATTICE_PER_POST, LatticePoint, ModuleId, Post, PostRect, Refusal, RefusedBy, StopReason,
+    TileId, TileTin, Tin, Vertex,
 };
 
 use crate::frame::{Kind, malformed};
@@ -27,6 +27,7 @@ struct TileOnDisk {
     residuals: Vec<u32>,
     triangles_charged: u32,
     refused: Vec<RefusalOnDisk>,
+    /// Why selection ended, in the lower four bits; in the upper ones how often the lattice halves an eighth of a post.
     stop: u8,
 }
 
@@ -56,7 +57,7 @@ pub fn encode_tile(stamp: &Stamp, tile: &TileTin) -> Vec<u8> {
         residuals: tile.residuals.clone(),
         triangles_charged: tile.triangles_charged,
         refused: tile.refused.iter().map(refusal_to_disk).collect(),
-        stop: code(&STOP, tile.stop),
+        stop: code(&STOP, tile.stop) | halvings(tile.tin.steps_per_post) << 4,
     };
     frame::seal(Kind::Tile, stamp, &codec::encode(&on_disk))
 }
@@ -74,7 +75,10 @@ pub fn decode_tile(path: &Path, bytes: &[u8]) -> Result<(Stamp, TileTin), Databa
 
 fn from_disk(on_disk: TileOnDisk) -> Result<TileTin, String> {
     let rect = rect_from_disk(on_disk.rect)?;
-    let (low, high) = (LatticePoint::from(rect.south_west()), LatticePoint::from(rect.north_east()));
+    let steps_per_post = steps_from_disk(on_disk.stop >> 4, rect)?;
+    let (low, high) = (rect.south_west(), rect.north_east());
+    let place = |post: Post| LatticePoint::new(post.row * steps_per_post, post.col * steps_per_post);
+    let (low, high) = (place(low), place(high));
     let inside = |[row, col, _]: &[i32; 3]| (low.row..=high.row).contains(row) && (low.col..=high.col).contains(col);
     if let Some(vertex) = on_disk.vertices.iter().position(|vertex| !inside(vertex)) {
         return Err(format!("vertex {vertex} lies outside the tile"));
@@ -91,12 +95,12 @@ fn from_disk(on_disk: TileOnDisk) -> Result<TileTin, String> {
     let vertices = on_disk.vertices.into_iter().map(vertex).collect();
     Ok(TileTin {
         tile: TileId { row: on_disk.tile.0, col: on_disk.tile.1 },
-        tin: Tin { rect, vertices, triangles: on_disk.triangles },
+        tin: Tin { rect, steps_per_post, vertices, triangles: on_disk.triangles },
         initial_count: on_disk.initial_count,
         residuals: on_disk.residuals,
         triangles_charged: on_disk.triangles_charged,
         refused: on_disk.refused.into_iter().map(refusal_from_disk).collect::<Result<_, _>>()?,
-        stop: meaning(&STOP, on_disk.stop, "stop reason")?,
+        stop: meaning(&STOP, on_disk.stop & 15, "stop reason")?,
     })
 }
 
@@ -106,6 +110,26 @@ fn rect_from_disk([south, west, north, east]: [i32; 4]) -> Result<PostRect, Stri
         return Ok(PostRect { south, west, north, east });
     }
     Err(format!("rows {south} to {north}, columns {west} to {east} are no rectangle of posts"))
+}
+
+/// How often the steps of a lattice halve an eighth of a post.
+fn halvings(steps_per_post: i32) -> u8 {
+    (steps_per_post / LATTICE_PER_POST).trailing_zeros() as u8
+}
+
+fn steps_from_disk(halvings: u8, rect: PostRect) -> Result<i32, String> {
+    let steps = LATTICE_PER_POST << halvings;
+    if FEATURE_STEPS_MAX < steps {
+        return Err(format!("found {steps} steps to a post, expected at most {FEATURE_STEPS_MAX}"));
+    }
+    let most = POSTS_MAX / (steps / LATTICE_PER_POST);
+    let lines = [rect.south, rect.west, rect.north, rect.east];
+    match lines.iter().find(|line| !(-most..=most).contains(*line)) {
+        Some(line) => {
+            Err(format!("found line {line}, expected at most {most} on a lattice of {steps} steps to a post"))
+        }
+        None => Ok(steps),
+    }
 }
 
 fn refusal_to_disk(refusal: &Refusal) -> RefusalOnDisk {
@@ -153,6 +177,24 @@ mod tests {
         let bytes = encode_tile(&stamp, &tile);
         assert_eq!(decode(&bytes).unwrap(), (stamp, tile.clone()));
         assert_eq!(encode_tile(&stamp, &tile), bytes);
+    }
+
+    #[test]
+    fn a_finer_lattice_survives_and_costs_no_byte() {
+        let eighths = encode_tile(&samples::stamp(), &samples::tile());
+        for steps_per_post in [16, 32, 64] {
+            let mut tile = samples::tile();
+            tile.tin.steps_per_post = steps_per_post;
+            for vertex in &mut tile.tin.vertices {
+                vertex.at.row *= steps_per_post / LATTICE_PER_POST;
+                vertex.at.col *= steps_per_post / LATTICE_PER_POST;
+            }
+            let bytes = encode_tile(&samples::stamp(), &tile);
+            assert_eq!((decode(&bytes).unwrap().1, bytes.len()), (tile, eighths.len()));
+        }
+        let mut odd = eighths[frame::FRAME_BYTES..].to_vec();
+        *odd.last_mut().unwrap() |= 4 << 4;
+        assert!(decode(&frame::seal(Kind::Tile, &samples::stamp(), &odd)).is_err(), "128 steps to a post are too fine");
     }
 
     #[test]

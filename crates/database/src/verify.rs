@@ -9,7 +9,10 @@ use serde::Deserialize;
 use crate::names::{MEASURED, MODULES, SURVEY, TILES, files};
 use crate::page::check_page;
 use crate::read::check_stamp;
-use crate::{DatabaseError, FileStamp, Folder, Manifest, curve_file, measured_file, removals_file, slm, tile_file};
+use crate::{
+    DatabaseError, FileStamp, Folder, Manifest, curve_file, level_file, lines_file, measured_file, profile_file,
+    removals_file, slm, tile_file,
+};
 
 /// One file that is not as it should be.
 #[derive(Debug)]
@@ -31,6 +34,8 @@ impl Folder {
                 (self.modules_path(tile), record.slm),
                 (self.measured_path(tile), record.measured),
                 (self.curve_path(tile), record.curve),
+                (self.profile_path(tile), record.profile),
+                (self.lines_path(tile), record.lines),
             ]
         });
         let of_tiles = of_tiles.filter_map(|(path, stamp)| Some((path, stamp?)));
@@ -93,6 +98,9 @@ impl Folder {
             Some("slm") => drop(slm::decode_modules(path, &bytes)?),
             Some("sums") => drop(measured_file::decode_measured(path, &bytes)?),
             Some("curve") => drop(curve_file::decode_curve(path, &bytes)?),
+            Some("profile") => drop(profile_file::decode_profile(path, &bytes)?),
+            Some("lines") => drop(lines_file::decode_lines(path, &bytes)?),
+            Some("level") => drop(level_file::decode_level(path, &bytes)?),
             Some("removed") => drop(removals_file::decode_removals(path, &bytes)?),
             _ => {}
         }

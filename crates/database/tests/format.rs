@@ -9,7 +9,7 @@ use std::process::{Command, Output};
 use database::{Fingerprint, TileModules, encode_levels, encode_modules};
 use serde_json::{Value, json};
 use terrain::{
-    GridFrame, LoadModule, ModuleGrid, ModuleId, ModuleRect, ModuleResidual, ModuleVertex, Side, Spacing, TileId,
+    Decks, GridFrame, LoadModule, ModuleGrid, ModuleId, ModuleRect, ModuleResidual, ModuleVertex, Side, Spacing, TileId,
 };
 
 fn workspace() -> PathBuf {
@@ -35,6 +35,7 @@ fn flat(id: ModuleId) -> LoadModule {
         classes: vec![0, 1],
         polygon_count: 2,
         residual: ModuleResidual { posts: 441, largest: 300, sum_abs: 25_600, sum_squared: 3_276_800 },
+        decks: Decks::default(),
     }
 }
 
@@ -58,9 +59,21 @@ fn example() -> Vec<u8> {
     encode_modules(&tile(1, 1), &[flat(ModuleId { row: 0, col: 0 })])
 }
 
-/// The bytes of the worked example: lines of offset, bytes, bar, meaning.
-fn bytes_of_page(page: &str) -> Vec<u8> {
-    let block = page.split("```hex\n").nth(1).unwrap().split("```").next().unwrap();
+/// A level bridge of class 3 over the middle of a load module, 150 m long and 20 m wide at 1010 m.
+fn bridge() -> Decks {
+    let [a, b] = [vertex(22_400, 30_720, 129_280), vertex(41_600, 30_720, 129_280)];
+    let [c, d] = [vertex(41_600, 33_280, 129_280), vertex(22_400, 33_280, 129_280)];
+    Decks::of_triangles([([a, b, c], 3), ([a, c, d], 3)])
+}
+
+fn example_with_a_deck() -> Vec<u8> {
+    let module = LoadModule { decks: bridge(), ..flat(ModuleId { row: 0, col: 0 }) };
+    encode_modules(&tile(1, 1), &[module])
+}
+
+/// The bytes of the worked example of a version: lines of offset, bytes, bar, meaning.
+fn bytes_of_page(page: &str, version: usize) -> Vec<u8> {
+    let block = page.split("```hex\n").nth(version).unwrap().split("```").next().unwrap();
     let mut bytes = Vec::new();
     for line in block.lines() {
         let mut words = line.split('|').next().unwrap().split_whitespace();
@@ -73,11 +86,13 @@ fn bytes_of_page(page: &str) -> Vec<u8> {
 #[test]
 fn the_worked_example_is_what_the_encoder_writes() {
     let page = std::fs::read_to_string(workspace().join("FORMAT.md")).unwrap();
-    let written = example().iter().fold(String::new(), |mut text, byte| {
-        write!(text, "{byte:02x} ").unwrap();
-        text
-    });
-    assert_eq!(bytes_of_page(&page), example(), "the encoder writes {written}");
+    for (version, example) in [(1, example()), (2, example_with_a_deck())] {
+        let written = example.iter().fold(String::new(), |mut text, byte| {
+            write!(text, "{byte:02x} ").unwrap();
+            text
+        });
+        assert_eq!(bytes_of_page(&page, version), example, "the encoder writes {written}");
+    }
 }
 
 /// Runs Python, or says that there is none.
@@ -126,10 +141,53 @@ fn the_python_reader_finds_every_level() {
 }
 
 #[test]
-fn the_python_reader_refuses_every_damage() {
+fn the_python_reader_finds_decks() {
+    let tile = tile(2, 3);
+    let over = |id: ModuleId| LoadModule { decks: bridge(), ..flat(id) };
+    let modules: Vec<_> = tile.modules.iter().map(|id| if id.col == 1 { over(id) } else { flat(id) }).collect();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("r00c00.slm");
-    std::fs::write(&path, example()).unwrap();
+    std::fs::write(&path, encode_modules(&tile, &modules)).unwrap();
+    let path = path.to_str().unwrap();
+    let Some(output) = python(&["scripts/read_slm.py", "--json", path]) else { return };
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let dump: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(dump["header"], json_of_header(2, 1));
+    let expected = modules.iter().map(|module| {
+        let mut told = as_json(module, 0);
+        let places: Vec<_> = module.decks.vertices.iter().map(|v| json!([v.x, v.y, v.z])).collect();
+        let Decks { triangles, classes, .. } = &module.decks;
+        told["decks"] = json!({ "vertices": places, "triangles": triangles, "classes": classes });
+        told
+    });
+    assert_eq!(dump["modules"], Value::Array(expected.collect()));
+    check_said(&[path], "decks          4 triangles in 2 load modules");
+    let at = |north: &'static str| ["--at", "505750", north, path];
+    check_said(&at("3875750"), "ground         1001.000 m, class 0, ground\ntopmost        1010.000 m, class 3, deck");
+    check_said(&at("3875775"), "topmost        1001.050 m, class 1, ground");
+    check_said(&[&["--ceiling", "1009.9"], &at("3875750")[..]].concat(), "topmost        1001.000 m, class 0, ground");
+    let high = python(&[&["scripts/read_slm.py", "--ceiling", "1000.9"], &at("3875750")[..]].concat()).unwrap();
+    assert!(high.status.code() == Some(1) && String::from_utf8_lossy(&high.stdout).contains("topmost        none"));
+}
+
+#[track_caller]
+fn check_said(arguments: &[&str], expected: &str) {
+    let output = python(&[&["scripts/read_slm.py"], arguments].concat()).unwrap();
+    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(said.contains(expected), "{said}{}", String::from_utf8_lossy(&output.stderr));
+}
+
+#[test]
+fn the_python_reader_refuses_every_damage() {
+    check_python_refuses_every_damage(&example());
+    check_python_refuses_every_damage(&example_with_a_deck());
+}
+
+#[track_caller]
+fn check_python_refuses_every_damage(good: &[u8]) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("r00c00.slm");
+    std::fs::write(&path, good).unwrap();
     let program = "import sys; sys.path.insert(0, 'scripts'); import read_slm\n\
         good = open(sys.argv[1], 'rb').read(); read_slm.parse(good)\n\
         bad = [good[:n] for n in range(len(good))] + [good + b'\\0']\n\
@@ -166,7 +224,12 @@ fn pyramid(id: ModuleId) -> LoadModule {
 }
 
 fn header_as_json(levels: u32) -> Value {
+    json_of_header(1, levels)
+}
+
+fn json_of_header(version: u32, levels: u32) -> Value {
     json!({
+        "version": version,
         "levels": levels,
         "tile": [0, 0], "area_modules": [2, 3], "rows": [0, 2], "columns": [0, 3],
         "side": 64000, "side_cells": 20, "spacing_m": 25.0, "origin_m": [505000.0, 3875000.0],

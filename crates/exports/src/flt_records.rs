@@ -1,7 +1,5 @@
 //! Records of OpenFlight 16.1: big-endian, each with its opcode and its length first.
 
-use crate::glb::COLOURS;
-
 /// Format revision level: 16.1.
 const REVISION: i32 = 1610;
 /// Bytes of a palette's own record, before its first vertex.
@@ -43,6 +41,16 @@ pub(crate) struct Place {
     pub utm_zone: Option<i16>,
     /// Radius of the content around its middle, in metres.
     pub radius_m: f64,
+}
+
+/// How a face is drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Face {
+    /// The class, as surface material.
+    pub class: u8,
+    pub color: [u8; 3],
+    /// Whether it is drawn from both sides.
+    pub is_seen_from_below: bool,
 }
 
 impl Records {
@@ -185,14 +193,16 @@ impl Records {
     }
 
     /// A triangle over vertices of the palette, its class as surface material.
-    pub(crate) fn face(&mut self, triangle: [u32; 3], class: u8) {
+    pub(crate) fn face(&mut self, triangle: [u32; 3], face: Face) {
         const TERRAIN_PACKED_COLOUR: u32 = 0x8000_0000 | 0x2000_0000 | 0x1000_0000;
         const FACE_COLOUR_WITH_NORMALS: u8 = 2;
-        let [red, green, blue] = COLOURS[usize::from(class) % COLOURS.len()].map(|part| (part * 255.0).round() as u32);
+        let [red, green, blue] = face.color.map(u32::from);
         self.open(opcode::FACE, 80);
-        self.zeros(8 + 4 + 2 + 2 + 4 + 2);
+        self.zeros(8 + 4 + 2);
+        self.put(&[u8::from(face.is_seen_from_below), 0]);
+        self.zeros(4 + 2);
         // No textures, no material; the class as surface material code; no feature.
-        self.i16s(&[-1, -1, -1, i16::from(class), 0]);
+        self.i16s(&[-1, -1, -1, i16::from(face.class), 0]);
         self.zeros(4 + 2 + 2);
         self.u32s(&[TERRAIN_PACKED_COLOUR]);
         self.put(&[FACE_COLOUR_WITH_NORMALS]);
@@ -245,7 +255,7 @@ mod tests {
         all.push();
         all.group("a");
         all.object("r0001c0002");
-        all.face([0, 1, 2], 3);
+        all.face([0, 1, 2], Face { class: 3, color: [1, 2, 3], is_seen_from_below: true });
         all.external("squares/r00c00.flt");
         all.pop();
         let expected = [

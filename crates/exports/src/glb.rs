@@ -1,33 +1,27 @@
-//! glTF 2.0 in one binary file: positions and normals as 32-bit floats, a primitive for each class of ground.
+//! glTF 2.0 in one binary file: positions and normals as 32-bit floats, a primitive and a material for each class, and
+//! decks in nodes of their own below one that is named so.
 //!
 //! glTF has y up and right-handed axes, so x points east, y up and z south.
 
 use std::io::{Result, Write};
 
 use serde_json::{Value, json};
-use terrain::{LATTICE_PER_POST, ModuleId, ModuleRect, Tin, metres_of_quanta};
+use terrain::{ModuleId, ModuleRect, Tin, metres_of_quanta};
 
-use crate::mesh::normals;
-use crate::modules::module_name;
+use crate::classes::Classes;
+use crate::mesh::{Part, normals};
+use crate::modules::{deck_name, module_name};
 use crate::{Facts, Mesh, Product, TinPlace};
-
-/// Base colours of classes, in order and over again: tell apart by the colour-blind, too.
-pub(crate) const COLOURS: [[f64; 3]; 8] = [
-    [0.55, 0.50, 0.36],
-    [0.34, 0.42, 0.30],
-    [0.10, 0.27, 0.45],
-    [0.62, 0.36, 0.12],
-    [0.46, 0.46, 0.46],
-    [0.17, 0.48, 0.43],
-    [0.60, 0.56, 0.20],
-    [0.42, 0.24, 0.38],
-];
 
 /// Meshes as they go into a glTF, each in a node of its own.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Gltf {
-    /// In order; none without triangles.
+pub(crate) struct Gltf<'a> {
+    /// Of the ground, in order; none without triangles.
     pub nodes: Vec<GltfNode>,
+    /// Of decks, likewise.
+    pub decks: Vec<GltfNode>,
+    /// What materials are called, and their colours.
+    pub classes: Classes<'a>,
     /// What else to tell a reader.
     pub extras: Value,
 }
@@ -96,7 +90,8 @@ impl Parts {
         self.accessor(view, start, F32, vectors.len(), "VEC3")
     }
 
-    fn add(&mut self, node: &GltfNode, materials: &[u8]) {
+    /// Adds a node of the ground or of decks; `materials` are those of the file, for decks or not.
+    fn add(&mut self, node: &GltfNode, is_deck: bool, materials: &[(bool, u8)]) {
         let positions = self.vectors(Self::POSITIONS, &node.positions);
         let [low, high] = bounds(&node.positions);
         (self.accessors[positions]["min"], self.accessors[positions]["max"]) = (json!(low), json!(high));
@@ -107,7 +102,7 @@ impl Parts {
             let component = put_indices(&mut self.views[Self::INDICES], triangles, node.positions.len());
             pad(&mut self.views[Self::INDICES], 0);
             let indices = self.accessor(Self::INDICES, start, component, 3 * triangles.len(), "SCALAR");
-            let material = materials.iter().position(|of| of == class);
+            let material = materials.iter().position(|of| *of == (is_deck, *class));
             primitives.push(json!({ "attributes": { "POSITION": positions, "NORMAL": normals }, "indices": indices,
                                     "material": material, "mode": 4 }));
         }
@@ -116,22 +111,32 @@ impl Parts {
     }
 }
 
-impl Gltf {
+impl Gltf<'_> {
     /// The bytes of the binary file.
     pub(crate) fn bytes(&self) -> Vec<u8> {
         let mut asset = json!({ "version": "2.0", "generator": "tiefort" });
         if !self.extras.is_null() {
             asset["extras"] = self.extras.clone();
         }
-        if self.nodes.is_empty() {
+        if self.nodes.is_empty() && self.decks.is_empty() {
             // No list may be empty.
             return container(&json!({ "asset": asset, "scene": 0, "scenes": [{ "name": "empty" }] }), &[]);
         }
-        let mut classes: Vec<u8> = self.nodes.iter().flat_map(|node| &node.groups).map(|(class, _)| *class).collect();
-        classes.sort_unstable();
-        classes.dedup();
+        let used = |nodes: &[GltfNode], is_deck: bool| -> Vec<(bool, u8)> {
+            nodes.iter().flat_map(|node| &node.groups).map(|(class, _)| (is_deck, *class)).collect()
+        };
+        let mut materials = [used(&self.nodes, false), used(&self.decks, true)].concat();
+        materials.sort_unstable();
+        materials.dedup();
         let mut parts = Parts::default();
-        self.nodes.iter().for_each(|node| parts.add(node, &classes));
+        self.nodes.iter().for_each(|node| parts.add(node, false, &materials));
+        self.decks.iter().for_each(|node| parts.add(node, true, &materials));
+        let mut top: Vec<usize> = (0..self.nodes.len()).collect();
+        if !self.decks.is_empty() {
+            let children: Vec<usize> = (self.nodes.len()..parts.nodes.len()).collect();
+            top.push(parts.nodes.len());
+            parts.nodes.push(json!({ "name": "decks", "children": children }));
+        }
         let mut binary = Vec::new();
         let mut views = Vec::new();
         for (index, bytes) in parts.views.iter().enumerate() {
@@ -147,23 +152,30 @@ impl Gltf {
             binary.extend_from_slice(bytes);
         }
         let document = json!({
-            "asset": asset, "scene": 0, "scenes": [{ "nodes": (0..parts.nodes.len()).collect::<Vec<_>>() }],
+            "asset": asset, "scene": 0, "scenes": [{ "nodes": top }],
             "nodes": parts.nodes, "meshes": parts.meshes,
-            "materials": classes.into_iter().map(material).collect::<Vec<_>>(),
+            "materials": materials.into_iter().map(|of| material(self.classes, of)).collect::<Vec<_>>(),
             "accessors": parts.accessors, "bufferViews": views, "buffers": [{ "byteLength": binary.len() }],
         });
         container(&document, &binary)
     }
 }
 
-fn material(class: u8) -> Value {
-    let [red, green, blue] = COLOURS[usize::from(class) % COLOURS.len()];
-    json!({
-        "name": format!("class_{class}"),
+/// The material of a class, for decks or not.
+fn material(classes: Classes, (is_deck, class): (bool, u8)) -> Value {
+    let [red, green, blue] = classes.light(class);
+    let word = classes.word(class);
+    let mut material = json!({
+        "name": if is_deck { format!("decks_{word}") } else { word },
         "pbrMetallicRoughness": {
             "baseColorFactor": [red, green, blue, 1.0], "metallicFactor": 0.0, "roughnessFactor": 1.0,
         },
-    })
+    });
+    if is_deck {
+        // A deck has no thickness, and is seen from below too.
+        material["doubleSided"] = json!(true);
+    }
+    material
 }
 
 fn bounds(vectors: &[[f32; 3]]) -> [[f32; 3]; 2] {
@@ -212,7 +224,8 @@ fn container(document: &Value, binary: &[u8]) -> Vec<u8> {
 }
 
 /// Writes `mesh` as binary glTF, counted from the south-west corner of what is exported: a node for each load module,
-/// over vertices of its own. Normals are those of the whole mesh, so that no line shows between two.
+/// over vertices of its own, and one for its decks below a node `decks`. Normals are those of the whole mesh, so that
+/// no line shows between two.
 ///
 /// # Errors
 /// Those of `out`.
@@ -220,18 +233,22 @@ pub fn write_glb(out: &mut impl Write, product: &Product, mesh: &Mesh) -> Result
     let facts = Facts::y_up(product);
     let positions: Vec<[f32; 3]> = mesh.metres().map(turned).collect();
     let normals: Vec<[f32; 3]> = mesh.normals().into_iter().map(turned).collect();
-    let node = |id: ModuleId| {
-        let part = mesh.part(product, ModuleRect { south: id.row, west: id.col, north: id.row + 1, east: id.col + 1 });
+    let node = |name: String, part: Part| {
         let node = GltfNode {
-            name: module_name(id),
+            name,
             positions: part.vertices.iter().map(|&v| positions[v as usize]).collect(),
             normals: part.vertices.iter().map(|&v| normals[v as usize]).collect(),
             groups: Vec::new(),
         };
         node.with_groups(&part.triangles, &part.classes)
     };
+    let alone = |id: ModuleId| ModuleRect { south: id.row, west: id.col, north: id.row + 1, east: id.col + 1 };
+    let of_module = |id: ModuleId| node(module_name(id), mesh.part(product, alone(id)));
+    let of_decks = |id: ModuleId| node(deck_name(alone(id)), mesh.deck_part(product, alone(id)));
     let gltf = Gltf {
-        nodes: product.rect.iter().map(node).filter(|node| !node.groups.is_empty()).collect(),
+        nodes: product.rect.iter().map(of_module).filter(|node| !node.groups.is_empty()).collect(),
+        decks: product.rect.iter().map(of_decks).filter(|node| !node.groups.is_empty()).collect(),
+        classes: product.classes(),
         extras: json!({
             "crs": product.crs(), "vertical_datum": product.vertical_datum(), "offset_m": facts.offset_m,
             "axes": facts.axes, "attribution": product.attributions(),
@@ -250,7 +267,7 @@ pub fn write_tin_glb(out: &mut impl Write, tin: &Tin, place: &TinPlace) -> Resul
         .vertices
         .iter()
         .map(|vertex| {
-            let posts = |lattice: i32, from: i32| f64::from(lattice) / f64::from(LATTICE_PER_POST) - f64::from(from);
+            let posts = |lattice: i32, from: i32| f64::from(lattice) / f64::from(tin.steps_per_post) - f64::from(from);
             let (row, col) = (posts(vertex.at.row, tin.rect.south), posts(vertex.at.col, tin.rect.west));
             [col * dx, row * dy, metres_of_quanta(vertex.height)]
         })
@@ -264,6 +281,8 @@ pub fn write_tin_glb(out: &mut impl Write, tin: &Tin, place: &TinPlace) -> Resul
     };
     let gltf = Gltf {
         nodes: vec![node],
+        decks: Vec::new(),
+        classes: Classes::default(),
         extras: json!({
             "crs": place.crs, "axes": "x east, y up, z south",
             "offset_m": [place.origin_m[0] + south_west[0], place.origin_m[1] + south_west[1], 0.0],
@@ -303,6 +322,29 @@ mod tests {
             [0, 1, 2].map(|view| document["bufferViews"][view]["byteStride"].as_u64()),
             [Some(12), Some(12), None]
         );
+    }
+
+    #[test]
+    fn decks_are_nodes_below_one_of_their_own_and_materials_have_the_names_and_colours_of_classes() {
+        let product = samples::with_bridge();
+        let mut bytes = Vec::new();
+        write_glb(&mut bytes, &product, &Mesh::of(&product)).unwrap();
+        let length = u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize;
+        let document: Value = serde_json::from_slice(&bytes[20..20 + length]).unwrap();
+        assert_eq!(document["nodes"][4], json!({ "name": "decks", "children": [2, 3] }));
+        assert_eq!(
+            (&document["scenes"][0]["nodes"], &document["nodes"][3]["name"]),
+            (&json!([0, 1, 4]), &json!("decks_r0000c0001"))
+        );
+        let names: Vec<&str> =
+            document["materials"].as_array().unwrap().iter().map(|of| of["name"].as_str().unwrap()).collect();
+        assert_eq!(names, ["default", "motorway", "decks_motorway", "decks_track"]);
+        let color = &document["materials"][1]["pbrMetallicRoughness"]["baseColorFactor"];
+        assert_eq!(
+            (color, &document["materials"][2]["doubleSided"]),
+            (&json!([0.034, 0.03, 0.027, 1.0]), &json!(true))
+        );
+        assert_eq!(document["meshes"][3]["primitives"].as_array().unwrap().len(), 2);
     }
 
     #[test]

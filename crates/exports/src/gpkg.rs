@@ -1,4 +1,5 @@
-//! A GeoPackage for QGIS: load modules, breaches, tiles and the triangles themselves, as layers of one file.
+//! A GeoPackage for QGIS: load modules, breaches, tiles, the triangles themselves and decks, as layers of one
+//! file.
 //!
 //! The one export that opens its file itself, because the library does; it is given a temporary name.
 
@@ -7,8 +8,9 @@ use std::path::Path;
 
 use database::{Report, ReportPlace};
 use rusqlite::{Connection, ToSql, params};
-use terrain::{HOLE_CLASS, LoadModule, ModuleRect, QUANTA_PER_METRE, metres_of_quanta};
+use terrain::{Decks, HOLE_CLASS, ModuleId, ModuleRect, ModuleVertex, QUANTA_PER_METRE, metres_of_quanta};
 
+use crate::classes::HOLE_NAME;
 use crate::gpkg_geometry::{polygon, polygon_z};
 use crate::{ExportError, Product, Step, Work, gpkg_index, gpkg_styles};
 
@@ -18,12 +20,13 @@ const VERSION: i32 = 10_300;
 /// When the layers are said to have changed: the same database gives the same file.
 const CHANGED: &str = "1970-01-01T00:00:00.000Z";
 
-/// A layer: its name, what it shows, its columns, whether its geometry has heights.
-struct Layer {
-    name: &'static str,
-    description: &'static str,
-    columns: &'static [(&'static str, &'static str)],
-    has_z: bool,
+/// A layer: its name, what it shows, its columns, the kind of its geometry, and whether that has heights.
+pub(crate) struct Layer {
+    pub name: &'static str,
+    pub description: &'static str,
+    pub columns: &'static [(&'static str, &'static str)],
+    pub geometry: &'static str,
+    pub has_z: bool,
 }
 
 const MODULES: Layer = Layer {
@@ -42,6 +45,7 @@ const MODULES: Layer = Layer {
         ("lowest_m", "DOUBLE"),
         ("highest_m", "DOUBLE"),
     ],
+    geometry: "POLYGON",
     has_z: false,
 };
 const BREACHES: Layer = Layer {
@@ -59,12 +63,14 @@ const BREACHES: Layer = Layer {
         ("rms_with_m", "DOUBLE"),
         ("rms_without_m", "DOUBLE"),
     ],
+    geometry: "POLYGON",
     has_z: false,
 };
 const TILES: Layer = Layer {
     name: "tiles",
     description: "tiles, the units of work",
     columns: &[("row", "INTEGER"), ("col", "INTEGER"), ("state", "TEXT")],
+    geometry: "POLYGON",
     has_z: false,
 };
 const TRIANGLES: Layer = Layer {
@@ -78,8 +84,12 @@ const TRIANGLES: Layer = Layer {
         ("slope_degrees", "DOUBLE"),
         ("area_m2", "DOUBLE"),
     ],
+    geometry: "POLYGON",
     has_z: true,
 };
+
+/// Listed only where there are decks.
+const DECKS: Layer = Layer { name: "decks", description: "triangles of the decks of bridges", ..TRIANGLES };
 
 /// West, south, east and north, in metres.
 type Extent = [f64; 4];
@@ -102,14 +112,21 @@ pub fn write_gpkg(
     connection.execute_batch("PRAGMA journal_mode = OFF; PRAGMA synchronous = OFF;").map_err(fault)?;
     let transaction = connection.transaction().map_err(fault)?;
     let package = Package { connection: &transaction, srs: product.epsg().map_or(-1, |code| code as i32) };
-    package.describe(product).map_err(fault)?;
+    package.describe(product.crs()).map_err(fault)?;
     package.add_modules(product).map_err(fault)?;
     package.add_breaches(product, report, window).map_err(fault)?;
     package.add_tiles(product).map_err(fault)?;
     let names: Vec<&str> = report.classes.iter().map(|class| class.name.as_str()).collect();
     package.add_triangles(product, &names, work, fault)?;
-    gpkg_styles::add(&transaction, &class_values(product, &names)).map_err(fault)?;
-    for layer in [MODULES, BREACHES, TILES, TRIANGLES] {
+    let mut layers = vec![&MODULES, &BREACHES, &TILES, &TRIANGLES];
+    if 0 < product.deck_triangles() {
+        package.add_decks(product, &names).map_err(fault)?;
+        layers.push(&DECKS);
+    }
+
+    let with_classes: Vec<&str> = layers[3..].iter().map(|layer| layer.name).collect();
+    gpkg_styles::add(&transaction, &with_classes, &class_values(product, &names)).map_err(fault)?;
+    for layer in layers {
         gpkg_index::add(&transaction, layer.name).map_err(fault)?;
     }
     transaction.commit().map_err(fault)
@@ -118,24 +135,31 @@ pub fn write_gpkg(
 /// The name of a class of ground, where the job gave it one.
 fn class_name(names: &[&str], class: u8) -> String {
     let name = names.get(usize::from(class)).map_or_else(|| format!("class {class}"), |name| (*name).to_owned());
-    if class == HOLE_CLASS { "hole".into() } else { name }
+    if class == HOLE_CLASS { HOLE_NAME.into() } else { name }
 }
 
-/// The name of every class that a triangle has, and its number.
+/// The name of every class that a triangle of ground or decks has, and its number.
 fn class_values(product: &Product, names: &[&str]) -> BTreeMap<u8, String> {
-    let classes = product.modules.iter().flat_map(|module| &module.classes);
+    let classes = product.modules.iter().flat_map(|module| module.classes.iter().chain(&module.decks.classes));
     classes.map(|&class| (class, class_name(names, class))).collect()
 }
 
-struct Package<'a> {
-    connection: &'a Connection,
+/// The triangles of a load module's ground, or of its decks.
+struct Triangles<'a> {
+    vertices: &'a [ModuleVertex],
+    corners: &'a [[u16; 3]],
+    classes: &'a [u8],
+}
+
+pub(crate) struct Package<'a> {
+    pub connection: &'a Connection,
     /// The coordinate system as the package numbers it.
-    srs: i32,
+    pub srs: i32,
 }
 
 impl Package<'_> {
     /// The tables that every package has, and the coordinate system.
-    fn describe(&self, product: &Product) -> rusqlite::Result<()> {
+    pub fn describe(&self, crs: &str) -> rusqlite::Result<()> {
         self.connection
             .execute_batch(&format!("PRAGMA application_id = {APPLICATION_ID}; PRAGMA user_version = {VERSION};"))?;
         self.connection.execute_batch(include_str!("gpkg.sql"))?;
@@ -148,17 +172,17 @@ impl Package<'_> {
         if ![-1, 0, 4326].contains(&self.srs) {
             let known = u16::try_from(self.srs).ok().and_then(crs_definitions::from_code);
             let definition = known.map_or("undefined", |known| known.wkt);
-            add.execute(params![product.crs(), self.srs, "EPSG", self.srs, definition])?;
+            add.execute(params![crs, self.srs, "EPSG", self.srs, definition])?;
         }
         Ok(())
     }
 
     /// Makes the table of a layer and lists it; the statement that adds a feature: geometry first, then its columns.
-    fn begin(&self, layer: &Layer, extent: Extent) -> rusqlite::Result<rusqlite::Statement<'_>> {
-        let Layer { name, description, columns, has_z } = layer;
+    pub fn begin(&self, layer: &Layer, extent: Extent) -> rusqlite::Result<rusqlite::Statement<'_>> {
+        let Layer { name, description, columns, geometry, has_z } = layer;
         let declared: String = columns.iter().map(|(name, kind)| format!(", {name} {kind}")).collect();
         self.connection.execute_batch(&format!(
-            "CREATE TABLE {name} (fid INTEGER PRIMARY KEY AUTOINCREMENT NOT NULL, geom POLYGON{declared});"
+            "CREATE TABLE {name} (fid INTEGER PRIMARY KEY AUTOINCREMENT NOT NULL, geom {geometry}{declared});"
         ))?;
         let [west, south, east, north] = extent;
         self.connection.execute(
@@ -166,8 +190,8 @@ impl Package<'_> {
             params![name, description, CHANGED, west, south, east, north, self.srs],
         )?;
         self.connection.execute(
-            "INSERT INTO gpkg_geometry_columns VALUES (?1, 'geom', 'POLYGON', ?2, ?3, 0)",
-            params![name, self.srs, i32::from(*has_z)],
+            "INSERT INTO gpkg_geometry_columns VALUES (?1, 'geom', ?2, ?3, ?4, 0)",
+            params![name, geometry, self.srs, i32::from(*has_z)],
         )?;
         let names: String = columns.iter().map(|(name, _)| format!(", {name}")).collect();
         let places: String = (2..2 + columns.len()).map(|place| format!(", ?{place}")).collect();
@@ -187,8 +211,8 @@ impl Package<'_> {
                 geometry,
                 row,
                 col,
-                module.triangles.len() as i64,
-                module.polygon_count,
+                i64::from(module.counts().triangles),
+                module.counts().polygons,
                 module.vertices.len() as i64,
                 module.residual.posts,
                 mean(module.residual.sum_squared).map(|mean| mean.sqrt() / metre),
@@ -252,8 +276,19 @@ impl Package<'_> {
             if work.stop.load(std::sync::atomic::Ordering::Relaxed) {
                 return Err(ExportError::Stopped { what: "load modules", done, total });
             }
-            self.add_triangles_of(&mut add, product, names, module).map_err(&fault)?;
+            let ground = Triangles { vertices: &module.vertices, corners: &module.triangles, classes: &module.classes };
+            self.add_triangles_of(&mut add, product, names, (module.id, ground)).map_err(&fault)?;
             (work.tell)(Step { what: "load modules", done: done + 1, total });
+        }
+        Ok(())
+    }
+
+    fn add_decks(&self, product: &Product, names: &[&str]) -> rusqlite::Result<()> {
+        let mut add = self.begin(&DECKS, extent(product, product.rect))?;
+        for module in &product.modules {
+            let Decks { vertices, triangles, classes } = &module.decks;
+            let decks = Triangles { vertices, corners: triangles, classes };
+            self.add_triangles_of(&mut add, product, names, (module.id, decks))?;
         }
         Ok(())
     }
@@ -263,21 +298,20 @@ impl Package<'_> {
         add: &mut rusqlite::Statement,
         product: &Product,
         names: &[&str],
-        module: &LoadModule,
+        (id, triangles): (ModuleId, Triangles),
     ) -> rusqlite::Result<()> {
-        let [east_m, north_m] = product.corner_m(module.id.row, module.id.col);
+        let [east_m, north_m] = product.corner_m(id.row, id.col);
         let metre = f64::from(QUANTA_PER_METRE);
-        for (&triangle, class) in module.triangles.iter().zip(&module.classes) {
+        for (&triangle, class) in triangles.corners.iter().zip(triangles.classes) {
             let corners = triangle.map(|v| {
-                let v = module.vertices[usize::from(v)];
+                let v = triangles.vertices[usize::from(v)];
                 [east_m + f64::from(v.x) / metre, north_m + f64::from(v.y) / metre, metres_of_quanta(v.z)]
             });
             let [a, b, c] = corners;
             let normal = crate::mesh::cross(crate::mesh::minus(b, a), crate::mesh::minus(c, a));
             let slope = normal[0].hypot(normal[1]).atan2(normal[2]).to_degrees();
-            let (geometry, name) = (polygon_z(self.srs, corners), class_name(names, *class));
-            let values: [&dyn ToSql; 7] =
-                [&geometry, &module.id.row, &module.id.col, class, &name, &slope, &(normal[2] / 2.0)];
+            let (geometry, name) = (polygon_z(self.srs, &corners), class_name(names, *class));
+            let values: [&dyn ToSql; 7] = [&geometry, &id.row, &id.col, class, &name, &slope, &(normal[2] / 2.0)];
             add.execute(values)?;
         }
         Ok(())
@@ -302,6 +336,22 @@ mod tests {
 
     use super::*;
     use crate::samples;
+
+    #[test]
+    fn decks_are_a_layer_of_their_own_with_a_style() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.gpkg");
+        let (workers, stop) = (Workers::new(1), AtomicBool::new(false));
+        let work = Work { workers: &workers, stop: &stop, tell: &|_| {} };
+        write_gpkg(&path, &samples::with_bridge(), &samples::report(), [8, 8], &work).unwrap();
+        let package = Connection::open(&path).unwrap();
+        let count = |what: &str| -> i64 { package.query_row(what, [], |row| row.get(0)).unwrap() };
+        let counts = ["triangles", "decks", "decks WHERE class = 2", "rtree_decks_geom", "layer_styles"]
+            .map(|layer| count(&format!("SELECT count(*) FROM {layer}")));
+        assert_eq!(counts, [6, 6, 2, 6, 5]);
+        assert_eq!(count("SELECT sum(triangles) FROM load_modules"), 12);
+        assert_eq!(count("SELECT styleQML LIKE '%value=\"2\"%' FROM layer_styles WHERE f_table_name = 'decks'"), 1);
+    }
 
     #[test]
     fn classes_have_the_names_of_the_job_and_holes_are_called_so() {

@@ -1,38 +1,63 @@
-//! Polygons as a GeoPackage stores them: a header with the extent, then well-known binary.
+//! Geometries as a GeoPackage stores them: a header with the extent, then well-known binary.
 
 /// Little-endian, with an extent in x and y.
 const FLAGS: u8 = 0b0000_0011;
 /// Codes of well-known binary.
 const POLYGON: u32 = 3;
 const POLYGON_Z: u32 = 1003;
+const POINT: u32 = 1;
+const POINT_Z: u32 = 1001;
+const LINE_Z: u32 = 1002;
 
 /// A polygon of one ring; `ring` does not repeat its first place.
 pub(crate) fn polygon(srs: i32, ring: &[[f64; 2]]) -> Vec<u8> {
     blob(srs, POLYGON, ring)
 }
 
-/// A triangle with heights.
-pub(crate) fn polygon_z(srs: i32, corners: [[f64; 3]; 3]) -> Vec<u8> {
-    blob(srs, POLYGON_Z, &corners)
+/// The same with heights.
+pub(crate) fn polygon_z(srs: i32, ring: &[[f64; 3]]) -> Vec<u8> {
+    blob(srs, POLYGON_Z, ring)
+}
+
+/// A place.
+pub(crate) fn point(srs: i32, place: [f64; 2]) -> Vec<u8> {
+    with_places(head(srs, &[place]), &[POINT], &[place])
+}
+
+/// A place with its height.
+pub(crate) fn point_z(srs: i32, place: [f64; 3]) -> Vec<u8> {
+    with_places(head(srs, &[place]), &[POINT_Z], &[place])
+}
+
+/// A line with heights.
+pub(crate) fn line_z(srs: i32, places: &[[f64; 3]]) -> Vec<u8> {
+    with_places(head(srs, places), &[LINE_Z, places.len() as u32], places)
 }
 
 fn blob<const N: usize>(srs: i32, kind: u32, ring: &[[f64; N]]) -> Vec<u8> {
-    let mut bytes = Vec::with_capacity(8 + 32 + 13 + 8 * N * (ring.len() + 1));
+    let closed: Vec<[f64; N]> = ring.iter().chain(ring.first()).copied().collect();
+    with_places(head(srs, ring), &[kind, 1, closed.len() as u32], &closed)
+}
+
+/// What stands before the well-known binary: the coordinate system and the extent.
+fn head<const N: usize>(srs: i32, places: &[[f64; N]]) -> Vec<u8> {
+    let mut bytes = Vec::with_capacity(8 + 32 + 13 + 8 * N * (places.len() + 1));
     bytes.extend_from_slice(&[b'G', b'P', 0, FLAGS]);
     bytes.extend_from_slice(&srs.to_le_bytes());
     for axis in 0..2 {
-        let values = || ring.iter().map(|place| place[axis]);
+        let values = || places.iter().map(|place| place[axis]);
         for end in [values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max)] {
             bytes.extend_from_slice(&end.to_le_bytes());
         }
     }
+    bytes
+}
+
+/// Well-known binary after a head: little-endian, its numbers, its places.
+fn with_places<const N: usize>(mut bytes: Vec<u8>, numbers: &[u32], places: &[[f64; N]]) -> Vec<u8> {
     bytes.push(1);
-    for number in [kind, 1, ring.len() as u32 + 1] {
-        bytes.extend_from_slice(&number.to_le_bytes());
-    }
-    for place in ring.iter().chain(ring.first()) {
-        place.iter().for_each(|number| bytes.extend_from_slice(&number.to_le_bytes()));
-    }
+    numbers.iter().for_each(|number| bytes.extend_from_slice(&number.to_le_bytes()));
+    places.iter().flatten().for_each(|number| bytes.extend_from_slice(&number.to_le_bytes()));
     bytes
 }
 
@@ -42,7 +67,7 @@ mod tests {
 
     #[test]
     fn a_triangle_is_closed_and_its_extent_stands_before_it() {
-        let bytes = polygon_z(32611, [[0.0, 0.0, 5.0], [2.0, 0.0, 6.0], [0.0, 3.0, 7.0]]);
+        let bytes = polygon_z(32611, &[[0.0, 0.0, 5.0], [2.0, 0.0, 6.0], [0.0, 3.0, 7.0]]);
         assert_eq!(bytes.len(), 8 + 32 + 13 + 4 * 24);
         assert_eq!((&bytes[..4], &bytes[4..8]), (&b"GP\0\x03"[..], &32611_i32.to_le_bytes()[..]));
         assert_eq!(bytes[16..24], 2.0_f64.to_le_bytes());

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use rusqlite::{Connection, params};
 use terrain::HOLE_CLASS;
 
-use crate::glb::COLOURS;
+use crate::classes;
 
 /// The table as QGIS makes it, listed as one without geometry.
 const TABLE: &str = "
@@ -18,8 +18,13 @@ CREATE TABLE layer_styles (
 INSERT INTO gpkg_contents (table_name, data_type, identifier, description, last_change)
     VALUES ('layer_styles', 'attributes', 'layer_styles', '', '1970-01-01T00:00:00.000Z');";
 
-/// Adds the styles; `classes` are the numbers and names of the classes of triangles.
-pub(crate) fn add(connection: &Connection, classes: &BTreeMap<u8, String>) -> rusqlite::Result<()> {
+/// Adds the styles; `with_classes` are the layers whose features have a class, `classes` the numbers and names of
+/// these.
+pub(crate) fn add(
+    connection: &Connection,
+    with_classes: &[&str],
+    classes: &BTreeMap<u8, String>,
+) -> rusqlite::Result<()> {
     connection.execute_batch(TABLE)?;
     let mut add = connection.prepare(
         "INSERT INTO layer_styles (f_table_catalog, f_table_schema, f_table_name, f_geometry_column, styleName,
@@ -28,7 +33,9 @@ pub(crate) fn add(connection: &Connection, classes: &BTreeMap<u8, String>) -> ru
     for (layer, outline) in [("load_modules", "70,70,70"), ("tiles", "0,70,160"), ("breaches", "200,40,20")] {
         add.execute(params![layer, outlined(outline)])?;
     }
-    add.execute(params!["triangles", by_class(classes)])?;
+    for layer in with_classes {
+        add.execute(params![layer, by_class(classes)])?;
+    }
     Ok(())
 }
 
@@ -41,12 +48,12 @@ fn outlined(color: &str) -> String {
 }
 
 /// Triangles filled by class, holes hatched.
-fn by_class(classes: &BTreeMap<u8, String>) -> String {
+fn by_class(of: &BTreeMap<u8, String>) -> String {
     let (mut categories, mut symbols) = (String::new(), String::new());
-    for (index, (class, name)) in classes.iter().enumerate() {
+    for (index, (class, name)) in of.iter().enumerate() {
+        let [red, green, blue] = classes::color(name, *class);
         let name = escaped(name);
         categories += &format!("<category render=\"true\" symbol=\"{index}\" value=\"{class}\" label=\"{name}\"/>");
-        let [red, green, blue] = COLOURS[usize::from(*class) % COLOURS.len()].map(|part| (part * 255.0).round() as u8);
         symbols += &match *class {
             HOLE_CLASS => symbol(&index.to_string(), "b_diagonal", "150,150,150,255", "150,150,150"),
             _ => symbol(&index.to_string(), "solid", &format!("{red},{green},{blue},255"), "60,60,60"),

@@ -1,4 +1,4 @@
-//! The load modules of a product as one mesh: vertices on shared sides are one vertex.
+//! The load modules of a product as one mesh: vertices on shared sides are one vertex, those of decks their own.
 
 use std::collections::HashMap;
 use std::ops::Range;
@@ -21,12 +21,14 @@ pub enum Coordinates {
 pub struct Mesh {
     /// East, north and up in quanta of 1/128 m; east and north from the mesh's south-west corner.
     pub vertices: Vec<[i32; 3]>,
-    /// Corners, counter-clockwise seen from above.
+    /// Corners, counter-clockwise seen from above: those of the ground, then those of decks.
     pub triangles: Vec<[u32; 3]>,
-    /// Class of the ground under each triangle.
+    /// Class of each triangle.
     pub classes: Vec<u8>,
-    /// First triangle of each load module, row by row from the south-west, and the end of the last.
+    /// First triangle of each load module's ground, row by row from the south-west, and the end of the last.
     pub(crate) starts: Vec<usize>,
+    /// The same of the decks of each load module; empty where no load module has any.
+    pub(crate) deck_starts: Vec<usize>,
 }
 
 /// Some load modules of a mesh, over vertices of their own.
@@ -46,20 +48,18 @@ pub(crate) struct Part {
 const EXACT_QUANTA_MAX: i32 = 1 << 24;
 
 impl Mesh {
-    /// The ground of a product: triangles over holes, where no source has a height, are left out.
+    /// Ground and decks of a product: triangles over holes, where no source has a height, are left out.
     pub fn of(product: &Product) -> Self {
-        Self::whole(product).without_holes()
+        Self::whole(product).without_holes().with_decks(product)
     }
 
-    /// All of a product, triangles over holes too.
+    /// All ground of a product, triangles over holes too.
     pub(crate) fn whole(product: &Product) -> Self {
-        let (side, rect) = (product.side(), product.rect);
         let mut mesh = Self::default();
         let mut shared = HashMap::new();
         for module in &product.modules {
-            let corner = [(module.id.col - rect.west) as i32 * side, (module.id.row - rect.south) as i32 * side];
             mesh.starts.push(mesh.triangles.len());
-            mesh.add(module, corner, &mut shared);
+            mesh.add(module, product.corner(module.id), &mut shared);
         }
         mesh.starts.push(mesh.triangles.len());
         mesh
@@ -91,14 +91,58 @@ impl Mesh {
         left
     }
 
+    /// The same with the decks of its product: they share vertices with each other, and none with the ground.
+    pub(crate) fn with_decks(mut self, product: &Product) -> Self {
+        if product.deck_triangles() == 0 {
+            return self;
+        }
+        let mut shared = HashMap::new();
+        for module in &product.modules {
+            self.deck_starts.push(self.triangles.len());
+            let corner = product.corner(module.id);
+            let mut place = |vertex: &ModuleVertex| {
+                let place = [corner[0] + i32::from(vertex.x), corner[1] + i32::from(vertex.y), vertex.z];
+                *shared.entry(place).or_insert_with(|| {
+                    self.vertices.push(place);
+                    self.vertices.len() as u32 - 1
+                })
+            };
+            let index_of: Vec<u32> = module.decks.vertices.iter().map(&mut place).collect();
+            let placed = module.decks.triangles.iter().map(|triangle| triangle.map(|v| index_of[usize::from(v)]));
+            self.triangles.extend(placed);
+            self.classes.extend_from_slice(&module.decks.classes);
+        }
+        self.deck_starts.push(self.triangles.len());
+        self
+    }
+
+    /// The triangles of the ground.
+    pub(crate) fn ground(&self) -> Range<usize> {
+        0..self.starts.last().copied().unwrap_or(0)
+    }
+
+    /// The triangles of decks.
+    pub(crate) fn decks(&self) -> Range<usize> {
+        self.ground().end..self.triangles.len()
+    }
+
     /// The ground of the load modules of `rect`, which `product`, of which this is the mesh, holds: without holes.
     pub(crate) fn part(&self, product: &Product, rect: ModuleRect) -> Part {
+        self.part_of(&self.starts, product, rect)
+    }
+
+    /// The decks of the load modules of `rect`; without triangles where they have none.
+    pub(crate) fn deck_part(&self, product: &Product, rect: ModuleRect) -> Part {
+        if self.deck_starts.is_empty() { Part::default() } else { self.part_of(&self.deck_starts, product, rect) }
+    }
+
+    fn part_of(&self, starts: &[usize], product: &Product, rect: ModuleRect) -> Part {
         let mut part = Part::default();
         let mut place_of = HashMap::new();
         for id in rect.iter() {
             let (row, col) = (id.row - product.rect.south, id.col - product.rect.west);
             let index = (row * product.rect.cols() + col) as usize;
-            let own = self.starts[index]..self.starts[index + 1];
+            let own = starts[index]..starts[index + 1];
             let start = part.triangles.len();
             for index in own.filter(|&index| self.classes[index] != HOLE_CLASS) {
                 let placed = self.triangles[index].map(|v| {
@@ -228,6 +272,21 @@ mod tests {
             assert_eq!((part.vertices.len(), part.triangles.len(), part.classes.len()), (6, 4, 4));
             assert_eq!(part.modules[1].1, 2..4);
         }
+    }
+
+    #[test]
+    fn decks_follow_the_ground_over_vertices_of_their_own() {
+        let product = samples::with_bridge();
+        let (mesh, ground) = (Mesh::of(&product), Mesh::whole(&product));
+        assert_eq!((mesh.ground(), mesh.decks()), (0..6, 6..12));
+        assert_eq!((&mesh.vertices[..7], &mesh.triangles[..6]), (&ground.vertices[..], &ground.triangles[..]));
+        // The lower bridge goes on over the line between the load modules: two vertices are shared.
+        assert_eq!((mesh.vertices.len(), &mesh.classes[6..]), (7 + 6 + 4, &[1, 1, 1, 1, 2, 2][..]));
+        let (both, east) = (mesh.deck_part(&product, product.rect), samples::eastern().rect);
+        assert_eq!((both.vertices.len(), both.triangles.len()), (10, 6));
+        assert_eq!(mesh.deck_part(&product, east).modules, [(ModuleId { row: 0, col: 1 }, 0..4)]);
+        assert_eq!(mesh.part(&product, east).triangles.len(), 4);
+        assert!(ground.deck_part(&product, east).triangles.is_empty());
     }
 
     #[test]

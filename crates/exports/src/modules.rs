@@ -10,6 +10,18 @@ pub(crate) fn module_name(id: ModuleId) -> String {
     format!("r{:04}c{:04}", id.row, id.col)
 }
 
+/// The name of the decks of a rectangle of load modules: `decks_r0012c0034`.
+pub(crate) fn deck_name(rect: ModuleRect) -> String {
+    format!("decks_{}", group_name(rect))
+}
+
+/// The name of the load modules of a rectangle: the south-west one, and the north-east one if there are several.
+pub(crate) fn group_name(rect: ModuleRect) -> String {
+    let low = ModuleId { row: rect.south, col: rect.west };
+    let high = ModuleId { row: rect.north - 1, col: rect.east - 1 };
+    if low == high { module_name(low) } else { format!("{}_{}", module_name(low), module_name(high)) }
+}
+
 /// The name of a load module's file: `r0012c0034.slm`.
 pub(crate) fn file_name(id: ModuleId, extension: &str) -> String {
     format!("{}.{extension}", module_name(id))

@@ -1,15 +1,15 @@
 //! OpenFlight: a file for each 4 km square, one that refers to all of them, and a MetaFlight index.
 //!
 //! All files count from one origin, the south-west corner of what is exported, and say in their headers where it lies;
-//! so they fit together as they are. Triangles over holes are left out.
+//! so they fit together as they are. Triangles over holes are left out; decks are a group of their own in their square.
 
 use terrain::{ModuleId, ModuleRect};
 
 use crate::earth::Earth;
-use crate::flt_records::{Place, Records};
-use crate::mesh::Mesh;
+use crate::flt_records::{Face, Place, Records};
+use crate::mesh::{Mesh, Part};
 use crate::metaflight::{Grid, metaflight};
-use crate::modules::module_name;
+use crate::modules::{deck_name, module_name};
 use crate::{Coordinates, Datum, ExportError, Facts, Product, Put, Work};
 
 /// Side of a square in metres.
@@ -28,23 +28,19 @@ pub fn write_openflight(product: &Product, put: &Put, work: &Work) -> Result<(),
     let earth = Earth::new(product, Some(Datum::Ellipsoid))?;
     let about = Facts::z_up(product, Coordinates::Local).comments(product).join("\n");
     work.each("squares", &squares, |&rect| {
-        let part = mesh.part(product, rect);
+        let (part, decks) = (mesh.part(product, rect), mesh.deck_part(product, rect));
         let mut records = Records::default();
         records.header(&place(product, &earth, rect)?);
         records.comment(&about);
         let vertex = |&v: &u32| (places[v as usize], normals[v as usize]);
-        records.vertices(&part.vertices.iter().map(vertex).collect::<Vec<_>>());
+        records.vertices(&part.vertices.iter().chain(&decks.vertices).map(vertex).collect::<Vec<_>>());
         records.push();
         records.group("square");
-        records.push();
-        for (id, triangles) in &part.modules {
-            records.object(&module_name(*id));
-            records.push();
-            let of_module = part.triangles[triangles.clone()].iter().zip(&part.classes[triangles.clone()]);
-            of_module.for_each(|(&triangle, &class)| records.face(triangle, class));
-            records.pop();
+        put_objects(&mut records, product, &part, None);
+        if !decks.triangles.is_empty() {
+            records.group("decks");
+            put_objects(&mut records, product, &decks, Some(part.vertices.len() as u32));
         }
-        records.pop();
         records.pop();
         let name = format!("squares/{}", square_name(product, rect, "flt"));
         put(&name, &records.into_bytes()).map_err(ExportError::write(&name))
@@ -63,6 +59,27 @@ pub fn write_openflight(product: &Product, put: &Put, work: &Work) -> Result<(),
     put("area.flt", &records.into_bytes()).map_err(ExportError::write("area.flt"))?;
     let index = metaflight(product, &grid(product), &place(product, &earth, product.rect)?);
     put("area.mft", index.as_bytes()).map_err(ExportError::write("area.mft"))
+}
+
+/// The faces of each load module as an object: of its ground, or of its decks, whose vertices begin at this one.
+fn put_objects(records: &mut Records, product: &Product, part: &Part, decks_from: Option<u32>) {
+    let (classes, first) = (product.classes(), decks_from.unwrap_or(0));
+    records.push();
+    for (id, triangles) in &part.modules {
+        if decks_from.is_some() && triangles.is_empty() {
+            continue;
+        }
+        let alone = ModuleRect { south: id.row, west: id.col, north: id.row + 1, east: id.col + 1 };
+        records.object(&if decks_from.is_some() { deck_name(alone) } else { module_name(*id) });
+        records.push();
+        let of_module = part.triangles[triangles.clone()].iter().zip(&part.classes[triangles.clone()]);
+        for (triangle, &class) in of_module {
+            let face = Face { class, color: classes.color(class), is_seen_from_below: decks_from.is_some() };
+            records.face(triangle.map(|v| first + v), face);
+        }
+        records.pop();
+    }
+    records.pop();
 }
 
 /// Load modules along the side of a square.
@@ -142,6 +159,30 @@ mod tests {
         assert_eq!(count(10, square), count(11, square));
         assert_eq!(count(63, &files["area.flt"]), 1);
         assert!(String::from_utf8_lossy(&files["area.mft"]).contains("<NumRowDivisions>1</NumRowDivisions>"));
+    }
+
+    #[test]
+    fn decks_are_a_group_of_their_own_behind_the_ground() {
+        let write = |product: &Product| {
+            let files = Mutex::new(BTreeMap::new());
+            let put = |name: &str, bytes: &[u8]| {
+                files.lock().unwrap().insert(name.to_owned(), bytes.to_vec());
+                Ok(())
+            };
+            let (workers, stop) = (Workers::new(2), AtomicBool::new(false));
+            write_openflight(product, &put, &Work { workers: &workers, stop: &stop, tell: &|_| {} }).unwrap();
+            files.into_inner().unwrap().remove("squares/r00c00.flt").unwrap()
+        };
+        let bytes = write(&samples::with_bridge());
+        let (mut at, mut found) = (0, BTreeMap::new());
+        while at < bytes.len() {
+            let word = |at: usize| u16::from_be_bytes([bytes[at], bytes[at + 1]]);
+            *found.entry(word(at)).or_insert(0) += 1;
+            at += usize::from(word(at + 2));
+        }
+        // Vertices, faces, objects and groups.
+        assert_eq!([69, 5, 4, 2].map(|code| found[&code]), [17, 12, 4, 2]);
+        assert_eq!(found[&10], found[&11]);
     }
 
     #[test]

@@ -5,8 +5,9 @@ use std::io::{Result, Write};
 use crate::{Coordinates, Facts, Mesh, Product};
 
 /// Writes `mesh` as binary little-endian PLY. Faces have corners only, since readers (meshio is one) take all lists to
-/// lie one behind the other; so triangles come class by class, and comments say which are whose. Coordinates are 32-bit
-/// floats where these are exact, else 64-bit ones. Nothing is buffered here: give it a `BufWriter`.
+/// lie one behind the other; so triangles come class by class, those of decks after all of the ground, and comments say
+/// which are whose. Coordinates are 32-bit floats where these are exact, else 64-bit ones. Nothing is buffered here:
+/// give it a `BufWriter`.
 ///
 /// # Errors
 /// Those of `out`.
@@ -14,29 +15,70 @@ pub fn write_ply(out: &mut impl Write, product: &Product, mesh: &Mesh, coordinat
     let facts = Facts::z_up(product, coordinates);
     let is_short = coordinates == Coordinates::Local && mesh.fits_floats();
     let mut comments = facts.comments(product);
+    let (groups, classes) = (mesh.groups(), product.classes());
     let mut first = 0;
-    for class in mesh.classes_present() {
-        let end = first + mesh.of_class(class).count();
-        comments.push(format!("class {class} faces {first} to {}", end - 1));
+    for &group in &groups {
+        let end = first + mesh.of_group(group).count();
+        let kind = if group.is_deck { "decks class" } else { "class" };
+        let name = classes.name(group.class).map(|_| format!(" {}", classes.word(group.class))).unwrap_or_default();
+        comments.push(format!("{kind} {} faces {first} to {}{name}", group.class, end - 1));
         first = end;
     }
-    let triangles = mesh.classes_present().into_iter().flat_map(|class| mesh.of_class(class));
+    let triangles = groups.iter().flat_map(|&group| mesh.of_group(group));
     let ply = Ply { comments: &comments, is_short, face_count: mesh.triangles.len() };
     put_ply(out, &ply, metres(mesh, product, &facts), triangles)
 }
 
-/// Writes `mesh` as OBJ, the triangles of each class as a group. Nothing is buffered here: give it a `BufWriter`.
+/// Writes `mesh` as OBJ, the triangles of each class as a group, and decks as an object of their own. `library` is the
+/// name of the file with the materials of [`obj_materials`], where there is one. Nothing is buffered here: give it a
+/// `BufWriter`.
 ///
 /// # Errors
 /// Those of `out`.
-pub fn write_obj(out: &mut impl Write, product: &Product, mesh: &Mesh, coordinates: Coordinates) -> Result<()> {
+pub fn write_obj(
+    out: &mut impl Write,
+    product: &Product,
+    mesh: &Mesh,
+    coordinates: Coordinates,
+    library: Option<&str>,
+) -> Result<()> {
     let facts = Facts::z_up(product, coordinates);
-    put_obj_vertices(out, &facts.comments(product), metres(mesh, product, &facts))?;
-    for class in mesh.classes_present() {
-        writeln!(out, "g class_{class}")?;
-        put_obj_faces(out, mesh.of_class(class))?;
+    let mut comments = facts.comments(product);
+    let (groups, classes) = (mesh.groups(), product.classes());
+    let named = groups.iter().filter(|group| !group.is_deck && classes.name(group.class).is_some());
+    comments.extend(named.map(|group| format!("class {} {}", group.class, classes.word(group.class))));
+    put_obj_comments(out, &comments)?;
+    if let Some(library) = library {
+        writeln!(out, "mtllib {library}")?;
+    }
+    put_obj_vertices(out, metres(mesh, product, &facts))?;
+    let mut was_deck = false;
+    for group in groups {
+        if group.is_deck && !was_deck {
+            writeln!(out, "o decks")?;
+        }
+        was_deck = group.is_deck;
+        writeln!(out, "g {}class_{}", if group.is_deck { "decks_" } else { "" }, group.class)?;
+        if library.is_some() {
+            writeln!(out, "usemtl {}", classes.word(group.class))?;
+        }
+        put_obj_faces(out, mesh.of_group(group))?;
     }
     Ok(())
+}
+
+/// The text of a library of materials for an OBJ, one for each class; `None` where all is ground of one class, which
+/// needs none.
+pub fn obj_materials(product: &Product, mesh: &Mesh) -> Option<String> {
+    let (groups, classes) = (mesh.groups(), product.classes());
+    let mut present: Vec<u8> = groups.iter().map(|group| group.class).collect();
+    present.sort_unstable();
+    present.dedup();
+    let material = |class: u8| {
+        let [red, green, blue] = classes.color(class).map(|part| f64::from(part) / 255.0);
+        format!("newmtl {}\nKd {red:.3} {green:.3} {blue:.3}\nillum 1\n", classes.word(class))
+    };
+    (1 < groups.len()).then(|| present.into_iter().map(material).collect())
 }
 
 /// Coordinates of the vertices as the file has them.
@@ -84,13 +126,13 @@ pub(crate) fn put_ply<'a>(
     Ok(())
 }
 
-/// The beginning of an OBJ, up to its faces.
-pub(crate) fn put_obj_vertices(
-    out: &mut impl Write,
-    comments: &[String],
-    mut vertices: impl Iterator<Item = [f64; 3]>,
-) -> Result<()> {
-    comments.iter().try_for_each(|line| writeln!(out, "# {line}"))?;
+/// Comments of an OBJ, a line each.
+pub(crate) fn put_obj_comments(out: &mut impl Write, comments: &[String]) -> Result<()> {
+    comments.iter().try_for_each(|line| writeln!(out, "# {line}"))
+}
+
+/// Vertices of an OBJ.
+pub(crate) fn put_obj_vertices(out: &mut impl Write, mut vertices: impl Iterator<Item = [f64; 3]>) -> Result<()> {
     // The shortest digits that read back as the same number.
     vertices.try_for_each(|[x, y, z]| writeln!(out, "v {x} {y} {z}"))
 }
@@ -100,17 +142,30 @@ pub(crate) fn put_obj_faces<'a>(out: &mut impl Write, triangles: impl Iterator<I
     triangles.into_iter().try_for_each(|[a, b, c]| writeln!(out, "f {} {} {}", a + 1, b + 1, c + 1))
 }
 
+/// The triangles of one class, on the ground or of decks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Group {
+    pub is_deck: bool,
+    pub class: u8,
+}
+
 impl Mesh {
-    /// The triangles of a class.
-    fn of_class(&self, class: u8) -> impl Iterator<Item = &[u32; 3]> {
-        self.triangles.iter().zip(&self.classes).filter(move |(_, of)| **of == class).map(|(triangle, _)| triangle)
+    /// The triangles of a group.
+    pub(crate) fn of_group(&self, group: Group) -> impl Iterator<Item = &[u32; 3]> {
+        let range = if group.is_deck { self.decks() } else { self.ground() };
+        let all = self.triangles[range.clone()].iter().zip(&self.classes[range]);
+        all.filter(move |(_, class)| **class == group.class).map(|(triangle, _)| triangle)
     }
 
-    /// Every class that a triangle has, in order.
-    pub(crate) fn classes_present(&self) -> Vec<u8> {
-        let mut present = [false; 256];
-        self.classes.iter().for_each(|&class| present[usize::from(class)] = true);
-        (0..=u8::MAX).filter(|&class| present[usize::from(class)]).collect()
+    /// Every group that has a triangle: those of the ground by class, then those of decks.
+    pub(crate) fn groups(&self) -> Vec<Group> {
+        let present = |is_deck: bool| {
+            let mut present = [false; 256];
+            let range = if is_deck { self.decks() } else { self.ground() };
+            self.classes[range].iter().for_each(|&class| present[usize::from(class)] = true);
+            (0..=u8::MAX).filter(move |&class| present[usize::from(class)]).map(move |class| Group { is_deck, class })
+        };
+        present(false).chain(present(true)).collect()
     }
 }
 
@@ -122,7 +177,7 @@ mod tests {
     fn text(coordinates: Coordinates) -> String {
         let product = samples::product();
         let mut bytes = Vec::new();
-        write_obj(&mut bytes, &product, &Mesh::of(&product), coordinates).unwrap();
+        write_obj(&mut bytes, &product, &Mesh::of(&product), coordinates, None).unwrap();
         String::from_utf8(bytes).unwrap()
     }
 
@@ -148,5 +203,37 @@ mod tests {
             // Each line of data has the same length, as readers take it that know no other property than corners.
             assert!(bytes[header + 7 * vertex_bytes..].chunks(13).all(|face| face[0] == 3));
         }
+    }
+
+    #[test]
+    fn decks_are_an_object_of_their_own_and_every_class_has_a_material() {
+        let product = samples::with_bridge();
+        let mesh = Mesh::of(&product);
+        let mut bytes = Vec::new();
+        write_obj(&mut bytes, &product, &mesh, Coordinates::Local, Some("a.mtl")).unwrap();
+        let text = String::from_utf8(bytes).unwrap();
+        let words = |line: &&str| !["#", "v ", "f "].iter().any(|start| line.starts_with(start));
+        let groups = ["g class_0", "usemtl default", "g class_1", "usemtl motorway"];
+        let decks = ["o decks", "g decks_class_1", "usemtl motorway", "g decks_class_2", "usemtl track"];
+        let lines: Vec<&str> = text.lines().filter(words).collect();
+        assert_eq!(lines, [&["mtllib a.mtl"][..], &groups, &decks].concat());
+        assert!(text.contains("\n# class 1 motorway\n") && text.lines().filter(|l| l.starts_with("f ")).count() == 12);
+        let materials = obj_materials(&product, &mesh).unwrap();
+        assert!(materials.contains("newmtl motorway\nKd 0.204 0.188 0.180\n"), "{materials}");
+        assert_eq!(materials.matches("newmtl").count(), 3);
+        let mut bytes = Vec::new();
+        write_ply(&mut bytes, &product, &mesh, Coordinates::Local).unwrap();
+        let text = String::from_utf8_lossy(&bytes);
+        let decks = ["decks class 1 faces 6 to 9 motorway", "decks class 2 faces 10 to 11 track"];
+        for said in ["class 1 faces 3 to 5 motorway", decks[0], decks[1]] {
+            assert!(text.contains(&format!("\ncomment {said}")), "{said}");
+        }
+    }
+
+    #[test]
+    fn ground_of_one_class_needs_no_materials() {
+        let mut product = samples::product();
+        product.modules.iter_mut().for_each(|module| module.classes.fill(0));
+        assert_eq!(obj_materials(&product, &Mesh::of(&product)), None);
     }
 }

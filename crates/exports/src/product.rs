@@ -5,6 +5,7 @@ use std::path::Path;
 use database::{Folder, Manifest, TileModules};
 use terrain::{GridFrame, HOLE_CLASS, LoadModule, ModuleGrid, ModuleId, ModuleRect, TileId};
 
+use crate::classes::{Classes, names_in};
 use crate::{ExportError, Work};
 
 /// A block of load modules by its south-west and north-east one, both inside.
@@ -30,6 +31,8 @@ pub enum Levels {
 pub struct Product {
     /// What `database.json` says.
     pub manifest: Manifest,
+    /// The names of the job's classes, in its order.
+    pub class_names: Vec<String>,
     /// The load modules of the whole area.
     pub grid: ModuleGrid,
     /// Where the working grid lies.
@@ -64,11 +67,12 @@ impl Product {
             levels.iter_mut().for_each(|modules| modules.retain(|module| rect.contains(module.id)));
             Ok((tile, levels))
         })?;
-        Self::put_together(manifest, rect, wanted.first(), read)
+        let class_names = names_in(&folder.report()?);
+        Self::put_together((manifest, class_names), rect, wanted.first(), read)
     }
 
     fn put_together(
-        manifest: Manifest,
+        (manifest, class_names): (Manifest, Vec<String>),
         rect: ModuleRect,
         level: usize,
         read: Vec<(TileModules, Vec<Vec<LoadModule>>)>,
@@ -96,7 +100,7 @@ impl Product {
         let mut levels = levels.into_iter();
         let (Some(first), Some(modules)) = (tiles.first(), levels.next()) else { return Err(damaged(0, rect)) };
         let (grid, frame) = (first.grid, first.frame);
-        Ok(Self { manifest, grid, frame, rect, level, modules, coarser: levels.collect(), tiles, tile_of })
+        Ok(Self { manifest, class_names, grid, frame, rect, level, modules, coarser: levels.collect(), tiles, tile_of })
     }
 
     /// The same at each of its levels, from fine to coarse, one at a time.
@@ -116,6 +120,11 @@ impl Product {
         f64::from(self.grid.side_cells) * self.frame.spacing.metres()
     }
 
+    /// East and north in quanta from the south-west corner of what is exported to that of a load module.
+    pub(crate) fn corner(&self, id: ModuleId) -> [i32; 2] {
+        [(id.col - self.rect.west) as i32 * self.side(), (id.row - self.rect.south) as i32 * self.side()]
+    }
+
     /// Easting and northing of the south-west corner of a load module.
     pub fn corner_m(&self, row: u32, col: u32) -> [f64; 2] {
         let [east_m, north_m] = [self.frame.origin_east_m, self.frame.origin_north_m];
@@ -132,6 +141,16 @@ impl Product {
     /// Triangles over holes, where no source has a height.
     pub fn hole_triangles(&self) -> usize {
         self.modules.iter().flat_map(|module| &module.classes).filter(|&&class| class == HOLE_CLASS).count()
+    }
+
+    /// Triangles of decks of bridges.
+    pub fn deck_triangles(&self) -> usize {
+        self.modules.iter().map(|module| module.decks.triangles.len()).sum()
+    }
+
+    /// The classes of the job, by name and colour.
+    pub(crate) fn classes(&self) -> Classes<'_> {
+        Classes::named(&self.class_names)
     }
 
     /// The coordinate system as the database names it.

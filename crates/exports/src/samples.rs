@@ -7,7 +7,8 @@ use database::{
     ReportPool, ReportRefusals, ReportResidual, ReportStops, ReportVoids, TileModules, TileRecord,
 };
 use terrain::{
-    GridFrame, HOLE_CLASS, LoadModule, ModuleGrid, ModuleId, ModuleRect, ModuleResidual, ModuleVertex, Spacing, TileId,
+    Decks, GridFrame, HOLE_CLASS, LoadModule, ModuleGrid, ModuleId, ModuleRect, ModuleResidual, ModuleVertex, Spacing,
+    TileId,
 };
 
 use crate::Product;
@@ -35,6 +36,7 @@ pub(crate) fn product() -> Product {
     manifest.tiles = vec![TileRecord::missing(tile)];
     Product {
         manifest,
+        class_names: Vec::new(),
         grid: GRID,
         frame,
         rect,
@@ -63,6 +65,23 @@ pub(crate) fn with_hole() -> Product {
     let mut product = product();
     // Triangles 0 (south) and 1 (west) remain ground.
     product.modules[1].classes = vec![1, 0, HOLE_CLASS, HOLE_CLASS];
+    product
+}
+
+/// The same with a motorway on the ground, and a bridge with that class over the line between both load modules.
+pub(crate) fn with_bridge() -> Product {
+    let mut product = product();
+    product.class_names = ["default", "motorway", "track"].map(str::to_owned).to_vec();
+    let vertex = |x, y, z| ModuleVertex { y, x, z };
+    let square = |[west, east]: [u16; 2], [low, high]: [i32; 2], class| {
+        let south = [vertex(west, 30_000, low), vertex(east, 30_000, high)];
+        let north = [vertex(east, 30_640, high), vertex(west, 30_640, low)];
+        [([south[0], south[1], north[0]], class), ([south[0], north[0], north[1]], class)]
+    };
+    product.modules[0].decks = Decks::of_triangles(square([60_000, 64_000], [129_024, 129_152], 1));
+    let over = square([0, 9000], [129_152, 129_280], 1).into_iter().chain(square([0, 9000], [130_000, 130_128], 2));
+    product.modules[1].decks = Decks::of_triangles(over);
+    product.modules.iter().for_each(|module| assert_eq!(module.check(), Ok(())));
     product
 }
 
@@ -102,6 +121,7 @@ fn modules() -> Vec<LoadModule> {
         classes: vec![0, 1],
         polygon_count: 2,
         residual: ModuleResidual { posts: 400, largest: 300, sum_abs: 25_600, sum_squared: 3_276_800 },
+        decks: Decks::default(),
     };
     let east = LoadModule {
         id: ModuleId { row: 0, col: 1 },
@@ -117,6 +137,7 @@ fn modules() -> Vec<LoadModule> {
         classes: vec![1, 0, 0, 1],
         polygon_count: 4,
         residual: ModuleResidual { posts: 441, largest: 128, sum_abs: 12_800, sum_squared: 1_638_400 },
+        decks: Decks::default(),
     };
     [&west, &east].iter().for_each(|module| assert_eq!(module.check(), Ok(())));
     vec![west, east]
@@ -155,6 +176,7 @@ pub(crate) fn report() -> Report {
         heights: None,
         residual_against_source: None,
         classes: Vec::new(),
+        features: None,
         levels: vec![],
         overall_point_weighted_rms_m: 1.0,
         dem_accuracy_m: None,

@@ -65,7 +65,7 @@ pub fn sidecar(product: &Product, mesh: &Mesh, facts: &Facts) -> String {
     let [east, north] = product.corner_m(rect.north, rect.east);
     let heights = mesh.vertices.iter().map(|vertex| vertex[2]);
     let range = |quanta: Option<i32>| quanta.map_or(Value::Null, |quanta| json!(metres_of_quanta(quanta)));
-    let value = json!({
+    let mut value = json!({
         "area": area.name,
         "crs": area.crs,
         "vertical_datum": if area.vertical_datum.is_empty() { Value::Null } else { json!(area.vertical_datum) },
@@ -87,6 +87,12 @@ pub fn sidecar(product: &Product, mesh: &Mesh, facts: &Facts) -> String {
         "hole_triangles_left_out": product.hole_triangles(),
         "attribution": product.attributions(),
     });
+    if 0 < product.deck_triangles() {
+        value["deck_triangles"] = json!(product.deck_triangles());
+    }
+    if 1 < product.class_names.len() {
+        value["classes"] = json!(product.class_names);
+    }
     format!("{value:#}\n")
 }
 

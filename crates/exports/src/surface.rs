@@ -1,6 +1,7 @@
 //! The compiled surface, and how far the ground lies above it, at every post of the working grid.
 //!
-//! Heights are those that residuals are measured with: at a post between vertices, rounded to 1/128 m.
+//! Heights are those that residuals are measured with: at a post between vertices, rounded to 1/128 m. A raster has one
+//! height at a place: that of the ground, whatever decks hang above it.
 
 use std::io::Write;
 

@@ -3,19 +3,20 @@
 //! left out, and in the coarse mesh load modules that are holes for more than half.
 //!
 //! Where load modules have coarser levels, those of a square are a mesh between the two, level by level.
+//! Decks are nodes of their own in the files of groups and levels; the coarse mesh of a square has none, and one class.
 //! Every square has a frame of its own, so that 32-bit floats are fine to a fraction of a millimetre. A geometric error
 //! is measured: of a square, how far its load modules lie from it; of a level in it and of a group, the largest
 //! residual.
 
 use serde_json::{Value, json};
-use terrain::{ModuleId, ModuleRect, QUANTA_PER_METRE};
+use terrain::{ModuleRect, QUANTA_PER_METRE};
 
 use crate::coarse::Coarse;
 use crate::earth::Earth;
 use crate::glb::{Gltf, GltfNode, turned};
 use crate::globe::{Globe, LocalFrame};
 use crate::mesh::{Mesh, Part};
-use crate::modules::module_name;
+use crate::modules::{deck_name, group_name};
 use crate::openflight::{square_name, square_side};
 use crate::{Datum, ExportError, Product, Put, Work};
 
@@ -27,7 +28,7 @@ use crate::{Datum, ExportError, Product, Put, Work};
 pub fn write_3dtiles(product: &Product, assumed: Option<Datum>, put: &Put, work: &Work) -> Result<Datum, ExportError> {
     let earth = Earth::new(product, assumed)?;
     let layer = |product: Product| {
-        let mesh = Mesh::whole(&product);
+        let mesh = Mesh::whole(&product).with_decks(&product);
         let globe = Globe::of(&product, &mesh, &earth, work)?;
         Ok(Layer { product, mesh, globe })
     };
@@ -97,18 +98,17 @@ impl Layers {
         let coarse = Coarse::of(&finest.product, &finest.mesh, rect);
         let middle = coarse.vertices[coarse.vertices.len() / 2] as usize;
         let frame = LocalFrame::at(finest.globe.lon_lat[middle], finest.globe.height_m[middle]);
-        let parts: Vec<Part> = self.layers.iter().map(|layer| layer.mesh.part(&layer.product, rect)).collect();
-        if parts.iter().all(|part| part.triangles.is_empty()) {
+        let parts: Vec<Parts> = self.layers.iter().map(|layer| layer.parts(rect)).collect();
+        if parts.iter().all(|parts| parts.triangle_count() == 0) {
             return Ok(None);
         }
-        let bounds = box_around(self.layers.iter().zip(&parts).flat_map(|(layer, part)| layer.places(&frame, part)));
+        let bounds = box_around(self.layers.iter().zip(&parts).flat_map(|(layer, parts)| layer.places(&frame, parts)));
         let mut children = finest.groups(&frame, rect, put)?;
         let mut error_m = finest.error_m(rect);
-        for (layer, part) in self.layers.iter().zip(&parts).skip(1) {
+        for (layer, parts) in self.layers.iter().zip(&parts).skip(1) {
             let name = square_name(&layer.product, rect, "glb");
             let uri = format!("levels/{}/{name}", layer.product.level);
-            let node = layer.node(&frame, group_name(rect), &part.vertices);
-            put_node(put, &uri, node.with_groups(&part.triangles, &part.classes))?;
+            put_gltf(put, &uri, layer.gltf(&frame, rect, parts))?;
             // What is coarser is never said to be truer, or a viewer would not go on to the finer.
             error_m = error_m.max(layer.error_m(rect));
             let mut level = json!({
@@ -129,7 +129,8 @@ impl Layers {
             let uri = format!("squares/{}", square_name(&finest.product, rect, "glb"));
             let classes = vec![0; coarse.triangles.len()];
             let node = finest.node(&frame, group_name(rect), &coarse.vertices);
-            put_node(put, &uri, node.with_groups(&coarse.triangles, &classes))?;
+            let nodes = vec![node.with_groups(&coarse.triangles, &classes)];
+            put_gltf(put, &uri, Gltf { nodes, ..Gltf::default() })?;
             tile["content"] = json!({ "uri": uri });
         }
         Ok(Some(tile))
@@ -138,13 +139,6 @@ impl Layers {
 
 /// Triangles that a group of load modules has at most, unless a single one has more.
 const GROUP_TRIANGLES_MAX: usize = 2048;
-
-/// The name of the load modules of a rectangle: the south-west one, and the north-east one if there are several.
-fn group_name(rect: ModuleRect) -> String {
-    let low = ModuleId { row: rect.south, col: rect.west };
-    let high = ModuleId { row: rect.north - 1, col: rect.east - 1 };
-    if low == high { module_name(low) } else { format!("{}_{}", module_name(low), module_name(high)) }
-}
 
 /// The two halves of a rectangle, across its longer side.
 fn halves(rect: ModuleRect) -> [ModuleRect; 2] {
@@ -157,30 +151,58 @@ fn halves(rect: ModuleRect) -> [ModuleRect; 2] {
     }
 }
 
-fn put_node(put: &Put, name: &str, node: GltfNode) -> Result<(), ExportError> {
-    let nodes = if node.groups.is_empty() { Vec::new() } else { vec![node] };
-    put(name, &Gltf { nodes, ..Gltf::default() }.bytes()).map_err(ExportError::write(name))
+fn put_gltf(put: &Put, name: &str, gltf: Gltf) -> Result<(), ExportError> {
+    put(name, &gltf.bytes()).map_err(ExportError::write(name))
+}
+
+/// Ground and decks of some load modules.
+struct Parts {
+    ground: Part,
+    decks: Part,
+}
+
+impl Parts {
+    fn triangle_count(&self) -> usize {
+        self.ground.triangles.len() + self.decks.triangles.len()
+    }
 }
 
 impl Layer {
+    fn parts(&self, rect: ModuleRect) -> Parts {
+        Parts { ground: self.mesh.part(&self.product, rect), decks: self.mesh.deck_part(&self.product, rect) }
+    }
+
+    /// The ground and the decks of a rectangle, each a node where there is any.
+    fn gltf(&self, frame: &LocalFrame, rect: ModuleRect, parts: &Parts) -> Gltf<'_> {
+        let nodes = |name: String, part: &Part| match part.triangles.is_empty() {
+            true => Vec::new(),
+            false => vec![self.node(frame, name, &part.vertices).with_groups(&part.triangles, &part.classes)],
+        };
+        Gltf {
+            nodes: nodes(group_name(rect), &parts.ground),
+            decks: nodes(deck_name(rect), &parts.decks),
+            classes: self.product.classes(),
+            ..Gltf::default()
+        }
+    }
+
     /// Writes a file for each group of load modules of a square; their tiles.
     fn groups(&self, frame: &LocalFrame, square: ModuleRect, put: &Put) -> Result<Vec<Value>, ExportError> {
         let mut tiles = Vec::new();
         let mut left = vec![square];
         while let Some(rect) = left.pop() {
-            let part = self.mesh.part(&self.product, rect);
-            if part.triangles.is_empty() {
+            let parts = self.parts(rect);
+            if parts.triangle_count() == 0 {
                 continue;
             }
-            if GROUP_TRIANGLES_MAX < part.triangles.len() && 1 < rect.count() {
+            if GROUP_TRIANGLES_MAX < parts.triangle_count() && 1 < rect.count() {
                 left.extend(halves(rect));
                 continue;
             }
             let uri = format!("groups/{}.glb", group_name(rect));
-            let node = self.node(frame, group_name(rect), &part.vertices);
-            put_node(put, &uri, node.with_groups(&part.triangles, &part.classes))?;
+            put_gltf(put, &uri, self.gltf(frame, rect, &parts))?;
             tiles.push(json!({
-                "boundingVolume": { "box": box_around(self.places(frame, &part)) },
+                "boundingVolume": { "box": box_around(self.places(frame, &parts)) },
                 "geometricError": self.error_m(rect),
                 "content": { "uri": uri },
             }));
@@ -194,9 +216,9 @@ impl Layer {
         f64::from(residuals.max().unwrap_or(0)) / f64::from(QUANTA_PER_METRE)
     }
 
-    /// Where the vertices of a part lie in a frame.
-    fn places(&self, frame: &LocalFrame, part: &Part) -> impl Iterator<Item = [f64; 3]> {
-        part.vertices.iter().map(|&v| frame.local(self.globe.place[v as usize]))
+    /// Where the vertices of ground and decks lie in a frame.
+    fn places(&self, frame: &LocalFrame, parts: &Parts) -> impl Iterator<Item = [f64; 3]> {
+        parts.ground.vertices.iter().chain(&parts.decks.vertices).map(|&v| frame.local(self.globe.place[v as usize]))
     }
 
     /// Vertices of the mesh in a frame.
@@ -285,6 +307,30 @@ mod tests {
         assert_eq!(files.keys().collect::<Vec<_>>(), ["tileset.json"]);
         let tileset: Value = serde_json::from_slice(&files["tileset.json"]).unwrap();
         assert!(tileset["root"].get("children").is_none(), "no list of children may be empty");
+    }
+
+    #[test]
+    fn decks_are_nodes_of_groups_and_their_boxes_hold_them() {
+        let files = written(&samples::with_bridge());
+        let file = &files["groups/r0000c0000_r0000c0001.glb"];
+        let length = u32::from_le_bytes(file[12..16].try_into().unwrap()) as usize;
+        let document: Value = serde_json::from_slice(&file[20..20 + length]).unwrap();
+        let names: Vec<&str> =
+            document["nodes"].as_array().unwrap().iter().map(|node| node["name"].as_str().unwrap()).collect();
+        assert_eq!(names, ["r0000c0000_r0000c0001", "decks_r0000c0000_r0000c0001", "decks"]);
+        let tileset: Value = serde_json::from_slice(&files["tileset.json"]).unwrap();
+        let bounds = |of: &Value| -> f64 {
+            let bounds = &of["boundingVolume"]["box"];
+            bounds[2].as_f64().unwrap() + bounds[11].as_f64().unwrap()
+        };
+        let square = &tileset["root"]["children"][0];
+        let highest = |of: &Value| {
+            let accessor = document["meshes"][1]["primitives"][0]["attributes"]["POSITION"].as_u64().unwrap();
+            document["accessors"][accessor as usize]["max"][1].as_f64().unwrap() - bounds(of)
+        };
+        assert!(highest(square) <= 1e-3 && highest(&square["children"][0]) <= 1e-3);
+        // The coarse mesh of the square is ground alone.
+        assert!(files["squares/r00c00.glb"] == written(&samples::product())["squares/r00c00.glb"]);
     }
 
     #[test]

@@ -7,10 +7,10 @@
 
 use std::io::{Result, Write};
 
-use terrain::{LATTICE_PER_POST, QUANTA_PER_METRE, Tin, metres_of_quanta};
+use terrain::{QUANTA_PER_METRE, Tin, metres_of_quanta};
 
 use crate::Coordinates;
-use crate::polygon_files::{Ply, put_obj_faces, put_obj_vertices, put_ply};
+use crate::polygon_files::{Ply, put_obj_comments, put_obj_faces, put_obj_vertices, put_ply};
 
 /// Where a TIN of a raster's own posts lies.
 #[derive(Clone, Debug, PartialEq)]
@@ -36,7 +36,7 @@ impl TinPlace {
     /// East, north and up of the vertices of `tin` in metres, from `zero_m`.
     fn metres<'a>(&self, tin: &'a Tin, zero_m: [f64; 2]) -> impl ExactSizeIterator<Item = [f64; 3]> + use<'a> {
         let (from_m, spacing_m) = ([0, 1].map(|axis| self.origin_m[axis] - zero_m[axis]), self.spacing_m);
-        let posts = |lattice: i32| f64::from(lattice) / f64::from(LATTICE_PER_POST);
+        let posts = |lattice: i32| f64::from(lattice) / f64::from(tin.steps_per_post);
         tin.vertices.iter().map(move |vertex| {
             let east_m = from_m[0] + posts(vertex.at.col) * spacing_m[0];
             let north_m = from_m[1] + posts(vertex.at.row) * spacing_m[1];
@@ -77,7 +77,8 @@ pub fn write_tin_ply(out: &mut impl Write, tin: &Tin, place: &TinPlace, coordina
 /// Those of `out`.
 pub fn write_tin_obj(out: &mut impl Write, tin: &Tin, place: &TinPlace, coordinates: Coordinates) -> Result<()> {
     let zero_m = place.zero_m(tin, coordinates);
-    put_obj_vertices(out, &place.comments(zero_m, coordinates), place.metres(tin, zero_m))?;
+    put_obj_comments(out, &place.comments(zero_m, coordinates))?;
+    put_obj_vertices(out, place.metres(tin, zero_m))?;
     put_obj_faces(out, tin.triangles.iter())
 }
 
@@ -98,7 +99,7 @@ mod tests {
         let mut vertices: Vec<_> = rect.corners().into_iter().enumerate().map(corner).collect();
         vertices.push(Vertex { at: LatticePoint::new(41, 25), height: -1 });
         let triangles = vec![[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]];
-        Tin { rect, vertices, triangles }
+        Tin::new(rect, vertices, triangles)
     }
 
     /// Header and body of the PLY.

@@ -1,7 +1,8 @@
 //! What features cost in triangles, counted before any tile is refined, and what becomes of those that cost too much.
 //!
-//! A point inside a load module adds two triangles and one on its side adds one, whatever else the TIN holds, because
-//! triangles = 2 V + B - 2. So the count is exact for what features put there, and a lower bound for their module.
+//! A deck has as many triangles at most as it has corners. On the ground, a point inside a load module adds two
+//! triangles and one on its side adds one, whatever else the TIN holds, because triangles = 2 V + B - 2. So the count
+//! is exact for what features put there, and a lower bound for their module.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -9,6 +10,7 @@ use crate::clean::Notes;
 use crate::forms::{Formed, form};
 use crate::pieces::Grant;
 use crate::strand::{Graded, Strand};
+use crate::strips::Face;
 use crate::{FeatureId, Flaw, Form, Grants, Place, Remark, Remedy, Site};
 
 /// Triangles that features take, by load module (row, column) and class.
@@ -72,7 +74,23 @@ pub fn cost(formed: &Formed, site: &Site) -> Cost {
             *cost.entry(module).or_default().entry(class).or_insert(0) += triangles;
         }
     }
+    for deck in &formed.decks {
+        for module in modules_under(deck, site) {
+            *cost.entry(module).or_default().entry(deck.class).or_insert(0) += deck.corners.len() as u32;
+        }
+    }
     cost
+}
+
+/// The load modules that a deck may lie over. In none of them it has more triangles than it has corners, also where a
+/// corner of the load module cuts it.
+fn modules_under(deck: &Face, site: &Site) -> Vec<(i32, i32)> {
+    let modules: Vec<(i32, i32)> = deck.corners.iter().map(|(place, _)| site.module_of(*place)).collect();
+    let span = |of: fn(&(i32, i32)) -> i32| {
+        let all = modules.iter().map(of);
+        all.clone().min().unwrap_or(0)..=all.max().unwrap_or(-1)
+    };
+    span(|module| module.0).flat_map(|row| span(|module| module.1).map(move |col| (row, col))).collect()
 }
 
 /// The load modules a point belongs to, with the triangles it adds to each.
@@ -176,6 +194,13 @@ fn features_of(formed: &Formed, site: &Site, modules: &BTreeMap<(i32, i32), u32>
                     of.parts += PARTS * triangles / degree[point as usize];
                 }
             }
+        }
+    }
+    for deck in &formed.decks {
+        for module in modules_under(deck, site).into_iter().filter(|module| modules.contains_key(module)) {
+            let member = Member { class: deck.class, id: deck.id, place: deck.corners[0].0, parts: 0 };
+            let of = features.entry(module).or_default().entry((deck.class, deck.id)).or_insert(member);
+            of.parts += PARTS * deck.corners.len() as u32;
         }
     }
     features.into_iter().map(|(module, found)| (module, found.into_values().collect())).collect()

@@ -36,6 +36,20 @@ pub struct FormedEdge {
     pub id: FeatureId,
 }
 
+/// A ring of edges of the TIN, or of what a higher class left of it, around ground of its class: a part of a strip,
+/// a shore, or a bank. Rings of one feature and role inside one another are its holes.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Surface {
+    /// Its class.
+    pub class: u16,
+    /// Side, shore or bank.
+    pub role: Role,
+    /// Its places with their heights in quanta; the first is not repeated.
+    pub ring: Vec<(Place, i32)>,
+    /// Which feature it comes from.
+    pub id: FeatureId,
+}
+
 /// All that features put into the ground.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Formed {
@@ -45,6 +59,8 @@ pub struct Formed {
     pub edges: Vec<FormedEdge>,
     /// Strips and junctions on the ground, by class.
     pub faces: Vec<Face>,
+    /// What edges of the TIN enclose and a class of its own covers, by class.
+    pub surfaces: Vec<Surface>,
     /// The surfaces of decks.
     pub decks: Vec<Face>,
     /// What was changed.
@@ -203,11 +219,28 @@ fn assemble(lines: Vec<Strand>, faces: &[Face], site: &Site, remarks: &mut Vec<R
             notes.write_at(places[0], Flaw::Overlap, Remedy::Cut);
         }
     }
-    collect(heights, edges)
+    let mut formed = collect(&heights, edges);
+    formed.surfaces = surfaces(&lines, &rounded, &heights);
+    formed
+}
+
+fn surfaces(lines: &[Strand], rounded: &[Vec<Place>], heights: &Decided) -> Vec<Surface> {
+    let is_surface = |(line, places): &(&Strand, &Vec<Place>)| {
+        matches!(line.role, Role::Side | Role::Shore | Role::Bank)
+            && 3 < places.len()
+            && places.first() == places.last()
+    };
+    let surface = |(line, places): (&Strand, &Vec<Place>)| {
+        let ring = places[1..].iter().map(|place| (*place, heights[place].3)).collect();
+        Surface { class: line.class, role: line.role, ring, id: line.id }
+    };
+    let mut surfaces: Vec<Surface> = lines.iter().zip(rounded).filter(is_surface).map(surface).collect();
+    surfaces.sort();
+    surfaces
 }
 
 /// Numbers the points that edges use.
-fn collect(heights: Decided, edges: BTreeMap<(Place, Place), (u16, Role, FeatureId)>) -> Formed {
+fn collect(heights: &Decided, edges: BTreeMap<(Place, Place), (u16, Role, FeatureId)>) -> Formed {
     let used: BTreeSet<Place> = edges.keys().flat_map(|(a, b)| [*a, *b]).collect();
     let points: Vec<(Place, i32)> = used.iter().map(|place| (*place, heights[place].3)).collect();
     let number = |place: Place| points.partition_point(|(other, _)| *other < place) as u32;
@@ -215,7 +248,7 @@ fn collect(heights: Decided, edges: BTreeMap<(Place, Place), (u16, Role, Feature
         .into_iter()
         .map(|((a, b), (class, role, id))| FormedEdge { a: number(a), b: number(b), role, class, id })
         .collect();
-    Formed { points, edges, faces: Vec::new(), decks: Vec::new(), remarks: Vec::new() }
+    Formed { points, edges, faces: Vec::new(), surfaces: Vec::new(), decks: Vec::new(), remarks: Vec::new() }
 }
 
 /// A line's own heights at the places it has after rounding: what is new lies between its stations.

@@ -29,8 +29,10 @@ pub use remark::{Flaw, Remark, Remedy};
 pub mod table;
 pub use table::{Form, Kind};
 mod lengths;
+mod overview;
+pub use overview::{IdleRule, Overview, OverviewRow, RowOrigin, overview};
 mod rules;
-pub use rules::{Feature, Rule, RuleKind, Sorted, Storey, Traits, nearest_tags, sort_out};
+pub use rules::{Feature, Rule, RuleKind, Sorted, Storey, Traits, class_names, nearest_tags, sort_out};
 
 // Onto the lattice.
 mod place;
@@ -92,9 +94,13 @@ mod room;
 mod toes;
 pub use toes::{CUT_RUN, FILL_RUN, reach_max};
 mod forms;
-pub use forms::{Formed, FormedEdge, form};
+pub use forms::{Formed, FormedEdge, Surface, form};
 mod cost;
 pub use cost::{Cost, Reserved, cost, reserve};
+
+// All of it, in its order.
+mod area;
+pub use area::{AreaFeatures, Levelled, Room};
 
 #[cfg(test)]
 mod samples;

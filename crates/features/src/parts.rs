@@ -7,7 +7,7 @@ use crate::lakes::Waters;
 use crate::rings::encloses;
 use crate::rivers::Fallen;
 use crate::strand::{Role, Strand};
-use crate::{Kind, Network, Outline, Place, Rounded, Site, Storey, Way};
+use crate::{Edge, Kind, Network, Outline, Place, Rounded, Site, Way};
 
 /// Edges of a river with the heights of their ends.
 pub type Line = Vec<([Place; 2], [i32; 2])>;
@@ -61,17 +61,26 @@ pub fn breaklines(rounded: &Rounded, ground: &dyn Fn(Place) -> Option<i32>) -> V
     strands
 }
 
-/// The middle lines of rivers and streams on the ground, reach by reach. What flows in a pipe is not in the ground.
+/// The middle lines of rivers and streams on the ground, reach by reach: none goes on through a place to which water
+/// flows from both sides, or from which it flows to both. What flows in a pipe is not in the ground.
 pub fn channels(network: &Network, fallen: &Fallen) -> Vec<Strand> {
-    let chains = network.chains().into_iter().filter(|chain| chain.traits.storey == Storey::Ground);
-    chains
-        .map(|chain| {
-            let station = |node: &u32| (network.nodes[*node as usize].place, fallen.heights[*node as usize]);
-            let id = network.ways[network.edges[chain.edges[0] as usize].way as usize].id;
-            let stations = chain.nodes.iter().map(station).collect();
-            Strand { role: Role::Channel, class: chain.traits.class, id, stations }
-        })
-        .collect()
+    let foot = |edge: u32| {
+        let Edge { a, b, .. } = network.edges[edge as usize];
+        if fallen.turned[edge as usize] { a } else { b }
+    };
+    let flows_through = |node: u32| match network.beside(node) {
+        [(_, one), (_, other)] => {
+            network.traits(*one) == network.traits(*other) && (foot(*one) == node) != (foot(*other) == node)
+        }
+        _ => false,
+    };
+    let strand = |(nodes, edges): (Vec<u32>, Vec<u32>)| {
+        let station = |node: &u32| (network.nodes[*node as usize].place, fallen.heights[*node as usize]);
+        let class = network.traits(edges[0]).class;
+        let id = network.ways[network.edges[edges[0] as usize].way as usize].id;
+        Strand { role: Role::Channel, class, id, stations: nodes.iter().map(station).collect() }
+    };
+    network.runs(&|edge| network.is_ground(edge), &flows_through).into_iter().map(strand).collect()
 }
 
 /// What decks cross: every piece of channels and shores, as its class says.

@@ -23,6 +23,13 @@ pub struct Outline {
     pub id: FeatureId,
 }
 
+impl Outline {
+    /// The places of its rings, ring after ring.
+    pub fn places(&self) -> impl Iterator<Item = Place> {
+        self.rings.iter().flat_map(|ring| &ring.places).copied()
+    }
+}
+
 /// Features on the lattice.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rounded {

@@ -39,7 +39,23 @@ pub struct Rule {
 }
 
 impl Rule {
-    fn matches(&self, feature: &Source) -> bool {
+    /// The first kind that what it matches may have; `None` where that is left out.
+    pub(crate) fn first_kind(&self) -> Option<Kind> {
+        match self.kind {
+            RuleKind::None => None,
+            RuleKind::Is(kind) => Some(kind),
+            RuleKind::AsBuiltIn => {
+                let tag = |(key, values): &(String, Vec<String>)| {
+                    values.iter().map(|value| (key.clone(), value.clone())).collect()
+                };
+                let tags: Vec<Vec<(String, String)>> = self.tags.iter().map(tag).collect();
+                let kinds = tags.iter().flatten().filter_map(|tag| table::kind_of(std::slice::from_ref(tag)));
+                Some(kinds.min().unwrap_or(Kind::Breakline))
+            }
+        }
+    }
+
+    pub(crate) fn matches(&self, feature: &Source) -> bool {
         self.tags.iter().all(|(key, values)| {
             feature.tag(key).is_some_and(|found| values.is_empty() || values.iter().any(|value| value == found))
         })
@@ -60,7 +76,7 @@ pub enum Storey {
 /// All that later stages ask of a feature, but its id and its shape.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Traits {
-    /// Number of its class in [`Sorted::classes`]; lower numbers keep their heights.
+    /// Number of its class in [`class_names`]; lower numbers keep their heights.
     pub class: u16,
     /// Its kind.
     pub kind: Kind,
@@ -76,6 +92,30 @@ pub struct Traits {
     pub level: Option<i32>,
     /// Whether heights of its vertices are pins.
     pub pins: bool,
+}
+
+impl Traits {
+    /// Gives all that they are, word by word.
+    pub(crate) fn feed(&self, word: &mut dyn FnMut(i64)) {
+        let Traits { class, kind, storey, width, grade_ppm, form, level, pins } = *self;
+        let (storey, layer) = match storey {
+            Storey::Ground => (0, 0),
+            Storey::Deck(layer) => (1, layer),
+            Storey::Tunnel(layer) => (2, layer),
+        };
+        let form = match form {
+            Form::Line => 0,
+            Form::Strip => 1,
+            Form::StripAlways => 2,
+            Form::Bench => 3,
+            Form::Polygon => 4,
+        };
+        let kind = Kind::ALL.iter().position(|other| *other == kind).unwrap_or(Kind::ALL.len()) as i64;
+        let numbers = [class.into(), kind, storey, layer.into(), width.into(), grade_ppm.into(), form, pins.into()];
+        numbers.into_iter().for_each(&mut *word);
+        word(level.is_some().into());
+        word(level.unwrap_or(0).into());
+    }
 }
 
 /// A feature whose kind is known.
@@ -94,8 +134,6 @@ pub struct Feature {
 pub struct Sorted {
     /// Features with a kind, in no order that matters.
     pub features: Vec<Feature>,
-    /// Names of classes, in the table's order; a rule's own class stands before that of its kind.
-    pub classes: Vec<String>,
     /// How many features each of the job's rules matched.
     pub matched: Vec<usize>,
     /// How many features each kind has, by the table.
@@ -120,7 +158,7 @@ pub fn sort_out(sources: Vec<Source>, rules: &[Rule]) -> Sorted {
     let kinds: Vec<_> = sources.iter().map(kind_of).collect();
     let mut matched = vec![0; rules.len()];
     kinds.iter().filter_map(|(rule, _)| *rule).for_each(|rule| matched[rule] += 1);
-    let classes = classes(&kinds, rules);
+    let classes = class_names(rules);
     let (mut features, mut remarks, mut by_kind) = (Vec::new(), Vec::new(), BTreeMap::new());
     for (source, (rule, kind)) in sources.into_iter().zip(kinds) {
         let Some(kind) = kind else { continue };
@@ -132,25 +170,27 @@ pub fn sort_out(sources: Vec<Source>, rules: &[Rule]) -> Sorted {
         features.push(Feature { id: source.id, traits, shape: source.shape });
     }
     Remark::sort(&mut remarks);
-    Sorted { features, classes, matched, by_kind, remarks }
+    Sorted { features, matched, by_kind, remarks }
 }
 
-fn class_name(rule: Option<&Rule>, kind: Kind) -> &str {
-    rule.and_then(|rule| rule.class.as_deref()).unwrap_or(kind.name())
-}
-
-/// Classes in the table's order; within a kind, in the order of rules, the kind's own last.
-fn classes(kinds: &[(Option<usize>, Option<Kind>)], rules: &[Rule]) -> Vec<String> {
-    let used: BTreeSet<(Kind, usize)> =
-        kinds.iter().filter_map(|(rule, kind)| Some(((*kind)?, rule.unwrap_or(rules.len())))).collect();
-    let mut classes: Vec<String> = Vec::new();
-    for (kind, rule) in used {
-        let name = class_name(rules.get(rule), kind);
-        if !classes.iter().any(|class| class == name) {
-            classes.push(name.to_owned());
+/// Names of the classes that features may have, whatever there is of them: those of all kinds in the table's order, a
+/// rule's own before that of its kind.
+pub fn class_names(rules: &[Rule]) -> Vec<String> {
+    let mut names: Vec<String> = Vec::new();
+    let mut add = |name: &str| {
+        if !names.iter().any(|other| other == name) {
+            names.push(name.to_owned());
         }
+    };
+    for kind in Kind::ALL {
+        rules.iter().filter(|rule| rule.first_kind() == Some(kind)).for_each(|rule| add(class_name(Some(rule), kind)));
+        add(kind.name());
     }
-    classes
+    names
+}
+
+pub(crate) fn class_name(rule: Option<&Rule>, kind: Kind) -> &str {
+    rule.and_then(|rule| rule.class.as_deref()).unwrap_or(kind.name())
 }
 
 /// Collects what was refused while one feature is looked at.
@@ -345,11 +385,13 @@ mod tests {
             source(3, &[("man_made", "embankment")]),
             source(4, &[("highway", "motorway")]),
         ];
-        let sorted = sort_out(sources, &[track, none, named]);
-        assert_eq!(sorted.classes, ["motorway", "desert track", "breakline"]);
+        let rules = [track, none, named];
+        let classes = class_names(&rules);
+        assert_eq!(classes[..5], ["motorway", "primary", "minor", "desert track", "track"]);
+        let sorted = sort_out(sources, &rules);
         assert_eq!(sorted.matched, [1, 1, 1]);
         let traits = sorted.features[0].traits;
-        assert_eq!((traits.width, traits.grade_ppm, traits.form, traits.class), (512, 125_000, Form::Bench, 1));
+        assert_eq!((traits.width, traits.grade_ppm, traits.form, traits.class), (512, 125_000, Form::Bench, 3));
         assert_eq!(sorted.features.len(), 3);
     }
 

@@ -169,8 +169,13 @@ pub fn rows() -> impl Iterator<Item = (&'static str, &'static [&'static str], Ki
 
 /// The kind of a feature with these tags by the built-in table: the first row that matches.
 pub fn kind_of(tags: &[(String, String)]) -> Option<Kind> {
+    row_of(tags).map(|row| MATCHES[row].2)
+}
+
+/// The number of the first row of the built-in table that matches these tags, from 0.
+pub fn row_of(tags: &[(String, String)]) -> Option<usize> {
     let has = |key: &str, values: &[&str]| tags.iter().any(|(name, value)| name == key && values.contains(&&**value));
-    MATCHES.into_iter().find(|(key, values, _)| has(key, values)).map(|(_, _, kind)| kind)
+    MATCHES.iter().position(|(key, values, _)| has(key, values))
 }
 
 #[cfg(test)]

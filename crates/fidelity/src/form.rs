@@ -180,7 +180,7 @@ mod tests {
         // Two triangles across 1 x 12 cells: atan(1/12) is 4.76 degrees.
         let rect = PostRect::of_size(2, 13);
         let vertices = rect.corners().map(|post| Vertex { at: post.into(), height: 0 }).to_vec();
-        let found = form(&Tin { rect, vertices, triangles: vec![[0, 1, 2], [0, 2, 3]] });
+        let found = form(&Tin::new(rect, vertices, vec![[0, 1, 2], [0, 2, 3]]));
         assert_eq!((found.slivers, found.sliver_share()), (2, 1.0));
         assert!((found.angle_min_degrees - (1.0_f64 / 12.0).atan().to_degrees()).abs() < 1e-9);
         assert!((found.angle_p5_degrees - 4.77).abs() < 1e-9, "{found:?}");
@@ -201,7 +201,7 @@ mod tests {
         let rect = PostRect::of_size(3, 3);
         let mut vertices = rect.corners().map(|post| Vertex { at: post.into(), height: 0 }).to_vec();
         vertices.push(Vertex { at: Post::new(1, 1).into(), height: 0 });
-        let junction = Tin { rect, vertices, triangles: vec![[0, 1, 4], [1, 2, 4], [0, 2, 3]] };
+        let junction = Tin::new(rect, vertices, vec![[0, 1, 4], [1, 2, 4], [0, 2, 3]]);
         let found = form(&junction);
         assert_eq!((found.cracks, found.t_junctions, found.wrong_areas), (3, 1, 0));
         let mut hole = junction.clone();
@@ -224,7 +224,7 @@ mod tests {
             let triangles = mesh::delaunay(&places);
             let at = |place: &Post| LatticePoint::new(place.row, place.col);
             let vertices = places.iter().map(|place| Vertex { at: at(place), height }).collect();
-            module_of(&Tin { rect, vertices, triangles }, id, spacing)
+            module_of(&Tin::new(rect, vertices, triangles), id, spacing)
         };
         let found = |west: Option<LatticePoint>, east: Option<LatticePoint>, step: i32| {
             let modules = [module(ids[0], 0, west), module(ids[1], step, east)];

@@ -42,6 +42,8 @@ mod seam;
 pub use seam::{SeamVisibility, seam_visibility};
 mod form;
 pub use form::{MeshForm, SLIVER_DEGREES, mesh_form};
+mod features;
+pub use features::{Bodies, FeatureFigures, missing_edges};
 mod registration;
 pub use registration::{Registration, SHIFT_POSTS_MAX, registration};
 mod regular;

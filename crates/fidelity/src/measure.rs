@@ -139,7 +139,7 @@ fn visit(module: &LoadModule, ground: &Reference, mut each: impl FnMut(terrain::
 
 #[cfg(test)]
 mod tests {
-    use terrain::{ModuleId, ModuleVertex, Post};
+    use terrain::{Decks, ModuleId, ModuleVertex, Post};
 
     use fastrand::Rng;
 
@@ -172,6 +172,7 @@ mod tests {
             polygon_count: triangles.len() as u32,
             triangles,
             residual: ModuleResidual::default(),
+            decks: Decks::default(),
         }
     }
 

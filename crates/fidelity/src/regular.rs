@@ -43,7 +43,7 @@ fn grid_of(dem: &Dem, rect: PostRect, step: i32) -> Tin {
             triangles.push([south_east, north_west + 1, north_west]);
         }
     }
-    Tin { rect, vertices, triangles }
+    Tin::new(rect, vertices, triangles)
 }
 
 #[cfg(test)]

@@ -1,6 +1,8 @@
 //! Ground for tests: random TINs, load modules cut from them, and slow, obvious answers.
 
-use terrain::{Dem, LatticePoint, LoadModule, ModuleGrid, ModuleId, ModuleResidual, ModuleVertex, Post, PostRect};
+use terrain::{
+    Decks, Dem, LatticePoint, LoadModule, ModuleGrid, ModuleId, ModuleResidual, ModuleVertex, Post, PostRect,
+};
 use terrain::{Spacing, Tin, Vertex};
 
 use crate::draw::Draw;
@@ -45,7 +47,7 @@ pub fn random_tin(rect: PostRect, count: usize, height: impl Fn(LatticePoint, &m
             Vertex { at, height: height(at, dice) }
         })
         .collect();
-    let tin = Tin { rect, vertices, triangles };
+    let tin = Tin::new(rect, vertices, triangles);
     tin.check().expect("a random TIN is sound");
     tin
 }
@@ -58,7 +60,7 @@ pub fn full_tin(dem: &Dem) -> Tin {
     let vertices = posts.map(|post| Vertex { at: post.into(), height: dem.height(post) }).collect();
     let cells = (0..high - 1).flat_map(|row| (0..wide - 1).map(move |col| row * wide + col));
     let triangles = cells.flat_map(|v| [[v, v + 1, v + wide + 1], [v, v + wide + 1, v + wide]]).collect();
-    Tin { rect, vertices, triangles }
+    Tin::new(rect, vertices, triangles)
 }
 
 /// One load module of 20 x 20 cells that holds a TIN of 21 x 21 posts, moved to its place.
@@ -89,6 +91,7 @@ pub fn module_of(tin: &Tin, id: ModuleId, spacing: Spacing) -> LoadModule {
         polygon_count: triangles.len() as u32,
         triangles,
         residual: ModuleResidual::default(),
+        decks: Decks::default(),
     }
 }
 

@@ -117,7 +117,7 @@ impl PostsInModule<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use terrain::{ModuleId, ModuleResidual, ModuleVertex};
+    use terrain::{Decks, ModuleId, ModuleResidual, ModuleVertex};
 
     const GRID: ModuleGrid = ModuleGrid { rows: 1, cols: 2, side_cells: 4 };
 
@@ -134,6 +134,7 @@ mod tests {
                 classes: vec![0, 0],
                 polygon_count: 2,
                 residual: ModuleResidual::default(),
+                decks: Decks::default(),
             }
         };
         vec![module(0), module(1)]

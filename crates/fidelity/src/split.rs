@@ -92,7 +92,7 @@ impl Shares {
 
 #[cfg(test)]
 mod tests {
-    use terrain::{Dem, Importance, ModuleGrid, ModuleId, ModuleResidual, ModuleVertex, Spacing};
+    use terrain::{Decks, Dem, Importance, ModuleGrid, ModuleId, ModuleResidual, ModuleVertex, Spacing};
 
     use super::*;
 
@@ -108,6 +108,7 @@ mod tests {
             classes: vec![0; 2],
             polygon_count: 2,
             residual: ModuleResidual::default(),
+            decks: Decks::default(),
         }
     }
 

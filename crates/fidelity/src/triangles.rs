@@ -3,7 +3,7 @@
 //! Places are east and north in posts of the working grid, heights are in quanta; both are `f64`. A vertex on the
 //! lattice keeps its place exactly, and vertices of two load modules at one place keep equal ones.
 
-use terrain::{LATTICE_PER_POST, LoadModule, ModuleGrid, PostRect, Spacing, Tin};
+use terrain::{LoadModule, ModuleGrid, PostRect, Spacing, Tin};
 
 use crate::cells::Cells;
 
@@ -28,7 +28,7 @@ impl Triangles {
     pub fn of_tin(tin: &Tin) -> Self {
         let places = tin.vertices.iter().map(|v| [i64::from(v.at.col), i64::from(v.at.row)]).collect();
         let heights = tin.vertices.iter().map(|vertex| vertex.height);
-        Self::new(tin.rect, (places, i64::from(LATTICE_PER_POST)), heights, tin.triangles.clone())
+        Self::new(tin.rect, (places, i64::from(tin.steps_per_post)), heights, tin.triangles.clone())
     }
 
     /// Those of the load modules of a whole area.
@@ -277,11 +277,11 @@ mod tests {
         // A pyramid of height 100 over a square of 8 posts, whose top stands on the middle post.
         let at = |row, col| LatticePoint::from(Post::new(row, col));
         let vertices = [(0, 0, 0), (0, 8, 0), (8, 8, 0), (8, 0, 0), (4, 4, 100)];
-        let tin = Tin {
-            rect: PostRect::of_size(9, 9),
-            vertices: vertices.map(|(row, col, height)| Vertex { at: at(row, col), height }).to_vec(),
-            triangles: vec![[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]],
-        };
+        let tin = Tin::new(
+            PostRect::of_size(9, 9),
+            vertices.map(|(row, col, height)| Vertex { at: at(row, col), height }).to_vec(),
+            vec![[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]],
+        );
         let triangles = Triangles::of_tin(&tin);
         for (from, to) in [([0.0, 0.0], [8.0, 8.0]), ([8.0, 0.0], [0.0, 8.0]), ([4.0, 0.0], [4.0, 8.0])] {
             let line = |z: f64| ([from[0], from[1], z], [to[0], to[1], z]);

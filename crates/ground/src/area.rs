@@ -48,6 +48,7 @@ impl GamingArea {
             area: job.limits.area_budget(&grid),
             per_window: window.limit,
             windows: Windows::of_size(grid, window.rows, window.cols),
+            reserved: Vec::new(),
         };
         refuse_impossible(job, &budget)?;
         let tiles = tiling.tiles().collect();

@@ -1,5 +1,6 @@
 //! Why there is no ground.
 
+use database::DatabaseError;
 use schedule::ScheduleError;
 use source_files::SourceError;
 use terrain::TileId;
@@ -11,6 +12,9 @@ pub enum GroundError {
     /// A raster or a file of polygons cannot be used.
     #[error(transparent)]
     Source(#[from] SourceError),
+    /// What features put into the ground cannot be read back.
+    #[error(transparent)]
+    Database(#[from] DatabaseError),
     /// The job asks for what cannot be.
     #[error("{key}: {found}, expected {expected}")]
     Impossible {
@@ -64,6 +68,7 @@ impl GroundError {
     pub fn hint(&self) -> Option<String> {
         match self {
             GroundError::Source(error) => error.hint(),
+            GroundError::Database(error) => error.hint().map(str::to_owned),
             GroundError::Impossible { hint, .. } => Some(hint.clone()),
             GroundError::OutsideSources { .. } => {
                 Some("this is a fault of the compiler; other rules in dem.voids or dem.resampling may avoid it".into())

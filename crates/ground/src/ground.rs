@@ -3,22 +3,25 @@
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, OnceLock};
 
+use database::Folder;
 use job::{DemSource, Job};
 use mask::Mask;
 use schedule::Workers;
 use source_files::{VoidSummary, read_polygons};
-use terrain::{Dem, GridFrame, Importance, Post, PostRect, TileId};
+use terrain::{Dem, GridFrame, Importance, PostRect, TileFeatures, TileId};
 
 use crate::area::GamingArea;
 use crate::bounds::Bounds;
 use crate::census::Census;
-use crate::given::{GamingAreaFrame, Given, GivenPost};
+use crate::given::{GamingAreaFrame, Given};
 use crate::large::WHOLE_BYTES_MAX;
+use crate::lines::Lines;
 use crate::mask_of::{Fault, Opening};
 use crate::relief::Relief;
 use crate::source::Source;
 use crate::sources::Opened;
 use crate::water::{Soundings, Water};
+use crate::window::Window;
 use crate::{GroundError, sources, water};
 
 /// Posts of an area up to which the windows of tiles are kept between stages (7 bytes a post).
@@ -34,6 +37,7 @@ pub struct Ground {
     rect: PostRect,
     frame: GridFrame,
     kept: Option<Vec<OnceLock<Arc<Window>>>>,
+    lines: OnceLock<Lines>,
     /// Points that the job gives.
     pub given: Given,
     /// Voids of the source under the area.
@@ -44,26 +48,6 @@ pub struct Ground {
     pub warnings: Vec<String>,
 }
 
-/// The ground of a rectangle of posts.
-pub struct Window {
-    /// Heights.
-    pub dem: Dem,
-    /// Weights and classes.
-    pub importance: Importance,
-    /// Posts that the job gives, of a tile's own window; none of any other.
-    pub given: Vec<GivenPost>,
-    /// Posts of such a window that it forbids.
-    pub forbidden: Vec<Post>,
-}
-
-impl Window {
-    /// What load modules of this rectangle are measured against.
-    pub fn measured(&self, area: &GamingArea) -> fidelity::Reference<'_> {
-        let spacing = area.frame.spacing;
-        fidelity::Reference { dem: &self.dem, mask: &self.importance, grid: area.grid, spacing }
-    }
-}
-
 impl Ground {
     /// Opens and judges everything the job names.
     ///
@@ -71,6 +55,23 @@ impl Ground {
     /// When a file cannot be used for this area.
     pub fn open(job: &Job, area: &GamingArea, workers: &Workers, stop: &AtomicBool) -> Result<Self, GroundError> {
         Self::open_within(job, area, (workers, stop), WHOLE_BYTES_MAX)
+    }
+
+    /// The ground of a finished database in `folder`, with the features that it has burned in.
+    ///
+    /// # Errors
+    /// As [`Ground::open`].
+    pub fn open_built(
+        job: &Job,
+        area: &GamingArea,
+        (workers, stop): (&Workers, &AtomicBool),
+        folder: &Folder,
+    ) -> Result<Self, GroundError> {
+        let ground = Self::open(job, area, workers, stop)?;
+        if job.features.is_some() {
+            ground.burn_in(folder, area);
+        }
+        Ok(ground)
     }
 
     /// The same, where rasters that take more than `whole_bytes_max` bytes are read by window.
@@ -107,7 +108,8 @@ impl Ground {
         let keep = area.rect.post_count() <= KEPT_POSTS_MAX;
         let kept = keep.then(|| area.tiles.iter().map(|_| OnceLock::new()).collect());
         let (rect, frame, given) = (area.rect, area.frame, Given::open(job, area)?);
-        let mut ground = Self { relief, mask, fault, rect, frame, kept, given, voids, warnings, accuracy_m };
+        let lines = OnceLock::new();
+        let mut ground = Self { relief, mask, fault, rect, frame, kept, lines, given, voids, warnings, accuracy_m };
         if !ground.relief.has_source_posts() {
             ground.take_census(job, area, workers, stop)?;
         }
@@ -153,7 +155,7 @@ impl Ground {
         self.fault.take()?;
         let place = GamingAreaFrame { rect: self.rect, frame: self.frame };
         let importance = mask::without_voids(self.given.weigh(importance, &place), &dem);
-        Ok(Window { dem, importance, given: Vec::new(), forbidden: Vec::new() })
+        Ok(Window { dem, importance, given: Vec::new(), forbidden: Vec::new(), featured: Vec::new() })
     }
 
     fn with_given(&self, area: &GamingArea, tile: TileId, window: Window) -> Result<Window, GroundError> {
@@ -167,20 +169,39 @@ impl Ground {
         self.relief.bounds.map(|bounds| told.fold(bounds, Bounds::and))
     }
 
-    /// The ground of one tile, made once where memory allows.
+    /// From now on, features are burned into every window but natural ones, as `folder` has them.
+    pub fn burn_in(&self, folder: &Folder, area: &GamingArea) {
+        self.lines.get_or_init(|| Lines::new(folder, area, self.kept.is_some()));
+    }
+
+    /// What features put into a tile; nothing before they are burned in.
+    ///
+    /// # Errors
+    /// When the file that says it cannot be read.
+    pub fn features(&self, tile: TileId) -> Result<Arc<TileFeatures>, GroundError> {
+        self.lines.get().map_or_else(|| Ok(Arc::new(TileFeatures::none(tile))), |lines| lines.features(tile))
+    }
+
+    /// The ground of one tile, made once where memory allows: natural, with features burned in if there are any.
+    ///
+    /// # Errors
+    /// When the source has no heights there, or features cannot be read.
+    pub fn tile(&self, area: &GamingArea, tile: TileId) -> Result<Arc<Window>, GroundError> {
+        let Some(lines) = self.lines.get() else { return self.natural_tile(area, tile) };
+        kept_or(lines.kept(area.tiling.index(tile)), || {
+            // Points that the job gives are looked up in what they are given for.
+            let window = lines.burn(Window::clone(&*self.natural_tile(area, tile)?))?;
+            self.with_given(area, tile, window)
+        })
+    }
+
+    /// The same without features.
     ///
     /// # Errors
     /// When the source has no heights there.
-    pub fn tile(&self, area: &GamingArea, tile: TileId) -> Result<Arc<Window>, GroundError> {
-        let rect = area.tiling.rect(tile);
-        let fresh = || self.with_given(area, tile, self.window(rect)?).map(Arc::new);
-        let Some(kept) = &self.kept else { return fresh() };
-        let slot = &kept[area.tiling.index(tile)];
-        if let Some(window) = slot.get() {
-            return Ok(window.clone());
-        }
-        let window = fresh()?;
-        Ok(slot.get_or_init(|| window).clone())
+    pub fn natural_tile(&self, area: &GamingArea, tile: TileId) -> Result<Arc<Window>, GroundError> {
+        let slot = self.kept.as_ref().map(|kept| &kept[area.tiling.index(tile)]);
+        kept_or(slot, || self.with_given(area, tile, self.natural(area.tiling.rect(tile))?))
     }
 
     /// The ground of a tile and of `halo` posts around it, put together from the windows of its neighbours, which
@@ -206,16 +227,42 @@ impl Ground {
                 heights[to as usize..][..cols.len()].copy_from_slice(part);
             }
         });
-        Ok(Window { dem, importance: join_importance(&parts, rect), given: Vec::new(), forbidden: Vec::new() })
+        let importance = join_importance(&parts, rect);
+        Ok(Window { dem, importance, given: Vec::new(), forbidden: Vec::new(), featured: Vec::new() })
     }
 
-    /// The ground of any rectangle of the area.
+    /// The ground of any rectangle of the area, with features burned in if there are any.
+    ///
+    /// # Errors
+    /// When the source has no heights there, or features cannot be read.
+    pub fn window(&self, rect: PostRect) -> Result<Window, GroundError> {
+        let natural = self.natural(rect)?;
+        match self.lines.get() {
+            Some(lines) => lines.burn(natural),
+            None => Ok(natural),
+        }
+    }
+
+    /// The ground of any rectangle of the area without features.
     ///
     /// # Errors
     /// When the source has no heights there.
-    pub fn window(&self, rect: PostRect) -> Result<Window, GroundError> {
+    pub fn natural(&self, rect: PostRect) -> Result<Window, GroundError> {
         self.with_importance(self.relief.dem(rect)?)
     }
+}
+
+/// What a slot holds, made if it is empty; made each time where there is no slot.
+pub(crate) fn kept_or(
+    slot: Option<&OnceLock<Arc<Window>>>,
+    make: impl FnOnce() -> Result<Window, GroundError>,
+) -> Result<Arc<Window>, GroundError> {
+    let Some(slot) = slot else { return make().map(Arc::new) };
+    if let Some(window) = slot.get() {
+        return Ok(window.clone());
+    }
+    let window = Arc::new(make()?);
+    Ok(slot.get_or_init(|| window).clone())
 }
 
 /// Whether a halo never reaches beyond a tile.

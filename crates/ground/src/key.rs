@@ -4,7 +4,7 @@ use engine::{FingerprintBuilder, Key, Part};
 use terrain::{Dem, Importance, Post, PostRect};
 
 use crate::given::GivenPost;
-use crate::ground::Window;
+use crate::window::Window;
 
 /// Heights of a window, and which of them are void.
 const HEIGHTS: Part = Part { name: "heights", changed: "its heights changed" };
@@ -16,7 +16,8 @@ const GIVEN: Part = Part { name: "given", changed: "the points given for it chan
 impl Window {
     /// The key of what is made from this window, with the window's own parts in it.
     pub fn key(&self, purpose: &'static str) -> Key {
-        let Self { dem, importance, given, forbidden } = self;
+        // What features have changed shows in heights and weights.
+        let Self { dem, importance, given, forbidden, featured: _ } = self;
         Key::new(purpose)
             .part(HEIGHTS, |part| feed_heights(part, dem))
             .part(WEIGHTS, |part| feed_weights(part, importance))
@@ -72,7 +73,7 @@ mod tests {
     }
 
     fn window(dem: Dem, importance: Importance) -> Window {
-        Window { dem, importance, given: Vec::new(), forbidden: Vec::new() }
+        Window { dem, importance, given: Vec::new(), forbidden: Vec::new(), featured: Vec::new() }
     }
 
     fn flat(rect: PostRect, odd: Post) -> Window {

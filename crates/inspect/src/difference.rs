@@ -91,8 +91,8 @@ fn module_difference(product: &Product, a: &LoadModule, b: &LoadModule) -> Modul
     let largest = |module: &LoadModule| f64::from(module.residual.largest) / f64::from(QUANTA_PER_METRE);
     ModuleDifference {
         module: a.id,
-        triangles: [a, b].map(|module| module.triangles.len() as u32),
-        polygons: [a, b].map(|module| module.polygon_count),
+        triangles: [a, b].map(|module| module.counts().triangles),
+        polygons: [a, b].map(|module| module.counts().polygons),
         rms_m: [rms(a), rms(b)],
         largest_m: [largest(a), largest(b)],
         apart_m: f64::from(apart(product, a, b)) / f64::from(QUANTA_PER_METRE),

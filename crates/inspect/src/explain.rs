@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
+use crate::explained_features::{ExplainedFeatures, explained_features};
 use compiler::{CompileError, Stage};
 use database::{Folder, TileState, files};
 use fidelity::{Split, best_split};
@@ -60,6 +61,8 @@ pub struct Explanation {
     pub one_more: Option<OneMore>,
     /// Why there is no ground to look at.
     pub no_ground: Option<String>,
+    /// Roads and water here, in jobs with some.
+    pub features: Option<ExplainedFeatures>,
 }
 
 /// The fullest window around a load module.
@@ -186,8 +189,8 @@ fn explained(
         tile: (tin.tile, state, tin.stop),
         tile_triangles: (tin.triangles_charged, allowed(allocation, tin.tile)),
         count_of: limits.count.name().into(),
-        triangles: module.triangles.len() as u32,
-        polygons: module.polygon_count,
+        triangles: module.counts().triangles,
+        polygons: module.counts().polygons,
         vertices_inside: (module.vertices.len() - module.border_vertex_count()) as u32,
         vertices_on_sides: on_sides,
         count: (limit_use.modules[product.grid.index(id)], limits.per_load_module),
@@ -205,6 +208,7 @@ fn explained(
         one_more: splits.and_then(|splits| one_more(product, splits, module)),
         no_ground: None,
         levels: Vec::new(),
+        features: explained_features(product, id, [west, south, west + side_m, south + side_m]),
     }
 }
 
@@ -217,7 +221,7 @@ fn levels(folder: &Folder, tile: TileId, id: ModuleId) -> Result<Vec<(u32, f64, 
     let metre = f64::from(QUANTA_PER_METRE);
     let figures = |module: &LoadModule| {
         let rms = mean_squares(module.residual.sum_squared as f64, module).sqrt();
-        (module.triangles.len() as u32, rms / metre, f64::from(module.residual.largest) / metre)
+        (module.counts().triangles, rms / metre, f64::from(module.residual.largest) / metre)
     };
     Ok(levels.iter().flatten().filter(|module| module.id == id).map(figures).collect())
 }
@@ -250,7 +254,8 @@ fn fullest_window(product: &Product, sums: &[u32], module: ModuleId) -> Explaine
 }
 
 fn classes(product: &Product, module: &LoadModule) -> Vec<(String, u32)> {
-    let names = product.job.importance.classes.iter().map(String::as_str).enumerate();
+    let all = product.job.class_names();
+    let names = all.iter().map(String::as_str).enumerate();
     let names = names.chain([(usize::from(HOLE_CLASS), HOLE_CLASS_NAME)]);
     let count = |class: usize| module.classes.iter().filter(|&&found| usize::from(found) == class).count() as u32;
     names.map(|(class, name)| (name.to_owned(), count(class))).filter(|(_, count)| 0 < *count).collect()

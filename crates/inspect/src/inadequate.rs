@@ -11,7 +11,7 @@ use compiler::CompileError;
 use geometry::Facet;
 use geometry::owned::{PostGrid, visit_residuals};
 use ground::{GamingArea, Ground, Window};
-use job::{Choice, Count, Job};
+use job::Choice;
 use product::{Opened, choose_ground, locate_weights};
 use schedule::Workers;
 use terrain::{
@@ -86,7 +86,7 @@ pub fn inadequate(folder: &Path, tolerance_m: Option<f64>) -> Result<Inadequate,
     let Opened { folder, manifest, mut job, area } = Opened::open(folder)?;
     choose_ground(&mut job, &manifest, folder.dir(), None)?;
     locate_weights(&mut job, &manifest, folder.dir())?;
-    let ground = Ground::open(&job, &area, &Workers::new(1), &AtomicBool::new(false))?;
+    let ground = Ground::open_built(&job, &area, (&Workers::new(1), &AtomicBool::new(false)), &folder)?;
     let window = ground.window(area.rect)?;
     let modules = read_modules(&folder, &area)?;
     let totals = &manifest.totals;
@@ -94,7 +94,7 @@ pub fn inadequate(folder: &Path, tolerance_m: Option<f64>) -> Result<Inadequate,
     let tolerance_m = tolerance_m.unwrap_or(3.0 * rms_m / f64::from(terrain::QUANTA_PER_METRE));
     let heaviest = heaviest(&window.importance, job.dem.water.as_ref().map(|water| water.class));
     let residual_m = weighted(modules.values(), &area, &window, heaviest);
-    let counts: Vec<u32> = modules.values().map(|module| counted(&job, module)).collect();
+    let counts: Vec<u32> = modules.values().map(|module| job.limits.count.of(module)).collect();
     let mut refused = BTreeSet::new();
     for &tile in &area.tiles {
         refused.extend(folder.read_tile(tile)?.1.refused.iter().map(|refusal| refusal.post));
@@ -118,13 +118,6 @@ pub fn inadequate(folder: &Path, tolerance_m: Option<f64>) -> Result<Inadequate,
         counts,
         residual_m,
     })
-}
-
-fn counted(job: &Job, module: &LoadModule) -> u32 {
-    match job.limits.count {
-        Count::Triangles => module.triangles.len() as u32,
-        Count::Polygons => module.polygon_count,
-    }
 }
 
 /// The weighted residual of each post: as it is where the ground matters most, in proportion elsewhere.

@@ -12,6 +12,8 @@ pub use fidelity::{
     SeamVisibility, SlopeClasses, SlopeDifference,
 };
 pub use measures::{BuiltResidual, ClassResidual, DatabaseFidelity, Fidelity, Sights, fidelity, measure};
+mod explained_features;
+pub use explained_features::ExplainedFeatures;
 mod explain;
 pub use explain::{ExplainedRefusal, ExplainedWindow, Explanation, OneMore, explain};
 mod difference;

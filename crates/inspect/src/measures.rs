@@ -97,7 +97,7 @@ pub fn fidelity(folder: &Path, against: Option<&Path>, sights: Sights) -> Result
     if no_classes.is_some() {
         job.importance.areas.clear();
     }
-    let ground = Ground::open(&job, &area, &Workers::new(1), &AtomicBool::new(false))?;
+    let ground = Ground::open_built(&job, &area, (&Workers::new(1), &AtomicBool::new(false)), &folder)?;
     let Window { dem, importance, .. } = ground.window(area.rect)?;
     if dem.void_count() == area.rect.post_count() {
         return Err(GroundError::Impossible {

@@ -262,7 +262,7 @@ pub(crate) fn problems_between(grid: ModuleGrid, levels: &[BTreeMap<ModuleId, Lo
 
 #[cfg(test)]
 mod tests {
-    use terrain::ModuleVertex;
+    use terrain::{Decks, ModuleVertex};
 
     use super::*;
 
@@ -285,6 +285,7 @@ mod tests {
             polygon_count: 1,
             triangles,
             residual: ModuleResidual::default(),
+            decks: Decks::default(),
         }
     }
 

@@ -2,6 +2,7 @@
 
 mod entries;
 mod exceeded;
+mod features;
 mod figures;
 mod made_from;
 mod modules;
@@ -79,12 +80,12 @@ pub fn verify(folder: &Path, dem: Option<&Path>) -> Result<Verdict, CompileError
             &Whole { folder: &folder, manifest: &manifest, job: &job, area: &area },
             levels,
             &mut verdict,
-            |tins| made_from::problems(&manifest, &job, &area, tins, &opened.fingerprints),
+            |tins| made_from::problems(&folder, &manifest, &job, &area, tins, &opened.fingerprints),
         )?;
     }
     if let Some(dem) = dem {
         let report = folder.report().ok();
-        let residuals = recompute(job, &area, dem, levels, report.as_ref(), &mut verdict)?;
+        let residuals = recompute(job, &area, &folder, dem, levels, report.as_ref(), &mut verdict)?;
         verdict.residual = Some(residual_of(&residuals.total()));
     }
     Ok(verdict)
@@ -118,6 +119,7 @@ fn check_sums(
     verdict.problems.extend(problems);
     verdict.unchecked.extend(unchecked);
     let report = if folder.path(files::REPORT).exists() { Some(folder.report()?) } else { None };
+    verdict.problems.extend(features::check(folder, manifest, job, area, modules, report.as_ref())?);
     let counts = exceeded::counts(job, area, modules);
     let mut exceeded = exceeded::of_counts(area, &counts);
     verdict.problems.extend(exceeded::wrong_states(manifest, area, &exceeded));
@@ -268,6 +270,7 @@ fn side_of(module: &LoadModule, side: Side) -> Vec<(u16, i32)> {
 fn recompute(
     mut job: Job,
     area: &GamingArea,
+    folder: &Folder,
     dem: &Path,
     levels: &[Modules],
     report: Option<&Report>,
@@ -277,7 +280,7 @@ fn recompute(
     let said = SourceSaid::default();
     let files = vec![SourceFile { written: written.clone(), path: dem.into(), said: said.clone() }];
     job.dem.source = DemSource::Files { written: vec![SourceEntry { name: written, said }], files };
-    let open = |job: &Job| Ground::open(job, area, &Workers::new(1), &AtomicBool::new(false));
+    let open = |job: &Job| Ground::open_built(job, area, (&Workers::new(1), &AtomicBool::new(false)), folder);
     // The files of areas of importance may be gone, and then nothing is known of classes.
     let (ground, has_classes) = match open(&job) {
         Ok(ground) => (ground, true),

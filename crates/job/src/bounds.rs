@@ -95,3 +95,23 @@ pub const SMOOTH_M_MAX: f64 = 10_000.0;
 pub const SLOPE_PERCENT_MAX: f64 = 10_000.0;
 /// Files and folders that a pattern may look at: more than any archive of rasters has, and a few seconds.
 pub const VISITED_MAX: usize = 500_000;
+/// Entries of `features.sources`: an entry for each layer of each file of a country.
+pub const FEATURE_SOURCES_MAX: usize = 4096;
+/// Rules of `features.rules`: each is tried on each feature.
+pub const RULES_MAX: usize = 1000;
+/// Tags in `where` of a rule, and values of one of them.
+pub const TAGS_MAX: usize = 1000;
+/// Characters of a tag's key or value: what OpenStreetMap allows.
+pub const TAG_CHARS_MAX: usize = 255;
+/// Characters of the name of a layer.
+pub const LAYER_CHARS_MAX: usize = 255;
+/// Metres of width that a rule may give: a step of heights to the widest runway and its shoulders.
+pub const RULE_WIDTH_M: std::ops::RangeInclusive<f64> = 0.01..=500.0;
+/// Percent of the greatest grade that a rule may give: half a right angle is the most.
+pub const RULE_GRADE_PERCENT: std::ops::RangeInclusive<f64> = 0.01..=100.0;
+/// The share of a load module's limit that features may take.
+pub const SHARE_MAX: std::ops::RangeInclusive<f64> = 0.01..=1.0;
+/// Metres that decks may be asked to keep clear of what runs below: the highest bridges leave so much.
+pub const CLEARANCE_M_MAX: f64 = 100.0;
+/// Metres back along a way in which the bank of a deck may sag.
+pub const BANK_M_MAX: f64 = 1000.0;

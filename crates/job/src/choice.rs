@@ -5,12 +5,13 @@
 
 use std::mem::discriminant;
 
+use features::{Form, Kind, RuleKind};
 use terrain::{Effort, HeightFit, LastBatch, Lattice, LodBorder, Resampling, Smooth, TileOrder};
 
 use self::Cost::{Residual, Seconds};
 use crate::{
-    Allocation, AreaPlace, Borders, ClipHeights, Count, DemSource, Edges, ErrorKey, MethodName, OuterBorder,
-    SampleClass, StartMethod,
+    Allocation, AreaPlace, Borders, ClipHeights, Count, DemSource, Edges, ErrorKey, HeightsFrom, MethodName,
+    OuterBorder, SampleClass, StartMethod,
 };
 
 /// A setting that is one of some words.
@@ -36,7 +37,7 @@ pub trait Choice: Sized + 'static {
 }
 
 /// One word of a setting.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug)]
 pub struct Word<T> {
     /// As a job file writes it.
     pub name: &'static str,
@@ -91,6 +92,63 @@ impl<T> Word<T> {
             cost => format!("{}; {}", self.meaning, cost.text()),
         }
     }
+}
+
+/// Kinds, with what the built-in table says of each.
+const KINDS: [Word<Kind>; 11] = [
+    Word::new("motorway", Kind::Motorway, "motorways and trunk roads: 12 m wide, at most 6 %, form auto"),
+    Word::new("primary", Kind::Primary, "primary to tertiary roads: 7 m wide, at most 10 %, form auto"),
+    Word::new("minor", Kind::Minor, "streets and other small roads: 5 m wide, at most 15 %, form auto"),
+    Word::new("track", Kind::Track, "tracks: 3 m wide, at most 25 %, form line"),
+    Word::new("rail", Kind::Rail, "railways: 5 m wide, at most 3 %, form auto"),
+    Word::new("runway", Kind::Runway, "runways, taxiways and aprons: 45 m wide, at most 2 %, form auto"),
+    Word::new("river", Kind::River, "rivers and canals: 10 m wide, falling, form line, or the polygon of its banks"),
+    Word::new("stream", Kind::Stream, "streams, ditches and drains: 1 m wide, falling, form line"),
+    Word::new("lake", Kind::Lake, "lakes and reservoirs: level, a polygon"),
+    Word::new("dam", Kind::Dam, "dams and weirs: they split water and stay ground"),
+    Word::new("breakline", Kind::Breakline, "lines that become edges of the TIN, as high as the ground or as they say"),
+];
+
+impl Choice for Kind {
+    const WORDS: &'static [Word<Self>] = &KINDS;
+}
+
+impl Choice for RuleKind {
+    const WORDS: &'static [Word<Self>] = &RULE_KINDS;
+
+    fn word(&self) -> &'static Word<Self> {
+        // All kinds are one variant.
+        Self::WORDS.iter().find(|word| word.value == *self).expect("only what a job can say is asked for its word")
+    }
+}
+
+/// What a rule can say of its kind: the kinds, and that there is none.
+const RULE_KINDS: [Word<RuleKind>; 12] = {
+    let none = Word::new("none", RuleKind::None, "left out");
+    let mut words = [none; 12];
+    let mut at = 0;
+    while at < KINDS.len() {
+        words[at] = Word::new(KINDS[at].name, RuleKind::Is(KINDS[at].value), KINDS[at].meaning);
+        at += 1;
+    }
+    words
+};
+
+impl Choice for Form {
+    /// Polygons have no word: shapes and tags say what is one.
+    const WORDS: &'static [Word<Self>] = &[
+        Word::new("line", Self::Line, "the centreline: about 2 triangles a station"),
+        Word::new("auto", Self::Strip, "a strip where the ground falls by more than 0.5 m across, else a line"),
+        Word::new("strip", Self::StripAlways, "both edges, level across: about 4 triangles a station"),
+        Word::new("bench", Self::Bench, "a strip, and where its slopes meet the ground: about 8 triangles a station"),
+    ];
+}
+
+impl Choice for HeightsFrom {
+    const WORDS: &'static [Word<Self>] = &[
+        Word::new("dem", Self::Dem, "heights come from the DEM"),
+        Word::new("feature", Self::Feature, "heights of the features' own vertices are hard"),
+    ];
 }
 
 impl Choice for AreaPlace {

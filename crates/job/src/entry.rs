@@ -2,6 +2,7 @@
 //!
 //! Every answer that is not the expected one becomes a [`JobError`] with the line, the key and the text as written.
 
+use std::borrow::Cow;
 use std::ops::{Range, RangeInclusive};
 use std::path::Path;
 
@@ -55,6 +56,11 @@ impl<'a> Section<'a> {
         };
         let entry = Entry { document, key: name.to_owned(), offset: key.span().start, value };
         entry.table()
+    }
+
+    /// Whether the job has it.
+    pub fn is_there(&self) -> bool {
+        self.table.is_some()
     }
 
     fn check_keys(&self) -> Result<(), JobError> {
@@ -309,7 +315,9 @@ impl<'a> Entry<'a> {
         T::named(found).cloned().ok_or_else(|| {
             let names: Vec<&str> = T::WORDS.iter().map(|word| word.name).collect();
             let mut fault = self.fault(self.expected());
-            if let Some(name) = keys::nearest(found, &names) {
+            // Of several words the last one may be meant: "track" in "road track".
+            let last = found.rsplit(' ').next().unwrap_or(found);
+            if let Some(name) = keys::nearest(found, &names).or_else(|| keys::nearest(last, &names)) {
                 fault.hint = format!("did you mean \"{name}\"?");
             }
             JobError::UnknownWord(fault)
@@ -326,6 +334,20 @@ impl<'a> Entry<'a> {
             value,
         };
         Ok(items.iter().enumerate().map(item).collect())
+    }
+
+    /// The keys and values of a table of any keys, sorted by key.
+    pub fn items(&self) -> Result<Vec<(String, Entry<'a>)>, JobError> {
+        let table = self.value.get_ref().as_table().ok_or_else(|| self.wrong_kind(&self.expected()))?;
+        let item = |(key, value): (&'a Spanned<Cow<'a, str>>, &'a Spanned<DeValue<'a>>)| {
+            let name = key.get_ref().to_string();
+            let (document, offset) = (self.document, key.span().start);
+            let entry = Entry { document, key: format!("{}.{name}", self.key), offset, value };
+            (name, entry)
+        };
+        let mut items: Vec<_> = table.iter().map(item).collect();
+        items.sort_by(|(one, _), (other, _)| one.cmp(other));
+        Ok(items)
     }
 
     /// The value as a table that holds no other keys than those of its place.

@@ -9,8 +9,8 @@ use std::ffi::OsStr;
 use std::fs;
 use std::path::{Component, Path, PathBuf};
 
-use crate::bounds::{SOURCES_MAX, VISITED_MAX};
-use crate::{AreaShape, DemSource, Fault, Job, JobError, NamedFile, SourceFile, Start};
+use crate::bounds::{FEATURE_SOURCES_MAX, SOURCES_MAX, VISITED_MAX};
+use crate::{AreaShape, DemSource, Fault, FeatureSource, FeaturesSpec, Job, JobError, NamedFile, SourceFile, Start};
 
 /// A file that the job mentions: where its name stands in the job, and the fault to tell if it is not there.
 pub(crate) struct Mention {
@@ -25,8 +25,16 @@ pub(crate) enum Place {
     ImportanceArea(usize),
     Geoid(usize),
     Water,
+    Features(usize),
     Start,
     Pins,
+}
+
+impl Place {
+    /// A pattern for the files of a folder.
+    fn pattern(self) -> &'static str {
+        if let Place::Features(_) = self { "*.gpkg" } else { "*.tif" }
+    }
 }
 
 /// Whether a name is a pattern.
@@ -52,9 +60,10 @@ fn split_pattern(written: &str) -> (PathBuf, PathBuf) {
 pub(crate) fn locate(job: &mut Job, mentions: Vec<Mention>) -> Result<(), JobError> {
     let folder = job.folder().to_owned();
     locate_sources(&mut job.dem.source, &folder, &mentions)?;
-    for Mention { place, fault } in mentions {
-        let named = match place {
-            Place::Source(_) => None,
+    job.features.as_mut().map_or(Ok(()), |features| locate_features(features, &folder, &mentions))?;
+    for mention in &mentions {
+        let named = match mention.place {
+            Place::Source(_) | Place::Features(_) => None,
             Place::Geoid(index) => Some(&job.dem.geoids[index].file),
             Place::Water => job.dem.water.as_ref().map(|water| &water.file),
             Place::ImportanceArea(index) => match &job.importance.areas[index].shape {
@@ -67,7 +76,7 @@ pub(crate) fn locate(job: &mut Job, mentions: Vec<Mention>) -> Result<(), JobErr
             },
             Place::Pins => job.tin.pins.as_ref(),
         };
-        named.map_or(Ok(()), |file| check_named(file, &folder, &fault))?;
+        named.map_or(Ok(()), |file| check_named(file, &folder, mention))?;
     }
     Ok(())
 }
@@ -76,37 +85,67 @@ pub(crate) fn locate(job: &mut Job, mentions: Vec<Mention>) -> Result<(), JobErr
 pub(crate) fn locate_sources(source: &mut DemSource, folder: &Path, mentions: &[Mention]) -> Result<(), JobError> {
     let DemSource::Files { files, .. } = source else { return Ok(()) };
     let (mut found, mut seen) = (Vec::new(), BTreeSet::new());
-    for Mention { place, fault } in mentions {
-        let Place::Source(index) = *place else { continue };
-        let more = source_files(&files[index], folder, fault)?;
+    for mention in mentions {
+        let Place::Source(index) = mention.place else { continue };
+        let more = source_files(&files[index], folder, mention)?;
         // A file that two entries find keeps the higher priority.
         found.extend(more.into_iter().filter(|file| seen.insert(file.path.clone())));
         if SOURCES_MAX < found.len() {
             let expected = format!("at most {SOURCES_MAX} files");
-            return Err(JobError::OutOfRange(Box::new(Fault { expected, ..(**fault).clone() })));
+            return Err(JobError::OutOfRange(Box::new(Fault { expected, ..(*mention.fault).clone() })));
         }
     }
     *files = found;
     Ok(())
 }
 
-/// The files that one entry of `dem.sources` stands for.
-fn source_files(source: &SourceFile, folder: &Path, fault: &Fault) -> Result<Vec<SourceFile>, JobError> {
-    if has_wildcard(&source.written) && !source.path.exists() {
-        let found = matches_of(&source.written, folder, fault)?.into_iter();
-        return Ok(found
-            .map(|NamedFile { written, path }| SourceFile { written, path, said: source.said.clone() })
-            .collect());
+/// Checks every file of `features.sources` and expands its patterns.
+fn locate_features(features: &mut FeaturesSpec, folder: &Path, mentions: &[Mention]) -> Result<(), JobError> {
+    let mut found = Vec::new();
+    for (index, source) in features.sources.iter().enumerate() {
+        let FeatureSource::File { file, layer, kind } = source else {
+            found.push(source.clone());
+            continue;
+        };
+        let mention = mentions.iter().find(|mention| matches!(mention.place, Place::Features(at) if at == index));
+        let mention = mention.expect("every file is mentioned");
+        for file in named_files(file, folder, mention)? {
+            let source = FeatureSource::File { file, layer: layer.clone(), kind: *kind };
+            // What two entries find, with nothing else said of it, counts once.
+            if !found.contains(&source) {
+                found.push(source);
+            }
+        }
+        if FEATURE_SOURCES_MAX < found.len() {
+            let expected = format!("at most {FEATURE_SOURCES_MAX} files");
+            return Err(JobError::OutOfRange(Box::new(Fault { expected, ..(*mention.fault).clone() })));
+        }
     }
-    let named = NamedFile { written: source.written.clone(), path: source.path.clone() };
-    check_named(&named, folder, fault)?;
-    Ok(vec![source.clone()])
+    features.sources = found;
+    Ok(())
 }
 
-fn check_named(named: &NamedFile, folder: &Path, fault: &Fault) -> Result<(), JobError> {
+/// The files that one entry of `dem.sources` stands for.
+fn source_files(source: &SourceFile, folder: &Path, mention: &Mention) -> Result<Vec<SourceFile>, JobError> {
+    let named = NamedFile { written: source.written.clone(), path: source.path.clone() };
+    let found = named_files(&named, folder, mention)?.into_iter();
+    Ok(found.map(|NamedFile { written, path }| SourceFile { written, path, said: source.said.clone() }).collect())
+}
+
+/// The files that a name or a pattern stands for.
+fn named_files(named: &NamedFile, folder: &Path, mention: &Mention) -> Result<Vec<NamedFile>, JobError> {
+    if has_wildcard(&named.written) && !named.path.exists() {
+        return matches_of(&named.written, folder, &mention.fault);
+    }
+    check_named(named, folder, mention)?;
+    Ok(vec![named.clone()])
+}
+
+fn check_named(named: &NamedFile, folder: &Path, mention: &Mention) -> Result<(), JobError> {
+    let fault = &mention.fault;
     let no_such = |found: &str, hint: String| {
         let found = format!("{}, {found}", fault.found);
-        JobError::NoSuchFile(Box::new(Fault { found, hint, ..fault.clone() }))
+        JobError::NoSuchFile(Box::new(Fault { found, hint, ..(**fault).clone() }))
     };
     let Ok(data) = fs::metadata(&named.path) else {
         return Err(no_such("which cannot be opened", relative_hint(folder)));
@@ -114,7 +153,7 @@ fn check_named(named: &NamedFile, folder: &Path, fault: &Fault) -> Result<(), Jo
     if data.is_dir() {
         return Err(no_such(
             "which is a folder",
-            format!("its files are {}/*.tif", named.written.trim_end_matches('/')),
+            format!("its files are {}/{}", named.written.trim_end_matches('/'), mention.place.pattern()),
         ));
     }
     if !data.is_file() {
@@ -154,7 +193,7 @@ fn matches_of(written: &str, folder: &Path, fault: &Fault) -> Result<Vec<NamedFi
     paths.sort();
     if paths.is_empty() {
         let (found, expected) =
-            (format!("{}, which no file matches", fault.found), "a pattern that finds a raster".to_owned());
+            (format!("{}, which no file matches", fault.found), format!("a pattern that finds {}", fault.expected));
         let hint = relative_hint(folder);
         return Err(JobError::NoSuchFile(Box::new(Fault { found, expected, hint, ..fault.clone() })));
     }
@@ -196,7 +235,7 @@ fn matches_below(home: &Path, rest: &Path, most: usize, fault: &Fault) -> Result
         if most < seen {
             let found = format!("{}, below which there are more than {most} files", fault.found);
             let expected = format!("a pattern that looks at {most} files at most");
-            let hint = "begin it with the folder that holds the rasters, such as \"dem/**/*.tif\"".to_owned();
+            let hint = "begin it with the folder that holds the files, such as \"dem/**/*.tif\"".to_owned();
             return Err(JobError::OutOfRange(Box::new(Fault { found, expected, hint, ..fault.clone() })));
         }
     }

@@ -8,10 +8,15 @@ pub fn key_tables() -> &'static [KeyTable] {
     &TABLES
 }
 
-/// What is known of a key, by its name with its section, as `tin.effort`. An item of a list is known as its list.
+/// What is known of a key, by its name with its section, as `tin.effort`. An item of a list is known as its list, and
+/// what stands in a table of any keys as that table.
 pub fn key(name: &str) -> Option<&'static Key> {
     let (place, own) = name.rsplit_once('.')?;
-    let known = |own: &str| table(place).iter().find(|key| key.name == own);
+    let keys = table(place);
+    if keys.is_empty() {
+        return key(place);
+    }
+    let known = |own: &str| keys.iter().find(|key| key.name == own);
     known(own).or_else(|| known(&own[..own.rfind('[')?]))
 }
 
@@ -42,9 +47,9 @@ impl Default for Optimising {
 
 /// The keys of a table, by its place in the job: `area`, `dem.voids`, `importance.areas[3]`.
 pub(crate) fn table(place: &str) -> &'static [Key] {
-    let place = match place.rfind('[') {
-        Some(at) => format!("{}[]", &place[..at]),
-        None => place.to_owned(),
+    let place = match (place.rfind('['), place.ends_with(']')) {
+        (Some(at), true) => format!("{}[]", &place[..at]),
+        _ => place.to_owned(),
     };
     TABLES.iter().find(|known| known.place == place).map_or(&[], |known| known.keys)
 }
@@ -114,6 +119,7 @@ pub(crate) fn hint_for_key(place: &str, found: &str) -> String {
 pub(crate) fn hint_for_section(found: &str) -> String {
     match (found, section_of("", found)) {
         ("sample", _) => "the sample terrain is chosen by source = \"sample\" and seed in [dem]".to_owned(),
+        ("roads" | "rivers" | "lakes" | "vectors", _) => "[features] names files of roads, rivers and lakes".to_owned(),
         ("workers" | "out", _) => format!("give it on the command line: --{found}"),
         (_, Some(name)) => format!("did you mean {found} in [{name}]?"),
         _ => match nearest(found, &section_names()) {

@@ -21,9 +21,12 @@ pub use model::{
     TilesSpec, TinSpec, Voids, WindowLimit,
 };
 // What a stage takes as it is.
+pub use features::Kind as FeatureKind;
 pub use terrain::{Effort, HeightFit, LastBatch, Lattice, LodBorder, Resampling, Smooth, TileOrder};
 mod importance;
 pub use importance::{AreaShape, HOLE_CLASS_NAME, ImportanceArea, ImportanceSpec, SampleClass};
+mod features_spec;
+pub use features_spec::{FeatureSource, FeaturesSpec, HeightsFrom};
 mod ground;
 pub use ground::{GeoidSpec, WaterSpec};
 mod lod;
@@ -46,5 +49,8 @@ mod files;
 mod load;
 mod read;
 mod sections;
+mod setting_list;
+pub use setting_list::Setting;
 mod settings;
-pub use settings::{Setting, deciding_lines};
+pub use settings::deciding_lines;
+mod settings_features;

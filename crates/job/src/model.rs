@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use terrain::{Effort, HeightFit, LastBatch, Lattice, ModuleGrid, Resampling, Spacing, TileOrder};
+use terrain::{Effort, HeightFit, LastBatch, Lattice, LoadModule, ModuleGrid, Resampling, Spacing, TileOrder};
 
-use crate::{GeoidSpec, ImportanceSpec, LodSpec, NamedFile, Start, WaterSpec};
+use crate::{FeaturesSpec, GeoidSpec, ImportanceSpec, LodSpec, NamedFile, Start, WaterSpec};
 
 /// All a run needs, as the job file says it, defaults filled in.
 #[derive(Clone, Debug, PartialEq)]
@@ -17,6 +17,8 @@ pub struct Job {
     pub dem: DemSpec,
     /// Where ground matters more.
     pub importance: ImportanceSpec,
+    /// Roads, rivers and lakes that become parts of the ground; none where the job has no such section.
+    pub features: Option<FeaturesSpec>,
     /// How the work is cut.
     pub tiles: TilesSpec,
     /// What the product is cut into.
@@ -27,6 +29,16 @@ pub struct Job {
     pub tin: TinSpec,
     /// Coarser levels of load modules.
     pub lod: LodSpec,
+}
+
+impl Job {
+    /// Names of the classes of triangles, by number: those of the ground, then those of features.
+    pub fn class_names(&self) -> Vec<String> {
+        match &self.features {
+            Some(features) => features.classes_after(&self.importance),
+            None => self.importance.classes.clone(),
+        }
+    }
 }
 
 /// The gaming area and its working grid.
@@ -235,6 +247,17 @@ pub enum Count {
     Triangles,
     /// Convex polygons, as clipping leaves them.
     Polygons,
+}
+
+impl Count {
+    /// What a load module has of that: all that is compared with a limit is counted here, decks too.
+    pub fn of(self, module: &LoadModule) -> u32 {
+        let counts = module.counts();
+        match self {
+            Self::Triangles => counts.triangles,
+            Self::Polygons => counts.polygons,
+        }
+    }
 }
 
 /// How posts are chosen.

@@ -2,21 +2,25 @@
 //!
 //! The reader takes ranges and defaults from here, `describe` the meanings, `docs/reference/job-keys.md` everything.
 
+use std::ops::RangeInclusive;
+
+use features::{Form, Kind, RuleKind};
 use terrain::{Effort, HeightFit, LastBatch, Lattice, LodBorder, Resampling, Smooth, TileOrder};
 
 use crate::bounds::{
-    AREAS_MAX, AROUND_KM_MAX, COARSER_LEVELS_MAX, COUNT_MAX, DATUM_CHARS_MAX, FEATHER_M_MAX, FILL_POSTS_MAX,
-    GEOIDS_MAX, HEIGHT_UNIT_M, LEVEL_M_MAX, MODULES_PER_TILE_MIN, NAME_CHARS_MAX, PER_MODULE_MAX, QUANTUM_M_MAX,
-    RESIDUAL_M_MAX, RMS_M_MIN, SEED_MAX, SIDE_QUANTA_MAX, SLOPE_PERCENT_MAX, SMOOTH_M_MAX, SOURCES_MAX,
-    THANKS_CHARS_MAX, TITLE_CHARS_MAX, TRIANGLES_MIN, WEIGHT_MAX, WKT_CHARS_MAX,
+    AREAS_MAX, AROUND_KM_MAX, BANK_M_MAX, CLEARANCE_M_MAX, COARSER_LEVELS_MAX, COUNT_MAX, DATUM_CHARS_MAX,
+    FEATHER_M_MAX, FEATURE_SOURCES_MAX, FILL_POSTS_MAX, GEOIDS_MAX, HEIGHT_UNIT_M, LAYER_CHARS_MAX, LEVEL_M_MAX,
+    MODULES_PER_TILE_MIN, NAME_CHARS_MAX, PER_MODULE_MAX, QUANTUM_M_MAX, RESIDUAL_M_MAX, RMS_M_MIN, RULE_GRADE_PERCENT,
+    RULE_WIDTH_M, RULES_MAX, SEED_MAX, SHARE_MAX, SIDE_QUANTA_MAX, SLOPE_PERCENT_MAX, SMOOTH_M_MAX, SOURCES_MAX,
+    TAG_CHARS_MAX, THANKS_CHARS_MAX, TITLE_CHARS_MAX, TRIANGLES_MIN, WEIGHT_MAX, WKT_CHARS_MAX,
 };
 use crate::{
-    Allocation, AreaPlace, Borders, ClipHeights, Count, DemSource, Edges, ErrorKey, Key, KeyTable, MethodName,
-    OuterBorder, SampleClass, StartMethod,
+    Allocation, AreaPlace, Borders, ClipHeights, Count, DemSource, Edges, ErrorKey, HeightsFrom, Key, KeyTable,
+    MethodName, OuterBorder, SampleClass, StartMethod,
 };
 
 /// All tables, the sections in their order, each before those that stand in it.
-pub(crate) static TABLES: [KeyTable; 16] = [
+pub(crate) static TABLES: [KeyTable; 19] = [
     KeyTable { place: "area", meaning: "The gaming area, whole load modules, and its working grid.", keys: AREA },
     KeyTable { place: "area.around", meaning: "An area around a place.", keys: AROUND },
     KeyTable { place: "dem", meaning: "Where heights come from.", keys: DEM },
@@ -26,6 +30,21 @@ pub(crate) static TABLES: [KeyTable; 16] = [
     KeyTable { place: "dem.water", meaning: "Water, where more is to be said than its path.", keys: WATER },
     KeyTable { place: "importance", meaning: "Where ground matters more.", keys: IMPORTANCE },
     KeyTable { place: "importance.areas[]", meaning: "An area with a weight of its own.", keys: AREAS },
+    KeyTable {
+        place: "features",
+        meaning: "Roads, rivers and lakes that become parts of the ground. Without this section there are none.",
+        keys: FEATURES,
+    },
+    KeyTable {
+        place: "features.sources[]",
+        meaning: "A source of features, where more is to be said than its path.",
+        keys: FEATURE_SOURCES,
+    },
+    KeyTable {
+        place: "features.rules[]",
+        meaning: "What becomes of features with certain tags; where no rule says it, the built-in table does.",
+        keys: RULES,
+    },
     KeyTable { place: "tiles", meaning: "How the work is cut.", keys: TILES },
     KeyTable { place: "load_modules", meaning: "What the product is cut into.", keys: LOAD_MODULES },
     KeyTable {
@@ -243,6 +262,77 @@ const AREAS: &[Key] = &[
         .line(CLASS, NAME_CHARS_MAX)
         .example("class = \"mountains\"; reports tell classes apart"),
     Key::new("weight", "its weight; 0 excludes posts from selection").bounded(weight).example(WEIGHT_EXAMPLE),
+];
+
+const FEATURES: &[Key] = &[
+    Key::new("sources", "files of lines and polygons; a path, a pattern or a table each")
+        .bounded(|| {
+            let sample = "or \"sample\" for the features of the built-in terrain";
+            format!("a list of 1 to {FEATURE_SOURCES_MAX} paths and patterns of files, {sample}")
+        })
+        .example("sources = [\"roads.osm.pbf\", { file = \"hydro.gpkg\", layer = \"rivers\" }]"),
+    Key::new("rules", "what becomes of features with certain tags; tried in order, before the built-in table")
+        .bounded(|| format!("a list of at most {RULES_MAX} rules, each {{ where = {{ … }}, kind = … }}"))
+        .otherwise("the built-in table alone")
+        .example("rules = [{ where = { highway = \"path\" }, kind = \"track\", width_m = 2 }]"),
+    Key::new("share_max", "of what a load module may hold, how much features may take")
+        .number("a share", SHARE_MAX)
+        .usual("0.5"),
+    Key::new("clearance_road_m", "what decks keep clear of above roads and runways")
+        .number(HIGH, CLEARANCE)
+        .usual("4.5"),
+    Key::new("clearance_rail_m", "what decks keep clear of above railways").number(HIGH, CLEARANCE).usual("6"),
+    Key::new("clearance_water_m", "what decks keep clear of above water").number(HIGH, CLEARANCE).usual("1"),
+    Key::new("bank_m", "how far back from a deck its bank may sag: decks rest on the highest ground within it")
+        .number("metres along the way", 0.0..=BANK_M_MAX)
+        .usual("100"),
+];
+
+const HIGH: &str = "metres";
+const CLEARANCE: RangeInclusive<f64> = 0.0..=CLEARANCE_M_MAX;
+
+const FEATURE_SOURCES: &[Key] = &[
+    Key::new("file", "the file: OpenStreetMap data as .pbf, GeoPackage, Shapefile or GeoJSON")
+        .form("the path of a file of lines and polygons")
+        .example("{ file = \"lakes.shp\", kind = \"lake\" }"),
+    Key::new("layer", "its layer")
+        .line("the name of a layer of a GeoPackage", LAYER_CHARS_MAX)
+        .otherwise("its only one")
+        .example("{ file = \"hydro.gpkg\", layer = \"rivers\" }"),
+    Key::new("kind", "the kind of its features, whatever their tags say; rules come first")
+        .words::<Kind>()
+        .otherwise("as rules and tags say")
+        .example("{ file = \"lakes.shp\", kind = \"lake\" }"),
+];
+
+const RULES: &[Key] = &[
+    Key::new("where", "tags or attribute columns, all of which a feature must have; empty for every feature")
+        .bounded(|| {
+            let values = "a value or a list of values each, [] for any";
+            format!("a table of tags with {values}, keys and values of 1 to {TAG_CHARS_MAX} characters")
+        })
+        .example("where = { highway = [\"track\", \"path\"], surface = \"sand\" }"),
+    Key::new("kind", "what it is")
+        .words::<RuleKind>()
+        .otherwise("as the built-in table or the source says, else \"breakline\"")
+        .example("kind = \"track\""),
+    Key::new("class", "its class, which triangles carry")
+        .bounded(|| format!("the name of a class, 1 to {NAME_CHARS_MAX} letters, digits, '-' or '_'"))
+        .otherwise("the name of its kind")
+        .example("class = \"trail\""),
+    Key::new("width_m", "its width")
+        .number("metres", RULE_WIDTH_M)
+        .otherwise("as its tags say, else as usual for its kind")
+        .example("width_m = 3"),
+    Key::new("grade_max_percent", "its greatest rise over run")
+        .number("percent", RULE_GRADE_PERCENT)
+        .otherwise("as usual for its kind")
+        .example("grade_max_percent = 25"),
+    Key::new("form", "what of it becomes edges of the TIN")
+        .words::<Form>()
+        .otherwise("as usual for its kind")
+        .example("form = \"line\""),
+    Key::new("z", "where its heights come from").words::<HeightsFrom>().usual("dem").example("z = \"feature\""),
 ];
 
 const TILES: &[Key] = &[

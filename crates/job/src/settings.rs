@@ -3,25 +3,13 @@
 //! One list serves both the announcement at the start of a run and the canonical text in `database.json`, so the two
 //! cannot disagree. The canonical text is itself a job: reading it gives the same settings again.
 
-use std::fmt::Display;
-
 use terrain::{THOUSANDTHS, metres_of_quanta};
 
+use crate::setting_list::{List, Setting, counted, number, quoted};
 use crate::{
     AreaShape, Budget, Choice, DemSource, Edges, GeoidSpec, ImportanceArea, Job, LodSpec, Method, Optimising,
-    Resampling, SourceEntry, Start, TinSpec, Voids, WaterSpec, key,
+    Resampling, SourceEntry, Start, TinSpec, Voids, WaterSpec, settings_features,
 };
-
-/// One setting of a job.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Setting {
-    /// The key with its section, as `area.spacing_m`.
-    pub key: &'static str,
-    /// The value as the job file writes it.
-    pub value: String,
-    /// What it means for this run.
-    pub meaning: String,
-}
 
 /// The lines of a [canonical text](Job::canonical_text) that decide what is built: all but the title, which only stands
 /// above the report's page.
@@ -36,6 +24,7 @@ impl Job {
         self.describe_area(&mut list);
         self.describe_dem(&mut list);
         self.describe_importance(&mut list);
+        self.features.iter().for_each(|features| settings_features::describe(features, &mut list));
         self.describe_tiles(&mut list);
         self.describe_modules(&mut list);
         self.describe_limits(&mut list);
@@ -256,41 +245,6 @@ fn water_level(water: &WaterSpec) -> &'static str {
     }
 }
 
-/// The settings so far.
-struct List(Vec<Setting>);
-
-impl List {
-    /// A setting that means the same in every run.
-    fn add(&mut self, key: &'static str, value: String) {
-        self.say(key, value, meaning(key));
-    }
-
-    /// A setting, and what it comes to in this run.
-    fn add_with(&mut self, key: &'static str, value: String, here: impl Display) {
-        self.say(key, value, format!("{}: {here}", meaning(key)));
-    }
-
-    /// A setting of some words.
-    fn choice<T: Choice>(&mut self, key: &'static str, value: &T) {
-        let word = value.word();
-        self.say(key, quoted(word.name), word.text());
-    }
-
-    fn say(&mut self, key: &'static str, value: String, meaning: impl Into<String>) {
-        self.0.push(Setting { key, value, meaning: meaning.into() });
-    }
-}
-
-fn meaning(name: &str) -> &'static str {
-    key(name).map_or("", |key| key.meaning)
-}
-
-/// A number as TOML, the shortest that reads back the same: 500 for 500.0, 31.25, 1e-7.
-fn number(value: f64) -> String {
-    let value = value + 0.0; // so that -0 is written as 0
-    if value.fract() == 0.0 && value.abs() < 1.0e15 { format!("{value:.0}") } else { format!("{value:?}") }
-}
-
 fn pair(values: [f64; 2]) -> String {
     format!("[{}, {}]", number(values[0]), number(values[1]))
 }
@@ -298,19 +252,6 @@ fn pair(values: [f64; 2]) -> String {
 /// A weight in thousandths as TOML.
 fn weight(thousandths: u16) -> String {
     number(f64::from(thousandths) / f64::from(THOUSANDTHS))
-}
-
-/// A text as a TOML basic string.
-fn quoted(text: &str) -> String {
-    let mut out = String::from("\"");
-    for c in text.chars() {
-        match c {
-            '"' | '\\' => out.extend(['\\', c]),
-            c if c.is_control() => out += &format!("\\u{:04X}", u32::from(c)),
-            c => out.push(c),
-        }
-    }
-    out + "\""
 }
 
 /// An entry of `dem.sources` as TOML.
@@ -326,10 +267,6 @@ fn source_text(SourceEntry { name, said }: &SourceEntry) -> String {
         true => quoted(name),
         false => format!("{{ file = {}, {} }}", quoted(name), keys.join(", ")),
     }
-}
-
-fn counted(count: usize, noun: &str) -> String {
-    if count == 1 { format!("1 {noun}") } else { format!("{count} {noun}s") }
 }
 
 /// How many of `modules` each of `tiles` gets: one number, or the two that occur.
@@ -375,15 +312,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_read_back_the_same() {
-        for value in [500.0, 31.25, 0.0078125, 1.0e-4, 5264750.5, 0.1 + 0.2, -3.0] {
-            assert_eq!(number(value).parse::<f64>().unwrap(), value);
-        }
-        assert_eq!((number(500.0), weight(8000), weight(125)), ("500".into(), "8".into(), "0.125".into()));
-    }
-
-    #[test]
-    fn text_is_escaped() {
-        assert_eq!(quoted("a\"b\\c\n"), "\"a\\\"b\\\\c\\u000A\"");
+    fn weights_are_written_in_whole_and_in_parts() {
+        assert_eq!((weight(8000), weight(125)), ("8".into(), "0.125".into()));
     }
 }

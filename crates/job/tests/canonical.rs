@@ -11,7 +11,7 @@ const SHORTEST: &str = "[area]\nname = \"small\"\ncrs = \"EPSG:32611\"\norigin_m
     size_m = [9000, 8500]\nspacing_m = 12.5\n[dem]\n";
 
 /// What follows [`SHORTEST`]: every word of every setting, and every form of a value, once at least.
-const REST: [&str; 19] = [
+const REST: [&str; 21] = [
     "source = \"sample\"",
     "source = \"sample\"\nseed = 0x1F\nvoids = { fill_within_posts = 8 }\nvertical_datum = \"EGM \\\"96\\\"\"",
     "source = \"sample\"\nvoids = \"hole\"\nwater = \"w.shp\"",
@@ -41,6 +41,11 @@ const REST: [&str; 19] = [
      start = { method = \"fowler-little\", points = 5 }\n[load_modules]\nedges = \"clip\"\nclip_heights = \"dem\"",
     "source = \"sample\"\n[tin]\nmethod = \"paper\"\nmax_residual_m = 2.5\nproximity_m = [10, 2.5]\nkey = \"sse\"",
     "source = \"sample\"\n[lod]\nlevels = [{ inner_share = 0.5 }, { inner_share = 2e-1 }]\nborder = \"own\"",
+    "source = \"sample\"\n[features]\nsources = [\"sample\"]",
+    "source = \"sample\"\n[features]\nsources = [\"r.osm.pbf\", { file = \"h.gpkg\", layer = \"a\", kind = \"lake\" }, \
+     { file = \"sample\" }]\nshare_max = 0.25\nclearance_road_m = 4.3\nclearance_rail_m = 7\nclearance_water_m = 0\n\
+     bank_m = 0\nrules = [{ where = {}, kind = \"none\" }, { where = { b = [], \"a c\" = \"d\" }, kind = \"rail\", \
+     class = \"t\", width_m = 3.5, grade_max_percent = 4, form = \"auto\", z = \"feature\" }]",
 ];
 
 #[test]

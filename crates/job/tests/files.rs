@@ -116,7 +116,7 @@ fn patterns_that_find_nothing_or_are_none_are_told() {
         empty.path(),
         &[
             r#"ROOT/jobs/ntc.toml:8: dem.sources[0]: found "dem/*.tif", which no file matches,"#,
-            "expected a pattern that finds a raster",
+            "expected a pattern that finds a raster file",
             "hint: paths are relative to the folder of the job file, ROOT/jobs",
         ],
     );

@@ -2,6 +2,8 @@
 
 use terrain::{ModuleId, ModuleRect, POINT_COST, RefusedBy};
 
+use crate::{ShortOf, Shortfall};
+
 /// Triangles one tile may add to its start, by load module, by window and in all.
 ///
 /// Tiles spend from their own allowances only; the allowances of all tiles together respect every limit,
@@ -68,6 +70,17 @@ impl Ledger {
     pub fn is_any_over(&self) -> bool {
         let over = |room: &[u32], spent: &[u32]| room.iter().zip(spent).any(|(room, spent)| room < spent);
         over(&self.allowance.module_room, &self.modules) || over(&self.allowance.window_room, &self.windows)
+    }
+
+    /// Everything that has more than it may: the tile, load modules, windows.
+    pub fn short(&self) -> Vec<Shortfall> {
+        let short = |of: ShortOf, needed: u32, room: u32| (room < needed).then_some(Shortfall { of, needed, room });
+        let allowance = &self.allowance;
+        let modules = allowance.modules.iter().zip(&self.modules).zip(&allowance.module_room);
+        let modules = modules.filter_map(|((module, &spent), &room)| short(ShortOf::Module(module), spent, room));
+        let windows = allowance.windows.iter().zip(&self.windows).zip(&allowance.window_room);
+        let windows = windows.filter_map(|((window, &spent), &room)| short(ShortOf::Window(window), spent, room));
+        short(ShortOf::Tile, self.spent, allowance.triangles).into_iter().chain(modules).chain(windows).collect()
     }
 
     fn module_index(&self, module: ModuleId) -> usize {

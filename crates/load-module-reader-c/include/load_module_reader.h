@@ -62,6 +62,14 @@ typedef struct {
     uint8_t class_of_ground; /* 0 is the default, LMR_HOLE_CLASS a hole */
 } lmr_sample;
 
+/* The ground or a deck. */
+typedef struct {
+    double height_m;
+    double normal[3];         /* unit vector upwards out of it: east, north, up */
+    uint8_t class_of_surface; /* 0 is the default, LMR_HOLE_CLASS a hole in the ground */
+    uint8_t is_deck;          /* 1 on a deck, 0 on the ground */
+} lmr_surface;
+
 /* Quanta of 1/128 m: x and y from the load module's south-west corner, z above the vertical datum. */
 typedef struct {
     uint16_t x, y;
@@ -78,6 +86,17 @@ typedef struct {
     const uint8_t *classes;           /* one for each triangle */
     size_t triangle_count;
 } lmr_module;
+
+/* The decks above the ground of a load module, for drawing: triangles as those of the ground, but they cover only some
+ * of the square, and may lie above each other. Without decks both counts are 0 and the lists NULL. What is pointed to
+ * lives until the ground is moved or unloaded. */
+typedef struct {
+    const lmr_vertex *vertices;
+    size_t vertex_count;
+    const uint16_t (*triangles)[3];   /* counter-clockwise seen from above */
+    const uint8_t *classes;           /* one for each triangle */
+    size_t triangle_count;
+} lmr_decks;
 
 /* What lmr_sight answers. */
 enum { LMR_FREE = 0, LMR_HIDDEN = 1, LMR_UNKNOWN = 2, LMR_INVALID = 3 };
@@ -101,13 +120,26 @@ int lmr_move(lmr_ground *ground, const lmr_area *area, double east_m, double nor
              char *why, size_t why_size);
 void lmr_unload(lmr_ground *ground);
 
-/* 1, or 0 where nothing is loaded, without ground or without a place to write to; then nothing is written. */
+/* Of the ground, whatever decks hang above it.
+ * 1, or 0 where nothing is loaded, without ground or without a place to write to; then nothing is written. */
 int lmr_height(const lmr_ground *ground, double east_m, double north_m, double *height_m);
 int lmr_sample_at(const lmr_ground *ground, double east_m, double north_m, lmr_sample *sample);
 /* Many heights at once; NaN where nothing is loaded. 1, or 0 without ground, or without lists although count is not 0.
  * The lists must not overlap. */
 int lmr_heights(const lmr_ground *ground, const double (*places_m)[2], double *heights_m, size_t count);
-/* Whether the ground stands between two places (east, north, height). LMR_HIDDEN sets `share`: how far along.
+/* Of the topmost of ground and decks (bridges) that is not above ceiling_m, metres above the vertical datum. With the
+ * height of a vehicle's wheels and a step it is what the vehicle drives on, over a bridge or under it; with INFINITY,
+ * what lies on top. Where a deck touches the ground it is the deck.
+ * 1, or 0 where nothing is loaded, where all is above ceiling_m or that is NaN, without ground or without a place to
+ * write to; then nothing is written. */
+int lmr_height_below(const lmr_ground *ground, double east_m, double north_m, double ceiling_m, double *height_m);
+int lmr_surface_below(const lmr_ground *ground, double east_m, double north_m, double ceiling_m, lmr_surface *surface);
+/* Many at once, each at an easting, a northing and a ceiling; NaN where lmr_height_below answers 0. 1 or 0 as
+ * lmr_heights. */
+int lmr_heights_below(const lmr_ground *ground, const double (*places_m)[3], double *heights_m, size_t count);
+/* Whether the ground or a deck stands between two places (east, north, height). A line passes over and under decks, and
+ * is hidden where it goes through one; a place at the height of a deck stands on it, and is not seen from below.
+ * LMR_HIDDEN sets `share`: how far along.
  * LMR_UNKNOWN: the line leaves what is loaded first, or a coordinate is not finite or beyond any ground (1e12 m from
  * the area's corner). LMR_INVALID: ground, from_m or to_m is NULL. */
 int lmr_sight(const lmr_ground *ground, const double from_m[3], const double to_m[3], double *share);
@@ -116,6 +148,7 @@ int lmr_sight(const lmr_ground *ground, const double from_m[3], const double to_
 size_t lmr_module_count(const lmr_ground *ground);
 /* 1, or 0 when there is no such one, without ground or without a place to write to. */
 int lmr_module_at(const lmr_ground *ground, size_t index, lmr_module *module);
+int lmr_decks_at(const lmr_ground *ground, size_t index, lmr_decks *decks);
 
 #ifdef __cplusplus
 }

@@ -4,14 +4,18 @@
 //! may be mapped into memory. Nothing is decided here; each function turns its arguments and calls the reader.
 //! A pointer that is null or not aligned is never followed: the function answers as the header says.
 
+mod values;
+
 use std::borrow::Cow;
 use std::ffi::{CStr, c_char, c_int};
 use std::fmt::Display;
 use std::path::Path;
 use std::sync::Arc;
 
-use load_module_reader::{Area, Block, Keep, LoadedGround, ReadError, Sight, TileFile, Vertex, open_file};
+use load_module_reader::{Area, Block, Keep, LoadedGround, ReadError, Sight, TileFile, open_file};
 use memmap2::Mmap;
+
+use crate::values::{AreaFrame, Decks, Module, Sample, Surface};
 
 /// `LMR_ALL`: the whole area.
 const ALL: u32 = u32::MAX;
@@ -21,40 +25,8 @@ const IN_MEMORY: c_int = 1;
 const MAPPED: c_int = 2;
 /// `LMR_INVALID`.
 const INVALID: c_int = 3;
-/// Places in one call at most: what fits into the memory of any machine.
-const PLACES_MAX: usize = isize::MAX as usize / size_of::<[f64; 2]>();
-
-/// `lmr_frame`.
-#[repr(C)]
-pub struct AreaFrame {
-    rows: u32,
-    cols: u32,
-    side_m: f64,
-    east_m: f64,
-    north_m: f64,
-}
-
-/// `lmr_sample`.
-#[repr(C)]
-pub struct Sample {
-    height_m: f64,
-    normal: [f64; 3],
-    class_of_ground: u8,
-}
-
-/// `lmr_module`.
-#[repr(C)]
-pub struct Module {
-    row: u32,
-    col: u32,
-    east_m: f64,
-    north_m: f64,
-    vertices: *const Vertex,
-    vertex_count: usize,
-    triangles: *const [u16; 3],
-    classes: *const u8,
-    triangle_count: usize,
-}
+/// Bytes of a list at most: what fits into the memory of any machine.
+const BYTES_MAX: usize = isize::MAX as usize;
 
 /// The bytes of a mapped file.
 struct Mapped(Mmap);
@@ -344,6 +316,45 @@ pub unsafe extern "C" fn lmr_sample_at(
     unsafe { give(sample, told) }
 }
 
+/// Height of the topmost surface not above a ceiling.
+///
+/// # Safety
+/// `ground` is null or comes from `lmr_load`; `height_m` is null or may be written.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn lmr_height_below(
+    ground: *const LoadedGround,
+    east_m: f64,
+    north_m: f64,
+    ceiling_m: f64,
+    height_m: *mut f64,
+) -> c_int {
+    // SAFETY: the caller's word.
+    let found = unsafe { given(ground) }.and_then(|ground| ground.height_below_m([east_m, north_m], ceiling_m));
+    // SAFETY: the caller's word.
+    found.map_or(0, |found| unsafe { give(height_m, found) })
+}
+
+/// Height, normal and class of the topmost surface not above a ceiling.
+///
+/// # Safety
+/// `ground` is null or comes from `lmr_load`; `surface` is null or may be written.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn lmr_surface_below(
+    ground: *const LoadedGround,
+    east_m: f64,
+    north_m: f64,
+    ceiling_m: f64,
+    surface: *mut Surface,
+) -> c_int {
+    // SAFETY: the caller's word.
+    let found = unsafe { given(ground) }.and_then(|ground| ground.sample_below([east_m, north_m], ceiling_m));
+    let Some(found) = found else { return 0 };
+    let (height_m, normal) = (found.height_m, found.normal);
+    let told = Surface { height_m, normal, class_of_surface: found.class, is_deck: found.is_deck.into() };
+    // SAFETY: the caller's word.
+    unsafe { give(surface, told) }
+}
+
 /// Heights at many places.
 ///
 /// # Safety
@@ -357,18 +368,49 @@ pub unsafe extern "C" fn lmr_heights(
     count: usize,
 ) -> c_int {
     // SAFETY: the caller's word.
+    unsafe { fill(ground, places_m, heights_m, count, LoadedGround::heights_m) }
+}
+
+/// Heights of the topmost surfaces not above a ceiling, at many places.
+///
+/// # Safety
+/// `ground` is null or comes from `lmr_load`; `places_m` is null or `count` triples, `heights_m` null or `count`
+/// numbers that may be written; the two do not overlap.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn lmr_heights_below(
+    ground: *const LoadedGround,
+    places_m: *const [f64; 3],
+    heights_m: *mut f64,
+    count: usize,
+) -> c_int {
+    // SAFETY: the caller's word.
+    unsafe { fill(ground, places_m, heights_m, count, LoadedGround::heights_below_m) }
+}
+
+/// Asks for a height at each of many places.
+///
+/// # Safety
+/// As of the two functions above.
+unsafe fn fill<T>(
+    ground: *const LoadedGround,
+    places_m: *const T,
+    heights_m: *mut f64,
+    count: usize,
+    ask: fn(&LoadedGround, &[T], &mut [f64]),
+) -> c_int {
+    // SAFETY: the caller's word.
     let (ground, first, out) = unsafe { (given(ground), given(places_m), given(heights_m)) };
     let Some(ground) = ground else { return 0 };
     if count == 0 {
         return 1;
     }
-    if first.is_none() || out.is_none() || PLACES_MAX < count {
+    if first.is_none() || out.is_none() || BYTES_MAX / size_of::<T>() < count {
         return 0;
     }
     // SAFETY: the caller's word.
     let (places, heights) =
         unsafe { (std::slice::from_raw_parts(places_m, count), std::slice::from_raw_parts_mut(heights_m, count)) };
-    ground.heights_m(places, heights);
+    ask(ground, places, heights);
     1
 }
 
@@ -433,4 +475,18 @@ pub unsafe extern "C" fn lmr_module_at(ground: *const LoadedGround, index: usize
     };
     // SAFETY: the caller's word.
     unsafe { give(module, told) }
+}
+
+/// The decks of one load module for drawing.
+///
+/// # Safety
+/// `ground` is null, or comes from `lmr_load` and is not moved while what is pointed to is used; `decks` is null or may
+/// be written.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn lmr_decks_at(ground: *const LoadedGround, index: usize, decks: *mut Decks) -> c_int {
+    // SAFETY: the caller's word.
+    let Some(ground) = (unsafe { given(ground) }) else { return 0 };
+    let Some(found) = ground.modules().get(index).map(|found| &found.module().decks) else { return 0 };
+    // SAFETY: the caller's word.
+    unsafe { give(decks, Decks::of(found)) }
 }

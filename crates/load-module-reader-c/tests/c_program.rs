@@ -6,10 +6,19 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// The worked example of `FORMAT.md`, byte by byte.
+/// The worked example of `FORMAT.md` without a deck, byte by byte.
 fn worked_example() -> Vec<u8> {
+    example_of_version(1)
+}
+
+/// That with a deck.
+fn with_a_deck() -> Vec<u8> {
+    example_of_version(2)
+}
+
+fn example_of_version(version: usize) -> Vec<u8> {
     let text = include_str!("../../../FORMAT.md");
-    let hex = text.split("```hex").nth(1).unwrap().split("```").next().unwrap();
+    let hex = text.split("```hex").nth(version).unwrap().split("```").next().unwrap();
     let lines = hex.lines().filter_map(|line| line.split('|').next());
     // The first number of a line is its offset.
     lines.flat_map(|line| line.split_whitespace().skip(1)).map(|byte| u8::from_str_radix(byte, 16).unwrap()).collect()
@@ -95,11 +104,12 @@ fn a_program_in_c_gets_right_answers() {
     let folder = tempfile::tempdir().unwrap();
     let program = folder.path().join("drive");
     compile("drive.c", &["-std=c99", "-pedantic"], &program).unwrap();
-    for (levels, file) in [("1", worked_example()), ("2", two_levels())] {
-        let area = folder.path().join(levels);
+    let files = [("1", "0", worked_example()), ("2", "0", two_levels()), ("1", "1", with_a_deck())];
+    for (levels, decks, file) in files {
+        let area = folder.path().join(format!("{levels}-{decks}"));
         std::fs::create_dir_all(area.join("modules")).unwrap();
         std::fs::write(area.join("modules/r00c00.slm"), file).unwrap();
-        let ran = Command::new(&program).arg(&area).arg(levels).output().unwrap();
+        let ran = Command::new(&program).arg(&area).args([levels, decks]).output().unwrap();
         let said = String::from_utf8_lossy(&ran.stdout);
         assert!(ran.status.success() && said == "0 faults\n", "{said}{}", String::from_utf8_lossy(&ran.stderr));
     }
@@ -126,6 +136,7 @@ fn damaged_files_and_hostile_arguments_do_no_harm() {
     std::fs::create_dir(&seeds).unwrap();
     std::fs::write(seeds.join("one.slm"), worked_example()).unwrap();
     std::fs::write(seeds.join("two.slm"), two_levels()).unwrap();
+    std::fs::write(seeds.join("deck.slm"), with_a_deck()).unwrap();
     let (first, last, seconds) = ("1", "400", "3");
     run(&seeds, &[first, seconds, last]);
 }

@@ -1,6 +1,6 @@
 /*
  * Opens the database named on the command line in every way, and asks everything there is to ask. Behind the name: how
- * many levels of detail it has.
+ * many levels of detail it has, and whether there is a deck.
  */
 #include "load_module_reader.h"
 
@@ -36,6 +36,44 @@ static void ask_levels(const lmr_area *area, uint32_t levels) {
     expect(lmr_load_level(area, frame.east_m, frame.north_m, 7, levels, why, sizeof why) == NULL, "no more levels");
     expect(strncmp(why, "found level ", 12) == 0, why);
     expect(lmr_load_level(area, frame.east_m, frame.north_m, 7, UINT32_MAX, why, sizeof why) == NULL, "nor any");
+}
+
+/* Over the middle of the load module hangs a deck, 5 m above the ground, class 3; or there is none. */
+static void ask_decks(const lmr_area *area, int has_decks) {
+    char why[256] = "";
+    lmr_frame frame;
+    lmr_describe(area, &frame);
+    lmr_ground *ground = lmr_load(area, frame.east_m, frame.north_m, 0, why, sizeof why);
+    const double east = frame.east_m + 250, north = frame.north_m + 250;
+    double on_ground = 0, top = 0, under = 0;
+    expect(lmr_height(ground, east, north, &on_ground), "the ground");
+    expect(lmr_height_below(ground, east, north, INFINITY, &top), "the topmost");
+    expect(top == (has_decks ? 1010.0 : on_ground), "the deck lies on top, where there is one");
+    expect(lmr_height_below(ground, east, north, 1009.9, &under) && under == on_ground, "the ground lies under it");
+    expect(lmr_height_below(ground, east, north, 1010.0, &under) && under == top, "not above: at it is enough");
+    expect(!lmr_height_below(ground, east, north, 990, &under) && under == top, "all lies above");
+    expect(!lmr_height_below(ground, east, north, NAN, &under), "no ceiling at all");
+    lmr_surface surface;
+    expect(lmr_surface_below(ground, east, north, INFINITY, &surface) && surface.height_m == top, "a surface");
+    expect(surface.is_deck == has_decks && (!has_decks || surface.class_of_surface == 3), "the deck's class");
+    expect(!has_decks || surface.normal[2] == 1.0, "it is level");
+    expect(lmr_surface_below(ground, east, north, 1009, &surface) && !surface.is_deck, "the ground's surface");
+    const double places[3][3] = {{east, north, INFINITY}, {east, north, 1009}, {east, north, 0}};
+    double heights[3];
+    expect(lmr_heights_below(ground, places, heights, 3), "three heights at once");
+    expect(heights[0] == top && heights[1] == on_ground && isnan(heights[2]), "over, under, and below all");
+    const double over[3] = {east - 100, north, 1011}, beyond[3] = {east + 100, north, 1011};
+    const double below[3] = {east - 100, north, 1009}, far_below[3] = {east + 100, north, 1009};
+    double share = -1;
+    expect(lmr_sight(ground, over, beyond, NULL) == LMR_FREE, "over the deck");
+    expect(lmr_sight(ground, below, far_below, NULL) == LMR_FREE, "under the deck");
+    expect(lmr_sight(ground, over, far_below, &share) == (has_decks ? LMR_HIDDEN : LMR_FREE), "through the deck");
+    expect(!has_decks || fabs(share - 0.5) < 1e-6, "half way");
+    lmr_decks decks;
+    expect(lmr_decks_at(ground, 0, &decks) && !lmr_decks_at(ground, 1, &decks), "decks to draw");
+    expect(decks.vertex_count == (has_decks ? 4u : 0u) && decks.triangle_count == (has_decks ? 2u : 0u), "as many");
+    expect(has_decks ? decks.vertices[0].z == 129280 && decks.classes[0] == 3 : !decks.vertices, "the lists");
+    lmr_unload(ground);
 }
 
 static void ask(const lmr_area *area) {
@@ -78,13 +116,14 @@ static void ask(const lmr_area *area) {
 
 int main(int argc, char **argv) {
     char why[32];
-    if (argc != 3) return 2;
+    if (argc != 4) return 2;
     for (int keep = LMR_ON_DISK; keep <= LMR_MAPPED; keep++) {
         lmr_area *area = lmr_open(argv[1], keep, why, sizeof why);
         expect(area != NULL, why);
         if (area) {
             ask(area);
             ask_levels(area, (uint32_t)atoi(argv[2]));
+            ask_decks(area, atoi(argv[3]));
         }
         lmr_close(area);
     }

@@ -109,6 +109,15 @@ static void seal(unsigned char *file, size_t length, uint64_t from, uint64_t byt
     put(file + from + bytes - 4, crc32(file + from, (size_t)bytes - 4), 4);
 }
 
+/* Bytes of an entry of the index: in version 2 each ends with four words about decks. */
+static uint64_t entry_bytes(const unsigned char *file) { return file[8] == 2 ? 48 : 32; }
+
+/* Bytes of the part with decks behind a section, as its entry says. */
+static uint64_t deck_bytes(const unsigned char *file, const unsigned char *entry) {
+    if (entry_bytes(file) == 32 || !word(entry + 36)) return 0;
+    return (20 + 8 * (uint64_t)word(entry + 32) + 7 * (uint64_t)word(entry + 36) + 3) / 4 * 4 + 4;
+}
+
 /* Load modules times levels, as the header says. */
 static uint64_t entries_of(const unsigned char *file) {
     uint64_t rows = word(file + 44) - (uint64_t)word(file + 40), cols = word(file + 52) - (uint64_t)word(file + 48);
@@ -119,12 +128,14 @@ static uint64_t entries_of(const unsigned char *file) {
 
 static void seal_all(unsigned char *file, size_t length) {
     if (length < 124) return;
-    uint64_t header = word(file + 12), entries = entries_of(file);
+    uint64_t header = word(file + 12), entries = entries_of(file), each = entry_bytes(file);
     seal(file, length, 0, header);
-    seal(file, length, header, 32 * entries + 4);
-    for (uint64_t i = 0; i < entries && header + 32 * i + 32 <= length; i++) {
-        const unsigned char *entry = file + header + 32 * i;
-        seal(file, length, word(entry) | (uint64_t)word(entry + 4) << 32, word(entry + 8));
+    seal(file, length, header, each * entries + 4);
+    for (uint64_t i = 0; i < entries && header + each * i + each <= length; i++) {
+        const unsigned char *entry = file + header + each * i;
+        uint64_t at = word(entry) | (uint64_t)word(entry + 4) << 32;
+        seal(file, length, at, word(entry + 8));
+        seal(file, length, at + word(entry + 8), deck_bytes(file, entry));
     }
 }
 
@@ -175,16 +186,28 @@ static void stretch(unsigned char *file, size_t length) {
 
 static unsigned char *entry_at(unsigned char *file, size_t length) {
     if (length < 124) return NULL;
-    uint64_t at = word(file + 12) + 32 * below(entries_of(file));
-    return entries_of(file) && at + 32 <= length ? file + at : NULL;
+    uint64_t at = word(file + 12) + entry_bytes(file) * below(entries_of(file));
+    return entries_of(file) && at + entry_bytes(file) <= length ? file + at : NULL;
 }
 
 static void damage_entry(unsigned char *file, size_t length) {
     unsigned char *entry = entry_at(file, length);
     if (!entry) return;
-    int field = (int)below(7);
+    int field = (int)below(entry_bytes(file) == 48 ? 11 : 7);
     if (field == 0) put(entry, odd_number(word(entry)), 8);
     else put(entry + 4 + 4 * field, odd_number(word(entry + 4 + 4 * field)), 4);
+}
+
+/* Gives all decks of a load module one height, any, which keeps them in order, and tells the index. */
+static void shake_decks(unsigned char *file, size_t length, unsigned char *entry) {
+    uint64_t at = word(entry) + (uint64_t)word(entry + 8), bytes = deck_bytes(file, entry);
+    /* What is written may lie over the entry itself. */
+    uint64_t vertices = word(entry + 32);
+    if (!bytes || at > length || bytes > length - at) return;
+    uint32_t z = below(3) ? (uint32_t)draw() : word(entry + 28) + (uint32_t)below(4096);
+    for (uint64_t i = 0; i < vertices; i++) put(file + at + 20 + 8 * i + 4, z, 4);
+    put(entry + 40, z, 4);
+    put(entry + 44, z, 4);
 }
 
 /* Gives the vertices of a load module any heights, and tells the index. */
@@ -201,6 +224,7 @@ static void shake_heights(unsigned char *file, size_t length) {
         low = height < low ? height : low;
         high = high < height ? height : high;
     }
+    shake_decks(file, length, entry);
     put(entry + 24, (uint32_t)low, 4);
     put(entry + 28, (uint32_t)high, 4);
 }
@@ -209,9 +233,10 @@ static void damage_section(unsigned char *file, size_t length) {
     unsigned char *entry = entry_at(file, length);
     if (!entry || word(entry + 4)) return;
     uint64_t at = word(entry), bytes = word(entry + 8);
-    if (at > length || bytes > length - at || bytes < 64) return;
+    if (deck_bytes(file, entry) && below(2)) at += bytes, bytes = deck_bytes(file, entry);
+    if (at > length || bytes > length - at || bytes < 24) return;
     for (uint64_t times = 1 + below(3); times; times--) {
-        uint64_t place = at + (below(2) ? below(56) : below(bytes - 8));
+        uint64_t place = at + (below(2) && 64 <= bytes ? below(56) : below(bytes - 8));
         int width = 1 << below(4);
         put(file + place, odd_number(word(file + place)), width);
     }
@@ -283,6 +308,29 @@ static void ask_sight(const lmr_ground *ground, const lmr_frame *frame, double h
     }
 }
 
+/* The topmost of ground and decks: never below the ground where there is no ceiling, never above one. */
+static void ask_below(const lmr_ground *ground, const double place[2], int found, double on_ground) {
+    double top = 0, many = 0;
+    lmr_surface surface;
+    expect(lmr_height_below(ground, place[0], place[1], INFINITY, &top) == found, "a top where there is ground");
+    expect(!found || on_ground <= top, "the ground or a deck above it");
+    double ceiling = below(3) ? (below(2) ? on_ground : top) + (double)below(9) - 4 : odd_double();
+    const double places[1][3] = {{place[0], place[1], ceiling}};
+    double height = 0;
+    int has = lmr_height_below(ground, place[0], place[1], ceiling, &height);
+    expect(!has || (found && height <= ceiling && height <= top), "not above the ceiling");
+    expect(has || !found || !(on_ground <= ceiling), "the ground where it is low enough");
+    expect(lmr_surface_below(ground, place[0], place[1], ceiling, &surface) == has, "a surface where a height is");
+    expect(lmr_heights_below(ground, places, &many, 1) == 1 && (has ? many == height : isnan(many)), "one as many");
+    if (has) {
+        const double *n = surface.normal;
+        double length = n[0] * n[0] + n[1] * n[1] + n[2] * n[2];
+        expect(surface.height_m == height && fabs(length - 1) < 1e-6 && 0 <= n[2], "a unit vector up");
+        expect(surface.is_deck <= 1 && (!surface.is_deck || surface.class_of_surface != LMR_HOLE_CLASS), "a class");
+        expect(surface.is_deck || height == on_ground, "the ground as it is");
+    }
+}
+
 static void ask_places(const lmr_ground *ground, const lmr_frame *frame) {
     double places[ASKED][2], heights[ASKED];
     for (int i = 0; i < ASKED; i++) {
@@ -303,6 +351,7 @@ static void ask_places(const lmr_ground *ground, const lmr_frame *frame) {
             expect(sample.height_m == height && fabs(length - 1) < 1e-6 && 0 <= n[2], "a unit vector up");
             last = height;
         }
+        ask_below(ground, places[i], found, height);
         ask_sight(ground, frame, last);
     }
 }
@@ -323,6 +372,15 @@ static void draw_modules(const lmr_ground *ground, const lmr_frame *frame) {
             for (int c = 0; c < 3; c++) expect(module.triangles[t][c] < module.vertex_count, "an index of a vertex");
             sum += module.classes[t];
         }
+        lmr_decks decks;
+        expect(lmr_decks_at(ground, i, &decks) == 1 && !decks.vertices == !decks.triangle_count, "decks or none");
+        for (size_t v = 0; v < decks.vertex_count; v++) {
+            expect(decks.vertices[v].x <= frame->side_m * 128 && decks.vertices[v].y <= frame->side_m * 128, "inside");
+        }
+        for (size_t t = 0; t < decks.triangle_count; t++) {
+            for (int c = 0; c < 3; c++) expect(decks.triangles[t][c] < decks.vertex_count, "an index of a vertex");
+            sum += decks.classes[t];
+        }
     }
 }
 
@@ -334,6 +392,9 @@ static void ask_nothing(const lmr_area *area, lmr_ground *ground) {
     lmr_frame frame;
     lmr_sample sample;
     lmr_module module;
+    lmr_surface surface;
+    lmr_decks decks;
+    const double triples[1][3] = {{0, 0, 0}};
     void *odd = (char *)three + 1;
     lmr_close(NULL);
     lmr_unload(NULL);
@@ -345,11 +406,18 @@ static void ask_nothing(const lmr_area *area, lmr_ground *ground) {
     expect(!lmr_move(NULL, area, 0, 0, 0, why, sizeof why) && !lmr_move(ground, NULL, 0, 0, 0, NULL, 3), "no move");
     expect(!lmr_height(NULL, 0, 0, &height) && !lmr_height(ground, 0, 0, NULL), "no height");
     expect(!lmr_sample_at(NULL, 0, 0, &sample) && !lmr_sample_at(ground, 0, 0, NULL), "no sample");
+    expect(!lmr_height_below(NULL, 0, 0, 0, &height) && !lmr_height_below(ground, 0, 0, 0, NULL), "no height");
+    expect(!lmr_surface_below(NULL, 0, 0, 0, &surface) && !lmr_surface_below(ground, 0, 0, 0, NULL), "no surface");
+    expect(!lmr_heights_below(NULL, triples, &height, 1) && !lmr_heights_below(ground, NULL, &height, 1), "none");
+    expect(!lmr_decks_at(NULL, 0, &decks) && !lmr_decks_at(ground, 0, NULL), "no decks");
     expect(!lmr_module_at(NULL, 0, &module) && !lmr_module_at(ground, 0, NULL), "no load module");
     expect(!lmr_heights(NULL, places, &height, 1) && !lmr_heights(ground, NULL, &height, 1), "no heights");
     if (ground) {
         expect(!lmr_heights(ground, places, NULL, 1) && !lmr_heights(ground, places, &height, SIZE_MAX), "no room");
         expect(lmr_heights(ground, NULL, NULL, 0) == 1, "no heights wanted");
+        expect(!lmr_heights_below(ground, triples, NULL, 1) && !lmr_heights_below(ground, triples, &height, SIZE_MAX),
+               "no room");
+        expect(lmr_heights_below(ground, NULL, NULL, 0) == 1, "no heights wanted");
         expect(lmr_sight(ground, NULL, three, &share) == LMR_INVALID, "no eye");
         expect(lmr_sight(ground, three, NULL, &share) == LMR_INVALID, "no target");
     }

@@ -19,6 +19,15 @@ pub enum Section {
         /// Its level; 0 is the finest.
         level: u16,
     },
+    /// The decks of one level of a load module.
+    Decks {
+        /// Its row in the area.
+        row: u32,
+        /// Its column in the area.
+        col: u32,
+        /// Its level; 0 is the finest.
+        level: u16,
+    },
 }
 
 impl fmt::Display for Section {
@@ -28,6 +37,8 @@ impl fmt::Display for Section {
             Section::Index => f.write_str("index"),
             Section::Module { row, col, level: 0 } => write!(f, "load module {row},{col}"),
             Section::Module { row, col, level } => write!(f, "load module {row},{col} at level {level}"),
+            Section::Decks { row, col, level: 0 } => write!(f, "decks of load module {row},{col}"),
+            Section::Decks { row, col, level } => write!(f, "decks of load module {row},{col} at level {level}"),
         }
     }
 }
@@ -58,8 +69,8 @@ pub enum ReadError {
     UnsupportedVersion {
         /// The file's version.
         found: u16,
-        /// The version this reader knows.
-        expected: u16,
+        /// The newest version that this reader knows.
+        newest: u16,
     },
     /// The file ends inside a section.
     Truncated {
@@ -179,8 +190,8 @@ impl fmt::Display for ReadError {
             Self::NotALoadModuleFile { found } => {
                 write!(f, "header, offset 0: found {found:02x?}, expected {:02x?}", crate::MAGIC)
             }
-            Self::UnsupportedVersion { found, expected } => {
-                write!(f, "header, offset 8: found format version {found}, expected {expected}")
+            Self::UnsupportedVersion { found, newest } => {
+                write!(f, "header, offset 8: found format version {found}, expected 1 to {newest}")
             }
             Self::Truncated { section, offset, found, expected } => {
                 write!(f, "{section}, offset {offset}: found {found} bytes, expected {expected}")

@@ -83,10 +83,10 @@ impl SlmFile {
     }
 }
 
-/// The bytes of one section. The index has been checked against the length of the file.
+/// The bytes of one section and of its decks. The index has been checked against the length of the file.
 fn section<'a>(bytes: &'a [u8], entry: &IndexEntry) -> &'a [u8] {
     let start = entry.offset as usize;
-    &bytes[start..start + entry.length as usize]
+    &bytes[start..entry.end() as usize]
 }
 
 #[cfg(test)]
@@ -123,9 +123,88 @@ mod tests {
         assert_eq!(file.module(2, 4).map(|module| module.level), Some(0));
     }
 
+    fn samples() -> [Vec<u8>; 4] {
+        [sample::file(), sample::two_levels(), sample::with_decks(), sample::with_one_deck_of_two_levels()]
+    }
+
+    #[test]
+    fn a_file_with_decks_is_of_version_2_and_has_the_same_ground() {
+        let (plain, bridged) =
+            (SlmFile::parse(&sample::file()).unwrap(), SlmFile::parse(&sample::with_decks()).unwrap());
+        assert!(!plain.header().has_decks() && bridged.header().has_decks());
+        for (plain, bridged) in plain.modules().iter().zip(bridged.modules()) {
+            assert!(plain.decks.is_empty() && !bridged.decks.is_empty());
+            assert_eq!(*plain, Module { decks: plain.decks.clone(), ..bridged.clone() });
+        }
+        let decks = &bridged.module(2, 4).unwrap().decks;
+        assert_eq!((decks.vertices.len(), decks.triangles[2], &decks.classes[..]), (8, [2, 3, 5], &[8, 8, 7, 7][..]));
+        let levels = SlmFile::parse(&sample::with_one_deck_of_two_levels()).unwrap();
+        let has_decks: Vec<bool> = levels.modules.iter().map(|module| !module.decks.is_empty()).collect();
+        assert_eq!(has_decks, [false, true, false, false]);
+    }
+
+    #[test]
+    fn what_checksums_cannot_know_of_decks_is_checked_too() {
+        let check = |damage: &dyn Fn(&mut [u8], usize), expected: &str| {
+            let mut bytes = sample::with_decks();
+            let entry = SlmFile::parse(&bytes).unwrap().index()[1];
+            damage(&mut bytes, (entry.offset + u64::from(entry.length)) as usize);
+            sample::mend_checksums(&mut bytes);
+            let error = SlmFile::parse(&bytes).unwrap_err().to_string();
+            assert!(error.contains(expected), "{error:?} does not say {expected:?}");
+        };
+        let (vertices, triangles, classes) = (20, 20 + 8 * 8, 20 + 8 * 8 + 4 * 6);
+        check(&|bytes, at| bytes[at + 4] = 9, "decks of load module 2,4, offset");
+        check(&|bytes, at| bytes[at + 8] = 1, "found level 1, expected 0");
+        check(&|bytes, at| bytes[at + 12] = 7, "found deck vertex count 7, expected 8");
+        check(&|bytes, at| bytes[at + vertices + 1] = 0xff, "found x 65296, expected 0 to 64000");
+        check(&|bytes, at| bytes.copy_within(at + vertices..at + vertices + 8, at + vertices + 8), "order of vertices");
+        check(&|bytes, at| bytes[at + vertices + 5] = 0x70, "found highest height of decks 28672, expected 5120");
+        check(&|bytes, at| bytes[at + triangles] = 8, "found vertex of a triangle 8, expected 0 to 7");
+        check(&|bytes, at| bytes.swap(at + triangles + 2, at + triangles + 4), "doubled area of a triangle -");
+        check(&|bytes, at| bytes[at + triangles + 8] = 1, "order of triangles");
+        check(&|bytes, at| bytes[at + triangles + 10] = 5, "doubled area of a triangle");
+        check(&|bytes, at| bytes[at + classes] = 255, "found class of a deck 255, expected 0 to 254");
+        // An index that says other things of decks than are there, and a version that is not the file's.
+        let index = 144 + 48;
+        check(&|bytes, _| bytes[index + 32] = 2, "found deck vertex count 2, expected 3 to 65535");
+        check(&|bytes, _| bytes[index + 36] = 0, "found deck triangle count 0, expected 1 to 131070");
+        check(&|bytes, _| bytes[index + 32..][..4].fill(0), "found deck triangle count 4, expected 0");
+        check(&|bytes, _| bytes[index + 38] = 1, "found length of decks");
+        check(&|bytes, _| bytes[index + 41] = 0xff, "found lowest height of decks 65280");
+        let mut bytes = sample::file();
+        bytes[8] = 2;
+        sample::mend_checksums(&mut bytes);
+        assert!(SlmFile::parse(&bytes).is_err(), "version 1 was read as version 2");
+        let mut bytes = sample::with_decks();
+        bytes[8] = 1;
+        sample::mend_checksums(&mut bytes);
+        assert!(SlmFile::parse(&bytes).is_err(), "version 2 was read as version 1");
+    }
+
+    #[test]
+    fn a_file_of_version_2_without_a_deck_is_refused() {
+        // The same load modules have one file only: it is of version 1.
+        let good = sample::with_decks();
+        let entries = SlmFile::parse(&good).unwrap().index().to_vec();
+        let section = |entry: &IndexEntry| &good[entry.offset as usize..][..entry.length as usize];
+        let mut bytes = good[..144 + 2 * 48 + 4].to_vec();
+        for (at, entry) in [144, 192].into_iter().zip(&entries) {
+            let offset = bytes.len() as u64;
+            bytes[at..at + 8].copy_from_slice(&offset.to_le_bytes());
+            bytes[at + 32..at + 48].fill(0);
+            bytes.extend_from_slice(section(entry));
+        }
+        let length = bytes.len() as u64;
+        bytes[16..24].copy_from_slice(&length.to_le_bytes());
+        sample::mend_checksums(&mut bytes);
+        let error = SlmFile::parse(&bytes).unwrap_err().to_string();
+        assert_eq!(error, "index, offset 144: found decks in some load module 0, expected 1");
+    }
+
     #[test]
     fn every_truncation_is_an_error() {
-        for bytes in [sample::file(), sample::two_levels()] {
+        for bytes in samples() {
             for length in 0..bytes.len() {
                 assert!(SlmFile::parse(&bytes[..length]).is_err(), "the first {length} bytes were accepted");
             }
@@ -134,8 +213,7 @@ mod tests {
 
     #[test]
     fn every_flipped_bit_is_an_error() {
-        check_every_flip(sample::file());
-        check_every_flip(sample::two_levels());
+        samples().into_iter().for_each(check_every_flip);
     }
 
     #[track_caller]
@@ -152,7 +230,7 @@ mod tests {
     #[test]
     fn every_byte_set_to_anything_is_an_error_where_checksums_are_mended() {
         // With the checksums made right again only the checks of meaning are left: none may panic.
-        for good in [sample::file(), sample::two_levels()] {
+        for good in samples() {
             for at in 0..good.len() {
                 for value in [0, 1, 0x7f, 0x80, 0xff] {
                     let mut bytes = good.clone();
@@ -176,9 +254,9 @@ mod tests {
     #[test]
     fn another_version_is_named() {
         let mut bytes = sample::file();
-        bytes[8] = 2;
+        bytes[8] = 3;
         let error = SlmFile::parse(&bytes).unwrap_err();
-        assert_eq!(error.to_string(), "header, offset 8: found format version 2, expected 1");
+        assert_eq!(error.to_string(), "header, offset 8: found format version 3, expected 1 to 2");
     }
 
     #[track_caller]

@@ -2,17 +2,25 @@
 
 /// The first eight bytes of every load-module file; a transfer as text damages them.
 pub const MAGIC: [u8; 8] = *b"\x89SLM\r\n\x1a\n";
-/// The version of the format that this crate reads.
-pub const VERSION: u16 = 1;
+/// The newest version of the format that this crate reads: of files with decks.
+pub const VERSION: u16 = 2;
+/// The version of files without decks.
+pub const VERSION_WITHOUT_DECKS: u16 = 1;
 /// Levels of detail in a file at most.
 pub const LEVELS_MAX: u16 = 8;
 /// Quanta in a metre, of coordinates and heights alike.
 pub const QUANTA_PER_METRE: u32 = 128;
 /// Bytes of the header before its texts.
 pub const FIXED_HEADER_BYTES: usize = 124;
-/// Bytes of one entry of the index.
+/// Bytes of one entry of the index in a file without decks.
 pub const INDEX_ENTRY_BYTES: usize = 32;
+/// Bytes that follow in each entry of a file with decks.
+pub const DECK_ENTRY_BYTES: usize = 16;
 /// Bytes of a load module's section before its vertices.
 pub const FIXED_MODULE_BYTES: usize = 56;
+/// Bytes of a part of decks before its vertices.
+pub const FIXED_DECKS_BYTES: usize = 20;
 /// Bytes of the longest file that is read: far above any tile, and small enough to hold in memory.
 pub const FILE_BYTES_MAX: u64 = 1 << 30;
+/// The class of triangles over a hole: no source has a height there, and their heights only close the surface.
+pub const HOLE_CLASS: u8 = 255;

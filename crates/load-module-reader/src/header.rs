@@ -1,7 +1,9 @@
 //! The header: which tile, on which grid, in which frame.
 
 use crate::bytes::{Cursor, check_section};
-use crate::{FIXED_HEADER_BYTES, LEVELS_MAX, MAGIC, QUANTA_PER_METRE, ReadError, Section, VERSION};
+use crate::{
+    FIXED_HEADER_BYTES, LEVELS_MAX, MAGIC, QUANTA_PER_METRE, ReadError, Section, VERSION, VERSION_WITHOUT_DECKS,
+};
 
 /// Bytes of the longest header: two texts of 65,535 bytes, padding, checksum.
 const HEADER_BYTES_MAX: u32 = (FIXED_HEADER_BYTES as u32 + 2 * u16::MAX as u32).next_multiple_of(4) + 4;
@@ -13,6 +15,8 @@ const ORIGIN_M_MAX: f64 = 1e9;
 /// What holds for all load modules of a file. Rows and columns count load modules from the area's south-west.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Header {
+    /// Version of the format: [`VERSION`] with decks, [`VERSION_WITHOUT_DECKS`] without.
+    pub version: u16,
     /// Levels of every load module, the finest first.
     pub level_count: u16,
     /// Row of the tile.
@@ -59,6 +63,11 @@ impl Header {
         [east + f64::from(col) * self.side_m(), north + f64::from(row) * self.side_m()]
     }
 
+    /// Whether some load module of the file has decks.
+    pub fn has_decks(&self) -> bool {
+        self.version != VERSION_WITHOUT_DECKS
+    }
+
     /// Load modules in the file, each of which has all levels.
     pub fn module_count(&self) -> u64 {
         u64::from(self.north - self.south) * u64::from(self.east - self.west)
@@ -73,7 +82,7 @@ impl Header {
     /// The header at the start of a file of `file_bytes` bytes, of which `file` is the beginning, and its length.
     pub(crate) fn parse(file: &[u8], file_bytes: u64) -> Result<(Self, usize), ReadError> {
         let mut cursor = Cursor::new(file, 0, Section::Header);
-        check_start(&mut cursor)?;
+        let version = check_start(&mut cursor)?;
         let offset = cursor.offset();
         let level_count = cursor.u16()?;
         let header_length = cursor.u32()?;
@@ -89,7 +98,7 @@ impl Header {
         })?;
         check_section(bytes, 0, Section::Header)?;
         cursor.within(offset, "level count", i64::from(level_count), (1, i64::from(LEVELS_MAX)))?;
-        let header = Self::parse_fields(level_count, Cursor::new(bytes, 0, Section::Header))?;
+        let header = Self::parse_fields(version, level_count, Cursor::new(bytes, 0, Section::Header))?;
         if file_bytes == file_length {
             return Ok((header, header_length));
         }
@@ -97,7 +106,7 @@ impl Header {
     }
 
     /// All after the lengths, up to the end of the header.
-    fn parse_fields(level_count: u16, mut cursor: Cursor) -> Result<Self, ReadError> {
+    fn parse_fields(version: u16, level_count: u16, mut cursor: Cursor) -> Result<Self, ReadError> {
         cursor.take(12)?;
         let length = cursor.u32()?;
         cursor.take(8)?;
@@ -119,6 +128,7 @@ impl Header {
         cursor.checksum()?;
         cursor.expect(12, "header length", i64::from(length), cursor.offset() as i64)?;
         Ok(Self {
+            version,
             level_count,
             tile_row,
             tile_col,
@@ -140,16 +150,16 @@ impl Header {
 }
 
 /// Magic and version: what must be right before anything else can be understood.
-fn check_start(cursor: &mut Cursor) -> Result<(), ReadError> {
+fn check_start(cursor: &mut Cursor) -> Result<u16, ReadError> {
     let found = cursor.array()?;
     if found != MAGIC {
         return Err(ReadError::NotALoadModuleFile { found });
     }
     let found = cursor.u16()?;
-    if found != VERSION {
-        return Err(ReadError::UnsupportedVersion { found, expected: VERSION });
+    if !(VERSION_WITHOUT_DECKS..=VERSION).contains(&found) {
+        return Err(ReadError::UnsupportedVersion { found, newest: VERSION });
     }
-    Ok(())
+    Ok(found)
 }
 
 /// A half-open, non-empty range of rows or columns of load modules inside the area.

@@ -1,7 +1,10 @@
 //! The index: where each load module lies, and what one needs to know before reading it.
 
 use crate::bytes::{Cursor, check_section};
-use crate::{FIXED_MODULE_BYTES, Header, INDEX_ENTRY_BYTES, ReadError, Section};
+use crate::{
+    DECK_ENTRY_BYTES, FIXED_DECKS_BYTES, FIXED_MODULE_BYTES, Header, INDEX_ENTRY_BYTES, ReadError, Section,
+    VERSION_WITHOUT_DECKS,
+};
 
 /// Where one level of a load module lies in the file, and its size.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -20,6 +23,44 @@ pub struct IndexEntry {
     pub z_low: i32,
     /// Height of the highest vertex in quanta of 1/128 m.
     pub z_high: i32,
+    /// The part with decks that follows the section. All of the above is about the ground alone.
+    pub decks: DecksEntry,
+}
+
+/// What the index says of the decks of one level of a load module; all zero where there are none.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct DecksEntry {
+    /// Vertices.
+    pub vertex_count: u32,
+    /// Triangles.
+    pub triangle_count: u32,
+    /// Height of the lowest vertex in quanta of 1/128 m.
+    pub z_low: i32,
+    /// Height of the highest vertex in quanta of 1/128 m.
+    pub z_high: i32,
+}
+
+impl DecksEntry {
+    /// Bytes of the part, checksum included; 0 where there are no decks, and no part.
+    pub fn length(&self) -> u32 {
+        if self.triangle_count == 0 {
+            return 0;
+        }
+        // At most 65,535 vertices and 131,070 triangles.
+        (FIXED_DECKS_BYTES as u32 + 8 * self.vertex_count + 7 * self.triangle_count).next_multiple_of(4) + 4
+    }
+}
+
+impl IndexEntry {
+    /// One past the last byte of the section and of the decks that follow it.
+    pub fn end(&self) -> u64 {
+        self.offset + u64::from(self.length) + u64::from(self.decks.length())
+    }
+}
+
+/// Bytes of one entry of the index in files of a version.
+pub(crate) fn entry_bytes(version: u16) -> usize {
+    if version == VERSION_WITHOUT_DECKS { INDEX_ENTRY_BYTES } else { INDEX_ENTRY_BYTES + DECK_ENTRY_BYTES }
 }
 
 /// The index that follows a header of `header_length` bytes: level by level, row by row from the south-west. `file` is
@@ -32,7 +73,8 @@ pub(crate) fn parse(
 ) -> Result<Vec<IndexEntry>, ReadError> {
     let base = header_length as u64;
     let count = header.module_count().saturating_mul(u64::from(header.level_count));
-    let length = count.saturating_mul(INDEX_ENTRY_BYTES as u64).saturating_add(4);
+    let entry_bytes = entry_bytes(header.version);
+    let length = count.saturating_mul(entry_bytes as u64).saturating_add(4);
     let rest = &file[header_length..];
     if (rest.len() as u64) < length {
         let found = rest.len() as u64;
@@ -43,16 +85,22 @@ pub(crate) fn parse(
     check_section(bytes, base, Section::Index)?;
     let mut cursor = Cursor::new(bytes, base, Section::Index);
     let mut next = base + length;
-    let mut entries = Vec::with_capacity(bytes.len() / INDEX_ENTRY_BYTES);
+    let mut entries = Vec::with_capacity(bytes.len() / entry_bytes);
     for _ in 0..count {
-        let entry = read_entry(&mut cursor, next, file_bytes)?;
-        next += u64::from(entry.length);
+        let mut entry = read_entry(&mut cursor, next, file_bytes)?;
+        if header.has_decks() {
+            entry.decks = read_decks(&mut cursor, file_bytes - next - u64::from(entry.length))?;
+        }
+        next = entry.end();
         entries.push(entry);
     }
-    if next == file_bytes {
-        return Ok(entries);
+    if next != file_bytes {
+        return Err(ReadError::WrongLength { found: file_bytes, expected: next });
     }
-    Err(ReadError::WrongLength { found: file_bytes, expected: next })
+    // The same load modules have one file only.
+    let has_decks = entries.iter().any(|entry| 0 < entry.decks.triangle_count);
+    cursor.expect(base, "decks in some load module", i64::from(has_decks), i64::from(header.has_decks()))?;
+    Ok(entries)
 }
 
 /// One entry, whose section must begin at `next`: sections lie back to back.
@@ -66,6 +114,7 @@ fn read_entry(cursor: &mut Cursor, next: u64, file_length: u64) -> Result<IndexE
         polygon_count: cursor.u32()?,
         z_low: cursor.i32()?,
         z_high: cursor.i32()?,
+        decks: DecksEntry::default(),
     };
     cursor.expect(at, "offset", clamp(entry.offset), clamp(next))?;
     let rest = clamp(file_length - next.min(file_length));
@@ -82,6 +131,32 @@ fn read_entry(cursor: &mut Cursor, next: u64, file_length: u64) -> Result<IndexE
     cursor.within(at + 20, "polygon count", i64::from(entry.polygon_count), (1, triangles))?;
     cursor.within(at + 24, "lowest height", i64::from(entry.z_low), (i64::from(i32::MIN), i64::from(entry.z_high)))?;
     Ok(entry)
+}
+
+/// What an entry says of decks, whose part must fit into the `rest` of the file behind the section of the ground.
+fn read_decks(cursor: &mut Cursor, rest: u64) -> Result<DecksEntry, ReadError> {
+    let at = cursor.offset();
+    let decks = DecksEntry {
+        vertex_count: cursor.u32()?,
+        triangle_count: cursor.u32()?,
+        z_low: cursor.i32()?,
+        z_high: cursor.i32()?,
+    };
+    let vertices = i64::from(decks.vertex_count);
+    if vertices == 0 {
+        cursor.expect(at + 4, "deck triangle count", i64::from(decks.triangle_count), 0)?;
+        cursor.expect(at + 8, "lowest height of decks", i64::from(decks.z_low), 0)?;
+        cursor.expect(at + 12, "highest height of decks", i64::from(decks.z_high), 0)?;
+        return Ok(decks);
+    }
+    cursor.within(at, "deck vertex count", vertices, (3, i64::from(u16::MAX)))?;
+    let triangles = (1, 2 * i64::from(u16::MAX));
+    cursor.within(at + 4, "deck triangle count", i64::from(decks.triangle_count), triangles)?;
+    let heights = (i64::from(i32::MIN), i64::from(decks.z_high));
+    cursor.within(at + 8, "lowest height of decks", i64::from(decks.z_low), heights)?;
+    // Decks that cannot be so long are refused before their bytes are read.
+    cursor.within(at, "length of decks", i64::from(decks.length()), (0, clamp(rest)))?;
+    Ok(decks)
 }
 
 /// Bytes of the longest section of so many vertices and triangles, all vertices on all sides.

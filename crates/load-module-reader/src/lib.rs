@@ -8,6 +8,9 @@
 //! [`Area`] opens all files of a database and reads only their headers and indexes. [`Area::load`] brings a [`Block`]
 //! of load modules into memory as [`LoadedGround`], and [`LoadedGround::moved`] follows the observer and reads only
 //! what is new.
+//! Decks of bridges hang above the ground: [`LoadedGround::height_m`] is that of the ground,
+//! [`LoadedGround::height_below_m`] that of the topmost of ground and decks not above a ceiling, for vehicles that
+//! drive over a bridge and under it.
 //! A query takes constant expected time. [`SlmFile`] is the plain way to read one whole file.
 //! Where load modules have several levels of detail, all of this is about the finest, and [`Area::load_level`] brings
 //! in another.
@@ -60,28 +63,33 @@
 
 mod format;
 pub use format::{
-    FILE_BYTES_MAX, FIXED_HEADER_BYTES, FIXED_MODULE_BYTES, INDEX_ENTRY_BYTES, LEVELS_MAX, MAGIC, QUANTA_PER_METRE,
-    VERSION,
+    DECK_ENTRY_BYTES, FILE_BYTES_MAX, FIXED_DECKS_BYTES, FIXED_HEADER_BYTES, FIXED_MODULE_BYTES, HOLE_CLASS,
+    INDEX_ENTRY_BYTES, LEVELS_MAX, MAGIC, QUANTA_PER_METRE, VERSION, VERSION_WITHOUT_DECKS,
 };
 mod error;
 pub use error::{ReadError, Section};
 mod bytes;
 mod header;
 pub use header::Header;
+mod vertex;
+pub use vertex::Vertex;
 mod index;
-pub use index::IndexEntry;
+pub use index::{DecksEntry, IndexEntry};
+mod decks;
+pub use decks::Decks;
 mod module;
-pub use module::{Module, Residual, Vertex};
+pub use module::{Module, Residual};
 mod tile_file;
 pub use tile_file::{Bytes, Keep, TileFile, open_file};
 mod file;
 pub use file::SlmFile;
 mod lookup;
 mod terrain_module;
-pub use terrain_module::{HOLE_CLASS, Sample, TerrainModule};
+pub use terrain_module::{Sample, TerrainModule};
 mod frame;
 pub use frame::{AreaFrame, Block};
 mod loaded_ground;
+mod sight;
 pub use loaded_ground::{LoadedGround, Sight};
 mod area;
 pub use area::Area;

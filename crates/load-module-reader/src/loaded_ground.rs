@@ -1,8 +1,9 @@
-//! Load modules held in memory around an observer: heights, normals, classes, lines of sight.
+//! Load modules held in memory around an observer: heights, normals, classes, lines of sight, over and under decks.
 
 use std::sync::Arc;
 
 use crate::lookup::{Lookup, STEPS};
+use crate::sight::{Line, crossed_at, entered_at, hidden_at};
 use crate::{AreaFrame, Block, QUANTA_PER_METRE, Sample, TerrainModule};
 
 /// A block of load modules, loaded. It holds no file open and may be asked from many threads.
@@ -15,6 +16,8 @@ pub struct LoadedGround {
     modules: Vec<Arc<TerrainModule>>,
     /// What finds their triangles, side by side so that a query reads it at once.
     lookups: Vec<Lookup>,
+    /// The same for decks; empty where no load module of the block has any.
+    decks: Vec<Option<Lookup>>,
     /// Steps of 1/4096 of a quantum along the side of a load module.
     side_steps: i64,
 }
@@ -24,7 +27,7 @@ pub struct LoadedGround {
 pub enum Sight {
     /// Nothing does.
     Free,
-    /// The ground does, for the first time so far along the line: 0 at its beginning, 1 at its end.
+    /// The ground or a deck does, for the first time so far along the line: 0 at its beginning, 1 at its end.
     Hidden(f64),
     /// The line leaves what is loaded, and nothing stands in its way before.
     Unknown,
@@ -35,7 +38,7 @@ impl LoadedGround {
     pub(crate) fn empty(frame: AreaFrame, level: u16) -> Self {
         let side_steps = i64::from(frame.side) * STEPS;
         let block = Block { south: 0, west: 0, north: 0, east: 0 };
-        Self { frame, level, block, modules: Vec::new(), lookups: Vec::new(), side_steps }
+        Self { frame, level, block, modules: Vec::new(), lookups: Vec::new(), decks: Vec::new(), side_steps }
     }
 
     /// The level of detail that is loaded; 0 is the finest.
@@ -66,7 +69,10 @@ impl LoadedGround {
     /// Another block, with its load modules.
     pub(crate) fn with_modules(self, block: Block, modules: Vec<Arc<TerrainModule>>) -> Self {
         let lookups = modules.iter().map(|module| module.lookup().clone()).collect();
-        Self { block, modules, lookups, ..self }
+        let has_decks = modules.iter().any(|module| module.decks().is_some());
+        let of_decks = modules.iter().filter(|_| has_decks).map(|module| module.decks().cloned());
+        let decks = of_decks.collect();
+        Self { block, modules, lookups, decks, ..self }
     }
 
     /// The load module under a place, by its place in `modules`, and the place in it in steps. The far sides of the
@@ -93,8 +99,8 @@ impl LoadedGround {
         Some((index as u32, (steps - index * self.side_steps).clamp(0, self.side_steps)))
     }
 
-    /// Height of the ground at an easting and northing, in metres above the vertical datum; `None` where nothing is
-    /// loaded.
+    /// Height of the ground at an easting and northing, in metres above the vertical datum, whatever decks hang above
+    /// it; `None` where nothing is loaded.
     #[inline]
     pub fn height_m(&self, place_m: [f64; 2]) -> Option<f64> {
         let (index, place) = self.locate(place_m)?;
@@ -128,6 +134,56 @@ impl LoadedGround {
         }
     }
 
+    /// Height of the topmost of ground and decks that is not above `ceiling_m`, at an easting and northing: with the
+    /// height of a vehicle's roof or of its wheels and a step, what it drives on, over a bridge or under it; with
+    /// infinity, what lies on top. `None` where nothing is loaded, and where all is above the ceiling or that is not a
+    /// number.
+    pub fn height_below_m(&self, place_m: [f64; 2], ceiling_m: f64) -> Option<f64> {
+        let (index, place) = self.locate(place_m)?;
+        let ground = self.lookups[index].height_m(place).filter(|height_m| *height_m <= ceiling_m);
+        self.deck_below(index, place, ceiling_m).map_or(ground, |deck| Some(ground.map_or(deck, |m| m.max(deck))))
+    }
+
+    /// [`LoadedGround::height_below_m`] at many places at once, each an easting, a northing and a ceiling, in
+    /// `heights_m`, NaN where there is none.
+    ///
+    /// # Panics
+    /// When the two lists differ in length.
+    pub fn heights_below_m(&self, places_m: &[[f64; 3]], heights_m: &mut [f64]) {
+        const AT_ONCE: usize = 32;
+        assert_eq!(places_m.len(), heights_m.len(), "one height for each place");
+        for (places, heights) in places_m.chunks(AT_ONCE).zip(heights_m.chunks_mut(AT_ONCE)) {
+            let mut on_ground = [[0.0; 2]; AT_ONCE];
+            on_ground.iter_mut().zip(places).for_each(|(on_ground, &[east, north, _])| *on_ground = [east, north]);
+            self.heights_m(&on_ground[..places.len()], heights);
+            for (&[east, north, ceiling_m], height_m) in places.iter().zip(heights) {
+                *height_m = if *height_m <= ceiling_m { *height_m } else { f64::NAN };
+                if self.decks.is_empty() {
+                    continue;
+                }
+                let located = self.locate([east, north]);
+                let deck = located.and_then(|(index, place)| self.deck_below(index, place, ceiling_m));
+                // The larger of two numbers one of which is not a number is the other.
+                *height_m = deck.map_or(*height_m, |deck| deck.max(*height_m));
+            }
+        }
+    }
+
+    /// Height of the topmost deck of a load module that is not above a ceiling, at a place in steps.
+    #[inline]
+    fn deck_below(&self, index: usize, place: [i64; 2], ceiling_m: f64) -> Option<f64> {
+        let decks = self.decks.get(index)?.as_ref()?;
+        let below = decks.triangles(place).map(|(_, height_m, _)| height_m).filter(|height_m| *height_m <= ceiling_m);
+        below.max_by(f64::total_cmp)
+    }
+
+    /// Height, normal and class of the topmost of ground and decks that is not above `ceiling_m`, as
+    /// [`LoadedGround::height_below_m`] finds it. Where a deck touches the ground it is the deck.
+    pub fn sample_below(&self, place_m: [f64; 2], ceiling_m: f64) -> Option<Sample> {
+        let (index, place) = self.locate(place_m)?;
+        self.modules[index].sample_below(place, ceiling_m)
+    }
+
     /// Height, normal and class of the ground at an easting and northing; `None` where nothing is loaded. On an edge
     /// it is that of one of the triangles beside it.
     pub fn sample(&self, place_m: [f64; 2]) -> Option<Sample> {
@@ -135,8 +191,10 @@ impl LoadedGround {
         self.modules[index].sample(place)
     }
 
-    /// Whether the ground stands between two places, each an easting, a northing and a height above the vertical
-    /// datum. What only touches the line does not hide it; an end below the ground is hidden. It is unknown where a
+    /// Whether the ground or a deck stands between two places, each an easting, a northing and a height above the
+    /// vertical datum. What only touches the line does not hide it; an end below the ground is hidden. Decks have no
+    /// thickness: a line passes over and under them, and is hidden where it goes through one; a place at the height of
+    /// a deck stands on it, and is not seen from below. It is unknown where a
     /// coordinate is not finite, or lies further than 1e12 m from the area's south-west corner or from height 0, where
     /// no ground can be. It takes at most as many steps as load modules are crossed.
     pub fn sight(&self, from_m: [f64; 3], to_m: [f64; 3]) -> Sight {
@@ -159,7 +217,13 @@ impl LoadedGround {
             let inside = |index: i64| u32::try_from(index).ok();
             let loaded = inside(row).zip(inside(col)).and_then(|(row, col)| self.module(row, col));
             match loaded {
-                Some(module) => nearest = nearest.min(hidden_at(module.lookup(), self.frame.side, corner, from, to)),
+                Some(module) => {
+                    let line = Line::in_module(corner, from, to);
+                    nearest = nearest.min(hidden_at(module.lookup(), self.frame.side, &line));
+                    if let Some(decks) = module.decks() {
+                        nearest = nearest.min(crossed_at(decks, self.frame.side, &line));
+                    }
+                }
                 None => left_at = entered_at(corner, side, from, to),
             }
             // What comes later lies further along the line; what is not loaded ends the walk whatever rounding says.
@@ -226,49 +290,4 @@ impl LoadedGround {
             Some([at[1], at[0]])
         })
     }
-}
-
-/// Where along a line the triangles of a load module first rise above it; infinity when they do not.
-fn hidden_at(lookup: &Lookup, side: u16, corner: [f64; 2], from: [f64; 3], to: [f64; 3]) -> f64 {
-    let local = |place: [f64; 3]| [place[0] - corner[0], place[1] - corner[1]];
-    let (start, end) = (local(from), local(to));
-    let along = [end[0] - start[0], end[1] - start[1]];
-    let length_squared = along[0] * along[0] + along[1] * along[1];
-    let mut nearest = f64::INFINITY;
-    if length_squared == 0.0 {
-        return nearest;
-    }
-    // Between two edges the ground is straight, so it is enough to look where an edge is crossed.
-    lookup.edges_along(side, start, end, |edge| {
-        let edge = edge.map(|place| place.map(f64::from));
-        let seen = edge.map(|place| {
-            let (dx, dy) = (place[0] - start[0], place[1] - start[1]);
-            (along[0] * dy - along[1] * dx, along[0] * dx + along[1] * dy)
-        });
-        let [(left_a, ahead_a), (left_b, ahead_b)] = seen;
-        if (0.0 < left_a) == (0.0 < left_b) && (left_a < 0.0) == (left_b < 0.0) || left_a == left_b {
-            return;
-        }
-        let share = left_a / (left_a - left_b);
-        let at = (ahead_a + share * (ahead_b - ahead_a)) / length_squared;
-        let height = edge[0][2] + share * (edge[1][2] - edge[0][2]);
-        if (0.0..=1.0).contains(&at) && from[2] + at * (to[2] - from[2]) < height {
-            nearest = nearest.min(at);
-        }
-    });
-    nearest
-}
-
-/// Where along a line a load module is entered.
-fn entered_at(corner: [f64; 2], side: f64, from: [f64; 3], to: [f64; 3]) -> f64 {
-    let enters = |axis: usize| {
-        let (low, high) = (corner[axis], corner[axis] + side);
-        match from[axis] {
-            at if at < low => (low - at) / (to[axis] - at),
-            at if high < at => (high - at) / (to[axis] - at),
-            _ => 0.0,
-        }
-    };
-    // The larger of two numbers one of which is not a number is the other.
-    enters(0).max(enters(1)).clamp(0.0, 1.0)
 }

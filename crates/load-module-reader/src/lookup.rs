@@ -7,7 +7,7 @@
 
 use std::sync::Arc;
 
-use crate::{Module, QUANTA_PER_METRE};
+use crate::{QUANTA_PER_METRE, Vertex};
 
 /// Steps of a rounded place to a quantum, as a power of two.
 const STEP_BITS: u32 = 12;
@@ -33,26 +33,33 @@ pub(crate) struct Lookup {
 }
 
 /// Corners of a triangle: x, y, z in quanta.
-type Corners = [[i32; 3]; 3];
+pub(crate) type Corners = [[i32; 3]; 3];
+
+/// Triangles of a load module: its ground, or its decks.
+#[derive(Clone, Copy)]
+pub(crate) struct Mesh<'a> {
+    pub vertices: &'a [Vertex],
+    pub triangles: &'a [[u16; 3]],
+}
 
 impl Lookup {
-    pub(crate) fn new(module: &Module, side: u16) -> Self {
-        let cells = (module.triangles.len() as f64).sqrt().ceil().clamp(1.0, f64::from(CELLS_MAX)) as u32;
+    pub(crate) fn new(mesh: Mesh, side: u16) -> Self {
+        let cells = (mesh.triangles.len() as f64).sqrt().ceil().clamp(1.0, f64::from(CELLS_MAX)) as u32;
         let mut lookup = Self::of_cells(cells, side);
-        while 1 < lookup.cells && !lookup.is_affordable(module) {
+        while 1 < lookup.cells && !lookup.is_affordable(mesh) {
             lookup = Self::of_cells(lookup.cells / 2, side);
         }
         let cells = lookup.cells;
         let first = (cells * cells) as usize + 1;
         let mut words = vec![0; first];
-        lookup.visit_cells(module, side, |cell, _, _| words[cell + 1] += ENTRY as u32);
+        lookup.visit_cells(mesh, side, |cell, _, _| words[cell + 1] += ENTRY as u32);
         words[0] = first as u32;
         for cell in 1..first {
             words[cell] += words[cell - 1];
         }
         words.resize(words[first - 1] as usize, 0);
         let mut next = words[..first].to_vec();
-        lookup.visit_cells(module, side, |cell, index, corners| {
+        lookup.visit_cells(mesh, side, |cell, index, corners| {
             let at = next[cell] as usize;
             for (place, [x, y, z]) in corners.iter().enumerate() {
                 words[at + 2 * place] = *x as u32 | (*y as u32) << 16;
@@ -71,12 +78,12 @@ impl Lookup {
     }
 
     /// Whether lists of so many cells take a bounded share of memory and time.
-    fn is_affordable(&self, module: &Module) -> bool {
+    fn is_affordable(&self, mesh: Mesh) -> bool {
         let touched = |triangle: &[u16; 3]| {
-            let [[west, east], [south, north]] = self.cells_around(&corners_of(module, *triangle));
+            let [[west, east], [south, north]] = self.cells_around(&corners_of(mesh, *triangle));
             u64::from(east - west + 1) * u64::from(north - south + 1)
         };
-        module.triangles.iter().map(touched).sum::<u64>() <= CELLS_PER_TRIANGLE_MAX * module.triangles.len() as u64
+        mesh.triangles.iter().map(touched).sum::<u64>() <= CELLS_PER_TRIANGLE_MAX * mesh.triangles.len() as u64
     }
 
     /// First and last column, first and last row of the cells that the rectangle around a triangle may touch.
@@ -90,9 +97,9 @@ impl Lookup {
     }
 
     /// Calls `each` with every cell that a triangle may touch, the triangle's place and its corners.
-    fn visit_cells(&self, module: &Module, side: u16, mut each: impl FnMut(usize, usize, &Corners)) {
-        for (index, triangle) in module.triangles.iter().enumerate() {
-            let corners = corners_of(module, *triangle);
+    fn visit_cells(&self, mesh: Mesh, side: u16, mut each: impl FnMut(usize, usize, &Corners)) {
+        for (index, triangle) in mesh.triangles.iter().enumerate() {
+            let corners = corners_of(mesh, *triangle);
             let [[west, east], [south, north]] = self.cells_around(&corners);
             for row in south..=north {
                 for col in west..=east {
@@ -148,6 +155,12 @@ impl Lookup {
         })
     }
 
+    /// Every triangle at a place in steps, where they may lie above each other: as [`Lookup::triangle`] gives one.
+    pub(crate) fn triangles(&self, place: [i64; 2]) -> impl Iterator<Item = (Corners, f64, usize)> {
+        let held = self.list(place).chunks_exact(ENTRY).filter_map(move |entry| Self::find(entry, place));
+        held.map(|(corners, shares, index)| (corners, height_m(&corners, shares), index))
+    }
+
     /// Height at a place in steps, metres.
     #[inline]
     pub(crate) fn height_m(&self, place: [i64; 2]) -> Option<f64> {
@@ -167,9 +180,9 @@ impl Lookup {
         Some((corners, height_m(&corners, shares), index))
     }
 
-    /// Calls `each` with the ends of every edge of the triangles that a line between two places in quanta may touch,
-    /// some of them more than once. Places may lie outside.
-    pub(crate) fn edges_along(&self, side: u16, from: [f64; 2], to: [f64; 2], mut each: impl FnMut([[i32; 3]; 2])) {
+    /// Calls `each` with every triangle that a line between two places in quanta may touch, with some more than once.
+    /// Places may lie outside.
+    pub(crate) fn triangles_along(&self, side: u16, from: [f64; 2], to: [f64; 2], mut each: impl FnMut(Corners)) {
         let (low, high) = if from[1] <= to[1] { (from, to) } else { (to, from) };
         let cell = |quanta: f64| self.cell(quanta.clamp(0.0, f64::from(side)) as i32);
         for row in cell(low[1])..=cell(high[1]) {
@@ -183,18 +196,18 @@ impl Lookup {
                 let place = (row * self.cells + col) as usize;
                 let (from, to) = (self.words[place] as usize, self.words[place + 1] as usize);
                 for entry in self.words[from..to].chunks_exact(ENTRY) {
-                    let corners = [0, 2, 4]
-                        .map(|at| [(entry[at] & 0xffff) as i32, (entry[at] >> 16) as i32, entry[at + 1].cast_signed()]);
-                    (0..3).for_each(|i| each([corners[i], corners[(i + 1) % 3]]));
+                    each([0, 2, 4].map(|at| {
+                        [(entry[at] & 0xffff) as i32, (entry[at] >> 16) as i32, entry[at + 1].cast_signed()]
+                    }));
                 }
             }
         }
     }
 }
 
-fn corners_of(module: &Module, triangle: [u16; 3]) -> Corners {
+fn corners_of(mesh: Mesh, triangle: [u16; 3]) -> Corners {
     triangle.map(|v| {
-        let v = &module.vertices[usize::from(v)];
+        let v = &mesh.vertices[usize::from(v)];
         [i32::from(v.x), i32::from(v.y), v.z]
     })
 }

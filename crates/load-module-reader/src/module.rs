@@ -1,19 +1,7 @@
 //! One load module: its section decoded, and every promise of the format checked.
 
 use crate::bytes::{Cursor, check_section};
-use crate::{FIXED_MODULE_BYTES, Header, IndexEntry, QUANTA_PER_METRE, ReadError, Section};
-
-/// A vertex, in quanta of 1/128 m from the load module's south-west corner. It lies in memory as C would have it.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Vertex {
-    /// East of the western side.
-    pub x: u16,
-    /// North of the southern side.
-    pub y: u16,
-    /// Above the vertical datum.
-    pub z: i32,
-}
+use crate::{Decks, FIXED_MODULE_BYTES, Header, IndexEntry, QUANTA_PER_METRE, ReadError, Section, Vertex};
 
 /// Residuals over the posts that a load module owns, in quanta of 1/128 m.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -58,6 +46,8 @@ pub struct Module {
     pub polygon_count: u32,
     /// How far the DEM's posts lie from the triangles.
     pub residual: Residual,
+    /// Decks of bridges above the ground. All lists above are about the ground alone.
+    pub decks: Decks,
 }
 
 impl Module {
@@ -70,7 +60,7 @@ impl Module {
         }
     }
 
-    /// The section that `entry` names, of the load module at (`row`, `col`).
+    /// The section that `entry` names, of the load module at (`row`, `col`), and the decks that follow it.
     pub(crate) fn parse(
         bytes: &[u8],
         header: &Header,
@@ -79,6 +69,8 @@ impl Module {
         (row, col): (u32, u32),
     ) -> Result<Self, ReadError> {
         let section = Section::Module { row, col, level };
+        // The index has been checked against the length of the file.
+        let (bytes, of_decks) = bytes.split_at(entry.length as usize);
         check_section(bytes, entry.offset, section)?;
         let mut cursor = Cursor::new(bytes, entry.offset, section);
         let fixed = read_fixed(&mut cursor, entry, level, (row, col))?;
@@ -94,8 +86,10 @@ impl Module {
         cursor.checksum()?;
         let polygon_count = entry.polygon_count;
         let residual = fixed.residual;
-        let module = Self { row, col, level, vertices, triangles, classes, sides, polygon_count, residual };
+        let decks = Decks::default();
+        let mut module = Self { row, col, level, vertices, triangles, classes, sides, polygon_count, residual, decks };
         module.check_cover(header.side, entry, section)?;
+        module.decks = Decks::parse(of_decks, header, entry, level, (row, col))?;
         Ok(module)
     }
 

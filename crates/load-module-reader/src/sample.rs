@@ -1,12 +1,37 @@
 //! A small file for the tests, put together byte by byte from `FORMAT.md` alone.
 
-use crate::{FIXED_HEADER_BYTES, FIXED_MODULE_BYTES, MAGIC};
+use crate::{FIXED_DECKS_BYTES, FIXED_HEADER_BYTES, FIXED_MODULE_BYTES, MAGIC};
 
 const CRS: &[u8] = b"EPSG:32611";
 const DATUM: &[u8] = b"EGM96";
 
 /// Vertices, triangles, side lists and classes of a load module.
 type Shape<'a> = (&'a [(u16, u16, i32)], &'a [[u16; 3]], [[u16; 2]; 4], &'a [u8]);
+
+/// Vertices, triangles and classes of the decks of a load module.
+type DeckShape<'a> = (&'a [(u16, u16, i32)], &'a [[u16; 3]], &'a [u8]);
+
+/// The western end of a bridge of class 7, level at 10 m, up to the line between both load modules.
+const WEST_END: DeckShape = (
+    &[(54_000, 20_000, 1280), (64_000, 20_000, 1280), (54_000, 24_000, 1280), (64_000, 24_000, 1280)],
+    &[[0, 1, 3], [0, 3, 2]],
+    &[7, 7],
+);
+/// The rest of it, rising from 10 m to 20 m, and a level one of class 8 that crosses it at 40 m.
+const EAST_END: DeckShape = (
+    &[
+        (10_000, 10_000, 5120),
+        (12_000, 10_000, 5120),
+        (0, 20_000, 1280),
+        (60_000, 20_000, 2560),
+        (0, 24_000, 1280),
+        (60_000, 24_000, 2560),
+        (10_000, 40_000, 5120),
+        (12_000, 40_000, 5120),
+    ],
+    &[[0, 1, 7], [0, 7, 6], [2, 3, 5], [2, 5, 4]],
+    &[8, 8, 7, 7],
+);
 
 const FLAT: Shape = (
     &[(0, 0, 640), (64_000, 0, 640), (0, 64_000, 640), (64_000, 64_000, 640)],
@@ -23,23 +48,42 @@ const PIT: Shape = (
 
 /// Load modules 2,3 and 2,4 of tile 0,1.
 pub(crate) fn file() -> Vec<u8> {
-    file_of(&[[FLAT, PIT]])
+    file_of(&[[FLAT, PIT]], &[])
 }
 
 /// The same, and a second level at which both are flat.
 pub(crate) fn two_levels() -> Vec<u8> {
-    file_of(&[[FLAT, PIT], [FLAT, FLAT]])
+    file_of(&[[FLAT, PIT], [FLAT, FLAT]], &[])
 }
 
-fn file_of(levels: &[[Shape; 2]]) -> Vec<u8> {
+/// The file of one level with bridges over both load modules.
+pub(crate) fn with_decks() -> Vec<u8> {
+    file_of(&[[FLAT, PIT]], &[Some(WEST_END), Some(EAST_END)])
+}
+
+/// The file of two levels with a bridge over the eastern load module at the finest alone.
+pub(crate) fn with_one_deck_of_two_levels() -> Vec<u8> {
+    file_of(&[[FLAT, PIT], [FLAT, FLAT]], &[None, Some(EAST_END)])
+}
+
+/// The file of these levels, in which so many sections from the first on may have decks.
+fn file_of(levels: &[[Shape; 2]], decks: &[Option<DeckShape>]) -> Vec<u8> {
     let header_length = (FIXED_HEADER_BYTES + CRS.len() + DATUM.len()).next_multiple_of(4) + 4;
     let level = |(level, shapes): (u32, &[Shape; 2])| [module(3, level, shapes[0]), module(4, level, shapes[1])];
     let sections: Vec<Vec<u8>> = (0..).zip(levels).flat_map(level).collect();
-    let index_length = sections.len() * 32 + 4;
-    let file_length = header_length + index_length + sections.iter().map(Vec::len).sum::<usize>();
-    let mut file = header(levels.len() as u8, header_length, file_length);
+    let place = |i: usize| (if i.is_multiple_of(2) { 3 } else { 4 }, (i / 2) as u32);
+    let shapes: Vec<Option<DeckShape>> = (0..sections.len()).map(|i| decks.get(i).copied().flatten()).collect();
+    let parts: Vec<Vec<u8>> = shapes
+        .iter()
+        .enumerate()
+        .map(|(i, shape)| shape.map_or(Vec::new(), |shape| deck_part(place(i), shape)))
+        .collect();
+    let (version, entry) = if decks.is_empty() { (1, 32) } else { (2, 48) };
+    let index_length = sections.len() * entry + 4;
+    let file_length = header_length + index_length + sections.iter().chain(&parts).map(Vec::len).sum::<usize>();
+    let mut file = header([version, levels.len() as u8], header_length, file_length);
     let mut offset = header_length + index_length;
-    for (section, shape) in sections.iter().zip(levels.iter().flatten()) {
+    for (i, (section, shape)) in sections.iter().zip(levels.iter().flatten()).enumerate() {
         let counts: [u32; 3] = if shape.0.len() == 5 { [5, 4, 4] } else { [4, 2, 1] };
         put(&mut file, &(offset as u64).to_le_bytes());
         put(&mut file, &(section.len() as u32).to_le_bytes());
@@ -47,10 +91,17 @@ fn file_of(levels: &[[Shape; 2]]) -> Vec<u8> {
         let low: i32 = if counts[0] == 5 { -7 } else { 640 };
         put(&mut file, &low.to_le_bytes());
         put(&mut file, &640i32.to_le_bytes());
-        offset += section.len();
+        offset += section.len() + parts[i].len();
+        if version == 2 {
+            let (vertices, triangles, _) = shapes[i].unwrap_or((&[], &[], &[]));
+            let heights = || vertices.iter().map(|&(_, _, z)| z);
+            let heights = [heights().min().unwrap_or(0), heights().max().unwrap_or(0)];
+            [vertices.len(), triangles.len()].iter().for_each(|&n| put(&mut file, &(n as u32).to_le_bytes()));
+            heights.iter().for_each(|height| put(&mut file, &height.to_le_bytes()));
+        }
     }
     put(&mut file, &[0; 4]);
-    sections.iter().for_each(|section| put(&mut file, section));
+    sections.iter().zip(&parts).for_each(|(section, part)| put(&mut file, &[&section[..], part].concat()));
     mend_checksums(&mut file);
     file
 }
@@ -59,9 +110,9 @@ fn put(file: &mut Vec<u8>, bytes: &[u8]) {
     file.extend_from_slice(bytes);
 }
 
-fn header(levels: u8, header_length: usize, file_length: usize) -> Vec<u8> {
+fn header([version, levels]: [u8; 2], header_length: usize, file_length: usize) -> Vec<u8> {
     let mut file = MAGIC.to_vec();
-    put(&mut file, &[1, 0, levels, 0]);
+    put(&mut file, &[version, 0, levels, 0]);
     put(&mut file, &(header_length as u32).to_le_bytes());
     put(&mut file, &(file_length as u64).to_le_bytes());
     for value in [0, 1, 4, 5, 2, 3, 3, 5, 64_000u32, 20, 400, 128] {
@@ -101,18 +152,38 @@ fn module(col: u32, level: u32, (vertices, triangles, sides, classes): Shape) ->
     bytes
 }
 
+fn deck_part((col, level): (u32, u32), (vertices, triangles, classes): DeckShape) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    for value in [2, col, level, vertices.len() as u32, triangles.len() as u32] {
+        put(&mut bytes, &value.to_le_bytes());
+    }
+    assert_eq!(bytes.len(), FIXED_DECKS_BYTES);
+    for &(x, y, z) in vertices {
+        put(&mut bytes, &x.to_le_bytes());
+        put(&mut bytes, &y.to_le_bytes());
+        put(&mut bytes, &z.to_le_bytes());
+    }
+    triangles.iter().flatten().for_each(|v| put(&mut bytes, &v.to_le_bytes()));
+    put(&mut bytes, classes);
+    bytes.resize(bytes.len().next_multiple_of(4) + 4, 0);
+    bytes
+}
+
 /// Makes the checksums right again where the lengths still allow it.
 pub(crate) fn mend_checksums(file: &mut [u8]) {
     let header_length = u32::from_le_bytes([file[12], file[13], file[14], file[15]]) as usize;
     mend(file, 0, header_length);
     let entries = 2 * usize::from(file[10]);
-    mend(file, header_length, entries * 32 + 4);
+    let size = if file[8] == 2 { 48 } else { 32 };
+    mend(file, header_length, entries * size + 4);
     for entry in 0..entries {
-        let at = header_length.saturating_add(entry * 32);
-        let Some(bytes) = file.get(at..).and_then(|rest| rest.get(..12)) else { return };
+        let at = header_length.saturating_add(entry * size);
+        let Some(bytes) = file.get(at..).and_then(|rest| rest.get(..size)) else { return };
         let word = |i: usize| u32::from_le_bytes([bytes[i], bytes[i + 1], bytes[i + 2], bytes[i + 3]]) as usize;
         let (offset, length) = (word(0), word(8));
+        let decks = (size == 48 && word(36) != 0).then(|| (20 + 8 * word(32) + 7 * word(36)).next_multiple_of(4) + 4);
         mend(file, offset, length);
+        mend(file, offset + length, decks.unwrap_or(0));
     }
 }
 

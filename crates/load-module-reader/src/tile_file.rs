@@ -101,7 +101,7 @@ impl TileFile {
         let first = first + usize::from(level) * self.header.module_count() as usize;
         let entries = &self.index[first..first + cols.len()];
         let (Some(low), Some(high)) = (entries.first(), entries.last()) else { return Ok(Vec::new()) };
-        let (start, end) = (low.offset, high.offset + u64::from(high.length));
+        let (start, end) = (low.offset, high.end());
         let read;
         let bytes = match &self.source {
             Source::Bytes(bytes) => &(**bytes).as_ref()[start as usize..end as usize],
@@ -112,8 +112,8 @@ impl TileFile {
             }
         };
         let decode = |(col, entry): (u32, &IndexEntry)| {
-            let at = (entry.offset - start) as usize;
-            Module::parse(&bytes[at..at + entry.length as usize], &self.header, entry, level, (row, col))
+            let section = &bytes[(entry.offset - start) as usize..(entry.end() - start) as usize];
+            Module::parse(section, &self.header, entry, level, (row, col))
         };
         let modules: Result<Vec<Module>, ReadError> = cols.zip(entries).map(decode).collect();
         modules.map_err(|fault| in_file(&self.path, fault))
@@ -156,7 +156,8 @@ fn read_start(file: &mut File, file_length: u64) -> std::io::Result<Vec<u8>> {
     // Wrong numbers are found later; here they must only not ask for more than there is.
     let levels = start.get(10..12).map_or(1, |b| u64::from(u16::from_le_bytes([b[0], b[1]])));
     let modules = north.saturating_sub(south).saturating_mul(east.saturating_sub(west)).saturating_mul(levels);
-    let wanted = header.saturating_add(modules.saturating_mul(32)).saturating_add(4).min(file_length);
+    let entry = start.get(8..10).map_or(0, |b| index::entry_bytes(u16::from_le_bytes([b[0], b[1]])) as u64);
+    let wanted = header.saturating_add(modules.saturating_mul(entry)).saturating_add(4).min(file_length);
     if GUESS < wanted {
         file.take(wanted - GUESS).read_to_end(&mut start)?;
     }

@@ -1,15 +1,32 @@
-//! The class of the ground under each triangle.
+//! The class of each triangle: that of the feature it belongs to, else of the ground under it.
 
 use geometry::Facet;
 use geometry::owned::{OwnedRows, PostGrid};
 use terrain::{Importance, LoadModule};
 
-use crate::Layout;
+use crate::{Faces, Layout};
+
+/// The class of the face that each triangle lies in; of the others, the class of the ground.
+pub(crate) fn of_triangles(module: &LoadModule, layout: &Layout, mask: &Importance, faces: Option<&Faces>) -> Vec<u8> {
+    let mut classes = of_ground(module, layout, mask);
+    let Some(faces) = faces else { return classes };
+    let origin = [module.id.row, module.id.col].map(|line| i64::from(line) * i64::from(module.side));
+    let corner = |v: u16| {
+        let vertex = module.vertices[usize::from(v)];
+        [origin[0] + i64::from(vertex.y), origin[1] + i64::from(vertex.x)]
+    };
+    for (class, triangle) in classes.iter_mut().zip(&module.triangles) {
+        if let Some(of_face) = faces.class_at(triangle.map(corner), layout.spacing.quanta_per_post()) {
+            *class = of_face;
+        }
+    }
+    classes
+}
 
 /// The class of most of the posts that each triangle owns, the smaller one where two have as many.
 ///
 /// A triangle that owns no post takes the class of the post nearest to its centroid.
-pub(crate) fn of_triangles(module: &LoadModule, layout: &Layout, mask: &Importance) -> Vec<u8> {
+fn of_ground(module: &LoadModule, layout: &Layout, mask: &Importance) -> Vec<u8> {
     let rect = layout.grid.posts_of(module.id);
     if mask.classes_of_row(mask.rect().south).is_none() {
         return vec![0; module.triangles.len()];
@@ -45,7 +62,7 @@ fn most_common(facet: &Facet, posts: &PostGrid, mask: &Importance, offset: usize
 
 #[cfg(test)]
 mod tests {
-    use terrain::{ModuleGrid, ModuleId, ModuleResidual, ModuleVertex, PostRect, Spacing};
+    use terrain::{Decks, ModuleGrid, ModuleId, ModuleResidual, ModuleVertex, PostRect, Spacing};
 
     use super::*;
 
@@ -64,9 +81,10 @@ mod tests {
             classes: vec![0, 0],
             polygon_count: 2,
             residual: ModuleResidual::default(),
+            decks: Decks::default(),
         };
         let mask = Importance::new(PostRect::of_size(5, 5), vec![1000; 25], classes.concat());
-        assert_eq!(of_triangles(&module, &layout, &mask), expected);
+        assert_eq!(of_triangles(&module, &layout, &mask, None), expected);
     }
 
     #[test]

@@ -46,7 +46,7 @@ pub fn clip(points: &[Vertex], layout: &Layout, heights: ClipHeights, mask: &Imp
         clipper.add(triangle.map(|v| points[v as usize]));
     }
     let modules = layout.modules.iter().zip(&clipper.pieces);
-    modules.map(|(id, pieces)| pieces.load_module(id, layout, mask)).collect()
+    modules.map(|(id, pieces)| pieces.load_module(id, layout, mask, None)).collect()
 }
 
 /// The points a tile's load modules depend on, each once, in canonical order.

@@ -9,9 +9,9 @@
 //! the square stays covered once, and only the coplanarity of that load module's pieces is given up.
 
 use limits::{polygons_of, triangles_of};
-use terrain::{Importance, LoadModule, ModuleId, ModuleResidual, ModuleVertex, Post};
+use terrain::{Decks, Importance, LoadModule, ModuleId, ModuleResidual, ModuleVertex, Post};
 
-use crate::{Layout, classes};
+use crate::{Faces, Layout, classes};
 
 /// A corner of a piece: its place, then what it is, then its height, in an order that decides who wins.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -64,11 +64,17 @@ impl Pieces {
         starts.zip(&self.ends).map(|(start, &end)| &self.corners[start as usize..end as usize])
     }
 
-    /// The load module these polygons make.
+    /// The load module these polygons make; `faces` give classes before `mask` does.
     ///
     /// # Panics
     /// When they do not cover its square exactly once.
-    pub(crate) fn load_module(&self, id: ModuleId, layout: &Layout, mask: &Importance) -> LoadModule {
+    pub(crate) fn load_module(
+        &self,
+        id: ModuleId,
+        layout: &Layout,
+        mask: &Importance,
+        faces: Option<&Faces>,
+    ) -> LoadModule {
         let mut corners = self.corners.clone();
         corners.sort_unstable();
         corners.dedup_by_key(|corner| corner.place());
@@ -81,10 +87,11 @@ impl Pieces {
             classes: Vec::new(),
             polygon_count: 0,
             residual: ModuleResidual::default(),
+            decks: Decks::default(),
         };
         let sides = self.fan(&corners, &mut module).unwrap_or_else(|| triangulate_afresh(&mut module));
         module.triangles.sort_unstable();
-        module.classes = classes::of_triangles(&module, layout, mask);
+        module.classes = classes::of_triangles(&module, layout, mask, faces);
         assert_sound(&module, sides);
         module
     }
@@ -181,7 +188,8 @@ mod tests {
         for polygon in polygons {
             pieces.push(polygon.iter().map(|&(y, x, z, is_crossing)| Corner::new(y, x, z, is_crossing)));
         }
-        let module = pieces.load_module(ModuleId { row: 0, col: 0 }, &layout, &Importance::uniform(grid.area(), 1000));
+        let mask = Importance::uniform(grid.area(), 1000);
+        let module = pieces.load_module(ModuleId { row: 0, col: 0 }, &layout, &mask, None);
         assert_eq!(module.check(), Ok(()));
         module
     }

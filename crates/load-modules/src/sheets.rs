@@ -88,5 +88,5 @@ pub(crate) fn constrained(layout: &Layout, seed: u64) -> Tin {
         let points: Vec<_> = own.iter().map(|&v| vertices[v].at).collect();
         triangles.extend(mesh::delaunay(&points).into_iter().map(|t| t.map(|v| own[v as usize] as u32)));
     }
-    Tin { rect, vertices, triangles }
+    Tin::new(rect, vertices, triangles)
 }

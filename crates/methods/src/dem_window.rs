@@ -66,7 +66,7 @@ pub(crate) fn within(rect: PostRect, points: usize) -> Result<(), Impossible> {
 /// The triangles over posts of the window, at the DEM's heights.
 pub(crate) fn tin_of(dem: &Dem, posts: &[Post], triangles: Vec<[u32; 3]>) -> Tin {
     let vertex = |&post: &Post| Vertex { at: LatticePoint::from(post), height: dem.height(post) };
-    Tin { rect: dem.rect(), vertices: posts.iter().map(vertex).collect(), triangles }
+    Tin::new(dem.rect(), posts.iter().map(vertex).collect(), triangles)
 }
 
 /// The posts of a rectangle that are not on its border lines, by row and column.

@@ -1,12 +1,13 @@
 //! What the mesh has and what it may have.
 
-use limits::{Charged, TileLedger};
+use limits::{Charged, ShortOf, Shortfall, TileLedger};
 use terrain::{ModuleId, ModuleRect, POINT_COST, RefusedBy};
 
 use crate::hold::Hold;
+use crate::parts::{NONE, Vertex};
 use crate::place::{PER_POST, Place};
 use crate::task::Budget;
-use crate::tile_mesh::{NONE, TileMesh, Vertex};
+use crate::tile_mesh::TileMesh;
 
 /// The budget as it is spent and refunded, and what was lent beyond it for a while.
 pub(crate) struct Account {
@@ -154,6 +155,18 @@ impl Account {
     /// Whether taking a vertex out brings something nearer to its limit that is over it.
     pub fn relieves(&self, vertex: &Vertex) -> bool {
         matches!(&self.books, Books::Limits(ledger) if ledger.is_over(vertex.at.y, vertex.at.x))
+    }
+
+    /// What is exceeded: the whole, load modules, windows.
+    pub fn short(&self) -> Vec<Shortfall> {
+        match &self.books {
+            Books::Total { most, left, .. } => {
+                let of = |count: i64| u32::try_from(count.max(0)).unwrap_or(u32::MAX);
+                let short = Shortfall { of: ShortOf::Tile, needed: of(*most - *left), room: of(*most) };
+                if *left < 0 { vec![short] } else { Vec::new() }
+            }
+            Books::Limits(ledger) => ledger.counts().short(),
+        }
     }
 
     /// Triangles spent so far.

@@ -2,11 +2,12 @@
 
 use crate::account::Account;
 use crate::insertion::{Found, Insertion};
+use crate::parts::{NONE, Vertex};
 use crate::queue::Queue;
 use crate::removal::Removal;
 use crate::tenants::Tenants;
 use crate::thin::is_dearer;
-use crate::tile_mesh::{NONE, TileMesh, Vertex};
+use crate::tile_mesh::TileMesh;
 
 /// Part of its gain that an insertion may have lost since it was judged.
 const LOST: f64 = 0.02;

@@ -1,9 +1,10 @@
 //! Flips: the other diagonal of two triangles, where it fits the ground better.
 
 use crate::form::{Form, squares};
+use crate::parts::NONE;
 use crate::patch::Patch;
 use crate::place::{Place, Shape};
-use crate::tile_mesh::{NONE, TileMesh, next, previous};
+use crate::tile_mesh::{TileMesh, next, previous};
 
 /// Passes at most; hardly any mesh needs more than six.
 const PASSES_MAX: usize = 10;
@@ -63,8 +64,8 @@ fn find(sheet: &TileMesh, edge: u32, least: f64, patch: &mut Patch) -> bool {
     let (c, d) = (sheet.apex(edge), sheet.apex(twin));
     let (first, second) = ([a, d, c], [d, b, c]);
     let (at_first, at_second) = (sheet.places(first), sheet.places(second));
-    let is_sound = |[a, b, c]: [Place; 3]| Shape::Sound.admits(a, b, c);
-    if !is_sound(at_first) || !is_sound(at_second) || sheet.is_constrained(a, b) {
+    let is_sound = |corners: [u32; 3], [a, b, c]: [Place; 3]| Shape::Sound.admits(a, b, c) || sheet.is_eased(corners);
+    if !is_sound(first, at_first) || !is_sound(second, at_second) || sheet.is_constrained(a, b) {
         return false;
     }
     let moments = &sheet.ground.moments;

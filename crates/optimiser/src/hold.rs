@@ -16,6 +16,10 @@ impl Hold {
     pub const HEIGHT: Self = Self(8);
     /// It stands at the DEM's height wherever it moves.
     pub const CREST: Self = Self(16);
+    /// It is an end of an edge that stays.
+    pub const FEATURE: Self = Self(32);
+    /// Neither place nor height is the optimiser's to choose.
+    pub const GIVEN: Self = Self(4 | 8);
 
     pub const fn and(self, other: Self) -> Self {
         Self(self.0 | other.0)

@@ -3,10 +3,11 @@
 use crate::form::{Form, squares};
 use crate::hold::Hold;
 use crate::moments::Sums;
+use crate::parts::NONE;
 use crate::patch::Patch;
 use crate::place::{Place, Shape};
 use crate::refit::Fit;
-use crate::tile_mesh::{NONE, TileMesh, next, previous};
+use crate::tile_mesh::{TileMesh, next, previous};
 
 /// Triangles one insertion may rewrite.
 const REACH_MAX: usize = 14;
@@ -58,7 +59,7 @@ impl Insertion {
     pub fn find(&mut self, sheet: &mut TileMesh, triangle: u32) -> Option<Found> {
         let corners = sheet.triangles[triangle as usize].corners;
         let places = sheet.places(corners);
-        let (_, at) = sheet.ground.worst(places, sheet.heights(corners))?;
+        let (_, at) = sheet.worst(corners)?;
         let (on_edge, hold) = self.classify(sheet, triangle, places, at)?;
         let hold = hold.and(sheet.ground.height_hold(at));
         let vertex = sheet.add_vertex(at, sheet.ground.height(at), hold);
@@ -108,7 +109,7 @@ impl Insertion {
             }
         }
         self.flip_around(sheet, guest);
-        let valid = |face: &Face| Shape::Sound.admits(guest.at, sheet.at(face.from), sheet.at(face.to));
+        let valid = |face: &Face| is_sound(sheet, guest.at, [face.from, face.to]);
         if !self.faces.iter().all(valid) {
             return None;
         }
@@ -157,7 +158,10 @@ impl Insertion {
         }
         let apex = sheet.apex(face.twin);
         let (a, d, b) = (sheet.at(face.from), sheet.at(apex), sheet.at(face.to));
-        if !Shape::Sound.admits(guest.at, a, d) || !Shape::Sound.admits(guest.at, d, b) {
+        let is_eased = |a: u32, b: u32| sheet.is_eased_at(guest.at, [a, b]);
+        if !(Shape::Sound.admits(guest.at, a, d) || is_eased(face.from, apex))
+            || !(Shape::Sound.admits(guest.at, d, b) || is_eased(apex, face.to))
+        {
             return None;
         }
         let old = face.squares + sheet.triangles[beyond as usize].squares;
@@ -184,6 +188,10 @@ impl Insertion {
             }
         }
     }
+}
+
+fn is_sound(sheet: &TileMesh, at: Place, [a, b]: [u32; 2]) -> bool {
+    Shape::Sound.admits(at, sheet.at(a), sheet.at(b)) || sheet.is_eased_at(at, [a, b])
 }
 
 impl Face {

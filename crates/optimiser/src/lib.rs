@@ -9,16 +9,20 @@
 mod task;
 pub use task::{Budget, Task};
 mod optimise;
-pub use optimise::{Optimised, fill, optimise, overshoot};
+pub use optimise::{Optimised, fill, optimise, weave_in};
+mod recipe;
+pub use recipe::overshoot;
 
 mod account;
 mod curve;
+mod ears;
 mod exchange;
 mod flips;
 mod form;
 mod hold;
 mod insertion;
 mod moments;
+mod parts;
 mod patch;
 mod place;
 mod queue;
@@ -28,8 +32,15 @@ mod sweep;
 mod tenants;
 mod thin;
 mod tile_mesh;
+mod weave;
 mod weighted_heights;
 
+#[cfg(test)]
+mod feature_cases;
+#[cfg(test)]
+mod feature_scene;
+#[cfg(test)]
+mod feature_tests;
 #[cfg(test)]
 mod scene;
 #[cfg(test)]

@@ -1,19 +1,23 @@
 //! The order of the steps.
 
-use terrain::{Dem, Effort, Importance, LATTICE_PER_POST, Lattice, Refusal, StopReason, Tin, Vertex as TinVertex};
+use limits::Shortfall;
+use terrain::{Dem, Importance, LATTICE_PER_POST, Lattice, LatticePoint, Refusal, StopReason, Tin};
 
 use crate::account::Account;
 use crate::exchange::{Exchange, Terms, Tools};
 use crate::flips::flip_all;
 use crate::hold::Hold;
 use crate::insertion::Insertion;
+use crate::parts::{Layout, NONE, Parts};
 use crate::place::{PER_POST, Place, Shape};
 use crate::queue::Queue;
+use crate::recipe::Recipe;
 use crate::removal::Removal;
 use crate::sweep::{Mover, Steps};
 use crate::task::Task;
 use crate::thin::{Shears, Until, thin};
-use crate::tile_mesh::{Layout, NONE, Star, TileMesh};
+use crate::tile_mesh::{Star, TileMesh};
+use crate::weave::weave;
 use crate::weighted_heights::WeightedHeights;
 
 /// A TIN made truer.
@@ -28,6 +32,11 @@ pub struct Optimised {
     pub refused: Option<Vec<Refusal>>,
     /// Why it ended.
     pub stop: StopReason,
+    /// Edges of features that cross others or lines and were left out, in 64ths of a post; none that are made as
+    /// [`terrain::Features`] asks.
+    pub left_out: Vec<[LatticePoint; 2]>,
+    /// Limits that are exceeded because nothing is left that may go.
+    pub short: Vec<Shortfall>,
 }
 
 /// Limits of load modules and windows are met once the whole is this share over its budget: earlier, too much would
@@ -42,39 +51,6 @@ const IDLE_SHARE: usize = 1000;
 const RELIEVED_FROM: f64 = 25.0;
 /// How far a cycle grows beyond the budget.
 const CYCLE_SHARE: f64 = 0.2;
-
-/// What an effort does.
-struct Recipe {
-    /// How many times its budget the TIN has before it is optimised.
-    overshoot: f64,
-    /// Times the budget to thin to, one after the other.
-    stages: &'static [f64],
-    /// Sweeps once the budget is met.
-    sweeps: usize,
-    /// Rounds of exchange at most.
-    rounds: usize,
-    /// Cycles of growing and thinning.
-    cycles: usize,
-    /// Sweeps on the final lattice.
-    last_sweeps: usize,
-}
-
-impl Recipe {
-    fn of(effort: Effort) -> Self {
-        match effort {
-            Effort::Fast => Self { overshoot: 1.0, stages: &[], sweeps: 3, rounds: 0, cycles: 0, last_sweeps: 0 },
-            Effort::Normal => Self { overshoot: 2.0, stages: &[1.0], sweeps: 2, rounds: 10, cycles: 0, last_sweeps: 2 },
-            Effort::Best => {
-                Self { overshoot: 3.0, stages: &[2.0, 1.5, 1.2, 1.0], sweeps: 2, rounds: 10, cycles: 8, last_sweeps: 4 }
-            }
-        }
-    }
-}
-
-/// How many times its budget a TIN should have before it is optimised.
-pub fn overshoot(effort: Effort) -> f64 {
-    Recipe::of(effort).overshoot
-}
 
 /// Makes a TIN truer within its budget.
 ///
@@ -99,24 +75,44 @@ pub fn fill(dem: &Dem, importance: &Importance, start: &Tin, task: &Task) -> Opt
     })
 }
 
+/// Puts features into a TIN and leaves the rest of it alone, but for what they displace and what is then over a limit.
+///
+/// # Panics
+/// As [`optimise`].
+pub fn weave_in(dem: &Dem, importance: &Importance, start: &Tin, task: &Task) -> Optimised {
+    work_on(dem, importance, start, task, |work| {
+        work.thin_to_goal();
+        work.meet_limits();
+        work.sheet.round_heights();
+    })
+}
+
 fn work_on(dem: &Dem, importance: &Importance, start: &Tin, task: &Task, steps: impl Fn(&mut Work)) -> Optimised {
     assert_eq!(dem.rect(), start.rect, "the TIN covers the window");
     assert_eq!(dem.rect(), importance.rect(), "heights and weights cover the same posts");
     let mut ground = WeightedHeights::new(dem, importance, task.open, task.height_fit);
-    ground.forbid(&task.forbidden);
-    let mut held = task.held.clone();
+    let mut forbidden = task.forbidden.clone();
+    forbidden.extend(task.features.barred_posts(dem.rect()));
+    forbidden.sort_unstable();
+    ground.forbid(forbidden);
+    let mut held: Vec<Place> = task.held.iter().map(|&at| Place::of(at, dem.rect(), LATTICE_PER_POST)).collect();
     held.sort_unstable();
     // What lies on a side that is not open is another tile's, or a fixed outer border of the area.
-    let hold = |vertex: &TinVertex| {
-        let at = Place::of(vertex.at, dem.rect());
-        if ground.is_on_closed_side(at) || held.binary_search(&vertex.at).is_ok() {
-            Hold::PLACE.and(Hold::HEIGHT)
+    let hold = |at: Place| {
+        if ground.is_on_closed_side(at) || held.binary_search(&at).is_ok() {
+            Hold::GIVEN
         } else {
             ground.height_hold(at)
         }
     };
     let layout = Layout { line_step: task.line_step.map(|posts| posts * PER_POST), hold: &hold };
-    let sheet = TileMesh::new(&ground, start, &layout);
+    let grown = Parts::of(&ground, start, &layout);
+    let has_features = !task.features.is_empty();
+    let (parts, left_out) = match has_features {
+        true => weave(&ground, grown, &task.features, start.rect, &layout),
+        false => (grown, Vec::new()),
+    };
+    let sheet = TileMesh::new(&ground, parts, layout.line_step, has_features);
     let account = Account::new(&task.budget, &sheet);
     let mut work = Work {
         sheet,
@@ -128,8 +124,9 @@ fn work_on(dem: &Dem, importance: &Importance, start: &Tin, task: &Task, steps: 
         cheapest: None,
     };
     steps(&mut work);
-    let (spent, stop, refused) = (work.account.spent(), work.stop(), work.refusals());
-    Optimised { tin: work.sheet.into_tin(start.rect), spent, refused, stop }
+    let (spent, stop, refused, short) = (work.account.spent(), work.stop(), work.refusals(), work.account.short());
+    let steps_per_post = start.steps_per_post.max(task.features.steps_per_post);
+    Optimised { tin: work.sheet.into_tin(start.rect, steps_per_post), spent, refused, stop, left_out, short }
 }
 
 /// Everything the steps work with.
@@ -174,6 +171,7 @@ impl Work<'_, '_> {
         }
         self.check();
         self.thin_to_goal();
+        self.meet_limits();
         self.snap();
         self.check();
         self.mover.steps.pattern = true;
@@ -335,8 +333,7 @@ impl Work<'_, '_> {
         for (triangle, record) in
             self.sheet.triangles.iter().enumerate().filter(|(_, record)| record.corners[0] != NONE)
         {
-            let (places, heights) = (self.sheet.places(record.corners), self.sheet.heights(record.corners));
-            if let Some((residual, _)) = self.sheet.ground.worst(places, heights)
+            if let Some((residual, _)) = self.sheet.worst(record.corners)
                 && largest < residual
             {
                 above.push((residual, triangle as u32, record.corners));
@@ -349,8 +346,7 @@ impl Work<'_, '_> {
     /// Inserts at the worst post of a triangle; where there is no room for a vertex, moves the nearest one there.
     fn insert_worst(&mut self, triangle: u32) {
         let corners = self.sheet.triangles[triangle as usize].corners;
-        let (places, heights) = (self.sheet.places(corners), self.sheet.heights(corners));
-        let Some((_, at)) = self.sheet.ground.worst(places, heights) else { return };
+        let Some((_, at)) = self.sheet.worst(corners) else { return };
         let Some(found) = self.insertion.find(&mut self.sheet, triangle) else {
             let away = |corner: &u32| self.sheet.at(*corner).squared_distance(at);
             let mut nearest = corners;
@@ -384,11 +380,12 @@ impl Work<'_, '_> {
         let all = 0..self.sheet.vertices.len() as u32;
         let mut homeless: Vec<u32> = all.filter(|&vertex| !self.has_place(vertex, Shape::Sound)).collect();
         // Once its neighbours stand on the lattice, a vertex finds a place or can go; a place between triangles of any
-        // shape is the last resort but one, and room made by a neighbour that goes the last.
+        // shape comes next, then room made by a neighbour that goes; only features leave less than that.
         while !homeless.is_empty() {
             homeless.retain(|&vertex| !self.has_place(vertex, Shape::Sound) && !self.take_out(vertex));
             homeless.retain(|&vertex| !self.has_place(vertex, Shape::Upright) && !self.take_out(vertex));
-            if homeless.first().is_some_and(|&vertex| !self.make_room(vertex)) {
+            let has_room = homeless.iter().any(|&vertex| self.make_room(vertex));
+            if !has_room && !homeless.iter().any(|&vertex| self.force_out(vertex)) {
                 break;
             }
         }
@@ -410,13 +407,36 @@ impl Work<'_, '_> {
 
     /// Takes a vertex out, if that leaves a valid mesh.
     fn take_out(&mut self, vertex: u32) -> bool {
-        if self.removal.find(&self.sheet, vertex).is_none() {
-            return false;
-        }
+        let can_go = self.removal.find(&self.sheet, vertex).is_some();
+        can_go && self.let_go(vertex)
+    }
+
+    /// Takes a vertex out whatever the triangles look like that fill its place.
+    fn force_out(&mut self, vertex: u32) -> bool {
+        self.removal.find_by_force(&self.sheet, vertex) && self.let_go(vertex)
+    }
+
+    /// Takes a vertex out as the removal has found it.
+    fn let_go(&mut self, vertex: u32) -> bool {
         self.account.refund(&self.sheet.vertices[vertex as usize]);
         self.sheet.apply(&mut self.removal.patch);
         self.sheet.drop_vertex(vertex);
         true
+    }
+
+    /// Where features stand so close together that no sound triangle fills the place of a vertex, thinning leaves it:
+    /// such vertices go all the same until every limit is met.
+    fn meet_limits(&mut self) {
+        if !self.sheet.has_features {
+            return;
+        }
+        for vertex in 0..self.sheet.vertices.len() as u32 {
+            let record = self.sheet.vertices[vertex as usize];
+            let is_over = self.account.left() < 0 || self.account.relieves(&record);
+            if is_over && self.sheet.is_vertex(vertex) {
+                self.force_out(vertex);
+            }
+        }
     }
 
     fn stop(&self) -> StopReason {

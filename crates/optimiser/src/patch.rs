@@ -2,7 +2,8 @@
 
 use crate::form::Form;
 use crate::moments::Sums;
-use crate::tile_mesh::{NONE, TileMesh, Triangle};
+use crate::parts::NONE;
+use crate::tile_mesh::{TileMesh, Triangle};
 
 /// A change in one place: triangles that go, triangles that come over the same outline, heights that move.
 #[derive(Default)]

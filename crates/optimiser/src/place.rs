@@ -1,10 +1,12 @@
 //! Where a vertex stands while it is being moved.
 
-use terrain::{LATTICE_PER_POST, LatticePoint, PostRect};
+use terrain::{FEATURE_STEPS_MAX, LatticePoint, PostRect};
 
 /// Steps of the working lattice between posts: fine enough that rounding costs nothing (measured), and so coarse that
 /// every orientation is exact.
 pub(crate) const PER_POST: i32 = 64;
+
+const _: () = assert!(FEATURE_STEPS_MAX <= PER_POST, "vertices of features stand on the working lattice");
 
 /// A place in 64ths of a post from the tile's south-west post.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Default)]
@@ -18,22 +20,20 @@ impl Place {
         Self { y, x }
     }
 
-    /// The place of a lattice point of a tile.
-    pub fn of(point: LatticePoint, tile: PostRect) -> Self {
-        let origin = LatticePoint::from(tile.south_west());
-        const STEP: i32 = PER_POST / LATTICE_PER_POST;
-        Self { y: (point.row - origin.row) * STEP, x: (point.col - origin.col) * STEP }
+    /// The place of a point of a tile, on a lattice with so many steps to a post.
+    pub fn of(point: LatticePoint, tile: PostRect, steps_per_post: i32) -> Self {
+        let step = PER_POST / steps_per_post;
+        Self { y: (point.row - tile.south * steps_per_post) * step, x: (point.col - tile.west * steps_per_post) * step }
     }
 
-    /// The lattice point here.
+    /// The point here on a lattice with so many steps to a post.
     ///
     /// # Panics
-    /// When the place lies between lattice points.
-    pub fn lattice_point(self, tile: PostRect) -> LatticePoint {
-        const STEP: i32 = PER_POST / LATTICE_PER_POST;
-        assert!(self.x % STEP == 0 && self.y % STEP == 0, "a finished vertex stands on the lattice");
-        let origin = LatticePoint::from(tile.south_west());
-        LatticePoint::new(origin.row + self.y / STEP, origin.col + self.x / STEP)
+    /// When the place lies between its points.
+    pub fn lattice_point(self, tile: PostRect, steps_per_post: i32) -> LatticePoint {
+        let step = PER_POST / steps_per_post;
+        assert!(self.x % step == 0 && self.y % step == 0, "a finished vertex stands on the lattice");
+        LatticePoint::new(tile.south * steps_per_post + self.y / step, tile.west * steps_per_post + self.x / step)
     }
 
     /// Posts east and north of the south-west post.
@@ -64,6 +64,28 @@ impl Place {
     }
 }
 
+/// The square of a quarter of a post, in steps.
+const LEAST_ALTITUDE_SQUARED: f64 = (PER_POST / 4 * (PER_POST / 4)) as f64;
+
+/// Whether a triangle that is not sound is as good as its given corners permit: these may stand closer together than a
+/// sound triangle is high, and slopes between them are wanted. Of two such corners the third stands off by a quarter of
+/// a post; three have a triangle, whatever its shape.
+pub(crate) fn is_eased(at: [Place; 3], is_given: [bool; 3]) -> bool {
+    let area = Place::orient(at[0], at[1], at[2]);
+    match is_given {
+        [true, true, true] => 0 < area,
+        [true, true, false] => stands_off(area, at[0], at[1]),
+        [false, true, true] => stands_off(area, at[1], at[2]),
+        [true, false, true] => stands_off(area, at[2], at[0]),
+        _ => false,
+    }
+}
+
+fn stands_off(area: i64, a: Place, b: Place) -> bool {
+    let base = a.squared_distance(b) as f64;
+    0 < area && base * LEAST_ALTITUDE_SQUARED <= area as f64 * area as f64
+}
+
 /// What a triangle may look like.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Shape {
@@ -83,14 +105,13 @@ impl Shape {
     #[inline(always)]
     pub fn admits(self, a: Place, b: Place, c: Place) -> bool {
         const LEAST_AREA: i64 = (PER_POST * PER_POST / 4) as i64;
-        const LEAST_ALTITUDE: f64 = PER_POST as f64 / 4.0;
         let area = Place::orient(a, b, c);
         match self {
             Shape::Upright => 0 < area,
             Shape::Large => LEAST_AREA <= area,
             Shape::Sound => {
                 let longest = a.squared_distance(b).max(b.squared_distance(c)).max(c.squared_distance(a)) as f64;
-                LEAST_AREA <= area && longest * (LEAST_ALTITUDE * LEAST_ALTITUDE) <= area as f64 * area as f64
+                LEAST_AREA <= area && longest * LEAST_ALTITUDE_SQUARED <= area as f64 * area as f64
             }
         }
     }

@@ -1,7 +1,8 @@
 //! Fitting a few neighbouring heights at once, everything around them held.
 
+use crate::parts::NONE;
 use crate::patch::Patch;
-use crate::tile_mesh::{NONE, TileMesh, next, previous};
+use crate::tile_mesh::{TileMesh, next, previous};
 
 /// Heights fitted at once, at most.
 pub(crate) const HEIGHTS_MAX: usize = 20;

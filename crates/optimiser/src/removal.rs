@@ -1,10 +1,11 @@
 //! Taking a vertex out: the best triangulation of the hole, the heights around it fitted again.
 
+use crate::ears::fill_by_ears;
 use crate::form::{Form, squares};
 use crate::hold::Hold;
 use crate::moments::Sums;
 use crate::patch::Patch;
-use crate::place::{Place, Shape};
+use crate::place::{Place, Shape, is_eased};
 use crate::refit::Fit;
 use crate::tile_mesh::{Star, TileMesh};
 
@@ -49,6 +50,28 @@ impl Removal {
         Some(new - self.fit.refit(sheet, &mut self.patch) - old)
     }
 
+    /// Removing a vertex whatever the shapes of the triangles that fill its hole; its patch is then ready to be
+    /// applied. `false` where it is given.
+    pub fn find_by_force(&mut self, sheet: &TileMesh, vertex: u32) -> bool {
+        let record = &sheet.vertices[vertex as usize];
+        if !sheet.is_vertex(vertex) || record.hold.is_fixed() {
+            return false;
+        }
+        sheet.star(vertex, &mut self.star);
+        self.patch.clear();
+        self.patch.old.extend(self.star.triangles());
+        let ring = &self.star.ring;
+        if !record.hold.is_on_line() || !self.star.is_closed() {
+            return fill_by_ears(sheet, ring, &mut self.patch);
+        }
+        let Some((first, second)) = self.ends_of_line(sheet, record.hold, record.at) else { return false };
+        self.other_side.clear();
+        self.other_side.extend_from_slice(&ring[second..]);
+        self.other_side.extend_from_slice(&ring[..=first]);
+        fill_by_ears(sheet, &ring[first..=second], &mut self.patch)
+            && fill_by_ears(sheet, &self.other_side, &mut self.patch)
+    }
+
     /// Where in the ring the line runs on through a vertex on it.
     fn ends_of_line(&self, sheet: &TileMesh, hold: Hold, at: Place) -> Option<(usize, usize)> {
         let is_next = |&vertex: &u32| {
@@ -66,6 +89,9 @@ impl Removal {
 struct Hole {
     at: [Place; CORNERS_MAX],
     height: [f64; CORNERS_MAX],
+    /// Whether a corner is given; not asked where there are no features.
+    is_given: [bool; CORNERS_MAX],
+    has_features: bool,
     /// Sums west of the chord from corner i to corner j, for i < j.
     chords: [[Sums; CORNERS_MAX]; CORNERS_MAX],
     /// Least squares of the part between corners i and j, and the corner its last triangle reaches.
@@ -79,6 +105,8 @@ impl Default for Hole {
         Self {
             at: [Place::default(); N],
             height: [0.0; N],
+            is_given: [false; N],
+            has_features: false,
             chords: [[Sums::default(); N]; N],
             best: [[0.0; N]; N],
             split: [[0; N]; N],
@@ -100,8 +128,9 @@ impl Hole {
         }
         for (i, &vertex) in polygon.iter().enumerate() {
             let vertex = &sheet.vertices[vertex as usize];
-            (self.at[i], self.height[i]) = (vertex.at, vertex.height);
+            (self.at[i], self.height[i], self.is_given[i]) = (vertex.at, vertex.height, vertex.hold.is_fixed());
         }
+        self.has_features = sheet.has_features;
         for i in 0..n {
             for j in i + 1..n {
                 self.chords[i][j] = sheet.ground.moments.edge(self.at[i], self.at[j]);
@@ -133,7 +162,7 @@ impl Hole {
         for k in i + 1..j {
             let parts = self.best[i][k] + self.best[k][j];
             let corners = [self.at[i], self.at[k], self.at[j]];
-            if best <= parts || !Shape::Sound.admits(corners[0], corners[1], corners[2]) {
+            if best <= parts || !(Shape::Sound.admits(corners[0], corners[1], corners[2]) || self.is_eased(i, k, j)) {
                 continue;
             }
             let heights = [self.height[i], self.height[k], self.height[j]];
@@ -144,6 +173,11 @@ impl Hole {
         }
         self.best[i][j] = best;
         self.split[i][j] = split;
+    }
+
+    fn is_eased(&self, i: usize, k: usize, j: usize) -> bool {
+        let corners = [i, k, j];
+        self.has_features && is_eased(corners.map(|i| self.at[i]), corners.map(|i| self.is_given[i]))
     }
 
     fn push_triangles(&self, polygon: &[u32], patch: &mut Patch) {

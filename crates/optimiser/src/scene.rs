@@ -2,8 +2,8 @@
 
 use limits::{Allowance, ModuleLines, TileLedger, Windows};
 use terrain::{
-    Dem, Effort, HeightFit, Importance, Lattice, LatticePoint, ModuleGrid, ModuleId, ModuleRect, Post, PostRect,
-    SeamSides, THOUSANDTHS, Tin, Vertex,
+    Dem, Effort, Features, HeightFit, Importance, Lattice, LatticePoint, ModuleGrid, ModuleId, ModuleRect, Post,
+    PostRect, SeamSides, THOUSANDTHS, Tin, Vertex,
 };
 
 use crate::task::{Budget, Task};
@@ -67,13 +67,14 @@ pub(crate) fn grid(dem: &Dem, step: i32) -> Tin {
             triangles.extend([[sw, se, ne], [sw, ne, nw]]);
         }
     }
-    Tin { rect, vertices, triangles }
+    Tin::new(rect, vertices, triangles)
 }
 
 /// A task without load modules.
 pub(crate) fn free(triangles: usize, effort: Effort) -> Task {
     Task {
         held: Vec::new(),
+        features: Features::default(),
         open: SeamSides::OPEN,
         line_step: None,
         budget: Budget::Triangles(triangles),
@@ -99,19 +100,6 @@ pub(crate) struct Caps {
 /// A task under the limits of load modules, the outer border held as the mesh has it.
 pub(crate) fn confined(start: &Tin, caps: Caps, effort: Effort) -> Task {
     let rect = start.rect;
-    let (rows, cols) = (rect.cells_high() as u32 / caps.side as u32, rect.cells_wide() as u32 / caps.side as u32);
-    let grid = ModuleGrid { rows, cols, side_cells: caps.side };
-    let windows = Windows::new(grid, 2);
-    let modules = ModuleRect { south: 0, west: 0, north: rows, east: cols };
-    let allowance = Allowance {
-        modules,
-        module_room: vec![caps.per_module; modules.count()],
-        windows: windows.origins,
-        window_size: (windows.rows, windows.cols),
-        window_room: vec![caps.per_window; windows.origins.count()],
-        triangles: caps.triangles,
-    };
-    let lines = ModuleLines { side: caps.side, south_west: ModuleId { row: 0, col: 0 }, rows, cols, reach: modules };
     let (low, high) = (LatticePoint::from(rect.south_west()), LatticePoint::from(rect.north_east()));
     let is_outer =
         |at: LatticePoint| at.row == low.row || at.row == high.row || at.col == low.col || at.col == high.col;
@@ -119,9 +107,37 @@ pub(crate) fn confined(start: &Tin, caps: Caps, effort: Effort) -> Task {
         held: start.vertices.iter().map(|vertex| vertex.at).filter(|&at| is_outer(at)).collect(),
         open: SeamSides::CLOSED,
         line_step: Some(caps.side),
-        budget: Budget::Limits(TileLedger::new(lines, allowance)),
+        budget: Budget::Limits(ledger(rect, caps, allowance(rect, caps))),
         ..free(0, effort)
     }
+}
+
+fn modules(rect: PostRect, caps: Caps) -> ModuleRect {
+    let count = |cells: usize| cells as u32 / caps.side as u32;
+    ModuleRect { south: 0, west: 0, north: count(rect.cells_high()), east: count(rect.cells_wide()) }
+}
+
+/// What a tile of its own may spend.
+pub(crate) fn allowance(rect: PostRect, caps: Caps) -> Allowance {
+    let modules = modules(rect, caps);
+    let grid = ModuleGrid { rows: modules.rows(), cols: modules.cols(), side_cells: caps.side };
+    let windows = Windows::new(grid, 2);
+    Allowance {
+        modules,
+        module_room: vec![caps.per_module; modules.count()],
+        windows: windows.origins,
+        window_size: (windows.rows, windows.cols),
+        window_room: vec![caps.per_window; windows.origins.count()],
+        triangles: caps.triangles,
+    }
+}
+
+/// The ledger of a tile of its own.
+pub(crate) fn ledger(rect: PostRect, caps: Caps, allowance: Allowance) -> TileLedger {
+    let reach = modules(rect, caps);
+    let south_west = ModuleId { row: 0, col: 0 };
+    let lines = ModuleLines { side: caps.side, south_west, rows: reach.rows(), cols: reach.cols(), reach };
+    TileLedger::new(lines, allowance)
 }
 
 /// What each load module has been given beyond its corners and the held border: triangles, row-major.

@@ -7,17 +7,22 @@ use crate::exchange::{Exchange, Terms, Tools};
 use crate::flips::flip_all;
 use crate::hold::Hold;
 use crate::insertion::Insertion;
-use crate::place::PER_POST;
+use crate::parts::{Layout, NONE, Parts};
+use crate::place::{PER_POST, Place};
 use crate::removal::Removal;
 use crate::scene::{Caps, confined, even, grid, patchy, rough, spent};
 use crate::sweep::{Mover, Steps};
 use crate::task::Budget;
 use crate::thin::{Shears, Until, is_dearer, thin};
-use crate::tile_mesh::{Layout, NONE, TileMesh};
+use crate::tile_mesh::TileMesh;
 use crate::weighted_heights::WeightedHeights;
 
 const RECT: PostRect = PostRect { south: 7, west: -3, north: 67, east: 77 };
 const STEPS: Steps = Steps { inner: 1, pattern: false };
+
+fn sheet_of<'a>(ground: &'a WeightedHeights<'a>, tin: &terrain::Tin, layout: &Layout) -> TileMesh<'a> {
+    TileMesh::new(ground, Parts::of(ground, tin, layout), layout.line_step, false)
+}
 
 /// Runs a test on rough ground under a grid of lines every 20 posts, with even and with patchy weights.
 fn with_sheet(test: impl Fn(&mut TileMesh, &Dem)) {
@@ -25,9 +30,9 @@ fn with_sheet(test: impl Fn(&mut TileMesh, &Dem)) {
         let dem = rough(RECT, seed);
         for importance in [even(RECT), patchy(RECT, seed)] {
             let ground = WeightedHeights::new(&dem, &importance, SeamSides::CLOSED, HeightFit::Squares);
-            let hold = |_: &terrain::Vertex| Hold::FREE;
+            let hold = |_: Place| Hold::FREE;
             let layout = Layout { line_step: Some(20 * PER_POST), hold: &hold };
-            let mut sheet = TileMesh::new(&ground, &grid(&dem, 4), &layout);
+            let mut sheet = sheet_of(&ground, &grid(&dem, 4), &layout);
             test(&mut sheet, &dem);
             assert_eq!(sheet.fault(), None);
         }
@@ -51,8 +56,8 @@ fn every_post_is_owned_once_after_every_kind_of_change() {
     let dem = rough(RECT, 9);
     let importance = even(RECT);
     let ground = WeightedHeights::new(&dem, &importance, SeamSides::OPEN, HeightFit::Squares);
-    let hold = |_: &terrain::Vertex| Hold::FREE;
-    let mut sheet = TileMesh::new(&ground, &grid(&dem, 4), &Layout { line_step: None, hold: &hold });
+    let hold = |_: Place| Hold::FREE;
+    let mut sheet = sheet_of(&ground, &grid(&dem, 4), &Layout { line_step: None, hold: &hold });
     let check = |sheet: &TileMesh, step: &str| {
         let (owners, count) = owned(sheet);
         assert!(owners.iter().all(|&owners| owners == 1), "{step}");
@@ -93,12 +98,13 @@ fn whoever_comes_where_a_limit_is_met_takes_somebodys_place() {
         let caps = Caps { per_module, per_window, ..no_limit };
         let task = confined(&start, caps, Effort::Normal);
         let ground = WeightedHeights::new(&dem, &importance, SeamSides::CLOSED, HeightFit::Squares);
-        let hold = |vertex: &terrain::Vertex| match task.held.contains(&vertex.at) {
-            true => Hold::PLACE.and(Hold::HEIGHT),
+        let held: Vec<Place> = task.held.iter().map(|&at| Place::of(at, rect, 8)).collect();
+        let hold = |at: Place| match held.contains(&at) {
+            true => Hold::GIVEN,
             false => Hold::FREE,
         };
         let layout = Layout { line_step: Some(SIDE * PER_POST), hold: &hold };
-        let mut sheet = TileMesh::new(&ground, &start, &layout);
+        let mut sheet = sheet_of(&ground, &start, &layout);
         let mut account = Account::new(&task.budget, &sheet);
         let before = sheet.squares();
         let (mut removal, mut insertion) = (Removal::default(), Insertion::default());
@@ -107,7 +113,7 @@ fn whoever_comes_where_a_limit_is_met_takes_somebodys_place() {
         assert!(0 < count && sheet.squares() < before, "{count} came");
         assert_eq!(sheet.fault(), None);
         sheet.round_heights();
-        let after = spent(&sheet.into_tin(rect), &task, SIDE);
+        let after = spent(&sheet.into_tin(rect, 8), &task, SIDE);
         assert!(after.iter().all(|&after| after <= per_module), "{after:?}");
         assert!(after.iter().sum::<u32>() <= per_window, "{after:?}");
     }

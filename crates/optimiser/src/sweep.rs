@@ -9,9 +9,10 @@ use crate::flips::flip_all;
 use crate::form::{Form, Hinge};
 use crate::hold::Hold;
 use crate::moments::Sums;
+use crate::parts::Vertex;
 use crate::place::{PER_POST, Place, Shape};
 use crate::refit::DAMPING;
-use crate::tile_mesh::{Star, TileMesh, Vertex, next};
+use crate::tile_mesh::{Star, TileMesh, next};
 
 /// Relative and absolute damping of steps in the plane.
 const PLANE_DAMPING: (f64, f64) = (0.01, 0.02);
@@ -128,7 +129,7 @@ impl Mover {
         let mut has_rims = false;
         for index in 0..self.candidates.len() {
             let at = self.candidates[index];
-            if sheet.ground.is_forbidden(at) || !self.is_valid(at) {
+            if sheet.ground.is_forbidden(at) || !self.leaves(sheet, at, Shape::Sound) {
                 continue;
             }
             if !has_rims {
@@ -161,7 +162,7 @@ impl Mover {
         }
         sheet.star(vertex, &mut self.star);
         self.look_around(sheet);
-        if !self.leaves(at, Shape::Large) {
+        if !self.leaves(sheet, at, Shape::Large) {
             return false;
         }
         self.sum_rims(sheet);
@@ -187,7 +188,7 @@ impl Mover {
         let mut tried = 0;
         for index in 0..self.ranked.len() {
             let at = self.ranked[index].1;
-            if !self.leaves(at, shape) {
+            if !self.leaves(sheet, at, shape) {
                 continue;
             }
             let stand = self.stand(sheet, at, record.height, record.hold);
@@ -249,17 +250,13 @@ impl Mover {
         if i + 1 == self.around.len() { 0 } else { i + 1 }
     }
 
-    #[inline(always)]
-    fn is_valid(&self, at: Place) -> bool {
-        self.leaves(at, Shape::Sound)
-    }
-
     /// Whether a vertex at a place leaves every triangle around it such a shape.
     #[inline(always)]
-    fn leaves(&self, at: Place, shape: Shape) -> bool {
+    fn leaves(&self, sheet: &TileMesh, at: Place, shape: Shape) -> bool {
         (0..self.star.edges.len()).all(|i| {
             let [a, b] = self.opposite(i);
             shape.admits(at, a.0, b.0)
+                || (shape == Shape::Sound && sheet.is_eased_at(at, [self.star.ring[i], self.star.ring[self.after(i)]]))
         })
     }
 

@@ -1,7 +1,7 @@
 //! What the optimiser is asked to do.
 
 use limits::TileLedger;
-use terrain::{Effort, HeightFit, Lattice, LatticePoint, Post, SeamSides};
+use terrain::{Effort, Features, HeightFit, Lattice, LatticePoint, Post, SeamSides};
 
 /// What the finished mesh may have.
 #[derive(Clone, Debug)]
@@ -21,6 +21,9 @@ pub struct Task {
     pub held: Vec<LatticePoint>,
     /// Posts that no vertex may come nearer to than to any other post, in ascending order; candidates they are none.
     pub forbidden: Vec<Post>,
+    /// Vertices and edges that the TIN has to keep, those of the tile only. What the budget permits comes on top of
+    /// them where it is one of limits, and counts them where it is a number.
+    pub features: Features,
     /// Sides on which vertices may be chosen; those on the others are held, too.
     pub open: SeamSides,
     /// Posts between lines that edges may not cross; `None` where only the tile's border is one.

@@ -5,7 +5,8 @@ use std::collections::BTreeMap;
 use terrain::{ModuleId, ModuleRect};
 
 use crate::account::Account;
-use crate::tile_mesh::{NONE, TileMesh};
+use crate::parts::NONE;
+use crate::tile_mesh::TileMesh;
 
 /// Vertices by load module; one on a line stands in the first of the two beside it.
 #[derive(Default)]

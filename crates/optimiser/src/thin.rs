@@ -115,6 +115,5 @@ fn is_done(account: &Account, until: Until, squares: f64) -> bool {
 
 /// Whether the triangles of a patch leave a larger weighted residual somewhere.
 fn leaves_more_than(largest: f64, sheet: &TileMesh, patch: &Patch) -> bool {
-    let worst = |corners: [u32; 3]| sheet.ground.worst(sheet.places(corners), sheet.heights(corners));
-    patch.new.iter().any(|&(corners, _)| worst(corners).is_some_and(|(residual, _)| largest < residual))
+    patch.new.iter().any(|&(corners, _)| sheet.worst(corners).is_some_and(|(residual, _)| largest < residual))
 }

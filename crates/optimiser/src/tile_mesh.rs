@@ -6,24 +6,9 @@ use crate::curve::along_curve;
 use crate::form::Form;
 use crate::hold::Hold;
 use crate::moments::Sums;
-use crate::place::Place;
+use crate::parts::{NONE, Parts, Vertex, line_hold};
+use crate::place::{Place, is_eased};
 use crate::weighted_heights::WeightedHeights;
-
-/// No edge, no vertex, no triangle.
-pub(crate) const NONE: u32 = u32::MAX;
-
-/// One vertex.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Vertex {
-    pub at: Place,
-    /// In quanta above the ground's level.
-    pub height: f64,
-    /// An edge that leaves it; [`NONE`] once it is gone.
-    pub edge: u32,
-    pub hold: Hold,
-    /// Whether something near it changed since this was last asked.
-    pub is_stirred: bool,
-}
 
 /// One triangle, counter-clockwise. An edge is `4 * triangle + corner it leaves`.
 #[derive(Clone, Copy, Debug)]
@@ -65,14 +50,6 @@ impl Star {
     }
 }
 
-/// Which vertices are held, and where lines run.
-pub(crate) struct Layout<'a> {
-    /// Steps between lines that edges may not cross; `None` where only the tile's border is one.
-    pub line_step: Option<i32>,
-    /// What else may not change about a vertex.
-    pub hold: &'a dyn Fn(&TinVertex) -> Hold,
-}
-
 /// The mesh of a tile.
 pub(crate) struct TileMesh<'a> {
     pub ground: &'a WeightedHeights<'a>,
@@ -86,11 +63,15 @@ pub(crate) struct TileMesh<'a> {
     free_vertices: Vec<u32>,
     pub(crate) free_triangles: Vec<u32>,
     line_step: Option<i32>,
+    /// Edges of features, by their ends, the lesser first, in ascending order.
+    kept: Vec<[Place; 2]>,
+    /// Whether there are features, which may stand closer together than a sound triangle is high.
+    pub has_features: bool,
 }
 
 impl<'a> TileMesh<'a> {
-    /// The sheet of a TIN, in an order in which neighbours in space are neighbours in memory.
-    pub fn new(ground: &'a WeightedHeights<'a>, tin: &Tin, layout: &Layout) -> Self {
+    /// The sheet of some parts, in an order in which neighbours in space are neighbours in memory.
+    pub fn new(ground: &'a WeightedHeights<'a>, parts: Parts, line_step: Option<i32>, has_features: bool) -> Self {
         let mut sheet = Self {
             ground,
             vertices: Vec::new(),
@@ -101,20 +82,11 @@ impl<'a> TileMesh<'a> {
             vertex_count: 0,
             free_vertices: Vec::new(),
             free_triangles: Vec::new(),
-            line_step: layout.line_step,
+            line_step,
+            kept: parts.kept,
+            has_features,
         };
-        let vertices = tin.vertices.iter().map(|vertex| {
-            let at = Place::of(vertex.at, tin.rect);
-            Vertex {
-                at,
-                height: f64::from(vertex.height) - ground.level(),
-                edge: NONE,
-                hold: sheet.line_hold(at).and((layout.hold)(vertex)),
-                is_stirred: true,
-            }
-        });
-        let vertices = vertices.collect();
-        sheet.fill(vertices, &tin.triangles);
+        sheet.fill(parts.vertices, &parts.triangles);
         sheet
     }
 
@@ -202,14 +174,7 @@ impl<'a> TileMesh<'a> {
 
     /// What lies on a line may only move along it.
     pub fn line_hold(&self, at: Place) -> Hold {
-        let far = self.ground.far();
-        let is_line = |at: i32, far: i32| match self.line_step {
-            Some(step) => at % step == 0,
-            None => at == 0 || at == far,
-        };
-        let column = if is_line(at.x, far.x) { Hold::COLUMN } else { Hold::FREE };
-        let row = if is_line(at.y, far.y) { Hold::ROW } else { Hold::FREE };
-        column.and(row)
+        line_hold(self.ground, self.line_step, at)
     }
 
     #[inline(always)]
@@ -254,12 +219,50 @@ impl<'a> TileMesh<'a> {
         self.vertices[vertex as usize].edge != NONE
     }
 
-    /// Whether the edge between two neighbours lies on a line.
+    /// Whether the edge between two neighbours lies on a line or belongs to a feature.
     #[inline(always)]
     pub fn is_constrained(&self, a: u32, b: u32) -> bool {
         let (a, b) = (&self.vertices[a as usize], &self.vertices[b as usize]);
         let both = |line: Hold| a.hold.has(line) && b.hold.has(line);
-        (a.at.x == b.at.x && both(Hold::COLUMN)) || (a.at.y == b.at.y && both(Hold::ROW))
+        (a.at.x == b.at.x && both(Hold::COLUMN))
+            || (a.at.y == b.at.y && both(Hold::ROW))
+            || (both(Hold::FEATURE) && self.keeps(a.at, b.at))
+    }
+
+    fn keeps(&self, a: Place, b: Place) -> bool {
+        self.kept.binary_search(&[a.min(b), a.max(b)]).is_ok()
+    }
+
+    /// Whether a triangle that is not sound is as good as its given corners permit.
+    pub fn is_eased(&self, corners: [u32; 3]) -> bool {
+        self.has_features && is_eased(self.places(corners), corners.map(|corner| self.is_given(corner)))
+    }
+
+    /// The same of a triangle between a place and two vertices.
+    pub fn is_eased_at(&self, at: Place, [a, b]: [u32; 2]) -> bool {
+        self.has_features && is_eased([at, self.at(a), self.at(b)], [false, self.is_given(a), self.is_given(b)])
+    }
+
+    pub fn is_given(&self, vertex: u32) -> bool {
+        self.vertices[vertex as usize].hold.is_fixed()
+    }
+
+    /// The post of largest weighted residual under a triangle where a vertex may come, and that residual in quanta:
+    /// on an edge of a feature none may.
+    #[inline(always)]
+    pub fn worst(&self, corners: [u32; 3]) -> Option<(f64, Place)> {
+        let (places, heights) = (self.places(corners), self.heights(corners));
+        if !self.has_features {
+            return self.ground.worst(places, heights, |_| true);
+        }
+        let is_kept = [0, 1, 2].map(|k| {
+            let both = [k, (k + 1) % 3].map(|k| self.vertices[corners[k] as usize].hold.has(Hold::FEATURE));
+            both == [true, true] && self.keeps(places[k], places[(k + 1) % 3])
+        });
+        self.ground.worst(places, heights, |at| {
+            let lies_on = |k: usize| is_kept[k] && Place::orient(places[k], places[(k + 1) % 3], at) == 0;
+            !(0..3).any(lies_on) && !self.ground.is_forbidden(at)
+        })
     }
 
     fn form_of(&self, record: &Triangle, sums: &[Sums; 3]) -> Form {
@@ -429,8 +432,8 @@ impl<'a> TileMesh<'a> {
     /// The finished TIN: first the vertices that were there from the start, then the others, by row and column.
     ///
     /// # Panics
-    /// When a vertex lies between lattice points.
-    pub fn into_tin(self, rect: PostRect) -> Tin {
+    /// When a vertex lies between points of the lattice with so many steps to a post.
+    pub fn into_tin(self, rect: PostRect, steps_per_post: i32) -> Tin {
         let mut order: Vec<u32> = (0..self.vertices.len() as u32).filter(|&vertex| self.is_vertex(vertex)).collect();
         let is_movable = |vertex: u32| !self.vertices[vertex as usize].hold.is_fixed();
         order.sort_unstable_by_key(|&vertex| (is_movable(vertex), self.at(vertex)));
@@ -439,10 +442,10 @@ impl<'a> TileMesh<'a> {
         let vertices = order.iter().map(|&vertex| {
             let vertex = &self.vertices[vertex as usize];
             let height = (vertex.height + self.ground.level()).round() as i32;
-            TinVertex { at: vertex.at.lattice_point(rect), height }
+            TinVertex { at: vertex.at.lattice_point(rect, steps_per_post), height }
         });
         let live = self.triangles.iter().filter(|record| record.corners[0] != NONE);
         let triangles = live.map(|record| record.corners.map(|vertex| index[vertex as usize])).collect();
-        Tin { rect, vertices: vertices.collect(), triangles }
+        Tin { rect, steps_per_post, vertices: vertices.collect(), triangles }
     }
 }

@@ -20,7 +20,7 @@ pub(crate) struct WeightedHeights<'a> {
     fit: HeightFit,
     far: Place,
     /// Posts that no vertex may come nearest to, in ascending order.
-    forbidden: &'a [Post],
+    forbidden: Vec<Post>,
 }
 
 impl<'a> WeightedHeights<'a> {
@@ -28,7 +28,7 @@ impl<'a> WeightedHeights<'a> {
         let rect = dem.rect();
         let far = Place::new(rect.cells_wide() as i32 * PER_POST, rect.cells_high() as i32 * PER_POST);
         let weight = importance.uniform_weight().map(|weight| f64::from(weight) / f64::from(THOUSANDTHS));
-        Self { moments: Moments::new(dem, importance), dem, importance, weight, open, fit, far, forbidden: &[] }
+        Self { moments: Moments::new(dem, importance), dem, importance, weight, open, fit, far, forbidden: Vec::new() }
     }
 
     /// Quanta of height that count as zero.
@@ -50,7 +50,7 @@ impl<'a> WeightedHeights<'a> {
     }
 
     /// Forbids vertices to come to stand at these posts, in ascending order.
-    pub fn forbid(&mut self, posts: &'a [Post]) {
+    pub fn forbid(&mut self, posts: Vec<Post>) {
         self.forbidden = posts;
     }
 
@@ -59,6 +59,12 @@ impl<'a> WeightedHeights<'a> {
     pub fn is_forbidden(&self, at: Place) -> bool {
         let nearest = |v: i32| (v + PER_POST / 2).div_euclid(PER_POST);
         !self.forbidden.is_empty() && self.forbidden.binary_search(&self.post(nearest(at.y), nearest(at.x))).is_ok()
+    }
+
+    /// Whether the post nearest to a place has a weight.
+    pub fn counts(&self, at: Place) -> bool {
+        let nearest = |v: i32| (v + PER_POST / 2).div_euclid(PER_POST);
+        0 < self.importance.weight(self.post(nearest(at.y), nearest(at.x)))
     }
 
     /// Posts of the tile.
@@ -100,9 +106,14 @@ impl<'a> WeightedHeights<'a> {
     }
 
     /// The post of largest weighted residual under a triangle, and that residual in quanta: candidates only, and none
-    /// where a corner stands.
+    /// where a corner stands or that is not `allowed`.
     #[inline(always)]
-    pub fn worst(&self, corners: [Place; 3], heights: [f64; 3]) -> Option<(f64, Place)> {
+    pub fn worst(
+        &self,
+        corners: [Place; 3],
+        heights: [f64; 3],
+        allowed: impl Fn(Place) -> bool,
+    ) -> Option<(f64, Place)> {
         let [a, b, c] = corners;
         let Plane { x: x0, y: y0, gx, gy } = Plane::new(corners, heights);
         let mut worst = (0.0, Place::default());
@@ -127,7 +138,7 @@ impl<'a> WeightedHeights<'a> {
                 };
                 let residual = weight * (f64::from(height) - (base + gx * (f64::from(col) - x0))).abs();
                 let at = Place::new(col * PER_POST, row * PER_POST);
-                if worst.0 < residual && at != a && at != b && at != c {
+                if worst.0 < residual && at != a && at != b && at != c && allowed(at) {
                     worst = (residual, at);
                 }
             }

@@ -1,8 +1,8 @@
-//! The breaches of a report as files for maps and for tables.
+//! What a report lists as files for maps and for tables: breaches, and what became of features.
 
-use database::{Report, files};
+use database::{FeatureRemark, Report, files};
 use job::Job;
-use views::{BreachPlaces, breaches_csv, breaches_geojson};
+use views::{BreachPlaces, breaches_csv, breaches_geojson, features_geojson};
 
 /// Names and texts of the files that list the breaches of `report`, whose job this is.
 pub fn breaches(job: &Job, report: &Report) -> [(&'static str, String); 2] {
@@ -15,4 +15,9 @@ pub fn breaches(job: &Job, report: &Report) -> [(&'static str, String); 2] {
         epsg: area.epsg,
     };
     [(files::BREACHES, breaches_geojson(report, &places)), (files::BREACHES_CSV, breaches_csv(report, &places))]
+}
+
+/// Name and text of the file that lists what was mended, degraded or left out of the features of this job.
+pub fn features_file(job: &Job, remarks: &[FeatureRemark]) -> (&'static str, String) {
+    (files::FEATURES, features_geojson(remarks, job.area.epsg))
 }

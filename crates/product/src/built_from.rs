@@ -25,7 +25,7 @@ impl BuiltFrom {
         // Nothing that is compared with heights depends on weights.
         job.importance.areas.clear();
         let name = choose_ground(&mut job, &manifest, folder.dir(), against)?;
-        let ground = Ground::open(&job, &area, &Workers::new(1), &AtomicBool::new(false))?;
+        let ground = Ground::open_built(&job, &area, (&Workers::new(1), &AtomicBool::new(false)), &folder)?;
         Ok(Self { ground, name })
     }
 

@@ -4,15 +4,15 @@
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-use database::{Folder, Manifest};
+use database::{AreaLevel, FeatureRemark, Folder, Manifest};
 use fidelity::each_residual;
 use ground::{GamingArea, Ground, GroundError, PlannedTile, Window, planned_tiles};
-use job::{Count, Job};
+use job::Job;
 use schedule::Workers;
 use terrain::{Dem, GridFrame, LoadModule, ModuleGrid, ModuleRect, Post, PostRect, TileId};
 use views::NO_RESIDUAL;
 
-use crate::{Opened, ProductError, choose_ground};
+use crate::{Opened, ProductError, choose_ground, read_told};
 
 /// What is wanted of a database.
 #[derive(Clone, Copy, Debug)]
@@ -57,6 +57,8 @@ pub struct Product {
     pub modules: Vec<LoadModule>,
     /// The ground under them, if it was wanted.
     pub ground: Option<ProductGround>,
+    /// What features of the area came to, and all remarks on them; nothing of jobs without any.
+    pub features: Option<(AreaLevel, Vec<FeatureRemark>)>,
 }
 
 /// The ground under a part of a database.
@@ -100,7 +102,7 @@ impl Product {
         check_part(part, area)?;
         let (workers, stop) = (Workers::new(wanted.workers), AtomicBool::new(false));
         let ground = match open_ground(opened, wanted.ground)? {
-            Some((job, name)) => Some((Ground::open(&job, area, &workers, &stop)?, name)),
+            Some((job, name)) => Some((Ground::open_built(&job, area, (&workers, &stop), folder)?, name)),
             None => None,
         };
         let meets = |tile: &TileId| meet(area.tiling.modules(*tile, area.grid), part).is_some();
@@ -120,7 +122,8 @@ impl Product {
         });
         let (manifest, job) = (manifest.clone(), job.clone());
         let (grid, frame, tiles) = (area.grid, area.frame, planned_tiles(area));
-        Ok(Self { manifest, job, grid, frame, tiles, part, modules, ground })
+        let features = read_told(opened)?.map(|(level, told)| (level, told.remarks));
+        Ok(Self { manifest, job, grid, frame, tiles, part, modules, ground, features })
     }
 
     /// What limits count, in every load module and window.
@@ -129,11 +132,7 @@ impl Product {
     /// When only a part was read.
     pub fn limit_use(&self) -> LimitUse {
         assert_eq!(self.part, self.grid.all(), "windows are counted over the whole area");
-        let count = |module: &LoadModule| match self.job.limits.count {
-            Count::Triangles => module.triangles.len() as u32,
-            Count::Polygons => module.polygon_count,
-        };
-        let modules: Vec<u32> = self.modules.iter().map(count).collect();
+        let modules: Vec<u32> = self.modules.iter().map(|module| self.job.limits.count.of(module)).collect();
         let window = self.job.limits.window;
         let windows = limits::Windows::of_size(self.grid, window.rows, window.cols);
         LimitUse { windows: windows.sums(self.grid, &modules), modules, window: [windows.rows, windows.cols] }

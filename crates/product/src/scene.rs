@@ -3,7 +3,7 @@
 use database::{Report, ReportPlace, TileState};
 use job::{Choice, Job};
 use terrain::{LoadModule, ModuleId, ModuleRect};
-use views::{Scene, SceneGround, SceneLimits, SceneTile};
+use views::{Scene, SceneFeatures, SceneGround, SceneLimits, SceneTile};
 
 use crate::{LimitUse, Product};
 
@@ -12,6 +12,8 @@ use crate::{LimitUse, Product};
 pub struct SceneParts {
     limits: SceneLimits,
     tiles: Vec<SceneTile>,
+    /// Names of all classes, and those that features have.
+    classes: (Vec<String>, Vec<u8>),
 }
 
 impl SceneParts {
@@ -47,7 +49,11 @@ impl SceneParts {
             color: planned.color,
             state: state(planned.tile),
         });
-        Self { limits, tiles: tiles.collect() }
+        let names = product.job.class_names().to_vec();
+        let of_features = product.job.features.as_ref().map(|spec| spec.classes()).unwrap_or_default();
+        let classes =
+            (0..).zip(&names).filter(|(_, name)| of_features.contains(name)).map(|(class, _)| class).collect();
+        Self { limits, tiles: tiles.collect(), classes: (names, classes) }
     }
 
     /// The scene of `part`, whose load modules are `modules`, row by row from the south-west.
@@ -65,6 +71,12 @@ impl SceneParts {
                 .map(|ground| SceneGround { dem: &ground.dem, residuals: &ground.residuals }),
             limits: &self.limits,
             water: water(&product.job),
+            features: product.features.as_ref().map(|(level, remarks)| SceneFeatures {
+                names: &self.classes.0,
+                classes: &self.classes.1,
+                lines: &level.lines,
+                remarks,
+            }),
             tiles: &self.tiles,
         }
     }
@@ -72,6 +84,6 @@ impl SceneParts {
 
 /// The class of water: what the job gives to its water polygons, or one that is named so.
 pub fn water(job: &Job) -> Option<u8> {
-    let named = || job.importance.classes.iter().position(|class| class == "water");
+    let named = || job.class_names().iter().position(|class| class == "water");
     job.dem.water.as_ref().map(|water| water.class).or_else(|| named().map(|index| index as u8))
 }

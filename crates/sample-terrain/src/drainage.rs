@@ -69,12 +69,12 @@ pub(crate) struct Octave {
     corner_m: (f64, f64),
 }
 
-/// All octaves of the block whose south-west corner is given in metres, coarsest first.
-pub(crate) fn octaves(seed: u64, region: &Region, corner_m: (f64, f64), side_m: f64) -> Vec<Octave> {
-    let mut octaves: Vec<Octave> = Vec::with_capacity(OCTAVES);
-    for number in 0..OCTAVES {
+/// The first `count` octaves of the square whose south-west corner is given in metres, coarsest first.
+pub(crate) fn octaves(seed: u64, region: &Region, corner_m: (f64, f64), side_m: f64, count: usize) -> Vec<Octave> {
+    let mut octaves: Vec<Octave> = Vec::with_capacity(count);
+    for number in 0..count {
         // Finer pivots beyond the border are steered by pivots farther out.
-        let margin_m: f32 = (number..OCTAVES).map(reach_m).sum();
+        let margin_m: f32 = (number..count).map(reach_m).sum();
         let octave = match octaves.last() {
             None => Octave::scatter(seed, number, corner_m, side_m, margin_m, |east_m, north_m| {
                 let [east, north] = region.slope(corner_m.0 + east_m, corner_m.1 + north_m, SLOPE_BASE_M);

@@ -5,10 +5,13 @@
 //! the lie of the land (ranges, basin floors: noise), drainage (ridges, gullies and washes that run downhill),
 //! and playas (found by walking to the bottom of closed basins).
 //!
+//! Upon it lie [`features()`]: highways, tracks over passes, bridges, washes and lakes, from the same seed.
+//!
 //! The same place has the same height whichever window or spacing it is asked for, on any machine: only `+ - * /`,
 //! square roots, comparisons and integer hashing are used, and heights are rounded once, to quanta of 1/128 m.
 
 mod drainage;
+mod features;
 mod noise;
 mod patch;
 mod playa;
@@ -16,6 +19,8 @@ mod region;
 mod window;
 
 use terrain::{Dem, PostRect, Spacing, quanta_of_metres};
+
+pub use features::{SampleFeature, SampleShape, features};
 
 use drainage::Posts;
 use patch::{BLOCK_M, Block};
@@ -61,7 +66,7 @@ pub fn classes(seed: u64, rect: PostRect, spacing: Spacing) -> Vec<u8> {
     by_patch(
         rect,
         spacing,
-        |corner_m| patch::nodes(&region, corner_m),
+        |corner_m| patch::nodes(&region, corner_m, BLOCK_M),
         |nodes, posts| {
             let class = |lie: &region::Lie| if OUTLINE_M < lie.bedrock_m() { MOUNTAIN } else { PLAIN };
             patch::lie(nodes, posts).iter().map(class).collect()

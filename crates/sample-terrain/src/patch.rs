@@ -9,12 +9,14 @@ use crate::region::{Lie, Region};
 pub(crate) const BLOCK_M: f64 = 3_200.0;
 /// Metres between nodes of the lattice on which the region is evaluated.
 const NODE_M: f64 = 400.0;
-/// Nodes a side: those of the block, one before and one after for the cubic spline, one for its far border.
-const NODES: usize = 11;
+/// Nodes a side beyond its cells: one before and one after for the cubic spline, one for its far border.
+const NODES_BEYOND: usize = 3;
 /// Depth in metres of the washes that each octave cuts into fans where incision is full.
 const WASHES_M: [f32; OCTAVES] = [0.0, 4.5, 3.5, 1.2];
 /// Height in metres of fan lobes at canyon mouths.
 const LOBE_M: f32 = 14.0;
+/// Octaves of rough ground: those that posts 100 m apart can show.
+const ROUGH_OCTAVES: usize = 2;
 
 /// No ground is lower than this, in metres.
 pub(crate) const LOWEST_M: f32 = 300.0;
@@ -33,8 +35,14 @@ pub(crate) struct Block {
 impl Block {
     /// The block whose south-west corner is given in metres; `playas` are those that touch it.
     pub(crate) fn new(seed: u64, region: &Region, corner_m: (f64, f64), playas: Vec<Playa>) -> Self {
-        let octaves = octaves(seed, region, corner_m, BLOCK_M);
-        Self { corner_m, nodes: nodes(region, corner_m), octaves, playas }
+        let octaves = octaves(seed, region, corner_m, BLOCK_M, OCTAVES);
+        Self { corner_m, nodes: nodes(region, corner_m, BLOCK_M), octaves, playas }
+    }
+
+    /// A wider square of ground without playas and without its finer drainage: what features are laid out on.
+    pub(crate) fn rough(seed: u64, region: &Region, corner_m: (f64, f64), side_m: f64) -> Self {
+        let octaves = octaves(seed, region, corner_m, side_m, ROUGH_OCTAVES);
+        Self { corner_m, nodes: nodes(region, corner_m, side_m), octaves, playas: Vec::new() }
     }
 
     /// Heights in metres at the posts of a patch, row-major.
@@ -55,21 +63,23 @@ impl Block {
     }
 }
 
-/// The lie of the land at the nodes of a block's lattice.
-pub(crate) fn nodes(region: &Region, corner_m: (f64, f64)) -> Vec<Lie> {
+/// The lie of the land at the nodes of a square's lattice.
+pub(crate) fn nodes(region: &Region, corner_m: (f64, f64), side_m: f64) -> Vec<Lie> {
+    let wide = (side_m / NODE_M) as usize + NODES_BEYOND;
     let place_m = |corner_m: f64, node: usize| corner_m + (node as f64 - 1.0) * NODE_M;
-    let places = (0..NODES).flat_map(|row| (0..NODES).map(move |col| (row, col)));
+    let places = (0..wide).flat_map(|row| (0..wide).map(move |col| (row, col)));
     places.map(|(row, col)| region.lie(place_m(corner_m.0, col), place_m(corner_m.1, row))).collect()
 }
 
-/// The lie of the land at the posts of a patch, row-major: a cubic spline through the block's nodes.
+/// The lie of the land at the posts of a patch, row-major: a cubic spline through the square's nodes.
 pub(crate) fn lie(nodes: &[Lie], posts: Posts<'_>) -> Vec<Lie> {
+    let wide = nodes.len().isqrt();
     let mut lies = Vec::with_capacity(posts.count());
-    let cols: Vec<(usize, [f32; 4])> = posts.east_m.iter().map(|&east_m| spline(east_m)).collect();
+    let cols: Vec<(usize, [f32; 4])> = posts.east_m.iter().map(|&east_m| spline(east_m, wide)).collect();
     for &north_m in posts.north_m {
-        let (row, up) = spline(north_m);
-        let column = |col: usize| [0, 1, 2, 3].map(|up| &nodes[(row + up) * NODES + col]);
-        let line: [Lie; NODES] = std::array::from_fn(|col| Lie::weighed(column(col), up));
+        let (row, up) = spline(north_m, wide);
+        let column = |col: usize| [0, 1, 2, 3].map(|up| &nodes[(row + up) * wide + col]);
+        let line: Vec<Lie> = (0..wide).map(|col| Lie::weighed(column(col), up)).collect();
         for &(col, right) in &cols {
             lies.push(Lie::weighed([0, 1, 2, 3].map(|east| &line[col + east]), right));
         }
@@ -77,10 +87,10 @@ pub(crate) fn lie(nodes: &[Lie], posts: Posts<'_>) -> Vec<Lie> {
     lies
 }
 
-/// First node and weights of the cubic B-spline at a place in the block.
-fn spline(place_m: f32) -> (usize, [f32; 4]) {
+/// First node and weights of the cubic B-spline at a place in a square of `wide` nodes a side.
+fn spline(place_m: f32, wide: usize) -> (usize, [f32; 4]) {
     let node = place_m / NODE_M as f32;
-    let first = (node as usize).min(NODES - 4);
+    let first = (node as usize).min(wide - 4);
     let t = node - first as f32;
     let r = 1.0 - t;
     let weights = [

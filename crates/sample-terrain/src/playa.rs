@@ -11,7 +11,7 @@ const SEARCH_M: f64 = 9_000.0;
 /// How far a playa may stretch from its middle, in metres: the radius that holds the highest level is taken.
 const RADII_M: [f64; 3] = [1_500.0, 3_000.0, 4_500.0];
 /// The largest of them.
-const RADIUS_M_MAX: f64 = 4_500.0;
+pub(crate) const RADIUS_M_MAX: f64 = 4_500.0;
 /// Part of the radius out to which the level is flat.
 const FLAT: f64 = 0.8;
 /// Fall of the level beyond, in metres per metre, so that where a wash leaves the basin there is no cliff.
@@ -22,14 +22,19 @@ const DEPTH_M: f64 = 14.0;
 /// A flat surface; the ground is nowhere below it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Playa {
-    middle: (f64, f64),
-    radius_m: f64,
-    level_m: f64,
+    /// Search cell, east and north, that it was found from.
+    pub(crate) cell: (i64, i64),
+    /// Its lowest ground, in metres east and north.
+    pub(crate) middle: (f64, f64),
+    /// How far it may stretch.
+    pub(crate) radius_m: f64,
+    /// Its height.
+    pub(crate) level_m: f64,
 }
 
 impl Playa {
     /// The playa of one search cell: at the bottom of the closed basin the cell's ground drains to, if it is near.
-    fn find(region: &Region, stream: Stream, (east, north): (i64, i64)) -> Option<Self> {
+    pub(crate) fn find(region: &Region, stream: Stream, (east, north): (i64, i64)) -> Option<Self> {
         let (right, up) = stream.pair(east, north);
         let start = ((east as f64 + 0.5 + 0.5 * right) * CELL_M, (north as f64 + 0.5 + 0.5 * up) * CELL_M);
         let height_m = |east_m, north_m| f64::from(region.lie(east_m, north_m).alluvium_m());
@@ -58,22 +63,29 @@ impl Playa {
             let rim = ring(32).map(|(dx, dy)| height_m(middle.0 + dx * radius_m, middle.1 + dy * radius_m));
             (rim.fold(lowest_m + DEPTH_M, f64::min) - 1.0).floor()
         };
-        let playas = RADII_M.map(|radius_m| Self { middle, radius_m, level_m: level_m(radius_m) });
+        let playas = RADII_M.map(|radius_m| Self { cell: (east, north), middle, radius_m, level_m: level_m(radius_m) });
         let best = playas.into_iter().reduce(|best, next| if best.level_m < next.level_m { next } else { best });
         best.filter(|playa| lowest_m + 1.0 < playa.level_m)
     }
 
     /// The playas that matter in a square of ground, in order of their search cells.
     pub(crate) fn around(seed: u64, region: &Region, corner_m: (f64, f64), size_m: (f64, f64)) -> Vec<Self> {
-        let stream = Stream::new(seed, 50);
-        let cells = |from_m: f64, size_m: f64| {
-            let margin_m = SEARCH_M + RADIUS_M_MAX;
+        let stream = Self::stream(seed);
+        Self::cells(corner_m, size_m, 0.0).filter_map(|cell| Self::find(region, stream, cell)).collect()
+    }
+
+    /// The numbers that searches begin with.
+    pub(crate) fn stream(seed: u64) -> Stream {
+        Stream::new(seed, 50)
+    }
+
+    /// Search cells of playas that may come within `beyond_m` metres of a rectangle of ground.
+    pub(crate) fn cells(corner_m: (f64, f64), size_m: (f64, f64), beyond_m: f64) -> impl Iterator<Item = (i64, i64)> {
+        let cells = move |from_m: f64, size_m: f64| {
+            let margin_m = SEARCH_M + RADIUS_M_MAX + beyond_m;
             ((from_m - margin_m) / CELL_M).floor() as i64..=((from_m + size_m + margin_m) / CELL_M).floor() as i64
         };
-        let rows = cells(corner_m.1, size_m.1);
-        rows.flat_map(|north| cells(corner_m.0, size_m.0).map(move |east| (east, north)))
-            .filter_map(|cell| Self::find(region, stream, cell))
-            .collect()
+        cells(corner_m.1, size_m.1).flat_map(move |north| cells(corner_m.0, size_m.0).map(move |east| (east, north)))
     }
 
     /// Whether any of a square of ground lies within the playa's reach.
@@ -81,6 +93,17 @@ impl Playa {
         let beyond = |place: f64, from: f64| (from - place).max(place - from - side_m).max(0.0);
         let (dx, dy) = (beyond(self.middle.0, corner_m.0), beyond(self.middle.1, corner_m.1));
         dx * dx + dy * dy < self.radius_m * self.radius_m
+    }
+
+    /// How far in metres its level is flat, from its middle.
+    pub(crate) fn flat_m(&self) -> f64 {
+        FLAT * self.radius_m
+    }
+
+    /// Whether a place in metres lies where the level is flat.
+    pub(crate) fn is_near(&self, [east_m, north_m]: [f64; 2]) -> bool {
+        let (dx, dy) = (east_m - self.middle.0, north_m - self.middle.1);
+        dx * dx + dy * dy <= self.flat_m() * self.flat_m()
     }
 
     /// Raises the heights of a patch to the playa's level where they are lower.

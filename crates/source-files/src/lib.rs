@@ -57,8 +57,8 @@ mod shapefile;
 pub use polygons::read_polygons;
 mod features;
 pub use features::{
-    BUILT_IN_KEYS, Extent, FeatureFile, Remark, Tags, VectorFeature, VectorShape, Vertices, Wanted, feature_layers,
-    is_feature_file, read_features,
+    BUILT_IN_KEYS, Extent, FeatureFile, Remark, Tags, VectorFeature, VectorShape, Vertices, Wanted,
+    feature_attribution, feature_layers, is_feature_file, read_features,
 };
 mod given;
 pub use given::{GivenFeature, GivenShape, read_given};

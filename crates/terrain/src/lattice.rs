@@ -1,13 +1,14 @@
-//! The lattice of eighths of a post on which every vertex of a TIN lies.
+//! The lattice on which every vertex of a TIN lies: eighths of a post, or finer steps where features need them.
 
 use crate::Post;
 
-/// Lattice steps between neighbouring posts.
+/// Lattice steps between neighbouring posts, but for TINs with features (see [`crate::Tin::steps_per_post`]).
 pub const LATTICE_PER_POST: i32 = 8;
 
 /// A place on the working lattice, in eighths of a post from the area's south-west post.
 ///
-/// Growing and the paper method use whole posts only; optimising moves free vertices to eighths.
+/// Growing and the paper method use whole posts only; optimising moves free vertices to eighths. Features, and TINs
+/// with features, count in finer steps of their own, which they name; what turns places into posts here knows eighths.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct LatticePoint {
     /// Eighths of a post north of the area's southern edge.

@@ -2,18 +2,7 @@
 
 use std::collections::HashMap;
 
-use crate::ModuleId;
-
-/// A vertex of a load module, in quanta of 1/128 m from the load module's south-west corner.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct ModuleVertex {
-    /// North of the southern side (compared first, as everywhere).
-    pub y: u16,
-    /// East of the western side.
-    pub x: u16,
-    /// Height above the datum.
-    pub z: i32,
-}
+use crate::{DeckFault, Decks, ModuleId, ModuleVertex};
 
 /// One finished load module.
 ///
@@ -35,6 +24,17 @@ pub struct LoadModule {
     pub polygon_count: u32,
     /// Residual of the DEM's posts that this load module owns.
     pub residual: ModuleResidual,
+    /// Decks of bridges above the ground. Of the fields above all but `id` and `side` are about the ground alone.
+    pub decks: Decks,
+}
+
+/// What of a load module counts against limits.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ModuleCounts {
+    /// Triangles of the ground and of decks.
+    pub triangles: u32,
+    /// Convex polygons of the ground, and triangles of decks.
+    pub polygons: u32,
 }
 
 /// Residuals over the posts a load module owns, in quanta of 1/128 m.
@@ -67,6 +67,8 @@ pub enum LoadModuleFault {
     AreaMissing(i64, i64),
     /// This edge inside the square has a triangle on one side only, or is used twice in one direction.
     Crack([ModuleVertex; 2]),
+    /// Decks are not as they must be.
+    InDecks(DeckFault),
 }
 
 impl std::fmt::Display for LoadModuleFault {
@@ -84,6 +86,7 @@ impl std::fmt::Display for LoadModuleFault {
                 let (from, to) = (format!("{},{}", a.x, a.y), format!("{},{}", b.x, b.y));
                 write!(f, "the edge {from} to {to} (quanta east, north) is not shared by two triangles")
             }
+            Self::InDecks(fault) => write!(f, "decks: {fault}"),
         }
     }
 }
@@ -95,6 +98,13 @@ impl LoadModule {
         let (bx, by) = (i64::from(b.x) - i64::from(a.x), i64::from(b.y) - i64::from(a.y));
         let (cx, cy) = (i64::from(c.x) - i64::from(a.x), i64::from(c.y) - i64::from(a.y));
         bx * cy - by * cx
+    }
+
+    /// What counts against limits: a simulator draws decks as it draws the ground, so each of their triangles counts as
+    /// one triangle and as one polygon.
+    pub fn counts(&self) -> ModuleCounts {
+        let of_decks = self.decks.triangles.len() as u32;
+        ModuleCounts { triangles: self.triangles.len() as u32 + of_decks, polygons: self.polygon_count + of_decks }
     }
 
     /// Indices of the vertices on one side, west to east or south to north.
@@ -116,7 +126,7 @@ impl LoadModule {
         self.vertices.iter().filter(on_border).count()
     }
 
-    /// Walks every invariant: indices, canonical order, orientation, area, cracks inside, T-junctions.
+    /// Walks every invariant: indices, canonical order, orientation, area, cracks inside, T-junctions, decks.
     ///
     /// # Errors
     /// The first fault found.
@@ -133,7 +143,8 @@ impl LoadModule {
             return Err(LoadModuleFault::NotCanonical);
         }
         self.check_area()?;
-        self.check_edges()
+        self.check_edges()?;
+        self.decks.check(self.side).map_err(LoadModuleFault::InDecks)
     }
 
     fn check_area(&self) -> Result<(), LoadModuleFault> {
@@ -200,6 +211,7 @@ mod tests {
             classes: vec![0, 0],
             polygon_count: 2,
             residual: ModuleResidual::default(),
+            decks: Decks::default(),
         }
     }
 
@@ -221,5 +233,17 @@ mod tests {
         assert_eq!(module.check(), Err(LoadModuleFault::Inconsistent));
         module.classes.pop();
         assert!(matches!(module.check(), Err(LoadModuleFault::AreaMissing(..))));
+    }
+
+    #[test]
+    fn triangles_of_decks_count_against_limits_and_are_checked() {
+        let mut module = square();
+        assert_eq!(module.counts(), ModuleCounts { triangles: 2, polygons: 2 });
+        let corners = [(0, 0), (0, 9), (9, 9)].map(|(y, x)| ModuleVertex { y, x, z: 640 });
+        module.decks = Decks::of_triangles([(corners, 1)]);
+        module.polygon_count = 1;
+        assert_eq!((module.counts(), module.check()), (ModuleCounts { triangles: 3, polygons: 2 }, Ok(())));
+        module.decks.triangles[0] = [0, 2, 1];
+        assert_eq!(module.check(), Err(LoadModuleFault::InDecks(DeckFault::NotCounterClockwise(0))));
     }
 }

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use crate::{LATTICE_PER_POST, LatticePoint, PostRect};
+use crate::{LATTICE_PER_POST, LatticePoint, Post, PostRect};
 
 /// One vertex: a lattice point and its height in quanta of 1/128 m.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -20,6 +20,9 @@ pub struct Vertex {
 pub struct Tin {
     /// The posts it covers.
     pub rect: PostRect,
+    /// Steps between posts of the lattice that places count in: [`LATTICE_PER_POST`], or more where features ask for
+    /// them.
+    pub steps_per_post: i32,
     /// Vertices, in the order in which they were inserted where that is known.
     pub vertices: Vec<Vertex>,
     /// Corners of each triangle, counter-clockwise.
@@ -67,6 +70,22 @@ impl std::fmt::Display for TinFault {
 }
 
 impl Tin {
+    /// A TIN on the lattice of eighths of a post.
+    pub fn new(rect: PostRect, vertices: Vec<Vertex>, triangles: Vec<[u32; 3]>) -> Self {
+        Self { rect, steps_per_post: LATTICE_PER_POST, vertices, triangles }
+    }
+
+    /// The place of a post on this TIN's lattice.
+    pub fn place_of(&self, post: Post) -> LatticePoint {
+        LatticePoint::new(post.row * self.steps_per_post, post.col * self.steps_per_post)
+    }
+
+    /// The post at a place on this TIN's lattice, if it lies on one.
+    pub fn post_at(&self, at: LatticePoint) -> Option<Post> {
+        let steps = self.steps_per_post;
+        (at.row % steps == 0 && at.col % steps == 0).then(|| Post::new(at.row / steps, at.col / steps))
+    }
+
     /// Doubled area of a triangle in squared lattice steps; positive when counter-clockwise.
     pub fn doubled_area(&self, triangle: [u32; 3]) -> i64 {
         let [a, b, c] = triangle.map(|v| self.vertices[v as usize].at);
@@ -82,7 +101,7 @@ impl Tin {
         self.check_vertices()?;
         let area = self.check_triangles()?;
         let cells = (self.rect.cells_wide() * self.rect.cells_high()) as i64;
-        let expected = 2 * cells * i64::from(LATTICE_PER_POST * LATTICE_PER_POST);
+        let expected = 2 * cells * i64::from(self.steps_per_post * self.steps_per_post);
         if area != expected {
             return Err(TinFault::AreaMissing(area, expected));
         }
@@ -90,7 +109,7 @@ impl Tin {
     }
 
     fn check_vertices(&self) -> Result<(), TinFault> {
-        let (low, high) = (LatticePoint::from(self.rect.south_west()), LatticePoint::from(self.rect.north_east()));
+        let (low, high) = (self.place_of(self.rect.south_west()), self.place_of(self.rect.north_east()));
         let outside = |at: LatticePoint| at.row < low.row || high.row < at.row || at.col < low.col || high.col < at.col;
         match self.vertices.iter().position(|vertex| outside(vertex.at)) {
             Some(vertex) => Err(TinFault::VertexOutside(vertex)),
@@ -136,7 +155,7 @@ impl Tin {
     }
 
     fn on_one_border_line(&self, from: LatticePoint, to: LatticePoint) -> bool {
-        let (low, high) = (LatticePoint::from(self.rect.south_west()), LatticePoint::from(self.rect.north_east()));
+        let (low, high) = (self.place_of(self.rect.south_west()), self.place_of(self.rect.north_east()));
         let same_row = from.row == to.row && (from.row == low.row || from.row == high.row);
         let same_col = from.col == to.col && (from.col == low.col || from.col == high.col);
         same_row || same_col
@@ -146,12 +165,11 @@ impl Tin {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Post;
 
     fn square() -> Tin {
         let rect = PostRect::of_size(3, 3);
         let corners = rect.corners().map(|post| Vertex { at: post.into(), height: 0 });
-        Tin { rect, vertices: corners.to_vec(), triangles: vec![[0, 1, 2], [0, 2, 3]] }
+        Tin::new(rect, corners.to_vec(), vec![[0, 1, 2], [0, 2, 3]])
     }
 
     #[test]

@@ -39,6 +39,9 @@ fn findings(report: &Report) -> Table {
     let mean = format!("{:.2} per load module, {} points", report.per_load_module.mean, grouped(report.points.total));
     table.row(["Triangles", &grouped(report.triangles), &mean]);
     table.row(["Breaches", &grouped(report.breaches.len() as u64), &breach_kinds(report)]);
+    if let Some(features) = &report.features {
+        table.row(["Features", "", &views::remarks_in_words(features)]);
+    }
     let refused = &report.refusals;
     let kinds = format!(
         "{} by load modules, {} by 4 km squares, {} by reservations",

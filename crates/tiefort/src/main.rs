@@ -65,9 +65,10 @@ Exit codes:
 /// Version of the program, of what it writes, and of how it decides.
 static LONG_VERSION: LazyLock<String> = LazyLock::new(|| {
     format!(
-        "{}\ndatabase format {}\nload-module format {}\nalgorithm revision {}",
+        "{}\ndatabase format {}\nload-module format {}, {} with decks\nalgorithm revision {}",
         env!("CARGO_PKG_VERSION"),
         database::FORMAT_VERSION,
+        database::MODULES_FORMAT_VERSION_WITHOUT_DECKS,
         database::MODULES_FORMAT_VERSION,
         compiler::ALGORITHM_REVISION
     )

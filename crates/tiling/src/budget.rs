@@ -6,7 +6,7 @@ use terrain::{ModuleGrid, ModuleId};
 use crate::Tiling;
 
 /// The limits of a whole area, in triangles.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Budget {
     /// The area's load modules.
     pub grid: ModuleGrid,
@@ -22,6 +22,8 @@ pub struct Budget {
     pub per_window: u32,
     /// The windows.
     pub windows: Windows,
+    /// Triangles of each load module that features take, row-major; empty where there are none.
+    pub reserved: Vec<u32>,
 }
 
 /// A limit that the initial points alone exceed.
@@ -57,7 +59,13 @@ pub enum BudgetFault {
 impl Budget {
     /// Triangles of each load module before any point is chosen, row-major.
     pub fn start(&self) -> Vec<u32> {
-        self.grid.all().iter().map(|module| start_triangles(self.grid, module, self.border_step)).collect()
+        self.grid.all().iter().map(|module| self.start_of(module)).collect()
+    }
+
+    /// Triangles of one load module before any point is chosen.
+    pub fn start_of(&self, module: ModuleId) -> u32 {
+        let reserved = self.reserved.get(self.grid.index(module)).copied().unwrap_or(0);
+        start_triangles(self.grid, module, self.border_step) + reserved
     }
 
     /// Triangles of the area before any point is chosen.
@@ -103,7 +111,7 @@ mod tests {
     fn budget(per_module: u32, area: u64, per_window: u32) -> Budget {
         let grid = ModuleGrid { rows: 10, cols: 10, side_cells: 20 };
         let windows = Windows::new(grid, 8);
-        Budget { grid, border_step: 5, per_module, pool: 0, area, per_window, windows }
+        Budget { grid, border_step: 5, per_module, pool: 0, area, per_window, windows, reserved: Vec::new() }
     }
 
     #[test]

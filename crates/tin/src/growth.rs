@@ -9,7 +9,7 @@ use crate::criterion::Criterion;
 use crate::gate::Gate;
 use crate::queue::{Queue, Top};
 use crate::sequence::{Sequence, Witness};
-use crate::task::Stop;
+use crate::task::{Stop, TileTask};
 use crate::weighted_surface::WeightedSurface;
 
 /// Everything a run changes.
@@ -19,6 +19,25 @@ pub(crate) struct Growth<'a, S: Simd> {
     pub mesh: Mesh,
     pub gate: Gate,
     pub sequence: Sequence,
+    /// Where no post may be selected.
+    pub barred: Barred,
+}
+
+/// Posts that are no candidates although they lie among them, in ascending order.
+pub(crate) struct Barred(Vec<LocalPost>);
+
+impl Barred {
+    /// Those of a task.
+    pub fn of(task: &TileTask) -> Self {
+        let mut posts: Vec<LocalPost> = task.barred.iter().map(|&post| LocalPost::of(post, task.rect)).collect();
+        posts.sort_unstable();
+        Self(posts)
+    }
+
+    #[inline(always)]
+    pub fn holds(&self, post: LocalPost) -> bool {
+        !self.0.is_empty() && self.0.binary_search(&post).is_ok()
+    }
 }
 
 impl<S: Simd> Growth<'_, S> {
@@ -76,11 +95,17 @@ impl<S: Simd> Growth<'_, S> {
             queue.push_located(&self.mesh, top.triangle, post);
             return None;
         };
-        let Some(refused) = self.gate.refuses(post) else { return Some(post) };
+        let is_barred = self.barred.holds(post);
+        let refused = self.gate.refuses(post);
+        if !is_barred && refused.is_none() {
+            return Some(post);
+        }
         let corners = self.corners(top.triangle);
-        self.sequence.refuse(self.tile, post, self.ground.residual_at(corners, post), refused);
+        if let Some(refused) = refused.filter(|_| !is_barred) {
+            self.sequence.refuse(self.tile, post, self.ground.residual_at(corners, post), refused);
+        }
         // Counters only grow, so what is refused now stays refused and the triangle settles for less.
-        match self.ground.worst_where(corners, |post| self.gate.refuses(post).is_none()) {
+        match self.ground.worst_where(corners, |post| !self.barred.holds(post) && self.gate.refuses(post).is_none()) {
             Some((value, post)) => {
                 self.mesh.set_key(top.triangle, criterion.key_when_confined(top.key, value));
                 queue.push_located(&self.mesh, top.triangle, post);

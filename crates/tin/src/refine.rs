@@ -6,7 +6,7 @@ use terrain::{Dem, Importance, StopReason, TileTin, Tin, Vertex};
 
 use crate::batch::Passes;
 use crate::criterion::{Largest, Squares};
-use crate::growth::Growth;
+use crate::growth::{Barred, Growth};
 use crate::sequence::{Nobody, Sequence, Witness};
 use crate::start::{Start, candidates};
 use crate::task::{Rule, Stop, TileTask};
@@ -50,7 +50,8 @@ pub(crate) fn grow<S: Simd>(
     };
     let ground = WeightedSurface::new(simd, dem, importance, candidates(task.rect, task.seams), unit);
     let sequence = Sequence { refused: start.refused, ..Sequence::default() };
-    let mut growth = Growth { tile: task.rect, ground, mesh: start.mesh, gate: start.gate, sequence };
+    let barred = Barred::of(task);
+    let mut growth = Growth { tile: task.rect, ground, mesh: start.mesh, gate: start.gate, sequence, barred };
     let stop = match &task.rule {
         Rule::WorstFirst => growth.run(Largest, &task.stop, witness),
         Rule::LargestSquares { guard } => by_squares(&mut growth, *guard, &task.stop, witness),
@@ -110,7 +111,7 @@ fn tin_of(dem: &Dem, order: &[LocalPost], mesh: &mesh::Mesh) -> Tin {
         Vertex { at: post.into(), height: dem.height(post) }
     };
     let triangles = mesh.triangles().iter().map(|record| record.corners.map(|post| index_at[place(post)])).collect();
-    Tin { rect, vertices: order.iter().map(vertex).collect(), triangles }
+    Tin::new(rect, order.iter().map(vertex).collect(), triangles)
 }
 
 #[cfg(test)]

@@ -57,7 +57,8 @@ impl Start {
     }
 
     fn insert_all(&mut self, task: &TileTask) {
-        let all = task.border.iter().chain(&task.inherited).chain(&task.kept);
+        let border = task.border.iter().filter(|post| task.barred.binary_search(post).is_err());
+        let all = border.chain(&task.inherited).chain(&task.kept);
         let mut posts: Vec<LocalPost> = all.map(|&post| LocalPost::of(post, task.rect)).collect();
         posts.sort_unstable();
         posts.dedup();

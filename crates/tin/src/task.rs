@@ -22,6 +22,9 @@ pub struct TileTask {
     pub start: Vec<StartPost>,
     /// The sides on which this tile may choose posts.
     pub seams: SeamSides,
+    /// Posts on its sides where no border point may stand, in ascending order: between the edges of a road that crosses
+    /// the side (see [`terrain::Features::barred_posts`]). The paper's passes do not ask.
+    pub barred: Vec<Post>,
     /// Which post comes next.
     pub rule: Rule,
     /// When to stop.
@@ -40,6 +43,7 @@ impl TileTask {
             kept: Vec::new(),
             start: Vec::new(),
             seams: SeamSides::CLOSED,
+            barred: Vec::new(),
             rule,
             stop: Stop::default(),
         }

@@ -5,6 +5,7 @@ use database::{
     Report, ReportBorder, ReportBreach, ReportHeights, ReportPart, ReportPlace, ReportResidual, ReportStage,
 };
 
+use crate::features_text::features_text;
 use crate::table::{Align, Table, fold, grouped};
 
 use Align::{Left, Right};
@@ -16,6 +17,7 @@ pub fn report_text(report: &Report) -> String {
         limits(report),
         residuals(report),
         levels(report),
+        report.features.as_ref().map(features_text),
         refusals(report),
         bound(report),
         breaches(report),
@@ -295,6 +297,7 @@ mod tests {
     #[test]
     fn no_line_is_wider_than_a_terminal_however_large_the_area() {
         let mut report = samples::with_levels();
+        report.features = Some(samples::features());
         report.triangles = 1_000_000_000;
         report.polygons = report.triangles;
         report.points.total = 500_000_000;

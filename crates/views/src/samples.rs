@@ -1,10 +1,11 @@
 //! A report with something in every part and a small piece of terrain, for the tests of this crate.
 
-use terrain::{GridFrame, LoadModule, ModuleGrid, ModuleId, ModuleResidual, ModuleVertex, Spacing};
+use terrain::{Decks, GridFrame, LoadModule, ModuleGrid, ModuleId, ModuleResidual, ModuleVertex, Spacing};
 
 use crate::picture::{Scene, SceneLimits};
 use database::{
-    Report, ReportBefore, ReportBound, ReportBreach, ReportClass, ReportLevel, ReportPerModule, ReportPerWindow,
+    Report, ReportBefore, ReportBound, ReportBreach, ReportClass, ReportFeatureChecks, ReportFeatureClass,
+    ReportFeatureCost, ReportFeatureRemarks, ReportFeatures, ReportLevel, ReportPerModule, ReportPerWindow,
     ReportPlace, ReportPoints, ReportPool, ReportRefusals, ReportResidual, ReportStage, ReportStops, ReportVoids,
 };
 
@@ -32,6 +33,7 @@ pub(crate) fn modules() -> Vec<LoadModule> {
             classes: vec![0; 4],
             polygon_count: 4,
             residual: ModuleResidual::default(),
+            decks: Decks::default(),
         }
     };
     GRID.all().iter().map(module).collect()
@@ -49,6 +51,7 @@ pub(crate) fn scene<'a>(modules: &'a [LoadModule], limits: &'a SceneLimits) -> S
         ground: None,
         limits,
         water: None,
+        features: None,
         tiles: &[],
     }
 }
@@ -101,6 +104,7 @@ pub(crate) fn report() -> Report {
         }),
         residual_against_source: Some(residual(3.1)),
         classes: vec![class("plains", 2_587_215, 64_939, 0.869), class("mountains", 1_313_410, 28_532, 5.268)],
+        features: None,
         levels: vec![],
         overall_point_weighted_rms_m: 2.999,
         dem_accuracy_m: Some(2.5),
@@ -130,4 +134,34 @@ pub(crate) fn with_levels() -> Report {
         |level, inner_share, triangles, rms_m| ReportLevel { level, inner_share, triangles, rms_m, max_m: 60.5 };
     let levels = vec![level(0, 1.0, 319_998, 2.999), level(1, 0.5, 223_000, 4.25), level(2, 0.2, 165_000, 7.875)];
     Report { levels, ..report() }
+}
+
+/// Features of two classes.
+pub(crate) fn features() -> ReportFeatures {
+    let cost = ReportFeatureCost {
+        triangles: 41_234,
+        module_max: 48,
+        module_share: 0.48,
+        window_max: 1_024,
+        window_share: 0.25,
+    };
+    let class = |name: &str, line_km, strip_km, lakes| ReportFeatureClass {
+        name: name.into(),
+        line_km,
+        strip_km,
+        lakes,
+        cost,
+        ..ReportFeatureClass::default()
+    };
+    ReportFeatures {
+        classes: vec![class("primary", 4.0, 8.25, 0), class("lake", 0.0, 0.0, 3)],
+        all: cost,
+        remarks: ReportFeatureRemarks { mended: 3, degraded: 2, left_out: 1 },
+        checks: ReportFeatureChecks {
+            edges: 1_234,
+            edges_missing: 4,
+            outside_rms_m: 1.25,
+            ..ReportFeatureChecks::default()
+        },
+    }
 }

@@ -12,6 +12,9 @@ pub use compare::{
 };
 mod look;
 pub use look::{Seen, Suggestion, look_at};
+mod vectors;
+pub use source_files::is_feature_file;
+pub use vectors::{SeenFeatures, look_at_features};
 mod sample;
 pub use sample::Sample;
 

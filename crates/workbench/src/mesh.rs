@@ -13,8 +13,8 @@ use ground::{GivenPost, GroundError, Window, chosen, posts_of_file, refused, sta
 use job::{ErrorKey, Optimising, StartMethod};
 use schedule::{Event as Scheduled, RankedTasks, Workers, in_rank_order_observed};
 use terrain::{
-    Dem, GainCurve, Importance, LastBatch, LatticePoint, Metres, ModuleGrid, PostRect, SeamSides, StopReason,
-    THOUSANDTHS, TileId, TileOrder, TileTin, Tin, Vertex,
+    Dem, Features, GainCurve, Importance, LastBatch, Metres, ModuleGrid, PostRect, SeamSides, StopReason, THOUSANDTHS,
+    TileId, TileOrder, TileTin, Tin, Vertex,
 };
 use tiling::{Gains, Tiling, points_equally, points_globally};
 use tin::{CostUnit, Proximity, Rule, Stop, SurveyTask, TileTask};
@@ -278,7 +278,7 @@ impl<'a> TinJob<'a> {
             Some(triangles) if self.tiles.len() == 1 => Most::Triangles(triangles),
             _ => Most::AsTask,
         };
-        Refinement { task, optimising, most }
+        Refinement { task, optimising, most, features: Features::default(), lakes: Vec::new() }
     }
 
     fn task(&self, tile: TileId, seams: SeamSides, inherited: Vec<terrain::Post>, points: Option<usize>) -> TileTask {
@@ -364,7 +364,8 @@ impl<'a> TinJob<'a> {
         });
         let started = start_posts(&given, task.rect, task.seams).iter().filter(|start| !start.pinned).count();
         task.stop.points = task.stop.points.map(|points| points.saturating_sub(started));
-        let window = Window { importance: weights(&dem), dem, given, forbidden: Vec::new() };
+        let (importance, forbidden, featured) = (weights(&dem), Vec::new(), Vec::new());
+        let window = Window { importance, dem, given, forbidden, featured };
         Ok(self.refinement(task).run(&window, seeds))
     }
 
@@ -395,7 +396,7 @@ impl<'a> TinJob<'a> {
             let published = |other: TileId| {
                 Ok(slots[self.tiling.index(other)].get().expect("lower-ranked neighbours are published first"))
             };
-            let seeds = inherited(&self.tiling, tile, published)?;
+            let seeds = inherited(&self.tiling, tile, &Features::default(), published)?;
             let points = shares.as_ref().map(|shares| shares[index]);
             let task = self.task(tile, self.tiling.owned_sides(tile), posts_of(&seeds), points);
             let window = dem.window(task.rect);
@@ -461,11 +462,11 @@ fn join(rect: PostRect, tiles: &[TileTin]) -> Tin {
     if let [only] = tiles {
         return only.tin.clone();
     }
-    let mut joined = Tin { rect, vertices: Vec::new(), triangles: Vec::new() };
+    let mut joined = Tin::new(rect, Vec::new(), Vec::new());
     let mut on_lines = HashMap::new();
     for tile in tiles {
         let part = &tile.tin;
-        let (low, high) = (LatticePoint::from(part.rect.south_west()), LatticePoint::from(part.rect.north_east()));
+        let (low, high) = (part.place_of(part.rect.south_west()), part.place_of(part.rect.north_east()));
         let mut place = |vertex: &Vertex| {
             let at = vertex.at;
             let mut fresh = || {

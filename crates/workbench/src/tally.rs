@@ -2,28 +2,27 @@
 
 use fidelity::Tally;
 use geometry::owned::{PostGrid, visit_residuals};
-use terrain::{Dem, LATTICE_PER_POST, LatticePoint, Post, Tin, Vertex};
+use terrain::{Dem, Post, Tin};
 
 /// Residuals at every post that a TIN covers and that is not void, each counted once.
 pub(crate) fn tally_of(dem: &Dem, tin: &Tin) -> Tally {
     let mut tally = Tally::default();
     for triangle in &tin.triangles {
-        visit_triangle(dem, triangle.map(|v| tin.vertices[v as usize]), &mut tally);
+        visit_triangle(dem, tin, *triangle, &mut tally);
     }
     tally
 }
 
-fn visit_triangle(dem: &Dem, corners: [Vertex; 3], tally: &mut Tally) {
-    let rect = dem.rect();
+fn visit_triangle(dem: &Dem, tin: &Tin, triangle: [u32; 3], tally: &mut Tally) {
+    let (rect, steps) = (dem.rect(), tin.steps_per_post);
+    let corners = triangle.map(|v| tin.vertices[v as usize]);
     // Counted from a post near the triangle, its corners stay small in a raster of any size.
-    let least = |pick: fn(&Vertex) -> i32| {
-        corners.iter().map(pick).min().expect("a triangle has corners").div_euclid(LATTICE_PER_POST)
-    };
-    let origin = Post::new(least(|vertex| vertex.at.row), least(|vertex| vertex.at.col));
-    let from = LatticePoint::from(origin);
+    let least = |at: [i32; 3]| at[0].min(at[1]).min(at[2]).div_euclid(steps);
+    let origin = Post::new(least(corners.map(|vertex| vertex.at.row)), least(corners.map(|vertex| vertex.at.col)));
+    let from = tin.place_of(origin);
     let grid = PostGrid {
         origin,
-        units_per_post: LATTICE_PER_POST,
+        units_per_post: steps,
         far_row: Some(rect.north - origin.row),
         far_col: Some(rect.east - origin.col),
     };

@@ -6,7 +6,7 @@ use std::fs;
 use std::path::Path;
 
 use database::{FileStamp, Fingerprint, Folder, Manifest, Measured, Report, Stamp, TileModules, TileState, files};
-use terrain::{LoadModule, Side, TileTin};
+use terrain::{Decks, LoadModule, ModuleVertex, Side, TileTin};
 
 use crate::scene::{Scene, Words, tile};
 
@@ -42,15 +42,15 @@ impl Forged {
     fn follow(&mut self) {
         for ((_, measured), (_, levels)) in self.measured.iter_mut().zip(&self.modules) {
             for (numbers, module) in measured.modules.iter_mut().zip(levels.iter().flatten()) {
-                (numbers.triangles, numbers.polygons) = (module.triangles.len() as u32, module.polygon_count);
+                (numbers.triangles, numbers.polygons) = (module.counts().triangles, module.counts().polygons);
                 (numbers.posts, numbers.largest) = (module.residual.posts, module.residual.largest);
                 (numbers.sum_abs, numbers.sum_squared) = (module.residual.sum_abs, module.residual.sum_squared);
             }
         }
         let finest = || self.modules.iter().flat_map(|(_, levels)| &levels[0]);
         let totals = &mut self.manifest.totals;
-        totals.triangles = finest().map(|module| module.triangles.len() as u64).sum();
-        totals.polygons = finest().map(|module| u64::from(module.polygon_count)).sum();
+        totals.triangles = finest().map(|module| u64::from(module.counts().triangles)).sum();
+        totals.polygons = finest().map(|module| u64::from(module.counts().polygons)).sum();
         totals.residual_posts = finest().map(|module| u64::from(module.residual.posts)).sum();
         totals.residual_largest = finest().map(|module| u64::from(module.residual.largest)).max().unwrap();
         totals.residual_sum_abs = finest().fold(0, |sum, module| sum.wrapping_add(module.residual.sum_abs));
@@ -141,10 +141,12 @@ fn check(kind: &str, table: &[(&str, Alter, Alter, &str)]) {
 
 #[test]
 fn altered_load_modules_are_told() {
-    let table: [(&str, Alter, Alter, &str); 8] = [
+    let table: [(&str, Alter, Alter, &str); 10] = [
         ("a height inside", |f| raise_inner(f.module()), nothing, "are not those of its tile's TIN"),
         ("a height on a side", raise_side, nothing, "a crack"),
         ("a class", |f| f.module().classes[0] = 7, nothing, "has class 7, the job has 2"),
+        ("a deck's class", |f| hang(f.module(), 1, 7), nothing, "triangle of decks 0 has class 7, the job has 2"),
+        ("decks past the limit", |f| hang(f.module(), 5000, 1), nothing, "against limits.per_load_module"),
         ("posts", |f| f.module().residual.posts += 1, nothing, "do not add up"),
         ("posts beyond any", |f| f.module().residual.posts = 70_000, nothing, "no residuals have the sums"),
         ("squares that wrap", |f| f.module().residual.sum_squared = u64::MAX, nothing, "no residuals have the sums"),
@@ -152,6 +154,12 @@ fn altered_load_modules_are_told() {
         ("polygons", |f| f.module().polygon_count -= 1, nothing, "polygons, and each of its"),
     ];
     check("constrained", &table);
+}
+
+/// Hangs so many triangles of one class over a load module, each above the one before.
+fn hang(module: &mut LoadModule, count: i32, class: u8) {
+    let corners = |z| [(0, 0), (0, 640), (640, 0)].map(|(y, x)| ModuleVertex { y, x, z });
+    module.decks = Decks::of_triangles((0..count).map(|i| (corners(1_000_000 + 640 * i), class)));
 }
 
 fn raise_inner(module: &mut LoadModule) {

@@ -54,7 +54,7 @@ fn welded(scene: &Scene, words: &Words) -> Tin {
             .collect();
         triangles.extend(module.triangles.iter().map(|triangle| triangle.map(|v| own[usize::from(v)])));
     }
-    Tin { rect: words.grid().area(), vertices, triangles }
+    Tin::new(words.grid().area(), vertices, triangles)
 }
 
 #[test]

@@ -30,6 +30,8 @@ pub struct Words {
     pub modules: String,
     pub limits: String,
     pub tin: String,
+    /// The whole section; none where it is empty.
+    pub features: String,
 }
 
 impl Words {
@@ -45,6 +47,7 @@ impl Words {
             modules: empty(),
             limits: empty(),
             tin: empty(),
+            features: empty(),
         }
     }
 
@@ -58,16 +61,17 @@ impl Words {
     }
 
     pub fn text(&self) -> String {
-        let Self { size: (rows, cols), tiles, dem, importance, order, modules, limits, tin } = self;
+        let Self { size: (rows, cols), tiles, dem, importance, order, modules, limits, tin, features } = self;
         let [east, north] = ORIGIN_M;
         format!(
             "[area]\nname = \"small\"\ncrs = \"EPSG:{EPSG}\"\norigin_m = [{east}, {north}]\nsize_m = [{}, {}]\n\
              spacing_m = 25\n[dem]\n{dem}\n[importance]\n{importance}\n[tiles]\nrows = {}\ncolumns = {}\n{order}\n\
-             [load_modules]\n{modules}\n[limits]\n{limits}\n[tin]\n{tin}\n",
+             [load_modules]\n{modules}\n[limits]\n{limits}\n[tin]\n{tin}\n{}",
             cols * 500,
             rows * 500,
             tiles.0,
             tiles.1,
+            if features.is_empty() { String::new() } else { format!("[features]\n{features}\n") },
         )
     }
 }

@@ -14,7 +14,8 @@ use database::{Folder, files};
 use engine::{Clock, Durability, Faults, Faulty, Memory, Store, World};
 use job::Job;
 
-use crate::scene::{Scene, Silent, Words, sample_dem};
+use crate::features::{Drawn, line, polygon};
+use crate::scene::{Scene, Silent, Words, sample_dem, write_dem};
 
 /// Where the database lies.
 const DIR: &str = "/share/area.tdb";
@@ -39,7 +40,11 @@ impl Kit {
     fn new(words: &Words, seed: u64) -> Self {
         // Made once, so that a run need not make it again.
         let dem = sample_dem(words.grid(), seed);
-        let (scene, memory) = (Scene::on(words, &dem), Memory::new());
+        let write = |folder: &Path| {
+            write_dem(&folder.join("dem.tif"), &dem);
+            std::fs::write(folder.join("features.geojson"), crate::features::geojson(&roads(seed))).unwrap();
+        };
+        let (scene, memory) = (Scene::with_files(words, write), Memory::new());
         work(&scene.job, &memory).unwrap();
         let files = memory.all(Path::new(DIR));
         Self { scene, files }
@@ -70,6 +75,16 @@ impl Kit {
             format!("{} has other bytes, first {line:?}", path.display())
         })
     }
+}
+
+/// A road through both tiles, a stream and a lake.
+fn roads(seed: u64) -> Vec<Drawn> {
+    let off = seed as f64 * 37.0;
+    vec![
+        line("highway=primary", &[(-50.0, 300.0 + off), (450.0, 900.0), (1050.0, 1700.0 - off)]),
+        line("waterway=stream", &[(800.0, 2050.0), (700.0 - off, 1000.0), (500.0, -50.0)]),
+        polygon("natural=water", &[(200.0, 1300.0), (400.0, 1300.0 + off), (380.0, 1600.0), (210.0, 1550.0)]),
+    ]
 }
 
 /// A clock on which an hour passes between any two looks, and that is tired of waiting after a thousand.
@@ -116,6 +131,10 @@ impl Kits {
                 modules: clip,
                 limits: "per_load_module = 30\npool = 0\nmean_per_load_module = 28".into(),
                 ..small((4, 2), (2, 1), "method = \"paper\"\npoints = 90")
+            },
+            Words {
+                features: "sources = [\"features.geojson\"]".into(),
+                ..small((4, 2), (2, 1), "method = \"greedy\"")
             },
         ];
         let kits: Vec<[Kit; 2]> = words.iter().map(|words| [1, 2].map(|seed| Kit::new(words, seed))).collect();

@@ -29,6 +29,7 @@ fn refined(dem: &Dem, rule: Rule, points: usize) -> Tin {
         kept: Vec::new(),
         start: Vec::new(),
         seams: SeamSides::OPEN,
+        barred: Vec::new(),
         rule,
         stop: Stop { points: Some(points - 4), ..Stop::default() },
     };

@@ -2,7 +2,8 @@
 //! regular grid of heights for every tile above, up to both roots.
 //!
 //! Tiles cover their squares: around what is exported the ground goes on from its border and falls to the lowest
-//! height, and where no source has a height the surface that closes the hole is kept; `holes.geojson` says where.
+//! height, and where no source has a height the surface that closes the hole is kept; `holes.geojson` says where. A
+//! tile is one surface without classes, so decks are left out.
 
 mod clip;
 mod collar;

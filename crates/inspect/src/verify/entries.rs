@@ -30,11 +30,13 @@ pub(crate) fn problems(manifest: &Manifest, job: &Job, area: &GamingArea) -> Vec
     if listed != area.tiles {
         problems.push("database.json: its list of tiles is not that of its job".into());
     }
-    for name in manifest.files.keys().filter(|name| *name != files::ALLOCATION) {
-        problems.push(format!("database.json: lists a file \"{name}\", which no build writes"));
+    let level = job.features.is_some().then_some(files::LEVEL);
+    let needed: Vec<&str> = std::iter::once(files::ALLOCATION).chain(level).collect();
+    for name in manifest.files.keys().filter(|name| !needed.contains(&name.as_str())) {
+        problems.push(format!("database.json: lists a file \"{name}\", which no build of its job writes"));
     }
-    if !manifest.files.contains_key(files::ALLOCATION) {
-        problems.push(format!("database.json: does not list {}", files::ALLOCATION));
+    for name in needed.into_iter().filter(|name| !manifest.files.contains_key(*name)) {
+        problems.push(format!("database.json: does not list {name}"));
     }
     problems.extend(manifest.tiles.iter().flat_map(|record| of_tile(record, job)));
     problems
@@ -52,7 +54,9 @@ fn of_tile(record: &TileRecord, job: &Job) -> Vec<String> {
         ("file in tiles/", record.tin.is_some(), true),
         ("file in modules/", record.slm.is_some(), true),
         ("file in measured/", record.measured.is_some(), true),
-        ("file in survey/", record.curve.is_some(), is_surveyed(job)),
+        ("curve in survey/", record.curve.is_some(), is_surveyed(job)),
+        ("profile of roads and water in survey/", record.profile.is_some(), job.features.is_some()),
+        ("file of roads and water in survey/", record.lines.is_some(), job.features.is_some()),
     ];
     for (what, found, expected) in needed {
         match (found, expected) {

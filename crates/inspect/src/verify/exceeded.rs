@@ -1,7 +1,7 @@
 //! Limits that are exceeded, and what the report and `breaches.*` say of them: the two have to be the same.
 
 use database::{Folder, Manifest, Report, ReportBreach, ReportPlace, TileState, files};
-use job::{Count, Edges, Job};
+use job::{Edges, Job};
 use serde_json::Value;
 use terrain::{LoadModule, ModuleId};
 
@@ -34,10 +34,7 @@ impl std::fmt::Display for Exceeded {
 
 /// What the limits count, for each load module of the area, row by row.
 pub(crate) fn counts(job: &Job, area: &GamingArea, modules: &Modules) -> Vec<u32> {
-    let count = |module: &LoadModule| match job.limits.count {
-        Count::Triangles => module.triangles.len() as u32,
-        Count::Polygons => module.polygon_count,
-    };
+    let count = |module: &LoadModule| job.limits.count.of(module);
     area.grid.all().iter().map(|module| modules.get(&module).map_or(0, count)).collect()
 }
 

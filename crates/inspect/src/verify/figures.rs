@@ -4,7 +4,7 @@
 use database::{Folder, Manifest, Measured, MeasuredModule, MeasuredTally, Report, ReportResidual};
 use fidelity::Residuals;
 use job::{Choice, Job};
-use terrain::{LoadModule, ModuleId, ModuleResidual, StopReason, metres_of_quanta};
+use terrain::{LoadModule, ModuleCounts, ModuleId, ModuleResidual, StopReason, metres_of_quanta};
 
 use super::exceeded::Exceeded;
 use super::modules::Modules;
@@ -113,7 +113,7 @@ fn differing(
 
 fn numbers(module: &LoadModule) -> MeasuredModule {
     let ModuleResidual { posts, largest, sum_abs, sum_squared } = module.residual;
-    let (triangles, polygons) = (module.triangles.len() as u32, module.polygon_count);
+    let ModuleCounts { triangles, polygons } = module.counts();
     MeasuredModule { triangles, polygons, posts, largest, sum_abs, sum_squared }
 }
 
@@ -131,8 +131,8 @@ pub(crate) fn differing_totals(
     let totals = &manifest.totals;
     let pairs = [
         ("points", tins.points.iter().map(|&points| u128::from(points)).sum(), totals.points),
-        ("triangles", sum(|module| module.triangles.len() as u128), totals.triangles),
-        ("polygons", sum(|module| u128::from(module.polygon_count)), totals.polygons),
+        ("triangles", sum(|module| module.counts().triangles.into()), totals.triangles),
+        ("polygons", sum(|module| module.counts().polygons.into()), totals.polygons),
         ("load modules above the limit", over as u128, totals.modules_over),
         ("limits exceeded", exceeded.len() as u128, totals.breaches),
         ("refused posts", tins.refused.iter().map(|&count| u128::from(count)).sum(), totals.refused),
@@ -225,8 +225,12 @@ fn of_counts(figures: &mut Figures, report: &Report, job: &Job, area: &GamingAre
     let all: u64 = counts.iter().map(|&count| u64::from(count)).sum();
     let over = |count: &&u32| limit < u64::from(**count);
     let above: u64 = counts.iter().map(|&count| u64::from(count).saturating_sub(limit)).sum();
-    figures.count("triangles", modules.values().map(|m| m.triangles.len() as u64).sum::<u64>(), report.triangles);
-    figures.count("polygons", modules.values().map(|m| u64::from(m.polygon_count)).sum::<u64>(), report.polygons);
+    figures.count(
+        "triangles",
+        modules.values().map(|m| u64::from(m.counts().triangles)).sum::<u64>(),
+        report.triangles,
+    );
+    figures.count("polygons", modules.values().map(|m| u64::from(m.counts().polygons)).sum::<u64>(), report.polygons);
     let listed = &report.per_load_module;
     figures.number("per_load_module.mean", all as f64 / counts.len() as f64, listed.mean);
     figures.number("per_load_module.mean_limit", job.limits.mean_per_load_module, listed.mean_limit);
@@ -273,7 +277,7 @@ fn of_levels(figures: &mut Figures, report: &Report, job: &Job, levels: &[Module
     for ((at, listed), (modules, share)) in report.levels.iter().enumerate().zip(levels.iter().zip(shares)) {
         let key = |name: &str| format!("levels[{at}].{name}");
         let total = Total::of(modules.values().map(|module| module.residual));
-        let triangles: u64 = modules.values().map(|module| module.triangles.len() as u64).sum();
+        let triangles: u64 = modules.values().map(|module| u64::from(module.counts().triangles)).sum();
         figures.count(&key("level"), at, listed.level.into());
         figures.number(&key("inner_share"), share, listed.inner_share);
         figures.count(&key("triangles"), triangles, listed.triangles);
@@ -305,7 +309,7 @@ fn of_residuals(figures: &mut Figures, report: &Report, job: &Job, area: &Gaming
         figures.number("heights.surface_m[1]", metres_of_quanta(high), listed.surface_m[1]);
     }
     let (mut squares, mut points) = (0.0, 0.0);
-    for (at, name) in job.importance.classes.iter().enumerate() {
+    for (at, name) in job.class_names().iter().enumerate() {
         let tally = sums.residuals.classes.get(at).cloned().unwrap_or_default();
         let own = sums.points.get(at).copied().unwrap_or(0);
         if 0 < tally.posts {

@@ -1,9 +1,9 @@
 //! What tiles say that they were made from, as far as it follows from the job and from other tiles.
 
-use database::{Fingerprint, Manifest, TileState};
+use database::{DatabaseError, Fingerprint, Folder, Manifest, TileState};
 use job::{Edges, Job};
 use limits::Allowance;
-use terrain::ModuleRect;
+use terrain::{ModuleRect, TileFeatures, TileId};
 
 use super::tins::OfTins;
 use compiler::ALGORITHM_REVISION;
@@ -14,6 +14,7 @@ use ground::GamingArea;
 
 /// Load-module files whose fingerprint is not that of the TINs and the job, and, second, what was not checked.
 pub(crate) fn problems(
+    folder: &Folder,
     manifest: &Manifest,
     job: &Job,
     area: &GamingArea,
@@ -37,21 +38,36 @@ pub(crate) fn problems(
             thinned += 1;
             continue;
         }
-        let key = modules_key(job, area, &|index| tins.stamps[index], &tins.removed, tile);
+        let features = match tile_features(job, folder, tile) {
+            Ok(features) => features,
+            Err(error) => {
+                problems.push(error.to_string());
+                continue;
+            }
+        };
+        let key = modules_key(job, area, &|index| tins.stamps[index], &tins.removed, &features);
         let expected = key.fingerprint();
         if *found != expected {
             problems.push(format!("modules/{tile}.slm: its fingerprint is not that of its TIN and its job"));
         }
     }
-    problems.extend(other_rules(manifest, job, area));
+    problems.extend(other_rules(folder, manifest, job, area));
     if 0 < thinned {
         unchecked.push(format!("fingerprints of {thinned} files in modules/: points were taken out around them"));
     }
     (problems, unchecked)
 }
 
+/// What features put into a tile, as its file says.
+fn tile_features(job: &Job, folder: &Folder, tile: TileId) -> Result<TileFeatures, DatabaseError> {
+    match &job.features {
+        Some(_) => Ok(folder.read_lines(tile)?.1),
+        None => Ok(TileFeatures::none(tile)),
+    }
+}
+
 /// Tiles whose points were selected by other rules than the job's. Frozen ones keep points that a build would choose.
-fn other_rules(manifest: &Manifest, job: &Job, area: &GamingArea) -> Vec<String> {
+fn other_rules(folder: &Folder, manifest: &Manifest, job: &Job, area: &GamingArea) -> Vec<String> {
     let mut problems = Vec::new();
     for record in manifest.tiles.iter().filter(|record| record.state != TileState::Frozen) {
         let tile = record.tile();
@@ -66,7 +82,8 @@ fn other_rules(manifest: &Manifest, job: &Job, area: &GamingArea) -> Vec<String>
             triangles: 0,
         };
         let budget = TileBudget { points: None, allowance: Some(allowance), rms_quanta: None };
-        let expected = rules(&tile_refinement(job, area, tile, &budget, Vec::new()));
+        let Ok(features) = tile_features(job, folder, tile) else { continue };
+        let expected = rules(&tile_refinement(job, area, tile, &budget, Vec::new(), &features));
         if record.made_from.as_ref().is_some_and(|parts| parts.get("rules") != Some(&expected)) {
             problems.push(format!("database.json: tile {tile} was selected by other rules than those of its job"));
         }

@@ -44,7 +44,7 @@ pub(crate) fn open(folder: &Folder, job: &Job, area: &GamingArea) -> Result<Open
         opened.levels.resize_with(count, BTreeMap::new);
         for (level, modules) in (0..header.level_count).zip(&mut opened.levels) {
             for module in file.level(level).unwrap_or(&[]) {
-                opened.problems.extend(unknown_class(module, job.importance.classes.len()));
+                opened.problems.extend(unknown_class(module, job.class_names().len()));
                 let module = load_module(module, header.side);
                 modules.insert(module.id, module);
             }
@@ -80,11 +80,14 @@ fn differing(header: &Header, job: &Job, area: &GamingArea, tile: TileId) -> Vec
     wrong.map(|(field, found, expected)| format!("its header says {field} {found}, the job {expected}")).collect()
 }
 
-/// The first triangle whose class the job does not have.
+/// The first triangle of the ground, or else of decks, whose class the job does not have.
 fn unknown_class(module: &Module, count: usize) -> Option<String> {
     let is_unknown = |&class: &u8| class != HOLE_CLASS && count <= usize::from(class);
-    let triangle = module.classes.iter().position(is_unknown)?;
-    let (row, col, class) = (module.row, module.col, module.classes[triangle]);
-    let text = format!("load module {row},{col}: triangle {triangle} has class {class}, the job has {count}");
+    let of = |what: &str, classes: &[u8]| {
+        let triangle = classes.iter().position(is_unknown)?;
+        Some(format!("{what} {triangle} has class {}, the job has {count}", classes[triangle]))
+    };
+    let what = of("triangle", &module.classes).or_else(|| of("triangle of decks", &module.decks.classes))?;
+    let text = format!("load module {},{}: {what}", module.row, module.col);
     Some(at_level(usize::from(module.level), text))
 }

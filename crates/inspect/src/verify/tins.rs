@@ -10,8 +10,7 @@ use database::{Folder, Manifest, Stamp};
 use job::{Borders, ClipHeights as JobClipHeights, Edges, Job, OuterBorder};
 use load_modules::{ClipHeights, Layout, clip};
 use terrain::{
-    Importance, LATTICE_PER_POST, LatticePoint, LoadModule, ModuleId, ModuleVertex, RefusedBy, StopReason, TileId,
-    TileTin, Vertex,
+    Importance, LatticePoint, LoadModule, ModuleId, ModuleVertex, RefusedBy, StopReason, TileId, TileTin, Vertex,
 };
 
 use compiler::CompileError;
@@ -120,9 +119,10 @@ impl OfTins {
 /// Points that a tile counts as its own, and those of them on lines where every build starts with points.
 fn count_points(job: &Job, area: &GamingArea, tin: &TileTin, removed: &[LatticePoint]) -> (u64, u64) {
     let gone: BTreeSet<LatticePoint> = removed.iter().copied().collect();
-    let line = |line: i32| line * LATTICE_PER_POST;
+    let steps = tin.tin.steps_per_post;
+    let line = |line: i32| line * steps;
     let (rect, whole) = (tin.tin.rect, area.rect);
-    let side = area.grid.side_cells * LATTICE_PER_POST;
+    let side = area.grid.side_cells * steps;
     let (mut points, mut border) = (0, 0);
     for at in tin.tin.vertices.iter().map(|vertex| vertex.at).filter(|at| !gone.contains(at)) {
         let is_north = at.row == line(rect.north) && rect.north != whole.north;
@@ -166,8 +166,9 @@ fn differing_parts(area: &GamingArea, tile: TileId, tin: &TileTin, modules: &Mod
 }
 
 fn parts_of(area: &GamingArea, tin: &TileTin) -> Result<Parts, String> {
-    let side = area.grid.side_cells * LATTICE_PER_POST;
-    let step = i64::from(area.frame.spacing.quanta_per_lattice_step());
+    let steps = tin.tin.steps_per_post;
+    let side = area.grid.side_cells * steps;
+    let step = i64::from(area.frame.spacing.quanta_per_post() / steps);
     let mut parts = Parts::new();
     for (number, triangle) in tin.tin.triangles.iter().enumerate() {
         let corners = triangle.map(|corner| tin.tin.vertices[corner as usize]);

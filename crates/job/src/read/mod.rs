@@ -2,6 +2,7 @@
 
 mod area;
 mod dem;
+mod features;
 mod given;
 mod importance;
 mod limits;
@@ -22,6 +23,7 @@ struct Sections<'a> {
     area: Section<'a>,
     dem: Section<'a>,
     importance: Section<'a>,
+    features: Section<'a>,
     tiles: Section<'a>,
     modules: Section<'a>,
     limits: Section<'a>,
@@ -46,6 +48,7 @@ pub(crate) fn read<'a>(
         area: section("area")?,
         dem: section("dem")?,
         importance: section("importance")?,
+        features: section("features")?,
         tiles: section("tiles")?,
         modules: section("load_modules")?,
         limits: section("limits")?,
@@ -73,13 +76,16 @@ fn job_of(sections: &Sections, path: &Path, find: Option<&FindArea>) -> Result<(
     let mut dem = dem::read(&sections.dem, path, &mut mentions)?;
     let mut importance = importance::read(&sections.importance, &dem.source, path, &mut mentions)?;
     dem.water = importance::water(&sections.dem, &mut importance, path, &mut mentions)?;
+    let features = features::read(&sections.features, &dem.source, &importance, path, &mut mentions)?;
     let tiles = tiles::read(&sections.tiles, &area.grid)?;
     let limits = limits::read(&sections.limits, &area.grid, modules.side_m)?;
     let given = given::read(&sections.tin, path, &mut mentions)?;
     let tin = tin::read(&sections.tin, &sections.modules, modules.edges, given)?;
+    let others = [&sections.dem, &sections.modules, &sections.tin];
+    features::refuse_beside(&sections.features, others, modules.edges, tin.method.name())?;
     modules.outer_border = area::outer_border(&sections.modules, modules.edges, tin.method)?;
     let lod = lod::read(&sections.lod)?;
-    Ok((Job { path: path.to_owned(), area, dem, importance, tiles, modules, limits, tin, lod }, mentions))
+    Ok((Job { path: path.to_owned(), area, dem, importance, features, tiles, modules, limits, tin, lod }, mentions))
 }
 
 /// The files of `dem.sources`, patterns expanded.

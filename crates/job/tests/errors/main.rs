@@ -3,6 +3,7 @@
 // A test that unwraps says where it failed, which is all a test has to say.
 #![allow(clippy::unwrap_used)]
 
+mod features;
 mod numbers;
 mod sources;
 mod together;

@@ -1,6 +1,6 @@
 //! Keys and words that no job has, that are missing, or of the wrong kind.
 
-use crate::check;
+use crate::{check, check_part};
 
 #[test]
 fn text_that_is_not_toml_is_told_with_line_and_column() {
@@ -72,10 +72,11 @@ fn unknown_keys_are_told_with_the_nearest_known_one() {
         "[importence]",
         &[
             "a/b.toml:9: importence: found a section or key that no job has, expected one of [area], [dem],",
-            "[importance], [tiles], [load_modules], [limits], [tin], [lod]",
+            "[importance], [features], [tiles], [load_modules], [limits], [tin], [lod]",
             "hint: did you mean [importance]?",
         ],
     );
+    check_part("[importance]", "[roads]", "hint: [features] names files of roads, rivers and lakes");
     check(
         "pool",
         "proximity_m = [300, 20]",
@@ -100,7 +101,7 @@ fn unknown_keys_are_told_with_the_nearest_known_one() {
         "workers = 2\n[area]",
         &[
             "a/b.toml:1: workers: found a section or key that no job has, expected one of [area], [dem],",
-            "[importance], [tiles], [load_modules], [limits], [tin], [lod]",
+            "[importance], [features], [tiles], [load_modules], [limits], [tin], [lod]",
             "hint: give it on the command line: --workers",
         ],
     );
@@ -109,7 +110,7 @@ fn unknown_keys_are_told_with_the_nearest_known_one() {
         "[sample]\nseed = 2\n[dem]",
         &[
             "a/b.toml:7: sample: found a section or key that no job has, expected one of [area], [dem],",
-            "[importance], [tiles], [load_modules], [limits], [tin], [lod]",
+            "[importance], [features], [tiles], [load_modules], [limits], [tin], [lod]",
             r#"hint: the sample terrain is chosen by source = "sample" and seed in [dem]"#,
         ],
     );

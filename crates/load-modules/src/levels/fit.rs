@@ -1,9 +1,9 @@
-//! Heights of the vertices inside at which squared residuals are least.
+//! Heights of the vertices that are free, inside, at which squared residuals are least.
 //!
 //! The normal equations couple vertices that share a triangle; conjugate gradients solve them, always in the same
 //! order of operations, so the heights are the same on every machine.
 
-use super::level_mesh::{LevelMesh, is_inside};
+use super::level_mesh::LevelMesh;
 use super::posts::Posts;
 
 /// Added to every vertex's own coefficient: a vertex that hardly any post asks for stays where it was.
@@ -21,18 +21,17 @@ struct Element {
     other: [f64; 3],
 }
 
-/// Moves the vertices inside to the heights that fit best, rounded to quanta, and brings squares up to date.
-pub(super) fn fit_heights(sheet: &mut LevelMesh, side: u16, posts: &Posts) {
-    let is_free: Vec<bool> = sheet.vertices.iter().map(|&vertex| is_inside(vertex, side)).collect();
+/// Moves the vertices that are free to the heights that fit best, rounded to quanta, and brings squares up to date.
+pub(super) fn fit_heights(sheet: &mut LevelMesh, is_free: &[bool], posts: &Posts) {
     if !is_free.contains(&true) {
         return;
     }
     let mut pull = vec![0.0; sheet.vertices.len()];
     let elements: Vec<Element> =
         sheet.triangles.iter().map(|&triangle| element(sheet, triangle, posts, &mut pull)).collect();
-    let rises = solve(&elements, &pull, &is_free);
+    let rises = solve(&elements, &pull, is_free);
     let (low, high) = relief(sheet);
-    for ((vertex, rise), _) in sheet.vertices.iter_mut().zip(rises).zip(&is_free).filter(|(_, is_free)| **is_free) {
+    for ((vertex, rise), _) in sheet.vertices.iter_mut().zip(rises).zip(is_free).filter(|(_, is_free)| **is_free) {
         vertex.z = (f64::from(vertex.z) + rise).round().clamp(low, high) as i32;
     }
     for (index, &triangle) in sheet.triangles.iter().enumerate() {

@@ -10,7 +10,7 @@ const PASSES_MAX: usize = 10;
 /// A flip has to gain more than one part in so many of the two triangles' squares: below it lies rounding.
 const LEAST_GAIN: u128 = 10_000;
 
-/// Flips edges until none gains, in passes over the triangles; gives the flips. Sides stay.
+/// Flips edges until none gains, in passes over the triangles; gives the flips. Sides and edges of features stay.
 pub(super) fn flip_all(sheet: &mut LevelMesh, posts: &Posts) -> usize {
     let mut total = 0;
     // Where neither triangle of an edge has changed since it was looked at, it would be found the same again.
@@ -62,7 +62,7 @@ fn flip(sheet: &mut LevelMesh, (t, k): (u32, usize), u: u32, posts: &Posts) -> b
     let d = from_corner(sheet.triangles[u as usize], b)[2];
     let before = sheet.squares[t as usize] + sheet.squares[u as usize];
     let (first, second) = ([a, d, c], [d, b, c]);
-    if before == 0 || !is_sound(sheet, first, posts) || !is_sound(sheet, second, posts) {
+    if before == 0 || sheet.keeps(a, b) || !is_sound(sheet, first, posts) || !is_sound(sheet, second, posts) {
         return false;
     }
     let (of_first, of_second) = (posts.squares(sheet.corners(first)), posts.squares(sheet.corners(second)));

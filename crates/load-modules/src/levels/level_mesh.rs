@@ -14,6 +14,8 @@ pub(super) struct LevelMesh {
     pub squares: Vec<u128>,
     /// The triangles around each vertex, in ascending order.
     pub stars: Vec<Vec<u32>>,
+    /// Edges of features, the lesser end first, in ascending order.
+    kept: Vec<[u16; 2]>,
 }
 
 /// Whether a vertex lies on no side of a load module.
@@ -29,12 +31,35 @@ pub(super) fn place(vertex: ModuleVertex) -> LatticePoint {
 impl LevelMesh {
     /// The canonical Delaunay triangulation of vertices in canonical order.
     pub fn delaunay(vertices: Vec<ModuleVertex>, posts: &Posts) -> Self {
+        Self::keeping(vertices, &[], posts)
+    }
+
+    /// The same with edges that stay.
+    ///
+    /// # Panics
+    /// When two of them cross.
+    pub fn keeping(vertices: Vec<ModuleVertex>, edges: &[[u16; 2]], posts: &Posts) -> Self {
         let places: Vec<_> = vertices.iter().map(|&vertex| place(vertex)).collect();
-        let triangles: Vec<_> = mesh::delaunay(&places).into_iter().map(|t| t.map(|v| v as u16)).collect();
+        let mut kept: Vec<[u16; 2]> = edges.iter().map(|&[a, b]| [a.min(b), a.max(b)]).collect();
+        kept.sort_unstable();
+        let triangles = match edges.is_empty() {
+            true => mesh::delaunay(&places),
+            false => {
+                let wanted: Vec<[u32; 2]> = kept.iter().map(|ends| ends.map(u32::from)).collect();
+                let (triangles, found) = mesh::constrained_delaunay(&places, &wanted);
+                assert!(!found.contains(&false), "edges of features do not cross");
+                triangles
+            }
+        };
         let stars = vec![Vec::new(); vertices.len()];
-        let mut sheet = Self { vertices, squares: Vec::new(), triangles: Vec::new(), stars };
-        triangles.into_iter().for_each(|triangle| sheet.add(triangle, posts));
+        let mut sheet = Self { vertices, squares: Vec::new(), triangles: Vec::new(), stars, kept };
+        triangles.into_iter().for_each(|triangle| sheet.add(triangle.map(|v| v as u16), posts));
         sheet
+    }
+
+    /// Whether the edge between two vertices stays.
+    pub fn keeps(&self, a: u16, b: u16) -> bool {
+        self.kept.binary_search(&[a.min(b), a.max(b)]).is_ok()
     }
 
     pub fn corners(&self, triangle: [u16; 3]) -> [ModuleVertex; 3] {

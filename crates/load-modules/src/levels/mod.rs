@@ -17,7 +17,7 @@ mod tests;
 
 use terrain::{Importance, LoadModule, LodBorder, ModuleResidual, ModuleVertex, Side};
 
-use crate::{Layout, classes, pieces};
+use crate::{Faces, Layout, classes, pieces};
 use level_mesh::{LevelMesh, is_inside};
 pub use posts::LevelGround;
 use posts::Posts;
@@ -31,14 +31,38 @@ pub struct Levels<'a> {
     pub border: LodBorder,
     /// Whether edges leave Delaunay where the other diagonal has smaller squared residuals.
     pub flips: bool,
+    /// What each level keeps of the features, as long as `inner_shares`, or nothing at all; a coarser one keeps no more
+    /// than a finer one.
+    pub features: &'a [LevelFeatures<'a>],
+}
+
+/// What a level keeps of roads, rivers and shores, by places in the list of the finest level's vertices.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct LevelFeatures<'a> {
+    /// Vertices that stay where and as high as they are, those of `edges` and beside them those on a side that belong
+    /// to an edge in the load module next to it.
+    pub vertices: Vec<u16>,
+    /// Edges that stay.
+    pub edges: Vec<[u16; 2]>,
+    /// What gives its triangles classes before the mask does.
+    pub faces: Option<&'a Faces>,
+}
+
+impl LevelFeatures<'_> {
+    fn all_vertices(&self) -> impl Iterator<Item = u16> {
+        self.vertices.iter().copied().chain(self.edges.iter().flatten().copied())
+    }
 }
 
 /// The levels of a load module, one for each share, from fine to coarse. Residuals are left empty.
 ///
 /// # Panics
-/// When shares do not fall, or the windows of `ground` do not hold the load module.
+/// When shares do not fall, edges of features cross, or the windows of `ground` do not hold the load module.
 pub fn coarser_levels(finest: &LoadModule, layout: &Layout, levels: &Levels, ground: &LevelGround) -> Vec<LoadModule> {
     assert!(levels.inner_shares.is_sorted_by(|finer, coarser| coarser < finer), "levels go from fine to coarse");
+    let none = LevelFeatures::default();
+    let features = |level: usize| levels.features.get(level).unwrap_or(&none);
+    let count = levels.inner_shares.len();
     let posts = Posts::new(finest.id, layout, ground);
     let inner: Vec<u16> =
         (0..).zip(&finest.vertices).filter(|(_, vertex)| is_inside(**vertex, finest.side)).map(|(v, _)| v).collect();
@@ -46,17 +70,17 @@ pub fn coarser_levels(finest: &LoadModule, layout: &Layout, levels: &Levels, gro
     let fewest = kept.last().copied().unwrap_or(inner.len());
     let gone = rank::removal_order(&finest.vertices, &inner, inner.len() - fewest, &posts);
     let sides = SideOrder::of(finest);
-    let level = |(&share, kept): (&f64, usize)| {
+    let level = |level: usize| {
         let mut stays = vec![true; finest.vertices.len()];
-        gone[..inner.len() - kept].iter().for_each(|&v| stays[usize::from(v)] = false);
+        gone[..inner.len() - kept[level]].iter().for_each(|&v| stays[usize::from(v)] = false);
         if levels.border == LodBorder::Own {
-            sides.thin(share, &mut stays);
+            sides.thin(levels.inner_shares[level], &mut stays);
         }
-        let vertices = (finest.vertices.iter().zip(&stays)).filter(|(_, stays)| **stays).map(|(&vertex, _)| vertex);
-        let sheet = fitted(vertices.collect(), finest.side, levels.flips, &posts);
-        load_module(finest, sheet, layout, ground.mask)
+        features(level).all_vertices().for_each(|v| stays[usize::from(v)] = true);
+        let sheet = fitted(finest, &stays, features(level), levels.flips, &posts);
+        load_module(finest, sheet, layout, (ground.mask, features(level).faces))
     };
-    levels.inner_shares.iter().zip(kept).map(level).collect()
+    (0..count).map(level).collect()
 }
 
 /// So many of `count`, rounded half up.
@@ -64,23 +88,34 @@ fn share_of(count: usize, share: f64) -> usize {
     (count as f64 * share).round() as usize
 }
 
-/// The vertices triangulated, those inside at fitted heights.
-fn fitted(vertices: Vec<ModuleVertex>, side: u16, flips: bool, posts: &Posts) -> LevelMesh {
+/// The vertices that stay triangulated, those inside at fitted heights unless they belong to features.
+fn fitted(finest: &LoadModule, stays: &[bool], features: &LevelFeatures, flips: bool, posts: &Posts) -> LevelMesh {
     /// Flips ask for other heights, and these for other flips; a third round hardly changes anything.
     const ROUNDS: usize = 2;
-    let mut sheet = LevelMesh::delaunay(vertices, posts);
-    fit::fit_heights(&mut sheet, side, posts);
+    let staying: Vec<usize> = (0..stays.len()).filter(|&v| stays[v]).collect();
+    let vertices: Vec<ModuleVertex> = staying.iter().map(|&v| finest.vertices[v]).collect();
+    let number = |v: u16| staying.partition_point(|&other| other < usize::from(v)) as u16;
+    let edges: Vec<[u16; 2]> = features.edges.iter().map(|ends| ends.map(number)).collect();
+    let mut is_free: Vec<bool> = vertices.iter().map(|&vertex| is_inside(vertex, finest.side)).collect();
+    features.all_vertices().for_each(|v| is_free[usize::from(number(v))] = false);
+    let mut sheet = LevelMesh::keeping(vertices, &edges, posts);
+    fit::fit_heights(&mut sheet, &is_free, posts);
     for _ in 0..ROUNDS {
         if !flips || flip::flip_all(&mut sheet, posts) == 0 {
             break;
         }
-        fit::fit_heights(&mut sheet, side, posts);
+        fit::fit_heights(&mut sheet, &is_free, posts);
     }
     sheet
 }
 
 /// The load module that a sheet is.
-fn load_module(finest: &LoadModule, sheet: LevelMesh, layout: &Layout, mask: &Importance) -> LoadModule {
+fn load_module(
+    finest: &LoadModule,
+    sheet: LevelMesh,
+    layout: &Layout,
+    (mask, faces): (&Importance, Option<&Faces>),
+) -> LoadModule {
     let (vertices, triangles) = sheet.into_lists();
     let mut module = LoadModule {
         id: finest.id,
@@ -90,8 +125,9 @@ fn load_module(finest: &LoadModule, sheet: LevelMesh, layout: &Layout, mask: &Im
         vertices,
         classes: Vec::new(),
         residual: ModuleResidual::default(),
+        decks: finest.decks.clone(),
     };
-    module.classes = classes::of_triangles(&module, layout, mask);
+    module.classes = classes::of_triangles(&module, layout, mask, faces);
     let sides = 3 * module.triangles.len();
     pieces::assert_sound(&module, sides);
     module

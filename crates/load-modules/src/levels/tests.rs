@@ -7,7 +7,7 @@ use terrain::{Dem, ModuleGrid, ModuleRect, Post, PostRect, Spacing};
 
 use super::*;
 use crate::sheets::{assert_sides_are_shared, constrained, points, side_list};
-use crate::{ClipHeights, clip, concatenate};
+use crate::{ClipHeights, Face, Faces, clip, concatenate};
 
 const SHARES: [f64; 2] = [0.5, 0.2];
 
@@ -39,7 +39,7 @@ fn at_ground(mut tin: terrain::Tin, dem: &Dem) -> terrain::Tin {
 
 /// Load modules with constrained edges on hills.
 fn constrained_modules(layout: &Layout, dem: &Dem, mask: &Importance, seed: u64) -> Vec<LoadModule> {
-    concatenate(&at_ground(constrained(layout, seed), dem), layout, mask)
+    concatenate(&at_ground(constrained(layout, seed), dem), layout, mask, None)
 }
 
 /// Load modules with clipped edges on hills.
@@ -77,7 +77,7 @@ fn check(border: LodBorder, flips: bool, clipped: bool, seed: u64) -> Vec<Vec<Lo
     let (dem, mask) = (hills(layout.grid.area()), Importance::uniform(layout.grid.area(), 1000));
     let make = if clipped { clipped_modules } else { constrained_modules };
     let finest = make(&layout, &dem, &mask, seed);
-    let wanted = Levels { inner_shares: &SHARES, border, flips };
+    let wanted = Levels { inner_shares: &SHARES, border, flips, features: &[] };
     let levels = all_levels(&finest, &layout, &wanted, &dem, &mask);
     for (at, fine) in finest.iter().enumerate() {
         let inner = inner_places(fine);
@@ -205,7 +205,7 @@ fn ground_without_weight_and_a_load_module_without_inner_vertices_have_levels_to
     let (dem, mask) = (hills(area), Importance::new(area, vec![0; area.post_count()], vec![0; area.post_count()]));
     let finest = constrained_modules(&layout, &dem, &mask, 9);
     let weighted = constrained_modules(&layout, &dem, &Importance::uniform(area, 1000), 9);
-    let wanted = Levels { inner_shares: &SHARES, border: LodBorder::Full, flips: true };
+    let wanted = Levels { inner_shares: &SHARES, border: LodBorder::Full, flips: true, features: &[] };
     let uniform = Importance::uniform(area, 1000);
     // Where nothing has a weight, all posts count the same.
     assert_eq!(
@@ -215,6 +215,81 @@ fn ground_without_weight_and_a_load_module_without_inner_vertices_have_levels_to
     let bare = finest[0].vertices.iter().copied().filter(|v| !is_inside(*v, finest[0].side)).collect();
     let ground = LevelGround { dem: &dem, mask: &mask };
     let near = Posts::new(finest[0].id, &layout, &ground);
-    let bare = load_module(&finest[0], LevelMesh::delaunay(bare, &near), &layout, &mask);
+    let bare = load_module(&finest[0], LevelMesh::delaunay(bare, &near), &layout, (&mask, None));
     assert_eq!(coarser_levels(&bare, &layout, &Levels { flips: false, ..wanted }, &ground), [bare.clone(), bare]);
+}
+
+#[test]
+fn a_level_keeps_the_edges_and_heights_of_the_features_it_is_told_to_keep() {
+    let layout = layout();
+    let area = layout.grid.area();
+    let (dem, mask) = (hills(area), Importance::uniform(area, 1000));
+    for (seed, border) in [(11, LodBorder::Full), (12, LodBorder::Own)] {
+        let finest = constrained_modules(&layout, &dem, &mask, seed).swap_remove(4);
+        // An edge of every second triangle: some of them flips would turn, and most have an end that would go.
+        let edges: Vec<[u16; 2]> = finest.triangles.iter().step_by(2).map(|&[a, b, _]| [b, a]).collect();
+        let side = finest.side_vertices(Side::North)[1];
+        let all = LevelFeatures { vertices: vec![side], edges, faces: None };
+        let few = LevelFeatures { edges: all.edges[..2].to_vec(), ..LevelFeatures::default() };
+        let features = [all, few];
+        let wanted = Levels { inner_shares: &[0.3, 0.0], border, flips: true, features: &features };
+        let ground = LevelGround { dem: &dem, mask: &mask };
+        let levels = coarser_levels(&finest, &layout, &wanted, &ground);
+        let bare = coarser_levels(&finest, &layout, &Levels { features: &[], ..wanted }, &ground);
+        let mut lost = 0;
+        for ((level, bare), features) in levels.iter().zip(&bare).zip(&features) {
+            assert_eq!(level.check(), Ok(()));
+            let of = |module: &LoadModule| -> BTreeSet<[ModuleVertex; 2]> {
+                let sides = module.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
+                let both = sides.flat_map(|[a, b]| [[a, b], [b, a]]);
+                both.map(|ends| ends.map(|v| module.vertices[usize::from(v)])).collect()
+            };
+            let (found, otherwise) = (of(level), of(bare));
+            let places: BTreeSet<ModuleVertex> = level.vertices.iter().copied().collect();
+            assert!(features.all_vertices().all(|v| places.contains(&finest.vertices[usize::from(v)])));
+            for edge in &features.edges {
+                let ends = edge.map(|v| finest.vertices[usize::from(v)]);
+                assert!(found.contains(&ends), "{ends:?}");
+                lost += usize::from(!otherwise.contains(&ends));
+            }
+        }
+        assert!(0 < lost, "without being told, levels lose such edges");
+    }
+}
+
+#[test]
+fn a_level_gives_its_triangles_the_classes_of_the_faces_it_is_told_to_show() {
+    let layout = layout();
+    let (area, side) = (layout.grid.area(), layout.side_lattice());
+    let (dem, mask) = (hills(area), Importance::uniform(area, 1000));
+    let finest = constrained_modules(&layout, &dem, &mask, 13).swap_remove(4);
+    let step = i32::from(finest.side) / side;
+    // Triangles that share no corner: a pond each.
+    let mut used = BTreeSet::new();
+    let ponds: Vec<[u16; 3]> = finest
+        .triangles
+        .iter()
+        .filter(|t| t.iter().all(|v| !used.contains(v)) && t.iter().all(|&v| used.insert(v)))
+        .copied()
+        .collect();
+    let (row, col) = (finest.id.row as i32 * side, finest.id.col as i32 * side);
+    let place = |v: u16| {
+        let vertex = finest.vertices[usize::from(v)];
+        terrain::LatticePoint::new(row + i32::from(vertex.y) / step, col + i32::from(vertex.x) / step)
+    };
+    let given: Vec<Face> = ponds.iter().map(|t| Face { class: 4, rings: vec![t.map(place).to_vec()] }).collect();
+    let faces = Faces::new(&given, terrain::LATTICE_PER_POST);
+    let edges = ponds.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]).collect();
+    let wet = LevelFeatures { vertices: Vec::new(), edges, faces: Some(&faces) };
+    let dry = LevelFeatures::default();
+    let features = [wet, dry];
+    let wanted = Levels { inner_shares: &[0.3, 0.0], border: LodBorder::Own, flips: true, features: &features };
+    let levels = coarser_levels(&finest, &layout, &wanted, &LevelGround { dem: &dem, mask: &mask });
+    let count = |level: &LoadModule| level.classes.iter().filter(|class| **class == 4).count();
+    assert!(
+        3 < ponds.len() && levels.iter().map(count).eq([ponds.len(), 0]),
+        "{:?} of {}",
+        levels.iter().map(count).collect::<Vec<_>>(),
+        ponds.len()
+    );
 }

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use super::osm::ATTRIBUTION;
 use super::osm::frames::MARK;
 use crate::dem_file::known_but_not_read;
 use crate::store::Store;
@@ -16,9 +17,22 @@ pub(super) enum Format {
     GeoJson,
 }
 
-/// Whether the file at `path` begins as one of the formats of features does; `false` where it cannot be read.
+/// Whether the file at `path` begins as one of the formats of features does; `false` where it cannot be read. Not all
+/// JSON is GeoJSON: that names what it holds early on.
 pub fn is_feature_file(path: &Path) -> bool {
-    open(path).is_ok()
+    const LOOKED_AT: u64 = 1 << 16;
+    const NAMES: [&[u8]; 3] = [b"\"FeatureCollection\"", b"\"Feature\"", b"\"coordinates\""];
+    match open(path) {
+        Ok((store, Format::GeoJson)) => store
+            .start(LOOKED_AT)
+            .is_ok_and(|start| NAMES.iter().any(|name| start.windows(name.len()).any(|window| window == *name))),
+        other => other.is_ok(),
+    }
+}
+
+/// Whom to name beside anything drawn from the file at `path`, where its format says so.
+pub fn feature_attribution(path: &Path) -> Option<&'static str> {
+    open(path).is_ok_and(|(_, format)| format == Format::OpenStreetMap).then_some(ATTRIBUTION)
 }
 
 /// The layers of features in the GeoPackage at `path`; none where it is a file of another format.

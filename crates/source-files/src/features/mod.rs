@@ -20,7 +20,7 @@ mod shapes;
 pub(crate) mod well_known;
 
 pub use clip::Extent;
-pub use formats::{feature_layers, is_feature_file};
+pub use formats::{feature_attribution, feature_layers, is_feature_file};
 pub use model::{BUILT_IN_KEYS, FeatureFile, Remark, Tags, VectorFeature, VectorShape, Vertices, Wanted};
 
 use std::path::Path;

@@ -344,7 +344,7 @@ fn what_is_no_file_of_features_is_refused_by_name() {
     let folder = Folder::new();
     let refused = |name: &str, bytes: &[u8]| {
         let path = folder.write(name, bytes);
-        assert!(name == "a.json" || !is_feature_file(&path), "{name}");
+        assert!(!is_feature_file(&path), "{name}");
         let error = read_features(&path, &WANTED).unwrap_err();
         (error.to_string(), error.hint().unwrap())
     };
@@ -373,4 +373,18 @@ fn a_file_of_features_is_no_raster() {
         assert!(error.to_string().contains("not a raster"), "{error}");
         assert!(error.hint().unwrap().contains("name a raster"), "{error}");
     }
+}
+
+#[test]
+fn json_that_names_no_features_is_no_file_of_them() {
+    let folder = Folder::new();
+    let check = |text: &str, expected: bool| {
+        let path = folder.path("a.json");
+        std::fs::write(&path, text).unwrap();
+        assert_eq!(is_feature_file(&path), expected, "{text}");
+    };
+    check(r#"{"format": 2, "sources": []}"#, false);
+    check(r#"{"features": [], "type": "FeatureCollection"}"#, true);
+    check(r#" {"type": "LineString", "coordinates": []}"#, true);
+    check(r#"{"type": "Feature", "geometry": null}"#, true);
 }

@@ -3,7 +3,8 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use inspect::{Explanation, explain};
+use database::FeatureRemark;
+use inspect::{ExplainedFeatures, Explanation, explain};
 use product::WantedGround;
 use serde_json::{Value, json};
 use terrain::{ModuleId, RefusedBy, StopReason, TileId};
@@ -61,6 +62,10 @@ fn text(found: &Explanation) -> String {
     let mut text = format!("Load module {}: east {west} to {east}, north {south} to {north}\n\n", found.module);
     text += &counts(found).text(2);
     text += "\n";
+    if let Some(features) = &found.features {
+        text += &features_text(features);
+        text += "\n";
+    }
     text += &refused_text(found);
     text += "\n";
     text += &one_more_text(found);
@@ -111,6 +116,35 @@ fn counts(found: &Explanation) -> Table {
         table.row(["class", &grouped(u64::from(*count)), &format!("triangles on {class}")]);
     }
     table
+}
+
+/// Remarks that a text lists; the JSON has them all.
+const REMARKS_MAX: usize = 10;
+
+fn features_text(features: &ExplainedFeatures) -> String {
+    let percent = |share: f64| format!("{:.0} %", 100.0 * share);
+    let mut text = match features.cost.iter().map(|(_, triangles)| triangles).sum::<u32>() {
+        0 => "No roads or water.\n".to_owned(),
+        all => format!(
+            "Roads and water take {all} triangles, {} of the limit; they may take {}:\n",
+            percent(features.share),
+            percent(features.share_max)
+        ),
+    };
+    let mut table = Table::new(&[Align::Left, Align::Right, Align::Left]);
+    for (class, triangles) in &features.cost {
+        table.row([class, &grouped(u64::from(*triangles)), "triangles"]);
+    }
+    for remark in features.remarks.iter().take(REMARKS_MAX) {
+        let FeatureRemark { feature, found, done, .. } = remark;
+        table.row(["remark", "", &format!("{feature}: {found}; {done}")]);
+    }
+    text += &table.text(2);
+    let more = features.remarks.len().saturating_sub(REMARKS_MAX);
+    if 0 < more {
+        text += &format!("  and {} more in features.geojson\n", grouped(more as u64));
+    }
+    text
 }
 
 fn stop_text(stop: StopReason) -> &'static str {
@@ -177,6 +211,25 @@ fn one_more_text(found: &Explanation) -> String {
     }
 }
 
+fn features_json(features: &ExplainedFeatures) -> Value {
+    let remark = |remark: &FeatureRemark| {
+        json!({
+            "feature": remark.feature,
+            "place_m": remark.at_m,
+            "outcome": views::outcome(remark),
+            "found": remark.found,
+            "done": remark.done,
+        })
+    };
+    let cost = features.cost.iter().map(|(name, triangles)| json!({ "name": name, "triangles": triangles }));
+    json!({
+        "classes": cost.collect::<Vec<_>>(),
+        "share": features.share,
+        "share_max": features.share_max,
+        "remarks": features.remarks.iter().map(remark).collect::<Vec<_>>(),
+    })
+}
+
 fn to_json(found: &Explanation) -> Value {
     let (tile, state, stop) = found.tile;
     let [rms_m, mean_abs_m, max_m] = found.residual_m;
@@ -230,5 +283,6 @@ fn to_json(found: &Explanation) -> Value {
             "max_m": max_m,
         })).collect::<Vec<_>>(),
         "no_ground": found.no_ground,
+        "features": found.features.as_ref().map(features_json),
     })
 }

@@ -5,9 +5,9 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use compiler::CompileError;
 use database::Folder;
-use exports::{Block, Datum, ExportError, Facts, Levels, Mesh, Product, Work};
+use exports::{Block, Datum, ExportError, Facts, FeatureLayers, Levels, Mesh, Product, Work};
 use job::Job;
-use product::BuiltFrom;
+use product::{BuiltFrom, Opened, read_told};
 use terrain::{ModuleId, PostRect};
 use views::grouped;
 
@@ -32,8 +32,11 @@ files of modules hold all levels; 3dtiles puts levels coarser than K between a
 square of 4 km and its load modules. A mesh (ply, obj, glb) is counted in metres
 from the south-west corner of what is exported; the file itself and NAME.json
 beside it say where that is. Load modules are named ROW,COL from the south-west,
-nodes of a glb r0003c0017. The faces of a ply come class by class; comments in
-it say which are whose. A geotiff is cloud optimised, with overviews; it names
+nodes of a glb r0003c0017. Classes are materials (glb, 3dtiles, openflight; obj
+with NAME.mtl) or attributes (gpkg); the faces of a ply come
+class by class, and comments in it say which are whose. Decks of bridges are
+meshes of their own, named decks; geotiff and quantized-mesh hold the ground
+alone. A geotiff is cloud optimised, with overviews; it names
 the system of its heights where that is known. Where no source has a height,
 rasters have none (NaN) and meshes no triangles; gpkg and modules keep these as
 class 'hole' (255), and quantized-mesh closes them and says where in
@@ -93,8 +96,10 @@ enum Format {
     Glb,
     /// A Cloud Optimized GeoTIFF of the compiled surface, or of its residual
     Geotiff,
-    /// A GeoPackage for QGIS: load modules, breaches, tiles, triangles, with styles
+    /// A GeoPackage for QGIS: load modules, breaches, tiles, triangles, decks, with styles
     Gpkg,
+    /// A GeoPackage of roads, rivers and lakes as they are in the ground, and what was mended, degraded or left out
+    Features,
     /// A folder of OpenFlight 16.1 files, one for each 4 km square, and a MetaFlight index
     Openflight,
     /// A folder of 3D Tiles 1.1, for globes
@@ -135,7 +140,7 @@ impl Format {
             Format::Obj => Some("obj"),
             Format::Glb => Some("glb"),
             Format::Geotiff => Some("tif"),
-            Format::Gpkg => Some("gpkg"),
+            Format::Gpkg | Format::Features => Some("gpkg"),
             Format::Modules | Format::Openflight | Format::Tiles3d | Format::QuantizedMesh => None,
         }
     }
@@ -145,9 +150,25 @@ impl Format {
         match self {
             Format::Modules => "of class 255, as in the database",
             Format::Gpkg => "in the layer triangles, of class hole",
+            Format::Features => "in none of its layers",
             Format::Geotiff => "NaN in the raster",
             Format::QuantizedMesh => "kept, since tiles must be closed; holes.geojson says where they are",
             Format::Ply | Format::Obj | Format::Glb | Format::Openflight | Format::Tiles3d => "left out",
+        }
+    }
+
+    /// Whether it has room for the ground alone, and decks are left out.
+    fn is_without_decks(self) -> bool {
+        matches!(self, Format::Geotiff | Format::QuantizedMesh)
+    }
+
+    /// What becomes of decks of bridges.
+    fn of_decks(self) -> &'static str {
+        match self {
+            Format::Modules => "in the files of their load modules",
+            Format::Gpkg | Format::Features => "in the layer decks",
+            Format::Geotiff | Format::QuantizedMesh => "left out: there is room for the ground alone",
+            Format::Ply | Format::Obj | Format::Glb | Format::Openflight | Format::Tiles3d => "meshes of their own",
         }
     }
 
@@ -196,11 +217,10 @@ fn check(arguments: &Arguments) -> Result<(), Failure> {
     let Some(expected) = arguments.format.extension() else { return Ok(()) };
     let found = files::extension(&arguments.out);
     if found != expected {
+        let name = arguments.format.to_possible_value();
+        let format = name.as_ref().map_or("", |name| name.get_name());
         let message = format!("{}: found the extension {found:?}, expected {expected:?}", arguments.out.display());
-        return Err(Failure::new(
-            message,
-            format!("--format {expected} writes one file whose name ends in .{expected}"),
-        ));
+        return Err(Failure::new(message, format!("--format {format} writes one file whose name ends in .{expected}")));
     }
     files::check_writable(&arguments.out)
 }
@@ -225,6 +245,7 @@ fn export(arguments: &Arguments, work: &Work) -> Result<String, Failure> {
         Format::Ply | Format::Obj | Format::Glb => write_mesh(arguments, &product)?,
         Format::Geotiff => write_raster(arguments, &product, work)?,
         Format::Gpkg => write_package(arguments, &product, work)?,
+        Format::Features => write_features(arguments)?,
         _ => {}
     }
     let mut said = None;
@@ -241,12 +262,13 @@ fn export(arguments: &Arguments, work: &Work) -> Result<String, Failure> {
         folder.finish()?;
     }
     let triangles: usize = product.modules.iter().map(|module| module.triangles.len()).sum();
+    let triangles = triangles + if arguments.format.is_without_decks() { 0 } else { product.deck_triangles() };
     let modules = match product.modules.len() {
         1 => "1 load module".to_owned(),
         count => format!("{} load modules", grouped(count as u64)),
     };
     let said = said.map(|datum| format!("{}\n", datum.said())).unwrap_or_default();
-    let coarser: usize = product.coarser.iter().flatten().map(|module| module.triangles.len()).sum();
+    let coarser: usize = product.coarser.iter().flatten().map(|module| module.counts().triangles as usize).sum();
     let level = match (product.level, product.coarser.len()) {
         (0, 0) => String::new(),
         (level, 0) => format!(" at level {level}"),
@@ -259,7 +281,11 @@ fn export(arguments: &Arguments, work: &Work) -> Result<String, Failure> {
         1 => format!("1 triangle over a hole is {}\n", arguments.format.of_holes()),
         count => format!("{} triangles over holes are {}\n", grouped(count as u64), arguments.format.of_holes()),
     };
-    Ok(format!("{said}{holes}{modules}, {} triangles{level}", grouped(triangles as u64)))
+    let decks = match product.deck_triangles() {
+        0 => String::new(),
+        count => format!("{} triangles of decks are {}\n", grouped(count as u64), arguments.format.of_decks()),
+    };
+    Ok(format!("{said}{holes}{decks}{modules}, {} triangles{level}", grouped(triangles as u64)))
 }
 
 fn write_raster(arguments: &Arguments, product: &Product, work: &Work) -> Result<(), Failure> {
@@ -279,6 +305,25 @@ fn write_package(arguments: &Arguments, product: &Product, work: &Work) -> Resul
     files::make_whole(&arguments.out, |path| Ok(exports::write_gpkg(path, product, &report, window, work)?))
 }
 
+fn write_features(arguments: &Arguments) -> Result<(), Failure> {
+    let opened = Opened::open(&arguments.database)?;
+    let Some((level, told)) = read_told(&opened)? else {
+        let message = "found --format features with a database without roads and water, expected one with some";
+        return Err(Failure::new(message, "[features] in a job names their files"));
+    };
+    let area = &opened.manifest.area;
+    let ([west, south], [wide, high]) = (area.origin_m, area.size_m);
+    let remarks: Vec<_> = told.remarks.iter().map(|remark| (views::outcome(remark), remark)).collect();
+    let layers = FeatureLayers {
+        crs: &area.crs,
+        extent_m: [west, south, west + wide, south + high],
+        classes: &opened.job.class_names(),
+        level: &level,
+        remarks: &remarks,
+    };
+    files::make_whole(&arguments.out, |path| Ok(exports::write_features_gpkg(path, &layers)?))
+}
+
 fn write_mesh(arguments: &Arguments, product: &Product) -> Result<(), Failure> {
     let mesh = Mesh::of(product);
     let coordinates = arguments.coordinates.into();
@@ -286,11 +331,17 @@ fn write_mesh(arguments: &Arguments, product: &Product) -> Result<(), Failure> {
         Format::Glb => Facts::y_up(product),
         _ => Facts::z_up(product, coordinates),
     };
+    let materials = exports::obj_materials(product, &mesh).filter(|_| arguments.format == Format::Obj);
+    let beside_it = arguments.out.with_extension("mtl");
+    let library = materials.as_ref().and(beside_it.file_name()).map(|name| name.to_string_lossy().into_owned());
     files::write_whole(&arguments.out, |out| match arguments.format {
-        Format::Obj => exports::write_obj(out, product, &mesh, coordinates),
+        Format::Obj => exports::write_obj(out, product, &mesh, coordinates, library.as_deref()),
         Format::Glb => exports::write_glb(out, product, &mesh),
         _ => exports::write_ply(out, product, &mesh, coordinates),
     })?;
+    if let Some(text) = materials {
+        files::write_whole(&beside_it, |out| std::io::Write::write_all(out, text.as_bytes()))?;
+    }
     let mut beside = arguments.out.clone().into_os_string();
     beside.push(".json");
     let text = exports::sidecar(product, &mesh, &facts);

@@ -96,6 +96,7 @@ fn maps(found: &Inadequate) -> [Image; 2] {
         ground: None,
         limits: &limits,
         water: None,
+        features: None,
         tiles: &[],
     };
     [draw_errors(&scene, &found.residual_m, found.tolerance_m, MAP_PIXELS), draw_module_limits(&scene, MAP_PIXELS)]

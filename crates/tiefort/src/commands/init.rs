@@ -1,12 +1,13 @@
-//! `tiefort init`: a job for the rasters somebody has, with what each of its numbers is.
+//! `tiefort init`: a job for rasters, and for the roads, rivers and lakes on them, with what each of its numbers is.
 
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 use job::Job;
-use views::fold;
-use workbench::{Seen, Suggestion};
+use workbench::{Seen, SeenFeatures, Suggestion};
 
+use crate::commands::init_features::{features_section, told_of};
+use crate::commands::job_words::{comment, quoted, relative};
 use crate::failure::{Failure, Outcome};
 use crate::terminal;
 
@@ -15,15 +16,17 @@ Examples:
   tiefort init n35w117.dt2 n35w118.dt2 --out fort.toml
   tiefort init dem/*.hgt > area.toml && tiefort build area.toml
   tiefort init grid.asc --crs EPSG:32611
+  tiefort init dem.tif roads.osm.pbf lakes.gpkg --out mine.toml
 
-The job covers the largest rectangle of whole load modules inside the files.";
+The job covers the largest rectangle of whole load modules inside the rasters.
+Roads, rivers and lakes become parts of the ground there.";
 
 /// Arguments of `init`.
 #[derive(Args)]
 #[command(after_help = AFTER_HELP)]
 pub struct Arguments {
     /// Rasters, or folders of them: GeoTIFF, DTED, HGT, Esri ASCII, raw with a .hdr; also in .gz and .zip; in order of
-    /// priority
+    /// priority. Roads, rivers and lakes: .osm.pbf, GeoPackage, Shapefile, GeoJSON
     #[arg(value_name = "FILES", required = true)]
     files: Vec<PathBuf>,
     /// Where to write the job; it must not exist yet [default: standard output]
@@ -38,13 +41,21 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     // Rasters may take long to look at.
     arguments.out.as_deref().map_or(Ok(()), crate::files::check_free)?;
-    let files = rasters(&arguments.files)?;
-    let suggestion = workbench::look_at(&files, arguments.crs.as_deref()).map_err(Failure::from);
-    let suggestion = suggestion.map_err(|failure| match arguments.crs {
+    let (vectors, files): (Vec<PathBuf>, Vec<PathBuf>) =
+        named_files(&arguments.files)?.into_iter().partition(|path| workbench::is_feature_file(path));
+    if let ([first, ..], []) = (vectors.as_slice(), files.as_slice()) {
+        let path = first.display();
+        let message = format!("{path}: found a file of roads, rivers or lakes, expected a raster beside it");
+        return Err(Failure::new(message, "name a raster of heights too, as dem.tif: area and ground come from it"));
+    }
+    let crs = arguments.crs.as_deref();
+    let suggestion = workbench::look_at(&files, crs).map_err(Failure::from);
+    let suggestion = suggestion.map_err(|failure| match crs {
         // The hint of a build would tell to write into the job that is about to be made.
         None => failure.hinted_where("no coordinate reference system", "say what it is: --crs EPSG:32611 (your own)"),
         Some(_) => failure,
     })?;
+    let features = workbench::look_at_features(&vectors, &suggestion)?;
     let datums = known_datums(&suggestion.seen);
     if 1 < datums.len() {
         terminal::tell(&format!(
@@ -52,24 +63,24 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
             datums.join(" and ")
         ));
     }
-    let crs = arguments.crs.as_deref();
-    terminal::tell(&found_text(&suggestion, &job_text(&suggestion, Path::new(""), "area", crs)));
+    let text = |folder: &Path, name: &str| job_text(&suggestion, &features, folder, name, crs);
+    terminal::tell(&found_text(&suggestion, &text(Path::new(""), "area")));
+    features.iter().for_each(|seen| terminal::tell(&told_of(seen)));
     remarks(&suggestion).iter().for_each(|remark| terminal::tell(&format!("note: {remark}")));
     let Some(out) = &arguments.out else {
-        terminal::print(&job_text(&suggestion, Path::new(""), "area", arguments.crs.as_deref()))?;
+        terminal::print(&text(Path::new(""), "area"))?;
         return Ok(Outcome::Sound);
     };
     let name = out.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
-    let folder = out.parent().unwrap_or(Path::new(""));
-    let text = job_text(&suggestion, folder, &name, arguments.crs.as_deref());
-    crate::files::write_new(out, &text)?;
+    crate::files::write_new(out, &text(out.parent().unwrap_or(Path::new("")), &name))?;
     terminal::print(&format!("{} is written; build it: tiefort build {}\n", out.display(), out.display()))?;
     Ok(Outcome::Sound)
 }
 
-/// The files named, and the rasters directly in the folders named, by name.
-fn rasters(named: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
+/// The files named, and the rasters and files of features directly in the folders named, by name.
+fn named_files(named: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
     const ENDINGS: [&str; 12] = ["tif", "tiff", "dt0", "dt1", "dt2", "hgt", "asc", "flt", "bil", "img", "zip", "gz"];
+    const OF_FEATURES: [&str; 5] = ["pbf", "gpkg", "shp", "geojson", "json"];
     let mut all = Vec::new();
     for path in named {
         if !path.is_dir() {
@@ -80,7 +91,11 @@ fn rasters(named: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
             Failure::new(format!("{}: {error}", path.display()), "check the path and its permissions")
         })?;
         let mut inside: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
-        inside.retain(|path| path.is_file() && ENDINGS.contains(&crate::files::extension(path).as_str()));
+        inside.retain(|path| {
+            let ending = crate::files::extension(path);
+            let is_of = |endings: &[&str]| endings.contains(&ending.as_str());
+            path.is_file() && (is_of(&ENDINGS) || is_of(&OF_FEATURES) && workbench::is_feature_file(path))
+        });
         inside.sort();
         if inside.is_empty() {
             let message = format!("{}: found a folder without rasters, expected some directly in it", path.display());
@@ -156,7 +171,13 @@ fn remarks(suggestion: &Suggestion) -> Vec<String> {
     remarks
 }
 
-fn job_text(suggestion: &Suggestion, folder: &Path, name: &str, given: Option<&str>) -> String {
+fn job_text(
+    suggestion: &Suggestion,
+    features: &[SeenFeatures],
+    folder: &Path,
+    name: &str,
+    given: Option<&str>,
+) -> String {
     let Suggestion { seen, epsg, origin_m, size_m, spacing_m, tiles, part_around, triangles, .. } = suggestion;
     let modules = size_m.map(|metres| metres / 500.0);
     let mut text = format!(
@@ -194,6 +215,7 @@ fn job_text(suggestion: &Suggestion, folder: &Path, name: &str, given: Option<&s
     text += "]\n";
     text += &voids_text(seen);
     text += &datum_text(seen);
+    text += &features_section(features, folder);
     text += &format!(
         "\n[tiles]\ncolumns = {}\nrows = {}\n\n[limits]\n\
          per_load_module = {}         # triangles\n\
@@ -258,12 +280,6 @@ fn source_text(seen: &Seen, folder: &Path, given: Option<&str>) -> String {
     format!("{}{notes}    {entry},\n", comment(&facts))
 }
 
-/// `text` as a comment above a source, in lines as wide as a terminal.
-fn comment(text: &str) -> String {
-    let line = format!("    # {}", text.split_whitespace().collect::<Vec<_>>().join(" "));
-    fold(&line, 0).replace("\n    ", "\n    # ") + "\n"
-}
-
 /// A number with all its digits.
 fn exact(number: f64) -> String {
     if number.fract() == 0.0 && number.abs() < 1.0e9 { format!("{number:.0}") } else { format!("{number:?}") }
@@ -315,20 +331,4 @@ fn known_datums(seen: &[Seen]) -> Vec<&str> {
         }
     }
     known
-}
-
-/// The path as a job in `folder` names it.
-fn relative(path: &Path, folder: &Path) -> String {
-    let here = |path: &Path| if path.as_os_str().is_empty() { PathBuf::from(".") } else { path.to_owned() };
-    let (Ok(file), Ok(folder)) = (path.canonicalize(), here(folder).canonicalize()) else {
-        return path.display().to_string();
-    };
-    match file.strip_prefix(&folder) {
-        Ok(below) => below.display().to_string(),
-        Err(_) => file.display().to_string(),
-    }
-}
-
-fn quoted(text: &str) -> String {
-    serde_json::Value::from(text).to_string()
 }

@@ -3,13 +3,14 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use compiler::{Plan, Played};
-use ground::PlannedTile;
+use compiler::{CompileError, Plan, Played};
+use ground::{FeatureTable, PlannedTile};
 use job::Job;
 use serde_json::{Value, json};
 use views::{Align, Table, fold, grouped};
 
 use crate::arguments::rows_by_columns;
+use crate::commands::plan_features;
 use crate::engines::{self, Glue};
 use crate::failure::{Failure, Outcome};
 use crate::{costs, files, fit, run, terminal};
@@ -85,15 +86,17 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let default = PathBuf::from(format!("{}.tdb", job.area.name));
     let folder = arguments.out.as_ref().unwrap_or(&default);
     let told = compiler::foresee(&job, folder)?;
-    told.iter().for_each(|note| terminal::tell(&format!("note: {}", terminal::short(note))));
+    let features = ground::feature_table(&job).map_err(CompileError::from)?;
+    let told = told.iter().chain(features.iter().flat_map(|features| &features.notes));
+    told.for_each(|note| terminal::tell(&format!("note: {}", terminal::short(note))));
     let played = played(&job, &plan, arguments)?;
     let glue = || Glue::new(&job, &plan, arguments.out.as_deref(), arguments.pack);
     let text = match arguments.emit {
-        Some(Emit::Json) => json_text(&job, &plan, &played),
+        Some(Emit::Json) => json_text(&job, &plan, features.as_ref(), &played),
         Some(Emit::Ninja) => engines::ninja(&glue()?),
         Some(Emit::Slurm) => engines::slurm(&glue()?),
         Some(Emit::Dask) => engines::dask(&glue()?),
-        None => fold(&plan_text(&job, &plan, &played), 2),
+        None => fold(&plan_text(&job, &plan, features.as_ref(), &played), 2),
     };
     terminal::print(&text)?;
     if !arguments.force {
@@ -122,10 +125,13 @@ fn played(job: &Job, plan: &Plan, arguments: &Arguments) -> Result<Vec<Played>, 
     Ok(tiles.iter().flat_map(|&tiles| compiler::play(&costs, tiles, modules, job.tiles.order, &workers)).collect())
 }
 
-fn plan_text(job: &Job, plan: &Plan, played: &[Played]) -> String {
+fn plan_text(job: &Job, plan: &Plan, features: Option<&FeatureTable>, played: &[Played]) -> String {
     let mut text = format!("Settings of {}\n{}\n", job.path.display(), run::settings_text(job));
     text += &forecast_table(job, plan).text(0);
     text += &format!("\n{}", corner_table(job).text(0));
+    if let Some(features) = features {
+        text += &format!("\n{}", plan_features::tables_text(features));
+    }
     if !played.is_empty() {
         text += &format!("\n{}", played_table(played).text(0));
     }
@@ -210,7 +216,7 @@ fn by_rank(plan: &Plan) -> Vec<&PlannedTile> {
     tiles
 }
 
-fn json_text(job: &Job, plan: &Plan, played: &[Played]) -> String {
+fn json_text(job: &Job, plan: &Plan, features: Option<&FeatureTable>, played: &[Played]) -> String {
     let simulation: Vec<Value> = played
         .iter()
         .map(|run| {
@@ -234,6 +240,7 @@ fn json_text(job: &Job, plan: &Plan, played: &[Played]) -> String {
         "forecast": { "memory_bytes": forecast.memory_bytes, "shared_bytes": forecast.shared_bytes,
                       "worker_bytes": forecast.worker_bytes, "seconds": forecast.seconds,
                       "disk_bytes": forecast.disk_bytes },
+        "features": features.map(plan_features::tables_json),
         "simulation": simulation,
         "tiles": tiles,
     });

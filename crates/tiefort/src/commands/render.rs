@@ -93,6 +93,8 @@ enum View {
     Limits,
     /// Tiles, their order and state
     Tiles,
+    /// Roads and water, and where one was mended, degraded or left out
+    Features,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -152,6 +154,11 @@ fn draw(arguments: &Arguments, product: &Product, reads_all: bool) -> Result<Ima
         View::Limits => Map::Limits,
         // A tile is drawn whole or not at all.
         View::Tiles => Map::Tiles,
+        View::Features if scene.features.is_none() => {
+            let message = "found --view features with a database without roads and water, expected one with some";
+            return Err(Failure::new(message, "[features] in a job names their files"));
+        }
+        View::Features => Map::Features,
     };
     Ok(draw_map(&scene, map, size))
 }

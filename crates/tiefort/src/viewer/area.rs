@@ -8,7 +8,7 @@ use job::Choice;
 use load_module_reader::{Area, Keep};
 use product::{Product, ProductGround, Wanted, WantedGround, water};
 use serde_json::json;
-use terrain::{HOLE_CLASS, ModuleGrid, ModuleRect};
+use terrain::{HOLE_CLASS, ModuleGrid, ModuleRect, named_class_color};
 use views::{RESIDUAL_SCALE_M, palette};
 
 use super::overview::Overview;
@@ -83,7 +83,8 @@ fn description(product: &Product, area: &Area, overview: &Overview) -> String {
         "hole": HOLE_CLASS,
         "triangles": totals.triangles,
         "polygons": totals.polygons,
-        "classes": product.job.importance.classes,
+        "classes": product.job.class_names(),
+        "class_colors": class_colors(&product.job.class_names()),
         "limits": {
             "count": limits.count.name(),
             "per_load_module": limits.per_load_module,
@@ -92,4 +93,10 @@ fn description(product: &Product, area: &Area, overview: &Overview) -> String {
         },
     })
     .to_string()
+}
+
+/// The colours of classes whose names say them, as `#547a4e`; nothing for the others.
+fn class_colors(names: &[String]) -> Vec<Option<String>> {
+    let hex = |[red, green, blue]: [u8; 3]| format!("#{red:02x}{green:02x}{blue:02x}");
+    names.iter().map(|name| named_class_color(name).map(hex)).collect()
 }

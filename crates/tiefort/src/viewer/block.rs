@@ -1,11 +1,12 @@
 //! A block of load modules as the page reads it.
 //!
 //! Load modules follow each other row by row from the south-west, each beginning at a multiple of 4 bytes:
-//! eleven u32 (row, column, vertices, triangles, polygons, posts measured, vertices on the southern, eastern, northern
-//! and western side, zero), two f32 (root mean square and largest residual, metres), the vertices (x and y as u16, z as
-//! i32, quanta), the triangles (three u16 each), the four sides (u16 each), the classes (u8 each), zeros.
+//! twelve u32 (row, column, vertices, triangles, polygons, posts measured, vertices on the southern, eastern, northern
+//! and western side, vertices and triangles of decks), two f32 (root mean square and largest residual, metres), the
+//! vertices (x and y as u16, z as i32, quanta), the triangles (three u16 each), the four sides (u16 each), the classes
+//! (u8 each), zeros up to a multiple of 4 bytes; then vertices, triangles and classes of decks likewise, and zeros.
 
-use load_module_reader::{Block, Module};
+use load_module_reader::{Block, Module, Vertex};
 
 use super::area::Viewed;
 use super::overview::residuals_m;
@@ -27,27 +28,38 @@ fn write(module: &Module, out: &mut Vec<u8>) {
     let sides = [0, 1, 2, 3].map(|side: usize| module.sides[side].len() as u32);
     let (vertices, triangles) = (module.vertices.len() as u32, module.triangles.len() as u32);
     let counts = [module.row, module.col, vertices, triangles, module.polygon_count, module.residual.posts];
-    for word in counts.into_iter().chain(sides).chain([0]) {
+    let decks = [module.decks.vertices.len() as u32, module.decks.triangles.len() as u32];
+    for word in counts.into_iter().chain(sides).chain(decks) {
         out.extend(word.to_le_bytes());
     }
     for figure in residuals_m(module) {
         out.extend(figure.to_le_bytes());
     }
-    for vertex in &module.vertices {
-        out.extend(vertex.x.to_le_bytes());
-        out.extend(vertex.y.to_le_bytes());
-        out.extend(vertex.z.to_le_bytes());
-    }
+    write_vertices(&module.vertices, out);
     for index in module.triangles.iter().flatten().chain(module.sides.iter().flatten()) {
         out.extend(index.to_le_bytes());
     }
     out.extend(&module.classes);
     out.resize(out.len().next_multiple_of(4), 0);
+    write_vertices(&module.decks.vertices, out);
+    for index in module.decks.triangles.iter().flatten() {
+        out.extend(index.to_le_bytes());
+    }
+    out.extend(&module.decks.classes);
+    out.resize(out.len().next_multiple_of(4), 0);
+}
+
+fn write_vertices(vertices: &[Vertex], out: &mut Vec<u8>) {
+    for vertex in vertices {
+        out.extend(vertex.x.to_le_bytes());
+        out.extend(vertex.y.to_le_bytes());
+        out.extend(vertex.z.to_le_bytes());
+    }
 }
 
 #[cfg(test)]
 mod tests {
-    use load_module_reader::{Residual, Vertex};
+    use load_module_reader::{Decks, Residual};
 
     use super::*;
 
@@ -64,13 +76,20 @@ mod tests {
             sides: [vec![0, 1], vec![1, 3], vec![2, 3], vec![0, 2]],
             polygon_count: 1,
             residual: Residual { posts: 4, largest: 256, sum_abs: 256, sum_squared: 65536 },
+            decks: Decks {
+                vertices: vec![vertex(0, 0), vertex(9, 0), vertex(0, 9)],
+                triangles: vec![[0, 1, 2]],
+                classes: vec![2],
+            },
         };
         let mut out = Vec::new();
         write(&module, &mut out);
-        assert_eq!(out.len(), 44 + 8 + 4 * 8 + 2 * 6 + 8 * 2 + 4);
+        let ground = 48 + 8 + 4 * 8 + 2 * 6 + 8 * 2 + 4;
+        assert_eq!(out.len(), ground + 3 * 8 + 6 + 2);
         let word = |place: usize| u32::from_le_bytes([0, 1, 2, 3].map(|byte| out[4 * place + byte]));
-        assert_eq!([0, 1, 2, 3, 4, 5, 6, 9].map(word), [3, 5, 4, 2, 1, 4, 2, 2]);
-        assert_eq!([11, 12].map(|place| f32::from_bits(word(place))), [1.0, 2.0]);
-        assert_eq!(out[out.len() - 4..], [0, 1, 0, 0]);
+        assert_eq!([0, 1, 2, 3, 4, 5, 6, 9, 10, 11].map(word), [3, 5, 4, 2, 1, 4, 2, 2, 3, 1]);
+        assert_eq!([12, 13].map(|place| f32::from_bits(word(place))), [1.0, 2.0]);
+        assert_eq!(out[ground - 4..ground], [0, 1, 0, 0]);
+        assert_eq!(out[out.len() - 8..], [0, 0, 1, 0, 2, 0, 2, 0]);
     }
 }

@@ -63,8 +63,10 @@ impl Overview {
             let height = f64::from(vertex.z) / metre;
             self.range_m = [self.range_m[0].min(height), self.range_m[1].max(height)];
         }
-        self.figures.extend((module.triangles.len() as u32).to_le_bytes());
-        self.figures.extend(module.polygon_count.to_le_bytes());
+        // Decks count as the ground does.
+        let of_decks = module.decks.triangles.len() as u32;
+        self.figures.extend((module.triangles.len() as u32 + of_decks).to_le_bytes());
+        self.figures.extend((module.polygon_count + of_decks).to_le_bytes());
         for figure in residuals_m(module) {
             self.figures.extend(figure.to_le_bytes());
         }

@@ -9,6 +9,7 @@ mod builds;
 mod columns;
 mod comparing;
 mod exports;
+mod features;
 mod foreseen;
 mod full_disk;
 mod help;
@@ -20,6 +21,7 @@ mod outlook;
 #[cfg(unix)]
 mod paths;
 mod raster;
+mod roads_and_water;
 mod scene;
 mod shared;
 mod starts;

@@ -13,11 +13,14 @@ const known = (area, stops, share) => (Number.isNaN(share) ? numbers(area.palett
 
 /** Red, green, blue from 0 to 1 as screens have them. */
 export const colorOf = {
-  /** Of what lies over the ground or in its place: water and holes; undefined for ground. */
+  /** Of what is known by its class: water, holes, roads; undefined for plain ground. */
   cover: (area, ofClass) => {
     if (ofClass === area.hole) return numbers(area.palette.nothing);
+    if (area.class_colors[ofClass]) return numbers(area.class_colors[ofClass]);
     return ofClass === area.water ? numbers(area.palette.water) : undefined;
   },
+  /** Of a deck whose class says nothing of its colour. */
+  deck: () => [0.42, 0.4, 0.38],
   height: (area, metres) =>
     known(area, area.palette.heights, (metres - area.height_m[0]) / (area.height_m[1] - area.height_m[0] || 1)),
   limits: (area, count) =>

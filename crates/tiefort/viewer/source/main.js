@@ -76,7 +76,7 @@ function frame(view, seconds, wish) {
   tank.place(camera);
   renderer.render(scene, camera);
   map.draw(terrain.block, tank, range);
-  const under = terrain.under(tank.east, tank.north);
+  const under = terrain.under(tank.east, tank.north, tank.ceiling());
   if (under) under.count = terrain.count(under.module);
   view.figures = {
     tank, under, frameMs: view.frameMs, loaded: terrain.loaded(),
@@ -178,9 +178,9 @@ function state(view) {
   return {
     east, north, height: tank.height, heading: tank.heading, tilt: tank.tilt, driven: tank.driven, speed: tank.speed,
     block: terrain.block, loaded: [...terrain.fine().keys()], waiting: terrain.asked.size, fault: terrain.fault,
-    showsDem: terrain.withDem, modules: figures?.loaded.modules, triangles: figures?.loaded.triangles,
+    showsDem: terrain.withDem, isOnDeck: figures?.under?.isDeck, modules: figures?.loaded.modules, triangles: figures?.loaded.triangles,
     coarser: [...terrain.drawn.values()].filter(({ module }) => module.level !== 0)
-      .map(({ module }) => [module.level, module.row, module.col, module.tin.triangles.length / 3]),
+      .map(({ module }) => [module.level, module.row, module.col, module.counts.triangles]),
     blocks: terrain.blocks, fullest: figures?.loaded.fullest, view: figures?.view, frameMs: view.frameMs, picked,
   };
 }

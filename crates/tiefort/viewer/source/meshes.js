@@ -9,6 +9,8 @@ import { coarseHeight } from "./surface.js";
 const ground = new MeshLambertMaterial({
   vertexColors: true, polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1,
 });
+// Decks have no thickness, and are seen from below too.
+const deck = new MeshLambertMaterial({ vertexColors: true, side: DoubleSide });
 // Unlit: a wall is no part of the ground, and should not show more than it must.
 const walls = new MeshBasicMaterial({ vertexColors: true, side: DoubleSide, color: 0xb8b8b8 });
 const cliffs = new MeshBasicMaterial({ vertexColors: true, color: 0xb8b8b8 });
@@ -43,6 +45,18 @@ export function moduleMesh(surface) {
   const edges = new Mesh(geometry, wires);
   mesh.add(edges);
   return { mesh, edges };
+}
+
+/** The decks of a load module, coloured by their classes. */
+export function deckMesh(area, decks) {
+  const geometry = geometryOf(corners(decks)), color = geometry.getAttribute("color");
+  geometry.computeVertexNormals();
+  geometry.computeBoundingSphere();
+  for (let i = 0; i < decks.triangles.length; i++) {
+    const of = colorOf.cover(area, decks.classes[Math.floor(i / 3)]) ?? colorOf.deck();
+    color.array.set(light(of), 3 * i);
+  }
+  return new Mesh(geometry, deck);
 }
 
 /** Colours a load module's surface: its triangles, or the ground they were made from. */

@@ -51,10 +51,12 @@ export async function readModules(area, [south, west, north, east], level) {
 }
 
 function moduleAt(area, bytes, start) {
-  const [row, col, vertexCount, triangleCount, polygons, posts, ...sideCounts] = new Uint32Array(bytes, start, 10);
-  const [rms, largest] = new Float32Array(bytes, start + 44, 2);
-  let at = start + 52;
-  const [plan, heights] = [new Uint16Array(bytes, at, 4 * vertexCount), new Int32Array(bytes, at, 2 * vertexCount)];
+  const words = new Uint32Array(bytes, start, 12), [row, col, vertexCount, triangleCount, polygons, posts] = words;
+  const sideCounts = words.subarray(6, 10), [deckVertices, deckTriangles] = words.subarray(10);
+  const [rms, largest] = new Float32Array(bytes, start + 48, 2);
+  const corner = [(col - area.corner[1]) * area.side_m, (row - area.corner[0]) * area.side_m];
+  let at = start + 56;
+  const points = pointsAt(bytes, at, vertexCount, corner);
   at += 8 * vertexCount;
   const triangles = new Uint16Array(bytes, at, 3 * triangleCount);
   at += 6 * triangleCount;
@@ -64,16 +66,29 @@ function moduleAt(area, bytes, start) {
     return list;
   });
   const classes = new Uint8Array(bytes, at, triangleCount);
-  at += triangleCount;
-  const [west, south] = [(col - area.corner[1]) * area.side_m, (row - area.corner[0]) * area.side_m];
-  const points = new Float32Array(3 * vertexCount);
-  for (let i = 0; i < vertexCount; i++) {
+  at = 4 * Math.ceil((at + triangleCount) / 4);
+  const decks = deckTriangles === 0 ? null : {
+    points: pointsAt(bytes, at, deckVertices, corner),
+    triangles: new Uint16Array(bytes, at + 8 * deckVertices, 3 * deckTriangles),
+    classes: new Uint8Array(bytes, at + 8 * deckVertices + 6 * deckTriangles, deckTriangles),
+  };
+  at += 8 * deckVertices + 7 * deckTriangles;
+  const tin = { points, triangles, sides };
+  // What limits count: decks as the ground.
+  const counts = { triangles: triangleCount + deckTriangles, polygons: polygons + deckTriangles };
+  return [{ row, col, counts, posts, rms, largest, classes, tin, decks }, 4 * Math.ceil(at / 4)];
+}
+
+/** Vertices of a load module whose south-west corner is at `[west, south]`. */
+function pointsAt(bytes, at, count, [west, south]) {
+  const [plan, heights] = [new Uint16Array(bytes, at, 4 * count), new Int32Array(bytes, at, 2 * count)];
+  const points = new Float32Array(3 * count);
+  for (let i = 0; i < count; i++) {
     points[3 * i] = west + plan[4 * i] / QUANTA;
     points[3 * i + 1] = south + plan[4 * i + 1] / QUANTA;
     points[3 * i + 2] = heights[2 * i + 1] / QUANTA;
   }
-  const tin = { points, triangles, sides };
-  return [{ row, col, polygons, posts, rms, largest, classes, tin }, start + 4 * Math.ceil((at - start) / 4)];
+  return points;
 }
 
 /** Fails with the reason where the sources of the database are not at hand. */

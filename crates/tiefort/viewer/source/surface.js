@@ -2,6 +2,20 @@
 
 /** The triangle of a surface under a place: its number, height and normal; null outside. */
 export function triangleUnder(surface, east, north) {
+  return trianglesUnder(surface, east, north).next().value ?? null;
+}
+
+/** The topmost triangle of decks at a place that is not above a ceiling; null where there is none. */
+export function deckUnder(decks, east, north, ceiling) {
+  let top = null;
+  for (const deck of trianglesUnder(decks, east, north)) {
+    if (deck.height <= ceiling && !(deck.height <= top?.height)) top = deck;
+  }
+  return top;
+}
+
+/** All triangles of a surface at a place. */
+function* trianglesUnder(surface, east, north) {
   const { points, triangles } = surface;
   // On an edge rounding must not make a hole.
   const slack = 1e-6;
@@ -17,9 +31,8 @@ export function triangleUnder(surface, east, north) {
     const normal = [uy * vz - uz * vy, uz * vx - ux * vz, area];
     const length = Math.hypot(...normal);
     const height = points[a + 2] + s * uz + w * vz;
-    return { number: t / 3, height, normal: normal.map((part) => part / length) };
+    yield { number: t / 3, height, normal: normal.map((part) => part / length) };
   }
-  return null;
 }
 
 /** Height of a coarse grid at a place along one of its lines: `[row, col]` in coarse steps, one of them whole. */

@@ -7,6 +7,9 @@ const FLY_MPS = 80, CLEARANCE_M = 3, CEILING_M = 12_000;
 const HURRY = 10;
 /** Half of the tracks' length and of the distance between them, metres. */
 const HALF_LENGTH = 3, HALF_WIDTH = 1.4;
+/** How much higher than its tracks a deck may begin for the tank to drive on it, and how far it goes before it looks
+ * again what it stands on: so it stays on a bridge, or under it. */
+const STEP_M = 1.5, LOOK_M = 3;
 
 export class Tank {
   constructor(terrain, east, north, heading) {
@@ -38,7 +41,17 @@ export class Tank {
     const change = GAIN_MPS2 * times * seconds * (forward === 0 ? 2 : 1);
     this.speed += Math.min(Math.max(wanted - this.speed, -change), change);
     this.heading += right * TURN_RADPS * seconds * (this.speed < 0 ? -1 : 1);
-    this.move(this.heading, this.speed * seconds);
+    const way = this.speed * seconds, looks = Math.ceil(Math.abs(way) / LOOK_M);
+    for (let look = 0; look < looks; look++) {
+      this.move(this.heading, way / looks);
+      this.height = this.terrain.under(this.east, this.north, this.ceiling())?.height ?? this.height;
+    }
+  }
+
+  /** Up to what height a surface may lie that the tank drives on, or that the observer flies over. */
+  ceiling() {
+    if (this.flies) return this.altitude;
+    return this.height === null ? Infinity : this.height + STEP_M;
   }
 
   fly(seconds, { forward, right, up, hurry }) {
@@ -54,11 +67,11 @@ export class Tank {
     this.north += Math.cos(direction) * metres;
   }
 
-  /** Stands on the ground: height, pitch and roll from the triangles under the ends of both tracks. */
+  /** Stands on ground or decks: height, pitch and roll from the triangles under the ends of both tracks. */
   settle() {
     const [sin, cos] = [Math.sin(this.heading), Math.cos(this.heading)];
-    const at = (along, aside) => this.terrain.under(
-      this.east + along * sin + aside * cos, this.north + along * cos - aside * sin)?.height;
+    const at = (along, aside) => this.terrain.under(this.east + along * sin + aside * cos,
+      this.north + along * cos - aside * sin, this.ceiling())?.height;
     const ends = [at(HALF_LENGTH, -HALF_WIDTH), at(HALF_LENGTH, HALF_WIDTH), at(-HALF_LENGTH, -HALF_WIDTH),
       at(-HALF_LENGTH, HALF_WIDTH)];
     // Not loaded yet: it stays as it stood.
@@ -95,7 +108,7 @@ export class Tank {
       camera.position.set(this.east, this.altitude, -this.north);
     } else if (this.chases) {
       camera.position.copy(base).addScaledVector(ahead, -this.away).add(new Vector3(0, 3, 0));
-      const ground = this.terrain.under(camera.position.x, -camera.position.z);
+      const ground = this.terrain.under(camera.position.x, -camera.position.z, this.ceiling());
       camera.position.y = Math.max(camera.position.y, (ground?.height ?? this.height) + 1.5);
     } else {
       // From the hatch, which leans as the tank does.

@@ -1,9 +1,9 @@
 // The block of load modules around the observer: loaded, drawn, dropped; around it load modules at coarser levels of
 // detail, where the database has them; beyond these the area as it is coarsely.
 import { Frustum, Group, Matrix4 } from "three";
-import { apron, coarseMesh, moduleLines, moduleMesh, paint, wallMeshes } from "./meshes.js";
+import { apron, coarseMesh, deckMesh, moduleLines, moduleMesh, paint, wallMeshes } from "./meshes.js";
 import { checkDem, readModules, readPosts } from "./server.js";
-import { triangleUnder } from "./surface.js";
+import { deckUnder, triangleUnder } from "./surface.js";
 
 /** Metres from the middle of the area to where nothing is any more. */
 const APRON_M = 400_000;
@@ -18,7 +18,7 @@ export class Terrain {
   constructor(area) {
     this.area = area;
     this.group = new Group();
-    // By row * cols + col: {module, surface, mesh, edges}. Levels that differ fit together, so that a load module stays
+    // By row * cols + col: {module, surface, mesh, edges, decks}. Levels that differ fit together, so that a load module stays
     // until the one in its place has come.
     this.drawn = new Map();
     this.colors = "height";
@@ -136,7 +136,10 @@ export class Terrain {
     paint(this.area, module, surface, mesh, this.colors);
     mesh.userData.key = key;
     this.group.add(mesh);
-    this.drawn.set(key, { module, surface, mesh, edges });
+    // The DEM knows no decks.
+    const decks = module.decks && surface === module.tin ? deckMesh(this.area, module.decks) : null;
+    if (decks) mesh.add(decks);
+    this.drawn.set(key, { module, surface, mesh, edges, decks });
   }
 
   drop(key) {
@@ -144,6 +147,7 @@ export class Terrain {
     if (!old) return false;
     this.group.remove(old.mesh);
     old.mesh.geometry.dispose();
+    old.decks?.geometry.dispose();
     return this.drawn.delete(key);
   }
 
@@ -204,18 +208,22 @@ export class Terrain {
     this.closed();
   }
 
-  /** What is drawn at a place: load module, triangle, height, normal; null where nothing fine is loaded. */
-  under(east, north) {
+  /** What is drawn at a place: load module, triangle, height, normal; null where nothing fine is loaded. It is the
+   * topmost of ground and decks that is not above `ceiling`, and the ground where all is. */
+  under(east, north, ceiling = Infinity) {
     const [west, south, far, top] = this.area.sides;
     const inside = [Math.min(Math.max(east, west), far - 1e-3), Math.min(Math.max(north, south), top - 1e-3)];
     const [row, col] = this.area.moduleAt(...inside);
     const found = this.drawn.get(row * this.area.cols + col);
     const triangle = found && triangleUnder(found.surface, ...inside);
-    return triangle ? { ...found, ...triangle } : null;
+    if (!triangle) return null;
+    const deck = found.decks && deckUnder(found.module.decks, ...inside, ceiling);
+    const isDeck = deck !== null && triangle.height <= deck.height;
+    return { ...found, ...(isDeck ? deck : triangle), isDeck };
   }
 
   count(module) {
-    return this.area.limits.count === "triangles" ? module.tin.triangles.length / 3 : module.polygons;
+    return module.counts[this.area.limits.count];
   }
 
   /** Load modules and triangles that the camera sees within its range. */
@@ -229,7 +237,7 @@ export class Terrain {
       const away = [Math.max(west - east, 0, east - west - side), Math.max(south - north, 0, north - south - side)];
       if (range < Math.hypot(...away) || !frustum.intersectsObject(mesh)) continue;
       modules += 1;
-      triangles += surface.triangles.length / 3;
+      triangles += surface === module.tin ? module.counts.triangles : surface.triangles.length / 3;
     }
     return { modules, triangles };
   }
@@ -246,8 +254,8 @@ export class Terrain {
     let triangles = 0, fullest = null;
     const coarser = { modules: this.drawn.size - drawn.size, triangles: 0 };
     for (const { module } of this.drawn.values()) {
-      if (module.level === 0) triangles += module.tin.triangles.length / 3;
-      else coarser.triangles += module.tin.triangles.length / 3;
+      if (module.level === 0) triangles += module.counts.triangles;
+      else coarser.triangles += module.counts.triangles;
     }
     if (!this.block) return { modules: 0, triangles, fullest, coarser };
     const [south, west, north, east] = this.block;

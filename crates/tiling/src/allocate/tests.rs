@@ -9,7 +9,16 @@ use terrain::{GainRun, ModuleGrid, TileId, TileOrder};
 const GRID: ModuleGrid = ModuleGrid { rows: 20, cols: 22, side_cells: 20 };
 
 fn budget(per_module: u32, pool: u64, area: u64, per_window: u32) -> Budget {
-    Budget { grid: GRID, border_step: 5, per_module, pool, area, per_window, windows: Windows::new(GRID, 8) }
+    Budget {
+        grid: GRID,
+        border_step: 5,
+        per_module,
+        pool,
+        area,
+        per_window,
+        windows: Windows::new(GRID, 8),
+        reserved: Vec::new(),
+    }
 }
 
 fn tiling(order: TileOrder) -> Tiling {

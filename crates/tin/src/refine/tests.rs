@@ -6,7 +6,9 @@ use fastrand::Rng;
 use geometry::{levels_available, rounded, visit_posts, widest_level};
 use limits::{Allowance, Windows};
 use mesh::{Lines, Mesh};
-use terrain::{LastBatch, ModuleGrid, ModuleId, ModuleRect, Post, PostRect, SeamSides, TileId};
+use terrain::{
+    Features, LastBatch, ModuleGrid, ModuleId, ModuleRect, Post, PostRect, SeamSides, Side, SideSpan, TileId,
+};
 
 use super::*;
 use crate::proximity::is_near;
@@ -51,6 +53,7 @@ fn plain_task(rect: PostRect, rule: Rule, points: usize) -> TileTask {
         kept: Vec::new(),
         start: Vec::new(),
         seams: SeamSides::OPEN,
+        barred: Vec::new(),
         rule,
         stop: Stop { points: Some(points), ..Stop::default() },
     }
@@ -244,6 +247,35 @@ fn closed_sides_hold_only_what_they_were_given() {
         let mut found: Vec<Post> = posts.filter(on).filter(|post| !rect.corners().contains(post)).collect();
         found.sort();
         assert_eq!(found, inherited);
+    }
+}
+
+#[test]
+fn no_border_point_is_selected_where_a_road_crosses_a_side() {
+    let rect = PostRect::of_size(61, 81);
+    let dem = hills(rect, 9, 1);
+    let span = |side, from, to| SideSpan { side, from, to };
+    let spans = vec![span(Side::North, 600, 1600), span(Side::East, 64 * 7 + 3, 64 * 31 - 1)];
+    let barred = Features { steps_per_post: 64, spans, ..Features::default() }.barred_posts(rect);
+    let border = vec![Post::new(60, 5), Post::new(60, 15)];
+    for rule in [Rule::WorstFirst, Rule::LargestSquares { guard: None }, Rule::LargestSquares { guard: Some(9000) }] {
+        let free = TileTask { border: border.clone(), ..plain_task(rect, rule, 700) };
+        let task = TileTask { barred: barred.clone(), ..free.clone() };
+        let importance = half_masked(rect);
+        let tile = refine(&dem, &importance, &task, widest_level());
+        let on_barred = |tile: &TileTin| {
+            let posts = tile.tin.vertices.iter().filter_map(|vertex| vertex.at.post());
+            posts.filter(|post| barred.binary_search(post).is_ok()).count()
+        };
+        assert!(3 < on_barred(&refine(&dem, &importance, &free, widest_level())), "it would select some");
+        assert_eq!((tile.tin.check(), on_barred(&tile)), (Ok(()), 0));
+        assert!(
+            tile.tin.vertices.iter().any(|vertex| vertex.at.post() == Some(border[0])),
+            "others of the border stay"
+        );
+        for (name, level) in levels_available() {
+            assert_eq!(refine(&dem, &importance, &task, level), tile, "{name}");
+        }
     }
 }
 

@@ -128,6 +128,12 @@ pub(super) fn maps(scene: &Scene) -> Markup {
     }
 }
 
+/// Roads and water, and what became of them.
+pub(super) fn features(scene: &Scene) -> Markup {
+    let caption = "Where roads and water run, and where something was wrong with one.";
+    figures(scene, Map::Features, MAP_PIXELS, caption)
+}
+
 /// Wireframe and residuals of one load module.
 pub(crate) fn module_images(scene: &Scene, module: &terrain::LoadModule) -> Markup {
     let (row, col) = (module.id.row, module.id.col);

@@ -82,6 +82,12 @@ pub fn report_html(page: &Page) -> String {
                 section id="residuals" {
                     h2 { "Residuals" } (tables::residuals(report)) (tables::levels(report)) (histograms(page))
                 }
+                @if let Some(features) = &report.features {
+                    section id="features" {
+                        h2 { "Roads and water" } (tables::features(features))
+                        @if let Some(scene) = page.scene { (maps::features(scene)) }
+                    }
+                }
                 @match page.scene {
                     Some(scene) => {
                         section id="maps" { h2 { "Maps" } (maps::maps(scene)) }
@@ -100,9 +106,10 @@ pub fn report_html(page: &Page) -> String {
     page.into_string()
 }
 
-const SECTIONS: [(&str, &str); 7] = [
+const SECTIONS: [(&str, &str); 8] = [
     ("limits", "Limits"),
     ("residuals", "Residuals"),
+    ("features", "Roads and water"),
     ("maps", "Maps"),
     ("worst", "Worst load modules"),
     ("breaches", "Breaches"),
@@ -112,8 +119,12 @@ const SECTIONS: [(&str, &str); 7] = [
 
 /// Those that this page has.
 fn sections(page: &Page) -> impl Iterator<Item = (&'static str, &'static str)> {
-    let has_scene = page.scene.is_some();
-    SECTIONS.into_iter().filter(move |&(id, _)| has_scene || id != "worst")
+    let (has_scene, has_features) = (page.scene.is_some(), page.report.features.is_some());
+    SECTIONS.into_iter().filter(move |&(id, _)| match id {
+        "worst" => has_scene,
+        "features" => has_features,
+        _ => true,
+    })
 }
 
 fn without_maps() -> Markup {
@@ -190,7 +201,7 @@ fn most_seen(scene: &Scene) -> Option<(u64, ModuleId)> {
         .flat_map(|row| (-reach..=reach).map(move |col| (row, col)))
         .filter(|&(row, col)| gap(row) * gap(row) + gap(col) * gap(col) <= VISIBLE_M * VISIBLE_M)
         .collect();
-    let counts: Vec<u64> = scene.modules.iter().map(|module| module.triangles.len() as u64).collect();
+    let counts: Vec<u64> = scene.modules.iter().map(|module| u64::from(module.counts().triangles)).collect();
     let (rows, cols) = (i64::from(scene.grid.rows), i64::from(scene.grid.cols));
     let seen = |module: ModuleId| -> u64 {
         let places = offsets.iter().map(|(row, col)| (i64::from(module.row) + row, i64::from(module.col) + col));

@@ -1,10 +1,11 @@
 //! Tables of the page: limits and advice, residuals, breaches, times, sources.
 
-use database::{Manifest, Report, ReportResidual};
+use database::{Manifest, Report, ReportFeatures, ReportResidual};
 use maud::{Markup, html};
 
 use super::advise;
 use super::marks::{BOUND_ROWS_MAX, Marks, ROWS_MAX};
+use crate::features_text::{amounts, check_rows, cost, remarks_in_words};
 use crate::report::{border_in_words, heights_in_words};
 use crate::table::grouped;
 
@@ -208,6 +209,24 @@ pub(super) fn levels(report: &Report) -> Markup {
         }))
             p.quiet { "Limits are about level 0; the others are for what is far away." }
         }
+    }
+}
+
+/// What roads and water cost, and what must hold of them.
+pub(super) fn features(features: &ReportFeatures) -> Markup {
+    let row = |name: &str, amounts: [String; 3], costs: [String; 3]| {
+        html! { tr { td { (name) } @for cell in amounts.iter().chain(&costs) { td.n { (cell) } } } }
+    };
+    html! {
+        (table(html! { th { "Class" } th.n { "km" } th.n { "of these strips, km" } th.n { "lakes" }
+                th.n { "triangles" } th.n { "most of a load module" } th.n { "most of a 4 km square" } }, html! {
+            @for class in &features.classes { (row(&class.name, amounts(class), cost(&class.cost))) }
+            (row("all", [const { String::new() }; 3], cost(&features.all)))
+        }))
+        p { (remarks_in_words(features)) "." }
+        (table(html! { th { "What must hold" } th { "found" } }, html! {
+            @for (what, found) in check_rows(&features.checks) { tr { td { (what) } td { (found) } } }
+        }))
     }
 }
 

@@ -42,7 +42,7 @@ fn limits() -> SceneLimits {
 /// The page of the sample terrain, with its ground or without.
 fn page_of(name: &str, with_ground: bool) -> String {
     let (modules, limits, mut report) = (samples::modules(), limits(), samples::report());
-    report.area = name.into();
+    (report.area, report.features) = (name.into(), Some(samples::features()));
     let frame = GridFrame { origin_east_m: 505_000.0, origin_north_m: 3_875_000.0, spacing: samples::spacing() };
     let dem = Dem::from_fn(samples::GRID.area(), |post| Some(64_000 + post.col * 320 - post.row * 160));
     let residuals = vec![64; dem.rect().post_count()];
@@ -56,6 +56,7 @@ fn page_of(name: &str, with_ground: bool) -> String {
         ground: with_ground.then_some(SceneGround { dem: &dem, residuals: &residuals }),
         limits: &limits,
         water: None,
+        features: None,
         tiles: &[],
     };
     let settings = [PageSetting { key: "area.name".into(), value: format!("\"{name}\""), meaning: "its name".into() }];
@@ -78,7 +79,7 @@ fn a_page_without_maps_says_how_to_come_by_them() {
         scene: None,
     });
     assert!(page.contains("tiefort render DIR") && page.contains("tiefort report DIR --format html"));
-    assert!(!page.contains("#worst"), "a link leads nowhere");
+    assert!(!page.contains("#worst") && !page.contains("#features"), "a link leads nowhere");
 }
 
 #[test]
@@ -89,8 +90,8 @@ fn the_page_is_one_file_that_loads_and_runs_nothing() {
     }
     let sources = page.matches("src=\"").count();
     assert_eq!(sources, page.matches("src=\"data:image/png;base64,").count());
-    // Six maps (two of them of limits), and two pictures of each of the six load modules.
-    assert_eq!(sources, 6 + 2 * 6);
+    // Seven maps (two of them of limits), and two pictures of each of the six load modules.
+    assert_eq!(sources, 7 + 2 * 6);
 }
 
 #[test]
@@ -116,7 +117,7 @@ fn names_from_outside_are_text_and_never_markup() {
 fn a_page_without_ground_says_so() {
     let page = page_of("fort", false);
     assert!(page.contains("No map of residuals") && !page.contains("Posts by residual"));
-    assert_eq!(page.matches("src=\"data:").count(), 5 + 6);
+    assert_eq!(page.matches("src=\"data:").count(), 6 + 6);
 }
 
 #[test]
@@ -133,6 +134,7 @@ fn the_most_that_is_seen_counts_load_modules_that_any_part_of_lies_near() {
         ground: None,
         limits: &limits,
         water: None,
+        features: None,
         tiles: &[],
     };
     assert_eq!(most_seen(&scene), Some((24, ModuleId { row: 0, col: 0 })));

@@ -16,7 +16,7 @@ pub(crate) fn module_pictures(scene: &Scene, module: &LoadModule, pixels: usize)
     let extent_m = scene.extent_m(ModuleRect { south: row, west: col, north: row + 1, east: col + 1 });
     let map_extent = MapExtent::of(extent_m, pixels);
     let wires = facets_wireframe(
-        &Facets::of_modules([module], scene.grid, scene.frame.spacing).with_covers([module], scene.water),
+        &Facets::of_modules([module], scene.grid, scene.frame.spacing).with_covers_of(scene, [module]),
         &map_extent,
     );
     let residuals = scene.ground.map(|ground| {

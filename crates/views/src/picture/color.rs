@@ -19,8 +19,29 @@ pub(crate) const NOTHING: Color = [200, 200, 200];
 pub(crate) const BREACH: Color = [213, 94, 0];
 /// What a limit kept from growing; on no scale.
 pub(crate) const BOUND: Color = [230, 159, 0];
-/// Water: the only blue.
+/// Water: the only blue, but for the rivers and streams among [`FEATURES`].
 pub(crate) const WATER: Color = [96, 154, 196];
+/// Roads and water by the names of their classes: roads dark, from grey to brown, and water blue. The last stands for
+/// every other name.
+pub(crate) const FEATURES: [(&str, Color); 10] = [
+    ("motorway", [44, 44, 46]),
+    ("primary", [74, 70, 68]),
+    ("minor", [106, 100, 94]),
+    ("track", [132, 96, 62]),
+    ("rail", [66, 38, 44]),
+    ("runway", [88, 86, 90]),
+    ("river", [44, 98, 156]),
+    ("stream", [88, 140, 200]),
+    ("lake", WATER),
+    ("other", [120, 70, 40]),
+];
+
+/// The place of a class of features among [`FEATURES`], by its name.
+pub(crate) fn feature_number(name: &str) -> u8 {
+    let last = FEATURES.len() - 1;
+    FEATURES.iter().position(|(known, _)| *known == name).unwrap_or(last) as u8
+}
+
 /// The sky at its top and at the horizon.
 pub(crate) const SKY: [Color; 2] = [[205, 203, 198], [240, 238, 234]];
 /// What distance fades into.
@@ -97,9 +118,12 @@ pub(crate) const RESIDUALS: Ramp = Ramp(&[
 pub(crate) const KINDS: [Color; 4] = [[226, 222, 212], [253, 205, 130], [178, 223, 188], [222, 190, 218]];
 
 /// The palette for programs that draw by themselves, as texts such as `#547a4e`: `heights`, `use`, `errors` and
-/// `residuals` from low to high, `breach`, `water`, `nothing`, and `sky` from its top to the horizon.
+/// `residuals` from low to high, `breach`, `water`, `nothing`, `sky` from its top to the horizon, and of `features`
+/// each class by its name.
 pub fn palette() -> Value {
     let all = |colors: &[Color]| colors.iter().copied().map(hex).collect::<Vec<_>>();
+    let features: serde_json::Map<String, Value> =
+        FEATURES.into_iter().map(|(name, color)| (name.to_owned(), json!(hex(color)))).collect();
     json!({
         "heights": all(HEIGHTS.0),
         "use": all(USE.0),
@@ -107,6 +131,7 @@ pub fn palette() -> Value {
         "residuals": all(RESIDUALS.0),
         "breach": hex(BREACH),
         "water": hex(WATER),
+        "features": features,
         "nothing": hex(NOTHING),
         "sky": all(&SKY),
     })
@@ -190,6 +215,10 @@ mod tests {
     fn blue_is_water_and_nothing_else() {
         assert!(is_blue(WATER) && is_blue([67, 147, 195]) && is_blue([59, 82, 139]));
         let ramps = [HEIGHTS, COUNTS, USE, ERRORS, RESIDUALS].into_iter().flat_map(|ramp| ramp.table(101));
+        let is_water = |name: &str| ["river", "stream", "lake"].contains(&name);
+        for (name, color) in FEATURES {
+            assert_eq!(is_blue(color), is_water(name), "{name}");
+        }
         let others = [BREACH, BOUND, NOTHING, PALE, SKY[0], SKY[1], HAZE].into_iter().chain(KINDS);
         for color in ramps.chain(others) {
             assert!(!is_blue(color), "{color:?}");

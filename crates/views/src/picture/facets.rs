@@ -2,9 +2,7 @@
 
 use std::f64::consts::FRAC_1_SQRT_2;
 
-use terrain::{
-    Dem, HOLE_CLASS, LATTICE_PER_POST, LoadModule, ModuleGrid, Post, QUANTA_PER_METRE, Spacing, Tin, metres_of_quanta,
-};
+use terrain::{Dem, HOLE_CLASS, LoadModule, ModuleGrid, Post, QUANTA_PER_METRE, Spacing, Tin, metres_of_quanta};
 
 use super::map_extent::slope;
 use super::scene::Scene;
@@ -35,12 +33,14 @@ pub enum Cover {
     Water,
     /// A hole: no source has a height there.
     Hole,
+    /// A road or water of a feature: its place among the colours of these.
+    Feature(u8),
 }
 
 impl Facets {
     /// Those of a TIN whose posts are `spacing_m` apart, west to east and south to north.
     pub fn of_tin(tin: &Tin, spacing_m: [f64; 2]) -> Self {
-        let metres = |lattice: i32, axis: usize| f64::from(lattice) / f64::from(LATTICE_PER_POST) * spacing_m[axis];
+        let metres = |lattice: i32, axis: usize| f64::from(lattice) / f64::from(tin.steps_per_post) * spacing_m[axis];
         let vertices = tin.vertices.iter();
         let vertices = vertices.map(|v| [metres(v.at.col, 0), metres(v.at.row, 1), metres_of_quanta(v.height)]);
         let posts = |count: i32, axis: usize| f64::from(count) * spacing_m[axis];
@@ -56,7 +56,7 @@ impl Facets {
 
     /// Those of a scene.
     pub(crate) fn of_scene(scene: &Scene) -> Self {
-        Self::of_modules(scene.modules, scene.grid, scene.frame.spacing).with_covers(scene.modules, scene.water)
+        Self::of_modules(scene.modules, scene.grid, scene.frame.spacing).with_covers_of(scene, scene.modules)
     }
 
     /// The facets of these load modules, told which of them lie over holes and which over water: those of a class.
@@ -74,6 +74,24 @@ impl Facets {
         self
     }
 
+    /// The facets of these load modules, told what they lie over in a scene.
+    pub(crate) fn with_covers_of<'a>(
+        self,
+        scene: &Scene,
+        modules: impl IntoIterator<Item = &'a LoadModule> + Clone,
+    ) -> Self {
+        let mut facets = self.with_covers(modules.clone(), scene.water);
+        if let Some(features) = scene.features {
+            let classes = modules.into_iter().flat_map(|module| &module.classes);
+            for (cover, &class) in facets.covers.iter_mut().zip(classes) {
+                if let Some(number) = features.color_of(class) {
+                    *cover = Cover::Feature(number);
+                }
+            }
+        }
+        facets
+    }
+
     /// What a triangle lies over.
     pub(crate) fn cover(&self, triangle: usize) -> Cover {
         self.covers.get(triangle).copied().unwrap_or_default()
@@ -87,15 +105,16 @@ impl Facets {
     /// What the posts of a DEM lie over, row by row from the south-west; empty where all lie over plain ground.
     pub(crate) fn post_covers(&self, dem: &Dem, spacing_m: f64) -> Vec<Cover> {
         let rect = dem.rect();
-        if !self.has(Cover::Water) && dem.void_count() == 0 {
+        let is_painted = |cover: Cover| matches!(cover, Cover::Water | Cover::Feature(_));
+        if !self.covers.iter().any(|cover| is_painted(*cover)) && dem.void_count() == 0 {
             return Vec::new();
         }
         let posts =
             (rect.south..=rect.north).flat_map(|row| (rect.west..=rect.east).map(move |col| Post::new(row, col)));
         let cover = |post| if dem.is_void(post) { Cover::Hole } else { Cover::Ground };
         let mut posts: Vec<Cover> = posts.map(cover).collect();
-        let triangles = self.corners.iter().enumerate().filter(|(index, _)| self.cover(*index) == Cover::Water);
-        for (_, &corners) in triangles {
+        let triangles = self.corners.iter().enumerate().map(|(index, corners)| (self.cover(index), corners));
+        for (cover, &corners) in triangles.filter(|(cover, _)| is_painted(*cover)) {
             let [a, b, c] = self.triangle(corners).map(|[x, y, _]| [x / spacing_m, y / spacing_m]);
             let left = |p: [f64; 2], q: [f64; 2], at: [f64; 2]| {
                 (q[0] - p[0]) * (at[1] - p[1]) - (q[1] - p[1]) * (at[0] - p[0])
@@ -109,7 +128,7 @@ impl Facets {
                     let at = [f64::from(col), f64::from(row)];
                     if 0.0 <= left(a, b, at) && 0.0 <= left(b, c, at) && 0.0 <= left(c, a, at) {
                         let place = rect.index(Post::new(row, col));
-                        posts[place] = Cover::Water;
+                        posts[place] = cover;
                     }
                 }
             }

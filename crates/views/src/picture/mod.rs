@@ -13,6 +13,8 @@ mod color;
 mod depth;
 mod errors;
 mod facets;
+mod feature_map;
+mod features;
 mod image;
 mod map_extent;
 mod module_maps;
@@ -37,7 +39,7 @@ pub use panels::{Panel, Style, draw_panels};
 pub use perspective::{Drawn, Look, Surface, draw_perspective, draw_wireframe};
 pub use relief::Shown;
 pub use residual_map::RESIDUAL_SCALE_M;
-pub use scene::{NO_RESIDUAL, Scene, SceneGround, SceneLimits, SceneTile};
+pub use scene::{NO_RESIDUAL, Scene, SceneFeatures, SceneGround, SceneLimits, SceneTile};
 pub(crate) use sheet::{Drawing, Key, Legend, length_text, round_length};
 pub use sight::{Eye, Sight, draw_sight};
 
@@ -56,6 +58,8 @@ pub enum Map {
     Limits,
     /// Tiles, their order and state.
     Tiles,
+    /// Roads and water, and what became of them.
+    Features,
 }
 
 impl Map {
@@ -83,5 +87,6 @@ pub(crate) fn drawings(scene: &Scene, map: Map, longest: usize) -> Vec<Drawing> 
         Map::Density => vec![module_maps::density(scene, longest)],
         Map::Limits => module_maps::limits(scene, longest).into(),
         Map::Tiles => vec![module_maps::tiles(scene, longest)],
+        Map::Features => vec![feature_map::feature_map(scene, longest)],
     }
 }

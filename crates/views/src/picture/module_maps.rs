@@ -19,7 +19,7 @@ pub(crate) fn density(scene: &Scene, longest: usize) -> Drawing {
     let is_known = !limits.modules.is_empty();
     let counts: Vec<u32> = match is_known {
         true => scene.part.iter().map(|module| limits.modules[scene.grid.index(module)]).collect(),
-        false => scene.modules.iter().map(|module| module.triangles.len() as u32).collect(),
+        false => scene.modules.iter().map(|module| module.counts().triangles).collect(),
     };
     let low = counts.iter().copied().min().unwrap_or(0);
     let high = counts.iter().copied().max().unwrap_or(0).max(low + 1);
@@ -269,7 +269,7 @@ fn label_tile(map: &mut Image, scene: &Scene, [left, top, wide, high]: [i64; 4],
         .modules
         .iter()
         .filter(|module| tile.modules.contains(module.id))
-        .map(|module| module.triangles.len() as u64)
+        .map(|module| u64::from(module.counts().triangles))
         .sum();
     let state = STATES.iter().find(|(state, _)| *state == tile.state).map_or("", |(_, name)| name);
     let mut lines = vec![
@@ -322,6 +322,7 @@ mod tests {
             ground: None,
             limits: &limits,
             water: None,
+            features: None,
             tiles: &[],
         };
         let map_extent = scene.map_extent(300);

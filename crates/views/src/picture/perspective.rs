@@ -6,7 +6,7 @@
 use terrain::{Dem, metres_of_quanta};
 
 use super::camera::{Camera, View};
-use super::color::{Color, GREY, HAZE, INK, NOTHING, SKY, WATER, WHITE, lit, mix};
+use super::color::{Color, FEATURES, GREY, HAZE, INK, NOTHING, SKY, WATER, WHITE, lit, mix};
 use super::depth::{Corner, DepthImage};
 use super::facets::{Cover, Facets, light_of_triangle};
 use super::image::Image;
@@ -97,9 +97,10 @@ pub fn draw_perspective(surface: &Surface, look: &Look) -> Drawn {
     let color = |[height_m, light]: [f64; 2], ahead: f64| {
         // Between three corners of one light it is that light but for rounding.
         let color = match light {
-            _ if light < (WATER_LIGHT + HOLE_LIGHT) / 2.0 => NOTHING,
-            _ if light < 0.0 => WATER,
-            _ => lit(tints.at(height_m), light as f32),
+            _ if 0.0 <= light => lit(tints.at(height_m), light as f32),
+            _ if (WATER_LIGHT + HOLE_LIGHT) / 2.0 < light => WATER,
+            _ if HOLE_LIGHT - 0.5 < light => NOTHING,
+            _ => FEATURES[((HOLE_LIGHT - light).round() as usize - 1).min(FEATURES.len() - 1)].1,
         };
         mix(color, HAZE, haze_share(ahead, half_m))
     };
@@ -145,6 +146,10 @@ const BLOCK: i32 = 64;
 /// Stand for the light on water and on holes, which have one colour however they lie.
 const WATER_LIGHT: f64 = -1.0;
 const HOLE_LIGHT: f64 = -2.0;
+/// The same for features of a colour: whole numbers below that of holes.
+fn feature_light(number: u8) -> f64 {
+    HOLE_LIGHT - 1.0 - f64::from(number)
+}
 /// Samples that a step of posts may cover: finer ones are not seen.
 const STEP_SAMPLES: f64 = 2.0;
 
@@ -183,6 +188,7 @@ impl Stage {
                     let light = match facets.cover(index) {
                         Cover::Water => WATER_LIGHT,
                         Cover::Hole => HOLE_LIGHT,
+                        Cover::Feature(number) => feature_light(number),
                         Cover::Ground => f64::from(light_of_triangle(facets.triangle(corners), times)),
                     };
                     let corner = |v: u32| {
@@ -259,6 +265,7 @@ impl Stage {
                     Cover::Ground => None,
                     Cover::Water => Some(WATER_LIGHT),
                     Cover::Hole => Some(HOLE_LIGHT),
+                    Cover::Feature(number) => Some(feature_light(number)),
                 };
                 if let Some(light) = light {
                     cell.iter_mut().for_each(|corner| corner.values[1] = light);
@@ -439,7 +446,7 @@ mod tests {
         let cells = (0..rect.cells_high() as u32)
             .flat_map(|row| (0..rect.cells_wide() as u32).map(move |col| row * wide + col));
         let triangles = cells.flat_map(|a| [[a, a + 1, a + wide + 1], [a, a + wide + 1, a + wide]]).collect();
-        Tin { rect, vertices: vertices.collect(), triangles }
+        Tin::new(rect, vertices.collect(), triangles)
     }
 
     #[test]
@@ -490,7 +497,7 @@ mod tests {
         let surface =
             |cover: Cover| Facets { covers: vec![cover; 60 * 60 * 2], ..Facets::of_tin(&every_post(&dem), SPACING_M) };
         let look = Look::overlooking(&Surface::Posts(&dem, SPACING_M, &[]), 30.0, 1.0, 200);
-        for (cover, color) in [(Cover::Water, WATER), (Cover::Hole, NOTHING)] {
+        for (cover, color) in [(Cover::Water, WATER), (Cover::Hole, NOTHING), (Cover::Feature(3), FEATURES[3].1)] {
             let image = draw_perspective(&Surface::Triangles(&surface(cover)), &look).image;
             let is_between =
                 |x: [u8; 3], a: [u8; 3], b: [u8; 3]| (0..3).all(|i| a[i].min(b[i]) <= x[i] && x[i] <= a[i].max(b[i]));

@@ -2,8 +2,9 @@
 
 use terrain::{Dem, metres_of_quanta};
 
-use super::color::{Color, GREY, HEIGHTS, NOTHING, WATER, lit};
+use super::color::{Color, FEATURES, GREY, HEIGHTS, NOTHING, WATER, lit};
 use super::facets::{Cover, Facets, light_of, light_of_triangle};
+use super::features::{draw_lines, keys as keys_of_features, shows};
 use super::image::Image;
 use super::map_extent::{MapExtent, Posts, SAMPLES, Samples};
 use super::scene::Scene;
@@ -45,7 +46,9 @@ impl Tints {
         let keys: Vec<_> =
             keys.into_iter().filter(|key| has(key.0)).map(|(_, key, name)| (key, name.to_owned())).collect();
         let keys = (!keys.is_empty()).then_some(Legend::Keys { title: String::new(), keys });
-        [Some(self.legend()), keys].into_iter().flatten().collect()
+        let features = keys_of_features(has);
+        let features = (!features.is_empty()).then(|| Legend::Keys { title: "Roads and water".into(), keys: features });
+        [Some(self.legend()), keys, features].into_iter().flatten().collect()
     }
 }
 
@@ -67,6 +70,10 @@ pub(crate) fn facets_relief(facets: &Facets, map_extent: &MapExtent, tints: &Tin
         let corners = facets.triangle(corners);
         match facets.cover(index) {
             Cover::Water => map_extent.cover(corners, |row, col, _| samples.add(row, col, WATER)),
+            Cover::Feature(number) => {
+                let color = FEATURES[usize::from(number)].1;
+                map_extent.cover(corners, |row, col, _| samples.add(row, col, color));
+            }
             Cover::Hole => map_extent.cover(corners, |row, col, _| samples.add(row, col, hatched(row, col))),
             Cover::Ground => {
                 let light = light_of_triangle(corners, SHADING_TIMES);
@@ -90,6 +97,7 @@ pub(crate) fn posts_relief(dem: &Dem, posts: &Posts, map_extent: &MapExtent, tin
         let [row, col] = between.sample;
         let color = match covers.get(nearest).copied().unwrap_or_default() {
             Cover::Water => WATER,
+            Cover::Feature(number) => FEATURES[usize::from(number)].1,
             Cover::Hole => hatched(row, col),
             Cover::Ground => {
                 let height_m = f64::from(between.blend(wide, |post| heights[post]));
@@ -141,7 +149,7 @@ pub(crate) fn relief(scene: &Scene, shown: Shown, longest: usize) -> Vec<Drawing
         title: format!("{}: {title}", scene.name),
         subtitle: format!("{}, {detail}", scene.what()),
         coordinates: scene.coordinates(),
-        legends: tints.legends(|cover| facets.has(cover), Key::Hatched),
+        legends: tints.legends(|cover| shows(scene, &facets, cover), Key::Hatched),
         notes: format!(
             "Light from several directions, most of it from the north-west; heights count {SHADING_TIMES} times in \
              the shading."
@@ -150,7 +158,9 @@ pub(crate) fn relief(scene: &Scene, shown: Shown, longest: usize) -> Vec<Drawing
     let tin = || {
         let detail = format!("{} triangles", grouped(facets.count() as u64));
         let sheet = sheet("relief of the load modules", detail);
-        Drawing { sheet, map: facets_relief(&facets, &map_extent, &tints), map_extent }
+        let mut map = facets_relief(&facets, &map_extent, &tints);
+        draw_lines(&mut map, &map_extent, scene, 1.0);
+        Drawing { sheet, map, map_extent }
     };
     let dem = || {
         let ground = scene.ground.expect("whoever asks for the ground has it");

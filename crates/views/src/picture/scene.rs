@@ -1,7 +1,9 @@
 //! A finished area, as pictures of it need it: plain values that somebody else has read.
 
+use database::{FeatureLine, FeatureRemark};
 use terrain::{Dem, GridFrame, LoadModule, ModuleGrid, ModuleId, ModuleRect, TileId};
 
+use super::color::feature_number;
 use super::map_extent::{MapExtent, Posts};
 use super::sheet::Coordinates;
 
@@ -18,7 +20,7 @@ pub struct Scene<'a> {
     pub frame: GridFrame,
     /// The part that is looked at.
     pub part: ModuleRect,
-    /// The load modules of that part, row by row from the south-west.
+    /// The load modules of that part, row by row from the south-west; their decks are counted, but not drawn yet.
     pub modules: &'a [LoadModule],
     /// The ground they stand for, where it is there to look at.
     pub ground: Option<SceneGround<'a>>,
@@ -26,8 +28,35 @@ pub struct Scene<'a> {
     pub limits: &'a SceneLimits,
     /// The class of water, where there is one.
     pub water: Option<u8>,
+    /// Roads and water, where there are any.
+    pub features: Option<SceneFeatures<'a>>,
     /// All tiles of the area, row by row from the south-west.
     pub tiles: &'a [SceneTile],
+}
+
+/// Roads and water of an area, as its database tells them.
+#[derive(Clone, Copy, Debug)]
+pub struct SceneFeatures<'a> {
+    /// Name of every class of the job; features have some of them.
+    pub names: &'a [String],
+    /// Classes that features have.
+    pub classes: &'a [u8],
+    /// Their lines, in metres of the area's coordinate system.
+    pub lines: &'a [FeatureLine],
+    /// What was mended, degraded or left out.
+    pub remarks: &'a [FeatureRemark],
+}
+
+impl SceneFeatures<'_> {
+    /// The place of a class among the colours, where features have it.
+    pub(crate) fn color_of(&self, class: u8) -> Option<u8> {
+        let name = self.names.get(usize::from(class)).filter(|_| self.classes.contains(&class))?;
+        Some(feature_number(name))
+    }
+
+    pub(crate) fn has_lines_of(&self, number: u8) -> bool {
+        self.lines.iter().any(|line| self.color_of(line.class) == Some(number))
+    }
 }
 
 /// The ground under a part of an area.

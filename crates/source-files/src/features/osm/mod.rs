@@ -32,7 +32,7 @@ use nodes::Nodes;
 use wire::Fault;
 
 /// Whom to name (Open Database License, section 4.3).
-const ATTRIBUTION: &str = "(c) OpenStreetMap contributors, ODbL 1.0";
+pub(super) const ATTRIBUTION: &str = "(c) OpenStreetMap contributors, ODbL 1.0";
 /// Ways without a node near the area that are looked at for whether their nodes are in the file at all.
 const LOST_MAX: usize = 100_000;
 

@@ -1,13 +1,15 @@
 //! Tests of what is asked of the ground, against slow and obvious answers.
 
+mod decks;
+
 use std::sync::Arc;
 
 use fastrand::Rng;
 
 use crate::lookup::STEPS;
 use crate::{
-    Area, Block, Keep, LoadedGround, Module, ReadError, Residual, Sight, SlmFile, TerrainModule, TileFile, Vertex,
-    sample,
+    Area, Block, Decks, Keep, LoadedGround, Module, ReadError, Residual, Sight, SlmFile, TerrainModule, TileFile,
+    Vertex, sample,
 };
 
 const SIDE: u16 = 64_000;
@@ -51,6 +53,7 @@ fn rough(n: u16, seed: u64) -> Module {
         sides: Default::default(),
         polygon_count,
         residual,
+        decks: Decks::default(),
     }
 }
 

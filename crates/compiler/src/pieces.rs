@@ -1,0 +1,379 @@
+//! What features came to, in the pieces that tiles need, and in the lines that people ask for.
+
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+
+use database::{AreaLevel, FeatureFace, FeatureLine, FeatureRemark, LineRole};
+use features::{Face, FeatureId, Formed, FormedEdge, Levelled, Place, Remark, Role, Surface};
+use ground::{GamingArea, slope_reach};
+use load_modules::{Layout, cut_decks};
+use terrain::{
+    FeatureSurface, Features, LATTICE_PER_POST, LatticePoint, ModuleId, PostRect, Side, SideSpan, SurfaceGround,
+    TileFeatures, TileId, Vertex,
+};
+use tiling::{outer_border_posts, outer_sides};
+
+use crate::read_features::ReadFeatures;
+use crate::run::Run;
+use crate::strips::strips;
+
+/// What features put into each tile, row-major.
+pub(crate) fn pieces(run: &Run, features: &features::AreaFeatures, formed: &Formed) -> Vec<TileFeatures> {
+    let steps = features.site.lattice.steps_per_post();
+    let mut cutting = Cutting { area: &run.area, steps, classes: classes_of(run), pieces: Vec::new() };
+    cutting.pieces = run.area.tiles.iter().map(|&tile| Piece::of(tile, steps)).collect();
+    cutting.edges(formed);
+    cutting.surfaces(&formed.surfaces);
+    cutting.decks(&formed.decks);
+    cutting.slopes(formed);
+    let Cutting { area, pieces, .. } = cutting;
+    pieces
+        .into_iter()
+        .map(|piece| {
+            let rect = area.tiling.rect(piece.features.tile);
+            piece.finish(rect)
+        })
+        .collect()
+}
+
+/// The job's number of each class of features.
+fn classes_of(run: &Run) -> Vec<u8> {
+    let names = run.job.class_names();
+    let spec = run.job.features.as_ref().expect("a stage of jobs with features");
+    let number = |class: &String| names.iter().position(|name| name == class).expect("a job has its features' classes");
+    features::class_names(&spec.rules).iter().map(|class| number(class) as u8).collect()
+}
+
+/// A tile's features while they are put together.
+struct Piece {
+    features: TileFeatures,
+    numbers: HashMap<Place, u32>,
+    /// Rings by body: the body's number in the area, then class, ground and ring.
+    bodies: BTreeMap<u32, Vec<FeatureSurface>>,
+}
+
+impl Piece {
+    fn of(tile: TileId, steps: i32) -> Self {
+        let kept = Features { steps_per_post: steps, ..Features::default() };
+        let features = TileFeatures { kept, ..TileFeatures::none(tile) };
+        Self { features, numbers: HashMap::new(), bodies: BTreeMap::new() }
+    }
+
+    fn vertex(&mut self, place: Place, height: i32) -> u32 {
+        let vertices = &mut self.features.kept.vertices;
+        *self.numbers.entry(place).or_insert_with(|| {
+            vertices.push(vertex((place, height)));
+            vertices.len() as u32 - 1
+        })
+    }
+
+    /// In an order that depends on nothing but the content.
+    fn finish(self, rect: PostRect) -> TileFeatures {
+        let Self { mut features, bodies, .. } = self;
+        let mut bodies: Vec<Vec<FeatureSurface>> = bodies.into_values().collect();
+        bodies.iter_mut().for_each(|rings| rings.sort());
+        bodies.sort();
+        features.surfaces = (0..).zip(bodies).flat_map(|(body, rings)| with_body(rings, body)).collect();
+        features.decks.sort();
+        features.decks = (0..).zip(features.decks).flat_map(|(body, deck)| with_body(vec![deck], body)).collect();
+        features.slopes.sort_unstable();
+        features.kept.spans = spans(&features.surfaces, rect, features.kept.steps_per_post);
+        features.kept = features.kept.canonical();
+        features
+    }
+}
+
+fn with_body(rings: Vec<FeatureSurface>, body: u32) -> impl Iterator<Item = FeatureSurface> {
+    rings.into_iter().map(move |ring| FeatureSurface { body, ..ring })
+}
+
+fn vertex((place, height): (Place, i32)) -> Vertex {
+    Vertex { at: LatticePoint::new(place.row, place.col), height }
+}
+
+struct Cutting<'a> {
+    area: &'a GamingArea,
+    steps: i32,
+    classes: Vec<u8>,
+    pieces: Vec<Piece>,
+}
+
+impl Cutting<'_> {
+    /// The pieces of the tiles that touch a box of places, grown by `reach` steps.
+    fn touching(&self, places: impl Iterator<Item = Place> + Clone, reach: i32) -> Vec<usize> {
+        let side = self.steps * self.area.grid.side_cells;
+        let span = |of: fn(&Place) -> i32, count: u32| {
+            let all = places.clone();
+            let low = all.clone().map(|place| of(&place)).min()? - reach;
+            let high = all.map(|place| of(&place)).max()? + reach;
+            // A place on a line touches the load modules on both sides of it.
+            let (first, last) = ((low - 1).div_euclid(side).max(0), high.div_euclid(side).min(count as i32 - 1));
+            (first <= last).then_some((first as u32, last as u32))
+        };
+        let grid = self.area.grid;
+        let (Some(rows), Some(cols)) = (span(|place| place.row, grid.rows), span(|place| place.col, grid.cols)) else {
+            return Vec::new();
+        };
+        let tile = |row, col| self.area.tiling.tile_of_module(ModuleId { row, col }, grid);
+        let (low, high) = (tile(rows.0, cols.0), tile(rows.1, cols.1));
+        let tiles = (low.row..=high.row).flat_map(|row| (low.col..=high.col).map(move |col| TileId { row, col }));
+        tiles.map(|tile| self.area.tiling.index(tile)).collect()
+    }
+
+    /// Vertices and edges; those on a line between tiles go to all of them.
+    fn edges(&mut self, formed: &Formed) {
+        let inside = |place: Place| {
+            let rect = self.area.rect;
+            let within = |v: i32, low: i32, high: i32| low * self.steps <= v && v <= high * self.steps;
+            within(place.row, rect.south, rect.north) && within(place.col, rect.west, rect.east)
+        };
+        let is_inside: Vec<bool> = formed.points.iter().map(|(place, _)| inside(*place)).collect();
+        let used: BTreeSet<u32> = formed
+            .edges
+            .iter()
+            .filter(|edge| is_inside[edge.a as usize] && is_inside[edge.b as usize])
+            .flat_map(|edge| [edge.a, edge.b])
+            .collect();
+        for point in used {
+            let (place, height) = formed.points[point as usize];
+            for index in self.touching(std::iter::once(place), 0) {
+                self.pieces[index].vertex(place, height);
+            }
+        }
+        for edge in &formed.edges {
+            let ends = [edge.a, edge.b].map(|point| formed.points[point as usize].0);
+            for index in self.touching(ends.into_iter(), 0) {
+                let piece = &mut self.pieces[index];
+                let [Some(&a), Some(&b)] = ends.map(|end| piece.numbers.get(&end)) else { continue };
+                piece.features.kept.edges.push([a, b]);
+            }
+        }
+    }
+
+    fn surfaces(&mut self, surfaces: &[Surface]) {
+        // Rings of one feature and role at one level are one body; strips are bodies of their own.
+        let mut bodies: BTreeMap<(u16, Role, FeatureId, i32), u32> = BTreeMap::new();
+        let mut next = 0;
+        for surface in surfaces {
+            let level = if surface.role == Role::Shore { surface.ring[0].1 } else { 0 };
+            let key = (surface.class, surface.role, surface.id, level);
+            let body = match bodies.get(&key).filter(|_| surface.role != Role::Side) {
+                Some(&body) => body,
+                None => {
+                    bodies.insert(key, next);
+                    next += 1;
+                    next - 1
+                }
+            };
+            let ground = match surface.role {
+                Role::Shore => SurfaceGround::Lake,
+                Role::Bank => SurfaceGround::River,
+                _ => SurfaceGround::Road,
+            };
+            let class = self.classes[usize::from(surface.class)];
+            let ring: Vec<Vertex> = surface.ring.iter().copied().map(vertex).collect();
+            // A shore lifts the ground within a post of it.
+            let reach = if ground == SurfaceGround::Lake { self.steps } else { 0 };
+            for index in self.touching(surface.ring.iter().map(|(place, _)| *place), reach) {
+                let ring = FeatureSurface { class, ground, body: 0, ring: ring.clone() };
+                self.pieces[index].bodies.entry(body).or_default().push(ring);
+            }
+        }
+    }
+
+    fn decks(&mut self, decks: &[Face]) {
+        for deck in decks {
+            let class = self.classes[usize::from(deck.class)];
+            let ring: Vec<Vertex> = deck.corners.iter().copied().map(vertex).collect();
+            for index in self.touching(deck.corners.iter().map(|(place, _)| *place), 0) {
+                let deck = FeatureSurface { class, ground: SurfaceGround::Road, body: 0, ring: ring.clone() };
+                self.pieces[index].features.decks.push(deck);
+            }
+        }
+    }
+
+    /// Edges and centrelines of roads, for all tiles into which their slopes may reach.
+    fn slopes(&mut self, formed: &Formed) {
+        let reach = (slope_reach(self.area.frame.spacing) + 1) * self.steps;
+        for edge in formed.edges.iter().filter(|edge| matches!(edge.role, Role::Side | Role::Centre)) {
+            let ends = [edge.a, edge.b].map(|point| formed.points[point as usize]);
+            for index in self.touching(ends.into_iter().map(|(place, _)| place), reach) {
+                self.pieces[index].features.slopes.push(ends.map(vertex));
+            }
+        }
+    }
+}
+
+/// Stretches of the sides of a tile that roads cover from edge to edge.
+fn spans(surfaces: &[FeatureSurface], rect: PostRect, steps: i32) -> Vec<SideSpan> {
+    let mut spans = Vec::new();
+    for surface in surfaces.iter().filter(|surface| surface.ground == SurfaceGround::Road) {
+        for side in Side::ALL {
+            let on_side = |at: LatticePoint| match side {
+                Side::South => (at.row == rect.south * steps).then_some(at.col),
+                Side::North => (at.row == rect.north * steps).then_some(at.col),
+                Side::West => (at.col == rect.west * steps).then_some(at.row),
+                Side::East => (at.col == rect.east * steps).then_some(at.row),
+            };
+            let along = || surface.ring.iter().filter_map(|vertex| on_side(vertex.at));
+            if let (Some(from), Some(to)) = (along().min(), along().max())
+                && from < to
+            {
+                spans.push(SideSpan { side, from, to });
+            }
+        }
+    }
+    spans
+}
+
+/// What is told of the whole area.
+pub(crate) fn area_level(run: &Run, read: &ReadFeatures, levelled: &Levelled) -> AreaLevel {
+    let (grid, classes) = (run.area.grid, classes_of(run));
+    let mut cost: Vec<(u32, u8, u32)> = Vec::new();
+    for (&(row, col), of) in &levelled.reserved.cost {
+        let (Ok(row), Ok(col)) = (u32::try_from(row), u32::try_from(col)) else { continue };
+        if row < grid.rows && col < grid.cols {
+            let place = grid.index(ModuleId { row, col }) as u32;
+            cost.extend(of.iter().map(|(class, count)| (place, classes[usize::from(*class)], *count)));
+        }
+    }
+    cost.sort_unstable();
+    let told = |remark: &Remark| {
+        let at_m = remark.posts.map(|[east, north]| {
+            let metres = |posts: f64| posts * run.area.frame.spacing.metres();
+            [run.area.frame.origin_east_m + metres(east), run.area.frame.origin_north_m + metres(north)]
+        });
+        FeatureRemark {
+            feature: read.vectors.name(remark.id).to_owned(),
+            at_m,
+            found: remark.flaw.to_string(),
+            done: remark.remedy.to_string(),
+            leaves_out: remark.remedy.leaves_out(),
+            degrades: remark.remedy.degrades(),
+        }
+    };
+    let remarks = read.vectors.remarks.iter().cloned().chain(levelled.remarks.iter().map(told)).collect();
+    let formed = &levelled.reserved.formed;
+    AreaLevel {
+        tiles: Vec::new(),
+        cost,
+        reserved: Vec::new(),
+        lines: lines(run, read, formed, &classes),
+        strips: strips(&read.features, formed, &classes, run.area.rect),
+        decks: decks(run, read, &formed.decks, &classes),
+        remarks,
+    }
+}
+
+/// The surfaces of bridges as people ask for them.
+fn decks(run: &Run, read: &ReadFeatures, decks: &[Face], classes: &[u8]) -> Vec<FeatureFace> {
+    let metres = metres_of(run, read);
+    let face = |deck: &Face| FeatureFace {
+        feature: read.vectors.name(deck.id).to_owned(),
+        class: classes[usize::from(deck.class)],
+        ring: deck.corners.iter().map(|&corner| metres(corner)).collect(),
+    };
+    decks.iter().map(face).collect()
+}
+
+/// Easting, northing and height of a place, in metres.
+fn metres_of(run: &Run, read: &ReadFeatures) -> impl Fn((Place, i32)) -> [f64; 3] {
+    let (lattice, frame) = (read.features.site.lattice, run.area.frame);
+    move |(place, height)| {
+        let [east, north] = lattice.posts_of(place).map(|posts| posts * frame.spacing.metres());
+        [frame.origin_east_m + east, frame.origin_north_m + north, terrain::metres_of_quanta(height)]
+    }
+}
+
+/// Triangles that features add to each load module, whatever else it holds, by its place: of the ground, and decks.
+pub(crate) fn reserved(run: &Run, formed: &Formed, pieces: &[TileFeatures]) -> Vec<(u32, u32)> {
+    let (area, job) = (&run.area, run.job);
+    let steps_per_post = pieces.first().map_or(LATTICE_PER_POST, |piece| piece.kept.steps_per_post);
+    let vertices = formed.points.iter().copied().map(vertex).collect();
+    let kept = Features { steps_per_post, vertices, ..Features::default() };
+    let mut border = outer_border_posts(area.rect, outer_sides(area.rect, area.rect), job.outer_step_cells());
+    border.sort_unstable();
+    let mut cost = limits::feature_cost(&kept, area.grid, &border);
+    for piece in pieces.iter().filter(|piece| !piece.decks.is_empty()) {
+        let modules = area.tiling.modules(piece.tile, area.grid);
+        let layout = Layout { grid: area.grid, modules, spacing: area.frame.spacing };
+        let decks = cut_decks(&piece.decks, piece.kept.steps_per_post, &layout);
+        for (module, decks) in modules.iter().zip(decks).filter(|(_, decks)| !decks.is_empty()) {
+            *cost.entry(module).or_insert(0) += decks.triangles.len() as u32;
+        }
+    }
+    cost.into_iter().map(|(module, triangles)| (area.grid.index(module) as u32, triangles)).collect()
+}
+
+/// Edges as lines of their features.
+fn lines(run: &Run, read: &ReadFeatures, formed: &Formed, classes: &[u8]) -> Vec<FeatureLine> {
+    let mut groups: BTreeMap<(FeatureId, Role, u16), Vec<&FormedEdge>> = BTreeMap::new();
+    for edge in &formed.edges {
+        groups.entry((edge.id, edge.role, edge.class)).or_default().push(edge);
+    }
+    let to_metres = metres_of(run, read);
+    let metres = |point: u32| to_metres(formed.points[point as usize]);
+    let traits = read.features.traits_by_id();
+    let mut lines = Vec::new();
+    for ((id, role, class), edges) in groups {
+        let of = traits.get(&id);
+        for chain in chains(&edges) {
+            lines.push(FeatureLine {
+                feature: read.vectors.name(id).to_owned(),
+                class: classes[usize::from(class)],
+                role: line_role(role),
+                width_m: of.map_or(0.0, |of| terrain::metres_of_quanta(of.width)),
+                grade_max_ppm: of.map_or(0, |of| of.grade_ppm),
+                vertices: chain.into_iter().map(metres).collect(),
+            });
+        }
+    }
+    lines
+}
+
+fn line_role(role: Role) -> LineRole {
+    match role {
+        Role::Side => LineRole::Side,
+        Role::Centre => LineRole::Centre,
+        Role::Shore => LineRole::Shore,
+        Role::Channel => LineRole::Channel,
+        Role::Bank => LineRole::Bank,
+        Role::Breakline => LineRole::Breakline,
+        Role::Toe => LineRole::Toe,
+    }
+}
+
+/// Edges one after another, as far as exactly two meet; from the least end on.
+fn chains(edges: &[&FormedEdge]) -> Vec<Vec<u32>> {
+    let mut beside: BTreeMap<u32, Vec<(u32, usize)>> = BTreeMap::new();
+    for (number, edge) in edges.iter().enumerate() {
+        beside.entry(edge.a).or_default().push((edge.b, number));
+        beside.entry(edge.b).or_default().push((edge.a, number));
+    }
+    let mut done = vec![false; edges.len()];
+    let mut chains = Vec::new();
+    // Open ends and forks first; what is left are rings.
+    for through in [false, true] {
+        for (&from, next) in &beside {
+            if (next.len() == 2) != through {
+                continue;
+            }
+            for &(to, number) in next {
+                if done[number] {
+                    continue;
+                }
+                done[number] = true;
+                let mut chain = vec![from, to];
+                let mut at = to;
+                while let [one, other] = beside[&at][..]
+                    && let Some(&(to, number)) = [one, other].iter().find(|(_, number)| !done[*number])
+                {
+                    done[number] = true;
+                    chain.push(to);
+                    at = to;
+                }
+                chains.push(chain);
+            }
+        }
+    }
+    chains
+}

@@ -1,0 +1,50 @@
+//! The features of a job on the lattice, and which tile asks the DEM at which of their stations.
+
+use features::{AreaFeatures, Place};
+use ground::{GamingArea, Vectors, area_features};
+use job::Job;
+use terrain::{ModuleId, TileId};
+
+use crate::CompileError;
+
+/// The features of a job as they were read, and which tile each of their stations lies in.
+pub(crate) struct ReadFeatures {
+    pub vectors: Vectors,
+    pub features: AreaFeatures,
+    /// Stations of each tile, by their place among those of the area. What lies beyond the area is in none.
+    pub by_tile: Vec<Vec<u32>>,
+}
+
+impl ReadFeatures {
+    /// Reads the features of a job that has some.
+    ///
+    /// # Errors
+    /// When a file of them cannot be read at all.
+    pub fn open(job: &Job, area: &GamingArea) -> Result<Option<Self>, CompileError> {
+        let Some((vectors, features)) = area_features(job, area)? else { return Ok(None) };
+        let mut by_tile = vec![Vec::new(); area.tiles.len()];
+        for (number, &place) in features.stations().iter().enumerate() {
+            if let Some(tile) = tile_of(area, &features, place) {
+                by_tile[area.tiling.index(tile)].push(number as u32);
+            }
+        }
+        Ok(Some(Self { vectors, features, by_tile }))
+    }
+
+    /// The stations of a tile.
+    pub fn stations(&self, index: usize) -> impl ExactSizeIterator<Item = Place> + Clone {
+        self.by_tile[index].iter().map(|&number| self.features.stations()[number as usize])
+    }
+}
+
+/// The tile of a place: on a line between two the one north or east of it, but for the area's own border.
+fn tile_of(area: &GamingArea, features: &AreaFeatures, place: Place) -> Option<TileId> {
+    let side = features.site.lattice.steps_per_post() * area.grid.side_cells;
+    let module = |at: i32, count: u32| {
+        let number = u32::try_from(at.div_euclid(side)).ok()?;
+        let on_border = at.rem_euclid(side) == 0 && number == count;
+        (number < count || on_border).then_some(number.min(count - 1))
+    };
+    let (row, col) = (module(place.row, area.grid.rows)?, module(place.col, area.grid.cols)?);
+    Some(area.tiling.tile_of_module(ModuleId { row, col }, area.grid))
+}

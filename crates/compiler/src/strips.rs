@@ -1,0 +1,112 @@
+//! What was found of strips: how long they are, whether one is too steep, whether one falls to a side.
+
+use std::collections::BTreeMap;
+
+use database::StripFigures;
+use features::{AreaFeatures, Face, FeatureLattice, Formed, Place};
+use terrain::PostRect;
+
+/// Figures of strips by class in an area that covers `rect`; `classes` are the job's numbers of the features' classes.
+/// Features are cut one load module outside of it; strips are counted whose middle lies inside.
+pub(crate) fn strips(features: &AreaFeatures, formed: &Formed, classes: &[u8], rect: PostRect) -> Vec<StripFigures> {
+    let (traits, lattice) = (features.traits_by_id(), features.site.lattice);
+    let mut figures: BTreeMap<u8, StripFigures> = BTreeMap::new();
+    for face in formed.faces.iter().filter(|face| is_inside(face, lattice, rect)) {
+        let Some(strip) = Strip::of(face, &formed.points) else { continue };
+        let class = classes[usize::from(face.class)];
+        let of = figures.entry(class).or_insert(StripFigures { class, ..StripFigures::default() });
+        let grade_ppm = traits.get(&face.id).map_or(0, |traits| traits.grade_ppm);
+        of.pieces += 1;
+        of.length_m += strip.length(lattice);
+        of.steeper += u64::from(strip.is_steeper(grade_ppm, lattice));
+        of.fall_max = of.fall_max.max(strip.fall());
+    }
+    figures.into_values().collect()
+}
+
+fn is_inside(face: &Face, lattice: FeatureLattice, rect: PostRect) -> bool {
+    let within = |of: fn(&Place) -> i32, low: i32, high: i32| {
+        let sum: i64 = face.corners.iter().map(|(place, _)| i64::from(of(place))).sum();
+        let line = |posts: i32| i64::from(posts) * i64::from(lattice.steps_per_post()) * face.corners.len() as i64;
+        line(low) <= sum && sum <= line(high)
+    };
+    within(|place| place.row, rect.south, rect.north) && within(|place| place.col, rect.west, rect.east)
+}
+
+/// A piece of a strip from one station to the next: right and left at its end, then left and right at its beginning,
+/// with the heights that the TIN has there.
+struct Strip([(Place, i32); 4]);
+
+impl Strip {
+    /// Of a face of four corners that are all in the TIN; all others are junctions, or cut by a higher class.
+    fn of(face: &Face, points: &[(Place, i32)]) -> Option<Self> {
+        let [right_from, right_to, left_to, left_from] = face.corners[..] else { return None };
+        let height = |corner: (Place, i32)| {
+            let found = points.binary_search_by_key(&corner.0, |(place, _)| *place).ok()?;
+            Some(points[found])
+        };
+        Some(Self([height(right_to)?, height(left_to)?, height(left_from)?, height(right_from)?]))
+    }
+
+    /// The largest difference in height across it, at either end, in quanta.
+    fn fall(&self) -> u32 {
+        let [a, b, c, d] = self.0.map(|(_, height)| height);
+        a.abs_diff(b).max(c.abs_diff(d))
+    }
+
+    /// The middles of its ends, doubled, and twice its rise between them.
+    fn middles(&self) -> ([Place; 2], i64) {
+        let [a, b, c, d] = self.0;
+        let doubled = |one: (Place, i32), other: (Place, i32)| {
+            (Place::new(one.0.row + other.0.row, one.0.col + other.0.col), i64::from(one.1) + i64::from(other.1))
+        };
+        let ((from, low), (to, high)) = (doubled(c, d), doubled(a, b));
+        ([from, to], high - low)
+    }
+
+    /// Metres along its middle.
+    fn length(&self, lattice: FeatureLattice) -> f64 {
+        let ([from, to], _) = self.middles();
+        let [east, north] = from.to(to).map(|steps| steps as f64 / 2.0 * lattice.metres_per_step());
+        (east * east + north * north).sqrt()
+    }
+
+    /// Whether it rises by more than a grade lets it and a quantum.
+    fn is_steeper(&self, grade_ppm: u32, lattice: FeatureLattice) -> bool {
+        let (_, rise) = self.middles();
+        let rise_max = self.length(lattice) * f64::from(terrain::QUANTA_PER_METRE) * f64::from(grade_ppm) / 1e6;
+        grade_ppm != 0 && rise_max + 1.0 < (rise as f64 / 2.0).abs()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use terrain::Spacing;
+
+    /// 25 m posts: 64 steps of 50 quanta each.
+    fn lattice() -> FeatureLattice {
+        FeatureLattice::of(Spacing::from_metres(25.0).unwrap())
+    }
+
+    /// Eastwards, 128 steps long and 16 wide, from one height to another.
+    fn strip(from: i32, to: i32) -> Strip {
+        let at = |row, col, height| (Place::new(row, col), height);
+        Strip([at(0, 128, to), at(16, 128, to), at(16, 0, from), at(0, 0, from)])
+    }
+
+    #[test]
+    fn a_strip_has_its_length_and_no_fall_and_is_steep_beyond_its_grade() {
+        let strip = strip(0, 640);
+        assert_eq!((strip.length(lattice()), strip.fall()), (50.0, 0));
+        assert!(!strip.is_steeper(100_000, lattice()) && strip.is_steeper(99_000, lattice()));
+        assert!(!strip.is_steeper(0, lattice()), "without a greatest grade nothing is too steep");
+    }
+
+    #[test]
+    fn a_corner_that_is_lower_than_the_one_across_is_a_fall() {
+        let mut fallen = strip(0, 640);
+        fallen.0[1].1 -= 7;
+        assert_eq!(fallen.fall(), 7);
+    }
+}

@@ -1,0 +1,10 @@
+//! Roads, rivers and lakes in small areas of known ground: what must hold of each is asked of the load modules, through
+//! the reader for simulators, and of what `level` published.
+
+mod drawing;
+pub use drawing::{Drawn, geojson, line, polygon};
+
+mod bytes;
+mod refused;
+mod roads;
+mod water;

@@ -1,0 +1,186 @@
+//! `survey/features.level`: what the features of an area came to. Private to this project.
+
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use crate::frame::{Kind, malformed};
+use crate::{DatabaseError, FileStamp, Stamp, codec, frame};
+
+/// What was decided of all features together.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct AreaLevel {
+    /// The file of each tile, row-major.
+    pub tiles: Vec<FileStamp>,
+    /// Triangles that features take of a load module and class: the load module's place in the area, row-major; the
+    /// class of the job; triangles. In ascending order.
+    pub cost: Vec<(u32, u8, u32)>,
+    /// Triangles that features take of a load module, counted exactly, by its place. Those that take none are left out.
+    pub reserved: Vec<(u32, u32)>,
+    /// Edges of the TIN as lines of their features.
+    pub lines: Vec<FeatureLine>,
+    /// What was found of strips, by class in ascending order.
+    pub strips: Vec<StripFigures>,
+    /// The surfaces of bridges.
+    pub decks: Vec<FeatureFace>,
+    /// What was mended, degraded or left out.
+    pub remarks: Vec<FeatureRemark>,
+}
+
+impl AreaLevel {
+    /// Triangles that features take of each of `count` load modules, row-major.
+    pub fn reserved_of(&self, count: usize) -> Vec<u32> {
+        let mut reserved = vec![0; count];
+        for &(place, triangles) in &self.reserved {
+            if let Some(of) = reserved.get_mut(place as usize) {
+                *of = triangles;
+            }
+        }
+        reserved
+    }
+}
+
+/// A run of edges of one feature, all of one role.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FeatureLine {
+    /// The feature, as its file names it.
+    pub feature: String,
+    /// Its class, a number of the job's.
+    pub class: u8,
+    /// What it is to its feature.
+    pub role: LineRole,
+    /// Metres wide.
+    pub width_m: f64,
+    /// The greatest grade it may have, in parts per million; 0 where it has none.
+    pub grade_max_ppm: u32,
+    /// Easting, northing and height of its vertices, in metres.
+    pub vertices: Vec<[f64; 3]>,
+}
+
+/// What was found of the strips of a class.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct StripFigures {
+    /// The class, a number of the job's.
+    pub class: u8,
+    /// Pieces from one station to the next.
+    pub pieces: u64,
+    /// Metres along their middles.
+    pub length_m: f64,
+    /// Pieces steeper than the greatest grade by more than a quantum of height.
+    pub steeper: u64,
+    /// The largest difference in height between left and right, in quanta.
+    pub fall_max: u32,
+}
+
+/// A polygon of a feature.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FeatureFace {
+    /// The feature, as its file names it.
+    pub feature: String,
+    /// Its class, a number of the job's.
+    pub class: u8,
+    /// Easting, northing and height of its corners, in metres; the first is not repeated.
+    pub ring: Vec<[f64; 3]>,
+}
+
+/// What a line of edges is to its feature.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub enum LineRole {
+    /// The outline of a strip or a junction.
+    Side,
+    /// A centreline.
+    Centre,
+    /// The outline of level water.
+    Shore,
+    /// The middle of a river or stream.
+    Channel,
+    /// The outline of a river.
+    Bank,
+    /// A line that a job names.
+    Breakline,
+    /// Where a slope meets the ground.
+    Toe,
+}
+
+impl LineRole {
+    /// The word for it.
+    pub fn name(self) -> &'static str {
+        match self {
+            LineRole::Side => "side",
+            LineRole::Centre => "centreline",
+            LineRole::Shore => "shore",
+            LineRole::Channel => "channel",
+            LineRole::Bank => "bank",
+            LineRole::Breakline => "breakline",
+            LineRole::Toe => "toe",
+        }
+    }
+}
+
+/// Something that was wrong with a feature, and what was done about it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FeatureRemark {
+    /// The feature, as its file names it.
+    pub feature: String,
+    /// Easting and northing in metres, where it has a place.
+    pub at_m: Option<[f64; 2]>,
+    /// What was wrong.
+    pub found: String,
+    /// What was done.
+    pub done: String,
+    /// Whether it, or a part of it, is missing from the ground because of it.
+    pub leaves_out: bool,
+    /// Whether it is coarser than asked for because of it.
+    pub degrades: bool,
+}
+
+/// The bytes of what features came to.
+pub fn encode_level(stamp: &Stamp, level: &AreaLevel) -> Vec<u8> {
+    frame::seal(Kind::Level, stamp, &codec::encode(level))
+}
+
+/// What features came to, whose file, at `path`, has these bytes.
+///
+/// # Errors
+/// When the file is not as it was written.
+pub fn decode_level(path: &Path, bytes: &[u8]) -> Result<(Stamp, AreaLevel), DatabaseError> {
+    let (stamp, payload) = frame::open(Kind::Level, path, bytes)?;
+    Ok((stamp, codec::decode(payload).map_err(|what| malformed(path, what))?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::samples;
+
+    #[test]
+    fn what_features_came_to_survives_its_file_and_every_damage_is_an_error() {
+        let path = Path::new("features.level");
+        let level = AreaLevel {
+            tiles: vec![FileStamp::of(b"one"), FileStamp::of(b"other")],
+            cost: vec![(0, 3, 12), (7, 2, 1)],
+            reserved: vec![(0, 12), (7, 1)],
+            lines: vec![FeatureLine {
+                feature: "way/12".into(),
+                class: 3,
+                role: LineRole::Centre,
+                width_m: 3.5,
+                grade_max_ppm: 250_000,
+                vertices: vec![[500_000.5, 4_000_000.0, 12.25]],
+            }],
+            strips: vec![StripFigures { class: 3, pieces: 2, length_m: 12.5, steeper: 1, fall_max: 9 }],
+            decks: vec![FeatureFace { feature: "way/13".into(), class: 3, ring: vec![[1.0, 2.0, 3.0]] }],
+            remarks: vec![FeatureRemark {
+                feature: "way/12".into(),
+                at_m: Some([1.0, 2.0]),
+                found: "a spike".into(),
+                done: "left out".into(),
+                leaves_out: true,
+                degrades: false,
+            }],
+        };
+        let bytes = encode_level(&samples::stamp(), &level);
+        assert_eq!(decode_level(path, &bytes).unwrap(), (samples::stamp(), level));
+        samples::check_every_damage(&bytes, |bytes| decode_level(path, bytes).is_err());
+    }
+}

@@ -1,0 +1,96 @@
+//! What `report.json` says of roads, rivers and lakes.
+
+use serde::{Deserialize, Serialize};
+
+/// What features of an area cost, how true they are, and what became of those that could not be as they were wanted.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ReportFeatures {
+    /// Each class of features that is there, in the job's order.
+    pub classes: Vec<ReportFeatureClass>,
+    /// What all of them take together.
+    pub all: ReportFeatureCost,
+    /// Remarks by what was done; `features.geojson` has each of them.
+    pub remarks: ReportFeatureRemarks,
+    /// What must hold of features, in figures.
+    pub checks: ReportFeatureChecks,
+}
+
+/// One class of features.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ReportFeatureClass {
+    /// Its name.
+    pub name: String,
+    /// Kilometres that are lines of the TIN: roads as centrelines, breaklines.
+    pub line_km: f64,
+    /// Kilometres that are strips with a left and a right edge.
+    pub strip_km: f64,
+    /// Kilometres of rivers and streams.
+    pub channel_km: f64,
+    /// Lakes.
+    pub lakes: u64,
+    /// Polygons of bridges.
+    pub deck_polygons: u64,
+    /// What it takes.
+    pub cost: ReportFeatureCost,
+}
+
+/// Triangles that features take, as they were reserved before any tile was refined.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ReportFeatureCost {
+    /// Triangles of the whole area.
+    pub triangles: u64,
+    /// Most triangles of a load module.
+    pub module_max: u64,
+    /// That, as a share of the limit of a load module.
+    pub module_share: f64,
+    /// Most triangles of a window.
+    pub window_max: u64,
+    /// That, as a share of the limit of a window.
+    pub window_share: f64,
+}
+
+/// Remarks on features, each counted once, by the worst that was done.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ReportFeatureRemarks {
+    /// Something was put right.
+    pub mended: u64,
+    /// A feature is coarser than was asked for.
+    pub degraded: u64,
+    /// A feature, or a part of it, is not in the ground.
+    pub left_out: u64,
+}
+
+/// What must hold of features.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ReportFeatureChecks {
+    /// Edges that the TIN has to keep.
+    pub edges: u64,
+    /// Those that it lacks; each is listed as degraded.
+    pub edges_missing: u64,
+    /// Pieces of roads from one station to the next.
+    pub stations: u64,
+    /// Those that are steeper than the greatest grade of their road by more than a quantum of height.
+    pub stations_steeper: u64,
+    /// Ends of pieces of strips.
+    pub strip_stations: u64,
+    /// The largest difference in height between the two edges of a strip at one of them, in metres.
+    pub strip_fall_max_m: f64,
+    /// Edges of rivers and streams.
+    pub river_edges: u64,
+    /// Those that rise downstream.
+    pub river_edges_rising: u64,
+    /// Lakes.
+    pub lakes: u64,
+    /// How far any vertex of the TIN in a lake lies from the lake's level, in metres.
+    pub lake_spread_max_m: f64,
+    /// Posts outside water within a post of a lake.
+    pub shore_posts: u64,
+    /// Those of them that lie below its level.
+    pub shore_posts_below: u64,
+    /// Posts outside features and their slopes.
+    pub outside_posts: u64,
+    /// RMS residual of these against the source's heights, in metres.
+    pub outside_rms_m: f64,
+    /// The largest of them, in metres.
+    pub outside_max_m: f64,
+}

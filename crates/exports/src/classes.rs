@@ -1,0 +1,94 @@
+//! Classes of triangles as exports name and colour them.
+
+use database::Report;
+use terrain::named_class_color;
+
+/// Base colours of classes whose names say nothing of their colour, in order and over again: told apart by the
+/// colour-blind, too.
+const COLOURS: [[f64; 3]; 8] = [
+    [0.55, 0.50, 0.36],
+    [0.34, 0.42, 0.30],
+    [0.10, 0.27, 0.45],
+    [0.62, 0.36, 0.12],
+    [0.46, 0.46, 0.46],
+    [0.17, 0.48, 0.43],
+    [0.60, 0.56, 0.20],
+    [0.42, 0.24, 0.38],
+];
+
+/// The classes of a job, in its order.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Classes<'a> {
+    names: &'a [String],
+}
+
+impl<'a> Classes<'a> {
+    /// Classes with these names.
+    pub(crate) fn named(names: &'a [String]) -> Self {
+        Self { names }
+    }
+
+    /// The name of a class, where a job has several: a single one needs none.
+    pub(crate) fn name(self, class: u8) -> Option<&'a str> {
+        self.names.get(usize::from(class)).filter(|_| 1 < self.names.len()).map(String::as_str)
+    }
+
+    /// The same as one word, which ends no line of a text and no word in it; `class_3` without a name.
+    pub(crate) fn word(self, class: u8) -> String {
+        let word = |c: char| if c.is_ascii_alphanumeric() || "-_.".contains(c) { c } else { '_' };
+        self.name(class).map_or_else(|| format!("class_{class}"), |name| name.chars().map(word).collect())
+    }
+
+    /// Red, green and blue from 0 to 255, as screens show them.
+    pub(crate) fn color(self, class: u8) -> [u8; 3] {
+        color(self.names.get(usize::from(class)).map_or("", String::as_str), class)
+    }
+
+    /// Red, green and blue from 0 to 1, as light adds up.
+    pub(crate) fn light(self, class: u8) -> [f64; 3] {
+        let named = self.names.get(usize::from(class)).and_then(|name| named_class_color(name));
+        named.map_or(COLOURS[usize::from(class) % COLOURS.len()], |color| color.map(linear))
+    }
+}
+
+/// The colour of a class by its name and number, as screens show it.
+pub(crate) fn color(name: &str, class: u8) -> [u8; 3] {
+    let numbered = COLOURS[usize::from(class) % COLOURS.len()].map(|part| (part * 255.0).round() as u8);
+    named_class_color(name).unwrap_or(numbered)
+}
+
+/// A part of a colour as screens show it, as light: the curve of sRGB, to a thousandth.
+fn linear(part: u8) -> f64 {
+    let part = f64::from(part) / 255.0;
+    let light = if part <= 0.04045 { part / 12.92 } else { ((part + 0.055) / 1.055).powf(2.4) };
+    (light * 1000.0).round() / 1000.0
+}
+
+/// The names that a report gives to the classes of its job, without that of holes, which is no class of a job.
+pub(crate) fn names_in(report: &Report) -> Vec<String> {
+    report.classes.iter().map(|class| class.name.clone()).filter(|name| name != HOLE_NAME).collect()
+}
+
+/// What triangles over holes are called.
+pub(crate) const HOLE_NAME: &str = "hole";
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_class_has_the_colour_of_its_name_or_else_of_its_number() {
+        let names = ["default", "a b\nc", "motorway", "lake"].map(str::to_owned);
+        let classes = Classes { names: &names };
+        assert_eq!(classes.color(2), named_class_color("motorway").unwrap());
+        assert_eq!((classes.color(0), classes.color(9)), ([140, 128, 92], [87, 107, 77]));
+        assert_eq!([classes.light(0), classes.light(3)], [[0.55, 0.50, 0.36], [0.117, 0.323, 0.552]]);
+        assert_eq!([1, 3, 9].map(|class| classes.word(class)), ["a_b_c", "lake", "class_9"]);
+    }
+
+    #[test]
+    fn a_single_class_needs_no_name() {
+        let names = ["default".to_owned()];
+        assert_eq!(Classes { names: &names }.word(0), "class_0");
+    }
+}

@@ -1,0 +1,287 @@
+//! All features of one area, in the order in which things are decided: what they are and where they run, then, with the
+//! heights of the DEM at every station, how high they lie and what they put into the ground.
+
+use std::collections::{BTreeMap, HashSet};
+
+use crate::pieces::moved;
+use crate::rules::Sorted;
+use crate::{
+    Bed, Cost, FeatureId, Flaw, GradeOptions, Graded, Grants, Network, Outline, Place, Remark, Reserved, Rule, Site,
+    Source, Strand, Traits, Waters, Way, banks, breaklines, channels, dams, fall, flowing, grade, have_line,
+    lakes_along, level, lines_inside, mend, outline_only, pins, reserve, round, shore, sides, sort_out, split_at_dams,
+    travelled, water,
+};
+
+/// Features on the lattice of an area, before their heights are known.
+#[derive(Clone, Debug)]
+pub struct AreaFeatures {
+    /// Where they lie.
+    pub site: Site,
+    /// How many features each of the job's rules matched.
+    pub matched: Vec<usize>,
+    /// What was mended or left out so far.
+    pub remarks: Vec<Remark>,
+    ways: Vec<Way>,
+    lines: Vec<Strand>,
+    outlines: Vec<Outline>,
+    dams: HashSet<Place>,
+    roads: Network,
+    road_sides: Vec<[Place; 2]>,
+    rivers: Network,
+    river_banks: Vec<[Place; 2]>,
+    /// Sorted, each once.
+    stations: Vec<Place>,
+}
+
+/// How high features lie, and what they put into the ground.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Levelled {
+    /// What they put into the ground, what it costs, and what was degraded for that.
+    pub reserved: Reserved,
+    /// All remarks: those of mending, too.
+    pub remarks: Vec<Remark>,
+}
+
+/// What features may take.
+pub trait Room {
+    /// Triangles of a load module (row, column).
+    fn of(&self, module: (i32, i32)) -> u32;
+
+    /// Leaves less to load modules where this is too much for several of them together; false when it is not. It must
+    /// end: sooner or later nothing is left to take.
+    fn narrow(&mut self, cost: &Cost) -> bool;
+}
+
+impl AreaFeatures {
+    /// Gives all that they are made of, word by word: equal words, equal features.
+    pub fn feed(&self, word: &mut dyn FnMut(i64)) {
+        let place = |Place { row, col }: Place, word: &mut dyn FnMut(i64)| {
+            word(row.into());
+            word(col.into());
+        };
+        let Self { site, ways, outlines, .. } = self;
+        word(site.lattice.steps_per_post().into());
+        word(ways.len() as i64);
+        for Way { traits, places, heights, id: _ } in ways {
+            traits.feed(word);
+            word(places.len() as i64);
+            places.iter().for_each(|&at| place(at, word));
+            word(heights.len() as i64);
+            for &(at, height) in heights {
+                place(at, word);
+                word(height.into());
+            }
+        }
+        word(outlines.len() as i64);
+        for Outline { traits, rings, id: _ } in outlines {
+            traits.feed(word);
+            word(rings.len() as i64);
+            for ring in rings {
+                word(ring.hole.into());
+                word(ring.places.len() as i64);
+                ring.places.iter().for_each(|&at| place(at, word));
+            }
+        }
+    }
+
+    /// What each feature on the lattice is.
+    pub fn traits_by_id(&self) -> BTreeMap<FeatureId, Traits> {
+        let ways = self.ways.iter().map(|way| (way.id, way.traits));
+        ways.chain(self.outlines.iter().map(|outline| (outline.id, outline.traits))).collect()
+    }
+
+    /// Sorts out, mends and rounds features, and finds where the DEM has to be asked.
+    pub fn of(sources: Vec<Source>, rules: &[Rule], site: Site) -> Self {
+        let Sorted { features, matched, by_kind: _, mut remarks } = sort_out(sources, rules);
+        let mut rounded = round(mend(features, &site), &site);
+        remarks.append(&mut rounded.remarks);
+        let roads = Network::of(&travelled(&rounded), site.lattice, &mut remarks);
+        let rivers = Network::of(&flowing(&rounded), site.lattice, &mut remarks);
+        let (road_sides, river_banks) = (sides(&roads), a_post_aside(&rivers));
+        let (dams, lines) = (dams(&rounded), breaklines(&rounded, &|_| None));
+        let outlines = split_at_dams(rounded.outlines, &rounded.ways);
+        let ways = rounded.ways;
+        let mut all = Self {
+            site,
+            matched,
+            remarks,
+            ways,
+            lines,
+            outlines,
+            dams,
+            roads,
+            road_sides,
+            rivers,
+            river_banks,
+            stations: Vec::new(),
+        };
+        all.stations = all.asked();
+        all
+    }
+
+    /// Whether there is nothing to put into the ground.
+    pub fn is_empty(&self) -> bool {
+        self.ways.is_empty() && self.outlines.is_empty()
+    }
+
+    /// Where the DEM is asked for a height: every station of ways and shores, the edges of wide ways, the banks of
+    /// rivers. In order of place, each once.
+    pub fn stations(&self) -> &[Place] {
+        &self.stations
+    }
+
+    fn asked(&self) -> Vec<Place> {
+        let nodes = [&self.roads, &self.rivers].into_iter().flat_map(|network| &network.nodes).map(|node| node.place);
+        let beside = [&self.road_sides, &self.river_banks].into_iter().flatten().flatten().copied();
+        let shores = self.outlines.iter().flat_map(Outline::places);
+        let lines = self.lines.iter().flat_map(|line| &line.stations).map(|(place, _)| *place);
+        let mut all: Vec<Place> = nodes.chain(beside).chain(shores).chain(lines).collect();
+        all.sort_unstable();
+        all.dedup();
+        all
+    }
+
+    /// Decides all heights, and forms features so that they take no more triangles than there is room for. `ground` has
+    /// the height of the DEM at each of the stations, in quanta.
+    ///
+    /// # Panics
+    /// When there is not one height, or none, for each station.
+    pub fn level(&self, ground: &[Option<i32>], options: GradeOptions, room: &mut dyn Room) -> Levelled {
+        assert_eq!(self.stations.len(), ground.len(), "the DEM was asked at every station");
+        let at = |place: Place| self.stations.binary_search(&place).ok().and_then(|found| ground[found]);
+        let mut remarks = self.remarks.clone();
+        let mut strands = self.waters(&at, &mut remarks);
+        strands.extend(self.breaklines(&at));
+        let roads = &self.roads;
+        let resting: Vec<Option<i32>> = roads.nodes.iter().map(|node| at(node.place)).collect();
+        let pins = pins(roads, &self.ways);
+        let heights = grade(roads, &resting, &pins, &water(&strands), options, &mut remarks);
+        let beside = |(sides, height): (&[Place; 2], &i32)| sides.map(|place| at(place).unwrap_or(*height));
+        let beside: Vec<[i32; 2]> = self.road_sides.iter().zip(&heights).map(beside).collect();
+        let grants = Grants::default();
+        let graded = Graded { network: roads, heights: &heights, beside: &beside, grants: &grants };
+        let mut reserved = reserve(&graded, &strands, &self.site, &|module| room.of(module));
+        // What was degraded before stays so.
+        while room.narrow(&reserved.cost) {
+            let before = reserved.formed.remarks.into_iter().filter(|remark| remark.flaw == Flaw::OverShare);
+            remarks.extend(before);
+            let graded = Graded { grants: &reserved.grants, ..graded };
+            reserved = reserve(&graded, &strands, &self.site, &|module| room.of(module));
+        }
+        remarks.append(&mut reserved.formed.remarks);
+        // What lies beyond the area is counted, not listed.
+        remarks.retain(|remark| remark.flaw != Flaw::Outside);
+        Remark::sort(&mut remarks);
+        Levelled { reserved, remarks }
+    }
+
+    /// Rivers, lakes and what else polygons of water became.
+    fn waters(&self, at: &dyn Fn(Place) -> Option<i32>, remarks: &mut Vec<Remark>) -> Vec<Strand> {
+        let Self { site, outlines, rivers, .. } = self;
+        let shores: Vec<Vec<Option<i32>>> = outlines.iter().map(|outline| outline.places().map(at).collect()).collect();
+        let has_line = have_line(outlines, rivers, site);
+        let is_dam = |place: Place| self.dams.contains(&place);
+        let waters: Waters = level(outlines, &shores, &has_line, &is_dam, site.lattice, remarks);
+        let ground: Vec<Option<i32>> = rivers.nodes.iter().map(|node| at(node.place)).collect();
+        let lowest = |(banks, ground): (&[Place; 2], &Option<i32>)| {
+            banks.iter().filter_map(|place| at(*place)).chain(*ground).min()
+        };
+        let lower_bank: Vec<Option<i32>> = self.river_banks.iter().zip(&ground).map(lowest).collect();
+        let lake = lakes_along(outlines, &waters, rivers, site);
+        let fallen = fall(rivers, Bed { ground: &ground, lower_bank: &lower_bank, lake: &lake }, remarks);
+        let mut strands = channels(rivers, &fallen);
+        strands.extend(waters.lakes.iter().flat_map(|lake| shore(&outlines[lake.outline as usize], lake.level)));
+        let inside = lines_inside(outlines, &waters.banks, rivers, &fallen, site);
+        let of_bank = |(number, line): (&u32, &crate::parts::Line)| banks(&outlines[*number as usize], line);
+        strands.extend(waters.banks.iter().zip(&inside).flat_map(of_bank));
+        let only = |number: &u32| outline_only(&outlines[*number as usize], &shores[*number as usize]);
+        strands.extend(waters.outlines_only.iter().flat_map(only));
+        strands
+    }
+
+    /// Breaklines at the heights of their source, else of the ground.
+    fn breaklines(&self, at: &dyn Fn(Place) -> Option<i32>) -> Vec<Strand> {
+        let ways = self.ways.iter().filter(|way| way.traits.kind == crate::Kind::Breakline).cloned().collect();
+        let outlines = self.outlines.iter().filter(|outline| outline.traits.kind == crate::Kind::Breakline).cloned();
+        breaklines(&crate::Rounded { ways, outlines: outlines.collect(), remarks: Vec::new() }, at)
+    }
+}
+
+/// Of each node of a network, the places a post to the left and to the right of its way.
+fn a_post_aside(network: &Network) -> Vec<[Place; 2]> {
+    let mut aside: Vec<[Place; 2]> = network.nodes.iter().map(|node| [node.place; 2]).collect();
+    let post = f64::from(network.lattice.steps_per_post());
+    for chain in network.chains() {
+        let place = |at: usize| network.nodes[chain.nodes[at] as usize].place;
+        for (at, &node) in chain.nodes.iter().enumerate() {
+            let [east, north] = place(at.saturating_sub(1)).to(place((at + 1).min(chain.nodes.len() - 1)));
+            let [east, north] = [east as f64, north as f64];
+            let length = (east * east + north * north).sqrt().max(1.0);
+            let by = |sign: f64| moved(place(at), -sign * post * north / length, sign * post * east / length);
+            aside[node as usize] = [by(1.0), by(-1.0)];
+        }
+    }
+    aside
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Role;
+    use crate::samples::{check, ground_at, site, way};
+
+    struct Thousand;
+
+    impl Room for Thousand {
+        fn of(&self, _module: (i32, i32)) -> u32 {
+            1000
+        }
+
+        fn narrow(&mut self, _cost: &Cost) -> bool {
+            false
+        }
+    }
+
+    fn levelled(sources: Vec<Source>, metres: impl Fn(f64, f64) -> f64) -> Levelled {
+        let all = AreaFeatures::of(sources, &[], site());
+        let ground: Vec<Option<i32>> = all.stations().iter().map(|place| ground_at(*place, &metres)).collect();
+        let levelled = all.level(&ground, GradeOptions::USUAL, &mut Thousand);
+        check(&levelled.reserved.formed);
+        levelled
+    }
+
+    fn lake() -> Source {
+        let ring = [(40.0, 10.0), (60.0, 10.0), (60.0, 30.0), (40.0, 30.0), (40.0, 10.0)];
+        way(3, "natural=water", &ring)
+    }
+
+    #[test]
+    fn a_road_a_river_and_a_lake_become_parts_of_the_ground_together() {
+        let road = way(1, "highway=primary", &[(5.0, 40.0), (95.0, 42.0)]);
+        let river = way(2, "waterway=river", &[(80.0, 95.0), (52.0, 45.0), (50.0, 20.0)]);
+        let all = levelled(vec![road, river, lake()], |east, north| 100.0 + north * 0.5 + (east - 50.0).abs() * 0.3);
+        let formed = &all.reserved.formed;
+        let of = |role: Role| formed.edges.iter().filter(|edge| edge.role == role).count();
+        assert!(0 < of(Role::Channel) && 0 < of(Role::Shore) && 0 < of(Role::Side) + of(Role::Centre));
+        let shore = formed.surfaces.iter().find(|surface| surface.role == Role::Shore).unwrap();
+        let level = shore.ring[0].1;
+        assert!(shore.ring.iter().all(|(_, height)| *height == level), "a lake is level");
+        assert!(all.remarks.iter().any(|remark| remark.flaw == Flaw::RoadOverRiver));
+    }
+
+    #[test]
+    fn the_order_of_features_does_not_show() {
+        let sources = || {
+            vec![
+                way(1, "highway=track", &[(5.0, 5.0), (30.0, 60.0), (95.0, 42.0)]),
+                way(2, "highway=primary", &[(5.0, 60.0), (95.0, 20.0)]),
+                lake(),
+                way(4, "waterway=stream", &[(80.0, 95.0), (50.0, 20.0)]),
+            ]
+        };
+        let hills = |east: f64, north: f64| 100.0 + (east * 0.3).sin() * 8.0 + north * 0.4;
+        let mut other = sources();
+        other.reverse();
+        assert_eq!(levelled(sources(), hills), levelled(other, hills));
+    }
+}

@@ -1,0 +1,78 @@
+//! What a job says about roads, rivers and lakes that become parts of the ground.
+
+use features::{GradeOptions, Kind, Rule};
+
+use crate::{ImportanceSpec, NamedFile};
+
+/// Roads, rivers and lakes that become parts of the ground.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FeaturesSpec {
+    /// Where they come from; their order decides nothing.
+    pub sources: Vec<FeatureSource>,
+    /// Tried in order, before the built-in ones.
+    pub rules: Vec<Rule>,
+    /// Of a load module's limit, what features may take.
+    pub share_max: f64,
+    /// What decks keep clear of, and how far back their banks may sag, in quanta.
+    pub options: GradeOptions,
+}
+
+/// Where features come from.
+#[derive(Clone, Debug, PartialEq)]
+pub enum FeatureSource {
+    /// Those that the built-in terrain brings (only with [`crate::DemSource::Sample`]).
+    Sample,
+    /// A file of lines and polygons.
+    File {
+        /// The file.
+        file: NamedFile,
+        /// Its layer, where it has several.
+        layer: Option<String>,
+        /// The kind of its features, whatever their tags say; rules come first.
+        kind: Option<Kind>,
+    },
+}
+
+/// Where the heights of features come from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum HeightsFrom {
+    /// The DEM.
+    Dem,
+    /// The features' own vertices.
+    Feature,
+}
+
+impl FeaturesSpec {
+    /// The files, each once, in the order of their entries.
+    pub fn files(&self) -> Vec<&NamedFile> {
+        let mut files: Vec<&NamedFile> = Vec::new();
+        for source in &self.sources {
+            let FeatureSource::File { file, .. } = source else { continue };
+            if !files.iter().any(|other| other.path == file.path) {
+                files.push(file);
+            }
+        }
+        files
+    }
+
+    /// Keys of tags that rules look at, sorted, each once.
+    pub fn keys(&self) -> Vec<&str> {
+        let mut keys: Vec<&str> = self.rules.iter().flat_map(|rule| &rule.tags).map(|(key, _)| key.as_str()).collect();
+        keys.sort_unstable();
+        keys.dedup();
+        keys
+    }
+
+    /// Names of the classes that features may have, in the order of the table of kinds.
+    pub fn classes(&self) -> Vec<String> {
+        features::class_names(&self.rules)
+    }
+
+    /// All classes: those of the ground, as in [`ImportanceSpec::classes`], then those of features that are not among
+    /// them, at most 255 together. They follow from the job alone.
+    pub fn classes_after(&self, ground: &ImportanceSpec) -> Vec<String> {
+        let mut all = ground.classes.clone();
+        all.extend(self.classes().into_iter().filter(|class| !ground.classes.contains(class)));
+        all
+    }
+}

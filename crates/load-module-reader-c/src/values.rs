@@ -1,0 +1,72 @@
+//! What the functions write for their callers, laid out as `include/load_module_reader.h` says.
+
+use load_module_reader::Vertex;
+
+/// `lmr_frame`.
+#[repr(C)]
+pub struct AreaFrame {
+    pub(crate) rows: u32,
+    pub(crate) cols: u32,
+    pub(crate) side_m: f64,
+    pub(crate) east_m: f64,
+    pub(crate) north_m: f64,
+}
+
+/// `lmr_sample`.
+#[repr(C)]
+pub struct Sample {
+    pub(crate) height_m: f64,
+    pub(crate) normal: [f64; 3],
+    pub(crate) class_of_ground: u8,
+}
+
+/// `lmr_surface`.
+#[repr(C)]
+pub struct Surface {
+    pub(crate) height_m: f64,
+    pub(crate) normal: [f64; 3],
+    pub(crate) class_of_surface: u8,
+    pub(crate) is_deck: u8,
+}
+
+/// `lmr_decks`.
+#[repr(C)]
+pub struct Decks {
+    pub(crate) vertices: *const Vertex,
+    pub(crate) vertex_count: usize,
+    pub(crate) triangles: *const [u16; 3],
+    pub(crate) classes: *const u8,
+    pub(crate) triangle_count: usize,
+}
+
+impl Decks {
+    /// Those of a load module, which outlives what is pointed to.
+    pub(crate) fn of(decks: &load_module_reader::Decks) -> Self {
+        Self {
+            vertices: start(&decks.vertices),
+            vertex_count: decks.vertices.len(),
+            triangles: start(&decks.triangles),
+            classes: start(&decks.classes),
+            triangle_count: decks.triangles.len(),
+        }
+    }
+}
+
+/// Where a list begins; null for an empty one.
+fn start<T>(list: &[T]) -> *const T {
+    if list.is_empty() { std::ptr::null() } else { list.as_ptr() }
+}
+
+/// `lmr_module`.
+#[repr(C)]
+pub struct Module {
+    pub(crate) row: u32,
+    pub(crate) col: u32,
+    pub(crate) east_m: f64,
+    pub(crate) north_m: f64,
+    pub(crate) vertices: *const Vertex,
+    pub(crate) vertex_count: usize,
+    pub(crate) triangles: *const [u16; 3],
+    pub(crate) classes: *const u8,
+    pub(crate) triangle_count: usize,
+}

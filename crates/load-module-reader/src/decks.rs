@@ -1,0 +1,109 @@
+//! Decks of bridges: one more part of a load module in a file of version 2, decoded and checked.
+
+use crate::bytes::{Cursor, check_section};
+use crate::{HOLE_CLASS, Header, IndexEntry, ReadError, Section, Vertex};
+
+/// The decks above the ground of a load module, as one mesh; without decks all lists are empty.
+///
+/// They cover what they cover: a place may lie under no deck, or under several. A deck that crosses the line between
+/// two load modules is cut there, and both have the same vertices on it.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Decks {
+    /// Sorted by y, then x, then z; each a corner of some triangle.
+    pub vertices: Vec<Vertex>,
+    /// Corners in `vertices`, counter-clockwise seen from above, smallest index first; sorted.
+    pub triangles: Vec<[u16; 3]>,
+    /// Class of each triangle; never [`HOLE_CLASS`].
+    pub classes: Vec<u8>,
+}
+
+impl Decks {
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.triangles.is_empty()
+    }
+
+    /// The part at `offset` of the file that follows the section `entry` names.
+    pub(crate) fn parse(
+        bytes: &[u8],
+        header: &Header,
+        entry: &IndexEntry,
+        level: u16,
+        (row, col): (u32, u32),
+    ) -> Result<Self, ReadError> {
+        if entry.decks.triangle_count == 0 {
+            return Ok(Self::default());
+        }
+        let section = Section::Decks { row, col, level };
+        let base = entry.offset + u64::from(entry.length);
+        check_section(bytes, base, section)?;
+        let mut cursor = Cursor::new(bytes, base, section);
+        cursor.expect_u32("row", row)?;
+        cursor.expect_u32("column", col)?;
+        cursor.expect_u32("level", u32::from(level))?;
+        cursor.expect_u32("deck vertex count", entry.decks.vertex_count)?;
+        cursor.expect_u32("deck triangle count", entry.decks.triangle_count)?;
+        let vertices = read_vertices(&mut cursor, header.side, entry)?;
+        let triangles = read_triangles(&mut cursor, &vertices, header.side, entry)?;
+        let mut classes = Vec::with_capacity(triangles.len());
+        for _ in 0..triangles.len() {
+            let offset = cursor.offset();
+            let [class] = cursor.array()?;
+            cursor.within(offset, "class of a deck", i64::from(class), (0, i64::from(HOLE_CLASS) - 1))?;
+            classes.push(class);
+        }
+        cursor.padding()?;
+        cursor.checksum()?;
+        Ok(Self { vertices, triangles, classes })
+    }
+}
+
+fn read_vertices(cursor: &mut Cursor, side: u16, entry: &IndexEntry) -> Result<Vec<Vertex>, ReadError> {
+    let (first, limit) = (cursor.offset(), (0, i64::from(side)));
+    let mut vertices: Vec<Vertex> = Vec::with_capacity(entry.decks.vertex_count as usize);
+    let (mut low, mut high) = (i32::MAX, i32::MIN);
+    for _ in 0..entry.decks.vertex_count {
+        let offset = cursor.offset();
+        let vertex = Vertex { x: cursor.u16()?, y: cursor.u16()?, z: cursor.i32()? };
+        cursor.within(offset, "x", i64::from(vertex.x), limit)?;
+        cursor.within(offset + 2, "y", i64::from(vertex.y), limit)?;
+        let sorted = vertices.last().is_none_or(|last| (last.y, last.x, last.z) < (vertex.y, vertex.x, vertex.z));
+        cursor.expect(offset, "order of vertices", i64::from(sorted), 1)?;
+        (low, high) = (low.min(vertex.z), high.max(vertex.z));
+        vertices.push(vertex);
+    }
+    cursor.expect(first, "lowest height of decks", i64::from(low), i64::from(entry.decks.z_low))?;
+    cursor.expect(first, "highest height of decks", i64::from(high), i64::from(entry.decks.z_high))?;
+    Ok(vertices)
+}
+
+/// Triangles in order, counter-clockwise, that together use every vertex.
+fn read_triangles(
+    cursor: &mut Cursor,
+    vertices: &[Vertex],
+    side: u16,
+    entry: &IndexEntry,
+) -> Result<Vec<[u16; 3]>, ReadError> {
+    let last = vertices.len() as i64 - 1;
+    let square = i64::from(side) * i64::from(side);
+    let mut is_used = vec![false; vertices.len()];
+    let mut triangles: Vec<[u16; 3]> = Vec::with_capacity(entry.decks.triangle_count as usize);
+    for _ in 0..entry.decks.triangle_count {
+        let offset = cursor.offset();
+        let triangle = [cursor.u16()?, cursor.u16()?, cursor.u16()?];
+        for (place, vertex) in triangle.into_iter().enumerate() {
+            cursor.within(offset + 2 * place as u64, "vertex of a triangle", i64::from(vertex), (0, last))?;
+            is_used[usize::from(vertex)] = true;
+        }
+        let smallest_first = triangle[0] < triangle[1] && triangle[0] < triangle[2];
+        let sorted = triangles.last().is_none_or(|last| *last < triangle);
+        cursor.expect(offset, "order of triangles", i64::from(smallest_first && sorted), 1)?;
+        let [a, b, c] = triangle.map(|v| vertices[usize::from(v)]).map(|v| [i64::from(v.x), i64::from(v.y)]);
+        let doubled = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+        cursor.within(offset, "doubled area of a triangle", doubled, (1, square))?;
+        triangles.push(triangle);
+    }
+    let unused = is_used.iter().filter(|&&is_used| !is_used).count() as i64;
+    cursor.expect(cursor.offset(), "vertices of no triangle", unused, 0)?;
+    Ok(triangles)
+}

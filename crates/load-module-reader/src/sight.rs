@@ -1,0 +1,142 @@
+//! Where along a line of sight the triangles of one load module stand in its way.
+
+use crate::QUANTA_PER_METRE;
+use crate::lookup::{Corners, Lookup, STEPS};
+
+/// A line of sight over a load module, in quanta from its south-west corner.
+pub(crate) struct Line {
+    start: [f64; 2],
+    end: [f64; 2],
+    /// From the start to the end.
+    along: [f64; 2],
+    length_squared: f64,
+    /// Heights of both ends.
+    heights: [f64; 2],
+}
+
+impl Line {
+    /// The line between two places in quanta, over the load module with this corner.
+    pub(crate) fn in_module(corner: [f64; 2], from: [f64; 3], to: [f64; 3]) -> Self {
+        let local = |place: [f64; 3]| [place[0] - corner[0], place[1] - corner[1]];
+        let (start, end) = (local(from), local(to));
+        let along = [end[0] - start[0], end[1] - start[1]];
+        let length_squared = along[0] * along[0] + along[1] * along[1];
+        Self { start, end, along, length_squared, heights: [from[2], to[2]] }
+    }
+
+    /// How far left of the line a place lies, and how far ahead, both times the length.
+    fn seen(&self, place: [f64; 3]) -> (f64, f64) {
+        let (dx, dy) = (place[0] - self.start[0], place[1] - self.start[1]);
+        (self.along[0] * dy - self.along[1] * dx, self.along[0] * dx + self.along[1] * dy)
+    }
+
+    /// Height of the line at a share of it.
+    fn height(&self, at: f64) -> f64 {
+        self.heights[0] + at * (self.heights[1] - self.heights[0])
+    }
+}
+
+/// Where along a line the triangles of the ground first rise above it; infinity when they do not.
+pub(crate) fn hidden_at(lookup: &Lookup, side: u16, line: &Line) -> f64 {
+    let mut nearest = f64::INFINITY;
+    if line.length_squared == 0.0 {
+        return nearest;
+    }
+    // Between two edges the ground is straight, so it is enough to look where an edge is crossed.
+    lookup.triangles_along(side, line.start, line.end, |corners| {
+        for i in 0..3 {
+            let edge = [corners[i], corners[(i + 1) % 3]].map(|place| place.map(f64::from));
+            let [(left_a, ahead_a), (left_b, ahead_b)] = edge.map(|place| line.seen(place));
+            if (0.0 < left_a) == (0.0 < left_b) && (left_a < 0.0) == (left_b < 0.0) || left_a == left_b {
+                continue;
+            }
+            let share = left_a / (left_a - left_b);
+            let at = (ahead_a + share * (ahead_b - ahead_a)) / line.length_squared;
+            let height = edge[0][2] + share * (edge[1][2] - edge[0][2]);
+            if (0.0..=1.0).contains(&at) && line.height(at) < height {
+                nearest = nearest.min(at);
+            }
+        }
+    });
+    nearest
+}
+
+/// Where along a line a deck is first crossed, from above or from below; infinity when none is.
+pub(crate) fn crossed_at(decks: &Lookup, side: u16, line: &Line) -> f64 {
+    if line.length_squared == 0.0 {
+        return crossed_upright(decks, side, line);
+    }
+    let mut nearest = f64::INFINITY;
+    decks.triangles_along(side, line.start, line.end, |corners| {
+        let Some([first, last]) = part_over(&corners, line) else { return };
+        let [before, after] = [first, last].map(|[at, height]| above(line.height(at), height));
+        if (0.0 <= before) != (0.0 <= after) {
+            let at = first[0] + (last[0] - first[0]) * (before / (before - after));
+            nearest = nearest.min(at.clamp(0.0, 1.0));
+        }
+    });
+    nearest
+}
+
+/// How far a line is above a deck, in quanta. A place on a deck is above it, also where rounding has put it a
+/// micrometre too low; so every crossing is found in exactly one of the triangles that meet there.
+fn above(line: f64, deck: f64) -> f64 {
+    const ROUNDING: f64 = 1e-6 * QUANTA_PER_METRE as f64;
+    line - deck + ROUNDING
+}
+
+/// The part of a line over or under a triangle: how far along it begins and ends, and the triangle's height there.
+fn part_over(corners: &Corners, line: &Line) -> Option<[[f64; 2]; 2]> {
+    let mut ends = [[0.0; 2]; 2];
+    let mut count = 0;
+    for i in 0..3 {
+        // In one direction, whichever of its triangles asks: then both find the same bits.
+        let (a, b) = (corners[i].min(corners[(i + 1) % 3]), corners[i].max(corners[(i + 1) % 3]));
+        let (a, b) = (a.map(f64::from), b.map(f64::from));
+        let ((left_a, ahead_a), (left_b, ahead_b)) = (line.seen(a), line.seen(b));
+        // What lies on the line counts as right of it, so none or two of the edges are crossed.
+        if (0.0 < left_a) == (0.0 < left_b) {
+            continue;
+        }
+        let share = left_a / (left_a - left_b);
+        let at = (ahead_a + share * (ahead_b - ahead_a)) / line.length_squared;
+        ends[count] = [at, a[2] + share * (b[2] - a[2])];
+        count += 1;
+    }
+    let [first, last] = if ends[0][0] <= ends[1][0] { ends } else { [ends[1], ends[0]] };
+    if count < 2 || last[0] < 0.0 || 1.0 < first[0] {
+        return None;
+    }
+    let at = |share: f64| [share, first[1] + (share - first[0]) / (last[0] - first[0]) * (last[1] - first[1])];
+    let begin = if first[0] < 0.0 { at(0.0) } else { first };
+    Some([begin, if 1.0 < last[0] { at(1.0) } else { last }])
+}
+
+/// The same of a line straight up or down.
+fn crossed_upright(decks: &Lookup, side: u16, line: &Line) -> f64 {
+    let end = i64::from(side) * STEPS;
+    let place = line.start.map(|quanta| ((quanta * STEPS as f64).round() as i64).clamp(0, end));
+    let mut nearest = f64::INFINITY;
+    for (_, height_m, _) in decks.triangles(place) {
+        let height = height_m * f64::from(QUANTA_PER_METRE);
+        let [before, after] = line.heights.map(|line| above(line, height));
+        if (0.0 <= before) != (0.0 <= after) {
+            nearest = nearest.min((before / (before - after)).clamp(0.0, 1.0));
+        }
+    }
+    nearest
+}
+
+/// Where along a line between two places in quanta a load module is entered.
+pub(crate) fn entered_at(corner: [f64; 2], side: f64, from: [f64; 3], to: [f64; 3]) -> f64 {
+    let enters = |axis: usize| {
+        let (low, high) = (corner[axis], corner[axis] + side);
+        match from[axis] {
+            at if at < low => (low - at) / (to[axis] - at),
+            at if high < at => (high - at) / (to[axis] - at),
+            _ => 0.0,
+        }
+    };
+    // The larger of two numbers one of which is not a number is the other.
+    enters(0).max(enters(1)).clamp(0.0, 1.0)
+}

@@ -1,0 +1,79 @@
+//! Between tallies and figures and the files that keep them.
+
+use database::{MeasuredFeatures, MeasuredTally};
+use fidelity::{FeatureFigures, Tally};
+use terrain::LatticePoint;
+
+/// What is kept of a tally.
+pub fn to_tally(tally: &Tally) -> MeasuredTally {
+    MeasuredTally {
+        posts: tally.posts,
+        sum: tally.sum,
+        sum_abs: tally.sum_abs,
+        sum_squared: [(tally.sum_squared >> 64) as u64, tally.sum_squared as u64],
+        largest: tally.largest,
+        bins: tally.filled_bins().collect(),
+    }
+}
+
+/// The tally that was kept.
+pub fn from_tally(tally: &MeasuredTally) -> Tally {
+    let [high, low] = tally.sum_squared.map(u128::from);
+    let mut sums = Tally::default().with_bins(tally.bins.iter().copied());
+    (sums.posts, sums.sum, sums.sum_abs) = (tally.posts, tally.sum, tally.sum_abs);
+    (sums.sum_squared, sums.largest) = (high << 64 | low, tally.largest);
+    sums
+}
+
+/// What is kept of the figures of features.
+pub fn to_features(figures: &FeatureFigures) -> MeasuredFeatures {
+    let FeatureFigures { steps_per_post, edges, missing, lake_spread, shore_posts, shore_below, outside } = figures;
+    MeasuredFeatures {
+        steps_per_post: *steps_per_post,
+        edges: *edges,
+        missing: missing.iter().map(|[a, b]| [a.row, a.col, b.row, b.col]).collect(),
+        lake_spread: *lake_spread,
+        shore_posts: *shore_posts,
+        shore_below: *shore_below,
+        outside: to_tally(outside),
+    }
+}
+
+/// The figures of features that were kept.
+pub fn from_features(measured: &MeasuredFeatures) -> FeatureFigures {
+    let MeasuredFeatures { steps_per_post, edges, missing, lake_spread, shore_posts, shore_below, outside } = measured;
+    let ends =
+        |&[row, col, to_row, to_col]: &[i32; 4]| [LatticePoint::new(row, col), LatticePoint::new(to_row, to_col)];
+    FeatureFigures {
+        steps_per_post: *steps_per_post,
+        edges: *edges,
+        missing: missing.iter().map(ends).collect(),
+        lake_spread: *lake_spread,
+        shore_posts: *shore_posts,
+        shore_below: *shore_below,
+        outside: from_tally(outside),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_was_found_of_features_survives_being_kept() {
+        let mut figures = FeatureFigures { steps_per_post: 64, edges: 9, lake_spread: 1, ..FeatureFigures::default() };
+        figures.missing = vec![[LatticePoint::new(1, -2), LatticePoint::new(3, 4)]];
+        (figures.shore_posts, figures.shore_below) = (7, 2);
+        figures.outside.add(-17);
+        assert_eq!(from_features(&to_features(&figures)), figures);
+    }
+
+    #[test]
+    fn a_tally_survives_being_kept() {
+        let mut tally = Tally::default();
+        [3, -4, 5000, 0, -128, i32::MAX].into_iter().for_each(|residual| tally.add(residual));
+        tally.sum_squared += 1 << 70;
+        assert_eq!(from_tally(&to_tally(&tally)), tally);
+        assert_eq!(from_tally(&to_tally(&Tally::default())), Tally::default());
+    }
+}

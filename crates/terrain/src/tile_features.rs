@@ -1,0 +1,62 @@
+//! All that features put into one tile: edges of its TIN, ground of their own class, slopes beside it, decks above it.
+
+use crate::{Features, TileId, Vertex};
+
+/// What features put into a tile. Places are in steps of the feature lattice from the area's south-west post, as in
+/// [`Features::steps_per_post`]; heights are in quanta.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct TileFeatures {
+    /// The tile.
+    pub tile: TileId,
+    /// Vertices and edges that its TIN keeps.
+    pub kept: Features,
+    /// Ground that has the class of a feature, of all that touches the tile.
+    pub surfaces: Vec<FeatureSurface>,
+    /// Edges of roads within reach of the tile, beside which the ground slopes to the natural one.
+    pub slopes: Vec<[Vertex; 2]>,
+    /// Bridges: polygons above the ground, of all that touch the tile. Their rings are simple.
+    pub decks: Vec<FeatureSurface>,
+}
+
+/// A ring of a feature with what lies inside.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct FeatureSurface {
+    /// Class of the triangles inside. Where rings overlap, the first in order has the ground.
+    pub class: u8,
+    /// What kind of ground it is.
+    pub ground: SurfaceGround,
+    /// Rings of one body inside one another are its holes.
+    pub body: u32,
+    /// Its vertices, the first not repeated.
+    pub ring: Vec<Vertex>,
+}
+
+/// What lies inside a ring of a feature.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum SurfaceGround {
+    /// Part of a road, at the heights of its ring.
+    Road,
+    /// Level water: every vertex of the ring has one height, and no shore lies below it.
+    Lake,
+    /// Water between banks, which falls along them.
+    River,
+}
+
+impl TileFeatures {
+    /// Those of a tile without any.
+    pub fn none(tile: TileId) -> Self {
+        Self { tile, kept: Features::default(), surfaces: Vec::new(), slopes: Vec::new(), decks: Vec::new() }
+    }
+
+    /// Bodies of level water, each with its rings.
+    pub fn lakes(&self) -> impl Iterator<Item = &[FeatureSurface]> {
+        let same = |a: &FeatureSurface, b: &FeatureSurface| (a.class, a.ground, a.body) == (b.class, b.ground, b.body);
+        self.surfaces.chunk_by(same).filter(|rings| rings[0].ground == SurfaceGround::Lake)
+    }
+
+    /// Whether there is nothing that changes the ground or lies above it.
+    pub fn is_empty(&self) -> bool {
+        let Self { tile: _, kept, surfaces, slopes, decks } = self;
+        kept.is_empty() && surfaces.is_empty() && slopes.is_empty() && decks.is_empty()
+    }
+}

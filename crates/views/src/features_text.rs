@@ -1,0 +1,86 @@
+//! Roads and water of a report in words: a table of what they cost, and what must hold of them.
+
+use database::{ReportFeatureChecks, ReportFeatureClass, ReportFeatureCost, ReportFeatures};
+
+use crate::table::{Align, Table, grouped};
+
+use Align::{Left, Right};
+
+/// The block of the text report.
+pub(crate) fn features_text(features: &ReportFeatures) -> String {
+    let mut table = Table::new(&[Left, Right, Right, Right, Right, Right, Right]);
+    table.row(["Roads and water", "km", "strips km", "lakes", "triangles", "load module", "4 km square"]);
+    for class in &features.classes {
+        let [km, strips, lakes] = amounts(class);
+        let name = format!("  {}", class.name);
+        table.row([name, km, strips, lakes].into_iter().chain(cost(&class.cost)));
+    }
+    let nothing = [const { String::new() }; 3];
+    table.row(["  all".to_owned()].into_iter().chain(nothing).chain(cost(&features.all)));
+    let mut checks = Table::new(&[Left, Left]);
+    for (what, found) in check_rows(&features.checks) {
+        checks.row([what, &found]);
+    }
+    format!("{}  {}\n{}", table.text(0), remarks_in_words(features), checks.text(2))
+}
+
+/// Kilometres, those of strips among them, and lakes of a class; nothing where it has none.
+pub(crate) fn amounts(class: &ReportFeatureClass) -> [String; 3] {
+    let km = |km: f64| if 0.0 < km { format!("{km:.2}") } else { String::new() };
+    let lakes = if class.lakes == 0 { String::new() } else { grouped(class.lakes) };
+    [km(class.line_km + class.strip_km + class.channel_km), km(class.strip_km), lakes]
+}
+
+/// Triangles, and the most of a limit that they take.
+pub(crate) fn cost(cost: &ReportFeatureCost) -> [String; 3] {
+    let share = |share: f64| format!("{:.0} %", 100.0 * share);
+    [grouped(cost.triangles), share(cost.module_share), share(cost.window_share)]
+}
+
+/// How many were mended, degraded and left out.
+pub fn remarks_in_words(features: &ReportFeatures) -> String {
+    let remarks = &features.remarks;
+    let (mended, degraded, out) = (grouped(remarks.mended), grouped(remarks.degraded), grouped(remarks.left_out));
+    if remarks.mended + remarks.degraded + remarks.left_out == 0 {
+        return "nothing was mended, degraded or left out".into();
+    }
+    format!("{mended} mended, {degraded} degraded, {out} left out; see features.geojson")
+}
+
+/// What must hold, and what was found.
+pub(crate) fn check_rows(checks: &ReportFeatureChecks) -> Vec<(&'static str, String)> {
+    let of = |count: u64, all: u64| format!("{} of {}", grouped(count), grouped(all));
+    vec![
+        ("edges missing from the TIN", of(checks.edges_missing, checks.edges)),
+        ("pieces of roads too steep", of(checks.stations_steeper, checks.stations)),
+        ("largest fall across a strip", format!("{:.3} m", checks.strip_fall_max_m)),
+        ("edges of rivers that rise", of(checks.river_edges_rising, checks.river_edges)),
+        ("lakes are level to within", format!("{:.3} m", checks.lake_spread_max_m)),
+        ("posts of shores below water", of(checks.shore_posts_below, checks.shore_posts)),
+        (
+            "residual outside features",
+            format!("RMS {:.3} m, largest {:.2} m", checks.outside_rms_m, checks.outside_max_m),
+        ),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::samples;
+    use crate::table::COLUMNS_MAX;
+
+    #[test]
+    fn roads_and_water_are_told_in_lines_no_wider_than_a_terminal() {
+        let text = features_text(&samples::features());
+        for expected in ["primary", "12.25", "4 of 1,234", "3 mended, 2 degraded, 1 left out", "RMS 1.250 m"] {
+            assert!(text.contains(expected), "{text}");
+        }
+        assert!(text.lines().all(|line| line.chars().count() <= COLUMNS_MAX), "{text}");
+    }
+
+    #[test]
+    fn without_remarks_it_says_so() {
+        assert!(features_text(&ReportFeatures::default()).contains("nothing was mended, degraded or left out"));
+    }
+}
