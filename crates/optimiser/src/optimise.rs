@@ -54,7 +54,7 @@ const CYCLE_SHARE: f64 = 0.2;
 
 /// Makes a TIN truer within its budget.
 ///
-/// A pure function of its arguments. The TIN covers the window; it may exceed the budget, see [`overshoot`], and is
+/// A pure function of its arguments. The TIN covers the window; it may exceed the budget, see [`crate::overshoot`], and is
 /// then thinned.
 ///
 /// # Panics
