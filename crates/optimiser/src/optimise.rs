@@ -54,8 +54,8 @@ const CYCLE_SHARE: f64 = 0.2;
 
 /// Makes a TIN truer within its budget.
 ///
-/// A pure function of its arguments. The TIN covers the window; it may exceed the budget, see [`crate::overshoot`], and is
-/// then thinned.
+/// A pure function of its arguments. The TIN covers the window; it may exceed the budget, see [`crate::overshoot`],
+/// and is then thinned.
 ///
 /// # Panics
 /// When the TIN, the window and the mask do not cover the same posts.
