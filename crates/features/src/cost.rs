@@ -9,7 +9,7 @@ use std::collections::{BTreeMap, HashMap};
 use crate::clean::Notes;
 use crate::forms::{Formed, form};
 use crate::pieces::Grant;
-use crate::strand::{Graded, Strand};
+use crate::strand::{Graded, Role, Strand};
 use crate::strips::Face;
 use crate::{FeatureId, Flaw, Form, Grants, Place, Remark, Remedy, Site};
 
@@ -121,7 +121,8 @@ pub struct Reserved {
 /// Forms features so that they take no more triangles of a load module than `triangles_max` says for it.
 ///
 /// Where they would, those features go down the ladder, the lowest class first at each step: tolerances doubled, then
-/// fourfold, a bench becomes a strip, a strip a line, and only then are features left out. Every step is a remark.
+/// fourfold, a bench becomes a strip, a strip a line, and only then is left out what they have in that load module; of
+/// water that is enclosed, all. Every step is a remark.
 pub fn reserve(
     graded: &Graded,
     strands: &[Strand],
@@ -165,6 +166,10 @@ struct Member {
     class: u16,
     id: FeatureId,
     place: Place,
+    /// The load module in which the edges lie, which may only touch the other.
+    piece: (i32, i32),
+    /// Whether it encloses water, and so is there as a whole or not at all.
+    is_whole: bool,
     /// How many triangles it takes there, in 120ths: a point of several features is shared among its edges.
     parts: u32,
 }
@@ -181,16 +186,19 @@ struct Crowd<'a> {
 }
 
 fn features_of(formed: &Formed, site: &Site, modules: &BTreeMap<(i32, i32), u32>) -> BTreeMap<(i32, i32), Vec<Member>> {
-    let mut features: BTreeMap<(i32, i32), BTreeMap<(u16, FeatureId), Member>> = BTreeMap::new();
+    let mut features: BTreeMap<(i32, i32), BTreeMap<(u16, FeatureId, (i32, i32)), Member>> = BTreeMap::new();
     let mut degree = vec![0; formed.points.len()];
     formed.edges.iter().flat_map(|edge| [edge.a, edge.b]).for_each(|point| degree[point as usize] += 1);
     for edge in &formed.edges {
+        let [a, b] = [edge.a, edge.b].map(|point| formed.points[point as usize].0);
+        let (piece, is_whole) = (site.module_under(a, b), matches!(edge.role, Role::Shore | Role::Bank));
         for point in [edge.a, edge.b] {
             let place = formed.points[point as usize].0;
             for (module, triangles) in modules_of(place, site) {
                 if modules.contains_key(&module) {
-                    let member = Member { class: edge.class, id: edge.id, place, parts: 0 };
-                    let of = features.entry(module).or_default().entry((edge.class, edge.id)).or_insert(member);
+                    let member = Member { class: edge.class, id: edge.id, place, piece, is_whole, parts: 0 };
+                    let key = (edge.class, edge.id, piece);
+                    let of = features.entry(module).or_default().entry(key).or_insert(member);
                     of.parts += PARTS * triangles / degree[point as usize];
                 }
             }
@@ -198,8 +206,10 @@ fn features_of(formed: &Formed, site: &Site, modules: &BTreeMap<(i32, i32), u32>
     }
     for deck in &formed.decks {
         for module in modules_under(deck, site).into_iter().filter(|module| modules.contains_key(module)) {
-            let member = Member { class: deck.class, id: deck.id, place: deck.corners[0].0, parts: 0 };
-            let of = features.entry(module).or_default().entry((deck.class, deck.id)).or_insert(member);
+            let (from, across) = (deck.corners[0].0, deck.corners[deck.corners.len() / 2].0);
+            let piece = site.module_under(from, across);
+            let member = Member { class: deck.class, id: deck.id, place: from, piece, is_whole: false, parts: 0 };
+            let of = features.entry(module).or_default().entry((deck.class, deck.id, piece)).or_insert(member);
             of.parts += PARTS * deck.corners.len() as u32;
         }
     }
@@ -228,7 +238,8 @@ fn degrade(crowd: &Crowd, reached: &mut (usize, u16), grants: &mut Grants, remar
             .collect();
         if *step == Step::Out {
             // No more than has to be, the smallest first; the next round asks again.
-            members.sort_by_key(|member| (member.parts, member.place, member.id));
+            let is_gap = |member: &Member| grants.is_out(member.id, member.piece);
+            members.sort_by_key(|member| (is_gap(member), member.parts, member.place, member.id));
             let mut gone = 0;
             members.retain(|member| {
                 let needed = gone < PARTS * crowd.surplus;
@@ -251,6 +262,13 @@ fn degrade(crowd: &Crowd, reached: &mut (usize, u16), grants: &mut Grants, remar
 fn apply(step: Step, members: &[Member], crowd: &Crowd, grants: &mut Grants, remarks: &mut Vec<Remark>) -> bool {
     let mut changed = false;
     for member in members {
+        if step == Step::Out && !member.is_whole && grants.leave_out(member.id, member.piece) {
+            changed = true;
+            let mut notes = Notes { id: member.id, lattice: crowd.site.lattice, remarks };
+            notes.write_at(member.place, Flaw::OverShare, Remedy::PartLeftOut);
+            continue;
+        }
+        // What is still there although it was left out, such as the corner of a wide road, goes with all of the feature.
         let form = crowd.forms.get(&member.id).copied().unwrap_or(Form::Line);
         let (before, after) = (grants.of(member.id), step.apply(grants.of(member.id)));
         if before != after && step.concerns(form) {
@@ -320,7 +338,7 @@ mod tests {
         let tags = ["motorway", "primary", "service", "track"];
         let sources = (0..200).map(|number| road(number, tags[number as usize % 4], 1.0 + number as f64 * 0.24));
         let formed = reserved(sources.collect(), 160);
-        assert!(formed.formed.remarks.iter().any(|remark| remark.remedy == Remedy::LeftOut));
+        assert!(formed.formed.remarks.iter().any(|remark| remark.remedy.leaves_out()));
         assert!(formed.formed.edges.iter().any(|edge| edge.class == 0), "motorways go last");
     }
 }

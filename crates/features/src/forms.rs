@@ -16,7 +16,7 @@ use crate::strand::{Graded, Role, Strand};
 use crate::strips::{Face, Room, Wide, wide_segments};
 use crate::thin::{Station, Tolerance, thin};
 use crate::toes::toes;
-use crate::{FeatureId, Flaw, Form, Network, Place, Remark, Remedy, Site};
+use crate::{FeatureId, Flaw, Form, Grants, Network, Place, Remark, Remedy, Site};
 
 /// A line inside a strip is worth a remark from this length on, in quanta: below it, it only ends at the strip's edge.
 const CUT_LENGTH_MIN: i64 = 30 * 128;
@@ -82,7 +82,8 @@ pub fn form(graded: &Graded, strands: &[Strand], site: &Site) -> Formed {
     let mut lines = outlines(&faces);
     lines.extend(toes);
     lines.extend(centrelines(network, &pieces, &wide, heights));
-    lines.extend(strands.iter().filter_map(|strand| thinned(strand, grants.of(strand.id), site, &stays)));
+    let thinned = strands.iter().filter_map(|strand| thinned(strand, grants.of(strand.id), site, &stays));
+    lines.extend(thinned.flat_map(|strand| with_gaps(strand, grants, site)));
     lines.sort_by(|a, b| (a.class, a.role, &a.stations, a.id).cmp(&(b.class, b.role, &b.stations, b.id)));
     let mut formed = assemble(lines, &faces, site, &mut remarks);
     (formed.faces, formed.decks) = (faces, decks);
@@ -122,6 +123,30 @@ fn thinned(strand: &Strand, grant: Grant, site: &Site, shared: &dyn Fn(Place) ->
     let kept = thin(&stations, Tolerance::USUAL.times(grant.tolerance), 0, site.lattice);
     let stations = kept.iter().map(|at| strand.stations[*at as usize]).collect();
     (!grant.out).then_some(Strand { stations, ..strand.clone() })
+}
+
+/// A strand without what is left out of it in some load modules. What encloses water is left out as a whole or not at
+/// all.
+fn with_gaps(strand: Strand, grants: &Grants, site: &Site) -> Vec<Strand> {
+    let is_whole = matches!(strand.role, Role::Shore | Role::Bank);
+    let is_out = |pair: &[(Place, i32)]| grants.is_out(strand.id, site.module_under(pair[0].0, pair[1].0));
+    if is_whole || !strand.stations.windows(2).any(is_out) {
+        return vec![strand];
+    }
+    let mut parts: Vec<Strand> = Vec::new();
+    let mut open = false;
+    for pair in strand.stations.windows(2) {
+        if is_out(pair) {
+            open = false;
+            continue;
+        }
+        match parts.last_mut().filter(|_| open) {
+            Some(part) => part.stations.push(pair[1]),
+            None => parts.push(Strand { stations: pair.to_vec(), ..strand }),
+        }
+        open = true;
+    }
+    parts
 }
 
 fn remark_narrow(network: &Network, pieces: &[Piece], remarks: &mut Vec<Remark>) {

@@ -1,6 +1,6 @@
 //! Chains cut into pieces whose stations are thinned, each segment of which is a line or a strip.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use crate::thin::{Station, Tolerance, thin};
 use crate::{FeatureId, Form, Network, Place, Site, Storey, Traits};
@@ -31,12 +31,24 @@ impl Grant {
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Grants {
     less: HashMap<FeatureId, Grant>,
+    /// Features that are left out in a load module (row, column).
+    gaps: HashSet<(FeatureId, (i32, i32))>,
 }
 
 impl Grants {
     /// What a feature may be.
     pub fn of(&self, id: FeatureId) -> Grant {
         self.less.get(&id).copied().unwrap_or(Grant::ALL)
+    }
+
+    /// Whether what a feature has in a load module is left out.
+    pub fn is_out(&self, id: FeatureId, module: (i32, i32)) -> bool {
+        self.gaps.contains(&(id, module)) || self.of(id).out
+    }
+
+    /// Leaves out what a feature has in a load module; false where it was left out already.
+    pub fn leave_out(&mut self, id: FeatureId, module: (i32, i32)) -> bool {
+        self.gaps.insert((id, module))
     }
 
     /// Leaves less to a feature.
@@ -112,10 +124,16 @@ pub fn pieces(
     grants: &Grants,
 ) -> Vec<Piece> {
     let grant = |edge: u32| grants.of(network.ways[network.edges[edge as usize].way as usize].id);
-    let picked = |edge: u32| !grant(edge).out && !matches!(network.traits(edge).storey, Storey::Tunnel(_));
+    let is_out = |edge: u32| {
+        let segment = network.segment(edge);
+        let id = network.ways[network.edges[edge as usize].way as usize].id;
+        grants.is_out(id, site.module_under(segment.a, segment.b))
+    };
+    let picked = |edge: u32| !is_out(edge) && !matches!(network.traits(edge).storey, Storey::Tunnel(_));
     let follows = |node: u32| match network.beside(node) {
         [(_, one), (_, other)] => {
-            network.traits(*one) == network.traits(*other) && grant(*one) == grant(*other) && picked(*one)
+            let same = network.traits(*one) == network.traits(*other) && grant(*one) == grant(*other);
+            same && picked(*one) && picked(*other)
         }
         _ => false,
     };

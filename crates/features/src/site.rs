@@ -46,6 +46,13 @@ impl Site {
         (place.row.div_euclid(steps), place.col.div_euclid(steps))
     }
 
+    /// The load module that holds a segment that crosses no line between load modules; of one on a line that north or
+    /// east of it.
+    pub fn module_under(&self, a: Place, b: Place) -> (i32, i32) {
+        let doubled = 2 * self.line_steps()[0];
+        ((a.row + b.row).div_euclid(doubled), (a.col + b.col).div_euclid(doubled))
+    }
+
     /// Calls `found` with the place of each tile and load-module line that a segment crosses between its ends.
     pub fn crossings(&self, segment: Segment, found: &mut impl FnMut(Place)) {
         let [east, north] = segment.a.to(segment.b);
