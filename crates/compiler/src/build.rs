@@ -97,8 +97,8 @@ pub(crate) fn decide_features(run: &mut Run, progress: &mut dyn Progress) -> Res
     if run.job.features.is_none() {
         return Ok(());
     }
-    profile(run, progress)?;
-    let (file, level) = level(run, progress)?;
+    let profiles = profile(run, progress)?;
+    let (file, level) = level(run, &profiles, progress)?;
     run.settle(file, level);
     Ok(())
 }

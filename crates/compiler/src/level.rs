@@ -1,35 +1,38 @@
 //! The stage `level`: how high all features of the area lie, and what they put into each tile. It sees profiles and
 //! features, never a raster.
 
-use database::{AreaLevel, FileStamp};
+use std::collections::BTreeSet;
+
+use database::{AreaLevel, FileStamp, Profile};
 use engine::{Artifact, Key, Outcome, Stamp, keep_or_make};
 use features::Cost;
 use job::FeaturesSpec;
-use limits::start_triangles;
 use terrain::{ModuleId, TileId};
 
 use crate::keys;
 use crate::pieces::{area_level, pieces, reserved};
-use crate::profile::profile_tile;
 use crate::read_features::ReadFeatures;
 use crate::run::{ALGORITHM_REVISION, Run};
 use crate::{CompileError, Event, Progress, Stage};
 
-/// Decides all heights of features, or keeps what is published and fresh.
-pub(crate) fn level(run: &Run, progress: &mut dyn Progress) -> Result<(FileStamp, AreaLevel), CompileError> {
+/// Decides all heights of features, or keeps what is published and fresh. `profiles` has the ground by tile.
+pub(crate) fn level(
+    run: &Run,
+    profiles: &[Profile],
+    progress: &mut dyn Progress,
+) -> Result<(FileStamp, AreaLevel), CompileError> {
     progress.tell(Event::Enter(Stage::Level, 0));
-    let level = level_area(run)?.into_inner();
+    let level = level_area(run, profiles)?.into_inner();
     progress.tell(Event::Leave(Stage::Level));
     Ok(level)
 }
 
 /// The same, with the bytes that say so.
-pub(crate) fn level_area(run: &Run) -> Result<Outcome<(FileStamp, AreaLevel)>, CompileError> {
+pub(crate) fn level_area(run: &Run, profiles: &[Profile]) -> Result<Outcome<(FileStamp, AreaLevel)>, CompileError> {
     let (read, spec) = (run.features()?, run.job.features.as_ref().expect("a stage of jobs with features"));
     let mut ground = vec![None; read.features.stations().len()];
-    for (&tile, stations) in run.area.tiles.iter().zip(&read.by_tile) {
-        let (_, profile) = profile_tile(run, tile)?.into_inner();
-        stations.iter().zip(profile.heights).for_each(|(&station, height)| ground[station as usize] = height);
+    for (profile, stations) in profiles.iter().zip(&read.by_tile) {
+        stations.iter().zip(&profile.heights).for_each(|(&station, &height)| ground[station as usize] = height);
     }
     keep_or_make(&Levelling { run, read: &read, spec, ground: &ground }, ALGORITHM_REVISION)
 }
@@ -82,18 +85,18 @@ impl Artifact for Levelling<'_> {
 struct Shares<'a> {
     run: &'a Run<'a>,
     spec: &'a FeaturesSpec,
-    /// Triangles of each load module, row-major.
+    /// Triangles that every build starts from, of each load module, row-major.
+    start: Vec<u32>,
+    /// Triangles that features may take, of each load module, row-major.
     modules: Vec<u32>,
 }
 
 impl<'a> Shares<'a> {
     fn new(run: &'a Run<'a>, spec: &'a FeaturesSpec) -> Self {
-        let budget = &run.area.budget;
-        let room = |module: ModuleId| {
-            let start = start_triangles(budget.grid, module, budget.border_step);
-            share(spec, u64::from(budget.per_module), u64::from(start)) as u32
-        };
-        Self { run, spec, modules: budget.grid.all().iter().map(room).collect() }
+        let start = run.area.budget.start();
+        let per_module = u64::from(run.area.budget.per_module);
+        let modules = start.iter().map(|&start| share(spec, per_module, u64::from(start)) as u32).collect();
+        Self { run, spec, start, modules }
     }
 }
 
@@ -113,34 +116,80 @@ impl features::Room for Shares<'_> {
     }
 
     fn narrow(&mut self, cost: &Cost) -> bool {
-        let (area, grid) = (&self.run.area, self.run.area.grid);
-        let taken: Vec<u32> = grid
-            .all()
-            .iter()
-            .map(|ModuleId { row, col }| cost.get(&(row as i32, col as i32)).map_or(0, |of| of.values().sum()))
-            .collect();
-        let start: Vec<u32> =
-            grid.all().iter().map(|module| start_triangles(grid, module, area.budget.border_step)).collect();
-        let total = |modules: &[usize], of: &[u32]| modules.iter().map(|&module| u64::from(of[module])).sum::<u64>();
+        let (budget, grid) = (&self.run.area.budget, self.run.area.grid);
+        let mut taken = self.taken(cost);
+        let windows = budget.windows;
+        let sums = windows.sums(grid, &taken).into_iter().zip(windows.sums(grid, &self.start));
         let mut narrowed = false;
-        let mut hold = |modules: &[usize], limit: u64| {
-            let room = share(self.spec, limit, total(modules, &start));
-            if total(modules, &taken) <= room {
-                return;
+        for (origin, (before, start)) in windows.origins.iter().zip(sums) {
+            let room = share(self.spec, budget.per_window.into(), start.into());
+            if room < u64::from(before) {
+                let modules: Vec<usize> = windows.modules_of(origin).iter().map(|module| grid.index(module)).collect();
+                self.hold(&modules, &mut taken, room);
+                narrowed = true;
             }
-            let level = level_of(modules.iter().map(|&module| taken[module]).collect(), room);
-            for &module in modules.iter().filter(|&&module| level < taken[module]) {
+        }
+        let total = |of: &[u32]| of.iter().map(|&count| u64::from(count)).sum::<u64>();
+        let room = share(self.spec, budget.area, total(&self.start));
+        if room < total(&taken) {
+            self.hold(&(0..grid.count()).collect::<Vec<usize>>(), &mut taken, room);
+            narrowed = true;
+        }
+        narrowed
+    }
+
+    fn widen(&mut self, cost: &Cost, short: &BTreeSet<(i32, i32)>) -> bool {
+        let (budget, grid) = (&self.run.area.budget, self.run.area.grid);
+        let taken = self.taken(cost);
+        let is_short: Vec<u32> =
+            grid.all().iter().map(|of| u32::from(short.contains(&(of.row as i32, of.col as i32)))).collect();
+        // What is left of a limit goes to all that are short of it alike, so that together they stay within it.
+        let each = |taken: u64, start: u64, limit: u64, short: u64| {
+            share(self.spec, limit, start).saturating_sub(taken).checked_div(short).unwrap_or(0)
+        };
+        let windows = budget.windows;
+        let [of_taken, of_start, of_short] = [&taken, &self.start, &is_short].map(|of| windows.sums(grid, of));
+        let total = |of: &[u32]| of.iter().map(|&count| u64::from(count)).sum::<u64>();
+        let of_area = each(total(&taken), total(&self.start), budget.area, total(&is_short));
+        let mut most = vec![of_area; grid.count()];
+        for (at, origin) in windows.origins.iter().enumerate() {
+            let [taken, start, short] = [of_taken[at], of_start[at], of_short[at]].map(u64::from);
+            let of_window = each(taken, start, budget.per_window.into(), short);
+            for module in windows.modules_of(origin).iter().map(|module| grid.index(module)) {
+                most[module] = most[module].min(of_window);
+            }
+        }
+        let mut widened = false;
+        let per_module = u64::from(budget.per_module);
+        for (at, room) in self.modules.iter_mut().enumerate() {
+            // What has to give something back keeps to that.
+            if is_short[at] == 1 && taken[at] <= *room {
+                let own = share(self.spec, per_module, self.start[at].into());
+                *room = own.min(u64::from(taken[at]) + most[at]) as u32;
+                widened |= taken[at] < *room;
+            }
+        }
+        widened
+    }
+}
+
+impl Shares<'_> {
+    /// Leaves several load modules no more than `room` together: cuts the fullest of them to one level. What one
+    /// window has cut counts as cut for the next.
+    fn hold(&mut self, modules: &[usize], taken: &mut [u32], room: u64) {
+        let level = level_of(modules.iter().map(|&module| taken[module]).collect(), room);
+        for &module in modules {
+            if level < taken[module] {
+                taken[module] = level;
                 self.modules[module] = self.modules[module].min(level);
             }
-            narrowed = true;
-        };
-        let windows = area.budget.windows;
-        for origin in windows.origins.iter() {
-            let modules: Vec<usize> = windows.modules_of(origin).iter().map(|module| grid.index(module)).collect();
-            hold(&modules, u64::from(area.budget.per_window));
         }
-        hold(&(0..grid.count()).collect::<Vec<usize>>(), area.budget.area);
-        narrowed
+    }
+
+    /// Triangles that features take, of each load module, row-major.
+    fn taken(&self, cost: &Cost) -> Vec<u32> {
+        let of = |ModuleId { row, col }: ModuleId| cost.get(&(row as i32, col as i32));
+        self.run.area.grid.all().iter().map(|of_| of(of_).map_or(0, |classes| classes.values().sum())).collect()
     }
 }
 

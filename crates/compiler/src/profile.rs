@@ -13,11 +13,13 @@ use crate::read_features::ReadFeatures;
 use crate::run::{ALGORITHM_REVISION, Run};
 use crate::{CompileError, Progress, Stage};
 
-/// Finds the ground along the features of every tile.
-pub(crate) fn profile(run: &Run, progress: &mut dyn Progress) -> Result<(), CompileError> {
+/// Finds the ground along the features of every tile; returns it by tile.
+pub(crate) fn profile(run: &Run, progress: &mut dyn Progress) -> Result<Vec<Profile>, CompileError> {
     // Before the clock of the stage's tiles runs.
     run.features()?;
-    run.for_each_tile(Stage::Profile, progress, |tile| Ok(profile_tile(run, tile)?.map(drop))).map(drop)
+    let profiles =
+        run.for_each_tile(Stage::Profile, progress, |tile| Ok(profile_tile(run, tile)?.map(|(_, profile)| profile)))?;
+    Ok(profiles.into_iter().map(Outcome::into_inner).collect())
 }
 
 /// The ground along the features of a tile, or what is published and fresh.

@@ -7,7 +7,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use database::{Folder, Share, ShareAllowance, Work};
+use database::{Folder, Profile, Share, ShareAllowance, Work};
 use engine::{Fingerprint, Outcome, Stamp};
 use job::Job;
 use limits::Allowance;
@@ -90,7 +90,7 @@ impl<'a> Session<'a> {
     fn make(&self, unit: Unit) -> Result<(), CompileError> {
         let fingerprint = match (unit.stage, unit.tile) {
             (Stage::Profile, Some(tile)) => profile_tile(&self.run, tile)?.into_inner().0.blake3,
-            (Stage::Level, None) => level_area(&self.run)?.into_inner().0.blake3,
+            (Stage::Level, None) => self.level()?,
             (Stage::Survey, Some(tile)) => survey_tile(&self.run, tile)?.into_inner().0.fingerprint,
             (Stage::Allocate, None) => self.allocate()?,
             (Stage::Refine, Some(tile)) => self.refine(tile)?.into_inner().stamp.fingerprint,
@@ -114,6 +114,20 @@ impl<'a> Session<'a> {
             }
             _ => Err(self.spoilt(unit, level)),
         }
+    }
+
+    fn level(&self) -> Result<Fingerprint, CompileError> {
+        let profile = |&tile: &TileId| {
+            let unit = Unit::of(Stage::Profile, tile);
+            match self.run.database.folder().read_profile(tile) {
+                Ok((_, file, profile)) if Some(file.blake3) == self.work.marks().marked(&unit.to_string()) => {
+                    Ok(profile)
+                }
+                _ => Err(self.spoilt(Unit::whole(Stage::Level), unit)),
+            }
+        };
+        let profiles: Vec<Profile> = self.run.area.tiles.iter().map(profile).collect::<Result<_, _>>()?;
+        Ok(level_area(&self.run, &profiles)?.into_inner().0.blake3)
     }
 
     fn allocate(&self) -> Result<Fingerprint, CompileError> {

@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, HashSet};
 use crate::pieces::moved;
 use crate::rules::Sorted;
 use crate::{
-    Bed, Cost, FeatureId, Flaw, GradeOptions, Graded, Grants, Network, Outline, Place, Remark, Reserved, Rule, Site,
+    Bed, FeatureId, Flaw, GradeOptions, Graded, Grants, Network, Outline, Place, Remark, Reserved, Room, Rule, Site,
     Source, Strand, Traits, Waters, Way, banks, breaklines, channels, dams, fall, flowing, grade, have_line,
     lakes_along, level, lines_inside, mend, outline_only, pins, reserve, round, shore, sides, sort_out, split_at_dams,
     travelled, water,
@@ -40,16 +40,6 @@ pub struct Levelled {
     pub reserved: Reserved,
     /// All remarks: those of mending, too.
     pub remarks: Vec<Remark>,
-}
-
-/// What features may take.
-pub trait Room {
-    /// Triangles of a load module (row, column).
-    fn of(&self, module: (i32, i32)) -> u32;
-
-    /// Leaves less to load modules where this is too much for several of them together; false when it is not. It must
-    /// end: sooner or later nothing is left to take.
-    fn narrow(&mut self, cost: &Cost) -> bool;
 }
 
 impl AreaFeatures {
@@ -160,14 +150,7 @@ impl AreaFeatures {
         let beside: Vec<[i32; 2]> = self.road_sides.iter().zip(&heights).map(beside).collect();
         let grants = Grants::default();
         let graded = Graded { network: roads, heights: &heights, beside: &beside, grants: &grants };
-        let mut reserved = reserve(&graded, &strands, &self.site, &|module| room.of(module));
-        // What was degraded before stays so.
-        while room.narrow(&reserved.cost) {
-            let before = reserved.formed.remarks.into_iter().filter(|remark| remark.flaw == Flaw::OverShare);
-            remarks.extend(before);
-            let graded = Graded { grants: &reserved.grants, ..graded };
-            reserved = reserve(&graded, &strands, &self.site, &|module| room.of(module));
-        }
+        let mut reserved = reserve(&graded, &strands, &self.site, room);
         remarks.append(&mut reserved.formed.remarks);
         // What lies beyond the area is counted, not listed.
         remarks.retain(|remark| remark.flaw != Flaw::Outside);
@@ -230,22 +213,10 @@ mod tests {
     use crate::Role;
     use crate::samples::{check, ground_at, site, way};
 
-    struct Thousand;
-
-    impl Room for Thousand {
-        fn of(&self, _module: (i32, i32)) -> u32 {
-            1000
-        }
-
-        fn narrow(&mut self, _cost: &Cost) -> bool {
-            false
-        }
-    }
-
     fn levelled(sources: Vec<Source>, metres: impl Fn(f64, f64) -> f64) -> Levelled {
         let all = AreaFeatures::of(sources, &[], site());
         let ground: Vec<Option<i32>> = all.stations().iter().map(|place| ground_at(*place, &metres)).collect();
-        let levelled = all.level(&ground, GradeOptions::USUAL, &mut Thousand);
+        let levelled = all.level(&ground, GradeOptions::USUAL, &mut 1000);
         check(&levelled.reserved.formed);
         levelled
     }

@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use crate::clean::Notes;
 use crate::decks::between;
 use crate::exact::Segment;
-use crate::pieces::{Grant, Piece, pieces};
+use crate::pieces::{Piece, pieces};
 use crate::rings::encloses;
 use crate::room::share_out;
 use crate::snap::snap_round;
@@ -16,7 +16,7 @@ use crate::strand::{Graded, Role, Strand};
 use crate::strips::{Face, Room, Wide, wide_segments};
 use crate::thin::{Station, Tolerance, thin};
 use crate::toes::toes;
-use crate::{FeatureId, Flaw, Form, Grants, Network, Place, Remark, Remedy, Site};
+use crate::{FeatureId, Flaw, Form, Grant, Grants, Network, Place, Remark, Remedy, Site};
 
 /// A line inside a strip is worth a remark from this length on, in quanta: below it, it only ends at the strip's edge.
 const CUT_LENGTH_MIN: i64 = 30 * 128;
@@ -82,8 +82,7 @@ pub fn form(graded: &Graded, strands: &[Strand], site: &Site) -> Formed {
     let mut lines = outlines(&faces);
     lines.extend(toes);
     lines.extend(centrelines(network, &pieces, &wide, heights));
-    let thinned = strands.iter().filter_map(|strand| thinned(strand, grants.of(strand.id), site, &stays));
-    lines.extend(thinned.flat_map(|strand| with_gaps(strand, grants, site)));
+    lines.extend(strands.iter().flat_map(|strand| thinned(strand, grants, site, &stays)));
     lines.sort_by(|a, b| (a.class, a.role, &a.stations, a.id).cmp(&(b.class, b.role, &b.stations, b.id)));
     let mut formed = assemble(lines, &faces, site, &mut remarks);
     (formed.faces, formed.decks) = (faces, decks);
@@ -95,7 +94,7 @@ pub fn form(graded: &Graded, strands: &[Strand], site: &Site) -> Formed {
 }
 
 /// Places that two strands have, or a strand and the network: thinning leaves them to both.
-fn shared_places(network: &Network, strands: &[Strand]) -> BTreeSet<Place> {
+pub(crate) fn shared_places(network: &Network, strands: &[Strand]) -> BTreeSet<Place> {
     let mut uses: HashMap<Place, u32> = network.nodes.iter().map(|node| (node.place, 1)).collect();
     let mut shared = BTreeSet::new();
     for strand in strands {
@@ -111,40 +110,37 @@ fn shared_places(network: &Network, strands: &[Strand]) -> BTreeSet<Place> {
     shared
 }
 
-/// A strand with the stations it needs, or nothing where it is left out. A channel keeps the stations beside a shared
-/// place too: where it passes below a road, only what lies between them is missing.
-fn thinned(strand: &Strand, grant: Grant, site: &Site, shared: &dyn Fn(Place) -> bool) -> Option<Strand> {
+/// A strand with the stations it needs, in parts where some of it is left out. A channel keeps the stations beside a
+/// shared place too: where it passes below a road, only what lies between them is missing. What encloses water is left
+/// out as a whole or not at all.
+pub(crate) fn thinned(strand: &Strand, grants: &Grants, site: &Site, shared: &dyn Fn(Place) -> bool) -> Vec<Strand> {
+    if grants.is_out(strand.id) {
+        return Vec::new();
+    }
     let keeps = |at: usize| strand.stations.get(at).is_some_and(|(place, _)| shared(*place));
     let station = |(at, &(place, height)): (usize, &(Place, i32))| {
         let beside = strand.role == Role::Channel && (keeps(at + 1) || (0 < at && keeps(at - 1)));
         Station { place, height, stays: site.on_line(place) || shared(place) || beside }
     };
     let stations: Vec<Station> = strand.stations.iter().enumerate().map(station).collect();
-    let kept = thin(&stations, Tolerance::USUAL.times(grant.tolerance), 0, site.lattice);
-    let stations = kept.iter().map(|at| strand.stations[*at as usize]).collect();
-    (!grant.out).then_some(Strand { stations, ..strand.clone() })
-}
-
-/// A strand without what is left out of it in some load modules. What encloses water is left out as a whole or not at
-/// all.
-fn with_gaps(strand: Strand, grants: &Grants, site: &Site) -> Vec<Strand> {
-    let is_whole = matches!(strand.role, Role::Shore | Role::Bank);
-    let is_out = |pair: &[(Place, i32)]| grants.is_out(strand.id, site.module_under(pair[0].0, pair[1].0));
-    if is_whole || !strand.stations.windows(2).any(is_out) {
-        return vec![strand];
-    }
+    let grants_along: Vec<Grant> =
+        stations.windows(2).map(|ends| grants.of(strand.id, site.module_under(ends[0].place, ends[1].place))).collect();
     let mut parts: Vec<Strand> = Vec::new();
-    let mut open = false;
-    for pair in strand.stations.windows(2) {
-        if is_out(pair) {
+    let (mut from, mut open) = (0, false);
+    for same in grants_along.chunk_by(|a, b| a == b) {
+        let to = from + same.len();
+        if same[0].out && !strand.role.is_whole() {
             open = false;
-            continue;
+        } else {
+            let kept = thin(&stations[from..=to], Tolerance::USUAL.times(same[0].tolerance), 0, site.lattice);
+            let kept = kept.into_iter().map(|at| strand.stations[from + at as usize]);
+            match parts.last_mut().filter(|_| open) {
+                Some(part) => part.stations.extend(kept.skip(1)),
+                None => parts.push(Strand { stations: kept.collect(), ..*strand }),
+            }
+            open = true;
         }
-        match parts.last_mut().filter(|_| open) {
-            Some(part) => part.stations.push(pair[1]),
-            None => parts.push(Strand { stations: pair.to_vec(), ..strand }),
-        }
-        open = true;
+        from = to;
     }
     parts
 }

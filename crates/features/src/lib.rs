@@ -14,7 +14,7 @@
 //! level(&outlines, &shores, ..) -> Waters           lakes; then lakes_along(..) -> levels for the rivers
 //! fall(&rivers, Bed, ..) -> Fallen                  rivers; channels(..), shore(..), banks(..) -> Vec<Strand>
 //! grade(&roads, &ground, &pins, &water(&strands), GradeOptions, ..) -> Vec<i32>
-//! reserve(&Graded, &strands, &Site, &triangles_max) -> Reserved
+//! reserve(&Graded, &strands, &Site, &mut Room) -> Reserved
 //!     .formed: Formed { points, edges, faces, decks, remarks }, .cost: triangles by load module and class
 //! ```
 //!
@@ -84,8 +84,10 @@ pub use parts::{Line, breaklines, channels, dams, flowing, have_line, lakes_alon
 // Forms and what they cost.
 mod thin;
 pub use thin::{Station, Tolerance, thin};
+mod grants;
+pub use grants::{Grant, Grants};
 mod pieces;
-pub use pieces::{FALL_MIN, Grant, Grants, Piece, STRIP_STEPS_MIN, sides};
+pub use pieces::{FALL_MIN, Piece, STRIP_STEPS_MIN, sides};
 mod strips;
 pub use strips::Face;
 mod strand;
@@ -96,11 +98,15 @@ pub use toes::{CUT_RUN, FILL_RUN, reach_max};
 mod forms;
 pub use forms::{Formed, FormedEdge, Surface, form};
 mod cost;
-pub use cost::{Cost, Reserved, cost, reserve};
+pub use cost::{Cost, cost};
+mod ladder;
+mod members;
+mod reserve;
+pub use reserve::{Reserved, Room, reserve};
 
 // All of it, in its order.
 mod area;
-pub use area::{AreaFeatures, Levelled, Room};
+pub use area::{AreaFeatures, Levelled};
 
 #[cfg(test)]
 mod samples;

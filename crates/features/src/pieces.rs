@@ -1,61 +1,13 @@
 //! Chains cut into pieces whose stations are thinned, each segment of which is a line or a strip.
 
-use std::collections::{HashMap, HashSet};
-
 use crate::thin::{Station, Tolerance, thin};
-use crate::{FeatureId, Form, Network, Place, Site, Storey, Traits};
+use crate::{FeatureId, Form, Grant, Grants, Network, Place, Site, Storey, Traits};
 
 /// The ground falls more than this across a strip, in quanta, where it pays: 0.5 m.
 pub const FALL_MIN: i32 = 64;
 
 /// Steps of the lattice below which a strip is a line.
 pub const STRIP_STEPS_MIN: i32 = 4;
-
-/// What the cost of features leaves to one of them.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct Grant {
-    /// How many times the usual tolerance it is thinned with: 1, 2 or 4.
-    pub tolerance: u8,
-    /// The most it may be: a bench, a strip or a line.
-    pub most: Form,
-    /// Whether it is left out.
-    pub out: bool,
-}
-
-impl Grant {
-    /// As asked for.
-    pub const ALL: Self = Self { tolerance: 1, most: Form::Bench, out: false };
-}
-
-/// What the cost of features leaves to each of them.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Grants {
-    less: HashMap<FeatureId, Grant>,
-    /// Features that are left out in a load module (row, column).
-    gaps: HashSet<(FeatureId, (i32, i32))>,
-}
-
-impl Grants {
-    /// What a feature may be.
-    pub fn of(&self, id: FeatureId) -> Grant {
-        self.less.get(&id).copied().unwrap_or(Grant::ALL)
-    }
-
-    /// Whether what a feature has in a load module is left out.
-    pub fn is_out(&self, id: FeatureId, module: (i32, i32)) -> bool {
-        self.gaps.contains(&(id, module)) || self.of(id).out
-    }
-
-    /// Leaves out what a feature has in a load module; false where it was left out already.
-    pub fn leave_out(&mut self, id: FeatureId, module: (i32, i32)) -> bool {
-        self.gaps.insert((id, module))
-    }
-
-    /// Leaves less to a feature.
-    pub fn set(&mut self, id: FeatureId, grant: Grant) {
-        self.less.insert(id, grant);
-    }
-}
 
 /// Thinned stations of one chain.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -123,13 +75,13 @@ pub fn pieces(
     shared: &dyn Fn(Place) -> bool,
     grants: &Grants,
 ) -> Vec<Piece> {
-    let grant = |edge: u32| grants.of(network.ways[network.edges[edge as usize].way as usize].id);
-    let is_out = |edge: u32| {
-        let segment = network.segment(edge);
-        let id = network.ways[network.edges[edge as usize].way as usize].id;
-        grants.is_out(id, site.module_under(segment.a, segment.b))
+    let granted = |edge: u32| {
+        let (segment, way) = (network.segment(edge), network.edges[edge as usize].way);
+        grants.of(network.ways[way as usize].id, site.module_under(segment.a, segment.b))
     };
-    let picked = |edge: u32| !is_out(edge) && !matches!(network.traits(edge).storey, Storey::Tunnel(_));
+    let by_edge: Vec<Grant> = (0..network.edges.len() as u32).map(granted).collect();
+    let grant = |edge: u32| by_edge[edge as usize];
+    let picked = |edge: u32| !grant(edge).out && !matches!(network.traits(edge).storey, Storey::Tunnel(_));
     let follows = |node: u32| match network.beside(node) {
         [(_, one), (_, other)] => {
             let same = network.traits(*one) == network.traits(*other) && grant(*one) == grant(*other);

@@ -24,6 +24,13 @@ pub enum Role {
     Toe,
 }
 
+impl Role {
+    /// Whether it encloses water, and so is there as a whole or not at all.
+    pub fn is_whole(self) -> bool {
+        matches!(self, Role::Shore | Role::Bank)
+    }
+}
+
 /// A line with heights that is no travelled way: a channel, a shore, a breakline.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Strand {

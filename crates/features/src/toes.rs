@@ -17,6 +17,9 @@ const WIDTHS_MAX: f64 = 2.0;
 /// The toe lines of all benches: along each side of a piece, as long as it is a strip of its whole width.
 pub(crate) fn toes(graded: &Graded, pieces: &[Piece], wide: &[Wide], faces: &[Face]) -> Vec<Strand> {
     let network = graded.network;
+    if !pieces.iter().any(|piece| piece.bench) {
+        return Vec::new();
+    }
     let sides = sides(network);
     let mut toes: Vec<Strand> = Vec::new();
     // Left and right of the piece at hand, and where both end.
