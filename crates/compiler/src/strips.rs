@@ -33,9 +33,12 @@ fn is_inside(face: &Face, lattice: FeatureLattice, rect: PostRect) -> bool {
     within(|place| place.row, rect.south, rect.north) && within(|place| place.col, rect.west, rect.east)
 }
 
-/// A piece of a strip from one station to the next: right and left at its end, then left and right at its beginning,
-/// with the heights that the TIN has there.
-struct Strip([(Place, i32); 4]);
+/// A piece of a strip from one station to the next.
+struct Strip {
+    /// Right and left at its end, then left and right at its beginning, with the heights that the TIN has there.
+    corners: [(Place, i32); 4],
+    centreline: [Place; 2],
+}
 
 impl Strip {
     /// Of a face of four corners that are all in the TIN; all others are junctions, or cut by a higher class.
@@ -45,35 +48,27 @@ impl Strip {
             let found = points.binary_search_by_key(&corner.0, |(place, _)| *place).ok()?;
             Some(points[found])
         };
-        Some(Self([height(right_to)?, height(left_to)?, height(left_from)?, height(right_from)?]))
+        let corners = [height(right_to)?, height(left_to)?, height(left_from)?, height(right_from)?];
+        Some(Self { corners, centreline: face.centreline? })
     }
 
     /// The largest difference in height across it, at either end, in quanta.
     fn fall(&self) -> u32 {
-        let [a, b, c, d] = self.0.map(|(_, height)| height);
+        let [a, b, c, d] = self.corners.map(|(_, height)| height);
         a.abs_diff(b).max(c.abs_diff(d))
     }
 
-    /// The middles of its ends, doubled, and twice its rise between them.
-    fn middles(&self) -> ([Place; 2], i64) {
-        let [a, b, c, d] = self.0;
-        let doubled = |one: (Place, i32), other: (Place, i32)| {
-            (Place::new(one.0.row + other.0.row, one.0.col + other.0.col), i64::from(one.1) + i64::from(other.1))
-        };
-        let ((from, low), (to, high)) = (doubled(c, d), doubled(a, b));
-        ([from, to], high - low)
-    }
-
-    /// Metres along its middle.
+    /// Metres along its centreline.
     fn length(&self, lattice: FeatureLattice) -> f64 {
-        let ([from, to], _) = self.middles();
-        let [east, north] = from.to(to).map(|steps| steps as f64 / 2.0 * lattice.metres_per_step());
+        let [east, north] =
+            self.centreline[0].to(self.centreline[1]).map(|steps| steps as f64 * lattice.metres_per_step());
         (east * east + north * north).sqrt()
     }
 
     /// Whether it rises by more than a grade lets it and a quantum.
     fn is_steeper(&self, grade_ppm: u32, lattice: FeatureLattice) -> bool {
-        let (_, rise) = self.middles();
+        let [a, b, c, d] = self.corners.map(|(_, height)| i64::from(height));
+        let rise = a + b - c - d;
         let rise_max = self.length(lattice) * f64::from(terrain::QUANTA_PER_METRE) * f64::from(grade_ppm) / 1e6;
         grade_ppm != 0 && rise_max + 1.0 < (rise as f64 / 2.0).abs()
     }
@@ -92,7 +87,8 @@ mod tests {
     /// Eastwards, 128 steps long and 16 wide, from one height to another.
     fn strip(from: i32, to: i32) -> Strip {
         let at = |row, col, height| (Place::new(row, col), height);
-        Strip([at(0, 128, to), at(16, 128, to), at(16, 0, from), at(0, 0, from)])
+        let corners = [at(0, 128, to), at(16, 128, to), at(16, 0, from), at(0, 0, from)];
+        Strip { corners, centreline: [Place::new(8, 0), Place::new(8, 128)] }
     }
 
     #[test]
@@ -106,7 +102,7 @@ mod tests {
     #[test]
     fn a_corner_that_is_lower_than_the_one_across_is_a_fall() {
         let mut fallen = strip(0, 640);
-        fallen.0[1].1 -= 7;
+        fallen.corners[1].1 -= 7;
         assert_eq!(fallen.fall(), 7);
     }
 }

@@ -10,11 +10,11 @@ use crate::decks::between;
 use crate::exact::Segment;
 use crate::pieces::{Piece, pieces};
 use crate::rings::encloses;
-use crate::room::share_out;
+use crate::room::{remark_rooms, share_out};
 use crate::snap::snap_round;
 use crate::strand::{Graded, Role, Strand};
 use crate::strips::{Face, Room, Wide, wide_segments};
-use crate::thin::{Station, Tolerance, thin};
+use crate::thin::{Grade, Station, Tolerance, thin};
 use crate::toes::toes;
 use crate::{FeatureId, Flaw, Form, Grant, Grants, Network, Place, Remark, Remedy, Site};
 
@@ -76,21 +76,52 @@ pub fn form(graded: &Graded, strands: &[Strand], site: &Site) -> Formed {
     let pieces = pieces(network, heights, beside, site, &stays, grants);
     remark_narrow(network, &pieces, &mut remarks);
     let mut wide = wide_segments(&pieces);
-    let all = share_out(network, &pieces, &mut wide, heights, &mut remarks);
-    let toes = toes(graded, &pieces, &wide, &all);
+    let thinned: Vec<Strand> = strands.iter().flat_map(|strand| thinned(strand, grants, site, &stays)).collect();
+    let mut formed = round_together(graded, &pieces, &mut wide, &thinned, site);
+    for _ in 0..ROUNDS_LEVEL {
+        let tilted = tilted(&formed);
+        if tilted.is_empty() {
+            break;
+        }
+        tilted.into_iter().for_each(|number| wide[number as usize].room = Room::None);
+        formed = round_together(graded, &pieces, &mut wide, &thinned, site);
+    }
+    remark_rooms(network, &pieces, &wide, &mut remarks);
+    formed.remarks.append(&mut remarks);
+    Remark::sort(&mut formed.remarks);
+    formed
+}
+
+/// Rounds in which strips that another line tilts become lines themselves.
+const ROUNDS_LEVEL: usize = 3;
+
+/// Rounds strips that have room, and all other lines, together.
+fn round_together(graded: &Graded, pieces: &[Piece], wide: &mut [Wide], thinned: &[Strand], site: &Site) -> Formed {
+    let Graded { network, heights, .. } = *graded;
+    let all = share_out(network, pieces, wide, heights);
+    let toes = toes(graded, pieces, wide, &all);
     let (decks, faces): (Vec<Face>, Vec<Face>) = all.into_iter().partition(|face| face.is_deck);
     let mut lines = outlines(&faces);
     lines.extend(toes);
-    lines.extend(centrelines(network, &pieces, &wide, heights));
-    lines.extend(strands.iter().flat_map(|strand| thinned(strand, grants, site, &stays)));
+    lines.extend(centrelines(network, pieces, wide, heights));
+    lines.extend(thinned.iter().cloned());
     lines.sort_by(|a, b| (a.class, a.role, &a.stations, a.id).cmp(&(b.class, b.role, &b.stations, b.id)));
+    let mut remarks = Vec::new();
     let mut formed = assemble(lines, &faces, site, &mut remarks);
-    (formed.faces, formed.decks) = (faces, decks);
+    (formed.faces, formed.decks, formed.remarks) = (faces, decks, remarks);
     formed.faces.sort_by(|a, b| (a.class, &a.corners).cmp(&(b.class, &b.corners)));
     formed.decks.sort_by(|a, b| (a.class, &a.corners).cmp(&(b.class, &b.corners)));
-    formed.remarks = remarks;
-    Remark::sort(&mut formed.remarks);
     formed
+}
+
+/// Strips of which a corner has the height of another line that passes through it: they would fall to a side.
+fn tilted(formed: &Formed) -> Vec<u32> {
+    let has_other_height = |&(place, height): &(Place, i32)| {
+        let found = formed.points.binary_search_by_key(&place, |(other, _)| *other);
+        found.is_ok_and(|found| formed.points[found].1 != height)
+    };
+    let strips = formed.faces.iter().filter(|face| face.corners.iter().any(has_other_height));
+    strips.filter_map(|face| face.wide).collect()
 }
 
 /// Places that two strands have, or a strand and the network: thinning leaves them to both.
@@ -132,7 +163,7 @@ pub(crate) fn thinned(strand: &Strand, grants: &Grants, site: &Site, shared: &dy
         if same[0].out && !strand.role.is_whole() {
             open = false;
         } else {
-            let kept = thin(&stations[from..=to], Tolerance::USUAL.times(same[0].tolerance), 0, site.lattice);
+            let kept = thin(&stations[from..=to], Tolerance::USUAL.times(same[0].tolerance), Grade::ANY, site.lattice);
             let kept = kept.into_iter().map(|at| strand.stations[from + at as usize]);
             match parts.last_mut().filter(|_| open) {
                 Some(part) => part.stations.extend(kept.skip(1)),

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use crate::clean::Notes;
 use crate::exact::Segment;
-use crate::{FeatureId, FeatureLattice, Flaw, Place, Remark, Remedy, Storey, Traits, Way};
+use crate::{FeatureId, FeatureLattice, Flaw, Form, Place, Remark, Remedy, Storey, Traits, Way};
 
 /// A station.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -86,8 +86,8 @@ impl Network {
                     continue;
                 }
                 let (from, to) = (nodes[a as usize].place, nodes[b as usize].place);
-                let (length, rise_max) = (lattice.length(from, to), lattice.rise_max(from, to, of.traits.grade_ppm));
-                edges.push(Edge { a, b, way: way as u32, length: length.min(1 << 28) as i32, rise_max });
+                let length = lattice.length(from, to).min(1 << 28) as i32;
+                edges.push(Edge { a, b, way: way as u32, length, rise_max: 0 });
             }
             if let Some(node) = shared {
                 let mut notes = Notes { id: of.id, lattice, remarks };
@@ -100,7 +100,30 @@ impl Network {
             node.on_ground |= starts[number + 1] - starts[number] == 1;
         }
         let ways = ways.iter().map(|way| WayOf { traits: way.traits, id: way.id }).collect();
-        Self { nodes, edges, ways, lattice, starts, beside }
+        let mut network = Self { nodes, edges, ways, lattice, starts, beside };
+        for edge in 0..network.edges.len() as u32 {
+            let Edge { a, b, .. } = network.edges[edge as usize];
+            let [from, to] = [a, b].map(|node| network.nodes[node as usize].place);
+            let (grade_ppm, flat) =
+                (network.traits(edge).grade_ppm, network.flat_at(a, edge) + network.flat_at(b, edge));
+            network.edges[edge as usize].rise_max = lattice.rise_max(from, to, grade_ppm, flat);
+        }
+        network
+    }
+
+    /// Quanta of an edge that are level at one of its ends: where three and more meet on the ground, half the width
+    /// of the widest other that may be a strip, which is level across.
+    pub fn flat_at(&self, node: u32, edge: u32) -> i32 {
+        let meets = self.beside(node);
+        if meets.len() < 3 || !self.nodes[node as usize].on_ground {
+            return 0;
+        }
+        let others = meets.iter().filter(|(_, other)| *other != edge && self.is_ground(*other));
+        let width = |(_, other): &(u32, u32)| {
+            let traits = self.traits(*other);
+            if matches!(traits.form, Form::Line | Form::Polygon) { 0 } else { traits.width / 2 }
+        };
+        others.map(width).max().unwrap_or(0)
     }
 
     /// Neighbours of a node, each with the edge that leads there, in order.

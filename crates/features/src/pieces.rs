@@ -1,6 +1,6 @@
 //! Chains cut into pieces whose stations are thinned, each segment of which is a line or a strip.
 
-use crate::thin::{Station, Tolerance, thin};
+use crate::thin::{Grade, Station, Tolerance, thin};
 use crate::{FeatureId, Form, Grant, Grants, Network, Place, Site, Storey, Traits};
 
 /// The ground falls more than this across a strip, in quanta, where it pays: 0.5 m.
@@ -99,7 +99,10 @@ pub fn pieces(
             Station { place, height: heights[*node as usize], stays: site.on_line(place) || shared(place) }
         };
         let stations: Vec<Station> = nodes.iter().map(station).collect();
-        let kept = thin(&stations, Tolerance::USUAL.times(grant.tolerance), traits.grade_ppm, network.lattice);
+        let (first, last) = (0, nodes.len() - 1);
+        let flat = [network.flat_at(nodes[first], edges[first]), network.flat_at(nodes[last], edges[last - 1])];
+        let grade = Grade { ppm: traits.grade_ppm, flat };
+        let kept = thin(&stations, Tolerance::USUAL.times(grant.tolerance), grade, network.lattice);
         let form = form_of(&traits, grant, network);
         let strip = |pair: &[u32]| match form {
             Form::Strip => (pair[0]..=pair[1]).any(|at| FALL_MIN < fall(nodes[at as usize])),

@@ -98,11 +98,14 @@ impl FeatureLattice {
         (i128::from(a.squared_to(b)) * scale * scale).unsigned_abs().isqrt() as i64
     }
 
-    /// The most a way of a grade may rise between two neighbouring places, in quanta, rounded down.
-    pub fn rise_max(self, a: Place, b: Place, grade_ppm: u32) -> i32 {
+    /// The most a way of a grade may rise between two neighbouring places, in quanta, rounded down. `flat` quanta of
+    /// it are level, but no more than three quarters.
+    pub fn rise_max(self, a: Place, b: Place, grade_ppm: u32, flat: i32) -> i32 {
         let scale = i128::from(self.quanta_per_step()) * i128::from(grade_ppm);
-        let rise = (i128::from(a.squared_to(b)) * scale * scale).unsigned_abs().isqrt() / 1_000_000;
-        rise.min(1 << 28) as i32
+        // Quanta times parts per million.
+        let whole = (i128::from(a.squared_to(b)) * scale * scale).unsigned_abs().isqrt();
+        let level = (u128::from(flat.unsigned_abs()) * u128::from(grade_ppm)).min(whole / 4 * 3);
+        ((whole - level) / 1_000_000).min(1 << 28) as i32
     }
 }
 
@@ -140,7 +143,9 @@ mod tests {
         let lattice = FeatureLattice::of(Spacing::from_metres(25.0).unwrap());
         let (a, b) = (Place::new(0, 0), Place::new(0, 64));
         assert_eq!(lattice.length(a, b), 3200);
-        assert_eq!(lattice.rise_max(a, b, 60_000), 192);
-        assert_eq!(lattice.rise_max(a, Place::new(1, 1), 20_000), 1);
+        assert_eq!(lattice.rise_max(a, b, 60_000, 0), 192);
+        assert_eq!(lattice.rise_max(a, Place::new(1, 1), 20_000, 0), 1);
+        assert_eq!(lattice.rise_max(a, b, 60_000, 800), 144);
+        assert_eq!(lattice.rise_max(a, b, 60_000, 3200), 48);
     }
 }

@@ -13,13 +13,7 @@ use crate::{Flaw, Network, Place, Remark, Remedy};
 const ROUNDS: usize = 4;
 
 /// The faces of all strips after overlaps are resolved, and what is left of each strip.
-pub(crate) fn share_out(
-    network: &Network,
-    pieces: &[Piece],
-    wide: &mut [Wide],
-    heights: &[i32],
-    remarks: &mut Vec<Remark>,
-) -> Vec<Face> {
+pub(crate) fn share_out(network: &Network, pieces: &[Piece], wide: &mut [Wide], heights: &[i32]) -> Vec<Face> {
     let mut found = faces(network, pieces, wide, heights);
     for _ in 0..ROUNDS {
         let losers = losers(network, pieces, wide, &found);
@@ -32,6 +26,11 @@ pub(crate) fn share_out(
         }
         found = faces(network, pieces, wide, heights);
     }
+    found
+}
+
+/// Writes down which strips others left less room than they ask for.
+pub(crate) fn remark_rooms(network: &Network, pieces: &[Piece], wide: &[Wide], remarks: &mut Vec<Remark>) {
     let mut told = BTreeSet::new();
     for of in wide.iter().filter(|of| of.room != Room::Whole) {
         let id = pieces[of.piece as usize].id(network, of.segment as usize);
@@ -41,7 +40,6 @@ pub(crate) fn share_out(
             Notes { id, lattice: network.lattice, remarks }.write_at(place, Flaw::Overlap, remedy);
         }
     }
-    found
 }
 
 /// The part a segment of an outline or of a line belongs to.

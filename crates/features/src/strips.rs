@@ -48,6 +48,8 @@ pub struct Face {
     pub corners: Vec<(Place, i32)>,
     /// Whether it is part of a deck and not of the ground.
     pub is_deck: bool,
+    /// The stations of its centreline, of a segment; none for a junction.
+    pub centreline: Option<[Place; 2]>,
     /// Nodes of the network it belongs to.
     pub(crate) nodes: Vec<u32>,
     /// Which strip segment it is; none for a junction.
@@ -127,6 +129,7 @@ pub(crate) fn faces(network: &Network, pieces: &[Piece], wide: &[Wide], heights:
         let ring = vec![(right_a, a), (right_b, b), (left_b, b), (left_a, a)];
         let mut face = face(network, pieces, of, ring, vec![of.a, of.b]);
         face.wide = Some(number as u32);
+        face.centreline = Some([of.a, of.b].map(|node| network.nodes[node as usize].place));
         faces.push(face);
     }
     faces.extend(junctions);
@@ -142,7 +145,7 @@ fn face(network: &Network, pieces: &[Piece], of: &Wide, mut corners: Vec<(Place,
         corners.pop();
     }
     let (class, id) = (piece.traits.class, piece.id(network, of.segment as usize));
-    Face { class, id, corners, is_deck: piece.is_deck(), nodes, wide: None }
+    Face { class, id, corners, is_deck: piece.is_deck(), nodes, wide: None, centreline: None }
 }
 
 fn arms(network: &Network, pieces: &[Piece], wide: &[Wide]) -> Vec<Arm> {

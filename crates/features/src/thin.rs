@@ -35,10 +35,23 @@ pub struct Station {
     pub stays: bool,
 }
 
+/// How steep a line may be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Grade {
+    /// The greatest grade in parts per million; 0 for none.
+    pub ppm: u32,
+    /// Quanta that are level at its beginning and at its end.
+    pub flat: [i32; 2],
+}
+
+impl Grade {
+    /// Of a line that may be as steep as the ground.
+    pub const ANY: Self = Self { ppm: 0, flat: [0; 2] };
+}
+
 /// The numbers of the stations that stay, in order; the first and the last do.
 ///
-/// `grade_ppm` of 0 stands for a line without a greatest grade.
-pub fn thin(stations: &[Station], tolerance: Tolerance, grade_ppm: u32, lattice: FeatureLattice) -> Vec<u32> {
+pub fn thin(stations: &[Station], tolerance: Tolerance, grade: Grade, lattice: FeatureLattice) -> Vec<u32> {
     let last = stations.len().saturating_sub(1);
     let mut kept: Vec<bool> = stations.iter().map(|station| station.stays).collect();
     for end in [0, last] {
@@ -56,7 +69,8 @@ pub fn thin(stations: &[Station], tolerance: Tolerance, grade_ppm: u32, lattice:
             .map(|at| (at, excess(stations[from], stations[to], stations[at], aside, height)))
             .max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)));
         let Some((at, excess)) = worst else { continue };
-        if 1.0 < excess || is_too_steep(stations[from], stations[to], grade_ppm, lattice) {
+        let flat = if from == 0 { grade.flat[0] } else { 0 } + if to == last { grade.flat[1] } else { 0 };
+        if 1.0 < excess || is_too_steep(stations[from], stations[to], Grade { flat: [flat, 0], ..grade }, lattice) {
             kept[at] = true;
             spans.extend([(from, at), (at, to)]);
         }
@@ -64,8 +78,9 @@ pub fn thin(stations: &[Station], tolerance: Tolerance, grade_ppm: u32, lattice:
     (0..stations.len() as u32).filter(|at| kept[*at as usize]).collect()
 }
 
-fn is_too_steep(a: Station, b: Station, grade_ppm: u32, lattice: FeatureLattice) -> bool {
-    0 < grade_ppm && lattice.rise_max(a.place, b.place, grade_ppm) < (a.height - b.height).abs()
+fn is_too_steep(a: Station, b: Station, grade: Grade, lattice: FeatureLattice) -> bool {
+    let Grade { ppm, flat } = grade;
+    0 < ppm && lattice.rise_max(a.place, b.place, ppm, flat[0] + flat[1]) < (a.height - b.height).abs()
 }
 
 /// How many times a tolerance a station lies off the line from `a` to `b`.
@@ -85,6 +100,8 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
+    const SIX: Grade = Grade { ppm: 60_000, flat: [0; 2] };
+
     fn lattice() -> FeatureLattice {
         FeatureLattice::of(terrain::Spacing::from_metres(25.0).unwrap())
     }
@@ -101,16 +118,24 @@ mod tests {
     #[test]
     fn a_straight_line_keeps_its_ends_and_what_has_to_stay() {
         let mut stations = line(&[0, 10, 20, 30, 40]);
-        assert_eq!(thin(&stations, Tolerance::USUAL, 60_000, lattice()), [0, 4]);
+        assert_eq!(thin(&stations, Tolerance::USUAL, SIX, lattice()), [0, 4]);
         stations[3].stays = true;
-        assert_eq!(thin(&stations, Tolerance::USUAL, 60_000, lattice()), [0, 3, 4]);
+        assert_eq!(thin(&stations, Tolerance::USUAL, SIX, lattice()), [0, 3, 4]);
+    }
+
+    #[test]
+    fn a_line_that_begins_level_is_not_as_long_as_it_looks() {
+        let stations = line(&[0, 180, 360]);
+        assert_eq!(thin(&stations, Tolerance::USUAL, SIX, lattice()), [0, 2]);
+        let level = Grade { flat: [800, 0], ..SIX };
+        assert_eq!(thin(&stations, Tolerance::USUAL, level, lattice()), [0, 1, 2]);
     }
 
     #[test]
     fn a_hump_higher_than_the_tolerance_stays() {
-        assert_eq!(thin(&line(&[0, 10, 25, 10, 0]), Tolerance::USUAL, 0, lattice()), [0, 2, 4]);
-        assert_eq!(thin(&line(&[0, 10, 15, 10, 0]), Tolerance::USUAL, 0, lattice()), [0, 4]);
-        assert_eq!(thin(&line(&[0, 10, 25, 10, 0]), Tolerance::USUAL.times(2), 0, lattice()), [0, 4]);
+        assert_eq!(thin(&line(&[0, 10, 25, 10, 0]), Tolerance::USUAL, Grade::ANY, lattice()), [0, 2, 4]);
+        assert_eq!(thin(&line(&[0, 10, 15, 10, 0]), Tolerance::USUAL, Grade::ANY, lattice()), [0, 4]);
+        assert_eq!(thin(&line(&[0, 10, 25, 10, 0]), Tolerance::USUAL.times(2), Grade::ANY, lattice()), [0, 4]);
     }
 
     proptest! {
@@ -123,10 +148,10 @@ mod tests {
                 stations.push(Station { place: Place::new(*row, 64 * at as i32), height, stays: at % 7 == 3 });
                 height += rise;
             }
-            let kept = thin(&stations, Tolerance::USUAL, 60_000, lattice());
+            let kept = thin(&stations, Tolerance::USUAL, SIX, lattice());
             for pair in kept.windows(2) {
                 let (from, to) = (stations[pair[0] as usize], stations[pair[1] as usize]);
-                prop_assert!(!is_too_steep(from, to, 60_000, lattice()));
+                prop_assert!(!is_too_steep(from, to, SIX, lattice()));
                 for at in pair[0] + 1..pair[1] {
                     prop_assert!(!stations[at as usize].stays);
                     let aside = 0.5 / lattice().metres_per_step();
