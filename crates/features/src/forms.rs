@@ -3,7 +3,7 @@
 //! Strips, lines, outlines and channels are rounded to the lattice once more, together, so that any two of them touch
 //! at shared points or not at all; where two had different heights at a point, the higher class keeps its own.
 
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
 use crate::clean::Notes;
 use crate::decks::between;
@@ -14,7 +14,7 @@ use crate::room::{remark_rooms, share_out};
 use crate::snap::snap_round;
 use crate::strand::{Graded, Role, Strand};
 use crate::strips::{Face, Room, Wide, wide_segments};
-use crate::thin::{Grade, Station, Tolerance, thin};
+use crate::thin::{Station, Tolerance, thin};
 use crate::toes::toes;
 use crate::{FeatureId, Flaw, Form, Grant, Grants, Network, Place, Remark, Remedy, Site};
 
@@ -79,7 +79,7 @@ pub fn form(graded: &Graded, strands: &[Strand], site: &Site) -> Formed {
     let thinned: Vec<Strand> = strands.iter().flat_map(|strand| thinned(strand, grants, site, &stays)).collect();
     let mut formed = round_together(graded, &pieces, &mut wide, &thinned, site);
     for _ in 0..ROUNDS_LEVEL {
-        let tilted = tilted(&formed);
+        let tilted = tilted(&formed, network);
         if tilted.is_empty() {
             break;
         }
@@ -114,13 +114,23 @@ fn round_together(graded: &Graded, pieces: &[Piece], wide: &mut [Wide], thinned:
     formed
 }
 
-/// Strips of which a corner has the height of another line that passes through it: they would fall to a side.
-fn tilted(formed: &Formed) -> Vec<u32> {
-    let has_other_height = |&(place, height): &(Place, i32)| {
+/// Strips that another line would tilt, or that would make one too steep: those of which a corner has the height of a
+/// line that passes through it, and those at the corner of which a line begins that is steeper than it may be.
+fn tilted(formed: &Formed, network: &Network) -> BTreeSet<u32> {
+    let grades: HashMap<FeatureId, u32> = network.ways.iter().map(|way| (way.id, way.traits.grade_ppm)).collect();
+    let mut steep: HashSet<Place> = HashSet::new();
+    for edge in formed.edges.iter().filter(|edge| edge.role == Role::Centre) {
+        let [a, b] = [edge.a, edge.b].map(|point| formed.points[point as usize]);
+        let grade_ppm = grades.get(&edge.id).copied().unwrap_or(0);
+        if 0 < grade_ppm && network.lattice.rise_max(a.0, b.0, grade_ppm, 0) + 1 < (a.1 - b.1).abs() {
+            steep.extend([a.0, b.0]);
+        }
+    }
+    let is_tilted = |&(place, height): &(Place, i32)| {
         let found = formed.points.binary_search_by_key(&place, |(other, _)| *other);
-        found.is_ok_and(|found| formed.points[found].1 != height)
+        steep.contains(&place) || found.is_ok_and(|found| formed.points[found].1 != height)
     };
-    let strips = formed.faces.iter().filter(|face| face.corners.iter().any(has_other_height));
+    let strips = formed.faces.iter().filter(|face| face.corners.iter().any(is_tilted));
     strips.filter_map(|face| face.wide).collect()
 }
 
@@ -151,7 +161,7 @@ pub(crate) fn thinned(strand: &Strand, grants: &Grants, site: &Site, shared: &dy
     let keeps = |at: usize| strand.stations.get(at).is_some_and(|(place, _)| shared(*place));
     let station = |(at, &(place, height)): (usize, &(Place, i32))| {
         let beside = strand.role == Role::Channel && (keeps(at + 1) || (0 < at && keeps(at - 1)));
-        Station { place, height, stays: site.on_line(place) || shared(place) || beside }
+        Station { place, height, stays: site.on_line(place) || shared(place) || beside, flat: [0; 2] }
     };
     let stations: Vec<Station> = strand.stations.iter().enumerate().map(station).collect();
     let grants_along: Vec<Grant> =
@@ -163,7 +173,7 @@ pub(crate) fn thinned(strand: &Strand, grants: &Grants, site: &Site, shared: &dy
         if same[0].out && !strand.role.is_whole() {
             open = false;
         } else {
-            let kept = thin(&stations[from..=to], Tolerance::USUAL.times(same[0].tolerance), Grade::ANY, site.lattice);
+            let kept = thin(&stations[from..=to], Tolerance::USUAL.times(same[0].tolerance), 0, site.lattice);
             let kept = kept.into_iter().map(|at| strand.stations[from + at as usize]);
             match parts.last_mut().filter(|_| open) {
                 Some(part) => part.stations.extend(kept.skip(1)),

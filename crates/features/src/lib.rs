@@ -83,7 +83,7 @@ pub use parts::{Line, breaklines, channels, dams, flowing, have_line, lakes_alon
 
 // Forms and what they cost.
 mod thin;
-pub use thin::{Grade, Station, Tolerance, thin};
+pub use thin::{Station, Tolerance, thin};
 mod grants;
 pub use grants::{Grant, Grants};
 mod pieces;

@@ -111,12 +111,22 @@ impl Network {
         network
     }
 
-    /// Quanta of an edge that are level at one of its ends: where three and more meet on the ground, half the width
-    /// of the widest other that may be a strip, which is level across.
+    /// Quanta of an edge that are level at one of its ends: where three and more meet on the ground, or where it turns
+    /// off sharply, half the width of the widest other that may be a strip, which is level across.
     pub fn flat_at(&self, node: u32, edge: u32) -> i32 {
         let meets = self.beside(node);
-        if meets.len() < 3 || !self.nodes[node as usize].on_ground {
+        if meets.len() < 2 || !self.nodes[node as usize].on_ground {
             return 0;
+        }
+        let to = |&(next, _): &(u32, u32)| self.nodes[node as usize].place.to(self.nodes[next as usize].place);
+        if let [one, other] = meets {
+            let ([east, north], [to_east, to_north]) = (to(one).map(i128::from), to(other).map(i128::from));
+            let dot = east * to_east + north * to_north;
+            let lengths = (east * east + north * north) * (to_east * to_east + to_north * to_north);
+            // Less than 60 degrees from straight on: the cosine is below -1/2.
+            if dot < 0 && lengths < 4 * dot * dot {
+                return 0;
+            }
         }
         let others = meets.iter().filter(|(_, other)| *other != edge && self.is_ground(*other));
         let width = |(_, other): &(u32, u32)| {

@@ -1,6 +1,6 @@
 //! Chains cut into pieces whose stations are thinned, each segment of which is a line or a strip.
 
-use crate::thin::{Grade, Station, Tolerance, thin};
+use crate::thin::{Station, Tolerance, thin};
 use crate::{FeatureId, Form, Grant, Grants, Network, Place, Site, Storey, Traits};
 
 /// The ground falls more than this across a strip, in quanta, where it pays: 0.5 m.
@@ -94,15 +94,15 @@ pub fn pieces(
     runs.map(|(nodes, edges)| {
         let traits = *network.traits(edges[0]);
         let grant = grant(edges[0]);
-        let station = |node: &u32| {
-            let place = network.nodes[*node as usize].place;
-            Station { place, height: heights[*node as usize], stays: site.on_line(place) || shared(place) }
+        let station = |(at, &node): (usize, &u32)| {
+            let place = network.nodes[node as usize].place;
+            let flat = |edge: Option<&u32>| edge.map_or(0, |edge| network.flat_at(node, *edge));
+            let flat = [flat(at.checked_sub(1).and_then(|before| edges.get(before))), flat(edges.get(at))];
+            let stays = site.on_line(place) || shared(place);
+            Station { place, height: heights[node as usize], stays, flat }
         };
-        let stations: Vec<Station> = nodes.iter().map(station).collect();
-        let (first, last) = (0, nodes.len() - 1);
-        let flat = [network.flat_at(nodes[first], edges[first]), network.flat_at(nodes[last], edges[last - 1])];
-        let grade = Grade { ppm: traits.grade_ppm, flat };
-        let kept = thin(&stations, Tolerance::USUAL.times(grant.tolerance), grade, network.lattice);
+        let stations: Vec<Station> = nodes.iter().enumerate().map(station).collect();
+        let kept = thin(&stations, Tolerance::USUAL.times(grant.tolerance), traits.grade_ppm, network.lattice);
         let form = form_of(&traits, grant, network);
         let strip = |pair: &[u32]| match form {
             Form::Strip => (pair[0]..=pair[1]).any(|at| FALL_MIN < fall(nodes[at as usize])),

@@ -338,4 +338,19 @@ mod tests {
         assert!(formed.formed.remarks.iter().any(|remark| remark.remedy.leaves_out()));
         assert!(formed.formed.edges.iter().any(|edge| edge.class == 0), "motorways go last");
     }
+
+    #[test]
+    fn a_crowded_load_module_takes_nothing_from_its_neighbours_and_gives_nearly_what_it_may() {
+        // A long road through eight load modules, the first of them full of others.
+        let mut sources = vec![way(1, "highway=service", &[(5.0, 25.0), (395.0, 25.0)])];
+        sources.extend((2..60).map(|number| road(number, "service", 1.0 + number as f64 * 0.8)));
+        let crowded = reserved(sources, 120);
+        let taken = |module| crowded.cost.get(&module).map_or(0, |classes| classes.values().sum::<u32>());
+        assert!(100 < taken((0, 0)), "{} of 120 triangles are used", taken((0, 0)));
+        let id = FeatureId { source: 0, numbering: Numbering::Way, number: 1 };
+        assert!((1..8).all(|col| crowded.grants.of(id, (0, col)) == Grant::ALL));
+        let east = |point: u32| crowded.formed.points[point as usize].0.col;
+        let farthest = crowded.formed.edges.iter().filter(|edge| edge.id == id).map(|edge| east(edge.b)).max();
+        assert_eq!(farthest, site().lattice.place_of([395.0, 25.0]).map(|place| place.col));
+    }
 }

@@ -33,25 +33,14 @@ pub struct Station {
     pub height: i32,
     /// Whether it stays whatever it costs.
     pub stays: bool,
-}
-
-/// How steep a line may be.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Grade {
-    /// The greatest grade in parts per million; 0 for none.
-    pub ppm: u32,
-    /// Quanta that are level at its beginning and at its end.
+    /// Quanta of the line that are level before it and after it.
     pub flat: [i32; 2],
-}
-
-impl Grade {
-    /// Of a line that may be as steep as the ground.
-    pub const ANY: Self = Self { ppm: 0, flat: [0; 2] };
 }
 
 /// The numbers of the stations that stay, in order; the first and the last do.
 ///
-pub fn thin(stations: &[Station], tolerance: Tolerance, grade: Grade, lattice: FeatureLattice) -> Vec<u32> {
+/// `grade_ppm` of 0 stands for a line without a greatest grade.
+pub fn thin(stations: &[Station], tolerance: Tolerance, grade_ppm: u32, lattice: FeatureLattice) -> Vec<u32> {
     let last = stations.len().saturating_sub(1);
     let mut kept: Vec<bool> = stations.iter().map(|station| station.stays).collect();
     for end in [0, last] {
@@ -69,8 +58,7 @@ pub fn thin(stations: &[Station], tolerance: Tolerance, grade: Grade, lattice: F
             .map(|at| (at, excess(stations[from], stations[to], stations[at], aside, height)))
             .max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)));
         let Some((at, excess)) = worst else { continue };
-        let flat = if from == 0 { grade.flat[0] } else { 0 } + if to == last { grade.flat[1] } else { 0 };
-        if 1.0 < excess || is_too_steep(stations[from], stations[to], Grade { flat: [flat, 0], ..grade }, lattice) {
+        if 1.0 < excess || is_too_steep(stations[from], stations[to], grade_ppm, lattice) {
             kept[at] = true;
             spans.extend([(from, at), (at, to)]);
         }
@@ -78,9 +66,9 @@ pub fn thin(stations: &[Station], tolerance: Tolerance, grade: Grade, lattice: F
     (0..stations.len() as u32).filter(|at| kept[*at as usize]).collect()
 }
 
-fn is_too_steep(a: Station, b: Station, grade: Grade, lattice: FeatureLattice) -> bool {
-    let Grade { ppm, flat } = grade;
-    0 < ppm && lattice.rise_max(a.place, b.place, ppm, flat[0] + flat[1]) < (a.height - b.height).abs()
+fn is_too_steep(a: Station, b: Station, grade_ppm: u32, lattice: FeatureLattice) -> bool {
+    let rise_max = lattice.rise_max(a.place, b.place, grade_ppm, a.flat[1] + b.flat[0]);
+    0 < grade_ppm && rise_max < (a.height - b.height).abs()
 }
 
 /// How many times a tolerance a station lies off the line from `a` to `b`.
@@ -100,8 +88,6 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    const SIX: Grade = Grade { ppm: 60_000, flat: [0; 2] };
-
     fn lattice() -> FeatureLattice {
         FeatureLattice::of(terrain::Spacing::from_metres(25.0).unwrap())
     }
@@ -111,6 +97,7 @@ mod tests {
             place: Place::new(0, 64 * at as i32),
             height: *height,
             stays: false,
+            flat: [0; 2],
         };
         heights.iter().enumerate().map(station).collect()
     }
@@ -118,24 +105,24 @@ mod tests {
     #[test]
     fn a_straight_line_keeps_its_ends_and_what_has_to_stay() {
         let mut stations = line(&[0, 10, 20, 30, 40]);
-        assert_eq!(thin(&stations, Tolerance::USUAL, SIX, lattice()), [0, 4]);
+        assert_eq!(thin(&stations, Tolerance::USUAL, 60_000, lattice()), [0, 4]);
         stations[3].stays = true;
-        assert_eq!(thin(&stations, Tolerance::USUAL, SIX, lattice()), [0, 3, 4]);
+        assert_eq!(thin(&stations, Tolerance::USUAL, 60_000, lattice()), [0, 3, 4]);
     }
 
     #[test]
     fn a_line_that_begins_level_is_not_as_long_as_it_looks() {
-        let stations = line(&[0, 180, 360]);
-        assert_eq!(thin(&stations, Tolerance::USUAL, SIX, lattice()), [0, 2]);
-        let level = Grade { flat: [800, 0], ..SIX };
-        assert_eq!(thin(&stations, Tolerance::USUAL, level, lattice()), [0, 1, 2]);
+        let mut stations = line(&[0, 180, 360]);
+        assert_eq!(thin(&stations, Tolerance::USUAL, 60_000, lattice()), [0, 2]);
+        stations[0].flat = [0, 800];
+        assert_eq!(thin(&stations, Tolerance::USUAL, 60_000, lattice()), [0, 1, 2]);
     }
 
     #[test]
     fn a_hump_higher_than_the_tolerance_stays() {
-        assert_eq!(thin(&line(&[0, 10, 25, 10, 0]), Tolerance::USUAL, Grade::ANY, lattice()), [0, 2, 4]);
-        assert_eq!(thin(&line(&[0, 10, 15, 10, 0]), Tolerance::USUAL, Grade::ANY, lattice()), [0, 4]);
-        assert_eq!(thin(&line(&[0, 10, 25, 10, 0]), Tolerance::USUAL.times(2), Grade::ANY, lattice()), [0, 4]);
+        assert_eq!(thin(&line(&[0, 10, 25, 10, 0]), Tolerance::USUAL, 0, lattice()), [0, 2, 4]);
+        assert_eq!(thin(&line(&[0, 10, 15, 10, 0]), Tolerance::USUAL, 0, lattice()), [0, 4]);
+        assert_eq!(thin(&line(&[0, 10, 25, 10, 0]), Tolerance::USUAL.times(2), 0, lattice()), [0, 4]);
     }
 
     proptest! {
@@ -145,13 +132,13 @@ mod tests {
         ) {
             let (mut height, mut stations) = (0, Vec::new());
             for (at, (rise, row)) in rises.iter().enumerate() {
-                stations.push(Station { place: Place::new(*row, 64 * at as i32), height, stays: at % 7 == 3 });
+                stations.push(Station { place: Place::new(*row, 64 * at as i32), height, stays: at % 7 == 3, flat: [0; 2] });
                 height += rise;
             }
-            let kept = thin(&stations, Tolerance::USUAL, SIX, lattice());
+            let kept = thin(&stations, Tolerance::USUAL, 60_000, lattice());
             for pair in kept.windows(2) {
                 let (from, to) = (stations[pair[0] as usize], stations[pair[1] as usize]);
-                prop_assert!(!is_too_steep(from, to, SIX, lattice()));
+                prop_assert!(!is_too_steep(from, to, 60_000, lattice()));
                 for at in pair[0] + 1..pair[1] {
                     prop_assert!(!stations[at as usize].stays);
                     let aside = 0.5 / lattice().metres_per_step();
