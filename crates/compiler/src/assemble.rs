@@ -129,10 +129,9 @@ fn make(assembling: &Assembling, stamp: &Stamp) -> Result<(Assembled, Sums), Com
 
 /// Ground that has the class of a feature; nothing where there is none.
 fn faces(features: &TileFeatures) -> Option<Faces> {
-    let same = |a: &FeatureSurface, b: &FeatureSurface| (a.class, a.ground, a.body) == (b.class, b.ground, b.body);
     let ring = |surface: &FeatureSurface| surface.ring.iter().map(|vertex| vertex.at).collect();
     let face = |body: &[FeatureSurface]| Face { class: body[0].class, rings: body.iter().map(ring).collect() };
-    let all: Vec<Face> = features.surfaces.chunk_by(same).map(face).collect();
+    let all: Vec<Face> = features.bodies().map(face).collect();
     (!all.is_empty()).then(|| Faces::new(&all, features.kept.steps_per_post))
 }
 

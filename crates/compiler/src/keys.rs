@@ -46,12 +46,14 @@ pub(crate) fn tin(window: &Window, refinement: &Refinement, seeds: &[Vertex]) ->
         .part(ALLOWANCE, |part| feed_allowance(part, &refinement.task))
         .part(BORDERS, |part| part.list(seeds.iter(), feed_vertex));
     // Tiles without features keep the keys they had before there were any.
-    match refinement.features.is_empty() {
+    match refinement.features.kept.is_empty() {
         true => key,
         false => key.part(FEATURES, |part| {
-            let part = feed_features(part, &refinement.features);
-            part.list(refinement.lakes.iter(), |part, rings| {
-                part.list(rings.iter(), |part, ring| part.list(ring.iter(), feed_vertex))
+            let part = feed_features(part, &refinement.features.kept);
+            let lakes: Vec<_> =
+                refinement.features.bodies().filter(|rings| rings[0].ground == SurfaceGround::Lake).collect();
+            part.list(lakes.into_iter(), |part, rings| {
+                part.list(rings.iter(), |part, surface| part.list(surface.ring.iter(), feed_vertex))
             })
         }),
     }
@@ -190,7 +192,7 @@ pub(crate) fn measured(run: &Run, modules: Fingerprint) -> Key {
 }
 
 fn feed_rules(builder: FingerprintBuilder, refinement: &Refinement) -> FingerprintBuilder {
-    let Refinement { task, optimising, most, features: _, lakes: _ } = refinement;
+    let Refinement { task, optimising, most, features: _ } = refinement;
     let builder = feed_growth(builder, task).list(task.kept.iter(), feed_post);
     let builder = builder.maybe(*optimising, |builder, optimising| {
         let job::Optimising { effort, height_fit, lattice } = optimising;

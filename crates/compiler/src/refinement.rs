@@ -1,10 +1,11 @@
 //! One tile's refinement: grown to its budget, or grown beyond it and optimised.
 
+use fidelity::Bodies;
 use ground::{GivenPost, Window, border_posts, start_posts};
 use job::{Effort, Job, Method, Optimising};
 use limits::Allowance;
 use optimiser::{Budget, Optimised, Task, fill, optimise, overshoot, weave_in};
-use terrain::{Dem, Features, HeightFit, Lattice, LatticePoint, Post, PostRect, THOUSANDTHS, TileTin, Tin, Vertex};
+use terrain::{Dem, HeightFit, Lattice, LatticePoint, Post, PostRect, THOUSANDTHS, TileFeatures, TileTin, Tin, Vertex};
 use tin::{Frame, Rule, Stop, TileTask};
 
 /// Room in a window of load modules while a tile is grown beyond its budget.
@@ -22,10 +23,8 @@ pub struct Refinement {
     pub optimising: Option<Optimising>,
     /// What the finished mesh may have where there are no load modules.
     pub most: Most,
-    /// Vertices and edges that it keeps whatever it is refined to.
-    pub features: Features,
-    /// Rings of level water, those of one body together: what lies inside has its height.
-    pub lakes: Vec<Vec<Vec<Vertex>>>,
+    /// What features put into it: vertices and edges that it keeps whatever it is refined to, and level water.
+    pub features: TileFeatures,
 }
 
 /// Where there are no load modules, the most a mesh may have.
@@ -50,7 +49,7 @@ impl Refinement {
     /// whatever the DEM says today.
     pub fn run(&self, window: &Window, seeds: &[Vertex]) -> TileTin {
         let mut tin = self.run_as_given(window, seeds);
-        lay_level(&mut tin.tin, &self.lakes);
+        lay_level(&mut tin.tin, &self.features);
         tin
     }
 
@@ -78,7 +77,7 @@ impl Refinement {
         };
         let Some(optimising) = self.optimising else {
             let grown = grown(&self.task);
-            if self.features.is_empty() {
+            if self.features.kept.is_empty() {
                 return grown;
             }
             // Every vertex where it grew, with features among them.
@@ -143,7 +142,7 @@ impl Refinement {
         };
         Task {
             held,
-            features: self.features.clone(),
+            features: self.features.kept.clone(),
             open: task.seams,
             line_step: match task.frame {
                 Frame::Sides { side_cells, .. } => Some(side_cells),
@@ -173,31 +172,14 @@ impl Refinement {
 }
 
 /// Puts vertices inside level water at its height: posts there weigh nothing, so nothing else holds them.
-fn lay_level(tin: &mut Tin, lakes: &[Vec<Vec<Vertex>>]) {
-    for rings in lakes {
-        let Some(level) = rings.first().and_then(|ring| ring.first()).map(|vertex| vertex.height) else { continue };
-        let rows = || rings.iter().flatten().map(|vertex| vertex.at.row);
-        let (Some(south), Some(north)) = (rows().min(), rows().max()) else { continue };
-        let near = tin.vertices.iter_mut().filter(|vertex| (south..=north).contains(&vertex.at.row));
-        for vertex in near.filter(|vertex| lies_inside(rings, vertex.at)) {
-            vertex.height = level;
-        }
+fn lay_level(tin: &mut Tin, features: &TileFeatures) {
+    let bodies = Bodies::of(features);
+    if !bodies.has_lake() {
+        return;
     }
-}
-
-/// Whether a place lies inside an odd number of rings; one on a ring may be either.
-fn lies_inside(rings: &[Vec<Vertex>], at: LatticePoint) -> bool {
-    let crossed = |(a, b): (LatticePoint, LatticePoint)| {
-        let (low, high) = if a.row < b.row { (a, b) } else { (b, a) };
-        let [rise, run] = [high.row - low.row, high.col - low.col].map(i64::from);
-        let [up, along] = [at.row - low.row, at.col - low.col].map(i64::from);
-        low.row <= at.row && at.row < high.row && along * rise < up * run
-    };
-    let edges = rings.iter().flat_map(|ring| {
-        let next = ring.iter().cycle().skip(1);
-        ring.iter().zip(next).map(|(a, b)| (a.at, b.at))
-    });
-    edges.filter(|&edge| crossed(edge)).count() % 2 == 1
+    for vertex in &mut tin.vertices {
+        vertex.height = bodies.lake_level_in(vertex.at, tin.steps_per_post).unwrap_or(vertex.height);
+    }
 }
 
 /// Adds what a job gives to a tile's task: points on the area's border to its border, others to what it starts from.

@@ -40,8 +40,7 @@ pub fn tile_refinement(
 ) -> Refinement {
     let barred = features.kept.barred_posts(area.tiling.rect(tile));
     let task = TileTask { barred, ..tile_task(job, area, tile, budget, inherited) };
-    let lakes = features.lakes().map(|rings| rings.iter().map(|surface| surface.ring.clone()).collect()).collect();
-    Refinement { task, optimising: optimising(job), most: Most::AsTask, features: features.kept.clone(), lakes }
+    Refinement { task, optimising: optimising(job), most: Most::AsTask, features: features.clone() }
 }
 
 /// The growth of one tile, inheriting `inherited` from its lower-ranked neighbours.

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 
 use ground::Window;
 use load_modules::{Layout, concatenate};
-use terrain::{Features, ModuleGrid, ModuleId, ModuleRect, ModuleResidual, Tin, Vertex};
+use terrain::{ModuleGrid, ModuleId, ModuleRect, ModuleResidual, TileFeatures, TileId, Tin, Vertex};
 use tin::{Stop, TileTask};
 
 use crate::CompileError;
@@ -48,7 +48,7 @@ fn without_limit(run: &Run, window: &Window, module: ModuleId, part: &Tin, extra
     let stop = Stop { points: Some(points + extra), ..Stop::default() };
     let task = TileTask { inherited, stop, ..TileTask::plain(tile, rect, rule(run.job, &run.area)) };
     let refinement =
-        Refinement { task, optimising, most: Most::AsTask, features: Features::default(), lakes: Vec::new() };
+        Refinement { task, optimising, most: Most::AsTask, features: TileFeatures::none(TileId { row: 0, col: 0 }) };
     let tin = match optimising {
         Some(optimising) => refinement.fill(&window, optimising, part),
         None => refinement.run(&window, &sides).tin,

@@ -167,8 +167,7 @@ impl<'a> Bodies<'a> {
     /// Those of a tile.
     pub fn of(features: &'a TileFeatures) -> Self {
         let steps = features.kept.steps_per_post;
-        let same = |a: &FeatureSurface, b: &FeatureSurface| (a.class, a.ground, a.body) == (b.class, b.ground, b.body);
-        let bodies = features.surfaces.chunk_by(same).map(|surfaces| Body::of(surfaces, steps)).collect();
+        let bodies = features.bodies().map(|surfaces| Body::of(surfaces, steps)).collect();
         Self { steps, bodies }
     }
 
@@ -181,6 +180,13 @@ impl<'a> Bodies<'a> {
     pub fn lake_level(&self, at: LatticePoint) -> Option<i32> {
         let first = self.bodies.iter().find(|body| body.holds(at, self.steps))?;
         (first.ground == SurfaceGround::Lake).then_some(first.level)
+    }
+
+    /// The same of a place in a lattice of so many steps a post; one between the places of features lies south-west.
+    pub fn lake_level_in(&self, at: LatticePoint, steps_per_post: i32) -> Option<i32> {
+        let (to_common, to_own) = common(self.steps, steps_per_post);
+        let at = scaled(at, to_own);
+        self.lake_level(LatticePoint::new(at.row.div_euclid(to_common), at.col.div_euclid(to_common)))
     }
 
     /// How far any vertex of a TIN in a lake lies from its level, in quanta. Vertices of other features, which cross

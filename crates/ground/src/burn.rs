@@ -5,15 +5,12 @@
 
 use std::collections::HashMap;
 
-use terrain::{Dem, FeatureSurface, HOLE_CLASS, Importance, LatticePoint, Post, PostRect, SurfaceGround, TileFeatures};
+use features::{CUT_RUN, FILL_RUN};
+use terrain::{Dem, HOLE_CLASS, Importance, LatticePoint, Post, PostRect, SurfaceGround, TileFeatures};
 use terrain::{Spacing, Vertex};
 
 use crate::window::Window;
 
-/// Run over rise of a slope that was cut.
-const CUT_RUN: f64 = 1.5;
-/// Run over rise of a slope that was filled.
-const FILL_RUN: f64 = 2.0;
 /// Metres from the edge of a road beyond which no slope reaches.
 pub const SLOPE_REACH_M: f64 = 60.0;
 
@@ -105,8 +102,7 @@ impl<'a> Burning<'a> {
     /// Puts posts on features at the features' heights; where two overlap, the first has the post.
     fn surfaces(&mut self) {
         let features = self.features;
-        let same = |a: &FeatureSurface, b: &FeatureSurface| (a.class, a.ground, a.body) == (b.class, b.ground, b.body);
-        for body in features.surfaces.chunk_by(same) {
+        for body in features.bodies() {
             let rings: Vec<&[Vertex]> = body.iter().map(|surface| &surface.ring[..]).collect();
             let banks = (body[0].ground == SurfaceGround::River).then(|| Near::of(&rings, self.steps));
             for post in posts_inside(&rings, self.steps, self.within) {
@@ -290,7 +286,7 @@ fn around(row: i32, col: i32, away: i32) -> Vec<(i32, i32)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use terrain::{Features, TileId};
+    use terrain::{FeatureSurface, Features, TileId};
 
     const STEPS: i32 = 64;
 

@@ -190,7 +190,8 @@ impl Ground {
         let Some(lines) = self.lines.get() else { return self.natural_tile(area, tile) };
         kept_or(lines.kept(area.tiling.index(tile)), || {
             // Points that the job gives are looked up in what they are given for.
-            let window = lines.burn(Window::clone(&*self.natural_tile(area, tile)?))?;
+            let natural = Window::clone(&*self.natural_tile(area, tile)?);
+            let window = lines.burn_tile(natural, tile, area.tiling.rect(tile))?;
             self.with_given(area, tile, window)
         })
     }

@@ -50,16 +50,15 @@ impl Lines {
         Ok(read)
     }
 
+    /// The window of a tile with its features; its neighbours add nothing that it does not have.
+    pub fn burn_tile(&self, window: Window, tile: TileId, rect: PostRect) -> Result<Window, GroundError> {
+        Ok(burn(window, &*self.features(tile)?, rect, self.spacing))
+    }
+
     /// A window with the features of all tiles that it touches.
     pub fn burn(&self, window: Window) -> Result<Window, GroundError> {
         let rect = window.dem.rect();
-        // The window of one tile, mostly; its neighbours then add nothing that it does not have.
-        let whole = self.tiles.iter().find(|(_, tile)| tile.contains_rect(&rect));
-        let burn =
-            |window, &(tile, of): &(TileId, PostRect)| Ok(burn(window, &*self.features(tile)?, of, self.spacing));
-        match whole {
-            Some(tile) => burn(window, tile),
-            None => self.tiles.iter().filter(|(_, tile)| tile.intersection(&rect).is_some()).try_fold(window, burn),
-        }
+        let mut touched = self.tiles.iter().filter(|(_, tile)| tile.intersection(&rect).is_some());
+        touched.try_fold(window, |window, &(tile, of)| self.burn_tile(window, tile, of))
     }
 }

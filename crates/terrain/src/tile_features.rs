@@ -48,10 +48,10 @@ impl TileFeatures {
         Self { tile, kept: Features::default(), surfaces: Vec::new(), slopes: Vec::new(), decks: Vec::new() }
     }
 
-    /// Bodies of level water, each with its rings.
-    pub fn lakes(&self) -> impl Iterator<Item = &[FeatureSurface]> {
+    /// Parts of roads, lakes and rivers, each with its rings; where two overlap, the first has the ground.
+    pub fn bodies(&self) -> impl Iterator<Item = &[FeatureSurface]> {
         let same = |a: &FeatureSurface, b: &FeatureSurface| (a.class, a.ground, a.body) == (b.class, b.ground, b.body);
-        self.surfaces.chunk_by(same).filter(|rings| rings[0].ground == SurfaceGround::Lake)
+        self.surfaces.chunk_by(same)
     }
 
     /// Whether there is nothing that changes the ground or lies above it.

@@ -14,7 +14,7 @@ use job::{ErrorKey, Optimising, StartMethod};
 use schedule::{Event as Scheduled, RankedTasks, Workers, in_rank_order_observed};
 use terrain::{
     Dem, Features, GainCurve, Importance, LastBatch, Metres, ModuleGrid, PostRect, SeamSides, StopReason, THOUSANDTHS,
-    TileId, TileOrder, TileTin, Tin, Vertex,
+    TileFeatures, TileId, TileOrder, TileTin, Tin, Vertex,
 };
 use tiling::{Gains, Tiling, points_equally, points_globally};
 use tin::{CostUnit, Proximity, Rule, Stop, SurveyTask, TileTask};
@@ -278,7 +278,7 @@ impl<'a> TinJob<'a> {
             Some(triangles) if self.tiles.len() == 1 => Most::Triangles(triangles),
             _ => Most::AsTask,
         };
-        Refinement { task, optimising, most, features: Features::default(), lakes: Vec::new() }
+        Refinement { task, optimising, most, features: TileFeatures::none(TileId { row: 0, col: 0 }) }
     }
 
     fn task(&self, tile: TileId, seams: SeamSides, inherited: Vec<terrain::Post>, points: Option<usize>) -> TileTask {
