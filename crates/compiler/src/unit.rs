@@ -80,7 +80,10 @@ impl<'a> Session<'a> {
         }
         let here = [tile.unwrap_or(TileId { row: 0, col: 0 })];
         let done = schedule::for_each_independent(&here, &Workers::new(1), self.run.stop, |_, _| self.make(unit));
-        done.map_err(|error| CompileError::from_schedule(stage, &here, error))?;
+        if let Err(error) = done {
+            let error = CompileError::from_schedule(stage, &here, error);
+            return Err(if self.has_damaged_lines() { self.spoilt(unit, Unit::whole(Stage::Level)) } else { error });
+        }
         if let Some(tile) = tile {
             progress.tell(Event::Done(stage, tile));
         }
@@ -114,6 +117,16 @@ impl<'a> Session<'a> {
             }
             _ => Err(self.spoilt(unit, level)),
         }
+    }
+
+    /// Whether what features put into a tile is no longer what `level` published. It is read in the middle of every
+    /// later stage, so a unit that failed asks afterwards.
+    fn has_damaged_lines(&self) -> bool {
+        let folder = self.run.database.folder();
+        self.run.level.as_ref().is_some_and(|settled| {
+            let mut lines = self.run.area.tiles.iter().zip(&settled.level.tiles);
+            lines.any(|(&tile, stamp)| folder.check_file(&folder.lines_path(tile), stamp).is_err())
+        })
     }
 
     fn level(&self) -> Result<Fingerprint, CompileError> {
