@@ -10,8 +10,17 @@ use super::sheet::{Drawing, Key, Legend, Sheet};
 use crate::features::outcome;
 use crate::table::grouped;
 
-/// What became of a feature, its colour, and half a mark's side; the most important last, over the others.
-const OUTCOMES: [(&str, Color, i64); 3] = [("mended", GREY, 1), ("degraded", BOUND, 3), ("left out", BREACH, 3)];
+/// What became of a feature, and its colour; the most important last, over the others.
+const OUTCOMES: [(&str, Color); 3] = [("mended", GREY), ("degraded", BOUND), ("left out", BREACH)];
+
+/// Half a mark's side in pixels: the more there are, the smaller, so that they do not become one.
+fn half_side(remarks: usize) -> i64 {
+    match remarks {
+        0..=300 => 3,
+        301..=3_000 => 2,
+        _ => 1,
+    }
+}
 
 /// Roads and water over a faint relief, with a mark at each remark.
 pub(crate) fn feature_map(scene: &Scene, longest: usize) -> Drawing {
@@ -21,10 +30,9 @@ pub(crate) fn feature_map(scene: &Scene, longest: usize) -> Drawing {
     let (wide, high) = (map_extent.pixels[0], map_extent.pixels[1]);
     let faint = (0..wide * high).map(|place| mix(relief.pixel(place % wide, place / wide), WHITE, 0.6)).collect();
     let mut map = Image::of(wide, high, faint);
-    draw_lines(&mut map, &map_extent, scene, 1.4);
     let remarks = scene.features.map_or(&[][..], |features| features.remarks);
-    let mut counts = [0_u64; 3];
-    for (number, (word, color, half)) in OUTCOMES.into_iter().enumerate() {
+    let (half, mut counts) = (half_side(remarks.len()), [0_u64; 3]);
+    for (number, (word, color)) in OUTCOMES.into_iter().enumerate() {
         for remark in remarks.iter().filter(|remark| outcome(remark) == word) {
             counts[number] += 1;
             let Some(place) = remark.at_m else { continue };
@@ -32,8 +40,10 @@ pub(crate) fn feature_map(scene: &Scene, longest: usize) -> Drawing {
             map.fill([x - half, y - half, 2 * half + 1, 2 * half + 1], color);
         }
     }
+    // What is there stays visible over what is not.
+    draw_lines(&mut map, &map_extent, scene, 1.4);
     let marks = OUTCOMES.iter().zip(counts).rev();
-    let marks = marks.map(|((word, color, _), count)| (Key::Filled(*color), format!("{word}: {}", grouped(count))));
+    let marks = marks.map(|((word, color), count)| (Key::Filled(*color), format!("{word}: {}", grouped(count))));
     let legends = vec![
         Legend::Keys { title: "Roads and water".into(), keys: keys(|cover| shows(scene, &facets, cover)) },
         Legend::Keys { title: "What became of them".into(), keys: marks.collect() },
