@@ -255,4 +255,21 @@ mod tests {
         other.reverse();
         assert_eq!(levelled(sources(), hills), levelled(other, hills));
     }
+
+    #[test]
+    fn a_lake_stays_where_a_few_tracks_crowd_one_of_its_load_modules() {
+        // The lake lies in two load modules; twenty tracks fill the northern one's corner.
+        let ring = [(10.0, 20.0), (40.0, 20.0), (40.0, 60.0), (10.0, 60.0), (10.0, 20.0)];
+        let track = |number: i64| {
+            let north = 70.0 + number as f64;
+            way(10 + number, "highway=track", &[(20.0, north), (25.0, north + 0.5)])
+        };
+        let sources = (0..20).map(track).chain([way(3, "natural=water", &ring)]);
+        let all = AreaFeatures::of(sources.collect(), &[], site());
+        let ground: Vec<Option<i32>> = all.stations().iter().map(|place| ground_at(*place, &|_, _| 5.0)).collect();
+        let levelled = all.level(&ground, GradeOptions::USUAL, &mut 40);
+        let of = |role: Role| levelled.reserved.formed.edges.iter().filter(|edge| edge.role == role).count();
+        assert!(4 <= of(Role::Shore) && 0 < of(Role::Centre), "{} and {}", of(Role::Shore), of(Role::Centre));
+        assert!(levelled.remarks.iter().any(|remark| remark.remedy.leaves_out()));
+    }
 }

@@ -58,14 +58,26 @@ pub(crate) fn as_asked(crowd: &Crowd) -> Fitted {
     Fitted { rungs: tally.rungs, triangles: tally.triangles }
 }
 
-/// Takes features down as far as they have to go to take no more than `room` triangles together; those for which
-/// `is_gone` says so are left out whatever there is room for.
+/// Which features stay where not all of them can.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Claim {
+    /// Before all others.
+    First,
+    /// By its class.
+    Usual,
+    /// Not at all, whatever there is room for.
+    Gone,
+}
+
+/// Takes features down as far as they have to go to take no more than `room` triangles together.
 ///
 /// Of what cannot stay even at the end of the ladder, the highest class stays first, and of a class what has the most
-/// metres a triangle.
-pub(crate) fn fit(crowd: &Crowd, room: u32, is_gone: &dyn Fn(&Member) -> bool) -> Fitted {
+/// metres a triangle, each as it is claimed.
+pub(crate) fn fit(crowd: &Crowd, room: u32, claim: &dyn Fn(&Member) -> Claim) -> Fitted {
     let members = &crowd.members;
-    let start: Vec<Rung> = members.iter().map(|of| if is_gone(of) { Rung::OUT } else { Rung::default() }).collect();
+    let claims: Vec<Claim> = members.iter().map(claim).collect();
+    let start: Vec<Rung> =
+        claims.iter().map(|claim| if *claim == Claim::Gone { Rung::OUT } else { Rung::default() }).collect();
     if let Some(fitted) = descend(crowd, room, start.clone()) {
         return fitted;
     }
@@ -77,7 +89,7 @@ pub(crate) fn fit(crowd: &Crowd, room: u32, is_gone: &dyn Fn(&Member) -> bool) -
     }
     let metres = |&(at, _): &(usize, i128), (_, triangles): &(usize, i128)| i128::from(members[at].length) * triangles;
     order.sort_by(|a, b| {
-        let class = members[a.0].class.cmp(&members[b.0].class);
+        let class = claims[a.0].cmp(&claims[b.0]).then(members[a.0].class.cmp(&members[b.0].class));
         class.then_with(|| metres(b, a).cmp(&metres(a, b))).then(a.0.cmp(&b.0))
     });
     // A junction that is there already costs nothing more, so that what stays hangs together.
@@ -213,7 +225,7 @@ mod tests {
 
     #[track_caller]
     fn check(crowd: &Crowd, room: u32, expected: &[&str]) {
-        let fitted = fit(crowd, room, &|_| false);
+        let fitted = fit(crowd, room, &|_| Claim::Usual);
         let word = |rung: &Rung| if rung.out { "out".to_owned() } else { format!("x{}", rung.grant().tolerance) };
         assert_eq!(fitted.rungs.iter().map(word).collect::<Vec<_>>(), expected);
         assert!(fitted.triangles <= room);
@@ -237,6 +249,13 @@ mod tests {
         let crowd = crowd(&[(0, 10, [8, 8, 8]), (0, 90, [10, 10, 10]), (0, 2, [4, 4, 4])]);
         check(&crowd, 14, &["out", "x1", "x1"]);
         check(&crowd, 18, &["x1", "x1", "out"]);
+    }
+
+    #[test]
+    fn what_is_claimed_first_stays_before_a_higher_class() {
+        let crowd = crowd(&[(0, 10, [8, 8, 8]), (9, 10, [8, 8, 8])]);
+        let fitted = fit(&crowd, 8, &|member| if member.class == 9 { Claim::First } else { Claim::Usual });
+        assert_eq!(fitted.rungs.iter().map(|rung| rung.is_out()).collect::<Vec<_>>(), [true, false]);
     }
 
     #[test]

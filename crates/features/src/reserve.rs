@@ -9,7 +9,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use crate::clean::Notes;
 use crate::cost::{Cost, cost, modules_of, modules_under};
 use crate::forms::{Formed, form};
-use crate::ladder::{Fitted, as_asked, fit, tell};
+use crate::ladder::{Claim, Fitted, as_asked, fit, tell};
 use crate::members::{Crowd, Crowds, Member, crowds};
 use crate::strand::{Graded, Strand};
 use crate::{FeatureId, Flaw, Grants, Place, Remark, Remedy, Site};
@@ -101,12 +101,23 @@ struct Share {
     gone: HashSet<(FeatureId, (i32, i32))>,
     /// Left out wherever they lie, with a place.
     out: BTreeMap<FeatureId, Place>,
+    /// The load modules of what is there as a whole or not at all.
+    whole: BTreeMap<FeatureId, Vec<(i32, i32)>>,
+    /// What is whole and stays at the cost of others, because more would be lost without it.
+    first: BTreeSet<FeatureId>,
 }
 
 impl Share {
     fn new(crowds: Crowds) -> Self {
         let asked = crowds.iter().map(|(module, crowd)| (*module, as_asked(crowd))).collect();
-        Self { crowds, asked, less: BTreeMap::new(), gone: HashSet::new(), out: BTreeMap::new() }
+        let mut whole: BTreeMap<FeatureId, Vec<(i32, i32)>> = BTreeMap::new();
+        for (module, crowd) in &crowds {
+            for member in crowd.members.iter().filter(|member| member.is_whole) {
+                whole.entry(member.id).or_default().push(*module);
+            }
+        }
+        let (less, gone, out, first) = Default::default();
+        Self { crowds, asked, less, gone, out, whole, first }
     }
 
     fn fitted(&self, module: &(i32, i32)) -> &Fitted {
@@ -117,22 +128,59 @@ impl Share {
     fn aim(&mut self, aims: Vec<((i32, i32), u32)>) {
         let mut again: BTreeMap<(i32, i32), u32> = aims.into_iter().collect();
         while !again.is_empty() {
-            let mut went = BTreeSet::new();
+            let mut refused: BTreeMap<FeatureId, Place> = BTreeMap::new();
             for (module, aim) in std::mem::take(&mut again) {
                 let Some(crowd) = self.crowds.get(&module) else { continue };
-                let is_gone =
-                    |member: &Member| self.out.contains_key(&member.id) || self.gone.contains(&(member.id, module));
-                let fitted = fit(crowd, aim, &is_gone);
-                for (member, rung) in crowd.members.iter().zip(&fitted.rungs) {
-                    if member.is_whole && rung.is_out() && !self.out.contains_key(&member.id) {
-                        self.out.insert(member.id, member.place);
-                        went.insert(member.id);
-                    }
-                }
+                let fitted = fit(crowd, aim, &|member| self.claim(member, module));
+                let whole = crowd.members.iter().zip(&fitted.rungs).filter(|(of, rung)| of.is_whole && rung.is_out());
+                let whole = whole.filter(|(member, _)| !self.out.contains_key(&member.id));
+                refused.extend(whole.map(|(member, _)| (member.id, member.place)));
                 self.less.insert(module, (aim, fitted));
             }
-            again.extend(self.with_any_of(&went));
+            for (id, place) in refused {
+                if self.first.contains(&id) || !self.is_worth_it(id) {
+                    self.first.remove(&id);
+                    self.out.insert(id, place);
+                } else {
+                    self.first.insert(id);
+                }
+                again.extend(self.whole[&id].iter().map(|module| (*module, self.aim_of(module))));
+            }
         }
+    }
+
+    fn claim(&self, member: &Member, module: (i32, i32)) -> Claim {
+        if self.out.contains_key(&member.id) || self.gone.contains(&(member.id, module)) {
+            Claim::Gone
+        } else if self.first.contains(&member.id) {
+            Claim::First
+        } else {
+            Claim::Usual
+        }
+    }
+
+    fn aim_of(&self, module: &(i32, i32)) -> u32 {
+        self.less.get(module).map_or(self.asked[module].triangles, |(aim, _)| *aim)
+    }
+
+    /// Whether more metres of features stay with something whole than without it.
+    fn is_worth_it(&self, id: FeatureId) -> bool {
+        // None where it cannot stay whatever is done, which is less than anything.
+        let kept = |claim: Claim| {
+            let mut length = 0;
+            for module in &self.whole[&id] {
+                let crowd = &self.crowds[module];
+                let of = |member: &Member| if member.id == id { claim } else { self.claim(member, *module) };
+                let fitted = fit(crowd, self.aim_of(module), &of);
+                let mut stays = crowd.members.iter().zip(&fitted.rungs).filter(|(_, rung)| !rung.is_out());
+                if claim == Claim::First && !stays.clone().any(|(member, _)| member.id == id) {
+                    return None;
+                }
+                length += stays.by_ref().map(|(member, _)| member.length).sum::<i64>();
+            }
+            Some(length)
+        };
+        kept(Claim::Gone) < kept(Claim::First)
     }
 
     /// The load modules of features, with what the ladder is asked for there.
@@ -141,8 +189,8 @@ impl Share {
             return Vec::new();
         }
         let holds = |crowd: &Crowd| crowd.members.iter().any(|member| features.contains(&member.id));
-        let aim = |module: &(i32, i32)| self.less.get(module).map_or(self.asked[module].triangles, |(aim, _)| *aim);
-        self.crowds.iter().filter(|(_, crowd)| holds(crowd)).map(|(module, _)| (*module, aim(module))).collect()
+        let of = self.crowds.iter().filter(|(_, crowd)| holds(crowd));
+        of.map(|(module, _)| (*module, self.aim_of(module))).collect()
     }
 
     /// What features would cost, by the estimate.
