@@ -1,5 +1,7 @@
 //! One tile's refinement: grown to its budget, or grown beyond it and optimised.
 
+use std::collections::HashSet;
+
 use ground::{GivenPost, Window, border_posts, start_posts};
 use job::{Effort, Job, Method, Optimising};
 use limits::Allowance;
@@ -50,7 +52,7 @@ impl Refinement {
     /// whatever the DEM says today.
     pub fn run(&self, window: &Window, seeds: &[Vertex]) -> TileTin {
         let mut tin = self.run_as_given(window, seeds);
-        lay_level(&mut tin.tin, &self.lakes);
+        lay_level(&mut tin.tin, &self.lakes, &self.features);
         tin
     }
 
@@ -172,14 +174,25 @@ impl Refinement {
     }
 }
 
-/// Puts vertices inside level water at its height: posts there weigh nothing, so nothing else holds them.
-fn lay_level(tin: &mut Tin, lakes: &[Vec<Vec<Vertex>>]) {
+/// Puts vertices inside level water at its height: posts there weigh nothing, so nothing else holds them. Those of
+/// features, as of a road over it, stay as they were decided.
+fn lay_level(tin: &mut Tin, lakes: &[Vec<Vec<Vertex>>], features: &Features) {
+    if lakes.is_empty() {
+        return;
+    }
+    // Both are powers of two.
+    let finest = tin.steps_per_post.max(features.steps_per_post);
+    let (of_tin, of_features) = (finest / tin.steps_per_post, finest / features.steps_per_post);
+    let scaled = |at: LatticePoint, by: i32| LatticePoint::new(at.row * by, at.col * by);
+    let decided: HashSet<LatticePoint> =
+        features.vertices.iter().map(|vertex| scaled(vertex.at, of_features)).collect();
     for rings in lakes {
         let Some(level) = rings.first().and_then(|ring| ring.first()).map(|vertex| vertex.height) else { continue };
         let rows = || rings.iter().flatten().map(|vertex| vertex.at.row);
         let (Some(south), Some(north)) = (rows().min(), rows().max()) else { continue };
         let near = tin.vertices.iter_mut().filter(|vertex| (south..=north).contains(&vertex.at.row));
-        for vertex in near.filter(|vertex| lies_inside(rings, vertex.at)) {
+        let is_free = |vertex: &&mut Vertex| !decided.contains(&scaled(vertex.at, of_tin));
+        for vertex in near.filter(is_free).filter(|vertex| lies_inside(rings, vertex.at)) {
             vertex.height = level;
         }
     }
