@@ -1,6 +1,7 @@
 //! What tiles are made from beside their ground, taken apart field by field: a new field does not compile until it is
 //! decided whether it counts.
 
+use database::SourceRecord;
 use engine::{Fingerprint, FingerprintBuilder, Key, Part, Stamp};
 use features::{AreaFeatures, Clearances, GradeOptions, Place};
 use ground::{GamingArea, Window, feed_post};
@@ -48,15 +49,16 @@ pub(crate) fn tin(window: &Window, refinement: &Refinement, seeds: &[Vertex]) ->
     // Tiles without features keep the keys they had before there were any.
     match refinement.features.kept.is_empty() {
         true => key,
-        false => key.part(FEATURES, |part| {
-            let part = feed_features(part, &refinement.features.kept);
-            let lakes: Vec<_> =
-                refinement.features.bodies().filter(|rings| rings[0].ground == SurfaceGround::Lake).collect();
-            part.list(lakes.into_iter(), |part, rings| {
-                part.list(rings.iter(), |part, surface| part.list(surface.ring.iter(), feed_vertex))
-            })
-        }),
+        false => key.part(FEATURES, |part| feed_kept(part, refinement)),
     }
+}
+
+fn feed_kept(builder: FingerprintBuilder, refinement: &Refinement) -> FingerprintBuilder {
+    let features = &refinement.features;
+    let lakes: Vec<_> = features.bodies().filter(|rings| rings[0].ground == SurfaceGround::Lake).collect();
+    feed_features(builder, &features.kept).list(lakes.into_iter(), |builder, rings| {
+        builder.list(rings.iter(), |builder, surface| builder.list(surface.ring.iter(), feed_vertex))
+    })
 }
 
 /// Of the ground along the features of a tile.
@@ -67,20 +69,27 @@ pub(crate) fn profile(window: &Window, steps: i32, stations: impl ExactSizeItera
 }
 
 /// Of what features of the area come to: where they run, the ground there, and what they may take.
-pub(crate) fn level(run: &Run, spec: &FeaturesSpec, features: &AreaFeatures, ground: &[Option<i32>]) -> Key {
-    let Budget { grid, border_step, per_module, pool: _, area, per_window, windows, reserved: _ } = &run.area.budget;
+pub(crate) fn level(
+    job: &Job,
+    budget: &Budget,
+    records: &[SourceRecord],
+    (features, notes): (&AreaFeatures, &[String]),
+    ground: &[Option<i32>],
+) -> Key {
+    let Budget { grid, border_step, per_module, pool: _, area, per_window, windows, reserved: _ } = budget;
     let ModuleGrid { rows, cols, side_cells } = *grid;
     // What sources and rules come to is in the features; the names of features are those of the files.
+    let spec = job.features.as_ref().expect("a stage of jobs with features");
     let FeaturesSpec { sources: _, rules: _, share_max, options } = spec;
     let GradeOptions { clearances: Clearances { road, rail, water }, bank } = *options;
     let files = spec.files();
-    let files = run.records.iter().filter(|record| files.iter().any(|file| file.written == record.path));
+    let files = records.iter().filter(|record| files.iter().any(|file| file.written == record.path));
     let files: Vec<Fingerprint> = files.map(|record| record.blake3).collect();
     let mut words = Vec::new();
     features.feed(&mut |word| words.push(word));
     Key::new("level")
         .part(RULES, |part| {
-            let part = part.list(run.job.class_names().iter(), |part, name| part.text(name)).real(*share_max);
+            let part = part.list(job.class_names().iter(), |part, name| part.text(name)).real(*share_max);
             [road, rail, water, bank].into_iter().fold(part, |part, quanta| part.signed(quanta.into()))
         })
         .part(ALLOWANCE, |part| {
@@ -90,6 +99,7 @@ pub(crate) fn level(run: &Run, spec: &FeaturesSpec, features: &AreaFeatures, gro
         })
         .part(FEATURES, |part| {
             let part = part.list(files.into_iter(), FingerprintBuilder::fingerprint);
+            let part = part.list(notes.iter(), |part, note| part.text(note));
             part.rows(std::iter::once(&words[..]), i64::to_le_bytes)
         })
         .part(PROFILES, |part| {
@@ -126,6 +136,12 @@ fn feed_surfaces(builder: FingerprintBuilder, features: &TileFeatures) -> Finger
 pub fn rules(refinement: &Refinement) -> String {
     let key = Key::new("tile").part(RULES, |part| feed_rules(part, refinement));
     key.parts().remove(RULES.name).unwrap_or_default()
+}
+
+/// What features put into a tile's TIN, as its record names it; nothing of a tile without any.
+pub fn kept_features(refinement: &Refinement) -> Option<String> {
+    let key = Key::new("tile").part(FEATURES, |part| feed_kept(part, refinement));
+    key.parts().remove(FEATURES.name).filter(|_| !refinement.features.kept.is_empty())
 }
 
 /// Of a tile's gain curve.

@@ -22,9 +22,10 @@ pub(crate) fn level(
     progress: &mut dyn Progress,
 ) -> Result<(FileStamp, AreaLevel), CompileError> {
     progress.tell(Event::Enter(Stage::Level, 0));
-    let level = level_area(run, profiles)?.into_inner();
+    let (file, level) = level_area(run, profiles)?.into_inner();
     progress.tell(Event::Leave(Stage::Level));
-    Ok(level)
+    level.notes.iter().for_each(|note| progress.tell(Event::Note(note.clone())));
+    Ok((file, level))
 }
 
 /// The same, with the bytes that say so.
@@ -50,7 +51,7 @@ impl Artifact for Levelling<'_> {
     type Error = CompileError;
 
     fn key(&self) -> Key {
-        keys::level(self.run, self.spec, &self.read.features, self.ground)
+        keys::level(self.run.job, &self.run.area.budget, &self.run.records, self.read.seen(), self.ground)
     }
 
     fn published(&self) -> Result<Option<Stamp>, CompileError> {

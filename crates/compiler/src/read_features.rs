@@ -31,6 +31,11 @@ impl ReadFeatures {
         Ok(Some(Self { vectors, features, by_tile }))
     }
 
+    /// What they are, and what a person should know of their files and rules.
+    pub fn seen(&self) -> (&AreaFeatures, &[String]) {
+        (&self.features, &self.vectors.notes)
+    }
+
     /// The stations of a tile.
     pub fn stations(&self, index: usize) -> impl ExactSizeIterator<Item = Place> + Clone {
         self.by_tile[index].iter().map(|&number| self.features.stations()[number as usize])

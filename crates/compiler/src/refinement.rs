@@ -1,5 +1,7 @@
 //! One tile's refinement: grown to its budget, or grown beyond it and optimised.
 
+use std::collections::HashSet;
+
 use fidelity::Bodies;
 use ground::{GivenPost, Window, border_posts, start_posts};
 use job::{Effort, Job, Method, Optimising};
@@ -171,14 +173,22 @@ impl Refinement {
     }
 }
 
-/// Puts vertices inside level water at its height: posts there weigh nothing, so nothing else holds them.
+/// Puts vertices inside level water at its height: posts there weigh nothing, so nothing else holds them. Those of
+/// features, as of a road over it, stay as they were decided.
 fn lay_level(tin: &mut Tin, features: &TileFeatures) {
     let bodies = Bodies::of(features);
     if !bodies.has_lake() {
         return;
     }
+    // Both are powers of two.
+    let finest = tin.steps_per_post.max(features.kept.steps_per_post);
+    let scaled = |at: LatticePoint, steps: i32| LatticePoint::new(at.row * (finest / steps), at.col * (finest / steps));
+    let of_feature = |vertex: &Vertex| scaled(vertex.at, features.kept.steps_per_post);
+    let decided: HashSet<LatticePoint> = features.kept.vertices.iter().map(of_feature).collect();
     for vertex in &mut tin.vertices {
-        vertex.height = bodies.lake_level_in(vertex.at, tin.steps_per_post).unwrap_or(vertex.height);
+        if !decided.contains(&scaled(vertex.at, tin.steps_per_post)) {
+            vertex.height = bodies.lake_level_in(vertex.at, tin.steps_per_post).unwrap_or(vertex.height);
+        }
     }
 }
 

@@ -82,7 +82,7 @@ impl Findings<'_> {
             refusals: refusals(&refused),
             bound,
             stops: self.stops(),
-            warnings: run.ground.warnings.clone(),
+            warnings: run.warnings(),
             outdated: false,
             tiles: Vec::new(),
             files: BTreeMap::new(),

@@ -147,6 +147,12 @@ impl Run<'_> {
         self.level = Some(Settled { file, level });
     }
 
+    /// What a person should know of what the run was made from.
+    pub fn warnings(&self) -> Vec<String> {
+        let of_features = self.level.iter().flat_map(|settled| &settled.level.notes);
+        self.ground.warnings.iter().chain(of_features).cloned().collect()
+    }
+
     /// What features put into a tile; nothing in jobs without them.
     pub fn tile_features(&self, tile: TileId) -> Result<Arc<TileFeatures>, CompileError> {
         Ok(self.ground.features(tile)?)

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 
 use ground::Window;
 use load_modules::{Layout, concatenate};
-use terrain::{ModuleGrid, ModuleId, ModuleRect, ModuleResidual, TileFeatures, TileId, Tin, Vertex};
+use terrain::{Features, ModuleGrid, ModuleId, ModuleRect, ModuleResidual, TileFeatures, Tin, Vertex};
 use tin::{Stop, TileTask};
 
 use crate::CompileError;
@@ -27,28 +27,42 @@ pub(crate) fn without_limits(
     let tile = run.area.tiling.modules(own.tile, run.area.grid);
     let window = run.window(own.tile)?;
     let parts = parts(&run.tin(own.tile, &own.stamp)?.tin, run.area.grid, tile);
+    let features = if run.level.is_some() { run.tile_features(own.tile)?.kept.clone() } else { Features::default() };
     let here = tile.iter().zip(&parts).filter_map(|(module, part)| Some((module, part, refused.get(&module)?)));
     Ok(here
-        .map(|(module, part, posts)| (module, without_limit(run, &window, module, part, posts.count() as usize)))
+        .map(|(module, part, posts)| {
+            let extra = posts.count() as usize;
+            (module, without_limit(run, (&window, &features), module, part, extra))
+        })
         .collect())
 }
 
-fn without_limit(run: &Run, window: &Window, module: ModuleId, part: &Tin, extra: usize) -> ModuleResidual {
+fn without_limit(
+    run: &Run,
+    (window, features): (&Window, &Features),
+    module: ModuleId,
+    part: &Tin,
+    extra: usize,
+) -> ModuleResidual {
     let rect = part.rect;
     let (dem, importance) = (window.dem.window(rect), window.importance.window(rect));
     let window = Window { dem, importance, given: Vec::new(), forbidden: Vec::new(), featured: Vec::new() };
-    let (sides, inner): (Vec<Vertex>, Vec<Vertex>) = part.vertices.iter().partition(|vertex| is_on_side(part, vertex));
     let optimising = optimising(run.job);
-    // What is filled has its sides already and counts all vertices; what is selected starts from its sides.
-    let (inherited, points) = match optimising {
-        Some(_) => (Vec::new(), part.vertices.len()),
-        None => (posts_of(&sides), inner.len()),
+    // What is filled has its sides and features already and counts all vertices; what is selected starts from them.
+    let (features, sides, points) = match optimising {
+        Some(_) => (Features::default(), Vec::new(), part.vertices.len()),
+        None => {
+            let features = features.within(rect).canonical();
+            let (sides, inner) = selected(part, &features);
+            (Features { spans: Vec::new(), ..features }, sides, inner)
+        }
     };
+    let inherited = posts_of(&sides);
     let tile = run.area.tiling.tile_of_module(module, run.area.grid);
     let stop = Stop { points: Some(points + extra), ..Stop::default() };
     let task = TileTask { inherited, stop, ..TileTask::plain(tile, rect, rule(run.job, &run.area)) };
-    let refinement =
-        Refinement { task, optimising, most: Most::AsTask, features: TileFeatures::none(TileId { row: 0, col: 0 }) };
+    let features = TileFeatures { kept: features, ..TileFeatures::none(tile) };
+    let refinement = Refinement { task, optimising, most: Most::AsTask, features };
     let tin = match optimising {
         Some(optimising) => refinement.fill(&window, optimising, part),
         None => refinement.run(&window, &sides).tin,
@@ -58,6 +72,20 @@ fn without_limit(run: &Run, window: &Window, module: ModuleId, part: &Tin, extra
     let mut modules = concatenate(&tin, &layout, &window.importance, None);
     fidelity::measure(&mut modules, &window.measured(&run.area));
     modules[0].residual
+}
+
+/// The vertices on the sides of a TIN that are none of features, in eighths, and how many there are inside.
+fn selected(part: &Tin, features: &Features) -> (Vec<Vertex>, usize) {
+    let (mut sides, mut inner) = (Vec::new(), 0);
+    for vertex in &part.vertices {
+        // Selected vertices stand on posts.
+        match part.post_at(vertex.at).filter(|&post| !features.has_post(post)) {
+            Some(post) if is_on_side(part, vertex) => sides.push(Vertex { at: post.into(), height: vertex.height }),
+            Some(_) => inner += 1,
+            None => {}
+        }
+    }
+    (sides, inner)
 }
 
 fn is_on_side(tin: &Tin, vertex: &Vertex) -> bool {

@@ -25,6 +25,8 @@ pub struct AreaLevel {
     pub decks: Vec<FeatureFace>,
     /// What was mended, degraded or left out.
     pub remarks: Vec<FeatureRemark>,
+    /// What a person should know of files and rules.
+    pub notes: Vec<String>,
 }
 
 impl AreaLevel {
@@ -40,7 +42,7 @@ impl AreaLevel {
     }
 }
 
-/// A run of edges of one feature, all of one role.
+/// A run of edges of one feature, all of one role; a channel runs downstream.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FeatureLine {
     /// The feature, as its file names it.
@@ -178,6 +180,7 @@ mod tests {
                 leaves_out: true,
                 degrades: false,
             }],
+            notes: vec!["no line or polygon in the file".into()],
         };
         let bytes = encode_level(&samples::stamp(), &level);
         assert_eq!(decode_level(path, &bytes).unwrap(), (samples::stamp(), level));

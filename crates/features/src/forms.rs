@@ -34,6 +34,8 @@ pub struct FormedEdge {
     pub class: u16,
     /// Which feature it comes from.
     pub id: FeatureId,
+    /// Whether its line runs from `b` to `a`: a channel runs downstream.
+    pub backwards: bool,
 }
 
 /// A ring of edges of the TIN, or of what a higher class left of it, around ground of its class: a part of a strip,
@@ -238,6 +240,9 @@ fn centrelines(network: &Network, pieces: &[Piece], wide: &[Wide], heights: &[i3
 /// Whose height a place has: the least of rank, class, role and height.
 type Decided = BTreeMap<Place, (Role, u16, Role, i32)>;
 
+/// What an edge belongs to: class, role and feature, and whether its line runs from the greater end to the lesser.
+type OfEdge = (u16, Role, FeatureId, bool);
+
 /// Rounds all lines together, decides the height of each point, and leaves out what lies in a strip of higher class.
 fn assemble(lines: Vec<Strand>, faces: &[Face], site: &Site, remarks: &mut Vec<Remark>) -> Formed {
     let mut rounded: Vec<Vec<Place>> =
@@ -256,7 +261,7 @@ fn assemble(lines: Vec<Strand>, faces: &[Face], site: &Site, remarks: &mut Vec<R
         }
     }
     let inside = Inside::new(faces, &lines, &rounded);
-    let mut edges: BTreeMap<(Place, Place), (u16, Role, FeatureId)> = BTreeMap::new();
+    let mut edges: BTreeMap<(Place, Place), OfEdge> = BTreeMap::new();
     for (number, (line, places)) in lines.iter().zip(&rounded).enumerate() {
         let mut cut = 0;
         for (at, ends) in places.windows(2).enumerate() {
@@ -265,7 +270,7 @@ fn assemble(lines: Vec<Strand>, faces: &[Face], site: &Site, remarks: &mut Vec<R
                 cut += site.lattice.length(ends[0], ends[1]);
             } else if !passes(at) && !passes(at + 1) {
                 let key = (ends[0].min(ends[1]), ends[0].max(ends[1]));
-                let mine = (line.class, line.role, line.id);
+                let mine = (line.class, line.role, line.id, ends[1] < ends[0]);
                 edges.entry(key).and_modify(|edge| *edge = mine.min(*edge)).or_insert(mine);
             }
             let above = passes(at) && (at == 0 || !passes(at - 1));
@@ -293,7 +298,9 @@ fn surfaces(lines: &[Strand], rounded: &[Vec<Place>], heights: &Decided) -> Vec<
             && places.first() == places.last()
     };
     let surface = |(line, places): (&Strand, &Vec<Place>)| {
-        let ring = places[1..].iter().map(|place| (*place, heights[place].3)).collect();
+        // Water is level, also where a road crosses its shore at another height.
+        let level = line.stations.first().filter(|_| line.role == Role::Shore).map(|(_, level)| *level);
+        let ring = places[1..].iter().map(|place| (*place, level.unwrap_or(heights[place].3))).collect();
         Surface { class: line.class, role: line.role, ring, id: line.id }
     };
     let mut surfaces: Vec<Surface> = lines.iter().zip(rounded).filter(is_surface).map(surface).collect();
@@ -302,13 +309,16 @@ fn surfaces(lines: &[Strand], rounded: &[Vec<Place>], heights: &Decided) -> Vec<
 }
 
 /// Numbers the points that edges use.
-fn collect(heights: &Decided, edges: BTreeMap<(Place, Place), (u16, Role, FeatureId)>) -> Formed {
+fn collect(heights: &Decided, edges: BTreeMap<(Place, Place), OfEdge>) -> Formed {
     let used: BTreeSet<Place> = edges.keys().flat_map(|(a, b)| [*a, *b]).collect();
     let points: Vec<(Place, i32)> = used.iter().map(|place| (*place, heights[place].3)).collect();
     let number = |place: Place| points.partition_point(|(other, _)| *other < place) as u32;
     let edges = edges
         .into_iter()
-        .map(|((a, b), (class, role, id))| FormedEdge { a: number(a), b: number(b), role, class, id })
+        .map(|((a, b), (class, role, id, backwards))| {
+            let (a, b) = (number(a), number(b));
+            FormedEdge { a, b, role, class, id, backwards }
+        })
         .collect();
     Formed { points, edges, faces: Vec::new(), surfaces: Vec::new(), decks: Vec::new(), remarks: Vec::new() }
 }

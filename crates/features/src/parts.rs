@@ -61,8 +61,8 @@ pub fn breaklines(rounded: &Rounded, ground: &dyn Fn(Place) -> Option<i32>) -> V
     strands
 }
 
-/// The middle lines of rivers and streams on the ground, reach by reach: none goes on through a place to which water
-/// flows from both sides, or from which it flows to both. What flows in a pipe is not in the ground.
+/// The middle lines of rivers and streams on the ground, reach by reach, each downstream: none goes on through a place
+/// to which water flows from both sides, or from which it flows to both. What flows in a pipe is not in the ground.
 pub fn channels(network: &Network, fallen: &Fallen) -> Vec<Strand> {
     let foot = |edge: u32| {
         let Edge { a, b, .. } = network.edges[edge as usize];
@@ -78,7 +78,11 @@ pub fn channels(network: &Network, fallen: &Fallen) -> Vec<Strand> {
         let station = |node: &u32| (network.nodes[*node as usize].place, fallen.heights[*node as usize]);
         let class = network.traits(edges[0]).class;
         let id = network.ways[network.edges[edges[0] as usize].way as usize].id;
-        Strand { role: Role::Channel, class, id, stations: nodes.iter().map(station).collect() }
+        let mut stations: Vec<(Place, i32)> = nodes.iter().map(station).collect();
+        if foot(edges[0]) == nodes[0] {
+            stations.reverse();
+        }
+        Strand { role: Role::Channel, class, id, stations }
     };
     network.runs(&|edge| network.is_ground(edge), &flows_through).into_iter().map(strand).collect()
 }

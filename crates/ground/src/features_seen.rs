@@ -4,7 +4,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-use features::{FeatureId, Form, Kind, Numbering, OverviewRow, RowOrigin, Rule, Shape, Source, overview};
+use features::{FeatureId, Form, Kind, Numbering, Overview, OverviewRow, RowOrigin, Rule, Shape, Source, overview};
 use job::{Choice, FeatureSource, FeaturesSpec, Job};
 use source_files::{BUILT_IN_KEYS, Extent, FeatureFile, VectorFeature, VectorShape, Wanted, read_features};
 
@@ -87,9 +87,22 @@ pub fn feature_table(job: &Job) -> Result<Option<FeatureTable>, GroundError> {
     let overview = overview(&all, &spec.rules);
     for (number, seen) in &mut seen {
         seen.without_kind = overview.unmatched.get(number).map_or(0, |&count| count as u64);
-        let mut own = all.iter().filter(|source| source.id.source == *number).peekable();
-        if own.peek().is_some() && own.clone().count() as u64 == seen.without_kind {
-            notes.push(no_kind(seen, &columns(own)));
+    }
+    let names: Vec<(u32, &str)> = seen.iter().map(|(number, seen)| (*number, seen.name.as_str())).collect();
+    notes.extend(notes_on(&overview, &all, &names, spec));
+    let rows = overview.rows.iter().map(|row| row_text(row, &spec.rules)).collect();
+    Ok(Some(FeatureTable { rows, sources: seen.into_iter().map(|(_, seen)| seen).collect(), notes }))
+}
+
+/// What a person should know of what becomes of features: files of which no feature has a kind, rules that decide nothing.
+/// `names` has the number and the name of each file.
+pub(crate) fn notes_on(overview: &Overview, all: &[Source], names: &[(u32, &str)], spec: &FeaturesSpec) -> Vec<String> {
+    let mut notes = Vec::new();
+    for &(number, name) in names {
+        let without_kind = overview.unmatched.get(&number).copied().unwrap_or(0);
+        let own = all.iter().filter(|source| source.id.source == number);
+        if 0 < without_kind && own.clone().count() == without_kind {
+            notes.push(no_kind(name, without_kind, &columns(own)));
         }
     }
     notes.extend(overview.idle.iter().map(|idle| {
@@ -100,8 +113,7 @@ pub fn feature_table(job: &Job) -> Result<Option<FeatureTable>, GroundError> {
             (taken, _) => format!("{rule} decides nothing: rules before it take all {taken} features that match it"),
         }
     }));
-    let rows = overview.rows.iter().map(|row| row_text(row, &spec.rules)).collect();
-    Ok(Some(FeatureTable { rows, sources: seen.into_iter().map(|(_, seen)| seen).collect(), notes }))
+    notes
 }
 
 /// A source of a job, read.
@@ -193,11 +205,10 @@ fn columns<'a>(features: impl Iterator<Item = &'a Source>) -> String {
     }
 }
 
-fn no_kind(seen: &SourceSeen, columns: &str) -> String {
+fn no_kind(name: &str, without_kind: usize, columns: &str) -> String {
     format!(
-        "{}: its features in the area have no kind by their tags ({columns}) and are left out, {} in all; name one, as \
-         {{ file = \"…\", kind = \"track\" }}, or write a rule",
-        seen.name, seen.without_kind
+        "{name}: its features in the area have no kind by their tags ({columns}) and are left out, {without_kind} in all; \
+         name one, as {{ file = \"…\", kind = \"track\" }}, or write a rule"
     )
 }
 

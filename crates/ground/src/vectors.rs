@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use database::FeatureRemark;
-use features::{AreaFeatures, FeatureId, Numbering, Position, Shape, Site, Source};
+use features::{AreaFeatures, FeatureId, Numbering, Position, Shape, Site, Source, overview};
 use job::{DemSource, FeatureSource, FeaturesSpec, Job};
 use sample_terrain::SampleShape;
 use source_files::{BUILT_IN_KEYS, Extent, FeatureFile, VectorFeature, VectorShape, Vertices, Wanted};
@@ -11,6 +11,7 @@ use terrain::GridFrame;
 
 use crate::GroundError;
 use crate::area::GamingArea;
+use crate::features_seen::notes_on;
 
 /// What the sources of features hold that lies in the area or near it.
 pub struct Vectors {
@@ -103,8 +104,12 @@ impl Vectors {
         let wanted = Wanted { epsg: job.area.epsg, bounds, layer: layer.as_deref(), keys: &keys };
         let FeatureFile { features, remarks, notes, found, outside, attribution } =
             source_files::read_features(&file.path, &wanted)?;
-        self.files.push(FeaturesRead { name: file.written.clone(), found, outside, attribution });
-        self.notes.extend(notes);
+        let name = match layer {
+            Some(layer) => format!("{}, layer {layer}", file.written),
+            None => file.written.clone(),
+        };
+        self.files.push(FeaturesRead { name: name.clone(), found, outside, attribution });
+        self.notes.extend(notes.iter().map(|note| format!("{name}: {note}")));
         self.remarks.extend(remarks.into_iter().map(|remark| FeatureRemark {
             feature: remark.id,
             at_m: remark.at,
@@ -150,6 +155,9 @@ pub fn area_features(job: &Job, area: &GamingArea) -> Result<Option<(Vectors, Ar
     let Some(spec) = &job.features else { return Ok(None) };
     let mut vectors = Vectors::read(job, area)?;
     let sources = std::mem::take(&mut vectors.sources);
+    let names: Vec<(u32, &str)> = (0..).zip(vectors.files.iter().map(|file| file.name.as_str())).collect();
+    let notes = notes_on(&overview(&sources, &spec.rules), &sources, &names, spec);
+    vectors.notes.extend(notes);
     let features = AreaFeatures::of(sources, &spec.rules, site(area));
     Ok(Some((vectors, features)))
 }

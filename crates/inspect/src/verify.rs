@@ -1,9 +1,12 @@
 //! Re-reads a database and believes nothing it says: files, TINs, load modules, sides, identities, limits.
 
+mod decided;
+mod deck;
 mod entries;
 mod exceeded;
 mod features;
 mod figures;
+mod laid;
 mod made_from;
 mod modules;
 mod opened;
@@ -119,7 +122,9 @@ fn check_sums(
     verdict.problems.extend(problems);
     verdict.unchecked.extend(unchecked);
     let report = if folder.path(files::REPORT).exists() { Some(folder.report()?) } else { None };
-    verdict.problems.extend(features::check(folder, manifest, job, area, modules, report.as_ref())?);
+    let (problems, unchecked) = features::check(folder, manifest, job, area, modules, report.as_ref())?;
+    verdict.problems.extend(problems);
+    verdict.unchecked.extend(unchecked);
     let counts = exceeded::counts(job, area, modules);
     let mut exceeded = exceeded::of_counts(area, &counts);
     verdict.problems.extend(exceeded::wrong_states(manifest, area, &exceeded));

@@ -12,7 +12,7 @@ use crate::{Allowance, Charged, ModuleLines, ShortOf, Shortfall};
 /// Triangles that features add to each load module, by load module.
 pub type FeatureCost = BTreeMap<ModuleId, u32>;
 
-/// What features cost in the load modules of `grid`. `border` are the posts that the outer border starts with, in
+/// What features cost in the load modules of `grid`; what lies outside of it costs nothing. `border` are the posts that the outer border starts with, in
 /// ascending order: a vertex on one of them costs nothing more.
 pub fn feature_cost(features: &Features, grid: ModuleGrid, border: &[Post]) -> FeatureCost {
     let steps = features.steps_per_post;
@@ -25,7 +25,9 @@ pub fn feature_cost(features: &Features, grid: ModuleGrid, border: &[Post]) -> F
     };
     let mut cost = FeatureCost::new();
     let mut add = |module: ModuleId, triangles: u32| *cost.entry(module).or_insert(0) += triangles;
-    for at in features.vertices.iter().map(|vertex| vertex.at).filter(|&at| !is_there(at)) {
+    let within = |steps: i32, count: u32| (0..=i64::from(side) * i64::from(count)).contains(&i64::from(steps));
+    let costs = |at: &LatticePoint| within(at.row, grid.rows) && within(at.col, grid.cols) && !is_there(*at);
+    for at in features.vertices.iter().map(|vertex| vertex.at).filter(costs) {
         match lines.charged(at.row, at.col) {
             Some(Charged::Inside(module)) => add(module, POINT_COST),
             Some(Charged::Between(first, second)) => [first, second].into_iter().for_each(|module| add(module, 1)),
@@ -90,6 +92,13 @@ mod tests {
         // Inside, on the line to the north, on the outer border; the second of these is there anyway.
         assert_eq!((of(0, 0), of(1, 0)), (Some(2 + 1 + 1), Some(1)));
         assert_eq!((of(0, 1), of(0, 2), of(1, 1)), (Some(1), Some(1), None));
+    }
+
+    #[test]
+    fn a_vertex_beyond_the_area_costs_nothing() {
+        let side = 20 * 64;
+        let beyond = [(-5, 7), (9, -1), (-side - 3, -side - 3), (3 * side + 1, 7), (7, 4 * side + 1), (-side, 7)];
+        assert_eq!(feature_cost(&features(&beyond), GRID, &[]), FeatureCost::new());
     }
 
     #[test]

@@ -7,7 +7,7 @@ pub use error::ProductError;
 mod opened;
 pub use opened::Opened;
 mod sources;
-pub use sources::{choose_ground, locate_weights};
+pub use sources::{choose_ground, locate_features, locate_weights};
 mod product;
 pub use product::{LimitUse, Product, ProductGround, Wanted, WantedGround};
 mod built_from;

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use database::{Fingerprint, Manifest, SourceRecord, files};
-use job::{AreaShape, DemSource, Job, NamedFile, SourceEntry, SourceFile, SourceSaid, Voids};
+use job::{AreaShape, DemSource, FeatureSource, Job, NamedFile, SourceEntry, SourceFile, SourceSaid, Voids};
 
 use crate::ProductError;
 
@@ -64,6 +64,19 @@ pub fn locate_weights(job: &mut Job, manifest: &Manifest, folder: &Path) -> Resu
         AreaShape::Slope { .. } | AreaShape::Sample(_) => None,
     });
     locate(named.chain(job.tin.pins.as_mut()), manifest, folder)
+}
+
+/// Points the job at the files of roads, rivers and lakes.
+///
+/// # Errors
+/// When no file with the recorded content is there.
+pub fn locate_features(job: &mut Job, manifest: &Manifest, folder: &Path) -> Result<(), ProductError> {
+    let sources = job.features.iter_mut().flat_map(|features| &mut features.sources);
+    let files = sources.filter_map(|source| match source {
+        FeatureSource::File { file, .. } => Some(file),
+        FeatureSource::Sample => None,
+    });
+    locate(files, manifest, folder)
 }
 
 /// A raster a database was built from. Its path is written as the job has it, and the job may have lain anywhere; but

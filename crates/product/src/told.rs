@@ -171,11 +171,9 @@ fn steeper(line: &FeatureLine, extent_m: [f64; 4]) -> u64 {
     if line.grade_max_ppm == 0 { 0 } else { edges(line, extent_m).filter(is_steeper).count() as u64 }
 }
 
-/// Edges of a channel that rise downstream. A line may run either way, so it falls towards the end that fewer edges
-/// rise to.
+/// Edges of a channel, which runs downstream, that rise.
 fn rising(line: &FeatureLine, extent_m: [f64; 4]) -> u64 {
-    let count = |is_meant: fn(f64) -> bool| edges(line, extent_m).filter(|[a, b]| is_meant(b[2] - a[2])).count();
-    count(|rise| 0.0 < rise).min(count(|rise| rise < 0.0)) as u64
+    edges(line, extent_m).filter(|[a, b]| a[2] < b[2]).count() as u64
 }
 
 /// Edges that the TINs lack, as remarks on their features.

@@ -6,7 +6,7 @@
 
 use std::path::Path;
 
-use geojson::{FeatureCollection, GeoJson, Geometry, GeometryValue, JsonObject, Position};
+use geojson::{FeatureCollection, GeoJson, Geometry, GeometryValue, JsonObject, JsonValue, Position};
 use mask::Polygon;
 
 use crate::beside::beside;
@@ -219,9 +219,12 @@ pub(crate) fn said_in(path: &Path, json: &GeoJson) -> Result<Option<Crs>, Source
         GeoJson::Feature(feature) => feature.foreign_members.as_ref(),
         GeoJson::FeatureCollection(features) => features.foreign_members.as_ref(),
     };
-    let Some(crs) = members.and_then(|members| members.get("crs")).filter(|crs| !crs.is_null()) else {
-        return Ok(None);
-    };
+    said_by(path, members.and_then(|members| members.get("crs")).filter(|crs| !crs.is_null()))
+}
+
+/// The same of its member `crs`, where it has one.
+pub(crate) fn said_by(path: &Path, crs: Option<&JsonValue>) -> Result<Option<Crs>, SourceError> {
+    let Some(crs) = crs else { return Ok(None) };
     let refused = |found: String| SourceError::UnnamedCrs { path: path.into(), found };
     match crs.pointer("/properties/name").and_then(|name| name.as_str()) {
         None => Err(refused(format!("an unnamed system ({crs})"))),

@@ -2,6 +2,8 @@
 //! stamps, sums that follow from it. `verify` has to tell each alteration in a sentence, but for those of the last
 //! table, which nothing that a database holds can show.
 
+mod features;
+
 use std::fs;
 use std::path::Path;
 
@@ -18,6 +20,8 @@ struct Forged {
     tins: Vec<(Stamp, TileTin)>,
     modules: Vec<(TileModules, Vec<Vec<LoadModule>>)>,
     measured: Vec<(Stamp, Measured)>,
+    /// What features came to, in jobs with some.
+    features: Option<features::Parts>,
 }
 
 impl Forged {
@@ -34,6 +38,7 @@ impl Forged {
                 .map(|&tile| folder.read_measured(tile).unwrap())
                 .map(|(stamp, _, measured)| (stamp, measured))
                 .collect(),
+            features: manifest.files.contains_key(files::LEVEL).then(|| features::Parts::open(&folder, &tiles)),
             manifest,
         }
     }
@@ -76,6 +81,9 @@ impl Forged {
             let (stamp, measured) = &mut self.measured[index];
             measured.modules_file = record.slm.unwrap();
             record.measured = write(folder.measured_path(at), database::encode_measured(stamp, measured));
+        }
+        if let Some(features) = &mut self.features {
+            features.seal(&folder, &mut self.manifest);
         }
         database.write_json(files::REPORT, &self.report).unwrap();
         database.finish(&self.manifest).unwrap();

@@ -8,12 +8,14 @@ use compiler::{Event, Progress, Stage};
 use job::Job;
 use terrain::{Dem, Post, TileId};
 
+use crate::features::{geojson, line, polygon};
 use crate::scene::{Scene, Words, assert_same, sample_dem, tile};
 
 /// Keeps what was told.
 #[derive(Default)]
 struct Heard {
     because: Vec<(TileId, String)>,
+    profiled: Vec<TileId>,
     surveyed: usize,
     assembled: usize,
     notes: Vec<String>,
@@ -24,6 +26,7 @@ impl Progress for Heard {
     fn tell(&mut self, event: Event) {
         match event {
             Event::Because(Stage::Refine, tile, why) => self.because.push((tile, why)),
+            Event::Done(Stage::Profile, tile) => self.profiled.push(tile),
             Event::Done(Stage::Survey, _) => self.surveyed += 1,
             Event::Done(Stage::Assemble, _) => self.assembled += 1,
             Event::Note(text) => self.notes.push(text),
@@ -136,6 +139,44 @@ fn a_changed_mask_reaches_the_tiles_it_weighs() {
     let (heard, refined) = rebuilt(&scene, "mask");
     assert!(refined.contains(&tile(0, 0)) && refined.len() < 9, "{refined:?}");
     assert!(heard.because.iter().any(|(at, why)| *at == tile(0, 0) && why.contains("its weights changed")));
+}
+
+/// A road along the south, a stream through the middle, a lake in the west, and a track in the north-east that ends at
+/// so many metres east.
+fn features(track_to: f64) -> String {
+    let drawn = [
+        line("highway=primary", &[(-100.0, 300.0), (2000.0, 500.0), (5200.0, 400.0)]),
+        line("waterway=stream", &[(2300.0, 4700.0), (2500.0, 2000.0), (2400.0, -100.0)]),
+        polygon("natural=water", &[(300.0, 2000.0), (900.0, 2050.0), (850.0, 2500.0), (320.0, 2400.0)]),
+        line("highway=track", &[(3600.0, 3500.0), (4000.0, 4200.0), (track_to, 4000.0)]),
+    ];
+    geojson(&drawn)
+}
+
+#[test]
+fn a_moved_road_rebuilds_only_tiles_that_it_reaches_each_with_its_cause() {
+    let words = Words { features: "sources = [\"features.geojson\"]".into(), ..words() };
+    let dem = sample_dem(words.grid(), 1);
+    let scene = Scene::with_files(&words, |folder: &Path| {
+        crate::scene::write_dem(&folder.join("dem.tif"), &dem);
+        fs::write(folder.join("features.geojson"), features(4600.0)).unwrap();
+    });
+    drop(scene.build("area", 2));
+    fs::write(scene.path("features.geojson"), features(4700.0)).unwrap();
+    let (heard, refined) = rebuilt(&scene, "a moved road");
+    assert_eq!(heard.profiled, [tile(2, 2)], "the ground is asked anew where the road was moved");
+    assert!(refined.contains(&tile(2, 2)) && refined.len() < 9, "{refined:?}");
+    assert!((0..3).all(|col| !refined.contains(&tile(0, col))), "{refined:?}");
+    for (at, why) in &heard.because {
+        let expected = if *at == tile(2, 2) { "roads, rivers or lakes in it changed" } else { "border" };
+        assert!(why.contains(expected), "{at}: {why}");
+    }
+    assert_eq!(heard.assembled, refined.len(), "load modules of tiles that were kept were made again");
+    // One tile by name, and what it holds its neighbours by is as it was.
+    fs::write(scene.path("features.geojson"), features(4500.0)).unwrap();
+    let (again, _) = scene.tile("area", tile(2, 2), false);
+    assert_eq!(again, [tile(2, 2)]);
+    rebuilt(&scene, "after one tile with a moved road");
 }
 
 #[test]

@@ -17,7 +17,7 @@ const JOBS: u64 = 60;
 const KEPT: [u64; 0] = [];
 
 /// Prints the seed of the job during which a test panics.
-struct Seed(u64);
+pub struct Seed(pub u64);
 
 impl Drop for Seed {
     fn drop(&mut self) {
@@ -27,7 +27,8 @@ impl Drop for Seed {
     }
 }
 
-fn ground(draw: &mut Draw, words: &Words) -> Dem {
+/// Some ground.
+pub fn ground(draw: &mut Draw, words: &Words) -> Dem {
     let (grid, rect) = (words.grid(), words.grid().area());
     match draw.below(5) {
         0 | 1 => sample_dem(grid, u64::from(draw.below(50))),

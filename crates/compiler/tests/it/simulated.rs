@@ -14,8 +14,8 @@ use database::{Folder, files};
 use engine::{Clock, Durability, Faults, Faulty, Memory, Store, World};
 use job::Job;
 
-use crate::features::{Drawn, line, polygon};
-use crate::scene::{Scene, Silent, Words, sample_dem, write_dem};
+use crate::features::{Drawn, drawn, line, polygon};
+use crate::scene::{Draw, Scene, Silent, Words, sample_dem, write_dem};
 
 /// Where the database lies.
 const DIR: &str = "/share/area.tdb";
@@ -42,7 +42,8 @@ impl Kit {
         let dem = sample_dem(words.grid(), seed);
         let write = |folder: &Path| {
             write_dem(&folder.join("dem.tif"), &dem);
-            std::fs::write(folder.join("features.geojson"), crate::features::geojson(&roads(seed))).unwrap();
+            let features = crate::features::geojson(&features(words, seed));
+            std::fs::write(folder.join("features.geojson"), features).unwrap();
         };
         let (scene, memory) = (Scene::with_files(words, write), Memory::new());
         work(&scene.job, &memory).unwrap();
@@ -74,6 +75,14 @@ impl Kit {
                 found.lines().zip(expected.lines()).filter(|(found, expected)| found != expected).collect();
             format!("{} has other bytes, first {line:?}", path.display())
         })
+    }
+}
+
+/// What of features one kit has: on two tiles a road, a stream and a lake, on more of them whatever is drawn.
+fn features(words: &Words, seed: u64) -> Vec<Drawn> {
+    match words.tiles {
+        (2, 1) => roads(seed),
+        (rows, cols) => drawn(&mut Draw(1000 * seed + u64::from(10 * rows + cols)), words.size),
     }
 }
 
@@ -135,6 +144,16 @@ impl Kits {
             Words {
                 features: "sources = [\"features.geojson\"]".into(),
                 ..small((4, 2), (2, 1), "method = \"greedy\"")
+            },
+            // Random ones over tile lines.
+            Words {
+                features: "sources = [\"features.geojson\"]".into(),
+                ..small((4, 4), (2, 2), "method = \"greedy\"\nallocation = \"equal\"")
+            },
+            Words {
+                features: "sources = [\"features.geojson\"]".into(),
+                limits: "per_load_module = 40".into(),
+                ..small((2, 6), (1, 3), "effort = \"fast\"")
             },
         ];
         let kits: Vec<[Kit; 2]> = words.iter().map(|words| [1, 2].map(|seed| Kit::new(words, seed))).collect();

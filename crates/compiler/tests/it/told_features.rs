@@ -87,7 +87,7 @@ fn a_database_with_features_is_sound_and_a_report_that_tells_others_is_not() {
     built.report.features.as_mut().unwrap().checks.edges += 1;
     built.database.write_json(files::REPORT, &built.report).unwrap();
     let problems = verify(&scene.path("a.tdb"), None).unwrap().problems;
-    assert!(problems.iter().any(|problem| problem.contains("features are not what the files say")), "{problems:?}");
+    assert!(problems.iter().any(|problem| problem.contains("report.json: features.checks.edges is")), "{problems:?}");
 }
 
 #[test]

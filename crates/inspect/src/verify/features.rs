@@ -1,18 +1,18 @@
-//! Roads and water: the files of the stages that decide them, lakes in the load modules, what the report says.
+//! Roads and water: the files of the stages that decide them, what is in the load modules, what the report says.
 
-use std::collections::HashSet;
-
-use database::{AreaLevel, Folder, Manifest, Report, ReportFeatures};
-use fidelity::{Bodies, missing_edges};
+use database::{Folder, Manifest, Report, ReportFeatures, SourceRecord, files};
 use ground::GamingArea;
 use job::Job;
-use product::{Opened, read_told};
-use terrain::{LatticePoint, LoadModule, TileFeatures, TileId};
+use product::{Opened, Told, features_file, locate_features, read_told};
+use serde_json::Value;
 
+use super::decided::Decided;
+use super::laid::Laid;
 use super::modules::Modules;
-use compiler::CompileError;
+use compiler::{ALGORITHM_REVISION, CompileError, level_fingerprint};
 
-/// What is wrong with the features of a database whose files are whole; nothing of a job without any.
+/// What is wrong with the features of a database whose files are whole, and, second, what was not checked; nothing of
+/// a job without any.
 ///
 /// # Errors
 /// When a file cannot be read that was sound a moment ago.
@@ -23,80 +23,120 @@ pub(crate) fn check(
     area: &GamingArea,
     modules: &Modules,
     report: Option<&Report>,
-) -> Result<Vec<String>, CompileError> {
+) -> Result<(Vec<String>, Vec<String>), CompileError> {
     let listed = report.and_then(|report| report.features.as_ref());
     if job.features.is_none() {
         let told = listed.map(|_| "report.json: tells of roads and water, and its job has none".to_owned());
-        return Ok(told.into_iter().collect());
+        return Ok((told.into_iter().collect(), Vec::new()));
     }
     let (.., level) = folder.read_level()?;
     let mut problems = Vec::new();
+    let mut decided = Decided::new(area);
+    let first_class = job.importance.classes.len();
     for (index, &tile) in area.tiles.iter().enumerate() {
-        problems.extend(of_tile(folder, area, modules, &level, (index, tile))?);
+        let (file, features) = folder.read_lines(tile)?;
+        if level.tiles.get(index) != Some(&file) {
+            problems.push(format!("survey/{tile}.lines: is not the file that survey/features.level lists"));
+            continue;
+        }
+        let (.., measured) = folder.read_measured(tile)?;
+        let told = measured.features.map(|found| product::from_features(&found).missing).unwrap_or_default();
+        problems.extend(decided.add(&features));
+        problems.extend(Laid { area, features: &features, told: &told, first_class }.problems(modules));
     }
+    if !problems.is_empty() {
+        return Ok((problems, Vec::new()));
+    }
+    problems.extend(decided.problems(&level, modules, listed.map(|features| &features.checks)));
     let opened = Opened::of(folder.clone(), manifest.clone())?;
     if let (Some(report), Some((_, told)), true) = (report, read_told(&opened)?, problems.is_empty()) {
         problems.extend(differing(report.features.as_ref(), &told.report));
+        problems.extend(differing_remarks(folder, job, &told));
     }
-    Ok(problems)
+    let unchecked = match made_from_profiles(folder, manifest, job, area)? {
+        Ok(problem) => {
+            problems.extend(problem);
+            None
+        }
+        Err(unchecked) => Some(unchecked),
+    };
+    Ok((problems, unchecked.into_iter().collect()))
 }
 
-/// A tile's file against the one of the area, its edges against its TIN, its lakes against its load modules.
-fn of_tile(
+/// Whether what features came to was made from the published ground along them; else why that is not known.
+fn made_from_profiles(
     folder: &Folder,
+    manifest: &Manifest,
+    job: &Job,
     area: &GamingArea,
-    modules: &Modules,
-    level: &AreaLevel,
-    (index, tile): (usize, TileId),
-) -> Result<Vec<String>, CompileError> {
-    let (file, features) = folder.read_lines(tile)?;
-    if level.tiles.get(index) != Some(&file) {
-        return Ok(vec![format!("survey/{tile}.lines: is not the file that survey/features.level lists")]);
+) -> Result<Result<Option<String>, String>, CompileError> {
+    if manifest.algorithm_revision != ALGORITHM_REVISION {
+        return Ok(Err("the ground along roads and water: another algorithm revision made it".into()));
     }
-    let mut problems = Vec::new();
-    let ((_, tin), (.., measured)) = (folder.read_tile(tile)?, folder.read_measured(tile)?);
-    let told = measured.features.map(|found| product::from_features(&found).missing).unwrap_or_default();
-    let untold = missing_edges(&tin.tin, &features.kept).into_iter().filter(|edge| !told.contains(edge)).count();
-    if 0 < untold {
-        problems.push(format!("tiles/{tile}.tin: lacks {untold} edges of roads or water that nothing tells of"));
+    let mut job = job.clone();
+    if locate_features(&mut job, manifest, folder.dir()).is_err() {
+        return Ok(
+            Err("the ground along roads and water: the files that features.sources names cannot be read".into()),
+        );
     }
-    let of_tile = area.tiling.modules(tile, area.grid).iter().filter_map(|id| modules.get(&id));
-    problems.extend(uneven_lakes(area, &features, of_tile));
-    Ok(problems)
+    let records: &[SourceRecord] = &manifest.sources;
+    let (stamp, ..) = folder.read_level()?;
+    let expected = level_fingerprint(&job, area, records, folder)?;
+    let is_other = expected != Some(stamp.fingerprint);
+    let problem = "survey/features.level: was not made from the ground along roads and water that survey/*.profile say";
+    Ok(Ok(is_other.then(|| problem.to_owned())))
 }
 
-/// Load modules with a vertex in a lake that is not on its level, and is no other feature's.
-fn uneven_lakes<'a>(
-    area: &GamingArea,
-    features: &TileFeatures,
-    modules: impl Iterator<Item = &'a LoadModule>,
-) -> Vec<String> {
-    let bodies = Bodies::of(features);
-    if !bodies.has_lake() {
+/// Whether the report says something else of features than the files, key by key.
+fn differing(listed: Option<&ReportFeatures>, found: &ReportFeatures) -> Vec<String> {
+    let Some(listed) = listed else {
+        return vec!["report.json: tells nothing of roads and water, and its job has some".into()];
+    };
+    if listed == found {
         return Vec::new();
     }
-    let step = area.frame.spacing.quanta_per_post() / features.kept.steps_per_post;
-    let decided: HashSet<LatticePoint> = features.kept.vertices.iter().map(|vertex| vertex.at).collect();
-    let is_uneven = |module: &&LoadModule| {
-        let corner = area.grid.posts_of(module.id).south_west();
-        let place = |post: i32, quanta: u16| post * features.kept.steps_per_post + i32::from(quanta) / step;
-        module.vertices.iter().any(|vertex| {
-            let at = LatticePoint::new(place(corner.row, vertex.y), place(corner.col, vertex.x));
-            let level = bodies.lake_level(at).filter(|_| !decided.contains(&at));
-            level.is_some_and(|level| level != vertex.z)
-        })
-    };
-    modules.filter(is_uneven).map(|module| format!("load module {}: a lake in it is not level", module.id)).collect()
+    let value = |features: &ReportFeatures| serde_json::to_value(features).unwrap_or_default();
+    let mut problems = Vec::new();
+    differing_keys("features", &value(listed), &value(found), &mut problems);
+    problems
 }
 
-/// Whether the report says something else of features than the files.
-fn differing(listed: Option<&ReportFeatures>, found: &ReportFeatures) -> Option<String> {
-    let text = |features: &ReportFeatures| format!("{features:?}");
-    match listed {
-        None => Some("report.json: tells nothing of roads and water, and its job has some".into()),
-        Some(listed) if text(listed) != text(found) => {
-            Some("report.json: features are not what the files say of roads and water".into())
+fn differing_keys(key: &str, listed: &Value, found: &Value, problems: &mut Vec<String>) {
+    match (listed, found) {
+        (Value::Object(listed), Value::Object(found)) => {
+            for (name, found) in found {
+                let nothing = Value::Null;
+                differing_keys(&format!("{key}.{name}"), listed.get(name).unwrap_or(&nothing), found, problems);
+            }
         }
-        Some(_) => None,
+        (Value::Array(listed), Value::Array(found)) if listed.len() == found.len() => {
+            for (at, (listed, found)) in listed.iter().zip(found).enumerate() {
+                differing_keys(&format!("{key}[{at}]"), listed, found, problems);
+            }
+        }
+        (Value::Array(listed), Value::Array(found)) => {
+            let [listed, found] = [listed, found].map(Vec::len);
+            problems.push(format!("report.json: {key} has {listed} entries, the files say {found}"));
+        }
+        _ if is_same(listed, found) => {}
+        _ => problems.push(format!("report.json: {key} is {listed}, the files say {found}")),
+    }
+}
+
+/// Numbers may differ in their last digits, where they were written and read.
+fn is_same(listed: &Value, found: &Value) -> bool {
+    match (listed.as_f64(), found.as_f64()) {
+        (Some(listed), Some(found)) => (found - listed).abs() <= 1e-9 * (1.0 + found.abs()),
+        _ => listed == found,
+    }
+}
+
+/// Whether the list of what was mended, degraded or left out is another than that of the files.
+fn differing_remarks(folder: &Folder, job: &Job, told: &Told) -> Option<String> {
+    let (name, text) = features_file(job, &told.remarks);
+    match folder.read_text(name) {
+        Ok(found) if found == text => None,
+        Ok(_) => Some(format!("{}: is not what {} says of each feature", name, files::LEVEL)),
+        Err(error) => Some(error.to_string()),
     }
 }

@@ -8,8 +8,8 @@ use terrain::{ModuleRect, TileFeatures, TileId};
 use super::tins::OfTins;
 use compiler::ALGORITHM_REVISION;
 use compiler::modules_key;
-use compiler::rules;
 use compiler::{TileBudget, tile_refinement};
+use compiler::{kept_features, rules};
 use ground::GamingArea;
 
 /// Load-module files whose fingerprint is not that of the TINs and the job, and, second, what was not checked.
@@ -83,9 +83,14 @@ fn other_rules(folder: &Folder, manifest: &Manifest, job: &Job, area: &GamingAre
         };
         let budget = TileBudget { points: None, allowance: Some(allowance), rms_quanta: None };
         let Ok(features) = tile_features(job, folder, tile) else { continue };
-        let expected = rules(&tile_refinement(job, area, tile, &budget, Vec::new(), &features));
+        let refinement = tile_refinement(job, area, tile, &budget, Vec::new(), &features);
+        let expected = rules(&refinement);
         if record.made_from.as_ref().is_some_and(|parts| parts.get("rules") != Some(&expected)) {
             problems.push(format!("database.json: tile {tile} was selected by other rules than those of its job"));
+        }
+        let expected = kept_features(&refinement);
+        if record.made_from.as_ref().is_some_and(|parts| parts.get("features") != expected.as_ref()) {
+            problems.push(format!("tiles/{tile}.tin: was made with other roads or water than survey/{tile}.lines has"));
         }
     }
     problems

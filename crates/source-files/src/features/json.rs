@@ -4,13 +4,14 @@ use geojson::{Feature, GeoJson, Geometry, GeometryValue, JsonValue, Position};
 
 use super::clip::Vertex;
 use super::columns::with_packed_tags;
+use super::loose::{self, Loose};
 use super::model::{FeatureFile, Wanted, file_name};
-use super::placing::{Placing, Texts, look_like_degrees};
+use super::placing::{LEFT_OUT, Placing, Texts, look_like_degrees};
 use super::raw::{Part, RawFeature, RawShape};
 use crate::SourceError;
 use crate::crs::Crs;
 use crate::limits::GEOJSON_BYTES_MAX;
-use crate::polygons::said_in;
+use crate::polygons::{said_by, said_in};
 use crate::store::Store;
 
 pub(super) fn read(store: &Store, wanted: &Wanted) -> Result<FeatureFile, SourceError> {
@@ -22,37 +23,48 @@ pub(super) fn read(store: &Store, wanted: &Wanted) -> Result<FeatureFile, Source
     let broken = |reason: String| SourceError::NotGeoJson { path: path.into(), reason };
     let text = String::from_utf8(store.start(GEOJSON_BYTES_MAX)?);
     let text = text.map_err(|_| broken("it is not UTF-8 text".into()))?;
-    let json: GeoJson =
-        text.trim_start_matches('\u{feff}').parse().map_err(|error: geojson::Error| broken(error.to_string()))?;
-    drop(text);
-    let said = said_in(path, &json)?;
+    let text = text.trim_start_matches('\u{feff}');
+    let (said, features) = match text.parse::<GeoJson>() {
+        Ok(json) => (said_in(path, &json)?, strict(json)),
+        Err(error) => {
+            let (crs, features) = loose::read(text).ok_or_else(|| broken(error.to_string()))?;
+            (said_by(path, crs.as_ref())?, features)
+        }
+    };
+    let (name, mut texts) = (file_name(store), Texts::default());
+    let (mut raw, mut faults) = (Vec::new(), Vec::new());
+    for (index, Loose { properties, shape }) in features.into_iter().enumerate() {
+        let id = format!("{name}#{index}");
+        let shape = match shape {
+            // A feature without a geometry is legal and adds nothing.
+            None => continue,
+            Some(Ok(shape)) => shape,
+            Some(Err(found)) => {
+                faults.push((id, found));
+                continue;
+            }
+        };
+        let tags: Vec<(String, String)> =
+            properties.into_iter().flatten().filter_map(|(key, value)| Some((key, text_of(value)?))).collect();
+        let tags = with_packed_tags(tags.iter().map(|(key, value)| (key.as_str(), value.as_str())));
+        raw.push(RawFeature { id, tags: texts.tags(tags), shape });
+    }
+    let all = raw.iter().flat_map(|feature| feature.shape.vertices());
+    let said = said.or_else(|| look_like_degrees(all).then(Crs::wgs84));
+    let mut placing = Placing::new(path, wanted, said)?;
+    faults.into_iter().for_each(|(id, found)| placing.remark(&id, None, found, LEFT_OUT));
+    raw.into_iter().for_each(|feature| placing.place(feature));
+    Ok(placing.finish(None))
+}
+
+fn strict(json: GeoJson) -> Vec<Loose> {
     let features = match json {
         GeoJson::Geometry(geometry) => vec![Feature { geometry: Some(geometry), ..Feature::default() }],
         GeoJson::Feature(feature) => vec![feature],
         GeoJson::FeatureCollection(collection) => collection.features,
     };
-    let (name, mut texts) = (file_name(store), Texts::default());
-    let raw: Vec<RawFeature> = features
-        .into_iter()
-        .enumerate()
-        .filter_map(|(index, feature)| {
-            // A feature without a geometry is legal and adds nothing.
-            let shape = shape_of(feature.geometry?);
-            let tags: Vec<(String, String)> = feature
-                .properties
-                .into_iter()
-                .flatten()
-                .filter_map(|(key, value)| Some((key, text_of(value)?)))
-                .collect();
-            let tags = with_packed_tags(tags.iter().map(|(key, value)| (key.as_str(), value.as_str())));
-            Some(RawFeature { id: format!("{name}#{index}"), tags: texts.tags(tags), shape })
-        })
-        .collect();
-    let all = raw.iter().flat_map(|feature| feature.shape.vertices());
-    let said = said.or_else(|| look_like_degrees(all).then(Crs::wgs84));
-    let mut placing = Placing::new(path, wanted, said)?;
-    raw.into_iter().for_each(|feature| placing.place(feature));
-    Ok(placing.finish(None))
+    let of = |Feature { geometry, properties, .. }| Loose { properties, shape: geometry.map(|of| Ok(shape_of(of))) };
+    features.into_iter().map(of).collect()
 }
 
 /// A property as a tag's value: texts as they are, numbers and booleans as written.

@@ -10,6 +10,7 @@ mod clip;
 mod columns;
 mod formats;
 mod json;
+mod loose;
 mod model;
 mod nest;
 pub(crate) mod osm;

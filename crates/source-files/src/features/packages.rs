@@ -20,7 +20,11 @@ const LOOKED_AT: usize = 1000;
 
 pub(super) fn read(path: &Path, wanted: &Wanted) -> Result<FeatureFile, SourceError> {
     let package = Package::open(path)?;
-    let table = chosen(path, &package, wanted.layer)?;
+    let Some(table) = chosen(path, &package, wanted.layer)? else {
+        let mut placing = Placing::new(path, wanted, None)?;
+        placing.note("a GeoPackage without a layer of features".into());
+        return Ok(placing.finish(None));
+    };
     let said = match package.crs(table.srs)? {
         Some(crs) => Some(crs),
         None => looks(path, &package, &table)?.then(Crs::wgs84),
@@ -88,8 +92,8 @@ impl Columns {
     }
 }
 
-/// The layer that is named, or the only one that holds anything.
-fn chosen(path: &Path, package: &Package, layer: Option<&str>) -> Result<Table, SourceError> {
+/// The layer that is named, or the only one that holds anything; `None` where there is no layer of features at all.
+fn chosen(path: &Path, package: &Package, layer: Option<&str>) -> Result<Option<Table>, SourceError> {
     let tables = package.tables()?;
     let listed =
         |tables: &[Table]| tables.iter().map(|table| format!("`{}`", table.name)).collect::<Vec<_>>().join(", ");
@@ -97,7 +101,7 @@ fn chosen(path: &Path, package: &Package, layer: Option<&str>) -> Result<Table, 
     if let Some(name) = layer {
         let expected = format!("one of {}", listed(&tables));
         let found = tables.into_iter().find(|table| table.name == name);
-        return found.ok_or_else(|| refused(format!("the layer `{name}` named"), expected));
+        return found.map(Some).ok_or_else(|| refused(format!("the layer `{name}` named"), expected));
     }
     let (mut filled, mut empty) = (Vec::new(), Vec::new());
     for table in tables {
@@ -108,7 +112,7 @@ fn chosen(path: &Path, package: &Package, layer: Option<&str>) -> Result<Table, 
         return Err(refused(found, "one of them named".into()));
     }
     // Where there is nothing in any layer, there is nothing in whichever is read.
-    filled.into_iter().chain(empty).next().ok_or_else(|| refused("no layer of features".into(), "one".into()))
+    Ok(filled.into_iter().chain(empty).next())
 }
 
 /// Whether the first places of a layer look like degrees.

@@ -138,7 +138,8 @@ impl Placing {
         }
         self.file.found += 1;
         if let Some(vertex) = shape.vertices().find(|vertex| !self.is_on_earth(vertex)) {
-            let found = format!("a vertex at {}, {}, which is not on the Earth", vertex[0], vertex[1]);
+            let [east, north] = [vertex[0], vertex[1]].map(coordinate);
+            let found = format!("a vertex at {east}, {north}, which is not on the Earth");
             return self.remark(&id, None, found, LEFT_OUT);
         }
         let extent = Extent::around(shape.vertices().map(|&[east, north, _]| [east, north]));
@@ -350,6 +351,11 @@ impl Part {
         };
         runs.iter_mut().flatten().for_each(|vertex| vertex[0] += by);
     }
+}
+
+/// A coordinate in a few characters, whatever it is.
+fn coordinate(number: f64) -> String {
+    if number.abs() < 1e12 || number.is_nan() { number.to_string() } else { format!("{number:e}") }
 }
 
 fn counted(vertices: usize) -> String {

@@ -240,13 +240,42 @@ fn of_several_layers_one_is_to_be_named() {
 }
 
 #[test]
-fn a_geopackage_without_features_is_told_and_one_without_layers_refused() {
+fn a_number_that_is_none_costs_its_own_feature_of_geojson_alone() {
+    let line = |places: &str| format!(r#"{{"type":"LineString","coordinates":[{places}]}}"#);
+    let places = ["[-117,35,NaN],[-116.991,35,7]", "[-117,null],[-116.991,35]", "[-117,35],[-116.991,1e999]"];
+    let mut all: Vec<String> = places.iter().map(|places| line(places)).collect();
+    all.extend([
+        r#"{"type":"Line"}"#.into(),
+        "7".into(),
+        r#"{"type":"LineString","coordinates":[7]}"#.into(),
+        LINE.into(),
+    ]);
+    let all: Vec<(&str, &str)> = all.iter().map(|geometry| (geometry.as_str(), r#""highway":"track""#)).collect();
+    let file = json(&all);
+    assert_eq!(ids(&file), ["roads.geojson#0", "roads.geojson#6"]);
+    assert_eq!(sizes(&file.features[0]), (vec![2], vec![None, Some(7.0)]));
+    let told = remarks(&file).join("; ");
+    for expected in [
+        "#0: 1 of 2 heights that are none",
+        "#1: a vertex at -117, NaN, which is not on the Earth (left out)",
+        "#2: a vertex at -116.991, NaN",
+        "#3: a geometry that is none (left out)",
+        "#4: a geometry that is none (left out)",
+        "#5: a place that is none (left out)",
+    ] {
+        assert!(told.contains(expected), "{expected}: {told}");
+    }
+}
+
+#[test]
+fn a_geopackage_without_features_or_layers_is_told() {
     let folder = Folder::new();
     let file = read(&package(&folder, &[("rivers", &[])]));
     assert_eq!((file.features.len(), file.notes), (0, vec!["no line or polygon in the file".to_owned()]));
     let folder = Folder::new();
-    let error = read_features(&package(&folder, &[]), &WANTED).unwrap_err();
-    assert!(error.to_string().ends_with("no layer of features; expected one"), "{error}");
+    let file = read(&package(&folder, &[]));
+    let expected = ["a GeoPackage without a layer of features", "no line or polygon in the file"];
+    assert_eq!((file.features.len(), file.notes), (0, expected.map(String::from).to_vec()));
 }
 
 #[test]

@@ -4,6 +4,10 @@
 mod drawing;
 pub use drawing::{Drawn, geojson, line, polygon};
 
+mod random;
+pub use random::drawn;
+
+mod bad_input;
 mod bytes;
 mod refused;
 mod roads;

@@ -1,0 +1,33 @@
+//! What the features of a finished database were made from, for those who check it.
+
+use database::{Folder, SourceRecord};
+use engine::Fingerprint;
+use ground::GamingArea;
+use job::Job;
+
+use crate::CompileError;
+use crate::keys;
+use crate::read_features::ReadFeatures;
+
+/// The fingerprint of what features of an area come to, from their files, which `records` name, and from the ground along
+/// them as it is published; `None` where that is not the ground along these features, or the job has none.
+///
+/// # Errors
+/// When a file cannot be read.
+pub fn level_fingerprint(
+    job: &Job,
+    area: &GamingArea,
+    records: &[SourceRecord],
+    folder: &Folder,
+) -> Result<Option<Fingerprint>, CompileError> {
+    let Some(read) = ReadFeatures::open(job, area)? else { return Ok(None) };
+    let mut ground = vec![None; read.features.stations().len()];
+    for (&tile, stations) in area.tiles.iter().zip(&read.by_tile) {
+        let (.., profile) = folder.read_profile(tile)?;
+        if profile.heights.len() != stations.len() {
+            return Ok(None);
+        }
+        stations.iter().zip(profile.heights).for_each(|(&station, height)| ground[station as usize] = height);
+    }
+    Ok(Some(keys::level(job, &area.budget, records, read.seen(), &ground).fingerprint()))
+}
