@@ -10,7 +10,7 @@ use crate::decks::between;
 use crate::exact::Segment;
 use crate::pieces::{Piece, pieces};
 use crate::rings::encloses;
-use crate::room::{remark_rooms, share_out};
+use crate::room::{remark_rooms, share_out, wide_of};
 use crate::snap::snap_round;
 use crate::strand::{Graded, Role, Strand};
 use crate::strips::{Face, Room, Wide, wide_segments};
@@ -81,7 +81,7 @@ pub fn form(graded: &Graded, strands: &[Strand], site: &Site) -> Formed {
     let thinned: Vec<Strand> = strands.iter().flat_map(|strand| thinned(strand, grants, site, &stays)).collect();
     let mut formed = round_together(graded, &pieces, &mut wide, &thinned, site);
     for _ in 0..ROUNDS_LEVEL {
-        let tilted = tilted(&formed, network);
+        let tilted = tilted(&formed, network, &wide);
         if tilted.is_empty() {
             break;
         }
@@ -117,8 +117,8 @@ fn round_together(graded: &Graded, pieces: &[Piece], wide: &mut [Wide], thinned:
 }
 
 /// Strips that another line would tilt, or that would make one too steep: those of which a corner has the height of a
-/// line that passes through it, and those at the corner of which a line begins that is steeper than it may be.
-fn tilted(formed: &Formed, network: &Network) -> BTreeSet<u32> {
+/// line that passes through it, and those at the side of which a line begins that is steeper than it may be.
+fn tilted(formed: &Formed, network: &Network, wide: &[Wide]) -> BTreeSet<u32> {
     let grades: HashMap<FeatureId, u32> = network.ways.iter().map(|way| (way.id, way.traits.grade_ppm)).collect();
     let mut steep: HashSet<Place> = HashSet::new();
     for edge in formed.edges.iter().filter(|edge| edge.role == Role::Centre) {
@@ -128,12 +128,24 @@ fn tilted(formed: &Formed, network: &Network) -> BTreeSet<u32> {
             steep.extend([a.0, b.0]);
         }
     }
-    let is_tilted = |&(place, height): &(Place, i32)| {
+    let has_other_height = |&(place, height): &(Place, i32)| {
         let found = formed.points.binary_search_by_key(&place, |(other, _)| *other);
-        steep.contains(&place) || found.is_ok_and(|found| formed.points[found].1 != height)
+        found.is_ok_and(|found| formed.points[found].1 != height)
     };
-    let strips = formed.faces.iter().filter(|face| face.corners.iter().any(is_tilted));
-    strips.filter_map(|face| face.wide).collect()
+    let is_beside_steep = |face: &Face| steep.iter().any(|place| is_on_outline(face, *place));
+    let strips = formed.faces.iter().filter(|face| face.corners.iter().any(has_other_height) || is_beside_steep(face));
+    strips.flat_map(|face| wide_of(face, wide)).collect()
+}
+
+/// Whether a place lies within a step of the outline of a face.
+fn is_on_outline(face: &Face, place: Place) -> bool {
+    let ends = face.corners.iter().zip(face.corners.iter().cycle().skip(1));
+    ends.map(|(a, b)| (a.0, b.0)).any(|(a, b)| {
+        let ([east, north], [to_east, to_north]) = (a.to(b), a.to(place));
+        let (cross, dot) = (east * to_north - north * to_east, east * to_east + north * to_north);
+        let squared = east * east + north * north;
+        (0..=squared).contains(&dot) && i128::from(cross) * i128::from(cross) <= i128::from(squared)
+    })
 }
 
 /// Places that two strands have, or a strand and the network: thinning leaves them to both.

@@ -6,6 +6,9 @@ use crate::clean::Notes;
 use crate::exact::Segment;
 use crate::{FeatureId, FeatureLattice, Flaw, Form, Place, Remark, Remedy, Storey, Traits, Way};
 
+/// Cosine between two edges below which a way goes on nearly straight: a turn of less than 60 degrees.
+const STRAIGHT: f64 = -0.5;
+
 /// A station.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Node {
@@ -112,28 +115,35 @@ impl Network {
     }
 
     /// Quanta of an edge that are level at one of its ends: where three and more meet on the ground, or where it turns
-    /// off sharply, half the width of the widest other that may be a strip, which is level across.
+    /// off sharply, as far as it runs inside the widest other that may be a strip, which is level across.
     pub fn flat_at(&self, node: u32, edge: u32) -> i32 {
         let meets = self.beside(node);
         if meets.len() < 2 || !self.nodes[node as usize].on_ground {
             return 0;
         }
-        let to = |&(next, _): &(u32, u32)| self.nodes[node as usize].place.to(self.nodes[next as usize].place);
-        if let [one, other] = meets {
-            let ([east, north], [to_east, to_north]) = (to(one).map(i128::from), to(other).map(i128::from));
-            let dot = east * to_east + north * to_north;
-            let lengths = (east * east + north * north) * (to_east * to_east + to_north * to_north);
-            // Less than 60 degrees from straight on: the cosine is below -1/2.
-            if dot < 0 && lengths < 4 * dot * dot {
-                return 0;
+        let to =
+            |next: u32| self.nodes[node as usize].place.to(self.nodes[next as usize].place).map(|steps| steps as f64);
+        let Some(&(next, _)) = meets.iter().find(|(_, other)| *other == edge) else { return 0 };
+        let own = to(next);
+        let inside = |&(next, other): &(u32, u32)| {
+            let traits = self.traits(other);
+            let is_strip = self.is_ground(other) && !matches!(traits.form, Form::Line | Form::Polygon);
+            if !is_strip || other == edge {
+                return 0.0;
             }
-        }
-        let others = meets.iter().filter(|(_, other)| *other != edge && self.is_ground(*other));
-        let width = |(_, other): &(u32, u32)| {
-            let traits = self.traits(*other);
-            if matches!(traits.form, Form::Line | Form::Polygon) { 0 } else { traits.width / 2 }
+            let (one, other) = (own, to(next));
+            let lengths = ((one[0] * one[0] + one[1] * one[1]) * (other[0] * other[0] + other[1] * other[1])).sqrt();
+            let cosine = (one[0] * other[0] + one[1] * other[1]) / lengths;
+            let sine = ((one[0] * other[1] - one[1] * other[0]) / lengths).abs();
+            let half = f64::from(traits.width) / 2.0;
+            match cosine {
+                // Nearly straight on, and no third one: the strip goes on as this edge does.
+                ..STRAIGHT if meets.len() == 2 => 0.0,
+                ..0.0 => half,
+                _ => half / sine.max(0.25),
+            }
         };
-        others.map(width).max().unwrap_or(0)
+        meets.iter().map(inside).fold(0.0, f64::max) as i32
     }
 
     /// Neighbours of a node, each with the edge that leads there, in order.

@@ -216,7 +216,7 @@ impl Share {
             if most < taken && 0 < estimate {
                 aims.push((module, estimate.saturating_sub((taken - most).saturating_mul(haste))));
             } else if up && estimate < asked.triangles && taken < most {
-                aims.push((module, estimate + (most - taken)));
+                aims.push((module, estimate.saturating_add(most - taken)));
             }
         }
         let before = self.less.clone();

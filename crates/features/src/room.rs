@@ -91,7 +91,7 @@ fn losers(network: &Network, pieces: &[Piece], wide: &[Wide], found: &[Face]) ->
 }
 
 /// The strip segments that make a face: its own, or those that meet in a junction.
-fn wide_of(face: &Face, wide: &[Wide]) -> Vec<u32> {
+pub(crate) fn wide_of(face: &Face, wide: &[Wide]) -> Vec<u32> {
     match face.wide {
         Some(own) => vec![own],
         None => {
