@@ -502,6 +502,44 @@ def check_gpkg(database, arguments, scratch):
     check_in_qgis(path, dict(zip(triangles["class"], triangles.class_name)), arguments)
 
 
+def check_features(database, arguments, scratch):
+    """Roads, rivers and lakes as layers, the same file as the build has put beside its report."""
+    told = database.report.get("features")
+    published = database.folder / "features.gpkg"
+    if not told:
+        expect(not published.exists(), "no features.gpkg without roads and water")
+        return
+    try:
+        import geopandas
+        import pyogrio
+    except ImportError as error:
+        raise Skip(error) from error
+    path = export(arguments, "features", scratch / "features.gpkg")
+    expect(path.read_bytes() == published.read_bytes(), "the file that the build has published, byte by byte")
+    again = export(arguments, "features", scratch / "again.gpkg")
+    expect(path.read_bytes() == again.read_bytes(), "the same bytes from run to run")
+    with sqlite3.connect(path) as package:
+        expect(package.execute("PRAGMA integrity_check").fetchone() == ("ok",), "SQLite finds the package sound")
+        expect(not package.execute("PRAGMA foreign_key_check").fetchall(), "its keys lead somewhere")
+    wanted = ["lines", "nodes", "decks", "culverts", "remarks"]
+    expect([name for name, *_ in pyogrio.list_layers(path)] == wanted, f"layers {wanted}")
+    layers = {name: geopandas.read_file(path, layer=name) for name in wanted}
+    code = int(database.manifest["area"]["crs"].removeprefix("EPSG:"))
+    expect(all(layer.crs.to_epsg() == code for layer in layers.values()), f"in EPSG:{code}")
+    classes = {of["name"] for of in told["classes"]}
+    lines = layers["lines"]
+    expect(0 < len(lines) and bool(lines.has_z.all()), f"{len(lines)} lines with heights")
+    expect(set(lines["class"]) | set(layers["decks"]["class"]) <= classes, f"of the classes {sorted(classes)}")
+    expect(set(lines.form) <= {"line", "strip", "bench", "polygon"}, f"of the forms {sorted(set(lines.form))}")
+    decks = sum(of["deck_polygons"] for of in told["classes"])
+    expect(len(layers["decks"]) == decks and bool(layers["decks"].has_z.all()), f"{decks} decks with heights")
+    counts = told["remarks"]
+    found = dict(layers["remarks"].outcome.value_counts())
+    said = {"mended": counts["mended"], "degraded": counts["degraded"], "left out": counts["left_out"]}
+    expect(all(found.get(of, 0) == count for of, count in said.items()), f"remarks {said}")
+    expect(len(layers["culverts"]) <= len(layers["remarks"]), f"{len(layers['culverts'])} culverts")
+
+
 def check_styles(path, classes):
     """What QGIS reads: a default style for each layer, its symbols and categories at their places."""
     with sqlite3.connect(path) as package:
@@ -755,6 +793,7 @@ CHECKS = [
     ("glb", check_glb),
     ("geotiff", check_geotiff),
     ("gpkg", check_gpkg),
+    ("features", check_features),
     ("openflight", check_openflight),
     ("3dtiles", check_3dtiles),
     ("quantized-mesh", check_quantized_mesh),

@@ -29,6 +29,8 @@ mod plan;
 pub use plan::{Plan, plan};
 mod foresee;
 pub use foresee::foresee;
+mod foresee_features;
+pub use foresee_features::{FeaturesForeseen, foresee_features};
 mod forecast;
 pub use forecast::{Forecast, PAGE_MODULES_MAX, PAGE_POSTS_MAX, StageSeconds};
 mod played;

@@ -11,12 +11,14 @@ use terrain::{Dem, Post, TileId};
 use crate::keys;
 use crate::read_features::ReadFeatures;
 use crate::run::{ALGORITHM_REVISION, Run};
-use crate::{CompileError, Progress, Stage};
+use crate::{CompileError, Event, Progress, Stage};
 
 /// Finds the ground along the features of every tile.
 pub(crate) fn profile(run: &Run, progress: &mut dyn Progress) -> Result<(), CompileError> {
     // Before the clock of the stage's tiles runs.
-    run.features()?;
+    for note in &run.features()?.table.notes {
+        progress.tell(Event::Note(note.clone()));
+    }
     run.for_each_tile(Stage::Profile, progress, |tile| Ok(profile_tile(run, tile)?.map(drop))).map(drop)
 }
 

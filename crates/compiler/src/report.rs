@@ -82,11 +82,17 @@ impl Findings<'_> {
             refusals: refusals(&refused),
             bound,
             stops: self.stops(),
-            warnings: run.ground.warnings.clone(),
+            warnings: self.warnings(),
             outdated: false,
             tiles: Vec::new(),
             files: BTreeMap::new(),
         })
+    }
+
+    /// What was told of the sources while it ran.
+    fn warnings(&self) -> Vec<String> {
+        let of_features = self.run.level.iter().flat_map(|settled| &settled.notes);
+        self.run.ground.warnings.iter().chain(of_features).cloned().collect()
     }
 
     /// What is told of features, in jobs with some.

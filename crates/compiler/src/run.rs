@@ -67,6 +67,8 @@ pub(crate) struct Run<'a> {
 pub(crate) struct Settled {
     pub file: FileStamp,
     pub level: AreaLevel,
+    /// What a person should know of their files and the rules.
+    pub notes: Vec<String>,
 }
 
 impl Run<'_> {
@@ -143,8 +145,9 @@ impl Run<'_> {
     pub fn settle(&mut self, file: FileStamp, level: AreaLevel) {
         self.area.budget.reserved = level.reserved_of(self.area.grid.count());
         self.ground.burn_in(self.database.folder(), &self.area);
-        self.read = OnceLock::new();
-        self.level = Some(Settled { file, level });
+        let read = std::mem::take(&mut self.read).into_inner();
+        let notes = read.map_or_else(Vec::new, |read| read.table.notes.clone());
+        self.level = Some(Settled { file, level, notes });
     }
 
     /// What features put into a tile; nothing in jobs without them.

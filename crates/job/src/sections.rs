@@ -303,6 +303,10 @@ const FEATURE_SOURCES: &[Key] = &[
         .words::<Kind>()
         .otherwise("as rules and tags say")
         .example("{ file = \"lakes.shp\", kind = \"lake\" }"),
+    Key::new("crs", "the system of its coordinates, where it names none or a wrong one; not of OpenStreetMap data")
+        .line("a coordinate system, as \"EPSG:4326\" or well-known text", WKT_CHARS_MAX)
+        .otherwise(FILE_SAYS)
+        .example("{ file = \"roads.shp\", crs = \"EPSG:32611\" }"),
 ];
 
 const RULES: &[Key] = &[

@@ -17,7 +17,7 @@ fn job(rest: &str) -> Job {
 }
 
 const FULL: &str = "[features]\nsources = [\"roads.osm.pbf\", { file = \"hydro.gpkg\", layer = \"rivers\" }, \
-    { file = \"lakes.shp\", kind = \"lake\" }, \"sample\", { file = \"sample\" }]\n\
+    { file = \"lakes.shp\", kind = \"lake\", crs = \"EPSG:32611\" }, \"sample\", { file = \"sample\" }]\n\
     rules = [{ where = { highway = [\"track\"], surface = \"sand\" }, class = \"trail\", width_m = 3, \
     grade_max_percent = 25, form = \"strip\", z = \"feature\" }, { where = { bridge = [] }, kind = \"none\" }, \
     { where = {}, kind = \"breakline\", form = \"auto\" }]\n\
@@ -27,15 +27,16 @@ const FULL: &str = "[features]\nsources = [\"roads.osm.pbf\", { file = \"hydro.g
 fn every_key_of_features_is_read() {
     let features = job(FULL).features.unwrap();
     let [roads, rivers, lakes, own, named] = features.sources.as_slice() else { panic!("there are five") };
-    let is = |source: &FeatureSource, written: &str, layer: Option<&str>, kind| {
-        let FeatureSource::File { file, layer: found, kind: of } = source else { panic!("it is a file") };
+    let is = |source: &FeatureSource, written: &str, layer: Option<&str>, kind, crs: Option<&str>| {
+        let FeatureSource::File { file, layer: found, kind: of, crs: named } = source else { panic!("it is a file") };
         assert_eq!((file.written.as_str(), found.as_deref(), *of), (written, layer, kind));
+        assert_eq!(named.as_deref(), crs);
     };
-    is(roads, "roads.osm.pbf", None, None);
-    is(rivers, "hydro.gpkg", Some("rivers"), None);
-    is(lakes, "lakes.shp", None, Some(Kind::Lake));
+    is(roads, "roads.osm.pbf", None, None, None);
+    is(rivers, "hydro.gpkg", Some("rivers"), None, None);
+    is(lakes, "lakes.shp", None, Some(Kind::Lake), Some("EPSG:32611"));
     assert_eq!(own, &FeatureSource::Sample);
-    is(named, "sample", None, None);
+    is(named, "sample", None, None, None);
     let tags = |tags: &[(&str, &[&str])]| -> Vec<(String, Vec<String>)> {
         tags.iter().map(|(key, all)| (key.to_string(), all.iter().map(|value| value.to_string()).collect())).collect()
     };

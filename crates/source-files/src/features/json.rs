@@ -25,7 +25,7 @@ pub(super) fn read(store: &Store, wanted: &Wanted) -> Result<FeatureFile, Source
     let json: GeoJson =
         text.trim_start_matches('\u{feff}').parse().map_err(|error: geojson::Error| broken(error.to_string()))?;
     drop(text);
-    let said = said_in(path, &json)?;
+    let said = wanted.system(|| said_in(path, &json))?;
     let features = match json {
         GeoJson::Geometry(geometry) => vec![Feature { geometry: Some(geometry), ..Feature::default() }],
         GeoJson::Feature(feature) => vec![feature],

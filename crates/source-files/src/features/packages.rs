@@ -21,10 +21,10 @@ const LOOKED_AT: usize = 1000;
 pub(super) fn read(path: &Path, wanted: &Wanted) -> Result<FeatureFile, SourceError> {
     let package = Package::open(path)?;
     let table = chosen(path, &package, wanted.layer)?;
-    let said = match package.crs(table.srs)? {
-        Some(crs) => Some(crs),
-        None => looks(path, &package, &table)?.then(Crs::wgs84),
-    };
+    let said = wanted.system(|| match package.crs(table.srs)? {
+        Some(crs) => Ok(Some(crs)),
+        None => Ok(looks(path, &package, &table)?.then(Crs::wgs84)),
+    })?;
     let mut placing = Placing::new(path, wanted, said)?;
     let file = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     let (name, mut texts) = (format!("{file}:{}", table.name), Texts::default());
