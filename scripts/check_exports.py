@@ -11,6 +11,7 @@ Python that has QGIS (Debian's python3-qgis). A reader that is missing is told a
 
 import argparse
 import json
+import math
 import pathlib
 import re
 import shutil
@@ -94,6 +95,8 @@ def main():
     parser.add_argument("--only", help="formats to check, with commas between")
     parser.add_argument("--all", action="store_true", help="a missing reader is a fault")
     arguments = parser.parse_args()
+    if arguments.pictures:
+        pathlib.Path(arguments.pictures).mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as scratch:
         scratch = pathlib.Path(scratch)
         folders = [*arguments.databases, *([with_holes(arguments, scratch)] if arguments.holes else [])]
@@ -760,6 +763,13 @@ def check_headers(folder, pyproj):
     expect(horizons, "what hides their horizon points hides all of them")
 
 
+def altitude(corners):
+    """The smallest altitude of a triangle seen from above."""
+    (x0, y0, _), (x1, y1, _), (x2, y2, _) = corners
+    doubled = abs((x1 - x0) * (y2 - y0) - (y1 - y0) * (x2 - x0))
+    return doubled / max(math.dist(a[:2], b[:2]) for a, b in zip(corners, [*corners[1:], corners[0]]))
+
+
 def check_cesium(database, arguments, scratch):
     """Heights at the middle of triangles, taken as ellipsoidal so that PROJ alone says where they are."""
     if not arguments.node_modules or not shutil.which("chromium"):
@@ -769,7 +779,10 @@ def check_cesium(database, arguments, scratch):
     modules = list(database.modules.items())
     places = []
     for (row, col), module in modules[:: max(1, len(modules) // 100)]:
-        corners = [module["vertices"][v] for v in module["triangles"][len(module["triangles"]) // 2]]
+        # A needle has no height of its own in a format that moves its corners by centimetres.
+        found = [[module["vertices"][v] for v in triangle] for triangle in module["triangles"]]
+        found = [corners for corners in found if 128 < altitude(corners)]
+        corners = found[len(found) // 2]
         x, y, z = (sum(corner[axis] for corner in corners) / 384 for axis in range(3))
         east, north = database.origin[0] + col * database.side + x, database.origin[1] + row * database.side + y
         places.append([*to.transform(east, north), z])
