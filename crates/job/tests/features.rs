@@ -146,3 +146,22 @@ fn files_of_features_are_found_by_name_and_pattern_and_what_is_missing_is_told()
     assert!(told("\"roads/\"").ends_with("hint: its files are roads/*.gpkg"));
     assert!(told("\"*.shp\"").contains("which no file matches, expected a pattern that finds a file of lines and"));
 }
+
+#[test]
+fn levels_leave_out_classes_of_features_that_there_are() {
+    let with = |levels: &str, features: &str| format!("{features}[lod]\nlevels = [{levels}]\n");
+    let refused = |text: &str| {
+        let error = Job::from_text(&format!("{HEAD}{text}"), Path::new("jobs/a.toml")).unwrap_err();
+        error.to_string()
+    };
+    let some = "[features]\nsources = [\"sample\"]\n";
+    let levels = "{ inner_share = 0.5 }, { inner_share = 0.2, leave_out = [\"track\", \"stream\"] }";
+    let read = job(&with(levels, some));
+    assert_eq!(read.lod.leave_out, [vec![], vec!["track".to_owned(), "stream".to_owned()]]);
+    assert!(read.lod.leaves_out() && !job(&with("{ inner_share = 0.5 }", some)).lod.leaves_out());
+    assert!(read.canonical_text().contains("{ inner_share = 0.2, leave_out = [\"track\", \"stream\"] }"));
+    let error = refused(&with("{ inner_share = 0.5, leave_out = [\"trak\"] }", some));
+    assert!(error.contains("expected a class of features"), "{error}");
+    let error = refused(&with("{ inner_share = 0.5, leave_out = [\"track\"] }", ""));
+    assert!(error.contains("expected a job with roads and water"), "{error}");
+}

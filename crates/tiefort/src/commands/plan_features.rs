@@ -12,8 +12,8 @@ use views::{Align, Table, grouped};
 const WIDTHS: &str = "Tags of width and lanes go before these widths, but not before those of rules.";
 
 /// What the forecast stands on.
-const FORECAST: &str = "Counted on level ground, before heights are known and anything is degraded: slopes bring strips \
-                        and more stations, and what costs more than its share is made coarser or left out.";
+const FORECAST: &str = "Counted on level ground, before heights are known and anything is degraded: slopes bring \
+                        strips and more stations, and what costs more than its share is made coarser or left out.";
 
 /// All tables.
 pub fn tables_text(features: &FeaturesForeseen, job: &Job) -> String {

@@ -314,7 +314,7 @@ impl Stage {
         }
     }
 
-    /// Lines of features that have no width in the ground; and bridges, each with a side that hangs from it, so that one seen from a bank is no thread.
+    /// Lines of features, and bridges with sides that hang from them: else one seen from a bank would be a line.
     fn draw_features(&mut self, surface: &Surface, times: f64) {
         let Surface::Triangles(facets) = surface else { return };
         let (view, half_m) = (self.view, self.haze_half_m);

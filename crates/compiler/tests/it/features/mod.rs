@@ -5,6 +5,7 @@ mod drawing;
 pub use drawing::{Drawn, geojson, line, polygon};
 
 mod bytes;
+mod left_out;
 mod refused;
 mod roads;
 mod water;
