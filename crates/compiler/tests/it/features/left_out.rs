@@ -51,7 +51,9 @@ fn inside(laid: &Laid, kind: Kind, roles: &[LineRole]) -> BTreeSet<[i64; 2]> {
     let side = i64::from(SIDE_CELLS) * 25 * 128;
     let lines = roles.iter().flat_map(|role| laid.lines(kind, *role)).flatten();
     let all = lines.map(|at| [quanta(at[0] - ORIGIN_M[0]), quanta(at[1] - ORIGIN_M[1])]);
-    all.filter(|at| at.iter().all(|along| along % side != 0)).collect()
+    // The ends of a strip may reach over the side of the area.
+    let is_inside = |along: &i64| 0 < *along && *along < 4 * side && along % side != 0;
+    all.filter(|at| at.iter().all(is_inside)).collect()
 }
 
 const ROAD: [LineRole; 2] = [LineRole::Centre, LineRole::Side];
