@@ -11,6 +11,7 @@ Python that has QGIS (Debian's python3-qgis). A reader that is missing is told a
 
 import argparse
 import json
+import math
 import pathlib
 import re
 import shutil
@@ -94,6 +95,8 @@ def main():
     parser.add_argument("--only", help="formats to check, with commas between")
     parser.add_argument("--all", action="store_true", help="a missing reader is a fault")
     arguments = parser.parse_args()
+    if arguments.pictures:
+        pathlib.Path(arguments.pictures).mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as scratch:
         scratch = pathlib.Path(scratch)
         folders = [*arguments.databases, *([with_holes(arguments, scratch)] if arguments.holes else [])]
@@ -502,6 +505,44 @@ def check_gpkg(database, arguments, scratch):
     check_in_qgis(path, dict(zip(triangles["class"], triangles.class_name)), arguments)
 
 
+def check_features(database, arguments, scratch):
+    """Roads, rivers and lakes as layers, the same file as the build has put beside its report."""
+    told = database.report.get("features")
+    published = database.folder / "features.gpkg"
+    if not told:
+        expect(not published.exists(), "no features.gpkg without roads and water")
+        return
+    try:
+        import geopandas
+        import pyogrio
+    except ImportError as error:
+        raise Skip(error) from error
+    path = export(arguments, "features", scratch / "features.gpkg")
+    expect(path.read_bytes() == published.read_bytes(), "the file that the build has published, byte by byte")
+    again = export(arguments, "features", scratch / "again.gpkg")
+    expect(path.read_bytes() == again.read_bytes(), "the same bytes from run to run")
+    with sqlite3.connect(path) as package:
+        expect(package.execute("PRAGMA integrity_check").fetchone() == ("ok",), "SQLite finds the package sound")
+        expect(not package.execute("PRAGMA foreign_key_check").fetchall(), "its keys lead somewhere")
+    wanted = ["lines", "nodes", "decks", "culverts", "remarks"]
+    expect([name for name, *_ in pyogrio.list_layers(path)] == wanted, f"layers {wanted}")
+    layers = {name: geopandas.read_file(path, layer=name) for name in wanted}
+    code = int(database.manifest["area"]["crs"].removeprefix("EPSG:"))
+    expect(all(layer.crs.to_epsg() == code for layer in layers.values()), f"in EPSG:{code}")
+    classes = {of["name"] for of in told["classes"]}
+    lines = layers["lines"]
+    expect(0 < len(lines) and bool(lines.has_z.all()), f"{len(lines)} lines with heights")
+    expect(set(lines["class"]) | set(layers["decks"]["class"]) <= classes, f"of the classes {sorted(classes)}")
+    expect(set(lines.form) <= {"line", "strip", "bench", "polygon"}, f"of the forms {sorted(set(lines.form))}")
+    decks = sum(of["deck_polygons"] for of in told["classes"])
+    expect(len(layers["decks"]) == decks and bool(layers["decks"].has_z.all()), f"{decks} decks with heights")
+    counts = told["remarks"]
+    found = dict(layers["remarks"].outcome.value_counts())
+    said = {"mended": counts["mended"], "degraded": counts["degraded"], "left out": counts["left_out"]}
+    expect(all(found.get(of, 0) == count for of, count in said.items()), f"remarks {said}")
+    expect(len(layers["culverts"]) <= len(layers["remarks"]), f"{len(layers['culverts'])} culverts")
+
+
 def check_styles(path, classes):
     """What QGIS reads: a default style for each layer, its symbols and categories at their places."""
     with sqlite3.connect(path) as package:
@@ -722,6 +763,13 @@ def check_headers(folder, pyproj):
     expect(horizons, "what hides their horizon points hides all of them")
 
 
+def altitude(corners):
+    """The smallest altitude of a triangle seen from above."""
+    (x0, y0, _), (x1, y1, _), (x2, y2, _) = corners
+    doubled = abs((x1 - x0) * (y2 - y0) - (y1 - y0) * (x2 - x0))
+    return doubled / max(math.dist(a[:2], b[:2]) for a, b in zip(corners, [*corners[1:], corners[0]]))
+
+
 def check_cesium(database, arguments, scratch):
     """Heights at the middle of triangles, taken as ellipsoidal so that PROJ alone says where they are."""
     if not arguments.node_modules or not shutil.which("chromium"):
@@ -731,7 +779,10 @@ def check_cesium(database, arguments, scratch):
     modules = list(database.modules.items())
     places = []
     for (row, col), module in modules[:: max(1, len(modules) // 100)]:
-        corners = [module["vertices"][v] for v in module["triangles"][len(module["triangles"]) // 2]]
+        # A needle has no height of its own in a format that moves its corners by centimetres.
+        found = [[module["vertices"][v] for v in triangle] for triangle in module["triangles"]]
+        found = [corners for corners in found if 128 < altitude(corners)]
+        corners = found[len(found) // 2]
         x, y, z = (sum(corner[axis] for corner in corners) / 384 for axis in range(3))
         east, north = database.origin[0] + col * database.side + x, database.origin[1] + row * database.side + y
         places.append([*to.transform(east, north), z])
@@ -755,6 +806,7 @@ CHECKS = [
     ("glb", check_glb),
     ("geotiff", check_geotiff),
     ("gpkg", check_gpkg),
+    ("features", check_features),
     ("openflight", check_openflight),
     ("3dtiles", check_3dtiles),
     ("quantized-mesh", check_quantized_mesh),

@@ -101,7 +101,7 @@ function readCounts(modules) {
         for (let col = word(48); col < word(52); col++, at += entry) {
           // Decks count as the ground does.
           const decks = entry === 32 ? 0 : word(at + 36);
-          if (0 < decks && level === 0) area.decks.push(deckIn(file, at, area, row, col));
+          if (0 < decks && level === 0) area.decks.push(...decksIn(file, at, area, row, col));
           counts.set(row * area.cols + col, { triangles: word(at + 16) + decks, polygons: word(at + 20) + decks });
         }
       }
@@ -110,17 +110,38 @@ function readCounts(modules) {
   return { ...area, counts: area.levels[0] };
 }
 
-/** Middle and height of the first triangle of a load module's decks, whose entry in the index is at `at`. */
-function deckIn(file, at, { side, origin }, row, col) {
-  const start = Number(file.readBigUInt64LE(at)) + file.readUInt32LE(at + 8) + 20;
-  const triangles = start + 8 * file.readUInt32LE(at + 32), middle = [0, 0, 0];
-  for (let corner = 0; corner < 3; corner++) {
-    const vertex = start + 8 * file.readUInt16LE(triangles + 2 * corner);
-    middle[0] += file.readUInt16LE(vertex) / 128 / 3;
-    middle[1] += file.readUInt16LE(vertex + 2) / 128 / 3;
-    middle[2] += file.readInt32LE(vertex + 4) / 128 / 3;
-  }
-  return [origin[0] + col * side + middle[0], origin[1] + row * side + middle[1], middle[2]];
+/**
+ * The triangles of a load module's decks, whose entry in the index is at `at`: their middles, the direction and length
+ * of their longest sides, and how far the ground lies below.
+ */
+function decksIn(file, at, { side, origin }, row, col) {
+  const ground = Number(file.readBigUInt64LE(at)), decks = ground + file.readUInt32LE(at + 8);
+  const read = (start, vertices, triangles) => {
+    const corner = (v) => {
+      const place = start + 8 * v;
+      const [x, y, z] = [file.readUInt16LE(place), file.readUInt16LE(place + 2), file.readInt32LE(place + 4)];
+      return [origin[0] + col * side + x / 128, origin[1] + row * side + y / 128, z / 128];
+    };
+    const first = start + 8 * vertices;
+    const triangle = (t) => [0, 2, 4].map((c) => corner(file.readUInt16LE(first + 6 * t + c)));
+    return Array.from({ length: triangles }, (_, t) => triangle(t));
+  };
+  const below = read(ground + 56, file.readUInt32LE(at + 12), file.readUInt32LE(at + 16));
+  return read(decks + 20, file.readUInt32LE(at + 32), file.readUInt32LE(at + 36)).map((corners) => {
+    const place = [0, 1, 2].map((axis) => corners.reduce((sum, of) => sum + of[axis], 0) / 3);
+    const sides = corners.map((from, c) => [0, 1].map((axis) => corners[(c + 1) % 3][axis] - from[axis]));
+    const along = sides.reduce((most, of) => (Math.hypot(...most) < Math.hypot(...of) ? of : most));
+    const under = below.map((triangle) => heightOn(triangle, place)).filter((height) => height !== null);
+    const heading = ((Math.atan2(along[0], along[1]) * 180) / Math.PI + 360) % 180;
+    return { place, heading, length: Math.hypot(...along), clear: place[2] - Math.max(...under) };
+  });
+}
+
+/** The height of a triangle at a place, where it lies over that. */
+function heightOn([a, b, c], [x, y]) {
+  const left = (p, q) => (q[0] - p[0]) * (y - p[1]) - (q[1] - p[1]) * (x - p[0]);
+  const [onA, onB, onC] = [left(b, c), left(c, a), left(a, b)];
+  return Math.min(onA, onB, onC) < 0 ? null : (onA * a[2] + onB * b[2] + onC * c[2]) / (onA + onB + onC);
 }
 
 async function check() {
@@ -337,27 +358,32 @@ async function flown(page) {
   await picture(page, "flight");
 }
 
-/** The tank stands on the highest deck where it is put there, and drives under it where it comes from beside it. */
+/** The tank stands on a deck where it is put there and drives along it, and drives under one from beside it. */
 async function bridged(page) {
-  const above = async ([east, north, height]) => {
-    await open(page, `east=${east}&north=${north}&heading=90&range=1000`);
-    const found = await state(page);
-    return { deck: found, off: found.height - height };
-  };
-  const range = [...own.decks].sort((a, b) => a[0] - b[0]), place = range[Math.floor(range.length / 2)];
-  const { deck, off } = await above(place);
+  const most = (of) => own.decks.reduce((best, deck) => (of(best) < of(deck) ? deck : best));
+  const at = ([east, north], heading) => `east=${east}&north=${north}&heading=${heading}&range=1000`;
+  const long = most((deck) => deck.length);
+  await open(page, at(long.place, long.heading));
+  const deck = await state(page), off = deck.height - long.place[2];
   expect(deck.isOnDeck && Math.abs(off) < 0.2, `the tank stands on a deck, ${off.toFixed(2)} m off`);
   await picture(page, "on-deck");
+  const far = Math.min(150, 0.2 * long.length);
   await page.keyboard.down("KeyW");
-  await page.waitForFunction(`150 < window.tiefort.state().driven`, { timeout: 120_000 });
-  await page.keyboard.up("KeyW");
+  await page.waitForFunction(`${far} < window.tiefort.state().driven`, { timeout: 120_000 });
   const along = await state(page);
-  expect(along.isOnDeck, `and drives on along it, at ${along.height.toFixed(1)} m`);
-  await open(page, `east=${place[0]}&north=${place[1] - 80}&heading=0&range=1000`);
+  await page.keyboard.up("KeyW");
+  // On a slow machine it has driven past the end of a short one before it is asked.
+  if (along.driven < 0.4 * long.length) {
+    expect(along.isOnDeck, `and drives on along it, ${along.driven.toFixed(1)} m, at ${along.height.toFixed(1)} m`);
+  }
+  const high = most((deck) => deck.clear);
+  if (high.clear < 3) return console.log(`     no deck is higher than ${high.clear.toFixed(1)} m over the ground`);
+  const across = high.heading + 90, [east, north] = high.place, turned = (across * Math.PI) / 180;
+  await open(page, at([east - 80 * Math.sin(turned), north - 80 * Math.cos(turned)], across));
   await picture(page, "before-deck");
   let [under, onDeck] = [null, 0];
   await page.keyboard.down("KeyW");
-  for (let now = await state(page); now.driven < 160; now = await state(page)) {
+  for (let now = await state(page); now.driven < 82; now = await state(page)) {
     onDeck += now.isOnDeck ? 1 : 0;
     if (under === null && 78 < now.driven) {
       under = now;
@@ -366,8 +392,8 @@ async function bridged(page) {
     await pause(20);
   }
   await page.keyboard.up("KeyW");
-  const below = place[2] - under.height;
-  expect(onDeck === 0 && 3 < below, `and another drives under it, ${below.toFixed(1)} m below`);
+  const below = high.place[2] - (under ?? (await state(page))).height;
+  expect(onDeck === 0 && high.clear / 2 < below, `and another drives under it, ${below.toFixed(1)} m below`);
 }
 
 async function picture(page, name) {

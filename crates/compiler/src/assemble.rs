@@ -1,19 +1,18 @@
 //! Load modules of every tile, their residuals and counts.
 
+use std::collections::BTreeSet;
+
 use database::{FileStamp, Measured, TileModules};
 use engine::{Artifact, Fingerprint, Key, Outcome, Stamp, keep_or_make};
 use fidelity::{FeatureFigures, Residuals, Tally};
 use ground::Window;
 use job::{Borders, ClipHeights as JobClipHeights, Edges, Job, OuterBorder};
-use load_modules::{ClipHeights, Face, Faces, Layout, clip, concatenate, cut_decks};
-use terrain::{
-    FeatureSurface, HOLE_CLASS, LatticePoint, LoadModule, ModuleCounts, Post, PostRect, TileFeatures, TileId, Tin,
-    Vertex,
-};
+use load_modules::{ClipHeights, Layout, clip, concatenate, cut_decks};
+use terrain::{HOLE_CLASS, LatticePoint, LoadModule, ModuleCounts, Post, PostRect, TileId, Tin, Vertex};
 
 use crate::assembled::{Assembled, ModuleNumbers};
 use crate::keys::{self, StampOf};
-use crate::levels::all_levels;
+use crate::levels::{all_levels, faces};
 use crate::measured::{from_measured, to_measured};
 use crate::refine::Published;
 use crate::run::{ALGORITHM_REVISION, Run};
@@ -45,7 +44,7 @@ pub(crate) fn assemble_tile(
     tile: TileId,
 ) -> Result<Outcome<(Assembled, Sums)>, CompileError> {
     let features = run.tile_features(tile)?;
-    let modules = keys::modules(run.job, &run.area, stamps, removed, &features).fingerprint();
+    let modules = keys::modules((run.job, &run.area), stamps, removed, (&features, run.left_out())).fingerprint();
     keep_or_make(&Assembling { run, stamps, removed, tile, modules }, ALGORITHM_REVISION)
 }
 
@@ -95,7 +94,7 @@ fn make(assembling: &Assembling, stamp: &Stamp) -> Result<(Assembled, Sums), Com
     let layout = Layout { grid: area.grid, modules: area.tiling.modules(tile, area.grid), spacing: area.frame.spacing };
     let own = run.tin(tile, &stamps(area.tiling.index(tile)))?;
     let features = run.tile_features(tile)?;
-    let faces = faces(&features);
+    let faces = faces(&features, &BTreeSet::new());
     // What is no feature has the class that the ground has without any.
     let natural = run.ground.natural_tile(area, tile)?;
     let mut modules = match run.job.modules.edges {
@@ -114,8 +113,7 @@ fn make(assembling: &Assembling, stamp: &Stamp) -> Result<(Assembled, Sums), Com
     let residuals = fidelity::measure(&mut modules, &window.measured(area));
     let at_source = run.ground.relief.residuals_at_source(&modules, area, area.tiling.rect(tile))?;
     let figures = feature_figures(run, tile, (&own.tin, &modules), &window)?;
-    let mut levels =
-        all_levels(run, modules, (&layout, &window.dem, &natural.importance), (&features.kept, faces.as_ref()));
+    let mut levels = all_levels(run, modules, (&layout, &window.dem, &natural.importance), &features);
     levels[1..].iter_mut().for_each(|level| drop(fidelity::measure(level, &window.measured(area))));
     let file = publish(run, tile, &layout, fingerprint, &levels)?;
     let counted = count_points(run, &own.tin, &removed[area.tiling.index(tile)], &window.importance);
@@ -125,14 +123,6 @@ fn make(assembling: &Assembling, stamp: &Stamp) -> Result<(Assembled, Sums), Com
     let sums = Sums { features: figures, ..sums(residuals, at_source, counted, heights) };
     done.measured = run.database.write_measured(stamp, &to_measured(tile, &done, &sums))?;
     Ok((done, sums))
-}
-
-/// Ground that has the class of a feature; nothing where there is none.
-fn faces(features: &TileFeatures) -> Option<Faces> {
-    let ring = |surface: &FeatureSurface| surface.ring.iter().map(|vertex| vertex.at).collect();
-    let face = |body: &[FeatureSurface]| Face { class: body[0].class, rings: body.iter().map(ring).collect() };
-    let all: Vec<Face> = features.bodies().map(face).collect();
-    (!all.is_empty()).then(|| Faces::new(&all, features.kept.steps_per_post))
 }
 
 fn sums(

@@ -60,6 +60,12 @@ pub enum CompileError {
         /// What the system said.
         found: String,
     },
+    /// The GeoPackage of features could not be made.
+    #[error("features.gpkg cannot be made: {message}")]
+    Package {
+        /// What the library says.
+        message: String,
+    },
     /// The database was made for another job.
     #[error("{path}: built from another job than this one, expected the same job: {difference}")]
     OtherJob {
@@ -87,6 +93,7 @@ impl From<ProductError> for CompileError {
         match error {
             ProductError::Database(error) => CompileError::Database(error),
             ProductError::Ground(error) => CompileError::Ground(error),
+            ProductError::Package { message } => CompileError::Package { message },
         }
     }
 }
@@ -101,6 +108,7 @@ impl CompileError {
                 Some("this is a fault of the compiler; what was published before is intact".to_owned())
             }
             CompileError::Stopped { .. } => Some("run the same command again to go on from here".to_owned()),
+            CompileError::Package { .. } => Some("free some memory and build again".to_owned()),
             CompileError::OtherRun { .. } => {
                 Some("wait for them to end, or build into another folder with --out".to_owned())
             }

@@ -14,6 +14,7 @@ use terrain::{
 use tiling::Budget;
 use tin::{CostUnit, Frame, Proximity, Rule, Stop, SurveyTask, TileTask};
 
+use crate::left_out::LeftOut;
 use crate::refinement::{Most, Refinement};
 use crate::run::Run;
 
@@ -31,6 +32,7 @@ const CUT: Part = Part { name: "cut", changed: "how load modules are cut changed
 /// The TINs that load modules are cut from.
 const TINS: Part = Part { name: "tins", changed: "a TIN changed" };
 /// What roads, rivers and lakes put into it.
+const LEFT_OUT: Part = Part { name: "left out", changed: "what coarser levels leave out changed" };
 const FEATURES: Part = Part { name: "features", changed: "roads, rivers or lakes in it changed" };
 /// The ground along features.
 const PROFILES: Part = Part { name: "profiles", changed: "the ground along roads, rivers or lakes changed" };
@@ -163,11 +165,10 @@ pub(crate) fn curve(window: &Window, task: &SurveyTask) -> Key {
 
 /// Of a tile's load modules, from TINs without the points that `removed` lists per tile.
 pub fn modules(
-    job: &Job,
-    area: &GamingArea,
+    (job, area): (&Job, &GamingArea),
     stamps: &StampOf,
     removed: &[Vec<LatticePoint>],
-    features: &TileFeatures,
+    (features, left_out): (&TileFeatures, Option<&LeftOut>),
 ) -> Key {
     let tile = features.tile;
     let mut reach = match job.modules.edges {
@@ -187,9 +188,14 @@ pub fn modules(
             })
         });
     // Load modules without features keep the keys they had before there were any.
-    match features.surfaces.is_empty() && features.decks.is_empty() {
+    let key = match features.surfaces.is_empty() && features.decks.is_empty() {
         true => key,
         false => key.part(FEATURES, |part| feed_surfaces(part, features)),
+    };
+    // What levels leave out is told by the classes of edges, which the TIN does not say.
+    match left_out {
+        None => key,
+        Some(left_out) => key.part(LEFT_OUT, |part| left_out.feed(part, &features.kept, area.frame.spacing)),
     }
 }
 
@@ -290,7 +296,8 @@ fn feed_modules(builder: FingerprintBuilder, modules: &ModulesSpec) -> Fingerpri
 }
 
 fn feed_levels(builder: FingerprintBuilder, lod: &LodSpec) -> FingerprintBuilder {
-    let LodSpec { inner_shares, border } = lod;
+    // What is left out has a part of its own.
+    let LodSpec { inner_shares, border, leave_out: _ } = lod;
     let border = match border {
         LodBorder::Full => 0,
         LodBorder::Own => 1,

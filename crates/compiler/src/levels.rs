@@ -3,32 +3,48 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use job::Method;
-use load_modules::{Faces, Layout, LevelFeatures, LevelGround, Levels, coarser_levels};
-use terrain::{Dem, Features, Importance, LoadModule};
+use load_modules::{Face, Faces, Layout, LevelFeatures, LevelGround, Levels, coarser_levels};
+use terrain::{Dem, FeatureSurface, Features, Importance, LoadModule, TileFeatures};
 
+use crate::left_out::{At, LeftOut, place_of};
 use crate::run::Run;
 
-/// Every level of a tile's load modules, beginning with the finest, which is given. Features stay in all of them.
+/// Every level of a tile's load modules, beginning with the finest, which is given. Features stay in all of them, but
+/// for classes that the job leaves out.
 pub(crate) fn all_levels(
     run: &Run,
     finest: Vec<LoadModule>,
     (layout, dem, mask): (&Layout, &Dem, &Importance),
-    (features, faces): (&Features, Option<&Faces>),
+    features: &TileFeatures,
 ) -> Vec<Vec<LoadModule>> {
     let lod = &run.job.lod;
     let mut levels = vec![finest];
     if lod.inner_shares.is_empty() {
         return levels;
     }
-    let kept = Kept::new(features, layout);
+    let left_out = run.left_out();
+    let kept: Vec<LevelKept> = match left_out {
+        Some(left_out) => (0..lod.inner_shares.len())
+            .map(|level| LevelKept {
+                kept: Kept::new(&features.kept, layout, Some((left_out, level))),
+                faces: faces(features, left_out.classes(level)),
+            })
+            .collect(),
+        None => {
+            let faces = faces(features, &BTreeSet::new());
+            vec![LevelKept { kept: Kept::new(&features.kept, layout, None), faces }]
+        }
+    };
     let ground = LevelGround { dem, mask };
     levels.resize_with(lod.level_count(), Vec::new);
     for place in 0..levels[0].len() {
-        let of_level = LevelFeatures { faces, ..kept.of(&levels[0][place]) };
-        let of_levels = match features.is_empty() {
-            true => Vec::new(),
-            false => vec![of_level; lod.inner_shares.len()],
-        };
+        let mut of_levels = Vec::new();
+        if !features.kept.is_empty() {
+            of_levels = kept.iter().map(|kept| kept.of(&levels[0][place])).collect::<Vec<_>>();
+            // Where none leaves out anything, all keep the same.
+            let last = of_levels[of_levels.len() - 1].clone();
+            of_levels.resize(lod.inner_shares.len(), last);
+        }
         let wanted = Levels {
             inner_shares: &lod.inner_shares,
             border: lod.border,
@@ -41,26 +57,46 @@ pub(crate) fn all_levels(
     levels
 }
 
-/// Vertices and edges of features by their places, in quanta from the area's south-west post.
+/// Ground that has the class of a feature, but for some classes; nothing where there is none.
+pub(crate) fn faces(features: &TileFeatures, without: &BTreeSet<u8>) -> Option<Faces> {
+    let ring = |surface: &FeatureSurface| surface.ring.iter().map(|vertex| vertex.at).collect();
+    let face = |body: &[FeatureSurface]| Face { class: body[0].class, rings: body.iter().map(ring).collect() };
+    let bodies = features.bodies().filter(|body| !without.contains(&body[0].class));
+    let all: Vec<Face> = bodies.map(face).collect();
+    (!all.is_empty()).then(|| Faces::new(&all, features.kept.steps_per_post))
+}
+
+/// What a level keeps of the features of a tile.
+struct LevelKept {
+    kept: Kept,
+    faces: Option<Faces>,
+}
+
+impl LevelKept {
+    fn of(&self, module: &LoadModule) -> LevelFeatures<'_> {
+        LevelFeatures { faces: self.faces.as_ref(), ..self.kept.of(module) }
+    }
+}
+
+/// Vertices and edges of features by their places.
 struct Kept {
-    vertices: BTreeSet<[i64; 2]>,
-    edges: BTreeMap<[i64; 2], Vec<[i64; 2]>>,
+    vertices: BTreeSet<At>,
+    edges: BTreeMap<At, Vec<At>>,
     side: i64,
 }
 
 impl Kept {
-    fn new(features: &Features, layout: &Layout) -> Self {
-        let step = i64::from(layout.spacing.quanta_per_post() / features.steps_per_post);
-        let place = |v: u32| {
-            let at = features.vertices[v as usize].at;
-            [i64::from(at.row) * step, i64::from(at.col) * step]
-        };
-        let mut edges: BTreeMap<[i64; 2], Vec<[i64; 2]>> = BTreeMap::new();
-        for [a, b] in features.edges.iter().map(|ends| ends.map(place)) {
+    /// All of them, or those that a level does not leave out.
+    fn new(features: &Features, layout: &Layout, left_out: Option<(&LeftOut, usize)>) -> Self {
+        let place = place_of(features, layout.spacing);
+        let keeps_edge = |ends: &[At; 2]| left_out.is_none_or(|(left_out, level)| left_out.keeps_edge(level, *ends));
+        let keeps_vertex = |at: &At| left_out.is_none_or(|(left_out, level)| left_out.keeps_vertex(level, *at));
+        let mut edges: BTreeMap<At, Vec<At>> = BTreeMap::new();
+        for [a, b] in features.edges.iter().map(|ends| ends.map(&place)).filter(keeps_edge) {
             edges.entry(a).or_default().push(b);
             edges.entry(b).or_default().push(a);
         }
-        let vertices = (0..features.vertices.len() as u32).map(place).collect();
+        let vertices = (0..features.vertices.len() as u32).map(&place).filter(keeps_vertex).collect();
         Self { vertices, edges, side: i64::from(layout.side()) }
     }
 

@@ -3,12 +3,13 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use database::{AreaLevel, FeatureFace, FeatureLine, FeatureRemark, LineRole};
-use features::{Face, FeatureId, Formed, FormedEdge, Levelled, Place, Remark, Role, Surface};
+use features::{Cost, Face, FeatureId, Formed, FormedEdge, Levelled, Place, Remark, Role, Surface};
 use ground::{GamingArea, slope_reach};
+use job::Job;
 use load_modules::{Layout, cut_decks};
 use terrain::{
-    FeatureSurface, Features, LATTICE_PER_POST, LatticePoint, ModuleId, PostRect, Side, SideSpan, SurfaceGround,
-    TileFeatures, TileId, Vertex,
+    FeatureSurface, Features, LATTICE_PER_POST, LatticePoint, ModuleGrid, ModuleId, PostRect, Side, SideSpan,
+    SurfaceGround, TileFeatures, TileId, Vertex,
 };
 use tiling::{outer_border_posts, outer_sides};
 
@@ -19,7 +20,7 @@ use crate::strips::strips;
 /// What features put into each tile, row-major.
 pub(crate) fn pieces(run: &Run, features: &features::AreaFeatures, formed: &Formed) -> Vec<TileFeatures> {
     let steps = features.site.lattice.steps_per_post();
-    let mut cutting = Cutting { area: &run.area, steps, classes: classes_of(run), pieces: Vec::new() };
+    let mut cutting = Cutting { area: &run.area, steps, classes: classes_of(run.job), pieces: Vec::new() };
     cutting.pieces = run.area.tiles.iter().map(|&tile| Piece::of(tile, steps)).collect();
     cutting.edges(formed);
     cutting.surfaces(&formed.surfaces);
@@ -36,9 +37,9 @@ pub(crate) fn pieces(run: &Run, features: &features::AreaFeatures, formed: &Form
 }
 
 /// The job's number of each class of features.
-fn classes_of(run: &Run) -> Vec<u8> {
-    let names = run.job.class_names();
-    let spec = run.job.features.as_ref().expect("a stage of jobs with features");
+fn classes_of(job: &Job) -> Vec<u8> {
+    let names = job.class_names();
+    let spec = job.features.as_ref().expect("a stage of jobs with features");
     let number = |class: &String| names.iter().position(|name| name == class).expect("a job has its features' classes");
     features::class_names(&spec.rules).iter().map(|class| number(class) as u8).collect()
 }
@@ -225,18 +226,24 @@ fn spans(surfaces: &[FeatureSurface], rect: PostRect, steps: i32) -> Vec<SideSpa
     spans
 }
 
-/// What is told of the whole area.
-pub(crate) fn area_level(run: &Run, read: &ReadFeatures, levelled: &Levelled) -> AreaLevel {
-    let (grid, classes) = (run.area.grid, classes_of(run));
-    let mut cost: Vec<(u32, u8, u32)> = Vec::new();
-    for (&(row, col), of) in &levelled.reserved.cost {
+/// What features take of each load module of the area, by its place and the class of the job, in ascending order.
+pub(crate) fn cost_of(job: &Job, grid: ModuleGrid, cost: &Cost) -> Vec<(u32, u8, u32)> {
+    let classes = classes_of(job);
+    let mut all: Vec<(u32, u8, u32)> = Vec::new();
+    for (&(row, col), of) in cost {
         let (Ok(row), Ok(col)) = (u32::try_from(row), u32::try_from(col)) else { continue };
         if row < grid.rows && col < grid.cols {
             let place = grid.index(ModuleId { row, col }) as u32;
-            cost.extend(of.iter().map(|(class, count)| (place, classes[usize::from(*class)], *count)));
+            all.extend(of.iter().map(|(class, count)| (place, classes[usize::from(*class)], *count)));
         }
     }
-    cost.sort_unstable();
+    all.sort_unstable();
+    all
+}
+
+/// What is told of the whole area.
+pub(crate) fn area_level(run: &Run, read: &ReadFeatures, levelled: &Levelled) -> AreaLevel {
+    let classes = classes_of(run.job);
     let told = |remark: &Remark| {
         let at_m = remark.posts.map(|[east, north]| {
             let metres = |posts: f64| posts * run.area.frame.spacing.metres();
@@ -255,13 +262,13 @@ pub(crate) fn area_level(run: &Run, read: &ReadFeatures, levelled: &Levelled) ->
     let formed = &levelled.reserved.formed;
     AreaLevel {
         tiles: Vec::new(),
-        cost,
+        cost: cost_of(run.job, run.area.grid, &levelled.reserved.cost),
         reserved: Vec::new(),
         lines: lines(run, read, formed, &classes),
         strips: strips(&read.features, formed, &classes, run.area.rect),
         decks: decks(run, read, &formed.decks, &classes),
         remarks,
-        notes: read.vectors.notes.clone(),
+        notes: read.table.notes.clone(),
     }
 }
 

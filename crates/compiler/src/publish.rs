@@ -93,18 +93,24 @@ pub(crate) fn publish(run: Run, ready: Ready, progress: &mut Stopwatch) -> Resul
     let work = run.database.folder().work(&run_name(&manifest.job, &run.records, ALGORITHM_REVISION));
     // The page opens the ground by itself: there is no room for it twice.
     drop((run.ground, run.tins));
-    let (job, database) = (run.job, run.database);
+    let (job, database, level) = (run.job, run.database, run.level.map(|settled| settled.level));
 
     // The last moment: from here on everything says that it was made from these files.
     changed(&run.states)?;
     (report.stages, report.tiles) = progress.times();
-    let of_features = told.map(|told| product::features_file(job, &told.remarks));
-    if of_features.is_none() {
+    let mut written: Vec<(&str, Vec<u8>)> =
+        product::breaches(job, &report).into_iter().map(|(name, text)| (name, text.into_bytes())).collect();
+    match told.zip(level) {
+        Some((told, level)) => {
+            let (name, text) = product::features_file(job, &told.remarks);
+            written.push((name, text.into_bytes()));
+            written.push((files::FEATURES_GPKG, product::features_package(job, &level, &told.remarks)?));
+        }
         // Those of an earlier job.
-        database.remove(files::FEATURES)?;
+        None => [files::FEATURES, files::FEATURES_GPKG].iter().try_for_each(|name| database.remove(name))?,
     }
-    for (name, text) in product::breaches(job, &report).into_iter().chain(of_features) {
-        let stamp = database.write_bytes(name, text.as_bytes())?;
+    for (name, bytes) in written {
+        let stamp = database.write_bytes(name, &bytes)?;
         report.files.insert(name.to_owned(), stamp);
     }
     database.write_json(files::REPORT, &report)?;

@@ -1,7 +1,7 @@
 //! The features of a job on the lattice, and which tile asks the DEM at which of their stations.
 
 use features::{AreaFeatures, Place};
-use ground::{GamingArea, Vectors, area_features};
+use ground::{FeatureTable, GamingArea, Vectors, site};
 use job::Job;
 use terrain::{ModuleId, TileId};
 
@@ -10,6 +10,8 @@ use crate::CompileError;
 /// The features of a job as they were read, and which tile each of their stations lies in.
 pub(crate) struct ReadFeatures {
     pub vectors: Vectors,
+    /// What they are, and what a person should know of the files and the rules.
+    pub table: FeatureTable,
     pub features: AreaFeatures,
     /// Stations of each tile, by their place among those of the area. What lies beyond the area is in none.
     pub by_tile: Vec<Vec<u32>>,
@@ -21,19 +23,22 @@ impl ReadFeatures {
     /// # Errors
     /// When a file of them cannot be read at all.
     pub fn open(job: &Job, area: &GamingArea) -> Result<Option<Self>, CompileError> {
-        let Some((vectors, features)) = area_features(job, area)? else { return Ok(None) };
+        let Some(spec) = &job.features else { return Ok(None) };
+        let mut vectors = Vectors::read(job, area)?;
+        let table = FeatureTable::of(&vectors, &spec.rules);
+        let features = AreaFeatures::of(std::mem::take(&mut vectors.sources), &spec.rules, site(area));
         let mut by_tile = vec![Vec::new(); area.tiles.len()];
         for (number, &place) in features.stations().iter().enumerate() {
             if let Some(tile) = tile_of(area, &features, place) {
                 by_tile[area.tiling.index(tile)].push(number as u32);
             }
         }
-        Ok(Some(Self { vectors, features, by_tile }))
+        Ok(Some(Self { vectors, table, features, by_tile }))
     }
 
     /// What they are, and what a person should know of their files and rules.
     pub fn seen(&self) -> (&AreaFeatures, &[String]) {
-        (&self.features, &self.vectors.notes)
+        (&self.features, &self.table.notes)
     }
 
     /// The stations of a tile.

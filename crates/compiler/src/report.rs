@@ -89,6 +89,7 @@ impl Findings<'_> {
         })
     }
 
+    /// What was told of the sources while it ran.
     /// What is told of features, in jobs with some.
     pub fn told(&self) -> Option<Told> {
         let (settled, figures) = (self.run.level.as_ref()?, self.sums.features.as_ref()?);

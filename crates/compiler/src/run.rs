@@ -11,6 +11,7 @@ use schedule::{Event as Scheduled, RankedTasks, Workers, in_rank_order_observed}
 use source_files::FileState;
 use terrain::{TileFeatures, TileId, TileTin};
 
+use crate::left_out::LeftOut;
 use crate::read_features::ReadFeatures;
 use crate::tins::Tins;
 use crate::{Clock, CompileError, Event, Progress, Stage};
@@ -67,6 +68,8 @@ pub(crate) struct Run<'a> {
 pub(crate) struct Settled {
     pub file: FileStamp,
     pub level: AreaLevel,
+    /// What coarser levels leave out of them.
+    pub left_out: Option<LeftOut>,
 }
 
 impl Run<'_> {
@@ -144,7 +147,13 @@ impl Run<'_> {
         self.area.budget.reserved = level.reserved_of(self.area.grid.count());
         self.ground.burn_in(self.database.folder(), &self.area);
         self.read = OnceLock::new();
-        self.level = Some(Settled { file, level });
+        let left_out = LeftOut::of(self.job, &self.area, &level);
+        self.level = Some(Settled { file, level, left_out });
+    }
+
+    /// What coarser levels leave out of features, in jobs where they do.
+    pub fn left_out(&self) -> Option<&LeftOut> {
+        self.level.as_ref()?.left_out.as_ref()
     }
 
     /// What a person should know of what the run was made from.

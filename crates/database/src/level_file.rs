@@ -119,6 +119,16 @@ impl LineRole {
     }
 }
 
+/// What is done where a road crosses a channel without a bridge.
+pub const CULVERT: &str = "a culvert was assumed";
+
+impl FeatureRemark {
+    /// Whether a channel passes below a road there.
+    pub fn is_culvert(&self) -> bool {
+        self.done == CULVERT
+    }
+}
+
 /// Something that was wrong with a feature, and what was done about it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FeatureRemark {

@@ -34,7 +34,7 @@ mod lines_file;
 pub use lines_file::{decode_lines, encode_lines};
 mod level_file;
 pub use level_file::{
-    AreaLevel, FeatureFace, FeatureLine, FeatureRemark, LineRole, StripFigures, decode_level, encode_level,
+    AreaLevel, CULVERT, FeatureFace, FeatureLine, FeatureRemark, LineRole, StripFigures, decode_level, encode_level,
 };
 mod removals_file;
 pub use removals_file::{Removals, decode_removals, encode_removals};

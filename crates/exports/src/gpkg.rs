@@ -8,26 +8,11 @@ use std::path::Path;
 
 use database::{Report, ReportPlace};
 use rusqlite::{Connection, ToSql, params};
+use source_files::geopackage_parts::{Extent, Layer, Package, add_index, polygon, polygon_z};
 use terrain::{Decks, HOLE_CLASS, ModuleId, ModuleRect, ModuleVertex, QUANTA_PER_METRE, metres_of_quanta};
 
 use crate::classes::HOLE_NAME;
-use crate::gpkg_geometry::{polygon, polygon_z};
-use crate::{ExportError, Product, Step, Work, gpkg_index, gpkg_styles};
-
-/// `GPKG`, and version 1.3 of it.
-const APPLICATION_ID: i32 = 0x4750_4b47;
-const VERSION: i32 = 10_300;
-/// When the layers are said to have changed: the same database gives the same file.
-const CHANGED: &str = "1970-01-01T00:00:00.000Z";
-
-/// A layer: its name, what it shows, its columns, the kind of its geometry, and whether that has heights.
-pub(crate) struct Layer {
-    pub name: &'static str,
-    pub description: &'static str,
-    pub columns: &'static [(&'static str, &'static str)],
-    pub geometry: &'static str,
-    pub has_z: bool,
-}
+use crate::{ExportError, Product, Step, Work, gpkg_styles};
 
 const MODULES: Layer = Layer {
     name: "load_modules",
@@ -91,9 +76,6 @@ const TRIANGLES: Layer = Layer {
 /// Listed only where there are decks.
 const DECKS: Layer = Layer { name: "decks", description: "triangles of the decks of bridges", ..TRIANGLES };
 
-/// West, south, east and north, in metres.
-type Extent = [f64; 4];
-
 /// Writes a GeoPackage at `path`, where no file may be. `window` is the rows and columns of load modules that a window
 /// of the report has.
 ///
@@ -113,6 +95,7 @@ pub fn write_gpkg(
     let transaction = connection.transaction().map_err(fault)?;
     let package = Package { connection: &transaction, srs: product.epsg().map_or(-1, |code| code as i32) };
     package.describe(product.crs()).map_err(fault)?;
+    let package = Layers(package);
     package.add_modules(product).map_err(fault)?;
     package.add_breaches(product, report, window).map_err(fault)?;
     package.add_tiles(product).map_err(fault)?;
@@ -127,7 +110,7 @@ pub fn write_gpkg(
     let with_classes: Vec<&str> = layers[3..].iter().map(|layer| layer.name).collect();
     gpkg_styles::add(&transaction, &with_classes, &class_values(product, &names)).map_err(fault)?;
     for layer in layers {
-        gpkg_index::add(&transaction, layer.name).map_err(fault)?;
+        add_index(&transaction, layer.name).map_err(fault)?;
     }
     transaction.commit().map_err(fault)
 }
@@ -151,55 +134,12 @@ struct Triangles<'a> {
     classes: &'a [u8],
 }
 
-pub(crate) struct Package<'a> {
-    pub connection: &'a Connection,
-    /// The coordinate system as the package numbers it.
-    pub srs: i32,
-}
+/// The package, as the layers of a product are added to it.
+struct Layers<'a>(Package<'a>);
 
-impl Package<'_> {
-    /// The tables that every package has, and the coordinate system.
-    pub fn describe(&self, crs: &str) -> rusqlite::Result<()> {
-        self.connection
-            .execute_batch(&format!("PRAGMA application_id = {APPLICATION_ID}; PRAGMA user_version = {VERSION};"))?;
-        self.connection.execute_batch(include_str!("gpkg.sql"))?;
-        let add = "INSERT INTO gpkg_spatial_ref_sys VALUES (?1, ?2, ?3, ?4, ?5, NULL)";
-        let mut add = self.connection.prepare(add)?;
-        add.execute(params!["undefined, projected", -1, "NONE", -1, "undefined"])?;
-        add.execute(params!["undefined, geographic", 0, "NONE", 0, "undefined"])?;
-        let wgs84 = crs_definitions::from_code(4326).map_or("undefined", |known| known.wkt);
-        add.execute(params!["WGS 84", 4326, "EPSG", 4326, wgs84])?;
-        if ![-1, 0, 4326].contains(&self.srs) {
-            let known = u16::try_from(self.srs).ok().and_then(crs_definitions::from_code);
-            let definition = known.map_or("undefined", |known| known.wkt);
-            add.execute(params![crs, self.srs, "EPSG", self.srs, definition])?;
-        }
-        Ok(())
-    }
-
-    /// Makes the table of a layer and lists it; the statement that adds a feature: geometry first, then its columns.
-    pub fn begin(&self, layer: &Layer, extent: Extent) -> rusqlite::Result<rusqlite::Statement<'_>> {
-        let Layer { name, description, columns, geometry, has_z } = layer;
-        let declared: String = columns.iter().map(|(name, kind)| format!(", {name} {kind}")).collect();
-        self.connection.execute_batch(&format!(
-            "CREATE TABLE {name} (fid INTEGER PRIMARY KEY AUTOINCREMENT NOT NULL, geom {geometry}{declared});"
-        ))?;
-        let [west, south, east, north] = extent;
-        self.connection.execute(
-            "INSERT INTO gpkg_contents VALUES (?1, 'features', ?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)",
-            params![name, description, CHANGED, west, south, east, north, self.srs],
-        )?;
-        self.connection.execute(
-            "INSERT INTO gpkg_geometry_columns VALUES (?1, 'geom', ?2, ?3, ?4, 0)",
-            params![name, geometry, self.srs, i32::from(*has_z)],
-        )?;
-        let names: String = columns.iter().map(|(name, _)| format!(", {name}")).collect();
-        let places: String = (2..2 + columns.len()).map(|place| format!(", ?{place}")).collect();
-        self.connection.prepare(&format!("INSERT INTO {name} (geom{names}) VALUES (?1{places})"))
-    }
-
+impl Layers<'_> {
     fn add_modules(&self, product: &Product) -> rusqlite::Result<()> {
-        let mut add = self.begin(&MODULES, extent(product, product.rect))?;
+        let mut add = self.0.begin(&MODULES, extent(product, product.rect))?;
         for module in &product.modules {
             let (row, col) = (module.id.row, module.id.col);
             let geometry =
@@ -226,7 +166,7 @@ impl Package<'_> {
     }
 
     fn add_breaches(&self, product: &Product, report: &Report, window: [u32; 2]) -> rusqlite::Result<()> {
-        let mut add = self.begin(&BREACHES, extent(product, product.grid.all()))?;
+        let mut add = self.0.begin(&BREACHES, extent(product, product.grid.all()))?;
         for breach in &report.breaches {
             let (place, at, [rows, cols]) = match breach.place {
                 ReportPlace::Module(at) => ("module", Some(at), [1, 1]),
@@ -253,7 +193,7 @@ impl Package<'_> {
     }
 
     fn add_tiles(&self, product: &Product) -> rusqlite::Result<()> {
-        let mut add = self.begin(&TILES, extent(product, product.grid.all()))?;
+        let mut add = self.0.begin(&TILES, extent(product, product.grid.all()))?;
         for tile in &product.tiles {
             let state = product.manifest.tile(tile.tile).map(|record| serde_json::json!(record.state));
             let state = state.and_then(|state| state.as_str().map(str::to_owned));
@@ -270,7 +210,7 @@ impl Package<'_> {
         work: &Work,
         fault: impl Fn(rusqlite::Error) -> ExportError,
     ) -> Result<(), ExportError> {
-        let mut add = self.begin(&TRIANGLES, extent(product, product.rect)).map_err(&fault)?;
+        let mut add = self.0.begin(&TRIANGLES, extent(product, product.rect)).map_err(&fault)?;
         let total = product.modules.len();
         for (done, module) in product.modules.iter().enumerate() {
             if work.stop.load(std::sync::atomic::Ordering::Relaxed) {
@@ -284,7 +224,7 @@ impl Package<'_> {
     }
 
     fn add_decks(&self, product: &Product, names: &[&str]) -> rusqlite::Result<()> {
-        let mut add = self.begin(&DECKS, extent(product, product.rect))?;
+        let mut add = self.0.begin(&DECKS, extent(product, product.rect))?;
         for module in &product.modules {
             let Decks { vertices, triangles, classes } = &module.decks;
             let decks = Triangles { vertices, corners: triangles, classes };
@@ -310,7 +250,7 @@ impl Package<'_> {
             let [a, b, c] = corners;
             let normal = crate::mesh::cross(crate::mesh::minus(b, a), crate::mesh::minus(c, a));
             let slope = normal[0].hypot(normal[1]).atan2(normal[2]).to_degrees();
-            let (geometry, name) = (polygon_z(self.srs, &corners), class_name(names, *class));
+            let (geometry, name) = (polygon_z(self.0.srs, &corners), class_name(names, *class));
             let values: [&dyn ToSql; 7] = [&geometry, &id.row, &id.col, class, &name, &slope, &(normal[2] / 2.0)];
             add.execute(values)?;
         }
@@ -318,7 +258,7 @@ impl Package<'_> {
     }
 
     fn rectangle(&self, [west, south, east, north]: Extent) -> Vec<u8> {
-        polygon(self.srs, &[[west, south], [east, south], [east, north], [west, north]])
+        polygon(self.0.srs, &[[west, south], [east, south], [east, north], [west, north]])
     }
 }
 

@@ -38,8 +38,9 @@ pub fn write_3dtiles(product: &Product, assumed: Option<Datum>, put: &Put, work:
         work.each("squares", &squares, |&rect| scene.square(rect, put))?.into_iter().flatten().collect();
     let heights = || scene.layers.iter().flat_map(|layer| layer.globe.height_m.iter().copied());
     let (low, high) = (heights().fold(f64::INFINITY, f64::min), heights().fold(f64::NEG_INFINITY, f64::max));
-    // Without any tile the ground is as good as flat.
-    let flat_m = high - low;
+    // Neither the tileset nor its root has anything to draw, so without their tiles all of the area is missing, however
+    // flat it is: viewers draw nothing at all where this error is too small to be seen.
+    let missing_m = size_m(product);
     let mut tileset = json!({
         "asset": {
             "version": "1.1",
@@ -50,16 +51,23 @@ pub fn write_3dtiles(product: &Product, assumed: Option<Datum>, put: &Put, work:
                 "attribution": product.attributions(),
             },
         },
-        "geometricError": flat_m,
+        "geometricError": missing_m,
         "root": {
             "boundingVolume": { "region": region(&scene.layers[0].globe.lon_lat, low, high) },
-            "geometricError": flat_m,
+            "geometricError": missing_m,
             "refine": "REPLACE",
         },
     });
     put_children(&mut tileset["root"], children);
     put("tileset.json", tileset.to_string().as_bytes()).map_err(ExportError::write("tileset.json"))?;
     Ok(earth.datum())
+}
+
+/// The longer side of a product, in metres.
+fn size_m(product: &Product) -> f64 {
+    let ModuleRect { south, west, north, east } = product.rect;
+    let [low, high] = [product.corner_m(south, west), product.corner_m(north, east)];
+    (high[0] - low[0]).max(high[1] - low[1])
 }
 
 /// Gives a tile its children: the list, where there is one, is not empty.
@@ -286,6 +294,8 @@ mod tests {
         }
         assert_eq!(files.len(), 1 + 1 + 1);
         assert!(modules.iter().all(|module| error(module) < error(square)));
+        // Where nothing is drawn, two load modules of 500 m are missing.
+        assert_eq!((error(&tileset), error(&tileset["root"])), (1000.0, 1000.0));
         let region = tileset["root"]["boundingVolume"]["region"].as_array().unwrap();
         // Heights above EGM96, whose surface lies some 30 m below the ellipsoid here.
         assert!((960.0..965.0).contains(&region[4].as_f64().unwrap()), "{region:?}");

@@ -17,8 +17,6 @@ use crate::{
 pub struct AreaFeatures {
     /// Where they lie.
     pub site: Site,
-    /// How many features each of the job's rules matched.
-    pub matched: Vec<usize>,
     /// What was mended or left out so far.
     pub remarks: Vec<Remark>,
     ways: Vec<Way>,
@@ -82,7 +80,7 @@ impl AreaFeatures {
 
     /// Sorts out, mends and rounds features, and finds where the DEM has to be asked.
     pub fn of(sources: Vec<Source>, rules: &[Rule], site: Site) -> Self {
-        let Sorted { features, matched, by_kind: _, mut remarks } = sort_out(sources, rules);
+        let Sorted { features, mut remarks } = sort_out(sources, rules);
         let mut rounded = round(mend(features, &site), &site);
         remarks.append(&mut rounded.remarks);
         let roads = Network::of(&travelled(&rounded), site.lattice, &mut remarks);
@@ -93,7 +91,6 @@ impl AreaFeatures {
         let ways = rounded.ways;
         let mut all = Self {
             site,
-            matched,
             remarks,
             ways,
             lines,
@@ -107,11 +104,6 @@ impl AreaFeatures {
         };
         all.stations = all.asked();
         all
-    }
-
-    /// Whether there is nothing to put into the ground.
-    pub fn is_empty(&self) -> bool {
-        self.ways.is_empty() && self.outlines.is_empty()
     }
 
     /// Where the DEM is asked for a height: every station of ways and shores, the edges of wide ways, the banks of

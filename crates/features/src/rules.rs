@@ -1,6 +1,6 @@
 //! From tags to what a feature is: the job's rules in order, then the built-in table.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 use crate::lengths::{self, height_of};
 use crate::{FeatureId, Flaw, Form, Kind, Remark, Remedy, Shape, Source, table};
@@ -134,10 +134,6 @@ pub struct Feature {
 pub struct Sorted {
     /// Features with a kind, in no order that matters.
     pub features: Vec<Feature>,
-    /// How many features each of the job's rules matched.
-    pub matched: Vec<usize>,
-    /// How many features each kind has, by the table.
-    pub by_kind: BTreeMap<Kind, usize>,
     /// Values that were refused.
     pub remarks: Vec<Remark>,
 }
@@ -156,13 +152,10 @@ pub fn sort_out(sources: Vec<Source>, rules: &[Rule]) -> Sorted {
         (rule, kind)
     };
     let kinds: Vec<_> = sources.iter().map(kind_of).collect();
-    let mut matched = vec![0; rules.len()];
-    kinds.iter().filter_map(|(rule, _)| *rule).for_each(|rule| matched[rule] += 1);
     let classes = class_names(rules);
-    let (mut features, mut remarks, mut by_kind) = (Vec::new(), Vec::new(), BTreeMap::new());
+    let (mut features, mut remarks) = (Vec::new(), Vec::new());
     for (source, (rule, kind)) in sources.into_iter().zip(kinds) {
         let Some(kind) = kind else { continue };
-        *by_kind.entry(kind).or_insert(0) += 1;
         let rule = rule.map(|rule| &rules[rule]);
         let class = class_name(rule, kind);
         let class = classes.iter().position(|name| name == class).unwrap_or_default() as u16;
@@ -170,7 +163,7 @@ pub fn sort_out(sources: Vec<Source>, rules: &[Rule]) -> Sorted {
         features.push(Feature { id: source.id, traits, shape: source.shape });
     }
     Remark::sort(&mut remarks);
-    Sorted { features, matched, by_kind, remarks }
+    Sorted { features, remarks }
 }
 
 /// Names of the classes that features may have, whatever there is of them: those of all kinds in the table's order, a
@@ -389,7 +382,6 @@ mod tests {
         let classes = class_names(&rules);
         assert_eq!(classes[..5], ["motorway", "primary", "minor", "desert track", "track"]);
         let sorted = sort_out(sources, &rules);
-        assert_eq!(sorted.matched, [1, 1, 1]);
         let traits = sorted.features[0].traits;
         assert_eq!((traits.width, traits.grade_ppm, traits.form, traits.class), (512, 125_000, Form::Bench, 3));
         assert_eq!(sorted.features.len(), 3);

@@ -4,11 +4,12 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-use features::{FeatureId, Form, Kind, Numbering, Overview, OverviewRow, RowOrigin, Rule, Shape, Source, overview};
-use job::{Choice, FeatureSource, FeaturesSpec, Job};
-use source_files::{BUILT_IN_KEYS, Extent, FeatureFile, VectorFeature, VectorShape, Wanted, read_features};
+use features::{FeatureId, Form, IdleRule, Kind, Numbering, OverviewRow, RowOrigin, Rule, Shape, Source, overview};
+use job::Choice;
+use source_files::{BUILT_IN_KEYS, Extent, VectorFeature, VectorShape, Wanted, read_features};
 
 use crate::GroundError;
+use crate::vectors::{FeaturesRead, Vectors};
 
 /// The features of a job.
 #[derive(Clone, Debug, PartialEq)]
@@ -43,16 +44,10 @@ pub struct FeatureRow {
 /// What of a source lies in the area and one load module on each side.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SourceSeen {
-    /// As the job writes it.
-    pub name: String,
-    /// Its lines and polygons; of OpenStreetMap data those with a key that the table looks at.
-    pub found: u64,
-    /// Of these, those outside.
-    pub outside: u64,
-    /// Of these, those inside that no row of the table takes, and that are left out.
+    /// What was read of it.
+    pub read: FeaturesRead,
+    /// Of its features inside, those that no row of the table takes, and that are left out.
     pub without_kind: u64,
-    /// How many single features had something wrong.
-    pub remarks: usize,
 }
 
 /// The features of a file, by the built-in table alone.
@@ -72,74 +67,34 @@ pub struct FeaturesSeen {
     pub notes: Vec<String>,
 }
 
-/// The table that results from a job's rules, and what its rows hold; `None` where the job names no features.
-///
-/// # Errors
-/// When a file cannot be read.
-pub fn feature_table(job: &Job) -> Result<Option<FeatureTable>, GroundError> {
-    let Some(spec) = &job.features else { return Ok(None) };
-    let (mut seen, mut notes, mut all) = (Vec::new(), Vec::new(), Vec::new());
-    for (number, read) in read_sources(job, spec)? {
-        notes.extend(read.notes);
-        seen.push((number, read.seen));
-        all.extend(read.sources);
-    }
-    let overview = overview(&all, &spec.rules);
-    for (number, seen) in &mut seen {
-        seen.without_kind = overview.unmatched.get(number).map_or(0, |&count| count as u64);
-    }
-    let names: Vec<(u32, &str)> = seen.iter().map(|(number, seen)| (*number, seen.name.as_str())).collect();
-    notes.extend(notes_on(&overview, &all, &names, spec));
-    let rows = overview.rows.iter().map(|row| row_text(row, &spec.rules)).collect();
-    Ok(Some(FeatureTable { rows, sources: seen.into_iter().map(|(_, seen)| seen).collect(), notes }))
-}
-
-/// What a person should know of what becomes of features: files of which no feature has a kind, rules that decide nothing.
-/// `names` has the number and the name of each file.
-pub(crate) fn notes_on(overview: &Overview, all: &[Source], names: &[(u32, &str)], spec: &FeaturesSpec) -> Vec<String> {
-    let mut notes = Vec::new();
-    for &(number, name) in names {
-        let without_kind = overview.unmatched.get(&number).copied().unwrap_or(0);
-        let own = all.iter().filter(|source| source.id.source == number);
-        if 0 < without_kind && own.clone().count() == without_kind {
-            notes.push(no_kind(name, without_kind, &columns(own)));
+impl FeatureTable {
+    /// What rules and the built-in table make of features that were read.
+    pub fn of(vectors: &Vectors, rules: &[Rule]) -> Self {
+        let overview = overview(&vectors.sources, rules);
+        let mut notes = vectors.notes.clone();
+        let mut sources: Vec<SourceSeen> =
+            vectors.files.iter().map(|read| SourceSeen { read: read.clone(), without_kind: 0 }).collect();
+        for own in vectors.sources.chunk_by(|a, b| a.id.source == b.id.source) {
+            let number = own[0].id.source;
+            let seen = &mut sources[number as usize];
+            seen.without_kind = overview.unmatched.get(&number).map_or(0, |&count| count as u64);
+            if own.len() as u64 == seen.without_kind {
+                notes.push(no_kind(seen, &columns(own)));
+            }
         }
+        notes.extend(overview.idle.iter().map(|idle| idle_text(idle, &rules[idle.rule])));
+        let rows = overview.rows.iter().map(|row| row_text(row, rules)).collect();
+        Self { rows, sources, notes }
     }
-    notes.extend(overview.idle.iter().map(|idle| {
-        let rule = format!("features.rules[{}] ({})", idle.rule, tags_text(&spec.rules[idle.rule].tags));
-        match (idle.taken, idle.nearest.as_slice()) {
-            (0, []) => format!("{rule} matches nothing: no feature in the area has a tag"),
-            (0, nearest) => format!("{rule} matches nothing; the nearest there is: {}", nearest.join(", ")),
-            (taken, _) => format!("{rule} decides nothing: rules before it take all {taken} features that match it"),
-        }
-    }));
-    notes
 }
 
-/// A source of a job, read.
-struct ReadSource {
-    seen: SourceSeen,
-    notes: Vec<String>,
-    sources: Vec<Source>,
-}
-
-/// Reads the files of a job's features, each with the number of its source.
-fn read_sources(job: &Job, spec: &FeaturesSpec) -> Result<Vec<(u32, ReadSource)>, GroundError> {
-    let mut all = Vec::new();
-    for (number, source) in (0..).zip(&spec.sources) {
-        let FeatureSource::File { file, layer, kind } = source else { continue };
-        let name = match layer {
-            Some(layer) => format!("{}, layer {layer}", file.written),
-            None => file.written.clone(),
-        };
-        let read = read_features(&file.path, &wanted(job, layer.as_deref(), &keys(spec)))?;
-        let FeatureFile { found, outside, remarks, features, notes, .. } = read;
-        let notes = notes.iter().map(|note| format!("{name}: {note}")).collect();
-        let seen = SourceSeen { name, found, outside, without_kind: 0, remarks: remarks.len() };
-        let sources = features.into_iter().map(|feature| source_of(feature, number, *kind)).collect();
-        all.push((number, ReadSource { seen, notes, sources }));
+fn idle_text(idle: &IdleRule, rule: &Rule) -> String {
+    let rule = format!("features.rules[{}] ({})", idle.rule, tags_text(&rule.tags));
+    match (idle.taken, idle.nearest.as_slice()) {
+        (0, []) => format!("{rule} matches nothing: no feature in the area has a tag"),
+        (0, nearest) => format!("{rule} matches nothing; the nearest there is: {}", nearest.join(", ")),
+        (taken, _) => format!("{rule} decides nothing: rules before it take all {taken} features that match it"),
     }
-    Ok(all)
 }
 
 /// What of the file at `path` lies in an area from `origin_m`, `size_m` large, by the built-in table alone.
@@ -154,11 +109,11 @@ pub fn features_in(
 ) -> Result<FeaturesSeen, GroundError> {
     let side = |axis: usize| [origin_m[axis], origin_m[axis] + size_m[axis]];
     let bounds = Extent { east: side(0), north: side(1) };
-    let read = read_features(path, &Wanted { epsg, bounds, layer, keys: &BUILT_IN_KEYS })?;
+    let read = read_features(path, &Wanted { epsg, bounds, layer, crs: None, keys: &BUILT_IN_KEYS })?;
     let is_polygon = |feature: &VectorFeature| matches!(feature.shape, VectorShape::Polygon(_));
     let first = read.features.first().map(is_polygon);
     let are_polygons = first.filter(|first| read.features.iter().all(|feature| is_polygon(feature) == *first));
-    let sources: Vec<Source> = read.features.into_iter().map(|feature| source_of(feature, 0, None)).collect();
+    let sources: Vec<Source> = read.features.into_iter().map(source_of).collect();
     let overview = overview(&sources, &[]);
     let mut kinds: BTreeMap<Kind, usize> = BTreeMap::new();
     for row in overview.rows.iter().filter(|row| 0 < row.count) {
@@ -174,29 +129,18 @@ pub fn features_in(
     })
 }
 
-/// Keys that make a way of OpenStreetMap wanted.
-fn keys(spec: &FeaturesSpec) -> Vec<&str> {
-    BUILT_IN_KEYS.into_iter().chain(spec.keys()).collect()
-}
-
-fn wanted<'a>(job: &Job, layer: Option<&'a str>, keys: &'a [&'a str]) -> Wanted<'a> {
-    let (origin_m, size_m) = (job.area.origin_m, job.area.size_m());
-    let side = |axis: usize| [origin_m[axis], origin_m[axis] + size_m[axis]];
-    let bounds = Extent { east: side(0), north: side(1) }.grown(job.modules.side_m);
-    Wanted { epsg: job.area.epsg, bounds, layer, keys }
-}
-
 /// A feature as the table looks at it: its tags, without its shape.
-fn source_of(feature: VectorFeature, source: u32, kind: Option<Kind>) -> Source {
+fn source_of(feature: VectorFeature) -> Source {
     let tags = feature.tags.iter().map(|(key, value)| (key.to_string(), value.to_string())).collect();
-    let id = FeatureId { source, numbering: Numbering::Row, number: 0 };
-    Source { id, tags, kind, shape: Shape::Line(Vec::new()) }
+    let id = FeatureId { source: 0, numbering: Numbering::Row, number: 0 };
+    Source { id, tags, kind: None, shape: Shape::Line(Vec::new()) }
 }
 
 /// Keys of the tags of some features, sorted, and no more than a line of them.
-fn columns<'a>(features: impl Iterator<Item = &'a Source>) -> String {
+fn columns(features: &[Source]) -> String {
     const SHOWN: usize = 8;
-    let keys: BTreeSet<&str> = features.flat_map(|feature| feature.tags.iter().map(|(key, _)| key.as_str())).collect();
+    let keys: BTreeSet<&str> =
+        features.iter().flat_map(|feature| feature.tags.iter().map(|(key, _)| key.as_str())).collect();
     let shown: Vec<&str> = keys.iter().copied().take(SHOWN).collect();
     match keys.len() {
         0 => "they have none".to_owned(),
@@ -205,10 +149,11 @@ fn columns<'a>(features: impl Iterator<Item = &'a Source>) -> String {
     }
 }
 
-fn no_kind(name: &str, without_kind: usize, columns: &str) -> String {
+fn no_kind(seen: &SourceSeen, columns: &str) -> String {
     format!(
-        "{name}: its features in the area have no kind by their tags ({columns}) and are left out, {without_kind} in all; \
-         name one, as {{ file = \"…\", kind = \"track\" }}, or write a rule"
+        "{}: its features in the area have no kind by their tags ({columns}) and are left out, {} in all; name one, as \
+         {{ file = \"…\", kind = \"track\" }}, or write a rule",
+        seen.read.name, seen.without_kind
     )
 }
 
@@ -266,7 +211,10 @@ fn width_text(kind: Kind, of_rule: Option<f64>) -> String {
 
 #[cfg(test)]
 mod tests {
+    use job::Job;
+
     use super::*;
+    use crate::area::GamingArea;
 
     const JOB: &str = "[area]\nname = \"a\"\ncrs = \"EPSG:32611\"\norigin_m = [500000, 3875000]\n\
         size_m = [2000, 2000]\nspacing_m = 25\n[dem]\nsource = \"sample\"\n[features]\n";
@@ -293,8 +241,9 @@ mod tests {
         }
         std::fs::write(folder.path().join("a.toml"), format!("{JOB}{keys}\n")).unwrap();
         let job = Job::load(&folder.path().join("a.toml")).map_err(|error| error.to_string())?;
-        let table = feature_table(&job).map_err(|error| error.to_string().replace(folder.path().to_str().unwrap(), ""));
-        table.map(|table| table.expect("the job names features"))
+        let vectors = Vectors::read(&job, &GamingArea::new(&job).unwrap());
+        let vectors = vectors.map_err(|error| error.to_string().replace(folder.path().to_str().unwrap(), ""))?;
+        Ok(FeatureTable::of(&vectors, &job.features.unwrap().rules))
     }
 
     fn rows(table: &FeatureTable) -> Vec<String> {
@@ -313,8 +262,48 @@ mod tests {
             ["track|sandy|1|3.5 m|20 %|line|rule 0: surface = sand", "track|track|1|3 m|25 %|line|highway = track"];
         assert_eq!(rows(&table), expected);
         let seen = &table.sources[0];
-        assert_eq!((seen.name.as_str(), seen.found, seen.outside, seen.without_kind), ("r.geojson", 4, 1, 1));
+        let read = &seen.read;
+        assert_eq!((read.name.as_str(), read.found, read.outside, seen.without_kind), ("r.geojson", 4, 1, 1));
         assert_eq!(table.notes, [""; 0]);
+    }
+
+    #[test]
+    fn the_built_in_terrain_s_own_features_are_counted_as_those_of_files_are() {
+        let table = table_of("sources = [\"sample\", \"r.geojson\"]", &[]).unwrap();
+        let [own, file] = table.sources.as_slice() else { panic!("there are two") };
+        assert_eq!((own.read.name.as_str(), file.read.found), ("sample", 4));
+        let counted: usize = table.rows.iter().map(|row| row.count).sum();
+        assert!(0 < own.read.found);
+        assert_eq!(counted as u64, own.read.found + file.read.found - file.read.outside - file.without_kind);
+    }
+
+    #[test]
+    fn a_job_says_the_system_of_a_file_that_names_none_or_a_wrong_one() {
+        let line = |crs: &str, coordinates: &str| {
+            format!(
+                "{{\"type\":\"FeatureCollection\",{crs}\"features\":[{{\"type\":\"Feature\",\"properties\":\
+                {{\"highway\":\"track\"}},\"geometry\":{{\"type\":\"LineString\",\"coordinates\":{coordinates}}}}}]}}"
+            )
+        };
+        // Zone 12, from which the area's middle is far in the west.
+        let west = "[[-47263, 3891727], [-46806, 3891700]]";
+        let wrong = "\"crs\":{\"type\":\"name\",\"properties\":{\"name\":\"EPSG:32610\"}},";
+        let none = "\"crs\":{\"type\":\"name\",\"properties\":{\"name\":\"the usual\"}},";
+        for crs in ["", wrong, none] {
+            let files = [("z.geojson", line(crs, west))];
+            let files: Vec<(&str, &str)> = files.iter().map(|(name, text)| (*name, text.as_str())).collect();
+            let said = table_of("sources = [{ file = \"z.geojson\", crs = \"EPSG:32612\" }]", &files).unwrap();
+            assert_eq!((said.sources[0].read.found, said.sources[0].read.outside), (1, 0), "{crs} {:?}", said.notes);
+            match table_of("sources = [\"z.geojson\"]", &files) {
+                Ok(table) => {
+                    assert_eq!(table.sources[0].read.outside, 1, "{crs}");
+                    assert!(table.notes[0].contains("name it with crs"), "{:?}", table.notes);
+                }
+                Err(error) => assert!(crs == none && error.contains("the usual"), "{error}"),
+            }
+        }
+        let error = table_of("sources = [{ file = \"r.geojson\", crs = \"EPSG:x\" }]", &[]).unwrap_err();
+        assert!(error.starts_with("features.sources: crs of r.geojson: EPSG: without a number"), "{error}");
     }
 
     #[test]
@@ -355,7 +344,7 @@ mod tests {
             note.starts_with("f.geojson: none of its 1 lines and polygons lies inside the area: they lie"),
             "{note}"
         );
-        assert_eq!((table.sources[0].found, table.sources[0].outside), (1, 1));
+        assert_eq!((table.sources[0].read.found, table.sources[0].read.outside), (1, 1));
         for (text, told) in [("{\"type\":", "nor GeoJSON"), ("", "an empty file"), ("PK\x03\x04", "a zip archive")] {
             let error = table_of("sources = [\"b.geojson\"]", &[("b.geojson", text)]).unwrap_err();
             assert!(error.contains("b.geojson") && error.contains(told), "{error}");

@@ -14,7 +14,7 @@ mod burn;
 pub use burn::{burn, slope_reach};
 mod lines;
 mod vectors;
-pub use vectors::{FeaturesRead, Vectors, area_features, site};
+pub use vectors::{FeaturesRead, Vectors, site};
 mod given;
 pub use given::{Given, GivenPost, border_posts, chosen, posts_of_file, refused, start_posts};
 mod ground;
@@ -34,7 +34,7 @@ pub use records::{records, states};
 mod locate;
 pub use locate::{Corner, corners, covered, find_area, utm_of};
 mod features_seen;
-pub use features_seen::{FeatureRow, FeatureTable, FeaturesSeen, SourceSeen, feature_table, features_in};
+pub use features_seen::{FeatureRow, FeatureTable, FeaturesSeen, SourceSeen, features_in};
 mod foresee;
 pub use foresee::foresee;
 

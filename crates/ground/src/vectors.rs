@@ -3,25 +3,26 @@
 use std::sync::Arc;
 
 use database::FeatureRemark;
-use features::{AreaFeatures, FeatureId, Numbering, Position, Shape, Site, Source, overview};
+use features::{FeatureId, Numbering, Position, Shape, Site, Source};
 use job::{DemSource, FeatureSource, FeaturesSpec, Job};
 use sample_terrain::SampleShape;
-use source_files::{BUILT_IN_KEYS, Extent, FeatureFile, VectorFeature, VectorShape, Vertices, Wanted};
+use source_files::{
+    BUILT_IN_KEYS, Crs, Done, Extent, FeatureFile, Remark, VectorFeature, VectorShape, Vertices, Wanted,
+};
 use terrain::GridFrame;
 
 use crate::GroundError;
 use crate::area::GamingArea;
-use crate::features_seen::notes_on;
 
 /// What the sources of features hold that lies in the area or near it.
 pub struct Vectors {
-    /// The features, none of them looked at yet.
+    /// The features, none of them looked at yet, source by source.
     pub sources: Vec<Source>,
     /// What each source holds, in the order of the job.
     pub files: Vec<FeaturesRead>,
     /// What could not be read of single features.
     pub remarks: Vec<FeatureRemark>,
-    /// What a person should know about the files.
+    /// What a person should know about the files, each behind the name of its file.
     pub notes: Vec<String>,
     names: Vec<Vec<String>>,
 }
@@ -29,14 +30,14 @@ pub struct Vectors {
 /// What one source of features holds.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FeaturesRead {
-    /// The source, as the job writes it.
+    /// The source, as the job writes it, with its layer.
     pub name: String,
-    /// Lines and polygons in it.
+    /// Its lines and polygons; of OpenStreetMap data those with a key that the table of kinds looks at.
     pub found: u64,
     /// Of these, those that lie outside the area and one load module around it.
     pub outside: u64,
-    /// Whom to name beside anything drawn from it.
-    pub attribution: Option<&'static str>,
+    /// Remarks on single features.
+    pub remarks: usize,
 }
 
 impl Vectors {
@@ -68,12 +69,7 @@ impl Vectors {
         let reach = bounds(area, [0.0; 2]);
         let found = sample_terrain::features(seed, reach.east[0], reach.north[0], reach.east[1], reach.north[1]);
         let at_post = GridFrame { origin_east_m: 0.0, origin_north_m: 0.0, spacing: area.frame.spacing };
-        self.files.push(FeaturesRead {
-            name: "sample".into(),
-            found: found.len() as u64,
-            outside: 0,
-            attribution: None,
-        });
+        self.files.push(FeaturesRead { name: "sample".into(), found: found.len() as u64, outside: 0, remarks: 0 });
         let (source, mut names) = (self.names.len() as u32, Vec::new());
         for feature in found {
             let line = |places: &[[f64; 2]]| places.iter().map(|place| position(*place, None, &at_post)).collect();
@@ -96,28 +92,23 @@ impl Vectors {
         spec: &FeaturesSpec,
         of: &FeatureSource,
     ) -> Result<(), GroundError> {
-        let FeatureSource::File { file, layer, kind } = of else { return Ok(()) };
+        let FeatureSource::File { file, layer, kind, crs } = of else { return Ok(()) };
+        let crs = crs.as_deref().map(|text| Crs::named(text).map_err(|found| bad_crs(&file.written, &found)));
+        let crs = crs.transpose()?;
         let mut keys: Vec<&str> = BUILT_IN_KEYS.into_iter().chain(spec.keys()).collect();
         keys.sort_unstable();
         keys.dedup();
         let bounds = bounds(area, [area.frame.origin_east_m, area.frame.origin_north_m]);
-        let wanted = Wanted { epsg: job.area.epsg, bounds, layer: layer.as_deref(), keys: &keys };
-        let FeatureFile { features, remarks, notes, found, outside, attribution } =
+        let wanted = Wanted { epsg: job.area.epsg, bounds, layer: layer.as_deref(), crs: crs.as_ref(), keys: &keys };
+        let FeatureFile { features, remarks, notes, found, outside, .. } =
             source_files::read_features(&file.path, &wanted)?;
         let name = match layer {
             Some(layer) => format!("{}, layer {layer}", file.written),
             None => file.written.clone(),
         };
-        self.files.push(FeaturesRead { name: name.clone(), found, outside, attribution });
         self.notes.extend(notes.iter().map(|note| format!("{name}: {note}")));
-        self.remarks.extend(remarks.into_iter().map(|remark| FeatureRemark {
-            feature: remark.id,
-            at_m: remark.at,
-            found: remark.found,
-            leaves_out: remark.done.contains("left out"),
-            done: remark.done.to_owned(),
-            degrades: false,
-        }));
+        self.files.push(FeaturesRead { name, found, outside, remarks: remarks.len() });
+        self.remarks.extend(remarks.into_iter().map(remark_of));
         let (source, mut names) = (self.names.len() as u32, Vec::with_capacity(features.len()));
         for VectorFeature { id, tags, shape } in features {
             let line = |vertices: &Vertices| -> Vec<Position> {
@@ -147,19 +138,24 @@ pub fn site(area: &GamingArea) -> Site {
     Site::new(area.frame.spacing, area.rect, side, side)
 }
 
-/// All that a job's features are before their heights are known, and what to call them.
-///
-/// # Errors
-/// As [`Vectors::read`].
-pub fn area_features(job: &Job, area: &GamingArea) -> Result<Option<(Vectors, AreaFeatures)>, GroundError> {
-    let Some(spec) = &job.features else { return Ok(None) };
-    let mut vectors = Vectors::read(job, area)?;
-    let sources = std::mem::take(&mut vectors.sources);
-    let names: Vec<(u32, &str)> = (0..).zip(vectors.files.iter().map(|file| file.name.as_str())).collect();
-    let notes = notes_on(&overview(&sources, &spec.rules), &sources, &names, spec);
-    vectors.notes.extend(notes);
-    let features = AreaFeatures::of(sources, &spec.rules, site(area));
-    Ok(Some((vectors, features)))
+fn remark_of(Remark { id, at, found, done }: Remark) -> FeatureRemark {
+    FeatureRemark {
+        feature: id,
+        at_m: at,
+        found,
+        leaves_out: matches!(done, Done::LeftOut(_)),
+        done: done.text().to_owned(),
+        degrades: false,
+    }
+}
+
+fn bad_crs(written: &str, found: &str) -> GroundError {
+    GroundError::Impossible {
+        key: "features.sources".into(),
+        found: format!("crs of {written}: {found}"),
+        expected: "a system that can be computed".into(),
+        hint: "give a code, as crs = \"EPSG:4326\"".into(),
+    }
 }
 
 /// The area and one load module around it, in metres; its south-west corner lies at `origin_m`.

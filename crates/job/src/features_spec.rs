@@ -7,13 +7,13 @@ use crate::{ImportanceSpec, NamedFile};
 /// Roads, rivers and lakes that become parts of the ground.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FeaturesSpec {
-    /// Where they come from; their order decides nothing.
+    /// Where they come from. The order decides nothing but how remarks number features.
     pub sources: Vec<FeatureSource>,
-    /// Tried in order, before the built-in ones.
+    /// What features are by their tags; tried in order, before the built-in table.
     pub rules: Vec<Rule>,
-    /// Of a load module's limit, what features may take.
+    /// The share of each limit that features may take, from 0 to 1.
     pub share_max: f64,
-    /// What decks keep clear of, and how far back their banks may sag, in quanta.
+    /// How high decks stand over what they cross, and how far from a deck its ends look for higher ground to rest on.
     pub options: GradeOptions,
 }
 
@@ -30,6 +30,8 @@ pub enum FeatureSource {
         layer: Option<String>,
         /// The kind of its features, whatever their tags say; rules come first.
         kind: Option<Kind>,
+        /// The system of its coordinates as the job names it, whatever the file says.
+        crs: Option<String>,
     },
 }
 

@@ -103,14 +103,14 @@ pub(crate) fn locate_sources(source: &mut DemSource, folder: &Path, mentions: &[
 fn locate_features(features: &mut FeaturesSpec, folder: &Path, mentions: &[Mention]) -> Result<(), JobError> {
     let mut found = Vec::new();
     for (index, source) in features.sources.iter().enumerate() {
-        let FeatureSource::File { file, layer, kind } = source else {
+        let FeatureSource::File { file, layer, kind, crs } = source else {
             found.push(source.clone());
             continue;
         };
         let mention = mentions.iter().find(|mention| matches!(mention.place, Place::Features(at) if at == index));
         let mention = mention.expect("every file is mentioned");
         for file in named_files(file, folder, mention)? {
-            let source = FeatureSource::File { file, layer: layer.clone(), kind: *kind };
+            let source = FeatureSource::File { file, layer: layer.clone(), kind: *kind, crs: crs.clone() };
             // What two entries find, with nothing else said of it, counts once.
             if !found.contains(&source) {
                 found.push(source);

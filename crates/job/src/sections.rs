@@ -303,6 +303,10 @@ const FEATURE_SOURCES: &[Key] = &[
         .words::<Kind>()
         .otherwise("as rules and tags say")
         .example("{ file = \"lakes.shp\", kind = \"lake\" }"),
+    Key::new("crs", "the system of its coordinates, where it names none or a wrong one; not of OpenStreetMap data")
+        .line("a coordinate system, as \"EPSG:4326\" or well-known text", WKT_CHARS_MAX)
+        .otherwise(FILE_SAYS)
+        .example("{ file = \"roads.shp\", crs = \"EPSG:32611\" }"),
 ];
 
 const RULES: &[Key] = &[
@@ -457,6 +461,12 @@ const LOD: &[Key] = &[
     Key::new("border", "what becomes of the vertices on the sides").words::<LodBorder>().usual("full"),
 ];
 
-const LEVELS: &[Key] = &[Key::new("inner_share", "how many of the finest level's inner vertices it keeps")
-    .form("the share of inner vertices that the level keeps, above 0 and below 1")
-    .example("{ inner_share = 0.5 }, half of the vertices inside a load module")];
+const LEVELS: &[Key] = &[
+    Key::new("inner_share", "how many of the finest level's inner vertices it keeps")
+        .form("the share of inner vertices that the level keeps, above 0 and below 1")
+        .example("{ inner_share = 0.5 }, half of the vertices inside a load module"),
+    Key::new("leave_out", "roads and water that the level does without, and coarser ones with it; decks stay")
+        .bounded(|| "a list of names of classes of features".to_owned())
+        .otherwise("none")
+        .example("{ inner_share = 0.2, leave_out = [\"track\", \"stream\"] }"),
+];

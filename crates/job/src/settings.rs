@@ -296,8 +296,13 @@ fn describe_lod(lod: &LodSpec, list: &mut List) {
     if lod.inner_shares.is_empty() {
         return;
     }
-    let levels: Vec<String> =
-        lod.inner_shares.iter().map(|&share| format!("{{ inner_share = {} }}", number(share))).collect();
+    let level = |(&share, classes): (&f64, &Vec<String>)| {
+        let classes: Vec<String> = classes.iter().map(|class| quoted(class)).collect();
+        let leave_out =
+            if classes.is_empty() { String::new() } else { format!(", leave_out = [{}]", classes.join(", ")) };
+        format!("{{ inner_share = {}{leave_out} }}", number(share))
+    };
+    let levels: Vec<String> = lod.inner_shares.iter().zip(&lod.leave_out).map(level).collect();
     let text = format!("[{}]", levels.join(", "));
     list.add_with(
         "lod.levels",

@@ -26,10 +26,11 @@ pub(crate) fn describe(features: &FeaturesSpec, list: &mut List) {
 }
 
 fn source_text(source: &FeatureSource) -> String {
-    let FeatureSource::File { file, layer, kind } = source else { return quoted("sample") };
+    let FeatureSource::File { file, layer, kind, crs } = source else { return quoted("sample") };
     let mut keys = vec![format!("file = {}", quoted(&file.written))];
     keys.extend(layer.as_ref().map(|layer| format!("layer = {}", quoted(layer))));
     keys.extend(kind.map(|kind| format!("kind = {}", quoted(Choice::name(&kind)))));
+    keys.extend(crs.as_ref().map(|crs| format!("crs = {}", quoted(crs))));
     // A file that is called as the built-in terrain's features are needs its table.
     match keys.len() == 1 && file.written != "sample" {
         true => quoted(&file.written),

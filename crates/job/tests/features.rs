@@ -17,7 +17,7 @@ fn job(rest: &str) -> Job {
 }
 
 const FULL: &str = "[features]\nsources = [\"roads.osm.pbf\", { file = \"hydro.gpkg\", layer = \"rivers\" }, \
-    { file = \"lakes.shp\", kind = \"lake\" }, \"sample\", { file = \"sample\" }]\n\
+    { file = \"lakes.shp\", kind = \"lake\", crs = \"EPSG:32611\" }, \"sample\", { file = \"sample\" }]\n\
     rules = [{ where = { highway = [\"track\"], surface = \"sand\" }, class = \"trail\", width_m = 3, \
     grade_max_percent = 25, form = \"strip\", z = \"feature\" }, { where = { bridge = [] }, kind = \"none\" }, \
     { where = {}, kind = \"breakline\", form = \"auto\" }]\n\
@@ -27,15 +27,16 @@ const FULL: &str = "[features]\nsources = [\"roads.osm.pbf\", { file = \"hydro.g
 fn every_key_of_features_is_read() {
     let features = job(FULL).features.unwrap();
     let [roads, rivers, lakes, own, named] = features.sources.as_slice() else { panic!("there are five") };
-    let is = |source: &FeatureSource, written: &str, layer: Option<&str>, kind| {
-        let FeatureSource::File { file, layer: found, kind: of } = source else { panic!("it is a file") };
+    let is = |source: &FeatureSource, written: &str, layer: Option<&str>, kind, crs: Option<&str>| {
+        let FeatureSource::File { file, layer: found, kind: of, crs: named } = source else { panic!("it is a file") };
         assert_eq!((file.written.as_str(), found.as_deref(), *of), (written, layer, kind));
+        assert_eq!(named.as_deref(), crs);
     };
-    is(roads, "roads.osm.pbf", None, None);
-    is(rivers, "hydro.gpkg", Some("rivers"), None);
-    is(lakes, "lakes.shp", None, Some(Kind::Lake));
+    is(roads, "roads.osm.pbf", None, None, None);
+    is(rivers, "hydro.gpkg", Some("rivers"), None, None);
+    is(lakes, "lakes.shp", None, Some(Kind::Lake), Some("EPSG:32611"));
     assert_eq!(own, &FeatureSource::Sample);
-    is(named, "sample", None, None);
+    is(named, "sample", None, None, None);
     let tags = |tags: &[(&str, &[&str])]| -> Vec<(String, Vec<String>)> {
         tags.iter().map(|(key, all)| (key.to_string(), all.iter().map(|value| value.to_string()).collect())).collect()
     };
@@ -144,4 +145,23 @@ fn files_of_features_are_found_by_name_and_pattern_and_what_is_missing_is_told()
     fs::create_dir(folder.path().join("roads")).unwrap();
     assert!(told("\"roads/\"").ends_with("hint: its files are roads/*.gpkg"));
     assert!(told("\"*.shp\"").contains("which no file matches, expected a pattern that finds a file of lines and"));
+}
+
+#[test]
+fn levels_leave_out_classes_of_features_that_there_are() {
+    let with = |levels: &str, features: &str| format!("{features}[lod]\nlevels = [{levels}]\n");
+    let refused = |text: &str| {
+        let error = Job::from_text(&format!("{HEAD}{text}"), Path::new("jobs/a.toml")).unwrap_err();
+        error.to_string()
+    };
+    let some = "[features]\nsources = [\"sample\"]\n";
+    let levels = "{ inner_share = 0.5 }, { inner_share = 0.2, leave_out = [\"track\", \"stream\"] }";
+    let read = job(&with(levels, some));
+    assert_eq!(read.lod.leave_out, [vec![], vec!["track".to_owned(), "stream".to_owned()]]);
+    assert!(read.lod.leaves_out() && !job(&with("{ inner_share = 0.5 }", some)).lod.leaves_out());
+    assert!(read.canonical_text().contains("{ inner_share = 0.2, leave_out = [\"track\", \"stream\"] }"));
+    let error = refused(&with("{ inner_share = 0.5, leave_out = [\"trak\"] }", some));
+    assert!(error.contains("expected a class of features"), "{error}");
+    let error = refused(&with("{ inner_share = 0.5, leave_out = [\"track\"] }", ""));
+    assert!(error.contains("expected a job with roads and water"), "{error}");
 }

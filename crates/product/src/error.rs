@@ -13,6 +13,12 @@ pub enum ProductError {
     /// The ground under it cannot be found or used, or it has not what was asked for.
     #[error(transparent)]
     Ground(#[from] GroundError),
+    /// The GeoPackage of features could not be made.
+    #[error("features.gpkg cannot be made: {message}")]
+    Package {
+        /// What the library says.
+        message: String,
+    },
 }
 
 impl ProductError {

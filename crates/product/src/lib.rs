@@ -18,6 +18,8 @@ mod scene;
 pub use scene::{SceneParts, water};
 mod breaches;
 pub use breaches::{breaches, features_file};
+mod features_gpkg;
+pub use features_gpkg::features_package;
 mod kept;
 pub use kept::{from_features, from_tally, to_features, to_tally};
 mod told;

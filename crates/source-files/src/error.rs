@@ -187,6 +187,12 @@ pub enum SourceError {
         expected OpenStreetMap (.osm.pbf), a GeoPackage, a Shapefile or GeoJSON"
     )]
     NotFeatures { path: PathBuf, found: String },
+    /// The system of the file's coordinates cannot be computed, and nothing else says what it is.
+    #[error("{path}: the coordinate reference system is {found}, expected one that can be computed")]
+    FeatureCrs { path: PathBuf, found: String },
+    /// A system is named for a file whose format knows only one.
+    #[error("{path}: {found}; expected no crs, since such data is in longitude and latitude on WGS 84")]
+    NoOtherCrs { path: PathBuf, found: String },
     /// The layer that is named is not there, or none is named where there are several.
     #[error("{path}: {found}; expected {expected}")]
     Layer { path: PathBuf, found: String, expected: String },
@@ -245,6 +251,8 @@ impl SourceError {
                 _ => "name a file of lines or polygons; ogr2ogr makes a GeoPackage of most others",
             },
             Layer { .. } => "name a layer: sources = [{ file = \"…\", layer = \"…\" }]; ogrinfo lists them",
+            FeatureCrs { .. } => "say what it is: features.sources = [{ file = \"…\", crs = \"EPSG:…\" }]",
+            NoOtherCrs { .. } => "remove crs",
             OtherFormat { found, .. } if has(found, &["features"]) => {
                 "name a raster here; files of lines and polygons go into features.sources"
             }

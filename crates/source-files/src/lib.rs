@@ -57,11 +57,12 @@ mod shapefile;
 pub use polygons::read_polygons;
 mod features;
 pub use features::{
-    BUILT_IN_KEYS, Extent, FeatureFile, Remark, Tags, VectorFeature, VectorShape, Vertices, Wanted,
+    BUILT_IN_KEYS, Done, Extent, FeatureFile, Remark, Tags, VectorFeature, VectorShape, Vertices, Wanted,
     feature_attribution, feature_layers, is_feature_file, read_features,
 };
 mod given;
 pub use given::{GivenFeature, GivenShape, read_given};
+pub mod geopackage_parts;
 pub mod geotiff_parts;
 mod write;
 pub use write::{write_classes, write_heights};

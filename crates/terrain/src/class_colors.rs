@@ -2,7 +2,7 @@
 
 /// Red, green and blue, as screens show them, of classes that features bring, highest roads first. Roads are grey to
 /// brown and lighter the smaller they are, water is blue, and nothing else is.
-const OF_FEATURES: [(&str, [u8; 3]); 12] = [
+pub const FEATURE_COLORS: [(&str, [u8; 3]); 12] = [
     ("motorway", [52, 48, 46]),
     ("primary", [78, 72, 68]),
     ("minor", [106, 98, 92]),
@@ -19,7 +19,7 @@ const OF_FEATURES: [(&str, [u8; 3]); 12] = [
 
 /// The fixed colour of a class of this name; `None` where the name says nothing of its colour.
 pub fn named_class_color(name: &str) -> Option<[u8; 3]> {
-    OF_FEATURES.iter().find(|(of, _)| *of == name).map(|(_, color)| *color)
+    FEATURE_COLORS.iter().find(|(of, _)| *of == name).map(|(_, color)| *color)
 }
 
 #[cfg(test)]

@@ -37,6 +37,6 @@ pub use load_module::{LoadModule, LoadModuleFault, ModuleCounts, ModuleResidual}
 mod choices;
 pub use choices::{Effort, HeightFit, LastBatch, Lattice, LodBorder, Resampling, Smooth, TileOrder};
 mod class_colors;
-pub use class_colors::named_class_color;
+pub use class_colors::{FEATURE_COLORS, named_class_color};
 mod breach;
 pub use breach::{Breach, BreachKind, BreachPlace};

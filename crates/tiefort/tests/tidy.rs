@@ -177,6 +177,13 @@ fn uses(manifest: &toml::Table, section: &str) -> Vec<String> {
     table.map(|table| table.keys().cloned().collect()).unwrap_or_default()
 }
 
+#[test]
+fn the_architecture_is_told_in_at_most_1500_words() {
+    let text = fs::read_to_string(root().join("crates/ARCHITECTURE.md")).unwrap();
+    let words = text.split_whitespace().count();
+    assert!(words <= 1500, "{words} words");
+}
+
 /// The rows of the table in `crates/ARCHITECTURE.md` below a head: what stands first, and the names beside it.
 fn table(head: &str) -> Vec<(String, Vec<String>)> {
     let text = fs::read_to_string(root().join("crates/ARCHITECTURE.md")).unwrap();

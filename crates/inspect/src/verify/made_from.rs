@@ -7,7 +7,7 @@ use terrain::{ModuleRect, TileFeatures, TileId};
 
 use super::tins::OfTins;
 use compiler::ALGORITHM_REVISION;
-use compiler::modules_key;
+use compiler::{LeftOut, modules_key};
 use compiler::{TileBudget, tile_refinement};
 use compiler::{kept_features, rules};
 use ground::GamingArea;
@@ -29,6 +29,14 @@ pub(crate) fn problems(
         ));
         return (problems, unchecked);
     }
+    let left_out = match job.lod.leaves_out().then(|| folder.read_level()) {
+        None => None,
+        Some(Ok((.., level))) => LeftOut::of(job, area, &level),
+        Some(Err(error)) => {
+            problems.push(error.to_string());
+            return (problems, unchecked);
+        }
+    };
     let mut thinned = 0;
     for (&tile, found) in area.tiles.iter().zip(found) {
         let near = area.tiling.neighbours(tile);
@@ -45,7 +53,8 @@ pub(crate) fn problems(
                 continue;
             }
         };
-        let key = modules_key(job, area, &|index| tins.stamps[index], &tins.removed, &features);
+        let stamps = |index: usize| tins.stamps[index];
+        let key = modules_key((job, area), &stamps, &tins.removed, (&features, left_out.as_ref()));
         let expected = key.fingerprint();
         if *found != expected {
             problems.push(format!("modules/{tile}.slm: its fingerprint is not that of its TIN and its job"));

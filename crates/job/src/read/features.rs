@@ -117,9 +117,10 @@ fn sources(
 fn source(item: &Entry, dem: &DemSource, job: &Path) -> Result<FeatureSource, JobError> {
     if item.is_table() {
         let table = item.table()?;
-        let layer = table.optional("layer").map(|layer| layer.prose(|c| c == '\0')).transpose()?;
+        let text = |key: &str| table.optional(key).map(|entry| entry.prose(|c| c == '\0')).transpose();
+        let (layer, crs) = (text("layer")?, text("crs")?);
         let kind = table.optional("kind").map(|kind| kind.word()).transpose()?;
-        return Ok(FeatureSource::File { file: table.required("file")?.file(job)?, layer, kind });
+        return Ok(FeatureSource::File { file: table.required("file")?.file(job)?, layer, kind, crs });
     }
     match (item.text()?, dem) {
         (SAMPLE, DemSource::Sample { .. }) => Ok(FeatureSource::Sample),
@@ -128,7 +129,7 @@ fn source(item: &Entry, dem: &DemSource, job: &Path) -> Result<FeatureSource, Jo
             "a file, since only the built-in terrain brings features of its own",
             "a file of that name is { file = \"sample\" }",
         )),
-        _ => Ok(FeatureSource::File { file: item.file(job)?, layer: None, kind: None }),
+        _ => Ok(FeatureSource::File { file: item.file(job)?, layer: None, kind: None, crs: None }),
     }
 }
 

@@ -2,9 +2,9 @@
 
 use crate::bounds::COARSER_LEVELS_MAX;
 use crate::entry::{Entry, Section};
-use crate::{JobError, LodSpec};
+use crate::{FeaturesSpec, JobError, LodSpec};
 
-pub(super) fn read(lod: &Section) -> Result<LodSpec, JobError> {
+pub(super) fn read(lod: &Section, features: Option<&FeaturesSpec>) -> Result<LodSpec, JobError> {
     let inner_shares = lod.optional("levels").map_or(Ok(Vec::new()), |entry| inner_shares(&entry))?;
     let border = match lod.optional("border") {
         Some(entry) if inner_shares.is_empty() => {
@@ -13,7 +13,31 @@ pub(super) fn read(lod: &Section) -> Result<LodSpec, JobError> {
         }
         _ => lod.word("border")?,
     };
-    Ok(LodSpec { inner_shares, border })
+    let leave_out = match lod.optional("levels") {
+        Some(entry) => entry.list()?.iter().map(|level| leave_out(level, features)).collect::<Result<_, _>>()?,
+        None => Vec::new(),
+    };
+    Ok(LodSpec { inner_shares, border, leave_out })
+}
+
+/// Classes of features that a level leaves out.
+fn leave_out(level: &Entry, features: Option<&FeaturesSpec>) -> Result<Vec<String>, JobError> {
+    let Some(entry) = level.table()?.optional("leave_out") else { return Ok(Vec::new()) };
+    let Some(features) = features else {
+        let hint = "remove it, or name files of roads and water in [features]";
+        return Err(entry.conflict("no [features]", "a job with roads and water", hint));
+    };
+    let known = features.classes();
+    let mut classes = Vec::new();
+    for item in entry.list()? {
+        let name = item.text()?;
+        if !known.iter().any(|class| class == name) {
+            let hint = format!("they are {}", known.join(", "));
+            return Err(item.out_of_range_with("a class of features", hint));
+        }
+        classes.push(name.to_owned());
+    }
+    Ok(classes)
 }
 
 fn inner_shares(levels: &Entry) -> Result<Vec<f64>, JobError> {

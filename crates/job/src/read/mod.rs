@@ -84,7 +84,7 @@ fn job_of(sections: &Sections, path: &Path, find: Option<&FindArea>) -> Result<(
     let others = [&sections.dem, &sections.modules, &sections.tin];
     features::refuse_beside(&sections.features, others, modules.edges, tin.method.name())?;
     modules.outer_border = area::outer_border(&sections.modules, modules.edges, tin.method)?;
-    let lod = lod::read(&sections.lod)?;
+    let lod = lod::read(&sections.lod, features.as_ref())?;
     Ok((Job { path: path.to_owned(), area, dem, importance, features, tiles, modules, limits, tin, lod }, mentions))
 }
 

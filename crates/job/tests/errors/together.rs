@@ -355,7 +355,7 @@ fn levels_are_few_and_go_from_fine_to_coarse() {
         "pool",
         "[lod]\nlevels = [0.5]",
         &[
-            "a/b.toml:17: lod.levels[0]: found the number 0.5, expected a table of inner_share",
+            "a/b.toml:17: lod.levels[0]: found the number 0.5, expected a table of inner_share, leave_out",
             "hint: for example levels = [{ inner_share = 0.5 }, { inner_share = 0.2 }]",
         ],
     );
@@ -363,7 +363,7 @@ fn levels_are_few_and_go_from_fine_to_coarse() {
         "pool",
         "[lod]\nlevels = [{ share = 0.5 }]",
         &[
-            "a/b.toml:17: lod.levels[0].share: found a key that no job has, expected one of inner_share",
+            "a/b.toml:17: lod.levels[0].share: found a key that no job has, expected one of inner_share, leave_out",
             "hint: configs/ntc.toml shows the usual keys with what they mean",
         ],
     );

@@ -25,10 +25,10 @@ pub(super) fn read(store: &Store, wanted: &Wanted) -> Result<FeatureFile, Source
     let text = text.map_err(|_| broken("it is not UTF-8 text".into()))?;
     let text = text.trim_start_matches('\u{feff}');
     let (said, features) = match text.parse::<GeoJson>() {
-        Ok(json) => (said_in(path, &json)?, strict(json)),
+        Ok(json) => (wanted.system(|| said_in(path, &json))?, strict(json)),
         Err(error) => {
             let (crs, features) = loose::read(text).ok_or_else(|| broken(error.to_string()))?;
-            (said_by(path, crs.as_ref())?, features)
+            (wanted.system(|| said_by(path, crs.as_ref()))?, features)
         }
     };
     let (name, mut texts) = (file_name(store), Texts::default());

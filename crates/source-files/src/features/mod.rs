@@ -22,7 +22,7 @@ pub(crate) mod well_known;
 
 pub use clip::Extent;
 pub use formats::{feature_attribution, feature_layers, is_feature_file};
-pub use model::{BUILT_IN_KEYS, FeatureFile, Remark, Tags, VectorFeature, VectorShape, Vertices, Wanted};
+pub use model::{BUILT_IN_KEYS, Done, FeatureFile, Remark, Tags, VectorFeature, VectorShape, Vertices, Wanted};
 
 use std::path::Path;
 
@@ -40,10 +40,19 @@ pub fn read_features(path: &Path, wanted: &Wanted) -> Result<FeatureFile, Source
         let (found, expected) = (format!("the layer `{layer}` named"), "no layer: only GeoPackages have some".into());
         return Err(SourceError::Layer { path: path.into(), found, expected });
     }
-    match format {
+    if let (Some(crs), Format::OpenStreetMap) = (wanted.crs, format) {
+        let found = format!("OpenStreetMap data, said to be in {}", crs.name());
+        return Err(SourceError::NoOtherCrs { path: path.into(), found });
+    }
+    let read = match format {
         Format::OpenStreetMap => osm::read(&store, wanted),
         Format::GeoPackage => packages::read(path, wanted),
         Format::Shapefile => shapes::read(&store, wanted),
         Format::GeoJson => json::read(&store, wanted),
-    }
+    };
+    read.map_err(|error| match error {
+        // Here the caller can say it.
+        SourceError::UnnamedCrs { path, found } => SourceError::FeatureCrs { path, found },
+        error => error,
+    })
 }

@@ -1,8 +1,11 @@
 //! What is wanted of a file of features, and what is read.
 
+use std::fmt;
 use std::sync::Arc;
 
 use super::clip::Extent;
+use crate::SourceError;
+use crate::crs::Crs;
 use crate::store::Store;
 
 /// Keys of OpenStreetMap that the built-in table of kinds looks at.
@@ -19,9 +22,21 @@ pub struct Wanted<'a> {
     pub bounds: Extent,
     /// The layer of a GeoPackage, which may be left out where there is only one.
     pub layer: Option<&'a str>,
+    /// The system of its coordinates, whatever the file says; OpenStreetMap data needs none.
+    pub crs: Option<&'a Crs>,
     /// Keys of OpenStreetMap that make a way or a multipolygon relation wanted, mostly [`BUILT_IN_KEYS`] and those of
     /// the job's own rules. Other formats are read whole.
     pub keys: &'a [&'a str],
+}
+
+impl Wanted<'_> {
+    /// The system of a file's coordinates: as the caller says, else as the file does.
+    pub(super) fn system(
+        &self,
+        of_file: impl FnOnce() -> Result<Option<Crs>, SourceError>,
+    ) -> Result<Option<Crs>, SourceError> {
+        self.crs.map_or_else(of_file, |crs| Ok(Some(crs.clone())))
+    }
 }
 
 /// Attributes, sorted by key. Texts that are the same are kept once.
@@ -75,7 +90,31 @@ pub struct Remark {
     /// What was wrong.
     pub found: String,
     /// What was done.
-    pub done: &'static str,
+    pub done: Done,
+}
+
+/// What was done about something that could not be used as it is, in words.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Done {
+    /// The feature, or a part of it, is missing.
+    LeftOut(&'static str),
+    /// All of it is there.
+    Kept(&'static str),
+}
+
+impl Done {
+    /// The words.
+    pub fn text(self) -> &'static str {
+        match self {
+            Done::LeftOut(text) | Done::Kept(text) => text,
+        }
+    }
+}
+
+impl fmt::Display for Done {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.text())
+    }
 }
 
 /// The features of a file.

@@ -25,10 +25,10 @@ pub(super) fn read(path: &Path, wanted: &Wanted) -> Result<FeatureFile, SourceEr
         placing.note("a GeoPackage without a layer of features".into());
         return Ok(placing.finish(None));
     };
-    let said = match package.crs(table.srs)? {
-        Some(crs) => Some(crs),
-        None => looks(path, &package, &table)?.then(Crs::wgs84),
-    };
+    let said = wanted.system(|| match package.crs(table.srs)? {
+        Some(crs) => Ok(Some(crs)),
+        None => Ok(looks(path, &package, &table)?.then(Crs::wgs84)),
+    })?;
     let mut placing = Placing::new(path, wanted, said)?;
     let file = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     let (name, mut texts) = (format!("{file}:{}", table.name), Texts::default());

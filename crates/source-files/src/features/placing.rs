@@ -6,7 +6,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::clip::{self, Extent, Vertex};
-use super::model::{FeatureFile, Remark, Tags, VectorFeature, VectorShape, Vertices, Wanted};
+use super::model::{Done, FeatureFile, Remark, Tags, VectorFeature, VectorShape, Vertices, Wanted};
 use super::raw::{Part, RawFeature};
 use crate::SourceError;
 use crate::crs::Crs;
@@ -118,7 +118,7 @@ impl Placing {
         self.file.notes.push(note);
     }
 
-    pub(super) fn remark(&mut self, id: &str, at: Option<[f64; 2]>, found: String, done: &'static str) {
+    pub(super) fn remark(&mut self, id: &str, at: Option<[f64; 2]>, found: String, done: Done) {
         if self.file.remarks.len() < REMARKS_MAX {
             self.file.remarks.push(Remark { id: id.into(), at, found, done });
         } else {
@@ -131,7 +131,8 @@ impl Placing {
         let RawFeature { id, tags, shape } = feature;
         if let Some(other) = shape.other {
             let done = if shape.parts.is_empty() { "left out" } else { "left out, its lines and polygons kept" };
-            self.remark(&id, None, format!("a {other}, where lines and polygons are read"), done);
+            let found = format!("a {other}, where lines and polygons are read");
+            self.remark(&id, None, found, Done::LeftOut(done));
         }
         if shape.parts.is_empty() {
             return;
@@ -184,12 +185,13 @@ impl Placing {
                     if let (Some(&first), Some(last)) = (ring.first(), ring.last())
                         && first[..2] != last[..2]
                     {
-                        self.remark(id, at, "a ring whose last vertex is not its first".into(), "closed");
+                        self.remark(id, at, "a ring whose last vertex is not its first".into(), Done::Kept("closed"));
                         ring.push(first);
                     }
                     if ring.len() < 4 {
                         let found = format!("a ring of {}, the last being the first", counted(ring.len()));
-                        self.remark(id, at, found, if index == 0 { LEFT_OUT } else { "the hole left out" });
+                        let done = if index == 0 { LEFT_OUT } else { Done::LeftOut("the hole left out") };
+                        self.remark(id, at, found, done);
                         // Without its outer ring there is nothing to have holes.
                         if index == 0 {
                             return None;
@@ -285,7 +287,7 @@ impl Placing {
         let count = all.count();
         if let Some(first) = wrong.first() {
             let found = format!("{} of {count} heights that are none, the first {}", wrong.len(), first[2]);
-            self.remark(id, Some([first[0], first[1]]), found, "left without a height there");
+            self.remark(id, Some([first[0], first[1]]), found, Done::Kept("left without a height there"));
         }
         (wrong.len() < count).then_some(unit_m)
     }
@@ -320,9 +322,11 @@ impl Placing {
             let (lies, bounds) = (self.text(&self.source, &self.lies), self.text(&self.area, &self.bounds));
             let place = if self.lies.is_empty() { "nowhere on the Earth".into() } else { lies };
             let found = self.file.found;
+            // OpenStreetMap data is in degrees, whatever else is said of it.
+            let hint = if attribution.is_some() { "" } else { "; if the file is in another system, name it with crs" };
             self.file.notes.push(format!(
                 "none of its {found} lines and polygons lies inside the area: they lie {place}; the area and one load \
-                module round it {bounds}"
+                module round it {bounds}{hint}"
             ));
         }
         self.file.features.shrink_to_fit();
@@ -339,7 +343,7 @@ impl Placing {
 }
 
 /// What is done with a feature that cannot be used.
-pub(super) const LEFT_OUT: &str = "left out";
+pub(super) const LEFT_OUT: Done = Done::LeftOut("left out");
 /// Metres, or feet, that no coordinate on the Earth exceeds in any system.
 const PLACE_MAX: f64 = 4.0e8;
 

@@ -2,7 +2,7 @@
 
 use super::clip::Vertex;
 use super::columns::{Table, with_packed_tags};
-use super::model::{FeatureFile, Wanted, file_name};
+use super::model::{Done, FeatureFile, Wanted, file_name};
 use super::nest;
 use super::placing::{LEFT_OUT, Placing, Texts, look_like_degrees};
 use super::raw::{Part, RawFeature, RawShape};
@@ -19,10 +19,10 @@ pub(super) fn read(store: &Store, wanted: &Wanted) -> Result<FeatureFile, Source
     let bytes = whole(store)?;
     let index = index_beside(path)?;
     let table = table_beside(store)?;
-    let said = match said_beside(path)? {
-        Some(crs) => Some(crs),
-        None => looks(store, &bytes, index.as_deref())?.then(Crs::wgs84),
-    };
+    let said = wanted.system(|| match said_beside(path)? {
+        Some(crs) => Ok(Some(crs)),
+        None => Ok(looks(store, &bytes, index.as_deref())?.then(Crs::wgs84)),
+    })?;
     let mut placing = Placing::new(path, wanted, said)?;
     if table.is_none() {
         placing.note("no table (.dbf) beside it, so its features have no attributes".into());
@@ -36,7 +36,7 @@ pub(super) fn read(store: &Store, wanted: &Wanted) -> Result<FeatureFile, Source
             Some(Some((_, true))) => continue,
             Some(Some((columns, false))) => columns,
             Some(None) => {
-                placing.remark(&id, None, "no row in the table".into(), "read without attributes");
+                placing.remark(&id, None, "no row in the table".into(), Done::Kept("read without attributes"));
                 Vec::new()
             }
             None => Vec::new(),

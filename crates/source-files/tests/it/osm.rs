@@ -11,7 +11,7 @@ use crate::support::Folder;
 /// Ten kilometres a side round 117 W, 35 N, in UTM zone 11.
 const BOUNDS: Extent = Extent { east: [495_000.0, 505_000.0], north: [3_868_000.0, 3_878_000.0] };
 
-const WANTED: Wanted = Wanted { epsg: 32611, bounds: BOUNDS, layer: None, keys: &BUILT_IN_KEYS };
+const WANTED: Wanted = Wanted { epsg: 32611, bounds: BOUNDS, layer: None, crs: None, keys: &BUILT_IN_KEYS };
 const ROAD: &[(&str, &str)] = &[("highway", "primary")];
 const LAKE: &[(&str, &str)] = &[("natural", "water"), ("type", "multipolygon")];
 

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use compiler::CompileError;
 use database::Folder;
-use exports::{Block, Datum, ExportError, Facts, FeatureLayers, Levels, Mesh, Product, Work};
+use exports::{Block, Datum, ExportError, Facts, Levels, Mesh, Product, Work};
 use job::Job;
 use product::{BuiltFrom, Opened, read_told};
 use terrain::{ModuleId, PostRect};
@@ -311,17 +311,8 @@ fn write_features(arguments: &Arguments) -> Result<(), Failure> {
         let message = "found --format features with a database without roads and water, expected one with some";
         return Err(Failure::new(message, "[features] in a job names their files"));
     };
-    let area = &opened.manifest.area;
-    let ([west, south], [wide, high]) = (area.origin_m, area.size_m);
-    let remarks: Vec<_> = told.remarks.iter().map(|remark| (views::outcome(remark), remark)).collect();
-    let layers = FeatureLayers {
-        crs: &area.crs,
-        extent_m: [west, south, west + wide, south + high],
-        classes: &opened.job.class_names(),
-        level: &level,
-        remarks: &remarks,
-    };
-    files::make_whole(&arguments.out, |path| Ok(exports::write_features_gpkg(path, &layers)?))
+    let bytes = product::features_package(&opened.job, &level, &told.remarks).map_err(CompileError::from)?;
+    files::write_whole(&arguments.out, |out| std::io::Write::write_all(out, &bytes))
 }
 
 fn write_mesh(arguments: &Arguments, product: &Product) -> Result<(), Failure> {

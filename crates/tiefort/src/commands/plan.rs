@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use compiler::{CompileError, Plan, Played};
-use ground::{FeatureTable, PlannedTile};
+use compiler::{FeaturesForeseen, Plan, Played};
+use ground::PlannedTile;
 use job::Job;
 use serde_json::{Value, json};
 use views::{Align, Table, fold, grouped};
@@ -86,8 +86,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let default = PathBuf::from(format!("{}.tdb", job.area.name));
     let folder = arguments.out.as_ref().unwrap_or(&default);
     let told = compiler::foresee(&job, folder)?;
-    let features = ground::feature_table(&job).map_err(CompileError::from)?;
-    let told = told.iter().chain(features.iter().flat_map(|features| &features.notes));
+    let features = compiler::foresee_features(&job)?;
+    let told = told.iter().chain(features.iter().flat_map(|features| &features.table.notes));
     told.for_each(|note| terminal::tell(&format!("note: {}", terminal::short(note))));
     let played = played(&job, &plan, arguments)?;
     let glue = || Glue::new(&job, &plan, arguments.out.as_deref(), arguments.pack);
@@ -125,12 +125,12 @@ fn played(job: &Job, plan: &Plan, arguments: &Arguments) -> Result<Vec<Played>, 
     Ok(tiles.iter().flat_map(|&tiles| compiler::play(&costs, tiles, modules, job.tiles.order, &workers)).collect())
 }
 
-fn plan_text(job: &Job, plan: &Plan, features: Option<&FeatureTable>, played: &[Played]) -> String {
+fn plan_text(job: &Job, plan: &Plan, features: Option<&FeaturesForeseen>, played: &[Played]) -> String {
     let mut text = format!("Settings of {}\n{}\n", job.path.display(), run::settings_text(job));
     text += &forecast_table(job, plan).text(0);
     text += &format!("\n{}", corner_table(job).text(0));
     if let Some(features) = features {
-        text += &format!("\n{}", plan_features::tables_text(features));
+        text += &format!("\n{}", plan_features::tables_text(features, job));
     }
     if !played.is_empty() {
         text += &format!("\n{}", played_table(played).text(0));
@@ -216,7 +216,7 @@ fn by_rank(plan: &Plan) -> Vec<&PlannedTile> {
     tiles
 }
 
-fn json_text(job: &Job, plan: &Plan, features: Option<&FeatureTable>, played: &[Played]) -> String {
+fn json_text(job: &Job, plan: &Plan, features: Option<&FeaturesForeseen>, played: &[Played]) -> String {
     let simulation: Vec<Value> = played
         .iter()
         .map(|run| {

@@ -5,6 +5,7 @@
 //! other (a pair that the common kinds of colour blindness keep apart). Blue is water and nothing else.
 
 use serde_json::{Value, json};
+use terrain::FEATURE_COLORS;
 
 /// A colour: red, green and blue, as screens show them.
 pub type Color = [u8; 3];
@@ -21,20 +22,17 @@ pub(crate) const BREACH: Color = [213, 94, 0];
 pub(crate) const BOUND: Color = [230, 159, 0];
 /// Water: the only blue, but for the rivers and streams among [`FEATURES`].
 pub(crate) const WATER: Color = [96, 154, 196];
-/// Roads and water by the names of their classes: roads dark, from grey to brown, and water blue. The last stands for
-/// every other name.
-pub(crate) const FEATURES: [(&str, Color); 10] = [
-    ("motorway", [44, 44, 46]),
-    ("primary", [74, 70, 68]),
-    ("minor", [106, 100, 94]),
-    ("track", [132, 96, 62]),
-    ("rail", [66, 38, 44]),
-    ("runway", [88, 86, 90]),
-    ("river", [44, 98, 156]),
-    ("stream", [88, 140, 200]),
-    ("lake", WATER),
-    ("other", [120, 70, 40]),
-];
+/// Roads and water by the names of their classes, in the colours that exports give them, too. The last stands for every
+/// other name.
+pub(crate) const FEATURES: [(&str, Color); FEATURE_COLORS.len() + 1] = {
+    let mut all = [("other", [120, 70, 40]); FEATURE_COLORS.len() + 1];
+    let mut at = 0;
+    while at < FEATURE_COLORS.len() {
+        all[at] = FEATURE_COLORS[at];
+        at += 1;
+    }
+    all
+};
 
 /// The place of a class of features among [`FEATURES`], by its name.
 pub(crate) fn feature_number(name: &str) -> u8 {
@@ -179,6 +177,8 @@ pub(crate) fn ink_on(background: Color) -> Color {
 
 #[cfg(test)]
 mod tests {
+    use terrain::named_class_color;
+
     use super::*;
 
     fn lightness([red, green, blue]: Color) -> f64 {
@@ -215,7 +215,7 @@ mod tests {
     fn blue_is_water_and_nothing_else() {
         assert!(is_blue(WATER) && is_blue([67, 147, 195]) && is_blue([59, 82, 139]));
         let ramps = [HEIGHTS, COUNTS, USE, ERRORS, RESIDUALS].into_iter().flat_map(|ramp| ramp.table(101));
-        let is_water = |name: &str| ["river", "stream", "lake"].contains(&name);
+        let is_water = |name: &str| ["river", "stream", "lake", "water"].contains(&name);
         for (name, color) in FEATURES {
             assert_eq!(is_blue(color), is_water(name), "{name}");
         }
@@ -223,6 +223,15 @@ mod tests {
         for color in ramps.chain(others) {
             assert!(!is_blue(color), "{color:?}");
         }
+    }
+
+    #[test]
+    fn pictures_and_exports_give_a_class_of_features_one_colour() {
+        for (number, (name, color)) in (0..).zip(FEATURES).take(FEATURE_COLORS.len()) {
+            assert_eq!((Some(color), number), (named_class_color(name), feature_number(name)));
+        }
+        assert_eq!(usize::from(feature_number("gravel pit")), FEATURE_COLORS.len());
+        assert_eq!(named_class_color("lake"), Some(WATER));
     }
 
     #[test]

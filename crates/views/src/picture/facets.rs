@@ -2,10 +2,11 @@
 
 use std::f64::consts::FRAC_1_SQRT_2;
 
+use database::LineRole;
 use terrain::{Dem, HOLE_CLASS, LoadModule, ModuleGrid, Post, QUANTA_PER_METRE, Spacing, Tin, metres_of_quanta};
 
 use super::map_extent::slope;
-use super::scene::Scene;
+use super::scene::{Scene, SceneFeatures};
 
 /// Triangles with the places of their corners: east, north and up, in metres.
 ///
@@ -21,6 +22,10 @@ pub struct Facets {
     pub(crate) side_m: Option<f64>,
     /// What each triangle lies over; empty where all lie over plain ground.
     pub(crate) covers: Vec<Cover>,
+    /// Triangles of bridges, which hang above the others, and their place among the colours of features.
+    pub(crate) decks: Vec<([[f64; 3]; 3], u8)>,
+    /// Edges that are the middle of a road, a river or a stream, and their place among the colours of features.
+    pub(crate) lines: Vec<([[f64; 3]; 2], u8)>,
 }
 
 /// What a triangle or a post lies over.
@@ -51,6 +56,8 @@ impl Facets {
             extent_m: [posts(rect.west, 0), posts(rect.south, 1), posts(rect.east, 0), posts(rect.north, 1)],
             side_m: None,
             covers: Vec::new(),
+            decks: Vec::new(),
+            lines: Vec::new(),
         }
     }
 
@@ -82,6 +89,9 @@ impl Facets {
     ) -> Self {
         let mut facets = self.with_covers(modules.clone(), scene.water);
         if let Some(features) = scene.features {
+            let decks = modules.clone().into_iter().filter(|module| !module.decks.is_empty());
+            facets.decks = decks.flat_map(|module| decks_of(module, scene, &features)).collect();
+            facets.lines = lines_of(scene, &features, facets.extent_m);
             let classes = modules.into_iter().flat_map(|module| &module.classes);
             for (cover, &class) in facets.covers.iter_mut().zip(classes) {
                 if let Some(number) = features.color_of(class) {
@@ -100,6 +110,15 @@ impl Facets {
     /// Whether any triangle lies over such a thing.
     pub(crate) fn has(&self, cover: Cover) -> bool {
         self.covers.contains(&cover)
+    }
+
+    /// Whether any triangle lies over such a thing, or a line or a bridge is one.
+    pub(crate) fn shows(&self, cover: Cover) -> bool {
+        let Cover::Feature(number) = cover else { return self.has(cover) };
+        let is_it = |of: &u8| *of == number;
+        self.has(cover)
+            || self.decks.iter().map(|(_, of)| of).any(is_it)
+            || self.lines.iter().map(|(_, of)| of).any(is_it)
     }
 
     /// What the posts of a DEM lie over, row by row from the south-west; empty where all lie over plain ground.
@@ -217,6 +236,36 @@ impl Facets {
             at == ends[1][axis] && (at == self.extent_m[axis] || at == self.extent_m[axis + 2])
         })
     }
+}
+
+/// The triangles of bridges of a load module, and their place among the colours of features.
+fn decks_of(module: &LoadModule, scene: &Scene, features: &SceneFeatures) -> Vec<([[f64; 3]; 3], u8)> {
+    let side = i64::from(scene.grid.side_cells) * i64::from(scene.frame.spacing.quanta_per_post());
+    let metres =
+        |index: u32, quanta: u16| (i64::from(index) * side + i64::from(quanta)) as f64 / f64::from(QUANTA_PER_METRE);
+    let place = |v: u16| {
+        let v = module.decks.vertices[usize::from(v)];
+        [metres(module.id.col, v.x), metres(module.id.row, v.y), metres_of_quanta(v.z)]
+    };
+    let triangles = module.decks.triangles.iter().zip(&module.decks.classes);
+    triangles.map(|(corners, &class)| (corners.map(place), features.color_of(class).unwrap_or(u8::MAX))).collect()
+}
+
+/// The middles of roads, rivers and streams inside an extent.
+fn lines_of(scene: &Scene, features: &SceneFeatures, [west, south, east, north]: [f64; 4]) -> Vec<([[f64; 3]; 2], u8)> {
+    let origin = [scene.frame.origin_east_m, scene.frame.origin_north_m];
+    let is_inside = |[x, y, _]: &[f64; 3]| west <= *x && *x <= east && south <= *y && *y <= north;
+    let mut all = Vec::new();
+    for line in features.lines.iter().filter(|line| matches!(line.role, LineRole::Centre | LineRole::Channel)) {
+        let Some(number) = features.color_of(line.class) else { continue };
+        for pair in line.vertices.windows(2) {
+            let ends = [pair[0], pair[1]].map(|[x, y, z]| [x - origin[0], y - origin[1], z]);
+            if ends.iter().all(is_inside) {
+                all.push((ends, number));
+            }
+        }
+    }
+    all
 }
 
 /// Where light comes from, seen from above: south-west, west, north-west (as on maps since Lehmann) and north, each of

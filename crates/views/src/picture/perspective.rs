@@ -75,7 +75,7 @@ impl Surface<'_> {
     /// Whether any of it lies over such a thing.
     pub(crate) fn has(&self, cover: Cover) -> bool {
         match self {
-            Surface::Triangles(facets) => facets.has(cover),
+            Surface::Triangles(facets) => facets.shows(cover),
             Surface::Posts(.., covers) => covers.contains(&cover),
         }
     }
@@ -105,6 +105,7 @@ pub fn draw_perspective(surface: &Surface, look: &Look) -> Drawn {
         mix(color, HAZE, haze_share(ahead, half_m))
     };
     stage.draw(surface, look.times, &color);
+    stage.draw_features(surface, look.times);
     stage.draw_walls(surface, look, |_, ahead| mix(WALL, HAZE, haze_share(ahead, half_m)));
     stage.finish()
 }
@@ -122,6 +123,11 @@ pub fn draw_wireframe(surface: &Surface, look: &Look) -> Drawn {
             stage.line(ends.map(place), thick, ink);
         }),
         Surface::Posts(dem, spacing_m, _) => stage.draw_grid(dem, *spacing_m, look.times),
+    }
+    if let Surface::Triangles(facets) = surface {
+        for ([a, b, c], _) in &facets.decks {
+            [[a, b], [b, c], [c, a]].into_iter().for_each(|[a, b]| stage.line([place(*a), place(*b)], 2.0, INK));
+        }
     }
     stage.finish()
 }
@@ -150,6 +156,10 @@ const HOLE_LIGHT: f64 = -2.0;
 fn feature_light(number: u8) -> f64 {
     HOLE_LIGHT - 1.0 - f64::from(number)
 }
+/// How high the side of a deck is drawn, and how far below its surface it begins: sides between two triangles of a
+/// deck stay hidden.
+const DECK_SIDE_M: f64 = 1.5;
+const DECK_HUNG_M: f64 = 0.05;
 /// Samples that a step of posts may cover: finer ones are not seen.
 const STEP_SAMPLES: f64 = 2.0;
 
@@ -301,6 +311,32 @@ impl Stage {
             let [a, b] = [pair[0], pair[1]];
             self.depth.triangle(&view, [a, b, hung(b)], color);
             self.depth.triangle(&view, [a, hung(b), hung(a)], color);
+        }
+    }
+
+    /// Lines of features, and bridges with sides that hang from them: else one seen from a bank would be a line.
+    fn draw_features(&mut self, surface: &Surface, times: f64) {
+        let Surface::Triangles(facets) = surface else { return };
+        let (view, half_m) = (self.view, self.haze_half_m);
+        let color = |number: u8| FEATURES[usize::from(number).min(FEATURES.len() - 1)].1;
+        for &(ends, number) in &facets.lines {
+            self.line(ends.map(|[x, y, z]| [x, y, z * times]), 2.0, color(number));
+        }
+        let corner = |[x, y, z]: [f64; 3], down_m: f64| Corner {
+            turned: view.turned([x, y, z * times - down_m]),
+            values: [0.0; 2],
+        };
+        for (corners, number) in &facets.decks {
+            let paint = color(*number);
+            let top = |_: [f64; 2], ahead: f64| mix(paint, HAZE, haze_share(ahead, half_m));
+            let side = |_: [f64; 2], ahead: f64| mix(lit(paint, 0.7), HAZE, haze_share(ahead, half_m));
+            self.depth.triangle(&view, corners.map(|at| corner(at, 0.0)), &top);
+            for (a, b) in [(0, 1), (1, 2), (2, 0)] {
+                let [a, b] = [corners[a], corners[b]];
+                let hung = [corner(a, DECK_SIDE_M), corner(b, DECK_SIDE_M)];
+                self.depth.triangle(&view, [corner(a, DECK_HUNG_M), corner(b, DECK_HUNG_M), hung[1]], &side);
+                self.depth.triangle(&view, [corner(a, DECK_HUNG_M), hung[1], hung[0]], &side);
+            }
         }
     }
 
@@ -489,6 +525,29 @@ mod tests {
             differing += usize::from((0..3).any(|i| 24 < a[i].abs_diff(b[i])));
         }
         assert!(5000 < inside && differing < inside / 50, "{differing} of {inside}");
+    }
+
+    #[test]
+    fn bridges_hang_above_the_ground_in_the_colour_of_their_class() {
+        let ground = Facets::of_tin(&every_post(&hills(60)), SPACING_M);
+        let [west, south, east, north] = ground.extent_m;
+        let up = ground.range_m().1 + 40.0;
+        let at = |aside: f64, on: f64| [(west + east) / 2.0 + aside, (south + north) / 2.0 + on, up];
+        let deck = [at(-300.0, -100.0), at(300.0, -100.0), at(300.0, 100.0)];
+        let decked = Facets { decks: vec![(deck, 3)], ..ground.clone() };
+        assert!(decked.shows(Cover::Feature(3)) && !decked.has(Cover::Feature(3)));
+        let look = Look::overlooking(&Surface::Triangles(&ground), 30.0, 1.0, 200);
+        for draw in [draw_perspective, draw_wireframe] {
+            let [without, with] = [&ground, &decked].map(|facets| draw(&Surface::Triangles(facets), &look).image);
+            let pixels = (0..200 * 112).map(|at| (at % 200, at / 200));
+            let changed = pixels.filter(|&(x, y)| without.pixel(x, y) != with.pixel(x, y)).count();
+            assert!((20..4000).contains(&changed), "{changed} pixels changed");
+        }
+        let image = draw_perspective(&Surface::Triangles(&decked), &look).image;
+        let [color, haze] = [FEATURES[3].1, HAZE];
+        let is_deck =
+            |found: [u8; 3]| (0..3).all(|i| (color[i].min(haze[i])..=color[i].max(haze[i])).contains(&found[i]));
+        assert!((0..200).any(|x| (0..112).any(|y| is_deck(image.pixel(x, y)))));
     }
 
     #[test]

@@ -20,7 +20,7 @@ pub struct Scene<'a> {
     pub frame: GridFrame,
     /// The part that is looked at.
     pub part: ModuleRect,
-    /// The load modules of that part, row by row from the south-west; their decks are counted, but not drawn yet.
+    /// The load modules of that part, row by row from the south-west.
     pub modules: &'a [LoadModule],
     /// The ground they stand for, where it is there to look at.
     pub ground: Option<SceneGround<'a>>,

@@ -9,6 +9,7 @@ pub use random::drawn;
 
 mod bad_input;
 mod bytes;
+mod left_out;
 mod refused;
 mod roads;
 mod water;

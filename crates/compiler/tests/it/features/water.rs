@@ -1,6 +1,6 @@
 //! Rivers and lakes.
 
-use database::LineRole;
+use database::{FeatureRemark, LineRole};
 use features::Kind;
 
 use super::drawing::{At, Drawing, Laid, SIDE_M, line, polygon};
@@ -84,6 +84,7 @@ fn a_road_over_a_river_without_a_bridge_is_a_culvert() {
     ];
     let laid = Drawing::new(noisy, &drawn).built();
     assert!(laid.was_told("a road crosses a river without a bridge"), "{:?}", laid.level.remarks);
+    assert!(laid.level.remarks.iter().any(FeatureRemark::is_culvert), "{:?}", laid.level.remarks);
     assert_eq!(laid.class((1000.0, 1010.0)), "primary");
 }
 

@@ -8,7 +8,7 @@ use super::kept::{KeptRelation, KeptWay, SEGMENT_M_MAX};
 use super::kinds::is_area;
 use super::nodes::{Nodes, degrees};
 use crate::features::clip::Vertex;
-use crate::features::model::Tags;
+use crate::features::model::{Done, Tags};
 use crate::features::nest::{Nested, nested};
 use crate::features::placing::{LEFT_OUT, Placing};
 use crate::features::raw::{Part, RawFeature, RawShape};
@@ -25,6 +25,9 @@ pub(super) fn place(nodes: &Nodes, ways: Vec<KeptWay>, relations: Vec<KeptRelati
         Drawer { nodes, ways: &[], placing, drawn: HashSet::new() }.way(way, &drawn);
     }
 }
+
+/// What is done with a ring that cannot be used.
+const RING_LEFT_OUT: Done = Done::LeftOut("the ring left out");
 
 struct Drawer<'a> {
     nodes: &'a Nodes,
@@ -48,7 +51,7 @@ impl Drawer<'_> {
         let id = format!("way/{}", way.id);
         if drawn.contains(&way.id) {
             let found = "the outline of a relation with the same tags".into();
-            return self.placing.remark(&id, None, found, "read once, with the relation");
+            return self.placing.remark(&id, None, found, Done::Kept("read once, with the relation"));
         }
         let is_closed = 4 <= way.nodes.len() && way.nodes.first() == way.nodes.last();
         let run = match self.run(&way.nodes) {
@@ -63,7 +66,7 @@ impl Drawer<'_> {
         let parts = if is_closed && is_area(&way.tags) {
             match closed(run) {
                 Some(ring) => {
-                    self.tell(&id, at, fault, "joined across");
+                    self.tell(&id, at, fault, Done::Kept("joined across"));
                     vec![Part::Polygon(vec![ring])]
                 }
                 None => {
@@ -77,7 +80,7 @@ impl Drawer<'_> {
                 let found = fault.unwrap_or_else(|| "fewer than 2 nodes".into());
                 return self.left_out(&id, at, found);
             }
-            self.tell(&id, at, fault, "cut there");
+            self.tell(&id, at, fault, Done::Kept("cut there"));
             lines.into_iter().map(Part::Line).collect()
         };
         self.feature(id, way.tags, parts);
@@ -88,7 +91,7 @@ impl Drawer<'_> {
         self.placing.count_left_out();
     }
 
-    fn tell(&mut self, id: &str, at: Option<[f64; 2]>, fault: Option<String>, done: &'static str) {
+    fn tell(&mut self, id: &str, at: Option<[f64; 2]>, fault: Option<String>, done: Done) {
         if let Some(fault) = fault {
             self.placing.remark(id, at, fault, done);
         }
@@ -162,7 +165,7 @@ impl Drawer<'_> {
                 self.left_out(&id, at, found);
             }
             polygons => {
-                self.tell(&id, at, fault, "its closed rings kept, the others left out");
+                self.tell(&id, at, fault, Done::LeftOut("its closed rings kept, the others left out"));
                 self.note_drawn(&relation.tags, outlines);
                 self.feature(id, relation.tags, polygons.into_iter().map(Part::Polygon).collect());
             }
@@ -192,17 +195,17 @@ impl Drawer<'_> {
                     let fault = run.fault();
                     match closed(run) {
                         Some(ring) => {
-                            self.tell(id, at, fault, "joined across");
+                            self.tell(id, at, fault, Done::Kept("joined across"));
                             placed.push((role, ring));
                         }
                         None => {
                             let found = fault.unwrap_or_else(|| "a ring of fewer than 3 places".into());
-                            self.tell(id, at, Some(found), "the ring left out");
+                            self.tell(id, at, Some(found), RING_LEFT_OUT);
                         }
                     }
                 }
                 Err(node) => {
-                    self.tell(id, at, Some(format!("its node {node} is not on the Earth")), "the ring left out");
+                    self.tell(id, at, Some(format!("its node {node} is not on the Earth")), RING_LEFT_OUT);
                 }
             }
         }
@@ -213,7 +216,7 @@ impl Drawer<'_> {
             match (depth % 2, inside) {
                 (1, Some(outer)) => holes.push((outer, ring)),
                 (0, _) if role == Role::Inner => {
-                    self.tell(id, at, Some("an inner ring outside all outer rings".into()), "the ring left out");
+                    self.tell(id, at, Some("an inner ring outside all outer rings".into()), RING_LEFT_OUT);
                 }
                 _ => polygons.push((index, vec![ring])),
             }

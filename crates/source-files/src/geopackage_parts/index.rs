@@ -8,7 +8,10 @@ const EXTENSION: &str = "gpkg_rtree_index";
 const DEFINITION: &str = "http://www.geopackage.org/spec120/#extension_rtree";
 
 /// Builds the index of a layer whose features are all there. Their extents stand at the head of each geometry.
-pub(crate) fn add(connection: &Connection, layer: &str) -> rusqlite::Result<()> {
+///
+/// # Errors
+/// When the library cannot write.
+pub fn add_index(connection: &Connection, layer: &str) -> rusqlite::Result<()> {
     connection.execute_batch(&format!(
         "CREATE TABLE IF NOT EXISTS gpkg_extensions (
              table_name TEXT, column_name TEXT, extension_name TEXT NOT NULL, definition TEXT NOT NULL,
@@ -24,7 +27,7 @@ pub(crate) fn add(connection: &Connection, layer: &str) -> rusqlite::Result<()> 
 }
 
 fn fill(connection: &Connection, layer: &str) -> rusqlite::Result<()> {
-    let mut features = connection.prepare(&format!("SELECT fid, geom FROM {layer}"))?;
+    let mut features = connection.prepare(&format!("SELECT fid, geom FROM {layer} WHERE geom NOTNULL"))?;
     let mut add = connection.prepare(&format!("INSERT INTO rtree_{layer}_geom VALUES (?1, ?2, ?3, ?4, ?5)"))?;
     let mut rows = features.query([])?;
     while let Some(row) = rows.next()? {

@@ -10,27 +10,27 @@ const POINT_Z: u32 = 1001;
 const LINE_Z: u32 = 1002;
 
 /// A polygon of one ring; `ring` does not repeat its first place.
-pub(crate) fn polygon(srs: i32, ring: &[[f64; 2]]) -> Vec<u8> {
+pub fn polygon(srs: i32, ring: &[[f64; 2]]) -> Vec<u8> {
     blob(srs, POLYGON, ring)
 }
 
 /// The same with heights.
-pub(crate) fn polygon_z(srs: i32, ring: &[[f64; 3]]) -> Vec<u8> {
+pub fn polygon_z(srs: i32, ring: &[[f64; 3]]) -> Vec<u8> {
     blob(srs, POLYGON_Z, ring)
 }
 
 /// A place.
-pub(crate) fn point(srs: i32, place: [f64; 2]) -> Vec<u8> {
+pub fn point(srs: i32, place: [f64; 2]) -> Vec<u8> {
     with_places(head(srs, &[place]), &[POINT], &[place])
 }
 
 /// A place with its height.
-pub(crate) fn point_z(srs: i32, place: [f64; 3]) -> Vec<u8> {
+pub fn point_z(srs: i32, place: [f64; 3]) -> Vec<u8> {
     with_places(head(srs, &[place]), &[POINT_Z], &[place])
 }
 
 /// A line with heights.
-pub(crate) fn line_z(srs: i32, places: &[[f64; 3]]) -> Vec<u8> {
+pub fn line_z(srs: i32, places: &[[f64; 3]]) -> Vec<u8> {
     with_places(head(srs, places), &[LINE_Z, places.len() as u32], places)
 }
 

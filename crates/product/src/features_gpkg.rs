@@ -2,14 +2,14 @@
 //! and what was mended, degraded or left out.
 
 use std::collections::BTreeMap;
-use std::path::Path;
 
 use database::{AreaLevel, FeatureLine, FeatureRemark, LineRole};
+use job::Job;
 use rusqlite::{Connection, params};
+use source_files::geopackage_parts::{Extent, Layer, Package, add_index, line_z, point, point_z, polygon_z};
+use views::outcome;
 
-use crate::gpkg::{Layer, Package};
-use crate::gpkg_geometry::{line_z, point, point_z, polygon_z};
-use crate::{ExportError, gpkg_index};
+use crate::ProductError;
 
 const LINES: Layer = Layer {
     name: "lines",
@@ -17,6 +17,7 @@ const LINES: Layer = Layer {
     columns: &[
         ("feature", "TEXT"),
         ("class", "TEXT"),
+        ("form", "TEXT"),
         ("role", "TEXT"),
         ("width_m", "DOUBLE"),
         ("length_m", "DOUBLE"),
@@ -47,50 +48,69 @@ const REMARKS: Layer = Layer {
     geometry: "POINT",
     has_z: false,
 };
+/// What was decided of roads and water where they cross.
+const CULVERTS: Layer = Layer {
+    name: "culverts",
+    description: "places where a channel passes below a road",
+    columns: &[("feature", "TEXT")],
+    geometry: "POINT",
+    has_z: false,
+};
 
-/// Roads, rivers and lakes of an area.
-#[derive(Clone, Copy, Debug)]
-pub struct FeatureLayers<'a> {
-    /// Name of the area's coordinate system, such as `EPSG:32611`.
-    pub crs: &'a str,
-    /// West, south, east and north of the area, in metres.
-    pub extent_m: [f64; 4],
-    /// Names of the job's classes.
-    pub classes: &'a [String],
-    /// What features came to.
-    pub level: &'a AreaLevel,
-    /// What was mended, degraded or left out, and which of these.
-    pub remarks: &'a [(&'static str, &'a FeatureRemark)],
-}
-
-/// Writes a GeoPackage of features at `path`, where no file may be.
+/// What features of a job came to in this area, as a GeoPackage. The same always gives the same bytes.
 ///
 /// # Errors
-/// When it cannot be written.
-pub fn write_features_gpkg(path: &Path, layers: &FeatureLayers) -> Result<(), ExportError> {
-    write(path, layers).map_err(|error| ExportError::write("GeoPackage")(std::io::Error::other(error)))
+/// When there is no room to make it.
+pub fn features_package(job: &Job, level: &AreaLevel, remarks: &[FeatureRemark]) -> Result<Vec<u8>, ProductError> {
+    let ([west, south], [wide, high]) = (job.area.origin_m, job.area.size_m());
+    let layers = FeatureLayers {
+        epsg: job.area.epsg,
+        extent_m: [west, south, west + wide, south + high],
+        classes: &job.class_names(),
+        level,
+        remarks,
+    };
+    write(&layers).map_err(|error| ProductError::Package { message: error.to_string() })
 }
 
-fn write(path: &Path, layers: &FeatureLayers) -> rusqlite::Result<()> {
-    let mut connection = Connection::open(path)?;
-    // The file has a temporary name until it is whole, so nothing has to survive a crash.
-    connection.execute_batch("PRAGMA journal_mode = OFF; PRAGMA synchronous = OFF;")?;
+struct FeatureLayers<'a> {
+    epsg: u32,
+    extent_m: Extent,
+    classes: &'a [String],
+    level: &'a AreaLevel,
+    remarks: &'a [FeatureRemark],
+}
+
+/// In memory: what a file holds besides depends on where it lies.
+fn write(layers: &FeatureLayers) -> rusqlite::Result<Vec<u8>> {
+    let mut connection = Connection::open_in_memory()?;
     let transaction = connection.transaction()?;
-    let epsg = layers.crs.strip_prefix("EPSG:").and_then(|code| code.parse().ok());
-    let package = Package { connection: &transaction, srs: epsg.unwrap_or(-1) };
-    package.describe(layers.crs)?;
+    let package = Package { connection: &transaction, srs: layers.epsg.cast_signed() };
+    package.describe(&format!("EPSG:{}", layers.epsg))?;
     add_lines(&package, layers)?;
     add_nodes(&package, layers)?;
     add_decks(&package, layers)?;
+    add_culverts(&package, layers)?;
     add_remarks(&package, layers)?;
-    for layer in [LINES, NODES, DECKS, REMARKS] {
-        gpkg_index::add(&transaction, layer.name)?;
+    for layer in [LINES, NODES, DECKS, CULVERTS, REMARKS] {
+        add_index(&transaction, layer.name)?;
     }
-    transaction.commit()
+    transaction.commit()?;
+    Ok(connection.serialize("main")?.to_vec())
 }
 
 fn class_of(layers: &FeatureLayers, class: u8) -> String {
     layers.classes.get(usize::from(class)).cloned().unwrap_or_default()
+}
+
+/// The form that a line belongs to.
+fn form_of(role: LineRole) -> &'static str {
+    match role {
+        LineRole::Centre | LineRole::Channel | LineRole::Breakline => "line",
+        LineRole::Side => "strip",
+        LineRole::Toe => "bench",
+        LineRole::Shore | LineRole::Bank => "polygon",
+    }
 }
 
 fn add_lines(package: &Package, layers: &FeatureLayers) -> rusqlite::Result<()> {
@@ -105,6 +125,7 @@ fn add_lines(package: &Package, layers: &FeatureLayers) -> rusqlite::Result<()> 
             line_z(package.srs, vertices),
             feature,
             class_of(layers, *class),
+            form_of(*role),
             role.name(),
             width_m,
             length,
@@ -140,13 +161,20 @@ fn add_decks(package: &Package, layers: &FeatureLayers) -> rusqlite::Result<()> 
     Ok(())
 }
 
-/// Those without a place stand in the south-west corner of the area.
+fn add_culverts(package: &Package, layers: &FeatureLayers) -> rusqlite::Result<()> {
+    let mut add = package.begin(&CULVERTS, layers.extent_m)?;
+    for remark in layers.remarks.iter().filter(|remark| remark.is_culvert()) {
+        add.execute(params![remark.at_m.map(|place| point(package.srs, place)), remark.feature])?;
+    }
+    Ok(())
+}
+
+/// Those without a place have no geometry.
 fn add_remarks(package: &Package, layers: &FeatureLayers) -> rusqlite::Result<()> {
-    let [west, south, ..] = layers.extent_m;
     let mut add = package.begin(&REMARKS, layers.extent_m)?;
-    for (outcome, remark) in layers.remarks {
-        let place = remark.at_m.unwrap_or([west, south]);
-        add.execute(params![point(package.srs, place), remark.feature, outcome, remark.found, remark.done])?;
+    for remark in layers.remarks {
+        let FeatureRemark { feature, at_m, found, done, .. } = remark;
+        add.execute(params![at_m.map(|place| point(package.srs, place)), feature, outcome(remark), found, done])?;
     }
     Ok(())
 }
@@ -159,46 +187,57 @@ fn length_m(a: [f64; 3], b: [f64; 3]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use database::FeatureFace;
+    use database::{CULVERT, FeatureFace};
 
-    #[test]
-    fn lines_nodes_bridges_and_remarks_are_layers_of_their_own() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("features.gpkg");
-        let line = |vertices: Vec<[f64; 3]>| FeatureLine {
+    fn remark(at_m: Option<[f64; 2]>, done: &str) -> FeatureRemark {
+        let (feature, found) = ("way 3".to_owned(), "a spike".to_owned());
+        FeatureRemark { feature, at_m, found, done: done.into(), leaves_out: true, degrades: false }
+    }
+
+    fn package() -> Vec<u8> {
+        let line = |role, vertices: Vec<[f64; 3]>| FeatureLine {
             feature: "way 1".into(),
             class: 1,
-            role: LineRole::Centre,
+            role,
             width_m: 7.0,
             grade_max_ppm: 100_000,
             vertices,
         };
         let middle = [30.0, 40.0, 2.5];
-        let lines = vec![line(vec![[0.0, 0.0, 0.0], middle]), line(vec![middle, [30.0, 140.0, 2.5]])];
+        let lines = vec![
+            line(LineRole::Centre, vec![[0.0, 0.0, 0.0], middle]),
+            line(LineRole::Centre, vec![middle, [30.0, 140.0, 2.5]]),
+            line(LineRole::Side, vec![middle, [60.0, 140.0, 2.5]]),
+        ];
         let deck = FeatureFace { feature: "way 2".into(), class: 1, ring: vec![[0.0; 3], [5.0, 0.0, 1.0], middle] };
         let level = AreaLevel { lines, decks: vec![deck], ..AreaLevel::default() };
-        let remark = FeatureRemark {
-            feature: "way 3".into(),
-            at_m: None,
-            found: "a spike".into(),
-            done: "left out".into(),
-            leaves_out: true,
-            degrades: false,
-        };
         let classes = ["plain", "primary"].map(str::to_owned);
+        let remarks = [remark(None, "left out"), remark(Some([5.0, 6.0]), CULVERT)];
         let extent_m = [0.0, 0.0, 500.0, 500.0];
-        let remarks = [("left out", &remark)];
-        let layers = FeatureLayers { crs: "EPSG:32611", extent_m, classes: &classes, level: &level, remarks: &remarks };
-        write_features_gpkg(&path, &layers).unwrap();
+        write(&FeatureLayers { epsg: 32611, extent_m, classes: &classes, level: &level, remarks: &remarks }).unwrap()
+    }
+
+    #[test]
+    fn lines_nodes_bridges_culverts_and_remarks_are_layers_of_their_own() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("features.gpkg");
+        std::fs::write(&path, package()).unwrap();
         let package = Connection::open(&path).unwrap();
         let number = |query: &str| -> f64 { package.query_row(query, [], |row| row.get(0)).unwrap() };
-        let counts =
-            ["lines", "nodes", "decks", "remarks"].map(|layer| number(&format!("SELECT count(*) + 0.0 FROM {layer}")));
-        assert_eq!(counts, [2.0, 3.0, 1.0, 1.0]);
+        let counts = ["lines", "nodes", "decks", "culverts", "remarks", "remarks WHERE geom IS NULL"]
+            .map(|layer| number(&format!("SELECT count(*) + 0.0 FROM {layer}")));
+        assert_eq!(counts, [3.0, 3.0, 1.0, 1.0, 2.0, 1.0]);
         assert_eq!(number("SELECT grade_found_percent FROM lines WHERE fid = 1"), 5.0);
         assert_eq!(number("SELECT grade_max_percent FROM lines WHERE fid = 2"), 10.0);
         assert_eq!(number("SELECT lines + 0.0 FROM nodes ORDER BY lines DESC LIMIT 1"), 2.0);
-        let class: String = package.query_row("SELECT class FROM decks", [], |row| row.get(0)).unwrap();
-        assert_eq!(class, "primary");
+        let text = |query: &str| -> String { package.query_row(query, [], |row| row.get(0)).unwrap() };
+        assert_eq!(text("SELECT class FROM decks"), "primary");
+        assert_eq!(text("SELECT group_concat(form) FROM lines"), "line,line,strip");
+        assert_eq!(text("PRAGMA integrity_check"), "ok");
+    }
+
+    #[test]
+    fn the_same_features_give_the_same_bytes() {
+        assert!(package() == package());
     }
 }
