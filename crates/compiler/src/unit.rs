@@ -88,6 +88,7 @@ impl<'a> Session<'a> {
     }
 
     fn make(&self, unit: Unit) -> Result<(), CompileError> {
+        self.check_lines(unit)?;
         let fingerprint = match (unit.stage, unit.tile) {
             (Stage::Profile, Some(tile)) => profile_tile(&self.run, tile)?.into_inner().0.blake3,
             (Stage::Level, None) => level_area(&self.run)?.into_inner().0.blake3,
@@ -113,6 +114,20 @@ impl<'a> Session<'a> {
                 Ok(())
             }
             _ => Err(self.spoilt(unit, level)),
+        }
+    }
+
+    /// What features put into the tile of a unit must lie on the disk as the area's file lists it.
+    fn check_lines(&self, unit: Unit) -> Result<(), CompileError> {
+        let area = &self.run.area;
+        let (Some(settled), Some(tile)) = (&self.run.level, unit.tile) else { return Ok(()) };
+        if unit.stage == Stage::Profile {
+            return Ok(());
+        }
+        let folder = self.run.database.folder();
+        match folder.check_file(&folder.lines_path(tile), &settled.level.tiles[area.tiling.index(tile)]) {
+            Ok(()) => Ok(()),
+            Err(_) => Err(self.spoilt(unit, Unit::whole(Stage::Level))),
         }
     }
 

@@ -94,8 +94,8 @@ pub fn feature_table(job: &Job) -> Result<Option<FeatureTable>, GroundError> {
     Ok(Some(FeatureTable { rows, sources: seen.into_iter().map(|(_, seen)| seen).collect(), notes }))
 }
 
-/// What a person should know of what becomes of features: files of which no feature has a kind, rules that decide nothing.
-/// `names` has the number and the name of each file.
+/// What a person should know of what becomes of features: files of which no feature has a kind, rules that decide
+/// nothing. `names` has the number and the name of each file.
 pub(crate) fn notes_on(overview: &Overview, all: &[Source], names: &[(u32, &str)], spec: &FeaturesSpec) -> Vec<String> {
     let mut notes = Vec::new();
     for &(number, name) in names {
@@ -207,8 +207,8 @@ fn columns<'a>(features: impl Iterator<Item = &'a Source>) -> String {
 
 fn no_kind(name: &str, without_kind: usize, columns: &str) -> String {
     format!(
-        "{name}: its features in the area have no kind by their tags ({columns}) and are left out, {without_kind} in all; \
-         name one, as {{ file = \"…\", kind = \"track\" }}, or write a rule"
+        "{name}: its features in the area have no kind by their tags ({columns}) and are left out, {without_kind} in \
+         all; name one, as {{ file = \"…\", kind = \"track\" }}, or write a rule"
     )
 }
 

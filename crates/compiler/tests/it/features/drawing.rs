@@ -107,7 +107,7 @@ pub struct Laid {
 }
 
 impl Laid {
-    pub fn open(scene: &Scene) -> Self {
+    fn open(scene: &Scene) -> Self {
         let folder = Folder::new(scene.path("area.tdb"));
         let area = ground::GamingArea::new(&scene.job).unwrap();
         let of = |&tile: &TileId| (folder.read_lines(tile).unwrap().1, folder.read_tile(tile).unwrap().1.tin);
@@ -167,7 +167,7 @@ impl Laid {
 
     /// What must hold of any features: all edges are there, no grade is exceeded, no river rises, lakes are level.
     #[track_caller]
-    pub fn check(&self) {
+    fn check(&self) {
         for (features, tin) in &self.tiles {
             assert_eq!(missing(features, tin), 0, "edges of features that tile {} has not", features.tile);
         }

