@@ -147,7 +147,11 @@ fn shares(run: &Run, curves: Option<&Curves>) -> Result<Shares, CompileError> {
     let floor = goal.as_ref().map(|goal| goal.floor);
     // What is optimised needs fewer points for the same residual: each tile is to come down to its part of it.
     let goal = goal.filter(|_| optimising(run.job).is_some());
-    let points: Option<Vec<usize>> = match (run.job.tin.budget, curves) {
+    let budget = match run.job.tin.budget {
+        PointBudget::Points(points) => PointBudget::Points(run.points_beside_features(points)),
+        PointBudget::Limits => PointBudget::Limits,
+    };
+    let points: Option<Vec<usize>> = match (budget, curves) {
         (PointBudget::Points(points), None) => Some(points_equally(points, area.tiles.len())),
         (PointBudget::Points(points), Some(curves)) => {
             let mut bands = curves.bands();
@@ -175,7 +179,7 @@ fn shares(run: &Run, curves: Option<&Curves>) -> Result<Shares, CompileError> {
     };
     let tiles = allowances.into_iter().enumerate().map(|(index, mut allowance)| {
         if let (Some(points), Some(allowance)) = (&points, &mut allowance) {
-            // Every point costs the same; `plan` has made sure that all of them fit.
+            // Every point costs the same, and all of them fit.
             allowance.triangles = points[index] as u32 * terrain::POINT_COST;
         }
         TileBudget {
