@@ -9,8 +9,8 @@ use crate::CompileError;
 use crate::keys;
 use crate::read_features::ReadFeatures;
 
-/// The fingerprint of what features of an area come to, from their files, which `records` name, and from the ground along
-/// them as it is published; `None` where that is not the ground along these features, or the job has none.
+/// The fingerprint of what features of an area come to, from their files, which `records` name, and from the ground
+/// along them as it is published; `None` where that is not the ground along these features, or the job has none.
 ///
 /// # Errors
 /// When a file cannot be read.

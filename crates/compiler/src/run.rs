@@ -6,10 +6,10 @@ use std::sync::{Arc, OnceLock};
 use database::{AreaLevel, Database, FileStamp, Manifest, SourceRecord};
 use engine::{Cause, FingerprintBuilder, Outcome, Stamp};
 use ground::{GamingArea, Ground, Window};
-use job::Job;
+use job::{Budget as PointBudget, Edges, Job};
 use schedule::{Event as Scheduled, RankedTasks, Workers, in_rank_order_observed};
 use source_files::FileState;
-use terrain::{TileFeatures, TileId, TileTin};
+use terrain::{POINT_COST, TileFeatures, TileId, TileTin};
 
 use crate::left_out::LeftOut;
 use crate::read_features::ReadFeatures;
@@ -159,7 +159,26 @@ impl Run<'_> {
     /// What a person should know of what the run was made from.
     pub fn warnings(&self) -> Vec<String> {
         let of_features = self.level.iter().flat_map(|settled| &settled.level.notes);
-        self.ground.warnings.iter().chain(of_features).cloned().collect()
+        let fewer = match self.job.tin.budget {
+            PointBudget::Points(asked) => Some((asked, self.points_beside_features(asked))),
+            PointBudget::Limits => None,
+        };
+        let fewer = fewer.filter(|(asked, fit)| fit < asked).map(|(asked, fit)| {
+            format!(
+                "tin.points: {asked} are asked for, and beside roads and water {fit} fit limits.mean_per_load_module"
+            )
+        });
+        self.ground.warnings.iter().chain(of_features).cloned().chain(fewer).collect()
+    }
+
+    /// Of so many points that a job asks for, those that the limit of the area leaves room for beside features. Without
+    /// features `plan` has made sure that all of them fit.
+    pub fn points_beside_features(&self, asked: u64) -> u64 {
+        let budget = &self.area.budget;
+        if budget.reserved.is_empty() || self.job.modules.edges != Edges::Constrained {
+            return asked;
+        }
+        asked.min(budget.area.saturating_sub(budget.start_total()) / u64::from(POINT_COST))
     }
 
     /// What features put into a tile; nothing in jobs without them.

@@ -110,26 +110,9 @@ pub(crate) fn allocate(
     progress: &mut dyn Progress,
 ) -> Result<Shares, CompileError> {
     progress.tell(Event::Enter(Stage::Allocate, 0));
-    let budget = points_left(run, progress);
-    let shares = shares(run, curves, budget)?;
+    let shares = shares(run, curves)?;
     progress.tell(Event::Leave(Stage::Allocate));
     Ok(shares)
-}
-
-/// The budget of points that a job asks for, as far as features leave room for it under the limit of the area.
-fn points_left(run: &Run, progress: &mut dyn Progress) -> PointBudget {
-    let budget = &run.area.budget;
-    match (run.job.tin.budget, run.job.modules.edges) {
-        (PointBudget::Points(points), Edges::Constrained) => {
-            let room = budget.area.saturating_sub(budget.start_total()) / u64::from(terrain::POINT_COST);
-            if room < points {
-                let note = format!("features leave room for {room} of the {points} points that the job asks for");
-                progress.tell(Event::Note(note));
-            }
-            PointBudget::Points(points.min(room))
-        }
-        (budget, _) => budget,
-    }
 }
 
 /// A survey lets every tile choose on all its sides and so predicts a little better than tiles will do.
@@ -157,13 +140,17 @@ impl Goal {
     }
 }
 
-fn shares(run: &Run, curves: Option<&Curves>, budget: PointBudget) -> Result<Shares, CompileError> {
+fn shares(run: &Run, curves: Option<&Curves>) -> Result<Shares, CompileError> {
     let area = &run.area;
     let by_rank = area.by_rank();
     let goal = curves.map(|curves| Goal::new(run, curves)).transpose()?.flatten();
     let floor = goal.as_ref().map(|goal| goal.floor);
     // What is optimised needs fewer points for the same residual: each tile is to come down to its part of it.
     let goal = goal.filter(|_| optimising(run.job).is_some());
+    let budget = match run.job.tin.budget {
+        PointBudget::Points(points) => PointBudget::Points(run.points_beside_features(points)),
+        PointBudget::Limits => PointBudget::Limits,
+    };
     let points: Option<Vec<usize>> = match (budget, curves) {
         (PointBudget::Points(points), None) => Some(points_equally(points, area.tiles.len())),
         (PointBudget::Points(points), Some(curves)) => {

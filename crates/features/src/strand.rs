@@ -40,7 +40,8 @@ pub struct Strand {
     pub class: u16,
     /// Which feature it comes from.
     pub id: FeatureId,
-    /// Its places with their heights in quanta, in order, those of a channel downstream; a closed one repeats its first.
+    /// Its places with their heights in quanta, in order, those of a channel downstream; a closed one repeats its
+    /// first.
     pub stations: Vec<(Place, i32)>,
 }
 

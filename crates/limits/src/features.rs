@@ -12,8 +12,8 @@ use crate::{Allowance, Charged, ModuleLines, ShortOf, Shortfall};
 /// Triangles that features add to each load module, by load module.
 pub type FeatureCost = BTreeMap<ModuleId, u32>;
 
-/// What features cost in the load modules of `grid`; what lies outside of it costs nothing. `border` are the posts that the outer border starts with, in
-/// ascending order: a vertex on one of them costs nothing more.
+/// What features cost in the load modules of `grid`; what lies outside of it costs nothing. `border` are the posts that
+/// the outer border starts with, in ascending order: a vertex on one of them costs nothing more.
 pub fn feature_cost(features: &Features, grid: ModuleGrid, border: &[Post]) -> FeatureCost {
     let steps = features.steps_per_post;
     let south_west = ModuleId { row: 0, col: 0 };

@@ -179,8 +179,8 @@ impl<'a> Decided<'a> {
         let (row, col) = expected.keys().chain(found.keys()).copied().find(|at| expected.get(at) != found.get(at))?;
         let [found, expected] = [&found, &expected].map(|of| of.get(&(row, col)).copied().unwrap_or(0));
         Some(format!(
-            "survey/features.level: features cost {found} triangles of load module {row},{col}, their vertices and decks \
-             come to {expected}"
+            "survey/features.level: features cost {found} triangles of load module {row},{col}, their vertices and \
+             decks come to {expected}"
         ))
     }
 
@@ -203,13 +203,13 @@ impl<'a> Decided<'a> {
         let (class, (pieces, fall)) = less?;
         let found = listed(*class);
         Some(format!(
-            "survey/features.level: class {class} has {} pieces of strips that fall across by {} quanta at most, the files \
-             of tiles have {pieces} and {fall}",
+            "survey/features.level: class {class} has {} pieces of strips that fall across by {} quanta at most, the \
+             files of tiles have {pieces} and {fall}",
             found.pieces, found.fall_max
         ))
     }
 
-    /// Two triangles for each vertex inside a load module, one for each on its side; those of edges beyond the area, too.
+    /// Two triangles for each vertex inside a load module, one for each on its side.
     fn of_vertices(&self, level: &AreaLevel) -> BTreeMap<(i32, i32), u32> {
         let side = self.steps * self.area.grid.side_cells;
         let mut triangles: BTreeMap<(i32, i32), u32> = BTreeMap::new();
@@ -252,7 +252,8 @@ impl<'a> Decided<'a> {
         let id = grid.all().iter().find(is_wrong)?;
         let found = reserved[grid.index(id)];
         Some(format!(
-            "survey/features.level: {found} triangles of load module {id} are reserved, which is not what features come to"
+            "survey/features.level: {found} triangles of load module {id} are reserved, which is not what features \
+             come to"
         ))
     }
 

@@ -6,8 +6,8 @@ use terrain::FeatureSurface;
 
 use super::laid::{At, Laid, Square, is_on, turn};
 
-/// What is wrong with the decks of a load module: corners that are not there, corners of no deck, or less or more of them
-/// than the polygons cover.
+/// What is wrong with the decks of a load module: corners that are not there, corners of no deck, or less or more than
+/// the polygons cover.
 pub(crate) fn wrong_decks(laid: &Laid, square: &Square) -> Option<String> {
     let decks: Vec<Deck> = laid.features.decks.iter().map(|deck| Deck::of(laid, deck)).collect();
     let found = &square.module.decks;

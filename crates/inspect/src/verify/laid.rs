@@ -40,7 +40,7 @@ impl Laid<'_> {
             ];
             problems.extend(found.into_iter().flatten().map(|what| format!("load module {id}: {what}")));
         }
-        problems.extend(bodies.iter().filter_map(|body| self.tilted(body, &kept)));
+        problems.extend(bodies.iter().filter_map(|body| self.tilted(body, &bodies, &kept)));
         problems
     }
 
@@ -70,10 +70,15 @@ impl Laid<'_> {
     }
 
     /// A lake whose shore has another height than most of it, where no other feature gives it one.
-    fn tilted(&self, lake: &Body, kept: &Kept) -> Option<String> {
+    fn tilted(&self, lake: &Body, bodies: &[Body], kept: &Kept) -> Option<String> {
         let level = lake.level()?;
         let own: HashSet<[At; 2]> = lake.edges().flat_map(|[a, b]| [[a, b], [b, a]]).collect();
-        let others: HashSet<At> = kept.edges.iter().filter(|edge| !own.contains(*edge)).flatten().copied().collect();
+        let edges = kept.edges.iter().filter(|edge| !own.contains(*edge)).flatten().copied();
+        // Roads may share edges with a shore, and so may other water.
+        let roads = self.features.slopes.iter().flatten().map(|vertex| self.at(vertex.at));
+        let rings =
+            bodies.iter().filter(|body| !std::ptr::eq(*body, lake)).flat_map(|body| body.rings.iter().flatten());
+        let others: HashSet<At> = edges.chain(roads).chain(rings.map(|(at, _)| *at)).collect();
         let ring = lake.rings.iter().flatten();
         let found = ring.filter_map(|(at, height)| {
             let stands = kept.heights.get(at).filter(|_| !others.contains(at)).unwrap_or(height);

@@ -5,7 +5,7 @@ use std::fs;
 use super::drawing::Drawing;
 use crate::scene::{EPSG, ORIGIN_M, Scene, Words};
 
-/// One feature: properties as they stand in JSON, and places in metres from the area's corner, as they stand there, too.
+/// One feature: properties and geometry as they stand in JSON.
 struct Raw {
     properties: String,
     geometry: String,

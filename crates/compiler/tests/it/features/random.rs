@@ -2,8 +2,8 @@
 //! ways that run back and cross themselves. Whatever is drawn, the product is whole, keeps its limits, and is the same
 //! from any number of workers.
 //!
-//! A failure prints its seed; `TIEFORT_SEED=n` runs that one alone, `TIEFORT_JOBS=n` the first n. Seeds that once failed
-//! stay in `KEPT`.
+//! A failure prints its seed; `TIEFORT_SEED=n` runs that one alone, `TIEFORT_JOBS=n` the first n, and
+//! `TIEFORT_KEEP=FOLDER` leaves job and features there. Seeds that once failed stay in `KEPT`.
 
 use std::fs;
 
@@ -19,7 +19,7 @@ use crate::scene::{Draw, Scene, Words, assert_same, write_dem};
 /// Drawings tried in every run.
 const JOBS: u64 = 40;
 /// Seeds that once showed a fault.
-const KEPT: [u64; 0] = [];
+const KEPT: [u64; 2] = [113, 137];
 
 const LINES: [&str; 14] = [
     "highway=motorway",
@@ -126,6 +126,11 @@ fn run(seed: u64) -> bool {
     let dem = ground(&mut draw, &words);
     let features = drawn(&mut draw, words.size);
     let scene = Scene::with_files(&words, |folder| {
+        if let Ok(kept) = std::env::var("TIEFORT_KEEP") {
+            fs::write(format!("{kept}/{seed}.geojson"), geojson(&features)).unwrap();
+            fs::write(format!("{kept}/{seed}.toml"), words.text()).unwrap();
+            write_dem(&std::path::Path::new(&kept).join("dem.tif"), &dem);
+        }
         write_dem(&folder.join("dem.tif"), &dem);
         fs::write(folder.join("features.geojson"), geojson(&features)).unwrap();
     });
