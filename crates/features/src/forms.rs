@@ -78,12 +78,17 @@ pub fn form(graded: &Graded, strands: &[Strand], site: &Site) -> Formed {
     let pieces = pieces(network, heights, beside, site, &stays, grants);
     remark_narrow(network, &pieces, &mut remarks);
     let mut wide = wide_segments(&pieces);
-    let thinned: Vec<Strand> = strands.iter().flat_map(|strand| thinned(strand, grants, site, &stays)).collect();
+    let mut thinned: Vec<Strand> = strands.iter().flat_map(|strand| thinned(strand, grants, site, &stays)).collect();
     let mut formed = round_together(graded, &pieces, &mut wide, &thinned, site);
     for _ in 0..ROUNDS_LEVEL {
-        let tilted = tilted(&formed, network, &wide);
-        if tilted.is_empty() {
+        let (tilted, uneven) = (tilted(&formed, network, &wide), uneven(&formed));
+        if tilted.is_empty() && uneven.is_empty() {
             break;
+        }
+        for (lake, place) in uneven {
+            lower(&mut thinned, &lake);
+            let mut notes = Notes { id: lake.id, lattice: site.lattice, remarks: &mut remarks };
+            notes.write_at(place, Flaw::LevelsDisagree, Remedy::Levelled);
         }
         tilted.into_iter().for_each(|number| wide[number as usize].room = Room::None);
         formed = round_together(graded, &pieces, &mut wide, &thinned, site);
@@ -114,6 +119,46 @@ fn round_together(graded: &Graded, pieces: &[Piece], wide: &mut [Wide], thinned:
     formed.faces.sort_by(|a, b| (a.class, &a.corners).cmp(&(b.class, &b.corners)));
     formed.decks.sort_by(|a, b| (a.class, &a.corners).cmp(&(b.class, &b.corners)));
     formed
+}
+
+/// A lake that meets water of a lower level, which is its level from now on.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Uneven {
+    id: FeatureId,
+    level: i32,
+    to: i32,
+}
+
+/// Lakes whose shores cross lower ones, each with a place where they do: what a dam left on both of its sides may meet
+/// in a sharp corner. What is travelled keeps its height where it crosses a shore.
+fn uneven(formed: &Formed) -> BTreeMap<Uneven, Place> {
+    let mut travelled: HashSet<u32> = HashSet::new();
+    for edge in formed.edges.iter().filter(|edge| edge.role <= Role::Centre) {
+        travelled.extend([edge.a, edge.b]);
+    }
+    // The height that was decided for a place where nothing is travelled.
+    let decided = |(place, _): &(Place, i32)| {
+        let found = formed.points.binary_search_by_key(place, |(other, _)| *other).ok()?;
+        (!travelled.contains(&(found as u32))).then_some((formed.points[found].1, *place))
+    };
+    let mut uneven = BTreeMap::new();
+    for lake in formed.surfaces.iter().filter(|surface| surface.role == Role::Shore) {
+        let level = lake.ring.iter().map(|(_, height)| *height).max();
+        if let (Some(level), Some((to, place))) = (level, lake.ring.iter().filter_map(decided).min())
+            && to < level
+        {
+            uneven.insert(Uneven { id: lake.id, level, to }, place);
+        }
+    }
+    uneven
+}
+
+/// Lowers the shores of a lake, those of its islands too.
+fn lower(strands: &mut [Strand], lake: &Uneven) {
+    let is_its = |strand: &&mut Strand| strand.role == Role::Shore && strand.id == lake.id;
+    for (_, height) in strands.iter_mut().filter(is_its).flat_map(|strand| &mut strand.stations) {
+        *height = if *height == lake.level { lake.to } else { *height };
+    }
 }
 
 /// Strips that another line would tilt, or that would make one too steep: those of which a corner has the height of a

@@ -86,6 +86,8 @@ pub enum Flaw {
         /// What was filled, in whole cubic metres.
         cubic_metres: i64,
     },
+    /// Level water that meets water of another level.
+    LevelsDisagree,
     /// Two features of different class in one place.
     Overlap,
     /// A strip narrower than four steps of the lattice.
@@ -141,6 +143,7 @@ impl Flaw {
             Flaw::FlowsUphill => "it is drawn uphill",
             Flaw::FlowsInCircle => "its water flows in a circle",
             Flaw::NoLineInside => "no line runs inside it and its shore is not level",
+            Flaw::LevelsDisagree => "it meets water of another level",
             Flaw::Overlap => "it overlaps a higher class",
             Flaw::TooNarrow => "it is narrower than four lattice steps",
             Flaw::OverShare => "features take more than their share of a load module",
