@@ -1,8 +1,8 @@
 # What the scripts that run real engines share: a job of 36 tiles, its bytes from a local build, and the comparison.
 # Sourced with `scratch` and `tiefort` set.
 
-# The job: 18 km x 18 km of the sample terrain, or `SIZE_M` metres, with its roads, washes and lakes unless `FEATURES` is
-# empty.
+# The job: 18 km x 18 km of the sample terrain, or `SIZE_M` metres, with its roads, washes and lakes unless `FEATURES`
+# is empty.
 make_job() {
     local size=${SIZE_M:-18000}
     sed -e "s/size_m = \[4000, 4000\]/size_m = [$size, $size]/" -e 's/columns = 2/columns = 6/' \

@@ -69,11 +69,11 @@ struct Arm {
 /// All features in their load modules.
 pub(crate) fn crowds(graded: &Graded, strands: &[Strand], site: &Site) -> Crowds {
     let shared = shared_places(graded.network, strands);
-    let mut crowds: BTreeMap<(i32, i32), (BTreeMap<(u16, FeatureId), Member>, Points)> = BTreeMap::new();
+    let mut crowds: BTreeMap<(i32, i32), Counting> = BTreeMap::new();
     for (number, tolerance) in TOLERANCES.into_iter().enumerate() {
         let grants = Grants::same(Grant { tolerance, ..Grant::ALL });
         for arm in arms(&Graded { grants: &grants, ..*graded }, strands, site, &|place| shared.contains(&place)) {
-            let (members, points) = crowds.entry(arm.module).or_default();
+            let Counting { members, points } = crowds.entry(arm.module).or_default();
             let member = members.entry((arm.class, arm.id)).or_insert_with(|| Member {
                 class: arm.class,
                 id: arm.id,
@@ -98,11 +98,18 @@ pub(crate) fn crowds(graded: &Graded, strands: &[Strand], site: &Site) -> Crowds
             }
         }
     }
-    let crowd = |(members, points): (BTreeMap<_, Member>, Points)| Crowd {
+    let crowd = |Counting { members, points }: Counting| Crowd {
         members: members.into_values().collect(),
         points: points.triangles,
     };
     crowds.into_iter().map(|(module, found)| (module, crowd(found))).collect()
+}
+
+/// A load module while its features are counted, by class and feature.
+#[derive(Default)]
+struct Counting {
+    members: BTreeMap<(u16, FeatureId), Member>,
+    points: Points,
 }
 
 /// The places of one load module in the order in which they are met.

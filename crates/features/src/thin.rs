@@ -132,7 +132,8 @@ mod tests {
         ) {
             let (mut height, mut stations) = (0, Vec::new());
             for (at, (rise, row)) in rises.iter().enumerate() {
-                stations.push(Station { place: Place::new(*row, 64 * at as i32), height, stays: at % 7 == 3, flat: [0; 2] });
+                let place = Place::new(*row, 64 * at as i32);
+                stations.push(Station { place, height, stays: at % 7 == 3, flat: [0; 2] });
                 height += rise;
             }
             let kept = thin(&stations, Tolerance::USUAL, 60_000, lattice());
