@@ -19,14 +19,17 @@ mod ears;
 mod exchange;
 mod flips;
 mod form;
+mod goals;
 mod hold;
 mod insertion;
+mod lattice;
 mod moments;
 mod parts;
 mod patch;
 mod place;
 mod queue;
 mod refit;
+mod refusals;
 mod removal;
 mod sweep;
 mod tenants;
@@ -34,6 +37,7 @@ mod thin;
 mod tile_mesh;
 mod weave;
 mod weighted_heights;
+mod work;
 
 #[cfg(test)]
 mod feature_cases;
