@@ -2,9 +2,9 @@
 
 use terrain::StopReason;
 
-use crate::exchange::{Exchange, Terms};
+use crate::gains::Gains;
 use crate::parts::NONE;
-use crate::thin::{Shears, Until, thin};
+use crate::thin::{Filling, Until};
 use crate::work::Work;
 
 impl Work<'_, '_> {
@@ -19,17 +19,17 @@ impl Work<'_, '_> {
 
     pub fn thin_to_goal(&mut self) {
         if let Some(goal) = self.goal() {
-            self.thin_until(Until::Squares(goal));
+            self.thin_until(Until::Squares(goal), Filling::Fitted);
         }
     }
 
     /// Inserts until the RMS residual is good enough, if it is not.
     pub fn reach_goal(&mut self) {
         const AT_ONCE: usize = 16;
-        let mut exchange = Exchange::default();
+        let mut gains = Gains::default();
         self.sheet.stir_all();
         while self.goal().is_some_and(|goal| goal < self.sheet.squares())
-            && 0 < self.exchange_once(&mut exchange, Terms::OnlyInsert, AT_ONCE)
+            && 0 < gains.insert(&mut self.sheet, &mut self.account, AT_ONCE, &mut self.insertion)
         {}
     }
 
@@ -43,8 +43,7 @@ impl Work<'_, '_> {
                 return;
             }
             self.account.keep_back(self.account.dearest() * above.len() as i64);
-            let shears = Shears { removal: &mut self.removal, mover: &mut self.mover, largest: Some(largest) };
-            thin(&mut self.sheet, &mut self.account, Until::Afforded, shears);
+            self.thin_until(Until::Afforded, Filling::Below(largest));
             self.account.keep_back(0);
             for (triangle, corners) in above {
                 if self.sheet.triangles[triangle as usize].corners == corners {
@@ -71,7 +70,8 @@ impl Work<'_, '_> {
         above.into_iter().map(|(_, triangle, corners)| (triangle, corners)).collect()
     }
 
-    /// Inserts at the worst post of a triangle; where there is no room for a vertex, moves the nearest one there.
+    /// Inserts at the worst post of a triangle; where there is no room for a vertex, moves the nearest one there, or
+    /// takes it out.
     fn insert_worst(&mut self, triangle: u32) {
         let corners = self.sheet.triangles[triangle as usize].corners;
         let Some((_, at)) = self.sheet.worst(corners) else { return };
@@ -79,7 +79,11 @@ impl Work<'_, '_> {
             let away = |corner: &u32| self.sheet.at(*corner).squared_distance(at);
             let mut nearest = corners;
             nearest.sort_unstable_by_key(away);
-            let _ = nearest.into_iter().any(|corner| self.mover.put(&mut self.sheet, corner, at));
+            let is_put = nearest.into_iter().any(|corner| self.mover.put(&mut self.sheet, corner, at));
+            if !is_put {
+                // Without one of its corners there is room for the post in the next round.
+                let _ = nearest.into_iter().any(|corner| self.take_out(corner));
+            }
             return;
         };
         let guest = self.sheet.vertices[found.vertex as usize];

@@ -17,7 +17,7 @@ impl Work<'_, '_> {
 
     /// Puts every vertex on the final lattice; those without a place there go, and what they cost is spent again.
     pub fn snap(&mut self) {
-        self.mover.steps.inner = self.final_step();
+        self.mover.step = self.final_step();
         let all = 0..self.sheet.vertices.len() as u32;
         let mut homeless: Vec<u32> = all.filter(|&vertex| !self.has_place(vertex, Shape::Sound)).collect();
         // Once its neighbours stand on the lattice, a vertex finds a place or can go; a place between triangles of any
@@ -47,7 +47,7 @@ impl Work<'_, '_> {
     }
 
     /// Takes a vertex out, if that leaves a valid mesh.
-    fn take_out(&mut self, vertex: u32) -> bool {
+    pub fn take_out(&mut self, vertex: u32) -> bool {
         let can_go = self.removal.find(&self.sheet, vertex).is_some();
         can_go && self.let_go(vertex)
     }

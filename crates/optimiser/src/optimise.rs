@@ -4,14 +4,17 @@ use limits::Shortfall;
 use terrain::{Dem, Importance, LATTICE_PER_POST, LatticePoint, Refusal, StopReason, Tin};
 
 use crate::account::Account;
+use crate::deep_flips::deep_flips;
+use crate::descent::descend;
 use crate::flips::flip_all;
+use crate::heights::fit_heights;
 use crate::hold::Hold;
 use crate::insertion::Insertion;
 use crate::parts::{Layout, Parts};
 use crate::place::{PER_POST, Place};
-use crate::recipe::Recipe;
+use crate::recipe::{Recipe, Step};
 use crate::removal::Removal;
-use crate::sweep::{Mover, Steps};
+use crate::sweep::Mover;
 use crate::task::Task;
 use crate::tile_mesh::TileMesh;
 use crate::weave::weave;
@@ -103,7 +106,7 @@ fn work_on(dem: &Dem, importance: &Importance, start: &Tin, task: &Task, steps: 
         sheet,
         account,
         task,
-        mover: Mover::new(Steps { inner: 1, pattern: false }),
+        mover: Mover::new(1),
         removal: Removal::default(),
         insertion: Insertion::default(),
         cheapest: None,
@@ -115,42 +118,50 @@ fn work_on(dem: &Dem, importance: &Importance, start: &Tin, task: &Task, steps: 
 }
 
 impl Work<'_, '_> {
-    /// Measured: flips first, or the sweep moves vertices of a mesh that no flip has adapted yet; thinning between
-    /// sweeps, because a vertex is worth what it is worth once its neighbours stand well.
     fn run(&mut self) {
-        let recipe = Recipe::of(self.task.effort);
-        if recipe.stages.is_empty() {
-            // Moved on the final lattice from the start, nothing has to be snapped: a third sweep costs less and gains
-            // more.
-            self.mover.steps.inner = self.final_step();
-        }
         self.check();
-        flip_all(&mut self.sheet);
-        self.check();
-        for stage in recipe.stages {
-            self.mover.sweep_and_flip(&mut self.sheet, 1);
-            self.check();
-            self.thin(stage - 1.0);
+        for &step in Recipe::of(self.task.effort).steps {
+            self.take(step);
             self.check();
         }
-        self.thin_to_goal();
-        self.mover.sweep_and_flip(&mut self.sheet, recipe.sweeps);
-        if recipe.rounds == 0 {
-            self.relieve();
-        }
-        self.exchange(recipe.rounds);
-        for _ in 0..recipe.cycles {
-            self.cycle();
-        }
-        self.check();
-        self.thin_to_goal();
-        self.meet_limits();
-        self.snap();
-        self.check();
-        self.mover.steps.pattern = true;
-        self.mover.sweep_and_flip(&mut self.sheet, recipe.last_sweeps);
         self.reach_goal();
         self.sheet.round_heights();
         self.meet_largest();
+    }
+
+    fn take(&mut self, step: Step) {
+        let final_step = self.final_step();
+        let Self { sheet, mover, .. } = self;
+        match step {
+            Step::OnLattice => mover.step = final_step,
+            Step::Flip => {
+                sheet.stir_all();
+                flip_all(sheet);
+            }
+            Step::Sweep => {
+                sheet.stir_all();
+                mover.sweep(sheet);
+                flip_all(sheet);
+            }
+            Step::SweepStirred => {
+                mover.sweep(sheet);
+                flip_all(sheet);
+            }
+            Step::Thin(times, by) => {
+                self.thin(times, by);
+                if times <= 1.0 {
+                    self.thin_to_goal();
+                }
+            }
+            Step::DeepFlip(rounds) => deep_flips(sheet, mover, rounds),
+            Step::Descend(steps) => descend(sheet, steps, mover.step),
+            Step::Grow(times) => self.grow(times),
+            Step::Snap => {
+                self.thin_to_goal();
+                self.meet_limits();
+                self.snap();
+            }
+            Step::FitHeights(steps) => fit_heights(sheet, steps),
+        }
     }
 }

@@ -7,7 +7,7 @@ use crate::moments::Sums;
 use crate::patch::Patch;
 use crate::place::{Place, Shape, is_eased};
 use crate::refit::Fit;
-use crate::tile_mesh::{Star, TileMesh};
+use crate::tile_mesh::{Star, TileMesh, next};
 
 /// Corners of a hole, at most.
 const CORNERS_MAX: usize = 13;
@@ -23,9 +23,19 @@ pub(crate) struct Removal {
 }
 
 impl Removal {
-    /// What removing a vertex costs in squares; its patch is then ready to be applied. `None` where it cannot go.
+    /// What removing a vertex costs in squares once the heights around it are fitted again; its patch is then ready to
+    /// be applied. `None` where it cannot go.
     #[inline(always)]
     pub fn find(&mut self, sheet: &TileMesh, vertex: u32) -> Option<f64> {
+        let cost = self.find_as_it_is(sheet, vertex)?;
+        let free = |&vertex: &u32| sheet.vertices[vertex as usize].hold.height_is_free();
+        self.patch.refit.extend(self.star.ring.iter().copied().filter(free));
+        Some(cost - self.fit.refit(sheet, &mut self.patch))
+    }
+
+    /// The same with all heights as they are.
+    #[inline(always)]
+    pub fn find_as_it_is(&mut self, sheet: &TileMesh, vertex: u32) -> Option<f64> {
         let record = &sheet.vertices[vertex as usize];
         if !sheet.is_vertex(vertex) || record.hold.is_fixed() {
             return None;
@@ -40,14 +50,12 @@ impl Removal {
             self.other_side.clear();
             self.other_side.extend_from_slice(&ring[second..]);
             self.other_side.extend_from_slice(&ring[..=first]);
-            self.hole.fill(sheet, &ring[first..=second], &mut self.patch)?
-                + self.hole.fill(sheet, &self.other_side, &mut self.patch)?
+            self.hole.fill(sheet, &ring[first..=second], &[], &mut self.patch)?
+                + self.hole.fill(sheet, &self.other_side, &[], &mut self.patch)?
         } else {
-            self.hole.fill(sheet, &self.star.ring, &mut self.patch)?
+            self.hole.fill(sheet, &self.star.ring, &self.star.edges, &mut self.patch)?
         };
-        let free = |&vertex: &u32| sheet.vertices[vertex as usize].hold.height_is_free();
-        self.patch.refit.extend(self.star.ring.iter().copied().filter(free));
-        Some(new - self.fit.refit(sheet, &mut self.patch) - old)
+        Some(new - old)
     }
 
     /// Removing a vertex whatever the shapes of the triangles that fill its hole; its patch is then ready to be
@@ -116,9 +124,10 @@ impl Default for Hole {
 
 impl Hole {
     /// Appends the triangles that fill a counter-clockwise polygon with the fewest squares, and gives these; `None`
-    /// where it has no valid triangulation or too many corners.
+    /// where it has no valid triangulation or too many corners. Where the polygon is a star's ring, `spokes` are the
+    /// star's edges, and what is summed along the ring is not summed again.
     #[inline(always)]
-    fn fill(&mut self, sheet: &TileMesh, polygon: &[u32], patch: &mut Patch) -> Option<f64> {
+    fn fill(&mut self, sheet: &TileMesh, polygon: &[u32], spokes: &[u32], patch: &mut Patch) -> Option<f64> {
         let n = polygon.len();
         if n < 3 {
             return Some(0.0);
@@ -133,7 +142,13 @@ impl Hole {
         self.has_features = sheet.has_features;
         for i in 0..n {
             for j in i + 1..n {
-                self.chords[i][j] = sheet.ground.moments.edge(self.at[i], self.at[j]);
+                self.chords[i][j] = if j == i + 1 && i < spokes.len() {
+                    sheet.sums_of(next(spokes[i]))
+                } else if i == 0 && j + 1 == n && spokes.len() == n {
+                    -sheet.sums_of(next(spokes[j]))
+                } else {
+                    sheet.ground.moments.edge(self.at[i], self.at[j])
+                };
             }
             if i + 1 < n {
                 self.best[i][i + 1] = 0.0;

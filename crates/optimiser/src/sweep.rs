@@ -5,7 +5,6 @@
 //! surface is continuous, so posts that change hands do not matter. The normal equations of such a step need only the
 //! forms of the triangles. No post is read.
 
-use crate::flips::flip_all;
 use crate::form::{Form, Hinge};
 use crate::hold::Hold;
 use crate::moments::Sums;
@@ -18,8 +17,13 @@ use crate::tile_mesh::{Star, TileMesh, next};
 const PLANE_DAMPING: (f64, f64) = (0.01, 0.02);
 /// Normal equations flatter than this have no step.
 const LEAST_DETERMINANT: f64 = 1e-4;
-/// Lattice places that are tried for a vertex, of 36 around it: two more gain nothing (measured).
-const SNAPS_TRIED: usize = 8;
+/// Lattice places that are tried for a vertex, of 36 around it: more gain nothing (measured).
+const SNAPS_TRIED: usize = 3;
+/// Parts of a Gauss-Newton step that are tried; the first that beats a change of height alone is taken. The ground
+/// bends less than its linearisation at the vertex says, so steps beyond the whole one pay most.
+const STEPS_TRIED: [f64; 3] = [2.0, 0.7, 0.25];
+/// Steps that promise less than this part of the mean squares of a triangle are not tried.
+const LEAST_PROMISE: f64 = 0.0;
 /// A step goes no further than this part of the farthest neighbour's distance.
 const STEP_MAX: f64 = 0.6;
 /// A move that gains this part of the mean squares of a triangle stirs its surroundings.
@@ -27,18 +31,12 @@ const STIRRING_SHARE: f64 = 0.005;
 /// Quanta squared that a move has to gain at least.
 const LEAST_GAIN: f64 = 1e-5;
 
-/// Steps of vertices.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Steps {
-    /// In 64ths of a post. On the tile's border, where a neighbour goes on from posts, vertices move from post to post.
-    pub inner: i32,
-    /// Whether single steps in the four directions are tried too.
-    pub pattern: bool,
-}
-
 /// Moves vertices of a sheet.
 pub(crate) struct Mover {
-    pub steps: Steps,
+    /// In 64ths of a post. On the tile's border, where a neighbour goes on from posts, vertices move from post to post.
+    pub step: i32,
+    /// Squares that a step has to promise.
+    least_promise: f64,
     /// Gain above which a move stirs its surroundings.
     stirring: f64,
     star: Star,
@@ -74,9 +72,10 @@ struct Normal {
 }
 
 impl Mover {
-    pub fn new(steps: Steps) -> Self {
+    pub fn new(step: i32) -> Self {
         Self {
-            steps,
+            step,
+            least_promise: 0.0,
             stirring: f64::INFINITY,
             star: Star::default(),
             around: Vec::new(),
@@ -88,26 +87,23 @@ impl Mover {
         }
     }
 
-    /// Moves every vertex once, or every stirred one. Gives the squares gained.
-    pub fn sweep(&mut self, sheet: &mut TileMesh, only_stirred: bool) -> f64 {
-        self.stirring = STIRRING_SHARE * sheet.squares() / sheet.triangle_count as f64;
-        let mut gain = 0.0;
-        for vertex in 0..sheet.vertices.len() as u32 {
-            if sheet.is_vertex(vertex) && (!only_stirred || sheet.vertices[vertex as usize].is_stirred) {
-                gain += self.relax(sheet, vertex);
-            }
-        }
-        self.stirring = f64::INFINITY;
-        gain
+    /// Sets what counts as little, by the mean squares of a triangle.
+    pub fn aim(&mut self, mean_squares: f64) {
+        self.least_promise = LEAST_PROMISE * mean_squares;
     }
 
-    /// Sweeps over all vertices, each followed by flips.
-    pub fn sweep_and_flip(&mut self, sheet: &mut TileMesh, sweeps: usize) {
-        for _ in 0..sweeps {
-            sheet.stir_all();
-            self.sweep(sheet, false);
-            flip_all(sheet);
+    /// Moves every stirred vertex once; only what moves far is stirred afterwards.
+    pub fn sweep(&mut self, sheet: &mut TileMesh) {
+        let mean = sheet.mean_squares();
+        self.aim(mean);
+        let all = 0..sheet.vertices.len() as u32;
+        let stirred: Vec<u32> = all.filter(|&v| sheet.is_vertex(v) && sheet.vertices[v as usize].is_stirred).collect();
+        sheet.vertices.iter_mut().for_each(|vertex| vertex.is_stirred = false);
+        self.stirring = STIRRING_SHARE * mean;
+        for vertex in stirred {
+            self.relax(sheet, vertex);
         }
+        self.stirring = f64::INFINITY;
     }
 
     /// Moves one vertex to a better place, if there is one, and to its best height. Gives the squares gained.
@@ -139,9 +135,7 @@ impl Mover {
             let stand = self.stand(sheet, at, record.height, record.hold);
             if stand.squares < best.squares - LEAST_GAIN {
                 best = stand;
-                if !self.steps.pattern {
-                    break;
-                }
+                break;
             }
         }
         self.settle(sheet, vertex, best);
@@ -176,7 +170,7 @@ impl Mover {
     /// The normal equations say in which order the places are promising, and the first few valid ones are tried.
     pub fn snap(&mut self, sheet: &mut TileMesh, vertex: u32, shape: Shape) -> bool {
         let record = sheet.vertices[vertex as usize];
-        let step = self.step(sheet, &record);
+        let step = self.step_of(sheet, &record);
         if record.hold.is_fixed() || (record.at.x % step == 0 && record.at.y % step == 0) {
             return true;
         }
@@ -224,10 +218,10 @@ impl Mover {
     }
 
     #[inline(always)]
-    fn step(&self, sheet: &TileMesh, record: &Vertex) -> i32 {
+    fn step_of(&self, sheet: &TileMesh, record: &Vertex) -> i32 {
         let (at, far) = (record.at, sheet.ground.far());
         let is_on_border = at.x == 0 || at.y == 0 || at.x == far.x || at.y == far.y;
-        if is_on_border { PER_POST } else { self.steps.inner }
+        if is_on_border { PER_POST } else { self.step }
     }
 
     #[inline(always)]
@@ -288,26 +282,21 @@ impl Mover {
     }
 
     fn find_candidates(&mut self, sheet: &TileMesh, record: &Vertex, normal: &Normal) {
-        let step = self.step(sheet, record);
+        let step = self.step_of(sheet, record);
         let (from, hold) = (record.at, record.hold);
-        if let Some((dx, dy)) = normal.step(hold) {
-            for part in [1.0, 0.5, 0.25] {
-                let round = |from: i32, by: f64| {
-                    let to = f64::from(from) + part * by * f64::from(PER_POST);
-                    (to / f64::from(step)).round() as i32 * step
-                };
-                let at = held_to_line(Place::new(round(from.x, dx), round(from.y, dy)), from, hold);
-                if at != from && is_inside(sheet, at) && !self.candidates.contains(&at) {
-                    self.candidates.push(at);
-                }
-            }
+        let plane = normal.plane();
+        let Some((dx, dy)) = normal.step(&plane, hold) else { return };
+        if plane.u * dx + plane.w * dy < self.least_promise {
+            return;
         }
-        if self.steps.pattern {
-            for (i, j) in [(1, 0), (-1, 0), (0, 1), (0, -1)] {
-                let at = held_to_line(Place::new(from.x + i * step, from.y + j * step), from, hold);
-                if at != from && is_inside(sheet, at) {
-                    self.candidates.push(at);
-                }
+        for part in STEPS_TRIED {
+            let round = |from: i32, by: f64| {
+                let to = f64::from(from) + part * by * f64::from(PER_POST);
+                (to / f64::from(step)).round() as i32 * step
+            };
+            let at = held_to_line(Place::new(round(from.x, dx), round(from.y, dy)), from, hold);
+            if at != from && is_inside(sheet, at) && !self.candidates.contains(&at) {
+                self.candidates.push(at);
             }
         }
     }
@@ -403,8 +392,8 @@ impl Normal {
 
     /// The damped Gauss-Newton step in the plane, in posts; `None` where there is none.
     #[inline(always)]
-    fn step(&self, hold: Hold) -> Option<(f64, f64)> {
-        let Plane { a, b, d, u, w } = self.plane();
+    fn step(&self, plane: &Plane, hold: Hold) -> Option<(f64, f64)> {
+        let &Plane { a, b, d, u, w } = plane;
         let (dx, dy) = match (hold.has(Hold::COLUMN), hold.has(Hold::ROW)) {
             (true, true) => return None,
             (true, false) => (0.0, w / d),

@@ -1,28 +1,20 @@
 //! What the steps of an optimisation share: the mesh, its account, and what each kind of change keeps between calls.
 
 use crate::account::Account;
-use crate::exchange::{Exchange, Terms, Tools};
-use crate::flips::flip_all;
+use crate::deep_thinning::thin_deep;
+use crate::gains::Gains;
 use crate::insertion::Insertion;
 use crate::queue::Queue;
+use crate::recipe::Thinning;
 use crate::removal::Removal;
 use crate::sweep::Mover;
 use crate::task::Task;
-use crate::thin::{Shears, Until, thin};
+use crate::thin::{Filling, Until, thin};
 use crate::tile_mesh::{Star, TileMesh};
 
 /// Limits of load modules and windows are met once the whole is this share over its budget: earlier, too much would
 /// go where ground is rough.
 const LIMITS_FROM: f64 = 0.1;
-/// One vertex in so many is exchanged in a round, at most.
-const ROUND_SHARE: usize = 10;
-/// Exchange ends with a round in which less than one vertex in so many was exchanged.
-const IDLE_SHARE: usize = 1000;
-/// Times the mean squares of a triangle above which a fast tile gives it a vertex in exchange for another: a lone post
-/// of many metres that a full window has refused.
-const RELIEVED_FROM: f64 = 25.0;
-/// How far a cycle grows beyond the budget.
-const CYCLE_SHARE: f64 = 0.2;
 
 /// Everything the steps work with.
 pub(crate) struct Work<'a, 'g> {
@@ -32,7 +24,7 @@ pub(crate) struct Work<'a, 'g> {
     pub mover: Mover,
     pub removal: Removal,
     pub insertion: Insertion,
-    /// Squares that the least useful vertex of the last exchange explains.
+    /// Squares that the least useful vertex explains, as far as thinning has found.
     pub cheapest: Option<f64>,
 }
 
@@ -42,61 +34,49 @@ impl Work<'_, '_> {
         debug_assert_eq!(self.sheet.fault(), None);
     }
 
-    /// Thins to the budget and a share more; to the limits of load modules and windows from a tenth over on.
-    pub fn thin(&mut self, share: f64) {
+    /// Thins to so many times the budget; to the limits of load modules and windows from a tenth over on.
+    pub fn thin(&mut self, times: f64, by: Thinning) {
+        let share = times - 1.0;
+        let filling = if by == Thinning::AsItIs { Filling::AsItIs } else { Filling::Fitted };
         if self.account.is_any_over() {
             self.account.lend(share.max(LIMITS_FROM));
-            self.thin_until(Until::Afforded);
+            self.thin_until(Until::Afforded, filling);
             if share <= LIMITS_FROM {
-                self.thin_until(Until::LimitsMet);
+                self.thin_until(Until::LimitsMet, filling);
             }
         }
         self.account.lend(share);
-        self.thin_until(Until::Afforded);
+        let last = match by {
+            Thinning::Deep(rest) => {
+                thin_deep(&mut self.sheet, &mut self.account, rest, &mut self.removal, &mut self.mover)
+            }
+            Thinning::AsItIs | Thinning::Fitted => self.thin_until(Until::Afforded, filling),
+        };
         self.account.lend(0.0);
+        self.cheapest = Some(last.unwrap_or(0.0).max(0.0));
         self.sheet.renumber();
     }
 
-    pub fn thin_until(&mut self, until: Until) {
-        let shears = Shears { removal: &mut self.removal, mover: &mut self.mover, largest: None };
-        thin(&mut self.sheet, &mut self.account, until, shears);
-    }
-
-    /// Rounds of flips, moves and exchange.
-    pub fn exchange(&mut self, rounds: usize) {
-        let mut exchange = Exchange::default();
-        self.sheet.stir_all();
-        for _ in 0..rounds {
-            flip_all(&mut self.sheet);
-            self.mover.sweep(&mut self.sheet, true);
-            self.mover.sweep(&mut self.sheet, true);
-            flip_all(&mut self.sheet);
-            let most = self.sheet.vertex_count / ROUND_SHARE;
-            if self.exchange_once(&mut exchange, Terms::OneForOne, most) <= self.sheet.vertex_count / IDLE_SHARE {
-                break;
-            }
-        }
-        // Without a round nobody knows what a vertex is worth.
-        self.cheapest = (0 < rounds).then(|| exchange.cheapest().unwrap_or(0.0));
-    }
-
-    pub fn exchange_once(&mut self, exchange: &mut Exchange, terms: Terms, most: usize) -> usize {
-        let mut tools = Tools { removal: &mut self.removal, insertion: &mut self.insertion };
-        exchange.round(&mut self.sheet, &mut self.account, terms, most, &mut tools)
-    }
-
-    /// Where limits have refused a vertex that is worth many others, one of these goes for it.
-    pub fn relieve(&mut self) {
-        let least = RELIEVED_FROM * self.sheet.squares() / self.sheet.triangle_count as f64;
-        let mut tools = Tools { removal: &mut self.removal, insertion: &mut self.insertion };
-        Exchange::default().relieve(&mut self.sheet, &mut self.account, least, &mut tools);
+    pub fn thin_until(&mut self, until: Until, filling: Filling) -> Option<f64> {
+        thin(&mut self.sheet, &mut self.account, until, filling, (&mut self.removal, &mut self.mover))
     }
 
     /// Inserts where it gains most while there is room.
     pub fn fill_up(&mut self) {
         if self.account.dearest() <= self.account.left() && self.task.rms_quanta.is_none() {
             self.sheet.stir_all();
-            self.exchange_once(&mut Exchange::default(), Terms::OnlyInsert, usize::MAX);
+            Gains::default().insert(&mut self.sheet, &mut self.account, usize::MAX, &mut self.insertion);
+        }
+    }
+
+    /// Grows to so many times the budget, where that is one.
+    pub fn grow(&mut self, times: f64) {
+        if self.task.rms_quanta.is_none() {
+            self.account.lend(times - 1.0);
+            self.insertion.tries_middles = true;
+            self.fill_by_squares();
+            self.insertion.tries_middles = false;
+            self.account.lend(0.0);
         }
     }
 
@@ -122,17 +102,5 @@ impl Work<'_, '_> {
             self.sheet.star(found.vertex, &mut star);
             star.triangles().for_each(|triangle| queue.enter(triangle, squares(&self.sheet, triangle)));
         }
-    }
-
-    /// Grows beyond the budget by true gains and thins again: out of one local optimum and into a better one.
-    pub fn cycle(&mut self) {
-        self.account.lend(CYCLE_SHARE);
-        self.fill_up();
-        self.account.lend(0.0);
-        self.sheet.stir_all();
-        flip_all(&mut self.sheet);
-        self.mover.sweep_and_flip(&mut self.sheet, 1);
-        self.thin(0.0);
-        self.mover.sweep_and_flip(&mut self.sheet, 2);
     }
 }
