@@ -48,7 +48,7 @@ pub(crate) enum Thinning {
 use Step::{DeepFlip, Descend, FitHeights, Flip, Grow, OnLattice, Snap, Sweep, SweepStirred, Thin};
 use Thinning::{AsItIs, Deep, Fitted};
 
-const FAST: &[Step] = &[OnLattice, Sweep, Thin(1.0, AsItIs), Sweep, DeepFlip(2), SweepStirred, Snap];
+const FAST: &[Step] = &[OnLattice, Sweep, Thin(1.0, AsItIs), Sweep, SweepStirred, SweepStirred, Snap];
 
 const NORMAL: &[Step] = &[
     Sweep,

@@ -21,9 +21,9 @@ const LEAST_DETERMINANT: f64 = 1e-4;
 const SNAPS_TRIED: usize = 3;
 /// Parts of a Gauss-Newton step that are tried; the first that beats a change of height alone is taken. The ground
 /// bends less than its linearisation at the vertex says, so steps beyond the whole one pay most.
-const STEPS_TRIED: [f64; 3] = [2.0, 0.7, 0.25];
+const STEPS_TRIED: [f64; 2] = [1.6, 0.5];
 /// Steps that promise less than this part of the mean squares of a triangle are not tried.
-const LEAST_PROMISE: f64 = 0.0;
+const LEAST_PROMISE: f64 = 0.008;
 /// A step goes no further than this part of the farthest neighbour's distance.
 const STEP_MAX: f64 = 0.6;
 /// A move that gains this part of the mean squares of a triangle stirs its surroundings.
