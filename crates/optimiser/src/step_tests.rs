@@ -121,6 +121,29 @@ fn flips_and_sweeps_never_raise_the_squares() {
 }
 
 #[test]
+fn every_instruction_level_gives_the_same_mesh() {
+    let mut meshes = Vec::new();
+    for (name, level) in geometry::levels_available() {
+        let dem = rough(RECT, 11);
+        let importance = patchy(RECT, 11);
+        let ground = WeightedHeights::new(&dem, &importance, SeamSides::OPEN, HeightFit::Squares);
+        let hold = |_: Place| Hold::FREE;
+        let mut sheet = sheet_of(&ground, &grid(&dem, 4), &Layout { line_step: None, hold: &hold });
+        let (mut mover, mut removal) = (Mover::at(level, 1), Removal::at(level));
+        sweep_all(&mut mover, &mut sheet);
+        let mut account = Account::new(&Budget::Triangles(200), &sheet);
+        thin_deep(&mut sheet, &mut account, 0.4, &mut removal, &mut mover);
+        sheet.renumber();
+        assert_eq!(sheet.fault(), None);
+        deep_flips(&mut sheet, &mut mover, 3);
+        meshes.push((name, format!("{:?} {:?}", sheet.vertices, sheet.triangles)));
+    }
+    for pair in meshes.windows(2) {
+        assert!(pair[0].1 == pair[1].1, "{} and {}", pair[0].0, pair[1].0);
+    }
+}
+
+#[test]
 fn deep_flips_gain_where_plain_ones_do_not() {
     with_sheet(|sheet, _| {
         let mut mover = Mover::new(1);

@@ -60,7 +60,7 @@ pub(crate) struct TileMesh<'a> {
     pub sums: Vec<[Sums; 3]>,
     pub triangle_count: usize,
     pub vertex_count: usize,
-    free_vertices: Vec<u32>,
+    pub(crate) free_vertices: Vec<u32>,
     pub(crate) free_triangles: Vec<u32>,
     line_step: Option<i32>,
     /// Edges of features, by their ends, the lesser first, in ascending order.
@@ -88,16 +88,6 @@ impl<'a> TileMesh<'a> {
         };
         sheet.fill(parts.vertices, &parts.triangles);
         sheet
-    }
-
-    /// Orders vertices and triangles along a curve again: a third of the time of all later steps on a large tile.
-    pub fn renumber(&mut self) {
-        let vertices = std::mem::take(&mut self.vertices);
-        let triangles: Vec<[u32; 3]> =
-            self.triangles.iter().map(|record| record.corners).filter(|corners| corners[0] != NONE).collect();
-        self.free_vertices.clear();
-        self.free_triangles.clear();
-        self.fill(vertices, &triangles);
     }
 
     fn fill(&mut self, vertices: Vec<Vertex>, triangles: &[[u32; 3]]) {
