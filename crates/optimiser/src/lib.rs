@@ -4,7 +4,8 @@
 //! Freed from all three, the same number of triangles follows the ground with well under half the residual.
 //! What carries it: (i) every vertex moves in x, y and height by Gauss-Newton steps on the true sum of squares, (ii)
 //! the moments of the posts under any triangle come from prefix sums along rows, and (iii) the mesh is grown beyond
-//! the budget first and thinned by what each vertex is truly worth.
+//! the budget first and thinned by what each vertex is truly worth. What decides in the end is topology: flips are
+//! judged by what comes of them once their vertices have moved.
 
 mod task;
 pub use task::{Budget, Task};
