@@ -108,15 +108,12 @@ impl Refinement {
             *allowance = Allowance {
                 triangles: more(allowance.triangles as usize) as u32,
                 module_room: room(&allowance.module_room),
-                window_room: match optimising.effort {
-                    Effort::Fast => allowance.window_room.clone(),
-                    Effort::Normal | Effort::Best => vec![NO_LIMIT; allowance.window_room.len()],
-                },
+                window_room: vec![NO_LIMIT; allowance.window_room.len()],
                 ..allowance.clone()
             };
         }
         let points = match self.most {
-            // A post makes two triangles at most, and two are there: a fast tile is never thinned, so must not exceed.
+            // A post makes two triangles at most, and two are there.
             Most::Triangles(triangles) => Some(more(triangles).saturating_sub(2) / 2),
             Most::AsTask => task.stop.points.map(more),
         };

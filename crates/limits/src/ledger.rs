@@ -115,27 +115,6 @@ impl Ledger {
         self.window_rows(module).any(|mut row| row.any(full)).then_some(RefusedBy::Window)
     }
 
-    /// The load modules of which every one counts in each limit that refuses `cost` more triangles in `module`: where
-    /// something has to go. `module` is one of them.
-    pub fn where_to_save(&self, module: ModuleId, cost: u32) -> ModuleRect {
-        let alone = ModuleRect { south: module.row, west: module.col, north: module.row + 1, east: module.col + 1 };
-        if self.room_of(module) < cost {
-            return alone;
-        }
-        let (windows, (rows, cols)) = (self.allowance.windows, self.allowance.window_size);
-        let full = |index: usize| self.allowance.window_room[index] < self.windows[index] + POINT_COST;
-        let mut common = self.allowance.modules;
-        for index in self.window_rows(module).flatten().filter(|&index| full(index)) {
-            let row = windows.south + index as u32 / windows.cols();
-            let col = windows.west + index as u32 % windows.cols();
-            common.south = common.south.max(row);
-            common.west = common.west.max(col);
-            common.north = common.north.min(row + rows);
-            common.east = common.east.min(col + cols);
-        }
-        common
-    }
-
     /// Spends `cost` triangles in `module`.
     ///
     /// # Panics
@@ -219,20 +198,6 @@ mod tests {
         // Windows at rows 0..=1, cols 0..=1 hold (1, 1); together they reach to row 3, column 3.
         assert_eq!(ledger.refuses(ModuleId { row: 3, col: 3 }, 1, false), Some(RefusedBy::Window));
         assert_eq!(ledger.refuses(ModuleId { row: 3, col: 4 }, 1, false), None);
-    }
-
-    #[test]
-    fn what_is_saved_where_the_ledger_says_makes_room() {
-        let mut ledger = ledger(100, 6);
-        let (south_west, inner) = (ModuleId { row: 1, col: 1 }, ModuleId { row: 2, col: 3 });
-        ledger.charge(south_west, 2);
-        ledger.charge(inner, 4);
-        // Only the windows that hold both are full.
-        let place = ledger.where_to_save(inner, 2);
-        assert_eq!(place, ModuleRect { south: 1, west: 1, north: 3, east: 4 });
-        ledger.refund(south_west, 2);
-        assert_eq!(ledger.refuses(inner, 2, false), None);
-        assert_eq!(ledger.where_to_save(inner, 97), ModuleRect { south: 2, west: 3, north: 3, east: 4 });
     }
 
     #[test]

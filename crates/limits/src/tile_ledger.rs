@@ -1,6 +1,6 @@
 //! The ledger of one tile, by place: what a point there is charged to, asked and booked in one go.
 
-use terrain::{ModuleId, ModuleRect, POINT_COST, RefusedBy};
+use terrain::{ModuleId, POINT_COST, RefusedBy};
 
 use crate::{Allowance, Charged, Ledger, ModuleLines};
 
@@ -86,16 +86,6 @@ impl TileLedger {
             Some(Charged::Between(first, second)) => self.ledger.is_over(first) || self.ledger.is_over(second),
             None => false,
         }
-    }
-
-    /// The load modules in which a point has to go before one can come there, where a limit refuses it.
-    pub fn where_to_save(&self, row: i32, col: i32) -> Option<ModuleRect> {
-        let (module, _) = self.refuses(row, col)?;
-        let cost = match self.lines.charged(row, col)? {
-            Charged::Inside(_) => POINT_COST,
-            Charged::Between(..) | Charged::Beside(_) => 1,
-        };
-        Some(self.ledger.where_to_save(module, cost))
     }
 
     /// What a point there is charged to; `None` for a load-module corner.

@@ -1,7 +1,7 @@
 //! What the mesh has and what it may have.
 
-use limits::{Charged, ShortOf, Shortfall, TileLedger};
-use terrain::{ModuleId, ModuleRect, POINT_COST, RefusedBy};
+use limits::{ShortOf, Shortfall, TileLedger};
+use terrain::{ModuleId, POINT_COST, RefusedBy};
 
 use crate::hold::Hold;
 use crate::parts::{NONE, Vertex};
@@ -68,11 +68,10 @@ impl Account {
 
     /// How many triangles (or vertices) more the whole may have.
     pub fn left(&self) -> i64 {
-        self.loan
-            + match &self.books {
-                Books::Total { left, .. } => *left,
-                Books::Limits(ledger) => ledger.counts().left(),
-            }
+        self.loan.saturating_add(match &self.books {
+            Books::Total { left, .. } => *left,
+            Books::Limits(ledger) => ledger.counts().left(),
+        })
     }
 
     /// What any vertex may cost.
@@ -100,28 +99,6 @@ impl Account {
     pub fn refuses(&self, at: Place) -> Option<(ModuleId, RefusedBy)> {
         let Books::Limits(ledger) = &self.books else { return None };
         ledger.refuses(at.y, at.x)
-    }
-
-    /// The load modules in which a vertex has to go before one can come there, where a limit refuses it.
-    pub fn where_to_save(&self, at: Place) -> Option<ModuleRect> {
-        let Books::Limits(ledger) = &self.books else { return None };
-        ledger.where_to_save(at.y, at.x)
-    }
-
-    /// The load module a place lies in, or the first of the two beside it; `None` for corners and without limits.
-    pub fn module_of(&self, at: Place) -> Option<ModuleId> {
-        let Books::Limits(ledger) = &self.books else { return None };
-        match ledger.charged(at.y, at.x)? {
-            Charged::Inside(module) | Charged::Between(module, _) | Charged::Beside(module) => Some(module),
-        }
-    }
-
-    /// Whether `guest` would fit if `vertex` were not there.
-    pub fn permits_instead_of(&mut self, vertex: &Vertex, guest: &Vertex) -> bool {
-        self.refund(vertex);
-        let permitted = self.permits(guest);
-        self.charge(vertex);
-        permitted
     }
 
     /// Whether a vertex fits into the total and every limit.

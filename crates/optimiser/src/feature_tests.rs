@@ -1,4 +1,4 @@
-//! Features in a tile: whatever is moved, flipped, thinned and exchanged around them, they stay.
+//! Features in a tile: whatever is moved, flipped, thinned and grown around them, they stay.
 
 use std::collections::BTreeMap;
 

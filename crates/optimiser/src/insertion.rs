@@ -19,6 +19,8 @@ const LEAST_FLIP_GAIN: f64 = 1e-3;
 pub(crate) struct Insertion {
     pub patch: Patch,
     pub fit: Fit,
+    /// Whether the middles of edges are tried beside the worst post: they stand on no lattice yet.
+    pub tries_middles: bool,
     /// The new vertex's star, counter-clockwise but for the order of its parts.
     faces: Vec<Face>,
 }
@@ -33,6 +35,14 @@ struct Face {
     /// Sums west of the edges to `from`, along the opposite edge, and to `to`.
     sums: [Sums; 3],
     squares: f64,
+}
+
+/// Where a vertex may come: the edge it splits, if any, and what holds it there.
+#[derive(Clone, Copy)]
+struct Site {
+    on_edge: Option<u32>,
+    at: Place,
+    hold: Hold,
 }
 
 /// A vertex to be.
@@ -57,20 +67,41 @@ impl Insertion {
     /// if it is not. `None` where nothing can be inserted.
     #[inline(always)]
     pub fn find(&mut self, sheet: &mut TileMesh, triangle: u32) -> Option<Found> {
+        let worst = self.worst_site(sheet, triangle);
+        if !self.tries_middles {
+            return self.try_site(sheet, triangle, worst?);
+        }
+        let middles: [Option<Site>; 3] = [0, 1, 2].map(|k| middle_site(sheet, triangle, k));
+        let mut best: Option<(f64, Site)> = None;
+        for site in worst.into_iter().chain(middles.into_iter().flatten()) {
+            let Some(Found { gain, vertex }) = self.try_site(sheet, triangle, site) else { continue };
+            sheet.drop_vertex(vertex);
+            if best.is_none_or(|(most, _)| most < gain) {
+                best = Some((gain, site));
+            }
+        }
+        let (_, site) = best?;
+        self.try_site(sheet, triangle, site)
+    }
+
+    /// Where the residual is largest.
+    #[inline(always)]
+    fn worst_site(&self, sheet: &TileMesh, triangle: u32) -> Option<Site> {
         let corners = sheet.triangles[triangle as usize].corners;
         let places = sheet.places(corners);
         let (_, at) = sheet.worst(corners)?;
         let (on_edge, hold) = self.classify(sheet, triangle, places, at)?;
-        let hold = hold.and(sheet.ground.height_hold(at));
-        let vertex = sheet.add_vertex(at, sheet.ground.height(at), hold);
-        let found = self.split(sheet, triangle, on_edge, vertex);
-        match found {
-            Some(gain) => Some(Found { gain, vertex }),
-            None => {
-                sheet.drop_vertex(vertex);
-                None
-            }
+        Some(Site { on_edge, at, hold: hold.and(sheet.ground.height_hold(at)) })
+    }
+
+    #[inline(always)]
+    fn try_site(&mut self, sheet: &mut TileMesh, triangle: u32, site: Site) -> Option<Found> {
+        let vertex = sheet.add_vertex(site.at, sheet.ground.height(site.at), site.hold);
+        let found = self.split(sheet, triangle, site.on_edge, vertex);
+        if found.is_none() {
+            sheet.drop_vertex(vertex);
         }
+        found.map(|gain| Found { gain, vertex })
     }
 
     /// The edge a place lies on, if any, and what holds a vertex there.
@@ -188,6 +219,19 @@ impl Insertion {
             }
         }
     }
+}
+
+/// The middle of an edge that is free to be split, where nothing holds a vertex.
+fn middle_site(sheet: &TileMesh, triangle: u32, k: usize) -> Option<Site> {
+    let edge = 4 * triangle + k as u32;
+    let (from, to) = sheet.ends(edge);
+    if sheet.twin(edge) == NONE || sheet.is_constrained(from, to) {
+        return None;
+    }
+    let (a, b) = (sheet.at(from), sheet.at(to));
+    let at = Place::new((a.x + b.x) / 2, (a.y + b.y) / 2);
+    let hold = sheet.line_hold(at).and(sheet.ground.height_hold(at));
+    (hold == Hold::FREE && !sheet.ground.is_forbidden(at)).then_some(Site { on_edge: Some(edge), at, hold })
 }
 
 fn is_sound(sheet: &TileMesh, at: Place, [a, b]: [u32; 2]) -> bool {

@@ -4,7 +4,8 @@
 //! Freed from all three, the same number of triangles follows the ground with well under half the residual.
 //! What carries it: (i) every vertex moves in x, y and height by Gauss-Newton steps on the true sum of squares, (ii)
 //! the moments of the posts under any triangle come from prefix sums along rows, and (iii) the mesh is grown beyond
-//! the budget first and thinned by what each vertex is truly worth.
+//! the budget first and thinned by what each vertex is truly worth. What decides in the end is topology: flips are
+//! judged by what comes of them once their vertices have moved.
 
 mod task;
 pub use task::{Budget, Task};
@@ -15,25 +16,37 @@ pub use recipe::overshoot;
 
 mod account;
 mod curve;
+mod deep_flips;
+mod deep_thinning;
+mod descent;
 mod ears;
-mod exchange;
 mod flips;
 mod form;
+mod gains;
+mod goals;
+mod heights;
 mod hold;
+mod hole;
 mod insertion;
+mod lanes;
+mod lattice;
 mod moments;
+mod normal;
 mod parts;
 mod patch;
 mod place;
 mod queue;
 mod refit;
+mod refusals;
 mod removal;
+mod renumber;
 mod sweep;
-mod tenants;
 mod thin;
 mod tile_mesh;
+mod undo;
 mod weave;
 mod weighted_heights;
+mod work;
 
 #[cfg(test)]
 mod feature_cases;

@@ -6,9 +6,13 @@
 
 use std::ops::{Add, Neg, Sub};
 
+use fearless_simd::{Simd, f64x4, prelude::*};
 use terrain::{Dem, Importance};
 
 use crate::place::{PER_POST, Place};
+
+/// Numbers in [`Sums`].
+pub(crate) const SUMS: usize = 10;
 
 /// Sums over posts: of weights and of weighted heights, each with the powers of x and y that a plane's fit needs.
 ///
@@ -36,6 +40,20 @@ impl Sums {
             sums.rest[i] = f(self.rest[i], other.rest[i]);
         }
         sums
+    }
+
+    /// z, 1, x z, z z, x, x x, x y, y y, y z, y.
+    #[inline(always)]
+    pub fn all(&self) -> [f64; SUMS] {
+        let ([a, b, c, d], [e, f, g, h], [i, j]) = (self.heights, self.shape, self.rest);
+        [a, b, c, d, e, f, g, h, i, j]
+    }
+
+    /// The sums of which these are [`Sums::all`].
+    #[inline(always)]
+    pub fn of(all: [f64; SUMS]) -> Self {
+        let [a, b, c, d, e, f, g, h, i, j] = all;
+        Self { heights: [a, b, c, d], shape: [e, f, g, h], rest: [i, j] }
     }
 
     /// The same sums with positions counted from `(x, y)`.
@@ -206,6 +224,46 @@ impl Moments {
         } else {
             Sums::default()
         }
+    }
+
+    /// As [`Moments::edge`], in lanes.
+    #[inline(always)]
+    pub fn edge_in<S: Simd>(&self, simd: S, a: Place, b: Place) -> Sums {
+        if a.y < b.y {
+            self.northward_in(simd, a, b)
+        } else if b.y < a.y {
+            -self.northward_in(simd, b, a)
+        } else {
+            self.edge(a, b)
+        }
+    }
+
+    #[inline(always)]
+    fn northward_in<S: Simd>(&self, simd: S, low: Place, high: Place) -> Sums {
+        let (first, end) = (low.row_from(), high.row_from());
+        if end <= first {
+            return Sums::default();
+        }
+        let mut walk = Walk::new(low, high, first);
+        let far = if low.x == self.far_x && high.x == self.far_x { 1 } else { 0 };
+        let zero = f64x4::splat(simd, 0.0);
+        let (mut heights, mut shape, mut rest) = (zero, zero, zero);
+        for row in first..end {
+            let at = walk.next_column() + far;
+            let y = f64::from(row);
+            let post = f64x4::from_slice(simd, &self.heights[row as usize * self.stride + at]);
+            let powers = f64x4::from_slice(simd, &[1.0, 1.0, y, y * y]);
+            heights += post;
+            shape += f64x4::from_slice(simd, &self.shape[row as usize * self.shape_stride + at]) * powers;
+            rest += post * f64x4::splat(simd, y);
+        }
+        let mut sums = Sums::default();
+        heights.store_slice(&mut sums.heights);
+        shape.store_slice(&mut sums.shape);
+        let mut all = [0.0; 4];
+        rest.store_slice(&mut all);
+        sums.rest = [all[0], all[1]];
+        sums
     }
 
     #[inline(always)]

@@ -105,10 +105,6 @@ impl TileMesh<'_> {
         vertex.edge = edge;
         vertex.is_stirred = true;
         let outer = patch.outline.iter().find(|outer| outer.from == from && outer.to == to);
-        self.sums[patch.slots[i] as usize][k] = match outer {
-            Some(outer) => outer.sums,
-            None => self.ground.moments.edge(self.at(from), self.at(to)),
-        };
         let twin = match outer {
             Some(outer) => outer.twin,
             None => patch
@@ -120,6 +116,12 @@ impl TileMesh<'_> {
                 })
                 // An edge of a patch lies on its outline, between two of its triangles, or on the tile's border.
                 .unwrap_or(NONE),
+        };
+        self.sums[patch.slots[i] as usize][k] = match outer {
+            Some(outer) => outer.sums,
+            // The triangle beyond has been sewn already.
+            None if twin != NONE && self.twin(twin) == edge => -self.sums_of(twin),
+            None => self.ground.moments.edge(self.at(from), self.at(to)),
         };
         debug_assert!(twin != NONE || self.is_constrained(from, to), "only border edges have no twin");
         self.triangles[(edge >> 2) as usize].twins[k] = twin;

@@ -1,4 +1,4 @@
-//! How much each effort does.
+//! How much each effort does, step by step.
 
 use terrain::Effort;
 
@@ -6,27 +6,118 @@ use terrain::Effort;
 pub(crate) struct Recipe {
     /// How many times its budget the TIN has before it is optimised.
     pub overshoot: f64,
-    /// Times the budget to thin to, one after the other.
-    pub stages: &'static [f64],
-    /// Sweeps once the budget is met.
-    pub sweeps: usize,
-    /// Rounds of exchange at most.
-    pub rounds: usize,
-    /// Cycles of growing and thinning.
-    pub cycles: usize,
-    /// Sweeps on the final lattice.
-    pub last_sweeps: usize,
+    pub steps: &'static [Step],
 }
+
+/// One step of a recipe.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Step {
+    /// From here on vertices move on the final lattice.
+    OnLattice,
+    /// Flips every edge that gains by it.
+    Flip,
+    /// Moves every vertex once, then flips where something changed much.
+    Sweep,
+    /// The same of vertices around which something has changed since they were moved.
+    SweepStirred,
+    /// Thins to so many times the budget.
+    Thin(f64, Thinning),
+    /// Flips where that gains once the vertices around have moved, in so many rounds of moves at most.
+    DeepFlip(usize),
+    /// Moves all vertices at once, in so many steps.
+    Descend(usize),
+    /// Grows to so many times the budget.
+    Grow(f64),
+    /// Puts every vertex on the final lattice.
+    Snap,
+    /// Fits all heights at once, in so many steps.
+    FitHeights(usize),
+}
+
+/// What thinning takes for the cost of a vertex.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Thinning {
+    /// What the squares rise by where nothing else changes.
+    AsItIs,
+    /// What they rise by once heights around the hole are fitted.
+    Fitted,
+    /// What they rise by once the vertices around have moved; this part of the fitted cost, as a first guess.
+    Deep(f64),
+}
+
+use Step::{DeepFlip, Descend, FitHeights, Flip, Grow, OnLattice, Snap, Sweep, SweepStirred, Thin};
+use Thinning::{AsItIs, Deep, Fitted};
+
+const FAST: &[Step] = &[OnLattice, Sweep, Thin(1.0, AsItIs), Sweep, SweepStirred, SweepStirred, Snap];
+
+const NORMAL: &[Step] = &[
+    Sweep,
+    Thin(1.6, AsItIs),
+    Sweep,
+    Thin(1.2, Fitted),
+    Sweep,
+    Thin(1.0, Deep(0.4)),
+    DeepFlip(3),
+    SweepStirred,
+    DeepFlip(3),
+    Descend(8),
+    Flip,
+    Snap,
+    Sweep,
+    FitHeights(9),
+];
+
+const BEST: &[Step] = &[
+    Sweep,
+    Thin(1.6, AsItIs),
+    Sweep,
+    Descend(4),
+    Flip,
+    Thin(1.2, Fitted),
+    Sweep,
+    DeepFlip(2),
+    Descend(4),
+    Flip,
+    Thin(1.0, Deep(0.4)),
+    DeepFlip(3),
+    Descend(6),
+    Flip,
+    // Grown by squares and thinned again: out of one local optimum and into a better one.
+    Grow(1.2),
+    Flip,
+    Sweep,
+    DeepFlip(2),
+    Descend(4),
+    Flip,
+    Thin(1.0, Deep(0.4)),
+    DeepFlip(3),
+    Descend(6),
+    Flip,
+    Grow(1.2),
+    Flip,
+    Sweep,
+    DeepFlip(2),
+    Descend(4),
+    Flip,
+    Thin(1.0, Deep(0.4)),
+    DeepFlip(3),
+    Descend(6),
+    Flip,
+    DeepFlip(3),
+    Descend(6),
+    Flip,
+    Snap,
+    Sweep,
+    FitHeights(9),
+];
 
 impl Recipe {
     /// What this effort does.
     pub fn of(effort: Effort) -> Self {
         match effort {
-            Effort::Fast => Self { overshoot: 1.0, stages: &[], sweeps: 3, rounds: 0, cycles: 0, last_sweeps: 0 },
-            Effort::Normal => Self { overshoot: 2.0, stages: &[1.0], sweeps: 2, rounds: 10, cycles: 0, last_sweeps: 2 },
-            Effort::Best => {
-                Self { overshoot: 3.0, stages: &[2.0, 1.5, 1.2, 1.0], sweeps: 2, rounds: 10, cycles: 8, last_sweeps: 4 }
-            }
+            Effort::Fast => Self { overshoot: 1.5, steps: FAST },
+            Effort::Normal => Self { overshoot: 2.5, steps: NORMAL },
+            Effort::Best => Self { overshoot: 2.5, steps: BEST },
         }
     }
 }

@@ -1,20 +1,19 @@
 //! Taking a vertex out: the best triangulation of the hole, the heights around it fitted again.
 
+use fearless_simd::{Level, Simd, dispatch};
+use geometry::widest_level;
+
 use crate::ears::fill_by_ears;
-use crate::form::{Form, squares};
 use crate::hold::Hold;
-use crate::moments::Sums;
+use crate::hole::Hole;
 use crate::patch::Patch;
-use crate::place::{Place, Shape, is_eased};
+use crate::place::Place;
 use crate::refit::Fit;
 use crate::tile_mesh::{Star, TileMesh};
 
-/// Corners of a hole, at most.
-const CORNERS_MAX: usize = 13;
-
 /// What finding a removal needs and leaves behind.
-#[derive(Default)]
 pub(crate) struct Removal {
+    level: Level,
     pub star: Star,
     pub patch: Patch,
     pub fit: Fit,
@@ -22,10 +21,41 @@ pub(crate) struct Removal {
     other_side: Vec<u32>,
 }
 
+impl Default for Removal {
+    fn default() -> Self {
+        Self::at(widest_level())
+    }
+}
+
 impl Removal {
-    /// What removing a vertex costs in squares; its patch is then ready to be applied. `None` where it cannot go.
-    #[inline(always)]
+    /// With lanes of some width; results do not depend on it.
+    pub fn at(level: Level) -> Self {
+        Self {
+            level,
+            star: Star::default(),
+            patch: Patch::default(),
+            fit: Fit::default(),
+            hole: Hole::default(),
+            other_side: Vec::new(),
+        }
+    }
+
+    /// What removing a vertex costs in squares once the heights around it are fitted again; its patch is then ready to
+    /// be applied. `None` where it cannot go.
     pub fn find(&mut self, sheet: &TileMesh, vertex: u32) -> Option<f64> {
+        let cost = self.find_as_it_is(sheet, vertex)?;
+        let free = |&vertex: &u32| sheet.vertices[vertex as usize].hold.height_is_free();
+        self.patch.refit.extend(self.star.ring.iter().copied().filter(free));
+        Some(cost - self.fit.refit(sheet, &mut self.patch))
+    }
+
+    /// The same with all heights as they are.
+    pub fn find_as_it_is(&mut self, sheet: &TileMesh, vertex: u32) -> Option<f64> {
+        dispatch!(self.level, simd => self.find_in(simd, sheet, vertex))
+    }
+
+    #[inline(always)]
+    fn find_in<S: Simd>(&mut self, simd: S, sheet: &TileMesh, vertex: u32) -> Option<f64> {
         let record = &sheet.vertices[vertex as usize];
         if !sheet.is_vertex(vertex) || record.hold.is_fixed() {
             return None;
@@ -40,14 +70,12 @@ impl Removal {
             self.other_side.clear();
             self.other_side.extend_from_slice(&ring[second..]);
             self.other_side.extend_from_slice(&ring[..=first]);
-            self.hole.fill(sheet, &ring[first..=second], &mut self.patch)?
-                + self.hole.fill(sheet, &self.other_side, &mut self.patch)?
+            self.hole.fill(simd, sheet, &ring[first..=second], &[], &mut self.patch)?
+                + self.hole.fill(simd, sheet, &self.other_side, &[], &mut self.patch)?
         } else {
-            self.hole.fill(sheet, &self.star.ring, &mut self.patch)?
+            self.hole.fill(simd, sheet, &self.star.ring, &self.star.edges, &mut self.patch)?
         };
-        let free = |&vertex: &u32| sheet.vertices[vertex as usize].hold.height_is_free();
-        self.patch.refit.extend(self.star.ring.iter().copied().filter(free));
-        Some(new - self.fit.refit(sheet, &mut self.patch) - old)
+        Some(new - old)
     }
 
     /// Removing a vertex whatever the shapes of the triangles that fill its hole; its patch is then ready to be
@@ -82,118 +110,5 @@ impl Removal {
         let first = self.star.ring.iter().position(is_next)?;
         let second = first + 1 + self.star.ring[first + 1..].iter().position(is_next)?;
         Some((first, second))
-    }
-}
-
-/// The best triangulation of a polygon, by dynamic programming over its chords.
-struct Hole {
-    at: [Place; CORNERS_MAX],
-    height: [f64; CORNERS_MAX],
-    /// Whether a corner is given; not asked where there are no features.
-    is_given: [bool; CORNERS_MAX],
-    has_features: bool,
-    /// Sums west of the chord from corner i to corner j, for i < j.
-    chords: [[Sums; CORNERS_MAX]; CORNERS_MAX],
-    /// Least squares of the part between corners i and j, and the corner its last triangle reaches.
-    best: [[f64; CORNERS_MAX]; CORNERS_MAX],
-    split: [[u8; CORNERS_MAX]; CORNERS_MAX],
-}
-
-impl Default for Hole {
-    fn default() -> Self {
-        const N: usize = CORNERS_MAX;
-        Self {
-            at: [Place::default(); N],
-            height: [0.0; N],
-            is_given: [false; N],
-            has_features: false,
-            chords: [[Sums::default(); N]; N],
-            best: [[0.0; N]; N],
-            split: [[0; N]; N],
-        }
-    }
-}
-
-impl Hole {
-    /// Appends the triangles that fill a counter-clockwise polygon with the fewest squares, and gives these; `None`
-    /// where it has no valid triangulation or too many corners.
-    #[inline(always)]
-    fn fill(&mut self, sheet: &TileMesh, polygon: &[u32], patch: &mut Patch) -> Option<f64> {
-        let n = polygon.len();
-        if n < 3 {
-            return Some(0.0);
-        }
-        if CORNERS_MAX < n {
-            return None;
-        }
-        for (i, &vertex) in polygon.iter().enumerate() {
-            let vertex = &sheet.vertices[vertex as usize];
-            (self.at[i], self.height[i], self.is_given[i]) = (vertex.at, vertex.height, vertex.hold.is_fixed());
-        }
-        self.has_features = sheet.has_features;
-        for i in 0..n {
-            for j in i + 1..n {
-                self.chords[i][j] = sheet.ground.moments.edge(self.at[i], self.at[j]);
-            }
-            if i + 1 < n {
-                self.best[i][i + 1] = 0.0;
-            }
-        }
-        for reach in 2..n {
-            for i in 0..n - reach {
-                self.find_split(i, i + reach);
-            }
-        }
-        if self.best[0][n - 1] == f64::INFINITY {
-            return None;
-        }
-        self.push_triangles(polygon, patch);
-        Some(self.best[0][n - 1])
-    }
-
-    #[inline(always)]
-    fn sums(&self, i: usize, k: usize, j: usize) -> Sums {
-        self.chords[i][k] + self.chords[k][j] - self.chords[i][j]
-    }
-
-    #[inline(always)]
-    fn find_split(&mut self, i: usize, j: usize) {
-        let (mut best, mut split) = (f64::INFINITY, 0);
-        for k in i + 1..j {
-            let parts = self.best[i][k] + self.best[k][j];
-            let corners = [self.at[i], self.at[k], self.at[j]];
-            if best <= parts || !(Shape::Sound.admits(corners[0], corners[1], corners[2]) || self.is_eased(i, k, j)) {
-                continue;
-            }
-            let heights = [self.height[i], self.height[k], self.height[j]];
-            let sum = parts + squares(&self.sums(i, k, j), corners, heights);
-            if sum < best {
-                (best, split) = (sum, k as u8);
-            }
-        }
-        self.best[i][j] = best;
-        self.split[i][j] = split;
-    }
-
-    fn is_eased(&self, i: usize, k: usize, j: usize) -> bool {
-        let corners = [i, k, j];
-        self.has_features && is_eased(corners.map(|i| self.at[i]), corners.map(|i| self.is_given[i]))
-    }
-
-    fn push_triangles(&self, polygon: &[u32], patch: &mut Patch) {
-        let mut open = [(0, 0); CORNERS_MAX];
-        open[0] = (0, polygon.len() - 1);
-        let mut count = 1;
-        while 0 < count {
-            count -= 1;
-            let (i, j) = open[count];
-            if i + 1 < j {
-                let k = usize::from(self.split[i][j]);
-                let form = Form::new(&self.sums(i, k, j), [self.at[i], self.at[k], self.at[j]]);
-                patch.new.push(([polygon[i], polygon[k], polygon[j]], form));
-                (open[count], open[count + 1]) = ((i, k), (k, j));
-                count += 2;
-            }
-        }
     }
 }

@@ -1,24 +1,28 @@
 //! Single steps: each does what it says it gains, and keeps every post once.
 
-use terrain::{Dem, Effort, HeightFit, Importance, PostRect, SeamSides};
+use terrain::{Dem, HeightFit, Importance, PostRect, SeamSides};
 
 use crate::account::Account;
-use crate::exchange::{Exchange, Terms, Tools};
+use crate::deep_flips::deep_flips;
+use crate::deep_thinning::thin_deep;
+use crate::descent::descend;
 use crate::flips::flip_all;
+use crate::gains::Gains;
+use crate::heights::fit_heights;
 use crate::hold::Hold;
 use crate::insertion::Insertion;
 use crate::parts::{Layout, NONE, Parts};
 use crate::place::{PER_POST, Place};
 use crate::removal::Removal;
-use crate::scene::{Caps, confined, even, grid, patchy, rough, spent};
-use crate::sweep::{Mover, Steps};
+use crate::scene::{even, grid, patchy, rough};
+use crate::sweep::Mover;
 use crate::task::Budget;
-use crate::thin::{Shears, Until, is_dearer, thin};
-use crate::tile_mesh::TileMesh;
+use crate::thin::{Filling, Until, is_dearer, thin};
+use crate::tile_mesh::{Star, TileMesh};
+use crate::undo::Saved;
 use crate::weighted_heights::WeightedHeights;
 
 const RECT: PostRect = PostRect { south: 7, west: -3, north: 67, east: 77 };
-const STEPS: Steps = Steps { inner: 1, pattern: false };
 
 fn sheet_of<'a>(ground: &'a WeightedHeights<'a>, tin: &terrain::Tin, layout: &Layout) -> TileMesh<'a> {
     TileMesh::new(ground, Parts::of(ground, tin, layout), layout.line_step, false)
@@ -37,6 +41,12 @@ fn with_sheet(test: impl Fn(&mut TileMesh, &Dem)) {
             assert_eq!(sheet.fault(), None);
         }
     }
+}
+
+fn sweep_all(mover: &mut Mover, sheet: &mut TileMesh) {
+    sheet.stir_all();
+    mover.sweep(sheet);
+    flip_all(sheet);
 }
 
 /// Posts that all triangles own together, by the rows of each, and by the sums of each.
@@ -66,72 +76,145 @@ fn every_post_is_owned_once_after_every_kind_of_change() {
     check(&sheet, "start");
     flip_all(&mut sheet);
     check(&sheet, "flips");
-    let mut mover = Mover::new(STEPS);
-    mover.sweep_and_flip(&mut sheet, 2);
+    let mut mover = Mover::new(1);
+    sweep_all(&mut mover, &mut sheet);
     check(&sheet, "moves");
-    let mut account = Account::new(&Budget::Triangles(200), &sheet);
     let (mut removal, mut insertion) = (Removal::default(), Insertion::default());
-    let shears = Shears { removal: &mut removal, mover: &mut mover, largest: None };
-    thin(&mut sheet, &mut account, Until::Afforded, shears);
-    check(&sheet, "removals");
+    for (triangles, filling) in [(400, Filling::AsItIs), (300, Filling::Fitted)] {
+        let mut account = Account::new(&Budget::Triangles(triangles), &sheet);
+        thin(&mut sheet, &mut account, Until::Afforded, filling, (&mut removal, &mut mover));
+        check(&sheet, "removals");
+    }
+    let mut account = Account::new(&Budget::Triangles(200), &sheet);
+    thin_deep(&mut sheet, &mut account, 0.4, &mut removal, &mut mover);
+    check(&sheet, "removals by true costs");
+    assert!(sheet.triangle_count <= 200);
+    deep_flips(&mut sheet, &mut mover, 3);
+    check(&sheet, "deep flips");
+    descend(&mut sheet, 4, 1);
+    check(&sheet, "a descent");
     sheet.renumber();
     check(&sheet, "another order");
     // A little room, so that something comes in even where thinning left nothing to gain.
     let mut account = Account::new(&Budget::Triangles(220), &sheet);
-    let mut tools = Tools { removal: &mut removal, insertion: &mut insertion };
-    assert!(0 < Exchange::default().round(&mut sheet, &mut account, Terms::OneForOne, 50, &mut tools));
-    check(&sheet, "exchange");
-}
-
-#[test]
-fn whoever_comes_where_a_limit_is_met_takes_somebodys_place() {
-    const SIDE: i32 = 20;
-    const NO_LIMIT: u32 = 10_000;
-    let rect = PostRect { south: 0, west: 0, north: 40, east: 40 };
-    let dem = rough(rect, 6);
-    let importance = even(rect);
-    let start = grid(&dem, 4);
-    // All four load modules have the same, so that either all of them are full or the one window is.
-    let no_limit = Caps { side: SIDE, per_module: NO_LIMIT, per_window: NO_LIMIT, triangles: NO_LIMIT };
-    let full = spent(&start, &confined(&start, no_limit, Effort::Normal), SIDE)[0];
-    for (per_module, per_window) in [(full, NO_LIMIT), (NO_LIMIT, 4 * full)] {
-        let caps = Caps { per_module, per_window, ..no_limit };
-        let task = confined(&start, caps, Effort::Normal);
-        let ground = WeightedHeights::new(&dem, &importance, SeamSides::CLOSED, HeightFit::Squares);
-        let held: Vec<Place> = task.held.iter().map(|&at| Place::of(at, rect, 8)).collect();
-        let hold = |at: Place| match held.contains(&at) {
-            true => Hold::GIVEN,
-            false => Hold::FREE,
-        };
-        let layout = Layout { line_step: Some(SIDE * PER_POST), hold: &hold };
-        let mut sheet = sheet_of(&ground, &start, &layout);
-        let mut account = Account::new(&task.budget, &sheet);
-        let before = sheet.squares();
-        let (mut removal, mut insertion) = (Removal::default(), Insertion::default());
-        let mut tools = Tools { removal: &mut removal, insertion: &mut insertion };
-        let count = Exchange::default().round(&mut sheet, &mut account, Terms::OneForOne, 20, &mut tools);
-        assert!(0 < count && sheet.squares() < before, "{count} came");
-        assert_eq!(sheet.fault(), None);
-        sheet.round_heights();
-        let after = spent(&sheet.into_tin(rect, 8), &task, SIDE);
-        assert!(after.iter().all(|&after| after <= per_module), "{after:?}");
-        assert!(after.iter().sum::<u32>() <= per_window, "{after:?}");
-    }
+    insertion.tries_middles = true;
+    assert!(0 < Gains::default().insert(&mut sheet, &mut account, 50, &mut insertion));
+    check(&sheet, "insertions");
 }
 
 #[test]
 fn flips_and_sweeps_never_raise_the_squares() {
     with_sheet(|sheet, _| {
-        let mut mover = Mover::new(STEPS);
+        let mut mover = Mover::new(1);
         let mut before = sheet.squares();
         for _ in 0..3 {
             sheet.stir_all();
             flip_all(sheet);
             let flipped = sheet.squares();
             assert!(flipped <= before);
-            let gain = mover.sweep(sheet, false);
+            sheet.stir_all();
+            mover.sweep(sheet);
             before = sheet.squares();
-            assert!(0.0 <= gain && (flipped - before - gain).abs() <= 1e-6 * flipped, "{gain} told");
+            assert!(before <= flipped);
+        }
+    });
+}
+
+#[test]
+fn every_instruction_level_gives_the_same_mesh() {
+    let mut meshes = Vec::new();
+    for (name, level) in geometry::levels_available() {
+        let dem = rough(RECT, 11);
+        let importance = patchy(RECT, 11);
+        let ground = WeightedHeights::new(&dem, &importance, SeamSides::OPEN, HeightFit::Squares);
+        let hold = |_: Place| Hold::FREE;
+        let mut sheet = sheet_of(&ground, &grid(&dem, 4), &Layout { line_step: None, hold: &hold });
+        let (mut mover, mut removal) = (Mover::at(level, 1), Removal::at(level));
+        sweep_all(&mut mover, &mut sheet);
+        let mut account = Account::new(&Budget::Triangles(200), &sheet);
+        thin_deep(&mut sheet, &mut account, 0.4, &mut removal, &mut mover);
+        sheet.renumber();
+        assert_eq!(sheet.fault(), None);
+        deep_flips(&mut sheet, &mut mover, 3);
+        meshes.push((name, format!("{:?} {:?}", sheet.vertices, sheet.triangles)));
+    }
+    for pair in meshes.windows(2) {
+        assert!(pair[0].1 == pair[1].1, "{} and {}", pair[0].0, pair[1].0);
+    }
+}
+
+#[test]
+fn deep_flips_gain_where_plain_ones_do_not() {
+    with_sheet(|sheet, _| {
+        let mut mover = Mover::new(1);
+        (0..8).for_each(|_| sweep_all(&mut mover, sheet));
+        let before = sheet.squares();
+        sheet.stir_all();
+        deep_flips(sheet, &mut mover, 3);
+        assert!(sheet.squares() < 0.99 * before, "{} of {before}", sheet.squares());
+    });
+}
+
+#[test]
+fn a_descent_lowers_the_squares_and_leaves_lines_where_they_are() {
+    with_sheet(|sheet, _| {
+        let on_lines = |sheet: &TileMesh| {
+            let held = sheet.vertices.iter().filter(|vertex| vertex.hold.is_on_line());
+            held.map(|vertex| vertex.at).collect::<Vec<Place>>()
+        };
+        let (before, lines) = (sheet.squares(), on_lines(sheet));
+        descend(sheet, 10, 8);
+        assert!(sheet.squares() < 0.7 * before, "{} of {before}", sheet.squares());
+        assert_eq!(on_lines(sheet), lines);
+        assert!(sheet.vertices.iter().all(|vertex| vertex.at.x % 8 == 0 && vertex.at.y % 8 == 0));
+        let told = sheet.squares();
+        sheet.sum_again();
+        assert_eq!(told, sheet.squares());
+    });
+}
+
+#[test]
+fn heights_fitted_at_once_leave_no_single_one_to_fit() {
+    with_sheet(|sheet, _| {
+        // The second time, damping has next to nothing left to hold on to.
+        fit_heights(sheet, 200);
+        fit_heights(sheet, 200);
+        let fitted = sheet.squares();
+        let mut star = Star::default();
+        for vertex in (0..sheet.vertices.len() as u32).step_by(11) {
+            for by in [-8.0, 8.0] {
+                sheet.vertices[vertex as usize].height += by;
+                sheet.star(vertex, &mut star);
+                star.triangles().for_each(|triangle| sheet.settle(triangle));
+                assert!(fitted <= sheet.squares() + 1e-6 * fitted);
+                sheet.vertices[vertex as usize].height -= by;
+                star.triangles().for_each(|triangle| sheet.settle(triangle));
+            }
+        }
+    });
+}
+
+#[test]
+fn what_is_undone_is_as_it_was() {
+    with_sheet(|sheet, _| {
+        let (mut removal, mut mover, mut saved) = (Removal::default(), Mover::new(1), Saved::default());
+        for vertex in (0..sheet.vertices.len() as u32).step_by(7) {
+            if removal.find(sheet, vertex).is_none() {
+                continue;
+            }
+            let text = |sheet: &TileMesh| {
+                format!("{:?} {:?} {:?} {:?}", sheet.vertices, sheet.triangles, sheet.forms, sheet.free_triangles)
+            };
+            let (before, squares) = (text(sheet), sheet.squares());
+            saved.save(sheet, removal.star.ring.iter().copied().chain([vertex]));
+            sheet.apply(&mut removal.patch);
+            removal.star.ring.iter().for_each(|&other| {
+                mover.relax(sheet, other);
+            });
+            assert!((saved.rise(sheet) - (sheet.squares() - squares)).abs() <= 1e-6 * squares);
+            saved.restore(sheet);
+            assert_eq!(text(sheet), before);
+            assert_eq!(sheet.fault(), None);
         }
     });
 }
@@ -165,7 +248,7 @@ fn what_a_removal_costs_and_an_insertion_gains_is_told_before() {
 #[test]
 fn squares_are_those_of_the_posts() {
     with_sheet(|sheet, dem| {
-        Mover::new(STEPS).sweep_and_flip(sheet, 1);
+        sweep_all(&mut Mover::new(1), sheet);
         let live = sheet.triangles.iter().filter(|record| record.corners[0] != NONE);
         for record in live {
             let (places, heights) = (sheet.places(record.corners), sheet.heights(record.corners));

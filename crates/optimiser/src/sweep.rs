@@ -5,44 +5,45 @@
 //! surface is continuous, so posts that change hands do not matter. The normal equations of such a step need only the
 //! forms of the triangles. No post is read.
 
-use crate::flips::flip_all;
+use fearless_simd::{Level, Simd, dispatch};
+use geometry::widest_level;
+
 use crate::form::{Form, Hinge};
 use crate::hold::Hold;
+use crate::lanes::{LANES, StarLanes, Totals};
 use crate::moments::Sums;
+use crate::normal::Normal;
 use crate::parts::Vertex;
 use crate::place::{PER_POST, Place, Shape};
 use crate::refit::DAMPING;
 use crate::tile_mesh::{Star, TileMesh, next};
 
-/// Relative and absolute damping of steps in the plane.
-const PLANE_DAMPING: (f64, f64) = (0.01, 0.02);
-/// Normal equations flatter than this have no step.
-const LEAST_DETERMINANT: f64 = 1e-4;
-/// Lattice places that are tried for a vertex, of 36 around it: two more gain nothing (measured).
-const SNAPS_TRIED: usize = 8;
-/// A step goes no further than this part of the farthest neighbour's distance.
-const STEP_MAX: f64 = 0.6;
+/// Lattice places that are tried for a vertex, of 36 around it: more gain nothing (measured).
+const SNAPS_TRIED: usize = 3;
+/// Parts of a Gauss-Newton step that are tried; the first that beats a change of height alone is taken. The ground
+/// bends less than its linearisation at the vertex says, so steps beyond the whole one pay most.
+const STEPS_TRIED: [f64; 2] = [1.6, 0.5];
+/// Steps that promise less than this part of the mean squares of a triangle are not tried.
+const LEAST_PROMISE: f64 = 0.008;
 /// A move that gains this part of the mean squares of a triangle stirs its surroundings.
 const STIRRING_SHARE: f64 = 0.005;
 /// Quanta squared that a move has to gain at least.
 const LEAST_GAIN: f64 = 1e-5;
 
-/// Steps of vertices.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Steps {
-    /// In 64ths of a post. On the tile's border, where a neighbour goes on from posts, vertices move from post to post.
-    pub inner: i32,
-    /// Whether single steps in the four directions are tried too.
-    pub pattern: bool,
-}
-
 /// Moves vertices of a sheet.
 pub(crate) struct Mover {
-    pub steps: Steps,
+    level: Level,
+    /// In 64ths of a post. On the tile's border, where a neighbour goes on from posts, vertices move from post to post.
+    pub step: i32,
+    /// Squares that a step has to promise.
+    least_promise: f64,
     /// Gain above which a move stirs its surroundings.
     stirring: f64,
     star: Star,
     around: Vec<(Place, f64)>,
+    /// The same star in lanes, where it has no more triangles than these.
+    lanes: StarLanes,
+    in_lanes: bool,
     /// Sums west of the edges from the vertex, and of those opposite to it.
     spokes: Vec<Sums>,
     /// The place the spokes were summed from.
@@ -61,25 +62,22 @@ struct Stand {
     squares: f64,
 }
 
-/// The normal equations of one vertex: a step in the plane, heights eliminated, and the height alone.
-#[derive(Default)]
-struct Normal {
-    matrix: [[f64; 3]; 3],
-    pull: [f64; 3],
-    stiffness: f64,
-    height_pull: f64,
-    squares: f64,
-    /// Distance to the farthest neighbour, in posts.
-    reach: f64,
-}
-
 impl Mover {
-    pub fn new(steps: Steps) -> Self {
+    pub fn new(step: i32) -> Self {
+        Self::at(widest_level(), step)
+    }
+
+    /// With lanes of some width; results do not depend on it.
+    pub fn at(level: Level, step: i32) -> Self {
         Self {
-            steps,
+            level,
+            step,
+            least_promise: 0.0,
             stirring: f64::INFINITY,
             star: Star::default(),
             around: Vec::new(),
+            lanes: StarLanes::default(),
+            in_lanes: false,
             spokes: Vec::new(),
             hub: None,
             rims: Vec::new(),
@@ -88,38 +86,39 @@ impl Mover {
         }
     }
 
-    /// Moves every vertex once, or every stirred one. Gives the squares gained.
-    pub fn sweep(&mut self, sheet: &mut TileMesh, only_stirred: bool) -> f64 {
-        self.stirring = STIRRING_SHARE * sheet.squares() / sheet.triangle_count as f64;
-        let mut gain = 0.0;
-        for vertex in 0..sheet.vertices.len() as u32 {
-            if sheet.is_vertex(vertex) && (!only_stirred || sheet.vertices[vertex as usize].is_stirred) {
-                gain += self.relax(sheet, vertex);
-            }
-        }
-        self.stirring = f64::INFINITY;
-        gain
+    /// Sets what counts as little, by the mean squares of a triangle.
+    pub fn aim(&mut self, mean_squares: f64) {
+        self.least_promise = LEAST_PROMISE * mean_squares;
     }
 
-    /// Sweeps over all vertices, each followed by flips.
-    pub fn sweep_and_flip(&mut self, sheet: &mut TileMesh, sweeps: usize) {
-        for _ in 0..sweeps {
-            sheet.stir_all();
-            self.sweep(sheet, false);
-            flip_all(sheet);
+    /// Moves every stirred vertex once; only what moves far is stirred afterwards.
+    pub fn sweep(&mut self, sheet: &mut TileMesh) {
+        let mean = sheet.mean_squares();
+        self.aim(mean);
+        let all = 0..sheet.vertices.len() as u32;
+        let stirred: Vec<u32> = all.filter(|&v| sheet.is_vertex(v) && sheet.vertices[v as usize].is_stirred).collect();
+        sheet.vertices.iter_mut().for_each(|vertex| vertex.is_stirred = false);
+        self.stirring = STIRRING_SHARE * mean;
+        for vertex in stirred {
+            self.relax(sheet, vertex);
         }
+        self.stirring = f64::INFINITY;
     }
 
     /// Moves one vertex to a better place, if there is one, and to its best height. Gives the squares gained.
-    #[inline(always)]
     pub fn relax(&mut self, sheet: &mut TileMesh, vertex: u32) -> f64 {
+        dispatch!(self.level, simd => self.relax_in(simd, sheet, vertex))
+    }
+
+    #[inline(always)]
+    fn relax_in<S: Simd>(&mut self, simd: S, sheet: &mut TileMesh, vertex: u32) -> f64 {
         let record = sheet.vertices[vertex as usize];
         if record.hold.has(Hold::PLACE) {
             return 0.0;
         }
         sheet.star(vertex, &mut self.star);
         self.look_around(sheet);
-        let normal = self.normal(sheet, vertex);
+        let normal = self.normal(simd, sheet, vertex);
         let stay = height_only(&record, &normal);
         self.candidates.clear();
         if !record.hold.is_fixed() {
@@ -136,15 +135,13 @@ impl Mover {
                 self.sum_rims(sheet);
                 has_rims = true;
             }
-            let stand = self.stand(sheet, at, record.height, record.hold);
+            let stand = self.stand(simd, sheet, at, record.height, record.hold);
             if stand.squares < best.squares - LEAST_GAIN {
                 best = stand;
-                if !self.steps.pattern {
-                    break;
-                }
+                break;
             }
         }
-        self.settle(sheet, vertex, best);
+        self.settle(simd, sheet, vertex, best);
         let gain = normal.squares - best.squares;
         if self.stirring < gain {
             sheet.vertices[vertex as usize].is_stirred = true;
@@ -155,6 +152,11 @@ impl Mover {
 
     /// Moves one vertex to the DEM's height at a place of one's own choice; `false` where it may not stand there.
     pub fn put(&mut self, sheet: &mut TileMesh, vertex: u32, at: Place) -> bool {
+        dispatch!(self.level, simd => self.put_in(simd, sheet, vertex, at))
+    }
+
+    #[inline(always)]
+    fn put_in<S: Simd>(&mut self, simd: S, sheet: &mut TileMesh, vertex: u32, at: Place) -> bool {
         let record = sheet.vertices[vertex as usize];
         let strays = || held_to_line(at, record.at, record.hold) != at;
         if record.hold.is_fixed() || strays() || sheet.ground.is_forbidden(at) {
@@ -166,7 +168,7 @@ impl Mover {
             return false;
         }
         self.sum_rims(sheet);
-        self.settle(sheet, vertex, Stand { at, height: sheet.ground.height(at), squares: 0.0 });
+        self.settle(simd, sheet, vertex, Stand { at, height: sheet.ground.height(at), squares: 0.0 });
         true
     }
 
@@ -175,23 +177,29 @@ impl Mover {
     ///
     /// The normal equations say in which order the places are promising, and the first few valid ones are tried.
     pub fn snap(&mut self, sheet: &mut TileMesh, vertex: u32, shape: Shape) -> bool {
+        dispatch!(self.level, simd => self.snap_in(simd, sheet, vertex, shape))
+    }
+
+    #[inline(always)]
+    fn snap_in<S: Simd>(&mut self, simd: S, sheet: &mut TileMesh, vertex: u32, shape: Shape) -> bool {
         let record = sheet.vertices[vertex as usize];
-        let step = self.step(sheet, &record);
+        let step = self.step_of(sheet, &record);
         if record.hold.is_fixed() || (record.at.x % step == 0 && record.at.y % step == 0) {
             return true;
         }
         sheet.star(vertex, &mut self.star);
         self.look_around(sheet);
         self.sum_rims(sheet);
-        self.rank_places(sheet, vertex, step);
+        self.rank_places(simd, sheet, vertex, step);
         let mut best = None;
         let mut tried = 0;
-        for index in 0..self.ranked.len() {
-            let at = self.ranked[index].1;
-            if !self.leaves(sheet, at, shape) {
+        let mut last = None;
+        while let Some(at) = self.most_promising() {
+            // On a line several places are one.
+            if last.replace(at) == Some(at) || !self.leaves(sheet, at, shape) {
                 continue;
             }
-            let stand = self.stand(sheet, at, record.height, record.hold);
+            let stand = self.stand(simd, sheet, at, record.height, record.hold);
             if best.is_none_or(|best: Stand| stand.squares < best.squares) {
                 best = Some(stand);
             }
@@ -200,14 +208,15 @@ impl Mover {
                 break;
             }
         }
-        best.inspect(|&best| self.settle(sheet, vertex, best)).is_some()
+        best.inspect(|&best| self.settle(simd, sheet, vertex, best)).is_some()
     }
 
-    /// Fills `ranked` with the lattice places around a vertex, the most promising first.
-    fn rank_places(&mut self, sheet: &TileMesh, vertex: u32, step: i32) {
+    /// Fills `ranked` with the lattice places around a vertex.
+    #[inline(always)]
+    fn rank_places<S: Simd>(&mut self, simd: S, sheet: &TileMesh, vertex: u32, step: i32) {
         const RINGS: i32 = 2;
         let record = sheet.vertices[vertex as usize];
-        let plane = self.normal(sheet, vertex).plane();
+        let plane = self.normal(simd, sheet, vertex).plane();
         let (x, y) = (record.at.x - record.at.x % step, record.at.y - record.at.y % step);
         self.ranked.clear();
         for j in -RINGS..=RINGS + 1 {
@@ -219,15 +228,21 @@ impl Mover {
                 }
             }
         }
-        self.ranked.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        self.ranked.dedup_by_key(|place| place.1);
+    }
+
+    /// Takes the most promising of the places that are left: few are looked at, so sorting all would cost more.
+    #[inline(always)]
+    fn most_promising(&mut self) -> Option<Place> {
+        let order = |a: &(f64, Place), b: &(f64, Place)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
+        let best = (0..self.ranked.len()).min_by(|&a, &b| order(&self.ranked[a], &self.ranked[b]))?;
+        Some(self.ranked.swap_remove(best).1)
     }
 
     #[inline(always)]
-    fn step(&self, sheet: &TileMesh, record: &Vertex) -> i32 {
+    fn step_of(&self, sheet: &TileMesh, record: &Vertex) -> i32 {
         let (at, far) = (record.at, sheet.ground.far());
         let is_on_border = at.x == 0 || at.y == 0 || at.x == far.x || at.y == far.y;
-        if is_on_border { PER_POST } else { self.steps.inner }
+        if is_on_border { PER_POST } else { self.step }
     }
 
     #[inline(always)]
@@ -236,6 +251,7 @@ impl Mover {
         self.hub = None;
         let look = |&vertex: &u32| (sheet.at(vertex), sheet.vertices[vertex as usize].height);
         self.around.extend(self.star.ring.iter().map(look));
+        self.in_lanes = self.lanes.enter(&self.around, self.star.edges.len());
     }
 
     /// The places and heights that triangle `i` of the star has beside the vertex.
@@ -261,9 +277,12 @@ impl Mover {
     }
 
     #[inline(always)]
-    fn normal(&self, sheet: &TileMesh, vertex: u32) -> Normal {
+    fn normal<S: Simd>(&self, simd: S, sheet: &TileMesh, vertex: u32) -> Normal {
         let record = &sheet.vertices[vertex as usize];
         let crest = record.hold.has(Hold::CREST).then(|| sheet.ground.slope(record.at));
+        if self.in_lanes {
+            return self.normal_in_lanes(simd, sheet, record, crest);
+        }
         let mut normal = Normal::default();
         for (i, &edge) in self.star.edges.iter().enumerate() {
             let (triangle, k) = ((edge >> 2) as usize, (edge & 3) as usize);
@@ -287,27 +306,41 @@ impl Mover {
         normal
     }
 
-    fn find_candidates(&mut self, sheet: &TileMesh, record: &Vertex, normal: &Normal) {
-        let step = self.step(sheet, record);
-        let (from, hold) = (record.at, record.hold);
-        if let Some((dx, dy)) = normal.step(hold) {
-            for part in [1.0, 0.5, 0.25] {
-                let round = |from: i32, by: f64| {
-                    let to = f64::from(from) + part * by * f64::from(PER_POST);
-                    (to / f64::from(step)).round() as i32 * step
-                };
-                let at = held_to_line(Place::new(round(from.x, dx), round(from.y, dy)), from, hold);
-                if at != from && is_inside(sheet, at) && !self.candidates.contains(&at) {
-                    self.candidates.push(at);
-                }
-            }
+    #[inline(always)]
+    fn normal_in_lanes<S: Simd>(&self, simd: S, sheet: &TileMesh, record: &Vertex, crest: Option<[f64; 2]>) -> Normal {
+        let (mut stiffness, mut pull) = ([0.0; LANES], [0.0; LANES]);
+        let mut normal = Normal::default();
+        for (i, &edge) in self.star.edges.iter().enumerate() {
+            let (triangle, k) = ((edge >> 2) as usize, (edge & 3) as usize);
+            let (face, form) = (&sheet.triangles[triangle], &sheet.forms[triangle]);
+            (stiffness[i], pull[i]) = (form.aa[k], form.pull(k, sheet.heights(face.corners)));
+            normal.squares += face.squares;
+            normal.stiffness += stiffness[i];
+            normal.height_pull += pull[i];
         }
-        if self.steps.pattern {
-            for (i, j) in [(1, 0), (-1, 0), (0, 1), (0, -1)] {
-                let at = held_to_line(Place::new(from.x + i * step, from.y + j * step), from, hold);
-                if at != from && is_inside(sheet, at) {
-                    self.candidates.push(at);
-                }
+        let all = self.lanes.totals(simd, (record.at, record.height), &stiffness, &pull, crest);
+        let Totals { xx, xy, xh, yy, yh, hh, pull, reach } = all;
+        normal.matrix = [[xx, xy, xh], [xy, yy, yh], [xh, yh, hh]];
+        Normal { pull, reach, ..normal }
+    }
+
+    #[inline(always)]
+    fn find_candidates(&mut self, sheet: &TileMesh, record: &Vertex, normal: &Normal) {
+        let step = self.step_of(sheet, record);
+        let (from, hold) = (record.at, record.hold);
+        let plane = normal.plane();
+        let Some((dx, dy)) = normal.step(&plane, hold) else { return };
+        if plane.u * dx + plane.w * dy < self.least_promise {
+            return;
+        }
+        for part in STEPS_TRIED {
+            let round = |from: i32, by: f64| {
+                let to = f64::from(from) + part * by * f64::from(PER_POST);
+                (to / f64::from(step)).round() as i32 * step
+            };
+            let at = held_to_line(Place::new(round(from.x, dx), round(from.y, dy)), from, hold);
+            if at != from && is_inside(sheet, at) && !self.candidates.contains(&at) {
+                self.candidates.push(at);
             }
         }
     }
@@ -315,14 +348,26 @@ impl Mover {
     #[inline(always)]
     fn sum_rims(&mut self, sheet: &TileMesh) {
         self.rims.clear();
-        self.rims.extend(self.star.edges.iter().map(|&edge| sheet.sums_of(next(edge))));
+        for (i, &edge) in self.star.edges.iter().enumerate() {
+            let sums = sheet.sums_of(next(edge));
+            self.rims.push(sums);
+            if self.in_lanes {
+                self.lanes.put_rim(i, &sums);
+            }
+        }
     }
 
     #[inline(always)]
-    fn sum_spokes(&mut self, sheet: &TileMesh, at: Place) {
+    fn sum_spokes<S: Simd>(&mut self, simd: S, sheet: &TileMesh, at: Place) {
         if self.hub != Some(at) {
             self.spokes.clear();
-            self.spokes.extend(self.around.iter().map(|&(to, _)| sheet.ground.moments.edge(at, to)));
+            for (i, &(to, _)) in self.around.iter().enumerate() {
+                let sums = sheet.ground.moments.edge_in(simd, at, to);
+                self.spokes.push(sums);
+                if self.in_lanes {
+                    self.lanes.put_spoke(i, self.around.len(), &sums);
+                }
+            }
             self.hub = Some(at);
         }
     }
@@ -335,14 +380,10 @@ impl Mover {
 
     /// What comes of standing at a valid place, at the best height there.
     #[inline(always)]
-    fn stand(&mut self, sheet: &TileMesh, at: Place, height: f64, hold: Hold) -> Stand {
-        self.sum_spokes(sheet, at);
+    fn stand<S: Simd>(&mut self, simd: S, sheet: &TileMesh, at: Place, height: f64, hold: Hold) -> Stand {
+        self.sum_spokes(simd, sheet, at);
         let height = if hold.has(Hold::CREST) { sheet.ground.height(at) } else { height };
-        let mut all = Hinge::default();
-        for i in 0..self.star.edges.len() {
-            let [a, b] = self.opposite(i);
-            all += Hinge::new(&self.sums(i), [at, a.0, b.0], [height, a.1, b.1]);
-        }
+        let all = if self.in_lanes { self.lanes.hinge(simd, at, height) } else { self.hinge(at, height) };
         if !hold.height_is_free() {
             return Stand { at, height, squares: all.squares };
         }
@@ -350,15 +391,25 @@ impl Mover {
         Stand { at, height: height + rise, squares: all.squares - rise * (2.0 * all.pull - rise * all.stiffness) }
     }
 
+    /// What all triangles say about the height of the vertex at a place, one after the other.
+    fn hinge(&self, at: Place, height: f64) -> Hinge {
+        let mut all = Hinge::default();
+        for i in 0..self.star.edges.len() {
+            let [a, b] = self.opposite(i);
+            all += Hinge::new(&self.sums(i), [at, a.0, b.0], [height, a.1, b.1]);
+        }
+        all
+    }
+
     /// Puts the vertex where it is to stand.
     #[inline(always)]
-    fn settle(&mut self, sheet: &mut TileMesh, vertex: u32, stand: Stand) {
+    fn settle<S: Simd>(&mut self, simd: S, sheet: &mut TileMesh, vertex: u32, stand: Stand) {
         let record = &mut sheet.vertices[vertex as usize];
         record.height = stand.height;
         let moved = record.at != stand.at;
         if moved {
             record.at = stand.at;
-            self.sum_spokes(sheet, stand.at);
+            self.sum_spokes(simd, sheet, stand.at);
         }
         for i in 0..self.star.edges.len() {
             let (triangle, k) = (self.star.edges[i] >> 2, (self.star.edges[i] & 3) as usize);
@@ -371,72 +422,6 @@ impl Mover {
             }
             sheet.settle(triangle);
         }
-    }
-}
-
-impl Normal {
-    #[inline(always)]
-    fn add(&mut self, toward: [f64; 3], stiffness: f64, pull: f64) {
-        for i in 0..3 {
-            for j in 0..3 {
-                self.matrix[i][j] += stiffness * toward[i] * toward[j];
-            }
-            self.pull[i] += pull * toward[i];
-        }
-        self.stiffness += stiffness;
-        self.height_pull += pull;
-    }
-
-    #[inline(always)]
-    fn plane(&self) -> Plane {
-        let (matrix, pull) = (&self.matrix, &self.pull);
-        let per_height = 1.0 / (matrix[2][2] + DAMPING);
-        let reduced = |i: usize, j: usize| matrix[i][j] - matrix[i][2] * matrix[2][j] * per_height;
-        Plane {
-            a: reduced(0, 0) + matrix[0][0] * PLANE_DAMPING.0 + PLANE_DAMPING.1,
-            b: reduced(0, 1),
-            d: reduced(1, 1) + matrix[1][1] * PLANE_DAMPING.0 + PLANE_DAMPING.1,
-            u: pull[0] - matrix[0][2] * pull[2] * per_height,
-            w: pull[1] - matrix[1][2] * pull[2] * per_height,
-        }
-    }
-
-    /// The damped Gauss-Newton step in the plane, in posts; `None` where there is none.
-    #[inline(always)]
-    fn step(&self, hold: Hold) -> Option<(f64, f64)> {
-        let Plane { a, b, d, u, w } = self.plane();
-        let (dx, dy) = match (hold.has(Hold::COLUMN), hold.has(Hold::ROW)) {
-            (true, true) => return None,
-            (true, false) => (0.0, w / d),
-            (false, true) => (u / a, 0.0),
-            (false, false) => {
-                let determinant = a * d - b * b;
-                if determinant <= LEAST_DETERMINANT {
-                    return None;
-                }
-                ((d * u - b * w) / determinant, (a * w - b * u) / determinant)
-            }
-        };
-        let (length, most) = (dx.abs().max(dy.abs()), STEP_MAX * self.reach);
-        let shorten = if most < length { most / length } else { 1.0 };
-        Some((dx * shorten, dy * shorten))
-    }
-}
-
-/// A step's normal equations in the plane, heights eliminated.
-struct Plane {
-    a: f64,
-    b: f64,
-    d: f64,
-    u: f64,
-    w: f64,
-}
-
-impl Plane {
-    /// By how much the squares change with a step, as far as the equations go.
-    #[inline(always)]
-    fn rise(&self, dx: f64, dy: f64) -> f64 {
-        dx * (self.a * dx + 2.0 * self.b * dy - 2.0 * self.u) + dy * (self.d * dy - 2.0 * self.w)
     }
 }
 

@@ -154,7 +154,7 @@ proptest! {
         per_module in 2u32..60,
         per_window in 8u32..160,
         triangles in 40u32..900,
-        effort in prop_oneof![Just(Effort::Normal), Just(Effort::Best)],
+        effort in prop_oneof![Just(Effort::Fast), Just(Effort::Normal), Just(Effort::Best)],
         weighted in any::<bool>(),
     ) {
         let rect = PostRect { south: 0, west: 0, north: 60, east: 80 };

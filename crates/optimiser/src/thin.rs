@@ -29,36 +29,56 @@ pub(crate) enum Until {
     Squares(f64),
 }
 
-/// What thinning works with.
-pub(crate) struct Shears<'a> {
-    pub removal: &'a mut Removal,
-    pub mover: &'a mut Mover,
-    /// No hole may leave a weighted residual above this many quanta.
-    pub largest: Option<f64>,
+/// How holes are filled, and what else may change around them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Filling {
+    /// Everything around a hole stays as it is: next to nothing is lost while far more vertices are there than will
+    /// be in the end.
+    AsItIs,
+    /// Heights around a hole are fitted, and then its vertices move.
+    Fitted,
+    /// Everything around a hole stays, and none may leave a weighted residual above this many quanta.
+    Below(f64),
 }
 
-/// Removes vertices, the cheapest first; each time the vertices around the hole move at once.
-pub(crate) fn thin(sheet: &mut TileMesh, account: &mut Account, until: Until, shears: Shears) {
-    let Shears { removal, mover, largest } = shears;
+/// Removes vertices, the cheapest first. Gives what the last one cost.
+pub(crate) fn thin(
+    sheet: &mut TileMesh,
+    account: &mut Account,
+    until: Until,
+    filling: Filling,
+    (removal, mover): (&mut Removal, &mut Mover),
+) -> Option<f64> {
+    mover.aim(sheet.mean_squares());
+    let find = |removal: &mut Removal, sheet: &TileMesh, vertex: u32| match filling {
+        Filling::Fitted => removal.find(sheet, vertex),
+        Filling::AsItIs => removal.find_as_it_is(sheet, vertex),
+        Filling::Below(_) => {
+            let cost = removal.find(sheet, vertex);
+            removal.patch.refit.clear();
+            removal.patch.rise.clear();
+            cost
+        }
+    };
     let mut queue = Queue::default();
     let mut is_stale = vec![false; sheet.vertices.len()];
     // What cannot go now may go once its surroundings have changed.
     let mut is_stuck = vec![false; sheet.vertices.len()];
     for vertex in 0..sheet.vertices.len() as u32 {
-        match removal.find(sheet, vertex) {
+        match find(removal, sheet, vertex) {
             Some(cost) => queue.enter(vertex, -cost),
             None => is_stuck[vertex as usize] = true,
         }
     }
-    let mut unstuck = Vec::new();
+    let (mut unstuck, mut last) = (Vec::new(), None);
     let mut squares = sheet.squares();
     while !is_done(account, until, squares) {
-        let Some((vertex, worth)) = queue.pop() else { return };
+        let Some((vertex, worth)) = queue.pop() else { break };
         let record = sheet.vertices[vertex as usize];
         if matches!(until, Until::LimitsMet) && !account.relieves(&record) {
             continue;
         }
-        let Some(cost) = removal.find(sheet, vertex) else {
+        let Some(cost) = find(removal, sheet, vertex) else {
             is_stuck[vertex as usize] = true;
             continue;
         };
@@ -70,23 +90,21 @@ pub(crate) fn thin(sheet: &mut TileMesh, account: &mut Account, until: Until, sh
         if let Until::Squares(most) = until
             && most < squares + cost
         {
-            return;
+            break;
         }
-        if largest.is_some() {
-            // Heights as they are, so that what is checked is what is done.
-            removal.patch.refit.clear();
-            removal.patch.rise.clear();
-        }
-        if largest.is_some_and(|largest| leaves_more_than(largest, sheet, &removal.patch)) {
+        if let Filling::Below(largest) = filling
+            && leaves_more_than(largest, sheet, &removal.patch)
+        {
             continue;
         }
+        last = Some(cost);
         squares += cost;
         account.refund(&record);
         sheet.apply(&mut removal.patch);
         sheet.drop_vertex(vertex);
         for index in 0..removal.star.ring.len() {
             let other = removal.star.ring[index];
-            if largest.is_none() {
+            if filling == Filling::Fitted {
                 squares -= mover.relax(sheet, other);
             }
             is_stale[other as usize] = true;
@@ -97,12 +115,13 @@ pub(crate) fn thin(sheet: &mut TileMesh, account: &mut Account, until: Until, sh
             }
         }
         for other in unstuck.drain(..) {
-            match removal.find(sheet, other) {
+            match find(removal, sheet, other) {
                 Some(cost) => queue.enter(other, -cost),
                 None => is_stuck[other as usize] = true,
             }
         }
     }
+    last
 }
 
 fn is_done(account: &Account, until: Until, squares: f64) -> bool {

@@ -60,7 +60,7 @@ pub(crate) struct TileMesh<'a> {
     pub sums: Vec<[Sums; 3]>,
     pub triangle_count: usize,
     pub vertex_count: usize,
-    free_vertices: Vec<u32>,
+    pub(crate) free_vertices: Vec<u32>,
     pub(crate) free_triangles: Vec<u32>,
     line_step: Option<i32>,
     /// Edges of features, by their ends, the lesser first, in ascending order.
@@ -88,16 +88,6 @@ impl<'a> TileMesh<'a> {
         };
         sheet.fill(parts.vertices, &parts.triangles);
         sheet
-    }
-
-    /// Orders vertices and triangles along a curve again: a third of the time of all later steps on a large tile.
-    pub fn renumber(&mut self) {
-        let vertices = std::mem::take(&mut self.vertices);
-        let triangles: Vec<[u32; 3]> =
-            self.triangles.iter().map(|record| record.corners).filter(|corners| corners[0] != NONE).collect();
-        self.free_vertices.clear();
-        self.free_triangles.clear();
-        self.fill(vertices, &triangles);
     }
 
     fn fill(&mut self, vertices: Vec<Vertex>, triangles: &[[u32; 3]]) {
@@ -162,6 +152,25 @@ impl<'a> TileMesh<'a> {
         }
     }
 
+    /// Brings sums, forms and squares up to date with all places and heights.
+    pub fn sum_again(&mut self) {
+        for triangle in 0..self.triangles.len() {
+            if !self.is_live(triangle as u32) {
+                continue;
+            }
+            let record = self.triangles[triangle];
+            let at = self.places(record.corners);
+            for k in 0..3 {
+                self.sums[triangle][k] = match record.twins[k] {
+                    twin if twin < 4 * triangle as u32 => -self.sums_of(twin),
+                    _ => self.ground.moments.edge(at[k], at[(k + 1) % 3]),
+                };
+            }
+            self.forms[triangle] = self.form_of(&record, &self.sums[triangle]);
+            self.settle(triangle as u32);
+        }
+    }
+
     /// Sums over the posts west of an edge.
     #[inline(always)]
     pub fn sums_of(&self, edge: u32) -> Sums {
@@ -209,6 +218,20 @@ impl<'a> TileMesh<'a> {
     #[inline(always)]
     pub fn apex(&self, edge: u32) -> u32 {
         self.triangles[(edge >> 2) as usize].corners[(previous(edge) & 3) as usize]
+    }
+
+    /// The ends of an inner edge and the two corners beyond it, its own triangle's first.
+    #[inline(always)]
+    pub fn around_edge(&self, edge: u32) -> [u32; 4] {
+        let (a, b) = self.ends(edge);
+        [a, b, self.apex(edge), self.apex(self.twin(edge))]
+    }
+
+    /// Whether an edge is on the border, or an inner one seen from the higher of its two sides.
+    #[inline(always)]
+    pub fn is_upper_side(&self, edge: u32) -> bool {
+        let twin = self.twin(edge);
+        twin == NONE || twin < edge
     }
 
     pub fn is_live(&self, triangle: u32) -> bool {
@@ -281,6 +304,11 @@ impl<'a> TileMesh<'a> {
         self.triangles.iter().map(|record| record.squares).sum()
     }
 
+    /// Mean squares of a triangle.
+    pub fn mean_squares(&self) -> f64 {
+        self.squares() / self.triangle_count as f64
+    }
+
     /// Sum of squared residuals over all posts, whatever their weights.
     pub fn plain_squares(&self) -> f64 {
         match self.ground.uniform_weight() {
@@ -309,6 +337,13 @@ impl<'a> TileMesh<'a> {
 
     pub fn stir_all(&mut self) {
         self.vertices.iter_mut().for_each(|vertex| vertex.is_stirred = true);
+    }
+
+    /// Stirs a vertex and those around it.
+    pub fn stir_around(&mut self, vertex: u32, star: &mut Star) {
+        self.star(vertex, star);
+        self.vertices[vertex as usize].is_stirred = true;
+        star.ring.iter().for_each(|&other| self.vertices[other as usize].is_stirred = true);
     }
 
     /// Fills `star` with the triangles around a vertex.

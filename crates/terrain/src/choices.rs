@@ -3,11 +3,11 @@
 /// How much work the optimised method does on one tile.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Effort {
-    /// Chosen posts are moved and their edges flipped.
+    /// From one and a half times the budget, thinned; what is left is moved and edges are flipped.
     Fast,
-    /// From twice the budget, thinned by true cost, then posts are exchanged.
+    /// From two and a half times the budget, thinned by true cost; flips that pay once their vertices have moved.
     Normal,
-    /// As normal from three times the budget, and cycles of growing and thinning.
+    /// As normal, and cycles of growing and thinning.
     Best,
 }
 
