@@ -41,6 +41,21 @@ pub(crate) enum Filling {
     Below(f64),
 }
 
+impl Filling {
+    /// What removing a vertex costs; its patch is then ready to be applied.
+    fn find(self, removal: &mut Removal, sheet: &TileMesh, vertex: u32) -> Option<f64> {
+        if self == Self::AsItIs {
+            return removal.find_as_it_is(sheet, vertex);
+        }
+        let cost = removal.find(sheet, vertex);
+        if self != Self::Fitted {
+            removal.patch.refit.clear();
+            removal.patch.rise.clear();
+        }
+        cost
+    }
+}
+
 /// Removes vertices, the cheapest first. Gives what the last one cost.
 pub(crate) fn thin(
     sheet: &mut TileMesh,
@@ -50,22 +65,15 @@ pub(crate) fn thin(
     (removal, mover): (&mut Removal, &mut Mover),
 ) -> Option<f64> {
     mover.aim(sheet.mean_squares());
-    let find = |removal: &mut Removal, sheet: &TileMesh, vertex: u32| match filling {
-        Filling::Fitted => removal.find(sheet, vertex),
-        Filling::AsItIs => removal.find_as_it_is(sheet, vertex),
-        Filling::Below(_) => {
-            let cost = removal.find(sheet, vertex);
-            removal.patch.refit.clear();
-            removal.patch.rise.clear();
-            cost
-        }
-    };
+    if is_done(account, until, sheet.squares()) {
+        return None;
+    }
     let mut queue = Queue::default();
     let mut is_stale = vec![false; sheet.vertices.len()];
     // What cannot go now may go once its surroundings have changed.
     let mut is_stuck = vec![false; sheet.vertices.len()];
     for vertex in 0..sheet.vertices.len() as u32 {
-        match find(removal, sheet, vertex) {
+        match filling.find(removal, sheet, vertex) {
             Some(cost) => queue.enter(vertex, -cost),
             None => is_stuck[vertex as usize] = true,
         }
@@ -78,7 +86,7 @@ pub(crate) fn thin(
         if matches!(until, Until::LimitsMet) && !account.relieves(&record) {
             continue;
         }
-        let Some(cost) = find(removal, sheet, vertex) else {
+        let Some(cost) = filling.find(removal, sheet, vertex) else {
             is_stuck[vertex as usize] = true;
             continue;
         };
@@ -87,14 +95,10 @@ pub(crate) fn thin(
             queue.enter(vertex, -cost);
             continue;
         }
-        if let Until::Squares(most) = until
-            && most < squares + cost
-        {
+        if matches!(until, Until::Squares(most) if most < squares + cost) {
             break;
         }
-        if let Filling::Below(largest) = filling
-            && leaves_more_than(largest, sheet, &removal.patch)
-        {
+        if matches!(filling, Filling::Below(largest) if leaves_more_than(largest, sheet, &removal.patch)) {
             continue;
         }
         last = Some(cost);
@@ -115,7 +119,7 @@ pub(crate) fn thin(
             }
         }
         for other in unstuck.drain(..) {
-            match find(removal, sheet, other) {
+            match filling.find(removal, sheet, other) {
                 Some(cost) => queue.enter(other, -cost),
                 None => is_stuck[other as usize] = true,
             }
