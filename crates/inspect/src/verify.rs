@@ -10,6 +10,7 @@ mod laid;
 mod made_from;
 mod modules;
 mod opened;
+mod square;
 mod tins;
 mod total;
 

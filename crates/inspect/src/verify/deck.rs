@@ -2,14 +2,18 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use terrain::FeatureSurface;
+use terrain::{FeatureSurface, LatticePoint};
 
-use super::laid::{At, Laid, Square, is_on, turn};
+use super::square::{At, Square, is_on, turn};
 
 /// What is wrong with the decks of a load module: corners that are not there, corners of no deck, or less or more than
 /// the polygons cover.
-pub(crate) fn wrong_decks(laid: &Laid, square: &Square) -> Option<String> {
-    let decks: Vec<Deck> = laid.features.decks.iter().map(|deck| Deck::of(laid, deck)).collect();
+pub(crate) fn wrong_decks(
+    decks: &[FeatureSurface],
+    at: &dyn Fn(LatticePoint) -> At,
+    square: &Square,
+) -> Option<String> {
+    let decks: Vec<Deck> = decks.iter().map(|deck| Deck::of(at, deck)).collect();
     let found = &square.module.decks;
     // Of a ring that crosses itself it is not said what a deck has.
     if decks.iter().any(|deck| !deck.is_simple() && deck.touches(square)) {
@@ -68,8 +72,8 @@ struct Deck {
 }
 
 impl Deck {
-    fn of(laid: &Laid, surface: &FeatureSurface) -> Self {
-        let ring = surface.ring.iter().map(|vertex| (laid.at(vertex.at), vertex.height)).collect();
+    fn of(at: &dyn Fn(LatticePoint) -> At, surface: &FeatureSurface) -> Self {
+        let ring = surface.ring.iter().map(|vertex| (at(vertex.at), vertex.height)).collect();
         Self { class: surface.class, ring }
     }
 

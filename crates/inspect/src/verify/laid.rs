@@ -4,13 +4,11 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
 use ground::GamingArea;
-use terrain::{FeatureSurface, Features, HOLE_CLASS, LatticePoint, LoadModule, SurfaceGround, TileFeatures, Vertex};
+use terrain::{FeatureSurface, Features, HOLE_CLASS, LatticePoint, SurfaceGround, TileFeatures, Vertex};
 
 use super::deck::wrong_decks;
 use super::modules::Modules;
-
-/// A place in quanta north and east of the area's south-west post.
-pub(crate) type At = (i64, i64);
+use super::square::{At, Square, is_on, turn};
 
 /// What features put into a tile.
 pub(crate) struct Laid<'a> {
@@ -36,7 +34,7 @@ impl Laid<'_> {
                 kept.lacking_edge(&square),
                 wrong_class(&square, &bodies, self.first_class),
                 uneven(&square, &bodies, &kept),
-                wrong_decks(self, &square),
+                wrong_decks(&self.features.decks, &|place| self.at(place), &square),
             ];
             problems.extend(found.into_iter().flatten().map(|what| format!("load module {id}: {what}")));
         }
@@ -98,55 +96,6 @@ pub(crate) fn place_text(area: &GamingArea, (north, east): At) -> String {
     format!("at {east:.1} m east, {north:.1} m north")
 }
 
-/// A load module with its vertices where they are in the area.
-pub(crate) struct Square<'a> {
-    pub module: &'a LoadModule,
-    south_west: At,
-    heights: HashMap<At, i32>,
-    edges: HashSet<[At; 2]>,
-}
-
-impl<'a> Square<'a> {
-    fn of(module: &'a LoadModule) -> Self {
-        let side = i64::from(module.side);
-        let south_west = (i64::from(module.id.row) * side, i64::from(module.id.col) * side);
-        let mut square = Self { module, south_west, heights: HashMap::new(), edges: HashSet::new() };
-        for vertex in &module.vertices {
-            square.heights.insert(square.at(vertex.y, vertex.x), vertex.z);
-        }
-        for triangle in &module.triangles {
-            let [a, b, c] = square.corners(triangle);
-            for (from, to) in [(a, b), (b, c), (c, a)] {
-                square.edges.insert([from.min(to), from.max(to)]);
-            }
-        }
-        square
-    }
-
-    pub fn at(&self, y: u16, x: u16) -> At {
-        (self.south_west.0 + i64::from(y), self.south_west.1 + i64::from(x))
-    }
-
-    fn corners(&self, triangle: &[u16; 3]) -> [At; 3] {
-        triangle.map(|v| {
-            let vertex = self.module.vertices[usize::from(v)];
-            self.at(vertex.y, vertex.x)
-        })
-    }
-
-    /// Whether a place lies in it or on its sides.
-    pub fn holds(&self, (y, x): At) -> bool {
-        let (side, (south, west)) = (i64::from(self.module.side), self.south_west);
-        (south..=south + side).contains(&y) && (west..=west + side).contains(&x)
-    }
-
-    /// South, west, north, east.
-    pub fn reach(&self) -> [i64; 4] {
-        let (side, (south, west)) = (i64::from(self.module.side), self.south_west);
-        [south, west, south + side, west + side]
-    }
-}
-
 /// Vertices and edges that the TIN has to keep, but for edges that it is told to lack.
 struct Kept {
     heights: HashMap<At, i32>,
@@ -182,18 +131,6 @@ impl Kept {
         let lacking = own.filter(|edge| !is_there(edge)).count();
         (0 < lacking).then(|| format!("lacks {lacking} edges of roads or water that nothing tells of"))
     }
-}
-
-/// Twice the area of a triangle: positive where it turns left, 0 where it is a line.
-pub(crate) fn turn(a: At, b: At, c: At) -> i128 {
-    let [ay, ax, by, bx, cy, cx] = [a.0, a.1, b.0, b.1, c.0, c.1].map(i128::from);
-    (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
-}
-
-/// Whether a place lies on the line from `a` to `b`, its ends included.
-pub(crate) fn is_on(a: At, b: At, at: At) -> bool {
-    let within = |a: i64, b: i64, v: i64| a.min(b) <= v && v <= a.max(b);
-    within(a.0, b.0, at.0) && within(a.1, b.1, at.1) && turn(a, b, at) == 0
 }
 
 /// Ground of features.

