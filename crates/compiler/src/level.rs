@@ -116,27 +116,23 @@ impl features::Room for Shares<'_> {
         }
     }
 
-    fn narrow(&mut self, cost: &Cost) -> bool {
+    fn narrow(&mut self, cost: &Cost) {
         let (budget, grid) = (&self.run.area.budget, self.run.area.grid);
         let mut taken = self.taken(cost);
         let windows = budget.windows;
         let sums = windows.sums(grid, &taken).into_iter().zip(windows.sums(grid, &self.start));
-        let mut narrowed = false;
         for (origin, (before, start)) in windows.origins.iter().zip(sums) {
             let room = share(self.spec, budget.per_window.into(), start.into());
             if room < u64::from(before) {
                 let modules: Vec<usize> = windows.modules_of(origin).iter().map(|module| grid.index(module)).collect();
                 self.hold(&modules, &mut taken, room);
-                narrowed = true;
             }
         }
         let total = |of: &[u32]| of.iter().map(|&count| u64::from(count)).sum::<u64>();
         let room = share(self.spec, budget.area, total(&self.start));
         if room < total(&taken) {
             self.hold(&(0..grid.count()).collect::<Vec<usize>>(), &mut taken, room);
-            narrowed = true;
         }
-        narrowed
     }
 
     fn widen(&mut self, cost: &Cost, short: &BTreeSet<(i32, i32)>) -> bool {

@@ -2,7 +2,7 @@
 //!
 //! What each would cost is estimated from thinned stations ([`crowds`]), and the ladder takes those of crowded load
 //! modules down ([`fit`]). Then all are formed, and what they really cost corrects the estimate of each load module:
-//! once upwards, so that room which is left is given back, and downwards until no load module gives too much.
+//! twice upwards too, so that room which is left is given back, then downwards until no load module gives too much.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
@@ -19,9 +19,8 @@ pub trait Room {
     /// Triangles of a load module (row, column).
     fn of(&self, module: (i32, i32)) -> u32;
 
-    /// Leaves less to load modules where this is too much for several of them together; false when it is not. It must
-    /// end: sooner or later nothing is left to take.
-    fn narrow(&mut self, cost: &Cost) -> bool;
+    /// Leaves less to load modules where this is too much for several of them together.
+    fn narrow(&mut self, cost: &Cost);
 
     /// Leaves more to those of `short` again, as far as this is less than several of them may take together; false
     /// when nothing is left to give.
@@ -34,9 +33,7 @@ impl Room for u32 {
         *self
     }
 
-    fn narrow(&mut self, _cost: &Cost) -> bool {
-        false
-    }
+    fn narrow(&mut self, _cost: &Cost) {}
 
     fn widen(&mut self, _cost: &Cost, _short: &BTreeSet<(i32, i32)>) -> bool {
         false

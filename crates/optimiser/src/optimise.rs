@@ -120,7 +120,7 @@ fn work_on(dem: &Dem, importance: &Importance, start: &Tin, task: &Task, steps: 
 impl Work<'_, '_> {
     fn run(&mut self) {
         self.check();
-        for &step in Recipe::of(self.task.effort).steps {
+        for &step in Recipe::of(self.task.effort).steps.iter().copied().flatten() {
             self.take(step);
             self.check();
         }

@@ -6,7 +6,8 @@ use terrain::Effort;
 pub(crate) struct Recipe {
     /// How many times its budget the TIN has before it is optimised.
     pub overshoot: f64,
-    pub steps: &'static [Step],
+    /// Its steps, part after part.
+    pub steps: &'static [&'static [Step]],
 }
 
 /// One step of a recipe.
@@ -67,7 +68,7 @@ const NORMAL: &[Step] = &[
     FitHeights(9),
 ];
 
-const BEST: &[Step] = &[
+const BEGINNING_OF_BEST: &[Step] = &[
     Sweep,
     Thin(1.6, AsItIs),
     Sweep,
@@ -82,42 +83,21 @@ const BEST: &[Step] = &[
     DeepFlip(3),
     Descend(6),
     Flip,
-    // Grown by squares and thinned again: out of one local optimum and into a better one.
-    Grow(1.2),
-    Flip,
-    Sweep,
-    DeepFlip(2),
-    Descend(4),
-    Flip,
-    Thin(1.0, Deep(0.4)),
-    DeepFlip(3),
-    Descend(6),
-    Flip,
-    Grow(1.2),
-    Flip,
-    Sweep,
-    DeepFlip(2),
-    Descend(4),
-    Flip,
-    Thin(1.0, Deep(0.4)),
-    DeepFlip(3),
-    Descend(6),
-    Flip,
-    DeepFlip(3),
-    Descend(6),
-    Flip,
-    Snap,
-    Sweep,
-    FitHeights(9),
 ];
+
+/// Grows by squares and thins again: out of one local optimum and into a better one.
+const CYCLE: &[Step] =
+    &[Grow(1.2), Flip, Sweep, DeepFlip(2), Descend(4), Flip, Thin(1.0, Deep(0.4)), DeepFlip(3), Descend(6), Flip];
+
+const END_OF_BEST: &[Step] = &[DeepFlip(3), Descend(6), Flip, Snap, Sweep, FitHeights(9)];
 
 impl Recipe {
     /// What this effort does.
     pub fn of(effort: Effort) -> Self {
         match effort {
-            Effort::Fast => Self { overshoot: 1.5, steps: FAST },
-            Effort::Normal => Self { overshoot: 2.5, steps: NORMAL },
-            Effort::Best => Self { overshoot: 2.5, steps: BEST },
+            Effort::Fast => Self { overshoot: 1.5, steps: &[FAST] },
+            Effort::Normal => Self { overshoot: 2.5, steps: &[NORMAL] },
+            Effort::Best => Self { overshoot: 2.5, steps: &[BEGINNING_OF_BEST, CYCLE, CYCLE, END_OF_BEST] },
         }
     }
 }
