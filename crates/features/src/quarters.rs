@@ -1,4 +1,5 @@
-//! Finds which segments and places are near one another, by cutting the area into quarters until few are left.
+//! Finds which segments and places are near one another: by a grid of squares, each cut into quarters until few are
+//! left.
 //!
 //! Crowded places are cut finer than empty ones, so a network takes time near linear in its segments wherever they
 //! lie. A pair may be found more than once.
@@ -8,6 +9,9 @@ use crate::exact::Segment;
 
 /// A square with this many candidate pairs or fewer is searched pair by pair.
 const PAIRS_MAX: usize = 512;
+
+/// Segments for each square of the grid, were they spread evenly.
+const PER_CELL: usize = 16;
 
 /// A square, closed on all sides, in steps.
 #[derive(Clone, Copy)]
@@ -56,11 +60,75 @@ impl Square {
     }
 }
 
+/// The area of all segments as squares of one size.
+struct Grid {
+    whole: Square,
+    /// Squares along a side.
+    count: i64,
+}
+
+/// A square by its row and column, and the number of what lies in it.
+type InCell = ([i64; 2], u32);
+
+impl Grid {
+    /// A grid for `segments`, none of whose squares is smaller than what lies within `reach` of a place.
+    fn of(segments: &[Segment], reach: i64) -> Option<Self> {
+        let whole = Square::around(segments)?;
+        let mut count = 1;
+        while (count * count) as usize * PER_CELL < segments.len() && 4 * (reach + 1) < whole.side / count {
+            count *= 2;
+        }
+        Some(Self { whole, count })
+    }
+
+    /// The square at a row and a column.
+    fn square(&self, [row, col]: [i64; 2]) -> Square {
+        let side = self.whole.side / self.count;
+        Square { south: self.whole.south + row * side, west: self.whole.west + col * side, side }
+    }
+
+    fn cell(&self, at: i64, low: i64) -> i64 {
+        (at - low).div_euclid(self.whole.side / self.count).clamp(0, self.count - 1)
+    }
+
+    /// Segments in every square that they come within `reach` of, square by square.
+    fn segments(&self, segments: &[Segment], reach: i64) -> Vec<InCell> {
+        let mut cells: Vec<InCell> = Vec::with_capacity(segments.len() + segments.len() / 4);
+        for (number, segment) in (0..).zip(segments) {
+            let span = |a: i32, b: i32, low: i64| {
+                self.cell(i64::from(a.min(b)) - reach, low)..=self.cell(i64::from(a.max(b)) + reach, low)
+            };
+            let cols = span(segment.a.col, segment.b.col, self.whole.west);
+            for row in span(segment.a.row, segment.b.row, self.whole.south) {
+                let here = cols.clone().map(|col| [row, col]);
+                cells.extend(here.filter(|at| self.square(*at).meets(segment, reach)).map(|at| (at, number)));
+            }
+        }
+        cells.sort_unstable();
+        cells
+    }
+
+    /// Places in the square that each lies in, square by square.
+    fn places(&self, places: &[Place]) -> Vec<InCell> {
+        let at = |place: &Place| {
+            [self.cell(place.row.into(), self.whole.south), self.cell(place.col.into(), self.whole.west)]
+        };
+        let mut cells: Vec<InCell> = (0..).zip(places).map(|(number, place)| (at(place), number)).collect();
+        cells.sort_unstable();
+        cells
+    }
+}
+
+fn numbers(cells: &[InCell]) -> Vec<u32> {
+    cells.iter().map(|(_, number)| *number).collect()
+}
+
 /// Calls `found` with every pair of segments whose boxes touch, the lesser number first, and some that do not.
 pub fn segment_pairs(segments: &[Segment], found: &mut impl FnMut(u32, u32)) {
-    let Some(square) = Square::around(segments) else { return };
-    let all: Vec<u32> = (0..segments.len() as u32).collect();
-    pairs_in(square, segments, &all, found);
+    let Some(grid) = Grid::of(segments, 0) else { return };
+    for cell in grid.segments(segments, 0).chunk_by(|a, b| a.0 == b.0).filter(|cell| 1 < cell.len()) {
+        pairs_in(grid.square(cell[0].0), segments, &numbers(cell), found);
+    }
 }
 
 fn pairs_in(square: Square, segments: &[Segment], numbers: &[u32], found: &mut impl FnMut(u32, u32)) {
@@ -82,11 +150,17 @@ fn pairs_in(square: Square, segments: &[Segment], numbers: &[u32], found: &mut i
 
 /// Calls `found` with every segment and every place within `reach` steps of it, both ways, and some farther ones.
 pub fn places_near(segments: &[Segment], places: &[Place], reach: i64, found: &mut impl FnMut(u32, u32)) {
-    let Some(square) = Square::around(segments) else { return };
-    let (all_segments, all_places): (Vec<u32>, Vec<u32>) =
-        ((0..segments.len() as u32).collect(), (0..places.len() as u32).collect());
+    let Some(grid) = Grid::of(segments, reach) else { return };
     let near = Near { segments, places, reach };
-    near.search(square, &all_segments, &all_places, found);
+    let (of_segments, of_places) = (grid.segments(segments, reach), grid.places(places));
+    let mut rest = &of_places[..];
+    for cell in of_segments.chunk_by(|a, b| a.0 == b.0) {
+        rest = &rest[rest.partition_point(|place| place.0 < cell[0].0)..];
+        let here = &rest[..rest.partition_point(|place| place.0 == cell[0].0)];
+        if !here.is_empty() {
+            near.search(grid.square(cell[0].0), &numbers(cell), &numbers(here), found);
+        }
+    }
 }
 
 struct Near<'a> {
