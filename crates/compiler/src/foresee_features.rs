@@ -7,7 +7,7 @@ use database::{AreaLevel, ReportFeatures};
 use fidelity::FeatureFigures;
 use ground::{FeatureTable, GamingArea};
 use job::Job;
-use terrain::ModuleId;
+use terrain::{ModuleId, in_turn};
 
 use crate::CompileError;
 use crate::pieces::cost_of;
@@ -37,7 +37,7 @@ pub struct FeaturesForeseen {
 /// When a file of them cannot be read at all.
 pub fn foresee_features(job: &Job) -> Result<Option<FeaturesForeseen>, CompileError> {
     let (Some(spec), area) = (&job.features, GamingArea::new(job)?) else { return Ok(None) };
-    let Some(ReadFeatures { table, features, .. }) = ReadFeatures::open(job, &area)? else { return Ok(None) };
+    let Some(ReadFeatures { table, features, .. }) = ReadFeatures::open(job, &area, &in_turn)? else { return Ok(None) };
     let level_ground = vec![Some(0); features.stations().len()];
     // No limit, so that nothing is degraded.
     let levelled = features.level(&level_ground, spec.options, &mut { u32::MAX });

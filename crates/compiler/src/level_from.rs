@@ -4,6 +4,7 @@ use database::{Folder, SourceRecord};
 use engine::Fingerprint;
 use ground::GamingArea;
 use job::Job;
+use terrain::in_turn;
 
 use crate::CompileError;
 use crate::keys;
@@ -20,7 +21,7 @@ pub fn level_fingerprint(
     records: &[SourceRecord],
     folder: &Folder,
 ) -> Result<Option<Fingerprint>, CompileError> {
-    let Some(read) = ReadFeatures::open(job, area)? else { return Ok(None) };
+    let Some(read) = ReadFeatures::open(job, area, &in_turn)? else { return Ok(None) };
     let mut ground = vec![None; read.features.stations().len()];
     for (&tile, stations) in area.tiles.iter().zip(&read.by_tile) {
         let (.., profile) = folder.read_profile(tile)?;

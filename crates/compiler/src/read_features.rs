@@ -3,7 +3,7 @@
 use features::{AreaFeatures, Place};
 use ground::{FeatureTable, GamingArea, Vectors, site};
 use job::Job;
-use terrain::{ModuleId, TileId};
+use terrain::{Each, ModuleId, TileId};
 
 use crate::CompileError;
 
@@ -18,15 +18,15 @@ pub(crate) struct ReadFeatures {
 }
 
 impl ReadFeatures {
-    /// Reads the features of a job that has some.
+    /// Reads the features of a job that has some; `each` runs what falls into pieces.
     ///
     /// # Errors
     /// When a file of them cannot be read at all.
-    pub fn open(job: &Job, area: &GamingArea) -> Result<Option<Self>, CompileError> {
+    pub fn open(job: &Job, area: &GamingArea, each: Each) -> Result<Option<Self>, CompileError> {
         let Some(spec) = &job.features else { return Ok(None) };
-        let mut vectors = Vectors::read(job, area)?;
+        let mut vectors = Vectors::read(job, area, each)?;
         let table = FeatureTable::of(&vectors, &spec.rules);
-        let features = AreaFeatures::of(std::mem::take(&mut vectors.sources), &spec.rules, site(area));
+        let features = AreaFeatures::of(std::mem::take(&mut vectors.sources), &spec.rules, site(area), each);
         let mut by_tile = vec![Vec::new(); area.tiles.len()];
         for (number, &place) in features.stations().iter().enumerate() {
             if let Some(tile) = tile_of(area, &features, place) {

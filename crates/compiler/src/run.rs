@@ -7,7 +7,7 @@ use database::{AreaLevel, Database, FileStamp, Manifest, SourceRecord};
 use engine::{Cause, FingerprintBuilder, Outcome, Stamp};
 use ground::{GamingArea, Ground, Window};
 use job::{Budget as PointBudget, Edges, Job};
-use schedule::{Event as Scheduled, RankedTasks, Workers, in_rank_order_observed};
+use schedule::{Event as Scheduled, RankedTasks, Workers, for_each_piece, in_rank_order_observed};
 use source_files::FileState;
 use terrain::{POINT_COST, TileFeatures, TileId, TileTin};
 
@@ -138,7 +138,9 @@ impl Run<'_> {
         if let Some(read) = self.read.get() {
             return Ok(read.clone());
         }
-        let read = ReadFeatures::open(self.job, &self.area)?.expect("a stage of jobs with features");
+        let read =
+            ReadFeatures::open(self.job, &self.area, &|count, piece| for_each_piece(&self.workers, count, piece))?
+                .expect("a stage of jobs with features");
         Ok(self.read.get_or_init(|| Arc::new(read)).clone())
     }
 

@@ -7,7 +7,7 @@ use std::time::Instant;
 use features::{
     FeatureId, GradeOptions, Network, Numbering, Position, Shape, Site, Source, grade, mend, round, sides, sort_out,
 };
-use terrain::{Post, PostRect, Spacing};
+use terrain::{Post, PostRect, Spacing, in_turn};
 
 const POSTS_LONG: i32 = 40_000;
 
@@ -60,7 +60,7 @@ fn main() {
     lap("roads");
     let mended = mend(sort_out(sources, &[]).features, &site);
     lap("sorted out and mended");
-    let rounded = round(mended, &site);
+    let rounded = round(mended, &site, &in_turn);
     lap("rounded");
     let mut remarks = Vec::new();
     let network = Network::of(&rounded.ways, site.lattice, &mut remarks);

@@ -67,6 +67,11 @@ impl Segment {
         if self.a == place || self.b == place {
             return true;
         }
+        // Most places that are asked for lie beside its box.
+        let aside = |a: i32, b: i32, at: i32| at < a.min(b) || a.max(b) < at;
+        if aside(self.a.row, self.b.row, place.row) || aside(self.a.col, self.b.col, place.col) {
+            return false;
+        }
         let [east, north] = self.a.to(self.b);
         let [to_east, to_north] = self.a.to(place);
         // In half steps, so that the sides of a pixel are whole numbers.

@@ -5,6 +5,8 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
+use terrain::in_turn;
+
 use crate::clean::Notes;
 use crate::decks::between;
 use crate::exact::Segment;
@@ -308,7 +310,7 @@ fn assemble(lines: Vec<Strand>, faces: &[Face], site: &Site, remarks: &mut Vec<R
     for ends in rounded.iter().flat_map(|line| line.windows(2)) {
         site.crossings(Segment { a: ends[0], b: ends[1] }, &mut |place| hot.push(place));
     }
-    snap_round(&mut rounded, &hot);
+    snap_round(&mut rounded, &hot, &in_turn);
     let own: Vec<Vec<i32>> = lines.iter().zip(&rounded).map(|(line, places)| heights_along(line, places)).collect();
     let mut heights: Decided = BTreeMap::new();
     for ((line, places), own) in lines.iter().zip(&rounded).zip(&own) {

@@ -181,7 +181,7 @@ mod tests {
     use crate::snap::touch_at_vertices_only;
     use crate::{FeatureId, Numbering, Rounded, Source, round, sort_out};
     use proptest::prelude::*;
-    use terrain::{Post, PostRect, Spacing};
+    use terrain::{Post, PostRect, Spacing, in_turn};
 
     fn site() -> Site {
         let area = PostRect::new(Post::new(0, 0), Post::new(40, 40));
@@ -204,7 +204,7 @@ mod tests {
 
     #[track_caller]
     fn check(sources: Vec<Source>, ways: usize, flaws: &[(Flaw, Remedy)]) -> Rounded {
-        let rounded = round(mended(sources), &site());
+        let rounded = round(mended(sources), &site(), &in_turn);
         let found: Vec<_> = rounded.remarks.iter().map(|remark| (remark.flaw.clone(), remark.remedy)).collect();
         assert_eq!((rounded.ways.len(), found), (ways, flaws.to_vec()));
         rounded
@@ -292,7 +292,7 @@ mod tests {
                 lines.iter().enumerate().map(|(n, (line, tag))| source(n as i64, tags[*tag], line)).collect();
             let mut reversed = sources.clone();
             reversed.reverse();
-            let rounded = round(mended(sources), &site());
+            let rounded = round(mended(sources), &site(), &in_turn);
             let mut all: Vec<Vec<Place>> = rounded.ways.iter().map(|way| way.places.clone()).collect();
             for ring in rounded.outlines.iter().flat_map(|outline| &outline.rings) {
                 all.push(ring.places.iter().chain(ring.places.first()).copied().collect());
@@ -303,7 +303,7 @@ mod tests {
                 site().crossings(crate::exact::Segment { a: pair[0], b: pair[1] }, &mut |place| crossed.push(place));
                 prop_assert!(crossed.is_empty(), "{:?} crosses a line at {:?}", pair, crossed);
             }
-            prop_assert_eq!(round(mended(reversed), &site()), rounded);
+            prop_assert_eq!(round(mended(reversed), &site(), &in_turn), rounded);
         }
     }
 }

@@ -61,14 +61,41 @@ impl Square {
 }
 
 /// The area of all segments as squares of one size.
+#[derive(Clone, Copy)]
 struct Grid {
     whole: Square,
     /// Squares along a side.
     count: i64,
 }
 
-/// A square by its row and column, and the number of what lies in it.
-type InCell = ([i64; 2], u32);
+/// The numbers of what lies in each square of a grid, square by square.
+struct Binned {
+    /// Where each square's numbers begin, and where the last one's end.
+    starts: Vec<u32>,
+    numbers: Vec<u32>,
+}
+
+impl Binned {
+    /// From the square of each number; a number may lie in several.
+    fn of(squares: usize, all: &[(u32, u32)]) -> Self {
+        let mut starts = vec![0; squares + 1];
+        all.iter().for_each(|(square, _)| starts[*square as usize + 1] += 1);
+        for square in 0..squares {
+            starts[square + 1] += starts[square];
+        }
+        let (mut next, mut numbers) = (starts.clone(), vec![0; all.len()]);
+        for (square, number) in all {
+            let place = &mut next[*square as usize];
+            numbers[*place as usize] = *number;
+            *place += 1;
+        }
+        Self { starts, numbers }
+    }
+
+    fn of_square(&self, square: usize) -> &[u32] {
+        &self.numbers[self.starts[square] as usize..self.starts[square + 1] as usize]
+    }
+}
 
 impl Grid {
     /// A grid for `segments`, none of whose squares is smaller than what lies within `reach` of a place.
@@ -81,86 +108,155 @@ impl Grid {
         Some(Self { whole, count })
     }
 
-    /// The square at a row and a column.
-    fn square(&self, [row, col]: [i64; 2]) -> Square {
+    /// How many squares there are.
+    fn squares(&self) -> usize {
+        (self.count * self.count) as usize
+    }
+
+    /// The squares of a row.
+    fn row(&self, row: usize) -> std::ops::Range<usize> {
+        let count = self.count as usize;
+        row * count..(row + 1) * count
+    }
+
+    /// The square of a number: row after row, from the south.
+    fn square(&self, number: usize) -> Square {
         let side = self.whole.side / self.count;
+        let (row, col) = (number as i64 / self.count, number as i64 % self.count);
         Square { south: self.whole.south + row * side, west: self.whole.west + col * side, side }
     }
 
-    fn cell(&self, at: i64, low: i64) -> i64 {
-        (at - low).div_euclid(self.whole.side / self.count).clamp(0, self.count - 1)
+    /// The row or column of squares at a coordinate; what lies outside is in the nearest.
+    fn line(&self, at: i64, low: i64) -> i64 {
+        // A square's side is a power of two.
+        ((at - low) >> (self.whole.side / self.count).trailing_zeros()).clamp(0, self.count - 1)
     }
 
-    /// Segments in every square that they come within `reach` of, square by square.
-    fn segments(&self, segments: &[Segment], reach: i64) -> Vec<InCell> {
-        let mut cells: Vec<InCell> = Vec::with_capacity(segments.len() + segments.len() / 4);
+    /// Segments in every square that they come within `reach` of.
+    fn segments(&self, segments: &[Segment], reach: i64) -> Binned {
+        let mut all: Vec<(u32, u32)> = Vec::with_capacity(segments.len() + segments.len() / 4);
         for (number, segment) in (0..).zip(segments) {
             let span = |a: i32, b: i32, low: i64| {
-                self.cell(i64::from(a.min(b)) - reach, low)..=self.cell(i64::from(a.max(b)) + reach, low)
+                (self.line(i64::from(a.min(b)) - reach, low), self.line(i64::from(a.max(b)) + reach, low))
             };
-            let cols = span(segment.a.col, segment.b.col, self.whole.west);
-            for row in span(segment.a.row, segment.b.row, self.whole.south) {
-                let here = cols.clone().map(|col| [row, col]);
-                cells.extend(here.filter(|at| self.square(*at).meets(segment, reach)).map(|at| (at, number)));
+            let (south, north) = span(segment.a.row, segment.b.row, self.whole.south);
+            let (west, east) = span(segment.a.col, segment.b.col, self.whole.west);
+            // A segment comes near every square of its box where that is one row or column.
+            let is_slim = south == north || west == east;
+            for row in south..=north {
+                for square in (row * self.count + west) as usize..=(row * self.count + east) as usize {
+                    if is_slim || self.square(square).meets(segment, reach) {
+                        all.push((square as u32, number));
+                    }
+                }
             }
         }
-        cells.sort_unstable();
-        cells
+        Binned::of(self.squares(), &all)
     }
 
-    /// Places in the square that each lies in, square by square.
-    fn places(&self, places: &[Place]) -> Vec<InCell> {
-        let at = |place: &Place| {
-            [self.cell(place.row.into(), self.whole.south), self.cell(place.col.into(), self.whole.west)]
+    /// Places in the square that each lies in.
+    fn places(&self, places: &[Place]) -> Binned {
+        let square = |place: &Place| {
+            let (row, col) =
+                (self.line(place.row.into(), self.whole.south), self.line(place.col.into(), self.whole.west));
+            (row * self.count + col) as u32
         };
-        let mut cells: Vec<InCell> = (0..).zip(places).map(|(number, place)| (at(place), number)).collect();
-        cells.sort_unstable();
-        cells
+        let all: Vec<(u32, u32)> = places.iter().map(square).zip(0..).collect();
+        Binned::of(self.squares(), &all)
     }
 }
 
-fn numbers(cells: &[InCell]) -> Vec<u32> {
-    cells.iter().map(|(_, number)| *number).collect()
+/// Pairs of segments whose boxes touch, row of squares by row of squares, so that rows can be searched at once.
+pub struct SegmentPairs<'a> {
+    segments: &'a [Segment],
+    grid: Option<(Grid, Binned)>,
 }
 
-/// Calls `found` with every pair of segments whose boxes touch, the lesser number first, and some that do not.
+impl<'a> SegmentPairs<'a> {
+    pub fn of(segments: &'a [Segment]) -> Self {
+        let grid = Grid::of(segments, 0).map(|grid| (grid, grid.segments(segments, 0)));
+        Self { segments, grid }
+    }
+
+    pub fn rows(&self) -> usize {
+        self.grid.as_ref().map_or(0, |(grid, _)| grid.count as usize)
+    }
+
+    /// Calls `found` with every pair in a row of which one is new, the lesser number first, and with some pairs whose
+    /// boxes do not touch.
+    pub fn in_row(&self, row: usize, is_new: &impl Fn(u32) -> bool, found: &mut impl FnMut(u32, u32)) {
+        let Some((grid, binned)) = &self.grid else { return };
+        for square in grid.row(row) {
+            pairs_in(grid.square(square), self.segments, binned.of_square(square), is_new, found);
+        }
+    }
+}
+
+/// Calls `found` with every pair of segments whose boxes touch, the lesser number first, and with some more pairs.
 pub fn segment_pairs(segments: &[Segment], found: &mut impl FnMut(u32, u32)) {
-    let Some(grid) = Grid::of(segments, 0) else { return };
-    for cell in grid.segments(segments, 0).chunk_by(|a, b| a.0 == b.0).filter(|cell| 1 < cell.len()) {
-        pairs_in(grid.square(cell[0].0), segments, &numbers(cell), found);
-    }
+    let pairs = SegmentPairs::of(segments);
+    (0..pairs.rows()).for_each(|row| pairs.in_row(row, &|_| true, found));
 }
 
-fn pairs_in(square: Square, segments: &[Segment], numbers: &[u32], found: &mut impl FnMut(u32, u32)) {
+fn pairs_in(
+    square: Square,
+    segments: &[Segment],
+    numbers: &[u32],
+    is_new: &impl Fn(u32) -> bool,
+    found: &mut impl FnMut(u32, u32),
+) {
+    if numbers.len() < 2 || !numbers.iter().any(|&number| is_new(number)) {
+        return;
+    }
     let few = numbers.len() * numbers.len() <= 2 * PAIRS_MAX;
     if few || square.side <= 2 {
         for (place, &one) in numbers.iter().enumerate() {
-            numbers[place + 1..].iter().for_each(|&other| found(one, other));
+            let all = is_new(one);
+            let others = numbers[place + 1..].iter().filter(|&&other| all || is_new(other));
+            others.for_each(|&other| found(one, other));
         }
         return;
     }
     for quarter in square.quarters() {
         let inside = |number: &u32| quarter.meets(&segments[*number as usize], 0);
         let inside: Vec<u32> = numbers.iter().copied().filter(inside).collect();
-        if 1 < inside.len() {
-            pairs_in(quarter, segments, &inside, found);
+        pairs_in(quarter, segments, &inside, is_new, found);
+    }
+}
+
+/// Segments and the places within `reach` steps of them, both ways, row of squares by row of squares.
+pub struct PlacesNear<'a> {
+    near: Near<'a>,
+    grid: Option<(Grid, Binned, Binned)>,
+}
+
+impl<'a> PlacesNear<'a> {
+    pub fn of(segments: &'a [Segment], places: &'a [Place], reach: i64) -> Self {
+        let grid = Grid::of(segments, reach);
+        let grid = grid.map(|grid| (grid, grid.segments(segments, reach), grid.places(places)));
+        Self { near: Near { segments, places, reach }, grid }
+    }
+
+    pub fn rows(&self) -> usize {
+        self.grid.as_ref().map_or(0, |(grid, ..)| grid.count as usize)
+    }
+
+    /// Calls `found` with every segment and place of a row that are near, and with some that are farther apart.
+    pub fn in_row(&self, row: usize, found: &mut impl FnMut(u32, u32)) {
+        let Some((grid, of_segments, of_places)) = &self.grid else { return };
+        for square in grid.row(row) {
+            let (segments, places) = (of_segments.of_square(square), of_places.of_square(square));
+            if !segments.is_empty() && !places.is_empty() {
+                self.near.search(grid.square(square), segments, places, found);
+            }
         }
     }
 }
 
 /// Calls `found` with every segment and every place within `reach` steps of it, both ways, and some farther ones.
 pub fn places_near(segments: &[Segment], places: &[Place], reach: i64, found: &mut impl FnMut(u32, u32)) {
-    let Some(grid) = Grid::of(segments, reach) else { return };
-    let near = Near { segments, places, reach };
-    let (of_segments, of_places) = (grid.segments(segments, reach), grid.places(places));
-    let mut rest = &of_places[..];
-    for cell in of_segments.chunk_by(|a, b| a.0 == b.0) {
-        rest = &rest[rest.partition_point(|place| place.0 < cell[0].0)..];
-        let here = &rest[..rest.partition_point(|place| place.0 == cell[0].0)];
-        if !here.is_empty() {
-            near.search(grid.square(cell[0].0), &numbers(cell), &numbers(here), found);
-        }
-    }
+    let near = PlacesNear::of(segments, places, reach);
+    (0..near.rows()).for_each(|row| near.in_row(row, found));
 }
 
 struct Near<'a> {

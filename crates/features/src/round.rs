@@ -3,6 +3,8 @@
 
 use std::collections::BTreeMap;
 
+use terrain::Each;
+
 use crate::clean::Notes;
 use crate::exact::Segment;
 use crate::gaps::family;
@@ -42,7 +44,8 @@ pub struct Rounded {
 }
 
 /// Puts in stations and shared vertices. Ways of different storeys do not see one another; outlines lie on the ground.
-pub fn round(mended: Mended, site: &Site) -> Rounded {
+/// `each` runs what falls into pieces.
+pub fn round(mended: Mended, site: &Site, each: Each) -> Rounded {
     let Mended { mut ways, areas, mut remarks } = mended;
     let mut groups: BTreeMap<Storey, Vec<usize>> = BTreeMap::new();
     for (number, way) in ways.iter().enumerate() {
@@ -61,7 +64,7 @@ pub fn round(mended: Mended, site: &Site) -> Rounded {
             }));
         }
         let hot = line_crossings(&lines, site);
-        let meetings = snap_round(&mut lines, &hot);
+        let meetings = snap_round(&mut lines, &hot, each);
         remark_meetings(&meetings, &numbers, &ways, site, &mut remarks);
         let mut lines = lines.into_iter();
         for &number in &numbers {

@@ -1,6 +1,6 @@
 //! Small networks for tests: lines of posts over a ground that is a function of the place.
 
-use terrain::{Post, PostRect, Spacing};
+use terrain::{Post, PostRect, Spacing, in_turn};
 
 use crate::exact::Segment;
 use crate::{
@@ -24,7 +24,7 @@ pub fn way(number: i64, tags: &str, positions: &[(f64, f64)]) -> Source {
 
 /// Features from tags to the lattice.
 pub fn rounded(sources: Vec<Source>) -> Rounded {
-    round(mend(sort_out(sources, &[]).features, &site()), &site())
+    round(mend(sort_out(sources, &[]).features, &site()), &site(), &in_turn)
 }
 
 /// The network of all ways, and the ground at its nodes; `metres` is a function of posts (east, north).

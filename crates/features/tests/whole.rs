@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use features::*;
 use proptest::prelude::*;
-use terrain::{Post, PostRect, Spacing};
+use terrain::{Post, PostRect, Spacing, in_turn};
 
 fn site() -> Site {
     let area = PostRect::new(Post::new(0, 0), Post::new(80, 80));
@@ -40,7 +40,7 @@ fn all_stages(sources: Vec<Source>, metres: &dyn Fn(f64, f64) -> f64, most: u32)
     };
     let sorted = sort_out(sources, &[]);
     let mended = mend(sorted.features, &site);
-    let mut rounded = round(mended, &site);
+    let mut rounded = round(mended, &site, &in_turn);
     rounded.outlines = split_at_dams(rounded.outlines, &rounded.ways);
     let mut remarks = sorted.remarks;
     remarks.extend(rounded.remarks.clone());

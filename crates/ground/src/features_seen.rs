@@ -7,6 +7,7 @@ use std::path::Path;
 use features::{FeatureId, Form, IdleRule, Kind, Numbering, OverviewRow, RowOrigin, Rule, Shape, Source, overview};
 use job::Choice;
 use source_files::{BUILT_IN_KEYS, Extent, VectorFeature, VectorShape, Wanted, read_features};
+use terrain::in_turn;
 
 use crate::GroundError;
 use crate::vectors::{FeaturesRead, Vectors};
@@ -109,7 +110,8 @@ pub fn features_in(
 ) -> Result<FeaturesSeen, GroundError> {
     let side = |axis: usize| [origin_m[axis], origin_m[axis] + size_m[axis]];
     let bounds = Extent { east: side(0), north: side(1) };
-    let read = read_features(path, &Wanted { epsg, bounds, layer, crs: None, keys: &BUILT_IN_KEYS })?;
+    let wanted = Wanted { epsg, bounds, layer, crs: None, keys: &BUILT_IN_KEYS };
+    let read = read_features(path, &wanted, &in_turn)?;
     let is_polygon = |feature: &VectorFeature| matches!(feature.shape, VectorShape::Polygon(_));
     let first = read.features.first().map(is_polygon);
     let are_polygons = first.filter(|first| read.features.iter().all(|feature| is_polygon(feature) == *first));
@@ -241,7 +243,7 @@ mod tests {
         }
         std::fs::write(folder.path().join("a.toml"), format!("{JOB}{keys}\n")).unwrap();
         let job = Job::load(&folder.path().join("a.toml")).map_err(|error| error.to_string())?;
-        let vectors = Vectors::read(&job, &GamingArea::new(&job).unwrap());
+        let vectors = Vectors::read(&job, &GamingArea::new(&job).unwrap(), &in_turn);
         let vectors = vectors.map_err(|error| error.to_string().replace(folder.path().to_str().unwrap(), ""))?;
         Ok(FeatureTable::of(&vectors, &job.features.unwrap().rules))
     }

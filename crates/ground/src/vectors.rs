@@ -9,7 +9,7 @@ use sample_terrain::SampleShape;
 use source_files::{
     BUILT_IN_KEYS, Crs, Done, Extent, FeatureFile, Remark, VectorFeature, VectorShape, Vertices, Wanted,
 };
-use terrain::GridFrame;
+use terrain::{Each, GridFrame};
 
 use crate::GroundError;
 use crate::area::GamingArea;
@@ -41,18 +41,19 @@ pub struct FeaturesRead {
 }
 
 impl Vectors {
-    /// Reads the features of a job; there are none where it has no section for them.
+    /// Reads the features of a job; there are none where it has no section for them. `each` runs what falls
+    /// into pieces.
     ///
     /// # Errors
     /// When a file cannot be read at all. What is wrong with single features is a remark.
-    pub fn read(job: &Job, area: &GamingArea) -> Result<Self, GroundError> {
+    pub fn read(job: &Job, area: &GamingArea, each: Each) -> Result<Self, GroundError> {
         let mut vectors =
             Self { sources: Vec::new(), files: Vec::new(), remarks: Vec::new(), notes: Vec::new(), names: Vec::new() };
         let Some(spec) = &job.features else { return Ok(vectors) };
         for source in &spec.sources {
             match source {
                 FeatureSource::Sample => vectors.add_sample(job, area),
-                FeatureSource::File { .. } => vectors.add_file(job, area, spec, source)?,
+                FeatureSource::File { .. } => vectors.add_file(job, area, spec, source, each)?,
             }
         }
         Ok(vectors)
@@ -91,6 +92,7 @@ impl Vectors {
         area: &GamingArea,
         spec: &FeaturesSpec,
         of: &FeatureSource,
+        each: Each,
     ) -> Result<(), GroundError> {
         let FeatureSource::File { file, layer, kind, crs } = of else { return Ok(()) };
         let crs = crs.as_deref().map(|text| Crs::named(text).map_err(|found| bad_crs(&file.written, &found)));
@@ -101,7 +103,7 @@ impl Vectors {
         let bounds = bounds(area, [area.frame.origin_east_m, area.frame.origin_north_m]);
         let wanted = Wanted { epsg: job.area.epsg, bounds, layer: layer.as_deref(), crs: crs.as_ref(), keys: &keys };
         let FeatureFile { features, remarks, notes, found, outside, .. } =
-            source_files::read_features(&file.path, &wanted)?;
+            source_files::read_features(&file.path, &wanted, each)?;
         let name = match layer {
             Some(layer) => format!("{}, layer {layer}", file.written),
             None => file.written.clone(),

@@ -38,5 +38,7 @@ mod choices;
 pub use choices::{Effort, HeightFit, LastBatch, Lattice, LodBorder, Resampling, Smooth, TileOrder};
 mod class_colors;
 pub use class_colors::{FEATURE_COLORS, named_class_color};
+mod each;
+pub use each::{Each, gather, in_turn};
 mod breach;
 pub use breach::{Breach, BreachKind, BreachPlace};

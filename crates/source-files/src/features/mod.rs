@@ -26,15 +26,17 @@ pub use model::{BUILT_IN_KEYS, Done, FeatureFile, Remark, Tags, VectorFeature, V
 
 use std::path::Path;
 
+use terrain::Each;
+
 use crate::SourceError;
 use formats::Format;
 
-/// Reads the lines and polygons of the file at `path` that lie inside the bounds.
+/// Reads the lines and polygons of the file at `path` that lie inside the bounds; `each` runs what falls into pieces.
 ///
 /// # Errors
 /// When it is none of the formats, is broken, too large, or in a coordinate system that cannot be brought to the
 /// area's, or when it has several layers and none is named. Features that cannot be used are no error.
-pub fn read_features(path: &Path, wanted: &Wanted) -> Result<FeatureFile, SourceError> {
+pub fn read_features(path: &Path, wanted: &Wanted, each: Each) -> Result<FeatureFile, SourceError> {
     let (store, format) = formats::open(path)?;
     if let (Some(layer), true) = (wanted.layer, format != Format::GeoPackage) {
         let (found, expected) = (format!("the layer `{layer}` named"), "no layer: only GeoPackages have some".into());
@@ -45,7 +47,7 @@ pub fn read_features(path: &Path, wanted: &Wanted) -> Result<FeatureFile, Source
         return Err(SourceError::NoOtherCrs { path: path.into(), found });
     }
     let read = match format {
-        Format::OpenStreetMap => osm::read(&store, wanted),
+        Format::OpenStreetMap => osm::read(&store, wanted, each),
         Format::GeoPackage => packages::read(path, wanted),
         Format::Shapefile => shapes::read(&store, wanted),
         Format::GeoJson => json::read(&store, wanted),

@@ -83,6 +83,32 @@ impl Placing {
         })
     }
 
+    /// For a part of the same file, to be placed elsewhere.
+    pub(super) fn of_part(&self) -> Self {
+        Self {
+            area: self.area.clone(),
+            source: self.source.clone(),
+            lies: Extent::NOTHING,
+            remarks_beyond: 0,
+            file: FeatureFile::default(),
+            ..*self
+        }
+    }
+
+    /// Takes over what was placed of the next part of the file.
+    pub(super) fn append(&mut self, part: Self) {
+        self.lies_over(&part.lies);
+        self.remarks_beyond += part.remarks_beyond;
+        let FeatureFile { mut features, remarks, notes, found, outside, attribution: _ } = part.file;
+        self.file.features.append(&mut features);
+        self.file.notes.extend(notes);
+        self.count_outside(outside);
+        self.file.found += found - outside;
+        for Remark { id, at, found, done } in remarks {
+            self.remark(&id, at, found, done);
+        }
+    }
+
     /// What of the file's coordinates lies within `metres` of the bounds.
     pub(super) fn within(&self, metres: f64) -> Extent {
         let bounds = self.bounds.grown(metres);
@@ -172,9 +198,11 @@ impl Placing {
 
     /// A part that has enough vertices, its rings closed.
     fn sound(&mut self, id: &str, part: Part) -> Option<Part> {
-        let at = part.runs().iter().flatten().next().and_then(|vertex| self.at(vertex));
+        let first = part.runs().iter().flatten().next().copied();
+        let at = |placing: &Self| first.and_then(|vertex| placing.at(&vertex));
         match part {
             Part::Line(line) if line.len() < 2 => {
+                let at = at(self);
                 self.remark(id, at, format!("a line of {}", counted(line.len())), LEFT_OUT);
                 None
             }
@@ -185,12 +213,14 @@ impl Placing {
                     if let (Some(&first), Some(last)) = (ring.first(), ring.last())
                         && first[..2] != last[..2]
                     {
+                        let at = at(self);
                         self.remark(id, at, "a ring whose last vertex is not its first".into(), Done::Kept("closed"));
                         ring.push(first);
                     }
                     if ring.len() < 4 {
                         let found = format!("a ring of {}, the last being the first", counted(ring.len()));
                         let done = if index == 0 { LEFT_OUT } else { Done::LeftOut("the hole left out") };
+                        let at = at(self);
                         self.remark(id, at, found, done);
                         // Without its outer ring there is nothing to have holes.
                         if index == 0 {

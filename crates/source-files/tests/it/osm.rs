@@ -4,6 +4,7 @@ use proptest::prelude::*;
 use source_files::{
     BUILT_IN_KEYS, Crs, Extent, FeatureFile, SourceError, VectorFeature, VectorShape, Wanted, read_features,
 };
+use terrain::in_turn;
 
 use crate::pbf::{Osm, Packing, bytes, frame, header, number, with_head};
 use crate::support::Folder;
@@ -17,7 +18,7 @@ const LAKE: &[(&str, &str)] = &[("natural", "water"), ("type", "multipolygon")];
 
 fn read_bytes(bytes: &[u8]) -> Result<FeatureFile, SourceError> {
     let folder = Folder::new();
-    read_features(&folder.write("a.osm.pbf", bytes), &WANTED)
+    read_features(&folder.write("a.osm.pbf", bytes), &WANTED, &in_turn)
 }
 
 #[track_caller]
@@ -66,7 +67,7 @@ fn ways_with_a_wanted_key_are_lines_in_metres_with_their_tags_sorted() {
     assert_eq!((line(feature).len(), line(feature)[0]), (3, expected));
     let named = Wanted { keys: &["power"], ..WANTED };
     let folder = Folder::new();
-    let file = read_features(&folder.write("a.osm.pbf", &osm.bytes()), &named).unwrap();
+    let file = read_features(&folder.write("a.osm.pbf", &osm.bytes()), &named, &in_turn).unwrap();
     assert_eq!(ids(&file), ["way/6"], "keys that the caller names");
 }
 

@@ -6,6 +6,7 @@ use source_files::{
     DemFile, Extent, FeatureFile, Reading, SourceError, VectorFeature, VectorShape, Wanted, feature_layers,
     is_feature_file, read_features,
 };
+use terrain::in_turn;
 
 use crate::pbf::header;
 use crate::support::{Folder, Tiff};
@@ -16,7 +17,7 @@ const WANTED: Wanted = Wanted { epsg: 32611, bounds: BOUNDS, layer: None, crs: N
 
 #[track_caller]
 fn read(path: &Path) -> FeatureFile {
-    read_features(path, &WANTED).unwrap()
+    read_features(path, &WANTED, &in_turn).unwrap()
 }
 
 fn ids(file: &FeatureFile) -> Vec<&str> {
@@ -224,18 +225,21 @@ fn of_several_layers_one_is_to_be_named() {
     let lines = [blob(1002, &[RUN])];
     let path = package(&folder, &[("rivers", &lines), ("lakes", &lines), ("none", &[])]);
     let refused = |layer| {
-        let error = read_features(&path, &Wanted { layer, ..WANTED }).unwrap_err();
+        let error = read_features(&path, &Wanted { layer, ..WANTED }, &in_turn).unwrap_err();
         (error.to_string().replace(&path.display().to_string(), "F"), error.hint().unwrap())
     };
     assert_eq!(refused(None).0, "F: 2 layers: `rivers`, `lakes`; expected one of them named");
     assert!(refused(None).1.contains("layer = "));
     let expected = "F: the layer `roads` named; expected one of `rivers`, `lakes`, `none`";
     assert_eq!(refused(Some("roads")).0, expected);
-    let named = read_features(&path, &Wanted { layer: Some("lakes"), ..WANTED }).unwrap();
+    let named = read_features(&path, &Wanted { layer: Some("lakes"), ..WANTED }, &in_turn).unwrap();
     assert_eq!(ids(&named), ["hydro.gpkg:lakes#1"]);
     assert_eq!(feature_layers(&path).unwrap(), ["rivers", "lakes", "none"]);
     let json = folder.write("a.geojson", LINE.as_bytes());
-    assert!(matches!(read_features(&json, &Wanted { layer: Some("x"), ..WANTED }), Err(SourceError::Layer { .. })));
+    assert!(matches!(
+        read_features(&json, &Wanted { layer: Some("x"), ..WANTED }, &in_turn),
+        Err(SourceError::Layer { .. })
+    ));
     assert_eq!((ids(&read(&json)), feature_layers(&json).unwrap().len()), (vec!["a.geojson#0"], 0));
 }
 
@@ -352,7 +356,7 @@ fn a_shapefile_gives_lines_with_heights_and_its_table_as_tags() {
     for end in 32..folder.path("roads.DBF").metadata().unwrap().len() as usize {
         let whole = table(&[" track   2T", "*gone    1F", " \u{e9}    ***?"]);
         folder.write("roads.DBF", &whole[..end]);
-        assert!(matches!(read_features(&path, &WANTED), Err(SourceError::Truncated { .. })), "cut at {end}");
+        assert!(matches!(read_features(&path, &WANTED, &in_turn), Err(SourceError::Truncated { .. })), "cut at {end}");
     }
 }
 
@@ -375,7 +379,7 @@ fn what_is_no_file_of_features_is_refused_by_name() {
     let refused = |name: &str, bytes: &[u8]| {
         let path = folder.write(name, bytes);
         assert!(!is_feature_file(&path), "{name}");
-        let error = read_features(&path, &WANTED).unwrap_err();
+        let error = read_features(&path, &WANTED, &in_turn).unwrap_err();
         (error.to_string(), error.hint().unwrap())
     };
     let (message, hint) = refused("dem.tif", &Tiff::of_heights(&[&[1, 2], &[3, 4]]).bytes());

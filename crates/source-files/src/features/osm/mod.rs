@@ -18,6 +18,8 @@ mod wire;
 use std::collections::HashSet;
 use std::sync::Arc;
 
+use terrain::Each;
+
 use super::model::{FeatureFile, Tags, Wanted};
 use super::placing::{LEFT_OUT, Placing, Texts};
 use crate::SourceError;
@@ -49,7 +51,7 @@ struct Reader<'a> {
     far_ways: u64,
 }
 
-pub(super) fn read(store: &Store, wanted: &Wanted) -> Result<FeatureFile, SourceError> {
+pub(super) fn read(store: &Store, wanted: &Wanted, each: Each) -> Result<FeatureFile, SourceError> {
     let mut placing = Placing::new(store.path(), wanted, Some(Crs::wgs84()))?;
     let mut reader = Reader {
         frames: Frames::open(store)?,
@@ -72,7 +74,7 @@ pub(super) fn read(store: &Store, wanted: &Wanted) -> Result<FeatureFile, Source
     placing.count_outside((all - relations.len()) as u64);
     reader.tell_lost(&mut placing);
     let Reader { nodes, ways, .. } = reader;
-    shapes::place(&nodes, ways, relations, &mut placing);
+    shapes::place(&nodes, ways, relations, &mut placing, each);
     Ok(placing.finish(Some(ATTRIBUTION)))
 }
 

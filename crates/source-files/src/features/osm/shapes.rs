@@ -2,6 +2,8 @@
 
 use std::collections::HashSet;
 
+use terrain::{Each, gather};
+
 use super::assemble::{NodeRing, Role, rings};
 use super::block::OFF_THE_EARTH;
 use super::kept::{KeptRelation, KeptWay, SEGMENT_M_MAX};
@@ -15,16 +17,30 @@ use crate::features::raw::{Part, RawFeature, RawShape};
 use crate::limits::RINGS_MAX;
 
 /// Places relations, then ways.
-pub(super) fn place(nodes: &Nodes, ways: Vec<KeptWay>, relations: Vec<KeptRelation>, placing: &mut Placing) {
+pub(super) fn place(
+    nodes: &Nodes,
+    ways: Vec<KeptWay>,
+    relations: Vec<KeptRelation>,
+    placing: &mut Placing,
+    each: Each,
+) {
     let mut drawer = Drawer { nodes, ways: &ways, placing, drawn: HashSet::new() };
     for relation in relations {
         drawer.relation(relation);
     }
     let drawn = drawer.drawn;
-    for way in ways.into_iter().filter(|way| way.is_wanted) {
-        Drawer { nodes, ways: &[], placing, drawn: HashSet::new() }.way(way, &drawn);
-    }
+    let pieces: Vec<&[KeptWay]> = ways.chunks(WAYS_A_PIECE).collect();
+    let placed = gather(each, pieces.len(), |number| {
+        let mut placing = placing.of_part();
+        let mut drawer = Drawer { nodes, ways: &[], placing: &mut placing, drawn: HashSet::new() };
+        pieces[number].iter().filter(|way| way.is_wanted).for_each(|way| drawer.way(way, &drawn));
+        placing
+    });
+    placed.into_iter().for_each(|part| placing.append(part));
 }
+
+/// Ways that are placed by one worker at a time.
+const WAYS_A_PIECE: usize = 2048;
 
 /// What is done with a ring that cannot be used.
 const RING_LEFT_OUT: Done = Done::LeftOut("the ring left out");
@@ -47,7 +63,7 @@ struct Run {
 }
 
 impl Drawer<'_> {
-    fn way(&mut self, way: KeptWay, drawn: &HashSet<i64>) {
+    fn way(&mut self, way: &KeptWay, drawn: &HashSet<i64>) {
         let id = format!("way/{}", way.id);
         if drawn.contains(&way.id) {
             let found = "the outline of a relation with the same tags".into();
@@ -61,29 +77,30 @@ impl Drawer<'_> {
                 return self.left_out(&id, None, found);
             }
         };
-        let at = run.places.iter().flatten().next().and_then(|vertex| self.placing.at(vertex));
+        let first = run.places.iter().flatten().next().copied();
+        let at = |placing: &Placing| first.and_then(|vertex| placing.at(&vertex));
         let fault = run.fault();
         let parts = if is_closed && is_area(&way.tags) {
             match closed(run) {
                 Some(ring) => {
-                    self.tell(&id, at, fault, Done::Kept("joined across"));
+                    self.tell(&id, at(self.placing), fault, Done::Kept("joined across"));
                     vec![Part::Polygon(vec![ring])]
                 }
                 None => {
                     let found = fault.unwrap_or_else(|| "fewer than 3 places".into());
-                    return self.left_out(&id, at, found);
+                    return self.left_out(&id, at(self.placing), found);
                 }
             }
         } else {
             let lines = pieces(run);
             if lines.is_empty() {
                 let found = fault.unwrap_or_else(|| "fewer than 2 nodes".into());
-                return self.left_out(&id, at, found);
+                return self.left_out(&id, at(self.placing), found);
             }
-            self.tell(&id, at, fault, Done::Kept("cut there"));
+            self.tell(&id, at(self.placing), fault, Done::Kept("cut there"));
             lines.into_iter().map(Part::Line).collect()
         };
-        self.feature(id, way.tags, parts);
+        self.feature(id, way.tags.clone(), parts);
     }
 
     fn left_out(&mut self, id: &str, at: Option<[f64; 2]>, found: String) {
