@@ -72,6 +72,15 @@ fn ways_with_a_wanted_key_are_lines_in_metres_with_their_tags_sorted() {
 }
 
 #[test]
+fn another_system_is_refused_for_data_that_is_in_degrees() {
+    let folder = Folder::new();
+    let utm = Crs::from_epsg(32611).unwrap();
+    let path = folder.write("a.osm.pbf", &grid().bytes());
+    let error = read_features(&path, &Wanted { crs: Some(&utm), ..WANTED }, &in_turn).unwrap_err();
+    assert!(matches!(error, SourceError::NoOtherCrs { .. }), "{error:?}");
+}
+
+#[test]
 fn the_order_of_blocks_and_how_they_are_packed_change_nothing() {
     let osm = grid().way(7, ROAD, &[1, 2, 300]).way(3, ROAD, &[2, 12]).way(9, &[], &[21, 22, 32, 21]).relation(
         4,
@@ -167,12 +176,14 @@ fn multipolygons_without_an_outer_ring_or_with_open_ones_are_told() {
         .relation(2, LAKE, &[(1, 2, "outer"), (1, 1, "inner")])
         .relation(3, LAKE, &[(1, 3, "outer"), (1, 99, "outer")])
         .relation(4, LAKE, &[(1, 3, "outer"), (1, 1, "inner")])
-        .relation(5, LAKE, &[]);
+        .relation(5, LAKE, &[])
+        .relation(6, LAKE, &[(1, 98, "outer"), (1, 99, "inner")]);
     let file = read(&osm);
     assert_eq!(ids(&file), ["relation/3", "relation/4"]);
     assert_eq!(
         remarks(&file),
         [
+            "relation/6: none of its 2 ways in the file (left out)",
             "relation/1: a multipolygon without an outer ring (left out)",
             "relation/2: an inner ring outside all outer rings (the ring left out)",
             "relation/2: 1 of its 2 ways in no closed ring (left out)",

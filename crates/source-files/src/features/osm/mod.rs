@@ -66,7 +66,9 @@ pub(super) fn read(store: &Store, wanted: &Wanted, each: Each) -> Result<Feature
     };
     reader.survey(store)?;
     let mut relations = reader.relations()?;
-    reader.near_ways(&relations, &mut placing)?;
+    let mut members = Members::of(&relations);
+    reader.near_ways(&mut members, &mut placing)?;
+    members.tell_absent(&mut relations, &mut placing);
     let all = relations.len();
     reader.keep_reached(&mut relations)?;
     reader.far_nodes()?;
@@ -149,8 +151,7 @@ impl<'a> Reader<'a> {
     }
 
     /// Keeps ways with a node near the area that are wanted, by themselves or by a relation.
-    fn near_ways(&mut self, relations: &[KeptRelation], placing: &mut Placing) -> Result<(), SourceError> {
-        let members = member_ids(relations);
+    fn near_ways(&mut self, members: &mut Members, placing: &mut Placing) -> Result<(), SourceError> {
         let Self { frames, blocks, keys, nodes, texts, ways, lost, far_ways, .. } = self;
         let mut way = Way::default();
         for (frame, _) in blocks.iter().filter(|(_, contents)| contents.ways.is_some()) {
@@ -160,7 +161,8 @@ impl<'a> Reader<'a> {
                 let mut known = KnownTexts::of(&block);
                 block.ways(&mut way, |way| {
                     let is_wanted = way.tags.iter().any(|&(key, _)| is_wanted_text[key]);
-                    if !is_wanted && members.binary_search(&way.id).is_err() {
+                    let is_member = members.see(way.id);
+                    if !is_wanted && !is_member {
                         return Ok::<_, Fault>(());
                     }
                     let near = way.nodes.iter().filter(|&&node| nodes.is_near(node)).count();
@@ -246,6 +248,42 @@ impl<'a> Reader<'a> {
             placing.remark(&format!("way/{way}"), None, found, LEFT_OUT);
         }
         placing.count_outside(self.far_ways);
+    }
+}
+
+/// The ways that relations name, and which of them are in the file.
+struct Members {
+    /// In order, each once.
+    ids: Vec<i64>,
+    seen: Vec<bool>,
+}
+
+impl Members {
+    fn of(relations: &[KeptRelation]) -> Self {
+        let ids = member_ids(relations);
+        Self { seen: vec![false; ids.len()], ids }
+    }
+
+    /// Takes note of a way of the file; whether a relation names it.
+    fn see(&mut self, id: i64) -> bool {
+        let found = self.ids.binary_search(&id);
+        found.iter().for_each(|&index| self.seen[index] = true);
+        found.is_ok()
+    }
+
+    /// Leaves out relations none of whose ways is in the file, which lie nowhere, and tells them.
+    fn tell_absent(&self, relations: &mut Vec<KeptRelation>, placing: &mut Placing) {
+        let is_there = |id: &i64| self.ids.binary_search(id).is_ok_and(|index| self.seen[index]);
+        relations.retain(|relation| {
+            let lies_somewhere = relation.members.is_empty() || relation.members.iter().any(|(_, id)| is_there(id));
+            if !lies_somewhere {
+                let count = relation.members.len();
+                let found = format!("none of its {count} ways in the file");
+                placing.remark(&format!("relation/{}", relation.id), None, found, LEFT_OUT);
+                placing.count_left_out();
+            }
+            lies_somewhere
+        });
     }
 }
 
