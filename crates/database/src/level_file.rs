@@ -17,6 +17,8 @@ pub struct AreaLevel {
     pub cost: Vec<(u32, u8, u32)>,
     /// Triangles that features take of a load module, counted exactly, by its place. Those that take none are left out.
     pub reserved: Vec<(u32, u32)>,
+    /// Metres of ways that were to be in the ground, bridges and tunnels not among them, by class in ascending order.
+    pub wanted_m: Vec<(u8, f64)>,
     /// Edges of the TIN as lines of their features.
     pub lines: Vec<FeatureLine>,
     /// What was found of strips, by class in ascending order.

@@ -20,6 +20,9 @@ pub struct ReportFeatures {
 pub struct ReportFeatureClass {
     /// Its name.
     pub name: String,
+    /// Kilometres of ways in the sources that are to be in the ground: mended and cut at the area's border, each
+    /// stretch once, without bridges and tunnels.
+    pub wanted_km: f64,
     /// Kilometres that are lines of the TIN: roads as centrelines, breaklines.
     pub line_km: f64,
     /// Kilometres that are strips with a left and a right edge.

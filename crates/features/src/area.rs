@@ -5,11 +5,12 @@ use std::collections::{BTreeMap, HashSet};
 
 use terrain::Each;
 
+use crate::exact::Segment;
 use crate::pieces::moved;
 use crate::rules::Sorted;
 use crate::{
     Bed, FeatureId, Flaw, GradeOptions, Graded, Grants, Network, Outline, Place, Remark, Reserved, Room, Rule, Site,
-    Source, Strand, Traits, Waters, Way, banks, breaklines, channels, dams, fall, flowing, grade, have_line,
+    Source, Storey, Strand, Traits, Waters, Way, banks, breaklines, channels, dams, fall, flowing, grade, have_line,
     lakes_along, level, lines_inside, mend, outline_only, pins, reserve, round, shore, sides, sort_out, split_at_dams,
     travelled, water,
 };
@@ -113,6 +114,25 @@ impl AreaFeatures {
     /// rivers. In order of place, each once.
     pub fn stations(&self) -> &[Place] {
         &self.stations
+    }
+
+    /// Quanta of ways that are to be in the ground, by class: without bridges, tunnels, and what lies beyond the area.
+    pub fn lengths_wanted(&self) -> BTreeMap<u16, u64> {
+        let mut lengths = BTreeMap::new();
+        for network in [&self.roads, &self.rivers] {
+            for (number, edge) in (0..).zip(&network.edges) {
+                let (traits, Segment { a, b }) = (network.traits(number), network.segment(number));
+                if traits.storey == Storey::Ground && self.site.holds_middle(a, b) {
+                    *lengths.entry(traits.class).or_default() += edge.length as u64;
+                }
+            }
+        }
+        for line in &self.lines {
+            for ends in line.stations.windows(2).filter(|ends| self.site.holds_middle(ends[0].0, ends[1].0)) {
+                *lengths.entry(line.class).or_default() += self.site.lattice.length(ends[0].0, ends[1].0) as u64;
+            }
+        }
+        lengths
     }
 
     fn asked(&self) -> Vec<Place> {

@@ -30,6 +30,14 @@ impl Site {
         Self { lattice, extent, module_posts, tile_posts }
     }
 
+    /// Whether the middle between two places lies in the area or on its border.
+    pub fn holds_middle(&self, a: Place, b: Place) -> bool {
+        let margin = self.module_posts * self.lattice.steps_per_post();
+        let Extent { south_west, north_east } = self.extent;
+        let within = |a: i32, b: i32, low: i32, high: i32| 2 * (low + margin) <= a + b && a + b <= 2 * (high - margin);
+        within(a.row, b.row, south_west.row, north_east.row) && within(a.col, b.col, south_west.col, north_east.col)
+    }
+
     /// Steps between load-module lines and between tile lines.
     fn line_steps(&self) -> [i32; 2] {
         [self.module_posts, self.tile_posts].map(|posts| posts * self.lattice.steps_per_post())

@@ -83,7 +83,13 @@ fn classes(level: &AreaLevel) -> BTreeSet<u8> {
     let of_lines = level.lines.iter().map(|line| line.class);
     let of_strips = level.strips.iter().map(|strips| strips.class);
     let of_decks = level.decks.iter().map(|deck| deck.class);
-    of_lines.chain(of_strips).chain(of_decks).chain(level.cost.iter().map(|(_, class, _)| *class)).collect()
+    let of_wanted = level.wanted_m.iter().map(|(class, _)| *class);
+    of_lines
+        .chain(of_wanted)
+        .chain(of_strips)
+        .chain(of_decks)
+        .chain(level.cost.iter().map(|(_, class, _)| *class))
+        .collect()
 }
 
 fn cost(area: &GamingArea, level: &AreaLevel, is_meant: impl Fn(u8) -> bool) -> ReportFeatureCost {
@@ -116,6 +122,7 @@ fn lengths(level: &AreaLevel, class: u8, extent_m: [f64; 4]) -> ReportFeatureCla
     let strips = level.strips.iter().filter(|strips| strips.class == class);
     ReportFeatureClass {
         name: String::new(),
+        wanted_km: sum_km(level.wanted_m.iter().filter(|(of, _)| *of == class).map(|(_, metres)| *metres)),
         line_km: km(&[LineRole::Centre, LineRole::Breakline]),
         strip_km: sum_km(strips.map(|strips| strips.length_m)),
         channel_km: km(&[LineRole::Channel]),

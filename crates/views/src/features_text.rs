@@ -8,14 +8,14 @@ use Align::{Left, Right};
 
 /// The block of the text report.
 pub(crate) fn features_text(features: &ReportFeatures) -> String {
-    let mut table = Table::new(&[Left, Right, Right, Right, Right, Right, Right]);
-    table.row(["Roads and water", "km", "strips km", "lakes", "triangles", "load module", "4 km square"]);
+    let mut table = Table::new(&[Left, Right, Right, Right, Right, Right, Right, Right]);
+    table.row(["Roads, water", "km", "of", "strips", "lakes", "triangles", "load module", "4 km square"]);
     for class in &features.classes {
-        let [km, strips, lakes] = amounts(class);
+        let [km, wanted, strips, lakes] = amounts(class);
         let name = format!("  {}", class.name);
-        table.row([name, km, strips, lakes].into_iter().chain(cost(&class.cost)));
+        table.row([name, km, wanted, strips, lakes].into_iter().chain(cost(&class.cost)));
     }
-    let nothing = [const { String::new() }; 3];
+    let nothing = [const { String::new() }; 4];
     table.row(["  all".to_owned()].into_iter().chain(nothing).chain(cost(&features.all)));
     let mut checks = Table::new(&[Left, Left]);
     for (what, found) in check_rows(&features.checks) {
@@ -24,11 +24,13 @@ pub(crate) fn features_text(features: &ReportFeatures) -> String {
     format!("{}  {}\n{}", table.text(0), remarks_in_words(features), checks.text(2))
 }
 
-/// Kilometres, those of strips among them, and lakes of a class; nothing where it has none.
-pub(crate) fn amounts(class: &ReportFeatureClass) -> [String; 3] {
+/// Kilometres in the ground, of how many, those of strips among them, and lakes of a class; nothing where it has none.
+pub(crate) fn amounts(class: &ReportFeatureClass) -> [String; 4] {
     let km = |km: f64| if 0.0 < km { format!("{km:.2}") } else { String::new() };
     let lakes = if class.lakes == 0 { String::new() } else { grouped(class.lakes) };
-    [km(class.line_km + class.strip_km + class.channel_km), km(class.strip_km), lakes]
+    let in_ground = class.line_km + class.strip_km + class.channel_km;
+    let in_ground = if 0.0 < class.wanted_km { format!("{in_ground:.2}") } else { km(in_ground) };
+    [in_ground, km(class.wanted_km), km(class.strip_km), lakes]
 }
 
 /// Triangles, and the most of a limit that they take.

@@ -147,6 +147,7 @@ pub(crate) fn features() -> ReportFeatures {
     };
     let class = |name: &str, line_km, strip_km, lakes| ReportFeatureClass {
         name: name.into(),
+        wanted_km: 1.5 * (line_km + strip_km),
         line_km,
         strip_km,
         lakes,

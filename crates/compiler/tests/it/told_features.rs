@@ -53,6 +53,11 @@ fn the_report_tells_what_features_cost_how_true_they_are_and_what_became_of_them
     assert!((1.9..2.2).contains(&km(primary)) && (0.7..0.9).contains(&km(track)), "{features:?}");
     assert!((1.5..2.3).contains(&km(stream)) && stream.channel_km == km(stream), "{features:?}");
     assert_eq!((lake.lakes, km(lake)), (1, 0.0));
+    // The track's bridge, its copy, and what was left out are not in the ground; nothing else is missing.
+    for class in &features.classes {
+        assert!(km(class) <= class.wanted_km + 0.001, "{class:?}");
+    }
+    assert!(0.99 * primary.wanted_km <= km(primary), "{primary:?}");
     let costs: u64 = features.classes.iter().map(|class| class.cost.triangles).sum();
     assert_eq!(features.all.triangles, costs);
     assert!(0.0 < features.all.module_share && features.all.module_share <= 0.5, "{features:?}");

@@ -28,7 +28,7 @@ fn roads_and_water_are_told_by_the_build_and_by_every_way_to_look_at_it() {
     let built = scene.run_to(0, &["build", "job.toml", "--out", "a.tdb"]);
     assert!(built.printed.contains("\nFeatures "), "{}", built.printed);
     let text = scene.run_to(0, &["report", "a.tdb"]).stdout;
-    for expected in ["\nRoads and water ", "\n  primary ", "\n  lake ", "edges missing from the TIN"] {
+    for expected in ["\nRoads, water ", "\n  primary ", "\n  lake ", "edges missing from the TIN"] {
         assert!(text.contains(expected), "{text}");
     }
     assert!(text.lines().all(|line| line.chars().count() <= 80), "{text}");
@@ -52,5 +52,5 @@ fn a_database_without_roads_and_water_has_no_map_and_no_package_of_them() {
     let without = "a database without roads and water, expected one with some";
     scene.refuses(&["render", "small.tdb", "--view", "features", "--out", "map.png"], &[without]);
     scene.refuses(&["export", "small.tdb", "--format", "features", "--out", "f.gpkg"], &[without]);
-    assert!(!scene.run_to(0, &["report", "small.tdb"]).stdout.contains("Roads and water"));
+    assert!(!scene.run_to(0, &["report", "small.tdb"]).stdout.contains("Roads, water"));
 }

@@ -214,14 +214,14 @@ pub(super) fn levels(report: &Report) -> Markup {
 
 /// What roads and water cost, and what must hold of them.
 pub(super) fn features(features: &ReportFeatures) -> Markup {
-    let row = |name: &str, amounts: [String; 3], costs: [String; 3]| {
+    let row = |name: &str, amounts: [String; 4], costs: [String; 3]| {
         html! { tr { td { (name) } @for cell in amounts.iter().chain(&costs) { td.n { (cell) } } } }
     };
     html! {
-        (table(html! { th { "Class" } th.n { "km" } th.n { "of these strips, km" } th.n { "lakes" }
+        (table(html! { th { "Class" } th.n { "km" } th.n { "of km wanted" } th.n { "as strips, km" } th.n { "lakes" }
                 th.n { "triangles" } th.n { "most of a load module" } th.n { "most of a 4 km square" } }, html! {
             @for class in &features.classes { (row(&class.name, amounts(class), cost(&class.cost))) }
-            (row("all", [const { String::new() }; 3], cost(&features.all)))
+            (row("all", [const { String::new() }; 4], cost(&features.all)))
         }))
         p { (remarks_in_words(features)) "." }
         (table(html! { th { "What must hold" } th { "found" } }, html! {
