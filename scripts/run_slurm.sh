@@ -115,7 +115,7 @@ sleep 2
 start slurmctld slurmctld -D -f "$SLURM_CONF"
 start n1 slurmd -D -N n1 -f "$SLURM_CONF"
 tell "controller and n1 started again"
-for _ in {1..600}; do
+for _ in {1..2400}; do
     [[ -e $scratch/slurm.tdb/report.json ]] && is_idle && break
     sleep 0.5
 done
