@@ -8,8 +8,8 @@ use ground::{GamingArea, slope_reach};
 use job::Job;
 use load_modules::{Layout, cut_decks};
 use terrain::{
-    FeatureSurface, Features, LATTICE_PER_POST, LatticePoint, ModuleGrid, ModuleId, PostRect, QUANTA_PER_METRE, Side,
-    SideSpan, SurfaceGround, TileFeatures, TileId, Vertex,
+    FeatureSurface, Features, LATTICE_PER_POST, LatticePoint, ModuleGrid, ModuleId, PostRect, Side, SideSpan,
+    SurfaceGround, TileFeatures, TileId, Vertex,
 };
 use tiling::{outer_border_posts, outer_sides};
 
@@ -264,7 +264,7 @@ pub(crate) fn area_level(run: &Run, read: &ReadFeatures, levelled: &Levelled) ->
         tiles: Vec::new(),
         cost: cost_of(run.job, run.area.grid, &levelled.reserved.cost),
         reserved: Vec::new(),
-        wanted_m: wanted_m(&read.features, &classes),
+        wanted_m: wanted_m(run, &read.features, &classes),
         lines: lines(run, read, formed, &classes),
         strips: strips(&read.features, formed, &classes, run.area.rect),
         decks: decks(run, read, &formed.decks, &classes),
@@ -274,11 +274,11 @@ pub(crate) fn area_level(run: &Run, read: &ReadFeatures, levelled: &Levelled) ->
 }
 
 /// Metres of ways that are to be in the ground, by class of the job.
-fn wanted_m(features: &AreaFeatures, classes: &[u8]) -> Vec<(u8, f64)> {
+fn wanted_m(run: &Run, features: &AreaFeatures, classes: &[u8]) -> Vec<(u8, f64)> {
     let mut wanted: Vec<(u8, f64)> = features
         .lengths_wanted()
         .into_iter()
-        .map(|(class, quanta)| (classes[usize::from(class)], quanta as f64 / f64::from(QUANTA_PER_METRE)))
+        .map(|(class, posts)| (classes[usize::from(class)], posts * run.area.frame.spacing.metres()))
         .collect();
     wanted.sort_by_key(|(class, _)| *class);
     wanted

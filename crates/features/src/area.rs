@@ -116,20 +116,23 @@ impl AreaFeatures {
         &self.stations
     }
 
-    /// Quanta of ways that are to be in the ground, by class: without bridges, tunnels, and what lies beyond the area.
-    pub fn lengths_wanted(&self) -> BTreeMap<u16, u64> {
+    /// Posts along ways that are to be in the ground, by class: without bridges, tunnels, and what lies beyond the area.
+    pub fn lengths_wanted(&self) -> BTreeMap<u16, f64> {
+        let of_network = |network: &Network| -> Vec<(u16, Segment)> {
+            let all = (0..network.edges.len() as u32).map(|edge| (network.traits(edge), network.segment(edge)));
+            all.filter(|(traits, _)| traits.storey == Storey::Ground).map(|(traits, of)| (traits.class, of)).collect()
+        };
+        let of_lines = self
+            .lines
+            .iter()
+            .flat_map(|line| line.stations.windows(2).map(|ends| (line.class, Segment { a: ends[0].0, b: ends[1].0 })));
         let mut lengths = BTreeMap::new();
-        for network in [&self.roads, &self.rivers] {
-            for (number, edge) in (0..).zip(&network.edges) {
-                let (traits, Segment { a, b }) = (network.traits(number), network.segment(number));
-                if traits.storey == Storey::Ground && self.site.holds_middle(a, b) {
-                    *lengths.entry(traits.class).or_default() += edge.length as u64;
-                }
-            }
-        }
-        for line in &self.lines {
-            for ends in line.stations.windows(2).filter(|ends| self.site.holds_middle(ends[0].0, ends[1].0)) {
-                *lengths.entry(line.class).or_default() += self.site.lattice.length(ends[0].0, ends[1].0) as u64;
+        for (class, Segment { a, b }) in
+            of_network(&self.roads).into_iter().chain(of_network(&self.rivers)).chain(of_lines)
+        {
+            if self.site.holds_middle(a, b) {
+                let steps = (a.squared_to(b) as f64).sqrt();
+                *lengths.entry(class).or_default() += steps / f64::from(self.site.lattice.steps_per_post());
             }
         }
         lengths

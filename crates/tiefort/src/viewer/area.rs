@@ -11,6 +11,7 @@ use serde_json::json;
 use terrain::{HOLE_CLASS, ModuleGrid, ModuleRect, named_class_color};
 use views::{RESIDUAL_SCALE_M, palette};
 
+use super::lines::Lines;
 use super::overview::Overview;
 use crate::failure::Failure;
 
@@ -29,6 +30,8 @@ pub struct Viewed {
     pub description: String,
     /// What the page draws far away and on its map.
     pub overview: Bytes,
+    /// Roads and streams that have no triangles of their own.
+    pub lines: Lines,
     /// The ground, once it was asked for, or why there is none.
     pub ground: OnceLock<Result<ProductGround, String>>,
 }
@@ -44,18 +47,21 @@ impl Viewed {
         let damaged = |error| Failure::new(error, "`tiefort verify` says what is damaged, `tiefort build` mends it");
         let area = Area::open(folder, Keep::OnDisk).map_err(damaged)?;
         let overview = Overview::read(&area).map_err(damaged)?;
+        let level = product.features.as_ref().map(|(level, _)| level);
+        let lines = level.map(|level| Lines::of(level, area.frame())).unwrap_or_default();
         Ok(Self {
             folder: folder.to_path_buf(),
             grid: product.grid,
-            description: description(&product, &area, &overview),
+            description: description(&product, &area, &overview, &lines),
             overview: overview.bytes().into(),
+            lines,
             ground: OnceLock::new(),
             area,
         })
     }
 }
 
-fn description(product: &Product, area: &Area, overview: &Overview) -> String {
+fn description(product: &Product, area: &Area, overview: &Overview, lines: &Lines) -> String {
     let (frame, manifest) = (area.frame(), &product.manifest);
     let (limits, totals) = (&product.job.limits, &manifest.totals);
     let window = limits.window;
@@ -76,6 +82,7 @@ fn description(product: &Product, area: &Area, overview: &Overview) -> String {
         "origin_m": frame.origin_m,
         "range_m": VISIBLE_RANGE_M,
         "coarse_steps": overview.steps,
+        "has_lines": !lines.is_empty(),
         "height_m": overview.range_m,
         "residual_scale_m": RESIDUAL_SCALE_M,
         "palette": palette(),

@@ -6,6 +6,7 @@
 //!   /api/overview                          coarse heights and the figures of every load module (overview.rs)
 //!   /api/modules/SOUTH/WEST/NORTH/EAST     a block of load modules, whole (block.rs)
 //!   /api/levels/LEVEL/SOUTH/WEST/NORTH/EAST   the same at a level of detail
+//!   /api/lines/SOUTH/WEST/NORTH/EAST       roads and streams without triangles of their own there (lines.rs)
 //!   /api/dem                               whether the sources are at hand, as JSON; else `why` says why not
 //!   /api/dem/SOUTH/WEST/NORTH/EAST         the posts of such a block (posts.rs)
 //! ```
@@ -15,6 +16,7 @@
 mod area;
 mod block;
 mod connections;
+mod lines;
 mod overview;
 mod posts;
 
@@ -80,6 +82,7 @@ fn routes(viewed: Arc<Viewed>, address: SocketAddr) -> Router {
         .route("/api/overview", get(overview))
         .route("/api/modules/{south}/{west}/{north}/{east}", get(modules))
         .route("/api/levels/{level}/{south}/{west}/{north}/{east}", get(level))
+        .route("/api/lines/{south}/{west}/{north}/{east}", get(lines))
         .route("/api/dem", get(ground))
         .route("/api/dem/{south}/{west}/{north}/{east}", get(dem))
         .layer(middleware::from_fn(move |request: Request, next: Next| only_from_here(request, next, address)))
@@ -117,6 +120,10 @@ async fn level(
     UrlPath((level, south, west, north, east)): UrlPath<(u16, u32, u32, u32, u32)>,
 ) -> Response {
     answer([south, west, north, east], viewed, move |viewed, block| block::bytes(viewed, block, level)).await
+}
+
+async fn lines(State(viewed): State<Arc<Viewed>>, UrlPath(sides): UrlPath<[u32; 4]>) -> Response {
+    answer(sides, viewed, |viewed, block| Ok(viewed.lines.bytes(block))).await
 }
 
 async fn ground(State(viewed): State<Arc<Viewed>>) -> impl IntoResponse {

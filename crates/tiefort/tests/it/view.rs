@@ -70,6 +70,29 @@ mod server {
     }
 
     #[test]
+    fn roads_without_triangles_of_their_own_are_given_load_module_by_load_module() {
+        let scene = Scene::with_job("small.toml", &[]);
+        let job = std::fs::read_to_string(scene.path("job.toml")).unwrap();
+        std::fs::write(scene.path("job.toml"), format!("{job}\n[features]\nsources = [\"sample\"]\n")).unwrap();
+        scene.run_to(0, &["build", "job.toml", "--quiet", "--no-html"]);
+        let server = served_in(scene, "small.tdb");
+        let area: Value = serde_json::from_slice(&server.asked("/api/area").1).unwrap();
+        assert_eq!(area["has_lines"], true);
+        let (status, lines) = server.asked("/api/lines/0/0/8/8");
+        assert!(status == 200 && !lines.is_empty() && lines.len() % 40 == 0);
+        let part = server.asked("/api/lines/2/0/3/8").1;
+        assert!(part.len() < lines.len());
+        for edge in lines.chunks(40) {
+            let word = |at: usize| u32::from_le_bytes(edge[4 * at..4 * at + 4].try_into().unwrap());
+            let metres = |at: usize| f64::from(f32::from_bits(word(at)));
+            let module = |at: usize| ((metres(at) + metres(at + 3)) / 2.0 / 500.0) as u32;
+            assert_eq!((word(0), word(1)), (module(5), module(4)), "row and column");
+            assert!(word(2) < area["classes"].as_array().unwrap().len() as u32);
+        }
+        assert_eq!(part.chunks(40).count(), lines.chunks(40).filter(|edge| edge[0] == 2).count());
+    }
+
+    #[test]
     fn the_server_hands_out_the_page_the_area_and_its_load_modules() {
         let server = served();
         let (status, page) = server.asked("/");

@@ -4,13 +4,19 @@ import {
   MeshLambertMaterial,
 } from "three";
 import { colorOf, light } from "./colors.js";
-import { coarseHeight } from "./surface.js";
+import { coarseHeight, triangleUnder } from "./surface.js";
 
 const ground = new MeshLambertMaterial({
   vertexColors: true, polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1,
 });
 // Decks have no thickness, and are seen from below too.
 const deck = new MeshLambertMaterial({ vertexColors: true, side: DoubleSide });
+// Roads and streams that are only lines lie on the ground as ribbons, which must not sink into it.
+const ribbons = new MeshLambertMaterial({
+  vertexColors: true, side: DoubleSide, polygonOffset: true, polygonOffsetFactor: -3, polygonOffsetUnits: -3,
+});
+/** Metres that a ribbon is long at most, so that it follows the ground beside its line, and how far it lies above. */
+const RIBBON_M_MAX = 12, RIBBON_LIFT_M = 0.15, RIBBON_WIDTH_M_MIN = 2;
 // Unlit: a wall is no part of the ground, and should not show more than it must.
 const walls = new MeshBasicMaterial({ vertexColors: true, side: DoubleSide, color: 0xb8b8b8 });
 const cliffs = new MeshBasicMaterial({ vertexColors: true, color: 0xb8b8b8 });
@@ -57,6 +63,36 @@ export function deckMesh(area, decks) {
     color.array.set(light(of), 3 * i);
   }
   return new Mesh(geometry, deck);
+}
+
+/** Roads and streams of a load module that are lines of its TIN, as ribbons on the ground. */
+export function roadMesh(area, roads, surface) {
+  const positions = [], tints = [];
+  const on = (east, north, height) =>
+    [east, Math.max(height, triangleUnder(surface, east, north)?.height ?? height) + RIBBON_LIFT_M, -north];
+  for (const { class: of, width, ends: [a, b] } of roads) {
+    const run = b.map((to, axis) => to - a[axis]), length = Math.hypot(run[0], run[1]);
+    if (length === 0) continue;
+    const half = Math.max(width, RIBBON_WIDTH_M_MIN) / 2;
+    const [right, up] = [(half * run[1]) / length, (-half * run[0]) / length];
+    const across = (share) => {
+      const [east, north, height] = a.map((from, axis) => from + share * run[axis]);
+      return [on(east - right, north - up, height), on(east + right, north + up, height)];
+    };
+    const pieces = Math.ceil(length / RIBBON_M_MAX), tint = light(colorOf.cover(area, of) ?? colorOf.deck());
+    for (let piece = 0; piece < pieces; piece++) {
+      const [left, other] = across(piece / pieces), [farLeft, farOther] = across((piece + 1) / pieces);
+      for (const corner of [left, other, farOther, left, farOther, farLeft]) {
+        positions.push(...corner);
+        tints.push(...tint);
+      }
+    }
+  }
+  const geometry = geometryOf(new Float32Array(positions));
+  geometry.getAttribute("color").array.set(tints);
+  geometry.computeVertexNormals();
+  geometry.computeBoundingSphere();
+  return new Mesh(geometry, ribbons);
 }
 
 /** Colours a load module's surface: its triangles, or the ground they were made from. */

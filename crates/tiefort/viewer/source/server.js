@@ -50,6 +50,18 @@ export async function readModules(area, [south, west, north, east], level) {
   return modules;
 }
 
+/** Puts roads and streams that are lines of the TIN into the load modules of a half-open block. */
+export async function readLines(area, [south, west, north, east], modules) {
+  const bytes = await (await answer(`/api/lines/${south}/${west}/${north}/${east}`)).arrayBuffer();
+  const found = new Map(modules.map((module) => [module.row * area.cols + module.col, module]));
+  const words = new Uint32Array(bytes), metres = new Float32Array(bytes);
+  const place = (at) => [metres[at] + area.sides[0], metres[at + 1] + area.sides[1], metres[at + 2]];
+  for (let at = 0; at < words.length; at += 10) {
+    const line = { class: words[at + 2], width: metres[at + 3], ends: [place(at + 4), place(at + 7)] };
+    (found.get(words[at] * area.cols + words[at + 1]).lines ??= []).push(line);
+  }
+}
+
 function moduleAt(area, bytes, start) {
   const words = new Uint32Array(bytes, start, 12), [row, col, vertexCount, triangleCount, polygons, posts] = words;
   const sideCounts = words.subarray(6, 10), [deckVertices, deckTriangles] = words.subarray(10);

@@ -1,8 +1,8 @@
 // The block of load modules around the observer: loaded, drawn, dropped; around it load modules at coarser levels of
 // detail, where the database has them; beyond these the area as it is coarsely.
 import { Frustum, Group, Matrix4 } from "three";
-import { apron, coarseMesh, deckMesh, moduleLines, moduleMesh, paint, wallMeshes } from "./meshes.js";
-import { checkDem, readModules, readPosts } from "./server.js";
+import { apron, coarseMesh, deckMesh, moduleLines, moduleMesh, paint, roadMesh, wallMeshes } from "./meshes.js";
+import { checkDem, readLines, readModules, readPosts } from "./server.js";
 import { deckUnder, triangleUnder } from "./surface.js";
 
 /** Metres from the middle of the area to where nothing is any more. */
@@ -18,8 +18,8 @@ export class Terrain {
   constructor(area) {
     this.area = area;
     this.group = new Group();
-    // By row * cols + col: {module, surface, mesh, edges, decks}. Levels that differ fit together, so that a load module stays
-    // until the one in its place has come.
+    // By row * cols + col: {module, surface, mesh, edges, decks, roads}. Levels that differ fit together, so that a load
+    // module stays until the one in its place has come.
     this.drawn = new Map();
     this.colors = "height";
     this.withEdges = this.withLines = this.withDem = false;
@@ -113,6 +113,7 @@ export class Terrain {
     try {
       const modules = await readModules(this.area, part, level);
       if (this.withDem && level === 0) await readPosts(this.area, part, modules);
+      if (this.area.has_lines && level === 0) await readLines(this.area, part, modules);
       for (const module of modules) {
         const key = module.row * this.area.cols + module.col;
         this.asked.delete(this.askedKey(key, level));
@@ -139,7 +140,9 @@ export class Terrain {
     // The DEM knows no decks.
     const decks = module.decks && surface === module.tin ? deckMesh(this.area, module.decks) : null;
     if (decks) mesh.add(decks);
-    this.drawn.set(key, { module, surface, mesh, edges, decks });
+    const roads = module.lines ? roadMesh(this.area, module.lines, surface) : null;
+    if (roads) mesh.add(roads);
+    this.drawn.set(key, { module, surface, mesh, edges, decks, roads });
   }
 
   drop(key) {
@@ -148,6 +151,7 @@ export class Terrain {
     this.group.remove(old.mesh);
     old.mesh.geometry.dispose();
     old.decks?.geometry.dispose();
+    old.roads?.geometry.dispose();
     return this.drawn.delete(key);
   }
 
