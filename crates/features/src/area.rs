@@ -116,7 +116,7 @@ impl AreaFeatures {
         &self.stations
     }
 
-    /// Posts along ways that are to be in the ground, by class: without bridges, tunnels, and what lies beyond the area.
+    /// Posts along ways that are to be in the ground, by class: without bridges and tunnels, inside the area.
     pub fn lengths_wanted(&self) -> BTreeMap<u16, f64> {
         let of_network = |network: &Network| -> Vec<(u16, Segment)> {
             let all = (0..network.edges.len() as u32).map(|edge| (network.traits(edge), network.segment(edge)));
