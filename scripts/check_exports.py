@@ -6,10 +6,12 @@
 With --holes a database with holes is built and checked, too, with --bridge one with a bridge over a valley. PROGRAM is
 target/release/tiefort unless said. Needs rasterio, rio-cogeo, meshio, geopandas, pyogrio, pyproj and numpy; osgconv
 (Debian's openscenegraph); node with what scripts/exports/package.json names for glTF and CesiumJS, and chromium; a
-Python that has QGIS (Debian's python3-qgis). A reader that is missing is told and skipped, unless --all is given.
+Python that has QGIS (Debian's python3-qgis); usd-core and mujoco; Debian's libsdformat-dev. A reader that is missing
+is told and skipped, unless --all is given.
 """
 
 import argparse
+import functools
 import json
 import math
 import pathlib
@@ -21,6 +23,7 @@ import subprocess
 import sys
 import tempfile
 import time
+import types
 import xml.etree.ElementTree as xml
 import zlib
 
@@ -28,6 +31,7 @@ import numpy
 
 sys.path.insert(0, str(pathlib.Path(__file__).parent))
 import read_slm  # noqa: E402
+from exports import engines  # noqa: E402
 
 HERE = pathlib.Path(__file__).parent
 HOLE = 255
@@ -800,6 +804,7 @@ def check_cesium(database, arguments, scratch):
     expect(ran.returncode == 0, f"CesiumJS agrees {ran.stderr[-400:]}")
 
 
+TOOLS = types.SimpleNamespace(export=export, expect=expect, Skip=Skip, datum=datum)
 CHECKS = [
     ("modules", check_modules),
     ("meshes", check_meshes),
@@ -811,6 +816,7 @@ CHECKS = [
     ("3dtiles", check_3dtiles),
     ("quantized-mesh", check_quantized_mesh),
     ("cesium", check_cesium),
+    *[(name, functools.partial(check, tools=TOOLS)) for name, check in engines.CHECKS],
 ]
 
 if __name__ == "__main__":

@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use terrain::{ModuleId, ModuleRect, Tin, metres_of_quanta};
 
 use crate::classes::Classes;
-use crate::mesh::{Part, normals};
+use crate::mesh::{Part, class_groups, normals};
 use crate::modules::{deck_name, module_name};
 use crate::{Facts, Mesh, Product, TinPlace};
 
@@ -48,10 +48,7 @@ pub(crate) fn turned([east, north, up]: [f64; 3]) -> [f32; 3] {
 impl GltfNode {
     /// The triangles of `mesh` by class, over vertices that are placed already.
     pub(crate) fn with_groups(mut self, triangles: &[[u32; 3]], classes: &[u8]) -> Self {
-        let mut by_class = vec![Vec::new(); 256];
-        triangles.iter().zip(classes).for_each(|(&triangle, &class)| by_class[usize::from(class)].push(triangle));
-        let groups = (0..=u8::MAX).zip(by_class).filter(|(_, triangles)| !triangles.is_empty());
-        self.groups = groups.collect();
+        self.groups = class_groups(triangles, classes);
         self
     }
 }

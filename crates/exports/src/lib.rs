@@ -47,6 +47,14 @@ mod tiles3d;
 pub use tiles3d::write_3dtiles;
 mod quantized;
 pub use quantized::write_quantized_mesh;
+mod archives;
+pub use archives::{write_3tz, write_mbtiles};
+mod usd;
+pub use usd::write_usd;
+mod gazebo;
+pub use gazebo::write_gazebo;
+mod heightmap;
+pub use heightmap::{Engine, write_heightmap};
 
 #[cfg(test)]
 mod samples;

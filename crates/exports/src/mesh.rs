@@ -192,6 +192,13 @@ impl Mesh {
     }
 }
 
+/// Triangles by class, in the order of classes.
+pub(crate) fn class_groups(triangles: &[[u32; 3]], classes: &[u8]) -> Vec<(u8, Vec<[u32; 3]>)> {
+    let mut by_class = vec![Vec::new(); 256];
+    triangles.iter().zip(classes).for_each(|(&triangle, &class)| by_class[usize::from(class)].push(triangle));
+    (0..=u8::MAX).zip(by_class).filter(|(_, triangles)| !triangles.is_empty()).collect()
+}
+
 /// Unit normals at vertices, of the triangles around each, by area.
 pub(crate) fn normals(places: &[[f64; 3]], triangles: &[[u32; 3]]) -> Vec<[f64; 3]> {
     let mut sums = vec![[0.0; 3]; places.len()];

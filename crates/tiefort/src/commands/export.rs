@@ -26,23 +26,26 @@ Examples:
   tiefort export ntc.tdb --format gpkg --out ntc.gpkg
   tiefort export ntc.tdb --format geotiff --layer residual --out residual.tif
   tiefort export ntc.tdb --format 3dtiles --assume-datum EGM96 --out ntc_3dtiles
+  tiefort export ntc.tdb --format usd --out ntc_usd
+  tiefort export ntc.tdb --format heightmap --engine unity --out ntc_unity
 
 --lod K exports a coarser level, where the job has [lod] levels. Without it
 files of modules hold all levels; 3dtiles puts levels coarser than K between a
 square of 4 km and its load modules. A mesh (ply, obj, glb) is counted in metres
-from the south-west corner of what is exported; the file itself and NAME.json
-beside it say where that is. Load modules are named ROW,COL from the south-west,
-nodes of a glb r0003c0017. Classes are materials (glb, 3dtiles, openflight; obj
-with NAME.mtl) or attributes (gpkg); the faces of a ply come
-class by class, and comments in it say which are whose. Decks of bridges are
-meshes of their own, named decks; geotiff and quantized-mesh hold the ground
-alone. A geotiff is cloud optimised, with overviews; it names
-the system of its heights where that is known. Where no source has a height,
-rasters have none (NaN) and meshes no triangles; gpkg and modules keep these as
-class 'hole' (255), and quantized-mesh closes them and says where in
-holes.geojson. 3dtiles and quantized-mesh want heights above the ellipsoid: they
-know EGM96 and the ellipsoid, and refuse any other datum unless told what to
-take it for.";
+from the south-west corner of what is exported, as usd and gazebo are; the file
+itself, or NAME.json beside it, says where that is. Load modules are named
+ROW,COL from the south-west, nodes of a glb r0003c0017. Classes are materials
+(glb, 3dtiles, openflight, usd; obj and gazebo with an mtl) or attributes
+(gpkg); the faces of a ply come class by class, and comments in it say which are
+whose. Decks of bridges are meshes of their own, named decks; geotiff,
+quantized-mesh, mbtiles and heightmap hold the ground alone. A geotiff is cloud
+optimised, with overviews; it names the system of its heights where that is
+known. Where no source has a height, rasters have none (NaN) and meshes no
+triangles; gpkg and modules keep these as class 'hole' (255), quantized-mesh
+closes them and says where in holes.geojson, and a heightmap closes them, too.
+3tz is 3dtiles in one file, mbtiles quantized-mesh in one; these four want
+heights above the ellipsoid: they know EGM96 and the ellipsoid, and refuse any
+other datum unless told what to take it for.";
 
 /// Arguments of `export`.
 #[derive(Args)]
@@ -70,9 +73,16 @@ pub struct Arguments {
     #[arg(long, value_name = "DEM")]
     against: Option<PathBuf>,
     /// What to take heights to be above, whatever the database says: EGM96, ellipsoid, or metres that their datum
-    /// lies above the ellipsoid; for 3dtiles and quantized-mesh only
+    /// lies above the ellipsoid; for 3dtiles, 3tz, quantized-mesh and mbtiles only
     #[arg(long, value_name = "DATUM", value_parser = datum, allow_hyphen_values = true)]
     assume_datum: Option<Datum>,
+    /// Whose heightmaps; for heightmap only
+    #[arg(long, value_enum, default_value_t = HeightmapEngine::Unreal)]
+    engine: HeightmapEngine,
+    /// Samples along a side of a heightmap, one of those that the engine takes [default: the least that holds the area
+    /// in one, else 2017 or 2049]; for heightmap only
+    #[arg(long, value_name = "N")]
+    size: Option<usize>,
     #[command(flatten)]
     workers: Workers,
     /// Print errors only
@@ -107,6 +117,17 @@ enum Format {
     Tiles3d,
     /// A folder of quantized-mesh 1.0 terrain, for globes
     QuantizedMesh,
+    /// 3D Tiles in one archive
+    #[value(name = "3tz")]
+    Archive,
+    /// Quantized-mesh terrain in one SQLite file
+    Mbtiles,
+    /// A folder of OpenUSD text: a file for each tile, with collision meshes, for Isaac Sim, Omniverse and Blender
+    Usd,
+    /// A folder of 16-bit heightmaps for Unreal or Unity, with the numbers to type into the import dialog
+    Heightmap,
+    /// A folder with a world for Gazebo: meshes of 2 km, loaded by distance
+    Gazebo,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -115,6 +136,23 @@ enum Layer {
     Surface,
     /// Height of the ground less that of the surface
     Residual,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum HeightmapEngine {
+    /// Sides of 505, 1009, 2017, 4033 or 8129, as PNG
+    Unreal,
+    /// Sides of 2^n + 1, as RAW
+    Unity,
+}
+
+impl From<HeightmapEngine> for exports::Engine {
+    fn from(engine: HeightmapEngine) -> Self {
+        match engine {
+            HeightmapEngine::Unreal => exports::Engine::Unreal,
+            HeightmapEngine::Unity => exports::Engine::Unity,
+        }
+    }
 }
 
 fn block(text: &str) -> Result<Block, String> {
@@ -141,7 +179,10 @@ impl Format {
             Format::Glb => Some("glb"),
             Format::Geotiff => Some("tif"),
             Format::Gpkg | Format::Features => Some("gpkg"),
+            Format::Archive => Some("3tz"),
+            Format::Mbtiles => Some("mbtiles"),
             Format::Modules | Format::Openflight | Format::Tiles3d | Format::QuantizedMesh => None,
+            Format::Usd | Format::Heightmap | Format::Gazebo => None,
         }
     }
 
@@ -153,13 +194,16 @@ impl Format {
             Format::Features => "in none of its layers",
             Format::Geotiff => "NaN in the raster",
             Format::QuantizedMesh => "kept, since tiles must be closed; holes.geojson says where they are",
+            Format::Mbtiles => "kept, since tiles must be closed; the entry holes of metadata says where they are",
+            Format::Heightmap => "as high as the triangles that close them; heightmap.json counts the samples",
             Format::Ply | Format::Obj | Format::Glb | Format::Openflight | Format::Tiles3d => "left out",
+            Format::Archive | Format::Usd | Format::Gazebo => "left out",
         }
     }
 
     /// Whether it has room for the ground alone, and decks are left out.
     fn is_without_decks(self) -> bool {
-        matches!(self, Format::Geotiff | Format::QuantizedMesh)
+        matches!(self, Format::Geotiff | Format::QuantizedMesh | Format::Mbtiles | Format::Heightmap)
     }
 
     /// What becomes of decks of bridges.
@@ -168,13 +212,15 @@ impl Format {
             Format::Modules => "in the files of their load modules",
             Format::Gpkg | Format::Features => "in the layer decks",
             Format::Geotiff | Format::QuantizedMesh => "left out: there is room for the ground alone",
+            Format::Mbtiles | Format::Heightmap => "left out: there is room for the ground alone",
             Format::Ply | Format::Obj | Format::Glb | Format::Openflight | Format::Tiles3d => "meshes of their own",
+            Format::Archive | Format::Usd | Format::Gazebo => "meshes of their own",
         }
     }
 
     /// Whether its heights are above the ellipsoid of WGS 84.
     fn is_for_globes(self) -> bool {
-        matches!(self, Format::Tiles3d | Format::QuantizedMesh)
+        matches!(self, Format::Tiles3d | Format::QuantizedMesh | Format::Archive | Format::Mbtiles)
     }
 }
 
@@ -208,7 +254,15 @@ fn check(arguments: &Arguments) -> Result<(), Failure> {
     }
     if arguments.assume_datum.is_some() && !arguments.format.is_for_globes() {
         let message = "found --assume-datum with a format whose heights stay as they are, expected none";
-        return Err(Failure::new(message, "leave --assume-datum out; only 3dtiles and quantized-mesh need it"));
+        return Err(Failure::new(
+            message,
+            "leave --assume-datum out; only 3dtiles, 3tz, quantized-mesh and mbtiles need it",
+        ));
+    }
+    let is_heightmap = arguments.format == Format::Heightmap;
+    if !is_heightmap && (arguments.size.is_some() || arguments.engine != HeightmapEngine::Unreal) {
+        let message = "found --size or --engine with another format than heightmap, expected none";
+        return Err(Failure::new(message, "leave them out, or add --format heightmap"));
     }
     if arguments.against.is_some() && !residual {
         let message = "found --against without --layer residual, expected both or none";
@@ -229,7 +283,7 @@ fn check(arguments: &Arguments) -> Result<(), Failure> {
 fn levels(arguments: &Arguments) -> Levels {
     match (arguments.format, arguments.lod) {
         (Format::Modules, None) => Levels::From(0),
-        (Format::Tiles3d, level) => Levels::From(level.unwrap_or(0)),
+        (Format::Tiles3d | Format::Archive, level) => Levels::From(level.unwrap_or(0)),
         (_, level) => Levels::One(level.unwrap_or(0)),
     }
 }
@@ -248,7 +302,7 @@ fn export(arguments: &Arguments, work: &Work) -> Result<String, Failure> {
         Format::Features => write_features(arguments)?,
         _ => {}
     }
-    let mut said = None;
+    let mut said = write_globe_file(arguments, &product, work)?;
     if let Some(folder) = folder {
         let put = |name: &str, bytes: &[u8]| folder.put(name, bytes);
         match arguments.format {
@@ -256,6 +310,11 @@ fn export(arguments: &Arguments, work: &Work) -> Result<String, Failure> {
             Format::Tiles3d => said = Some(exports::write_3dtiles(&product, arguments.assume_datum, &put, work)?),
             Format::QuantizedMesh => {
                 said = Some(exports::write_quantized_mesh(&product, arguments.assume_datum, &put, work)?);
+            }
+            Format::Usd => exports::write_usd(&product, &put, work)?,
+            Format::Gazebo => exports::write_gazebo(&product, &put, work)?,
+            Format::Heightmap => {
+                exports::write_heightmap(&product, arguments.engine.into(), arguments.size, &put, work)?;
             }
             _ => exports::write_modules(&product, &put, work)?,
         }
@@ -286,6 +345,24 @@ fn export(arguments: &Arguments, work: &Work) -> Result<String, Failure> {
         count => format!("{} triangles of decks are {}\n", grouped(count as u64), arguments.format.of_decks()),
     };
     Ok(format!("{said}{holes}{decks}{modules}, {} triangles{level}", grouped(triangles as u64)))
+}
+
+/// Writes what is one file for globes; what was done to heights.
+fn write_globe_file(arguments: &Arguments, product: &Product, work: &Work) -> Result<Option<Datum>, Failure> {
+    let assumed = arguments.assume_datum;
+    let mut said = None;
+    match arguments.format {
+        Format::Archive => files::write_whole_or(&arguments.out, |out| {
+            said = Some(exports::write_3tz(out, product, assumed, work)?);
+            Ok(())
+        })?,
+        Format::Mbtiles => files::make_whole(&arguments.out, |path| {
+            said = Some(exports::write_mbtiles(path, product, assumed, work)?);
+            Ok(())
+        })?,
+        _ => {}
+    }
+    Ok(said)
 }
 
 fn write_raster(arguments: &Arguments, product: &Product, work: &Work) -> Result<(), Failure> {

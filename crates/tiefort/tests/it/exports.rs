@@ -13,17 +13,34 @@ fn built() -> Scene {
     scene
 }
 
+/// Formats whose heights are above the ellipsoid.
+const FOR_GLOBES: [&str; 4] = ["3dtiles", "quantized-mesh", "3tz", "mbtiles"];
+
 #[test]
 fn every_format_is_written_and_the_same_every_time() {
     let scene = built();
-    let names = ["modules", "mesh.ply", "mesh.obj", "mesh.glb", "a.tif", "a.gpkg", "flt", "tiles", "terrain"];
-    let formats = ["modules", "ply", "obj", "glb", "geotiff", "gpkg", "openflight", "3dtiles", "quantized-mesh"];
-    for (format, name) in formats.into_iter().zip(names) {
+    let all = [
+        ("modules", "modules"),
+        ("ply", "mesh.ply"),
+        ("obj", "mesh.obj"),
+        ("glb", "mesh.glb"),
+        ("geotiff", "a.tif"),
+        ("gpkg", "a.gpkg"),
+        ("openflight", "flt"),
+        ("3dtiles", "tiles"),
+        ("quantized-mesh", "terrain"),
+        ("3tz", "tiles.3tz"),
+        ("mbtiles", "terrain.mbtiles"),
+        ("usd", "usd"),
+        ("heightmap", "heightmap"),
+        ("gazebo", "gazebo"),
+    ];
+    for (format, name) in all {
         for folder in ["one", "two"] {
             fs::create_dir_all(scene.path(folder)).unwrap();
             let (out, workers) = (format!("{folder}/{name}"), if folder == "one" { "1" } else { "2" });
             let mut arguments = vec!["export", "a.tdb", "--format", format, "--out", &out, "--workers", workers];
-            if ["3dtiles", "quantized-mesh"].contains(&format) {
+            if FOR_GLOBES.contains(&format) {
                 arguments.extend(["--assume-datum", "EGM96"]);
             }
             let said = scene.run_to(0, &arguments);
@@ -109,9 +126,14 @@ fn every_format_leaves_holes_out_or_marks_them_and_says_so() {
         ("openflight", "flt", left_out),
         ("3dtiles", "tiles", left_out),
         ("quantized-mesh", "terrain", "holes.geojson says where they are"),
+        ("3tz", "tiles.3tz", left_out),
+        ("mbtiles", "terrain.mbtiles", "the entry holes of metadata says where they are"),
+        ("usd", "usd", left_out),
+        ("heightmap", "heightmap", "heightmap.json counts the samples"),
+        ("gazebo", "gazebo", left_out),
     ] {
         let mut arguments = vec!["export", "a.tdb", "--format", format, "--out", name];
-        if ["3dtiles", "quantized-mesh"].contains(&format) {
+        if FOR_GLOBES.contains(&format) {
             arguments.extend(["--assume-datum", "EGM96"]);
         }
         let found = scene.run_to(0, &arguments).stderr;
@@ -147,8 +169,12 @@ fn what_cannot_be_exported_is_refused() {
     refuses(&["geotiff", "--against", "a.tif", "--out", "b.tif"], &["--against"]);
     refuses(&["gpkg", "--assume-datum", "EGM96", "--out", "b.gpkg"], &["--assume-datum"]);
     refuses(&["modules", "--out", "a.tdb"], &["a.tdb", "expected a name that is free"]);
-    for format in ["3dtiles", "quantized-mesh"] {
-        refuses(&[format, "--out", "new"], &["unknown datum", "EGM96"]);
+    refuses(&["heightmap", "--size", "1000", "--out", "new"], &["1000 samples", "505, 1009, 2017"]);
+    refuses(&["heightmap", "--engine", "unity", "--size", "505", "--out", "new"], &["505 samples", "513"]);
+    refuses(&["usd", "--engine", "unity", "--out", "new"], &["--size or --engine"]);
+    refuses(&["3tz", "--out", "tiles.zip"], &["\"zip\"", "\"3tz\""]);
+    for (format, name) in [("3dtiles", "new"), ("quantized-mesh", "new"), ("3tz", "a.3tz"), ("mbtiles", "a.mbtiles")] {
+        refuses(&[format, "--out", name], &["unknown datum", "EGM96"]);
     }
     scene.refuses(&["export", "none.tdb", "--format", "ply", "--out", "mesh.ply"], &["none.tdb"]);
     let said = scene.run_to(2, &["export", "a.tdb", "--format", "3dtiles", "--assume-datum", "sea", "--out", "new"]);
@@ -175,9 +201,10 @@ fn every_format_takes_any_level_that_the_database_has() {
             (Some(level), Some(triangles(level as usize)))
         );
     }
-    let names = ["m1", "mesh.ply", "mesh.obj", "a.tif", "a.gpkg", "flt", "terrain", "t1"];
+    let names = ["m1", "mesh.ply", "mesh.obj", "a.tif", "a.gpkg", "flt", "terrain", "t1", "usd", "gazebo", "map"];
     let formats = ["modules", "ply", "obj", "geotiff", "gpkg", "openflight", "quantized-mesh", "3dtiles"];
-    for (format, name) in formats.into_iter().zip(names) {
+    let formats = formats.into_iter().chain(["usd", "gazebo", "heightmap"]);
+    for (format, name) in formats.zip(names) {
         let mut arguments = vec!["export", "a.tdb", "--format", format, "--lod", "1", "--out", name];
         if ["3dtiles", "quantized-mesh"].contains(&format) {
             arguments.extend(["--assume-datum", "EGM96"]);

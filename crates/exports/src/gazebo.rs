@@ -1,0 +1,235 @@
+//! A world for Gazebo (SDF 1.9): a model for each block of load modules, its mesh an OBJ beside it, and levels that
+//! load the blocks near a performer.
+//!
+//! x points east, y north, z up; the origin is the south-west corner of what is exported, at height 0.
+
+use std::fmt::Write as _;
+
+use terrain::{ModuleId, ModuleRect, QUANTA_PER_METRE, metres_of_quanta};
+
+use crate::gpkg_styles::escaped;
+use crate::mesh::{Part, class_groups};
+use crate::modules::group_name;
+use crate::polygon_files::{put_obj_faces, put_obj_vertices};
+use crate::{Datum, Earth, ExportError, Mesh, Product, Put, Work, obj_materials};
+
+/// Load modules along the side of a block, as many as a level pages at once.
+const BLOCK_MODULES: u32 = 4;
+/// How far from a performer a block is loaded, in sides of a block.
+const BUFFER_BLOCKS: f64 = 2.0;
+/// Metres of height that a level's box spans: all that can fly over the Earth's ground.
+const LEVEL_HIGH_M: f64 = 60_000.0;
+/// The side of the box that stands for the vehicle in the world, in metres, and how far above the ground it begins.
+const OBSERVER_M: f64 = 2.0;
+
+/// Writes `area.sdf`, and `meshes/*.obj` with their materials.
+///
+/// # Errors
+/// When a file cannot be written, the area's system cannot be computed, or the work was asked to stop.
+pub fn write_gazebo(product: &Product, put: &Put, work: &Work) -> Result<(), ExportError> {
+    let mesh = Mesh::of(product);
+    let materials = obj_materials(product, &mesh);
+    let squares = product.squares(BLOCK_MODULES);
+    let blocks = work.each("blocks", &squares, |&rect| {
+        let (ground, decks) = (mesh.part(product, rect), mesh.deck_part(product, rect));
+        if ground.triangles.is_empty() && decks.triangles.is_empty() {
+            return Ok(None);
+        }
+        let name = format!("meshes/{}.obj", group_name(rect));
+        let text = block_text(product, &mesh, rect, &[(false, &ground), (true, &decks)], materials.is_some());
+        put(&name, text.as_bytes()).map_err(ExportError::write(&name))?;
+        Ok(Some(rect))
+    })?;
+    if let Some(text) = materials {
+        put("meshes/classes.mtl", text.as_bytes()).map_err(ExportError::write("meshes/classes.mtl"))?;
+    }
+    let blocks: Vec<ModuleRect> = blocks.into_iter().flatten().collect();
+    let text = world(product, &mesh, &blocks)?;
+    put("area.sdf", text.as_bytes()).map_err(ExportError::write("area.sdf"))
+}
+
+/// A block as OBJ, counted from its own south-west corner.
+fn block_text(
+    product: &Product,
+    mesh: &Mesh,
+    rect: ModuleRect,
+    parts: &[(bool, &Part)],
+    has_materials: bool,
+) -> String {
+    let [west, south] = corner(product, rect);
+    let mut bytes: Vec<u8> = Vec::new();
+    if has_materials {
+        bytes.extend(b"mtllib classes.mtl\n");
+    }
+    let metres = |vertex: &u32| {
+        let [x, y, z] = mesh.vertices[*vertex as usize];
+        [x - west, y - south, z].map(|quanta| f64::from(quanta) / f64::from(QUANTA_PER_METRE))
+    };
+    let mut first = 0;
+    // Nothing fails where bytes go to memory.
+    let _ = put_obj_vertices(&mut bytes, parts.iter().flat_map(|(_, part)| &part.vertices).map(metres));
+    for (is_deck, part) in parts.iter().filter(|(_, part)| !part.triangles.is_empty()) {
+        bytes.extend(format!("o {}\n", if *is_deck { "decks" } else { "ground" }).bytes());
+        for (class, triangles) in class_groups(&part.triangles, &part.classes) {
+            if has_materials {
+                bytes.extend(format!("usemtl {}\n", product.classes().word(class)).bytes());
+            }
+            let moved: Vec<[u32; 3]> = triangles.iter().map(|triangle| triangle.map(|v| v + first)).collect();
+            let _ = put_obj_faces(&mut bytes, moved.iter());
+        }
+        first += part.vertices.len() as u32;
+    }
+    String::from_utf8_lossy(&bytes).into_owned()
+}
+
+/// East and north in quanta from the south-west corner of what is exported to that of a block.
+fn corner(product: &Product, rect: ModuleRect) -> [i32; 2] {
+    product.corner(ModuleId { row: rect.south, col: rect.west })
+}
+
+fn world(product: &Product, mesh: &Mesh, blocks: &[ModuleRect]) -> Result<String, ExportError> {
+    let place_m = product.corner_m(product.rect.south, product.rect.west);
+    // Longitudes and latitudes only.
+    let [longitude, latitude] = Earth::new(product, Some(Datum::Ellipsoid))?.lon_lat(place_m)?;
+    let name = escaped(&product.manifest.area.name);
+    let mut text = format!(
+        "<?xml version=\"1.0\"?>\n<!-- tiefort: x east, y north of {} {} in {}, z up above {}; metres -->\n\
+         <sdf version=\"1.9\">\n  <world name=\"{name}\">\n",
+        place_m[0],
+        place_m[1],
+        escaped(product.crs()),
+        match product.vertical_datum() {
+            "" => "an unknown vertical datum".into(),
+            datum => escaped(datum),
+        },
+    );
+    for (file, system) in [
+        ("gz-sim-physics-system", "Physics"),
+        ("gz-sim-user-commands-system", "UserCommands"),
+        ("gz-sim-scene-broadcaster-system", "SceneBroadcaster"),
+    ] {
+        let _ = writeln!(text, "    <plugin filename=\"{file}\" name=\"gz::sim::systems::{system}\"/>");
+    }
+    let _ = write!(
+        text,
+        "    <spherical_coordinates>\n      <surface_model>EARTH_WGS84</surface_model>\n      \
+         <world_frame_orientation>ENU</world_frame_orientation>\n      \
+         <latitude_deg>{latitude:.9}</latitude_deg>\n      <longitude_deg>{longitude:.9}</longitude_deg>\n      \
+         <elevation>0</elevation>\n      <heading_deg>0</heading_deg>\n    </spherical_coordinates>\n    \
+         <light type=\"directional\" name=\"sun\">\n      <cast_shadows>true</cast_shadows>\n      \
+         <diffuse>0.9 0.9 0.85 1</diffuse>\n      <direction>0.5 -0.4 -0.8</direction>\n    </light>\n"
+    );
+    for &rect in blocks {
+        put_model(&mut text, product, rect);
+    }
+    put_observer(&mut text, product, mesh);
+    text.push_str("    <plugin filename=\"ignored\" name=\"gz::sim\">\n");
+    let _ = writeln!(
+        text,
+        "      <performer name=\"observer\">\n        <ref>observer</ref>\n        \
+         <geometry><box><size>{OBSERVER_M} {OBSERVER_M} {OBSERVER_M}</size></box></geometry>\n      </performer>"
+    );
+    for &rect in blocks {
+        put_level(&mut text, product, rect);
+    }
+    text.push_str("    </plugin>\n  </world>\n</sdf>\n");
+    Ok(text)
+}
+
+fn put_model(text: &mut String, product: &Product, rect: ModuleRect) {
+    let [east, north] = corner(product, rect).map(metres_of_quanta);
+    let name = group_name(rect);
+    let _ = writeln!(
+        text,
+        "    <model name=\"{name}\">\n      <static>true</static>\n      <pose>{east} {north} 0 0 0 0</pose>\n      \
+         <link name=\"ground\">"
+    );
+    for element in ["collision", "visual"] {
+        let _ = writeln!(
+            text,
+            "        <{element} name=\"{element}\">\n          \
+             <geometry><mesh><uri>meshes/{name}.obj</uri></mesh></geometry>\n        </{element}>"
+        );
+    }
+    text.push_str("      </link>\n    </model>\n");
+}
+
+/// A box above the middle of the area: what levels follow, until a vehicle takes its place.
+fn put_observer(text: &mut String, product: &Product, mesh: &Mesh) {
+    let sides = [product.rect.cols(), product.rect.rows()].map(|count| f64::from(count) * product.side_m());
+    let middle = sides.map(|side| side / 2.0);
+    let away = |[x, y, _]: &[f64; 3]| (x - middle[0]).hypot(y - middle[1]);
+    let near = mesh.metres().min_by(|a, b| away(a).total_cmp(&away(b))).unwrap_or([middle[0], middle[1], 0.0]);
+    let [east, north, up] = [near[0], near[1], near[2] + OBSERVER_M];
+    let size = format!("{OBSERVER_M} {OBSERVER_M} {OBSERVER_M}");
+    let _ = write!(
+        text,
+        "    <model name=\"observer\">\n      <pose>{east} {north} {up} 0 0 0</pose>\n      <link name=\"body\">\n"
+    );
+    for element in ["collision", "visual"] {
+        let _ = writeln!(
+            text,
+            "        <{element} name=\"{element}\">\n          \
+             <geometry><box><size>{size}</size></box></geometry>\n        </{element}>"
+        );
+    }
+    text.push_str("      </link>\n    </model>\n");
+}
+
+fn put_level(text: &mut String, product: &Product, rect: ModuleRect) {
+    let sides = [rect.cols(), rect.rows()].map(|count| f64::from(count) * product.side_m());
+    let corner = corner(product, rect).map(metres_of_quanta);
+    let [east, north] = [0, 1].map(|axis| corner[axis] + sides[axis] / 2.0);
+    let buffer = BUFFER_BLOCKS * f64::from(BLOCK_MODULES) * product.side_m();
+    let name = group_name(rect);
+    let _ = writeln!(
+        text,
+        "      <level name=\"{name}\">\n        <ref>{name}</ref>\n        \
+         <pose>{east} {north} 0 0 0 0</pose>\n        \
+         <geometry><box><size>{} {} {LEVEL_HIGH_M}</size></box></geometry>\n        \
+         <buffer>{buffer}</buffer>\n      </level>",
+        sides[0], sides[1]
+    );
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+    use std::sync::Mutex;
+    use std::sync::atomic::AtomicBool;
+
+    use schedule::Workers;
+
+    use super::*;
+    use crate::samples;
+
+    #[test]
+    fn a_world_has_a_model_and_a_level_for_each_block_and_a_mesh_for_each_model() {
+        let files = Mutex::new(BTreeMap::new());
+        let put = |name: &str, bytes: &[u8]| {
+            files.lock().unwrap().insert(name.to_owned(), String::from_utf8(bytes.to_vec()).unwrap());
+            Ok(())
+        };
+        let (workers, stop) = (Workers::new(2), AtomicBool::new(false));
+        let product = samples::with_bridge();
+        write_gazebo(&product, &put, &Work { workers: &workers, stop: &stop, tell: &|_| {} }).unwrap();
+        let files = files.into_inner().unwrap();
+        let names: Vec<&str> = files.keys().map(String::as_str).collect();
+        assert_eq!(names, ["area.sdf", "meshes/classes.mtl", "meshes/r0000c0000_r0000c0001.obj"]);
+        let world = &files["area.sdf"];
+        for part in [
+            "<uri>meshes/r0000c0000_r0000c0001.obj</uri>",
+            "<level name=\"r0000c0000_r0000c0001\">",
+            "<pose>500 250 0 0 0 0</pose>",
+            "<buffer>4000</buffer>",
+        ] {
+            assert!(world.contains(part), "{part} is not in {world}");
+        }
+        let mesh = &files["meshes/r0000c0000_r0000c0001.obj"];
+        let count = |what: &str| mesh.lines().filter(|line| line.starts_with(what)).count();
+        let decks = product.deck_triangles();
+        assert_eq!((count("f "), count("o ")), (6 + decks, 2), "{mesh}");
+        let corners = mesh.lines().filter_map(|line| line.strip_prefix("f ")).flat_map(str::split_whitespace);
+        assert!(corners.map(|text| text.parse::<usize>().unwrap()).all(|corner| (1..=count("v ")).contains(&corner)));
+    }
+}
