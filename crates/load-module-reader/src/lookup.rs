@@ -1,9 +1,11 @@
 //! Which triangle of a load module lies under a place, in constant expected time.
 //!
-//! A grid of square cells over the load module, about as many as triangles, lists for each cell the corners of the
-//! triangles that touch it, so that a query reads memory in two places only. A place is first rounded to 1/4096 of a
-//! quantum (2 micrometres), after which left or right of an edge is a question about whole numbers: some triangle
-//! always holds the place, on edges and corners too.
+//! A grid of square cells lies over the load module, about as many as triangles. Each names the triangles that touch
+//! it, those that cover most of it first, so that a query seldom looks at more than two. Grid and corners of triangles
+//! lie in one run of memory, of about two kilobytes for a hundred polygons: queries at random places wait for memory
+//! most of the time, and the smaller what they read is, the more of it the processor keeps at hand. A place is first
+//! rounded to 1/4096 of a quantum (2 micrometres), after which left or right of an edge is a question about whole
+//! numbers: some triangle always holds the place, on edges and corners too.
 
 use std::sync::Arc;
 
@@ -13,21 +15,31 @@ use crate::{QUANTA_PER_METRE, Vertex};
 const STEP_BITS: u32 = 12;
 /// Steps of a rounded place to a quantum.
 pub(crate) const STEPS: i64 = 1 << STEP_BITS;
+/// Cells for each triangle: more take more memory, fewer take more tests.
+const CELLS_PER_TRIANGLE: f64 = 1.5;
 /// Most cells along a side.
 const CELLS_MAX: u32 = 128;
-/// Cells that the rectangles around all triangles may touch at most, for each triangle. Terrain takes about ten; a file
-/// of splinters across the whole square would take thousands, and with them gigabytes and minutes.
-const CELLS_PER_TRIANGLE_MAX: u64 = 64;
-/// Words of a triangle in a list: x and y in one, z in the next, for each corner; then its place in the load module.
-const ENTRY: usize = 7;
+/// Cells that the rectangles around all triangles may touch at most, for each triangle. Terrain takes about fifteen; a
+/// file of splinters across the whole square would take thousands, and with them gigabytes and minutes.
+const TOUCHED_PER_TRIANGLE_MAX: u64 = 64;
+/// How much further than its lines a cell reaches, in quanta: a place on a line may be rounded to either side of it.
+const REACH: f64 = 2.0;
+/// Words of a cell: where the list of its other triangles begins, or 0; then the first triangles, two in a word.
+const CELL: usize = 4;
+/// Triangles in a cell.
+const FIRST: usize = 2 * (CELL - 1);
+/// No triangle.
+const NONE: u32 = 0xffff;
+/// Words of a triangle: x and y in one, z in the next, for each corner.
+const TRIANGLE: usize = 6;
 
-/// The lists of one load module.
+/// What finds the triangles of one load module. A clone shares it.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Lookup {
-    /// Where each cell's list begins, row by row from the south-west, and the end of the last; then the lists.
+    /// Cells, row by row from the south-west; triangles; lists, each its length and then triangles.
     words: Arc<[u32]>,
     /// Cells along a side.
-    cells: u32,
+    across: u32,
     /// Cells in a quantum, times 2^32.
     scale: u64,
 }
@@ -42,164 +54,240 @@ pub(crate) struct Mesh<'a> {
     pub triangles: &'a [[u16; 3]],
 }
 
+/// A triangle over a cell, while lists are made.
+#[derive(Clone, Copy)]
+struct Touch {
+    cell: u32,
+    triangle: u32,
+    /// Grows with the part of the cell that it covers: how far it reaches beyond the middle, 1 where it covers all.
+    cover: f32,
+}
+
 impl Lookup {
     pub(crate) fn new(mesh: Mesh, side: u16) -> Self {
-        let cells = (mesh.triangles.len() as f64).sqrt().ceil().clamp(1.0, f64::from(CELLS_MAX)) as u32;
-        let mut lookup = Self::of_cells(cells, side);
-        while 1 < lookup.cells && !lookup.is_affordable(mesh) {
-            lookup = Self::of_cells(lookup.cells / 2, side);
+        let cells = CELLS_PER_TRIANGLE * mesh.triangles.len() as f64;
+        let mut lookup = Self::of_cells(cells.sqrt().ceil().clamp(1.0, f64::from(CELLS_MAX)) as u32, side);
+        let most = TOUCHED_PER_TRIANGLE_MAX * mesh.triangles.len() as u64;
+        while 1 < lookup.across && most < lookup.touched_at_most(mesh) {
+            lookup = Self::of_cells(lookup.across / 2, side);
         }
-        let cells = lookup.cells;
-        let first = (cells * cells) as usize + 1;
-        let mut words = vec![0; first];
-        lookup.visit_cells(mesh, side, |cell, _, _| words[cell + 1] += ENTRY as u32);
-        words[0] = first as u32;
-        for cell in 1..first {
-            words[cell] += words[cell - 1];
+        let mut touches = Vec::new();
+        for (index, triangle) in (0..).zip(mesh.triangles) {
+            lookup.touch(side, index, &corners_of(mesh, *triangle), &mut touches);
         }
-        words.resize(words[first - 1] as usize, 0);
-        let mut next = words[..first].to_vec();
-        lookup.visit_cells(mesh, side, |cell, index, corners| {
-            let at = next[cell] as usize;
-            for (place, [x, y, z]) in corners.iter().enumerate() {
-                words[at + 2 * place] = *x as u32 | (*y as u32) << 16;
-                words[at + 2 * place + 1] = z.cast_unsigned();
-            }
-            words[at + 6] = index as u32;
-            next[cell] += ENTRY as u32;
-        });
-        lookup.words = words.into();
+        lookup.words = lookup.words_of(mesh, &touches).into();
         lookup
     }
 
     /// No lists yet.
-    fn of_cells(cells: u32, side: u16) -> Self {
-        Self { words: Arc::new([]), cells, scale: (u64::from(cells) << 32) / u64::from(side).max(1) }
+    fn of_cells(across: u32, side: u16) -> Self {
+        Self { words: Arc::new([]), across, scale: (u64::from(across) << 32) / u64::from(side).max(1) }
     }
 
-    /// Whether lists of so many cells take a bounded share of memory and time.
-    fn is_affordable(&self, mesh: Mesh) -> bool {
+    fn cell_count(&self) -> usize {
+        (self.across * self.across) as usize
+    }
+
+    /// Cells that the rectangles around all triangles touch.
+    fn touched_at_most(&self, mesh: Mesh) -> u64 {
         let touched = |triangle: &[u16; 3]| {
             let [[west, east], [south, north]] = self.cells_around(&corners_of(mesh, *triangle));
             u64::from(east - west + 1) * u64::from(north - south + 1)
         };
-        mesh.triangles.iter().map(touched).sum::<u64>() <= CELLS_PER_TRIANGLE_MAX * mesh.triangles.len() as u64
+        mesh.triangles.iter().map(touched).sum()
     }
 
     /// First and last column, first and last row of the cells that the rectangle around a triangle may touch.
     fn cells_around(&self, corners: &Corners) -> [[u32; 2]; 2] {
         [0, 1].map(|axis| {
             let values = || corners.iter().map(|corner| corner[axis]);
-            // A place on a line of cells may be rounded to either side of it.
             let low = (values().min().unwrap_or(0) - 1).max(0);
-            [self.cell(low), self.cell(values().max().unwrap_or(0) + 1)]
+            [self.row(low), self.row(values().max().unwrap_or(0) + 1)]
         })
     }
 
-    /// Calls `each` with every cell that a triangle may touch, the triangle's place and its corners.
-    fn visit_cells(&self, mesh: Mesh, side: u16, mut each: impl FnMut(usize, usize, &Corners)) {
-        for (index, triangle) in mesh.triangles.iter().enumerate() {
-            let corners = corners_of(mesh, *triangle);
-            let [[west, east], [south, north]] = self.cells_around(&corners);
-            for row in south..=north {
-                for col in west..=east {
-                    if touches(&corners, self.lines(row, side), self.lines(col, side)) {
-                        each((row * self.cells + col) as usize, index, &corners);
-                    }
+    /// Adds every cell that a triangle may touch.
+    fn touch(&self, side: u16, triangle: u32, corners: &Corners, touches: &mut Vec<Touch>) {
+        let [[west, east], [south, north]] = self.cells_around(corners);
+        let wide = f64::from(side) / f64::from(self.across);
+        let middle = |row: u32| (f64::from(row) + 0.5) * wide;
+        // How far left of each edge the middle of the south-western cell lies, in units of what a cell reaches to
+        // either side of its middle; and how much further each cell to the east and to the north.
+        let edges = [0, 1, 2].map(|i| {
+            let [a, b] = [corners[i], corners[(i + 1) % 3]].map(|[x, y, _]| [f64::from(x), f64::from(y)]);
+            let along = [b[0] - a[0], b[1] - a[1]];
+            let unit = 1.0 / ((wide / 2.0 + REACH) * (along[0].abs() + along[1].abs()));
+            let left = along[0] * (middle(south) - a[1]) - along[1] * (middle(west) - a[0]);
+            [left * unit, -along[1] * wide * unit, along[0] * wide * unit]
+        });
+        for row in south..=north {
+            for col in west..=east {
+                let (right, up) = (f64::from(col - west), f64::from(row - south));
+                let reaches = edges.map(|[left, eastwards, northwards]| left + right * eastwards + up * northwards);
+                let least = reaches[0].min(reaches[1]).min(reaches[2]);
+                // Rounding is far smaller than what a cell reaches beyond its lines.
+                if -1.0 <= least {
+                    touches.push(Touch { cell: row * self.across + col, triangle, cover: least.min(1.0) as f32 });
                 }
             }
         }
     }
 
-    /// Words in memory.
-    #[cfg(test)]
-    pub(crate) fn word_count(&self) -> usize {
-        self.words.len()
+    /// Cells, triangles and lists.
+    fn words_of(&self, mesh: Mesh, touches: &[Touch]) -> Vec<u32> {
+        let count = self.cell_count();
+        let mut words = vec![0; CELL * count];
+        words.reserve_exact(TRIANGLE * mesh.triangles.len() + touches.len());
+        for &triangle in mesh.triangles {
+            let corners = corners_of(mesh, triangle);
+            words.extend(corners.iter().flat_map(|[x, y, z]| [*x as u32 | (*y as u32) << 16, z.cast_unsigned()]));
+        }
+        let (touches, ends) = by_cell(touches, count);
+        let mut start = 0;
+        for (cell, end) in ends.into_iter().enumerate() {
+            let over_cell = &touches[start..end as usize];
+            start = end as usize;
+            let fit = over_cell.iter().take(FIRST).take_while(|touch| touch.triangle < NONE).count();
+            for (word, pair) in (CELL * cell + 1..).zip(over_cell[..fit].chunks(2)) {
+                words[word] = pair[0].triangle | pair[pair.len() - 1].triangle << 16;
+            }
+            words[CELL * cell + 1 + fit.div_ceil(2)..CELL * (cell + 1)].fill(NONE | NONE << 16);
+            if fit < over_cell.len() {
+                words[CELL * cell] = words.len() as u32;
+                words.push((over_cell.len() - fit) as u32);
+                words.extend(over_cell[fit..].iter().map(|touch| touch.triangle));
+            }
+        }
+        words
     }
 
-    /// The cell of a coordinate in quanta.
+    /// Bytes in memory.
+    #[cfg(test)]
+    pub(crate) fn byte_count(&self) -> usize {
+        size_of_val(&*self.words)
+    }
+
+    /// The row or column of a coordinate in quanta.
     #[inline]
-    fn cell(&self, quanta: i32) -> u32 {
-        (((quanta as u64) * self.scale) >> 32).min(u64::from(self.cells - 1)) as u32
+    fn row(&self, quanta: i32) -> u32 {
+        (((quanta as u64) * self.scale) >> 32).min(u64::from(self.across - 1)) as u32
     }
 
     /// A row or column of cells: its lines in quanta, and a little more.
-    fn lines(&self, cell: u32, side: u16) -> [i64; 2] {
-        let line = |cell: u32| i64::from(cell) * i64::from(side) / i64::from(self.cells);
-        [line(cell) - 2, line(cell + 1) + 2]
+    fn lines(&self, row: u32, side: u16) -> [f64; 2] {
+        let line = |row: u32| f64::from(row) * f64::from(side) / f64::from(self.across);
+        [line(row) - REACH, line(row + 1) + REACH]
     }
 
-    /// The list of the cell at a place in steps inside the square.
+    /// The cell at a place in steps inside the square.
     #[inline]
-    pub(crate) fn list(&self, [x, y]: [i64; 2]) -> &[u32] {
-        let cell = self.cell((y >> STEP_BITS) as i32) * self.cells + self.cell((x >> STEP_BITS) as i32);
-        let (from, to) = (self.words[cell as usize] as usize, self.words[cell as usize + 1] as usize);
-        &self.words[from..to]
+    pub(crate) fn cell(&self, [x, y]: [i64; 2]) -> &[u32; CELL] {
+        self.cell_at(self.row((y >> STEP_BITS) as i32), self.row((x >> STEP_BITS) as i32))
     }
 
-    /// The triangle of a cell's list at a place in steps: its corners, how much of it lies opposite each, and where it
-    /// stands in the load module.
     #[inline]
-    fn find(list: &[u32], [x, y]: [i64; 2]) -> Option<(Corners, [i64; 3], usize)> {
-        list.chunks_exact(ENTRY).find_map(|entry| {
-            let corner = |place: usize| {
-                let [xy, z] = [entry[2 * place], entry[2 * place + 1]];
-                [(xy & 0xffff) as i32, (xy >> 16) as i32, z.cast_signed()]
-            };
-            let corners = [corner(0), corner(1), corner(2)];
-            let to = corners.map(|[cx, cy, _]| [(i64::from(cx) << STEP_BITS) - x, (i64::from(cy) << STEP_BITS) - y]);
-            // Sides are at most 2^28 steps, so products stay below 2^57.
-            let cross = |a: [i64; 2], b: [i64; 2]| a[0] * b[1] - a[1] * b[0];
-            let shares = [cross(to[1], to[2]), cross(to[2], to[0]), cross(to[0], to[1])];
-            (0 <= shares[0] && 0 <= shares[1] && 0 <= shares[2]).then_some((corners, shares, entry[6] as usize))
+    fn cell_at(&self, row: u32, col: u32) -> &[u32; CELL] {
+        &self.words.as_chunks().0[(row * self.across + col) as usize]
+    }
+
+    /// The triangles of a cell, those that cover most of it first.
+    #[inline]
+    fn triangles_of(&self, cell: &[u32; CELL]) -> impl Iterator<Item = usize> {
+        let pairs = cell[1..].iter().map(|pair| [pair & NONE, pair >> 16]).take_while(|pair| pair[0] != NONE);
+        // A pair of one triangle names it twice.
+        let first = pairs.flat_map(|[a, b]| [Some(a), (a != b).then_some(b)]).flatten().map(|index| index as usize);
+        let list = match cell[0] as usize {
+            0 => &[],
+            list => &self.words[list + 1..][..self.words[list] as usize],
+        };
+        first.chain(list.iter().map(|&index| index as usize))
+    }
+
+    /// A word of the first triangle of a cell: reading it asks for the memory.
+    #[inline]
+    pub(crate) fn first_word(&self, cell: &[u32; CELL]) -> u32 {
+        let at = CELL * self.cell_count() + TRIANGLE * (cell[1] & NONE) as usize;
+        self.words.get(at).copied().unwrap_or(0)
+    }
+
+    /// Corners of a triangle.
+    #[inline]
+    fn corners(&self, index: usize) -> Corners {
+        let words = &self.words[CELL * self.cell_count() + TRIANGLE * index..][..TRIANGLE];
+        [0, 2, 4].map(|at| [(words[at] & 0xffff) as i32, (words[at] >> 16) as i32, words[at + 1].cast_signed()])
+    }
+
+    /// Corners of a triangle, and how much of it lies opposite each, seen from a place in steps: nothing is negative
+    /// where it holds the place.
+    #[inline]
+    fn shares(&self, index: usize, [x, y]: [i64; 2]) -> (Corners, [i64; 3]) {
+        let corners = self.corners(index);
+        let to = corners.map(|[cx, cy, _]| [(i64::from(cx) << STEP_BITS) - x, (i64::from(cy) << STEP_BITS) - y]);
+        // Sides are at most 2^28 steps, so products stay below 2^57.
+        let cross = |a: [i64; 2], b: [i64; 2]| a[0] * b[1] - a[1] * b[0];
+        (corners, [cross(to[1], to[2]), cross(to[2], to[0]), cross(to[0], to[1])])
+    }
+
+    /// Every triangle at a place in steps, where they may lie above each other: its corners, the height there in metres,
+    /// and where it stands in the load module.
+    pub(crate) fn triangles(&self, place: [i64; 2]) -> impl Iterator<Item = (Corners, f64, usize)> {
+        self.triangles_of(self.cell(place)).filter_map(move |index| {
+            let (corners, shares) = self.shares(index, place);
+            holds(shares).then(|| (corners, height_m(&corners, shares), index))
         })
     }
 
-    /// Every triangle at a place in steps, where they may lie above each other: as [`Lookup::triangle`] gives one.
-    pub(crate) fn triangles(&self, place: [i64; 2]) -> impl Iterator<Item = (Corners, f64, usize)> {
-        let held = self.list(place).chunks_exact(ENTRY).filter_map(move |entry| Self::find(entry, place));
-        held.map(|(corners, shares, index)| (corners, height_m(&corners, shares), index))
+    /// Corners of the triangle at a place in steps, the height there in metres, and where it stands in the load module.
+    pub(crate) fn triangle(&self, place: [i64; 2]) -> Option<(Corners, f64, usize)> {
+        self.triangles(place).next()
     }
 
     /// Height at a place in steps, metres.
     #[inline]
     pub(crate) fn height_m(&self, place: [i64; 2]) -> Option<f64> {
-        Self::height_in(self.list(place), place)
+        self.height_in(self.cell(place), place)
     }
 
-    /// The same, where the cell's list is known.
+    /// The same, where the cell is known.
     #[inline]
-    pub(crate) fn height_in(list: &[u32], place: [i64; 2]) -> Option<f64> {
-        let (corners, shares, _) = Self::find(list, place)?;
-        Some(height_m(&corners, shares))
+    pub(crate) fn height_in(&self, cell: &[u32; CELL], place: [i64; 2]) -> Option<f64> {
+        for &pair in &cell[1..] {
+            let [first, second] = [pair & NONE, pair >> 16];
+            if first == NONE {
+                break;
+            }
+            // Both are tested before a branch: a wrong guess of the processor costs more than the second test.
+            let (of_first, of_second) = (self.shares(first as usize, place), self.shares(second as usize, place));
+            let in_first = holds(of_first.1);
+            if in_first | holds(of_second.1) {
+                let (corners, shares) = if in_first { of_first } else { of_second };
+                return Some(height_m(&corners, shares));
+            }
+        }
+        self.height_in_list(cell, place)
     }
 
-    /// Corners of the triangle at a place in steps, the height there in metres, and where it stands in the load module.
-    pub(crate) fn triangle(&self, place: [i64; 2]) -> Option<(Corners, f64, usize)> {
-        let (corners, shares, index) = Self::find(self.list(place), place)?;
-        Some((corners, height_m(&corners, shares), index))
+    /// The same, where the first triangles of the cell do not hold the place.
+    #[cold]
+    fn height_in_list(&self, cell: &[u32; CELL], place: [i64; 2]) -> Option<f64> {
+        let held = self.triangles_of(cell).map(|index| self.shares(index, place)).find(|(_, shares)| holds(*shares));
+        held.map(|(corners, shares)| height_m(&corners, shares))
     }
 
     /// Calls `each` with every triangle that a line between two places in quanta may touch, with some more than once.
     /// Places may lie outside.
     pub(crate) fn triangles_along(&self, side: u16, from: [f64; 2], to: [f64; 2], mut each: impl FnMut(Corners)) {
         let (low, high) = if from[1] <= to[1] { (from, to) } else { (to, from) };
-        let cell = |quanta: f64| self.cell(quanta.clamp(0.0, f64::from(side)) as i32);
-        for row in cell(low[1])..=cell(high[1]) {
-            let [south, north] = self.lines(row, side).map(|quanta| quanta as f64);
+        let row_at = |quanta: f64| self.row(quanta.clamp(0.0, f64::from(side)) as i32);
+        for row in row_at(low[1])..=row_at(high[1]) {
+            let [south, north] = self.lines(row, side);
             let Some([west, east]) = extent_between(low, high, south, north) else { continue };
             if east < 0.0 || f64::from(side) < west {
                 continue;
             }
             // Rounding may put the line into the next cell: look a little further.
-            for col in cell(west - 1.0)..=cell(east + 1.0) {
-                let place = (row * self.cells + col) as usize;
-                let (from, to) = (self.words[place] as usize, self.words[place + 1] as usize);
-                for entry in self.words[from..to].chunks_exact(ENTRY) {
-                    each([0, 2, 4].map(|at| {
-                        [(entry[at] & 0xffff) as i32, (entry[at] >> 16) as i32, entry[at + 1].cast_signed()]
-                    }));
-                }
+            for col in row_at(west - 1.0)..=row_at(east + 1.0) {
+                self.triangles_of(self.cell_at(row, col)).for_each(|index| each(self.corners(index)));
             }
         }
     }
@@ -212,6 +300,12 @@ fn corners_of(mesh: Mesh, triangle: [u16; 3]) -> Corners {
     })
 }
 
+/// Whether a triangle with such shares holds the place: one question, so that there is one branch.
+#[inline]
+fn holds(shares: [i64; 3]) -> bool {
+    0 <= shares[0] | shares[1] | shares[2]
+}
+
 #[inline]
 fn height_m(corners: &Corners, shares: [i64; 3]) -> f64 {
     let [a, b, c] = shares.map(|share| share as f64);
@@ -220,15 +314,29 @@ fn height_m(corners: &Corners, shares: [i64; 3]) -> f64 {
     (heights[0] + up / (a + b + c)) / f64::from(QUANTA_PER_METRE)
 }
 
-/// Whether a cell lies not wholly beyond one of a triangle's edges.
-fn touches(corners: &Corners, [south, north]: [i64; 2], [west, east]: [i64; 2]) -> bool {
-    (0..3).all(|i| {
-        let [a, b] = [corners[i], corners[(i + 1) % 3]].map(|[x, y, _]| [i64::from(x), i64::from(y)]);
-        // The corner of the cell that lies furthest to the left of the edge.
-        let x = if a[1] < b[1] { west } else { east };
-        let y = if a[0] < b[0] { north } else { south };
-        0 <= (b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0])
-    })
+/// Touches cell by cell, those that cover most of a cell first, and where those of each cell end.
+fn by_cell(touches: &[Touch], cell_count: usize) -> (Vec<Touch>, Vec<u32>) {
+    let mut ends = vec![0; cell_count + 1];
+    for touch in touches {
+        ends[touch.cell as usize + 1] += 1;
+    }
+    for cell in 1..=cell_count {
+        ends[cell] += ends[cell - 1];
+    }
+    let mut sorted = vec![Touch { cell: 0, triangle: 0, cover: 0.0 }; touches.len()];
+    for touch in touches {
+        let next = &mut ends[touch.cell as usize];
+        sorted[*next as usize] = *touch;
+        *next += 1;
+    }
+    // Each has become where its cell ends.
+    ends.pop();
+    let mut start = 0;
+    for &end in &ends {
+        sorted[start as usize..end as usize].sort_by(|a, b| b.cover.total_cmp(&a.cover));
+        start = end;
+    }
+    (sorted, ends)
 }
 
 /// The westernmost and easternmost x of the part of a line, from its lower to its upper end, between two parallels.

@@ -390,8 +390,8 @@ fn splinters_across_a_load_module_take_no_more_room_than_other_triangles() {
     for count in [100, 16_000, 64_000] {
         let module = splinters(count);
         let prepared = TerrainModule::new(module.clone(), SIDE);
-        let words = prepared.lookup().word_count() as u64;
-        assert!(words <= 16_385 + 7 * 64 * u64::from(count + 2), "{count}: {words} words");
+        let bytes = prepared.lookup().byte_count() as u64;
+        assert!(bytes <= 20 * 16_384 + (24 + 4 * 64) * u64::from(count + 2), "{count}: {bytes} bytes");
         let mut draw = Rng::with_seed(3);
         for _ in 0..50 {
             let place = [0, 1].map(|_| draw.i64(0..=i64::from(SIDE) * STEPS));
