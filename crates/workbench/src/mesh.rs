@@ -12,6 +12,7 @@ use geometry::WORKING_POSTS_MAX;
 use ground::{GivenPost, GroundError, Window, chosen, posts_of_file, refused, start_posts};
 use job::{ErrorKey, Optimising, StartMethod};
 use schedule::{Event as Scheduled, RankedTasks, Workers, in_rank_order_observed};
+use source_files::Raster;
 use terrain::{
     Dem, Features, GainCurve, Importance, LastBatch, Metres, ModuleGrid, PostRect, SeamSides, StopReason, THOUSANDTHS,
     TileFeatures, TileId, TileOrder, TileTin, Tin, Vertex,
@@ -100,6 +101,32 @@ pub struct Mesh {
 /// When the raster cannot be used, or nothing says when to stop.
 pub fn tin(request: &TinRequest, stop: &AtomicBool, progress: &mut dyn Progress) -> Result<Mesh, CompileError> {
     let heights = Heights::read(&request.dem, request.workers, stop, progress)?;
+    tin_over(&heights, request, stop, progress)
+}
+
+/// The same from a raster that is in memory already, instead of the one that `request` names.
+///
+/// # Errors
+/// As [`tin`].
+pub fn tin_of_raster(
+    raster: Raster,
+    request: &TinRequest,
+    stop: &AtomicBool,
+    progress: &mut dyn Progress,
+) -> Result<Mesh, CompileError> {
+    progress.tell(Event::Enter(Stage::Read, 0));
+    let heights = Heights::of_raster(raster, &Workers::new(request.workers), stop)?;
+    progress.tell(Event::Leave(Stage::Read));
+    heights.notes.iter().for_each(|note| progress.tell(Event::Note(note.clone())));
+    tin_over(&heights, request, stop, progress)
+}
+
+fn tin_over(
+    heights: &Heights,
+    request: &TinRequest,
+    stop: &AtomicBool,
+    progress: &mut dyn Progress,
+) -> Result<Mesh, CompileError> {
     let tiles = heights.refine(request, stop, progress)?;
     progress.tell(Event::Enter(Stage::Assemble, 0));
     let exhausted = tiles.iter().any(|tile| tile.stop == StopReason::Exhausted);
