@@ -467,6 +467,12 @@ fn refuse(request: &TinRequest, rect: PostRect, longest: usize) -> Result<(), Co
             &format!("at least the {corners} corners of tiles"),
             "corners of tiles are vertices of every mesh",
         ),
+        _ if request.triangles.is_some_and(|triangles| triangles < 2 * rows as usize * cols as usize) => impossible(
+            "--triangles",
+            request.triangles.unwrap_or_default().to_string(),
+            &format!("at least {}, two in each tile", 2 * rows as usize * cols as usize),
+            "ask for more triangles, or for fewer tiles",
+        ),
         None if [request.max_residual_m, request.rms_m, request.triangles.map(|_| 0.0)].iter().all(Option::is_none) => {
             impossible(
                 "--points",
