@@ -53,6 +53,10 @@ impl Raster {
         let ArrayRaster { name, crs, south_west, spacing, size, nodata } = about;
         let too_large = |what, found, limit| Err(SourceError::TooLarge { path: name.clone(), what, found, limit });
         let [rows, cols] = size.map(|posts| posts as u64);
+        if rows == 0 || cols == 0 {
+            let (what, expected) = ("the number of posts".into(), "at least one row and one column".into());
+            return Err(SourceError::Malformed { path: name, what, found: format!("{rows} x {cols}"), expected });
+        }
         if POSTS_A_SIDE_MAX < rows.max(cols) {
             return too_large("posts a side", rows.max(cols), POSTS_A_SIDE_MAX);
         }
@@ -102,5 +106,6 @@ mod tests {
         assert!(error.starts_with("array: an infinite height at 25.0, 0.0 m"), "{error}");
         let nowhere = ArrayRaster { south_west: [f64::NAN, 0.0], ..about([1, 1]) };
         assert!(Raster::of_array(nowhere, PostArray::F64(vec![0.0])).is_err());
+        assert!(Raster::of_array(about([0, 5]), PostArray::F64(Vec::new())).is_err());
     }
 }

@@ -97,6 +97,57 @@ impl Ground {
     }
 }
 
+/// What stands for a line that nothing hides: beyond its end.
+const FREE: f64 = 2.0;
+
+/// Both ends of a line.
+fn ends(&[ax, ay, az, bx, by, bz]: &[f64; 6]) -> [[f64; 3]; 2] {
+    [[ax, ay, az], [bx, by, bz]]
+}
+
+fn hidden_at(ground: &LoadedGround, line: &[f64; 6]) -> f64 {
+    let [from, to] = ends(line);
+    match ground.sight(from, to) {
+        Sight::Free => FREE,
+        Sight::Hidden(share) => share,
+        Sight::Unknown => f64::NAN,
+    }
+}
+
+/// Heights at places: at places far apart load module by load module, since each then stays in the processor's cache.
+fn heights_by_module(ground: &LoadedGround, places: &[[f64; 2]], heights: &mut [f64]) {
+    /// Places in a load module, one after the other, up to which they are sorted.
+    const RUN: usize = 8;
+    let block = ground.block();
+    let outside = block.count();
+    let index = |place: &[f64; 2]| {
+        let [row, col] = ground.frame().module_at(*place);
+        let (row, col) = (row - i64::from(block.south), col - i64::from(block.west));
+        let (high, wide) = (i64::from(block.north - block.south), i64::from(block.east - block.west));
+        let is_inside = 0 <= row && row < high && 0 <= col && col < wide;
+        if is_inside { (row * wide + col) as usize } else { outside }
+    };
+    let indexes: Vec<u32> = places.iter().map(|place| index(place) as u32).collect();
+    let runs = indexes.windows(2).filter(|pair| pair[0] != pair[1]).count();
+    if RUN * runs < places.len() || places.len() < outside {
+        return ground.heights_m(places, heights);
+    }
+    let mut starts = vec![0_u32; outside + 2];
+    indexes.iter().for_each(|&index| starts[index as usize + 1] += 1);
+    (1..starts.len()).for_each(|index| starts[index] += starts[index - 1]);
+    let mut sorted = vec![[0.0; 2]; places.len()];
+    let mut at = vec![0_u32; places.len()];
+    for ((place, &index), at) in places.iter().zip(&indexes).zip(&mut at) {
+        let next = &mut starts[index as usize];
+        *at = *next;
+        sorted[*next as usize] = *place;
+        *next += 1;
+    }
+    let mut found = vec![0.0; places.len()];
+    ground.heights_m(&sorted, &mut found);
+    heights.iter_mut().zip(at).for_each(|(height, at)| *height = found[at as usize]);
+}
+
 fn contains(outer: Block, inner: Block) -> bool {
     inner.count() == 0
         || outer.south <= inner.south
@@ -161,8 +212,7 @@ impl Ground {
 
     /// Heights at places, each an easting and a northing; not a number where there is no ground.
     fn heights<'py>(&self, py: Python<'py>, xy: PyReadonlyArray2<'py, f64>) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let each = |ground: &LoadedGround, places: &[[f64; 2]], heights: &mut [f64]| ground.heights_m(places, heights);
-        Ok(PyArray1::from_vec(py, self.ask(py, (places(&xy)?, AT_ONCE), f64::NAN, each)?))
+        Ok(PyArray1::from_vec(py, self.ask(py, (places(&xy)?, AT_ONCE), f64::NAN, heights_by_module)?))
     }
 
     /// Unit vectors out of the ground.
@@ -193,29 +243,25 @@ impl Ground {
         lines: PyReadonlyArray2<'py, f64>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let each = |ground: &LoadedGround, lines: &[[f64; 6]], shares: &mut [f64]| {
-            for (share, &[ax, ay, az, bx, by, bz]) in shares.iter_mut().zip(lines) {
-                *share = match ground.sight([ax, ay, az], [bx, by, bz]) {
-                    Sight::Free => 2.0,
-                    Sight::Hidden(share) => share,
-                    Sight::Unknown => f64::NAN,
-                };
-            }
+            shares.iter_mut().zip(lines).for_each(|(share, line)| *share = hidden_at(ground, line));
         };
         Ok(PyArray1::from_vec(py, self.ask(py, (places(&lines)?, LINES_AT_ONCE), f64::NAN, each)?))
     }
 
-    /// How far each line stays above the ground at least.
-    fn clearance<'py>(
-        &self,
-        py: Python<'py>,
-        lines: PyReadonlyArray2<'py, f64>,
-    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let each = |ground: &LoadedGround, lines: &[[f64; 6]], metres: &mut [f64]| {
-            for (metres, &[ax, ay, az, bx, by, bz]) in metres.iter_mut().zip(lines) {
-                *metres = ground.clearance_m([ax, ay, az], [bx, by, bz]).unwrap_or(f64::NAN);
+    /// The same, and how far each line stays above the ground at least.
+    fn sights<'py>(&self, py: Python<'py>, lines: PyReadonlyArray2<'py, f64>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let each = |ground: &LoadedGround, lines: &[[f64; 6]], sights: &mut [[f64; 2]]| {
+            let has_decks = ground.modules().iter().any(|module| !module.module().decks.is_empty());
+            for (sight, line) in sights.iter_mut().zip(lines) {
+                let [from, to] = ends(line);
+                let clearance_m = ground.clearance_m(from, to);
+                // What never comes below the ground is seen: both questions look at the same crossings.
+                let is_free = !has_decks && clearance_m.is_some_and(|metres| 0.0 <= metres);
+                let share = if is_free { FREE } else { hidden_at(ground, line) };
+                *sight = [share, clearance_m.unwrap_or(f64::NAN)];
             }
         };
-        Ok(PyArray1::from_vec(py, self.ask(py, (places(&lines)?, LINES_AT_ONCE), f64::NAN, each)?))
+        table(py, self.ask(py, (places(&lines)?, LINES_AT_ONCE), [f64::NAN; 2], each)?.into_iter())
     }
 
     /// One load module at a level of detail.

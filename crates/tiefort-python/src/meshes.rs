@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use source_files::{ArrayRaster, Crs, Raster};
 use terrain::{StopReason, metres_of_quanta};
-use tiefort::library::{self, Failure};
+use tiefort::library::{self, Failure, SystemClock};
 use workbench::Mesh;
 
 use crate::arrays::{places, posts_of};
@@ -21,6 +21,8 @@ use crate::within::within;
 #[pyclass(frozen)]
 pub struct Tin {
     mesh: Mesh,
+    /// What the library took.
+    seconds: f64,
 }
 
 /// Where the posts of an array lie: the system, the south-west post, the spacing to the east and to the north, the
@@ -41,12 +43,13 @@ pub fn tin_of_array(
     let request = library::tin_request(&name, words).map_err(|failure| raised(py, &failure))?;
     let crs = crs.map(|text| system(&text)).transpose().map_err(|failure| raised(py, &failure))?;
     let (posts, size) = posts_of(array, south_first)?;
-    let mesh = wait(py, told, move |stop, progress| {
+    wait(py, told, move |stop, progress| {
+        let clock = SystemClock::start();
         let raster = Raster::of_array(ArrayRaster { name, crs, south_west, spacing, size, nodata }, posts);
         let raster = raster.map_err(compiler::CompileError::from)?;
-        Ok(workbench::tin_of_raster(raster, &request, stop, progress)?)
-    })?;
-    Ok(Tin { mesh })
+        let mesh = workbench::tin_of_raster(raster, &request, stop, progress)?;
+        Ok(Tin { mesh, seconds: clock.seconds() })
+    })
 }
 
 /// A mesh of the heights in a file; `words` are those of `tiefort tin`.
@@ -58,8 +61,11 @@ pub fn tin_of_file(
     told: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Tin> {
     let request = library::tin_request(&path, words).map_err(|failure| raised(py, &failure))?;
-    let mesh = wait(py, told, move |stop, progress| Ok(workbench::tin(&request, stop, progress)?))?;
-    Ok(Tin { mesh })
+    wait(py, told, move |stop, progress| {
+        let clock = SystemClock::start();
+        let mesh = workbench::tin(&request, stop, progress)?;
+        Ok(Tin { mesh, seconds: clock.seconds() })
+    })
 }
 
 fn system(text: &str) -> Result<Crs, Failure> {
@@ -106,6 +112,12 @@ impl Tin {
         let Mesh { dem, east_m, north_m, spacing_m, .. } = &self.mesh;
         let rect = dem.rect();
         ([*east_m, *north_m], [spacing_m.0, spacing_m.1], [rect.posts_high(), rect.posts_wide()])
+    }
+
+    /// Seconds that the library took to make it.
+    #[getter]
+    fn seconds(&self) -> f64 {
+        self.seconds
     }
 
     /// Why it has no more vertices.

@@ -12,7 +12,13 @@ import pytest
 import tiefort
 
 JOB: dict[str, Any] = {
-    "area": {"name": "small", "crs": "EPSG:32611", "origin_m": [505_000, 3_875_000], "size_m": [4000, 3000]},
+    "area": {
+        "name": "small",
+        "crs": "EPSG:32611",
+        "origin_m": [505_000, 3_875_000],
+        "size_m": [4000, 3000],
+        "spacing_m": 25,
+    },
     "dem": {"source": "sample"},
     "tiles": {"rows": 2, "columns": 2},
 }

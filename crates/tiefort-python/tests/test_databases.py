@@ -31,7 +31,7 @@ def test_a_build_has_the_bytes_of_the_command_line(database: Path, tmp_path: Pat
     job = tmp_path / "small.toml"
     job.write_text(
         '[area]\nname = "small"\ncrs = "EPSG:32611"\norigin_m = [505000, 3875000]\nsize_m = [4000, 3000]\n'
-        '[dem]\nsource = "sample"\n[tiles]\nrows = 2\ncolumns = 2\n'
+        'spacing_m = 25\n[dem]\nsource = "sample"\n[tiles]\nrows = 2\ncolumns = 2\n'
     )
     done = run("build", job, "--out", tmp_path / "theirs.tdb", "--quiet")
     assert done.returncode in (0, 1), done.stderr

@@ -446,6 +446,10 @@ fn refuse(request: &TinRequest, rect: PostRect, longest: usize) -> Result<(), Co
     let impossible = |key: &str, found: String, expected: &str, hint: &str| {
         Err(GroundError::Impossible { key: key.into(), found, expected: expected.into(), hint: hint.into() }.into())
     };
+    if rect.posts_wide() < 2 || rect.posts_high() < 2 {
+        let found = format!("{} x {} posts", rect.posts_high(), rect.posts_wide());
+        return impossible("DEM", found, "at least 2 x 2 posts", "a mesh needs ground to cover");
+    }
     let (rows, cols) = request.tiles;
     if rows == 0 || cols == 0 || rect.cells_high() < rows as usize || rect.cells_wide() < cols as usize {
         let found = format!("{rows}x{cols} for {} x {} posts", rect.posts_high(), rect.posts_wide());
@@ -454,10 +458,6 @@ fn refuse(request: &TinRequest, rect: PostRect, longest: usize) -> Result<(), Co
     if WORKING_POSTS_MAX <= longest {
         let found = format!("tiles of {longest} cells");
         return impossible("--tiles", found, "tiles below 16384 cells a side", "ask for more tiles");
-    }
-    if rect.posts_wide() < 2 || rect.posts_high() < 2 {
-        let found = format!("{} x {} posts", rect.posts_high(), rect.posts_wide());
-        return impossible("DEM", found, "at least 2 x 2 posts", "a mesh needs ground to cover");
     }
     let corners = (rows as usize + 1) * (cols as usize + 1);
     match request.points {

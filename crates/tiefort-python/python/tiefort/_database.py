@@ -210,14 +210,14 @@ class Database:
         LineOfSight
         """
         lines, shape = _lines(a, b)
-        share = self._ground.hidden_at(lines)
+        share, clearance_m = self._ground.sights(lines).T
         hidden = share <= 1.0
         blocker = np.where(hidden[:, None], lines[:, :3] + share[:, None] * (lines[:, 3:] - lines[:, :3]), np.nan)
         return LineOfSight(
             (share == 2.0).reshape(shape),
             ~np.isnan(share).reshape(shape),
             blocker.reshape((*shape, 3)),
-            self._ground.clearance(lines).reshape(shape),
+            clearance_m.reshape(shape),
         )
 
     def visible(self, a: npt.ArrayLike, b: npt.ArrayLike) -> npt.NDArray[np.bool_]:

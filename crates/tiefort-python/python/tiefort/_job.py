@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any, Callable, Union
 
 from . import _tiefort
-from ._errors import JobError
+from ._errors import JobError, RequestError
 from ._inputs import Path, path_of
 from ._mesh import Residual
 from ._progress import Progress, Teller
@@ -107,15 +107,13 @@ def _folder(job: Job, out: Path | None) -> str:
     return f"{job.name}.tdb" if out is None else path_of(out)
 
 
-def _count(count: int | None) -> int | None:
-    if count is None:
-        return None
-    count = operator.index(count)
-    if not 1 <= count <= 1024:
-        from ._errors import RequestError
-
-        raise RequestError(f"workers: found {count}, expected 1 to 1024", "leave workers out: one for each core")
-    return count
+def _how(workers: int | None, fresh: bool, force: bool, strict: bool, page: bool) -> _tiefort.How:
+    if workers is not None:
+        workers = operator.index(workers)
+        if not 1 <= workers <= 1024:
+            message = f"workers: found {workers}, expected 1 to 1024"
+            raise RequestError(message, "leave workers out: one for each core")
+    return {"workers": workers, "fresh": fresh, "force": force, "strict": strict, "page": page}
 
 
 def build(
@@ -164,7 +162,7 @@ def build(
         When another build is at work in the folder.
     """
     read = _job_of(job)
-    how = (_count(workers), fresh, force, strict, html)
+    how = _how(workers, fresh, force, strict, html)
     text, rebuilt, kept, unchanged = _tiefort.build(read._job, _folder(read, out), how, Teller(progress))
     return Report(text, rebuilt=rebuilt, kept=kept, unchanged=unchanged)
 
@@ -186,7 +184,7 @@ def tile(
     With `release_borders`, what a changed border reaches is made again, too; the rest as for `build`.
     """
     read = _job_of(job)
-    how = (_count(workers), False, force, strict, html)
+    how = _how(workers, False, force, strict, html)
     row, col = tile
     text, tiles = _tiefort.tile(read._job, (row, col), _folder(read, out), release_borders, how, Teller(progress))
     return Report(text, rebuilt=len(tiles))

@@ -60,6 +60,8 @@ class Mesh:
         Class of the ground under each triangle of a load module, 255 over holes. None for others.
     stop : str or None
         Why a mesh of heights has no more vertices.
+    seconds : float
+        What the library took to make a mesh of heights.
     """
 
     def __init__(
@@ -80,13 +82,14 @@ class Mesh:
         self.classes = classes
         self.transform: Affine6 | None = None
         self.stop: str | None = None
+        self.seconds = 0.0
         self._tin = tin
         self._exported = exported
         if tin is not None:
             (west, south), (east_step, north_step), (rows, _) = tin.grid
             north = south + north_step * (rows - 1)
             self.transform = (east_step, 0.0, west - east_step / 2, 0.0, -north_step, north + north_step / 2)
-            self.stop = tin.stop
+            self.stop, self.seconds = tin.stop, tin.seconds
 
     @classmethod
     def _of_tin(cls, tin: _tiefort.Tin) -> Mesh:
