@@ -1,8 +1,8 @@
 //! Waits for work in Rust: without holding Python's lock, telling progress, and looking for Ctrl-C.
 //!
-//! The work runs in a thread of its own, because a signal is only seen by the thread that waits. A run looks at its flag
-//! between tiles, and a tile may take minutes: so it gets a moment to end by itself, then it is left alone. What it does
-//! after that is what any run does that was asked to stop: it ends its tile and ends.
+//! The work runs in a thread of its own, because only the thread that waits sees a signal. A run looks at its flag
+//! between tiles, and a tile may take minutes: so it gets a moment to end by itself, then it is left alone. After that
+//! it does what any run does that was asked to stop: it ends its tile and ends.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;

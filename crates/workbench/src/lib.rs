@@ -19,6 +19,7 @@ mod sample;
 pub use sample::Sample;
 
 mod heights;
+mod join;
 mod outlook;
 mod suiting;
 mod tally;

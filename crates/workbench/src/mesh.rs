@@ -1,6 +1,5 @@
 //! Without load modules: just a mesh from a raster, on the raster's own posts or on those it is resampled to.
 
-use std::collections::HashMap;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
@@ -21,6 +20,7 @@ use tiling::{Gains, Tiling, points_equally, points_globally};
 use tin::{CostUnit, Proximity, Rule, Stop, SurveyTask, TileTask};
 
 use crate::heights::Heights;
+use crate::join::join;
 use crate::tally::tally_of;
 
 /// The paper's proximity test: metres across, metres in height.
@@ -488,29 +488,4 @@ fn refuse(request: &TinRequest, rect: PostRect, longest: usize) -> Result<(), Co
 /// Voids are never selected.
 fn weights(dem: &Dem) -> Importance {
     mask::without_voids(Importance::uniform(dem.rect(), THOUSANDTHS), dem)
-}
-
-/// Tiles put together: points on shared lines are equal, so they are one vertex.
-fn join(rect: PostRect, tiles: &[TileTin]) -> Tin {
-    if let [only] = tiles {
-        return only.tin.clone();
-    }
-    let mut joined = Tin::new(rect, Vec::new(), Vec::new());
-    let mut on_lines = HashMap::new();
-    for tile in tiles {
-        let part = &tile.tin;
-        let (low, high) = (part.place_of(part.rect.south_west()), part.place_of(part.rect.north_east()));
-        let mut place = |vertex: &Vertex| {
-            let at = vertex.at;
-            let mut fresh = || {
-                joined.vertices.push(*vertex);
-                joined.vertices.len() as u32 - 1
-            };
-            let is_on_line = at.row == low.row || at.row == high.row || at.col == low.col || at.col == high.col;
-            if is_on_line { *on_lines.entry(at).or_insert_with(fresh) } else { fresh() }
-        };
-        let places: Vec<u32> = part.vertices.iter().map(&mut place).collect();
-        joined.triangles.extend(part.triangles.iter().map(|corners| corners.map(|v| places[v as usize])));
-    }
-    joined
 }
