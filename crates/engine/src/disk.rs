@@ -35,10 +35,17 @@ pub struct Disk;
 /// A file whose lock is held: the system frees it when the process ends.
 #[derive(Debug)]
 struct Locked {
-    _file: File,
+    file: File,
 }
 
 impl Guard for Locked {}
+
+impl Drop for Locked {
+    fn drop(&mut self) {
+        // A process that was forked meanwhile has the file open, too: closing it here alone would leave it locked.
+        let _ = self.file.unlock();
+    }
+}
 
 impl Store for Disk {
     fn read(&self, path: &Path) -> Result<Vec<u8>> {
@@ -130,7 +137,7 @@ impl Store for Disk {
             LockKind::Shared => file.try_lock_shared(),
         };
         match locked {
-            Ok(()) => Ok(Some(Box::new(Locked { _file: file }))),
+            Ok(()) => Ok(Some(Box::new(Locked { file }))),
             Err(TryLockError::WouldBlock) => Ok(None),
             Err(TryLockError::Error(source)) => Err(source),
         }

@@ -24,9 +24,21 @@ impl Job {
         Self::load_asking(path, Some(find))
     }
 
+    /// The job that `text` holds, as if it were the file at `path`, with the files it names; `find` may have to find
+    /// its area.
+    ///
+    /// # Errors
+    /// As [`Job::load_with`], but for those of the job file itself.
+    pub fn of_text(text: &str, path: &Path, find: &FindArea) -> Result<Job, JobError> {
+        Self::of_text_asking(text, path, Some(find))
+    }
+
     fn load_asking(path: &Path, find: Option<&FindArea>) -> Result<Job, JobError> {
-        let text = text_of(path)?;
-        let (mut job, mentions) = read::read(&text, path, find)?;
+        Self::of_text_asking(&text_of(path)?, path, find)
+    }
+
+    fn of_text_asking(text: &str, path: &Path, find: Option<&FindArea>) -> Result<Job, JobError> {
+        let (mut job, mentions) = read::read(text, path, find)?;
         files::locate(&mut job, mentions)?;
         Ok(job)
     }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::lookup::{Lookup, STEPS};
-use crate::sight::{Line, crossed_at, entered_at, hidden_at};
+use crate::sight::{Line, crossed_at, entered_at, hidden_at, least_above};
 use crate::{AreaFrame, Block, QUANTA_PER_METRE, Sample, TerrainModule};
 
 /// A block of load modules, loaded. It holds no file open and may be asked from many threads.
@@ -204,12 +204,7 @@ impl LoadedGround {
         if self.is_below(from_m) {
             return Sight::Hidden(0.0);
         }
-        let quanta = |place: [f64; 3]| {
-            let metre = f64::from(QUANTA_PER_METRE);
-            let (east, north) = (place[0] - self.frame.origin_m[0], place[1] - self.frame.origin_m[1]);
-            [east * metre, north * metre, place[2] * metre]
-        };
-        let (from, to) = (quanta(from_m), quanta(to_m));
+        let (from, to) = (self.quanta(from_m), self.quanta(to_m));
         let side = f64::from(self.frame.side);
         let (mut nearest, mut left_at) = (f64::INFINITY, f64::INFINITY);
         for [row, col] in self.modules_along(from, to) {
@@ -237,6 +232,33 @@ impl LoadedGround {
             (false, false) if self.is_below(to_m) => Sight::Hidden(1.0),
             (false, false) => Sight::Free,
         }
+    }
+
+    /// How far a line between two places stays above the ground at least, in metres: negative where the ground rises
+    /// above it. Decks are not looked at. `None` where the line leaves what is loaded.
+    pub fn clearance_m(&self, from_m: [f64; 3], to_m: [f64; 3]) -> Option<f64> {
+        if self.is_beyond_any_ground(from_m) || self.is_beyond_any_ground(to_m) {
+            return None;
+        }
+        let above = |place: [f64; 3]| self.height_m([place[0], place[1]]).map(|height_m| place[2] - height_m);
+        let mut least = above(from_m)?.min(above(to_m)?);
+        let (from, to) = (self.quanta(from_m), self.quanta(to_m));
+        for [row, col] in self.modules_along(from, to) {
+            let inside = |index: i64| u32::try_from(index).ok();
+            let index = self.block.contains(inside(row)?, inside(col)?).then_some([inside(row)?, inside(col)?])?;
+            let corner = [col, row].map(|index| index as f64 * f64::from(self.frame.side));
+            let lookup = &self.lookups[self.block.index(index[0], index[1])];
+            let line = Line::in_module(corner, from, to);
+            least = least.min(least_above(lookup, self.frame.side, &line) / f64::from(QUANTA_PER_METRE));
+        }
+        Some(least)
+    }
+
+    /// A place in quanta from the area's south-west corner.
+    fn quanta(&self, place: [f64; 3]) -> [f64; 3] {
+        let metre = f64::from(QUANTA_PER_METRE);
+        let (east, north) = (place[0] - self.frame.origin_m[0], place[1] - self.frame.origin_m[1]);
+        [east * metre, north * metre, place[2] * metre]
     }
 
     /// Whether a place is so far away, or no place at all, that nothing can be said of lines to it.

@@ -61,6 +61,31 @@ pub(crate) fn hidden_at(lookup: &Lookup, side: u16, line: &Line) -> f64 {
     nearest
 }
 
+/// The least height in quanta of a line above the triangles of the ground, where it crosses their edges; infinity where
+/// it crosses none. Between two edges the ground is straight, so beside the line's ends this is its least of all.
+pub(crate) fn least_above(lookup: &Lookup, side: u16, line: &Line) -> f64 {
+    let mut least = f64::INFINITY;
+    if line.length_squared == 0.0 {
+        return least;
+    }
+    lookup.triangles_along(side, line.start, line.end, |corners| {
+        for i in 0..3 {
+            let edge = [corners[i], corners[(i + 1) % 3]].map(|place| place.map(f64::from));
+            let [(left_a, ahead_a), (left_b, ahead_b)] = edge.map(|place| line.seen(place));
+            if (0.0 < left_a) == (0.0 < left_b) && (left_a < 0.0) == (left_b < 0.0) || left_a == left_b {
+                continue;
+            }
+            let share = left_a / (left_a - left_b);
+            let at = (ahead_a + share * (ahead_b - ahead_a)) / line.length_squared;
+            if (0.0..=1.0).contains(&at) {
+                let height = edge[0][2] + share * (edge[1][2] - edge[0][2]);
+                least = least.min(line.height(at) - height);
+            }
+        }
+    });
+    least
+}
+
 /// Where along a line a deck is first crossed, from above or from below; infinity when none is.
 pub(crate) fn crossed_at(decks: &Lookup, side: u16, line: &Line) -> f64 {
     if line.length_squared == 0.0 {

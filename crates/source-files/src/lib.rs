@@ -34,6 +34,8 @@ pub use dem_file::{DemFile, Reading};
 mod raster;
 mod samples;
 pub use raster::Raster;
+mod array;
+pub use array::{ArrayRaster, PostArray};
 mod voids;
 pub use voids::{VoidPolicy, VoidSummary};
 mod resample;

@@ -3,11 +3,11 @@
 use std::fmt;
 use std::io;
 use std::path::Path;
-use std::process::ExitCode;
 
 use compiler::CompileError;
 use database::DatabaseError;
 use exports::ExportError;
+use ground::GroundError;
 use job::JobError;
 use product::ProductError;
 
@@ -40,16 +40,48 @@ impl Outcome {
     }
 }
 
-impl From<Outcome> for ExitCode {
-    fn from(outcome: Outcome) -> Self {
-        ExitCode::from(outcome.code())
-    }
-}
-
 /// Exit code of a failure.
 const FAILED: u8 = 2;
 /// Exit code when trying again later may help: `EX_TEMPFAIL` of sysexits.
 const TRY_LATER: u8 = 75;
+
+/// What a failure is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Cause {
+    /// What was asked for cannot be.
+    Request,
+    /// The job file.
+    Job,
+    /// A raster, or another file that is read.
+    Source,
+    /// A terrain database.
+    Database,
+    /// A terrain database that others are at work on: the same may do later.
+    Busy,
+    /// A file or a folder that is written.
+    Output,
+    /// It was asked to stop.
+    Stopped,
+    /// We are wrong.
+    Bug,
+}
+
+impl Cause {
+    fn of_compiler(error: &CompileError) -> Self {
+        match error {
+            error if error.is_stopped() => Self::Stopped,
+            error if error.is_transient() => Self::Busy,
+            CompileError::Ground(GroundError::Source(_)) => Self::Source,
+            CompileError::Ground(GroundError::Database(_))
+            | CompileError::Database(_)
+            | CompileError::OtherJob { .. } => Self::Database,
+            CompileError::Ground(GroundError::Panicked { .. } | GroundError::OutsideSources { .. })
+            | CompileError::Panicked { .. } => Self::Bug,
+            CompileError::Package { .. } => Self::Output,
+            _ => Self::Request,
+        }
+    }
+}
 
 /// Why a command did not do its work.
 #[derive(Debug)]
@@ -57,12 +89,18 @@ pub struct Failure {
     message: String,
     hint: Option<String>,
     code: u8,
+    cause: Cause,
 }
 
 impl Failure {
     /// Something wrong with the world: exit code 2.
     pub fn new(message: impl fmt::Display, hint: impl Into<String>) -> Self {
-        Self { message: message.to_string(), hint: Some(hint.into()), code: FAILED }
+        Self { message: message.to_string(), hint: Some(hint.into()), code: FAILED, cause: Cause::Request }
+    }
+
+    /// The same about something else than what was asked for.
+    pub fn about(cause: Cause, message: impl fmt::Display, hint: impl Into<String>) -> Self {
+        Self { cause, ..Self::new(message, hint) }
     }
 
     /// A file that could not be written.
@@ -75,24 +113,25 @@ impl Failure {
         // A temporary file adds its own name, which is none that was given.
         let told = source.to_string();
         let told = told.split_once(" at path \"").map_or(told.as_str(), |(cause, _)| cause);
-        Self::new(format!("{}: cannot be written: {told}", path.display()), hint)
+        Self { cause: Cause::Output, ..Self::new(format!("{}: cannot be written: {told}", path.display()), hint) }
     }
 
     /// We are wrong; what and where was told when it happened.
     pub fn bug() -> Self {
         let hint = "this is a fault in tiefort, not in your input; please report it with the note above";
-        Self::new("found a state that should be impossible", hint)
+        Self { cause: Cause::Bug, ..Self::new("found a state that should be impossible", hint) }
     }
 
     /// Why the compiler ended early; `signal` is the exit code of the signal that came, if one did.
     pub fn of_compiler(error: &CompileError, signal: Option<u8>) -> Self {
-        if error.is_stopped() {
+        let cause = Cause::of_compiler(error);
+        if cause == Cause::Stopped {
             let again = || "run the same command again: it goes on where it stopped".to_owned();
             let (hint, code) = (error.hint().unwrap_or_else(again), signal.unwrap_or(FAILED));
-            return Self { message: error.to_string(), hint: Some(hint), code };
+            return Self { message: error.to_string(), hint: Some(hint), code, cause };
         }
         let code = if error.is_transient() { TRY_LATER } else { FAILED };
-        Self { message: error.to_string(), hint: error.hint(), code }
+        Self { message: error.to_string(), hint: error.hint(), code, cause }
     }
 
     /// With the exit code of the signal that came, if one did: then that is why.
@@ -106,18 +145,31 @@ impl Failure {
     }
 
     /// Prints it and gives the exit code.
-    pub fn tell(&self) -> ExitCode {
+    pub fn tell(&self) -> u8 {
         terminal::tell(&self.to_string());
-        ExitCode::from(self.code)
+        self.code
+    }
+
+    /// What was found and what was expected.
+    pub fn message(&self) -> &str {
+        &self.message
+    }
+
+    /// What could be done about it.
+    pub fn hint(&self) -> &str {
+        // What has no hint of its own is a refusal of the system.
+        self.hint.as_deref().unwrap_or("check the path named above, its permissions, and the room on its disk")
+    }
+
+    /// What it is about.
+    pub fn cause(&self) -> Cause {
+        self.cause
     }
 }
 
 impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        // What has no hint of its own is a refusal of the system.
-        let fallback = "check the path named above, its permissions, and the room on its disk";
-        let (message, hint) = (&self.message, self.hint.as_deref().unwrap_or(fallback));
-        write!(f, "error: {}\nhint: {}", terminal::short(message), terminal::short(hint))
+        write!(f, "error: {}\nhint: {}", terminal::short(&self.message), terminal::short(self.hint()))
     }
 }
 
@@ -129,7 +181,7 @@ impl From<NotPrinted> for Failure {
 
 impl From<JobError> for Failure {
     fn from(error: JobError) -> Self {
-        Self::new(&error, error.hint())
+        Self { cause: Cause::Job, ..Self::new(&error, error.hint()) }
     }
 }
 
@@ -149,21 +201,29 @@ impl From<ExportError> for Failure {
     fn from(error: ExportError) -> Self {
         match error {
             ExportError::Database(error) => error.into(),
-            error => Self { message: error.to_string(), hint: error.hint(), code: FAILED },
+            error => {
+                let (message, hint) = (error.to_string(), error.hint());
+                let cause = match error {
+                    ExportError::Stopped { .. } => Cause::Stopped,
+                    ExportError::Panicked { .. } => Cause::Bug,
+                    ExportError::Write { .. } => Cause::Output,
+                    _ => Cause::Request,
+                };
+                Self { message, hint, code: FAILED, cause }
+            }
         }
     }
 }
 
 impl From<DatabaseError> for Failure {
     fn from(error: DatabaseError) -> Self {
-        let code = if error.is_transient() { TRY_LATER } else { FAILED };
-        Self { message: error.to_string(), hint: error.hint().map(str::to_owned), code }
+        Self::of_compiler(&error.into(), None)
     }
 }
 
 /// The exit code after arguments that are none of this program's.
-pub fn wrong_arguments() -> ExitCode {
-    ExitCode::from(FAILED)
+pub fn wrong_arguments() -> u8 {
+    FAILED
 }
 
 /// A panic is told in one line instead of the usual trace: what should have held, and where.

@@ -8,7 +8,7 @@ use std::sync::atomic::AtomicBool;
 use compiler::{CompileError, Event, Progress, Stage};
 use ground::{decode, warnings_of};
 use schedule::Workers;
-use source_files::{DemFile, Mosaic, MosaicRules, MosaicVoids, RasterFrame, Reading, VoidPolicy};
+use source_files::{DemFile, Mosaic, MosaicRules, MosaicVoids, Raster, RasterFrame, Reading, VoidPolicy};
 use terrain::{Dem, Post, PostRect, Resampling, TileId, quanta_of_metres};
 
 use crate::suiting::{SuitingGrid, suiting_grid};
@@ -48,17 +48,32 @@ impl Heights {
     /// # Errors
     /// When it cannot be decoded, or no grid suits it.
     pub fn of(file: &DemFile, workers: &Workers, stop: &AtomicBool) -> Result<Self, CompileError> {
-        if !has_square_posts(file.frame()) {
-            return resampled(file, &suiting_grid(file.frame())?, workers, stop);
+        if has_square_posts(file.frame()) {
+            return Self::as_they_are(decode(file, file.rect(), workers, stop)?);
         }
-        let mut raster = decode(file, file.rect(), workers, stop)?;
-        let notes = warnings_of(file.frame(), raster.range_m(), raster.notes());
+        let suiting = suiting_grid(file.frame())?;
+        let window = file.window_reaching(&suiting.crs, &suiting.grid, suiting.rect).unwrap_or(file.rect());
+        resampled(decode(file, window, workers, stop)?, &suiting, workers, stop)
+    }
+
+    /// Those of a whole raster in memory.
+    ///
+    /// # Errors
+    /// When they are all void, or no grid suits it.
+    pub fn of_raster(raster: Raster, workers: &Workers, stop: &AtomicBool) -> Result<Self, CompileError> {
+        if has_square_posts(raster.frame()) {
+            return Self::as_they_are(raster);
+        }
+        let suiting = suiting_grid(raster.frame())?;
+        resampled(raster, &suiting, workers, stop)
+    }
+
+    /// A raster's own posts.
+    fn as_they_are(mut raster: Raster) -> Result<Self, CompileError> {
+        let notes = warnings_of(raster.frame(), raster.range_m(), raster.notes());
         raster.settle_voids(VoidPolicy::Hole)?;
-        let scale = file.sample_scale();
-        let dem = Dem::from_fn(file.rect(), |post| {
-            raster.sample(post).and_then(|sample| quanta_of_metres(scale.height_m(sample)))
-        });
-        Ok(Self { dem: Arc::new(dem), frame: file.frame().clone(), notes })
+        let dem = Dem::from_fn(raster.window(), |post| raster.height_m(post).and_then(quanta_of_metres));
+        Ok(Self { dem: Arc::new(dem), frame: raster.frame().clone(), notes })
     }
 }
 
@@ -70,15 +85,14 @@ pub(crate) fn has_square_posts(frame: &RasterFrame) -> bool {
 
 /// Heights on another grid, by the code that projects the sources of a job.
 fn resampled(
-    file: &DemFile,
+    raster: Raster,
     suiting: &SuitingGrid,
     workers: &Workers,
     stop: &AtomicBool,
 ) -> Result<Heights, CompileError> {
     let SuitingGrid { crs, grid, rect } = suiting;
-    let window = file.window_reaching(crs, grid, *rect).unwrap_or(file.rect());
-    let raster = decode(file, window, workers, stop)?;
-    let mut notes = warnings_of(file.frame(), raster.range_m(), raster.notes());
+    let own = raster.frame().clone();
+    let mut notes = warnings_of(&own, raster.range_m(), raster.notes());
     let voids = MosaicVoids { next_source: false, fill_within: 0 };
     let rules = MosaicRules { resampling: Resampling::Bilinear, feather_m: 0.0, voids };
     let mosaic = Mosaic::new(vec![raster], rules, crs, grid, *rect)?;
@@ -96,7 +110,7 @@ fn resampled(
     dem.fill_voids(|post| part(post).height(post));
     let spacing = grid.spacing.metres();
     let frame = RasterFrame {
-        path: file.frame().path.clone(),
+        path: own.path.clone(),
         crs: crs.clone(),
         south_west: [grid.origin_east_m, grid.origin_north_m],
         spacing: [spacing; 2],
@@ -106,7 +120,7 @@ fn resampled(
     notes.push(format!(
         "{}: resampled from {} to {} x {} posts {spacing} m apart in {}",
         frame.path.display(),
-        posts_text(file.frame()),
+        posts_text(&own),
         frame.cols,
         frame.rows,
         frame.crs.name(),

@@ -2,7 +2,7 @@
 //! rasters, which suggests a job.
 
 mod mesh;
-pub use mesh::{Mesh, TinMethod, TinRequest, TinStart, tin};
+pub use mesh::{Mesh, TinMethod, TinRequest, TinStart, tin, tin_of_raster};
 mod tin_levels;
 pub use tin_levels::tin_levels;
 mod compare;
@@ -19,6 +19,7 @@ mod sample;
 pub use sample::Sample;
 
 mod heights;
+mod join;
 mod outlook;
 mod suiting;
 mod tally;

@@ -1,6 +1,5 @@
 //! Without load modules: just a mesh from a raster, on the raster's own posts or on those it is resampled to.
 
-use std::collections::HashMap;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
@@ -12,6 +11,7 @@ use geometry::WORKING_POSTS_MAX;
 use ground::{GivenPost, GroundError, Window, chosen, posts_of_file, refused, start_posts};
 use job::{ErrorKey, Optimising, StartMethod};
 use schedule::{Event as Scheduled, RankedTasks, Workers, in_rank_order_observed};
+use source_files::Raster;
 use terrain::{
     Dem, Features, GainCurve, Importance, LastBatch, Metres, ModuleGrid, PostRect, SeamSides, StopReason, THOUSANDTHS,
     TileFeatures, TileId, TileOrder, TileTin, Tin, Vertex,
@@ -20,6 +20,7 @@ use tiling::{Gains, Tiling, points_equally, points_globally};
 use tin::{CostUnit, Proximity, Rule, Stop, SurveyTask, TileTask};
 
 use crate::heights::Heights;
+use crate::join::join;
 use crate::tally::tally_of;
 
 /// The paper's proximity test: metres across, metres in height.
@@ -100,6 +101,32 @@ pub struct Mesh {
 /// When the raster cannot be used, or nothing says when to stop.
 pub fn tin(request: &TinRequest, stop: &AtomicBool, progress: &mut dyn Progress) -> Result<Mesh, CompileError> {
     let heights = Heights::read(&request.dem, request.workers, stop, progress)?;
+    tin_over(&heights, request, stop, progress)
+}
+
+/// The same from a raster that is in memory already, instead of the one that `request` names.
+///
+/// # Errors
+/// As [`tin`].
+pub fn tin_of_raster(
+    raster: Raster,
+    request: &TinRequest,
+    stop: &AtomicBool,
+    progress: &mut dyn Progress,
+) -> Result<Mesh, CompileError> {
+    progress.tell(Event::Enter(Stage::Read, 0));
+    let heights = Heights::of_raster(raster, &Workers::new(request.workers), stop)?;
+    progress.tell(Event::Leave(Stage::Read));
+    heights.notes.iter().for_each(|note| progress.tell(Event::Note(note.clone())));
+    tin_over(&heights, request, stop, progress)
+}
+
+fn tin_over(
+    heights: &Heights,
+    request: &TinRequest,
+    stop: &AtomicBool,
+    progress: &mut dyn Progress,
+) -> Result<Mesh, CompileError> {
     let tiles = heights.refine(request, stop, progress)?;
     progress.tell(Event::Enter(Stage::Assemble, 0));
     let exhausted = tiles.iter().any(|tile| tile.stop == StopReason::Exhausted);
@@ -419,6 +446,10 @@ fn refuse(request: &TinRequest, rect: PostRect, longest: usize) -> Result<(), Co
     let impossible = |key: &str, found: String, expected: &str, hint: &str| {
         Err(GroundError::Impossible { key: key.into(), found, expected: expected.into(), hint: hint.into() }.into())
     };
+    if rect.posts_wide() < 2 || rect.posts_high() < 2 {
+        let found = format!("{} x {} posts", rect.posts_high(), rect.posts_wide());
+        return impossible("DEM", found, "at least 2 x 2 posts", "a mesh needs ground to cover");
+    }
     let (rows, cols) = request.tiles;
     if rows == 0 || cols == 0 || rect.cells_high() < rows as usize || rect.cells_wide() < cols as usize {
         let found = format!("{rows}x{cols} for {} x {} posts", rect.posts_high(), rect.posts_wide());
@@ -428,10 +459,6 @@ fn refuse(request: &TinRequest, rect: PostRect, longest: usize) -> Result<(), Co
         let found = format!("tiles of {longest} cells");
         return impossible("--tiles", found, "tiles below 16384 cells a side", "ask for more tiles");
     }
-    if rect.posts_wide() < 2 || rect.posts_high() < 2 {
-        let found = format!("{} x {} posts", rect.posts_high(), rect.posts_wide());
-        return impossible("DEM", found, "at least 2 x 2 posts", "a mesh needs ground to cover");
-    }
     let corners = (rows as usize + 1) * (cols as usize + 1);
     match request.points {
         Some(points) if points < corners => impossible(
@@ -439,6 +466,12 @@ fn refuse(request: &TinRequest, rect: PostRect, longest: usize) -> Result<(), Co
             points.to_string(),
             &format!("at least the {corners} corners of tiles"),
             "corners of tiles are vertices of every mesh",
+        ),
+        _ if request.triangles.is_some_and(|triangles| triangles < 2 * rows as usize * cols as usize) => impossible(
+            "--triangles",
+            request.triangles.unwrap_or_default().to_string(),
+            &format!("at least {}, two in each tile", 2 * rows as usize * cols as usize),
+            "ask for more triangles, or for fewer tiles",
         ),
         None if [request.max_residual_m, request.rms_m, request.triangles.map(|_| 0.0)].iter().all(Option::is_none) => {
             impossible(
@@ -455,29 +488,4 @@ fn refuse(request: &TinRequest, rect: PostRect, longest: usize) -> Result<(), Co
 /// Voids are never selected.
 fn weights(dem: &Dem) -> Importance {
     mask::without_voids(Importance::uniform(dem.rect(), THOUSANDTHS), dem)
-}
-
-/// Tiles put together: points on shared lines are equal, so they are one vertex.
-fn join(rect: PostRect, tiles: &[TileTin]) -> Tin {
-    if let [only] = tiles {
-        return only.tin.clone();
-    }
-    let mut joined = Tin::new(rect, Vec::new(), Vec::new());
-    let mut on_lines = HashMap::new();
-    for tile in tiles {
-        let part = &tile.tin;
-        let (low, high) = (part.place_of(part.rect.south_west()), part.place_of(part.rect.north_east()));
-        let mut place = |vertex: &Vertex| {
-            let at = vertex.at;
-            let mut fresh = || {
-                joined.vertices.push(*vertex);
-                joined.vertices.len() as u32 - 1
-            };
-            let is_on_line = at.row == low.row || at.row == high.row || at.col == low.col || at.col == high.col;
-            if is_on_line { *on_lines.entry(at).or_insert_with(fresh) } else { fresh() }
-        };
-        let places: Vec<u32> = part.vertices.iter().map(&mut place).collect();
-        joined.triangles.extend(part.triangles.iter().map(|corners| corners.map(|v| places[v as usize])));
-    }
-    joined
 }

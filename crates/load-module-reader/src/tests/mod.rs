@@ -171,14 +171,16 @@ fn a_line_of_sight_agrees_with_small_steps() {
         };
         let least = (0..=2000).map(|step| at(f64::from(step) / 2000.0)).fold(f64::INFINITY, f64::min);
         let world = |[x, y]: [f64; 2], up: f64| [east + x, north + y, up];
+        let clearance = file.clearance_m(world(from, up), world(to, over)).unwrap();
+        assert!(clearance <= least + 1e-4 && least <= clearance + 3.0, "{clearance} of {least}");
         match file.sight(world(from, up), world(to, over)) {
             Sight::Free => {
                 free += 1;
-                assert!(-0.5 < least, "{least}");
+                assert!(-0.5 < least && -1e-5 <= clearance, "{least}, {clearance}");
             }
             Sight::Hidden(share) => {
                 hidden += 1;
-                assert!(at(share) < 1e-6, "{} at {share}", at(share));
+                assert!(at(share) < 1e-6 && clearance < 1e-5, "{} at {share}, {clearance}", at(share));
             }
             Sight::Unknown => panic!("all of it is loaded"),
         }

@@ -47,6 +47,12 @@ impl Crs {
         Self::horizontal(4326).expect("every table of systems has this one")
     }
 
+    /// Metres in a plane that lies nowhere on Earth: that of heights whose system is not known.
+    pub fn plane() -> Self {
+        let anywhere = "+proj=tmerc +lat_0=0 +lon_0=0 +k=1 +x_0=0 +y_0=0 +datum=WGS84 +units=m";
+        Self::new(anywhere.into(), "no coordinate system".into(), None).expect("a projection that is known")
+    }
+
     /// The system of places on the ground with an EPSG code.
     ///
     /// # Errors

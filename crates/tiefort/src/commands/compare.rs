@@ -1,6 +1,7 @@
 //! `tiefort compare`: the founding paper's Table 1 on any DEM.
 
 use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 use clap::Args;
@@ -101,22 +102,36 @@ fn window(text: &str) -> Result<PostRect, String> {
 
 /// Compares.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
+    let signals = Signals::watch()?;
+    let (found, seconds) = compared(arguments, signals.stop()).map_err(|failure| failure.after(signals.exit_code()))?;
+    terminal::print(&match arguments.format {
+        Format::Text => text(&found, &seconds),
+        Format::Json => format!("{:#}\n", to_json(&found, &seconds)),
+    })?;
+    Ok(Outcome::Sound)
+}
+
+/// The comparison for a program.
+///
+/// # Errors
+/// When the ground cannot be used, or no method can make what was asked for.
+pub fn json_text(arguments: &Arguments, stop: &AtomicBool) -> Result<String, Failure> {
+    let (found, seconds) = compared(arguments, stop)?;
+    Ok(to_json(&found, &seconds).to_string())
+}
+
+/// The comparison, and what each row took; pictures are drawn where they are wanted.
+fn compared(arguments: &Arguments, stop: &AtomicBool) -> Result<(Comparison, Vec<f64>), Failure> {
     let request = request(arguments)?;
     arguments.pictures.as_deref().map_or(Ok(()), NewFolder::check)?;
-    let signals = Signals::watch()?;
     let mut watch = Watch { quiet: arguments.quiet, names: Vec::new(), began: Instant::now(), seconds: Vec::new() };
     watch.names = names(&request);
-    let found = workbench::compare(&request, signals.stop(), &mut |event| watch.hear(event));
-    let found = found.map_err(|error| Failure::of_compiler(&error, signals.exit_code()))?;
+    let found = workbench::compare(&request, stop, &mut |event| watch.hear(event))?;
     refuse_all(&found)?;
     if let Some(folder) = &arguments.pictures {
         draw(&found, NewFolder::begin(folder)?)?;
     }
-    terminal::print(&match arguments.format {
-        Format::Text => text(&found, &watch.seconds),
-        Format::Json => format!("{:#}\n", to_json(&found, &watch.seconds)),
-    })?;
-    Ok(Outcome::Sound)
+    Ok((found, watch.seconds))
 }
 
 fn request(arguments: &Arguments) -> Result<CompareRequest, Failure> {

@@ -230,7 +230,8 @@ fn features_json(features: &ExplainedFeatures) -> Value {
     })
 }
 
-fn to_json(found: &Explanation) -> Value {
+/// For a program.
+pub fn to_json(found: &Explanation) -> Value {
     let (tile, state, stop) = found.tile;
     let [rms_m, mean_abs_m, max_m] = found.residual_m;
     let window = found.window;

@@ -94,6 +94,13 @@ pub struct Arguments {
     out: PathBuf,
 }
 
+impl Arguments {
+    /// How many things are done at once.
+    pub fn workers(&self) -> usize {
+        self.workers.count()
+    }
+}
+
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Format {
     /// A folder with one load-module file (FORMAT.md) for each load module
@@ -226,19 +233,27 @@ impl Format {
 
 /// Exports.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
-    check(arguments)?;
     let signals = Signals::watch()?;
     let steps = Steps::start(arguments.quiet);
     let tell = |step| steps.tell(step);
-    let workers = schedule::Workers::new(arguments.workers.count());
+    let workers = schedule::Workers::new(arguments.workers());
     let work = Work { workers: &workers, stop: signals.stop(), tell: &tell };
-    let exported = export(arguments, &work);
+    let exported = checked(arguments, &work);
     let seconds = steps.finish();
     let summary = exported.map_err(|failure| failure.after(signals.exit_code()))?;
     if !arguments.quiet {
         terminal::tell(&format!("{summary} in {seconds:.1} s: {}", files::shown(&arguments.out).display()));
     }
     Ok(Outcome::Sound)
+}
+
+/// Refuses what cannot be, else does it; what was exported, in words.
+///
+/// # Errors
+/// When it cannot be, the database cannot be read, or nothing can be written there.
+pub fn checked(arguments: &Arguments, work: &Work) -> Result<String, Failure> {
+    check(arguments)?;
+    export(arguments, work)
 }
 
 /// Refuses what cannot be, before any work.

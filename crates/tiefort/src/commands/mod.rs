@@ -1,26 +1,26 @@
 //! The commands, one file each: its arguments, its help, and what it calls.
 
 mod build;
-mod compare;
+pub mod compare;
 mod completions;
 mod diff;
-mod explain;
-mod export;
+pub mod explain;
+pub mod export;
 mod fidelity;
 mod inadequate;
 mod init;
 mod init_features;
 mod job_words;
 mod man;
-mod plan;
+pub mod plan;
 mod plan_features;
 mod render;
 mod report;
 mod sample;
 mod status;
 mod task;
-mod tile;
-mod tin;
+pub mod tile;
+pub mod tin;
 mod verify;
 mod view;
 mod worker;

@@ -216,7 +216,8 @@ fn by_rank(plan: &Plan) -> Vec<&PlannedTile> {
     tiles
 }
 
-fn json_text(job: &Job, plan: &Plan, features: Option<&FeaturesForeseen>, played: &[Played]) -> String {
+/// For a program.
+pub fn json_text(job: &Job, plan: &Plan, features: Option<&FeaturesForeseen>, played: &[Played]) -> String {
     let simulation: Vec<Value> = played
         .iter()
         .map(|run| {

@@ -5,7 +5,7 @@ use std::sync::PoisonError;
 
 use clap::{ArgGroup, Args};
 use compiler::{Stage, Stopwatch};
-use exports::TinPlace;
+use exports::{Coordinates, TinPlace};
 use inspect::{Fidelity, Sights};
 use job::{Effort, ErrorKey, HeightFit, Lattice, MethodName, Optimising};
 use serde_json::{Value, json};
@@ -147,15 +147,19 @@ fn of_optimised(key: &str) -> String {
 
 /// A kind of file a mesh is written to.
 #[derive(Clone, Copy)]
-enum Kind {
+pub enum Kind {
+    /// Polygon File Format, binary.
     Ply,
+    /// Wavefront OBJ.
     Obj,
+    /// Binary glTF 2.0.
     Glb,
 }
 
 /// Makes the mesh.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
-    let kind = kind(arguments)?;
+    let on_map = arguments.coordinates == MeshOrigin::Map;
+    let kind = kind_of(&arguments.out, on_map)?;
     let request = request(arguments)?;
     let outs = outs(arguments);
     outs.iter().try_for_each(|out| files::check_writable(out))?;
@@ -180,7 +184,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     signals.tell_once(|| {});
     let meshes = meshed.map_err(|error| Failure::of_compiler(&error, signals.exit_code()))?;
     for (mesh, out) in meshes.iter().zip(&outs) {
-        write(mesh, kind, arguments, out)?;
+        write_mesh(mesh, kind, on_map, out)?;
     }
     let measure = |mesh: &Mesh| {
         arguments.measure.then(|| inspect::measure(&mesh.tin, &mesh.dem, Metres(mesh.spacing_m.0), Sights::USUAL))
@@ -275,17 +279,21 @@ fn measured_text(measured: Option<&Fidelity>) -> String {
     measured.map_or_else(String::new, |found| format!("\n{}", measures::text(found)))
 }
 
-fn kind(arguments: &Arguments) -> Result<Kind, Failure> {
-    match files::extension(&arguments.out).as_str() {
+/// The kind of file that a name says, with map coordinates where there is room for them.
+///
+/// # Errors
+/// When there is none, or the name says no kind.
+pub fn kind_of(out: &Path, on_map: bool) -> Result<Kind, Failure> {
+    match files::extension(out).as_str() {
         "ply" => Ok(Kind::Ply),
         "obj" => Ok(Kind::Obj),
-        "glb" if arguments.coordinates == MeshOrigin::Map => {
+        "glb" if on_map => {
             let message = "found --coordinates map with a .glb, which has no room for map coordinates";
             Err(Failure::new(message, "leave --coordinates out, or write .ply or .obj"))
         }
         "glb" => Ok(Kind::Glb),
         found => {
-            let path = arguments.out.display();
+            let path = out.display();
             Err(Failure::new(
                 format!("{path}: found the extension {found:?}, expected \"ply\", \"obj\" or \"glb\""),
                 "the extension of --out says which kind of mesh is written",
@@ -294,7 +302,11 @@ fn kind(arguments: &Arguments) -> Result<Kind, Failure> {
     }
 }
 
-fn request(arguments: &Arguments) -> Result<TinRequest, Failure> {
+/// What is to be made.
+///
+/// # Errors
+/// When arguments do not fit together.
+pub fn request(arguments: &Arguments) -> Result<TinRequest, Failure> {
     Ok(TinRequest {
         dem: arguments.dem.clone(),
         method: method(arguments)?,
@@ -348,13 +360,17 @@ fn optimising(arguments: &Arguments) -> Optimising {
     }
 }
 
-fn write(mesh: &Mesh, kind: Kind, arguments: &Arguments, out: &Path) -> Result<(), Failure> {
+/// Writes a mesh.
+///
+/// # Errors
+/// When it cannot be written; what lay there before is then still there.
+pub fn write_mesh(mesh: &Mesh, kind: Kind, on_map: bool, out: &Path) -> Result<(), Failure> {
     let place = TinPlace {
         origin_m: [mesh.east_m, mesh.north_m],
         spacing_m: [mesh.spacing_m.0, mesh.spacing_m.1],
         crs: mesh.epsg.map(|code| format!("EPSG:{code}")),
     };
-    let coordinates = arguments.coordinates.into();
+    let coordinates = if on_map { Coordinates::Map } else { Coordinates::Local };
     files::write_whole(out, |out| match kind {
         Kind::Ply => exports::write_tin_ply(out, &mesh.tin, &place, coordinates),
         Kind::Obj => exports::write_tin_obj(out, &mesh.tin, &place, coordinates),

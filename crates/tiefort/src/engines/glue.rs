@@ -10,6 +10,7 @@ use terrain::TileId;
 
 use crate::costs;
 use crate::failure::Failure;
+use crate::program;
 
 /// Seconds a task should take, so that starting it does not matter.
 const TASK_S: f64 = 30.0;
@@ -69,7 +70,7 @@ impl Glue {
         let default = PathBuf::from(format!("{}.tdb", job.area.name));
         let out = out.unwrap_or(&default);
         let absolute = |path: &Path| std::path::absolute(path).map_err(|error| Failure::output(path, &error));
-        let program = std::env::current_exe().map_err(|error| Failure::output(Path::new("tiefort"), &error))?;
+        let program = program::path().map_err(|error| Failure::output(Path::new("tiefort"), &error))?;
         let sources = match &job.dem.source {
             DemSource::Files { files, .. } => {
                 files.iter().map(|file| absolute(&file.path)).collect::<Result<_, _>>()?

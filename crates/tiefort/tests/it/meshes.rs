@@ -113,6 +113,15 @@ fn tiles_and_targets_make_a_mesh_too() {
 }
 
 #[test]
+fn fewer_triangles_than_tiles_begin_with_are_refused() {
+    let scene = Scene::new();
+    Raster::sound().write(&scene.path("dem.tif"));
+    let few = ["tin", "dem.tif", "--triangles", "17", "--tiles", "3x3", "--out", "mesh.ply"];
+    scene.refuses(&few, &["--triangles: 17", "at least 18, two in each tile", "fewer tiles"]);
+    scene.run_to(0, &["tin", "dem.tif", "--triangles", "18", "--tiles", "3x3", "--out", "mesh.ply", "--quiet"]);
+}
+
+#[test]
 fn a_mesh_of_a_bad_raster_is_refused() {
     let scene = Scene::new();
     fs::write(scene.path("dem.tif"), "no raster").unwrap();

@@ -1,0 +1,5 @@
+"""Runs the command: ``python -m tiefort``."""
+
+from ._cli import main
+
+main()

@@ -1,0 +1,379 @@
+"""A finished terrain database, asked for heights and lines of sight."""
+
+from __future__ import annotations
+
+import json
+import math
+import operator
+from dataclasses import dataclass
+from types import TracebackType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _tiefort
+from ._errors import RequestError
+from ._inputs import Affine6, Path, path_of, places_of
+from ._mesh import Mesh, Residual
+from ._report import Report
+
+if TYPE_CHECKING:
+    from geopandas import GeoDataFrame
+    from xarray import DataArray
+
+# Targets of a viewshed that are asked for at once, and most of them: a gigabyte of answers.
+_AT_ONCE = 1 << 20
+_VIEWSHED_MAX = 1 << 28
+
+
+@dataclass(frozen=True)
+class LineOfSight:
+    """What stands between places.
+
+    Attributes
+    ----------
+    visible : ndarray of bool, shape (...)
+        Whether nothing does. False where a line leaves the area.
+    known : ndarray of bool, shape (...)
+        Whether the area holds enough ground to say.
+    blocker : ndarray of float64, shape (..., 3)
+        East, north and height of the first place that hides the rest; NaN where nothing does.
+    clearance_m : ndarray of float64, shape (...)
+        How far the whole line stays above the ground at least, in metres; negative where the ground rises above it,
+        NaN where it leaves the area. Decks of bridges are not counted.
+    """
+
+    visible: npt.NDArray[np.bool_]
+    known: npt.NDArray[np.bool_]
+    blocker: npt.NDArray[np.float64]
+    clearance_m: npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Viewshed:
+    """What is seen from one place.
+
+    Attributes
+    ----------
+    visible : ndarray of bool, shape (rows, columns)
+        The northern row first; False beyond the range and outside the area.
+    at : (float, float, float)
+        East, north and height of the eye.
+    transform : tuple of six float
+        Where the grid lies, as rasterio has it.
+    crs : str
+        Its coordinate system.
+    """
+
+    visible: npt.NDArray[np.bool_]
+    at: tuple[float, float, float]
+    transform: Affine6
+    crs: str
+
+    def to_xarray(self) -> DataArray:
+        """Return an ``xarray.DataArray``."""
+        return _data_array(self.visible, self.transform, self.crs, "visible")
+
+
+def open(path: Path) -> Database:
+    """Open a terrain database that a build has finished.
+
+    Raises
+    ------
+    DatabaseError
+        When it is none, unfinished or damaged.
+    """
+    return Database(path)
+
+
+class Database:
+    """A finished terrain database; a context manager, which closes it.
+
+    Attributes
+    ----------
+    crs : str
+        Coordinate system, as ``EPSG:32611``.
+    bounds : (float, float, float, float)
+        West, south, east and north, in metres.
+    spacing_m : float
+        Metres between posts of the working grid.
+    shape : (int, int)
+        Rows and columns of load modules, counted from the south-west.
+    levels : int
+        Levels of detail; 0 is the finest.
+    vertical_datum : str
+        What heights are above; empty where that is not known.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path_of(path)
+        self._ground = _tiefort.Ground(self._path)
+        frame = self._ground.frame()
+        self.spacing_m, self._report = self._ground.told()
+        self.crs: str = frame["crs"]
+        self.vertical_datum: str = frame["vertical_datum"]
+        self.levels: int = frame["levels"]
+        self.shape: tuple[int, int] = (frame["rows"], frame["cols"])
+        self.module_side_m: float = frame["side_m"]
+        west, south = frame["origin_m"]
+        rows, cols = self.shape
+        self.bounds: tuple[float, float, float, float] = (
+            west,
+            south,
+            west + cols * self.module_side_m,
+            south + rows * self.module_side_m,
+        )
+
+    def __enter__(self) -> Database:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        rows, cols = self.shape
+        return f"Database({self._path!r}, {rows} x {cols} load modules, {self.crs})"
+
+    def close(self) -> None:
+        """Let go of files and memory; what is asked after that raises `ClosedError`."""
+        self._ground.close()
+
+    @property
+    def report(self) -> Report:
+        """What the build found."""
+        return Report(self._report)
+
+    def heights(self, xy: npt.ArrayLike) -> npt.NDArray[np.float64]:
+        """Return heights of the ground.
+
+        Parameters
+        ----------
+        xy : array_like, shape (..., 2)
+            East and north in metres.
+
+        Returns
+        -------
+        ndarray of float64, shape (...)
+            Metres above the vertical datum; NaN outside of the area.
+        """
+        places, shape = places_of(xy)
+        return self._ground.heights(places).reshape(shape)
+
+    def normals(self, xy: npt.ArrayLike) -> npt.NDArray[np.float64]:
+        """Return unit vectors out of the ground: east, north, up.
+
+        Parameters
+        ----------
+        xy : array_like, shape (..., 2)
+            East and north in metres.
+
+        Returns
+        -------
+        ndarray of float64, shape (..., 3)
+            NaN outside of the area.
+        """
+        places, shape = places_of(xy)
+        return self._ground.normals(places).reshape((*shape, 3))
+
+    def classes(self, xy: npt.ArrayLike) -> npt.NDArray[np.uint8]:
+        """Return classes of the ground.
+
+        Parameters
+        ----------
+        xy : array_like, shape (..., 2)
+            East and north in metres.
+
+        Returns
+        -------
+        ndarray of uint8, shape (...)
+            255 over holes and outside of the area.
+        """
+        places, shape = places_of(xy)
+        return self._ground.classes(places).reshape(shape)
+
+    def line_of_sight(self, a: npt.ArrayLike, b: npt.ArrayLike) -> LineOfSight:
+        """Return what stands between places; `a` and `b` are broadcast against each other.
+
+        Parameters
+        ----------
+        a, b : array_like, shape (..., 3)
+            East, north and height of eyes and of targets, in metres.
+
+        Returns
+        -------
+        LineOfSight
+        """
+        lines, shape = _lines(a, b)
+        share, clearance_m = self._ground.sights(lines).T
+        hidden = share <= 1.0
+        blocker = np.where(hidden[:, None], lines[:, :3] + share[:, None] * (lines[:, 3:] - lines[:, :3]), np.nan)
+        return LineOfSight(
+            (share == 2.0).reshape(shape),
+            ~np.isnan(share).reshape(shape),
+            blocker.reshape((*shape, 3)),
+            clearance_m.reshape(shape),
+        )
+
+    def visible(self, a: npt.ArrayLike, b: npt.ArrayLike) -> npt.NDArray[np.bool_]:
+        """Return whether nothing stands between places: `line_of_sight` without the rest, in less time."""
+        lines, shape = _lines(a, b)
+        return np.asarray(self._ground.hidden_at(lines) == 2.0).reshape(shape)
+
+    def viewshed(
+        self,
+        at: npt.ArrayLike,
+        range_m: float,
+        *,
+        eye_m: float = 2.0,
+        target_m: float = 0.0,
+        spacing_m: float | None = None,
+    ) -> Viewshed:
+        """Return what is seen from one place.
+
+        Parameters
+        ----------
+        at : array_like, shape (2,)
+            East and north of the eye, in metres.
+        range_m : float
+            How far it sees, in metres.
+        eye_m, target_m : float
+            Metres of the eye and of what it looks at above the ground.
+        spacing_m : float, optional
+            Metres between the places that it looks at; those of the working grid unless given.
+
+        Returns
+        -------
+        Viewshed
+        """
+        places, shape = places_of(at, name="at")
+        if shape != ():
+            raise RequestError(f"at: found {len(places)} places, expected one", "call viewshed once for each")
+        spacing_m = self.spacing_m if spacing_m is None else float(spacing_m)
+        numbers = (("range_m", range_m), ("spacing_m", spacing_m))
+        for name, metres in numbers:
+            if not (math.isfinite(metres) and 0 < metres):
+                raise RequestError(f"{name}: found {metres}, expected a number above 0", "in metres")
+        east, north = map(float, places[0])
+        ground_m = float(self.heights(places)[0])
+        if math.isnan(ground_m):
+            raise RequestError(f"at: found {east}, {north}, where there is no ground", f"the area is {self.bounds}")
+        reach = int(range_m // spacing_m)
+        if _VIEWSHED_MAX < (2 * reach + 1) ** 2:
+            message = f"found {2 * reach + 1} x {2 * reach + 1} places to look at, expected at most {_VIEWSHED_MAX}"
+            raise RequestError(message, "ask for a larger spacing_m or a smaller range_m")
+        steps = np.arange(-reach, reach + 1) * spacing_m
+        dx, dy = np.meshgrid(steps, steps[::-1])
+        inside = dx**2 + dy**2 <= range_m**2
+        targets = np.column_stack((east + dx[inside], north + dy[inside]))
+        eye = (east, north, ground_m + eye_m)
+        seen = np.zeros(len(targets), bool)
+        for first in range(0, len(targets), _AT_ONCE):
+            part = targets[first : first + _AT_ONCE]
+            heights = self.heights(part) + target_m
+            seen[first : first + _AT_ONCE] = self.visible(eye, np.column_stack((part, heights)))
+        visible = np.zeros(inside.shape, bool)
+        visible[inside] = seen
+        corner = (reach + 0.5) * spacing_m
+        transform = (spacing_m, 0.0, east - corner, 0.0, -spacing_m, north + corner)
+        return Viewshed(visible, eye, transform, self.crs)
+
+    def module(self, row: int, col: int, level: int = 0) -> Mesh:
+        """Return one load module, its row and column counted from the south-west, at a level of detail.
+
+        The mesh lies on the map, in metres; its `classes` are those of the ground under its triangles. Decks of bridges
+        are not in it.
+        """
+        row, col, level = (_index(name, number) for name, number in (("row", row), ("col", col), ("level", level)))
+        vertices, triangles, classes, figures = self._ground.module(row, col, level)
+        residual = Residual(figures["rms_m"] if figures["posts"] else math.nan, figures["max_m"])
+        exported = [self._path, f"--modules={row},{col}", f"--lod={level}"]
+        return Mesh(vertices, triangles, residual, self.crs, exported=exported, classes=classes)
+
+    @property
+    def modules(self) -> GeoDataFrame:
+        """All load modules as a ``geopandas.GeoDataFrame``: a square each, with counts and residuals."""
+        import geopandas
+        import shapely
+
+        table = self._ground.modules()
+        counts = {
+            name: table[:, place].astype(np.int64)
+            for place, name in enumerate(("row", "col", "triangles", "vertices", "posts"))
+        }
+        west, south = self.bounds[:2]
+        left = west + table[:, 1] * self.module_side_m
+        low = south + table[:, 0] * self.module_side_m
+        squares = shapely.box(left, low, left + self.module_side_m, low + self.module_side_m)
+        columns = {**counts, "rms_m": table[:, 5], "max_m": table[:, 6]}
+        return geopandas.GeoDataFrame(columns, geometry=squares, crs=self.crs)
+
+    def to_xarray(self, spacing_m: float | None = None) -> DataArray:
+        """Return heights of the whole area as an ``xarray.DataArray``, the northern row first.
+
+        Parameters
+        ----------
+        spacing_m : float, optional
+            Metres between them; those of the working grid unless given.
+        """
+        spacing_m = self.spacing_m if spacing_m is None else float(spacing_m)
+        if not (math.isfinite(spacing_m) and 0 < spacing_m):
+            raise RequestError(f"spacing_m: found {spacing_m}, expected a number above 0", "in metres")
+        west, south, east, north = self.bounds
+        x = west + spacing_m * np.arange(int((east - west) / spacing_m + 1e-9) + 1)
+        y = south + spacing_m * np.arange(int((north - south) / spacing_m + 1e-9) + 1)[::-1]
+        heights = np.empty((len(y), len(x)))
+        for row, place in enumerate(y):
+            heights[row] = self.heights(np.column_stack((x, np.full(len(x), place))))
+        half = spacing_m / 2
+        transform = (spacing_m, 0.0, x[0] - half, 0.0, -spacing_m, y[0] + half)
+        return _data_array(heights, transform, self.crs, "height")
+
+    def explain(self, row: int, col: int, *, against: Path | None = None) -> dict[str, Any]:
+        """Return everything there is to know about one load module, as ``tiefort explain --format json`` does."""
+        self._ground.frame()
+        module = (_index("row", row), _index("col", col))
+        found = _tiefort.explain(self._path, module, None if against is None else path_of(against))
+        told: dict[str, Any] = json.loads(found)
+        return told
+
+
+def _index(name: str, number: int) -> int:
+    number = operator.index(number)
+    if not 0 <= number < 1 << 16:
+        raise RequestError(f"{name}: found {number}, expected 0 or more", "rows and columns count from the south-west")
+    return number
+
+
+def _lines(a: npt.ArrayLike, b: npt.ArrayLike) -> tuple[npt.NDArray[np.float64], tuple[int, ...]]:
+    eyes, of_eyes = places_of(a, 3, "a")
+    targets, of_targets = places_of(b, 3, "b")
+    try:
+        shape = np.broadcast_shapes(of_eyes, of_targets)
+    except ValueError as error:
+        message = f"found {of_eyes} places a and {of_targets} places b, expected as many, or one"
+        raise RequestError(message, "shapes follow NumPy's rules of broadcasting") from error
+    lines = np.empty((*shape, 6))
+    lines[..., :3] = eyes.reshape((*of_eyes, 3))
+    lines[..., 3:] = targets.reshape((*of_targets, 3))
+    return lines.reshape(-1, 6), shape
+
+
+def _data_array(values: npt.NDArray[Any], transform: Affine6, crs: str, name: str) -> DataArray:
+    import xarray
+
+    rows, cols = values.shape
+    step, _, west, _, down, north = transform
+    coordinates = {
+        "y": north + down * (np.arange(rows) + 0.5),
+        "x": west + step * (np.arange(cols) + 0.5),
+    }
+    found = xarray.DataArray(values, coordinates, ("y", "x"), name, {"crs": crs, "transform": transform})
+    if hasattr(found, "rio"):
+        found = found.rio.write_crs(crs)
+    return found

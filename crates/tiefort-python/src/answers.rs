@@ -1,0 +1,328 @@
+//! A finished database that answers: heights, normals, classes, lines of sight, load modules.
+
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use database::Folder;
+use load_module_reader::{Area, Block, HOLE_CLASS, Keep, LoadedGround, QUANTA_PER_METRE, ReadError, Sight};
+use numpy::{PyArray1, PyArray2, PyReadonlyArray2};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use tiefort::library::{self, Cause, Failure};
+
+use crate::arrays::places;
+use crate::raised::{named, raised};
+use crate::tables::table;
+
+/// Load modules up to which all of a database is loaded at the first question (about 12 kB each).
+const WHOLE_MAX: usize = 1 << 14;
+/// Questions that are answered before signals are looked for.
+const AT_ONCE: usize = 1 << 20;
+/// The same of lines of sight, which take longer.
+const LINES_AT_ONCE: usize = 1 << 15;
+
+/// What a database is asked through; nothing once it is closed.
+#[pyclass(frozen)]
+pub struct Ground {
+    path: PathBuf,
+    held: Mutex<Option<Held>>,
+}
+
+#[derive(Clone)]
+struct Held {
+    area: Arc<Area>,
+    ground: Option<Arc<LoadedGround>>,
+}
+
+/// Vertices, triangles, the class under each triangle, and figures of the residuals.
+type ModuleArrays<'py> =
+    (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<u32>>, Bound<'py, PyArray1<u8>>, Bound<'py, PyDict>);
+
+fn unreadable(error: &ReadError) -> Failure {
+    let hint = "`tiefort verify` says what is damaged; a build mends it";
+    Failure::about(Cause::Database, error, hint)
+}
+
+impl Ground {
+    /// What is held, which the caller may change a copy of.
+    fn held(&self, py: Python<'_>) -> PyResult<Held> {
+        let held = self.held.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        held.ok_or_else(|| {
+            let message = format!("{}: found a database that was closed, expected an open one", self.path.display());
+            named(py, "ClosedError", &message, "open it again with tiefort.open")
+        })
+    }
+
+    /// Ground that holds all load modules of a block.
+    fn loaded(&self, mut held: Held, wanted: Block) -> Result<Arc<LoadedGround>, Failure> {
+        let whole = held.area.whole();
+        let wanted = if whole.count() <= WHOLE_MAX { whole } else { wanted };
+        if let Some(ground) = held.ground.as_ref().filter(|ground| contains(ground.block(), wanted)) {
+            return Ok(Arc::clone(ground));
+        }
+        let ground = match &held.ground {
+            Some(ground) => ground.moved(&held.area, wanted),
+            None => held.area.load(wanted),
+        };
+        let ground = Arc::new(ground.map_err(|error| unreadable(&error))?);
+        held.ground = Some(Arc::clone(&ground));
+        let mut kept = self.held.lock().unwrap_or_else(PoisonError::into_inner);
+        if kept.is_some() {
+            *kept = Some(held);
+        }
+        Ok(ground)
+    }
+
+    /// Asks the ground under some places, so many at once; `each` gets the ground, the places and where answers go.
+    fn ask<const N: usize, T: Clone + Send>(
+        &self,
+        py: Python<'_>,
+        (asked, at_once): (&[[f64; N]], usize),
+        unknown: T,
+        each: impl Fn(&LoadedGround, &[[f64; N]], &mut [T]) + Sync,
+    ) -> PyResult<Vec<T>> {
+        let mut answers = vec![unknown; asked.len()];
+        for (places, answers) in asked.chunks(at_once).zip(answers.chunks_mut(at_once)) {
+            let held = self.held(py)?;
+            // Python may change its array meanwhile.
+            let places = places.to_vec();
+            let asked = py.detach(|| {
+                let block = around(&held.area, &places);
+                self.loaded(held, block).map(|ground| each(&ground, &places, answers))
+            });
+            asked.map_err(|failure| raised(py, &failure))?;
+            py.check_signals()?;
+        }
+        Ok(answers)
+    }
+}
+
+/// What stands for a line that nothing hides: beyond its end.
+const FREE: f64 = 2.0;
+
+/// Both ends of a line.
+fn ends(&[ax, ay, az, bx, by, bz]: &[f64; 6]) -> [[f64; 3]; 2] {
+    [[ax, ay, az], [bx, by, bz]]
+}
+
+fn hidden_at(ground: &LoadedGround, line: &[f64; 6]) -> f64 {
+    let [from, to] = ends(line);
+    match ground.sight(from, to) {
+        Sight::Free => FREE,
+        Sight::Hidden(share) => share,
+        Sight::Unknown => f64::NAN,
+    }
+}
+
+/// Heights at places: at places far apart load module by load module, since each then stays in the processor's cache.
+fn heights_by_module(ground: &LoadedGround, places: &[[f64; 2]], heights: &mut [f64]) {
+    /// Places in a load module, one after the other, up to which they are sorted.
+    const RUN: usize = 8;
+    let block = ground.block();
+    let outside = block.count();
+    let index = |place: &[f64; 2]| {
+        let [row, col] = ground.frame().module_at(*place);
+        let (row, col) = (row - i64::from(block.south), col - i64::from(block.west));
+        let (high, wide) = (i64::from(block.north - block.south), i64::from(block.east - block.west));
+        let is_inside = 0 <= row && row < high && 0 <= col && col < wide;
+        if is_inside { (row * wide + col) as usize } else { outside }
+    };
+    let indexes: Vec<u32> = places.iter().map(|place| index(place) as u32).collect();
+    let runs = indexes.windows(2).filter(|pair| pair[0] != pair[1]).count();
+    if RUN * runs < places.len() || places.len() < outside {
+        return ground.heights_m(places, heights);
+    }
+    let mut starts = vec![0_u32; outside + 2];
+    indexes.iter().for_each(|&index| starts[index as usize + 1] += 1);
+    (1..starts.len()).for_each(|index| starts[index] += starts[index - 1]);
+    let mut sorted = vec![[0.0; 2]; places.len()];
+    let mut at = vec![0_u32; places.len()];
+    for ((place, &index), at) in places.iter().zip(&indexes).zip(&mut at) {
+        let next = &mut starts[index as usize];
+        *at = *next;
+        sorted[*next as usize] = *place;
+        *next += 1;
+    }
+    let mut found = vec![0.0; places.len()];
+    ground.heights_m(&sorted, &mut found);
+    heights.iter_mut().zip(at).for_each(|(height, at)| *height = found[at as usize]);
+}
+
+fn contains(outer: Block, inner: Block) -> bool {
+    inner.count() == 0
+        || outer.south <= inner.south
+            && inner.north <= outer.north
+            && outer.west <= inner.west
+            && inner.east <= outer.east
+}
+
+/// The load modules under the rectangle around some places: of a line, both ends. None where all lie outside.
+fn around<const N: usize>(area: &Area, places: &[[f64; N]]) -> Block {
+    let ends =
+        |place: &[f64; N]| [[place[0], place[1]], if N == 6 { [place[3], place[4]] } else { [place[0], place[1]] }];
+    let known = places.iter().flat_map(ends).filter(|place| place.iter().all(|metres| metres.is_finite()));
+    let mut bounds: Option<[[f64; 2]; 2]> = None;
+    for [x, y] in known {
+        let [low, high] = bounds.unwrap_or([[x, y]; 2]);
+        bounds = Some([[low[0].min(x), low[1].min(y)], [high[0].max(x), high[1].max(y)]]);
+    }
+    let Some([low, high]) = bounds else { return Block { south: 0, west: 0, north: 0, east: 0 } };
+    // The far sides of the area belong to it.
+    let (low, high) = (area.block_around(low, 1), area.block_around(high, 1));
+    Block { south: low.south, west: low.west, north: high.north, east: high.east }
+}
+
+#[pymethods]
+impl Ground {
+    /// Opens the database in a folder.
+    #[new]
+    fn new(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
+        let opened = py.detach(|| open(&path));
+        let area = opened.map_err(|failure| raised(py, &failure))?;
+        let held = Held { area: Arc::new(area), ground: None };
+        Ok(Self { path, held: Mutex::new(Some(held)) })
+    }
+
+    /// Lets go of everything.
+    fn close(&self) {
+        self.held.lock().unwrap_or_else(PoisonError::into_inner).take();
+    }
+
+    /// Where load modules lie: south-west corner, side, rows, columns, levels, system, vertical datum.
+    fn frame<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let held = self.held(py)?;
+        let (frame, found) = (held.area.frame(), PyDict::new(py));
+        found.set_item("origin_m", frame.origin_m)?;
+        found.set_item("side_m", frame.side_m())?;
+        found.set_item("rows", frame.rows)?;
+        found.set_item("cols", frame.cols)?;
+        found.set_item("levels", frame.level_count)?;
+        found.set_item("crs", &frame.crs)?;
+        found.set_item("vertical_datum", &frame.vertical_datum)?;
+        Ok(found)
+    }
+
+    /// What `database.json` says of the spacing, what `report.json` says, and the names of classes.
+    fn told(&self, py: Python<'_>) -> PyResult<(f64, String)> {
+        self.held(py)?;
+        let folder = Folder::new(&self.path);
+        let read = py.detach(|| Ok((folder.finished()?.area.spacing_m, library::report_json(&folder.report()?))));
+        read.map_err(|failure: Failure| raised(py, &failure))
+    }
+
+    /// Heights at places, each an easting and a northing; not a number where there is no ground.
+    fn heights<'py>(&self, py: Python<'py>, xy: PyReadonlyArray2<'py, f64>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        Ok(PyArray1::from_vec(py, self.ask(py, (places(&xy)?, AT_ONCE), f64::NAN, heights_by_module)?))
+    }
+
+    /// Unit vectors out of the ground.
+    fn normals<'py>(&self, py: Python<'py>, xy: PyReadonlyArray2<'py, f64>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let each = |ground: &LoadedGround, places: &[[f64; 2]], normals: &mut [[f64; 3]]| {
+            for (normal, &place) in normals.iter_mut().zip(places) {
+                *normal = ground.sample(place).map_or([f64::NAN; 3], |sample| sample.normal);
+            }
+        };
+        table(py, self.ask(py, (places(&xy)?, AT_ONCE), [f64::NAN; 3], each)?.into_iter())
+    }
+
+    /// Classes of the ground.
+    fn classes<'py>(&self, py: Python<'py>, xy: PyReadonlyArray2<'py, f64>) -> PyResult<Bound<'py, PyArray1<u8>>> {
+        let each = |ground: &LoadedGround, places: &[[f64; 2]], classes: &mut [u8]| {
+            for (class, &place) in classes.iter_mut().zip(places) {
+                *class = ground.sample(place).map_or(HOLE_CLASS, |sample| sample.class);
+            }
+        };
+        Ok(PyArray1::from_vec(py, self.ask(py, (places(&xy)?, AT_ONCE), HOLE_CLASS, each)?))
+    }
+
+    /// How far along each line, six numbers from an eye to a target, something hides the rest: 2 where nothing does,
+    /// not a number where the line leaves the ground first.
+    fn hidden_at<'py>(
+        &self,
+        py: Python<'py>,
+        lines: PyReadonlyArray2<'py, f64>,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let each = |ground: &LoadedGround, lines: &[[f64; 6]], shares: &mut [f64]| {
+            shares.iter_mut().zip(lines).for_each(|(share, line)| *share = hidden_at(ground, line));
+        };
+        Ok(PyArray1::from_vec(py, self.ask(py, (places(&lines)?, LINES_AT_ONCE), f64::NAN, each)?))
+    }
+
+    /// The same, and how far each line stays above the ground at least.
+    fn sights<'py>(&self, py: Python<'py>, lines: PyReadonlyArray2<'py, f64>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let each = |ground: &LoadedGround, lines: &[[f64; 6]], sights: &mut [[f64; 2]]| {
+            let has_decks = ground.modules().iter().any(|module| !module.module().decks.is_empty());
+            for (sight, line) in sights.iter_mut().zip(lines) {
+                let [from, to] = ends(line);
+                let clearance_m = ground.clearance_m(from, to);
+                // What never comes below the ground is seen: both questions look at the same crossings.
+                let is_free = !has_decks && clearance_m.is_some_and(|metres| 0.0 <= metres);
+                let share = if is_free { FREE } else { hidden_at(ground, line) };
+                *sight = [share, clearance_m.unwrap_or(f64::NAN)];
+            }
+        };
+        table(py, self.ask(py, (places(&lines)?, LINES_AT_ONCE), [f64::NAN; 2], each)?.into_iter())
+    }
+
+    /// One load module at a level of detail.
+    fn module<'py>(&self, py: Python<'py>, row: u32, col: u32, level: u16) -> PyResult<ModuleArrays<'py>> {
+        let area = self.held(py)?.area;
+        let block = Block { south: row, west: col, north: row.saturating_add(1), east: col.saturating_add(1) };
+        let loaded = py.detach(|| area.load_level(block, level));
+        let loaded = loaded.map_err(|error| {
+            let (rows, cols) = (area.frame().rows, area.frame().cols);
+            let hint = format!("rows go from 0 to {}, columns from 0 to {}, from the south-west", rows - 1, cols - 1);
+            named(py, "RequestError", &error.to_string(), &hint)
+        })?;
+        let Some(module) = loaded.modules().first().map(|module| module.module()) else {
+            return Err(raised(py, &Failure::bug()));
+        };
+        let metres = |quanta: i32| f64::from(quanta) / f64::from(QUANTA_PER_METRE);
+        let side_m = area.frame().side_m();
+        let [east, north] = area.frame().origin_m;
+        let corner = [east + f64::from(col) * side_m, north + f64::from(row) * side_m];
+        let vertices = module.vertices.iter().map(|vertex| {
+            let [x, y] = [vertex.x, vertex.y].map(i32::from).map(metres);
+            [corner[0] + x, corner[1] + y, metres(vertex.z)]
+        });
+        let residual = PyDict::new(py);
+        residual.set_item("posts", module.residual.posts)?;
+        residual.set_item("rms_m", module.residual.rms_m())?;
+        residual.set_item("max_m", f64::from(module.residual.largest) / f64::from(QUANTA_PER_METRE))?;
+        let triangles = module.triangles.iter().map(|corners| corners.map(u32::from));
+        let classes = PyArray1::from_slice(py, &module.classes);
+        Ok((table(py, vertices)?, table(py, triangles)?, classes, residual))
+    }
+
+    /// A row for each load module: row, column, triangles, vertices, posts measured, RMS and largest residual.
+    fn modules<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let area = self.held(py)?.area;
+        let rows = py.detach(|| {
+            let mut all = Vec::with_capacity(area.whole().count());
+            for south in 0..area.frame().rows {
+                let ground = area.load(Block { south, west: 0, north: south + 1, east: area.frame().cols })?;
+                all.extend(ground.modules().iter().map(|module| {
+                    let module = module.module();
+                    let residual = &module.residual;
+                    [
+                        f64::from(module.row),
+                        f64::from(module.col),
+                        module.triangles.len() as f64,
+                        module.vertices.len() as f64,
+                        f64::from(residual.posts),
+                        residual.rms_m().unwrap_or(f64::NAN),
+                        f64::from(residual.largest) / f64::from(QUANTA_PER_METRE),
+                    ]
+                }));
+            }
+            Ok(all)
+        });
+        table(py, rows.map_err(|error: ReadError| raised(py, &unreadable(&error)))?.into_iter())
+    }
+}
+
+/// The load modules of a database that a build has finished.
+fn open(path: &Path) -> Result<Area, Failure> {
+    Folder::new(path).finished()?;
+    Area::open(path, Keep::OnDisk).map_err(|error| unreadable(&error))
+}

@@ -1,0 +1,101 @@
+//! Waits for work in Rust: without holding Python's lock, telling progress, and looking for Ctrl-C.
+//!
+//! The work runs in a thread of its own, because only the thread that waits sees a signal. A run looks at its flag
+//! between tiles, and a tile may take minutes: so it gets a moment to end by itself, then it is left alone. After that
+//! it does what any run does that was asked to stop: it ends its tile and ends.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::thread::Builder;
+use std::time::Duration;
+
+use compiler::{Event, Progress};
+use pyo3::prelude::*;
+use tiefort::library::Failure;
+
+use crate::raised::{named, raised};
+
+/// How often signals are looked for.
+const LOOK: Duration = Duration::from_millis(20);
+/// What a run has to end by itself.
+const GRACE: Duration = Duration::from_millis(400);
+
+/// What the work tells.
+enum News<T> {
+    Event(Event),
+    Ended(Result<T, Failure>),
+}
+
+/// Sends progress to the thread that waits.
+struct Told<T>(Sender<News<T>>);
+
+impl<T> Progress for Told<T> {
+    fn tell(&mut self, event: Event) {
+        // Nobody listens to a run that was left alone.
+        let _ = self.0.send(News::Event(event));
+    }
+}
+
+/// Runs `work` and returns what it returns; `told` is called with each event as (what, stage, tile, total, note).
+///
+/// # Errors
+/// The failure of `work` as an exception, what `told` raises, and what a signal raises.
+pub fn wait<T: Send + 'static>(
+    py: Python<'_>,
+    told: Option<&Bound<'_, PyAny>>,
+    work: impl FnOnce(&AtomicBool, &mut dyn Progress) -> Result<T, Failure> + Send + 'static,
+) -> PyResult<T> {
+    let stop = Arc::new(AtomicBool::new(false));
+    let (sender, mut receiver) = channel();
+    let flag = Arc::clone(&stop);
+    let run = move || {
+        let mut progress = Told(sender.clone());
+        let ended = catch_unwind(AssertUnwindSafe(|| work(&flag, &mut progress)));
+        let _ = sender.send(News::Ended(ended.unwrap_or_else(|_| Err(Failure::bug()))));
+    };
+    if let Err(error) = Builder::new().name("tiefort".into()).spawn(run) {
+        let hint = "end other programs, or raise the limit of threads";
+        return Err(named(py, "RequestError", &format!("found no thread to work in: {error}, expected one"), hint));
+    }
+    loop {
+        let news;
+        (receiver, news) = py.detach(move || {
+            let news = receiver.recv_timeout(LOOK);
+            (receiver, news)
+        });
+        let heard = match news {
+            Ok(News::Ended(ended)) => return ended.map_err(|failure| raised(py, &failure)),
+            Ok(News::Event(event)) => told.map_or(Ok(()), |told| tell(told, event)),
+            Err(RecvTimeoutError::Timeout) => Ok(()),
+            Err(RecvTimeoutError::Disconnected) => Err(raised(py, &Failure::bug())),
+        };
+        if let Err(error) = heard.and_then(|()| py.check_signals()) {
+            stop.store(true, Ordering::Relaxed);
+            py.detach(move || end(&receiver));
+            return Err(error);
+        }
+    }
+}
+
+/// Waits a moment for work that was asked to stop.
+fn end<T>(receiver: &Receiver<News<T>>) {
+    while let Ok(News::Event(_)) = receiver.recv_timeout(GRACE) {}
+}
+
+fn tell(told: &Bound<'_, PyAny>, event: Event) -> PyResult<()> {
+    type Told = (&'static str, Option<&'static str>, Option<(u32, u32)>, Option<usize>, Option<String>);
+    let arguments: Told = match event {
+        Event::Enter(stage, total) => ("enter", Some(stage.name()), None, Some(total), None),
+        Event::Started(stage, tile) => ("started", Some(stage.name()), Some((tile.row, tile.col)), None, None),
+        Event::Because(stage, tile, why) => {
+            ("because", Some(stage.name()), Some((tile.row, tile.col)), None, Some(why))
+        }
+        Event::Done(stage, tile) => ("done", Some(stage.name()), Some((tile.row, tile.col)), None, None),
+        Event::Kept(stage, tile) => ("kept", Some(stage.name()), Some((tile.row, tile.col)), None, None),
+        Event::Leave(stage) => ("leave", Some(stage.name()), None, None, None),
+        Event::Note(note) => ("note", None, None, None, Some(note)),
+    };
+    told.call1(arguments).map(drop)
+}
