@@ -45,11 +45,13 @@ REPEAT_S, REPEAT_MAX = 2.0, 5
 
 # Our rows: options beside --triangles.
 OURS = {
-    "fast": ["--effort", "fast", "--height-fit", "l2"],
-    "normal": ["--effort", "normal", "--height-fit", "l2"],
-    "best": ["--effort", "best", "--height-fit", "l2"],
-    "normal, on posts": ["--effort", "normal", "--height-fit", "l2", "--lattice", "post"],
-    "normal, crests kept": ["--effort", "normal", "--height-fit", "l2_keep_crests"],
+    "fast": ["--effort", "fast", "--sight", "false"],
+    "normal": ["--effort", "normal", "--sight", "false"],
+    "best": ["--effort", "best", "--sight", "false"],
+    "normal, on posts": ["--effort", "normal", "--sight", "false", "--lattice", "post"],
+    "fast, sight": ["--effort", "fast", "--sight", "true"],
+    "normal, sight": ["--effort", "normal", "--sight", "true"],
+    "best, sight": ["--effort", "best", "--sight", "true"],
 }
 # What a binary without --triangles and --effort is asked for instead, so that the rest can be tried.
 STAND_INS = {

@@ -4,8 +4,7 @@
     scripts/limit.py                         all efforts at 2,000 and 8,000 triangles on five surfaces
     scripts/limit.py --triangles 500 2000    other numbers of triangles
     scripts/limit.py --efforts normal        some efforts only
-    scripts/limit.py --height-fit l2_keep_crests
-                                             other options of `tiefort tin`: whatever is not known here is handed on
+    scripts/limit.py --sight true            other options of `tiefort tin`: whatever is not known here is handed on
     scripts/limit.py --binary PATH           another program than target/release/tiefort, which has to be built
 
 On smooth ground a continuous surface of N triangles has at least an RMS residual of about
@@ -16,8 +15,7 @@ where H is the ground's Hessian and kappa is 1/180 where det H > 0 and 1/90 wher
 mesh that is known, not a proven bound). Eta is a surface's RMS residual over that. The limit holds for large N: where
 N is small or the ground rough for it, eta may fall below 1.
 
-The limit is one of free heights, so `--height-fit l2` is asked for unless other options are given; crests that keep
-the height of the DEM cost a few hundredths.
+The limit is one of plain squares, so `--sight false` is asked for unless other options are given.
 
 Hessians are written down here, meshes are rasterised by NumPy: no code is shared with the compiler. The exit code is 1
 when the worst eta of an effort is above its bar.
@@ -98,7 +96,7 @@ def main():
     parser.add_argument("--efforts", nargs="+", choices=list(BARS), default=list(BARS))
     parser.add_argument("--binary", type=pathlib.Path, default=TARGET / "release" / "tiefort")
     options, others = parser.parse_known_args()
-    others = others or ["--height-fit", "l2"]
+    others = others or ["--sight", "false"]
     FOLDER.mkdir(parents=True, exist_ok=True)
     prepare_venv()
     import numpy

@@ -10,7 +10,7 @@ from fidelity.workshop import (DATA, FOLDER, ROOT, evaluate, faults, markdown, n
                                tell, why, write_heights, write_mesh)
 
 EFFORTS = ("fast", "normal", "best")
-HEIGHT_FITS = ("l2", "l2_keep_crests")
+SIGHTS = (True, False)
 # The bisection ends this near to the mean it looks for, in triangles per load module; or with points this near to each
 # other, in parts of them, as when limits hold the mean below it whatever the points.
 MEAN_WITHIN = 0.02
@@ -156,13 +156,13 @@ def compare(tiefort, area):
 def optimised(tiefort, area):
     """What the compiler is asked for, by name; one row as it is where it does not know efforts yet."""
     plain = {"method": "optimised"}
-    asked = plain | {"effort": EFFORTS[0], "height_fit": HEIGHT_FITS[0]}
+    asked = plain | {"effort": EFFORTS[0], "sight": SIGHTS[0]}
     ran = run(tiefort, "plan", write_job(changed(area.job, tin=asked)))
     if ran["code"] != 0:
         skip(f"{area.name}, efforts", f"{why(ran)}; `optimised` is run as it is")
         return [("optimised, as it is", plain)]
-    return [(f"{effort}, {fit}", plain | {"effort": effort, "height_fit": fit})
-            for effort in EFFORTS for fit in HEIGHT_FITS]
+    return [(effort + (", sight" if sight else ""), plain | {"effort": effort, "sight": sight})
+            for effort in EFFORTS for sight in SIGHTS]
 
 
 def best_paper(results):

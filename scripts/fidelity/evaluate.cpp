@@ -1,7 +1,7 @@
 // Judges a triangulated terrain against the raster it was made from: is it a valid surface, and how true is it?
 //
 //     g++ -O2 -std=c++17 -o evaluate evaluate.cpp
-//     evaluate MESH HEIGHTS SPACING_X SPACING_Y [--sight-lines N] [--seams COLUMNS/ROWS WITHIN]
+//     evaluate MESH HEIGHTS SPACING_X SPACING_Y [--sight-lines N] [--eyes M,…] [--seams COLUMNS/ROWS WITHIN]
 //
 // It shares no code with the compiler, so that neither can hide the other's mistakes. It prints one JSON object, and
 // exits with 0 for a valid surface, 1 for an invalid one, 2 when it could not read its input.
@@ -41,7 +41,7 @@ constexpr double OFF_LATTICE_POSTS = 0.002;
 // With more posts a side, products of two sides in lattice steps would not fit 64 bits.
 constexpr uint32_t POSTS_A_SIDE_MAX = 16384;
 
-constexpr double EYE_M = 2.5;
+constexpr double EYE_M = 2.5; // unless other eyes are asked for
 constexpr double SIGHT_NEAR_M = 200.0, SIGHT_FAR_M = 4000.0;
 constexpr double DEGREES = 57.295779513082320877;
 
@@ -491,9 +491,9 @@ double bilinear(const Heights& heights, Place p) {
 }
 
 // On the raster the ground is looked at every half post.
-bool visible_on_dem(const Heights& heights, const Line& line) {
+bool visible_on_dem(const Heights& heights, const Line& line, double eye_m) {
     double posts = std::hypot(line.to.x - line.from.x, line.to.y - line.from.y);
-    double eye = bilinear(heights, line.from) + EYE_M, target = bilinear(heights, line.to) + EYE_M;
+    double eye = bilinear(heights, line.from) + eye_m, target = bilinear(heights, line.to) + eye_m;
     for (double step = 0.5; step < posts; step += 0.5) {
         double t = step / posts;
         if (eye + t * (target - eye) < bilinear(heights, line.at(t))) {
@@ -537,8 +537,8 @@ class Squares {
     }
 
     // The ground is looked at wherever the line enters or leaves a triangle: between, both are straight.
-    bool visible(const Line& line) {
-        double eye = height(line.from) + EYE_M, target = height(line.to) + EYE_M;
+    bool visible(const Line& line, double eye_m) {
+        double eye = height(line.from) + eye_m, target = height(line.to) + eye_m;
         question_++;
         bool clear = !std::isnan(eye) && !std::isnan(target);
         each_square_under(line, [&](size_t square) {
@@ -662,11 +662,11 @@ struct Sight {
     int64_t lines = 0, same = 0, false_visible = 0, false_hidden = 0, dem_visible = 0, tin_visible = 0;
 };
 
-Sight line_of_sight(const Mesh& mesh, const Heights& heights, size_t wanted) {
+Sight line_of_sight(const Mesh& mesh, const Heights& heights, size_t wanted, double eye_m) {
     Squares squares(mesh, heights);
     Sight sight;
     for (const Line& line : sight_lines(heights, wanted)) {
-        bool dem = visible_on_dem(heights, line), tin = squares.visible(line);
+        bool dem = visible_on_dem(heights, line, eye_m), tin = squares.visible(line, eye_m);
         sight.lines++;
         sight.same += dem == tin;
         sight.false_visible += tin && !dem;
@@ -683,6 +683,7 @@ struct Arguments {
     std::string mesh, heights;
     double spacing_x = 0.0, spacing_y = 0.0;
     size_t sight_lines = 20000;
+    std::vector<double> eyes_m;
     std::vector<int64_t> seam_columns, seam_rows;
     int64_t seam_within = 0;
 };
@@ -699,13 +700,18 @@ std::vector<int64_t> numbers(const std::string& text) {
 Arguments arguments(int count, char** words) {
     if (count < 5) {
         throw std::runtime_error("usage: evaluate MESH HEIGHTS SPACING_X SPACING_Y [--sight-lines N] "
-                                 "[--seams COLUMN,…/ROW,… WITHIN_POSTS]");
+                                 "[--eyes METRES,…] [--seams COLUMN,…/ROW,… WITHIN_POSTS]");
     }
-    Arguments given{words[1], words[2], std::stod(words[3]), std::stod(words[4]), 20000, {}, {}, 0};
+    Arguments given{words[1], words[2], std::stod(words[3]), std::stod(words[4]), 20000, {}, {}, {}, 0};
     for (int i = 5; i < count; i++) {
         std::string word = words[i];
         if (word == "--sight-lines" && i + 1 < count) {
             given.sight_lines = std::stoul(words[++i]);
+        } else if (word == "--eyes" && i + 1 < count) {
+            std::istringstream in(words[++i]);
+            for (std::string eye; std::getline(in, eye, ',');) {
+                given.eyes_m.push_back(std::stod(eye));
+            }
         } else if (word == "--seams" && i + 2 < count) {
             std::string lines = words[++i];
             size_t slash = std::min(lines.find('/'), lines.size());
@@ -713,7 +719,7 @@ Arguments arguments(int count, char** words) {
             given.seam_rows = numbers(slash < lines.size() ? lines.substr(slash + 1) : "");
             given.seam_within = std::stoll(words[++i]);
         } else {
-            throw std::runtime_error("found " + word + ", expected --sight-lines or --seams");
+            throw std::runtime_error("found " + word + ", expected --sight-lines, --eyes or --seams");
         }
     }
     return given;
@@ -770,7 +776,13 @@ bool judge(const Arguments& given) {
         print_seams(posts, heights, given);
     }
     if (0 < given.sight_lines) {
-        print_sight(line_of_sight(mesh, heights, given.sight_lines));
+        print_sight(line_of_sight(mesh, heights, given.sight_lines, EYE_M));
+        for (size_t i = 0; i < given.eyes_m.size(); i++) {
+            Sight sight = line_of_sight(mesh, heights, given.sight_lines, given.eyes_m[i]);
+            std::printf("%s\"%g\": %.6f%s", i == 0 ? "  \"agreement_at_m\": {" : "", given.eyes_m[i],
+                        double(sight.same) / double(std::max<int64_t>(sight.lines, 1)),
+                        i + 1 < given.eyes_m.size() ? ", " : "},\n");
+        }
     }
     std::printf("  \"slope_rms_degrees\": %.6f\n}\n", slope_rms(posts, heights));
     return valid;

@@ -9,8 +9,7 @@ MARK = "Written by `scripts/bench_fidelity.py --quick --readme`:\n\n"
 RASTER_ROWS = {"greedy": "greedy insertion (`pydelatin`)", "Lindstrom-Turk": "edge collapse (CGAL, Lindstrom-Turk)",
                "fast": "`fast`", "normal": "`normal`", "best": "`best`"}
 AREA_ROWS = {"regular grid": "regular grid of 125 m", "paper + clip": "the paper's method, clipped",
-             "fast, l2_keep_crests": "`fast`", "normal, l2_keep_crests": "`normal` (default)",
-             "best, l2_keep_crests": "`best`"}
+             "fast, sight": "`fast`", "normal, sight": "`normal` (default)", "best, sight": "`best`"}
 HEAD = "| {} | RMS m | largest m | lines of sight | slope RMS | s |\n| - | -: | -: | -: | -: | -: |\n"
 
 

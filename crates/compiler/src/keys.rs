@@ -4,7 +4,7 @@
 use database::SourceRecord;
 use engine::{Fingerprint, FingerprintBuilder, Key, Part, Stamp};
 use features::{AreaFeatures, Clearances, GradeOptions, Place};
-use ground::{GamingArea, Window, feed_post};
+use ground::{GamingArea, Surroundings, Window, feed_post};
 use job::{Borders, ClipHeights, Edges, FeaturesSpec, Job, LodBorder, LodSpec, ModulesSpec, OuterBorder};
 use limits::Allowance;
 use terrain::{
@@ -27,6 +27,8 @@ const RULES: Part = Part { name: "rules", changed: "what the job says of selecti
 const ALLOWANCE: Part = Part { name: "allowance", changed: "its allowance moved" };
 /// The border points that it inherits.
 const BORDERS: Part = Part { name: "borders", changed: "a neighbour's border changed" };
+/// The ground that lies within sight of it.
+const SIGHT: Part = Part { name: "sight", changed: "ground within sight changed" };
 /// How load modules are cut.
 const CUT: Part = Part { name: "cut", changed: "how load modules are cut changed" };
 /// The TINs that load modules are cut from.
@@ -42,12 +44,21 @@ const MODULES: Part = Part { name: "modules", changed: "the load modules changed
 const MEASURE: Part = Part { name: "measure", changed: "what is measured changed" };
 
 /// Of a tile's TIN.
-pub(crate) fn tin(window: &Window, refinement: &Refinement, seeds: &[Vertex]) -> Key {
+pub(crate) fn tin(
+    window: &Window,
+    refinement: &Refinement,
+    within_sight: Option<&Surroundings>,
+    seeds: &[Vertex],
+) -> Key {
     let key = window
         .key("tile")
         .part(RULES, |part| feed_rules(part, refinement))
         .part(ALLOWANCE, |part| feed_allowance(part, &refinement.task))
         .part(BORDERS, |part| part.list(seeds.iter(), feed_vertex));
+    let key = match within_sight {
+        None => key,
+        Some(around) => key.part(SIGHT, |part| part.rows(around.rows(), i32::to_le_bytes)),
+    };
     // Tiles without features keep the keys they had before there were any.
     match refinement.features.kept.is_empty() {
         true => key,
@@ -217,7 +228,7 @@ fn feed_rules(builder: FingerprintBuilder, refinement: &Refinement) -> Fingerpri
     let Refinement { task, optimising, most, features: _ } = refinement;
     let builder = feed_growth(builder, task).list(task.kept.iter(), feed_post);
     let builder = builder.maybe(*optimising, |builder, optimising| {
-        let job::Optimising { effort, height_fit, lattice } = optimising;
+        let job::Optimising { effort, height_fit, lattice, sight } = optimising;
         let effort = match effort {
             job::Effort::Fast => 0,
             job::Effort::Normal => 1,
@@ -225,14 +236,17 @@ fn feed_rules(builder: FingerprintBuilder, refinement: &Refinement) -> Fingerpri
         };
         let height_fit = match height_fit {
             job::HeightFit::Squares => 0,
-            job::HeightFit::SquaresKeepCrests => 1,
             job::HeightFit::Off => 2,
         };
         let lattice = match lattice {
             job::Lattice::Eighth => 0,
             job::Lattice::Post => 1,
         };
-        builder.case(effort).case(height_fit).case(lattice)
+        let builder = builder.case(effort).case(height_fit).case(lattice);
+        builder.maybe(sight, |builder, job::Sight { eyes_quanta, range_quanta }| {
+            let [lowest, highest] = eyes_quanta;
+            [lowest, highest, range_quanta].into_iter().fold(builder, |builder, word| builder.signed(word.into()))
+        })
     });
     match most {
         Most::AsTask => builder.case(0),

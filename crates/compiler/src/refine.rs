@@ -4,7 +4,7 @@ use std::sync::{Arc, OnceLock};
 
 use database::{TileRecord, TileState};
 use engine::{Artifact, Before, Cause, Key, Outcome, Parts, Stamp, keep_or_make};
-use ground::Window;
+use ground::{Sight, Surroundings, Window, scanned};
 use terrain::{ModuleId, StopReason, TileId, TileTin, Vertex};
 
 use crate::cause::{FROZEN, summary};
@@ -83,6 +83,8 @@ pub(crate) struct Refining<'a> {
     run: &'a Run<'a>,
     window: Arc<Window>,
     pub refinement: Refinement,
+    /// Whose lines of sight count, and the ground they run over, where they do.
+    sight: Option<(Sight, Surroundings)>,
     /// The border points that it inherits or keeps.
     pub seeds: Vec<Vertex>,
 }
@@ -92,7 +94,14 @@ impl<'a> Refining<'a> {
     pub fn new(run: &'a Run, budget: &TileBudget, seeds: Vec<Vertex>, tile: TileId) -> Result<Self, CompileError> {
         let features = run.tile_features(tile)?;
         let refinement = tile_refinement(run.job, &run.area, tile, budget, posts_of(&seeds), &features);
-        Ok(Self { run, window: run.window(tile)?, refinement, seeds })
+        let metres_per_post = run.area.frame.spacing.metres();
+        let sight = refinement.optimising.and_then(|optimising| optimising.sight);
+        let within = |sight| -> Result<(Sight, Surroundings), CompileError> {
+            let sight = scanned(sight, metres_per_post);
+            Ok((sight, run.ground.within_sight(&run.area, tile, &sight)?))
+        };
+        let sight = sight.map(within).transpose()?;
+        Ok(Self { run, window: run.window(tile)?, refinement, sight, seeds })
     }
 
     fn tile(&self) -> TileId {
@@ -101,7 +110,9 @@ impl<'a> Refining<'a> {
 
     /// The TIN.
     pub fn refine(&self) -> TileTin {
-        self.refinement.run(&self.window, &self.seeds)
+        let for_sight = |(sight, around): &(Sight, Surroundings)| sight.weigh(&self.window.importance, around);
+        let in_squares = self.sight.as_ref().map(for_sight);
+        self.refinement.run(&self.window, in_squares.as_ref(), &self.seeds)
     }
 
     /// Publishes it.
@@ -116,7 +127,7 @@ impl Artifact for Refining<'_> {
     type Error = CompileError;
 
     fn key(&self) -> Key {
-        keys::tin(&self.window, &self.refinement, &self.seeds)
+        keys::tin(&self.window, &self.refinement, self.sight.as_ref().map(|(_, around)| around), &self.seeds)
     }
 
     fn published(&self) -> Result<Option<Stamp>, CompileError> {

@@ -7,14 +7,17 @@ use ground::{GivenPost, Window, border_posts, start_posts};
 use job::{Effort, Job, Method, Optimising};
 use limits::Allowance;
 use optimiser::{Budget, Optimised, Task, fill, optimise, overshoot, weave_in};
-use terrain::{Dem, HeightFit, Lattice, LatticePoint, Post, PostRect, THOUSANDTHS, TileFeatures, TileTin, Tin, Vertex};
+use terrain::{
+    Dem, HeightFit, Importance, Lattice, LatticePoint, Post, PostRect, THOUSANDTHS, TileFeatures, TileTin, Tin, Vertex,
+};
 use tin::{Frame, Rule, Stop, TileTask};
 
 /// Room in a window of load modules while a tile is grown beyond its budget.
 const NO_LIMIT: u32 = u32::MAX / 4;
 
 /// How features come into a TIN that is not optimised.
-const PLAIN: Optimising = Optimising { effort: Effort::Fast, height_fit: HeightFit::Off, lattice: Lattice::Post };
+const PLAIN: Optimising =
+    Optimising { effort: Effort::Fast, height_fit: HeightFit::Off, lattice: Lattice::Post, sight: None };
 
 /// What is to be done for one tile.
 #[derive(Clone, Debug)]
@@ -48,16 +51,16 @@ pub(crate) fn optimising(job: &Job) -> Option<Optimising> {
 
 impl Refinement {
     /// Refines the tile. `seeds` are the vertices it inherits or keeps, at the heights they were published with,
-    /// whatever the DEM says today.
-    pub fn run(&self, window: &Window, seeds: &[Vertex]) -> TileTin {
-        let mut tin = self.run_as_given(window, seeds);
+    /// whatever the DEM says today. `in_squares` is what posts weigh where it is optimised, if that is another thing.
+    pub fn run(&self, window: &Window, in_squares: Option<&Importance>, seeds: &[Vertex]) -> TileTin {
+        let mut tin = self.run_as_given(window, in_squares, seeds);
         lay_level(&mut tin.tin, &self.features);
         tin
     }
 
-    fn run_as_given(&self, window: &Window, seeds: &[Vertex]) -> TileTin {
+    fn run_as_given(&self, window: &Window, in_squares: Option<&Importance>, seeds: &[Vertex]) -> TileTin {
         if window.given.is_empty() {
-            return self.run_given(window, seeds);
+            return self.run_given(window, in_squares, seeds);
         }
         let mut own = self.clone();
         give(&mut own.task, &window.given, window.dem.rect());
@@ -65,10 +68,10 @@ impl Refinement {
         let is_free = |post: &&GivenPost| !seeds.iter().any(|seed| seed.at == post.at.into());
         let given = window.given.iter().filter(is_free);
         let heights = given.filter_map(|post| Some(Vertex { at: post.at.into(), height: post.height? }));
-        own.run_given(window, &heights.chain(seeds.iter().copied()).collect::<Vec<_>>())
+        own.run_given(window, in_squares, &heights.chain(seeds.iter().copied()).collect::<Vec<_>>())
     }
 
-    fn run_given(&self, window: &Window, seeds: &[Vertex]) -> TileTin {
+    fn run_given(&self, window: &Window, in_squares: Option<&Importance>, seeds: &[Vertex]) -> TileTin {
         let grown = |task: &TileTask| {
             let level = geometry::widest_level();
             let differs = |seed: &Vertex| seed.at.post().is_some_and(|post| window.dem.height(post) != seed.height);
@@ -88,7 +91,8 @@ impl Refinement {
             return self.join(grown, woven);
         };
         let grown = grown(&self.beyond_budget(optimising));
-        let task = self.optimisation(optimising, grown.initial_count, &window.forbidden);
+        let in_squares = in_squares.cloned();
+        let task = Task { in_squares, ..self.optimisation(optimising, grown.initial_count, &window.forbidden) };
         let optimised = optimise(&window.dem, &window.importance, &grown.tin, &task);
         self.join(grown, optimised)
     }
@@ -148,6 +152,7 @@ impl Refinement {
                 Frame::Plain | Frame::Corners { .. } => None,
             },
             budget,
+            in_squares: None,
             effort: optimising.effort,
             height_fit: optimising.height_fit,
             lattice: optimising.lattice,

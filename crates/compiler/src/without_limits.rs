@@ -65,7 +65,7 @@ fn without_limit(
     let refinement = Refinement { task, optimising, most: Most::AsTask, features };
     let tin = match optimising {
         Some(optimising) => refinement.fill(&window, optimising, part),
-        None => refinement.run(&window, &sides).tin,
+        None => refinement.run(&window, None, &sides).tin,
     };
     let here = ModuleRect { south: module.row, west: module.col, north: module.row + 1, east: module.col + 1 };
     let layout = Layout { grid: run.area.grid, modules: here, spacing: run.area.frame.spacing };

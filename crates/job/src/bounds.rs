@@ -115,3 +115,7 @@ pub const SHARE_MAX: std::ops::RangeInclusive<f64> = 0.01..=1.0;
 pub const CLEARANCE_M_MAX: f64 = 100.0;
 /// Metres back along a way in which the bank of a deck may sag.
 pub const BANK_M_MAX: f64 = 1000.0;
+/// Metres above the ground that an eye may be: lower ones see nothing but the next bump, higher ones fly.
+pub const EYE_M: std::ops::RangeInclusive<f64> = 0.5..=100.0;
+/// Metres that an eye may look.
+pub const SIGHT_M: std::ops::RangeInclusive<f64> = 100.0..=10_000.0;

@@ -19,6 +19,9 @@ pub trait Choice: Sized + 'static {
     /// All of them, in the order in which they are listed. What a variant holds besides is not part of its word.
     const WORDS: &'static [Word<Self>];
 
+    /// Words that there were, and what is there instead.
+    const GONE: &'static [(&'static str, &'static str)] = &[];
+
     /// Its word.
     fn word(&self) -> &'static Word<Self> {
         let is_its = |word: &&Word<Self>| discriminant(&word.value) == discriminant(self);
@@ -273,18 +276,10 @@ impl Choice for Effort {
 }
 
 impl Choice for HeightFit {
+    const GONE: &'static [(&'static str, &'static str)] =
+        &[("l2_keep_crests", "crests are kept by sight = true, at less RMS residual: leave the key out")];
     const WORDS: &'static [Word<Self>] = &[
-        Word::costing(
-            "l2",
-            Self::Squares,
-            "vertices stand where squared residuals are least",
-            Residual("4 % less RMS residual, crests are shaved"),
-        ),
-        Word::new(
-            "l2_keep_crests",
-            Self::SquaresKeepCrests,
-            "vertices stand where squared residuals are least, crests at DEM height",
-        ),
+        Word::new("l2", Self::Squares, "vertices stand where squared residuals are least"),
         Word::costing("off", Self::Off, "vertices stand at DEM height", Residual("16 % more RMS residual")),
     ];
 }

@@ -320,6 +320,9 @@ impl<'a> Entry<'a> {
             if let Some(name) = keys::nearest(found, &names).or_else(|| keys::nearest(last, &names)) {
                 fault.hint = format!("did you mean \"{name}\"?");
             }
+            if let Some((_, instead)) = T::GONE.iter().find(|(gone, _)| *gone == found) {
+                fault.hint = (*instead).to_owned();
+            }
             JobError::UnknownWord(fault)
         })
     }

@@ -1,7 +1,7 @@
 //! The keys of a job file by name, and the one that was probably meant.
 
 use crate::sections::TABLES;
-use crate::{Choice, Key, KeyTable, Optimising, Usual};
+use crate::{Choice, Key, KeyTable, Optimising, Sight, Usual};
 
 /// The tables of a job file, the sections first in their order, each before those that stand in it.
 pub fn key_tables() -> &'static [KeyTable] {
@@ -39,9 +39,24 @@ pub fn usual<T: Choice + Clone>(name: &str) -> T {
     T::named(usual_text(name)).cloned().expect("what holds is one of the words")
 }
 
+impl Default for Sight {
+    fn default() -> Self {
+        let numbers = |name| usual_text(name).trim_matches(['[', ']']).split(", ").map(str::parse::<f64>);
+        let numbers = |name| numbers(name).collect::<Result<Vec<f64>, _>>().expect("what holds is a value of its key");
+        let (eyes, range) = (numbers("tin.sight_eyes_m"), numbers("tin.sight_range_m"));
+        Self::of_metres([eyes[0], eyes[1]], range[0])
+    }
+}
+
 impl Default for Optimising {
     fn default() -> Self {
-        Self { effort: usual("tin.effort"), height_fit: usual("tin.height_fit"), lattice: usual("tin.lattice") }
+        let sight = usual_text("tin.sight") == "true";
+        Self {
+            effort: usual("tin.effort"),
+            height_fit: usual("tin.height_fit"),
+            lattice: usual("tin.lattice"),
+            sight: sight.then(Sight::default),
+        }
     }
 }
 

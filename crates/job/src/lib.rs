@@ -17,7 +17,7 @@ pub use named_file::NamedFile;
 mod model;
 pub use model::{
     Allocation, Area, Borders, Budget, ClipHeights, Count, DemSource, DemSpec, Edges, ErrorKey, Job, LimitsSpec,
-    Method, MethodName, ModulesSpec, Optimising, OuterBorder, Proximity, SourceEntry, SourceFile, SourceSaid,
+    Method, MethodName, ModulesSpec, Optimising, OuterBorder, Proximity, Sight, SourceEntry, SourceFile, SourceSaid,
     TilesSpec, TinSpec, Voids, WindowLimit,
 };
 // What a stage takes as it is.

@@ -2,7 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use terrain::{Effort, HeightFit, LastBatch, Lattice, LoadModule, ModuleGrid, Resampling, Spacing, TileOrder};
+use terrain::{
+    Effort, HeightFit, LastBatch, Lattice, LoadModule, ModuleGrid, QUANTA_PER_METRE, Resampling, Spacing, TileOrder,
+};
 
 use crate::{FeaturesSpec, GeoidSpec, ImportanceSpec, LodSpec, NamedFile, Start, WaterSpec};
 
@@ -319,6 +321,25 @@ pub struct Optimising {
     pub height_fit: HeightFit,
     /// Where vertices stand.
     pub lattice: Lattice,
+    /// Whose lines of sight count, if any do.
+    pub sight: Option<Sight>,
+}
+
+/// Lines of sight that are to be as they are on the ground.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Sight {
+    /// The lowest and the highest eye, and what they look at, above the ground in quanta of 1/128 m.
+    pub eyes_quanta: [i32; 2],
+    /// How far they look, in quanta.
+    pub range_quanta: i32,
+}
+
+impl Sight {
+    /// Of eyes between two heights, and a range, in metres.
+    pub(crate) fn of_metres(eyes: [f64; 2], range: f64) -> Self {
+        let quanta = |metres: f64| (metres * f64::from(QUANTA_PER_METRE)).round() as i32;
+        Self { eyes_quanta: eyes.map(quanta), range_quanta: quanta(range) }
+    }
 }
 
 /// A post this near a vertex both ways is left out of a batch. Both bounds are inclusive.

@@ -8,11 +8,11 @@ use features::{Form, Kind, RuleKind};
 use terrain::{Effort, HeightFit, LastBatch, Lattice, LodBorder, Resampling, Smooth, TileOrder};
 
 use crate::bounds::{
-    AREAS_MAX, AROUND_KM_MAX, BANK_M_MAX, CLEARANCE_M_MAX, COARSER_LEVELS_MAX, COUNT_MAX, DATUM_CHARS_MAX,
+    AREAS_MAX, AROUND_KM_MAX, BANK_M_MAX, CLEARANCE_M_MAX, COARSER_LEVELS_MAX, COUNT_MAX, DATUM_CHARS_MAX, EYE_M,
     FEATHER_M_MAX, FEATURE_SOURCES_MAX, FILL_POSTS_MAX, GEOIDS_MAX, HEIGHT_UNIT_M, LAYER_CHARS_MAX, LEVEL_M_MAX,
     MODULES_PER_TILE_MIN, NAME_CHARS_MAX, PER_MODULE_MAX, QUANTUM_M_MAX, RESIDUAL_M_MAX, RMS_M_MIN, RULE_GRADE_PERCENT,
-    RULE_WIDTH_M, RULES_MAX, SEED_MAX, SHARE_MAX, SIDE_QUANTA_MAX, SLOPE_PERCENT_MAX, SMOOTH_M_MAX, SOURCES_MAX,
-    TAG_CHARS_MAX, THANKS_CHARS_MAX, TITLE_CHARS_MAX, TRIANGLES_MIN, WEIGHT_MAX, WKT_CHARS_MAX,
+    RULE_WIDTH_M, RULES_MAX, SEED_MAX, SHARE_MAX, SIDE_QUANTA_MAX, SIGHT_M, SLOPE_PERCENT_MAX, SMOOTH_M_MAX,
+    SOURCES_MAX, TAG_CHARS_MAX, THANKS_CHARS_MAX, TITLE_CHARS_MAX, TRIANGLES_MIN, WEIGHT_MAX, WKT_CHARS_MAX,
 };
 use crate::{
     Allocation, AreaPlace, Borders, ClipHeights, Count, DemSource, Edges, ErrorKey, HeightsFrom, Key, KeyTable,
@@ -432,8 +432,19 @@ const TIN: &[Key] = &[
     Key::new("height_fit", "which vertices leave the height of the DEM")
         .of(&[MethodName::Optimised])
         .words::<HeightFit>()
-        .usual("l2_keep_crests"),
+        .usual("l2"),
     Key::new("lattice", "where vertices stand").of(&[MethodName::Optimised]).words::<Lattice>().usual("eighth"),
+    Key::new("sight", "whether ground that decides what is seen from elsewhere counts more than other ground")
+        .of(&[MethodName::Optimised])
+        .usual("true"),
+    Key::new("sight_eyes_m", "how high above the ground eyes are, and what they look at: the lowest and the highest")
+        .of(&[MethodName::Optimised])
+        .bounded(|| format!("[lowest, highest] in metres, {} to {}", EYE_M.start(), EYE_M.end()))
+        .usual("[1, 10]"),
+    Key::new("sight_range_m", "how far they look; at most 160 posts")
+        .of(&[MethodName::Optimised])
+        .number("metres", SIGHT_M)
+        .usual("2000"),
     Key::new("start", "points that tiles start from")
         .form("the path of a file, or a table of method, points")
         .otherwise("none")

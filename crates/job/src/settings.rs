@@ -8,7 +8,7 @@ use terrain::{THOUSANDTHS, metres_of_quanta};
 use crate::setting_list::{List, Setting, counted, number, quoted};
 use crate::{
     AreaShape, Budget, Choice, DemSource, Edges, GeoidSpec, ImportanceArea, Job, LodSpec, Method, Optimising,
-    Resampling, SourceEntry, Start, TinSpec, Voids, WaterSpec, settings_features,
+    Resampling, Sight, SourceEntry, Start, TinSpec, Voids, WaterSpec, settings_features,
 };
 
 /// The lines of a [canonical text](Job::canonical_text) that decide what is built: all but the title, which only stands
@@ -206,10 +206,15 @@ impl Job {
         list.choice("tin.key", &tin.key);
         list.choice("tin.allocation", &tin.allocation);
         match tin.method {
-            Method::Optimised(Optimising { effort, height_fit, lattice }) => {
+            Method::Optimised(Optimising { effort, height_fit, lattice, sight }) => {
                 list.choice("tin.effort", &effort);
                 list.choice("tin.height_fit", &height_fit);
                 list.choice("tin.lattice", &lattice);
+                list.add("tin.sight", sight.is_some().to_string());
+                if let Some(Sight { eyes_quanta, range_quanta }) = sight {
+                    list.add("tin.sight_eyes_m", pair(eyes_quanta.map(metres_of_quanta)));
+                    list.add("tin.sight_range_m", number(metres_of_quanta(range_quanta)));
+                }
             }
             Method::Greedy | Method::Paper { .. } => {
                 let metres = number(metres_of_quanta(tin.residual_quantum as i32));

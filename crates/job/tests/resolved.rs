@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use job::{
     Allocation, AreaShape, Budget, ClipHeights, Count, DemSource, Edges, Effort, ErrorKey, HeightFit, Job, LastBatch,
-    Lattice, LodBorder, Method, Optimising, Proximity, SampleClass, TileOrder, Voids, WindowLimit,
+    Lattice, LodBorder, Method, Optimising, Proximity, SampleClass, Sight, TileOrder, Voids, WindowLimit,
 };
 use terrain::ModuleGrid;
 
@@ -43,8 +43,12 @@ fn the_shortest_job_has_the_documented_defaults() {
     assert_eq!((job.limits.per_load_module, job.limits.pool), (100, 0));
     assert_eq!(job.limits.area_budget(&job.area.grid), 32 * 30);
     assert_eq!(job.limits.window, WindowLimit { limit: 4096, rows: 5, cols: 6 });
-    let usual =
-        Optimising { effort: Effort::Normal, height_fit: HeightFit::SquaresKeepCrests, lattice: Lattice::Eighth };
+    let usual = Optimising {
+        effort: Effort::Normal,
+        height_fit: HeightFit::Squares,
+        lattice: Lattice::Eighth,
+        sight: Some(Sight { eyes_quanta: [128, 1280], range_quanta: 256_000 }),
+    };
     assert_eq!(job.tin.method, Method::Optimised(usual));
     assert_eq!((job.tin.key, job.tin.budget), (ErrorKey::Sse, Budget::Limits));
     assert_eq!((job.tin.allocation, job.tin.residual_quantum), (Allocation::Global, 1));
@@ -121,12 +125,15 @@ fn every_word_of_the_optimised_method_is_read_and_written_back() {
         let expected = Optimising { effort, ..Optimising::default() };
         assert_eq!(optimising(format!("effort = \"{word}\"")), expected);
     }
-    let heights =
-        [("l2", HeightFit::Squares), ("l2_keep_crests", HeightFit::SquaresKeepCrests), ("off", HeightFit::Off)];
-    for (word, height_fit) in heights {
+    for (word, height_fit) in [("l2", HeightFit::Squares), ("off", HeightFit::Off)] {
         let expected = Optimising { height_fit, ..Optimising::default() };
         assert_eq!(optimising(format!("height_fit = \"{word}\"")), expected);
     }
+    for (sight, expected) in [("true", Some(Sight::default())), ("false", None)] {
+        assert_eq!(optimising(format!("sight = {sight}")).sight, expected);
+    }
+    let far = optimising("sight_eyes_m = [2.5, 2.5]\nsight_range_m = 500".into()).sight;
+    assert_eq!(far, Some(Sight { eyes_quanta: [320, 320], range_quanta: 64_000 }));
     for (word, lattice) in [("eighth", Lattice::Eighth), ("post", Lattice::Post)] {
         let expected = Optimising { lattice, ..Optimising::default() };
         assert_eq!(optimising(format!("lattice = \"{word}\"")), expected);
@@ -254,11 +261,14 @@ fn every_setting_is_described_with_value_and_meaning() {
                 r#"tin.effort = "normal": more still, thinned by true cost, deep flips: 12 % less RMS "#,
                 "residual than fast; 33 s of a core for a million triangles"
             ),
-            concat!(
-                r#"tin.height_fit = "l2_keep_crests": vertices stand where squared residuals are least, "#,
-                "crests at DEM height"
-            ),
+            r#"tin.height_fit = "l2": vertices stand where squared residuals are least"#,
             r#"tin.lattice = "eighth": vertices stand on eighths of a post, those on lines between tiles on posts"#,
+            "tin.sight = true: whether ground that decides what is seen from elsewhere counts more than other ground",
+            concat!(
+                "tin.sight_eyes_m = [1, 10]: how high above the ground eyes are, and what they look at: the lowest ",
+                "and the highest"
+            ),
+            "tin.sight_range_m = 2000: how far they look; at most 160 posts",
         ]
     );
 }

@@ -1,6 +1,6 @@
 //! Decides where ground matters more: classes and weights per post, from polygons and class overlays.
 //!
-//! One verb, [`importance`]. Every post is decided from the area alone, never from the window asked for, so the
+//! Its main verb is [`importance`]. Every post is decided from the area alone, never from the window asked for, so the
 //! windows of two tiles agree wherever they overlap.
 
 mod area;
@@ -9,6 +9,8 @@ mod polygon;
 pub use polygon::Polygon;
 mod slope;
 pub use slope::{steep, steep_halo};
+mod sight;
+pub use sight::{Sight, Surroundings};
 mod smooth;
 
 use terrain::{Dem, GridFrame, HOLE_CLASS, Importance, PostRect, Smooth};

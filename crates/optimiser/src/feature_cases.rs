@@ -188,7 +188,7 @@ proptest! {
         check(&features, Caps { side: SIDE, per_module, per_window, triangles }, |task| {
             task.largest_quanta = largest_quanta;
             task.lattice = if on_posts { Lattice::Post } else { Lattice::Eighth };
-            task.height_fit = if fits { HeightFit::SquaresKeepCrests } else { HeightFit::Off };
+            task.height_fit = if fits { HeightFit::Squares } else { HeightFit::Off };
         });
     }
 }

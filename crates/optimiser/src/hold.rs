@@ -15,7 +15,7 @@ impl Hold {
     /// It keeps its height.
     pub const HEIGHT: Self = Self(8);
     /// It stands at the DEM's height wherever it moves.
-    pub const CREST: Self = Self(16);
+    pub const ON_GROUND: Self = Self(16);
     /// It is an end of an edge that stays.
     pub const FEATURE: Self = Self(32);
     /// Neither place nor height is the optimiser's to choose.
@@ -50,6 +50,6 @@ impl Hold {
     /// Whether its height is free to be fitted.
     #[inline(always)]
     pub const fn height_is_free(self) -> bool {
-        !self.has(Self::HEIGHT) && !self.has(Self::CREST)
+        !self.has(Self::HEIGHT) && !self.has(Self::ON_GROUND)
     }
 }

@@ -91,7 +91,7 @@ impl Insertion {
         let places = sheet.places(corners);
         let (_, at) = sheet.worst(corners)?;
         let (on_edge, hold) = self.classify(sheet, triangle, places, at)?;
-        Some(Site { on_edge, at, hold: hold.and(sheet.ground.height_hold(at)) })
+        Some(Site { on_edge, at, hold: hold.and(sheet.ground.height_hold()) })
     }
 
     #[inline(always)]
@@ -230,7 +230,7 @@ fn middle_site(sheet: &TileMesh, triangle: u32, k: usize) -> Option<Site> {
     }
     let (a, b) = (sheet.at(from), sheet.at(to));
     let at = Place::new((a.x + b.x) / 2, (a.y + b.y) / 2);
-    let hold = sheet.line_hold(at).and(sheet.ground.height_hold(at));
+    let hold = sheet.line_hold(at).and(sheet.ground.height_hold());
     (hold == Hold::FREE && !sheet.ground.is_forbidden(at)).then_some(Site { on_edge: Some(edge), at, hold })
 }
 

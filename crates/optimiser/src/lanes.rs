@@ -91,7 +91,7 @@ impl StarLanes {
     }
 
     /// The normal equations of the vertex `hub`, at a place and a height, with the stiffness and the pull of each of
-    /// its triangles; on a crest the vertex rises with the ground, whose slope is then given.
+    /// its triangles; where it stands on the ground the vertex rises with the ground, whose slope is then given.
     #[inline(always)]
     pub fn totals<S: Simd>(
         &self,
@@ -99,7 +99,7 @@ impl StarLanes {
         (at, height): (Place, f64),
         stiffness: &[f64; LANES],
         pull: &[f64; LANES],
-        crest: Option<[f64; 2]>,
+        ground_slope: Option<[f64; 2]>,
     ) -> Totals {
         let (x0, y0) = at.posts();
         let (x, y, h) = (f64x8::splat(simd, x0), f64x8::splat(simd, y0), f64x8::splat(simd, height));
@@ -107,13 +107,13 @@ impl StarLanes {
         let (bx, by, hb) = (second(simd, &self.x) - x, second(simd, &self.y) - y, second(simd, &self.h) - h);
         let per_area = f64x8::splat(simd, 1.0) / (ax * by - ay * bx);
         let (gx, gy) = ((ha * by - hb * ay) * per_area, (hb * ax - ha * bx) * per_area);
-        let (tx, ty) = match crest {
+        let (tx, ty) = match ground_slope {
             Some([x, y]) => (f64x8::splat(simd, x) - gx, f64x8::splat(simd, y) - gy),
             None => (-gx, -gy),
         };
         let (s, p) = (f64x8::from_slice(simd, stiffness), f64x8::from_slice(simd, pull));
         let (sx, sy) = (s * tx, s * ty);
-        let rises = if crest.is_some() { 0.0 } else { 1.0 };
+        let rises = if ground_slope.is_some() { 0.0 } else { 1.0 };
         let reach = |reach: f64, i: usize| reach.max((self.x[i] - x0).abs()).max((self.y[i] - y0).abs());
         Totals {
             xx: self.total(sx * tx),
@@ -216,7 +216,7 @@ mod tests {
     fn lanes_of_every_width_say_what_triangles_say_one_by_one() {
         let rect = PostRect { south: 0, west: 0, north: 40, east: 40 };
         let (dem, importance) = (rough(rect, 5), patchy(rect, 5));
-        let ground = WeightedHeights::new(&dem, &importance, SeamSides::OPEN, HeightFit::Squares);
+        let ground = WeightedHeights::new(&dem, (&importance, &importance), SeamSides::OPEN, HeightFit::Squares);
         let layout = Layout { line_step: None, hold: &|_| Hold::FREE };
         let sheet = TileMesh::new(&ground, Parts::of(&ground, &grid(&dem, 4), &layout), None, false);
         let moments = &sheet.ground.moments;

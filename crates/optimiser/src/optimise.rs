@@ -78,7 +78,9 @@ pub fn weave_in(dem: &Dem, importance: &Importance, start: &Tin, task: &Task) ->
 fn work_on(dem: &Dem, importance: &Importance, start: &Tin, task: &Task, steps: impl Fn(&mut Work)) -> Optimised {
     assert_eq!(dem.rect(), start.rect, "the TIN covers the window");
     assert_eq!(dem.rect(), importance.rect(), "heights and weights cover the same posts");
-    let mut ground = WeightedHeights::new(dem, importance, task.open, task.height_fit);
+    let in_squares = task.in_squares.as_ref().unwrap_or(importance);
+    assert_eq!(dem.rect(), in_squares.rect(), "heights and weights cover the same posts");
+    let mut ground = WeightedHeights::new(dem, (importance, in_squares), task.open, task.height_fit);
     let mut forbidden = task.forbidden.clone();
     forbidden.extend(task.features.barred_posts(dem.rect()));
     forbidden.sort_unstable();
@@ -87,11 +89,7 @@ fn work_on(dem: &Dem, importance: &Importance, start: &Tin, task: &Task, steps: 
     held.sort_unstable();
     // What lies on a side that is not open is another tile's, or a fixed outer border of the area.
     let hold = |at: Place| {
-        if ground.is_on_closed_side(at) || held.binary_search(&at).is_ok() {
-            Hold::GIVEN
-        } else {
-            ground.height_hold(at)
-        }
+        if ground.is_on_closed_side(at) || held.binary_search(&at).is_ok() { Hold::GIVEN } else { ground.height_hold() }
     };
     let layout = Layout { line_step: task.line_step.map(|posts| posts * PER_POST), hold: &hold };
     let grown = Parts::of(&ground, start, &layout);

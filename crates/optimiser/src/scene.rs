@@ -78,6 +78,7 @@ pub(crate) fn free(triangles: usize, effort: Effort) -> Task {
         open: SeamSides::OPEN,
         line_step: None,
         budget: Budget::Triangles(triangles),
+        in_squares: None,
         effort,
         height_fit: HeightFit::Squares,
         lattice: Lattice::Eighth,

@@ -33,7 +33,7 @@ fn with_sheet(test: impl Fn(&mut TileMesh, &Dem)) {
     for seed in [1, 2, 3] {
         let dem = rough(RECT, seed);
         for importance in [even(RECT), patchy(RECT, seed)] {
-            let ground = WeightedHeights::new(&dem, &importance, SeamSides::CLOSED, HeightFit::Squares);
+            let ground = WeightedHeights::new(&dem, (&importance, &importance), SeamSides::CLOSED, HeightFit::Squares);
             let hold = |_: Place| Hold::FREE;
             let layout = Layout { line_step: Some(20 * PER_POST), hold: &hold };
             let mut sheet = sheet_of(&ground, &grid(&dem, 4), &layout);
@@ -65,7 +65,7 @@ fn owned(sheet: &TileMesh) -> (Vec<u32>, f64) {
 fn every_post_is_owned_once_after_every_kind_of_change() {
     let dem = rough(RECT, 9);
     let importance = even(RECT);
-    let ground = WeightedHeights::new(&dem, &importance, SeamSides::OPEN, HeightFit::Squares);
+    let ground = WeightedHeights::new(&dem, (&importance, &importance), SeamSides::OPEN, HeightFit::Squares);
     let hold = |_: Place| Hold::FREE;
     let mut sheet = sheet_of(&ground, &grid(&dem, 4), &Layout { line_step: None, hold: &hold });
     let check = |sheet: &TileMesh, step: &str| {
@@ -126,7 +126,7 @@ fn every_instruction_level_gives_the_same_mesh() {
     for (name, level) in geometry::levels_available() {
         let dem = rough(RECT, 11);
         let importance = patchy(RECT, 11);
-        let ground = WeightedHeights::new(&dem, &importance, SeamSides::OPEN, HeightFit::Squares);
+        let ground = WeightedHeights::new(&dem, (&importance, &importance), SeamSides::OPEN, HeightFit::Squares);
         let hold = |_: Place| Hold::FREE;
         let mut sheet = sheet_of(&ground, &grid(&dem, 4), &Layout { line_step: None, hold: &hold });
         let (mut mover, mut removal) = (Mover::at(level, 1), Removal::at(level));
@@ -274,7 +274,7 @@ fn a_cost_below_zero_is_not_put_back_for_ever() {
 fn a_triangle_without_posts_is_exactly_nothing() {
     let dem = rough(RECT, 4);
     let importance: Importance = patchy(RECT, 4);
-    let ground = WeightedHeights::new(&dem, &importance, SeamSides::OPEN, HeightFit::Squares);
+    let ground = WeightedHeights::new(&dem, (&importance, &importance), SeamSides::OPEN, HeightFit::Squares);
     let place = crate::place::Place::new;
     let thin = [place(1000, 1010), place(3400, 1012), place(1001, 1020)];
     assert_eq!(ground.moments.triangle(thin), crate::moments::Sums::default());

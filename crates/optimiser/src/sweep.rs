@@ -279,9 +279,9 @@ impl Mover {
     #[inline(always)]
     fn normal<S: Simd>(&self, simd: S, sheet: &TileMesh, vertex: u32) -> Normal {
         let record = &sheet.vertices[vertex as usize];
-        let crest = record.hold.has(Hold::CREST).then(|| sheet.ground.slope(record.at));
+        let ground_slope = record.hold.has(Hold::ON_GROUND).then(|| sheet.ground.slope(record.at));
         if self.in_lanes {
-            return self.normal_in_lanes(simd, sheet, record, crest);
+            return self.normal_in_lanes(simd, sheet, record, ground_slope);
         }
         let mut normal = Normal::default();
         for (i, &edge) in self.star.edges.iter().enumerate() {
@@ -295,7 +295,7 @@ impl Mover {
             let per_area = 1.0 / (ax * by - ay * bx);
             let slope = [(ha * by - hb * ay) * per_area, (hb * ax - ha * bx) * per_area];
             // A vertex that keeps to the ground rises with it.
-            let toward = match crest {
+            let toward = match ground_slope {
                 Some(ground) => [ground[0] - slope[0], ground[1] - slope[1], 0.0],
                 None => [-slope[0], -slope[1], 1.0],
             };
@@ -307,7 +307,13 @@ impl Mover {
     }
 
     #[inline(always)]
-    fn normal_in_lanes<S: Simd>(&self, simd: S, sheet: &TileMesh, record: &Vertex, crest: Option<[f64; 2]>) -> Normal {
+    fn normal_in_lanes<S: Simd>(
+        &self,
+        simd: S,
+        sheet: &TileMesh,
+        record: &Vertex,
+        ground_slope: Option<[f64; 2]>,
+    ) -> Normal {
         let (mut stiffness, mut pull) = ([0.0; LANES], [0.0; LANES]);
         let mut normal = Normal::default();
         for (i, &edge) in self.star.edges.iter().enumerate() {
@@ -318,7 +324,7 @@ impl Mover {
             normal.stiffness += stiffness[i];
             normal.height_pull += pull[i];
         }
-        let all = self.lanes.totals(simd, (record.at, record.height), &stiffness, &pull, crest);
+        let all = self.lanes.totals(simd, (record.at, record.height), &stiffness, &pull, ground_slope);
         let Totals { xx, xy, xh, yy, yh, hh, pull, reach } = all;
         normal.matrix = [[xx, xy, xh], [xy, yy, yh], [xh, yh, hh]];
         Normal { pull, reach, ..normal }
@@ -382,7 +388,7 @@ impl Mover {
     #[inline(always)]
     fn stand<S: Simd>(&mut self, simd: S, sheet: &TileMesh, at: Place, height: f64, hold: Hold) -> Stand {
         self.sum_spokes(simd, sheet, at);
-        let height = if hold.has(Hold::CREST) { sheet.ground.height(at) } else { height };
+        let height = if hold.has(Hold::ON_GROUND) { sheet.ground.height(at) } else { height };
         let all = if self.in_lanes { self.lanes.hinge(simd, at, height) } else { self.hinge(at, height) };
         if !hold.height_is_free() {
             return Stand { at, height, squares: all.squares };

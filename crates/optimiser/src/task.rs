@@ -1,7 +1,7 @@
 //! What the optimiser is asked to do.
 
 use limits::TileLedger;
-use terrain::{Effort, Features, HeightFit, Lattice, LatticePoint, Post, SeamSides};
+use terrain::{Effort, Features, HeightFit, Importance, Lattice, LatticePoint, Post, SeamSides};
 
 /// What the finished mesh may have.
 #[derive(Clone, Debug)]
@@ -30,6 +30,9 @@ pub struct Task {
     pub line_step: Option<i32>,
     /// What the mesh may have in the end.
     pub budget: Budget,
+    /// What posts weigh where squares are counted, if that is other than what they weigh elsewhere: in the choice of
+    /// posts, and for ends that are residuals.
+    pub in_squares: Option<Importance>,
     /// How much time to spend.
     pub effort: Effort,
     /// How heights are chosen.

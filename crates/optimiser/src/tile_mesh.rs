@@ -311,15 +311,11 @@ impl<'a> TileMesh<'a> {
 
     /// Sum of squared residuals over all posts, whatever their weights.
     pub fn plain_squares(&self) -> f64 {
-        match self.ground.uniform_weight() {
-            // One weight for all is a weight of one.
-            Some(weight) if 0.0 < weight => self.squares(),
-            _ => {
-                let live = self.triangles.iter().filter(|record| record.corners[0] != NONE);
-                live.map(|record| self.ground.plain_squares(self.places(record.corners), self.heights(record.corners)))
-                    .sum()
-            }
+        if self.ground.squares_are_plain() {
+            return self.squares();
         }
+        let live = self.triangles.iter().filter(|record| record.corners[0] != NONE);
+        live.map(|record| self.ground.plain_squares(self.places(record.corners), self.heights(record.corners))).sum()
     }
 
     /// Rounds all heights to whole quanta, which is how they are kept.

@@ -2,7 +2,6 @@
 
 use std::ops::Range;
 
-use geometry::is_ridge_candidate;
 use terrain::{Dem, HeightFit, Importance, Post, SeamSides, THOUSANDTHS};
 
 use crate::hold::Hold;
@@ -15,6 +14,7 @@ pub(crate) struct WeightedHeights<'a> {
     dem: &'a Dem,
     importance: &'a Importance,
     weight: Option<f64>,
+    squares_are_plain: bool,
     /// Sides on which posts may be chosen.
     open: SeamSides,
     fit: HeightFit,
@@ -24,11 +24,29 @@ pub(crate) struct WeightedHeights<'a> {
 }
 
 impl<'a> WeightedHeights<'a> {
-    pub fn new(dem: &'a Dem, importance: &'a Importance, open: SeamSides, fit: HeightFit) -> Self {
+    /// Posts weigh one thing where they are chosen and another in squares.
+    pub fn new(
+        dem: &'a Dem,
+        (importance, in_squares): (&'a Importance, &Importance),
+        open: SeamSides,
+        fit: HeightFit,
+    ) -> Self {
         let rect = dem.rect();
         let far = Place::new(rect.cells_wide() as i32 * PER_POST, rect.cells_high() as i32 * PER_POST);
         let weight = importance.uniform_weight().map(|weight| f64::from(weight) / f64::from(THOUSANDTHS));
-        Self { moments: Moments::new(dem, importance), dem, importance, weight, open, fit, far, forbidden: Vec::new() }
+        // One weight for all is a weight of one.
+        let squares_are_plain = in_squares.uniform_weight().is_some_and(|weight| 0 < weight);
+        Self {
+            moments: Moments::new(dem, in_squares),
+            squares_are_plain,
+            dem,
+            importance,
+            weight,
+            open,
+            fit,
+            far,
+            forbidden: Vec::new(),
+        }
     }
 
     /// Quanta of height that count as zero.
@@ -160,9 +178,9 @@ impl<'a> WeightedHeights<'a> {
         sum
     }
 
-    /// The weight that all posts have, if they have one.
-    pub fn uniform_weight(&self) -> Option<f64> {
-        self.weight
+    /// Whether squares are what they would be if all posts weighed one.
+    pub fn squares_are_plain(&self) -> bool {
+        self.squares_are_plain
     }
 
     /// Absolute residual in quanta, not weighted, at the post of a triangle that lies at a place.
@@ -177,15 +195,12 @@ impl<'a> WeightedHeights<'a> {
         self.post(at.y / PER_POST, at.x / PER_POST)
     }
 
-    /// Whether a vertex that is put in at a place keeps to the DEM's height: everywhere, on crests, or nowhere.
-    pub fn height_hold(&self, at: Place) -> Hold {
-        let is_post = at.x % PER_POST == 0 && at.y % PER_POST == 0;
-        let keeps = match self.fit {
-            HeightFit::Squares => false,
-            HeightFit::SquaresKeepCrests => is_post && is_ridge_candidate(self.dem, self.post_at(at)),
-            HeightFit::Off => true,
-        };
-        if keeps { Hold::CREST } else { Hold::FREE }
+    /// Whether vertices keep to the DEM's height wherever they move.
+    pub fn height_hold(&self) -> Hold {
+        match self.fit {
+            HeightFit::Squares => Hold::FREE,
+            HeightFit::Off => Hold::ON_GROUND,
+        }
     }
 }
 

@@ -17,8 +17,6 @@ pub enum Effort {
 pub enum HeightFit {
     /// All that may: each stands where squared residuals are least.
     Squares,
-    /// All that may but those on crests, which fitted heights would shave.
-    SquaresKeepCrests,
     /// None.
     Off,
 }

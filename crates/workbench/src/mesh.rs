@@ -8,7 +8,7 @@ use compiler::{CompileError, Event, Most, Progress, Refinement, Stage, inherited
 use database::ReportResidual;
 use fidelity::Tally;
 use geometry::WORKING_POSTS_MAX;
-use ground::{GivenPost, GroundError, Window, chosen, posts_of_file, refused, start_posts};
+use ground::{GivenPost, GroundError, Surroundings, Window, chosen, posts_of_file, refused, scanned, start_posts};
 use job::{ErrorKey, Optimising, StartMethod};
 use schedule::{Event as Scheduled, RankedTasks, Workers, in_rank_order_observed};
 use source_files::Raster;
@@ -178,7 +178,7 @@ pub(crate) fn untiled(request: &TinRequest, dem: &Dem, spacing_m: [f64; 2]) -> R
     let job = TinJob::new(request, dem, spacing_m)?;
     let tile = job.tiles[0];
     let task = job.task(tile, SeamSides::CLOSED, Vec::new(), job.points().map(|points| points as usize));
-    job.refined(task, dem.clone(), &[])
+    job.refined(task, dem, &[])
 }
 
 /// The residuals of the optimised method on several grounds that share a number of triangles by one threshold of gain;
@@ -380,7 +380,8 @@ impl<'a> TinJob<'a> {
 
     /// A tile's TIN, from what it starts from. All vertices count, so it starts from no more than its share, and that
     /// leaves fewer to select; fixed points are in whatever the share is.
-    fn refined(&self, mut task: TileTask, dem: Dem, seeds: &[Vertex]) -> Result<TileTin, CompileError> {
+    fn refined(&self, mut task: TileTask, whole: &Dem, seeds: &[Vertex]) -> Result<TileTin, CompileError> {
+        let dem = whole.window(task.rect);
         let mut given = self.start(&dem)?;
         let fixed = given.iter().filter(|post| post.pinned).count();
         let mut left = task.stop.points.unwrap_or(usize::MAX).saturating_sub(fixed);
@@ -393,7 +394,15 @@ impl<'a> TinJob<'a> {
         task.stop.points = task.stop.points.map(|points| points.saturating_sub(started));
         let (importance, forbidden, featured) = (weights(&dem), Vec::new(), Vec::new());
         let window = Window { importance, dem, given, forbidden, featured };
-        Ok(self.refinement(task).run(&window, seeds))
+        let refinement = self.refinement(task);
+        let sight = refinement.optimising.and_then(|optimising| optimising.sight);
+        let in_squares = sight.map(|sight| {
+            let sight = scanned(sight, self.spacing.0);
+            let wide = window.dem.rect().grown(sight.halo()).intersection(&whole.rect()).expect("a tile is a part");
+            let around = Surroundings::new(wide, |post| (!whole.is_void(post)).then(|| whole.height(post)));
+            sight.weigh(&window.importance, &around)
+        });
+        Ok(refinement.run(&window, in_squares.as_ref(), seeds))
     }
 
     fn refine(
@@ -426,8 +435,7 @@ impl<'a> TinJob<'a> {
             let seeds = inherited(&self.tiling, tile, &Features::default(), published)?;
             let points = shares.as_ref().map(|shares| shares[index]);
             let task = self.task(tile, self.tiling.owned_sides(tile), posts_of(&seeds), points);
-            let window = dem.window(task.rect);
-            let done = self.refined(task, window, &seeds)?;
+            let done = self.refined(task, dem, &seeds)?;
             assert!(slots[index].set(done).is_ok(), "each tile is refined once");
             Ok(())
         };

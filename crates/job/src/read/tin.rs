@@ -4,11 +4,11 @@
 
 use terrain::QUANTA_PER_METRE;
 
-use crate::bounds::{QUANTUM_M_MAX, RESIDUAL_M_MAX};
+use crate::bounds::{EYE_M, QUANTUM_M_MAX, RESIDUAL_M_MAX};
 use crate::entry::Section;
 use crate::{
-    Allocation, Budget, Choice, Edges, ErrorKey, JobError, Method, MethodName, NamedFile, Optimising, Proximity, Start,
-    TinSpec, keys,
+    Allocation, Budget, Choice, Edges, ErrorKey, JobError, Method, MethodName, NamedFile, Optimising, Proximity, Sight,
+    Start, TinSpec, keys,
 };
 
 pub(super) fn read(
@@ -26,6 +26,7 @@ pub(super) fn read(
             effort: tin.word("effort")?,
             height_fit: tin.word("height_fit")?,
             lattice: tin.word("lattice")?,
+            sight: sight(tin)?,
         }),
     };
     let residual = |key| tin.optional(key).map(|entry| entry.number()).transpose();
@@ -132,6 +133,25 @@ fn residual_quantum(tin: &Section, name: MethodName) -> Result<u32, JobError> {
         return Err(entry.out_of_range(entry.expected()));
     }
     Ok(quanta as u32)
+}
+
+fn sight(tin: &Section) -> Result<Option<Sight>, JobError> {
+    let said = ["sight_eyes_m", "sight_range_m"].into_iter().find_map(|key| tin.optional(key));
+    match (tin.flag("sight")?, said) {
+        (false, Some(entry)) => {
+            Err(entry.conflict("sight = false", "no such key, since no lines of sight count", "remove one of the two"))
+        }
+        (false, None) => Ok(None),
+        (true, _) => {
+            let [lowest, highest] = tin.pair("sight_eyes_m")?;
+            if !(EYE_M.contains(&lowest) && EYE_M.contains(&highest) && lowest <= highest)
+                && let Some(entry) = tin.optional("sight_eyes_m")
+            {
+                return Err(entry.out_of_range(entry.expected()));
+            }
+            Ok(Some(Sight::of_metres([lowest, highest], tin.number("sight_range_m")?)))
+        }
+    }
 }
 
 fn proximity(tin: &Section) -> Result<Option<Proximity>, JobError> {

@@ -181,9 +181,33 @@ fn values_of_the_tin_section_are_checked() {
         "method",
         "height_fit = false",
         &[
-            r#"a/b.toml:18: tin.height_fit: found the truth value false, expected "l2" or "l2_keep_crests""#,
-            r#"or "off""#,
-            r#"hint: for example height_fit = "l2_keep_crests""#,
+            r#"a/b.toml:18: tin.height_fit: found the truth value false, expected "l2" or "off""#,
+            r#"hint: for example height_fit = "l2""#,
+        ],
+    );
+    check(
+        "method",
+        "sight = false\nsight_range_m = 500",
+        &[
+            "a/b.toml:19: tin.sight_range_m: found 500 beside sight = false, expected no such key, since no lines of",
+            "sight count",
+            "hint: remove one of the two",
+        ],
+    );
+    check(
+        "method",
+        "sight_eyes_m = [10, 1]",
+        &[
+            "a/b.toml:18: tin.sight_eyes_m: found [10, 1], expected [lowest, highest] in metres, 0.5 to 100",
+            "hint: for example sight_eyes_m = [1, 10]",
+        ],
+    );
+    check(
+        "method",
+        "sight_range_m = 5",
+        &[
+            "a/b.toml:18: tin.sight_range_m: found 5, expected metres from 100 to 10000",
+            "hint: for example sight_range_m = 2000",
         ],
     );
     check(

@@ -92,7 +92,7 @@ fn unknown_keys_are_told_with_the_nearest_known_one() {
         &[
             "a/b.toml:18: tin.budget: found a key that no job has, expected one of method, points, key,",
             "allocation, residual_quantum_m, proximity_m, proximity, last_batch, max_residual_m, target_rms_m,",
-            "effort, height_fit, lattice, start, pins",
+            "effort, height_fit, lattice, sight, sight_eyes_m, sight_range_m, start, pins",
             "hint: configs/ntc.toml shows the usual keys with what they mean",
         ],
     );
@@ -425,9 +425,14 @@ fn words_are_told_with_the_nearest_known_one() {
     check(
         "method",
         r#"height_fit = "l3""#,
+        &[r#"a/b.toml:18: tin.height_fit: found "l3", expected "l2" or "off""#, r#"hint: did you mean "l2"?"#],
+    );
+    check(
+        "method",
+        r#"height_fit = "l2_keep_crests""#,
         &[
-            r#"a/b.toml:18: tin.height_fit: found "l3", expected "l2" or "l2_keep_crests" or "off""#,
-            r#"hint: did you mean "l2"?"#,
+            r#"a/b.toml:18: tin.height_fit: found "l2_keep_crests", expected "l2" or "off""#,
+            "hint: crests are kept by sight = true, at less RMS residual: leave the key out",
         ],
     );
     check(

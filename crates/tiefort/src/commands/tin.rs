@@ -7,7 +7,7 @@ use clap::{ArgGroup, Args};
 use compiler::{Stage, Stopwatch};
 use exports::{Coordinates, TinPlace};
 use inspect::{Fidelity, Sights};
-use job::{Effort, ErrorKey, HeightFit, Lattice, MethodName, Optimising};
+use job::{Effort, ErrorKey, HeightFit, Lattice, MethodName, Optimising, Sight};
 use serde_json::{Value, json};
 use terrain::{Metres, StopReason};
 use views::{Align, Table, grouped};
@@ -96,6 +96,8 @@ pub struct Arguments {
     height_fit: Option<HeightFit>,
     #[arg(long, value_parser = choice::<Lattice>(), help = of_optimised("tin.lattice"))]
     lattice: Option<Lattice>,
+    #[arg(long, value_name = "true|false", help = of_optimised("tin.sight"))]
+    sight: Option<bool>,
     /// What coordinates are counted from
     #[arg(long, value_enum, default_value_t = MeshOrigin::Local)]
     coordinates: MeshOrigin,
@@ -344,6 +346,7 @@ fn refuse_flags_of_optimised(arguments: &Arguments) -> Result<(), Failure> {
         ("--effort", arguments.effort.is_some()),
         ("--height-fit", arguments.height_fit.is_some()),
         ("--lattice", arguments.lattice.is_some()),
+        ("--sight", arguments.sight.is_some()),
     ];
     let Some((flag, _)) = flags.into_iter().find(|&(_, given)| given) else { return Ok(()) };
     let message = format!("found {flag} with another method than optimised, expected the method's own");
@@ -357,6 +360,7 @@ fn optimising(arguments: &Arguments) -> Optimising {
         effort: arguments.effort.unwrap_or(usual.effort),
         height_fit: arguments.height_fit.unwrap_or(usual.height_fit),
         lattice: arguments.lattice.unwrap_or(usual.lattice),
+        sight: arguments.sight.map_or(usual.sight, |sight| sight.then(Sight::default)),
     }
 }
 

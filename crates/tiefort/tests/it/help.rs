@@ -69,7 +69,7 @@ fn wrong_values_of_arguments_end_with_2_and_say_what_was_expected() {
         (&["tin", "a.tif", "--triangles", "1", "--out", "m.ply"], "2.."),
         (&["tin", "a.tif", "--triangles", "9", "--points", "9", "--out", "m.ply"], "cannot be used with"),
         (&["tin", "a.tif", "--points", "9", "--effort", "high", "--out", "m.ply"], "fast, normal, best"),
-        (&["tin", "a.tif", "--points", "9", "--height-fit", "l3", "--out", "m.ply"], "l2, l2_keep_crests, off"),
+        (&["tin", "a.tif", "--points", "9", "--height-fit", "l3", "--out", "m.ply"], "l2, off"),
         (&["tin", "a.tif", "--points", "9", "--lattice", "8", "--out", "m.ply"], "eighth, post"),
         (&["tin", "a.tif", "--rms", "nan", "--out", "m.ply"], "above 0"),
         (&["tin", "a.tif", "--points", "9", "--tiles", "6", "--out", "m.ply"], "expected ROWSxCOLUMNS"),
