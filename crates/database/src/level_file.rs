@@ -174,6 +174,7 @@ mod tests {
             tiles: vec![FileStamp::of(b"one"), FileStamp::of(b"other")],
             cost: vec![(0, 3, 12), (7, 2, 1)],
             reserved: vec![(0, 12), (7, 1)],
+            wanted_m: vec![(3, 1250.5), (7, 0.25)],
             lines: vec![FeatureLine {
                 feature: "way/12".into(),
                 class: 3,
