@@ -13,13 +13,14 @@ use tiefort::library::{self, Cause, Failure};
 use crate::arrays::places;
 use crate::raised::{named, raised};
 use crate::tables::table;
+use crate::waiting::wait;
 
 /// Load modules up to which all of a database is loaded at the first question (about 12 kB each).
 const WHOLE_MAX: usize = 1 << 14;
 /// Questions that are answered before signals are looked for.
 const AT_ONCE: usize = 1 << 20;
 /// The same of lines of sight, which take longer.
-const LINES_AT_ONCE: usize = 1 << 15;
+const LINES_AT_ONCE: usize = 1 << 12;
 
 /// What a database is asked through; nothing once it is closed.
 #[pyclass(frozen)]
@@ -297,28 +298,31 @@ impl Ground {
     /// A row for each load module: row, column, triangles, vertices, posts measured, RMS and largest residual.
     fn modules<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let area = self.held(py)?.area;
-        let rows = py.detach(|| {
-            let mut all = Vec::with_capacity(area.whole().count());
-            for south in 0..area.frame().rows {
-                let ground = area.load(Block { south, west: 0, north: south + 1, east: area.frame().cols })?;
-                all.extend(ground.modules().iter().map(|module| {
-                    let module = module.module();
-                    let residual = &module.residual;
-                    [
-                        f64::from(module.row),
-                        f64::from(module.col),
-                        module.triangles.len() as f64,
-                        module.vertices.len() as f64,
-                        f64::from(residual.posts),
-                        residual.rms_m().unwrap_or(f64::NAN),
-                        f64::from(residual.largest) / f64::from(QUANTA_PER_METRE),
-                    ]
-                }));
-            }
-            Ok(all)
-        });
-        table(py, rows.map_err(|error: ReadError| raised(py, &unreadable(&error)))?.into_iter())
+        let rows = wait(py, None, move |_, _| rows_of(&area).map_err(|error| unreadable(&error)))?;
+        table(py, rows.into_iter())
     }
+}
+
+/// What there is to tell of every load module.
+fn rows_of(area: &Area) -> Result<Vec<[f64; 7]>, ReadError> {
+    let mut all = Vec::with_capacity(area.whole().count());
+    for south in 0..area.frame().rows {
+        let ground = area.load(Block { south, west: 0, north: south + 1, east: area.frame().cols })?;
+        all.extend(ground.modules().iter().map(|module| {
+            let module = module.module();
+            let residual = &module.residual;
+            [
+                f64::from(module.row),
+                f64::from(module.col),
+                module.triangles.len() as f64,
+                module.vertices.len() as f64,
+                f64::from(residual.posts),
+                residual.rms_m().unwrap_or(f64::NAN),
+                f64::from(residual.largest) / f64::from(QUANTA_PER_METRE),
+            ]
+        }));
+    }
+    Ok(all)
 }
 
 /// The load modules of a database that a build has finished.

@@ -10,7 +10,7 @@ use tiefort::library::{self, Failure, SystemClock};
 
 use crate::raised::raised;
 use crate::tables::residual_of;
-use crate::waiting::wait;
+use crate::waiting::{Raising, wait, wait_for};
 
 /// A job, read and found good.
 #[pyclass(frozen)]
@@ -79,8 +79,10 @@ pub fn build(
     how: How,
     told: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<(String, usize, usize, bool)> {
-    let (job, workers) = how.begin(job.get(), &folder).map_err(|failure| raised(py, &failure))?;
-    wait(py, told, move |stop, progress| {
+    let job = job.get();
+    let begun = py.detach(|| how.begin(job, &folder));
+    let (job, workers) = begun.map_err(|failure| raised(py, &failure))?;
+    wait_for(py, told, Raising::AwaitsIt, move |stop, progress| {
         let clock = SystemClock::start();
         let usual = compiler::Options::new(workers, stop, &clock);
         let options = compiler::Options { fresh: how.fresh, page: how.page, ..usual };
@@ -101,10 +103,11 @@ pub fn tile(
     told: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<(String, Vec<(u32, u32)>)> {
     let id = TileId { row: id.0, col: id.1 };
-    let begun = how.begin(job.get(), &folder);
+    let job = job.get();
+    let begun = py.detach(|| how.begin(job, &folder));
     let checked = begun.and_then(|begun| library::check_tile(&begun.0, id).map(|()| begun));
     let (job, workers) = checked.map_err(|failure| raised(py, &failure))?;
-    wait(py, told, move |stop, progress| {
+    wait_for(py, told, Raising::AwaitsIt, move |stop, progress| {
         let clock = SystemClock::start();
         let options = compiler::Options { page: how.page, ..compiler::Options::new(workers, stop, &clock) };
         let rebuilt = compiler::rebuild_tile(&job, &folder, id, release_borders, &options, progress)?;

@@ -38,6 +38,15 @@ impl<T> Progress for Told<T> {
     }
 }
 
+/// What becomes of work when the callback raises. After a signal it is left alone in any case.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Raising {
+    /// It is left alone after a moment: nothing depends on its end.
+    LeavesIt,
+    /// It is waited for: until its end it keeps a folder from others.
+    AwaitsIt,
+}
+
 /// Runs `work` and returns what it returns; `told` is called with each event as (what, stage, tile, total, note).
 ///
 /// # Errors
@@ -45,6 +54,19 @@ impl<T> Progress for Told<T> {
 pub fn wait<T: Send + 'static>(
     py: Python<'_>,
     told: Option<&Bound<'_, PyAny>>,
+    work: impl FnOnce(&AtomicBool, &mut dyn Progress) -> Result<T, Failure> + Send + 'static,
+) -> PyResult<T> {
+    wait_for(py, told, Raising::LeavesIt, work)
+}
+
+/// The same, where the end of the work may have to be waited for.
+///
+/// # Errors
+/// As [`wait`].
+pub fn wait_for<T: Send + 'static>(
+    py: Python<'_>,
+    told: Option<&Bound<'_, PyAny>>,
+    raising: Raising,
     work: impl FnOnce(&AtomicBool, &mut dyn Progress) -> Result<T, Failure> + Send + 'static,
 ) -> PyResult<T> {
     let stop = Arc::new(AtomicBool::new(false));
@@ -59,6 +81,8 @@ pub fn wait<T: Send + 'static>(
         let hint = "end other programs, or raise the limit of threads";
         return Err(named(py, "RequestError", &format!("found no thread to work in: {error}, expected one"), hint));
     }
+    // What the callback raised, while the end is waited for.
+    let mut raised_before = None;
     loop {
         let news;
         (receiver, news) = py.detach(move || {
@@ -66,12 +90,18 @@ pub fn wait<T: Send + 'static>(
             (receiver, news)
         });
         let heard = match news {
-            Ok(News::Ended(ended)) => return ended.map_err(|failure| raised(py, &failure)),
-            Ok(News::Event(event)) => told.map_or(Ok(()), |told| tell(told, event)),
-            Err(RecvTimeoutError::Timeout) => Ok(()),
-            Err(RecvTimeoutError::Disconnected) => Err(raised(py, &Failure::bug())),
+            Ok(News::Ended(ended)) => {
+                return raised_before.map_or_else(|| ended.map_err(|failure| raised(py, &failure)), Err);
+            }
+            Ok(News::Event(event)) if raised_before.is_none() => told.map_or(Ok(()), |told| tell(told, event)),
+            Ok(News::Event(_)) | Err(RecvTimeoutError::Timeout) => Ok(()),
+            Err(RecvTimeoutError::Disconnected) => return Err(raised(py, &Failure::bug())),
         };
-        if let Err(error) = heard.and_then(|()| py.check_signals()) {
+        let signal = py.check_signals();
+        if let (Err(error), true, Ok(())) = (&heard, raising == Raising::AwaitsIt, &signal) {
+            stop.store(true, Ordering::Relaxed);
+            raised_before = Some(error.clone_ref(py));
+        } else if let Err(error) = signal.and(heard) {
             stop.store(true, Ordering::Relaxed);
             py.detach(move || end(&receiver));
             return Err(error);
