@@ -9,7 +9,7 @@ use compiler::{CompileError, Event, Progress, Stage};
 use ground::{decode, warnings_of};
 use schedule::Workers;
 use source_files::{DemFile, Mosaic, MosaicRules, MosaicVoids, RasterFrame, Reading, VoidPolicy};
-use terrain::{Dem, Post, PostRect, Resampling, TileId, quanta_of_metres};
+use terrain::{Dem, Post, PostRect, Resampling, TileId};
 
 use crate::suiting::{SuitingGrid, suiting_grid};
 
@@ -54,11 +54,7 @@ impl Heights {
         let mut raster = decode(file, file.rect(), workers, stop)?;
         let notes = warnings_of(file.frame(), raster.range_m(), raster.notes());
         raster.settle_voids(VoidPolicy::Hole)?;
-        let scale = file.sample_scale();
-        let dem = Dem::from_fn(file.rect(), |post| {
-            raster.sample(post).and_then(|sample| quanta_of_metres(scale.height_m(sample)))
-        });
-        Ok(Self { dem: Arc::new(dem), frame: file.frame().clone(), notes })
+        Ok(Self { dem: Arc::new(raster.dem()), frame: file.frame().clone(), notes })
     }
 }
 
