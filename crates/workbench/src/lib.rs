@@ -19,6 +19,8 @@ mod sample;
 pub use sample::Sample;
 
 mod heights;
+mod join;
 mod outlook;
 mod suiting;
 mod tally;
+mod tiles;
