@@ -21,6 +21,7 @@ import functools
 import json
 import os
 import pathlib
+import platform
 import re
 import shutil
 import statistics
@@ -41,6 +42,7 @@ SAMPLE = {"posts": 1979, "spacing_m": 25.25, "origin_m": [505_000, 3_875_000], "
 
 # What is held: the time of a run over that of the peer's triangulation, residuals, memory.
 BAR_UNTILED, BAR_TILED, BAR_PAPER, BAR_BUILD = 0.30, 0.12, 0.60, 1.20
+BAR_TIN, BAR_NORMAL = 0.35, 6.50
 BAR_RMS_UNTILED, BAR_RMS_TILED = 1.005, 1.02
 BAR_MEMORY_MB = 200
 
@@ -94,7 +96,7 @@ def replaced(text, pattern, by):
 def write_jobs(job):
     """Job files by name: this project's method at its fastest, and the paper's with either kind of edge."""
     paper = replaced(job, r'method = "optimised"', PAPER)
-    texts = {"default": replaced(job, r'method = "optimised"', 'method = "optimised"\neffort = "fast"')}
+    texts = {"default": replaced(job, r'method = "optimised"', 'method = "optimised"\neffort = "fast"'), "normal": job}
     for edges in ["clip", "constrained"]:
         texts[f"paper-{edges}"] = f'{paper}\n[load_modules]\nedges = "{edges}"\n'
     paths = {name: FOLDER / f"{name}.toml" for name in texts}
@@ -160,7 +162,7 @@ def one_round(tiefort, dem, heights, jobs):
     """Everything that is compared, once, in turn."""
     mesh, database = FOLDER / "mesh.ply", FOLDER / "area.tdb"
     runs = {"peer": run_peer(heights)}
-    runs["untiled"] = run_tin(tiefort, dem, mesh, "--workers", 1)
+    runs["untiled"] = run_tin(tiefort, dem, mesh, "--tiles", "1x1", "--workers", 1)
     runs["untiled"]["mesh"] = read_ply(mesh, heights.shape)
     runs["tiled"] = run_tin(tiefort, dem, mesh, "--tiles", "6x6", "--workers", 2)
     runs["tiled"]["mesh"] = read_ply(mesh, heights.shape)
@@ -250,6 +252,7 @@ def table(rounds, heights, memory_mb):
         ["pydelatin, triangulation", f"{min(peer):.3f} s", "1", "1", "1", "", ""],
         seconds_row("tin, refine, 1 worker", rounds, "untiled", refine, refine_cpu, BAR_UNTILED),
         seconds_row("tin 6x6, refine, 2 workers", rounds, "tiled", refine, refine_cpu, BAR_TILED),
+        seconds_row("tin 6x6, whole process, 2 workers", rounds, "tiled", wall, cpu, BAR_TIN),
     ]
     for edges in ["clip", "constrained"]:
         name = f"paper-{edges}"
@@ -257,6 +260,7 @@ def table(rounds, heights, memory_mb):
         rows.append(seconds_row("  sum of its stages", rounds, name, stages, cpu, None))
     rows.append(seconds_row("build, optimised, fast", rounds, "default", wall, cpu, BAR_BUILD))
     rows.append(seconds_row("  sum of its stages", rounds, "default", stages, cpu, None))
+    rows.append(seconds_row("build, optimised, normal", rounds, "normal", wall, cpu, BAR_NORMAL))
     theirs, untiled, tiled = (rms(rounds[-1][name]["mesh"], heights) for name in ["peer", "untiled", "tiled"])
     rows.append(["RMS of pydelatin", f"{theirs:.4f} m", "1", "", "", "", ""])
     rows.append(plain_row("RMS of tin, over pydelatin's", f"{untiled:.4f} m", untiled / theirs, BAR_RMS_UNTILED))
@@ -291,12 +295,29 @@ def write_readme(text):
 
 
 def print_instructions(tiefort, dem):
-    """Instructions of `tin`, untiled, counted by callgrind: the same on a busy machine."""
+    """Millions of instructions of one worker, counted by callgrind: the same on a busy machine. Meshes are read to
+    written, on the whole raster by worst posts, and of 2,000 points on a small one by every effort."""
+    small = dem.with_name("tiefort_size_bavarian_alps_460x376_utm32n.tif")
+    greedy = ["--points", POINTS, "--method", "greedy", "--key", "max"]
+    runs = {"tin": [dem, *greedy, "--tiles", "1x1"], "tin 6x6": [dem, *greedy, "--tiles", "6x6"]}
+    if small.exists():
+        optimised = {f"tin, 460 x 376, {effort}": effort for effort in ["fast", "normal", "best"]}
+        runs |= {what: [small, "--points", 2000, "--effort", effort] for what, effort in optimised.items()}
     out = FOLDER / "callgrind.out"
-    command = ["valgrind", "--tool=callgrind", f"--callgrind-out-file={out}", tiefort, "tin", dem, "--points", POINTS,
-               "--method", "greedy", "--key", "max", "--workers", 1, "--out", FOLDER / "mesh.ply"]
-    counted = re.search(r"Collected : (\d+)", measured(*command)["err"])
-    print(f"callgrind: {int(counted[1]):,} instructions for tin, untiled, read to written")
+    rows = [["callgrind", "million instructions", ""]]
+    for what, words in runs.items():
+        command = ["valgrind", "--tool=callgrind", f"--callgrind-out-file={out}", tiefort, "tin", *words,
+                   "--workers", 1, "--out", FOLDER / "mesh.ply"]
+        counted = re.search(r"Collected : (\d+)", measured(*command)["err"])
+        rows.append([what, f"{int(counted[1]) / 1e6:,.0f}", ""])
+    print("\n".join(["", *aligned(rows)]))
+
+
+def processor():
+    """The name of the processor; ratios differ between processors, as caches and memory do."""
+    told = pathlib.Path("/proc/cpuinfo")
+    found = re.search(r"model name\s*: (.*)", told.read_text()) if told.exists() else None
+    return found[1] if found else platform.processor() or platform.machine()
 
 
 # --- start ---
@@ -356,6 +377,7 @@ def main():
     rows = table(rounds, heights.astype("f8"), memory_mb)
     lines = [
         f"{today}: {dem.name}, {POINTS:,} points, {options.rounds} rounds, {os.cpu_count()} cores",
+        processor(),
         f"load of the machine before {before}, after {load()}\n{note}",
         *aligned(rows),
         "",

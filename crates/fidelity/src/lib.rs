@@ -44,6 +44,8 @@ mod form;
 pub use form::{MeshForm, SLIVER_DEGREES, mesh_form};
 mod features;
 pub use features::{Bodies, FeatureFigures, missing_edges};
+mod limit;
+pub use limit::{Limit, limit};
 mod registration;
 pub use registration::{Registration, SHIFT_POSTS_MAX, registration};
 mod regular;

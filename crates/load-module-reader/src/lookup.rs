@@ -228,8 +228,8 @@ impl Lookup {
         (corners, [cross(to[1], to[2]), cross(to[2], to[0]), cross(to[0], to[1])])
     }
 
-    /// Every triangle at a place in steps, where they may lie above each other: its corners, the height there in metres,
-    /// and where it stands in the load module.
+    /// Every triangle at a place in steps, where they may lie above each other: its corners, the height there in
+    /// metres, and where it stands in the load module.
     pub(crate) fn triangles(&self, place: [i64; 2]) -> impl Iterator<Item = (Corners, f64, usize)> {
         self.triangles_of(self.cell(place)).filter_map(move |index| {
             let (corners, shares) = self.shares(index, place);

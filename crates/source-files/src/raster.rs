@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use terrain::{Post, PostRect};
+use terrain::{Dem, Post, PostRect, quanta_of_metres};
 
 use crate::chunk::{Chunk, Header, Meaning};
 use crate::frame::{RasterFrame, SampleScale};
 use crate::limits::HEIGHT_M_MAX;
-use crate::samples::Samples;
+use crate::samples::{Samples, each, number};
 use crate::void_posts::VoidPosts;
 use crate::{DatumShift, SourceError};
 
@@ -157,6 +157,24 @@ impl Raster {
     /// When `post` lies outside the window.
     pub fn height_m(&self, post: Post) -> Option<f64> {
         self.sample(post).map(|sample| self.scale.height_m(sample))
+    }
+
+    /// Its heights in quanta; voids stay void.
+    pub fn dem(&self) -> Dem {
+        if 0 < self.voids.count {
+            return Dem::from_fn(self.window, |post| self.height_m(post).and_then(quanta_of_metres));
+        }
+        let (scale, wide) = (self.scale, self.window.posts_wide());
+        // The type of samples is asked for once a row, and not once a post.
+        Dem::from_row_fn(self.window, |row, heights| {
+            let at = (row - self.window.south) as usize * wide;
+            each!(&self.samples, posts => {
+                for (height, &sample) in heights.iter_mut().zip(&posts[at..]) {
+                    // `check_range` has let no height through that has no quanta.
+                    *height = quanta_of_metres(scale.height_m(number(sample))).unwrap_or(0);
+                }
+            });
+        })
     }
 
     /// Where a post of the window lies, by its index, for messages.

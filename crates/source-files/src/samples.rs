@@ -192,7 +192,8 @@ impl Samples {
     }
 }
 
-fn number<T: Sample>(sample: T) -> f64 {
+/// A sample as a number.
+pub(crate) fn number<T: Sample>(sample: T) -> f64 {
     sample.into()
 }
 

@@ -9,7 +9,7 @@ use compiler::{CompileError, Event, Progress, Stage};
 use ground::{decode, warnings_of};
 use schedule::Workers;
 use source_files::{DemFile, Mosaic, MosaicRules, MosaicVoids, Raster, RasterFrame, Reading, VoidPolicy};
-use terrain::{Dem, Post, PostRect, Resampling, TileId, quanta_of_metres};
+use terrain::{Dem, Post, PostRect, Resampling, TileId};
 
 use crate::suiting::{SuitingGrid, suiting_grid};
 
@@ -72,8 +72,7 @@ impl Heights {
     fn as_they_are(mut raster: Raster) -> Result<Self, CompileError> {
         let notes = warnings_of(raster.frame(), raster.range_m(), raster.notes());
         raster.settle_voids(VoidPolicy::Hole)?;
-        let dem = Dem::from_fn(raster.window(), |post| raster.height_m(post).and_then(quanta_of_metres));
-        Ok(Self { dem: Arc::new(dem), frame: raster.frame().clone(), notes })
+        Ok(Self { dem: Arc::new(raster.dem()), frame: raster.frame().clone(), notes })
     }
 }
 

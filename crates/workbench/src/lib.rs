@@ -23,3 +23,4 @@ mod join;
 mod outlook;
 mod suiting;
 mod tally;
+mod tiles;

@@ -6,7 +6,7 @@ use std::sync::{Arc, OnceLock};
 
 use compiler::{CompileError, Event, Most, Progress, Refinement, Stage, inherited, posts_of};
 use database::ReportResidual;
-use fidelity::Tally;
+use fidelity::{Limit, Tally};
 use geometry::WORKING_POSTS_MAX;
 use ground::{GivenPost, GroundError, Surroundings, Window, chosen, posts_of_file, refused, scanned, start_posts};
 use job::{ErrorKey, Optimising, StartMethod};
@@ -21,7 +21,8 @@ use tin::{CostUnit, Proximity, Rule, Stop, SurveyTask, TileTask};
 
 use crate::heights::Heights;
 use crate::join::join;
-use crate::tally::tally_of;
+use crate::tally::{tally_of, tally_on_all};
+use crate::tiles::usual_tiles;
 
 /// The paper's proximity test: metres across, metres in height.
 const PROXIMITY_M: (f64, u32) = (300.0, 20);
@@ -66,8 +67,8 @@ pub struct TinRequest {
     pub rms_m: Option<f64>,
     /// What tiles start from beside their corners.
     pub start: Option<TinStart>,
-    /// Rows and columns of tiles.
-    pub tiles: (u32, u32),
+    /// Rows and columns of tiles; those that suit the raster and the number of points where `None`.
+    pub tiles: Option<(u32, u32)>,
     /// Tiles at once.
     pub workers: usize,
 }
@@ -89,6 +90,8 @@ pub struct Mesh {
     pub epsg: Option<u32>,
     /// Against every one of those posts.
     pub residual: ReportResidual,
+    /// What so many triangles can reach on it at best; `None` where the ground is too small to say.
+    pub limit: Option<Limit>,
     /// Vertices.
     pub points: usize,
     /// Why selection ended: that of the tile that stopped for want of posts, if any did.
@@ -130,8 +133,8 @@ fn tin_over(
     let tiles = heights.refine(request, stop, progress)?;
     progress.tell(Event::Enter(Stage::Assemble, 0));
     let exhausted = tiles.iter().any(|tile| tile.stop == StopReason::Exhausted);
-    let stop = if exhausted { StopReason::Exhausted } else { tiles[0].stop };
-    let mesh = heights.mesh(join(heights.dem.rect(), &tiles), stop);
+    let ended = if exhausted { StopReason::Exhausted } else { tiles[0].stop };
+    let mesh = heights.mesh(join(heights.dem.rect(), &tiles), ended, request.workers, stop)?;
     progress.tell(Event::Leave(Stage::Assemble));
     Ok(mesh)
 }
@@ -145,7 +148,11 @@ impl Heights {
         progress: &mut dyn Progress,
     ) -> Result<Vec<TileTin>, CompileError> {
         let workers = Workers::new(request.workers);
-        let mut job = TinJob::new(request, &self.dem, self.frame.spacing)?;
+        let tiles = request.tiles.unwrap_or_else(|| suiting_tiles(request, self.dem.rect()));
+        if request.tiles.is_none() && 1 < tiles.0 * tiles.1 {
+            progress.tell(Event::Note(format!("{} x {} tiles at once; --tiles 1x1 makes one", tiles.0, tiles.1)));
+        }
+        let mut job = TinJob::new(request, tiles, &self.dem, self.frame.spacing)?;
         if let Some(TinStart::File(path)) = &request.start {
             job.given = posts_of_file(path, &self.frame, self.dem.rect())?;
             job.refuse_given()?;
@@ -155,18 +162,23 @@ impl Heights {
     }
 
     /// A TIN over them as a mesh.
-    pub fn mesh(&self, tin: Tin, stop: StopReason) -> Mesh {
-        Mesh {
+    ///
+    /// # Errors
+    /// When it is stopped.
+    pub fn mesh(&self, tin: Tin, ended: StopReason, workers: usize, stop: &AtomicBool) -> Result<Mesh, CompileError> {
+        let tally = tally_on_all(&self.dem, &tin, &Workers::new(workers), stop)?;
+        Ok(Mesh {
             points: tin.vertices.len(),
-            residual: compiler::residual_of(&tally_of(&self.dem, &tin)),
+            residual: compiler::residual_of(&tally),
+            limit: fidelity::limit(&self.dem, tin.triangles.len()),
             tin,
             dem: Arc::clone(&self.dem),
             east_m: self.frame.south_west[0],
             north_m: self.frame.south_west[1],
             spacing_m: (self.frame.spacing[0], self.frame.spacing[1]),
             epsg: self.frame.crs.epsg(),
-            stop,
-        }
+            stop: ended,
+        })
     }
 }
 
@@ -175,7 +187,7 @@ impl Heights {
 /// # Errors
 /// When the request does not fit the ground.
 pub(crate) fn untiled(request: &TinRequest, dem: &Dem, spacing_m: [f64; 2]) -> Result<TileTin, CompileError> {
-    let job = TinJob::new(request, dem, spacing_m)?;
+    let job = TinJob::new(request, (1, 1), dem, spacing_m)?;
     let tile = job.tiles[0];
     let task = job.task(tile, SeamSides::CLOSED, Vec::new(), job.points().map(|points| points as usize));
     job.refined(task, dem, &[])
@@ -200,7 +212,7 @@ pub(crate) fn untiled_together(
         max_residual_m: None,
         rms_m: None,
         start: None,
-        tiles: (1, 1),
+        tiles: None,
         workers: 1,
     };
     // Two are there before any point, and a point makes two more.
@@ -208,7 +220,7 @@ pub(crate) fn untiled_together(
     let reach = 4 * points / grounds.len().max(1) + 1;
     let survey = |dem: &Dem| {
         let request = request(triangles);
-        let job = TinJob::new(&request, dem, [spacing_m; 2])?;
+        let job = TinJob::new(&request, (1, 1), dem, [spacing_m; 2])?;
         Ok(job.curve(dem, job.tiles[0], reach))
     };
     let curves = grounds.iter().map(survey).collect::<Result<Vec<_>, CompileError>>()?;
@@ -239,12 +251,16 @@ struct TinJob<'a> {
 }
 
 impl<'a> TinJob<'a> {
-    fn new(request: &'a TinRequest, dem: &Dem, spacing_m: [f64; 2]) -> Result<Self, CompileError> {
+    fn new(
+        request: &'a TinRequest,
+        (rows, cols): (u32, u32),
+        dem: &Dem,
+        spacing_m: [f64; 2],
+    ) -> Result<Self, CompileError> {
         let rect = dem.rect();
-        let (rows, cols) = request.tiles;
         let longest =
             (rect.cells_high().div_ceil(rows.max(1) as usize)).max(rect.cells_wide().div_ceil(cols.max(1) as usize));
-        refuse(request, rect, longest)?;
+        refuse(request, (rows, cols), rect, longest)?;
         let tiling = Tiling::new(rect, 1, rows, cols, TileOrder::Color);
         let quantum = if request.method == TinMethod::Paper { terrain::QUANTA_PER_METRE as u32 } else { 1 };
         let units = |metres: f64| (metres * f64::from(terrain::QUANTA_PER_METRE) / f64::from(quantum)).floor() as u64;
@@ -450,7 +466,16 @@ impl<'a> TinJob<'a> {
     }
 }
 
-fn refuse(request: &TinRequest, rect: PostRect, longest: usize) -> Result<(), CompileError> {
+/// Rows and columns of tiles where none are asked for. Where a residual ends the mesh or it starts from given points,
+/// tiles would make another mesh, and so would the paper's passes.
+fn suiting_tiles(request: &TinRequest, rect: PostRect) -> (u32, u32) {
+    let points = request.points.or(request.triangles.map(|triangles| triangles / 2));
+    let is_cut = request.method != TinMethod::Paper && request.start.is_none();
+    let by_count = request.max_residual_m.is_none() && request.rms_m.is_none();
+    points.filter(|_| is_cut && by_count).map_or((1, 1), |points| usual_tiles(rect, points))
+}
+
+fn refuse(request: &TinRequest, (rows, cols): (u32, u32), rect: PostRect, longest: usize) -> Result<(), CompileError> {
     let impossible = |key: &str, found: String, expected: &str, hint: &str| {
         Err(GroundError::Impossible { key: key.into(), found, expected: expected.into(), hint: hint.into() }.into())
     };
@@ -458,7 +483,6 @@ fn refuse(request: &TinRequest, rect: PostRect, longest: usize) -> Result<(), Co
         let found = format!("{} x {} posts", rect.posts_high(), rect.posts_wide());
         return impossible("DEM", found, "at least 2 x 2 posts", "a mesh needs ground to cover");
     }
-    let (rows, cols) = request.tiles;
     if rows == 0 || cols == 0 || rect.cells_high() < rows as usize || rect.cells_wide() < cols as usize {
         let found = format!("{rows}x{cols} for {} x {} posts", rect.posts_high(), rect.posts_wide());
         return impossible("--tiles", found, "at least one row and column, and a cell for each", "try --tiles 6x6");

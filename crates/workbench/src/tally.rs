@@ -1,13 +1,39 @@
 //! Residuals of a TIN without load modules.
 
+use std::sync::atomic::AtomicBool;
+
+use compiler::{CompileError, Stage};
 use fidelity::Tally;
 use geometry::owned::{PostGrid, visit_residuals};
-use terrain::{Dem, Post, Tin};
+use schedule::Workers;
+use terrain::{Dem, Post, TileId, Tin};
 
 /// Residuals at every post that a TIN covers and that is not void, each counted once.
 pub(crate) fn tally_of(dem: &Dem, tin: &Tin) -> Tally {
+    tally_of_some(dem, tin, &tin.triangles)
+}
+
+/// The same on all workers: sums are whole numbers, so it does not matter how triangles are shared out.
+///
+/// # Errors
+/// When it is stopped.
+pub(crate) fn tally_on_all(dem: &Dem, tin: &Tin, workers: &Workers, stop: &AtomicBool) -> Result<Tally, CompileError> {
+    const PARTS_PER_WORKER: usize = 4;
+    let size = tin.triangles.len().div_ceil(PARTS_PER_WORKER * workers.count()).max(1);
+    let parts: Vec<&[[u32; 3]]> = tin.triangles.chunks(size).collect();
+    let tallies = schedule::for_each_independent(&parts, workers, stop, |_, part| -> Result<Tally, CompileError> {
+        Ok(tally_of_some(dem, tin, part))
+    });
+    let nowhere = vec![TileId { row: 0, col: 0 }; parts.len()];
+    let tallies = tallies.map_err(|error| CompileError::from_schedule(Stage::Assemble, &nowhere, error))?;
+    let mut all = Tally::default();
+    tallies.iter().for_each(|tally| all.merge(tally));
+    Ok(all)
+}
+
+fn tally_of_some(dem: &Dem, tin: &Tin, triangles: &[[u32; 3]]) -> Tally {
     let mut tally = Tally::default();
-    for triangle in &tin.triangles {
+    for triangle in triangles {
         visit_triangle(dem, tin, *triangle, &mut tally);
     }
     tally

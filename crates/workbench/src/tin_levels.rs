@@ -25,16 +25,17 @@ pub fn tin_levels(
 ) -> Result<Vec<Mesh>, CompileError> {
     refuse(request, levels)?;
     let heights = Heights::read(&request.dem, request.workers, stop, progress)?;
+    let whole = TinRequest { tiles: Some((1, 1)), ..request.clone() };
     if let TinMethod::Optimised(_) = request.method {
         let level = |&points: &usize| {
-            let request = TinRequest { points: Some(points), ..request.clone() };
+            let request = TinRequest { points: Some(points), ..whole.clone() };
             let tile = heights.refine(&request, stop, progress)?.swap_remove(0);
-            Ok(heights.mesh(tile.tin, tile.stop))
+            heights.mesh(tile.tin, tile.stop, request.workers, stop)
         };
         return levels.iter().map(level).collect();
     }
     let most = levels.last().copied();
-    let whole = heights.refine(&TinRequest { points: most, ..request.clone() }, stop, progress)?.swap_remove(0);
+    let whole = heights.refine(&TinRequest { points: most, ..whole }, stop, progress)?.swap_remove(0);
     progress.tell(Event::Enter(Stage::Assemble, 0));
     let began = whole.initial_count as usize;
     if let Some(&few) = levels.iter().find(|&&points| points < began) {
@@ -46,10 +47,10 @@ pub fn tin_levels(
     }
     let level = |&points: &usize| {
         let is_whole = whole.tin.vertices.len() <= points;
-        let stop = if is_whole { whole.stop } else { StopReason::BudgetSpent };
-        heights.mesh(tin::prefix(&whole, points), stop)
+        let ended = if is_whole { whole.stop } else { StopReason::BudgetSpent };
+        heights.mesh(tin::prefix(&whole, points), ended, request.workers, stop)
     };
-    let meshes = levels.iter().map(level).collect();
+    let meshes = levels.iter().map(level).collect::<Result<Vec<_>, CompileError>>()?;
     progress.tell(Event::Leave(Stage::Assemble));
     Ok(meshes)
 }
@@ -61,8 +62,7 @@ fn refuse(request: &TinRequest, levels: &[usize]) -> Result<(), CompileError> {
         let expected = "numbers of vertices, each above the one before";
         return Err(impossible(found, expected.into(), "for example --levels 1000,2500,5000"));
     }
-    if request.tiles != (1, 1) {
-        let (rows, columns) = request.tiles;
+    if let Some((rows, columns)) = request.tiles.filter(|&tiles| tiles != (1, 1)) {
         let found = format!("levels of {rows}x{columns} tiles");
         return Err(impossible(found, "one tile".into(), "tiles have sequences of their own: leave --tiles out"));
     }

@@ -97,7 +97,7 @@ fn equivalent_points_are_the_fewest_whose_iterative_tin_is_better() {
                 max_residual_m: None,
                 rms_m: None,
                 start: None,
-                tiles: (1, 1),
+                tiles: None,
                 workers: 1,
             };
             workbench::tin(&request, &AtomicBool::new(false), &mut Silent).unwrap().residual.rms_m

@@ -122,7 +122,7 @@ fn a_mesh_of_more_points_than_posts_is_every_post() {
                 max_residual_m: None,
                 rms_m: None,
                 start: None,
-                tiles,
+                tiles: Some(tiles),
                 workers: 2,
             };
             let mesh = workbench::tin(&request, &false.into(), &mut Silent).unwrap();
@@ -240,7 +240,7 @@ fn voids_of_a_mesh_are_no_vertices_and_in_no_statistic() {
             max_residual_m: None,
             rms_m: None,
             start: None,
-            tiles,
+            tiles: Some(tiles),
             workers: 2,
         };
         let mesh = workbench::tin(&request, &false.into(), &mut Silent).unwrap();

@@ -130,7 +130,7 @@ fn a_mesh_from_a_raster_is_that_of_the_method_and_tiles_cost_little() {
             max_residual_m: None,
             rms_m: None,
             start: None,
-            tiles,
+            tiles: Some(tiles),
             workers,
         };
         let mesh = workbench::tin(&request, &false.into(), &mut Silent).unwrap();

@@ -79,7 +79,7 @@ impl Subject {
             max_residual_m: None,
             rms_m: if let Until::RmsM(rms_m) = until { Some(rms_m) } else { None },
             start,
-            tiles: (1, 1),
+            tiles: None,
             workers: 1,
         };
         Ok(untiled(&request, &self.dem, [self.spacing.0; 2])?.tin)
