@@ -16,7 +16,7 @@ SIGHTS = (True, False)
 MEAN_WITHIN = 0.02
 POINTS_WITHIN = 0.002
 BUILDS_MAX = 14
-NEAR_SEAMS_M = 250
+NEAR_SEAMS_M = 1000
 MODULE_M = 500
 HEAD = ["", "mean", "RMS m", "of paper", "of grid", "max m", "mean m", "largest", "4 km", "breaches", "seconds", "MB",
         "valid", "sight %", "visible %", "slope RMS"]

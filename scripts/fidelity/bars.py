@@ -92,4 +92,4 @@ def seams(jobs):
         for tiles, result in results.items():
             found = result["judged"].get("seams", {})
             if tiles == "6 x 6, global" and found.get("posts"):
-                yield f"{name}: RMS near tile lines, of elsewhere", found["rms_m"] / found["others_rms_m"], 1.15, False
+                yield f"{name}: RMS near tile lines, of elsewhere", found["rms_m"] / found["others_rms_m"], 1.03, False

@@ -50,12 +50,12 @@ impl Default for Sight {
 
 impl Default for Optimising {
     fn default() -> Self {
-        let sight = usual_text("tin.sight") == "true";
+        let effort = usual("tin.effort");
         Self {
-            effort: usual("tin.effort"),
+            effort,
             height_fit: usual("tin.height_fit"),
             lattice: usual("tin.lattice"),
-            sight: sight.then(Sight::default),
+            sight: Sight::is_usual_with(effort).then(Sight::default),
         }
     }
 }

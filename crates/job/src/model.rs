@@ -335,6 +335,11 @@ pub struct Sight {
 }
 
 impl Sight {
+    /// Whether lines of sight count where nothing says it: they would take a good part of a fast build.
+    pub fn is_usual_with(effort: Effort) -> bool {
+        effort != Effort::Fast
+    }
+
     /// Of eyes between two heights, and a range, in metres.
     pub(crate) fn of_metres(eyes: [f64; 2], range: f64) -> Self {
         let quanta = |metres: f64| (metres * f64::from(QUANTA_PER_METRE)).round() as i32;

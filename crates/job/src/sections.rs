@@ -436,7 +436,8 @@ const TIN: &[Key] = &[
     Key::new("lattice", "where vertices stand").of(&[MethodName::Optimised]).words::<Lattice>().usual("eighth"),
     Key::new("sight", "whether ground that decides what is seen from elsewhere counts more than other ground")
         .of(&[MethodName::Optimised])
-        .usual("true"),
+        .otherwise("true; false with effort = \"fast\"")
+        .example("sight = true"),
     Key::new("sight_eyes_m", "how high above the ground eyes are, and what they look at: the lowest and the highest")
         .of(&[MethodName::Optimised])
         .bounded(|| format!("[lowest, highest] in metres, {} to {}", EYE_M.start(), EYE_M.end()))
@@ -444,7 +445,7 @@ const TIN: &[Key] = &[
     Key::new("sight_range_m", "how far they look; at most 160 posts")
         .of(&[MethodName::Optimised])
         .number("metres", SIGHT_M)
-        .usual("2000"),
+        .usual("1000"),
     Key::new("start", "points that tiles start from")
         .form("the path of a file, or a table of method, points")
         .otherwise("none")

@@ -47,7 +47,7 @@ fn the_shortest_job_has_the_documented_defaults() {
         effort: Effort::Normal,
         height_fit: HeightFit::Squares,
         lattice: Lattice::Eighth,
-        sight: Some(Sight { eyes_quanta: [128, 1280], range_quanta: 256_000 }),
+        sight: Some(Sight { eyes_quanta: [128, 1280], range_quanta: 128_000 }),
     };
     assert_eq!(job.tin.method, Method::Optimised(usual));
     assert_eq!((job.tin.key, job.tin.budget), (ErrorKey::Sse, Budget::Limits));
@@ -122,7 +122,8 @@ fn every_word_of_the_optimised_method_is_read_and_written_back() {
         optimising
     };
     for (word, effort) in [("fast", Effort::Fast), ("normal", Effort::Normal), ("best", Effort::Best)] {
-        let expected = Optimising { effort, ..Optimising::default() };
+        let sight = (effort != Effort::Fast).then(Sight::default);
+        let expected = Optimising { effort, sight, ..Optimising::default() };
         assert_eq!(optimising(format!("effort = \"{word}\"")), expected);
     }
     for (word, height_fit) in [("l2", HeightFit::Squares), ("off", HeightFit::Off)] {
@@ -268,7 +269,7 @@ fn every_setting_is_described_with_value_and_meaning() {
                 "tin.sight_eyes_m = [1, 10]: how high above the ground eyes are, and what they look at: the lowest ",
                 "and the highest"
             ),
-            "tin.sight_range_m = 2000: how far they look; at most 160 posts",
+            "tin.sight_range_m = 1000: how far they look; at most 160 posts",
         ]
     );
 }

@@ -3,8 +3,8 @@
 use proptest::prelude::*;
 use terrain::{Dem, Effort, HeightFit, Importance, Lattice, Post, PostRect};
 
-use crate::optimise;
 use crate::scene::{Caps, confined, even, free, grid, measured, patchy, rough, spent};
+use crate::{Task, optimise};
 
 const RECT: PostRect = PostRect { south: 0, west: 0, north: 80, east: 120 };
 
@@ -109,6 +109,27 @@ fn unfitted_heights_are_the_dems() {
         let post = vertex.at.post().unwrap();
         assert_eq!(vertex.height, dem.height(post), "{post}");
     }
+}
+
+#[test]
+fn vertices_go_where_posts_weigh_more_in_squares_and_goals_stay_what_they_are() {
+    let dem = rough(RECT, 11);
+    let is_west = |col: i32| col < RECT.east / 2;
+    let weights: Vec<u16> = RECT.posts().map(|post| if is_west(post.col) { 4000 } else { 1000 }).collect();
+    let heavy = Importance::new(RECT, weights, vec![0; RECT.post_count()]);
+    let west = |in_squares: Option<Importance>| {
+        let task = Task { in_squares, ..free(300, Effort::Normal) };
+        let tin = optimise(&dem, &even(RECT), &grid(&dem, 5), &task).tin;
+        tin.check().unwrap();
+        tin.vertices.iter().filter(|vertex| is_west(vertex.at.col / 8)).count()
+    };
+    let plain = west(None);
+    assert_eq!(west(Some(even(RECT))), plain);
+    assert!(5 * plain < 4 * west(Some(heavy.clone())), "{plain}");
+    let largest = 1500.0;
+    let task = Task { in_squares: Some(heavy), largest_quanta: Some(largest), ..free(2500, Effort::Normal) };
+    let met = measured(&optimise(&dem, &even(RECT), &grid(&dem, 2), &task).tin, &dem).1;
+    assert!(met <= largest + 1.0, "{met}");
 }
 
 #[test]

@@ -229,6 +229,23 @@ fn a_small_edit_of_an_optimised_area_moves_few_tiles() {
 }
 
 #[test]
+fn ground_within_sight_of_a_tile_has_it_refined_again_and_lines_of_sight_can_be_left_out() {
+    for (sight, reaches) in [("sight = true\nsight_range_m = 1000", true), ("sight = false", false)] {
+        let tin = format!("method = \"optimised\"\nallocation = \"equal\"\neffort = \"fast\"\n{sight}");
+        let words = Words { tin, ..Words::raster() };
+        let ground = sample_dem(words.grid(), 1);
+        let scene = Scene::on(&words, &ground);
+        drop(scene.build("area", 2));
+        let rect = ground.rect();
+        let (low, high) = (Post::new(rect.south + 2, rect.west + 2), Post::new(rect.south + 9, rect.west + 9));
+        scene.replace_dem(&with_block(&ground, low, high));
+        let (heard, _) = rebuilt(&scene, sight);
+        let is_seen = heard.because.iter().any(|(_, why)| why.contains("ground within sight changed"));
+        assert_eq!(is_seen, reaches, "{sight}: {:?}", heard.because);
+    }
+}
+
+#[test]
 fn another_area_is_refused_and_nothing_is_touched() {
     let scene = Scene::new(&Words::sample());
     drop(scene.build("area", 2));

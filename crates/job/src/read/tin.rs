@@ -7,8 +7,8 @@ use terrain::QUANTA_PER_METRE;
 use crate::bounds::{EYE_M, QUANTUM_M_MAX, RESIDUAL_M_MAX};
 use crate::entry::Section;
 use crate::{
-    Allocation, Budget, Choice, Edges, ErrorKey, JobError, Method, MethodName, NamedFile, Optimising, Proximity, Sight,
-    Start, TinSpec, keys,
+    Allocation, Budget, Choice, Edges, Effort, ErrorKey, JobError, Method, MethodName, NamedFile, Optimising,
+    Proximity, Sight, Start, TinSpec, keys,
 };
 
 pub(super) fn read(
@@ -22,12 +22,11 @@ pub(super) fn read(
     let method = match name {
         MethodName::Paper => Method::Paper { proximity: proximity(tin)?, last_batch: tin.word("last_batch")? },
         MethodName::Greedy => Method::Greedy,
-        MethodName::Optimised => Method::Optimised(Optimising {
-            effort: tin.word("effort")?,
-            height_fit: tin.word("height_fit")?,
-            lattice: tin.word("lattice")?,
-            sight: sight(tin)?,
-        }),
+        MethodName::Optimised => {
+            let effort = tin.word("effort")?;
+            let (height_fit, lattice) = (tin.word("height_fit")?, tin.word("lattice")?);
+            Method::Optimised(Optimising { effort, height_fit, lattice, sight: sight(tin, effort)? })
+        }
     };
     let residual = |key| tin.optional(key).map(|entry| entry.number()).transpose();
     let (max_residual_m, target_rms_m) = (residual("max_residual_m")?, residual("target_rms_m")?);
@@ -135,11 +134,16 @@ fn residual_quantum(tin: &Section, name: MethodName) -> Result<u32, JobError> {
     Ok(quanta as u32)
 }
 
-fn sight(tin: &Section) -> Result<Option<Sight>, JobError> {
+fn sight(tin: &Section, effort: Effort) -> Result<Option<Sight>, JobError> {
     let said = ["sight_eyes_m", "sight_range_m"].into_iter().find_map(|key| tin.optional(key));
-    match (tin.flag("sight")?, said) {
+    let asked = tin.optional("sight").map(|entry| entry.flag()).transpose()?;
+    match (asked.unwrap_or(Sight::is_usual_with(effort)), said) {
         (false, Some(entry)) => {
-            Err(entry.conflict("sight = false", "no such key, since no lines of sight count", "remove one of the two"))
+            let (beside, hint) = match asked {
+                Some(_) => ("sight = false", "remove one of the two"),
+                None => ("effort = \"fast\"", "add sight = true, or remove it"),
+            };
+            Err(entry.conflict(beside, "no such key, since no lines of sight count", hint))
         }
         (false, None) => Ok(None),
         (true, _) => {

@@ -196,6 +196,15 @@ fn values_of_the_tin_section_are_checked() {
     );
     check(
         "method",
+        "effort = \"fast\"\nsight_range_m = 500",
+        &[
+            "a/b.toml:19: tin.sight_range_m: found 500 beside effort = \"fast\", expected no such key, since no lines of",
+            "sight count",
+            "hint: add sight = true, or remove it",
+        ],
+    );
+    check(
+        "method",
         "sight_eyes_m = [10, 1]",
         &[
             "a/b.toml:18: tin.sight_eyes_m: found [10, 1], expected [lowest, highest] in metres, 0.5 to 100",
@@ -207,7 +216,7 @@ fn values_of_the_tin_section_are_checked() {
         "sight_range_m = 5",
         &[
             "a/b.toml:18: tin.sight_range_m: found 5, expected metres from 100 to 10000",
-            "hint: for example sight_range_m = 2000",
+            "hint: for example sight_range_m = 1000",
         ],
     );
     check(

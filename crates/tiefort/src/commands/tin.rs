@@ -7,7 +7,7 @@ use clap::{ArgGroup, Args};
 use compiler::{Stage, Stopwatch};
 use exports::{Coordinates, TinPlace};
 use inspect::{Fidelity, Sights};
-use job::{Effort, ErrorKey, HeightFit, Lattice, MethodName, Optimising, Sight};
+use job::{Effort, ErrorKey, HeightFit, Lattice, MethodName, Optimising, Sight, Usual};
 use serde_json::{Value, json};
 use terrain::{Metres, StopReason};
 use views::{Align, Table, grouped};
@@ -146,7 +146,11 @@ fn meaning(key: &str) -> String {
 
 /// The same of a key of the optimised method.
 fn of_optimised(key: &str) -> String {
-    format!("{}; for --method optimised only [default: {}]", meaning(key), job::usual_text(key))
+    let usual = match job::key(key).map(|key| key.usual) {
+        Some(Usual::Is(usual) | Usual::Otherwise(usual)) => usual,
+        Some(Usual::Needed) | None => "none",
+    };
+    format!("{}; for --method optimised only [default: {usual}]", meaning(key))
 }
 
 /// A kind of file a mesh is written to.
@@ -366,11 +370,12 @@ fn refuse_flags_of_optimised(arguments: &Arguments) -> Result<(), Failure> {
 /// The flags given, over a job's defaults.
 fn optimising(arguments: &Arguments) -> Optimising {
     let usual = Optimising::default();
+    let effort = arguments.effort.unwrap_or(usual.effort);
     Optimising {
-        effort: arguments.effort.unwrap_or(usual.effort),
+        effort,
         height_fit: arguments.height_fit.unwrap_or(usual.height_fit),
         lattice: arguments.lattice.unwrap_or(usual.lattice),
-        sight: arguments.sight.map_or(usual.sight, |sight| sight.then(Sight::default)),
+        sight: arguments.sight.unwrap_or(Sight::is_usual_with(effort)).then(Sight::default),
     }
 }
 
