@@ -16,9 +16,11 @@ pub(crate) fn usual_tiles(rect: PostRect, points: usize) -> (u32, u32) {
     if count < TILES_MIN {
         return (1, 1);
     }
+    // Squares, but for rasters narrower than one.
     let side = (high * wide / count).sqrt();
-    let along = |cells: f64| (cells / side + 0.5).max(1.0) as u32;
-    (along(high), along(wide))
+    let across = (high.min(wide) / side + 0.5).max(1.0).floor();
+    let (across, along) = (across as u32, (count / across + 0.5) as u32);
+    if high < wide { (across, along) } else { (along, across) }
 }
 
 #[cfg(test)]
