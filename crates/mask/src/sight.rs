@@ -27,7 +27,8 @@ const NEAR: i64 = 10 * 128;
 /// What a point that passes its horizon exactly counts.
 const FULL: i64 = 64;
 /// What a post counts on average, in parts of what it would if every point of every ray counted in full. So measured:
-/// 28 in the Alps, 34 in basin and range, 48 in the desert, within a kilometre. A constant, so that no ground weighs by what lies far away.
+/// 28 in the Alps, 34 in basin and range, 48 in the desert, within a kilometre. A constant, so that no ground weighs by
+/// what lies far away.
 const USUAL: i64 = 36;
 /// How many times the usual count as much as anything can.
 const MOST: i64 = 20;

@@ -198,8 +198,8 @@ fn values_of_the_tin_section_are_checked() {
         "method",
         "effort = \"fast\"\nsight_range_m = 500",
         &[
-            "a/b.toml:19: tin.sight_range_m: found 500 beside effort = \"fast\", expected no such key, since no lines of",
-            "sight count",
+            "a/b.toml:19: tin.sight_range_m: found 500 beside effort = \"fast\", expected no such key, since no",
+            "lines of sight count",
             "hint: add sight = true, or remove it",
         ],
     );
