@@ -7,10 +7,10 @@ from bench import ROOT
 MARK = "Written by `scripts/bench_fidelity.py --quick --readme`:\n\n"
 # Rows of a raster and of an area as they are called there, and as they are called here.
 RASTER_ROWS = {"greedy": "greedy insertion (`pydelatin`)", "Lindstrom-Turk": "edge collapse (CGAL, Lindstrom-Turk)",
-               "fast, sight": "`fast`", "normal, sight": "`normal` (default)", "best, sight": "`best`",
+               "fast": "`fast`", "normal, sight": "`normal` (default)", "best, sight": "`best`",
                "normal": "`normal`, `sight = false`"}
 AREA_ROWS = {"regular grid": "regular grid of 125 m", "paper + clip": "the paper's method, clipped",
-             "fast, sight": "`fast`", "normal, sight": "`normal` (default)", "best, sight": "`best`",
+             "fast": "`fast`", "normal, sight": "`normal` (default)", "best, sight": "`best`",
              "normal": "`normal`, `sight = false`"}
 HEAD = "| {} | RMS m | largest m | lines of sight | slope RMS | s |\n| - | -: | -: | -: | -: | -: |\n"
 
