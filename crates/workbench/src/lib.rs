@@ -2,7 +2,9 @@
 //! rasters, which suggests a job.
 
 mod mesh;
-pub use mesh::{Mesh, TinMethod, TinRequest, TinStart, tin, tin_of_raster};
+pub use mesh::{Mesh, tin, tin_of_raster};
+mod request;
+pub use request::{TinMethod, TinRequest, TinStart};
 mod tin_levels;
 pub use tin_levels::tin_levels;
 mod compare;

@@ -7,7 +7,8 @@ use ground::GroundError;
 use terrain::StopReason;
 
 use crate::heights::Heights;
-use crate::mesh::{Mesh, TinMethod, TinRequest};
+use crate::mesh::Mesh;
+use crate::request::{TinMethod, TinRequest};
 
 /// Makes a mesh for each of `levels`, numbers of vertices that rise.
 ///

@@ -16,7 +16,8 @@ use terrain::{Dem, Metres, Post, PostRect, Tin, quanta_of_metres};
 
 use super::made::{CompareGround, Equivalent, Made};
 use crate::heights::{Heights, has_square_posts};
-use crate::mesh::{TinRequest, untiled};
+use crate::mesh::untiled;
+use crate::request::TinRequest;
 use crate::tally::tally_of;
 use crate::{TinMethod, TinStart};
 
