@@ -1,7 +1,7 @@
 //! The compiled part of the Python package: arrays in, meshes and answers out, and the command `tiefort`.
 //!
 //! Everything is done by the libraries that the commands use; what is here only brings values over. The package around
-//! it, `python/tiefort`, holds names, documentation and what is optional. [`waiting`] lets other threads of Python run
+//! it, `python/tiefort`, holds names, documentation and what is optional. `waiting` lets other threads of Python run
 //! meanwhile, passes on progress, and ends when Python has been interrupted.
 
 mod raised;

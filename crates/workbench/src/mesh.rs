@@ -48,6 +48,8 @@ pub struct Mesh {
     pub limit: Option<Limit>,
     /// Vertices.
     pub points: usize,
+    /// Rows and columns of the tiles that it was made in.
+    pub tiles: (u32, u32),
     /// Why selection ended: that of the tile that stopped for want of posts, if any did.
     pub stop: StopReason,
 }
@@ -64,7 +66,7 @@ pub fn tin(request: &TinRequest, stop: &AtomicBool, progress: &mut dyn Progress)
 /// The same from a raster that is in memory already, instead of the one that `request` names.
 ///
 /// # Errors
-/// As [`tin`].
+/// As [`tin()`].
 pub fn tin_of_raster(
     raster: Raster,
     request: &TinRequest,
@@ -90,7 +92,8 @@ fn tin_over(
     let ended = if exhausted { StopReason::Exhausted } else { tiles[0].stop };
     let mesh = heights.mesh(join(heights.dem.rect(), &tiles), ended, request.workers, stop)?;
     progress.tell(Event::Leave(Stage::Assemble));
-    Ok(mesh)
+    let count = |of: fn(&TileTin) -> u32| tiles.iter().map(of).max().unwrap_or(0) + 1;
+    Ok(Mesh { tiles: (count(|tile| tile.tile.row), count(|tile| tile.tile.col)), ..mesh })
 }
 
 impl Heights {
@@ -103,9 +106,6 @@ impl Heights {
     ) -> Result<Vec<TileTin>, CompileError> {
         let workers = Workers::new(request.workers);
         let tiles = request.tiles.unwrap_or_else(|| suiting_tiles(request, self.dem.rect()));
-        if request.tiles.is_none() && 1 < tiles.0 * tiles.1 {
-            progress.tell(Event::Note(format!("{} x {} tiles at once; --tiles 1x1 makes one", tiles.0, tiles.1)));
-        }
         let mut job = TinJob::new(request, tiles, &self.dem, self.frame.spacing)?;
         if let Some(TinStart::File(path)) = &request.start {
             job.given = posts_of_file(path, &self.frame, self.dem.rect())?;
@@ -131,6 +131,7 @@ impl Heights {
             north_m: self.frame.south_west[1],
             spacing_m: (self.frame.spacing[0], self.frame.spacing[1]),
             epsg: self.frame.crs.epsg(),
+            tiles: (1, 1),
             stop: ended,
         })
     }

@@ -244,7 +244,11 @@ fn told(
     seconds: f64,
 ) -> String {
     if let ([mesh], true) = (meshes, arguments.levels.is_empty()) {
-        return summary(mesh, seconds) + &measured_text(measured[0].as_ref());
+        let tiles = match (arguments.tiles, mesh.tiles) {
+            (Some(_), _) | (None, (1, 1)) => String::new(),
+            (None, (rows, cols)) => format!("{rows} x {cols} tiles at once; --tiles 1x1 makes one\n"),
+        };
+        return summary(mesh, seconds) + &tiles + &measured_text(measured[0].as_ref());
     }
     let mut table = Table::new(&[Align::Left, Align::Right, Align::Right, Align::Right, Align::Right, Align::Right]);
     table.row(["level", "points", "triangles", "RMS m", "99 % m", "largest m"]);
@@ -273,6 +277,7 @@ fn summary_json(mesh: &Mesh, measured: Option<&Fidelity>) -> Value {
         "points": mesh.points,
         "triangles": mesh.tin.triangles.len(),
         "residual": mesh.residual,
+        "tiles": [mesh.tiles.0, mesh.tiles.1],
     });
     if let Some(limit) = mesh.limit {
         summary["limit"] = json!({
