@@ -9,7 +9,7 @@
 //! takes all of these at once; [`regular_grid`] is what a TIN is held against.
 
 mod tally;
-pub use tally::{Residuals, Tally};
+pub use tally::{Histogram, Residuals, Sums, Tally};
 mod measure;
 pub use measure::{Reference, each_residual, measure, residuals};
 mod split;

@@ -12,7 +12,9 @@
 //! best mesh that is known, not a proven bound. Where N is small or the ground rough for it, the limit does not hold:
 //! a TIN may be better. So the number of triangles and the share of rough ground belong beside it.
 
-use terrain::{Dem, Post, metres_of_quanta};
+use std::ops::Range;
+
+use terrain::{Dem, Each, Post, gather, metres_of_quanta};
 
 /// What so many triangles can reach on a ground.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -40,25 +42,20 @@ type Hessian = [f64; 3];
 ///
 /// Differences are taken over half the side of a triangle, at places as far apart: noise from post to post, which no
 /// triangle follows, counts for as little as it does for the triangles.
-pub fn limit(dem: &Dem, triangles: usize) -> Option<Limit> {
+pub fn limit(dem: &Dem, triangles: usize, each: Each) -> Option<Limit> {
     let rect = dem.rect();
     let (wide, high) = (rect.cells_wide(), rect.cells_high());
     let area = wide as f64 * high as f64;
     // Two triangles make a square.
     let side = (2.0 * area / triangles.max(1) as f64).sqrt();
     let step = ((side / 2.0 + 0.5) as usize).clamp(1, (wide.min(high) / 4).max(1));
-    let line = |row: i32| -> Vec<Option<Hessian>> {
-        let cols = (rect.west + step as i32..=rect.east - step as i32).step_by(step);
-        cols.map(|col| hessian(dem, Post::new(row, col), step as i32)).collect()
-    };
     let rows: Vec<i32> = (rect.south + step as i32..=rect.north - step as i32).step_by(step).collect();
+    let bands: Vec<Sums> = gather(each, rows.len().div_ceil(BAND), |band| {
+        let from = band * BAND;
+        Sums::of_rows(dem, &rows, from..(from + BAND).min(rows.len()), step)
+    });
     let mut sums = Sums::default();
-    let (mut below, mut here) = (Vec::new(), line(*rows.first()?));
-    for index in 0..rows.len() {
-        let above = rows.get(index + 1).map(|&row| line(row)).unwrap_or_default();
-        sums.add(&below, &here, &above);
-        (below, here) = (here, above);
-    }
+    bands.iter().for_each(|band| sums.merge(band));
     let mean = sums.densities / (0 < sums.places).then_some(sums.places as f64)?;
     Some(Limit {
         triangles,
@@ -67,8 +64,11 @@ pub fn limit(dem: &Dem, triangles: usize) -> Option<Limit> {
     })
 }
 
-/// Sums over places, in the order of posts: they do not depend on who else is at work.
-#[derive(Default)]
+/// Lines of places that are summed together.
+const BAND: usize = 32;
+
+/// Sums over places, in the order of posts within a band and of bands: they do not depend on who is at work.
+#[derive(Clone, Copy, Default)]
 struct Sums {
     places: u64,
     densities: f64,
@@ -78,6 +78,32 @@ struct Sums {
 }
 
 impl Sums {
+    /// Those of some of the lines of places.
+    fn of_rows(dem: &Dem, rows: &[i32], band: Range<usize>, step: usize) -> Self {
+        let (rect, far) = (dem.rect(), step as i32);
+        let line = |index: usize| -> Vec<Option<Hessian>> {
+            let Some(&row) = rows.get(index) else { return Vec::new() };
+            let cols = (rect.west + far..=rect.east - far).step_by(step);
+            cols.map(|col| hessian(dem, Post::new(row, col), far)).collect()
+        };
+        let mut sums = Self::default();
+        let mut below = band.start.checked_sub(1).map(line).unwrap_or_default();
+        let mut here = line(band.start);
+        for index in band {
+            let above = line(index + 1);
+            sums.add(&below, &here, &above);
+            (below, here) = (here, above);
+        }
+        sums
+    }
+
+    fn merge(&mut self, other: &Self) {
+        self.places += other.places;
+        self.densities += other.densities;
+        self.compared += other.compared;
+        self.rough += other.rough;
+    }
+
     /// Adds a line of places; the lines below and above it are empty where there are none.
     fn add(&mut self, below: &[Option<Hessian>], here: &[Option<Hessian>], above: &[Option<Hessian>]) {
         for (index, hessian) in here.iter().enumerate() {
@@ -132,7 +158,7 @@ fn hessian(dem: &Dem, at: Post, step: i32) -> Option<Hessian> {
 
 #[cfg(test)]
 mod tests {
-    use terrain::{PostRect, quanta_of_metres};
+    use terrain::{PostRect, in_turn, quanta_of_metres};
 
     use super::*;
 
@@ -154,7 +180,7 @@ mod tests {
                 (ground(|x, y| 0.02 * x * y), of_determinant(4e-4, 1.0 / 90.0, triangles)),
                 (ground(|x, y| 0.002 * (x * x + 25.0 * y * y)), of_determinant(4e-4, 1.0 / 180.0, triangles)),
             ] {
-                let found = limit(&found, triangles).unwrap();
+                let found = limit(&found, triangles, &in_turn).unwrap();
                 assert!((found.rms_m / expected - 1.0).abs() < 0.02, "{found:?}, expected {expected}");
                 assert!(found.rough_share < 0.01, "{found:?}");
                 let eta = found.eta(1.5 * found.rms_m).unwrap();
@@ -165,7 +191,7 @@ mod tests {
 
     #[test]
     fn a_plane_has_no_limit_to_be_far_from() {
-        let found = limit(&ground(|x, y| x / 4.0 + y / 2.0), 100).unwrap();
+        let found = limit(&ground(|x, y| x / 4.0 + y / 2.0), 100, &in_turn).unwrap();
         assert_eq!((found.rms_m, found.rough_share, found.eta(1.0)), (0.0, 0.0, None));
     }
 
@@ -174,10 +200,10 @@ mod tests {
         let mut draw = fastrand::Rng::with_seed(1);
         let rect = PostRect::new(Post::new(0, 0), Post::new(400, 400));
         let noise = Dem::from_fn(rect, |_| Some(draw.i32(0..1000)));
-        let share = limit(&noise, 20_000).unwrap().rough_share;
+        let share = limit(&noise, 20_000, &in_turn).unwrap().rough_share;
         assert!(0.3 < share, "{share}");
         let waves = ground(|x, y| 50.0 * (x / 40.0).sin() * (y / 40.0).sin());
-        let [few, many] = [100, 20_000].map(|triangles| limit(&waves, triangles).unwrap().rough_share);
+        let [few, many] = [100, 20_000].map(|triangles| limit(&waves, triangles, &in_turn).unwrap().rough_share);
         assert!(many < 0.02 && many < few, "{few}, {many}");
     }
 
@@ -185,8 +211,9 @@ mod tests {
     fn voids_are_in_no_limit_and_small_ground_has_none() {
         let whole = ground(|x, y| 0.01 * (x * x + y * y));
         let torn = Dem::from_fn(whole.rect(), |post| (post.col % 97 != 5).then(|| whole.height(post)));
-        let (whole, torn) = (limit(&whole, 2000).unwrap(), limit(&torn, 2000).unwrap());
+        let (whole, torn) = (limit(&whole, 2000, &in_turn).unwrap(), limit(&torn, 2000, &in_turn).unwrap());
         assert!((torn.rms_m / whole.rms_m - 1.0).abs() < 0.01, "{torn:?}, {whole:?}");
-        assert_eq!(limit(&Dem::from_rows(PostRect::new(Post::new(0, 0), Post::new(1, 1)), &[1, 2, 3, 4]), 2), None);
+        let small = Dem::from_rows(PostRect::new(Post::new(0, 0), Post::new(1, 1)), &[1, 2, 3, 4]);
+        assert_eq!(limit(&small, 2, &in_turn), None);
     }
 }

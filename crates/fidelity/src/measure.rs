@@ -4,7 +4,7 @@ use geometry::Facet;
 use geometry::owned::{PostGrid, visit_residuals};
 use terrain::{Dem, Importance, LoadModule, ModuleGrid, ModuleResidual, Spacing};
 
-use crate::tally::{Residuals, Tally, bin};
+use crate::tally::{Residuals, Sums};
 
 /// The ground that load modules are measured against.
 #[derive(Clone, Copy, Debug)]
@@ -65,12 +65,12 @@ fn count(module: &LoadModule, ground: &Reference, all: &mut Residuals) -> Module
     let mut own = Sums::default();
     match (one_class, whole) {
         (true, true) => {
-            let bins = all.class(0).bins();
+            let mut histogram = all.class(0).histogram();
             visit(module, ground, |_, residual| {
                 own.add(residual);
-                bins[bin(residual.unsigned_abs())] += 1;
+                histogram.add(residual);
             });
-            own.add_to(all.class(0));
+            all.class(0).add_sums(&own);
         }
         _ => visit(module, ground, |post, residual| {
             if whole || !ground.dem.is_void(post) {
@@ -80,36 +80,6 @@ fn count(module: &LoadModule, ground: &Reference, all: &mut Residuals) -> Module
         }),
     }
     ModuleResidual { posts: own.posts, largest: own.largest, sum_abs: own.sum_abs, sum_squared: own.sum_squared }
-}
-
-/// Residuals of one load module: it has at most 2^26 posts, so an RMS residual of 4 km fits.
-#[derive(Default)]
-struct Sums {
-    posts: u32,
-    largest: u32,
-    sum: i64,
-    sum_abs: u64,
-    sum_squared: u64,
-}
-
-impl Sums {
-    #[inline(always)]
-    fn add(&mut self, residual: i32) {
-        let size = u64::from(residual.unsigned_abs());
-        self.posts += 1;
-        self.largest = self.largest.max(residual.unsigned_abs());
-        self.sum += i64::from(residual);
-        self.sum_abs += size;
-        self.sum_squared += size * size;
-    }
-
-    fn add_to(&self, tally: &mut Tally) {
-        tally.posts += u64::from(self.posts);
-        tally.largest = tally.largest.max(self.largest);
-        tally.sum += self.sum;
-        tally.sum_abs += self.sum_abs;
-        tally.sum_squared += u128::from(self.sum_squared);
-    }
 }
 
 /// Calls `each` with every post that one triangle of a load module owns and its residual, voids included.

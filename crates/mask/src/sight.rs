@@ -244,15 +244,33 @@ impl<'a> Scan<'a> {
         let eyes = i64::from(EYE_STEP * EYE_STEP);
         let points = i64::from((self.sight.range - self.sight.nearest).max(1)) * RAYS as i64;
         let most = (16 * MOST * USUAL * points / eyes).max(1);
-        let count = |row: i32, col: i32| {
-            let post = Post::new(row, col);
-            if self.around.contains(post) { i64::from(self.counts[self.around.index(post)]) } else { 0 }
-        };
-        let mixed = |post: Post| {
-            let line = |row: i32| count(row, post.col - 1) + 2 * count(row, post.col) + count(row, post.col + 1);
-            line(post.row - 1) + 2 * line(post.row) + line(post.row + 1)
-        };
-        rect.posts().map(|post| (mixed(post) * i64::from(FULLY) / most).min(FULLY.into()) as u32).collect()
+        let mut shares = Vec::with_capacity(rect.post_count());
+        let (mut column, mut all) = (vec![0; rect.posts_wide() + 2], Vec::new());
+        for row in rect.south..=rect.north {
+            column.fill(0);
+            for (beside, times) in [(row - 1, 1), (row, 2), (row + 1, 1)] {
+                self.row_of_counts(beside, rect, &mut all);
+                column.iter_mut().zip(&all).for_each(|(sum, &count)| *sum += times * i64::from(count));
+            }
+            let mixed = column.windows(3).map(|near| near[0] + 2 * near[1] + near[2]);
+            shares.extend(mixed.map(|mixed| (mixed * i64::from(FULLY) / most).min(FULLY.into()) as u32));
+        }
+        shares
+    }
+
+    /// The counts of a row from one post west of `rect` to one east of it; 0 where there is no ground.
+    fn row_of_counts(&self, row: i32, rect: PostRect, counts: &mut Vec<u32>) {
+        let around = self.around;
+        counts.clear();
+        counts.resize(rect.posts_wide() + 2, 0);
+        if row < around.south || around.north < row {
+            return;
+        }
+        let (west, east) = ((rect.west - 1).max(around.west), (rect.east + 1).min(around.east));
+        let from = around.index(Post::new(row, west));
+        let to = (west - (rect.west - 1)) as usize;
+        let wide = (east - west) as usize + 1;
+        counts[to..to + wide].copy_from_slice(&self.counts[from..from + wide]);
     }
 }
 

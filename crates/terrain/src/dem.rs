@@ -173,6 +173,27 @@ impl Dem {
         (self.lowest, self.highest)
     }
 
+    /// Every second post of `rect` in both directions, from its south-western one: a quarter of the posts. The posts of
+    /// the result are counted in steps of two.
+    ///
+    /// # Panics
+    /// When `rect` is not wholly inside.
+    pub fn every_second(&self, rect: PostRect) -> Dem {
+        assert!(self.rect.contains_rect(&rect), "posts are taken from inside the window that holds them");
+        let half = rect.halved();
+        let fine =
+            |post: Post| Post::new(rect.south + 2 * (post.row - half.south), rect.west + 2 * (post.col - half.west));
+        let mut coarse = Self::from_row_fn(half, |row, heights| {
+            let from = fine(Post::new(row, half.west));
+            let of_row = &self.row(from.row)[(from.col - self.rect.west) as usize..];
+            heights.iter_mut().zip(of_row.iter().step_by(2)).for_each(|(to, &height)| *to = height);
+        });
+        if !self.void_bits.is_empty() {
+            half.posts().filter(|&post| self.is_void(fine(post))).for_each(|post| coarse.mark_void(post));
+        }
+        coarse
+    }
+
     /// A copy of part of this window.
     ///
     /// # Panics
@@ -227,6 +248,17 @@ mod tests {
             }
         });
         assert_eq!(by_row, sloping(rect));
+    }
+
+    #[test]
+    fn every_second_post_of_a_part_is_taken_from_its_south_west_corner() {
+        let rect = PostRect::new(Post::new(0, 0), Post::new(9, 12));
+        let hole = Post::new(5, 7);
+        let dem = Dem::from_fn(rect, |post| (post != hole).then_some(post.row * 100 + post.col));
+        let coarse = dem.every_second(PostRect::new(Post::new(3, 5), Post::new(8, 11)));
+        assert_eq!(coarse.rect(), PostRect::new(Post::new(1, 2), Post::new(3, 5)));
+        assert_eq!(coarse.row(2), [505, 0, 509, 511]);
+        assert!(coarse.is_void(Post::new(2, 3)) && coarse.void_count() == 1);
     }
 
     #[test]

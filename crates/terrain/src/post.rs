@@ -140,6 +140,13 @@ impl PostRect {
         (cut.south <= cut.north && cut.west <= cut.east).then_some(cut)
     }
 
+    /// The rectangle in steps of two posts: an odd row or column at its far end is left out.
+    pub fn halved(&self) -> PostRect {
+        let (south, west) = (self.south.div_euclid(2), self.west.div_euclid(2));
+        let half = |cells: usize| (cells / 2) as i32;
+        PostRect { south, west, north: south + half(self.cells_high()), east: west + half(self.cells_wide()) }
+    }
+
     /// The rectangle grown by `posts` on every side.
     pub fn grown(&self, posts: i32) -> PostRect {
         PostRect {

@@ -26,3 +26,4 @@ mod outlook;
 mod suiting;
 mod tally;
 mod tiles;
+mod trend;

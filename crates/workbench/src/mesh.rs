@@ -8,7 +8,7 @@ use compiler::{CompileError, Event, Most, Progress, Refinement, Stage, inherited
 use database::ReportResidual;
 use fidelity::{Limit, Tally};
 use ground::{GivenPost, GroundError, Surroundings, Window, chosen, posts_of_file, refused, scanned, start_posts};
-use job::{ErrorKey, Optimising};
+use job::{Effort, ErrorKey, Optimising};
 use schedule::{Event as Scheduled, RankedTasks, Workers, in_rank_order_observed};
 use source_files::Raster;
 use terrain::{
@@ -23,9 +23,15 @@ use crate::join::join;
 use crate::request::{TinMethod, TinRequest, TinStart, refuse};
 use crate::tally::{tally_of, tally_on_all};
 use crate::tiles::usual_tiles;
+use crate::trend::continued;
 
 /// The paper's proximity test: metres across, metres in height.
 const PROXIMITY_M: (f64, u32) = (300.0, 20);
+
+/// A survey of a tile goes this many times further than an equal share, where that gains most.
+const SURVEY_REACH: usize = 3;
+/// A hasty survey needs so many posts for each point of an equal share.
+const POSTS_PER_POINT: usize = 24;
 
 /// A mesh and where it lies.
 #[derive(Clone, Debug)]
@@ -120,11 +126,13 @@ impl Heights {
     /// # Errors
     /// When it is stopped.
     pub fn mesh(&self, tin: Tin, ended: StopReason, workers: usize, stop: &AtomicBool) -> Result<Mesh, CompileError> {
-        let tally = tally_on_all(&self.dem, &tin, &Workers::new(workers), stop)?;
+        let workers = Workers::new(workers);
+        let tally = tally_on_all(&self.dem, &tin, &workers, stop)?;
+        let each = |count: usize, piece: &(dyn Fn(usize) + Sync)| schedule::for_each_piece(&workers, count, piece);
         Ok(Mesh {
             points: tin.vertices.len(),
             residual: compiler::residual_of(&tally),
-            limit: fidelity::limit(&self.dem, tin.triangles.len()),
+            limit: fidelity::limit(&self.dem, tin.triangles.len(), &each),
             tin,
             dem: Arc::clone(&self.dem),
             east_m: self.frame.south_west[0],
@@ -311,16 +319,32 @@ impl<'a> TinJob<'a> {
     ) -> Result<Option<Vec<GainCurve>>, CompileError> {
         let Some(points) = self.points().filter(|_| 1 < self.tiles.len()) else { return Ok(None) };
         progress.tell(Event::Enter(Stage::Survey, self.tiles.len()));
-        let reach = 3 * points as usize / self.tiles.len() + 1;
-        let curve = |_, &tile: &TileId| Ok(self.curve(dem, tile, reach));
+        let curve = |_, &tile: &TileId| Ok(self.curve_of_share(dem, tile, points as usize));
         let curves = schedule::for_each_independent(&self.tiles, workers, stop, curve);
         let curves = curves.map_err(|error| CompileError::from_schedule(Stage::Survey, &self.tiles, error))?;
         progress.tell(Event::Leave(Stage::Survey));
         Ok(Some(curves))
     }
 
-    /// What a tile would gain by so many points.
-    fn curve(&self, dem: &Dem, tile: TileId, reach: usize) -> GainCurve {
+    /// What a tile would gain by a few times its equal share of `points`.
+    ///
+    /// Only how tiles compare matters. So where points are few among posts, every second post is surveyed for the share
+    /// alone, and the curve goes on as it came. Optimising with more than the least effort takes so long that a whole
+    /// survey costs nothing beside it.
+    fn curve_of_share(&self, dem: &Dem, tile: TileId, points: usize) -> GainCurve {
+        let (rect, share) = (self.tiling.rect(tile), points / self.tiles.len() + 1);
+        let is_fast = match self.request.method {
+            TinMethod::Optimised(optimising) => optimising.effort == Effort::Fast,
+            TinMethod::Greedy { .. } | TinMethod::Paper => true,
+        };
+        if is_fast && POSTS_PER_POINT * share <= rect.post_count() {
+            return continued(self.curve(&dem.every_second(rect), tile, share), share, SURVEY_REACH);
+        }
+        self.curve(&dem.window(rect), tile, SURVEY_REACH * points / self.tiles.len() + 1)
+    }
+
+    /// What a tile would gain by so many points on a window of it.
+    fn curve(&self, window: &Dem, tile: TileId, reach: usize) -> GainCurve {
         let mut growth = self.task(tile, self.tiling.shared_sides(tile), Vec::new(), Some(reach));
         growth.stop = Stop { points: Some(reach), ..Stop::default() };
         if let Rule::Batches { .. } = growth.rule {
@@ -329,12 +353,12 @@ impl<'a> TinJob<'a> {
         let outer = tiling::outer_sides(growth.rect, self.area());
         let owned = self.tiling.owned_sides(tile);
         let owned = SeamSides::from_fn(|side| owned.is_open(side) || outer.is_open(side));
-        let window = dem.window(growth.rect);
-        let importance = weights(&window);
+        growth.rect = window.rect();
+        let importance = weights(window);
         // One load module as large as the raster: costs are points, and all are booked to it.
         let grid = ModuleGrid { rows: 1, cols: 1, side_cells: i32::from(u16::MAX) };
         let task = SurveyTask { growth, owned, grid, cost: CostUnit::Points };
-        tin::survey(&window, &importance, &task, geometry::widest_level())
+        tin::survey(window, &importance, &task, geometry::widest_level())
     }
 
     /// What a tile starts from beside its corners.

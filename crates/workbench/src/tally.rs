@@ -3,7 +3,7 @@
 use std::sync::atomic::AtomicBool;
 
 use compiler::{CompileError, Stage};
-use fidelity::Tally;
+use fidelity::{Sums, Tally};
 use geometry::owned::{PostGrid, visit_residuals};
 use schedule::Workers;
 use terrain::{Dem, Post, TileId, Tin};
@@ -57,9 +57,12 @@ fn visit_triangle(dem: &Dem, tin: &Tin, triangle: [u32; 3], tally: &mut Tally) {
         corners.map(|vertex| vertex.at.row - from.row),
         corners.map(|vertex| vertex.height),
     );
+    let (mut sums, mut histogram, whole) = (Sums::default(), tally.histogram(), dem.void_count() == 0);
     visit_residuals(&grid, &facet, dem, |post, residual| {
-        if !dem.is_void(post) {
-            tally.add(residual);
+        if whole || !dem.is_void(post) {
+            sums.add(residual);
+            histogram.add(residual);
         }
     });
+    tally.add_sums(&sums);
 }
