@@ -4,6 +4,7 @@ use std::net::IpAddr;
 use std::path::PathBuf;
 
 use clap::Args;
+use clap::builder::RangedI64ValueParser;
 use exports::Datum;
 
 use super::export::datum;
@@ -61,17 +62,22 @@ pub struct Arguments {
     #[arg(long, value_name = "DATUM", value_parser = datum, allow_hyphen_values = true)]
     assume_datum: Option<Datum>,
     /// MiB of a request's body at most
-    #[arg(long, value_name = "MIB", default_value_t = BODY_MIB, value_parser = clap::value_parser!(u32).range(1..=1024))]
+    #[arg(long, value_name = "MIB", default_value_t = BODY_MIB, value_parser = up_to(1024))]
     max_body: u32,
     /// Connections at a time
-    #[arg(long, value_name = "N", default_value_t = CLIENTS, value_parser = clap::value_parser!(u32).range(1..=65536))]
+    #[arg(long, value_name = "N", default_value_t = CLIENTS, value_parser = up_to(65536))]
     max_clients: u32,
     /// Seconds in which a request must arrive whole
-    #[arg(long, value_name = "N", default_value_t = REQUEST_SECONDS, value_parser = clap::value_parser!(u32).range(1..=3600))]
+    #[arg(long, value_name = "N", default_value_t = REQUEST_SECONDS, value_parser = up_to(3600))]
     request_seconds: u32,
     /// Seconds in which an answer is made and read
-    #[arg(long, value_name = "N", default_value_t = ANSWER_SECONDS, value_parser = clap::value_parser!(u32).range(1..=3600))]
+    #[arg(long, value_name = "N", default_value_t = ANSWER_SECONDS, value_parser = up_to(3600))]
     answer_seconds: u32,
+}
+
+/// Reads a whole number from 1.
+fn up_to(most: i64) -> RangedI64ValueParser<u32> {
+    clap::value_parser!(u32).range(1..=most)
 }
 
 fn host(text: &str) -> Result<IpAddr, String> {

@@ -21,11 +21,12 @@ use tokio::sync::Semaphore;
 use tokio::task::spawn_blocking;
 
 use super::body::Bodies;
+use super::contents::TileModulesFile;
 use super::files::{self, Part};
 use super::globe::Kind;
 use super::queries::{Heights, Lines, RawQuery};
 use super::refusal::Refusal;
-use super::snapshot::{Served, Snapshot, TileModulesFile};
+use super::snapshot::{Served, Snapshot};
 use crate::arguments::row_col;
 use crate::commands::explain::to_json;
 use crate::failure::Failure;
@@ -36,9 +37,9 @@ pub struct Shared {
     /// The databases by name.
     pub served: BTreeMap<String, Arc<Served>>,
     pub bodies: Bodies,
-    /// Queries at a time: as many as there are cores.
+    /// Queries at a time, and files that are read: as many as there are cores.
     queries: Arc<Semaphore>,
-    /// Files that are made at a time.
+    /// Files for globes that are made at a time; the first of a database sets it on the globe, others wait for that.
     makers: Arc<Semaphore>,
     /// Explanations at a time: each reads the whole database.
     explanations: Arc<Semaphore>,
@@ -115,7 +116,8 @@ pub fn path_of(name: &str) -> String {
 }
 
 fn described(name: &str, snapshot: &Snapshot) -> Value {
-    let (area, totals, frame) = (&snapshot.manifest.area, &snapshot.manifest.totals, &snapshot.frame);
+    let (area, totals, frame) =
+        (&snapshot.contents.manifest.area, &snapshot.contents.manifest.totals, &snapshot.contents.frame);
     let path = path_of(name);
     let at = |what: &str| format!("{path}/{what}");
     json!({
@@ -130,7 +132,7 @@ fn described(name: &str, snapshot: &Snapshot) -> Value {
         "load_modules": [frame.rows, frame.cols],
         "levels": frame.level_count,
         "triangles": totals.triangles,
-        "fingerprint": snapshot.fingerprint.to_string(),
+        "fingerprint": snapshot.contents.fingerprint.to_string(),
         "links": {
             "terrain": at("layer.json"),
             "tileset": at("tileset.json"),
@@ -148,12 +150,12 @@ async fn globe_file(shared: &Shared, headers: &HeaderMap, name: &str, kind: Kind
     let headers = headers.clone();
     let made = at_a_place(&shared.makers, move || {
         served.ask(|snapshot| {
-            let key = format!("{} {} {file}", snapshot.fingerprint, snapshot.globes.key());
+            let key = format!("{} {} {file}", snapshot.contents.fingerprint, snapshot.globes.key());
             let tag = files::tag(Fingerprint::of_bytes(key.as_bytes()));
             if files::is_known(&headers, &tag) {
                 return Ok(files::known(&tag));
             }
-            let bytes = snapshot.globes.file(snapshot, kind, &file)?;
+            let bytes = snapshot.globes.file(&snapshot.contents, kind, &file)?;
             Ok(files::content(content_type(&file), &tag, bytes))
         })
     });
@@ -226,7 +228,7 @@ pub async fn modules(State(shared): Context, UrlPath(name): UrlPath<String>) -> 
             "blake3": file.stamp.blake3.to_string(),
         })
     };
-    let look = move || served.ask(|snapshot| Ok(snapshot.files.iter().map(listed).collect::<Vec<_>>()));
+    let look = move || served.ask(|snapshot| Ok(snapshot.contents.files.iter().map(listed).collect::<Vec<_>>()));
     Ok(json_answer(&json!({ "files": at_a_place(&shared.queries, look).await? })))
 }
 
@@ -243,15 +245,15 @@ pub async fn module_file(
     let served = shared.named(&name)?;
     let read = move || {
         served.ask(|snapshot| {
-            if let Some(of_tile) = snapshot.files.iter().find(|of_tile| file_name(of_tile) == file) {
+            if let Some(of_tile) = snapshot.contents.files.iter().find(|of_tile| file_name(of_tile) == file) {
                 return tile_file(of_tile, &headers);
             }
             let id = module_id(&file).ok_or_else(|| no_file(&file))?;
-            let of_tile = snapshot.files.iter().find(|of_tile| of_tile.block.contains(id.row, id.col));
+            let of_tile = snapshot.contents.files.iter().find(|of_tile| of_tile.block.contains(id.row, id.col));
             one_module(snapshot, of_tile.ok_or_else(|| no_file(&file))?, id, &headers)
         })
     };
-    at_a_place(&shared.makers, read).await
+    at_a_place(&shared.queries, read).await
 }
 
 fn no_file(file: &str) -> Refusal {
@@ -275,10 +277,7 @@ fn tile_file(of_tile: &TileModulesFile, headers: &HeaderMap) -> Answer {
         return Ok(files::known(&tag));
     }
     let length = of_tile.stamp.length;
-    let part = match Part::asked(headers, &tag, length) {
-        Ok(part) => part,
-        Err(refused) => return Ok(refused),
-    };
+    let Some(part) = Part::asked(headers, &tag, length) else { return Ok(files::outside(length)) };
     let (first, end) = match part {
         Part::Whole => (0, length),
         Part::Bytes(first, last) => (first, last + 1),
@@ -303,17 +302,16 @@ fn one_module(snapshot: &Snapshot, of_tile: &TileModulesFile, id: ModuleId, head
     if files::is_known(headers, &tag) {
         return Ok(files::known(&tag));
     }
-    let read = Folder::new(&snapshot.folder).read_levels(of_tile.tile);
+    let read = Folder::new(&snapshot.contents.folder).read_levels(of_tile.tile);
     let (header, levels) = read.map_err(|error| Refusal::of(Failure::from(error)))?;
     let bytes: Bytes = exports::module_file(&header, &levels, id).ok_or_else(Refusal::fault)?.into();
     let length = bytes.len() as u64;
-    Ok(match Part::asked(headers, &tag, length) {
-        Ok(Part::Whole) => Part::Whole.answer(&tag, length, bytes),
-        Ok(Part::Bytes(first, last)) => {
-            Part::Bytes(first, last).answer(&tag, length, bytes.slice(first as usize..=last as usize))
-        }
-        Err(refused) => refused,
-    })
+    let Some(part) = Part::asked(headers, &tag, length) else { return Ok(files::outside(length)) };
+    let bytes = match part {
+        Part::Whole => bytes,
+        Part::Bytes(first, last) => bytes.slice(first as usize..=last as usize),
+    };
+    Ok(part.answer(&tag, length, bytes))
 }
 
 fn kind(is_raw: bool) -> [(header::HeaderName, &'static str); 1] {
@@ -375,7 +373,7 @@ pub async fn explained(
         served.ask(|snapshot| {
             let module = asked_module(snapshot, &query)?;
             let ground = if query.one_more { WantedGround::Recorded } else { WantedGround::None };
-            let found = explain(&snapshot.folder, module, ground, resources::cores());
+            let found = explain(&snapshot.contents.folder, module, ground, resources::cores());
             let found = found.map_err(|error| {
                 Refusal::of(Failure::from(error)).with_status(StatusCode::CONFLICT, StatusCode::NOT_FOUND)
             })?;
@@ -400,7 +398,7 @@ fn asked_module(snapshot: &Snapshot, query: &ExplainQuery) -> Result<ModuleId, R
         (None, Some(text)) => {
             let pair = text.split_once(',').and_then(|(east, north)| Some([east.parse().ok()?, north.parse().ok()?]));
             let place: [f64; 2] = pair.ok_or_else(|| wrong(&format!("at={text}")))?;
-            let [row, col] = snapshot.frame.module_under(place).ok_or_else(|| outside(snapshot, text))?;
+            let [row, col] = snapshot.contents.frame.module_under(place).ok_or_else(|| outside(snapshot, text))?;
             Ok(ModuleId { row, col })
         }
         (None, None) => Err(wrong("neither module nor at")),
@@ -409,7 +407,7 @@ fn asked_module(snapshot: &Snapshot, query: &ExplainQuery) -> Result<ModuleId, R
 }
 
 fn outside(snapshot: &Snapshot, text: &str) -> Refusal {
-    let area = &snapshot.manifest.area;
+    let area = &snapshot.contents.manifest.area;
     let [[west, east], [south, north]] =
         [0, 1].map(|axis| [area.origin_m[axis], area.origin_m[axis] + area.size_m[axis]]);
     Refusal::missing(

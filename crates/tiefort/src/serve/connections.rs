@@ -39,7 +39,8 @@ const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
 /// What a client is told when all places are taken by requests at work.
 const ALL_TAKEN: &[u8] = b"HTTP/1.1 503 Service Unavailable\r\nContent-Type: application/json\r\nRetry-After: 1\r\n\
     Connection: close\r\nContent-Length: 118\r\n\r\n\
-    {\"error\":\"found all places taken, expected a free one\",\"hint\":\"ask again; --max-clients of `tiefort serve` has more\"}\n";
+    {\"error\":\"found all places taken, expected a free one\",\
+    \"hint\":\"ask again; --max-clients of `tiefort serve` has more\"}\n";
 
 /// How a connection stands.
 #[derive(Clone, Copy)]

@@ -48,22 +48,18 @@ pub enum Part {
 }
 
 impl Part {
-    /// What a client asks of a file of this name and length. Several ranges at once are answered with the whole file, as
-    /// is one of a content that the client has of another build.
-    ///
-    /// # Errors
-    /// When the range lies outside the file.
-    pub fn asked(headers: &HeaderMap, tag: &str, length: u64) -> Result<Self, Response> {
+    /// What a client asks of a file of this name and length; `None` for a range outside it. Several ranges at once are
+    /// answered with the whole file, as is one of a content that the client has of another build.
+    pub fn asked(headers: &HeaderMap, tag: &str, length: u64) -> Option<Self> {
         let text = |name: header::HeaderName| headers.get(name).and_then(|value| value.to_str().ok());
-        let Some(range) = text(header::RANGE) else { return Ok(Part::Whole) };
+        let Some(range) = text(header::RANGE) else { return Some(Part::Whole) };
         if text(header::IF_RANGE).is_some_and(|same| same != tag) {
-            return Ok(Part::Whole);
+            return Some(Part::Whole);
         }
-        let Ok(parsed) = parse_range_header(range) else { return Ok(Part::Whole) };
-        match parsed.validate(length).as_deref() {
-            Ok([one]) => Ok(Part::Bytes(*one.start(), *one.end())),
-            Ok(_) => Ok(Part::Whole),
-            Err(_) => Err(outside(range, length)),
+        let Ok(parsed) = parse_range_header(range) else { return Some(Part::Whole) };
+        match parsed.validate(length).ok()?.as_slice() {
+            [one] => Some(Part::Bytes(*one.start(), *one.end())),
+            _ => Some(Part::Whole),
         }
     }
 
@@ -80,10 +76,11 @@ impl Part {
     }
 }
 
-fn outside(range: &str, length: u64) -> Response {
+/// The answer to a range outside a file of this length.
+pub fn outside(length: u64) -> Response {
     let refusal = Refusal::new(
         StatusCode::RANGE_NOT_SATISFIABLE,
-        format!("found the range {range}, expected one within {length} bytes"),
+        format!("found a range outside the file, expected one within its {length} bytes"),
         "the last byte is one less than the length",
     );
     let mut response = refusal.into_response();
@@ -116,15 +113,15 @@ mod tests {
 
     #[test]
     fn a_range_is_one_run_of_bytes_inside_the_file_of_the_same_build() {
-        let asked = |range| Part::asked(&headers(&[(header::RANGE, range)]), "\"a\"", 100).map_err(|r| r.status());
-        assert_eq!(asked("bytes=0-9"), Ok(Part::Bytes(0, 9)));
-        assert_eq!(asked("bytes=90-"), Ok(Part::Bytes(90, 99)));
-        assert_eq!(asked("bytes=-1"), Ok(Part::Bytes(99, 99)));
-        assert_eq!(asked("bytes=90-200"), Ok(Part::Bytes(90, 99)));
-        assert_eq!(asked("bytes=0-1,3-4"), Ok(Part::Whole));
-        assert_eq!(asked("lines=1-2"), Ok(Part::Whole));
-        assert_eq!(asked("bytes=100-"), Err(StatusCode::RANGE_NOT_SATISFIABLE));
+        let asked = |range| Part::asked(&headers(&[(header::RANGE, range)]), "\"a\"", 100);
+        assert_eq!(asked("bytes=0-9"), Some(Part::Bytes(0, 9)));
+        assert_eq!(asked("bytes=90-"), Some(Part::Bytes(90, 99)));
+        assert_eq!(asked("bytes=-1"), Some(Part::Bytes(99, 99)));
+        assert_eq!(asked("bytes=90-200"), Some(Part::Bytes(90, 99)));
+        assert_eq!(asked("bytes=0-1,3-4"), Some(Part::Whole));
+        assert_eq!(asked("lines=1-2"), Some(Part::Whole));
+        assert_eq!(asked("bytes=100-"), None);
         let of_another_build = headers(&[(header::RANGE, "bytes=0-9"), (header::IF_RANGE, "\"b\"")]);
-        assert_eq!(Part::asked(&of_another_build, "\"a\"", 100).unwrap(), Part::Whole);
+        assert_eq!(Part::asked(&of_another_build, "\"a\"", 100), Some(Part::Whole));
     }
 }

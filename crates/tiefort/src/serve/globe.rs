@@ -1,7 +1,7 @@
 //! What globes ask for: quantized-mesh terrain and 3D Tiles, file by file, with the bytes of `tiefort export`.
 //!
-//! The area is set on the globe when the first of its files is asked for; a file is made when it is asked for, and those
-//! made last are kept.
+//! The area is set on the globe when the first of its files is asked for; a file is made when it is asked for, and
+//! those made last are kept.
 
 use std::sync::atomic::AtomicBool;
 use std::sync::{Mutex, OnceLock, PoisonError};
@@ -12,8 +12,8 @@ use exports::{Datum, ExportError, Levels, Product, QuantizedMesh, Tileset, Work}
 use lru::LruCache;
 use schedule::Workers;
 
+use super::contents::Contents;
 use super::refusal::Refusal;
-use super::snapshot::Snapshot;
 use crate::failure::Failure;
 use crate::resources;
 
@@ -60,7 +60,7 @@ impl Globes {
     ///
     /// # Errors
     /// When there is none of this name, the area is too large, or cannot be set on the globe.
-    pub fn file(&self, of: &Snapshot, kind: Kind, name: &str) -> Result<Bytes, Refusal> {
+    pub fn file(&self, of: &Contents, kind: Kind, name: &str) -> Result<Bytes, Refusal> {
         let lock = || self.kept.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(bytes) = lock().files.get(name) {
             return Ok(bytes.clone());
@@ -83,14 +83,14 @@ impl Globes {
         Ok(bytes)
     }
 
-    fn terrain(&self, of: &Snapshot) -> Result<QuantizedMesh<Product>, Refusal> {
+    fn terrain(&self, of: &Contents) -> Result<QuantizedMesh<Product>, Refusal> {
         worked(of, |work| {
             let product = Product::read(&of.folder, None, Levels::One(0), work)?;
             QuantizedMesh::of(product, self.assumed, work)
         })
     }
 
-    fn tileset(&self, of: &Snapshot) -> Result<Tileset, Refusal> {
+    fn tileset(&self, of: &Contents) -> Result<Tileset, Refusal> {
         worked(of, |work| {
             let product = Product::read(&of.folder, None, Levels::From(0), work)?;
             Tileset::of(&product, self.assumed, work)
@@ -112,7 +112,7 @@ impl Kept {
 }
 
 /// Works on all of an area that is not too large.
-fn worked<R>(of: &Snapshot, work: impl FnOnce(&Work) -> Result<R, ExportError>) -> Result<R, Refusal> {
+fn worked<R>(of: &Contents, work: impl FnOnce(&Work) -> Result<R, ExportError>) -> Result<R, Refusal> {
     let triangles = of.manifest.totals.triangles;
     if TRIANGLES_MAX < triangles {
         return Err(Refusal::new(

@@ -7,8 +7,8 @@ use axum::http::StatusCode;
 use load_module_reader::{Area, Block, Keep, LoadedGround, ReadError, TileFile};
 use lru::LruCache;
 
+use super::contents::Contents;
 use super::refusal::Refusal;
-use super::snapshot::Snapshot;
 
 /// Load modules along a side of a block.
 const SIDE: u32 = 16;
@@ -34,7 +34,7 @@ impl Default for Ground {
 
 impl Ground {
     /// The block of this key, read once however many ask for it.
-    fn block(&self, of: &Snapshot, key: Key) -> Result<Loading, Refusal> {
+    fn block(&self, of: &Contents, key: Key) -> Result<Loading, Refusal> {
         let lock = || self.blocks.lock().unwrap_or_else(PoisonError::into_inner);
         let loading = Arc::clone(lock().get_or_insert(key, Loading::default));
         if let Err(refusal) = loading.get_or_init(|| load(of, key)) {
@@ -52,7 +52,7 @@ impl Ground {
     /// When there is no such level, or a file cannot be read.
     pub fn under(
         &self,
-        of: &Snapshot,
+        of: &Contents,
         level: u16,
         places: &[[f64; 2]],
         mut each: impl FnMut(&LoadedGround, &[usize]),
@@ -78,7 +78,7 @@ impl Ground {
     /// When there is no such level, the line is too long, or a file cannot be read.
     pub fn around(
         &self,
-        of: &Snapshot,
+        of: &Contents,
         level: u16,
         ends: [[f64; 2]; 2],
         before: Option<LoadedGround>,
@@ -124,7 +124,7 @@ impl Ground {
     }
 }
 
-fn check_level(of: &Snapshot, level: u16) -> Result<(), Refusal> {
+fn check_level(of: &Contents, level: u16) -> Result<(), Refusal> {
     match of.frame.level_count {
         count if level < count => Ok(()),
         1 => Err(Refusal::request(format!("found level {level}, expected 0, the only one"), "leave level out")),
@@ -136,7 +136,7 @@ fn check_level(of: &Snapshot, level: u16) -> Result<(), Refusal> {
 }
 
 /// The load modules of the area in the rectangle around a line, and one more on every side.
-fn around(of: &Snapshot, ends: [[f64; 2]; 2]) -> Block {
+fn around(of: &Contents, ends: [[f64; 2]; 2]) -> Block {
     let [from, to] = ends.map(|end| of.frame.module_at(end));
     let range = |axis: usize, count: u32| {
         let clamped = |index: i64| index.clamp(0, i64::from(count)) as u32;
@@ -148,7 +148,7 @@ fn around(of: &Snapshot, ends: [[f64; 2]; 2]) -> Block {
     Block { south, west, north, east }
 }
 
-fn load(of: &Snapshot, (level, row, col): Key) -> Result<LoadedGround, Refusal> {
+fn load(of: &Contents, (level, row, col): Key) -> Result<LoadedGround, Refusal> {
     let block = Block {
         south: row * SIDE,
         west: col * SIDE,

@@ -4,21 +4,23 @@
 //!   connections   a bounded number of clients, each for a bounded time
 //!   routes        address to answer; packing, other origins, refusals in JSON
 //!   answers       what each address answers, from a
-//!   snapshot      database as one build left it: opened again when its record changed
+//!   snapshot      database as one build left it: opened again when its record changed   (contents)
 //!   ground        load modules in memory, for queries       (queries, body)
 //!   globe         terrain and 3D Tiles, file by file        (files)
-//!   openapi, pages   what can be asked
+//!   openapi, pages   what can be asked                     (paths)
 //! ```
 //! An answer comes from one finished build or says to ask later. All that stays in memory is bounded.
 
 mod answers;
 mod body;
 mod connections;
+mod contents;
 mod files;
 mod globe;
 mod ground;
 mod openapi;
 mod pages;
+mod paths;
 mod queries;
 mod refusal;
 mod routes;

@@ -1,8 +1,8 @@
-//! What can be asked, for programs: an OpenAPI 3.1 document of the addresses in [`super::routes`].
+//! What can be asked, for programs: an OpenAPI 3.1 document of the addresses in [`super::paths`].
 
 use serde_json::{Value, json};
 
-use super::routes::paths;
+use super::paths;
 
 const DESCRIPTION: &str = "Terrain databases over HTTP. With one database, all its addresses also work without \
     /{database}. Places are metres of the area's own system, east before north; rows and columns count from the \
@@ -19,7 +19,7 @@ pub fn document() -> Value {
         "paths": {
             paths::DATABASES: { "get": get("Every database", "", &[], &[("application/json", "the list")]) },
             paths::DATABASE: {
-                "get": get("One database", "System, corner, size, levels.", &["database"], &[("application/json", "it")]),
+                "get": get("One database", "System, corner, size.", &["database"], &[("application/json", "it")]),
             },
             paths::LAYER: { "get": get(
                 "Terrain for globes: layer.json",
@@ -203,10 +203,10 @@ fn line_of_sight() -> Value {
             "properties": { "lines": list(json!({
                 "type": "object",
                 "properties": {
-                    "visible": or_null("boolean", "null where the line leaves the area before anything blocks it"),
+                    "visible": or_null("boolean", "null where it leaves the area before anything blocks it"),
                     "blocked_at": or_null("number", "share of the line at which something first stands in its way"),
                     "blocker": or_null("array", "east, north and height of the line there"),
-                    "clearance_m": or_null("number", "least height of the line above the ground, below 0 where blocked"),
+                    "clearance_m": or_null("number", "least height above the ground, below 0 where blocked"),
                 },
             }), "in the order of the lines") },
         },
@@ -218,8 +218,8 @@ fn line_of_sight() -> Value {
         body,
         [
             "little-endian 64-bit floats, six for each line",
-            "little-endian 64-bit floats, three for each line: 1 visible, 0 not, NaN unknown; share of the line at which \
-             it is blocked; least height above the ground in metres; NaN where there is none",
+            "little-endian 64-bit floats, three for each line: 1 visible, 0 not, NaN unknown; share of the line at \
+             which it is blocked; least height above the ground in metres; NaN where there is none",
         ],
         answer,
     )

@@ -8,7 +8,8 @@ use serde_json::Value;
 /// What a page may load: itself.
 const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'";
 const STYLE: &str = "
-body { font: 16px/1.5 system-ui, sans-serif; max-width: 60rem; margin: 2rem auto; padding: 0 1rem; color-scheme: light dark }
+body { font: 16px/1.5 system-ui, sans-serif; max-width: 60rem; margin: 2rem auto; padding: 0 1rem }
+:root { color-scheme: light dark }
 table { border-collapse: collapse } td, th { text-align: left; padding: .2rem 1rem .2rem 0; vertical-align: top }
 code, pre { font-family: ui-monospace, monospace; font-size: 90% } pre { overflow-x: auto; padding: .5rem 0 }
 h3 code { font-weight: bold }";
@@ -36,7 +37,7 @@ pub fn index(databases: &[Value]) -> Response {
     page(
         "Terrain databases",
         html! {
-            p { a href="/docs" { "What can be asked" } ", the same for programs as " a href="/openapi.json" { "OpenAPI" }
+            p { a href="/docs" { "What can be asked" } ", for programs as " a href="/openapi.json" { "OpenAPI" }
                 ", and this list as " a href="/databases.json" { "JSON" } "." }
             @for database in databases {
                 h2 { (text(&database["name"])) }

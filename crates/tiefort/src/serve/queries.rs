@@ -1,7 +1,7 @@
 //! Heights and lines of sight: positions in, numbers out, as JSON or as little-endian 64-bit floats.
 //!
-//! JSON has finite numbers only, and `null` where there is no answer. Among raw numbers a position that is not a number,
-//! infinite or outside the area is answered with NaN, as the reader's own functions do.
+//! JSON has finite numbers only, and `null` where there is no answer. Among raw numbers a position that is not a
+//! number, infinite or outside the area is answered with NaN, as the reader's own functions do.
 
 use load_module_reader::Sight;
 use serde::{Deserialize, Serialize};
@@ -88,7 +88,7 @@ impl Heights {
     /// When a file cannot be read.
     pub fn answer(&self, snapshot: &Snapshot) -> Result<Vec<u8>, Refusal> {
         let mut heights = vec![f64::NAN; self.positions.len()];
-        snapshot.ground.under(snapshot, self.level, &self.positions, |ground, indices| {
+        snapshot.ground.under(&snapshot.contents, self.level, &self.positions, |ground, indices| {
             let mut found = vec![f64::NAN; indices.len()];
             match self.ceiling {
                 None => {
@@ -144,17 +144,18 @@ impl Lines {
     pub fn answer(&self, snapshot: &Snapshot) -> Result<Vec<u8>, Refusal> {
         let mut answers = Vec::with_capacity(self.lines.len());
         // Ground under all lines at once, where that is not too much; else line by line.
-        let mut held =
-            self.around_all(snapshot).and_then(|ends| snapshot.ground.around(snapshot, self.level, ends, None).ok());
+        let mut held = self
+            .around_all(snapshot)
+            .and_then(|ends| snapshot.ground.around(&snapshot.contents, self.level, ends, None).ok());
         for &[from_east, from_north, from_height, to_east, to_north, to_height] in &self.lines {
             let (from, to) = ([from_east, from_north, from_height], [to_east, to_north, to_height]);
             // It begins outside: there is nothing to look at.
-            if snapshot.frame.module_under([from_east, from_north]).is_none() {
+            if snapshot.contents.frame.module_under([from_east, from_north]).is_none() {
                 answers.push(LineAnswer { visible: None, blocked_at: None, blocker: None, clearance_m: None });
                 continue;
             }
             let ends = [[from_east, from_north], [to_east, to_north]];
-            let ground = snapshot.ground.around(snapshot, self.level, ends, held.take())?;
+            let ground = snapshot.ground.around(&snapshot.contents, self.level, ends, held.take())?;
             let (visible, blocked_at) = match ground.sight(from, to) {
                 Sight::Free => (Some(true), None),
                 Sight::Hidden(share) => (Some(false), Some(share)),
@@ -173,7 +174,8 @@ impl Lines {
 
     /// South-west and north-east corner of the rectangle around all lines that begin in the area.
     fn around_all(&self, snapshot: &Snapshot) -> Option<[[f64; 2]; 2]> {
-        let inside = self.lines.iter().filter(|line| snapshot.frame.module_under([line[0], line[1]]).is_some());
+        let inside =
+            self.lines.iter().filter(|line| snapshot.contents.frame.module_under([line[0], line[1]]).is_some());
         inside.flat_map(|line| [[line[0], line[1]], [line[3], line[4]]]).fold(None, |around, [east, north]| {
             let [low, high] = around.unwrap_or([[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]]);
             Some([[low[0].min(east), low[1].min(north)], [high[0].max(east), high[1].max(north)]])

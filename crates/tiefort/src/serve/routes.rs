@@ -20,25 +20,7 @@ use tower_http::cors::{AllowOrigin, CorsLayer};
 
 use super::answers::{self, Context, Shared, path_of};
 use super::refusal::Refusal;
-use super::{openapi, pages};
-
-/// The addresses of databases, as OpenAPI and the router write them.
-pub mod paths {
-    pub const DATABASES: &str = "/databases.json";
-    pub const DATABASE: &str = "/{database}";
-    pub const LAYER: &str = "/{database}/layer.json";
-    pub const TERRAIN: &str = "/{database}/{z}/{x}/{file}";
-    pub const HOLES: &str = "/{database}/holes.geojson";
-    pub const TILESET: &str = "/{database}/tileset.json";
-    pub const SQUARE: &str = "/{database}/squares/{file}";
-    pub const GROUP: &str = "/{database}/groups/{file}";
-    pub const LEVEL: &str = "/{database}/levels/{level}/{file}";
-    pub const MODULES: &str = "/{database}/modules";
-    pub const MODULE: &str = "/{database}/modules/{file}";
-    pub const HEIGHTS: &str = "/{database}/heights";
-    pub const SIGHT: &str = "/{database}/line-of-sight";
-    pub const EXPLAIN: &str = "/{database}/explain";
-}
+use super::{openapi, pages, paths};
 
 /// Addresses that belong to no database.
 const OF_ALL: [&str; 4] = ["/", "/docs", "/openapi.json", paths::DATABASES];

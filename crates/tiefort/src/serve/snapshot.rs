@@ -9,17 +9,13 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::SystemTime;
 
-use database::{FileStamp, Fingerprint, Folder, Manifest};
 use exports::Datum;
-use load_module_reader::{AreaFrame, Block, Keep, TileFile};
-use terrain::TileId;
 
+use super::contents::{Contents, RECORD};
 use super::globe::Globes;
 use super::ground::Ground;
 use super::refusal::Refusal;
 use crate::failure::Failure;
-
-const RECORD: &str = "database.json";
 
 /// How the record of a build looked: every change of it is a new file.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -43,27 +39,10 @@ impl Record {
     }
 }
 
-/// The file of a tile's load modules.
-pub struct TileModulesFile {
-    pub tile: TileId,
-    pub path: PathBuf,
-    /// The load modules in it.
-    pub block: Block,
-    /// How it must look.
-    pub stamp: FileStamp,
-}
-
 /// A database as one build left it.
 pub struct Snapshot {
-    pub folder: PathBuf,
     record: Option<Record>,
-    /// What `database.json` says.
-    pub manifest: Manifest,
-    /// Of `database.json`, which holds the checksum of every file.
-    pub fingerprint: Fingerprint,
-    /// Where load modules lie.
-    pub frame: AreaFrame,
-    pub files: Vec<TileModulesFile>,
+    pub contents: Contents,
     /// Load modules in memory.
     pub ground: Ground,
     /// What globes ask for.
@@ -72,42 +51,16 @@ pub struct Snapshot {
 
 impl Snapshot {
     fn open(folder: &Path, assumed: Option<Datum>) -> Result<Self, Failure> {
+        // Looked at before anything is read: what changes meanwhile is seen.
         let record = Record::look(folder);
-        let of_folder = Folder::new(folder);
-        let manifest = of_folder.finished()?;
-        let bytes = fs::read(folder.join(RECORD)).map_err(|error| Failure::output(&folder.join(RECORD), &error))?;
-        let mut files = Vec::new();
-        let mut frame = None;
-        for tile in &manifest.tiles {
-            let Some(stamp) = tile.slm else { continue };
-            let path = of_folder.modules_path(tile.tile());
-            let file = TileFile::open(&path, Keep::OnDisk).map_err(|error| damaged(&error))?;
-            let header = file.header();
-            let block = Block { south: header.south, west: header.west, north: header.north, east: header.east };
-            frame.get_or_insert_with(|| AreaFrame::of(header));
-            files.push(TileModulesFile { tile: tile.tile(), path, block, stamp });
-        }
-        let frame = frame.ok_or_else(|| damaged(&"found no load modules, expected some"))?;
-        Ok(Self {
-            folder: folder.to_path_buf(),
-            record,
-            fingerprint: Fingerprint::of_bytes(&bytes),
-            ground: Ground::default(),
-            globes: Globes::new(assumed),
-            manifest,
-            frame,
-            files,
-        })
+        let contents = Contents::read(folder)?;
+        Ok(Self { record, contents, ground: Ground::default(), globes: Globes::new(assumed) })
     }
 
     /// Whether the database is still that of this build.
     fn is_current(&self) -> bool {
-        self.record.is_some() && self.record == Record::look(&self.folder)
+        self.record.is_some() && self.record == Record::look(&self.contents.folder)
     }
-}
-
-fn damaged(error: &dyn std::fmt::Display) -> Failure {
-    Failure::new(error, "`tiefort verify` says what is damaged, `tiefort build` mends it")
 }
 
 /// A folder that is served.

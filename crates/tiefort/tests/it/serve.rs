@@ -229,7 +229,7 @@ fn heights_and_lines_of_sight_are_those_of_the_reader() {
         assert_eq!((answer["visible"].as_bool(), answer["blocked_at"].as_f64()), (Some(visible), at), "{line:?}");
         assert_eq!(answer["clearance_m"].as_f64(), clearance);
         assert_eq!(answer["blocker"].is_null(), visible);
-        let numbers = [f64::from(u8::from(visible)), at.unwrap_or(f64::NAN), clearance.unwrap()];
+        let numbers = [f64::from(u8::from(visible)), at.unwrap_or(f64::NAN), clearance.unwrap_or(f64::NAN)];
         assert!(raw.iter().zip(&numbers).all(|(a, b)| same(a, b)), "{raw:?} is not {numbers:?}");
         seen[usize::from(visible)] += 1;
     }

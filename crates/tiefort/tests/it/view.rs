@@ -1,11 +1,9 @@
 //! `tiefort view`: the server, or word of how to build it in.
 
-use crate::scene::Scene;
-
 #[cfg(not(feature = "viewer"))]
 #[test]
 fn without_the_viewer_the_command_says_how_to_build_it_in() {
-    let scene = Scene::new();
+    let scene = crate::scene::Scene::new();
     scene.refuses(&["view", "small.tdb"], &["without the viewer"]);
     let hint = scene.run_to(2, &["view", "small.tdb"]).stderr;
     assert!(hint.contains("scripts/build_viewer.sh") && hint.contains("--features viewer"), "{hint}");
