@@ -38,8 +38,8 @@ Addresses begin with the folder's name; with one DIR they also work without.
   /NAME/explain              one load module, explained
 
 While a database is being built it answers 503, and afterwards from the new
-one; no answer mixes two builds. Nobody is asked for a password: beyond this
-machine, serve behind a proxy that does. Ctrl-C ends it.";
+one; no answer mixes two builds. It asks for no password: beyond this machine,
+put it behind a proxy that does. Ctrl-C ends it.";
 
 /// Arguments of `serve`.
 #[derive(Args)]

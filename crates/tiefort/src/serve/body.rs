@@ -120,8 +120,9 @@ impl Received {
     /// # Errors
     /// When it says anything else; `expected` is what to send.
     pub fn json<T: DeserializeOwned>(&self, expected: &str) -> Result<T, Refusal> {
-        serde_json::from_slice(&self.bytes)
-            .map_err(|error| Refusal::request(format!("found a body of which {error}, expected {expected}"), JSON_HINT))
+        serde_json::from_slice(&self.bytes).map_err(|error| {
+            Refusal::request(format!("found a body that cannot be read ({error}), expected {expected}"), JSON_HINT)
+        })
     }
 
     /// Its numbers, `N` at a time.

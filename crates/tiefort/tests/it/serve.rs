@@ -458,7 +458,7 @@ fn only_this_machine_and_the_origins_that_were_named_may_ask() {
 
 #[cfg(unix)]
 #[test]
-fn ctrl_c_ends_it_within_a_second_whoever_is_connected() {
+fn ctrl_c_ends_it_within_a_second_with_clients_connected() {
     for signal in ["-INT", "-TERM"] {
         let mut server = served();
         let mut idle = server.connect();
