@@ -73,6 +73,7 @@ fn get(summary: &str, description: &str, parameters: &[&str], kinds: &[(&str, &s
         "responses": {
             "200": { "description": said.join(", "), "content": content },
             "404": { "description": "no such database or file" },
+            "409": { "description": "what the database holds does not allow it: error says why" },
             "503": { "description": "the database is being built, or not there: ask again" },
         },
     })
