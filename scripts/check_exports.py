@@ -5,7 +5,8 @@
 
 With --holes a database with holes is built and checked, too, with --bridge one with a bridge over a valley. PROGRAM is
 target/release/tiefort unless said. Needs rasterio, rio-cogeo, meshio, geopandas, pyogrio, pyproj and numpy; osgconv
-(Debian's openscenegraph); node with what scripts/exports/package.json names for glTF and CesiumJS, and chromium; a
+(Debian's openscenegraph); node with what scripts/exports/package.json names for glTF and CesiumJS, which also loads
+from `tiefort serve`, and chromium; a
 Python that has QGIS (Debian's python3-qgis); usd-core and mujoco; Debian's libsdformat-dev. A reader that is missing
 is told and skipped, unless --all is given.
 """
@@ -774,7 +775,7 @@ def altitude(corners):
     return doubled / max(math.dist(a[:2], b[:2]) for a, b in zip(corners, [*corners[1:], corners[0]]))
 
 
-def check_cesium(database, arguments, scratch):
+def cesium_places(database, arguments, scratch):
     """Heights at the middle of triangles, taken as ellipsoidal so that PROJ alone says where they are."""
     if not arguments.node_modules or not shutil.which("chromium"):
         raise Skip("no --node-modules with cesium and puppeteer-core, or no chromium")
@@ -791,8 +792,30 @@ def check_cesium(database, arguments, scratch):
         east, north = database.origin[0] + col * database.side + x, database.origin[1] + row * database.side + y
         places.append([*to.transform(east, north), z])
     (scratch / "places.json").write_text(json.dumps(places))
+
+
+def check_cesium(database, arguments, scratch):
+    """The exports in CesiumJS."""
+    cesium_places(database, arguments, scratch)
     terrain = export(arguments, "quantized-mesh", scratch / "level_terrain", "--assume-datum", "ellipsoid")
     tileset = export(arguments, "3dtiles", scratch / "level_3dtiles", "--assume-datum", "ellipsoid")
+    run_cesium(arguments, scratch, terrain, tileset)
+
+
+def check_serve(database, arguments, scratch):
+    """The same from `tiefort serve`, without any export."""
+    cesium_places(database, arguments, scratch)
+    command = [arguments.tiefort, "serve", str(database.folder), "--port", "0", "--cors", "*"]
+    command += ["--assume-datum", "ellipsoid"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as service:
+        try:
+            address = service.stdout.readline().strip() + database.folder.resolve().name
+            run_cesium(arguments, scratch, address, address)
+        finally:
+            service.terminate()
+
+
+def run_cesium(arguments, scratch, terrain, tileset):
     script = pathlib.Path(arguments.node_modules) / "cesium.mjs"
     shutil.copy(HERE / "exports" / "cesium.mjs", script)
     command = ["node", str(script), "--terrain", str(terrain), "--tileset", str(tileset)]
@@ -816,6 +839,7 @@ CHECKS = [
     ("3dtiles", check_3dtiles),
     ("quantized-mesh", check_quantized_mesh),
     ("cesium", check_cesium),
+    ("serve", check_serve),
     *[(name, functools.partial(check, tools=TOOLS)) for name, check in engines.CHECKS],
 ]
 

@@ -1,7 +1,9 @@
 // Loads the exports for globes in CesiumJS, in a headless Chromium, and compares heights with given places.
 //
 //   node cesium.mjs --terrain DIR --tileset DIR --places places.json [--pictures DIR] [--chromium /usr/bin/chromium]
+//   node cesium.mjs --terrain http://…/NAME --tileset http://…/NAME --places places.json
 //
+// The second form loads them from `tiefort serve --cors '*'`, as a page of another origin does.
 // places.json: [[longitude, latitude, height above the ellipsoid], …] of the compiled surface. Run it where `npm
 // install` has put cesium and puppeteer-core. Exit code 0 when everything agrees.
 import { createServer } from "node:http";
@@ -24,6 +26,8 @@ const { values } = parseArgs({
 });
 const cesium = join(dirname(createRequire(import.meta.url).resolve("cesium/package.json")), "Build", "Cesium");
 const roots = { cesium, terrain: values.terrain, tileset: values.tileset };
+// Folders are handed out by the server below; a service hands out its own.
+const address = (name) => (values[name]?.startsWith("http:") ? values[name] : `/${name}`);
 const types = {
   ".js": "text/javascript", ".css": "text/css", ".json": "application/json", ".glb": "model/gltf-binary",
 };
@@ -78,13 +82,13 @@ try {
   await page.waitForFunction("window.Cesium !== undefined", { timeout: 300_000 });
   const places = JSON.parse(readFileSync(values.places));
   if (values.terrain) {
-    const heights = await page.evaluate(async (places) => {
-      const terrain = await Cesium.CesiumTerrainProvider.fromUrl("/terrain", { requestVertexNormals: true });
+    const heights = await page.evaluate(async (places, address) => {
+      const terrain = await Cesium.CesiumTerrainProvider.fromUrl(address, { requestVertexNormals: true });
       const asked = places.map(([lon, lat]) => Cesium.Cartographic.fromDegrees(lon, lat));
       await Cesium.sampleTerrainMostDetailed(terrain, asked);
       window.terrain = terrain;
       return asked.map((place) => place.height);
-    }, places);
+    }, places, address("terrain"));
     const off = heights.map((height, index) => Math.abs(height - places[index][2]));
     const worst = Math.max(...off.map((metres) => (Number.isFinite(metres) ? metres : Infinity)));
     expect(worst < Number(values.tolerance),
@@ -109,7 +113,7 @@ process.exit(faults === 0 ? 0 : 1);
 
 // Draws the globe from the south of the places, looking north and down, until everything is loaded.
 async function look(page, name, places, withTileset) {
-  const found = await page.evaluate(async (places, withTileset) => {
+  const found = await page.evaluate(async (places, withTileset, address) => {
     document.getElementById("globe").innerHTML = "";
     const viewer = new Cesium.Viewer("globe", {
       baseLayer: false, animation: false, timeline: false, geocoder: false, homeButton: false, infoBox: false,
@@ -123,7 +127,7 @@ async function look(page, name, places, withTileset) {
     let failed = 0;
     let tileset;
     if (withTileset) {
-      tileset = await Cesium.Cesium3DTileset.fromUrl("/tileset/tileset.json");
+      tileset = await Cesium.Cesium3DTileset.fromUrl(`${address}/tileset.json`);
       tileset.tileFailed.addEventListener(() => failed++);
       viewer.scene.primitives.add(tileset);
       viewer.scene.globe.show = false;
@@ -145,7 +149,7 @@ async function look(page, name, places, withTileset) {
     const statistics = tileset?.statistics;
     return { failed, tiles: statistics?.numberOfTilesWithContentReady ?? 0,
              triangles: statistics?.numberOfTrianglesSelected ?? 0 };
-  }, places, withTileset);
+  }, places, withTileset, address("tileset"));
   if (values.pictures) await page.screenshot({ path: join(values.pictures, `${name}.png`) });
   return found;
 }

@@ -1,7 +1,7 @@
 //! One load-module file (`FORMAT.md`) per load module, for simulators that page single files.
 
 use database::{TileModules, encode_levels};
-use terrain::{ModuleId, ModuleRect};
+use terrain::{LoadModule, ModuleId, ModuleRect};
 
 use crate::{ExportError, Product, Put, Work};
 
@@ -36,16 +36,28 @@ pub fn write_modules(product: &Product, put: &Put, work: &Work) -> Result<(), Ex
     let all: Vec<usize> = (0..product.modules.len()).collect();
     work.each("load modules", &all, |&index| {
         let module = &product.modules[index];
-        let ModuleId { row, col } = module.id;
-        let alone = ModuleRect { south: row, west: col, north: row + 1, east: col + 1 };
         let tile = &product.tiles[product.tile_of[index] as usize];
-        let header = TileModules { modules: alone, ..tile.clone() };
+        let coarser = product.coarser.iter().map(|level| level[index].clone());
+        let levels = std::iter::once(module.clone()).chain(coarser);
         let name = file_name(module.id, "slm");
-        let coarser = product.coarser.iter().map(|level| vec![level[index].clone()]);
-        let levels: Vec<_> = std::iter::once(vec![module.clone()]).chain(coarser).collect();
-        put(&name, &encode_levels(&header, &levels)).map_err(ExportError::write(&name))
+        put(&name, &alone(tile, levels.collect())).map_err(ExportError::write(&name))
     })?;
     Ok(())
+}
+
+/// The file of one load module, at all of its levels, as [`write_modules`] writes it; `tile` and `levels` are what the
+/// file of its tile says. `None` where the tile has no such load module.
+pub fn module_file(tile: &TileModules, levels: &[Vec<LoadModule>], id: ModuleId) -> Option<Vec<u8>> {
+    let at = |level: &Vec<LoadModule>| level.iter().find(|module| module.id == id).cloned();
+    Some(alone(tile, levels.iter().map(at).collect::<Option<_>>()?))
+}
+
+/// The file of a load module that is given at all of its levels.
+fn alone(tile: &TileModules, levels: Vec<LoadModule>) -> Vec<u8> {
+    let ModuleId { row, col } = levels[0].id;
+    let modules = ModuleRect { south: row, west: col, north: row + 1, east: col + 1 };
+    let levels: Vec<Vec<LoadModule>> = levels.into_iter().map(|module| vec![module]).collect();
+    encode_levels(&TileModules { modules, ..tile.clone() }, &levels)
 }
 
 #[cfg(test)]

@@ -8,6 +8,9 @@
 //! is measured: of a square, how far its load modules lie from it; of a level in it and of a group, the largest
 //! residual.
 
+use std::collections::BTreeMap;
+use std::sync::{Mutex, PoisonError};
+
 use serde_json::{Value, json};
 use terrain::{ModuleRect, QUANTA_PER_METRE};
 
@@ -26,42 +29,67 @@ use crate::{Datum, ExportError, Product, Put, Work};
 /// # Errors
 /// When a file cannot be written, heights cannot be brought above the ellipsoid, or the work was asked to stop.
 pub fn write_3dtiles(product: &Product, assumed: Option<Datum>, put: &Put, work: &Work) -> Result<Datum, ExportError> {
-    let earth = Earth::new(product, assumed)?;
-    let layer = |product: Product| {
-        let mesh = Mesh::whole(&product).with_decks(&product);
-        let globe = Globe::of(&product, &mesh, &earth, work)?;
-        Ok(Layer { product, mesh, globe })
-    };
-    let scene = Layers { layers: product.levels().map(layer).collect::<Result<_, ExportError>>()? };
-    let squares = product.squares(square_side(product));
-    let children: Vec<Value> =
-        work.each("squares", &squares, |&rect| scene.square(rect, put))?.into_iter().flatten().collect();
-    let heights = || scene.layers.iter().flat_map(|layer| layer.globe.height_m.iter().copied());
-    let (low, high) = (heights().fold(f64::INFINITY, f64::min), heights().fold(f64::NEG_INFINITY, f64::max));
-    // Neither the tileset nor its root has anything to draw, so without their tiles all of the area is missing, however
-    // flat it is: viewers draw nothing at all where this error is too small to be seen.
-    let missing_m = size_m(product);
-    let mut tileset = json!({
-        "asset": {
-            "version": "1.1",
-            "tilesetVersion": "1",
-            "extras": {
-                "generator": "tiefort", "area": product.manifest.area.name, "crs": product.crs(),
-                "vertical_datum": product.vertical_datum(), "heights": earth.datum().said(),
-                "attribution": product.attributions(),
-            },
-        },
-        "geometricError": missing_m,
-        "root": {
-            "boundingVolume": { "region": region(&scene.layers[0].globe.lon_lat, low, high) },
-            "geometricError": missing_m,
-            "refine": "REPLACE",
-        },
-    });
-    put_children(&mut tileset["root"], children);
-    put("tileset.json", tileset.to_string().as_bytes()).map_err(ExportError::write("tileset.json"))?;
-    Ok(earth.datum())
+    let layers = Layers::of(product, assumed, work)?;
+    let put = |name: &str, bytes: &[u8]| put(name, bytes).map_err(ExportError::write(name));
+    let tileset = layers.tileset(work, |rect| layers.square(rect, &|name, made| put(name, &made())))?;
+    put("tileset.json", tileset.as_bytes())?;
+    Ok(layers.earth.datum())
 }
+
+/// A product as 3D Tiles, each file of which is made when it is asked for.
+pub struct Tileset {
+    layers: Layers,
+    text: String,
+    /// The square of every other file, by its name.
+    square_of: BTreeMap<String, ModuleRect>,
+}
+
+impl Tileset {
+    /// Sets a product on the globe, and measures its squares.
+    ///
+    /// # Errors
+    /// When heights cannot be brought above the ellipsoid, or the work was asked to stop.
+    pub fn of(product: &Product, assumed: Option<Datum>, work: &Work) -> Result<Self, ExportError> {
+        let layers = Layers::of(product, assumed, work)?;
+        let named = Mutex::new(BTreeMap::new());
+        let lock = || named.lock().unwrap_or_else(PoisonError::into_inner);
+        let text = layers.tileset(work, |rect| {
+            layers.square(rect, &|name, _| {
+                lock().insert(name.to_owned(), rect);
+                Ok(())
+            })
+        })?;
+        let square_of = named.into_inner().unwrap_or_else(PoisonError::into_inner);
+        Ok(Self { layers, text, square_of })
+    }
+
+    /// What was done to heights.
+    pub fn datum(&self) -> Datum {
+        self.layers.earth.datum()
+    }
+
+    /// The bytes of a file by its name in the export; `None` where the export has none of this name.
+    ///
+    /// # Errors
+    /// None are known: those of making it.
+    pub fn file(&self, name: &str) -> Result<Option<Vec<u8>>, ExportError> {
+        if name == "tileset.json" {
+            return Ok(Some(self.text.clone().into_bytes()));
+        }
+        let Some(&rect) = self.square_of.get(name) else { return Ok(None) };
+        let found = Mutex::new(None);
+        self.layers.square(rect, &|made_name, made| {
+            if made_name == name {
+                *found.lock().unwrap_or_else(PoisonError::into_inner) = Some(made());
+            }
+            Ok(())
+        })?;
+        Ok(found.into_inner().unwrap_or_else(PoisonError::into_inner))
+    }
+}
+
+/// Takes a file of a tileset by its name, and what makes its bytes.
+type Take<'a> = dyn Fn(&str, &dyn Fn() -> Vec<u8>) -> Result<(), ExportError> + Sync + 'a;
 
 /// The longer side of a product, in metres.
 fn size_m(product: &Product) -> f64 {
@@ -97,11 +125,59 @@ struct Layer {
 /// All levels, from fine to coarse.
 struct Layers {
     layers: Vec<Layer>,
+    earth: Earth,
 }
 
 impl Layers {
-    /// Writes the files of a square; its tile, if it has any ground.
-    fn square(&self, rect: ModuleRect, put: &Put) -> Result<Option<Value>, ExportError> {
+    fn of(product: &Product, assumed: Option<Datum>, work: &Work) -> Result<Self, ExportError> {
+        let earth = Earth::new(product, assumed)?;
+        let layer = |product: Product| {
+            let mesh = Mesh::whole(&product).with_decks(&product);
+            let globe = Globe::of(&product, &mesh, &earth, work)?;
+            Ok(Layer { product, mesh, globe })
+        };
+        let layers = product.levels().map(layer).collect::<Result<_, ExportError>>()?;
+        Ok(Self { layers, earth })
+    }
+
+    /// The text of `tileset.json`; `square` gives the tile of a square.
+    fn tileset(
+        &self,
+        work: &Work,
+        square: impl Fn(ModuleRect) -> Result<Option<Value>, ExportError> + Sync,
+    ) -> Result<String, ExportError> {
+        let product = &self.layers[0].product;
+        let squares = product.squares(square_side(product));
+        let children: Vec<Value> =
+            work.each("squares", &squares, |&rect| square(rect))?.into_iter().flatten().collect();
+        let heights = || self.layers.iter().flat_map(|layer| layer.globe.height_m.iter().copied());
+        let (low, high) = (heights().fold(f64::INFINITY, f64::min), heights().fold(f64::NEG_INFINITY, f64::max));
+        // Neither the tileset nor its root has anything to draw, so without their tiles all of the area is missing,
+        // however flat it is: viewers draw nothing at all where this error is too small to be seen.
+        let missing_m = size_m(product);
+        let mut tileset = json!({
+            "asset": {
+                "version": "1.1",
+                "tilesetVersion": "1",
+                "extras": {
+                    "generator": "tiefort", "area": product.manifest.area.name, "crs": product.crs(),
+                    "vertical_datum": product.vertical_datum(), "heights": self.earth.datum().said(),
+                    "attribution": product.attributions(),
+                },
+            },
+            "geometricError": missing_m,
+            "root": {
+                "boundingVolume": { "region": region(&self.layers[0].globe.lon_lat, low, high) },
+                "geometricError": missing_m,
+                "refine": "REPLACE",
+            },
+        });
+        put_children(&mut tileset["root"], children);
+        Ok(tileset.to_string())
+    }
+
+    /// Hands out the files of a square; its tile, if it has any ground.
+    fn square(&self, rect: ModuleRect, take: &Take) -> Result<Option<Value>, ExportError> {
         let finest = &self.layers[0];
         let coarse = Coarse::of(&finest.product, &finest.mesh, rect);
         let middle = coarse.vertices[coarse.vertices.len() / 2] as usize;
@@ -111,12 +187,12 @@ impl Layers {
             return Ok(None);
         }
         let bounds = box_around(self.layers.iter().zip(&parts).flat_map(|(layer, parts)| layer.places(&frame, parts)));
-        let mut children = finest.groups(&frame, rect, put)?;
+        let mut children = finest.groups(&frame, rect, take)?;
         let mut error_m = finest.error_m(rect);
         for (layer, parts) in self.layers.iter().zip(&parts).skip(1) {
             let name = square_name(&layer.product, rect, "glb");
             let uri = format!("levels/{}/{name}", layer.product.level);
-            put_gltf(put, &uri, layer.gltf(&frame, rect, parts))?;
+            take(&uri, &|| layer.gltf(&frame, rect, parts).bytes())?;
             // What is coarser is never said to be truer, or a viewer would not go on to the finer.
             error_m = error_m.max(layer.error_m(rect));
             let mut level = json!({
@@ -135,10 +211,12 @@ impl Layers {
         put_children(&mut tile, children);
         if !coarse.triangles.is_empty() {
             let uri = format!("squares/{}", square_name(&finest.product, rect, "glb"));
-            let classes = vec![0; coarse.triangles.len()];
-            let node = finest.node(&frame, group_name(rect), &coarse.vertices);
-            let nodes = vec![node.with_groups(&coarse.triangles, &classes)];
-            put_gltf(put, &uri, Gltf { nodes, ..Gltf::default() })?;
+            take(&uri, &|| {
+                let classes = vec![0; coarse.triangles.len()];
+                let node = finest.node(&frame, group_name(rect), &coarse.vertices);
+                let nodes = vec![node.with_groups(&coarse.triangles, &classes)];
+                Gltf { nodes, ..Gltf::default() }.bytes()
+            })?;
             tile["content"] = json!({ "uri": uri });
         }
         Ok(Some(tile))
@@ -157,10 +235,6 @@ fn halves(rect: ModuleRect) -> [ModuleRect; 2] {
         let middle = rect.south.midpoint(rect.north);
         [ModuleRect { north: middle, ..rect }, ModuleRect { south: middle, ..rect }]
     }
-}
-
-fn put_gltf(put: &Put, name: &str, gltf: Gltf) -> Result<(), ExportError> {
-    put(name, &gltf.bytes()).map_err(ExportError::write(name))
 }
 
 /// Ground and decks of some load modules.
@@ -194,8 +268,8 @@ impl Layer {
         }
     }
 
-    /// Writes a file for each group of load modules of a square; their tiles.
-    fn groups(&self, frame: &LocalFrame, square: ModuleRect, put: &Put) -> Result<Vec<Value>, ExportError> {
+    /// Hands out a file for each group of load modules of a square; their tiles.
+    fn groups(&self, frame: &LocalFrame, square: ModuleRect, take: &Take) -> Result<Vec<Value>, ExportError> {
         let mut tiles = Vec::new();
         let mut left = vec![square];
         while let Some(rect) = left.pop() {
@@ -208,7 +282,7 @@ impl Layer {
                 continue;
             }
             let uri = format!("groups/{}.glb", group_name(rect));
-            put_gltf(put, &uri, self.gltf(frame, rect, &parts))?;
+            take(&uri, &|| self.gltf(frame, rect, &parts).bytes())?;
             tiles.push(json!({
                 "boundingVolume": { "box": box_around(self.places(frame, &parts)) },
                 "geometricError": self.error_m(rect),
@@ -274,6 +348,21 @@ mod tests {
         let work = Work { workers: &workers, stop: &stop, tell: &|_| {} };
         assert_eq!(write_3dtiles(product, None, &put, &work).unwrap(), Datum::Egm96);
         files.into_inner().unwrap()
+    }
+
+    #[test]
+    fn a_file_asked_for_alone_is_that_of_the_export() {
+        for product in [samples::product(), samples::with_hole(), samples::with_levels(), samples::with_bridge()] {
+            let (workers, stop) = (Workers::new(2), AtomicBool::new(false));
+            let work = Work { workers: &workers, stop: &stop, tell: &|_| {} };
+            let tileset = Tileset::of(&product, None, &work).unwrap();
+            for (name, bytes) in written(&product) {
+                assert!(tileset.file(&name).unwrap() == Some(bytes), "{name}");
+            }
+            for other in ["", "groups/", "squares/r00c99.glb", "groups/r0000c0000.glb/", "/tileset.json"] {
+                assert_eq!(tileset.file(other).unwrap(), None, "{other:?}");
+            }
+        }
     }
 
     fn error(tile: &Value) -> f64 {

@@ -1,5 +1,6 @@
 //! Where the load modules of an area lie.
 
+use crate::lookup::STEPS;
 use crate::{Header, QUANTA_PER_METRE};
 
 /// Where load modules lie.
@@ -22,7 +23,8 @@ pub struct AreaFrame {
 }
 
 impl AreaFrame {
-    pub(crate) fn of(header: &Header) -> Self {
+    /// That of the area a file belongs to.
+    pub fn of(header: &Header) -> Self {
         Self {
             rows: header.area_rows,
             cols: header.area_cols,
@@ -48,6 +50,30 @@ impl AreaFrame {
         };
         [index(north_m, self.origin_m[1]), index(east_m, self.origin_m[0])]
     }
+
+    /// Row and column of the load module that is asked for what lies at a place; `None` outside the area. The far sides
+    /// of the area belong to it.
+    pub fn module_under(&self, [east_m, north_m]: [f64; 2]) -> Option<[u32; 2]> {
+        let side_steps = i64::from(self.side) * STEPS;
+        let (row, _) = steps(north_m - self.origin_m[1], self.rows, side_steps)?;
+        let (col, _) = steps(east_m - self.origin_m[0], self.cols, side_steps)?;
+        Some([row, col])
+    }
+}
+
+/// The row or column of load modules, of `count`, at a distance from the area's side, and the steps from there.
+#[inline]
+pub(crate) fn steps(metres: f64, count: u32, side_steps: i64) -> Option<(u32, i64)> {
+    let steps = metres * (f64::from(QUANTA_PER_METRE) * STEPS as f64) + 0.5;
+    let end = side_steps * i64::from(count);
+    // Far outside, or not a number: nowhere.
+    if !(0.0 <= steps && steps < end as f64 + 1.0) {
+        return None;
+    }
+    let steps = steps as i64;
+    // A quotient of floats may be off by one at a line; either load module has the line.
+    let index = ((steps as f64 / side_steps as f64) as i64).min(i64::from(count) - 1);
+    Some((index as u32, (steps - index * side_steps).clamp(0, side_steps)))
 }
 
 /// A half-open rectangle of load modules.
@@ -70,11 +96,13 @@ impl Block {
         (rows as usize).saturating_mul(cols as usize)
     }
 
-    pub(crate) fn contains(&self, row: u32, col: u32) -> bool {
+    /// Whether a load module lies inside.
+    pub fn contains(&self, row: u32, col: u32) -> bool {
         self.south <= row && row < self.north && self.west <= col && col < self.east
     }
 
-    pub(crate) fn index(&self, row: u32, col: u32) -> usize {
+    /// Where a load module inside stands, row by row from the south-west.
+    pub fn index(&self, row: u32, col: u32) -> usize {
         (row - self.south) as usize * (self.east - self.west) as usize + (col - self.west) as usize
     }
 }

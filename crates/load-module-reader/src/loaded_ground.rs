@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use crate::frame::steps;
 use crate::lookup::{Lookup, STEPS};
 use crate::sight::{Line, crossed_at, entered_at, hidden_at, least_above};
 use crate::{AreaFrame, Block, QUANTA_PER_METRE, Sample, TerrainModule};
@@ -34,6 +35,16 @@ pub enum Sight {
 }
 
 impl LoadedGround {
+    /// Load modules of one area and level that were loaded in other blocks, row by row from the south-west, as one
+    /// block. They are shared, not copied.
+    ///
+    /// # Panics
+    /// When they are not as many as the block has.
+    pub fn of_modules(frame: AreaFrame, level: u16, block: Block, modules: Vec<Arc<TerrainModule>>) -> Self {
+        assert_eq!(modules.len(), block.count(), "one load module for each place of the block");
+        Self::empty(frame, level).with_modules(block, modules)
+    }
+
     /// Nothing loaded yet.
     pub(crate) fn empty(frame: AreaFrame, level: u16) -> Self {
         let side_steps = i64::from(frame.side) * STEPS;
@@ -87,16 +98,7 @@ impl LoadedGround {
     /// The row or column of load modules at a distance from the area's side, and the steps from there.
     #[inline]
     fn steps(&self, metres: f64, count: u32) -> Option<(u32, i64)> {
-        let steps = metres * (f64::from(QUANTA_PER_METRE) * STEPS as f64) + 0.5;
-        let end = self.side_steps * i64::from(count);
-        // Far outside, or not a number: nowhere.
-        if !(0.0 <= steps && steps < end as f64 + 1.0) {
-            return None;
-        }
-        let steps = steps as i64;
-        // A quotient of floats may be off by one at a line; either load module has the line.
-        let index = ((steps as f64 / self.side_steps as f64) as i64).min(i64::from(count) - 1);
-        Some((index as u32, (steps - index * self.side_steps).clamp(0, self.side_steps)))
+        steps(metres, count, self.side_steps)
     }
 
     /// Height of the ground at an easting and northing, in metres above the vertical datum, whatever decks hang above

@@ -7,7 +7,9 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use terrain::{ModuleId, TileId};
 use tiefort::library::{self, Failure, SystemClock};
+use workbench::HeldGround;
 
+use crate::meshes::{ARRAY, Placed, raster_of};
 use crate::raised::raised;
 use crate::tables::residual_of;
 use crate::waiting::{Raising, wait, wait_for};
@@ -145,7 +147,22 @@ pub fn export(py: Python<'_>, words: Vec<OsString>) -> PyResult<String> {
 /// Compares with the words of `tiefort compare`; the table as JSON.
 #[pyfunction]
 pub fn compare(py: Python<'_>, words: Vec<OsString>) -> PyResult<String> {
-    wait(py, None, move |stop, _| library::compare(words, stop))
+    wait(py, None, move |stop, _| library::compare(words, None, stop))
+}
+
+/// The same on the heights in an array, which `words` call `array`.
+#[pyfunction]
+pub fn compare_on_array(
+    py: Python<'_>,
+    array: &Bound<'_, PyAny>,
+    placed: Placed,
+    words: Vec<OsString>,
+) -> PyResult<String> {
+    let make = raster_of(py, array, placed)?;
+    wait(py, None, move |stop, _| {
+        let ground = HeldGround::of(make()?, ARRAY, stop)?;
+        library::compare(words, Some(ground), stop)
+    })
 }
 
 /// Everything there is to know about one load module, as JSON.

@@ -3,6 +3,7 @@
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
+use compiler::CompileError;
 use numpy::{PyArray1, PyArray2, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -27,7 +28,7 @@ pub struct Tin {
 
 /// Where the posts of an array lie: the system, the south-west post, the spacing to the east and to the north, the
 /// value that marks voids, and whether the first row is the southern one.
-type Placed = (Option<String>, [f64; 2], [f64; 2], Option<f64>, bool);
+pub type Placed = (Option<String>, [f64; 2], [f64; 2], Option<f64>, bool);
 
 /// A mesh of the heights in an array; `words` are those of `tiefort tin`.
 #[pyfunction]
@@ -38,18 +39,32 @@ pub fn tin_of_array(
     words: Vec<OsString>,
     told: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Tin> {
-    let name = PathBuf::from("array");
-    let (crs, south_west, spacing, nodata, south_first) = placed;
-    let request = library::tin_request(&name, words).map_err(|failure| raised(py, &failure))?;
-    let crs = crs.map(|text| system(&text)).transpose().map_err(|failure| raised(py, &failure))?;
-    let (posts, size) = posts_of(array, south_first)?;
+    let request = library::tin_request(Path::new(ARRAY), words).map_err(|failure| raised(py, &failure))?;
+    let make = raster_of(py, array, placed)?;
     wait(py, told, move |stop, progress| {
         let clock = SystemClock::start();
-        let raster = Raster::of_array(ArrayRaster { name, crs, south_west, spacing, size, nodata }, posts);
-        let raster = raster.map_err(compiler::CompileError::from)?;
-        let mesh = workbench::tin_of_raster(raster, &request, stop, progress)?;
+        let mesh = workbench::tin_of_raster(make()?, &request, stop, progress)?;
         Ok(Tin { mesh, seconds: clock.seconds() })
     })
+}
+
+/// What messages call an array.
+pub const ARRAY: &str = "array";
+
+/// What makes a raster of the heights in an array, once Python's lock is not held.
+///
+/// # Errors
+/// When the system cannot be computed, or the array holds no heights.
+pub fn raster_of(
+    py: Python<'_>,
+    array: &Bound<'_, PyAny>,
+    placed: Placed,
+) -> PyResult<impl FnOnce() -> Result<Raster, CompileError> + Send + use<>> {
+    let (crs, south_west, spacing, nodata, south_first) = placed;
+    let crs = crs.map(|text| system(&text)).transpose().map_err(|failure| raised(py, &failure))?;
+    let (posts, size) = posts_of(array, south_first)?;
+    let told = ArrayRaster { name: ARRAY.into(), crs, south_west, spacing, size, nodata };
+    Ok(move || Raster::of_array(told, posts).map_err(CompileError::from))
 }
 
 /// A mesh of the heights in a file; `words` are those of `tiefort tin`.

@@ -185,6 +185,29 @@ def test_methods_are_compared(tmp_path: Path) -> None:
     assert run("sample", "--out", tmp_path / "dem.tif").returncode == 0
     found = tiefort.compare(tmp_path / "dem.tif", points=[100], methods=["regular", "iterative"])
     assert [row["method"] for row in found["rows"]] == ["regular", "iterative"]
+    with pytest.raises(tiefort.RequestError, match="found crs with a path"):
+        tiefort.compare(tmp_path / "dem.tif", crs="EPSG:32611")
+
+
+def without_seconds(found: dict[str, Any]) -> list[dict[str, Any]]:
+    return [{key: value for key, value in row.items() if key != "seconds"} for row in found["rows"]]
+
+
+def test_methods_are_compared_on_heights_in_memory(tmp_path: Path) -> None:
+    asked: dict[str, Any] = {"points": [100], "methods": ["regular", "iterative"]}
+    found = tiefort.compare(hills(), spacing_m=25.0, **asked)
+    assert [row["method"] for row in found["rows"]] == ["regular", "iterative"]
+    again = tiefort.compare(hills().astype(np.float64), spacing_m=25.0, **asked)
+    assert without_seconds(found) == without_seconds(again)
+    part = tiefort.compare(hills(), spacing_m=25.0, window="10,20,30x40", **asked)
+    assert without_seconds(part) != without_seconds(found)
+    with pytest.raises(tiefort.RequestError, match="points: found|points"):
+        tiefort.compare(hills(), points=[])
+    rasterio = pytest.importorskip("rasterio")
+    assert run("sample", "--posts", 301, "--out", tmp_path / "dem.tif").returncode == 0
+    with rasterio.open(tmp_path / "dem.tif") as dataset:
+        held = tiefort.compare(dataset, **asked)
+    assert without_seconds(held) == without_seconds(tiefort.compare(tmp_path / "dem.tif", **asked))
 
 
 def test_a_database_answers_for_heights_normals_and_classes(database: Path) -> None:

@@ -37,6 +37,8 @@ mod program;
 mod progress;
 mod resources;
 mod run;
+#[cfg(feature = "serve")]
+mod serve;
 mod signals;
 mod steps;
 mod terminal;

@@ -11,7 +11,7 @@ use exports::Work;
 use job::Job;
 use product::WantedGround;
 use terrain::{ModuleId, TileId};
-use workbench::{Mesh, TinRequest};
+use workbench::{HeldGround, Mesh, TinRequest};
 
 pub use crate::clock::SystemClock;
 use crate::commands::{compare, explain, export, plan, tile, tin};
@@ -94,13 +94,13 @@ pub fn export(words: Vec<OsString>, stop: &AtomicBool) -> Result<String, Failure
     export::checked(&arguments, &Work { workers: &workers, stop, tell: &|_| {} })
 }
 
-/// What `tiefort compare --format json` prints with these words.
+/// What `tiefort compare --format json` prints with these words; on `ground`, where it is in memory.
 ///
 /// # Errors
 /// When the words do not fit together, or the ground cannot be used.
-pub fn compare(words: Vec<OsString>, stop: &AtomicBool) -> Result<String, Failure> {
+pub fn compare(words: Vec<OsString>, ground: Option<HeldGround>, stop: &AtomicBool) -> Result<String, Failure> {
     let arguments: compare::Arguments = read(words.into_iter().chain(["--quiet".into()]))?;
-    compare::json_text(&arguments, stop)
+    compare::json_text(&arguments, ground, stop)
 }
 
 /// Whether a file can be made at `path`.

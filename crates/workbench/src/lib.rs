@@ -9,8 +9,8 @@ mod tin_levels;
 pub use tin_levels::tin_levels;
 mod compare;
 pub use compare::{
-    CompareEvent, CompareGround, CompareMethod, CompareRequest, CompareRow, Comparison, Equivalent, Forced, Impossible,
-    Made, compare,
+    CompareEvent, CompareGround, CompareMethod, CompareRequest, CompareRow, Comparison, Equivalent, Forced, HeldGround,
+    Impossible, Made, compare,
 };
 mod look;
 pub use look::{Seen, Suggestion, look_at};

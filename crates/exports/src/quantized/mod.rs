@@ -11,6 +11,7 @@ mod holes;
 mod lattice;
 mod tile;
 
+use std::borrow::Borrow;
 use std::collections::{BTreeMap, BTreeSet};
 
 use serde_json::{Value, json};
@@ -43,132 +44,132 @@ pub fn write_quantized_mesh(
     put: &Put,
     work: &Work,
 ) -> Result<Datum, ExportError> {
-    let earth = Earth::new(product, assumed)?;
-    // A tile has to cover its square, so holes keep the triangles that close them.
-    let mesh = Mesh::whole(product);
-    let globe = Globe::of(product, &mesh, &earth, work)?;
-    let heights = || globe.height_m.iter().copied();
-    let foot_m = heights().fold(f64::INFINITY, f64::min).floor();
-    let level = finest_level(product.side_m());
-    let mut scene = TileInputs { product, earth: &earth, foot_m, level, fall_m: 0.0 };
-    let bounds = scene.bounds(&globe);
-    let collar_m = scene.collar_m(&bounds)?;
-    let extent_m = f64::from(product.rect.rows().max(product.rect.cols())) * product.side_m();
-    scene.fall_m = (2.0 * collar_m).max(0.2 * extent_m);
-    let sheet = with_collar(product, &mesh, &globe, &earth, collar_m, |height_m| scene.fallen(height_m, collar_m))?;
-    scene.write_finest(&sheet, &bounds, put, work)?;
-    scene.write_grids(&bounds, put, work)?;
-    let holes = holes(&mesh, &globe);
-    if let Some(holes) = &holes {
-        put("holes.geojson", format!("{holes}\n").as_bytes()).map_err(ExportError::write("holes.geojson"))?;
+    let terrain = QuantizedMesh::of(product, assumed, work)?;
+    for (what, tiles) in [("tiles of triangles", terrain.finest_tiles()), ("tiles of heights", terrain.grid_tiles())] {
+        work.each(what, &tiles, |&(level, col, row)| {
+            let name = format!("{level}/{col}/{row}.terrain");
+            put(&name, &terrain.made(level, col, row)).map_err(ExportError::write(&name))
+        })?;
     }
-    let layer = scene.layer(&bounds, holes.is_some());
-    put("layer.json", format!("{layer:#}\n").as_bytes()).map_err(ExportError::write("layer.json"))?;
-    Ok(earth.datum())
-}
-
-/// The level whose tiles are some load modules wide.
-fn finest_level(side_m: f64) -> u32 {
-    let level = (180.0 * DEGREE_M / (MODULES_PER_TILE * side_m)).log2().ceil();
-    level.clamp(1.0, 20.0) as u32
-}
-
-/// Lowest and highest steps of the finest level, east and north.
-struct Bounds {
-    x: (i64, i64),
-    y: (i64, i64),
-    /// West, south, east and north in degrees.
-    degrees: [f64; 4],
-}
-
-impl Bounds {
-    /// First and last column and row of the tiles of a level.
-    fn tiles(&self, finest: u32, level: u32) -> ([i64; 2], [i64; 2]) {
-        let range = |(low, high): (i64, i64)| {
-            let tiles = tiles(low, high);
-            [tiles.start() >> (finest - level), tiles.end() >> (finest - level)]
-        };
-        if level == 0 { ([0, 1], [0, 0]) } else { (range(self.x), range(self.y)) }
+    for name in ["holes.geojson", "layer.json"] {
+        if let Some(text) = terrain.file(name) {
+            put(name, &text).map_err(ExportError::write(name))?;
+        }
     }
+    Ok(terrain.earth.datum())
 }
 
-/// The steps at which tiles begin and end.
-fn ends([first, last]: [i64; 2]) -> [i64; 2] {
-    [first * STEPS, (last + 1) * STEPS]
-}
-
-fn too_wide(product: &Product) -> ExportError {
-    ExportError::Impossible {
-        what: "the area".into(),
-        found: format!("ground around it that {} does not reach", product.crs()),
-        expected: "an area well inside its coordinate system".into(),
-        hint: "export a smaller block with --modules".into(),
-    }
-}
-
-struct TileInputs<'a> {
-    product: &'a Product,
-    earth: &'a Earth,
+/// A product as quantized-mesh, each file of which is made when it is asked for.
+pub struct QuantizedMesh<P> {
+    product: P,
+    earth: Earth,
     /// A whole number of metres below all that is exported: how deep the ground around it falls.
     foot_m: f64,
     level: u32,
     /// How far from the border the ground has fallen to that, metres.
     fall_m: f64,
+    bounds: Bounds,
+    holes: Option<Value>,
+    /// Of the finest level.
+    nodes: Vec<Node>,
+    triangles: Vec<[u32; 3]>,
+    /// Triangles over each tile of the finest level, by row and column.
+    of_tile: BTreeMap<[i64; 2], Vec<u32>>,
 }
 
-impl TileInputs<'_> {
-    fn bounds(&self, globe: &Globe) -> Bounds {
-        let places: Vec<[i64; 2]> = globe.lon_lat.iter().map(|&place| steps(self.level, place)).collect();
-        let range = |axis: usize| {
-            let values = || places.iter().map(|place| place[axis]);
-            (values().min().unwrap_or(0), values().max().unwrap_or(0))
-        };
-        let degrees = |axis: usize| {
-            let values = || globe.lon_lat.iter().map(|place| place[axis]);
-            [values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max)]
-        };
-        let ([west, east], [south, north]) = (degrees(0), degrees(1));
-        Bounds { x: range(0), y: range(1), degrees: [west, south, east, north] }
+impl<P: Borrow<Product>> QuantizedMesh<P> {
+    /// Sets a product on the globe.
+    ///
+    /// # Errors
+    /// When heights cannot be brought above the ellipsoid, or the work was asked to stop.
+    pub fn of(product: P, assumed: Option<Datum>, work: &Work) -> Result<Self, ExportError> {
+        let whole: &Product = product.borrow();
+        let earth = Earth::new(whole, assumed)?;
+        // A tile has to cover its square, so holes keep the triangles that close them.
+        let mesh = Mesh::whole(whole);
+        let globe = Globe::of(whole, &mesh, &earth, work)?;
+        let foot_m = globe.height_m.iter().copied().fold(f64::INFINITY, f64::min).floor();
+        let level = finest_level(whole.side_m());
+        let bounds = Bounds::of(&globe, level);
+        let collar_m = collar_m(whole, &earth, &bounds, level)?;
+        let extent_m = f64::from(whole.rect.rows().max(whole.rect.cols())) * whole.side_m();
+        let holes = holes(&mesh, &globe);
+        let (nodes, triangles, of_tile) = (Vec::new(), Vec::new(), BTreeMap::new());
+        let fall_m = (2.0 * collar_m).max(0.2 * extent_m);
+        let mut terrain = Self { product, earth, foot_m, level, fall_m, bounds, holes, nodes, triangles, of_tile };
+        let outer_m = |height_m| terrain.fallen(height_m, collar_m);
+        let sheet = with_collar(terrain.product.borrow(), &mesh, &globe, &terrain.earth, collar_m, outer_m)?;
+        terrain.place(sheet);
+        Ok(terrain)
     }
 
-    /// How far ground has to go on around what is exported, so that it covers every tile of the finest level to its
-    /// borders; these need not run along the sides of the area.
-    fn collar_m(&self, bounds: &Bounds) -> Result<f64, ExportError> {
-        /// Places looked at along a border of all tiles together.
-        const LOOKS: i64 = 256;
-        const MARGIN_M: f64 = 10.0;
-        let (cols, rows) = bounds.tiles(self.level, self.level);
-        let ([west, east], [south, north]) = (ends(cols), ends(rows));
-        let rect = self.product.rect;
-        let low = self.product.corner_m(rect.south, rect.west);
-        let high = self.product.corner_m(rect.north, rect.east);
-        let along = |from: i64, to: i64, look: i64| from + (to - from) * look / LOOKS;
-        let looks = (0..=LOOKS).flat_map(|look| {
-            let (x, y) = (along(west, east, look), along(south, north, look));
-            [[x, south], [x, north], [west, y], [east, y]]
-        });
-        let mut collar_m = MARGIN_M;
-        for steps in looks {
-            let place = self.earth.place_m(lon_lat(self.level, steps)).ok_or_else(|| too_wide(self.product))?;
-            for axis in 0..2 {
-                collar_m = collar_m.max(low[axis] - place[axis] + MARGIN_M).max(place[axis] - high[axis] + MARGIN_M);
-            }
+    /// What was done to heights.
+    pub fn datum(&self) -> Datum {
+        self.earth.datum()
+    }
+
+    /// The bytes of a file by its name in the export; `None` where the export has none of this name.
+    pub fn file(&self, name: &str) -> Option<Vec<u8>> {
+        match name {
+            "layer.json" => Some(format!("{:#}\n", self.layer()).into_bytes()),
+            "holes.geojson" => self.holes.as_ref().map(|holes| format!("{holes}\n").into_bytes()),
+            name => self.tile_named(name).map(|(level, col, row)| self.made(level, col, row)),
         }
-        Ok(collar_m)
+    }
+
+    /// Level, column and row of `LEVEL/COLUMN/ROW.terrain`, where there is such a tile.
+    fn tile_named(&self, name: &str) -> Option<(u32, i64, i64)> {
+        let mut parts = name.strip_suffix(".terrain")?.split('/');
+        let tile = (parts.next()?.parse().ok()?, parts.next()?.parse().ok()?, parts.next()?.parse().ok()?);
+        let (level, col, row) = tile;
+        if self.level < level || name != format!("{level}/{col}/{row}.terrain") {
+            return None;
+        }
+        let (cols, rows) = self.bounds.tiles(self.level, level);
+        let inside = |[first, last]: [i64; 2], at: i64| first <= at && at <= last;
+        (inside(cols, col) && inside(rows, row)).then_some(tile)
     }
 
     /// The tiles that hold the triangles themselves.
-    fn write_finest(&self, sheet: &GlobeMesh, bounds: &Bounds, put: &Put, work: &Work) -> Result<(), ExportError> {
-        let node = |v: u32| {
-            let (place, height_m) = (sheet.lon_lat[v as usize], sheet.height_m[v as usize]);
-            let [x, y] = steps(self.level, place);
-            Node { x, y, h: height_steps(height_m), normal: sheet.normal[v as usize] }
+    fn finest_tiles(&self) -> Vec<(u32, i64, i64)> {
+        self.of_tile.keys().map(|&[row, col]| (self.level, col, row)).collect()
+    }
+
+    /// The tiles above, each a grid of heights.
+    fn grid_tiles(&self) -> Vec<(u32, i64, i64)> {
+        let mut all = BTreeSet::new();
+        for level in 0..self.level {
+            let (cols, rows) = self.bounds.tiles(self.level, level);
+            all.extend((rows[0]..=rows[1]).flat_map(|row| (cols[0]..=cols[1]).map(move |col| (level, col, row))));
+        }
+        all.into_iter().collect()
+    }
+
+    /// The bytes of a tile that there is.
+    fn made(&self, level: u32, col: i64, row: i64) -> Vec<u8> {
+        if level < self.level {
+            return self.grid(level, col, row).bytes();
+        }
+        let mut tile = Tile::new(level, col, row);
+        for &triangle in self.of_tile.get(&[row, col]).into_iter().flatten() {
+            let corners = self.triangles[triangle as usize].map(|v| self.nodes[v as usize]);
+            tile.add(&clip::piece(corners, col, row));
+        }
+        assert!(0.999 < tile.covered(), "ground goes on over all of tile {level}/{col}/{row}");
+        tile.bytes()
+    }
+
+    /// Puts ground and collar on the lattice, and finds the triangles over each tile of the finest level.
+    fn place(&mut self, sheet: GlobeMesh) {
+        let node = |v: usize| {
+            let [x, y] = steps(self.level, sheet.lon_lat[v]);
+            Node { x, y, h: height_steps(sheet.height_m[v]), normal: sheet.normal[v] }
         };
-        let nodes: Vec<Node> = (0..sheet.lon_lat.len() as u32).map(node).collect();
-        let (cols, rows) = bounds.tiles(self.level, self.level);
-        let mut of_tile: BTreeMap<[i64; 2], Vec<[Node; 3]>> = BTreeMap::new();
-        for triangle in &sheet.triangles {
-            let triangle = triangle.map(|v| nodes[v as usize]);
+        self.nodes = (0..sheet.lon_lat.len()).map(node).collect();
+        self.triangles = sheet.triangles;
+        let (cols, rows) = self.bounds.tiles(self.level, self.level);
+        for (index, triangle) in (0..).zip(&self.triangles) {
+            let triangle = triangle.map(|v| self.nodes[v as usize]);
             let range = |of: fn(&Node) -> i64, [first, last]: [i64; 2]| {
                 let values = || triangle.iter().map(of);
                 let tiles = tiles(values().min().unwrap_or(0), values().max().unwrap_or(0));
@@ -176,38 +177,10 @@ impl TileInputs<'_> {
             };
             for row in range(|node| node.y, rows) {
                 for col in range(|node| node.x, cols) {
-                    of_tile.entry([row, col]).or_default().push(triangle);
+                    self.of_tile.entry([row, col]).or_default().push(index);
                 }
             }
         }
-        let of_tile: Vec<_> = of_tile.into_iter().collect();
-        work.each("tiles of triangles", &of_tile, |([row, col], triangles)| {
-            let mut tile = Tile::new(self.level, *col, *row);
-            triangles.iter().for_each(|&triangle| tile.add(&clip::piece(triangle, *col, *row)));
-            assert!(0.999 < tile.covered(), "ground goes on over all of tile {}/{col}/{row}", self.level);
-            self.put(put, &tile, [*col, *row], self.level)
-        })?;
-        Ok(())
-    }
-
-    /// The tiles above, each a grid of heights.
-    fn write_grids(&self, bounds: &Bounds, put: &Put, work: &Work) -> Result<(), ExportError> {
-        let mut all = BTreeSet::new();
-        for level in 0..self.level {
-            let (cols, rows) = bounds.tiles(self.level, level);
-            all.extend((rows[0]..=rows[1]).flat_map(|row| (cols[0]..=cols[1]).map(move |col| (level, col, row))));
-        }
-        let all: Vec<(u32, i64, i64)> = all.into_iter().collect();
-        work.each("tiles of heights", &all, |&(level, col, row)| {
-            let tile = self.grid(level, col, row);
-            self.put(put, &tile, [col, row], level)
-        })?;
-        Ok(())
-    }
-
-    fn put(&self, put: &Put, tile: &Tile, [col, row]: [i64; 2], level: u32) -> Result<(), ExportError> {
-        let name = format!("{level}/{col}/{row}.terrain");
-        put(&name, &tile.bytes()).map_err(ExportError::write(&name))
     }
 
     /// A tile of heights at the corners of squares, and of normals across them.
@@ -245,8 +218,9 @@ impl TileInputs<'_> {
 
     /// Height above the ellipsoid at a longitude and latitude, on what is exported or around it.
     fn height_at(&self, place: [f64; 2]) -> f64 {
-        let rect = self.product.rect;
-        let (low, high) = (self.product.corner_m(rect.south, rect.west), self.product.corner_m(rect.north, rect.east));
+        let product: &Product = self.product.borrow();
+        let rect = product.rect;
+        let (low, high) = (product.corner_m(rect.south, rect.west), product.corner_m(rect.north, rect.east));
         let Some(place) = self.earth.place_m(place) else { return self.foot_m };
         let beyond = |axis: usize| (low[axis] - place[axis]).max(place[axis] - high[axis]);
         let outside_m = beyond(0).max(beyond(1)).max(0.0);
@@ -255,18 +229,19 @@ impl TileInputs<'_> {
             return self.foot_m;
         }
         let inside = [0, 1].map(|axis| place[axis].clamp(low[axis], high[axis]));
-        let height = height_m(self.product, inside).unwrap_or(0.0);
+        let height = height_m(product, inside).unwrap_or(0.0);
         let above = self.earth.lon_lat(inside).map_or(0.0, |place| self.earth.datum_m(place));
         self.fallen(height + above, outside_m)
     }
 
-    fn layer(&self, bounds: &Bounds, has_holes: bool) -> Value {
+    fn layer(&self) -> Value {
         let available = |level: u32| {
-            let ([first_col, last_col], [first_row, last_row]) = bounds.tiles(self.level, level);
+            let ([first_col, last_col], [first_row, last_row]) = self.bounds.tiles(self.level, level);
             json!([{ "startX": first_col, "startY": first_row, "endX": last_col, "endY": last_row }])
         };
-        let area = &self.product.manifest.area;
-        let of_holes = if has_holes { "; holes are closed, holes.geojson says where" } else { "" };
+        let product: &Product = self.product.borrow();
+        let area = &product.manifest.area;
+        let of_holes = if self.holes.is_some() { "; holes are closed, holes.geojson says where" } else { "" };
         json!({
             "tilejson": "2.1.0",
             "name": area.name,
@@ -277,13 +252,93 @@ impl TileInputs<'_> {
             "projection": "EPSG:4326",
             "tiles": ["{z}/{x}/{y}.terrain"],
             "extensions": ["octvertexnormals"],
-            "attribution": self.product.attributions().join("; "),
-            "bounds": bounds.degrees,
+            "attribution": product.attributions().join("; "),
+            "bounds": self.bounds.degrees,
             "minzoom": 0,
             "maxzoom": self.level,
             "available": (0..=self.level).map(available).collect::<Vec<_>>(),
         })
     }
+}
+
+/// The level whose tiles are some load modules wide.
+fn finest_level(side_m: f64) -> u32 {
+    let level = (180.0 * DEGREE_M / (MODULES_PER_TILE * side_m)).log2().ceil();
+    level.clamp(1.0, 20.0) as u32
+}
+
+/// Lowest and highest steps of the finest level, east and north.
+struct Bounds {
+    x: (i64, i64),
+    y: (i64, i64),
+    /// West, south, east and north in degrees.
+    degrees: [f64; 4],
+}
+
+impl Bounds {
+    /// Those of all vertices on the globe.
+    fn of(globe: &Globe, level: u32) -> Self {
+        let places: Vec<[i64; 2]> = globe.lon_lat.iter().map(|&place| steps(level, place)).collect();
+        let range = |axis: usize| {
+            let values = || places.iter().map(|place| place[axis]);
+            (values().min().unwrap_or(0), values().max().unwrap_or(0))
+        };
+        let degrees = |axis: usize| {
+            let values = || globe.lon_lat.iter().map(|place| place[axis]);
+            [values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max)]
+        };
+        let ([west, east], [south, north]) = (degrees(0), degrees(1));
+        Self { x: range(0), y: range(1), degrees: [west, south, east, north] }
+    }
+
+    /// First and last column and row of the tiles of a level.
+    fn tiles(&self, finest: u32, level: u32) -> ([i64; 2], [i64; 2]) {
+        let range = |(low, high): (i64, i64)| {
+            let tiles = tiles(low, high);
+            [tiles.start() >> (finest - level), tiles.end() >> (finest - level)]
+        };
+        if level == 0 { ([0, 1], [0, 0]) } else { (range(self.x), range(self.y)) }
+    }
+}
+
+/// The steps at which tiles begin and end.
+fn ends([first, last]: [i64; 2]) -> [i64; 2] {
+    [first * STEPS, (last + 1) * STEPS]
+}
+
+fn too_wide(product: &Product) -> ExportError {
+    ExportError::Impossible {
+        what: "the area".into(),
+        found: format!("ground around it that {} does not reach", product.crs()),
+        expected: "an area well inside its coordinate system".into(),
+        hint: "export a smaller block with --modules".into(),
+    }
+}
+
+/// How far ground has to go on around what is exported, so that it covers every tile of the finest level to its
+/// borders; these need not run along the sides of the area.
+fn collar_m(product: &Product, earth: &Earth, bounds: &Bounds, level: u32) -> Result<f64, ExportError> {
+    /// Places looked at along a border of all tiles together.
+    const LOOKS: i64 = 256;
+    const MARGIN_M: f64 = 10.0;
+    let (cols, rows) = bounds.tiles(level, level);
+    let ([west, east], [south, north]) = (ends(cols), ends(rows));
+    let rect = product.rect;
+    let low = product.corner_m(rect.south, rect.west);
+    let high = product.corner_m(rect.north, rect.east);
+    let along = |from: i64, to: i64, look: i64| from + (to - from) * look / LOOKS;
+    let looks = (0..=LOOKS).flat_map(|look| {
+        let (x, y) = (along(west, east, look), along(south, north, look));
+        [[x, south], [x, north], [west, y], [east, y]]
+    });
+    let mut collar_m = MARGIN_M;
+    for steps in looks {
+        let place = earth.place_m(lon_lat(level, steps)).ok_or_else(|| too_wide(product))?;
+        for axis in 0..2 {
+            collar_m = collar_m.max(low[axis] - place[axis] + MARGIN_M).max(place[axis] - high[axis] + MARGIN_M);
+        }
+    }
+    Ok(collar_m)
 }
 
 /// Height of the triangles at an easting and northing of a product, in metres above its datum.

@@ -69,6 +69,15 @@ def path_of(path: Path) -> str:
     return os.fsdecode(path)
 
 
+def alone(crs: Any, transform: Any, spacing_m: float | None, nodata: float | None) -> None:
+    """Refuse what is said beside a path."""
+    said = (("crs", crs), ("transform", transform), ("spacing_m", spacing_m), ("nodata", nodata))
+    for name, value in said:
+        if value is not None:
+            message = f"found {name} with a path, expected what the file says itself"
+            raise RequestError(message, f"leave {name} out, or open the file and give its heights as an array")
+
+
 def posts_of(dem: Any, crs: Any, transform: Any, spacing_m: float | None, nodata: float | None) -> Posts:
     """Heights as the compiled part takes them; what is said beside them goes before what they say themselves."""
     found = _held(dem)

@@ -11,7 +11,7 @@ from typing import Any, Callable, Union
 
 from . import _tiefort
 from ._errors import JobError, RequestError
-from ._inputs import Path, path_of
+from ._inputs import Path, alone, is_path, path_of, posts_of
 from ._mesh import Residual
 from ._progress import Progress, Teller
 from ._report import Report, residual_of
@@ -286,22 +286,34 @@ def export(
 
 
 def compare(
-    ground: Path,
+    ground: Any,
     *,
     points: Iterable[int] = (2500, 5000),
     methods: Iterable[str] = (),
     start: Iterable[str] = (),
     window: str | None = None,
+    crs: Any = None,
+    transform: Any = None,
+    spacing_m: float | None = None,
+    nodata: float | None = None,
 ) -> dict[str, Any]:
-    """Compare methods on a raster, or on that of a job: points, residuals, equivalent points, seconds.
+    """Compare methods on heights: points, residuals, equivalent points, seconds.
 
-    Arguments and keys are those of ``tiefort compare --format json``.
+    Heights are the path of a raster or of a job, or what `tin` takes: an array, a DataArray, a rasterio dataset, with
+    ``crs``, ``transform``, ``spacing_m`` and ``nodata`` as there. Other arguments, and keys, are those of ``tiefort
+    compare --format json``.
     """
-    words = [path_of(ground), "--points=" + ",".join(str(operator.index(number)) for number in points)]
+    words = ["--points=" + ",".join(str(operator.index(number)) for number in points)]
     for name, chosen in (("methods", list(methods)), ("start", list(start))):
         if chosen:
             words.append(f"--{name}={','.join(chosen)}")
     if window is not None:
         words.append(f"--window={window}")
-    found: dict[str, Any] = json.loads(_tiefort.compare(words))
-    return found
+    told: dict[str, Any]
+    if is_path(ground):
+        alone(crs, transform, spacing_m, nodata)
+        told = json.loads(_tiefort.compare([path_of(ground), *words]))
+    else:
+        posts = posts_of(ground, crs, transform, spacing_m, nodata)
+        told = json.loads(_tiefort.compare_on_array(posts.array, posts.placed, ["array", *words]))
+    return told

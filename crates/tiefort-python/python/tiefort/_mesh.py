@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from . import _tiefort
 from ._errors import RequestError
-from ._inputs import Affine6, Path, is_path, path_of, places_of, posts_of
+from ._inputs import Affine6, Path, alone, is_path, path_of, places_of, posts_of
 from ._progress import Progress, Teller
 
 if TYPE_CHECKING:
@@ -268,11 +268,7 @@ def tin(
         words.append(f"--start={path_of(start)}")
     told = Teller(progress)
     if is_path(dem):
-        said = (("crs", crs), ("transform", transform), ("spacing_m", spacing_m), ("nodata", nodata))
-        for name, value in said:
-            if value is not None:
-                message = f"found {name} with a path, expected what the file says itself"
-                raise RequestError(message, f"leave {name} out, or open the file and give its heights as an array")
+        alone(crs, transform, spacing_m, nodata)
         return Mesh._of_tin(_tiefort.tin_of_file(path_of(dem), words, told))
     posts = posts_of(dem, crs, transform, spacing_m, nodata)
     return Mesh._of_tin(_tiefort.tin_of_array(posts.array, posts.placed, words, told))

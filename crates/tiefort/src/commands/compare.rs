@@ -9,7 +9,9 @@ use job::{Job, StartMethod};
 use serde_json::{Value, json};
 use terrain::{Post, PostRect};
 use views::{Align, Facets, Image, Look, Panel, Style, Surface, Table, draw_panels, fold, grouped};
-use workbench::{CompareEvent, CompareGround, CompareMethod, CompareRequest, CompareRow, Comparison, Equivalent, Made};
+use workbench::{
+    CompareEvent, CompareGround, CompareMethod, CompareRequest, CompareRow, Comparison, Equivalent, HeldGround, Made,
+};
 
 use crate::arguments::{Format, start_method};
 use crate::failure::{Failure, Outcome};
@@ -103,7 +105,8 @@ fn window(text: &str) -> Result<PostRect, String> {
 /// Compares.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let signals = Signals::watch()?;
-    let (found, seconds) = compared(arguments, signals.stop()).map_err(|failure| failure.after(signals.exit_code()))?;
+    let found = compared(arguments, request(arguments)?, signals.stop());
+    let (found, seconds) = found.map_err(|failure| failure.after(signals.exit_code()))?;
     terminal::print(&match arguments.format {
         Format::Text => text(&found, &seconds),
         Format::Json => format!("{:#}\n", to_json(&found, &seconds)),
@@ -111,18 +114,25 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     Ok(Outcome::Sound)
 }
 
-/// The comparison for a program.
+/// The comparison for a program; on `ground` instead of what the arguments name, where it is in memory.
 ///
 /// # Errors
 /// When the ground cannot be used, or no method can make what was asked for.
-pub fn json_text(arguments: &Arguments, stop: &AtomicBool) -> Result<String, Failure> {
-    let (found, seconds) = compared(arguments, stop)?;
+pub fn json_text(arguments: &Arguments, ground: Option<HeldGround>, stop: &AtomicBool) -> Result<String, Failure> {
+    let mut request = request(arguments)?;
+    if let Some(held) = ground {
+        request.ground = CompareGround::Held(held);
+    }
+    let (found, seconds) = compared(arguments, request, stop)?;
     Ok(to_json(&found, &seconds).to_string())
 }
 
 /// The comparison, and what each row took; pictures are drawn where they are wanted.
-fn compared(arguments: &Arguments, stop: &AtomicBool) -> Result<(Comparison, Vec<f64>), Failure> {
-    let request = request(arguments)?;
+fn compared(
+    arguments: &Arguments,
+    request: CompareRequest,
+    stop: &AtomicBool,
+) -> Result<(Comparison, Vec<f64>), Failure> {
     arguments.pictures.as_deref().map_or(Ok(()), NewFolder::check)?;
     let mut watch = Watch { quiet: arguments.quiet, names: Vec::new(), began: Instant::now(), seconds: Vec::new() };
     watch.names = names(&request);

@@ -169,7 +169,11 @@ fn block(text: &str) -> Result<Block, String> {
     Ok(Block { south_west: module(south_west).map_err(wrong)?, north_east: module(north_east).map_err(wrong)? })
 }
 
-fn datum(text: &str) -> Result<Datum, String> {
+/// Reads what heights are to be taken to be above.
+///
+/// # Errors
+/// In words, when it is anything else.
+pub fn datum(text: &str) -> Result<Datum, String> {
     let metres = text.parse().ok().filter(|metres: &f64| metres.abs() <= DATUM_M_MAX).map(Datum::Above);
     metres.or_else(|| Datum::named(text)).ok_or("expected EGM96, ellipsoid, or metres to add, such as -30.5".into())
 }

@@ -17,6 +17,7 @@ mod plan_features;
 mod render;
 mod report;
 mod sample;
+mod serve;
 mod status;
 mod task;
 pub mod tile;
@@ -50,6 +51,8 @@ pub enum Command {
     Report(report::Arguments),
     /// Draw it: relief, perspective, wireframe, residuals, density, limits, tiles
     Render(render::Arguments),
+    /// Answer programs over HTTP: heights, lines of sight, load modules, terrain for globes
+    Serve(serve::Arguments),
     /// Drive through it, in a browser on this machine
     View(view::Arguments),
     /// Explain one load module: what it holds, what was refused, what one more point would buy
@@ -92,6 +95,7 @@ impl Command {
             Command::Status(arguments) => status::run(&arguments),
             Command::Report(arguments) => report::run(&arguments),
             Command::Render(arguments) => render::run(&arguments),
+            Command::Serve(arguments) => serve::run(&arguments),
             Command::View(arguments) => view::run(&arguments),
             Command::Explain(arguments) => explain::run(&arguments),
             Command::Diff(arguments) => diff::run(&arguments),

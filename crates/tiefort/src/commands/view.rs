@@ -13,7 +13,7 @@ Examples:
 
 Prints the address to open in a browser on this machine; nobody else can reach
 it. Ctrl-C ends it. W, A, S, D or arrows drive; F flies; the page lists the
-rest.
+rest. Beside the page it answers all that `tiefort serve DIR` does.
 
 The viewer is built in by
   scripts/build_viewer.sh
@@ -34,8 +34,8 @@ pub struct Arguments {
 /// Serves the page until Ctrl-C.
 #[cfg(feature = "viewer")]
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
-    crate::viewer::serve(&arguments.database, arguments.port)?;
-    Ok(Outcome::Sound)
+    let page = crate::viewer::page(&arguments.database)?;
+    super::serve::run_with_page(&arguments.database, arguments.port, page)
 }
 
 /// Says how to get a program that can.

@@ -1,4 +1,4 @@
-//! The server of `tiefort view`: a page and the load modules it asks for, on 127.0.0.1 only.
+//! The page of `tiefort view` and the load modules it asks for, beside the addresses of the service (serve/mod.rs).
 //!
 //! ```text
 //!   /                                      the page, /viewer.js its program
@@ -10,32 +10,26 @@
 //!   /api/dem                               whether the sources are at hand, as JSON; else `why` says why not
 //!   /api/dem/SOUTH/WEST/NORTH/EAST         the posts of such a block (posts.rs)
 //! ```
-//! Blocks are half-open, connections bounded in number and time (connections.rs). Everything is little-endian. An
-//! answer other than 200 is a sentence for a person.
+//! Blocks are half-open. Everything is little-endian. An answer other than 200 is a sentence for a person.
 
 mod area;
 mod block;
-mod connections;
 mod lines;
 mod overview;
 mod posts;
 
-use std::net::{Ipv4Addr, SocketAddr};
 use std::path::Path;
 use std::sync::Arc;
 
 use axum::Router;
-use axum::extract::{Path as UrlPath, Request, State};
+use axum::extract::{Path as UrlPath, State};
 use axum::http::{StatusCode, header};
-use axum::middleware::{self, Next};
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
 use load_module_reader::Block;
-use tokio::net::TcpListener;
-use tokio::runtime;
 
 use crate::failure::Failure;
-use crate::terminal;
+use crate::serve::Page;
 use area::Viewed;
 
 const PAGE: &str = include_str!("../../viewer/index.html");
@@ -46,36 +40,12 @@ const POLICY: &str = "default-src 'self'; style-src 'self' 'unsafe-inline'; img-
 const BLOCK_MODULES_MAX: usize = 1024;
 const FAULT: &str = "a fault in tiefort; the terminal says which";
 
-/// Serves `folder` until Ctrl-C.
+/// The page of the database in `folder`, and what it asks.
 ///
 /// # Errors
-/// When the database cannot be read, or the port is taken.
-pub fn serve(folder: &Path, port: u16) -> Result<(), Failure> {
-    let viewed = Arc::new(Viewed::open(folder)?);
-    let refused = |error: std::io::Error| {
-        Failure::new(
-            format!("127.0.0.1:{port}: cannot be served: {error}"),
-            "choose another --port, or 0 for a free one",
-        )
-    };
-    let runtime = runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build().map_err(refused)?;
-    runtime.block_on(async {
-        let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port)).await.map_err(refused)?;
-        let address = listener.local_addr().map_err(refused)?;
-        terminal::print(&format!("http://{address}/\n"))?;
-        terminal::tell(&format!("tiefort view: {}; open the address above, Ctrl-C ends this", folder.display()));
-        let server = tokio::spawn(connections::serve(listener, routes(viewed, address)));
-        let stopped = tokio::signal::ctrl_c().await;
-        // A page may hold its connections open for minutes: they end with the process.
-        server.abort();
-        stopped.map_err(refused)
-    })?;
-    runtime.shutdown_background();
-    Ok(())
-}
-
-fn routes(viewed: Arc<Viewed>, address: SocketAddr) -> Router {
-    Router::new()
+/// When the database cannot be read.
+pub fn page(folder: &Path) -> Result<Page, Failure> {
+    let routes = Router::new()
         .route("/", get(async || text("text/html; charset=utf-8", PAGE)))
         .route("/viewer.js", get(async || text("text/javascript; charset=utf-8", PROGRAM)))
         .route("/api/area", get(area))
@@ -85,18 +55,8 @@ fn routes(viewed: Arc<Viewed>, address: SocketAddr) -> Router {
         .route("/api/lines/{south}/{west}/{north}/{east}", get(lines))
         .route("/api/dem", get(ground))
         .route("/api/dem/{south}/{west}/{north}/{east}", get(dem))
-        .layer(middleware::from_fn(move |request: Request, next: Next| only_from_here(request, next, address)))
-        .with_state(viewed)
-}
-
-/// Refuses requests under another name than this machine's own, which a page from elsewhere could have had sent.
-async fn only_from_here(request: Request, next: Next, address: SocketAddr) -> Response {
-    let host = request.headers().get(header::HOST).and_then(|host| host.to_str().ok()).unwrap_or_default();
-    let names = [format!("127.0.0.1:{}", address.port()), format!("localhost:{}", address.port())];
-    if names.iter().any(|name| name == host) {
-        return next.run(request).await;
-    }
-    (StatusCode::FORBIDDEN, format!("found a request for {host:?}, expected {}", names[0])).into_response()
+        .with_state(Arc::new(Viewed::open(folder)?));
+    Ok(Page { routes, paths: &["/viewer.js", "/api/*"] })
 }
 
 fn text(kind: &'static str, body: &'static str) -> impl IntoResponse {

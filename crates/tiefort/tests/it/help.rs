@@ -2,7 +2,7 @@
 
 use crate::scene::Scene;
 
-const COMMANDS: [&str; 21] = [
+const COMMANDS: [&str; 22] = [
     "build",
     "tile",
     "plan",
@@ -10,6 +10,7 @@ const COMMANDS: [&str; 21] = [
     "worker",
     "status",
     "report",
+    "serve",
     "view",
     "render",
     "explain",

@@ -23,6 +23,10 @@ mod paths;
 mod raster;
 mod roads_and_water;
 mod scene;
+#[cfg(feature = "serve")]
+mod serve;
+#[cfg(feature = "serve")]
+mod server;
 mod shared;
 mod starts;
 mod streams;

@@ -1,41 +1,21 @@
 //! `tiefort view`: the server, or word of how to build it in.
 
-use crate::scene::Scene;
-
 #[cfg(not(feature = "viewer"))]
 #[test]
 fn without_the_viewer_the_command_says_how_to_build_it_in() {
-    let scene = Scene::new();
+    let scene = crate::scene::Scene::new();
     scene.refuses(&["view", "small.tdb"], &["without the viewer"]);
     let hint = scene.run_to(2, &["view", "small.tdb"]).stderr;
     assert!(hint.contains("scripts/build_viewer.sh") && hint.contains("--features viewer"), "{hint}");
 }
 
 #[cfg(feature = "viewer")]
-mod server {
-    use std::io::{BufRead, BufReader, ErrorKind, Read, Write};
-    use std::net::TcpStream;
-    use std::process::{Child, Stdio};
-    use std::time::{Duration, Instant};
-
+mod page {
     use serde_json::Value;
 
-    use super::Scene;
     use crate::raster::Raster;
-
-    /// A server, ended with the test.
-    struct Server {
-        process: Child,
-        host: String,
-        scene: Scene,
-    }
-
-    impl Drop for Server {
-        fn drop(&mut self) {
-            let _ = self.process.kill();
-            let _ = self.process.wait();
-        }
-    }
+    use crate::scene::Scene;
+    use crate::server::Server;
 
     fn served() -> Server {
         let scene = Scene::with_job("small.toml", &[]);
@@ -44,24 +24,14 @@ mod server {
     }
 
     fn served_in(scene: Scene, folder: &str) -> Server {
-        let mut process =
-            scene.program().args(["view", folder]).stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
-        let mut line = String::new();
-        BufReader::new(process.stdout.take().unwrap()).read_line(&mut line).unwrap();
-        let host = line.trim().strip_prefix("http://").unwrap().trim_end_matches('/').to_owned();
-        Server { process, host, scene }
+        Server::start(scene, &["view", folder])
     }
 
     impl Server {
         /// Status and body of an answer to a request for `path` under the name `host`.
         fn asked_as(&self, host: &str, path: &str) -> (u16, Vec<u8>) {
-            let mut stream = TcpStream::connect(&self.host).unwrap();
-            write!(stream, "GET {path} HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n\r\n").unwrap();
-            let mut answer = Vec::new();
-            stream.read_to_end(&mut answer).unwrap();
-            let end = answer.windows(4).position(|four| four == b"\r\n\r\n").unwrap();
-            let head = String::from_utf8(answer[..end].to_vec()).unwrap();
-            (head.split(' ').nth(1).unwrap().parse().unwrap(), answer[end + 4..].to_vec())
+            let answer = self.ask("GET", path, &[&format!("Host: {host}")], &[]);
+            (answer.status, answer.body)
         }
 
         fn asked(&self, path: &str) -> (u16, Vec<u8>) {
@@ -133,70 +103,12 @@ mod server {
         assert!(status == 409 && String::from_utf8(why).unwrap().contains("dem.tif"));
     }
 
-    /// Longer than a client may take for its request, on a busy machine.
-    const ENOUGH: Duration = Duration::from_secs(40);
-
     #[test]
-    fn slow_clients_neither_keep_others_waiting_nor_stay() {
+    fn beside_the_page_programs_are_answered_as_by_serve() {
         let server = served();
-        let begun = |text: &str| {
-            let mut stream = TcpStream::connect(&server.host).unwrap();
-            stream.set_read_timeout(Some(ENOUGH)).unwrap();
-            stream.write_all(text.as_bytes()).unwrap();
-            stream
-        };
-        let texts = ["", "G", "GET / HTTP/1.1\r\nHost: ", "GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nA: "];
-        let mut clients: Vec<TcpStream> = (0..400).map(|i| begun(texts[i % texts.len()])).collect();
-        let start = Instant::now();
-        assert_eq!(server.asked("/api/area").0, 200);
-        assert!(start.elapsed() < Duration::from_secs(3), "an answer after {:?}", start.elapsed());
-        // The newest client sends on, a byte at a time; it is ended as the others are.
-        let last = clients.last_mut().unwrap();
-        last.set_read_timeout(Some(Duration::from_millis(200))).unwrap();
-        let is_open = |stream: &mut TcpStream| {
-            let read = stream.write_all(b"a").and_then(|()| stream.read(&mut [0; 256]));
-            // Nothing to read within the time; an answer, an end or an error is an end.
-            matches!(read, Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut))
-        };
-        while is_open(last) {
-            assert!(start.elapsed() < ENOUGH, "a slow client is still connected");
-        }
-        for client in &mut clients {
-            let mut rest = Vec::new();
-            let waited = matches!(client.read_to_end(&mut rest), Err(error) if error.kind() == ErrorKind::WouldBlock);
-            assert!(!waited, "a client that sends nothing is still connected");
-        }
-    }
-
-    #[test]
-    fn clients_that_do_not_read_make_place_for_others() {
-        let server = served();
-        let ask = || {
-            let mut stream = TcpStream::connect(&server.host).unwrap();
-            // More answers than sockets hold, none of them read.
-            let requests = format!("GET /viewer.js HTTP/1.1\r\nHost: {}\r\n\r\n", server.host).repeat(20);
-            stream.write_all(requests.as_bytes()).unwrap();
-            stream
-        };
-        let clients: Vec<TcpStream> = (0..100).map(|_| ask()).collect();
-        let start = Instant::now();
-        assert_eq!(server.asked("/api/area").0, 200);
-        assert!(start.elapsed() < Duration::from_secs(3), "an answer after {:?}", start.elapsed());
-        drop(clients);
-    }
-
-    #[test]
-    fn a_request_that_is_too_long_is_refused() {
-        let server = served();
-        let mut stream = TcpStream::connect(&server.host).unwrap();
-        stream.set_read_timeout(Some(ENOUGH)).unwrap();
-        let long = "a".repeat(1 << 16);
-        // The server may end the connection before all is sent.
-        let _ = write!(stream, "GET / HTTP/1.1\r\nHost: {}\r\nA: {long}\r\n\r\n", server.host);
-        let mut answer = Vec::new();
-        let _ = stream.read_to_end(&mut answer);
-        assert!(!answer.starts_with(b"HTTP/1.1 200"), "{}", String::from_utf8_lossy(&answer));
-        assert_eq!(server.asked("/api/area").0, 200);
+        assert_eq!(server.asked("/small.tdb/modules/r00c00.slm").0, 200);
+        assert_eq!(server.asked("/databases.json").0, 200);
+        assert_eq!(server.post("/heights", r#"{"positions": [[505010, 3875010]]}"#).status, 200);
     }
 
     #[test]

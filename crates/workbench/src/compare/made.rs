@@ -1,18 +1,46 @@
 //! What methods are compared on, and what one made.
 
 use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
+use compiler::CompileError;
 use fidelity::Tally;
 use job::Job;
-use terrain::Tin;
+use schedule::Workers;
+use source_files::Raster;
+use terrain::{Dem, Metres, Tin};
+
+use crate::heights::Heights;
 
 /// What to compare methods on.
 #[derive(Clone, Debug)]
 pub enum CompareGround {
     /// The posts of a raster.
     Raster(PathBuf),
+    /// The heights of a raster in memory.
+    Held(HeldGround),
     /// The ground of a job: its one raster's own posts, or else its working grid.
     Job(Box<Job>),
+}
+
+/// The heights of a raster in memory, on its own posts where these are square, else resampled.
+#[derive(Clone, Debug)]
+pub struct HeldGround {
+    pub(super) dem: Arc<Dem>,
+    pub(super) spacing: Metres,
+    pub(super) name: String,
+}
+
+impl HeldGround {
+    /// Those of a raster.
+    ///
+    /// # Errors
+    /// When it has no heights, or no grid suits it.
+    pub fn of(raster: Raster, name: &str, stop: &AtomicBool) -> Result<Self, CompileError> {
+        let Heights { dem, frame, .. } = Heights::of_raster(raster, &Workers::new(1), stop)?;
+        Ok(Self { dem, spacing: Metres(frame.spacing[0]), name: name.to_owned() })
+    }
 }
 
 /// What a method made.

@@ -16,7 +16,7 @@ use ground::GroundError;
 use terrain::{Dem, PostRect};
 
 pub use choose::CompareMethod;
-pub use made::{CompareGround, Equivalent, Forced, Made};
+pub use made::{CompareGround, Equivalent, Forced, HeldGround, Made};
 pub use methods::Impossible;
 
 use curve::Curve;

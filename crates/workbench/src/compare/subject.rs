@@ -14,7 +14,7 @@ use schedule::Workers;
 use source_files::{DemFile, Reading, VoidPolicy};
 use terrain::{Dem, Metres, Post, PostRect, Tin, quanta_of_metres};
 
-use super::made::{CompareGround, Equivalent, Made};
+use super::made::{CompareGround, Equivalent, HeldGround, Made};
 use crate::heights::{Heights, has_square_posts};
 use crate::mesh::untiled;
 use crate::request::TinRequest;
@@ -52,6 +52,10 @@ impl Subject {
                     true => of_file(&file, windowed(file.rect(), window)?, name, stop),
                     false => of_resampled(&file, window, &name, stop),
                 }
+            }
+            CompareGround::Held(HeldGround { dem, spacing, name }) => {
+                let height = |post: Post| (!dem.is_void(post)).then(|| dem.height(post));
+                of_heights(windowed(dem.rect(), window)?, *spacing, name.clone(), height)
             }
             CompareGround::Job(job) => of_job(job, window, stop),
         }
