@@ -31,6 +31,8 @@ mod blocks;
 mod geotiff;
 mod surface;
 mod tiff_layout;
+mod byte_raster;
+pub use byte_raster::{ByteRaster, write_byte_raster};
 pub use surface::{GroundHeights, write_residual, write_surface};
 mod gpkg;
 mod gpkg_styles;

@@ -7,6 +7,7 @@
 //!   /api/modules/SOUTH/WEST/NORTH/EAST     a block of load modules, whole (block.rs)
 //!   /api/levels/LEVEL/SOUTH/WEST/NORTH/EAST   the same at a level of detail
 //!   /api/lines/SOUTH/WEST/NORTH/EAST       roads and streams without triangles of their own there (lines.rs)
+//!   /api/relief                            heights and classes on a fine grid, for shades and shadows (relief.rs)
 //!   /api/dem                               whether the sources are at hand, as JSON; else `why` says why not
 //!   /api/dem/SOUTH/WEST/NORTH/EAST         the posts of such a block (posts.rs)
 //! ```
@@ -19,6 +20,7 @@ mod connections;
 mod lines;
 mod overview;
 mod posts;
+mod relief;
 
 use std::net::{Ipv4Addr, SocketAddr};
 use std::path::Path;
@@ -83,6 +85,7 @@ fn routes(viewed: Arc<Viewed>, address: SocketAddr) -> Router {
         .route("/api/modules/{south}/{west}/{north}/{east}", get(modules))
         .route("/api/levels/{level}/{south}/{west}/{north}/{east}", get(level))
         .route("/api/lines/{south}/{west}/{north}/{east}", get(lines))
+        .route("/api/relief", get(relief::answer))
         .route("/api/dem", get(ground))
         .route("/api/dem/{south}/{west}/{north}/{east}", get(dem))
         .layer(middleware::from_fn(move |request: Request, next: Next| only_from_here(request, next, address)))

@@ -21,7 +21,7 @@ export class SmallMap {
   /** Paints the area anew: shaded heights, water and holes, or a square for each load module. */
   repaint(colors) {
     const { area, ground } = this, { wide, high, heights, classes } = area.coarse;
-    const byModule = colors !== "height";
+    const byModule = (this.byModule = colors !== "height");
     [ground.width, ground.height] = byModule ? [area.cols, area.rows] : [wide - 1, high - 1];
     const picture = new ImageData(ground.width, ground.height);
     for (let row = 0; row < ground.height; row++) {
@@ -47,7 +47,7 @@ export class SmallMap {
 
   draw(block, tank, range) {
     const { area, canvas, pixels } = this, context = canvas.getContext("2d");
-    context.imageSmoothingEnabled = false;
+    context.imageSmoothingEnabled = !this.byModule;
     context.drawImage(this.ground, 0, 0, canvas.width, canvas.height);
     const [x, y] = [(tank.east - area.sides[0]) * pixels, (area.sides[3] - tank.north) * pixels];
     if (block) {

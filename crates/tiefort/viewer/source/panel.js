@@ -38,13 +38,27 @@ export function showFigures(area, { tank, loaded, view, under, frameMs }) {
 }
 
 export function showName(area) {
-  at("figures").querySelector("h1").textContent = `${area.name}, ${area.crs}`;
+  at("figures").querySelector("summary").textContent = `${area.name}, ${area.crs}`;
+  document.title = `${area.name} - tiefort view`;
+}
+
+const WINDS = ["N", "NE", "E", "SE", "S", "SW", "W", "NW"];
+
+/** What is always seen: heading, height, speed and gear. */
+export function showHud({ tank }) {
+  const heading = ((degrees(tank.heading + tank.turned) % 360) + 360) % 360;
+  const wind = WINDS[Math.round(heading / 45) % WINDS.length];
+  const above = tank.height === null ? "" : ` (${Math.max(tank.altitude - tank.height, 0).toFixed(0)} m above ground)`;
+  const height = tank.flies ? `${tank.altitude.toFixed(0)} m${above}` : `${tank.height?.toFixed(1) ?? "-"} m`;
+  const speed = `${(3.6 * Math.abs(tank.speed)).toFixed(0)} km/h`;
+  const words = `${wind} ${heading.toFixed(0)}\u00b0 \u00b7 ${height} \u00b7 ${speed} \u00b7 gear ${tank.gear + 1}`;
+  const place = at("hud").querySelector("span");
+  if (place.textContent !== words) place.textContent = words;
 }
 
 /** The scale of colours. */
 export function showLegend(area, colors, showsDem) {
   const [stops, low, high] = legendOf(area, colors, showsDem);
-  at("legend").style.display = "block";
   at("legend").querySelector("i").style.background = `linear-gradient(to right, ${stops.join(", ")})`;
   at("legend").querySelector("span").replaceChildren(...[low, high].map((words) => {
     const element = document.createElement("em");
