@@ -76,7 +76,7 @@ impl Line {
 
 /// How the earth falls away below a level line.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Curvature(f64);
+pub struct Curvature(pub(crate) f64);
 
 impl Curvature {
     /// The ground as a map has it.

@@ -18,7 +18,8 @@ Examples:
   tiefort profile ntc.tdb 530000,3899000 534000,3897000 536000,3897000 \\
       --spacing 5 --format csv > line.csv
 
-Goes straight from place to place. Heights are those of the ground; decks of
+Goes straight from place to place; a `--` goes before places that begin with a
+minus. Heights are those of the ground; decks of
 bridges are in columns of their own. In Python: Database.profile, which answers
 the same.";
 
@@ -35,8 +36,7 @@ pub struct Arguments {
     #[arg(value_name = "DIR")]
     database: PathBuf,
     /// Places to go through, two or more: east and north in metres
-    #[arg(value_name = "E,N", required = true, num_args = 2.., value_parser = places::place,
-        allow_hyphen_values = true)]
+    #[arg(value_name = "E,N", required = true, num_args = 2.., value_parser = places::place)]
     places: Vec<[f64; 2]>,
     /// Metres between heights at most
     #[arg(long, value_name = "M", value_parser = positive, default_value = "10")]

@@ -29,7 +29,7 @@ Heights of both ends are metres above the ground. Decks of bridges hide what is
 behind them, as ground does. In Python: Database.line_of_sight and
 Database.viewshed, which answer the same.
 
-Exit codes: 0, whatever is seen; 64 for wrong arguments.";
+Exit codes: 0, whatever is seen; 2 for what cannot be looked at.";
 
 /// Places of a viewshed up to which one is made, and drawn.
 const PLACES_MAX: u64 = 1 << 28;

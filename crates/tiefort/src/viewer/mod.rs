@@ -11,7 +11,7 @@
 //!   /api/dem                               whether the sources are at hand, as JSON; else `why` says why not
 //!   /api/dem/SOUTH/WEST/NORTH/EAST         the posts of such a block (posts.rs)
 //! ```
-//! Blocks are half-open, connections bounded in number and time (connections.rs). Everything is little-endian. An
+//! What the tools of the page ask is listed in tools.rs. Blocks are half-open, connections bounded in number and time (connections.rs). Everything is little-endian. An
 //! answer other than 200 is a sentence for a person.
 
 mod area;
@@ -21,6 +21,7 @@ mod lines;
 mod overview;
 mod posts;
 mod relief;
+mod tools;
 
 use std::net::{Ipv4Addr, SocketAddr};
 use std::path::Path;
@@ -88,6 +89,7 @@ fn routes(viewed: Arc<Viewed>, address: SocketAddr) -> Router {
         .route("/api/relief", get(relief::answer))
         .route("/api/dem", get(ground))
         .route("/api/dem/{south}/{west}/{north}/{east}", get(dem))
+        .merge(tools::routes())
         .layer(middleware::from_fn(move |request: Request, next: Next| only_from_here(request, next, address)))
         .with_state(viewed)
 }

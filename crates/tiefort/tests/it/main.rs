@@ -24,6 +24,7 @@ mod raster;
 mod roads_and_water;
 mod scene;
 mod shared;
+mod sight;
 mod starts;
 mod streams;
 mod view;

@@ -49,12 +49,14 @@ export async function start() {
   fitted(view);
   run(view, wishes);
   // What a test asks, and whoever is curious in the console.
-  window.tiefort = { state: () => state(view), skyBelowHorizon: () => skyBelowHorizon(view) };
+  window.tiefort = { view, state: () => state(view), skyBelowHorizon: () => skyBelowHorizon(view) };
 }
 
 function viewOf(area) {
   const canvas = at("scene"), isSoft = drawsInSoftware();
-  const renderer = new WebGLRenderer({ canvas, antialias: !isSoft });
+  // Nothing lies behind the picture, and who lays the page together need not look for it.
+  const context = canvas.getContext("webgl2", { alpha: false, antialias: !isSoft, stencil: false });
+  const renderer = new WebGLRenderer({ canvas, context });
   const scene = new Scene(), sky = looks.prepare(area);
   const sun = new DirectionalLight(0xfff4e0, 2.3);
   sun.position.set(-1, 1.1, -1);
