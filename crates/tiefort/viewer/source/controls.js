@@ -11,7 +11,7 @@ const LOOK_PITCH = [-1.4, 1.2], AWAY = [8, 400];
 const CLICK_PX = 5, FULL_PX = 70;
 
 /** Keys belong to what is written into, chosen from or pressed. */
-const isOwn = (event) => event.target.matches("select, input:not([type=checkbox]), textarea")
+const isOwn = (event) => event.target.matches("select, input:not([type=checkbox])")
   || (["Space", "Enter"].includes(event.code) && event.target.matches("summary, button, input, a"));
 
 /** Calls `pick(x, y)` for clicks, `press(event)` for keys that switch something, `touch()` for the first of anything;

@@ -53,7 +53,7 @@ function sunlight({ wide, high, heights, step }, sun) {
         shadow = a + share * (b - a) - drop;
         next[line] = distance[low] + share * (distance[low + 1] - distance[low]) + way;
       }
-      const soft = Math.max(SOFT * next[line], 0.5);
+      const soft = Math.max(SOFT * next[line], 0.2 * step);
       if (height < shadow) lit[place] = Math.round(255 * Math.max(0, 1 - (shadow - height) / soft));
       if (shadow <= height) next[line] = 0;
       top[place] = Math.max(shadow, height);

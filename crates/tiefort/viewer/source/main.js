@@ -15,6 +15,7 @@ import { sunAt } from "./sun.js";
 import { switches } from "./switches.js";
 import { Tank } from "./tank.js";
 import { Terrain } from "./terrain.js";
+import { TOOL_KEYS, Tools } from "./tools.js";
 
 const EYE_DEGREES = 55, NEAR_M = 1, FAR_M = 500_000;
 /** Seconds that one picture may stand for, so that a slow machine drives slowly and not in leaps. */
@@ -31,9 +32,17 @@ export async function start() {
   const light = lighting(view);
   setSwitches(wanted);
   const listens = switches(view, { light });
-  const help = helpList();
+  const help = helpList(), tools = new Tools(view);
+  const search = (event) => {
+    event.preventDefault();
+    at("tools").open = true;
+    at("place").select();
+  };
   const keys = (event) => {
     if (event.key === "?") help();
+    else if (event.code === "Escape") tools.clear();
+    else if (TOOL_KEYS[event.code]) at(TOOL_KEYS[event.code]).click();
+    else if (event.code === "KeyN") search(event);
     else if (event.code === "KeyX") tank.level();
     else if (/^Digit[1-4]$/.test(event.code)) tank.shift(Number(event.code.at(-1)) - 1);
     else listens(event);
@@ -42,14 +51,16 @@ export async function start() {
     at("keys").classList.add("gone");
     if (tank.drifts) [tank.drifts, tank.speed] = [false, 0];
   };
-  const wishes = controls(view.renderer.domElement, tank, { pick: (x, y) => pick(view, x, y), press: keys, touch });
+  const wishes = controls(view.renderer.domElement, tank, {
+    pick: (x, y) => tools.click(x, y) || pick(view, x, y), press: keys, touch,
+  });
   at("help").addEventListener("click", help);
   at("horizon").addEventListener("click", () => tank.level());
   scene.add(terrain.group, tank.model);
   fitted(view);
   run(view, wishes);
   // What a test asks, and whoever is curious in the console.
-  window.tiefort = { view, state: () => state(view), skyBelowHorizon: () => skyBelowHorizon(view) };
+  window.tiefort = { state: () => ({ ...state(view), answer: tools.answer, tool: tools.mode }), skyBelowHorizon: () => skyBelowHorizon(view) };
 }
 
 function viewOf(area) {

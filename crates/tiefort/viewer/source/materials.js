@@ -107,7 +107,8 @@ export function setOverlay(texture, west, north, metres) {
 export function setLook({ wireframe, facets, texture, going, range }) {
   changes += 1;
   edges.value = wireframe ? 1 : 0;
-  shared.softness.value = facets ? 0 : SOFTNESS;
+  // A layer of slopes tells those of the triangles.
+  shared.softness.value = facets || going ? 0 : SOFTNESS;
   shared.textured.value = texture ? 1 : 0;
   shared.going.value = going ? 1 : 0;
   shared.smoothM.value.set(0.35 * range, 0.85 * range);

@@ -72,6 +72,7 @@ export function showPicked(area, picked) {
   const box = at("picked");
   box.style.display = picked ? "block" : "none";
   if (!picked) return;
+  at("answer").style.display = "none";
   const { row, col, level, place, triangle } = picked, figures = area.figures(row, col);
   const [east, north] = area.inSystem(place[0], place[1]);
   const metres = (value) => (Number.isNaN(value) ? "no post measured" : `${value.toFixed(2)} m`);
@@ -96,6 +97,17 @@ export function showPicked(area, picked) {
     element.textContent = words;
     return element;
   }));
+}
+
+/** What a tool answers: words, and a drawing where `draw` makes one on a canvas. */
+export function tell(words, draw) {
+  const box = at("answer");
+  box.style.display = words ? "block" : "none";
+  if (words) at("picked").style.display = "none";
+  const [line, canvas] = [document.createElement("div"), document.createElement("canvas")];
+  line.textContent = words;
+  box.replaceChildren(...(draw ? [line, canvas] : [line]));
+  draw?.(canvas);
 }
 
 export function note(words) {
