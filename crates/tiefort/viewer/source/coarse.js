@@ -1,6 +1,6 @@
 // The whole area on a coarse grid, for what is far away, and the level ground around it.
 import { BufferAttribute, BufferGeometry, Group, Sphere, Vector3 } from "three";
-import { bytes, colorOf, isWater, MADE, WATER } from "./colors.js";
+import { bytes, colorOf, isWater, MADE, numbers, WATER } from "./colors.js";
 import * as looks from "./materials.js";
 import { geometryOf, meshOf, seaTint, tintAt, tintOf } from "./meshes.js";
 
@@ -129,7 +129,10 @@ export function apron(area, base, reach) {
   rectangle(-reach, south, west, north);
   rectangle(east, south, reach, north);
   const geometry = geometryOf(new Float32Array(positions)), tint = geometry.getAttribute("tint");
-  const isSea = area.height_m[0] === 0, color = isSea ? [...bytes(colorOf.sea(area)), WATER] : tintAt(area, base);
+  // Nothing is known of it: land in the haze, or the sea where the area has one.
+  const haze = bytes(numbers(area.palette.haze)), land = tintAt(area, base).map((part, i) => (part + 2 * haze[i]) / 3);
+  const isSea = area.height_m[0] === 0;
+  const color = isSea ? [...bytes(colorOf.sea(area)), WATER] : [...land.slice(0, 3), MADE];
   for (let i = 0; i < tint.count; i++) tint.array.set(color, 4 * i);
   geometry.computeVertexNormals();
   const mesh = meshOf(geometry, looks.apron);

@@ -35,7 +35,7 @@ export const colorOf = {
   /** Of water without a class. */
   sea: (area) => numbers(area.palette.water),
   /** Of a level of detail. */
-  levels: (level) => numbers(LEVELS[Math.min(level, LEVELS.length - 1)]),
+  levels: (_, level) => numbers(LEVELS[Math.min(level, LEVELS.length - 1)]),
   residuals: (area, rms) => known(area, area.palette.errors, rms / area.residual_scale_m),
   residual: (area, metres) => known(area, area.palette.residuals, 0.5 + metres / (2 * area.residual_scale_m)),
 };

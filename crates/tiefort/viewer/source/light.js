@@ -8,7 +8,8 @@ const AROUND_M = 400, HOLLOW_M = 70;
 /** How wide the edge of a shadow is: the tangent of the sun's disc, made larger to look soft on a coarse grid. */
 const SOFT = 0.06;
 
-const packed = (rise) => Math.round(127.5 + 127.5 * Math.sign(rise) * Math.sqrt(Math.min(Math.abs(rise) / STEEPEST, 1)));
+const packed = (rise) =>
+  Math.round(127.5 + 127.5 * Math.sign(rise) * Math.sqrt(Math.min(Math.abs(rise) / STEEPEST, 1)));
 
 /** Mean heights within a square of `reach` posts each way, by sums that run along rows, then along columns. */
 function blurred({ wide, high, heights }, reach) {

@@ -60,7 +60,10 @@ export async function start() {
   fitted(view);
   run(view, wishes);
   // What a test asks, and whoever is curious in the console.
-  window.tiefort = { state: () => ({ ...state(view), answer: tools.answer, tool: tools.mode }), skyBelowHorizon: () => skyBelowHorizon(view) };
+  window.tiefort = {
+    state: () => ({ ...state(view), answer: tools.answer, tool: tools.mode }),
+    skyBelowHorizon: () => skyBelowHorizon(view),
+  };
 }
 
 function viewOf(area) {
@@ -109,7 +112,11 @@ function begin(view, wanted) {
 function lighting(view) {
   const { area } = view, worker = new Worker("/viewer.js", { type: "module" });
   let isRead = false;
-  worker.onmessage = ({ data }) => (data.fault ? note(data.fault) : looks.setRelief(area, data));
+  worker.onmessage = ({ data }) => {
+    if (data.fault) note(`The relief could not be read: ${data.fault}`);
+    else looks.setRelief(area, data);
+    view.lit = true;
+  };
   return () => {
     const sun = sunAt(view.hour, area.latitude ?? 40);
     looks.setSun(area, sun);
@@ -151,8 +158,10 @@ function frame(view, passed, wish, now) {
   else tank.step(seconds, wish);
   tank.place(camera);
   looks.setFrame(now / 1000, tank.east, tank.north, tank.flies || !tank.chases ? 0 : 4.5);
+  looks.setSplit(Number(at("split").value));
   const version = `${terrain.version} ${looks.version()} ${view.version ?? 0}`;
   if (view.pace.draws(camera, version, now)) {
+    looks.setWidth(renderer.domElement.width);
     renderer.render(scene, camera);
     if (view.drew) view.pace.took(passed);
     view.drew = true;
@@ -192,6 +201,7 @@ function state(view) {
       .map(({ module }) => [module.level, module.row, module.col, module.counts.triangles]),
     blocks: terrain.blocks, fullest: loaded.fullest, view: seen, frameMs: view.frameMs, picked,
     flies: tank.flies, altitude: tank.altitude, turned: tank.turned, pitch: tank.pitch, gear: tank.gear,
-    drifts: tank.drifts, frames: view.frames, count: view.count, pixelRatio: view.renderer.getPixelRatio(),
+    drifts: tank.drifts, lit: view.lit === true, frames: view.frames, count: view.count,
+    pixelRatio: view.renderer.getPixelRatio(),
   };
 }

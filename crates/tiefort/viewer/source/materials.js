@@ -28,7 +28,8 @@ const shared = {
   reliefMap: { value: flat }, reliefPlace: { value: new Vector4() }, noiseMap: { value: null },
   overMap: { value: clear }, overPlace: { value: new Vector4(0, 0, 1, 0) },
   smoothM: { value: new Vector2(1500, 3000) }, softness: { value: SOFTNESS }, seconds: { value: 0 },
-  textured: { value: 1 }, going: { value: 0 }, blob: { value: new Vector4() },
+  split: { value: new Vector2() }, splitSide: { value: 0 }, textured: { value: 1 }, going: { value: 0 },
+  blob: { value: new Vector4() },
 };
 
 function groundMaterial(edges, options) {
@@ -42,6 +43,12 @@ const edges = { value: 0 }, none = { value: 0 };
 /** Load modules, whose triangles may show their edges; what is drawn coarsely; decks, which are seen from below too;
  * ribbons on the ground, which must not sink into it. */
 export const fine = groundMaterial(edges, {});
+/** The same, where two surfaces share the picture: left of the line and right of it. */
+export const sides = [-1, 1].map((side) => {
+  const material = groundMaterial(edges, {});
+  material.uniforms.splitSide = { value: side };
+  return material;
+});
 export const coarse = groundMaterial(none, { polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1 });
 export const walls = groundMaterial(none, { side: DoubleSide });
 export const cliffs = groundMaterial(none, {});
@@ -112,6 +119,17 @@ export function setLook({ wireframe, facets, texture, going, range }) {
   shared.textured.value = texture ? 1 : 0;
   shared.going.value = going ? 1 : 0;
   shared.smoothM.value.set(0.35 * range, 0.85 * range);
+}
+
+/** Where two surfaces meet, as a part of a picture's width. */
+export function setSplit(share) {
+  if (shared.split.value.x !== share) changes += 1;
+  shared.split.value.x = share;
+}
+
+/** How many pixels the next picture is wide. */
+export function setWidth(pixels) {
+  shared.split.value.y = pixels;
 }
 
 /** The time for waves, and the shadow under the tank: east, north and metres; 0 for none. */

@@ -34,11 +34,11 @@ export function meshOf(geometry, material) {
 }
 
 /** A load module's surface. */
-export function moduleMesh(surface) {
+export function moduleMesh(surface, material = looks.fine) {
   const geometry = geometryOf(corners(surface));
   geometry.computeVertexNormals();
   geometry.computeBoundingSphere();
-  return meshOf(geometry, looks.fine);
+  return meshOf(geometry, material);
 }
 
 /** The decks of a load module, coloured by their classes. */

@@ -16,7 +16,8 @@ function random(seed) {
 function octaves(cells, count, seed) {
   const out = new Float32Array(SIZE * SIZE);
   for (let octave = 0, share = 0.5; octave < count; octave++, share /= 2) {
-    const side = cells << octave, next = random(seed + octave), lattice = Float32Array.from({ length: side * side }, next);
+    const side = cells << octave, next = random(seed + octave);
+    const lattice = Float32Array.from({ length: side * side }, next);
     const smooth = (at) => at * at * (3 - 2 * at);
     for (let y = 0, i = 0; y < SIZE; y++) {
       const v = (y * side) / SIZE, row = Math.floor(v), up = smooth(v - row);

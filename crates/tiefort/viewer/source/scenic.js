@@ -6,6 +6,8 @@ const TRIED = 36, DIRECTIONS = 12, RAYS = 7, LOOKS = 14;
 const VIEW_RADIANS = 0.85, REACH_M = 9000, ABOVE_M = 160;
 /** How much a place that sees water gains. */
 const SHORE = 0.035;
+/** Metres that ground a kilometre around should differ. */
+const ROUGH_M = 250;
 
 /** Height of the coarse grid near a place; undefined outside. */
 export function coarseAt(area, east, north) {
@@ -20,12 +22,12 @@ function isWaterAt({ coarse, ...area }, east, north) {
   return isWater(area, coarse.classes[row * coarse.wide + col]);
 }
 
-/** What is seen from a place: how much the heights in view differ, less what lies outside. */
+/** What is seen from a place: how far the ground in view goes up and down, and how high it stands. */
 function score(area, [east, north], eye, direction, reach) {
-  let [seen, sum, squares, outside, water] = [0, 0, 0, 0, 0];
+  let [relief, skyline, outside, water] = [0, 0, 0, 0];
   for (let ray = 0; ray < RAYS; ray++) {
     const way = direction + VIEW_RADIANS * (ray / (RAYS - 1) - 0.5), [sin, cos] = [Math.sin(way), Math.cos(way)];
-    let horizon = -Infinity;
+    let [horizon, before] = [-0.3, undefined];
     for (let look = 1; look <= LOOKS; look++) {
       const away = (reach * look * look) / (LOOKS * LOOKS) + 100;
       const height = coarseAt(area, east + sin * away, north + cos * away);
@@ -35,18 +37,23 @@ function score(area, [east, north], eye, direction, reach) {
       }
       const rise = (height - eye) / away;
       if (rise < horizon) continue;
-      if (isWaterAt(area, east + sin * away, north + cos * away)) water += 1;
       horizon = rise;
-      // Peaks above the eye count more than depths below.
-      const counted = eye < height ? eye + 1.6 * (height - eye) : height;
-      [seen, sum, squares] = [seen + 1, sum + counted, squares + counted * counted];
+      relief += Math.abs(height - (before ?? height));
+      before = height;
+      if (isWaterAt(area, east + sin * away, north + cos * away)) water += 1;
     }
+    skyline += Math.min(horizon, 0.25) / RAYS;
   }
-  if (seen < RAYS) return 0;
-  const relief = Math.sqrt(Math.max(squares / seen - (sum / seen) ** 2, 0));
-  // Light comes from the north-west: ground looks best with it from behind or from the side.
-  const shores = 1 + Math.min(water, 12) * SHORE;
-  return relief * shores * (1 - (0.8 * outside) / (RAYS * LOOKS)) * (1 + 0.2 * Math.sin(direction - Math.PI / 4));
+  // Light comes from the north-west: ground looks best with it from the side.
+  const bySide = 1 + 0.3 * Math.abs(Math.sin(direction + Math.PI / 4)), shores = 1 + Math.min(water, 12) * SHORE;
+  return relief * shores * bySide * (0.3 + Math.max(skyline + 0.05, 0) * 4) * (1 - (0.8 * outside) / (RAYS * LOOKS));
+}
+
+/** How much the heights a kilometre around a place differ. */
+function roughness(area, [east, north]) {
+  const heights = Array.from({ length: 12 }, (_, i) =>
+    coarseAt(area, east + 1000 * Math.sin(i), north + 1000 * Math.cos(i))).filter((height) => height !== undefined);
+  return heights.length < 8 ? 0 : Math.max(...heights) - Math.min(...heights);
 }
 
 /** East, north, height of the eye and heading. */
@@ -59,8 +66,10 @@ export function scenicPlace(area) {
       const place = [west + share(col) * (east - west), south + share(row) * (north - south)];
       const ground = coarseAt(area, ...place);
       if (!(ground !== undefined)) continue;
+      const rough = 0.3 + Math.min(roughness(area, place) / ROUGH_M, 1);
       for (let number = 0; number < DIRECTIONS; number++) {
-        const direction = (2 * Math.PI * number) / DIRECTIONS, found = score(area, place, ground + ABOVE_M, direction, reach);
+        const direction = (2 * Math.PI * number) / DIRECTIONS;
+        const found = rough * score(area, place, ground + ABOVE_M, direction, reach);
         if (best.score < found) best = { score: found, place, direction, ground };
       }
     }

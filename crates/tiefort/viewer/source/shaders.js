@@ -1,5 +1,5 @@
-// The shaders of ground, water and sky. Colours are those of screens from beginning to end, as in the server's pictures,
-// so that ground in full light has the colour that the palette gives it.
+// The shaders of ground, water and sky. Colours are those of screens from beginning to end, as in the server's
+// pictures, so that ground in full light has the colour that the palette gives it.
 import { STEEPEST } from "./light.js";
 
 /** Haze between the eye and what it sees; the same behind everything, so that ground meets sky without a line. */
@@ -36,6 +36,8 @@ export const GROUND_FRAGMENT = /* glsl */ `
   uniform vec2 smoothM;
   uniform float softness, edges, seconds, textured, going;
   uniform vec4 blob;
+  uniform vec2 split;
+  uniform float splitSide;
   in vec3 place, facing, bary;
   in vec4 own;
   out vec4 seen;
@@ -58,16 +60,16 @@ export const GROUND_FRAGMENT = /* glsl */ `
   vec3 ground(float away, vec3 n, vec3 smoothly, float lit, float open) {
     vec3 base = own.rgb;
     if (0.5 < textured) {
-      float patches = texture(noiseMap, place.zx / 610.0).r - 0.48, grain = 0.0;
+      float patches = 1.2 * (texture(noiseMap, place.zx / 3700.0).r - 0.48), grain = 0.0;
       // Further away it is as good as even.
       if (away < 1500.0) {
         vec2 near = texture(noiseMap, place.xz / 23.0).rg;
-        patches += 0.35 * (near.r - 0.48);
+        patches += 0.3 * (near.r - 0.48);
         grain = near.g - 0.47;
       }
       if (own.a < 0.25) {
         float steep = smoothstep(0.06, 0.26, 1.0 - mix(n.y, smoothly.y, 0.7) + 0.14 * patches);
-        base = mix(base * (1.0 + 0.28 * patches * vec3(0.8, 1.0, 1.25)), rockTint * (1.0 + 0.5 * grain), 0.85 * steep);
+        base = mix(base * (1.0 + patches * vec3(0.6, 0.35, 0.2)), rockTint * (1.0 + 0.5 * grain), 0.85 * steep);
         base *= 1.0 + 0.34 * grain;
       } else base *= 1.0 + 0.12 * grain;
     }
@@ -81,6 +83,8 @@ export const GROUND_FRAGMENT = /* glsl */ `
   }
 
   void main() {
+    // Two surfaces side by side: each is drawn on its own side of a line across the picture.
+    if (splitSide * (gl_FragCoord.x - split.x * split.y) < 0.0) discard;
     vec3 toEye = cameraPosition - place;
     float away = length(toEye);
     vec3 toward = toEye / away;

@@ -1,4 +1,5 @@
 // The picture as a file, with an arrow to the north and a scale, and a drive as a track.
+import { setWidth } from "./materials.js";
 import { at } from "./panel.js";
 import { hitAt } from "./pick.js";
 
@@ -21,6 +22,7 @@ export function pictureOf(view) {
   const { renderer, scene, camera, tank, area, pace } = view, source = renderer.domElement;
   pace.again();
   pace.set(pace.most);
+  setWidth(renderer.domElement.width);
   renderer.render(scene, camera);
   const canvas = document.createElement("canvas"), context = canvas.getContext("2d");
   [canvas.width, canvas.height] = [source.width, source.height];

@@ -34,6 +34,7 @@ export function switches(view, { light }) {
       note(`The DEM is not at hand: ${fault.message}`);
       at("layers").open = true;
     }
+    at("splitter").hidden = !terrain.withDem;
     shown();
   };
   const range = () => {
@@ -44,7 +45,7 @@ export function switches(view, { light }) {
   const hour = () => {
     const value = Number(at("hour").value), minutes = String(60 * (value % 1)).padStart(2, "0");
     view.hour = value <= AS_ON_MAPS ? null : value;
-    at("hour").nextElementSibling.textContent = view.hour === null ? "as on maps" : `${Math.floor(value)}:${minutes}`;
+    at("hour").nextElementSibling.textContent = view.hour === null ? "as on a map" : `${Math.floor(value)}:${minutes}`;
     light();
   };
   for (const id of ["colors", "wireframe", "lines", "facets", "texture"]) at(id).addEventListener("change", shown);

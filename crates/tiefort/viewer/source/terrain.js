@@ -2,6 +2,7 @@
 // detail, where the database has them; beyond these the area as it is coarsely.
 import { Frustum, Group, Matrix4 } from "three";
 import { apron, Coarse } from "./coarse.js";
+import * as looks from "./materials.js";
 import { deckMesh, moduleLines, moduleMesh, paint, roadMesh } from "./meshes.js";
 import { checkDem, readLines, readModules, readPosts } from "./server.js";
 import { deckUnder, triangleUnder } from "./surface.js";
@@ -22,8 +23,8 @@ export class Terrain {
   constructor(area) {
     this.area = area;
     this.group = new Group();
-    // By row * cols + col: {module, surface, mesh, decks, roads}. Levels that differ fit together, so that a load
-    // module stays until the one in its place has come.
+    // By row * cols + col: {module, surface, mesh, beside, decks, roads}. Levels that differ fit together, so that a
+    // load module stays until the one in its place has come.
     this.drawn = new Map();
     this.colors = "height";
     this.withLines = this.withDem = false;
@@ -146,8 +147,15 @@ export class Terrain {
   draw(key, module) {
     this.drop(key);
     const surface = (this.withDem && module.dem) || module.tin;
-    const mesh = moduleMesh(surface);
+    const isSplit = surface !== module.tin;
+    const mesh = moduleMesh(surface, isSplit ? looks.sides[1] : looks.fine);
     paint(this.area, module, surface, mesh, this.colors);
+    // Left of the line are the triangles that were made from it.
+    const beside = isSplit ? moduleMesh(module.tin, looks.sides[0]) : null;
+    if (beside) {
+      paint(this.area, module, module.tin, beside, this.colors);
+      mesh.add(beside);
+    }
     mesh.userData.key = key;
     this.group.add(mesh);
     // The DEM knows no decks.
@@ -155,7 +163,7 @@ export class Terrain {
     if (decks) mesh.add(decks);
     const roads = module.lines ? roadMesh(this.area, module.lines, surface) : null;
     if (roads) mesh.add(roads);
-    this.drawn.set(key, { module, surface, mesh, decks, roads });
+    this.drawn.set(key, { module, surface, mesh, beside, decks, roads });
   }
 
   drop(key) {
@@ -163,6 +171,7 @@ export class Terrain {
     if (!old) return false;
     this.group.remove(old.mesh);
     old.mesh.geometry.dispose();
+    old.beside?.geometry.dispose();
     old.decks?.geometry.dispose();
     old.roads?.geometry.dispose();
     return this.drawn.delete(key);
@@ -196,7 +205,10 @@ export class Terrain {
   repaint() {
     this.version += 1;
     this.coarse.repaint(this.colors);
-    for (const { module, surface, mesh } of this.drawn.values()) paint(this.area, module, surface, mesh, this.colors);
+    for (const { module, surface, mesh, beside } of this.drawn.values()) {
+      paint(this.area, module, surface, mesh, this.colors);
+      if (beside) paint(this.area, module, module.tin, beside, this.colors);
+    }
   }
 
   /** Shows the DEM, or the triangles again. Fails where the DEM is not at hand; then nothing has changed. */
