@@ -31,11 +31,8 @@ impl LoadedGround {
             let steps = if spacing_m > 0.0 && 1.0 <= steps && steps.is_finite() { steps as u64 } else { 1 };
             for step in 1..=steps {
                 let share = step as f64 / steps as f64;
-                let place_m = if step == steps {
-                    ends[1]
-                } else {
-                    [ends[0][0] + share * run[0], ends[0][1] + share * run[1]]
-                };
+                let place_m =
+                    if step == steps { ends[1] } else { [ends[0][0] + share * run[0], ends[0][1] + share * run[1]] };
                 points.push(self.profile_point(before_m + share * length_m, place_m));
             }
             before_m += length_m;

@@ -19,7 +19,9 @@ pub fn place_above(text: &str) -> Result<[f64; 3], String> {
     match numbers(text) {
         Some([_, _, above]) if above < 0.0 => Err("expected 0 or more metres above the ground".into()),
         Some(place) => Ok(place),
-        None => Err("expected EAST,NORTH,ABOVE in metres, the last above the ground, such as 521000,3893000,2.5".into()),
+        None => {
+            Err("expected EAST,NORTH,ABOVE in metres, the last above the ground, such as 521000,3893000,2.5".into())
+        }
     }
 }
 

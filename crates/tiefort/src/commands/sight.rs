@@ -107,7 +107,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
 
 /// An end of a line of sight, as a height above the vertical datum.
 fn end(name: &str, [east, north, above]: [f64; 3], ground: &LoadedGround) -> Result<[f64; 3], Failure> {
-    let height_m = ground.height_m([east, north]).ok_or_else(|| places::outside(name, [east, north], ground.frame()))?;
+    let height_m =
+        ground.height_m([east, north]).ok_or_else(|| places::outside(name, [east, north], ground.frame()))?;
     Ok([east, north, height_m + above])
 }
 
@@ -251,9 +252,7 @@ fn write_tiff(looks: &Looks, spacing: Spacing, out: &Path) -> Result<Count, Fail
     let side = looks.viewshed.side() as usize;
     let raster = ByteRaster { origin_m: looks.corner(), spacing, size: [side, side], epsg };
     let mut count = Count::default();
-    files::write_whole(out, |out| {
-        write_byte_raster(out, &raster, |first, last| looks.rows(first, last, &mut count))
-    })?;
+    files::write_whole(out, |out| write_byte_raster(out, &raster, |first, last| looks.rows(first, last, &mut count)))?;
     Ok(count)
 }
 
@@ -263,9 +262,7 @@ fn write_png(looks: &Looks, out: &Path) -> Result<Count, Failure> {
     let numbers = looks.rows(0, side - 1, &mut count);
     let seen: Vec<Option<bool>> = numbers.iter().map(|&number| (number <= SEEN).then_some(number == SEEN)).collect();
     let ([west, south], step_m) = (looks.corner(), looks.viewshed.spacing_m);
-    let place = |at: usize| {
-        [west + (at % side) as f64 * step_m, south + (side - 1 - at / side) as f64 * step_m]
-    };
+    let place = |at: usize| [west + (at % side) as f64 * step_m, south + (side - 1 - at / side) as f64 * step_m];
     let height = |at: usize| looks.ground.height_m(place(at)).map_or(f32::NAN, |height_m| height_m as f32);
     let heights: Vec<f32> = (0..side * side).map(height).collect();
     let image = draw_seen(&SeenGround { side, spacing_m: step_m, height_m: &heights, seen: &seen });

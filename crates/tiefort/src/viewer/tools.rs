@@ -114,7 +114,9 @@ fn sight_of(viewed: &Viewed, from: &str, to: &str) -> Result<Value, String> {
     };
     let blocker = hidden_at.map(|at| [0, 1, 2].map(|axis| from[axis] + at * (to[axis] - from[axis])));
     let clearance_m = ground.clearance_m(from, to);
-    Ok(json!({ "visible": hidden_at.is_none(), "from": from, "to": to, "blocker": blocker, "clearance_m": clearance_m }))
+    Ok(
+        json!({ "visible": hidden_at.is_none(), "from": from, "to": to, "blocker": blocker, "clearance_m": clearance_m }),
+    )
 }
 
 fn viewshed_of(viewed: &Viewed, from: &str, [target_m, range_m, spacing_m]: [f64; 3]) -> Result<Vec<u8>, String> {
@@ -191,6 +193,9 @@ mod tests {
     #[test]
     fn a_zone_of_utm_is_named_by_its_band() {
         let epsg = |zone| utm(zone).and_then(Result::ok).and_then(|crs| crs.epsg());
-        assert_eq!(["11S", "33n", "19H", "61S", "11", "S"].map(epsg), [Some(32611), Some(32633), Some(32719), None, None, None]);
+        assert_eq!(
+            ["11S", "33n", "19H", "61S", "11", "S"].map(epsg),
+            [Some(32611), Some(32633), Some(32719), None, None, None]
+        );
     }
 }

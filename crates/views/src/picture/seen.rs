@@ -59,7 +59,8 @@ mod tests {
     #[test]
     fn what_is_hidden_is_darker_than_what_is_seen_and_what_is_beyond_is_pale() {
         let side = 41;
-        let seen: Vec<Option<bool>> = (0..side * side).map(|at| [Some(true), Some(false), None][at % side / 14]).collect();
+        let seen: Vec<Option<bool>> =
+            (0..side * side).map(|at| [Some(true), Some(false), None][at % side / 14]).collect();
         let image = draw_seen(&SeenGround { side, spacing_m: 25.0, height_m: &vec![5.0; side * side], seen: &seen });
         let light = |x: usize| image.pixel(x, 3).iter().map(|&part| u32::from(part)).sum::<u32>();
         assert!(light(20) < light(5) && light(5) < light(35));
