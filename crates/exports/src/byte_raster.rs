@@ -18,8 +18,8 @@ pub struct ByteRaster {
     pub epsg: u16,
 }
 
-/// Writes the numbers. `rows` is asked for one band of rows after another, by the first and the last of them counted from
-/// the north, and gives their numbers row by row from the north.
+/// Writes the numbers. `rows` is asked for one band of rows after another, by the first and the last of them counted
+/// from the north, and gives their numbers row by row from the north.
 ///
 /// # Errors
 /// Those of `out`.

@@ -253,8 +253,8 @@ impl Ground {
         Ok(PyArray1::from_vec(py, self.ask(py, (places(&xy)?, AT_ONCE), HOLE_CLASS, each)?))
     }
 
-    /// Whether each line, six numbers from an eye to a target, meets nothing and stays on the ground: lines from one eye
-    /// one after the other take less time.
+    /// Whether each line, six numbers from an eye to a target, meets nothing and stays on the ground: lines from one
+    /// eye, one after the other, take less time.
     fn seen<'py>(&self, py: Python<'py>, lines: PyReadonlyArray2<'py, f64>) -> PyResult<Bound<'py, PyArray1<bool>>> {
         let each = |ground: &LoadedGround, lines: &[[f64; 6]], seen: &mut [bool]| {
             for (lines, seen) in runs_from_one_eye(lines, seen) {
@@ -292,8 +292,8 @@ impl Ground {
         table(py, found.map_err(|failure| raised(py, &failure))?.into_iter().map(row))
     }
 
-    /// How far along each line something hides the rest, 2 where nothing does and not a number where the line leaves the
-    /// ground first; and how far the line stays above the ground at least.
+    /// How far along each line something hides the rest, 2 where nothing does and not a number where the line leaves
+    /// the ground first; and how far the line stays above the ground at least.
     fn sights<'py>(&self, py: Python<'py>, lines: PyReadonlyArray2<'py, f64>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let each = |ground: &LoadedGround, lines: &[[f64; 6]], sights: &mut [[f64; 2]]| {
             let has_decks = ground.modules().iter().any(|module| !module.module().decks.is_empty());

@@ -11,7 +11,8 @@
 //!   /api/dem                               whether the sources are at hand, as JSON; else `why` says why not
 //!   /api/dem/SOUTH/WEST/NORTH/EAST         the posts of such a block (posts.rs)
 //! ```
-//! What the tools of the page ask is listed in tools.rs. Blocks are half-open, connections bounded in number and time (connections.rs). Everything is little-endian. An
+//! What the tools of the page ask is listed in tools.rs.
+//! Blocks are half-open, connections bounded in number and time (connections.rs). Everything is little-endian. An
 //! answer other than 200 is a sentence for a person.
 
 mod area;

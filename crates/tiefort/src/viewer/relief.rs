@@ -1,9 +1,9 @@
 //! Heights and classes of the whole area on a fine regular grid: what the page shades distant ground with, and casts
 //! shadows by.
 //!
-//! As bytes: heights across and up, then heights along the side of a load module less one (u32 each), the lowest height
-//! and the step between numbers in metres (f32 each); the heights as such numbers (u16), row by row from the south-west;
-//! the class at each (u8).
+//! As bytes: heights across and up, then heights along the side of a load module less one (u32 each), the lowest
+//! height and the step between numbers in metres (f32 each); the heights as such numbers (u16), row by row from the
+//! south-west; the class at each (u8).
 
 use std::sync::Arc;
 

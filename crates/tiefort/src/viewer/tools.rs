@@ -2,8 +2,8 @@
 //!
 //! ```text
 //!   /api/sight/EAST,NORTH,ABOVE/EAST,NORTH,ABOVE    whether one place sees the other, as JSON
-//!   /api/viewshed/EAST,NORTH,ABOVE/TARGET/RANGE/SPACING   places along a side (u32) and metres between them (f32), then
-//!                                                   row by row from the north 1 seen, 0 hidden, 255 not looked at (u8)
+//!   /api/viewshed/EAST,NORTH,ABOVE/TARGET/RANGE/SPACING   places along a side (u32), metres between them (f32), then row
+//!                                                   by row from the north 1 seen, 0 hidden, 255 neither (u8)
 //!   /api/profile/SPACING/EAST,NORTH/EAST,NORTH      heights along a line, as JSON
 //!   /api/find/WORDS                                 a place of the area's system, of coordinates as people write them
 //!   /api/where/EAST,NORTH                           longitude and latitude, as JSON
@@ -114,9 +114,13 @@ fn sight_of(viewed: &Viewed, from: &str, to: &str) -> Result<Value, String> {
     };
     let blocker = hidden_at.map(|at| [0, 1, 2].map(|axis| from[axis] + at * (to[axis] - from[axis])));
     let clearance_m = ground.clearance_m(from, to);
-    Ok(
-        json!({ "visible": hidden_at.is_none(), "from": from, "to": to, "blocker": blocker, "clearance_m": clearance_m }),
-    )
+    Ok(json!({
+        "visible": hidden_at.is_none(),
+        "from": from,
+        "to": to,
+        "blocker": blocker,
+        "clearance_m": clearance_m,
+    }))
 }
 
 fn viewshed_of(viewed: &Viewed, from: &str, [target_m, range_m, spacing_m]: [f64; 3]) -> Result<Vec<u8>, String> {

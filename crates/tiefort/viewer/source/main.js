@@ -1,5 +1,6 @@
 // The page of `tiefort view`: one picture after another, and what hangs together by that.
 import { DirectionalLight, HemisphereLight, PerspectiveCamera, Scene, WebGLRenderer } from "three";
+import { askWhere } from "./ask.js";
 import { controls } from "./controls.js";
 import { skyBelowHorizon } from "./crack.js";
 import { helpList } from "./help.js";
@@ -30,6 +31,8 @@ export async function start() {
   const wanted = asked(area);
   begin(view, wanted);
   const light = lighting(view);
+  // For the sun's height; where the area lies nowhere on the globe, a middle one will do.
+  askWhere(area.inSystem(0, 0)).then(({ latitude }) => (area.latitude = latitude)).catch(() => null);
   setSwitches(wanted);
   const listens = switches(view, { light });
   const help = helpList(), tools = new Tools(view);
@@ -202,6 +205,6 @@ function state(view) {
     blocks: terrain.blocks, fullest: loaded.fullest, view: seen, frameMs: view.frameMs, picked,
     flies: tank.flies, altitude: tank.altitude, turned: tank.turned, pitch: tank.pitch, gear: tank.gear,
     drifts: tank.drifts, lit: view.lit === true, frames: view.frames, count: view.count,
-    pixelRatio: view.renderer.getPixelRatio(),
+    pixelRatio: view.renderer.getPixelRatio(), geometries: view.renderer.info.memory.geometries,
   };
 }

@@ -67,7 +67,8 @@ export function roadMesh(area, roads, surface) {
       const [east, north, height] = a.map((from, axis) => from + share * run[axis]);
       return [on(east - right, north - up, height), on(east + right, north + up, height)];
     };
-    const pieces = Math.ceil(length / RIBBON_M_MAX), tint = tintOf(area, of, colorOf.cover(area, of) ?? colorOf.deck());
+    // Too narrow to mirror anything: seen flat, a stream would glitter.
+    const pieces = Math.ceil(length / RIBBON_M_MAX), tint = [...bytes(colorOf.cover(area, of) ?? colorOf.deck()), MADE];
     for (let piece = 0; piece < pieces; piece++) {
       const [left, other] = across(piece / pieces), [farLeft, farOther] = across((piece + 1) / pieces);
       for (const corner of [left, other, farOther, left, farOther, farLeft]) {

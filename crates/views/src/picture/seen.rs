@@ -32,7 +32,7 @@ pub fn draw_seen(ground: &SeenGround) -> Image {
         let share = f64::from(height - low) / f64::from((top - low).max(1e-3));
         // Light from the north-west: what falls off that way is bright.
         let before = |step: usize, is_first: bool| if is_first { height } else { height_m[index - step] };
-        let (west, north) = (before(1, index % side == 0), before(side, index < side));
+        let (west, north) = (before(1, index.is_multiple_of(side)), before(side, index < side));
         let falls = if west.is_nan() || north.is_nan() { 0.0 } else { 2.0 * height - west - north };
         let ground = lit(HEIGHTS.at(share), (1.0 + 0.7 * falls / spacing_m as f32).clamp(0.5, 1.3));
         match seen[index] {
