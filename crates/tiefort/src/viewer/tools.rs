@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!   /api/sight/EAST,NORTH,ABOVE/EAST,NORTH,ABOVE    whether one place sees the other, as JSON
-//!   /api/viewshed/EAST,NORTH,ABOVE/TARGET/RANGE/SPACING   places along a side (u32), metres between them (f32), then row
+//!   /api/viewshed/EAST,NORTH,ABOVE/TARGET/RANGE/SPACING   places a side (u32), metres between them (f32), then row
 //!                                                   by row from the north 1 seen, 0 hidden, 255 neither (u8)
 //!   /api/profile/SPACING/EAST,NORTH/EAST,NORTH      heights along a line, as JSON
 //!   /api/find/WORDS                                 a place of the area's system, of coordinates as people write them
