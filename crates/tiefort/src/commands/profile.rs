@@ -66,8 +66,10 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     }
     let length_m: f64 = arguments.places.windows(2).map(|ends| distance(ends[0], ends[1])).sum();
     if PLACES_MAX < length_m / arguments.spacing {
-        let message = format!("--spacing: found {} m on a line of {length_m:.0} m", arguments.spacing);
-        return Err(Failure::new(message, format!("{} places at most", grouped(PLACES_MAX as u64))));
+        let most = grouped(PLACES_MAX as u64);
+        let found = format!("--spacing: found {} m on a line of {length_m:.0} m", arguments.spacing);
+        let hint = "ask for a larger spacing or a shorter line";
+        return Err(Failure::new(format!("{found}, expected {most} places at most"), hint));
     }
     let ground = places::ground_around(&area, &arguments.places, 0.0)?;
     let points = ground.profile(&arguments.places, arguments.spacing);

@@ -3,6 +3,7 @@ import { BufferAttribute, BufferGeometry, Group, Sphere, Vector3 } from "three";
 import { bytes, colorOf, isWater, MADE, numbers, WATER } from "./colors.js";
 import * as looks from "./materials.js";
 import { geometryOf, meshOf, seaTint, tintAt, tintOf } from "./meshes.js";
+import { isSea } from "./server.js";
 
 /** Load modules along the side of a part that is drawn at once, or not where the camera does not look. */
 const PART = 10;
@@ -61,7 +62,8 @@ export class Coarse {
         const cover = colorOf.cover(area, classes[i]);
         // A road is narrower than a cell: far away only water is more than a line.
         const stays = cover && (isWater(area, classes[i]) || classes[i] === area.hole);
-        found = stays ? tintOf(area, classes[i], cover) : heights[i] === 0 ? seaTint(area) : tintAt(area, heights[i]);
+        const plain = isSea(area, [heights[i]]) ? seaTint(area) : tintAt(area, heights[i]);
+        found = stays ? tintOf(area, classes[i], cover) : plain;
       } else {
         const [row, col] = [Math.floor(i / wide), i % wide].map((place) => Math.floor(place / steps));
         const figures = area.figures(Math.min(row, area.rows - 1), Math.min(col, area.cols - 1));
@@ -131,8 +133,7 @@ export function apron(area, base, reach) {
   const geometry = geometryOf(new Float32Array(positions)), tint = geometry.getAttribute("tint");
   // Nothing is known of it: land in the haze, or the sea where the area has one.
   const haze = bytes(numbers(area.palette.haze)), land = tintAt(area, base).map((part, i) => (part + 2 * haze[i]) / 3);
-  const isSea = area.height_m[0] === 0;
-  const color = isSea ? [...bytes(colorOf.sea(area)), WATER] : [...land.slice(0, 3), MADE];
+  const color = area.hasSea ? [...bytes(colorOf.sea(area)), WATER] : [...land.slice(0, 3), MADE];
   for (let i = 0; i < tint.count; i++) tint.array.set(color, 4 * i);
   geometry.computeVertexNormals();
   const mesh = meshOf(geometry, looks.apron);

@@ -1,5 +1,6 @@
 // The small map: the whole area, the block that is loaded, the observer.
 import { bytes, colorOf } from "./colors.js";
+import { isSea } from "./server.js";
 
 /** Draws on `canvas`; `go(east, north)` is called for clicks. */
 export class SmallMap {
@@ -36,7 +37,8 @@ export class SmallMap {
           // Light from the north-west.
           const slope = (heights[place + 1] - heights[place] + heights[place] - heights[place + wide]) / step;
           const shade = Math.min(Math.max(0.9 + slope, 0.45), 1.25);
-          const flat = colorOf.cover(area, classes[place]) ?? colorOf.height(area, heights[place]);
+          const flat = colorOf.cover(area, classes[place])
+            ?? (isSea(area, [heights[place]]) ? colorOf.sea(area) : undefined) ?? colorOf.height(area, heights[place]);
           color = flat.map((part) => part * shade);
         }
         picture.data.set([...bytes(color), 255], at);

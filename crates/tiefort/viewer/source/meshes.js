@@ -2,6 +2,7 @@
 import { BufferAttribute, BufferGeometry, LineBasicMaterial, LineSegments, Mesh } from "three";
 import { bytes, colorOf, GROUND, isWater, MADE, WATER } from "./colors.js";
 import * as looks from "./materials.js";
+import { isSea } from "./server.js";
 import { triangleUnder } from "./surface.js";
 
 /** Metres that a ribbon is long at most, so that it follows the ground beside its line, and how far it lies above. */
@@ -108,7 +109,8 @@ export function paint(area, module, surface, mesh, colors) {
   }
   for (let t = 0; 3 * t < triangles.length; t++) {
     const three = triangles.subarray(3 * t, 3 * t + 3), isPlain = !one && !byPost;
-    const cover = covers[module.classes[t]] ?? (isPlain && isSea(points, three) ? seaTint(area) : undefined);
+    const heights = Array.from(three, (vertex) => points[3 * vertex + 2]);
+    const cover = covers[module.classes[t]] ?? (isPlain && isSea(area, heights) ? seaTint(area) : undefined);
     three.forEach((vertex, i) => attribute.array.set(cover ?? (own ? own[vertex] : one), 4 * (3 * t + i)));
   }
   attribute.needsUpdate = true;
@@ -119,9 +121,6 @@ export const tintAt = (area, height) => [...bytes(colorOf.height(area, height)),
 
 /** The tint of water without a class. */
 export const seaTint = (area) => [...bytes(colorOf.sea(area)), WATER];
-
-/** Level ground at height 0 is the sea: only rasters that know no other name for it have it. */
-const isSea = (points, three) => three.every((vertex) => points[3 * vertex + 2] === 0);
 
 /** Lines between load modules, along their triangles. */
 export function moduleLines(drawn) {

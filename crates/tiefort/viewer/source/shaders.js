@@ -69,7 +69,7 @@ export const GROUND_FRAGMENT = /* glsl */ `
       }
       if (own.a < 0.25) {
         float steep = smoothstep(0.06, 0.26, 1.0 - mix(n.y, smoothly.y, 0.7) + 0.14 * patches);
-        base = mix(base * (1.0 + patches * vec3(0.6, 0.35, 0.2)), rockTint * (1.0 + 0.5 * grain), 0.85 * steep);
+        base = mix(base * (1.0 + patches * vec3(0.5, 0.42, 0.3)), rockTint * (1.0 + 0.5 * grain), 0.85 * steep);
         base *= 1.0 + 0.34 * grain;
       } else base *= 1.0 + 0.12 * grain;
     }

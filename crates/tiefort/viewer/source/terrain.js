@@ -38,7 +38,7 @@ export class Terrain {
     // Changes with what is drawn.
     this.version = 0;
     this.coarse = new Coarse(area);
-    this.base = area.height_m[0] - 20;
+    this.base = area.hasSea ? Math.min(area.height_m[0], 0) - 1 : area.height_m[0] - 20;
     this.group.add(this.coarse.group, apron(area, this.base, APRON_M));
     this.closed();
   }
