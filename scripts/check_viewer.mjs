@@ -2,11 +2,11 @@
 // Drives through a database in a headless Chromium, and looks for what is missing, torn or miscounted.
 //
 //   node scripts/check_viewer.mjs [DIR] [--tiefort PROGRAM] [--pictures DIR] [--chromium /usr/bin/chromium]
-//                                 [--metres 2000] [--range M] [--update-reference]
+//                                 [--metres 2000] [--range M] [--idle] [--update-reference]
 //
 // DIR is a terrain database; without it tests/jobs/small.toml is built, and the first picture is compared with
-// scripts/viewer/reference.json. PROGRAM is built with the feature `viewer`. Counts are taken from the load-module
-// files by this script itself (FORMAT.md). Needs what scripts/build_viewer.sh installs. Exit code 0: all is well.
+// scripts/viewer/reference.json. --idle holds the time of pictures, too. PROGRAM is built with the feature `viewer`.
+// Counts are taken from the load-module files by this script itself (FORMAT.md). Needs what scripts/build_viewer.sh installs. Exit code 0: all is well.
 import { spawn, spawnSync } from "node:child_process";
 import { existsSync, mkdirSync, mkdtempSync, readFileSync, readdirSync, rmSync, writeFileSync } from "node:fs";
 import { createRequire } from "node:module";
@@ -28,6 +28,7 @@ const { values, positionals } = parseArgs({
     chromium: { type: "string", default: "/usr/bin/chromium" },
     metres: { type: "string", default: "2000" },
     range: { type: "string" },
+    idle: { type: "boolean", default: false },
     "update-reference": { type: "boolean", default: false },
   },
 });
@@ -186,6 +187,7 @@ async function check() {
   await touched(page);
   await flown(page);
   await tools.linked(page, told);
+  await tools.paced(page, { ...told, start, isIdle: values.idle });
   await tools.begun(page, told);
   if (0 < own.decks.length) await bridged(page);
   expect(failed.length === 0, `every answer was whole ${failed.slice(0, 3)}`);

@@ -123,3 +123,28 @@ export async function linked(page, { expect, address, open }) {
     && before.flies === after.flies && (!before.flies || near(before.altitude, after.altitude, 0.2));
   expect(isThere, `a link opens the same view of ${address}: ${link}`);
 }
+
+/** Milliseconds of a picture in the middle and at most, on a machine that does nothing else. */
+const MEDIAN_MS_MAX = 60, FRAME_MS_MAX = 150;
+
+/** How long pictures take while driving at full speed, at 1280 x 800; held where the machine is idle. */
+export async function paced(page, { expect, open, pause, size, start, isIdle }) {
+  await page.setViewport({ width: 1280, height: 800, hasTouch: true });
+  await open(page, start);
+  await page.keyboard.press("Digit4");
+  await page.keyboard.down("ShiftLeft");
+  await page.keyboard.down("KeyW");
+  await pause(2500);
+  const before = (await state(page)).count;
+  await pause(8000);
+  const { count, frames, driven, geometries } = await state(page);
+  await page.keyboard.up("KeyW");
+  await page.keyboard.up("ShiftLeft");
+  const taken = frames.slice(Math.max(frames.length - (count - before), 0)).sort((a, b) => a - b);
+  const median = taken[Math.floor(taken.length / 2)], most = taken.at(-1);
+  const told = `pictures of ${median.toFixed(0)} ms in the middle, ${most.toFixed(0)} ms at most, `
+    + `${(driven / 1000).toFixed(1)} km, ${geometries} meshes`;
+  if (isIdle) expect(median <= MEDIAN_MS_MAX && most <= FRAME_MS_MAX, told);
+  else console.log(`     ${told}`);
+  await page.setViewport({ ...size, hasTouch: true });
+}

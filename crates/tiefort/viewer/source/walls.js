@@ -5,6 +5,9 @@ import * as looks from "./materials.js";
 import { geometryOf, meshOf, tintAt } from "./meshes.js";
 import { coarseHeight } from "./surface.js";
 
+/** Metres that walls reach beyond the line they hang from. */
+const LIP_M = 0.2;
+
 /** A side of a load module (south, east, north, west) in coarse steps: where it begins, and which way it goes. */
 function sideLine(area, { row, col }, side) {
   const steps = area.coarse_steps, [south, west] = [row * steps, col * steps];
@@ -72,6 +75,11 @@ function upward(count) {
 /** North and west run from right to left for who stands outside. */
 const outward = (wall, side) => (side < 2 ? wall : wall.reverse());
 
+/** Reaches a little beyond the upper line too: a wall bends where the line below it does, and so, but for rounding,
+ * lies on the line above; a pixel may fall between. */
+const lipped = (wall) =>
+  wall.map(([east, north, high, low]) => [east, north, high + (low < high ? LIP_M : -LIP_M), low]);
+
 /** Walls that close what is open between fine and coarse load modules, and those along the border of the area. */
 export function wallMeshes(area, drawn, base) {
   const [inner, border] = [new Walls(area, false), new Walls(area, true)];
@@ -85,7 +93,7 @@ export function wallMeshes(area, drawn, base) {
     [[-1, 0], [0, 1], [1, 0], [0, -1]].forEach(([up, right], side) => {
       const [row, col] = [module.row + up, module.col + right];
       if (!isInside(row, col)) border.add(outward(wallAlong(area, module, surface, side, () => base), side));
-      else if (!drawn.has(row * area.cols + col)) inner.add(wallAlong(area, module, surface, side, onto));
+      else if (!drawn.has(row * area.cols + col)) inner.add(lipped(wallAlong(area, module, surface, side, onto)));
     });
   }
   addBorder(area, drawn, base, border);
