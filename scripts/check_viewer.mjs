@@ -2,11 +2,11 @@
 // Drives through a database in a headless Chromium, and looks for what is missing, torn or miscounted.
 //
 //   node scripts/check_viewer.mjs [DIR] [--tiefort PROGRAM] [--pictures DIR] [--chromium /usr/bin/chromium]
-//                                 [--metres 2000] [--range M] [--update-reference]
+//                                 [--metres 2000] [--range M] [--idle] [--update-reference]
 //
 // DIR is a terrain database; without it tests/jobs/small.toml is built, and the first picture is compared with
-// scripts/viewer/reference.json. PROGRAM is built with the feature `viewer`. Counts are taken from the load-module
-// files by this script itself (FORMAT.md). Needs what scripts/build_viewer.sh installs. Exit code 0: all is well.
+// scripts/viewer/reference.json. --idle holds the time of pictures, too. PROGRAM is built with the feature `viewer`.
+// Counts are taken from the load-module files by this script itself (FORMAT.md). Needs what scripts/build_viewer.sh installs. Exit code 0: all is well.
 import { spawn, spawnSync } from "node:child_process";
 import { existsSync, mkdirSync, mkdtempSync, readFileSync, readdirSync, rmSync, writeFileSync } from "node:fs";
 import { createRequire } from "node:module";
@@ -14,6 +14,7 @@ import { tmpdir } from "node:os";
 import { dirname, join } from "node:path";
 import { fileURLToPath, pathToFileURL } from "node:url";
 import { parseArgs } from "node:util";
+import * as tools from "./viewer/tools.mjs";
 
 const root = join(dirname(fileURLToPath(import.meta.url)), "..");
 const library = createRequire(join(root, "crates", "tiefort", "viewer", "package.json")).resolve("puppeteer-core");
@@ -27,11 +28,14 @@ const { values, positionals } = parseArgs({
     chromium: { type: "string", default: "/usr/bin/chromium" },
     metres: { type: "string", default: "2000" },
     range: { type: "string" },
+    idle: { type: "boolean", default: false },
     "update-reference": { type: "boolean", default: false },
   },
 });
 /** The picture is compared on a grid of so many colours; levels of 255 that they may differ by. */
 const GRID = [32, 20], MEAN_LEVELS_MAX = 4, LEVELS_MAX = 40;
+/** Milliseconds after which a picture that stands still has all its pixels. */
+const STILL_MS = 600;
 const SIZE = { width: 1120, height: 700 };
 
 let faults = 0;
@@ -74,6 +78,11 @@ try {
 }
 console.log(`${faults} faults`);
 process.exit(faults === 0 ? 0 : 1);
+
+/** What the program prints. */
+function run(words) {
+  return String(spawnSync(values.tiefort, words).stdout);
+}
 
 /** Starts the server on a free port. */
 async function serve() {
@@ -147,11 +156,11 @@ function heightOn([a, b, c], [x, y]) {
 async function check() {
   const page = await browser.newPage();
   await page.setViewport({ ...SIZE, hasTouch: true });
-  const said = [], failed = [], asked = [];
+  const said = [], failed = [], wanted = [];
   page.on("console", (message) => ["error", "warn"].includes(message.type()) && said.push(message.text()));
   page.on("pageerror", (error) => said.push(String(error)));
   page.on("response", (response) => response.ok() || failed.push(`${response.status()} ${response.url()}`));
-  page.on("request", (request) => asked.push(request.url()));
+  page.on("request", (request) => wanted.push(request.url()));
   if (!positionals[0]) await compared(page);
   const metres = Number(values.metres);
   const middle = [own.origin[0] + (own.cols * own.side) / 2, own.origin[1] + (own.rows * own.side) / 2];
@@ -170,11 +179,20 @@ async function check() {
   await picture(page, "end");
   await clicked(page);
   await shown(page);
+  const told = { address, expect, picture, pause, run, folder, open, size: SIZE };
+  await tools.colored(page, told);
+  await tools.asked(page, told);
+  await tools.linked(page, told);
+  await tools.framed(page, told);
   await touched(page);
   await flown(page);
+  await tools.linked(page, told);
+  await tools.paced(page, { ...told, start, isIdle: values.idle });
+  await tools.begun(page, told);
   if (0 < own.decks.length) await bridged(page);
   expect(failed.length === 0, `every answer was whole ${failed.slice(0, 3)}`);
-  expect(asked.every((url) => url.startsWith(address) || url.startsWith("data:")), "nothing was asked of anybody else");
+  const isOurs = (url) => url.startsWith(address) || url === "about:blank" || url.startsWith("data:");
+  expect(wanted.every(isOurs), "nothing was asked of anybody else");
   expect(said.length === 0, `no error in the console ${said.slice(0, 3)}`);
 }
 
@@ -191,10 +209,12 @@ function state(page) {
 /** Waits until all that is wanted is there, and two pictures more. */
 async function settled(page) {
   await page.waitForFunction(() => {
-    const { block, modules, waiting, height, fault } = window.tiefort.state();
+    const { block, modules, waiting, height, fault, lit } = window.tiefort.state();
     const wanted = (block[2] - block[0]) * (block[3] - block[1]);
-    return fault !== null || (height !== null && waiting === 0 && modules === wanted);
+    return fault !== null || (lit && height !== null && waiting === 0 && modules === wanted);
   }, { timeout: 120_000, polling: 100 });
+  // What stands still is drawn finely a moment later.
+  await pause(STILL_MS);
   await page.evaluate(() => new Promise((end) => requestAnimationFrame(() => requestAnimationFrame(end))));
 }
 
@@ -310,10 +330,10 @@ async function shown(page) {
   await settled(page);
   await picture(page, "without-edges");
   await page.keyboard.press("KeyG");
-  const isRead = () => !document.getElementById("note").innerText.startsWith("reading");
+  const isRead = () => !document.getElementById("note").textContent.startsWith("reading");
   await page.waitForFunction(isRead, { timeout: 120_000 });
   const { showsDem } = await state(page);
-  const note = await page.$eval("#note", (box) => box.innerText);
+  const note = await page.$eval("#note", (box) => box.textContent);
   expect(showsDem || note.includes("not at hand"), showsDem ? "the DEM is shown" : `no DEM, and told so: ${note}`);
   if (showsDem) {
     await whole(page, "of the DEM");

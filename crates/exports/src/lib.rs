@@ -31,6 +31,10 @@ mod blocks;
 mod geotiff;
 mod surface;
 mod tiff_layout;
+/// Coordinate systems, for places that are asked for in another one than the area's.
+pub use source_files::Crs;
+mod byte_raster;
+pub use byte_raster::{ByteRaster, write_byte_raster};
 pub use surface::{GroundHeights, write_residual, write_surface};
 mod gpkg;
 mod gpkg_styles;

@@ -41,6 +41,14 @@ impl AreaFrame {
         f64::from(self.side) / f64::from(QUANTA_PER_METRE)
     }
 
+    /// Whether a place lies in the area, its far sides included.
+    pub fn holds(&self, [east_m, north_m]: [f64; 2]) -> bool {
+        let inside = |metres: f64, origin: f64, count: u32| {
+            (0.0..=f64::from(count) * self.side_m()).contains(&(metres - origin))
+        };
+        inside(east_m, self.origin_m[0], self.cols) && inside(north_m, self.origin_m[1], self.rows)
+    }
+
     /// Row and column of the load module under a place, however far outside the area that lies. What is not a number
     /// lies as far south and west as can be.
     pub fn module_at(&self, [east_m, north_m]: [f64; 2]) -> [i64; 2] {

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::frame::steps;
 use crate::lookup::{Lookup, STEPS};
-use crate::sight::{Line, crossed_at, entered_at, hidden_at, least_above};
+use crate::sight::{Curvature, Line, crossed_at, entered_at, hidden_at, least_above};
 use crate::{AreaFrame, Block, QUANTA_PER_METRE, Sample, TerrainModule};
 
 /// A block of load modules, loaded. It holds no file open and may be asked from many threads.
@@ -200,6 +200,11 @@ impl LoadedGround {
     /// coordinate is not finite, or lies further than 1e12 m from the area's south-west corner or from height 0, where
     /// no ground can be. It takes at most as many steps as load modules are crossed.
     pub fn sight(&self, from_m: [f64; 3], to_m: [f64; 3]) -> Sight {
+        self.sight_over(from_m, to_m, Curvature::NONE)
+    }
+
+    /// [`LoadedGround::sight`] over ground that falls away as the earth does.
+    pub fn sight_over(&self, from_m: [f64; 3], to_m: [f64; 3], curvature: Curvature) -> Sight {
         if self.is_beyond_any_ground(from_m) || self.is_beyond_any_ground(to_m) {
             return Sight::Unknown;
         }
@@ -215,7 +220,7 @@ impl LoadedGround {
             let loaded = inside(row).zip(inside(col)).and_then(|(row, col)| self.module(row, col));
             match loaded {
                 Some(module) => {
-                    let line = Line::in_module(corner, from, to);
+                    let line = Line::in_module(corner, from, to, curvature);
                     nearest = nearest.min(hidden_at(module.lookup(), self.frame.side, &line));
                     if let Some(decks) = module.decks() {
                         nearest = nearest.min(crossed_at(decks, self.frame.side, &line));
@@ -239,6 +244,11 @@ impl LoadedGround {
     /// How far a line between two places stays above the ground at least, in metres: negative where the ground rises
     /// above it. Decks are not looked at. `None` where the line leaves what is loaded.
     pub fn clearance_m(&self, from_m: [f64; 3], to_m: [f64; 3]) -> Option<f64> {
+        self.clearance_over_m(from_m, to_m, Curvature::NONE)
+    }
+
+    /// [`LoadedGround::clearance_m`] over ground that falls away as the earth does.
+    pub fn clearance_over_m(&self, from_m: [f64; 3], to_m: [f64; 3], curvature: Curvature) -> Option<f64> {
         if self.is_beyond_any_ground(from_m) || self.is_beyond_any_ground(to_m) {
             return None;
         }
@@ -250,21 +260,21 @@ impl LoadedGround {
             let index = self.block.contains(inside(row)?, inside(col)?).then_some([inside(row)?, inside(col)?])?;
             let corner = [col, row].map(|index| index as f64 * f64::from(self.frame.side));
             let lookup = &self.lookups[self.block.index(index[0], index[1])];
-            let line = Line::in_module(corner, from, to);
+            let line = Line::in_module(corner, from, to, curvature);
             least = least.min(least_above(lookup, self.frame.side, &line) / f64::from(QUANTA_PER_METRE));
         }
         Some(least)
     }
 
     /// A place in quanta from the area's south-west corner.
-    fn quanta(&self, place: [f64; 3]) -> [f64; 3] {
+    pub(crate) fn quanta(&self, place: [f64; 3]) -> [f64; 3] {
         let metre = f64::from(QUANTA_PER_METRE);
         let (east, north) = (place[0] - self.frame.origin_m[0], place[1] - self.frame.origin_m[1]);
         [east * metre, north * metre, place[2] * metre]
     }
 
     /// Whether a place is so far away, or no place at all, that nothing can be said of lines to it.
-    fn is_beyond_any_ground(&self, place_m: [f64; 3]) -> bool {
+    pub(crate) fn is_beyond_any_ground(&self, place_m: [f64; 3]) -> bool {
         // Areas are at most 2^30 cells a side, of at most 512 m: 5.5e11 m.
         const FAR_M: f64 = 1e12;
         let [east, north] = self.frame.origin_m;
@@ -273,13 +283,13 @@ impl LoadedGround {
     }
 
     /// Whether a place lies below the ground, by more than rounding.
-    fn is_below(&self, place_m: [f64; 3]) -> bool {
+    pub(crate) fn is_below(&self, place_m: [f64; 3]) -> bool {
         const ROUNDING_M: f64 = 1e-6;
         self.height_m([place_m[0], place_m[1]]).is_some_and(|height_m| place_m[2] + ROUNDING_M < height_m)
     }
 
     /// Rows and columns of the load modules under a line in quanta, from its beginning, where nothing else is between.
-    fn modules_along(&self, from: [f64; 3], to: [f64; 3]) -> impl Iterator<Item = [i64; 2]> {
+    pub(crate) fn modules_along(&self, from: [f64; 3], to: [f64; 3]) -> impl Iterator<Item = [i64; 2]> {
         let side = f64::from(self.frame.side);
         let last = [i64::from(self.frame.cols) - 1, i64::from(self.frame.rows) - 1];
         // The far sides of the area belong to it.

@@ -161,6 +161,24 @@ impl Lookup {
         words
     }
 
+    /// Cells along a side.
+    pub(crate) fn across(&self) -> u32 {
+        self.across
+    }
+
+    /// Of each cell, row by row, the height in quanta that no triangle which touches it rises above.
+    pub(crate) fn tops(&self) -> Vec<i32> {
+        let top = |index: usize| self.corners(index).map(|corner| corner[2]).into_iter().max().unwrap_or(i32::MIN);
+        let cells = (0..self.across).flat_map(|row| (0..self.across).map(move |col| (row, col)));
+        let highest = |(row, col)| self.triangles_of(self.cell_at(row, col)).map(top).max();
+        cells.map(|cell| highest(cell).unwrap_or(i32::MIN)).collect()
+    }
+
+    /// A row or column of cells: its lines in quanta, and a little more.
+    pub(crate) fn lines_of(&self, row: u32, side: u16) -> [f64; 2] {
+        self.lines(row, side)
+    }
+
     /// Bytes in memory.
     #[cfg(test)]
     pub(crate) fn byte_count(&self) -> usize {
@@ -276,7 +294,19 @@ impl Lookup {
 
     /// Calls `each` with every triangle that a line between two places in quanta may touch, with some more than once.
     /// Places may lie outside.
-    pub(crate) fn triangles_along(&self, side: u16, from: [f64; 2], to: [f64; 2], mut each: impl FnMut(Corners)) {
+    pub(crate) fn triangles_along(&self, side: u16, from: [f64; 2], to: [f64; 2], each: impl FnMut(Corners)) {
+        self.triangles_along_in(side, from, to, |_, _| true, each);
+    }
+
+    /// The same of the cells, by row and column, that are `wanted`.
+    pub(crate) fn triangles_along_in(
+        &self,
+        side: u16,
+        from: [f64; 2],
+        to: [f64; 2],
+        wanted: impl Fn(u32, u32) -> bool,
+        mut each: impl FnMut(Corners),
+    ) {
         let (low, high) = if from[1] <= to[1] { (from, to) } else { (to, from) };
         let row_at = |quanta: f64| self.row(quanta.clamp(0.0, f64::from(side)) as i32);
         for row in row_at(low[1])..=row_at(high[1]) {
@@ -287,6 +317,9 @@ impl Lookup {
             }
             // Rounding may put the line into the next cell: look a little further.
             for col in row_at(west - 1.0)..=row_at(east + 1.0) {
+                if !wanted(row, col) {
+                    continue;
+                }
                 self.triangles_of(self.cell_at(row, col)).for_each(|index| each(self.corners(index)));
             }
         }

@@ -12,16 +12,19 @@ pub(crate) struct Line {
     length_squared: f64,
     /// Heights of both ends.
     heights: [f64; 2],
+    /// Four times as much as its middle hangs below the straight line, for the curvature of the earth.
+    sag: f64,
 }
 
 impl Line {
     /// The line between two places in quanta, over the load module with this corner.
-    pub(crate) fn in_module(corner: [f64; 2], from: [f64; 3], to: [f64; 3]) -> Self {
+    pub(crate) fn in_module(corner: [f64; 2], from: [f64; 3], to: [f64; 3], curvature: Curvature) -> Self {
         let local = |place: [f64; 3]| [place[0] - corner[0], place[1] - corner[1]];
         let (start, end) = (local(from), local(to));
         let along = [end[0] - start[0], end[1] - start[1]];
         let length_squared = along[0] * along[0] + along[1] * along[1];
-        Self { start, end, along, length_squared, heights: [from[2], to[2]] }
+        let sag = curvature.per_metre() * length_squared / f64::from(QUANTA_PER_METRE);
+        Self { start, end, along, length_squared, heights: [from[2], to[2]], sag }
     }
 
     /// How far left of the line a place lies, and how far ahead, both times the length.
@@ -32,18 +35,80 @@ impl Line {
 
     /// Height of the line at a share of it.
     fn height(&self, at: f64) -> f64 {
-        self.heights[0] + at * (self.heights[1] - self.heights[0])
+        self.heights[0] + at * (self.heights[1] - self.heights[0]) - self.sag * at * (1.0 - at)
+    }
+
+    /// The lowest it may be between two shares of it, or a little less.
+    pub(crate) fn lowest(&self, [first, last]: [f64; 2]) -> f64 {
+        let bow = last - first;
+        self.height(first).min(self.height(last)) - self.sag * bow * bow / 4.0
+    }
+
+    /// The first and the last share of it over a rectangle, in quanta from the load module's corner; the first is the
+    /// larger one where it passes by.
+    pub(crate) fn shares_over(&self, low: [f64; 2], high: [f64; 2]) -> [f64; 2] {
+        let (mut first, mut last) = (0.0_f64, 1.0_f64);
+        for axis in 0..2 {
+            if self.along[axis] == 0.0 {
+                continue;
+            }
+            let at = |side: f64| (side - self.start[axis]) / self.along[axis];
+            let (a, b) = (at(low[axis]), at(high[axis]));
+            first = first.max(a.min(b));
+            last = last.min(a.max(b));
+        }
+        [first, last]
+    }
+
+    /// Where the straight ground between two of its edges rises highest above a line that sags, and by how much; the
+    /// edges themselves are looked at elsewhere.
+    fn highest_between(&self, corners: &Corners) -> Option<[f64; 2]> {
+        if self.sag == 0.0 {
+            return None;
+        }
+        let [first, last] = part_over(corners, self)?;
+        let slope = (last[1] - first[1]) / (last[0] - first[0]);
+        let at = (1.0 + (slope - (self.heights[1] - self.heights[0])) / self.sag) / 2.0;
+        let is_between = first[0] < at && at < last[0];
+        is_between.then(|| [at, first[1] + slope * (at - first[0]) - self.height(at)])
+    }
+}
+
+/// How the earth falls away below a level line.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Curvature(pub(crate) f64);
+
+impl Curvature {
+    /// The ground as a map has it.
+    pub const NONE: Self = Self(0.0);
+
+    /// A round earth of 6,371 km whose air bends light by `refraction` of that: 0 for none, 0.13 as is usual for light.
+    /// More than all of it is taken as all.
+    pub fn of_earth(refraction: f64) -> Self {
+        const RADIUS_M: f64 = 6_371_000.0;
+        // What is no number bends nothing.
+        Self((1.0 - refraction.max(0.0)).max(0.0) / (2.0 * RADIUS_M))
+    }
+
+    /// Metres that the ground falls at a metre's distance; it falls with the square of that.
+    pub fn per_metre(self) -> f64 {
+        self.0
     }
 }
 
 /// Where along a line the triangles of the ground first rise above it; infinity when they do not.
 pub(crate) fn hidden_at(lookup: &Lookup, side: u16, line: &Line) -> f64 {
+    hidden_in(lookup, side, line, |_, _| true)
+}
+
+/// The same, looked for only in those cells of the load module, by row and column, that may rise above the line.
+pub(crate) fn hidden_in(lookup: &Lookup, side: u16, line: &Line, may_rise: impl Fn(u32, u32) -> bool) -> f64 {
     let mut nearest = f64::INFINITY;
     if line.length_squared == 0.0 {
         return nearest;
     }
     // Between two edges the ground is straight, so it is enough to look where an edge is crossed.
-    lookup.triangles_along(side, line.start, line.end, |corners| {
+    lookup.triangles_along_in(side, line.start, line.end, may_rise, |corners| {
         for i in 0..3 {
             let edge = [corners[i], corners[(i + 1) % 3]].map(|place| place.map(f64::from));
             let [(left_a, ahead_a), (left_b, ahead_b)] = edge.map(|place| line.seen(place));
@@ -56,6 +121,11 @@ pub(crate) fn hidden_at(lookup: &Lookup, side: u16, line: &Line) -> f64 {
             if (0.0..=1.0).contains(&at) && line.height(at) < height {
                 nearest = nearest.min(at);
             }
+        }
+        if let Some([at, above]) = line.highest_between(&corners)
+            && 0.0 < above
+        {
+            nearest = nearest.min(at - (above / line.sag).sqrt());
         }
     });
     nearest
@@ -81,6 +151,9 @@ pub(crate) fn least_above(lookup: &Lookup, side: u16, line: &Line) -> f64 {
                 let height = edge[0][2] + share * (edge[1][2] - edge[0][2]);
                 least = least.min(line.height(at) - height);
             }
+        }
+        if let Some([_, above]) = line.highest_between(&corners) {
+            least = least.min(-above);
         }
     });
     least

@@ -4,7 +4,9 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use database::Folder;
-use load_module_reader::{Area, Block, HOLE_CLASS, Keep, LoadedGround, QUANTA_PER_METRE, ReadError, Sight};
+use load_module_reader::{
+    Area, Block, Curvature, HOLE_CLASS, Keep, LoadedGround, ProfilePoint, QUANTA_PER_METRE, ReadError, Sight,
+};
 use numpy::{PyArray1, PyArray2, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -21,6 +23,8 @@ const WHOLE_MAX: usize = 1 << 14;
 const AT_ONCE: usize = 1 << 20;
 /// The same of lines of sight, which take longer.
 const LINES_AT_ONCE: usize = 1 << 12;
+/// Lines from one eye for which it is worth while to keep what it sees over.
+const EYE_LINES_MIN: usize = 64;
 
 /// What a database is asked through; nothing once it is closed.
 #[pyclass(frozen)]
@@ -104,6 +108,19 @@ const FREE: f64 = 2.0;
 /// Both ends of a line.
 fn ends(&[ax, ay, az, bx, by, bz]: &[f64; 6]) -> [[f64; 3]; 2] {
     [[ax, ay, az], [bx, by, bz]]
+}
+
+/// Lines that begin at one place, one after the other, with their answers.
+fn runs_from_one_eye<'a>(
+    lines: &'a [[f64; 6]],
+    seen: &'a mut [bool],
+) -> impl Iterator<Item = (&'a [[f64; 6]], &'a mut [bool])> {
+    let mut rest = seen;
+    lines.chunk_by(|a, b| a[..3] == b[..3]).map(move |run| {
+        let (these, others) = std::mem::take(&mut rest).split_at_mut(run.len());
+        rest = others;
+        (run, these)
+    })
 }
 
 fn hidden_at(ground: &LoadedGround, line: &[f64; 6]) -> f64 {
@@ -236,20 +253,47 @@ impl Ground {
         Ok(PyArray1::from_vec(py, self.ask(py, (places(&xy)?, AT_ONCE), HOLE_CLASS, each)?))
     }
 
-    /// How far along each line, six numbers from an eye to a target, something hides the rest: 2 where nothing does,
-    /// not a number where the line leaves the ground first.
-    fn hidden_at<'py>(
-        &self,
-        py: Python<'py>,
-        lines: PyReadonlyArray2<'py, f64>,
-    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let each = |ground: &LoadedGround, lines: &[[f64; 6]], shares: &mut [f64]| {
-            shares.iter_mut().zip(lines).for_each(|(share, line)| *share = hidden_at(ground, line));
+    /// Whether each line, six numbers from an eye to a target, meets nothing and stays on the ground: lines from one
+    /// eye, one after the other, take less time.
+    fn seen<'py>(&self, py: Python<'py>, lines: PyReadonlyArray2<'py, f64>) -> PyResult<Bound<'py, PyArray1<bool>>> {
+        let each = |ground: &LoadedGround, lines: &[[f64; 6]], seen: &mut [bool]| {
+            for (lines, seen) in runs_from_one_eye(lines, seen) {
+                let mut eye = (EYE_LINES_MIN <= lines.len()).then(|| ground.eye(ends(&lines[0])[0], Curvature::NONE));
+                for (line, seen) in lines.iter().zip(seen) {
+                    let [from, to] = ends(line);
+                    *seen = match &mut eye {
+                        Some(eye) => eye.sees(to),
+                        None => ground.sight(from, to) == Sight::Free,
+                    };
+                }
+            }
         };
-        Ok(PyArray1::from_vec(py, self.ask(py, (places(&lines)?, LINES_AT_ONCE), f64::NAN, each)?))
+        Ok(PyArray1::from_vec(py, self.ask(py, (places(&lines)?, LINES_AT_ONCE), false, each)?))
     }
 
-    /// The same, and how far each line stays above the ground at least.
+    /// Heights along a line through places: metres along it, east, north, height, that of a deck above it, class.
+    fn profile<'py>(
+        &self,
+        py: Python<'py>,
+        xy: PyReadonlyArray2<'py, f64>,
+        spacing_m: f64,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let (held, through) = (self.held(py)?, places(&xy)?.to_vec());
+        let found = py.detach(|| {
+            let block = around(&held.area, &through);
+            self.loaded(held, block).map(|ground| ground.profile(&through, spacing_m))
+        });
+        let row = |point: ProfilePoint| {
+            let number = |number: Option<f64>| number.unwrap_or(f64::NAN);
+            let [east, north] = point.place_m;
+            let class = f64::from(point.class.unwrap_or(HOLE_CLASS));
+            [point.along_m, east, north, number(point.height_m), number(point.deck_m), class]
+        };
+        table(py, found.map_err(|failure| raised(py, &failure))?.into_iter().map(row))
+    }
+
+    /// How far along each line something hides the rest, 2 where nothing does and not a number where the line leaves
+    /// the ground first; and how far the line stays above the ground at least.
     fn sights<'py>(&self, py: Python<'py>, lines: PyReadonlyArray2<'py, f64>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let each = |ground: &LoadedGround, lines: &[[f64; 6]], sights: &mut [[f64; 2]]| {
             let has_decks = ground.modules().iter().any(|module| !module.module().decks.is_empty());

@@ -285,6 +285,31 @@ def test_a_viewshed_is_the_lines_of_sight_to_its_places(database: Path) -> None:
             opened.viewshed((507_000, 3_876_500), 1e6, spacing_m=0.01)
 
 
+def test_places_seen_from_one_eye_are_those_of_single_lines(database: Path) -> None:
+    with tiefort.open(database) as opened:
+        west, south, east, north = opened.bounds
+        ends = np.random.default_rng(4).uniform((west, south), (east, north), (300, 2))
+        targets = np.column_stack((ends, opened.heights(ends) + 2))
+        eye = (*targets[0, :2], targets[0, 2] + 20)
+        assert 10 < opened.visible(eye, targets).sum() < 290
+        assert (opened.visible(eye, targets) == opened.line_of_sight(eye, targets).visible).all()
+
+
+def test_a_profile_is_the_heights_along_a_line(database: Path) -> None:
+    with tiefort.open(database) as opened:
+        through = [(506_000, 3_876_000), (507_000, 3_876_000), (507_000, 3_876_500)]
+        found = opened.profile(through, spacing_m=100)
+        assert list(found.along_m) == [100 * step for step in range(16)]
+        assert (found.heights == opened.heights(found.places)).all()
+        assert (found.classes == opened.classes(found.places)).all()
+        with pytest.raises(tiefort.RequestError, match="through"):
+            opened.profile(through[:1])
+        with pytest.raises(tiefort.RequestError, match="spacing_m"):
+            opened.profile(through, spacing_m=0)
+    done = run("profile", database, "506000,3876000", "507000,3876000", "--spacing", "100", "--format", "csv")
+    assert done.returncode == 0 and len(done.stdout.splitlines()) == 12, done.stderr
+
+
 def test_a_load_module_is_a_mesh(database: Path, tmp_path: Path) -> None:
     with tiefort.open(database) as opened:
         mesh = opened.module(2, 3)

@@ -33,6 +33,7 @@ mod lines;
 mod measures;
 mod measures_json;
 mod new_folder;
+mod places;
 mod program;
 mod progress;
 mod resources;

@@ -17,8 +17,8 @@ pub use page::{Advice, Page, PageSetting, advise, report_html};
 mod picture;
 pub use picture::{
     Camera, Color, Cover, Drawn, Eye, Facets, Image, Look, Map, NO_RESIDUAL, Panel, RESIDUAL_SCALE_M, Scene,
-    SceneFeatures, SceneGround, SceneLimits, SceneTile, Shown, Sight, Style, Surface, draw_errors, draw_map,
-    draw_module_limits, draw_panels, draw_perspective, draw_sight, draw_wireframe, palette,
+    SceneFeatures, SceneGround, SceneLimits, SceneTile, SeenGround, Shown, Sight, Style, Surface, draw_errors,
+    draw_map, draw_module_limits, draw_panels, draw_perspective, draw_seen, draw_sight, draw_wireframe, palette,
 };
 mod table;
 pub use table::{Align, COLUMNS_MAX, Table, fold, grouped};

@@ -1,6 +1,7 @@
 //! Tests of what is asked of the ground, against slow and obvious answers.
 
 mod decks;
+mod eye;
 
 use std::sync::Arc;
 

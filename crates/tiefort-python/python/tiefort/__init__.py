@@ -17,7 +17,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from ._database import Database, LineOfSight, Viewshed, open
+    from ._database import Database, LineOfSight, Profile, Viewshed, open
     from ._errors import (
         BusyError,
         ClosedError,
@@ -47,6 +47,7 @@ __all__ = [
     "LineOfSight",
     "Mesh",
     "OutputError",
+    "Profile",
     "Progress",
     "Report",
     "RequestError",
@@ -68,7 +69,7 @@ __all__ = [
 ]
 
 _HOMES = {
-    "_database": ("Database", "LineOfSight", "Viewshed", "open"),
+    "_database": ("Database", "LineOfSight", "Profile", "Viewshed", "open"),
     "_errors": (
         "BusyError",
         "ClosedError",

@@ -76,6 +76,34 @@ class Viewshed:
         return _data_array(self.visible, self.transform, self.crs, "visible")
 
 
+@dataclass(frozen=True)
+class Profile:
+    """The ground along a line.
+
+    Attributes
+    ----------
+    along_m : ndarray of float64, shape (n,)
+        Metres from the beginning, along the line.
+    places : ndarray of float64, shape (n, 2)
+        East and north.
+    heights : ndarray of float64, shape (n,)
+        Heights of the ground; NaN outside of the area.
+    decks : ndarray of float64, shape (n,)
+        Heights of the topmost deck above it; NaN where there is none.
+    classes : ndarray of uint8, shape (n,)
+        255 over holes and outside of the area.
+    crs : str
+        The coordinate system.
+    """
+
+    along_m: npt.NDArray[np.float64]
+    places: npt.NDArray[np.float64]
+    heights: npt.NDArray[np.float64]
+    decks: npt.NDArray[np.float64]
+    classes: npt.NDArray[np.uint8]
+    crs: str
+
+
 def open(path: Path) -> Database:
     """Open a terrain database that a build has finished.
 
@@ -223,7 +251,32 @@ class Database:
     def visible(self, a: npt.ArrayLike, b: npt.ArrayLike) -> npt.NDArray[np.bool_]:
         """Return whether nothing stands between places: `line_of_sight` without the rest, in less time."""
         lines, shape = _lines(a, b)
-        return np.asarray(self._ground.hidden_at(lines) == 2.0).reshape(shape)
+        return self._ground.seen(lines).reshape(shape)
+
+    def profile(self, through: npt.ArrayLike, spacing_m: float = 10.0) -> Profile:
+        """Return the ground along a line, as ``tiefort profile`` does.
+
+        Parameters
+        ----------
+        through : array_like, shape (n, 2)
+            East and north of the places that it goes through, straight from one to the next, in metres.
+        spacing_m : float
+            Metres between heights at most; the places are among them.
+
+        Returns
+        -------
+        Profile
+        """
+        places, shape = places_of(through, name="through")
+        if len(shape) != 1 or len(places) < 2:
+            raise RequestError(f"through: found {shape} places, expected a list of two or more", "[[e, n], [e, n]]")
+        if not (math.isfinite(spacing_m) and 0 < spacing_m):
+            raise RequestError(f"spacing_m: found {spacing_m}, expected a number above 0", "in metres")
+        steps = float(np.hypot(*np.diff(places, axis=0).T).sum()) / spacing_m
+        if not steps <= _VIEWSHED_MAX:
+            raise RequestError(f"found {steps:.0f} heights, expected at most {_VIEWSHED_MAX}", "a larger spacing_m")
+        along, east, north, height, deck, ofclass = self._ground.profile(places, float(spacing_m)).T
+        return Profile(along, np.column_stack((east, north)), height, deck, ofclass.astype(np.uint8), self.crs)
 
     def viewshed(
         self,
@@ -234,7 +287,7 @@ class Database:
         target_m: float = 0.0,
         spacing_m: float | None = None,
     ) -> Viewshed:
-        """Return what is seen from one place.
+        """Return what is seen from one place, as ``tiefort sight`` does.
 
         Parameters
         ----------

@@ -14,10 +14,12 @@ mod job_words;
 mod man;
 pub mod plan;
 mod plan_features;
+mod profile;
 mod render;
 mod report;
 mod sample;
 mod serve;
+mod sight;
 mod status;
 mod task;
 pub mod tile;
@@ -55,6 +57,10 @@ pub enum Command {
     Serve(serve::Arguments),
     /// Drive through it, in a browser on this machine
     View(view::Arguments),
+    /// Tell what is seen from a place: another place, or all around
+    Sight(sight::Arguments),
+    /// Measure the ground along a line
+    Profile(profile::Arguments),
     /// Explain one load module: what it holds, what was refused, what one more point would buy
     Explain(explain::Arguments),
     /// List the load modules in which two databases differ, and by how much
@@ -97,6 +103,8 @@ impl Command {
             Command::Render(arguments) => render::run(&arguments),
             Command::Serve(arguments) => serve::run(&arguments),
             Command::View(arguments) => view::run(&arguments),
+            Command::Sight(arguments) => sight::run(&arguments),
+            Command::Profile(arguments) => profile::run(&arguments),
             Command::Explain(arguments) => explain::run(&arguments),
             Command::Diff(arguments) => diff::run(&arguments),
             Command::Verify(arguments) => verify::run(&arguments),

@@ -7,9 +7,11 @@
 //!   /api/modules/SOUTH/WEST/NORTH/EAST     a block of load modules, whole (block.rs)
 //!   /api/levels/LEVEL/SOUTH/WEST/NORTH/EAST   the same at a level of detail
 //!   /api/lines/SOUTH/WEST/NORTH/EAST       roads and streams without triangles of their own there (lines.rs)
+//!   /api/relief                            heights and classes on a fine grid, for shades and shadows (relief.rs)
 //!   /api/dem                               whether the sources are at hand, as JSON; else `why` says why not
 //!   /api/dem/SOUTH/WEST/NORTH/EAST         the posts of such a block (posts.rs)
 //! ```
+//! What the tools of the page ask is listed in tools.rs.
 //! Blocks are half-open. Everything is little-endian. An answer other than 200 is a sentence for a person.
 
 mod area;
@@ -17,6 +19,8 @@ mod block;
 mod lines;
 mod overview;
 mod posts;
+mod relief;
+mod tools;
 
 use std::path::Path;
 use std::sync::Arc;
@@ -53,8 +57,10 @@ pub fn page(folder: &Path) -> Result<Page, Failure> {
         .route("/api/modules/{south}/{west}/{north}/{east}", get(modules))
         .route("/api/levels/{level}/{south}/{west}/{north}/{east}", get(level))
         .route("/api/lines/{south}/{west}/{north}/{east}", get(lines))
+        .route("/api/relief", get(relief::answer))
         .route("/api/dem", get(ground))
         .route("/api/dem/{south}/{west}/{north}/{east}", get(dem))
+        .merge(tools::routes())
         .with_state(Arc::new(Viewed::open(folder)?));
     Ok(Page { routes, paths: &["/viewer.js", "/api/*"] })
 }

@@ -28,6 +28,7 @@ mod serve;
 #[cfg(feature = "serve")]
 mod server;
 mod shared;
+mod sight;
 mod starts;
 mod streams;
 mod view;

@@ -90,6 +90,46 @@ mod page {
     }
 
     #[test]
+    fn the_tools_of_the_page_answer_as_the_commands_do() {
+        let server = served();
+        let value = |path: &str| {
+            let (status, body) = server.asked(path);
+            let text = String::from_utf8(body).unwrap();
+            assert_eq!(status, 200, "{path}: {text}");
+            serde_json::from_str::<Value>(&text).unwrap()
+        };
+        let line = value("/api/sight/506000,3875500,1/508500,3878500,1");
+        let words = ["sight", "small.tdb", "--from", "506000,3875500,1", "--to", "508500,3878500,1"];
+        let said = server.scene.run_to(0, &words).stdout;
+        let clearance = format!("clearance  {:.2} m", line["clearance_m"].as_f64().unwrap());
+        assert!(line["visible"] == false && said.starts_with("hidden") && said.contains(&clearance), "{line}: {said}");
+        let (status, seen) = server.asked("/api/viewshed/507000,3876500,20/1/1800/50");
+        assert_eq!((status, seen.len(), &seen[..4]), (200, 8 + 73 * 73, &73u32.to_le_bytes()[..]));
+        assert!(seen[8..].iter().all(|kind| [0, 1, 255].contains(kind)));
+        let profile = value("/api/profile/100/506000,3876000/507000,3876000");
+        assert_eq!(profile["height_m"].as_array().unwrap().len(), 11);
+        assert_eq!(value("/api/find/506000%203876000")["place_m"], serde_json::json!([506_000.0, 3_876_000.0]));
+        let near = value("/api/find/11S%20506000%203876000");
+        assert!((near["place_m"][1].as_f64().unwrap() - 3_876_000.0).abs() < 1e-3, "{near}");
+        let globe = value("/api/where/506000,3876000");
+        let [latitude, longitude] = ["latitude", "longitude"].map(|name| globe[name].as_f64().unwrap());
+        let back = value(&format!("/api/find/{latitude},{longitude}"));
+        assert!((back["place_m"][0].as_f64().unwrap() - 506_000.0).abs() < 0.01, "{back}");
+        for wrong in [
+            "/api/sight/1,2,3/4,5,6",
+            "/api/viewshed/507000,3876500,20/1/900000/1",
+            "/api/viewshed/507000,3876500,20/1/0/1",
+            "/api/profile/0/506000,3876000/507000,3876000",
+            "/api/find/nowhere",
+            "/api/find/11X%201%202",
+        ] {
+            assert_eq!(server.asked(wrong).0, 409, "{wrong}");
+        }
+        let (status, relief) = server.asked("/api/relief");
+        assert_eq!((status, relief.len()), (200, 20 + 3 * 161 * 161));
+    }
+
+    #[test]
     fn without_its_raster_a_database_is_served_and_says_that_there_is_no_dem() {
         let scene = Scene::with_job("raster.toml", &[]);
         Raster::sound().write(&scene.path("dem.tif"));

@@ -1,7 +1,10 @@
 // Colours: those of the server's pictures (`area.palette`, crates/views), so that a map here is read as one there.
 
-const numbers = (hex) => [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16) / 255);
-const linear = (value) => (value <= 0.04045 ? value / 12.92 : ((value + 0.055) / 1.055) ** 2.4);
+/** Red, green and blue from 0 to 1 of `#547a4e`. */
+export const numbers = (hex) => [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16) / 255);
+
+/** Levels of detail, from the finest, and what is drawn coarsely. */
+const LEVELS = ["#f1e3b0", "#e2a76f", "#b6638a", "#6d4a8f", "#4b4b57"];
 
 function along(stops, share) {
   const at = Math.min(Math.max(share, 0), 1) * (stops.length - 1), low = Math.min(Math.floor(at), stops.length - 2);
@@ -10,6 +13,8 @@ function along(stops, share) {
 }
 
 const known = (area, stops, share) => (Number.isNaN(share) ? numbers(area.palette.nothing) : along(stops, share));
+
+const WATERS = new Set(["water", "lake", "river", "stream", "sea"]);
 
 /** Red, green, blue from 0 to 1 as screens have them. */
 export const colorOf = {
@@ -27,20 +32,31 @@ export const colorOf = {
     area.limits.per_load_module < count
       ? numbers(area.palette.breach)
       : known(area, area.palette.use, count / area.limits.per_load_module),
+  /** Of water without a class. */
+  sea: (area) => numbers(area.palette.water),
+  /** Of a level of detail. */
+  levels: (_, level) => numbers(LEVELS[Math.min(level, LEVELS.length - 1)]),
   residuals: (area, rms) => known(area, area.palette.errors, rms / area.residual_scale_m),
   residual: (area, metres) => known(area, area.palette.residuals, 0.5 + metres / (2 * area.residual_scale_m)),
 };
 
-/** The same for the renderer, which reckons with light. */
-export const light = (color) => color.map(linear);
+/** The same for style sheets, the map and the renderer. */
+export const bytes = (color) => color.map((value) => Math.min(Math.max(Math.round(255 * value), 0), 255));
 
-/** The same for style sheets and the map. */
-export const bytes = (color) => color.map((value) => Math.round(255 * value));
+/** What a tint is of, as its fourth byte tells the shader: ground, something made by hands, water. */
+export const GROUND = 0, MADE = 127, WATER = 255;
+
+/** Whether a class is water. */
+export function isWater(area, ofClass) {
+  return ofClass === area.water || WATERS.has(area.classes[ofClass]);
+}
 
 /** What the legend of a way of colouring shows: stops, and words at both ends. */
 export function legendOf(area, colors, showsDem) {
   const scale = area.residual_scale_m, { heights, use, errors, residuals } = area.palette;
   if (colors === "limits") return [use, "0", `${area.limits.per_load_module} ${area.limits.count} a load module`];
+  if (colors === "going") return [["#40943f", "#f2d959", "#e68026", "#b81414"], "level", "45 % and more"];
+  if (colors === "levels") return [LEVELS, "finest level", "coarser"];
   if (colors === "height") return [heights, ...area.height_m.map((metres) => `${Math.round(metres)} m`)];
   if (showsDem) return [residuals, `TIN ${scale} m above`, `below`];
   return [errors, "0", `${scale} m RMS in a load module`];

@@ -5,23 +5,31 @@ const KEYS = {
   KeyD: ["right", 1], ArrowRight: ["right", 1], KeyA: ["right", -1], ArrowLeft: ["right", -1],
   KeyE: ["up", 1], PageUp: ["up", 1], KeyQ: ["up", -1], PageDown: ["up", -1],
 };
+const BRAKES = ["Space", "KeyB"];
 const LOOK_PITCH = [-1.4, 1.2], AWAY = [8, 400];
 /** Pixels a pointer may stray in a click, and that a finger drags for full speed. */
 const CLICK_PX = 5, FULL_PX = 70;
 
-/** Calls `pick(x, y)` for clicks and `press(code)` for keys that switch something; gives what tells wishes. */
-export function controls(canvas, tank, { pick, press }) {
+/** Keys belong to what is written into, chosen from or pressed. */
+const isOwn = (event) => event.target.matches("select, input:not([type=checkbox])")
+  || (["Space", "Enter"].includes(event.code) && event.target.matches("summary, button, input, a"));
+
+/** Calls `pick(x, y)` for clicks, `press(event)` for keys that switch something, `touch()` for the first of anything;
+ * gives what tells wishes. */
+export function controls(canvas, tank, { pick, press, touch }) {
   const held = new Set(), pointers = new Map();
   const clamp = (value, [low, high]) => Math.min(Math.max(value, low), high);
   addEventListener("keydown", (event) => {
-    if (event.ctrlKey || event.metaKey || event.altKey || event.target.matches("select, input[type=range]")) return;
-    if (KEYS[event.code]) event.preventDefault();
-    else if (!event.repeat) press(event.code);
+    touch();
+    if (event.ctrlKey || event.metaKey || event.altKey || isOwn(event)) return;
+    if (KEYS[event.code] || BRAKES.includes(event.code)) event.preventDefault();
+    else if (!event.repeat) press(event);
     held.add(event.code);
   });
   addEventListener("keyup", (event) => held.delete(event.code));
   addEventListener("blur", () => held.clear());
   canvas.addEventListener("pointerdown", (event) => {
+    touch();
     canvas.setPointerCapture(event.pointerId);
     canvas.focus();
     const drives = event.pointerType === "touch" && event.clientX < innerWidth / 2;
@@ -48,11 +56,17 @@ export function controls(canvas, tank, { pick, press }) {
   canvas.addEventListener("pointercancel", end);
   canvas.addEventListener("wheel", (event) => {
     event.preventDefault();
-    if (tank.flies) tank.altitude *= 1 + 0.0005 * event.deltaY;
+    touch();
+    // Height above the ground, by its share: so one turn of the wheel means the same near the ground and far above.
+    if (tank.flies) {
+      const ground = tank.height ?? 0;
+      tank.altitude = ground + Math.max(tank.altitude - ground, 4) * Math.exp(0.001 * event.deltaY);
+    }
     else tank.away = clamp(tank.away * Math.exp(0.001 * event.deltaY), AWAY);
   }, { passive: false });
   return () => {
-    const wish = { forward: 0, right: 0, up: 0, hurry: held.has("ShiftLeft") || held.has("ShiftRight") };
+    const brake = BRAKES.some((code) => held.has(code));
+    const wish = { forward: 0, right: 0, up: 0, brake, hurry: held.has("ShiftLeft") || held.has("ShiftRight") };
     for (const code of held) if (KEYS[code]) wish[KEYS[code][0]] += KEYS[code][1];
     for (const { drives, start, last, strayed } of pointers.values()) {
       if (!drives || !strayed) continue;

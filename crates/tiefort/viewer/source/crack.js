@@ -5,19 +5,19 @@ import { Color, LinearSRGBColorSpace, Vector2, Vector3, WebGLRenderTarget } from
 const BELOW = Math.sin((1 * Math.PI) / 180);
 
 /** Pixels that look below the horizon, and how many of them see the sky. */
-export function skyBelowHorizon({ renderer, scene, camera }) {
+export function skyBelowHorizon({ renderer, scene, sky: heaven, camera }) {
   const { x: wide, y: high } = renderer.getDrawingBufferSize(new Vector2());
   const target = new WebGLRenderTarget(wide, high);
-  const [background, fog] = [scene.background, scene.fog];
   scene.background = new Color().setRGB(1, 0, 1, LinearSRGBColorSpace);
-  scene.fog = null;
+  heaven.visible = false;
   renderer.setRenderTarget(target);
   renderer.render(scene, camera);
   const pixels = new Uint8Array(4 * wide * high);
   renderer.readRenderTargetPixels(target, 0, 0, wide, high, pixels);
   renderer.setRenderTarget(null);
   target.dispose();
-  Object.assign(scene, { background, fog });
+  scene.background = null;
+  heaven.visible = true;
   let [below, sky] = [0, 0];
   const places = [], rays = raysOf(camera), ray = new Vector3();
   for (let y = 0; y < high; y++) {

@@ -1,188 +1,210 @@
 // The page of `tiefort view`: one picture after another, and what hangs together by that.
-import {
-  BufferGeometry, Color, DirectionalLight, Float32BufferAttribute, Fog, HemisphereLight, LineBasicMaterial, LineLoop,
-  PerspectiveCamera, Raycaster, Scene, Vector2, WebGLRenderer,
-} from "three";
+import { DirectionalLight, HemisphereLight, PerspectiveCamera, Scene, WebGLRenderer } from "three";
+import { askWhere } from "./ask.js";
 import { controls } from "./controls.js";
+import { skyBelowHorizon } from "./crack.js";
+import { helpList } from "./help.js";
+import { asked, follower, setSwitches } from "./link.js";
 import { SmallMap } from "./map.js";
-import { at, note, showFigures, showLegend, showName, showPicked, wrong } from "./panel.js";
+import * as looks from "./materials.js";
+import { at, note, showFigures, showHud, showName, wrong } from "./panel.js";
+import { Pace } from "./pace.js";
+import { pick } from "./pick.js";
+import { coarseAt, scenicPlace } from "./scenic.js";
 import { readArea } from "./server.js";
+import { sunAt } from "./sun.js";
+import { switches } from "./switches.js";
 import { Tank } from "./tank.js";
 import { Terrain } from "./terrain.js";
-import { skyBelowHorizon } from "./crack.js";
+import { TOOL_KEYS, Tools } from "./tools.js";
 
-const FOG_M = [4_000, 90_000], EYE_DEGREES = 55, NEAR_M = 1, FAR_M = 500_000;
+const EYE_DEGREES = 55, NEAR_M = 1, FAR_M = 500_000;
 /** Seconds that one picture may stand for, so that a slow machine drives slowly and not in leaps. */
 const STEP_SECONDS_MAX = 0.25;
+/** Milliseconds between two tables of figures, and two pictures of the map. */
+const FIGURES_MS = 250, MAP_MS = 100;
 
-async function start() {
+export async function start() {
   const area = await readArea();
   showName(area);
-  const canvas = at("scene");
-  const renderer = new WebGLRenderer({ canvas, antialias: true });
-  renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
-  const scene = new Scene();
-  // As at the horizon of the server's pictures: blue is water only.
-  const sky = new Color(area.palette.sky.at(-1));
-  scene.background = sky;
-  scene.fog = new Fog(sky, ...FOG_M);
+  const view = viewOf(area), { scene, tank, terrain } = view;
+  const wanted = asked(area);
+  begin(view, wanted);
+  const light = lighting(view);
+  // For the sun's height; where the area lies nowhere on the globe, a middle one will do.
+  askWhere(area.inSystem(0, 0)).then(({ latitude }) => (area.latitude = latitude)).catch(() => null);
+  setSwitches(wanted);
+  const listens = switches(view, { light });
+  const help = helpList(), tools = new Tools(view);
+  const search = (event) => {
+    event.preventDefault();
+    at("tools").open = true;
+    at("place").select();
+  };
+  const keys = (event) => {
+    if (event.key === "?") help();
+    else if (event.code === "Escape") tools.clear();
+    else if (TOOL_KEYS[event.code]) at(TOOL_KEYS[event.code]).click();
+    else if (event.code === "KeyN") search(event);
+    else if (event.code === "KeyX") tank.level();
+    else if (/^Digit[1-4]$/.test(event.code)) tank.shift(Number(event.code.at(-1)) - 1);
+    else listens(event);
+  };
+  const touch = () => {
+    at("keys").classList.add("gone");
+    if (tank.drifts) [tank.drifts, tank.speed] = [false, 0];
+  };
+  const wishes = controls(view.renderer.domElement, tank, {
+    pick: (x, y) => tools.click(x, y) || pick(view, x, y), press: keys, touch,
+  });
+  at("help").addEventListener("click", help);
+  at("horizon").addEventListener("click", () => tank.level());
+  scene.add(terrain.group, tank.model);
+  fitted(view);
+  run(view, wishes);
+  // What a test asks, and whoever is curious in the console.
+  window.tiefort = {
+    state: () => ({ ...state(view), answer: tools.answer, tool: tools.mode }),
+    skyBelowHorizon: () => skyBelowHorizon(view),
+  };
+}
+
+function viewOf(area) {
+  const canvas = at("scene"), isSoft = drawsInSoftware();
+  // Nothing lies behind the picture, and who lays the page together need not look for it.
+  const context = canvas.getContext("webgl2", { alpha: false, antialias: !isSoft, stencil: false });
+  const renderer = new WebGLRenderer({ canvas, context });
+  const scene = new Scene(), sky = looks.prepare(area);
   const sun = new DirectionalLight(0xfff4e0, 2.3);
   sun.position.set(-1, 1.1, -1);
-  scene.add(sun, new HemisphereLight(0xf0eee8, 0x77705c, 1.4));
-  const camera = new PerspectiveCamera(EYE_DEGREES, 1, NEAR_M, FAR_M);
-  const terrain = new Terrain(area);
-  const tank = new Tank(terrain, ...startPlace(area));
-  scene.add(terrain.group, tank.model);
-  const view = { area, renderer, scene, camera, terrain, tank, range: area.range_m, frameMs: 0 };
-  view.map = new SmallMap(area, at("map").querySelector("canvas"), (east, north) => {
-    Object.assign(tank, { east, north, speed: 0 });
-    tank.height = null;
-  });
-  const wishes = controls(canvas, tank, { pick: (x, y) => pick(view, x, y), press: switches(view) });
+  scene.add(sky, sun, new HemisphereLight(0xf0eee8, 0x77705c, 1.4));
+  const camera = new PerspectiveCamera(EYE_DEGREES, 1, NEAR_M, FAR_M), terrain = new Terrain(area);
+  const tank = new Tank(terrain, 0, 0, 0);
+  const view = { area, renderer, scene, sky, camera, terrain, tank, range: area.range_m, hour: null, frameMs: 0 };
+  view.pace = new Pace(view, isSoft);
+  view.map = new SmallMap(area, at("map").querySelector("canvas"), (east, north) => tank.goTo(east, north));
+  return view;
+}
+
+/** Whether no graphics hardware is at hand: then every sample of a pixel costs. */
+function drawsInSoftware() {
+  const context = document.createElement("canvas").getContext("webgl2");
+  const names = context?.getExtension("WEBGL_debug_renderer_info");
+  const name = names ? context.getParameter(names.UNMASKED_RENDERER_WEBGL) : "";
+  context?.getExtension("WEBGL_lose_context")?.loseContext();
+  return /swiftshader|llvmpipe|software/i.test(name);
+}
+
+/** Begins where the address says, else in flight at the most scenic place, nearing it slowly. */
+function begin(view, wanted) {
+  const { area, tank } = view, { place, heading, turned, pitch, height, range } = wanted;
+  if (Number.isFinite(range)) view.range = range;
+  if (!place) {
+    const scenic = scenicPlace(area);
+    Object.assign(tank, scenic, { flies: true, drifts: true, pitch: -0.1 });
+  } else {
+    Object.assign(tank, { east: place[0], north: place[1], heading, turned, chases: wanted.chases });
+    if (Number.isFinite(pitch)) tank.pitch = pitch;
+    if (Number.isFinite(height)) Object.assign(tank, { flies: true, altitude: height });
+    else tank.altitude = (coarseAt(area, ...place) ?? 0) + 60;
+  }
+  at("fly").checked = tank.flies;
+}
+
+/** Lights the ground: at once by the coarse heights, then by those that the worker reads. */
+function lighting(view) {
+  const { area } = view, worker = new Worker("/viewer.js", { type: "module" });
+  let isRead = false;
+  worker.onmessage = ({ data }) => {
+    if (data.fault) note(`The relief could not be read: ${data.fault}`);
+    else looks.setRelief(area, data);
+    view.lit = true;
+  };
+  return () => {
+    const sun = sunAt(view.hour, area.latitude ?? 40);
+    looks.setSun(area, sun);
+    worker.postMessage({ sideM: isRead ? null : area.side_m, sun });
+    isRead = true;
+  };
+}
+
+function fitted({ renderer, camera, pace }) {
   const fit = () => {
     renderer.setSize(innerWidth, innerHeight, false);
     camera.aspect = innerWidth / innerHeight;
     camera.updateProjectionMatrix();
+    pace.again();
   };
   addEventListener("resize", fit);
   fit();
+}
+
+function run(view, wishes) {
+  const follow = follower(view);
   let last = performance.now();
-  renderer.setAnimationLoop((now) => {
+  view.frames = [];
+  view.renderer.setAnimationLoop((now) => {
     const passed = Math.max(now - last, 0);
     last = now;
     view.frameMs += 0.1 * (passed - view.frameMs);
-    frame(view, Math.min(passed / 1000, STEP_SECONDS_MAX), wishes());
+    frame(view, passed, wishes(), now);
+    follow(now);
   });
-  // What a test asks, and whoever is curious in the console.
-  window.tiefort = { state: () => state(view), skyBelowHorizon: () => skyBelowHorizon(view) };
 }
 
-/** Where the tank begins: the middle of the area, or what the address says (?east=…&north=…&heading=…). */
-function startPlace(area) {
-  const asked = new URLSearchParams(location.search);
-  const number = (name) => (asked.has(name) ? Number(asked.get(name)) : NaN);
-  const place = area.fromSystem(number("east"), number("north"));
-  const [east, north] = place.every(Number.isFinite) ? place : [area.side_m / 2, area.side_m / 2];
-  const [west, south, far, top] = area.sides;
-  const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
-  return [clamp(east, west, far), clamp(north, south, top), ((number("heading") || 0) * Math.PI) / 180];
-}
-
-function frame(view, seconds, wish) {
+function frame(view, passed, wish, now) {
   const { area, renderer, scene, camera, terrain, tank, map, range } = view;
+  const seconds = Math.min(passed / 1000, STEP_SECONDS_MAX);
+  terrain.drawSome();
   terrain.follow(tank.east, tank.north, range);
   if (tank.height === null) tank.settle();
   else tank.step(seconds, wish);
   tank.place(camera);
-  renderer.render(scene, camera);
-  map.draw(terrain.block, tank, range);
+  looks.setFrame(now / 1000, tank.east, tank.north, tank.flies || !tank.chases ? 0 : 4.5);
+  looks.setSplit(Number(at("split").value));
+  const version = `${terrain.version} ${looks.version()} ${view.version ?? 0}`;
+  if (view.pace.draws(camera, version, now)) {
+    looks.setWidth(renderer.domElement.width);
+    renderer.render(scene, camera);
+    if (view.drew) view.pace.took(passed);
+    view.drew = true;
+    view.count = (view.count ?? 0) + 1;
+    view.frames.push(passed);
+    if (600 < view.frames.length) view.frames.shift();
+  } else view.drew = false;
+  if (MAP_MS < now - (view.mapAt ?? -Infinity)) {
+    view.mapAt = now;
+    map.draw(terrain.block, tank, range);
+    showHud(view);
+  }
+  if (FIGURES_MS < now - (view.figuresAt ?? -Infinity)) {
+    view.figuresAt = now;
+    if (at("figures").open) showFigures(area, figures(view));
+    wrong(terrain.fault && `Load modules could not be read: ${terrain.fault}`);
+  }
+}
+
+/** What is loaded, seen and stood on. */
+function figures({ terrain, tank, camera, range, frameMs }) {
   const under = terrain.under(tank.east, tank.north, tank.ceiling());
   if (under) under.count = terrain.count(under.module);
-  view.figures = {
-    tank, under, frameMs: view.frameMs, loaded: terrain.loaded(),
-    view: terrain.inView(camera, tank.east, tank.north, range),
-  };
-  showFigures(area, view.figures);
-  wrong(terrain.fault && `Load modules could not be read: ${terrain.fault}`);
-}
-
-/** The switches, by mouse or by key; gives what a key does. */
-function switches(view) {
-  const { area, terrain, tank, map } = view;
-  const shown = () => {
-    const colors = at("colors").value;
-    if (colors !== terrain.colors) map.repaint(colors);
-    terrain.show({ colors, wireframe: at("wireframe").checked, lines: at("lines").checked });
-    showLegend(area, colors, terrain.withDem);
-  };
-  const dem = async () => {
-    note(at("dem").checked ? "reading the ground …" : "");
-    try {
-      await terrain.showDem(at("dem").checked);
-      unpick(view);
-      note("");
-    } catch (fault) {
-      at("dem").checked = false;
-      note(`The DEM is not at hand: ${fault.message}`);
-    }
-    shown();
-  };
-  const range = () => {
-    view.range = Number(at("range").value);
-    at("range").nextElementSibling.textContent = `${view.range / 1000} km`;
-  };
-  for (const id of ["colors", "wireframe", "lines"]) at(id).addEventListener("change", shown);
-  at("dem").addEventListener("change", dem);
-  at("fly").addEventListener("change", () => tank.takeOff(at("fly").checked));
-  at("chase").addEventListener("change", () => (tank.chases = at("chase").checked));
-  at("range").addEventListener("input", range);
-  at("range").value = new URLSearchParams(location.search).get("range") ?? area.range_m;
-  range();
-  shown();
-  const keys = { KeyT: "wireframe", KeyM: "lines", KeyG: "dem", KeyF: "fly", KeyH: "chase" };
-  return (code) => {
-    if (code === "KeyC") {
-      at("colors").selectedIndex = (at("colors").selectedIndex + 1) % at("colors").length;
-      shown();
-    } else if (keys[code]) at(keys[code]).click();
-  };
-}
-
-/** Reads the triangle under the pointer, and outlines it. */
-function pick(view, x, y) {
-  const { area, scene, camera, terrain } = view;
-  const rays = new Raycaster();
-  rays.setFromCamera(new Vector2((2 * x) / innerWidth - 1, 1 - (2 * y) / innerHeight), camera);
-  const meshes = [...terrain.drawn.values()].map(({ mesh }) => mesh);
-  const [hit] = rays.intersectObjects([...meshes, terrain.coarse.mesh], false);
-  unpick(view);
-  if (!hit) return;
-  const place = [hit.point.x, -hit.point.z, hit.point.y], [row, col] = area.moduleAt(place[0], place[1]);
-  const found = terrain.drawn.get(hit.object.userData.key);
-  if (!found) return showPicked(area, { row, col, place });
-  const { module, surface } = found, number = hit.faceIndex, positions = [];
-  for (const vertex of surface.triangles.subarray(3 * number, 3 * number + 3)) {
-    const [east, north, up] = surface.points.subarray(3 * vertex, 3 * vertex + 3);
-    positions.push(east, up + 0.4, -north);
-  }
-  const outline = new BufferGeometry().setAttribute("position", new Float32BufferAttribute(positions, 3));
-  view.outline = new LineLoop(outline, new LineBasicMaterial({ color: 0xff3d9a, depthTest: false }));
-  scene.add(view.outline);
-  const normal = [hit.face.normal.x, -hit.face.normal.z, hit.face.normal.y];
-  const isTin = surface === module.tin;
-  const ofClass = isTin ? module.classes[number] : undefined;
-  const className = ofClass === area.hole ? "hole" : (area.classes[ofClass] ?? ofClass);
-  const residual = isTin ? undefined : surface.residuals[nearest(surface, number, place)];
-  const { row: ownRow, col: ownCol, level } = module;
-  view.picked = { row: ownRow, col: ownCol, level, place, triangle: { number, normal, className, residual } };
-  showPicked(area, view.picked);
-}
-
-/** Forgets what was clicked. */
-function unpick(view) {
-  if (view.outline) view.scene.remove(view.outline);
-  view.outline = view.picked = undefined;
-  showPicked(view.area, null);
-}
-
-/** The corner of a triangle that a place is nearest to. */
-function nearest({ points, triangles }, number, [east, north]) {
-  const away = (vertex) => Math.hypot(points[3 * vertex] - east, points[3 * vertex + 1] - north);
-  return [...triangles.subarray(3 * number, 3 * number + 3)].reduce((a, b) => (away(b) < away(a) ? b : a));
+  const view = terrain.inView(camera, tank.east, tank.north, range);
+  return { tank, under, frameMs, loaded: terrain.loaded(), view };
 }
 
 /** Everything a test wants to know. */
 function state(view) {
-  const { area, terrain, tank, figures, picked } = view;
+  const { area, terrain, tank, picked } = view, { under, loaded, view: seen } = figures(view);
   const [east, north] = area.inSystem(tank.east, tank.north);
   return {
     east, north, height: tank.height, heading: tank.heading, tilt: tank.tilt, driven: tank.driven, speed: tank.speed,
     block: terrain.block, loaded: [...terrain.fine().keys()], waiting: terrain.asked.size, fault: terrain.fault,
-    showsDem: terrain.withDem, isOnDeck: figures?.under?.isDeck, modules: figures?.loaded.modules, triangles: figures?.loaded.triangles,
+    showsDem: terrain.withDem, isOnDeck: under?.isDeck, modules: loaded.modules, triangles: loaded.triangles,
     coarser: [...terrain.drawn.values()].filter(({ module }) => module.level !== 0)
       .map(({ module }) => [module.level, module.row, module.col, module.counts.triangles]),
-    blocks: terrain.blocks, fullest: figures?.loaded.fullest, view: figures?.view, frameMs: view.frameMs, picked,
+    blocks: terrain.blocks, fullest: loaded.fullest, view: seen, frameMs: view.frameMs, picked,
+    flies: tank.flies, altitude: tank.altitude, turned: tank.turned, pitch: tank.pitch, gear: tank.gear,
+    drifts: tank.drifts, lit: view.lit === true, frames: view.frames, count: view.count,
+    pixelRatio: view.renderer.getPixelRatio(), geometries: view.renderer.info.memory.geometries,
   };
 }
-
-start().catch((fault) => wrong(`The area could not be shown: ${fault.message}`));

@@ -1,5 +1,6 @@
 // The small map: the whole area, the block that is loaded, the observer.
 import { bytes, colorOf } from "./colors.js";
+import { isSea } from "./server.js";
 
 /** Draws on `canvas`; `go(east, north)` is called for clicks. */
 export class SmallMap {
@@ -21,7 +22,7 @@ export class SmallMap {
   /** Paints the area anew: shaded heights, water and holes, or a square for each load module. */
   repaint(colors) {
     const { area, ground } = this, { wide, high, heights, classes } = area.coarse;
-    const byModule = colors !== "height";
+    const byModule = (this.byModule = colors !== "height");
     [ground.width, ground.height] = byModule ? [area.cols, area.rows] : [wide - 1, high - 1];
     const picture = new ImageData(ground.width, ground.height);
     for (let row = 0; row < ground.height; row++) {
@@ -36,7 +37,8 @@ export class SmallMap {
           // Light from the north-west.
           const slope = (heights[place + 1] - heights[place] + heights[place] - heights[place + wide]) / step;
           const shade = Math.min(Math.max(0.9 + slope, 0.45), 1.25);
-          const flat = colorOf.cover(area, classes[place]) ?? colorOf.height(area, heights[place]);
+          const flat = colorOf.cover(area, classes[place])
+            ?? (isSea(area, [heights[place]]) ? colorOf.sea(area) : undefined) ?? colorOf.height(area, heights[place]);
           color = flat.map((part) => part * shade);
         }
         picture.data.set([...bytes(color), 255], at);
@@ -47,7 +49,7 @@ export class SmallMap {
 
   draw(block, tank, range) {
     const { area, canvas, pixels } = this, context = canvas.getContext("2d");
-    context.imageSmoothingEnabled = false;
+    context.imageSmoothingEnabled = !this.byModule;
     context.drawImage(this.ground, 0, 0, canvas.width, canvas.height);
     const [x, y] = [(tank.east - area.sides[0]) * pixels, (area.sides[3] - tank.north) * pixels];
     if (block) {

@@ -38,13 +38,27 @@ export function showFigures(area, { tank, loaded, view, under, frameMs }) {
 }
 
 export function showName(area) {
-  at("figures").querySelector("h1").textContent = `${area.name}, ${area.crs}`;
+  at("figures").querySelector("summary").textContent = `${area.name}, ${area.crs}`;
+  document.title = `${area.name} - tiefort view`;
+}
+
+const WINDS = ["N", "NE", "E", "SE", "S", "SW", "W", "NW"];
+
+/** What is always seen: heading, height, speed and gear. */
+export function showHud({ tank }) {
+  const heading = ((degrees(tank.heading + tank.turned) % 360) + 360) % 360;
+  const wind = WINDS[Math.round(heading / 45) % WINDS.length];
+  const above = tank.height === null ? "" : ` (${Math.max(tank.altitude - tank.height, 0).toFixed(0)} m above ground)`;
+  const height = tank.flies ? `${tank.altitude.toFixed(0)} m${above}` : `${tank.height?.toFixed(1) ?? "-"} m`;
+  const speed = `${(3.6 * Math.abs(tank.speed)).toFixed(0)} km/h`;
+  const words = `${wind} ${heading.toFixed(0)}\u00b0 \u00b7 ${height} \u00b7 ${speed} \u00b7 gear ${tank.gear + 1}`;
+  const place = at("hud").querySelector("span");
+  if (place.textContent !== words) place.textContent = words;
 }
 
 /** The scale of colours. */
 export function showLegend(area, colors, showsDem) {
   const [stops, low, high] = legendOf(area, colors, showsDem);
-  at("legend").style.display = "block";
   at("legend").querySelector("i").style.background = `linear-gradient(to right, ${stops.join(", ")})`;
   at("legend").querySelector("span").replaceChildren(...[low, high].map((words) => {
     const element = document.createElement("em");
@@ -58,6 +72,7 @@ export function showPicked(area, picked) {
   const box = at("picked");
   box.style.display = picked ? "block" : "none";
   if (!picked) return;
+  at("answer").style.display = "none";
   const { row, col, level, place, triangle } = picked, figures = area.figures(row, col);
   const [east, north] = area.inSystem(place[0], place[1]);
   const metres = (value) => (Number.isNaN(value) ? "no post measured" : `${value.toFixed(2)} m`);
@@ -82,6 +97,17 @@ export function showPicked(area, picked) {
     element.textContent = words;
     return element;
   }));
+}
+
+/** What a tool answers: words, and a drawing where `draw` makes one on a canvas. */
+export function tell(words, draw) {
+  const box = at("answer");
+  box.style.display = words ? "block" : "none";
+  if (words) at("picked").style.display = "none";
+  const [line, canvas] = [document.createElement("div"), document.createElement("canvas")];
+  line.textContent = words;
+  box.replaceChildren(...(draw ? [line, canvas] : [line]));
+  draw?.(canvas);
 }
 
 export function note(words) {

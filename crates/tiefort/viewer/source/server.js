@@ -2,6 +2,13 @@
 // the middle of the area, so that they are small numbers, whole in 1/128 m, that a 32-bit float holds exactly.
 
 const QUANTA = 128;
+/** Metres that a TIN leaves the sea's level by, and the share of an area from which on level ground at 0 is the sea:
+ * rasters that know no other name for it have it so. */
+const SEA_M = 0.75, SEA_SHARE = 0.02;
+const isAtSeaLevel = (height) => Math.abs(height) < SEA_M;
+
+/** Whether ground at these heights is the sea. */
+export const isSea = (area, heights) => area.hasSea && heights.every(isAtSeaLevel);
 
 async function answer(path) {
   const response = await fetch(path);
@@ -18,6 +25,7 @@ export async function readArea() {
   const classes = new Uint8Array(bytes, bytes.byteLength - wide * high);
   const heights = new Float32Array(bytes, 0, wide * high);
   area.coarse = { wide, high, heights, classes };
+  area.hasSea = SEA_SHARE * heights.length < heights.filter(isAtSeaLevel).length;
   // What comes after them, the classes, fills no whole words.
   const part = [4 * wide * high, 4 * area.rows * area.cols];
   const words = new Uint32Array(bytes, ...part), metres = new Float32Array(bytes, ...part);

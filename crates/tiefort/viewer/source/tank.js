@@ -1,8 +1,12 @@
 // The observer: a tank that follows the triangles it stands on, or an eye that flies above them.
 import { BoxGeometry, CylinderGeometry, Group, Matrix4, Mesh, MeshLambertMaterial, Vector3 } from "three";
 
-const FORWARD_MPS = 18, BACK_MPS = 6, GAIN_MPS2 = 6, TURN_RADPS = 0.7;
-const FLY_MPS = 80, CLEARANCE_M = 3, CEILING_M = 12_000;
+const BACK_MPS = 6, GAIN_MPS2 = 6, BRAKE_MPS2 = 14, TURN_RADPS = 0.7;
+const CLEARANCE_M = 3, CEILING_M = 12_000;
+/** Highest speed in each gear, driving and in flight, metres a second; the gears that are in at first. */
+const GEARS = { driving: [4, 10, 18, 25], flying: [20, 80, 200, 500] }, FIRST_GEARS = { driving: 2, flying: 1 };
+/** Metres a second of the slow approach before the observer does anything. */
+const DRIFT_MPS = 14;
 /** Times as fast with the shift key. */
 const HURRY = 10;
 /** Half of the tracks' length and of the distance between them, metres. */
@@ -14,6 +18,8 @@ const STEP_M = 1.5, LOOK_M = 3;
 export class Tank {
   constructor(terrain, east, north, heading) {
     Object.assign(this, { terrain, east, north, heading, speed: 0, driven: 0, flies: false, height: null });
+    this.gears = { ...FIRST_GEARS };
+    this.drifts = false;
     // Where the observer looks, beyond where the tank points; and how far behind it he is.
     Object.assign(this, { turned: 0, pitch: -0.12, away: 22, chases: true });
     // The tank's own axes: right, up, backwards.
@@ -35,10 +41,24 @@ export class Tank {
     this.settle();
   }
 
-  drive(seconds, { forward, right, hurry }) {
+  /** The gear that is in, from 0, and its highest speed. */
+  get gear() {
+    return this.gears[this.flies ? "flying" : "driving"];
+  }
+
+  get topSpeed() {
+    return GEARS[this.flies ? "flying" : "driving"][this.gear];
+  }
+
+  shift(gear) {
+    this.gears[this.flies ? "flying" : "driving"] = Math.min(Math.max(gear, 0), GEARS.driving.length - 1);
+  }
+
+  drive(seconds, { forward, right, hurry, brake }) {
     const times = hurry ? HURRY : 1;
-    const wanted = forward * (forward < 0 ? BACK_MPS : FORWARD_MPS) * times;
-    const change = GAIN_MPS2 * times * seconds * (forward === 0 ? 2 : 1);
+    const wanted = brake ? 0 : forward * Math.min(forward < 0 ? BACK_MPS : Infinity, this.topSpeed) * times;
+    const gain = brake ? BRAKE_MPS2 * Math.max(1, Math.abs(this.speed) / this.topSpeed) : GAIN_MPS2 * times;
+    const change = gain * seconds * (forward === 0 && !brake ? 2 : 1);
     this.speed += Math.min(Math.max(wanted - this.speed, -change), change);
     this.heading += right * TURN_RADPS * seconds * (this.speed < 0 ? -1 : 1);
     const way = this.speed * seconds, looks = Math.ceil(Math.abs(way) / LOOK_M);
@@ -55,11 +75,11 @@ export class Tank {
   }
 
   fly(seconds, { forward, right, up, hurry }) {
-    const reach = FLY_MPS * (hurry ? HURRY : 1) * seconds;
+    const most = this.topSpeed * (hurry ? HURRY : 1);
     this.heading += right * TURN_RADPS * seconds;
-    this.speed = forward * FLY_MPS * (hurry ? HURRY : 1);
-    this.move(this.heading + this.turned, forward * reach);
-    this.altitude += 0.5 * up * reach;
+    this.speed = this.drifts ? DRIFT_MPS : forward * most;
+    this.move(this.heading + this.turned, this.speed * seconds);
+    this.altitude += 0.5 * up * most * seconds;
   }
 
   move(direction, metres) {
@@ -84,19 +104,34 @@ export class Tank {
     const up = new Vector3().crossVectors(aside, ahead).normalize();
     this.axes = [new Vector3().crossVectors(ahead, up), up, ahead.clone().negate()];
     this.tilt = [Math.asin(ahead.y), Math.asin(aside.y)];
+    if (typeof this.above === "number") this.altitude = this.height + this.above;
+    this.above = null;
     this.altitude = this.flies ? Math.min(Math.max(this.altitude, this.height + CLEARANCE_M), CEILING_M) : this.height;
   }
 
   takeOff(flies) {
-    this.flies = flies;
+    [this.flies, this.drifts, this.speed] = [flies, false, 0];
+    // What it flew above is far below: it comes down to the ground, not to what is under its height.
+    if (!flies) this.height = null;
     this.altitude = (this.height ?? 0) + 60;
     this.settle();
   }
 
+  /** Looks ahead and level again, whatever way it was turned. */
+  level() {
+    [this.turned, this.pitch] = [0, this.flies ? -0.05 : -0.12];
+  }
+
+  /** Goes to a place and stands, or flies as high above the ground as before. */
+  goTo(east, north) {
+    const above = this.flies && this.height !== null ? this.altitude - this.height : null;
+    Object.assign(this, { east, north, speed: 0, height: null, drifts: false, above });
+  }
+
   /** Puts the camera where the observer is. */
   place(camera) {
-    if (this.height === null) return;
-    const base = new Vector3(this.east, this.height, -this.north);
+    if (this.height === null && !this.flies) return;
+    const base = new Vector3(this.east, this.height ?? 0, -this.north);
     this.model.visible = !this.flies && this.chases;
     this.model.matrixAutoUpdate = false;
     this.model.matrix = new Matrix4().makeBasis(...this.axes).setPosition(base);

@@ -1,9 +1,12 @@
 // The block of load modules around the observer: loaded, drawn, dropped; around it load modules at coarser levels of
 // detail, where the database has them; beyond these the area as it is coarsely.
 import { Frustum, Group, Matrix4 } from "three";
-import { apron, coarseMesh, deckMesh, moduleLines, moduleMesh, paint, roadMesh, wallMeshes } from "./meshes.js";
+import { apron, Coarse } from "./coarse.js";
+import * as looks from "./materials.js";
+import { deckMesh, moduleLines, moduleMesh, paint, roadMesh } from "./meshes.js";
 import { checkDem, readLines, readModules, readPosts } from "./server.js";
 import { deckUnder, triangleUnder } from "./surface.js";
+import { wallMeshes } from "./walls.js";
 
 /** Metres from the middle of the area to where nothing is any more. */
 const APRON_M = 400_000;
@@ -13,25 +16,30 @@ const RING = 0.5;
 const MODULES_MAX = 1024;
 /** How long after load modules could not be read they are asked for again. */
 const AGAIN_MS = 2000;
+/** Milliseconds of a picture that load modules which have come may take. */
+const DRAW_MS = 7;
 
 export class Terrain {
   constructor(area) {
     this.area = area;
     this.group = new Group();
-    // By row * cols + col: {module, surface, mesh, edges, decks, roads}. Levels that differ fit together, so that a load
-    // module stays until the one in its place has come.
+    // By row * cols + col: {module, surface, mesh, beside, decks, roads}. Levels that differ fit together, so that a
+    // load module stays until the one in its place has come.
     this.drawn = new Map();
     this.colors = "height";
-    this.withEdges = this.withLines = this.withDem = false;
+    this.withLines = this.withDem = false;
     // For each level the half-open block within which load modules are at least that fine.
     this.blocks = [];
     this.lacks = false;
     this.asked = new Set();
+    // What has come and is not drawn yet.
+    this.came = [];
     this.fault = null;
-    this.coarse = coarseMesh(area);
-    this.coarse.repaint(this.colors);
-    this.base = area.height_m[0] - 20;
-    this.group.add(this.coarse.mesh, apron(area, this.base, APRON_M));
+    // Changes with what is drawn.
+    this.version = 0;
+    this.coarse = new Coarse(area);
+    this.base = area.hasSea ? Math.min(area.height_m[0], 0) - 1 : area.height_m[0] - 20;
+    this.group.add(this.coarse.group, apron(area, this.base, APRON_M));
     this.closed();
   }
 
@@ -46,6 +54,18 @@ export class Terrain {
   /** The block of the finest level; null before anything was asked for. */
   get block() {
     return this.blocks[0] ?? null;
+  }
+
+  /** Draws what has come, as much of it as one picture may wait for. */
+  drawSome() {
+    if (this.came.length === 0) return;
+    const end = performance.now() + DRAW_MS;
+    while (0 < this.came.length && performance.now() < end) {
+      const module = this.came.shift(), key = module.row * this.area.cols + module.col;
+      this.asked.delete(this.askedKey(key, module.level));
+      if (this.levelOf(key) === module.level) this.draw(key, module);
+    }
+    this.closed();
   }
 
   /** Follows the observer: drops what is out of range, asks for what is missing. */
@@ -114,12 +134,7 @@ export class Terrain {
       const modules = await readModules(this.area, part, level);
       if (this.withDem && level === 0) await readPosts(this.area, part, modules);
       if (this.area.has_lines && level === 0) await readLines(this.area, part, modules);
-      for (const module of modules) {
-        const key = module.row * this.area.cols + module.col;
-        this.asked.delete(this.askedKey(key, level));
-        if (this.levelOf(key) === level) this.draw(key, module);
-      }
-      this.closed();
+      this.came.push(...modules);
       this.fault = null;
     } catch (fault) {
       // What was not loaded stays coarse; the page says so, and asks again.
@@ -132,9 +147,15 @@ export class Terrain {
   draw(key, module) {
     this.drop(key);
     const surface = (this.withDem && module.dem) || module.tin;
-    const { mesh, edges } = moduleMesh(surface);
-    edges.visible = this.withEdges;
+    const isSplit = surface !== module.tin;
+    const mesh = moduleMesh(surface, isSplit ? looks.sides[1] : looks.fine);
     paint(this.area, module, surface, mesh, this.colors);
+    // Left of the line are the triangles that were made from it.
+    const beside = isSplit ? moduleMesh(module.tin, looks.sides[0]) : null;
+    if (beside) {
+      paint(this.area, module, module.tin, beside, this.colors);
+      mesh.add(beside);
+    }
     mesh.userData.key = key;
     this.group.add(mesh);
     // The DEM knows no decks.
@@ -142,7 +163,7 @@ export class Terrain {
     if (decks) mesh.add(decks);
     const roads = module.lines ? roadMesh(this.area, module.lines, surface) : null;
     if (roads) mesh.add(roads);
-    this.drawn.set(key, { module, surface, mesh, edges, decks, roads });
+    this.drawn.set(key, { module, surface, mesh, beside, decks, roads });
   }
 
   drop(key) {
@@ -150,6 +171,7 @@ export class Terrain {
     if (!old) return false;
     this.group.remove(old.mesh);
     old.mesh.geometry.dispose();
+    old.beside?.geometry.dispose();
     old.decks?.geometry.dispose();
     old.roads?.geometry.dispose();
     return this.drawn.delete(key);
@@ -158,21 +180,22 @@ export class Terrain {
   /** Makes the surface whole again after load modules came or went. */
   closed() {
     const { area, group } = this;
+    this.version += 1;
     for (const old of [...(this.walls ?? []), this.lines].filter(Boolean)) {
       group.remove(old);
       old.geometry.dispose();
     }
     this.coarse.cut((row, col) => this.drawn.has(row * area.cols + col));
     this.walls = wallMeshes(area, this.drawn, this.base);
-    this.lines = moduleLines(this.drawn);
-    this.lines.visible = this.withLines;
-    group.add(...this.walls, this.lines);
+    this.lines = this.withLines ? moduleLines(this.drawn) : null;
+    group.add(...[...this.walls, this.lines].filter(Boolean));
   }
 
-  show({ colors, wireframe, lines }) {
-    [this.withEdges, this.withLines] = [wireframe, lines];
-    for (const one of this.drawn.values()) one.edges.visible = wireframe;
-    this.lines.visible = lines;
+  show({ colors, lines }) {
+    if (lines !== this.withLines) {
+      this.withLines = lines;
+      this.closed();
+    }
     if (colors !== this.colors) {
       this.colors = colors;
       this.repaint();
@@ -180,8 +203,12 @@ export class Terrain {
   }
 
   repaint() {
+    this.version += 1;
     this.coarse.repaint(this.colors);
-    for (const { module, surface, mesh } of this.drawn.values()) paint(this.area, module, surface, mesh, this.colors);
+    for (const { module, surface, mesh, beside } of this.drawn.values()) {
+      paint(this.area, module, surface, mesh, this.colors);
+      if (beside) paint(this.area, module, module.tin, beside, this.colors);
+    }
   }
 
   /** Shows the DEM, or the triangles again. Fails where the DEM is not at hand; then nothing has changed. */
@@ -192,6 +219,10 @@ export class Terrain {
       const rows = modules.map((module) => module.row), cols = modules.map((module) => module.col);
       const part = [Math.min(...rows), Math.min(...cols), Math.max(...rows) + 1, Math.max(...cols) + 1];
       await readPosts(this.area, part, modules);
+    }
+    // What came meanwhile came without, or with.
+    for (const module of this.came.splice(0)) {
+      this.asked.delete(this.askedKey(module.row * this.area.cols + module.col, module.level));
     }
     this.withDem = wanted;
     // Coarser levels go, or come again.

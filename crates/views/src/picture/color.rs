@@ -42,6 +42,8 @@ pub(crate) fn feature_number(name: &str) -> u8 {
 
 /// The sky at its top and at the horizon.
 pub(crate) const SKY: [Color; 2] = [[205, 203, 198], [240, 238, 234]];
+/// Bare rock, which steep ground turns into in pictures that are driven through.
+pub(crate) const ROCK: Color = [139, 126, 108];
 /// What distance fades into.
 pub(crate) const HAZE: Color = [228, 226, 220];
 
@@ -116,8 +118,8 @@ pub(crate) const RESIDUALS: Ramp = Ramp(&[
 pub(crate) const KINDS: [Color; 4] = [[226, 222, 212], [253, 205, 130], [178, 223, 188], [222, 190, 218]];
 
 /// The palette for programs that draw by themselves, as texts such as `#547a4e`: `heights`, `use`, `errors` and
-/// `residuals` from low to high, `breach`, `water`, `nothing`, `sky` from its top to the horizon, and of `features`
-/// each class by its name.
+/// `residuals` from low to high, `breach`, `water`, `nothing`, `rock` for steep ground, `sky` from its top to the
+/// horizon, `haze` that distance fades into, and of `features` each class by its name.
 pub fn palette() -> Value {
     let all = |colors: &[Color]| colors.iter().copied().map(hex).collect::<Vec<_>>();
     let features: serde_json::Map<String, Value> =
@@ -131,7 +133,9 @@ pub fn palette() -> Value {
         "water": hex(WATER),
         "features": features,
         "nothing": hex(NOTHING),
+        "rock": hex(ROCK),
         "sky": all(&SKY),
+        "haze": hex(HAZE),
     })
 }
 
@@ -219,7 +223,7 @@ mod tests {
         for (name, color) in FEATURES {
             assert_eq!(is_blue(color), is_water(name), "{name}");
         }
-        let others = [BREACH, BOUND, NOTHING, PALE, SKY[0], SKY[1], HAZE].into_iter().chain(KINDS);
+        let others = [BREACH, BOUND, NOTHING, PALE, ROCK, SKY[0], SKY[1], HAZE].into_iter().chain(KINDS);
         for color in ramps.chain(others) {
             assert!(!is_blue(color), "{color:?}");
         }

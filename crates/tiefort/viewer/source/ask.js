@@ -1,0 +1,41 @@
+// What is asked of the server about places: all of them in the area's own system, metres.
+import { forward, toPoint } from "mgrs";
+
+async function ask(path) {
+  const response = await fetch(path);
+  if (!response.ok) throw new Error(await response.text());
+  return response;
+}
+
+const words = (numbers) => numbers.map((number) => String(Number(number.toFixed(3)))).join(",");
+
+/** Whether one place sees another, both with metres above the ground. */
+export const askSight = async (from, to) => (await ask(`/api/sight/${words(from)}/${words(to)}`)).json();
+
+/** Heights along a line. */
+export const askProfile = async (from, to, spacing) =>
+  (await ask(`/api/profile/${spacing.toFixed(3)}/${words(from)}/${words(to)}`)).json();
+
+/** What is seen around a place: places along a side, metres between them, and bytes from the north-west. */
+export async function askViewshed(from, target, range, spacing) {
+  const bytes = await (await ask(`/api/viewshed/${words(from)}/${target}/${range}/${spacing}`)).arrayBuffer();
+  const [side] = new Uint32Array(bytes, 0, 1);
+  return { side, spacing, seen: new Uint8Array(bytes, 8, side * side) };
+}
+
+/** A place of coordinates as people write them: of the area's system, degrees, UTM or MGRS. */
+export async function askPlace(written) {
+  const plain = written.trim(), close = plain.replace(/\s/g, "").toUpperCase();
+  let asked = plain;
+  if (/^\d{1,2}[C-X][A-Z]{2}(\d\d){1,5}$/.test(close)) {
+    const [longitude, latitude] = toPoint(close);
+    asked = `${latitude} ${longitude}`;
+  }
+  return (await (await ask(`/api/find/${encodeURIComponent(asked)}`)).json()).place_m;
+}
+
+/** Degrees and MGRS of a place. */
+export async function askWhere(place) {
+  const { longitude, latitude } = await (await ask(`/api/where/${words(place)}`)).json();
+  return { longitude, latitude, mgrs: Math.abs(latitude) < 80 ? forward([longitude, latitude], 4) : "" };
+}

@@ -1,0 +1,139 @@
+// The look of ground and sky: one material for everything that lies on the ground, near or far, and what they share.
+import {
+  BackSide, BoxGeometry, Color, DataTexture, DoubleSide, GLSL3, LinearFilter, LinearMipmapNearestFilter, Mesh,
+  RGBAFormat, ShaderMaterial, Vector2, Vector3, Vector4,
+} from "three";
+import { numbers } from "./colors.js";
+import { noiseTexture } from "./noise.js";
+import { GROUND_FRAGMENT, GROUND_VERTEX, SKY_FRAGMENT, SKY_VERTEX } from "./shaders.js";
+import { lightOf } from "./sun.js";
+
+/** Metres at which two thirds of what is seen are haze. */
+const HAZE_M = 38_000;
+/** Part of the shade that comes from the smooth relief where facets are near. */
+const SOFTNESS = 0.72;
+
+const flat = new DataTexture(new Uint8Array([128, 128, 255, 255]), 1, 1, RGBAFormat);
+const clear = new DataTexture(new Uint8Array(4), 1, 1, RGBAFormat);
+flat.needsUpdate = clear.needsUpdate = true;
+
+let changes = 0;
+/** A number that changes with what is set here. */
+export const version = () => changes;
+
+const shared = {
+  sunWay: { value: new Vector3(0, 1, 0) }, sunTint: { value: new Color() }, skyTint: { value: new Color() },
+  hazeTint: { value: new Color() }, glowTint: { value: new Color() }, hazeM: { value: HAZE_M },
+  rockTint: { value: new Color() }, topTint: { value: new Color() }, edgeTint: { value: new Color(0.06, 0.08, 0.09) },
+  reliefMap: { value: flat }, reliefPlace: { value: new Vector4() }, noiseMap: { value: null },
+  overMap: { value: clear }, overPlace: { value: new Vector4(0, 0, 1, 0) },
+  smoothM: { value: new Vector2(1500, 3000) }, softness: { value: SOFTNESS }, seconds: { value: 0 },
+  split: { value: new Vector2() }, splitSide: { value: 0 }, textured: { value: 1 }, going: { value: 0 },
+  blob: { value: new Vector4() },
+};
+
+function groundMaterial(edges, options) {
+  return new ShaderMaterial({
+    uniforms: { ...shared, edges }, vertexShader: GROUND_VERTEX, fragmentShader: GROUND_FRAGMENT, glslVersion: GLSL3,
+    ...options,
+  });
+}
+
+const edges = { value: 0 }, none = { value: 0 };
+/** Load modules, whose triangles may show their edges; what is drawn coarsely; decks, which are seen from below too;
+ * ribbons on the ground, which must not sink into it. */
+export const fine = groundMaterial(edges, {});
+/** The same, where two surfaces share the picture: left of the line and right of it. */
+export const sides = [-1, 1].map((side) => {
+  const material = groundMaterial(edges, {});
+  material.uniforms.splitSide = { value: side };
+  return material;
+});
+export const coarse = groundMaterial(none, { polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1 });
+export const walls = groundMaterial(none, { side: DoubleSide });
+export const cliffs = groundMaterial(none, {});
+export const apron = groundMaterial(none, {});
+// The relief ends with the area.
+for (const { uniforms } of [cliffs, apron]) {
+  uniforms.reliefMap = { value: flat };
+  uniforms.smoothM = { value: new Vector2(1e8, 2e8) };
+  uniforms.softness = { value: 0 };
+}
+export const decks = groundMaterial(none, { side: DoubleSide });
+export const ribbons = groundMaterial(none, {
+  side: DoubleSide, polygonOffset: true, polygonOffsetFactor: -3, polygonOffsetUnits: -3,
+});
+
+/** Sets what the palette says; gives the sky. */
+export function prepare(area) {
+  shared.noiseMap.value = noiseTexture();
+  shared.rockTint.value.setRGB(...numbers(area.palette.rock));
+  shared.topTint.value.setRGB(...numbers(area.palette.sky[0]));
+  const material = new ShaderMaterial({
+    uniforms: shared, vertexShader: SKY_VERTEX, fragmentShader: SKY_FRAGMENT, glslVersion: GLSL3, side: BackSide,
+    depthWrite: false,
+  });
+  const sky = new Mesh(new BoxGeometry(2, 2, 2), material);
+  sky.frustumCulled = false;
+  // After the ground, so that only what it leaves free is reckoned.
+  sky.renderOrder = 1;
+  return sky;
+}
+
+/** Lets the sun stand at a vector east, north, up. */
+export function setSun(area, sun) {
+  changes += 1;
+  const { sun: strength, sky, haze, glow } = lightOf(sun, numbers(area.palette.haze));
+  shared.sunWay.value.set(sun[0], sun[2], -sun[1]);
+  [["sunTint", strength], ["skyTint", sky], ["hazeTint", haze], ["glowTint", glow]]
+    .forEach(([name, tint]) => shared[name].value.setRGB(...tint));
+}
+
+/** Light from afar: texels of light.js, and how far they are apart. */
+export function setRelief(area, { wide, high, step, data }) {
+  changes += 1;
+  shared.reliefMap.value.dispose();
+  const texture = new DataTexture(data, wide, high, RGBAFormat);
+  [texture.minFilter, texture.magFilter, texture.generateMipmaps] = [LinearMipmapNearestFilter, LinearFilter, true];
+  texture.needsUpdate = true;
+  const [west, south] = area.sides;
+  shared.reliefMap.value = texture;
+  // South is z, and the texture's rows go north.
+  shared.reliefPlace.value.set(1 / (wide * step), -1 / (high * step), (0.5 - west / step) / wide,
+    (0.5 - south / step) / high);
+}
+
+/** A picture over the ground: a texture of so many metres each way, its north-west corner at a place; null for none. */
+export function setOverlay(texture, west, north, metres) {
+  changes += 1;
+  shared.overMap.value = texture ?? clear;
+  shared.overPlace.value.set(west ?? 0, -(north ?? 0), metres ?? 1, texture ? 1 : 0);
+}
+
+/** What the switches say, and how far load modules are seen. */
+export function setLook({ wireframe, facets, texture, going, range }) {
+  changes += 1;
+  edges.value = wireframe ? 1 : 0;
+  // A layer of slopes tells those of the triangles.
+  shared.softness.value = facets || going ? 0 : SOFTNESS;
+  shared.textured.value = texture ? 1 : 0;
+  shared.going.value = going ? 1 : 0;
+  shared.smoothM.value.set(0.35 * range, 0.85 * range);
+}
+
+/** Where two surfaces meet, as a part of a picture's width. */
+export function setSplit(share) {
+  if (shared.split.value.x !== share) changes += 1;
+  shared.split.value.x = share;
+}
+
+/** How many pixels the next picture is wide. */
+export function setWidth(pixels) {
+  shared.split.value.y = pixels;
+}
+
+/** The time for waves, and the shadow under the tank: east, north and metres; 0 for none. */
+export function setFrame(seconds, east, north, metres) {
+  shared.seconds.value = seconds % 1000;
+  shared.blob.value.set(east, -north, Math.max(metres, 1), 0 < metres ? 1 : 0);
+}

@@ -1,0 +1,150 @@
+// The tools: line of sight, viewshed, distance and profile, a place by its coordinates, pictures, tracks, links.
+import { DataTexture, NearestFilter, RGBAFormat } from "three";
+import { askPlace, askProfile, askSight, askViewshed } from "./ask.js";
+import { drawProfile, profileInWords } from "./chart.js";
+import { linkOf } from "./link.js";
+import { Marks } from "./marks.js";
+import { setOverlay } from "./materials.js";
+import { at, tell } from "./panel.js";
+import { hitAt } from "./pick.js";
+import { recorder, savePicture } from "./shot.js";
+
+const FREE = [0.35, 1, 0.45], HIDDEN = [1, 0.25, 0.2], LINE = [1, 0.88, 0.3];
+/** Of places that are seen and that are not: what is laid over the ground, and how much of it. */
+const SEEN = [90, 220, 100, 95], DARK = [28, 10, 40, 135];
+const VIEWSHED = { range: 5000, spacing: 25 };
+/** Heights of a profile at most, and metres between them at least. */
+const STEPS = 400, STEP_M = 1;
+const HINTS = {
+  sight: "click the eye, then the place it looks at", measure: "click where the line begins, then where it ends",
+};
+/** Keys of the tools, by the ids of their buttons. */
+export const TOOL_KEYS = {
+  KeyR: "sight", KeyV: "viewshed", KeyP: "measure", KeyK: "picture", KeyZ: "record", KeyL: "link",
+};
+
+export class Tools {
+  constructor(view) {
+    Object.assign(this, { view, mode: null, first: null, marks: new Marks(view), overlay: null, answer: null });
+    const record = recorder(view);
+    for (const mode of ["sight", "measure"]) at(mode).addEventListener("click", () => this.choose(mode));
+    at("viewshed").addEventListener("click", () => this.tried(() => this.viewshed()));
+    at("picture").addEventListener("click", () => savePicture(view));
+    at("record").addEventListener("click", () => {
+      const count = record();
+      tell(count === null ? "recording; press again to save the track" : `${count} places saved`);
+    });
+    at("link").addEventListener("click", () => this.tried(() => this.link()));
+    at("goto").addEventListener("submit", (event) => {
+      event.preventDefault();
+      this.tried(() => this.go(at("place").value));
+    });
+  }
+
+  /** Chooses what clicks mean; the same again gives it up. */
+  choose(mode) {
+    this.mode = this.mode === mode ? null : mode;
+    this.first = null;
+    for (const id of Object.keys(HINTS)) at(id).setAttribute("aria-pressed", id === this.mode);
+    tell(this.mode ? HINTS[this.mode] : "");
+  }
+
+  /** Forgets everything that was asked. */
+  clear() {
+    if (this.mode) this.choose(this.mode);
+    this.marks.clear();
+    setOverlay(null);
+    this.overlay?.dispose();
+    [this.overlay, this.answer] = [null, null];
+    at("viewshed").setAttribute("aria-pressed", false);
+    tell("");
+  }
+
+  /** Says what went wrong, where something did. */
+  async tried(what) {
+    try {
+      await what();
+    } catch (fault) {
+      tell(fault.message);
+    }
+  }
+
+  /** A click at a place of the window; whether it was one of a tool's. */
+  click(x, y) {
+    if (!this.mode) return false;
+    const hit = hitAt(this.view, x, y);
+    if (!hit) return true;
+    const place = this.view.area.inSystem(hit.point.x, -hit.point.z);
+    if (!this.first) {
+      this.first = place;
+      this.marks.draw([[[...place, hit.point.y], [...place, hit.point.y + 30], LINE]]);
+      return true;
+    }
+    const [from, mode] = [this.first, this.mode];
+    this.first = null;
+    this.tried(() => (mode === "sight" ? this.sight(from, place) : this.measure(from, place)));
+    return true;
+  }
+
+  async sight(from, to) {
+    const [eye, target] = [Number(at("eye").value), Number(at("target").value)];
+    const found = await askSight([...from, eye], [...to, target]), { visible, blocker, clearance_m: clearance } = found;
+    this.marks.draw(visible ? [[found.from, found.to, FREE]]
+      : [[found.from, blocker, FREE], [blocker, found.to, HIDDEN]]);
+    const away = (place) => Math.hypot(place[0] - found.from[0], place[1] - found.from[1]).toFixed(0);
+    this.answer = found;
+    tell(`${visible ? "visible" : `hidden, first ${away(blocker)} m from the eye`}; ${away(found.to)} m apart; `
+      + `clearance ${clearance === null ? "unknown" : `${clearance.toFixed(2)} m`}`);
+  }
+
+  async measure(from, to) {
+    const length = Math.hypot(to[0] - from[0], to[1] - from[1]), spacing = Math.max(length / STEPS, STEP_M);
+    const found = await askProfile(from, to, spacing), { along_m: along, height_m: heights } = found;
+    const place = (i) => {
+      const share = along[i] / (along.at(-1) || 1);
+      return [from[0] + share * (to[0] - from[0]), from[1] + share * (to[1] - from[1]), heights[i] ?? 0];
+    };
+    this.marks.draw(along.slice(1).map((_, i) => [place(i), place(i + 1), LINE]));
+    this.answer = found;
+    tell(profileInWords(found), (canvas) => drawProfile(canvas, found));
+  }
+
+  /** What is seen from where the observer stands, or from above the ground below. */
+  async viewshed() {
+    if (this.overlay) return this.clear();
+    const { area, tank } = this.view, place = area.inSystem(tank.east, tank.north);
+    const eye = tank.flies ? Math.max(tank.altitude - (tank.height ?? tank.altitude), 0) : Number(at("eye").value);
+    tell("looking …");
+    const { range, spacing } = VIEWSHED, target = Number(at("target").value);
+    const found = await askViewshed([...place, eye], target, range, spacing), { side, seen } = found;
+    const data = new Uint8Array(4 * side * side);
+    seen.forEach((what, i) => {
+      const [row, col] = [Math.floor(i / side), i % side], isEdge = row % (side - 1) === 0 || col % (side - 1) === 0;
+      if (what <= 1 && !isEdge) data.set(what === 1 ? SEEN : DARK, 4 * i);
+    });
+    this.overlay = new DataTexture(data, side, side, RGBAFormat);
+    this.overlay.magFilter = NearestFilter;
+    this.overlay.needsUpdate = true;
+    const reach = (side / 2) * spacing;
+    setOverlay(this.overlay, tank.east - reach, tank.north + reach, side * spacing);
+    const count = seen.filter((what) => what === 1).length, all = seen.filter((what) => what <= 1).length;
+    at("viewshed").setAttribute("aria-pressed", true);
+    this.answer = { seen: count, places: all };
+    tell(`seen from ${eye.toFixed(1)} m above the ground: ${((100 * count) / all).toFixed(1)} % within `
+      + `${range / 1000} km, ${((count * spacing * spacing) / 1e6).toFixed(2)} km²`);
+  }
+
+  async go(words) {
+    const place = await askPlace(words), { area, tank } = this.view;
+    tank.goTo(...area.fromSystem(...place));
+    tell(`at ${place.map((metres) => metres.toFixed(1)).join(", ")}`);
+    this.view.renderer.domElement.focus();
+  }
+
+  async link() {
+    const link = new URL(linkOf(this.view), location.href).href;
+    history.replaceState(null, "", link);
+    await navigator.clipboard?.writeText(link).catch(() => null);
+    tell("the address now opens this place and view");
+  }
+}
