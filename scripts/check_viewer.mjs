@@ -6,7 +6,7 @@
 //
 // DIR is a terrain database; without it tests/jobs/small.toml is built, and the first picture is compared with
 // scripts/viewer/reference.json. PROGRAM is built with the feature `viewer`. Counts are taken from the load-module
-// files by this script itself (FORMAT.md). Needs what scripts/build_viewer.sh installs. Exit code 0: all is well.
+// files by this script itself (docs/FORMAT.md). Needs what scripts/build_viewer.sh installs. Exit code 0: all is well.
 import { spawn, spawnSync } from "node:child_process";
 import { existsSync, mkdirSync, mkdtempSync, readFileSync, readdirSync, rmSync, writeFileSync } from "node:fs";
 import { createRequire } from "node:module";
@@ -174,7 +174,7 @@ async function check() {
   await flown(page);
   if (0 < own.decks.length) await bridged(page);
   expect(failed.length === 0, `every answer was whole ${failed.slice(0, 3)}`);
-  expect(asked.every((url) => url.startsWith(address) || url.startsWith("data:")), "nothing was asked of anybody else");
+  expect(asked.every((url) => url.startsWith(address) || url.startsWith("data:")), "nothing else was asked");
   expect(said.length === 0, `no error in the console ${said.slice(0, 3)}`);
 }
 
