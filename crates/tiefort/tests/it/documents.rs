@@ -176,11 +176,13 @@ fn every_job_of_readme_and_book_is_read() {
 }
 
 /// Examples of `--help` that are not run, by what they begin with, and why.
-const HELP_NOT_RUN: [(&str, &str); 5] = [
+const HELP_NOT_RUN: [(&str, &str); 7] = [
     ("tiefort init n35w117.dt2", "needs DTED"),
     ("tiefort init dem/*.hgt", "needs HGT"),
     ("tiefort init dem.tif roads.osm.pbf", "needs OpenStreetMap data"),
     ("tiefort view", "runs until Ctrl-C"),
+    ("tiefort serve", "runs until Ctrl-C"),
+    ("curl", "asks a service"),
     ("tiefort worker", "the tests of builds run workers"),
 ];
 
