@@ -1,9 +1,10 @@
-//! The example of the book (`docs/guides/simulators.md`): follows a tank over a database and looks at a place.
+//! The example of the book (`docs/guides/simulators.md`): `follow DATABASE`.
 
-use load_module_reader::{Area, Keep, Sight};
+use load_module_reader::{Area, Keep, ReadError, Sight};
 
-fn main() -> Result<(), load_module_reader::ReadError> {
-    let area = Area::open("mine.tdb", Keep::OnDisk)?;
+/// Drives a tank over a database such as `mine.tdb`, and tells from where it sees a place.
+pub fn follow(database: &str) -> Result<(), ReadError> {
+    let area = Area::open(database, Keep::OnDisk)?;
     let mut tank = [506_125.0, 3_876_310.5];
 
     // 15 x 15 load modules around the tank: 3.5 km and more in every direction.
@@ -22,4 +23,8 @@ fn main() -> Result<(), load_module_reader::ReadError> {
         }
     }
     Ok(())
+}
+
+fn main() -> Result<(), ReadError> {
+    follow(&std::env::args().nth(1).unwrap_or("mine.tdb".into()))
 }
