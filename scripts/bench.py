@@ -3,7 +3,7 @@
 
     scripts/bench.py                 build the release binary, install the peer, measure
     scripts/bench.py --rounds 9      more rounds, on a busy machine
-    scripts/bench.py --readme        put the table into README.md
+    scripts/bench.py --book          put the table into the book
     scripts/bench.py --callgrind     also count instructions (needs valgrind)
 
 The peer is `pydelatin` (the hmm algorithm), installed from PyPI into `target/bench/venv`; only the call that
@@ -30,7 +30,8 @@ import sys
 import time
 import venv
 
-ROOT = pathlib.Path(__file__).resolve().parent.parent
+from book import FIGURES, ROOT, put
+
 FOLDER = ROOT / "target" / "bench"
 VENV = FOLDER / "venv"
 PACKAGES = ["pydelatin==0.4.0", "numpy", "tifffile", "imagecodecs"]
@@ -285,15 +286,6 @@ def stages(rounds):
         yield f"stages of {name}: {parts} s"
 
 
-def write_readme(text):
-    """Puts the table where README.md shows it: in the block that begins with a date."""
-    path = ROOT / "README.md"
-    block = re.compile(r"```text\n\d{4}-\d\d-\d\d: .*?```", re.DOTALL)
-    after, count = block.subn(lambda _: f"```text\n{text}```", path.read_text())
-    assert count == 1, f"README.md shows {count} tables of this script, expected one"
-    path.write_text(after)
-
-
 def print_instructions(tiefort, dem):
     """Millions of instructions of one worker, counted by callgrind: the same on a busy machine. Meshes are read to
     written, on the whole raster by worst posts, and of 2,000 points on a small one by every effort."""
@@ -341,7 +333,7 @@ def arguments():
     parser.add_argument("--no-build", action="store_true", help="take the binary as it is")
     parser.add_argument("--binary", type=pathlib.Path, default=ROOT / "target" / "release" / "tiefort",
                         help="the binary to measure; with another than the default, --no-build is implied")
-    parser.add_argument("--readme", action="store_true", help="put the table into README.md")
+    parser.add_argument("--book", action="store_true", help="put the table into the book")
     parser.add_argument("--callgrind", action="store_true", help="also count instructions with valgrind")
     return parser.parse_args()
 
@@ -385,8 +377,8 @@ def main():
     ]
     text = "\n".join(lines) + "\n"
     print(text, end="")
-    if options.readme:
-        write_readme(text)
+    if options.book:
+        put(FIGURES, "speed", f"```text\n{text}```")
     if options.callgrind:
         print_instructions(tiefort, dem)
     sys.exit(1 if any(row[-1] == "MISSED" for row in rows) else 0)

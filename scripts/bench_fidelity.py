@@ -6,7 +6,7 @@
     scripts/bench_fidelity.py --large          Lindstrom-Turk on large rasters too: minutes, a gigabyte
     scripts/bench_fidelity.py --only desert    inputs and jobs whose name has this in it
     scripts/bench_fidelity.py --json all.json  every figure, for a program
-    scripts/bench_fidelity.py --quick --readme put the figures of the desert into README.md
+    scripts/bench_fidelity.py --quick --book   put the figures of the desert into README and the book
 
 1. Equal triangles, no load modules, per raster: greedy insertion (`pydelatin`) of so many points gives the number of
    triangles; CGAL's Lindstrom-Turk edge collapse and `tiefort tin --triangles` are asked for the same.
@@ -193,7 +193,8 @@ def arguments():
     parser.add_argument("--tables", default="123", metavar="DIGITS", help="which of the three tables (default 123)")
     parser.add_argument("--reuse-peer", action="store_true", help="keep what Lindstrom-Turk made and took earlier")
     parser.add_argument("--json", type=pathlib.Path, metavar="FILE", help="also write every figure here")
-    parser.add_argument("--readme", action="store_true", help="also put the figures of the desert into README.md")
+    parser.add_argument("--book", action="store_true",
+                        help="also put the figures of the desert into README and the book")
     parser.add_argument("--no-build", action="store_true", help="take the binary as it is")
     parser.add_argument("--binary", type=pathlib.Path, default=TARGET / "release" / "tiefort",
                         help="the binary to measure; with another than the default, --no-build is implied")
@@ -241,7 +242,7 @@ def main():
     print(f"\n{os.cpu_count()} cores; load of the machine before {before}, after {load()}")
     if options.json:
         options.json.write_text(json.dumps(results | {"missed": missed}, indent=1))
-    if options.readme:
+    if options.book:
         headline.write(results)
     sys.exit(1 if missed else 0)
 

@@ -25,6 +25,8 @@ import sys
 import tempfile
 import time
 
+from book import FIGURES, put
+
 JOB = """[area]
 name = "size"
 crs = "EPSG:32611"
@@ -77,10 +79,11 @@ def measure(arguments, folder, posts, source):
     count = tiles[0] * tiles[1]
     disk = sum(path.stat().st_size for path in database.rglob("*") if path.is_file()) / 2**20
     ratios = [plan["seconds"] / cpu, plan["memory_bytes"] / 2**20 / memory, plan["disk_bytes"] / 2**20 / disk]
-    print(f"| {source} | {posts:,} x {rows:,} | {count:,} | {modules[0] * modules[1]:,} "
-          f"| {1000 * cpu / count:.0f} ms ({ratios[0]:.2f}) | {memory:.0f} MB ({ratios[1]:.2f}) "
-          f"| {disk:.0f} MB ({ratios[2]:.2f}) |", flush=True)
-    return all(1 / 1.5 <= ratio <= 1.5 for ratio in ratios)
+    row = (f"| {source} | {posts:,} x {rows:,} | {count:,} | {modules[0] * modules[1]:,} "
+           f"| {1000 * cpu / count:.0f} ms ({ratios[0]:.2f}) | {memory:.0f} MB ({ratios[1]:.2f}) "
+           f"| {disk:.0f} MB ({ratios[2]:.2f}) |")
+    print(row, flush=True)
+    return row, all(1 / 1.5 <= ratio <= 1.5 for ratio in ratios)
 
 
 def main():
@@ -92,14 +95,17 @@ def main():
     parser.add_argument("--tin", default='method = "greedy"')
     parser.add_argument("--sources", default="sample,raster")
     parser.add_argument("--keep", type=pathlib.Path)
+    parser.add_argument("--book", action="store_true", help="also put the table into the book")
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory() as scratch:
         folder = arguments.keep or pathlib.Path(scratch)
         folder.mkdir(parents=True, exist_ok=True)
         print(TABLE)
         cases = itertools.product(arguments.sources.split(","), map(int, arguments.widths.split(",")))
-        is_near = [measure(arguments, folder, posts, source) for source, posts in cases]
-    sys.exit(0 if all(is_near) else 1)
+        measured = [measure(arguments, folder, posts, source) for source, posts in cases]
+    if arguments.book:
+        put(FIGURES, "size", "\n".join([TABLE, *(row for row, _ in measured)]))
+    sys.exit(0 if all(is_near for _, is_near in measured) else 1)
 
 
 if __name__ == "__main__":

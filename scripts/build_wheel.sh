@@ -14,7 +14,7 @@ while [[ $# -gt 0 ]]; do
     esac
     shift
 done
-# Unless one is at hand, maturin lives in an environment of its own.
+# Unless one is installed, maturin lives in an environment of its own.
 maturin=$(command -v maturin || true)
 if [[ -z $maturin ]]; then
     tools=${CARGO_TARGET_DIR:-target}/tools/python

@@ -46,7 +46,7 @@ def expect(holds, what):
 
 
 class Database:
-    """The load modules, by the reader that was written from FORMAT.md alone."""
+    """The load modules, by the reader that was written from docs/FORMAT.md alone."""
 
     def __init__(self, folder):
         self.folder = pathlib.Path(folder)

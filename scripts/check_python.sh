@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Checks the Python package as a stranger gets it: installs a wheel into fresh environments, one with NumPy alone, with
-# no Rust, compiler or GDAL on the path; runs the README's example, the command, the tests and the notebook; then mypy
+# no Rust, compiler or GDAL on the path; runs the book's examples, the command, the tests and the notebook; then mypy
 # and ruff. With --extras also the packages that meshes and databases are given to. Says so and ends where there is no
 # Python to check with.
 #
@@ -31,11 +31,13 @@ start=$SECONDS
 "$scratch/plain/bin/pip" install --quiet --disable-pip-version-check "$wheel"
 printf 'installed in %d s: %s bytes of wheel, %s kB on the disk\n' $((SECONDS - start)) "$(stat -c %s "$wheel")" \
     "$(du -sk "$scratch"/plain/lib/python*/site-packages/tiefort | cut -f1)" >&2
-# The example of the README: the first block in Python below its title.
-awk '/^## Python/ { on = 1 } on && /^```python/ { copy = 1; next } /^```/ && copy { exit } copy' README.md \
-    >"$scratch/example.py"
-[[ -s $scratch/example.py ]]
+# The examples of the book: the first block in Python of a page. The second one reads a database.
+block() { awk '/^```python/ { copy = 1; next } /^```/ && copy { exit } copy' "docs/guides/$1.md"; }
+block python >"$scratch/example.py"
+block simulators >"$scratch/reading.py"
+[[ -s $scratch/example.py && -s $scratch/reading.py ]]
 (cd "$scratch" && alone plain tiefort sample --out dem.tif && alone plain python example.py)
+(cd "$scratch" && cp -r demo.tdb mine.tdb && alone plain python reading.py)
 [[ -s $scratch/mesh.ply ]]
 (cd "$scratch" && alone plain tiefort tin dem.tif --points 500 --out again.ply && alone plain tiefort --version)
 alone plain python -m tiefort --help >/dev/null

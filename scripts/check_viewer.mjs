@@ -6,7 +6,8 @@
 //
 // DIR is a terrain database; without it tests/jobs/small.toml is built, and the first picture is compared with
 // scripts/viewer/reference.json. --idle holds the time of pictures, too. PROGRAM is built with the feature `viewer`.
-// Counts are taken from the load-module files by this script itself (FORMAT.md). Needs what scripts/build_viewer.sh installs. Exit code 0: all is well.
+// Counts are taken from the load-module files by this script itself (docs/FORMAT.md). Needs what
+// scripts/build_viewer.sh installs. Exit code 0: all is well.
 import { spawn, spawnSync } from "node:child_process";
 import { existsSync, mkdirSync, mkdtempSync, readFileSync, readdirSync, rmSync, writeFileSync } from "node:fs";
 import { createRequire } from "node:module";
@@ -192,7 +193,7 @@ async function check() {
   if (0 < own.decks.length) await bridged(page);
   expect(failed.length === 0, `every answer was whole ${failed.slice(0, 3)}`);
   const isOurs = (url) => url.startsWith(address) || url === "about:blank" || url.startsWith("data:");
-  expect(wanted.every(isOurs), "nothing was asked of anybody else");
+  expect(wanted.every(isOurs), "nothing else was asked");
   expect(said.length === 0, `no error in the console ${said.slice(0, 3)}`);
 }
 

@@ -3,7 +3,7 @@
 
     scripts/compare_methods.py                   the extract of the shared data that is as large as the paper's
     scripts/compare_methods.py dem.tif           any raster
-    scripts/compare_methods.py --readme          put the table into README.md
+    scripts/compare_methods.py --book            put the table into the book
     scripts/compare_methods.py --tiefort PATH    with this program [default: target/release/tiefort, built if missing]
 
 Figures are those of `tiefort compare`. The paper's ground was another one (the National Training Center, posts 30 m
@@ -17,9 +17,9 @@ import pathlib
 import subprocess
 import sys
 
-ROOT = pathlib.Path(__file__).resolve().parent.parent
+from book import ROOT, put
+
 EXTRACT = "ntc_standin/tiefort_size_mackay_idaho_460x376_utm12n.tif"
-README_MARK = "Table 1, written by `scripts/compare_methods.py --readme`:\n\n"
 
 # Polis and McKeown (1993), Table 1: RMS, largest residual, equivalent points.
 PAPER = {
@@ -85,7 +85,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("dem", nargs="?")
     parser.add_argument("--tiefort")
-    parser.add_argument("--readme", action="store_true")
+    parser.add_argument("--book", action="store_true")
     arguments = parser.parse_args()
     data = pathlib.Path(os.environ.get("TIEFORT_DATA", ROOT.parent / "shared" / "data"))
     dem = pathlib.Path(arguments.dem) if arguments.dem else data / EXTRACT
@@ -99,11 +99,8 @@ def main():
     size = f"{found['columns_of_posts']} x {found['rows_of_posts']} posts, {found['spacing_m']:g} m apart"
     text = f"{dem.name}, {size}\n\n" + table([cells(row, found["posts"]) for row in rows]) + "\n" + "".join(notes(rows))
     print(text, end="")
-    if arguments.readme:
-        path = ROOT / "README.md"
-        before, rest = path.read_text().split(README_MARK)
-        after = rest[rest.index("\n## "):]
-        path.write_text(before + README_MARK + text + after)
+    if arguments.book:
+        put(ROOT / "docs" / "paper.md", "table 1", text)
     return 0
 
 

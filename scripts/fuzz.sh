@@ -26,7 +26,7 @@ seed() {
     local target=$1 ending
     mkdir -p "corpus/$target" "artifacts/$target"
     if [[ $target == module_file ]]; then
-        python3 -B ../scripts/fuzz_seeds.py ../FORMAT.md "corpus/$target"
+        python3 -B ../scripts/fuzz_seeds.py ../docs/FORMAT.md "corpus/$target"
         return 0
     fi
     [[ -n ${TIEFORT_DATA:-} ]] || return 0

@@ -31,7 +31,7 @@ if ! "$compiler" -std=gnu99 -O1 -g -Wall -Wextra -Werror -fsanitize=address,unde
 fi
 
 mkdir "$scratch/seeds"
-python3 -B scripts/fuzz_seeds.py FORMAT.md "$scratch/seeds"
+python3 -B scripts/fuzz_seeds.py docs/FORMAT.md "$scratch/seeds"
 if [[ -x $build/debug/tiefort ]]; then
     tiefort=$(realpath "$build/debug/tiefort")
     cp tests/jobs/small.toml "$scratch/plain.toml"

@@ -2,7 +2,7 @@
 """Writes load-module files to begin fuzzing from: the worked examples of FORMAT.md, without a deck and with one, at one
 to eight levels.
 
-    python3 scripts/fuzz_seeds.py FORMAT.md fuzz/corpus/module_file
+    python3 scripts/fuzz_seeds.py docs/FORMAT.md fuzz/corpus/module_file
 """
 
 import pathlib

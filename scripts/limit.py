@@ -5,6 +5,7 @@
     scripts/limit.py --triangles 500 2000    other numbers of triangles
     scripts/limit.py --efforts normal        some efforts only
     scripts/limit.py --sight true            other options of `tiefort tin`: whatever is not known here is handed on
+    scripts/limit.py --book                  also put the table into the book
     scripts/limit.py --binary PATH           another program than target/release/tiefort, which has to be built
 
 On smooth ground a continuous surface of N triangles has at least an RMS residual of about
@@ -26,6 +27,7 @@ import pathlib
 import subprocess
 import sys
 
+from book import ROOT, put
 from fidelity.workshop import FOLDER, TARGET, markdown, prepare_venv
 
 POSTS = 1001
@@ -94,6 +96,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--triangles", nargs="+", type=int, default=[2000, 8000])
     parser.add_argument("--efforts", nargs="+", choices=list(BARS), default=list(BARS))
+    parser.add_argument("--book", action="store_true")
     parser.add_argument("--binary", type=pathlib.Path, default=TARGET / "release" / "tiefort")
     options, others = parser.parse_known_args()
     others = others or ["--sight", "false"]
@@ -119,7 +122,12 @@ def main():
             cells.append(" / ".join(found))
         rows.append(cells)
     counts = " / ".join(f"{count:,}" for count in options.triangles)
-    markdown(f"eta at N = {counts}", ["surface", *options.efforts], rows)
+    head = f"eta at N = {counts}"
+    markdown(head, ["surface", *options.efforts], rows)
+    if options.book:
+        worst_row = ["the worst", *(f"**{worst[effort]:.3f}**" for effort in options.efforts)]
+        lines = [[head, *options.efforts], ["-"] + ["-:"] * len(options.efforts), *rows, worst_row]
+        put(ROOT / "docs" / "fidelity.md", "eta", "\n".join(f"| {' | '.join(line)} |" for line in lines))
     missed = [effort for effort, eta in worst.items() if BARS[effort] < eta]
     for effort, eta in worst.items():
         print(f"{'MISSED' if effort in missed else 'met   '} {effort}: worst eta {eta:.3f}, at most {BARS[effort]}")

@@ -28,7 +28,7 @@ SIDES = ["south", "east", "north", "west"]
 
 
 class Damaged(Exception):
-    """The file is not as FORMAT.md says."""
+    """The file is not as docs/FORMAT.md says."""
 
 
 def expect(holds, part, what):

@@ -22,7 +22,7 @@ DATA = pathlib.Path(os.environ.get("TIEFORT_DATA", ROOT / ".." / "shared" / "dat
 
 
 def tell(text):
-    """Says something to whoever waits; tables go to stdout."""
+    """Says something to the user; tables go to stdout."""
     print(text, file=sys.stderr, flush=True)
 
 

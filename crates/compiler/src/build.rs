@@ -160,7 +160,7 @@ fn unchanged(job: &Job, there: &Folder, progress: &mut dyn Progress) -> Result<O
     progress.tell(Event::Enter(Stage::Read, 0));
     let records = ground::records(job)?;
     let (database, _) = Database::create_or_open(there, &database_area(job))?;
-    // Looked at again, now that nobody else can change it.
+    // Looked at again, now that no other process can change it.
     let manifest = there.manifest()?;
     let fresh = fresh(there, &manifest, job, &records)?;
     progress.tell(Event::Leave(Stage::Read));

@@ -56,7 +56,7 @@ impl<'a> Stopwatch<'a> {
         (self.stages.iter().chain(between).cloned().collect(), self.tiles.iter().map(tile).collect())
     }
 
-    /// Gives the time that has passed to the innermost open stage.
+    /// Counts the time that has passed for the innermost open stage.
     fn account(&mut self) {
         let now = [self.clock.wall(), self.clock.cpu()];
         let [wall, cpu] = [0, 1].map(|which| now[which].saturating_sub(self.until[which]).as_secs_f64());

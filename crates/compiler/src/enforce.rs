@@ -1,7 +1,7 @@
 //! Clip mode: where clipped pieces exceed a limit, the least valuable points make room, in bounded rounds.
 //!
 //! A whole-area stage that sees counts and proposals only. Every round picks the cheapest removals that free
-//! something needed, never two that forecast on each other, and assembles again what they reach.
+//! something needed, never two whose forecasts depend on each other, and assembles again what they reach.
 
 use std::collections::BTreeSet;
 

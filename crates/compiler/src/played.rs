@@ -167,7 +167,7 @@ mod tests {
         assert_eq!(played[0].at_once, 1);
         assert!((played[0].busy - 1.0).abs() < 1e-9, "{}", played[0].busy);
         assert_eq!((played[1].at_once, played[2].at_once), (9, 9));
-        // Refining takes four rounds of tiles, whoever is there.
+        // Refining takes four rounds of tiles, with any number of workers.
         let refine_s = 4.0 * (8.0 + SECONDS_PER_UNIT);
         assert!(refine_s <= played[2].seconds && played[2].busy < 0.3, "{:?}", played[2]);
     }

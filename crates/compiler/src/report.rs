@@ -1,4 +1,4 @@
-//! The numbers of a finished build, as the report gives them. Times are added by whoever holds the clock.
+//! The numbers of a finished build, as the report gives them. Times are added by the caller, who holds the clock.
 
 use std::collections::{BTreeMap, BTreeSet};
 

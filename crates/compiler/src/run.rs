@@ -19,7 +19,7 @@ use crate::{Clock, CompileError, Event, Progress, Stage};
 /// Rises whenever the result of any stage may change for the same input; a test with golden hashes holds it.
 pub const ALGORITHM_REVISION: u32 = 7;
 
-/// What a run needs from whoever starts it.
+/// What a run needs from its caller.
 #[derive(Clone, Copy)]
 pub struct Options<'a> {
     /// Tiles at once.

@@ -229,7 +229,7 @@ fn publish_again(refining: &Refining, tin: TileTin) -> Result<Published, Compile
     Ok(Published { cause: Some(Cause::Other), ..published })
 }
 
-/// Runs `tile`, with its sides frozen if its border would change. Gives it, and whether it is frozen.
+/// Runs `tile`, with its sides frozen if its border would change. Returns it, and whether it is frozen.
 fn rerun(
     run: &Run,
     shares: &Shares,

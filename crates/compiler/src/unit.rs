@@ -1,6 +1,6 @@
 //! One unit of a build's work, for processes that share a directory: idempotent, and it reads only what is published.
 //!
-//! A unit that is done leaves a mark with the fingerprint of what it published. Whoever builds on it compares mark and
+//! A unit that is done leaves a mark with the fingerprint of what it published. What builds on it compares mark and
 //! file, and takes the mark back if they differ. `publish` walks through all stages again, keeps what is fresh and
 //! makes what is not, so whatever went wrong before, the result is that of a build.
 
@@ -155,7 +155,7 @@ impl<'a> Session<'a> {
             }
         };
         let curves = is_surveyed(run.job).then(|| Curves::published(run, curve)).transpose()?;
-        let shares = allocate(run, curves.as_ref(), &mut Nobody)?;
+        let shares = allocate(run, curves.as_ref(), &mut Silent)?;
         for (&tile, budget) in run.area.tiles.iter().zip(&shares.tiles) {
             self.work.write_share(tile, &to_share(budget))?;
         }
@@ -250,9 +250,9 @@ pub fn perform(
 }
 
 /// Listens to nothing.
-struct Nobody;
+struct Silent;
 
-impl Progress for Nobody {
+impl Progress for Silent {
     fn tell(&mut self, _event: Event) {}
 }
 

@@ -22,7 +22,7 @@ use crate::{Clock, CompileError, Event, Progress, Stage, Stopwatch};
 pub struct Sharing<'a> {
     /// A name that no other worker has.
     pub name: &'a str,
-    /// A lease that nobody has renewed for so long is free.
+    /// A lease that was not renewed for so long is free.
     pub lease: Duration,
     /// How long to wait when nothing is ready.
     pub pause: Duration,
@@ -73,7 +73,7 @@ pub fn work(
             return Err(CompileError::Stopped { stage: Stage::Refine, done: total - worker.open.len(), total });
         }
         if worker.is_published() {
-            // Whoever published may have been ended before it swept up.
+            // The process that published may have been ended before it swept up.
             worker.session.work.sweep();
             return Ok(WorkerEnd { units: worker.units, published: None });
         }
@@ -145,7 +145,7 @@ impl Worker<'_, '_> {
                 let _ = lease.give_up();
                 Ok(())
             }
-            // Whoever published the build has swept away what this process was writing.
+            // The process that published the build has swept away what this one was writing.
             Err(_) if self.is_published() => Ok(()),
             Err(error) => {
                 // Others may have it at once; if that cannot be said either, the lease expires.

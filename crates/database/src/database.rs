@@ -89,13 +89,13 @@ impl Database {
         let dir = folder.dir();
         folder.store().make_folders(dir).map_err(|source| DatabaseError::from_io("create", dir, 0, source))?;
         let lock = Lock::take(&folder, kind)?;
-        // Looked at again, now that nobody else can change it.
+        // Looked at again, now that no other process can change it.
         let previous = examine(&folder, area)?;
         FOLDERS.iter().try_for_each(|name| make_folder(&folder, &folder.path(name)))?;
         Ok((Self { folder, _lock: lock }, previous))
     }
 
-    /// Removes what killed processes left half-written. Whoever is writing at this moment finds its file gone.
+    /// Removes what killed processes left half-written. A process that is writing now finds its file gone.
     ///
     /// # Errors
     /// When a folder cannot be listed, or a file in it not removed.
@@ -128,7 +128,7 @@ impl Database {
         Ok(self.folder.work(run))
     }
 
-    /// Removes what processes left for one another, once the build is published or nobody shares the directory.
+    /// Removes what processes left for one another, once the build is published or no process shares the directory.
     ///
     /// # Errors
     /// When something cannot be removed.
@@ -240,7 +240,7 @@ impl Database {
         self.remove_if_there(&self.folder.path(name))
     }
 
-    /// Removes everything a build has made, for a fresh start. Whoever reads meanwhile finds no `database.json`.
+    /// Removes everything a build has made, for a fresh start. A reader finds no `database.json` meanwhile.
     ///
     /// # Errors
     /// When something cannot be removed.

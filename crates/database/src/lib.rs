@@ -6,7 +6,7 @@
 //!   database.json        what was asked for, what is there: written last
 //!   survey/r02c03.curve  gain curves; allocation.json
 //!   tiles/r02c03.tin     one tile's TIN
-//!   modules/r02c03.slm   one tile's load modules (FORMAT.md)
+//!   modules/r02c03.slm   one tile's load modules (docs/FORMAT.md)
 //!   measured/r02c03.sums what was measured of them
 //!   work/                leases and marks of processes that share the directory; gone at the end of a build
 //!   report.json …        what a run found; the only files that know times

@@ -51,7 +51,7 @@ pub struct Report {
     /// Levels of detail, the finest first; none where there is only that one.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub levels: Vec<ReportLevel>,
-    /// RMS over all classes, each post counted once, whatever its class: in metres.
+    /// RMS of the residuals of all classes, each weighted by its points as in the founding paper, in metres.
     pub overall_point_weighted_rms_m: f64,
     /// What the source says of its own accuracy, in metres.
     pub dem_accuracy_m: Option<f64>,

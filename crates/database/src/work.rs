@@ -111,7 +111,7 @@ impl Work {
     /// What a tile may spend.
     ///
     /// # Errors
-    /// When nobody has said so yet, or the file is damaged.
+    /// When no process has said so yet, or the file is damaged.
     pub fn read_share(&self, tile: TileId) -> Result<Share, DatabaseError> {
         let path = self.share_path(tile);
         json::decode(&path, &read(&*self.store, &path)?)

@@ -1,4 +1,4 @@
-//! `FORMAT.md` and the reader written from it alone agree with what the encoder writes.
+//! `docs/FORMAT.md` and the reader written from it alone agree with what the encoder writes.
 
 #![allow(clippy::unwrap_used)]
 
@@ -85,7 +85,7 @@ fn bytes_of_page(page: &str, version: usize) -> Vec<u8> {
 
 #[test]
 fn the_worked_example_is_what_the_encoder_writes() {
-    let page = std::fs::read_to_string(workspace().join("FORMAT.md")).unwrap();
+    let page = std::fs::read_to_string(workspace().join("docs/FORMAT.md")).unwrap();
     for (version, example) in [(1, example()), (2, example_with_a_deck())] {
         let written = example.iter().fold(String::new(), |mut text, byte| {
             write!(text, "{byte:02x} ").unwrap();

@@ -6,7 +6,7 @@ use crate::{Cause, Key, Parts, Stamp};
 
 /// One artifact of one kind: what it is made from, how it is read, how it is made.
 pub trait Artifact {
-    /// What whoever asked for it is given.
+    /// What the caller is given.
     type Output;
     /// Why it cannot be made, or not be read.
     type Error: fmt::Display;

@@ -1,6 +1,6 @@
 //! The system's files.
 //!
-//! A rename is all or nothing for whoever reads, and for a process that is killed. For a computer that loses power the
+//! A rename is all or nothing for readers, and for a process that is killed. For a computer that loses power the
 //! bytes must reach the disk first; that costs milliseconds a file, so the many files of a build wait until its end
 //! ([`Store::sync`]), before `database.json` calls them complete. Until then each is guarded by its own checksum.
 
@@ -12,7 +12,7 @@ use std::sync::{PoisonError, RwLock, RwLockWriteGuard};
 use crate::store::{TEMPORARY_PREFIX, TEMPORARY_SUFFIX};
 use crate::{Durability, Entry, Guard, Held, LockKind, Store};
 
-/// Held for reading by whoever writes a file.
+/// Held for reading while a file is written.
 static GATE: RwLock<()> = RwLock::new(());
 
 /// Keeps this process from writing, so that it can end at once and leave nothing half-written.
@@ -185,7 +185,7 @@ pub fn check_writable(_: &Path) -> Result<()> {
     Ok(())
 }
 
-/// What the system said about a temporary file, without its name, which means nothing to anybody.
+/// What the system said about a temporary file, without its name, which means nothing to a user.
 fn without_path(error: Error) -> Error {
     match error.kind() {
         ErrorKind::NotFound
@@ -266,7 +266,7 @@ mod tests {
     }
 
     #[test]
-    fn nobody_writes_while_writing_is_held_back() {
+    fn no_file_is_written_while_writing_is_held_back() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.tin");
         // Other tests of this process may be writing.

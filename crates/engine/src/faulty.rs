@@ -101,7 +101,7 @@ impl World {
         self.state().count
     }
 
-    /// A number below `end` that the seed gives, for whoever sets a run up.
+    /// A number below `end` that the seed gives, for setting a run up.
     pub fn choose(&self, end: usize) -> usize {
         self.state().random.usize(..end)
     }
@@ -112,7 +112,7 @@ impl World {
 }
 
 impl State {
-    /// Gives the turn to one of the workers that do not wait.
+    /// Passes the turn to one of the workers that do not wait.
     fn pass_on(&mut self) {
         let earliest = self.workers.iter().filter(|worker| !worker.has_left).map(|worker| worker.until).min();
         let Some(earliest) = earliest else { return };
@@ -160,7 +160,7 @@ impl Faulty {
         state
     }
 
-    /// Gives the turn to another, unless it was given to this one before it came to ask for it.
+    /// Passes the turn to another, unless it was given to this one before it came to ask for it.
     fn pass_on(&self, state: &mut State) {
         if state.turn == self.worker && state.workers[self.worker].is_at_work {
             state.workers[self.worker].is_at_work = false;

@@ -1,8 +1,8 @@
 //! Who works on what, among processes that share a directory: leases that expire.
 //!
 //! ```text
-//!   refine-r02c03.0   made by whoever comes first: only one can; its holder writes a count into it now and then
-//!   refine-r02c03.1   made by whoever has seen .0 unchanged for the length of a lease: again only one can
+//!   refine-r02c03.0   made by the first process: only one can; its holder writes a count into it now and then
+//!   refine-r02c03.1   made by one that has seen .0 unchanged for the length of a lease: again only one can
 //! ```
 //! The lease of the highest number counts. No clock is compared with another one: a lease is old when *this* process
 //! has looked at the same bytes for long enough by its own clock, which the caller reads. A process that was only slow
@@ -42,7 +42,7 @@ struct Seen {
 pub enum Claim {
     /// It is ours; and whether it was taken from a holder that has gone silent.
     Ours(Lease, bool),
-    /// Somebody holds it.
+    /// A process holds it.
     Held,
 }
 
@@ -74,7 +74,7 @@ impl Leases {
                     let lease = Lease { store: Arc::clone(&self.store), path, holder: self.holder.clone() };
                     return Ok(Claim::Ours(lease, 0 < number));
                 }
-                // The folder is gone: somebody has published the build.
+                // The folder is gone: the build is published.
                 Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Claim::Held),
                 Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
                 Err(error) => return Err(StoreError::new("write", &path, content.len(), error)),
@@ -105,7 +105,7 @@ impl Lease {
     /// Says that the holder is alive. `count` differs from call to call.
     ///
     /// # Errors
-    /// When the file cannot be written, or is gone because somebody has published the build.
+    /// When the file cannot be written, or is gone because the build is published.
     pub fn renew(&self, count: u64) -> Result<(), StoreError> {
         self.write(format!("{} {count}\n", self.holder).as_bytes())
     }
@@ -149,7 +149,7 @@ mod tests {
     fn ours(claim: Claim) -> Lease {
         match claim {
             Claim::Ours(lease, _) => lease,
-            Claim::Held => panic!("somebody else holds it"),
+            Claim::Held => panic!("another process holds it"),
         }
     }
 

@@ -42,7 +42,7 @@ impl Marks {
 
     /// Takes a mark back: what was published turned out to be damaged.
     pub fn unmark(&self, unit: &str) {
-        // If it cannot be removed, whoever trusts it finds the damage again.
+        // If it cannot be removed, the next reader finds the damage again.
         let _ = self.store.remove(&self.path(unit));
     }
 

@@ -1,4 +1,4 @@
-//! Where files lie. Whoever writes a database says where by a [`Store`], and never asks the system itself.
+//! Where files lie. What writes a database says where by a [`Store`], and never asks the system itself.
 
 use std::fmt;
 use std::io;
@@ -34,7 +34,7 @@ pub enum Entry {
 /// Who may hold a lock beside the holder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LockKind {
-    /// Nobody.
+    /// No process.
     Alone,
     /// Others who share it, too.
     Shared,
@@ -43,7 +43,7 @@ pub enum LockKind {
 /// Who holds a lock.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Held {
-    /// Nobody.
+    /// No process.
     Free,
     /// Processes that share it.
     Shared,
@@ -54,7 +54,7 @@ pub enum Held {
 /// A lock that is held as long as this value lives; it dies with its process, however that ends.
 pub trait Guard: fmt::Debug + Send + Sync {}
 
-/// Where files lie. Nothing is ever half-written to whoever reads: [`Store::replace`] is all or nothing.
+/// Where files lie. Nothing is ever half-written to a reader: [`Store::replace`] is all or nothing.
 pub trait Store: fmt::Debug + Send + Sync {
     /// All bytes of a file.
     ///
@@ -100,7 +100,7 @@ pub trait Store: fmt::Debug + Send + Sync {
     /// `AlreadyExists` to all but the first; others as [`Store::read`].
     fn create_new(&self, path: &Path, bytes: &[u8]) -> io::Result<()>;
 
-    /// Writes over a file that is there; whoever reads meanwhile may see a part.
+    /// Writes over a file that is there; a reader may see a part meanwhile.
     ///
     /// # Errors
     /// As [`Store::read`].

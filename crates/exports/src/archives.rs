@@ -16,7 +16,7 @@ use crate::{Datum, ExportError, Product, Put, Work, write_3dtiles, write_quantiz
 /// The last file of a 3TZ: where every other begins, by the MD5 sum of its name (3D Tiles Archive Format 1.3).
 const INDEX: &str = "@3dtilesIndex1@";
 
-/// Writes 3D Tiles as one archive of stored files with an index. Gives what was done to heights.
+/// Writes 3D Tiles as one archive of stored files with an index. Returns what was done to heights.
 ///
 /// # Errors
 /// Those of [`write_3dtiles`].
@@ -73,7 +73,7 @@ fn archive(files: &Files) -> zip::result::ZipResult<Vec<u8>> {
     Ok(writer.finish()?.into_inner())
 }
 
-/// Writes quantized-mesh terrain as one SQLite file at `path`, rows from the south as MBTiles 1.3 has them. Gives what
+/// Writes quantized-mesh terrain as one SQLite file at `path`, rows from the south as in MBTiles 1.3. Returns what
 /// was done to heights.
 ///
 /// # Errors

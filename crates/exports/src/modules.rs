@@ -1,4 +1,4 @@
-//! One load-module file (`FORMAT.md`) per load module, for simulators that page single files.
+//! One load-module file (`docs/FORMAT.md`) per load module, for simulators that page single files.
 
 use database::{TileModules, encode_levels};
 use terrain::{LoadModule, ModuleId, ModuleRect};

@@ -24,7 +24,7 @@ use crate::openflight::{square_name, square_side};
 use crate::{Datum, ExportError, Product, Put, Work};
 
 /// Writes `tileset.json`, `squares/*.glb`, `groups/*.glb` and, for coarser levels, `levels/K/*.glb`. `assumed` is what
-/// to take heights to be above; else the database says it. Gives what was done to heights.
+/// to take heights to be above; else the database says it. Returns what was done to heights.
 ///
 /// # Errors
 /// When a file cannot be written, heights cannot be brought above the ellipsoid, or the work was asked to stop.
@@ -98,7 +98,7 @@ fn size_m(product: &Product) -> f64 {
     (high[0] - low[0]).max(high[1] - low[1])
 }
 
-/// Gives a tile its children: the list, where there is one, is not empty.
+/// Adds its children to a tile: the list, where there is one, is not empty.
 fn put_children(tile: &mut Value, children: Vec<Value>) {
     if !children.is_empty() {
         tile["children"] = Value::Array(children);

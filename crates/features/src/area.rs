@@ -44,7 +44,7 @@ pub struct Levelled {
 }
 
 impl AreaFeatures {
-    /// Gives all that they are made of, word by word: equal words, equal features.
+    /// Returns all that they are made of, word by word: equal words, equal features.
     pub fn feed(&self, word: &mut dyn FnMut(i64)) {
         let place = |Place { row, col }: Place, word: &mut dyn FnMut(i64)| {
             word(row.into());

@@ -82,7 +82,7 @@ fn losers(network: &Network, pieces: &[Piece], wide: &[Wide], found: &[Face]) ->
             return;
         }
         let (winner, loser) = if p.rank < q.rank { (p, q) } else { (q, p) };
-        // A line of lower class is cut where it lies in a strip; that costs nobody room.
+        // A line of lower class is cut where it lies in a strip; that costs no other feature room.
         if let (Some(face), true) = (loser.face, winner.face.is_some() || winner.rank.0 < loser.rank.0) {
             losers.extend(wide_of(&found[face as usize], wide));
         }

@@ -95,7 +95,7 @@ pub struct Traits {
 }
 
 impl Traits {
-    /// Gives all that they are, word by word.
+    /// Returns all that they are, word by word.
     pub(crate) fn feed(&self, word: &mut dyn FnMut(i64)) {
         let Traits { class, kind, storey, width, grade_ppm, form, level, pins } = *self;
         let (storey, layer) = match storey {

@@ -22,7 +22,7 @@ pub(crate) fn toes(graded: &Graded, pieces: &[Piece], wide: &[Wide], faces: &[Fa
     }
     let sides = sides(network);
     let mut toes: Vec<Strand> = Vec::new();
-    // Left and right of the piece at hand, and where both end.
+    // Left and right of the present piece, and where both end.
     let mut open: Option<(u32, u32, usize)> = None;
     for face in faces.iter().filter(|face| face.corners.len() == 4 && !face.is_deck) {
         let Some(of) = face.wide.map(|number| wide[number as usize]) else { continue };

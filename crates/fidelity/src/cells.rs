@@ -7,7 +7,7 @@
 //!   |    |/____\   |
 //!   +----+----+----+
 //! ```
-//! Cells list too many rather than too few: whoever asks tests what it finds.
+//! Cells list too many rather than too few: the caller tests what it finds.
 
 use std::cell::Cell;
 use std::ops::RangeInclusive;

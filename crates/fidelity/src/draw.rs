@@ -51,7 +51,7 @@ mod tests {
         let first = |seed, index| Draw::new(seed, index).unit();
         assert_eq!(first(3, 7), first(3, 7));
         assert!(first(3, 7) != first(3, 8) && first(3, 7) != first(4, 7) && first(3, 7) != first(7, 3));
-        // Whoever changes this changes every published figure.
+        // A change of this changes every published figure.
         assert_eq!(Draw::new(1, 0).unit().to_bits(), UNIT_OF_FIRST_PAIR);
     }
 

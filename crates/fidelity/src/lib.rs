@@ -7,6 +7,21 @@
 //! And what matters to a tank, of the load modules of an area or of a plain TIN: what is seen, how steep it is, where
 //! there is cover, where water runs, how far the surfaces lie apart, and what the mesh is like. [`DemGround::measure`]
 //! takes all of these at once; [`regular_grid`] is what a TIN is held against.
+//!
+//! ```
+//! use fidelity::{DemGround, Triangles, regular_grid};
+//! use terrain::{Dem, Metres, PostRect};
+//!
+//! // Heights are whole numbers of 1/128 m.
+//! let rect = PostRect::of_size(201, 201);
+//! let dem = Dem::from_fn(rect, |post| Some((post.row - 100) * (post.row - 100) + post.row * post.col));
+//! let grid = regular_grid(&dem, rect, 3200);
+//!
+//! let ground = DemGround::new(&dem, rect, Metres(25.0));
+//! let measures = ground.measure(&Triangles::of_tin(&grid.tin), 1000, 1, None);
+//! println!("{:.2} m; {:?}", measures.residual.rms_m, measures.line_of_sight);
+//! assert!(measures.residual.rms_m < 1.0);
+//! ```
 
 mod tally;
 pub use tally::{Histogram, Residuals, Sums, Tally};

@@ -32,7 +32,7 @@ impl<'a> Surface<'a> {
         Self { heights, stride, relief: i64::from(highest) - i64::from(lowest), candidates: extent, extent }
     }
 
-    /// The same ground with candidates confined to `rect`: sides outside it belong to somebody else.
+    /// The same ground with candidates confined to `rect`: sides outside it belong to other tiles.
     pub fn with_candidates(self, rect: LocalRect) -> Self {
         Self { candidates: rect, ..self }
     }

@@ -16,12 +16,12 @@ pub fn datum_of(file: &SourceFile, opened: &DemFile) -> Option<String> {
 
 /// How each source's heights become those of the datum that is wanted, and what a person should know.
 pub struct Datums {
-    /// In the order of the sources; `None` where they are as wanted, or nobody knows.
+    /// In the order of the sources; `None` where they are as wanted, or unknown.
     pub shifts: Vec<Option<DatumShift>>,
     pub warnings: Vec<String>,
 }
 
-/// Finds a way to one datum for all sources; tells of those that are above nobody knows what.
+/// Finds a way to one datum for all sources; tells of those whose datum is unknown.
 ///
 /// # Errors
 /// When a source is above another datum than is wanted and the job names no grid for the way, or a grid cannot be used.

@@ -117,7 +117,7 @@ pub fn decode(file: &DemFile, window: PostRect, workers: &Workers, stop: &Atomic
     Ok(file.assemble(window, decoded.into_iter().flatten().collect())?)
 }
 
-/// What a person should know about a raster: heights that look like a sentinel nobody declared, and more.
+/// What a person should know about a raster: heights that look like a sentinel that is not declared, and more.
 pub fn warnings_of(frame: &RasterFrame, range_m: Option<(f64, f64)>, notes: &[String]) -> Vec<String> {
     const LOWEST_LAND_M: f64 = -450.0;
     const HIGHEST_LAND_M: f64 = 8900.0;

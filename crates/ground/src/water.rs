@@ -79,7 +79,7 @@ impl Water {
         soundings
     }
 
-    /// Gives every body its level; how many have no height at all and so stay as they are.
+    /// Sets the level of every body; returns how many have no height at all and so stay as they are.
     pub fn level(&mut self, soundings: &Soundings) -> usize {
         for (index, body) in self.bodies.iter_mut().enumerate().filter(|(_, body)| body.level.is_none()) {
             body.level = soundings.get(&index).and_then(median);

@@ -1,4 +1,4 @@
-//! What a job may leave open about its area, and what whoever knows coordinate systems and rasters makes of it.
+//! What a job may leave open about its area, and what a caller that knows coordinate systems and rasters makes of it.
 //!
 //! This crate looks at neither, so it asks: [`crate::Job::load_with`] takes the answer as a function.
 

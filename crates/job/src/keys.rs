@@ -119,7 +119,7 @@ fn abbreviates(short: &str, word: &str) -> bool {
     3 <= short.len() && short.chars().next() == word.chars().next() && short.chars().all(|c| letters.any(|l| l == c))
 }
 
-/// What somebody who wrote the key `found` in `place` probably meant.
+/// The key that was probably meant where `found` stands in `place`.
 pub(crate) fn hint_for_key(place: &str, found: &str) -> String {
     if let Some(name) = section_of(place, found) {
         return format!("did you mean {found} in [{name}]?");
@@ -130,7 +130,7 @@ pub(crate) fn hint_for_key(place: &str, found: &str) -> String {
     }
 }
 
-/// What somebody who wrote `found` outside all sections, or as a section, probably meant.
+/// The section that was probably meant where `found` stands outside all sections, or as one.
 pub(crate) fn hint_for_section(found: &str) -> String {
     match (found, section_of("", found)) {
         ("sample", _) => "the sample terrain is chosen by source = \"sample\" and seed in [dem]".to_owned(),

@@ -79,7 +79,7 @@ pub struct DemSpec {
     pub geoids: Vec<GeoidSpec>,
     /// Water that is to lie level.
     pub water: Option<WaterSpec>,
-    /// Whether damage that could be warned about is an error. Asked for by whoever runs the job, not in its text.
+    /// Whether damage that could be warned about is an error. Asked for on the command line, not in the job's text.
     pub strict: bool,
 }
 

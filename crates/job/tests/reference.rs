@@ -22,7 +22,7 @@ A key that is not listed here is an error.
 Costs were measured on the desert of `configs/desert.toml` (1021 x 1021 posts, 83,000 triangles), those given as a \
 range on several areas; a residual is compared with that of the word that holds where the key is left out.
 Residuals of the efforts and of the paper's method are those of the second table that `scripts/bench_fidelity.py \
---quick --readme` writes, which the [README](../../README.md) shows.
+--quick --book` writes, which [Figures](../figures/README.md#how-near-to-the-ground-at-equal-triangles) shows.
 Seconds of an effort are what `tiefort plan` forecasts by, on one core; reading, surveying and writing come on top \
 of them.
 ";
@@ -90,17 +90,18 @@ fn the_reference_of_job_files_is_current() {
     assert!(found == text, "UPDATE_GOLDEN=1 cargo test -p job --test reference writes {} again", page.display());
 }
 
-/// RMS residuals of the rows of the README's table of the whole desert, by the words that a row begins with.
-fn rms_of_readme(row: &str) -> f64 {
-    let readme = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../../README.md")).unwrap();
-    let table = &readme[readme.find("| the whole desert").unwrap()..];
+/// RMS residuals of the rows of the book's table of the whole desert, by the words that a row begins with.
+fn rms_of_figures(row: &str) -> f64 {
+    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/figures/README.md");
+    let figures = std::fs::read_to_string(page).unwrap();
+    let table = &figures[figures.find("| the whole desert").unwrap()..];
     let line = table.lines().find(|line| line.starts_with(&format!("| {row}"))).unwrap();
     line.split('|').nth(2).unwrap().trim().parse().unwrap()
 }
 
 #[test]
-fn the_readme_measures_what_efforts_and_methods_are_said_to_gain() {
-    let rms = ["the paper's method", "`fast`", "`normal`", "`best`"].map(rms_of_readme);
+fn the_figures_measure_what_efforts_and_methods_are_said_to_gain() {
+    let rms = ["the paper's method", "`fast`", "`normal`", "`best`"].map(rms_of_figures);
     for (effort, pair) in [Effort::Fast, Effort::Normal, Effort::Best].iter().zip(rms.windows(2)) {
         let less = format!("{:.0} % less RMS residual", 100.0 * (1.0 - pair[1] / pair[0]));
         assert!(effort.word().meaning.contains(&less), "{}: {less}", effort.name());

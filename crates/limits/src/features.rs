@@ -40,7 +40,7 @@ pub fn feature_cost(features: &Features, grid: ModuleGrid, border: &[Post]) -> F
 
 impl Allowance {
     /// Takes out what features cost in the load modules `own` of the tile; each load module is paid for by the tile it
-    /// lies in. Gives what does not suffice: there, nothing is left.
+    /// lies in. Returns what does not suffice: there, nothing is left.
     pub fn take_features(&mut self, own: ModuleRect, cost: &FeatureCost) -> Vec<Shortfall> {
         let mut short = Vec::new();
         let mut take = |room: &mut u32, of: ShortOf, needed: u32| {

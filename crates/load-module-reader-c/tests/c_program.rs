@@ -6,7 +6,7 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// The worked example of `FORMAT.md` without a deck, byte by byte.
+/// The worked example of `docs/FORMAT.md` without a deck, byte by byte.
 fn worked_example() -> Vec<u8> {
     example_of_version(1)
 }
@@ -17,7 +17,7 @@ fn with_a_deck() -> Vec<u8> {
 }
 
 fn example_of_version(version: usize) -> Vec<u8> {
-    let text = include_str!("../../../FORMAT.md");
+    let text = include_str!("../../../docs/FORMAT.md");
     let hex = text.split("```hex").nth(version).unwrap().split("```").next().unwrap();
     let lines = hex.lines().filter_map(|line| line.split('|').next());
     // The first number of a line is its offset.
@@ -113,6 +113,22 @@ fn a_program_in_c_gets_right_answers() {
         let said = String::from_utf8_lossy(&ran.stdout);
         assert!(ran.status.success() && said == "0 faults\n", "{said}{}", String::from_utf8_lossy(&ran.stderr));
     }
+}
+
+#[test]
+fn the_example_of_the_book_compiles_and_runs() {
+    let page = include_str!("../../../docs/guides/simulators.md");
+    let block = page.split("```c\n").nth(1).and_then(|rest| rest.split("```").next()).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let (source, program) = (folder.path().join("follow.c"), folder.path().join("follow"));
+    std::fs::write(&source, block).unwrap();
+    compile(source.to_str().unwrap(), &["-std=c99", "-pedantic"], &program).unwrap();
+    let run = || Command::new(&program).current_dir(&folder).output().unwrap();
+    // Without a database it says so.
+    assert_eq!(run().status.code(), Some(2));
+    std::fs::create_dir_all(folder.path().join("mine.tdb/modules")).unwrap();
+    std::fs::write(folder.path().join("mine.tdb/modules/r00c00.slm"), worked_example()).unwrap();
+    assert!(run().status.success());
 }
 
 #[test]

@@ -107,7 +107,7 @@ pub enum ReadError {
         section: Section,
         /// Where it stands.
         offset: u64,
-        /// The field's name in `FORMAT.md`.
+        /// The field's name in `docs/FORMAT.md`.
         field: &'static str,
         /// The value found.
         found: i64,
@@ -120,7 +120,7 @@ pub enum ReadError {
         section: Section,
         /// Where it stands.
         offset: u64,
-        /// The field's name in `FORMAT.md`.
+        /// The field's name in `docs/FORMAT.md`.
         field: &'static str,
         /// The value found.
         found: i64,
@@ -135,7 +135,7 @@ pub enum ReadError {
         section: Section,
         /// Where it stands.
         offset: u64,
-        /// The field's name in `FORMAT.md`.
+        /// The field's name in `docs/FORMAT.md`.
         field: &'static str,
         /// What it should have been.
         expected: &'static str,

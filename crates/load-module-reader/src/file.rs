@@ -19,7 +19,7 @@ impl SlmFile {
     /// Reads and checks the file at `path`.
     ///
     /// # Errors
-    /// When the file cannot be read or anything in it is not as `FORMAT.md` says; the error carries the path.
+    /// When the file cannot be read or anything in it is not as `docs/FORMAT.md` says; the error carries the path.
     pub fn open(path: impl AsRef<Path>) -> Result<Self, ReadError> {
         let path = path.as_ref();
         let unreadable = |source| ReadError::Unreadable { path: path.to_path_buf(), source };
@@ -38,7 +38,7 @@ impl SlmFile {
     /// Decodes and checks a file held in memory.
     ///
     /// # Errors
-    /// When anything in it is not as `FORMAT.md` says.
+    /// When anything in it is not as `docs/FORMAT.md` says.
     pub fn parse(bytes: &[u8]) -> Result<Self, ReadError> {
         let found = bytes.len() as u64;
         if FILE_BYTES_MAX < found {

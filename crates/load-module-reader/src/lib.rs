@@ -1,7 +1,7 @@
 //! Reads our load-module files (`modules/r02c03.slm`) and answers what a simulator asks of the ground.
 //!
 //! Written for simulators: it depends on nothing else of this project, owns all it returns and never panics,
-//! whatever the bytes. The layout is described field by field in `FORMAT.md`. Every section of a file carries
+//! whatever the bytes. The layout is described field by field in `docs/FORMAT.md`. Every section of a file carries
 //! a checksum, every length and offset has exactly one right value, and what the sections hold is checked too:
 //! what is returned is sound, and anything else is a [`ReadError`].
 //!
@@ -15,12 +15,16 @@
 //! Where load modules have several levels of detail, all of this is about the finest, and [`Area::load_level`] brings
 //! in another.
 //!
-//! ```no_run
+//! ```
 //! use load_module_reader::{Area, Keep, Sight};
 //!
 //! # fn main() -> Result<(), load_module_reader::ReadError> {
-//! let area = Area::open("ntc.tdb", Keep::OnDisk)?;
-//! let mut tank = [530_125.0, 3_899_310.5];
+//! # let database = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/worked");
+//! # /*
+//! let database = "ntc.tdb";
+//! # */
+//! let area = Area::open(database, Keep::OnDisk)?;
+//! let mut tank = [505_125.0, 3_875_310.5];
 //!
 //! // 15 x 15 load modules around the tank: a view of 3.5 km and more in every direction.
 //! let mut ground = area.load(area.block_around(tank, 7))?;

@@ -3,7 +3,7 @@
 //! A grid of square cells lies over the load module, about as many as triangles. Each names the triangles that touch
 //! it, those that cover most of it first, so that a query seldom looks at more than two. Grid and corners of triangles
 //! lie in one run of memory, of about two kilobytes for a hundred polygons: queries at random places wait for memory
-//! most of the time, and the smaller what they read is, the more of it the processor keeps at hand. A place is first
+//! most of the time, and the smaller what they read is, the more of it stays in the processor's cache. A place is first
 //! rounded to 1/4096 of a quantum (2 micrometres), after which left or right of an edge is a question about whole
 //! numbers: some triangle always holds the place, on edges and corners too.
 

@@ -1,4 +1,4 @@
-//! A small file for the tests, put together byte by byte from `FORMAT.md` alone.
+//! A small file for the tests, put together byte by byte from `docs/FORMAT.md` alone.
 
 use crate::{FIXED_DECKS_BYTES, FIXED_HEADER_BYTES, FIXED_MODULE_BYTES, MAGIC};
 

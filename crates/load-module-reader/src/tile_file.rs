@@ -43,7 +43,7 @@ impl TileFile {
     /// Opens the file at `path`.
     ///
     /// # Errors
-    /// When it cannot be read, or header or index are not as `FORMAT.md` says; the error carries the path.
+    /// When it cannot be read, or header or index are not as `docs/FORMAT.md` says; the error carries the path.
     pub fn open(path: impl AsRef<Path>, keep: Keep) -> Result<Self, ReadError> {
         let path = path.as_ref();
         let unreadable = |source| ReadError::Unreadable { path: path.to_path_buf(), source };
@@ -62,10 +62,10 @@ impl TileFile {
         Ok(Self { path: path.to_path_buf(), header, index, source: Source::File(Mutex::new(file)) })
     }
 
-    /// A file whose bytes are at hand already; `name` is for messages.
+    /// A file whose bytes are in memory already; `name` is for messages.
     ///
     /// # Errors
-    /// When header or index are not as `FORMAT.md` says, or the file is too large.
+    /// When header or index are not as `docs/FORMAT.md` says, or the file is too large.
     pub fn of_bytes(name: impl AsRef<Path>, bytes: Bytes) -> Result<Self, ReadError> {
         let path = name.as_ref();
         let whole = (*bytes).as_ref();

@@ -6,6 +6,36 @@
 //! the moments of the posts under any triangle come from prefix sums along rows, and (iii) the mesh is grown beyond
 //! the budget first and thinned by what each vertex is truly worth. What decides in the end is topology: flips are
 //! judged by what comes of them once their vertices have moved.
+//!
+//! ```
+//! use optimiser::{Budget, Task, optimise};
+//! use terrain::{Dem, Effort, Features, HeightFit, Importance, Lattice, Post, PostRect, SeamSides, Tin, Vertex};
+//!
+//! // Heights are whole numbers of 1/128 m.
+//! let rect = PostRect::of_size(65, 65);
+//! let dem = Dem::from_fn(rect, |post| Some((post.row - 32) * (post.row - 32) + 2 * post.col * post.col));
+//! // A mesh over every fourth post to begin with.
+//! let posts: Vec<Post> = (0..17 * 17).map(|place| Post::new(place / 17 * 4, place % 17 * 4)).collect();
+//! let vertices = posts.iter().map(|&post| Vertex { at: post.into(), height: dem.height(post) }).collect();
+//! let start = Tin::new(rect, vertices, mesh::delaunay(&posts));
+//!
+//! let task = Task {
+//!     held: Vec::new(),
+//!     forbidden: Vec::new(),
+//!     features: Features::default(),
+//!     open: SeamSides::OPEN,
+//!     line_step: None,
+//!     budget: Budget::Triangles(200),
+//!     in_squares: None,
+//!     effort: Effort::Normal,
+//!     height_fit: HeightFit::Squares,
+//!     lattice: Lattice::Eighth,
+//!     rms_quanta: None,
+//!     largest_quanta: None,
+//! };
+//! let made = optimise(&dem, &Importance::uniform(rect, 1000), &start, &task);
+//! assert!(made.tin.triangles.len() <= 200);
+//! ```
 
 mod task;
 pub use task::{Budget, Task};

@@ -193,7 +193,7 @@ impl Moments {
         }
         for (col, z) in heights.enumerate() {
             let (w, x) = (weight(col), col as f64);
-            // Heights of posts without weight are not even read: a void's is nobody's business.
+            // Heights of posts without weight are not even read: a void's means nothing.
             let z = if w == 0.0 { 0.0 } else { z };
             sums = [sums[0] + w * z, sums[1] + w, sums[2] + w * x * z, sums[3] + w * z * z];
             self.heights.push(sums);

@@ -91,7 +91,7 @@ fn stands_off(area: i64, a: Place, b: Place) -> bool {
 pub(crate) enum Shape {
     /// Of a doubled area of a quarter of a square post and a quarter of a post high, at least. That no triangle turns
     /// over keeps the mesh an embedding; that none is a needle keeps its slopes sane. Without the second rule one in
-    /// 400 on the desert stood steeper than 75 degrees, a dark crack in the ground to whoever drives there; it costs
+    /// 400 on the desert stood steeper than 75 degrees, a dark crack in the ground to a driver; it costs
     /// a thousandth of the RMS residual.
     Sound,
     /// Large enough, whatever its slopes: where a residual has to be met.

@@ -1,4 +1,4 @@
-//! A finished database read back, for whoever wants to look at it: load modules, the ground they were made from, and
+//! A finished database read back, to be looked at: load modules, the ground they were made from, and
 //! how far one lies from the other at every post.
 
 use std::path::Path;

@@ -13,7 +13,7 @@ pub(crate) enum Attempt<R, E> {
 
 /// Runs a task and catches its panic.
 ///
-/// What the task left half-changed behind its shared references is nobody's to read: after a panic no task starts and
+/// What the task left half-changed behind its shared references must not be read: after a panic no task starts and
 /// no result is returned. So it is safe to assert unwind safety here.
 pub(crate) fn attempt<R, E>(task: impl FnOnce() -> Result<R, E>) -> Attempt<R, E> {
     match catch_unwind(AssertUnwindSafe(task)) {
@@ -49,7 +49,7 @@ impl<R, E> Outcome<R, E> {
     }
 
     /// Takes in how `task` ended; a failure counts if none before it in `place` is known.
-    /// Gives the result, if there is one.
+    /// Returns the result, if there is one.
     pub(crate) fn accept(&mut self, task: usize, place: usize, attempt: Attempt<R, E>) -> Option<&R> {
         let error = match attempt {
             Attempt::Done(result) => return Some(self.results[task].insert(result)),

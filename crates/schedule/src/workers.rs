@@ -14,7 +14,7 @@ impl Workers {
     /// `count` workers.
     ///
     /// # Panics
-    /// When `count` is zero: nobody would do the work.
+    /// When `count` is zero: no thread would do the work.
     pub fn new(count: usize) -> Self {
         assert!(0 < count, "work needs at least one worker");
         Self { count, pool: OnceLock::new() }

@@ -31,7 +31,7 @@ struct Kept {
     decoded: u64,
 }
 
-/// A chunk, or the place where somebody is decoding it: others who need it wait there.
+/// A chunk, or the place where a thread is decoding it: others who need it wait there.
 #[derive(Default)]
 struct Entry {
     slot: Arc<Mutex<Option<Arc<Chunk>>>>,
@@ -75,7 +75,7 @@ impl ChunkCache {
     fn book(&self, key: Key, slot: &Arc<Mutex<Option<Arc<Chunk>>>>, bytes: u64) {
         let mut kept = locked(&self.kept);
         kept.decoded += 1;
-        // Somebody may have let go of it while it was decoded.
+        // Its users may have let go of it while it was decoded.
         if let Some(entry) = kept.chunks.peek_mut(&key).filter(|entry| Arc::ptr_eq(&entry.slot, slot)) {
             entry.bytes = bytes;
             kept.bytes += bytes;

@@ -60,7 +60,7 @@ pub enum SourceError {
     /// A format that is known, but not read.
     #[error("{path}: {found}, which is not read; expected GeoTIFF, DTED, HGT, Esri ASCII, or raw with a .hdr")]
     OtherFormat { path: PathBuf, found: &'static str },
-    /// A format nobody here knows.
+    /// A format that is not known here.
     #[error("{path}: it begins with {found}; expected GeoTIFF, DTED, HGT, Esri ASCII, or raw with a .hdr beside it")]
     UnknownFormat { path: PathBuf, found: String },
     /// A compression that is not read.
@@ -198,7 +198,7 @@ pub enum SourceError {
     Layer { path: PathBuf, found: String, expected: String },
 
     // Points and polygons of a job.
-    /// A point or polygon that somebody gives is not one.
+    /// A point or polygon that is given is not one.
     #[error("{path}: {place}: found {found}, expected {expected}")]
     Given { path: PathBuf, place: String, found: String, expected: String },
 }

@@ -1,6 +1,6 @@
 //! GeoPackages: their layers, each in its own coordinate system, and what is in them.
 //!
-//! The file is a database, and one that somebody made to do harm can hold programs (views, triggers, virtual tables).
+//! The file is a database, and one that was made to do harm can hold programs (views, triggers, virtual tables).
 //! So it is opened for reading only, and only plain tables of it are looked at.
 
 use std::path::Path;
@@ -114,7 +114,7 @@ impl<'a> Package<'a> {
 
     /// The system of a layer, where it names one.
     pub(crate) fn crs(&self, srs: i64) -> Result<Option<Crs>, SourceError> {
-        // Undefined, projected and geographic: nobody knows which.
+        // Undefined, projected and geographic: it is not known which.
         if srs <= 0 || !self.is_table("gpkg_spatial_ref_sys")? {
             return Ok(None);
         }

@@ -1,4 +1,4 @@
-//! GeoTIFF files in: opened and judged at once, decoded strip by strip or tile by tile by whoever has a thread.
+//! GeoTIFF files in: opened and judged at once, decoded strip by strip or tile by tile on the caller's threads.
 //!
 //! [`GeoTiff::open`] reads the directory only. [`GeoTiff::decode`] is called with disjoint lists of chunks from any
 //! number of threads, each with a file handle of its own, and [`GeoTiff::assemble`] puts the chunks of a window

@@ -86,7 +86,7 @@ pub(crate) fn said_beside(path: &Path) -> Result<Option<Crs>, SourceError> {
 }
 
 /// Whether numbers can only be degrees: a projected area a degree or two of metres wide at the system's origin is not
-/// a place anybody compiles.
+/// a place that is compiled.
 fn look_like_degrees(polygons: &[Polygon]) -> bool {
     let mut corners = polygons.iter().flat_map(|polygon| &polygon.rings).flatten();
     corners.all(|[east, north]| east.abs() <= 360.0 && north.abs() <= 90.0)

@@ -72,7 +72,7 @@ impl Store {
         let name = self.name.strip_suffix(".gz").unwrap_or(&self.name).to_owned();
         let mut decoder = GzDecoder::new(BufReader::new(self.handle()?));
         let bytes = self.unpack(&mut decoder)?;
-        // A reader that stops here would miss what somebody appended, a second part of the heights, perhaps.
+        // A reader that stops here would miss what was appended, a second part of the heights, perhaps.
         let rest = decoder.into_inner().fill_buf().map_err(|source| self.stopped(source))?.len();
         match rest {
             0 => Ok(self.holding(name, bytes)),

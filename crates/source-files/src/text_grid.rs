@@ -198,7 +198,7 @@ pub(crate) struct AsciiGrid {
     rows: u32,
     nodata: f64,
     header_bytes: u64,
-    /// Byte at which each chunk of rows begins, once somebody has counted the numbers before it.
+    /// Byte at which each chunk of rows begins, once the numbers before it are counted.
     starts: Arc<OnceLock<Vec<u64>>>,
 }
 

@@ -73,7 +73,7 @@ impl Raster {
 }
 
 impl Raster {
-    /// Gives every void post a height; those at most `within` posts from one, whose indices it gives, a smooth one.
+    /// Sets a height at every void post, a smooth one within `within` posts of a height; returns the indices of these.
     pub(crate) fn fill_around(&mut self, within: u32) -> Vec<usize> {
         let near = Filling::new(self).grow(within).smooth();
         let filled = near.filled.clone();

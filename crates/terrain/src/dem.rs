@@ -143,7 +143,7 @@ impl Dem {
         self.void_count
     }
 
-    /// Gives every void post a height that keeps the mesh defined; it stays a void.
+    /// Sets a height at every void post, so that the mesh is defined; it stays a void.
     pub fn fill_voids(&mut self, mut height: impl FnMut(Post) -> i32) {
         for row in self.rect.south..=self.rect.north {
             for col in self.rect.west..=self.rect.east {

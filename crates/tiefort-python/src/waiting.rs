@@ -33,7 +33,7 @@ struct Told<T>(Sender<News<T>>);
 
 impl<T> Progress for Told<T> {
     fn tell(&mut self, event: Event) {
-        // Nobody listens to a run that was left alone.
+        // A run that was left alone has no listener.
         let _ = self.0.send(News::Event(event));
     }
 }

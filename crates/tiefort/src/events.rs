@@ -51,7 +51,7 @@ pub fn event_text(event: &Event, stage_time: Option<&ReportStage>, at_s: f64) ->
     format!("{at_s:>9.3} s  {words}")
 }
 
-/// Prints one line of JSON at once. Nobody may be listening any more; the work goes on all the same.
+/// Prints one line of JSON at once. The reader may be gone; the work goes on all the same.
 pub fn print_line(value: &Value) {
     let mut out = stdout().lock();
     let _ = writeln!(out, "{value}").and_then(|()| out.flush());

@@ -20,7 +20,7 @@ pub enum Outcome {
     Sound,
     /// Finished, with limits that could not be met.
     Breaches,
-    /// Compared, and not alike.
+    /// Two databases were compared, and they differ.
     Differ,
     /// Found damage, or anything at all under `--strict`.
     Damaged,

@@ -71,11 +71,16 @@ Exit codes:
   75   not now: the same may do later
   130  stopped by SIGINT; 143 by SIGTERM";
 
-/// Version of the program, of what it writes, and of how it decides.
+/// What is built in beyond what every program has.
+const FEATURES: &str = if cfg!(feature = "viewer") { "viewer" } else { "none (viewer is left out)" };
+
+/// Version of the program, what it was built from, versions of what it writes, and of how it decides.
 static LONG_VERSION: LazyLock<String> = LazyLock::new(|| {
     format!(
-        "{}\ndatabase format {}\nload-module format {}, {} with decks\nalgorithm revision {}",
+        "{}\ncommit {}\nfeatures {FEATURES}\ndatabase format {}\nload-module format {}, {} with decks\n\
+         algorithm revision {}",
         env!("CARGO_PKG_VERSION"),
+        env!("TIEFORT_COMMIT"),
         database::FORMAT_VERSION,
         database::MODULES_FORMAT_VERSION_WITHOUT_DECKS,
         database::MODULES_FORMAT_VERSION,

@@ -37,7 +37,7 @@ pub enum Show {
     JsonLog,
 }
 
-/// Where a run is, for whoever has to end it in a hurry.
+/// Where a run is, for ending it in a hurry.
 #[derive(Debug, Default)]
 pub struct Place {
     stage: Option<Stage>,

@@ -111,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn memory_bounds_the_workers_that_nobody_asked_for() {
+    fn memory_bounds_the_workers_that_were_not_asked_for() {
         check(None, 16_000, 8, false);
         check(None, 500, 3, true);
         check(None, 50, 1, true);

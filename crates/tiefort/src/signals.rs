@@ -23,7 +23,7 @@ const EXIT_BASE: i32 = 128;
 const LOOK: Duration = Duration::from_millis(20);
 /// What a run has to stop by itself.
 const GRACE: Duration = Duration::from_millis(400);
-/// What whoever is writing a file has to finish it.
+/// The time that a thread has to finish writing a file.
 const WRITING: Duration = Duration::from_millis(300);
 
 /// Watches for signals from [`Signals::watch`] until the process ends.

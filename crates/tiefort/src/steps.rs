@@ -49,7 +49,7 @@ impl Steps {
             }
             Display::Lines(last) => {
                 let at_s = self.seconds();
-                // Whoever panicked holding it was telling something else.
+                // A thread that panicked holding it was telling something else.
                 let mut last = last.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
                 if PAUSE_S <= at_s - *last {
                     *last = at_s;

@@ -62,7 +62,7 @@ const LINES_MAX: usize = 80;
 /// Of more, how many from its beginning and its end.
 const LINES_KEPT: (usize, usize) = (20, 5);
 
-/// `text` short enough to be read: a value that somebody wrote may be as long as the file it stands in.
+/// `text` short enough to be read: a value from a file may be as long as the file it stands in.
 pub fn short(text: &str) -> String {
     let lines: Vec<String> = text.lines().map(short_line).collect();
     if lines.len() <= LINES_MAX {

@@ -48,6 +48,9 @@ const BANNED_ANYWHERE: [&str; 7] = [
     concat!("pypi", ".org"),
 ];
 
+/// Words that stand for a noun which a stranger would like to read.
+const VAGUE_WORDS: [&str; 5] = ["whoever", "nobody", "somebody", "anybody", "whomever"];
+
 /// What no program text outside tests may hold.
 const BANNED_IN_PROGRAMS: [&str; 6] =
     [concat!("to", "do!("), concat!("unimpl", "emented!("), concat!("db", "g!("), ".unwrap()", "#[ignore", "unsafe {"];
@@ -459,6 +462,80 @@ fn links_of_documents_lead_to_files_that_exist() {
             let files = links(line).filter(|link| !link.contains("://") && !link.starts_with('#'));
             let lost = files.filter(|link| !folder.join(link.split('#').next().unwrap()).exists());
             faults.extend(lost.map(|link| text.at(place, format!("{link} is not there"))));
+        }
+    }
+    expect_none(faults);
+}
+
+/// The anchors of a document's headings, as GitHub and mdBook make them.
+fn anchors(text: &Text) -> Vec<String> {
+    let headings =
+        prose(text).filter_map(|(_, line)| line.strip_prefix('#')?.trim_start_matches('#').strip_prefix(' '));
+    let anchor = |heading: &str| {
+        let words = heading.trim().to_lowercase().replace(' ', "-");
+        words.chars().filter(|c| c.is_alphanumeric() || ['-', '_'].contains(c)).collect()
+    };
+    headings.map(anchor).collect()
+}
+
+#[test]
+fn anchors_of_links_are_headings() {
+    let documents = documents();
+    let anchors: BTreeMap<PathBuf, Vec<String>> =
+        documents.iter().map(|text| (root().join(&text.path), anchors(text))).collect();
+    let mut faults = Vec::new();
+    for text in &documents {
+        let folder = root().join(text.path.parent().unwrap());
+        for (place, line) in prose(text) {
+            for link in links(line).filter(|link| !link.contains("://")) {
+                let Some((file, anchor)) = link.split_once('#') else { continue };
+                let target = if file.is_empty() { root().join(&text.path) } else { folder.join(file) };
+                let target = target.canonicalize().unwrap_or(target);
+                if !anchors.get(&target).is_some_and(|found| found.iter().any(|found| found == anchor)) {
+                    faults.push(text.at(place, format!("{link} is no heading")));
+                }
+            }
+        }
+    }
+    expect_none(faults);
+}
+
+#[test]
+fn links_of_the_book_stay_in_the_book() {
+    let mut faults = Vec::new();
+    for text in documents().iter().filter(|text| text.path.starts_with("docs")) {
+        let depth = text.path.components().count() - 2;
+        for (place, line) in prose(text) {
+            let leaving = links(line).filter(|link| depth < link.matches("../").count());
+            faults.extend(leaving.map(|link| text.at(place, format!("{link} leads out of docs, and the built book"))));
+        }
+    }
+    expect_none(faults);
+}
+
+#[test]
+fn every_page_of_the_book_stands_in_its_summary() {
+    let summary = fs::read_to_string(root().join("docs/SUMMARY.md")).unwrap();
+    let pages = documents().into_iter().filter_map(|text| Some(text.path.strip_prefix("docs").ok()?.to_owned()));
+    let lost =
+        pages.filter(|page| page != Path::new("SUMMARY.md") && !summary.contains(&format!("({})", page.display())));
+    expect_none(lost.map(|page| format!("docs/SUMMARY.md does not list {}", page.display())).collect());
+}
+
+#[test]
+fn the_readme_has_at_most_700_words() {
+    let words = fs::read_to_string(root().join("README.md")).unwrap().split_whitespace().count();
+    assert!(words <= 700, "{words} words");
+}
+
+#[test]
+fn no_text_speaks_of_whoever() {
+    let mut faults = Vec::new();
+    for text in texts().iter().filter(|text| !text.path.ends_with("tidy.rs")) {
+        for (place, line) in text.lines.iter().enumerate() {
+            let lower = line.to_lowercase();
+            let words = lower.split(|c: char| !c.is_alphanumeric());
+            faults.extend(words.filter(|word| VAGUE_WORDS.contains(word)).map(|word| text.at(place, word)));
         }
     }
     expect_none(faults);

@@ -178,7 +178,7 @@ impl<'a> State<'a> {
         Taken { threshold: None, left }
     }
 
-    /// Books as much of a run as limits and what is `left` permit, a point at a time. Gives what was booked.
+    /// Books as much of a run as limits and what is `left` permit, a point at a time. Returns what was booked.
     fn accept_while_permitted(&mut self, tile: usize, module: ModuleId, cost: u32, left: u64) -> u64 {
         let mut booked = 0;
         while booked < cost {

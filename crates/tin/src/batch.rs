@@ -169,7 +169,7 @@ impl Batch {
         self.queue.push(&growth.mesh, triangle);
     }
 
-    /// Gives the parked triangles back to the queue.
+    /// Puts the parked triangles back into the queue.
     fn release<S: Simd>(&mut self, growth: &mut Growth<S>) {
         for candidate in std::mem::take(&mut self.waiting) {
             if growth.mesh.triangles()[candidate.triangle as usize].key == 0 {

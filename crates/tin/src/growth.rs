@@ -72,7 +72,7 @@ impl<S: Simd> Growth<'_, S> {
         }
     }
 
-    /// Gives every triangle its key.
+    /// Computes the key of every triangle.
     #[inline(always)]
     pub fn score_all<C: Criterion>(&mut self, criterion: C) {
         for triangle in 0..self.mesh.triangles().len() as u32 {

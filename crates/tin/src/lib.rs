@@ -5,6 +5,21 @@
 //! that for one tile and sees nothing but the tile's window; [`survey`] runs the same growth ahead to
 //! learn what each triangle would gain.
 //!
+//! ```
+//! use fearless_simd::Level;
+//! use terrain::{Dem, Importance, PostRect, TileId};
+//! use tin::{Rule, Stop, TileTask};
+//!
+//! // Heights are whole numbers of 1/128 m.
+//! let rect = PostRect::of_size(65, 65);
+//! let dem = Dem::from_fn(rect, |post| Some(post.row * post.row + 3 * post.row * post.col));
+//! let stop = Stop { points: Some(200), ..Stop::default() };
+//! let task = TileTask { stop, ..TileTask::plain(TileId { row: 0, col: 0 }, rect, Rule::WorstFirst) };
+//!
+//! let made = tin::refine(&dem, &Importance::uniform(rect, 1000), &task, Level::new());
+//! assert_eq!(made.tin.vertices.len(), 4 + 200);
+//! ```
+//!
 //! Everything generic over the lanes is inlined into the one dispatch around a tile's refinement: a function left
 //! on its own would be compiled for the oldest processor and call each lane operation.
 

@@ -7,7 +7,7 @@ use terrain::{Dem, Importance, StopReason, TileTin, Tin, Vertex};
 use crate::batch::Passes;
 use crate::criterion::{Largest, Squares};
 use crate::growth::{Barred, Growth};
-use crate::sequence::{Nobody, Sequence, Witness};
+use crate::sequence::{Sequence, Unwatched, Witness};
 use crate::start::{Start, candidates};
 use crate::task::{Rule, Stop, TileTask};
 use crate::weighted_surface::WeightedSurface;
@@ -23,7 +23,7 @@ pub fn refine(dem: &Dem, importance: &Importance, task: &TileTask, level: Level)
     assert_eq!(dem.rect(), task.rect, "the window covers the tile");
     let start = Start::new(task);
     let initial = start.vertices.clone();
-    let (growth, stop) = dispatch!(level, simd => grow(simd, dem, importance, task, start, &mut Nobody));
+    let (growth, stop) = dispatch!(level, simd => grow(simd, dem, importance, task, start, &mut Unwatched));
     finish(dem, task, &initial, growth, stop)
 }
 

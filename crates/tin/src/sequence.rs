@@ -11,10 +11,10 @@ pub(crate) trait Witness {
     fn squares(&mut self, _sum: f64) {}
 }
 
-/// Nobody wants to know.
-pub(crate) struct Nobody;
+/// Witnesses nothing.
+pub(crate) struct Unwatched;
 
-impl Witness for Nobody {
+impl Witness for Unwatched {
     fn selected(&mut self, _post: LocalPost, _gain: f64) {}
 }
 

@@ -31,7 +31,7 @@ impl Start {
         start
     }
 
-    /// What somebody gives: pins without asking, others as far as limits permit.
+    /// What a job gives: pins without asking, others as far as limits permit.
     fn insert_given(&mut self, task: &TileTask) {
         let mut hint = 0;
         let (pinned, others): (Vec<StartPost>, Vec<StartPost>) = task.start.iter().partition(|start| start.pinned);
@@ -80,7 +80,7 @@ fn first_corners(mesh: &Mesh) -> Vec<LocalPost> {
     corners
 }
 
-/// Where candidates may lie: everywhere but on the sides that belong to somebody else.
+/// Where candidates may lie: everywhere but on the sides that belong to another tile.
 pub(crate) fn candidates(rect: PostRect, seams: SeamSides) -> LocalRect {
     let shut = |open: bool| i32::from(!open);
     LocalRect {

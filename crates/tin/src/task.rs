@@ -18,7 +18,7 @@ pub struct TileTask {
     pub inherited: Vec<Post>,
     /// Border points on this tile's own seams that must stay as its neighbours hold them: paid for by this tile.
     pub kept: Vec<Post>,
-    /// Posts to start from beside those, in this order; none on a side that belongs to somebody else.
+    /// Posts to start from beside those, in this order; none on a side that belongs to another tile.
     pub start: Vec<StartPost>,
     /// The sides on which this tile may choose posts.
     pub seams: SeamSides,
@@ -72,7 +72,7 @@ impl TileTask {
     }
 }
 
-/// A post that a tile starts from because somebody says so.
+/// A post that a tile starts from because the job says so.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct StartPost {
     /// The post.

@@ -290,7 +290,7 @@ impl<'a> TinJob<'a> {
     fn task(&self, tile: TileId, seams: SeamSides, inherited: Vec<terrain::Post>, points: Option<usize>) -> TileTask {
         let by_squares = matches!(self.rule, Rule::LargestSquares { .. });
         let rect = self.tiling.rect(tile);
-        // The raster's own border is nobody else's: its posts are ordinary candidates.
+        // The raster's own border is no seam: its posts are ordinary candidates.
         let outer = tiling::outer_sides(rect, self.area());
         TileTask {
             inherited,

@@ -1,4 +1,4 @@
-//! Levels of detail: neighbours at any two of them fit, counts and figures are true, whoever makes them.
+//! Levels of detail: neighbours at any two of them fit, counts and figures are true, with any number of workers.
 
 use compiler::Built;
 use database::Folder;

@@ -114,7 +114,7 @@ fn lod(draw: &mut Draw) -> String {
     }
 }
 
-/// Runs the job of a seed, and gives whether it was possible at all.
+/// Runs the job of a seed; returns whether it was possible at all.
 fn run(seed: u64) -> bool {
     let _seed = Seed(seed);
     // Spread, since neighbouring states of the generator draw alike.

@@ -34,7 +34,7 @@ const DEGREE_M: f64 = 111_320.0;
 const GRID: i64 = 64;
 
 /// Writes `layer.json`, `LEVEL/COLUMN/ROW.terrain` and, where there are holes, `holes.geojson`. `assumed` is what to
-/// take heights to be above; else the database says it. Gives what was done to heights.
+/// take heights to be above; else the database says it. Returns what was done to heights.
 ///
 /// # Errors
 /// When a file cannot be written, heights cannot be brought above the ellipsoid, or the work was asked to stop.

@@ -5,7 +5,7 @@ use super::parameters::{Datum, Method, Parameters, datum_named};
 use super::system::Crs;
 use super::vertical::unit_m;
 
-/// Longer texts describe no system anybody uses.
+/// Longer texts describe no system in use.
 const CHARS_MAX: usize = 1 << 16;
 /// Brackets inside brackets: the standard needs six.
 const DEPTH_MAX: usize = 24;

@@ -300,7 +300,7 @@ fn what_asks_for_too_much_or_cannot_be_unpacked_is_refused() {
 }
 
 #[test]
-fn kinds_of_members_that_nobody_knows_and_wild_numbers_are_no_panic() {
+fn unknown_kinds_of_members_and_wild_numbers_are_no_panic() {
     let osm = Osm::new(&[(i64::MAX, [-117.0, 35.0]), (i64::MIN, [-117.001, 35.0])])
         .way(i64::MIN, ROAD, &[i64::MAX, i64::MIN])
         .relation(-1, LAKE, &[(7, i64::MIN, "outer"), (1, i64::MAX, "x")]);

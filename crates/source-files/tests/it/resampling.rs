@@ -25,7 +25,7 @@ fn bumpy(row: i32, col: i32) -> i16 {
 #[test]
 fn posts_that_coincide_are_copied_exactly_wherever_the_grid_begins() {
     let raster = raster(bumpy);
-    // A millimetre off is floating-point noise of somebody's arithmetic, not a place of its own.
+    // A millimetre off is floating-point noise of arithmetic, not a place of its own.
     for noise_m in [0.0, 1.0e-5, -1.0e-5] {
         let grid = grid(SOUTH_WEST.0 - 20.0 + noise_m, SOUTH_WEST.1 + 10.0, 10.0);
         let rect = PostRect::new(Post::new(0, 2), Post::new(7, 13));

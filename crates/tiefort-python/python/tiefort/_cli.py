@@ -13,6 +13,6 @@ def main() -> None:
     """Run the program with the words of the command line and end with its exit code."""
     script = sys.argv[0]
     if not os.path.basename(script).startswith("tiefort"):
-        # As a module, under a name that nobody would type to run it again.
+        # As a module, under a name that is not typed to run it again.
         script = shutil.which("tiefort") or "tiefort"
     command_line([script, *sys.argv[1:]])

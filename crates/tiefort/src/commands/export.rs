@@ -103,7 +103,7 @@ impl Arguments {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Format {
-    /// A folder with one load-module file (FORMAT.md) for each load module
+    /// A folder with one load-module file (docs/FORMAT.md) for each load module
     Modules,
     /// A mesh as binary PLY
     Ply,

@@ -31,7 +31,7 @@ pub struct Arguments {
 /// Prints one page, or writes all.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let mut program = Cli::command();
-    // Gives every command its full name.
+    // Sets the full name of every command.
     program.build();
     let Some(folder) = &arguments.out else {
         terminal::print(&String::from_utf8_lossy(&page(named(&program, arguments.command.as_deref())?)?))?;

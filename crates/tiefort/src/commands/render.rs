@@ -203,7 +203,7 @@ fn sight(arguments: &Arguments) -> Sight {
     }
 }
 
-/// A flag that changes nothing is a mistake of whoever gave it.
+/// A flag that changes nothing is a mistake of the caller.
 fn refuse_flags_without_use(arguments: &Arguments) -> Result<(), Failure> {
     let perspective = is_perspective(arguments);
     let surface = arguments.view == View::Relief || perspective;

@@ -12,7 +12,7 @@ use crate::{arguments, files};
 const AFTER_HELP: &str = "\
 Examples:
   tiefort sample --out sample.tif
-  tiefort sample --posts 1001 --spacing 30 --seed 7 --out dem.tif \\
+  tiefort sample --posts 1001 --spacing 30 --seed 7 --out other.tif \\
       --classes classes.tif
 
 The same seed gives the same terrain on any machine.";

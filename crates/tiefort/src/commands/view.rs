@@ -11,9 +11,9 @@ Examples:
   tiefort view ntc.tdb
   tiefort view ntc.tdb --port 8380
 
-Prints the address to open in a browser on this machine; nobody else can reach
-it. Ctrl-C ends it. W, A, S, D or arrows drive; F flies; the page lists the
-rest. Beside the page it answers all that `tiefort serve DIR` does.
+Prints the address to open in a browser on this machine; no other machine can
+reach it. Ctrl-C ends it. W, A, S, D or arrows drive; F flies; the page lists
+the rest. Beside the page it answers all that `tiefort serve DIR` does.
 
 The viewer is built in by
   scripts/build_viewer.sh

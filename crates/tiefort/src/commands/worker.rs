@@ -17,7 +17,7 @@ Examples:
   tiefort worker ntc.toml --out /share/ntc.tdb    on every host, one for each core
 
 Start it any number of times, on any hosts that share the folder, at any time.
-Each takes tiles that are ready and that nobody else is working on, until the
+Each takes tiles that are ready and that no other is working on, until the
 build is done; one of them publishes it. Any of them may be killed: what it was
 working on is done by another once its lease is over. Clocks need not agree.
 
@@ -36,7 +36,7 @@ pub struct Arguments {
     job: PathBuf,
     #[command(flatten)]
     run: RunArguments,
-    /// Seconds after which work that nobody has been heard of is done by another worker
+    /// Seconds of silence after which a worker's work is done by another
     #[arg(long, value_name = "SECONDS", default_value_t = 60)]
     #[arg(value_parser = clap::value_parser!(u64).range(1..=86_400))]
     lease: u64,

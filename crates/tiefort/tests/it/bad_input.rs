@@ -105,7 +105,7 @@ fn a_folder_that_cannot_be_made() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn a_place_where_nobody_can_write() {
+fn a_place_that_cannot_be_written_to() {
     let scene = Scene::with_job("small.toml", &[]);
     scene.refuses(&["build", "job.toml", "--out", "/proc/x.tdb"], &["/proc/x.tdb"]);
 }

@@ -39,6 +39,17 @@ fn the_help_of_every_command_has_an_example_of_it() {
 }
 
 #[test]
+fn the_version_tells_commit_features_and_formats() {
+    let version = Scene::new().run_to(0, &["--version"]).stdout;
+    let lines: Vec<&str> = version.lines().collect();
+    let starts = ["tiefort ", "commit ", "features ", "database format ", "load-module format ", "algorithm revision "];
+    assert_eq!(lines.len(), starts.len(), "{version}");
+    for (line, start) in lines.iter().zip(starts) {
+        assert!(line.starts_with(start) && start.len() < line.len(), "{start}: {version}");
+    }
+}
+
+#[test]
 fn the_help_lists_every_command() {
     let help = Scene::new().run_to(0, &["--help"]).stdout;
     for command in COMMANDS {

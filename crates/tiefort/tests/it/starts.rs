@@ -1,4 +1,4 @@
-//! From rasters that somebody has to a job that works: `init`, and areas that are found instead of stated.
+//! From rasters to a job that works: `init`, and areas that are found instead of stated.
 
 use std::fs;
 

@@ -1,4 +1,4 @@
-//! What goes to stdout, what to stderr, and what happens when nobody listens or someone interrupts.
+//! What goes to stdout, what to stderr, and what happens when the reader is gone, or at an interruption.
 
 use std::io::{BufRead, BufReader, Read};
 use std::process::{Command, Stdio};

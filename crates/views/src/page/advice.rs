@@ -172,7 +172,7 @@ fn importance(report: &Report) -> Option<Advice> {
         ),
         change: format!("importance: bring the weight of {:?} nearer to that of {:?}", worst.name, best.name),
         effect: format!(
-            "Moves {} from {:?} to {:?}. Leave it as it is where nobody drives there.",
+            "Moves {} from {:?} to {:?}. Leave it as it is where no vehicle drives there.",
             report.count, best.name, worst.name
         ),
     })

@@ -56,7 +56,7 @@ impl Camera {
             })
         };
         let size = (east - west).max(north - south);
-        // Further and further back, in steps that nobody sees.
+        // Further and further back, in steps too small to see.
         let mut tries = (0..400).map(|step| from(size * (0.3 + 0.02 * f64::from(step))));
         tries.find(|camera| sees(camera)).unwrap_or(from(size * 10.0))
     }

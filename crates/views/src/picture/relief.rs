@@ -163,7 +163,7 @@ pub(crate) fn relief(scene: &Scene, shown: Shown, longest: usize) -> Vec<Drawing
         Drawing { sheet, map, map_extent }
     };
     let dem = || {
-        let ground = scene.ground.expect("whoever asks for the ground has it");
+        let ground = scene.ground.expect("a caller that asks for the ground has it");
         let detail = format!("posts {} m apart", scene.frame.spacing.metres());
         let covers = facets.post_covers(ground.dem, scene.frame.spacing.metres());
         let map = posts_relief(ground.dem, &scene.posts(&ground), &map_extent, &tints, &covers);

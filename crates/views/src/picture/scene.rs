@@ -1,4 +1,4 @@
-//! A finished area, as pictures of it need it: plain values that somebody else has read.
+//! A finished area, as pictures of it need it: plain values that the caller has read.
 
 use database::{FeatureLine, FeatureRemark};
 use terrain::{Dem, GridFrame, LoadModule, ModuleGrid, ModuleId, ModuleRect, TileId};

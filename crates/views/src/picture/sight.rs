@@ -20,7 +20,7 @@ pub struct Eye {
     pub above_m: f64,
 }
 
-/// An observer, as far as anybody said.
+/// An observer, as far as was said.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sight {
     /// Where he stands; without it, where he overlooks all of the scene.
@@ -50,7 +50,7 @@ pub fn draw_sight(scene: &Scene, shown: Shown, style: Style, sight: &Sight, wide
     let triangles = Surface::Triangles(&facets);
     let tin = || Panel { label: format!("TIN, {} triangles", grouped(facets.count() as u64)), surface: triangles };
     let dem = || {
-        let dem = scene.ground.expect("whoever asks for the ground has it").dem;
+        let dem = scene.ground.expect("a caller that asks for the ground has it").dem;
         let spacing_m = scene.frame.spacing.metres();
         let label = format!("DEM, {} posts {spacing_m} m apart", grouped(dem.rect().post_count() as u64));
         Panel { label, surface: Surface::Posts(dem, [spacing_m; 2], covers.as_deref().unwrap_or_default()) }

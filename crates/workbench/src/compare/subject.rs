@@ -190,7 +190,7 @@ fn of_heights(
     Ok(Subject { dem, spacing, name })
 }
 
-/// Gives voids the height of a post near them, ring by ring, so that what covers them is no cliff.
+/// Sets voids to the height of a post near them, ring by ring, so that what covers them is no cliff.
 fn fill(dem: &mut Dem) {
     if dem.void_count() == 0 {
         return;

@@ -118,7 +118,7 @@ fn words(draw: &mut Draw) -> Words {
     }
 }
 
-/// Runs the drawing of a seed, and gives whether it was possible at all.
+/// Runs the drawing of a seed; returns whether it was possible at all.
 fn run(seed: u64) -> bool {
     let _seed = Seed(seed);
     let mut draw = Draw(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) + 7);
