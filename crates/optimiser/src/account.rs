@@ -9,10 +9,10 @@ use crate::place::{PER_POST, Place};
 use crate::task::Budget;
 use crate::tile_mesh::TileMesh;
 
-/// The budget as it is spent and refunded, and what was lent beyond it for a while.
+/// The budget as it is spent and refunded, and what is allowed beyond it for a while.
 pub(crate) struct Account {
     books: Books,
-    loan: i64,
+    beyond: i64,
 }
 
 enum Books {
@@ -45,17 +45,17 @@ impl Account {
                 Books::Limits(ledger)
             }
         };
-        Self { books, loan: 0 }
+        Self { books, beyond: 0 }
     }
 
     /// Permits `share` of the whole more than there may be in the end; 0 takes that back.
-    pub fn lend(&mut self, share: f64) {
-        self.loan = (share * self.most() as f64) as i64;
+    pub fn allow_beyond(&mut self, share: f64) {
+        self.beyond = (share * self.most() as f64) as i64;
     }
 
     /// Keeps so many triangles (or vertices) back.
     pub fn keep_back(&mut self, count: i64) {
-        self.loan = -count;
+        self.beyond = -count;
     }
 
     /// Triangles (or vertices) the whole may have.
@@ -68,7 +68,7 @@ impl Account {
 
     /// How many triangles (or vertices) more the whole may have.
     pub fn left(&self) -> i64 {
-        self.loan.saturating_add(match &self.books {
+        self.beyond.saturating_add(match &self.books {
             Books::Total { left, .. } => *left,
             Books::Limits(ledger) => ledger.counts().left(),
         })

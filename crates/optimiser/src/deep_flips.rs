@@ -16,12 +16,12 @@ const LEAST_GAIN: f64 = 0.01;
 /// A flip is given up when a round of moves leaves more than this part of what was still to be gained.
 const GIVE_UP: f64 = 0.5;
 
-/// Looks once at every edge near a stirred vertex; what it moves is stirred afterwards.
+/// Looks once at every edge near a changed vertex; what it moves is changed afterwards.
 pub(crate) fn deep_flips(sheet: &mut TileMesh, mover: &mut Mover, rounds: usize) {
     let mean = sheet.mean_squares();
     mover.aim(mean);
-    let was_stirred: Vec<bool> = sheet.vertices.iter().map(|vertex| vertex.is_stirred).collect();
-    sheet.vertices.iter_mut().for_each(|vertex| vertex.is_stirred = false);
+    let had_changed: Vec<bool> = sheet.vertices.iter().map(|vertex| vertex.has_changed).collect();
+    sheet.vertices.iter_mut().for_each(|vertex| vertex.has_changed = false);
     let mut pass = Pass { mean, rounds, patch: Patch::default(), saved: Saved::default(), star: Star::default() };
     for triangle in 0..sheet.triangles.len() as u32 {
         for k in 0..3 {
@@ -33,8 +33,8 @@ pub(crate) fn deep_flips(sheet: &mut TileMesh, mover: &mut Mover, rounds: usize)
                 continue;
             }
             let corners = sheet.around_edge(edge);
-            let is_stirred = |&v: &u32| was_stirred[v as usize] || sheet.vertices[v as usize].is_stirred;
-            if corners.iter().any(is_stirred) {
+            let has_changed = |&v: &u32| had_changed[v as usize] || sheet.vertices[v as usize].has_changed;
+            if corners.iter().any(has_changed) {
                 pass.try_edge(sheet, mover, edge, corners);
             }
         }
@@ -67,7 +67,7 @@ impl Pass {
         sheet.apply(&mut self.patch);
         if self.settles(sheet, mover, new - old, [c, d, a, b]) {
             for vertex in [a, b, c, d] {
-                sheet.stir_around(vertex, &mut self.star);
+                sheet.mark_around(vertex, &mut self.star);
             }
         } else {
             self.saved.restore(sheet);

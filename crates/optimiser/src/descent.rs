@@ -49,7 +49,7 @@ pub(crate) fn descend(sheet: &mut TileMesh, steps: usize, step: i32) {
         memory.remember(difference(&to, &at), difference(&next, &slope));
         (at, slope, squares) = (to, next, fewer);
     }
-    sheet.stir_all();
+    sheet.mark_all_changed();
 }
 
 /// What may change about a vertex.

@@ -12,13 +12,13 @@ const LEAST_GAIN: f64 = 1e-4;
 /// Part of a triangle's mean squares below which two triangles are left as they are.
 pub(crate) const LEAST_SHARE: f64 = 0.02;
 
-/// Flips edges near stirred vertices, until none gains; stirs what it touches.
+/// Flips edges near changed vertices, until none gains; marks as changed what it touches.
 pub(crate) fn flip_all(sheet: &mut TileMesh) {
     let mut patch = Patch::default();
     let least = LEAST_SHARE * sheet.mean_squares();
-    let is_stirred = |corner: u32| sheet.vertices.get(corner as usize).is_some_and(|vertex| vertex.is_stirred);
+    let has_changed = |corner: u32| sheet.vertices.get(corner as usize).is_some_and(|vertex| vertex.has_changed);
     let mut active: Vec<bool> =
-        sheet.triangles.iter().map(|triangle| triangle.corners.into_iter().any(is_stirred)).collect();
+        sheet.triangles.iter().map(|triangle| triangle.corners.into_iter().any(has_changed)).collect();
     for _ in 0..PASSES_MAX {
         let mut touched = vec![false; active.len()];
         let mut has_flipped = false;

@@ -11,7 +11,7 @@ const LOST: f64 = 0.02;
 /// Quanta squared that an insertion has to gain.
 const LEAST_GAIN: f64 = 0.02;
 
-/// Gains from round to round: only what was stirred is judged again.
+/// Gains from round to round: only what was changed is judged again.
 #[derive(Default)]
 pub(crate) struct Gains {
     gains: Vec<f64>,
@@ -49,14 +49,14 @@ impl Gains {
             if corners[0] == NONE {
                 continue;
             }
-            let is_stirred = corners.iter().any(|&corner| sheet.vertices[corner as usize].is_stirred);
-            if is_stirred || self.judged[triangle as usize] != corners {
+            let has_changed = corners.iter().any(|&corner| sheet.vertices[corner as usize].has_changed);
+            if has_changed || self.judged[triangle as usize] != corners {
                 self.judge(sheet, triangle, insertion);
             } else if 0.0 < self.gains[triangle as usize] {
                 self.queue.enter(triangle, self.gains[triangle as usize]);
             }
         }
-        sheet.vertices.iter_mut().for_each(|vertex| vertex.is_stirred = false);
+        sheet.vertices.iter_mut().for_each(|vertex| vertex.has_changed = false);
     }
 
     fn grow(&mut self, sheet: &TileMesh) {
@@ -77,7 +77,7 @@ impl Gains {
         }
     }
 
-    /// Gives whether a vertex was inserted.
+    /// Returns whether a vertex was inserted.
     fn insert_into(
         &mut self,
         sheet: &mut TileMesh,
@@ -87,8 +87,8 @@ impl Gains {
         insertion: &mut Insertion,
     ) -> bool {
         let Some(Found { gain, vertex }) = insertion.find(sheet, triangle) else { return false };
-        let guest = sheet.vertices[vertex as usize];
-        if !account.permits(&guest) {
+        let inserted = sheet.vertices[vertex as usize];
+        if !account.permits(&inserted) {
             sheet.drop_vertex(vertex);
             return false;
         }
@@ -100,7 +100,7 @@ impl Gains {
             }
             return false;
         }
-        account.charge(&guest);
+        account.charge(&inserted);
         insertion.patch.old.iter().for_each(|&old| self.queue.cancel(old));
         sheet.apply(&mut insertion.patch);
         let mut around: Vec<u32> = insertion.patch.new.iter().flat_map(|(corners, _)| *corners).collect();
@@ -116,7 +116,7 @@ impl Gains {
         let mut triangles: Vec<u32> = Vec::new();
         let mut star = Star::default();
         for &vertex in vertices {
-            sheet.vertices[vertex as usize].is_stirred = true;
+            sheet.vertices[vertex as usize].has_changed = true;
             sheet.star(vertex, &mut star);
             triangles.extend(star.triangles());
         }

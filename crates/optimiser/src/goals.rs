@@ -27,7 +27,7 @@ impl Work<'_, '_> {
     pub fn reach_goal(&mut self) {
         const AT_ONCE: usize = 16;
         let mut gains = Gains::default();
-        self.sheet.stir_all();
+        self.sheet.mark_all_changed();
         while self.goal().is_some_and(|goal| goal < self.sheet.squares())
             && 0 < gains.insert(&mut self.sheet, &mut self.account, AT_ONCE, &mut self.insertion)
         {}
@@ -86,9 +86,9 @@ impl Work<'_, '_> {
             }
             return;
         };
-        let guest = self.sheet.vertices[found.vertex as usize];
-        if self.account.permits(&guest) {
-            self.account.charge(&guest);
+        let inserted = self.sheet.vertices[found.vertex as usize];
+        if self.account.permits(&inserted) {
+            self.account.charge(&inserted);
             // Fitted heights would lift residuals elsewhere; as it stands, the post is met exactly.
             self.insertion.patch.refit.clear();
             self.insertion.patch.rise.clear();

@@ -47,7 +47,7 @@ struct Site {
 
 /// A vertex to be.
 #[derive(Clone, Copy)]
-struct Guest {
+struct Inserted {
     at: Place,
     height: f64,
     vertex: u32,
@@ -122,51 +122,51 @@ impl Insertion {
     /// Splits the triangle, flips around the new vertex, fits heights. Gives the gain.
     fn split(&mut self, sheet: &TileMesh, triangle: u32, on_edge: Option<u32>, vertex: u32) -> Option<f64> {
         let record = &sheet.vertices[vertex as usize];
-        let guest = Guest { at: record.at, height: record.height, vertex };
+        let inserted = Inserted { at: record.at, height: record.height, vertex };
         self.patch.clear();
         self.faces.clear();
         self.patch.old.push(triangle);
         for k in 0..3 {
             let edge = 4 * triangle + k;
             if on_edge != Some(edge) {
-                self.push_face(sheet, guest, edge);
+                self.push_face(sheet, inserted, edge);
                 continue;
             }
             let twin = sheet.twin(edge);
             if twin != NONE {
                 self.patch.old.push(twin >> 2);
-                self.push_face(sheet, guest, next(twin));
-                self.push_face(sheet, guest, previous(twin));
+                self.push_face(sheet, inserted, next(twin));
+                self.push_face(sheet, inserted, previous(twin));
             }
         }
-        self.flip_around(sheet, guest);
-        let valid = |face: &Face| is_sound(sheet, guest.at, [face.from, face.to]);
+        self.flip_around(sheet, inserted);
+        let valid = |face: &Face| is_sound(sheet, inserted.at, [face.from, face.to]);
         if !self.faces.iter().all(valid) {
             return None;
         }
         let old: f64 = self.patch.old.iter().map(|&old| sheet.triangles[old as usize].squares).sum();
         let new: f64 = self.faces.iter().map(|face| face.squares).sum();
-        self.fill_patch(sheet, guest);
+        self.fill_patch(sheet, inserted);
         Some(old - new + self.fit.refit(sheet, &mut self.patch))
     }
 
     /// The triangle between the new vertex and an edge seen from inside.
     #[inline(always)]
-    fn push_face(&mut self, sheet: &TileMesh, guest: Guest, edge: u32) {
+    fn push_face(&mut self, sheet: &TileMesh, inserted: Inserted, edge: u32) {
         let (from, to) = sheet.ends(edge);
         let (a, b) = (sheet.at(from), sheet.at(to));
         let moments = &sheet.ground.moments;
-        let sums = [moments.edge(guest.at, a), sheet.sums_of(edge), moments.edge(guest.at, b)];
-        self.faces.push(Face::new(sheet, guest, (from, to), sheet.twin(edge), sums));
+        let sums = [moments.edge(inserted.at, a), sheet.sums_of(edge), moments.edge(inserted.at, b)];
+        self.faces.push(Face::new(sheet, inserted, (from, to), sheet.twin(edge), sums));
     }
 
     /// Takes neighbours in while the flip of the edge to them gains.
-    fn flip_around(&mut self, sheet: &TileMesh, guest: Guest) {
+    fn flip_around(&mut self, sheet: &TileMesh, inserted: Inserted) {
         const TRIES_MAX: usize = 60;
         let mut index = 0;
         for _ in 0..TRIES_MAX {
             let Some(&face) = self.faces.get(index) else { return };
-            match self.flipped(sheet, guest, &face) {
+            match self.flipped(sheet, inserted, &face) {
                 Some([first, second]) => {
                     self.patch.old.push(face.twin >> 2);
                     self.faces[index] = first;
@@ -178,7 +178,7 @@ impl Insertion {
     }
 
     #[inline(always)]
-    fn flipped(&self, sheet: &TileMesh, guest: Guest, face: &Face) -> Option<[Face; 2]> {
+    fn flipped(&self, sheet: &TileMesh, inserted: Inserted, face: &Face) -> Option<[Face; 2]> {
         let beyond = face.twin >> 2;
         if face.twin == NONE
             || REACH_MAX <= self.patch.old.len()
@@ -189,31 +189,31 @@ impl Insertion {
         }
         let apex = sheet.apex(face.twin);
         let (a, d, b) = (sheet.at(face.from), sheet.at(apex), sheet.at(face.to));
-        let is_eased = |a: u32, b: u32| sheet.is_eased_at(guest.at, [a, b]);
-        if !(Shape::Sound.admits(guest.at, a, d) || is_eased(face.from, apex))
-            || !(Shape::Sound.admits(guest.at, d, b) || is_eased(apex, face.to))
+        let is_eased = |a: u32, b: u32| sheet.is_eased_at(inserted.at, [a, b]);
+        if !(Shape::Sound.admits(inserted.at, a, d) || is_eased(face.from, apex))
+            || !(Shape::Sound.admits(inserted.at, d, b) || is_eased(apex, face.to))
         {
             return None;
         }
         let old = face.squares + sheet.triangles[beyond as usize].squares;
-        let spoke = sheet.ground.moments.edge(guest.at, d);
+        let spoke = sheet.ground.moments.edge(inserted.at, d);
         let (first_rim, second_rim) = (next(face.twin), previous(face.twin));
         let sums = [face.sums[0], sheet.sums_of(first_rim), spoke];
-        let first = Face::new(sheet, guest, (face.from, apex), sheet.twin(first_rim), sums);
+        let first = Face::new(sheet, inserted, (face.from, apex), sheet.twin(first_rim), sums);
         if old <= first.squares {
             return None;
         }
         let sums = [spoke, sheet.sums_of(second_rim), face.sums[2]];
-        let second = Face::new(sheet, guest, (apex, face.to), sheet.twin(second_rim), sums);
+        let second = Face::new(sheet, inserted, (apex, face.to), sheet.twin(second_rim), sums);
         (first.squares + second.squares < old * (1.0 - LEAST_FLIP_GAIN)).then_some([first, second])
     }
 
-    fn fill_patch(&mut self, sheet: &TileMesh, guest: Guest) {
+    fn fill_patch(&mut self, sheet: &TileMesh, inserted: Inserted) {
         for face in &self.faces {
-            let corners = [guest.vertex, face.from, face.to];
+            let corners = [inserted.vertex, face.from, face.to];
             self.patch.new.push((corners, Form::new(&face.all(), sheet.places(corners))));
         }
-        for vertex in std::iter::once(guest.vertex).chain(self.faces.iter().flat_map(|face| [face.from, face.to])) {
+        for vertex in std::iter::once(inserted.vertex).chain(self.faces.iter().flat_map(|face| [face.from, face.to])) {
             if sheet.vertices[vertex as usize].hold.height_is_free() && !self.patch.refit.contains(&vertex) {
                 self.patch.refit.push(vertex);
             }
@@ -240,13 +240,13 @@ fn is_sound(sheet: &TileMesh, at: Place, [a, b]: [u32; 2]) -> bool {
 
 impl Face {
     #[inline(always)]
-    fn new(sheet: &TileMesh, guest: Guest, (from, to): (u32, u32), twin: u32, sums: [Sums; 3]) -> Self {
+    fn new(sheet: &TileMesh, inserted: Inserted, (from, to): (u32, u32), twin: u32, sums: [Sums; 3]) -> Self {
         let mut face = Self { from, to, twin, sums, squares: 0.0 };
         let (a, b) = (&sheet.vertices[from as usize], &sheet.vertices[to as usize]);
-        let corners = [guest.at, a.at, b.at];
+        let corners = [inserted.at, a.at, b.at];
         // A first triangle may be too thin to have a plane; a flip may still mend it, and if not, it is refused.
         if Place::orient(corners[0], corners[1], corners[2]) != 0 {
-            face.squares = squares(&face.all(), corners, [guest.height, a.height, b.height]);
+            face.squares = squares(&face.all(), corners, [inserted.height, a.height, b.height]);
         }
         face
     }

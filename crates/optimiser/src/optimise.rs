@@ -133,15 +133,15 @@ impl Work<'_, '_> {
         match step {
             Step::OnLattice => mover.step = final_step,
             Step::Flip => {
-                sheet.stir_all();
+                sheet.mark_all_changed();
                 flip_all(sheet);
             }
             Step::Sweep => {
-                sheet.stir_all();
+                sheet.mark_all_changed();
                 mover.sweep(sheet);
                 flip_all(sheet);
             }
-            Step::SweepStirred => {
+            Step::SweepChanged => {
                 mover.sweep(sheet);
                 flip_all(sheet);
             }

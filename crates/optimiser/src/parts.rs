@@ -19,7 +19,7 @@ pub(crate) struct Vertex {
     pub edge: u32,
     pub hold: Hold,
     /// Whether something near it changed since this was last asked.
-    pub is_stirred: bool,
+    pub has_changed: bool,
 }
 
 /// Which vertices are held, and where lines run.
@@ -64,7 +64,7 @@ impl Parts {
         let vertex = |vertex: &TinVertex| {
             let at = Place::of(vertex.at, tin.rect, tin.steps_per_post);
             let hold = layout.line_hold(ground, at).and((layout.hold)(at));
-            Vertex { at, height: f64::from(vertex.height) - ground.level(), edge: NONE, hold, is_stirred: true }
+            Vertex { at, height: f64::from(vertex.height) - ground.level(), edge: NONE, hold, has_changed: true }
         };
         let vertices = tin.vertices.iter().map(vertex).collect();
         Self { vertices, triangles: tin.triangles.clone(), kept: Vec::new() }

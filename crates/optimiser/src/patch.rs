@@ -35,7 +35,7 @@ impl Patch {
 }
 
 impl TileMesh<'_> {
-    /// Carries out a change and stirs everything it touches.
+    /// Carries out a change and marks as changed everything it touches.
     pub fn apply(&mut self, patch: &mut Patch) {
         self.cut_out(patch);
         for (i, &(corners, form)) in patch.new.iter().enumerate() {
@@ -51,7 +51,7 @@ impl TileMesh<'_> {
         self.triangle_count = self.triangle_count + patch.new.len() - patch.old.len();
         for (&vertex, &rise) in patch.refit.iter().zip(&patch.rise) {
             self.vertices[vertex as usize].height += rise;
-            self.vertices[vertex as usize].is_stirred = true;
+            self.vertices[vertex as usize].has_changed = true;
         }
         for &triangle in &patch.slots {
             self.settle(triangle);
@@ -103,7 +103,7 @@ impl TileMesh<'_> {
         let edge = 4 * patch.slots[i] + k as u32;
         let vertex = &mut self.vertices[from as usize];
         vertex.edge = edge;
-        vertex.is_stirred = true;
+        vertex.has_changed = true;
         let outer = patch.outline.iter().find(|outer| outer.from == from && outer.to == to);
         let twin = match outer {
             Some(outer) => outer.twin,

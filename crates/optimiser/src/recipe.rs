@@ -20,7 +20,7 @@ pub(crate) enum Step {
     /// Moves every vertex once, then flips where something changed much.
     Sweep,
     /// The same of vertices around which something has changed since they were moved.
-    SweepStirred,
+    SweepChanged,
     /// Thins to so many times the budget.
     Thin(f64, Thinning),
     /// Flips where that gains once the vertices around have moved, in so many rounds of moves at most.
@@ -46,10 +46,10 @@ pub(crate) enum Thinning {
     Deep(f64),
 }
 
-use Step::{DeepFlip, Descend, FitHeights, Flip, Grow, OnLattice, Snap, Sweep, SweepStirred, Thin};
+use Step::{DeepFlip, Descend, FitHeights, Flip, Grow, OnLattice, Snap, Sweep, SweepChanged, Thin};
 use Thinning::{AsItIs, Deep, Fitted};
 
-const FAST: &[Step] = &[OnLattice, Sweep, Thin(1.0, AsItIs), Sweep, SweepStirred, SweepStirred, Snap];
+const FAST: &[Step] = &[OnLattice, Sweep, Thin(1.0, AsItIs), Sweep, SweepChanged, SweepChanged, Snap];
 
 const NORMAL: &[Step] = &[
     Sweep,
@@ -59,7 +59,7 @@ const NORMAL: &[Step] = &[
     Sweep,
     Thin(1.0, Deep(0.4)),
     DeepFlip(3),
-    SweepStirred,
+    SweepChanged,
     DeepFlip(3),
     Descend(8),
     Flip,

@@ -1,4 +1,4 @@
-//! Neighbours in space become neighbours in memory again: a third of the time of all later steps on a large tile.
+//! Neighbours in space become neighbours in memory again.
 
 use crate::curve::along_curve;
 use crate::parts::{NONE, Vertex};

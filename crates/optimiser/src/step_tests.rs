@@ -44,7 +44,7 @@ fn with_sheet(test: impl Fn(&mut TileMesh, &Dem)) {
 }
 
 fn sweep_all(mover: &mut Mover, sheet: &mut TileMesh) {
-    sheet.stir_all();
+    sheet.mark_all_changed();
     mover.sweep(sheet);
     flip_all(sheet);
 }
@@ -108,11 +108,11 @@ fn flips_and_sweeps_never_raise_the_squares() {
         let mut mover = Mover::new(1);
         let mut before = sheet.squares();
         for _ in 0..3 {
-            sheet.stir_all();
+            sheet.mark_all_changed();
             flip_all(sheet);
             let flipped = sheet.squares();
             assert!(flipped <= before);
-            sheet.stir_all();
+            sheet.mark_all_changed();
             mover.sweep(sheet);
             before = sheet.squares();
             assert!(before <= flipped);
@@ -149,7 +149,7 @@ fn deep_flips_gain_where_plain_ones_do_not() {
         let mut mover = Mover::new(1);
         (0..8).for_each(|_| sweep_all(&mut mover, sheet));
         let before = sheet.squares();
-        sheet.stir_all();
+        sheet.mark_all_changed();
         deep_flips(sheet, &mut mover, 3);
         assert!(sheet.squares() < 0.99 * before, "{} of {before}", sheet.squares());
     });

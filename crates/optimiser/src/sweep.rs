@@ -25,8 +25,8 @@ const SNAPS_TRIED: usize = 3;
 const STEPS_TRIED: [f64; 2] = [1.6, 0.5];
 /// Steps that promise less than this part of the mean squares of a triangle are not tried.
 const LEAST_PROMISE: f64 = 0.008;
-/// A move that gains this part of the mean squares of a triangle stirs its surroundings.
-const STIRRING_SHARE: f64 = 0.005;
+/// A move that gains this part of the mean squares of a triangle marks as changed its surroundings.
+const LEAST_CHANGE_SHARE: f64 = 0.005;
 /// Quanta squared that a move has to gain at least.
 const LEAST_GAIN: f64 = 1e-5;
 
@@ -37,8 +37,8 @@ pub(crate) struct Mover {
     pub step: i32,
     /// Squares that a step has to promise.
     least_promise: f64,
-    /// Gain above which a move stirs its surroundings.
-    stirring: f64,
+    /// Gain above which a move marks as changed its surroundings.
+    least_change: f64,
     star: Star,
     around: Vec<(Place, f64)>,
     /// The same star in lanes, where it has no more triangles than these.
@@ -73,7 +73,7 @@ impl Mover {
             level,
             step,
             least_promise: 0.0,
-            stirring: f64::INFINITY,
+            least_change: f64::INFINITY,
             star: Star::default(),
             around: Vec::new(),
             lanes: StarLanes::default(),
@@ -91,18 +91,18 @@ impl Mover {
         self.least_promise = LEAST_PROMISE * mean_squares;
     }
 
-    /// Moves every stirred vertex once; only what moves far is stirred afterwards.
+    /// Moves every changed vertex once; only what moves far is changed afterwards.
     pub fn sweep(&mut self, sheet: &mut TileMesh) {
         let mean = sheet.mean_squares();
         self.aim(mean);
         let all = 0..sheet.vertices.len() as u32;
-        let stirred: Vec<u32> = all.filter(|&v| sheet.is_vertex(v) && sheet.vertices[v as usize].is_stirred).collect();
-        sheet.vertices.iter_mut().for_each(|vertex| vertex.is_stirred = false);
-        self.stirring = STIRRING_SHARE * mean;
-        for vertex in stirred {
+        let changed: Vec<u32> = all.filter(|&v| sheet.is_vertex(v) && sheet.vertices[v as usize].has_changed).collect();
+        sheet.vertices.iter_mut().for_each(|vertex| vertex.has_changed = false);
+        self.least_change = LEAST_CHANGE_SHARE * mean;
+        for vertex in changed {
             self.relax(sheet, vertex);
         }
-        self.stirring = f64::INFINITY;
+        self.least_change = f64::INFINITY;
     }
 
     /// Moves one vertex to a better place, if there is one, and to its best height. Gives the squares gained.
@@ -143,9 +143,9 @@ impl Mover {
         }
         self.settle(simd, sheet, vertex, best);
         let gain = normal.squares - best.squares;
-        if self.stirring < gain {
-            sheet.vertices[vertex as usize].is_stirred = true;
-            self.star.ring.iter().for_each(|&other| sheet.vertices[other as usize].is_stirred = true);
+        if self.least_change < gain {
+            sheet.vertices[vertex as usize].has_changed = true;
+            self.star.ring.iter().for_each(|&other| sheet.vertices[other as usize].has_changed = true);
         }
         gain
     }

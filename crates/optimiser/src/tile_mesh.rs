@@ -331,15 +331,15 @@ impl<'a> TileMesh<'a> {
         }
     }
 
-    pub fn stir_all(&mut self) {
-        self.vertices.iter_mut().for_each(|vertex| vertex.is_stirred = true);
+    pub fn mark_all_changed(&mut self) {
+        self.vertices.iter_mut().for_each(|vertex| vertex.has_changed = true);
     }
 
     /// Stirs a vertex and those around it.
-    pub fn stir_around(&mut self, vertex: u32, star: &mut Star) {
+    pub fn mark_around(&mut self, vertex: u32, star: &mut Star) {
         self.star(vertex, star);
-        self.vertices[vertex as usize].is_stirred = true;
-        star.ring.iter().for_each(|&other| self.vertices[other as usize].is_stirred = true);
+        self.vertices[vertex as usize].has_changed = true;
+        star.ring.iter().for_each(|&other| self.vertices[other as usize].has_changed = true);
     }
 
     /// Fills `star` with the triangles around a vertex.
@@ -379,7 +379,7 @@ impl<'a> TileMesh<'a> {
 
     /// A new vertex; it belongs to no triangle yet.
     pub fn add_vertex(&mut self, at: Place, height: f64, hold: Hold) -> u32 {
-        let vertex = Vertex { at, height, edge: NONE, hold, is_stirred: true };
+        let vertex = Vertex { at, height, edge: NONE, hold, has_changed: true };
         match self.free_vertices.pop() {
             Some(index) => {
                 self.vertices[index as usize] = vertex;

@@ -55,7 +55,7 @@ pub(crate) fn weave(
         height: f64::from(vertex.height) - ground.level(),
         edge: NONE,
         hold: layout.line_hold(ground, at).and(Hold::GIVEN),
-        is_stirred: true,
+        has_changed: true,
     }));
     vertices.sort_unstable_by_key(|vertex| vertex.at);
     let at: Vec<Place> = vertices.iter().map(|vertex| vertex.at).collect();

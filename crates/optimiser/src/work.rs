@@ -39,20 +39,20 @@ impl Work<'_, '_> {
         let share = times - 1.0;
         let filling = if by == Thinning::AsItIs { Filling::AsItIs } else { Filling::Fitted };
         if self.account.is_any_over() {
-            self.account.lend(share.max(LIMITS_FROM));
+            self.account.allow_beyond(share.max(LIMITS_FROM));
             self.thin_until(Until::Afforded, filling);
             if share <= LIMITS_FROM {
                 self.thin_until(Until::LimitsMet, filling);
             }
         }
-        self.account.lend(share);
+        self.account.allow_beyond(share);
         let last = match by {
             Thinning::Deep(rest) => {
                 thin_deep(&mut self.sheet, &mut self.account, rest, &mut self.removal, &mut self.mover)
             }
             Thinning::AsItIs | Thinning::Fitted => self.thin_until(Until::Afforded, filling),
         };
-        self.account.lend(0.0);
+        self.account.allow_beyond(0.0);
         self.cheapest = Some(last.unwrap_or(0.0).max(0.0));
         self.sheet.renumber();
     }
@@ -64,7 +64,7 @@ impl Work<'_, '_> {
     /// Inserts where it gains most while there is room.
     pub fn fill_up(&mut self) {
         if self.account.dearest() <= self.account.left() && self.task.rms_quanta.is_none() {
-            self.sheet.stir_all();
+            self.sheet.mark_all_changed();
             Gains::default().insert(&mut self.sheet, &mut self.account, usize::MAX, &mut self.insertion);
         }
     }
@@ -72,11 +72,11 @@ impl Work<'_, '_> {
     /// Grows to so many times the budget, where that is one.
     pub fn grow(&mut self, times: f64) {
         if self.task.rms_quanta.is_none() {
-            self.account.lend(times - 1.0);
+            self.account.allow_beyond(times - 1.0);
             self.insertion.tries_middles = true;
             self.fill_by_squares();
             self.insertion.tries_middles = false;
-            self.account.lend(0.0);
+            self.account.allow_beyond(0.0);
         }
     }
 
@@ -91,12 +91,12 @@ impl Work<'_, '_> {
         while self.account.dearest() <= self.account.left() {
             let Some((triangle, _)) = queue.pop() else { return };
             let Some(found) = self.insertion.find(&mut self.sheet, triangle) else { continue };
-            let guest = self.sheet.vertices[found.vertex as usize];
-            if found.gain <= 0.0 || !self.account.permits(&guest) {
+            let inserted = self.sheet.vertices[found.vertex as usize];
+            if found.gain <= 0.0 || !self.account.permits(&inserted) {
                 self.sheet.drop_vertex(found.vertex);
                 continue;
             }
-            self.account.charge(&guest);
+            self.account.charge(&inserted);
             self.insertion.patch.old.iter().for_each(|&old| queue.cancel(old));
             self.sheet.apply(&mut self.insertion.patch);
             self.sheet.star(found.vertex, &mut star);

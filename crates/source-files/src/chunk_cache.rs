@@ -87,9 +87,9 @@ impl ChunkCache {
     }
 
     fn decode(&self, file: &DemFile, index: usize, chunk: u32) -> Result<Chunk, SourceError> {
-        let mut lent = locked(&self.decoders).get_mut(&index).and_then(Vec::pop);
-        let decoded = file.decode_one(chunk, &mut lent);
-        if let Some(decoder) = lent {
+        let mut kept = locked(&self.decoders).get_mut(&index).and_then(Vec::pop);
+        let decoded = file.decode_one(chunk, &mut kept);
+        if let Some(decoder) = kept {
             locked(&self.decoders).get_or_insert_mut(index, Vec::new).push(decoder);
         }
         decoded

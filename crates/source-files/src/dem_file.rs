@@ -152,13 +152,13 @@ impl DemFile {
         }
     }
 
-    /// Decodes one chunk with the decoder lent, which is made where the format needs one and there is none yet.
-    pub(crate) fn decode_one(&self, chunk: u32, lent: &mut Option<FileDecoder>) -> Result<Chunk, SourceError> {
+    /// Decodes one chunk with the decoder `kept`, which is made where the format needs one and there is none yet.
+    pub(crate) fn decode_one(&self, chunk: u32, kept: &mut Option<FileDecoder>) -> Result<Chunk, SourceError> {
         match &self.reader {
             Reader::GeoTiff(tiff) => {
-                let mut decoder = lent.take().map_or_else(|| tiff.decoder(), Ok)?;
+                let mut decoder = kept.take().map_or_else(|| tiff.decoder(), Ok)?;
                 let decoded = tiff.decode_with(&mut decoder, chunk);
-                *lent = Some(decoder);
+                *kept = Some(decoder);
                 decoded
             }
             Reader::Dted(dted) => dted.decode(chunk),

@@ -77,10 +77,10 @@ impl DemFile {
     /// # Errors
     /// As [`DemFile::decode`] and [`DemFile::assemble`].
     pub fn look(&self, window: PostRect, chunks: &[u32]) -> Result<Look, SourceError> {
-        let (mut look, mut lent) = (Look::default(), None);
+        let (mut look, mut kept) = (Look::default(), None);
         for &chunk in chunks {
             let Some(cut) = self.posts_of(chunk).intersection(&window) else { continue };
-            let raster = self.assemble(cut, vec![self.decode_one(chunk, &mut lent)?])?;
+            let raster = self.assemble(cut, vec![self.decode_one(chunk, &mut kept)?])?;
             let first_void = raster.voids.iter().next().map(|index| raster.place(index));
             look.add(Look {
                 posts: cut.post_count(),
@@ -107,9 +107,9 @@ impl DemFile {
         if self.fractional().is_none() {
             return Ok(false);
         }
-        let mut lent = None;
+        let mut kept = None;
         for chunk in self.chunks_of(window) {
-            let samples = self.decode_one(chunk, &mut lent)?.samples;
+            let samples = self.decode_one(chunk, &mut kept)?.samples;
             if samples.is_some_and(|samples| !samples.all_whole()) {
                 return Ok(true);
             }

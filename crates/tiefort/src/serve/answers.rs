@@ -84,7 +84,7 @@ fn json_answer(value: &Value) -> Response {
     ([(header::CONTENT_TYPE, "application/json")], format!("{value:#}\n")).into_response()
 }
 
-/// What is told of every database; of one that is not at hand, why.
+/// What is told of every database; of one that cannot be read, why.
 pub async fn described_all(shared: &Shared) -> Result<Vec<Value>, Refusal> {
     let served: Vec<Arc<Served>> = shared.served.values().cloned().collect();
     let described = |served: &Arc<Served>| {

@@ -42,7 +42,7 @@ pub fn index(databases: &[Value]) -> Response {
             @for database in databases {
                 h2 { (text(&database["name"])) }
                 @if let Some(error) = database["error"].as_str() {
-                    p { "Not at hand: " (error) }
+                    p { "Cannot be read: " (error) }
                 } @else {
                     table {
                         tr { th { "Area" } td { (text(&database["area"])) } }

@@ -8,7 +8,7 @@
 //!   /api/levels/LEVEL/SOUTH/WEST/NORTH/EAST   the same at a level of detail
 //!   /api/lines/SOUTH/WEST/NORTH/EAST       roads and streams without triangles of their own there (lines.rs)
 //!   /api/relief                            heights and classes on a fine grid, for shades and shadows (relief.rs)
-//!   /api/dem                               whether the sources are at hand, as JSON; else `why` says why not
+//!   /api/dem                               whether the sources can be read, as JSON; else `why` says why not
 //!   /api/dem/SOUTH/WEST/NORTH/EAST         the posts of such a block (posts.rs)
 //! ```
 //! What the tools of the page ask is listed in tools.rs.

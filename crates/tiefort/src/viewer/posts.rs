@@ -1,4 +1,4 @@
-//! The DEM's posts under a block of load modules, where what the database was built from is at hand.
+//! The DEM's posts under a block of load modules, where the sources of the database can be read.
 //!
 //! As bytes: heights of all posts of the block, its four border lines included, in metres (f32), row by row from the
 //! south-west; then the residual of each, DEM less triangles (f32; not a number at voids).
@@ -37,7 +37,7 @@ pub fn bytes(viewed: &Viewed, block: Block) -> Result<Vec<u8>, String> {
 /// The ground of the whole area, read when it is first asked for.
 ///
 /// # Errors
-/// In words, when the sources are not at hand, or too large.
+/// In words, when the sources cannot be read, or too large.
 pub fn ground(viewed: &Viewed) -> Result<&ProductGround, String> {
     viewed.ground.get_or_init(|| read(viewed)).as_ref().map_err(Clone::clone)
 }

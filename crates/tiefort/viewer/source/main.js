@@ -86,7 +86,7 @@ function viewOf(area) {
   return view;
 }
 
-/** Whether no graphics hardware is at hand: then every sample of a pixel costs. */
+/** Whether there is no graphics hardware: then every sample of a pixel costs. */
 function drawsInSoftware() {
   const context = document.createElement("canvas").getContext("webgl2");
   const names = context?.getExtension("WEBGL_debug_renderer_info");

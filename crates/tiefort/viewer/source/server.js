@@ -111,7 +111,7 @@ function pointsAt(bytes, at, count, [west, south]) {
   return points;
 }
 
-/** Fails with the reason where the sources of the database are not at hand. */
+/** Fails with the reason where the sources of the database cannot be read. */
 export async function checkDem() {
   const { why } = await (await answer("/api/dem")).json();
   if (why !== null) throw new Error(why);

@@ -31,7 +31,7 @@ export function switches(view, { light }) {
       note("");
     } catch (fault) {
       at("dem").checked = false;
-      note(`The DEM is not at hand: ${fault.message}`);
+      note(`The DEM cannot be read: ${fault.message}`);
       at("layers").open = true;
     }
     at("splitter").hidden = !terrain.withDem;

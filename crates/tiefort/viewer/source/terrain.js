@@ -211,7 +211,7 @@ export class Terrain {
     }
   }
 
-  /** Shows the DEM, or the triangles again. Fails where the DEM is not at hand; then nothing has changed. */
+  /** Shows the DEM, or the triangles again. Fails where the DEM cannot be read; then nothing has changed. */
   async showDem(wanted) {
     if (wanted) await checkDem();
     const modules = [...this.drawn.values()].map(({ module }) => module).filter((module) => module.level === 0);
