@@ -47,7 +47,7 @@ fn without_flags(text: &str) -> String {
         let end = flag.find(|c: char| !c.is_ascii_lowercase() && c != '-').unwrap_or(flag.len());
         let name = flag[..end].trim_end_matches('-');
         let is_flag =
-            name.starts_with(|c: char| c.is_ascii_lowercase()) && !before.ends_with(|c: char| !" (['".contains(c));
+            name.starts_with(|c: char| c.is_ascii_lowercase()) && !before.ends_with(|c: char| !" ([<|'".contains(c));
         told += before;
         match OTHERWISE.iter().find(|(flag, _)| *flag == name) {
             _ if !is_flag => told += &rest[at..at + 2 + name.len()],
