@@ -39,7 +39,7 @@ pub use posts::{PostHeights, residuals_at_posts, residuals_by_class};
 mod draw;
 mod samples;
 mod sight;
-pub use sight::{EYE_M, LineOfSight, RANGE_M, line_of_sight, sees_on};
+pub use sight::{EYE_M, LineOfSight, RANGE_M, line_of_sight};
 mod slope;
 pub use slope::{SlopeDifference, slope};
 mod grade;
