@@ -72,7 +72,11 @@ Exit codes:
   130  stopped by SIGINT; 143 by SIGTERM";
 
 /// What is built in beyond what every program has.
-const FEATURES: &str = if cfg!(feature = "viewer") { "viewer" } else { "none (viewer is left out)" };
+const FEATURES: &str = match (cfg!(feature = "serve"), cfg!(feature = "viewer")) {
+    (_, true) => "serve, viewer",
+    (true, false) => "serve (viewer is left out)",
+    (false, false) => "none (serve and viewer are left out)",
+};
 
 /// Version of the program, what it was built from, versions of what it writes, and of how it decides.
 static LONG_VERSION: LazyLock<String> = LazyLock::new(|| {

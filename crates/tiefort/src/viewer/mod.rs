@@ -18,6 +18,7 @@ mod area;
 mod block;
 mod lines;
 mod overview;
+mod plain;
 mod posts;
 mod relief;
 mod tools;
@@ -35,6 +36,7 @@ use load_module_reader::Block;
 use crate::failure::Failure;
 use crate::serve::Page;
 use area::Viewed;
+use plain::{FAULT, bytes};
 
 const PAGE: &str = include_str!("../../viewer/index.html");
 const PROGRAM: &str = include_str!("../../viewer/dist/viewer.js");
@@ -42,7 +44,6 @@ const PROGRAM: &str = include_str!("../../viewer/dist/viewer.js");
 const POLICY: &str = "default-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:";
 /// Load modules in one answer at most: a view of 8 km each way.
 const BLOCK_MODULES_MAX: usize = 1024;
-const FAULT: &str = "a fault in tiefort; the terminal says which";
 
 /// The page of the database in `folder`, and what it asks.
 ///
@@ -121,8 +122,4 @@ async fn answer(
         Ok(Err(why)) => (StatusCode::CONFLICT, why).into_response(),
         Err(_) => (StatusCode::INTERNAL_SERVER_ERROR, FAULT).into_response(),
     }
-}
-
-fn bytes(body: axum::body::Bytes) -> Response {
-    ([(header::CONTENT_TYPE, "application/octet-stream")], body).into_response()
 }

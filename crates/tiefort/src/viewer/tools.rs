@@ -22,7 +22,7 @@ use load_module_reader::{Curvature, Sight, Viewshed};
 use serde_json::{Value, json};
 
 use super::area::Viewed;
-use super::{FAULT, bytes};
+use super::plain::{FAULT, bytes};
 use crate::failure::Failure;
 use crate::places::{self, ground_around, place, place_above};
 
