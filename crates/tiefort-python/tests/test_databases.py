@@ -201,7 +201,7 @@ def test_methods_are_compared_on_heights_in_memory(tmp_path: Path) -> None:
     assert without_seconds(found) == without_seconds(again)
     part = tiefort.compare(hills(), spacing_m=25.0, window="10,20,30x40", **asked)
     assert without_seconds(part) != without_seconds(found)
-    with pytest.raises(tiefort.RequestError, match="points: found|points"):
+    with pytest.raises(tiefort.RequestError, match="points"):
         tiefort.compare(hills(), points=[])
     rasterio = pytest.importorskip("rasterio")
     assert run("sample", "--posts", 301, "--out", tmp_path / "dem.tif").returncode == 0
