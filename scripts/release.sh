@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Makes the files of a release in target/release-files: source archive, program, wheel and checksums.
 # Needs a clean checkout, Node for the page of the viewer, and Python for the wheel; `--no-wheel` leaves that out.
-# The program is linked statically where Rust's target for musl and musl-gcc are installed.
+# The program is linked statically: with musl where Rust's target for it and musl-gcc are installed, else with glibc.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -32,11 +32,14 @@ git archive --prefix="$source/" --add-virtual-file="$source/COMMIT:$commit" HEAD
 
 host=$(rustc -vV | sed -n 's/^host: //p')
 target=$host
-static=${host%-gnu}-musl
-if [[ $host == *-linux-gnu && -d $(rustc --print sysroot)/lib/rustlib/$static ]] && command -v musl-gcc >/dev/null; then
-    target=$static
+musl=${host%-gnu}-musl
+if [[ $host == *-linux-gnu && -d $(rustc --print sysroot)/lib/rustlib/$musl ]] && command -v musl-gcc >/dev/null; then
+    target=$musl
+elif [[ $host == *-linux-gnu ]]; then
+    # It looks up no names and loads no libraries, the two things that a static glibc cannot do.
+    export RUSTFLAGS="${RUSTFLAGS-} -C target-feature=+crt-static"
 else
-    printf 'no %s here: the program is for %s, linked with its C library\n' "$static" "$host" >&2
+    printf 'no musl here: the program is linked with the C library of %s\n' "$host" >&2
 fi
 scripts/build_viewer.sh
 cargo build --release --locked -p tiefort --features viewer --target "$target"
@@ -51,10 +54,15 @@ cp "$tiefort" README.md CHANGELOG.md LICENSE-APACHE LICENSE-MIT "$folder"
 "$tiefort" completions zsh >"$folder/completions/_tiefort"
 "$tiefort" completions fish >"$folder/completions/tiefort.fish"
 "$tiefort" --version | grep -q "^commit $commit$"
+if [[ $host == *-linux-gnu ]] && ldd "$tiefort" >&2; then
+    printf 'the program needs libraries, expected none\n' >&2
+    exit 1
+fi
 "${archive[@]}" -C "$scratch" -c "tiefort-$version-$target" | gzip -n >"$out/tiefort-$version-$target.tar.gz"
 
 if [[ $wheel == yes ]]; then
-    scripts/build_wheel.sh
+    # A library that Python loads cannot be static.
+    env -u RUSTFLAGS scripts/build_wheel.sh
     cp target/wheels/tiefort-*.whl "$out"
 fi
 (cd "$out" && sha256sum -- * >SHA256SUMS)
