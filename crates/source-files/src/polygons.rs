@@ -140,7 +140,7 @@ struct Collected<'a> {
 }
 
 impl Collected<'_> {
-    /// Adds all polygons of a GeoJSON text; gives the system that it names.
+    /// Adds all polygons of a GeoJSON text; returns the system that it names.
     fn add_json(&mut self, bytes: &[u8]) -> Result<Option<Crs>, SourceError> {
         let broken = |reason: String| SourceError::NotGeoJson { path: self.path.into(), reason };
         let text = std::str::from_utf8(bytes).map_err(|_| broken("it is not UTF-8 text".into()))?;

@@ -191,7 +191,7 @@ impl Raster {
     }
 }
 
-/// Copies the part of a chunk that lies in the window; gives the number of posts.
+/// Copies the part of a chunk that lies in the window; returns the number of posts.
 fn place(header: &Header, window: PostRect, chunk: &Chunk, samples: &mut Samples) -> usize {
     let posts = chunk.posts;
     let Some(cut) = posts.intersection(&window) else { return 0 };

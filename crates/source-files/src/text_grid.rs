@@ -301,7 +301,7 @@ impl AsciiGrid {
     }
 }
 
-/// Reads the next run of bytes that are not white space into `word`; gives the bytes it took, white space and all.
+/// Reads the next run of bytes that are not white space into `word`; returns the bytes it took, white space and all.
 fn next_word(reader: &mut impl BufRead, word: &mut Vec<u8>) -> std::io::Result<Option<u64>> {
     word.clear();
     let mut read = 0;

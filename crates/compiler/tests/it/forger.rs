@@ -121,7 +121,7 @@ fn scene(kind: &str) -> Scene {
     scene
 }
 
-/// Alters a database, follows, alters what `after` says, and seals; gives what `verify` says.
+/// Alters a database, follows, alters what `after` says, and seals; returns what `verify` says.
 fn forged(scene: &Scene, parts: &Forged, alter: Alter, after: Alter) -> Vec<String> {
     let mut parts = parts.clone();
     alter(&mut parts);

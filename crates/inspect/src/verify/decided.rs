@@ -30,7 +30,7 @@ impl<'a> Decided<'a> {
         Self { area, steps: 0, heights, edges, decks: BTreeSet::new(), strips: BTreeSet::new() }
     }
 
-    /// Adds those of a tile; gives what two tiles do not agree on.
+    /// Adds those of a tile; returns what two tiles do not agree on.
     pub fn add(&mut self, features: &TileFeatures) -> Option<String> {
         let kept = &features.kept;
         self.steps = kept.steps_per_post;

@@ -10,7 +10,7 @@ const PASSES_MAX: usize = 10;
 /// A flip has to gain more than one part in so many of the two triangles' squares: below it lies rounding.
 const LEAST_GAIN: u128 = 10_000;
 
-/// Flips edges until none gains, in passes over the triangles; gives the flips. Sides and edges of features stay.
+/// Flips edges until none gains, in passes over the triangles; returns the flips. Sides and edges of features stay.
 pub(super) fn flip_all(sheet: &mut LevelMesh, posts: &Posts) -> usize {
     let mut total = 0;
     // Where neither triangle of an edge has changed since it was looked at, it would be found the same again.
