@@ -53,7 +53,11 @@ cp "$tiefort" README.md CHANGELOG.md LICENSE-APACHE LICENSE-MIT "$folder"
 "$tiefort" completions bash >"$folder/completions/tiefort"
 "$tiefort" completions zsh >"$folder/completions/_tiefort"
 "$tiefort" completions fish >"$folder/completions/tiefort.fish"
-"$tiefort" --version | grep -q "^commit $commit$"
+found=$("$tiefort" --version | sed -n 's/^commit //p')
+if [[ $found != "$commit" ]]; then
+    printf 'the program names commit %s, expected %s: was something committed meanwhile?\n' "$found" "$commit" >&2
+    exit 1
+fi
 if [[ $host == *-linux-gnu ]] && ldd "$tiefort" >&2; then
     printf 'the program needs libraries, expected none\n' >&2
     exit 1
