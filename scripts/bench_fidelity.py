@@ -7,6 +7,8 @@
     scripts/bench_fidelity.py --only desert    inputs and jobs whose name has this in it
     scripts/bench_fidelity.py --json all.json  every figure, for a program
     scripts/bench_fidelity.py --quick --book   put the figures of the desert into README and the book
+    scripts/bench_fidelity.py --tables 4 --book                put what each effort costs and gains into the book
+    scripts/bench_fidelity.py --tables 4 --before PROGRAM      hold it against an earlier program, too
 
 1. Equal triangles, no load modules, per raster: greedy insertion (`pydelatin`) of so many points gives the number of
    triangles; CGAL's Lindstrom-Turk edge collapse and `tiefort tin --triangles` are asked for the same.
@@ -14,6 +16,8 @@
    clipped edges, brought by bisection over its points to the mean the limits allow. Points are shared equally among
    tiles, the paper's practice, and by need; ratios and bars take the better of the two.
 3. What cutting an area into tiles costs, and sharing triangles equally among them.
+4. What each effort costs and gains on every real area: residual, lines of sight for eyes at 1, 2.5 and 10 m, angles
+   below 5 degrees, processor time of the build without its page. Only where it is asked for.
 
 Every mesh and every database is judged by scripts/fidelity/evaluate.cpp, which shares no code with the compiler (its
 own test: scripts/fidelity/selftest.py). Where Lindstrom-Turk folds over, the topmost triangle counts.
@@ -22,6 +26,8 @@ Seconds of table 1 are from heights in memory to the mesh. Greedy and Lindstrom-
 are the seconds that the program prints for its stages after `read` (refining, merging, measuring: all but reading and
 writing), with one worker. Short runs are repeated and the best counts. Seconds of tables 2 and 3 are those of the
 whole process, reading and publishing included, on all cores; MB is its peak memory.
+
+Table 4 needs 10 minutes on two cores, twice that with an earlier program.
 
 Faults of a mesh are told in short; --json has them all. Missing rasters, programs or options are skipped loudly. The
 exit code is 1 when a bar is missed.
@@ -190,11 +196,12 @@ def arguments():
     parser.add_argument("--quick", action="store_true", help="the desert window and the desert job only")
     parser.add_argument("--large", action="store_true", help="Lindstrom-Turk on rasters above 500,000 posts, too")
     parser.add_argument("--only", metavar="NAME", help="inputs and jobs with this in their name")
-    parser.add_argument("--tables", default="123", metavar="DIGITS", help="which of the three tables (default 123)")
+    parser.add_argument("--tables", default="123", metavar="DIGITS", help="which of the four tables (default 123)")
     parser.add_argument("--reuse-peer", action="store_true", help="keep what Lindstrom-Turk made and took earlier")
     parser.add_argument("--json", type=pathlib.Path, metavar="FILE", help="also write every figure here")
     parser.add_argument("--book", action="store_true",
                         help="also put the figures of the desert into README and the book")
+    parser.add_argument("--before", type=pathlib.Path, metavar="PROGRAM", help="an earlier program, for table 4")
     parser.add_argument("--no-build", action="store_true", help="take the binary as it is")
     parser.add_argument("--binary", type=pathlib.Path, default=TARGET / "release" / "tiefort",
                         help="the binary to measure; with another than the default, --no-build is implied")
@@ -218,7 +225,7 @@ def main():
     if not compiled("evaluate"):
         sys.exit("without its evaluator this script has nothing to say")
     wanted = lambda name: options.only is None or options.only in name
-    before, results = load(), {"rasters": {}, "areas": {}, "tiles": {}}
+    before, results = load(), {"rasters": {}, "areas": {}, "tiles": {}, "efforts": {}}
 
     if "1" in options.tables:
         print("## 1. Equal triangles, no load modules")
@@ -235,6 +242,12 @@ def main():
             if "3" in options.tables:
                 print("\n## 3. The cost of tiles")
                 results["tiles"][area.name] = areas.tiling(tiefort, area)
+
+    if "4" in options.tables:
+        print("\n## 4. What each effort costs and gains")
+        before_program = options.before and options.before.resolve(strict=True)
+        for area in areas.areas(tiefort, options.quick, wanted, areas.REAL):
+            results["efforts"][area.name] = areas.efforts(tiefort, area, before_program)
 
     if not any(results.values()):
         sys.exit("nothing was measured: no input or job has such a name, or its raster is missing")

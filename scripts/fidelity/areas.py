@@ -9,6 +9,13 @@ from fidelity import terrain
 from fidelity.workshop import (DATA, FOLDER, ROOT, evaluate, faults, markdown, number, ratio, run, scratch, skip,
                                tell, why, write_heights, write_mesh)
 
+# Areas of configs/, and real rasters in metres that have none: as many load modules as fit.
+CONFIGS = ["desert", "alps", "ntc", "ntc-even"]
+RASTERS = {"mackay": "dem/mackay_idaho_738x919_30m_utm12n.tif", "baja": "dem/baja_california_sur_1264x1005_29m.tif",
+           "big-butte": "dem/big_butte_idaho_623x672_30m_utm12n.tif",
+           "big-tujunga": "dem/bigtujunga_california_1197x643_30m_utm11n.tif",
+           "missoula": "dem/missoula_valley_714x975_31m_utm11n.tif"}
+REAL = ["desert", "alps", *RASTERS]
 EFFORTS = ("fast", "normal", "best")
 SIGHTS = (True, False)
 # The bisection ends this near to the mean it looks for, in triangles per load module; or with points this near to each
@@ -18,6 +25,10 @@ POINTS_WITHIN = 0.002
 BUILDS_MAX = 14
 NEAR_SEAMS_M = 1000
 MODULE_M = 500
+# The working grid of rasters without a job: a border step of 125 m is a whole number of these.
+WORKING_M = 25
+# Lines of sight are judged at these heights of eyes, in metres.
+EYES_M = ("1", "2.5", "10")
 HEAD = ["", "mean", "RMS m", "of paper", "of grid", "max m", "mean m", "largest", "4 km", "breaches", "seconds", "MB",
         "valid", "sight %", "visible %", "slope RMS"]
 
@@ -33,25 +44,60 @@ class Area:
     spacing_m: tuple
 
 
-def areas(tiefort, quick, wanted):
+def areas(tiefort, quick, wanted, names=CONFIGS):
     """The jobs that are wanted and whose rasters are there. The sample comes twice: with importance and without."""
-    names = ["desert"] if quick else ["desert", "alps", "ntc", "ntc-even"]
-    for name in filter(wanted, names):
-        job = tomllib.loads((ROOT / "configs" / f"{name.removesuffix('-even')}.toml").read_text())
-        if name.endswith("-even"):
-            job.pop("importance")
-        sources = [DATA / path.split("shared/data/")[-1] for path in job["dem"].get("sources", [])]
-        missing = [path for path in sources if not path.exists()]
-        if missing:
-            skip(name, f"no {missing[0]}")
-            continue
-        if sources:
-            job["dem"]["sources"] = [str(path) for path in sources]
-        heights = terrain.working_grid(job, tiefort)
-        if heights is not None:
-            raw = FOLDER / f"{name}-area.heights"
-            write_heights(raw, heights)
-            yield Area(name, job, heights, raw, (job["area"]["spacing_m"],) * 2)
+    for name in filter(wanted, ["desert"] if quick else names):
+        job = job_of_raster(name) if name in RASTERS else job_of_config(name)
+        area = job and area_of(tiefort, name, job)
+        if area:
+            yield area
+
+
+def area_of(tiefort, name, job):
+    """A job with its working grid; None when that cannot be had."""
+    heights = terrain.working_grid(job, tiefort)
+    if heights is None:
+        return None
+    raw = FOLDER / f"{name}-area.heights"
+    write_heights(raw, heights)
+    return Area(name, job, heights, raw, (job["area"]["spacing_m"],) * 2)
+
+
+def job_of_config(name):
+    """The job of configs/; None when its raster is missing."""
+    job = tomllib.loads((ROOT / "configs" / f"{name.removesuffix('-even')}.toml").read_text())
+    if name.endswith("-even"):
+        job.pop("importance")
+    sources = [DATA / path.split("shared/data/")[-1] for path in job["dem"].get("sources", [])]
+    missing = [path for path in sources if not path.exists()]
+    if missing:
+        return skip(name, f"no {missing[0]}")
+    if sources:
+        job["dem"]["sources"] = [str(path) for path in sources]
+    return job
+
+
+def job_of_raster(name):
+    """A job like those of configs/ over a raster, as many load modules as lie inside; None when it is missing."""
+    if not (DATA / RASTERS[name]).exists():
+        return skip(name, f"no {DATA / RASTERS[name]}")
+    heights, spacing_m, profile = terrain.read(DATA / RASTERS[name])
+    source = FOLDER / f"{name}-area.tif"
+    terrain.write_geotiff(source, heights, profile)
+    # The middle of the south-westernmost pixel is the first post.
+    west, south = profile["transform"] * (0.5, heights.shape[0] - 0.5)
+    reach = [(posts - 1) * step for posts, step in zip(heights.shape[::-1], spacing_m)]
+    start = [-(-west // WORKING_M) * WORKING_M, -(-south // WORKING_M) * WORKING_M]
+    size = [int((first + length - begin) // MODULE_M) * MODULE_M
+            for first, length, begin in zip((west, south), reach, start)]
+    epsg = profile["crs"].to_epsg()
+    return {
+        "area": {"name": name, "crs": f"EPSG:{epsg}", "origin_m": start, "size_m": size, "spacing_m": WORKING_M},
+        "dem": {"sources": [str(source)], "voids": "fail"},
+        "tiles": {"columns": 6, "rows": 6},
+        "limits": {"per_load_module": 100, "mean_per_load_module": 32, "per_4km_square": 4096},
+        "tin": {"method": "optimised"},
+    }
 
 
 # --- jobs ---
@@ -83,16 +129,17 @@ def write_job(job):
     return path
 
 
-def build(tiefort, area, job, judge=True):
+def build(tiefort, area, job, judge=True, page=True, options=()):
     """Builds a database from nothing; what the run took, what it reports, and what the evaluator says of it."""
     path = write_job(job)
+    words = ["--fresh", "--quiet"] + ([] if page else ["--no-html"])
     with scratch("area.tdb") as database:
-        ran = run(tiefort, "build", path, "--out", database, "--workers", os.cpu_count(), "--fresh", "--quiet")
+        ran = run(tiefort, "build", path, "--out", database, "--workers", os.cpu_count(), *words)
         if ran["code"] not in (0, 1):
             return ran
         ran["report"] = json.loads((database / "report.json").read_text())
         if judge:
-            ran["judged"] = judge_database(database, area)
+            ran["judged"] = judge_database(database, area, *options)
             check_against_report(ran, area)
     return ran
 
@@ -103,7 +150,7 @@ def check_against_report(ran, area):
         tell(f"NOTE {area.name}: report.json has RMS {theirs:.4f} m, the evaluator {ours:.4f} m")
 
 
-def judge_database(database, area):
+def judge_database(database, area, *options):
     """Load modules as one mesh, welded where they hold equal points, read by the project's reader in Python."""
     import read_slm
 
@@ -125,7 +172,7 @@ def judge_database(database, area):
     write_mesh(mesh, vertices, triangles, side // cells)
     columns, rows = (",".join(map(str, sorted(found - {0}))) for found in lines)
     return evaluate(mesh, area.raw, area.spacing_m, "--seams", f"{columns}/{rows}",
-                    int(NEAR_SEAMS_M // area.spacing_m[0]))
+                    int(NEAR_SEAMS_M // area.spacing_m[0]), *options)
 
 
 # --- at equal triangles ---
@@ -272,3 +319,42 @@ def tiling(tiefort, area):
             "breaches", "seconds", "MB", "valid"]
     markdown(f"{area.name}: what tiles cost", head, rows)
     return results
+
+
+# --- what each effort costs and gains ---
+
+
+EFFORT_ROWS = {"fast": {"effort": "fast"}, "normal": {"effort": "normal"}, "best": {"effort": "best"},
+               "normal, sight = false": {"effort": "normal", "sight": False}}
+# An earlier program has the same efforts.
+BEFORE_ROWS = {"before, fast": {"effort": "fast"}, "before, normal": {"effort": "normal"}}
+EFFORT_HEAD = ["", "RMS m", "of normal", *(f"sight at {eye} m" for eye in EYES_M), "angles below 5°", "cpu s",
+               "of normal"]
+
+
+def efforts(tiefort, area, before):
+    """Residual, lines of sight, thin triangles and processor time of every effort; of an earlier program's, too."""
+    results = {}
+    rows = [(tiefort, *row) for row in EFFORT_ROWS.items()]
+    rows += [(before, *row) for row in BEFORE_ROWS.items()] if before else []
+    for program, name, tin in rows:
+        tell(f"{area.name}: {name}")
+        job = changed(area.job, tin={"method": "optimised"} | tin)
+        ran = build(program, area, job, page=False, options=["--eyes", ",".join(EYES_M)])
+        if "report" in ran:
+            results[name] = row_of(ran)
+        else:
+            skip(f"{area.name}, {name}", why(ran))
+    markdown(f"{area.name}: what each effort costs and gains", EFFORT_HEAD, [
+        effort_cells(name, result, results.get("normal")) for name, result in results.items()])
+    return results
+
+
+def effort_cells(name, result, normal):
+    judged = result["judged"]
+    ratios = [ratio(result[key], normal and normal[key], 2 if key == "cpu_s" else 3) for key in ("rms_m", "cpu_s")]
+    return [
+        name, number(result["rms_m"], 3), ratios[0],
+        *(f"{100 * judged['agreement_at_m'][eye]:.2f} %" for eye in EYES_M),
+        f"{100 * judged['least_angle_below']['5']:.2f} %", number(result["cpu_s"], 2), ratios[1],
+    ]

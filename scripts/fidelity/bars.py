@@ -14,7 +14,8 @@ OURS = ("fast", "normal", "best", "normal, on posts", "fast, sight", "normal, si
 
 def tell(results):
     """Prints every bar as a table; the names of those that are missed."""
-    rows = [*rasters(results["rasters"]), *limited(results["areas"]), *seams(results["tiles"])]
+    rows = [*rasters(results["rasters"]), *limited(results["areas"]), *seams(results["tiles"]),
+            *efforts(results["efforts"])]
     if not rows:
         return []
     print("\n## Bars")
@@ -93,3 +94,27 @@ def seams(jobs):
             found = result["judged"].get("seams", {})
             if tiles == "6 x 6, global" and found.get("posts"):
                 yield f"{name}: RMS near tile lines, of elsewhere", found["rms_m"] / found["others_rms_m"], 1.03, False
+
+
+# What an effort may have of the residual that an earlier program's has: which, of which, at most.
+OF_BEFORE = [("fast", "before, fast", 0.95), ("normal", "before, normal", 1.0), ("best", "before, normal", 0.94),
+             ("normal, sight = false", "before, normal", 0.97)]
+# Share of lines of sight that `normal` keeps beyond what it kept before.
+MORE_SIGHT = 0.005
+
+
+def efforts(jobs):
+    for name, results in jobs.items():
+        for ours, earlier, bar in OF_BEFORE:
+            if ours in results and earlier in results:
+                found = results[ours]["rms_m"] / results[earlier]["rms_m"]
+                yield f"{name}: RMS of {ours}, of {earlier}", found, bar, False
+        now, before = results.get("normal"), results.get("before, normal")
+        if not now or not before:
+            continue
+        now, before = now["judged"], before["judged"]
+        for eye, kept in before["agreement_at_m"].items():
+            gained = 100 * (now["agreement_at_m"][eye] - kept)
+            yield f"{name}: lines of sight at {eye} m gained by normal, points", gained, 100 * MORE_SIGHT, True
+        thin = [100 * judged["least_angle_below"]["5"] for judged in (now, before)]
+        yield f"{name}: angles below 5 degrees of normal, %, at most as before", thin[0], thin[1], False

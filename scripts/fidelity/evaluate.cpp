@@ -2,6 +2,7 @@
 //
 //     g++ -O2 -std=c++17 -o evaluate evaluate.cpp
 //     evaluate MESH HEIGHTS SPACING_X SPACING_Y [--sight-lines N] [--eyes M,…] [--seams COLUMNS/ROWS WITHIN]
+//              [--residuals FILE]
 //
 // It shares no code with the compiler, so that neither can hide the other's mistakes. It prints one JSON object, and
 // exits with 0 for a valid surface, 1 for an invalid one, 2 when it could not read its input.
@@ -9,7 +10,8 @@
 // MESH is a binary little-endian PLY in metres from the south-west post (`tiefort tin --out x.ply`), or ".mesh": the
 // letters MESHPOST, 32-bit lattice steps per post, two 32-bit counts, vertices as three doubles (column and row from
 // the south-west post in posts, height in metres), triangles as three 32-bit indices. HEIGHTS is 32-bit columns and
-// rows, then 32-bit floats, rows from the south. SPACING_X and SPACING_Y are metres between posts.
+// rows, then 32-bit floats, rows from the south. SPACING_X and SPACING_Y are metres between posts. --residuals writes
+// surface less raster at every post like HEIGHTS, NaN outside all triangles.
 //
 // Topology is decided in whole numbers. Corners of a PLY stand on 1/64 of a post, since that is finer than any lattice
 // the compiler writes and a 32-bit float in metres is not exact; those of a .mesh are rounded to the steps it names.
@@ -680,7 +682,7 @@ Sight line_of_sight(const Mesh& mesh, const Heights& heights, size_t wanted, dou
 // --- telling ---
 
 struct Arguments {
-    std::string mesh, heights;
+    std::string mesh, heights, residuals;
     double spacing_x = 0.0, spacing_y = 0.0;
     size_t sight_lines = 20000;
     std::vector<double> eyes_m;
@@ -700,9 +702,10 @@ std::vector<int64_t> numbers(const std::string& text) {
 Arguments arguments(int count, char** words) {
     if (count < 5) {
         throw std::runtime_error("usage: evaluate MESH HEIGHTS SPACING_X SPACING_Y [--sight-lines N] "
-                                 "[--eyes METRES,…] [--seams COLUMN,…/ROW,… WITHIN_POSTS]");
+                                 "[--eyes METRES,…] [--seams COLUMN,…/ROW,… WITHIN_POSTS] "
+                                 "[--residuals FILE]");
     }
-    Arguments given{words[1], words[2], std::stod(words[3]), std::stod(words[4]), 20000, {}, {}, {}, 0};
+    Arguments given{words[1], words[2], "", std::stod(words[3]), std::stod(words[4]), 20000, {}, {}, {}, 0};
     for (int i = 5; i < count; i++) {
         std::string word = words[i];
         if (word == "--sight-lines" && i + 1 < count) {
@@ -718,8 +721,10 @@ Arguments arguments(int count, char** words) {
             given.seam_columns = numbers(lines.substr(0, slash));
             given.seam_rows = numbers(slash < lines.size() ? lines.substr(slash + 1) : "");
             given.seam_within = std::stoll(words[++i]);
+        } else if (word == "--residuals" && i + 1 < count) {
+            given.residuals = words[++i];
         } else {
-            throw std::runtime_error("found " + word + ", expected --sight-lines, --eyes or --seams");
+            throw std::runtime_error("found " + word + ", expected --sight-lines, --eyes, --seams or --residuals");
         }
     }
     return given;
@@ -737,6 +742,22 @@ void print_seams(const Posts& posts, const Heights& heights, const Arguments& gi
     Residuals others = residuals(posts, heights, [&](int64_t column, int64_t row) { return !near(column, row); });
     std::printf("  \"seams\": {\"posts\": %lld, \"rms_m\": %.9g, \"others_rms_m\": %.9g},\n", (long long)seams.posts,
                 seams.rms_m, others.rms_m);
+}
+
+void write_residuals(const std::string& path, const Posts& posts, const Heights& heights) {
+    std::ofstream out(path, std::ios::binary);
+    uint32_t size[2] = {uint32_t(heights.columns), uint32_t(heights.rows)};
+    out.write(reinterpret_cast<const char*>(size), sizeof size);
+    for (int64_t row = 0; row < heights.rows; row++) {
+        for (int64_t column = 0; column < heights.columns; column++) {
+            size_t post = size_t(row) * size_t(heights.columns) + size_t(column);
+            float residual = float(posts.heights[post] - heights.at(column, row));
+            out.write(reinterpret_cast<const char*>(&residual), sizeof residual);
+        }
+    }
+    if (!out.flush()) {
+        throw std::runtime_error(path + ": cannot be written");
+    }
 }
 
 void print_sight(const Sight& sight) {
@@ -774,6 +795,9 @@ bool judge(const Arguments& given) {
     std::printf("  \"least_angle_below\": {\"5\": %.6f, \"10\": %.6f, \"20\": %.6f},\n", below_5, below_10, below_20);
     if (0 < given.seam_within) {
         print_seams(posts, heights, given);
+    }
+    if (!given.residuals.empty()) {
+        write_residuals(given.residuals, posts, heights);
     }
     if (0 < given.sight_lines) {
         print_sight(line_of_sight(mesh, heights, given.sight_lines, EYE_M));

@@ -1,6 +1,7 @@
 """What README and the book show of the figures of bench_fidelity.py: three short tables."""
 
 from book import FIGURES, ROOT, put
+from fidelity.areas import EFFORT_HEAD, EFFORT_ROWS, effort_cells
 
 # Rows of a raster and of an area as they are called there, and as they are called here.
 RASTER_ROWS = {"greedy": "greedy insertion (`pydelatin`)", "Lindstrom-Turk": "edge collapse (CGAL, Lindstrom-Turk)",
@@ -52,8 +53,23 @@ def of_readme(results):
     return text
 
 
+def of_efforts(areas):
+    """What each effort costs and gains, area after area."""
+    text = ""
+    for name, results in areas.items():
+        lines = [[name, *EFFORT_HEAD[1:]], ["-", *["-:"] * (len(EFFORT_HEAD) - 1)]]
+        normal, rows = results.get("normal"), [row for row in EFFORT_ROWS if row in results]
+        lines += [effort_cells(f"`{row}`", results[row], normal) for row in rows]
+        text += "\n".join(f"| {' | '.join(line)} |" for line in lines) + "\n\n"
+    return text
+
+
 def write(results):
     """Puts the tables where README and the book have them."""
+    if results["efforts"]:
+        put(FIGURES, "efforts", of_efforts(results["efforts"]))
+    if not results["rasters"] or not results["areas"]:
+        return
     raster = [found for name, found in results["rasters"].items() if name.startswith("desert-window")][-1]
     text = of_raster(raster) + "\n" + "\n".join(of_area(*item) for item in results["areas"].items())
     put(FIGURES, "fidelity", text)

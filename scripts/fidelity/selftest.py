@@ -114,6 +114,14 @@ class Tester:
         assert judged["valid"] == (done.returncode == 0), "the exit code says what the object says"
         return judged
 
+    def residuals(self, path):
+        """Surface less ground at every post, as the evaluator writes it."""
+        out = self.folder / "posts.residuals"
+        subprocess.run([self.program, path, self.heights, "100", "100", "--residuals", out], capture_output=True)
+        found = array.array("f", out.read_bytes()[8:])
+        assert struct.unpack("<II", out.read_bytes()[:8]) == (SIDE, SIDE)
+        return found
+
     def expect(self, name, holds, found):
         print(f"{'ok    ' if holds else 'FAILED'} {name}" + ("" if holds else f": {found}"))
         self.failed += not holds
@@ -135,6 +143,10 @@ class Tester:
         self.expect("they see through the wall", flat["sight"]["false_visible"] > 0.2, flat["sight"])
         largest = max(abs(ground(c, r) - plane(c, r)) for c in range(SIDE) for r in range(SIDE))
         self.expect("their largest residual is the one worked out here", abs(flat["max_m"] - largest) < 1e-9, flat)
+        found = self.residuals(path)
+        wanted = [plane(c, r) - ground(c, r) for r in range(SIDE) for c in range(SIDE)]
+        near = all(abs(one - other) < 1e-4 for one, other in zip(found, wanted, strict=True))
+        self.expect("every residual is the one worked out here", near, list(found))
 
         ply = self.folder / "right.ply"
         write_ply(ply, (moved(grid()[0], 40, 0.125, -0.25), grid()[1]), 25.27)
