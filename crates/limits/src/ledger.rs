@@ -29,9 +29,23 @@ pub struct Allowance {
 pub struct Ledger {
     /// What may be spent in each load module, less what neighbours spent there.
     allowance: Allowance,
-    modules: Vec<u32>,
-    windows: Vec<u32>,
+    modules: Vec<Account>,
+    /// What each window has left, negative where it has more than it may.
+    left: Vec<i32>,
     spent: u32,
+    /// What was ever booked; refunds are not taken off.
+    booked: i64,
+}
+
+/// What is known of a load module.
+#[derive(Clone, Copy, Debug, Default)]
+struct Account {
+    spent: u32,
+    /// What the windows that hold it had left, the least of them, when they were looked at: by it most points are
+    /// judged without a look at every window.
+    left: i32,
+    /// What was booked by then.
+    booked: i64,
 }
 
 impl Ledger {
@@ -39,8 +53,9 @@ impl Ledger {
     pub fn new(allowance: Allowance) -> Self {
         assert_eq!(allowance.module_room.len(), allowance.modules.count(), "one room per load module");
         assert_eq!(allowance.window_room.len(), allowance.windows.count(), "one room per window");
-        let (modules, windows) = (vec![0; allowance.module_room.len()], vec![0; allowance.window_room.len()]);
-        Self { allowance, modules, windows, spent: 0 }
+        let count = allowance.module_room.len();
+        let left = allowance.window_room.iter().map(|&room| i32::try_from(room).unwrap_or(i32::MAX)).collect();
+        Self { allowance, modules: vec![Account::default(); count], left, spent: 0, booked: 0 }
     }
 
     /// Triangles spent so far.
@@ -56,20 +71,19 @@ impl Ledger {
     /// Triangles `module` may still gain.
     pub fn room_of(&self, module: ModuleId) -> u32 {
         let index = self.module_index(module);
-        self.allowance.module_room[index].saturating_sub(self.modules[index])
+        self.allowance.module_room[index].saturating_sub(self.modules[index].spent)
     }
 
     /// Whether `module`, or a window that holds it, has more than it may.
     pub fn is_over(&self, module: ModuleId) -> bool {
         let index = self.module_index(module);
-        let over = |index: usize| self.allowance.window_room[index] < self.windows[index];
-        self.allowance.module_room[index] < self.modules[index] || self.window_rows(module).any(|mut row| row.any(over))
+        self.allowance.module_room[index] < self.modules[index].spent || self.least_left(module) < 0
     }
 
     /// Whether any load module or window has more than it may.
     pub fn is_any_over(&self) -> bool {
-        let over = |room: &[u32], spent: &[u32]| room.iter().zip(spent).any(|(room, spent)| room < spent);
-        over(&self.allowance.module_room, &self.modules) || over(&self.allowance.window_room, &self.windows)
+        let mut modules = self.allowance.module_room.iter().zip(&self.modules);
+        modules.any(|(&room, module)| room < module.spent) || self.left.iter().any(|&left| left < 0)
     }
 
     /// Everything that has more than it may: the tile, load modules, windows.
@@ -77,9 +91,11 @@ impl Ledger {
         let short = |of: ShortOf, needed: u32, room: u32| (room < needed).then_some(Shortfall { of, needed, room });
         let allowance = &self.allowance;
         let modules = allowance.modules.iter().zip(&self.modules).zip(&allowance.module_room);
-        let modules = modules.filter_map(|((module, &spent), &room)| short(ShortOf::Module(module), spent, room));
-        let windows = allowance.windows.iter().zip(&self.windows).zip(&allowance.window_room);
-        let windows = windows.filter_map(|((window, &spent), &room)| short(ShortOf::Window(window), spent, room));
+        let modules = modules.filter_map(|((id, module), &room)| short(ShortOf::Module(id), module.spent, room));
+        let windows = allowance.windows.iter().zip(&self.left).zip(&allowance.window_room);
+        let spent = |room: u32, left: i32| (i64::from(room) - i64::from(left)) as u32;
+        let windows =
+            windows.filter_map(|((window, &left), &room)| short(ShortOf::Window(window), spent(room, left), room));
         short(ShortOf::Tile, self.spent, allowance.triangles).into_iter().chain(modules).chain(windows).collect()
     }
 
@@ -111,8 +127,23 @@ impl Ledger {
         if self.room_of(module) < cost {
             return Some(if beyond_tile { RefusedBy::Reservation } else { RefusedBy::Module });
         }
-        let full = |index: usize| self.allowance.window_room[index] < self.windows[index] + POINT_COST;
-        self.window_rows(module).any(|mut row| row.any(full)).then_some(RefusedBy::Window)
+        let (seen, cost) = (self.modules[self.module_index(module)], POINT_COST as i32);
+        let has_room = i64::from(cost) <= i64::from(seen.left) - (self.booked - seen.booked);
+        (!has_room && self.least_left(module) < cost).then_some(RefusedBy::Window)
+    }
+
+    /// What the windows that hold `module` have left, the least of them; as much as can be where none does.
+    fn least_left(&self, module: ModuleId) -> i32 {
+        let least = |row: std::ops::Range<usize>| self.left[row].iter().fold(i32::MAX, |least, &left| least.min(left));
+        self.window_rows(module).map(least).fold(i32::MAX, i32::min)
+    }
+
+    /// Looks at the windows of every load module again, so that many points are judged fast.
+    pub fn look_again(&mut self) {
+        for (index, module) in self.allowance.modules.iter().enumerate() {
+            let (left, booked) = (self.least_left(module), self.booked);
+            self.modules[index] = Account { left, booked, ..self.modules[index] };
+        }
     }
 
     /// Spends `cost` triangles in `module`.
@@ -121,13 +152,26 @@ impl Ledger {
     /// When a limit refuses them: the caller asks first.
     pub fn charge(&mut self, module: ModuleId, cost: u32) {
         self.book(module, cost);
-        assert!(!self.is_over(module), "the caller asked whether load module and windows have room");
+        let index = self.module_index(module);
+        let Account { spent, left, .. } = self.modules[index];
+        let fits = spent <= self.allowance.module_room[index] && 0 <= left;
+        assert!(fits, "the caller asked whether load module and windows have room");
         assert!(self.spent <= self.allowance.triangles, "a tile spends no more than its allowance");
     }
 
     /// Notes `cost` triangles that `module` has already, whether or not it may.
     pub fn book(&mut self, module: ModuleId, cost: u32) {
-        self.each_count(module, |count| *count += cost);
+        let mut least = i32::MAX;
+        for row in self.window_rows(module) {
+            for left in &mut self.left[row] {
+                *left -= cost as i32;
+                least = least.min(*left);
+            }
+        }
+        self.spent += cost;
+        self.booked += i64::from(cost);
+        let index = self.module_index(module);
+        self.modules[index] = Account { spent: self.modules[index].spent + cost, left: least, booked: self.booked };
     }
 
     /// Takes back `cost` triangles of `module`.
@@ -135,17 +179,13 @@ impl Ledger {
     /// # Panics
     /// When there are not so many.
     pub fn refund(&mut self, module: ModuleId, cost: u32) {
-        self.each_count(module, |count| *count = count.checked_sub(cost).expect("only what was booked is refunded"));
-    }
-
-    /// Everything in which triangles of `module` count.
-    fn each_count(&mut self, module: ModuleId, mut change: impl FnMut(&mut u32)) {
+        let take = |count: &mut u32| *count = count.checked_sub(cost).expect("only what was booked is refunded");
         let index = self.module_index(module);
-        change(&mut self.modules[index]);
+        take(&mut self.modules[index].spent);
         for row in self.window_rows(module) {
-            self.windows[row].iter_mut().for_each(&mut change);
+            self.left[row].iter_mut().for_each(|left| *left += cost as i32);
         }
-        change(&mut self.spent);
+        take(&mut self.spent);
     }
 
     /// Takes room in `module` for points a neighbour has chosen and paid for.
@@ -198,6 +238,29 @@ mod tests {
         // Windows at rows 0..=1, cols 0..=1 hold (1, 1); together they reach to row 3, column 3.
         assert_eq!(ledger.refuses(ModuleId { row: 3, col: 3 }, 1, false), Some(RefusedBy::Window));
         assert_eq!(ledger.refuses(ModuleId { row: 3, col: 4 }, 1, false), None);
+    }
+
+    #[test]
+    fn what_was_seen_of_windows_refuses_as_a_look_at_all_of_them_does() {
+        let mut draw = fastrand::Rng::with_seed(11);
+        let mut ledger = ledger(1000, 60);
+        let modules: Vec<ModuleId> = ledger.allowance.modules.iter().collect();
+        let mut booked = Vec::new();
+        let (mut refused, mut free) = (0, 0);
+        for _ in 0..4000 {
+            let module = modules[draw.usize(..modules.len())];
+            let is_full = |index: usize| ledger.left[index] < POINT_COST as i32;
+            let expected = ledger.window_rows(module).any(|mut row| row.any(is_full));
+            assert_eq!(ledger.refuses(module, 2, false), expected.then_some(RefusedBy::Window));
+            *(if expected { &mut refused } else { &mut free }) += 1;
+            if !expected {
+                ledger.charge(module, 2);
+                booked.push(module);
+            } else if let Some(module) = booked.pop() {
+                ledger.refund(module, 2);
+            }
+        }
+        assert!(100 < refused && 100 < free, "{refused} refused, {free} free");
     }
 
     #[test]

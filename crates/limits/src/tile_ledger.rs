@@ -36,6 +36,11 @@ impl TileLedger {
         }
     }
 
+    /// Makes ready to judge many points fast.
+    pub fn look_again(&mut self) {
+        self.ledger.look_again();
+    }
+
     /// Spends what a point costs.
     ///
     /// # Panics

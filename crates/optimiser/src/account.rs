@@ -1,6 +1,6 @@
 //! What the mesh has and what it may have.
 
-use limits::{ShortOf, Shortfall, TileLedger};
+use limits::{Charged, ShortOf, Shortfall, TileLedger};
 use terrain::{ModuleId, POINT_COST, RefusedBy};
 
 use crate::hold::Hold;
@@ -95,10 +95,27 @@ impl Account {
         }
     }
 
+    /// What squares come to for as many triangles as a vertex inside costs: one on the outer border costs half of them,
+    /// so that two may go, or come, for one inside.
+    pub fn rate(&self, vertex: &Vertex, squares: f64) -> f64 {
+        let is_half = match &self.books {
+            Books::Total { cost, .. } => vertex.hold.is_on_line() && cost.1 < cost.0,
+            Books::Limits(ledger) => matches!(ledger.charged(vertex.at.y, vertex.at.x), Some(Charged::Beside(_))),
+        };
+        if is_half && 0.0 < squares { 2.0 * squares } else { squares }
+    }
+
     /// The load module whose limit, or whose window's, refuses a vertex there.
     pub fn refuses(&self, at: Place) -> Option<(ModuleId, RefusedBy)> {
         let Books::Limits(ledger) = &self.books else { return None };
         ledger.refuses(at.y, at.x)
+    }
+
+    /// Makes ready to judge many places fast.
+    pub fn look_again(&mut self) {
+        if let Books::Limits(ledger) = &mut self.books {
+            ledger.look_again();
+        }
     }
 
     /// Whether a vertex fits into the total and every limit.

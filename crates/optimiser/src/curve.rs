@@ -1,16 +1,17 @@
 //! A Morton curve: what is near in the plane becomes near in memory.
 
-use crate::place::Place;
+use crate::place::{PER_POST, Place};
 
-/// `items` in the order in which a Morton curve meets them; ties by number.
+/// `items` in the order in which a Morton curve over whole posts meets them; ties by number.
 pub(crate) fn along_curve(items: impl Iterator<Item = u32>, at: impl Fn(u32) -> Place) -> Vec<u32> {
-    let mut keyed: Vec<(u64, u32)> = items.map(|item| (key(at(item)), item)).collect();
+    // One number for both sorts in half the time: a tile has fewer than 2^16 posts a side.
+    let mut keyed: Vec<u64> = items.map(|item| key(at(item)) << 32 | u64::from(item)).collect();
     keyed.sort_unstable();
-    keyed.into_iter().map(|(_, item)| item).collect()
+    keyed.into_iter().map(|keyed| keyed as u32).collect()
 }
 
 fn key(at: Place) -> u64 {
-    spread(at.x as u32) | spread(at.y as u32) << 1
+    spread((at.x / PER_POST) as u32) | spread((at.y / PER_POST) as u32) << 1
 }
 
 /// The bits of a number with a gap after each.

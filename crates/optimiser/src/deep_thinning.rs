@@ -20,6 +20,8 @@ enum Known {
     StaleGuess,
     /// Its true cost.
     Cost,
+    /// Nothing yet.
+    New,
     /// That it cannot go.
     Stuck,
 }
@@ -35,9 +37,9 @@ pub(crate) fn thin_deep(
 ) -> Option<f64> {
     mover.aim(sheet.mean_squares());
     let mut waiting = Waiting { queue: Queue::default(), known: Vec::new(), share };
-    waiting.known.resize(sheet.vertices.len(), Known::Stuck);
+    waiting.known.resize(sheet.vertices.len(), Known::New);
     for vertex in 0..sheet.vertices.len() as u32 {
-        waiting.enter(sheet, removal, vertex);
+        waiting.enter(sheet, account, removal, vertex);
     }
     let mut saved = Saved::default();
     let mut last = None;
@@ -48,18 +50,20 @@ pub(crate) fn thin_deep(
             waiting.known[vertex as usize] = Known::Stuck;
             continue;
         };
-        if known == Known::StaleGuess && is_dearer(waiting.guess(cost), -worth) {
-            waiting.put_back(vertex, waiting.guess(cost), Known::Guess);
+        sheet.vertices[vertex as usize].cost = cost;
+        let record = sheet.vertices[vertex as usize];
+        let guess = account.rate(&record, waiting.guess(cost));
+        if known == Known::StaleGuess && is_dearer(guess, -worth) {
+            waiting.put_back(vertex, guess, Known::Guess);
             continue;
         }
         let ring = &removal.star.ring;
         saved.save(sheet, ring.iter().copied().chain([vertex]));
-        let record = sheet.vertices[vertex as usize];
         sheet.apply(&mut removal.patch);
         for index in 0..removal.star.ring.len() {
             mover.relax(sheet, removal.star.ring[index]);
         }
-        let cost = saved.rise(sheet);
+        let cost = account.rate(&record, saved.rise(sheet));
         if known != Known::Cost && waiting.has_cheaper_than(cost, -worth) {
             saved.restore(sheet);
             waiting.put_back(vertex, cost, Known::Cost);
@@ -69,7 +73,7 @@ pub(crate) fn thin_deep(
         account.refund(&record);
         sheet.drop_vertex(vertex);
         let ring = std::mem::take(&mut removal.star.ring);
-        ring.iter().for_each(|&other| waiting.unsettle(sheet, removal, other));
+        ring.iter().for_each(|&other| waiting.unsettle(sheet, account, removal, other));
         removal.star.ring = ring;
     }
     last
@@ -87,9 +91,13 @@ impl Waiting {
         if 0.0 < cost { self.share * cost } else { cost }
     }
 
-    fn enter(&mut self, sheet: &TileMesh, removal: &mut Removal, vertex: u32) {
+    fn enter(&mut self, sheet: &TileMesh, account: &Account, removal: &mut Removal, vertex: u32) {
+        let record = &sheet.vertices[vertex as usize];
+        if !record.cost.is_nan() && self.known[vertex as usize] == Known::New {
+            return self.put_back(vertex, account.rate(record, self.guess(record.cost)), Known::StaleGuess);
+        }
         match removal.find(sheet, vertex) {
-            Some(cost) => self.put_back(vertex, self.guess(cost), Known::Guess),
+            Some(cost) => self.put_back(vertex, account.rate(record, self.guess(cost)), Known::Guess),
             None => self.known[vertex as usize] = Known::Stuck,
         }
     }
@@ -105,9 +113,9 @@ impl Waiting {
     }
 
     /// The surroundings of a vertex have changed: what could not go now may.
-    fn unsettle(&mut self, sheet: &TileMesh, removal: &mut Removal, vertex: u32) {
+    fn unsettle(&mut self, sheet: &TileMesh, account: &Account, removal: &mut Removal, vertex: u32) {
         match self.known[vertex as usize] {
-            Known::Stuck => self.enter(sheet, removal, vertex),
+            Known::Stuck => self.enter(sheet, account, removal, vertex),
             _ => self.known[vertex as usize] = Known::StaleGuess,
         }
     }

@@ -52,18 +52,11 @@ impl Default for Hole {
 }
 
 impl Hole {
-    /// Appends the triangles that fill a counter-clockwise polygon with the fewest squares, and gives these; `None`
+    /// Finds the triangles that fill a counter-clockwise polygon with the fewest squares, and gives these; `None`
     /// where it has no valid triangulation or too many corners. Where the polygon is a star's ring, `spokes` are the
     /// star's edges, and what is summed along the ring is not summed again.
     #[inline(always)]
-    pub fn fill<S: Simd>(
-        &mut self,
-        simd: S,
-        sheet: &TileMesh,
-        polygon: &[u32],
-        spokes: &[u32],
-        patch: &mut Patch,
-    ) -> Option<f64> {
+    pub fn fill<S: Simd>(&mut self, simd: S, sheet: &TileMesh, polygon: &[u32], spokes: &[u32]) -> Option<f64> {
         let n = polygon.len();
         if n < 3 {
             return Some(0.0);
@@ -103,7 +96,6 @@ impl Hole {
         if self.best[0][n - 1] == f64::INFINITY {
             return None;
         }
-        self.push_triangles(polygon, patch);
         Some(self.best[0][n - 1])
     }
 
@@ -167,9 +159,10 @@ impl Hole {
         Sums::of(all)
     }
 
-    fn push_triangles(&self, polygon: &[u32], patch: &mut Patch) {
+    /// Appends the triangles that were found for a polygon.
+    pub fn push_triangles(&self, polygon: &[u32], patch: &mut Patch) {
         let mut open = [(0, 0); CORNERS_MAX];
-        open[0] = (0, polygon.len() - 1);
+        open[0] = (0, polygon.len().saturating_sub(1));
         let mut count = 1;
         while 0 < count {
             count -= 1;

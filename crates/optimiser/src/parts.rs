@@ -20,6 +20,8 @@ pub(crate) struct Vertex {
     pub hold: Hold,
     /// Whether something near it changed since this was last asked.
     pub has_changed: bool,
+    /// What removing it cost, the heights around it fitted, when that was last asked or guessed; NaN where it was not.
+    pub cost: f64,
 }
 
 /// Which vertices are held, and where lines run.
@@ -64,7 +66,14 @@ impl Parts {
         let vertex = |vertex: &TinVertex| {
             let at = Place::of(vertex.at, tin.rect, tin.steps_per_post);
             let hold = layout.line_hold(ground, at).and((layout.hold)(at));
-            Vertex { at, height: f64::from(vertex.height) - ground.level(), edge: NONE, hold, has_changed: true }
+            Vertex {
+                at,
+                height: f64::from(vertex.height) - ground.level(),
+                edge: NONE,
+                hold,
+                has_changed: true,
+                cost: f64::NAN,
+            }
         };
         let vertices = tin.vertices.iter().map(vertex).collect();
         Self { vertices, triangles: tin.triangles.clone(), kept: Vec::new() }

@@ -62,6 +62,11 @@ impl Queue {
         None
     }
 
+    /// All items, in the order of their worth.
+    pub fn into_items(mut self) -> impl Iterator<Item = (u32, f64)> {
+        std::iter::from_fn(move || self.pop())
+    }
+
     /// Takes the item of largest worth.
     pub fn pop(&mut self) -> Option<(u32, f64)> {
         let top = self.peek()?;

@@ -22,7 +22,7 @@ pub(crate) enum Step {
     /// The same of vertices around which something has changed since they were moved.
     SweepChanged,
     /// Thins to so many times the budget.
-    Thin(f64, Thinning),
+    Thin(f64, ThinBy),
     /// Flips where that gains once the vertices around have moved, in so many rounds of moves at most.
     DeepFlip(usize),
     /// Moves all vertices at once, in so many steps.
@@ -37,7 +37,7 @@ pub(crate) enum Step {
 
 /// What thinning takes for the cost of a vertex.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Thinning {
+pub(crate) enum ThinBy {
     /// What the squares rise by where nothing else changes.
     AsItIs,
     /// What they rise by once heights around the hole are fitted.
@@ -47,9 +47,10 @@ pub(crate) enum Thinning {
 }
 
 use Step::{DeepFlip, Descend, FitHeights, Flip, Grow, OnLattice, Snap, Sweep, SweepChanged, Thin};
-use Thinning::{AsItIs, Deep, Fitted};
+use ThinBy::{AsItIs, Deep, Fitted};
 
-const FAST: &[Step] = &[OnLattice, Sweep, Thin(1.0, AsItIs), Sweep, SweepChanged, SweepChanged, Snap];
+/// Fitting all heights before thinning does most of what a sweep would there, for an eighth of its time.
+const FAST: &[Step] = &[OnLattice, FitHeights(3), Thin(1.0, AsItIs), Sweep, SweepChanged, Snap];
 
 const NORMAL: &[Step] = &[
     Sweep,
@@ -95,7 +96,7 @@ impl Recipe {
     /// What this effort does.
     pub fn of(effort: Effort) -> Self {
         match effort {
-            Effort::Fast => Self { overshoot: 1.5, steps: &[FAST] },
+            Effort::Fast => Self { overshoot: 1.45, steps: &[FAST] },
             Effort::Normal => Self { overshoot: 2.5, steps: &[NORMAL] },
             Effort::Best => Self { overshoot: 2.5, steps: &[BEGINNING_OF_BEST, CYCLE, CYCLE, END_OF_BEST] },
         }

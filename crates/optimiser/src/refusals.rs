@@ -10,6 +10,7 @@ impl Work<'_, '_> {
     pub fn refusals(&mut self) -> Option<Vec<Refusal>> {
         let cheapest = self.cheapest?;
         let mut refused = Vec::new();
+        self.account.look_again();
         for triangle in 0..self.sheet.triangles.len() as u32 {
             let corners = self.sheet.triangles[triangle as usize].corners;
             if !self.sheet.is_live(triangle) || self.account.refuses(middle(self.sheet.places(corners))).is_none() {

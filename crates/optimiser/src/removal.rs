@@ -17,8 +17,9 @@ pub(crate) struct Removal {
     pub star: Star,
     pub patch: Patch,
     pub fit: Fit,
-    hole: Hole,
-    other_side: Vec<u32>,
+    /// The holes that the last vertex would leave, two where it lies on a line, and what surrounds them.
+    holes: [Hole; 2],
+    outlines: [Vec<u32>; 2],
 }
 
 impl Default for Removal {
@@ -35,47 +36,60 @@ impl Removal {
             star: Star::default(),
             patch: Patch::default(),
             fit: Fit::default(),
-            hole: Hole::default(),
-            other_side: Vec::new(),
+            holes: Default::default(),
+            outlines: Default::default(),
         }
     }
 
     /// What removing a vertex costs in squares once the heights around it are fitted again; its patch is then ready to
     /// be applied. `None` where it cannot go.
     pub fn find(&mut self, sheet: &TileMesh, vertex: u32) -> Option<f64> {
-        let cost = self.find_as_it_is(sheet, vertex)?;
+        let cost = self.cost(sheet, vertex)?;
+        self.make_ready();
         let free = |&vertex: &u32| sheet.vertices[vertex as usize].hold.height_is_free();
         self.patch.refit.extend(self.star.ring.iter().copied().filter(free));
         Some(cost - self.fit.refit(sheet, &mut self.patch))
     }
 
-    /// The same with all heights as they are.
-    pub fn find_as_it_is(&mut self, sheet: &TileMesh, vertex: u32) -> Option<f64> {
-        dispatch!(self.level, simd => self.find_in(simd, sheet, vertex))
+    /// What removing a vertex costs in squares with all heights as they are; [`Removal::make_ready`] makes its patch.
+    pub fn cost(&mut self, sheet: &TileMesh, vertex: u32) -> Option<f64> {
+        dispatch!(self.level, simd => self.cost_in(simd, sheet, vertex))
     }
 
     #[inline(always)]
-    fn find_in<S: Simd>(&mut self, simd: S, sheet: &TileMesh, vertex: u32) -> Option<f64> {
+    fn cost_in<S: Simd>(&mut self, simd: S, sheet: &TileMesh, vertex: u32) -> Option<f64> {
         let record = &sheet.vertices[vertex as usize];
         if !sheet.is_vertex(vertex) || record.hold.is_fixed() {
             return None;
         }
         sheet.star(vertex, &mut self.star);
+        self.outlines.iter_mut().for_each(Vec::clear);
+        let old: f64 = self.star.triangles().map(|triangle| sheet.triangles[triangle as usize].squares).sum();
+        let ring = &self.star.ring;
+        let spokes: &[u32] = if record.hold.is_on_line() && self.star.is_closed() {
+            let (first, second) = self.ends_of_line(sheet, record.hold, record.at)?;
+            self.outlines[0].extend_from_slice(&ring[first..=second]);
+            self.outlines[1].extend_from_slice(&ring[second..]);
+            self.outlines[1].extend_from_slice(&ring[..=first]);
+            &[]
+        } else {
+            self.outlines[0].extend_from_slice(ring);
+            &self.star.edges
+        };
+        let mut new = 0.0;
+        for (hole, outline) in self.holes.iter_mut().zip(&self.outlines) {
+            new += hole.fill(simd, sheet, outline, spokes)?;
+        }
+        Some(new - old)
+    }
+
+    /// Makes the patch that takes out the vertex whose cost was asked last.
+    pub fn make_ready(&mut self) {
         self.patch.clear();
         self.patch.old.extend(self.star.triangles());
-        let old: f64 = self.star.triangles().map(|triangle| sheet.triangles[triangle as usize].squares).sum();
-        let new = if record.hold.is_on_line() && self.star.is_closed() {
-            let (first, second) = self.ends_of_line(sheet, record.hold, record.at)?;
-            let ring = &self.star.ring;
-            self.other_side.clear();
-            self.other_side.extend_from_slice(&ring[second..]);
-            self.other_side.extend_from_slice(&ring[..=first]);
-            self.hole.fill(simd, sheet, &ring[first..=second], &[], &mut self.patch)?
-                + self.hole.fill(simd, sheet, &self.other_side, &[], &mut self.patch)?
-        } else {
-            self.hole.fill(simd, sheet, &self.star.ring, &self.star.edges, &mut self.patch)?
-        };
-        Some(new - old)
+        for (hole, outline) in self.holes.iter().zip(&self.outlines) {
+            hole.push_triangles(outline, &mut self.patch);
+        }
     }
 
     /// Removing a vertex whatever the shapes of the triangles that fill its hole; its patch is then ready to be
@@ -93,11 +107,8 @@ impl Removal {
             return fill_by_ears(sheet, ring, &mut self.patch);
         }
         let Some((first, second)) = self.ends_of_line(sheet, record.hold, record.at) else { return false };
-        self.other_side.clear();
-        self.other_side.extend_from_slice(&ring[second..]);
-        self.other_side.extend_from_slice(&ring[..=first]);
-        fill_by_ears(sheet, &ring[first..=second], &mut self.patch)
-            && fill_by_ears(sheet, &self.other_side, &mut self.patch)
+        let beyond = [&ring[second..], &ring[..=first]].concat();
+        fill_by_ears(sheet, &ring[first..=second], &mut self.patch) && fill_by_ears(sheet, &beyond, &mut self.patch)
     }
 
     /// Where in the ring the line runs on through a vertex on it.

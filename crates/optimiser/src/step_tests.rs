@@ -17,7 +17,7 @@ use crate::removal::Removal;
 use crate::scene::{even, grid, patchy, rough};
 use crate::sweep::Mover;
 use crate::task::Budget;
-use crate::thin::{Filling, Until, is_dearer, thin};
+use crate::thin::{Filling, Thinning, Until, is_dearer};
 use crate::tile_mesh::{Star, TileMesh};
 use crate::undo::Saved;
 use crate::weighted_heights::WeightedHeights;
@@ -29,7 +29,7 @@ fn sheet_of<'a>(ground: &'a WeightedHeights<'a>, tin: &terrain::Tin, layout: &La
 }
 
 /// Runs a test on rough ground under a grid of lines every 20 posts, with even and with patchy weights.
-fn with_sheet(test: impl Fn(&mut TileMesh, &Dem)) {
+fn with_sheet(mut test: impl FnMut(&mut TileMesh, &Dem)) {
     for seed in [1, 2, 3] {
         let dem = rough(RECT, seed);
         for importance in [even(RECT), patchy(RECT, seed)] {
@@ -82,7 +82,7 @@ fn every_post_is_owned_once_after_every_kind_of_change() {
     let (mut removal, mut insertion) = (Removal::default(), Insertion::default());
     for (triangles, filling) in [(400, Filling::AsItIs), (300, Filling::Fitted)] {
         let mut account = Account::new(&Budget::Triangles(triangles), &sheet);
-        thin(&mut sheet, &mut account, Until::Afforded, filling, (&mut removal, &mut mover));
+        Thinning::by(filling).run(&mut sheet, &mut account, Until::Afforded, (&mut removal, &mut mover));
         check(&sheet, "removals");
     }
     let mut account = Account::new(&Budget::Triangles(200), &sheet);
@@ -118,6 +118,25 @@ fn flips_and_sweeps_never_raise_the_squares() {
             assert!(before <= flipped);
         }
     });
+}
+
+#[test]
+fn thinning_in_several_goes_is_thinning_in_one() {
+    let thinned = |goes: &[f64]| {
+        let mut meshes = Vec::new();
+        with_sheet(|sheet, _| {
+            let mut account = Account::new(&Budget::Triangles(300), sheet);
+            let (mut removal, mut mover) = (Removal::default(), Mover::new(1));
+            let mut thinning = Thinning::by(Filling::AsItIs);
+            for &beyond in goes {
+                account.allow_beyond(beyond);
+                thinning.run(sheet, &mut account, Until::Afforded, (&mut removal, &mut mover));
+            }
+            meshes.push(format!("{:?}", sheet.triangles));
+        });
+        meshes
+    };
+    assert!(thinned(&[0.5, 0.2, 0.0]) == thinned(&[0.0]));
 }
 
 #[test]

@@ -379,7 +379,7 @@ impl<'a> TileMesh<'a> {
 
     /// A new vertex; it belongs to no triangle yet.
     pub fn add_vertex(&mut self, at: Place, height: f64, hold: Hold) -> u32 {
-        let vertex = Vertex { at, height, edge: NONE, hold, has_changed: true };
+        let vertex = Vertex { at, height, edge: NONE, hold, has_changed: true, cost: f64::NAN };
         match self.free_vertices.pop() {
             Some(index) => {
                 self.vertices[index as usize] = vertex;

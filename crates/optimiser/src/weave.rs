@@ -56,6 +56,7 @@ pub(crate) fn weave(
         edge: NONE,
         hold: layout.line_hold(ground, at).and(Hold::GIVEN),
         has_changed: true,
+        cost: f64::NAN,
     }));
     vertices.sort_unstable_by_key(|vertex| vertex.at);
     let at: Vec<Place> = vertices.iter().map(|vertex| vertex.at).collect();

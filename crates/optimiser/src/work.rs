@@ -5,11 +5,11 @@ use crate::deep_thinning::thin_deep;
 use crate::gains::Gains;
 use crate::insertion::Insertion;
 use crate::queue::Queue;
-use crate::recipe::Thinning;
+use crate::recipe::ThinBy;
 use crate::removal::Removal;
 use crate::sweep::Mover;
 use crate::task::Task;
-use crate::thin::{Filling, Until, thin};
+use crate::thin::{Filling, Thinning, Until};
 use crate::tile_mesh::{Star, TileMesh};
 
 /// Limits of load modules and windows are met once the whole is this share over its budget: earlier, too much would
@@ -35,30 +35,42 @@ impl Work<'_, '_> {
     }
 
     /// Thins to so many times the budget; to the limits of load modules and windows from a tenth over on.
-    pub fn thin(&mut self, times: f64, by: Thinning) {
+    pub fn thin(&mut self, times: f64, by: ThinBy) {
         let share = times - 1.0;
-        let filling = if by == Thinning::AsItIs { Filling::AsItIs } else { Filling::Fitted };
+        let filling = if by == ThinBy::AsItIs { Filling::AsItIs } else { Filling::Fitted };
+        let mut thinning = Thinning::by(filling);
         if self.account.is_any_over() {
             self.account.allow_beyond(share.max(LIMITS_FROM));
-            self.thin_until(Until::Afforded, filling);
+            self.thin_on(&mut thinning, Until::Afforded);
             if share <= LIMITS_FROM {
-                self.thin_until(Until::LimitsMet, filling);
+                self.thin_on(&mut thinning, Until::LimitsMet);
             }
         }
         self.account.allow_beyond(share);
         let last = match by {
-            Thinning::Deep(rest) => {
+            ThinBy::Deep(rest) => {
                 thin_deep(&mut self.sheet, &mut self.account, rest, &mut self.removal, &mut self.mover)
             }
-            Thinning::AsItIs | Thinning::Fitted => self.thin_until(Until::Afforded, filling),
+            ThinBy::AsItIs | ThinBy::Fitted => {
+                thinning.last = None;
+                self.thin_on(&mut thinning, Until::Afforded);
+                thinning.last
+            }
         };
         self.account.allow_beyond(0.0);
         self.cheapest = Some(last.unwrap_or(0.0).max(0.0));
         self.sheet.renumber();
     }
 
+    /// Removes vertices, the cheapest first. Gives what the last one cost.
     pub fn thin_until(&mut self, until: Until, filling: Filling) -> Option<f64> {
-        thin(&mut self.sheet, &mut self.account, until, filling, (&mut self.removal, &mut self.mover))
+        let mut thinning = Thinning::by(filling);
+        self.thin_on(&mut thinning, until);
+        thinning.last
+    }
+
+    fn thin_on(&mut self, thinning: &mut Thinning, until: Until) {
+        thinning.run(&mut self.sheet, &mut self.account, until, (&mut self.removal, &mut self.mover));
     }
 
     /// Inserts where it gains most while there is room.
@@ -72,6 +84,8 @@ impl Work<'_, '_> {
     /// Grows to so many times the budget, where that is one.
     pub fn grow(&mut self, times: f64) {
         if self.task.rms_quanta.is_none() {
+            // So much will change that what is known of costs is no guess at them.
+            self.sheet.vertices.iter_mut().for_each(|vertex| vertex.cost = f64::NAN);
             self.account.allow_beyond(times - 1.0);
             self.insertion.tries_middles = true;
             self.fill_by_squares();
