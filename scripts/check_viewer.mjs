@@ -15,7 +15,10 @@ import { tmpdir } from "node:os";
 import { dirname, join } from "node:path";
 import { fileURLToPath, pathToFileURL } from "node:url";
 import { parseArgs } from "node:util";
+import { housed, turned } from "./viewer/buildings.mjs";
+import { draped } from "./viewer/imagery.mjs";
 import * as tools from "./viewer/tools.mjs";
+import { curved, tracked } from "./viewer/tracks.mjs";
 
 const root = join(dirname(fileURLToPath(import.meta.url)), "..");
 const library = createRequire(join(root, "crates", "tiefort", "viewer", "package.json")).resolve("puppeteer-core");
@@ -57,7 +60,7 @@ if (!folder) {
 }
 if (values.pictures) mkdirSync(values.pictures, { recursive: true });
 const own = readCounts(join(folder, "modules"));
-const { server, address } = await serve();
+const { server, address } = await serve(folder);
 const browser = await puppeteer.launch({
   executablePath: values.chromium,
   userDataDir: join(scratch, "profile"),
@@ -85,8 +88,20 @@ function run(words) {
   return String(spawnSync(values.tiefort, words).stdout);
 }
 
+/** Builds the small job with a section more, beside files of its own, and serves it. */
+async function serveJob(name, section, files) {
+  const place = join(scratch, name);
+  mkdirSync(place);
+  for (const [file, text] of Object.entries(files)) writeFileSync(join(place, file), text);
+  writeFileSync(join(place, "job.toml"), `${readFileSync(join(root, "tests", "jobs", "small.toml"))}\n${section}`);
+  const words = ["build", join(place, "job.toml"), "--out", join(place, "area.tdb"), "--quiet", "--no-html"];
+  if (spawnSync(values.tiefort, words, { stdio: "inherit" }).status !== 0) throw new Error(`${name} was not built`);
+  const { server, address } = await serve(join(place, "area.tdb"));
+  return { address, end: () => server.kill("SIGINT") };
+}
+
 /** Starts the server on a free port. */
-async function serve() {
+async function serve(folder) {
   const server = spawn(values.tiefort, ["view", folder], { stdio: ["ignore", "pipe", "inherit"] });
   const address = await new Promise((found, failed) => {
     server.stdout.on("data", (text) => found(String(text).trim()));
@@ -180,9 +195,11 @@ async function check() {
   await picture(page, "end");
   await clicked(page);
   await shown(page);
-  const told = { address, expect, picture, pause, run, folder, open, size: SIZE };
+  const told = { address, expect, picture, pause, run, folder, open, size: SIZE, own, settled, serveJob };
   await tools.colored(page, told);
   await tools.asked(page, told);
+  await curved(page, told);
+  await tracked(page, told);
   await tools.linked(page, told);
   await tools.framed(page, told);
   await touched(page);
@@ -190,15 +207,19 @@ async function check() {
   await tools.linked(page, told);
   await tools.paced(page, { ...told, start, isIdle: values.idle });
   await tools.begun(page, told);
+  await turned(page, told);
+  await draped({ ...told, browser, program: values.tiefort, scratch, middle });
   if (0 < own.decks.length) await bridged(page);
   expect(failed.length === 0, `every answer was whole ${failed.slice(0, 3)}`);
   const isOurs = (url) => url.startsWith(address) || url === "about:blank" || url.startsWith("data:");
   expect(wanted.every(isOurs), "nothing else was asked");
+  // It asks another server.
+  if (!positionals[0]) await housed(page, told);
   expect(said.length === 0, `no error in the console ${said.slice(0, 3)}`);
 }
 
-async function open(page, start) {
-  await page.goto(`${address}?${start}`, { timeout: 120_000 });
+async function open(page, start, of = address) {
+  await page.goto(`${of}?${start}`, { timeout: 120_000 });
   await page.waitForFunction("window.tiefort !== undefined", { timeout: 120_000 });
   await settled(page);
 }

@@ -14,7 +14,7 @@
 
 use std::ops::Range;
 
-use terrain::{Dem, Each, Post, gather, metres_of_quanta};
+use terrain::{Dem, Each, Post, PostRect, QUANTA_PER_METRE, gather};
 
 /// What so many triangles can reach on a ground.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,130 +35,236 @@ impl Limit {
     }
 }
 
-/// Second derivatives in metres a post squared: twice to the east, twice to the north, once to each.
-type Hessian = [f64; 3];
+/// How much a part of the ground curves: what the limit of the whole is computed from. All are whole numbers, so that
+/// sums over parts do not depend on the order of parts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Curvature {
+    /// Cells of ground that is known.
+    pub cells: u64,
+    /// The integral of (kappa |det H|)^(1/3) over them, in millionths: lengths across are in posts, heights in metres.
+    pub integral: u64,
+    /// Cells of rough ground.
+    pub rough_cells: u64,
+}
+
+/// Parts of a whole in [`Curvature::integral`].
+const MILLION: f64 = 1e6;
+
+impl Curvature {
+    /// Adds that of another part.
+    pub fn merge(&mut self, other: &Self) {
+        self.cells += other.cells;
+        self.integral = self.integral.saturating_add(other.integral);
+        self.rough_cells += other.rough_cells;
+    }
+
+    /// The limit for so many triangles; `None` where no second derivatives are known.
+    pub fn limit(&self, triangles: usize) -> Option<Limit> {
+        let area = (0 < self.cells).then_some(self.cells as f64)?;
+        let integral = self.integral as f64 / MILLION;
+        Some(Limit {
+            triangles,
+            rms_m: integral * integral.sqrt() / area.sqrt() / triangles.max(1) as f64,
+            rough_share: self.rough_cells as f64 / area,
+        })
+    }
+}
 
 /// The limit of a ground for so many triangles; `None` where the ground is too small to have second derivatives.
+pub fn limit(dem: &Dem, triangles: usize, each: Each) -> Option<Limit> {
+    curvature(dem, dem.rect(), triangles, each).limit(triangles)
+}
+
+/// How much the ground of a rectangle curves for so many triangles.
 ///
 /// Differences are taken over half the side of a triangle, at places as far apart: noise from post to post, which no
 /// triangle follows, counts for as little as it does for the triangles.
-pub fn limit(dem: &Dem, triangles: usize, each: Each) -> Option<Limit> {
-    let rect = dem.rect();
+///
+/// # Panics
+/// When the window does not hold all posts of the rectangle.
+pub fn curvature(dem: &Dem, rect: PostRect, triangles: usize, each: Each) -> Curvature {
+    assert!(dem.rect().contains_rect(&rect), "the window holds the ground that is asked for");
     let (wide, high) = (rect.cells_wide(), rect.cells_high());
     let area = wide as f64 * high as f64;
     // Two triangles make a square.
     let side = (2.0 * area / triangles.max(1) as f64).sqrt();
     let step = ((side / 2.0 + 0.5) as usize).clamp(1, (wide.min(high) / 4).max(1));
-    let rows: Vec<i32> = (rect.south + step as i32..=rect.north - step as i32).step_by(step).collect();
-    let bands: Vec<Sums> = gather(each, rows.len().div_ceil(BAND), |band| {
+    let places = Places { dem, rect, step };
+    let bands: Vec<Sums> = gather(each, places.row_count().div_ceil(BAND), |band| {
         let from = band * BAND;
-        Sums::of_rows(dem, &rows, from..(from + BAND).min(rows.len()), step)
+        places.sums(from..(from + BAND).min(places.row_count()))
     });
     let mut sums = Sums::default();
     bands.iter().for_each(|band| sums.merge(band));
-    let mean = sums.densities / (0 < sums.places).then_some(sums.places as f64)?;
-    Some(Limit {
-        triangles,
-        rms_m: (mean * area).powf(1.5) / area.sqrt() / triangles.max(1) as f64,
-        rough_share: sums.rough as f64 / sums.compared.max(1) as f64,
-    })
+    if sums.measured == 0 {
+        return Curvature::default();
+    }
+    let share = |part: u64, of: u64| part as f64 / of.max(1) as f64;
+    let cells = area * share(sums.known, sums.places);
+    let whole = |number: f64| (number + 0.5) as u64;
+    Curvature {
+        cells: whole(cells),
+        integral: whole(cells * places.densities(sums.roots) / sums.measured as f64 * MILLION),
+        rough_cells: whole(cells * share(sums.rough, sums.compared)),
+    }
 }
 
-/// Lines of places that are summed together.
+/// Rows of places that are summed together.
 const BAND: usize = 32;
 
-/// Sums over places, in the order of posts within a band and of bands: they do not depend on who is at work.
+/// Second differences in quanta: twice to the east, four times that once to each side, twice to the north.
+type Bend = [i64; 3];
+
+/// Places a step apart, from a step inside a rectangle.
+struct Places<'a> {
+    dem: &'a Dem,
+    rect: PostRect,
+    step: usize,
+}
+
+impl Places<'_> {
+    fn row_count(&self) -> usize {
+        (self.rect.cells_high() / self.step).saturating_sub(1)
+    }
+
+    fn row(&self, index: usize) -> i32 {
+        self.rect.south + ((index + 1) * self.step) as i32
+    }
+
+    /// Sums over some rows of places.
+    fn sums(&self, rows: Range<usize>) -> Sums {
+        let mut sums = Sums::default();
+        let row = |index: usize| if index < self.row_count() { self.bends(index) } else { Vec::new() };
+        let mut below = rows.start.checked_sub(1).map(row).unwrap_or_default();
+        let mut here = row(rows.start);
+        for index in rows {
+            let above = row(index + 1);
+            sums.add([&below, &here, &above]);
+            if 0 < self.dem.void_count() {
+                sums.known -= self.places(index).filter(|&post| self.dem.is_void(post)).count() as u64;
+            }
+            (below, here) = (here, above);
+        }
+        sums
+    }
+
+    /// The places of a row.
+    fn places(&self, index: usize) -> impl Iterator<Item = Post> {
+        let (row, rect, step) = (self.row(index), self.rect, self.step);
+        (rect.west + step as i32..=rect.east - step as i32).step_by(step).map(move |col| Post::new(row, col))
+    }
+
+    /// The bends at a row of places, taken over a step; `None` next to a void.
+    fn bends(&self, index: usize) -> Vec<Option<Bend>> {
+        let (step, from) = (self.step as i32, (self.rect.west - self.dem.rect().west) as usize);
+        let rows = [-step, 0, step].map(|off| &self.dem.row(self.row(index) + off)[from..]);
+        let whole = self.dem.void_count() == 0;
+        let known = |(at, post)| (whole || !self.is_next_to_void(post)).then(|| bend(rows, self.step * at, self.step));
+        self.places(index).enumerate().map(known).collect()
+    }
+
+    fn is_next_to_void(&self, post: Post) -> bool {
+        let offs = [-1, 0, 1].map(|off| off * self.step as i32);
+        offs.iter().any(|row| offs.iter().any(|col| self.dem.is_void(Post::new(post.row + row, post.col + col))))
+    }
+
+    /// The sum of (kappa |det H|)^(1/3) at places, from that of their roots: what all have in common comes last.
+    fn densities(&self, roots: f64) -> f64 {
+        let step = self.step as f64;
+        let of_one = 1.0 / (f64::from(QUANTA_PER_METRE) * step * step);
+        roots * cube_root(of_one * of_one / 16.0 / 180.0)
+    }
+}
+
+/// Second differences around the middle of three rows of heights, whose first post of so many on is at `at`.
+fn bend([south, here, north]: [&[i32]; 3], at: usize, step: usize) -> Bend {
+    let [west, middle, east] = [at, at + step, at + 2 * step];
+    let height = |row: &[i32], col: usize| i64::from(row[col]);
+    let twice = 2 * height(here, middle);
+    let across = height(here, west) - twice + height(here, east);
+    let both = height(north, east) - height(north, west) - height(south, east) + height(south, west);
+    [across, both, height(south, middle) - twice + height(north, middle)]
+}
+
+/// Sums over places, in the order of places within a band and of bands: they do not depend on who is at work.
 #[derive(Clone, Copy, Default)]
 struct Sums {
     places: u64,
-    densities: f64,
+    /// Those that are no void.
+    known: u64,
+    /// Those that are not next to one either.
+    measured: u64,
+    /// Cube roots of what the determinants count, in quanta.
+    roots: f64,
     /// Places with all four neighbours, and the rough ones among them.
     compared: u64,
     rough: u64,
 }
 
 impl Sums {
-    /// Those of some of the lines of places.
-    fn of_rows(dem: &Dem, rows: &[i32], band: Range<usize>, step: usize) -> Self {
-        let (rect, far) = (dem.rect(), step as i32);
-        let line = |index: usize| -> Vec<Option<Hessian>> {
-            let Some(&row) = rows.get(index) else { return Vec::new() };
-            let cols = (rect.west + far..=rect.east - far).step_by(step);
-            cols.map(|col| hessian(dem, Post::new(row, col), far)).collect()
-        };
-        let mut sums = Self::default();
-        let mut below = band.start.checked_sub(1).map(line).unwrap_or_default();
-        let mut here = line(band.start);
-        for index in band {
-            let above = line(index + 1);
-            sums.add(&below, &here, &above);
-            (below, here) = (here, above);
-        }
-        sums
-    }
-
     fn merge(&mut self, other: &Self) {
         self.places += other.places;
-        self.densities += other.densities;
+        self.known += other.known;
+        self.measured += other.measured;
+        self.roots += other.roots;
         self.compared += other.compared;
         self.rough += other.rough;
     }
 
-    /// Adds a line of places; the lines below and above it are empty where there are none.
-    fn add(&mut self, below: &[Option<Hessian>], here: &[Option<Hessian>], above: &[Option<Hessian>]) {
-        for (index, hessian) in here.iter().enumerate() {
-            let Some(hessian) = *hessian else { continue };
-            self.places += 1;
-            self.densities += density(hessian);
-            let at = |line: &[Option<Hessian>], index: usize| line.get(index).copied().flatten();
+    /// Adds a row of places, between the one south of it and the one north of it, which are empty where there are none.
+    fn add(&mut self, [below, here, above]: [&[Option<Bend>]; 3]) {
+        self.places += here.len() as u64;
+        self.known += here.len() as u64;
+        for (index, bend) in here.iter().enumerate() {
+            let Some(bend) = *bend else { continue };
+            self.measured += 1;
+            self.roots += root(bend);
+            let at = |row: &[Option<Bend>], index: usize| row.get(index).copied().flatten();
             let west = index.checked_sub(1).and_then(|index| at(here, index));
             let around = [west.zip(at(here, index + 1)), at(below, index).zip(at(above, index))];
             if let [Some(across), Some(along)] = around {
                 // From neighbour to neighbour are two steps.
                 let change = size(across).max(size(along)) / 4.0;
                 self.compared += 1;
-                self.rough += u64::from(size(([0.0; 3], hessian)) < change);
+                self.rough += u64::from(size(([0; 3], bend)) < change);
             }
         }
     }
 }
 
-/// What a place adds to the integral.
-fn density([xx, xy, yy]: Hessian) -> f64 {
-    let determinant = xx * yy - xy * xy;
-    let kappa = if 0.0 < determinant { 1.0 / 180.0 } else { 1.0 / 90.0 };
-    (kappa * determinant.abs()).cbrt()
+/// The cube root of 16 times the determinant of a place, in quanta, doubled where it is negative: kappa is twice as
+/// large there.
+fn root([xx, xy, yy]: Bend) -> f64 {
+    let determinant = 16.0 * (xx as f64 * yy as f64) - xy as f64 * xy as f64;
+    cube_root(if 0.0 < determinant { determinant } else { -2.0 * determinant })
 }
 
-/// The square of how much two Hessians differ.
-fn size((a, b): (Hessian, Hessian)) -> f64 {
-    let [xx, xy, yy] = [0, 1, 2].map(|part| (a[part] - b[part]) * (a[part] - b[part]));
-    xx + 2.0 * xy + yy
+/// 16 times the square of how much two bends differ.
+fn size((a, b): (Bend, Bend)) -> f64 {
+    let [xx, xy, yy] = [0, 1, 2].map(|part| (a[part] - b[part]) as f64).map(|off| off * off);
+    16.0 * xx + 2.0 * xy + 16.0 * yy
 }
 
-/// Second differences over steps of so many posts; `None` next to a void.
-fn hessian(dem: &Dem, at: Post, step: i32) -> Option<Hessian> {
-    let mut heights = [[0.0; 3]; 3];
-    for (row, line) in (-1..=1).zip(&mut heights) {
-        for (col, height) in (-1..=1).zip(line) {
-            let post = Post::new(at.row + row * step, at.col + col * step);
-            if dem.is_void(post) {
-                return None;
-            }
-            *height = metres_of_quanta(dem.height(post));
-        }
+/// The cube root of a number that is not negative, by sums, products and quotients alone: the same on every machine.
+fn cube_root(of: f64) -> f64 {
+    if of == 0.0 {
+        return 0.0;
     }
-    let [south, here, north] = heights;
-    let square = f64::from(step) * f64::from(step);
-    let xx = (here[0] - 2.0 * here[1] + here[2]) / square;
-    let yy = (south[1] - 2.0 * here[1] + north[1]) / square;
-    let xy = (north[2] - north[0] - south[2] + south[0]) / (4.0 * square);
-    Some([xx, xy, yy])
+    // A third of the exponent is within 6 % of the root; each step of Halley's leaves the cube of what is missing.
+    let mut root = f64::from_bits(of.to_bits() / 3 + THIRD_OF_BIAS);
+    for _ in 0..2 {
+        let cube = root * root * root;
+        root *= (cube + of + of) / (cube + cube + of);
+    }
+    root
 }
+
+/// Two thirds of the bits of 1, less what makes the largest error smallest.
+const THIRD_OF_BIAS: u64 = 0x2A9F_7893_0000_0000;
 
 #[cfg(test)]
 mod tests {
-    use terrain::{PostRect, in_turn, quanta_of_metres};
+    use terrain::{in_turn, quanta_of_metres};
 
     use super::*;
 
@@ -208,11 +314,41 @@ mod tests {
     }
 
     #[test]
+    fn the_limit_of_parts_together_is_that_of_the_whole_wherever_they_lie_in_their_windows() {
+        let whole = ground(|x, y| 50.0 * (x / 40.0).sin() * (y / 50.0).sin());
+        let mut parts = Curvature::default();
+        for (row, col) in [(0, 0), (0, 200), (200, 0), (200, 200)] {
+            let rect = PostRect::new(Post::new(row, col), Post::new(row + 200, col + 200));
+            let part = curvature(&whole, rect, 2000, &in_turn);
+            assert_eq!(part, curvature(&whole.window(rect), rect, 2000, &in_turn));
+            parts.merge(&part);
+        }
+        let (parts, whole) = (parts.limit(8000).unwrap(), limit(&whole, 8000, &in_turn).unwrap());
+        assert!((parts.rms_m / whole.rms_m - 1.0).abs() < 0.01, "{parts:?}, {whole:?}");
+        assert!((parts.rough_share - whole.rough_share).abs() < 0.01, "{parts:?}, {whole:?}");
+    }
+
+    #[test]
+    fn a_cube_root_is_one_to_twelve_digits() {
+        for exponent in -60..60 {
+            let of = 1.2345_f64.powi(5 * exponent);
+            assert!((cube_root(of) / of.cbrt() - 1.0).abs() < 3e-12, "{of}: {}", cube_root(of));
+        }
+        assert_eq!(cube_root(0.0), 0.0);
+    }
+
+    #[test]
     fn voids_are_in_no_limit_and_small_ground_has_none() {
         let whole = ground(|x, y| 0.01 * (x * x + y * y));
-        let torn = Dem::from_fn(whole.rect(), |post| (post.col % 97 != 5).then(|| whole.height(post)));
-        let (whole, torn) = (limit(&whole, 2000, &in_turn).unwrap(), limit(&torn, 2000, &in_turn).unwrap());
-        assert!((torn.rms_m / whole.rms_m - 1.0).abs() < 0.01, "{torn:?}, {whole:?}");
+        let all = limit(&whole, 2000, &in_turn).unwrap().rms_m;
+        // The same triangles have less ground to follow.
+        let is_torn = |post: Post| post.col % 97 == 5;
+        let is_west = |post: Post| post.col < 200;
+        for (is_void, share) in [(&is_torn as &dyn Fn(Post) -> bool, 96.0 / 97.0), (&is_west, 0.5)] {
+            let dem = Dem::from_fn(whole.rect(), |post| (!is_void(post)).then(|| whole.height(post)));
+            let found = limit(&dem, 2000, &in_turn).unwrap().rms_m / all;
+            assert!((found - share).abs() < 0.01, "{found}, expected {share}");
+        }
         let small = Dem::from_rows(PostRect::new(Post::new(0, 0), Post::new(1, 1)), &[1, 2, 3, 4]);
         assert_eq!(limit(&small, 2, &in_turn), None);
     }

@@ -79,7 +79,9 @@ fn count(module: &LoadModule, ground: &Reference, all: &mut Residuals) -> Module
             }
         }),
     }
-    ModuleResidual { posts: own.posts, largest: own.largest, sum_abs: own.sum_abs, sum_squared: own.sum_squared }
+    // A load module has at most 2^26 posts, so an RMS residual of 4 km fits.
+    let sum_squared = own.sum_squared as u64;
+    ModuleResidual { posts: own.posts, largest: own.largest, sum_abs: own.sum_abs, sum_squared }
 }
 
 /// Calls `each` with every post that one triangle of a load module owns and its residual, voids included.

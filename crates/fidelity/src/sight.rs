@@ -162,8 +162,9 @@ fn sees(samples: &DemSamples, pair: Pair) -> bool {
     steps(pair).all(|(share, place)| samples.height(place) <= eye[2] + share * (target[2] - eye[2]))
 }
 
-/// Whether the second place of a pair is seen from the first on the triangles.
-fn sees_on(triangles: &Triangles, pair: Pair) -> bool {
+/// Whether the second place of a pair, east and north in posts, is seen from the first on the triangles, both
+/// [`EYE_M`] above them.
+pub fn sees_on(triangles: &Triangles, pair: [[f64; 2]; 2]) -> bool {
     let [eye, target] = pair.map(|place| above(place, triangles.height_at(place)));
     !triangles.hide(eye, target)
 }

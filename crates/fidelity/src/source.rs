@@ -1,8 +1,12 @@
 //! Residuals at the posts of the source DEM, which need not be those of the working grid.
 
+use std::ops::Range;
+
+use geometry::resample::rounded;
 use terrain::{LoadModule, ModuleGrid, Post, PostRect, Spacing};
 
 use crate::Tally;
+use crate::tally::Sums;
 
 /// Where the source's posts lie, in horizontal quanta of 1/128 m from the area's south-west post.
 pub struct SourcePosts<'a> {
@@ -12,9 +16,12 @@ pub struct SourcePosts<'a> {
     pub south_west: [f64; 2],
     /// Between posts, to the east and to the north.
     pub step: [f64; 2],
-    /// Height in metres; `None` where the source has none.
-    pub height_m: &'a (dyn Fn(Post) -> Option<f64> + Sync),
+    /// Its heights.
+    pub push_row_m: &'a PushRow<'a>,
 }
+
+/// Appends the heights in metres of some columns of a row; NaN where there is none.
+pub type PushRow<'a> = dyn Fn(i32, Range<i32>, &mut Vec<f64>) + Sync + 'a;
 
 /// Residuals at the source's posts inside `modules`, each counted once: a post on a side belongs to the load module
 /// north or east of it, on the area's far borders to the one there.
@@ -59,31 +66,32 @@ impl PostsInModule<'_> {
         // Heights in quanta by post; NaN where there is none, or where the post is counted already.
         let mut heights = Vec::with_capacity(self.posts.post_count());
         for row in self.posts.south..=self.posts.north {
-            heights.extend((self.posts.west..=self.posts.east).map(|col| {
-                let height_m = (self.source.height_m)(Post::new(row, col));
-                height_m.map_or(f64::NAN, |height_m| height_m * f64::from(terrain::QUANTA_PER_METRE))
-            }));
+            (self.source.push_row_m)(row, self.posts.west..self.posts.east + 1, &mut heights);
         }
+        heights.iter_mut().for_each(|height| *height *= f64::from(terrain::QUANTA_PER_METRE));
+        let (mut sums, mut histogram) = (Sums::default(), tally.histogram());
         for triangle in &self.module.triangles {
             let corners = triangle.map(|v| {
                 let vertex = self.module.vertices[usize::from(v)];
                 [f64::from(vertex.x), f64::from(vertex.y), f64::from(vertex.z)]
             });
             self.visit(corners, |row, col, plane| {
-                let height = &mut heights[row * wide + col];
+                let height = &mut heights[row as usize * wide + col as usize];
                 if !height.is_nan() {
-                    tally.add((*height - plane).round() as i32);
+                    let residual = rounded(*height - plane);
+                    sums.add(residual);
+                    histogram.add(residual);
                     *height = f64::NAN;
                 }
             });
         }
+        tally.add_sums(&sums);
     }
 
     /// Calls `visit` with row and column (from the first post inside) of each post of the closed triangle, and the
     /// plane's height there, in quanta.
-    fn visit(&self, [a, b, c]: [[f64; 3]; 3], mut visit: impl FnMut(usize, usize, f64)) {
-        /// Share of the triangle by which rounding may put a post on an edge outside both sides of it.
-        const ON_EDGE: f64 = 1e-9;
+    #[inline(always)]
+    fn visit(&self, [a, b, c]: [[f64; 3]; 3], mut visit: impl FnMut(i32, i32, f64)) {
         let scale = 1.0 / ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]));
         let first = |axis: usize, at: i32| {
             self.source.south_west[axis] + f64::from(at) * self.source.step[axis] - self.corner[axis]
@@ -93,23 +101,59 @@ impl PostsInModule<'_> {
             let place = |at: f64| (at - start) / self.source.step[axis];
             let low = place(a[axis].min(b[axis]).min(c[axis])) - ON_EDGE;
             let high = place(a[axis].max(b[axis]).max(c[axis])) + ON_EDGE;
-            (low.ceil().max(0.0) as usize, ((high + 1.0).floor().max(0.0) as usize).min(posts))
+            (low.ceil().max(0.0) as i32, ((high + 1.0).floor().max(0.0) as i32).min(posts as i32))
         };
         let (south, north) = range(1, y0, self.posts.posts_high());
         let (west, east) = range(0, x0, self.posts.posts_wide());
         // Shares of b and c at a post, and what they change by from post to post eastwards.
         let step_b = self.source.step[0] * (c[1] - a[1]) * scale;
         let step_c = -self.source.step[0] * (b[1] - a[1]) * scale;
+        let sides = [step_b, step_c, -(step_b + step_c)].map(Slope::of);
         for row in south..north {
-            let (x, y) = (x0 - a[0], y0 + row as f64 * self.source.step[1] - a[1]);
+            let (x, y) = (x0 - a[0], y0 + f64::from(row) * self.source.step[1] - a[1]);
             let at_b = (x * (c[1] - a[1]) - y * (c[0] - a[0])) * scale;
             let at_c = ((b[0] - a[0]) * y - (b[1] - a[1]) * x) * scale;
-            for col in west..east {
-                let (at_b, at_c) = (at_b + col as f64 * step_b, at_c + col as f64 * step_c);
+            let mut near = (f64::from(west), f64::from(east));
+            for (side, share) in sides.iter().zip([at_b, at_c, 1.0 - at_b - at_c]) {
+                near = side.narrowed(near, share);
+            }
+            for col in near.0 as i32..near.1 as i32 {
+                let (at_b, at_c) = (at_b + f64::from(col) * step_b, at_c + f64::from(col) * step_c);
                 if -ON_EDGE <= at_b && -ON_EDGE <= at_c && at_b + at_c <= 1.0 + ON_EDGE {
                     visit(row, col, a[2] + at_b * (b[2] - a[2]) + at_c * (c[2] - a[2]));
                 }
             }
+        }
+    }
+}
+
+/// Share of the triangle by which rounding may put a post on an edge outside both sides of it.
+const ON_EDGE: f64 = 1e-9;
+
+/// How a corner's share of a triangle changes along a row.
+struct Slope {
+    grows: bool,
+    shrinks: bool,
+    /// Columns it takes to grow by the whole, negative.
+    columns: f64,
+}
+
+impl Slope {
+    fn of(step: f64) -> Self {
+        Self { grows: 0.0 < step, shrinks: step < 0.0, columns: -1.0 / step }
+    }
+
+    /// The part of a range of columns in which the share, so large at column 0, may not be negative: too wide by a
+    /// column at either end, so that rounding loses no post.
+    #[inline(always)]
+    fn narrowed(&self, (first, end): (f64, f64), share: f64) -> (f64, f64) {
+        let crossing = share * self.columns;
+        if self.grows {
+            (if first < crossing - 1.0 { crossing - 1.0 } else { first }, end)
+        } else if self.shrinks {
+            (first, if crossing + 2.0 < end { crossing + 2.0 } else { end })
+        } else {
+            (first, end)
         }
     }
 }
@@ -144,12 +188,14 @@ mod tests {
     fn every_source_post_in_the_area_is_counted_once_with_its_residual() {
         let spacing = Spacing::from_metres(25.0).unwrap();
         // Posts every 20 m from 10 m outside the area: 10 x 5 inside; one metre above the ramp.
-        let height_m = |post: Post| Some((f64::from(post.col) * 20.0 - 10.0) / 10.0 + 1.0);
+        let push_row_m = |_: i32, cols: Range<i32>, heights: &mut Vec<f64>| {
+            heights.extend(cols.map(|col| (f64::from(col) * 20.0 - 10.0) / 10.0 + 1.0));
+        };
         let source = SourcePosts {
             window: PostRect::of_size(7, 12),
             south_west: [-1280.0, -1280.0],
             step: [2560.0, 2560.0],
-            height_m: &height_m,
+            push_row_m: &push_row_m,
         };
         let tally = residuals_at_source(&ramp(), GRID, spacing, &source);
         assert_eq!((tally.posts, tally.largest), (50, 128));
@@ -160,12 +206,14 @@ mod tests {
     fn posts_on_the_far_border_count_and_voids_do_not() {
         let spacing = Spacing::from_metres(25.0).unwrap();
         // Posts on every fourth cell: 3 x 2 of them on corners of load modules, one void.
-        let height_m = |post: Post| (post.col != 1 || post.row != 1).then(|| f64::from(post.col) * 10.0);
+        let push_row_m = |row: i32, cols: Range<i32>, heights: &mut Vec<f64>| {
+            heights.extend(cols.map(|col| if (row, col) == (1, 1) { f64::NAN } else { f64::from(col) * 10.0 }));
+        };
         let source = SourcePosts {
             window: PostRect::of_size(2, 3),
             south_west: [0.0, 0.0],
             step: [12_800.0, 12_800.0],
-            height_m: &height_m,
+            push_row_m: &push_row_m,
         };
         let tally = residuals_at_source(&ramp(), GRID, spacing, &source);
         assert_eq!((tally.posts, tally.largest), (5, 0));

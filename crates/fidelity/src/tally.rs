@@ -52,7 +52,7 @@ impl Tally {
         self.largest = self.largest.max(sums.largest);
         self.sum += sums.sum;
         self.sum_abs += sums.sum_abs;
-        self.sum_squared += u128::from(sums.sum_squared);
+        self.sum_squared += sums.sum_squared;
     }
 
     /// The bins, made when the first post comes.
@@ -142,15 +142,14 @@ impl Histogram<'_> {
     }
 }
 
-/// Sums over the posts of a load module or of a triangle, small enough to stay in registers: at most 2^26 posts, so
-/// that an RMS residual of 4 km fits.
+/// Sums over the posts of a load module or of a triangle, few enough to stay in registers.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Sums {
     pub(crate) posts: u32,
     pub(crate) largest: u32,
     pub(crate) sum: i64,
     pub(crate) sum_abs: u64,
-    pub(crate) sum_squared: u64,
+    pub(crate) sum_squared: u128,
 }
 
 impl Sums {
@@ -162,7 +161,7 @@ impl Sums {
         self.largest = self.largest.max(residual.unsigned_abs());
         self.sum += i64::from(residual);
         self.sum_abs += size;
-        self.sum_squared += size * size;
+        self.sum_squared += u128::from(size * size);
     }
 }
 

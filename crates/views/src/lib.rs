@@ -23,7 +23,7 @@ pub use picture::{
 mod table;
 pub use table::{Align, COLUMNS_MAX, Table, fold, grouped};
 mod report;
-pub use report::{report_text, stage_table};
+pub use report::{eta_in_words, report_text, stage_table};
 
 #[cfg(test)]
 mod samples;

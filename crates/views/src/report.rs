@@ -2,7 +2,8 @@
 //! at most 80 columns.
 
 use database::{
-    Report, ReportBorder, ReportBreach, ReportHeights, ReportPart, ReportPlace, ReportResidual, ReportStage,
+    Report, ReportBorder, ReportBreach, ReportHeights, ReportLimit, ReportPart, ReportPlace, ReportResidual,
+    ReportStage,
 };
 
 use crate::features_text::features_text;
@@ -40,6 +41,10 @@ fn headline(report: &Report) -> Option<String> {
     table.row(["points", &grouped(points.total), &kinds]);
     let largest = format!("RMS residual against the working grid, largest {:.2} m", report.residual.max_m);
     table.row(["residual", &format!("{:.3} m", report.residual.rms_m), &largest]);
+    if let Some(eta) = report.limit.and_then(eta_of) {
+        let (figure, meaning) = eta.split_once(' ').unwrap_or_default();
+        table.row(["eta", figure, meaning]);
+    }
     let verdict = match report.breaches.len() {
         0 => "every limit is met".to_owned(),
         1 => "limit is not met".to_owned(),
@@ -117,6 +122,19 @@ fn residuals(report: &Report) -> Option<String> {
         text += &format!("  posts without a height in the source: {voids}, of which {filled} were filled\n");
     }
     Some(text)
+}
+
+/// The distance from the limit, in words; `None` where there is none, as on a plane.
+pub(crate) fn eta_of(limit: ReportLimit) -> Option<String> {
+    Some(eta_in_words(limit.eta?, limit.triangles, limit.rough_share))
+}
+
+/// The distance from the limit, in words that begin with the figure.
+pub fn eta_in_words(eta: f64, triangles: u64, rough_share: f64) -> String {
+    let (count, rough) = (grouped(triangles), rough_share * 100.0);
+    format!(
+        "{eta:.2} times the RMS of the best surface of {count} triangles; {rough:.0} % of the ground is rough for them"
+    )
 }
 
 /// Residuals of load modules at the outer border of the area, and of those inside.

@@ -93,6 +93,12 @@ pub(crate) fn report() -> Report {
             per_4km: ReportPerWindow { max: 4_810, limit: 4_096, over: 140, worst_9x9: 5_600 },
         }),
         residual: residual(2.999),
+        limit: Some(database::ReportLimit {
+            triangles: 319_998,
+            rms_m: 2.4375,
+            eta: Some(2.999 / 2.4375),
+            rough_share: 0.375,
+        }),
         border: Some(database::ReportBorder {
             at_border: database::ReportPart { posts: 77_000, rms_m: 3.4, max_m: 31.0 },
             inside: database::ReportPart { posts: 3_823_528, rms_m: 3.2, max_m: 36.5 },

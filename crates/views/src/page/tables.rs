@@ -6,7 +6,7 @@ use maud::{Markup, html};
 use super::advise;
 use super::marks::{BOUND_ROWS_MAX, Marks, ROWS_MAX};
 use crate::features_text::{amounts, check_rows, cost, remarks_in_words};
-use crate::report::{border_in_words, heights_in_words};
+use crate::report::{border_in_words, eta_of, heights_in_words};
 use crate::table::grouped;
 
 pub(super) fn verdict(report: &Report) -> Markup {
@@ -171,6 +171,9 @@ pub(super) fn residuals(report: &Report) -> Markup {
                 "Pooled by points, as the founding paper's Table 2 prints its overall figure: RMS "
                 (format!("{:.3} m", report.overall_point_weighted_rms_m)) "."
             }
+        }
+        @if let Some(eta) = report.limit.and_then(eta_of) {
+            p.quiet { "Eta: " (eta) "." }
         }
         @if let Some(border) = &report.border {
             p.quiet { "Load modules " (border_in_words(border)) "." }
