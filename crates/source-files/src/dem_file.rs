@@ -279,7 +279,7 @@ fn of_bare_rows(store: &Store, start: &[u8], reading: &Reading) -> Result<Found,
 }
 
 /// The coordinate system: what the job says, else what the file says, else what a `.prj` beside it says.
-fn crs_of(store: &Store, own: Option<Result<Crs, String>>, reading: &Reading) -> Result<Crs, SourceError> {
+pub(crate) fn crs_of(store: &Store, own: Option<Result<Crs, String>>, reading: &Reading) -> Result<Crs, SourceError> {
     if let Some(crs) = &reading.crs {
         return Ok(crs.clone());
     }

@@ -13,7 +13,7 @@ use crate::store::{Handle, Store};
 use crate::unpacked::Packing;
 
 /// Tags whose values decide how the file is decoded.
-mod tag {
+pub(crate) mod tag {
     pub const IMAGE_WIDTH: u16 = 256;
     pub const IMAGE_LENGTH: u16 = 257;
     pub const BITS_PER_SAMPLE: u16 = 258;
@@ -85,10 +85,14 @@ impl Layout {
 /// Reads the first directory of an open file and checks it.
 pub(crate) fn read_layout(store: &Store, file: &mut Handle) -> Result<Layout, SourceError> {
     let path = store.path();
-    let mut bytes = Bytes { path, file, len: store.len(), little: true, big_tiff: false };
-    let directory = bytes.directory()?;
+    let directory = first_directory(store, file)?;
     let first = |tag| directory.iter().find(|&&(found, _)| found == tag).map(|&(_, value)| value);
     Facts { path, first: &first }.layout()
+}
+
+/// The tags of the first directory, each with the first of its values; all of them lie inside the file.
+pub(crate) fn first_directory(store: &Store, file: &mut Handle) -> Result<Vec<(u16, u64)>, SourceError> {
+    Bytes { path: store.path(), file, len: store.len(), little: true, big_tiff: false }.directory()
 }
 
 /// The open file, read at given places and never past its end.
@@ -318,7 +322,7 @@ impl Facts<'_> {
     }
 }
 
-fn sample_name(bits: u64, format: u64) -> String {
+pub(crate) fn sample_name(bits: u64, format: u64) -> String {
     let format = match format {
         1 => "unsigned",
         2 => "signed",
@@ -329,7 +333,7 @@ fn sample_name(bits: u64, format: u64) -> String {
     format!("{bits}-bit {format}")
 }
 
-fn compression_name(code: u64) -> String {
+pub(crate) fn compression_name(code: u64) -> String {
     let name = match code {
         2..=4 => "CCITT fax",
         6 | 7 => "JPEG",

@@ -87,6 +87,9 @@ pub enum SourceError {
     /// Something else of the format that is not read.
     #[error("{path}: {found}, which is not supported")]
     TiffFeature { path: PathBuf, found: String },
+    /// A picture of a kind that is not drawn, or that lies nowhere.
+    #[error("{path}: {found}, expected {expected}")]
+    Picture { path: PathBuf, found: String, expected: &'static str, remedy: &'static str },
 
     // The file is sound, but lies nowhere or not where it should.
     /// The file does not say which coordinate system it is in.
@@ -224,6 +227,7 @@ impl SourceError {
             NoPosition { path } | ControlPoints { path, .. } | Rotated { path, .. } => {
                 ("warp it onto a north-up grid: gdalwarp -r bilinear", path)
             }
+            Picture { path, remedy, .. } => (*remedy, path),
             NotClasses { path, .. } => ("rewrite it: gdal_translate -ot Byte", path),
             NotFeatures { path, found } if found.contains("OpenStreetMap data") => {
                 return Some(format!(

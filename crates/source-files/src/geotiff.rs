@@ -233,7 +233,7 @@ fn samples_in(decoded: DecodingResult) -> Option<Samples> {
 /// The library's decoder on one open source.
 pub(crate) type FileDecoder = Decoder<BufReader<Handle>>;
 
-fn decoder(path: &Path, file: Handle) -> Result<FileDecoder, SourceError> {
+pub(crate) fn decoder(path: &Path, file: Handle) -> Result<FileDecoder, SourceError> {
     let mut limits = Limits::default();
     limits.decoding_buffer_size = CHUNK_BYTES_MAX as usize;
     limits.intermediate_buffer_size = CHUNK_BYTES_MAX as usize;
@@ -244,7 +244,7 @@ fn decoder(path: &Path, file: Handle) -> Result<FileDecoder, SourceError> {
     Ok(decoder.with_limits(limits))
 }
 
-fn directory_error(path: &Path, error: TiffError) -> SourceError {
+pub(crate) fn directory_error(path: &Path, error: TiffError) -> SourceError {
     let path = path.into();
     match error {
         TiffError::IoError(source) if source.kind() != ErrorKind::UnexpectedEof => SourceError::Read { path, source },
@@ -281,7 +281,7 @@ fn refuse_masks(path: &Path, decoder: &mut FileDecoder) -> Result<(), SourceErro
     Ok(())
 }
 
-fn geo_tags(path: &Path, decoder: &mut FileDecoder) -> Result<GeoTags, SourceError> {
+pub(crate) fn geo_tags(path: &Path, decoder: &mut FileDecoder) -> Result<GeoTags, SourceError> {
     let mut value = |tag| decoder.find_tag(tag).map_err(|error| directory_error(path, error));
     let doubles = |value: Option<tiff::decoder::ifd::Value>| {
         value.map(|value| value.into_f64_vec()).transpose().map_err(|error| directory_error(path, error))
@@ -305,7 +305,7 @@ fn geo_tags(path: &Path, decoder: &mut FileDecoder) -> Result<GeoTags, SourceErr
 }
 
 /// The value that marks a void post.
-fn nodata(path: &Path, decoder: &mut FileDecoder) -> Result<Option<f64>, SourceError> {
+pub(crate) fn nodata(path: &Path, decoder: &mut FileDecoder) -> Result<Option<f64>, SourceError> {
     let value = decoder.find_tag(Tag::GdalNodata).map_err(|error| directory_error(path, error))?;
     let Some(value) = value else { return Ok(None) };
     let text = value.into_string().map_err(|error| directory_error(path, error))?;

@@ -1,5 +1,6 @@
 //! A window of a raster in memory: samples as stored, southern row first, and which of them are void.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use terrain::{Dem, Post, PostRect, QUANTA_PER_METRE, quanta_of_metres};
@@ -157,6 +158,28 @@ impl Raster {
     /// When `post` lies outside the window.
     pub fn height_m(&self, post: Post) -> Option<f64> {
         self.sample(post).map(|sample| self.scale.height_m(sample))
+    }
+
+    /// Appends the heights in metres of some columns of a row; NaN where it is void.
+    ///
+    /// # Panics
+    /// When one of these posts lies outside the window.
+    pub fn push_row_m(&self, row: i32, cols: Range<i32>, heights: &mut Vec<f64>) {
+        let is_inside = |col: i32| self.window.contains(Post::new(row, col));
+        assert!(is_inside(cols.start) && is_inside(cols.end - 1), "posts lie in the window");
+        let first = self.window.index(Post::new(row, cols.start));
+        let (scale, start) = (self.scale, heights.len());
+        each!(&self.samples, posts => {
+            let row = &posts[first..first + cols.len()];
+            heights.extend(row.iter().map(|&sample| scale.height_m(number(sample))));
+        });
+        if 0 < self.voids.count {
+            let row = &mut heights[start..];
+            (first..)
+                .zip(row)
+                .filter(|&(index, _)| self.voids.contains(index))
+                .for_each(|(_, height)| *height = f64::NAN);
+        }
     }
 
     /// Its heights in quanta; voids stay void.

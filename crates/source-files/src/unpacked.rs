@@ -116,13 +116,13 @@ fn runs(packed: impl BufRead, promise: Promise) -> Result<(), String> {
 }
 
 /// A stream of LZW as TIFF has it.
-struct Lzw<R> {
+pub(crate) struct Lzw<R> {
     packed: R,
     decoder: decode::Decoder,
 }
 
 impl<R: BufRead> Lzw<R> {
-    fn new(packed: R) -> Self {
+    pub(crate) fn new(packed: R) -> Self {
         let configuration = decode::Configuration::with_tiff_size_switch(BitOrder::Msb, 8);
         Self { packed, decoder: configuration.with_yield_on_full_buffer(true).build() }
     }

@@ -6,6 +6,8 @@ use load_module_reader::{Area, AreaFrame, Block, Keep, LoadedGround, ReadError};
 
 use crate::failure::{Cause, Failure};
 
+/// How far air usually bends light, as a part of the earth's own curvature.
+pub const REFRACTION: f64 = 0.13;
 /// Load modules that are held at once at most: about 12 kB each.
 const MODULES_MAX: u64 = 100_000;
 

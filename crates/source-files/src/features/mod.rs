@@ -52,7 +52,14 @@ pub fn read_features(path: &Path, wanted: &Wanted, each: Each) -> Result<Feature
         Format::Shapefile => shapes::read(&store, wanted),
         Format::GeoJson => json::read(&store, wanted),
     };
-    read.map_err(|error| match error {
+    let with_buildings = |mut read: FeatureFile| {
+        if wanted.buildings && format != Format::OpenStreetMap {
+            let is_building = |feature: &&VectorFeature| feature.tag(model::BUILDING_KEY).is_some();
+            read.buildings = read.features.iter().filter(is_building).cloned().collect();
+        }
+        read
+    };
+    read.map(with_buildings).map_err(|error| match error {
         // Here the caller can say it.
         SourceError::UnnamedCrs { path, found } => SourceError::FeatureCrs { path, found },
         error => error,

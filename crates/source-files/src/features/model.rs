@@ -12,6 +12,9 @@ use crate::store::Store;
 pub const BUILT_IN_KEYS: [&str; 8] =
     ["highway", "railway", "aeroway", "waterway", "natural", "landuse", "water", "man_made"];
 
+/// The key that makes a closed line of a file a building.
+pub(super) const BUILDING_KEY: &str = "building";
+
 /// What is wanted of a file of features.
 #[derive(Clone, Copy, Debug)]
 pub struct Wanted<'a> {
@@ -27,6 +30,8 @@ pub struct Wanted<'a> {
     /// Keys of OpenStreetMap that make a way or a multipolygon relation wanted, mostly [`BUILT_IN_KEYS`] and those of
     /// the job's own rules. Other formats are read whole.
     pub keys: &'a [&'a str],
+    /// Whether buildings are read, too, apart from the features.
+    pub buildings: bool,
 }
 
 impl Wanted<'_> {
@@ -122,6 +127,9 @@ impl fmt::Display for Done {
 pub struct FeatureFile {
     /// Those inside the bounds: of OpenStreetMap data relations, then ways, by number; of others in file order.
     pub features: Vec<VectorFeature>,
+    /// Buildings inside the bounds, by their key `building`, where they were wanted; of OpenStreetMap data they are no
+    /// features and have no tags but those of their heights.
+    pub buildings: Vec<VectorFeature>,
     /// What was left out or not used as it is, at most [`crate::limits::REMARKS_MAX`]; `notes` counts the rest.
     pub remarks: Vec<Remark>,
     /// What a person should know about the file as a whole.

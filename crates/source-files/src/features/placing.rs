@@ -99,7 +99,7 @@ impl Placing {
     pub(super) fn append(&mut self, part: Self) {
         self.lies_over(&part.lies);
         self.remarks_beyond += part.remarks_beyond;
-        let FeatureFile { mut features, remarks, notes, found, outside, attribution: _ } = part.file;
+        let FeatureFile { mut features, remarks, notes, found, outside, attribution: _, buildings: _ } = part.file;
         self.file.features.append(&mut features);
         self.file.notes.extend(notes);
         self.count_outside(outside);
@@ -339,6 +339,11 @@ impl Placing {
             let id = format!("{id}.{number}");
             self.file.features.push(VectorFeature { id, tags: tags.clone(), shape: shape(part) });
         }
+    }
+
+    /// What was placed, and nothing of what was told.
+    pub(super) fn into_features(self) -> Vec<VectorFeature> {
+        self.file.features
     }
 
     /// What was placed, with a word where that is nothing.

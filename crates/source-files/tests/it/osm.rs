@@ -12,7 +12,8 @@ use crate::support::Folder;
 /// Ten kilometres a side round 117 W, 35 N, in UTM zone 11.
 const BOUNDS: Extent = Extent { east: [495_000.0, 505_000.0], north: [3_868_000.0, 3_878_000.0] };
 
-const WANTED: Wanted = Wanted { epsg: 32611, bounds: BOUNDS, layer: None, crs: None, keys: &BUILT_IN_KEYS };
+const WANTED: Wanted =
+    Wanted { epsg: 32611, bounds: BOUNDS, layer: None, crs: None, keys: &BUILT_IN_KEYS, buildings: false };
 const ROAD: &[(&str, &str)] = &[("highway", "primary")];
 const LAKE: &[(&str, &str)] = &[("natural", "water"), ("type", "multipolygon")];
 
@@ -164,6 +165,30 @@ fn multipolygons_are_put_together_from_their_ways() {
     assert_eq!(ids(&file), ["relation/5.1", "relation/5.2"]);
     assert_eq!((rings(&file.features[0]), rings(&file.features[1])), (vec![4], vec![11, 4]));
     assert_eq!(remarks(&file), [""; 0]);
+}
+
+#[test]
+fn buildings_are_read_apart_with_the_tags_of_their_heights_and_change_no_feature() {
+    const HALL: &[(&str, &str)] = &[("type", "multipolygon"), ("building", "yes"), ("height", "12")];
+    let osm = grid()
+        .way(1, &[("building", "house"), ("addr:street", "x"), ("building:levels", "2")], &[1, 2, 12, 11, 1])
+        .way(2, &[("building", "yes")], &[31, 36, 86, 81, 31])
+        .way(3, &[], &[43, 44, 54, 53, 43])
+        .way(4, &[("building", "yes"), ("natural", "water")], &[7, 8, 18, 17, 7])
+        .way(5, ROAD, &[1, 2])
+        .way(6, &[("building", "yes")], &[4, 5])
+        .relation(9, HALL, &[(1, 2, "outer"), (1, 3, "inner")])
+        .relation(8, LAKE, &[(1, 2, "outer")]);
+    let plain = read(&osm);
+    let folder = Folder::new();
+    let path = folder.write("a.osm.pbf", &osm.bytes());
+    let with = read_features(&path, &Wanted { buildings: true, ..WANTED }, &in_turn).unwrap();
+    assert_eq!((&with.features, &with.remarks, with.found), (&plain.features, &plain.remarks, plain.found));
+    assert!(plain.buildings.is_empty());
+    let ids: Vec<&str> = with.buildings.iter().map(|building| building.id.as_str()).collect();
+    assert_eq!(ids, ["relation/9", "way/1", "way/4", "way/6"], "the outline of a relation is read with it");
+    assert_eq!((rings(&with.buildings[0]), with.buildings[0].tag("height")), (vec![7, 5], Some("12")));
+    assert_eq!(with.buildings[1].tags.len(), 2, "no address is kept");
 }
 
 #[test]

@@ -18,8 +18,12 @@ fn read(file: &str, epsg: u32, [west, south, east, north]: [f64; 4]) -> Option<F
         [all.into_iter().fold(f64::INFINITY, f64::min), all.into_iter().fold(f64::NEG_INFINITY, f64::max)]
     };
     let bounds = Extent { east: span(0), north: span(1) };
-    let found =
-        read_features(&path, &Wanted { epsg, bounds, layer: None, crs: None, keys: &BUILT_IN_KEYS }, &in_turn).unwrap();
+    let found = read_features(
+        &path,
+        &Wanted { epsg, bounds, layer: None, crs: None, keys: &BUILT_IN_KEYS, buildings: false },
+        &in_turn,
+    )
+    .unwrap();
     let places = found.features.iter().flat_map(|feature| match &feature.shape {
         VectorShape::Line(line) => std::slice::from_ref(line),
         VectorShape::Polygon(rings) => rings,

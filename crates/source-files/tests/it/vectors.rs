@@ -13,7 +13,7 @@ use crate::support::{Folder, Tiff};
 
 /// Ten kilometres a side in UTM zone 11.
 const BOUNDS: Extent = Extent { east: [495_000.0, 505_000.0], north: [3_868_000.0, 3_878_000.0] };
-const WANTED: Wanted = Wanted { epsg: 32611, bounds: BOUNDS, layer: None, crs: None, keys: &[] };
+const WANTED: Wanted = Wanted { epsg: 32611, bounds: BOUNDS, layer: None, crs: None, keys: &[], buildings: false };
 
 #[track_caller]
 fn read(path: &Path) -> FeatureFile {

@@ -90,10 +90,9 @@ fn refraction(text: &str) -> Result<f64, String> {
 
 /// Looks.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
-    const REFRACTION: f64 = 0.13;
     let area = places::open(&arguments.database)?;
     let curvature = if arguments.curvature {
-        Curvature::of_earth(arguments.refraction.unwrap_or(REFRACTION))
+        Curvature::of_earth(arguments.refraction.unwrap_or(places::REFRACTION))
     } else {
         Curvature::NONE
     };

@@ -10,7 +10,7 @@ use inspect::{Fidelity, Sights};
 use job::{Effort, ErrorKey, HeightFit, Lattice, MethodName, Optimising, Sight, Usual};
 use serde_json::{Value, json};
 use terrain::{Metres, StopReason};
-use views::{Align, Table, grouped};
+use views::{Align, Table, eta_in_words, grouped};
 use workbench::{Mesh, TinMethod, TinRequest, TinStart};
 
 use crate::arguments::{MeshOrigin, Workers, choice, positive, rows_by_columns, start_method, start_methods};
@@ -418,8 +418,7 @@ fn summary(mesh: &Mesh, seconds: f64) -> String {
     let residual = format!("RMS {rms_m:.3} m, 99 % within {p99_m:.2} m, largest {max_m:.2} m");
     let limit = mesh.limit.and_then(|limit| Some((limit, limit.eta(rms_m)?)));
     let eta = limit.map_or_else(String::new, |(limit, eta)| {
-        let rough = format!("{:.0} % of the ground is rough for them", limit.rough_share * 100.0);
-        format!("eta: {eta:.2} times the RMS of the best surface of {triangles} triangles; {rough}\n")
+        format!("eta: {}\n", eta_in_words(eta, limit.triangles as u64, limit.rough_share))
     });
     format!("{points} points, {triangles} triangles in {seconds:.1} s: {end}\nresidual: {residual}\n{eta}")
 }

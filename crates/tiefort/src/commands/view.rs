@@ -10,6 +10,7 @@ const AFTER_HELP: &str = "\
 Examples:
   tiefort view ntc.tdb
   tiefort view ntc.tdb --port 8380
+  tiefort view ntc.tdb --imagery survey.tif --imagery harbour.tif
 
 Prints the address to open in a browser on this machine; no other machine can
 reach it. Ctrl-C ends it. W, A, S, D or arrows drive; F flies; the page lists
@@ -29,12 +30,15 @@ pub struct Arguments {
     /// Port on 127.0.0.1; 0 takes any that is free
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub port: u16,
+    /// GeoTIFF to lay over the ground, in any coordinate system; may be given several times, later ones above
+    #[arg(long, value_name = "FILE")]
+    pub imagery: Vec<PathBuf>,
 }
 
 /// Serves the page until Ctrl-C.
 #[cfg(feature = "viewer")]
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
-    let page = crate::viewer::page(&arguments.database)?;
+    let page = crate::viewer::page(&arguments.database, &arguments.imagery)?;
     super::serve::run_with_page(&arguments.database, arguments.port, page)
 }
 

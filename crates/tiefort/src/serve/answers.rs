@@ -20,7 +20,7 @@ use terrain::ModuleId;
 use tokio::sync::Semaphore;
 use tokio::task::spawn_blocking;
 
-use super::body::Bodies;
+use super::body::{Bodies, Received};
 use super::contents::TileModulesFile;
 use super::files::{self, Part};
 use super::globe::Kind;
@@ -314,24 +314,13 @@ fn one_module(snapshot: &Snapshot, of_tile: &TileModulesFile, id: ModuleId, head
     Ok(part.answer(&tag, length, bytes))
 }
 
-fn kind(is_raw: bool) -> [(header::HeaderName, &'static str); 1] {
-    [(header::CONTENT_TYPE, if is_raw { "application/octet-stream" } else { "application/json" })]
-}
-
 pub async fn heights(
     State(shared): Context,
     UrlPath(name): UrlPath<String>,
     Query(query): Query<RawQuery>,
     request: Request,
 ) -> Answer {
-    let served = shared.named(&name)?;
-    let body = shared.bodies.receive(request).await?;
-    let look = move || {
-        let asked = Heights::of(&body, query)?;
-        let answer = served.ask(|snapshot| asked.answer(snapshot))?;
-        Ok((kind(asked.is_raw()), answer).into_response())
-    };
-    at_a_place(&shared.queries, look).await
+    numbers(&shared, &name, request, move |body| Heights::of(body, query), Heights::answer).await
 }
 
 pub async fn line_of_sight(
@@ -340,12 +329,24 @@ pub async fn line_of_sight(
     Query(query): Query<RawQuery>,
     request: Request,
 ) -> Answer {
-    let served = shared.named(&name)?;
+    numbers(&shared, &name, request, move |body| Lines::of(body, query), Lines::answer).await
+}
+
+/// What `answer` says to what `read` finds in a body, in the kind of numbers that the body has.
+async fn numbers<T: 'static>(
+    shared: &Shared,
+    name: &str,
+    request: Request,
+    read: impl FnOnce(&Received) -> Result<T, Refusal> + Send + 'static,
+    answer: fn(&T, &Snapshot) -> Result<Vec<u8>, Refusal>,
+) -> Answer {
+    let served = shared.named(name)?;
     let body = shared.bodies.receive(request).await?;
     let look = move || {
-        let asked = Lines::of(&body, query)?;
-        let answer = served.ask(|snapshot| asked.answer(snapshot))?;
-        Ok((kind(asked.is_raw()), answer).into_response())
+        let asked = read(&body)?;
+        let answer = served.ask(|snapshot| answer(&asked, snapshot))?;
+        let kind = if body.is_raw() { "application/octet-stream" } else { "application/json" };
+        Ok(([(header::CONTENT_TYPE, kind)], answer).into_response())
     };
     at_a_place(&shared.queries, look).await
 }

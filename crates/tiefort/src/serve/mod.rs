@@ -15,7 +15,7 @@ mod answers;
 mod body;
 mod connections;
 mod contents;
-mod files;
+pub mod files;
 mod globe;
 mod ground;
 mod openapi;

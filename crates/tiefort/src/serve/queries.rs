@@ -19,6 +19,19 @@ pub struct RawQuery {
     pub ceiling: Option<f64>,
 }
 
+impl RawQuery {
+    /// Refuses what would be overlooked: JSON says these things itself.
+    fn refuse_beside_json(self) -> Result<(), Refusal> {
+        match (self.level, self.ceiling) {
+            (0, None) => Ok(()),
+            _ => Err(Refusal::request(
+                "found level or ceiling behind the question mark, expected them in the JSON",
+                r#"as {"positions": [[EAST, NORTH]], "level": 1}; behind the question mark they go with raw numbers"#,
+            )),
+        }
+    }
+}
+
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct HeightsAsked {
@@ -77,6 +90,7 @@ impl Heights {
             let RawQuery { level, ceiling } = query;
             return Ok(Self { positions: body.numbers()?, level, ceiling, is_raw: true });
         }
+        query.refuse_beside_json()?;
         let HeightsAsked { positions, level, ceiling } =
             body.json(r#"{"positions": [[EAST, NORTH], …], "level": 0, "ceiling": HEIGHT}"#)?;
         Ok(Self { positions, level, ceiling, is_raw: false })
@@ -107,10 +121,6 @@ impl Heights {
         }
         json(&HeightsAnswer { heights: heights.into_iter().map(finite).collect() })
     }
-
-    pub fn is_raw(&self) -> bool {
-        self.is_raw
-    }
 }
 
 /// What was asked of lines of sight.
@@ -132,6 +142,7 @@ impl Lines {
         if body.is_raw() {
             return Ok(Self { lines: body.numbers()?, level: query.level, is_raw: true });
         }
+        query.refuse_beside_json()?;
         let LinesAsked { lines, level } =
             body.json(r#"{"lines": [[EAST, NORTH, HEIGHT, EAST, NORTH, HEIGHT], …], "level": 0}"#)?;
         Ok(Self { lines, level, is_raw: false })
@@ -180,10 +191,6 @@ impl Lines {
             let [low, high] = around.unwrap_or([[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]]);
             Some([[low[0].min(east), low[1].min(north)], [high[0].max(east), high[1].max(north)]])
         })
-    }
-
-    pub fn is_raw(&self) -> bool {
-        self.is_raw
     }
 }
 

@@ -11,6 +11,7 @@ use serde_json::json;
 use terrain::{HOLE_CLASS, ModuleGrid, ModuleRect, named_class_color};
 use views::{RESIDUAL_SCALE_M, palette};
 
+use super::buildings::Buildings;
 use super::lines::Lines;
 use super::overview::Overview;
 use crate::failure::Failure;
@@ -32,6 +33,8 @@ pub struct Viewed {
     pub overview: Bytes,
     /// Roads and streams that have no triangles of their own.
     pub lines: Lines,
+    /// Buildings, which are drawn only.
+    pub buildings: Buildings,
     /// The ground, once it was asked for, or why there is none.
     pub ground: OnceLock<Result<ProductGround, String>>,
 }
@@ -49,19 +52,21 @@ impl Viewed {
         let overview = Overview::read(&area).map_err(damaged)?;
         let level = product.features.as_ref().map(|(level, _)| level);
         let lines = level.map(|level| Lines::of(level, area.frame())).unwrap_or_default();
+        let buildings = Buildings::read(&database::Folder::new(folder), &area);
         Ok(Self {
             folder: folder.to_path_buf(),
             grid: product.grid,
-            description: description(&product, &area, &overview, &lines),
+            description: description(&product, &area, &overview, &lines, buildings.count()),
             overview: overview.bytes().into(),
             lines,
+            buildings,
             ground: OnceLock::new(),
             area,
         })
     }
 }
 
-fn description(product: &Product, area: &Area, overview: &Overview, lines: &Lines) -> String {
+fn description(product: &Product, area: &Area, overview: &Overview, lines: &Lines, buildings: usize) -> String {
     let (frame, manifest) = (area.frame(), &product.manifest);
     let (limits, totals) = (&product.job.limits, &manifest.totals);
     let window = limits.window;
@@ -83,6 +88,7 @@ fn description(product: &Product, area: &Area, overview: &Overview, lines: &Line
         "range_m": VISIBLE_RANGE_M,
         "coarse_steps": overview.steps,
         "has_lines": !lines.is_empty(),
+        "buildings": buildings,
         "height_m": overview.range_m,
         "residual_scale_m": RESIDUAL_SCALE_M,
         "palette": palette(),

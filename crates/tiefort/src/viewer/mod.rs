@@ -7,15 +7,18 @@
 //!   /api/modules/SOUTH/WEST/NORTH/EAST     a block of load modules, whole (block.rs)
 //!   /api/levels/LEVEL/SOUTH/WEST/NORTH/EAST   the same at a level of detail
 //!   /api/lines/SOUTH/WEST/NORTH/EAST       roads and streams without triangles of their own there (lines.rs)
+//!   /api/buildings/SOUTH/WEST/NORTH/EAST   buildings there, drawn only (buildings.rs)
 //!   /api/relief                            heights and classes on a fine grid, for shades and shadows (relief.rs)
 //!   /api/dem                               whether the sources can be read, as JSON; else `why` says why not
 //!   /api/dem/SOUTH/WEST/NORTH/EAST         the posts of such a block (posts.rs)
 //! ```
-//! What the tools of the page ask is listed in tools.rs.
+//! What the tools of the page ask is listed in tools.rs, squares of pictures of the ground in imagery.rs.
 //! Blocks are half-open. Everything is little-endian. An answer other than 200 is a sentence for a person.
 
 mod area;
 mod block;
+mod buildings;
+mod imagery;
 mod lines;
 mod overview;
 mod plain;
@@ -23,7 +26,7 @@ mod posts;
 mod relief;
 mod tools;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use axum::Router;
@@ -45,11 +48,13 @@ const POLICY: &str = "default-src 'self'; style-src 'self' 'unsafe-inline'; img-
 /// Load modules in one answer at most: a view of 8 km each way.
 const BLOCK_MODULES_MAX: usize = 1024;
 
-/// The page of the database in `folder`, and what it asks.
+/// The page of the database in `folder`, and what it asks; `imagery` are pictures to lay over the ground.
 ///
 /// # Errors
-/// When the database cannot be read.
-pub fn page(folder: &Path) -> Result<Page, Failure> {
+/// When the database or a picture cannot be read.
+pub fn page(folder: &Path, imagery: &[PathBuf]) -> Result<Page, Failure> {
+    let viewed = Viewed::open(folder)?;
+    let pictures = imagery::routes(imagery, viewed.area.frame())?;
     let routes = Router::new()
         .route("/", get(async || text("text/html; charset=utf-8", PAGE)))
         .route("/viewer.js", get(async || text("text/javascript; charset=utf-8", PROGRAM)))
@@ -58,11 +63,13 @@ pub fn page(folder: &Path) -> Result<Page, Failure> {
         .route("/api/modules/{south}/{west}/{north}/{east}", get(modules))
         .route("/api/levels/{level}/{south}/{west}/{north}/{east}", get(level))
         .route("/api/lines/{south}/{west}/{north}/{east}", get(lines))
+        .route("/api/buildings/{south}/{west}/{north}/{east}", get(standing))
         .route("/api/relief", get(relief::answer))
         .route("/api/dem", get(ground))
         .route("/api/dem/{south}/{west}/{north}/{east}", get(dem))
         .merge(tools::routes())
-        .with_state(Arc::new(Viewed::open(folder)?));
+        .with_state(Arc::new(viewed))
+        .merge(pictures);
     Ok(Page { routes, paths: &["/viewer.js", "/api/*"] })
 }
 
@@ -91,6 +98,10 @@ async fn level(
 
 async fn lines(State(viewed): State<Arc<Viewed>>, UrlPath(sides): UrlPath<[u32; 4]>) -> Response {
     answer(sides, viewed, |viewed, block| Ok(viewed.lines.bytes(block))).await
+}
+
+async fn standing(State(viewed): State<Arc<Viewed>>, UrlPath(sides): UrlPath<[u32; 4]>) -> Response {
+    answer(sides, viewed, |viewed, block| viewed.buildings.bytes(&viewed.area, block)).await
 }
 
 async fn ground(State(viewed): State<Arc<Viewed>>) -> impl IntoResponse {

@@ -1,13 +1,15 @@
 //! What the page asks of the ground: lines of sight, viewsheds, profiles, and places in other coordinates.
 //!
 //! ```text
-//!   /api/sight/EAST,NORTH,ABOVE/EAST,NORTH,ABOVE    whether one place sees the other, as JSON
-//!   /api/viewshed/EAST,NORTH,ABOVE/TARGET/RANGE/SPACING   places a side (u32), metres between them (f32), then row
-//!                                                   by row from the north 1 seen, 0 hidden, 255 neither (u8)
+//!   /api/sight/EAST,NORTH,ABOVE/EAST,NORTH,ABOVE/EARTH    whether one place sees the other, as JSON
+//!   /api/viewshed/EAST,NORTH,ABOVE/TARGET/RANGE/SPACING/EARTH   places a side (u32), metres between them (f32), then
+//!                                                   row by row from the north 1 seen, 0 hidden, 255 neither (u8)
 //!   /api/profile/SPACING/EAST,NORTH/EAST,NORTH      heights along a line, as JSON
 //!   /api/find/WORDS                                 a place of the area's system, of coordinates as people write them
 //!   /api/where/EAST,NORTH                           longitude and latitude, as JSON
+//!   /api/degrees/EAST,NORTH;EAST,NORTH              longitude and latitude of each, as JSON, at most 200
 //! ```
+//! EARTH is `flat` or `round`: with the curvature of the earth and the usual bending of light, as `--curvature` has it.
 //! The answers are those of `tiefort sight` and `tiefort profile`: the reader library gives them.
 
 use std::sync::Arc;
@@ -24,32 +26,39 @@ use serde_json::{Value, json};
 use super::area::Viewed;
 use super::plain::{FAULT, bytes};
 use crate::failure::Failure;
-use crate::places::{self, ground_around, place, place_above};
+use crate::places::{self, REFRACTION, ground_around, place, place_above};
 
 /// Places along a side of a viewshed, and along a profile.
 const SIDE_MAX: u64 = 1025;
+/// Places whose degrees are asked for at once: an address holds some thousand characters.
+const DEGREES_MAX: usize = 200;
 /// See [`SIDE_MAX`].
 const STEPS_MAX: f64 = 20_000.0;
 
 /// The routes of the tools.
 pub fn routes() -> Router<Arc<Viewed>> {
     Router::new()
-        .route("/api/sight/{from}/{to}", get(sight))
-        .route("/api/viewshed/{from}/{target}/{range}/{spacing}", get(viewshed))
+        .route("/api/sight/{from}/{to}/{earth}", get(sight))
+        .route("/api/viewshed/{from}/{target}/{range}/{spacing}/{earth}", get(viewshed))
         .route("/api/profile/{spacing}/{from}/{to}", get(profile))
         .route("/api/find/{words}", get(find))
         .route("/api/where/{place}", get(where_is))
+        .route("/api/degrees/{places}", get(degrees))
 }
 
-async fn sight(State(viewed): State<Arc<Viewed>>, UrlPath((from, to)): UrlPath<(String, String)>) -> Response {
-    answer(move || sight_of(&viewed, &from, &to)).await
+async fn sight(
+    State(viewed): State<Arc<Viewed>>,
+    UrlPath((from, to, earth)): UrlPath<(String, String, String)>,
+) -> Response {
+    answer(move || sight_of(&viewed, [&from, &to], curvature(&earth)?)).await
 }
 
 async fn viewshed(
     State(viewed): State<Arc<Viewed>>,
-    UrlPath((from, target, range, spacing)): UrlPath<(String, f64, f64, f64)>,
+    UrlPath((from, target, range, spacing, earth)): UrlPath<(String, f64, f64, f64, String)>,
 ) -> Response {
-    match tokio::task::spawn_blocking(move || viewshed_of(&viewed, &from, [target, range, spacing])).await {
+    let ask = move || viewshed_of(&viewed, &from, [target, range, spacing], curvature(&earth)?);
+    match tokio::task::spawn_blocking(ask).await {
         Ok(Ok(found)) => bytes(found.into()),
         Ok(Err(why)) => (StatusCode::CONFLICT, why).into_response(),
         Err(_) => (StatusCode::INTERNAL_SERVER_ERROR, FAULT).into_response(),
@@ -70,10 +79,36 @@ async fn find(State(viewed): State<Arc<Viewed>>, UrlPath(words): UrlPath<String>
 async fn where_is(State(viewed): State<Arc<Viewed>>, UrlPath(words): UrlPath<String>) -> Response {
     answer(move || {
         let crs = Crs::named(&viewed.area.frame().crs)?;
-        let [longitude, latitude] = crs.to(&Crs::wgs84(), place(&words)?).ok_or("found no such place on the globe")?;
+        let [longitude, latitude] = in_degrees(&crs, &words)?;
         Ok(json!({ "longitude": longitude, "latitude": latitude }))
     })
     .await
+}
+
+async fn degrees(State(viewed): State<Arc<Viewed>>, UrlPath(words): UrlPath<String>) -> Response {
+    answer(move || {
+        let crs = Crs::named(&viewed.area.frame().crs)?;
+        let places: Vec<&str> = words.split(';').collect();
+        if DEGREES_MAX < places.len() {
+            return Err(format!("found {} places, expected {DEGREES_MAX} at most", places.len()));
+        }
+        let found: Result<Vec<[f64; 2]>, String> = places.iter().map(|words| in_degrees(&crs, words)).collect();
+        Ok(json!(found?))
+    })
+    .await
+}
+
+/// Longitude and latitude of a place of a system.
+fn in_degrees(crs: &Crs, words: &str) -> Result<[f64; 2], String> {
+    crs.to(&Crs::wgs84(), place(words)?).ok_or_else(|| "found no such place on the globe".into())
+}
+
+fn curvature(earth: &str) -> Result<Curvature, String> {
+    match earth {
+        "flat" => Ok(Curvature::NONE),
+        "round" => Ok(Curvature::of_earth(REFRACTION)),
+        _ => Err("expected flat or round".into()),
+    }
 }
 
 /// What `ask` says, asked where it may wait for the disk.
@@ -97,7 +132,7 @@ fn inside(viewed: &Viewed, [east, north]: [f64; 2]) -> Result<[f64; 2], String> 
     if frame.holds([east, north]) { Ok([east, north]) } else { Err(in_words(&outside())) }
 }
 
-fn sight_of(viewed: &Viewed, from: &str, to: &str) -> Result<Value, String> {
+fn sight_of(viewed: &Viewed, [from, to]: [&str; 2], curvature: Curvature) -> Result<Value, String> {
     let (from, to) = (place_above(from)?, place_above(to)?);
     let plan = |end: [f64; 3]| inside(viewed, [end[0], end[1]]);
     let ends_m = [plan(from)?, plan(to)?];
@@ -107,13 +142,13 @@ fn sight_of(viewed: &Viewed, from: &str, to: &str) -> Result<Value, String> {
         Ok::<_, String>([end[0], end[1], height_m + end[2]])
     };
     let (from, to) = (stands(from)?, stands(to)?);
-    let hidden_at = match ground.sight(from, to) {
+    let hidden_at = match ground.sight_over(from, to, curvature) {
         Sight::Hidden(at) => Some(at),
         Sight::Free => None,
         Sight::Unknown => return Err("the line leaves the area".into()),
     };
     let blocker = hidden_at.map(|at| [0, 1, 2].map(|axis| from[axis] + at * (to[axis] - from[axis])));
-    let clearance_m = ground.clearance_m(from, to);
+    let clearance_m = ground.clearance_over_m(from, to, curvature);
     Ok(json!({
         "visible": hidden_at.is_none(),
         "from": from,
@@ -123,14 +158,19 @@ fn sight_of(viewed: &Viewed, from: &str, to: &str) -> Result<Value, String> {
     }))
 }
 
-fn viewshed_of(viewed: &Viewed, from: &str, [target_m, range_m, spacing_m]: [f64; 3]) -> Result<Vec<u8>, String> {
+fn viewshed_of(
+    viewed: &Viewed,
+    from: &str,
+    [target_m, range_m, spacing_m]: [f64; 3],
+    curvature: Curvature,
+) -> Result<Vec<u8>, String> {
     let [east, north, eye_m] = place_above(from)?;
     let place_m = inside(viewed, [east, north])?;
     let numbers = [target_m, range_m, spacing_m];
     if !numbers.iter().all(|number| number.is_finite() && 0.0 <= *number) || range_m == 0.0 || spacing_m == 0.0 {
         return Err("expected a range and a spacing above 0, and a target of 0 or more metres".into());
     }
-    let viewshed = Viewshed { place_m, eye_m, target_m, range_m, spacing_m, curvature: Curvature::NONE };
+    let viewshed = Viewshed { place_m, eye_m, target_m, range_m, spacing_m, curvature };
     let side = viewshed.side();
     if SIDE_MAX < side {
         return Err(format!("found {side} places along a side, expected {SIDE_MAX} at most"));

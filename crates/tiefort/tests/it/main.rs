@@ -15,6 +15,8 @@ mod foreseen;
 mod full_disk;
 mod help;
 mod hints;
+#[cfg(feature = "viewer")]
+mod imagery;
 mod measures;
 mod meshes;
 mod odd_files;

@@ -263,6 +263,9 @@ fn what_cannot_be_read_is_refused_in_words() {
     server.ask("POST", "/heights", &raw, &[0; 24]).check_refusal(400, &["24 bytes", "multiple of 16"]);
     server.ask("POST", "/line-of-sight", &raw, &[0; 8]).check_refusal(400, &["multiple of 48"]);
     server.post("/heights?hight=3", "{}").check_refusal(400, &["hight"]);
+    for asked in ["/heights?level=1", "/heights?ceiling=9"] {
+        server.post(asked, r#"{"positions": []}"#).check_refusal(400, &["found level or ceiling", "in the JSON"]);
+    }
     // Raw numbers that are no places are answered with what is none.
     let strange = [f64::NAN, 1.0, f64::INFINITY, 1.0, 1.0, f64::NEG_INFINITY, 1e300, -1e300];
     assert!(server.post_raw("/heights", &strange).iter().all(|height| height.is_nan()));

@@ -62,6 +62,51 @@ mod page {
         assert_eq!(part.chunks(40).count(), lines.chunks(40).filter(|edge| edge[0] == 2).count());
     }
 
+    /// Two houses, the larger one with a courtyard, and one that hangs over the ground.
+    const HOUSES: &str = r#"{"type": "FeatureCollection",
+        "crs": {"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::32611"}}, "features": [
+        {"type": "Feature", "properties": {"building": "yes", "height": "9"}, "geometry": {"type": "Polygon",
+            "coordinates": [[[505600, 3875600], [505610, 3875600], [505610, 3875610], [505600, 3875610],
+            [505600, 3875600]]]}},
+        {"type": "Feature", "properties": {"building": "yes", "building:levels": "5"}, "geometry": {"type": "Polygon",
+            "coordinates": [[[505700, 3875700], [505740, 3875700], [505740, 3875740], [505700, 3875740],
+            [505700, 3875700]], [[505710, 3875710], [505720, 3875710], [505720, 3875720], [505710, 3875710]]]}},
+        {"type": "Feature", "properties": {"building": "roof", "height": "12", "min_height": "8"}, "geometry":
+            {"type": "Polygon", "coordinates": [[[506600, 3876600], [506620, 3876600], [506620, 3876620],
+            [506600, 3876600]]]}}]}"#;
+
+    #[test]
+    fn buildings_stand_on_the_ground_and_the_largest_of_a_load_module_come_first() {
+        let scene = Scene::with_job("small.toml", &[]);
+        let job = std::fs::read_to_string(scene.path("job.toml")).unwrap();
+        std::fs::write(scene.path("houses.geojson"), HOUSES).unwrap();
+        std::fs::write(scene.path("job.toml"), format!("{job}\n[features]\nsources = [\"houses.geojson\"]\n")).unwrap();
+        scene.run_to(0, &["build", "job.toml", "--quiet", "--no-html"]);
+        let server = served_in(scene, "small.tdb");
+        let area: Value = serde_json::from_slice(&server.asked("/api/area").1).unwrap();
+        assert_eq!(area["buildings"], 3);
+        let (status, all) = server.asked("/api/buildings/0/0/8/8");
+        let word = |at: usize| u32::from_le_bytes(all[4 * at..4 * at + 4].try_into().unwrap());
+        let metres = |at: usize| f64::from(f32::from_bits(word(at)));
+        assert_eq!((status, [0, 1, 2].map(word)), (200, [2, 4, 3]), "two rings, of four corners and of three");
+        let height = |east: f64, north: f64| {
+            let path = format!("/api/profile/1/{east},{north}/{},{north}", east + 1.0);
+            serde_json::from_slice::<Value>(&server.asked(&path).1).unwrap()["height_m"][0].as_f64().unwrap()
+        };
+        let [floor, roof, size] = [3, 4, 5].map(metres);
+        let corners = [(505_700.0, 3_875_700.0), (505_740.0, 3_875_700.0), (505_740.0, 3_875_740.0)];
+        let ground = corners.map(|(east, north)| height(east, north));
+        assert!(ground.iter().all(|height| floor < *height && *height + 2.0 < roof), "{floor} {roof} {ground:?}");
+        assert!(roof - floor < 15.0 + 25.0 + 40.0 && size == 40.0);
+        let second = 6 + 2 * 7;
+        assert_eq!([second, second + 1].map(word), [1, 4], "the smaller one comes after it");
+        assert_eq!(server.asked("/api/buildings/4/4/8/8").1.len(), 0);
+        let hanging = server.asked("/api/buildings/3/3/4/4").1;
+        let part = |at: usize| f64::from(f32::from_le_bytes(hanging[at..at + 4].try_into().unwrap()));
+        assert!((part(12) - part(8) - 4.0).abs() < 0.01 || part(12) - part(8) < 4.0 + 20.0);
+        assert!(height(506_600.0, 3_876_600.0) - 20.0 < part(8));
+    }
+
     #[test]
     fn the_server_hands_out_the_page_the_area_and_its_load_modules() {
         let server = served();
@@ -98,12 +143,12 @@ mod page {
             assert_eq!(status, 200, "{path}: {text}");
             serde_json::from_str::<Value>(&text).unwrap()
         };
-        let line = value("/api/sight/506000,3875500,1/508500,3878500,1");
+        let line = value("/api/sight/506000,3875500,1/508500,3878500,1/flat");
         let words = ["sight", "small.tdb", "--from", "506000,3875500,1", "--to", "508500,3878500,1"];
         let said = server.scene.run_to(0, &words).stdout;
         let clearance = format!("clearance  {:.2} m", line["clearance_m"].as_f64().unwrap());
         assert!(line["visible"] == false && said.starts_with("hidden") && said.contains(&clearance), "{line}: {said}");
-        let (status, seen) = server.asked("/api/viewshed/507000,3876500,20/1/1800/50");
+        let (status, seen) = server.asked("/api/viewshed/507000,3876500,20/1/1800/50/flat");
         assert_eq!((status, seen.len(), &seen[..4]), (200, 8 + 73 * 73, &73u32.to_le_bytes()[..]));
         assert!(seen[8..].iter().all(|kind| [0, 1, 255].contains(kind)));
         let profile = value("/api/profile/100/506000,3876000/507000,3876000");
@@ -115,10 +160,19 @@ mod page {
         let [latitude, longitude] = ["latitude", "longitude"].map(|name| globe[name].as_f64().unwrap());
         let back = value(&format!("/api/find/{latitude},{longitude}"));
         assert!((back["place_m"][0].as_f64().unwrap() - 506_000.0).abs() < 0.01, "{back}");
+        let both = value("/api/degrees/506000,3876000;507000,3876000");
+        assert_eq!((both[0][0].as_f64(), both[0][1].as_f64()), (Some(longitude), Some(latitude)));
+        assert!(both[0][0].as_f64() < both[1][0].as_f64() && both.as_array().unwrap().len() == 2);
+        let round = value("/api/sight/506000,3875500,1/508500,3878500,1/round");
+        let said = server.scene.run_to(0, &[&words[..], &["--curvature"]].concat()).stdout;
+        let clearance = format!("clearance  {:.2} m", round["clearance_m"].as_f64().unwrap());
+        assert!(said.contains(&clearance) && round["clearance_m"] != line["clearance_m"], "{round}: {said}");
         for wrong in [
-            "/api/sight/1,2,3/4,5,6",
-            "/api/viewshed/507000,3876500,20/1/900000/1",
-            "/api/viewshed/507000,3876500,20/1/0/1",
+            "/api/sight/506000,3875500,1/508500,3878500,1/cube",
+            "/api/degrees/1",
+            "/api/sight/1,2,3/4,5,6/flat",
+            "/api/viewshed/507000,3876500,20/1/900000/1/flat",
+            "/api/viewshed/507000,3876500,20/1/0/1/flat",
             "/api/profile/0/506000,3876000/507000,3876000",
             "/api/find/nowhere",
             "/api/find/11X%201%202",

@@ -10,15 +10,16 @@ async function ask(path) {
 const words = (numbers) => numbers.map((number) => String(Number(number.toFixed(3)))).join(",");
 
 /** Whether one place sees another, both with metres above the ground. */
-export const askSight = async (from, to) => (await ask(`/api/sight/${words(from)}/${words(to)}`)).json();
+export const askSight = async (from, to, earth) =>
+  (await ask(`/api/sight/${words(from)}/${words(to)}/${earth}`)).json();
 
 /** Heights along a line. */
 export const askProfile = async (from, to, spacing) =>
   (await ask(`/api/profile/${spacing.toFixed(3)}/${words(from)}/${words(to)}`)).json();
 
 /** What is seen around a place: places along a side, metres between them, and bytes from the north-west. */
-export async function askViewshed(from, target, range, spacing) {
-  const bytes = await (await ask(`/api/viewshed/${words(from)}/${target}/${range}/${spacing}`)).arrayBuffer();
+export async function askViewshed(from, target, range, spacing, earth) {
+  const bytes = await (await ask(`/api/viewshed/${words(from)}/${target}/${range}/${spacing}/${earth}`)).arrayBuffer();
   const [side] = new Uint32Array(bytes, 0, 1);
   return { side, spacing, seen: new Uint8Array(bytes, 8, side * side) };
 }
@@ -32,6 +33,19 @@ export async function askPlace(written) {
     asked = `${latitude} ${longitude}`;
   }
   return (await (await ask(`/api/find/${encodeURIComponent(asked)}`)).json()).place_m;
+}
+
+/** Places whose degrees are asked for at once. */
+const DEGREES_MAX = 100;
+
+/** Longitude and latitude of places. */
+export async function askDegrees(places) {
+  const found = [];
+  for (let i = 0; i < places.length; i += DEGREES_MAX) {
+    const part = places.slice(i, i + DEGREES_MAX).map(words).join(";");
+    found.push(...(await (await ask(`/api/degrees/${part}`)).json()));
+  }
+  return found;
 }
 
 /** Degrees and MGRS of a place. */

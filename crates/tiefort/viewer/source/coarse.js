@@ -7,20 +7,18 @@ import { isSea } from "./server.js";
 
 /** Load modules along the side of a part that is drawn at once, or not where the camera does not look. */
 const PART = 10;
+/** Steps between the heights of a part that is far away: its border keeps all, so that parts fit together. */
+const STRIDES = [4, 2];
+/** Radians that a height may be off where it is left out: less than a pixel of a screen. */
+const OFF_MAX = 0.001;
+/** Metres that the observer moves between two looks at which parts are far away. */
+const LOOK_M = 200;
 
 export class Coarse {
   constructor(area) {
-    const { wide, high, heights } = area.coarse, step = area.side_m / area.coarse_steps;
     this.area = area;
     this.group = new Group();
-    const positions = new Float32Array(3 * wide * high);
-    for (let row = 0, i = 0; row < high; row++) {
-      for (let col = 0; col < wide; col++, i++) {
-        positions.set([area.sides[0] + col * step, heights[i], -(area.sides[1] + row * step)], 3 * i);
-      }
-    }
-    this.whole = geometryOf(positions);
-    this.whole.setAttribute("normal", new BufferAttribute(normals(area.coarse, step), 3));
+    this.normals = normals(area.coarse, area.side_m / area.coarse_steps);
     this.parts = [];
     for (let south = 0; south < area.rows; south += PART) {
       for (let west = 0; west < area.cols; west += PART) this.addPart(south, west);
@@ -30,76 +28,164 @@ export class Coarse {
   }
 
   addPart(south, west) {
-    const { area, whole } = this, { wide, heights } = area.coarse, steps = area.coarse_steps;
+    const { area } = this, { wide, heights } = area.coarse, steps = area.coarse_steps;
     const block = [south, west, Math.min(south + PART, area.rows), Math.min(west + PART, area.cols)];
-    const geometry = new BufferGeometry();
-    for (const name of ["position", "normal", "tint"]) geometry.setAttribute(name, whole.getAttribute(name));
-    const modules = (block[2] - south) * (block[3] - west);
-    geometry.setIndex(new BufferAttribute(new Uint32Array(6 * modules * steps * steps), 1));
+    const step = area.side_m / steps, [rows, cols] = [(block[2] - south) * steps, (block[3] - west) * steps];
+    const count = (rows + 1) * (cols + 1);
+    const [positions, smooth] = [new Float32Array(3 * count), new Float32Array(3 * count)];
+    // Where each of its heights is among those of the area.
+    const places = new Uint32Array(count);
     let [low, top] = [Infinity, -Infinity];
-    for (let row = south * steps; row <= block[2] * steps; row++) {
-      for (let col = west * steps; col <= block[3] * steps; col++) {
-        const height = heights[row * wide + col];
+    for (let row = 0, i = 0; row <= rows; row++) {
+      for (let col = 0; col <= cols; col++, i++) {
+        const at = (south * steps + row) * wide + west * steps + col, height = heights[at];
+        places[i] = at;
+        positions.set([area.sides[0] + (west * steps + col) * step, height,
+          -(area.sides[1] + (south * steps + row) * step)], 3 * i);
+        smooth.set(this.normals.subarray(3 * at, 3 * at + 3), 3 * i);
         if (height < low) low = height;
         if (top < height) top = height;
       }
     }
+    const geometry = geometryOf(positions);
+    geometry.setAttribute("normal", new BufferAttribute(smooth, 3));
+    geometry.setIndex(new BufferAttribute(new Uint16Array(6 * rows * cols), 1));
     const [left, down] = [area.sides[0] + west * area.side_m, area.sides[1] + south * area.side_m];
     const half = [(block[3] - west) / 2, (block[2] - south) / 2].map((modules) => modules * area.side_m);
     geometry.boundingSphere = new Sphere(new Vector3(left + half[0], (low + top) / 2, -(down + half[1])),
       Math.hypot(...half, (top - low) / 2));
     const mesh = meshOf(geometry, looks.coarse);
-    this.parts.push({ block, mesh, finely: null });
+    const height = (row, col) => positions[3 * (row * (cols + 1) + col) + 1];
+    // How far away it may be drawn at each stride.
+    const from = STRIDES.map((stride) =>
+      (rows % stride || cols % stride ? Infinity : offBy(height, rows, cols, stride) / OFF_MAX));
+    const ends = [left, down, left + 2 * half[0], down + 2 * half[1]];
+    this.parts.push({ block, mesh, rows, cols, places, ends, from, finely: null, isPlain: true, stride: 1 });
     this.group.add(mesh);
   }
 
   repaint(colors) {
-    const { area } = this, { wide, high, heights, classes } = area.coarse, steps = area.coarse_steps;
-    const tint = this.whole.getAttribute("tint");
-    for (let i = 0; i < wide * high; i++) {
-      let found;
-      if (colors === "height" || colors === "going") {
-        const cover = colorOf.cover(area, classes[i]);
-        // A road is narrower than a cell: far away only water is more than a line.
-        const stays = cover && (isWater(area, classes[i]) || classes[i] === area.hole);
-        const plain = isSea(area, [heights[i]]) ? seaTint(area) : tintAt(area, heights[i]);
-        found = stays ? tintOf(area, classes[i], cover) : plain;
-      } else {
-        const [row, col] = [Math.floor(i / wide), i % wide].map((place) => Math.floor(place / steps));
-        const figures = area.figures(Math.min(row, area.rows - 1), Math.min(col, area.cols - 1));
-        const value = { limits: figures.count, residuals: figures.rms, levels: Infinity }[colors];
-        found = [...bytes(colorOf[colors](area, value)), MADE];
-      }
-      tint.array.set(found, 4 * i);
+    const { area } = this, { wide, heights, classes } = area.coarse, steps = area.coarse_steps;
+    const isByHeight = colors === "height" || colors === "going";
+    for (const part of this.parts) {
+      const tint = part.mesh.geometry.getAttribute("tint");
+      part.isPlain = isByHeight;
+      part.places.forEach((at, i) => {
+        let found;
+        if (isByHeight) {
+          const cover = colorOf.cover(area, classes[at]);
+          // A road is narrower than a cell: far away only water is more than a line.
+          const stays = cover && (isWater(area, classes[at]) || classes[at] === area.hole);
+          const isLevel = isSea(area, [heights[at]]), plain = isLevel ? seaTint(area) : tintAt(area, heights[at]);
+          found = stays ? tintOf(area, classes[at], cover) : plain;
+          // Shores stay where they are.
+          if (stays || isLevel) part.isPlain = false;
+        } else {
+          const [row, col] = [Math.floor(at / wide), at % wide].map((place) => Math.floor(place / steps));
+          const figures = area.figures(Math.min(row, area.rows - 1), Math.min(col, area.cols - 1));
+          const value = { limits: figures.count, residuals: figures.rms, levels: Infinity }[colors];
+          found = [...bytes(colorOf[colors](area, value)), MADE];
+        }
+        tint.array.set(found, 4 * i);
+      });
+      tint.needsUpdate = true;
     }
-    tint.needsUpdate = true;
+    this.looked = null;
   }
 
   /** Leaves out load modules that are drawn finely. */
   cut(isFine) {
-    const { wide } = this.area.coarse, steps = this.area.coarse_steps;
     for (const part of this.parts) {
-      const [south, west, north, east] = part.block, index = part.mesh.geometry.index;
-      let finely = "", end = 0;
+      const [south, west, north, east] = part.block;
+      let finely = "";
       for (let row = south; row < north; row++) {
         for (let col = west; col < east; col++) finely += isFine(row, col) ? "1" : "0";
       }
       if (finely === part.finely) continue;
       part.finely = finely;
-      for (let row = south, i = 0; row < north; row++) {
-        for (let col = west; col < east; col++, i++) {
-          if (finely[i] === "1") continue;
-          for (let cell = 0; cell < steps * steps; cell++, end += 6) {
-            const at = (row * steps + Math.floor(cell / steps)) * wide + col * steps + (cell % steps);
-            index.array.set([at, at + 1, at + wide + 1, at, at + wide + 1, at + wide], end);
-          }
-        }
-      }
-      index.needsUpdate = true;
-      part.mesh.geometry.setDrawRange(0, end);
-      part.mesh.visible = 0 < end;
+      this.index(part);
     }
   }
+
+  /** Draws with fewer triangles what is so far away that it looks the same. */
+  follow(east, north) {
+    if (this.looked && Math.hypot(east - this.looked[0], north - this.looked[1]) < LOOK_M) return;
+    this.looked = [east, north];
+    for (const part of this.parts) {
+      const [west, south, far, top] = part.ends;
+      const away = Math.hypot(Math.max(west - east, 0, east - far), Math.max(south - north, 0, north - top)) - LOOK_M;
+      const stride = STRIDES.find((_, i) => part.isPlain && part.from[i] < away) ?? 1;
+      if (stride === part.stride) continue;
+      part.stride = stride;
+      this.index(part);
+    }
+  }
+
+  /** The triangles of a part: all of them but those of load modules that are drawn finely, or fewer of them. */
+  index(part) {
+    const { rows, cols, finely, mesh } = part, { index } = mesh.geometry, steps = this.area.coarse_steps;
+    let end = 0;
+    const put = (...corners) => {
+      index.array.set(corners, end);
+      end += corners.length;
+    };
+    if (part.stride !== 1 && !finely.includes("1")) strided(part, put);
+    else {
+      const across = cols / steps, wide = cols + 1;
+      // Row by row, so that what was reckoned for one row of heights is still there for the next.
+      for (let row = 0; row < rows; row++) {
+        for (let col = 0; col < cols; col++) {
+          if (finely[Math.floor(row / steps) * across + Math.floor(col / steps)] === "1") continue;
+          const at = row * wide + col;
+          put(at, at + 1, at + wide + 1, at, at + wide + 1, at + wide);
+        }
+      }
+    }
+    index.needsUpdate = true;
+    mesh.geometry.setDrawRange(0, end);
+    mesh.visible = 0 < end;
+  }
+}
+
+/** The triangles of a part some of whose heights are left out, but for those along its border: squares there are fans
+ * around their middles. */
+function strided({ rows, cols, stride }, put) {
+  const wide = cols + 1, at = (row, col) => row * wide + col;
+  for (let south = 0; south < rows; south += stride) {
+    for (let west = 0; west < cols; west += stride) {
+      const [north, east] = [south + stride, west + stride];
+      const corners = [at(south, west), at(south, east), at(north, east), at(north, west)];
+      const open = [south === 0, east === cols, north === rows, west === 0];
+      if (!open.includes(true)) {
+        put(corners[0], corners[1], corners[2], corners[0], corners[2], corners[3]);
+        continue;
+      }
+      const middle = at(south + stride / 2, west + stride / 2);
+      open.forEach((isOpen, side) => {
+        const [from, to] = [corners[side], corners[(side + 1) % 4]], pieces = isOpen ? stride : 1;
+        const step = (to - from) / pieces;
+        for (let piece = 0; piece < pieces; piece++) put(middle, from + piece * step, from + (piece + 1) * step);
+      });
+    }
+  }
+}
+
+/** Metres that a height is off at most where only one in so many is kept each way. */
+function offBy(height, rows, cols, stride) {
+  let most = 0;
+  for (let row = 0; row < rows; row++) {
+    for (let col = 0; col < cols; col++) {
+      const [up, right] = [(row % stride) / stride, (col % stride) / stride];
+      const [south, west] = [row - (row % stride), col - (col % stride)];
+      const [a, b, c, d] = [height(south, west), height(south, west + stride), height(south + stride, west + stride),
+        height(south + stride, west)];
+      const on = up <= right ? a + right * (b - a) + up * (c - b) : a + up * (d - a) + right * (c - d);
+      const off = Math.abs(height(row, col) - on);
+      // A height that is missing stays a hole.
+      most = Math.max(most, Number.isNaN(off) ? Infinity : off);
+    }
+  }
+  return most;
 }
 
 /** Smooth normals of a grid. */
@@ -126,10 +212,13 @@ export function apron(area, base, reach) {
       positions.push(x, base, -y);
     }
   };
-  rectangle(-reach, -reach, reach, south);
-  rectangle(-reach, north, reach, reach);
-  rectangle(-reach, south, west, north);
-  rectangle(east, south, reach, north);
+  // Rectangles that meet along whole sides: beside a corner in the middle of a side a pixel may show the sky.
+  const across = [-reach, west, east, reach], along = [-reach, south, north, reach];
+  for (let row = 0; row < 3; row++) {
+    for (let col = 0; col < 3; col++) {
+      if (row !== 1 || col !== 1) rectangle(across[col], along[row], across[col + 1], along[row + 1]);
+    }
+  }
   const geometry = geometryOf(new Float32Array(positions)), tint = geometry.getAttribute("tint");
   // Nothing is known of it: land in the haze, or the sea where the area has one.
   const haze = bytes(numbers(area.palette.haze)), land = tintAt(area, base).map((part, i) => (part + 2 * haze[i]) / 3);

@@ -2,7 +2,8 @@
 import { at } from "./panel.js";
 
 const degrees = (radians) => (radians * 180) / Math.PI, radians = (degrees) => (degrees * Math.PI) / 180;
-const SWITCHES = ["wireframe", "lines", "facets", "texture", "dem"], BY_DEFAULT = ["texture"];
+const SWITCHES = ["wireframe", "lines", "facets", "texture", "buildings", "dem"];
+const BY_DEFAULT = ["texture", "buildings"];
 /** Milliseconds between two changes of the address: browsers refuse a hundred in half a minute. */
 const EVERY_MS = 700;
 
@@ -16,21 +17,25 @@ export function asked(area) {
     place: place.every(Number.isFinite) ? [clamp(place[0], west, far), clamp(place[1], south, top)] : null,
     heading: radians(number("heading") || 0), turned: radians(number("look") || 0), pitch: radians(number("pitch")),
     height: number("height"), range: number("range"), hour: number("hour"), colors: words.get("colors"),
-    chases: words.get("eye") !== "hatch",
+    chases: words.get("eye") !== "hatch", imagery: number("imagery"),
     layers: words.has("layers") ? words.get("layers").split(" ") : null,
   };
 }
 
 /** Sets the switches that the address names. */
-export function setSwitches({ colors, layers, chases, hour }) {
+export function setSwitches({ colors, layers, chases, hour, imagery }) {
   if ([...at("colors").options].some((option) => option.value === colors)) at("colors").value = colors;
   if (layers) for (const id of SWITCHES) if (id !== "dem") at(id).checked = layers.includes(id);
   at("chase").checked = chases;
   if (Number.isFinite(hour)) at("hour").value = hour;
+  if (Number.isFinite(imagery)) {
+    at("imagery").checked = 0 < imagery;
+    if (0 < imagery) at("strength").value = imagery;
+  }
 }
 
 /** The address of what is seen now. */
-export function linkOf({ area, tank, range, hour }) {
+export function linkOf({ area, tank, range, hour, imagery }) {
   const [east, north] = area.inSystem(tank.east, tank.north), words = new URLSearchParams();
   const round = (value, digits) => String(Number(value.toFixed(digits)));
   words.set("east", round(east, 1));
@@ -43,6 +48,8 @@ export function linkOf({ area, tank, range, hour }) {
   if (range !== area.range_m) words.set("range", String(range));
   if (hour !== null) words.set("hour", String(hour));
   if (at("colors").value !== "height") words.set("colors", at("colors").value);
+  const strength = at("imagery").checked ? Number(at("strength").value) : 0;
+  if (imagery.levels.length !== 0 && strength !== 1) words.set("imagery", String(strength));
   const layers = SWITCHES.filter((id) => at(id).checked);
   if (String(layers) !== String(BY_DEFAULT)) words.set("layers", layers.join(" "));
   return `${location.pathname}?${words}`;

@@ -1,9 +1,12 @@
 // The page of `tiefort view`: one picture after another, and what hangs together by that.
 import { DirectionalLight, HemisphereLight, PerspectiveCamera, Scene, WebGLRenderer } from "three";
 import { askWhere } from "./ask.js";
+import { Casts } from "./casts.js";
 import { controls } from "./controls.js";
 import { skyBelowHorizon } from "./crack.js";
 import { helpList } from "./help.js";
+import { Houses } from "./houses.js";
+import { Imagery } from "./imagery.js";
 import { asked, follower, setSwitches } from "./link.js";
 import { SmallMap } from "./map.js";
 import * as looks from "./materials.js";
@@ -59,7 +62,8 @@ export async function start() {
   });
   at("help").addEventListener("click", help);
   at("horizon").addEventListener("click", () => tank.level());
-  scene.add(terrain.group, tank.model);
+  view.imagery.begin().catch((fault) => note(`The imagery could not be read: ${fault.message}`));
+  scene.add(terrain.group, view.houses.group, tank.model);
   fitted(view);
   run(view, wishes);
   // What a test asks, and whoever is curious in the console.
@@ -81,7 +85,9 @@ function viewOf(area) {
   const camera = new PerspectiveCamera(EYE_DEGREES, 1, NEAR_M, FAR_M), terrain = new Terrain(area);
   const tank = new Tank(terrain, 0, 0, 0);
   const view = { area, renderer, scene, sky, camera, terrain, tank, range: area.range_m, hour: null, frameMs: 0 };
+  [view.houses, view.casts] = [new Houses(area), new Casts()];
   view.pace = new Pace(view, isSoft);
+  view.imagery = new Imagery(area, renderer);
   view.map = new SmallMap(area, at("map").querySelector("canvas"), (east, north) => tank.goTo(east, north));
   return view;
 }
@@ -123,6 +129,7 @@ function lighting(view) {
   return () => {
     const sun = sunAt(view.hour, area.latitude ?? 40);
     looks.setSun(area, sun);
+    view.sun = sun;
     worker.postMessage({ sideM: isRead ? null : area.side_m, sun });
     isRead = true;
   };
@@ -157,13 +164,16 @@ function frame(view, passed, wish, now) {
   const seconds = Math.min(passed / 1000, STEP_SECONDS_MAX);
   terrain.drawSome();
   terrain.follow(tank.east, tank.north, range);
+  view.imagery.follow(tank.east, tank.north);
   if (tank.height === null) tank.settle();
   else tank.step(seconds, wish);
   tank.place(camera);
+  view.houses.follow(tank.east, tank.north, camera.position.y);
   looks.setFrame(now / 1000, tank.east, tank.north, tank.flies || !tank.chases ? 0 : 4.5);
   looks.setSplit(Number(at("split").value));
-  const version = `${terrain.version} ${looks.version()} ${view.version ?? 0}`;
+  const version = `${terrain.version} ${looks.version()} ${view.version ?? 0} ${view.houses.version}`;
   if (view.pace.draws(camera, version, now)) {
+    view.casts.draw(view);
     looks.setWidth(renderer.domElement.width);
     renderer.render(scene, camera);
     if (view.drew) view.pace.took(passed);
@@ -185,11 +195,11 @@ function frame(view, passed, wish, now) {
 }
 
 /** What is loaded, seen and stood on. */
-function figures({ terrain, tank, camera, range, frameMs }) {
+function figures({ terrain, tank, camera, range, frameMs, houses }) {
   const under = terrain.under(tank.east, tank.north, tank.ceiling());
   if (under) under.count = terrain.count(under.module);
   const view = terrain.inView(camera, tank.east, tank.north, range);
-  return { tank, under, frameMs, loaded: terrain.loaded(), view };
+  return { tank, under, frameMs, loaded: terrain.loaded(), view, houses: houses.counts() };
 }
 
 /** Everything a test wants to know. */
@@ -202,9 +212,11 @@ function state(view) {
     showsDem: terrain.withDem, isOnDeck: under?.isDeck, modules: loaded.modules, triangles: loaded.triangles,
     coarser: [...terrain.drawn.values()].filter(({ module }) => module.level !== 0)
       .map(({ module }) => [module.level, module.row, module.col, module.counts.triangles]),
+    houses: view.houses.counts(),
     blocks: terrain.blocks, fullest: loaded.fullest, view: seen, frameMs: view.frameMs, picked,
     flies: tank.flies, altitude: tank.altitude, turned: tank.turned, pitch: tank.pitch, gear: tank.gear,
     drifts: tank.drifts, lit: view.lit === true, frames: view.frames, count: view.count,
+    imagery: { levels: view.imagery.levels.length, drawn: view.imagery.drawn, isWhole: view.imagery.isWhole },
     pixelRatio: view.renderer.getPixelRatio(), geometries: view.renderer.info.memory.geometries,
   };
 }

@@ -1,11 +1,13 @@
 // The look of ground and sky: one material for everything that lies on the ground, near or far, and what they share.
 import {
-  BackSide, BoxGeometry, Color, DataTexture, DoubleSide, GLSL3, LinearFilter, LinearMipmapNearestFilter, Mesh,
-  RGBAFormat, ShaderMaterial, Vector2, Vector3, Vector4,
+  BackSide, BoxGeometry, Color, DataArrayTexture, DataTexture,
+  DoubleSide, GLSL3, LinearFilter, LinearMipmapNearestFilter, Mesh,
+  Matrix4, RGBAFormat, ShaderMaterial, Vector2, Vector3, Vector4,
 } from "three";
 import { numbers } from "./colors.js";
 import { noiseTexture } from "./noise.js";
-import { GROUND_FRAGMENT, GROUND_VERTEX, SKY_FRAGMENT, SKY_VERTEX } from "./shaders.js";
+import { RIBBON_VERTEX } from "./ribbon_shader.js";
+import { GROUND_FRAGMENT, GROUND_VERTEX, PICTURE_LEVELS_MAX, SKY_FRAGMENT, SKY_VERTEX } from "./shaders.js";
 import { lightOf } from "./sun.js";
 
 /** Metres at which two thirds of what is seen are haze. */
@@ -15,11 +17,14 @@ const SOFTNESS = 0.72;
 
 const flat = new DataTexture(new Uint8Array([128, 128, 255, 255]), 1, 1, RGBAFormat);
 const clear = new DataTexture(new Uint8Array(4), 1, 1, RGBAFormat);
-flat.needsUpdate = clear.needsUpdate = true;
+const noPicture = new DataArrayTexture(new Uint8Array(4), 1, 1, 1);
+flat.needsUpdate = clear.needsUpdate = noPicture.needsUpdate = true;
 
 let changes = 0;
 /** A number that changes with what is set here. */
 export const version = () => changes;
+/** Says that something else was set. */
+export const changed = () => (changes += 1);
 
 const shared = {
   sunWay: { value: new Vector3(0, 1, 0) }, sunTint: { value: new Color() }, skyTint: { value: new Color() },
@@ -28,39 +33,74 @@ const shared = {
   reliefMap: { value: flat }, reliefPlace: { value: new Vector4() }, noiseMap: { value: null },
   overMap: { value: clear }, overPlace: { value: new Vector4(0, 0, 1, 0) },
   smoothM: { value: new Vector2(1500, 3000) }, softness: { value: SOFTNESS }, seconds: { value: 0 },
-  split: { value: new Vector2() }, splitSide: { value: 0 }, textured: { value: 1 }, going: { value: 0 },
-  blob: { value: new Vector4() },
+  split: { value: new Vector2() }, splitSide: { value: 0 },
+  blob: { value: new Vector4() }, castMap: { value: clear }, castPlace: { value: new Matrix4() },
+  castReach: { value: new Vector4() },
+  pictureMap: { value: noPicture }, pictureStrength: { value: 0 }, pictureLevels: { value: 0 }, pictureM: { value: 1 },
+  pictureCorner: { value: new Vector2() },
+  pictureWindows: { value: Array.from({ length: PICTURE_LEVELS_MAX }, () => new Vector3(0, 0, 1)) },
 };
 
-function groundMaterial(edges, options) {
-  return new ShaderMaterial({
-    uniforms: { ...shared, edges }, vertexShader: GROUND_VERTEX, fragmentShader: GROUND_FRAGMENT, glslVersion: GLSL3,
+/** What is switched on, and for which materials: those whose triangles may show their edges, or both sides of a line,
+ * have marks of their own; plain ones show none of it. */
+const on = { TEXTURED: true, GOING: false, OVERLAID: false, PICTURED: false, EDGES: false };
+const materials = [];
+
+function groundMaterial(marks, options) {
+  const material = new ShaderMaterial({
+    uniforms: { ...shared }, vertexShader: GROUND_VERTEX, fragmentShader: GROUND_FRAGMENT, glslVersion: GLSL3,
     ...options,
   });
+  material.userData.marks = marks;
+  materials.push(material);
+  compile(material);
+  return material;
 }
 
-const edges = { value: 0 }, none = { value: 0 };
+/** Lets a material reckon what is switched on, and nothing else. */
+function compile(material) {
+  const { marks } = material.userData;
+  const isPlain = marks.includes("PLAIN"), mayShow = (name) => (name === "EDGES" ? marks.includes(name) : !isPlain);
+  const wanted = [...Object.keys(on).filter((name) => on[name] && mayShow(name)),
+    ...marks.filter((name) => name !== "EDGES")];
+  if (Object.keys(material.defines).join() === wanted.join()) return;
+  material.defines = Object.fromEntries(wanted.map((name) => [name, ""]));
+  material.needsUpdate = true;
+}
+
+/** Switches parts of the shaders on or off. */
+function turn(switches) {
+  changes += 1;
+  Object.assign(on, switches);
+  materials.forEach(compile);
+}
+
 /** Load modules, whose triangles may show their edges; what is drawn coarsely; decks, which are seen from below too;
  * ribbons on the ground, which must not sink into it. */
-export const fine = groundMaterial(edges, {});
+export const fine = groundMaterial(["EDGES"], {});
 /** The same, where two surfaces share the picture: left of the line and right of it. */
 export const sides = [-1, 1].map((side) => {
-  const material = groundMaterial(edges, {});
+  const material = groundMaterial(["EDGES", "SPLIT"], {});
   material.uniforms.splitSide = { value: side };
   return material;
 });
-export const coarse = groundMaterial(none, { polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1 });
-export const walls = groundMaterial(none, { side: DoubleSide });
-export const cliffs = groundMaterial(none, {});
-export const apron = groundMaterial(none, {});
+export const coarse = groundMaterial([], { polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1 });
+export const walls = groundMaterial([], { side: DoubleSide });
+export const cliffs = groundMaterial([], {});
+export const apron = groundMaterial([], {});
 // The relief ends with the area.
 for (const { uniforms } of [cliffs, apron]) {
   uniforms.reliefMap = { value: flat };
   uniforms.smoothM = { value: new Vector2(1e8, 2e8) };
   uniforms.softness = { value: 0 };
 }
-export const decks = groundMaterial(none, { side: DoubleSide });
-export const ribbons = groundMaterial(none, {
+/** Buildings, lit as the blocks they are. */
+export const blocks = groundMaterial(["PLAIN"], {});
+blocks.uniforms.smoothM = { value: new Vector2(1e8, 2e8) };
+blocks.uniforms.softness = { value: 0 };
+export const decks = groundMaterial([], { side: DoubleSide });
+export const ribbons = groundMaterial([], {
+  vertexShader: RIBBON_VERTEX,
   side: DoubleSide, polygonOffset: true, polygonOffsetFactor: -3, polygonOffsetUnits: -3,
 });
 
@@ -105,19 +145,49 @@ export function setRelief(area, { wide, high, step, data }) {
 
 /** A picture over the ground: a texture of so many metres each way, its north-west corner at a place; null for none. */
 export function setOverlay(texture, west, north, metres) {
-  changes += 1;
+  turn({ OVERLAID: Boolean(texture) });
   shared.overMap.value = texture ?? clear;
   shared.overPlace.value.set(west ?? 0, -(north ?? 0), metres ?? 1, texture ? 1 : 0);
 }
 
+/** The shadows of blocks: depths as the sun sees them, how a place becomes one of theirs, and how far they reach. */
+export function setCasts(casts) {
+  changes += 1;
+  shared.castMap.value = casts?.map ?? clear;
+  if (casts) shared.castPlace.value.copy(casts.place);
+  if (casts) shared.castReach.value.copy(casts.reach);
+  else shared.castReach.value.w = 0;
+}
+
+/** Pictures over the ground, in the layers of a texture: metres along the side of each, and of the finest pixel; the
+ * corner that places count from. */
+export function setPictures(texture, sides, finest, [west, south]) {
+  changes += 1;
+  const levels = Math.min(sides.length, PICTURE_LEVELS_MAX);
+  shared.pictureMap.value = texture;
+  shared.pictureLevels.value = levels;
+  shared.pictureM.value = finest;
+  shared.pictureCorner.value.set(west, south);
+  for (let level = 0; level < levels; level++) shared.pictureWindows.value[level].z = sides[level];
+}
+
+/** The middle of what the layer of a level shows, east and north of the corner. */
+export function setPictureWindow(level, [east, north]) {
+  changes += 1;
+  if (level < PICTURE_LEVELS_MAX) Object.assign(shared.pictureWindows.value[level], { x: east, y: north });
+}
+
+/** How strongly pictures cover the ground, from 0 to 1. */
+export function setPictureStrength(strength) {
+  turn({ PICTURED: 0 < strength });
+  shared.pictureStrength.value = strength;
+}
+
 /** What the switches say, and how far load modules are seen. */
 export function setLook({ wireframe, facets, texture, going, range }) {
-  changes += 1;
-  edges.value = wireframe ? 1 : 0;
+  turn({ EDGES: Boolean(wireframe), TEXTURED: Boolean(texture), GOING: Boolean(going) });
   // A layer of slopes tells those of the triangles.
   shared.softness.value = facets || going ? 0 : SOFTNESS;
-  shared.textured.value = texture ? 1 : 0;
-  shared.going.value = going ? 1 : 0;
   shared.smoothM.value.set(0.35 * range, 0.85 * range);
 }
 

@@ -56,7 +56,7 @@ export function deckMesh(area, decks) {
 
 /** Roads and streams of a load module that are lines of its TIN, as ribbons on the ground. */
 export function roadMesh(area, roads, surface) {
-  const positions = [], tints = [];
+  const positions = [], tints = [], asides = [];
   const on = (east, north, height) =>
     [east, Math.max(height, triangleUnder(surface, east, north)?.height ?? height) + RIBBON_LIFT_M, -north];
   for (const { class: of, width, ends: [a, b] } of roads) {
@@ -72,14 +72,18 @@ export function roadMesh(area, roads, surface) {
     const pieces = Math.ceil(length / RIBBON_M_MAX), tint = [...bytes(colorOf.cover(area, of) ?? colorOf.deck()), MADE];
     for (let piece = 0; piece < pieces; piece++) {
       const [left, other] = across(piece / pieces), [farLeft, farOther] = across((piece + 1) / pieces);
-      for (const corner of [left, other, farOther, left, farOther, farLeft]) {
+      [left, other, farOther, left, farOther, farLeft].forEach((corner, i) => {
+        // South is z, and the first of a pair lies left of the line.
+        const side = [-1, 1, 1, -1, 1, -1][i];
         positions.push(...corner);
         tints.push(...tint);
-      }
+        asides.push(side * right, -side * up);
+      });
     }
   }
   const geometry = geometryOf(new Float32Array(positions));
   geometry.getAttribute("tint").array.set(tints);
+  geometry.setAttribute("aside", new BufferAttribute(new Float32Array(asides), 2));
   geometry.computeVertexNormals();
   geometry.computeBoundingSphere();
   return meshOf(geometry, looks.ribbons);

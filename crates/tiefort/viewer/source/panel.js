@@ -6,7 +6,7 @@ const grouped = (number) => Math.round(number).toLocaleString("en-US");
 const degrees = (radians) => (radians * 180) / Math.PI;
 
 /** The counters: rows of a name and a value. */
-export function showFigures(area, { tank, loaded, view, under, frameMs }) {
+export function showFigures(area, { tank, loaded, view, under, frameMs, houses }) {
   const limits = area.limits, place = area.inSystem(tank.east, tank.north).map((metres) => metres.toFixed(0));
   const here = under ? `${under.module.row},${under.module.col}` : "–";
   const count = under ? `${under.count} of ${limits.per_load_module}` : "–";
@@ -30,6 +30,7 @@ export function showFigures(area, { tank, loaded, view, under, frameMs }) {
     const { modules, triangles } = loaded.coarser;
     rows.splice(7, 0, ["farther, coarser", `${grouped(triangles)} in ${grouped(modules)}`]);
   }
+  if (area.buildings) rows.splice(-1, 0, ["buildings drawn", `${grouped(houses.drawn)} of ${grouped(houses.all)}`]);
   const table = at("figures").querySelector("table");
   while (table.rows.length < rows.length) [0, 1].forEach(((row) => () => row.insertCell())(table.insertRow()));
   rows.forEach((row, i) => row.forEach((words, j) => {

@@ -1,5 +1,6 @@
 // The shaders of ground, water and sky. Colours are those of screens from beginning to end, as in the server's
 // pictures, so that ground in full light has the colour that the palette gives it.
+import { CAST } from "./casts_shader.js";
 import { STEEPEST } from "./light.js";
 
 /** Haze between the eye and what it sees; the same behind everything, so that ground meets sky without a line. */
@@ -27,20 +28,56 @@ export const GROUND_VERTEX = /* glsl */ `
   }
 `;
 
-/** `own.a` says what it is: 0 ground, 1/2 made by hands (roads, decks), 1 water. */
+/** Levels of pictures: from pixels of a hand's breadth to the largest area. */
+export const PICTURE_LEVELS_MAX = 20;
+
+/** The colour of pictures of the ground, multiplied with how opaque it is: from the finest level that reaches so far
+ * and is there, but from none that is finer than a pixel of the screen. */
+const PICTURES = /* glsl */ `
+  uniform highp sampler2DArray pictureMap;
+  uniform float pictureStrength, pictureM;
+  uniform int pictureLevels;
+  uniform vec2 pictureCorner;
+  uniform vec3 pictureWindows[${PICTURE_LEVELS_MAX}];
+  /** Metres east and south from pixel to pixel of the screen. */
+  vec2 across, along;
+  vec4 pictured() {
+    vec2 at = vec2(place.x, -place.z) - pictureCorner;
+    float wide = max(dot(across, across), dot(along, along)), narrow = min(dot(across, across), dot(along, along));
+    // Seen at a slant a pixel is long and narrow: something in between.
+    float level = 0.25 * log2(max(wide * narrow, 1e-12)) - log2(pictureM);
+    vec4 got = vec4(0.0);
+    for (int i = clamp(int(floor(level + 0.5)), 0, pictureLevels - 1); i < pictureLevels; i++) {
+      vec3 window = pictureWindows[i];
+      vec2 off = abs(at - window.xy) / window.z;
+      float share = i + 1 == pictureLevels ? 1.0 : clamp(24.0 * (0.5 - max(off.x, off.y)) - 0.1, 0.0, 1.0);
+      if (share == 0.0) continue;
+      got += (1.0 - got.a) * share * textureLod(pictureMap, vec3(at / window.z, float(i)), 0.0);
+      if (0.99 < got.a) break;
+    }
+    return got * pictureStrength;
+  }
+`;
+
+/** What is switched off is not compiled in: drawn in software, both sides of a condition are reckoned for every pixel.
+ * `own.a` says what it is: 0 ground, 1/2 made by hands (roads, decks), 1 water. */
 export const GROUND_FRAGMENT = /* glsl */ `
   ${HAZE}
+  ${CAST}
   uniform sampler2D reliefMap, noiseMap, overMap;
   uniform vec4 reliefPlace, overPlace;
   uniform vec3 sunTint, skyTint, rockTint, edgeTint;
   uniform vec2 smoothM;
-  uniform float softness, edges, seconds, textured, going;
+  uniform float softness, seconds;
   uniform vec4 blob;
   uniform vec2 split;
   uniform float splitSide;
   in vec3 place, facing, bary;
   in vec4 own;
   out vec4 seen;
+  #ifdef PICTURED
+  ${PICTURES}
+  #endif
 
   vec3 water(vec3 toward, float away, float lit) {
     vec2 at = place.xz / 38.0;
@@ -59,7 +96,7 @@ export const GROUND_FRAGMENT = /* glsl */ `
 
   vec3 ground(float away, vec3 n, vec3 smoothly, float lit, float open) {
     vec3 base = own.rgb;
-    if (0.5 < textured) {
+    #ifdef TEXTURED
       float patches = 1.2 * (texture(noiseMap, place.zx / 3700.0).r - 0.48), grain = 0.0;
       // Further away it is as good as even.
       if (away < 1500.0) {
@@ -72,19 +109,31 @@ export const GROUND_FRAGMENT = /* glsl */ `
         base = mix(base * (1.0 + patches * vec3(0.5, 0.42, 0.3)), rockTint * (1.0 + 0.5 * grain), 0.85 * steep);
         base *= 1.0 + 0.34 * grain;
       } else base *= 1.0 + 0.12 * grain;
-    }
-    if (0.5 < going) {
+    #endif
+    #ifdef PICTURED
+      if (own.a < 0.25) {
+        vec4 picture = pictured();
+        base = base * (1.0 - picture.a) + picture.rgb;
+      }
+    #endif
+    #ifdef GOING
       float steep = length(n.xz) / max(n.y, 0.05);
       vec3 fair = mix(vec3(0.25, 0.58, 0.27), vec3(0.95, 0.85, 0.35), clamp(steep / 0.25, 0.0, 1.0));
       vec3 hard = mix(fair, vec3(0.9, 0.5, 0.15), clamp((steep - 0.25) / 0.2, 0.0, 1.0));
       base = mix(base, steep < 0.45 ? hard : vec3(0.72, 0.08, 0.08), 0.85);
-    }
+    #endif
     return base * (skyTint * (0.55 + 0.45 * n.y) * open + sunTint * max(dot(n, sunWay), 0.0) * lit);
   }
 
   void main() {
-    // Two surfaces side by side: each is drawn on its own side of a line across the picture.
-    if (splitSide * (gl_FragCoord.x - split.x * split.y) < 0.0) discard;
+    #ifdef PICTURED
+      across = dFdx(place.xz);
+      along = dFdy(place.xz);
+    #endif
+    #ifdef SPLIT
+      // Two surfaces side by side: each is drawn on its own side of a line across the picture.
+      if (splitSide * (gl_FragCoord.x - split.x * split.y) < 0.0) discard;
+    #endif
     vec3 toEye = cameraPosition - place;
     float away = length(toEye);
     vec3 toward = toEye / away;
@@ -96,18 +145,18 @@ export const GROUND_FRAGMENT = /* glsl */ `
     vec3 n = normalize(mix(facing, smoothly, far));
     vec2 from = place.xz - blob.xy;
     float under = blob.w < 0.5 ? 1.0 : 1.0 - 0.55 * (1.0 - smoothstep(0.4, 1.0, dot(from, from) / (blob.z * blob.z)));
-    float lit = relief.b * under;
+    float lit = relief.b * under * castLight(place, facing);
     vec3 color = 0.75 < own.a ? water(toward, away, lit) : ground(away, n, smoothly, lit, relief.a * under);
-    if (0.5 < overPlace.w) {
+    #ifdef OVERLAID
       vec4 over = texture(overMap, (place.xz - overPlace.xy) / overPlace.z);
       color = mix(color, over.rgb, over.a);
-    }
-    if (0.5 < edges) {
+    #endif
+    #ifdef EDGES
       vec3 wide = fwidth(bary);
       vec3 inside = smoothstep(vec3(0.0), 1.2 * wide + 1e-6, bary);
       float thin = clamp(1.0 - 4.0 * max(max(wide.x, wide.y), wide.z), 0.0, 1.0);
       color = mix(color, edgeTint, 0.5 * thin * (1.0 - min(min(inside.x, inside.y), inside.z)));
-    }
+    #endif
     float clear = exp(-away / hazeM);
     seen = vec4(mix(hazeToward(-toward), color, clear), 1.0);
   }

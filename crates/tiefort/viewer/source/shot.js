@@ -1,4 +1,5 @@
 // The picture as a file, with an arrow to the north and a scale, and a drive as a track.
+import { gpxOf } from "./gpx.js";
 import { setWidth } from "./materials.js";
 import { at } from "./panel.js";
 import { hitAt } from "./pick.js";
@@ -58,7 +59,7 @@ export function savePicture(view) {
   pictureOf(view).toBlob((blob) => save(blob, `${view.area.name}.png`));
 }
 
-/** Records where the observer is, once a second, until it is pressed again. */
+/** Records where the observer is, once a second, until it is pressed again; then saves it as the page says. */
 export function recorder(view) {
   let rows = null, timer = 0;
   const note = () => {
@@ -69,7 +70,7 @@ export function recorder(view) {
     rows.push([new Date().toISOString(), east.toFixed(2), north.toFixed(2), height.toFixed(2), tank.speed.toFixed(2),
       heading.toFixed(1)]);
   };
-  return () => {
+  return async () => {
     at("record").setAttribute("aria-pressed", rows === null);
     if (rows === null) {
       rows = [];
@@ -78,11 +79,15 @@ export function recorder(view) {
       return null;
     }
     clearInterval(timer);
-    const head = "time,east_m,north_m,height_m,speed_mps,heading_degrees";
-    const text = [head, ...rows.map((row) => row.join(","))].join("\n") + "\n";
-    save(new Blob([text], { type: "text/csv" }), `${view.area.name}-track.csv`);
-    const count = rows.length;
+    const track = rows, { name } = view.area;
     rows = null;
-    return count;
+    if (at("track").value === "gpx") {
+      save(new Blob([await gpxOf(name, track)], { type: "application/gpx+xml" }), `${name}-track.gpx`);
+    } else {
+      const head = "time,east_m,north_m,height_m,speed_mps,heading_degrees";
+      const text = [head, ...track.map((row) => row.join(","))].join("\n") + "\n";
+      save(new Blob([text], { type: "text/csv" }), `${name}-track.csv`);
+    }
+    return track.length;
   };
 }

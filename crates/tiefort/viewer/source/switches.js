@@ -5,6 +5,7 @@ import { unpick } from "./pick.js";
 
 const KEYS = {
   KeyT: "wireframe", KeyM: "lines", KeyG: "dem", KeyF: "fly", KeyH: "chase", KeyJ: "facets", KeyU: "texture",
+  KeyI: "imagery", Digit0: "buildings",
 };
 const PANELS = { KeyY: "layers", KeyO: "figures" };
 /** The lowest place of the light's slider means light as on maps. */
@@ -17,6 +18,7 @@ export function switches(view, { light }) {
     const colors = at("colors").value, is = (id) => at(id).checked;
     if (colors !== terrain.colors) map.repaint(colors === "going" || colors === "levels" ? "height" : colors);
     terrain.show({ colors, lines: is("lines") });
+    view.houses.show(is("buildings"));
     looks.setLook({
       wireframe: is("wireframe"), facets: is("facets"), range: view.range, going: colors === "going",
       texture: is("texture") && (colors === "height" || colors === "going"),
@@ -42,21 +44,27 @@ export function switches(view, { light }) {
     at("range").nextElementSibling.textContent = `${view.range / 1000} km`;
     shown();
   };
+  const imagery = () => view.imagery.show(at("imagery").checked, Number(at("strength").value));
   const hour = () => {
     const value = Number(at("hour").value), minutes = String(60 * (value % 1)).padStart(2, "0");
     view.hour = value <= AS_ON_MAPS ? null : value;
     at("hour").nextElementSibling.textContent = view.hour === null ? "as on a map" : `${Math.floor(value)}:${minutes}`;
     light();
   };
-  for (const id of ["colors", "wireframe", "lines", "facets", "texture"]) at(id).addEventListener("change", shown);
+  const looked = ["colors", "wireframe", "lines", "facets", "texture", "buildings"];
+  for (const id of looked) at(id).addEventListener("change", shown);
   at("dem").addEventListener("change", dem);
+  at("imagery").addEventListener("change", imagery);
+  at("strength").addEventListener("input", imagery);
   at("fly").addEventListener("change", () => tank.takeOff(at("fly").checked));
   at("chase").addEventListener("change", () => (tank.chases = at("chase").checked));
   at("range").addEventListener("input", range);
   at("hour").addEventListener("input", hour);
+  at("buildings").parentElement.hidden = !area.buildings;
   at("range").value = view.range;
   range();
   hour();
+  imagery();
   return ({ code }) => {
     if (code === "KeyC") {
       at("colors").selectedIndex = (at("colors").selectedIndex + 1) % at("colors").length;

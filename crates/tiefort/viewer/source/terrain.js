@@ -70,6 +70,7 @@ export class Terrain {
 
   /** Follows the observer: drops what is out of range, asks for what is missing. */
   follow(east, north, range) {
+    this.coarse.follow(east, north);
     // The DEM has one level, and would not fit to coarser load modules.
     const levels = this.withDem ? 1 : this.area.levels;
     const blocks = Array.from({ length: levels }, (_, level) =>

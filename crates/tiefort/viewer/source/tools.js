@@ -12,12 +12,15 @@ import { recorder, savePicture } from "./shot.js";
 const FREE = [0.35, 1, 0.45], HIDDEN = [1, 0.25, 0.2], LINE = [1, 0.88, 0.3];
 /** Of places that are seen and that are not: what is laid over the ground, and how much of it. */
 const SEEN = [90, 220, 100, 95], DARK = [28, 10, 40, 135];
-const VIEWSHED = { range: 5000, spacing: 25 };
+/** Metres between places of a viewshed at least, and places along its side at most. */
+const SPACING_M = 25, SIDE_MAX = 1001;
 /** Heights of a profile at most, and metres between them at least. */
 const STEPS = 400, STEP_M = 1;
 const HINTS = {
   sight: "click the eye, then the place it looks at", measure: "click where the line begins, then where it ends",
 };
+/** The earth that lines of sight are looked along. */
+const earth = () => (at("curved").checked ? "round" : "flat");
 /** Keys of the tools, by the ids of their buttons. */
 export const TOOL_KEYS = {
   KeyR: "sight", KeyV: "viewshed", KeyP: "measure", KeyK: "picture", KeyZ: "record", KeyL: "link",
@@ -31,8 +34,10 @@ export class Tools {
     at("viewshed").addEventListener("click", () => this.tried(() => this.viewshed()));
     at("picture").addEventListener("click", () => savePicture(view));
     at("record").addEventListener("click", () => {
-      const count = record();
-      tell(count === null ? "recording; press again to save the track" : `${count} places saved`);
+      this.tried(async () => {
+        const count = await record();
+        tell(count === null ? "recording; press again to save the track" : `${count} places saved`);
+      });
     });
     at("link").addEventListener("click", () => this.tried(() => this.link()));
     at("goto").addEventListener("submit", (event) => {
@@ -88,7 +93,8 @@ export class Tools {
 
   async sight(from, to) {
     const [eye, target] = [Number(at("eye").value), Number(at("target").value)];
-    const found = await askSight([...from, eye], [...to, target]), { visible, blocker, clearance_m: clearance } = found;
+    const found = await askSight([...from, eye], [...to, target], earth());
+    const { visible, blocker, clearance_m: clearance } = found;
     this.marks.draw(visible ? [[found.from, found.to, FREE]]
       : [[found.from, blocker, FREE], [blocker, found.to, HIDDEN]]);
     const away = (place) => Math.hypot(place[0] - found.from[0], place[1] - found.from[1]).toFixed(0);
@@ -113,10 +119,12 @@ export class Tools {
   async viewshed() {
     if (this.overlay) return this.clear();
     const { area, tank } = this.view, place = area.inSystem(tank.east, tank.north);
-    const eye = tank.flies ? Math.max(tank.altitude - (tank.height ?? tank.altitude), 0) : Number(at("eye").value);
+    const above = Math.max(tank.altitude - (tank.height ?? tank.altitude), 0);
+    const eye = tank.flies && at("aloft").checked ? above : Number(at("eye").value);
     tell("looking …");
-    const { range, spacing } = VIEWSHED, target = Number(at("target").value);
-    const found = await askViewshed([...place, eye], target, range, spacing), { side, seen } = found;
+    const target = Number(at("target").value), range = 1000 * (Number(at("reach").value) || 5);
+    const spacing = Math.max(SPACING_M, Math.ceil((2 * range) / (SIDE_MAX - 1)));
+    const found = await askViewshed([...place, eye], target, range, spacing, earth()), { side, seen } = found;
     const data = new Uint8Array(4 * side * side);
     seen.forEach((what, i) => {
       const [row, col] = [Math.floor(i / side), i % side], isEdge = row % (side - 1) === 0 || col % (side - 1) === 0;
@@ -131,7 +139,8 @@ export class Tools {
     at("viewshed").setAttribute("aria-pressed", true);
     this.answer = { seen: count, places: all };
     tell(`seen from ${eye.toFixed(1)} m above the ground: ${((100 * count) / all).toFixed(1)} % within `
-      + `${range / 1000} km, ${((count * spacing * spacing) / 1e6).toFixed(2)} km²`);
+      + `${range / 1000} km${earth() === "round" ? " on the round earth" : ""}, `
+      + `${((count * spacing * spacing) / 1e6).toFixed(2)} km²`);
   }
 
   async go(words) {

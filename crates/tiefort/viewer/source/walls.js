@@ -5,8 +5,10 @@ import * as looks from "./materials.js";
 import { geometryOf, meshOf, tintAt } from "./meshes.js";
 import { coarseHeight } from "./surface.js";
 
-/** Metres that walls reach beyond the line they hang from. */
-const LIP_M = 0.2;
+/** How far walls reach beyond the upper of the lines they stand between, as a part of their distance: a quarter of a
+ * pixel, since some renderers place corners by a sixteenth only. Metres that they reach beyond the lower line, and below
+ * the base. */
+const LIP = 3e-4, FOOT_M = 2, BELOW_M = 10;
 
 /** A side of a load module (south, east, north, west) in coarse steps: where it begins, and which way it goes. */
 function sideLine(area, { row, col }, side) {
@@ -75,28 +77,29 @@ function upward(count) {
 /** North and west run from right to left for who stands outside. */
 const outward = (wall, side) => (side < 2 ? wall : wall.reverse());
 
-/** Reaches a little beyond the upper line too: a wall bends where the line below it does, and so, but for rounding,
- * lies on the line above; a pixel may fall between. */
-const lipped = (wall) =>
-  wall.map(([east, north, high, low]) => [east, north, high + (low < high ? LIP_M : -LIP_M), low]);
+/** From below the lower of two lines to above the upper one, so that the wall is whole where they cross: were its edges
+ * to follow one line each, it would be narrowest somewhere beside the crossing, and leave open what lies between. Both
+ * reach a little further, since a wall bends where either line does, and so, but for rounding, lies on the other. */
+const between = (wall, lip) => wall.map(([east, north, one, other]) =>
+  [east, north, Math.max(one, other) + lip, Math.min(one, other) - FOOT_M]);
 
 /** Walls that close what is open between fine and coarse load modules, and those along the border of the area. */
 export function wallMeshes(area, drawn, base) {
   const [inner, border] = [new Walls(area, false), new Walls(area, true)];
   const isInside = (row, col) => 0 <= row && 0 <= col && row < area.rows && col < area.cols;
-  // A little further than the other surface, against rounding.
-  const onto = (height, row, col) => {
-    const other = coarseHeight(area.coarse, row, col);
-    return other + (other < height ? -2 : 2);
-  };
+  const onto = (_, row, col) => coarseHeight(area.coarse, row, col);
+  // The level ground around the area meets the walls at the base; edges of different lengths do not quite meet.
+  const foot = base - BELOW_M;
+  // The observer stands in the middle of what is drawn finely.
+  const lip = (LIP * Math.sqrt(drawn.size) * area.side_m) / 2;
   for (const { module, surface } of drawn.values()) {
     [[-1, 0], [0, 1], [1, 0], [0, -1]].forEach(([up, right], side) => {
       const [row, col] = [module.row + up, module.col + right];
-      if (!isInside(row, col)) border.add(outward(wallAlong(area, module, surface, side, () => base), side));
-      else if (!drawn.has(row * area.cols + col)) inner.add(lipped(wallAlong(area, module, surface, side, onto)));
+      if (!isInside(row, col)) border.add(outward(wallAlong(area, module, surface, side, () => foot), side));
+      else if (!drawn.has(row * area.cols + col)) inner.add(between(wallAlong(area, module, surface, side, onto), lip));
     });
   }
-  addBorder(area, drawn, base, border);
+  addBorder(area, drawn, foot, border);
   return [inner.mesh(), border.mesh()];
 }
 

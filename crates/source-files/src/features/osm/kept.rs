@@ -24,3 +24,9 @@ pub(super) struct KeptRelation {
     pub tags: Tags,
     pub members: Vec<(Role, i64)>,
 }
+
+/// In the order of their numbers. Of a way that a file has twice, one is kept, whichever comes first.
+pub(super) fn sort_ways(ways: &mut Vec<KeptWay>) {
+    ways.sort_by(|a, b| (a.id, &a.nodes).cmp(&(b.id, &b.nodes)));
+    ways.dedup_by_key(|way| way.id);
+}

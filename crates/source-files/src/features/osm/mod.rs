@@ -8,15 +8,14 @@
 
 mod assemble;
 mod block;
+mod buildings;
 pub(crate) mod frames;
 mod kept;
 mod kinds;
 mod nodes;
 mod shapes;
+mod texts;
 mod wire;
-
-use std::collections::HashSet;
-use std::sync::Arc;
 
 use terrain::Each;
 
@@ -28,9 +27,11 @@ use crate::store::Store;
 use assemble::Role;
 use block::{Block, Contents, Demands, MemberKind, OFF_THE_EARTH, Way};
 
+use buildings::{BuildingTexts, Buildings};
 use frames::{Frame, FrameKind, Frames};
-use kept::{KeptRelation, KeptWay, SEGMENT_M_MAX};
+use kept::{KeptRelation, KeptWay, SEGMENT_M_MAX, sort_ways};
 use nodes::Nodes;
+use texts::{KnownTexts, wanted_texts};
 use wire::Fault;
 
 /// Whom to name (Open Database License, section 4.3).
@@ -49,6 +50,8 @@ struct Reader<'a> {
     /// Wanted ways that have no node near the area: their first nodes, as far as they are looked at.
     lost: Vec<(i64, i64)>,
     far_ways: u64,
+    /// Buildings, where they are wanted.
+    buildings: Option<Buildings>,
 }
 
 pub(super) fn read(store: &Store, wanted: &Wanted, each: Each) -> Result<FeatureFile, SourceError> {
@@ -63,6 +66,7 @@ pub(super) fn read(store: &Store, wanted: &Wanted, each: Each) -> Result<Feature
         ways: Vec::new(),
         lost: Vec::new(),
         far_ways: 0,
+        buildings: wanted.buildings.then(|| Buildings::new(placing.within(0.0))),
     };
     reader.survey(store)?;
     let mut relations = reader.relations()?;
@@ -75,9 +79,10 @@ pub(super) fn read(store: &Store, wanted: &Wanted, each: Each) -> Result<Feature
     placing.lies_over(&reader.nodes.lies);
     placing.count_outside((all - relations.len()) as u64);
     reader.tell_lost(&mut placing);
-    let Reader { nodes, ways, .. } = reader;
-    shapes::place(&nodes, ways, relations, &mut placing, each);
-    Ok(placing.finish(Some(ATTRIBUTION)))
+    let Reader { nodes, ways, buildings, .. } = reader;
+    let buildings = buildings.map(|buildings| buildings.placed(&nodes, &placing, each)).unwrap_or_default();
+    shapes::place(&nodes, ways, relations, &mut placing, kinds::is_area, each);
+    Ok(FeatureFile { buildings, ..placing.finish(Some(ATTRIBUTION)) })
 }
 
 impl<'a> Reader<'a> {
@@ -118,18 +123,22 @@ impl<'a> Reader<'a> {
 
     /// The multipolygon relations with a wanted key.
     fn relations(&mut self) -> Result<Vec<KeptRelation>, SourceError> {
-        let Self { frames, blocks, keys, texts, .. } = self;
+        let Self { frames, blocks, keys, texts, buildings, .. } = self;
         let mut kept = Vec::new();
         for (frame, _) in blocks.iter().filter(|(_, contents)| contents.relations) {
             frames.with_bytes(frame, |bytes| {
                 let block = Block::read(bytes)?;
                 let is_wanted = wanted_texts(&block, keys);
+                let of_buildings = BuildingTexts::of(&block);
                 let mut known = KnownTexts::of(&block);
                 block.relations(|relation| {
                     let is_multipolygon = relation
                         .tags
                         .iter()
                         .any(|&(key, value)| block.texts[key] == b"type" && block.texts[value] == b"multipolygon");
+                    if let (true, Some(buildings)) = (is_multipolygon, &mut *buildings) {
+                        buildings.see_relation(&block, relation, &of_buildings, &mut known, texts);
+                    }
                     if !is_multipolygon || !relation.tags.iter().any(|&(key, _)| is_wanted[key]) {
                         return Ok::<_, Fault>(());
                     }
@@ -145,6 +154,7 @@ impl<'a> Reader<'a> {
                 })
             })?;
         }
+        buildings.iter_mut().for_each(Buildings::sort_relations);
         kept.sort_by_key(|relation: &KeptRelation| relation.id);
         kept.dedup_by_key(|relation| relation.id);
         Ok(kept)
@@ -152,14 +162,18 @@ impl<'a> Reader<'a> {
 
     /// Keeps ways with a node near the area that are wanted, by themselves or by a relation.
     fn near_ways(&mut self, members: &mut Members, placing: &mut Placing) -> Result<(), SourceError> {
-        let Self { frames, blocks, keys, nodes, texts, ways, lost, far_ways, .. } = self;
+        let Self { frames, blocks, keys, nodes, texts, ways, lost, far_ways, buildings } = self;
         let mut way = Way::default();
         for (frame, _) in blocks.iter().filter(|(_, contents)| contents.ways.is_some()) {
             frames.with_bytes(frame, |bytes| {
                 let block = Block::read(bytes)?;
                 let is_wanted_text = wanted_texts(&block, keys);
+                let of_buildings = BuildingTexts::of(&block);
                 let mut known = KnownTexts::of(&block);
                 block.ways(&mut way, |way| {
+                    if let Some(buildings) = buildings {
+                        buildings.see_way(&block, way, &of_buildings, (&mut known, texts), nodes);
+                    }
                     let is_wanted = way.tags.iter().any(|&(key, _)| is_wanted_text[key]);
                     let is_member = members.see(way.id);
                     if !is_wanted && !is_member {
@@ -297,37 +311,7 @@ fn member_ids(relations: &[KeptRelation]) -> Vec<i64> {
     ids
 }
 
-/// In the order of their numbers. Of a way that a file has twice, one is kept, whichever comes first.
-fn sort_ways(ways: &mut Vec<KeptWay>) {
-    ways.sort_by(|a, b| (a.id, &a.nodes).cmp(&(b.id, &b.nodes)));
-    ways.dedup_by_key(|way| way.id);
-}
-
 /// Whether some of the sorted ids lie in a range.
 fn reaches(ids: &[i64], [least, most]: [i64; 2]) -> bool {
     ids.get(ids.partition_point(|&id| id < least)).is_some_and(|&id| id <= most)
-}
-
-/// Which texts of a block are wanted keys.
-fn wanted_texts(block: &Block, keys: &[&str]) -> Vec<bool> {
-    let keys: HashSet<&[u8]> = keys.iter().map(|key| key.as_bytes()).collect();
-    block.texts.iter().map(|text| keys.contains(text)).collect()
-}
-
-/// The texts of a block that have been kept so far.
-struct KnownTexts(Vec<Option<Arc<str>>>);
-
-impl KnownTexts {
-    fn of(block: &Block) -> Self {
-        Self(vec![None; block.texts.len()])
-    }
-
-    fn tags(&mut self, block: &Block, tags: &[(usize, usize)], texts: &mut Texts) -> Tags {
-        let mut text = |index: usize| {
-            self.0[index].get_or_insert_with(|| texts.keep(&String::from_utf8_lossy(block.texts[index]))).clone()
-        };
-        let mut tags: Tags = tags.iter().map(|&(key, value)| (text(key), text(value))).collect();
-        tags.sort_unstable();
-        tags
-    }
 }

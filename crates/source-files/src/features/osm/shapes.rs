@@ -7,7 +7,6 @@ use terrain::{Each, gather};
 use super::assemble::{NodeRing, Role, rings};
 use super::block::OFF_THE_EARTH;
 use super::kept::{KeptRelation, KeptWay, SEGMENT_M_MAX};
-use super::kinds::is_area;
 use super::nodes::{Nodes, degrees};
 use crate::features::clip::Vertex;
 use crate::features::model::{Done, Tags};
@@ -16,15 +15,16 @@ use crate::features::placing::{LEFT_OUT, Placing};
 use crate::features::raw::{Part, RawFeature, RawShape};
 use crate::limits::RINGS_MAX;
 
-/// Places relations, then ways.
+/// Places relations, then ways; `is_area` says which closed ways are polygons.
 pub(super) fn place(
     nodes: &Nodes,
     ways: Vec<KeptWay>,
     relations: Vec<KeptRelation>,
     placing: &mut Placing,
+    is_area: fn(&Tags) -> bool,
     each: Each,
 ) {
-    let mut drawer = Drawer { nodes, ways: &ways, placing, drawn: HashSet::new() };
+    let mut drawer = Drawer { nodes, ways: &ways, placing, is_area, drawn: HashSet::new() };
     for relation in relations {
         drawer.relation(relation);
     }
@@ -32,7 +32,7 @@ pub(super) fn place(
     let pieces: Vec<&[KeptWay]> = ways.chunks(WAYS_A_PIECE).collect();
     let placed = gather(each, pieces.len(), |number| {
         let mut placing = placing.of_part();
-        let mut drawer = Drawer { nodes, ways: &[], placing: &mut placing, drawn: HashSet::new() };
+        let mut drawer = Drawer { nodes, ways: &[], placing: &mut placing, is_area, drawn: HashSet::new() };
         pieces[number].iter().filter(|way| way.is_wanted).for_each(|way| drawer.way(way, &drawn));
         placing
     });
@@ -49,6 +49,8 @@ struct Drawer<'a> {
     nodes: &'a Nodes,
     ways: &'a [KeptWay],
     placing: &'a mut Placing,
+    /// Whether a closed way with these tags is a polygon.
+    is_area: fn(&Tags) -> bool,
     /// Ways that are outlines of a relation with the same tags.
     drawn: HashSet<i64>,
 }
@@ -80,7 +82,7 @@ impl Drawer<'_> {
         let first = run.places.iter().flatten().next().copied();
         let at = |placing: &Placing| first.and_then(|vertex| placing.at(&vertex));
         let fault = run.fault();
-        let parts = if is_closed && is_area(&way.tags) {
+        let parts = if is_closed && (self.is_area)(&way.tags) {
             match closed(run) {
                 Some(ring) => {
                     self.tell(&id, at(self.placing), fault, Done::Kept("joined across"));

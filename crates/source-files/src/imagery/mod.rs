@@ -1,0 +1,26 @@
+//! Pictures of the ground in: GeoTIFFs of colours, in any coordinate system, drawn onto squares of another one.
+//!
+//! ```text
+//!   directories   what a file says of its picture, its overviews and its masks
+//!   level         one of these, cut into strips or tiles
+//!   unpack        a strip or tile as numbers, then as colours
+//!   picture       all of them, opened
+//!   keep          those decoded last
+//!   draw          a square of ground, from the level that is as fine as it
+//! ```
+//! A picture is never read whole: a square takes the strips or tiles below it, and no more than [`level::PIXELS_MAX`]
+//! pixels of them.
+
+mod directories;
+mod draw;
+mod keep;
+mod level;
+mod picture;
+mod unpack;
+
+pub use draw::Square;
+pub use keep::Keep;
+pub use picture::Imagery;
+
+#[cfg(test)]
+mod tests;
