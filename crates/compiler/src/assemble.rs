@@ -4,11 +4,11 @@ use std::collections::BTreeSet;
 
 use database::{FileStamp, Measured, TileModules};
 use engine::{Artifact, Fingerprint, Key, Outcome, Stamp, keep_or_make};
-use fidelity::{FeatureFigures, Residuals, Tally};
+use fidelity::{Curvature, FeatureFigures, Residuals, Tally};
 use ground::Window;
 use job::{Borders, ClipHeights as JobClipHeights, Edges, Job, OuterBorder};
 use load_modules::{ClipHeights, Layout, clip, concatenate, cut_decks};
-use terrain::{HOLE_CLASS, LatticePoint, LoadModule, ModuleCounts, Post, PostRect, TileId, Tin, Vertex};
+use terrain::{HOLE_CLASS, LatticePoint, LoadModule, ModuleCounts, Post, PostRect, TileId, Tin, Vertex, in_turn};
 
 use crate::assembled::{Assembled, ModuleNumbers};
 use crate::keys::{self, StampOf};
@@ -117,10 +117,10 @@ fn make(assembling: &Assembling, stamp: &Stamp) -> Result<(Assembled, Sums), Com
     levels[1..].iter_mut().for_each(|level| drop(fidelity::measure(level, &window.measured(area))));
     let file = publish(run, tile, &layout, fingerprint, &levels)?;
     let counted = count_points(run, &own.tin, &removed[area.tiling.index(tile)], &window.importance);
-    let heights = heights_of(&levels[0]);
+    let ground = (heights_of(&levels[0]), curvature(run, tile, &levels[0], &window));
     let (modules, coarser) = numbers_of(&levels);
     let mut done = Assembled { file, measured: FileStamp::of(&[]), modules, coarser };
-    let sums = Sums { features: figures, ..sums(residuals, at_source, counted, heights) };
+    let sums = Sums { features: figures, ..sums(residuals, at_source, counted, ground) };
     done.measured = run.database.write_measured(stamp, &to_measured(tile, &done, &sums))?;
     Ok((done, sums))
 }
@@ -129,10 +129,16 @@ fn sums(
     residuals: Residuals,
     at_source: Option<Tally>,
     (points, border): (Vec<u64>, u64),
-    heights: (i32, i32),
+    (heights, curvature): ((i32, i32), Curvature),
 ) -> Sums {
     let (has_source, at_source) = (at_source.is_some(), at_source.unwrap_or_default());
-    Sums { residuals, has_source, at_source, points, border, heights, features: None }
+    Sums { residuals, has_source, at_source, points, border, heights, curvature, features: None }
+}
+
+/// How much the ground of a tile curves, for triangles as large as these load modules have them.
+fn curvature(run: &Run, tile: TileId, modules: &[LoadModule], window: &Window) -> Curvature {
+    let triangles = modules.iter().map(|module| module.triangles.len()).sum();
+    fidelity::curvature(&window.dem, run.area.tiling.rect(tile), triangles, &in_turn)
 }
 
 /// How true a tile is to its features, in jobs with some.
@@ -169,7 +175,8 @@ pub(crate) fn read_assembled(run: &Run, tins: &[Published], tile: TileId) -> Res
     let features = feature_figures(run, tile, (&own.tin, &levels[0]), &window)?;
     let measured = folder.stamp_file(&folder.measured_path(tile))?;
     let done = Assembled { file, measured, modules, coarser };
-    Ok((done, Sums { features, ..sums(residuals, at_source, counted, heights_of(&levels[0])) }))
+    let ground = (heights_of(&levels[0]), curvature(run, tile, &levels[0], &window));
+    Ok((done, Sums { features, ..sums(residuals, at_source, counted, ground) }))
 }
 
 /// Numbers of the finest level, and of each of the others.

@@ -1,7 +1,7 @@
 //! What tiles are made from beside their ground, taken apart field by field: a new field does not compile until it is
 //! decided whether it counts.
 
-use database::SourceRecord;
+use database::{Building, SourceRecord};
 use engine::{Fingerprint, FingerprintBuilder, Key, Part, Stamp};
 use features::{AreaFeatures, Clearances, GradeOptions, Place};
 use ground::{GamingArea, Surroundings, Window, feed_post};
@@ -36,12 +36,26 @@ const TINS: Part = Part { name: "tins", changed: "a TIN changed" };
 /// What roads, rivers and lakes put into it.
 const LEFT_OUT: Part = Part { name: "left out", changed: "what coarser levels leave out changed" };
 const FEATURES: Part = Part { name: "features", changed: "roads, rivers or lakes in it changed" };
+/// Buildings, which are drawn only.
+const BUILDINGS: Part = Part { name: "buildings", changed: "buildings changed" };
 /// The ground along features.
 const PROFILES: Part = Part { name: "profiles", changed: "the ground along roads, rivers or lakes changed" };
 /// The load modules that were measured.
 const MODULES: Part = Part { name: "modules", changed: "the load modules changed" };
 /// How they are measured.
 const MEASURE: Part = Part { name: "measure", changed: "what is measured changed" };
+
+/// Of the buildings of an area.
+pub(crate) fn buildings(all: &[Building]) -> Key {
+    let corner =
+        |part: FingerprintBuilder, [east, north]: &[i32; 2]| part.signed((*east).into()).signed((*north).into());
+    Key::new("buildings").part(BUILDINGS, |part| {
+        part.list(all.iter(), |part, Building { rings, bottom, top }| {
+            let part = part.list(rings.iter(), |part, ring| part.list(ring.iter(), corner));
+            part.signed((*bottom).into()).signed((*top).into())
+        })
+    })
+}
 
 /// Of a tile's TIN.
 pub(crate) fn tin(
@@ -93,7 +107,7 @@ pub(crate) fn level(
     let ModuleGrid { rows, cols, side_cells } = *grid;
     // What sources and rules come to is in the features; the names of features are those of the files.
     let spec = job.features.as_ref().expect("a stage of jobs with features");
-    let FeaturesSpec { sources: _, rules: _, share_max, options } = spec;
+    let FeaturesSpec { sources: _, rules: _, buildings: _, share_max, options } = spec;
     let GradeOptions { clearances: Clearances { road, rail, water }, bank } = *options;
     let files = spec.files();
     let files = records.iter().filter(|record| files.iter().any(|file| file.written == record.path));

@@ -9,6 +9,7 @@ use features::Cost;
 use job::FeaturesSpec;
 use terrain::{ModuleId, TileId};
 
+use crate::buildings::publish_buildings;
 use crate::keys;
 use crate::pieces::{area_level, pieces, reserved};
 use crate::read_features::ReadFeatures;
@@ -35,6 +36,7 @@ pub(crate) fn level_area(run: &Run, profiles: &[Profile]) -> Result<Outcome<(Fil
     for (profile, stations) in profiles.iter().zip(&read.by_tile) {
         stations.iter().zip(&profile.heights).for_each(|(&station, &height)| ground[station as usize] = height);
     }
+    publish_buildings(run, &read)?;
     keep_or_make(&Levelling { run, read: &read, spec, ground: &ground }, ALGORITHM_REVISION)
 }
 

@@ -2,7 +2,7 @@
 
 use database::{FileStamp, Measured, MeasuredModule};
 use fidelity::Residuals;
-use product::{from_features, from_tally, to_features, to_tally};
+use product::{from_curvature, from_features, from_tally, to_curvature, to_features, to_tally};
 use terrain::{ModuleResidual, TileId};
 
 use crate::assembled::{Assembled, ModuleNumbers};
@@ -30,6 +30,7 @@ pub(crate) fn to_measured(tile: TileId, assembled: &Assembled, sums: &Sums) -> M
         points: sums.points.clone(),
         border: sums.border,
         heights: sums.heights.into(),
+        curvature: to_curvature(sums.curvature),
         features: sums.features.as_ref().map(to_features),
     }
 }
@@ -85,6 +86,7 @@ pub fn sums_of(measured: Measured) -> Sums {
         points: measured.points,
         border: measured.border,
         heights: measured.heights.into(),
+        curvature: from_curvature(measured.curvature),
         features: measured.features.as_ref().map(from_features),
     }
 }

@@ -9,6 +9,7 @@ use terrain::{LatticePoint, TileId};
 
 use crate::assemble::crs;
 use crate::assembled::Assembled;
+use crate::buildings::stamp_of_buildings;
 use crate::forecast::{PAGE_MODULES_MAX, PAGE_POSTS_MAX};
 use crate::refine::Published;
 use crate::report::Findings;
@@ -76,6 +77,9 @@ pub(crate) fn prepare(
     manifest.state = ManifestState::Complete;
     let allocation = run.database.write_json(files::ALLOCATION, &allocation_json(run, shares))?;
     manifest.files.insert(files::ALLOCATION.to_owned(), allocation);
+    if let Some(buildings) = stamp_of_buildings(run)? {
+        manifest.files.insert(files::BUILDINGS.to_owned(), buildings);
+    }
     for (index, &tile) in run.area.tiles.iter().enumerate() {
         let state = state_of(run, &report, tile, frozen.contains(&tile));
         fill(run, &mut manifest, tile, state, &findings.tins[index], &findings.assembled[index])?;

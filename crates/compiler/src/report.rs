@@ -3,11 +3,11 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use database::{
-    Report, ReportBefore, ReportBorder, ReportBreach, ReportClass, ReportHeights, ReportLevel, ReportPart,
+    Report, ReportBefore, ReportBorder, ReportBreach, ReportClass, ReportHeights, ReportLevel, ReportLimit, ReportPart,
     ReportPerModule, ReportPerWindow, ReportPoints, ReportPool, ReportRefusals, ReportResidual, ReportStops,
     ReportVoids, Totals,
 };
-use fidelity::{Residuals, Tally};
+use fidelity::{Curvature, Residuals, Tally};
 use job::{Choice, HOLE_CLASS_NAME};
 use limits::Windows;
 use product::Told;
@@ -66,6 +66,7 @@ impl Findings<'_> {
             pool: self.pool(&counts),
             before_removals: self.before_removals(),
             residual: residual_of(&total),
+            limit: limit_of(&self.sums.curvature, sum(|numbers| numbers.triangles), &total),
             border: self.border(),
             heights: Some(self.heights()),
             residual_against_source: run.ground.relief.has_source_posts().then(|| self.at_source(&total)),
@@ -383,6 +384,13 @@ fn refusals(refused: &Refused) -> ReportRefusals {
         by_reservation: count(RefusedBy::Reservation),
         largest_m: metres_of_quanta(all.largest() as i32),
     }
+}
+
+/// How near residuals are to those of the best surface of so many triangles; `None` where the ground is too small.
+pub fn limit_of(curvature: &Curvature, triangles: u64, total: &Tally) -> Option<ReportLimit> {
+    let limit = curvature.limit(usize::try_from(triangles).unwrap_or(usize::MAX))?;
+    let eta = limit.eta(total.rms_m());
+    Some(ReportLimit { triangles, rms_m: limit.rms_m, eta, rough_share: limit.rough_share })
 }
 
 /// A tally as the report gives it.

@@ -5,7 +5,7 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use fidelity::{FeatureFigures, Residuals, Tally};
+use fidelity::{Curvature, FeatureFigures, Residuals, Tally};
 
 /// Of one tile, or of many.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -22,6 +22,8 @@ pub struct Sums {
     pub border: u64,
     /// The lowest and the highest vertex, in quanta.
     pub heights: (i32, i32),
+    /// How much the ground curves, for triangles as large as each tile has them.
+    pub curvature: Curvature,
     /// What was found of features, in jobs with some.
     pub features: Option<FeatureFigures>,
 }
@@ -56,6 +58,7 @@ impl Sums {
             *sum += points;
         }
         self.border += other.border;
+        self.curvature.merge(&other.curvature);
         match (&mut self.features, &other.features) {
             (Some(mine), Some(others)) => mine.merge(others),
             (mine @ None, Some(others)) => *mine = Some(others.clone()),

@@ -6,18 +6,18 @@ use ground::GamingArea;
 use job::{Allocation, Borders, Budget as PointBudget, Edges, Effort, ErrorKey, Job, Method, OuterBorder};
 use limits::Allowance;
 use terrain::{Features, ModuleId, ModuleRect, Post, SeamSides, Side, TileFeatures, TileId, TileTin, Vertex};
-use tiling::{Tiling, outer_border_posts, outer_sides};
+use tiling::{Budget, Tiling, outer_border_posts, outer_sides};
 use tin::{CostUnit, Frame, Proximity, Rule, Stop, SurveyTask, TileTask};
 
 use crate::CompileError;
 use crate::refinement::{Most, Refinement, optimising};
 
-/// A survey looks this many times further than an equal share.
-const SURVEY_REACH: u64 = 3;
+/// A survey looks so many halves of an equal share far.
+const SURVEY_REACH: u64 = 6;
 /// The same, for a quick look: few tiles deserve more, and a fast build does not wait for them.
-const SURVEY_REACH_OF_FAST: u64 = 2;
+const SURVEY_REACH_OF_FAST: u64 = 3;
 /// The same, where an RMS residual is asked for that optimising reaches within the budget and selection alone does not.
-const SURVEY_REACH_TO_RMS: u64 = 5;
+const SURVEY_REACH_TO_RMS: u64 = 10;
 
 /// What one tile may spend.
 pub struct TileBudget {
@@ -156,9 +156,10 @@ pub(crate) fn survey_task(job: &Job, area: &GamingArea, tile: TileId, features: 
     let reach = match optimising(job) {
         Some(_) if job.tin.target_rms_m.is_some() => SURVEY_REACH_TO_RMS,
         Some(_) if is_surveyed_in_haste(job) => SURVEY_REACH_OF_FAST,
+        _ if job.tin.budget == PointBudget::Limits => SURVEY_REACH.min(reach_of_windows(area, modules)),
         _ => SURVEY_REACH,
     };
-    let share = |total: u64| reach * total * modules.count() as u64 / area.grid.count() as u64;
+    let share = |total: u64| reach * total * modules.count() as u64 / area.grid.count() as u64 / 2;
     let (points, cost) = match job.tin.budget {
         PointBudget::Points(points) => (Some(share(points) as usize), CostUnit::Points),
         PointBudget::Limits => (None, CostUnit::Triangles),
@@ -179,6 +180,17 @@ pub(crate) fn survey_task(job: &Job, area: &GamingArea, tile: TileId, features: 
     }
     let owned = with_outer_sides(job, area, tile, area.tiling.owned_sides(tile));
     SurveyTask { growth, owned, grid: area.grid, cost }
+}
+
+/// How many halves of an equal share the limit of windows lets a tile come to, where it is twice as large as they are:
+/// what lies beyond is never asked for. A smaller tile may have the most of its windows for itself.
+fn reach_of_windows(area: &GamingArea, modules: ModuleRect) -> u64 {
+    let Budget { grid, per_window, windows, area: total, .. } = &area.budget;
+    if modules.rows() < 2 * windows.rows || modules.cols() < 2 * windows.cols {
+        return u64::MAX;
+    }
+    let of_window = u64::from(windows.rows) * u64::from(windows.cols);
+    (2 * u64::from(*per_window) * grid.count() as u64).div_ceil(of_window * (*total).max(1))
 }
 
 /// Load modules to their limit (or beyond it by the pool), no windows.

@@ -10,9 +10,9 @@ use terrain::{GainCurve, LoadModule, TileFeatures, TileTin};
 use crate::lock::LOCK_NAME;
 use crate::names::{MEASURED, MODULES, SURVEY, TILES, WORK, files};
 use crate::{
-    Area, AreaLevel, DatabaseError, FileStamp, Folder, Lock, Manifest, ManifestState, Measured, Profile, Removals,
-    TileModules, Work, encode_curve, encode_level, encode_levels, encode_lines, encode_measured, encode_profile,
-    encode_removals, encode_tile, json,
+    Area, AreaLevel, Building, DatabaseError, FileStamp, Folder, Lock, Manifest, ManifestState, Measured, Profile,
+    Removals, TileModules, Work, encode_buildings, encode_curve, encode_level, encode_levels, encode_lines,
+    encode_measured, encode_profile, encode_removals, encode_tile, json,
 };
 
 /// The folders of a database that stay.
@@ -213,6 +213,14 @@ impl Database {
     /// As [`Database::write_tile`].
     pub fn write_level(&self, stamp: &Stamp, level: &AreaLevel) -> Result<FileStamp, DatabaseError> {
         self.publish(&self.folder.path(files::LEVEL), &encode_level(stamp, level))
+    }
+
+    /// Publishes the buildings of the area.
+    ///
+    /// # Errors
+    /// As [`Database::write_tile`].
+    pub fn write_buildings(&self, stamp: &Stamp, buildings: &[Building]) -> Result<FileStamp, DatabaseError> {
+        self.publish(&self.folder.path(files::BUILDINGS), &encode_buildings(stamp, buildings))
     }
 
     /// Publishes a value, which must be an object, as checksummed JSON under one of the names of [`files`].

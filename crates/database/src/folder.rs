@@ -11,9 +11,9 @@ use crate::frame::{FRAME_BYTES, Kind};
 use crate::names::{MEASURED, MODULES, SURVEY, TILES, WORK, files};
 use crate::read::{check_stamp, read, refuse_other};
 use crate::{
-    AreaLevel, DatabaseError, FileStamp, Manifest, ManifestState, Measured, NotADatabase, Profile, Removals, Report,
-    Stamp, TileModules, Work, curve_file, frame, json, level_file, lines_file, measured_file, profile_file,
-    removals_file, slm, tile_file,
+    AreaLevel, Building, DatabaseError, FileStamp, Manifest, ManifestState, Measured, NotADatabase, Profile, Removals,
+    Report, Stamp, TileModules, Work, buildings_file, curve_file, frame, json, level_file, lines_file, measured_file,
+    profile_file, removals_file, slm, tile_file,
 };
 
 /// The directory of a database, to read from. Holds no file open and no lock.
@@ -256,6 +256,23 @@ impl Folder {
     /// When the header cannot be read or is damaged.
     pub fn level_stamp(&self) -> Result<Option<Stamp>, DatabaseError> {
         self.stamp(Kind::Level, &self.path(files::LEVEL))
+    }
+
+    /// What the buildings were made from, by their file's header alone; `None` when there are none.
+    ///
+    /// # Errors
+    /// When the header cannot be read or is damaged.
+    pub fn buildings_stamp(&self) -> Result<Option<Stamp>, DatabaseError> {
+        self.stamp(Kind::Buildings, &self.path(files::BUILDINGS))
+    }
+
+    /// The buildings of the area, and what they were made from.
+    ///
+    /// # Errors
+    /// When the file is missing or damaged.
+    pub fn read_buildings(&self) -> Result<(Stamp, Vec<Building>), DatabaseError> {
+        let path = self.path(files::BUILDINGS);
+        buildings_file::decode_buildings(&path, &self.read(&path)?)
     }
 
     /// The ground along the features of `tile`, what it was made from, and the bytes that say so.

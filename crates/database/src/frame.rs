@@ -20,8 +20,6 @@ use crate::codec::PAYLOAD_BYTES_MAX;
 
 /// Bytes before the payload.
 pub(crate) const FRAME_BYTES: usize = 64;
-/// Version of the private files.
-const VERSION: u32 = 1;
 
 /// What a framed file holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,6 +31,7 @@ pub(crate) enum Kind {
     Profile,
     Lines,
     Level,
+    Buildings,
 }
 
 impl Kind {
@@ -45,6 +44,18 @@ impl Kind {
             Kind::Profile => *b"\x89PRO\r\n\x1a\n",
             Kind::Lines => *b"\x89LIN\r\n\x1a\n",
             Kind::Level => *b"\x89LEV\r\n\x1a\n",
+            Kind::Buildings => *b"\x89BLD\r\n\x1a\n",
+        }
+    }
+
+    /// Version of its files. Files of another one are made again.
+    fn version(self) -> u32 {
+        match self {
+            // 2: how much the ground curves.
+            Kind::Measured => 2,
+            Kind::Tile | Kind::Curve | Kind::Removals | Kind::Profile | Kind::Lines | Kind::Level | Kind::Buildings => {
+                1
+            }
         }
     }
 }
@@ -53,7 +64,7 @@ impl Kind {
 pub(crate) fn seal(kind: Kind, stamp: &Stamp, payload: &[u8]) -> Vec<u8> {
     let mut file = Vec::with_capacity(FRAME_BYTES + payload.len());
     file.extend_from_slice(&kind.magic());
-    file.extend_from_slice(&VERSION.to_le_bytes());
+    file.extend_from_slice(&kind.version().to_le_bytes());
     file.extend_from_slice(&stamp.algorithm_revision.to_le_bytes());
     file.extend_from_slice(&stamp.fingerprint.0);
     file.extend_from_slice(&(payload.len() as u64).to_le_bytes());
@@ -98,8 +109,9 @@ fn read_header(kind: Kind, path: &Path, bytes: &[u8]) -> Result<FrameHeader, Dat
     if found != expected {
         return Err(DatabaseError::NotOurFile { path: path.to_path_buf(), found, expected });
     }
-    if word(8) != VERSION {
-        return Err(DatabaseError::OtherVersion { path: path.to_path_buf(), found: word(8), expected: VERSION });
+    if word(8) != kind.version() {
+        let (path, expected) = (path.to_path_buf(), kind.version());
+        return Err(DatabaseError::OtherVersion { path, found: word(8), expected });
     }
     check(path, "header", crc32fast::hash(&header[..60]), word(60))?;
     let payload_length = u64::from_le_bytes(part(header, 48));

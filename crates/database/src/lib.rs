@@ -36,10 +36,14 @@ mod level_file;
 pub use level_file::{
     AreaLevel, CULVERT, FeatureFace, FeatureLine, FeatureRemark, LineRole, StripFigures, decode_level, encode_level,
 };
+mod buildings_file;
+pub use buildings_file::{Building, decode_buildings, encode_buildings};
 mod removals_file;
 pub use removals_file::{Removals, decode_removals, encode_removals};
 mod measured_file;
-pub use measured_file::{Measured, MeasuredFeatures, MeasuredModule, MeasuredTally, decode_measured, encode_measured};
+pub use measured_file::{
+    Measured, MeasuredCurvature, MeasuredFeatures, MeasuredModule, MeasuredTally, decode_measured, encode_measured,
+};
 mod slm;
 /// Version of the load-module files.
 pub use load_module_reader::{
@@ -59,9 +63,9 @@ pub use report_features::{
 };
 mod report;
 pub use report::{
-    Report, ReportBefore, ReportBorder, ReportBound, ReportBreach, ReportClass, ReportHeights, ReportLevel, ReportPart,
-    ReportPerModule, ReportPerWindow, ReportPlace, ReportPoints, ReportPool, ReportRefusals, ReportResidual,
-    ReportStage, ReportStops, ReportTile, ReportVoids,
+    Report, ReportBefore, ReportBorder, ReportBound, ReportBreach, ReportClass, ReportHeights, ReportLevel,
+    ReportLimit, ReportPart, ReportPerModule, ReportPerWindow, ReportPlace, ReportPoints, ReportPool, ReportRefusals,
+    ReportResidual, ReportStage, ReportStops, ReportTile, ReportVoids,
 };
 mod lock;
 pub use lock::Lock;

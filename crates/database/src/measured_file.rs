@@ -30,8 +30,21 @@ pub struct Measured {
     pub border: u64,
     /// The lowest and the highest vertex, in quanta.
     pub heights: [i32; 2],
+    /// How much the ground curves.
+    pub curvature: MeasuredCurvature,
     /// What was found of features, in jobs with some.
     pub features: Option<MeasuredFeatures>,
+}
+
+/// How much the ground of a tile curves: what the smallest RMS residual on it is computed from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct MeasuredCurvature {
+    /// Cells of ground that is known.
+    pub cells: u64,
+    /// The integral over them, in millionths.
+    pub integral: u64,
+    /// Cells of rough ground.
+    pub rough_cells: u64,
 }
 
 /// What was found of the features of a tile.
@@ -98,11 +111,12 @@ struct MeasuredOnDisk {
     points: Vec<u64>,
     border: u64,
     heights: [i32; 2],
+    curvature: MeasuredCurvature,
 }
 
 /// The bytes of what was measured.
 pub fn encode_measured(stamp: &Stamp, measured: &Measured) -> Vec<u8> {
-    let Measured { tile, modules_file, modules, classes, at_source, points, border, heights, features } =
+    let Measured { tile, modules_file, modules, classes, at_source, points, border, heights, curvature, features } =
         measured.clone();
     let on_disk = MeasuredOnDisk {
         tile: (tile.row, tile.col),
@@ -114,6 +128,7 @@ pub fn encode_measured(stamp: &Stamp, measured: &Measured) -> Vec<u8> {
         points,
         border,
         heights,
+        curvature,
     };
     let mut bytes = codec::encode(&on_disk);
     // Files of jobs without features are as they were before there were any.
@@ -131,11 +146,13 @@ pub fn decode_measured(path: &Path, bytes: &[u8]) -> Result<(Stamp, Measured), D
     let (stamp, payload) = frame::open(Kind::Measured, path, bytes)?;
     let (on_disk, features): (MeasuredOnDisk, Option<MeasuredFeatures>) =
         codec::decode_two(payload).map_err(|what| malformed(path, what))?;
-    let MeasuredOnDisk { tile: (row, col), length, blake3, modules, classes, at_source, points, border, heights } =
-        on_disk;
+    let MeasuredOnDisk { tile: (row, col), length, blake3, modules, classes, .. } = on_disk;
+    let MeasuredOnDisk { at_source, points, border, heights, curvature, .. } = on_disk;
     let modules_file = FileStamp { length, blake3: Fingerprint(blake3) };
     let tile = TileId { row, col };
-    Ok((stamp, Measured { tile, modules_file, modules, classes, at_source, points, border, heights, features }))
+    let measured =
+        Measured { tile, modules_file, modules, classes, at_source, points, border, heights, curvature, features };
+    Ok((stamp, measured))
 }
 
 #[cfg(test)]

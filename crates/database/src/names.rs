@@ -20,6 +20,8 @@ pub mod files {
     pub const ALLOCATION: &str = "survey/allocation.json";
     /// What features of the area came to: their heights, their cost, what was mended.
     pub const LEVEL: &str = "survey/features.level";
+    /// Buildings of the sources of features, which are drawn only.
+    pub const BUILDINGS: &str = "survey/features.buildings";
 }
 
 /// Folder of the tiles' TINs.

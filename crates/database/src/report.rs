@@ -38,6 +38,9 @@ pub struct Report {
     /// The same, of load modules at the outer border of the area and of the others apart.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub border: Option<ReportBorder>,
+    /// How near `residual` is to that of the best surface of so many triangles; absent where the ground is too small.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub limit: Option<ReportLimit>,
     /// Heights of the surface, and of the sources under it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub heights: Option<ReportHeights>,
@@ -181,6 +184,20 @@ pub struct ReportBorder {
     pub at_border: ReportPart,
     /// Of all others.
     pub inside: ReportPart,
+}
+
+/// The distance from the limit.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ReportLimit {
+    /// Triangles of all load modules, at the finest level.
+    pub triangles: u64,
+    /// RMS residual of the best surface of so many, in metres.
+    pub rms_m: f64,
+    /// RMS residual against the working grid over that; absent where that is 0, as on a plane.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub eta: Option<f64>,
+    /// Share of the ground that is rough for so many: the limit does not hold there.
+    pub rough_share: f64,
 }
 
 /// Heights in metres, lowest and highest.
@@ -389,6 +406,7 @@ mod tests {
             pool: ReportPool::default(),
             before_removals: Some(ReportBefore { removed: 3, ..ReportBefore::default() }),
             residual: ReportResidual { rms_m: 1.1, max_m: 9.0, mean_abs_m: 0.7, p95_m: 2.0, p99_m: 3.3 },
+            limit: Some(ReportLimit { triangles: 32, rms_m: 0.75, eta: Some(1.1 / 0.75), rough_share: 0.125 }),
             border: None,
             heights: None,
             residual_against_source: None,
@@ -430,7 +448,7 @@ mod tests {
             "/per_4km/max /per_4km/limit /per_4km/over /per_4km/worst_9x9 /voids/count /voids/filled /warnings",
             "/breaches/0/kind /breaches/0/where /breaches/0/count /breaches/0/limit /breaches/0/excess",
             "/breaches/0/refused /breaches/0/rms_with_m /breaches/0/rms_without_m /levels/0/level /levels/0/triangles",
-            "/levels/0/rms_m /levels/0/max_m",
+            "/levels/0/rms_m /levels/0/max_m /limit/triangles /limit/rms_m /limit/eta /limit/rough_share",
         ]
         .iter()
         .flat_map(|line| line.split(' '))

@@ -5,7 +5,9 @@ use terrain::{
     ModuleVertex, Post, PostRect, Refusal, RefusedBy, Spacing, StopReason, TileId, TileTin, Tin, Vertex,
 };
 
-use crate::{Area, FileStamp, Fingerprint, Measured, MeasuredModule, MeasuredTally, Stamp, TileModules};
+use crate::{
+    Area, FileStamp, Fingerprint, Measured, MeasuredCurvature, MeasuredModule, MeasuredTally, Stamp, TileModules,
+};
 
 pub(crate) const TILE: TileId = TileId { row: 0, col: 1 };
 
@@ -74,6 +76,7 @@ pub(crate) fn measured() -> Measured {
         points: vec![7, 0],
         border: 2,
         heights: [-5, 1280],
+        curvature: MeasuredCurvature { cells: 400, integral: 123_456_789, rough_cells: 17 },
         features: None,
     }
 }

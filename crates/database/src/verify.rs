@@ -10,8 +10,8 @@ use crate::names::{MEASURED, MODULES, SURVEY, TILES, files};
 use crate::page::check_page;
 use crate::read::check_stamp;
 use crate::{
-    DatabaseError, FileStamp, Folder, Manifest, curve_file, level_file, lines_file, measured_file, profile_file,
-    removals_file, slm, tile_file,
+    DatabaseError, FileStamp, Folder, Manifest, buildings_file, curve_file, level_file, lines_file, measured_file,
+    profile_file, removals_file, slm, tile_file,
 };
 
 /// One file that is not as it should be.
@@ -101,6 +101,7 @@ impl Folder {
             Some("profile") => drop(profile_file::decode_profile(path, &bytes)?),
             Some("lines") => drop(lines_file::decode_lines(path, &bytes)?),
             Some("level") => drop(level_file::decode_level(path, &bytes)?),
+            Some("buildings") => drop(buildings_file::decode_buildings(path, &bytes)?),
             Some("removed") => drop(removals_file::decode_removals(path, &bytes)?),
             _ => {}
         }

@@ -172,6 +172,7 @@ pub(crate) fn report() -> Report {
         pool: ReportPool { size: 0, used: 0 },
         before_removals: None,
         residual,
+        limit: None,
         border: None,
         heights: None,
         residual_against_source: None,

@@ -50,7 +50,7 @@ fn is_of_number(c: char) -> bool {
 }
 
 /// A number without sign or exponent, its point a point or a comma.
-fn decimal(text: &str) -> Option<f64> {
+pub(crate) fn decimal(text: &str) -> Option<f64> {
     let plain = !text.is_empty() && text.chars().all(is_of_number);
     plain.then(|| text.replace(',', ".").parse().ok()).flatten()
 }

@@ -110,7 +110,7 @@ pub fn features_in(
 ) -> Result<FeaturesSeen, GroundError> {
     let side = |axis: usize| [origin_m[axis], origin_m[axis] + size_m[axis]];
     let bounds = Extent { east: side(0), north: side(1) };
-    let wanted = Wanted { epsg, bounds, layer, crs: None, keys: &BUILT_IN_KEYS };
+    let wanted = Wanted { epsg, bounds, layer, crs: None, keys: &BUILT_IN_KEYS, buildings: false };
     let read = read_features(path, &wanted, &in_turn)?;
     let is_polygon = |feature: &VectorFeature| matches!(feature.shape, VectorShape::Polygon(_));
     let first = read.features.first().map(is_polygon);

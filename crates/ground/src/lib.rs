@@ -12,6 +12,7 @@ mod bounds;
 pub use bounds::Bounds;
 mod burn;
 pub use burn::{burn, slope_reach};
+mod buildings;
 mod lines;
 mod vectors;
 pub use vectors::{FeaturesRead, Vectors, site};

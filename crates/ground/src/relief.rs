@@ -128,7 +128,7 @@ impl Relief {
             window: raster.window(),
             south_west: off.map(quanta),
             step: frame.spacing.map(quanta),
-            height_m: &|post| raster.height_m(post),
+            push_row_m: &|row, cols, heights| raster.push_row_m(row, cols, heights),
         };
         Some(residuals_at_source(modules, area.grid, self.frame.spacing, &source))
     }

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use database::Building;
 use database::FeatureRemark;
 use features::{FeatureId, Numbering, Position, Shape, Site, Source};
 use job::{DemSource, FeatureSource, FeaturesSpec, Job};
@@ -13,11 +14,14 @@ use terrain::{Each, GridFrame};
 
 use crate::GroundError;
 use crate::area::GamingArea;
+use crate::buildings;
 
 /// What the sources of features hold that lies in the area or near it.
 pub struct Vectors {
     /// The features, none of them looked at yet, source by source.
     pub sources: Vec<Source>,
+    /// Buildings, which are drawn only, where the job wants them; sorted, each once.
+    pub buildings: Vec<Building>,
     /// What each source holds, in the order of the job.
     pub files: Vec<FeaturesRead>,
     /// What could not be read of single features.
@@ -47,8 +51,14 @@ impl Vectors {
     /// # Errors
     /// When a file cannot be read at all. What is wrong with single features is a remark.
     pub fn read(job: &Job, area: &GamingArea, each: Each) -> Result<Self, GroundError> {
-        let mut vectors =
-            Self { sources: Vec::new(), files: Vec::new(), remarks: Vec::new(), notes: Vec::new(), names: Vec::new() };
+        let mut vectors = Self {
+            sources: Vec::new(),
+            buildings: Vec::new(),
+            files: Vec::new(),
+            remarks: Vec::new(),
+            notes: Vec::new(),
+            names: Vec::new(),
+        };
         let Some(spec) = &job.features else { return Ok(vectors) };
         for source in &spec.sources {
             match source {
@@ -56,6 +66,7 @@ impl Vectors {
                 FeatureSource::File { .. } => vectors.add_file(job, area, spec, source, each)?,
             }
         }
+        buildings::settle(&mut vectors.buildings);
         Ok(vectors)
     }
 
@@ -101,9 +112,18 @@ impl Vectors {
         keys.sort_unstable();
         keys.dedup();
         let bounds = bounds(area, [area.frame.origin_east_m, area.frame.origin_north_m]);
-        let wanted = Wanted { epsg: job.area.epsg, bounds, layer: layer.as_deref(), crs: crs.as_ref(), keys: &keys };
-        let FeatureFile { features, remarks, notes, found, outside, .. } =
+        let wanted = Wanted {
+            epsg: job.area.epsg,
+            bounds,
+            layer: layer.as_deref(),
+            crs: crs.as_ref(),
+            keys: &keys,
+            buildings: spec.buildings,
+        };
+        let FeatureFile { features, buildings, remarks, notes, found, outside, .. } =
             source_files::read_features(&file.path, &wanted, each)?;
+        buildings::add(&buildings, area, &mut self.buildings);
+        drop(buildings);
         let name = match layer {
             Some(layer) => format!("{}, layer {layer}", file.written),
             None => file.written.clone(),

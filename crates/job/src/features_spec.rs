@@ -11,6 +11,8 @@ pub struct FeaturesSpec {
     pub sources: Vec<FeatureSource>,
     /// What features are by their tags; tried in order, before the built-in table.
     pub rules: Vec<Rule>,
+    /// Whether buildings are kept beside the ground, to be drawn.
+    pub buildings: bool,
     /// The share of each limit that features may take, from 0 to 1.
     pub share_max: f64,
     /// How high decks stand over what they cross, and how far from a deck its ends look for higher ground to rest on.
@@ -55,6 +57,11 @@ impl FeaturesSpec {
             }
         }
         files
+    }
+
+    /// Whether a database has a file of buildings: the job wants it, and has a file that may hold some.
+    pub fn has_buildings(&self) -> bool {
+        self.buildings && self.sources.iter().any(|source| matches!(source, FeatureSource::File { .. }))
     }
 
     /// Keys of tags that rules look at, sorted, each once.

@@ -275,6 +275,8 @@ const FEATURES: &[Key] = &[
         .bounded(|| format!("a list of at most {RULES_MAX} rules, each {{ where = {{ … }}, kind = … }}"))
         .otherwise("the built-in table alone")
         .example("rules = [{ where = { highway = \"path\" }, kind = \"track\", width_m = 2 }]"),
+    Key::new("buildings", "keep buildings, which `tiefort view` draws as blocks; they are no part of the ground")
+        .usual("true"),
     Key::new("share_max", "of what a load module may hold, how much features may take")
         .number("a share", SHARE_MAX)
         .usual("0.5"),

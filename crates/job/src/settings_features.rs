@@ -14,6 +14,7 @@ pub(crate) fn describe(features: &FeaturesSpec, list: &mut List) {
         let rules: Vec<String> = features.rules.iter().map(rule_text).collect();
         list.add_with("features.rules", format!("[{}]", rules.join(", ")), counted(rules.len(), "rule"));
     }
+    list.add("features.buildings", features.buildings.to_string());
     list.add("features.share_max", number(features.share_max));
     let Clearances { road, rail, water } = features.options.clearances;
     let lengths = [

@@ -21,7 +21,8 @@ const FULL: &str = "[features]\nsources = [\"roads.osm.pbf\", { file = \"hydro.g
     rules = [{ where = { highway = [\"track\"], surface = \"sand\" }, class = \"trail\", width_m = 3, \
     grade_max_percent = 25, form = \"strip\", z = \"feature\" }, { where = { bridge = [] }, kind = \"none\" }, \
     { where = {}, kind = \"breakline\", form = \"auto\" }]\n\
-    share_max = 0.25\nclearance_road_m = 5\nclearance_rail_m = 6.5\nclearance_water_m = 0\nbank_m = 50\n";
+    buildings = false\nshare_max = 0.25\nclearance_road_m = 5\n\
+    clearance_rail_m = 6.5\nclearance_water_m = 0\nbank_m = 50\n";
 
 #[test]
 fn every_key_of_features_is_read() {
@@ -53,7 +54,7 @@ fn every_key_of_features_is_read() {
     let none = Rule { tags: tags(&[("bridge", &[])]), kind: RuleKind::None, ..bare.clone() };
     let rest = Rule { tags: vec![], kind: RuleKind::Is(Kind::Breakline), form: Some(Form::Strip), ..bare };
     assert_eq!(features.rules, [rule, none, rest]);
-    assert_eq!(features.share_max, 0.25);
+    assert_eq!((features.share_max, features.buildings), (0.25, false));
     let clearances = Clearances { road: 640, rail: 832, water: 0 };
     assert_eq!(features.options, GradeOptions { clearances, bank: 6400 });
 }
@@ -62,6 +63,7 @@ fn every_key_of_features_is_read() {
 fn what_a_job_leaves_out_is_as_usual_and_without_the_section_there_are_no_features() {
     let features = job("[features]\nsources = [\"sample\"]\n").features.unwrap();
     assert_eq!((features.share_max, features.options), (0.5, GradeOptions::USUAL));
+    assert!(features.buildings && !features.has_buildings(), "the built-in terrain has none");
     assert!(features.rules.is_empty());
     assert_eq!(job("").features, None);
     assert!(!job("").canonical_text().contains("features"));

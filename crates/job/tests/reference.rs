@@ -23,6 +23,8 @@ Costs were measured on the desert of `configs/desert.toml` (1021 x 1021 posts, 8
 range on several areas; a residual is compared with that of the word that holds where the key is left out.
 Residuals of the efforts and of the paper's method are those of the second table that `scripts/bench_fidelity.py \
 --quick --book` writes, which [Figures](../figures/README.md#how-near-to-the-ground-at-equal-triangles) shows.
+What each effort costs and gains on other areas, in residual, lines of sight, thin triangles and processor time, is in \
+[Figures](../figures/README.md#what-each-effort-costs-and-gains).
 Seconds of an effort are what `tiefort plan` forecasts by, on one core; reading, surveying and writing come on top \
 of them.
 ";

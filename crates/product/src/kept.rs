@@ -1,7 +1,7 @@
 //! Between tallies and figures and the files that keep them.
 
-use database::{MeasuredFeatures, MeasuredTally};
-use fidelity::{FeatureFigures, Tally};
+use database::{MeasuredCurvature, MeasuredFeatures, MeasuredTally};
+use fidelity::{Curvature, FeatureFigures, Tally};
 use terrain::LatticePoint;
 
 /// What is kept of a tally.
@@ -23,6 +23,16 @@ pub fn from_tally(tally: &MeasuredTally) -> Tally {
     (sums.posts, sums.sum, sums.sum_abs) = (tally.posts, tally.sum, tally.sum_abs);
     (sums.sum_squared, sums.largest) = (high << 64 | low, tally.largest);
     sums
+}
+
+/// What is kept of how much the ground curves.
+pub fn to_curvature(Curvature { cells, integral, rough_cells }: Curvature) -> MeasuredCurvature {
+    MeasuredCurvature { cells, integral, rough_cells }
+}
+
+/// How much the ground curves, as it was kept.
+pub fn from_curvature(MeasuredCurvature { cells, integral, rough_cells }: MeasuredCurvature) -> Curvature {
+    Curvature { cells, integral, rough_cells }
 }
 
 /// What is kept of the figures of features.

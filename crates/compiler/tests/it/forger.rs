@@ -224,7 +224,7 @@ fn altered_manifests_are_told() {
 
 #[test]
 fn altered_reports_are_told() {
-    let table: [(&str, Alter, Alter, &str); 13] = [
+    let table: [(&str, Alter, Alter, &str); 14] = [
         ("name", nothing, |f| f.report.area = "x".into(), "report.json: area is \"x\""),
         ("count", nothing, |f| f.report.count = "polygons".into(), "report.json: count is"),
         ("triangles", nothing, |f| f.report.triangles += 1, "report.json: triangles is"),
@@ -234,6 +234,7 @@ fn altered_reports_are_told() {
         ("limit", nothing, |f| f.report.per_load_module.limit += 1, "report.json: per_load_module.limit is"),
         ("window", nothing, |f| f.report.per_4km.worst_9x9 -= 1, "report.json: per_4km.worst_9x9 is"),
         ("residual", nothing, |f| f.report.residual.rms_m *= 0.9, "report.json: residual.rms_m is"),
+        ("eta", nothing, |f| f.report.limit.as_mut().unwrap().eta = Some(1.0), "report.json: limit.eta is"),
         ("percentile", nothing, |f| f.report.residual.p99_m -= 0.5, "report.json: residual.p99_m is"),
         ("class", nothing, |f| f.report.classes[1].residual.rms_m += 0.1, "report.json: classes[1].residual.rms_m is"),
         ("class posts", nothing, |f| f.report.classes[0].posts += 1, "report.json: classes[0].posts is"),

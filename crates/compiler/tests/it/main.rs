@@ -16,6 +16,7 @@ mod changed;
 mod compare;
 mod damage;
 mod difficult_ground;
+mod distance;
 mod features;
 mod forger;
 mod given;

@@ -1,10 +1,12 @@
 //! A finished database read back for pictures, explained, and compared with another.
 
+use fidelity::{EYE_M, Triangles, sees_on};
 use inspect::{difference, explain};
+use load_module_reader::{Area, Curvature, Keep, Sight};
 use product::{NO_RESIDUAL, Product, ProductError, ProductGround, Wanted, WantedGround};
 use terrain::{Dem, ModuleId, ModuleRect, Post};
 
-use crate::scene::{Scene, Words, sample_dem};
+use crate::scene::{Scene, Words, sample_dem, spacing};
 
 fn words() -> Words {
     Words { size: (6, 8), tiles: (2, 2), ..Words::raster() }
@@ -28,6 +30,38 @@ fn residuals_at_posts_add_up_to_what_the_build_measured() {
     let found = product.limit_use();
     assert_eq!(found.windows.iter().max(), Some(&(report.per_4km.max as u32)));
     assert_eq!(found.modules.iter().map(|&count| u64::from(count)).sum::<u64>(), report.triangles);
+}
+
+#[test]
+fn the_reader_sees_what_fidelity_measures() {
+    let words = words();
+    let scene = Scene::on(&words, &sample_dem(words.grid(), 1));
+    drop(scene.build("area", 2));
+    let product = read(&scene, None).unwrap();
+    let triangles = Triangles::of_modules(&product.modules, product.grid, spacing());
+    let area = Area::open(scene.path("area"), Keep::InMemory).unwrap();
+    let ground = area.load(area.whole()).unwrap();
+    let (origin_m, post_m) = (area.frame().origin_m, spacing().metres());
+    let whole = product.grid.posts_of_rect(product.grid.all());
+    let reach = [whole.cells_wide(), whole.cells_high()].map(|cells| cells as f64);
+    let mut draw = fastrand::Rng::with_seed(9);
+    let mut seen = 0;
+    for _ in 0..40 {
+        let mut place = || reach.map(|reach| reach * draw.f64());
+        let from = place();
+        let stands = |place: [f64; 2]| {
+            let [east, north] = [0, 1].map(|axis| origin_m[axis] + post_m * place[axis]);
+            [east, north, ground.height_m([east, north]).unwrap() + EYE_M]
+        };
+        let mut eye = ground.eye(stands(from), Curvature::NONE);
+        for to in (0..200).map(|_| place()) {
+            let expected = sees_on(&triangles, [from, to]);
+            assert_eq!(ground.sight(stands(from), stands(to)) == Sight::Free, expected, "{from:?} {to:?}");
+            assert_eq!(eye.sees(stands(to)), expected, "{from:?} {to:?}");
+            seen += u32::from(expected);
+        }
+    }
+    assert!((400..7600).contains(&seen), "{seen} of 8,000");
 }
 
 #[test]

@@ -31,8 +31,11 @@ pub(crate) fn problems(manifest: &Manifest, job: &Job, area: &GamingArea) -> Vec
         problems.push("database.json: its list of tiles is not that of its job".into());
     }
     let level = job.features.is_some().then_some(files::LEVEL);
+    let has_buildings = job.features.as_ref().is_some_and(job::FeaturesSpec::has_buildings);
     let needed: Vec<&str> = std::iter::once(files::ALLOCATION).chain(level).collect();
-    for name in manifest.files.keys().filter(|name| !needed.contains(&name.as_str())) {
+    // A database that was built before buildings were kept has none.
+    let is_of_job = |name: &str| needed.contains(&name) || (has_buildings && name == files::BUILDINGS);
+    for name in manifest.files.keys().filter(|name| !is_of_job(name)) {
         problems.push(format!("database.json: lists a file \"{name}\", which no build of its job writes"));
     }
     for name in needed.into_iter().filter(|name| !manifest.files.contains_key(*name)) {

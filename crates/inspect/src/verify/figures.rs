@@ -11,9 +11,7 @@ use super::modules::Modules;
 use super::tins::OfTins;
 use super::total::{Total, squares};
 use crate::recount;
-use compiler::residual_of;
-use compiler::sums_of;
-use compiler::{Adding, Sums};
+use compiler::{Adding, Sums, limit_of, residual_of, sums_of};
 use ground::GamingArea;
 
 /// Statistics of load modules that no residuals of that many posts have.
@@ -289,6 +287,12 @@ fn of_levels(figures: &mut Figures, report: &Report, job: &Job, levels: &[Module
 fn of_residuals(figures: &mut Figures, report: &Report, job: &Job, area: &GamingArea, modules: &Modules, sums: &Sums) {
     let total = sums.residuals.total();
     figures.residual("residual", &residual_of(&total), &report.residual);
+    if let (Some(found), Some(listed)) = (limit_of(&sums.curvature, report.triangles, &total), &report.limit) {
+        figures.count("limit.triangles", found.triangles, listed.triangles);
+        figures.number("limit.rms_m", found.rms_m, listed.rms_m);
+        figures.number("limit.eta", found.eta.unwrap_or(0.0), listed.eta.unwrap_or(0.0));
+        figures.number("limit.rough_share", found.rough_share, listed.rough_share);
+    }
     if let (Some(listed), true) = (&report.residual_against_source, sums.has_source) {
         figures.residual("residual_against_source", &residual_of(&sums.at_source), listed);
     }

@@ -30,6 +30,7 @@ pub(super) fn read(
     let spec = FeaturesSpec {
         sources,
         rules: rules.as_ref().map_or(Ok(Vec::new()), |rules| read_rules(rules, importance))?,
+        buildings: features.flag("buildings")?,
         share_max: features.number("share_max")?,
         options: GradeOptions {
             clearances: Clearances {

@@ -151,6 +151,20 @@ fn share_of_rim() -> f64 {
     234.375 / 834.375
 }
 
+/// Holds a line of sight to how far it stays above the ground `at` each share of it; whether it is free.
+fn agrees_with_small_steps(found: Sight, clearance_m: f64, at: impl Fn(f64) -> f64) -> bool {
+    let least = (0..=2000).map(|step| at(f64::from(step) / 2000.0)).fold(f64::INFINITY, f64::min);
+    assert!(clearance_m <= least + 1e-4 && least <= clearance_m + 3.0, "{clearance_m} of {least}");
+    match found {
+        Sight::Free => assert!(-0.5 < least && -1e-5 <= clearance_m, "{least}, {clearance_m}"),
+        Sight::Hidden(share) => {
+            assert!(at(share) < 1e-6 && clearance_m < 1e-5, "{} at {share}, {clearance_m}", at(share));
+        }
+        Sight::Unknown => panic!("all of it is loaded"),
+    }
+    found == Sight::Free
+}
+
 #[test]
 fn a_line_of_sight_agrees_with_small_steps() {
     let module = rough(9, 7);
@@ -170,20 +184,11 @@ fn a_line_of_sight_agrees_with_small_steps() {
             let ground = by_search(&module, local.map(|metres| metres * 128.0));
             up + share * (over - up) - ground
         };
-        let least = (0..=2000).map(|step| at(f64::from(step) / 2000.0)).fold(f64::INFINITY, f64::min);
         let world = |[x, y]: [f64; 2], up: f64| [east + x, north + y, up];
-        let clearance = file.clearance_m(world(from, up), world(to, over)).unwrap();
-        assert!(clearance <= least + 1e-4 && least <= clearance + 3.0, "{clearance} of {least}");
-        match file.sight(world(from, up), world(to, over)) {
-            Sight::Free => {
-                free += 1;
-                assert!(-0.5 < least && -1e-5 <= clearance, "{least}, {clearance}");
-            }
-            Sight::Hidden(share) => {
-                hidden += 1;
-                assert!(at(share) < 1e-6 && clearance < 1e-5, "{} at {share}, {clearance}", at(share));
-            }
-            Sight::Unknown => panic!("all of it is loaded"),
+        let (from, to) = (world(from, up), world(to, over));
+        match agrees_with_small_steps(file.sight(from, to), file.clearance_m(from, to).unwrap(), at) {
+            true => free += 1,
+            false => hidden += 1,
         }
     }
     assert!(20 < hidden && 20 < free, "{hidden} hidden, {free} free");

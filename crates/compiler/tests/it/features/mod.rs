@@ -8,6 +8,7 @@ mod random;
 pub use random::drawn;
 
 mod bad_input;
+mod buildings;
 mod bytes;
 mod left_out;
 mod refused;
