@@ -210,7 +210,7 @@ pub(crate) fn points_around(
     Ok(all)
 }
 
-/// Writes the file of a tile's load modules, unless the very same bytes lie there.
+/// Writes the file of a tile's load modules.
 fn publish(
     run: &Run,
     tile: TileId,
@@ -227,12 +227,6 @@ fn publish(
         vertical_datum: run.job.dem.vertical_datum.clone().unwrap_or_default(),
         fingerprint,
     };
-    let bytes = database::encode_levels(&header, levels);
-    let stamp = FileStamp::of(&bytes);
-    let folder = run.database.folder();
-    if folder.check_file(&folder.modules_path(tile), &stamp).is_ok() {
-        return Ok(stamp);
-    }
     Ok(run.database.write_modules(&header, levels)?)
 }
 

@@ -164,7 +164,7 @@ impl Database {
         self.publish(&self.folder.removals_path(removals.tile), &encode_removals(stamp, removals))
     }
 
-    /// Publishes a tile's load modules at every level, the finest first.
+    /// Publishes a tile's load modules at every level, the finest first, unless the very same bytes lie there.
     ///
     /// # Errors
     /// As [`Database::write_tile`].
@@ -172,7 +172,12 @@ impl Database {
     /// # Panics
     /// As [`encode_levels`].
     pub fn write_modules(&self, tile: &TileModules, levels: &[Vec<LoadModule>]) -> Result<FileStamp, DatabaseError> {
-        self.publish(&self.folder.modules_path(tile.tile), &encode_levels(tile, levels))
+        let (path, bytes) = (self.folder.modules_path(tile.tile), encode_levels(tile, levels));
+        let stamp = FileStamp::of(&bytes);
+        if self.folder.check_file(&path, &stamp).is_err() {
+            self.write(&path, &bytes, Durability::Later)?;
+        }
+        Ok(stamp)
     }
 
     /// Publishes what was measured of a tile's load modules.

@@ -112,8 +112,16 @@ pub fn curvature(dem: &Dem, rect: PostRect, triangles: usize, each: Each) -> Cur
 /// Rows of places that are summed together.
 const BAND: usize = 32;
 
-/// Second differences in quanta: twice to the east, four times that once to each side, twice to the north.
-type Bend = [i64; 3];
+/// Second differences at a row of places, in quanta: whole numbers, NaN next to a void.
+#[derive(Default)]
+struct Bends {
+    /// Twice to the east.
+    xx: Vec<f64>,
+    /// Four times that once to each side.
+    xy: Vec<f64>,
+    /// Twice to the north.
+    yy: Vec<f64>,
+}
 
 /// Places a step apart, from a step inside a rectangle.
 struct Places<'a> {
@@ -134,7 +142,7 @@ impl Places<'_> {
     /// Sums over some rows of places.
     fn sums(&self, rows: Range<usize>) -> Sums {
         let mut sums = Sums::default();
-        let row = |index: usize| if index < self.row_count() { self.bends(index) } else { Vec::new() };
+        let row = |index: usize| if index < self.row_count() { self.bends(index) } else { Bends::default() };
         let mut below = rows.start.checked_sub(1).map(row).unwrap_or_default();
         let mut here = row(rows.start);
         for index in rows {
@@ -154,13 +162,28 @@ impl Places<'_> {
         (rect.west + step as i32..=rect.east - step as i32).step_by(step).map(move |col| Post::new(row, col))
     }
 
-    /// The bends at a row of places, taken over a step; `None` next to a void.
-    fn bends(&self, index: usize) -> Vec<Option<Bend>> {
-        let (step, from) = (self.step as i32, (self.rect.west - self.dem.rect().west) as usize);
-        let rows = [-step, 0, step].map(|off| &self.dem.row(self.row(index) + off)[from..]);
-        let whole = self.dem.void_count() == 0;
-        let known = |(at, post)| (whole || !self.is_next_to_void(post)).then(|| bend(rows, self.step * at, self.step));
-        self.places(index).enumerate().map(known).collect()
+    /// The bends at a row of places, taken over a step.
+    fn bends(&self, index: usize) -> Bends {
+        let step = self.step as i32;
+        let count = (self.rect.cells_wide() / self.step).saturating_sub(1);
+        let from = (self.rect.west - self.dem.rect().west) as usize;
+        let heights = |off: i32| -> Vec<f64> {
+            let row = &self.dem.row(self.row(index) + off)[from..];
+            row.iter().step_by(self.step).take(count + 2).map(|&height| f64::from(height)).collect()
+        };
+        let rows = [-step, 0, step].map(heights);
+        let [south, here, north] = [0, 1, 2].map(|row| Row::of(&rows[row], count));
+        let mut bends = Bends {
+            xx: (0..count).map(|at| here.west[at] - 2.0 * here.middle[at] + here.east[at]).collect(),
+            xy: (0..count).map(|at| north.east[at] - north.west[at] - south.east[at] + south.west[at]).collect(),
+            yy: (0..count).map(|at| south.middle[at] - 2.0 * here.middle[at] + north.middle[at]).collect(),
+        };
+        if 0 < self.dem.void_count() {
+            for (at, _) in self.places(index).enumerate().filter(|&(_, post)| self.is_next_to_void(post)) {
+                [bends.xx[at], bends.xy[at], bends.yy[at]] = [f64::NAN; 3];
+            }
+        }
+        bends
     }
 
     fn is_next_to_void(&self, post: Post) -> bool {
@@ -176,14 +199,17 @@ impl Places<'_> {
     }
 }
 
-/// Second differences around the middle of three rows of heights, whose first post of so many on is at `at`.
-fn bend([south, here, north]: [&[i32]; 3], at: usize, step: usize) -> Bend {
-    let [west, middle, east] = [at, at + step, at + 2 * step];
-    let height = |row: &[i32], col: usize| i64::from(row[col]);
-    let twice = 2 * height(here, middle);
-    let across = height(here, west) - twice + height(here, east);
-    let both = height(north, east) - height(north, west) - height(south, east) + height(south, west);
-    [across, both, height(south, middle) - twice + height(north, middle)]
+/// Heights a step apart: those west of, at and east of each of some places.
+struct Row<'a> {
+    west: &'a [f64],
+    middle: &'a [f64],
+    east: &'a [f64],
+}
+
+impl<'a> Row<'a> {
+    fn of(heights: &'a [f64], places: usize) -> Self {
+        Self { west: &heights[..places], middle: &heights[1..=places], east: &heights[2..places + 2] }
+    }
 }
 
 /// Sums over places, in the order of places within a band and of bands: they do not depend on who is at work.
@@ -212,51 +238,62 @@ impl Sums {
     }
 
     /// Adds a row of places, between the one south of it and the one north of it, which are empty where there are none.
-    fn add(&mut self, [below, here, above]: [&[Option<Bend>]; 3]) {
-        self.places += here.len() as u64;
-        self.known += here.len() as u64;
-        for (index, bend) in here.iter().enumerate() {
-            let Some(bend) = *bend else { continue };
+    fn add(&mut self, [below, here, above]: [&Bends; 3]) {
+        let count = here.xx.len();
+        self.places += count as u64;
+        self.known += count as u64;
+        let roots: Vec<f64> = (0..count).map(|at| root(here.at(at))).collect();
+        for root in roots.into_iter().filter(|root| !root.is_nan()) {
             self.measured += 1;
-            self.roots += root(bend);
-            let at = |row: &[Option<Bend>], index: usize| row.get(index).copied().flatten();
-            let west = index.checked_sub(1).and_then(|index| at(here, index));
-            let around = [west.zip(at(here, index + 1)), at(below, index).zip(at(above, index))];
-            if let [Some(across), Some(along)] = around {
-                // From neighbour to neighbour are two steps.
-                let change = size(across).max(size(along)) / 4.0;
-                self.compared += 1;
-                self.rough += u64::from(size(([0; 3], bend)) < change);
-            }
+            self.roots += root;
         }
+        if below.xx.is_empty() || above.xx.is_empty() {
+            return;
+        }
+        for at in 1..count.saturating_sub(1) {
+            let [across, along] =
+                [(here.at(at - 1), here.at(at + 1)), (below.at(at), above.at(at))].map(|(a, b)| size(a, b));
+            let own = size([0.0; 3], here.at(at));
+            // From neighbour to neighbour are two steps. NaN where one of the five is.
+            let change = if across < along { along } else { across } / 4.0;
+            self.compared += u64::from(!(own + across + along).is_nan());
+            self.rough += u64::from((own < change) & !(own + across + along).is_nan());
+        }
+    }
+}
+
+impl Bends {
+    #[inline(always)]
+    fn at(&self, place: usize) -> [f64; 3] {
+        [self.xx[place], self.xy[place], self.yy[place]]
     }
 }
 
 /// The cube root of 16 times the determinant of a place, in quanta, doubled where it is negative: kappa is twice as
 /// large there.
-fn root([xx, xy, yy]: Bend) -> f64 {
-    let determinant = 16.0 * (xx as f64 * yy as f64) - xy as f64 * xy as f64;
+#[inline(always)]
+fn root([xx, xy, yy]: [f64; 3]) -> f64 {
+    let determinant = 16.0 * (xx * yy) - xy * xy;
     cube_root(if 0.0 < determinant { determinant } else { -2.0 * determinant })
 }
 
 /// 16 times the square of how much two bends differ.
-fn size((a, b): (Bend, Bend)) -> f64 {
-    let [xx, xy, yy] = [0, 1, 2].map(|part| (a[part] - b[part]) as f64).map(|off| off * off);
+#[inline(always)]
+fn size(a: [f64; 3], b: [f64; 3]) -> f64 {
+    let [xx, xy, yy] = [0, 1, 2].map(|part| a[part] - b[part]).map(|off| off * off);
     16.0 * xx + 2.0 * xy + 16.0 * yy
 }
 
 /// The cube root of a number that is not negative, by sums, products and quotients alone: the same on every machine.
+#[inline(always)]
 fn cube_root(of: f64) -> f64 {
-    if of == 0.0 {
-        return 0.0;
-    }
     // A third of the exponent is within 6 % of the root; each step of Halley's leaves the cube of what is missing.
     let mut root = f64::from_bits(of.to_bits() / 3 + THIRD_OF_BIAS);
     for _ in 0..2 {
         let cube = root * root * root;
         root *= (cube + of + of) / (cube + cube + of);
     }
-    root
+    if of == 0.0 { 0.0 } else { root }
 }
 
 /// Two thirds of the bits of 1, less what makes the largest error smallest.

@@ -2,11 +2,12 @@
 
 use std::ops::Range;
 
+use fearless_simd::{Simd, dispatch};
 use geometry::resample::rounded;
 use terrain::{LoadModule, ModuleGrid, Post, PostRect, Spacing};
 
 use crate::Tally;
-use crate::tally::Sums;
+use crate::tally::{Histogram, Sums};
 
 /// Where the source's posts lie, in horizontal quanta of 1/128 m from the area's south-west post.
 pub struct SourcePosts<'a> {
@@ -62,36 +63,27 @@ struct PostsInModule<'a> {
 
 impl PostsInModule<'_> {
     fn count(&self, tally: &mut Tally) {
-        let wide = self.posts.posts_wide();
-        // Heights in quanta by post; NaN where there is none, or where the post is counted already.
-        let mut heights = Vec::with_capacity(self.posts.post_count());
-        for row in self.posts.south..=self.posts.north {
-            (self.source.push_row_m)(row, self.posts.west..self.posts.east + 1, &mut heights);
-        }
-        heights.iter_mut().for_each(|height| *height *= f64::from(terrain::QUANTA_PER_METRE));
-        let (mut sums, mut histogram) = (Sums::default(), tally.histogram());
-        for triangle in &self.module.triangles {
+        // Heights of the triangles by post, in quanta; NaN outside of all. A post on an edge has that of the first one.
+        let mut planes = vec![f64::NAN; self.posts.post_count()];
+        for triangle in self.module.triangles.iter().rev() {
             let corners = triangle.map(|v| {
                 let vertex = self.module.vertices[usize::from(v)];
                 [f64::from(vertex.x), f64::from(vertex.y), f64::from(vertex.z)]
             });
-            self.visit(corners, |row, col, plane| {
-                let height = &mut heights[row as usize * wide + col as usize];
-                if !height.is_nan() {
-                    let residual = rounded(*height - plane);
-                    sums.add(residual);
-                    histogram.add(residual);
-                    *height = f64::NAN;
-                }
-            });
+            self.lay(corners, &mut planes);
         }
+        let mut heights = Vec::with_capacity(planes.len());
+        for row in self.posts.south..=self.posts.north {
+            (self.source.push_row_m)(row, self.posts.west..self.posts.east + 1, &mut heights);
+        }
+        let level = geometry::widest_level();
+        let sums = dispatch!(level, simd => count_in(simd, &heights, &planes, tally.histogram()));
         tally.add_sums(&sums);
     }
 
-    /// Calls `visit` with row and column (from the first post inside) of each post of the closed triangle, and the
-    /// plane's height there, in quanta.
+    /// Writes the height of a closed triangle's plane at each post of it, in quanta.
     #[inline(always)]
-    fn visit(&self, [a, b, c]: [[f64; 3]; 3], mut visit: impl FnMut(i32, i32, f64)) {
+    fn lay(&self, [a, b, c]: [[f64; 3]; 3], planes: &mut [f64]) {
         let scale = 1.0 / ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]));
         let first = |axis: usize, at: i32| {
             self.source.south_west[axis] + f64::from(at) * self.source.step[axis] - self.corner[axis]
@@ -101,7 +93,9 @@ impl PostsInModule<'_> {
             let place = |at: f64| (at - start) / self.source.step[axis];
             let low = place(a[axis].min(b[axis]).min(c[axis])) - ON_EDGE;
             let high = place(a[axis].max(b[axis]).max(c[axis])) + ON_EDGE;
-            (low.ceil().max(0.0) as i32, ((high + 1.0).floor().max(0.0) as i32).min(posts as i32))
+            // A conversion drops what is behind the point and stops at 0.
+            let from = low as u32;
+            ((from + u32::from(f64::from(from) < low)) as i32, ((high + 1.0) as u32).min(posts as u32) as i32)
         };
         let (south, north) = range(1, y0, self.posts.posts_high());
         let (west, east) = range(0, x0, self.posts.posts_wide());
@@ -117,15 +111,55 @@ impl PostsInModule<'_> {
             for (side, share) in sides.iter().zip([at_b, at_c, 1.0 - at_b - at_c]) {
                 near = side.narrowed(near, share);
             }
-            for col in near.0 as i32..near.1 as i32 {
-                let (at_b, at_c) = (at_b + f64::from(col) * step_b, at_c + f64::from(col) * step_c);
-                if -ON_EDGE <= at_b && -ON_EDGE <= at_c && at_b + at_c <= 1.0 + ON_EDGE {
-                    visit(row, col, a[2] + at_b * (b[2] - a[2]) + at_c * (c[2] - a[2]));
-                }
+            let at = |col: i32| (at_b + f64::from(col) * step_b, at_c + f64::from(col) * step_c);
+            let is_inside = |col: i32| {
+                let (at_b, at_c) = at(col);
+                -ON_EDGE <= at_b && -ON_EDGE <= at_c && at_b + at_c <= 1.0 + ON_EDGE
+            };
+            let (mut from, mut end) = (near.0 as i32, near.1 as i32);
+            while from < end && !is_inside(from) {
+                from += 1;
+            }
+            while from < end && !is_inside(end - 1) {
+                end -= 1;
+            }
+            if end <= from {
+                continue;
+            }
+            let row = row as usize * self.posts.posts_wide();
+            for (col, plane) in (from..end).zip(&mut planes[row + from as usize..row + end as usize]) {
+                let (at_b, at_c) = at(col);
+                *plane = a[2] + at_b * (b[2] - a[2]) + at_c * (c[2] - a[2]);
             }
         }
     }
 }
+
+/// Sums and a histogram of what heights in metres are above heights in quanta; posts without either are left out.
+#[inline(always)]
+fn count_in<S: Simd>(_: S, heights_m: &[f64], planes: &[f64], mut histogram: Histogram) -> Sums {
+    let mut sums = Sums::default();
+    let mut residuals = [0; TOGETHER];
+    for (heights_m, planes) in heights_m.chunks(TOGETHER).zip(planes.chunks(TOGETHER)) {
+        // NaN where either is.
+        let above = |(height_m, plane): (&f64, &f64)| height_m * f64::from(terrain::QUANTA_PER_METRE) - plane;
+        let mut known = 0;
+        for (above, to) in heights_m.iter().zip(planes).map(above).zip(&mut residuals) {
+            *to = rounded(above);
+            known += usize::from(!above.is_nan());
+        }
+        if known < planes.len() {
+            let found = heights_m.iter().zip(planes).map(above).filter(|above| !above.is_nan());
+            found.zip(&mut residuals).for_each(|(above, to)| *to = rounded(above));
+        }
+        sums.add_all(&residuals[..known]);
+        residuals[..known].iter().for_each(|&residual| histogram.add(residual));
+    }
+    sums
+}
+
+/// Posts whose residuals are found together.
+const TOGETHER: usize = 64;
 
 /// Share of the triangle by which rounding may put a post on an edge outside both sides of it.
 const ON_EDGE: f64 = 1e-9;

@@ -163,6 +163,24 @@ impl Sums {
         self.sum_abs += size;
         self.sum_squared += u128::from(size * size);
     }
+
+    /// Counts some posts, fewer than 2^16.
+    #[inline(always)]
+    pub fn add_all(&mut self, residuals: &[i32]) {
+        let (mut sum, mut sum_abs, mut sum_squared) = (0_i64, 0_u64, 0_u64);
+        for &residual in residuals {
+            let size = u64::from(residual.unsigned_abs());
+            sum += i64::from(residual);
+            sum_abs += size;
+            // Residuals have 24 bits.
+            sum_squared += size * size;
+            self.largest = self.largest.max(residual.unsigned_abs());
+        }
+        self.posts += residuals.len() as u32;
+        self.sum += sum;
+        self.sum_abs += sum_abs;
+        self.sum_squared += u128::from(sum_squared);
+    }
 }
 
 /// The bin of an absolute residual.

@@ -257,13 +257,13 @@ impl Choice for Effort {
         Word::costing(
             "fast",
             Self::Fast,
-            "more posts are chosen, thinned, moved: 56 % less RMS residual than paper",
+            "more posts are chosen, thinned, moved: 53 % less RMS residual than paper",
             Seconds(3.6),
         ),
         Word::costing(
             "normal",
             Self::Normal,
-            "more still, thinned by true cost, deep flips: 10 % less RMS residual than fast",
+            "more still, thinned by true cost, deep flips: 15 % less RMS residual than fast",
             Seconds(33.0),
         ),
         Word::costing(

@@ -8,8 +8,9 @@
 //! triangles alone as the whole area would.
 
 use geometry::cut::{Line, crossing};
-use geometry::orient;
-use terrain::{Dem, Importance, LATTICE_PER_POST, LatticePoint, LoadModule, Post, PostRect, Vertex};
+use geometry::{LocalPost, WORKING_POSTS_MAX};
+use mesh::Mesh;
+use terrain::{Dem, Importance, LATTICE_PER_POST, LatticePoint, LoadModule, ModuleRect, Post, Vertex};
 
 use crate::Layout;
 use crate::outline::{Mark, What, outline, reach};
@@ -37,14 +38,12 @@ pub fn halo_posts(side_cells: i32) -> i32 {
 /// are left empty.
 ///
 /// # Panics
-/// When points are missing: a triangle then reaches further than the halo, or an edge passes through a corner.
+/// When the corner of a load module in or beside the tile is no point.
 pub fn clip(points: &[Vertex], layout: &Layout, heights: ClipHeights, mask: &Importance) -> Vec<LoadModule> {
     let points = points_around(points, layout);
-    let places: Vec<_> = points.iter().map(|vertex| vertex.at).collect();
+    assert_corners(&points, layout);
     let mut clipper = Clipper::new(layout, heights);
-    for triangle in mesh::delaunay(&places) {
-        clipper.add(triangle.map(|v| points[v as usize]));
-    }
+    triangulate(&points, layout, |triangle| clipper.add(triangle));
     let modules = layout.modules.iter().zip(&clipper.pieces);
     modules.map(|(id, pieces)| pieces.load_module(id, layout, mask, None)).collect()
 }
@@ -65,6 +64,47 @@ pub(crate) fn points_around(points: &[Vertex], layout: &Layout) -> Vec<Vertex> {
     let distinct = near.windows(2).all(|pair| pair[0].at < pair[1].at);
     assert!(distinct, "a point has one height in every tile that lists it");
     near
+}
+
+/// Calls `each` with the triangles of the canonical Delaunay triangulation that may reach into the tile.
+///
+/// The mesh grows from corners of load modules up to two sides away. Some of those may be no points: no circle that
+/// reaches into the tile comes that far, so their triangles are others.
+fn triangulate(points: &[Vertex], layout: &Layout, mut each: impl FnMut([Vertex; 3])) {
+    let (grid, tile) = (layout.grid, layout.modules);
+    let wide = ModuleRect {
+        south: tile.south.saturating_sub(2),
+        west: tile.west.saturating_sub(2),
+        north: (tile.north + 2).min(grid.rows),
+        east: (tile.east + 2).min(grid.cols),
+    };
+    let window = grid.posts_of_rect(wide);
+    if WORKING_POSTS_MAX < window.posts_high().max(window.posts_wide()) {
+        let places: Vec<_> = points.iter().map(|vertex| vertex.at).collect();
+        return mesh::delaunay(&places).into_iter().for_each(|triangle| each(triangle.map(|v| points[v as usize])));
+    }
+    let mut mesh = Mesh::with_corners_every(window, grid.side_cells);
+    mesh.reserve(points.len());
+    let mut heights = vec![None; window.post_count()];
+    let mut hint = 0;
+    for vertex in points {
+        let at = vertex.at.post().expect("points to clip stand on whole posts");
+        heights[window.index(at)] = Some(vertex.height);
+        let post = LocalPost::of(at, window);
+        let triangle = mesh.triangle_at(post, hint);
+        if !mesh.triangles()[triangle as usize].corners.contains(&post) {
+            hint = mesh.insert(post, triangle)[0];
+        }
+    }
+    for triangle in mesh.triangles() {
+        let corners = triangle.corners.map(|corner| {
+            let at = corner.post(window);
+            heights[window.index(at)].map(|height| Vertex { at: at.into(), height })
+        });
+        if let [Some(a), Some(b), Some(c)] = corners {
+            each([a, b, c]);
+        }
+    }
 }
 
 /// Where a mark is: north and east of the area's corner, height (all in quanta), whether it is a crossing.
@@ -95,7 +135,6 @@ impl<'a> Clipper<'a> {
         if north < south || east < west {
             return;
         }
-        assert_local(corners, self.layout);
         if rows.0 == rows.1 && cols.0 == cols.1 {
             // Most triangles lie in one load module and are a piece as they are.
             return self.push(rows.0, cols.0, triangle.map(|vertex| self.vertex(vertex)).into_iter());
@@ -169,33 +208,18 @@ fn height_on_line(dem: &Dem, line: Line, along: i64, quanta_per_post: i32) -> i3
     (numerator.signum() * ((2 * numerator.abs() + step) / (2 * step))) as i32
 }
 
-/// Holds the bound on which the halo rests: the circle of a triangle that reaches into the tile is no
-/// larger than that of a load module's square, unless it is centred outside the area.
-fn assert_local(corners: [LatticePoint; 3], layout: &Layout) {
-    let [a, b, c] = corners;
-    let square = |p: LatticePoint, q: LatticePoint| {
-        let (x, y) = (i128::from(q.col) - i128::from(p.col), i128::from(q.row) - i128::from(p.row));
-        x * x + y * y
-    };
-    let (side, doubled_area) = (i128::from(layout.side_lattice()), i128::from(orient(a, b, c)));
-    let sides = [square(a, b), square(b, c), square(c, a)];
-    // radius = product of the sides / (2 * doubled area) <= side / sqrt 2
-    let is_small = sides.iter().product::<i128>() <= 2 * side * side * doubled_area * doubled_area;
-    let is_cap = || sides.iter().all(|&length| length <= side * side) && !centre_lies_in(corners, layout.grid.area());
-    assert!(is_small || is_cap(), "the triangle {a:?} {b:?} {c:?} reaches further than the halo: points are missing");
-}
-
-/// Whether the centre of a triangle's circle lies in the area, its border included.
-fn centre_lies_in([a, b, c]: [LatticePoint; 3], area: PostRect) -> bool {
-    let relative = |p: LatticePoint| (i128::from(p.col) - i128::from(a.col), i128::from(p.row) - i128::from(a.row));
-    let ((bx, by), (cx, cy)) = (relative(b), relative(c));
-    let (b2, c2, whole) = (bx * bx + by * by, cx * cx + cy * cy, 2 * (bx * cy - by * cx));
-    let (x, y) = (cy * b2 - by * c2, bx * c2 - cx * b2);
-    let within = |v: i128, from: i32, low: i32, high: i32| {
-        let lattice = |post: i32| i128::from(post) * i128::from(LATTICE_PER_POST) - i128::from(from);
-        lattice(low) * whole <= v && v <= lattice(high) * whole
-    };
-    within(x, a.col, area.west, area.east) && within(y, a.row, area.south, area.north)
+/// Holds what the halo rests on: corners of the load modules in and beside the tile are points.
+fn assert_corners(points: &[Vertex], layout: &Layout) {
+    let area = layout.grid.area();
+    let around = layout.grid.posts_of_rect(layout.modules).grown(layout.grid.side_cells);
+    let lines = |low: i32, high: i32| (low..=high).step_by(layout.grid.side_cells as usize);
+    for row in lines(around.south, around.north) {
+        for col in lines(around.west, around.east) {
+            let corner = Post::new(row, col);
+            let is_point = points.binary_search_by_key(&corner.into(), |vertex| vertex.at).is_ok();
+            assert!(is_point || !area.contains(corner), "points are missing: a load module has its corner at {corner}");
+        }
+    }
 }
 
 #[cfg(test)]
