@@ -99,7 +99,13 @@ impl Ledger {
         short(ShortOf::Tile, self.spent, allowance.triangles).into_iter().chain(modules).chain(windows).collect()
     }
 
-    fn module_index(&self, module: ModuleId) -> usize {
+    /// A count of 0 for every load module, by [`Ledger::module_index`].
+    pub(crate) fn no_counts(&self) -> Vec<u32> {
+        vec![0; self.modules.len()]
+    }
+
+    /// The place of a load module among those of the allowance.
+    pub(crate) fn module_index(&self, module: ModuleId) -> usize {
         let modules = self.allowance.modules;
         debug_assert!(modules.contains(module), "load module {module} is beyond this tile's ring");
         (module.row - modules.south) as usize * modules.cols() as usize + (module.col - modules.west) as usize
@@ -172,6 +178,13 @@ impl Ledger {
         self.booked += i64::from(cost);
         let index = self.module_index(module);
         self.modules[index] = Account { spent: self.modules[index].spent + cost, left: least, booked: self.booked };
+    }
+
+    /// Notes what load modules have already, whether or not they may.
+    pub(crate) fn book_counts(&mut self, counts: &[u32]) {
+        for (module, &cost) in self.allowance.modules.iter().zip(counts).filter(|&(_, &cost)| 0 < cost) {
+            self.book(module, cost);
+        }
     }
 
     /// Takes back `cost` triangles of `module`.

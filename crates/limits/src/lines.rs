@@ -1,6 +1,6 @@
 //! Which load modules a point adds triangles to.
 
-use terrain::{ModuleId, ModuleRect};
+use terrain::{ModuleId, ModuleRect, POINT_COST};
 
 /// The load modules a point adds triangles to: two in one, or one on either side of a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -43,6 +43,20 @@ impl ModuleLines {
             (true, false) => Some(self.between(module(row - 1, col), module(row, col))),
             (false, true) => Some(self.between(module(row, col - 1), module(row, col))),
             (true, true) => None,
+        }
+    }
+
+    /// Calls `each` with the load modules that a point is charged to, and with how many triangles.
+    pub fn each_charge(&self, row: i32, col: i32, mut each: impl FnMut(ModuleId, u32)) {
+        match self.charged(row, col) {
+            Some(Charged::Inside(module)) => each(module, POINT_COST),
+            Some(Charged::Between(first, second)) => {
+                each(first, 1);
+                each(second, 1);
+            }
+            Some(Charged::Beside(module)) => each(module, 1),
+            // Load-module corners are there from the start.
+            None => {}
         }
     }
 

@@ -54,6 +54,16 @@ impl TileLedger {
         self.each_charge(row, col, Ledger::book);
     }
 
+    /// Notes all points that are there already, by row and column, whether or not they may be.
+    pub fn book_all(&mut self, points: impl IntoIterator<Item = (i32, i32)>) {
+        let Self { lines, ledger } = self;
+        let mut counts = ledger.no_counts();
+        for (row, col) in points {
+            lines.each_charge(row, col, |module, cost| counts[ledger.module_index(module)] += cost);
+        }
+        ledger.book_counts(&counts);
+    }
+
     /// Takes back what a point cost.
     ///
     /// # Panics
@@ -63,16 +73,8 @@ impl TileLedger {
     }
 
     fn each_charge(&mut self, row: i32, col: i32, book: impl Fn(&mut Ledger, ModuleId, u32)) {
-        match self.lines.charged(row, col) {
-            Some(Charged::Inside(module)) => book(&mut self.ledger, module, POINT_COST),
-            Some(Charged::Between(first, second)) => {
-                book(&mut self.ledger, first, 1);
-                book(&mut self.ledger, second, 1);
-            }
-            Some(Charged::Beside(module)) => book(&mut self.ledger, module, 1),
-            // Load-module corners are there from the start.
-            None => {}
-        }
+        let Self { lines, ledger } = self;
+        lines.each_charge(row, col, |module, cost| book(ledger, module, cost));
     }
 
     /// Takes the room of a point that a neighbour chose on a shared side.

@@ -41,7 +41,7 @@ impl Account {
                 let mut ledger = ledger.clone().in_finer_steps(PER_POST);
                 let live = sheet.vertices.iter().filter(|vertex| vertex.edge != NONE);
                 let paid = live.filter(|vertex| !vertex.hold.has(Hold::PLACE));
-                paid.for_each(|vertex| ledger.book(vertex.at.y, vertex.at.x));
+                ledger.book_all(paid.map(|vertex| (vertex.at.y, vertex.at.x)));
                 Books::Limits(ledger)
             }
         };

@@ -200,8 +200,11 @@ impl<'a> State<'a> {
         }
         let rows = self.window_rows(module);
         let limit = self.budget.per_window;
-        let full = rows.clone().any(|row| self.windows[row].iter().any(|&count| limit < count + cost));
-        if full {
+        // Looks at all windows, which in lanes is quicker than stopping at the first full one.
+        let is_full = |row: std::ops::Range<usize>| {
+            self.windows[row].iter().fold(false, |full, &count| full | (limit < count + cost))
+        };
+        if rows.clone().fold(false, |full, row| full | is_full(row)) {
             return false;
         }
         rows.for_each(|row| self.windows[row].iter_mut().for_each(|count| *count += cost));
