@@ -35,7 +35,7 @@ const MOST: i64 = 20;
 /// Steps of the scale on which posts decide.
 const FULLY: u32 = 1000;
 /// A post that decides as much as anything can weighs so many times more, where squares are counted.
-const STRENGTH: u64 = 20;
+const STRENGTH: u64 = 12;
 
 /// Posts that an eye may look far: a halo of that size is read around every tile.
 const RANGE_MAX: i32 = 160;
