@@ -331,9 +331,11 @@ mod tests {
         let ridge = |post: Post| Some(if post.col == 50 { 1000 } else { 0 });
         let around = Surroundings::new(AREA, ridge);
         let weighed = sight().weigh(&Importance::uniform(AREA, 1000), &around);
-        let mean = |col: i32| (20..70).map(|row| u32::from(weighed.weight(Post::new(row, col)))).sum::<u32>() / 50;
-        let beside: Vec<u32> = (40..60).filter(|&col: &i32| 1 < (col - 50).abs()).map(mean).collect();
-        assert!(beside.iter().all(|&weight| 5 * weight < 4 * mean(50)), "{beside:?} {}", mean(50));
+        // Of squares, that which sight has added.
+        let added = |post: Post| u64::from(weighed.weight(post)).pow(2) - 1_000_000;
+        let mean = |col: i32| (20..70).map(|row| added(Post::new(row, col))).sum::<u64>() / 50;
+        let beside: Vec<u64> = (40..60).filter(|&col: &i32| 1 < (col - 50).abs()).map(mean).collect();
+        assert!(beside.iter().all(|&squared| 9 * squared < 5 * mean(50)), "{beside:?} {}", mean(50));
         assert!(AREA.posts().all(|post| 1000 <= weighed.weight(post)));
     }
 
