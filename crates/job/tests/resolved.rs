@@ -259,8 +259,8 @@ fn every_setting_is_described_with_value_and_meaning() {
             r#"tin.key = "sse": a triangle is worth its weighted squared residuals"#,
             r#"tin.allocation = "global": tiles share by what a survey says they gain"#,
             concat!(
-                r#"tin.effort = "normal": more still, thinned by true cost, deep flips: 15 % less RMS "#,
-                "residual than fast; 33 s of a core for a million triangles"
+                r#"tin.effort = "normal": more still, thinned by true cost, deep flips: 16 % less RMS "#,
+                "residual than fast; 24 s of a core for a million triangles"
             ),
             r#"tin.height_fit = "l2": vertices stand where squared residuals are least"#,
             r#"tin.lattice = "eighth": vertices stand on eighths of a post, those on lines between tiles on posts"#,

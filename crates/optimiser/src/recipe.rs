@@ -98,7 +98,7 @@ impl Recipe {
         match effort {
             Effort::Fast => Self { overshoot: 1.45, steps: &[FAST] },
             Effort::Normal => Self { overshoot: 2.5, steps: &[NORMAL] },
-            Effort::Best => Self { overshoot: 2.5, steps: &[BEGINNING_OF_BEST, CYCLE, CYCLE, END_OF_BEST] },
+            Effort::Best => Self { overshoot: 2.5, steps: &[BEGINNING_OF_BEST, CYCLE, CYCLE, CYCLE, END_OF_BEST] },
         }
     }
 }
