@@ -85,21 +85,23 @@ fn triangulate(points: &[Vertex], layout: &Layout, mut each: impl FnMut([Vertex;
     }
     let mut mesh = Mesh::with_corners_every(window, grid.side_cells);
     mesh.reserve(points.len());
-    let mut heights = vec![None; window.post_count()];
     let mut hint = 0;
     for vertex in points {
         let at = vertex.at.post().expect("points to clip stand on whole posts");
-        heights[window.index(at)] = Some(vertex.height);
         let post = LocalPost::of(at, window);
         let triangle = mesh.triangle_at(post, hint);
         if !mesh.triangles()[triangle as usize].corners.contains(&post) {
             hint = mesh.insert(post, triangle)[0];
         }
     }
+    // Where each row of posts begins among the points.
+    let start = |row: i32| points.partition_point(|vertex| vertex.at < Post::new(row, window.west).into());
+    let starts: Vec<usize> = (window.south..=window.north + 1).map(start).collect();
     for triangle in mesh.triangles() {
         let corners = triangle.corners.map(|corner| {
-            let at = corner.post(window);
-            heights[window.index(at)].map(|height| Vertex { at: at.into(), height })
+            let row = &points[starts[corner.row() as usize]..starts[corner.row() as usize + 1]];
+            let place = row.binary_search_by_key(&corner.post(window).into(), |vertex| vertex.at);
+            place.ok().map(|place| row[place])
         });
         if let [Some(a), Some(b), Some(c)] = corners {
             each([a, b, c]);
@@ -302,6 +304,16 @@ mod tests {
             }
         }
         places.into_iter().map(|post| Vertex { at: post.into(), height: draw.i32(0..999) }).collect()
+    }
+
+    #[test]
+    fn a_window_too_large_for_the_mesh_kernel_has_the_same_load_modules() {
+        // The whole is 20,000 posts wide, and what surrounds the outer tiles 12,000.
+        let grid = ModuleGrid { rows: 1, cols: 5, side_cells: 4000 };
+        let layout = whole(grid, 0.0625);
+        for seed in 0..10 {
+            check(&clusters(grid, seed), &layout, &Importance::uniform(grid.area(), 1000), (&[0, 1], &[0, 1, 4, 5]));
+        }
     }
 
     #[test]
