@@ -7,6 +7,8 @@ import { join } from "node:path";
 const state = (page) => page.evaluate("window.tiefort.state()");
 /** Metres of a pixel, and pixels along a side. */
 const PIXEL_M = 2, SIDE = 1000;
+/** Squares share one texture. */
+const TEXTURES_MAX = 10;
 const BLUE = [30, 60, 235], GREEN = [30, 200, 60];
 
 /** A GeoTIFF of bare colours, not packed, with its north-western corner at a place. */
@@ -132,8 +134,9 @@ export async function draped(told) {
     await open(link.slice(1));
     const again = await colorAt(page, x, y);
     expect(again.every((part, i) => Math.abs(part - weakly[i]) < 12), `a link opens it as strong: ${inWords(again)}`);
-    const { imagery } = await state(page);
-    expect(0 < imagery.drawn, `${imagery.drawn} squares at ${imagery.levels} levels`);
+    const { imagery, textures } = await state(page);
+    expect(0 < imagery.drawn && textures < TEXTURES_MAX,
+      `${imagery.drawn} squares at ${imagery.levels} levels in ${textures} textures, with those of the ground`);
   } finally {
     await page.close();
     const ended = new Promise((end) => server.once("exit", end));

@@ -29,6 +29,8 @@ pub struct FeaturesForeseen {
     pub over_share: usize,
     /// Triangles that are left of all where no load module gives more than that share.
     pub within_share: u64,
+    /// Buildings that stand in the area, where the job wants them and has a file that may hold some.
+    pub buildings: Option<usize>,
 }
 
 /// Foresees the features of a job that has some.
@@ -37,7 +39,9 @@ pub struct FeaturesForeseen {
 /// When a file of them cannot be read at all.
 pub fn foresee_features(job: &Job) -> Result<Option<FeaturesForeseen>, CompileError> {
     let (Some(spec), area) = (&job.features, GamingArea::new(job)?) else { return Ok(None) };
-    let Some(ReadFeatures { table, features, .. }) = ReadFeatures::open(job, &area, &in_turn)? else { return Ok(None) };
+    let Some(read) = ReadFeatures::open(job, &area, &in_turn)? else { return Ok(None) };
+    let ReadFeatures { table, features, vectors, .. } = read;
+    let buildings = spec.has_buildings().then_some(vectors.buildings.len());
     let level_ground = vec![Some(0); features.stations().len()];
     // No limit, so that nothing is degraded.
     let levelled = features.level(&level_ground, spec.options, &mut { u32::MAX });
@@ -53,5 +57,5 @@ pub fn foresee_features(job: &Job) -> Result<Option<FeaturesForeseen>, CompileEr
     crowded.sort_by_key(|&(ModuleId { row, col }, triangles)| (std::cmp::Reverse(triangles), row, col));
     crowded.truncate(NAMED);
     let cost = product::told(job, &area, &level, &FeatureFigures::default()).report;
-    Ok(Some(FeaturesForeseen { table, cost, crowded, over_share, within_share }))
+    Ok(Some(FeaturesForeseen { table, cost, crowded, over_share, within_share, buildings }))
 }

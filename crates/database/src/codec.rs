@@ -34,6 +34,19 @@ pub(crate) fn decode<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, String> {
     options().deserialize(bytes).map_err(|error| error.to_string())
 }
 
+/// The bytes of `value`, small numbers in few of them: below 251 in one, and signed ones below 126 either way.
+pub(crate) fn encode_small(value: &impl Serialize) -> Vec<u8> {
+    options().with_varint_encoding().serialize(value).expect("plain values of a bounded area always encode")
+}
+
+/// The value that [`encode_small`] gave these bytes for.
+///
+/// # Errors
+/// What is wrong with the bytes, in words.
+pub(crate) fn decode_small<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, String> {
+    options().with_varint_encoding().deserialize(bytes).map_err(|error| error.to_string())
+}
+
 /// The value whose bytes begin these, and what follows it, if anything does.
 ///
 /// # Errors
@@ -60,6 +73,14 @@ mod tests {
     fn an_absurd_length_is_an_error_and_no_allocation() {
         assert!(decode::<Vec<u64>>(&[255; 8]).is_err());
         assert!(decode::<Vec<u64>>(&[255, 255, 255, 255, 255, 0, 0, 0, 1]).is_err());
+    }
+
+    #[test]
+    fn small_numbers_take_few_bytes() {
+        let value = vec![(7u16, -1i32), (300, 125), (1, -1000)];
+        assert_eq!(encode_small(&value), [3, 7, 1, 251, 44, 1, 250, 1, 251, 207, 7]);
+        assert_eq!(decode_small::<Vec<(u16, i32)>>(&encode_small(&value)), Ok(value));
+        assert!(decode_small::<Vec<u64>>(&[253, 255, 255, 255, 255, 255, 255, 255, 255]).is_err());
     }
 
     #[test]

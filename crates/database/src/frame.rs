@@ -53,9 +53,9 @@ impl Kind {
         match self {
             // 2: how much the ground curves.
             Kind::Measured => 2,
-            Kind::Tile | Kind::Curve | Kind::Removals | Kind::Profile | Kind::Lines | Kind::Level | Kind::Buildings => {
-                1
-            }
+            // 2: corners as steps from one to the next.
+            Kind::Buildings => 2,
+            Kind::Tile | Kind::Curve | Kind::Removals | Kind::Profile | Kind::Lines | Kind::Level => 1,
         }
     }
 }

@@ -37,7 +37,7 @@ pub use level_file::{
     AreaLevel, CULVERT, FeatureFace, FeatureLine, FeatureRemark, LineRole, StripFigures, decode_level, encode_level,
 };
 mod buildings_file;
-pub use buildings_file::{Building, decode_buildings, encode_buildings};
+pub use buildings_file::{BUILDING_UNITS_PER_METRE, Building, decode_buildings, encode_buildings};
 mod removals_file;
 pub use removals_file::{Removals, decode_removals, encode_removals};
 mod measured_file;

@@ -1,18 +1,17 @@
 //! Buildings of the sources of features, as blocks that are drawn only: no height of the ground depends on them.
 
-use database::Building;
+use database::{BUILDING_UNITS_PER_METRE, Building};
 use features::building_heights;
 use source_files::{VectorFeature, VectorShape, Vertices};
-use terrain::{QUANTA_PER_METRE, quanta_of_metres};
 
 use crate::area::GamingArea;
 
-/// Buildings of an area at most: about 100 bytes each in memory and in the file.
+/// Buildings of an area at most: about 100 bytes each in memory, and 30 in the file.
 const BUILDINGS_MAX: usize = 1 << 21;
 /// Corners of a building at most: the largest halls and terraces have some hundreds.
 const CORNERS_MAX: usize = 2048;
-/// Twice the least area of a footprint, in quanta squared: a square metre.
-const TWICE_AREA_MIN: i64 = 2 * (QUANTA_PER_METRE as i64) * (QUANTA_PER_METRE as i64);
+/// Twice the least area of a footprint, in its units squared: a square metre.
+const TWICE_AREA_MIN: i64 = 2 * (BUILDING_UNITS_PER_METRE as i64) * (BUILDING_UNITS_PER_METRE as i64);
 
 /// Adds those of `found` that stand in the area.
 pub(crate) fn add(found: &[VectorFeature], area: &GamingArea, buildings: &mut Vec<Building>) {
@@ -43,11 +42,11 @@ fn building(feature: &VectorFeature, area: &GamingArea) -> Option<Building> {
             None => {}
         }
     }
-    let (bottom, top) = (quanta_of_metres(heights.bottom_m)?, quanta_of_metres(heights.top_m)?);
+    let (bottom, top) = (units(heights.bottom_m)?, units(heights.top_m)?);
     (stands_inside(&placed[0], area) && bottom < top).then_some(Building { rings: placed, bottom, top })
 }
 
-/// A ring in quanta from the area's south-west corner, the outer one counter-clockwise, others clockwise; `None` where
+/// A ring in units from the area's south-west corner, the outer one counter-clockwise, others clockwise; `None` where
 /// it encloses nothing.
 fn ring_of(ring: &Vertices, area: &GamingArea, is_outer: bool) -> Option<Vec<[i32; 2]>> {
     let spacing = area.frame.spacing.metres();
@@ -57,7 +56,7 @@ fn ring_of(ring: &Vertices, area: &GamingArea, is_outer: bool) -> Option<Vec<[i3
     ];
     let mut placed = Vec::with_capacity(ring.places.len());
     for place in &ring.places {
-        let at = [0, 1].map(|axis| quanta_along(place[axis] - corner[axis]));
+        let at = [0, 1].map(|axis| units(place[axis] - corner[axis]));
         let [Some(east), Some(north)] = at else { return None };
         if placed.last() != Some(&[east, north]) {
             placed.push([east, north]);
@@ -76,10 +75,10 @@ fn ring_of(ring: &Vertices, area: &GamingArea, is_outer: bool) -> Option<Vec<[i3
     Some(placed)
 }
 
-/// Quanta of a distance along an axis; `None` beyond what 32 bits hold, some 16,000 km.
-fn quanta_along(metres: f64) -> Option<i32> {
-    let quanta = (metres * f64::from(QUANTA_PER_METRE)).round();
-    (quanta.abs() <= f64::from(i32::MAX)).then_some(quanta as i32)
+/// A length in the units of buildings; `None` beyond what 32 bits hold.
+fn units(metres: f64) -> Option<i32> {
+    let units = (metres * f64::from(BUILDING_UNITS_PER_METRE)).round();
+    (units.abs() <= f64::from(i32::MAX)).then_some(units as i32)
 }
 
 /// Twice the area that a ring encloses, positive where it runs counter-clockwise.
@@ -92,8 +91,8 @@ fn twice_area(ring: &[[i32; 2]]) -> i64 {
 
 /// Whether the middle of a ring's extent lies in the area.
 fn stands_inside(ring: &[[i32; 2]], area: &GamingArea) -> bool {
-    let quanta = |cells: f64| cells * area.frame.spacing.metres() * f64::from(QUANTA_PER_METRE);
-    let reach = [quanta(area.rect.cells_wide() as f64), quanta(area.rect.cells_high() as f64)];
+    let units = |cells: f64| cells * area.frame.spacing.metres() * f64::from(BUILDING_UNITS_PER_METRE);
+    let reach = [units(area.rect.cells_wide() as f64), units(area.rect.cells_high() as f64)];
     [0, 1].into_iter().all(|axis| {
         let along = ring.iter().map(|corner| i64::from(corner[axis]));
         let (low, top) = (along.clone().min().unwrap_or(0), along.max().unwrap_or(0));
@@ -143,11 +142,11 @@ mod tests {
         let house = polygon(&[&square([1010.0, 2020.0], 10.0), &square([1012.0, 2022.0], 4.0)], "yes");
         let expected = Building {
             rings: vec![
-                vec![[2560, 2560], [2560, 3840], [1280, 3840], [1280, 2560]],
-                vec![[1536, 2816], [1536, 3328], [2048, 3328], [2048, 2816]],
+                vec![[160, 160], [160, 240], [80, 240], [80, 160]],
+                vec![[96, 176], [96, 208], [128, 208], [128, 176]],
             ],
             bottom: 0,
-            top: 768,
+            top: 48,
         };
         let all = found(&[house.clone(), house]);
         assert_eq!(all.len(), 1, "what two sources have is there once");

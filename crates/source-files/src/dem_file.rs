@@ -8,7 +8,7 @@ use crate::beside::{RAW_ENDINGS, beside};
 use crate::chunk::{Chunk, Header};
 use crate::crs::Crs;
 use crate::dted::{self, Dted};
-use crate::error::A_JOB;
+use crate::error::{A_JOB, A_TEXT};
 use crate::features::osm::frames::MARK as OSM_MARK;
 use crate::frame::{Axes, Facts};
 use crate::geotiff::{FileDecoder, GeoTiff};
@@ -253,10 +253,8 @@ fn of_bare_rows(store: &Store, start: &[u8], reading: &Reading) -> Result<Found,
     if store.len() == 0 {
         return Err(SourceError::Empty { path: store.path().into() });
     }
-    if let Some(name) = known_but_not_read(start) {
-        let is_job = store.path().extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml"));
-        let name = if is_job { A_JOB } else { name };
-        return Err(SourceError::OtherFormat { path: store.path().into(), found: name });
+    if let Some(found) = text_in(store.path(), start).or_else(|| known_but_not_read(start)) {
+        return Err(SourceError::OtherFormat { path: store.path().into(), found });
     }
     if let Some(header) = (!store.is_packed()).then(|| beside(store.path(), &["hdr"])).flatten() {
         let header = Store::plain(&header)?;
@@ -335,6 +333,27 @@ pub(crate) fn known_but_not_read(start: &[u8]) -> Option<&'static str> {
     if text.starts_with('{') {
         return Some("a JSON file, not a raster");
     }
-    let is_text = 144 <= start.len() && start.iter().all(|&b| b.is_ascii_graphic() || b.is_ascii_whitespace());
-    is_text.then_some("a text file of some other kind (a USGS DEM, SDTS or XYZ file, perhaps)")
+    None
+}
+
+/// What a file is that begins as a text does, of no other kind that is known.
+pub(crate) fn text_in(path: &Path, start: &[u8]) -> Option<&'static str> {
+    // The last character may be cut off.
+    let whole = std::str::from_utf8(start).map_or_else(|error| error.valid_up_to(), str::len);
+    let text = std::str::from_utf8(&start[..whole]).unwrap_or_default();
+    let is_text = start.len() < whole + 4 && !text.contains(|c: char| c.is_control() && !c.is_whitespace());
+    let is_known = known_but_not_read(start).is_some();
+    if text.trim().is_empty() || !is_text || is_known {
+        return None;
+    }
+    let is_number = |word: &str| word.parse::<f64>().is_ok();
+    let words: Vec<&str> = text.lines().next()?.split([' ', ',', ';', '\t']).filter(|word| !word.is_empty()).collect();
+    // Fixed columns: the level of the DEM, and the code of its pattern.
+    let code = |at: usize| text.get(at..at + 6).is_some_and(|word| matches!(word.trim(), "1" | "2" | "3" | "4"));
+    Some(match () {
+        () if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml")) => A_JOB,
+        () if code(144) && code(150) => "a USGS DEM",
+        () if words.len() == 3 && words.iter().all(|word| is_number(word)) => "a list of heights (XYZ)",
+        () => A_TEXT,
+    })
 }

@@ -89,7 +89,7 @@ pub enum SourceError {
     TiffFeature { path: PathBuf, found: String },
     /// A picture of a kind that is not drawn, or that lies nowhere.
     #[error("{path}: {found}, expected {expected}")]
-    Picture { path: PathBuf, found: String, expected: &'static str, remedy: &'static str },
+    Picture { path: PathBuf, found: String, expected: &'static str, remedy: Option<&'static str> },
 
     // The file is sound, but lies nowhere or not where it should.
     /// The file does not say which coordinate system it is in.
@@ -227,7 +227,7 @@ impl SourceError {
             NoPosition { path } | ControlPoints { path, .. } | Rotated { path, .. } => {
                 ("warp it onto a north-up grid: gdalwarp -r bilinear", path)
             }
-            Picture { path, remedy, .. } => (*remedy, path),
+            Picture { path, remedy: Some(remedy), .. } => (*remedy, path),
             NotClasses { path, .. } => ("rewrite it: gdal_translate -ot Byte", path),
             NotFeatures { path, found } if found.contains("OpenStreetMap data") => {
                 return Some(format!(
@@ -292,6 +292,7 @@ impl SourceError {
             HeaderAlone { .. } => "name the file of heights; its header is found beside it",
             OtherFormat { found: A_JOB, .. } => "name a raster, such as those in dem.sources of the job",
             OtherFormat { .. } => "name a raster; if it was fetched from the web, look at what came instead",
+            Picture { .. } => "name a picture of the ground from above; jobs, notes and tables are none",
             UnknownFormat { .. } => "look at it with gdalinfo; what that knows, gdal_translate makes a GeoTIFF of",
             NotHgtSize { .. } => "the tile was not copied or unpacked whole, or is of another make; fetch it again",
             NoCorner { .. } => "give its south-west corner: { file = \"x.hgt\", corner = [35, -117] }, latitude first",
@@ -341,6 +342,7 @@ pub(crate) const A_FOLDER: &str = "a folder";
 pub(crate) const A_DATABASE: &str = "the folder of a terrain database";
 pub(crate) const A_DANGLING_LINK: &str = "a link that leads nowhere";
 pub(crate) const A_JOB: &str = "a job file, not a raster";
+pub(crate) const A_TEXT: &str = "a text file, not a raster";
 
 /// `path` as GDAL opens it and a shell takes it: packed files through the virtual systems it has for them.
 fn for_gdal(path: &Path) -> String {

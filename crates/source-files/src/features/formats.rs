@@ -4,7 +4,8 @@ use std::path::Path;
 
 use super::osm::ATTRIBUTION;
 use super::osm::frames::MARK;
-use crate::dem_file::known_but_not_read;
+use crate::dem_file::{known_but_not_read, text_in};
+use crate::error::{A_JOB, A_TEXT};
 use crate::store::Store;
 use crate::{SourceError, geopackage, shapefile};
 
@@ -110,8 +111,11 @@ fn name_of(path: &Path, start: &[u8]) -> String {
         "pbf" => format!("a .pbf file that begins with {} and is no OpenStreetMap data", hexadecimal(start)),
         "dbf" => "the table of a Shapefile".into(),
         "hgt" | "asc" | "flt" | "dt0" | "dt1" | "dt2" => format!("a raster (.{ending})"),
-        _ => known_but_not_read(start)
-            .map_or_else(|| format!("a file that begins with {}", hexadecimal(start)), str::to_owned),
+        _ => match known_but_not_read(start).or_else(|| text_in(path, start)) {
+            Some(A_TEXT | A_JOB) => "a text file of some other kind".into(),
+            Some(found) => found.into(),
+            None => format!("a file that begins with {}", hexadecimal(start)),
+        },
     }
 }
 

@@ -40,6 +40,7 @@ pub(super) fn levels(store: &Store) -> Result<(Vec<Level>, GeoTags), SourceError
     let mut decoder = decoder(path, file)?;
     let tags = geo_tags(path, &mut decoder)?;
     let is_big_endian = matches!(decoder.byte_order(), ByteOrder::BigEndian);
+    // What no pixel can have, or is no number, marks none of them.
     let nodata = nodata(path, &mut decoder).ok().flatten();
     let nodata = nodata.filter(|number| (0.0..=65535.0).contains(number) && number.fract() == 0.0);
     let about = About { store, is_big_endian, nodata: nodata.map(|number| number as u16) };
@@ -103,7 +104,7 @@ struct About<'a> {
 
 impl About<'_> {
     fn refused(&self, found: impl Into<String>, expected: &'static str, remedy: &'static str) -> SourceError {
-        SourceError::Picture { path: self.store.path().into(), found: found.into(), expected, remedy }
+        SourceError::Picture { path: self.store.path().into(), found: found.into(), expected, remedy: Some(remedy) }
     }
 
     fn number(&self, ifd: &mut IfdDecoder, tag: Tag) -> Result<Option<u32>, SourceError> {

@@ -5,9 +5,13 @@ use std::path::Path;
 use super::level::{Level, PIXELS_MAX};
 use super::{directories, unpack};
 use crate::SourceError;
-use crate::dem_file::{Reading, crs_of};
+use crate::dem_file::{Reading, crs_of, text_in};
 use crate::frame::RasterFrame;
 use crate::store::Store;
+
+/// So many bytes say whether a file is a text.
+const TEXT_BYTES: u64 = 512;
+const EXPECTED: &str = "a GeoTIFF of colours";
 
 /// A picture whose directories were read and found good; nothing is decoded yet, but for the range of 16-bit colours.
 #[derive(Debug)]
@@ -31,6 +35,14 @@ impl Imagery {
 
     fn read(path: &Path, id: usize) -> Result<Self, SourceError> {
         let store = Store::plain(path)?;
+        if let Some(found) = text_in(path, &store.start(TEXT_BYTES)?) {
+            return Err(SourceError::Picture {
+                path: path.into(),
+                found: found.into(),
+                expected: EXPECTED,
+                remedy: None,
+            });
+        }
         let (mut levels, tags) = directories::levels(&store)?;
         let crs = crs_of(&store, tags.keys.crs(), &Reading::AS_IT_SAYS)?;
         let (cols, rows) = (levels[0].cols, levels[0].rows);
@@ -66,11 +78,12 @@ impl Imagery {
 /// The word of a reader of heights, said of a picture.
 fn as_picture(path: &Path, error: SourceError) -> SourceError {
     use SourceError::*;
-    let picture = |found: String, expected, remedy| Picture { path: path.into(), found, expected, remedy };
+    let picture =
+        |found: String, expected, remedy| Picture { path: path.into(), found, expected, remedy: Some(remedy) };
     match error {
         NotTiff { found, .. } => {
             let found = format!("not a TIFF: it begins with {found}");
-            picture(found, "a GeoTIFF", "convert it, with its place: gdal_translate")
+            picture(found, EXPECTED, "convert it, with its place: gdal_translate")
         }
         NoCrs { .. } => picture(
             "no coordinate reference system in the file or in a .prj beside it".into(),

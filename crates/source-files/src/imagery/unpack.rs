@@ -47,7 +47,8 @@ pub(super) fn colored(level: &Level, chunk: u32) -> Result<Colored, SourceError>
     let bands = level.bands as usize;
     let mut pixels: Vec<[u8; 4]> = numbers.chunks_exact(bands).map(|pixel| color(level, pixel)).collect();
     if let Some(mask) = &level.mask {
-        blank(mask, level.corner_of(chunk), cols, &mut pixels)?;
+        let hidden = hidden_by(mask, level.corner_of(chunk), [cols, rows])?;
+        pixels.iter_mut().zip(hidden).filter(|(_, is_hidden)| *is_hidden).for_each(|(pixel, _)| *pixel = [0; 4]);
     }
     Ok(Colored { cols, rows, pixels: Some(pixels) })
 }
@@ -81,9 +82,9 @@ fn color(level: &Level, pixel: &[u16]) -> [u8; 4] {
     [rgb[0], rgb[1], rgb[2], alpha]
 }
 
-/// Makes pixels transparent where the mask says that there is no picture.
-fn blank(mask: &Level, [west, north]: [u32; 2], cols: u32, pixels: &mut [[u8; 4]]) -> Result<(), SourceError> {
-    let rows = (pixels.len() / cols as usize) as u32;
+/// Whether the mask says that there is no picture, for each pixel of a strip or tile.
+fn hidden_by(mask: &Level, [west, north]: [u32; 2], [cols, rows]: [u32; 2]) -> Result<Vec<bool>, SourceError> {
+    let mut hidden = vec![false; cols as usize * rows as usize];
     let (east, south) = ((west + cols).min(mask.cols), (north + rows).min(mask.rows));
     for down in north / mask.chunk_rows..south.div_ceil(mask.chunk_rows) {
         for across in west / mask.chunk_cols..east.div_ceil(mask.chunk_cols) {
@@ -92,14 +93,13 @@ fn blank(mask: &Level, [west, north]: [u32; 2], cols: u32, pixels: &mut [[u8; 4]
             for row in north.max(top)..south.min(top + mask.rows_of(chunk)) {
                 for col in west.max(left)..east.min(left + mask.chunk_cols) {
                     let at = ((row - top) * mask.chunk_cols + col - left) as usize;
-                    if numbers.as_ref().is_none_or(|numbers| numbers[at * mask.bands as usize] == 0) {
-                        pixels[((row - north) * cols + col - west) as usize] = [0; 4];
-                    }
+                    let is_hidden = numbers.as_ref().is_none_or(|numbers| numbers[at * mask.bands as usize] == 0);
+                    hidden[((row - north) * cols + col - west) as usize] = is_hidden;
                 }
             }
         }
     }
-    Ok(())
+    Ok(hidden)
 }
 
 /// The numbers of all pixels of a strip or tile, pixel by pixel, padding included; `None` where the writer left it out.
@@ -248,18 +248,11 @@ pub(super) fn set_range(levels: &mut [Level]) -> Result<(), SourceError> {
     if least.bits != 16 {
         return Ok(());
     }
-    let (bands, colors) = (least.bands as usize, least.color_bands() as usize);
     let all = least.chunks_across() * least.chunks_down();
     let step = all.div_ceil(RANGE_CHUNKS as u32).max(1);
     let mut counts = vec![0u64; 1 << 16];
     for chunk in (step / 2..all).step_by(step as usize) {
-        let Some(numbers) = numbers(least, chunk)? else { continue };
-        for pixel in numbers.chunks_exact(bands) {
-            let is_there = least.alpha.is_none_or(|(band, _)| 0 < pixel[band as usize]);
-            if is_there && least.nodata.is_none_or(|nodata| pixel[..colors].iter().any(|&number| number != nodata)) {
-                pixel[..colors].iter().for_each(|&number| counts[usize::from(number)] += 1);
-            }
-        }
+        count(least, chunk, &mut counts)?;
     }
     let total: u64 = counts.iter().sum();
     let below = |share: f64| {
@@ -273,5 +266,26 @@ pub(super) fn set_range(levels: &mut [Level]) -> Result<(), SourceError> {
     let [low, high] = [below(RANGE_CUT), below(1.0 - RANGE_CUT)];
     let range = if WHOLE_RANGE <= high { [0, u16::MAX] } else { [low.min(u16::MAX - 1), high.max(low + 1)] };
     levels.iter_mut().for_each(|level| level.range = range);
+    Ok(())
+}
+
+/// Counts the numbers of all colours of a strip or tile, but for pixels where there is no picture.
+fn count(level: &Level, chunk: u32, counts: &mut [u64]) -> Result<(), SourceError> {
+    let Some(numbers) = numbers(level, chunk)? else { return Ok(()) };
+    let (corner, size) = (level.corner_of(chunk), [level.chunk_cols, level.rows_of(chunk)]);
+    let hidden = level.mask.as_ref().map(|mask| hidden_by(mask, corner, size)).transpose()?;
+    for (at, pixel) in numbers.chunks_exact(level.bands as usize).enumerate() {
+        let (col, row) = (corner[0] + at as u32 % size[0], corner[1] + at as u32 / size[0]);
+        let colors = &pixel[..level.color_bands() as usize];
+        // A tile may reach beyond the picture.
+        let is_there = col < level.cols
+            && row < level.rows
+            && hidden.as_ref().is_none_or(|hidden| !hidden[at])
+            && level.alpha.is_none_or(|(band, _)| 0 < pixel[band as usize])
+            && level.nodata.is_none_or(|nodata| colors.iter().any(|&number| number != nodata));
+        if is_there {
+            colors.iter().for_each(|&number| counts[usize::from(number)] += 1);
+        }
+    }
     Ok(())
 }

@@ -120,5 +120,5 @@ fn text_and_raw_copies_of_the_crop_hold_its_posts() {
 fn a_format_that_is_not_read_is_named() {
     let Some(path) = data("formats/usgsdem/SainteHelens.dem.gz") else { return };
     let error = DemFile::open(&path, &Reading::AS_IT_SAYS).unwrap_err();
-    assert!(error.to_string().contains("a text file of some other kind (a USGS DEM"), "{error}");
+    assert!(error.to_string().contains("a USGS DEM, which is not read"), "{error}");
 }

@@ -17,7 +17,16 @@ const FORECAST: &str = "Counted on level ground, before heights are known and an
 
 /// All tables.
 pub fn tables_text(features: &FeaturesForeseen, job: &Job) -> String {
-    format!("{}\n{}", kinds_text(&features.table), forecast_text(features, job))
+    let buildings = features.buildings.map_or_else(String::new, |count| format!("\n{}", buildings_text(count)));
+    format!("{}\n{}{buildings}", kinds_text(&features.table), forecast_text(features, job))
+}
+
+fn buildings_text(count: usize) -> String {
+    format!(
+        "Buildings: {}, kept beside the ground to be drawn; they cost no triangle. features.buildings = false \
+         leaves them out.\n",
+        grouped(count as u64)
+    )
 }
 
 fn forecast_text(features: &FeaturesForeseen, job: &Job) -> String {
@@ -74,7 +83,7 @@ fn kinds_text(features: &FeatureTable) -> String {
 
 /// The same for a program.
 pub fn tables_json(foreseen: &FeaturesForeseen) -> Value {
-    let FeaturesForeseen { table: features, cost, crowded, over_share, within_share } = foreseen;
+    let FeaturesForeseen { table: features, cost, crowded, over_share, within_share, buildings } = foreseen;
     let sources: Vec<Value> = features
         .sources
         .iter()
@@ -101,5 +110,6 @@ pub fn tables_json(foreseen: &FeaturesForeseen) -> Value {
         crowded.iter().map(|(id, triangles)| json!({ "module": [id.row, id.col], "triangles": triangles })).collect();
     let forecast = json!({ "classes": classes, "all": cost_json("all", &cost.all), "crowded": crowded,
                            "modules_over_share": over_share, "triangles_within_share": within_share });
-    json!({ "sources": sources, "rows": rows, "notes": features.notes, "forecast": forecast })
+    json!({ "sources": sources, "rows": rows, "notes": features.notes, "forecast": forecast,
+            "buildings": buildings })
 }

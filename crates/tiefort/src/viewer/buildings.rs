@@ -6,10 +6,11 @@
 
 use std::collections::BTreeMap;
 
-use database::{Building, Folder};
-use load_module_reader::{Area, Block, LoadedGround, QUANTA_PER_METRE};
+use database::{BUILDING_UNITS_PER_METRE, Building, Folder, files};
+use load_module_reader::{Area, Block, LoadedGround};
 
 use crate::places::ground_around;
+use crate::terminal;
 
 /// Metres along a wall between two places where the ground is looked at.
 const STEP_M: f64 = 5.0;
@@ -23,11 +24,17 @@ const LEAST_M: f64 = 2.5;
 pub struct Buildings(BTreeMap<(u32, u32), Vec<Building>>);
 
 impl Buildings {
-    /// Those of the database in `folder`; none where it has no file of them, or one that cannot be read, which
-    /// `tiefort verify` tells.
+    /// Those of the database in `folder`; none where it has no file of them. One that cannot be read is told, and
+    /// leaves the rest to be seen.
     pub fn read(folder: &Folder, area: &Area) -> Self {
         let mut buildings = Self::default();
-        let all = folder.read_buildings().map(|(_, all)| all).unwrap_or_default();
+        if !folder.path(files::BUILDINGS).exists() {
+            return buildings;
+        }
+        let all = folder.read_buildings().map(|(_, all)| all).unwrap_or_else(|error| {
+            terminal::tell(&format!("warning: no building is drawn: {error}"));
+            Vec::new()
+        });
         let frame = area.frame();
         for building in all {
             let middle = middle_m(&building).map(|metres| (metres / frame.side_m()).floor());
@@ -101,8 +108,8 @@ fn ground_under(building: &Building, ground: &LoadedGround, origin_m: [f64; 2]) 
     found
 }
 
-fn metres(quanta: i32) -> f64 {
-    f64::from(quanta) / f64::from(QUANTA_PER_METRE)
+fn metres(units: i32) -> f64 {
+    f64::from(units) / f64::from(BUILDING_UNITS_PER_METRE)
 }
 
 /// Lowest and highest place along an axis, in metres from the area's south-west corner.

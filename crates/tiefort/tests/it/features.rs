@@ -162,9 +162,33 @@ fn plan_tells_rules_that_match_nothing_and_features_that_all_lie_outside() {
 }
 
 #[test]
+fn plan_counts_the_buildings_that_a_job_keeps() {
+    let house = |east_km: f64| {
+        let west = -116.923 + east_km * 0.011;
+        let corners = [[0.0, 0.0], [3e-4, 0.0], [3e-4, 2e-4], [0.0, 0.0]].map(|[x, y]| [west + x, 35.03 + y]);
+        let geometry = serde_json::json!({ "type": "Polygon", "coordinates": [corners] });
+        serde_json::json!({ "type": "Feature", "properties": { "building": "yes" }, "geometry": geometry })
+    };
+    let all = serde_json::json!({ "type": "FeatureCollection", "features": [house(0.0), house(0.2), house(50.0)] });
+    let plan = |keys: &str| {
+        let scene = with_features(&[("a.geojson", &all.to_string())], &format!("sources = [\"a.geojson\"]\n{keys}"));
+        let json = scene.run_to(0, &["plan", "job.toml", "--emit", "json"]).stdout;
+        let json: Value = serde_json::from_str(&json).unwrap();
+        (flat(&scene.run_to(0, &["plan", "job.toml"]).stdout), json["features"]["buildings"].clone())
+    };
+    let (text, count) = plan("");
+    assert!(text.contains("Buildings: 2, kept beside the ground to be drawn; they cost no triangle."), "{text}");
+    assert_eq!(count, 2);
+    let (text, count) = plan("buildings = false");
+    assert!(!text.contains("Buildings: ") && count == Value::Null, "{text}");
+}
+
+#[test]
 fn plan_refuses_a_file_of_features_that_cannot_be_read() {
     let keys = "sources = [\"a.geojson\"]";
-    for (text, part) in [("", "an empty file"), ("{\"type\": 3", "a.geojson"), ("north is up", "begins with 6e 6f")] {
+    for (text, part) in
+        [("", "an empty file"), ("{\"type\": 3", "a.geojson"), ("north is up", "found a text file of some other kind")]
+    {
         with_features(&[("a.geojson", text)], keys).refuses(&["plan", "job.toml"], &["a.geojson", part]);
     }
     with_features(&[], keys).refuses(&["plan", "job.toml"], &["features.sources[0]", "which cannot be opened"]);

@@ -1,25 +1,21 @@
 // What is asked of the server about places: all of them in the area's own system, metres.
 import { forward, toPoint } from "mgrs";
-
-async function ask(path) {
-  const response = await fetch(path);
-  if (!response.ok) throw new Error(await response.text());
-  return response;
-}
+import { answer } from "./server.js";
 
 const words = (numbers) => numbers.map((number) => String(Number(number.toFixed(3)))).join(",");
 
 /** Whether one place sees another, both with metres above the ground. */
 export const askSight = async (from, to, earth) =>
-  (await ask(`/api/sight/${words(from)}/${words(to)}/${earth}`)).json();
+  (await answer(`/api/sight/${words(from)}/${words(to)}/${earth}`)).json();
 
 /** Heights along a line. */
 export const askProfile = async (from, to, spacing) =>
-  (await ask(`/api/profile/${spacing.toFixed(3)}/${words(from)}/${words(to)}`)).json();
+  (await answer(`/api/profile/${spacing.toFixed(3)}/${words(from)}/${words(to)}`)).json();
 
 /** What is seen around a place: places along a side, metres between them, and bytes from the north-west. */
 export async function askViewshed(from, target, range, spacing, earth) {
-  const bytes = await (await ask(`/api/viewshed/${words(from)}/${target}/${range}/${spacing}/${earth}`)).arrayBuffer();
+  const asked = `/api/viewshed/${words(from)}/${target}/${range}/${spacing}/${earth}`;
+  const bytes = await (await answer(asked)).arrayBuffer();
   const [side] = new Uint32Array(bytes, 0, 1);
   return { side, spacing, seen: new Uint8Array(bytes, 8, side * side) };
 }
@@ -32,7 +28,7 @@ export async function askPlace(written) {
     const [longitude, latitude] = toPoint(close);
     asked = `${latitude} ${longitude}`;
   }
-  return (await (await ask(`/api/find/${encodeURIComponent(asked)}`)).json()).place_m;
+  return (await (await answer(`/api/find/${encodeURIComponent(asked)}`)).json()).place_m;
 }
 
 /** Places whose degrees are asked for at once. */
@@ -43,13 +39,13 @@ export async function askDegrees(places) {
   const found = [];
   for (let i = 0; i < places.length; i += DEGREES_MAX) {
     const part = places.slice(i, i + DEGREES_MAX).map(words).join(";");
-    found.push(...(await (await ask(`/api/degrees/${part}`)).json()));
+    found.push(...(await (await answer(`/api/degrees/${part}`)).json()));
   }
   return found;
 }
 
 /** Degrees and MGRS of a place. */
 export async function askWhere(place) {
-  const { longitude, latitude } = await (await ask(`/api/where/${words(place)}`)).json();
+  const { longitude, latitude } = await (await answer(`/api/where/${words(place)}`)).json();
   return { longitude, latitude, mgrs: Math.abs(latitude) < 80 ? forward([longitude, latitude], 4) : "" };
 }

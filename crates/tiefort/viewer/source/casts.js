@@ -10,6 +10,10 @@ import { CASTS } from "./houses.js";
 const REACH_M = 900, MOVE_M = 150;
 /** Texels a side, and how deep along the light blocks may lie. */
 const TEXELS = 2048, DEEP_M = 4000;
+/** How much more than that is drawn each way: blocks beyond it cast shadows into it. */
+const ROOM = 1.25;
+/** The lowest sun, by the sine of its height, that casts shadows: lower ones are longer than what is drawn. */
+const SUN_MIN = 0.03;
 
 export class Casts {
   constructor() {
@@ -25,7 +29,7 @@ export class Casts {
 
   /** Draws them anew where blocks, sun or observer have moved. */
   draw({ renderer, scene, houses, tank, sun }) {
-    const isUp = sun && 0.03 < sun[2] && 0 < houses.counts().drawn;
+    const isUp = sun && SUN_MIN < sun[2] && 0 < houses.counts().drawn;
     if (!isUp) {
       if (this.drawn !== "") setCasts(null);
       this.drawn = "";
@@ -39,7 +43,7 @@ export class Casts {
       depthTexture: new DepthTexture(TEXELS, TEXELS, FloatType, undefined, undefined, undefined, NearestFilter,
         NearestFilter),
     });
-    const { camera, target } = this, height = tank.height ?? 0, half = 1.25 * REACH_M;
+    const { camera, target } = this, height = tank.height ?? 0, half = ROOM * REACH_M;
     Object.assign(camera, { left: -half, right: half, top: half, bottom: -half, near: 0, far: 2 * DEEP_M });
     camera.position.set(x + DEEP_M * sun[0], height + DEEP_M * sun[2], -(y + DEEP_M * sun[1]));
     camera.lookAt(x, height, -y);

@@ -67,19 +67,21 @@ export class Coarse {
   repaint(colors) {
     const { area } = this, { wide, heights, classes } = area.coarse, steps = area.coarse_steps;
     const isByHeight = colors === "height" || colors === "going";
+    // A road is narrower than a cell: far away only water is more than a line.
+    const stays = (ofClass) =>
+      colorOf.cover(area, ofClass) && (isWater(area, ofClass) || ofClass === area.hole);
+    const covers = new Map([...new Set(classes)].filter(stays).map((ofClass) =>
+      [ofClass, tintOf(area, ofClass, colorOf.cover(area, ofClass))]));
     for (const part of this.parts) {
       const tint = part.mesh.geometry.getAttribute("tint");
       part.isPlain = isByHeight;
       part.places.forEach((at, i) => {
         let found;
         if (isByHeight) {
-          const cover = colorOf.cover(area, classes[at]);
-          // A road is narrower than a cell: far away only water is more than a line.
-          const stays = cover && (isWater(area, classes[at]) || classes[at] === area.hole);
-          const isLevel = isSea(area, [heights[at]]), plain = isLevel ? seaTint(area) : tintAt(area, heights[at]);
-          found = stays ? tintOf(area, classes[at], cover) : plain;
+          const cover = covers.get(classes[at]), isLevel = isSea(area, [heights[at]]);
+          found = cover ?? (isLevel ? seaTint(area) : tintAt(area, heights[at]));
           // Shores stay where they are.
-          if (stays || isLevel) part.isPlain = false;
+          if (cover || isLevel) part.isPlain = false;
         } else {
           const [row, col] = [Math.floor(at / wide), at % wide].map((place) => Math.floor(place / steps));
           const figures = area.figures(Math.min(row, area.rows - 1), Math.min(col, area.cols - 1));

@@ -1,7 +1,12 @@
 // Colours: those of the server's pictures (`area.palette`, crates/views), so that a map here is read as one there.
 
+const known = new Map();
+
 /** Red, green and blue from 0 to 1 of `#547a4e`. */
-export const numbers = (hex) => [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16) / 255);
+export function numbers(hex) {
+  if (!known.has(hex)) known.set(hex, [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16) / 255));
+  return known.get(hex);
+}
 
 /** Levels of detail, from the finest, and what is drawn coarsely. */
 const LEVELS = ["#f1e3b0", "#e2a76f", "#b6638a", "#6d4a8f", "#4b4b57"];
@@ -12,7 +17,7 @@ function along(stops, share) {
   return a.map((value, i) => value + (at - low) * (b[i] - value));
 }
 
-const known = (area, stops, share) => (Number.isNaN(share) ? numbers(area.palette.nothing) : along(stops, share));
+const orNothing = (area, stops, share) => (Number.isNaN(share) ? numbers(area.palette.nothing) : along(stops, share));
 
 const WATERS = new Set(["water", "lake", "river", "stream", "sea"]);
 
@@ -27,17 +32,17 @@ export const colorOf = {
   /** Of a deck whose class says nothing of its colour. */
   deck: () => [0.42, 0.4, 0.38],
   height: (area, metres) =>
-    known(area, area.palette.heights, (metres - area.height_m[0]) / (area.height_m[1] - area.height_m[0] || 1)),
+    orNothing(area, area.palette.heights, (metres - area.height_m[0]) / (area.height_m[1] - area.height_m[0] || 1)),
   limits: (area, count) =>
     area.limits.per_load_module < count
       ? numbers(area.palette.breach)
-      : known(area, area.palette.use, count / area.limits.per_load_module),
+      : orNothing(area, area.palette.use, count / area.limits.per_load_module),
   /** Of water without a class. */
   sea: (area) => numbers(area.palette.water),
   /** Of a level of detail. */
   levels: (_, level) => numbers(LEVELS[Math.min(level, LEVELS.length - 1)]),
-  residuals: (area, rms) => known(area, area.palette.errors, rms / area.residual_scale_m),
-  residual: (area, metres) => known(area, area.palette.residuals, 0.5 + metres / (2 * area.residual_scale_m)),
+  residuals: (area, rms) => orNothing(area, area.palette.errors, rms / area.residual_scale_m),
+  residual: (area, metres) => orNothing(area, area.palette.residuals, 0.5 + metres / (2 * area.residual_scale_m)),
 };
 
 /** The same for style sheets, the map and the renderer. */

@@ -4,6 +4,8 @@ import { BufferAttribute, Group, ShapeUtils, Vector2 } from "three";
 import { MADE } from "./colors.js";
 import * as looks from "./materials.js";
 import { geometryOf, meshOf } from "./meshes.js";
+import { note } from "./panel.js";
+import { answer } from "./server.js";
 
 /** Load modules along the side of a part that is read and drawn at once. */
 const PART = 4;
@@ -19,6 +21,7 @@ const AGAIN_MS = 5000;
 export const CASTS = 1;
 /** How far normals of walls lean up. */
 const WALLS_LEAN = 0.5;
+/** Colours that walls and roofs have, by their place. */
 const WALLS = [[214, 203, 186], [201, 190, 176], [223, 214, 200], [190, 176, 160], [208, 196, 190]];
 const ROOFS = [[150, 92, 72], [138, 128, 120], [164, 108, 82], [120, 112, 108], [146, 134, 122]];
 
@@ -30,8 +33,8 @@ export class Houses {
     this.parts = new Map();
     // Change with what is drawn, and with what has been read.
     this.version = this.stock = 0;
-    this.at = null;
-    this.waits = 0;
+    // Where it was last looked which are drawn, whether to look again, and parts that are on their way.
+    [this.at, this.lacks, this.waits] = [null, false, 0];
   }
 
   /** Whether they are shown. */
@@ -42,10 +45,10 @@ export class Houses {
     this.stock += 1;
   }
 
-  /** Follows the observer's eye. */
-  follow(east, north, height) {
+  /** Follows the observer. */
+  follow(east, north) {
     if (!this.area.buildings || !this.group.visible) return;
-    const place = [east, north, height];
+    const place = [east, north];
     if (this.at && !this.lacks && Math.hypot(...place.map((to, i) => to - this.at[i])) < MOVE_M) return;
     [this.at, this.lacks] = [place, false];
     for (const [key, part] of this.parts) {
@@ -82,16 +85,15 @@ export class Houses {
     this.parts.set(key, null);
     this.waits += 1;
     try {
-      const response = await fetch(`/api/buildings/${block.join("/")}`);
-      if (!response.ok) throw new Error(await response.text());
-      const part = { ...partOf(this.area, await response.arrayBuffer()), box: this.boxOf(row, col) };
+      const bytes = await (await answer(`/api/buildings/${block.join("/")}`)).arrayBuffer();
+      const part = { ...partOf(this.area, bytes), box: this.boxOf(row, col) };
       this.parts.set(key, part);
       if (part.mesh) this.group.add(part.mesh);
       this.version += 1;
       this.stock += 1;
       this.lacks = true;
     } catch (fault) {
-      this.fault = fault.message;
+      note(`Buildings could not be read: ${fault.message}`);
       setTimeout(() => [this.parts.delete(key), (this.lacks = true)], AGAIN_MS);
     }
     this.waits -= 1;
@@ -135,7 +137,7 @@ export class Houses {
   }
 }
 
-/** Metres from a box on the map to a place; above it, the height counts. */
+/** Metres on the map from a box to a place. */
 function away([west, south, east, north], [x, y]) {
   return Math.hypot(Math.max(west - x, 0, x - east), Math.max(south - y, 0, y - north));
 }
@@ -182,6 +184,7 @@ function lean(normals) {
 
 /** Walls and roof of a block, and its underside where it is seen: it lies lower than any ground otherwise. */
 function addBlock({ floor, roof, rings }, positions, tints) {
+  // Neighbours differ, and a building always has the same.
   const { x, y } = rings[0][0], pick = (list) => list[Math.abs(Math.round(7 * x + 13 * y)) % list.length];
   const [wall, top] = [[...pick(WALLS), MADE], [...pick(ROOFS), MADE]];
   const put = (tint, ...corners) => corners.forEach(([place, height]) => {

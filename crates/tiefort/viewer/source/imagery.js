@@ -4,11 +4,14 @@
 import { Box2, DataArrayTexture, DataTexture, LinearFilter, RepeatWrapping, RGBAFormat, Vector2, Vector3 } from "three";
 import * as looks from "./materials.js";
 import { at, note } from "./panel.js";
+import { answer } from "./server.js";
 
 /** Squares along the side of a window: more are finer far away, and take more memory. */
 const WINDOW = 6;
 /** Squares asked for at a time, and taken over in one picture. */
 const ASKED_MAX = 4, TAKEN_MAX = 2;
+/** The answer where no picture lies. */
+const NO_PICTURE = 204;
 /** How long after squares could not be read they are asked for again. */
 const AGAIN_MS = 3000;
 
@@ -21,7 +24,7 @@ export class Imagery {
 
   /** Asks whether there are pictures; the switches appear with them. */
   async begin() {
-    const about = await (await fetch("/api/imagery")).json();
+    const about = await (await answer("/api/imagery")).json();
     if (about.levels === 0) return;
     const { side, pixel_m: finest, levels } = about;
     this.side = side;
@@ -108,9 +111,8 @@ export class Imagery {
     this.asked += 1;
     square.isAsked = true;
     try {
-      const response = await fetch(`/api/imagery/${index}/${square.row}/${square.col}`);
-      if (!response.ok) throw new Error(await response.text());
-      if (response.status !== 204) {
+      const response = await answer(`/api/imagery/${index}/${square.row}/${square.col}`);
+      if (response.status !== NO_PICTURE) {
         this.came.push({ index, slot, square, data: new Uint8Array(await response.arrayBuffer()) });
       }
       if (this.fault) note("");

@@ -1,6 +1,6 @@
 // The page of `tiefort view`: one picture after another, and what hangs together by that.
-import { DirectionalLight, HemisphereLight, PerspectiveCamera, Scene, WebGLRenderer } from "three";
 import { askWhere } from "./ask.js";
+import { drawingOn } from "./canvas.js";
 import { Casts } from "./casts.js";
 import { controls } from "./controls.js";
 import { skyBelowHorizon } from "./crack.js";
@@ -11,7 +11,6 @@ import { asked, follower, setSwitches } from "./link.js";
 import { SmallMap } from "./map.js";
 import * as looks from "./materials.js";
 import { at, note, showFigures, showHud, showName, wrong } from "./panel.js";
-import { Pace } from "./pace.js";
 import { pick } from "./pick.js";
 import { coarseAt, scenicPlace } from "./scenic.js";
 import { readArea } from "./server.js";
@@ -21,16 +20,18 @@ import { Tank } from "./tank.js";
 import { Terrain } from "./terrain.js";
 import { TOOL_KEYS, Tools } from "./tools.js";
 
-const EYE_DEGREES = 55, NEAR_M = 1, FAR_M = 500_000;
 /** Seconds that one picture may stand for, so that a slow machine drives slowly and not in leaps. */
 const STEP_SECONDS_MAX = 0.25;
 /** Milliseconds between two tables of figures, and two pictures of the map. */
 const FIGURES_MS = 250, MAP_MS = 100;
+/** Pictures whose milliseconds a test may ask for. */
+const FRAMES_KEPT = 600;
 
 export async function start() {
-  const area = await readArea();
+  // While the server answers, the canvas is made ready.
+  const reading = readArea(), drawing = drawingOn(at("scene")), area = await reading;
   showName(area);
-  const view = viewOf(area), { scene, tank, terrain } = view;
+  const view = viewOf(area, drawing), { scene, tank, terrain } = view;
   const wanted = asked(area);
   begin(view, wanted);
   const light = lighting(view);
@@ -64,7 +65,6 @@ export async function start() {
   at("horizon").addEventListener("click", () => tank.level());
   view.imagery.begin().catch((fault) => note(`The imagery could not be read: ${fault.message}`));
   scene.add(terrain.group, view.houses.group, tank.model);
-  fitted(view);
   run(view, wishes);
   // What a test asks, and whoever is curious in the console.
   window.tiefort = {
@@ -73,32 +73,17 @@ export async function start() {
   };
 }
 
-function viewOf(area) {
-  const canvas = at("scene"), isSoft = drawsInSoftware();
-  // Nothing lies behind the picture, and who lays the page together need not look for it.
-  const context = canvas.getContext("webgl2", { alpha: false, antialias: !isSoft, stencil: false });
-  const renderer = new WebGLRenderer({ canvas, context });
-  const scene = new Scene(), sky = looks.prepare(area);
-  const sun = new DirectionalLight(0xfff4e0, 2.3);
-  sun.position.set(-1, 1.1, -1);
-  scene.add(sky, sun, new HemisphereLight(0xf0eee8, 0x77705c, 1.4));
-  const camera = new PerspectiveCamera(EYE_DEGREES, 1, NEAR_M, FAR_M), terrain = new Terrain(area);
-  const tank = new Tank(terrain, 0, 0, 0);
-  const view = { area, renderer, scene, sky, camera, terrain, tank, range: area.range_m, hour: null, frameMs: 0 };
-  [view.houses, view.casts] = [new Houses(area), new Casts()];
-  view.pace = new Pace(view, isSoft);
-  view.imagery = new Imagery(area, renderer);
+function viewOf(area, drawing) {
+  const { renderer, scene, sky } = drawing, terrain = new Terrain(area), tank = new Tank(terrain, 0, 0, 0);
+  looks.setPalette(area);
+  scene.add(sky);
+  const view = { ...drawing, area, terrain, tank, range: area.range_m, hour: null };
+  // Changes with what tools put into the scene; pictures drawn, and milliseconds of the last ones.
+  Object.assign(view, { version: 0, count: 0, frames: [], frameMs: 0, drew: false });
+  [view.mapAt, view.figuresAt] = [-Infinity, -Infinity];
+  [view.houses, view.casts, view.imagery] = [new Houses(area), new Casts(), new Imagery(area, renderer)];
   view.map = new SmallMap(area, at("map").querySelector("canvas"), (east, north) => tank.goTo(east, north));
   return view;
-}
-
-/** Whether there is no graphics hardware: then every sample of a pixel costs. */
-function drawsInSoftware() {
-  const context = document.createElement("canvas").getContext("webgl2");
-  const names = context?.getExtension("WEBGL_debug_renderer_info");
-  const name = names ? context.getParameter(names.UNMASKED_RENDERER_WEBGL) : "";
-  context?.getExtension("WEBGL_lose_context")?.loseContext();
-  return /swiftshader|llvmpipe|software/i.test(name);
 }
 
 /** Begins where the address says, else in flight at the most scenic place, nearing it slowly. */
@@ -135,21 +120,9 @@ function lighting(view) {
   };
 }
 
-function fitted({ renderer, camera, pace }) {
-  const fit = () => {
-    renderer.setSize(innerWidth, innerHeight, false);
-    camera.aspect = innerWidth / innerHeight;
-    camera.updateProjectionMatrix();
-    pace.again();
-  };
-  addEventListener("resize", fit);
-  fit();
-}
-
 function run(view, wishes) {
   const follow = follower(view);
   let last = performance.now();
-  view.frames = [];
   view.renderer.setAnimationLoop((now) => {
     const passed = Math.max(now - last, 0);
     last = now;
@@ -168,26 +141,28 @@ function frame(view, passed, wish, now) {
   if (tank.height === null) tank.settle();
   else tank.step(seconds, wish);
   tank.place(camera);
-  view.houses.follow(tank.east, tank.north, camera.position.y);
+  view.houses.follow(tank.east, tank.north);
   looks.setFrame(now / 1000, tank.east, tank.north, tank.flies || !tank.chases ? 0 : 4.5);
   looks.setSplit(Number(at("split").value));
-  const version = `${terrain.version} ${looks.version()} ${view.version ?? 0} ${view.houses.version}`;
+  const version = `${terrain.version} ${looks.version()} ${view.version} ${view.houses.version}`;
   if (view.pace.draws(camera, version, now)) {
     view.casts.draw(view);
     looks.setWidth(renderer.domElement.width);
     renderer.render(scene, camera);
     if (view.drew) view.pace.took(passed);
     view.drew = true;
-    view.count = (view.count ?? 0) + 1;
+    view.count += 1;
     view.frames.push(passed);
-    if (600 < view.frames.length) view.frames.shift();
+    if (FRAMES_KEPT < view.frames.length) view.frames.shift();
+    // The first picture waits for nothing else.
+    if (view.count === 1) return;
   } else view.drew = false;
-  if (MAP_MS < now - (view.mapAt ?? -Infinity)) {
+  if (MAP_MS < now - view.mapAt) {
     view.mapAt = now;
     map.draw(terrain.block, tank, range);
     showHud(view);
   }
-  if (FIGURES_MS < now - (view.figuresAt ?? -Infinity)) {
+  if (FIGURES_MS < now - view.figuresAt) {
     view.figuresAt = now;
     if (at("figures").open) showFigures(area, figures(view));
     wrong(terrain.fault && `Load modules could not be read: ${terrain.fault}`);
@@ -217,6 +192,13 @@ function state(view) {
     flies: tank.flies, altitude: tank.altitude, turned: tank.turned, pitch: tank.pitch, gear: tank.gear,
     drifts: tank.drifts, lit: view.lit === true, frames: view.frames, count: view.count,
     imagery: { levels: view.imagery.levels.length, drawn: view.imagery.drawn, isWhole: view.imagery.isWhole },
-    pixelRatio: view.renderer.getPixelRatio(), geometries: view.renderer.info.memory.geometries,
+    pixelRatio: view.renderer.getPixelRatio(), ...view.renderer.info.memory, inScene: geometriesIn(view.scene),
   };
+}
+
+/** The geometries of a scene: the renderer should hold no others. */
+function geometriesIn(scene) {
+  const all = new Set();
+  scene.traverse(({ geometry }) => geometry && all.add(geometry));
+  return all.size;
 }

@@ -1,5 +1,5 @@
 // The small map: the whole area, the block that is loaded, the observer.
-import { bytes, colorOf } from "./colors.js";
+import { colorOf } from "./colors.js";
 import { isSea } from "./server.js";
 
 /** Draws on `canvas`; `go(east, north)` is called for clicks. */
@@ -11,24 +11,26 @@ export class SmallMap {
     canvas.width = Math.max(Math.round((size * area.cols) / longer), 40);
     canvas.height = Math.max(Math.round((size * area.rows) / longer), 40);
     this.pixels = canvas.width / (area.cols * area.side_m);
-    this.ground = document.createElement("canvas");
+    // Painted when it is first drawn.
+    this.ground = null;
     canvas.addEventListener("click", (event) => {
       const [x, y] = [event.offsetX / this.pixels, event.offsetY / this.pixels];
       go(area.sides[0] + x, area.sides[3] - y);
     });
-    this.repaint("height");
   }
 
   /** Paints the area anew: shaded heights, water and holes, or a square for each load module. */
   repaint(colors) {
-    const { area, ground } = this, { wide, high, heights, classes } = area.coarse;
+    const { area } = this, { wide, high, heights, classes } = area.coarse;
+    const ground = (this.ground ??= document.createElement("canvas"));
     const byModule = (this.byModule = colors !== "height");
     [ground.width, ground.height] = byModule ? [area.cols, area.rows] : [wide - 1, high - 1];
     const picture = new ImageData(ground.width, ground.height);
+    const covers = Array.from({ length: 256 }, (_, ofClass) => colorOf.cover(area, ofClass));
     for (let row = 0; row < ground.height; row++) {
       for (let col = 0; col < ground.width; col++) {
         const at = 4 * ((ground.height - 1 - row) * ground.width + col);
-        let color;
+        let color, shade = 1;
         if (byModule) {
           const figures = area.figures(row, col);
           color = colorOf[colors](area, colors === "limits" ? figures.count : figures.rms);
@@ -36,18 +38,19 @@ export class SmallMap {
           const place = row * wide + col, step = area.side_m / area.coarse_steps;
           // Light from the north-west.
           const slope = (heights[place + 1] - heights[place] + heights[place] - heights[place + wide]) / step;
-          const shade = Math.min(Math.max(0.9 + slope, 0.45), 1.25);
-          const flat = colorOf.cover(area, classes[place])
-            ?? (isSea(area, [heights[place]]) ? colorOf.sea(area) : undefined) ?? colorOf.height(area, heights[place]);
-          color = flat.map((part) => part * shade);
+          shade = Math.min(Math.max(0.9 + slope, 0.45), 1.25);
+          color = covers[classes[place]]
+            ?? (isSea(area, [heights[place]]) ? colorOf.sea(area) : colorOf.height(area, heights[place]));
         }
-        picture.data.set([...bytes(color), 255], at);
+        for (let part = 0; part < 3; part++) picture.data[at + part] = 255 * shade * color[part];
+        picture.data[at + 3] = 255;
       }
     }
     ground.getContext("2d").putImageData(picture, 0, 0);
   }
 
   draw(block, tank, range) {
+    if (!this.ground) this.repaint("height");
     const { area, canvas, pixels } = this, context = canvas.getContext("2d");
     context.imageSmoothingEnabled = !this.byModule;
     context.drawImage(this.ground, 0, 0, canvas.width, canvas.height);

@@ -3,6 +3,7 @@ import { BufferGeometry, Float32BufferAttribute, LineBasicMaterial, LineSegments
 
 /** Metres that a line lies above the ground it follows. */
 const LIFT_M = 1;
+const seenThrough = new LineBasicMaterial({ vertexColors: true, depthTest: false });
 
 export class Marks {
   constructor(view) {
@@ -15,7 +16,7 @@ export class Marks {
     this.view.scene.remove(this.lines);
     this.lines.geometry.dispose();
     this.lines = null;
-    this.view.version = (this.view.version ?? 0) + 1;
+    this.view.version += 1;
   }
 
   /** Draws pieces, each from a place to a place (east, north and height in the area's system) in a colour. */
@@ -32,10 +33,10 @@ export class Marks {
     const geometry = new BufferGeometry();
     geometry.setAttribute("position", new Float32BufferAttribute(positions, 3));
     geometry.setAttribute("color", new Float32BufferAttribute(colors, 3));
-    this.lines = new LineSegments(geometry, new LineBasicMaterial({ vertexColors: true, depthTest: false }));
+    this.lines = new LineSegments(geometry, seenThrough);
     this.lines.frustumCulled = false;
     this.lines.renderOrder = 2;
     scene.add(this.lines);
-    this.view.version = (this.view.version ?? 0) + 1;
+    this.view.version += 1;
   }
 }

@@ -104,11 +104,14 @@ export const ribbons = groundMaterial([], {
   side: DoubleSide, polygonOffset: true, polygonOffsetFactor: -3, polygonOffsetUnits: -3,
 });
 
-/** Sets what the palette says; gives the sky. */
-export function prepare(area) {
-  shared.noiseMap.value = noiseTexture();
+/** Sets what the palette says. */
+export function setPalette(area) {
   shared.rockTint.value.setRGB(...numbers(area.palette.rock));
   shared.topTint.value.setRGB(...numbers(area.palette.sky[0]));
+}
+
+export function skyMesh() {
+  shared.noiseMap.value = noiseTexture();
   const material = new ShaderMaterial({
     uniforms: shared, vertexShader: SKY_VERTEX, fragmentShader: SKY_FRAGMENT, glslVersion: GLSL3, side: BackSide,
     depthWrite: false,

@@ -10,12 +10,12 @@ const SLOW_MS = 48, FAST_MS = 22;
 const PATIENCE = 8, STILL_MS = 250;
 
 export class Pace {
-  constructor({ renderer }, isSoft) {
-    Object.assign(this, { renderer, isSoft, place: isSoft ? 2 : 0, since: 0, ms: 0, moved: -Infinity, isFull: false });
+  constructor(renderer, isSoft) {
+    Object.assign(this, { renderer, isSoft, place: isSoft ? 2 : 0, since: 0, ms: 0, stillSince: null, isFull: false });
     this.most = isSoft ? 1 : Math.min(devicePixelRatio, 2);
     this.last = new Matrix4();
     this.version = -1;
-    renderer.setPixelRatio(this.most);
+    renderer.setPixelRatio(this.most * RATIOS[this.place]);
   }
 
   /** Whether a picture is to be drawn now; sets how finely. `version` changes with what is drawn. */
@@ -24,12 +24,14 @@ export class Pace {
     const isStill = this.last.equals(camera.matrixWorld) && this.version === version;
     if (!isStill) {
       this.last.copy(camera.matrixWorld);
-      [this.version, this.moved] = [version, now];
+      [this.version, this.stillSince] = [version, null];
       this.set(this.most * RATIOS[this.place]);
       this.isFull = this.place === 0;
       return true;
     }
-    if (this.isFull || now - this.moved < STILL_MS) return !this.isFull && this.place === 0;
+    // From the first picture on that would be the same: the one before may have taken longer than that.
+    this.stillSince ??= now;
+    if (this.isFull || now - this.stillSince < STILL_MS) return !this.isFull && this.place === 0;
     this.set(this.most);
     return (this.isFull = true);
   }

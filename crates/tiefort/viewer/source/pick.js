@@ -4,6 +4,8 @@ import {
 } from "three";
 import { showPicked } from "./panel.js";
 
+const outlined = new LineBasicMaterial({ color: 0xff3d9a, depthTest: false });
+
 /** Where a ray through a point of the window meets the ground. */
 export function hitAt({ camera, terrain }, x, y) {
   const rays = new Raycaster();
@@ -26,9 +28,9 @@ export function pick(view, x, y) {
     positions.push(east, up + 0.4, -north);
   }
   const outline = new BufferGeometry().setAttribute("position", new Float32BufferAttribute(positions, 3));
-  view.outline = new LineLoop(outline, new LineBasicMaterial({ color: 0xff3d9a, depthTest: false }));
+  view.outline = new LineLoop(outline, outlined);
   scene.add(view.outline);
-  view.version = (view.version ?? 0) + 1;
+  view.version += 1;
   const normal = [hit.face.normal.x, -hit.face.normal.z, hit.face.normal.y];
   const isTin = surface === module.tin;
   const ofClass = isTin ? module.classes[number] : undefined;
@@ -43,6 +45,7 @@ export function pick(view, x, y) {
 export function unpick(view) {
   if (view.outline) {
     view.scene.remove(view.outline);
+    view.outline.geometry.dispose();
     view.version += 1;
   }
   view.outline = view.picked = undefined;

@@ -10,37 +10,44 @@ const SHORE = 0.035;
 const ROUGH_M = 250;
 
 /** Height of the coarse grid near a place; undefined outside. */
-export function coarseAt(area, east, north) {
-  const { wide, high, heights } = area.coarse, step = area.side_m / area.coarse_steps;
-  const [col, row] = [Math.round((east - area.sides[0]) / step), Math.round((north - area.sides[1]) / step)];
+export function coarseAt({ coarse: { wide, high, heights }, sides, side_m, coarse_steps }, east, north) {
+  const step = side_m / coarse_steps;
+  const [col, row] = [Math.round((east - sides[0]) / step), Math.round((north - sides[1]) / step)];
   return 0 <= row && 0 <= col && row < high && col < wide ? heights[row * wide + col] : undefined;
 }
 
-function isWaterAt({ coarse, ...area }, east, north) {
+/** What does not change from place to place: the coarse grid, whether a class is water, and for each direction its rays
+ * as steps of the grid to the places that are looked at. */
+function views(area, reach) {
   const step = area.side_m / area.coarse_steps;
-  const [col, row] = [Math.round((east - area.sides[0]) / step), Math.round((north - area.sides[1]) / step)];
-  return isWater(area, coarse.classes[row * coarse.wide + col]);
+  const isWet = Array.from({ length: 256 }, (_, ofClass) => isWater(area, ofClass));
+  // Close together near the eye.
+  const distances = Array.from({ length: LOOKS }, (_, look) => (reach * (look + 1) ** 2) / (LOOKS * LOOKS) + 100);
+  const directions = Array.from({ length: DIRECTIONS }, (_, number) => (2 * Math.PI * number) / DIRECTIONS);
+  const raysOf = (direction) => Array.from({ length: RAYS }, (_, ray) => {
+    const way = direction + VIEW_RADIANS * (ray / (RAYS - 1) - 0.5);
+    return distances.map((away) => ({ away, right: (away * Math.sin(way)) / step, up: (away * Math.cos(way)) / step }));
+  });
+  return directions.map((direction) => ({ ...area.coarse, isWet, direction, rays: raysOf(direction) }));
 }
 
-/** What is seen from a place: how far the ground in view goes up and down, and how high it stands. */
-function score(area, [east, north], eye, direction, reach) {
+/** What is seen from a place of the grid: how far the ground in view goes up and down, and how high it stands. */
+function score({ wide, high, heights, classes, isWet, direction, rays }, [across, along], eye) {
   let [relief, skyline, outside, water] = [0, 0, 0, 0];
-  for (let ray = 0; ray < RAYS; ray++) {
-    const way = direction + VIEW_RADIANS * (ray / (RAYS - 1) - 0.5), [sin, cos] = [Math.sin(way), Math.cos(way)];
+  for (const ray of rays) {
     let [horizon, before] = [-0.3, undefined];
-    for (let look = 1; look <= LOOKS; look++) {
-      const away = (reach * look * look) / (LOOKS * LOOKS) + 100;
-      const height = coarseAt(area, east + sin * away, north + cos * away);
-      if (height === undefined) {
+    for (const { away, right, up } of ray) {
+      const col = Math.round(across + right), row = Math.round(along + up);
+      if (row < 0 || col < 0 || high <= row || wide <= col) {
         outside += 1;
         continue;
       }
-      const rise = (height - eye) / away;
+      const index = row * wide + col, height = heights[index], rise = (height - eye) / away;
       if (rise < horizon) continue;
       horizon = rise;
       relief += Math.abs(height - (before ?? height));
       before = height;
-      if (isWaterAt(area, east + sin * away, north + cos * away)) water += 1;
+      if (isWet[classes[index]]) water += 1;
     }
     skyline += Math.min(horizon, 0.25) / RAYS;
   }
@@ -59,18 +66,19 @@ function roughness(area, [east, north]) {
 /** East, north, height of the eye and heading. */
 export function scenicPlace(area) {
   const [west, south, east, north] = area.sides, reach = Math.min(REACH_M, 0.6 * Math.min(east - west, north - south));
+  const all = views(area, reach), step = area.side_m / area.coarse_steps;
   let best = { score: -1 };
   for (let row = 0; row < TRIED; row++) {
     for (let col = 0; col < TRIED; col++) {
       const share = (at) => 0.05 + (0.9 * at) / (TRIED - 1);
       const place = [west + share(col) * (east - west), south + share(row) * (north - south)];
       const ground = coarseAt(area, ...place);
-      if (!(ground !== undefined)) continue;
+      if (ground === undefined) continue;
       const rough = 0.3 + Math.min(roughness(area, place) / ROUGH_M, 1);
-      for (let number = 0; number < DIRECTIONS; number++) {
-        const direction = (2 * Math.PI * number) / DIRECTIONS;
-        const found = rough * score(area, place, ground + ABOVE_M, direction, reach);
-        if (best.score < found) best = { score: found, place, direction, ground };
+      const onGrid = [(place[0] - west) / step, (place[1] - south) / step];
+      for (const view of all) {
+        const found = rough * score(view, onGrid, ground + ABOVE_M);
+        if (best.score < found) best = { score: found, place, direction: view.direction, ground };
       }
     }
   }

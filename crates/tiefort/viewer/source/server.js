@@ -10,7 +10,8 @@ const isAtSeaLevel = (height) => Math.abs(height) < SEA_M;
 /** Whether ground at these heights is the sea. */
 export const isSea = (area, heights) => area.hasSea && heights.every(isAtSeaLevel);
 
-async function answer(path) {
+/** What the server answers; fails with its words where it has none. */
+export async function answer(path) {
   const response = await fetch(path);
   if (!response.ok) throw new Error(await response.text());
   return response;
@@ -18,8 +19,8 @@ async function answer(path) {
 
 /** What the area is, with its overview: heights and classes on a coarse grid, figures of every load module. */
 export async function readArea() {
-  const area = await (await answer("/api/area")).json();
-  const bytes = await (await answer("/api/overview")).arrayBuffer();
+  const answers = [answer("/api/area"), answer("/api/overview")];
+  const area = await (await answers[0]).json(), bytes = await (await answers[1]).arrayBuffer();
   const [wide, high] = [area.cols * area.coarse_steps + 1, area.rows * area.coarse_steps + 1];
   area.corner = [Math.floor(area.rows / 2), Math.floor(area.cols / 2)];
   const classes = new Uint8Array(bytes, bytes.byteLength - wide * high);

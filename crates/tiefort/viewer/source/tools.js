@@ -130,6 +130,8 @@ export class Tools {
       const [row, col] = [Math.floor(i / side), i % side], isEdge = row % (side - 1) === 0 || col % (side - 1) === 0;
       if (what <= 1 && !isEdge) data.set(what === 1 ? SEEN : DARK, 4 * i);
     });
+    // Pressed twice before the answer, it is asked twice.
+    this.overlay?.dispose();
     this.overlay = new DataTexture(data, side, side, RGBAFormat);
     this.overlay.magFilter = NearestFilter;
     this.overlay.needsUpdate = true;

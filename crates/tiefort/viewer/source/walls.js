@@ -6,8 +6,8 @@ import { geometryOf, meshOf, tintAt } from "./meshes.js";
 import { coarseHeight } from "./surface.js";
 
 /** How far walls reach beyond the upper of the lines they stand between, as a part of their distance: a quarter of a
- * pixel, since some renderers place corners by a sixteenth only. Metres that they reach beyond the lower line, and below
- * the base. */
+ * pixel, since some renderers place corners by a sixteenth only. Metres that they reach beyond the lower line, and
+ * below the base. */
 const LIP = 3e-4, FOOT_M = 2, BELOW_M = 10;
 
 /** A side of a load module (south, east, north, west) in coarse steps: where it begins, and which way it goes. */

@@ -1,19 +1,18 @@
 // The part that runs beside the page, so that no picture waits for it: reads the relief, and lights it.
 import { texels } from "./light.js";
+import { answer } from "./server.js";
 
 let relief = null, wanted = null;
 
 /** The relief as the server gives it: what shades are reckoned from, and classes. */
 async function read(sideM) {
-  const response = await fetch("/api/relief");
-  if (!response.ok) throw new Error(await response.text());
-  const bytes = await response.arrayBuffer(), [wide, high, steps] = new Uint32Array(bytes, 0, 3);
+  const bytes = await (await answer("/api/relief")).arrayBuffer(), [wide, high, steps] = new Uint32Array(bytes, 0, 3);
   const [low, unit] = new Float32Array(bytes, 12, 2), numbers = new Uint16Array(bytes, 20, wide * high);
   const heights = Float32Array.from(numbers, (number) => low + unit * number);
   return { wide, high, heights, step: sideM / steps };
 }
 
-function answer() {
+function light() {
   if (!relief || !wanted) return;
   const data = texels(relief, wanted);
   postMessage({ wide: relief.wide, high: relief.high, step: relief.step, data }, [data.buffer]);
@@ -30,6 +29,6 @@ export function work() {
         return postMessage({ fault: fault.message });
       }
     }
-    answer();
+    light();
   };
 }

@@ -33,8 +33,8 @@ fn buildings_of_the_area_are_kept_and_the_ground_has_the_same_bytes_without_them
     drawing.built();
     let folder = Folder::new(drawing.scene.path("area.tdb"));
     let (_, buildings) = folder.read_buildings().unwrap();
-    assert_eq!(buildings.iter().map(|building| building.top).collect::<Vec<_>>(), [6 * 128, 9 * 128]);
-    assert_eq!(buildings[0].rings[0].iter().min(), Some(&[100 * 128, 100 * 128]));
+    assert_eq!(buildings.iter().map(|building| building.top).collect::<Vec<_>>(), [6 * 8, 9 * 8]);
+    assert_eq!(buildings[0].rings[0].iter().min(), Some(&[100 * 8, 100 * 8]));
     assert!(folder.manifest().unwrap().files.contains_key(files::BUILDINGS));
     let with = ground_of(&drawing.scene, "area.tdb");
     assert!(drawing.scene.build("area.tdb", 2).is_unchanged);

@@ -11,6 +11,10 @@ use super::level::PIXELS_MAX;
 use super::{Imagery, Keep, Square};
 use crate::crs::Crs;
 
+mod jpeg;
+mod kinds;
+mod writer;
+
 const UTM: &str = "EPSG:32611";
 /// The corner of the pictures here, in UTM.
 const CORNER: [f64; 2] = [520_000.0, 3_890_000.0];
@@ -194,6 +198,8 @@ fn what_is_no_picture_with_a_place_is_refused_in_words() {
     let heights = vec![1.0f32; 64 * 48];
     PLAIN.write::<tiff::encoder::colortype::Gray32Float>(&path, &heights);
     refused("colours are 32-bit floating point, expected 8- or 16-bit unsigned", "-ot Byte -scale");
+    std::fs::write(&path, "east,north\n1,2\n").unwrap();
+    refused("a.tif: a text file, not a raster, expected a GeoTIFF of colours", "name a picture");
     std::fs::write(&path, b"\x89PNG\r\n\x1a\n").unwrap();
     refused("not a TIFF: it begins with 89 50 4e 47, expected a GeoTIFF", "gdal_translate");
     let mut encoder = TiffEncoder::new(File::create(&path).unwrap()).unwrap();
