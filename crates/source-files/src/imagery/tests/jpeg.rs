@@ -61,12 +61,12 @@ pub fn encoded(
     let side = 8 * fine(0);
     for north in (0..rows).step_by(side as usize) {
         for west in (0..cols).step_by(side as usize) {
-            for part in 0..parts {
+            for (part, last) in last.iter_mut().enumerate() {
                 for block in 0..fine(part) * fine(part) {
                     let (col, row) = (west + 8 * (block % fine(part)), north + 8 * (block / fine(part)));
                     let level = i32::from(pixel(col.min(cols - 1), row.min(rows - 1))[part]) - 128;
-                    bits.put_level(level - last[part]);
-                    last[part] = level;
+                    bits.put_level(level - *last);
+                    *last = level;
                 }
             }
         }

@@ -63,8 +63,8 @@ fn a_picture_has_the_same_colours_in_every_layout_and_packing() {
         for (is_planar, is_predicted) in [(false, false), (true, false), (false, true), (true, true)] {
             let rgb = Picture { layout, packing, is_planar, is_predicted, ..Picture::rgb(SIZE, color) };
             let is_big_endian = is_predicted;
-            check(Form { is_big_endian, ..PLAIN }, &[rgb.clone()], 0, |col, row| opaque(color(col, row)));
-            check(Form { is_big: true, ..PLAIN }, &[rgb.clone()], 0, |col, row| opaque(color(col, row)));
+            check(Form { is_big_endian, ..PLAIN }, std::slice::from_ref(&rgb), 0, |col, row| opaque(color(col, row)));
+            check(Form { is_big: true, ..PLAIN }, std::slice::from_ref(&rgb), 0, |col, row| opaque(color(col, row)));
             // All of the range is used, so that nothing is stretched.
             let numbers = rgb.numbers.iter().map(|number| 257 * number).collect();
             let deep = Picture { bits: 16, numbers, ..rgb };
@@ -82,7 +82,7 @@ fn jpegs_have_their_colours_however_they_stand_in_a_file() {
             let packing = Packing::Jpeg { has_tables };
             let rgb = Picture { layout, packing, photometric, ..Picture::rgb(SIZE, patch) };
             let form = Form { is_big_endian, ..PLAIN };
-            check(form, &[rgb.clone()], 2, |col, row| opaque(patch(col, row)));
+            check(form, std::slice::from_ref(&rgb), 2, |col, row| opaque(patch(col, row)));
             let planar = Picture { is_planar: true, photometric: 2, ..rgb.clone() };
             check(form, &[planar], 0, |col, row| opaque(patch(col, row)));
             let grey =
@@ -117,7 +117,7 @@ fn a_palette_gives_the_colours_at_every_depth() {
         let palette: Vec<u16> = (0..3).flat_map(part).collect();
         let picture =
             Picture { bits, layout, packing, palette, ..Picture::of(SIZE, 1, 3, |col, row| vec![number(col, row)]) };
-        check(PLAIN, &[picture.clone()], 0, |col, row| opaque(entry(number(col, row))));
+        check(PLAIN, std::slice::from_ref(&picture), 0, |col, row| opaque(entry(number(col, row))));
         check(Form { nodata: Some("1"), ..PLAIN }, &[picture], 0, |col, row| match number(col, row) {
             1 => NOTHING,
             number => opaque(entry(number)),
@@ -209,15 +209,17 @@ fn beyond_a_mask_there_is_nothing_whatever_the_layouts_of_both() {
 
 #[test]
 fn nodata_is_where_all_parts_of_a_colour_have_it() {
-    let is_nothing = |col: u32, row: u32| (col + row) % 3 == 0;
+    let is_nothing = |col: u32, row: u32| (col + row).is_multiple_of(3);
     for (is_planar, layout) in LAYOUTS.into_iter().flat_map(|layout| [(false, layout), (true, layout)]) {
         let pixel = |col: u32, row: u32| if is_nothing(col, row) { [9; 3] } else { [9, 9, 10] };
         let picture = Picture { is_planar, layout, ..Picture::rgb(SIZE, pixel) };
         let expected = |col, row| if is_nothing(col, row) { NOTHING } else { opaque([9, 9, 10]) };
-        check(Form { nodata: Some("9"), ..PLAIN }, &[picture.clone()], 0, expected);
+        check(Form { nodata: Some("9"), ..PLAIN }, std::slice::from_ref(&picture), 0, expected);
         // What no pixel can have is passed over.
         for nodata in ["-9999", "nan", "0.5", "1e10"] {
-            check(Form { nodata: Some(nodata), ..PLAIN }, &[picture.clone()], 0, |col, row| opaque(pixel(col, row)));
+            check(Form { nodata: Some(nodata), ..PLAIN }, std::slice::from_ref(&picture), 0, |col, row| {
+                opaque(pixel(col, row))
+            });
         }
     }
 }
