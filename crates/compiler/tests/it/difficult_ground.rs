@@ -201,8 +201,8 @@ fn voids_fail_unless_they_are_to_be_filled() {
         let product = Product::read(&scene.path("area"));
         let clipped = !words.modules.is_empty();
         product.check(if clipped { Edges::Clipped } else { Edges::Constrained });
-        // Filled heights lie between those around them: no spike, no pit. A fitted vertex on the highest post may stand a
-        // quarter of a metre above it.
+        // Filled heights lie between those around them: no spike, no pit. A vertex that is fitted on the highest post
+        // may stand a quarter of a metre above it.
         let fitted = if name == "optimised" { 32 } else { 0 };
         let ends = |heights: &mut dyn Iterator<Item = i32>| {
             heights.fold((i32::MAX, i32::MIN), |(a, b), h| (a.min(h), b.max(h)))

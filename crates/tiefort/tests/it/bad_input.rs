@@ -38,7 +38,7 @@ fn a_missing_job() {
 fn a_raster_that_is_no_tiff() {
     let scene = Scene::with_job("raster.toml", &[]);
     fs::write(scene.path("dem.tif"), "north is up\n").unwrap();
-    scene.refuses(&BUILD, &["dem.tif", "it begins with 6e 6f 72 74", "expected GeoTIFF, DTED, HGT"]);
+    scene.refuses(&BUILD, &["dem.tif", "a text file, not a raster", "expected GeoTIFF, DTED, HGT"]);
     fs::write(scene.path("dem.tif"), "").unwrap();
     scene.refuses(&BUILD, &["dem.tif"]);
 }

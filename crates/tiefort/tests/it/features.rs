@@ -187,7 +187,7 @@ fn plan_counts_the_buildings_that_a_job_keeps() {
 fn plan_refuses_a_file_of_features_that_cannot_be_read() {
     let keys = "sources = [\"a.geojson\"]";
     for (text, part) in
-        [("", "an empty file"), ("{\"type\": 3", "a.geojson"), ("north is up", "found a text file of some other kind")]
+        [("", "an empty file"), ("{\"type\": 3", "a.geojson"), ("north is up", "a text file of some other kind")]
     {
         with_features(&[("a.geojson", text)], keys).refuses(&["plan", "job.toml"], &["a.geojson", part]);
     }
