@@ -1,8 +1,8 @@
 // Walls that close what is open between fine and coarse load modules, and those along the border of the area.
 import { BufferAttribute } from "three";
-import { bytes, MADE, numbers } from "./colors.js";
+import { bytes, colorOf, isWater, MADE, numbers } from "./colors.js";
 import * as looks from "./materials.js";
-import { geometryOf, meshOf, tintAt } from "./meshes.js";
+import { geometryOf, meshOf, tintAt, tintOf } from "./meshes.js";
 import { coarseHeight } from "./surface.js";
 
 /** How far walls reach beyond the upper of the lines they stand between, as a part of their distance: a quarter of a
@@ -16,7 +16,15 @@ function sideLine(area, { row, col }, side) {
   return [[south, west, 0, 1], [south, west + steps, 1, 0], [south + steps, west, 0, 1], [south, west, 1, 0]][side];
 }
 
-/** Upper and lower points of a wall along a side, from the surface's heights to `below(height, row, col)`. */
+/** The tint of water at a place of the coarse grid; null on land. */
+function waterAt(area, row, col) {
+  const { wide, classes } = area.coarse, ofClass = classes[Math.round(row) * wide + Math.round(col)];
+  const cover = colorOf.cover(area, ofClass);
+  return cover && isWater(area, ofClass) ? tintOf(area, ofClass, cover) : null;
+}
+
+/** Upper and lower points of a wall along a side, from the surface's heights to `below(height, row, col)`, with the
+ * tint of water there. */
 function wallAlong(area, module, surface, side, below) {
   const [row, col, up, right] = sideLine(area, module, side);
   const step = area.side_m / area.coarse_steps;
@@ -33,7 +41,7 @@ function wallAlong(area, module, surface, side, below) {
     const [[from, low], [to, high]] = [fine[i], fine[i + 1]];
     const height = low + ((at - from) / (to - from)) * (high - low);
     const place = [row + at * up, col + at * right];
-    return [west + at * right * step, south + at * up * step, height, below(height, ...place)];
+    return [west + at * right * step, south + at * up * step, height, below(height, ...place), waterAt(area, ...place)];
   });
 }
 
@@ -47,10 +55,10 @@ class Walls {
   /** Seen from in front, `wall` runs from left to right. */
   add(wall) {
     for (let i = 0; i + 1 < wall.length; i++) {
-      const [[ax, ay, ah, al], [bx, by, bh, bl]] = [wall[i], wall[i + 1]];
+      const [[ax, ay, ah, al, water], [bx, by, bh, bl, on]] = [wall[i], wall[i + 1]];
       for (const [x, y, z] of [[ax, ay, ah], [ax, ay, al], [bx, by, bh], [bx, by, bh], [ax, ay, al], [bx, by, bl]]) {
         this.positions.push(x, z, -y);
-        this.tints.push(...(this.isCliff ? CLIFF(this.area) : tintAt(this.area, z)));
+        this.tints.push(...(this.isCliff ? CLIFF(this.area) : (on && water) ?? tintAt(this.area, z)));
       }
     }
   }
@@ -80,8 +88,8 @@ const outward = (wall, side) => (side < 2 ? wall : wall.reverse());
 /** From below the lower of two lines to above the upper one, so that the wall is whole where they cross: were its edges
  * to follow one line each, it would be narrowest somewhere beside the crossing, and leave open what lies between. Both
  * reach a little further, since a wall bends where either line does, and so, but for rounding, lies on the other. */
-const between = (wall, lip) => wall.map(([east, north, one, other]) =>
-  [east, north, Math.max(one, other) + lip, Math.min(one, other) - FOOT_M]);
+const between = (wall, lip) => wall.map(([east, north, one, other, water]) =>
+  [east, north, Math.max(one, other) + lip, Math.min(one, other) - FOOT_M, water]);
 
 /** Walls that close what is open between fine and coarse load modules, and those along the border of the area. */
 export function wallMeshes(area, drawn, base) {
