@@ -23,6 +23,7 @@
 //! assert!(measures.residual.rms_m < 1.0);
 //! ```
 
+mod by_post;
 mod tally;
 pub use tally::{Histogram, Residuals, Sums, Tally};
 mod measure;

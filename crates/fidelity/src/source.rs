@@ -2,11 +2,11 @@
 
 use std::ops::Range;
 
-use fearless_simd::{Simd, dispatch};
-use geometry::resample::rounded;
+use fearless_simd::{Simd, dispatch, f64x8, prelude::*};
 use terrain::{LoadModule, ModuleGrid, Post, PostRect, Spacing};
 
 use crate::Tally;
+use crate::by_post::ByPost;
 use crate::tally::{Histogram, Sums};
 
 /// Where the source's posts lie, in horizontal quanta of 1/128 m from the area's south-west post.
@@ -63,27 +63,38 @@ struct PostsInModule<'a> {
 
 impl PostsInModule<'_> {
     fn count(&self, tally: &mut Tally) {
-        // Heights of the triangles by post, in quanta; NaN outside of all. A post on an edge has that of the first one.
-        let mut planes = vec![f64::NAN; self.posts.post_count()];
+        let level = geometry::widest_level();
+        let sums = dispatch!(level, simd => self.sums(simd, tally.histogram()));
+        tally.add_sums(&sums);
+    }
+
+    #[inline(always)]
+    fn sums<S: Simd>(&self, simd: S, histogram: Histogram) -> Sums {
+        // Heights of the triangles by post, in quanta. A post on an edge has that of the first one.
+        let mut planes = ByPost::new(self.posts.posts_high(), self.posts.posts_wide());
         for triangle in self.module.triangles.iter().rev() {
             let corners = triangle.map(|v| {
                 let vertex = self.module.vertices[usize::from(v)];
                 [f64::from(vertex.x), f64::from(vertex.y), f64::from(vertex.z)]
             });
-            self.lay(corners, &mut planes);
+            self.lay(simd, corners, &mut planes);
         }
-        let mut heights = Vec::with_capacity(planes.len());
+        let mut residuals = Vec::with_capacity(planes.values().len());
         for row in self.posts.south..=self.posts.north {
-            (self.source.push_row_m)(row, self.posts.west..self.posts.east + 1, &mut heights);
+            (self.source.push_row_m)(row, self.posts.west..self.posts.east + 1, &mut residuals);
         }
-        let level = geometry::widest_level();
-        let sums = dispatch!(level, simd => count_in(simd, &heights, &planes, tally.histogram()));
-        tally.add_sums(&sums);
+        // NaN where there is no height or no triangle.
+        for (residual, plane) in residuals.iter_mut().zip(planes.values()) {
+            *residual = *residual * f64::from(terrain::QUANTA_PER_METRE) - plane;
+        }
+        let mut sums = Sums::default();
+        sums.add_rounded(&residuals, histogram);
+        sums
     }
 
     /// Writes the height of a closed triangle's plane at each post of it, in quanta.
     #[inline(always)]
-    fn lay(&self, [a, b, c]: [[f64; 3]; 3], planes: &mut [f64]) {
+    fn lay<S: Simd>(&self, simd: S, [a, b, c]: [[f64; 3]; 3], planes: &mut ByPost) {
         let scale = 1.0 / ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]));
         let first = |axis: usize, at: i32| {
             self.source.south_west[axis] + f64::from(at) * self.source.step[axis] - self.corner[axis]
@@ -94,103 +105,29 @@ impl PostsInModule<'_> {
             let low = place(a[axis].min(b[axis]).min(c[axis])) - ON_EDGE;
             let high = place(a[axis].max(b[axis]).max(c[axis])) + ON_EDGE;
             // A conversion drops what is behind the point and stops at 0.
-            let from = low as u32;
-            ((from + u32::from(f64::from(from) < low)) as i32, ((high + 1.0) as u32).min(posts as u32) as i32)
+            let from = low as usize;
+            from + usize::from((from as f64) < low)..((high + 1.0) as usize).min(posts)
         };
-        let (south, north) = range(1, y0, self.posts.posts_high());
-        let (west, east) = range(0, x0, self.posts.posts_wide());
+        let rows = range(1, y0, self.posts.posts_high());
+        let cols = range(0, x0, self.posts.posts_wide());
         // Shares of b and c at a post, and what they change by from post to post eastwards.
-        let step_b = self.source.step[0] * (c[1] - a[1]) * scale;
-        let step_c = -self.source.step[0] * (b[1] - a[1]) * scale;
-        let sides = [step_b, step_c, -(step_b + step_c)].map(Slope::of);
-        for row in south..north {
-            let (x, y) = (x0 - a[0], y0 + f64::from(row) * self.source.step[1] - a[1]);
-            let at_b = (x * (c[1] - a[1]) - y * (c[0] - a[0])) * scale;
-            let at_c = ((b[0] - a[0]) * y - (b[1] - a[1]) * x) * scale;
-            let mut near = (f64::from(west), f64::from(east));
-            for (side, share) in sides.iter().zip([at_b, at_c, 1.0 - at_b - at_c]) {
-                near = side.narrowed(near, share);
-            }
-            let at = |col: i32| (at_b + f64::from(col) * step_b, at_c + f64::from(col) * step_c);
-            let is_inside = |col: i32| {
-                let (at_b, at_c) = at(col);
-                -ON_EDGE <= at_b && -ON_EDGE <= at_c && at_b + at_c <= 1.0 + ON_EDGE
-            };
-            let (mut from, mut end) = (near.0 as i32, near.1 as i32);
-            while from < end && !is_inside(from) {
-                from += 1;
-            }
-            while from < end && !is_inside(end - 1) {
-                end -= 1;
-            }
-            if end <= from {
-                continue;
-            }
-            let row = row as usize * self.posts.posts_wide();
-            for (col, plane) in (from..end).zip(&mut planes[row + from as usize..row + end as usize]) {
-                let (at_b, at_c) = at(col);
-                *plane = a[2] + at_b * (b[2] - a[2]) + at_c * (c[2] - a[2]);
-            }
-        }
+        let step_b = f64x8::splat(simd, self.source.step[0] * (c[1] - a[1]) * scale);
+        let step_c = f64x8::splat(simd, -self.source.step[0] * (b[1] - a[1]) * scale);
+        let (rise_b, rise_c) = (f64x8::splat(simd, b[2] - a[2]), f64x8::splat(simd, c[2] - a[2]));
+        let (low, whole) = (f64x8::splat(simd, -ON_EDGE), f64x8::splat(simd, 1.0 + ON_EDGE));
+        let (start, end) = (f64x8::splat(simd, a[2]), f64x8::splat(simd, cols.end as f64));
+        planes.write(simd, (rows, cols), |row, _, cols| {
+            let (x, y) = (x0 - a[0], y0 + row as f64 * self.source.step[1] - a[1]);
+            let at_b = f64x8::splat(simd, (x * (c[1] - a[1]) - y * (c[0] - a[0])) * scale) + cols * step_b;
+            let at_c = f64x8::splat(simd, ((b[0] - a[0]) * y - (b[1] - a[1]) * x) * scale) + cols * step_c;
+            let is_inside = at_b.simd_ge(low) & at_c.simd_ge(low) & (at_b + at_c).simd_le(whole) & cols.simd_lt(end);
+            (is_inside, start + at_b * rise_b + at_c * rise_c)
+        });
     }
 }
-
-/// Sums and a histogram of what heights in metres are above heights in quanta; posts without either are left out.
-#[inline(always)]
-fn count_in<S: Simd>(_: S, heights_m: &[f64], planes: &[f64], mut histogram: Histogram) -> Sums {
-    let mut sums = Sums::default();
-    let mut residuals = [0; TOGETHER];
-    for (heights_m, planes) in heights_m.chunks(TOGETHER).zip(planes.chunks(TOGETHER)) {
-        // NaN where either is.
-        let above = |(height_m, plane): (&f64, &f64)| height_m * f64::from(terrain::QUANTA_PER_METRE) - plane;
-        let mut known = 0;
-        for (above, to) in heights_m.iter().zip(planes).map(above).zip(&mut residuals) {
-            *to = rounded(above);
-            known += usize::from(!above.is_nan());
-        }
-        if known < planes.len() {
-            let found = heights_m.iter().zip(planes).map(above).filter(|above| !above.is_nan());
-            found.zip(&mut residuals).for_each(|(above, to)| *to = rounded(above));
-        }
-        sums.add_all(&residuals[..known]);
-        residuals[..known].iter().for_each(|&residual| histogram.add(residual));
-    }
-    sums
-}
-
-/// Posts whose residuals are found together.
-const TOGETHER: usize = 64;
 
 /// Share of the triangle by which rounding may put a post on an edge outside both sides of it.
 const ON_EDGE: f64 = 1e-9;
-
-/// How a corner's share of a triangle changes along a row.
-struct Slope {
-    grows: bool,
-    shrinks: bool,
-    /// Columns it takes to grow by the whole, negative.
-    columns: f64,
-}
-
-impl Slope {
-    fn of(step: f64) -> Self {
-        Self { grows: 0.0 < step, shrinks: step < 0.0, columns: -1.0 / step }
-    }
-
-    /// The part of a range of columns in which the share, so large at column 0, may not be negative: too wide by a
-    /// column at either end, so that rounding loses no post.
-    #[inline(always)]
-    fn narrowed(&self, (first, end): (f64, f64), share: f64) -> (f64, f64) {
-        let crossing = share * self.columns;
-        if self.grows {
-            (if first < crossing - 1.0 { crossing - 1.0 } else { first }, end)
-        } else if self.shrinks {
-            (first, if crossing + 2.0 < end { crossing + 2.0 } else { end })
-        } else {
-            (first, end)
-        }
-    }
-}
 
 #[cfg(test)]
 mod tests {

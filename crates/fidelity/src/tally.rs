@@ -1,5 +1,6 @@
 //! Sums and a histogram of residuals, for each class of ground.
 
+use geometry::resample::rounded;
 use terrain::QUANTA_PER_METRE;
 
 /// Residuals below this have a bin for every quantum (32 m); above, 256 bins an octave.
@@ -164,6 +165,25 @@ impl Sums {
         self.sum_squared += u128::from(size * size);
     }
 
+    /// Counts posts by residuals in quanta, rounded half away from zero, here and in a histogram; NaN is left out.
+    #[inline(always)]
+    pub fn add_rounded(&mut self, residuals: &[f64], mut histogram: Histogram) {
+        let mut whole = [0; TOGETHER];
+        for residuals in residuals.chunks(TOGETHER) {
+            let mut known = 0;
+            for (residual, to) in residuals.iter().zip(&mut whole) {
+                *to = rounded(*residual);
+                known += usize::from(!residual.is_nan());
+            }
+            if known < residuals.len() {
+                let found = residuals.iter().filter(|residual| !residual.is_nan());
+                found.zip(&mut whole).for_each(|(&residual, to)| *to = rounded(residual));
+            }
+            self.add_all(&whole[..known]);
+            whole[..known].iter().for_each(|&residual| histogram.add(residual));
+        }
+    }
+
     /// Counts some posts, fewer than 2^16.
     #[inline(always)]
     pub fn add_all(&mut self, residuals: &[i32]) {
@@ -182,6 +202,9 @@ impl Sums {
         self.sum_squared += u128::from(sum_squared);
     }
 }
+
+/// Residuals that are counted together.
+const TOGETHER: usize = 64;
 
 /// The bin of an absolute residual.
 #[inline(always)]

@@ -18,7 +18,7 @@ pub use spans::{Span, Spans};
 mod surface;
 pub use surface::{Surface, WORKING_POSTS_MAX};
 mod scan;
-pub use scan::{largest_numerator, locate, locate_all, rounded, squares_sum, visit_owned, visit_posts};
+pub use scan::{largest_numerator, locate, locate_all, rounded, squares_sum, visit_owned, visit_posts, widened};
 mod level;
 pub use level::{levels_available, widest_level};
 mod ridge;

@@ -65,7 +65,7 @@ fn squares_in_box_8<S: Simd>(simd: S, surface: &Surface, facet: &Facet, x0: i32,
     let (zero, one) = (i32x8::splat(simd, 0), i32x8::splat(simd, 1));
     let rounding = Rounding::new(simd, facet.den);
     let start = facet.origin() + facet.py * i64::from(y0) + facet.px * i64::from(x0);
-    let east = wide(simd, iota) * f64x8::splat(simd, facet.px as f64);
+    let east = widened(simd, iota) * f64x8::splat(simd, facet.px as f64);
     let mut plane = east + f64x8::splat(simd, start as f64);
     let step = f64x8::splat(simd, facet.py as f64);
     let mut sum = f64x8::splat(simd, 0.0);
@@ -73,9 +73,9 @@ fn squares_in_box_8<S: Simd>(simd: S, surface: &Surface, facet: &Facet, x0: i32,
     let first = y0 as usize * stride + x0 as usize;
     let rows = &heights[first..][..(y1 - y0) as usize * stride + 8];
     for row in rows.chunks(stride) {
-        let height = wide(simd, i32x8::from_slice(simd, &row[..8]));
+        let height = widened(simd, i32x8::from_slice(simd, &row[..8]));
         let inside = (w0 | w1 | w2).simd_ge(zero).select(one, zero);
-        let residual = rounding.residuals(simd, height, plane) * wide(simd, inside);
+        let residual = rounding.residuals(simd, height, plane) * widened(simd, inside);
         sum += residual * residual;
         plane += step;
         (w0, w1, w2) = (w0 + step0, w1 + step1, w2 + step2);
@@ -85,7 +85,7 @@ fn squares_in_box_8<S: Simd>(simd: S, surface: &Surface, facet: &Facet, x0: i32,
 
 /// Eight whole numbers below 2^24 as f64, exactly.
 #[inline(always)]
-fn wide<S: Simd>(simd: S, numbers: i32x8<S>) -> f64x8<S> {
+pub fn widened<S: Simd>(simd: S, numbers: i32x8<S>) -> f64x8<S> {
     let (low, high) = simd.cvt_f32_i32x8(numbers).widen();
     simd.combine_f64x4(low, high)
 }
