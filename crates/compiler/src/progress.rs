@@ -82,8 +82,8 @@ pub enum Event {
 }
 
 /// Listens to a run.
-pub trait Progress {
-    /// Called on the thread that runs the build, in order; must return at once.
+pub trait Progress: Send {
+    /// Called in order, by one worker at a time; must return at once.
     fn tell(&mut self, event: Event);
 
     /// What the stage that is about to be left has taken this time; told just before it is left.

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 /// What time it is.
-pub trait Clock {
+pub trait Clock: Sync {
     /// Time since any beginning that stays the same.
     fn wall(&self) -> Duration;
 

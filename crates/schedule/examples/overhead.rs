@@ -1,4 +1,4 @@
-//! Measures what the coordinator itself costs, and how busy it keeps workers on a board of tiles.
+//! Measures what the walk by rank itself costs, and how busy it keeps workers on a board of tiles.
 //!
 //! `cargo run --release -p schedule --example overhead`
 

@@ -83,7 +83,7 @@ impl RankedTasks {
         &self.links[self.middles[task]..self.begins[task + 1]]
     }
 
-    /// Bytes that a coordinator of these tasks holds: what is here, and what it keeps of each task while it runs.
+    /// Bytes that a walk through these tasks holds: what is here, and what it keeps of each task while it runs.
     pub fn coordinator_bytes(&self) -> u64 {
         /// State, count of missing neighbours, place in the queue, result.
         const BYTES_PER_TASK: usize = 48;

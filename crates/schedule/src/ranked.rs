@@ -1,25 +1,30 @@
-//! The coordinator: tasks that build on their neighbours, handed to workers lowest rank first.
+//! Tasks that build on their neighbours, taken by workers lowest rank first.
 //!
 //! ```text
-//!   calling thread: ready queue, results, observer
-//!        │ task number, only when a worker is idle        ▲ (task, how it ended)
-//!        ▼                                                │
-//!     worker 1 … worker n: run the task, catch its panic ─┘
+//!   calling thread and worker 1 … worker n - 1, each:
+//!     ┌─> take a task ──> run it, catch its panic ──> tell that it is done ─┐
+//!     └── park while none may start <──────────────────────────────────────┘
+//!   under one lock: tasks that may start, results, observer
 //! ```
+//!
+//! A worker takes its next task itself. A thread that handed tasks out would have to be woken for each of them, and
+//! with every core busy that takes up to a tick of the system's scheduler.
 
+use std::panic::resume_unwind;
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 
-use crossbeam::channel::{self, Receiver, Sender};
+use crossbeam::sync::{Parker, Unparker};
 
 use crate::attempt::{Attempt, Outcome, attempt};
 use crate::ready::Ready;
 use crate::{RankedTasks, ScheduleError, Workers};
 
-/// What the coordinator tells, on the calling thread, in the order in which it happens.
+/// What happens, told by one worker at a time, in the order in which it happens.
 #[derive(Debug)]
 pub enum Event<'a, R> {
-    /// A task was given to a worker.
+    /// A worker took a task.
     Started(usize),
     /// A task is done; told before any task that waits for it starts.
     Done(usize, &'a R),
@@ -28,8 +33,7 @@ pub enum Event<'a, R> {
 /// Runs every task once all its neighbours of lower rank are done, never two neighbours at once; of the tasks that may
 /// start, the one of lowest rank first. Results are in task order.
 ///
-/// `on_done` runs on the calling thread, before any task that waits for the finished one starts. With one worker the
-/// tasks run on the calling thread too.
+/// `on_done` runs before any task that waits for the finished one starts. The calling thread is one of the workers.
 ///
 /// # Errors
 /// The first failure or panic in rank order among the tasks that ran, after which no task starts; `Stopped` when
@@ -39,7 +43,7 @@ pub fn in_rank_order<R: Send, E: Send>(
     workers: &Workers,
     stop: &AtomicBool,
     task: impl Fn(usize) -> Result<R, E> + Sync,
-    mut on_done: impl FnMut(usize, &R),
+    mut on_done: impl FnMut(usize, &R) + Send,
 ) -> Result<Vec<R>, ScheduleError<R, E>> {
     let observe = |event: Event<R>| {
         if let Event::Done(task, result) = event {
@@ -58,41 +62,45 @@ pub fn in_rank_order_observed<R: Send, E: Send>(
     workers: &Workers,
     stop: &AtomicBool,
     task: impl Fn(usize) -> Result<R, E> + Sync,
-    observe: impl FnMut(Event<R>),
+    observe: impl FnMut(Event<R>) + Send,
 ) -> Result<Vec<R>, ScheduleError<R, E>> {
-    let mut walk = Walk { plan, ready: Ready::new(plan), outcome: Outcome::new(plan.len()), stop, observe };
-    let threads = workers.count().min(plan.len());
-    if threads <= 1 {
-        while let Some(next) = walk.start() {
-            walk.finish(next, attempt(|| task(next)));
-        }
-    } else if let Err(message) = walk_with_threads(&mut walk, threads, &task) {
-        return Err(ScheduleError::NoThread { workers: workers.count(), message });
-    }
+    let outcome = Outcome::new(plan.len());
+    let walk = Walk { plan, ready: Ready::new(plan), outcome, in_progress: 0, is_called_off: false, stop, observe };
+    let threads = workers.count().min(plan.len()).max(1);
+    let walk = walk_with_threads(walk, threads, &task)
+        .map_err(|message| ScheduleError::NoThread { workers: workers.count(), message })?;
     walk.outcome.into_results()
 }
 
-/// The state of one run, on the calling thread.
+/// The state of one run.
 struct Walk<'a, R, E, O> {
     plan: &'a RankedTasks,
     ready: Ready<'a>,
     outcome: Outcome<R, E>,
+    in_progress: usize,
+    /// Whether a thread was not to be had.
+    is_called_off: bool,
     stop: &'a AtomicBool,
     observe: O,
 }
 
 impl<R, E, O: FnMut(Event<R>)> Walk<'_, R, E, O> {
-    /// The next task to run now; none after a failure or a request to stop.
-    fn start(&mut self) -> Option<usize> {
-        if self.outcome.is_failed() || self.stop.load(Ordering::Relaxed) {
-            return None;
+    /// What a worker is to do now; nothing more to start after a failure or a request to stop.
+    fn next(&mut self) -> Next {
+        let is_halted = self.is_called_off || self.outcome.is_failed() || self.stop.load(Ordering::Relaxed);
+        match (!is_halted).then(|| self.ready.start()).flatten() {
+            Some(task) => {
+                self.in_progress += 1;
+                (self.observe)(Event::Started(task));
+                Next::Run(task)
+            }
+            None if self.in_progress == 0 || is_halted => Next::GoHome,
+            None => Next::Wait,
         }
-        let task = self.ready.start()?;
-        (self.observe)(Event::Started(task));
-        Some(task)
     }
 
     fn finish(&mut self, task: usize, attempt: Attempt<R, E>) {
+        self.in_progress -= 1;
         if let Some(result) = self.outcome.accept(task, self.plan.place(task), attempt) {
             (self.observe)(Event::Done(task, result));
             self.ready.finish(task);
@@ -100,61 +108,86 @@ impl<R, E, O: FnMut(Event<R>)> Walk<'_, R, E, O> {
     }
 }
 
-/// A task and how it ended.
-type Report<R, E> = (usize, Attempt<R, E>);
-
-/// Spawns the workers and keeps them busy until nothing may start any more and all have reported.
-///
-/// The channel of tasks is closed when this function's closure ends, however it ends, and that is what sends the
-/// workers home; so a panic in the observer cannot leave the scope waiting for them.
-fn walk_with_threads<R: Send, E: Send, O: FnMut(Event<R>)>(
-    walk: &mut Walk<'_, R, E, O>,
-    threads: usize,
-    task: &(impl Fn(usize) -> Result<R, E> + Sync),
-) -> Result<(), String> {
-    thread::scope(|scope| {
-        let (give, tasks) = channel::bounded::<usize>(threads);
-        let (report, reports) = channel::bounded::<Report<R, E>>(threads);
-        for number in 0..threads {
-            let (tasks, report) = (tasks.clone(), report.clone());
-            let named = thread::Builder::new().name(format!("worker {number}"));
-            named.spawn_scoped(scope, move || work(&tasks, &report, task)).map_err(|e| e.to_string())?;
-        }
-        coordinate(walk, threads, &give, &reports);
-        Ok(())
-    })
+/// What a worker is to do.
+enum Next {
+    Run(usize),
+    /// Until another worker has finished a task.
+    Wait,
+    GoHome,
 }
 
-/// What a worker does until the channel of tasks closes.
-fn work<R, E>(tasks: &Receiver<usize>, report: &Sender<Report<R, E>>, task: &impl Fn(usize) -> Result<R, E>) {
-    for number in tasks {
-        if report.send((number, attempt(|| task(number)))).is_err() {
-            return;
+/// Walks on the calling thread and as many others as make up `threads`, until nothing may start any more and all have
+/// come home.
+fn walk_with_threads<'a, R: Send, E: Send, O: FnMut(Event<R>) + Send>(
+    walk: Walk<'a, R, E, O>,
+    threads: usize,
+    task: &(impl Fn(usize) -> Result<R, E> + Sync),
+) -> Result<Walk<'a, R, E, O>, String> {
+    let walk = Mutex::new(walk);
+    let parkers: Vec<Parker> = (0..threads).map(|_| Parker::new()).collect();
+    let unparkers: Vec<Unparker> = parkers.iter().map(|parker| parker.unparker().clone()).collect();
+    thread::scope(|scope| {
+        let (mut parkers, walk) = (parkers.into_iter(), &walk);
+        let own = parkers.next().expect("there is a thread at least");
+        // No task starts before all workers are there.
+        let mut held = walk.lock().expect("no observer was called yet");
+        let mut others = Vec::new();
+        for (number, parker) in (1..).zip(parkers) {
+            let others_wake = WakeOthers(&unparkers);
+            let named = thread::Builder::new().name(format!("worker {number}"));
+            let spawned = named.spawn_scoped(scope, move || work(walk, &parker, &others_wake, task));
+            let spawned = spawned.map_err(|error| error.to_string());
+            held.is_called_off = spawned.is_err();
+            others.push(spawned?);
         }
+        drop(held);
+        work(walk, &own, &WakeOthers(&unparkers), task);
+        // A panic of the observer goes on to the caller.
+        others.into_iter().for_each(|other| other.join().unwrap_or_else(|panic| resume_unwind(panic)));
+        Ok::<(), String>(())
+    })?;
+    Ok(walk.into_inner().expect("an observer that panicked has ended this run"))
+}
+
+/// Wakes all workers that wait, also when its owner panics.
+struct WakeOthers<'a>(&'a [Unparker]);
+
+impl WakeOthers<'_> {
+    fn wake(&self) {
+        self.0.iter().for_each(Unparker::unpark);
     }
 }
 
-/// Hands out a task whenever a worker is idle and one may start. A task is handed out only then, so that the choice is
-/// always the lowest rank known at that moment.
-fn coordinate<R, E, O: FnMut(Event<R>)>(
-    walk: &mut Walk<'_, R, E, O>,
-    threads: usize,
-    give: &Sender<usize>,
-    reports: &Receiver<Report<R, E>>,
+impl Drop for WakeOthers<'_> {
+    fn drop(&mut self) {
+        self.wake();
+    }
+}
+
+/// What a worker does until nothing may start any more, or an observer panicked beside it.
+fn work<R, E, O: FnMut(Event<R>)>(
+    walk: &Mutex<Walk<'_, R, E, O>>,
+    parker: &Parker,
+    others: &WakeOthers,
+    task: &impl Fn(usize) -> Result<R, E>,
 ) {
-    let mut in_progress = 0;
+    let Ok(mut held) = walk.lock() else { return };
     loop {
-        while in_progress < threads
-            && let Some(next) = walk.start()
-        {
-            give.send(next).expect("workers take tasks until this sender is dropped");
-            in_progress += 1;
+        let now = held.next();
+        drop(held);
+        let ended = match now {
+            Next::GoHome => return,
+            Next::Wait => {
+                parker.park();
+                None
+            }
+            Next::Run(number) => Some((number, attempt(|| task(number)))),
+        };
+        let Ok(again) = walk.lock() else { return };
+        held = again;
+        if let Some((number, ended)) = ended {
+            held.finish(number, ended);
+            others.wake();
         }
-        if in_progress == 0 {
-            return;
-        }
-        let (task, attempt) = reports.recv().expect("a worker reports every task it took, panic or not");
-        in_progress -= 1;
-        walk.finish(task, attempt);
     }
 }

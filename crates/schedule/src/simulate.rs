@@ -19,7 +19,7 @@ pub struct Simulation {
     pub at_once: usize,
 }
 
-/// Plays the coordinator with `workers` workers and tasks of the given durations.
+/// Plays a walk by rank with `workers` workers and tasks of the given durations.
 ///
 /// # Panics
 /// When there is no worker, or not one duration per task.

@@ -1,10 +1,11 @@
-//! The coordinator's rules, traced: order, neighbours, results, panics, errors, stopping.
+//! The rules of the walk by rank, traced: order, neighbours, results, panics, errors, stopping.
 
 // A test that unwraps says where it failed, which is all a test has to say.
 #![allow(clippy::unwrap_used)]
 
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::time::{Duration, Instant};
 
 use schedule::{Event, RankedTasks, ScheduleError, Workers, in_rank_order, in_rank_order_observed};
 
@@ -72,7 +73,7 @@ fn results_are_the_same_for_any_workers_and_any_ready_order() {
 fn no_two_neighbours_are_ever_in_progress_together() {
     for plan in variants() {
         for workers in [1, 2, 8] {
-            // Seen from inside the tasks, and once more from the coordinator's own events.
+            // Seen from inside the tasks, and once more from the events told.
             let running = Mutex::new(Vec::new());
             let task = |t: usize| {
                 let mut now = running.lock().unwrap();
@@ -95,8 +96,27 @@ fn no_two_neighbours_are_ever_in_progress_together() {
             };
             in_rank_order_observed(&plan, &Workers::new(workers), &AtomicBool::new(false), task, observe).unwrap();
             assert!(open.is_empty() && most <= workers);
-            assert!(workers == 1 || 1 < most, "with {workers} workers at least two tasks overlap");
         }
+    }
+}
+
+#[test]
+fn as_many_tasks_run_at_once_as_there_are_workers() {
+    for workers in [1, 2, 8] {
+        // The first tasks, which have no neighbours of lower rank, wait for each other.
+        let (plan, arrived) = (four_colours(), AtomicUsize::new(0));
+        let task = |t: usize| {
+            if plan.place(t) < workers {
+                arrived.fetch_add(1, Ordering::Relaxed);
+                let begun = Instant::now();
+                while arrived.load(Ordering::Relaxed) < workers {
+                    assert!(begun.elapsed() < Duration::from_secs(60), "task {t} was left alone");
+                    std::thread::yield_now();
+                }
+            }
+            Ok::<_, String>(())
+        };
+        in_rank_order(&plan, &Workers::new(workers), &AtomicBool::new(false), task, |_, _| ()).unwrap();
     }
 }
 

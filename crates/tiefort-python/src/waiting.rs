@@ -31,7 +31,7 @@ enum News<T> {
 /// Sends progress to the thread that waits.
 struct Told<T>(Sender<News<T>>);
 
-impl<T> Progress for Told<T> {
+impl<T: Send> Progress for Told<T> {
     fn tell(&mut self, event: Event) {
         // A run that was left alone has no listener.
         let _ = self.0.send(News::Event(event));

@@ -11,7 +11,7 @@ use crate::scene::{ORIGIN_M, Scene, Words, assert_same};
 /// Does something once, when a stage begins.
 struct When<'a> {
     stage: Stage,
-    act: Option<Box<dyn FnOnce() + 'a>>,
+    act: Option<Box<dyn FnOnce() + Send + 'a>>,
 }
 
 impl Progress for When<'_> {
@@ -44,7 +44,7 @@ fn scene() -> Scene {
 /// A build during which `act` is done at a stage ends with `expected` and leaves no complete database; the next one, of
 /// files as they were, comes to the bytes of an undisturbed build.
 #[track_caller]
-fn check(stage: Stage, expected: &[&str], act: impl FnOnce(&Scene)) {
+fn check(stage: Stage, expected: &[&str], act: impl FnOnce(&Scene) + Send) {
     let scene = scene();
     drop(scene.build("undisturbed", 1));
     let mut progress = When { stage, act: Some(Box::new(|| act(&scene))) };

@@ -1,9 +1,8 @@
 //! What a run leaves in a database is written by the library, and a database is complete only with all of it.
 
-use std::cell::Cell;
 use std::fs;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 
 use compiler::{Event, Options, Progress, Sharing, Stage, Unit, UnitEnd};
@@ -18,9 +17,9 @@ fn scene() -> Scene {
 }
 
 /// Does something at one event.
-struct At<F: FnMut()>(Event, F);
+struct At<F: FnMut() + Send>(Event, F);
 
-impl<F: FnMut()> Progress for At<F> {
+impl<F: FnMut() + Send> Progress for At<F> {
     fn tell(&mut self, event: Event) {
         if event == self.0 {
             self.1();
@@ -49,11 +48,8 @@ fn complete(scene: &Scene, folder: &str, has_page: bool) -> Report {
 
 /// Builds with a page and a clock that goes on by a second whenever it is looked at.
 fn build_with_page(scene: &Scene, folder: &str, progress: &mut dyn Progress) -> compiler::Built {
-    let (now, stop) = (Cell::new(0), AtomicBool::new(false));
-    let clock = SetBy(|| {
-        now.set(now.get() + 1);
-        Duration::from_secs(now.get())
-    });
+    let (now, stop) = (AtomicU64::new(0), AtomicBool::new(false));
+    let clock = SetBy(|| Duration::from_secs(now.fetch_add(1, Ordering::Relaxed) + 1));
     compiler::build(&scene.job, &scene.path(folder), &Options::new(2, &stop, &clock), progress).unwrap()
 }
 

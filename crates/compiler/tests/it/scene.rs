@@ -244,7 +244,7 @@ impl Clock for Still {
 /// A clock that a test sets.
 pub struct SetBy<F>(pub F);
 
-impl<F: Fn() -> Duration> Clock for SetBy<F> {
+impl<F: Fn() -> Duration + Sync> Clock for SetBy<F> {
     fn wall(&self) -> Duration {
         self.0()
     }

@@ -1,8 +1,7 @@
 //! Processes that share a directory: units of work in any order, workers side by side, the bytes of a build.
 
-use std::cell::Cell;
 use std::path::Path;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use compiler::{CompileError, Event, Options, Progress, Sharing, Stage, Unit, UnitEnd};
@@ -95,9 +94,9 @@ fn perform_in(folder: &Path, job: &Job, units: &[Unit]) -> UnitEnd {
 }
 
 /// Does something when a stage ends.
-struct When<F: FnMut()>(Stage, F);
+struct When<F: FnMut() + Send>(Stage, F);
 
-impl<F: FnMut()> Progress for When<F> {
+impl<F: FnMut() + Send> Progress for When<F> {
     fn tell(&mut self, event: Event) {
         if event == Event::Leave(self.0) {
             self.1();
@@ -106,7 +105,7 @@ impl<F: FnMut()> Progress for When<F> {
 }
 
 /// All units but the surveys of a job in a folder, and `before_sweeping` before its work is swept.
-fn finish_in(folder: &Path, job: &Job, before_sweeping: impl FnMut()) {
+fn finish_in(folder: &Path, job: &Job, before_sweeping: impl FnMut() + Send) {
     perform_in(folder, job, &[Unit::whole(Stage::Allocate)]);
     tiles().into_iter().for_each(|tile| drop(perform_in(folder, job, &[Unit::of(Stage::Refine, tile)])));
     tiles().into_iter().for_each(|tile| drop(perform_in(folder, job, &[Unit::of(Stage::Assemble, tile)])));
@@ -145,9 +144,9 @@ fn as_long_as_a_slow_worker_is_there_no_build_of_another_job_begins() {
     let folder = first.path("area");
     drop(next.build("area", 2));
     // It has read its ground and joined when it looks at the clock for its first lease.
-    let (has_read, is_first) = (Cell::new(false), Cell::new(true));
+    let (has_read, is_first) = (AtomicBool::new(false), AtomicBool::new(true));
     let clock = || {
-        if has_read.get() && is_first.replace(false) {
+        if has_read.load(Ordering::Relaxed) && is_first.swap(false, Ordering::Relaxed) {
             finish_in(&folder, &first.job, || ());
             is_kept_out(&folder, &next.job);
         }
@@ -155,11 +154,11 @@ fn as_long_as_a_slow_worker_is_there_no_build_of_another_job_begins() {
     };
     let second = Duration::from_secs(1);
     let sharing = Sharing { name: "slow", lease: second, pause: second, holding: &|_| {} };
-    let (stop, mut read) = (AtomicBool::new(false), When(Stage::Read, || has_read.set(true)));
+    let (stop, mut read) = (AtomicBool::new(false), When(Stage::Read, || has_read.store(true, Ordering::Relaxed)));
     let clock = SetBy(clock);
     let options = Options { clock: &clock, ..options(1, &stop) };
     let end = compiler::work(&first.job, &folder, &options, &sharing, &mut read).unwrap();
-    assert!(!is_first.get() && end.units == 0 && end.published.is_none(), "{end:?}");
+    assert!(!is_first.load(Ordering::Relaxed) && end.units == 0 && end.published.is_none(), "{end:?}");
     survey_in(&folder, &next.job);
     finish_in(&folder, &next.job, || ());
     assert_same(&next.product("area"), &first.product("area"), "the second job");

@@ -1,11 +1,10 @@
 //! Workers that share a store which fails, tears, delays and forgets, and that are ended at any step: whatever
 //! happens, the build ends in the bytes of an undisturbed one. A run depends on nothing but its seed.
 
-use std::cell::Cell;
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
@@ -98,19 +97,17 @@ fn roads(seed: u64) -> Vec<Drawn> {
 
 /// A clock on which an hour passes between any two looks, and that is tired of waiting after a thousand.
 struct Hourly<'a> {
-    hours: &'a Cell<u64>,
+    hours: &'a AtomicU64,
     stop: &'a AtomicBool,
 }
 
 impl Clock for Hourly<'_> {
     fn wall(&self) -> Duration {
-        self.hours.set(self.hours.get() + 1);
-        Duration::from_secs(3600 * self.hours.get())
+        Duration::from_secs(3600 * (self.hours.fetch_add(1, Ordering::Relaxed) + 1))
     }
 
     fn wait(&self, _time: Duration) {
-        self.hours.set(self.hours.get() + 1);
-        self.stop.store(100_000 < self.hours.get(), Ordering::Relaxed);
+        self.stop.store(100_000 <= self.hours.fetch_add(1, Ordering::Relaxed), Ordering::Relaxed);
     }
 }
 
@@ -118,7 +115,7 @@ impl Clock for Hourly<'_> {
 fn work(job: &Job, memory: &Memory) -> Result<(), CompileError> {
     let folder = Folder::stored(Arc::new(memory.clone()), DIR);
     // Every look at the time is an hour later, so leases of the dead are over at once.
-    let (stop, hours) = (AtomicBool::new(false), Cell::new(0));
+    let (stop, hours) = (AtomicBool::new(false), AtomicU64::new(0));
     let clock = Hourly { hours: &hours, stop: &stop };
     let options = Options { page: false, ..Options::new(1, &stop, &clock) };
     let sharing = Sharing { name: "last", lease: LEASE, pause: Duration::ZERO, holding: &|_| () };
