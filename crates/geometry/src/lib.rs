@@ -17,6 +17,8 @@ mod spans;
 pub use spans::{Span, Spans};
 mod surface;
 pub use surface::{Surface, WORKING_POSTS_MAX};
+mod blocks;
+pub use blocks::Blocks;
 mod scan;
 pub use scan::{largest_numerator, locate, locate_all, rounded, squares_sum, visit_owned, visit_posts, widened};
 mod level;

@@ -1,7 +1,7 @@
 //! Weighted residuals under a triangle: the scan of `geometry`, times the importance mask.
 
 use fearless_simd::Simd;
-use geometry::{Facet, LocalPost, LocalRect, Surface, largest_numerator, locate_all, rounded, squares_sum};
+use geometry::{Blocks, Facet, LocalPost, LocalRect, Surface, largest_numerator, locate_all, rounded, squares_sum};
 use geometry::{locate, visit_owned, visit_posts};
 use terrain::{Dem, Importance, THOUSANDTHS};
 
@@ -13,6 +13,7 @@ pub(crate) struct WeightedSurface<'a, S: Simd> {
     simd: S,
     surface: Surface<'a>,
     everywhere: Surface<'a>,
+    blocks: Blocks<'a>,
     weights: Weights<'a>,
     /// Quanta in one unit of residual.
     unit: u64,
@@ -35,7 +36,14 @@ impl<'a, S: Simd> WeightedSurface<'a, S> {
                 Weights::Varying { importance, blocks, blocks_wide }
             }
         };
-        Self { simd, surface: everywhere.with_candidates(candidates), everywhere, weights, unit: u64::from(unit) }
+        Self {
+            simd,
+            surface: everywhere.with_candidates(candidates),
+            everywhere,
+            blocks: Blocks::of(dem),
+            weights,
+            unit: u64::from(unit),
+        }
     }
 
     /// The one weight under a triangle, if it is known to be uniform there.
@@ -83,7 +91,9 @@ impl<'a, S: Simd> WeightedSurface<'a, S> {
         let facet = self.surface.facet(corners);
         match self.weight_under(&facet) {
             Some(0) => 0,
-            Some(weight) => weight * self.units(&facet, largest_numerator(self.simd, &self.surface, &facet)),
+            Some(weight) => {
+                weight * self.units(&facet, largest_numerator(self.simd, &self.surface, &self.blocks, &facet))
+            }
             None => self.worst_where(corners, |_| true).map_or(0, |(value, _)| value),
         }
     }

@@ -37,6 +37,10 @@ pub fn squares_sum<S: Simd>(simd: S, surface: &Surface, facet: &Facet) -> f64 {
     if is_plain && x1 - x0 < 16 {
         return squares_in_box_16(simd, surface, facet, x0, y0, y1);
     }
+    if is_plain && x1 - x0 < 32 {
+        let west = squares_in_box_16(simd, surface, facet, x0, y0, y1);
+        return west + squares_in_box_16(simd, surface, facet, x0 + 16, y0, y1);
+    }
     squares_in_spans(simd, surface, facet)
 }
 
@@ -90,7 +94,7 @@ pub fn widened<S: Simd>(simd: S, numbers: i32x8<S>) -> f64x8<S> {
     simd.combine_f64x4(low, high)
 }
 
-/// A triangle under 16 columns wide: one load per row, no spans.
+/// The part of a triangle within 16 columns: one load per row, no spans.
 #[inline(always)]
 fn squares_in_box_16<S: Simd>(simd: S, surface: &Surface, facet: &Facet, x0: i32, y0: i32, y1: i32) -> f64 {
     let iota = i32x16::from_slice(simd, &IOTA);

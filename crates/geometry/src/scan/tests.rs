@@ -27,8 +27,8 @@ fn random_facet(surface: &Surface, random: &mut Rng, reach: i32) -> Option<Facet
     }
 }
 
-fn largest_at(level: Level, surface: &Surface, facet: &Facet) -> u64 {
-    dispatch!(level, simd => largest_numerator(simd, surface, facet))
+fn largest_at(level: Level, surface: &Surface, blocks: &Blocks, facet: &Facet) -> u64 {
+    dispatch!(level, simd => largest_numerator(simd, surface, blocks, facet))
 }
 
 fn locate_at(level: Level, surface: &Surface, facet: &Facet, threshold: u64) -> Option<LocalPost> {
@@ -40,7 +40,7 @@ fn squares_at(level: Level, surface: &Surface, facet: &Facet) -> f64 {
 }
 
 #[track_caller]
-fn check(surface: &Surface, facet: &Facet) {
+fn check(surface: &Surface, blocks: &Blocks, facet: &Facet) {
     let mut slow = (0u64, None);
     visit_posts(surface, facet, |post, numerator| {
         if slow.0 < numerator {
@@ -58,7 +58,7 @@ fn check(surface: &Surface, facet: &Facet) {
         }
     });
     for (name, level) in levels_available() {
-        assert_eq!(largest_at(level, surface, facet), slow.0, "largest at {name}, {facet:?}");
+        assert_eq!(largest_at(level, surface, blocks, facet), slow.0, "largest at {name}, {facet:?}");
         assert_eq!(squares_at(level, surface, facet), squares as f64, "squares at {name}, {facet:?}");
         if 0 < quotient {
             assert_eq!(locate_at(level, surface, facet, threshold), first, "locate at {name}, {facet:?}");
@@ -70,13 +70,34 @@ fn check(surface: &Surface, facet: &Facet) {
 fn every_level_finds_what_the_definition_finds() {
     for (relief, reach) in [(5, 7), (3000, 7), (3000, 15), (200_000, 15), (200_000, 40), (900_000, 80)] {
         let dem = rough(90, 75, relief, relief as u64);
-        let surface = Surface::new(&dem);
+        let (surface, blocks) = (Surface::new(&dem), Blocks::of(&dem));
         let confined = surface.with_candidates(LocalRect { south: 1, west: 1, north: 88, east: 73 });
         let mut random = Rng::with_seed(reach as u64);
         for _ in 0..400 {
             if let Some(facet) = random_facet(&surface, &mut random, reach) {
-                check(&surface, &facet);
-                check(&confined, &facet);
+                check(&surface, &blocks, &facet);
+                check(&confined, &blocks, &facet);
+            }
+        }
+    }
+}
+
+/// Hills in which most blocks lie nearer to a wide triangle than its worst post.
+#[test]
+fn every_level_finds_what_the_definition_finds_where_blocks_are_left_out() {
+    let hills = |row: i32, col: i32| {
+        let (north, east) = (f64::from(row), f64::from(col));
+        4e5 * (north / 31.0).sin() * (east / 47.0).cos() + 2e3 * (north * 1.7 + east * 0.9).sin()
+    };
+    let dem = Dem::from_fn(PostRect::of_size(190, 275), |post| Some(hills(post.row, post.col) as i32));
+    let (surface, blocks) = (Surface::new(&dem), Blocks::of(&dem));
+    let confined = surface.with_candidates(LocalRect { south: 1, west: 1, north: 188, east: 273 });
+    let mut random = Rng::with_seed(4);
+    for reach in [40, 130, 260] {
+        for _ in 0..60 {
+            if let Some(facet) = random_facet(&surface, &mut random, reach) {
+                check(&surface, &blocks, &facet);
+                check(&confined, &blocks, &facet);
             }
         }
     }
@@ -85,10 +106,10 @@ fn every_level_finds_what_the_definition_finds() {
 #[test]
 fn a_triangle_in_the_last_row_and_column_stays_in_bounds() {
     let dem = rough(17, 33, 1000, 3);
-    let surface = Surface::new(&dem);
-    check(&surface, &surface.facet([LocalPost::new(15, 31), LocalPost::new(15, 32), LocalPost::new(16, 32)]));
-    check(&surface, &surface.facet([LocalPost::new(16, 31), LocalPost::new(15, 32), LocalPost::new(16, 32)]));
-    check(&surface, &surface.facet([LocalPost::new(0, 0), LocalPost::new(0, 32), LocalPost::new(16, 32)]));
+    let (surface, blocks) = (Surface::new(&dem), Blocks::of(&dem));
+    check(&surface, &blocks, &surface.facet([LocalPost::new(15, 31), LocalPost::new(15, 32), LocalPost::new(16, 32)]));
+    check(&surface, &blocks, &surface.facet([LocalPost::new(16, 31), LocalPost::new(15, 32), LocalPost::new(16, 32)]));
+    check(&surface, &blocks, &surface.facet([LocalPost::new(0, 0), LocalPost::new(0, 32), LocalPost::new(16, 32)]));
 }
 
 #[test]
