@@ -92,6 +92,8 @@ pub fn serve(command: &str, options: &Options, page: Option<Page>) -> Result<(),
     // What waits for the disk has a thread each; places in queues bound how many are at work (answers.rs).
     let runtime = runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build().map_err(refused)?;
     runtime.block_on(async {
+        // Before the address is told: a signal may follow at once.
+        let stopped = Stopped::watch().map_err(refused)?;
         let listener = TcpListener::bind(address).await.map_err(refused)?;
         let address = listener.local_addr().map_err(refused)?;
         terminal::print(&format!("http://{address}/\n"))?;
@@ -104,7 +106,7 @@ pub fn serve(command: &str, options: &Options, page: Option<Page>) -> Result<(),
         let limits =
             Limits { clients: options.clients_max, request: options.request_within, answer: options.answer_within };
         let server = tokio::spawn(connections::serve(listener, all, limits, move |uri| find.find(uri)));
-        let stopped = until_stopped().await;
+        let stopped = stopped.come().await;
         // Clients may hold their connections open for minutes: they end with the process.
         server.abort();
         stopped.map_err(refused)
@@ -113,24 +115,40 @@ pub fn serve(command: &str, options: &Options, page: Option<Page>) -> Result<(),
     Ok(())
 }
 
-/// Waits for Ctrl-C, or for the word of a supervisor.
-async fn until_stopped() -> std::io::Result<()> {
+/// Ctrl-C, or the word of a supervisor.
+struct Stopped {
     #[cfg(unix)]
-    {
-        use tokio::signal::unix::{SignalKind, signal};
-        let (told, mut stopped) = tokio::sync::mpsc::channel(1);
-        for kind in [SignalKind::interrupt(), SignalKind::terminate()] {
-            let (mut signal, told) = (signal(kind)?, told.clone());
-            tokio::spawn(async move {
-                signal.recv().await;
-                let _ = told.send(()).await;
-            });
+    signals: [tokio::signal::unix::Signal; 2],
+}
+
+impl Stopped {
+    /// Begins to watch: from here on a signal does not end the process.
+    fn watch() -> std::io::Result<Self> {
+        #[cfg(unix)]
+        {
+            use tokio::signal::unix::{SignalKind, signal};
+            Ok(Self { signals: [signal(SignalKind::interrupt())?, signal(SignalKind::terminate())?] })
         }
-        stopped.recv().await;
-        Ok(())
+        #[cfg(not(unix))]
+        Ok(Self {})
     }
-    #[cfg(not(unix))]
-    tokio::signal::ctrl_c().await
+
+    /// Waits for it.
+    async fn come(self) -> std::io::Result<()> {
+        #[cfg(unix)]
+        {
+            use std::task::{Context, Poll};
+            let [mut interrupt, mut terminate] = self.signals;
+            let come = |context: &mut Context| match interrupt.poll_recv(context) {
+                Poll::Pending => terminate.poll_recv(context),
+                come => come,
+            };
+            std::future::poll_fn(come).await;
+            Ok(())
+        }
+        #[cfg(not(unix))]
+        tokio::signal::ctrl_c().await
+    }
 }
 
 fn opened(options: &Options) -> Result<BTreeMap<String, Arc<Served>>, Failure> {

@@ -461,6 +461,16 @@ fn only_this_machine_and_the_origins_that_were_named_may_ask() {
 
 #[cfg(unix)]
 #[test]
+fn ctrl_c_ends_it_in_order_from_the_moment_its_address_is_told() {
+    for signal in ["-INT", "-TERM", "-INT", "-TERM"] {
+        let mut server = served();
+        std::process::Command::new("kill").args([signal, &server.process.id().to_string()]).status().unwrap();
+        assert_eq!(server.process.wait().unwrap().code(), Some(0), "{signal}");
+    }
+}
+
+#[cfg(unix)]
+#[test]
 fn ctrl_c_ends_it_within_a_second_with_clients_connected() {
     for signal in ["-INT", "-TERM"] {
         let mut server = served();
