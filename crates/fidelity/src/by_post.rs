@@ -6,7 +6,7 @@ use fearless_simd::{Simd, f64x8, mask64x8, prelude::*};
 
 /// Posts that are written together.
 const LANES: usize = 8;
-const FIRST: [f64; LANES] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
+const IOTA: [f64; LANES] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
 
 /// One value a post, by rows from the south-west post on; NaN where none was written.
 pub(crate) struct ByPost {
@@ -38,7 +38,7 @@ impl ByPost {
         (rows, cols): (Range<usize>, Range<usize>),
         mut value: impl FnMut(usize, usize, f64x8<S>) -> (mask64x8<S>, f64x8<S>),
     ) {
-        let first = f64x8::from_slice(simd, &FIRST);
+        let first = f64x8::from_slice(simd, &IOTA);
         for row in rows {
             for col in cols.clone().step_by(LANES) {
                 let (is_inside, new) = value(row, col, first + f64x8::splat(simd, col as f64));

@@ -71,7 +71,7 @@ impl BlockHeights {
 
 #[cfg(test)]
 mod tests {
-    use terrain::PostRect;
+    use terrain::{Post, PostRect};
 
     use super::*;
 
@@ -81,14 +81,16 @@ mod tests {
         for (high, wide) in [(1, 1), (8, 8), (9, 7), (17, 40), (30, 65)] {
             let dem = Dem::from_fn(PostRect::of_size(high, wide), |_| Some(random.i32(-900..900)));
             let blocks = BlockHeights::of(&dem);
-            for (row, col) in
-                (0..high.div_ceil(SIDE)).flat_map(|row| (0..wide.div_ceil(SIDE)).map(move |col| (row, col)))
-            {
-                let of = |at: usize, end: usize| at * SIDE..(at * SIDE + SIDE).min(end);
-                let (heights, stride) = dem.padded();
-                let posts = of(row, high).flat_map(|y| of(col, wide).map(move |x| heights[y * stride + x]));
-                let (low, top) = blocks.ranges(row, col);
-                assert_eq!((Some(low[0]), Some(top[0])), (posts.clone().min(), posts.max()), "{high} x {wide}");
+            let corners =
+                (0..high).step_by(SIDE).flat_map(|south| (0..wide).step_by(SIDE).map(move |west| (south, west)));
+            for (south, west) in corners {
+                let (north, east) = ((south + SIDE).min(high) - 1, (west + SIDE).min(wide) - 1);
+                let post = |row: usize, col: usize| Post::new(row as i32, col as i32);
+                let of_block = PostRect::new(post(south, west), post(north, east));
+                let heights: Vec<i32> = of_block.posts().map(|post| dem.height(post)).collect();
+                let (low, top) = blocks.ranges(south / SIDE, west / SIDE);
+                let expected = (heights.iter().min(), heights.iter().max());
+                assert_eq!((low.first(), top.first()), expected, "{high} x {wide} at {south}, {west}");
             }
         }
     }

@@ -36,6 +36,29 @@ impl Facet {
         (a.min(b).min(c), a.max(b).max(c), d.min(e).min(f), d.max(e).max(f))
     }
 
+    /// How far an edge, from corner `edge` to the next, runs to the east and to the north.
+    #[inline(always)]
+    pub fn edge(&self, edge: usize) -> (i32, i32) {
+        let next = (edge + 1) % 3;
+        (self.x[next] - self.x[edge], self.y[next] - self.y[edge])
+    }
+
+    /// The function of an edge at a post, times the edge's length its distance to the left: positive inside, 0 on the
+    /// edge. Exact for posts within 2^30 of the corners.
+    #[inline(always)]
+    pub fn edge_at(&self, edge: usize, x: i32, y: i32) -> i64 {
+        let (dx, dy) = self.edge(edge);
+        i64::from(dx) * i64::from(y - self.y[edge]) - i64::from(dy) * i64::from(x - self.x[edge])
+    }
+
+    /// Whether the triangle owns the posts on an edge, away from the far borders: a shift east, then a smaller one
+    /// north, stays inside over edges that run south, or level to the east.
+    #[inline(always)]
+    pub fn owns_edge(&self, edge: usize) -> bool {
+        let (dx, dy) = self.edge(edge);
+        (-dy, dx) > (0, 0)
+    }
+
     /// The plane's height at (0, 0) times `den`.
     #[inline(always)]
     pub fn origin(&self) -> i64 {

@@ -20,7 +20,9 @@ pub use surface::{Surface, WORKING_POSTS_MAX};
 mod blocks;
 pub use blocks::Blocks;
 mod scan;
-pub use scan::{largest_numerator, locate, locate_all, rounded, squares_sum, visit_owned, visit_posts, widened};
+pub use scan::{
+    WIDENED_MAX, largest_numerator, locate, locate_all, rounded, squares_sum, visit_owned, visit_posts, widened,
+};
 mod level;
 pub use level::{levels_available, widest_level};
 mod ridge;

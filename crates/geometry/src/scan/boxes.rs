@@ -29,9 +29,8 @@ macro_rules! box_of_lanes {
                     .wrapping_add(px.wrapping_mul(x0 - facet.x[0]))
                     .wrapping_add(py.wrapping_mul(y0 - facet.y[0]));
                 // den < 2^31 bounds the edge functions over a box this narrow, so they do not wrap.
-                let (first0, dx0, dy0) = edge(facet, 0, 1, x0, y0);
-                let (first1, dx1, dy1) = edge(facet, 1, 2, x0, y0);
-                let (first2, dx2, dy2) = edge(facet, 2, 0, x0, y0);
+                let [first0, first1, first2] = [0, 1, 2].map(|edge| facet.edge_at(edge, x0, y0) as i32);
+                let [(dx0, dy0), (dx1, dy1), (dx2, dy2)] = [0, 1, 2].map(|edge| facet.edge(edge));
                 Self {
                     den: $lanes::splat(simd, den),
                     plane: iota * $lanes::splat(simd, px) + $lanes::splat(simd, start),
@@ -89,13 +88,6 @@ macro_rules! box_of_lanes {
             None
         }
     };
-}
-
-/// Start and steps (north, east) of the function of edge `i`, `j` at (x0, y0).
-#[inline(always)]
-fn edge(facet: &Facet, i: usize, j: usize, x0: i32, y0: i32) -> (i32, i32, i32) {
-    let (dx, dy) = (facet.x[j] - facet.x[i], facet.y[j] - facet.y[i]);
-    (dx * (y0 - facet.y[i]) - dy * (x0 - facet.x[i]), dx, dy)
 }
 
 /// Absolute values by lane; one instruction where the processor has it.

@@ -9,8 +9,9 @@ use fearless_simd::{Simd, f64x8, i32x8, i32x16, prelude::*};
 
 use super::lanes::IOTA;
 use super::squares::widened;
+use super::visit::CandidateSpans;
 use crate::blocks::{BlockHeights, Blocks, SIDE, TOGETHER};
-use crate::{Facet, LocalPost, LocalRect, Spans, Surface};
+use crate::{Facet, LocalPost, LocalRect, Surface};
 
 /// Largest `|n|` over the candidate posts of the closed triangle.
 ///
@@ -69,8 +70,8 @@ impl<'a, S: Simd> Scan<'a, S> {
         let (heights, stride) = surface.rows();
         let last = (SIDE - 1) as i64;
         let slack = [0, 1, 2].map(|edge| {
-            let (dx, dy) = sides(facet, edge);
-            (last * (dx.max(0) + (-dy).max(0))) as f64
+            let (dx, dy) = facet.edge(edge);
+            (last * i64::from(dx.max(0) + (-dy).max(0))) as f64
         });
         Self {
             heights,
@@ -97,9 +98,9 @@ impl<'a, S: Simd> Scan<'a, S> {
     /// The function of an edge at the same posts: below zero outside.
     #[inline(always)]
     fn edge(&self, simd: S, edge: usize, row: i32, col: i32, step: i64) -> f64x8<S> {
-        let (dx, dy) = sides(self.facet, edge);
-        let first = dx * i64::from(row - self.facet.y[edge]) - dy * i64::from(col - self.facet.x[edge]);
-        f64x8::splat(simd, first as f64) - self.iota * f64x8::splat(simd, (dy * step) as f64)
+        let east = i64::from(self.facet.edge(edge).1) * step;
+        let first = self.facet.edge_at(edge, col, row);
+        f64x8::splat(simd, first as f64) - self.iota * f64x8::splat(simd, east as f64)
     }
 
     /// Those of eight blocks, from one on, that reach into the triangle and may hold more than `largest`.
@@ -123,7 +124,7 @@ impl<'a, S: Simd> Scan<'a, S> {
 
     /// The larger, by lane, of `largest` and `|n|` at the posts of one block.
     #[inline(always)]
-    fn block(&self, simd: S, (row, col): (usize, usize), largest: f64x8<S>) -> f64x8<S> {
+    fn block(&self, simd: S, (row, col): (usize, usize), mut largest: f64x8<S>) -> f64x8<S> {
         let (within, west) = (self.within, (col * SIDE) as i32);
         let south = within.south.max((row * SIDE) as i32);
         let north = within.north.min((row * SIDE + SIDE - 1) as i32);
@@ -133,11 +134,10 @@ impl<'a, S: Simd> Scan<'a, S> {
         let mut plane = self.plane(simd, south, west, 1);
         let mut a = is_within.select(self.edge(simd, 0, south, west, 1), outside);
         let (mut b, mut c) = (self.edge(simd, 1, south, west, 1), self.edge(simd, 2, south, west, 1));
-        let north_a = f64x8::splat(simd, sides(self.facet, 0).0 as f64);
-        let north_b = f64x8::splat(simd, sides(self.facet, 1).0 as f64);
-        let north_c = f64x8::splat(simd, sides(self.facet, 2).0 as f64);
+        let north_a = f64x8::splat(simd, f64::from(self.facet.edge(0).0));
+        let north_b = f64x8::splat(simd, f64::from(self.facet.edge(1).0));
+        let north_c = f64x8::splat(simd, f64::from(self.facet.edge(2).0));
         let north_plane = f64x8::splat(simd, self.facet.py as f64);
-        let mut largest = largest;
         let first = south as usize * self.stride + west as usize;
         let rows = &self.heights[first..][..(north - south) as usize * self.stride + SIDE];
         for row in rows.chunks(self.stride) {
@@ -150,13 +150,6 @@ impl<'a, S: Simd> Scan<'a, S> {
         }
         largest
     }
-}
-
-/// How far an edge runs to the east and to the north.
-#[inline(always)]
-fn sides(facet: &Facet, edge: usize) -> (i64, i64) {
-    let next = (edge + 1) % 3;
-    (i64::from(facet.x[next] - facet.x[edge]), i64::from(facet.y[next] - facet.y[edge]))
 }
 
 /// Calls `visit` for the candidate posts whose `|n|` is at least `threshold`, row by row, until it breaks.
@@ -175,17 +168,12 @@ pub fn reached<S: Simd>(
     let stride_lanes = f64x8::splat(simd, facet.px as f64 * 16.0);
     let origin = facet.origin();
     let (heights, stride) = surface.rows();
-    let candidates = surface.candidates();
-    for span in Spans::new(facet) {
-        if span.row < candidates.south || candidates.north < span.row {
-            continue;
-        }
-        let (mut left, right) = (span.left.max(candidates.west), span.right.min(candidates.east));
-        let first = (origin + facet.py * i64::from(span.row) + facet.px * i64::from(left)) as f64;
+    for (row, mut left, right) in CandidateSpans::new(surface, facet) {
+        let first = (origin + facet.py * i64::from(row) + facet.px * i64::from(left)) as f64;
         let first = f64x8::splat(simd, first);
         let (mut plane_low, mut plane_high) = (first + east_low, first + east_high);
         while left <= right {
-            let index = span.row as usize * stride + left as usize;
+            let index = row as usize * stride + left as usize;
             let height = i32x16::from_slice(simd, &heights[index..index + 16]);
             let (low, high) = simd.cvt_f32_i32x16(height).widen();
             let (low, high) = (simd.abs_f64x8(low * den - plane_low), simd.abs_f64x8(high * den - plane_high));
@@ -194,7 +182,7 @@ pub fn reached<S: Simd>(
             let high = (high.simd_ge(threshold) & iota_high.simd_lt(end)).to_bitmask();
             let mut hits = low | high << 8;
             while hits != 0 {
-                visit(LocalPost::new(span.row, left + hits.trailing_zeros() as i32))?;
+                visit(LocalPost::new(row, left + hits.trailing_zeros() as i32))?;
                 hits &= hits - 1;
             }
             (plane_low, plane_high) = (plane_low + stride_lanes, plane_high + stride_lanes);

@@ -19,7 +19,7 @@ use fearless_simd::Simd;
 use crate::{Blocks, Facet, LocalPost, Surface};
 
 pub use lanes::rounded;
-pub use squares::{squares_sum, widened};
+pub use squares::{WIDENED_MAX, squares_sum, widened};
 pub use visit::{visit_owned, visit_posts};
 
 /// Largest `den * relief` for which 32-bit lanes are exact.

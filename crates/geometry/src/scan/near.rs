@@ -5,7 +5,8 @@ use std::ops::ControlFlow;
 use fearless_simd::{Simd, i32x16, prelude::*};
 
 use super::lanes::IOTA;
-use crate::{Facet, LocalPost, Spans, Surface};
+use super::visit::CandidateSpans;
+use crate::{Facet, LocalPost, Surface};
 
 /// Plane numerators of a row, 16 posts at a time.
 struct Lanes<S: Simd> {
@@ -49,15 +50,10 @@ pub fn largest<S: Simd>(simd: S, surface: &Surface, facet: &Facet) -> u64 {
     let zero = i32x16::splat(simd, 0);
     let mut largest = zero;
     let (heights, stride) = surface.rows();
-    let candidates = surface.candidates();
-    for span in Spans::new(facet) {
-        if span.row < candidates.south || candidates.north < span.row {
-            continue;
-        }
-        let (left, right) = (span.left.max(candidates.west), span.right.min(candidates.east));
+    for (row, left, right) in CandidateSpans::new(surface, facet) {
         let mut remaining = right - left + 1;
-        let mut index = span.row as usize * stride + left as usize;
-        let mut plane = lanes.plane(simd, span.row, left);
+        let mut index = row as usize * stride + left as usize;
+        let mut plane = lanes.plane(simd, row, left);
         while 0 < remaining {
             let height = i32x16::from_slice(simd, &heights[index..index + 16]);
             let numerator = simd.abs_i32x16(height * lanes.den - plane);
@@ -84,22 +80,17 @@ pub fn reached<S: Simd>(
     let threshold = i32x16::splat(simd, threshold);
     let lanes = Lanes::new(simd, facet);
     let (heights, stride) = surface.rows();
-    let candidates = surface.candidates();
-    for span in Spans::new(facet) {
-        if span.row < candidates.south || candidates.north < span.row {
-            continue;
-        }
-        let (left, right) = (span.left.max(candidates.west), span.right.min(candidates.east));
+    for (row, left, right) in CandidateSpans::new(surface, facet) {
         let mut col = left;
-        let mut plane = lanes.plane(simd, span.row, left);
+        let mut plane = lanes.plane(simd, row, left);
         while col <= right {
-            let index = span.row as usize * stride + col as usize;
+            let index = row as usize * stride + col as usize;
             let height = i32x16::from_slice(simd, &heights[index..index + 16]);
             let reached = simd.abs_i32x16(height * lanes.den - plane).simd_ge(threshold);
             let inside = lanes.iota.simd_lt(i32x16::splat(simd, right - col + 1));
             let mut hits = (reached & inside).to_bitmask();
             while hits != 0 {
-                visit(LocalPost::new(span.row, col + hits.trailing_zeros() as i32))?;
+                visit(LocalPost::new(row, col + hits.trailing_zeros() as i32))?;
                 hits &= hits - 1;
             }
             plane += lanes.stride;

@@ -44,24 +44,18 @@ pub fn squares_sum<S: Simd>(simd: S, surface: &Surface, facet: &Facet) -> f64 {
     squares_in_spans(simd, surface, facet)
 }
 
-/// Start and steps (north, east) of the function of edge `i`, `j` at (x0, y0), lowered where the triangle does not
-/// own the edge.
+/// The function of an edge at (x0, y0), lowered where the triangle does not own the edge.
 #[inline(always)]
-fn owned_edge(facet: &Facet, i: usize, j: usize, x0: i32, y0: i32) -> (i32, i32, i32) {
-    let (dx, dy) = (facet.x[j] - facet.x[i], facet.y[j] - facet.y[i]);
-    // A shift east, then a smaller one north, stays inside over edges that run south, or level to the east.
-    let is_owned = dy < 0 || (dy == 0 && 0 < dx);
-    let first = dx * (y0 - facet.y[i]) - dy * (x0 - facet.x[i]);
-    (first - i32::from(!is_owned), dx, dy)
+fn owned_edge(facet: &Facet, edge: usize, x0: i32, y0: i32) -> i32 {
+    facet.edge_at(edge, x0, y0) as i32 - i32::from(!facet.owns_edge(edge))
 }
 
 /// A triangle under 8 columns wide: one load per row, no spans.
 #[inline(always)]
 fn squares_in_box_8<S: Simd>(simd: S, surface: &Surface, facet: &Facet, x0: i32, y0: i32, y1: i32) -> f64 {
     let iota = i32x8::from_slice(simd, &IOTA[..8]);
-    let (first0, dx0, dy0) = owned_edge(facet, 0, 1, x0, y0);
-    let (first1, dx1, dy1) = owned_edge(facet, 1, 2, x0, y0);
-    let (first2, dx2, dy2) = owned_edge(facet, 2, 0, x0, y0);
+    let [first0, first1, first2] = [0, 1, 2].map(|edge| owned_edge(facet, edge, x0, y0));
+    let [(dx0, dy0), (dx1, dy1), (dx2, dy2)] = [0, 1, 2].map(|edge| facet.edge(edge));
     let mut w0 = i32x8::splat(simd, first0) - iota * i32x8::splat(simd, dy0);
     let mut w1 = i32x8::splat(simd, first1) - iota * i32x8::splat(simd, dy1);
     let mut w2 = i32x8::splat(simd, first2) - iota * i32x8::splat(simd, dy2);
@@ -87,7 +81,10 @@ fn squares_in_box_8<S: Simd>(simd: S, surface: &Surface, facet: &Facet, x0: i32,
     simd.reduce_sum_f64x8(sum)
 }
 
-/// Eight whole numbers below 2^24 as f64, exactly.
+/// Largest size of a whole number that `widened` takes.
+pub const WIDENED_MAX: i32 = 1 << 24;
+
+/// Eight whole numbers up to `WIDENED_MAX` in size as f64, exactly: each is an `f32` on the way.
 #[inline(always)]
 pub fn widened<S: Simd>(simd: S, numbers: i32x8<S>) -> f64x8<S> {
     let (low, high) = simd.cvt_f32_i32x8(numbers).widen();
@@ -98,9 +95,8 @@ pub fn widened<S: Simd>(simd: S, numbers: i32x8<S>) -> f64x8<S> {
 #[inline(always)]
 fn squares_in_box_16<S: Simd>(simd: S, surface: &Surface, facet: &Facet, x0: i32, y0: i32, y1: i32) -> f64 {
     let iota = i32x16::from_slice(simd, &IOTA);
-    let (first0, dx0, dy0) = owned_edge(facet, 0, 1, x0, y0);
-    let (first1, dx1, dy1) = owned_edge(facet, 1, 2, x0, y0);
-    let (first2, dx2, dy2) = owned_edge(facet, 2, 0, x0, y0);
+    let [first0, first1, first2] = [0, 1, 2].map(|edge| owned_edge(facet, edge, x0, y0));
+    let [(dx0, dy0), (dx1, dy1), (dx2, dy2)] = [0, 1, 2].map(|edge| facet.edge(edge));
     let mut w0 = i32x16::splat(simd, first0) - iota * i32x16::splat(simd, dy0);
     let mut w1 = i32x16::splat(simd, first1) - iota * i32x16::splat(simd, dy1);
     let mut w2 = i32x16::splat(simd, first2) - iota * i32x16::splat(simd, dy2);

@@ -5,11 +5,7 @@ use crate::{Facet, LocalPost, LocalRect, Spans, Surface};
 /// Calls `visit(post, |n|)` for every candidate post of the closed triangle, row by row.
 #[inline(always)]
 pub fn visit_posts(surface: &Surface, facet: &Facet, visit: impl FnMut(LocalPost, u64)) {
-    let candidates = surface.candidates();
-    let rows = Spans::new(facet)
-        .filter(|span| candidates.south <= span.row && span.row <= candidates.north)
-        .map(|span| (span.row, span.left.max(candidates.west), span.right.min(candidates.east)));
-    visit_rows(surface, facet, rows, visit);
+    visit_rows(surface, facet, CandidateSpans::new(surface, facet), visit);
 }
 
 /// Calls `visit(post, |n|)` for every candidate post the triangle owns, row by row.
@@ -36,6 +32,37 @@ fn visit_rows(
             let height = i64::from(heights[row as usize * stride + col as usize]);
             visit(LocalPost::new(row, col), (height * facet.den - plane).unsigned_abs());
             plane += facet.px;
+        }
+    }
+}
+
+/// Rows and inclusive columns of the candidate posts of a closed triangle; empty rows have `right < left`.
+pub(super) struct CandidateSpans {
+    spans: Spans,
+    candidates: LocalRect,
+}
+
+impl CandidateSpans {
+    #[inline(always)]
+    pub fn new(surface: &Surface, facet: &Facet) -> Self {
+        Self { spans: Spans::new(facet), candidates: surface.candidates() }
+    }
+}
+
+impl Iterator for CandidateSpans {
+    type Item = (i32, i32, i32);
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<(i32, i32, i32)> {
+        loop {
+            let span = self.spans.next()?;
+            if self.candidates.north < span.row {
+                return None;
+            }
+            if self.candidates.south <= span.row {
+                let (west, east) = (self.candidates.west, self.candidates.east);
+                return Some((span.row, span.left.max(west), span.right.min(east)));
+            }
         }
     }
 }
