@@ -3,7 +3,7 @@
 //! A flip that raises the squares at first may still lead to a better mesh: on smooth ground most of what is lost sits
 //! in the topology that greedy growth leaves, and plain flips cannot leave it.
 
-use crate::flips::{LEAST_SHARE, is_gain, propose};
+use crate::flips::{Flip, propose};
 use crate::patch::Patch;
 use crate::sweep::Mover;
 use crate::tile_mesh::{Star, TileMesh};
@@ -55,17 +55,15 @@ struct Pass {
 impl Pass {
     fn try_edge(&mut self, sheet: &mut TileMesh, mover: &mut Mover, edge: u32, [a, b, c, d]: [u32; 4]) {
         let rise = |old: f64| RISE_MAX * old.min(self.mean);
-        let Some((old, new)) = propose(sheet, edge, LEAST_SHARE * self.mean, |old| old + rise(old), &mut self.patch)
-        else {
-            return;
-        };
-        if is_gain(old, new) {
+        let limit = |old: f64| old + rise(old);
+        let Some(flip) = propose(sheet, edge, self.mean, limit, &mut self.patch) else { return };
+        if flip.is_gain() {
             sheet.apply(&mut self.patch);
             return;
         }
         self.saved.save(sheet, [c, d, a, b]);
         sheet.apply(&mut self.patch);
-        if self.settles(sheet, mover, new - old, [c, d, a, b]) {
+        if self.settles(sheet, mover, &flip, [c, d, a, b]) {
             for vertex in [a, b, c, d] {
                 sheet.mark_around(vertex, &mut self.star);
             }
@@ -75,9 +73,10 @@ impl Pass {
     }
 
     /// Moves the ends of the new edge, then those of the old one, until the flip has paid or is given up.
-    fn settles(&self, sheet: &mut TileMesh, mover: &mut Mover, rise: f64, vertices: [u32; 4]) -> bool {
-        let least = LEAST_GAIN * self.mean;
-        let mut before = rise + least;
+    fn settles(&self, sheet: &mut TileMesh, mover: &mut Mover, flip: &Flip, vertices: [u32; 4]) -> bool {
+        // What squares have to fall by.
+        let least = LEAST_GAIN * self.mean + flip.needles;
+        let mut before = flip.new_squares - flip.old_squares + least;
         for _ in 0..self.rounds {
             for vertex in vertices {
                 mover.relax(sheet, vertex);

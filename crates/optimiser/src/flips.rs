@@ -1,8 +1,8 @@
-//! Flips: the other diagonal of two triangles, where it fits the ground better.
+//! Flips: the other diagonal of two triangles, where it fits the ground better, needles counted as a misfit.
 
 use crate::form::{Form, squares};
 use crate::patch::Patch;
-use crate::place::{Place, Shape};
+use crate::place::{Place, Shape, is_needle};
 use crate::tile_mesh::{TileMesh, next, previous};
 
 /// Passes at most; hardly any mesh needs more than six.
@@ -10,12 +10,14 @@ const PASSES_MAX: usize = 10;
 /// Part of the two triangles' squares that a flip has to gain: below it lies rounding.
 const LEAST_GAIN: f64 = 1e-4;
 /// Part of a triangle's mean squares below which two triangles are left as they are.
-pub(crate) const LEAST_SHARE: f64 = 0.02;
+const LEAST_SHARE: f64 = 0.02;
+/// What a needle counts beside the squares, in parts of a triangle's mean squares.
+pub(crate) const NEEDLE: f64 = 0.5;
 
 /// Flips edges near changed vertices, until none gains; marks as changed what it touches.
 pub(crate) fn flip_all(sheet: &mut TileMesh) {
     let mut patch = Patch::default();
-    let least = LEAST_SHARE * sheet.mean_squares();
+    let mean = sheet.mean_squares();
     let has_changed = |corner: u32| sheet.vertices.get(corner as usize).is_some_and(|vertex| vertex.has_changed);
     let mut active: Vec<bool> =
         sheet.triangles.iter().map(|triangle| triangle.corners.into_iter().any(has_changed)).collect();
@@ -25,10 +27,9 @@ pub(crate) fn flip_all(sheet: &mut TileMesh) {
         for triangle in 0..sheet.triangles.len() as u32 {
             for k in 0..3 {
                 let edge = 4 * triangle + k;
-                let limit = |old: f64| old * (1.0 - LEAST_GAIN);
                 if !sheet.is_live(triangle)
                     || !is_active(sheet, edge, &active)
-                    || propose(sheet, edge, least, limit, &mut patch).is_none()
+                    || propose(sheet, edge, mean, limit_of_gain, &mut patch).is_none()
                 {
                     continue;
                 }
@@ -44,11 +45,6 @@ pub(crate) fn flip_all(sheet: &mut TileMesh) {
     }
 }
 
-/// Whether squares have fallen by more than rounding.
-pub(crate) fn is_gain(old: f64, new: f64) -> bool {
-    new < old * (1.0 - LEAST_GAIN)
-}
-
 /// Whether an inner edge, looked at from its lower side only, has an active triangle beside it.
 #[inline(always)]
 fn is_active(sheet: &TileMesh, edge: u32, active: &[bool]) -> bool {
@@ -56,19 +52,39 @@ fn is_active(sheet: &TileMesh, edge: u32, active: &[bool]) -> bool {
     !sheet.is_upper_side(edge) && (active[(edge >> 2) as usize] || active[(twin >> 2) as usize])
 }
 
-/// Fills `patch` with the flip of an inner edge, if that is valid and leaves less squares than `limit` says of those
-/// before. Gives the squares of the two triangles before and after; two of `least` or less are left as they are.
+/// Two triangles before and after a flip.
+pub(crate) struct Flip {
+    pub old_squares: f64,
+    pub new_squares: f64,
+    /// What the needles count for that come, less those that go.
+    pub needles: f64,
+}
+
+impl Flip {
+    /// Whether squares and needles count for less afterwards.
+    pub fn is_gain(&self) -> bool {
+        self.new_squares + self.needles < limit_of_gain(self.old_squares)
+    }
+}
+
+/// What is left has to count for less than this to be a gain and not rounding.
+fn limit_of_gain(old_squares: f64) -> f64 {
+    old_squares * (1.0 - LEAST_GAIN)
+}
+
+/// Fills `patch` with the flip of an inner edge, if that is valid and what it leaves, needles included, counts for less
+/// than `limit` says of the squares before. `mean` is a triangle's; two of a small share of it are left as they are.
 #[inline(always)]
 pub(crate) fn propose(
     sheet: &TileMesh,
     edge: u32,
-    least: f64,
+    mean: f64,
     limit: impl Fn(f64) -> f64,
     patch: &mut Patch,
-) -> Option<(f64, f64)> {
+) -> Option<Flip> {
     let twin = sheet.twin(edge);
     let old = sheet.triangles[(edge >> 2) as usize].squares + sheet.triangles[(twin >> 2) as usize].squares;
-    if old <= least {
+    if old <= LEAST_SHARE * mean {
         return None;
     }
     let [a, b, c, d] = sheet.around_edge(edge);
@@ -82,17 +98,24 @@ pub(crate) fn propose(
     let diagonal = moments.edge(at_first[1], at_first[2]);
     let sums = diagonal + sheet.sums_of(next(twin)) + sheet.sums_of(previous(edge));
     let squares_first = squares(&sums, at_first, sheet.heights(first));
-    let bound = limit(old);
-    if bound <= squares_first {
+    let (bound, each) = (limit(old), NEEDLE * mean);
+    // Two needles may go.
+    if bound + 2.0 * each <= squares_first {
         return None;
     }
     let rest = sheet.sums_of(previous(twin)) + sheet.sums_of(next(edge)) - diagonal;
     let new = squares_first + squares(&rest, at_second, sheet.heights(second));
-    if bound <= new {
+    if bound + 2.0 * each <= new {
+        return None;
+    }
+    let count = |triangles: [[Place; 3]; 2]| triangles.iter().filter(|&&[a, b, c]| is_needle(a, b, c)).count() as f64;
+    let of_old = [[a, b, c], [a, d, b]].map(|corners| sheet.places(corners));
+    let needles = each * (count([at_first, at_second]) - count(of_old));
+    if bound <= new + needles {
         return None;
     }
     patch.clear();
     patch.old.extend([edge >> 2, twin >> 2]);
     patch.new.extend([(first, Form::new(&sums, at_first)), (second, Form::new(&rest, at_second))]);
-    Some((old, new))
+    Some(Flip { old_squares: old, new_squares: new, needles })
 }

@@ -86,6 +86,16 @@ fn stands_off(area: i64, a: Place, b: Place) -> bool {
     0 < area && base * LEAST_ALTITUDE_SQUARED <= area as f64 * area as f64
 }
 
+/// Whether a triangle has an angle below 5 degrees: sound, but no ground looks like that.
+pub(crate) fn is_needle(a: Place, b: Place, c: Place) -> bool {
+    /// Squared sine of 5 degrees.
+    const SINE_SQUARED: f64 = 0.007_596_123_493_895_97;
+    let [ab, bc, ca] = [(a, b), (b, c), (c, a)].map(|(from, to)| from.squared_distance(to) as f64);
+    // The sine of an angle is the doubled area over the product of the sides at it, the two longest at the smallest.
+    let doubled_area = Place::orient(a, b, c) as f64;
+    doubled_area * doubled_area * ab.min(bc).min(ca) < SINE_SQUARED * ab * bc * ca
+}
+
 /// What a triangle may look like.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Shape {
@@ -112,6 +122,22 @@ impl Shape {
             Shape::Sound => {
                 let longest = a.squared_distance(b).max(b.squared_distance(c)).max(c.squared_distance(a)) as f64;
                 LEAST_AREA <= area && longest * LEAST_ALTITUDE_SQUARED <= area as f64 * area as f64
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_needle_has_an_angle_below_five_degrees() {
+        // The tangent of 5 degrees is 0.08749.
+        for (height, expected) in [(559, true), (560, false)] {
+            let [a, b, c] = [(0, 0), (6400, 0), (6400, height)].map(|(x, y)| Place::new(x, y));
+            for [a, b, c] in [[a, b, c], [b, c, a], [c, a, b]] {
+                assert_eq!(is_needle(a, b, c), expected, "{height} high");
             }
         }
     }

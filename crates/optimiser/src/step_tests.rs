@@ -6,13 +6,13 @@ use crate::account::Account;
 use crate::deep_flips::deep_flips;
 use crate::deep_thinning::thin_deep;
 use crate::descent::descend;
-use crate::flips::flip_all;
+use crate::flips::{NEEDLE, flip_all};
 use crate::gains::Gains;
 use crate::heights::fit_heights;
 use crate::hold::Hold;
 use crate::insertion::Insertion;
 use crate::parts::{Layout, NONE, Parts};
-use crate::place::{PER_POST, Place};
+use crate::place::{PER_POST, Place, is_needle};
 use crate::removal::Removal;
 use crate::scene::{even, grid, patchy, rough};
 use crate::sweep::Mover;
@@ -118,6 +118,29 @@ fn flips_and_sweeps_never_raise_the_squares() {
             assert!(before <= flipped);
         }
     });
+}
+
+#[test]
+fn flips_take_needles_away_where_the_ground_allows() {
+    let needles = |sheet: &TileMesh| {
+        let corners = sheet.triangles.iter().map(|record| record.corners).filter(|corners| corners[0] != NONE);
+        corners.map(|corners| sheet.places(corners)).filter(|&[a, b, c]| is_needle(a, b, c)).count()
+    };
+    let (mut before, mut after) = (0, 0);
+    with_sheet(|sheet, _| {
+        // Vertices that wander towards crests leave needles.
+        let mut mover = Mover::new(1);
+        sheet.mark_all_changed();
+        mover.sweep(sheet);
+        let count = |sheet: &TileMesh, mean: f64| sheet.squares() + NEEDLE * mean * needles(sheet) as f64;
+        let (mean, had) = (sheet.mean_squares(), needles(sheet));
+        let counted = count(sheet, mean);
+        sheet.mark_all_changed();
+        flip_all(sheet);
+        assert!(count(sheet, mean) < counted);
+        (before, after) = (before + had, after + needles(sheet));
+    });
+    assert!(after < before, "{before} needles before, {after} after");
 }
 
 #[test]
