@@ -3,7 +3,7 @@
 //! A flip that raises the squares at first may still lead to a better mesh: on smooth ground most of what is lost sits
 //! in the topology that greedy growth leaves, and plain flips cannot leave it.
 
-use crate::flips::{Flip, propose};
+use crate::flips::{Flip, Scale, propose};
 use crate::patch::Patch;
 use crate::sweep::Mover;
 use crate::tile_mesh::{Star, TileMesh};
@@ -22,7 +22,9 @@ pub(crate) fn deep_flips(sheet: &mut TileMesh, mover: &mut Mover, rounds: usize)
     mover.aim(mean);
     let had_changed: Vec<bool> = sheet.vertices.iter().map(|vertex| vertex.has_changed).collect();
     sheet.vertices.iter_mut().for_each(|vertex| vertex.has_changed = false);
-    let mut pass = Pass { mean, rounds, patch: Patch::default(), saved: Saved::default(), star: Star::default() };
+    let scale = Scale::of(sheet);
+    let mut pass =
+        Pass { mean, scale, rounds, patch: Patch::default(), saved: Saved::default(), star: Star::default() };
     for triangle in 0..sheet.triangles.len() as u32 {
         for k in 0..3 {
             if !sheet.is_live(triangle) {
@@ -45,6 +47,7 @@ pub(crate) fn deep_flips(sheet: &mut TileMesh, mover: &mut Mover, rounds: usize)
 struct Pass {
     /// Mean squares of a triangle.
     mean: f64,
+    scale: Scale,
     /// Rounds of moves after a flip, at most.
     rounds: usize,
     patch: Patch,
@@ -56,7 +59,7 @@ impl Pass {
     fn try_edge(&mut self, sheet: &mut TileMesh, mover: &mut Mover, edge: u32, [a, b, c, d]: [u32; 4]) {
         let rise = |old: f64| RISE_MAX * old.min(self.mean);
         let limit = |old: f64| old + rise(old);
-        let Some(flip) = propose(sheet, edge, self.mean, limit, &mut self.patch) else { return };
+        let Some(flip) = propose(sheet, edge, &self.scale, limit, &mut self.patch) else { return };
         if flip.is_gain() {
             sheet.apply(&mut self.patch);
             return;

@@ -11,13 +11,34 @@ const PASSES_MAX: usize = 10;
 const LEAST_GAIN: f64 = 1e-4;
 /// Part of a triangle's mean squares below which two triangles are left as they are.
 const LEAST_SHARE: f64 = 0.02;
-/// What a needle counts beside the squares, in parts of a triangle's mean squares.
-pub(crate) const NEEDLE: f64 = 0.5;
+/// What a needle counts beside the squares, in parts of what half of all triangles have.
+const NEEDLE: f64 = 0.5;
+
+/// What flips are judged by, beside squares.
+pub(crate) struct Scale {
+    /// Squares of two triangles that are left as they are.
+    least: f64,
+    /// What a needle counts.
+    pub needle: f64,
+}
+
+impl Scale {
+    /// By mean squares of a triangle, and by their median: beside cliffs a few triangles have most of the squares, and
+    /// a needle must not count for as much as water that is off its level.
+    pub fn of(sheet: &TileMesh) -> Self {
+        Self { least: LEAST_SHARE * sheet.mean_squares(), needle: NEEDLE * sheet.median_squares() }
+    }
+}
 
 /// Flips edges near changed vertices, until none gains; marks as changed what it touches.
 pub(crate) fn flip_all(sheet: &mut TileMesh) {
+    let scale = Scale::of(sheet);
+    flip_all_by(sheet, &scale);
+}
+
+/// The same, judged by some scale.
+pub(crate) fn flip_all_by(sheet: &mut TileMesh, scale: &Scale) {
     let mut patch = Patch::default();
-    let mean = sheet.mean_squares();
     let has_changed = |corner: u32| sheet.vertices.get(corner as usize).is_some_and(|vertex| vertex.has_changed);
     let mut active: Vec<bool> =
         sheet.triangles.iter().map(|triangle| triangle.corners.into_iter().any(has_changed)).collect();
@@ -29,7 +50,7 @@ pub(crate) fn flip_all(sheet: &mut TileMesh) {
                 let edge = 4 * triangle + k;
                 if !sheet.is_live(triangle)
                     || !is_active(sheet, edge, &active)
-                    || propose(sheet, edge, mean, limit_of_gain, &mut patch).is_none()
+                    || propose(sheet, edge, scale, limit_of_gain, &mut patch).is_none()
                 {
                     continue;
                 }
@@ -73,18 +94,18 @@ fn limit_of_gain(old_squares: f64) -> f64 {
 }
 
 /// Fills `patch` with the flip of an inner edge, if that is valid and what it leaves, needles included, counts for less
-/// than `limit` says of the squares before. `mean` is a triangle's; two of a small share of it are left as they are.
+/// than `limit` says of the squares before.
 #[inline(always)]
 pub(crate) fn propose(
     sheet: &TileMesh,
     edge: u32,
-    mean: f64,
+    scale: &Scale,
     limit: impl Fn(f64) -> f64,
     patch: &mut Patch,
 ) -> Option<Flip> {
     let twin = sheet.twin(edge);
     let old = sheet.triangles[(edge >> 2) as usize].squares + sheet.triangles[(twin >> 2) as usize].squares;
-    if old <= LEAST_SHARE * mean {
+    if old <= scale.least {
         return None;
     }
     let [a, b, c, d] = sheet.around_edge(edge);
@@ -98,19 +119,20 @@ pub(crate) fn propose(
     let diagonal = moments.edge(at_first[1], at_first[2]);
     let sums = diagonal + sheet.sums_of(next(twin)) + sheet.sums_of(previous(edge));
     let squares_first = squares(&sums, at_first, sheet.heights(first));
-    let (bound, each) = (limit(old), NEEDLE * mean);
+    let bound = limit(old);
     // Two needles may go.
-    if bound + 2.0 * each <= squares_first {
+    let most = bound + 2.0 * scale.needle;
+    if most <= squares_first {
         return None;
     }
     let rest = sheet.sums_of(previous(twin)) + sheet.sums_of(next(edge)) - diagonal;
     let new = squares_first + squares(&rest, at_second, sheet.heights(second));
-    if bound + 2.0 * each <= new {
+    if most <= new {
         return None;
     }
     let count = |triangles: [[Place; 3]; 2]| triangles.iter().filter(|&&[a, b, c]| is_needle(a, b, c)).count() as f64;
     let of_old = [[a, b, c], [a, d, b]].map(|corners| sheet.places(corners));
-    let needles = each * (count([at_first, at_second]) - count(of_old));
+    let needles = scale.needle * (count([at_first, at_second]) - count(of_old));
     if bound <= new + needles {
         return None;
     }

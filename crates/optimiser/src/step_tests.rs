@@ -6,7 +6,7 @@ use crate::account::Account;
 use crate::deep_flips::deep_flips;
 use crate::deep_thinning::thin_deep;
 use crate::descent::descend;
-use crate::flips::{NEEDLE, flip_all};
+use crate::flips::{Scale, flip_all, flip_all_by};
 use crate::gains::Gains;
 use crate::heights::fit_heights;
 use crate::hold::Hold;
@@ -121,26 +121,30 @@ fn flips_and_sweeps_never_raise_the_squares() {
 }
 
 #[test]
-fn flips_take_needles_away_where_the_ground_allows() {
+fn flips_leave_fewer_needles_where_needles_count() {
     let needles = |sheet: &TileMesh| {
         let corners = sheet.triangles.iter().map(|record| record.corners).filter(|corners| corners[0] != NONE);
         corners.map(|corners| sheet.places(corners)).filter(|&[a, b, c]| is_needle(a, b, c)).count()
     };
-    let (mut before, mut after) = (0, 0);
-    with_sheet(|sheet, _| {
-        // Vertices that wander towards crests leave needles.
-        let mut mover = Mover::new(1);
-        sheet.mark_all_changed();
-        mover.sweep(sheet);
-        let count = |sheet: &TileMesh, mean: f64| sheet.squares() + NEEDLE * mean * needles(sheet) as f64;
-        let (mean, had) = (sheet.mean_squares(), needles(sheet));
-        let counted = count(sheet, mean);
-        sheet.mark_all_changed();
-        flip_all(sheet);
-        assert!(count(sheet, mean) < counted);
-        (before, after) = (before + had, after + needles(sheet));
-    });
-    assert!(after < before, "{before} needles before, {after} after");
+    let left = |part: f64| {
+        let mut left = 0;
+        with_sheet(|sheet, _| {
+            // Vertices that wander towards crests leave needles.
+            sheet.mark_all_changed();
+            Mover::new(1).sweep(sheet);
+            let mut scale = Scale::of(sheet);
+            scale.needle *= part;
+            let count = |sheet: &TileMesh| sheet.squares() + scale.needle * needles(sheet) as f64;
+            let before = count(sheet);
+            sheet.mark_all_changed();
+            flip_all_by(sheet, &scale);
+            assert!(count(sheet) < before);
+            left += needles(sheet);
+        });
+        left
+    };
+    let [counted, free] = [1.0, 0.0].map(left);
+    assert!(counted < free, "{counted} needles where they count, {free} where not");
 }
 
 #[test]

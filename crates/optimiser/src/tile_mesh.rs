@@ -309,6 +309,14 @@ impl<'a> TileMesh<'a> {
         self.squares() / self.triangle_count as f64
     }
 
+    /// Squares that half of the triangles do not exceed.
+    pub fn median_squares(&self) -> f64 {
+        let live = self.triangles.iter().filter(|record| record.corners[0] != NONE);
+        let mut squares: Vec<f64> = live.map(|record| record.squares).collect();
+        let middle = squares.len() / 2;
+        *squares.select_nth_unstable_by(middle, f64::total_cmp).1
+    }
+
     /// Sum of squared residuals over all posts, whatever their weights.
     pub fn plain_squares(&self) -> f64 {
         if self.ground.squares_are_plain() {
