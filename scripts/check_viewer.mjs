@@ -19,6 +19,7 @@ import { housed, turned } from "./viewer/buildings.mjs";
 import { draped } from "./viewer/imagery.mjs";
 import * as tools from "./viewer/tools.mjs";
 import { curved, tracked } from "./viewer/tracks.mjs";
+import { until } from "./viewer/wait.mjs";
 
 const root = join(dirname(fileURLToPath(import.meta.url)), "..");
 const library = createRequire(join(root, "crates", "tiefort", "viewer", "package.json")).resolve("puppeteer-core");
@@ -220,7 +221,7 @@ async function check() {
 
 async function open(page, start, of = address) {
   await page.goto(`${of}?${start}`, { timeout: 120_000 });
-  await page.waitForFunction("window.tiefort !== undefined", { timeout: 120_000 });
+  await until(page, "window.tiefort !== undefined");
   await settled(page);
 }
 
@@ -230,11 +231,11 @@ function state(page) {
 
 /** Waits until all that is wanted is there, and two pictures more. */
 async function settled(page) {
-  await page.waitForFunction(() => {
+  await until(page, () => {
     const { block, modules, waiting, height, fault, lit } = window.tiefort.state();
     const wanted = (block[2] - block[0]) * (block[3] - block[1]);
     return fault !== null || (lit && height !== null && waiting === 0 && modules === wanted);
-  }, { timeout: 120_000, polling: 100 });
+  });
   // What stands still is drawn finely a moment later.
   await pause(STILL_MS);
   await page.evaluate(() => new Promise((end) => requestAnimationFrame(() => requestAnimationFrame(end))));
@@ -320,7 +321,7 @@ async function drive(page, metres) {
   }
   await page.keyboard.up("ShiftLeft");
   await page.keyboard.up("KeyW");
-  await page.waitForFunction("window.tiefort.state().speed === 0", { timeout: 60_000 });
+  await until(page, "window.tiefort.state().speed === 0", 60_000);
   const after = await state(page);
   const gone = Math.hypot(after.east - before.east, after.north - before.north);
   const frame = frames.sort((a, b) => a - b)[Math.floor(frames.length / 2)];
@@ -354,7 +355,7 @@ async function shown(page) {
   await picture(page, "without-edges");
   await page.keyboard.press("KeyG");
   const isRead = () => !document.getElementById("note").textContent.startsWith("reading");
-  await page.waitForFunction(isRead, { timeout: 120_000 });
+  await until(page, isRead);
   const { showsDem } = await state(page);
   const note = await page.$eval("#note", (box) => box.textContent);
   expect(showsDem || note.includes("not at hand"), showsDem ? "the DEM is shown" : `no DEM, and told so: ${note}`);
@@ -412,7 +413,7 @@ async function bridged(page) {
   await picture(page, "on-deck");
   const far = Math.min(150, 0.2 * long.length);
   await page.keyboard.down("KeyW");
-  await page.waitForFunction(`${far} < window.tiefort.state().driven`, { timeout: 120_000 });
+  await until(page, `${far} < window.tiefort.state().driven`);
   const along = await state(page);
   await page.keyboard.up("KeyW");
   // On a slow machine it has driven past the end of a short one before it is asked.

@@ -1,5 +1,7 @@
 // What check_viewer.mjs looks at: that the ground is whole from high above in all directions, and buildings.
 
+import { until } from "./wait.mjs";
+
 const state = (page) => page.evaluate("window.tiefort.state()");
 
 /** From high above, all around, where fine ground meets coarse and the area its border, no pixel sees the sky. */
@@ -37,7 +39,7 @@ export async function housed(page, { expect, picture, pause, serveJob, settled, 
   try {
     const at = `east=505550&north=3875500&heading=35&height=${HEIGHT_M}&pitch=-12&range=1000`;
     await open(page, at, other.address);
-    await page.waitForFunction("window.tiefort.state().houses.drawn === 4", { timeout: 60_000 });
+    await until(page, "window.tiefort.state().houses.drawn === 4", 60_000);
     await settled(page);
     await pause(700);
     const { houses: counts } = await state(page);

@@ -3,6 +3,7 @@
 import { spawn } from "node:child_process";
 import { writeFileSync } from "node:fs";
 import { join } from "node:path";
+import { until } from "./wait.mjs";
 
 const state = (page) => page.evaluate("window.tiefort.state()");
 /** Metres of a pixel, and pixels along a side. */
@@ -103,7 +104,7 @@ export async function draped(told) {
       await page.goto(`${address}?${words}`, { timeout: 120_000 });
       const isThere = "window.tiefort?.state().imagery.levels !== 0 && window.tiefort.state().imagery.isWhole"
         + " && window.tiefort.state().lit && window.tiefort.state().waiting === 0";
-      await page.waitForFunction(isThere, { timeout: 120_000 });
+      await until(page, isThere);
       await page.evaluate(() => document.getElementById("keys").classList.add("gone"));
       await pause(1500);
     };

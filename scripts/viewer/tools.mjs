@@ -1,5 +1,7 @@
 // What check_viewer.mjs looks at besides driving: the beginning, panels, a phone, the tools, a link opened again.
 
+import { until } from "./wait.mjs";
+
 const KEYS_OF_COLORS = ["height", "going", "residuals", "limits", "levels"];
 const near = (a, b, most) => Math.abs(a - b) <= most;
 const text = (page, id) => page.$eval(`#${id}`, (box) => box.textContent);
@@ -9,9 +11,9 @@ const state = (page) => page.evaluate("window.tiefort.state()");
 export async function begun(page, { address, expect, picture, pause }) {
   const since = Date.now();
   await page.goto(address, { timeout: 120_000 });
-  await page.waitForFunction("window.tiefort !== undefined && 0 < window.tiefort.state().count", { timeout: 120_000 });
+  await until(page, "window.tiefort !== undefined && 0 < window.tiefort.state().count");
   console.log(`     first picture after ${Date.now() - since} ms`);
-  await page.waitForFunction("window.tiefort.state().height !== null && window.tiefort.state().lit");
+  await until(page, "window.tiefort.state().height !== null && window.tiefort.state().lit");
   const first = await state(page);
   await pause(1500);
   const second = await state(page), gone = Math.hypot(second.east - first.east, second.north - first.north);
@@ -54,7 +56,7 @@ export async function framed(page, { expect, picture, pause, size }) {
   await picture(page, "phone");
   await page.setViewport({ ...size, hasTouch: true });
   // A page that is turned into a phone's, and back, begins again.
-  await page.waitForFunction("window.tiefort?.state().lit", { timeout: 60_000 });
+  await until(page, "window.tiefort?.state().lit", 60_000);
   await page.keyboard.press("?");
   await pause(300);
   expect(await page.$eval("#all", (box) => box.open && 10 < box.querySelectorAll("dt").length), "? lists the keys");
@@ -79,7 +81,7 @@ export async function asked(page, { expect, picture, pause, run, folder, size })
   await page.keyboard.press("KeyR");
   await page.mouse.click(size.width / 2 - 60, size.height * 0.9);
   await page.mouse.click(size.width / 2 + 160, size.height * 0.72);
-  await page.waitForFunction("window.tiefort.state().answer !== null", { timeout: 30_000 });
+  await until(page, "window.tiefort.state().answer !== null", 30_000);
   const { answer: line } = await state(page);
   const end = ([east, north]) => `${east.toFixed(3)},${north.toFixed(3)},2.5`;
   const said = run(["sight", folder, "--from", end(line.from), "--to", end(line.to)]);
@@ -91,13 +93,13 @@ export async function asked(page, { expect, picture, pause, run, folder, size })
   await page.keyboard.press("KeyP");
   await page.mouse.click(size.width / 2 - 60, size.height * 0.9);
   await page.mouse.click(size.width / 2 + 160, size.height * 0.72);
-  await page.waitForFunction("window.tiefort.state().answer?.along_m !== undefined", { timeout: 30_000 });
+  await until(page, "window.tiefort.state().answer?.along_m !== undefined", 30_000);
   expect(/km; climbs \d+ m/.test(await text(page, "answer")), `a profile tells: ${await text(page, "answer")}`);
   await picture(page, "profile");
   await page.keyboard.press("Escape");
   const place = await state(page);
   await page.keyboard.press("KeyV");
-  await page.waitForFunction("window.tiefort.state().answer?.seen !== undefined", { timeout: 30_000 });
+  await until(page, "window.tiefort.state().answer?.seen !== undefined", 30_000);
   const { answer: seen } = await state(page);
   expect(0 < seen.seen && seen.seen < seen.places, `a viewshed of ${seen.seen} in ${seen.places} places`);
   await pause(700);

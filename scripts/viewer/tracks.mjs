@@ -1,5 +1,7 @@
 // What check_viewer.mjs looks at: a track as GPX, and lines of sight over the round earth.
 
+import { until } from "./wait.mjs";
+
 const state = (page) => page.evaluate("window.tiefort.state()");
 
 /** A track that is saved as GPX has places in degrees, where the observer stands. */
@@ -12,7 +14,7 @@ export async function tracked(page, { expect, pause }) {
   await page.keyboard.press("KeyZ");
   await pause(2300);
   await page.keyboard.press("KeyZ");
-  await page.waitForFunction("window.saved !== undefined", { timeout: 30_000 });
+  await until(page, "window.saved !== undefined", 30_000);
   const { east, north } = await state(page);
   const where = await page.evaluate(async (place) => (await fetch(`/api/where/${place}`)).json(), `${east},${north}`);
   const text = await page.evaluate(() => window.saved.text());
@@ -31,7 +33,7 @@ export async function curved(page, { expect, run, folder, size }) {
     await page.keyboard.press("KeyR");
     await page.mouse.click(size.width / 2 - 60, size.height * 0.9);
     await page.mouse.click(size.width / 2 + 160, size.height * 0.85);
-    await page.waitForFunction("window.tiefort.state().answer?.clearance_m !== undefined", { timeout: 30_000 });
+    await until(page, "window.tiefort.state().answer?.clearance_m !== undefined", 30_000);
     const { answer: line } = await state(page), end = ([east, north]) => `${east.toFixed(3)},${north.toFixed(3)},2.5`;
     const words = ["sight", folder, "--from", end(line.from), "--to", end(line.to)];
     const said = run(isRound ? [...words, "--curvature"] : words);
