@@ -202,6 +202,13 @@ impl<'a> Session<'a> {
         not_ready(unit, need)
     }
 
+    /// Removes what processes left that were ended before they could: nothing of it is needed once the build is
+    /// published.
+    pub fn sweep(&self) -> Result<(), CompileError> {
+        self.work.sweep();
+        Ok(self.run.database.sweep()?)
+    }
+
     /// Declares the database complete, after whatever is still to be done.
     pub fn publish(self, progress: &mut Stopwatch) -> Result<Built, CompileError> {
         self.run.database.sweep()?;
@@ -238,6 +245,7 @@ pub fn perform(
     let progress = &mut Stopwatch::start(options.clock, progress);
     let mut session = Session::join(job, &folder.into(), options, progress)?;
     if session.is_finished {
+        session.sweep()?;
         return Ok(UnitEnd::Finished);
     }
     for &unit in units {

@@ -56,7 +56,7 @@ pub fn work(
     let progress = &mut Stopwatch::start(options.clock, progress);
     let session = Session::join(job, &folder.into(), options, progress)?;
     if session.is_finished {
-        session.work.sweep();
+        session.sweep()?;
         return Ok(WorkerEnd { units: 0, published: None });
     }
     let mut worker = Worker {
@@ -74,7 +74,7 @@ pub fn work(
         }
         if worker.is_published() {
             // The process that published may have been ended before it swept up.
-            worker.session.work.sweep();
+            worker.session.sweep()?;
             return Ok(WorkerEnd { units: worker.units, published: None });
         }
         let next = match worker.next() {

@@ -82,6 +82,25 @@ fn a_published_tile_that_is_damaged_takes_its_mark_back() {
     assert_same(&scene.product("alone"), &scene.product("area"), "after damage");
 }
 
+#[test]
+fn who_comes_to_a_finished_build_removes_what_the_process_that_published_left() {
+    let scene = Scene::new(&Words { tin: "method = \"greedy\"\nallocation = \"equal\"".into(), ..Words::sample() });
+    drop(scene.build("alone", 2));
+    let (area, mut of_run) = (scene.path("area"), None);
+    finish_in(&area, &scene.job, || of_run = std::fs::read_dir(area.join("work")).unwrap().next());
+    let done = of_run.unwrap().unwrap().path().join("done");
+    // As if it was ended between its last two steps: `database.json` says complete, and work is still there.
+    for unit in [Unit::whole(Stage::Publish), Unit::of(Stage::Refine, tile(0, 0))] {
+        std::fs::create_dir_all(&done).unwrap();
+        std::fs::write(done.join("allocate"), b"0").unwrap();
+        std::fs::write(area.join(".tiefort-x.part"), b"half").unwrap();
+        let end = perform(&scene, &[unit]).unwrap();
+        assert!(matches!(end, UnitEnd::Finished), "{unit}: {end:?}");
+        assert!(!area.join("work").exists() && !area.join(".tiefort-x.part").exists(), "{unit}");
+        assert_same(&scene.product("alone"), &scene.product("area"), "after it was swept");
+    }
+}
+
 /// Two jobs of one area, whose bytes differ.
 fn two_jobs() -> [Scene; 2] {
     let equal = "method = \"greedy\"\nallocation = \"equal\"";
