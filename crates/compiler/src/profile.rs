@@ -61,15 +61,15 @@ impl Artifact for Profiling<'_> {
 
     fn make(&self, _key: &Key, stamp: &Stamp) -> Result<(FileStamp, Profile), CompileError> {
         let steps = self.read.features.site.lattice.steps_per_post();
-        let heights = self.stations().map(|place| height_at(&self.window.dem, steps, place)).collect();
+        let heights = self.stations().map(|place| Some(height_at(&self.window.dem, steps, place))).collect();
         let profile = Profile { tile: self.tile, heights };
         Ok((self.run.database.write_profile(stamp, &profile)?, profile))
     }
 }
 
-/// The height of a DEM at a place between its posts, bilinear and rounded to quanta; nothing where one of the posts
-/// around it is a void.
-fn height_at(dem: &Dem, steps: i32, place: Place) -> Option<i32> {
+/// The height of a DEM at a place between its posts, bilinear and rounded to quanta: over a hole that of the surface
+/// that closes it.
+fn height_at(dem: &Dem, steps: i32, place: Place) -> i32 {
     let (row, col) = (place.row.div_euclid(steps), place.col.div_euclid(steps));
     let (north, east) = (i64::from(place.row.rem_euclid(steps)), i64::from(place.col.rem_euclid(steps)));
     let steps = i64::from(steps);
@@ -79,15 +79,10 @@ fn height_at(dem: &Dem, steps: i32, place: Place) -> Option<i32> {
         (Post::new(row + 1, col), north * (steps - east)),
         (Post::new(row + 1, col + 1), north * east),
     ];
-    let mut sum = 0;
-    for (post, share) in corners.into_iter().filter(|(_, share)| *share != 0) {
-        if dem.is_void(post) {
-            return None;
-        }
-        sum += share * i64::from(dem.height(post));
-    }
+    let needed = corners.into_iter().filter(|(_, share)| *share != 0);
+    let sum: i64 = needed.map(|(post, share)| share * i64::from(dem.height(post))).sum();
     let whole = steps * steps;
-    Some((2 * sum + whole).div_euclid(2 * whole) as i32)
+    (2 * sum + whole).div_euclid(2 * whole) as i32
 }
 
 #[cfg(test)]
@@ -96,13 +91,14 @@ mod tests {
     use terrain::PostRect;
 
     #[test]
-    fn a_height_between_posts_is_bilinear_and_a_void_beside_it_is_one() {
+    fn a_height_between_posts_is_bilinear_over_holes_too() {
         let rect = PostRect::of_size(3, 3);
-        let dem = Dem::from_fn(rect, |post| (post != Post::new(2, 2)).then_some(100 * post.row + 10 * post.col));
+        let hole = Post::new(2, 2);
+        let mut dem = Dem::from_fn(rect, |post| (post != hole).then_some(100 * post.row + 10 * post.col));
+        dem.fill_voids(|_| 300);
         let at = |row, col| height_at(&dem, 64, Place::new(row, col));
-        assert_eq!((at(0, 0), at(64, 32), at(32, 32), at(1, 0)), (Some(0), Some(105), Some(55), Some(2)));
+        assert_eq!((at(0, 0), at(64, 32), at(32, 32), at(1, 0)), (0, 105, 55, 2));
         // The last post of a row needs none beyond it.
-        assert_eq!((at(0, 128), at(32, 128)), (Some(20), Some(70)));
-        assert_eq!((at(127, 127), at(128, 127), at(128, 64)), (None, None, Some(210)));
+        assert_eq!((at(0, 128), at(32, 128), at(128, 64), at(128, 96)), (20, 70, 210, 255));
     }
 }

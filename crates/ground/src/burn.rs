@@ -6,7 +6,7 @@
 use std::collections::HashMap;
 
 use features::{CUT_RUN, FILL_RUN};
-use terrain::{Dem, HOLE_CLASS, Importance, LatticePoint, Post, PostRect, SurfaceGround, TileFeatures};
+use terrain::{Dem, Importance, LatticePoint, Post, PostRect, SurfaceGround, TileFeatures};
 use terrain::{Spacing, Vertex};
 
 use crate::window::Window;
@@ -31,7 +31,9 @@ pub fn burn(window: Window, features: &TileFeatures, tile: PostRect, spacing: Sp
     burning.shores();
     let Burning { rect, heights, class_of, .. } = burning;
     let importance = importance(&window.importance, rect, &class_of);
-    let dem = Dem::from_fn(rect, |post| heights[rect.index(post)]);
+    let mut dem = Dem::from_fn(rect, |post| heights[rect.index(post)]);
+    // Holes keep the heights that close the surface over them.
+    dem.fill_voids(|post| window.dem.height(post));
     let is_changed =
         |post: &Post| dem.is_void(*post) != window.dem.is_void(*post) || dem.height(*post) != window.dem.height(*post);
     let changed = rect.posts().filter(|post| class_of[rect.index(*post)].is_some() || is_changed(post));
@@ -42,14 +44,14 @@ pub fn burn(window: Window, features: &TileFeatures, tile: PostRect, spacing: Sp
     Window { dem, importance, featured, ..window }
 }
 
-/// Posts on features weigh nothing and have the class of the feature.
+/// Posts on features weigh nothing and have the class of the feature, also where a lake closes a hole.
 fn importance(before: &Importance, rect: PostRect, class_of: &[Option<u8>]) -> Importance {
     if class_of.iter().all(Option::is_none) {
         return before.clone();
     }
     let of = |post: Post| match class_of[rect.index(post)] {
-        Some(class) if before.class(post) != HOLE_CLASS => (0, class),
-        _ => (before.weight(post), before.class(post)),
+        Some(class) => (0, class),
+        None => (before.weight(post), before.class(post)),
     };
     let (weights, classes) = rect.posts().map(of).unzip();
     Importance::new(rect, weights, classes)
@@ -286,7 +288,7 @@ fn around(row: i32, col: i32, away: i32) -> Vec<(i32, i32)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use terrain::{FeatureSurface, Features, TileId};
+    use terrain::{FeatureSurface, Features, HOLE_CLASS, TileId};
 
     const STEPS: i32 = 64;
 
@@ -338,10 +340,32 @@ mod tests {
     fn a_post_on_a_road_has_its_height_and_a_hole_stays_one() {
         let ring = vec![vertex(9.0, 2.0, 100), vertex(9.0, 18.0, 260), vertex(11.0, 18.0, 260), vertex(11.0, 2.0, 100)];
         let road = features(vec![surface(SurfaceGround::Road, ring)], Vec::new());
-        let window = burned(window(|post| (post != Post::new(10, 7)).then_some(9)), &road);
+        let hole = Post::new(10, 7);
+        let mut ground = window(|post| (post != hole).then_some(9));
+        ground.dem.fill_voids(|_| 8);
+        let window = burned(ground, &road);
         assert_eq!(window.dem.height(Post::new(10, 10)), 180);
         assert_eq!(window.dem.height(Post::new(12, 10)), 9);
-        assert!(window.dem.is_void(Post::new(10, 7)));
+        assert!(window.dem.is_void(hole));
+        assert_eq!(window.dem.height(hole), 8, "the surface over a hole is where it was");
+    }
+
+    #[test]
+    fn a_lake_closes_a_hole_with_its_level_and_class() {
+        let corners = [(4.5, 4.5), (4.5, 15.5), (15.5, 15.5), (15.5, 4.5)];
+        let ring = corners.map(|(row, col)| vertex(row, col, 500)).to_vec();
+        let is_hole = |post: Post| 10 <= post.col && 10 <= post.row;
+        let mut ground = window(|post| (!is_hole(post)).then_some(400));
+        let classes = ground.dem.rect().posts().map(|post| if is_hole(post) { HOLE_CLASS } else { 0 }).collect();
+        ground.importance = Importance::new(ground.dem.rect(), vec![1000; ground.dem.rect().post_count()], classes);
+        ground.dem.fill_voids(|_| 399);
+        let window = burned(ground, &features(vec![surface(SurfaceGround::Lake, ring)], Vec::new()));
+        for post in window.dem.rect().posts() {
+            let is_of_hole = window.importance.class(post) == HOLE_CLASS;
+            assert_eq!(window.dem.is_void(post), is_of_hole, "{post}: a post of the class of holes has no height");
+        }
+        let at = |row, col| (window.dem.height(Post::new(row, col)), window.importance.class(Post::new(row, col)));
+        assert_eq!((at(12, 12), at(12, 18)), ((500, 4), (399, HOLE_CLASS)));
     }
 
     #[test]

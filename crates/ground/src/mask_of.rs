@@ -31,12 +31,28 @@ impl Fault {
 /// Where water is level it has no residual, so the weight costs points along its shore only. Measured under a mean of
 /// 32 triangles, on a sea coast and on 60 lakes laid on slopes: of 120,018 water posts 3,360 lay more than 0.5 m off
 /// their level at 1 time, 211 at 8 times and none at 32, for 0.2 and 1 % more RMS residual on land.
-const WATER_TIMES: u16 = 32;
+const WATER_TIMES: u32 = 32;
 
-/// The weight at which water lies level, in thousandths, unless the job's own is larger; weights end at 65.535.
-fn water_weight(job: &Job, spec: &WaterSpec) -> u16 {
-    let heaviest = job.importance.heaviest().max(THOUSANDTHS / WATER_TIMES);
-    heaviest.saturating_mul(WATER_TIMES).max(spec.weight.unwrap_or(0))
+/// Weights of a mask in thousandths, which end at 65.535. Only what they are to one another counts: where water has to
+/// weigh more than that, all of them are made smaller.
+struct Weights {
+    /// The weight at which water lies level, unless the job's own is larger; 0 where there is no water.
+    water: u32,
+}
+
+impl Weights {
+    fn of(job: &Job) -> Self {
+        let heaviest = u32::from(job.importance.heaviest()).max(u32::from(THOUSANDTHS) / WATER_TIMES);
+        let water = |spec: &WaterSpec| (WATER_TIMES * heaviest).max(spec.weight.unwrap_or(0).into());
+        Self { water: job.dem.water.as_ref().map_or(0, water) }
+    }
+
+    /// A weight of the job as the mask has it. One that is not 0 stays so.
+    fn scaled(&self, weight: u32) -> u16 {
+        let most = self.water.max(u16::MAX.into());
+        let scaled = (u64::from(weight) * u64::from(u16::MAX) + u64::from(most) / 2) / u64::from(most);
+        u16::try_from(scaled).unwrap_or(u16::MAX).max(u16::from(0 < weight))
+    }
 }
 
 /// What a mask is opened for.
@@ -54,17 +70,19 @@ impl Opening<'_> {
     /// When a file cannot be used.
     pub fn mask(&self, water: Vec<Polygon>) -> Result<Mask<'static>, GroundError> {
         let (job, classes) = (self.job, &self.job.importance.classes);
+        let weights = Weights::of(job);
         let mut areas = Vec::new();
         for spec in &job.importance.areas {
-            let (class, weight) = (classes[usize::from(spec.class)].clone(), spec.weight);
+            let (class, weight) = (classes[usize::from(spec.class)].clone(), weights.scaled(spec.weight.into()));
             areas.push(mask::Area { class, weight, shape: self.shape(spec)? });
         }
         let water = job.dem.water.as_ref().map(|spec| mask::Area {
             class: classes[usize::from(spec.class)].clone(),
-            weight: water_weight(job, spec),
+            weight: weights.scaled(weights.water),
             shape: Shape::Polygons(water),
         });
         let ImportanceSpec { default_weight, smooth, .. } = job.importance;
+        let default_weight = weights.scaled(default_weight.into());
         Ok(Mask { default_weight, areas, smooth, over: water.into_iter().collect() })
     }
 

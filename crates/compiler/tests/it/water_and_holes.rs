@@ -4,8 +4,9 @@ use std::path::Path;
 
 use terrain::{Dem, HOLE_CLASS, Post, PostRect};
 
+use crate::features::{Drawn, geojson, line, polygon};
 use crate::product::Product;
-use crate::scene::{ORIGIN_M, SIDE_CELLS, Scene, Words, sample_dem};
+use crate::scene::{ORIGIN_M, SIDE_CELLS, Scene, Words, sample_dem, write_dem};
 use crate::surface::sums_of_product;
 
 /// Posts of a lake over the middle of the area, where four tiles meet; south and west of it counts.
@@ -60,16 +61,25 @@ fn water_lies_level_beside_ground_of_several_weights_and_by_every_method() {
 }
 
 #[test]
+fn water_lies_level_beside_ground_of_any_weight() {
+    let plains = |weight: f64| {
+        format!(
+            "default = {weight}\nareas = [{{ slope_above_percent = 20, smooth_m = 500, class = \"steep\", weight = 1 }}]"
+        )
+    };
+    // Above 2.047 all weights are made smaller, so that water can weigh more.
+    [2.0, 2.1, 8.0, 20.0, 65.535].iter().for_each(|&weight| check_level("", &plains(weight), "", 0.5));
+    check_level("", &plains(8.0), "method = \"greedy\"", 0.5);
+}
+
+#[test]
 fn triangles_over_a_hole_have_its_class_and_others_have_theirs() {
     let words = Words {
         dem: "sources = [\"dem.tif\"]\nvoids = \"hole\"".into(),
         importance: "areas = [{ slope_above_percent = 20, smooth_m = 500, class = \"steep\", weight = 1 }]".into(),
         ..tinned("")
     };
-    let sound = sample_dem(words.grid(), 1);
-    let is_hole = |post: Post| (30..90).contains(&post.row) && (50..115).contains(&post.col);
-    let holed = Dem::from_fn(sound.rect(), |post| (!is_hole(post)).then(|| sound.height(post)));
-    let scene = Scene::on(&words, &holed);
+    let scene = Scene::on(&words, &holed(&words));
     let report = scene.build("area", 2).report;
     let hole = report.classes.last().unwrap();
     assert_eq!((hole.name.as_str(), hole.posts), ("hole", 0));
@@ -82,4 +92,53 @@ fn triangles_over_a_hole_have_its_class_and_others_have_theirs() {
     assert!(!any_of(0, 0) && !any_of(7, 8), "outside");
     assert!(any_of(1, 3) && !all_of(1, 3), "across");
     assert_eq!(SIDE_CELLS, 20, "what the places above were counted with");
+}
+
+/// Ground with a square hole of 65 x 60 posts.
+fn holed(words: &Words) -> Dem {
+    let sound = sample_dem(words.grid(), 1);
+    let is_hole = |post: Post| (30..90).contains(&post.row) && (50..115).contains(&post.col);
+    Dem::from_fn(sound.rect(), |post| (!is_hole(post)).then(|| sound.height(post)))
+}
+
+/// Builds with these features, and looks at every height that a simulator reads.
+#[track_caller]
+fn check_features_over_a_hole(voids: &str, drawn: &[Drawn]) {
+    let words = Words {
+        dem: format!("sources = [\"dem.tif\"]\nvoids = {voids}"),
+        features: "sources = [\"features.geojson\"]".into(),
+        // Fitted heights may stand out of the ground beside a gorge; these have to lie on it.
+        ..tinned("height_fit = \"off\"")
+    };
+    let (dem, drawn) = (holed(&words), geojson(drawn));
+    let scene = Scene::with_files(&words, |folder| {
+        write_dem(&folder.join("dem.tif"), &dem);
+        std::fs::write(folder.join("features.geojson"), &drawn).unwrap();
+    });
+    drop(scene.build("area", 2));
+    scene.verify("area");
+    let product = Product::read(&scene.path("area"));
+    product.check_cracks();
+    let known = dem.rect().posts().filter(|&post| !dem.is_void(post)).map(|post| i64::from(dem.height(post)));
+    let (low, high) = known.fold((i64::MAX, i64::MIN), |(low, high), z| (low.min(z), high.max(z)));
+    let slack = 30 * 128;
+    for z in product.modules.values().flat_map(|module| &module.vertices).map(|vertex| i64::from(vertex.z)) {
+        assert!((low - slack..=high + slack).contains(&z), "{voids}: {} m in {drawn}", z / 128);
+    }
+}
+
+#[test]
+fn roads_and_water_over_a_hole_pull_no_ground_away() {
+    // The hole lies from 1250 to 2850 m east and from 750 to 2225 m north.
+    let all = [
+        line("highway=primary", &[(500.0, 1500.0), (3900.0, 1520.0)]),
+        line("highway=track", &[(1500.0, 900.0), (2600.0, 2000.0)]),
+        line("waterway=river", &[(2000.0, 4000.0), (2100.0, 1200.0)]),
+        polygon("natural=water", &[(900.0, 1000.0), (1600.0, 1000.0), (1600.0, 1400.0), (900.0, 1400.0)]),
+        polygon("natural=water", &[(2200.0, 1700.0), (2500.0, 1700.0), (2500.0, 2000.0), (2200.0, 2000.0)]),
+    ];
+    for voids in ["\"hole\"", "{ fill_within_posts = 8, hole = true }"] {
+        all.iter().for_each(|one| check_features_over_a_hole(voids, std::slice::from_ref(one)));
+        check_features_over_a_hole(voids, &all);
+    }
 }
