@@ -83,14 +83,13 @@ impl Findings<'_> {
             refusals: refusals(&refused),
             bound,
             stops: self.stops(),
-            warnings: run.warnings(),
+            warnings: run.warnings().into_iter().chain(beyond_sources(&self.heights())).collect(),
             outdated: false,
             tiles: Vec::new(),
             files: BTreeMap::new(),
         })
     }
 
-    /// What was told of the sources while it ran.
     /// What is told of features, in jobs with some.
     pub fn told(&self) -> Option<Told> {
         let (settled, figures) = (self.run.level.as_ref()?, self.sums.features.as_ref()?);
@@ -350,6 +349,19 @@ impl Findings<'_> {
     }
 }
 
+/// What a person should know where the surface leaves the heights of the sources by more than fitting explains: by 10 m
+/// and a twentieth of their range.
+fn beyond_sources(heights: &ReportHeights) -> Option<String> {
+    let [low, high] = heights.sources_m?;
+    (0.05 * (high - low)).max(10.0).lt(&heights.outside_m).then(|| {
+        format!(
+            "the surface reaches {:.2} m beyond the heights of the sources, {low:.2} m to {high:.2} m: a cliff, a deep \
+             cut or a wrong level may do that, and tiefort render --view residual shows where",
+            heights.outside_m
+        )
+    })
+}
+
 /// Figures of one level from those of its load modules.
 fn level_figures<'a>(level: u32, inner_share: f64, modules: impl Iterator<Item = &'a ModuleNumbers>) -> ReportLevel {
     let mut triangles = 0;
@@ -404,5 +416,20 @@ pub fn residual_of(tally: &Tally) -> ReportResidual {
         mean_abs_m: tally.mean_abs_m(),
         p95_m: tally.percentile_m(95.0),
         p99_m: tally.percentile_m(99.0),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_surface_far_beyond_its_sources_is_told() {
+        let told = |outside_m, sources_m| {
+            beyond_sources(&ReportHeights { surface_m: [0.0, 0.0], sources_m, outside_m }).is_some()
+        };
+        assert_eq!([9.0, 10.0, 11.0].map(|metres| told(metres, Some([500.0, 600.0]))), [false, false, true]);
+        assert_eq!([99.0, 101.0].map(|metres| told(metres, Some([0.0, 2000.0]))), [false, true]);
+        assert!(!told(500.0, None), "nothing is known of sources");
     }
 }

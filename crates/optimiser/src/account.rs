@@ -10,11 +10,13 @@ use crate::task::Budget;
 use crate::tile_mesh::TileMesh;
 
 /// The budget as it is spent and refunded, and what is allowed beyond it for a while.
+#[derive(Clone)]
 pub(crate) struct Account {
     books: Books,
     beyond: i64,
 }
 
+#[derive(Clone)]
 enum Books {
     /// Triangles or vertices in all.
     Total {

@@ -2,9 +2,11 @@
 
 use terrain::StopReason;
 
+use crate::account::Account;
 use crate::gains::Gains;
 use crate::parts::NONE;
 use crate::thin::{Filling, Until};
+use crate::tile_mesh::TileMesh;
 use crate::work::Work;
 
 impl Work<'_, '_> {
@@ -33,29 +35,39 @@ impl Work<'_, '_> {
         {}
     }
 
-    /// Inserts where a residual is larger than it may be, and makes room for that where it can be spared.
+    /// Inserts where a residual is larger than it may be, and makes room for that where it can be spared. Where limits
+    /// leave too little room, the mesh ends as it was when its largest residual was least: what is taken away to make
+    /// room would be missed more.
     pub fn meet_largest(&mut self) {
         const ROUNDS: usize = 20;
         let Some(largest) = self.task.largest_quanta else { return };
-        for _ in 0..ROUNDS {
+        let mut least: Option<(f64, TileMesh, Account)> = None;
+        for round in 0..=ROUNDS {
             let above = self.above(largest);
-            if above.is_empty() {
-                return;
+            let Some(&(worst, ..)) = above.first() else { return };
+            if least.as_ref().is_none_or(|(least, ..)| worst < *least) {
+                least = Some((worst, self.sheet.clone(), self.account.clone()));
+            }
+            if round == ROUNDS {
+                break;
             }
             self.account.keep_back(self.account.dearest() * above.len() as i64);
             self.thin_until(Until::Afforded, Filling::Below(largest));
             self.account.keep_back(0);
-            for (triangle, corners) in above {
+            for (_, triangle, corners) in above {
                 if self.sheet.triangles[triangle as usize].corners == corners {
                     self.insert_worst(triangle);
                 }
             }
             self.sheet.round_heights();
         }
+        if let Some((_, sheet, account)) = least {
+            (self.sheet, self.account) = (sheet, account);
+        }
     }
 
-    /// Triangles with a weighted residual above `largest`, the worst first, and their corners.
-    fn above(&self, largest: f64) -> Vec<(u32, [u32; 3])> {
+    /// Triangles with a weighted residual above `largest`, the worst first: the residual, the triangle, its corners.
+    fn above(&self, largest: f64) -> Vec<(f64, u32, [u32; 3])> {
         let mut above = Vec::new();
         for (triangle, record) in
             self.sheet.triangles.iter().enumerate().filter(|(_, record)| record.corners[0] != NONE)
@@ -67,7 +79,7 @@ impl Work<'_, '_> {
             }
         }
         above.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-        above.into_iter().map(|(_, triangle, corners)| (triangle, corners)).collect()
+        above
     }
 
     /// Inserts at the worst post of a triangle; where there is no room for a vertex, moves the nearest one there, or

@@ -63,6 +63,24 @@ fn a_largest_residual_asked_for_is_met_where_the_budget_allows_it() {
 }
 
 #[test]
+fn a_largest_residual_that_no_budget_reaches_makes_nothing_worse() {
+    let dem = rough(RECT, 4);
+    for effort in [Effort::Fast, Effort::Normal] {
+        let mut task = free(1200, effort);
+        let (squares, before) = measured(&optimise(&dem, &even(RECT), &grid(&dem, 4), &task).tin, &dem);
+        for share in [0.0, 0.1, 0.5] {
+            task.largest_quanta = Some(share * before);
+            let done = optimise(&dem, &even(RECT), &grid(&dem, 4), &task);
+            done.tin.check().unwrap();
+            let (with_goal, after) = measured(&done.tin, &dem);
+            assert!(after <= before, "{effort:?}, {share}: {after} of {before}");
+            assert!(with_goal <= 1.3 * squares, "{effort:?}, {share}: {with_goal} of {squares}");
+            assert!(done.tin.triangles.len() <= 1200);
+        }
+    }
+}
+
+#[test]
 fn ground_that_weighs_nothing_is_left_alone() {
     let dem = rough(RECT, 5);
     let nothing = Importance::uniform(RECT, 0);

@@ -51,6 +51,7 @@ impl Star {
 }
 
 /// The mesh of a tile.
+#[derive(Clone)]
 pub(crate) struct TileMesh<'a> {
     pub ground: &'a WeightedHeights<'a>,
     pub vertices: Vec<Vertex>,

@@ -23,7 +23,7 @@ pub(super) fn read(area: &Section, modules: &Section, find: &mut Find) -> Result
     let (spacing_entry, spacing) = spacing(area)?;
     let border_step_m = length(modules, "border_step_m")?;
     let side_m = length(modules, "side_m")?;
-    let border_step_cells = border_step_cells(&spacing_entry, spacing, border_step_m)?;
+    let border_step_cells = border_step_cells(&spacing_entry, spacing, border_step_m, side_m)?;
     let side_cells = side_cells(modules, spacing, side_m, border_step_m)?;
     let (epsg, origin_m, grid) = match (place, epsg) {
         (Some((entry, place)), epsg) => {
@@ -147,11 +147,13 @@ fn length(modules: &Section, key: &str) -> Result<f64, JobError> {
     }
 }
 
-fn border_step_cells(entry: &Entry, spacing: Spacing, border_step_m: f64) -> Result<i32, JobError> {
+fn border_step_cells(entry: &Entry, spacing: Spacing, border_step_m: f64, side_m: f64) -> Result<i32, JobError> {
     spacing.posts_in(Metres(border_step_m)).ok_or_else(|| {
         let expected = format!("a spacing that divides load_modules.border_step_m, {border_step_m} m");
-        let hint = nearest_spacing(border_step_m, spacing.metres())
-            .map(|(near, parts)| format!("{near} m is {border_step_m} m / {parts}; the DEM is resampled to it"));
+        let hint = nearest_spacing(border_step_m, side_m, spacing.metres()).map(|(near, parts)| {
+            let is = if parts == 1 { "the step itself".into() } else { format!("{border_step_m} m / {parts}") };
+            format!("{near} m is {is}; the DEM is resampled to it")
+        });
         match hint {
             Some(hint) => entry.out_of_range_with(expected, hint),
             None => entry.out_of_range(expected),
@@ -159,12 +161,15 @@ fn border_step_cells(entry: &Entry, spacing: Spacing, border_step_m: f64) -> Res
     })
 }
 
-/// The spacing nearest to `wanted` that divides the border step and is a multiple of 1/16 m, and into how many parts.
-fn nearest_spacing(border_step_m: f64, wanted: f64) -> Option<(f64, u32)> {
+/// The spacing nearest to `wanted` that divides the border step, is a multiple of 1/16 m and leaves a load module at
+/// least two cells along a side; and into how many parts.
+fn nearest_spacing(border_step_m: f64, side_m: f64, wanted: f64) -> Option<(f64, u32)> {
     const PARTS_MAX: u32 = 8000; // 500 m in sixteenths: no more parts are possible
     let fits = |parts: u32| {
         let metres = border_step_m / f64::from(parts);
-        Spacing::from_metres(metres).filter(|s| s.metres() * f64::from(parts) == border_step_m).map(|_| (metres, parts))
+        Spacing::from_metres(metres)
+            .filter(|s| s.metres() * f64::from(parts) == border_step_m && 2.0 * metres <= side_m)
+            .map(|_| (metres, parts))
     };
     let farther = |(metres, _): &(f64, u32)| (metres - wanted).abs();
     (1..=PARTS_MAX).filter_map(fits).min_by(|a, b| farther(a).total_cmp(&farther(b)))

@@ -333,6 +333,15 @@ fn lengths_that_do_not_divide_are_refused_with_one_that_does() {
     );
     check(
         "spacing_m",
+        "spacing_m = 400",
+        &[
+            "a/b.toml:6: area.spacing_m: found 400, expected a spacing that divides load_modules.border_step_m,",
+            "125 m",
+            "hint: 125 m is the step itself; the DEM is resampled to it",
+        ],
+    );
+    check(
+        "spacing_m",
         "spacing_m = 0.3",
         &[
             "a/b.toml:6: area.spacing_m: found 0.3, expected metres between posts, a positive multiple of 1/16",
