@@ -83,7 +83,7 @@ impl Findings<'_> {
             refusals: refusals(&refused),
             bound,
             stops: self.stops(),
-            warnings: run.warnings().into_iter().chain(beyond_sources(&self.heights())).collect(),
+            warnings: run.warnings().into_iter().chain(self.beyond_sources()).collect(),
             outdated: false,
             tiles: Vec::new(),
             files: BTreeMap::new(),
@@ -94,6 +94,11 @@ impl Findings<'_> {
     pub fn told(&self) -> Option<Told> {
         let (settled, figures) = (self.run.level.as_ref()?, self.sums.features.as_ref()?);
         Some(product::told(self.run.job, &self.run.area, &settled.level, figures))
+    }
+
+    /// A guard of its own, in jobs with features: it knows the sources' heights and no other.
+    fn beyond_sources(&self) -> Option<String> {
+        self.run.level.as_ref().and_then(|_| beyond_sources(&self.heights()))
     }
 
     fn stops(&self) -> ReportStops {
@@ -349,14 +354,14 @@ impl Findings<'_> {
     }
 }
 
-/// What a person should know where the surface leaves the heights of the sources by more than fitting explains: by 10 m
-/// and a twentieth of their range.
+/// What a person should know where roads and water take the surface beyond the heights of the sources: by 10 m and a
+/// fifth of their range, more than fitted heights do there.
 fn beyond_sources(heights: &ReportHeights) -> Option<String> {
     let [low, high] = heights.sources_m?;
-    (0.05 * (high - low)).max(10.0).lt(&heights.outside_m).then(|| {
+    (0.2 * (high - low)).max(10.0).lt(&heights.outside_m).then(|| {
         format!(
-            "the surface reaches {:.2} m beyond the heights of the sources, {low:.2} m to {high:.2} m: a cliff, a deep \
-             cut or a wrong level may do that, and tiefort render --view residual shows where",
+            "the surface reaches {:.2} m beyond the heights of the sources, {low:.2} m to {high:.2} m: a wrong level \
+             or a deep cut may do that, and tiefort render --view residual shows where",
             heights.outside_m
         )
     })
@@ -428,8 +433,8 @@ mod tests {
         let told = |outside_m, sources_m| {
             beyond_sources(&ReportHeights { surface_m: [0.0, 0.0], sources_m, outside_m }).is_some()
         };
-        assert_eq!([9.0, 10.0, 11.0].map(|metres| told(metres, Some([500.0, 600.0]))), [false, false, true]);
-        assert_eq!([99.0, 101.0].map(|metres| told(metres, Some([0.0, 2000.0]))), [false, true]);
+        assert_eq!([9.0, 10.0, 11.0].map(|metres| told(metres, Some([500.0, 540.0]))), [false, false, true]);
+        assert_eq!([399.0, 401.0].map(|metres| told(metres, Some([0.0, 2000.0]))), [false, true]);
         assert!(!told(500.0, None), "nothing is known of sources");
     }
 }
