@@ -360,6 +360,7 @@ async function shown(page) {
   const note = await page.$eval("#note", (box) => box.textContent);
   expect(showsDem || note.includes("not at hand"), showsDem ? "the DEM is shown" : `no DEM, and told so: ${note}`);
   if (showsDem) {
+    await settled(page);
     await whole(page, "of the DEM");
     await page.select("#colors", "residuals");
     await settled(page);

@@ -6,7 +6,7 @@ use database::{FileStamp, Profile};
 use engine::{Artifact, Key, Outcome, Stamp, keep_or_make};
 use features::Place;
 use ground::Window;
-use terrain::{Dem, Post, TileId};
+use terrain::{Dem, Post, PostRect, TileId};
 
 use crate::keys;
 use crate::read_features::ReadFeatures;
@@ -68,8 +68,10 @@ impl Artifact for Profiling<'_> {
 }
 
 /// The height of a DEM at a place between its posts, bilinear and rounded to quanta: over a hole that of the surface
-/// that closes it.
+/// that closes it, beyond the DEM that of the nearest place inside.
 fn height_at(dem: &Dem, steps: i32, place: Place) -> i32 {
+    let PostRect { south, west, north, east } = dem.rect();
+    let place = Place::new(place.row.clamp(south * steps, north * steps), place.col.clamp(west * steps, east * steps));
     let (row, col) = (place.row.div_euclid(steps), place.col.div_euclid(steps));
     let (north, east) = (i64::from(place.row.rem_euclid(steps)), i64::from(place.col.rem_euclid(steps)));
     let steps = i64::from(steps);
@@ -88,7 +90,6 @@ fn height_at(dem: &Dem, steps: i32, place: Place) -> i32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use terrain::PostRect;
 
     #[test]
     fn a_height_between_posts_is_bilinear_over_holes_too() {
@@ -100,5 +101,6 @@ mod tests {
         assert_eq!((at(0, 0), at(64, 32), at(32, 32), at(1, 0)), (0, 105, 55, 2));
         // The last post of a row needs none beyond it.
         assert_eq!((at(0, 128), at(32, 128), at(128, 64), at(128, 96)), (20, 70, 210, 255));
+        assert_eq!((at(-70, -1), at(32, 999), at(-5, 32)), (0, 70, 5), "beyond it the nearest height counts");
     }
 }

@@ -13,7 +13,8 @@ pub(crate) struct ReadFeatures {
     /// What they are, and what a person should know of the files and the rules.
     pub table: FeatureTable,
     pub features: AreaFeatures,
-    /// Stations of each tile, by their place among those of the area. What lies beyond the area is in none.
+    /// Stations of each tile, by their place among those of the area. What lies beyond the area is in the tile nearest
+    /// to it.
     pub by_tile: Vec<Vec<u32>>,
 }
 
@@ -29,9 +30,7 @@ impl ReadFeatures {
         let features = AreaFeatures::of(std::mem::take(&mut vectors.sources), &spec.rules, site(area), each);
         let mut by_tile = vec![Vec::new(); area.tiles.len()];
         for (number, &place) in features.stations().iter().enumerate() {
-            if let Some(tile) = tile_of(area, &features, place) {
-                by_tile[area.tiling.index(tile)].push(number as u32);
-            }
+            by_tile[area.tiling.index(tile_of(area, &features, place))].push(number as u32);
         }
         Ok(Some(Self { vectors, table, features, by_tile }))
     }
@@ -47,14 +46,10 @@ impl ReadFeatures {
     }
 }
 
-/// The tile of a place: on a line between two the one north or east of it, but for the area's own border.
-fn tile_of(area: &GamingArea, features: &AreaFeatures, place: Place) -> Option<TileId> {
+/// The tile nearest to a place: on a line between two the one north or east of it.
+fn tile_of(area: &GamingArea, features: &AreaFeatures, place: Place) -> TileId {
     let side = features.site.lattice.steps_per_post() * area.grid.side_cells;
-    let module = |at: i32, count: u32| {
-        let number = u32::try_from(at.div_euclid(side)).ok()?;
-        let on_border = at.rem_euclid(side) == 0 && number == count;
-        (number < count || on_border).then_some(number.min(count - 1))
-    };
-    let (row, col) = (module(place.row, area.grid.rows)?, module(place.col, area.grid.cols)?);
-    Some(area.tiling.tile_of_module(ModuleId { row, col }, area.grid))
+    let module = |at: i32, count: u32| u32::try_from(at.div_euclid(side)).unwrap_or(0).min(count - 1);
+    let (row, col) = (module(place.row, area.grid.rows), module(place.col, area.grid.cols));
+    area.tiling.tile_of_module(ModuleId { row, col }, area.grid)
 }

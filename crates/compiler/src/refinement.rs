@@ -165,6 +165,8 @@ impl Refinement {
     fn join(&self, grown: TileTin, optimised: Optimised) -> TileTin {
         let Optimised { tin, spent, refused, stop, left_out: _, short: _ } = optimised;
         TileTin {
+            // What the tile began with may have been thinned out.
+            initial_count: grown.initial_count.min(tin.vertices.len() as u32),
             tin,
             residuals: Vec::new(),
             triangles_charged: spent,

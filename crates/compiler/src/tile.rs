@@ -35,7 +35,8 @@ pub struct Rebuilt {
     pub database: Database,
 }
 
-/// Runs one tile of a finished database again, with the published allocation.
+/// Runs one tile of a finished database again, with the published allocation; with it others in which roads, rivers or
+/// lakes have changed, since what crosses a side has to be the same in both tiles.
 ///
 /// If its outgoing border comes out as published, only this tile changes. Otherwise its sides are frozen as the
 /// neighbours have them, or, with `release_borders`, the tiles that the new border reaches are rebuilt too.
@@ -63,8 +64,14 @@ pub fn rebuild_tile(
     run.database.begin(&beginning(&run))?;
 
     progress.tell(Event::Enter(Stage::Refine, 0));
-    let reached = if release_borders {
-        cascade(&run, &shares, &mut tins, tile, progress)?
+    let others = with_other_features(&run, tile);
+    if !others.is_empty() {
+        let text = format!("roads, rivers or lakes changed in {} other tiles: these are run, too", others.len());
+        progress.tell(Event::Note(text));
+    }
+    let reached = if release_borders || !others.is_empty() {
+        let first = others.into_iter().chain([tile]).collect();
+        cascade(&run, &shares, &mut tins, first, progress)?
     } else {
         rerun(&run, &shares, &mut tins, tile, progress)?
     };
@@ -268,16 +275,24 @@ fn freeze(run: &Run, refining: &mut Refining, own: Vec<Vertex>) {
     refining.seeds.extend(own);
 }
 
-/// Runs `tile` and every higher-ranked tile that a changed border reaches, in rank order.
+/// Tiles other than `tile` in which features are not what they were.
+fn with_other_features(run: &Run, tile: TileId) -> Vec<TileId> {
+    let (Some(settled), Some(manifest)) = (&run.level, &run.previous) else { return Vec::new() };
+    let lines = run.area.tiles.iter().zip(&settled.level.tiles);
+    let has_others = |other: TileId, now| manifest.tile(other).is_none_or(|record| record.lines != Some(now));
+    lines.filter(|&(&other, &now)| other != tile && has_others(other, now)).map(|(&other, _)| other).collect()
+}
+
+/// Runs these tiles and every higher-ranked tile that a changed border reaches, in rank order.
 fn cascade(
     run: &Run,
     shares: &Shares,
     tins: &mut [Published],
-    tile: TileId,
+    first: Vec<TileId>,
     progress: &mut dyn Progress,
 ) -> Result<Vec<(TileId, bool)>, CompileError> {
     let tiling = &run.area.tiling;
-    let mut waiting = BTreeSet::from([(tiling.rank(tile), tile)]);
+    let mut waiting: BTreeSet<_> = first.into_iter().map(|tile| (tiling.rank(tile), tile)).collect();
     let mut reached = Vec::new();
     while let Some((_, tile)) = waiting.pop_first() {
         progress.tell(Event::Started(Stage::Refine, tile));

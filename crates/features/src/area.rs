@@ -150,18 +150,20 @@ impl AreaFeatures {
     }
 
     /// Decides all heights, and forms features so that they take no more triangles than there is room for. `ground` has
-    /// the height of the DEM at each of the stations, in quanta.
+    /// the height of the DEM at each of the stations, in quanta; beyond the area that of the nearest place inside, which
+    /// counts for features that have no part inside.
     ///
     /// # Panics
     /// When there is not one height, or none, for each station.
     pub fn level(&self, ground: &[Option<i32>], options: GradeOptions, room: &mut dyn Room) -> Levelled {
         assert_eq!(self.stations.len(), ground.len(), "the DEM was asked at every station");
-        let at = |place: Place| self.stations.binary_search(&place).ok().and_then(|found| ground[found]);
+        let near = |place: Place| self.stations.binary_search(&place).ok().and_then(|found| ground[found]);
+        let at = |place: Place| near(place).filter(|_| self.site.holds(place));
         let mut remarks = self.remarks.clone();
-        let mut strands = self.waters(&at, &mut remarks);
-        strands.extend(self.breaklines(&at));
+        let mut strands = self.waters((&at, &near), &mut remarks);
+        strands.extend(self.breaklines(&near));
         let roads = &self.roads;
-        let resting: Vec<Option<i32>> = roads.nodes.iter().map(|node| at(node.place)).collect();
+        let resting = ground_of(roads, &at, &near);
         let pins = pins(roads, &self.ways);
         let heights = grade(roads, &resting, &pins, &water(&strands), options, &mut remarks);
         let beside = |(sides, height): (&[Place; 2], &i32)| sides.map(|place| at(place).unwrap_or(*height));
@@ -176,14 +178,20 @@ impl AreaFeatures {
         Levelled { reserved, remarks }
     }
 
-    /// Rivers, lakes and what else polygons of water became.
-    fn waters(&self, at: &dyn Fn(Place) -> Option<i32>, remarks: &mut Vec<Remark>) -> Vec<Strand> {
+    /// Rivers, lakes and what else polygons of water became, by the ground inside the area and that nearest to places
+    /// beyond it.
+    fn waters(&self, (at, near): (Ground, Ground), remarks: &mut Vec<Remark>) -> Vec<Strand> {
         let Self { site, outlines, rivers, .. } = self;
-        let shores: Vec<Vec<Option<i32>>> = outlines.iter().map(|outline| outline.places().map(at).collect()).collect();
+        let shore_by = |outline: &Outline, ground: Ground| outline.places().map(ground).collect::<Vec<Option<i32>>>();
+        let shore_of = |outline: &Outline| match shore_by(outline, at) {
+            unknown if unknown.iter().all(Option::is_none) => shore_by(outline, near),
+            known => known,
+        };
+        let shores: Vec<Vec<Option<i32>>> = outlines.iter().map(shore_of).collect();
         let has_line = have_line(outlines, rivers, site);
         let is_dam = |place: Place| self.dams.contains(&place);
         let waters: Waters = level(outlines, &shores, &has_line, &is_dam, site.lattice, remarks);
-        let ground: Vec<Option<i32>> = rivers.nodes.iter().map(|node| at(node.place)).collect();
+        let ground = ground_of(rivers, at, near);
         let lowest = |(banks, ground): (&[Place; 2], &Option<i32>)| {
             banks.iter().filter_map(|place| at(*place)).chain(*ground).min()
         };
@@ -195,17 +203,31 @@ impl AreaFeatures {
         let inside = lines_inside(outlines, &waters.banks, rivers, &fallen, site);
         let of_bank = |(number, line): (&u32, &crate::parts::Line)| banks(&outlines[*number as usize], line);
         strands.extend(waters.banks.iter().zip(&inside).flat_map(of_bank));
-        let only = |number: &u32| outline_only(&outlines[*number as usize], &shores[*number as usize]);
+        let only = |number: &u32| {
+            let outline = &outlines[*number as usize];
+            outline_only(outline, &shore_by(outline, near))
+        };
         strands.extend(waters.outlines_only.iter().flat_map(only));
         strands
     }
 
     /// Breaklines at the heights of their source, else of the ground.
-    fn breaklines(&self, at: &dyn Fn(Place) -> Option<i32>) -> Vec<Strand> {
+    fn breaklines(&self, at: Ground) -> Vec<Strand> {
         let ways = self.ways.iter().filter(|way| way.traits.kind == crate::Kind::Breakline).cloned().collect();
         let outlines = self.outlines.iter().filter(|outline| outline.traits.kind == crate::Kind::Breakline).cloned();
         breaklines(&crate::Rounded { ways, outlines: outlines.collect(), remarks: Vec::new() }, at)
     }
+}
+
+/// The height of the ground at a place, where there is one.
+type Ground<'a> = &'a dyn Fn(Place) -> Option<i32>;
+
+/// The ground inside the area at each node of a network; what has no part inside rests on the ground nearest to it.
+fn ground_of(network: &Network, at: Ground, near: Ground) -> Vec<Option<i32>> {
+    let place = |node: u32| network.nodes[node as usize].place;
+    let mut ground: Vec<Option<i32>> = network.nodes.iter().map(|node| at(node.place)).collect();
+    network.give_heights(&mut ground, &|node| near(place(node)));
+    ground
 }
 
 /// Of each node of a network, the places a post to the left and to the right of its way.

@@ -31,8 +31,10 @@ pub fn grade(
     remarks: &mut Vec<Remark>,
 ) -> Vec<i32> {
     assert_eq!(network.nodes.len(), ground.len(), "every node has a height of the ground, or none");
-    let resting: Vec<Option<i32>> =
+    let mut resting: Vec<Option<i32>> =
         network.nodes.iter().zip(ground).map(|(node, ground)| ground.filter(|_| node.on_ground)).collect();
+    // A bridge that no road leads to stands on the ground below it.
+    network.give_heights(&mut resting, &|node| ground[node as usize]);
     let mut resting = smooth(network, &resting);
     raise_sagging_ends(network, &mut resting, options.bank);
     let mut swept = sweep(network, &resting, pins, remarks);

@@ -151,6 +151,27 @@ impl Network {
         &self.beside[self.starts[node as usize] as usize..self.starts[node as usize + 1] as usize]
     }
 
+    /// Gives the nodes of every connected part that has no height anywhere the heights of `others`.
+    pub(crate) fn give_heights(&self, heights: &mut [Option<i32>], others: &dyn Fn(u32) -> Option<i32>) {
+        let mut seen = vec![false; self.nodes.len()];
+        for first in 0..self.nodes.len() as u32 {
+            if std::mem::replace(&mut seen[first as usize], true) {
+                continue;
+            }
+            let mut part = vec![first];
+            let mut at = 0;
+            while let Some(&node) = part.get(at) {
+                let unseen =
+                    self.beside(node).iter().filter(|(next, _)| !std::mem::replace(&mut seen[*next as usize], true));
+                part.extend(unseen.map(|(next, _)| *next));
+                at += 1;
+            }
+            if part.iter().all(|node| heights[*node as usize].is_none()) {
+                part.iter().for_each(|&node| heights[node as usize] = others(node));
+            }
+        }
+    }
+
     /// What an edge is.
     pub fn traits(&self, edge: u32) -> &Traits {
         &self.ways[self.edges[edge as usize].way as usize].traits

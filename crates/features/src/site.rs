@@ -38,6 +38,11 @@ impl Site {
         within(a.row, b.row, south_west.row, north_east.row) && within(a.col, b.col, south_west.col, north_east.col)
     }
 
+    /// Whether a place lies in the area or on its border.
+    pub fn holds(&self, place: Place) -> bool {
+        self.holds_middle(place, place)
+    }
+
     /// Steps between load-module lines and between tile lines.
     fn line_steps(&self) -> [i32; 2] {
         [self.module_posts, self.tile_posts].map(|posts| posts * self.lattice.steps_per_post())

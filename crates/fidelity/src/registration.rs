@@ -49,8 +49,9 @@ pub fn registration(dem: &PostHeights, tin: &PostHeights, spacing: Metres) -> Op
     let both = Both { dem, tin, margin: reach as usize + 2 };
     let coarse = both.best_of(reach)?;
     let nine = both.nine_around(coarse)?;
-    // A finer look may prefer a neighbour.
-    let best = (0..9).max_by(|&a, &b| nine[a].total_cmp(&nine[b])).map(|i| moved(coarse, i)).unwrap_or(coarse);
+    // A finer look may prefer a neighbour, but none so far away that its own neighbours leave the posts.
+    let within = (0..9).filter(|&i| moved(coarse, i).iter().all(|posts| posts.abs() <= reach));
+    let best = within.max_by(|&a, &b| nine[a].total_cmp(&nine[b])).map(|i| moved(coarse, i)).unwrap_or(coarse);
     let nine = if best == coarse { nine } else { both.nine_around(best)? };
     let [east, north] = top_of(&nine);
     let posts = dem.known().count().max(1) as f64;
@@ -220,8 +221,10 @@ mod tests {
             let is_whole = east.fract() == 0.0 && north.fract() == 0.0;
             assert!(if is_whole { 0.9999 } else { 0.9 } < found.best_correlation, "{found:?}");
         }
-        let far = registration(&still, &hills(9.0, 0.0), SPACING).unwrap();
-        assert!(far.is_at_end, "{far:?}");
+        for (east, north) in [(9.0, 0.0), (-9.0, 0.0), (0.0, 9.0), (0.0, -9.0), (9.0, 9.0), (-9.0, -9.0)] {
+            let far = registration(&still, &hills(east, north), SPACING).unwrap();
+            assert!(far.is_at_end, "moved by {east}, {north}: {far:?}");
+        }
     }
 
     #[test]
