@@ -35,7 +35,7 @@ const CUT: Part = Part { name: "cut", changed: "how load modules are cut changed
 const TINS: Part = Part { name: "tins", changed: "a TIN changed" };
 /// What roads, rivers and lakes put into it.
 const LEFT_OUT: Part = Part { name: "left out", changed: "what coarser levels leave out changed" };
-const FEATURES: Part = Part { name: "features", changed: "roads, rivers or lakes in it changed" };
+pub(crate) const FEATURES: Part = Part { name: "features", changed: "roads, rivers or lakes in it changed" };
 /// Buildings, which are drawn only.
 const BUILDINGS: Part = Part { name: "buildings", changed: "buildings changed" };
 /// The ground along features.

@@ -13,6 +13,7 @@ use crate::assembled::Assembled;
 use crate::build::{decide_features, open};
 use crate::curves::Curves;
 use crate::enforce::enforce;
+use crate::keys;
 use crate::publish::{beginning, prepare, publish};
 use crate::refine::{Published, Refining};
 use crate::report::Findings;
@@ -64,7 +65,7 @@ pub fn rebuild_tile(
     run.database.begin(&beginning(&run))?;
 
     progress.tell(Event::Enter(Stage::Refine, 0));
-    let others = with_other_features(&run, tile);
+    let others = with_other_features(&run, &shares, &tins, tile)?;
     if !others.is_empty() {
         let text = format!("roads, rivers or lakes changed in {} other tiles: these are run, too", others.len());
         progress.tell(Event::Note(text));
@@ -276,11 +277,24 @@ fn freeze(run: &Run, refining: &mut Refining, own: Vec<Vertex>) {
 }
 
 /// Tiles other than `tile` in which features are not what they were.
-fn with_other_features(run: &Run, tile: TileId) -> Vec<TileId> {
-    let (Some(settled), Some(manifest)) = (&run.level, &run.previous) else { return Vec::new() };
-    let lines = run.area.tiles.iter().zip(&settled.level.tiles);
-    let has_others = |other: TileId, now| manifest.tile(other).is_none_or(|record| record.lines != Some(now));
-    lines.filter(|&(&other, &now)| other != tile && has_others(other, now)).map(|(&other, _)| other).collect()
+fn with_other_features(
+    run: &Run,
+    shares: &Shares,
+    tins: &[Published],
+    tile: TileId,
+) -> Result<Vec<TileId>, CompileError> {
+    let mut others = Vec::new();
+    if run.job.features.is_none() {
+        return Ok(others);
+    }
+    for (tin, &other) in tins.iter().zip(&run.area.tiles).filter(|&(_, &other)| other != tile) {
+        let now = as_built(run, shares, tins, other)?.key().parts();
+        let name = keys::FEATURES.name;
+        if tin.made_from.as_ref().is_some_and(|before| before.get(name) != now.get(name)) {
+            others.push(other);
+        }
+    }
+    Ok(others)
 }
 
 /// Runs these tiles and every higher-ranked tile that a changed border reaches, in rank order.

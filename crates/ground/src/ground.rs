@@ -99,6 +99,10 @@ impl Ground {
             Some(water) => {
                 let polygons = read_polygons(&water.file.path, job.area.epsg)?;
                 relief.water = Some(Water::new(job, polygons.clone(), area.frame, area.rect));
+                if !relief.water.as_ref().is_some_and(|water| water.reaches(area.rect)) {
+                    let path = water.file.path.display();
+                    warnings.push(format!("dem.water: {path}: none of its polygons reaches into the area"));
+                }
                 warnings.extend(find_levels(&mut relief, area, workers, stop)?);
                 polygons
             }

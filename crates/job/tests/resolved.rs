@@ -191,6 +191,8 @@ fn the_canonical_text_is_the_same_job() {
     for variant in variants.into_iter().chain(voids.iter().map(String::as_str)).chain([all]) {
         check_canonical(&job(&format!("{SHORTEST}{variant}")));
     }
+    let no = |voids: &str| job(&format!("{SHORTEST}voids = {voids}\n")).dem.voids;
+    assert_eq!(no("{ hole = false }"), no("\"fail\""), "a table that says no");
     let sources = r#"sources = ["a.tif", { file = "b.hgt", crs = "EPSG:4326", corner = [35, -117], nodata = -9999,
         height_unit_m = 0.3048, vertical_datum = "EGM96", attribution = "NASA" }]
 feather_m = 5"#;

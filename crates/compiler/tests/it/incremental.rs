@@ -9,6 +9,7 @@ use job::Job;
 use terrain::{Dem, Post, TileId};
 
 use crate::features::{geojson, line, polygon};
+use crate::product::Product;
 use crate::scene::{Scene, Words, assert_same, sample_dem, tile};
 
 /// Keeps what was told.
@@ -178,6 +179,33 @@ fn a_moved_road_rebuilds_only_tiles_that_it_reaches_each_with_its_cause() {
     let (again, _) = scene.tile("area", tile(2, 2), false);
     assert_eq!(again, [tile(2, 2)]);
     rebuilt(&scene, "after one tile with a moved road");
+}
+
+#[test]
+fn one_tile_again_takes_others_with_it_in_which_roads_have_changed() {
+    let words = Words { features: "sources = [\"features.geojson\"]".into(), ..words() };
+    let dem = sample_dem(words.grid(), 1);
+    let drawn = |track: &[(f64, f64)]| geojson(&[line("highway=track", track)]);
+    let scene = Scene::with_files(&words, |folder: &Path| {
+        crate::scene::write_dem(&folder.join("dem.tif"), &dem);
+        fs::write(folder.join("features.geojson"), drawn(&[(2300.0, 2200.0), (2700.0, 2400.0)])).unwrap();
+    });
+    drop(scene.build("area", 2));
+    let leaving = [(2300.0, 2200.0), (4000.0, 2400.0), (4100.0, 400.0)];
+    fs::write(scene.path("features.geojson"), drawn(&leaving)).unwrap();
+    let (again, is_frozen) = scene.tile("area", tile(1, 1), false);
+    assert!(!is_frozen && [tile(1, 1), tile(1, 2), tile(0, 2)].iter().all(|tile| again.contains(tile)), "{again:?}");
+    scene.verify("area");
+    Product::read(&scene.path("area")).check_cracks();
+    // Back to where it was: two tiles have no features any more.
+    fs::write(scene.path("features.geojson"), drawn(&[(2300.0, 2200.0), (2700.0, 2400.0)])).unwrap();
+    let (again, _) = scene.tile("area", tile(1, 1), false);
+    assert!([tile(1, 1), tile(1, 2), tile(0, 2)].iter().all(|tile| again.contains(tile)), "{again:?}");
+    scene.verify("area");
+    Product::read(&scene.path("area")).check_cracks();
+    drop(scene.build("area", 2));
+    drop(scene.build("fresh", 2));
+    assert_same(&scene.product("fresh"), &scene.product("area"), "one tile, then a build");
 }
 
 #[test]

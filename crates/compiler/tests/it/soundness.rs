@@ -111,6 +111,17 @@ fn regular_border_points_that_make_room_are_not_counted_as_selected_ones() {
 }
 
 #[test]
+fn points_to_start_from_go_with_every_effort() {
+    for effort in ["fast", "normal"] {
+        let tin = format!("effort = \"{effort}\"\nstart = {{ method = \"vip\", points = 500 }}");
+        let limits = "per_load_module = 20\nmean_per_load_module = 8".into();
+        let scene = Scene::new(&Words { tin, limits, ..Words::sample() });
+        drop(scene.build("area", 2));
+        scene.verify("area");
+    }
+}
+
+#[test]
 fn limits_that_no_removal_can_meet_are_breaches() {
     // What load modules start with: once a border point is chosen in the merge, its pieces are more.
     let tin = "method = \"paper\"\npoints = 800".into();

@@ -70,6 +70,19 @@ fn water_lies_level_beside_ground_of_any_weight() {
 }
 
 #[test]
+fn water_that_lies_elsewhere_is_told() {
+    let water = "water = { file = \"lake.json\", level_m = 5 }";
+    let words = Words { dem: format!("source = \"sample\"\nseed = 1\n{water}"), ..tinned("") };
+    let scene = Scene::with_files(&words, |folder| {
+        let ring = "[[1e6,5e6],[1.1e6,5e6],[1.1e6,5.1e6],[1e6,5e6]]";
+        let text = format!(r#"{{"type":"Polygon","coordinates":[{ring}]}}"#);
+        std::fs::write(folder.join("lake.json"), text).unwrap();
+    });
+    let warnings = scene.build("area", 2).report.warnings;
+    assert!(warnings.iter().any(|warning| warning.contains("none of its polygons reaches")), "{warnings:?}");
+}
+
+#[test]
 fn triangles_over_a_hole_have_its_class_and_others_have_theirs() {
     let words = Words {
         dem: "sources = [\"dem.tif\"]\nvoids = \"hole\"".into(),

@@ -132,7 +132,9 @@ fn voids(dem: &Section) -> Result<(Voids, bool), JobError> {
     }
     let table = entry.table()?;
     let (next_source, hole) = (table.flag("next_source")?, table.flag("hole")?);
-    let posts = match (table.optional("fill_within_posts"), next_source || hole) {
+    // A table that says no to both says `"fail"`; an empty one says nothing.
+    let says_more = ["next_source", "hole"].iter().any(|key| table.optional(key).is_some());
+    let posts = match (table.optional("fill_within_posts"), says_more) {
         (None, true) => None,
         (None, false) => Some(table.required("fill_within_posts")?),
         (some, _) => some,
