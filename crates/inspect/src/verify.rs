@@ -147,8 +147,8 @@ fn check_sums(
 
 /// What a report says that no file of the database shows.
 fn unchecked_figures(report: &Report) -> Option<String> {
-    let is_of_other_ground = report.warnings.iter().any(|warning| warning.contains("made from other ground"));
-    is_of_other_ground.then(|| "residuals in report.json: it says that tiles were made from other ground".to_owned())
+    let told = figures::is_of_other_ground(report);
+    told.then(|| "residuals in report.json: it says that tiles were made from other ground".to_owned())
 }
 
 /// Polygons of load modules that nothing cut: every triangle is one.

@@ -209,6 +209,24 @@ fn one_tile_again_takes_others_with_it_in_which_roads_have_changed() {
 }
 
 #[test]
+fn one_tile_of_an_area_with_a_lake_on_other_ground_is_sound() {
+    let words = Words { features: "sources = [\"features.geojson\"]".into(), ..words() };
+    let dem = sample_dem(words.grid(), 1);
+    let scene = Scene::with_files(&words, |folder: &Path| {
+        crate::scene::write_dem(&folder.join("dem.tif"), &dem);
+        let lake = [(300.0, 2000.0), (900.0, 2050.0), (850.0, 2500.0), (320.0, 2400.0)];
+        fs::write(folder.join("features.geojson"), geojson(&[polygon("natural=water", &lake)])).unwrap();
+    });
+    drop(scene.build("area", 2));
+    let raised = |post: Post| if 100 < post.col { post.row % 7 * 300 } else { 0 };
+    scene.replace_dem(&Dem::from_fn(dem.rect(), |post| Some(dem.height(post) + raised(post))));
+    drop(scene.tile("area", tile(0, 0), false));
+    scene.verify("area");
+    drop(scene.build("area", 2));
+    scene.verify("area");
+}
+
+#[test]
 fn a_changed_pin_reaches_its_tile_and_what_its_borders_lead_to() {
     let pin = |east: f64| {
         let at = [crate::scene::ORIGIN_M[0] + east, crate::scene::ORIGIN_M[1] + 425.0];

@@ -143,6 +143,11 @@ pub(crate) fn differing_totals(
     differing.map(|(what, found, listed)| format!("{what}: {found} in the files, {listed} in database.json")).collect()
 }
 
+/// Whether a report says itself that tiles were made from other ground than it measured residuals against.
+pub(super) fn is_of_other_ground(report: &Report) -> bool {
+    report.warnings.iter().any(|warning| warning.contains("made from other ground"))
+}
+
 /// Numbers of the report that are not those of the files, by key.
 pub(crate) fn differing_report(
     report: &Report,
@@ -155,8 +160,7 @@ pub(crate) fn differing_report(
     of_counts(&mut figures, report, job, area, &levels[0], counts);
     of_points(&mut figures, report, area, tins);
     of_levels(&mut figures, report, job, levels);
-    let is_of_other_ground = report.warnings.iter().any(|warning| warning.contains("made from other ground"));
-    if let Some(sums) = sums.filter(|_| !is_of_other_ground) {
+    if let Some(sums) = sums.filter(|_| !is_of_other_ground(report)) {
         of_residuals(&mut figures, report, job, area, &levels[0], sums);
     }
     let mut problems = figures.problems();
