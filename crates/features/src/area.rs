@@ -150,8 +150,8 @@ impl AreaFeatures {
     }
 
     /// Decides all heights, and forms features so that they take no more triangles than there is room for. `ground` has
-    /// the height of the DEM at each of the stations, in quanta. Beyond the area that is the height of the nearest place
-    /// inside, and only features without any place inside rest on it.
+    /// the height of the DEM at each of the stations, in quanta. Beyond the area that is the height of the nearest
+    /// place inside, and only features without any place inside rest on it.
     ///
     /// # Panics
     /// When there is not one height, or none, for each station.
