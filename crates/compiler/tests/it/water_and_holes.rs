@@ -62,11 +62,10 @@ fn water_lies_level_beside_ground_of_several_weights_and_by_every_method() {
 
 #[test]
 fn water_lies_level_beside_ground_of_any_weight() {
-    let steep = "areas = [{ slope_above_percent = 20, smooth_m = 500, class = \"steep\", weight = 1 }]";
-    let plains = |weight: f64| format!("default = {weight}\n{steep}");
     // Above 2.047 all weights are made smaller, so that water can weigh more.
-    [2.0, 2.1, 8.0, 20.0, 65.535].iter().for_each(|&weight| check_level("", &plains(weight), "", 0.5));
-    check_level("", &plains(8.0), "method = \"greedy\"", 0.5);
+    for weight in [2.0, 8.0, 65.535] {
+        check_level("", &format!("default = {weight}"), "", 0.5);
+    }
 }
 
 #[test]
