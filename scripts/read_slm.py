@@ -57,7 +57,7 @@ def parse(data):
     places = [(row, column) for row in range(south, north) for column in range(west, east)]
     places = [(level, place) for level in range(header["levels"]) for place in places]
     has_decks = header["version"] == 2
-    each = ENTRY.size + (DECK_ENTRY.size if has_decks else 0)
+    each = entry_bytes(header)
     index_length = each * len(places) + 4
     index = checked(data, header_length, index_length, "index")
     end = header_length + index_length
@@ -76,6 +76,11 @@ def parse(data):
     any_decks = any(module.get("decks", {}).get("triangles") for module in modules)
     expect(any_decks == has_decks, "index", "found no decks in a file of version 2")
     return header, modules
+
+
+def entry_bytes(header):
+    """Bytes of an entry of the index."""
+    return ENTRY.size + (DECK_ENTRY.size if header["version"] == 2 else 0)
 
 
 def parse_header(data):
