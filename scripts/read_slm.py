@@ -11,6 +11,7 @@ Exit codes: 0 read, 1 nothing at that place, 2 damaged or unreadable.
 """
 
 import argparse
+import collections
 import json
 import math
 import struct
@@ -206,6 +207,11 @@ def check_vertices(vertices, side, heights, part):
 def check_triangles(triangles, vertices, side, part):
     total = doubled_area(triangles, vertices, part)
     expect(total == 2 * side * side, part, f"found doubled area {total}, expected {2 * side * side}")
+    edges = collections.Counter(edge for a, b, c in triangles for edge in ((a, b), (b, c), (c, a)))
+    for (a, b), count in edges.items():
+        ends = list(zip(vertices[a], vertices[b]))[:2]
+        is_side = any(found == (line, line) for found in ends for line in (0, side))
+        expect(is_side or edges[b, a] == count, part, f"the edge from vertex {a} to {b} is torn")
 
 
 def doubled_area(triangles, vertices, part):

@@ -77,6 +77,7 @@ mod header;
 pub use header::Header;
 mod vertex;
 pub use vertex::Vertex;
+mod cover;
 mod index;
 pub use index::{DecksEntry, IndexEntry};
 mod decks;

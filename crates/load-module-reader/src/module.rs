@@ -1,6 +1,7 @@
 //! One load module: its section decoded, and every promise of the format checked.
 
 use crate::bytes::{Cursor, check_section};
+use crate::cover::torn_edge_count;
 use crate::{Decks, FIXED_MODULE_BYTES, Header, IndexEntry, QUANTA_PER_METRE, ReadError, Section, Vertex};
 
 /// Residuals over the posts that a load module owns, in quanta of 1/128 m.
@@ -93,7 +94,7 @@ impl Module {
         Ok(module)
     }
 
-    /// Every triangle counter-clockwise, and all of them together as large as the square.
+    /// Every triangle counter-clockwise, all of them together as large as the square, and none torn from another.
     fn check_cover(&self, side: u16, entry: &IndexEntry, section: Section) -> Result<(), ReadError> {
         let offset = triangles_offset(entry);
         let square = 2 * i64::from(side) * i64::from(side);
@@ -106,11 +107,14 @@ impl Module {
             }
             area += doubled;
         }
-        if area == square {
-            return Ok(());
+        let wrong = |field, found, expected| Err(ReadError::WrongValue { section, offset, field, found, expected });
+        if area != square {
+            return wrong("doubled area of all triangles", area, square);
         }
-        let field = "doubled area of all triangles";
-        Err(ReadError::WrongValue { section, offset, field, found: area, expected: square })
+        match torn_edge_count(&self.vertices, &self.triangles, side) {
+            0 => Ok(()),
+            torn => wrong("torn edges", torn as i64, 0),
+        }
     }
 }
 

@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use fastrand::Rng;
 
+use crate::cover::torn_edge_count;
 use crate::lookup::STEPS;
 use crate::{
     Area, Block, Decks, Keep, LoadedGround, Module, ReadError, Residual, Sight, SlmFile, TerrainModule, TileFile,
@@ -424,4 +425,55 @@ fn what_is_no_file_is_not_waited_for() {
     }
     assert!(matches!(Area::open(&folder, Keep::OnDisk), Err(ReadError::NotAFile { .. })));
     std::fs::remove_dir_all(folder).unwrap();
+}
+
+/// The sample with other triangles in its flat load module, and its checksums made right.
+fn with_triangles(triangles: [[u16; 3]; 2]) -> Vec<u8> {
+    let mut bytes = sample::file();
+    let words = |triangles: [[u16; 3]; 2]| -> Vec<u8> {
+        triangles.as_flattened().iter().flat_map(|vertex| vertex.to_le_bytes()).collect()
+    };
+    let old = words([[0, 1, 3], [0, 3, 2]]);
+    let at = bytes.windows(old.len()).position(|found| found == old).unwrap();
+    bytes[at..at + old.len()].copy_from_slice(&words(triangles));
+    sample::mend_checksums(&mut bytes);
+    bytes
+}
+
+#[test]
+fn a_hole_beside_an_overlap_as_large_is_refused() {
+    assert!(SlmFile::parse(&with_triangles([[0, 1, 2], [1, 3, 2]])).is_ok());
+    for overlapping in [[[0, 1, 2], [0, 1, 3]], [[0, 1, 3], [1, 3, 2]], [[0, 1, 2], [0, 3, 2]]] {
+        let error = SlmFile::parse(&with_triangles(overlapping)).unwrap_err().to_string();
+        assert!(error.contains("found torn edges 2, expected 0"), "{overlapping:?}: {error}");
+    }
+}
+
+#[test]
+fn torn_edges_are_those_that_a_list_of_all_edges_names() {
+    let mut draw = Rng::with_seed(17);
+    for seed in 0..60 {
+        let mut module = rough(1 + (seed % 7) as u16, seed);
+        if 20 <= seed {
+            for _ in 0..1 + seed % 3 {
+                let count = module.triangles.len();
+                let (from, to) = (draw.usize(..count), draw.usize(..count));
+                module.triangles[to] = module.triangles[from];
+            }
+        }
+        let directed = |&[a, b, c]: &[u16; 3]| [(a, b), (b, c), (c, a)];
+        let edges: Vec<(u16, u16)> = module.triangles.iter().flat_map(directed).collect();
+        let is_torn = |&(from, to): &(u16, u16)| {
+            let [a, b] = [from, to].map(|index| module.vertices[usize::from(index)]);
+            let on_side = (a.x == b.x && a.x % SIDE == 0) || (a.y == b.y && a.y % SIDE == 0);
+            let count = |edge| edges.iter().filter(|&&found| found == edge).count();
+            !on_side && count((from, to)) != count((to, from))
+        };
+        let mut torn: Vec<(u16, u16)> = edges.iter().filter(|edge| is_torn(edge)).copied().collect();
+        torn.iter_mut().for_each(|edge| *edge = (edge.0.min(edge.1), edge.0.max(edge.1)));
+        torn.sort_unstable();
+        torn.dedup();
+        assert_eq!(torn_edge_count(&module.vertices, &module.triangles, SIDE), torn.len(), "seed {seed}");
+        assert!(20 <= seed || torn.is_empty(), "seed {seed}");
+    }
 }
