@@ -56,6 +56,13 @@ pub enum SourceError {
     #[error("{path}: too large: {found} {what}, at most {limit} are read")]
     TooLarge { path: PathBuf, what: &'static str, found: u64, limit: u64 },
 
+    /// What is in the file takes more memory than a file of its size may.
+    #[error(
+        "{path}: its lines and polygons take more than {} MB of memory, at most that is given to a file of {} kB",
+        limit / 1_000_000, file_bytes.div_ceil(1000)
+    )]
+    OutOfProportion { path: PathBuf, file_bytes: u64, limit: u64 },
+
     // The file is sound, but of a kind that is not read.
     /// A format that is known, but not read.
     #[error("{path}: {found}, which is not read; expected GeoTIFF, DTED, HGT, Esri ASCII, or raw with a .hdr")]
@@ -263,6 +270,7 @@ impl SourceError {
             TooLarge { what, .. } if has(what, &["block"]) => {
                 "no extract of OpenStreetMap has such blocks: the file is damaged; fetch it again"
             }
+            OutOfProportion { .. } => "it repeats itself, as no map does: the file is damaged or made to do harm",
             TooLarge { what: "bytes" | "features (or more)", .. } => {
                 "cut the part you need: ogr2ogr -spat WEST SOUTH EAST NORTH out.gpkg in.…"
             }

@@ -1,12 +1,15 @@
 //! GeoPackages: their layers, each in its own coordinate system, and what is in them.
 //!
-//! The file is a database, and one that was made to do harm can hold programs (views, triggers, virtual tables).
-//! So it is opened for reading only, and only plain tables of it are looked at.
+//! The file is a database, and one that was made to do harm can hold programs (views, triggers, virtual tables,
+//! columns that are computed). So it is opened for reading only, only plain tables of it are looked at, and no more is
+//! taken from them than the file has bytes.
+
+mod open;
 
 use std::path::Path;
 
 use rusqlite::types::ValueRef;
-use rusqlite::{Connection, OpenFlags, OptionalExtension, Row};
+use rusqlite::{Connection, OptionalExtension, Row};
 
 use crate::SourceError;
 use crate::crs::Crs;
@@ -26,8 +29,8 @@ pub(crate) struct Layer {
     pub polygons: Vec<Rings>,
 }
 
-/// The layers of the GeoPackage at `path` that hold polygons.
-pub(crate) fn layers(path: &Path) -> Result<Vec<Layer>, SourceError> {
+/// The layers of the GeoPackage at `path` that hold polygons, and its bytes.
+pub(crate) fn layers(path: &Path) -> Result<(Vec<Layer>, u64), SourceError> {
     let package = Package::open(path)?;
     let mut layers = Vec::new();
     for table in package.tables()? {
@@ -36,7 +39,7 @@ pub(crate) fn layers(path: &Path) -> Result<Vec<Layer>, SourceError> {
             layers.push(Layer { crs: package.crs(table.srs)?, polygons });
         }
     }
-    Ok(layers)
+    Ok((layers, package.bytes))
 }
 
 /// The names of the layers of the GeoPackage at `path`.
@@ -55,21 +58,20 @@ pub(crate) struct Table {
 pub(crate) struct Package<'a> {
     path: &'a Path,
     database: Connection,
+    /// Bytes of the file and of the log beside it.
+    bytes: u64,
 }
 
 impl<'a> Package<'a> {
     /// Opens the GeoPackage at `path` for reading.
     pub(crate) fn open(path: &'a Path) -> Result<Self, SourceError> {
-        let broken = |error: rusqlite::Error| {
-            let (what, expected) = ("the GeoPackage".into(), "a sound GeoPackage".into());
-            SourceError::Malformed { path: path.into(), what, found: error.to_string(), expected }
-        };
-        let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_NO_MUTEX;
-        let database = Connection::open_with_flags(path, flags).map_err(broken)?;
-        let guards = "PRAGMA trusted_schema = OFF; PRAGMA query_only = ON; PRAGMA cell_size_check = ON; \
-                      PRAGMA mmap_size = 0;";
-        database.execute_batch(guards).map_err(broken)?;
-        Ok(Self { path, database })
+        let (database, bytes) = open::read_only(path)?;
+        Ok(Self { path, database, bytes })
+    }
+
+    /// Bytes of the file and of the log beside it.
+    pub(crate) fn bytes(&self) -> u64 {
+        self.bytes
     }
 
     pub(crate) fn broken(&self, error: impl std::fmt::Display) -> SourceError {
@@ -85,7 +87,24 @@ impl<'a> Package<'a> {
         // A virtual table has no page of its own to begin on.
         let plain = "SELECT 1 FROM sqlite_schema WHERE type = 'table' AND rootpage > 0 AND lower(name) = lower(?1)";
         let found = self.database.query_row(plain, [name], |_| Ok(())).optional();
-        found.map(|found| found.is_some()).map_err(|error| self.broken(error))
+        let is_table = found.map(|found| found.is_some()).map_err(|error| self.broken(error))?;
+        if is_table {
+            self.stores_all_columns(name)?;
+        }
+        Ok(is_table)
+    }
+
+    /// A column that is computed is a program: it may make gigabytes of nothing.
+    fn stores_all_columns(&self, name: &str) -> Result<(), SourceError> {
+        let computed = "SELECT CAST(name AS BLOB) FROM pragma_table_xinfo(?1) WHERE hidden <> 0";
+        let found = self.database.query_row(computed, [name], |row| row.get::<_, Vec<u8>>(0)).optional();
+        match found.map_err(|error| self.broken(error))? {
+            None => Ok(()),
+            Some(column) => {
+                let column = String::from_utf8_lossy(&column).into_owned();
+                Err(self.malformed(format!("a column `{column}` of `{name}` that is computed"), "columns of values"))
+            }
+        }
     }
 
     /// Its tables of features.
@@ -161,7 +180,7 @@ impl<'a> Package<'a> {
     ///
     /// The library's own list panics where a name is not UTF-8.
     pub(crate) fn columns(&self, table: &Table) -> Result<Vec<(usize, String)>, SourceError> {
-        let query = "SELECT name, type, pk FROM pragma_table_xinfo(?1) WHERE hidden <> 1 ORDER BY cid";
+        let query = "SELECT name, type, pk FROM pragma_table_xinfo(?1) ORDER BY cid";
         let mut statement = self.database.prepare(query).map_err(|error| self.broken(error))?;
         let mut rows = statement.query([&table.name]).map_err(|error| self.broken(error))?;
         let (mut columns, mut place) = (Vec::new(), 0);
@@ -188,9 +207,15 @@ impl<'a> Package<'a> {
         let query = format!("SELECT {columns} FROM {} LIMIT {}", quoted(&table.name), ROWS_MAX + 1);
         let mut statement = self.database.prepare(&query).map_err(|error| self.broken(error))?;
         let mut rows = statement.query([]).map_err(|error| self.broken(error))?;
-        let mut count = 0;
+        let (mut count, mut bytes) = (0, 0);
         while let Some(row) = rows.next().map_err(|error| self.broken(error))? {
             count += 1;
+            bytes += self.bytes_of(row)?;
+            // Damaged pages may give the same bytes over and over.
+            if self.bytes < bytes {
+                let found = format!("rows of `{}` that hold more bytes than the file", table.name);
+                return Err(self.malformed(found, "a sound GeoPackage"));
+            }
             if ROWS_MAX < count {
                 let (what, found, limit) = ("features (or more)", count, ROWS_MAX);
                 return Err(SourceError::TooLarge { path: self.path.into(), what, found, limit });
@@ -198,6 +223,18 @@ impl<'a> Package<'a> {
             found(row)?;
         }
         Ok(())
+    }
+
+    /// Bytes of the texts and blobs of a row.
+    fn bytes_of(&self, row: &Row) -> Result<u64, SourceError> {
+        let mut bytes = 0;
+        for index in 0..row.as_ref().column_count() {
+            bytes += match row.get_ref(index).map_err(|error| self.broken(error))? {
+                ValueRef::Text(bytes) | ValueRef::Blob(bytes) => bytes.len() as u64,
+                ValueRef::Null | ValueRef::Integer(_) | ValueRef::Real(_) => 0,
+            };
+        }
+        Ok(bytes)
     }
 
     /// Whether a layer holds anything.

@@ -9,6 +9,7 @@ use geojson::{FeatureCollection, GeoJson, Geometry, GeometryValue, JsonObject, P
 use mask::Polygon;
 
 use crate::SourceError;
+use crate::allowance::Allowance;
 use crate::crs::Crs;
 use crate::limits::GEOJSON_BYTES_MAX;
 use crate::polygons::{corner, projected, said_in};
@@ -61,7 +62,7 @@ pub fn read_given(path: &Path, epsg: u32) -> Result<Vec<GivenFeature>, SourceErr
     }
     let said = said.or_else(|| features.iter().all(looks_like_degrees).then(Crs::wgs84));
     match said {
-        Some(crs) if crs.epsg() != Some(epsg) => brought(path, features, &crs, epsg),
+        Some(crs) if crs.epsg() != Some(epsg) => brought(&Allowance::new(path, store.len()), features, &crs, epsg),
         _ => Ok(features),
     }
 }
@@ -78,8 +79,13 @@ fn looks_like_degrees(feature: &GivenFeature) -> bool {
     }
 }
 
-fn brought(path: &Path, features: Vec<GivenFeature>, crs: &Crs, epsg: u32) -> Result<Vec<GivenFeature>, SourceError> {
-    let refused = |found: String| SourceError::PolygonCrs { path: path.into(), found, expected: epsg };
+fn brought(
+    allowance: &Allowance,
+    features: Vec<GivenFeature>,
+    crs: &Crs,
+    epsg: u32,
+) -> Result<Vec<GivenFeature>, SourceError> {
+    let refused = |found: String| SourceError::PolygonCrs { path: allowance.path().into(), found, expected: epsg };
     let area = Crs::from_epsg(epsg).map_err(refused)?;
     let shape = |shape: GivenShape| match shape {
         GivenShape::Point(at) => {
@@ -87,7 +93,7 @@ fn brought(path: &Path, features: Vec<GivenFeature>, crs: &Crs, epsg: u32) -> Re
             placed.map(GivenShape::Point)
         }
         GivenShape::Polygon(polygon) => {
-            let mut all = projected(path, vec![polygon], crs, epsg)?;
+            let mut all = projected(allowance, vec![polygon], crs, epsg)?;
             Ok(GivenShape::Polygon(all.remove(0)))
         }
     };

@@ -11,6 +11,7 @@ pub use error::SourceError;
 mod beside;
 mod content;
 pub use content::{FileState, content};
+mod allowance;
 mod crs;
 mod store;
 pub use crs::Crs;

@@ -32,6 +32,20 @@ pub const OSM_HEAD_BYTES_MAX: u64 = 64 << 10;
 pub const OSM_BLOCK_BYTES_MAX: u64 = 32 << 20;
 /// Texts, and groups, of a block of OpenStreetMap data: blocks hold 8000 things, each with some tens of tags at most.
 pub const OSM_STRINGS_MAX: usize = 1 << 20;
+/// Numbers in one list of OpenStreetMap data, such as the nodes of a way: the project's own data has at most 2000 for
+/// ways and 32,000 for relations, other makers' contour lines some ten thousand.
+pub const OSM_NUMBERS_MAX: usize = 1 << 20;
+/// Bytes of memory that what is read of a file of lines and polygons may take, whatever its size: 2 million vertices.
+pub const FEATURE_BYTES_FREE: u64 = 64 << 20;
+/// Bytes of memory beside that for each byte of the file: real extracts, packed as they are, take fewer than 10.
+pub const FEATURE_BYTES_A_BYTE: u64 = 64;
+/// Bytes of memory that what is read of one file may take at most: what the largest machines at hand have to spare.
+pub const FEATURE_BYTES_MAX: u64 = 16 << 30;
+/// Bytes that a packed file of lines and polygons may unpack to, whatever its size.
+pub const UNPACKED_FEATURE_BYTES_FREE: u64 = 16 << 20;
+/// Bytes beside that for each byte of it: indented GeoJSON is packed to a tenth, tables of a Shapefile that are mostly
+/// blanks to a thirtieth.
+pub const UNPACKED_FEATURE_BYTES_A_BYTE: u64 = 48;
 /// Things about features that are told one by one; what comes after them is counted.
 pub const REMARKS_MAX: usize = 10_000;
 /// Rings of one polygon: which lies in which is found by comparing them.

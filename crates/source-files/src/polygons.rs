@@ -9,6 +9,7 @@ use std::path::Path;
 use geojson::{FeatureCollection, GeoJson, Geometry, GeometryValue, JsonObject, JsonValue, Position};
 use mask::Polygon;
 
+use crate::allowance::{Allowance, VERTEX_BYTES};
 use crate::beside::beside;
 use crate::crs::Crs;
 use crate::limits::GEOJSON_BYTES_MAX;
@@ -45,28 +46,35 @@ pub fn read_polygons(path: &Path, epsg: u32) -> Result<Vec<Polygon>, SourceError
     if collected.polygons.is_empty() {
         return Err(SourceError::NoPolygons { path: path.into() });
     }
-    placed(path, collected.polygons, said, epsg)
+    placed(&Allowance::new(path, store.len()), collected.polygons, said, epsg)
 }
 
 /// The polygons of all layers.
 fn of_geopackage(path: &Path, epsg: u32) -> Result<Vec<Polygon>, SourceError> {
     let mut collected = Collected { path, polygons: Vec::new(), rings: 0 };
     let mut all = Vec::new();
-    for layer in geopackage::layers(path)? {
+    let (layers, bytes) = geopackage::layers(path)?;
+    let allowance = Allowance::new(path, bytes);
+    for layer in layers {
         for rings in layer.polygons {
             let rings = rings.into_iter().map(|ring| collected.closed(Some(ring))).collect::<Result<_, _>>()?;
             collected.polygons.push(Polygon { rings });
         }
-        all.append(&mut placed(path, std::mem::take(&mut collected.polygons), layer.crs, epsg)?);
+        all.append(&mut placed(&allowance, std::mem::take(&mut collected.polygons), layer.crs, epsg)?);
     }
     if all.is_empty() { Err(SourceError::NoPolygons { path: path.into() }) } else { Ok(all) }
 }
 
 /// Polygons in the area's system; `said` is their own, where it is known.
-fn placed(path: &Path, polygons: Vec<Polygon>, said: Option<Crs>, epsg: u32) -> Result<Vec<Polygon>, SourceError> {
+fn placed(
+    allowance: &Allowance,
+    polygons: Vec<Polygon>,
+    said: Option<Crs>,
+    epsg: u32,
+) -> Result<Vec<Polygon>, SourceError> {
     let said = said.or_else(|| look_like_degrees(&polygons).then(Crs::wgs84));
     match said {
-        Some(crs) if crs.epsg() != Some(epsg) => projected(path, polygons, &crs, epsg),
+        Some(crs) if crs.epsg() != Some(epsg) => projected(allowance, polygons, &crs, epsg),
         _ => Ok(polygons),
     }
 }
@@ -95,12 +103,12 @@ fn look_like_degrees(polygons: &[Polygon]) -> bool {
 /// Polygons brought from `crs` to the area's system. Long sides get corners between, since what is straight in one
 /// system is not in the other.
 pub(crate) fn projected(
-    path: &Path,
+    allowance: &Allowance,
     polygons: Vec<Polygon>,
     crs: &Crs,
     epsg: u32,
 ) -> Result<Vec<Polygon>, SourceError> {
-    let outside = |found: String| SourceError::PolygonCrs { path: path.into(), found, expected: epsg };
+    let outside = |found: String| SourceError::PolygonCrs { path: allowance.path().into(), found, expected: epsg };
     let area = Crs::from_epsg(epsg).map_err(&outside)?;
     let ring = |ring: &Vec<[f64; 2]>| {
         let mut corners = Vec::with_capacity(ring.len());
@@ -108,6 +116,7 @@ pub(crate) fn projected(
         for (&from, to) in ring.iter().zip(next) {
             let to = to.copied().unwrap_or(from);
             let pieces = pieces_of(crs, from, to);
+            allowance.take(VERTEX_BYTES * pieces as usize)?;
             for step in 0..pieces {
                 let share = f64::from(step) / f64::from(pieces);
                 let place = [0, 1].map(|axis| from[axis] + share * (to[axis] - from[axis]));

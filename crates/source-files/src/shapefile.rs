@@ -37,7 +37,7 @@ pub(crate) fn shapes<'a>(
     index: Option<&[u8]>,
 ) -> Result<impl Iterator<Item = Result<Shape, SourceError>> + use<'a>, SourceError> {
     let places = match index.and_then(|index| index.get(HEADER_BYTES..)) {
-        Some(entries) => entries.chunks_exact(8).map(|entry| 2 * big(&entry[..4])).collect(),
+        Some(entries) => indexed(store, bytes, entries)?,
         None => in_sequence(store, bytes)?,
     };
     Ok(places.into_iter().map(move |at| shape(store, bytes, at)))
@@ -74,6 +74,21 @@ fn shape(store: &Store, bytes: &[u8], at: usize) -> Result<Shape, SourceError> {
         8 | 18 | 28 => Shape::Other("MultiPoint"),
         _ => Shape::Other("shape of some other kind"),
     })
+}
+
+/// Where records begin as the index says. They may come in any order and leave bytes out, but none of them twice: an
+/// index that names one record a million times makes a file of gigabytes of it.
+fn indexed(store: &Store, bytes: &[u8], entries: &[u8]) -> Result<Vec<usize>, SourceError> {
+    let places: Vec<usize> = entries.chunks_exact(8).map(|entry| 2 * big(&entry[..4])).collect();
+    let mut all = 0;
+    for &at in &places {
+        all += 8 + 2 * big(&part(store, bytes, at, 8)?[4..]);
+        if bytes.len() < all {
+            let found = format!("{} records of more bytes than the file has", places.len());
+            return Err(store.malformed("the index beside it (.shx)", found, "each record once"));
+        }
+    }
+    Ok(places)
 }
 
 /// Where records begin when one follows the other.

@@ -12,7 +12,9 @@ use zip::ZipArchive;
 
 use crate::SourceError;
 use crate::content::regular;
-use crate::limits::{ARCHIVE_ENTRIES_MAX, UNPACKED_BYTES_MAX};
+use crate::limits::{
+    ARCHIVE_ENTRIES_MAX, UNPACKED_BYTES_MAX, UNPACKED_FEATURE_BYTES_A_BYTE, UNPACKED_FEATURE_BYTES_FREE,
+};
 
 /// Where the bytes of a source are.
 #[derive(Clone, Debug)]
@@ -23,6 +25,8 @@ pub(crate) struct Store {
     name: String,
     unpacked: Option<Arc<[u8]>>,
     len: u64,
+    /// Bytes of the file as it lies there.
+    file_bytes: u64,
 }
 
 /// An open source.
@@ -54,7 +58,7 @@ impl Store {
     pub(crate) fn plain(path: &Path) -> Result<Self, SourceError> {
         let data = regular(path)?;
         let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-        Ok(Self { path: path.into(), name, unpacked: None, len: data.len() })
+        Ok(Self { path: path.into(), name, unpacked: None, len: data.len(), file_bytes: data.len() })
     }
 
     /// The file at `path`, unpacked when it is a gzip or zip file.
@@ -62,16 +66,23 @@ impl Store {
         let plain = Self::plain(path)?;
         let start = plain.start(4)?;
         match start.as_slice() {
-            [0x1f, 0x8b, ..] => plain.inflated(),
+            [0x1f, 0x8b, ..] => plain.inflated(UNPACKED_BYTES_MAX),
             [b'P', b'K', 3 | 5, 4 | 6] => plain.unzipped(),
             _ => Ok(plain),
         }
     }
 
-    fn inflated(&self) -> Result<Self, SourceError> {
+    /// The gzip file of lines and polygons at `path`, unpacked. These are taken apart, which takes many times the
+    /// memory, so they are bounded by the size of the file.
+    pub(crate) fn inflated_features(path: &Path) -> Result<Self, SourceError> {
+        let plain = Self::plain(path)?;
+        plain.inflated(unpacked_features_max(plain.len))
+    }
+
+    fn inflated(&self, limit: u64) -> Result<Self, SourceError> {
         let name = self.name.strip_suffix(".gz").unwrap_or(&self.name).to_owned();
         let mut decoder = GzDecoder::new(BufReader::new(self.handle()?));
-        let bytes = self.unpack(&mut decoder)?;
+        let bytes = self.unpack(&mut decoder, limit)?;
         // A reader that stops here would miss what was appended, a second part of the heights, perhaps.
         let rest = decoder.into_inner().fill_buf().map_err(|source| self.stopped(source))?.len();
         match rest {
@@ -97,19 +108,19 @@ impl Store {
             return Err(SourceError::ArchiveHolds { path: self.path.clone(), found: names.len() });
         };
         let entry = archive.by_name(name).map_err(|error| self.broken(error.to_string()))?;
-        let bytes = self.unpack(entry)?;
+        let bytes = self.unpack(entry, UNPACKED_BYTES_MAX)?;
         Ok(self.holding(name.rsplit(['/', '\\']).next().unwrap_or(name).to_owned(), bytes))
     }
 
     /// Everything `packed` holds, and no more than the limit, whatever its header promises.
-    fn unpack(&self, packed: impl Read) -> Result<Vec<u8>, SourceError> {
+    fn unpack(&self, packed: impl Read, limit: u64) -> Result<Vec<u8>, SourceError> {
         let mut bytes = Vec::new();
         packed
-            .take(UNPACKED_BYTES_MAX + 1)
+            .take(limit + 1)
             .read_to_end(&mut bytes)
             .map_err(|error| self.broken(format!("it cannot be unpacked: {error}")))?;
-        if UNPACKED_BYTES_MAX < bytes.len() as u64 {
-            let (what, limit) = ("bytes once unpacked (or more)", UNPACKED_BYTES_MAX);
+        if limit < bytes.len() as u64 {
+            let what = "bytes once unpacked (or more)";
             return Err(SourceError::TooLarge { path: self.path.clone(), what, found: limit + 1, limit });
         }
         Ok(bytes)
@@ -117,7 +128,7 @@ impl Store {
 
     fn holding(&self, name: String, bytes: Vec<u8>) -> Self {
         let len = bytes.len() as u64;
-        Self { path: self.path.clone(), name, unpacked: Some(bytes.into()), len }
+        Self { path: self.path.clone(), name, unpacked: Some(bytes.into()), len, file_bytes: self.file_bytes }
     }
 
     fn broken(&self, found: String) -> SourceError {
@@ -135,6 +146,11 @@ impl Store {
 
     pub(crate) fn len(&self) -> u64 {
         self.len
+    }
+
+    /// Bytes of the file as it lies there, packed or not.
+    pub(crate) fn file_bytes(&self) -> u64 {
+        self.file_bytes
     }
 
     pub(crate) fn is_packed(&self) -> bool {
@@ -182,6 +198,12 @@ impl Store {
     pub(crate) fn malformed(&self, what: &str, found: String, expected: &str) -> SourceError {
         SourceError::Malformed { path: self.path.clone(), what: what.into(), found, expected: expected.into() }
     }
+}
+
+/// Bytes that a packed file of lines and polygons of so many bytes may unpack to.
+fn unpacked_features_max(file_bytes: u64) -> u64 {
+    let limit = UNPACKED_FEATURE_BYTES_A_BYTE.saturating_mul(file_bytes).saturating_add(UNPACKED_FEATURE_BYTES_FREE);
+    limit.min(UNPACKED_BYTES_MAX)
 }
 
 /// Files that lie beside a raster and describe it.

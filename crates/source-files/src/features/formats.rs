@@ -65,7 +65,7 @@ pub(super) fn open(path: &Path) -> Result<(Store, Format), SourceError> {
         return Ok((store, Format::OpenStreetMap));
     }
     if start.starts_with(&[0x1f, 0x8b]) {
-        let unpacked = Store::open(path)?;
+        let unpacked = Store::inflated_features(path)?;
         let start = unpacked.start(512)?;
         return match is_json(&start) {
             true => Ok((unpacked, Format::GeoJson)),

@@ -51,10 +51,11 @@ pub(super) fn read(store: &Store, wanted: &Wanted) -> Result<FeatureFile, Source
     }
     let all = raw.iter().flat_map(|feature| feature.shape.vertices());
     let said = said.or_else(|| look_like_degrees(all).then(Crs::wgs84));
-    let mut placing = Placing::new(path, wanted, said)?;
+    let mut placing = Placing::new(path, store.file_bytes(), wanted, said)?;
     faults.into_iter().for_each(|(id, found)| placing.remark(&id, None, found, LEFT_OUT));
+    texts.count(placing.allowance());
     raw.into_iter().for_each(|feature| placing.place(feature));
-    Ok(placing.finish(None))
+    placing.finish(None)
 }
 
 fn strict(json: GeoJson) -> Vec<Loose> {

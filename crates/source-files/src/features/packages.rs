@@ -21,15 +21,15 @@ const LOOKED_AT: usize = 1000;
 pub(super) fn read(path: &Path, wanted: &Wanted) -> Result<FeatureFile, SourceError> {
     let package = Package::open(path)?;
     let Some(table) = chosen(path, &package, wanted.layer)? else {
-        let mut placing = Placing::new(path, wanted, None)?;
+        let mut placing = Placing::new(path, package.bytes(), wanted, None)?;
         placing.note("a GeoPackage without a layer of features".into());
-        return Ok(placing.finish(None));
+        return placing.finish(None);
     };
     let said = wanted.system(|| match package.crs(table.srs)? {
         Some(crs) => Ok(Some(crs)),
         None => Ok(looks(path, &package, &table)?.then(Crs::wgs84)),
     })?;
-    let mut placing = Placing::new(path, wanted, said)?;
+    let mut placing = Placing::new(path, package.bytes(), wanted, said)?;
     let file = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     let (name, mut texts) = (format!("{file}:{}", table.name), Texts::default());
     let columns = Columns::of(path, &package, &table)?;
@@ -51,12 +51,13 @@ pub(super) fn read(path: &Path, wanted: &Wanted) -> Result<FeatureFile, SourceEr
                 let said = columns.said(row).map_err(|error| package.broken(error))?;
                 let tags = with_packed_tags(said.iter().map(|(key, value)| (*key, value.as_str())));
                 placing.place(RawFeature { id, tags: texts.tags(tags), shape });
+                texts.count(placing.allowance());
             }
             Err(found) => placing.remark(&id, None, found, LEFT_OUT),
         }
         Ok(())
     })?;
-    Ok(placing.finish(None))
+    placing.finish(None)
 }
 
 /// Columns of a layer and where they stand in a row.

@@ -9,22 +9,33 @@ use super::clip::{self, Extent, Vertex};
 use super::model::{Done, FeatureFile, Remark, Tags, VectorFeature, VectorShape, Vertices, Wanted};
 use super::raw::{Part, RawFeature};
 use crate::SourceError;
+use crate::allowance::{Allowance, VERTEX_BYTES};
 use crate::crs::Crs;
 use crate::limits::{HEIGHT_M_MAX, REMARKS_MAX};
 use crate::polygons::pieces_of;
 
 /// Texts that are the same, kept once.
 #[derive(Debug, Default)]
-pub(super) struct Texts(HashSet<Arc<str>>);
+pub(super) struct Texts {
+    kept: HashSet<Arc<str>>,
+    /// Bytes kept since they were last asked for.
+    bytes: usize,
+}
 
 impl Texts {
     pub(super) fn keep(&mut self, text: &str) -> Arc<str> {
-        if let Some(kept) = self.0.get(text) {
+        if let Some(kept) = self.kept.get(text) {
             return kept.clone();
         }
         let kept: Arc<str> = text.into();
-        self.0.insert(kept.clone());
+        self.kept.insert(kept.clone());
+        self.bytes += text.len() + 64;
         kept
+    }
+
+    /// Counts what was kept since this was last called.
+    pub(super) fn count(&mut self, allowance: &Allowance) {
+        allowance.count(std::mem::take(&mut self.bytes));
     }
 
     /// Tags in the order that features have them.
@@ -56,12 +67,14 @@ pub(super) struct Placing {
     lies: Extent,
     height_unit_m: f64,
     remarks_beyond: u64,
+    /// Of the whole file, whose parts share it.
+    allowance: Arc<Allowance>,
     file: FeatureFile,
 }
 
 impl Placing {
-    /// For a file in the system `said`, or in the area's own.
-    pub(super) fn new(path: &Path, wanted: &Wanted, said: Option<Crs>) -> Result<Self, SourceError> {
+    /// For a file of so many bytes in the system `said`, or in the area's own.
+    pub(super) fn new(path: &Path, file_bytes: u64, wanted: &Wanted, said: Option<Crs>) -> Result<Self, SourceError> {
         let refused = |found: String| SourceError::PolygonCrs { path: path.into(), found, expected: wanted.epsg };
         let area = Crs::from_epsg(wanted.epsg).map_err(refused)?;
         let source = said.unwrap_or_else(|| area.clone());
@@ -79,6 +92,7 @@ impl Placing {
             lies: Extent::NOTHING,
             height_unit_m,
             remarks_beyond: 0,
+            allowance: Arc::new(Allowance::new(path, file_bytes)),
             file,
         })
     }
@@ -90,9 +104,15 @@ impl Placing {
             source: self.source.clone(),
             lies: Extent::NOTHING,
             remarks_beyond: 0,
+            allowance: self.allowance.clone(),
             file: FeatureFile::default(),
             ..*self
         }
+    }
+
+    /// What the file may take.
+    pub(super) fn allowance(&self) -> &Arc<Allowance> {
+        &self.allowance
     }
 
     /// Takes over what was placed of the next part of the file.
@@ -152,8 +172,11 @@ impl Placing {
         }
     }
 
-    /// Places a feature.
+    /// Places a feature, as long as the file may take more; [`Placing::finish`] refuses the file if it may not.
     pub(super) fn place(&mut self, feature: RawFeature) {
+        if self.allowance.is_spent() {
+            return;
+        }
         let RawFeature { id, tags, shape } = feature;
         if let Some(other) = shape.other {
             let done = if shape.parts.is_empty() { "left out" } else { "left out, its lines and polygons kept" };
@@ -323,6 +346,9 @@ impl Placing {
     }
 
     fn keep(&mut self, id: String, tags: Tags, mut parts: Vec<Part>, unit_m: Option<f64>) {
+        let vertices: usize = parts.iter().flat_map(Part::runs).map(Vec::len).sum();
+        // Each part has tags of its own.
+        self.allowance.count(parts.len() * (128 + 32 * tags.len()) + vertices * VERTEX_BYTES);
         let vertices = |run: Vec<Vertex>| Vertices {
             heights_m: unit_m.map_or_else(Vec::new, |unit_m| run.iter().map(|v| height_m(v, unit_m)).collect()),
             places: run.into_iter().map(|[east, north, _]| [east, north]).collect(),
@@ -347,7 +373,11 @@ impl Placing {
     }
 
     /// What was placed, with a word where that is nothing.
-    pub(super) fn finish(mut self, attribution: Option<&'static str>) -> FeatureFile {
+    ///
+    /// # Errors
+    /// When that takes more than the file may.
+    pub(super) fn finish(mut self, attribution: Option<&'static str>) -> Result<FeatureFile, SourceError> {
+        self.allowance.check()?;
         if 0 < self.remarks_beyond {
             self.file.notes.push(format!("{} more remarks about single features", self.remarks_beyond));
         }
@@ -366,7 +396,7 @@ impl Placing {
         }
         self.file.features.shrink_to_fit();
         self.file.attribution = attribution;
-        self.file
+        Ok(self.file)
     }
 
     fn text(&self, crs: &Crs, Extent { east, north }: &Extent) -> String {

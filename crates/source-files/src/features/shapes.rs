@@ -23,7 +23,7 @@ pub(super) fn read(store: &Store, wanted: &Wanted) -> Result<FeatureFile, Source
         Some(crs) => Ok(Some(crs)),
         None => Ok(looks(store, &bytes, index.as_deref())?.then(Crs::wgs84)),
     })?;
-    let mut placing = Placing::new(path, wanted, said)?;
+    let mut placing = Placing::new(path, store.len(), wanted, said)?;
     if table.is_none() {
         placing.note("no table (.dbf) beside it, so its features have no attributes".into());
     }
@@ -45,6 +45,7 @@ pub(super) fn read(store: &Store, wanted: &Wanted) -> Result<FeatureFile, Source
             Ok(shape) => {
                 let tags = with_packed_tags(columns.iter().map(|(key, value)| (*key, value.as_str())));
                 placing.place(RawFeature { id, tags: texts.tags(tags), shape });
+                texts.count(placing.allowance());
             }
             Err(rings) => {
                 let found = format!("a polygon of {rings} rings, more than the {RINGS_MAX} that are put together");
@@ -52,7 +53,7 @@ pub(super) fn read(store: &Store, wanted: &Wanted) -> Result<FeatureFile, Source
             }
         }
     }
-    Ok(placing.finish(None))
+    placing.finish(None)
 }
 
 fn whole(store: &Store) -> Result<Vec<u8>, SourceError> {

@@ -9,6 +9,7 @@ mod mosaics;
 mod osm;
 mod overlays;
 mod pbf;
+mod proportion;
 mod real_files;
 mod real_vectors;
 mod refusals;

@@ -118,7 +118,10 @@ impl<'a> Block<'a> {
     }
 
     /// Tells `found` the id and place of every node.
-    pub(super) fn nodes(&self, mut found: impl FnMut(i64, Decimicro)) -> Result<(), Fault> {
+    pub(super) fn nodes<E: From<Fault>>(
+        &self,
+        mut found: impl FnMut(i64, Decimicro) -> Result<(), E>,
+    ) -> Result<(), E> {
         for group in &self.groups {
             for field in Fields(group) {
                 match field? {
@@ -132,7 +135,7 @@ impl<'a> Block<'a> {
                                 _ => {}
                             }
                         }
-                        found(id, self.place(at[0], at[1]));
+                        found(id, self.place(at[0], at[1]))?;
                     }
                     (2, value) => self.dense_nodes(value.bytes()?, &mut found)?,
                     _ => {}
@@ -142,7 +145,11 @@ impl<'a> Block<'a> {
         Ok(())
     }
 
-    fn dense_nodes(&self, bytes: &[u8], found: &mut impl FnMut(i64, Decimicro)) -> Result<(), Fault> {
+    fn dense_nodes<E: From<Fault>>(
+        &self,
+        bytes: &[u8],
+        found: &mut impl FnMut(i64, Decimicro) -> Result<(), E>,
+    ) -> Result<(), E> {
         let [mut ids, mut norths, mut easts] = [const { Vec::new() }; 3];
         for field in Fields(bytes) {
             match field? {
@@ -153,13 +160,13 @@ impl<'a> Block<'a> {
             }
         }
         if ids.len() != norths.len() || ids.len() != easts.len() {
-            return Err("nodes without one latitude and longitude each");
+            return Err("nodes without one latitude and longitude each".into());
         }
         let (mut id, mut at) = (0_i64, [0_i64; 2]);
         for ((step, east), north) in ids.into_iter().zip(easts).zip(norths) {
             id = id.wrapping_add(step);
             at = [at[0].wrapping_add(east), at[1].wrapping_add(north)];
-            found(id, self.place(at[0], at[1]));
+            found(id, self.place(at[0], at[1]))?;
         }
         Ok(())
     }
@@ -264,11 +271,14 @@ impl<'a> Block<'a> {
     }
 
     /// What the block holds; tells `node` the id and place of every node.
-    pub(super) fn contents(&self, mut node: impl FnMut(i64, Decimicro)) -> Result<Contents, Fault> {
+    pub(super) fn contents<E: From<Fault>>(
+        &self,
+        mut node: impl FnMut(i64, Decimicro) -> Result<(), E>,
+    ) -> Result<Contents, E> {
         let mut contents = Contents::default();
         self.nodes(|id, place| {
             contents.nodes = Some(widened(contents.nodes, id));
-            node(id, place);
+            node(id, place)
         })?;
         for group in &self.groups {
             for field in Fields(group) {

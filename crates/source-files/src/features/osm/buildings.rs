@@ -9,6 +9,8 @@ use super::kept::{KeptRelation, KeptWay, sort_ways};
 use super::nodes::{Nodes, degrees};
 use super::shapes;
 use super::texts::{KnownTexts, wanted_texts};
+use crate::SourceError;
+use crate::allowance::Allowance;
 use crate::features::clip::Extent;
 use crate::features::model::{BUILDING_KEY, Tags, VectorFeature};
 use crate::features::placing::{Placing, Texts};
@@ -59,18 +61,20 @@ impl Buildings {
         block: &Block,
         relation: &Relation,
         of: &BuildingTexts,
-        known: &mut KnownTexts,
-        texts: &mut Texts,
-    ) {
+        (known, texts): (&mut KnownTexts, &mut Texts),
+        allowance: &Allowance,
+    ) -> Result<(), SourceError> {
         if !of.has(&relation.tags) {
-            return;
+            return Ok(());
         }
         let role = |text: usize| if block.texts[text] == b"inner" { Role::Inner } else { Role::Outer };
         let ways = relation.members.iter().filter(|(kind, ..)| *kind == MemberKind::Way);
         let members: Vec<(Role, i64)> = ways.map(|&(_, id, text)| (role(text), id)).collect();
         self.members.extend(members.iter().map(|&(role, id)| (id, role == Role::Outer)));
         let tags = of.tags(block, &relation.tags, known, texts);
-        self.relations.push(KeptRelation { id: relation.id, tags, members });
+        texts.count(allowance);
+        self.relations.push(KeptRelation { id: relation.id, tags, members }.counted(allowance)?);
+        Ok(())
     }
 
     /// To be called when all relations have been seen.
@@ -88,20 +92,23 @@ impl Buildings {
         of: &BuildingTexts,
         (known, texts): (&mut KnownTexts, &mut Texts),
         nodes: &Nodes,
-    ) {
+        allowance: &Allowance,
+    ) -> Result<(), SourceError> {
         let member = self.members.partition_point(|&(id, _)| id < way.id);
         let of_relations = self.members[member..].iter().take_while(|(id, _)| *id == way.id);
         // The outline of a relation is read with that.
         let is_outline = of_relations.clone().any(|(_, is_outer)| *is_outer);
         let is_wanted = !is_outline && of.has(&way.tags);
         if !is_wanted && of_relations.count() == 0 {
-            return;
+            return Ok(());
         }
         if way.nodes.iter().any(|&node| nodes.place(node).is_some_and(|place| self.near.holds(degrees(place)))) {
             let tags = if is_wanted { of.tags(block, &way.tags, known, texts) } else { Tags::new() };
             let nodes = way.nodes.as_slice().into();
-            self.ways.push(KeptWay { id: way.id, tags, nodes, reaches_out: false, is_wanted });
+            texts.count(allowance);
+            self.ways.push(KeptWay { id: way.id, tags, nodes, reaches_out: false, is_wanted }.counted(allowance)?);
         }
+        Ok(())
     }
 
     /// The buildings: relations, then ways, by number. What is wrong with single ones is not told: they are drawn only.

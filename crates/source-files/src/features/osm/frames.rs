@@ -119,13 +119,16 @@ impl<'a> Frames<'a> {
     }
 
     /// What is read of a block once it is unpacked.
-    pub(super) fn with_bytes<T>(
+    pub(super) fn with_bytes<T, E: Into<Stop>>(
         &mut self,
         frame: &Frame,
-        read: impl FnOnce(&[u8]) -> Result<T, Fault>,
+        read: impl FnOnce(&[u8]) -> Result<T, E>,
     ) -> Result<T, SourceError> {
         let found = read(self.unpack(frame)?);
-        found.map_err(|fault| self.broken(frame, fault))
+        found.map_err(|stop| match stop.into() {
+            Stop::Fault(fault) => self.broken(frame, fault),
+            Stop::Refused(error) => *error,
+        })
     }
 
     fn refused(&self, frame: &Frame, refusal: Refusal) -> SourceError {
@@ -146,6 +149,24 @@ impl<'a> Frames<'a> {
     fn broken(&self, frame: &Frame, reason: &str) -> SourceError {
         let what = format!("block {} (byte {})", frame.index, frame.begins_at);
         self.store.malformed(&what, reason.into(), "a sound block of OpenStreetMap data")
+    }
+}
+
+/// Why a block is not read on: it is broken, or the file is refused.
+pub(super) enum Stop {
+    Fault(Fault),
+    Refused(Box<SourceError>),
+}
+
+impl From<Fault> for Stop {
+    fn from(fault: Fault) -> Self {
+        Stop::Fault(fault)
+    }
+}
+
+impl From<SourceError> for Stop {
+    fn from(error: SourceError) -> Self {
+        Stop::Refused(Box::new(error))
     }
 }
 

@@ -1,6 +1,8 @@
 //! Ways and relations that are kept while a file is gone through.
 
 use super::assemble::Role;
+use crate::SourceError;
+use crate::allowance::Allowance;
 use crate::features::model::Tags;
 
 /// Longer segments are no road or river but a node in the wrong place. Nodes up to this far from the area are kept.
@@ -23,6 +25,22 @@ pub(super) struct KeptRelation {
     pub id: i64,
     pub tags: Tags,
     pub members: Vec<(Role, i64)>,
+}
+
+impl KeptWay {
+    /// Counts what it takes: its own bytes, and for each node its number here and among those that are looked for.
+    pub(super) fn counted(self, allowance: &Allowance) -> Result<Self, SourceError> {
+        allowance.take(128 + 16 * self.nodes.len() + 32 * self.tags.len())?;
+        Ok(self)
+    }
+}
+
+impl KeptRelation {
+    /// Counts what it takes: its own bytes, and for each member the member here and in the list of all.
+    pub(super) fn counted(self, allowance: &Allowance) -> Result<Self, SourceError> {
+        allowance.take(128 + 32 * self.members.len() + 32 * self.tags.len())?;
+        Ok(self)
+    }
 }
 
 /// In the order of their numbers. Of a way that a file has twice, one is kept, whichever comes first.

@@ -17,22 +17,24 @@ mod shapes;
 mod texts;
 mod wire;
 
+use std::sync::Arc;
+
 use terrain::Each;
 
 use super::model::{FeatureFile, Tags, Wanted};
 use super::placing::{LEFT_OUT, Placing, Texts};
 use crate::SourceError;
+use crate::allowance::Allowance;
 use crate::crs::Crs;
 use crate::store::Store;
 use assemble::Role;
 use block::{Block, Contents, Demands, MemberKind, OFF_THE_EARTH, Way};
 
 use buildings::{BuildingTexts, Buildings};
-use frames::{Frame, FrameKind, Frames};
+use frames::{Frame, FrameKind, Frames, Stop};
 use kept::{KeptRelation, KeptWay, SEGMENT_M_MAX, sort_ways};
 use nodes::Nodes;
 use texts::{KnownTexts, wanted_texts};
-use wire::Fault;
 
 /// Whom to name (Open Database License, section 4.3).
 pub(super) const ATTRIBUTION: &str = "(c) OpenStreetMap contributors, ODbL 1.0";
@@ -52,10 +54,12 @@ struct Reader<'a> {
     far_ways: u64,
     /// Buildings, where they are wanted.
     buildings: Option<Buildings>,
+    /// What all of it may take.
+    allowance: Arc<Allowance>,
 }
 
 pub(super) fn read(store: &Store, wanted: &Wanted, each: Each) -> Result<FeatureFile, SourceError> {
-    let mut placing = Placing::new(store.path(), wanted, Some(Crs::wgs84()))?;
+    let mut placing = Placing::new(store.path(), store.len(), wanted, Some(Crs::wgs84()))?;
     let mut reader = Reader {
         frames: Frames::open(store)?,
         blocks: Vec::new(),
@@ -67,6 +71,7 @@ pub(super) fn read(store: &Store, wanted: &Wanted, each: Each) -> Result<Feature
         lost: Vec::new(),
         far_ways: 0,
         buildings: wanted.buildings.then(|| Buildings::new(placing.within(0.0))),
+        allowance: placing.allowance().clone(),
     };
     reader.survey(store)?;
     let mut relations = reader.relations()?;
@@ -82,7 +87,7 @@ pub(super) fn read(store: &Store, wanted: &Wanted, each: Each) -> Result<Feature
     let Reader { nodes, ways, buildings, .. } = reader;
     let buildings = buildings.map(|buildings| buildings.placed(&nodes, &placing, each)).unwrap_or_default();
     shapes::place(&nodes, ways, relations, &mut placing, kinds::is_area, each);
-    Ok(FeatureFile { buildings, ..placing.finish(Some(ATTRIBUTION)) })
+    Ok(FeatureFile { buildings, ..placing.finish(Some(ATTRIBUTION))? })
 }
 
 impl<'a> Reader<'a> {
@@ -102,17 +107,18 @@ impl<'a> Reader<'a> {
                     has_places_on_ways = demands.has_places_on_ways;
                 }
                 FrameKind::Data => {
-                    let nodes = &mut self.nodes;
+                    let (nodes, allowance) = (&mut self.nodes, &self.allowance);
                     let contents = self.frames.with_bytes(&frame, |bytes| {
                         let block = Block::read(bytes)?;
                         if has_places_on_ways {
                             block.ways(&mut way, |way| {
-                                way.nodes.iter().zip(&way.places).for_each(|(&id, &place)| nodes.see(id, place));
-                                Ok::<_, Fault>(())
+                                let mut placed = way.nodes.iter().zip(&way.places);
+                                Ok::<_, Stop>(placed.try_for_each(|(&id, &place)| nodes.see(id, place, allowance))?)
                             })?;
                         }
-                        block.contents(|id, place| nodes.see(id, place))
+                        block.contents(|id, place| Ok::<_, Stop>(nodes.see(id, place, allowance)?))
                     })?;
+                    self.allowance.take(size_of::<(Frame, Contents)>())?;
                     self.blocks.push((frame, contents));
                 }
             }
@@ -123,7 +129,7 @@ impl<'a> Reader<'a> {
 
     /// The multipolygon relations with a wanted key.
     fn relations(&mut self) -> Result<Vec<KeptRelation>, SourceError> {
-        let Self { frames, blocks, keys, texts, buildings, .. } = self;
+        let Self { frames, blocks, keys, texts, buildings, allowance, .. } = self;
         let mut kept = Vec::new();
         for (frame, _) in blocks.iter().filter(|(_, contents)| contents.relations) {
             frames.with_bytes(frame, |bytes| {
@@ -137,19 +143,17 @@ impl<'a> Reader<'a> {
                         .iter()
                         .any(|&(key, value)| block.texts[key] == b"type" && block.texts[value] == b"multipolygon");
                     if let (true, Some(buildings)) = (is_multipolygon, &mut *buildings) {
-                        buildings.see_relation(&block, relation, &of_buildings, &mut known, texts);
+                        buildings.see_relation(&block, relation, &of_buildings, (&mut known, texts), allowance)?;
                     }
                     if !is_multipolygon || !relation.tags.iter().any(|&(key, _)| is_wanted[key]) {
-                        return Ok::<_, Fault>(());
+                        return Ok::<_, Stop>(());
                     }
                     let role = |text: &[u8]| if text == b"inner" { Role::Inner } else { Role::Outer };
                     let ways = relation.members.iter().filter(|(kind, ..)| *kind == MemberKind::Way);
                     let members = ways.map(|&(_, id, text)| (role(block.texts[text]), id)).collect();
-                    kept.push(KeptRelation {
-                        id: relation.id,
-                        tags: known.tags(&block, &relation.tags, texts),
-                        members,
-                    });
+                    let tags = known.tags(&block, &relation.tags, texts);
+                    texts.count(allowance);
+                    kept.push(KeptRelation { id: relation.id, tags, members }.counted(allowance)?);
                     Ok(())
                 })
             })?;
@@ -162,7 +166,7 @@ impl<'a> Reader<'a> {
 
     /// Keeps ways with a node near the area that are wanted, by themselves or by a relation.
     fn near_ways(&mut self, members: &mut Members, placing: &mut Placing) -> Result<(), SourceError> {
-        let Self { frames, blocks, keys, nodes, texts, ways, lost, far_ways, buildings } = self;
+        let Self { frames, blocks, keys, nodes, texts, ways, lost, far_ways, buildings, allowance } = self;
         let mut way = Way::default();
         for (frame, _) in blocks.iter().filter(|(_, contents)| contents.ways.is_some()) {
             frames.with_bytes(frame, |bytes| {
@@ -172,18 +176,19 @@ impl<'a> Reader<'a> {
                 let mut known = KnownTexts::of(&block);
                 block.ways(&mut way, |way| {
                     if let Some(buildings) = buildings {
-                        buildings.see_way(&block, way, &of_buildings, (&mut known, texts), nodes);
+                        buildings.see_way(&block, way, &of_buildings, (&mut known, texts), nodes, allowance)?;
                     }
                     let is_wanted = way.tags.iter().any(|&(key, _)| is_wanted_text[key]);
                     let is_member = members.see(way.id);
                     if !is_wanted && !is_member {
-                        return Ok::<_, Fault>(());
+                        return Ok::<_, Stop>(());
                     }
                     let near = way.nodes.iter().filter(|&&node| nodes.is_near(node)).count();
                     if 0 < near {
                         let tags = if is_wanted { known.tags(&block, &way.tags, texts) } else { Tags::new() };
                         let (reaches_out, nodes) = (near < way.nodes.len(), way.nodes.as_slice().into());
-                        ways.push(KeptWay { id: way.id, tags, nodes, reaches_out, is_wanted });
+                        texts.count(allowance);
+                        ways.push(KeptWay { id: way.id, tags, nodes, reaches_out, is_wanted }.counted(allowance)?);
                     } else if is_wanted {
                         *far_ways += 1;
                         match way.nodes.first() {
@@ -202,7 +207,7 @@ impl<'a> Reader<'a> {
 
     /// Lets go of relations without a way near the area, and fetches the other ways of those that have one.
     fn keep_reached(&mut self, relations: &mut Vec<KeptRelation>) -> Result<(), SourceError> {
-        let Self { frames, blocks, ways, .. } = self;
+        let Self { frames, blocks, ways, allowance, .. } = self;
         let is_kept = |id: i64| ways.binary_search_by_key(&id, |way| way.id).is_ok();
         relations.retain(|relation| relation.members.is_empty() || relation.members.iter().any(|(_, id)| is_kept(*id)));
         let mut missing = member_ids(relations);
@@ -217,9 +222,10 @@ impl<'a> Reader<'a> {
                     if missing.binary_search(&way.id).is_ok() {
                         let nodes = way.nodes.as_slice().into();
                         let tags = Tags::new();
-                        ways.push(KeptWay { id: way.id, tags, nodes, reaches_out: true, is_wanted: false });
+                        let way = KeptWay { id: way.id, tags, nodes, reaches_out: true, is_wanted: false };
+                        ways.push(way.counted(allowance)?);
                     }
-                    Ok::<_, Fault>(())
+                    Ok::<_, Stop>(())
                 })
             })?;
         }
@@ -229,7 +235,7 @@ impl<'a> Reader<'a> {
 
     /// Finds the nodes of kept ways that are not near the area.
     fn far_nodes(&mut self) -> Result<(), SourceError> {
-        let Self { frames, blocks, nodes, ways, lost, .. } = self;
+        let Self { frames, blocks, nodes, ways, lost, allowance, .. } = self;
         let of_ways = ways.iter().filter(|way| way.reaches_out).flat_map(|way| way.nodes.iter().copied());
         let of_ways = of_ways.filter(|&id| !nodes.is_near(id));
         let mut missing: Vec<i64> = of_ways.chain(lost.iter().map(|&(_, node)| node)).collect();
@@ -240,10 +246,9 @@ impl<'a> Reader<'a> {
                 continue;
             }
             frames.with_bytes(frame, |bytes| {
-                Block::read(bytes)?.nodes(|id, place| {
-                    if missing.binary_search(&id).is_ok() {
-                        nodes.keep(id, place);
-                    }
+                Block::read(bytes)?.nodes(|id, place| match missing.binary_search(&id) {
+                    Ok(_) => Ok::<_, Stop>(nodes.keep(id, place, allowance)?),
+                    Err(_) => Ok(()),
                 })
             })?;
         }

@@ -1,7 +1,12 @@
 //! Places of nodes: those near the area in a sorted table of sixteen bytes each, and those that kept ways need besides.
 
 use super::block::{Decimicro, OFF_THE_EARTH};
+use crate::SourceError;
+use crate::allowance::Allowance;
 use crate::features::clip::Extent;
+
+/// Bytes that a node takes in a table, and while that grows.
+const NODE_BYTES: usize = 32;
 
 /// Where nodes lie.
 #[derive(Debug)]
@@ -21,15 +26,17 @@ impl Nodes {
     }
 
     /// Takes note of a node. One that is not on the Earth counts as near, so that it is told.
-    pub(super) fn see(&mut self, id: i64, place: Decimicro) {
+    pub(super) fn see(&mut self, id: i64, place: Decimicro, allowance: &Allowance) -> Result<(), SourceError> {
         let is_off = place == OFF_THE_EARTH;
         let degrees = degrees(place);
         if !is_off {
             self.lies.hold(degrees);
         }
         if is_off || self.box_near.holds(degrees) {
+            allowance.take(NODE_BYTES)?;
             self.near.all.push((id, place));
         }
+        Ok(())
     }
 
     /// To be called when all have been seen.
@@ -48,8 +55,10 @@ impl Nodes {
     }
 
     /// Keeps a node that is needed.
-    pub(super) fn keep(&mut self, id: i64, place: Decimicro) {
+    pub(super) fn keep(&mut self, id: i64, place: Decimicro, allowance: &Allowance) -> Result<(), SourceError> {
+        allowance.take(NODE_BYTES)?;
         self.far.all.push((id, place));
+        Ok(())
     }
 }
 

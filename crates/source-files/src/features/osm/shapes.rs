@@ -154,6 +154,12 @@ impl Drawer<'_> {
         if !relation.members.iter().any(|(role, _)| *role == Role::Outer) {
             return self.left_out(&id, None, "a multipolygon without an outer ring".into());
         }
+        // Many relations may name the same ways, and each draws all of them again.
+        let nodes: usize = members.iter().map(|(_, nodes, _)| nodes.len()).sum();
+        self.placing.allowance().count(8 * nodes);
+        if self.placing.allowance().is_spent() {
+            return;
+        }
         let lines: Vec<(Role, &[i64])> = members.iter().map(|&(role, nodes, _)| (role, nodes)).collect();
         let (rings, open) = rings(&lines);
         let first = members.iter().flat_map(|&(_, nodes, _)| nodes).find_map(|&node| self.nodes.place(node));

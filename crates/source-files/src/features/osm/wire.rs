@@ -4,6 +4,8 @@
 //! objects, so that a file of 33 KB asks for 1.3 GB, and the first panics on a kind of member that it does not know.
 //! Nothing here allocates.
 
+use crate::limits::OSM_NUMBERS_MAX;
+
 /// Why a message cannot be read.
 pub(super) type Fault = &'static str;
 
@@ -31,11 +33,18 @@ impl<'a> Value<'a> {
 
     /// Appends what a repeated number holds: many packed together, or one by itself.
     pub(super) fn append_to<T>(self, all: &mut Vec<T>, of: impl Fn(u64) -> T) -> Result<(), Fault> {
+        let mut add = |number: u64| {
+            if OSM_NUMBERS_MAX <= all.len() {
+                return Err("a list of more than a million numbers, as no way, relation or block of nodes has");
+            }
+            all.push(of(number));
+            Ok(())
+        };
         match self {
-            Value::Number(number) => all.push(of(number)),
+            Value::Number(number) => add(number)?,
             Value::Bytes(mut bytes) => {
                 while !bytes.is_empty() {
-                    all.push(of(varint(&mut bytes)?));
+                    add(varint(&mut bytes)?)?;
                 }
             }
             Value::Fixed => return Err("a field that is no number where one should be"),
