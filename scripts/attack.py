@@ -1,0 +1,429 @@
+#!/usr/bin/env python3
+"""Attacks the compiler with made-up areas, networks and jobs, and judges what it builds by a judge of its own.
+
+    scripts/attack.py --tiefort target/release/tiefort                  1,000 seeds
+    scripts/attack.py --tiefort target/release/tiefort --short          a minute of them
+    scripts/attack.py --tiefort target/release/tiefort --seeds 17       one again, --seeds 100:200 some
+    scripts/attack.py --tiefort … --seeds 17 --keep /tmp/17             and keeps its files there
+
+Each seed makes an area (cliffs, mesas, noise, voids, blocks of a town, windows of real rasters from TIEFORT_DATA or
+../shared/data), at times a network over it, and a job with its keys at random. Then
+
+build    the job is built, and `judge.py`, which knows only FORMAT.md, judges it: watertight within and across levels,
+         limits, residuals, heights within bounds, lakes level, no deck under ground, rivers that fall
+verify   `tiefort verify` must say the same of it
+report   its figures are those of the triangles
+again    other workers, one tile again, a section or key taken out and put back: always the bytes of a fresh build
+damage   a copy is damaged with its checksums right, and `verify` must object
+
+Prints each fault with its seed. Needs NumPy. Exit codes: 0 no fault, 1 faults.
+"""
+
+import argparse
+import collections
+import concurrent.futures
+import json
+import pathlib
+import random
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+import traceback
+
+import numpy as np
+
+import attack_scenes
+import forge
+import judge
+import read_slm
+
+BUILD_SECONDS_MAX = 120
+SHORT_SEEDS, SHORT_SECONDS = 80, 75
+# What a build may refuse, in its own words: jobs that ask for what cannot be.
+REFUSALS = [
+    r"need more triangles than mean_per_load_module",
+    r"a forbidden post, .*, that is a corner",
+]
+
+
+class Attack:
+    """One seed: its folder, its scene, and the faults found so far, each with a word for its kind."""
+
+    def __init__(self, program, seed, folder):
+        self.program, self.seed, self.folder = program, seed, folder
+        self.faults, self.notes = [], collections.Counter()
+        self.scene = attack_scenes.Scene(seed, folder)
+        # What is done with a scene must not depend on how the scene was drawn.
+        self.draw = random.Random(seed * 7919 + 1)
+
+    def fault(self, kind, text):
+        self.faults.append((kind, text))
+
+    def run(self, *arguments):
+        ended = subprocess.run([self.program, *arguments], cwd=self.folder, capture_output=True, text=True,
+                               timeout=BUILD_SECONDS_MAX)
+        if ended.returncode not in (0, 1, 2) or "panicked" in ended.stderr:
+            self.fault("panic", f"{' '.join(arguments)} ended with {ended.returncode}: {ended.stderr[-600:]}")
+        return ended.returncode, (ended.stdout + ended.stderr).strip()
+
+    def build(self, job, into, kind="build"):
+        """Builds a job; whether there is a database now, and the exit code."""
+        code, said = self.run("build", job, "--out", into, "--workers", "1", "--no-html", "--quiet")
+        if code == 2 and any(re.search(refusal, said) for refusal in REFUSALS):
+            self.notes["refused"] += 1
+            return None
+        if code not in (0, 1):
+            self.fault(kind, f"exit {code}: {said[:600]}")
+            return None
+        return code
+
+    def all(self):
+        """Everything that is done with a seed."""
+        (self.folder / "job.toml").write_text(self.scene.job.text())
+        code = self.build("job.toml", "area")
+        if code is None:
+            return
+        self.notes["built"] += 1
+        faults = self.judge("area", self.scene.job.sections, code)
+        self.verify("area", faults)
+        self.told()
+        if self.draw.random() < 0.2:
+            self.repeated()
+        if self.draw.random() < 0.5:
+            self.again()
+        if not self.faults and self.draw.random() < 0.5:
+            self.damage()
+
+    def judge(self, name, sections, code):
+        """Judges a database of these sections; returns the kinds of faults."""
+        try:
+            database = judge.Database.read(self.folder / name)
+        except read_slm.Damaged as error:
+            self.fault("format", str(error))
+            return {"format"}
+        found = collections.defaultdict(list)
+        own_borders = sections.get("lod", {}).get("border") == '"own"'
+        found["crack"] += judge.watertight(database, own_borders)
+        # A breach is told by exit code 1.
+        over = judge.limits(database, self.scene.job.limits if "limits" in sections else {})
+        if over and code == 0:
+            found["limits"] += over
+        if self.is_bare(sections):
+            found["residual"] += judge.residuals(database, self.scene.posts)
+        found["beyond"] += judge.beyond(database, self.scene.posts, self.exempt(sections, database)).faults
+        found["lake"] += judge.uneven_lakes(database)
+        found["level"] += judge.levels(database)
+        found["deck crack"] += judge.deck_cracks(database)
+        found["deck"] += judge.sunken_decks(database)
+        found["river"] += judge.feature_lines(database)
+        for kind, faults in found.items():
+            for fault in faults[:3]:
+                self.fault(kind, fault)
+            if faults[3:]:
+                self.fault(kind, f"and {len(faults) - 3} more")
+        return {kind for kind, faults in found.items() if faults}
+
+    def exempt(self, sections, database):
+        """Which vertices may leave the ground: near features, which shape it, near water, and at pins."""
+        grid, places, areas = self.scene.grid, [], []
+        quanta = attack_scenes.QUANTA
+        if "features" in sections:
+            near = 12 * grid.spacing_m + 60
+            for _, geometry, _ in self.scene.network.features:
+                rings = geometry if isinstance(geometry[0], list) else []
+                areas += rings[:1]
+                for line in rings or [geometry]:
+                    places += [(a, b, near) for a, b in zip(line, line[1:] or line)]
+        clipped = sections.get("load_modules", {}).get("edges") == '"clip"'
+        pinned = self.scene.job.pinned if "pins" in sections.get("tin", {}) else []
+        has_water = "water" in sections["dem"]
+
+        def at(x, y):
+            found = np.zeros(len(x), dtype=bool)
+            if has_water:
+                return ~found
+            if clipped:
+                # Where triangles are cut, vertices lie on their planes.
+                side = database.side
+                found |= (x % side == 0) | (y % side == 0)
+            for (ax, ay), (bx, by), near in places:
+                found |= away(x / quanta, y / quanta, ax, ay, bx, by) < near
+            for ring in areas:
+                found |= inside(x / quanta, y / quanta, ring)
+            for _, column, row in pinned:
+                found |= (x == column * database.spacing) & (y == row * database.spacing)
+            return found
+
+        return at
+
+    def verify(self, name, faults):
+        """`verify` objects to what the judge does, and to nothing else."""
+        code, said = self.run("verify", name)
+        if code == 0 and faults:
+            self.fault("verify", f"says sound, and the judge found {', '.join(sorted(faults))}")
+        if code != 0 and not faults:
+            self.fault("verify", f"exit {code}, and the judge finds no fault: {said[:500]}")
+        if code == 0 and not faults and self.is_bare(self.scene.job.sections):
+            code, said = self.run("verify", name, "--dem", "dem.asc")
+            if code != 0:
+                self.fault("verify", f"--dem: exit {code}, and the judge finds no fault: {said[:500]}")
+
+    def told(self):
+        """The report's figures are those of the triangles."""
+        database = judge.Database.read(self.folder / "area")
+        report = json.loads((self.folder / "area/report.json").read_text())
+        counted = judge.counts(database, self.scene.job.limits.get("count") == "polygons")
+        in_level = [sum(map(judge.triangle_count, level.values())) for level in database.levels]
+        limit = self.scene.job.limits["per_load_module"]
+        wanted = {
+            ("per_load_module", "max"): int(counted.max()),
+            ("per_load_module", "over"): int((counted > limit).sum()),
+            ("per_4km", "max"): judge.windows(counted, database.side / attack_scenes.QUANTA),
+            ("pool", "used"): min(int(np.maximum(counted - limit, 0).sum()), self.scene.job.limits.get("pool", 0)),
+        }
+        for (table, key), value in wanted.items():
+            if report[table][key] != value:
+                self.fault("report", f"{table}.{key} is {report[table][key]}, the triangles say {value}")
+        if [level["triangles"] for level in report.get("levels", [])] not in ([], in_level):
+            self.fault("report", f"triangles of levels are not {in_level}")
+        if self.is_bare(self.scene.job.sections):
+            rms = judge.rms_m(database, self.scene.posts)
+            if abs(report["residual"]["rms_m"] - rms) > 0.001 * rms + 0.002:
+                self.fault("report", f"residual.rms_m is {report['residual']['rms_m']}, the triangles say {rms}")
+
+    def is_bare(self, sections):
+        """Whether the working ground is the scene's posts and nothing else."""
+        is_filled = "fill" in sections["dem"].get("voids", "")
+        return "features" not in sections and "water" not in sections["dem"] and not is_filled
+
+    def repeated(self):
+        """Other workers, another order of features and a tile made again: the same bytes."""
+        self.notes["repeated"] += 1
+        code, said = self.run("build", "job.toml", "--out", "repeated", "--workers", "3", "--no-html", "--quiet")
+        if code == 2:
+            return self.fault("again", f"with three workers: exit {code}: {said[:300]}")
+        self.same("area", "repeated", "with three workers")
+        if self.scene.network and self.scene.job.sections.get("features"):
+            self.scene.network.write(self.folder / "features.geojson", self.draw)
+            if self.build("job.toml", "shuffled", "again") is not None:
+                self.alike("area", "shuffled")
+            self.scene.network.write(self.folder / "features.geojson")
+        tile = self.draw.choice(sorted((self.folder / "area/tiles").glob("*.tin"))).stem
+        code, said = self.run("tile", "job.toml", f"{int(tile[1:3])},{int(tile[4:6])}", "--out", "repeated", "--quiet")
+        if code == 2:
+            return self.fault("again", f"tile {tile} again: exit {code}: {said[:300]}")
+        self.same("area", "repeated", f"tile {tile} again")
+
+    def again(self):
+        """Takes a section or key out, builds into the same folder, then puts it back. Other tiles or load modules would
+        be another area, which is refused."""
+        sections = self.scene.job.sections
+        # Clipped edges need another method than the one that holds where none is named.
+        known = ["features", "lod", "importance", "limits"] + ["tin"] * (not self.scene.job.clip)
+        optional = [section for section in known if section in sections]
+        optional += [key for key in ("tin.pins", "dem.water", "tin.start", "lod.border", "features.rules")
+                     if key.split(".")[1] in sections.get(key.split(".")[0], {})]
+        without = [self.draw.choice(optional)]
+        self.notes[f"without {without[0]}"] += 1
+        # Levels that leave roads out need roads.
+        without += ["lod"] if without == ["features"] else []
+        job, text = self.scene.job, self.scene.job.text(without)
+        kept = {name: {key: value for key, value in keys.items() if f"{name}.{key}" not in without}
+                for name, keys in sections.items() if name not in without}
+        if self.draw.random() < 0.4:
+            # Another job altogether, over the same ground.
+            job = attack_scenes.Job(self.draw, self.scene, "other-")
+            kept, text, without = job.sections, job.text(), "another job"
+        (self.folder / "other.toml").write_text(text)
+        fresh = self.build("other.toml", "fresh", "build")
+        if fresh is None:
+            return
+        first, self.scene.job = self.scene.job, job
+        self.judge("fresh", kept, fresh)
+        self.scene.job = first
+        shutil.copytree(self.folder / "area", self.folder / "again")
+        if self.build("other.toml", "again", "again") is None:
+            self.fault("again", f"without {without}")
+            return
+        self.same("fresh", "again", f"without {without}")
+        if self.draw.random() < 0.5 and self.build("job.toml", "again", "again") is not None:
+            self.same("area", "again", f"without {without}, and back")
+
+    def alike(self, one, other):
+        """The same load modules from features in another order; their files differ in the fingerprint alone."""
+        modules = lambda name: [read_slm.parse(path.read_bytes())[1]
+                                for path in sorted((self.folder / name / "modules").iterdir())]
+        if modules(one) != modules(other):
+            self.fault("again", "features in another order give other load modules")
+
+    def same(self, one, other, what):
+        files = lambda name: {str(path.relative_to(self.folder / name)): path.read_bytes()
+                              for part in ("tiles", "modules") for path in (self.folder / name / part).iterdir()}
+        one, other = files(one), files(other)
+        differ = sorted(name for name in one.keys() | other.keys() if one.get(name) != other.get(name))
+        if differ:
+            self.fault("again", f"{what}: {len(differ)} files are not those of a fresh build: {differ[:4]}")
+
+    def damage(self):
+        """Damages a copy with all checksums right; `verify` must object."""
+        shutil.copytree(self.folder / "area", self.folder / "damaged", dirs_exist_ok=True)
+        files = sorted((self.folder / "damaged/modules").glob("*.slm"))
+        forgery = forge.Forgery(self.draw.choice(files))
+        numbers = range(len(forgery.modules))
+        decked = [number for number in numbers if forgery.modules[number].get("decks", {}).get("triangles")]
+        sinks = decked and self.draw.random() < 0.7
+        number = self.draw.choice(decked if sinks else numbers)
+        how = self.sink if sinks else self.draw.choice([self.lift, self.lift, self.reclass, self.understate, self.flip])
+        what = how(forgery, number, forgery.modules[number])
+        if what is None:
+            return
+        forgery.write()
+        code, said = self.run("verify", "damaged")
+        self.notes["damaged"] += 1
+        if code == 0:
+            self.fault("forged", f"verify says sound: {what} in {forgery.path.name}, section {number}")
+        elif code == 2 and "checksum" in said:
+            self.fault("forged", f"verify sees the checksum alone: {said[:300]}")
+        if how in (self.lift, self.understate) and self.is_bare(self.scene.job.sections):
+            damaged = judge.Database.read(self.folder / "damaged")
+            if not judge.residuals(damaged, self.scene.posts):
+                self.fault("judge", f"sees nothing of {what} in {forgery.path.name}, section {number}")
+
+    def lift(self, forgery, number, module):
+        at = self.draw.randrange(len(module["vertices"]))
+        by = self.draw.choice([-1, 1]) * self.draw.choice([40, 1280])
+        forgery.set_height(number, at, module["vertices"][at][2] + by)
+        return f"vertex {at} moved by {by} quanta"
+
+    def reclass(self, forgery, number, module):
+        at = self.draw.randrange(len(module["triangles"]))
+        kind = 0 if module["classes"][at] else 1
+        forgery.set_class(number, at, kind)
+        return f"triangle {at} of class {module['classes'][at]} became {kind}"
+
+    def understate(self, forgery, number, module):
+        squares = module["residual"]["sum_squared"]
+        if squares < 4:
+            return None
+        forgery.set_residual(number, squares * 9 // 10)
+        return f"squares {squares} became {squares * 9 // 10}"
+
+    def sink(self, forgery, number, module):
+        """Moves a vertex of a deck down, as far as its order allows."""
+        places = module["decks"]["vertices"]
+        at = self.draw.randrange(len(places))
+        height = places[at][2] - self.draw.choice([1, 128, 6400])
+        if at and places[at - 1][:2] == places[at][:2]:
+            return None
+        forgery.set_deck_height(number, at, height)
+        return f"vertex {at} of decks sunk to {height} quanta"
+
+    def flip(self, forgery, number, module):
+        """Turns an edge between two triangles whose four corners are convex."""
+        found = turned(module["vertices"], module["triangles"], self.draw)
+        if found is None:
+            return None
+        forgery.set_triangles(number, found)
+        return "an edge was turned"
+
+
+def away(x, y, ax, ay, bx, by):
+    """Distance of places from a piece of a line."""
+    dx, dy = bx - ax, by - ay
+    along = np.clip(((x - ax) * dx + (y - ay) * dy) / max(dx * dx + dy * dy, 1e-9), 0, 1)
+    return np.hypot(x - ax - along * dx, y - ay - along * dy)
+
+
+def inside(x, y, ring):
+    """Which places a ring holds."""
+    found = np.zeros(len(x), dtype=bool)
+    for (ax, ay), (bx, by) in zip(ring, ring[1:]):
+        with np.errstate(divide="ignore", invalid="ignore"):
+            found ^= ((ay > y) != (by > y)) & (x < ax + (y - ay) / (by - ay) * (bx - ax))
+    return found
+
+
+def turned(vertices, triangles, draw):
+    """The triangles with one edge turned, sorted as FORMAT.md asks; None where no edge can be."""
+    beside = {}
+    for triangle in triangles:
+        for at in range(3):
+            beside[triangle[at], triangle[(at + 1) % 3]] = triangle
+    edges = sorted(edge for edge in beside if edge[0] < edge[1] and edge[::-1] in beside)
+    draw.shuffle(edges)
+    area = lambda a, b, c: ((vertices[b][0] - vertices[a][0]) * (vertices[c][1] - vertices[a][1])
+                            - (vertices[b][1] - vertices[a][1]) * (vertices[c][0] - vertices[a][0]))
+    for a, b in edges:
+        one, other = beside[a, b], beside[b, a]
+        [c], [d] = set(one) - {a, b}, set(other) - {a, b}
+        if area(c, a, d) > 0 and area(d, b, c) > 0:
+            kept = [triangle for triangle in triangles if triangle not in (one, other)]
+            smallest_first = lambda t: min(t[at:] + t[:at] for at in range(3))
+            return sorted(kept + [smallest_first((c, a, d)), smallest_first((d, b, c))])
+    return None
+
+
+def attack(program, seed, keep):
+    """Runs a seed; returns it with its faults, its notes, seconds, and what it was."""
+    start = time.monotonic()
+    folder = pathlib.Path(keep or tempfile.mkdtemp(prefix=f"tiefort-attack-{seed}-"))
+    folder.mkdir(parents=True, exist_ok=True)
+    about, faults, notes = "", [], collections.Counter()
+    try:
+        one = Attack(program, seed, folder)
+        grid = one.scene.grid
+        about = f"{one.scene.kind}, {grid.rows}x{grid.columns} of {grid.side_m:g} m at {grid.spacing_m:g} m"
+        about += f", {len(one.scene.network.features)} features" if one.scene.network else ""
+        faults, notes = one.faults, one.notes
+        one.all()
+    except subprocess.TimeoutExpired as error:
+        faults.append(("slow", str(error)[:300]))
+    except Exception:
+        faults.append(("script", traceback.format_exc()))
+    if not keep:
+        shutil.rmtree(folder, ignore_errors=True)
+    return seed, faults, notes, time.monotonic() - start, about
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--tiefort", required=True, help="the program")
+    parser.add_argument("--seeds", help="one, or FIRST:END", default="1:1001")
+    parser.add_argument("--short", action="store_true", help=f"{SHORT_SEEDS} seeds, or as many as a minute holds")
+    parser.add_argument("--at-once", type=int, default=2, help="seeds at the same time")
+    parser.add_argument("--keep", help="with one seed: the folder for its files")
+    options = parser.parse_args()
+    program = str(pathlib.Path(options.tiefort).resolve())
+    first, _, end = options.seeds.partition(":")
+    seeds = range(int(first), int(end or int(first) + 1))
+    if options.short:
+        seeds = range(1, SHORT_SEEDS + 1)
+    if not attack_scenes.data_folder():
+        print("no real rasters: neither TIEFORT_DATA nor ../shared/data is there", flush=True)
+    start, kinds, notes, failed, done = time.monotonic(), collections.Counter(), collections.Counter(), [], 0
+    with concurrent.futures.ProcessPoolExecutor(options.at_once) as pool:
+        runs = [pool.submit(attack, program, seed, options.keep) for seed in seeds]
+        for run in concurrent.futures.as_completed(runs):
+            if options.short and SHORT_SECONDS < time.monotonic() - start:
+                pool.shutdown(cancel_futures=True)
+                break
+            seed, faults, noted, seconds, about = run.result()
+            notes += noted
+            done += 1
+            kinds.update({kind for kind, _ in faults})
+            if faults:
+                failed.append(seed)
+                print(f"seed {seed} ({about}; {seconds:.1f} s)", flush=True)
+                for kind, text in faults:
+                    print(f"  {kind}: {text}", flush=True)
+    told = ", ".join(f"{count} {note}" for note, count in sorted(notes.items()))
+    print(f"{done} seeds in {time.monotonic() - start:.0f} s: {told}")
+    print(f"{len(failed)} with faults" + (f": {dict(kinds)}; seeds {sorted(failed)[:40]}" if failed else ""))
+    sys.exit(1 if failed else 0)
+
+
+if __name__ == "__main__":
+    main()
