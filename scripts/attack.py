@@ -161,15 +161,17 @@ class Attack:
 
     def verify(self, name, faults):
         """`verify` objects to what the judge does, and to nothing else."""
-        code, said = self.run("verify", name)
+        # How high the posts are it knows with a raster only.
+        self.agree("verify", faults - {"beyond"}, "verify", name)
+        if self.is_bare(self.scene.job.sections):
+            self.agree("verify --dem", faults, "verify", name, "--dem", "dem.asc")
+
+    def agree(self, what, faults, *arguments):
+        code, said = self.run(*arguments)
         if code == 0 and faults:
-            self.fault("verify", f"says sound, and the judge found {', '.join(sorted(faults))}")
+            self.fault("verify", f"{what} says sound, and the judge found {', '.join(sorted(faults))}")
         if code != 0 and not faults:
-            self.fault("verify", f"exit {code}, and the judge finds no fault: {said[:500]}")
-        if code == 0 and not faults and self.is_bare(self.scene.job.sections):
-            code, said = self.run("verify", name, "--dem", "dem.asc")
-            if code != 0:
-                self.fault("verify", f"--dem: exit {code}, and the judge finds no fault: {said[:500]}")
+            self.fault("verify", f"{what}: exit {code}, and the judge finds no fault: {said[:500]}")
 
     def told(self):
         """The report's figures are those of the triangles."""
@@ -306,7 +308,7 @@ class Attack:
 
     def understate(self, forgery, number, module):
         squares = module["residual"]["sum_squared"]
-        if squares < 4:
+        if squares < 10_000:
             return None
         forgery.set_residual(number, squares * 9 // 10)
         return f"squares {squares} became {squares * 9 // 10}"
@@ -395,6 +397,7 @@ def main():
     parser.add_argument("--short", action="store_true", help=f"{SHORT_SEEDS} seeds, or as many as a minute holds")
     parser.add_argument("--at-once", type=int, default=2, help="seeds at the same time")
     parser.add_argument("--keep", help="with one seed: the folder for its files")
+    parser.add_argument("--allow", default="", help="kinds of faults that are told and do not fail, with commas")
     options = parser.parse_args()
     program = str(pathlib.Path(options.tiefort).resolve())
     first, _, end = options.seeds.partition(":")
@@ -404,6 +407,7 @@ def main():
     if not attack_scenes.data_folder():
         print("no real rasters: neither TIEFORT_DATA nor ../shared/data is there", flush=True)
     start, kinds, notes, failed, done = time.monotonic(), collections.Counter(), collections.Counter(), [], 0
+    allowed = set(filter(None, options.allow.split(",")))
     with concurrent.futures.ProcessPoolExecutor(options.at_once) as pool:
         runs = [pool.submit(attack, program, seed, options.keep) for seed in seeds]
         for run in concurrent.futures.as_completed(runs):
@@ -414,14 +418,16 @@ def main():
             notes += noted
             done += 1
             kinds.update({kind for kind, _ in faults})
-            if faults:
+            if {kind for kind, _ in faults} - allowed:
                 failed.append(seed)
+            if faults:
                 print(f"seed {seed} ({about}; {seconds:.1f} s)", flush=True)
                 for kind, text in faults:
                     print(f"  {kind}: {text}", flush=True)
     told = ", ".join(f"{count} {note}" for note, count in sorted(notes.items()))
     print(f"{done} seeds in {time.monotonic() - start:.0f} s: {told}")
-    print(f"{len(failed)} with faults" + (f": {dict(kinds)}; seeds {sorted(failed)[:40]}" if failed else ""))
+    print(f"{len(failed)} with faults" + (f" (beside {options.allow})" if allowed else ""))
+    print(f"faults by kind, in seeds: {dict(kinds) or 'none'}; seeds {sorted(failed)[:40]}")
     sys.exit(1 if failed else 0)
 
 
