@@ -289,7 +289,8 @@ class Attack:
             self.fault("forged", f"verify says sound: {what} in {forgery.path.name}, section {number}")
         elif code == 2 and "checksum" in said:
             self.fault("forged", f"verify sees the checksum alone: {said[:300]}")
-        if how in (self.lift, self.understate) and self.is_bare(self.scene.job.sections):
+        # A vertex whose triangles hold no post shows in the tile's TIN alone.
+        if how == self.understate and self.is_bare(self.scene.job.sections):
             damaged = judge.Database.read(self.folder / "damaged")
             if not judge.residuals(damaged, self.scene.posts):
                 self.fault("judge", f"sees nothing of {what} in {forgery.path.name}, section {number}")
