@@ -107,8 +107,9 @@ pub(crate) fn level(
     let ModuleGrid { rows, cols, side_cells } = *grid;
     // What sources and rules come to is in the features; the names of features are those of the files.
     let spec = job.features.as_ref().expect("a stage of jobs with features");
-    let FeaturesSpec { sources: _, rules: _, buildings: _, share_max, options } = spec;
-    let GradeOptions { clearances: Clearances { road, rail, water }, bank } = *options;
+    let FeaturesSpec { sources: _, rules: _, buildings: _, share_max, grade_give: _, options } = spec;
+    let GradeOptions { clearances, bank, cut_max, fill_max, clip, smooth_milliposts } = *options;
+    let Clearances { road, rail, water } = clearances;
     let files = spec.files();
     let files = records.iter().filter(|record| files.iter().any(|file| file.written == record.path));
     let files: Vec<Fingerprint> = files.map(|record| record.blake3).collect();
@@ -117,7 +118,9 @@ pub(crate) fn level(
     Key::new("level")
         .part(RULES, |part| {
             let part = part.list(job.class_names().iter(), |part, name| part.text(name)).real(*share_max);
-            [road, rail, water, bank].into_iter().fold(part, |part, quanta| part.signed(quanta.into()))
+            let quanta = [road, rail, water, bank, cut_max, fill_max, clip];
+            let part = quanta.into_iter().fold(part, |part, quanta| part.signed(quanta.into()));
+            part.maybe(smooth_milliposts, |part, thousandths| part.number(thousandths.into()))
         })
         .part(ALLOWANCE, |part| {
             let part = part.number(rows.into()).number(cols.into()).signed(side_cells.into());

@@ -343,6 +343,7 @@ fn lines(run: &Run, read: &ReadFeatures, formed: &Formed, classes: &[u8]) -> Vec
                 role: line_role(role),
                 width_m: of.map_or(0.0, |of| terrain::metres_of_quanta(of.width)),
                 grade_max_ppm: of.map_or(0, |of| of.grade_ppm),
+                grade_most_ppm: of.map_or(0, |of| of.grade_most_ppm()),
                 vertices: chain.into_iter().map(metres).collect(),
             });
         }

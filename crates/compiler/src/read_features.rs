@@ -27,7 +27,8 @@ impl ReadFeatures {
         let Some(spec) = &job.features else { return Ok(None) };
         let mut vectors = Vectors::read(job, area, each)?;
         let table = FeatureTable::of(&vectors, &spec.rules);
-        let features = AreaFeatures::of(std::mem::take(&mut vectors.sources), &spec.rules, site(area), each);
+        let features =
+            AreaFeatures::of(std::mem::take(&mut vectors.sources), &spec.rules, spec.grade_give, site(area), each);
         let mut by_tile = vec![Vec::new(); area.tiles.len()];
         for (number, &place) in features.stations().iter().enumerate() {
             by_tile[area.tiling.index(tile_of(area, &features, place))].push(number as u32);

@@ -15,7 +15,7 @@ pub(crate) fn strips(features: &AreaFeatures, formed: &Formed, classes: &[u8], r
         let Some(strip) = Strip::of(face, &formed.points) else { continue };
         let class = classes[usize::from(face.class)];
         let of = figures.entry(class).or_insert(StripFigures { class, ..StripFigures::default() });
-        let grade_ppm = traits.get(&face.id).map_or(0, |traits| traits.grade_ppm);
+        let grade_ppm = traits.get(&face.id).map_or(0, |traits| traits.grade_most_ppm());
         of.pieces += 1;
         of.length_m += strip.length(lattice);
         of.steeper += u64::from(strip.is_steeper(grade_ppm, lattice));

@@ -55,8 +55,10 @@ pub struct FeatureLine {
     pub role: LineRole,
     /// Metres wide.
     pub width_m: f64,
-    /// The greatest grade it may have, in parts per million; 0 where it has none.
+    /// The greatest grade of its rule, in parts per million; 0 where it has none.
     pub grade_max_ppm: u32,
+    /// The steepest it may be where limits of cut and fill ask for it, in parts per million.
+    pub grade_most_ppm: u32,
     /// Easting, northing and height of its vertices, in metres.
     pub vertices: Vec<[f64; 3]>,
 }
@@ -181,6 +183,7 @@ mod tests {
                 role: LineRole::Centre,
                 width_m: 3.5,
                 grade_max_ppm: 250_000,
+                grade_most_ppm: 375_000,
                 vertices: vec![[500_000.5, 4_000_000.0, 12.25]],
             }],
             strips: vec![StripFigures { class: 3, pieces: 2, length_m: 12.5, steeper: 1, fall_max: 9 }],

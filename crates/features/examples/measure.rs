@@ -58,7 +58,7 @@ fn main() {
     };
     let sources = roads(posts_wide, lines);
     lap("roads");
-    let mended = mend(sort_out(sources, &[]).features, &site);
+    let mended = mend(sort_out(sources, &[], 1.5).features, &site);
     lap("sorted out and mended");
     let rounded = round(mended, &site, &in_turn);
     lap("rounded");

@@ -81,10 +81,10 @@ impl AreaFeatures {
         ways.chain(self.outlines.iter().map(|outline| (outline.id, outline.traits))).collect()
     }
 
-    /// Sorts out, mends and rounds features, and finds where the DEM has to be asked. `each` runs what falls into
-    /// pieces.
-    pub fn of(sources: Vec<Source>, rules: &[Rule], site: Site, each: Each) -> Self {
-        let Sorted { features, mut remarks } = sort_out(sources, rules);
+    /// Sorts out, mends and rounds features, and finds where the DEM has to be asked. `grade_give` is how many times
+    /// its grade a road may be unless a rule says so; `each` runs what falls into pieces.
+    pub fn of(sources: Vec<Source>, rules: &[Rule], grade_give: f64, site: Site, each: Each) -> Self {
+        let Sorted { features, mut remarks } = sort_out(sources, rules, grade_give);
         let mut rounded = round(mend(features, &site), &site, each);
         remarks.append(&mut rounded.remarks);
         let roads = Network::of(&travelled(&rounded), site.lattice, &mut remarks);
@@ -256,7 +256,7 @@ mod tests {
     use crate::samples::{check, ground_at, site, way};
 
     fn levelled(sources: Vec<Source>, metres: impl Fn(f64, f64) -> f64) -> Levelled {
-        let all = AreaFeatures::of(sources, &[], site(), &in_turn);
+        let all = AreaFeatures::of(sources, &[], 1.5, site(), &in_turn);
         let ground: Vec<Option<i32>> = all.stations().iter().map(|place| ground_at(*place, &metres)).collect();
         let levelled = all.level(&ground, GradeOptions::USUAL, &mut 1000);
         check(&levelled.reserved.formed);
@@ -307,7 +307,7 @@ mod tests {
             way(10 + number, "highway=track", &[(20.0, north), (25.0, north + 0.5)])
         };
         let sources = (0..20).map(track).chain([way(3, "natural=water", &ring)]);
-        let all = AreaFeatures::of(sources.collect(), &[], site(), &in_turn);
+        let all = AreaFeatures::of(sources.collect(), &[], 1.5, site(), &in_turn);
         let ground: Vec<Option<i32>> = all.stations().iter().map(|place| ground_at(*place, &|_, _| 5.0)).collect();
         let levelled = all.level(&ground, GradeOptions::USUAL, &mut 40);
         let of = |role: Role| levelled.reserved.formed.edges.iter().filter(|edge| edge.role == role).count();

@@ -166,7 +166,8 @@ fn lower(strands: &mut [Strand], lake: &Uneven) {
 /// Strips that another line would tilt, or that would make one too steep: those of which a corner has the height of a
 /// line that passes through it, and those at the side of which a line begins that is steeper than it may be.
 fn tilted(formed: &Formed, network: &Network, wide: &[Wide]) -> BTreeSet<u32> {
-    let grades: HashMap<FeatureId, u32> = network.ways.iter().map(|way| (way.id, way.traits.grade_ppm)).collect();
+    let grades: HashMap<FeatureId, u32> =
+        network.ways.iter().map(|way| (way.id, way.traits.grade_most_ppm())).collect();
     let mut steep: HashSet<Place> = HashSet::new();
     for edge in formed.edges.iter().filter(|edge| edge.role == Role::Centre) {
         let [a, b] = [edge.a, edge.b].map(|point| formed.points[point as usize]);

@@ -6,7 +6,7 @@
 //! anything: it is mended or left out, and each time a [`Remark`] says so. In the order of use:
 //!
 //! ```text
-//! sort_out(Vec<Source>, &[Rule]) -> Sorted          kinds, classes, widths, grades
+//! sort_out(Vec<Source>, &[Rule], f64) -> Sorted     kinds, classes, widths, grades
 //! mend(Vec<Feature>, &Site) -> Mended               ways and areas on the lattice, cut at the area's border
 //! round(Mended, &Site) -> Rounded                   stations; lines touch at shared vertices or not at all
 //! split_at_dams(rounded.outlines, &rounded.ways) -> Vec<Outline>
@@ -64,8 +64,10 @@ pub use round::{Outline, Rounded, round};
 // Heights.
 mod network;
 pub use network::{Chain, Edge, Network, Node, WayOf};
+mod fit;
+mod forest;
+mod heaps;
 mod smooth;
-pub use smooth::smooth;
 mod sweep;
 pub use sweep::Pin;
 mod decks;

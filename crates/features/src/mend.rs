@@ -199,7 +199,7 @@ mod tests {
     }
 
     fn mended(sources: Vec<Source>) -> Mended {
-        mend(sort_out(sources, &[]).features, &site())
+        mend(sort_out(sources, &[], 1.5).features, &site())
     }
 
     #[track_caller]

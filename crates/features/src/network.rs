@@ -151,25 +151,42 @@ impl Network {
         &self.beside[self.starts[node as usize] as usize..self.starts[node as usize + 1] as usize]
     }
 
-    /// Gives the nodes of every connected part that has no height anywhere the heights of `others`.
-    pub(crate) fn give_heights(&self, heights: &mut [Option<i32>], others: &dyn Fn(u32) -> Option<i32>) {
-        let mut seen = vec![false; self.nodes.len()];
+    /// The number of the connected part of each node, in the order of their first nodes.
+    pub(crate) fn parts(&self) -> Vec<u32> {
+        let (mut parts, mut count) = (vec![u32::MAX; self.nodes.len()], 0);
         for first in 0..self.nodes.len() as u32 {
-            if std::mem::replace(&mut seen[first as usize], true) {
+            if parts[first as usize] != u32::MAX {
                 continue;
             }
-            let mut part = vec![first];
-            let mut at = 0;
-            while let Some(&node) = part.get(at) {
-                let unseen =
-                    self.beside(node).iter().filter(|(next, _)| !std::mem::replace(&mut seen[*next as usize], true));
-                part.extend(unseen.map(|(next, _)| *next));
-                at += 1;
+            parts[first as usize] = count;
+            let mut front = vec![first];
+            while let Some(node) = front.pop() {
+                for &(next, _) in self.beside(node) {
+                    if parts[next as usize] == u32::MAX {
+                        parts[next as usize] = count;
+                        front.push(next);
+                    }
+                }
             }
-            if part.iter().all(|node| heights[*node as usize].is_none()) {
-                part.iter().for_each(|&node| heights[node as usize] = others(node));
-            }
+            count += 1;
         }
+        parts
+    }
+
+    /// Gives the nodes of every connected part that has no height anywhere the heights of `others`.
+    pub(crate) fn give_heights(&self, heights: &mut [Option<i32>], others: &dyn Fn(u32) -> Option<i32>) {
+        let parts = self.parts();
+        let mut known = vec![false; parts.iter().map(|part| *part as usize + 1).max().unwrap_or(0)];
+        heights.iter().zip(&parts).for_each(|(height, part)| known[*part as usize] |= height.is_some());
+        for (node, height) in (0..).zip(heights).filter(|(node, _)| !known[parts[*node as usize] as usize]) {
+            *height = others(node);
+        }
+    }
+
+    /// Decimetres of ways that a node stands for: half of its edges, and one at least.
+    pub(crate) fn decimetres_at(&self, node: u32) -> i64 {
+        let quanta: i64 = self.beside(node).iter().map(|(_, edge)| i64::from(self.edges[*edge as usize].length)).sum();
+        (5 * quanta / i64::from(terrain::QUANTA_PER_METRE)).max(1)
     }
 
     /// What an edge is.

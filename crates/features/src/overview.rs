@@ -153,7 +153,16 @@ mod tests {
         let owned = |values: &[&str]| values.iter().map(|value| value.to_string()).collect();
         let tags = tags.iter().map(|(key, values)| (key.to_string(), owned(values))).collect();
         let class = class.map(str::to_owned);
-        Rule { tags, kind, class, width_m: Some(4.0), grade_max_percent: None, form: None, pins: false }
+        Rule {
+            tags,
+            kind,
+            class,
+            width_m: Some(4.0),
+            grade_max_percent: None,
+            grade_give: None,
+            form: None,
+            pins: false,
+        }
     }
 
     /// What rows that decide anything, or are rules, say.

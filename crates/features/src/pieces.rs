@@ -102,7 +102,14 @@ pub fn pieces(
             Station { place, height: heights[node as usize], stays, flat }
         };
         let stations: Vec<Station> = nodes.iter().enumerate().map(station).collect();
-        let kept = thin(&stations, Tolerance::USUAL.times(grant.tolerance), traits.grade_ppm, network.lattice);
+        // Where the grade has given way, so do the edges of what is thinned.
+        let gives = |(ends, edge): (&[u32], &u32)| {
+            let rise = (heights[ends[0] as usize] - heights[ends[1] as usize]).abs();
+            network.edges[*edge as usize].rise_max < rise
+        };
+        let has_given = nodes.windows(2).zip(&edges).any(gives);
+        let grade_ppm = if has_given { traits.grade_most_ppm() } else { traits.grade_ppm };
+        let kept = thin(&stations, Tolerance::USUAL.times(grant.tolerance), grade_ppm, network.lattice);
         let form = form_of(&traits, grant, network);
         let strip = |pair: &[u32]| match form {
             Form::Strip => (pair[0]..=pair[1]).any(|at| FALL_MIN < fall(nodes[at as usize])),

@@ -63,6 +63,13 @@ pub enum Flaw {
         /// The grade found, in parts per million.
         grade_ppm: u32,
     },
+    /// A way steeper than its grade, because limits of cut and fill ask for it.
+    GradeRelaxed {
+        /// The steepest grade found, in parts per million.
+        grade_ppm: u32,
+        /// Whole metres of it that are steeper than its grade.
+        metres: u32,
+    },
     /// A deck too low over what it crosses; how much is missing.
     ClearanceLacks {
         /// Quanta of 1/128 m that are missing.
@@ -103,6 +110,9 @@ impl fmt::Display for Flaw {
             Flaw::BadTag { key, found } => write!(f, "{key} = \"{found}\" is not a value it can have"),
             Flaw::PinsTooSteep { grade_ppm } => {
                 write!(f, "pinned heights ask for a grade of {:.1} %", f64::from(*grade_ppm) / 1e4)
+            }
+            Flaw::GradeRelaxed { grade_ppm, metres } => {
+                write!(f, "the ground asks for a grade of {:.1} %, over {metres} m", f64::from(*grade_ppm) / 1e4)
             }
             Flaw::ClearanceLacks { quanta } => write!(f, "the deck is {:.2} m too low", metres(*quanta)),
             Flaw::LevelRefused { found } => write!(f, "its level of {:.2} m does not fit its shore", metres(*found)),

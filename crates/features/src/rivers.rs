@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use crate::clean::Notes;
 use crate::flow::Flow;
 use crate::isotonic::{falling, squares};
+use crate::smooth::filled;
 use crate::{FeatureId, Flaw, Network, Numbering, Remark, Remedy};
 
 /// Rounds in which reaches agree on the height of the confluences between them.
@@ -50,26 +51,6 @@ pub fn fall(network: &Network, bed: Bed, remarks: &mut Vec<Remark>) -> Fallen {
     }
     run_down(&flow, &groups, bed.lake, &mut heights);
     Fallen { heights, turned }
-}
-
-/// Heights of all nodes: where the DEM has none, that of the nearest node, in edges, that has one.
-fn filled(network: &Network, ground: &[Option<i32>]) -> Vec<i32> {
-    let mut filled = ground.to_vec();
-    let mut front: Vec<u32> = (0..ground.len() as u32).filter(|node| ground[*node as usize].is_some()).collect();
-    while !front.is_empty() {
-        let mut next = Vec::new();
-        for node in front {
-            for &(beside, _) in network.beside(node) {
-                if filled[beside as usize].is_none() {
-                    filled[beside as usize] = filled[node as usize];
-                    next.push(beside);
-                }
-            }
-        }
-        next.sort_unstable();
-        front = next;
-    }
-    filled.into_iter().map(|height| height.unwrap_or(0)).collect()
 }
 
 /// Which edges flow against the direction of their way: OpenStreetMap draws rivers downhill, others anyhow. A way is

@@ -32,6 +32,8 @@ pub struct Rule {
     pub width_m: Option<f64>,
     /// The greatest grade in percent.
     pub grade_max_percent: Option<f64>,
+    /// How many times that grade it may be where limits of cut and fill ask for it, from 1.
+    pub grade_give: Option<f64>,
     /// The form.
     pub form: Option<Form>,
     /// Whether heights of the feature are pins (`z = "feature"`).
@@ -86,6 +88,8 @@ pub struct Traits {
     pub width: i32,
     /// Greatest rise over run, in parts per million.
     pub grade_ppm: u32,
+    /// Thousandths of that grade that it may be where limits of cut and fill ask for it: 1000 where it never gives way.
+    pub grade_give: u32,
     /// How it stands in the TIN where the ground asks for it.
     pub form: Form,
     /// The level its source gives, in quanta.
@@ -95,9 +99,14 @@ pub struct Traits {
 }
 
 impl Traits {
+    /// The steepest that it may be where limits of cut and fill ask for it, in parts per million.
+    pub fn grade_most_ppm(&self) -> u32 {
+        (u64::from(self.grade_ppm) * u64::from(self.grade_give) / 1000).min(u64::from(u32::MAX)) as u32
+    }
+
     /// Returns all that they are, word by word.
     pub(crate) fn feed(&self, word: &mut dyn FnMut(i64)) {
-        let Traits { class, kind, storey, width, grade_ppm, form, level, pins } = *self;
+        let Traits { class, kind, storey, width, grade_ppm, grade_give, form, level, pins } = *self;
         let (storey, layer) = match storey {
             Storey::Ground => (0, 0),
             Storey::Deck(layer) => (1, layer),
@@ -111,7 +120,9 @@ impl Traits {
             Form::Polygon => 4,
         };
         let kind = Kind::ALL.iter().position(|other| *other == kind).unwrap_or(Kind::ALL.len()) as i64;
-        let numbers = [class.into(), kind, storey, layer.into(), width.into(), grade_ppm.into(), form, pins.into()];
+        let numbers =
+            [class.into(), kind, storey, layer.into(), width.into(), grade_ppm.into(), grade_give.into(), form];
+        word(pins.into());
         numbers.into_iter().for_each(&mut *word);
         word(level.is_some().into());
         word(level.unwrap_or(0).into());
@@ -138,8 +149,9 @@ pub struct Sorted {
     pub remarks: Vec<Remark>,
 }
 
-/// Says what each feature is: the first of `rules` that matches decides, then the built-in table.
-pub fn sort_out(sources: Vec<Source>, rules: &[Rule]) -> Sorted {
+/// Says what each feature is: the first of `rules` that matches decides, then the built-in table. `grade_give` is how
+/// many times its grade a road may be where limits ask for it and no rule says so; railways and runways never are.
+pub fn sort_out(sources: Vec<Source>, rules: &[Rule], grade_give: f64) -> Sorted {
     let built_in = |source: &Source| source.kind.or_else(|| table::kind_of(&source.tags));
     let kind_of = |source: &Source| -> (Option<usize>, Option<Kind>) {
         let rule = rules.iter().position(|rule| rule.matches(source));
@@ -159,7 +171,7 @@ pub fn sort_out(sources: Vec<Source>, rules: &[Rule]) -> Sorted {
         let rule = rule.map(|rule| &rules[rule]);
         let class = class_name(rule, kind);
         let class = classes.iter().position(|name| name == class).unwrap_or_default() as u16;
-        let traits = traits(&source, kind, class, rule, &mut remarks);
+        let traits = traits(&source, kind, class, (rule, grade_give), &mut remarks);
         features.push(Feature { id: source.id, traits, shape: source.shape });
     }
     Remark::sort(&mut remarks);
@@ -217,12 +229,20 @@ impl Reader<'_> {
     }
 }
 
-fn traits(source: &Source, kind: Kind, class: u16, rule: Option<&Rule>, remarks: &mut Vec<Remark>) -> Traits {
+fn traits(
+    source: &Source,
+    kind: Kind,
+    class: u16,
+    (rule, grade_give): (Option<&Rule>, f64),
+    remarks: &mut Vec<Remark>,
+) -> Traits {
     let mut reader = Reader { source, remarks };
     let width = width(&mut reader, kind, rule);
     let storey = storey(&mut reader, kind);
     let level_m = if kind == Kind::Lake { reader.read(&["level_m", "ele"], height_of) } else { None };
     let grade = rule.and_then(|rule| rule.grade_max_percent).map(|percent| (percent * 10_000.0).round() as u32);
+    let gives = !matches!(kind, Kind::Rail | Kind::Runway);
+    let give = rule.and_then(|rule| rule.grade_give).unwrap_or(if gives { grade_give } else { 1.0 });
     let is_area = is_area(source, kind);
     Traits {
         class,
@@ -230,6 +250,7 @@ fn traits(source: &Source, kind: Kind, class: u16, rule: Option<&Rule>, remarks:
         storey,
         width,
         grade_ppm: grade.unwrap_or(kind.grade_default_ppm()),
+        grade_give: (give * 1000.0).round() as u32,
         form: if is_area { Form::Polygon } else { rule.and_then(|rule| rule.form).unwrap_or(kind.form_default()) },
         level: level_m.and_then(terrain::quanta_of_metres),
         pins: rule.is_some_and(|rule| rule.pins),
@@ -320,6 +341,7 @@ mod tests {
             class: None,
             width_m: None,
             grade_max_percent: None,
+            grade_give: None,
             form: None,
             pins: false,
         }
@@ -327,7 +349,7 @@ mod tests {
 
     #[track_caller]
     fn traits_of(tags: &[(&str, &str)]) -> (Traits, Vec<Remark>) {
-        let sorted = sort_out(vec![source(1, tags)], &[]);
+        let sorted = sort_out(vec![source(1, tags)], &[], 1.5);
         (sorted.features[0].traits, sorted.remarks)
     }
 
@@ -367,6 +389,7 @@ mod tests {
             class: Some("desert track".into()),
             width_m: Some(4.0),
             grade_max_percent: Some(12.5),
+            grade_give: None,
             form: Some(Form::Bench),
             ..rule("highway", "track")
         };
@@ -381,7 +404,7 @@ mod tests {
         let rules = [track, none, named];
         let classes = class_names(&rules);
         assert_eq!(classes[..5], ["motorway", "primary", "minor", "desert track", "track"]);
-        let sorted = sort_out(sources, &rules);
+        let sorted = sort_out(sources, &rules, 1.5);
         let traits = sorted.features[0].traits;
         assert_eq!((traits.width, traits.grade_ppm, traits.form, traits.class), (512, 125_000, Form::Bench, 3));
         assert_eq!(sorted.features.len(), 3);

@@ -24,7 +24,7 @@ pub fn way(number: i64, tags: &str, positions: &[(f64, f64)]) -> Source {
 
 /// Features from tags to the lattice.
 pub fn rounded(sources: Vec<Source>) -> Rounded {
-    round(mend(sort_out(sources, &[]).features, &site()), &site(), &in_turn)
+    round(mend(sort_out(sources, &[], 1.5).features, &site()), &site(), &in_turn)
 }
 
 /// The network of all ways, and the ground at its nodes; `metres` is a function of posts (east, north).

@@ -113,6 +113,12 @@ pub const RULE_GRADE_PERCENT: std::ops::RangeInclusive<f64> = 0.01..=100.0;
 pub const SHARE_MAX: std::ops::RangeInclusive<f64> = 0.01..=1.0;
 /// Metres that decks may be asked to keep clear of what runs below: the highest bridges leave so much.
 pub const CLEARANCE_M_MAX: f64 = 100.0;
+/// Metres that roads and rivers may cut into the ground or be filled before their grades give way.
+pub const EARTHWORK_M_MAX: f64 = 1000.0;
+/// How many times its greatest grade a road may be.
+pub const GRADE_GIVE: std::ops::RangeInclusive<f64> = 1.0..=10.0;
+/// Posts along a road over which the ground is smoothed.
+pub const SMOOTH_POSTS: std::ops::RangeInclusive<f64> = 0.0..=100.0;
 /// Metres back along a way in which the bank of a deck may sag.
 pub const BANK_M_MAX: f64 = 1000.0;
 /// Metres above the ground that an eye may be: lower ones see nothing but the next bump, higher ones fly.

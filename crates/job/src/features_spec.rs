@@ -15,7 +15,9 @@ pub struct FeaturesSpec {
     pub buildings: bool,
     /// The share of each limit that features may take, from 0 to 1.
     pub share_max: f64,
-    /// How high decks stand over what they cross, and how far from a deck its ends look for higher ground to rest on.
+    /// How many times its greatest grade a road may be where limits of cut and fill ask for it, from 1.
+    pub grade_give: f64,
+    /// How high decks stand over what they cross, where they rest, and how far roads follow the ground.
     pub options: GradeOptions,
 }
 

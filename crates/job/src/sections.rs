@@ -8,11 +8,12 @@ use features::{Form, Kind, RuleKind};
 use terrain::{Effort, HeightFit, LastBatch, Lattice, LodBorder, Resampling, Smooth, TileOrder};
 
 use crate::bounds::{
-    AREAS_MAX, AROUND_KM_MAX, BANK_M_MAX, CLEARANCE_M_MAX, COARSER_LEVELS_MAX, COUNT_MAX, DATUM_CHARS_MAX, EYE_M,
-    FEATHER_M_MAX, FEATURE_SOURCES_MAX, FILL_POSTS_MAX, GEOIDS_MAX, HEIGHT_UNIT_M, LAYER_CHARS_MAX, LEVEL_M_MAX,
-    MODULES_PER_TILE_MIN, NAME_CHARS_MAX, PER_MODULE_MAX, QUANTUM_M_MAX, RESIDUAL_M_MAX, RMS_M_MIN, RULE_GRADE_PERCENT,
-    RULE_WIDTH_M, RULES_MAX, SEED_MAX, SHARE_MAX, SIDE_QUANTA_MAX, SIGHT_M, SLOPE_PERCENT_MAX, SMOOTH_M_MAX,
-    SOURCES_MAX, TAG_CHARS_MAX, THANKS_CHARS_MAX, TITLE_CHARS_MAX, TRIANGLES_MIN, WEIGHT_MAX, WKT_CHARS_MAX,
+    AREAS_MAX, AROUND_KM_MAX, BANK_M_MAX, CLEARANCE_M_MAX, COARSER_LEVELS_MAX, COUNT_MAX, DATUM_CHARS_MAX,
+    EARTHWORK_M_MAX, EYE_M, FEATHER_M_MAX, FEATURE_SOURCES_MAX, FILL_POSTS_MAX, GEOIDS_MAX, GRADE_GIVE, HEIGHT_UNIT_M,
+    LAYER_CHARS_MAX, LEVEL_M_MAX, MODULES_PER_TILE_MIN, NAME_CHARS_MAX, PER_MODULE_MAX, QUANTUM_M_MAX, RESIDUAL_M_MAX,
+    RMS_M_MIN, RULE_GRADE_PERCENT, RULE_WIDTH_M, RULES_MAX, SEED_MAX, SHARE_MAX, SIDE_QUANTA_MAX, SIGHT_M,
+    SLOPE_PERCENT_MAX, SMOOTH_M_MAX, SMOOTH_POSTS, SOURCES_MAX, TAG_CHARS_MAX, THANKS_CHARS_MAX, TITLE_CHARS_MAX,
+    TRIANGLES_MIN, WEIGHT_MAX, WKT_CHARS_MAX,
 };
 use crate::{
     Allocation, AreaPlace, Borders, ClipHeights, Count, DemSource, Edges, ErrorKey, HeightsFrom, Key, KeyTable,
@@ -288,10 +289,27 @@ const FEATURES: &[Key] = &[
     Key::new("bank_m", "how far back from a deck its bank may sag: decks rest on the highest ground within it")
         .number("metres along the way", 0.0..=BANK_M_MAX)
         .usual("100"),
+    Key::new("cut_max_m", "how deep roads and rivers may cut into the ground before grades give way")
+        .number(HIGH, EARTHWORK_M)
+        .usual("10"),
+    Key::new("fill_max_m", "how high roads and rivers may be filled before grades give way")
+        .number(HIGH, EARTHWORK_M)
+        .usual("10"),
+    Key::new("grade_give", "how many times its greatest grade a road may be where those limits ask for it; 1: never")
+        .number("a factor", GRADE_GIVE)
+        .usual("1.5"),
+    Key::new("clip_m", "heights of the DEM farther than this from a first fit are taken for errors")
+        .number(HIGH, EARTHWORK_M)
+        .usual("3"),
+    Key::new("smooth_posts", "posts along roads, either side, over which noisy ground is smoothed; 0: not at all")
+        .number("posts", SMOOTH_POSTS)
+        .otherwise("2 where the DEM is noisy along roads, else 0")
+        .example("smooth_posts = 3"),
 ];
 
 const HIGH: &str = "metres";
 const CLEARANCE: RangeInclusive<f64> = 0.0..=CLEARANCE_M_MAX;
+const EARTHWORK_M: RangeInclusive<f64> = 0.0..=EARTHWORK_M_MAX;
 
 const FEATURE_SOURCES: &[Key] = &[
     Key::new("file", "the file: OpenStreetMap data as .pbf, GeoPackage, Shapefile or GeoJSON")
@@ -334,6 +352,10 @@ const RULES: &[Key] = &[
         .number("percent", RULE_GRADE_PERCENT)
         .otherwise("as usual for its kind")
         .example("grade_max_percent = 25"),
+    Key::new("grade_give", "how many times that it may be where limits of cut and fill ask for it")
+        .number("a factor", GRADE_GIVE)
+        .otherwise("1 of railways and runways, else as all features")
+        .example("grade_give = 1.2"),
     Key::new("form", "what of it becomes edges of the TIN")
         .words::<Form>()
         .otherwise("as usual for its kind")

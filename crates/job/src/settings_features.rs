@@ -1,6 +1,6 @@
 //! The settings of `[features]`: as TOML, and with what they mean.
 
-use features::{Clearances, Rule, RuleKind};
+use features::{Clearances, GradeOptions, Rule, RuleKind};
 use terrain::metres_of_quanta;
 
 use crate::setting_list::{List, counted, number, quoted};
@@ -16,14 +16,21 @@ pub(crate) fn describe(features: &FeaturesSpec, list: &mut List) {
     }
     list.add("features.buildings", features.buildings.to_string());
     list.add("features.share_max", number(features.share_max));
-    let Clearances { road, rail, water } = features.options.clearances;
+    let GradeOptions { clearances, bank, cut_max, fill_max, clip, smooth_milliposts } = features.options;
+    let Clearances { road, rail, water } = clearances;
     let lengths = [
         ("features.clearance_road_m", road),
         ("features.clearance_rail_m", rail),
         ("features.clearance_water_m", water),
-        ("features.bank_m", features.options.bank),
+        ("features.bank_m", bank),
+        ("features.cut_max_m", cut_max),
+        ("features.fill_max_m", fill_max),
+        ("features.clip_m", clip),
     ];
     lengths.into_iter().for_each(|(key, quanta)| list.add(key, number(metres_of_quanta(quanta))));
+    list.add("features.grade_give", number(features.grade_give));
+    let smooth_posts = smooth_milliposts.map(|thousandths| number(f64::from(thousandths) / 1000.0));
+    smooth_posts.into_iter().for_each(|posts| list.add("features.smooth_posts", posts));
 }
 
 fn source_text(source: &FeatureSource) -> String {
@@ -47,6 +54,7 @@ fn rule_text(rule: &Rule) -> String {
     keys.extend(rule.class.as_ref().map(|class| format!("class = {}", quoted(class))));
     keys.extend(rule.width_m.map(|width_m| format!("width_m = {}", number(width_m))));
     keys.extend(rule.grade_max_percent.map(|percent| format!("grade_max_percent = {}", number(percent))));
+    keys.extend(rule.grade_give.map(|give| format!("grade_give = {}", number(give))));
     keys.extend(rule.form.map(|form| format!("form = {}", quoted(form.name()))));
     if rule.pins {
         keys.push("z = \"feature\"".to_owned());

@@ -19,10 +19,11 @@ fn job(rest: &str) -> Job {
 const FULL: &str = "[features]\nsources = [\"roads.osm.pbf\", { file = \"hydro.gpkg\", layer = \"rivers\" }, \
     { file = \"lakes.shp\", kind = \"lake\", crs = \"EPSG:32611\" }, \"sample\", { file = \"sample\" }]\n\
     rules = [{ where = { highway = [\"track\"], surface = \"sand\" }, class = \"trail\", width_m = 3, \
-    grade_max_percent = 25, form = \"strip\", z = \"feature\" }, { where = { bridge = [] }, kind = \"none\" }, \
+    grade_max_percent = 25, grade_give = 1.2, form = \"strip\", z = \"feature\" }, { where = { bridge = [] }, kind = \"none\" }, \
     { where = {}, kind = \"breakline\", form = \"auto\" }]\n\
     buildings = false\nshare_max = 0.25\nclearance_road_m = 5\n\
-    clearance_rail_m = 6.5\nclearance_water_m = 0\nbank_m = 50\n";
+    clearance_rail_m = 6.5\nclearance_water_m = 0\nbank_m = 50\n\
+    cut_max_m = 5\nfill_max_m = 6\nclip_m = 2\nsmooth_posts = 1.5\ngrade_give = 1.25\n";
 
 #[test]
 fn every_key_of_features_is_read() {
@@ -47,16 +48,28 @@ fn every_key_of_features_is_read() {
         class: Some("trail".into()),
         width_m: Some(3.0),
         grade_max_percent: Some(25.0),
+        grade_give: Some(1.2),
         form: Some(Form::StripAlways),
         pins: true,
     };
-    let bare = Rule { class: None, width_m: None, grade_max_percent: None, form: None, pins: false, ..rule.clone() };
+    let bare = Rule {
+        class: None,
+        width_m: None,
+        grade_max_percent: None,
+        grade_give: None,
+        form: None,
+        pins: false,
+        ..rule.clone()
+    };
     let none = Rule { tags: tags(&[("bridge", &[])]), kind: RuleKind::None, ..bare.clone() };
     let rest = Rule { tags: vec![], kind: RuleKind::Is(Kind::Breakline), form: Some(Form::Strip), ..bare };
     assert_eq!(features.rules, [rule, none, rest]);
-    assert_eq!((features.share_max, features.buildings), (0.25, false));
+    assert_eq!((features.share_max, features.grade_give, features.buildings), (0.25, 1.25, false));
     let clearances = Clearances { road: 640, rail: 832, water: 0 };
-    assert_eq!(features.options, GradeOptions { clearances, bank: 6400 });
+    assert_eq!(
+        features.options,
+        GradeOptions { clearances, bank: 6400, cut_max: 640, fill_max: 768, clip: 256, smooth_milliposts: Some(1500) }
+    );
 }
 
 #[test]

@@ -116,7 +116,7 @@ fn form_of(role: LineRole) -> &'static str {
 fn add_lines(package: &Package, layers: &FeatureLayers) -> rusqlite::Result<()> {
     let mut add = package.begin(&LINES, layers.extent_m)?;
     for line in &layers.level.lines {
-        let FeatureLine { feature, class, role, width_m, grade_max_ppm, vertices } = line;
+        let FeatureLine { feature, class, role, width_m, grade_max_ppm, grade_most_ppm: _, vertices } = line;
         let pairs = || vertices.windows(2).map(|pair| (length_m(pair[0], pair[1]), (pair[1][2] - pair[0][2]).abs()));
         let length: f64 = pairs().map(|(length, _)| length).sum();
         let found = pairs().filter(|pair| 0.0 < pair.0).map(|(length, rise)| 100.0 * rise / length).fold(0.0, f64::max);
@@ -201,6 +201,7 @@ mod tests {
             role,
             width_m: 7.0,
             grade_max_ppm: 100_000,
+            grade_most_ppm: 150_000,
             vertices,
         };
         let middle = [30.0, 40.0, 2.5];

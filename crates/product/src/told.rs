@@ -171,11 +171,11 @@ fn checks(level: &AreaLevel, figures: &FeatureFigures, extent_m: [f64; 4]) -> Re
     checks
 }
 
-/// Edges of a line that are steeper than its greatest grade by more than a quantum of height.
+/// Edges of a line that are steeper than they may be at most by more than a quantum of height.
 fn steeper(line: &FeatureLine, extent_m: [f64; 4]) -> u64 {
-    let rise_max = |a, b| length_m(a, b) * f64::from(line.grade_max_ppm) / 1e6 + metres(1);
+    let rise_max = |a, b| length_m(a, b) * f64::from(line.grade_most_ppm) / 1e6 + metres(1);
     let is_steeper = |[a, b]: &[[f64; 3]; 2]| rise_max(*a, *b) < (b[2] - a[2]).abs();
-    if line.grade_max_ppm == 0 { 0 } else { edges(line, extent_m).filter(is_steeper).count() as u64 }
+    if line.grade_most_ppm == 0 { 0 } else { edges(line, extent_m).filter(is_steeper).count() as u64 }
 }
 
 /// Edges of a channel, which runs downstream, that rise.

@@ -289,9 +289,9 @@ impl<'a> Decided<'a> {
         let step = self.step() as f64;
         let is_steeper = |[(a, low), (b, high)]: &[(LatticePoint, i32); 2]| {
             let run = f64::from(b.col - a.col).hypot(f64::from(b.row - a.row)) * step;
-            run * f64::from(line.grade_max_ppm) / 1e6 + 1.001 < f64::from(low.abs_diff(*high))
+            run * f64::from(line.grade_most_ppm) / 1e6 + 1.001 < f64::from(low.abs_diff(*high))
         };
-        if line.grade_max_ppm == 0 {
+        if line.grade_most_ppm == 0 {
             0
         } else {
             self.edges_of(line).iter().filter(|edge| is_steeper(edge)).count() as u64

@@ -27,11 +27,13 @@ pub(super) fn read(
     }
     let sources = sources(&features.required("sources")?, dem, job, mentions)?;
     let rules = features.optional("rules");
+    let smooth_posts = features.optional("smooth_posts").map(|entry| entry.number()).transpose()?;
     let spec = FeaturesSpec {
         sources,
         rules: rules.as_ref().map_or(Ok(Vec::new()), |rules| read_rules(rules, importance))?,
         buildings: features.flag("buildings")?,
         share_max: features.number("share_max")?,
+        grade_give: features.number("grade_give")?,
         options: GradeOptions {
             clearances: Clearances {
                 road: quanta(features, "clearance_road_m")?,
@@ -39,6 +41,10 @@ pub(super) fn read(
                 water: quanta(features, "clearance_water_m")?,
             },
             bank: quanta(features, "bank_m")?,
+            cut_max: quanta(features, "cut_max_m")?,
+            fill_max: quanta(features, "fill_max_m")?,
+            clip: quanta(features, "clip_m")?,
+            smooth_milliposts: smooth_posts.map(|posts| (posts * 1000.0).round() as u32),
         },
     };
     let classes = spec.classes_after(importance).len();
@@ -146,7 +152,7 @@ fn rule(item: &Entry, importance: &ImportanceSpec) -> Result<Rule, JobError> {
     let table = item.table()?;
     let tags = tags(&table.required("where")?)?;
     let kind = table.optional("kind").map_or(Ok(RuleKind::AsBuiltIn), |kind| kind.word())?;
-    let others = ["class", "width_m", "grade_max_percent", "form", "z"].into_iter();
+    let others = ["class", "width_m", "grade_max_percent", "grade_give", "form", "z"].into_iter();
     if let (RuleKind::None, Some(other)) = (kind, others.clone().find_map(|key| table.optional(key))) {
         let hint = "remove it, or write another kind";
         return Err(other.conflict("kind = \"none\"", "no more keys, since these features are left out", hint));
@@ -159,6 +165,7 @@ fn rule(item: &Entry, importance: &ImportanceSpec) -> Result<Rule, JobError> {
         class: table.optional("class").map(|entry| class(&entry, importance)).transpose()?,
         width_m: number("width_m")?,
         grade_max_percent: number("grade_max_percent")?,
+        grade_give: number("grade_give")?,
         form: table.optional("form").map(|entry| entry.word::<Form>()).transpose()?,
         pins: heights == HeightsFrom::Feature,
     })

@@ -68,7 +68,15 @@ mod tests {
     use database::{FeatureLine, FeatureRemark, LineRole};
 
     fn line(role: LineRole, vertices: Vec<[f64; 3]>) -> FeatureLine {
-        FeatureLine { feature: "way 1".into(), class: 1, role, width_m: 7.0, grade_max_ppm: 100_000, vertices }
+        FeatureLine {
+            feature: "way 1".into(),
+            class: 1,
+            role,
+            width_m: 7.0,
+            grade_max_ppm: 100_000,
+            grade_most_ppm: 150_000,
+            vertices,
+        }
     }
 
     #[test]

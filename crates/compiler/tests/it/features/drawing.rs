@@ -180,7 +180,7 @@ impl Laid {
             for ends in line.vertices.windows(2) {
                 let [run, rise] =
                     [(ends[1][0] - ends[0][0]).hypot(ends[1][1] - ends[0][1]), (ends[1][2] - ends[0][2]).abs()];
-                let greatest = f64::from(line.grade_max_ppm) / 1e6;
+                let greatest = f64::from(line.grade_most_ppm) / 1e6;
                 if line.role == LineRole::Centre && 0.0 < greatest && !self.was_told("grade") {
                     assert!(rise <= greatest * run + 1.0 / 64.0, "{name}: {rise} m on {run} m");
                 }
