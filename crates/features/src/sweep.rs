@@ -223,7 +223,8 @@ mod tests {
                 .filter_map(|node| Some((node, i64::from(heights[node % 64]?))))
                 .collect();
             let start = |none: i32| (0..network.nodes.len()).map(|node| heights[node % 64].unwrap_or(none)).collect();
-            let (low, high) = (lowest(&network, &costs(&network), start(NONE)), highest(&network, &costs(&network), start(-NONE)));
+            let costs = costs(&network);
+            let (low, high) = (lowest(&network, &costs, start(NONE)), highest(&network, &costs, start(-NONE)));
             let paths = all_paths(&network);
             for t in 0..network.nodes.len() {
                 let above = known.iter().map(|(s, h)| h + paths[*s][t]).min().unwrap();

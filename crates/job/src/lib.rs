@@ -45,6 +45,7 @@ pub use key::{Key, KeyTable, Usual, Values};
 mod keys;
 pub use keys::{key, key_tables, usual, usual_text};
 mod entry;
+mod feature_keys;
 mod files;
 mod load;
 mod read;

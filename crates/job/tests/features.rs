@@ -19,7 +19,8 @@ fn job(rest: &str) -> Job {
 const FULL: &str = "[features]\nsources = [\"roads.osm.pbf\", { file = \"hydro.gpkg\", layer = \"rivers\" }, \
     { file = \"lakes.shp\", kind = \"lake\", crs = \"EPSG:32611\" }, \"sample\", { file = \"sample\" }]\n\
     rules = [{ where = { highway = [\"track\"], surface = \"sand\" }, class = \"trail\", width_m = 3, \
-    grade_max_percent = 25, grade_give = 1.2, form = \"strip\", z = \"feature\" }, { where = { bridge = [] }, kind = \"none\" }, \
+    grade_max_percent = 25, grade_give = 1.2, \
+    form = \"strip\", z = \"feature\" }, { where = { bridge = [] }, kind = \"none\" }, \
     { where = {}, kind = \"breakline\", form = \"auto\" }]\n\
     buildings = false\nshare_max = 0.25\nclearance_road_m = 5\n\
     clearance_rail_m = 6.5\nclearance_water_m = 0\nbank_m = 50\n\
