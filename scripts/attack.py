@@ -118,7 +118,7 @@ class Attack:
         found["level"] += judge.levels(database)
         found["deck crack"] += judge.deck_cracks(database)
         found["deck"] += judge.sunken_decks(database)
-        found["river"] += judge.feature_lines(database)
+        found["river"] += judge.feature_lines(database) + judge.rising_lines(database)
         for kind, faults in found.items():
             for fault in faults[:3]:
                 self.fault(kind, fault)

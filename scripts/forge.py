@@ -132,6 +132,15 @@ class Forgery:
         start, length = self.section(number)
         decks = self.modules[number]["decks"]
         at = start + length
+        if self.header["version"] == 3:
+            # Decks are the first part behind the table, and their checksum stands in it.
+            (count,) = struct.unpack_from("<I", self.data, at + 12)
+            (size,) = struct.unpack_from("<I", self.data, at + 20)
+            table = 16 + 12 * count + 4
+            part = at + table
+            struct.pack_into("<i", self.data, part + 8 + 8 * vertex + 4, height)
+            struct.pack_into("<I", self.data, at + 24, zlib.crc32(bytes(self.data[part : part + size])))
+            return seal(self.data, at, table)
         struct.pack_into("<i", self.data, at + read_slm.DECKS.size + 8 * vertex + 4, height)
         heights = [z for _, _, z in decks["vertices"]]
         heights[vertex] = height

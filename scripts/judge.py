@@ -16,7 +16,8 @@ residuals    every post anew, against what the sections of load modules say
 beyond       vertices outside the range of the posts within two of them
 lakes        heights over all vertices of connected triangles of water
 decks        how far decks stand above the triangles under them, exactly, over their whole area
-rivers       whether triangles along the lines of channels fall
+feature_lines  lines of features.gpkg are edges of triangles, and channels fall
+rising_lines   the same of the lines in load modules
 """
 
 import argparse
@@ -72,6 +73,7 @@ class Module:
     sides: dict
     ground: Mesh
     decks: Mesh = None
+    lines: list = field(default_factory=list)
 
 
 def triangle_count(module):
@@ -119,6 +121,7 @@ class Database:
                     part["sides"],
                     Mesh.of(part, west, south),
                     Mesh.of(decks, west, south) if decks and decks["triangles"] else None,
+                    part.get("lines", []),
                 )
         rows, columns = first["area_modules"]
         report = folder / "report.json"
@@ -639,6 +642,23 @@ def piece_faults(name, role, ends, told, ground):
         yield f"{name}: rises downstream by {(found[1] - found[0]) / QUANTA:.3f} m"
 
 
+def rising_lines(database):
+    """Faults of the middle lines of channels that load modules hold (version 3): they run downstream, and so does the
+    ground under them wherever both ends of a piece are its vertices."""
+    heights, faults = vertices_by_place(database), []
+    for (row, column), module in database.levels[0].items():
+        for line in module.lines:
+            if line["kind"] != "channel":
+                continue
+            own = [(x + column * database.side, y + row * database.side, z) for x, y, z in line["vertices"]]
+            for one, other in zip(own, own[1:]):
+                ground = [heights.get(end[:2]) for end in (one, other)] if line["in_ground"] else [None]
+                fall = [one[2] - other[2]] + ([ground[0] - ground[1]] if None not in ground else [])
+                if min(fall) < 0:
+                    faults.append(f"a channel rises by {-min(fall) / QUANTA:.3f} m at {database.metres(*one[:2])}")
+    return faults
+
+
 def read_posts(path):
     """Posts of an Esri ASCII grid in quanta, from the south-west; NaN for a void."""
     lines = pathlib.Path(path).read_text().split("\n")
@@ -661,7 +681,7 @@ def judge(database, limits_of_job=None, posts=None, own_borders=False, exempt=No
         faults += limits(database, limits_of_job)
     if posts is not None:
         faults += beyond(database, posts, exempt).faults
-    return faults + uneven_lakes(database, water) + sunken_decks(database) + feature_lines(database)
+    return faults + uneven_lakes(database, water) + sunken_decks(database) + feature_lines(database) + rising_lines(database)
 
 
 def main():
