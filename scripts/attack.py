@@ -169,9 +169,9 @@ class Attack:
     def agree(self, what, faults, *arguments):
         code, said = self.run(*arguments)
         if code == 0 and faults:
-            self.fault("verify", f"{what} says sound, and the judge found {', '.join(sorted(faults))}")
+            self.fault("blind", f"{what} says sound, and the judge found {', '.join(sorted(faults))}")
         if code != 0 and not faults:
-            self.fault("verify", f"{what}: exit {code}, and the judge finds no fault: {said[:500]}")
+            self.fault("alarm", f"{what}: exit {code}, and the judge finds no fault: {said[:500]}")
 
     def told(self):
         """The report's figures are those of the triangles."""
@@ -211,7 +211,7 @@ class Attack:
         if self.scene.network and self.scene.job.sections.get("features"):
             self.scene.network.write(self.folder / "features.geojson", self.draw)
             if self.build("job.toml", "shuffled", "again") is not None:
-                self.alike("area", "shuffled")
+                self.alike("area", "shuffled", "features in another order")
             self.scene.network.write(self.folder / "features.geojson")
         tile = self.draw.choice(sorted((self.folder / "area/tiles").glob("*.tin"))).stem
         code, said = self.run("tile", "job.toml", f"{int(tile[1:3])},{int(tile[4:6])}", "--out", "repeated", "--quiet")
@@ -254,12 +254,12 @@ class Attack:
         if self.draw.random() < 0.5 and self.build("job.toml", "again", "again") is not None:
             self.same("area", "again", f"without {without}, and back")
 
-    def alike(self, one, other):
-        """The same load modules from features in another order; their files differ in the fingerprint alone."""
+    def alike(self, one, other, what):
+        """The same load modules, in files that may differ in the fingerprint."""
         modules = lambda name: [read_slm.parse(path.read_bytes())[1]
                                 for path in sorted((self.folder / name / "modules").iterdir())]
         if modules(one) != modules(other):
-            self.fault("again", "features in another order give other load modules")
+            self.fault("order", f"{what}: other load modules")
 
     def same(self, one, other, what):
         files = lambda name: {str(path.relative_to(self.folder / name)): path.read_bytes()

@@ -681,7 +681,8 @@ def judge(database, limits_of_job=None, posts=None, own_borders=False, exempt=No
         faults += limits(database, limits_of_job)
     if posts is not None:
         faults += beyond(database, posts, exempt).faults
-    return faults + uneven_lakes(database, water) + sunken_decks(database) + feature_lines(database) + rising_lines(database)
+    faults += uneven_lakes(database, water) + sunken_decks(database)
+    return faults + feature_lines(database) + rising_lines(database)
 
 
 def main():
