@@ -229,7 +229,9 @@ def deck_cracks(database):
         for across, beside in ((True, (row, column + 1)), (False, (row + 1, column))):
             line = database.side * ((column if across else row) + 1)
             other = database.levels[0].get(beside)
-            if other and deck_ends(module, across, line) != deck_ends(other, across, line):
+            # Where one of them has none there, a deck ends at the line or runs along it.
+            ends = [deck_ends(each, across, line) for each in (module, other)] if other else [set()]
+            if all(ends) and ends[0] != ends[1]:
                 faults.append(f"load modules {(row, column)} and {beside}: decks differ on the line between them")
     return faults
 
