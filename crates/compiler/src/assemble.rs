@@ -117,7 +117,7 @@ fn make(assembling: &Assembling, stamp: &Stamp) -> Result<(Assembled, Sums), Com
     levels[1..].iter_mut().for_each(|level| drop(fidelity::measure(level, &window.measured(area))));
     let file = publish(run, tile, &layout, fingerprint, &levels)?;
     let counted = count_points(run, &own.tin, &removed[area.tiling.index(tile)], &window.importance);
-    let ground = (heights_of(&levels[0]), curvature(run, tile, &levels[0], &window));
+    let ground = (heights_of(&levels), curvature(run, tile, &levels[0], &window));
     let (modules, coarser) = numbers_of(&levels);
     let mut done = Assembled { file, measured: FileStamp::of(&[]), modules, coarser };
     let sums = Sums { features: figures, ..sums(residuals, at_source, counted, ground) };
@@ -156,9 +156,9 @@ fn feature_figures(
     Ok(Some(FeatureFigures::of((tin, modules), &features, &ground, &window.featured, area.rect)))
 }
 
-/// The lowest and the highest vertex of load modules, in quanta.
-fn heights_of(modules: &[LoadModule]) -> (i32, i32) {
-    let heights = modules.iter().flat_map(|module| &module.vertices).map(|vertex| vertex.z);
+/// The lowest and the highest vertex of all levels of load modules, in quanta.
+fn heights_of(levels: &[Vec<LoadModule>]) -> (i32, i32) {
+    let heights = levels.iter().flatten().flat_map(|module| &module.vertices).map(|vertex| vertex.z);
     heights.fold((i32::MAX, i32::MIN), |(low, high), z| (low.min(z), high.max(z)))
 }
 
@@ -175,7 +175,7 @@ pub(crate) fn read_assembled(run: &Run, tins: &[Published], tile: TileId) -> Res
     let features = feature_figures(run, tile, (&own.tin, &levels[0]), &window)?;
     let measured = folder.stamp_file(&folder.measured_path(tile))?;
     let done = Assembled { file, measured, modules, coarser };
-    let ground = (heights_of(&levels[0]), curvature(run, tile, &levels[0], &window));
+    let ground = (heights_of(&levels), curvature(run, tile, &levels[0], &window));
     Ok((done, Sums { features, ..sums(residuals, at_source, counted, ground) }))
 }
 

@@ -20,7 +20,7 @@ pub struct Sums {
     pub points: Vec<u64>,
     /// Those of them that every build starts from: border points, corners not counted.
     pub border: u64,
-    /// The lowest and the highest vertex, in quanta.
+    /// The lowest and the highest vertex of all levels, in quanta.
     pub heights: (i32, i32),
     /// How much the ground curves, for triangles as large as each tile has them.
     pub curvature: Curvature,

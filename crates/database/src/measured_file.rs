@@ -28,7 +28,7 @@ pub struct Measured {
     pub points: Vec<u64>,
     /// Points on the border that every build starts from.
     pub border: u64,
-    /// The lowest and the highest vertex, in quanta.
+    /// The lowest and the highest vertex of all levels, in quanta.
     pub heights: [i32; 2],
     /// How much the ground curves.
     pub curvature: MeasuredCurvature,

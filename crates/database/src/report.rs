@@ -203,7 +203,7 @@ pub struct ReportLimit {
 /// Heights in metres, lowest and highest.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ReportHeights {
-    /// Of the surface's vertices.
+    /// Of the surface's vertices, at all levels.
     pub surface_m: [f64; 2],
     /// Of the sources under the area, before voids are filled, with the stated level of water; none for the sample
     /// terrain.

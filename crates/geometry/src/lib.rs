@@ -25,5 +25,7 @@ pub use scan::{
 };
 mod level;
 pub use level::{levels_available, widest_level};
+mod bounds;
+pub use bounds::{BEYOND_LEAST, height_bounds, height_bounds_in};
 mod ridge;
 pub use ridge::is_ridge_candidate;

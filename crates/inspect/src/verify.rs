@@ -1,5 +1,6 @@
 //! Re-reads a database and believes nothing it says: files, TINs, load modules, sides, identities, limits.
 
+mod beyond;
 mod decided;
 mod deck;
 mod entries;
@@ -29,6 +30,7 @@ use schedule::Workers;
 use terrain::{LoadModule, ModuleId, Side};
 
 use crate::recount;
+use beyond::{Around, Beyond};
 use modules::{Modules, at_level};
 
 /// What a verification found.
@@ -44,6 +46,9 @@ pub struct Verdict {
     pub checked_modules: usize,
     /// Residuals recomputed against a DEM, when one was given.
     pub residual: Option<ReportResidual>,
+    /// With such a DEM, vertices that stand as far outside the posts around them as any may, counted in each load
+    /// module and at each level that has them.
+    pub held_vertices: Option<u64>,
 }
 
 /// Re-reads every file of a database and checks what a simulator relies on; with `dem`, recomputes residuals.
@@ -89,7 +94,8 @@ pub fn verify(folder: &Path, dem: Option<&Path>) -> Result<Verdict, CompileError
     }
     if let Some(dem) = dem {
         let report = folder.report().ok();
-        let residuals = recompute(job, &area, &folder, dem, levels, report.as_ref(), &mut verdict)?;
+        let built = Built { area: &area, folder: &folder, revision: manifest.algorithm_revision };
+        let residuals = recompute(job, &built, dem, levels, report.as_ref(), &mut verdict)?;
         verdict.residual = Some(residual_of(&residuals.total()));
     }
     Ok(verdict)
@@ -272,11 +278,18 @@ fn side_of(module: &LoadModule, side: Side) -> Vec<(u16, i32)> {
     vertices.map(along).collect()
 }
 
-/// Residuals against a DEM, load module by load module; those that disagree with the files are problems.
+/// What was built, where, and by which algorithms.
+struct Built<'a> {
+    area: &'a GamingArea,
+    folder: &'a Folder,
+    revision: u32,
+}
+
+/// Residuals against a DEM, load module by load module; those that disagree with the files are problems, and so are
+/// vertices that stand outside the posts around them.
 fn recompute(
     mut job: Job,
-    area: &GamingArea,
-    folder: &Folder,
+    &Built { area, folder, revision }: &Built,
     dem: &Path,
     levels: &[Modules],
     report: Option<&Report>,
@@ -299,16 +312,20 @@ fn recompute(
     let problems = &mut verdict.problems;
     let mut all = Residuals::default();
     let mut bounds = ground.relief.bounds;
+    let mut beyond = Beyond::default();
     for &tile in &area.tiles {
         let window = ground.tile(area, tile)?;
         // Water may lie below any shore, and points may be given any height.
         let told =
             window.given.iter().filter_map(|given| given.height).chain([window.dem.range().0, window.dem.range().1]);
         bounds = bounds.map(|bounds| told.fold(bounds, Bounds::and));
+        let features = ground.features(tile)?;
+        let around = Around::of(&ground, (&job, area), (&window, &features))?;
         for (level, modules) in levels.iter().enumerate() {
             let ids = area.tiling.modules(tile, area.grid);
             let mut own: Vec<LoadModule> = ids.iter().filter_map(|module| modules.get(&module).cloned()).collect();
             let residuals = fidelity::measure(&mut own, &window.measured(area));
+            beyond.add(level, &own, &around);
             if level == 0 {
                 all.merge(&residuals);
             }
@@ -319,6 +336,10 @@ fn recompute(
             problems.extend(of_level.into_iter().map(|problem| at_level(level, problem)));
         }
     }
+    let (problem, unchecked) = beyond.told(revision);
+    problems.extend(problem);
+    verdict.unchecked.extend(unchecked);
+    verdict.held_vertices = Some(beyond.held());
     if let Some(bounds) = bounds {
         problems.extend(outside(&levels[0], bounds, &all));
     }

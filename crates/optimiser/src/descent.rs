@@ -6,6 +6,7 @@
 
 use std::collections::VecDeque;
 
+use crate::heights::is_free;
 use crate::parts::{NONE, Vertex};
 use crate::place::{PER_POST, Place, Shape};
 use crate::tile_mesh::TileMesh;
@@ -28,9 +29,10 @@ type Vector = [f64; 3];
 
 /// Moves all vertices that are free down the squares, in so many steps; they stand on multiples of `step` afterwards.
 pub(crate) fn descend(sheet: &mut TileMesh, steps: usize, step: i32) {
-    let free: Vec<Freedom> = sheet.vertices.iter().map(Freedom::of).collect();
+    let mut free: Vec<Freedom> = sheet.vertices.iter().map(Freedom::of).collect();
     let mut at: Vec<Vector> = sheet.vertices.iter().map(vector).collect();
     let mut slope = gradient(sheet, &at, &free);
+    stop(sheet, &mut free, &mut slope);
     let blocks = blocks(sheet, &at, &free);
     let mut memory = Memory::default();
     let mut squares = sheet.squares();
@@ -72,6 +74,16 @@ impl Freedom {
         }
         if !self.height {
             vector[2] = 0.0;
+        }
+    }
+}
+
+/// Leaves alone what would leave the heights that the ground permits.
+fn stop(sheet: &TileMesh, free: &mut [Freedom], slope: &mut [Vector]) {
+    for ((vertex, free), slope) in sheet.vertices.iter().zip(free).zip(slope) {
+        if free.height && !is_free(sheet, vertex, -slope[2]) {
+            *free = Freedom { place: false, height: false };
+            free.mask(slope);
         }
     }
 }
@@ -270,24 +282,24 @@ fn step_down(
 }
 
 /// Puts a vertex on the lattice point nearest to where it should go. Its height follows the slope there: without that,
-/// rounding would undo what a step gains.
+/// rounding would undo what a step gains. Where that height is out of bounds, the vertex stays.
 fn put(sheet: &mut TileMesh, vertex: usize, [x, y, h]: Vector, block: &Block, free: Freedom, step: i32) {
     let far = sheet.ground.far();
     let record = &mut sheet.vertices[vertex];
+    let mut to = record.at;
     let mut rise = 0.0;
     if free.place {
         let round = |to: f64| (to * f64::from(PER_POST) / f64::from(step)).round() as i32 * step;
-        let at = Place::new(round(x), round(y));
+        to = Place::new(round(x), round(y));
         let is_inside = |at: i32, far: i32| MARGIN < at && at < far - MARGIN;
-        if !is_inside(at.x, far.x) || !is_inside(at.y, far.y) || sheet.ground.is_forbidden(at) {
+        if !is_inside(to.x, far.x) || !is_inside(to.y, far.y) || sheet.ground.is_forbidden(to) {
             return;
         }
-        record.at = at;
-        let (east, north) = at.posts();
+        let (east, north) = to.posts();
         rise = block.tilt[0] * (east - x) + block.tilt[1] * (north - y);
     }
-    if free.height {
-        record.height = h + rise;
+    if free.height && sheet.ground.bounded(to, h + rise) == h + rise {
+        (record.at, record.height) = (to, h + rise);
     }
 }
 

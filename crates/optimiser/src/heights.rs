@@ -1,5 +1,6 @@
 //! All heights at once: the squares are a quadratic form in them, and conjugate gradients bring it down.
 
+use crate::parts::{NONE, Vertex};
 use crate::refit::DAMPING;
 use crate::tile_mesh::TileMesh;
 
@@ -7,22 +8,16 @@ use crate::tile_mesh::TileMesh;
 pub(crate) fn fit_heights(sheet: &mut TileMesh, steps: usize) {
     let live: Vec<u32> = (0..sheet.triangles.len() as u32).filter(|&triangle| sheet.is_live(triangle)).collect();
     let (mut residual, stiffness) = pulls(sheet, &live);
-    for (vertex, residual) in sheet.vertices.iter().zip(&mut residual) {
-        if !vertex.hold.height_is_free() {
-            *residual = 0.0;
-        }
-    }
+    let is_free: Vec<bool> =
+        sheet.vertices.iter().zip(&residual).map(|(vertex, &pull)| is_free(sheet, vertex, pull)).collect();
+    clear_held(&mut residual, &is_free);
     let scaled = |residual: &[f64]| residual.iter().zip(&stiffness).map(|(r, s)| r / s).collect::<Vec<f64>>();
     let mut direction = scaled(&residual);
     let mut rise = vec![0.0; residual.len()];
     let mut worth = dot(&residual, &direction);
     for _ in 0..steps {
         let mut bent = bend(sheet, &live, &direction);
-        for (vertex, bent) in sheet.vertices.iter().zip(&mut bent) {
-            if !vertex.hold.height_is_free() {
-                *bent = 0.0;
-            }
-        }
+        clear_held(&mut bent, &is_free);
         let curvature = dot(&direction, &bent);
         if curvature <= 0.0 || worth <= 0.0 {
             break;
@@ -37,8 +32,20 @@ pub(crate) fn fit_heights(sheet: &mut TileMesh, steps: usize) {
         let kept = worth / before;
         direction.iter_mut().zip(next).for_each(|(direction, next)| *direction = next + kept * *direction);
     }
-    sheet.vertices.iter_mut().zip(rise).for_each(|(vertex, rise)| vertex.height += rise);
+    for ((vertex, rise), _) in sheet.vertices.iter_mut().zip(rise).zip(is_free).filter(|(_, is_free)| *is_free) {
+        vertex.height = sheet.ground.bounded(vertex.at, vertex.height + rise);
+    }
     live.into_iter().for_each(|triangle| sheet.settle(triangle));
+}
+
+/// Whether a height may follow its pull.
+pub(crate) fn is_free(sheet: &TileMesh, vertex: &Vertex, pull: f64) -> bool {
+    let further = vertex.height + pull.signum();
+    vertex.edge != NONE && vertex.hold.height_is_free() && sheet.ground.bounded(vertex.at, further) == further
+}
+
+fn clear_held(values: &mut [f64], is_free: &[bool]) {
+    values.iter_mut().zip(is_free).filter(|(_, is_free)| !**is_free).for_each(|(value, _)| *value = 0.0);
 }
 
 /// Half the slope of the squares towards lower heights, and the diagonal of the form, for each vertex.

@@ -14,6 +14,8 @@ pub(crate) const DAMPING: f64 = 0.01;
 pub(crate) struct Fit {
     matrix: [[f64; HEIGHTS_MAX]; HEIGHTS_MAX],
     pull: [f64; HEIGHTS_MAX],
+    /// The matrix's diagonal before it was factored.
+    diagonal: [f64; HEIGHTS_MAX],
     /// For each vertex of the sheet its place among the unknowns, plus one.
     place: Vec<u8>,
 }
@@ -30,7 +32,64 @@ impl Fit {
         }
         self.set_up(sheet, patch);
         self.factor(patch.refit.len());
-        self.solve(&mut patch.rise)
+        self.solve(&mut patch.rise);
+        let stays = |(&vertex, &rise): (&u32, &f64)| bounded_rise(sheet, vertex, rise) == rise;
+        if patch.refit.iter().zip(&patch.rise).all(stays) {
+            return self.gain(&patch.rise, &[None; HEIGHTS_MAX]);
+        }
+        self.refit_bounded(sheet, patch)
+    }
+
+    /// Lets heights that would leave their bounds stop there, and fits the others anew, until none does.
+    #[inline(never)]
+    fn refit_bounded(&mut self, sheet: &TileMesh, patch: &mut Patch) -> f64 {
+        let n = patch.refit.len();
+        let mut stopped: [Option<f64>; HEIGHTS_MAX] = [None; HEIGHTS_MAX];
+        let mut gain = 0.0;
+        loop {
+            let mut is_new = false;
+            for (i, &vertex) in patch.refit.iter().enumerate() {
+                let rise = bounded_rise(sheet, vertex, patch.rise[i]);
+                if stopped[i].is_none() && rise != patch.rise[i] {
+                    stopped[i] = Some(rise);
+                    gain += self.substitute(i, n, rise);
+                    is_new = true;
+                }
+            }
+            if !is_new {
+                return gain + self.gain(&patch.rise, &stopped);
+            }
+            self.restore(n);
+            self.factor(n);
+            self.solve(&mut patch.rise);
+            let rises = patch.rise.iter_mut().zip(&stopped);
+            rises.for_each(|(rise, stopped)| *rise = stopped.unwrap_or(*rise));
+        }
+    }
+
+    /// Puts a rise that is known into the equations, so that solving them finds the others. Gives what it gains alone.
+    fn substitute(&mut self, i: usize, n: usize, rise: f64) -> f64 {
+        let gain = rise * (2.0 * self.pull[i] - (self.diagonal[i] - DAMPING) * rise);
+        for j in 0..n {
+            let coupling = &mut self.matrix[i.min(j)][i.max(j)];
+            if j != i {
+                self.pull[j] -= *coupling * rise;
+                *coupling = 0.0;
+            }
+        }
+        (self.diagonal[i], self.pull[i]) = (1.0, 0.0);
+        gain
+    }
+
+    /// Undoes [`Fit::factor`], which leaves the upper half as it is.
+    #[allow(clippy::needless_range_loop, reason = "the indices of a triangular system say more than iterators")]
+    fn restore(&mut self, n: usize) {
+        for i in 0..n {
+            for j in 0..i {
+                self.matrix[i][j] = self.matrix[j][i];
+            }
+            self.matrix[i][i] = self.diagonal[i];
+        }
     }
 
     fn set_up(&mut self, sheet: &TileMesh, patch: &Patch) {
@@ -114,6 +173,7 @@ impl Fit {
     fn factor(&mut self, n: usize) {
         for j in 0..n {
             let mut pivot = self.matrix[j][j];
+            self.diagonal[j] = pivot;
             for k in 0..j {
                 pivot -= self.matrix[j][k] * self.matrix[j][k];
             }
@@ -131,10 +191,10 @@ impl Fit {
         }
     }
 
-    /// Solves for the rises and gives what they gain.
+    /// Solves for the rises.
     #[allow(clippy::needless_range_loop, reason = "the indices of a triangular system say more than iterators")]
     #[inline(always)]
-    fn solve(&self, rise: &mut [f64]) -> f64 {
+    fn solve(&self, rise: &mut [f64]) {
         let n = rise.len();
         for i in 0..n {
             let mut sum = self.pull[i];
@@ -150,7 +210,22 @@ impl Fit {
             }
             rise[i] = sum / self.matrix[i][i];
         }
-        // h'(A + d)h = p'h at the solution, so the squares fall by p'h + d h'h.
-        (0..n).map(|i| self.pull[i] * rise[i] + DAMPING * rise[i] * rise[i]).sum()
     }
+
+    /// What solving has gained for those that did not stop.
+    #[inline(always)]
+    fn gain(&self, rise: &[f64], stopped: &[Option<f64>]) -> f64 {
+        // h'(A + d)h = p'h at the solution, so the squares fall by p'h + d h'h.
+        let gain = |i: usize| self.pull[i] * rise[i] + DAMPING * rise[i] * rise[i];
+        (0..rise.len()).filter(|&i| stopped[i].is_none()).map(gain).sum()
+    }
+}
+
+/// By how much a vertex may rise, of what it should.
+#[inline(always)]
+fn bounded_rise(sheet: &TileMesh, vertex: u32, rise: f64) -> f64 {
+    let record = &sheet.vertices[vertex as usize];
+    let wanted = record.height + rise;
+    let bounded = sheet.ground.bounded(record.at, wanted);
+    if bounded == wanted { rise } else { bounded - record.height }
 }

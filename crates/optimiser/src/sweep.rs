@@ -60,6 +60,8 @@ struct Stand {
     at: Place,
     height: f64,
     squares: f64,
+    /// Whether its best height lies further from the ground than it may.
+    is_stopped: bool,
 }
 
 impl Mover {
@@ -118,11 +120,17 @@ impl Mover {
         }
         sheet.star(vertex, &mut self.star);
         self.look_around(sheet);
-        let normal = self.normal(simd, sheet, vertex);
-        let stay = height_only(&record, &normal);
+        let normal = self.normal(simd, sheet, vertex, record.hold.has(Hold::ON_GROUND));
+        let stay = height_only(sheet, &record, &normal);
         self.candidates.clear();
         if !record.hold.is_fixed() {
-            self.find_candidates(sheet, &record, &normal);
+            if stay.is_stopped {
+                // Where the ground ends its rise, it rises and falls with the ground.
+                let along = self.normal(simd, sheet, vertex, true);
+                self.find_candidates(sheet, &record, &along);
+            } else {
+                self.find_candidates(sheet, &record, &normal);
+            }
         }
         let mut best = stay;
         let mut has_rims = false;
@@ -135,8 +143,9 @@ impl Mover {
                 self.sum_rims(sheet);
                 has_rims = true;
             }
-            let stand = self.stand(simd, sheet, at, record.height, record.hold);
-            if stand.squares < best.squares - LEAST_GAIN {
+            let most = best.squares - LEAST_GAIN;
+            let stand = self.stand(simd, sheet, at, &record, most);
+            if stand.squares < most {
                 best = stand;
                 break;
             }
@@ -168,7 +177,12 @@ impl Mover {
             return false;
         }
         self.sum_rims(sheet);
-        self.settle(simd, sheet, vertex, Stand { at, height: sheet.ground.height(at), squares: 0.0 });
+        self.settle(
+            simd,
+            sheet,
+            vertex,
+            Stand { at, height: sheet.ground.height(at), squares: 0.0, is_stopped: false },
+        );
         true
     }
 
@@ -199,8 +213,9 @@ impl Mover {
             if last.replace(at) == Some(at) || !self.leaves(sheet, at, shape) {
                 continue;
             }
-            let stand = self.stand(simd, sheet, at, record.height, record.hold);
-            if best.is_none_or(|best: Stand| stand.squares < best.squares) {
+            let most = best.map_or(f64::INFINITY, |best: Stand| best.squares);
+            let stand = self.stand(simd, sheet, at, &record, most);
+            if stand.squares < most {
                 best = Some(stand);
             }
             tried += 1;
@@ -216,7 +231,7 @@ impl Mover {
     fn rank_places<S: Simd>(&mut self, simd: S, sheet: &TileMesh, vertex: u32, step: i32) {
         const RINGS: i32 = 2;
         let record = sheet.vertices[vertex as usize];
-        let plane = self.normal(simd, sheet, vertex).plane();
+        let plane = self.normal(simd, sheet, vertex, record.hold.has(Hold::ON_GROUND)).plane();
         let (x, y) = (record.at.x - record.at.x % step, record.at.y - record.at.y % step);
         self.ranked.clear();
         for j in -RINGS..=RINGS + 1 {
@@ -277,9 +292,9 @@ impl Mover {
     }
 
     #[inline(always)]
-    fn normal<S: Simd>(&self, simd: S, sheet: &TileMesh, vertex: u32) -> Normal {
+    fn normal<S: Simd>(&self, simd: S, sheet: &TileMesh, vertex: u32, keeps_to_ground: bool) -> Normal {
         let record = &sheet.vertices[vertex as usize];
-        let ground_slope = record.hold.has(Hold::ON_GROUND).then(|| sheet.ground.slope(record.at));
+        let ground_slope = keeps_to_ground.then(|| sheet.ground.slope(record.at));
         if self.in_lanes {
             return self.normal_in_lanes(simd, sheet, record, ground_slope);
         }
@@ -384,17 +399,29 @@ impl Mover {
         self.spokes[i] + self.rims[i] - self.spokes[self.after(i)]
     }
 
-    /// What comes of standing at a valid place, at the best height there.
+    /// What comes of standing at a valid place, at the best height there; where squares are `most` or more, at the best
+    /// height whatever the ground permits.
     #[inline(always)]
-    fn stand<S: Simd>(&mut self, simd: S, sheet: &TileMesh, at: Place, height: f64, hold: Hold) -> Stand {
+    fn stand<S: Simd>(&mut self, simd: S, sheet: &TileMesh, at: Place, record: &Vertex, most: f64) -> Stand {
         self.sum_spokes(simd, sheet, at);
-        let height = if hold.has(Hold::ON_GROUND) { sheet.ground.height(at) } else { height };
+        let hold = record.hold;
+        let height = if hold.has(Hold::ON_GROUND) { sheet.ground.height(at) } else { record.height };
         let all = if self.in_lanes { self.lanes.hinge(simd, at, height) } else { self.hinge(at, height) };
         if !hold.height_is_free() {
-            return Stand { at, height, squares: all.squares };
+            return Stand { at, height, squares: all.squares, is_stopped: false };
         }
+        let least = |rise: f64| all.squares - rise * (2.0 * all.pull - rise * all.stiffness);
         let rise = all.pull / (all.stiffness + DAMPING);
-        Stand { at, height: height + rise, squares: all.squares - rise * (2.0 * all.pull - rise * all.stiffness) }
+        let free = Stand { at, height: height + rise, squares: least(rise), is_stopped: false };
+        // What the ground permits is no better, and not asked of a place that is not good enough anyway.
+        if most <= free.squares {
+            return free;
+        }
+        let bounded = sheet.ground.bounded(at, free.height);
+        if bounded == free.height {
+            return free;
+        }
+        Stand { height: bounded, squares: least(bounded - height), is_stopped: true, ..free }
     }
 
     /// What all triangles say about the height of the vertex at a place, one after the other.
@@ -433,13 +460,15 @@ impl Mover {
 
 /// The best height where the vertex stands.
 #[inline(always)]
-fn height_only(record: &Vertex, normal: &Normal) -> Stand {
+fn height_only(sheet: &TileMesh, record: &Vertex, normal: &Normal) -> Stand {
     if !record.hold.height_is_free() {
-        return Stand { at: record.at, height: record.height, squares: normal.squares };
+        return Stand { at: record.at, height: record.height, squares: normal.squares, is_stopped: false };
     }
-    let rise = normal.height_pull / (normal.stiffness + DAMPING);
+    let best = record.height + normal.height_pull / (normal.stiffness + DAMPING);
+    let height = sheet.ground.bounded(record.at, best);
+    let rise = height - record.height;
     let gain = rise * (2.0 * normal.height_pull - rise * normal.stiffness);
-    Stand { at: record.at, height: record.height + rise, squares: normal.squares - gain }
+    Stand { at: record.at, height, squares: normal.squares - gain, is_stopped: height != best }
 }
 
 fn held_to_line(to: Place, from: Place, hold: Hold) -> Place {

@@ -1,7 +1,7 @@
 //! Whole runs: what they promise of any mesh they are given.
 
 use proptest::prelude::*;
-use terrain::{Dem, Effort, HeightFit, Importance, Lattice, Post, PostRect};
+use terrain::{Dem, Effort, HeightFit, Importance, Lattice, Post, PostRect, Tin, Vertex};
 
 use crate::scene::{Caps, confined, even, free, grid, measured, patchy, rough, spent};
 use crate::{Task, optimise};
@@ -76,6 +76,41 @@ fn a_largest_residual_that_no_budget_reaches_makes_nothing_worse() {
             assert!(after <= before, "{effort:?}, {share}: {after} of {before}");
             assert!(with_goal <= 1.3 * squares, "{effort:?}, {share}: {with_goal} of {squares}");
             assert!(done.tin.triangles.len() <= 1200);
+        }
+    }
+}
+
+/// Rough ground, cliffs of 100 m across it and a tower on every 100th post.
+fn broken(rect: PostRect, seed: u64) -> Dem {
+    let ground = rough(rect, seed);
+    Dem::from_fn(rect, |post| {
+        let cliff = if (post.col + post.row / 3) % 50 < 25 { 12_800 } else { 0 };
+        let tower = if (31 * post.row + post.col) % 100 == 0 { 5_000 } else { 0 };
+        Some(ground.height(post) / 4 + cliff + tower)
+    })
+}
+
+/// How far a vertex stands outside the 5 x 5 posts around it, and how far it may.
+fn outside(dem: &Dem, tin: &Tin, vertex: &Vertex) -> (i32, i32) {
+    let nearest = |at: i32| (2 * at + tin.steps_per_post).div_euclid(2 * tin.steps_per_post);
+    let (row, col) = (nearest(vertex.at.row), nearest(vertex.at.col));
+    let around = (row - 2..=row + 2).flat_map(|row| (col - 2..=col + 2).map(move |col| Post::new(row, col)));
+    let heights: Vec<i32> = around.filter(|&post| dem.rect().contains(post)).map(|post| dem.height(post)).collect();
+    let (low, high) = (*heights.iter().min().unwrap(), *heights.iter().max().unwrap());
+    ((low - vertex.height).max(vertex.height - high), ((high - low) / 10).max(128))
+}
+
+#[test]
+fn no_vertex_stands_far_outside_the_posts_around_it() {
+    for (seed, effort) in [(1, Effort::Fast), (2, Effort::Normal), (3, Effort::Best)] {
+        let dem = broken(RECT, seed);
+        for (importance, lattice) in [(even(RECT), Lattice::Eighth), (patchy(RECT, seed), Lattice::Post)] {
+            let task = Task { lattice, largest_quanta: Some(4_000.0), ..free(400, effort) };
+            let done = optimise(&dem, &importance, &grid(&dem, 5), &task);
+            let found: Vec<_> = done.tin.vertices.iter().map(|vertex| outside(&dem, &done.tin, vertex)).collect();
+            assert!(found.iter().all(|(beyond, most)| beyond <= most), "{effort:?}, {lattice:?}: {found:?}");
+            // Fitted heights do leave them.
+            assert!(found.iter().any(|(beyond, _)| 0 < *beyond), "{effort:?}, {lattice:?}");
         }
     }
 }

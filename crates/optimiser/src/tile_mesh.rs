@@ -457,6 +457,10 @@ impl<'a> TileMesh<'a> {
             if !self.is_live(edge >> 2) || self.ends(edge).0 != vertex {
                 return Some(format!("vertex {vertex} does not leave edge {edge}"));
             }
+            let record = &self.vertices[vertex as usize];
+            if record.hold.height_is_free() && self.ground.bounded(record.at, record.height) != record.height {
+                return Some(format!("vertex {vertex} stands outside the ground: {record:?}"));
+            }
         }
         let flat = |record: &&Triangle| {
             let [a, b, c] = self.places(record.corners);

@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use fearless_simd::{Level, dispatch};
+use geometry::{BEYOND_LEAST, height_bounds_in, widest_level};
 use terrain::{Dem, HeightFit, Importance, Post, SeamSides, THOUSANDTHS};
 
 use crate::hold::Hold;
@@ -19,6 +21,7 @@ pub(crate) struct WeightedHeights<'a> {
     open: SeamSides,
     fit: HeightFit,
     far: Place,
+    level: Level,
     /// Posts that no vertex may come nearest to, in ascending order.
     forbidden: Vec<Post>,
 }
@@ -45,6 +48,7 @@ impl<'a> WeightedHeights<'a> {
             open,
             fit,
             far,
+            level: widest_level(),
             forbidden: Vec::new(),
         }
     }
@@ -109,6 +113,32 @@ impl<'a> WeightedHeights<'a> {
         let south = height(row, col) * (1.0 - x) + height(row, col + 1) * x;
         let north = height(row + 1, col) * (1.0 - x) + height(row + 1, col + 1) * x;
         south * (1.0 - y) + north * y - self.level()
+    }
+
+    /// The height nearest to another that a vertex may have at a place, in quanta above the level.
+    #[inline(always)]
+    pub fn bounded(&self, at: Place, height: f64) -> f64 {
+        let clamp = |at: i32, far: i32| (at as u32 / PER_POST as u32).min(far as u32 / PER_POST as u32 - 1) as usize;
+        let (row, col) = (clamp(at.y, self.far.y), clamp(at.x, self.far.x));
+        let (heights, stride) = self.dem.padded();
+        let cell = &heights[row * stride + col..][..stride + 2];
+        let (a, b, c, d) = (cell[0], cell[1], cell[stride], cell[stride + 1]);
+        let (low, high) = (a.min(b).min(c.min(d)), a.max(b).max(c.max(d)));
+        let absolute = height + self.level();
+        // Within a metre of the cell it stands in, it is within that of all posts around it.
+        if f64::from(low - BEYOND_LEAST) <= absolute && absolute <= f64::from(high + BEYOND_LEAST) {
+            return height;
+        }
+        self.bounded_by_all(at, height)
+    }
+
+    #[inline(never)]
+    fn bounded_by_all(&self, at: Place, height: f64) -> f64 {
+        let origin = self.dem.rect().south_west();
+        let steps = |post: i32, at: i32| i64::from(post) * i64::from(PER_POST) + i64::from(at);
+        let place = (steps(origin.row, at.y), steps(origin.col, at.x));
+        let (low, high) = dispatch!(self.level, simd => height_bounds_in(simd, self.dem, place, i64::from(PER_POST)));
+        height.clamp(f64::from(low) - self.level(), f64::from(high) - self.level())
     }
 
     /// The DEM's slope between posts, in quanta per post to the east and to the north.

@@ -14,6 +14,9 @@ use crate::recount;
 use compiler::{Adding, Sums, limit_of, residual_of, sums_of};
 use ground::GamingArea;
 
+/// The first revision that measures the heights of all levels, not of the finest alone.
+const ALL_LEVELS_SINCE: u32 = 10;
+
 /// Statistics of load modules that no residuals of that many posts have.
 pub(crate) fn impossible(area: &GamingArea, modules: &Modules) -> Vec<String> {
     let is_possible = |module: &LoadModule| {
@@ -63,7 +66,8 @@ pub(crate) fn measured(
         let ids: Vec<ModuleId> = area.tiling.modules(tile, area.grid).iter().collect();
         let of_tile: Vec<&LoadModule> =
             levels.iter().flat_map(|level| ids.iter().filter_map(|id| level.get(id))).collect();
-        let wrong = differing(&read, record.slm, &of_tile, ids.len(), points);
+        let of_files = (record.slm, manifest.algorithm_revision);
+        let wrong = differing(&read, of_files, &of_tile, ids.len(), points);
         problems.extend(wrong.into_iter().map(|what| format!("measured/{tile}.sums: {what}")));
         if problems.is_empty() {
             adding.add(sums_of(read));
@@ -74,7 +78,7 @@ pub(crate) fn measured(
 
 fn differing(
     read: &Measured,
-    slm: Option<database::FileStamp>,
+    (slm, revision): (Option<database::FileStamp>, u32),
     modules: &[&LoadModule],
     finest: usize,
     points: u64,
@@ -102,7 +106,8 @@ fn differing(
     if read.points.iter().map(|&points| u128::from(points)).sum::<u128>() != u128::from(points) {
         problems.push("its points by class do not add up to those of the TIN");
     }
-    let heights = || finest.iter().flat_map(|module| &module.vertices).map(|vertex| vertex.z);
+    let of_heights = if revision < ALL_LEVELS_SINCE { finest } else { modules };
+    let heights = || of_heights.iter().flat_map(|module| &module.vertices).map(|vertex| vertex.z);
     if Some(read.heights[0]) != heights().min() || Some(read.heights[1]) != heights().max() {
         problems.push("its lowest and highest vertex are not those of the load modules");
     }

@@ -12,6 +12,8 @@ const DAMPING: f64 = 0.01;
 const STEPS_MAX: usize = 300;
 /// What is left of the squared, scaled rest when the steps end.
 const REST: f64 = 1e-14;
+/// Heights that reach their bounds stop there, and the others are fitted anew, so often at most.
+const ROUNDS_MAX: usize = 4;
 
 /// One triangle's part of the equations.
 struct Element {
@@ -21,30 +23,38 @@ struct Element {
     other: [f64; 3],
 }
 
-/// Moves the vertices that are free to the heights that fit best, rounded to quanta, and brings squares up to date.
+/// Moves the vertices that are free to the heights that fit best within [`geometry::height_bounds`], rounded to quanta,
+/// and brings squares up to date.
 pub(super) fn fit_heights(sheet: &mut LevelMesh, is_free: &[bool], posts: &Posts) {
     if !is_free.contains(&true) {
         return;
     }
-    let mut pull = vec![0.0; sheet.vertices.len()];
-    let elements: Vec<Element> =
-        sheet.triangles.iter().map(|&triangle| element(sheet, triangle, posts, &mut pull)).collect();
-    let rises = solve(&elements, &pull, is_free);
-    let (low, high) = relief(sheet);
-    for ((vertex, rise), _) in sheet.vertices.iter_mut().zip(rises).zip(is_free).filter(|(_, is_free)| **is_free) {
-        vertex.z = (f64::from(vertex.z) + rise).round().clamp(low, high) as i32;
+    let mut is_free = is_free.to_vec();
+    for _ in 0..ROUNDS_MAX {
+        let mut pull = vec![0.0; sheet.vertices.len()];
+        let elements: Vec<Element> =
+            sheet.triangles.iter().map(|&triangle| element(sheet, triangle, posts, &mut pull)).collect();
+        let rises = solve(&elements, &pull, &is_free);
+        let mut has_stopped = false;
+        for (v, rise) in rises.into_iter().enumerate() {
+            if !is_free[v] {
+                continue;
+            }
+            let vertex = &mut sheet.vertices[v];
+            let wanted = (f64::from(vertex.z) + rise).round();
+            let (low, high) = posts.height_bounds(*vertex);
+            let bounded = wanted.clamp(f64::from(low), f64::from(high));
+            vertex.z = bounded as i32;
+            is_free[v] = bounded == wanted;
+            has_stopped |= bounded != wanted;
+        }
+        if !has_stopped {
+            break;
+        }
     }
     for (index, &triangle) in sheet.triangles.iter().enumerate() {
         sheet.squares[index] = posts.squares(triangle.map(|v| sheet.vertices[usize::from(v)]));
     }
-}
-
-/// How low and how high a vertex may go: as far again as the load module's vertices lie apart.
-fn relief(sheet: &LevelMesh) -> (f64, f64) {
-    let heights = || sheet.vertices.iter().map(|vertex| vertex.z);
-    let (low, high) = (heights().min().unwrap_or(0), heights().max().unwrap_or(0));
-    let (low, high) = (f64::from(low), f64::from(high));
-    (low - (high - low), high + (high - low))
 }
 
 /// The products of shares under a triangle; adds the residuals times the shares to `pull`.

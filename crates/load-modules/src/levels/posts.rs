@@ -1,7 +1,7 @@
 //! The posts that triangles of a load module own, and what each counts.
 
-use geometry::Facet;
 use geometry::owned::{OwnedRows, PostGrid, visit_residuals};
+use geometry::{Facet, height_bounds};
 use terrain::{Dem, Importance, ModuleId, ModuleVertex, Post};
 
 use crate::Layout;
@@ -48,6 +48,13 @@ impl<'a> Posts<'a> {
     /// Quanta between posts.
     pub fn step(&self) -> i64 {
         i64::from(self.grid.units_per_post)
+    }
+
+    /// The lowest and the highest height that a vertex of the load module may have.
+    pub fn height_bounds(&self, vertex: ModuleVertex) -> (i32, i32) {
+        let along = |post: i32, units: u16| i64::from(post) * self.step() + i64::from(units);
+        let place = (along(self.grid.origin.row, vertex.y), along(self.grid.origin.col, vertex.x));
+        height_bounds(self.dem, place, self.step())
     }
 
     fn counts(&self, post: Post) -> bool {

@@ -174,14 +174,40 @@ fn no_other_height_of_an_inner_vertex_fits_better() {
         let near = Posts::new(module.id, &layout, &ground);
         let best = squares(module, &near);
         for v in (0..module.vertices.len()).filter(|&v| is_inside(module.vertices[v], module.side)) {
+            let (low, high) = near.height_bounds(module.vertices[v]);
             for rise in [-40, 40] {
                 let mut other = module.clone();
                 other.vertices[v].z += rise;
+                if other.vertices[v].z < low || high < other.vertices[v].z {
+                    continue;
+                }
                 let posts_there = module.triangles.iter().filter(|t| t.contains(&(v as u16))).count();
                 assert!(best <= squares(&other, &near) + 4 * posts_there as u128, "{} at vertex {v}", module.id);
             }
         }
     }
+}
+
+#[test]
+fn no_vertex_of_a_coarser_level_stands_far_outside_the_posts_around_it() {
+    let layout = layout();
+    let ground = hills(layout.grid.area());
+    let cliff = |post: Post| if (post.col + post.row / 3) % 30 < 15 { 12_800 } else { 0 };
+    let dem = Dem::from_fn(layout.grid.area(), |post| Some(ground.height(post) / 10 + cliff(post)));
+    let mask = Importance::uniform(layout.grid.area(), 1000);
+    let finest = constrained_modules(&layout, &dem, &mask, 3);
+    let wanted = Levels { inner_shares: &SHARES, border: LodBorder::Full, flips: true, features: &[] };
+    let levels = all_levels(&finest, &layout, &wanted, &dem, &mask);
+    let mut at_bound = 0;
+    for module in levels[1..].iter().flatten() {
+        let posts = Posts::new(module.id, &layout, &LevelGround { dem: &dem, mask: &mask });
+        for vertex in module.vertices.iter().filter(|vertex| is_inside(**vertex, module.side)) {
+            let (low, high) = posts.height_bounds(*vertex);
+            assert!(low <= vertex.z && vertex.z <= high, "{}: {vertex:?} of {low} to {high}", module.id);
+            at_bound += usize::from(low == vertex.z || high == vertex.z);
+        }
+    }
+    assert!(0 < at_bound, "the cliff asks for heights beyond it");
 }
 
 #[test]

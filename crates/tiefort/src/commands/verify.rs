@@ -46,6 +46,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         let (rms_m, max_m, p99_m) = (residual.rms_m, residual.max_m, residual.p99_m);
         text += &format!("residual: RMS {rms_m:.3} m, 99 % within {p99_m:.2} m, largest {max_m:.2} m\n");
     }
+    if let Some(held) = verdict.held_vertices {
+        text += &format!("{} vertices stand as far outside the posts around them as any may\n", grouped(held));
+    }
     terminal::print(&fold(&text, 2))?;
     Ok(if verdict.problems.is_empty() { Outcome::Sound } else { Outcome::Damaged })
 }
