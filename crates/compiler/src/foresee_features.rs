@@ -4,6 +4,7 @@
 //! lines then, and fewer stations are needed; on the other hand nothing is narrowed or left out for a limit.
 
 use database::{AreaLevel, ReportFeatures};
+use features::Shares;
 use fidelity::FeatureFigures;
 use ground::{FeatureTable, GamingArea};
 use job::Job;
@@ -44,7 +45,7 @@ pub fn foresee_features(job: &Job) -> Result<Option<FeaturesForeseen>, CompileEr
     let buildings = spec.has_buildings().then_some(vectors.buildings.len());
     let level_ground = vec![Some(0); features.stations().len()];
     // No limit, so that nothing is degraded.
-    let levelled = features.level(&level_ground, spec.options, &mut { u32::MAX });
+    let levelled = features.level(&level_ground, spec.options, &Shares::all());
     let level = AreaLevel { cost: cost_of(job, area.grid, &levelled.reserved.cost), ..AreaLevel::default() };
     let mut modules = vec![0; area.grid.count()];
     level.cost.iter().for_each(|&(place, _, triangles)| modules[place as usize] += triangles);

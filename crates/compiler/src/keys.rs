@@ -107,7 +107,7 @@ pub(crate) fn level(
     let ModuleGrid { rows, cols, side_cells } = *grid;
     // What sources and rules come to is in the features; the names of features are those of the files.
     let spec = job.features.as_ref().expect("a stage of jobs with features");
-    let FeaturesSpec { sources: _, rules: _, buildings: _, share_max, grade_give: _, options } = spec;
+    let FeaturesSpec { share_main, share_max, options, .. } = spec;
     let GradeOptions { clearances, bank, cut_max, fill_max, clip, smooth_milliposts } = *options;
     let Clearances { road, rail, water } = clearances;
     let files = spec.files();
@@ -117,7 +117,8 @@ pub(crate) fn level(
     features.feed(&mut |word| words.push(word));
     Key::new("level")
         .part(RULES, |part| {
-            let part = part.list(job.class_names().iter(), |part, name| part.text(name)).real(*share_max);
+            let part = part.list(job.class_names().iter(), |part, name| part.text(name));
+            let part = part.real(*share_main).real(*share_max);
             let quanta = [road, rail, water, bank, cut_max, fill_max, clip];
             let part = quanta.into_iter().fold(part, |part, quanta| part.signed(quanta.into()));
             part.maybe(smooth_milliposts, |part, thousandths| part.number(thousandths.into()))
@@ -149,7 +150,7 @@ fn feed_features(builder: FingerprintBuilder, features: &Features) -> Fingerprin
 
 /// Classes of the ground inside features, and decks above it; their edges are in the TIN.
 fn feed_surfaces(builder: FingerprintBuilder, features: &TileFeatures) -> FingerprintBuilder {
-    let TileFeatures { tile: _, kept: _, surfaces, slopes: _, decks } = features;
+    let TileFeatures { tile: _, kept: _, surfaces, shaped, slopes: _, decks } = features;
     let feed = |builder: FingerprintBuilder, surface: &FeatureSurface| {
         let FeatureSurface { class, ground, body, ring } = surface;
         let ground = match ground {
@@ -159,7 +160,7 @@ fn feed_surfaces(builder: FingerprintBuilder, features: &TileFeatures) -> Finger
         };
         builder.case(*class).case(ground).number((*body).into()).list(ring.iter(), feed_vertex)
     };
-    builder.list(surfaces.iter(), feed).list(decks.iter(), feed)
+    builder.list(surfaces.iter(), feed).list(shaped.iter(), feed).list(decks.iter(), feed)
 }
 
 /// What the job says of selecting and optimising in a tile, as its record names it.
@@ -216,7 +217,7 @@ pub fn modules(
             })
         });
     // Load modules without features keep the keys they had before there were any.
-    let key = match features.surfaces.is_empty() && features.decks.is_empty() {
+    let key = match features.surfaces.is_empty() && features.shaped.is_empty() && features.decks.is_empty() {
         true => key,
         false => key.part(FEATURES, |part| feed_surfaces(part, features)),
     };

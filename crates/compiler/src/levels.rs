@@ -63,7 +63,10 @@ pub(crate) fn faces(features: &TileFeatures, without: &BTreeSet<u8>) -> Option<F
     let face = |body: &[FeatureSurface]| Face { class: body[0].class, rings: body.iter().map(ring).collect() };
     let bodies = features.bodies().filter(|body| !without.contains(&body[0].class));
     let all: Vec<Face> = bodies.map(face).collect();
-    (!all.is_empty()).then(|| Faces::new(&all, features.kept.steps_per_post))
+    let loose = features.shaped_bodies().filter(|body| !without.contains(&body[0].class));
+    let loose: Vec<Face> = loose.map(face).collect();
+    let is_there = !all.is_empty() || !loose.is_empty();
+    is_there.then(|| Faces::new(&all, features.kept.steps_per_post).with_loose(&loose))
 }
 
 /// What a level keeps of the features of a tile.

@@ -2,8 +2,13 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
-use database::{AreaLevel, FeatureFace, FeatureLine, FeatureRemark, LineRole};
-use features::{AreaFeatures, Cost, Face, FeatureId, Formed, FormedEdge, Levelled, Place, Remark, Role, Surface};
+use database::{
+    AreaLevel, FeatureAmounts, FeatureEnd, FeatureFace, FeatureLeftOut, FeatureLine, FeatureRemark, FeatureWhy,
+    LineRole,
+};
+use features::{
+    Cost, Face, FeatureId, Formed, FormedEdge, Levelled, Limit, Place, Remark, Reserved, Role, Surface, Why,
+};
 use ground::{GamingArea, slope_reach};
 use job::Job;
 use load_modules::{Layout, cut_decks};
@@ -23,7 +28,8 @@ pub(crate) fn pieces(run: &Run, features: &features::AreaFeatures, formed: &Form
     let mut cutting = Cutting { area: &run.area, steps, classes: classes_of(run.job), pieces: Vec::new() };
     cutting.pieces = run.area.tiles.iter().map(|&tile| Piece::of(tile, steps)).collect();
     cutting.edges(formed);
-    cutting.surfaces(&formed.surfaces);
+    cutting.surfaces(&formed.surfaces, true);
+    cutting.surfaces(&formed.shaped, false);
     cutting.decks(&formed.decks);
     cutting.slopes(formed);
     let Cutting { area, pieces, .. } = cutting;
@@ -50,13 +56,16 @@ struct Piece {
     numbers: HashMap<Place, u32>,
     /// Rings by body: the body's number in the area, then class, ground and ring.
     bodies: BTreeMap<u32, Vec<FeatureSurface>>,
+    /// The same of what is not in the TIN.
+    shaped: BTreeMap<u32, Vec<FeatureSurface>>,
 }
 
 impl Piece {
     fn of(tile: TileId, steps: i32) -> Self {
         let kept = Features { steps_per_post: steps, ..Features::default() };
         let features = TileFeatures { kept, ..TileFeatures::none(tile) };
-        Self { features, numbers: HashMap::new(), bodies: BTreeMap::new() }
+        let (numbers, bodies, shaped) = Default::default();
+        Self { features, numbers, bodies, shaped }
     }
 
     fn vertex(&mut self, place: Place, height: i32) -> u32 {
@@ -69,11 +78,8 @@ impl Piece {
 
     /// In an order that depends on nothing but the content.
     fn finish(self, rect: PostRect) -> TileFeatures {
-        let Self { mut features, bodies, .. } = self;
-        let mut bodies: Vec<Vec<FeatureSurface>> = bodies.into_values().collect();
-        bodies.iter_mut().for_each(|rings| rings.sort());
-        bodies.sort();
-        features.surfaces = (0..).zip(bodies).flat_map(|(body, rings)| with_body(rings, body)).collect();
+        let Self { mut features, bodies, shaped, .. } = self;
+        (features.surfaces, features.shaped) = (in_order(bodies), in_order(shaped));
         features.decks.sort();
         features.decks = (0..).zip(features.decks).flat_map(|(body, deck)| with_body(vec![deck], body)).collect();
         features.slopes.sort_unstable();
@@ -81,6 +87,14 @@ impl Piece {
         features.kept = features.kept.canonical();
         features
     }
+}
+
+/// Rings of bodies, which are numbered in an order that depends on nothing but the content.
+fn in_order(bodies: BTreeMap<u32, Vec<FeatureSurface>>) -> Vec<FeatureSurface> {
+    let mut bodies: Vec<Vec<FeatureSurface>> = bodies.into_values().collect();
+    bodies.iter_mut().for_each(|rings| rings.sort());
+    bodies.sort();
+    (0..).zip(bodies).flat_map(|(body, rings)| with_body(rings, body)).collect()
 }
 
 fn with_body(rings: Vec<FeatureSurface>, body: u32) -> impl Iterator<Item = FeatureSurface> {
@@ -150,7 +164,8 @@ impl Cutting<'_> {
         }
     }
 
-    fn surfaces(&mut self, surfaces: &[Surface]) {
+    /// Ground that features cover, and whether its outline is in the TIN.
+    fn surfaces(&mut self, surfaces: &[Surface], is_held: bool) {
         // Rings of one feature and role at one level are one body; strips are bodies of their own.
         let mut bodies: BTreeMap<(u16, Role, FeatureId, i32), u32> = BTreeMap::new();
         let mut next = 0;
@@ -176,7 +191,8 @@ impl Cutting<'_> {
             let reach = if ground == SurfaceGround::Lake { self.steps } else { 0 };
             for index in self.touching(surface.ring.iter().map(|(place, _)| *place), reach) {
                 let ring = FeatureSurface { class, ground, body: 0, ring: ring.clone() };
-                self.pieces[index].bodies.entry(body).or_default().push(ring);
+                let Piece { bodies, shaped, .. } = &mut self.pieces[index];
+                if is_held { bodies } else { shaped }.entry(body).or_default().push(ring);
             }
         }
     }
@@ -195,8 +211,9 @@ impl Cutting<'_> {
     /// Edges and centrelines of roads, for all tiles into which their slopes may reach.
     fn slopes(&mut self, formed: &Formed) {
         let reach = (slope_reach(self.area.frame.spacing) + 1) * self.steps;
-        for edge in formed.edges.iter().filter(|edge| matches!(edge.role, Role::Side | Role::Centre)) {
-            let ends = [edge.a, edge.b].map(|point| formed.points[point as usize]);
+        let held = formed.edges.iter().filter(|edge| matches!(edge.role, Role::Side | Role::Centre));
+        let held = held.map(|edge| [edge.a, edge.b].map(|point| formed.points[point as usize]));
+        for ends in held.chain(formed.shaped_slopes.iter().copied()) {
             for index in self.touching(ends.into_iter().map(|(place, _)| place), reach) {
                 self.pieces[index].features.slopes.push(ends.map(vertex));
             }
@@ -264,7 +281,9 @@ pub(crate) fn area_level(run: &Run, read: &ReadFeatures, levelled: &Levelled) ->
         tiles: Vec::new(),
         cost: cost_of(run.job, run.area.grid, &levelled.reserved.cost),
         reserved: Vec::new(),
-        wanted_m: wanted_m(run, &read.features, &classes),
+        amounts: amounts(&levelled.reserved, &classes),
+        left_out: left_out(run, read, &levelled.reserved, &classes),
+        ends: ends(run, read, &levelled.reserved, &classes),
         lines: lines(run, read, formed, &classes),
         strips: strips(&read.features, formed, &classes, run.area.rect),
         decks: decks(run, read, &formed.decks, &classes),
@@ -273,15 +292,55 @@ pub(crate) fn area_level(run: &Run, read: &ReadFeatures, levelled: &Levelled) ->
     }
 }
 
-/// Metres of ways that are to be in the ground, by class of the job.
-fn wanted_m(run: &Run, features: &AreaFeatures, classes: &[u8]) -> Vec<(u8, f64)> {
-    let mut wanted: Vec<(u8, f64)> = features
-        .lengths_wanted()
-        .into_iter()
-        .map(|(class, posts)| (classes[usize::from(class)], posts * run.area.frame.spacing.metres()))
-        .collect();
-    wanted.sort_by_key(|(class, _)| *class);
-    wanted
+/// How much there is of each class of the job, and how much of it is in the ground.
+fn amounts(reserved: &Reserved, classes: &[u8]) -> Vec<FeatureAmounts> {
+    let metres = |quanta: i64| quanta as f64 / f64::from(terrain::QUANTA_PER_METRE);
+    let amounts = reserved.amounts.iter().map(|(class, amounts)| FeatureAmounts {
+        class: classes[usize::from(*class)],
+        wanted_m: metres(amounts.wanted),
+        kept_m: metres(amounts.kept),
+        is_main: amounts.is_main,
+        lakes_wanted: amounts.lakes_wanted,
+        lakes_kept: amounts.lakes_kept,
+    });
+    let mut amounts: Vec<FeatureAmounts> = amounts.collect();
+    amounts.sort_by_key(|amounts| amounts.class);
+    amounts
+}
+
+/// What is not in the ground, as people ask for it.
+fn left_out(run: &Run, read: &ReadFeatures, reserved: &Reserved, classes: &[u8]) -> Vec<FeatureLeftOut> {
+    let metres = metres_of(run, read);
+    let why = |why: Why| match why {
+        Why::Limit(Limit::Module(row, col)) => FeatureWhy::Module(row as u32, col as u32),
+        Why::Limit(Limit::Window(row, col)) => FeatureWhy::Window(row as u32, col as u32),
+        Why::Limit(Limit::Area) => FeatureWhy::Area,
+        Why::Stub => FeatureWhy::Stub,
+        Why::Alone | Why::Beyond => FeatureWhy::Alone,
+        Why::Pond => FeatureWhy::Pond,
+    };
+    let left_out = reserved.left_out.iter().map(|left| FeatureLeftOut {
+        feature: read.vectors.name(left.id).to_owned(),
+        class: classes[usize::from(left.class)],
+        why: why(left.why),
+        length_m: left.length as f64 / f64::from(terrain::QUANTA_PER_METRE),
+        lines: left.lines.iter().map(|line| line.iter().map(|&station| metres(station)).collect()).collect(),
+    });
+    left_out.collect()
+}
+
+/// Where what is in the ground ends although its source goes on.
+fn ends(run: &Run, read: &ReadFeatures, reserved: &Reserved, classes: &[u8]) -> Vec<FeatureEnd> {
+    let metres = metres_of(run, read);
+    let ends = reserved.loose_ends.iter().map(|&(place, class, id)| {
+        let [east, north, _] = metres((place, 0));
+        FeatureEnd {
+            feature: read.vectors.name(id).to_owned(),
+            class: classes[usize::from(class)],
+            at_m: [east, north],
+        }
+    });
+    ends.collect()
 }
 
 /// The surfaces of bridges as people ask for them.

@@ -83,7 +83,7 @@ impl Findings<'_> {
             refusals: refusals(&refused),
             bound,
             stops: self.stops(),
-            warnings: run.warnings().into_iter().chain(self.beyond_sources()).collect(),
+            warnings: run.warnings().into_iter().chain(self.left_out()).chain(self.beyond_sources()).collect(),
             outdated: false,
             tiles: Vec::new(),
             files: BTreeMap::new(),
@@ -94,6 +94,12 @@ impl Findings<'_> {
     pub fn told(&self) -> Option<Told> {
         let (settled, figures) = (self.run.level.as_ref()?, self.sums.features.as_ref()?);
         Some(product::told(self.run.job, &self.run.area, &settled.level, figures))
+    }
+
+    /// What of features had no room, where that is more than a person expects.
+    fn left_out(&self) -> Vec<String> {
+        let level = self.run.level.as_ref().map(|settled| &settled.level);
+        level.map_or_else(Vec::new, |level| product::left_out_warnings(self.run.job, level))
     }
 
     /// A guard of its own, in jobs with features: it knows the sources' heights and no other.

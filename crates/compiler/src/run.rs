@@ -147,7 +147,8 @@ impl Run<'_> {
     /// From now on, features are part of the ground, and what they take of the limits is taken.
     pub fn settle(&mut self, file: FileStamp, level: AreaLevel) {
         self.area.budget.reserved = level.reserved_of(self.area.grid.count());
-        self.ground.burn_in(self.database.folder(), &self.area);
+        let left_out_weight = self.job.features.as_ref().map_or(1.0, |spec| spec.left_out_weight);
+        self.ground.burn_in(self.database.folder(), &self.area, left_out_weight);
         self.read = OnceLock::new();
         let left_out = LeftOut::of(self.job, &self.area, &level);
         self.level = Some(Settled { file, level, left_out });

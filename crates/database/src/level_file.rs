@@ -17,8 +17,12 @@ pub struct AreaLevel {
     pub cost: Vec<(u32, u8, u32)>,
     /// Triangles that features take of a load module, counted exactly, by its place. Those that take none are left out.
     pub reserved: Vec<(u32, u32)>,
-    /// Metres of ways that were to be in the ground, bridges and tunnels not among them, by class in ascending order.
-    pub wanted_m: Vec<(u8, f64)>,
+    /// How much there is of each class, and how much of it is in the ground, by class in ascending order.
+    pub amounts: Vec<FeatureAmounts>,
+    /// Stretches from junction to junction and bodies of water that are not in the ground.
+    pub left_out: Vec<FeatureLeftOut>,
+    /// Where what is in the ground ends although its source goes on.
+    pub ends: Vec<FeatureEnd>,
     /// Edges of the TIN as lines of their features.
     pub lines: Vec<FeatureLine>,
     /// What was found of strips, by class in ascending order.
@@ -42,6 +46,66 @@ impl AreaLevel {
         }
         reserved
     }
+}
+
+/// How much there is of a class, and how much of it is in the ground.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct FeatureAmounts {
+    /// The class, a number of the job's.
+    pub class: u8,
+    /// Metres of ways in the area, bridges among them, tunnels not.
+    pub wanted_m: f64,
+    /// Those of them that are in the ground.
+    pub kept_m: f64,
+    /// Whether it is of a kind that may use the larger share of limits.
+    pub is_main: bool,
+    /// Bodies of water of a hectare and more.
+    pub lakes_wanted: u32,
+    /// Those of them that are in the ground.
+    pub lakes_kept: u32,
+}
+
+/// Why something is not in the ground.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum FeatureWhy {
+    /// A load module has no room for it: its row and column.
+    Module(u32, u32),
+    /// A window has no room for it: row and column of its south-western load module.
+    Window(u32, u32),
+    /// The area has no room for it.
+    Area,
+    /// It would end where its source goes on, soon after a junction or inside one load module.
+    Stub,
+    /// It would hang together with too little.
+    Alone,
+    /// It is small water with a long shore.
+    Pond,
+}
+
+/// What is not in the ground: a stretch of a way from junction to junction, or a body of water.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FeatureLeftOut {
+    /// The feature it begins with, as its file names it.
+    pub feature: String,
+    /// Its class, a number of the job's.
+    pub class: u8,
+    /// Why.
+    pub why: FeatureWhy,
+    /// Metres of it in the area.
+    pub length_m: f64,
+    /// Easting, northing and height of its vertices, in metres; several lines of water with islands.
+    pub lines: Vec<Vec<[f64; 3]>>,
+}
+
+/// Where what is in the ground ends although its source goes on.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FeatureEnd {
+    /// The feature that ends there, as its file names it.
+    pub feature: String,
+    /// Its class, a number of the job's.
+    pub class: u8,
+    /// Easting and northing, in metres.
+    pub at_m: [f64; 2],
 }
 
 /// A run of edges of one feature, all of one role; a channel runs downstream.
@@ -172,11 +236,27 @@ mod tests {
     #[test]
     fn what_features_came_to_survives_its_file_and_every_damage_is_an_error() {
         let path = Path::new("features.level");
+        let left_out = FeatureLeftOut {
+            feature: "way/3".into(),
+            class: 3,
+            why: FeatureWhy::Window(2, 1),
+            length_m: 120.5,
+            lines: vec![vec![[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]],
+        };
         let level = AreaLevel {
             tiles: vec![FileStamp::of(b"one"), FileStamp::of(b"other")],
             cost: vec![(0, 3, 12), (7, 2, 1)],
             reserved: vec![(0, 12), (7, 1)],
-            wanted_m: vec![(3, 1250.5), (7, 0.25)],
+            amounts: vec![FeatureAmounts {
+                class: 3,
+                wanted_m: 1250.5,
+                kept_m: 0.25,
+                is_main: true,
+                lakes_wanted: 2,
+                lakes_kept: 1,
+            }],
+            left_out: vec![left_out],
+            ends: vec![FeatureEnd { feature: "way 7".into(), class: 3, at_m: [0.5, -0.0] }],
             lines: vec![FeatureLine {
                 feature: "way/12".into(),
                 class: 3,

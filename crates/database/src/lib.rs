@@ -34,7 +34,8 @@ mod lines_file;
 pub use lines_file::{decode_lines, encode_lines};
 mod level_file;
 pub use level_file::{
-    AreaLevel, CULVERT, FeatureFace, FeatureLine, FeatureRemark, LineRole, StripFigures, decode_level, encode_level,
+    AreaLevel, CULVERT, FeatureAmounts, FeatureEnd, FeatureFace, FeatureLeftOut, FeatureLine, FeatureRemark,
+    FeatureWhy, LineRole, StripFigures, decode_level, encode_level,
 };
 mod buildings_file;
 pub use buildings_file::{BUILDING_UNITS_PER_METRE, Building, decode_buildings, encode_buildings};

@@ -21,6 +21,7 @@ struct LinesOnDisk {
     edges: Vec<[u32; 2]>,
     spans: Vec<(u8, i32, i32)>,
     surfaces: Vec<SurfaceOnDisk>,
+    shaped: Vec<SurfaceOnDisk>,
     slopes: Vec<[Corner; 2]>,
     decks: Vec<SurfaceOnDisk>,
 }
@@ -35,7 +36,7 @@ struct SurfaceOnDisk {
 
 /// The bytes of what features put into a tile.
 pub fn encode_lines(stamp: &Stamp, features: &TileFeatures) -> Vec<u8> {
-    let TileFeatures { tile, kept, surfaces, slopes, decks } = features;
+    let TileFeatures { tile, kept, surfaces, shaped, slopes, decks } = features;
     let Features { steps_per_post, vertices, edges, spans } = kept;
     let side = |side: Side| Side::ALL.iter().position(|other| *other == side).expect("a side is one of four") as u8;
     let on_disk = LinesOnDisk {
@@ -45,6 +46,7 @@ pub fn encode_lines(stamp: &Stamp, features: &TileFeatures) -> Vec<u8> {
         edges: edges.clone(),
         spans: spans.iter().map(|span| (side(span.side), span.from, span.to)).collect(),
         surfaces: surfaces.iter().map(to_disk).collect(),
+        shaped: shaped.iter().map(to_disk).collect(),
         slopes: slopes.iter().map(|ends| [corner(&ends[0]), corner(&ends[1])]).collect(),
         decks: decks.iter().map(to_disk).collect(),
     };
@@ -69,8 +71,9 @@ pub fn decode_lines(path: &Path, bytes: &[u8]) -> Result<(Stamp, TileFeatures), 
     let span = |(side, from, to): (u8, i32, i32)| Some(SideSpan { side: *Side::ALL.get(usize::from(side))?, from, to });
     let spans: Option<Vec<SideSpan>> = on_disk.spans.into_iter().map(span).collect();
     let surfaces: Option<Vec<FeatureSurface>> = on_disk.surfaces.into_iter().map(of_disk).collect();
+    let shaped: Option<Vec<FeatureSurface>> = on_disk.shaped.into_iter().map(of_disk).collect();
     let decks: Option<Vec<FeatureSurface>> = on_disk.decks.into_iter().map(of_disk).collect();
-    let (Some(spans), Some(surfaces), Some(decks)) = (spans, surfaces, decks) else {
+    let (Some(spans), Some(surfaces), Some(shaped), Some(decks)) = (spans, surfaces, shaped, decks) else {
         return Err(malformed(path, "found a side or a kind of ground that there is not"));
     };
     let vertices = on_disk.vertices.into_iter().map(vertex).collect();
@@ -78,6 +81,7 @@ pub fn decode_lines(path: &Path, bytes: &[u8]) -> Result<(Stamp, TileFeatures), 
         tile: TileId { row: on_disk.tile.0, col: on_disk.tile.1 },
         kept: Features { steps_per_post, vertices, edges: on_disk.edges, spans },
         surfaces,
+        shaped,
         slopes: on_disk.slopes.into_iter().map(|ends| ends.map(vertex)).collect(),
         decks,
     };
@@ -125,6 +129,7 @@ mod tests {
                 spans: vec![SideSpan { side: Side::North, from: -5, to: 9 }],
             },
             surfaces: GROUNDS.map(surface).to_vec(),
+            shaped: vec![surface(SurfaceGround::Lake)],
             slopes: vec![[vertices[0], vertices[1]]],
             decks: vec![surface(SurfaceGround::Road)],
         };

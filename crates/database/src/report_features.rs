@@ -21,8 +21,14 @@ pub struct ReportFeatureClass {
     /// Its name.
     pub name: String,
     /// Kilometres of ways in the sources that are to be in the ground: mended and cut at the area's border, each
-    /// stretch once, without bridges and tunnels.
+    /// stretch once, bridges among them, without tunnels.
     pub wanted_km: f64,
+    /// Those of them that are in the ground.
+    pub kept_km: f64,
+    /// Lakes of a hectare and more.
+    pub lakes_wanted: u64,
+    /// Those of them that are in the ground.
+    pub lakes_kept: u64,
     /// Kilometres that are lines of the TIN: roads as centrelines, breaklines.
     pub line_km: f64,
     /// Kilometres that are strips with a left and a right edge.
@@ -82,6 +88,10 @@ pub struct ReportFeatureChecks {
     pub river_edges: u64,
     /// Those that rise downstream.
     pub river_edges_rising: u64,
+    /// Ends of what is in the ground at which its source goes on; `features.geojson` has each of them.
+    pub loose_ends: u64,
+    /// Pieces of stretches that are to be in the ground and are not.
+    pub pieces_missing: u64,
     /// Lakes.
     pub lakes: u64,
     /// How far any vertex of the TIN in a lake lies from the lake's level, in metres.

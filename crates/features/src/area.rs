@@ -5,12 +5,11 @@ use std::collections::{BTreeMap, HashSet};
 
 use terrain::Each;
 
-use crate::exact::Segment;
 use crate::pieces::moved;
 use crate::rules::Sorted;
 use crate::{
-    Bed, FeatureId, Flaw, GradeOptions, Graded, Grants, Network, Outline, Place, Remark, Reserved, Room, Rule, Site,
-    Source, Storey, Strand, Traits, Waters, Way, banks, breaklines, channels, dams, fall, flowing, grade, have_line,
+    About, Bed, FeatureId, Flaw, GradeOptions, Graded, Grants, Network, Outline, Place, Remark, Reserved, Rule, Shares,
+    Site, Source, Strand, Traits, Waters, Way, banks, breaklines, channels, dams, fall, flowing, grade, have_line,
     lakes_along, level, lines_inside, mend, outline_only, pins, reserve, round, shore, sides, sort_out, split_at_dams,
     travelled, water,
 };
@@ -30,6 +29,8 @@ pub struct AreaFeatures {
     road_sides: Vec<[Place; 2]>,
     rivers: Network,
     river_banks: Vec<[Place; 2]>,
+    /// What stands for the names of features that have one.
+    names: BTreeMap<FeatureId, u64>,
     /// Sorted, each once.
     stations: Vec<Place>,
 }
@@ -53,8 +54,9 @@ impl AreaFeatures {
         let Self { site, ways, outlines, .. } = self;
         word(site.lattice.steps_per_post().into());
         word(ways.len() as i64);
-        for Way { traits, places, heights, id: _ } in ways {
+        for Way { traits, places, heights, id } in ways {
             traits.feed(word);
+            word(self.names.get(id).copied().unwrap_or(0) as i64);
             word(places.len() as i64);
             places.iter().for_each(|&at| place(at, word));
             word(heights.len() as i64);
@@ -84,6 +86,7 @@ impl AreaFeatures {
     /// Sorts out, mends and rounds features, and finds where the DEM has to be asked. `grade_give` is how many times
     /// its grade a road may be unless a rule says so; `each` runs what falls into pieces.
     pub fn of(sources: Vec<Source>, rules: &[Rule], grade_give: f64, site: Site, each: Each) -> Self {
+        let names = names(&sources);
         let Sorted { features, mut remarks } = sort_out(sources, rules, grade_give);
         let mut rounded = round(mend(features, &site), &site, each);
         remarks.append(&mut rounded.remarks);
@@ -104,6 +107,7 @@ impl AreaFeatures {
             road_sides,
             rivers,
             river_banks,
+            names,
             stations: Vec::new(),
         };
         all.stations = all.asked();
@@ -114,28 +118,6 @@ impl AreaFeatures {
     /// rivers. In order of place, each once.
     pub fn stations(&self) -> &[Place] {
         &self.stations
-    }
-
-    /// Posts along ways that are to be in the ground, by class: without bridges and tunnels, inside the area.
-    pub fn lengths_wanted(&self) -> BTreeMap<u16, f64> {
-        let of_network = |network: &Network| -> Vec<(u16, Segment)> {
-            let all = (0..network.edges.len() as u32).map(|edge| (network.traits(edge), network.segment(edge)));
-            all.filter(|(traits, _)| traits.storey == Storey::Ground).map(|(traits, of)| (traits.class, of)).collect()
-        };
-        let of_lines = self
-            .lines
-            .iter()
-            .flat_map(|line| line.stations.windows(2).map(|ends| (line.class, Segment { a: ends[0].0, b: ends[1].0 })));
-        let mut lengths = BTreeMap::new();
-        for (class, Segment { a, b }) in
-            of_network(&self.roads).into_iter().chain(of_network(&self.rivers)).chain(of_lines)
-        {
-            if self.site.holds_middle(a, b) {
-                let steps = (a.squared_to(b) as f64).sqrt();
-                *lengths.entry(class).or_default() += steps / f64::from(self.site.lattice.steps_per_post());
-            }
-        }
-        lengths
     }
 
     fn asked(&self) -> Vec<Place> {
@@ -155,7 +137,7 @@ impl AreaFeatures {
     ///
     /// # Panics
     /// When there is not one height, or none, for each station.
-    pub fn level(&self, ground: &[Option<i32>], options: GradeOptions, room: &mut dyn Room) -> Levelled {
+    pub fn level(&self, ground: &[Option<i32>], options: GradeOptions, shares: &Shares) -> Levelled {
         assert_eq!(self.stations.len(), ground.len(), "the DEM was asked at every station");
         let near = |place: Place| self.stations.binary_search(&place).ok().and_then(|found| ground[found]);
         let at = |place: Place| near(place).filter(|_| self.site.holds(place));
@@ -170,7 +152,12 @@ impl AreaFeatures {
         let beside: Vec<[i32; 2]> = self.road_sides.iter().zip(&heights).map(beside).collect();
         let grants = Grants::default();
         let graded = Graded { network: roads, heights: &heights, beside: &beside, grants: &grants };
-        let mut reserved = reserve(&graded, &strands, &self.site, room);
+        let kinds = self.traits_by_id();
+        let about = |id: FeatureId| {
+            let name = self.names.get(&id).copied().unwrap_or(0);
+            kinds.get(&id).map(|traits| About { kind: traits.kind, name })
+        };
+        let mut reserved = reserve(&graded, &strands, &self.site, shares, &about);
         remarks.append(&mut reserved.formed.remarks);
         // What lies beyond the area is counted, not listed.
         remarks.retain(|remark| remark.flaw != Flaw::Outside);
@@ -219,6 +206,20 @@ impl AreaFeatures {
     }
 }
 
+/// What stands for the names of features, or for their numbers where they have no name.
+fn names(sources: &[Source]) -> BTreeMap<FeatureId, u64> {
+    // FNV-1a, of the content alone.
+    let hash = |text: &str| {
+        text.bytes()
+            .fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
+    };
+    let named = |source: &Source| {
+        let name = ["name", "ref"].iter().find_map(|key| source.tag(key)).filter(|name| !name.is_empty())?;
+        Some((source.id, hash(name)))
+    };
+    sources.iter().filter_map(named).collect()
+}
+
 /// The height of the ground at a place, where there is one.
 type Ground<'a> = &'a dyn Fn(Place) -> Option<i32>;
 
@@ -258,7 +259,7 @@ mod tests {
     fn levelled(sources: Vec<Source>, metres: impl Fn(f64, f64) -> f64) -> Levelled {
         let all = AreaFeatures::of(sources, &[], 1.5, site(), &in_turn);
         let ground: Vec<Option<i32>> = all.stations().iter().map(|place| ground_at(*place, &metres)).collect();
-        let levelled = all.level(&ground, GradeOptions::USUAL, &mut 1000);
+        let levelled = all.level(&ground, GradeOptions::USUAL, &Shares::each([8, 8], 1000));
         check(&levelled.reserved.formed);
         levelled
     }
@@ -299,7 +300,7 @@ mod tests {
     }
 
     #[test]
-    fn a_lake_stays_where_a_few_tracks_crowd_one_of_its_load_modules() {
+    fn a_lake_of_a_hectare_has_room_that_tracks_have_not() {
         // The lake lies in two load modules; twenty tracks fill the northern one's corner.
         let ring = [(10.0, 20.0), (40.0, 20.0), (40.0, 60.0), (10.0, 60.0), (10.0, 20.0)];
         let track = |number: i64| {
@@ -309,9 +310,12 @@ mod tests {
         let sources = (0..20).map(track).chain([way(3, "natural=water", &ring)]);
         let all = AreaFeatures::of(sources.collect(), &[], 1.5, site(), &in_turn);
         let ground: Vec<Option<i32>> = all.stations().iter().map(|place| ground_at(*place, &|_, _| 5.0)).collect();
-        let levelled = all.level(&ground, GradeOptions::USUAL, &mut 40);
+        let mut shares = Shares::each([8, 8], 40);
+        shares.modules.iter_mut().for_each(|share| share.main = 64);
+        let levelled = all.level(&ground, GradeOptions::USUAL, &shares);
         let of = |role: Role| levelled.reserved.formed.edges.iter().filter(|edge| edge.role == role).count();
         assert!(4 <= of(Role::Shore) && 0 < of(Role::Centre), "{} and {}", of(Role::Shore), of(Role::Centre));
         assert!(levelled.remarks.iter().any(|remark| remark.remedy.leaves_out()));
+        assert!(levelled.reserved.left_out.iter().all(|left| matches!(left.why, crate::Why::Limit(_))));
     }
 }

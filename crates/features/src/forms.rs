@@ -65,6 +65,10 @@ pub struct Formed {
     pub faces: Vec<Face>,
     /// What edges of the TIN enclose and a class of its own covers, by class.
     pub surfaces: Vec<Surface>,
+    /// Ground that a class of its own covers without being in the TIN: what there was no room for.
+    pub shaped: Vec<Surface>,
+    /// Edges of roads that there was no room for, beside which the ground slopes to the natural one.
+    pub shaped_slopes: Vec<[(Place, i32); 2]>,
     /// The surfaces of decks.
     pub decks: Vec<Face>,
     /// What was changed.
@@ -73,14 +77,15 @@ pub struct Formed {
 
 /// Forms a network and all other strands together.
 pub fn form(graded: &Graded, strands: &[Strand], site: &Site) -> Formed {
-    let Graded { network, heights, beside, grants } = *graded;
+    let Graded { network, heights, grants, .. } = *graded;
     let mut remarks = Vec::new();
-    let shared = shared_places(network, strands);
+    let shared = shared_places(network, strands, grants);
     let stays = |place: Place| shared.contains(&place);
-    let pieces = pieces(network, heights, beside, site, &stays, grants);
+    let pieces = pieces(network, heights, site, &stays, grants);
     remark_narrow(network, &pieces, &mut remarks);
     let mut wide = wide_segments(&pieces);
-    let mut thinned: Vec<Strand> = strands.iter().flat_map(|strand| thinned(strand, grants, site, &stays)).collect();
+    let thinned = |(number, strand): (usize, &Strand)| thinned(strand, grants.of_strand(number), site, &stays);
+    let mut thinned: Vec<Strand> = strands.iter().enumerate().filter_map(thinned).collect();
     let mut formed = round_together(graded, &pieces, &mut wide, &thinned, site);
     for _ in 0..ROUNDS_LEVEL {
         let (tilted, uneven) = (tilted(&formed, network, &wide), uneven(&formed));
@@ -196,56 +201,35 @@ fn is_on_outline(face: &Face, place: Place) -> bool {
     })
 }
 
-/// Places that two strands have, or a strand and the network: thinning leaves them to both.
-pub(crate) fn shared_places(network: &Network, strands: &[Strand]) -> BTreeSet<Place> {
-    let mut uses: HashMap<Place, u32> = network.nodes.iter().map(|node| (node.place, 1)).collect();
-    let mut shared = BTreeSet::new();
-    for strand in strands {
+/// Places that two strands in the ground have, or a strand and the network: thinning leaves them to both.
+pub(crate) fn shared_places(network: &Network, strands: &[Strand], grants: &Grants) -> HashSet<Place> {
+    let edges = network.edges.iter().enumerate().filter(|(number, _)| !grants.of_edge(*number as u32).out);
+    let mut seen: HashSet<Place> =
+        edges.flat_map(|(_, edge)| [edge.a, edge.b].map(|node| network.nodes[node as usize].place)).collect();
+    let mut shared = HashSet::new();
+    for (_, strand) in strands.iter().enumerate().filter(|(number, _)| !grants.of_strand(*number).out) {
         let open = if strand.stations.first() == strand.stations.last() { 1 } else { 0 };
-        for (place, _) in &strand.stations[open..] {
-            let count = uses.entry(*place).or_insert(0);
-            *count += 1;
-            if 1 < *count {
-                shared.insert(*place);
-            }
-        }
+        shared.extend(strand.stations[open..].iter().map(|(place, _)| *place).filter(|place| !seen.insert(*place)));
     }
     shared
 }
 
-/// A strand with the stations it needs, in parts where some of it is left out. A channel keeps the stations beside a
-/// shared place too: where it passes below a road, only what lies between them is missing. What encloses water is left
-/// out as a whole or not at all.
-pub(crate) fn thinned(strand: &Strand, grants: &Grants, site: &Site, shared: &dyn Fn(Place) -> bool) -> Vec<Strand> {
-    if grants.is_out(strand.id) {
-        return Vec::new();
-    }
+/// A strand with the stations it needs; none where it is left out.
+fn thinned(strand: &Strand, grant: Grant, site: &Site, shared: &dyn Fn(Place) -> bool) -> Option<Strand> {
+    let kept = (!grant.out).then(|| needed(strand, grant.tolerance(), site, shared))?;
+    Some(Strand { stations: kept.into_iter().map(|at| strand.stations[at as usize]).collect(), ..*strand })
+}
+
+/// The numbers of the stations that a strand needs. A channel keeps the stations beside a shared place too: where it
+/// passes below a road, only what lies between them is missing.
+pub(crate) fn needed(strand: &Strand, tolerance: Tolerance, site: &Site, shared: &dyn Fn(Place) -> bool) -> Vec<u32> {
     let keeps = |at: usize| strand.stations.get(at).is_some_and(|(place, _)| shared(*place));
     let station = |(at, &(place, height)): (usize, &(Place, i32))| {
         let beside = strand.role == Role::Channel && (keeps(at + 1) || (0 < at && keeps(at - 1)));
         Station { place, height, stays: site.on_line(place) || shared(place) || beside, flat: [0; 2] }
     };
     let stations: Vec<Station> = strand.stations.iter().enumerate().map(station).collect();
-    let grants_along: Vec<Grant> =
-        stations.windows(2).map(|ends| grants.of(strand.id, site.module_under(ends[0].place, ends[1].place))).collect();
-    let mut parts: Vec<Strand> = Vec::new();
-    let (mut from, mut open) = (0, false);
-    for same in grants_along.chunk_by(|a, b| a == b) {
-        let to = from + same.len();
-        if same[0].out && !strand.role.is_whole() {
-            open = false;
-        } else {
-            let kept = thin(&stations[from..=to], Tolerance::USUAL.times(same[0].tolerance), 0, site.lattice);
-            let kept = kept.into_iter().map(|at| strand.stations[from + at as usize]);
-            match parts.last_mut().filter(|_| open) {
-                Some(part) => part.stations.extend(kept.skip(1)),
-                None => parts.push(Strand { stations: kept.collect(), ..*strand }),
-            }
-            open = true;
-        }
-        from = to;
-    }
-    parts
+    thin(&stations, tolerance, 0, site.lattice)
 }
 
 fn remark_narrow(network: &Network, pieces: &[Piece], remarks: &mut Vec<Remark>) {
@@ -380,7 +364,8 @@ fn collect(heights: &Decided, edges: BTreeMap<(Place, Place), OfEdge>) -> Formed
             FormedEdge { a, b, role, class, id, backwards }
         })
         .collect();
-    Formed { points, edges, faces: Vec::new(), surfaces: Vec::new(), decks: Vec::new(), remarks: Vec::new() }
+    let (faces, surfaces, shaped, shaped_slopes, decks, remarks) = Default::default();
+    Formed { points, edges, faces, surfaces, shaped, shaped_slopes, decks, remarks }
 }
 
 /// A line's own heights at the places it has after rounding: what is new lies between its stations.
@@ -501,24 +486,18 @@ mod tests {
     }
 
     #[test]
-    fn a_road_across_a_side_slope_is_a_strip_level_across_and_a_line_on_flat_ground() {
+    fn a_road_is_a_strip_over_its_whole_length_level_across_whatever_the_ground() {
         let road = way(1, "highway=primary", &[(10.0, 10.0), (90.0, 10.0)]);
-        let slope = formed(vec![road.clone()], |_, north| north * 3.0);
-        check_level_across(&slope);
-        assert_eq!(roles(&slope, Role::Centre), 0);
+        let bumpy = |east: f64, north: f64| if east < 55.0 { 0.0 } else { (east - 54.0).min(30.0) * (north - 10.0) };
+        let grounds: [&dyn Fn(f64, f64) -> f64; 3] = [&|_, north| north * 3.0, &|_, _| 7.0, &bumpy];
+        for ground in grounds {
+            let formed = formed(vec![road.clone()], ground);
+            check_level_across(&formed);
+            assert_eq!(roles(&formed, Role::Centre), 0);
+        }
         // A station at each end and one on the module line between: two faces.
-        assert_eq!((slope.faces.len(), slope.points.len()), (2, 6));
         let flat = formed(vec![road], |_, _| 7.0);
-        assert_eq!((roles(&flat, Role::Centre), flat.faces.len(), flat.points.len()), (2, 0, 3));
-    }
-
-    #[test]
-    fn the_form_changes_at_stations() {
-        let road = way(1, "highway=primary", &[(10.0, 10.0), (90.0, 10.0)]);
-        let formed =
-            formed(vec![road], |east, north| if east < 55.0 { 0.0 } else { (east - 54.0).min(30.0) * (north - 10.0) });
-        check_level_across(&formed);
-        assert!(0 < roles(&formed, Role::Centre) && !formed.faces.is_empty());
+        assert_eq!((flat.faces.len(), flat.points.len()), (2, 6));
     }
 
     #[test]

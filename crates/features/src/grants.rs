@@ -1,13 +1,11 @@
-//! What the cost of features leaves to each of them, load module by load module.
+//! What the cost of features leaves to each of them: tolerance and form of every edge of a network and every strand.
 
-use std::collections::{HashMap, HashSet};
+use crate::{Form, Tolerance};
 
-use crate::{FeatureId, Form};
-
-/// What the cost of features leaves to one of them in a load module.
+/// What the cost of features leaves to one of them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Grant {
-    /// How many times the usual tolerance it is thinned with: 1, 2 or 4.
+    /// What it is thinned with, in [`Tolerance::ALL`].
     pub tolerance: u8,
     /// The most it may be: a bench, a strip or a line.
     pub most: Form,
@@ -17,53 +15,33 @@ pub struct Grant {
 
 impl Grant {
     /// As asked for.
-    pub const ALL: Self = Self { tolerance: 1, most: Form::Bench, out: false };
+    pub const ALL: Self = Self { tolerance: 0, most: Form::Bench, out: false };
     /// Nothing.
     pub const OUT: Self = Self { out: true, ..Self::ALL };
-}
 
-/// What the cost of features leaves to each of them.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Grants {
-    /// Where nothing else is said.
-    others: Grant,
-    /// By feature and load module (row, column).
-    less: HashMap<(FeatureId, (i32, i32)), Grant>,
-    out: HashSet<FeatureId>,
-}
-
-impl Default for Grants {
-    fn default() -> Self {
-        Self::same(Grant::ALL)
+    /// How far it may lie from its stations.
+    pub fn tolerance(self) -> Tolerance {
+        Tolerance::ALL[usize::from(self.tolerance)]
     }
+}
+
+/// What the cost of features leaves to each of them; all of it where nothing is said.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Grants {
+    /// By edge of the network.
+    pub edges: Vec<Grant>,
+    /// By strand.
+    pub strands: Vec<Grant>,
 }
 
 impl Grants {
-    /// The same for every feature everywhere.
-    pub fn same(grant: Grant) -> Self {
-        Self { others: grant, less: HashMap::new(), out: HashSet::new() }
+    /// What an edge of the network may be.
+    pub fn of_edge(&self, edge: u32) -> Grant {
+        self.edges.get(edge as usize).copied().unwrap_or(Grant::ALL)
     }
 
-    /// What a feature may be in a load module (row, column).
-    pub fn of(&self, id: FeatureId, module: (i32, i32)) -> Grant {
-        if self.is_out(id) {
-            return Grant::OUT;
-        }
-        self.less.get(&(id, module)).copied().unwrap_or(self.others)
-    }
-
-    /// Whether a feature is left out wherever it lies.
-    pub fn is_out(&self, id: FeatureId) -> bool {
-        self.out.contains(&id)
-    }
-
-    /// Leaves less, or more again, to a feature in a load module.
-    pub fn set(&mut self, id: FeatureId, module: (i32, i32), grant: Grant) {
-        self.less.insert((id, module), grant);
-    }
-
-    /// Leaves out a feature wherever it lies; false where it was left out already.
-    pub fn leave_out(&mut self, id: FeatureId) -> bool {
-        self.out.insert(id)
+    /// What a strand may be.
+    pub fn of_strand(&self, strand: usize) -> Grant {
+        self.strands.get(strand).copied().unwrap_or(Grant::ALL)
     }
 }

@@ -14,7 +14,7 @@
 //! level(&outlines, &shores, ..) -> Waters           lakes; then lakes_along(..) -> levels for the rivers
 //! fall(&rivers, Bed, ..) -> Fallen                  rivers; channels(..), shore(..), banks(..) -> Vec<Strand>
 //! grade(&roads, &ground, &pins, &water(&strands), GradeOptions, ..) -> Vec<i32>
-//! reserve(&Graded, &strands, &Site, &mut Room) -> Reserved
+//! reserve(&Graded, &strands, &Site, &Shares, about) -> Reserved
 //!     .formed: Formed { points, edges, faces, decks, remarks }, .cost: triangles by load module and class
 //! ```
 //!
@@ -91,7 +91,7 @@ pub use thin::{Station, Tolerance, thin};
 mod grants;
 pub use grants::{Grant, Grants};
 mod pieces;
-pub use pieces::{FALL_MIN, Piece, STRIP_STEPS_MIN, sides};
+pub use pieces::{Piece, STRIP_STEPS_MIN, sides};
 mod strips;
 pub use strips::Face;
 mod strand;
@@ -103,10 +103,21 @@ mod forms;
 pub use forms::{Formed, FormedEdge, Surface, form};
 mod cost;
 pub use cost::{Cost, cost};
-mod ladder;
-mod members;
+mod shares;
+pub use shares::{Limit, Share, Shares};
+mod stretches;
+pub use stretches::About;
+mod choice;
+mod choose;
+mod outlay;
+mod strokes;
+mod stubs;
+mod tally;
+pub use choice::Why;
 mod reserve;
-pub use reserve::{Reserved, Room, reserve};
+mod shapes;
+mod take_back;
+pub use reserve::{Amounts, LeftOut, Reserved, reserve};
 
 // All of it, in its order.
 mod area;

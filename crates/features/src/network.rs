@@ -230,7 +230,7 @@ impl Network {
                 }
                 for &(next, edge) in self.beside(node) {
                     if !done[edge as usize] && picked(edge) {
-                        runs.push(self.run(node, next, edge, follows, &mut done));
+                        runs.push(self.run(node, (next, edge), (picked, follows), &mut done));
                     }
                 }
             }
@@ -241,16 +241,15 @@ impl Network {
     fn run(
         &self,
         from: u32,
-        next: u32,
-        edge: u32,
-        follows: &dyn Fn(u32) -> bool,
+        (next, edge): (u32, u32),
+        (picked, follows): (&dyn Fn(u32) -> bool, &dyn Fn(u32) -> bool),
         done: &mut [bool],
     ) -> (Vec<u32>, Vec<u32>) {
         let (mut nodes, mut edges) = (vec![from, next], vec![edge]);
         done[edge as usize] = true;
         let mut at = next;
         while follows(at) && at != from {
-            let onward = self.beside(at).iter().find(|(_, edge)| !done[*edge as usize]);
+            let onward = self.beside(at).iter().find(|(_, edge)| picked(*edge) && !done[*edge as usize]);
             let Some(&(next, edge)) = onward else { break };
             done[edge as usize] = true;
             nodes.push(next);

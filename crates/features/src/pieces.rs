@@ -1,10 +1,7 @@
 //! Chains cut into pieces whose stations are thinned, each segment of which is a line or a strip.
 
-use crate::thin::{Station, Tolerance, thin};
+use crate::thin::{Station, thin};
 use crate::{FeatureId, Form, Grant, Grants, Network, Place, Site, Storey, Traits};
-
-/// The ground falls more than this across a strip, in quanta, where it pays: 0.5 m.
-pub const FALL_MIN: i32 = 64;
 
 /// Steps of the lattice below which a strip is a line.
 pub const STRIP_STEPS_MIN: i32 = 4;
@@ -65,31 +62,27 @@ pub(crate) fn moved(place: Place, east: f64, north: f64) -> Place {
     Place::new(rounded(place.row, north), rounded(place.col, east))
 }
 
-/// Cuts a network into pieces. `beside` is the ground at both sides of each node, in quanta; `shared` says
-/// which places others use, so that they stay; `grants` says what their cost leaves to them.
+/// Cuts a network into pieces. `shared` says which places others use, so that they stay; `grants` says what their cost
+/// leaves to them.
 pub fn pieces(
     network: &Network,
     heights: &[i32],
-    beside: &[[i32; 2]],
     site: &Site,
     shared: &dyn Fn(Place) -> bool,
     grants: &Grants,
 ) -> Vec<Piece> {
-    let granted = |edge: u32| {
-        let (segment, way) = (network.segment(edge), network.edges[edge as usize].way);
-        grants.of(network.ways[way as usize].id, site.module_under(segment.a, segment.b))
-    };
-    let by_edge: Vec<Grant> = (0..network.edges.len() as u32).map(granted).collect();
-    let grant = |edge: u32| by_edge[edge as usize];
+    let grant = |edge: u32| grants.of_edge(edge);
     let picked = |edge: u32| !grant(edge).out && !matches!(network.traits(edge).storey, Storey::Tunnel(_));
-    let follows = |node: u32| match network.beside(node) {
-        [(_, one), (_, other)] => {
-            let same = network.traits(*one) == network.traits(*other) && grant(*one) == grant(*other);
-            same && picked(*one) && picked(*other)
+    // Where only two of those that meet are in the ground, the way goes on.
+    let follows = |node: u32| {
+        let mut meet = network.beside(node).iter().map(|(_, edge)| *edge).filter(|edge| picked(*edge));
+        match (meet.next(), meet.next(), meet.next()) {
+            (Some(one), Some(other), None) => {
+                network.traits(one) == network.traits(other) && grant(one) == grant(other)
+            }
+            _ => false,
         }
-        _ => false,
     };
-    let fall = |node: u32| (beside[node as usize][0] - beside[node as usize][1]).abs();
     let runs = network.runs(&picked, &follows).into_iter();
     runs.map(|(nodes, edges)| {
         let traits = *network.traits(edges[0]);
@@ -109,17 +102,11 @@ pub fn pieces(
         };
         let has_given = nodes.windows(2).zip(&edges).any(gives);
         let grade_ppm = if has_given { traits.grade_most_ppm() } else { traits.grade_ppm };
-        let kept = thin(&stations, Tolerance::USUAL.times(grant.tolerance), grade_ppm, network.lattice);
+        let kept = thin(&stations, grant.tolerance(), grade_ppm, network.lattice);
         let form = form_of(&traits, grant, network);
-        let strip = |pair: &[u32]| match form {
-            Form::Strip => (pair[0]..=pair[1]).any(|at| FALL_MIN < fall(nodes[at as usize])),
-            form => matches!(form, Form::StripAlways | Form::Bench),
-        };
-        let mut strips: Vec<bool> = kept.windows(2).map(strip).collect();
-        fill_short_gaps(&mut strips);
         Piece {
             traits,
-            strips,
+            strips: vec![matches!(form, Form::StripAlways | Form::Bench); kept.len() - 1],
             nodes: kept.iter().map(|at| nodes[*at as usize]).collect(),
             edges: kept[..kept.len() - 1].iter().map(|at| edges[*at as usize]).collect(),
             bench: form == Form::Bench,
@@ -128,9 +115,14 @@ pub fn pieces(
     .collect()
 }
 
+/// Whether a way is too narrow for a strip.
+pub(crate) fn is_narrow(traits: &Traits, network: &Network) -> bool {
+    traits.width < STRIP_STEPS_MIN * network.lattice.quanta_per_step()
+}
+
 /// The form a way may have: the lesser of what it asks for and what it is granted; decks are always wide.
 fn form_of(traits: &Traits, grant: Grant, network: &Network) -> Form {
-    if traits.width < STRIP_STEPS_MIN * network.lattice.quanta_per_step() {
+    if is_narrow(traits, network) {
         return Form::Line;
     }
     if matches!(traits.storey, Storey::Deck(_)) {
@@ -139,14 +131,6 @@ fn form_of(traits: &Traits, grant: Grant, network: &Network) -> Form {
     match (traits.form, grant.most) {
         (Form::Polygon, _) | (_, Form::Line) | (Form::Line, _) => Form::Line,
         (Form::Bench, Form::Bench) => Form::Bench,
-        (Form::Strip, _) => Form::Strip,
-        (Form::Bench | Form::StripAlways, _) => Form::StripAlways,
-    }
-}
-
-/// A single segment of line between two of strip is a strip too.
-fn fill_short_gaps(strips: &mut [bool]) {
-    for at in 1..strips.len().saturating_sub(1) {
-        strips[at] |= strips[at - 1] && strips[at + 1];
+        (Form::Strip | Form::Bench | Form::StripAlways, _) => Form::StripAlways,
     }
 }

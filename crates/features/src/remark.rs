@@ -99,8 +99,14 @@ pub enum Flaw {
     Overlap,
     /// A strip narrower than four steps of the lattice.
     TooNarrow,
-    /// More triangles than features may take in a load module.
+    /// More triangles than features may take of a limit.
     OverShare,
+    /// An end where its source goes on, soon after a junction or inside one load module.
+    Stub,
+    /// A part of the road network that hangs together with too little.
+    Alone,
+    /// A small body of water with a long shore.
+    Pond,
 }
 
 impl fmt::Display for Flaw {
@@ -156,7 +162,10 @@ impl Flaw {
             Flaw::LevelsDisagree => "it meets water of another level",
             Flaw::Overlap => "it overlaps a higher class",
             Flaw::TooNarrow => "it is narrower than four lattice steps",
-            Flaw::OverShare => "features take more than their share of a load module",
+            Flaw::OverShare => "features take more than their share of a limit",
+            Flaw::Stub => "only an end of it has room, which leads nowhere",
+            Flaw::Alone => "only a piece of its network has room, which hangs together with nothing",
+            Flaw::Pond => "its shore is long for so little water",
             _ => "it has a flaw",
         }
     }
@@ -211,15 +220,17 @@ pub enum Remedy {
     BecameLine,
     /// It was cut.
     Cut,
-    /// Tolerances were doubled.
-    ToleranceDoubled,
-    /// Tolerances were made four times as large.
-    ToleranceFourfold,
+    /// Tolerances were made larger.
+    Coarser {
+        /// How many times.
+        times: u8,
+    },
 }
 
 impl fmt::Display for Remedy {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
+            Remedy::Coarser { times } => return write!(f, "thinned with {times} times the tolerance"),
             Remedy::LeftOut => "left out",
             Remedy::PartLeftOut => "left out in part",
             Remedy::PointLeftOut => "the point was left out",
@@ -243,8 +254,6 @@ impl fmt::Display for Remedy {
             Remedy::BecameStrip => "became a strip without slopes",
             Remedy::BecameLine => "became a line",
             Remedy::Cut => "cut",
-            Remedy::ToleranceDoubled => "thinned with twice the tolerance",
-            Remedy::ToleranceFourfold => "thinned with four times the tolerance",
         })
     }
 }
@@ -259,12 +268,7 @@ impl Remedy {
     pub fn degrades(self) -> bool {
         matches!(
             self,
-            Remedy::Narrowed
-                | Remedy::BecameStrip
-                | Remedy::BecameLine
-                | Remedy::ToleranceDoubled
-                | Remedy::ToleranceFourfold
-                | Remedy::OutlineOnly
+            Remedy::Narrowed | Remedy::BecameStrip | Remedy::BecameLine | Remedy::Coarser { .. } | Remedy::OutlineOnly
         )
     }
 }

@@ -43,6 +43,14 @@ impl Site {
         self.holds_middle(place, place)
     }
 
+    /// Whether a place lies on the area's border or beyond it.
+    pub fn on_border(&self, place: Place) -> bool {
+        let margin = self.module_posts * self.lattice.steps_per_post();
+        let Extent { south_west, north_east } = self.extent;
+        let inside = |at: i32, low: i32, high: i32| low + margin < at && at < high - margin;
+        !(inside(place.row, south_west.row, north_east.row) && inside(place.col, south_west.col, north_east.col))
+    }
+
     /// Steps between load-module lines and between tile lines.
     fn line_steps(&self) -> [i32; 2] {
         [self.module_posts, self.tile_posts].map(|posts| posts * self.lattice.steps_per_post())

@@ -25,8 +25,8 @@ pub enum Role {
 }
 
 impl Role {
-    /// Whether it encloses water, and so is there as a whole or not at all.
-    pub fn is_whole(self) -> bool {
+    /// Whether it is the outline of water.
+    pub fn is_outline(self) -> bool {
         matches!(self, Role::Shore | Role::Bank)
     }
 }

@@ -16,11 +16,14 @@ pub struct Tolerance {
 
 impl Tolerance {
     /// 0.5 m aside and 0.15 m in height.
-    pub const USUAL: Self = Self { aside_m: 0.5, height_m: 0.15 };
+    pub const USUAL: Self = Self::of(0.5, 0.15);
 
-    /// So many times as much.
-    pub fn times(self, factor: u8) -> Self {
-        Self { aside_m: self.aside_m * f64::from(factor), height_m: self.height_m * f64::from(factor) }
+    /// What features are thinned with, the finest first.
+    pub const ALL: [Self; 5] =
+        [Self::USUAL, Self::of(1.0, 0.3), Self::of(2.0, 0.6), Self::of(4.0, 1.0), Self::of(8.0, 2.0)];
+
+    const fn of(aside_m: f64, height_m: f64) -> Self {
+        Self { aside_m, height_m }
     }
 }
 
@@ -122,7 +125,7 @@ mod tests {
     fn a_hump_higher_than_the_tolerance_stays() {
         assert_eq!(thin(&line(&[0, 10, 25, 10, 0]), Tolerance::USUAL, 0, lattice()), [0, 2, 4]);
         assert_eq!(thin(&line(&[0, 10, 15, 10, 0]), Tolerance::USUAL, 0, lattice()), [0, 4]);
-        assert_eq!(thin(&line(&[0, 10, 25, 10, 0]), Tolerance::USUAL.times(2), 0, lattice()), [0, 4]);
+        assert_eq!(thin(&line(&[0, 10, 25, 10, 0]), Tolerance::ALL[1], 0, lattice()), [0, 4]);
     }
 
     proptest! {

@@ -150,7 +150,12 @@ fn residuals_without(modules: &[LoadModule], ground: &Reference, left_out: &[Pos
 pub struct Bodies<'a> {
     steps: i32,
     bodies: Vec<Body<'a>>,
+    /// Bodies by the blocks of posts that they reach into, in their order.
+    blocks: HashMap<(i32, i32), Vec<u32>>,
 }
+
+/// Posts a side of a block.
+const BLOCK: i32 = 8;
 
 struct Body<'a> {
     ground: SurfaceGround,
@@ -167,8 +172,22 @@ impl<'a> Bodies<'a> {
     /// Those of a tile.
     pub fn of(features: &'a TileFeatures) -> Self {
         let steps = features.kept.steps_per_post;
-        let bodies = features.bodies().map(|surfaces| Body::of(surfaces, steps)).collect();
-        Self { steps, bodies }
+        let bodies: Vec<Body> = features.bodies().map(|surfaces| Body::of(surfaces, steps)).collect();
+        let mut blocks: HashMap<(i32, i32), Vec<u32>> = HashMap::new();
+        for (number, body) in (0..).zip(&bodies) {
+            let [south, west, north, east] = body.reach.map(|at| at.div_euclid(BLOCK * steps.max(1)));
+            for block in (south..=north).flat_map(|row| (west..=east).map(move |col| (row, col))) {
+                blocks.entry(block).or_default().push(number);
+            }
+        }
+        Self { steps, bodies, blocks }
+    }
+
+    /// The bodies that may hold a place, in their order.
+    fn near(&self, at: LatticePoint) -> impl Iterator<Item = &Body<'a>> {
+        let side = BLOCK * self.steps.max(1);
+        let block = self.blocks.get(&(at.row.div_euclid(side), at.col.div_euclid(side)));
+        block.into_iter().flatten().map(|number| &self.bodies[*number as usize])
     }
 
     /// Whether there is a lake.
@@ -178,7 +197,7 @@ impl<'a> Bodies<'a> {
 
     /// The level of the lake that a place, in steps of the features' lattice, lies in or on the shore of.
     pub fn lake_level(&self, at: LatticePoint) -> Option<i32> {
-        let first = self.bodies.iter().find(|body| body.holds(at, self.steps))?;
+        let first = self.near(at).find(|body| body.holds(at, self.steps))?;
         (first.ground == SurfaceGround::Lake).then_some(first.level)
     }
 
@@ -216,7 +235,7 @@ impl<'a> Bodies<'a> {
                     let at = LatticePoint::new(post.row * self.steps, post.col * self.steps);
                     let is_shore = is_within(a, b, at, self.steps)
                         && !dem.is_void(post)
-                        && !self.bodies.iter().any(|body| body.holds(at, self.steps));
+                        && !self.near(at).any(|body| body.holds(at, self.steps));
                     if is_shore {
                         posts.insert(post);
                     }

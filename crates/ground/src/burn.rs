@@ -20,8 +20,13 @@ pub fn slope_reach(spacing: Spacing) -> i32 {
 }
 
 /// A window with what features put into the ground of a tile that covers `tile`, as far as it reaches into it.
-pub fn burn(window: Window, features: &TileFeatures, tile: PostRect, spacing: Spacing) -> Window {
-    if features.surfaces.is_empty() && features.slopes.is_empty() {
+pub fn burn(
+    window: Window,
+    features: &TileFeatures,
+    tile: PostRect,
+    (spacing, left_out_weight): (Spacing, f64),
+) -> Window {
+    if features.surfaces.is_empty() && features.shaped.is_empty() && features.slopes.is_empty() {
         return window;
     }
     let Some(within) = tile.intersection(&window.dem.rect()) else { return window };
@@ -29,14 +34,18 @@ pub fn burn(window: Window, features: &TileFeatures, tile: PostRect, spacing: Sp
     burning.slopes();
     burning.surfaces();
     burning.shores();
-    let Burning { rect, heights, class_of, .. } = burning;
-    let importance = importance(&window.importance, rect, &class_of);
+    let Burning { rect, heights, class_of, is_shaped, .. } = burning;
+    let importance = importance(&window.importance, rect, &class_of, (&is_shaped, left_out_weight));
     let mut dem = Dem::from_fn(rect, |post| heights[rect.index(post)]);
     // Holes keep the heights that close the surface over them.
     dem.fill_voids(|post| window.dem.height(post));
     let is_changed =
         |post: &Post| dem.is_void(*post) != window.dem.is_void(*post) || dem.height(*post) != window.dem.height(*post);
-    let changed = rect.posts().filter(|post| class_of[rect.index(*post)].is_some() || is_changed(post));
+    let is_featured = |post: &Post| {
+        let index = rect.index(*post);
+        class_of[index].is_some() || (is_changed(post) && !is_shaped[index])
+    };
+    let changed = rect.posts().filter(is_featured);
     // What the features of another tile changed stays changed.
     let mut featured: Vec<Post> = window.featured.iter().copied().chain(changed).collect();
     featured.sort_unstable();
@@ -44,13 +53,21 @@ pub fn burn(window: Window, features: &TileFeatures, tile: PostRect, spacing: Sp
     Window { dem, importance, featured, ..window }
 }
 
-/// Posts on features weigh nothing and have the class of the feature, also where a lake closes a hole.
-fn importance(before: &Importance, rect: PostRect, class_of: &[Option<u8>]) -> Importance {
-    if class_of.iter().all(Option::is_none) {
+/// Posts on features weigh nothing and have the class of the feature, also where a lake closes a hole. Posts on what is
+/// not in the TIN weigh so many times what they did.
+fn importance(
+    before: &Importance,
+    rect: PostRect,
+    class_of: &[Option<u8>],
+    (is_shaped, times): (&[bool], f64),
+) -> Importance {
+    if class_of.iter().all(Option::is_none) && !is_shaped.contains(&true) {
         return before.clone();
     }
+    let more = |weight: u16| (f64::from(weight) * times).min(f64::from(u16::MAX)) as u16;
     let of = |post: Post| match class_of[rect.index(post)] {
         Some(class) => (0, class),
+        None if is_shaped[rect.index(post)] => (more(before.weight(post)), before.class(post)),
         None => (before.weight(post), before.class(post)),
     };
     let (weights, classes) = rect.posts().map(of).unzip();
@@ -68,6 +85,8 @@ struct Burning<'a> {
     heights: Vec<Option<i32>>,
     /// The class of the feature that a post lies on.
     class_of: Vec<Option<u8>>,
+    /// Whether a post lies on a feature that is not in the TIN.
+    is_shaped: Vec<bool>,
 }
 
 impl<'a> Burning<'a> {
@@ -75,8 +94,8 @@ impl<'a> Burning<'a> {
         let rect = window.dem.rect();
         let heights: Vec<Option<i32>> =
             rect.posts().map(|post| (!window.dem.is_void(post)).then(|| window.dem.height(post))).collect();
-        let class_of = vec![None; heights.len()];
-        Self { rect, within, features, spacing, steps: features.kept.steps_per_post, heights, class_of }
+        let (class_of, is_shaped) = (vec![None; heights.len()], vec![false; heights.len()]);
+        Self { rect, within, features, spacing, steps: features.kept.steps_per_post, heights, class_of, is_shaped }
     }
 
     /// Lowers and lifts the ground beside roads, each post by the edge nearest to it.
@@ -101,19 +120,22 @@ impl<'a> Burning<'a> {
         }
     }
 
-    /// Puts posts on features at the features' heights; where two overlap, the first has the post.
+    /// Puts posts on features at the features' heights; where two overlap, the first has the post, and those in the TIN
+    /// come first.
     fn surfaces(&mut self) {
         let features = self.features;
-        for body in features.bodies() {
+        let bodies = features.bodies().map(|body| (body, true));
+        for (body, is_held) in bodies.chain(features.shaped_bodies().map(|body| (body, false))) {
             let rings: Vec<&[Vertex]> = body.iter().map(|surface| &surface.ring[..]).collect();
             let banks = (body[0].ground == SurfaceGround::River).then(|| Near::of(&rings, self.steps));
             for post in posts_inside(&rings, self.steps, self.within) {
                 let index = self.rect.index(post);
-                if self.class_of[index].is_some() {
+                if self.class_of[index].is_some() || self.is_shaped[index] {
                     continue;
                 }
                 let height = match body[0].ground {
                     // A hole of the ground stays one under a road.
+                    _ if !is_held && self.heights[index].is_none() => continue,
                     SurfaceGround::Road if self.heights[index].is_none() => continue,
                     SurfaceGround::Road => height_in(&rings, self.place(post)),
                     SurfaceGround::Lake => rings[0][0].height,
@@ -122,21 +144,24 @@ impl<'a> Burning<'a> {
                     }
                 };
                 self.heights[index] = Some(height);
-                self.class_of[index] = Some(body[0].class);
+                self.class_of[index] = is_held.then_some(body[0].class);
+                self.is_shaped[index] = !is_held;
             }
         }
     }
 
     /// Lifts what lies within a post of a lake and lower than it.
     fn shores(&mut self) {
-        for lake in self.features.surfaces.iter().filter(|surface| surface.ground == SurfaceGround::Lake) {
+        let all = self.features.surfaces.iter().chain(&self.features.shaped);
+        for lake in all.filter(|surface| surface.ground == SurfaceGround::Lake) {
             let ring = &lake.ring;
             for (at, &a) in ring.iter().enumerate() {
                 let b = ring[(at + 1) % ring.len()];
                 for post in self.posts_near(&[a, b], 1) {
                     let index = self.rect.index(post);
                     let is_near = nearest_on([a, b], self.place(post)).0 <= f64::from(self.steps);
-                    let ground = self.heights[index].filter(|_| is_near && self.class_of[index].is_none());
+                    let is_free = is_near && self.class_of[index].is_none() && !self.is_shaped[index];
+                    let ground = self.heights[index].filter(|_| is_free);
                     self.heights[index] = ground.map(|ground| ground.max(a.height + 1)).or(self.heights[index]);
                 }
             }
@@ -316,7 +341,7 @@ mod tests {
 
     fn burned(window: Window, features: &TileFeatures) -> Window {
         let tile = window.dem.rect();
-        burn(window, features, tile, Spacing::from_metres(10.0).unwrap())
+        burn(window, features, tile, (Spacing::from_metres(10.0).unwrap(), 2.0))
     }
 
     #[test]
@@ -348,6 +373,20 @@ mod tests {
         assert_eq!(window.dem.height(Post::new(12, 10)), 9);
         assert!(window.dem.is_void(hole));
         assert_eq!(window.dem.height(hole), 8, "the surface over a hole is where it was");
+    }
+
+    #[test]
+    fn a_lake_that_is_not_in_the_tin_is_level_and_its_posts_weigh_twice() {
+        let corners = [(4.5, 4.5), (4.5, 15.5), (15.5, 15.5), (15.5, 4.5)];
+        let ring = corners.map(|(row, col)| vertex(row, col, 500)).to_vec();
+        let shaped = vec![surface(SurfaceGround::Lake, ring)];
+        let features = TileFeatures { shaped, ..features(Vec::new(), Vec::new()) };
+        let window = burned(window(|post| Some(post.col * 40)), &features);
+        let at = |row, col| (window.dem.height(Post::new(row, col)), window.importance.weight(Post::new(row, col)));
+        // The shore is lifted; nothing counts as a part of features but what is beside them.
+        assert_eq!((at(10, 10), at(10, 4), at(10, 3)), ((500, 2000), (501, 1000), (120, 1000)));
+        assert!(!window.featured.contains(&Post::new(10, 10)) && window.featured.contains(&Post::new(10, 4)));
+        assert_eq!(window.importance.class(Post::new(10, 10)), 0);
     }
 
     #[test]

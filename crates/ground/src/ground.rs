@@ -68,8 +68,8 @@ impl Ground {
         folder: &Folder,
     ) -> Result<Self, GroundError> {
         let ground = Self::open(job, area, workers, stop)?;
-        if job.features.is_some() {
-            ground.burn_in(folder, area);
+        if let Some(spec) = &job.features {
+            ground.burn_in(folder, area, spec.left_out_weight);
         }
         Ok(ground)
     }
@@ -173,9 +173,10 @@ impl Ground {
         self.relief.bounds.map(|bounds| told.fold(bounds, Bounds::and))
     }
 
-    /// From now on, features are burned into every window but natural ones, as `folder` has them.
-    pub fn burn_in(&self, folder: &Folder, area: &GamingArea) {
-        self.lines.get_or_init(|| Lines::new(folder, area, self.kept.is_some()));
+    /// From now on, features are burned into every window but natural ones, as `folder` has them. Posts on those that had
+    /// no room weigh `left_out_weight` times what they otherwise would.
+    pub fn burn_in(&self, folder: &Folder, area: &GamingArea, left_out_weight: f64) {
+        self.lines.get_or_init(|| Lines::new(folder, area, left_out_weight, self.kept.is_some()));
     }
 
     /// What features put into a tile; nothing before they are burned in.

@@ -20,17 +20,19 @@ pub(crate) struct Lines {
     folder: Folder,
     tiles: Vec<(TileId, PostRect)>,
     spacing: Spacing,
+    /// Times that posts on features weigh which are not in the TIN.
+    left_out_weight: f64,
     read: Mutex<LruCache<TileId, Arc<TileFeatures>>>,
     windows: Option<Vec<OnceLock<Arc<Window>>>>,
 }
 
 impl Lines {
     /// Of the tiles of `area`; `keeps` says whether windows of tiles are kept.
-    pub fn new(folder: &Folder, area: &GamingArea, keeps: bool) -> Self {
+    pub fn new(folder: &Folder, area: &GamingArea, left_out_weight: f64, keeps: bool) -> Self {
         let tiles: Vec<_> = area.tiles.iter().map(|&tile| (tile, area.tiling.rect(tile))).collect();
         let windows = keeps.then(|| tiles.iter().map(|_| OnceLock::new()).collect());
         let (folder, spacing) = (folder.clone(), area.frame.spacing);
-        Self { folder, tiles, spacing, read: Mutex::new(LruCache::new(TILES_MAX)), windows }
+        Self { folder, tiles, spacing, left_out_weight, read: Mutex::new(LruCache::new(TILES_MAX)), windows }
     }
 
     /// Where the window of a tile is kept.
@@ -52,7 +54,7 @@ impl Lines {
 
     /// The window of a tile with its features; its neighbours add nothing that it does not have.
     pub fn burn_tile(&self, window: Window, tile: TileId, rect: PostRect) -> Result<Window, GroundError> {
-        Ok(burn(window, &*self.features(tile)?, rect, self.spacing))
+        Ok(burn(window, &*self.features(tile)?, rect, (self.spacing, self.left_out_weight)))
     }
 
     /// A window with the features of all tiles that it touches.

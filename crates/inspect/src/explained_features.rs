@@ -1,6 +1,6 @@
 //! What features take of one load module, and what became of them there.
 
-use database::FeatureRemark;
+use database::{FeatureLeftOut, FeatureRemark};
 use product::Product;
 use terrain::ModuleId;
 
@@ -15,6 +15,8 @@ pub struct ExplainedFeatures {
     pub share_max: f64,
     /// What was mended, degraded or left out in it.
     pub remarks: Vec<FeatureRemark>,
+    /// Stretches from junction to junction, and bodies of water, that touch it and are not in the ground.
+    pub left_out: Vec<FeatureLeftOut>,
 }
 
 /// Those of a load module; nothing of a job without features.
@@ -28,10 +30,14 @@ pub(crate) fn explained_features(product: &Product, id: ModuleId, extent_m: [f64
     let [west, south, east, north] = extent_m;
     let lies_here =
         |remark: &&FeatureRemark| remark.at_m.is_some_and(|[x, y]| west <= x && x <= east && south <= y && y <= north);
+    let touches = |left: &&FeatureLeftOut| {
+        left.lines.iter().flatten().any(|[x, y, _]| west <= *x && *x <= east && south <= *y && *y <= north)
+    };
     Some(ExplainedFeatures {
         cost,
         share: f64::from(total) / f64::from(product.job.limits.per_load_module.max(1)),
-        share_max: spec.share_max,
+        share_max: spec.share_main.max(spec.share_max),
         remarks: remarks.iter().filter(lies_here).cloned().collect(),
+        left_out: level.left_out.iter().filter(touches).cloned().collect(),
     })
 }

@@ -109,6 +109,9 @@ pub const LAYER_CHARS_MAX: usize = 255;
 pub const RULE_WIDTH_M: std::ops::RangeInclusive<f64> = 0.01..=500.0;
 /// Percent of the greatest grade that a rule may give: half a right angle is the most.
 pub const RULE_GRADE_PERCENT: std::ops::RangeInclusive<f64> = 0.01..=100.0;
+/// Times that posts weigh which lie on features that there was no room for.
+pub const LEFT_OUT_WEIGHT: std::ops::RangeInclusive<f64> = 0.0..=10.0;
+
 /// The share of a load module's limit that features may take.
 pub const SHARE_MAX: std::ops::RangeInclusive<f64> = 0.01..=1.0;
 /// Metres that decks may be asked to keep clear of what runs below: the highest bridges leave so much.

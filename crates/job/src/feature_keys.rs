@@ -5,8 +5,8 @@ use std::ops::RangeInclusive;
 use features::{Form, Kind, RuleKind};
 
 use crate::bounds::{
-    BANK_M_MAX, CLEARANCE_M_MAX, EARTHWORK_M_MAX, FEATURE_SOURCES_MAX, GRADE_GIVE, LAYER_CHARS_MAX, NAME_CHARS_MAX,
-    RULE_GRADE_PERCENT, RULE_WIDTH_M, RULES_MAX, SHARE_MAX, SMOOTH_POSTS, TAG_CHARS_MAX, WKT_CHARS_MAX,
+    BANK_M_MAX, CLEARANCE_M_MAX, EARTHWORK_M_MAX, FEATURE_SOURCES_MAX, GRADE_GIVE, LAYER_CHARS_MAX, LEFT_OUT_WEIGHT,
+    NAME_CHARS_MAX, RULE_GRADE_PERCENT, RULE_WIDTH_M, RULES_MAX, SHARE_MAX, SMOOTH_POSTS, TAG_CHARS_MAX, WKT_CHARS_MAX,
 };
 use crate::sections::FILE_SAYS;
 use crate::{HeightsFrom, Key};
@@ -24,9 +24,21 @@ pub(crate) const FEATURES: &[Key] = &[
         .example("rules = [{ where = { highway = \"path\" }, kind = \"track\", width_m = 2 }]"),
     Key::new("buildings", "keep buildings, which `tiefort view` draws as blocks; they are no part of the ground")
         .usual("true"),
-    Key::new("share_max", "of what a load module may hold, how much features may take")
+    Key::new(
+        "share_main",
+        "of each limit, how much features may take for motorways, primary, rail, river, larger lakes",
+    )
+    .number("a share", SHARE_MAX)
+    .usual("0.8"),
+    Key::new("share_max", "of each limit, how much features may take for all others, and to be finer and wider")
         .number("a share", SHARE_MAX)
         .usual("0.5"),
+    Key::new(
+        "left_out_weight",
+        "times that posts weigh on roads and in water that had no room and only shape the ground",
+    )
+    .number("a factor", LEFT_OUT_WEIGHT)
+    .usual("2"),
     Key::new("clearance_road_m", "what decks keep clear of above roads and runways")
         .number(HIGH, CLEARANCE)
         .usual("4.5"),

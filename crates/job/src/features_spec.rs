@@ -13,8 +13,13 @@ pub struct FeaturesSpec {
     pub rules: Vec<Rule>,
     /// Whether buildings are kept beside the ground, to be drawn.
     pub buildings: bool,
+    /// The share of each limit that features may take while motorways, primary roads, railways, rivers and lakes of a
+    /// hectare and more are granted, from 0 to 1; never less than `share_max`.
+    pub share_main: f64,
     /// The share of each limit that features may take, from 0 to 1.
     pub share_max: f64,
+    /// Times that posts weigh which lie on features that there was no room for.
+    pub left_out_weight: f64,
     /// How many times its greatest grade a road may be where limits of cut and fill ask for it, from 1.
     pub grade_give: f64,
     /// How high decks stand over what they cross, where they rest, and how far roads follow the ground.

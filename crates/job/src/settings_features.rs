@@ -15,7 +15,9 @@ pub(crate) fn describe(features: &FeaturesSpec, list: &mut List) {
         list.add_with("features.rules", format!("[{}]", rules.join(", ")), counted(rules.len(), "rule"));
     }
     list.add("features.buildings", features.buildings.to_string());
+    list.add("features.share_main", number(features.share_main));
     list.add("features.share_max", number(features.share_max));
+    list.add("features.left_out_weight", number(features.left_out_weight));
     let GradeOptions { clearances, bank, cut_max, fill_max, clip, smooth_milliposts } = features.options;
     let Clearances { road, rail, water } = clearances;
     let lengths = [

@@ -36,7 +36,12 @@ pub struct Faces {
     edges: Vec<[LatticePoint; 2]>,
     /// The parts in each cell, by row and column, in the order of their faces.
     cells: BTreeMap<[i32; 2], Vec<u32>>,
+    /// Faces whose outlines triangles need not keep: they give their class where they cover more than half of one.
+    loose: Option<Box<Faces>>,
 }
+
+/// Parts of a side into which a triangle is cut to see how much of it a face covers.
+const PARTS: i64 = 4;
 
 /// The edges of a face that reach into one row of cells.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -48,9 +53,36 @@ struct Part {
 impl Faces {
     /// Faces whose rings count in steps of which so many make a post. Of faces that overlap the first wins.
     pub fn new(faces: &[Face], steps_per_post: i32) -> Self {
-        let mut index = Self { steps_per_post, parts: Vec::new(), edges: Vec::new(), cells: BTreeMap::new() };
+        let mut index =
+            Self { steps_per_post, parts: Vec::new(), edges: Vec::new(), cells: BTreeMap::new(), loose: None };
         faces.iter().for_each(|face| index.add(face));
         index
+    }
+
+    /// Adds faces whose outlines triangles need not keep.
+    #[must_use]
+    pub fn with_loose(self, faces: &[Face]) -> Self {
+        let loose = (!faces.is_empty()).then(|| Box::new(Self::new(faces, self.steps_per_post)));
+        Self { loose, ..self }
+    }
+
+    /// The class that covers more than half of a triangle, by the centres of its parts.
+    fn class_over(&self, corners: [[i64; 2]; 3], units_per_post: i32) -> Option<u8> {
+        let [a, b, c] = corners;
+        // Places in parts of a side along two of them.
+        let at =
+            |i: i64, j: i64| [0, 1].map(|axis| PARTS * a[axis] + i * (b[axis] - a[axis]) + j * (c[axis] - a[axis]));
+        let mut found: BTreeMap<u8, i64> = BTreeMap::new();
+        for (i, j) in (0..PARTS).flat_map(|i| (0..PARTS - i).map(move |j| (i, j))) {
+            let up = [at(i, j), at(i + 1, j), at(i, j + 1)];
+            let down = (i + j < PARTS - 1).then(|| [at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)]);
+            for part in std::iter::once(up).chain(down) {
+                if let Some(class) = self.class_at(part, units_per_post * PARTS as i32) {
+                    *found.entry(class).or_default() += 1;
+                }
+            }
+        }
+        found.into_iter().find(|(_, count)| PARTS * PARTS < 2 * count).map(|(class, _)| class)
     }
 
     /// The class of each triangle that lies inside a face, by the triangles' order.
@@ -68,12 +100,13 @@ impl Faces {
         let centre = Centre::of(corners, self.steps_per_post, units_per_post);
         let cell = i128::from(CELL_POSTS * self.steps_per_post) * centre.den;
         let [row, col] = [centre.row, centre.col].map(|at| i32::try_from(at.div_euclid(cell)).ok());
-        let parts = self.cells.get(&[row?, col?])?.iter().map(|&part| &self.parts[part as usize]);
+        let parts = self.cells.get(&[row?, col?]).into_iter().flatten().map(|&part| &self.parts[part as usize]);
         let is_inside = |part: &&Part| {
             let edges = &self.edges[part.edges.start as usize..part.edges.end as usize];
             edges.iter().filter(|edge| centre.is_west_of(**edge)).count() % 2 == 1
         };
-        parts.into_iter().find(is_inside).map(|part| part.class)
+        let own = parts.into_iter().find(is_inside).map(|part| part.class);
+        own.or_else(|| self.loose.as_ref()?.class_over(corners, units_per_post))
     }
 
     fn add(&mut self, face: &Face) {

@@ -23,7 +23,7 @@ pub use features_gpkg::features_package;
 mod kept;
 pub use kept::{from_curvature, from_features, from_tally, to_curvature, to_features, to_tally};
 mod told;
-pub use told::{Told, read_told, told};
+pub use told::{Told, left_out_warnings, read_told, told};
 mod drape;
 pub use drape::{Drape, DrapedArea, SQUARE_PIXELS};
 mod page;

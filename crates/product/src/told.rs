@@ -6,8 +6,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use database::{
-    AreaLevel, FeatureLine, FeatureRemark, LineRole, ReportFeatureChecks, ReportFeatureClass, ReportFeatureCost,
-    ReportFeatureRemarks, ReportFeatures,
+    AreaLevel, FeatureAmounts, FeatureLine, FeatureRemark, LineRole, ReportFeatureChecks, ReportFeatureClass,
+    ReportFeatureCost, ReportFeatureRemarks, ReportFeatures,
 };
 use fidelity::FeatureFigures;
 use ground::GamingArea;
@@ -30,7 +30,15 @@ pub struct Told {
 pub fn told(job: &Job, area: &GamingArea, level: &AreaLevel, figures: &FeatureFigures) -> Told {
     let extent_m = extent_m(area);
     let missing = missing(area, level, figures);
-    let remarks: Vec<FeatureRemark> = level.remarks.iter().cloned().chain(missing).collect();
+    let ends = level.ends.iter().map(|end| FeatureRemark {
+        feature: end.feature.clone(),
+        at_m: Some(end.at_m),
+        found: "it ends here although its source goes on".into(),
+        done: "what goes on had no room".into(),
+        leaves_out: false,
+        degrades: true,
+    });
+    let remarks: Vec<FeatureRemark> = level.remarks.iter().cloned().chain(missing).chain(ends).collect();
     let names = job.class_names();
     let classes = classes(level).into_iter().map(|class| ReportFeatureClass {
         name: names.get(usize::from(class)).cloned().unwrap_or_default(),
@@ -65,6 +73,36 @@ pub fn read_told(opened: &Opened) -> Result<Option<(AreaLevel, Told)>, ProductEr
     Ok(Some((level, told)))
 }
 
+/// The share of a main kind that may be left out without a warning, and that of all ways.
+const LEFT_OUT_MAX: [f64; 2] = [0.01, 0.1];
+
+/// What a person should know of what had no room: too much of a main class, of all ways, or lakes of a hectare.
+pub fn left_out_warnings(job: &Job, level: &AreaLevel) -> Vec<String> {
+    let (names, amounts) = (job.class_names(), &level.amounts);
+    let out = |wanted: f64, kept: f64, most: f64| most * wanted < wanted - kept;
+    let told = |what: &str, wanted: f64, kept: f64| {
+        let percent = 100.0 * (wanted - kept) / wanted;
+        let [left, wanted] = [wanted - kept, wanted].map(|metres| metres / 1000.0);
+        format!("{percent:.1} % of {what} had no room and is left out: {left:.1} of {wanted:.1} km")
+    };
+    let mut warnings: Vec<String> = amounts
+        .iter()
+        .filter(|of| of.is_main && out(of.wanted_m, of.kept_m, LEFT_OUT_MAX[0]))
+        .map(|of| told(names.get(usize::from(of.class)).map_or("a class", String::as_str), of.wanted_m, of.kept_m))
+        .collect();
+    let sum = |of: fn(&FeatureAmounts) -> f64| amounts.iter().map(of).sum::<f64>();
+    let (wanted, kept) = (sum(|of| of.wanted_m), sum(|of| of.kept_m));
+    if out(wanted, kept, LEFT_OUT_MAX[1]) {
+        warnings.push(told("all roads, rivers and lines", wanted, kept));
+    }
+    let lakes = amounts.iter().map(|of| of.lakes_wanted - of.lakes_kept).sum::<u32>();
+    if 0 < lakes {
+        let all = amounts.iter().map(|of| of.lakes_wanted).sum::<u32>();
+        warnings.push(format!("{lakes} of {all} lakes of a hectare and more had no room and are left out"));
+    }
+    warnings
+}
+
 /// Remarks, each counted once, by the worst that was done.
 fn counts(remarks: &[FeatureRemark]) -> ReportFeatureRemarks {
     let mut counts = ReportFeatureRemarks::default();
@@ -83,7 +121,7 @@ fn classes(level: &AreaLevel) -> BTreeSet<u8> {
     let of_lines = level.lines.iter().map(|line| line.class);
     let of_strips = level.strips.iter().map(|strips| strips.class);
     let of_decks = level.decks.iter().map(|deck| deck.class);
-    let of_wanted = level.wanted_m.iter().map(|(class, _)| *class);
+    let of_wanted = level.amounts.iter().map(|amounts| amounts.class);
     of_lines
         .chain(of_wanted)
         .chain(of_strips)
@@ -120,9 +158,13 @@ fn lengths(level: &AreaLevel, class: u8, extent_m: [f64; 4]) -> ReportFeatureCla
         sum_km(lines.flat_map(|line| edges(line, extent_m)).map(|[a, b]| length_m(a, b)))
     };
     let strips = level.strips.iter().filter(|strips| strips.class == class);
+    let amounts = level.amounts.iter().find(|amounts| amounts.class == class).copied().unwrap_or_default();
     ReportFeatureClass {
         name: String::new(),
-        wanted_km: sum_km(level.wanted_m.iter().filter(|(of, _)| *of == class).map(|(_, metres)| *metres)),
+        wanted_km: amounts.wanted_m / 1000.0,
+        kept_km: amounts.kept_m / 1000.0,
+        lakes_wanted: amounts.lakes_wanted.into(),
+        lakes_kept: amounts.lakes_kept.into(),
         line_km: km(&[LineRole::Centre, LineRole::Breakline]),
         strip_km: sum_km(strips.map(|strips| strips.length_m)),
         channel_km: km(&[LineRole::Channel]),
@@ -146,6 +188,7 @@ fn checks(level: &AreaLevel, figures: &FeatureFigures, extent_m: [f64; 4]) -> Re
         stations_steeper: level.strips.iter().map(|strips| strips.steeper).sum(),
         strip_stations: level.strips.iter().map(|strips| 2 * strips.pieces).sum(),
         strip_fall_max_m: metres(level.strips.iter().map(|strips| strips.fall_max).max().unwrap_or(0)),
+        loose_ends: level.ends.len() as u64,
         lakes: lakes(level.lines.iter(), extent_m),
         lake_spread_max_m: metres(figures.lake_spread),
         shore_posts: figures.shore_posts,

@@ -12,6 +12,8 @@ pub struct TileFeatures {
     pub kept: Features,
     /// Ground that has the class of a feature, of all that touches the tile.
     pub surfaces: Vec<FeatureSurface>,
+    /// Ground that features shape without being in the TIN, of all that touches the tile: where they had no room.
+    pub shaped: Vec<FeatureSurface>,
     /// Edges of roads within reach of the tile, beside which the ground slopes to the natural one.
     pub slopes: Vec<[Vertex; 2]>,
     /// Bridges: polygons above the ground, of all that touch the tile. Their rings are simple.
@@ -42,21 +44,38 @@ pub enum SurfaceGround {
     River,
 }
 
+impl FeatureSurface {
+    fn is_of_one_body(&self, other: &Self) -> bool {
+        (self.class, self.ground, self.body) == (other.class, other.ground, other.body)
+    }
+}
+
 impl TileFeatures {
     /// Those of a tile without any.
     pub fn none(tile: TileId) -> Self {
-        Self { tile, kept: Features::default(), surfaces: Vec::new(), slopes: Vec::new(), decks: Vec::new() }
+        Self {
+            tile,
+            kept: Features::default(),
+            surfaces: Vec::new(),
+            shaped: Vec::new(),
+            slopes: Vec::new(),
+            decks: Vec::new(),
+        }
     }
 
     /// Parts of roads, lakes and rivers, each with its rings; where two overlap, the first has the ground.
     pub fn bodies(&self) -> impl Iterator<Item = &[FeatureSurface]> {
-        let same = |a: &FeatureSurface, b: &FeatureSurface| (a.class, a.ground, a.body) == (b.class, b.ground, b.body);
-        self.surfaces.chunk_by(same)
+        self.surfaces.chunk_by(FeatureSurface::is_of_one_body)
+    }
+
+    /// The same of ground that features shape without being in the TIN.
+    pub fn shaped_bodies(&self) -> impl Iterator<Item = &[FeatureSurface]> {
+        self.shaped.chunk_by(FeatureSurface::is_of_one_body)
     }
 
     /// Whether there is nothing that changes the ground or lies above it.
     pub fn is_empty(&self) -> bool {
-        let Self { tile: _, kept, surfaces, slopes, decks } = self;
-        kept.is_empty() && surfaces.is_empty() && slopes.is_empty() && decks.is_empty()
+        let Self { tile: _, kept, surfaces, shaped, slopes, decks } = self;
+        kept.is_empty() && surfaces.is_empty() && shaped.is_empty() && slopes.is_empty() && decks.is_empty()
     }
 }

@@ -8,14 +8,13 @@ use Align::{Left, Right};
 
 /// The block of the text report.
 pub(crate) fn features_text(features: &ReportFeatures) -> String {
-    let mut table = Table::new(&[Left, Right, Right, Right, Right, Right, Right, Right]);
-    table.row(["Roads, water", "km", "of", "strips", "lakes", "triangles", "load module", "4 km square"]);
+    let mut table = Table::new(&[Left, Right, Right, Right, Right, Right, Right, Right, Right]);
+    table.row(["Roads, water", "km", "of", "kept", "strips", "lakes", "triangles", "module", "4 km"]);
     for class in &features.classes {
-        let [km, wanted, strips, lakes] = amounts(class);
         let name = format!("  {}", class.name);
-        table.row([name, km, wanted, strips, lakes].into_iter().chain(cost(&class.cost)));
+        table.row([name].into_iter().chain(amounts(class)).chain(cost(&class.cost)));
     }
-    let nothing = [const { String::new() }; 4];
+    let nothing = [const { String::new() }; 5];
     table.row(["  all".to_owned()].into_iter().chain(nothing).chain(cost(&features.all)));
     let mut checks = Table::new(&[Left, Left]);
     for (what, found) in check_rows(&features.checks) {
@@ -24,13 +23,37 @@ pub(crate) fn features_text(features: &ReportFeatures) -> String {
     format!("{}  {}\n{}", table.text(0), remarks_in_words(features), checks.text(2))
 }
 
-/// Kilometres in the ground, of how many, those of strips among them, and lakes of a class; nothing where it has none.
-pub(crate) fn amounts(class: &ReportFeatureClass) -> [String; 4] {
+/// Kilometres in the ground, of how many, that in per cent, those of strips among them, and lakes of a class; nothing
+/// where it has none.
+pub(crate) fn amounts(class: &ReportFeatureClass) -> [String; 5] {
     let km = |km: f64| if 0.0 < km { format!("{km:.2}") } else { String::new() };
-    let lakes = if class.lakes == 0 { String::new() } else { grouped(class.lakes) };
-    let in_ground = class.line_km + class.strip_km + class.channel_km;
-    let in_ground = if 0.0 < class.wanted_km { format!("{in_ground:.2}") } else { km(in_ground) };
-    [in_ground, km(class.wanted_km), km(class.strip_km), lakes]
+    let lakes = match (class.lakes, class.lakes_wanted) {
+        (0, 0) => String::new(),
+        (lakes, _) => grouped(lakes),
+    };
+    let kept = kept(class).map(|kept| format!("{:.1} %", 100.0 * kept)).unwrap_or_default();
+    let in_ground = if 0.0 < class.wanted_km { format!("{:.2}", class.kept_km) } else { String::new() };
+    [in_ground, km(class.wanted_km), kept, km(class.strip_km), lakes]
+}
+
+/// The share of the kilometres of a class that are in the ground, or of its lakes of a hectare and more.
+pub(crate) fn kept(class: &ReportFeatureClass) -> Option<f64> {
+    if 0.0 < class.wanted_km {
+        Some(class.kept_km / class.wanted_km)
+    } else {
+        (0 < class.lakes_wanted).then(|| class.lakes_kept as f64 / class.lakes_wanted as f64)
+    }
+}
+
+/// The least share of a class above tracks that is well kept.
+const KEPT_WELL: f64 = 0.95;
+
+/// Classes that are less to a reader where less of them is in the ground.
+const SMALL: [&str; 2] = ["track", "stream"];
+
+/// Whether too little of a class is in the ground.
+pub(crate) fn is_thin(class: &ReportFeatureClass) -> bool {
+    !SMALL.contains(&class.name.as_str()) && kept(class).is_some_and(|kept| kept < KEPT_WELL)
 }
 
 /// Triangles, and the most of a limit that they take.
@@ -57,6 +80,8 @@ pub(crate) fn check_rows(checks: &ReportFeatureChecks) -> Vec<(&'static str, Str
         ("pieces of roads too steep", of(checks.stations_steeper, checks.stations)),
         ("largest fall across a strip", format!("{:.3} m", checks.strip_fall_max_m)),
         ("edges of rivers that rise", of(checks.river_edges_rising, checks.river_edges)),
+        ("ends where the source goes on", grouped(checks.loose_ends)),
+        ("pieces of kept stretches missing", grouped(checks.pieces_missing)),
         ("lakes are level to within", format!("{:.3} m", checks.lake_spread_max_m)),
         ("posts of shores below water", of(checks.shore_posts_below, checks.shore_posts)),
         (

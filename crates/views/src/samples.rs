@@ -154,6 +154,9 @@ pub(crate) fn features() -> ReportFeatures {
     let class = |name: &str, line_km, strip_km, lakes| ReportFeatureClass {
         name: name.into(),
         wanted_km: 1.5 * (line_km + strip_km),
+        kept_km: line_km + strip_km,
+        lakes_wanted: lakes,
+        lakes_kept: lakes / 2,
         line_km,
         strip_km,
         lakes,

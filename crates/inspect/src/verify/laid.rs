@@ -25,6 +25,7 @@ impl Laid<'_> {
     pub fn problems(&self, modules: &Modules) -> Vec<String> {
         let kept = self.kept();
         let bodies = self.bodies();
+        let shaped: BTreeSet<u8> = self.features.shaped.iter().map(|surface| surface.class).collect();
         let mut problems = Vec::new();
         for id in self.area.tiling.modules(self.features.tile, self.area.grid).iter() {
             let Some(module) = modules.get(&id) else { continue };
@@ -32,7 +33,7 @@ impl Laid<'_> {
             let found = [
                 kept.lacking_vertex(&square),
                 kept.lacking_edge(&square),
-                wrong_class(&square, &bodies, self.first_class),
+                wrong_class(&square, &bodies, &shaped, self.first_class),
                 uneven(&square, &bodies, &kept),
                 wrong_decks(&self.features.decks, &|place| self.at(place), &square),
             ];
@@ -202,12 +203,13 @@ fn bodies_under<'a>(square: &Square, bodies: &'a [Body]) -> Vec<Option<&'a Body>
     square.module.triangles.iter().map(under).collect()
 }
 
-fn wrong_class(square: &Square, bodies: &[Body], first_class: usize) -> Option<String> {
+fn wrong_class(square: &Square, bodies: &[Body], shaped: &BTreeSet<u8>, first_class: usize) -> Option<String> {
     let under = bodies_under(square, bodies);
     let is_wrong = |(class, body): &(&u8, &Option<&Body>)| match body {
         _ if **class == HOLE_CLASS => false,
         Some(body) => **class != body.class,
-        None => first_class <= usize::from(**class),
+        // What is not in the TIN may cover most of a triangle.
+        None => first_class <= usize::from(**class) && !shaped.contains(*class),
     };
     let wrong = square.module.classes.iter().zip(&under).filter(is_wrong).count();
     (0 < wrong).then(|| format!("{wrong} triangles have not the class of the road or water under them"))

@@ -32,7 +32,9 @@ pub(super) fn read(
         sources,
         rules: rules.as_ref().map_or(Ok(Vec::new()), |rules| read_rules(rules, importance))?,
         buildings: features.flag("buildings")?,
+        share_main: features.number("share_main")?,
         share_max: features.number("share_max")?,
+        left_out_weight: features.number("left_out_weight")?,
         grade_give: features.number("grade_give")?,
         options: GradeOptions {
             clearances: Clearances {

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use database::FeatureRemark;
+use database::{FeatureLeftOut, FeatureRemark, FeatureWhy};
 use inspect::{ExplainedFeatures, Explanation, explain};
 use product::WantedGround;
 use serde_json::{Value, json};
@@ -144,7 +144,26 @@ fn features_text(features: &ExplainedFeatures) -> String {
     if 0 < more {
         text += &format!("  and {} more in features.geojson\n", grouped(more as u64));
     }
+    for left in features.left_out.iter().take(REMARKS_MAX) {
+        text += &format!("  left out: {}, {:.0} m: {}\n", left.feature, left.length_m, why_text(left.why));
+    }
+    let more = features.left_out.len().saturating_sub(REMARKS_MAX);
+    if 0 < more {
+        text += &format!("  and {} more: --format json\n", grouped(more as u64));
+    }
     text
+}
+
+/// Why something is not in the ground, a limit with its place.
+fn why_text(why: FeatureWhy) -> String {
+    match why {
+        FeatureWhy::Module(row, col) => format!("load module {row},{col} has no room"),
+        FeatureWhy::Window(row, col) => format!("the 4 km square from load module {row},{col} has no room"),
+        FeatureWhy::Area => "the area has no room".into(),
+        FeatureWhy::Stub => "it would lead nowhere".into(),
+        FeatureWhy::Alone => "it would hang together with too little".into(),
+        FeatureWhy::Pond => "its shore is long for so little water".into(),
+    }
 }
 
 fn stop_text(stop: StopReason) -> &'static str {
@@ -211,6 +230,10 @@ fn one_more_text(found: &Explanation) -> String {
     }
 }
 
+fn left_out_json(left: &FeatureLeftOut) -> Value {
+    json!({ "feature": left.feature, "length_m": left.length_m, "why": why_text(left.why) })
+}
+
 fn features_json(features: &ExplainedFeatures) -> Value {
     let remark = |remark: &FeatureRemark| {
         json!({
@@ -226,6 +249,7 @@ fn features_json(features: &ExplainedFeatures) -> Value {
         "classes": cost.collect::<Vec<_>>(),
         "share": features.share,
         "share_max": features.share_max,
+        "left_out": features.left_out.iter().map(left_out_json).collect::<Vec<_>>(),
         "remarks": features.remarks.iter().map(remark).collect::<Vec<_>>(),
     })
 }

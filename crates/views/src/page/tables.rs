@@ -5,7 +5,7 @@ use maud::{Markup, html};
 
 use super::advise;
 use super::marks::{BOUND_ROWS_MAX, Marks, ROWS_MAX};
-use crate::features_text::{amounts, check_rows, cost, remarks_in_words};
+use crate::features_text::{amounts, check_rows, cost, is_thin, kept, remarks_in_words};
 use crate::report::{border_in_words, eta_of, heights_in_words};
 use crate::table::grouped;
 
@@ -20,7 +20,28 @@ pub(super) fn verdict(report: &Report) -> Markup {
                 " not met: see " a href="#breaches" { "breaches" } "."
             }
         }
+        @if let Some(features) = &report.features { (in_the_ground(features)) }
         @for warning in &report.warnings { pre.quiet { "warning: " (warning) } }
+    }
+}
+
+/// How much of every class is in the ground, in a line; too little of one stands out.
+fn in_the_ground(features: &ReportFeatures) -> Markup {
+    let told: Vec<_> = features.classes.iter().filter_map(|class| Some((class, kept(class)?))).collect();
+    html! {
+        @if !told.is_empty() {
+            p.kept { "In the ground: "
+                @for (at, (class, kept)) in told.iter().enumerate() {
+                    @if 0 < at { ", " }
+                    span.thin[is_thin(class)] {
+                        (class.name) " " (format!("{:.1} %", 100.0 * kept))
+                        @if 0.0 < class.wanted_km { (format!(" of {:.1} km", class.wanted_km)) }
+                        @else { " of " (grouped(class.lakes_wanted)) " lakes of a hectare" }
+                    }
+                }
+                "."
+            }
+        }
     }
 }
 
@@ -217,14 +238,14 @@ pub(super) fn levels(report: &Report) -> Markup {
 
 /// What roads and water cost, and what must hold of them.
 pub(super) fn features(features: &ReportFeatures) -> Markup {
-    let row = |name: &str, amounts: [String; 4], costs: [String; 3]| {
-        html! { tr { td { (name) } @for cell in amounts.iter().chain(&costs) { td.n { (cell) } } } }
+    let row = |name: &str, is_thin: bool, amounts: [String; 5], costs: [String; 3]| {
+        html! { tr { td.thin[is_thin] { (name) } @for cell in amounts.iter().chain(&costs) { td.n { (cell) } } } }
     };
     html! {
-        (table(html! { th { "Class" } th.n { "km" } th.n { "of km wanted" } th.n { "as strips, km" } th.n { "lakes" }
+        (table(html! { th { "Class" } th.n { "km" } th.n { "of km wanted" } th.n { "kept" } th.n { "as strips, km" } th.n { "lakes" }
                 th.n { "triangles" } th.n { "most of a load module" } th.n { "most of a 4 km square" } }, html! {
-            @for class in &features.classes { (row(&class.name, amounts(class), cost(&class.cost))) }
-            (row("all", [const { String::new() }; 4], cost(&features.all)))
+            @for class in &features.classes { (row(&class.name, is_thin(class), amounts(class), cost(&class.cost))) }
+            (row("all", false, [const { String::new() }; 5], cost(&features.all)))
         }))
         p { (remarks_in_words(features)) "." }
         (table(html! { th { "What must hold" } th { "found" } }, html! {

@@ -1,0 +1,84 @@
+//! What there is to choose from, and what came of it.
+
+use crate::outlay::Outlays;
+use crate::pieces::is_narrow;
+use crate::shares::{Limit, Shares};
+use crate::strand::{Graded, Strand};
+use crate::stretches::{Part, Stretches};
+use crate::strokes::Stroke;
+use crate::tally::Way;
+use crate::{FeatureId, Form, Site};
+
+/// Why a stretch is not in the ground.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Why {
+    /// A limit has no room for it.
+    Limit(Limit),
+    /// It would end where its source goes on, soon after a junction or inside one load module.
+    Stub,
+    /// It would hang together with too little.
+    Alone,
+    /// A small body of water that would cost too much.
+    Pond,
+    /// It lies beyond the area, and nothing in the ground leads to it.
+    Beyond,
+}
+
+/// What there is to choose from.
+pub(crate) struct Choice<'a> {
+    pub stretches: &'a Stretches,
+    pub strokes: &'a [Stroke],
+    pub outlays: &'a Outlays,
+    pub shares: &'a Shares,
+    pub graded: &'a Graded<'a>,
+    pub site: &'a Site,
+}
+
+/// What was chosen: of each stretch what it is granted, or why it is not.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Chosen {
+    pub ways: Vec<Result<Way, Why>>,
+    /// Triangles of each load module by the estimate, without what was taken before.
+    pub estimate: Vec<i64>,
+    /// Whether any limit was in the way of anything.
+    pub is_bound: bool,
+}
+
+impl Choice<'_> {
+    /// The widest form that any part of a stretch may have.
+    pub fn form_most_of(&self, stretch: u32) -> u8 {
+        self.widest(stretch).0
+    }
+
+    /// The widest form that any part of a stretch may have, and the width of that part.
+    pub fn widest(&self, stretch: u32) -> (u8, i32) {
+        let network = self.graded.network;
+        let mut most = (0, 0);
+        if let Part::Way(_, edges) = &self.stretches.all[stretch as usize].part {
+            for traits in edges.iter().map(|edge| network.traits(*edge)).filter(|traits| !is_narrow(traits, network)) {
+                let form = match traits.form {
+                    Form::Line | Form::Polygon => 0,
+                    Form::Strip | Form::StripAlways => 1,
+                    Form::Bench => 2,
+                };
+                most = most.max((form, traits.width));
+            }
+        }
+        most
+    }
+}
+
+/// The features of a stretch.
+pub(crate) fn ids<'a>(
+    choice: &'a Choice,
+    stretch: u32,
+    strands: &'a [Strand],
+) -> Box<dyn Iterator<Item = FeatureId> + 'a> {
+    let network = choice.graded.network;
+    match &choice.stretches.all[stretch as usize].part {
+        Part::Way(_, edges) => {
+            Box::new(edges.iter().map(|edge| network.ways[network.edges[*edge as usize].way as usize].id))
+        }
+        Part::Strands(numbers) => Box::new(numbers.iter().map(|number| strands[*number as usize].id)),
+    }
+}
