@@ -146,7 +146,7 @@ mod tests {
             vertices: vec![vertex, ModuleVertex { y: 0, x: 12 * 128, z: 0 }],
             classes: Vec::new(),
             residual: ModuleResidual::default(),
-            decks: Vec::new(),
+            decks: terrain::Decks::default(),
         };
         let height = |post: Post| if post.col < 3 { 12_800 } else { 12_800 + 40 * 128 };
         let features = TileFeatures::none(terrain::TileId { row: 0, col: 0 });
