@@ -90,8 +90,6 @@ pub struct ReportFeatureChecks {
     pub river_edges_rising: u64,
     /// Ends of what is in the ground at which its source goes on; `features.geojson` has each of them.
     pub loose_ends: u64,
-    /// Pieces of stretches that are to be in the ground and are not.
-    pub pieces_missing: u64,
     /// Lakes.
     pub lakes: u64,
     /// How far any vertex of the TIN in a lake lies from the lake's level, in metres.

@@ -81,7 +81,6 @@ pub(crate) fn check_rows(checks: &ReportFeatureChecks) -> Vec<(&'static str, Str
         ("largest fall across a strip", format!("{:.3} m", checks.strip_fall_max_m)),
         ("edges of rivers that rise", of(checks.river_edges_rising, checks.river_edges)),
         ("ends where the source goes on", grouped(checks.loose_ends)),
-        ("pieces of kept stretches missing", grouped(checks.pieces_missing)),
         ("lakes are level to within", format!("{:.3} m", checks.lake_spread_max_m)),
         ("posts of shores below water", of(checks.shore_posts_below, checks.shore_posts)),
         (
