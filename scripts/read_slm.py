@@ -19,12 +19,18 @@ import sys
 import zlib
 
 MAGIC = b"\x89SLM\r\n\x1a\n"
-VERSIONS = [1, 2]
+VERSIONS = [1, 2, 3]
 FIXED_HEADER_BYTES = 124
 ENTRY = struct.Struct("<QIIIIii")
 DECK_ENTRY = struct.Struct("<IIii")
 SECTION = struct.Struct("<IIIIII4HIIQQ")
 DECKS = struct.Struct("<IIIII")
+TABLE = struct.Struct("<IIII")
+PART = struct.Struct("<III")
+LINE = struct.Struct("<BBBBHH")
+LINE_KINDS = ["travelled", "channel", "breakline"]
+LINE_FORMS = ["nothing", "line", "strip", "bench"]
+STOREYS = ["ground", "bridge", "tunnel"]
 SIDES = ["south", "east", "north", "west"]
 
 
@@ -57,8 +63,7 @@ def parse(data):
     (south, north), (west, east) = header["rows"], header["columns"]
     places = [(row, column) for row in range(south, north) for column in range(west, east)]
     places = [(level, place) for level in range(header["levels"]) for place in places]
-    has_decks = header["version"] == 2
-    each = entry_bytes(header)
+    version, each = header["version"], entry_bytes(header)
     index_length = each * len(places) + 4
     index = checked(data, header_length, index_length, "index")
     end = header_length + index_length
@@ -68,20 +73,26 @@ def parse(data):
         expect(entry[0] == end, "index", f"load module {place} begins at {entry[0]}, expected {end}")
         module = parse_module(data, header["side"], level, place, entry)
         end += entry[1]
-        if has_decks:
+        if version == 2:
             deck_entry = DECK_ENTRY.unpack_from(index, each * number + ENTRY.size)
             module["decks"], length = parse_decks(data, header["side"], level, place, deck_entry, end)
+            end += length
+        if version == 3:
+            (length,) = struct.unpack_from("<I", index, each * number + ENTRY.size)
+            module.update(parse_parts(data, header["side"], level, place, end, length))
             end += length
         modules.append(module)
     expect(end == len(data), "index", f"sections end at {end} of a file of {len(data)}")
     any_decks = any(module.get("decks", {}).get("triangles") for module in modules)
-    expect(any_decks == has_decks, "index", "found no decks in a file of version 2")
+    expect(any_decks or version != 2, "index", "found no decks in a file of version 2")
+    others = any(module.get("lines") or module.get("unknown_parts") for module in modules)
+    expect(others or version != 3, "index", "found no part other than decks in a file of version 3")
     return header, modules
 
 
 def entry_bytes(header):
     """Bytes of an entry of the index."""
-    return ENTRY.size + (DECK_ENTRY.size if header["version"] == 2 else 0)
+    return ENTRY.size + {1: 0, 2: DECK_ENTRY.size, 3: 4}[header["version"]]
 
 
 def parse_header(data):
@@ -181,19 +192,100 @@ def parse_decks(data, side, level, place, entry, start):
     found = DECKS.unpack_from(body)
     expect(found == (*place, level, vertex_count, triangle_count), part, f"found {found}")
     expect(not any(body[end:]), part, "padding is not zero")
-    vertices = list(struct.iter_unpack("<HHi", body[DECKS.size : triangles_at]))
+    decks = checked_decks(body, side, DECKS.size, (vertex_count, triangle_count), part)
+    heights = (min(z for _, _, z in decks["vertices"]), max(z for _, _, z in decks["vertices"]))
+    expect(heights == (lowest, highest), part, f"found heights {heights}, expected {(lowest, highest)}")
+    return decks, length
+
+
+def checked_decks(body, side, start, counts, part):
+    """The decks whose lists begin at `start` of a part."""
+    triangles_at = start + 8 * counts[0]
+    classes_at = triangles_at + 6 * counts[1]
+    vertices = list(struct.iter_unpack("<HHi", body[start:triangles_at]))
     triangles = list(struct.iter_unpack("<3H", body[triangles_at:classes_at]))
-    classes = list(body[classes_at:end])
+    classes = list(body[classes_at : classes_at + counts[1]])
     places = [(y, x, z) for x, y, z in vertices]
     expect(all(max(x, y) <= side for x, y, _ in vertices), part, "a vertex lies outside the square")
     expect(all(a < b for a, b in zip(places, places[1:])), part, "vertices are not sorted")
-    heights = (min(z for _, _, z in vertices), max(z for _, _, z in vertices))
-    expect(heights == (lowest, highest), part, f"found heights {heights}, expected {(lowest, highest)}")
     doubled_area(triangles, vertices, part)
     used = {corner for triangle in triangles for corner in triangle}
-    expect(used == set(range(vertex_count)), part, "a vertex belongs to no triangle")
+    expect(used == set(range(counts[0])), part, "a vertex belongs to no triangle")
     expect(max(classes) < 255, part, "a deck has the class of holes")
-    return {"vertices": vertices, "triangles": triangles, "classes": classes}, length
+    return {"vertices": vertices, "triangles": triangles, "classes": classes}
+
+
+def parse_parts(data, side, level, place, start, length):
+    """The parts of a load module, which take so many bytes from `start` on: decks, lines, kinds that are not known."""
+    found = {"decks": {"vertices": [], "triangles": [], "classes": []}, "lines": [], "unknown_parts": []}
+    if length == 0:
+        return found
+    of = f"load module {place[0]},{place[1]}" + (f" at level {level}" if level else "")
+    expect(36 <= length and start + length <= len(data), "index", f"found {length} bytes of parts of {of}")
+    row, column, found_level, count = TABLE.unpack_from(data, start)
+    table_bytes = TABLE.size + PART.size * count + 4
+    expect(1 <= count and table_bytes < length, f"parts of {of}", f"found {count} parts in {length} bytes")
+    table = checked(data, start, table_bytes, f"parts of {of}")
+    expect((row, column, found_level) == (*place, level), f"parts of {of}", f"found {(row, column, found_level)}")
+    at, last = start + table_bytes, 0
+    for kind, bytes_of_part, checksum in PART.iter_unpack(table[TABLE.size :]):
+        part = {1: "decks of ", 2: "lines of "}.get(kind, f"part {kind} of ") + of
+        expect(last < kind, part, f"found kind {kind} behind {last}")
+        expect(4 <= bytes_of_part and bytes_of_part % 4 == 0, part, f"found a length of {bytes_of_part}")
+        expect(at + bytes_of_part <= start + length, part, f"found a length of {bytes_of_part}")
+        body = data[at : at + bytes_of_part]
+        expect(zlib.crc32(body) == checksum, part, f"found checksum {zlib.crc32(body):08x}, expected {checksum:08x}")
+        if kind == 1:
+            found["decks"] = parse_deck_part(body, side, part)
+        elif kind == 2:
+            found["lines"] = parse_lines(body, side, part)
+        else:
+            found["unknown_parts"].append(kind)
+        at, last = at + bytes_of_part, kind
+    expect(at == start + length, f"parts of {of}", f"parts end at {at}, expected {start + length}")
+    return found
+
+
+def parse_deck_part(body, side, part):
+    expect(8 <= len(body), part, f"found {len(body)} bytes")
+    counts = struct.unpack_from("<II", body)
+    expect(3 <= counts[0] <= 65535 and 1 <= counts[1] <= 131070, part, f"found counts {counts}")
+    end = 8 + 8 * counts[0] + 7 * counts[1]
+    expect(len(body) == padded(end) and not any(body[end:]), part, f"found {len(body)} bytes, expected {padded(end)}")
+    return checked_decks(body, side, 8, counts, part)
+
+
+def parse_lines(body, side, part):
+    expect(8 <= len(body), part, f"found {len(body)} bytes")
+    line_count, vertex_count = struct.unpack_from("<II", body)
+    expect(1 <= line_count and len(body) == 8 + 8 * (line_count + vertex_count), part, f"found {len(body)} bytes")
+    vertices_at = 8 + LINE.size * line_count
+    vertices = list(struct.iter_unpack("<HHi", body[vertices_at:]))
+    records = list(LINE.iter_unpack(body[8:vertices_at]))
+    expect(sum(record[-1] for record in records) == vertex_count, part, "lines have other vertices than the part")
+    lines, keys = [], []
+    for kind_of_class, kind, form, flags, width, count in records:
+        expect(kind_of_class < 255 and kind < 3 and form < 4 and flags < 12 and 2 <= count, part, "found no such line")
+        kept, in_ground, storey = bool(flags & 1), bool(flags & 2), flags >> 2
+        expect(not in_ground or (kept and storey == 0), part, "a line is in the ground and left out")
+        expect(form == 0 or in_ground or (kept and storey == 1), part, "a line has a form and is nowhere")
+        own, vertices = vertices[:count], vertices[count:]
+        expect(all(max(x, y) <= side for x, y, _ in own), part, "a vertex lies outside the square")
+        expect(all(a[:2] != b[:2] for a, b in zip(own, own[1:])), part, "two neighbours lie at one place")
+        places = [(y, x, z) for x, y, z in own]
+        keys.append((kind_of_class, kind, form, storey, kept, in_ground, width, places))
+        lines.append({
+            "class": kind_of_class,
+            "kind": LINE_KINDS[kind],
+            "form": LINE_FORMS[form],
+            "storey": STOREYS[storey],
+            "kept": kept,
+            "in_ground": in_ground,
+            "width": width,
+            "vertices": own,
+        })
+    expect(all(a < b for a, b in zip(keys, keys[1:])), part, "lines are not sorted")
+    return lines
 
 
 def check_vertices(vertices, side, heights, part):
@@ -285,11 +377,20 @@ def summary(header, modules):
     decks = [len(module["decks"]["triangles"]) for module in finest if "decks" in module]
     if decks:
         lines.append(f"decks          {sum(decks)} triangles in {sum(map(bool, decks))} load modules")
+    ways = [line for module in finest for line in module.get("lines", [])]
+    if ways:
+        whole, kept = (sum(map(length_m, some)) / 1000 for some in (ways, [way for way in ways if way["kept"]]))
+        lines.append(f"lines          {len(ways)}, {whole:.2f} km, of which {kept:.2f} km are kept")
     for level in range(1, header["levels"]):
         own = [module for module in modules if module["level"] == level]
         count = sum(len(module["triangles"]) for module in own)
         lines.append(f"level {level}        {count} triangles, rms residual {rms(own)}")
     return "\n".join(lines)
+
+
+def length_m(line):
+    pieces = zip(line["vertices"], line["vertices"][1:])
+    return sum(math.dist(a[:2], b[:2]) for a, b in pieces) / 128
 
 
 def rms(modules):

@@ -7,7 +7,7 @@ use engine::{Artifact, Fingerprint, Key, Outcome, Stamp, keep_or_make};
 use fidelity::{Curvature, FeatureFigures, Residuals, Tally};
 use ground::Window;
 use job::{Borders, ClipHeights as JobClipHeights, Edges, Job, OuterBorder};
-use load_modules::{ClipHeights, Layout, clip, concatenate, cut_decks};
+use load_modules::{ClipHeights, Layout, clip, concatenate, cut_decks, cut_lines};
 use terrain::{HOLE_CLASS, LatticePoint, LoadModule, ModuleCounts, Post, PostRect, TileId, Tin, Vertex, in_turn};
 
 use crate::assembled::{Assembled, ModuleNumbers};
@@ -110,6 +110,8 @@ fn make(assembling: &Assembling, stamp: &Stamp) -> Result<(Assembled, Sums), Com
     };
     let decks = cut_decks(&features.decks, features.kept.steps_per_post, &layout);
     modules.iter_mut().zip(decks).for_each(|(module, decks)| module.decks = decks);
+    let lines = cut_lines(keys::lines_of(run.job, &features), features.kept.steps_per_post, &layout);
+    modules.iter_mut().zip(lines).for_each(|(module, lines)| module.lines = lines);
     let residuals = fidelity::measure(&mut modules, &window.measured(area));
     let at_source = run.ground.relief.residuals_at_source(&modules, area, area.tiling.rect(tile))?;
     let figures = feature_figures(run, tile, (&own.tin, &modules), &window)?;

@@ -8,8 +8,8 @@ use ground::{GamingArea, Surroundings, Window, feed_post};
 use job::{Borders, ClipHeights, Edges, FeaturesSpec, Job, LodBorder, LodSpec, ModulesSpec, OuterBorder};
 use limits::Allowance;
 use terrain::{
-    FeatureSurface, Features, LastBatch, LatticePoint, ModuleGrid, ModuleId, ModuleRect, SeamSides, Side, SideSpan,
-    SurfaceGround, TileFeatures, Vertex,
+    FeatureSurface, Features, LastBatch, LatticePoint, LineForm, LineKind, LineStorey, LineTraits, ModuleGrid,
+    ModuleId, ModuleRect, SeamSides, Side, SideSpan, SurfaceGround, TileFeatures, Vertex, WayLine,
 };
 use tiling::Budget;
 use tin::{CostUnit, Frame, Proximity, Rule, Stop, SurveyTask, TileTask};
@@ -36,6 +36,8 @@ const TINS: Part = Part { name: "tins", changed: "a TIN changed" };
 /// What roads, rivers and lakes put into it.
 const LEFT_OUT: Part = Part { name: "left out", changed: "what coarser levels leave out changed" };
 pub(crate) const FEATURES: Part = Part { name: "features", changed: "roads, rivers or lakes in it changed" };
+/// The middle lines of ways, in the ground or not.
+const LINES: Part = Part { name: "lines", changed: "lines of roads or rivers in it changed" };
 /// Buildings, which are drawn only.
 const BUILDINGS: Part = Part { name: "buildings", changed: "buildings changed" };
 /// The ground along features.
@@ -150,7 +152,7 @@ fn feed_features(builder: FingerprintBuilder, features: &Features) -> Fingerprin
 
 /// Classes of the ground inside features, and decks above it; their edges are in the TIN.
 fn feed_surfaces(builder: FingerprintBuilder, features: &TileFeatures) -> FingerprintBuilder {
-    let TileFeatures { tile: _, kept: _, surfaces, shaped, slopes: _, decks } = features;
+    let TileFeatures { tile: _, kept: _, surfaces, shaped, slopes: _, decks, lines: _ } = features;
     let feed = |builder: FingerprintBuilder, surface: &FeatureSurface| {
         let FeatureSurface { class, ground, body, ring } = surface;
         let ground = match ground {
@@ -161,6 +163,37 @@ fn feed_surfaces(builder: FingerprintBuilder, features: &TileFeatures) -> Finger
         builder.case(*class).case(ground).number((*body).into()).list(ring.iter(), feed_vertex)
     };
     builder.list(surfaces.iter(), feed).list(shaped.iter(), feed).list(decks.iter(), feed)
+}
+
+/// The lines of a tile that its load modules have: none where the job's format leaves them out.
+pub(crate) fn lines_of<'a>(job: &Job, features: &'a TileFeatures) -> &'a [WayLine] {
+    if VERSION_WITH_LINES <= job.modules.format { &features.lines } else { &[] }
+}
+
+/// The version of the format from which on load modules have lines.
+const VERSION_WITH_LINES: u32 = 3;
+
+fn feed_line(builder: FingerprintBuilder, line: &WayLine) -> FingerprintBuilder {
+    let WayLine { class, traits: LineTraits { kind, form, storey, is_kept, is_in_ground, width }, vertices } = line;
+    let kind = match kind {
+        LineKind::Travelled => 0,
+        LineKind::Channel => 1,
+        LineKind::Breakline => 2,
+    };
+    let form = match form {
+        LineForm::Nothing => 0,
+        LineForm::Line => 1,
+        LineForm::Strip => 2,
+        LineForm::Bench => 3,
+    };
+    let storey = match storey {
+        LineStorey::Ground => 0,
+        LineStorey::Bridge => 1,
+        LineStorey::Tunnel => 2,
+    };
+    let builder = builder.case(*class).case(kind).case(form).case(storey);
+    let builder = builder.case((*is_kept).into()).case((*is_in_ground).into()).number((*width).into());
+    builder.list(vertices.iter(), feed_vertex)
 }
 
 /// What the job says of selecting and optimising in a tile, as its record names it.
@@ -221,6 +254,8 @@ pub fn modules(
         true => key,
         false => key.part(FEATURES, |part| feed_surfaces(part, features)),
     };
+    let lines = lines_of(job, features);
+    let key = if lines.is_empty() { key } else { key.part(LINES, |part| part.list(lines.iter(), feed_line)) };
     // What levels leave out is told by the classes of edges, which the TIN does not say.
     match left_out {
         None => key,
@@ -313,7 +348,7 @@ fn feed_allowance(builder: FingerprintBuilder, task: &TileTask) -> FingerprintBu
 }
 
 fn feed_modules(builder: FingerprintBuilder, modules: &ModulesSpec) -> FingerprintBuilder {
-    let ModulesSpec { side_m, side_quanta, border_step_m, border_step_cells, outer_border, edges } = modules;
+    let ModulesSpec { side_m, side_quanta, border_step_m, border_step_cells, outer_border, edges, format: _ } = modules;
     let outer_border = match outer_border {
         OuterBorder::Refined => 0,
         OuterBorder::Fixed => 1,

@@ -7,14 +7,15 @@ use database::{
     LineRole,
 };
 use features::{
-    Cost, Face, FeatureId, Formed, FormedEdge, Levelled, Limit, Place, Remark, Reserved, Role, Surface, Why,
+    Cost, Face, FeatureId, Formed, FormedEdge, Levelled, Limit, Middle, Place, Remark, Reserved, Role, Surface, Traits,
+    Why,
 };
 use ground::{GamingArea, slope_reach};
 use job::Job;
 use load_modules::{Layout, cut_decks};
 use terrain::{
-    FeatureSurface, Features, LATTICE_PER_POST, LatticePoint, ModuleGrid, ModuleId, PostRect, Side, SideSpan,
-    SurfaceGround, TileFeatures, TileId, Vertex,
+    FeatureSurface, Features, LATTICE_PER_POST, LatticePoint, LineTraits, ModuleGrid, ModuleId, PostRect, Side,
+    SideSpan, SurfaceGround, TileFeatures, TileId, Vertex, WayLine,
 };
 use tiling::{outer_border_posts, outer_sides};
 
@@ -32,6 +33,7 @@ pub(crate) fn pieces(run: &Run, features: &features::AreaFeatures, formed: &Form
     cutting.surfaces(&formed.shaped, false);
     cutting.decks(&formed.decks);
     cutting.slopes(formed);
+    cutting.lines(&formed.middles, &features.traits_by_id());
     let Cutting { area, pieces, .. } = cutting;
     pieces
         .into_iter()
@@ -83,6 +85,7 @@ impl Piece {
         features.decks.sort();
         features.decks = (0..).zip(features.decks).flat_map(|(body, deck)| with_body(vec![deck], body)).collect();
         features.slopes.sort_unstable();
+        features.lines.sort();
         features.kept.spans = spans(&features.surfaces, rect, features.kept.steps_per_post);
         features.kept = features.kept.canonical();
         features
@@ -204,6 +207,23 @@ impl Cutting<'_> {
             for index in self.touching(deck.corners.iter().map(|(place, _)| *place), 0) {
                 let deck = FeatureSurface { class, ground: SurfaceGround::Road, body: 0, ring: ring.clone() };
                 self.pieces[index].features.decks.push(deck);
+            }
+        }
+    }
+
+    /// Middle lines of ways, each for all tiles that it touches.
+    fn lines(&mut self, middles: &[Middle], traits: &BTreeMap<FeatureId, Traits>) {
+        for middle in middles {
+            let class = self.classes[usize::from(middle.class)];
+            let width = traits.get(&middle.id).map_or(0, |of| of.width.clamp(0, u16::MAX.into()) as u16);
+            let traits = LineTraits { width, ..middle.traits };
+            let vertices: Vec<Vertex> = middle.stations.iter().copied().map(vertex).collect();
+            // A long line touches the box of many tiles; what touches none of its pieces is not given it.
+            let pieces = middle.stations.windows(2);
+            let tiles: BTreeSet<usize> =
+                pieces.flat_map(|ends| self.touching(ends.iter().map(|(place, _)| *place), 0)).collect();
+            for index in tiles {
+                self.pieces[index].features.lines.push(WayLine { class, traits, vertices: vertices.clone() });
             }
         }
     }

@@ -48,7 +48,8 @@ pub use measured_file::{
 mod slm;
 /// Version of the load-module files.
 pub use load_module_reader::{
-    VERSION as MODULES_FORMAT_VERSION, VERSION_WITHOUT_DECKS as MODULES_FORMAT_VERSION_WITHOUT_DECKS,
+    VERSION as MODULES_FORMAT_VERSION, VERSION_OF_GROUND as MODULES_FORMAT_VERSION_OF_GROUND,
+    VERSION_WITH_DECKS as MODULES_FORMAT_VERSION_WITH_DECKS,
 };
 pub use slm::{TileModules, decode_levels, decode_modules, encode_levels, encode_modules, load_module};
 mod json;

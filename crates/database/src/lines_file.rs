@@ -3,10 +3,11 @@
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
-use terrain::{FEATURE_STEPS_MAX, FeatureSurface, Features, LATTICE_PER_POST, LatticePoint};
-use terrain::{Side, SideSpan, SurfaceGround, TileFeatures, TileId, Vertex};
+use terrain::{FEATURE_STEPS_MAX, FeatureSurface, Features, LATTICE_PER_POST, LatticePoint, LineTraits};
+use terrain::{Side, SideSpan, SurfaceGround, TileFeatures, TileId, Vertex, WayLine};
 
 use crate::frame::{Kind, malformed};
+use crate::slm::{line_numbers, line_of_numbers};
 use crate::{DatabaseError, Stamp, codec, frame};
 
 /// Row, column, height.
@@ -24,7 +25,11 @@ struct LinesOnDisk {
     shaped: Vec<SurfaceOnDisk>,
     slopes: Vec<[Corner; 2]>,
     decks: Vec<SurfaceOnDisk>,
+    lines: Vec<LineOnDisk>,
 }
+
+/// Class; kind, form and storey by number; whether it is kept and in the ground; width; vertices.
+type LineOnDisk = (u8, [u8; 3], [bool; 2], u16, Vec<Corner>);
 
 #[derive(Serialize, Deserialize)]
 struct SurfaceOnDisk {
@@ -36,7 +41,7 @@ struct SurfaceOnDisk {
 
 /// The bytes of what features put into a tile.
 pub fn encode_lines(stamp: &Stamp, features: &TileFeatures) -> Vec<u8> {
-    let TileFeatures { tile, kept, surfaces, shaped, slopes, decks } = features;
+    let TileFeatures { tile, kept, surfaces, shaped, slopes, decks, lines } = features;
     let Features { steps_per_post, vertices, edges, spans } = kept;
     let side = |side: Side| Side::ALL.iter().position(|other| *other == side).expect("a side is one of four") as u8;
     let on_disk = LinesOnDisk {
@@ -49,6 +54,7 @@ pub fn encode_lines(stamp: &Stamp, features: &TileFeatures) -> Vec<u8> {
         shaped: shaped.iter().map(to_disk).collect(),
         slopes: slopes.iter().map(|ends| [corner(&ends[0]), corner(&ends[1])]).collect(),
         decks: decks.iter().map(to_disk).collect(),
+        lines: lines.iter().map(line_to_disk).collect(),
     };
     frame::seal(Kind::Lines, stamp, &codec::encode(&on_disk))
 }
@@ -73,8 +79,11 @@ pub fn decode_lines(path: &Path, bytes: &[u8]) -> Result<(Stamp, TileFeatures), 
     let surfaces: Option<Vec<FeatureSurface>> = on_disk.surfaces.into_iter().map(of_disk).collect();
     let shaped: Option<Vec<FeatureSurface>> = on_disk.shaped.into_iter().map(of_disk).collect();
     let decks: Option<Vec<FeatureSurface>> = on_disk.decks.into_iter().map(of_disk).collect();
-    let (Some(spans), Some(surfaces), Some(shaped), Some(decks)) = (spans, surfaces, shaped, decks) else {
-        return Err(malformed(path, "found a side or a kind of ground that there is not"));
+    let lines: Option<Vec<WayLine>> = on_disk.lines.into_iter().map(line_of_disk).collect();
+    let (Some(spans), Some(surfaces), Some(shaped), Some(decks), Some(lines)) =
+        (spans, surfaces, shaped, decks, lines)
+    else {
+        return Err(malformed(path, "found a side, a kind of ground or of line that there is not"));
     };
     let vertices = on_disk.vertices.into_iter().map(vertex).collect();
     let features = TileFeatures {
@@ -84,6 +93,7 @@ pub fn decode_lines(path: &Path, bytes: &[u8]) -> Result<(Stamp, TileFeatures), 
         shaped,
         slopes: on_disk.slopes.into_iter().map(|ends| ends.map(vertex)).collect(),
         decks,
+        lines,
     };
     Ok((stamp, features))
 }
@@ -110,10 +120,22 @@ fn of_disk(surface: SurfaceOnDisk) -> Option<FeatureSurface> {
     Some(FeatureSurface { class, ground, body, ring: ring.into_iter().map(vertex).collect() })
 }
 
+fn line_to_disk(line: &WayLine) -> LineOnDisk {
+    let WayLine { class, traits, vertices } = line;
+    let LineTraits { is_kept, is_in_ground, width, .. } = *traits;
+    (*class, line_numbers(traits), [is_kept, is_in_ground], width, vertices.iter().map(corner).collect())
+}
+
+fn line_of_disk((class, numbers, [is_kept, is_in_ground], width, vertices): LineOnDisk) -> Option<WayLine> {
+    let traits = LineTraits { is_kept, is_in_ground, width, ..line_of_numbers(numbers)? };
+    Some(WayLine { class, traits, vertices: vertices.into_iter().map(vertex).collect() })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::samples;
+    use terrain::{LineForm, LineKind, LineStorey};
 
     #[test]
     fn features_survive_their_file_and_every_damage_is_an_error() {
@@ -132,6 +154,18 @@ mod tests {
             shaped: vec![surface(SurfaceGround::Lake)],
             slopes: vec![[vertices[0], vertices[1]]],
             decks: vec![surface(SurfaceGround::Road)],
+            lines: vec![WayLine {
+                class: 4,
+                traits: LineTraits {
+                    kind: LineKind::Channel,
+                    form: LineForm::Line,
+                    storey: LineStorey::Ground,
+                    is_kept: true,
+                    is_in_ground: true,
+                    width: 128,
+                },
+                vertices: vertices.clone(),
+            }],
         };
         let bytes = encode_lines(&samples::stamp(), &features);
         assert_eq!(decode_lines(path, &bytes).unwrap(), (samples::stamp(), features.clone()));

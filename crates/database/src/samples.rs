@@ -1,8 +1,9 @@
 //! Small values for the tests of this crate.
 
 use terrain::{
-    Decks, GainCurve, GainRun, GridFrame, LatticePoint, LoadModule, ModuleGrid, ModuleId, ModuleRect, ModuleResidual,
-    ModuleVertex, Post, PostRect, Refusal, RefusedBy, Spacing, StopReason, TileId, TileTin, Tin, Vertex,
+    Decks, GainCurve, GainRun, GridFrame, LatticePoint, LineForm, LineKind, LineStorey, LineTraits, LoadModule,
+    ModuleGrid, ModuleId, ModuleLine, ModuleRect, ModuleResidual, ModuleVertex, Post, PostRect, Refusal, RefusedBy,
+    Spacing, StopReason, TileId, TileTin, Tin, Vertex,
 };
 
 use crate::{
@@ -123,6 +124,7 @@ pub(crate) fn modules() -> Vec<LoadModule> {
         polygon_count: 2,
         residual: ModuleResidual { posts: 400, largest: 300, sum_abs: 25_600, sum_squared: 3_276_800 },
         decks: Decks::default(),
+        lines: Vec::new(),
     };
     let east = LoadModule {
         id: ModuleId { row: 2, col: 4 },
@@ -139,6 +141,7 @@ pub(crate) fn modules() -> Vec<LoadModule> {
         polygon_count: 4,
         residual: ModuleResidual { posts: 399, largest: 128, sum_abs: 12_800, sum_squared: 1_638_400 },
         decks: Decks::default(),
+        lines: Vec::new(),
     };
     [&west, &east].iter().for_each(|module| assert_eq!(module.check(), Ok(())));
     vec![west, east]
@@ -176,6 +179,25 @@ pub(crate) fn levels_with_decks() -> Vec<Vec<LoadModule>> {
         modules.iter().for_each(|module| assert_eq!(module.check(), Ok(())));
     }
     levels[1][0].decks = Decks::default();
+    levels
+}
+
+/// The same levels with lines at the finest: a road up to the line between both load modules, one that is left out, and
+/// a stream.
+pub(crate) fn levels_with_lines() -> Vec<Vec<LoadModule>> {
+    let mut levels = levels_with_decks();
+    let vertex = |(x, y, z): (u16, u16, i32)| ModuleVertex { y, x, z };
+    let line = |class, kind, form, is_kept, places: &[(u16, u16, i32)]| {
+        let storey = LineStorey::Ground;
+        let traits = LineTraits { kind, form, storey, is_kept, is_in_ground: is_kept, width: 640 };
+        ModuleLine { class, traits, vertices: places.iter().copied().map(vertex).collect() }
+    };
+    let road = |places| line(1, LineKind::Travelled, LineForm::Strip, true, places);
+    let out = line(2, LineKind::Travelled, LineForm::Nothing, false, &[(0, 0, -5), (900, 0, -6)]);
+    let stream = line(3, LineKind::Channel, LineForm::Line, true, &[(500, 64_000, 9), (500, 9, 8), (700, 0, 7)]);
+    levels[0][0].lines = vec![road(&[(0, 700, 7), (64_000, 700, 9)])];
+    levels[0][1].lines = vec![road(&[(0, 700, 9), (64_000, 700, 8)]), out, stream];
+    levels[0].iter().for_each(|module| assert_eq!(module.check(), Ok(())));
     levels
 }
 

@@ -3,11 +3,12 @@
 use std::path::Path;
 
 use load_module_reader::{
-    DECK_ENTRY_BYTES, FIXED_HEADER_BYTES, Header, INDEX_ENTRY_BYTES, LEVELS_MAX, MAGIC, Module, QUANTA_PER_METRE,
-    SlmFile, VERSION, VERSION_WITHOUT_DECKS, Vertex,
+    DECK_ENTRY_BYTES, FIXED_HEADER_BYTES, Header, INDEX_ENTRY_BYTES, LEVELS_MAX, MAGIC, Module, PART_DECKS, PART_LINES,
+    PARTS_ENTRY_BYTES, QUANTA_PER_METRE, SlmFile, VERSION, VERSION_OF_GROUND, VERSION_WITH_DECKS, Vertex,
 };
 use terrain::{
-    Decks, GridFrame, LoadModule, ModuleGrid, ModuleId, ModuleRect, ModuleResidual, ModuleVertex, Side, Spacing, TileId,
+    Decks, GridFrame, LineForm, LineKind, LineStorey, LineTraits, LoadModule, ModuleGrid, ModuleId, ModuleLine,
+    ModuleRect, ModuleResidual, ModuleVertex, Side, Spacing, TileId,
 };
 
 use crate::{DatabaseError, Fingerprint};
@@ -46,8 +47,8 @@ pub fn encode_modules(tile: &TileModules, modules: &[LoadModule]) -> Vec<u8> {
     encode(tile, &[modules])
 }
 
-/// The bytes of the file that holds these levels of a tile's load modules, the finest first: of format version 2 if any
-/// of them has decks, else of version 1.
+/// The bytes of the file that holds these levels of a tile's load modules, the finest first: of format version 3 if any
+/// of them has lines, else of version 2 if any has decks, else of version 1.
 ///
 /// # Panics
 /// When there are none or more than eight, or the load modules of one are not exactly those of the tile, row by row
@@ -61,9 +62,13 @@ fn encode(tile: &TileModules, levels: &[&[LoadModule]]) -> Vec<u8> {
     let level_count = u16::try_from(levels.len()).ok().filter(|count| (1..=LEVELS_MAX).contains(count));
     let level_count = level_count.expect("a tile's file holds one level or a few");
     let header_length = (FIXED_HEADER_BYTES + tile.crs.len() + tile.vertical_datum.len()).next_multiple_of(4) + 4;
-    let has_decks = levels.iter().any(|modules| modules.iter().any(|module| !module.decks.is_empty()));
-    let version = if has_decks { VERSION } else { VERSION_WITHOUT_DECKS };
-    let entry_bytes = INDEX_ENTRY_BYTES + if has_decks { DECK_ENTRY_BYTES } else { 0 };
+    let version = version_of(levels);
+    let entry_bytes = INDEX_ENTRY_BYTES
+        + match version {
+            VERSION => PARTS_ENTRY_BYTES,
+            VERSION_WITH_DECKS => DECK_ENTRY_BYTES,
+            _ => 0,
+        };
     let index_length = levels.len() * tile.modules.count() * entry_bytes + 4;
     let mut index = Vec::with_capacity(index_length);
     let mut sections = Vec::new();
@@ -77,10 +82,18 @@ fn encode(tile: &TileModules, levels: &[&[LoadModule]]) -> Vec<u8> {
             let start = sections.len();
             put_module(&mut sections, module, level);
             let offset = (header_length + index_length + start) as u64;
-            put_entry(&mut index, module, offset, (sections.len() - start) as u32);
-            if has_decks {
-                put_deck_entry(&mut index, &module.decks);
-                put_decks(&mut sections, module, level);
+            let end = sections.len();
+            put_entry(&mut index, module, offset, (end - start) as u32);
+            match version {
+                VERSION => {
+                    put_parts(&mut sections, module, level);
+                    put_u32s(&mut index, [(sections.len() - end) as u32]);
+                }
+                VERSION_WITH_DECKS => {
+                    put_deck_entry(&mut index, &module.decks);
+                    put_decks(&mut sections, module, level);
+                }
+                _ => {}
             }
         }
     }
@@ -91,6 +104,16 @@ fn encode(tile: &TileModules, levels: &[&[LoadModule]]) -> Vec<u8> {
     file.extend_from_slice(&index);
     file.extend_from_slice(&sections);
     file
+}
+
+/// The least version of the format that holds all there is.
+fn version_of(levels: &[&[LoadModule]]) -> u16 {
+    let any = |has: fn(&LoadModule) -> bool| levels.iter().any(|modules| modules.iter().any(has));
+    match (any(|module| !module.lines.is_empty()), any(|module| !module.decks.is_empty())) {
+        (true, _) => VERSION,
+        (false, true) => VERSION_WITH_DECKS,
+        (false, false) => VERSION_OF_GROUND,
+    }
 }
 
 fn put_header(file: &mut Vec<u8>, tile: &TileModules, start: [u16; 2], header_length: u32, file_length: u64) {
@@ -165,12 +188,82 @@ fn put_decks(file: &mut Vec<u8>, module: &LoadModule, level: u32) {
     let start = file.len();
     put_u32s(file, [module.id.row, module.id.col, level]);
     put_u32s(file, [decks.vertices.len() as u32, decks.triangles.len() as u32]);
-    put_vertices(file, &decks.vertices);
-    put_u16s(file, decks.triangles.iter().flatten().copied());
-    assert_eq!(decks.classes.len(), decks.triangles.len(), "decks of load module {} have a class each", module.id);
-    file.extend_from_slice(&decks.classes);
+    put_deck_lists(file, decks);
     pad(file, start);
     put_checksum(file, start);
+}
+
+fn put_deck_lists(file: &mut Vec<u8>, decks: &Decks) {
+    put_vertices(file, &decks.vertices);
+    put_u16s(file, decks.triangles.iter().flatten().copied());
+    assert_eq!(decks.classes.len(), decks.triangles.len(), "decks have a class for each triangle");
+    file.extend_from_slice(&decks.classes);
+}
+
+/// The table of a load module's parts, and the parts; nothing where it has none.
+fn put_parts(file: &mut Vec<u8>, module: &LoadModule, level: u32) {
+    let mut parts = Vec::new();
+    if !module.decks.is_empty() {
+        parts.push((PART_DECKS, deck_part(&module.decks)));
+    }
+    if !module.lines.is_empty() {
+        parts.push((PART_LINES, line_part(&module.lines)));
+    }
+    if parts.is_empty() {
+        return;
+    }
+    let start = file.len();
+    put_u32s(file, [module.id.row, module.id.col, level, parts.len() as u32]);
+    parts.iter().for_each(|(kind, part)| put_u32s(file, [*kind, part.len() as u32, crc32fast::hash(part)]));
+    put_checksum(file, start);
+    parts.iter().for_each(|(_, part)| file.extend_from_slice(part));
+}
+
+fn deck_part(decks: &Decks) -> Vec<u8> {
+    let mut part = Vec::new();
+    put_u32s(&mut part, [decks.vertices.len() as u32, decks.triangles.len() as u32]);
+    put_deck_lists(&mut part, decks);
+    pad(&mut part, 0);
+    part
+}
+
+const KINDS: [LineKind; 3] = [LineKind::Travelled, LineKind::Channel, LineKind::Breakline];
+const FORMS: [LineForm; 4] = [LineForm::Nothing, LineForm::Line, LineForm::Strip, LineForm::Bench];
+const STOREYS: [LineStorey; 3] = [LineStorey::Ground, LineStorey::Bridge, LineStorey::Tunnel];
+
+/// The numbers of kind, form and storey of a line, as all files have them.
+pub(crate) fn line_numbers(traits: &LineTraits) -> [u8; 3] {
+    fn number<T: PartialEq>(all: &[T], one: &T) -> u8 {
+        all.iter().position(|other| other == one).expect("the list is of all there are") as u8
+    }
+    [number(&KINDS, &traits.kind), number(&FORMS, &traits.form), number(&STOREYS, &traits.storey)]
+}
+
+/// A line left out without width, of the kind, form and storey of these numbers; `None` where there are none such.
+pub(crate) fn line_of_numbers([kind, form, storey]: [u8; 3]) -> Option<LineTraits> {
+    Some(LineTraits {
+        kind: *KINDS.get(usize::from(kind))?,
+        form: *FORMS.get(usize::from(form))?,
+        storey: *STOREYS.get(usize::from(storey))?,
+        is_kept: false,
+        is_in_ground: false,
+        width: 0,
+    })
+}
+
+fn line_part(lines: &[ModuleLine]) -> Vec<u8> {
+    let mut part = Vec::new();
+    let vertices: usize = lines.iter().map(|line| line.vertices.len()).sum();
+    put_u32s(&mut part, [lines.len() as u32, vertices as u32]);
+    for ModuleLine { class, traits, vertices } in lines {
+        let LineTraits { is_kept, is_in_ground, width, .. } = *traits;
+        let [kind, form, storey] = line_numbers(traits);
+        part.extend([*class, kind, form, u8::from(is_kept) | u8::from(is_in_ground) << 1 | storey << 2]);
+        let count = u16::try_from(vertices.len()).expect("a line numbers its vertices in 16 bits");
+        put_u16s(&mut part, [width, count]);
+    }
+    lines.iter().for_each(|line| put_vertices(&mut part, &line.vertices));
+    part
 }
 
 fn put_vertices(file: &mut Vec<u8>, vertices: &[ModuleVertex]) {
@@ -267,7 +360,15 @@ pub fn load_module(module: &Module, side: u16) -> LoadModule {
             triangles: module.decks.triangles.clone(),
             classes: module.decks.classes.clone(),
         },
+        lines: module.lines.iter().map(|line| module_line(line, vertices(&line.vertices))).collect(),
     }
+}
+
+fn module_line(line: &load_module_reader::Line, vertices: Vec<ModuleVertex>) -> ModuleLine {
+    let load_module_reader::Line { class, kind, form, storey, is_kept, is_in_ground, width, vertices: _ } = *line;
+    // The reader numbers them as the file does.
+    let traits = line_of_numbers([kind as u8, form as u8, storey as u8]).expect("both lists are of all there are");
+    ModuleLine { class, traits: LineTraits { is_kept, is_in_ground, width, ..traits }, vertices }
 }
 
 #[cfg(test)]
@@ -306,6 +407,23 @@ mod tests {
         assert_eq!(bytes[8..10], [2, 0]);
         assert_eq!(decode_levels(path, &bytes).unwrap(), (tile.clone(), levels.clone()));
         samples::check_every_damage(&bytes, |bytes| decode_levels(path, bytes).is_err());
+    }
+
+    #[test]
+    fn lines_survive_their_file_of_version_3() {
+        let (tile, levels) = (samples::tile_modules(), samples::levels_with_lines());
+        let bytes = encode_levels(&tile, &levels);
+        let path = Path::new("r00c01.slm");
+        assert_eq!(bytes[8..10], [3, 0]);
+        assert_eq!(decode_levels(path, &bytes).unwrap(), (tile.clone(), levels.clone()));
+        samples::check_every_damage(&bytes, |bytes| decode_levels(path, bytes).is_err());
+        let without = |mut module: LoadModule| {
+            module.lines.clear();
+            module
+        };
+        let bare: Vec<Vec<LoadModule>> =
+            levels.into_iter().map(|level| level.into_iter().map(without).collect()).collect();
+        assert_eq!(bare, samples::levels_with_decks());
     }
 
     #[test]

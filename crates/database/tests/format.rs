@@ -9,7 +9,8 @@ use std::process::{Command, Output};
 use database::{Fingerprint, TileModules, encode_levels, encode_modules};
 use serde_json::{Value, json};
 use terrain::{
-    Decks, GridFrame, LoadModule, ModuleGrid, ModuleId, ModuleRect, ModuleResidual, ModuleVertex, Side, Spacing, TileId,
+    Decks, GridFrame, LineForm, LineKind, LineStorey, LineTraits, LoadModule, ModuleGrid, ModuleId, ModuleLine,
+    ModuleRect, ModuleResidual, ModuleVertex, Side, Spacing, TileId,
 };
 
 fn workspace() -> PathBuf {
@@ -36,6 +37,7 @@ fn flat(id: ModuleId) -> LoadModule {
         polygon_count: 2,
         residual: ModuleResidual { posts: 441, largest: 300, sum_abs: 25_600, sum_squared: 3_276_800 },
         decks: Decks::default(),
+        lines: Vec::new(),
     }
 }
 
@@ -71,6 +73,27 @@ fn example_with_a_deck() -> Vec<u8> {
     encode_modules(&tile(1, 1), &[module])
 }
 
+fn line(class: u8, form: LineForm, storey: LineStorey, width: u16, ends: [ModuleVertex; 2]) -> ModuleLine {
+    let is_kept = form != LineForm::Nothing;
+    let traits = LineTraits { kind: LineKind::Travelled, form, storey, is_kept, is_in_ground: false, width };
+    ModuleLine { class, traits, vertices: ends.to_vec() }
+}
+
+/// The bridge with the line of its road, and a track that is left out.
+fn with_lines(id: ModuleId) -> LoadModule {
+    let road = [vertex(22_400, 32_000, 129_280), vertex(41_600, 32_000, 129_280)];
+    let track = [vertex(0, 6400, 128_013), vertex(22_400, 6400, 128_026)];
+    let lines = vec![
+        line(3, LineForm::Strip, LineStorey::Bridge, 2560, road),
+        line(4, LineForm::Nothing, LineStorey::Ground, 384, track),
+    ];
+    LoadModule { decks: bridge(), lines, ..flat(id) }
+}
+
+fn example_with_lines() -> Vec<u8> {
+    encode_modules(&tile(1, 1), &[with_lines(ModuleId { row: 0, col: 0 })])
+}
+
 /// The bytes of the worked example of a version: lines of offset, bytes, bar, meaning.
 fn bytes_of_page(page: &str, version: usize) -> Vec<u8> {
     let block = page.split("```hex\n").nth(version).unwrap().split("```").next().unwrap();
@@ -86,7 +109,7 @@ fn bytes_of_page(page: &str, version: usize) -> Vec<u8> {
 #[test]
 fn the_worked_example_is_what_the_encoder_writes() {
     let page = std::fs::read_to_string(workspace().join("docs/FORMAT.md")).unwrap();
-    for (version, example) in [(1, example()), (2, example_with_a_deck())] {
+    for (version, example) in [(1, example()), (2, example_with_a_deck()), (3, example_with_lines())] {
         let written = example.iter().fold(String::new(), |mut text, byte| {
             write!(text, "{byte:02x} ").unwrap();
             text
@@ -170,6 +193,33 @@ fn the_python_reader_finds_decks() {
     assert!(high.status.code() == Some(1) && String::from_utf8_lossy(&high.stdout).contains("topmost        none"));
 }
 
+#[test]
+fn the_python_reader_finds_lines() {
+    let tile = tile(2, 3);
+    let modules: Vec<_> = tile.modules.iter().map(|id| if id.col == 1 { with_lines(id) } else { flat(id) }).collect();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("r00c00.slm");
+    std::fs::write(&path, encode_modules(&tile, &modules)).unwrap();
+    let path = path.to_str().unwrap();
+    let Some(output) = python(&["scripts/read_slm.py", "--json", path]) else { return };
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let dump: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(dump["header"], json_of_header(3, 1));
+    let road = json!({
+        "class": 3, "kind": "travelled", "form": "strip", "storey": "bridge", "kept": true, "in_ground": false,
+        "width": 2560, "vertices": [[22_400, 32_000, 129_280], [41_600, 32_000, 129_280]],
+    });
+    let track = json!({
+        "class": 4, "kind": "travelled", "form": "nothing", "storey": "ground", "kept": false, "in_ground": false,
+        "width": 384, "vertices": [[0, 6400, 128_013], [22_400, 6400, 128_026]],
+    });
+    assert_eq!(dump["modules"][1]["lines"], json!([road, track]));
+    assert_eq!((&dump["modules"][0]["lines"], &dump["modules"][1]["unknown_parts"]), (&json!([]), &json!([])));
+    assert_eq!(dump["modules"][1]["decks"]["classes"], json!([3, 3]));
+    check_said(&[path], "lines          4, 0.65 km, of which 0.30 km are kept");
+    check_said(&["--at", "505750", "3875750", path], "topmost        1010.000 m, class 3, deck");
+}
+
 #[track_caller]
 fn check_said(arguments: &[&str], expected: &str) {
     let output = python(&[&["scripts/read_slm.py"], arguments].concat()).unwrap();
@@ -181,6 +231,7 @@ fn check_said(arguments: &[&str], expected: &str) {
 fn the_python_reader_refuses_every_damage() {
     check_python_refuses_every_damage(&example());
     check_python_refuses_every_damage(&example_with_a_deck());
+    check_python_refuses_every_damage(&example_with_lines());
 }
 
 #[track_caller]

@@ -122,6 +122,7 @@ fn modules() -> Vec<LoadModule> {
         polygon_count: 2,
         residual: ModuleResidual { posts: 400, largest: 300, sum_abs: 25_600, sum_squared: 3_276_800 },
         decks: Decks::default(),
+        lines: Vec::new(),
     };
     let east = LoadModule {
         id: ModuleId { row: 0, col: 1 },
@@ -138,6 +139,7 @@ fn modules() -> Vec<LoadModule> {
         polygon_count: 4,
         residual: ModuleResidual { posts: 441, largest: 128, sum_abs: 12_800, sum_squared: 1_638_400 },
         decks: Decks::default(),
+        lines: Vec::new(),
     };
     [&west, &east].iter().for_each(|module| assert_eq!(module.check(), Ok(())));
     vec![west, east]

@@ -10,6 +10,7 @@ use terrain::in_turn;
 use crate::clean::Notes;
 use crate::decks::between;
 use crate::exact::Segment;
+use crate::middles::{Middle, middles};
 use crate::pieces::{Piece, pieces};
 use crate::rings::encloses;
 use crate::room::{remark_rooms, share_out, wide_of};
@@ -71,6 +72,8 @@ pub struct Formed {
     pub shaped_slopes: Vec<[(Place, i32); 2]>,
     /// The surfaces of decks.
     pub decks: Vec<Face>,
+    /// The middle lines of all ways, in the ground or not.
+    pub middles: Vec<Middle>,
     /// What was changed.
     pub remarks: Vec<Remark>,
 }
@@ -100,6 +103,7 @@ pub fn form(graded: &Graded, strands: &[Strand], site: &Site) -> Formed {
         tilted.into_iter().for_each(|number| wide[number as usize].room = Room::None);
         formed = round_together(graded, &pieces, &mut wide, &thinned, site);
     }
+    formed.middles = middles(graded, (&pieces, &wide), (strands, &thinned), site);
     remark_rooms(network, &pieces, &wide, &mut remarks);
     formed.remarks.append(&mut remarks);
     Remark::sort(&mut formed.remarks);
@@ -364,8 +368,8 @@ fn collect(heights: &Decided, edges: BTreeMap<(Place, Place), OfEdge>) -> Formed
             FormedEdge { a, b, role, class, id, backwards }
         })
         .collect();
-    let (faces, surfaces, shaped, shaped_slopes, decks, remarks) = Default::default();
-    Formed { points, edges, faces, surfaces, shaped, shaped_slopes, decks, remarks }
+    let (faces, surfaces, shaped, shaped_slopes, decks, middles, remarks) = Default::default();
+    Formed { points, edges, faces, surfaces, shaped, shaped_slopes, decks, middles, remarks }
 }
 
 /// A line's own heights at the places it has after rounding: what is new lies between its stations.

@@ -15,7 +15,7 @@
 //! fall(&rivers, Bed, ..) -> Fallen                  rivers; channels(..), shore(..), banks(..) -> Vec<Strand>
 //! grade(&roads, &ground, &pins, &water(&strands), GradeOptions, ..) -> Vec<i32>
 //! reserve(&Graded, &strands, &Site, &Shares, about) -> Reserved
-//!     .formed: Formed { points, edges, faces, decks, remarks }, .cost: triangles by load module and class
+//!     .formed: Formed { points, edges, faces, decks, middles, remarks }, .cost: triangles by load module and class
 //! ```
 //!
 //! The DEM comes in as values: at every `network.nodes[..].place`, at both [`sides`] of each, at the lower bank of
@@ -101,6 +101,8 @@ mod toes;
 pub use toes::{CUT_RUN, FILL_RUN, reach_max};
 mod forms;
 pub use forms::{Formed, FormedEdge, Surface, form};
+mod middles;
+pub use middles::Middle;
 mod cost;
 pub use cost::{Cost, cost};
 mod shares;

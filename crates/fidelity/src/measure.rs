@@ -275,6 +275,7 @@ mod tests {
             triangles,
             residual: ModuleResidual::default(),
             decks: Decks::default(),
+            lines: Vec::new(),
         }
     }
 

@@ -92,6 +92,7 @@ pub fn module_of(tin: &Tin, id: ModuleId, spacing: Spacing) -> LoadModule {
         triangles,
         residual: ModuleResidual::default(),
         decks: Decks::default(),
+        lines: Vec::new(),
     }
 }
 

@@ -150,6 +150,7 @@ mod tests {
                 polygon_count: 2,
                 residual: ModuleResidual::default(),
                 decks: Decks::default(),
+                lines: Vec::new(),
             }
         };
         vec![module(0), module(1)]

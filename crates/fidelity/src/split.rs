@@ -109,6 +109,7 @@ mod tests {
             polygon_count: 2,
             residual: ModuleResidual::default(),
             decks: Decks::default(),
+            lines: Vec::new(),
         }
     }
 

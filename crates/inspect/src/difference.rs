@@ -36,7 +36,10 @@ pub struct ModuleDifference {
     pub rms_m: [f64; 2],
     /// Largest residual of each, in metres.
     pub largest_m: [f64; 2],
-    /// How far the two surfaces lie apart at most, at posts, in metres; 0 where only triangles or classes differ.
+    /// Middle lines of ways of each.
+    pub lines: [usize; 2],
+    /// How far the two surfaces lie apart at most, at posts, in metres; 0 where only triangles, classes, decks
+    /// or lines differ.
     pub apart_m: f64,
 }
 
@@ -95,6 +98,7 @@ fn module_difference(product: &Product, a: &LoadModule, b: &LoadModule) -> Modul
         polygons: [a, b].map(|module| module.counts().polygons),
         rms_m: [rms(a), rms(b)],
         largest_m: [largest(a), largest(b)],
+        lines: [a, b].map(|module| module.lines.len()),
         apart_m: f64::from(apart(product, a, b)) / f64::from(QUANTA_PER_METRE),
     }
 }

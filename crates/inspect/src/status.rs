@@ -1,11 +1,13 @@
 //! How far a database is, from what lies in its directory: nothing is believed that the files do not bear out.
 
 use std::collections::BTreeSet;
+use std::io::Read;
 use std::path::Path;
 
 use compiler::{CompileError, run_name};
 use database::{Folder, Lock, Manifest, ManifestState, TileRecord, TileState};
 use engine::Held;
+use load_module_reader::{MAGIC, open_file};
 use terrain::TileId;
 
 /// How one tile stands.
@@ -32,6 +34,8 @@ pub struct Status {
     pub held: Held,
     /// Every tile, row by row.
     pub tiles: Vec<(TileId, TileProgress)>,
+    /// The versions of the format that its files of load modules have, in ascending order.
+    pub formats: BTreeSet<u16>,
 }
 
 impl Status {
@@ -64,7 +68,16 @@ pub fn status(folder: &Path) -> Result<Status, CompileError> {
         false => under_way(&folder, record),
     };
     let tiles = manifest.tiles.iter().map(|record| (record.tile(), progress(record))).collect();
-    Ok(Status { manifest, held, tiles })
+    let paths = manifest.tiles.iter().map(|record| folder.modules_path(record.tile()));
+    let formats = paths.filter_map(|path| format_of(&path)).collect();
+    Ok(Status { manifest, held, tiles, formats })
+}
+
+/// The version of the format that a file of load modules names; nothing where there is no such file.
+fn format_of(path: &Path) -> Option<u16> {
+    let mut start = [0; 10];
+    open_file(path).ok()?.read_exact(&mut start).ok()?;
+    start.starts_with(&MAGIC).then(|| u16::from_le_bytes([start[8], start[9]]))
 }
 
 fn finished(folder: &Folder, record: &TileRecord) -> TileProgress {

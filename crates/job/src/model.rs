@@ -187,6 +187,8 @@ pub struct ModulesSpec {
     pub outer_border: OuterBorder,
     /// How load modules get their sides.
     pub edges: Edges,
+    /// The newest version that their files may have: 2 without lines of ways, 3 with them.
+    pub format: u32,
 }
 
 /// Which points the outer border of the area has, beside the corners of load modules.

@@ -285,6 +285,9 @@ const LOAD_MODULES: &[Key] = &[
     Key::new("clip_heights", "height of a vertex that clipping makes; for edges = \"clip\" only")
         .words::<ClipHeights>()
         .usual("coplanar"),
+    Key::new("format", "newest version of their files; 2 leaves out the lines of roads and rivers")
+        .whole("a version of the format", 2..=3)
+        .usual("3"),
 ];
 
 fn length() -> String {

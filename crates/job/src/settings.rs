@@ -11,6 +11,9 @@ use crate::{
     Resampling, Sight, SourceEntry, Start, TinSpec, Voids, WaterSpec, settings_features,
 };
 
+/// What `load_modules.format` usually is.
+const MODULES_FORMAT_USUAL: u32 = 3;
+
 /// The lines of a [canonical text](Job::canonical_text) that decide what is built: all but the title, which only stands
 /// above the report's page.
 pub fn deciding_lines(canonical: &str) -> impl Iterator<Item = &str> {
@@ -181,6 +184,10 @@ impl Job {
         list.choice("load_modules.edges", &modules.edges);
         if let Edges::Clip(heights) = &modules.edges {
             list.choice("load_modules.clip_heights", heights);
+        }
+        // Without features there is nothing that it could leave out.
+        if self.features.is_some() || modules.format != MODULES_FORMAT_USUAL {
+            list.add("load_modules.format", modules.format.to_string());
         }
     }
 

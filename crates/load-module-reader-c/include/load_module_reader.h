@@ -98,6 +98,27 @@ typedef struct {
     size_t triangle_count;
 } lmr_decks;
 
+/* What a line is the middle of, what it is in the ground, and where it runs. */
+enum { LMR_TRAVELLED = 0, LMR_CHANNEL = 1, LMR_BREAKLINE = 2 };
+enum { LMR_NOTHING = 0, LMR_LINE = 1, LMR_STRIP = 2, LMR_BENCH = 3 };
+enum { LMR_ON_GROUND = 0, LMR_ON_BRIDGE = 1, LMR_IN_TUNNEL = 2 };
+
+/* The middle line of a road, a rail, a river or a stream in the square of a load module, or of a part of it in which
+ * nothing changes. A way that goes on in the next load module has the same vertex there. Ways that the budget left out
+ * of the ground are there too: is_kept is 0. Only the finest level has lines. What is pointed to lives until the ground
+ * is moved or unloaded. */
+typedef struct {
+    const lmr_vertex *vertices;       /* 2 or more; z is the height decided for the way */
+    size_t vertex_count;
+    uint16_t width;                   /* of the way in quanta of 1/128 m; 0 for a line without any */
+    uint8_t class_of_way;
+    uint8_t kind;                     /* LMR_TRAVELLED, LMR_CHANNEL (runs downstream), LMR_BREAKLINE */
+    uint8_t form;                     /* LMR_NOTHING to LMR_BENCH */
+    uint8_t storey;                   /* LMR_ON_GROUND, LMR_ON_BRIDGE, LMR_IN_TUNNEL */
+    uint8_t is_kept;                  /* 0 where the way is left out */
+    uint8_t is_in_ground;             /* 1 where triangles of the ground have its edges */
+} lmr_line;
+
 /* What lmr_sight answers. */
 enum { LMR_FREE = 0, LMR_HIDDEN = 1, LMR_UNKNOWN = 2, LMR_INVALID = 3 };
 
@@ -149,6 +170,10 @@ size_t lmr_module_count(const lmr_ground *ground);
 /* 1, or 0 when there is no such one, without ground or without a place to write to. */
 int lmr_module_at(const lmr_ground *ground, size_t index, lmr_module *module);
 int lmr_decks_at(const lmr_ground *ground, size_t index, lmr_decks *decks);
+/* Lines of a load module. 0 when there is no such one, or without ground. */
+size_t lmr_line_count(const lmr_ground *ground, size_t index);
+/* One of them: 1, or 0 when there is no such one, without ground or without a place to write to. */
+int lmr_line_at(const lmr_ground *ground, size_t index, size_t line, lmr_line *out);
 
 #ifdef __cplusplus
 }

@@ -4,6 +4,7 @@
 //! may be mapped into memory. Nothing is decided here; each function turns its arguments and calls the reader.
 //! A pointer that is null or not aligned is never followed: the function answers as the header says.
 
+mod pointers;
 mod values;
 
 use std::borrow::Cow;
@@ -15,7 +16,8 @@ use std::sync::Arc;
 use load_module_reader::{Area, Block, Keep, LoadedGround, ReadError, Sight, TileFile, open_file};
 use memmap2::Mmap;
 
-use crate::values::{AreaFrame, Decks, Module, Sample, Surface};
+use crate::pointers::{give, given};
+use crate::values::{AreaFrame, Decks, Line, Module, Sample, Surface};
 
 /// `LMR_ALL`: the whole area.
 const ALL: u32 = u32::MAX;
@@ -84,28 +86,6 @@ unsafe fn tell(error: &dyn Display, why: *mut c_char, size: usize) {
         std::ptr::copy_nonoverlapping(text.as_ptr(), why.cast::<u8>(), length);
         *why.add(length) = 0;
     }
-}
-
-/// What a pointer points to, unless it is null or not aligned.
-///
-/// # Safety
-/// If it is neither, it points to a `T` that lives as long as what is returned is used, and nothing writes to it then.
-unsafe fn given<'a, T>(pointer: *const T) -> Option<&'a T> {
-    // SAFETY: the caller's word, and what is checked first.
-    (!pointer.is_null() && pointer.is_aligned()).then(|| unsafe { &*pointer })
-}
-
-/// The same, for something that the caller has this function write: it may hold anything before.
-///
-/// # Safety
-/// If the pointer is neither null nor unaligned, a `T` may be written there.
-unsafe fn give<T>(pointer: *mut T, value: T) -> c_int {
-    if pointer.is_null() || !pointer.is_aligned() {
-        return 0;
-    }
-    // SAFETY: the caller's word.
-    unsafe { pointer.write(value) };
-    1
 }
 
 /// A path as C has it: any bytes.
@@ -489,4 +469,29 @@ pub unsafe extern "C" fn lmr_decks_at(ground: *const LoadedGround, index: usize,
     let Some(found) = ground.modules().get(index).map(|found| &found.module().decks) else { return 0 };
     // SAFETY: the caller's word.
     unsafe { give(decks, Decks::of(found)) }
+}
+
+/// Lines of one load module.
+///
+/// # Safety
+/// `ground` is null or comes from `lmr_load`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn lmr_line_count(ground: *const LoadedGround, index: usize) -> usize {
+    // SAFETY: the caller's word.
+    let ground = unsafe { given(ground) };
+    ground.and_then(|ground| ground.modules().get(index)).map_or(0, |found| found.module().lines.len())
+}
+
+/// One line of one load module.
+///
+/// # Safety
+/// `ground` is null, or comes from `lmr_load` and is not moved while what is pointed to is used; `out` is null or may
+/// be written.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn lmr_line_at(ground: *const LoadedGround, index: usize, line: usize, out: *mut Line) -> c_int {
+    // SAFETY: the caller's word.
+    let Some(ground) = (unsafe { given(ground) }) else { return 0 };
+    let Some(found) = ground.modules().get(index).and_then(|found| found.module().lines.get(line)) else { return 0 };
+    // SAFETY: the caller's word.
+    unsafe { give(out, Line::of(found)) }
 }

@@ -52,6 +52,37 @@ impl Decks {
     }
 }
 
+/// `lmr_line`.
+#[repr(C)]
+pub struct Line {
+    pub(crate) vertices: *const Vertex,
+    pub(crate) vertex_count: usize,
+    pub(crate) width: u16,
+    pub(crate) class_of_way: u8,
+    pub(crate) kind: u8,
+    pub(crate) form: u8,
+    pub(crate) storey: u8,
+    pub(crate) is_kept: u8,
+    pub(crate) is_in_ground: u8,
+}
+
+impl Line {
+    /// One of a load module, which outlives what is pointed to.
+    pub(crate) fn of(line: &load_module_reader::Line) -> Self {
+        Self {
+            vertices: line.vertices.as_ptr(),
+            vertex_count: line.vertices.len(),
+            width: line.width,
+            class_of_way: line.class,
+            kind: line.kind as u8,
+            form: line.form as u8,
+            storey: line.storey as u8,
+            is_kept: line.is_kept.into(),
+            is_in_ground: line.is_in_ground.into(),
+        }
+    }
+}
+
 /// Where a list begins; null for an empty one.
 fn start<T>(list: &[T]) -> *const T {
     if list.is_empty() { std::ptr::null() } else { list.as_ptr() }

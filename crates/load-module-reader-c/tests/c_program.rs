@@ -16,6 +16,11 @@ fn with_a_deck() -> Vec<u8> {
     example_of_version(2)
 }
 
+/// That with lines too.
+fn with_lines() -> Vec<u8> {
+    example_of_version(3)
+}
+
 fn example_of_version(version: usize) -> Vec<u8> {
     let text = include_str!("../../../docs/FORMAT.md");
     let hex = text.split("```hex").nth(version).unwrap().split("```").next().unwrap();
@@ -104,7 +109,8 @@ fn a_program_in_c_gets_right_answers() {
     let folder = tempfile::tempdir().unwrap();
     let program = folder.path().join("drive");
     compile("drive.c", &["-std=c99", "-pedantic"], &program).unwrap();
-    let files = [("1", "0", worked_example()), ("2", "0", two_levels()), ("1", "1", with_a_deck())];
+    let files =
+        [("1", "0", worked_example()), ("2", "0", two_levels()), ("1", "1", with_a_deck()), ("1", "2", with_lines())];
     for (levels, decks, file) in files {
         let area = folder.path().join(format!("{levels}-{decks}"));
         std::fs::create_dir_all(area.join("modules")).unwrap();

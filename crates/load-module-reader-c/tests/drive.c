@@ -38,6 +38,23 @@ static void ask_levels(const lmr_area *area, uint32_t levels) {
     expect(lmr_load_level(area, frame.east_m, frame.north_m, 7, UINT32_MAX, why, sizeof why) == NULL, "nor any");
 }
 
+/* The bridge is the middle of a line, and a track that is left out is another one; or there are none. */
+static void ask_lines(const lmr_area *area, int has_lines) {
+    char why[256];
+    lmr_ground *ground = lmr_load(area, 505250, 3875250, LMR_ALL, why, sizeof why);
+    expect(ground != NULL && lmr_line_count(ground, 0) == (has_lines ? 2u : 0u), "as many lines");
+    lmr_line road, track;
+    expect(!lmr_line_at(ground, 0, 2, &road) && !lmr_line_at(ground, 1, 0, &road), "no other lines");
+    expect(lmr_line_at(ground, 0, 0, &road) == has_lines && lmr_line_at(ground, 0, 1, &track) == has_lines, "lines");
+    if (has_lines) {
+        expect(road.class_of_way == 3 && road.width == 2560 && road.vertex_count == 2, "the road");
+        expect(road.kind == LMR_TRAVELLED && road.form == LMR_STRIP && road.storey == LMR_ON_BRIDGE, "what it is");
+        expect(road.is_kept && !road.is_in_ground && road.vertices[1].x == 41600, "where it is");
+        expect(track.class_of_way == 4 && track.form == LMR_NOTHING && !track.is_kept, "the track is left out");
+    }
+    lmr_unload(ground);
+}
+
 /* Over the middle of the load module hangs a deck, 5 m above the ground, class 3; or there is none. */
 static void ask_decks(const lmr_area *area, int has_decks) {
     char why[256] = "";
@@ -123,7 +140,8 @@ int main(int argc, char **argv) {
         if (area) {
             ask(area);
             ask_levels(area, (uint32_t)atoi(argv[2]));
-            ask_decks(area, atoi(argv[3]));
+            ask_decks(area, argv[3][0] != '0');
+            ask_lines(area, argv[3][0] == '2');
         }
         lmr_close(area);
     }

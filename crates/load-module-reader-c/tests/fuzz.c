@@ -109,13 +109,34 @@ static void seal(unsigned char *file, size_t length, uint64_t from, uint64_t byt
     put(file + from + bytes - 4, crc32(file + from, (size_t)bytes - 4), 4);
 }
 
-/* Bytes of an entry of the index: in version 2 each ends with four words about decks. */
-static uint64_t entry_bytes(const unsigned char *file) { return file[8] == 2 ? 48 : 32; }
+/* Bytes of an entry of the index: in version 2 each ends with four words about decks, in version 3 with one about parts. */
+static uint64_t entry_bytes(const unsigned char *file) { return file[8] == 2 ? 48 : file[8] == 3 ? 36 : 32; }
 
 /* Bytes of the part with decks behind a section, as its entry says. */
 static uint64_t deck_bytes(const unsigned char *file, const unsigned char *entry) {
-    if (entry_bytes(file) == 32 || !word(entry + 36)) return 0;
+    if (entry_bytes(file) != 48 || !word(entry + 36)) return 0;
     return (20 + 8 * (uint64_t)word(entry + 32) + 7 * (uint64_t)word(entry + 36) + 3) / 4 * 4 + 4;
+}
+
+/* Bytes of the table of parts behind a section and of its parts, as its entry says; those of the table alone. */
+static uint64_t parts_bytes(const unsigned char *file, const unsigned char *entry) {
+    return entry_bytes(file) == 36 ? word(entry + 32) : 0;
+}
+
+static uint64_t table_bytes(const unsigned char *table) { return 16 + 12 * (uint64_t)word(table + 12) + 4; }
+
+/* Makes the checksums of parts right in their table, and its own. */
+static void seal_parts(unsigned char *file, size_t length, uint64_t at, uint64_t bytes) {
+    if (bytes < 36 || at > length || bytes > length - at || table_bytes(file + at) > bytes) return;
+    uint64_t part = at + table_bytes(file + at);
+    for (uint64_t i = 0; i < word(file + at + 12); i++) {
+        unsigned char *entry = file + at + 16 + 12 * i;
+        uint64_t own = word(entry + 4);
+        if (own > at + bytes - part) break;
+        put(entry + 8, crc32(file + part, (size_t)own), 4);
+        part += own;
+    }
+    seal(file, length, at, table_bytes(file + at));
 }
 
 /* Load modules times levels, as the header says. */
@@ -136,6 +157,7 @@ static void seal_all(unsigned char *file, size_t length) {
         uint64_t at = word(entry) | (uint64_t)word(entry + 4) << 32;
         seal(file, length, at, word(entry + 8));
         seal(file, length, at + word(entry + 8), deck_bytes(file, entry));
+        seal_parts(file, length, at + word(entry + 8), parts_bytes(file, entry));
     }
 }
 
@@ -193,7 +215,7 @@ static unsigned char *entry_at(unsigned char *file, size_t length) {
 static void damage_entry(unsigned char *file, size_t length) {
     unsigned char *entry = entry_at(file, length);
     if (!entry) return;
-    int field = (int)below(entry_bytes(file) == 48 ? 11 : 7);
+    int field = (int)below((entry_bytes(file) - 4) / 4);
     if (field == 0) put(entry, odd_number(word(entry)), 8);
     else put(entry + 4 + 4 * field, odd_number(word(entry + 4 + 4 * field)), 4);
 }
@@ -242,6 +264,25 @@ static void damage_section(unsigned char *file, size_t length) {
     }
 }
 
+/* Other kinds, counts, lengths and lines: in the table of parts, or somewhere behind it. */
+static void damage_parts(unsigned char *file, size_t length) {
+    unsigned char *entry = entry_at(file, length);
+    if (!entry || word(entry + 4)) return;
+    uint64_t at = word(entry) + (uint64_t)word(entry + 8), bytes = parts_bytes(file, entry);
+    if (bytes < 36 || at > length || bytes > length - at) return;
+    if (below(4) == 0) {
+        /* A kind that is not known. */
+        uint64_t last = word(file + at + 12);
+        if (last && last < 9 && 16 + 12 * last <= bytes) put(file + at + 4 + 12 * last, 3 + below(1000), 4);
+        return;
+    }
+    for (uint64_t times = 1 + below(3); times; times--) {
+        uint64_t place = at + (below(2) ? below(36) : below(bytes - 3));
+        int width = 1 << below(3);
+        if (place + (uint64_t)width <= length) put(file + place, odd_number(file[place]), width);
+    }
+}
+
 static size_t damage_length(unsigned char *file, size_t length) {
     size_t cut = below(2) ? (size_t)below(length + 1) : length - (size_t)below(length < 64 ? length + 1 : 64);
     if (below(3) == 0 && length + 4096 < FILE_BYTES) {
@@ -263,7 +304,8 @@ static size_t damage_bytes(unsigned char *file, size_t length) {
 
 static size_t damage(unsigned char *file, size_t length) {
     for (uint64_t times = below(4); times; times--) {
-        switch (below(9)) {
+        switch (below(11)) {
+            case 9: case 10: damage_parts(file, length); break;
             case 0: damage_header(file, length); break;
             case 1: damage_entry(file, length); break;
             case 2: case 3: damage_section(file, length); break;
@@ -356,6 +398,20 @@ static void ask_places(const lmr_ground *ground, const lmr_frame *frame) {
     }
 }
 
+static void draw_lines(const lmr_ground *ground, const lmr_frame *frame, size_t module) {
+    size_t count = lmr_line_count(ground, module);
+    lmr_line line;
+    expect(!lmr_line_at(ground, module, count, &line) && !lmr_line_at(ground, module, SIZE_MAX, &line), "no such line");
+    for (size_t i = 0; i < count; i++) {
+        expect(lmr_line_at(ground, module, i, &line) == 1 && 2 <= line.vertex_count, "every line");
+        expect(line.class_of_way != LMR_HOLE_CLASS && line.kind <= LMR_BREAKLINE && line.form <= LMR_BENCH, "a line");
+        expect(line.storey <= LMR_IN_TUNNEL && line.is_kept <= 1 && line.is_in_ground <= line.is_kept, "flags");
+        for (size_t v = 0; v < line.vertex_count; v++) {
+            expect(line.vertices[v].x <= frame->side_m * 128 && line.vertices[v].y <= frame->side_m * 128, "inside");
+        }
+    }
+}
+
 static void draw_modules(const lmr_ground *ground, const lmr_frame *frame) {
     size_t count = lmr_module_count(ground);
     lmr_module module;
@@ -381,6 +437,7 @@ static void draw_modules(const lmr_ground *ground, const lmr_frame *frame) {
             for (int c = 0; c < 3; c++) expect(decks.triangles[t][c] < decks.vertex_count, "an index of a vertex");
             sum += decks.classes[t];
         }
+        draw_lines(ground, frame, i);
     }
 }
 
@@ -410,6 +467,9 @@ static void ask_nothing(const lmr_area *area, lmr_ground *ground) {
     expect(!lmr_surface_below(NULL, 0, 0, 0, &surface) && !lmr_surface_below(ground, 0, 0, 0, NULL), "no surface");
     expect(!lmr_heights_below(NULL, triples, &height, 1) && !lmr_heights_below(ground, NULL, &height, 1), "none");
     expect(!lmr_decks_at(NULL, 0, &decks) && !lmr_decks_at(ground, 0, NULL), "no decks");
+    lmr_line line;
+    expect(!lmr_line_count(NULL, 0) && !lmr_line_count(ground, SIZE_MAX), "no lines");
+    expect(!lmr_line_at(NULL, 0, 0, &line) && !lmr_line_at(ground, 0, 0, NULL), "no line");
     expect(!lmr_module_at(NULL, 0, &module) && !lmr_module_at(ground, 0, NULL), "no load module");
     expect(!lmr_heights(NULL, places, &height, 1) && !lmr_heights(ground, NULL, &height, 1), "no heights");
     if (ground) {

@@ -1,6 +1,6 @@
 //! A cursor over the bytes of one section: every read is bounded and knows where it stands.
 
-use crate::{ReadError, Section};
+use crate::{ReadError, Section, Vertex};
 
 /// Reads little-endian values of `section` one after the other.
 pub(crate) struct Cursor<'a> {
@@ -57,6 +57,15 @@ impl<'a> Cursor<'a> {
 
     pub(crate) fn u64(&mut self) -> Result<u64, ReadError> {
         Ok(u64::from_le_bytes(self.array()?))
+    }
+
+    /// A vertex in a square with sides of `side` quanta.
+    pub(crate) fn vertex(&mut self, side: u16) -> Result<Vertex, ReadError> {
+        let offset = self.offset();
+        let vertex = Vertex { x: self.u16()?, y: self.u16()?, z: self.i32()? };
+        self.within(offset, "x", i64::from(vertex.x), (0, i64::from(side)))?;
+        self.within(offset + 2, "y", i64::from(vertex.y), (0, i64::from(side)))?;
+        Ok(vertex)
     }
 
     /// A number of metres, which must be finite.

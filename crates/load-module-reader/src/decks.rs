@@ -1,4 +1,4 @@
-//! Decks of bridges: one more part of a load module in a file of version 2, decoded and checked.
+//! Decks of bridges: one more part of a load module in files of versions 2 and 3, decoded and checked.
 
 use crate::bytes::{Cursor, check_section};
 use crate::{HOLE_CLASS, Header, IndexEntry, ReadError, Section, Vertex};
@@ -23,7 +23,7 @@ impl Decks {
         self.triangles.is_empty()
     }
 
-    /// The part at `offset` of the file that follows the section `entry` names.
+    /// The part of a file of version 2 that follows the section `entry` names.
     pub(crate) fn parse(
         bytes: &[u8],
         header: &Header,
@@ -43,8 +43,25 @@ impl Decks {
         cursor.expect_u32("level", u32::from(level))?;
         cursor.expect_u32("deck vertex count", entry.decks.vertex_count)?;
         cursor.expect_u32("deck triangle count", entry.decks.triangle_count)?;
-        let vertices = read_vertices(&mut cursor, header.side, entry)?;
-        let triangles = read_triangles(&mut cursor, &vertices, header.side, entry)?;
+        let first = cursor.offset();
+        let counts = [entry.decks.vertex_count, entry.decks.triangle_count];
+        let (decks, [low, high]) = Self::read_lists(&mut cursor, header.side, counts)?;
+        cursor.expect(first, "lowest height of decks", i64::from(low), i64::from(entry.decks.z_low))?;
+        cursor.expect(first, "highest height of decks", i64::from(high), i64::from(entry.decks.z_high))?;
+        cursor.padding()?;
+        cursor.checksum()?;
+        Ok(decks)
+    }
+
+    /// So many vertices and triangles, and their classes, in a square with sides of `side` quanta; with the lowest and
+    /// the highest of the vertices.
+    pub(crate) fn read_lists(
+        cursor: &mut Cursor,
+        side: u16,
+        [vertex_count, triangle_count]: [u32; 2],
+    ) -> Result<(Self, [i32; 2]), ReadError> {
+        let vertices = read_vertices(cursor, side, vertex_count)?;
+        let triangles = read_triangles(cursor, &vertices, side, triangle_count)?;
         let mut classes = Vec::with_capacity(triangles.len());
         for _ in 0..triangles.len() {
             let offset = cursor.offset();
@@ -52,43 +69,31 @@ impl Decks {
             cursor.within(offset, "class of a deck", i64::from(class), (0, i64::from(HOLE_CLASS) - 1))?;
             classes.push(class);
         }
-        cursor.padding()?;
-        cursor.checksum()?;
-        Ok(Self { vertices, triangles, classes })
+        let heights = vertices.iter().map(|vertex| vertex.z);
+        let heights = heights.fold([i32::MAX, i32::MIN], |[low, high], z| [low.min(z), high.max(z)]);
+        Ok((Self { vertices, triangles, classes }, heights))
     }
 }
 
-fn read_vertices(cursor: &mut Cursor, side: u16, entry: &IndexEntry) -> Result<Vec<Vertex>, ReadError> {
-    let (first, limit) = (cursor.offset(), (0, i64::from(side)));
-    let mut vertices: Vec<Vertex> = Vec::with_capacity(entry.decks.vertex_count as usize);
-    let (mut low, mut high) = (i32::MAX, i32::MIN);
-    for _ in 0..entry.decks.vertex_count {
+fn read_vertices(cursor: &mut Cursor, side: u16, count: u32) -> Result<Vec<Vertex>, ReadError> {
+    let mut vertices: Vec<Vertex> = Vec::with_capacity(count as usize);
+    for _ in 0..count {
         let offset = cursor.offset();
-        let vertex = Vertex { x: cursor.u16()?, y: cursor.u16()?, z: cursor.i32()? };
-        cursor.within(offset, "x", i64::from(vertex.x), limit)?;
-        cursor.within(offset + 2, "y", i64::from(vertex.y), limit)?;
+        let vertex = cursor.vertex(side)?;
         let sorted = vertices.last().is_none_or(|last| (last.y, last.x, last.z) < (vertex.y, vertex.x, vertex.z));
         cursor.expect(offset, "order of vertices", i64::from(sorted), 1)?;
-        (low, high) = (low.min(vertex.z), high.max(vertex.z));
         vertices.push(vertex);
     }
-    cursor.expect(first, "lowest height of decks", i64::from(low), i64::from(entry.decks.z_low))?;
-    cursor.expect(first, "highest height of decks", i64::from(high), i64::from(entry.decks.z_high))?;
     Ok(vertices)
 }
 
 /// Triangles in order, counter-clockwise, that together use every vertex.
-fn read_triangles(
-    cursor: &mut Cursor,
-    vertices: &[Vertex],
-    side: u16,
-    entry: &IndexEntry,
-) -> Result<Vec<[u16; 3]>, ReadError> {
+fn read_triangles(cursor: &mut Cursor, vertices: &[Vertex], side: u16, count: u32) -> Result<Vec<[u16; 3]>, ReadError> {
     let last = vertices.len() as i64 - 1;
     let square = i64::from(side) * i64::from(side);
     let mut is_used = vec![false; vertices.len()];
-    let mut triangles: Vec<[u16; 3]> = Vec::with_capacity(entry.decks.triangle_count as usize);
-    for _ in 0..entry.decks.triangle_count {
+    let mut triangles: Vec<[u16; 3]> = Vec::with_capacity(count as usize);
+    for _ in 0..count {
         let offset = cursor.offset();
         let triangle = [cursor.u16()?, cursor.u16()?, cursor.u16()?];
         for (place, vertex) in triangle.into_iter().enumerate() {

@@ -28,6 +28,24 @@ pub enum Section {
         /// Its level; 0 is the finest.
         level: u16,
     },
+    /// The lines of one level of a load module.
+    Lines {
+        /// Its row in the area.
+        row: u32,
+        /// Its column in the area.
+        col: u32,
+        /// Its level; 0 is the finest.
+        level: u16,
+    },
+    /// The table of parts of one level of a load module, or a part of a kind that is not known.
+    Parts {
+        /// Its row in the area.
+        row: u32,
+        /// Its column in the area.
+        col: u32,
+        /// Its level; 0 is the finest.
+        level: u16,
+    },
 }
 
 impl fmt::Display for Section {
@@ -35,12 +53,17 @@ impl fmt::Display for Section {
         match self {
             Section::Header => f.write_str("header"),
             Section::Index => f.write_str("index"),
-            Section::Module { row, col, level: 0 } => write!(f, "load module {row},{col}"),
-            Section::Module { row, col, level } => write!(f, "load module {row},{col} at level {level}"),
-            Section::Decks { row, col, level: 0 } => write!(f, "decks of load module {row},{col}"),
-            Section::Decks { row, col, level } => write!(f, "decks of load module {row},{col} at level {level}"),
+            Section::Module { row, col, level } => of_level(f, "", [row, col], level),
+            Section::Decks { row, col, level } => of_level(f, "decks of ", [row, col], level),
+            Section::Lines { row, col, level } => of_level(f, "lines of ", [row, col], level),
+            Section::Parts { row, col, level } => of_level(f, "parts of ", [row, col], level),
         }
     }
+}
+
+fn of_level(f: &mut fmt::Formatter<'_>, what: &str, [row, col]: [&u32; 2], level: &u16) -> fmt::Result {
+    write!(f, "{what}load module {row},{col}")?;
+    if *level == 0 { Ok(()) } else { write!(f, " at level {level}") }
 }
 
 /// Why a load-module file could not be read. Offsets are bytes from the start of the file.

@@ -4,7 +4,7 @@ use std::io::Read;
 use std::path::Path;
 
 use crate::tile_file::open_file;
-use crate::{FILE_BYTES_MAX, Header, IndexEntry, Module, ReadError, index};
+use crate::{FILE_BYTES_MAX, Header, IndexEntry, Module, ReadError, Section, VERSION, index};
 
 /// All load modules of one tile, decoded and checked.
 #[derive(Clone, Debug, PartialEq)]
@@ -53,7 +53,19 @@ impl SlmFile {
             .zip(&index)
             .map(|((level, place), entry)| Module::parse(section(bytes, entry), &header, entry, level, place))
             .collect::<Result<_, _>>()?;
-        Ok(Self { header, index, modules })
+        let file = Self { header, index, modules };
+        file.check_version()?;
+        Ok(file)
+    }
+
+    /// The same load modules have one file only: with decks alone it is of version 2.
+    fn check_version(&self) -> Result<(), ReadError> {
+        let more = |module: &Module| !module.lines.is_empty() || !module.unknown_parts.is_empty();
+        if self.header.version != VERSION || self.modules.iter().any(more) {
+            return Ok(());
+        }
+        let (section, field) = (Section::Header, "parts other than decks");
+        Err(ReadError::WrongValue { section, offset: 8, field, found: 0, expected: 1 })
     }
 
     /// What holds for all load modules of the file.
@@ -83,7 +95,7 @@ impl SlmFile {
     }
 }
 
-/// The bytes of one section and of its decks. The index has been checked against the length of the file.
+/// The bytes of one section and of what follows it. The index has been checked against the length of the file.
 fn section<'a>(bytes: &'a [u8], entry: &IndexEntry) -> &'a [u8] {
     let start = entry.offset as usize;
     &bytes[start..entry.end() as usize]
@@ -92,7 +104,6 @@ fn section<'a>(bytes: &'a [u8], entry: &IndexEntry) -> &'a [u8] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Section;
     use crate::sample;
 
     #[test]
@@ -123,15 +134,101 @@ mod tests {
         assert_eq!(file.module(2, 4).map(|module| module.level), Some(0));
     }
 
-    fn samples() -> [Vec<u8>; 4] {
-        [sample::file(), sample::two_levels(), sample::with_decks(), sample::with_one_deck_of_two_levels()]
+    fn samples() -> [Vec<u8>; 5] {
+        let (decks, one_deck) = (sample::with_decks(), sample::with_one_deck_of_two_levels());
+        [sample::file(), sample::two_levels(), decks, one_deck, sample::with_parts()]
+    }
+
+    #[test]
+    fn a_file_with_parts_is_of_version_3_and_unknown_kinds_are_passed_over() {
+        let file = SlmFile::parse(&sample::with_parts()).unwrap();
+        assert_eq!(file.header().version, 3);
+        let [west, east] = file.modules() else { panic!("two load modules") };
+        let bridged = SlmFile::parse(&sample::with_decks()).unwrap();
+        assert_eq!(west.decks, bridged.modules()[0].decks);
+        assert_eq!((&west.lines[..], &east.unknown_parts[..]), (&[][..], &[77][..]));
+        let told =
+            |line: &crate::Line| (line.class, line.kind, line.form, line.storey, line.is_kept, line.is_in_ground);
+        use crate::{LineForm, LineKind, LineStorey};
+        let (road, river) = (LineKind::Travelled, LineKind::Channel);
+        assert_eq!(
+            east.lines.iter().map(told).collect::<Vec<_>>(),
+            [
+                (7, road, LineForm::Nothing, LineStorey::Ground, false, false),
+                (7, road, LineForm::Strip, LineStorey::Ground, true, true),
+                (7, road, LineForm::Strip, LineStorey::Bridge, true, false),
+                (9, river, LineForm::Line, LineStorey::Ground, true, true),
+            ]
+        );
+        assert_eq!((east.lines[1].width, east.lines[3].vertices.len()), (896, 3));
+        for (plain, parted) in bridged.modules().iter().zip(file.modules()) {
+            assert_eq!((&plain.vertices, &plain.triangles), (&parted.vertices, &parted.triangles));
+        }
+    }
+
+    #[test]
+    fn what_checksums_cannot_know_of_parts_is_checked_too() {
+        let check = |damage: &dyn Fn(&mut [u8], usize), expected: &str| {
+            let mut bytes = sample::with_parts();
+            let entry = SlmFile::parse(&bytes).unwrap().index()[1];
+            damage(&mut bytes, (entry.offset + u64::from(entry.length)) as usize);
+            sample::mend_checksums(&mut bytes);
+            let error = SlmFile::parse(&bytes).unwrap_err().to_string();
+            assert!(error.contains(expected), "{error:?} does not say {expected:?}");
+        };
+        // The table has three entries; lines follow, then what is unknown.
+        let lines = 16 + 3 * 12 + 4 + (8 + 8 * 8 + 7 * 4);
+        let vertices = lines + 8 + 4 * 8;
+        check(&|bytes, at| bytes[at] = 9, "parts of load module 2,4, offset");
+        check(&|bytes, at| bytes[at + 8] = 1, "found level 1, expected 0");
+        check(&|bytes, at| bytes[at + 12] = 0, "found part count 0, expected 1 to");
+        check(&|bytes, at| bytes[at + 14] = 1, "found part count 65539, expected 1 to");
+        check(&|bytes, at| bytes[at + 16] = 2, "found kind of a part 2, expected 3 to");
+        check(
+            &|bytes, at| (bytes[at + 20], bytes[at + 32]) = (bytes[at + 20] - 4, bytes[at + 32] + 4),
+            "found length of decks 96, expected 100",
+        );
+        check(&|bytes, at| bytes[at + 20] -= 4, "found bytes behind the last part 4, expected 0");
+        check(&|bytes, at| bytes[at + 20] += 1, "found length of a part, less whole words, 1, expected 0");
+        check(&|bytes, at| bytes[at + 23] = 9, "found length of a part 150995044, expected 4 to");
+        check(&|bytes, at| bytes[at + lines] = 3, "found length of lines");
+        check(&|bytes, at| bytes[at + lines + 8] = 255, "found class of a line 255, expected 0 to 254");
+        check(&|bytes, at| bytes[at + lines + 9] = 3, "found kind of a line 3, expected 0 to 2");
+        check(&|bytes, at| bytes[at + lines + 10] = 4, "found form of a line 4, expected 0 to 3");
+        check(&|bytes, at| bytes[at + lines + 11] = 12, "found flags of a line 12, expected 0 to 11");
+        check(&|bytes, at| bytes[at + lines + 11] = 2, "found agreement of form and flags 0, expected 1");
+        check(&|bytes, at| bytes[at + lines + 10] = 1, "found agreement of form and flags 0, expected 1");
+        check(&|bytes, at| bytes[at + lines + 14] = 1, "found vertex count of a line 1, expected 2 to 65535");
+        check(&|bytes, at| bytes[at + lines + 14] = 3, "found vertex count of lines 9, expected 10");
+        check(&|bytes, at| bytes[at + vertices + 1] = 0xff, "found x 65");
+        check(
+            &|bytes, at| bytes.copy_within(at + vertices..at + vertices + 8, at + vertices + 8),
+            "found length of a line's piece 0, expected 1",
+        );
+        check(&|bytes, at| bytes.copy_within(at + lines + 24..at + lines + 32, at + lines + 16), "order of lines");
+        let index = 144 + 36 + 32;
+        check(&|bytes, _| bytes[index] -= 3, "found length of parts, less whole words, 1, expected 0");
+        check(&|bytes, _| bytes[index + 2] = 9, "expected 36 to 280");
+        for version in [1, 2] {
+            let mut bytes = sample::with_parts();
+            bytes[8] = version;
+            sample::mend_checksums(&mut bytes);
+            assert!(SlmFile::parse(&bytes).is_err(), "version 3 was read as version {version}");
+        }
+    }
+
+    #[test]
+    fn a_file_of_version_3_with_decks_alone_is_refused() {
+        // The same load modules have one file only: it is of version 2.
+        let error = SlmFile::parse(&sample::with_decks_as_the_only_part()).unwrap_err().to_string();
+        assert_eq!(error, "header, offset 8: found parts other than decks 0, expected 1");
     }
 
     #[test]
     fn a_file_with_decks_is_of_version_2_and_has_the_same_ground() {
         let (plain, bridged) =
             (SlmFile::parse(&sample::file()).unwrap(), SlmFile::parse(&sample::with_decks()).unwrap());
-        assert!(!plain.header().has_decks() && bridged.header().has_decks());
+        assert_eq!((plain.header().version, bridged.header().version), (1, 2));
         for (plain, bridged) in plain.modules().iter().zip(bridged.modules()) {
             assert!(plain.decks.is_empty() && !bridged.decks.is_empty());
             assert_eq!(*plain, Module { decks: plain.decks.clone(), ..bridged.clone() });
@@ -254,9 +351,9 @@ mod tests {
     #[test]
     fn another_version_is_named() {
         let mut bytes = sample::file();
-        bytes[8] = 3;
+        bytes[8] = 4;
         let error = SlmFile::parse(&bytes).unwrap_err();
-        assert_eq!(error.to_string(), "header, offset 8: found format version 3, expected 1 to 2");
+        assert_eq!(error.to_string(), "header, offset 8: found format version 4, expected 1 to 3");
     }
 
     #[track_caller]

@@ -1,9 +1,7 @@
 //! The header: which tile, on which grid, in which frame.
 
 use crate::bytes::{Cursor, check_section};
-use crate::{
-    FIXED_HEADER_BYTES, LEVELS_MAX, MAGIC, QUANTA_PER_METRE, ReadError, Section, VERSION, VERSION_WITHOUT_DECKS,
-};
+use crate::{FIXED_HEADER_BYTES, LEVELS_MAX, MAGIC, QUANTA_PER_METRE, ReadError, Section, VERSION, VERSION_OF_GROUND};
 
 /// Bytes of the longest header: two texts of 65,535 bytes, padding, checksum.
 const HEADER_BYTES_MAX: u32 = (FIXED_HEADER_BYTES as u32 + 2 * u16::MAX as u32).next_multiple_of(4) + 4;
@@ -15,7 +13,8 @@ const ORIGIN_M_MAX: f64 = 1e9;
 /// What holds for all load modules of a file. Rows and columns count load modules from the area's south-west.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Header {
-    /// Version of the format: [`VERSION`] with decks, [`VERSION_WITHOUT_DECKS`] without.
+    /// Version of the format: [`VERSION`] with a table of parts for each load module, [`crate::VERSION_WITH_DECKS`]
+    /// with decks alone, [`VERSION_OF_GROUND`] without either.
     pub version: u16,
     /// Levels of every load module, the finest first.
     pub level_count: u16,
@@ -61,11 +60,6 @@ impl Header {
     pub fn module_origin_m(&self, row: u32, col: u32) -> [f64; 2] {
         let [east, north] = self.origin_m;
         [east + f64::from(col) * self.side_m(), north + f64::from(row) * self.side_m()]
-    }
-
-    /// Whether some load module of the file has decks.
-    pub fn has_decks(&self) -> bool {
-        self.version != VERSION_WITHOUT_DECKS
     }
 
     /// Load modules in the file, each of which has all levels.
@@ -156,7 +150,7 @@ fn check_start(cursor: &mut Cursor) -> Result<u16, ReadError> {
         return Err(ReadError::NotALoadModuleFile { found });
     }
     let found = cursor.u16()?;
-    if !(VERSION_WITHOUT_DECKS..=VERSION).contains(&found) {
+    if !(VERSION_OF_GROUND..=VERSION).contains(&found) {
         return Err(ReadError::UnsupportedVersion { found, newest: VERSION });
     }
     Ok(found)

@@ -2,8 +2,8 @@
 
 use crate::bytes::{Cursor, check_section};
 use crate::{
-    DECK_ENTRY_BYTES, FIXED_DECKS_BYTES, FIXED_MODULE_BYTES, Header, INDEX_ENTRY_BYTES, ReadError, Section,
-    VERSION_WITHOUT_DECKS,
+    DECK_ENTRY_BYTES, FIXED_DECKS_BYTES, FIXED_MODULE_BYTES, FIXED_TABLE_BYTES, Header, INDEX_ENTRY_BYTES,
+    PARTS_ENTRY_BYTES, ReadError, Section, TABLE_ENTRY_BYTES, VERSION, VERSION_WITH_DECKS,
 };
 
 /// Where one level of a load module lies in the file, and its size.
@@ -23,8 +23,11 @@ pub struct IndexEntry {
     pub z_low: i32,
     /// Height of the highest vertex in quanta of 1/128 m.
     pub z_high: i32,
-    /// The part with decks that follows the section. All of the above is about the ground alone.
+    /// The part with decks that follows the section in a file of version 2. All of the above is about the ground alone.
     pub decks: DecksEntry,
+    /// Bytes of the table of parts and of all its parts that follow the section in a file of version 3; 0 where the
+    /// load module has none.
+    pub parts_length: u32,
 }
 
 /// What the index says of the decks of one level of a load module; all zero where there are none.
@@ -52,15 +55,20 @@ impl DecksEntry {
 }
 
 impl IndexEntry {
-    /// One past the last byte of the section and of the decks that follow it.
+    /// One past the last byte of the section and of all parts that follow it.
     pub fn end(&self) -> u64 {
-        self.offset + u64::from(self.length) + u64::from(self.decks.length())
+        self.offset + u64::from(self.length) + u64::from(self.decks.length()) + u64::from(self.parts_length)
     }
 }
 
 /// Bytes of one entry of the index in files of a version.
 pub(crate) fn entry_bytes(version: u16) -> usize {
-    if version == VERSION_WITHOUT_DECKS { INDEX_ENTRY_BYTES } else { INDEX_ENTRY_BYTES + DECK_ENTRY_BYTES }
+    INDEX_ENTRY_BYTES
+        + match version {
+            VERSION => PARTS_ENTRY_BYTES,
+            VERSION_WITH_DECKS => DECK_ENTRY_BYTES,
+            _ => 0,
+        }
 }
 
 /// The index that follows a header of `header_length` bytes: level by level, row by row from the south-west. `file` is
@@ -88,8 +96,11 @@ pub(crate) fn parse(
     let mut entries = Vec::with_capacity(bytes.len() / entry_bytes);
     for _ in 0..count {
         let mut entry = read_entry(&mut cursor, next, file_bytes)?;
-        if header.has_decks() {
-            entry.decks = read_decks(&mut cursor, file_bytes - next - u64::from(entry.length))?;
+        let rest = file_bytes - next - u64::from(entry.length);
+        match header.version {
+            VERSION => entry.parts_length = read_parts_length(&mut cursor, rest)?,
+            VERSION_WITH_DECKS => entry.decks = read_decks(&mut cursor, rest)?,
+            _ => {}
         }
         next = entry.end();
         entries.push(entry);
@@ -98,9 +109,28 @@ pub(crate) fn parse(
         return Err(ReadError::WrongLength { found: file_bytes, expected: next });
     }
     // The same load modules have one file only.
-    let has_decks = entries.iter().any(|entry| 0 < entry.decks.triangle_count);
-    cursor.expect(base, "decks in some load module", i64::from(has_decks), i64::from(header.has_decks()))?;
+    let some = |has: fn(&IndexEntry) -> bool| i64::from(entries.iter().any(has));
+    match header.version {
+        VERSION => cursor.expect(base, "parts of some load module", some(|entry| 0 < entry.parts_length), 1)?,
+        VERSION_WITH_DECKS => {
+            cursor.expect(base, "decks in some load module", some(|entry| 0 < entry.decks.triangle_count), 1)?;
+        }
+        _ => {}
+    }
     Ok(entries)
+}
+
+/// What an entry says of parts, which must fit into the `rest` of the file behind the section of the ground.
+fn read_parts_length(cursor: &mut Cursor, rest: u64) -> Result<u32, ReadError> {
+    /// A table of one part with one word.
+    const LEAST: usize = FIXED_TABLE_BYTES + TABLE_ENTRY_BYTES + 4 + 4;
+    let offset = cursor.offset();
+    let length = cursor.u32()?;
+    if length != 0 {
+        cursor.within(offset, "length of parts", i64::from(length), (LEAST as i64, clamp(rest)))?;
+        cursor.expect(offset, "length of parts, less whole words,", i64::from(length % 4), 0)?;
+    }
+    Ok(length)
 }
 
 /// One entry, whose section must begin at `next`: sections lie back to back.
@@ -115,6 +145,7 @@ fn read_entry(cursor: &mut Cursor, next: u64, file_length: u64) -> Result<IndexE
         z_low: cursor.i32()?,
         z_high: cursor.i32()?,
         decks: DecksEntry::default(),
+        parts_length: 0,
     };
     cursor.expect(at, "offset", clamp(entry.offset), clamp(next))?;
     let rest = clamp(file_length - next.min(file_length));

@@ -10,7 +10,8 @@
 //! what is new.
 //! Decks of bridges hang above the ground: [`LoadedGround::height_m`] is that of the ground,
 //! [`LoadedGround::height_below_m`] that of the topmost of ground and decks not above a ceiling, for vehicles that
-//! drive over a bridge and under it.
+//! drive over a bridge and under it. [`Module::lines`] are the middle lines of roads, rails, rivers and streams, those
+//! that are left out of the ground too.
 //! A query takes constant expected time. [`SlmFile`] is the plain way to read one whole file.
 //! Where load modules have several levels of detail, all of this is about the finest, and [`Area::load_level`] brings
 //! in another.
@@ -67,8 +68,9 @@
 
 mod format;
 pub use format::{
-    DECK_ENTRY_BYTES, FILE_BYTES_MAX, FIXED_DECKS_BYTES, FIXED_HEADER_BYTES, FIXED_MODULE_BYTES, HOLE_CLASS,
-    INDEX_ENTRY_BYTES, LEVELS_MAX, MAGIC, QUANTA_PER_METRE, VERSION, VERSION_WITHOUT_DECKS,
+    DECK_ENTRY_BYTES, FILE_BYTES_MAX, FIXED_DECKS_BYTES, FIXED_DECKS_PART_BYTES, FIXED_HEADER_BYTES, FIXED_LINES_BYTES,
+    FIXED_MODULE_BYTES, FIXED_TABLE_BYTES, HOLE_CLASS, INDEX_ENTRY_BYTES, LEVELS_MAX, LINE_BYTES, MAGIC, PART_DECKS,
+    PART_LINES, PARTS_ENTRY_BYTES, QUANTA_PER_METRE, TABLE_ENTRY_BYTES, VERSION, VERSION_OF_GROUND, VERSION_WITH_DECKS,
 };
 mod error;
 pub use error::{ReadError, Section};
@@ -82,7 +84,10 @@ mod index;
 pub use index::{DecksEntry, IndexEntry};
 mod decks;
 pub use decks::Decks;
+mod lines;
+pub use lines::{Line, LineForm, LineKind, LineStorey};
 mod module;
+mod parts;
 pub use module::{Module, Residual};
 mod tile_file;
 pub use tile_file::{Bytes, Keep, TileFile, open_file};

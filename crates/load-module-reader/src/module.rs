@@ -2,7 +2,10 @@
 
 use crate::bytes::{Cursor, check_section};
 use crate::cover::torn_edge_count;
-use crate::{Decks, FIXED_MODULE_BYTES, Header, IndexEntry, QUANTA_PER_METRE, ReadError, Section, Vertex};
+use crate::parts::Parts;
+use crate::{
+    Decks, FIXED_MODULE_BYTES, Header, IndexEntry, Line, QUANTA_PER_METRE, ReadError, Section, VERSION, Vertex,
+};
 
 /// Residuals over the posts that a load module owns, in quanta of 1/128 m.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -49,6 +52,10 @@ pub struct Module {
     pub residual: Residual,
     /// Decks of bridges above the ground. All lists above are about the ground alone.
     pub decks: Decks,
+    /// Middle lines of ways, in the ground or left out; sorted. The finest level alone has them.
+    pub lines: Vec<Line>,
+    /// Kinds of parts that this reader does not know; it has passed over them.
+    pub unknown_parts: Vec<u32>,
 }
 
 impl Module {
@@ -61,7 +68,7 @@ impl Module {
         }
     }
 
-    /// The section that `entry` names, of the load module at (`row`, `col`), and the decks that follow it.
+    /// The section that `entry` names, of the load module at (`row`, `col`), and the parts that follow it.
     pub(crate) fn parse(
         bytes: &[u8],
         header: &Header,
@@ -71,7 +78,7 @@ impl Module {
     ) -> Result<Self, ReadError> {
         let section = Section::Module { row, col, level };
         // The index has been checked against the length of the file.
-        let (bytes, of_decks) = bytes.split_at(entry.length as usize);
+        let (bytes, behind) = bytes.split_at(entry.length as usize);
         check_section(bytes, entry.offset, section)?;
         let mut cursor = Cursor::new(bytes, entry.offset, section);
         let fixed = read_fixed(&mut cursor, entry, level, (row, col))?;
@@ -85,12 +92,27 @@ impl Module {
         let classes = cursor.take(triangles.len())?.to_vec();
         cursor.padding()?;
         cursor.checksum()?;
-        let polygon_count = entry.polygon_count;
-        let residual = fixed.residual;
-        let decks = Decks::default();
-        let mut module = Self { row, col, level, vertices, triangles, classes, sides, polygon_count, residual, decks };
+        let mut module = Self {
+            row,
+            col,
+            level,
+            vertices,
+            triangles,
+            classes,
+            sides,
+            polygon_count: entry.polygon_count,
+            residual: fixed.residual,
+            decks: Decks::default(),
+            lines: Vec::new(),
+            unknown_parts: Vec::new(),
+        };
         module.check_cover(header.side, entry, section)?;
-        module.decks = Decks::parse(of_decks, header, entry, level, (row, col))?;
+        if header.version == VERSION {
+            let parts = Parts::parse(behind, header, entry, level, (row, col))?;
+            (module.decks, module.lines, module.unknown_parts) = (parts.decks, parts.lines, parts.unknown);
+        } else {
+            module.decks = Decks::parse(behind, header, entry, level, (row, col))?;
+        }
         Ok(module)
     }
 
@@ -156,14 +178,11 @@ fn triangles_offset(entry: &IndexEntry) -> u64 {
 }
 
 fn read_vertices(cursor: &mut Cursor, side: u16, entry: &IndexEntry) -> Result<Vec<Vertex>, ReadError> {
-    let limit = (0, i64::from(side));
     let mut vertices: Vec<Vertex> = Vec::with_capacity(entry.vertex_count as usize);
     let (mut low, mut high) = (i32::MAX, i32::MIN);
     for _ in 0..entry.vertex_count {
         let offset = cursor.offset();
-        let vertex = Vertex { x: cursor.u16()?, y: cursor.u16()?, z: cursor.i32()? };
-        cursor.within(offset, "x", i64::from(vertex.x), limit)?;
-        cursor.within(offset + 2, "y", i64::from(vertex.y), limit)?;
+        let vertex = cursor.vertex(side)?;
         let sorted = vertices.last().is_none_or(|last| (last.y, last.x) < (vertex.y, vertex.x));
         cursor.expect(offset, "order of vertices", i64::from(sorted), 1)?;
         (low, high) = (low.min(vertex.z), high.max(vertex.z));

@@ -82,6 +82,7 @@ mod tests {
             polygon_count: 2,
             residual: ModuleResidual::default(),
             decks: Decks::default(),
+            lines: Vec::new(),
         };
         let mask = Importance::new(PostRect::of_size(5, 5), vec![1000; 25], classes.concat());
         assert_eq!(of_triangles(&module, &layout, &mask, None), expected);

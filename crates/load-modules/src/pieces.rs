@@ -88,6 +88,7 @@ impl Pieces {
             polygon_count: 0,
             residual: ModuleResidual::default(),
             decks: Decks::default(),
+            lines: Vec::new(),
         };
         let sides = self.fan(&corners, &mut module).unwrap_or_else(|| triangulate_afresh(&mut module));
         module.triangles.sort_unstable();

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use crate::{DeckFault, Decks, ModuleId, ModuleVertex};
+use crate::{DeckFault, Decks, LineFault, ModuleId, ModuleLine, ModuleVertex, module_line};
 
 /// One finished load module.
 ///
@@ -26,6 +26,8 @@ pub struct LoadModule {
     pub residual: ModuleResidual,
     /// Decks of bridges above the ground. Of the fields above all but `id` and `side` are about the ground alone.
     pub decks: Decks,
+    /// Middle lines of ways, in order; they count against no limit.
+    pub lines: Vec<ModuleLine>,
 }
 
 /// What of a load module counts against limits.
@@ -69,6 +71,8 @@ pub enum LoadModuleFault {
     Crack([ModuleVertex; 2]),
     /// Decks are not as they must be.
     InDecks(DeckFault),
+    /// Lines are not as they must be.
+    InLines(LineFault),
 }
 
 impl std::fmt::Display for LoadModuleFault {
@@ -87,6 +91,7 @@ impl std::fmt::Display for LoadModuleFault {
                 write!(f, "the edge {from} to {to} (quanta east, north) is not shared by two triangles")
             }
             Self::InDecks(fault) => write!(f, "decks: {fault}"),
+            Self::InLines(fault) => write!(f, "lines: {fault}"),
         }
     }
 }
@@ -126,7 +131,7 @@ impl LoadModule {
         self.vertices.iter().filter(on_border).count()
     }
 
-    /// Walks every invariant: indices, canonical order, orientation, area, cracks inside, T-junctions, decks.
+    /// Walks every invariant: indices, canonical order, orientation, area, cracks inside, T-junctions, decks, lines.
     ///
     /// # Errors
     /// The first fault found.
@@ -144,7 +149,8 @@ impl LoadModule {
         }
         self.check_area()?;
         self.check_edges()?;
-        self.decks.check(self.side).map_err(LoadModuleFault::InDecks)
+        self.decks.check(self.side).map_err(LoadModuleFault::InDecks)?;
+        module_line::check(&self.lines, self.side).map_err(LoadModuleFault::InLines)
     }
 
     fn check_area(&self) -> Result<(), LoadModuleFault> {
@@ -212,6 +218,7 @@ mod tests {
             polygon_count: 2,
             residual: ModuleResidual::default(),
             decks: Decks::default(),
+            lines: Vec::new(),
         }
     }
 

@@ -1,6 +1,6 @@
 //! All that features put into one tile: edges of its TIN, ground of their own class, slopes beside it, decks above it.
 
-use crate::{Features, TileId, Vertex};
+use crate::{Features, LineTraits, TileId, Vertex};
 
 /// What features put into a tile. Places are in steps of the feature lattice from the area's south-west post, as in
 /// [`Features::steps_per_post`]; heights are in quanta.
@@ -18,6 +18,20 @@ pub struct TileFeatures {
     pub slopes: Vec<[Vertex; 2]>,
     /// Bridges: polygons above the ground, of all that touch the tile. Their rings are simple.
     pub decks: Vec<FeatureSurface>,
+    /// Middle lines of all ways that touch the tile, in the ground or not; they change nothing in it.
+    pub lines: Vec<WayLine>,
+}
+
+/// The middle line of a way, or of a part of it in which nothing changes. It has a vertex wherever it crosses a line
+/// between load modules.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct WayLine {
+    /// Class of its way.
+    pub class: u8,
+    /// What else is known of it.
+    pub traits: LineTraits,
+    /// Two or more.
+    pub vertices: Vec<Vertex>,
 }
 
 /// A ring of a feature with what lies inside.
@@ -60,6 +74,7 @@ impl TileFeatures {
             shaped: Vec::new(),
             slopes: Vec::new(),
             decks: Vec::new(),
+            lines: Vec::new(),
         }
     }
 
@@ -73,9 +88,9 @@ impl TileFeatures {
         self.shaped.chunk_by(FeatureSurface::is_of_one_body)
     }
 
-    /// Whether there is nothing that changes the ground or lies above it.
+    /// Whether there is nothing that changes the ground or lies above it; lines do not.
     pub fn is_empty(&self) -> bool {
-        let Self { tile: _, kept, surfaces, shaped, slopes, decks } = self;
+        let Self { tile: _, kept, surfaces, shaped, slopes, decks, lines: _ } = self;
         kept.is_empty() && surfaces.is_empty() && shaped.is_empty() && slopes.is_empty() && decks.is_empty()
     }
 }

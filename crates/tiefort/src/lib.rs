@@ -81,12 +81,13 @@ const FEATURES: &str = match (cfg!(feature = "serve"), cfg!(feature = "viewer"))
 /// Version of the program, what it was built from, versions of what it writes, and of how it decides.
 static LONG_VERSION: LazyLock<String> = LazyLock::new(|| {
     format!(
-        "{}\ncommit {}\nfeatures {FEATURES}\ndatabase format {}\nload-module format {}, {} with decks\n\
+        "{}\ncommit {}\nfeatures {FEATURES}\ndatabase format {}\nload-module format {}, {} with decks, {} with lines\n\
          algorithm revision {}",
         env!("CARGO_PKG_VERSION"),
         env!("TIEFORT_COMMIT"),
         database::FORMAT_VERSION,
-        database::MODULES_FORMAT_VERSION_WITHOUT_DECKS,
+        database::MODULES_FORMAT_VERSION_OF_GROUND,
+        database::MODULES_FORMAT_VERSION_WITH_DECKS,
         database::MODULES_FORMAT_VERSION,
         compiler::ALGORITHM_REVISION
     )

@@ -34,6 +34,7 @@ pub(crate) fn modules() -> Vec<LoadModule> {
             polygon_count: 4,
             residual: ModuleResidual::default(),
             decks: Decks::default(),
+            lines: Vec::new(),
         }
     };
     GRID.all().iter().map(module).collect()

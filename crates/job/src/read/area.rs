@@ -40,10 +40,10 @@ pub(super) fn read(area: &Section, modules: &Section, find: &mut Find) -> Result
     };
     // A multiple of the spacing, itself one of 1/16 m, so this is whole; and side_cells has checked that it fits.
     let side_quanta = (side_m * f64::from(QUANTA_PER_METRE)) as u16;
-    let edges = edges(modules)?;
+    let (edges, format) = (edges(modules)?, modules.whole_u32("format")?);
     // What the method asks for is not known yet: `outer_border` decides.
     let outer_border = OuterBorder::Fixed;
-    let modules = ModulesSpec { side_m, side_quanta, border_step_m, border_step_cells, outer_border, edges };
+    let modules = ModulesSpec { side_m, side_quanta, border_step_m, border_step_cells, outer_border, edges, format };
     Ok((Area { name, title, epsg, origin_m, spacing, grid }, modules))
 }
 

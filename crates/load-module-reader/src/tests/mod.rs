@@ -56,6 +56,8 @@ fn rough(n: u16, seed: u64) -> Module {
         polygon_count,
         residual,
         decks: Decks::default(),
+        lines: Vec::new(),
+        unknown_parts: Vec::new(),
     }
 }
 

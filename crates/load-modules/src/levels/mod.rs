@@ -126,6 +126,8 @@ fn load_module(
         classes: Vec::new(),
         residual: ModuleResidual::default(),
         decks: finest.decks.clone(),
+        // They are the same at every level, so that the finest has them alone.
+        lines: Vec::new(),
     };
     module.classes = classes::of_triangles(&module, layout, mask, faces);
     let sides = 3 * module.triangles.len();

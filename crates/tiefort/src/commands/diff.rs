@@ -105,6 +105,7 @@ fn to_json(found: &Difference, figures: &Figures) -> Value {
             "apart_m": module.apart_m,
             "triangles": module.triangles,
             "polygons": module.polygons,
+            "lines": module.lines,
             "rms_m": module.rms_m,
             "max_m": module.largest_m,
         })

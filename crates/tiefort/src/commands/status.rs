@@ -89,6 +89,11 @@ fn status_text(status: &Status) -> String {
     if status.is_complete() {
         let (points, triangles) = (grouped(totals.points), grouped(totals.triangles));
         text += &format!("\n{triangles} triangles, {points} points, {} breaches\n", grouped(totals.breaches));
+        if let Some(newest) = status.formats.last().filter(|newest| 1 < **newest) {
+            let holds =
+                if *newest == 2 { "decks of bridges" } else { "decks of bridges and lines of roads and rivers" };
+            text += &format!("load modules of format version {newest}: with {holds}\n");
+        }
     }
     fold(&text, 2)
 }

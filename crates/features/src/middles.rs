@@ -1,0 +1,255 @@
+//! The middle lines of ways, whole: of what is in the ground, of bridges and tunnels, and of what is left out.
+//!
+//! They are what a map draws and what a simulator drives along. Where a line crosses one between load modules it has a
+//! station, so that its parts in both meet there.
+
+use std::collections::BTreeMap;
+
+use terrain::{LineForm, LineKind, LineStorey, LineTraits};
+
+use crate::decks::between;
+use crate::exact::Segment;
+use crate::pieces::Piece;
+use crate::strips::{Room, Wide};
+use crate::thin::{Station, Tolerance, thin};
+use crate::{FeatureId, Graded, Network, Place, Role, Site, Storey, Strand, Traits};
+
+/// The middle line of a way, or of a part of it in which nothing changes.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Middle {
+    /// Its class.
+    pub class: u16,
+    /// What else is known of it, but its width: that is its feature's.
+    pub traits: LineTraits,
+    /// Which feature it comes from.
+    pub id: FeatureId,
+    /// Its places with their heights in quanta, in order, those of a channel downstream.
+    pub stations: Vec<(Place, i32)>,
+}
+
+/// How many times the usual tolerance lines are thinned with that are no edges.
+const TOLERANCE_OUT: u8 = 2;
+
+/// The middle lines of a network that was cut into `pieces`, of which `wide` are strips, and of all strands, of which
+/// `thinned` are in the ground.
+pub(crate) fn middles(
+    graded: &Graded,
+    (pieces, wide): (&[Piece], &[Wide]),
+    (strands, thinned): (&[Strand], &[Strand]),
+    site: &Site,
+) -> Vec<Middle> {
+    let mut middles = of_pieces(graded, pieces, wide);
+    middles.extend(beside_pieces(graded, site));
+    let is_line = |strand: &&Strand| matches!(strand.role, Role::Channel | Role::Breakline);
+    middles.extend(thinned.iter().filter(is_line).map(|strand| of_strand(strand.clone(), true)));
+    let mut kept: BTreeMap<(Role, u16, FeatureId), Vec<&Strand>> = BTreeMap::new();
+    for strand in thinned.iter().filter(is_line) {
+        kept.entry((strand.role, strand.class, strand.id)).or_default().push(strand);
+    }
+    for strand in strands.iter().filter(is_line) {
+        let kept = kept.get(&(strand.role, strand.class, strand.id)).map_or(&[][..], Vec::as_slice);
+        middles.extend(left_out(strand, kept, site).into_iter().map(|strand| of_strand(strand, false)));
+    }
+    middles.iter_mut().for_each(|middle| cross_lines(&mut middle.stations, site));
+    middles.retain(|middle| 2 <= middle.stations.len());
+    middles.sort();
+    middles
+}
+
+/// Of what is formed: parts of one form.
+fn of_pieces(graded: &Graded, pieces: &[Piece], wide: &[Wide]) -> Vec<Middle> {
+    let Graded { network, heights, .. } = *graded;
+    let mut strips: Vec<Vec<bool>> = pieces.iter().map(|piece| vec![false; piece.strips.len()]).collect();
+    for of in wide.iter().filter(|of| of.room != Room::None) {
+        strips[of.piece as usize][of.segment as usize] = true;
+    }
+    let mut middles = Vec::new();
+    for (piece, strips) in pieces.iter().zip(&strips) {
+        let mut from = 0;
+        for same in strips.chunk_by(|a, b| a == b) {
+            let to = from + same.len();
+            let form = match (same[0], piece.bench) {
+                (false, _) => LineForm::Line,
+                (true, false) => LineForm::Strip,
+                (true, true) => LineForm::Bench,
+            };
+            let traits = LineTraits { form, is_in_ground: !piece.is_deck(), ..travelled(&piece.traits) };
+            let stations = stations(network, heights, &piece.nodes[from..=to]);
+            middles.push(Middle { class: piece.traits.class, traits, id: piece.id(network, from), stations });
+            from = to;
+        }
+    }
+    middles
+}
+
+/// Of edges that no piece has: tunnels, and what is left out.
+fn beside_pieces(graded: &Graded, site: &Site) -> Vec<Middle> {
+    let Graded { network, heights, grants, .. } = *graded;
+    let way = |edge: u32| network.edges[edge as usize].way as usize;
+    let is_out = |edge: u32| {
+        let segment = network.segment(edge);
+        grants.of(network.ways[way(edge)].id, site.module_under(segment.a, segment.b)).out
+    };
+    let is_out: Vec<bool> = (0..network.edges.len() as u32).map(is_out).collect();
+    let is_tunnel = |edge: u32| matches!(network.traits(edge).storey, Storey::Tunnel(_));
+    let picked = |edge: u32| is_out[edge as usize] || is_tunnel(edge);
+    let follows = |node: u32| match network.beside(node) {
+        [(_, one), (_, other)] => {
+            let same =
+                network.traits(*one) == network.traits(*other) && is_out[*one as usize] == is_out[*other as usize];
+            same && picked(*one) && picked(*other)
+        }
+        _ => false,
+    };
+    let runs = network.runs(&picked, &follows).into_iter();
+    runs.map(|(nodes, edges)| {
+        let of = network.traits(edges[0]);
+        let traits = LineTraits { is_kept: !is_out[edges[0] as usize], ..travelled(of) };
+        let stations = thinned_out(stations(network, heights, &nodes), site);
+        Middle { class: of.class, traits, id: network.ways[way(edges[0])].id, stations }
+    })
+    .collect()
+}
+
+/// What is travelled, kept, and in the ground nothing yet.
+fn travelled(of: &Traits) -> LineTraits {
+    let storey = match of.storey {
+        Storey::Ground => LineStorey::Ground,
+        Storey::Deck(_) => LineStorey::Bridge,
+        Storey::Tunnel(_) => LineStorey::Tunnel,
+    };
+    let (kind, form) = (LineKind::Travelled, LineForm::Nothing);
+    LineTraits { kind, form, storey, is_kept: true, is_in_ground: false, width: 0 }
+}
+
+fn stations(network: &Network, heights: &[i32], nodes: &[u32]) -> Vec<(Place, i32)> {
+    nodes.iter().map(|&node| (network.nodes[node as usize].place, heights[node as usize])).collect()
+}
+
+fn of_strand(strand: Strand, is_kept: bool) -> Middle {
+    let Strand { role, class, id, stations } = strand;
+    let kind = if role == Role::Channel { LineKind::Channel } else { LineKind::Breakline };
+    let form = if is_kept { LineForm::Line } else { LineForm::Nothing };
+    let traits = LineTraits { kind, form, storey: LineStorey::Ground, is_kept, is_in_ground: is_kept, width: 0 };
+    Middle { class, traits, id, stations }
+}
+
+/// The parts of a strand that are left out: those along which none of what is kept of its feature runs.
+fn left_out(strand: &Strand, kept: &[&Strand], site: &Site) -> Vec<Strand> {
+    let mut is_out = vec![true; strand.stations.len().saturating_sub(1)];
+    for kept in kept {
+        let at = |station: Option<&(Place, i32)>| {
+            let place = station?.0;
+            strand.stations.iter().position(|(other, _)| *other == place)
+        };
+        // One that is closed ends where it begins.
+        let is_closed = kept.stations.first() == kept.stations.last();
+        match (at(kept.stations.first()), at(kept.stations.last())) {
+            (Some(_), Some(_)) if is_closed => is_out.fill(false),
+            (Some(from), Some(to)) if from < to => is_out[from..to].fill(false),
+            _ => {}
+        }
+    }
+    let mut parts = Vec::new();
+    let mut from = 0;
+    for same in is_out.chunk_by(|a, b| a == b) {
+        let to = from + same.len();
+        if same[0] {
+            let stations = thinned_out(strand.stations[from..=to].to_vec(), site);
+            parts.push(Strand { stations, ..*strand });
+        }
+        from = to;
+    }
+    parts
+}
+
+/// The stations that a line needs which is no edge.
+fn thinned_out(stations: Vec<(Place, i32)>, site: &Site) -> Vec<(Place, i32)> {
+    let station = |&(place, height): &(Place, i32)| Station { place, height, stays: site.on_line(place), flat: [0; 2] };
+    let all: Vec<Station> = stations.iter().map(station).collect();
+    let kept = thin(&all, Tolerance::USUAL.times(TOLERANCE_OUT), 0, site.lattice);
+    kept.into_iter().map(|at| stations[at as usize]).collect()
+}
+
+/// Adds the stations at which a line crosses one between load modules, where it has none yet, and takes away those
+/// that repeat a place.
+fn cross_lines(stations: &mut Vec<(Place, i32)>, site: &Site) {
+    let mut all: Vec<(Place, i32)> = Vec::with_capacity(stations.len());
+    for ends in stations.windows(2) {
+        let (a, b) = (ends[0], ends[1]);
+        all.push(a);
+        let mut crossed = Vec::new();
+        site.crossings(Segment { a: a.0, b: b.0 }, &mut |place| crossed.push(place));
+        crossed.sort_by_key(|place| a.0.squared_to(*place));
+        all.extend(crossed.into_iter().map(|place| (place, between([a.0, b.0], [a.1, b.1], place))));
+    }
+    all.extend(stations.last());
+    all.dedup_by_key(|(place, _)| *place);
+    *stations = all;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::samples::{formed, formed_as, site, way};
+    use crate::{Form, Formed};
+
+    fn of_number(formed: &Formed, number: i64) -> Vec<&Middle> {
+        formed.middles.iter().filter(|middle| middle.id.number == number).collect()
+    }
+
+    #[test]
+    fn a_road_with_a_bridge_and_a_tunnel_is_one_line_from_end_to_end() {
+        let sources = vec![
+            way(1, "highway=primary", &[(10.0, 20.0), (20.0, 20.0)]),
+            way(2, "highway=primary bridge=yes", &[(20.0, 20.0), (40.0, 20.0)]),
+            way(3, "highway=primary", &[(40.0, 20.0), (60.0, 20.0)]),
+            way(4, "highway=primary tunnel=yes", &[(60.0, 20.0), (120.0, 20.0)]),
+        ];
+        let formed = formed_as(sources, |_, north| 0.2 * north, Form::StripAlways);
+        let all = [1, 2, 3, 4].map(|number| of_number(&formed, number));
+        let told = all.clone().map(|parts| {
+            assert_eq!(parts.len(), 1, "{parts:?}");
+            let LineTraits { form, storey, is_kept, is_in_ground, .. } = parts[0].traits;
+            (form, storey, is_kept, is_in_ground)
+        });
+        assert_eq!(told[0], (LineForm::Strip, LineStorey::Ground, true, true));
+        assert_eq!((told[1], told[2]), ((LineForm::Strip, LineStorey::Bridge, true, false), told[0]));
+        assert_eq!(told[3], (LineForm::Nothing, LineStorey::Tunnel, true, false));
+        let ends = all.map(|parts| [parts[0].stations[0], parts[0].stations[parts[0].stations.len() - 1]]);
+        assert!(ends.windows(2).all(|pair| pair[0][1] == pair[1][0]), "{ends:?}");
+    }
+
+    #[test]
+    fn lines_have_a_station_on_every_line_between_load_modules() {
+        let sources = vec![
+            way(1, "highway=track", &[(10.0, 20.0), (180.0, 90.0)]),
+            way(2, "waterway=stream", &[(10.0, 120.0), (180.0, 30.0)]),
+        ];
+        let formed = formed(sources, |east, north| east + 0.1 * north);
+        assert!(formed.middles.iter().any(|middle| middle.traits.kind == LineKind::Channel));
+        for ends in formed.middles.iter().flat_map(|middle| middle.stations.windows(2)) {
+            let mut crossed = Vec::new();
+            site().crossings(Segment { a: ends[0].0, b: ends[1].0 }, &mut |place| crossed.push(place));
+            assert!(crossed.is_empty() && ends[0].0 != ends[1].0);
+        }
+    }
+
+    #[test]
+    fn what_is_left_out_has_its_line_too() {
+        let sources: Vec<_> = (0..100)
+            .map(|number| {
+                let north = 1.0 + number as f64 * 0.48;
+                way(number, "highway=track", &[(5.0, north), (45.0, north)])
+            })
+            .collect();
+        let all = crate::AreaFeatures::of(sources, &[], site(), &terrain::in_turn);
+        let ground: Vec<Option<i32>> = all.stations().iter().map(|_| Some(0)).collect();
+        let levelled = all.level(&ground, crate::GradeOptions::USUAL, &mut 40);
+        let middles = &levelled.reserved.formed.middles;
+        let (kept, out): (Vec<&Middle>, Vec<&Middle>) = middles.iter().partition(|middle| middle.traits.is_kept);
+        assert!(!kept.is_empty() && !out.is_empty());
+        assert_eq!(kept.len() + out.len(), 100);
+        assert!(middles.iter().all(|middle| middle.traits.fit()));
+    }
+}
