@@ -69,7 +69,7 @@ impl Artifact for Profiling<'_> {
 
 /// The height of a DEM at a place between its posts, bilinear and rounded to quanta: over a hole that of the surface
 /// that closes it, beyond the DEM that of the nearest place inside.
-fn height_at(dem: &Dem, steps: i32, place: Place) -> i32 {
+pub(crate) fn height_at(dem: &Dem, steps: i32, place: Place) -> i32 {
     let PostRect { south, west, north, east } = dem.rect();
     let place = Place::new(place.row.clamp(south * steps, north * steps), place.col.clamp(west * steps, east * steps));
     let (row, col) = (place.row.div_euclid(steps), place.col.div_euclid(steps));

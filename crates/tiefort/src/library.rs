@@ -14,7 +14,7 @@ use terrain::{ModuleId, TileId};
 use workbench::{HeldGround, Mesh, TinRequest};
 
 pub use crate::clock::SystemClock;
-use crate::commands::{compare, explain, export, plan, tile, tin};
+use crate::commands::{budgets, compare, explain, export, plan, tile, tin};
 pub use crate::failure::{Cause, Failure};
 use crate::{files, fit, resources};
 
@@ -59,7 +59,7 @@ pub fn write_mesh(mesh: &Mesh, out: &Path, on_map: bool) -> Result<(), Failure> 
 /// When it cannot be planned.
 pub fn plan(job: &Job) -> Result<String, Failure> {
     let features = compiler::foresee_features(job)?;
-    Ok(plan::json_text(job, &compiler::plan(job)?, features.as_ref(), &[]))
+    Ok(plan::json_text(job, &compiler::plan(job)?, (features.as_ref(), &budgets::of_job(job)), &[]))
 }
 
 /// What `tiefort report --format json` prints.

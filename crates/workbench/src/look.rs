@@ -61,16 +61,86 @@ pub struct Suggestion {
     pub part_around: Option<[f64; 2]>,
     /// Metres between posts of the finest raster, about.
     pub posts_m: f64,
-    /// Triangles of a load module that an area is suggested, on average.
-    pub triangles: u32,
-    /// The RMS residual that these will leave, in metres, from a look at windows of the area; `None` where those have
-    /// no heights.
-    pub rms_m: Option<f64>,
+    looked: Looked,
+}
+
+/// What it takes to look at the ground again.
+#[derive(Clone, Debug)]
+struct Looked {
+    crs: Crs,
+    spacing: Spacing,
+    frames: Vec<RasterFrame>,
+    given: Option<String>,
+}
+
+/// Looks at the ground at most, to find how many triangles leave a residual.
+const LOOKS_MAX: usize = 5;
+/// Triangles of a load module that are tried for a residual: the least there can be, and the most a job may have.
+const TRIANGLES_TRIED: [f64; 2] = [8.0, 20_000.0];
+
+impl Suggestion {
+    /// Load modules of the area.
+    pub fn modules(&self) -> u64 {
+        let [cols, rows] = self.size_m.map(|metres| (metres / SIDE_M).round() as u64);
+        cols * rows
+    }
+
+    /// The RMS residual that so many triangles of a load module will leave, in metres, from a look at windows of the
+    /// area; `None` where those have no heights.
+    ///
+    /// # Errors
+    /// When a raster cannot be opened or decoded.
+    pub fn rms_m(&self, triangles: u32) -> Result<Option<f64>, CompileError> {
+        let Looked { crs, spacing, frames, given } = &self.looked;
+        let modules = self.size_m.map(|metres| (metres / SIDE_M).round() as usize);
+        let side_cells = (SIDE_M / self.spacing_m).round() as usize;
+        let sampled = Sampled {
+            crs,
+            grid: GridFrame { origin_east_m: self.origin_m[0], origin_north_m: self.origin_m[1], spacing: *spacing },
+            rect: PostRect::of_size(modules[1] * side_cells + 1, modules[0] * side_cells + 1),
+            side_cells,
+            triangles: triangles as usize,
+        };
+        let lowest_m: Vec<f64> = self.seen.iter().map(|seen| seen.range_m.map_or(0.0, |(low, _)| low)).collect();
+        let open = |index: usize| {
+            let seen: &Seen = &self.seen[index];
+            Ok(open(&seen.path, given.as_deref(), seen.undeclared)?.0)
+        };
+        sampled.rms_m(frames, &lowest_m, open)
+    }
+
+    /// Triangles of a load module that leave this RMS residual, about: from some looks, between which the logarithm of
+    /// the residual is taken as straight over that of the triangles.
+    ///
+    /// # Errors
+    /// As [`Suggestion::rms_m`].
+    pub fn triangles_for(&self, rms_m: f64) -> Result<u32, CompileError> {
+        let [least, most] = TRIANGLES_TRIED;
+        let mut at = f64::from(TRIANGLES);
+        let mut before: Option<[f64; 2]> = None;
+        for _ in 0..LOOKS_MAX {
+            let Some(left_m) = self.rms_m(at.round() as u32)?.filter(|left_m| 0.0 < *left_m) else { break };
+            if (left_m / rms_m).ln().abs() < 0.03 {
+                break;
+            }
+            // Twice the triangles leave half the residual, until two looks say otherwise.
+            let slope = before.map_or(-1.0, |[triangles, left_before_m]| {
+                ((left_m / left_before_m).ln() / (at / triangles).ln()).clamp(-2.0, -0.3)
+            });
+            before = Some([at, left_m]);
+            let next = (at * ((rms_m / left_m).ln() / slope).exp()).clamp(least, most);
+            if (next - at).abs() < 0.5 {
+                break;
+            }
+            at = next;
+        }
+        Ok(at.round() as u32)
+    }
 }
 
 /// Values that mark voids where a file does not say so: no land is as low, and none of 32,767 m is as high.
 const MARKS: [f64; 7] = [-32768.0, -32767.0, -9999.0, -99999.0, 32767.0, f32::MIN as f64, f32::MAX as f64];
-/// Triangles of a load module on average: the founding paper's.
+/// Triangles of a load module that are looked at first: the founding paper's mean.
 const TRIANGLES: u32 = 32;
 
 /// Width and height of an area that is a part of what there is, in metres, about.
@@ -117,17 +187,8 @@ pub fn look_at(paths: &[PathBuf], given: Option<&str>) -> Result<Suggestion, Com
     let tiles = modules.map(|modules| ((f64::from(modules) / MODULES_A_TILE).round() as u32).clamp(1, modules / 2));
     let (spacing_m, tiles) = (spacing.metres(), (tiles[1], tiles[0]));
     let posts_m = posts_m(&frames, &crs);
-    let side_cells = (SIDE_M / spacing_m).round() as usize;
-    let sampled = Sampled {
-        crs: &crs,
-        grid: GridFrame { origin_east_m: origin_m[0], origin_north_m: origin_m[1], spacing },
-        rect: PostRect::of_size(modules[1] as usize * side_cells + 1, modules[0] as usize * side_cells + 1),
-        side_cells,
-        triangles: TRIANGLES as usize,
-    };
-    let lowest_m: Vec<f64> = seen.iter().map(|seen| seen.range_m.map_or(0.0, |(low, _)| low)).collect();
-    let rms_m = sampled.rms_m(&frames, &lowest_m, |index| Ok(open(&paths[index], given, seen[index].undeclared)?.0))?;
-    Ok(Suggestion { seen, epsg, origin_m, size_m, spacing_m, tiles, part_around, posts_m, rms_m, triangles: TRIANGLES })
+    let looked = Looked { crs, spacing, frames, given: given.map(str::to_owned) };
+    Ok(Suggestion { seen, epsg, origin_m, size_m, spacing_m, tiles, part_around, posts_m, looked })
 }
 
 /// System, spacing, origin and size of an area in the middle of a raster, and where that middle is; `None` where the

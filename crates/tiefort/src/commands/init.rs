@@ -2,11 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::Args;
+use clap::{Args, ValueEnum};
+use compiler::BUDGETS;
 use job::Job;
 use workbench::{Seen, SeenFeatures, Suggestion};
 
 use crate::commands::init_features::{features_section, told_of};
+use crate::commands::init_limits::{Asked, Limits, choose};
 use crate::commands::job_words::{comment, quoted, relative};
 use crate::failure::{Failure, Outcome};
 use crate::terminal;
@@ -35,6 +37,40 @@ pub struct Arguments {
     /// Coordinate system of files that do not say
     #[arg(long, value_name = "EPSG:CODE")]
     crs: Option<String>,
+    /// Limits of that hardware: 32 triangles a load module on average, 100 at most, 4096 in 4 km [default: what keeps
+    /// roads and water whole]
+    #[arg(long, value_enum, value_name = "HARDWARE", conflicts_with_all = ["mean", "rms"])]
+    limits: Option<Hardware>,
+    /// Triangles of a load module on average; at most three times as many, and 128 times in 4 km
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(8..=20_000), conflicts_with = "rms")]
+    mean: Option<u32>,
+    /// As many triangles as leave this RMS residual in metres, about
+    #[arg(long, value_name = "R", value_parser = residual)]
+    rms: Option<f64>,
+}
+
+/// Hardware whose limits are known.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Hardware {
+    /// The image generators of the founding paper
+    Simnet,
+}
+
+/// A residual in metres.
+fn residual(text: &str) -> Result<f64, String> {
+    let metres = text.parse().ok().filter(|metres| (0.01..=1000.0).contains(metres));
+    metres.ok_or_else(|| "expected 0.01 to 1000 metres".to_owned())
+}
+
+impl Arguments {
+    fn asked(&self) -> Asked {
+        match (self.limits, self.mean, self.rms) {
+            (Some(Hardware::Simnet), ..) => Asked::Simnet,
+            (_, Some(mean), _) => Asked::Mean(mean),
+            (_, _, Some(rms_m)) => Asked::Rms(rms_m),
+            (None, None, None) => Asked::Data,
+        }
+    }
 }
 
 /// Writes a job.
@@ -63,10 +99,16 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
             datums.join(" and ")
         ));
     }
-    let text = |folder: &Path, name: &str| job_text(&suggestion, &features, folder, name, crs);
-    terminal::tell(&found_text(&suggestion, &text(Path::new(""), "area")));
+    let with =
+        |limits: &Limits, folder: &Path, name: &str| job_text((&suggestion, &features, limits), folder, name, crs);
+    let any = with(&Limits::of(BUDGETS[0]), Path::new(""), "area");
+    let limits = choose(arguments.asked(), &suggestion, &any)?;
+    let rms_m = suggestion.rms_m(limits.for_ground(suggestion.modules()))?;
+    let text = |folder: &Path, name: &str| with(&limits, folder, name);
+    terminal::tell(&found_text(&suggestion, (limits.mean, rms_m), &text(Path::new(""), "area")));
     features.iter().for_each(|seen| terminal::tell(&told_of(seen)));
-    remarks(&suggestion).iter().for_each(|remark| terminal::tell(&format!("note: {remark}")));
+    limits.said.iter().for_each(|said| terminal::tell(said));
+    remarks(&suggestion, limits.mean).iter().for_each(|remark| terminal::tell(&format!("note: {remark}")));
     let Some(out) = &arguments.out else {
         terminal::print(&text(Path::new(""), "area"))?;
         return Ok(Outcome::Sound);
@@ -107,8 +149,8 @@ fn named_files(named: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
 }
 
 /// What was found, and what a build of it takes and leaves: one line, broken where a terminal ends.
-fn found_text(suggestion: &Suggestion, job: &str) -> String {
-    let Suggestion { seen, size_m, spacing_m, part_around, rms_m, triangles, .. } = suggestion;
+fn found_text(suggestion: &Suggestion, (triangles, rms_m): (u32, Option<f64>), job: &str) -> String {
+    let Suggestion { seen, size_m, spacing_m, part_around, .. } = suggestion;
     let voids: usize = seen.iter().map(|file| file.voids).sum();
     let files = if seen.len() == 1 { "1 file".to_owned() } else { format!("{} files", seen.len()) };
     let [wide, high] = size_m.map(|metres| metres / 1000.0);
@@ -126,7 +168,7 @@ fn found_text(suggestion: &Suggestion, job: &str) -> String {
         text += &format!("; a build takes about {:.0} s of one core and {memory}", plan.forecast.seconds.max(1.0));
     }
     if let Some(rms_m) = rms_m {
-        text += &format!("; {triangles} triangles a load module leave an RMS residual {}", about(*rms_m));
+        text += &format!("; {triangles} triangles a load module leave an RMS residual {}", about(rms_m));
     }
     text
 }
@@ -143,15 +185,15 @@ fn about(metres: f64) -> String {
 
 /// What a person should think about before a build: ground finer than the budget can show, and a grid finer than the
 /// ground is known.
-fn remarks(suggestion: &Suggestion) -> Vec<String> {
+fn remarks(suggestion: &Suggestion, triangles: u32) -> Vec<String> {
     /// Posts for a triangle, beyond which more of them change hardly anything.
     const POSTS_A_TRIANGLE_MAX: f64 = 100.0;
     /// Spacings for a post of the source, beyond which the grid repeats what the source says.
     const COARSE: f64 = 1.5;
-    let Suggestion { spacing_m, posts_m, triangles, .. } = suggestion;
+    let Suggestion { spacing_m, posts_m, .. } = suggestion;
     let cells = (500.0 / spacing_m).powi(2);
     let mut remarks = Vec::new();
-    let each = cells / f64::from(*triangles);
+    let each = cells / f64::from(triangles);
     if POSTS_A_TRIANGLE_MAX < each {
         let coarser = if *spacing_m < 5.0 { 12.5 } else { 25.0 };
         let times = views::grouped((coarser / spacing_m).powi(2).round() as u64);
@@ -172,13 +214,12 @@ fn remarks(suggestion: &Suggestion) -> Vec<String> {
 }
 
 fn job_text(
-    suggestion: &Suggestion,
-    features: &[SeenFeatures],
+    (suggestion, features, limits): (&Suggestion, &[SeenFeatures], &Limits),
     folder: &Path,
     name: &str,
     given: Option<&str>,
 ) -> String {
-    let Suggestion { seen, epsg, origin_m, size_m, spacing_m, tiles, part_around, triangles, .. } = suggestion;
+    let Suggestion { seen, epsg, origin_m, size_m, spacing_m, tiles, part_around, .. } = suggestion;
     let modules = size_m.map(|metres| metres / 500.0);
     let mut text = format!(
         "# Written by `tiefort init`. Every line may be changed;\n\
@@ -218,8 +259,8 @@ fn job_text(
     text += &features_section(features, folder);
     text += &format!(
         "\n[tiles]\ncolumns = {}\nrows = {}\n\n[limits]\n\
-         per_load_module = {}         # triangles\n\
-         mean_per_load_module = {triangles}     # over the whole area: {} triangles\n\
+         {}per_load_module = {}         # triangles\n\
+         mean_per_load_module = {}     # over the whole area: {} triangles\n\
          per_4km_square = {}         # in every window of 8 x 8 load modules\n\n\
          [tin]\nmethod = \"optimised\"          # the budget is the limits\n\n\
          # Coarser levels of every load module, for what is far away: the share of\n\
@@ -227,9 +268,11 @@ fn job_text(
          # [lod]\n# levels = [{{ inner_share = 0.5 }}, {{ inner_share = 0.2 }}]\n",
         tiles.1,
         tiles.0,
-        job::usual_text("limits.per_load_module"),
-        views::grouped((modules[0] * modules[1]) as u64 * u64::from(*triangles)),
-        job::usual_text("limits.per_4km_square"),
+        limits.comment(),
+        limits.most[0],
+        limits.mean,
+        views::grouped(suggestion.modules() * u64::from(limits.mean)),
+        limits.most[1],
     );
     // Names in headers may hold anything; in a job they stand in comments, where control characters are no TOML.
     terminal::plain(&text).into_owned()

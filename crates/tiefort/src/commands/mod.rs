@@ -1,5 +1,6 @@
 //! The commands, one file each: its arguments, its help, and what it calls.
 
+pub mod budgets;
 mod build;
 pub mod compare;
 mod completions;
@@ -10,6 +11,7 @@ mod fidelity;
 mod inadequate;
 mod init;
 mod init_features;
+mod init_limits;
 mod job_words;
 mod man;
 pub mod plan;

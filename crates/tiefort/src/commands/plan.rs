@@ -3,14 +3,14 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use compiler::{FeaturesForeseen, Plan, Played};
+use compiler::{Budgeted, FeaturesForeseen, Plan, Played};
 use ground::PlannedTile;
 use job::Job;
 use serde_json::{Value, json};
 use views::{Align, Table, fold, grouped};
 
 use crate::arguments::rows_by_columns;
-use crate::commands::plan_features;
+use crate::commands::{budgets, plan_features};
 use crate::engines::{self, Glue};
 use crate::failure::{Failure, Outcome};
 use crate::{costs, files, fit, run, terminal};
@@ -92,11 +92,11 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let played = played(&job, &plan, arguments)?;
     let glue = || Glue::new(&job, &plan, arguments.out.as_deref(), arguments.pack);
     let text = match arguments.emit {
-        Some(Emit::Json) => json_text(&job, &plan, features.as_ref(), &played),
+        Some(Emit::Json) => json_text(&job, &plan, (features.as_ref(), &budgets::of_job(&job)), &played),
         Some(Emit::Ninja) => engines::ninja(&glue()?),
         Some(Emit::Slurm) => engines::slurm(&glue()?),
         Some(Emit::Dask) => engines::dask(&glue()?),
-        None => fold(&plan_text(&job, &plan, features.as_ref(), &played), 2),
+        None => fold(&plan_text(&job, &plan, (features.as_ref(), &budgets::of_job(&job)), &played), 2),
     };
     terminal::print(&text)?;
     if !arguments.force {
@@ -125,12 +125,18 @@ fn played(job: &Job, plan: &Plan, arguments: &Arguments) -> Result<Vec<Played>, 
     Ok(tiles.iter().flat_map(|&tiles| compiler::play(&costs, tiles, modules, job.tiles.order, &workers)).collect())
 }
 
-fn plan_text(job: &Job, plan: &Plan, features: Option<&FeaturesForeseen>, played: &[Played]) -> String {
+fn plan_text(
+    job: &Job,
+    plan: &Plan,
+    (features, budgets): (Option<&FeaturesForeseen>, &[Budgeted]),
+    played: &[Played],
+) -> String {
     let mut text = format!("Settings of {}\n{}\n", job.path.display(), run::settings_text(job));
     text += &forecast_table(job, plan).text(0);
     text += &format!("\n{}", corner_table(job).text(0));
     if let Some(features) = features {
         text += &format!("\n{}", plan_features::tables_text(features, job));
+        text += &budgets::table_text(budgets);
     }
     if !played.is_empty() {
         text += &format!("\n{}", played_table(played).text(0));
@@ -217,7 +223,12 @@ fn by_rank(plan: &Plan) -> Vec<&PlannedTile> {
 }
 
 /// For a program.
-pub fn json_text(job: &Job, plan: &Plan, features: Option<&FeaturesForeseen>, played: &[Played]) -> String {
+pub fn json_text(
+    job: &Job,
+    plan: &Plan,
+    (features, budgets): (Option<&FeaturesForeseen>, &[Budgeted]),
+    played: &[Played],
+) -> String {
     let simulation: Vec<Value> = played
         .iter()
         .map(|run| {
@@ -242,6 +253,7 @@ pub fn json_text(job: &Job, plan: &Plan, features: Option<&FeaturesForeseen>, pl
                       "worker_bytes": forecast.worker_bytes, "seconds": forecast.seconds,
                       "disk_bytes": forecast.disk_bytes },
         "features": features.map(plan_features::tables_json),
+        "budgets": budgets::table_json(budgets),
         "simulation": simulation,
         "tiles": tiles,
     });

@@ -109,6 +109,39 @@ fn init_writes_a_section_of_features_that_plan_reads() {
 }
 
 #[test]
+fn init_sizes_limits_from_the_data_or_as_it_is_told() {
+    let scene = scene();
+    fs::write(scene.path("roads.json"), lines(&ROADS)).unwrap();
+    let check = |name: &str, more: &[&str], told: &str, limits: [u32; 3]| {
+        let arguments = [&["init", "roads.json", "dem.asc", "--out", name], &INIT[..], more].concat();
+        let said = scene.run_to(0, &arguments);
+        assert!(flat(&said.stderr).contains(told), "{}", said.stderr);
+        let job = fs::read_to_string(scene.path(name)).unwrap();
+        let [most, mean, square] = limits;
+        for (key, limit) in [("per_load_module", most), ("mean_per_load_module", mean), ("per_4km_square", square)] {
+            assert!(job.contains(&format!("\n{key} = {limit} ")), "{key} is not {limit} in:\n{job}");
+        }
+        assert!(job.contains(&format!("mean {mean:>4}: ")) && job.contains("(this job)"), "{job}");
+        job
+    };
+    scene.run_to(0, &[&["init", "roads.json", "dem.asc", "--out", "data.toml"], &INIT[..]].concat());
+    let job = fs::read_to_string(scene.path("data.toml")).unwrap();
+    assert!(job.lines().all(|line| line.chars().count() <= 80), "{job}");
+    check("simnet.toml", &["--limits", "simnet"], "32 triangles a load module keep", [100, 32, 4096]);
+    check("mean.toml", &["--mean", "100"], "100 triangles a load module keep", [300, 100, 12_800]);
+    scene.refuses(&[&["init", "dem.asc", "--mean", "9", "--rms", "1"], &INIT[..]].concat(), &["--mean", "--rms"]);
+    let plan = scene.run_to(0, &["plan", "data.toml"]).stdout;
+    assert!(flat(&plan).contains("What budgets would keep of features"), "{plan}");
+    let json = scene.run_to(0, &["plan", "data.toml", "--emit", "json"]).stdout;
+    let json: Value = serde_json::from_str(&json).unwrap();
+    let budgets = json["budgets"].as_array().unwrap();
+    assert_eq!((&budgets[0]["mean_per_load_module"], &budgets[budgets.len() - 1]["holds"]), (&32.into(), &true.into()));
+    let least = budgets.iter().find(|budget| budget["holds"] == true).unwrap();
+    let mean = format!("\nmean_per_load_module = {} ", least["mean_per_load_module"]);
+    assert!(job.contains(&mean), "{mean} is not in:\n{job}");
+}
+
+#[test]
 fn init_takes_features_from_a_folder_and_refuses_them_alone() {
     let scene = scene();
     fs::create_dir(scene.path("all")).unwrap();

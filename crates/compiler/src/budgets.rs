@@ -1,0 +1,173 @@
+//! What budgets of different size would keep of the roads and water of a job: heights are read along features once, and
+//! each budget is tried on them, as the stages `profile` and `level` do. No TIN is made.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::atomic::AtomicBool;
+
+use features::{AreaFeatures, FeatureId, Formed, Kind, Levelled, Place, Role, Storey, doubled_area};
+use ground::{GamingArea, Ground};
+use job::Job;
+use schedule::{Workers, for_each_piece};
+use terrain::LineStorey;
+
+use crate::CompileError;
+use crate::level::Shares;
+use crate::profile::height_at;
+use crate::read_features::ReadFeatures;
+
+/// Triangles of a load module on average that are tried: SIMNET's first.
+pub const BUDGETS: [u32; 7] = [32, 64, 125, 250, 500, 1000, 2000];
+/// Of a mean, what a load module may have at most, and a square of 4 km.
+pub const BUDGET_TIMES: [u32; 2] = [3, 128];
+/// What SIMNET's hardware held of a load module and of a square of 4 km.
+pub const SIMNET: [u32; 2] = [100, 4096];
+/// The share of the length of each kind that a budget is to keep: of motorways, primaries, rails and rivers, and of
+/// every other kind.
+pub const KEPT_MIN: [f64; 2] = [0.995, 0.95];
+/// Square metres from which on a lake is to be kept.
+const LAKE_M2_MIN: f64 = 10_000.0;
+
+/// What a budget would keep of the features of an area.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Budgeted {
+    /// Triangles of a load module, on average over the area.
+    pub mean: u32,
+    /// At most in one load module.
+    pub per_load_module: u32,
+    /// At most in a window of 4 km.
+    pub per_window: u32,
+    /// Metres of ways by kind, in the table's order: kept, and all there are, tunnels not among them.
+    pub kinds: Vec<(Kind, [f64; 2])>,
+    /// Lakes of 1 ha and more: kept, and all there are.
+    pub lakes: [usize; 2],
+    /// Triangles that features would take.
+    pub triangles: u64,
+}
+
+impl Budgeted {
+    /// Whether it keeps nearly all: 99.5 % of motorways, primaries, rails and rivers, 95 % of every other kind, and
+    /// every lake of 1 ha.
+    pub fn holds(&self) -> bool {
+        let enough = |&(kind, [kept, all]): &(Kind, [f64; 2])| {
+            let is_main = matches!(kind, Kind::Motorway | Kind::Primary | Kind::Rail | Kind::River);
+            KEPT_MIN[usize::from(!is_main)] * all <= kept
+        };
+        self.lakes[0] == self.lakes[1] && self.kinds.iter().all(enough)
+    }
+
+    /// Whether it keeps all there is.
+    pub fn is_whole(&self) -> bool {
+        self.lakes[0] == self.lakes[1] && self.kinds.iter().all(|(_, [kept, all])| all - kept < 1.0)
+    }
+
+    /// Metres of all kinds for which `picked` says so: kept, and all there are.
+    pub fn metres(&self, picked: impl Fn(Kind) -> bool) -> [f64; 2] {
+        let of = self.kinds.iter().filter(|(kind, _)| picked(*kind)).map(|(_, metres)| *metres);
+        of.fold([0.0; 2], |[kept, all], [more_kept, more]| [kept + more_kept, all + more])
+    }
+}
+
+/// The limits of a mean: those of SIMNET for its own, else three times as much for a load module and 128 times as much
+/// for a square of 4 km.
+pub fn limits_of(mean: u32) -> [u32; 2] {
+    if mean == BUDGETS[0] { SIMNET } else { BUDGET_TIMES.map(|times| mean.saturating_mul(times)) }
+}
+
+/// The features of a job with the heights along them, on which budgets are tried.
+pub struct Budgets {
+    job: Job,
+    read: ReadFeatures,
+    ground: Vec<Option<i32>>,
+    lakes: BTreeSet<FeatureId>,
+}
+
+impl Budgets {
+    /// Reads the features of a job and the ground along them; `None` for a job without any.
+    ///
+    /// # Errors
+    /// When features or rasters cannot be read, or the job is impossible.
+    pub fn open(job: &Job, workers: usize) -> Result<Option<Self>, CompileError> {
+        let (workers, stop) = (Workers::new(workers), AtomicBool::new(false));
+        let area = GamingArea::new(job)?;
+        let each = |count: usize, piece: &(dyn Fn(usize) + Sync)| for_each_piece(&workers, count, piece);
+        let Some(read) = ReadFeatures::open(job, &area, &each)? else { return Ok(None) };
+        let source = Ground::open(job, &area, &workers, &stop)?;
+        let steps = read.features.site.lattice.steps_per_post();
+        let mut ground = vec![None; read.features.stations().len()];
+        for (&tile, stations) in area.tiles.iter().zip(&read.by_tile).filter(|(_, stations)| !stations.is_empty()) {
+            let window = source.natural_tile(&area, tile)?;
+            for &station in stations {
+                let place: Place = read.features.stations()[station as usize];
+                ground[station as usize] = Some(height_at(&window.dem, steps, place));
+            }
+        }
+        let mut all = Self { job: job.clone(), read, ground, lakes: BTreeSet::new() };
+        all.lakes = all.lakes_of(&all.level(&mut { u32::MAX }).reserved.formed);
+        Ok(Some(all))
+    }
+
+    /// What a mean and its limits would keep.
+    ///
+    /// # Errors
+    /// When the job is impossible with these limits.
+    pub fn of_mean(&self, mean: u32) -> Result<Budgeted, CompileError> {
+        let [per_load_module, per_window] = limits_of(mean);
+        let mut job = self.job.clone();
+        (job.limits.mean_per_load_module, job.limits.per_load_module) = (f64::from(mean), per_load_module);
+        job.limits.window.limit = per_window;
+        let area = GamingArea::new(&job)?;
+        let spec = job.features.as_ref().expect("a job with features");
+        let Levelled { reserved, .. } = self.level(&mut Shares::new(&area, spec));
+        let kept = self.lakes_of(&reserved.formed);
+        let triangles = reserved.cost.values().flat_map(BTreeMap::values).map(|&count| u64::from(count)).sum();
+        Ok(Budgeted {
+            mean,
+            per_load_module,
+            per_window,
+            kinds: self.kinds(&reserved.formed),
+            lakes: [self.lakes.intersection(&kept).count(), self.lakes.len()],
+            triangles,
+        })
+    }
+
+    fn level(&self, room: &mut dyn features::Room) -> Levelled {
+        let spec = self.job.features.as_ref().expect("a job with features");
+        self.read.features.level(&self.ground, spec.options, room)
+    }
+
+    /// Metres by kind, kept and all, of what lies in the area and in no tunnel.
+    fn kinds(&self, formed: &Formed) -> Vec<(Kind, [f64; 2])> {
+        let features: &AreaFeatures = &self.read.features;
+        let traits = features.traits_by_id();
+        let metres = features.site.lattice.metres_per_step();
+        let mut kinds: BTreeMap<Kind, [f64; 2]> = BTreeMap::new();
+        for middle in formed.middles.iter().filter(|middle| middle.traits.storey != LineStorey::Tunnel) {
+            let Some(of) = traits.get(&middle.id).filter(|of| !matches!(of.storey, Storey::Tunnel(_))) else {
+                continue;
+            };
+            let [kept, all] = kinds.entry(of.kind).or_default();
+            for ends in middle.stations.windows(2) {
+                let (a, b) = (ends[0].0, ends[1].0);
+                if features.site.holds_middle(a, b) {
+                    let length = (a.squared_to(b) as f64).sqrt() * metres;
+                    *all += length;
+                    *kept += if middle.traits.is_kept { length } else { 0.0 };
+                }
+            }
+        }
+        kinds.into_iter().filter(|(_, [_, all])| 0.0 < *all).collect()
+    }
+
+    /// Lakes of 1 ha and more, with a place in the area.
+    fn lakes_of(&self, formed: &Formed) -> BTreeSet<FeatureId> {
+        let site = &self.read.features.site;
+        let square = site.lattice.metres_per_step().powi(2);
+        let shores = formed.surfaces.iter().filter(|surface| surface.role == Role::Shore);
+        let is_large = |ring: &[(Place, i32)]| {
+            let places: Vec<Place> = ring.iter().map(|(place, _)| *place).collect();
+            LAKE_M2_MIN <= doubled_area(&places).abs() as f64 / 2.0 * square
+                && places.iter().any(|place| site.holds(*place))
+        };
+        shores.filter(|shore| is_large(&shore.ring)).map(|shore| shore.id).collect()
+    }
+}

@@ -1,0 +1,81 @@
+//! What budgets would keep of the features of a job, as a table and as JSON.
+
+use compiler::{BUDGETS, Budgeted, Budgets};
+use job::Job;
+use serde_json::{Value, json};
+use views::{Align, Table, grouped};
+
+use crate::{resources, terminal};
+
+/// A share of a length, in whole per cent where it is not nearly all.
+pub fn share([kept, all]: [f64; 2]) -> String {
+    let percent = if 0.0 < all { 100.0 * kept / all } else { 100.0 };
+    match percent {
+        99.95.. => "100 %".to_owned(),
+        99.0.. => format!("{:.1} %", (10.0 * percent).floor() / 10.0),
+        _ => format!("{percent:.0} %"),
+    }
+}
+
+/// What each budget would keep of a job with features, up to the one that keeps all; nothing of other jobs.
+pub fn of_job(job: &Job) -> Vec<Budgeted> {
+    let budgets = match Budgets::open(job, resources::cores()) {
+        Ok(Some(budgets)) => budgets,
+        Ok(None) => return Vec::new(),
+        Err(error) => {
+            terminal::tell(&format!("note: what budgets would keep of roads and water is not known: {error}"));
+            return Vec::new();
+        }
+    };
+    let mut tried: Vec<Budgeted> = Vec::new();
+    for mean in BUDGETS {
+        tried.extend(budgets.of_mean(mean));
+        if tried.last().is_some_and(Budgeted::is_whole) {
+            break;
+        }
+    }
+    tried
+}
+
+/// The table; empty where there is none.
+pub fn table_text(budgets: &[Budgeted]) -> String {
+    let Some(first) = budgets.first() else { return String::new() };
+    let kinds: Vec<_> = first.kinds.iter().map(|(kind, _)| *kind).collect();
+    let mut table = Table::new(&vec![Align::Right; 4 + kinds.len()]);
+    let names = kinds.iter().map(|kind| kind.name().to_owned());
+    let head = ["mean".to_owned(), "most".to_owned()].into_iter().chain(names);
+    table.row(head.chain(["lakes".to_owned(), "triangles".to_owned()]));
+    for of in budgets {
+        let metres = |kind| of.kinds.iter().find(|(other, _)| *other == kind).map_or([0.0; 2], |(_, metres)| *metres);
+        let row = [of.mean, of.per_load_module].map(|count| grouped(count.into()));
+        let lakes = if of.lakes[1] == 0 { "-".to_owned() } else { format!("{}/{}", of.lakes[0], of.lakes[1]) };
+        let shares = kinds.iter().map(|kind| share(metres(*kind)));
+        table.row(row.into_iter().chain(shares).chain([lakes, grouped(of.triangles)]));
+    }
+    format!(
+        "\nWhat budgets would keep of features: triangles of a load module on average and at most; the kept share of \
+         the length of each kind; lakes of 1 ha and more; triangles that features take.\n{}",
+        table.text(0)
+    )
+}
+
+/// The same for a program.
+pub fn table_json(budgets: &[Budgeted]) -> Value {
+    let of = |budget: &Budgeted| {
+        let kinds: serde_json::Map<String, Value> = budget
+            .kinds
+            .iter()
+            .map(|(kind, [kept, all])| (kind.name().to_owned(), json!({ "kept_m": kept, "all_m": all })))
+            .collect();
+        json!({
+            "mean_per_load_module": budget.mean,
+            "per_load_module": budget.per_load_module,
+            "per_4km_square": budget.per_window,
+            "kinds": kinds,
+            "lakes_of_1_ha": { "kept": budget.lakes[0], "all": budget.lakes[1] },
+            "triangles": budget.triangles,
+            "holds": budget.holds(),
+        })
+    };
+    budgets.iter().map(of).collect()
+}

@@ -1,0 +1,127 @@
+//! The limits of a job that `init` writes: those asked for, or the least budget that keeps roads and water whole.
+
+use std::path::Path;
+
+use compiler::{BUDGETS, Budgeted, Budgets, limits_of};
+use job::Job;
+use workbench::Suggestion;
+
+use crate::commands::budgets::share;
+use crate::failure::Failure;
+use crate::{resources, terminal};
+
+/// What a person asks of the limits.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Asked {
+    /// What the data needs.
+    Data,
+    /// Those of SIMNET's hardware.
+    Simnet,
+    /// So many triangles of a load module on average.
+    Mean(u32),
+    /// This RMS residual in metres.
+    Rms(f64),
+}
+
+/// The limits of a job.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Limits {
+    /// Triangles of a load module on average.
+    pub mean: u32,
+    /// At most in a load module, and in a square of 4 km.
+    pub most: [u32; 2],
+    /// What budgets would keep; empty without features.
+    pub budgets: Vec<Budgeted>,
+    /// Why it is these, in a line; nothing where there is nothing to say.
+    pub said: Option<String>,
+}
+
+impl Limits {
+    /// Those of a mean, of which nothing is known.
+    pub fn of(mean: u32) -> Self {
+        Self { mean, most: limits_of(mean), budgets: Vec::new(), said: None }
+    }
+
+    /// Triangles of a load module that are left to the ground, on average.
+    pub fn for_ground(&self, modules: u64) -> u32 {
+        let features = self.budgets.iter().find(|budget| budget.mean == self.mean).map_or(0, |of| of.triangles);
+        let each = features.div_ceil(modules.max(1));
+        self.mean.saturating_sub(u32::try_from(each).unwrap_or(u32::MAX)).max(self.mean / 2).max(1)
+    }
+
+    /// What budgets would keep, as comments of a job.
+    pub fn comment(&self) -> String {
+        let mut text = String::new();
+        if !self.budgets.is_empty() {
+            text += "# What budgets would keep of the length of roads and rivers, and of lakes of\n# 1 ha and more:\n";
+        }
+        for of in &self.budgets {
+            let lakes =
+                if of.lakes[1] == 0 { String::new() } else { format!(", {} of {} lakes", of.lakes[0], of.lakes[1]) };
+            let chosen = if of.mean == self.mean { "  (this job)" } else { "" };
+            text += &format!("#   mean {:>4}: {:>5}{lakes}{chosen}\n", of.mean, share(of.metres(|_| true)));
+        }
+        text
+    }
+}
+
+/// Chooses the limits. `text` is the job with any.
+///
+/// # Errors
+/// When rasters cannot be read.
+pub fn choose(asked: Asked, suggestion: &Suggestion, text: &str) -> Result<Limits, Failure> {
+    let mean = match asked {
+        Asked::Data => None,
+        Asked::Simnet => Some(BUDGETS[0]),
+        Asked::Mean(mean) => Some(mean),
+        Asked::Rms(rms_m) => Some(suggestion.triangles_for(rms_m)?),
+    };
+    // What cannot be opened is refused by a build, in its own words.
+    let opened = Job::from_text(text, Path::new("job")).map(|job| Budgets::open(&job, resources::cores()));
+    let budgets = match opened {
+        Ok(Ok(Some(budgets))) => budgets,
+        Ok(Err(error)) => {
+            terminal::tell(&format!("note: what budgets would keep of roads and water is not known: {error}"));
+            return Ok(Limits::of(mean.unwrap_or(BUDGETS[0])));
+        }
+        Ok(Ok(None)) | Err(_) => return Ok(Limits::of(mean.unwrap_or(BUDGETS[0]))),
+    };
+    let mut tried = Vec::new();
+    for rung in BUDGETS {
+        // With so little, not even the first points fit.
+        let Ok(of) = budgets.of_mean(rung) else { continue };
+        let is_last = of.holds();
+        tried.push(of);
+        if is_last {
+            break;
+        }
+    }
+    if let Some(mean) = mean.filter(|mean| tried.iter().all(|of| of.mean != *mean)) {
+        tried.extend(budgets.of_mean(mean));
+        tried.sort_by_key(|of| of.mean);
+    }
+    let Some(chosen) = tried.iter().find(|of| mean.map_or_else(|| of.holds(), |mean| of.mean == mean)).or(tried.last())
+    else {
+        return Ok(Limits::of(mean.unwrap_or(BUDGETS[0])));
+    };
+    let said = Some(sentence(chosen, &tried, mean.is_some()));
+    let (mean, most) = (chosen.mean, [chosen.per_load_module, chosen.per_window]);
+    Ok(Limits { mean, most, budgets: tried, said })
+}
+
+/// Why it is this mean.
+fn sentence(chosen: &Budgeted, tried: &[Budgeted], is_asked: bool) -> String {
+    let kept = |of: &Budgeted| {
+        let roads = of.metres(|kind| kind.is_travelled());
+        match (0.0 < roads[1], 0.0 < of.metres(|_| true)[1]) {
+            (true, _) => format!("{} of the roads", share(roads)),
+            (false, true) => format!("{} of the rivers", share(of.metres(|_| true))),
+            (false, false) => format!("{} of {} lakes", of.lakes[0], of.lakes[1]),
+        }
+    };
+    let mean = chosen.mean;
+    match tried.first().filter(|least| least.mean < mean && !is_asked) {
+        Some(least) => format!("{mean} triangles a load module: {} would keep {}", least.mean, kept(least)),
+        None => format!("{mean} triangles a load module keep {}", kept(chosen)),
+    }
+}
