@@ -16,6 +16,8 @@ use super::lines::Lines;
 use super::overview::Overview;
 use crate::failure::Failure;
 
+/// The version of the format from which on load modules have lines.
+const VERSION_WITH_LINES: u32 = 3;
 /// How far the observer sees load modules.
 const VISIBLE_RANGE_M: f64 = 3500.0;
 
@@ -31,8 +33,8 @@ pub struct Viewed {
     pub description: String,
     /// What the page draws far away and on its map.
     pub overview: Bytes,
-    /// Roads and streams that have no triangles of their own.
-    pub lines: Lines,
+    /// Roads and streams that have no triangles of their own; `None` where load modules have lines.
+    pub lines: Option<Lines>,
     /// Buildings, which are drawn only.
     pub buildings: Buildings,
     /// The ground, once it was asked for, or why there is none.
@@ -51,12 +53,13 @@ impl Viewed {
         let area = Area::open(folder, Keep::OnDisk).map_err(damaged)?;
         let overview = Overview::read(&area).map_err(damaged)?;
         let level = product.features.as_ref().map(|(level, _)| level);
-        let lines = level.map(|level| Lines::of(level, area.frame())).unwrap_or_default();
+        let in_modules = level.is_some() && VERSION_WITH_LINES <= product.job.modules.format;
+        let lines = (!in_modules).then(|| level.map(|level| Lines::of(level, area.frame())).unwrap_or_default());
         let buildings = Buildings::read(&database::Folder::new(folder), &area);
         Ok(Self {
             folder: folder.to_path_buf(),
             grid: product.grid,
-            description: description(&product, &area, &overview, &lines, buildings.count()),
+            description: description(&product, &area, &overview, lines.as_ref(), buildings.count()),
             overview: overview.bytes().into(),
             lines,
             buildings,
@@ -66,7 +69,7 @@ impl Viewed {
     }
 }
 
-fn description(product: &Product, area: &Area, overview: &Overview, lines: &Lines, buildings: usize) -> String {
+fn description(product: &Product, area: &Area, overview: &Overview, lines: Option<&Lines>, buildings: usize) -> String {
     let (frame, manifest) = (area.frame(), &product.manifest);
     let (limits, totals) = (&product.job.limits, &manifest.totals);
     let window = limits.window;
@@ -87,7 +90,7 @@ fn description(product: &Product, area: &Area, overview: &Overview, lines: &Line
         "origin_m": frame.origin_m,
         "range_m": VISIBLE_RANGE_M,
         "coarse_steps": overview.steps,
-        "has_lines": !lines.is_empty(),
+        "has_lines": lines.is_none_or(|lines| !lines.is_empty()),
         "buildings": buildings,
         "height_m": overview.range_m,
         "residual_scale_m": RESIDUAL_SCALE_M,

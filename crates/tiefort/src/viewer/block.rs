@@ -81,6 +81,8 @@ mod tests {
                 triangles: vec![[0, 1, 2]],
                 classes: vec![2],
             },
+            lines: Vec::new(),
+            unknown_parts: Vec::new(),
         };
         let mut out = Vec::new();
         write(&module, &mut out);

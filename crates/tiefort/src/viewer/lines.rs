@@ -1,4 +1,5 @@
-//! Roads and streams that are lines of the TIN and have no triangles of their own, as the page reads them.
+//! Roads, rails, rivers and streams as the page reads them, to draw each as one ribbon from end to end: the lines of
+//! load modules; where these have none, those edges of the TIN that are lines and have no triangles of their own.
 //!
 //! As bytes, of each edge: row and column of its load module, class (u32 each); width, then east and north from the
 //! area's south-west corner and height of both ends (f32 each, metres).
@@ -6,11 +7,37 @@
 use std::collections::BTreeMap;
 
 use database::{AreaLevel, FeatureLine, LineRole};
-use load_module_reader::{AreaFrame, Block};
+use load_module_reader::{Area, AreaFrame, Block, Line, LineKind, LineStorey, QUANTA_PER_METRE, Vertex};
 
 /// The lines of an area by load module, row and column.
 #[derive(Default)]
 pub struct Lines(BTreeMap<(u32, u32), Vec<u8>>);
+
+/// The lines of load modules in a block that are drawn: all that is kept, but for tunnels and breaklines.
+///
+/// # Errors
+/// In words, when a load module cannot be read.
+pub fn of_modules(area: &Area, block: Block) -> Result<Vec<u8>, String> {
+    let ground = area.load(block).map_err(|error| error.to_string())?;
+    let is_drawn = |line: &&Line| line.is_kept && line.storey != LineStorey::Tunnel && line.kind != LineKind::Breakline;
+    let metres = |quanta: i64| quanta as f64 / f64::from(QUANTA_PER_METRE);
+    let mut bytes = Vec::new();
+    for module in ground.modules().iter().map(|module| module.module()) {
+        let corner = [module.col, module.row].map(|number| f64::from(number) * area.frame().side_m());
+        let place = |vertex: &Vertex| {
+            [corner[0] + metres(vertex.x.into()), corner[1] + metres(vertex.y.into()), metres(vertex.z.into())]
+        };
+        for line in module.lines.iter().filter(is_drawn) {
+            for ends in line.vertices.windows(2) {
+                let words = [module.row, module.col, line.class.into()];
+                let numbers = [metres(line.width.into())].into_iter().chain(ends.iter().flat_map(place));
+                bytes.extend(words.into_iter().flat_map(u32::to_le_bytes));
+                bytes.extend(numbers.flat_map(|number| (number as f32).to_le_bytes()));
+            }
+        }
+    }
+    Ok(bytes)
+}
 
 impl Lines {
     /// Those of an area that lie in a load module of its frame.

@@ -6,7 +6,7 @@
 //!   /api/overview                          coarse heights and the figures of every load module (overview.rs)
 //!   /api/modules/SOUTH/WEST/NORTH/EAST     a block of load modules, whole (block.rs)
 //!   /api/levels/LEVEL/SOUTH/WEST/NORTH/EAST   the same at a level of detail
-//!   /api/lines/SOUTH/WEST/NORTH/EAST       roads and streams without triangles of their own there (lines.rs)
+//!   /api/lines/SOUTH/WEST/NORTH/EAST       roads and streams there (lines.rs)
 //!   /api/buildings/SOUTH/WEST/NORTH/EAST   buildings there, drawn only (buildings.rs)
 //!   /api/relief                            heights and classes on a fine grid, for shades and shadows (relief.rs)
 //!   /api/dem                               whether the sources can be read, as JSON; else `why` says why not
@@ -97,7 +97,11 @@ async fn level(
 }
 
 async fn lines(State(viewed): State<Arc<Viewed>>, UrlPath(sides): UrlPath<[u32; 4]>) -> Response {
-    answer(sides, viewed, |viewed, block| Ok(viewed.lines.bytes(block))).await
+    let read = |viewed: &Viewed, block| match &viewed.lines {
+        Some(lines) => Ok(lines.bytes(block)),
+        None => lines::of_modules(&viewed.area, block),
+    };
+    answer(sides, viewed, read).await
 }
 
 async fn standing(State(viewed): State<Arc<Viewed>>, UrlPath(sides): UrlPath<[u32; 4]>) -> Response {

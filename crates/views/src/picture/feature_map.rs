@@ -2,7 +2,7 @@
 
 use super::color::{BOUND, BREACH, Color, GREY, WHITE, mix};
 use super::facets::Facets;
-use super::features::{draw_lines, keys, pixel, shows};
+use super::features::{draw_left_out, draw_lines, keys, pixel, shows};
 use super::image::Image;
 use super::relief::{Tints, facets_relief};
 use super::scene::Scene;
@@ -41,6 +41,7 @@ pub(crate) fn feature_map(scene: &Scene, longest: usize) -> Drawing {
         }
     }
     // What is there stays visible over what is not.
+    let has_left_out = draw_left_out(&mut map, &map_extent, scene);
     draw_lines(&mut map, &map_extent, scene, 1.4);
     let marks = OUTCOMES.iter().zip(counts).rev();
     let marks = marks.map(|((word, color), count)| (Key::Filled(*color), format!("{word}: {}", grouped(count))));
@@ -48,12 +49,13 @@ pub(crate) fn feature_map(scene: &Scene, longest: usize) -> Drawing {
         Legend::Keys { title: "Roads and water".into(), keys: keys(|cover| shows(scene, &facets, cover)) },
         Legend::Keys { title: "What became of them".into(), keys: marks.collect() },
     ];
+    let dotted = if has_left_out { " Dotted lines are left out of the ground." } else { "" };
     let sheet = Sheet {
         title: format!("{}: roads and water", scene.name),
         subtitle: format!("{}, {} remarks", scene.what(), grouped(remarks.len() as u64)),
         coordinates: scene.coordinates(),
         legends,
-        notes: "Marks stand where something was wrong; features.geojson says what, and what was done.".into(),
+        notes: format!("Marks stand where something was wrong; features.geojson says what, and what was done.{dotted}"),
     };
     Drawing { sheet, map, map_extent }
 }
@@ -66,6 +68,7 @@ mod tests {
     use super::*;
     use crate::samples;
     use database::{FeatureLine, FeatureRemark, LineRole};
+    use terrain::{LineForm, LineKind, LineStorey, LineTraits, ModuleLine, ModuleVertex};
 
     fn line(role: LineRole, vertices: Vec<[f64; 3]>) -> FeatureLine {
         FeatureLine {
@@ -107,6 +110,32 @@ mod tests {
         // Without features there is nothing to draw.
         let bare = feature_map(&samples::scene(&modules, &limits), 300);
         assert_ne!(bare.map.pixel(150, 50), BREACH);
+    }
+
+    #[test]
+    fn a_road_that_is_left_out_is_dotted() {
+        let names = ["plain", "primary"].map(str::to_owned);
+        let mut modules = samples::modules();
+        let traits = LineTraits {
+            kind: LineKind::Travelled,
+            form: LineForm::Nothing,
+            storey: LineStorey::Ground,
+            is_kept: false,
+            is_in_ground: false,
+            width: 896,
+        };
+        // On the middle of a row of pixels.
+        let vertex = |x| ModuleVertex { y: 31_680, x, z: 0 };
+        modules[0].lines = vec![ModuleLine { class: 1, traits, vertices: vec![vertex(0), vertex(64_000)] }];
+        let limits = SceneLimits::default();
+        let features = SceneFeatures { names: &names, classes: &[1], lines: &[], remarks: &[] };
+        let scene = Scene { features: Some(features), ..samples::scene(&modules, &limits) };
+        let drawing = feature_map(&scene, 300);
+        let primary = FEATURES[usize::from(feature_number("primary"))].1;
+        // The scene is 1500 x 1000 m: 100 pixels a load module.
+        let dots = (0..100).filter(|x| drawing.map.pixel(*x, 150) == primary).count();
+        assert!((15..60).contains(&dots), "{dots} pixels of a line of 100");
+        assert!(drawing.sheet.notes.contains("Dotted"));
     }
 
     #[test]

@@ -1,8 +1,9 @@
 //! Roads and water on a map: their lines in the colours of their classes.
 
 use database::LineRole;
+use terrain::{ModuleVertex, QUANTA_PER_METRE};
 
-use super::color::FEATURES;
+use super::color::{Color, FEATURES};
 use super::facets::{Cover, Facets};
 use super::image::Image;
 use super::map_extent::MapExtent;
@@ -38,6 +39,47 @@ pub(crate) fn draw_lines(image: &mut Image, map_extent: &MapExtent, scene: &Scen
                 image.line(a, b, thick * times, color);
             }
         }
+    }
+}
+
+/// Pixels from one dot of what is left out to the next, and those that it is long and thick.
+const DOTS: [f64; 3] = [4.5, 1.2, 1.4];
+
+/// Draws dots along the ways that load modules say are left out of the ground; whether there are any.
+pub(crate) fn draw_left_out(image: &mut Image, map_extent: &MapExtent, scene: &Scene) -> bool {
+    let Some(features) = scene.features else { return false };
+    let quantum_m = 1.0 / f64::from(QUANTA_PER_METRE);
+    let side_m = f64::from(scene.grid.side_cells) * scene.frame.spacing.metres();
+    let mut any = false;
+    for module in scene.modules {
+        let corner = [module.id.col, module.id.row].map(|number| f64::from(number) * side_m);
+        for line in module.lines.iter().filter(|line| !line.traits.is_kept) {
+            let Some(number) = features.color_of(line.class) else { continue };
+            any = true;
+            let at = |vertex: &ModuleVertex| {
+                let place = [f64::from(vertex.x), f64::from(vertex.y)].map(|quanta| quanta * quantum_m);
+                map_extent.at([corner[0] + place[0], corner[1] + place[1]]).map(|at| at - 0.5)
+            };
+            let places: Vec<[f64; 2]> = line.vertices.iter().map(at).collect();
+            dots(image, &places, FEATURES[usize::from(number)].1);
+        }
+    }
+    any
+}
+
+/// Dots along a line, evenly apart over its corners.
+fn dots(image: &mut Image, places: &[[f64; 2]], color: Color) {
+    let [apart, long, thick] = DOTS;
+    let mut next = 0.0;
+    for pair in places.windows(2) {
+        let [east, south] = [pair[1][0] - pair[0][0], pair[1][1] - pair[0][1]];
+        let length = (east * east + south * south).sqrt();
+        while next < length {
+            let on = |along: f64| [pair[0][0] + along / length * east, pair[0][1] + along / length * south];
+            image.line(on(next), on((next + long).min(length)), thick, color);
+            next += apart;
+        }
+        next -= length;
     }
 }
 
