@@ -1,17 +1,17 @@
 //! What budgets of different size would keep of the roads and water of a job: heights are read along features once, and
 //! each budget is tried on them, as the stages `profile` and `level` do. No TIN is made.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::sync::atomic::AtomicBool;
 
-use features::{AreaFeatures, FeatureId, Formed, Kind, Levelled, Place, Role, Storey, doubled_area};
+use features::{AreaFeatures, Formed, Kind, Levelled, Place, Storey};
 use ground::{GamingArea, Ground};
 use job::Job;
 use schedule::{Workers, for_each_piece};
 use terrain::LineStorey;
 
 use crate::CompileError;
-use crate::level::Shares;
+use crate::level::shares;
 use crate::profile::height_at;
 use crate::read_features::ReadFeatures;
 
@@ -24,9 +24,6 @@ pub const SIMNET: [u32; 2] = [100, 4096];
 /// The share of the length of each kind that a budget is to keep: of motorways, primaries, rails and rivers, and of
 /// every other kind.
 pub const KEPT_MIN: [f64; 2] = [0.995, 0.95];
-/// Square metres from which on a lake is to be kept.
-const LAKE_M2_MIN: f64 = 10_000.0;
-
 /// What a budget would keep of the features of an area.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Budgeted {
@@ -39,7 +36,7 @@ pub struct Budgeted {
     /// Metres of ways by kind, in the table's order: kept, and all there are, tunnels not among them.
     pub kinds: Vec<(Kind, [f64; 2])>,
     /// Lakes of 1 ha and more: kept, and all there are.
-    pub lakes: [usize; 2],
+    pub lakes: [u32; 2],
     /// Triangles that features would take.
     pub triangles: u64,
 }
@@ -78,7 +75,6 @@ pub struct Budgets {
     job: Job,
     read: ReadFeatures,
     ground: Vec<Option<i32>>,
-    lakes: BTreeSet<FeatureId>,
 }
 
 impl Budgets {
@@ -101,9 +97,7 @@ impl Budgets {
                 ground[station as usize] = Some(height_at(&window.dem, steps, place));
             }
         }
-        let mut all = Self { job: job.clone(), read, ground, lakes: BTreeSet::new() };
-        all.lakes = all.lakes_of(&all.level(&mut { u32::MAX }).reserved.formed);
-        Ok(Some(all))
+        Ok(Some(Self { job: job.clone(), read, ground }))
     }
 
     /// What a mean and its limits would keep.
@@ -117,22 +111,12 @@ impl Budgets {
         job.limits.window.limit = per_window;
         let area = GamingArea::new(&job)?;
         let spec = job.features.as_ref().expect("a job with features");
-        let Levelled { reserved, .. } = self.level(&mut Shares::new(&area, spec));
-        let kept = self.lakes_of(&reserved.formed);
+        let Levelled { reserved, .. } =
+            self.read.features.level(&self.ground, spec.options, &shares(&area.budget, spec));
+        let lakes = reserved.amounts.values();
+        let lakes = lakes.fold([0; 2], |[kept, all], of| [kept + of.lakes_kept, all + of.lakes_wanted]);
         let triangles = reserved.cost.values().flat_map(BTreeMap::values).map(|&count| u64::from(count)).sum();
-        Ok(Budgeted {
-            mean,
-            per_load_module,
-            per_window,
-            kinds: self.kinds(&reserved.formed),
-            lakes: [self.lakes.intersection(&kept).count(), self.lakes.len()],
-            triangles,
-        })
-    }
-
-    fn level(&self, room: &mut dyn features::Room) -> Levelled {
-        let spec = self.job.features.as_ref().expect("a job with features");
-        self.read.features.level(&self.ground, spec.options, room)
+        Ok(Budgeted { mean, per_load_module, per_window, kinds: self.kinds(&reserved.formed), lakes, triangles })
     }
 
     /// Metres by kind, kept and all, of what lies in the area and in no tunnel.
@@ -156,18 +140,5 @@ impl Budgets {
             }
         }
         kinds.into_iter().filter(|(_, [_, all])| 0.0 < *all).collect()
-    }
-
-    /// Lakes of 1 ha and more, with a place in the area.
-    fn lakes_of(&self, formed: &Formed) -> BTreeSet<FeatureId> {
-        let site = &self.read.features.site;
-        let square = site.lattice.metres_per_step().powi(2);
-        let shores = formed.surfaces.iter().filter(|surface| surface.role == Role::Shore);
-        let is_large = |ring: &[(Place, i32)]| {
-            let places: Vec<Place> = ring.iter().map(|(place, _)| *place).collect();
-            LAKE_M2_MIN <= doubled_area(&places).abs() as f64 / 2.0 * square
-                && places.iter().any(|place| site.holds(*place))
-        };
-        shores.filter(|shore| is_large(&shore.ring)).map(|shore| shore.id).collect()
     }
 }

@@ -33,6 +33,7 @@ pub use foresee::foresee;
 mod foresee_features;
 pub use foresee_features::{FeaturesForeseen, foresee_features};
 mod budgets;
+mod chains;
 pub use budgets::{BUDGETS, Budgeted, Budgets, limits_of};
 mod forecast;
 pub use forecast::{Forecast, PAGE_MODULES_MAX, PAGE_POSTS_MAX, StageSeconds};

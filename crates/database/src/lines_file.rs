@@ -80,8 +80,7 @@ pub fn decode_lines(path: &Path, bytes: &[u8]) -> Result<(Stamp, TileFeatures), 
     let shaped: Option<Vec<FeatureSurface>> = on_disk.shaped.into_iter().map(of_disk).collect();
     let decks: Option<Vec<FeatureSurface>> = on_disk.decks.into_iter().map(of_disk).collect();
     let lines: Option<Vec<WayLine>> = on_disk.lines.into_iter().map(line_of_disk).collect();
-    let (Some(spans), Some(surfaces), Some(shaped), Some(decks), Some(lines)) =
-        (spans, surfaces, shaped, decks, lines)
+    let (Some(spans), Some(surfaces), Some(shaped), Some(decks), Some(lines)) = (spans, surfaces, shaped, decks, lines)
     else {
         return Err(malformed(path, "found a side, a kind of ground or of line that there is not"));
     };

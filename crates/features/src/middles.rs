@@ -27,8 +27,8 @@ pub struct Middle {
     pub stations: Vec<(Place, i32)>,
 }
 
-/// How many times the usual tolerance lines are thinned with that are no edges.
-const TOLERANCE_OUT: u8 = 2;
+/// What lines are thinned with that are no edges.
+const TOLERANCE_OUT: Tolerance = Tolerance::ALL[1];
 
 /// The middle lines of a network that was cut into `pieces`, of which `wide` are strips, and of all strands, of which
 /// `thinned` are in the ground.
@@ -86,11 +86,7 @@ fn of_pieces(graded: &Graded, pieces: &[Piece], wide: &[Wide]) -> Vec<Middle> {
 fn beside_pieces(graded: &Graded, site: &Site) -> Vec<Middle> {
     let Graded { network, heights, grants, .. } = *graded;
     let way = |edge: u32| network.edges[edge as usize].way as usize;
-    let is_out = |edge: u32| {
-        let segment = network.segment(edge);
-        grants.of(network.ways[way(edge)].id, site.module_under(segment.a, segment.b)).out
-    };
-    let is_out: Vec<bool> = (0..network.edges.len() as u32).map(is_out).collect();
+    let is_out: Vec<bool> = (0..network.edges.len() as u32).map(|edge| grants.of_edge(edge).out).collect();
     let is_tunnel = |edge: u32| matches!(network.traits(edge).storey, Storey::Tunnel(_));
     let picked = |edge: u32| is_out[edge as usize] || is_tunnel(edge);
     let follows = |node: u32| match network.beside(node) {
@@ -167,7 +163,7 @@ fn left_out(strand: &Strand, kept: &[&Strand], site: &Site) -> Vec<Strand> {
 fn thinned_out(stations: Vec<(Place, i32)>, site: &Site) -> Vec<(Place, i32)> {
     let station = |&(place, height): &(Place, i32)| Station { place, height, stays: site.on_line(place), flat: [0; 2] };
     let all: Vec<Station> = stations.iter().map(station).collect();
-    let kept = thin(&all, Tolerance::USUAL.times(TOLERANCE_OUT), 0, site.lattice);
+    let kept = thin(&all, TOLERANCE_OUT, 0, site.lattice);
     kept.into_iter().map(|at| stations[at as usize]).collect()
 }
 
@@ -243,9 +239,9 @@ mod tests {
                 way(number, "highway=track", &[(5.0, north), (45.0, north)])
             })
             .collect();
-        let all = crate::AreaFeatures::of(sources, &[], site(), &terrain::in_turn);
+        let all = crate::AreaFeatures::of(sources, &[], 1.5, site(), &terrain::in_turn);
         let ground: Vec<Option<i32>> = all.stations().iter().map(|_| Some(0)).collect();
-        let levelled = all.level(&ground, crate::GradeOptions::USUAL, &mut 40);
+        let levelled = all.level(&ground, crate::GradeOptions::USUAL, &crate::Shares::each([8, 8], 40));
         let middles = &levelled.reserved.formed.middles;
         let (kept, out): (Vec<&Middle>, Vec<&Middle>) = middles.iter().partition(|middle| middle.traits.is_kept);
         assert!(!kept.is_empty() && !out.is_empty());
