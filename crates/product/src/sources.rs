@@ -7,8 +7,8 @@ use job::{AreaShape, DemSource, FeatureSource, Job, NamedFile, SourceEntry, Sour
 
 use crate::ProductError;
 
-/// Points the job at the ground to measure against, and gives its name. What is void in a raster of one's own choice
-/// is left out.
+/// Points the job at the ground to measure against, and gives its name. A raster of one's own choice is taken as it
+/// is: no feature and no water is burned into it, and what is void in it is left out.
 ///
 /// # Errors
 /// When no file with the recorded content is there.
@@ -26,6 +26,7 @@ pub fn choose_ground(
         let files = vec![SourceFile { written: written.clone(), path: path.into(), said: said.clone() }];
         job.dem.source = DemSource::Files { written: vec![SourceEntry { name: written.clone(), said }], files };
         job.dem.voids = Voids::Hole;
+        (job.features, job.dem.water) = (None, None);
         return Ok(written);
     }
     match &mut job.dem.source {
