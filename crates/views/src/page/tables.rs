@@ -1,331 +1,313 @@
-//! The ground of a job: windows of heights and weights on demand.
+//! Tables of the page: limits and advice, residuals, breaches, times, sources.
 
-use std::sync::atomic::AtomicBool;
-use std::sync::{Arc, OnceLock};
+use database::{Manifest, Report, ReportFeatures, ReportResidual};
+use maud::{Markup, html};
 
-use database::Folder;
-use job::{DemSource, Job};
-use mask::Mask;
-use schedule::Workers;
-use source_files::{VoidSummary, read_polygons};
-use terrain::{Dem, GridFrame, Importance, PostRect, TileFeatures, TileId};
+use super::advise;
+use super::marks::{BOUND_ROWS_MAX, Marks, ROWS_MAX};
+use crate::features_text::{amounts, check_rows, cost, is_thin, kept, remarks_in_words};
+use crate::report::{border_in_words, eta_of, heights_in_words};
+use crate::table::grouped;
 
-use crate::area::GamingArea;
-use crate::bounds::Bounds;
-use crate::census::Census;
-use crate::given::{GamingAreaFrame, Given};
-use crate::large::WHOLE_BYTES_MAX;
-use crate::lines::Lines;
-use crate::mask_of::{Fault, Opening};
-use crate::relief::Relief;
-use crate::source::Source;
-use crate::sources::Opened;
-use crate::water::{Soundings, Water};
-use crate::window::Window;
-use crate::{GroundError, sources, water};
-
-/// Posts of an area up to which the windows of tiles are kept between stages (7 bytes a post).
-pub const KEPT_POSTS_MAX: usize = 16 << 20;
-
-/// Where heights and weights come from.
-pub struct Ground {
-    /// Heights before any weight.
-    pub relief: Arc<Relief>,
-    mask: Mask<'static>,
-    /// What went wrong in a part of the mask that reads files or heights on demand.
-    fault: Fault,
-    rect: PostRect,
-    frame: GridFrame,
-    kept: Option<Vec<OnceLock<Arc<Window>>>>,
-    lines: OnceLock<Lines>,
-    /// Points that the job gives.
-    pub given: Given,
-    /// Voids of the source under the area.
-    pub voids: VoidSummary,
-    /// Vertical accuracy of the least accurate source that states one, in metres.
-    pub accuracy_m: Option<f64>,
-    /// What a person should know about the sources.
-    pub warnings: Vec<String>,
+pub(super) fn verdict(report: &Report) -> Markup {
+    let breaches = report.breaches.len() as u64;
+    html! {
+        @if breaches == 0 {
+            div.verdict { "Every limit is met." }
+        } @else {
+            div.verdict.breached {
+                b { (grouped(breaches)) } @if breaches == 1 { " limit is" } @else { " limits are" }
+                " not met: see " a href="#breaches" { "breaches" } "."
+            }
+        }
+        @if let Some(features) = &report.features { (in_the_ground(features)) }
+        @for warning in &report.warnings { pre.quiet { "warning: " (warning) } }
+    }
 }
 
-impl Ground {
-    /// Opens and judges everything the job names.
-    ///
-    /// # Errors
-    /// When a file cannot be used for this area.
-    pub fn open(job: &Job, area: &GamingArea, workers: &Workers, stop: &AtomicBool) -> Result<Self, GroundError> {
-        Self::open_within(job, area, (workers, stop), WHOLE_BYTES_MAX)
-    }
-
-    /// The ground of a finished database in `folder`, with the features that it has burned in.
-    ///
-    /// # Errors
-    /// As [`Ground::open`].
-    pub fn open_built(
-        job: &Job,
-        area: &GamingArea,
-        (workers, stop): (&Workers, &AtomicBool),
-        folder: &Folder,
-    ) -> Result<Self, GroundError> {
-        let ground = Self::open(job, area, workers, stop)?;
-        if let Some(spec) = &job.features {
-            ground.burn_in(folder, area, spec.left_out_weight);
-        }
-        Ok(ground)
-    }
-
-    /// The same, where rasters that take more than `whole_bytes_max` bytes are read by window.
-    pub fn open_within(
-        job: &Job,
-        area: &GamingArea,
-        (workers, stop): (&Workers, &AtomicBool),
-        whole_bytes_max: u64,
-    ) -> Result<Self, GroundError> {
-        let opened = match &job.dem.source {
-            DemSource::Sample { seed } => Opened {
-                source: Source::Sample(*seed),
-                voids: VoidSummary::default(),
-                warnings: Vec::new(),
-                accuracy_m: None,
-                range_m: None,
-            },
-            DemSource::Files { files, .. } => sources::open(job, area, files, workers, stop, whole_bytes_max)?,
-        };
-        let Opened { source, voids, mut warnings, accuracy_m, range_m } = opened;
-        let bounds = range_m.map(Bounds::of_metres);
-        let mut relief = Relief { source, frame: area.frame, water: None, bounds };
-        let polygons = match &job.dem.water {
-            None => Vec::new(),
-            Some(water) => {
-                let polygons = read_polygons(&water.file.path, job.area.epsg)?;
-                relief.water = Some(Water::new(job, polygons.clone(), area.frame, area.rect));
-                if !relief.water.as_ref().is_some_and(|water| water.reaches(area.rect)) {
-                    let path = water.file.path.display();
-                    warnings.push(format!("dem.water: {path}: none of its polygons reaches into the area"));
+/// How much of every class is in the ground, in a line; too little of one stands out.
+fn in_the_ground(features: &ReportFeatures) -> Markup {
+    let told: Vec<_> = features.classes.iter().filter_map(|class| Some((class, kept(class)?))).collect();
+    html! {
+        @if !told.is_empty() {
+            p.kept { "In the ground: "
+                @for (at, (class, kept)) in told.iter().enumerate() {
+                    @if 0 < at { ", " }
+                    span.thin[is_thin(class)] {
+                        (class.name) " " (format!("{:.1} %", 100.0 * kept))
+                        @if 0.0 < class.wanted_km { (format!(" of {:.1} km", class.wanted_km)) }
+                        @else { " of " (grouped(class.lakes_wanted)) " lakes of a hectare" }
+                    }
                 }
-                warnings.extend(find_levels(&mut relief, area, workers, stop)?);
-                polygons
+                "."
             }
-        };
-        let (relief, fault) = (Arc::new(relief), Fault::default());
-        let mask = Opening { job, area, relief: &relief, fault: &fault }.mask(polygons)?;
-        let keep = area.rect.post_count() <= KEPT_POSTS_MAX;
-        let kept = keep.then(|| area.tiles.iter().map(|_| OnceLock::new()).collect());
-        let (rect, frame, given) = (area.rect, area.frame, Given::open(job, area)?);
-        let lines = OnceLock::new();
-        let mut ground = Self { relief, mask, fault, rect, frame, kept, lines, given, voids, warnings, accuracy_m };
-        if !ground.relief.has_source_posts() {
-            ground.take_census(job, area, workers, stop)?;
         }
-        Ok(ground)
     }
+}
 
-    /// Looks at every post of a mosaic once, and judges what is missing.
-    fn take_census(
-        &mut self,
-        job: &Job,
-        area: &GamingArea,
-        workers: &Workers,
-        stop: &AtomicBool,
-    ) -> Result<(), GroundError> {
-        let of_tile = |_: usize, &tile: &TileId| -> Result<Census, GroundError> {
-            let Some(patch) = self.relief.patch(area.tiling.rect(tile))? else { return Ok(Census::new()) };
-            let census = Census::of(&patch, area.rect);
-            if let Some(kept) = &self.kept {
-                let window = Arc::new(self.with_given(area, tile, self.with_importance(patch.dem())?)?);
-                kept[area.tiling.index(tile)].get_or_init(|| window);
+/// A table that scrolls by itself where it is wider than the screen, and repeats its head where it goes on on paper.
+pub(super) fn table(head: Markup, rows: Markup) -> Markup {
+    html! { div.wide tabindex="0" { table { thead { tr { (head) } } tbody { (rows) } } } }
+}
+
+pub(super) fn limits(report: &Report, marks: &Marks) -> Markup {
+    let (modules, windows) = (report.per_load_module, report.per_4km);
+    let rows = [
+        (
+            "limits.per_load_module",
+            grouped(modules.max),
+            grouped(modules.limit),
+            modules.max as f64 / modules.limit as f64,
+            modules.over,
+        ),
+        (
+            "limits.mean_per_load_module",
+            format!("{:.2}", modules.mean),
+            modules.mean_limit.to_string(),
+            modules.mean / modules.mean_limit,
+            u64::from(modules.mean_limit < modules.mean),
+        ),
+        (
+            "limits.per_4km_square",
+            grouped(windows.max),
+            grouped(windows.limit),
+            windows.max as f64 / windows.limit as f64,
+            windows.over,
+        ),
+    ];
+    html! {
+        (table(html! {
+            th { "Limit, in " (report.count) } th.n { "most used" } th.n { "limit" }
+            th.n { "use" } th.n { "above" }
+        }, html! {
+            @for (name, used, limit, share, over) in rows {
+                tr {
+                    td { code { (name) } } td.n { (used) } td.n { (limit) }
+                    td.n { (format!("{:.1} %", 100.0 * share)) } td.n { (grouped(over)) }
+                }
             }
-            Ok(census)
-        };
-        let mut census = Census::new();
-        // A census is some kilobytes, so those of a large area are added up as they come.
-        for tiles in area.tiles.chunks(1 << 10) {
-            let parts = schedule::for_each_independent(tiles, workers, stop, of_tile)
-                .map_err(|error| GroundError::from_schedule(tiles, error))?;
-            parts.iter().for_each(|part| census.add(part));
-        }
-        self.voids = census.judge(job, area)?;
-        if 0 < census.gap {
-            let (gap, of) = (census.gap, area.rect.post_count());
-            let map = census.map();
-            self.warnings.push(format!("no source reaches {gap} of {of} posts, which are holes (north is up):\n{map}"));
-        }
-        Ok(())
-    }
-
-    /// Weights and classes as the job and its pins have them.
-    fn with_importance(&self, dem: Dem) -> Result<Window, GroundError> {
-        let importance = mask::importance(&self.mask, self.rect, &self.frame, dem.rect());
-        self.fault.take()?;
-        let place = GamingAreaFrame { rect: self.rect, frame: self.frame };
-        let importance = mask::without_voids(self.given.weigh(importance, &place), &dem);
-        Ok(Window { dem, importance, given: Vec::new(), forbidden: Vec::new(), featured: Vec::new() })
-    }
-
-    fn with_given(&self, area: &GamingArea, tile: TileId, window: Window) -> Result<Window, GroundError> {
-        let given = self.given.of_tile(area, tile, &window.dem)?;
-        Ok(Window { given, forbidden: self.given.forbidden(area.tiling.rect(tile)), ..window })
-    }
-
-    /// What heights lie within: those of the sources, and what the job says itself of water and points.
-    pub fn bounds(&self) -> Option<Bounds> {
-        let told = self.relief.water.iter().flat_map(Water::levels_known).chain(self.given.heights());
-        self.relief.bounds.map(|bounds| told.fold(bounds, Bounds::and))
-    }
-
-    /// From now on, features are burned into every window but natural ones, as `folder` has them. Posts on those that
-    /// had
-    /// no room weigh `left_out_weight` times what they otherwise would.
-    pub fn burn_in(&self, folder: &Folder, area: &GamingArea, left_out_weight: f64) {
-        self.lines.get_or_init(|| Lines::new(folder, area, left_out_weight, self.kept.is_some()));
-    }
-
-    /// What features put into a tile; nothing before they are burned in.
-    ///
-    /// # Errors
-    /// When the file that says it cannot be read.
-    pub fn features(&self, tile: TileId) -> Result<Arc<TileFeatures>, GroundError> {
-        self.lines.get().map_or_else(|| Ok(Arc::new(TileFeatures::none(tile))), |lines| lines.features(tile))
-    }
-
-    /// The ground of one tile, made once where memory allows: natural, with features burned in if there are any.
-    ///
-    /// # Errors
-    /// When the source has no heights there, or features cannot be read.
-    pub fn tile(&self, area: &GamingArea, tile: TileId) -> Result<Arc<Window>, GroundError> {
-        let Some(lines) = self.lines.get() else { return self.natural_tile(area, tile) };
-        kept_or(lines.kept(area.tiling.index(tile)), || {
-            // Points that the job gives are looked up in what they are given for.
-            let natural = Window::clone(&*self.natural_tile(area, tile)?);
-            let window = lines.burn_tile(natural, tile, area.tiling.rect(tile))?;
-            self.with_given(area, tile, window)
-        })
-    }
-
-    /// The same without features.
-    ///
-    /// # Errors
-    /// When the source has no heights there.
-    pub fn natural_tile(&self, area: &GamingArea, tile: TileId) -> Result<Arc<Window>, GroundError> {
-        let slot = self.kept.as_ref().map(|kept| &kept[area.tiling.index(tile)]);
-        kept_or(slot, || self.with_given(area, tile, self.natural(area.tiling.rect(tile))?))
-    }
-
-    /// The ground of a tile and of `halo` posts around it, put together from the windows of its neighbours, which
-    /// are kept where memory allows.
-    ///
-    /// # Errors
-    /// When the source has no heights there.
-    pub fn around(&self, area: &GamingArea, tile: TileId, halo: i32) -> Result<Window, GroundError> {
-        let wide = area.tiling.rect(tile).grown(halo);
-        let rect = wide.intersection(&self.rect).expect("a tile lies inside the area");
-        let mut near = area.tiling.neighbours(tile);
-        near.push(tile);
-        if self.kept.is_none() || !near.iter().all(|&other| reaches(area.tiling.rect(other), halo)) {
-            return self.window(rect);
-        }
-        let parts = near.iter().map(|&other| self.tile(area, other)).collect::<Result<Vec<_>, _>>()?;
-        let dem = Dem::from_row_fn(rect, |row, heights| {
-            for (part, cols) in
-                parts.iter().filter_map(|part| overlap(part.dem.rect(), rect, row).map(|cols| (part, cols)))
-            {
-                let (from, to) = (cols.start - part.dem.rect().west, cols.start - rect.west);
-                let part = &part.dem.row(row)[from as usize..][..cols.len()];
-                heights[to as usize..][..cols.len()].copy_from_slice(part);
+            tr {
+                td { code { "limits.pool" } } td.n { (grouped(report.pool.used)) } td.n { (grouped(report.pool.size)) }
+                td.n {} td.n {}
             }
-        });
-        let importance = join_importance(&parts, rect);
-        Ok(Window { dem, importance, given: Vec::new(), forbidden: Vec::new(), featured: Vec::new() })
+        }))
+        p.quiet { "The fullest 9 x 9 load modules, which bound a 4 km square at any offset, hold "
+            (grouped(windows.worst_9x9)) " " (report.count) "." }
+        (bound(report, marks))
     }
+}
 
-    /// The ground of any rectangle of the area, with features burned in if there are any.
-    ///
-    /// # Errors
-    /// When the source has no heights there, or features cannot be read.
-    pub fn window(&self, rect: PostRect) -> Result<Window, GroundError> {
-        let natural = self.natural(rect)?;
-        match self.lines.get() {
-            Some(lines) => lines.burn(natural),
-            None => Ok(natural),
+/// Where limits were met by refusing posts, and what that cost.
+fn bound(report: &Report, marks: &Marks) -> Markup {
+    let refused = &report.refusals;
+    if refused.count == 0 {
+        return html! { p { "No limit kept a post out." } };
+    }
+    html! {
+        h3 { "Where limits kept posts out" }
+        p {
+            (grouped(refused.count)) " posts were refused: "
+            (grouped(refused.by_module)) " by the limit of a load module, "
+            (grouped(refused.by_window)) " by that of a 4 km square, " (grouped(refused.by_reservation))
+            " to keep what a neighbour's side was promised. The largest residual among them is "
+            (format!("{:.2} m", refused.largest_m)) "."
+        }
+        @if !report.bound.is_empty() {
+            (table(html! { th { "Limit" } th { "Where" } th.n { "count" } th.n { "limit" } th.n { "refused" }
+                    th.n { "largest, m" } th.n { "RMS, m" } th.n { "RMS without the limit, m" } }, html! {
+                @for bound in report.bound.iter().take(BOUND_ROWS_MAX) {
+                    tr {
+                        td { code { (bound.kind) } } td { (marks.link(bound.place)) } td.n { (grouped(bound.count)) }
+                        td.n { (grouped(bound.limit)) } td.n { (bound.refused) }
+                        td.n { (format!("{:.2}", bound.refused_largest_m)) }
+                        td.n { (format!("{:.3}", bound.rms_with_m)) }
+                        td.n { (format!("{:.3}", bound.rms_without_m)) }
+                    }
+                }
+        }))
+            (more(report.bound.len(), BOUND_ROWS_MAX, "report.json"))
         }
     }
+}
 
-    /// The ground of any rectangle of the area without features.
-    ///
-    /// # Errors
-    /// When the source has no heights there.
-    pub fn natural(&self, rect: PostRect) -> Result<Window, GroundError> {
-        self.with_importance(self.relief.dem(rect)?)
+fn more(rows: usize, shown: usize, file: &str) -> Markup {
+    html! {
+        @if shown < rows { p.quiet { "and " (grouped((rows - shown) as u64)) " more in " code { (file) } "." } }
     }
 }
 
-/// What a slot holds, made if it is empty; made each time where there is no slot.
-pub(crate) fn kept_or(
-    slot: Option<&OnceLock<Arc<Window>>>,
-    make: impl FnOnce() -> Result<Window, GroundError>,
-) -> Result<Arc<Window>, GroundError> {
-    let Some(slot) = slot else { return make().map(Arc::new) };
-    if let Some(window) = slot.get() {
-        return Ok(window.clone());
+pub(super) fn advice(report: &Report) -> Markup {
+    let advice = advise(report);
+    html! {
+        h3 { "What to change" }
+        @if advice.is_empty() { p { "Nothing binds: more would need finer ground, not other limits." } }
+        @for advice in advice {
+            div.advice {
+                p { b { (advice.policy) } ": " (advice.found) }
+                p { code { (advice.change) } }
+                p { (advice.effect) }
+            }
+        }
     }
-    let window = Arc::new(make()?);
-    Ok(slot.get_or_init(|| window).clone())
 }
 
-/// Whether a halo never reaches beyond a tile.
-fn reaches(tile: PostRect, halo: i32) -> bool {
-    halo <= tile.cells_wide().min(tile.cells_high()) as i32
-}
-
-/// The columns of a row that a part holds of a whole.
-fn overlap(part: PostRect, whole: PostRect, row: i32) -> Option<std::ops::Range<i32>> {
-    let cut = part.intersection(&whole)?;
-    (cut.south <= row && row <= cut.north).then_some(cut.west..cut.east + 1)
-}
-
-fn join_importance(parts: &[Arc<Window>], rect: PostRect) -> Importance {
-    let first = parts[0].importance.uniform_weight();
-    let is_plain = |part: &Arc<Window>| {
-        part.importance.uniform_weight() == first
-            && part.importance.classes_of_row(part.importance.rect().south).is_none()
+pub(super) fn residuals(report: &Report) -> Markup {
+    let row = |name: &str, posts: String, points: String, residual: &ReportResidual| {
+        let ReportResidual { rms_m, max_m, mean_abs_m, p95_m, p99_m } = *residual;
+        html! {
+            tr {
+                td { (name) } td.n { (posts) } td.n { (points) }
+                td.n { (format!("{rms_m:.3}")) } td.n { (format!("{max_m:.2}")) }
+                td.n { (format!("{mean_abs_m:.3}")) } td.n { (format!("{p95_m:.2}")) } td.n { (format!("{p99_m:.2}")) }
+            }
+        }
     };
-    if let Some(weight) = first
-        && parts.iter().all(is_plain)
-    {
-        return Importance::uniform(rect, weight);
+    html! {
+        (table(html! { th { "Residuals in metres" } th.n { "posts" } th.n { "points" } th.n { "RMS" } th.n { "largest" }
+                th.n { "mean" } th.n { "95 %" } th.n { "99 %" } }, html! {
+            @for class in &report.classes {
+                @if class.posts == 0 {
+                    tr {
+                        td { (&class.name) }
+                        td.n { "-" }
+                        td.n { (grouped(class.points)) }
+                        @for _ in 0..5 { td.n { "-" } }
+                    }
+                } @else {
+                    (row(&class.name, grouped(class.posts), grouped(class.points), &class.residual))
+                }
+            }
+            (row(
+                "overall, weighted by posts",
+                grouped(report.classes.iter().map(|class| class.posts).sum()),
+                grouped(report.points.total),
+                &report.residual,
+            ))
+            @if let Some(source) = &report.residual_against_source {
+                (row("against the source DEM", String::new(), String::new(), source))
+            }
+        }))
+        @if 1 < report.classes.len() {
+            p.quiet {
+                "Pooled by points, as the founding paper's Table 2 prints its overall figure: RMS "
+                (format!("{:.3} m", report.overall_point_weighted_rms_m)) "."
+            }
+        }
+        @if let Some(eta) = report.limit.and_then(eta_of) {
+            p.quiet { "Eta: " (eta) "." }
+        }
+        @if let Some(border) = &report.border {
+            p.quiet { "Load modules " (border_in_words(border)) "." }
+        }
+        @if let Some(heights) = &report.heights {
+            p.quiet { "Surface: " (heights_in_words(heights)) "." }
+        }
+        @if let Some(accuracy_m) = report.dem_accuracy_m {
+            p.quiet { "The source states an accuracy of " (accuracy_m) " m." }
+        }
+        @if 0 < report.voids.count {
+            p.quiet {
+                "Posts without a height in the source: " (grouped(report.voids.count)) ", of which "
+                (grouped(report.voids.filled)) " were filled."
+            }
+        }
     }
-    let holder = |post| parts.iter().find(|part| part.importance.rect().contains(post)).expect("parts cover the whole");
-    let posts = || {
-        (rect.south..=rect.north)
-            .flat_map(move |row| (rect.west..=rect.east).map(move |col| terrain::Post::new(row, col)))
+}
+
+/// Levels of detail, where there are several.
+pub(super) fn levels(report: &Report) -> Markup {
+    let finest = report.levels.first().map_or(0, |level| level.triangles);
+    html! {
+        @if !report.levels.is_empty() {
+            h3 { "Levels of detail" }
+            (table(html! { th { "Level" } th.n { "inner vertices" } th.n { "triangles" } th.n { "of level 0" }
+                    th.n { "RMS, m" } th.n { "largest, m" } }, html! {
+                @for level in &report.levels {
+                    tr {
+                        td { (level.level) } td.n { (format!("{} %", 100.0 * level.inner_share)) }
+                        td.n { (grouped(level.triangles)) }
+                        td.n { (format!("{:.1} %", 100.0 * level.triangles as f64 / finest.max(1) as f64)) }
+                        td.n { (format!("{:.3}", level.rms_m)) } td.n { (format!("{:.2}", level.max_m)) }
+                    }
+                }
+        }))
+            p.quiet { "Limits are about level 0; the others are for what is far away." }
+        }
+    }
+}
+
+/// What roads and water cost, and what must hold of them.
+pub(super) fn features(features: &ReportFeatures) -> Markup {
+    let row = |name: &str, is_thin: bool, amounts: [String; 5], costs: [String; 3]| {
+        html! { tr { td.thin[is_thin] { (name) } @for cell in amounts.iter().chain(&costs) { td.n { (cell) } } } }
     };
-    let weights = posts().map(|post| holder(post).importance.weight(post)).collect();
-    let classes = posts().map(|post| holder(post).importance.class(post)).collect();
-    Importance::new(rect, weights, classes)
-}
-
-/// Finds the level of each body of water from the heights of all tiles; what a person should know about it.
-fn find_levels(
-    relief: &mut Relief,
-    area: &GamingArea,
-    workers: &Workers,
-    stop: &AtomicBool,
-) -> Result<Option<String>, GroundError> {
-    let Some(water) = relief.water.as_ref().filter(|water| water.is_unknown()) else { return Ok(None) };
-    let tiles: Vec<TileId> = area.tiles.iter().copied().filter(|&tile| water.reaches(area.tiling.rect(tile))).collect();
-    let mut all = Soundings::new();
-    for tiles in tiles.chunks(1 << 10) {
-        let sound = |_: usize, &tile: &TileId| -> Result<Soundings, GroundError> {
-            Ok(water.sound(&relief.dry(area.tiling.rect(tile))?, area.rect))
-        };
-        let parts = schedule::for_each_independent(tiles, workers, stop, sound)
-            .map_err(|error| GroundError::from_schedule(tiles, error))?;
-        parts.into_iter().for_each(|part| water::add(&mut all, part));
+    html! {
+        (table(html! { th { "Class" } th.n { "km" } th.n { "of km wanted" } th.n { "kept" } th.n { "as strips, km" } th.n { "lakes" }
+                th.n { "triangles" } th.n { "most of a load module" } th.n { "most of a 4 km square" } }, html! {
+            @for class in &features.classes { (row(&class.name, is_thin(class), amounts(class), cost(&class.cost))) }
+            (row("all", false, [const { String::new() }; 5], cost(&features.all)))
+        }))
+        p { (remarks_in_words(features)) "." }
+        (table(html! { th { "What must hold" } th { "found" } }, html! {
+            @for (what, found) in check_rows(&features.checks) { tr { td { (what) } td { (found) } } }
+        }))
     }
-    let without = relief.water.as_mut().map_or(0, |water| water.level(&all));
-    let told = || format!("{without} bodies of water hold no post with a height and are left as they are");
-    Ok((0 < without).then(told))
 }
 
-#[cfg(test)]
-mod tests;
+pub(super) fn breaches(report: &Report, marks: &Marks) -> Markup {
+    if report.breaches.is_empty() {
+        return html! { p { "None." } };
+    }
+    html! {
+        p { "All of them with their places: " code { "breaches.csv" } ", " code { "breaches.geojson" } "." }
+        (table(html! {
+            th { "Limit" } th { "Where" } th.n { "count" } th.n { "limit" } th.n { "excess" } th.n { "refused" }
+            th.n { "RMS, m" } th.n { "RMS without the limit, m" } }, html! {
+            @for breach in report.breaches.iter().take(ROWS_MAX) {
+                tr {
+                    td { code { (breach.kind) } } td { (marks.link(breach.place)) }
+                    @for count in [breach.count, breach.limit, breach.excess] {
+                        td.n { (crate::report::amount(breach, count)) }
+                    }
+                    td.n { (breach.refused) } td.n { (format!("{:.3}", breach.rms_with_m)) }
+                    td.n { @if let Some(rms_m) = breach.rms_without_m { (format!("{rms_m:.3}")) } }
+                }
+            }
+        }))
+        (more(report.breaches.len(), ROWS_MAX, "breaches.csv"))
+    }
+}
+
+pub(super) fn stages(report: &Report) -> Markup {
+    let wall_s: f64 = report.stages.iter().map(|stage| stage.wall_s).sum();
+    let cpu_s: f64 = report.stages.iter().map(|stage| stage.cpu_s).sum();
+    html! {
+        p.quiet { (format!("{wall_s:.2} s with {} workers.", report.workers)) }
+        (table(html! { th { "Stage" } th.n { "wall, s" } th.n { "cpu, s" } th { "share of the time" } }, html! {
+            @for stage in &report.stages {
+                tr {
+                    td { (stage.name) }
+                    td.n { (format!("{:.2}", stage.wall_s)) } td.n { (format!("{:.2}", stage.cpu_s)) }
+                    td.share { span.bar style=(format!("width:{:.1}%", 100.0 * stage.wall_s / wall_s.max(1e-9))) {} }
+                }
+            }
+            tr { td { b { "all" } } td.n { (format!("{wall_s:.2}")) } td.n { (format!("{cpu_s:.2}")) } td {} }
+        }))
+    }
+}
+
+pub(super) fn sources(manifest: &Manifest) -> Markup {
+    html! {
+        div.stack { (table(html! { th { "Source" } th { "BLAKE3 of its content" } th { "Attribution" } }, html! {
+            @for source in &manifest.sources {
+                tr {
+                    td { code { (source.path) } } td { code { (source.blake3.to_string()) } }
+                    td { (source.attribution.as_deref().unwrap_or("")) }
+                }
+            }
+        })) }
+        p.quiet {
+            "Algorithm revision " (manifest.algorithm_revision) ", database format " (manifest.format_version) "."
+        }
+    }
+}
