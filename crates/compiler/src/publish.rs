@@ -1,7 +1,9 @@
 //! The manifest before anything changes; and the last stage: breaches, the report, its page, and the manifest when
 //! everything is there.
 
-use database::{Area, Database, FileStamp, Manifest, ManifestState, Removals, Report, SourceRecord, TileState, files};
+use database::{
+    Area, Database, FileStamp, Manifest, ManifestState, Removals, Report, SourceRecord, TileRecord, TileState, files,
+};
 use job::Job;
 use product::{Opened, Product, Told, Wanted, WantedGround};
 use serde_json::{Value, json};
@@ -178,6 +180,8 @@ fn fill(
         run.database.remove(&format!("survey/{tile}.curve"))?;
     }
     let record = manifest.tile_mut(tile).expect("the manifest lists every tile");
+    // Nothing that the build before it said of the tile holds any more.
+    *record = TileRecord::missing(tile);
     record.state = state;
     record.fingerprint = Some(tin.stamp.fingerprint);
     record.made_from.clone_from(&tin.made_from);

@@ -261,6 +261,39 @@ fn a_changed_limit_moves_allowances_and_keeps_surveys_that_it_does_not_reach() {
 }
 
 #[test]
+fn sections_taken_out_of_a_job_and_put_back_leave_nothing_of_the_build_before() {
+    let plain = Words { size: (4, 4), tiles: (2, 2), ..Words::sample() };
+    let drawn = [
+        line("highway=primary", &[(-100.0, 300.0), (2100.0, 500.0)]),
+        polygon("natural=water", &[(300.0, 1000.0), (900.0, 1050.0), (850.0, 1500.0), (320.0, 1400.0)]),
+        polygon("building=yes", &[(1500.0, 1500.0), (1540.0, 1500.0), (1540.0, 1530.0)]),
+    ];
+    let features = "sources = [\"features.geojson\"]\nbuildings = true".to_owned();
+    let tin = |tin: &str| Words { tin: tin.into(), ..plain.clone() };
+    let greedy = "method = \"greedy\"\npoints = 100";
+    let clipped = Words { modules: "edges = \"clip\"".into(), ..tin(greedy) };
+    let equal = tin("allocation = \"equal\"");
+    let levels = tin("[lod]\nlevels = [{ inner_share = 0.5 }]");
+    let mut scene = Scene::with_files(&Words { features, ..plain.clone() }, |folder: &Path| {
+        fs::write(folder.join("features.geojson"), geojson(&drawn)).unwrap();
+    });
+    let with_features = scene.job.clone();
+    let path = scene.path("job.toml");
+    let of = |words: &Words| Job::from_text(&words.text(), &path).unwrap();
+    let jobs = [&plain, &levels, &clipped, &equal].map(of);
+    drop(scene.build("area", 2));
+    for job in jobs.into_iter().flat_map(|job| [job, with_features.clone()]) {
+        let what = job.canonical_text();
+        scene.job = job;
+        drop(scene.build("area", 2));
+        fs::remove_dir_all(scene.path("fresh")).ok();
+        drop(scene.build("fresh", 2));
+        assert_same(&scene.product("fresh"), &scene.product("area"), &what);
+        scene.verify("area");
+    }
+}
+
+#[test]
 fn a_small_edit_of_an_optimised_area_moves_few_tiles() {
     let words = Words { size: (12, 12), tiles: (4, 4), ..Words::raster() };
     let ground = sample_dem(words.grid(), 1);
