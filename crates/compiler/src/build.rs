@@ -54,10 +54,11 @@ pub fn build(
     }
     let mut run = open(job, folder, options, progress)?;
     if options.fresh {
-        run.database.clear()?;
         run.previous = None;
+        run.database.begin_afresh(&beginning(&run))?;
+    } else {
+        run.database.begin(&beginning(&run))?;
     }
-    run.database.begin(&beginning(&run))?;
     finish(run, progress)
 }
 

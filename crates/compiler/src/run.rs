@@ -3,7 +3,7 @@
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, OnceLock};
 
-use database::{AreaLevel, Database, FileStamp, Manifest, SourceRecord};
+use database::{AreaLevel, Database, FileStamp, Manifest, RUN_DIGITS, SourceRecord};
 use engine::{Cause, FingerprintBuilder, Outcome, Stamp};
 use ground::{GamingArea, Ground, Window};
 use job::{Budget as PointBudget, Edges, Job};
@@ -201,7 +201,7 @@ pub fn run_name(job: &str, sources: &[SourceRecord], revision: u32) -> String {
     for source in sources {
         builder = builder.text(&source.path).fingerprint(source.blake3);
     }
-    builder.finish().to_string()[..16].to_owned()
+    builder.finish().to_string()[..RUN_DIGITS].to_owned()
 }
 
 /// Whether the files of a job are still what they were, or which is not.

@@ -20,22 +20,9 @@ const FOLDERS: [&str; 4] = [TILES, MODULES, MEASURED, SURVEY];
 /// What is written beside a finished build.
 const REPORTS: [&str; 6] =
     [files::REPORT, files::REPORT_HTML, files::BREACHES, files::BREACHES_CSV, files::FEATURES, files::FEATURES_GPKG];
-/// What may lie in a database's directory and makes a directory without `database.json` ours.
-const OURS: [&str; 13] = [
-    LOCK_NAME,
-    TILES,
-    MODULES,
-    MEASURED,
-    SURVEY,
-    WORK,
-    files::DATABASE,
-    files::REPORT,
-    files::REPORT_HTML,
-    files::BREACHES,
-    files::BREACHES_CSV,
-    files::FEATURES,
-    files::FEATURES_GPKG,
-];
+/// Endings of the names that a build gives to files in those folders.
+const ENDINGS: [&str; 9] =
+    [".tin", ".removed", ".slm", ".sums", ".curve", ".profile", ".lines", ".level", ".buildings"];
 
 /// A database to write to: by this process alone, or by all that have joined it.
 #[derive(Debug)]
@@ -49,8 +36,9 @@ impl Database {
     /// it is there and can be believed. Locks it, makes the folders and removes what a killed run left half-written.
     ///
     /// # Errors
-    /// When the directory holds anything that is not ours, a database of another format version or area, or a link in
-    /// place of a folder; when another build holds the lock; when it cannot be written to. Nothing is changed then.
+    /// When the directory holds anything and no `database.json` of ours, a database of another format version or area,
+    /// or a link in place of a folder; when another build holds the lock; when it cannot be written to. Nothing is
+    /// changed then.
     pub fn create_or_open(folder: impl Into<Folder>, area: &Area) -> Result<(Self, Option<Manifest>), DatabaseError> {
         let (database, previous) = Self::open(folder.into(), area, LockKind::Alone)?;
         database.sweep()?;
@@ -128,15 +116,23 @@ impl Database {
         Ok(self.folder.work(run))
     }
 
-    /// Removes what processes left for one another, once the build is published or no process shares the directory.
+    /// Removes what processes left for one another, once the build is published or no process shares the directory;
+    /// nothing that has another name than a run.
     ///
     /// # Errors
     /// When something cannot be removed.
     pub fn remove_work(&self) -> Result<(), DatabaseError> {
         let path = self.folder.path(WORK);
         check_folder(&self.folder, &path)?;
-        match remove_all(&**self.folder.store(), &path) {
-            Err(source) if source.kind() != ErrorKind::NotFound => {
+        let store = self.folder.store();
+        let remove = || {
+            let runs = store.list(&path)?.into_iter().filter(|run| Work::is_of_run(run));
+            runs.filter(|run| matches!(store.entry(run), Ok(Entry::Folder)))
+                .try_for_each(|run| remove_all(&**store, &run))?;
+            store.remove_folder(&path)
+        };
+        match remove() {
+            Err(source) if !matches!(source.kind(), ErrorKind::NotFound | ErrorKind::DirectoryNotEmpty) => {
                 Err(DatabaseError::from_io("remove", &path, 0, source))
             }
             _ => Ok(()),
@@ -253,24 +249,30 @@ impl Database {
         self.remove_if_there(&self.folder.path(name))
     }
 
-    /// Removes everything a build has made, for a fresh start. A reader finds no `database.json` meanwhile.
+    /// Begins as [`Database::begin`] does, and removes every file a build has made, for a fresh start. A reader finds
+    /// an incomplete database meanwhile, and so does a build after this one was ended.
     ///
     /// # Errors
-    /// When something cannot be removed.
-    pub fn clear(&self) -> Result<(), DatabaseError> {
-        self.remove(files::DATABASE)?;
-        REPORTS.iter().try_for_each(|name| self.remove(name))?;
+    /// When `database.json` cannot be written, or something not removed.
+    ///
+    /// # Panics
+    /// When `manifest` is not incomplete.
+    pub fn begin_afresh(&self, manifest: &Manifest) -> Result<(), DatabaseError> {
+        self.begin(manifest)?;
+        self.remove(files::ALLOCATION)?;
         for name in FOLDERS {
-            let folder = self.folder.path(name);
-            for path in self.folder.list(&folder)? {
-                self.remove_if_there(&path)?;
+            for path in self.folder.list(&self.folder.path(name))? {
+                let is_ours = ENDINGS.iter().any(|ending| path.to_string_lossy().ends_with(ending));
+                if is_ours && matches!(self.folder.store().entry(&path), Ok(Entry::File(_))) {
+                    self.remove_if_there(&path)?;
+                }
             }
         }
         Ok(())
     }
 
     /// Says, before a build changes its first file, that the files no longer belong together; on the disk when this
-    /// returns, if the disk said otherwise before. What was reported of the files before is removed.
+    /// returns. What was reported of the files before is removed.
     ///
     /// # Errors
     /// When `database.json` cannot be written.
@@ -279,9 +281,8 @@ impl Database {
     /// When `manifest` is not incomplete.
     pub fn begin(&self, manifest: &Manifest) -> Result<(), DatabaseError> {
         assert_eq!(manifest.state, ManifestState::Incomplete, "a build begins incomplete");
-        // Where there is no database yet, losing this file loses nothing, so it need not wait for the disk.
-        let first = self.folder.store().entry(&self.folder.path(files::DATABASE)).is_err();
-        self.write_manifest(manifest, if first { Durability::Later } else { Durability::Now })?;
+        // By this file a later build knows that the others are ours.
+        self.write_manifest(manifest, Durability::Now)?;
         REPORTS.iter().try_for_each(|name| self.remove(name))
     }
 
@@ -354,18 +355,65 @@ fn examine(folder: &Folder, area: &Area) -> Result<Option<Manifest>, DatabaseErr
             return Ok(Some(manifest));
         }
         // Where it is damaged, other files tell by themselves what they were made from.
-        Err(DatabaseError::Missing { .. } | DatabaseError::NotADatabase { .. }) => {}
-        Err(DatabaseError::WrongChecksum { .. } | DatabaseError::Malformed { .. }) => {}
+        Err(DatabaseError::WrongChecksum { .. }) => refuse_others(folder)?,
+        Err(
+            error @ (DatabaseError::Missing { .. }
+            | DatabaseError::NotADatabase { .. }
+            | DatabaseError::Malformed { .. }),
+        ) => {
+            let refused = refuse_filled(folder, &error);
+            // Another process may have begun a build after `database.json` was looked for.
+            if refused.is_err()
+                && let Ok(manifest) = folder.manifest()
+            {
+                manifest.check_area(&folder.path(files::DATABASE), area)?;
+                return Ok(Some(manifest));
+            }
+            refused?;
+        }
         Err(error) => return Err(error),
     }
-    // Without a manifest to trust, nothing may lie there that a build does not make itself.
+    Ok(None)
+}
+
+/// Refuses a directory whose `database.json` was ours and is damaged if a build would not make all that lies there.
+fn refuse_others(folder: &Folder) -> Result<(), DatabaseError> {
+    let ours = [LOCK_NAME, WORK, files::DATABASE];
+    let is_ours = |name: &str| [&ours[..], &FOLDERS, &REPORTS].concat().contains(&name) || is_temporary(name);
+    let names = folder.list(folder.dir())?.into_iter().map(|path| name_of(&path));
+    let other = names.into_iter().find(|name| !is_ours(name));
+    other.map_or(Ok(()), |name| {
+        let found = format!("{name:?} in it and a damaged {}", files::DATABASE);
+        Err(DatabaseError::NotOurFolder { path: folder.dir().to_path_buf(), found })
+    })
+}
+
+fn name_of(path: &Path) -> String {
+    path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default()
+}
+
+/// Refuses a directory without a `database.json` of ours in which there is anything to lose, whatever it is called:
+/// a build that was ended before it wrote that file has left its lock and empty folders.
+fn refuse_filled(folder: &Folder, why: &DatabaseError) -> Result<(), DatabaseError> {
+    let (dir, store) = (folder.dir(), folder.store());
     for path in folder.list(dir)? {
-        let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-        if !OURS.contains(&name.as_str()) && !is_temporary(&name) {
-            return Err(not_ours(&format!("{name:?} in it")));
+        let name = name_of(&path);
+        let is_nothing = match store.entry(&path) {
+            Ok(Entry::File(_)) => name == LOCK_NAME || is_temporary(&name),
+            Ok(Entry::Folder) => FOLDERS.contains(&name.as_str()) && folder.list(&path)?.is_empty(),
+            Ok(Entry::Other) => false,
+            // Another process has taken it away meanwhile.
+            Err(error) => error.kind() == ErrorKind::NotFound,
+        };
+        if !is_nothing {
+            let found = match (name == files::DATABASE, why) {
+                (true, DatabaseError::Malformed { what, .. }) => format!("a {name} that no build wrote ({what})"),
+                _ => format!("{name:?} in it and no {}", files::DATABASE),
+            };
+            return Err(DatabaseError::NotOurFolder { path: dir.to_path_buf(), found });
         }
     }
-    Ok(None)
+    Ok(())
 }
 
 /// Does what fails where another process sweeps up at the same moment, and takes a temporary file or a folder of

@@ -62,7 +62,7 @@ pub enum DatabaseError {
         /// What it is.
         found: NotADatabase,
     },
-    /// The folder holds something that no build wrote.
+    /// The folder holds something, and no `database.json` of ours that vouches for it.
     #[error("{}: found {found}, expected an empty folder or a terrain database", path.display())]
     NotOurFolder {
         /// The folder.
@@ -300,7 +300,9 @@ impl DatabaseError {
             Self::NotWritable { .. } => "choose another folder with --out",
             Self::Unfinished { .. } => "run `tiefort build` first, which goes on from what is there",
             Self::NotADatabase { found, .. } => found.hint(),
-            Self::NotOurFolder { .. } => "choose another folder with --out; what is there is left alone",
+            Self::NotOurFolder { .. } => {
+                "choose another folder with --out, or empty this one yourself; what is there is left alone"
+            }
             Self::NotAFolder { .. } | Self::NotAFile { .. } => {
                 "a database has plain files and folders only, and output follows no link out of it; remove it"
             }

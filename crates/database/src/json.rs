@@ -27,16 +27,16 @@ pub(crate) fn encode(path: &Path, value: &impl Serialize) -> Result<String, Data
         return Err(malformed(path, "found a value without keys, expected an object"));
     };
     // Sealed in place: the report of a large area is a hundred megabytes.
-    let (length, tail) = (open.len(), tail(open));
+    let (length, tail) = (open.len(), tail(open.as_bytes()));
     text.truncate(length);
     text.push_str(&tail);
     Ok(text)
 }
 
 /// What follows a text that is open, which is the text up to its closing brace.
-fn tail(open: &str) -> String {
+fn tail(open: &[u8]) -> String {
     let mut hasher = blake3::Hasher::new();
-    hasher.update(open.as_bytes()).update(END.as_bytes());
+    hasher.update(open).update(END.as_bytes());
     format!("{BEFORE}{}{AFTER}", Fingerprint(*hasher.finalize().as_bytes()))
 }
 
@@ -45,16 +45,16 @@ fn tail(open: &str) -> String {
 /// # Errors
 /// When a byte is not as it was written, or the text has other keys than `T`.
 pub(crate) fn decode<T: DeserializeOwned>(path: &Path, bytes: &[u8]) -> Result<T, DatabaseError> {
-    let text = std::str::from_utf8(bytes).map_err(|error| malformed(path, error.to_string()))?;
-    let at = text.rfind(BEFORE).ok_or_else(|| malformed(path, "no checksum at the end"))?;
-    let (open, stored) = text.split_at(at);
+    let at = bytes.windows(BEFORE.len()).rposition(|bytes| bytes == BEFORE.as_bytes());
+    let (open, stored) = bytes.split_at(at.ok_or_else(|| malformed(path, "no checksum at the end"))?);
     let computed = tail(open);
-    if computed != stored {
-        let stored = stored[BEFORE.len()..].trim_end_matches(AFTER);
+    if computed.as_bytes() != stored {
+        let stored = String::from_utf8_lossy(&stored[BEFORE.len()..]);
         let computed = computed[BEFORE.len()..].trim_end_matches(AFTER);
-        let (found, expected) = (computed.to_string(), stored.to_string());
+        let (found, expected) = (computed.to_string(), stored.trim_end_matches(AFTER).to_string());
         return Err(DatabaseError::WrongChecksum { path: path.to_path_buf(), section: "text", found, expected });
     }
+    let open = std::str::from_utf8(open).map_err(|error| malformed(path, error.to_string()))?;
     serde_json::from_str(&format!("{open}{END}")).map_err(|error| malformed(path, error.to_string()))
 }
 

@@ -72,7 +72,7 @@ pub use report::{
 mod lock;
 pub use lock::Lock;
 mod work;
-pub use work::{Share, ShareAllowance, Work};
+pub use work::{RUN_DIGITS, Share, ShareAllowance, Work};
 mod folder;
 pub use folder::Folder;
 mod names;

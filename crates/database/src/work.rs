@@ -22,6 +22,9 @@ const LEASES: &str = "leases";
 const DONE: &str = "done";
 const SHARES: &str = "shares";
 
+/// Digits of a run's name.
+pub const RUN_DIGITS: usize = 16;
+
 /// The work folder of one run.
 #[derive(Clone, Debug)]
 pub struct Work {
@@ -82,6 +85,12 @@ impl Work {
         }
     }
 
+    /// Whether a path ends in the name of a run.
+    pub(crate) fn is_of_run(path: &Path) -> bool {
+        let name = path.file_name().map(|name| name.to_string_lossy()).unwrap_or_default();
+        name.len() == RUN_DIGITS && name.bytes().all(|byte| matches!(byte, b'0'..=b'9' | b'a'..=b'f'))
+    }
+
     /// The leases, for the process that calls itself `holder`.
     pub fn leases(&self, holder: &str, expiry: Duration) -> Leases {
         Leases::new(Arc::clone(&self.store), self.folder.join(LEASES), holder, expiry)
@@ -136,13 +145,13 @@ mod tests {
     fn marks_and_shares_survive_and_are_gone_with_the_run() {
         let folder = tempfile::tempdir().unwrap();
         let (database, _) = Database::join(&folder.path().join("a.tdb"), &samples::area()).unwrap();
-        let work = database.work("run").unwrap();
+        let work = database.work("0123456789abcdef").unwrap();
         assert_eq!(work.marks().marked("refine-r00c01"), None);
         let fingerprint = samples::stamp().fingerprint;
         work.marks().mark("refine-r00c01", fingerprint).unwrap();
         assert_eq!(work.marks().marked("refine-r00c01"), Some(fingerprint));
         assert_eq!(work.marks().all().unwrap(), ["refine-r00c01"]);
-        assert_eq!(database.work("other run").unwrap().marks().marked("refine-r00c01"), None);
+        assert_eq!(database.work("fedcba9876543210").unwrap().marks().marked("refine-r00c01"), None);
         let share = Share { points: Some(7), rms_quanta: Some(0.1 + 0.2), allowance: None };
         work.write_share(samples::TILE, &share).unwrap();
         assert_eq!(work.read_share(samples::TILE).unwrap(), share);

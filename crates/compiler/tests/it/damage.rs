@@ -99,12 +99,28 @@ fn a_damaged_manifest_is_an_error_of_verify_and_the_next_build_writes_it_again()
     let sound = scene.product("area");
     let path = scene.path("area").join("database.json");
     let text = fs::read_to_string(&path).unwrap();
-    for damaged in [String::new(), text[..text.len() / 2].to_owned(), text.replacen("\"tiles\"", "\"tails\"", 1)] {
-        fs::write(&path, damaged).unwrap();
-        let error = inspect::verify(&scene.path("area"), None).unwrap_err();
-        assert!(error.to_string().contains("database.json"), "{error}");
-        drop(scene.build("area", 2));
-        assert_same(&sound, &scene.product("area"), "database.json");
+    fs::write(&path, text.replacen("\"tiles\"", "\"tails\"", 1)).unwrap();
+    let error = inspect::verify(&scene.path("area"), None).unwrap_err();
+    assert!(error.to_string().contains("database.json"), "{error}");
+    drop(scene.build("area", 2));
+    assert_same(&sound, &scene.product("area"), "database.json");
+}
+
+#[test]
+fn without_a_manifest_of_ours_a_folder_is_left_alone() {
+    let scene = scene("constrained");
+    let path = scene.path("area").join("database.json");
+    let text = fs::read_to_string(&path).unwrap();
+    for damaged in [Some(""), Some(&text[..text.len() / 2]), Some("{}"), None] {
+        match damaged {
+            Some(damaged) => fs::write(&path, damaged).unwrap(),
+            None => fs::remove_file(&path).unwrap(),
+        }
+        assert!(inspect::verify(&scene.path("area"), None).unwrap_err().to_string().contains("database.json"));
+        let before = scene.product("area");
+        let error = scene.try_build("area", 2).unwrap_err();
+        assert!(error.to_string().contains("expected an empty folder or a terrain database"), "{error}");
+        assert_same(&before, &scene.product("area"), "refused");
     }
 }
 

@@ -285,12 +285,14 @@ fn put(memory: &Memory, files: &Files) {
 }
 
 /// Some of the files of a database, some of them damaged.
-fn half(files: &Files, random: &mut fastrand::Rng) -> Files {
-    let mut half = files.clone();
-    half.retain(|_, _| random.u8(..4) != 0);
-    for bytes in half.values_mut().filter(|bytes| !bytes.is_empty()) {
+fn half(all: &Files, random: &mut fastrand::Rng) -> Files {
+    let mut half = all.clone();
+    let is_manifest = |path: &Path| path.ends_with(files::DATABASE);
+    // Without it the folder would be another's. The end of it says that it was ours.
+    half.retain(|path, _| random.u8(..4) != 0 || is_manifest(path));
+    for (path, bytes) in half.iter_mut().filter(|(_, bytes)| !bytes.is_empty()) {
         if random.u8(..4) == 0 {
-            let at = random.usize(..bytes.len());
+            let at = random.usize(..if is_manifest(path) { bytes.len() / 2 } else { bytes.len() });
             bytes[at] ^= 1;
         }
     }

@@ -99,8 +99,9 @@ fn opening_again_finds_the_database_and_removes_what_was_left_over() {
     let (database, previous) = Database::create_or_open(&dir, &samples::area()).unwrap();
     assert_eq!(previous, Some(manifest));
     assert!(left_over.iter().all(|path| !path.exists()));
-    database.clear().unwrap();
-    assert!(fs::read_dir(dir.join("tiles")).unwrap().next().is_none() && !dir.join("database.json").exists());
+    database.begin_afresh(&Manifest::new(samples::area(), "job".into(), 7)).unwrap();
+    assert!(fs::read_dir(dir.join("tiles")).unwrap().next().is_none());
+    assert_eq!(Folder::new(&dir).manifest().unwrap().state, ManifestState::Incomplete, "what is there stays ours");
 }
 
 #[test]
@@ -108,11 +109,73 @@ fn a_directory_that_is_not_ours_is_refused_and_left_alone() {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("thesis.tex"), b"").unwrap();
     let error = Database::create_or_open(folder.path(), &samples::area()).unwrap_err();
-    assert!(matches!(&error, DatabaseError::NotOurFolder { found, .. } if found == "\"thesis.tex\" in it"), "{error}");
+    let expected = "\"thesis.tex\" in it and no database.json";
+    assert!(matches!(&error, DatabaseError::NotOurFolder { found, .. } if found == expected), "{error}");
     assert!(error.hint().is_some());
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
     let file = folder.path().join("thesis.tex");
     assert!(matches!(Database::create_or_open(&file, &samples::area()), Err(DatabaseError::NotOurFolder { .. })));
+}
+
+#[test]
+fn names_of_ours_do_not_make_a_folder_ours() {
+    let filled: [&[&str]; 8] = [
+        &["work/2026/letters/thesis.doc"],
+        &["report.html"],
+        &["tiles/r00c00.tin", "lock"],
+        &["survey/answers.csv"],
+        &["modules/a/b"],
+        &["features.gpkg"],
+        &["breaches.csv", "measured/a.sums"],
+        &["database.json", "work/0123456789abcdef/done/a"],
+    ];
+    for names in filled {
+        let folder = tempfile::tempdir().unwrap();
+        for name in names {
+            fs::create_dir_all(folder.path().join(name).parent().unwrap()).unwrap();
+            fs::write(folder.path().join(name), "{\"theirs\": 1}\n").unwrap();
+        }
+        let opened = [
+            Database::create_or_open(folder.path(), &samples::area()),
+            Database::join(folder.path(), &samples::area()),
+        ];
+        for error in opened.map(Result::unwrap_err) {
+            assert!(matches!(error, DatabaseError::NotOurFolder { .. }), "{names:?}: {error}");
+        }
+        assert!(Database::foresee(folder.path(), &samples::area()).is_err());
+        let is_theirs = |name: &&str| fs::read(folder.path().join(name)).unwrap() == b"{\"theirs\": 1}\n";
+        assert!(names.iter().all(is_theirs), "{names:?}");
+        let others = fs::read_dir(folder.path()).unwrap().count();
+        let own: std::collections::BTreeSet<_> = names.iter().map(|name| name.split('/').next()).collect();
+        assert_eq!(others, own.len(), "{names:?}: something was made there");
+    }
+}
+
+#[test]
+fn what_a_build_leaves_that_ended_before_it_began_is_gone_on_with() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path().join("a.tdb");
+    drop(Database::create_or_open(&dir, &samples::area()).unwrap());
+    fs::write(dir.join(".tiefort-x.part"), b"half").unwrap();
+    assert!(!dir.join(files::DATABASE).exists());
+    Database::create_or_open(&dir, &samples::area()).unwrap();
+}
+
+#[test]
+fn only_runs_are_removed_from_the_work_folder_and_only_files_of_ours_for_a_fresh_start() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path().join("a.tdb");
+    build(&dir);
+    let theirs = ["work/2026/letters/thesis.doc", "tiles/notes.txt", "modules/kept/b.slm", "notes.txt"];
+    for name in theirs.iter().copied().chain(["work/0123456789abcdef/done/refine-r00c00"]) {
+        fs::create_dir_all(dir.join(name).parent().unwrap()).unwrap();
+        fs::write(dir.join(name), b"theirs").unwrap();
+    }
+    let (database, _) = Database::create_or_open(&dir, &samples::area()).unwrap();
+    assert!(!dir.join("work/0123456789abcdef").exists());
+    database.begin_afresh(&Manifest::new(samples::area(), "job".into(), 7)).unwrap();
+    assert!(theirs.iter().all(|name| fs::read(dir.join(name)).unwrap() == b"theirs"));
+    assert_eq!(fs::read_dir(dir.join("tiles")).unwrap().count(), 1);
 }
 
 #[test]
