@@ -8,7 +8,8 @@ use job::{Effort, Job, Method, Optimising};
 use limits::Allowance;
 use optimiser::{Budget, Optimised, Task, fill, optimise, overshoot, weave_in};
 use terrain::{
-    Dem, HeightFit, Importance, Lattice, LatticePoint, Post, PostRect, THOUSANDTHS, TileFeatures, TileTin, Tin, Vertex,
+    Dem, HeightFit, Importance, Lattice, LatticePoint, Post, PostRect, StopReason, THOUSANDTHS, TileFeatures, TileTin,
+    Tin, Vertex,
 };
 use tin::{Frame, Rule, Stop, TileTask};
 
@@ -80,21 +81,50 @@ impl Refinement {
             }
             tin::refine(&with_heights(&window.dem, seeds), &window.importance, task, level)
         };
-        let Some(optimising) = self.optimising else {
-            let grown = grown(&self.task);
-            if self.features.kept.is_empty() {
-                return grown;
-            }
-            // Every vertex where it grew, with features among them.
-            let task = self.optimisation(PLAIN, grown.initial_count, &window.forbidden);
-            let woven = weave_in(&window.dem, &window.importance, &grown.tin, &task);
-            return self.join(grown, woven);
-        };
-        let grown = grown(&self.beyond_budget(optimising));
+        let Some(optimising) = self.optimising else { return self.woven(window, grown(&self.task)) };
+        let enough = self.to_largest(&grown);
+        let own = enough.as_ref().map_or(self, |(own, _)| own);
+        let grown = grown(&own.beyond_budget(optimising));
         let in_squares = in_squares.cloned();
-        let task = Task { in_squares, ..self.optimisation(optimising, grown.initial_count, &window.forbidden) };
+        let task = Task { in_squares, ..own.optimisation(optimising, grown.initial_count, &window.forbidden) };
         let optimised = optimise(&window.dem, &window.importance, &grown.tin, &task);
-        self.join(grown, optimised)
+        match enough {
+            // By its own order of choosing so many do not reach the residual, by worst posts they do.
+            Some((_, plain)) if optimised.stop != StopReason::ResidualReached && plain.refused.is_empty() => {
+                self.woven(window, plain)
+            }
+            _ => own.join(grown, optimised),
+        }
+    }
+
+    /// A TIN as it grew, with features among its vertices.
+    fn woven(&self, window: &Window, grown: TileTin) -> TileTin {
+        if self.features.kept.is_empty() {
+            return grown;
+        }
+        let task = self.optimisation(PLAIN, grown.initial_count, &window.forbidden);
+        let woven = weave_in(&window.dem, &window.importance, &grown.tin, &task);
+        self.join(grown, woven)
+    }
+
+    /// Where a largest residual ends the choosing before the budget does: the TIN that reaches it by worst posts alone,
+    /// and this refinement with no more to spend than that took.
+    fn to_largest(&self, grown: &impl Fn(&TileTask) -> TileTin) -> Option<(Self, TileTin)> {
+        let Rule::LargestSquares { guard: Some(value) } = self.task.rule else { return None };
+        let stop = Stop { value: Some(value), rms_quanta: None, ..self.task.stop };
+        let plain = grown(&TileTask { rule: Rule::WorstFirst, stop, ..self.task.clone() });
+        if plain.stop == StopReason::BudgetSpent {
+            return None;
+        }
+        let mut own = self.clone();
+        match (&mut own.task.frame, &mut own.most) {
+            (Frame::Sides { allowance, .. }, _) => allowance.triangles = plain.triangles_charged,
+            (_, Most::Triangles(most)) => *most = plain.tin.triangles.len().min(*most),
+            (_, Most::AsTask) => {
+                own.task.stop.points = Some(plain.tin.vertices.len() - plain.initial_count as usize);
+            }
+        }
+        Some((own, plain))
     }
 
     /// A TIN with as many vertices more as the task's points permit, all counted; what it has is left alone.

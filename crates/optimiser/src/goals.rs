@@ -126,7 +126,9 @@ impl Work<'_, '_> {
     }
 
     pub fn stop(&self) -> StopReason {
-        if self.goal().is_some_and(|goal| self.sheet.squares() <= goal) {
+        if self.task.largest_quanta.is_some_and(|largest| self.above(largest).is_empty()) {
+            StopReason::ResidualReached
+        } else if self.goal().is_some_and(|goal| self.sheet.squares() <= goal) {
             StopReason::RmsReached
         } else if self.account.left() < self.account.dearest() {
             StopReason::BudgetSpent

@@ -17,6 +17,7 @@ mod compare;
 mod damage;
 mod difficult_ground;
 mod distance;
+mod ends;
 mod features;
 mod forger;
 mod given;
