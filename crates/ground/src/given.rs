@@ -15,6 +15,7 @@ use tin::StartPost;
 
 use crate::GroundError;
 use crate::area::GamingArea;
+use crate::excluded::excluded;
 
 /// A post that the job gives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -37,8 +38,10 @@ pub struct Given {
     outer_is_fixed: bool,
     posts: Vec<GivenPost>,
     forbidden: Vec<Post>,
-    /// Weights are multiplied by so many thousandths inside polygons; 0 leaves posts out.
+    /// Weights are multiplied by so many thousandths inside polygons.
     factors: Vec<(mask::Polygon, u32)>,
+    /// Polygons in which nothing is chosen.
+    excluded: Vec<mask::Polygon>,
 }
 
 impl Given {
@@ -110,7 +113,7 @@ impl Given {
                 (Some("importance"), GivenShape::Polygon(polygon)) => {
                     self.factors.push((polygon, factor_of(&file.path, &feature)?));
                 }
-                (Some("exclude"), GivenShape::Polygon(polygon)) => self.factors.push((polygon, 0)),
+                (Some("exclude"), GivenShape::Polygon(polygon)) => self.excluded.push(polygon),
                 (pin, shape) => {
                     let shape = if matches!(shape, GivenShape::Point(_)) { "point" } else { "polygon" };
                     let found =
@@ -141,14 +144,19 @@ impl Given {
         self.posts.iter().filter(|post| post.pinned).map(|post| post.at).collect()
     }
 
-    /// Posts of a rectangle that are forbidden, in ascending order.
-    pub fn forbidden(&self, rect: PostRect) -> Vec<Post> {
-        self.forbidden.iter().copied().filter(|&post| rect.contains(post)).collect()
+    /// Posts of a rectangle that no vertex may come nearer to than to any other, in ascending order: those that pins
+    /// forbid, and those that keep vertices out of polygons.
+    pub fn forbidden(&self, area: &GamingAreaFrame, rect: PostRect) -> Vec<Post> {
+        let mut posts = excluded(&self.excluded, area, rect);
+        posts.extend(self.forbidden.iter().filter(|&&post| rect.contains(post)));
+        posts.sort_unstable();
+        posts.dedup();
+        posts
     }
 
     /// Weights with what pins say of them.
     pub fn weigh(&self, importance: Importance, area: &GamingAreaFrame) -> Importance {
-        if self.forbidden.is_empty() && self.factors.is_empty() {
+        if self.forbidden.is_empty() && self.factors.is_empty() && self.excluded.is_empty() {
             return importance;
         }
         let rect = importance.rect();
@@ -158,9 +166,12 @@ impl Given {
             for (weight, _) in weights.iter_mut().zip(inside).filter(|(_, inside)| *inside) {
                 let scaled = u64::from(*weight) * u64::from(*factor) / u64::from(THOUSANDTHS);
                 // What mattered still does, however small the factor.
-                let least = u64::from(0 < *weight && 0 < *factor);
-                *weight = scaled.clamp(least, u64::from(u16::MAX)) as u32;
+                *weight = scaled.clamp(u64::from(0 < *weight), u64::from(u16::MAX)) as u32;
             }
+        }
+        for polygon in &self.excluded {
+            let inside = inside(polygon, area, rect);
+            weights.iter_mut().zip(inside).filter(|(_, inside)| *inside).for_each(|(weight, _)| *weight = 0);
         }
         let weights = rect
             .posts()
@@ -176,7 +187,12 @@ impl Given {
     /// When the method to start from cannot make the tile's share of points.
     pub fn of_tile(&self, area: &GamingArea, tile: TileId, dem: &Dem) -> Result<Vec<GivenPost>, GroundError> {
         let rect = area.tiling.rect(tile);
+        let place = GamingAreaFrame { rect: area.rect, frame: area.frame };
+        let barred = self.forbidden(&place, rect);
+        let is_barred = |at: Post| barred.binary_search(&at).is_ok();
         let mut found: Vec<GivenPost> = self.posts.iter().copied().filter(|post| rect.contains(post.at)).collect();
+        // A pin says more than a point to start from does.
+        found.retain(|post| post.pinned || !is_barred(post.at));
         if let Some((method, points)) = self.start {
             let modules = area.tiling.modules(tile, area.grid).count() as u64;
             let share = (points * modules).div_ceil(area.grid.count() as u64) as usize;
@@ -186,7 +202,7 @@ impl Given {
             let known: std::collections::HashSet<Post> = found.iter().map(|post| post.at).collect();
             // A fixed outer border has its own points.
             let is_fixed = |at: Post| self.outer_is_fixed && area.rect.has_on_border(at);
-            let fresh = chosen.into_iter().filter(|&at| !known.contains(&at) && !is_fixed(at));
+            let fresh = chosen.into_iter().filter(|&at| !known.contains(&at) && !is_fixed(at) && !is_barred(at));
             found.extend(fresh.map(|at| GivenPost { at, pinned: false, outer: false, height: None }));
         }
         Ok(found)
@@ -254,7 +270,7 @@ pub fn border_posts(given: &[GivenPost]) -> impl Iterator<Item = Post> {
 }
 
 /// Whether each post of a window lies inside a polygon, row-major.
-fn inside(polygon: &mask::Polygon, area: &GamingAreaFrame, rect: PostRect) -> Vec<bool> {
+pub(crate) fn inside(polygon: &mask::Polygon, area: &GamingAreaFrame, rect: PostRect) -> Vec<bool> {
     let shape = mask::Shape::Polygons(vec![polygon.clone()]);
     let only = mask::Area { class: "inside".into(), weight: THOUSANDTHS, shape };
     let mask = mask::Mask { default_weight: 0, areas: vec![only], smooth: terrain::Smooth::None, over: Vec::new() };

@@ -164,7 +164,8 @@ impl Ground {
 
     fn with_given(&self, area: &GamingArea, tile: TileId, window: Window) -> Result<Window, GroundError> {
         let given = self.given.of_tile(area, tile, &window.dem)?;
-        Ok(Window { given, forbidden: self.given.forbidden(area.tiling.rect(tile)), ..window })
+        let place = GamingAreaFrame { rect: self.rect, frame: self.frame };
+        Ok(Window { given, forbidden: self.given.forbidden(&place, area.tiling.rect(tile)), ..window })
     }
 
     /// What heights lie within: those of the sources, and what the job says itself of water and points.

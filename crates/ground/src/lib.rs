@@ -16,6 +16,7 @@ mod buildings;
 mod lines;
 mod vectors;
 pub use vectors::{FeaturesRead, Vectors, site};
+mod excluded;
 mod given;
 pub use given::{Given, GivenPost, border_posts, chosen, posts_of_file, refused, start_posts};
 mod ground;

@@ -7,7 +7,7 @@ use database::Folder;
 use terrain::{LatticePoint, Post, TileTin, Vertex};
 
 use crate::product::{Edges, Product};
-use crate::scene::{ORIGIN_M, SIDE_CELLS, Scene, Words, differing, tile};
+use crate::scene::{Draw, ORIGIN_M, SIDE_CELLS, Scene, Words, differing, tile};
 
 const CONSTRAINED: &str = "method = \"greedy\"";
 const PAPER: &str = "method = \"paper\"\npoints = 900";
@@ -201,6 +201,50 @@ fn a_polygon_of_importance_draws_points_and_an_excluded_one_has_none() {
         build(r#""pin":"importance","factor":30"#),
     );
     assert!(none == 0 && usual < many, "{none}, {usual}, {many}");
+}
+
+/// Whether a place lies inside a ring, all in posts.
+fn is_within(ring: &[[f64; 2]], [col, row]: [f64; 2]) -> bool {
+    let next = ring.iter().cycle().skip(1);
+    let crosses = |(a, b): (&[f64; 2], &[f64; 2])| {
+        (a[1] <= row) != (b[1] <= row) && col < a[0] + (row - a[1]) / (b[1] - a[1]) * (b[0] - a[0])
+    };
+    ring.iter().zip(next).filter(|&edge| crosses(edge)).count() % 2 == 1
+}
+
+#[test]
+fn an_excluded_polygon_has_no_vertex_whatever_the_method_and_the_points_to_start_from() {
+    let methods =
+        ["", "effort = \"fast\"", CONSTRAINED, "lattice = \"post\"", "start = { method = \"vip\", points = 300 }"];
+    for seed in 0..15_u64 {
+        let draw = &mut Draw(seed);
+        let middle = [draw.within(20, 60), draw.within(20, 60)].map(f64::from);
+        let corner = |turn: f64, reach: f64| [middle[0] + reach * turn.cos(), middle[1] + reach * turn.sin()];
+        let count = draw.within(3, 7);
+        let mut reach = || f64::from(draw.within(30, 250)) / 10.0;
+        let ring: Vec<[f64; 2]> =
+            (0..count).map(|at| corner(f64::from(at) / f64::from(count) * std::f64::consts::TAU, reach())).collect();
+        let place = |&[col, row]: &[f64; 2]| format!("[{},{}]", ORIGIN_M[0] + col * 25.0, ORIGIN_M[1] + row * 25.0);
+        let corners: Vec<String> = ring.iter().chain(&ring[..1]).map(place).collect();
+        let geometry = format!(r#"{{"type":"Polygon","coordinates":[[{}]]}}"#, corners.join(","));
+        let pin = format!(r#"{{"type":"Feature","properties":{{"pin":"exclude"}},"geometry":{geometry}}}"#);
+        let method = methods[seed as usize % methods.len()];
+        let tin = format!("{method}\npins = \"pins.geojson\"");
+        let small = Words { size: (4, 4), tiles: (2, 2), limits: String::new(), ..words(&tin) };
+        let scene = Scene::with_files(&small, |folder| std::fs::write(folder.join("pins.geojson"), pin).unwrap());
+        scene.build("a.tdb", 2);
+        let folder = Folder::new(scene.path("a.tdb"));
+        for index in 0..4 {
+            let tin = folder.read_tile(tile(index / 2, index % 2)).unwrap().1.tin;
+            let steps = f64::from(tin.steps_per_post);
+            let side = SIDE_CELLS * tin.steps_per_post;
+            for LatticePoint { row, col } in tin.vertices.iter().map(|vertex| vertex.at) {
+                let is_corner = row % side == 0 && col % side == 0;
+                let place = [f64::from(col) / steps, f64::from(row) / steps];
+                assert!(is_corner || !is_within(&ring, place), "seed {seed}: {method:?}: a vertex at {place:?}");
+            }
+        }
+    }
 }
 
 #[test]
