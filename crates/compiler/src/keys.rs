@@ -159,6 +159,7 @@ fn feed_surfaces(builder: FingerprintBuilder, features: &TileFeatures) -> Finger
             SurfaceGround::Road => 0,
             SurfaceGround::Lake => 1,
             SurfaceGround::River => 2,
+            SurfaceGround::Strip => 3,
         };
         builder.case(*class).case(ground).number((*body).into()).list(ring.iter(), feed_vertex)
     };

@@ -22,7 +22,7 @@ use tiling::{outer_border_posts, outer_sides};
 use crate::chains::chains;
 use crate::read_features::ReadFeatures;
 use crate::run::Run;
-use crate::strips::strips;
+use crate::strips::{is_one_of, strips, whole_strips};
 
 /// What features put into each tile, row-major.
 pub(crate) fn pieces(run: &Run, features: &features::AreaFeatures, formed: &Formed) -> Vec<TileFeatures> {
@@ -30,8 +30,9 @@ pub(crate) fn pieces(run: &Run, features: &features::AreaFeatures, formed: &Form
     let mut cutting = Cutting { area: &run.area, steps, classes: classes_of(run.job), pieces: Vec::new() };
     cutting.pieces = run.area.tiles.iter().map(|&tile| Piece::of(tile, steps)).collect();
     cutting.edges(formed);
-    cutting.surfaces(&formed.surfaces, true);
-    cutting.surfaces(&formed.shaped, false);
+    let whole = whole_strips(formed);
+    cutting.surfaces(&formed.surfaces, true, &whole);
+    cutting.surfaces(&formed.shaped, false, &BTreeSet::new());
     cutting.decks(&formed.decks);
     cutting.slopes(formed);
     cutting.lines(&formed.middles, &features.traits_by_id());
@@ -168,8 +169,9 @@ impl Cutting<'_> {
         }
     }
 
-    /// Ground that features cover, and whether its outline is in the TIN.
-    fn surfaces(&mut self, surfaces: &[Surface], is_held: bool) {
+    /// Ground that features cover, and whether its outline is in the TIN; `whole` are pieces of strips that nothing cuts.
+    fn surfaces(&mut self, surfaces: &[Surface], is_held: bool, whole: &BTreeSet<(u16, Vec<Place>)>) {
+        let is_whole = |surface: &Surface| is_one_of(whole, surface);
         // Rings of one feature and role at one level are one body; strips are bodies of their own.
         let mut bodies: BTreeMap<(u16, Role, FeatureId, i32), u32> = BTreeMap::new();
         let mut next = 0;
@@ -187,6 +189,7 @@ impl Cutting<'_> {
             let ground = match surface.role {
                 Role::Shore => SurfaceGround::Lake,
                 Role::Bank => SurfaceGround::River,
+                _ if is_whole(surface) => SurfaceGround::Strip,
                 _ => SurfaceGround::Road,
             };
             let class = self.classes[usize::from(surface.class)];
@@ -245,7 +248,7 @@ impl Cutting<'_> {
 /// Stretches of the sides of a tile that roads cover from edge to edge.
 fn spans(surfaces: &[FeatureSurface], rect: PostRect, steps: i32) -> Vec<SideSpan> {
     let mut spans = Vec::new();
-    for surface in surfaces.iter().filter(|surface| surface.ground == SurfaceGround::Road) {
+    for surface in surfaces.iter().filter(|surface| surface.ground.is_road()) {
         for side in Side::ALL {
             let on_side = |at: LatticePoint| match side {
                 Side::South => (at.row == rect.south * steps).then_some(at.col),

@@ -1,9 +1,9 @@
 //! What was found of strips: how long they are, whether one is too steep, whether one falls to a side.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use database::StripFigures;
-use features::{AreaFeatures, Face, FeatureLattice, Formed, Place};
+use features::{AreaFeatures, Face, FeatureLattice, Formed, Place, Surface};
 use terrain::PostRect;
 
 /// Figures of strips by class in an area that covers `rect`; `classes` are the job's numbers of the features' classes.
@@ -22,6 +22,24 @@ pub(crate) fn strips(features: &AreaFeatures, formed: &Formed, classes: &[u8], r
         of.fall_max = of.fall_max.max(strip.fall());
     }
     figures.into_values().collect()
+}
+
+/// The corners of pieces of strips that nothing cuts, in ascending order, with their classes.
+pub(crate) fn whole_strips(formed: &Formed) -> BTreeSet<(u16, Vec<Place>)> {
+    let whole = formed.faces.iter().filter(|face| Strip::of(face, &formed.points).is_some());
+    whole.map(|face| (face.class, sorted(face.corners.iter().map(|(place, _)| *place)))).collect()
+}
+
+/// Whether a surface is one of such pieces.
+pub(crate) fn is_one_of(whole: &BTreeSet<(u16, Vec<Place>)>, surface: &Surface) -> bool {
+    let corners = surface.ring.iter().map(|(place, _)| *place);
+    surface.ring.len() == 4 && whole.contains(&(surface.class, sorted(corners)))
+}
+
+fn sorted(places: impl Iterator<Item = Place>) -> Vec<Place> {
+    let mut places: Vec<Place> = places.collect();
+    places.sort_unstable();
+    places
 }
 
 fn is_inside(face: &Face, lattice: FeatureLattice, rect: PostRect) -> bool {

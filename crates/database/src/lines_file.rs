@@ -105,11 +105,13 @@ fn vertex((row, col, height): Corner) -> Vertex {
     Vertex { at: LatticePoint::new(row, col), height }
 }
 
-const GROUNDS: [SurfaceGround; 3] = [SurfaceGround::Road, SurfaceGround::Lake, SurfaceGround::River];
+/// By their numbers in the file.
+const GROUNDS: [SurfaceGround; 4] =
+    [SurfaceGround::Road, SurfaceGround::Lake, SurfaceGround::River, SurfaceGround::Strip];
 
 fn to_disk(surface: &FeatureSurface) -> SurfaceOnDisk {
     let FeatureSurface { class, ground, body, ring } = surface;
-    let ground = GROUNDS.iter().position(|other| other == ground).expect("there are three kinds of ground") as u8;
+    let ground = GROUNDS.iter().position(|other| other == ground).expect("every kind of ground is listed") as u8;
     SurfaceOnDisk { class: *class, ground, body: *body, ring: ring.iter().map(corner).collect() }
 }
 

@@ -136,8 +136,8 @@ impl<'a> Burning<'a> {
                 let height = match body[0].ground {
                     // A hole of the ground stays one under a road.
                     _ if !is_held && self.heights[index].is_none() => continue,
-                    SurfaceGround::Road if self.heights[index].is_none() => continue,
-                    SurfaceGround::Road => height_in(&rings, self.place(post)),
+                    SurfaceGround::Road | SurfaceGround::Strip if self.heights[index].is_none() => continue,
+                    SurfaceGround::Road | SurfaceGround::Strip => height_in(&rings, self.place(post)),
                     SurfaceGround::Lake => rings[0][0].height,
                     SurfaceGround::River => {
                         banks.as_ref().map_or(rings[0][0].height, |banks| banks.height(self.place(post)))

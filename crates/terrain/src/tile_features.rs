@@ -52,10 +52,20 @@ pub struct FeatureSurface {
 pub enum SurfaceGround {
     /// Part of a road, at the heights of its ring.
     Road,
+    /// The same of a piece of a strip that nothing cuts: its ring has the two corners of its end, then those of its
+    /// beginning.
+    Strip,
     /// Level water: every vertex of the ring has one height, and no shore lies below it.
     Lake,
     /// Water between banks, which falls along them.
     River,
+}
+
+impl SurfaceGround {
+    /// Whether it is part of a road.
+    pub fn is_road(self) -> bool {
+        matches!(self, Self::Road | Self::Strip)
+    }
 }
 
 impl FeatureSurface {

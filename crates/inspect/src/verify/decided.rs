@@ -20,7 +20,7 @@ pub(crate) struct Decided<'a> {
     heights: HashMap<LatticePoint, i32>,
     edges: HashSet<[LatticePoint; 2]>,
     decks: BTreeSet<Ring>,
-    /// Rings of strips and junctions in the order of their corners, each once.
+    /// Pieces of strips that nothing cuts: the corners of the end, then those of the beginning, each piece once.
     strips: BTreeSet<(u8, Vec<(LatticePoint, i32)>)>,
 }
 
@@ -49,7 +49,7 @@ impl<'a> Decided<'a> {
             let corners = deck.ring.iter().map(|vertex| (vertex.at, vertex.height));
             ring(deck.class, corners)
         }));
-        let roads = features.surfaces.iter().filter(|surface| surface.ground == SurfaceGround::Road);
+        let roads = features.surfaces.iter().filter(|surface| surface.ground == SurfaceGround::Strip);
         let corners = |ring: &[Vertex]| ring.iter().map(|vertex| (vertex.at, vertex.height)).collect();
         self.strips.extend(roads.map(|road| (road.class, corners(&road.ring))));
         let place = self.text(differs?);
@@ -184,7 +184,7 @@ impl<'a> Decided<'a> {
         ))
     }
 
-    /// Strips whose ring has no corner but those of their two ends: they are counted, and as uneven as they are.
+    /// Pieces of strips that lie in the area with all corners: they are counted, and as uneven as they are.
     fn differing_strips(&self, level: &AreaLevel) -> Option<String> {
         let mut own: BTreeMap<u8, (u64, u32)> = BTreeMap::new();
         for (class, ring) in &self.strips {

@@ -1,9 +1,10 @@
 //! Roads, junctions, bridges and tunnels.
 
-use database::LineRole;
+use database::{Folder, LineRole};
 use features::Kind;
 
-use super::drawing::{At, Drawing, Laid, SIDE_M, line};
+use super::drawing::{At, Drawing, Drawn, Laid, SIDE_M, line};
+use crate::scene::Words;
 
 /// The fall across a road at a place, between points so far to the left and to the right.
 #[track_caller]
@@ -97,6 +98,37 @@ fn two_hundred_roads_in_one_load_module_keep_all_limits() {
     };
     let laid = Drawing::new(|_, north| 500.0 + 0.1 * north, &(0..200).map(road).collect::<Vec<_>>()).built();
     assert!(laid.was_told("left out"), "not all of them fit");
+}
+
+/// Streets 61 m apart and a few degrees off north, broken off here and there, every fifth of them a main one.
+fn streets() -> Vec<Drawn> {
+    const APART_M: f64 = 61.0;
+    let place = |along: f64, across: f64| (along - 0.05 * across + 200.0, across + 0.05 * along - 30.0);
+    let street = |number: usize, is_east: bool| {
+        let class = if number.is_multiple_of(5) { "highway=primary" } else { "highway=residential" };
+        let at = |crossing: usize| {
+            let (along, across) = (crossing as f64 * APART_M, number as f64 * APART_M);
+            if is_east { place(along, across) } else { place(across, along) }
+        };
+        let pieces = (0..30).step_by(6).filter(move |first| (first + number) % 4 != 3);
+        pieces.map(move |first| line(class, &(first..=first + 6).map(at).collect::<Vec<_>>())).collect::<Vec<_>>()
+    };
+    (0..30).flat_map(|number| [true, false].map(|is_east| street(number, is_east))).flatten().collect()
+}
+
+#[test]
+fn a_grid_of_streets_on_slopes_is_sound_whatever_the_side_of_a_load_module() {
+    let hills = |east: f64, north: f64| 500.0 + 60.0 * ((east * 0.009).sin() + (north * 0.011).cos()) + 0.1 * north;
+    for side in [125, 250, 500] {
+        let modules = format!("side_m = {side}");
+        let limits = "per_load_module = 8000\nmean_per_load_module = 2000\nper_4km_square = 900000".into();
+        let words = Words { modules, limits, ..Drawing::words() };
+        let drawing = Drawing::of(words, hills, &streets());
+        drawing.scene.build("area.tdb", 2);
+        drawing.scene.verify("area.tdb");
+        let level = Folder::new(drawing.scene.path("area.tdb")).read_level().unwrap().2;
+        assert!(level.strips.iter().all(|strips| 50 < strips.pieces), "{side} m: {:?}", level.strips);
+    }
 }
 
 #[test]
