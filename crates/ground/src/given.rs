@@ -316,7 +316,7 @@ pub fn posts_of_file(path: &Path, frame: &RasterFrame, rect: PostRect) -> Result
         key: "--start".into(),
         found: "a raster whose coordinate system has no EPSG code".into(),
         expected: "one that places in a file can be brought to".into(),
-        hint: "name the system in a job: [area] crs, and [tin] start".into(),
+        hint: "name the system: --crs EPSG:32611 (your own)".into(),
     })?;
     let lattice = Lattice { rect, origin_m: frame.south_west, spacing_m: frame.spacing[0] };
     let mut posts = Vec::new();

@@ -6,9 +6,11 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use compiler::{CompileError, Event, Progress, Stage};
-use ground::{decode, warnings_of};
+use ground::{GroundError, decode, warnings_of};
 use schedule::Workers;
-use source_files::{DemFile, Mosaic, MosaicRules, MosaicVoids, Raster, RasterFrame, Reading, VoidPolicy};
+use source_files::{
+    Crs, DemFile, Mosaic, MosaicRules, MosaicVoids, Raster, RasterFrame, Reading, SourceError, VoidPolicy,
+};
 use terrain::{Dem, Post, PostRect, Resampling, TileId};
 
 use crate::suiting::{SuitingGrid, suiting_grid};
@@ -25,20 +27,22 @@ pub(crate) struct Heights {
 }
 
 impl Heights {
-    /// Those of all of a raster; what was done to it is told.
+    /// Those of all of a raster, in the system `crs` where it names none; what was done to it is told.
     ///
     /// # Errors
     /// When it cannot be read, or no grid suits it.
     pub fn read(
         path: &Path,
+        crs: Option<&str>,
         workers: usize,
         stop: &AtomicBool,
         progress: &mut dyn Progress,
     ) -> Result<Self, CompileError> {
         progress.tell(Event::Enter(Stage::Read, 0));
-        let file = DemFile::open(path, &Reading::AS_IT_SAYS)?;
-        let heights = Self::of(&file, &Workers::new(workers), stop)?;
+        let (file, note) = open_alone(path, crs)?;
+        let mut heights = Self::of(&file, &Workers::new(workers), stop)?;
         progress.tell(Event::Leave(Stage::Read));
+        heights.notes.splice(0..0, note);
         heights.notes.iter().for_each(|note| progress.tell(Event::Note(note.clone())));
         Ok(heights)
     }
@@ -74,6 +78,54 @@ impl Heights {
         raster.settle_voids(VoidPolicy::Hole)?;
         Ok(Self { dem: Arc::new(raster.dem()), frame: raster.frame().clone(), notes })
     }
+}
+
+/// Opens a raster without a job, in the system `given` where it names none that can be computed. Where nothing names
+/// one, its posts are taken to lie in a plane of metres, which a note tells.
+///
+/// # Errors
+/// When it cannot be read, or `given` is no system; also when nothing names a system and places look like degrees.
+pub(crate) fn open_alone(path: &Path, given: Option<&str>) -> Result<(DemFile, Option<String>), CompileError> {
+    match (DemFile::open(path, &Reading::AS_IT_SAYS), given) {
+        (Ok(file), _) => Ok((file, None)),
+        (Err(SourceError::NoCrs { .. } | SourceError::UnnamedCrs { .. }), Some(given)) => {
+            Ok((DemFile::open(path, &in_system(crs_named(given)?))?, None))
+        }
+        (Err(error @ SourceError::NoCrs { .. }), None) => {
+            let file = DemFile::open(path, &in_system(Crs::plane()))?;
+            if might_be_degrees(file.frame()) {
+                return Err(error.into());
+            }
+            let text = "no coordinate system: its posts are taken as metres in a plane; --crs names one";
+            Ok((file, Some(format!("{}: {text}", path.display()))))
+        }
+        (Err(error), _) => Err(error.into()),
+    }
+}
+
+fn in_system(crs: Crs) -> Reading {
+    Reading { crs: Some(crs), ..Reading::AS_IT_SAYS }
+}
+
+/// The system of an argument `--crs`.
+///
+/// # Errors
+/// When it cannot be computed.
+pub(crate) fn crs_named(given: &str) -> Result<Crs, CompileError> {
+    let impossible = |found| GroundError::Impossible {
+        key: "--crs".into(),
+        found: format!("{given}: {found}"),
+        expected: "a system that can be computed".into(),
+        hint: "for example --crs EPSG:32611".into(),
+    };
+    Crs::named(given).map_err(|found| impossible(found).into())
+}
+
+/// Whether every post lies within the degrees of the Earth, and others no farther than a tenth of one.
+fn might_be_degrees(frame: &RasterFrame) -> bool {
+    let ([west, south], [east, north]) = (frame.south_west, frame.place(frame.rows - 1, frame.cols - 1));
+    let is_near = frame.spacing.iter().all(|step| *step <= 0.1);
+    is_near && -360.0 <= west && east <= 360.0 && -90.0 <= south && north <= 90.0
 }
 
 /// Whether the posts of a raster are as far apart to the east as to the north, in metres.

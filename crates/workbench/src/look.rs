@@ -7,6 +7,7 @@ use ground::{GroundError, covered};
 use source_files::{Crs, DemFile, RasterFrame, Reading, SourceError};
 use terrain::{GridFrame, PostRect, Spacing};
 
+use crate::heights::crs_named;
 use crate::outlook::Sampled;
 use crate::suiting::{area_crs, posts_m, spacing_for};
 
@@ -216,13 +217,7 @@ fn open(path: &Path, given: Option<&str>, nodata: Option<f64>) -> Result<(DemFil
     match (DemFile::open(path, &reading), given) {
         (Ok(file), _) => Ok((file, false)),
         (Err(SourceError::NoCrs { .. }), Some(given)) => {
-            let crs = Crs::named(given).map_err(|found| GroundError::Impossible {
-                key: "--crs".into(),
-                found: format!("{given}: {found}"),
-                expected: "a system that can be computed".into(),
-                hint: "for example --crs EPSG:32611".into(),
-            })?;
-            Ok((DemFile::open(path, &Reading { crs: Some(crs), ..reading })?, true))
+            Ok((DemFile::open(path, &Reading { crs: Some(crs_named(given)?), ..reading })?, true))
         }
         (Err(error), _) => Err(error.into()),
     }

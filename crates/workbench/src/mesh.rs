@@ -65,7 +65,7 @@ pub struct Mesh {
 /// # Errors
 /// When the raster cannot be used, or nothing says when to stop.
 pub fn tin(request: &TinRequest, stop: &AtomicBool, progress: &mut dyn Progress) -> Result<Mesh, CompileError> {
-    let heights = Heights::read(&request.dem, request.workers, stop, progress)?;
+    let heights = Heights::read(&request.dem, request.crs.as_deref(), request.workers, stop, progress)?;
     tin_over(&heights, request, stop, progress)
 }
 
@@ -169,6 +169,7 @@ pub(crate) fn untiled_together(
 ) -> Result<Option<Tally>, CompileError> {
     let request = |triangles: usize| TinRequest {
         dem: PathBuf::new(),
+        crs: None,
         method: TinMethod::Optimised(Optimising::default()),
         points: None,
         triangles: Some(triangles),

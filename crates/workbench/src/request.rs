@@ -36,6 +36,8 @@ pub enum TinStart {
 pub struct TinRequest {
     /// The raster.
     pub dem: PathBuf,
+    /// Its coordinate system, where it names none.
+    pub crs: Option<String>,
     /// Which post comes next.
     pub method: TinMethod,
     /// Vertices at most, corners included.

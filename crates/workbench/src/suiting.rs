@@ -65,7 +65,8 @@ pub(crate) fn area_crs(frames: &[RasterFrame]) -> Result<Crs, job::NoArea> {
     const WEB_MERCATOR: u32 = 3857;
     let first = &frames[0].crs;
     let shared = frames.iter().all(|frame| frame.crs == *first);
-    let metric = first.unit_m() == Some(1.0) && first.epsg().is_some_and(|code| code != WEB_MERCATOR);
+    let is_on_ground = first.epsg().is_some_and(|code| code != WEB_MERCATOR) || *first == Crs::plane();
+    let metric = first.unit_m() == Some(1.0) && is_on_ground;
     if shared && metric { Ok(first.clone()) } else { utm_of(frames) }
 }
 

@@ -25,7 +25,7 @@ pub fn tin_levels(
     progress: &mut dyn Progress,
 ) -> Result<Vec<Mesh>, CompileError> {
     refuse(request, levels)?;
-    let heights = Heights::read(&request.dem, request.workers, stop, progress)?;
+    let heights = Heights::read(&request.dem, request.crs.as_deref(), request.workers, stop, progress)?;
     let whole = TinRequest { tiles: Some((1, 1)), ..request.clone() };
     if let TinMethod::Optimised(_) = request.method {
         let level = |&points: &usize| {

@@ -25,7 +25,7 @@ fn compare(ground: CompareGround, window: Option<PostRect>, methods: &[&str], po
 fn desert() -> Option<(CompareGround, Option<PostRect>)> {
     let path = data("ntc_scape/ntc_1024x1024_25m_assumed.tif")?;
     let window = PostRect::new(Post::new(648, 481), Post::new(1023, 940));
-    Some((CompareGround::Raster(path), Some(window)))
+    Some((CompareGround::Raster { path, crs: None }, Some(window)))
 }
 
 #[track_caller]
@@ -82,7 +82,12 @@ fn equivalent_points_are_the_fewest_whose_iterative_tin_is_better() {
     let scene = Scene::new(&Words::sample());
     let path = scene.path("dem.tif");
     sample(&path);
-    let found = compare(CompareGround::Raster(path.clone()), None, &["lattice", "regular", "optimised"], &[150, 400]);
+    let found = compare(
+        CompareGround::Raster { path: path.clone(), crs: None },
+        None,
+        &["lattice", "regular", "optimised"],
+        &[150, 400],
+    );
     for row in &found.rows {
         let made = row.made.as_ref().unwrap();
         let Equivalent::Points(points) = made.equivalent else {
@@ -91,6 +96,7 @@ fn equivalent_points_are_the_fewest_whose_iterative_tin_is_better() {
         let iterative = |points: usize| {
             let request = TinRequest {
                 dem: path.clone(),
+                crs: None,
                 method: TinMethod::Paper,
                 points: Some(points),
                 triangles: None,

@@ -116,6 +116,7 @@ fn a_mesh_of_more_points_than_posts_is_every_post() {
         for method in [TinMethod::Greedy { key: ErrorKey::Max }, TinMethod::Paper, optimised] {
             let request = TinRequest {
                 dem: path.clone(),
+                crs: None,
                 method,
                 points: Some(10_000),
                 triangles: None,
@@ -237,6 +238,7 @@ fn voids_of_a_mesh_are_no_vertices_and_in_no_statistic() {
         let method = TinMethod::Greedy { key: ErrorKey::Sse };
         let request = TinRequest {
             dem: path.clone(),
+            crs: None,
             method,
             points: Some(400),
             triangles: None,

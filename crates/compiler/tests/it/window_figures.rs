@@ -124,6 +124,7 @@ fn a_mesh_from_a_raster_is_that_of_the_method_and_tiles_cost_little() {
     let mesh = |method, tiles, workers| {
         let request = TinRequest {
             dem: path.clone(),
+            crs: None,
             method,
             points: Some(5000),
             triangles: None,

@@ -14,6 +14,7 @@ use workbench::{
 };
 
 use crate::arguments::{Format, start_method};
+use crate::commands::tin::without_job;
 use crate::failure::{Failure, Outcome};
 use crate::new_folder::NewFolder;
 use crate::signals::Signals;
@@ -71,6 +72,9 @@ pub struct Arguments {
     /// Only these posts: the south-western one, then how many
     #[arg(long, value_name = "ROW,COL,ROWSxCOLUMNS", value_parser = window)]
     window: Option<PostRect>,
+    /// Coordinate system of a raster that names none [default: metres in a plane]
+    #[arg(long, value_name = "EPSG:CODE")]
+    crs: Option<String>,
     /// Draw the ground and every TIN from one eye, shaded and as wires, into a new folder
     #[arg(long, value_name = "DIR")]
     pictures: Option<PathBuf>,
@@ -136,7 +140,9 @@ fn compared(
     arguments.pictures.as_deref().map_or(Ok(()), NewFolder::check)?;
     let mut watch = Watch { quiet: arguments.quiet, names: Vec::new(), began: Instant::now(), seconds: Vec::new() };
     watch.names = names(&request);
-    let found = workbench::compare(&request, stop, &mut |event| watch.hear(event))?;
+    let is_job = matches!(request.ground, CompareGround::Job(_));
+    let found = workbench::compare(&request, stop, &mut |event| watch.hear(event)).map_err(Failure::from);
+    let found = found.map_err(|failure| if is_job { failure } else { without_job(failure) })?;
     refuse_all(&found)?;
     if let Some(folder) = &arguments.pictures {
         draw(&found, NewFolder::begin(folder)?)?;
@@ -151,7 +157,7 @@ fn request(arguments: &Arguments) -> Result<CompareRequest, Failure> {
     }
     let ground = match files::extension(&arguments.ground).as_str() {
         "toml" => CompareGround::Job(Box::new(load(&arguments.ground)?)),
-        _ => CompareGround::Raster(arguments.ground.clone()),
+        _ => CompareGround::Raster { path: arguments.ground.clone(), crs: arguments.crs.clone() },
     };
     let mut points: Vec<usize> = arguments.points.iter().map(|&points| points as usize).collect();
     points.dedup();

@@ -100,6 +100,9 @@ pub struct Arguments {
     lattice: Option<Lattice>,
     #[arg(long, value_name = "true|false", help = of_optimised("tin.sight"))]
     sight: Option<bool>,
+    /// Coordinate system of a raster that names none [default: metres in a plane]
+    #[arg(long, value_name = "EPSG:CODE")]
+    crs: Option<String>,
     /// What coordinates are counted from
     #[arg(long, value_enum, default_value_t = MeshOrigin::Local)]
     coordinates: MeshOrigin,
@@ -190,7 +193,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     listener.finish();
     let seconds = clock.seconds();
     signals.tell_once(|| {});
-    let meshes = meshed.map_err(|error| Failure::of_compiler(&error, signals.exit_code()))?;
+    let meshes = meshed.map_err(|error| without_job(Failure::of_compiler(&error, signals.exit_code())))?;
     for (mesh, out) in meshes.iter().zip(&outs) {
         write_mesh(mesh, kind, on_map, out)?;
     }
@@ -206,6 +209,11 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         }
     }
     Ok(Outcome::Sound)
+}
+
+/// The same, with a hint that needs no job where a raster's coordinate system is not known.
+pub fn without_job(failure: Failure) -> Failure {
+    failure.hinted_where("coordinate reference system", "say what it is: --crs EPSG:32611 (your own)")
 }
 
 /// The files to write: one, or one for each level with its number of vertices in its name.
@@ -330,6 +338,7 @@ pub fn kind_of(out: &Path, on_map: bool) -> Result<Kind, Failure> {
 pub fn request(arguments: &Arguments) -> Result<TinRequest, Failure> {
     Ok(TinRequest {
         dem: arguments.dem.clone(),
+        crs: arguments.crs.clone(),
         method: method(arguments)?,
         points: arguments.points.map(|points| points as usize),
         triangles: arguments.triangles.map(|triangles| triangles as usize),

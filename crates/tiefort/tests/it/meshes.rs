@@ -46,6 +46,81 @@ fn a_glb_says_where_it_lies_and_has_no_map_coordinates() {
     scene.refuses(&map, &["--coordinates map", ".glb"]);
 }
 
+#[test]
+fn a_raster_without_a_coordinate_system_is_meshed_and_compared_in_a_plane_of_metres() {
+    let scene = Scene::new();
+    Raster::sound().write(&scene.path("dem.tif"));
+    Raster::sound().without_crs().write(&scene.path("bare.tif"));
+    let mesh = |raster: &str, more: &[&str], told: &str| {
+        let arguments = ["tin", raster, "--points", "200", "--out", "mesh.ply"];
+        let said = scene.run_to(0, &[&arguments[..], more].concat());
+        assert_eq!(said.stderr.contains("no coordinate system"), !told.is_empty(), "{}", said.stderr);
+        assert!(said.stderr.contains(told), "{}", said.stderr);
+        fs::read(scene.path("mesh.ply")).unwrap()
+    };
+    let known = mesh("dem.tif", &[], "");
+    let plane = mesh("bare.tif", &[], "bare.tif: no coordinate system: its posts are taken as metres in a plane");
+    let given = mesh("bare.tif", &["--crs", "EPSG:32611"], "");
+    // All but the header, which names the system and the place: without keys, posts are centres of pixels.
+    let body = |mesh: &[u8]| {
+        let end = b"end_header\n";
+        mesh.windows(end.len()).position(|bytes| bytes == end).map(|at| mesh[at..].to_vec()).unwrap()
+    };
+    assert!(body(&given) == body(&known) && body(&plane) == body(&known));
+    scene.refuses(&["tin", "bare.tif", "--points", "9", "--crs", "EPSG:1", "--out", "a.ply"], &["--crs", "EPSG:1"]);
+    let compared = |raster: &str, more: &[&str]| {
+        let arguments = ["compare", raster, "--methods", "lattice,optimised", "--points", "300", "--format", "json"];
+        let told = scene.run_to(0, &[&arguments[..], more].concat()).stdout;
+        let mut told: Value = serde_json::from_str(&told).unwrap();
+        told["rows"].as_array_mut().unwrap().iter_mut().for_each(|row| {
+            row.as_object_mut().unwrap().remove("seconds");
+        });
+        told["rows"].clone()
+    };
+    assert_eq!(compared("bare.tif", &[]), compared("dem.tif", &[]));
+    assert_eq!(compared("bare.tif", &["--crs", "EPSG:32611"]), compared("dem.tif", &[]));
+}
+
+#[test]
+fn a_grid_without_a_coordinate_system_whose_posts_are_not_square_is_resampled_in_its_plane() {
+    let scene = Scene::new();
+    let rows: Vec<String> =
+        (0..41).map(|row| (0..31).map(|col| format!("{} ", row * col % 17)).collect::<String>()).collect();
+    let header = "ncols 31\nnrows 41\nxllcorner 1000\nyllcorner 2000\ndx 30\ndy 20\n";
+    fs::write(scene.path("a.asc"), format!("{header}{}\n", rows.join("\n"))).unwrap();
+    let said = scene.run_to(0, &["tin", "a.asc", "--points", "60", "--out", "mesh.ply"]);
+    assert!(said.stderr.contains("in no coordinate system"), "{}", said.stderr);
+}
+
+#[test]
+fn a_raster_that_might_be_in_degrees_is_not_taken_as_metres() {
+    let scene = Scene::new();
+    Raster::sound().geographic().without_crs().write(&scene.path("bare.tif"));
+    for command in [&["tin", "bare.tif", "--points", "60", "--out", "a.ply"][..], &["compare", "bare.tif"]] {
+        let said = scene.run_to(2, command);
+        assert!(said.stderr.contains("hint: say what it is: --crs EPSG:"), "{}", said.stderr);
+        assert!(!said.stderr.contains("dem.sources"), "{}", said.stderr);
+    }
+    scene.run_to(0, &["tin", "bare.tif", "--crs", "EPSG:4326", "--points", "60", "--out", "a.ply"]);
+}
+
+#[test]
+fn the_first_end_that_is_reached_ends_an_optimised_mesh() {
+    let scene = Scene::new();
+    Raster::sound().write(&scene.path("dem.tif"));
+    let triangles = |ends: &[&str]| {
+        let arguments = [&["tin", "dem.tif", "--json", "--out", "mesh.ply"], ends].concat();
+        let told = scene.run_to(0, &arguments).stdout;
+        let summary: Value = serde_json::from_str(told.lines().last().unwrap()).unwrap();
+        (summary["triangles"].as_u64().unwrap(), summary["residual"]["max_m"].as_f64().unwrap())
+    };
+    for ends in [["--points", "1500"], ["--triangles", "3000"]] {
+        let (all, _) = triangles(&ends);
+        let (few, largest_m) = triangles(&[&ends[..], &["--max-residual", "6"]].concat());
+        assert!(2 * few < all && largest_m <= 6.0, "{ends:?}: {few} triangles of {all}, {largest_m} m are left");
+    }
+}
+
 /// The vertices and the triangles of an OBJ, each by their places, whatever their order.
 fn obj(text: &str) -> (std::collections::BTreeSet<String>, std::collections::BTreeSet<Vec<String>>) {
     let places: Vec<&str> = text.lines().filter_map(|line| line.strip_prefix("v ")).collect();

@@ -17,7 +17,12 @@ use crate::heights::Heights;
 #[derive(Clone, Debug)]
 pub enum CompareGround {
     /// The posts of a raster.
-    Raster(PathBuf),
+    Raster {
+        /// Its file.
+        path: PathBuf,
+        /// Its coordinate system, where it names none.
+        crs: Option<String>,
+    },
     /// The heights of a raster in memory.
     Held(HeldGround),
     /// The ground of a job: its one raster's own posts, or else its working grid.

@@ -11,11 +11,11 @@ use ground::{GamingArea, Ground, GroundError, decode, reading};
 use job::{DemSource, Job, SourceFile};
 use methods::DemWindow;
 use schedule::Workers;
-use source_files::{DemFile, Reading, VoidPolicy};
+use source_files::{DemFile, VoidPolicy};
 use terrain::{Dem, Metres, Post, PostRect, Tin, quanta_of_metres};
 
 use super::made::{CompareGround, Equivalent, HeldGround, Made};
-use crate::heights::{Heights, has_square_posts};
+use crate::heights::{Heights, has_square_posts, open_alone};
 use crate::mesh::untiled;
 use crate::request::TinRequest;
 use crate::tally::tally_of;
@@ -45,8 +45,9 @@ impl Subject {
     /// When it cannot be read, or is too large or too small.
     pub fn open(ground: &CompareGround, window: Option<PostRect>, stop: &AtomicBool) -> Result<Self, CompileError> {
         match ground {
-            CompareGround::Raster(path) => {
-                let file = DemFile::open(path, &Reading::AS_IT_SAYS)?;
+            CompareGround::Raster { path, crs } => {
+                // Distances are all that matters here.
+                let (file, _) = open_alone(path, crs.as_deref())?;
                 let name = path.display().to_string();
                 match has_square_posts(file.frame()) {
                     true => of_file(&file, windowed(file.rect(), window)?, name, stop),
@@ -78,6 +79,7 @@ impl Subject {
     pub fn refine(&self, method: TinMethod, start: Option<TinStart>, until: Until) -> Result<Tin, CompileError> {
         let request = TinRequest {
             dem: Path::new("").into(),
+            crs: None,
             method,
             points: if let Until::Points(points) = until { Some(points) } else { None },
             triangles: None,
