@@ -136,6 +136,20 @@ fn every_command_of_readme_and_book_runs() {
     assert!(20 < count, "{count} blocks");
 }
 
+#[test]
+fn readme_begins_with_two_commands_and_the_whole_check_runs_both() {
+    let first = blocks("README.md").swap_remove(0);
+    let commands: Vec<&str> = first.text.lines().filter_map(|line| line.split("  #").next()).map(str::trim).collect();
+    assert_eq!(commands, ["cargo run --release -- build configs/ntc.toml", "cargo test --workspace"]);
+    let read = |name: &str| fs::read_to_string(root().join(name)).unwrap();
+    let has = |name: &str, step: &str| read(name).lines().any(|line| line.starts_with(step));
+    assert!(has(".ci/run", "source scripts/check.sh") && has("scripts/check.sh", "step cargo test --workspace"));
+    assert!(has(".ci/run", "step cargo run --release -- build configs/ntc.toml "));
+    // What `cargo run` runs from the root.
+    assert!(has("Cargo.toml", "default-members = [\"crates/tiefort\"]"));
+    assert!(root().join("configs/ntc.toml").exists());
+}
+
 /// Puts the keys of one table over those of another, section by section.
 fn lay_over(job: &mut toml::Table, part: toml::Table) {
     for (name, section) in part {
