@@ -169,7 +169,7 @@ impl Cutting<'_> {
         }
     }
 
-    /// Ground that features cover, and whether its outline is in the TIN; `whole` are pieces of strips that nothing cuts.
+    /// Ground that features cover, and whether its outline is in the TIN; `whole` are pieces of strips, uncut.
     fn surfaces(&mut self, surfaces: &[Surface], is_held: bool, whole: &BTreeSet<(u16, Vec<Place>)>) {
         let is_whole = |surface: &Surface| is_one_of(whole, surface);
         // Rings of one feature and role at one level are one body; strips are bodies of their own.
