@@ -37,7 +37,7 @@ pub use source::{decode, reading, warnings_of};
 mod records;
 pub use records::{records, states};
 mod locate;
-pub use locate::{Corner, corners, covered, find_area, utm_of};
+pub use locate::{Corner, corners, covered, find_area, rectangle_around, utm_of};
 mod features_seen;
 pub use features_seen::{FeatureRow, FeatureTable, FeaturesSeen, SourceSeen, features_in};
 mod foresee;

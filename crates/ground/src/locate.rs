@@ -193,6 +193,12 @@ pub fn covered(
     Ok(([place(0, west), place(1, south)], [wide as f64 * side_m, high as f64 * side_m]))
 }
 
+/// South-west and north-east corners of the rectangle around rasters, in metres of a system; `None` where none of them
+/// can be expressed in it.
+pub fn rectangle_around(frames: &[RasterFrame], crs: &Crs) -> Option<[[f64; 2]; 2]> {
+    Footprints { frames, crs }.bounds()
+}
+
 /// The first post in the south-west: one of the raster's own where it is in the area's system and spacing, else a
 /// round number.
 fn first_post(frames: &[RasterFrame], crs: &Crs, low: [f64; 2], spacing_m: f64) -> [f64; 2] {

@@ -76,6 +76,8 @@ fn every_key_of_features_is_read() {
 #[test]
 fn what_a_job_leaves_out_is_as_usual_and_without_the_section_there_are_no_features() {
     let features = job("[features]\nsources = [\"sample\"]\n").features.unwrap();
+    let word_alone = job("[features]\nsources = \"sample\"\n").features.unwrap();
+    assert_eq!(word_alone.sources, features.sources);
     assert_eq!((features.share_max, features.options), (0.5, GradeOptions::USUAL));
     assert!(features.buildings && !features.has_buildings(), "the built-in terrain has none");
     assert!(features.rules.is_empty());

@@ -272,7 +272,8 @@ fn of_bare_rows(store: &Store, start: &[u8], reading: &Reading) -> Result<Found,
     };
     let corner = reading.corner.or_else(|| hgt::corner_in(store.name()));
     let corner = corner.ok_or_else(|| SourceError::NoCorner { path: store.path().into() })?;
-    let (axes, facts) = (hgt::axes(&rows, corner), Facts::of("HGT"));
+    // All that comes in this form, of SRTM and after it, is above that geoid.
+    let (axes, facts) = (hgt::axes(&rows, corner), Facts { vertical_datum: Some("EGM96".into()), ..Facts::of("HGT") });
     Ok(Found { size: (rows.cols, rows.rows), reader: Reader::Rows(rows), axes, facts, crs: Some(Ok(Crs::wgs84())) })
 }
 

@@ -60,6 +60,7 @@ mod geopackage;
 mod kept;
 mod polygons;
 mod shapefile;
+mod shapefile_parts;
 pub use polygons::read_polygons;
 mod features;
 pub use features::{

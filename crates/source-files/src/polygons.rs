@@ -10,9 +10,9 @@ use geojson::{FeatureCollection, GeoJson, Geometry, GeometryValue, JsonObject, J
 use mask::Polygon;
 
 use crate::allowance::{Allowance, VERTEX_BYTES};
-use crate::beside::beside;
 use crate::crs::Crs;
 use crate::limits::GEOJSON_BYTES_MAX;
+use crate::shapefile_parts::Parts;
 use crate::store::Store;
 use crate::{SourceError, geopackage, shapefile};
 
@@ -23,7 +23,10 @@ use crate::{SourceError, geopackage, shapefile};
 /// When the file is none of them, holds other geometries or none, a ring is not closed, or its coordinates are in a
 /// system that cannot be brought to the area's.
 pub fn read_polygons(path: &Path, epsg: u32) -> Result<Vec<Polygon>, SourceError> {
-    let store = Store::plain(path)?;
+    let mut store = Store::plain(path)?;
+    if store.start(4)? == b"PK\x03\x04" {
+        store = Store::zipped_shapefile(path)?.swap_remove(0);
+    }
     if GEOJSON_BYTES_MAX < store.len() {
         let (found, limit) = (store.len(), GEOJSON_BYTES_MAX);
         return Err(SourceError::TooLarge { path: path.into(), what: "bytes", found, limit });
@@ -35,18 +38,19 @@ pub fn read_polygons(path: &Path, epsg: u32) -> Result<Vec<Polygon>, SourceError
     let mut collected = Collected { path, polygons: Vec::new(), rings: 0 };
     let said = match bytes.starts_with(&shapefile::MARK) {
         true => {
-            for rings in shapefile::rings(&store, &bytes, index_beside(path)?.as_deref())? {
+            let parts = Parts::of(&store)?;
+            for rings in shapefile::rings(&store, &bytes, parts.index()?.as_deref())? {
                 let rings = rings.into_iter().map(|ring| collected.closed(Some(ring))).collect::<Result<_, _>>()?;
                 collected.polygons.push(Polygon { rings });
             }
-            said_beside(path)?
+            parts.system()?
         }
         false => collected.add_json(&bytes)?,
     };
     if collected.polygons.is_empty() {
         return Err(SourceError::NoPolygons { path: path.into() });
     }
-    placed(&Allowance::new(path, store.len()), collected.polygons, said, epsg)
+    placed(&Allowance::new(path, store.file_bytes()), collected.polygons, said, epsg)
 }
 
 /// The polygons of all layers.
@@ -77,20 +81,6 @@ fn placed(
         Some(crs) if crs.epsg() != Some(epsg) => projected(allowance, polygons, &crs, epsg),
         _ => Ok(polygons),
     }
-}
-
-/// The bytes of the index of a Shapefile.
-pub(crate) fn index_beside(path: &Path) -> Result<Option<Vec<u8>>, SourceError> {
-    let Some(index) = beside(path, &["shx"]) else { return Ok(None) };
-    Store::plain(&index)?.start(GEOJSON_BYTES_MAX).map(Some)
-}
-
-/// The system that a `.prj` beside the file names.
-pub(crate) fn said_beside(path: &Path) -> Result<Option<Crs>, SourceError> {
-    let Some(prj) = beside(path, &["prj"]) else { return Ok(None) };
-    let text = Store::plain(&prj)?.start(1 << 16)?;
-    let crs = Crs::from_wkt(&String::from_utf8_lossy(&text));
-    crs.map(Some).map_err(|found| SourceError::UnnamedCrs { path: prj, found })
 }
 
 /// Whether numbers can only be degrees: a projected area a degree or two of metres wide at the system's origin is not

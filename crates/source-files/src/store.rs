@@ -91,16 +91,57 @@ impl Store {
         }
     }
 
-    fn unzipped(&self) -> Result<Self, SourceError> {
-        let mut archive = ZipArchive::new(self.handle()?).map_err(|error| self.broken(error.to_string()))?;
+    /// The parts of the one Shapefile in the zip file at `path`, unpacked, its shapes first.
+    ///
+    /// # Errors
+    /// When there is none or more than one, or when the parts unpack to more than files of features may.
+    pub(crate) fn zipped_shapefile(path: &Path) -> Result<Vec<Self>, SourceError> {
+        const ENDINGS: [&str; 5] = [".shp", ".shx", ".dbf", ".cpg", ".prj"];
+        let plain = Self::plain(path)?;
+        let refused = |found: String| SourceError::NotFeatures { path: path.into(), found };
+        let (mut archive, names) = plain.archive().map_err(|error| match error {
+            SourceError::Malformed { .. } => refused("a zip archive that cannot be opened".into()),
+            error => error,
+        })?;
+        let is_shapes = |name: &&String| name.to_lowercase().ends_with(ENDINGS[0]) && !is_beside(name);
+        let all: Vec<&String> = names.iter().filter(is_shapes).collect();
+        let [shapes] = all.as_slice() else {
+            let found = match all.len() {
+                0 => "a zip archive without a Shapefile in it".to_owned(),
+                count => format!("a zip archive of {count} Shapefiles"),
+            };
+            return Err(refused(found));
+        };
+        let base = &shapes[..shapes.len() - ENDINGS[0].len()];
+        let (mut parts, mut left) = (Vec::new(), unpacked_features_max(plain.len));
+        for ending in ENDINGS {
+            let is_part =
+                |name: &&String| name.strip_prefix(base).is_some_and(|rest| rest.eq_ignore_ascii_case(ending));
+            let Some(name) = names.iter().find(is_part) else { continue };
+            let entry = archive.by_name(name).map_err(|error| plain.broken(error.to_string()))?;
+            let bytes = plain.unpack(entry, left)?;
+            left -= bytes.len() as u64;
+            parts.push(plain.holding(name.rsplit(['/', '\\']).next().unwrap_or(name).to_owned(), bytes));
+        }
+        Ok(parts)
+    }
+
+    /// A zip file, and the names of the files in it.
+    fn archive(&self) -> Result<(ZipArchive<Handle>, Vec<String>), SourceError> {
+        let archive = ZipArchive::new(self.handle()?).map_err(|error| self.broken(error.to_string()))?;
         if ARCHIVE_ENTRIES_MAX < archive.len() {
             let (found, limit) = (archive.len() as u64, ARCHIVE_ENTRIES_MAX as u64);
             return Err(SourceError::TooLarge { path: self.path.clone(), what: "files in an archive", found, limit });
         }
-        let mut names: Vec<String> = (0..archive.len())
+        let names = (0..archive.len())
             .filter_map(|index| archive.name_for_index(index)?.ok().map(std::borrow::Cow::into_owned))
             .filter(|name| !name.ends_with('/'))
             .collect();
+        Ok((archive, names))
+    }
+
+    fn unzipped(&self) -> Result<Self, SourceError> {
+        let (mut archive, mut names) = self.archive()?;
         if 1 < names.len() {
             names.retain(|name| !is_beside(name));
         }

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use compiler::CompileError;
-use ground::{GroundError, covered};
+use ground::{GroundError, covered, rectangle_around};
 use source_files::{Crs, DemFile, RasterFrame, Reading, SourceError};
 use terrain::{GridFrame, PostRect, Spacing};
 
@@ -53,6 +53,8 @@ pub struct Suggestion {
     pub origin_m: [f64; 2],
     /// Width and height in metres.
     pub size_m: [f64; 2],
+    /// Width and height in metres of the rectangle around the rasters, in the area's system.
+    pub around_m: [f64; 2],
     /// Metres between posts of the working grid.
     pub spacing_m: f64,
     /// Rows and columns of tiles.
@@ -188,8 +190,10 @@ pub fn look_at(paths: &[PathBuf], given: Option<&str>) -> Result<Suggestion, Com
     let tiles = modules.map(|modules| ((f64::from(modules) / MODULES_A_TILE).round() as u32).clamp(1, modules / 2));
     let (spacing_m, tiles) = (spacing.metres(), (tiles[1], tiles[0]));
     let posts_m = posts_m(&frames, &crs);
+    let around = rectangle_around(&frames, &crs).unwrap_or([origin_m; 2]);
+    let around_m = [0, 1].map(|axis| (around[1][axis] - around[0][axis]).max(size_m[axis]));
     let looked = Looked { crs, spacing, frames, given: given.map(str::to_owned) };
-    Ok(Suggestion { seen, epsg, origin_m, size_m, spacing_m, tiles, part_around, posts_m, looked })
+    Ok(Suggestion { seen, epsg, origin_m, size_m, around_m, spacing_m, tiles, part_around, posts_m, looked })
 }
 
 /// System, spacing, origin and size of an area in the middle of a raster, and where that middle is; `None` where the

@@ -95,7 +95,8 @@ fn sources(
     job: &Path,
     mentions: &mut Vec<Mention>,
 ) -> Result<Vec<FeatureSource>, JobError> {
-    let items = entry.list()?;
+    // The one word that is no path may stand without a list, as the text of the key says.
+    let items = if entry.text().is_ok_and(|text| text == SAMPLE) { vec![entry.clone()] } else { entry.list()? };
     if items.is_empty() || FEATURE_SOURCES_MAX < items.len() {
         return Err(entry.out_of_range(entry.expected()));
     }

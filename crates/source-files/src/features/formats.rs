@@ -47,7 +47,7 @@ pub fn feature_layers(path: &Path) -> Result<Vec<String>, SourceError> {
     }
 }
 
-/// Opens a file of features; gzipped GeoJSON is unpacked.
+/// Opens a file of features; gzipped GeoJSON and zipped Shapefiles are unpacked.
 pub(super) fn open(path: &Path) -> Result<(Store, Format), SourceError> {
     let store = Store::plain(path)?;
     let start = store.start(512)?;
@@ -72,6 +72,13 @@ pub(super) fn open(path: &Path) -> Result<(Store, Format), SourceError> {
             false => Err(refused(path, &format!("a gzip file of {}", name_of(path, &start)))),
         };
     }
+    if start.starts_with(b"PK\x03\x04") {
+        let shapes = Store::zipped_shapefile(path)?.swap_remove(0);
+        return match shapes.start(4)?.starts_with(&shapefile::MARK) {
+            true => Ok((shapes, Format::Shapefile)),
+            false => Err(refused(path, "a zip archive of a .shp that is no Shapefile")),
+        };
+    }
     if is_json(&start) {
         return Ok((store, Format::GeoJson));
     }
@@ -90,13 +97,12 @@ fn is_json(start: &[u8]) -> bool {
 
 /// What a file is that is not read.
 fn name_of(path: &Path, start: &[u8]) -> String {
-    const MARKS: [(&[u8], &str); 8] = [
+    const MARKS: [(&[u8], &str); 7] = [
         (b"II\x2a\0", "a GeoTIFF raster"),
         (b"MM\0\x2a", "a GeoTIFF raster"),
         (b"II\x2b\0", "a GeoTIFF raster"),
         (b"MM\0\x2b", "a GeoTIFF raster"),
         (b"UHL1", "a DTED raster"),
-        (b"PK\x03\x04", "a zip archive"),
         (b"BZh", "a bzip2 file"),
         (b"fgb\x03", "a FlatGeobuf file"),
     ];

@@ -7,23 +7,21 @@ use super::nest;
 use super::placing::{LEFT_OUT, Placing, Texts, look_like_degrees};
 use super::raw::{Part, RawFeature, RawShape};
 use crate::SourceError;
-use crate::beside::beside;
 use crate::crs::Crs;
-use crate::limits::{RINGS_MAX, SHAPEFILE_BYTES_MAX};
-use crate::polygons::{index_beside, said_beside};
+use crate::limits::RINGS_MAX;
 use crate::shapefile::{self, Shape};
+use crate::shapefile_parts::{Parts, whole};
 use crate::store::Store;
 
 pub(super) fn read(store: &Store, wanted: &Wanted) -> Result<FeatureFile, SourceError> {
-    let path = store.path();
-    let bytes = whole(store)?;
-    let index = index_beside(path)?;
-    let table = table_beside(store)?;
-    let said = wanted.system(|| match said_beside(path)? {
+    let (path, parts) = (store.path(), Parts::of(store)?);
+    let (bytes, index) = (whole(&parts.shapes)?, parts.index()?);
+    let table = table_of(&parts)?;
+    let said = wanted.system(|| match parts.system()? {
         Some(crs) => Ok(Some(crs)),
         None => Ok(looks(store, &bytes, index.as_deref())?.then(Crs::wgs84)),
     })?;
-    let mut placing = Placing::new(path, store.len(), wanted, said)?;
+    let mut placing = Placing::new(path, store.file_bytes(), wanted, said)?;
     if table.is_none() {
         placing.note("no table (.dbf) beside it, so its features have no attributes".into());
     }
@@ -56,23 +54,9 @@ pub(super) fn read(store: &Store, wanted: &Wanted) -> Result<FeatureFile, Source
     placing.finish(None)
 }
 
-fn whole(store: &Store) -> Result<Vec<u8>, SourceError> {
-    if SHAPEFILE_BYTES_MAX < store.len() {
-        let (found, limit) = (store.len(), SHAPEFILE_BYTES_MAX);
-        return Err(SourceError::TooLarge { path: store.path().into(), what: "bytes", found, limit });
-    }
-    store.start(SHAPEFILE_BYTES_MAX)
-}
-
-fn table_beside(store: &Store) -> Result<Option<Table>, SourceError> {
-    let Some(path) = beside(store.path(), &["dbf"]) else { return Ok(None) };
-    let encoding = match beside(store.path(), &["cpg"]) {
-        Some(cpg) => Some(String::from_utf8_lossy(&Store::plain(&cpg)?.start(64)?).into_owned()),
-        None => None,
-    };
-    let table = Store::plain(&path)?;
-    let bytes = whole(&table)?;
-    Table::read(&table, bytes, encoding.as_deref()).map(Some)
+fn table_of(parts: &Parts) -> Result<Option<Table>, SourceError> {
+    let Some(table) = &parts.table else { return Ok(None) };
+    Table::read(table, whole(table)?, parts.encoding()?.as_deref()).map(Some)
 }
 
 fn looks(store: &Store, bytes: &[u8], index: Option<&[u8]>) -> Result<bool, SourceError> {

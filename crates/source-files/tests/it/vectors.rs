@@ -422,3 +422,47 @@ fn json_that_names_no_features_is_no_file_of_them() {
     check(r#" {"type": "LineString", "coordinates": []}"#, true);
     check(r#"{"type": "Feature", "geometry": null}"#, true);
 }
+
+/// A zip file of some files.
+fn zipped(files: &[(&str, &[u8])]) -> Vec<u8> {
+    let mut archive = zip::ZipWriter::new(std::io::Cursor::new(Vec::new()));
+    for (name, bytes) in files {
+        archive.start_file(*name, zip::write::SimpleFileOptions::default()).unwrap();
+        std::io::Write::write_all(&mut archive, bytes).unwrap();
+    }
+    archive.finish().unwrap().into_inner()
+}
+
+#[test]
+fn a_zipped_shapefile_is_read_with_all_that_is_beside_it() {
+    let degrees = [[-117.0, 35.0, 0.0], [-116.999, 35.0, 0.0]];
+    let square = [[-117.0, 35.0, 0.0], [-117.0, 35.001, 0.0], [-116.999, 35.001, 0.0], [-117.0, 35.0, 0.0]];
+    let (lines, rings) = (shapefile(&[record(3, &[0], &degrees)]), shapefile(&[record(5, &[0], &square)]));
+    let rows = table(&[" track   2T"]);
+    let utm = br#"PROJCS["x",GEOGCS["x",DATUM["D_WGS_1984",SPHEROID["WGS_1984",6378137,298.257223563]],PRIMEM["Greenwich",0],UNIT["Degree",0.0174532925199433]],PROJECTION["Transverse_Mercator"],PARAMETER["False_Easting",500000],PARAMETER["False_Northing",0],PARAMETER["Central_Meridian",-117],PARAMETER["Scale_Factor",0.9996],PARAMETER["Latitude_Of_Origin",0],UNIT["Meter",1]]"#;
+    let folder = Folder::new();
+    let more: [(&str, &[u8]); 4] =
+        [("a/roads.DBF", &rows), ("a/roads.cpg", b"UTF-8"), ("readme.txt", b"x"), ("__MACOSX/a/._roads.shp", b"x")];
+    let path = folder.write("r.zip", &zipped(&[&[("a/roads.shp", &lines[..])], &more[..]].concat()));
+    assert!(is_feature_file(&path));
+    let file = read(&path);
+    assert_eq!((ids(&file), file.notes.len()), (vec!["r.zip#0"], 0));
+    assert_eq!(tags(&file.features[0]), [("highway", "track"), ("lanes", "2"), ("oneway", "true")]);
+
+    // The system is that of the .prj in the archive.
+    let path = folder.write("p.zip", &zipped(&[("roads.shp", &lines), ("roads.prj", utm)]));
+    assert_eq!((read(&path).found, read(&path).outside), (1, 1), "metres, though they look like degrees");
+    let path = folder.write("w.zip", &zipped(&[("lake.shp", &rings)]));
+    assert_eq!(source_files::read_polygons(&path, 32611).unwrap().len(), 1);
+
+    let refused = |files: &[(&str, &[u8])]| {
+        let path = folder.write("n.zip", &zipped(files));
+        assert!(!is_feature_file(&path));
+        read_features(&path, &WANTED, &in_turn).unwrap_err().to_string()
+    };
+    assert!(refused(&[("a.tif", b"x")]).contains("a zip archive without a Shapefile in it, which is not read as"));
+    assert!(refused(&[("a.shp", &lines), ("b.shp", &rings)]).contains("a zip archive of 2 Shapefiles"));
+    assert!(refused(&[("a.shp", b"nothing")]).contains("a .shp that is no Shapefile"));
+    let bomb = shapefile(&[record(3, &[0], &vec![[-117.0, 35.0, 0.0]; 2_000_000])]);
+    assert!(refused(&[("a.shp", &bomb)]).contains("bytes once unpacked (or more)"));
+}

@@ -158,6 +158,9 @@ fn found_text(suggestion: &Suggestion, (triangles, rms_m): (u32, Option<f64>), j
     let datums = known_datums(seen);
     let datum = if datums.is_empty() { "an unknown datum".to_owned() } else { datums.join(" and ") };
     let mut text = format!("found {files}: {wide} x {high} km at {spacing_m} m, {voids}, heights above {datum}");
+    if let Some([wide, high]) = left_out_km(suggestion) {
+        text += &format!("; {wide} km of the files' width and {high} km of their height are left out");
+    }
     if part_around.is_some() {
         text += "; the area is a part in the middle of the first, see around in the job";
     }
@@ -171,6 +174,14 @@ fn found_text(suggestion: &Suggestion, (triangles, rms_m): (u32, Option<f64>), j
         text += &format!("; {triangles} triangles a load module leave an RMS residual {}", about(rms_m));
     }
     text
+}
+
+/// Kilometres of the width and the height of the rectangle around the files that whole load modules leave out; `None`
+/// where that is less than a cell, or where the area is a part of them only.
+fn left_out_km(Suggestion { size_m, around_m, spacing_m, part_around, .. }: &Suggestion) -> Option<[f64; 2]> {
+    let left = [0, 1].map(|axis| around_m[axis] - size_m[axis]);
+    let is_much = part_around.is_none() && left.iter().any(|metres| spacing_m <= metres);
+    is_much.then(|| left.map(|metres| (metres / 10.0).round() / 100.0))
 }
 
 /// A residual in two figures: it is from a look at parts of the area.
@@ -227,7 +238,7 @@ fn job_text(
          \n[area]\nname = \"{}\"\n\
          crs = \"EPSG:{epsg}\"{}\n\
          origin_m = [{}, {}]  # east and north of the south-west post\n\
-         # {} x {} load modules: the largest rectangle that the files cover\n\
+         # {} x {} load modules: the largest rectangle that the files cover{}\n\
          size_m = [{}, {}]\n\
          spacing_m = {spacing_m}  # of the working grid; it divides 125 m\n\n[dem]\nsources = [\n",
         plain_name(name),
@@ -236,6 +247,9 @@ fn job_text(
         origin_m[1],
         modules[0],
         modules[1],
+        left_out_km(suggestion).map_or(String::new(), |[wide, high]| format!(
+            ",\n# {wide} km of their width and {high} km of their height left out"
+        )),
         size_m[0],
         size_m[1],
     );

@@ -39,6 +39,11 @@ fn found_of(SeenFeatures { seen, kind_by_name, .. }: &SeenFeatures) -> String {
     text
 }
 
+/// Whether neither a tag nor a name says what anything in it is.
+fn has_no_kind(SeenFeatures { seen, kind_by_name, .. }: &SeenFeatures) -> bool {
+    seen.kinds.is_empty() && 0 < seen.without_kind && kind_by_name.is_none()
+}
+
 /// The section `[features]` of a job in `folder`; empty where there are no files of features.
 pub fn features_section(all: &[SeenFeatures], folder: &Path) -> String {
     if all.is_empty() {
@@ -53,12 +58,14 @@ pub fn features_section(all: &[SeenFeatures], folder: &Path) -> String {
         let mut keys = vec![format!("file = {}", quoted(&relative(&seen.path, folder)))];
         keys.extend(seen.layer.as_ref().map(|layer| format!("layer = {}", quoted(layer))));
         keys.extend(seen.kind_by_name.map(|kind| format!("kind = {}", quoted(kind))));
+        let wants_kind = has_no_kind(seen);
         let entry = match keys.len() {
-            1 => quoted(&relative(&seen.path, folder)),
+            1 if !wants_kind => quoted(&relative(&seen.path, folder)),
             _ => format!("{{ {} }}", keys.join(", ")),
         };
         let sign = if is_used(seen) { "" } else { "# " };
-        text += &format!("{}    {sign}{entry},\n", comment(&found_of(seen)));
+        let kind = if wants_kind { "  # kind = \"…\"" } else { "" };
+        text += &format!("{}    {sign}{entry},{kind}\n", comment(&found_of(seen)));
     }
     text + &format!(
         "{sign}]\n{sign}share_max = {}  # of a load module's limit that they may take\n",

@@ -142,6 +142,20 @@ fn init_sizes_limits_from_the_data_or_as_it_is_told() {
 }
 
 #[test]
+fn init_leaves_room_for_the_kind_of_each_layer_that_nothing_tells() {
+    let scene = scene();
+    package(&scene.path("data.gpkg"), &[("a", &[0.0]), ("b", &[0.1])]);
+    let said = scene.run_to(0, &[&["init", "dem.asc", "data.gpkg", "--out", "a.toml"], &INIT[..]].concat());
+    assert!(flat(&said.stderr).contains("add kind = \"…\", or all 1 are left out"), "{}", said.stderr);
+    let job = fs::read_to_string(scene.path("a.toml")).unwrap();
+    for layer in ["a", "b"] {
+        let line = format!("\n    {{ file = \"data.gpkg\", layer = \"{layer}\" }},  # kind = \"…\"\n");
+        assert!(job.contains(&line), "{line} is not in:\n{job}");
+    }
+    scene.run_to(0, &["plan", "a.toml"]);
+}
+
+#[test]
 fn init_takes_features_from_a_folder_and_refuses_them_alone() {
     let scene = scene();
     fs::create_dir(scene.path("all")).unwrap();

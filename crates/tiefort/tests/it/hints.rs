@@ -126,6 +126,20 @@ fn init_tells_to_say_crs_as_an_argument_and_takes_a_folder_for_its_rasters() {
     assert!(said.printed.lines().all(|line| line.chars().count() <= 80), "{}", said.printed);
     let job = said.stdout;
     assert!(job.contains("a.asc") && job.contains("size_m = [2000, 2000]"), "{job}");
+    assert!(!job.contains("left out") && !line.contains("left out"), "all of it: {job}");
+    // 2.225 by 2.475 km, of which whole load modules take 2 by 2.
+    let row = "7 ".repeat(90) + "\n";
+    let head = head.replace("ncols 81", "ncols 90").replace("nrows 81", "nrows 100");
+    fs::write(scene.path("b.asc"), head + &row.repeat(100)).unwrap();
+    let said = scene.run_to(0, &["init", "b.asc", "--crs", "EPSG:32611"]);
+    let line = said.stderr.split_whitespace().collect::<Vec<_>>().join(" ");
+    let left = "; 0.23 km of the files' width and 0.48 km of their height are left out";
+    assert!(line.contains(left), "{}", said.stderr);
+    assert!(
+        said.stdout.contains("# 0.23 km of their width and 0.48 km of their height left out\nsize_m"),
+        "{}",
+        said.stdout
+    );
 }
 
 #[test]
