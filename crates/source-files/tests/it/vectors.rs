@@ -439,7 +439,12 @@ fn a_zipped_shapefile_is_read_with_all_that_is_beside_it() {
     let square = [[-117.0, 35.0, 0.0], [-117.0, 35.001, 0.0], [-116.999, 35.001, 0.0], [-117.0, 35.0, 0.0]];
     let (lines, rings) = (shapefile(&[record(3, &[0], &degrees)]), shapefile(&[record(5, &[0], &square)]));
     let rows = table(&[" track   2T"]);
-    let utm = br#"PROJCS["x",GEOGCS["x",DATUM["D_WGS_1984",SPHEROID["WGS_1984",6378137,298.257223563]],PRIMEM["Greenwich",0],UNIT["Degree",0.0174532925199433]],PROJECTION["Transverse_Mercator"],PARAMETER["False_Easting",500000],PARAMETER["False_Northing",0],PARAMETER["Central_Meridian",-117],PARAMETER["Scale_Factor",0.9996],PARAMETER["Latitude_Of_Origin",0],UNIT["Meter",1]]"#;
+    let utm = concat!(
+        r#"PROJCS["x",GEOGCS["x",DATUM["D_WGS_1984",SPHEROID["WGS_1984",6378137,298.257223563]],"#,
+        r#"PRIMEM["Greenwich",0],UNIT["Degree",0.0174532925199433]],PROJECTION["Transverse_Mercator"],"#,
+        r#"PARAMETER["False_Easting",500000],PARAMETER["False_Northing",0],PARAMETER["Central_Meridian",-117],"#,
+        r#"PARAMETER["Scale_Factor",0.9996],PARAMETER["Latitude_Of_Origin",0],UNIT["Meter",1]]"#,
+    );
     let folder = Folder::new();
     let more: [(&str, &[u8]); 4] =
         [("a/roads.DBF", &rows), ("a/roads.cpg", b"UTF-8"), ("readme.txt", b"x"), ("__MACOSX/a/._roads.shp", b"x")];
@@ -450,7 +455,7 @@ fn a_zipped_shapefile_is_read_with_all_that_is_beside_it() {
     assert_eq!(tags(&file.features[0]), [("highway", "track"), ("lanes", "2"), ("oneway", "true")]);
 
     // The system is that of the .prj in the archive.
-    let path = folder.write("p.zip", &zipped(&[("roads.shp", &lines), ("roads.prj", utm)]));
+    let path = folder.write("p.zip", &zipped(&[("roads.shp", &lines), ("roads.prj", utm.as_bytes())]));
     assert_eq!((read(&path).found, read(&path).outside), (1, 1), "metres, though they look like degrees");
     let path = folder.write("w.zip", &zipped(&[("lake.shp", &rings)]));
     assert_eq!(source_files::read_polygons(&path, 32611).unwrap().len(), 1);
