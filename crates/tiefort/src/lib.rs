@@ -30,6 +30,7 @@ mod fit;
 mod left_over;
 pub mod library;
 mod lines;
+mod making;
 mod measures;
 mod measures_json;
 mod new_folder;
@@ -106,6 +107,7 @@ struct Cli {
 /// `program` is what is typed to run it, where that is not this executable.
 pub fn command_line(words: impl IntoIterator<Item = OsString>, program: Option<PathBuf>) -> u8 {
     failure::report_bugs_in_one_line();
+    signals::begin();
     program::is(program);
     let cli = match Cli::try_parse_from(words) {
         Ok(cli) => cli,

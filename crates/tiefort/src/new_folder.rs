@@ -8,6 +8,7 @@ use tempfile::TempDir;
 
 use crate::failure::Failure;
 use crate::left_over;
+use crate::making::Making;
 
 /// A folder in the making, beside the place where it will appear.
 #[derive(Debug)]
@@ -16,6 +17,7 @@ pub struct NewFolder {
     making: TempDir,
     /// Says to other exports that this one lives.
     _held: Option<fs::File>,
+    _making: Making,
 }
 
 impl NewFolder {
@@ -35,7 +37,8 @@ impl NewFolder {
         builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o777));
         let making = builder.tempdir_in(around).map_err(|error| Failure::output(&path, &error))?;
         let held = left_over::hold(making.path());
-        Ok(Self { path, making, _held: held })
+        let noted = Making::begin(making.path());
+        Ok(Self { path, making, _held: held, _making: noted })
     }
 
     /// Whether a folder may appear at `path`, asked before long work.

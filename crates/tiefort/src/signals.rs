@@ -5,8 +5,8 @@
 //! then holds writing back, so that nothing is left half-written, says how to go on, and ends the process. What a
 //! tile has not published is done again by the next run.
 
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, Once};
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -15,6 +15,7 @@ use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
 
 use crate::failure::Failure;
+use crate::making;
 use crate::terminal;
 
 /// Added to a signal's number, gives the exit code shells expect.
@@ -25,6 +26,40 @@ const LOOK: Duration = Duration::from_millis(20);
 const GRACE: Duration = Duration::from_millis(400);
 /// The time that a thread has to finish writing a file.
 const WRITING: Duration = Duration::from_millis(300);
+
+/// Whether this process is the program, and not one that uses it as a library and has signals of its own.
+static IS_PROGRAM: AtomicBool = AtomicBool::new(false);
+/// Whether some command watches for signals by itself.
+static IS_WATCHED: AtomicBool = AtomicBool::new(false);
+
+/// To be called where the program begins. A file larger than files may be (`ulimit -f`) becomes a write that fails, as
+/// on a full disk, and what was half-written is removed; the system would end the process there.
+pub fn begin() {
+    IS_PROGRAM.store(true, Ordering::SeqCst);
+    #[cfg(unix)]
+    let _ = flag::register(signal_hook::consts::SIGXFSZ, Arc::default());
+}
+
+/// Ends the program as the first signal would, once what it is making is removed, where no command watches by itself.
+pub fn end_where_nothing_else_does() {
+    static ONCE: Once = Once::new();
+    if !IS_PROGRAM.load(Ordering::SeqCst) {
+        return;
+    }
+    ONCE.call_once(|| {
+        if IS_WATCHED.load(Ordering::SeqCst) {
+            return;
+        }
+        let Ok(signals) = Signals::watch() else { return };
+        thread::spawn(move || {
+            while !signals.stop.load(Ordering::Relaxed) {
+                thread::sleep(LOOK);
+            }
+            let _nothing_begins = making::remove_all();
+            std::process::exit(i32::from(signals.exit_code().unwrap_or(1)));
+        });
+    });
+}
 
 /// Watches for signals from [`Signals::watch`] until the process ends.
 #[derive(Clone, Debug)]
@@ -41,6 +76,7 @@ impl Signals {
     /// # Errors
     /// When the system refuses.
     pub fn watch() -> Result<Self, Failure> {
+        IS_WATCHED.store(true, Ordering::SeqCst);
         let signals = Self { stop: Arc::default(), received: Arc::default(), told: Arc::default() };
         for signal in [SIGINT, SIGTERM] {
             signals.register(signal).map_err(|error| {
@@ -83,6 +119,7 @@ impl Signals {
             signals.tell_once(|| {
                 failure.tell();
             });
+            let _nothing_begins = making::remove_all();
             std::process::exit(i32::from(signals.exit_code().unwrap_or(1)));
         });
     }

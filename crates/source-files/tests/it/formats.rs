@@ -117,7 +117,8 @@ fn an_hgt_tile_is_placed_by_its_name_or_by_the_corner_given() {
     bytes[..2].copy_from_slice(&77_i16.to_be_bytes());
     bytes[2..4].copy_from_slice(&(-32768_i16).to_be_bytes());
     let raster = open(&folder.write("N35W117.hgt", &bytes), &Reading::AS_IT_SAYS).unwrap();
-    assert_eq!((raster.format(), raster.vertical_datum()), ("HGT", Some("EGM96")));
+    let file = DemFile::open(&folder.path("N35W117.hgt"), &Reading::AS_IT_SAYS).unwrap();
+    assert_eq!((file.format(), file.vertical_datum()), ("HGT", Some("EGM96")));
     assert_eq!(raster.frame().south_west, [-117.0, 35.0]);
     assert_eq!((raster.height_m(Post::new(1200, 0)), raster.void_count()), (Some(77.0), 1));
     let other = folder.write("tile", &bytes);

@@ -316,3 +316,41 @@ fn pins_that_do_not_say_what_for_are_told_with_what_to_write() {
         }
     }
 }
+
+#[test]
+fn a_file_larger_than_files_may_be_is_an_error_and_leaves_nothing_behind() {
+    let scene = Scene::new();
+    let before = scene.everything();
+    let mut shell = Command::new("sh");
+    let line = "ulimit -f 10; exec \"$0\" sample --posts 501 --out s.tif";
+    shell.current_dir(scene.path("")).args(["-c", line, env!("CARGO_BIN_EXE_tiefort")]);
+    let said = shell.output().unwrap();
+    let told = String::from_utf8_lossy(&said.stderr);
+    assert!(said.status.code() == Some(2) && told.contains("s.tif"), "{:?}: {told}", said.status);
+    assert!(scene.everything() == before, "nothing half-written is left");
+}
+
+/// Whether some file in a folder, or in a folder in that, has a byte.
+fn holds_bytes(folder: &Path) -> bool {
+    fs::read_dir(folder).into_iter().flatten().flatten().any(|entry| match entry.metadata() {
+        Ok(data) if data.is_dir() => holds_bytes(&entry.path()),
+        data => data.is_ok_and(|data| 0 < data.len()),
+    })
+}
+
+#[test]
+fn a_signal_while_a_file_is_being_written_leaves_nothing_behind() {
+    let scene = Scene::new();
+    let before = scene.everything();
+    let mut program = scene.program();
+    let mut child =
+        program.args(["sample", "--posts", "12001", "--out", "s.tif"]).stderr(Stdio::null()).spawn().unwrap();
+    let begun = Instant::now();
+    while !holds_bytes(&scene.path("")) && begun.elapsed() < SECONDS_MAX {
+        std::thread::yield_now();
+    }
+    let killed = Command::new("kill").arg(child.id().to_string()).status().unwrap();
+    assert!(killed.success());
+    assert_eq!(child.wait().unwrap().code(), Some(143));
+    assert!(scene.everything() == before, "nothing half-written is left");
+}
