@@ -4,15 +4,17 @@
 use std::collections::BTreeMap;
 use std::sync::atomic::AtomicBool;
 
-use features::{AreaFeatures, Formed, Kind, Levelled, Place, Storey};
+use database::Profile;
+use features::{AreaFeatures, Formed, Kind, Levelled, Storey};
 use ground::{GamingArea, Ground};
 use job::Job;
 use schedule::{Workers, for_each_piece};
 use terrain::LineStorey;
 
 use crate::CompileError;
+use crate::heard::Heard;
 use crate::level::shares;
-use crate::profile::height_at;
+use crate::profile::sound;
 use crate::read_features::ReadFeatures;
 
 /// Triangles of a load module on average that are tried: SIMNET's first.
@@ -74,7 +76,7 @@ pub fn limits_of(mean: u32) -> [u32; 2] {
 pub struct Budgets {
     job: Job,
     read: ReadFeatures,
-    ground: Vec<Option<i32>>,
+    heard: Heard,
 }
 
 impl Budgets {
@@ -88,16 +90,10 @@ impl Budgets {
         let each = |count: usize, piece: &(dyn Fn(usize) + Sync)| for_each_piece(&workers, count, piece);
         let Some(read) = ReadFeatures::open(job, &area, &each)? else { return Ok(None) };
         let source = Ground::open(job, &area, &workers, &stop)?;
-        let steps = read.features.site.lattice.steps_per_post();
-        let mut ground = vec![None; read.features.stations().len()];
-        for (&tile, stations) in area.tiles.iter().zip(&read.by_tile).filter(|(_, stations)| !stations.is_empty()) {
-            let window = source.natural_tile(&area, tile)?;
-            for &station in stations {
-                let place: Place = read.features.stations()[station as usize];
-                ground[station as usize] = Some(height_at(&window.dem, steps, place));
-            }
-        }
-        Ok(Some(Self { job: job.clone(), read, ground }))
+        let sounded = |&tile| Ok(sound(&area, &read, tile, &source.natural_tile(&area, tile)?.dem));
+        let profiles: Vec<Profile> = area.tiles.iter().map(sounded).collect::<Result<_, CompileError>>()?;
+        let heard = Heard::of(&read, profiles.iter());
+        Ok(Some(Self { job: job.clone(), read, heard }))
     }
 
     /// What a mean and its limits would keep.
@@ -111,8 +107,8 @@ impl Budgets {
         job.limits.window.limit = per_window;
         let area = GamingArea::new(&job)?;
         let spec = job.features.as_ref().expect("a job with features");
-        let Levelled { reserved, .. } =
-            self.read.features.level(&self.ground, spec.options, &shares(&area.budget, spec));
+        let (sounded, shares) = (self.heard.sounded(), shares(&area.budget, spec));
+        let Levelled { reserved, .. } = self.read.features.level(sounded, (spec.options, spec.falls), &shares);
         let lakes = reserved.amounts.values();
         let lakes = lakes.fold([0; 2], |[kept, all], of| [kept + of.lakes_kept, all + of.lakes_wanted]);
         let triangles = reserved.cost.values().flat_map(BTreeMap::values).map(|&count| u64::from(count)).sum();

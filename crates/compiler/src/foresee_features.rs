@@ -4,7 +4,7 @@
 //! lines then, and fewer stations are needed; on the other hand nothing is narrowed or left out for a limit.
 
 use database::{AreaLevel, ReportFeatures};
-use features::Shares;
+use features::{Shares, Sounded};
 use fidelity::FeatureFigures;
 use ground::{FeatureTable, GamingArea};
 use job::Job;
@@ -45,7 +45,9 @@ pub fn foresee_features(job: &Job) -> Result<Option<FeaturesForeseen>, CompileEr
     let buildings = spec.has_buildings().then_some(vectors.buildings.len());
     let level_ground = vec![Some(0); features.stations().len()];
     // No limit, so that nothing is degraded.
-    let levelled = features.level(&level_ground, spec.options, &Shares::all());
+    let inside = vec![Vec::new(); features.outlines().len()];
+    let sounded = Sounded { heights: &level_ground, middles: &level_ground, inside: &inside };
+    let levelled = features.level(sounded, (spec.options, spec.falls), &Shares::all());
     let level = AreaLevel { cost: cost_of(job, area.grid, &levelled.reserved.cost), ..AreaLevel::default() };
     let mut modules = vec![0; area.grid.count()];
     level.cost.iter().for_each(|&(place, _, triangles)| modules[place as usize] += triangles);

@@ -3,7 +3,7 @@
 
 use database::{Building, SourceRecord};
 use engine::{Fingerprint, FingerprintBuilder, Key, Part, Stamp};
-use features::{AreaFeatures, Clearances, GradeOptions, Place};
+use features::{AreaFeatures, Clearances, FallOptions, GradeOptions, Outline, Place, Sounded};
 use ground::{GamingArea, Surroundings, Window, feed_post};
 use job::{Borders, ClipHeights, Edges, FeaturesSpec, Job, LodBorder, LodSpec, ModulesSpec, OuterBorder};
 use limits::Allowance;
@@ -91,9 +91,20 @@ fn feed_kept(builder: FingerprintBuilder, refinement: &Refinement) -> Fingerprin
 }
 
 /// Of the ground along the features of a tile.
-pub(crate) fn profile(window: &Window, steps: i32, stations: impl ExactSizeIterator<Item = Place>) -> Key {
+pub(crate) fn profile(
+    window: &Window,
+    steps: i32,
+    stations: impl ExactSizeIterator<Item = Place>,
+    beds: impl ExactSizeIterator<Item = Place>,
+    basins: &[(u32, &Outline)],
+) -> Key {
+    let feed_place = |part: FingerprintBuilder, Place { row, col }: Place| part.signed(row.into()).signed(col.into());
     window.key("profile").part(FEATURES, |part| {
-        part.signed(steps.into()).list(stations, |part, Place { row, col }| part.signed(row.into()).signed(col.into()))
+        let part = part.signed(steps.into()).list(stations, feed_place).list(beds, feed_place);
+        part.list(basins.iter(), |part, (number, outline)| {
+            part.number((*number).into())
+                .list(outline.rings.iter(), |part, ring| part.list(ring.places.iter().copied(), feed_place))
+        })
     })
 }
 
@@ -103,15 +114,16 @@ pub(crate) fn level(
     budget: &Budget,
     records: &[SourceRecord],
     (features, notes): (&AreaFeatures, &[String]),
-    ground: &[Option<i32>],
+    sounded: Sounded,
 ) -> Key {
     let Budget { grid, border_step, per_module, pool: _, area, per_window, windows, reserved: _ } = budget;
     let ModuleGrid { rows, cols, side_cells } = *grid;
     // What sources and rules come to is in the features; the names of features are those of the files.
     let spec = job.features.as_ref().expect("a stage of jobs with features");
-    let FeaturesSpec { share_main, share_max, options, .. } = spec;
+    let FeaturesSpec { share_main, share_max, options, falls, .. } = spec;
     let GradeOptions { clearances, bank, cut_max, fill_max, clip, smooth_milliposts } = *options;
     let Clearances { road, rail, water } = clearances;
+    let FallOptions { tau, carve_max, tilt, cut_max: _, fill_max: _ } = *falls;
     let files = spec.files();
     let files = records.iter().filter(|record| files.iter().any(|file| file.written == record.path));
     let files: Vec<Fingerprint> = files.map(|record| record.blake3).collect();
@@ -123,7 +135,8 @@ pub(crate) fn level(
             let part = part.real(*share_main).real(*share_max);
             let quanta = [road, rail, water, bank, cut_max, fill_max, clip];
             let part = quanta.into_iter().fold(part, |part, quanta| part.signed(quanta.into()));
-            part.maybe(smooth_milliposts, |part, thousandths| part.number(thousandths.into()))
+            let part = part.maybe(smooth_milliposts, |part, thousandths| part.number(thousandths.into()));
+            part.number(tau.into()).signed(carve_max.into()).case(tilt.into())
         })
         .part(ALLOWANCE, |part| {
             let part = part.number(rows.into()).number(cols.into()).signed(side_cells.into());
@@ -136,7 +149,13 @@ pub(crate) fn level(
             part.rows(std::iter::once(&words[..]), i64::to_le_bytes)
         })
         .part(PROFILES, |part| {
-            part.list(ground.iter(), |part, height| part.maybe(*height, |part, height| part.signed(height.into())))
+            let Sounded { heights, middles, inside } = sounded;
+            let feed = |part: FingerprintBuilder, height: &Option<i32>| {
+                part.maybe(*height, |part, height| part.signed(height.into()))
+            };
+            part.list(heights.iter(), feed).list(middles.iter(), feed).list(inside.iter(), |part, of| {
+                part.list(of.iter(), |part, (height, count)| part.signed((*height).into()).number((*count).into()))
+            })
         })
 }
 

@@ -3,12 +3,13 @@
 
 use database::{AreaLevel, FileStamp, Profile};
 use engine::{Artifact, Key, Outcome, Stamp, keep_or_make};
-use features::{Share, Shares};
+use features::{Share, Shares, Sounded};
 use job::FeaturesSpec;
 use terrain::TileId;
 use tiling::Budget;
 
 use crate::buildings::publish_buildings;
+use crate::heard::Heard;
 use crate::keys;
 use crate::pieces::{area_level, pieces, reserved};
 use crate::read_features::ReadFeatures;
@@ -31,12 +32,9 @@ pub(crate) fn level(
 /// The same, with the bytes that say so.
 pub(crate) fn level_area(run: &Run, profiles: &[Profile]) -> Result<Outcome<(FileStamp, AreaLevel)>, CompileError> {
     let (read, spec) = (run.features()?, run.job.features.as_ref().expect("a stage of jobs with features"));
-    let mut ground = vec![None; read.features.stations().len()];
-    for (profile, stations) in profiles.iter().zip(&read.by_tile) {
-        stations.iter().zip(&profile.heights).for_each(|(&station, &height)| ground[station as usize] = height);
-    }
+    let heard = Heard::of(&read, profiles.iter());
     publish_buildings(run, &read)?;
-    keep_or_make(&Levelling { run, read: &read, spec, ground: &ground }, ALGORITHM_REVISION)
+    keep_or_make(&Levelling { run, read: &read, spec, sounded: heard.sounded() }, ALGORITHM_REVISION)
 }
 
 /// What features of the area come to, as the engine asks for it.
@@ -44,7 +42,7 @@ struct Levelling<'a> {
     run: &'a Run<'a>,
     read: &'a ReadFeatures,
     spec: &'a FeaturesSpec,
-    ground: &'a [Option<i32>],
+    sounded: Sounded<'a>,
 }
 
 impl Artifact for Levelling<'_> {
@@ -52,7 +50,7 @@ impl Artifact for Levelling<'_> {
     type Error = CompileError;
 
     fn key(&self) -> Key {
-        keys::level(self.run.job, &self.run.area.budget, &self.run.records, self.read.seen(), self.ground)
+        keys::level(self.run.job, &self.run.area.budget, &self.run.records, self.read.seen(), self.sounded)
     }
 
     fn published(&self) -> Result<Option<Stamp>, CompileError> {
@@ -70,8 +68,9 @@ impl Artifact for Levelling<'_> {
     }
 
     fn make(&self, _key: &Key, stamp: &Stamp) -> Result<(FileStamp, AreaLevel), CompileError> {
-        let Self { run, read, spec, ground } = *self;
-        let levelled = read.features.level(ground, spec.options, &shares(&run.area.budget, spec));
+        let Self { run, read, spec, sounded } = *self;
+        let shares = shares(&run.area.budget, spec);
+        let levelled = read.features.level(sounded, (spec.options, spec.falls), &shares);
         let pieces = pieces(run, &read.features, &levelled.reserved.formed);
         let mut level = area_level(run, read, &levelled);
         level.reserved = reserved(run, &levelled.reserved.formed, &pieces);

@@ -7,6 +7,7 @@ use job::Job;
 use terrain::in_turn;
 
 use crate::CompileError;
+use crate::heard::Heard;
 use crate::keys;
 use crate::read_features::ReadFeatures;
 
@@ -22,13 +23,15 @@ pub fn level_fingerprint(
     folder: &Folder,
 ) -> Result<Option<Fingerprint>, CompileError> {
     let Some(read) = ReadFeatures::open(job, area, &in_turn)? else { return Ok(None) };
-    let mut ground = vec![None; read.features.stations().len()];
-    for (&tile, stations) in area.tiles.iter().zip(&read.by_tile) {
+    let mut profiles = Vec::new();
+    for (index, &tile) in area.tiles.iter().enumerate() {
         let (.., profile) = folder.read_profile(tile)?;
-        if profile.heights.len() != stations.len() {
+        let asked = [read.stations(index).len(), read.beds(index).len()];
+        if asked != [profile.heights.len(), profile.middles.len()] {
             return Ok(None);
         }
-        stations.iter().zip(profile.heights).for_each(|(&station, height)| ground[station as usize] = height);
+        profiles.push(profile);
     }
-    Ok(Some(keys::level(job, &area.budget, records, read.seen(), &ground).fingerprint()))
+    let heard = Heard::of(&read, profiles.iter());
+    Ok(Some(keys::level(job, &area.budget, records, read.seen(), heard.sounded()).fingerprint()))
 }

@@ -13,6 +13,7 @@ pub use error::CompileError;
 mod run;
 pub use run::{ALGORITHM_REVISION, Options, run_name};
 mod cause;
+mod heard;
 mod keys;
 pub use keys::{kept_features, modules as modules_key, rules};
 mod build;

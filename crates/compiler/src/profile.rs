@@ -1,12 +1,13 @@
 //! The stage `profile`: the ground along features, tile by tile. It reads the features and one tile's heights.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use database::{FileStamp, Profile};
 use engine::{Artifact, Key, Outcome, Stamp, keep_or_make};
-use features::Place;
-use ground::Window;
-use terrain::{Dem, Post, PostRect, TileId};
+use features::{Kind, Outline, Place};
+use ground::{GamingArea, Window, posts_inside};
+use terrain::{Dem, LatticePoint, Post, PostRect, TileId, Vertex};
 
 use crate::keys;
 use crate::read_features::ReadFeatures;
@@ -37,8 +38,16 @@ struct Profiling<'a> {
 }
 
 impl Profiling<'_> {
+    fn index(&self) -> usize {
+        self.run.area.tiling.index(self.tile)
+    }
+
     fn stations(&self) -> impl ExactSizeIterator<Item = Place> + Clone {
-        self.read.stations(self.run.area.tiling.index(self.tile))
+        self.read.stations(self.index())
+    }
+
+    fn beds(&self) -> impl ExactSizeIterator<Item = Place> + Clone + use<> {
+        self.read.beds(self.index()).into_iter()
     }
 }
 
@@ -47,7 +56,8 @@ impl Artifact for Profiling<'_> {
     type Error = CompileError;
 
     fn key(&self) -> Key {
-        keys::profile(self.window, self.read.features.site.lattice.steps_per_post(), self.stations())
+        let steps = self.read.features.site.lattice.steps_per_post();
+        keys::profile(self.window, steps, self.stations(), self.beds(), &basins(&self.run.area, self.read, self.tile))
     }
 
     fn published(&self) -> Result<Option<Stamp>, CompileError> {
@@ -56,20 +66,80 @@ impl Artifact for Profiling<'_> {
 
     fn read(&self, _key: &Key) -> Option<(Stamp, (FileStamp, Profile))> {
         let (stamp, file, profile) = self.run.database.folder().read_profile(self.tile).ok()?;
-        (profile.heights.len() == self.stations().len()).then_some((stamp, (file, profile)))
+        let is_whole = profile.heights.len() == self.stations().len() && profile.middles.len() == self.beds().len();
+        is_whole.then_some((stamp, (file, profile)))
     }
 
     fn make(&self, _key: &Key, stamp: &Stamp) -> Result<(FileStamp, Profile), CompileError> {
-        let steps = self.read.features.site.lattice.steps_per_post();
-        let heights = self.stations().map(|place| Some(height_at(&self.window.dem, steps, place))).collect();
-        let profile = Profile { tile: self.tile, heights };
+        let profile = sound(&self.run.area, self.read, self.tile, &self.window.dem);
         Ok((self.run.database.write_profile(stamp, &profile)?, profile))
     }
 }
 
+/// The ground along the features of a tile, by the heights of its DEM.
+pub(crate) fn sound(area: &GamingArea, read: &ReadFeatures, tile: TileId, dem: &Dem) -> Profile {
+    let (index, steps) = (area.tiling.index(tile), read.features.site.lattice.steps_per_post());
+    let heights = read.stations(index).map(|place| Some(height_at(dem, steps, place))).collect();
+    let middles = read.beds(index).into_iter().map(|place| middle_at(dem, steps, place)).collect();
+    let own = own_posts(area.tiling.rect(tile), area.rect);
+    let inside = |(number, outline): (u32, &Outline)| {
+        let rings: Vec<Vec<Vertex>> = outline.rings.iter().map(|ring| vertices(&ring.places)).collect();
+        let rings: Vec<&[Vertex]> = rings.iter().map(Vec::as_slice).collect();
+        let mut heights: BTreeMap<i32, u32> = BTreeMap::new();
+        for post in posts_inside(&rings, steps, own) {
+            *heights.entry(dem.height(post)).or_default() += 1;
+        }
+        (!heights.is_empty()).then(|| (number, heights.into_iter().collect()))
+    };
+    let inside = basins(area, read, tile).into_iter().filter_map(inside).collect();
+    Profile { tile, heights, middles, inside }
+}
+
+/// Polygons of water that reach into a tile, by their number.
+fn basins<'a>(area: &GamingArea, read: &'a ReadFeatures, tile: TileId) -> Vec<(u32, &'a Outline)> {
+    let steps = read.features.site.lattice.steps_per_post();
+    let PostRect { south, west, north, east } = area.tiling.rect(tile);
+    let reaches = |(_, outline): &(u32, &Outline)| {
+        let span = |of: fn(Place) -> i32, low: i32, high: i32| {
+            let (least, most) = (outline.places().map(of).min(), outline.places().map(of).max());
+            least.is_some_and(|least| least <= high * steps) && most.is_some_and(|most| low * steps <= most)
+        };
+        span(|place| place.row, south, north) && span(|place| place.col, west, east)
+    };
+    let is_water = |(_, outline): &(u32, &Outline)| matches!(outline.traits.kind, Kind::Lake | Kind::River);
+    (0..).zip(read.features.outlines()).filter(is_water).filter(reaches).collect()
+}
+
+fn vertices(places: &[Place]) -> Vec<Vertex> {
+    places.iter().map(|place| Vertex { at: LatticePoint::new(place.row, place.col), height: 0 }).collect()
+}
+
+/// The posts of a tile that are no other tile's: those on a line between two belong to the one north or east of it.
+fn own_posts(tile: PostRect, area: PostRect) -> PostRect {
+    let north = if tile.north < area.north { tile.north - 1 } else { tile.north };
+    let east = if tile.east < area.east { tile.east - 1 } else { tile.east };
+    PostRect { north, east, ..tile }
+}
+
+/// The middle one of the heights at the post nearest to a place and the eight around it, as far as the DEM reaches.
+fn middle_at(dem: &Dem, steps: i32, place: Place) -> i32 {
+    let PostRect { south, west, north, east } = dem.rect();
+    let near = |at: i32, low: i32, high: i32| {
+        let post = (2 * at + steps).div_euclid(2 * steps);
+        (-1..=1).map(move |by| (post + by).clamp(low, high))
+    };
+    let rows = near(place.row, south, north);
+    let mut heights: Vec<i32> = rows
+        .flat_map(|row| near(place.col, west, east).map(move |col| Post::new(row, col)))
+        .map(|post| dem.height(post))
+        .collect();
+    heights.sort_unstable();
+    heights[heights.len() / 2]
+}
+
 /// The height of a DEM at a place between its posts, bilinear and rounded to quanta: over a hole that of the surface
 /// that closes it, beyond the DEM that of the nearest place inside.
-pub(crate) fn height_at(dem: &Dem, steps: i32, place: Place) -> i32 {
+fn height_at(dem: &Dem, steps: i32, place: Place) -> i32 {
     let PostRect { south, west, north, east } = dem.rect();
     let place = Place::new(place.row.clamp(south * steps, north * steps), place.col.clamp(west * steps, east * steps));
     let (row, col) = (place.row.div_euclid(steps), place.col.div_euclid(steps));

@@ -41,6 +41,13 @@ impl ReadFeatures {
         (&self.features, &self.table.notes)
     }
 
+    /// The stations of a tile through which rivers run.
+    pub fn beds(&self, index: usize) -> Vec<Place> {
+        let (stations, is_bed) = (self.features.stations(), self.features.is_bed());
+        let beds = self.by_tile[index].iter().filter(|station| is_bed[**station as usize]);
+        beds.map(|station| stations[*station as usize]).collect()
+    }
+
     /// The stations of a tile.
     pub fn stations(&self, index: usize) -> impl ExactSizeIterator<Item = Place> + Clone {
         self.by_tile[index].iter().map(|&number| self.features.stations()[number as usize])

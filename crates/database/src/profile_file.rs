@@ -8,25 +8,32 @@ use terrain::TileId;
 use crate::frame::{Kind, malformed};
 use crate::{DatabaseError, Stamp, codec, frame};
 
-/// Heights of the DEM at the stations of features in one tile, in the order of their places.
+/// What the DEM says along features in one tile.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Profile {
     /// The tile.
     pub tile: TileId,
-    /// Quanta, or nothing over a void.
+    /// Its height at each of their stations, in the order of places, in quanta; nothing over a void.
     pub heights: Vec<Option<i32>>,
+    /// The middle one of nine heights around each of those stations through which a river runs, in quanta.
+    pub middles: Vec<i32>,
+    /// Of polygons of water by their number: how often each height occurs at the posts inside, in quanta, ascending.
+    pub inside: Vec<(u32, Vec<(i32, u32)>)>,
 }
 
 #[derive(Serialize, Deserialize)]
 struct ProfileOnDisk {
     tile: (u32, u32),
     heights: Vec<Option<i32>>,
+    middles: Vec<i32>,
+    inside: Vec<(u32, Vec<(i32, u32)>)>,
 }
 
 /// The bytes of a profile.
 pub fn encode_profile(stamp: &Stamp, profile: &Profile) -> Vec<u8> {
-    let Profile { tile, heights } = profile.clone();
-    frame::seal(Kind::Profile, stamp, &codec::encode(&ProfileOnDisk { tile: (tile.row, tile.col), heights }))
+    let Profile { tile, heights, middles, inside } = profile.clone();
+    let on_disk = ProfileOnDisk { tile: (tile.row, tile.col), heights, middles, inside };
+    frame::seal(Kind::Profile, stamp, &codec::encode(&on_disk))
 }
 
 /// The profile whose file, at `path`, has these bytes.
@@ -35,8 +42,9 @@ pub fn encode_profile(stamp: &Stamp, profile: &Profile) -> Vec<u8> {
 /// When the file is not as it was written.
 pub fn decode_profile(path: &Path, bytes: &[u8]) -> Result<(Stamp, Profile), DatabaseError> {
     let (stamp, payload) = frame::open(Kind::Profile, path, bytes)?;
-    let ProfileOnDisk { tile: (row, col), heights } = codec::decode(payload).map_err(|what| malformed(path, what))?;
-    Ok((stamp, Profile { tile: TileId { row, col }, heights }))
+    let ProfileOnDisk { tile: (row, col), heights, middles, inside } =
+        codec::decode(payload).map_err(|what| malformed(path, what))?;
+    Ok((stamp, Profile { tile: TileId { row, col }, heights, middles, inside }))
 }
 
 #[cfg(test)]
@@ -47,7 +55,9 @@ mod tests {
     #[test]
     fn profiles_survive_their_file_and_every_damage_is_an_error() {
         let path = Path::new("r00c01.profile");
-        let profile = Profile { tile: samples::TILE, heights: vec![Some(-7), None, Some(90_000)] };
+        let heights = vec![Some(-7), None, Some(90_000)];
+        let inside = vec![(2, vec![(-7, 3), (12, 1)])];
+        let profile = Profile { tile: samples::TILE, heights, middles: vec![9, -9], inside };
         let bytes = encode_profile(&samples::stamp(), &profile);
         assert_eq!(decode_profile(path, &bytes).unwrap(), (samples::stamp(), profile));
         samples::check_every_damage(&bytes, |bytes| decode_profile(path, bytes).is_err());

@@ -1,17 +1,17 @@
 //! All features of one area, in the order in which things are decided: what they are and where they run, then, with the
 //! heights of the DEM at every station, how high they lie and what they put into the ground.
 
-use std::collections::{BTreeMap, HashSet};
+use std::collections::{BTreeMap, HashMap, HashSet};
 
 use terrain::Each;
 
 use crate::pieces::moved;
 use crate::rules::Sorted;
 use crate::{
-    About, Bed, FeatureId, Flaw, GradeOptions, Graded, Grants, Network, Outline, Place, Remark, Reserved, Rule, Shares,
-    Site, Source, Strand, Traits, Waters, Way, banks, breaklines, channels, dams, fall, flowing, grade, have_line,
-    lakes_along, level, lines_inside, mend, outline_only, pins, reserve, round, shore, sides, sort_out, split_at_dams,
-    travelled, water,
+    About, Bed, FallOptions, FeatureId, Flaw, GradeOptions, Graded, Grants, Histogram, Lake, Network, Outline, Place,
+    Remark, Reserved, Rule, Shares, Shores, Site, Source, Strand, Traits, Waters, Way, afloat, banks, breaklines,
+    channels, dams, fall, flowing, grade, have_line, lakes_along, level, lift_shores, lines_inside, mend, outline_only,
+    pins, reserve, round, shore, sides, sort_out, split_at_dams, travelled, water, with_water,
 };
 
 /// Features on the lattice of an area, before their heights are known.
@@ -33,6 +33,19 @@ pub struct AreaFeatures {
     names: BTreeMap<FeatureId, u64>,
     /// Sorted, each once.
     stations: Vec<Place>,
+    /// Of each station whether a river runs through it.
+    is_bed: Vec<bool>,
+}
+
+/// What the DEM says along features.
+#[derive(Clone, Copy)]
+pub struct Sounded<'a> {
+    /// Its height at each of the [`AreaFeatures::stations`], in quanta.
+    pub heights: &'a [Option<i32>],
+    /// The middle one of nine heights around each station that is a [`AreaFeatures::is_bed`].
+    pub middles: &'a [Option<i32>],
+    /// Heights of the posts inside each of the [`AreaFeatures::outlines`].
+    pub inside: &'a [Histogram],
 }
 
 /// How high features lie, and what they put into the ground.
@@ -109,8 +122,11 @@ impl AreaFeatures {
             river_banks,
             names,
             stations: Vec::new(),
+            is_bed: Vec::new(),
         };
         all.stations = all.asked();
+        let beds: HashSet<Place> = all.rivers.nodes.iter().map(|node| node.place).collect();
+        all.is_bed = all.stations.iter().map(|place| beds.contains(place)).collect();
         all
     }
 
@@ -118,6 +134,16 @@ impl AreaFeatures {
     /// rivers. In order of place, each once.
     pub fn stations(&self) -> &[Place] {
         &self.stations
+    }
+
+    /// Of each station whether a river runs through it, so that heights around it are asked for, too.
+    pub fn is_bed(&self) -> &[bool] {
+        &self.is_bed
+    }
+
+    /// All polygons; those of water are asked for the heights inside.
+    pub fn outlines(&self) -> &[Outline] {
+        &self.outlines
     }
 
     fn asked(&self) -> Vec<Place> {
@@ -131,22 +157,28 @@ impl AreaFeatures {
         all
     }
 
-    /// Decides all heights, and forms features so that they take no more triangles than there is room for. `ground` has
-    /// the height of the DEM at each of the stations, in quanta. Beyond the area that is the height of the nearest
-    /// place inside, and only features without any place inside rest on it.
+    /// Decides all heights, and forms features so that they take no more triangles than there is room for. Beyond the
+    /// area a height of the DEM is that of the nearest place inside, and only features without any place inside rest
+    /// on it.
     ///
     /// # Panics
-    /// When there is not one height, or none, for each station.
-    pub fn level(&self, ground: &[Option<i32>], options: GradeOptions, shares: &Shares) -> Levelled {
-        assert_eq!(self.stations.len(), ground.len(), "the DEM was asked at every station");
-        let near = |place: Place| self.stations.binary_search(&place).ok().and_then(|found| ground[found]);
+    /// When there is not one height, or none, for each station, and one histogram for each outline.
+    pub fn level(&self, sounded: Sounded, (options, falls): (GradeOptions, FallOptions), shares: &Shares) -> Levelled {
+        let Sounded { heights, middles, inside } = sounded;
+        assert_eq!([heights.len(), middles.len()], [self.stations.len(); 2], "the DEM was asked at every station");
+        assert_eq!(inside.len(), self.outlines.len(), "the DEM was asked inside every outline");
+        let of = |place: Place, all: &[Option<i32>]| self.stations.binary_search(&place).ok().and_then(|at| all[at]);
+        let near = |place: Place| of(place, heights);
         let at = |place: Place| near(place).filter(|_| self.site.holds(place));
+        let middle = |place: Place| of(place, middles).filter(|_| self.site.holds(place));
         let mut remarks = self.remarks.clone();
-        let mut strands = self.waters((&at, &near), &mut remarks);
+        let (mut strands, lakes) =
+            self.waters(Soundings { at: &at, near: &near, middle: &middle, inside }, falls, &mut remarks);
         strands.extend(self.breaklines(&near));
         let roads = &self.roads;
         let resting = ground_of(roads, &at, &near);
-        let pins = pins(roads, &self.ways);
+        let afloat = afloat(&self.outlines, &lakes, roads, &self.road_sides, &self.site);
+        let pins = with_water(roads, pins(roads, &self.ways), &afloat, &mut remarks);
         let heights = grade(roads, &resting, &pins, &water(&strands), options, &mut remarks);
         let beside = |(sides, height): (&[Place; 2], &i32)| sides.map(|place| at(place).unwrap_or(*height));
         let beside: Vec<[i32; 2]> = self.road_sides.iter().zip(&heights).map(beside).collect();
@@ -166,9 +198,10 @@ impl AreaFeatures {
     }
 
     /// Rivers, lakes and what else polygons of water became, by the ground inside the area and that nearest to places
-    /// beyond it.
-    fn waters(&self, (at, near): (Ground, Ground), remarks: &mut Vec<Remark>) -> Vec<Strand> {
+    /// beyond it; and the lakes.
+    fn waters(&self, of: Soundings, falls: FallOptions, remarks: &mut Vec<Remark>) -> (Vec<Strand>, Vec<Lake>) {
         let Self { site, outlines, rivers, .. } = self;
+        let Soundings { at, near, middle, inside } = of;
         let shore_by = |outline: &Outline, ground: Ground| outline.places().map(ground).collect::<Vec<Option<i32>>>();
         let shore_of = |outline: &Outline| match shore_by(outline, at) {
             unknown if unknown.iter().all(Option::is_none) => shore_by(outline, near),
@@ -177,14 +210,22 @@ impl AreaFeatures {
         let shores: Vec<Vec<Option<i32>>> = outlines.iter().map(shore_of).collect();
         let has_line = have_line(outlines, rivers, site);
         let is_dam = |place: Place| self.dams.contains(&place);
-        let waters: Waters = level(outlines, &shores, &has_line, &is_dam, site.lattice, remarks);
+        let all = Shores { heights: &shores, inside, has_line: &has_line };
+        let mut waters: Waters = level(outlines, all, &is_dam, falls, site.lattice, remarks);
         let ground = ground_of(rivers, at, near);
         let lowest = |(banks, ground): (&[Place; 2], &Option<i32>)| {
             banks.iter().filter_map(|place| at(*place)).chain(*ground).min()
         };
         let lower_bank: Vec<Option<i32>> = self.river_banks.iter().zip(&ground).map(lowest).collect();
-        let lake = lakes_along(outlines, &waters, rivers, site);
-        let fallen = fall(rivers, Bed { ground: &ground, lower_bank: &lower_bank, lake: &lake }, remarks);
+        let middles: Vec<Option<i32>> =
+            rivers.nodes.iter().zip(&ground).map(|(node, ground)| middle(node.place).or(*ground)).collect();
+        let still = lakes_along(outlines, &waters.lakes, rivers, site);
+        let bed = Bed { ground: &ground, middle: &middles, lower_bank: &lower_bank };
+        let fallen = fall(rivers, bed, &still, falls, remarks);
+        let levels: HashMap<u32, i32> =
+            still.iter().zip(&fallen.levels).map(|(still, level)| (still.body, *level)).collect();
+        waters.lakes.iter_mut().for_each(|lake| lake.level = levels.get(&lake.body).copied().unwrap_or(lake.level));
+        lift_shores(outlines, &shores, &mut waters.lakes, site.lattice, remarks);
         let mut strands = channels(rivers, &fallen);
         strands.extend(waters.lakes.iter().flat_map(|lake| shore(&outlines[lake.outline as usize], lake.level)));
         let inside = lines_inside(outlines, &waters.banks, rivers, &fallen, site);
@@ -195,7 +236,7 @@ impl AreaFeatures {
             outline_only(outline, &shore_by(outline, near))
         };
         strands.extend(waters.outlines_only.iter().flat_map(only));
-        strands
+        (strands, waters.lakes)
     }
 
     /// Breaklines at the heights of their source, else of the ground.
@@ -222,6 +263,19 @@ fn names(sources: &[Source]) -> BTreeMap<FeatureId, u64> {
 
 /// The height of the ground at a place, where there is one.
 type Ground<'a> = &'a dyn Fn(Place) -> Option<i32>;
+
+/// The ground as water asks for it.
+#[derive(Clone, Copy)]
+struct Soundings<'a> {
+    /// At a place inside the area.
+    at: Ground<'a>,
+    /// At the nearest place inside.
+    near: Ground<'a>,
+    /// The middle one of nine around a place.
+    middle: Ground<'a>,
+    /// At the posts inside each outline.
+    inside: &'a [Histogram],
+}
 
 /// The ground inside the area at each node of a network; what has no part inside rests on the ground nearest to it.
 fn ground_of(network: &Network, at: Ground, near: Ground) -> Vec<Option<i32>> {
@@ -259,9 +313,15 @@ mod tests {
     fn levelled(sources: Vec<Source>, metres: impl Fn(f64, f64) -> f64) -> Levelled {
         let all = AreaFeatures::of(sources, &[], 1.5, site(), &in_turn);
         let ground: Vec<Option<i32>> = all.stations().iter().map(|place| ground_at(*place, &metres)).collect();
-        let levelled = all.level(&ground, GradeOptions::USUAL, &Shares::each([8, 8], 1000));
+        let levelled = level_usual(&all, &ground, &Shares::each([8, 8], 1000));
         check(&levelled.reserved.formed);
         levelled
+    }
+
+    fn level_usual(all: &AreaFeatures, ground: &[Option<i32>], shares: &Shares) -> Levelled {
+        let inside = vec![Vec::new(); all.outlines().len()];
+        let sounded = Sounded { heights: ground, middles: ground, inside: &inside };
+        all.level(sounded, (GradeOptions::USUAL, FallOptions::USUAL), shares)
     }
 
     fn lake() -> Source {
@@ -312,7 +372,7 @@ mod tests {
         let ground: Vec<Option<i32>> = all.stations().iter().map(|place| ground_at(*place, &|_, _| 5.0)).collect();
         let mut shares = Shares::each([8, 8], 40);
         shares.modules.iter_mut().for_each(|share| share.main = 64);
-        let levelled = all.level(&ground, GradeOptions::USUAL, &shares);
+        let levelled = level_usual(&all, &ground, &shares);
         let of = |role: Role| levelled.reserved.formed.edges.iter().filter(|edge| edge.role == role).count();
         assert!(4 <= of(Role::Shore) && 0 < of(Role::Centre), "{} and {}", of(Role::Shore), of(Role::Centre));
         assert!(levelled.remarks.iter().any(|remark| remark.remedy.leaves_out()));

@@ -34,6 +34,11 @@ pub(crate) struct Problem {
 
 /// Fits a height to every node; loops in so many rounds.
 pub(crate) fn fit(problem: &Problem, rounds: u64) -> Vec<i64> {
+    by_parts(problem, &|part, _| part.solve(rounds))
+}
+
+/// What comes of each part by itself, whose nodes have these numbers.
+fn by_parts(problem: &Problem, of: &dyn Fn(&Part, &[u32]) -> Vec<i64>) -> Vec<i64> {
     let graph = Graph::of(problem.places.len(), &problem.ties);
     let (sample_starts, samples) = by_node(problem);
     let mut heights = vec![0; problem.places.len()];
@@ -41,11 +46,25 @@ pub(crate) fn fit(problem: &Problem, rounds: u64) -> Vec<i64> {
     for nodes in graph.parts() {
         nodes.iter().zip(0..).for_each(|(&node, number)| local[node as usize] = number);
         let part = Part::of(problem, &graph, (&sample_starts, &samples), &nodes, &local);
-        for (&node, height) in nodes.iter().zip(part.solve(rounds)) {
+        for (&node, height) in nodes.iter().zip(of(&part, &nodes)) {
             heights[node as usize] = height;
         }
     }
     heights
+}
+
+/// Heights that keep all ties, as near to some heights as the middle between the nearest from below and from above.
+pub(crate) fn keep_ties(problem: &Problem, heights: Vec<i64>) -> Vec<i64> {
+    by_parts(problem, &|part, nodes| {
+        let mut of_part: Vec<i64> = nodes.iter().map(|node| heights[*node as usize]).collect();
+        part.make_keep_ties(&mut of_part);
+        of_part
+    })
+}
+
+/// The greatest heights that ranges allow through ties.
+pub(crate) fn most(problem: &Problem) -> Vec<i64> {
+    by_parts(problem, &|part, _| part.lowest(part.ranges.iter().map(|range| range.most).collect()))
 }
 
 /// The samples in the order of their nodes, and where those of each node begin.

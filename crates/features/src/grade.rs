@@ -70,7 +70,7 @@ pub fn grade(
     let mut swept = lay(network, &resting, &pins, options);
     straighten(network, &swept.costs, &mut swept.heights);
     clear(network, &mut swept, water, options.clearances, remarks);
-    remark_steep(network, &swept.heights, &|edge| relaxed_max(network, edge), remarks);
+    remark_steep(network, &swept.heights, &|edge| network.relaxed_max(edge), remarks);
     Remark::sort(remarks);
     swept.heights
 }
@@ -84,7 +84,7 @@ fn lay(network: &Network, resting: &[Option<i32>], pins: &[Pin], options: GradeO
         .map(|height| height.map(|height| [height - options.cut_max, height + options.fill_max]))
         .collect();
     pins.iter().for_each(|pin| limits[pin.node as usize] = Some([pin.height; 2]));
-    relax_within(network, &mut costs, &limits, &|edge| relaxed_max(network, edge));
+    relax_within(network, &mut costs, &limits, &|edge| network.relaxed_max(edge));
     // Where nothing of a network rests on the ground it lies at height 0: it has none to be true to.
     let mut wishes = filled(network, resting);
     straighten(network, &costs, &mut wishes);
@@ -106,12 +106,6 @@ fn lay(network: &Network, resting: &[Option<i32>], pins: &[Pin], options: GradeO
     let heights = fitted(&smooth(network, &clipped.collect::<Vec<_>>(), resting, options.smooth_milliposts));
     let (_, most) = bounds(network, &costs, pins);
     Swept { heights, costs, most }
-}
-
-/// What an edge may rise where limits ask for it.
-fn relaxed_max(network: &Network, edge: u32) -> i32 {
-    let give = i64::from(network.traits(edge).grade_give);
-    (i64::from(network.edges[edge as usize].rise_max) * give / 1000) as i32
 }
 
 /// A network with its limits, before the ground is asked.

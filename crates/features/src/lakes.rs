@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use crate::clean::Notes;
 use crate::strand::{Role, Strand};
-use crate::{FeatureLattice, Flaw, Kind, Outline, Place, Remark, Remedy, Ring};
+use crate::{FallOptions, FeatureLattice, Flaw, Kind, Outline, Place, Remark, Remedy, Ring};
 
 /// A level that its source gives may lie this far, in quanta, from the heights of the shore: 10 m.
 const LEVEL_OFF_MAX: i32 = 10 * 128;
@@ -12,8 +12,14 @@ const LEVEL_OFF_MAX: i32 = 10 * 128;
 /// A polygon of a river without a line inside is a lake where its shore varies by less than this, in quanta: 2 m.
 const SHORE_SPREAD_MAX: i32 = 2 * 128;
 
-/// Which of a hundred heights of the shore is the level.
-const SHORE_PERCENT: usize = 5;
+/// Posts inside a lake from which they tell whether it is flat.
+const INSIDE_MIN: u64 = 9;
+
+/// Half the posts inside a flat lake lie within so many quanta: 1 m.
+const FLAT_SPREAD: i32 = 128;
+
+/// A level is uncertain where the upper tenth of heights lies so many quanta above the lower one: 10 m.
+const SPREAD_TOLD: i32 = 10 * 128;
 
 /// A body of water at one level.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,6 +28,10 @@ pub struct Lake {
     pub outline: u32,
     /// Its level in quanta.
     pub level: i32,
+    /// Whether its source says so.
+    pub is_fixed: bool,
+    /// Its body of water: the number of the first lake with which it shares shore.
+    pub body: u32,
     /// Cubic metres of ground that the shore is lifted by, to the level plus one quantum.
     pub fill_m3: i64,
 }
@@ -37,15 +47,29 @@ pub struct Waters {
     pub outlines_only: Vec<u32>,
 }
 
-/// Decides the level of each water body. `shores` has a height for each place of each ring of each outline, ring after
-/// ring; `has_line` says in which outlines a river runs; `dams` are places on dams, at which two bodies stay apart.
+/// How often each height occurs at the posts inside a lake, in quanta, ascending.
+pub type Histogram = Vec<(i32, u32)>;
+
+/// What the DEM says of the outlines of water: one of each for every outline.
+#[derive(Clone, Copy)]
+pub struct Shores<'a> {
+    /// A height for each place of each ring, ring after ring.
+    pub heights: &'a [Vec<Option<i32>>],
+    /// Heights of the posts inside.
+    pub inside: &'a [Histogram],
+    /// Whether a river runs inside.
+    pub has_line: &'a [bool],
+}
+
+/// Decides the level of each water body by the heights along its shore and inside; `dams` are places on dams, at which
+/// two bodies stay apart.
 ///
 /// Outlines of other kinds than water are passed over.
 pub fn level(
     outlines: &[Outline],
-    shores: &[Vec<Option<i32>>],
-    has_line: &[bool],
+    shores: Shores,
     dams: &dyn Fn(Place) -> bool,
+    options: FallOptions,
     lattice: FeatureLattice,
     remarks: &mut Vec<Remark>,
 ) -> Waters {
@@ -53,11 +77,11 @@ pub fn level(
     for (number, outline) in outlines.iter().enumerate() {
         let mut notes = Notes { id: outline.id, lattice, remarks };
         let first = outline.rings.first().and_then(|ring| ring.places.first().copied());
-        let mut shore: Vec<i32> = shores[number].iter().copied().flatten().collect();
+        let mut shore: Vec<i32> = shores.heights[number].iter().copied().flatten().collect();
         shore.sort_unstable();
         let spread = shore.last().zip(shore.first()).map_or(0, |(most, least)| most - least);
         match outline.traits.kind {
-            Kind::River if has_line[number] => waters.banks.push(number as u32),
+            Kind::River if shores.has_line[number] => waters.banks.push(number as u32),
             Kind::River if SHORE_SPREAD_MAX <= spread => {
                 notes.write_of(first, Flaw::NoLineInside, Remedy::OutlineOnly);
                 waters.outlines_only.push(number as u32);
@@ -66,14 +90,26 @@ pub fn level(
                 if outline.traits.kind == Kind::River {
                     notes.write_of(first, Flaw::NoLineInside, Remedy::BecameLake);
                 }
-                let level = level_of(outline, &shore, first, &mut notes);
-                waters.lakes.push(Lake { outline: number as u32, level, fill_m3: 0 });
+                let (level, is_fixed) = level_of(outline, (&shore, &shores.inside[number]), options, first, &mut notes);
+                let body = waters.lakes.len() as u32;
+                waters.lakes.push(Lake { outline: number as u32, level, is_fixed, body, fill_m3: 0 });
             }
             _ => {}
         }
     }
     join_bodies(outlines, &mut waters.lakes, dams);
-    for lake in &mut waters.lakes {
+    waters
+}
+
+/// Counts what shores are lifted by, once levels are decided, and writes it down.
+pub fn lift_shores(
+    outlines: &[Outline],
+    shores: &[Vec<Option<i32>>],
+    lakes: &mut [Lake],
+    lattice: FeatureLattice,
+    remarks: &mut Vec<Remark>,
+) {
+    for lake in lakes {
         let outline = &outlines[lake.outline as usize];
         lake.fill_m3 = fill(outline, &shores[lake.outline as usize], lake.level, lattice);
         if 0 < lake.fill_m3 {
@@ -82,24 +118,77 @@ pub fn level(
             Notes { id: outline.id, lattice, remarks }.write_of(first, flaw, Remedy::Lifted);
         }
     }
-    waters
 }
 
-/// The level of a source if it fits the shore, else what a twentieth of the shore lies at or below.
-fn level_of(outline: &Outline, shore: &[i32], first: Option<Place>, notes: &mut Notes) -> i32 {
+/// The level of a source if it fits the shore, else that of the flat inside, else a low one of all heights that cuts
+/// and fills no more than may be; and whether it is the source's. `shore` is sorted.
+fn level_of(
+    outline: &Outline,
+    (shore, inside): (&[i32], &Histogram),
+    options: FallOptions,
+    first: Option<Place>,
+    notes: &mut Notes,
+) -> (i32, bool) {
     let (least, most) = match (shore.first(), shore.last()) {
         (Some(least), Some(most)) => (*least, *most),
-        _ => return outline.traits.level.unwrap_or(0),
+        _ => return (outline.traits.level.unwrap_or(0), outline.traits.level.is_some()),
     };
     match outline.traits.level {
-        Some(level) if least - LEVEL_OFF_MAX <= level && level <= most + LEVEL_OFF_MAX => level,
-        found => {
-            if let Some(found) = found {
-                notes.write_of(first, Flaw::LevelRefused { found }, Remedy::ShoreTaken);
-            }
-            shore[(shore.len() - 1) * SHORE_PERCENT / 100]
-        }
+        Some(level) if least - LEVEL_OFF_MAX <= level && level <= most + LEVEL_OFF_MAX => return (level, true),
+        Some(found) => notes.write_of(first, Flaw::LevelRefused { found }, Remedy::ShoreTaken),
+        None => {}
     }
+    if let Some(level) = flat_inside(inside) {
+        return (level, false);
+    }
+    let mut all: Vec<(i32, u32)> = shore.iter().map(|height| (*height, 1)).chain(inside.iter().copied()).collect();
+    all.sort_unstable();
+    let [low, level, high] = [100, options.tau, 900].map(|thousandths| quantile(&all, thousandths));
+    if SPREAD_TOLD < high - low {
+        notes.write_of(first, Flaw::LevelUncertain { quanta: high - low }, Remedy::ShoreTaken);
+    }
+    let (least, most) = (high - options.cut_max, low + options.fill_max);
+    (if most < least { (least + most) >> 1 } else { level.clamp(least, most) }, false)
+}
+
+/// The middle of the shortest span that holds half of the posts inside, where that is short.
+fn flat_inside(inside: &Histogram) -> Option<i32> {
+    let count: u64 = inside.iter().map(|(_, count)| u64::from(*count)).sum();
+    if count < INSIDE_MIN {
+        return None;
+    }
+    let half = count / 2 + 1;
+    let (mut best, mut end, mut held): (Option<(i32, i32)>, usize, u64) = (None, 0, 0);
+    for &(from, of_from) in inside {
+        while held < half && end < inside.len() {
+            held += u64::from(inside[end].1);
+            end += 1;
+        }
+        if held < half {
+            break;
+        }
+        let span = inside[end - 1].0 - from;
+        best = Some(best.map_or((span, from), |best| best.min((span, from))));
+        held -= u64::from(of_from);
+    }
+    best.filter(|(span, _)| *span <= FLAT_SPREAD).map(|(span, from)| {
+        let held: Vec<(i32, u32)> =
+            inside.iter().copied().filter(|(height, _)| (from..=from + span).contains(height)).collect();
+        quantile(&held, 500)
+    })
+}
+
+/// The height below which so many thousandths of some lie; ascending, each so many times.
+fn quantile(heights: &[(i32, u32)], thousandths: u32) -> i32 {
+    let count: u64 = heights.iter().map(|(_, count)| u64::from(*count)).sum();
+    let mut left = count.saturating_sub(1) * u64::from(thousandths) / 1000;
+    for &(height, count) in heights {
+        if left < u64::from(count) {
+            return height;
+        }
+        left -= u64::from(count);
+    }
+    heights.last().map_or(0, |(height, _)| *height)
 }
 
 /// Bodies that share a stretch of shore are one, at the lowest of their levels; a dam keeps them apart.
@@ -120,12 +209,15 @@ fn join_bodies(outlines: &[Outline], lakes: &mut [Lake], dams: &dyn Fn(Place) ->
             body[one.max(other)] = one.min(other);
         }
     }
-    let mut levels: HashMap<usize, i32> = HashMap::new();
+    let mut levels: HashMap<usize, (i32, bool)> = HashMap::new();
     for (number, lake) in lakes.iter().enumerate() {
-        levels.entry(root(&body, number)).and_modify(|level| *level = lake.level.min(*level)).or_insert(lake.level);
+        let level = (lake.level, lake.is_fixed);
+        let lower = |other: &mut (i32, bool)| *other = if level.0 < other.0 { level } else { *other };
+        levels.entry(root(&body, number)).and_modify(lower).or_insert(level);
     }
     for (number, lake) in lakes.iter_mut().enumerate() {
-        lake.level = levels[&root(&body, number)];
+        lake.body = root(&body, number) as u32;
+        (lake.level, lake.is_fixed) = levels[&(lake.body as usize)];
     }
 }
 
@@ -214,8 +306,11 @@ mod tests {
         };
         let shores: Vec<Vec<Option<i32>>> = rounded.outlines.iter().map(shore).collect();
         let mut remarks = rounded.remarks.clone();
-        let none = vec![false; shores.len()];
-        let waters = level(&rounded.outlines, &shores, &none, dams, site().lattice, &mut remarks);
+        let (none, inside) = (vec![false; shores.len()], vec![Vec::new(); shores.len()]);
+        let of = Shores { heights: &shores, inside: &inside, has_line: &none };
+        let (lattice, options) = (site().lattice, FallOptions::USUAL);
+        let mut waters = level(&rounded.outlines, of, dams, options, lattice, &mut remarks);
+        lift_shores(&rounded.outlines, &shores, &mut waters.lakes, lattice, &mut remarks);
         let levels = waters.lakes.iter().map(|lake| lake.level / 128).collect();
         (levels, remarks.into_iter().map(|remark| remark.flaw).collect(), rounded)
     }
@@ -228,9 +323,25 @@ mod tests {
     fn a_level_is_that_of_the_source_or_a_low_one_of_the_shore() {
         let slope = |east: f64, _: f64| 100.0 + east;
         assert_eq!(levels(vec![lake(1, "ele=115", 10.0, 30.0)], slope, &none).0, [115]);
-        assert_eq!(levels(vec![lake(1, "", 10.0, 30.0)], slope, &none).0, [110]);
+        // A lower third of the shore would be 116, but nine tenths of it may be cut by 10 m at most.
+        assert_eq!(levels(vec![lake(1, "", 10.0, 30.0)], slope, &none).0, [120]);
         let (found, flaws, _) = levels(vec![lake(1, "ele=1150", 10.0, 30.0)], slope, &none);
-        assert_eq!((found, &flaws[0]), (vec![110], &Flaw::LevelRefused { found: 1150 * 128 }));
+        assert_eq!((found, &flaws[0]), (vec![120], &Flaw::LevelRefused { found: 1150 * 128 }));
+        assert_eq!(levels(vec![lake(1, "", 10.0, 20.0)], |east, _| 100.0 + east / 4.0, &none).0, [102]);
+    }
+
+    #[test]
+    fn a_flat_inside_is_the_level_whatever_the_shore_says() {
+        let flat = vec![(-900, 3), (500, 2), (510, 4), (600, 3), (640, 1), (9000, 2)];
+        assert_eq!(flat_inside(&flat), Some(510));
+        assert_eq!(flat_inside(&flat[1..3].to_vec()), None, "too few to tell");
+        assert_eq!(flat_inside(&(0..20).map(|at| (100 * at, 1)).collect()), None);
+    }
+
+    #[test]
+    fn a_quantile_is_one_of_the_heights() {
+        let heights = [(1, 2), (5, 1), (9, 7)];
+        assert_eq!([0, 100, 200, 300, 1000].map(|share| quantile(&heights, share)), [1, 1, 1, 5, 9]);
     }
 
     #[test]

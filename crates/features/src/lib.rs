@@ -11,8 +11,8 @@
 //! round(Mended, &Site) -> Rounded                   stations; lines touch at shared vertices or not at all
 //! split_at_dams(rounded.outlines, &rounded.ways) -> Vec<Outline>
 //! Network::of(&travelled(&rounded), ..), Network::of(&flowing(&rounded), ..)
-//! level(&outlines, &shores, ..) -> Waters           lakes; then lakes_along(..) -> levels for the rivers
-//! fall(&rivers, Bed, ..) -> Fallen                  rivers; channels(..), shore(..), banks(..) -> Vec<Strand>
+//! level(&outlines, &shores, ..) -> Waters           lakes; then lakes_along(..) -> Vec<Still> for the rivers
+//! fall(&rivers, Bed, &still, ..) -> Fallen                  rivers; channels(..), shore(..), banks(..) -> Vec<Strand>
 //! grade(&roads, &ground, &pins, &water(&strands), GradeOptions, ..) -> Vec<i32>
 //! reserve(&Graded, &strands, &Site, &Shares, about) -> Reserved
 //!     .formed: Formed { points, edges, faces, decks, middles, remarks }, .cost: triangles by load module and class
@@ -75,13 +75,16 @@ pub use decks::{Clearances, Water};
 mod grade;
 pub use grade::{GradeOptions, grade, pins};
 mod flow;
-mod isotonic;
+mod orient;
 mod rivers;
-pub use rivers::{Bed, Fallen, fall};
+mod tilt;
+pub use rivers::{Bed, FallOptions, Fallen, Still, fall};
 mod dams;
 pub use dams::split_at_dams;
 mod lakes;
-pub use lakes::{Lake, Waters, banks, level, outline_only, shore};
+pub use lakes::{Histogram, Lake, Shores, Waters, banks, level, lift_shores, outline_only, shore};
+mod afloat;
+pub use afloat::{afloat, with_water};
 mod parts;
 pub use parts::{Line, breaklines, channels, dams, flowing, have_line, lakes_along, lines_inside, travelled, water};
 
@@ -123,7 +126,7 @@ pub use reserve::{Amounts, LeftOut, Reserved, reserve};
 
 // All of it, in its order.
 mod area;
-pub use area::{AreaFeatures, Levelled};
+pub use area::{AreaFeatures, Levelled, Sounded};
 
 #[cfg(test)]
 mod samples;

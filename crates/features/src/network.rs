@@ -194,6 +194,12 @@ impl Network {
         &self.ways[self.edges[edge as usize].way as usize].traits
     }
 
+    /// Quanta that an edge may rise where limits of cut and fill ask for it.
+    pub(crate) fn relaxed_max(&self, edge: u32) -> i32 {
+        let give = i64::from(self.traits(edge).grade_give);
+        (i64::from(self.edges[edge as usize].rise_max) * give / 1000) as i32
+    }
+
     /// Whether an edge lies on the ground.
     pub fn is_ground(&self, edge: u32) -> bool {
         self.traits(edge).storey == Storey::Ground

@@ -1,13 +1,12 @@
 //! What each stage hands to the next: which ways are travelled, which flow, where lakes lie along rivers.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeMap, HashMap, HashSet};
 
 use crate::decks::Water;
-use crate::lakes::Waters;
 use crate::rings::encloses;
-use crate::rivers::Fallen;
+use crate::rivers::{Fallen, Still};
 use crate::strand::{Role, Strand};
-use crate::{Edge, Kind, Network, Outline, Place, Rounded, Site, Way};
+use crate::{Edge, Kind, Lake, Network, Outline, Place, Rounded, Site, Way};
 
 /// Edges of a river with the heights of their ends.
 pub type Line = Vec<([Place; 2], [i32; 2])>;
@@ -173,26 +172,53 @@ pub fn lines_inside(
     numbers.iter().map(|&number| cells.inside(&outlines[number as usize]).into_iter().map(ends).collect()).collect()
 }
 
-/// The level of the lake that each node of the rivers lies in or at; the lowest where there are two.
-pub fn lakes_along(outlines: &[Outline], waters: &Waters, rivers: &Network, site: &Site) -> Vec<Option<i32>> {
-    let mut levels: Vec<Option<i32>> = vec![None; rivers.nodes.len()];
-    let mut lower = |node: u32, level: i32| {
-        let here = &mut levels[node as usize];
-        *here = Some(here.map_or(level, |other| other.min(level)));
+/// The bodies of water of an area with the nodes of a network that lie in them or at their shores, each node in the
+/// lowest of several.
+pub fn lakes_along(outlines: &[Outline], lakes: &[Lake], network: &Network, site: &Site) -> Vec<Still> {
+    let mut lake_of: Vec<Option<(i32, u32)>> = vec![None; network.nodes.len()];
+    let mut lower = |node: u32, lake: &Lake| {
+        let of_node = &mut lake_of[node as usize];
+        let of = (lake.level, lake.body);
+        *of_node = Some(of_node.map_or(of, |other| other.min(of)));
     };
-    let cells = Cells::of(rivers, site);
-    for lake in &waters.lakes {
+    let cells = Cells::of(network, site);
+    for lake in lakes {
         let outline = &outlines[lake.outline as usize];
-        for edge in cells.inside(outline) {
-            lower(rivers.edges[edge as usize].a, lake.level);
-            lower(rivers.edges[edge as usize].b, lake.level);
+        for edge in cells.inside(outline).into_iter().filter(|edge| network.is_ground(*edge)) {
+            lower(network.edges[edge as usize].a, lake);
+            lower(network.edges[edge as usize].b, lake);
         }
-        for place in outline.rings.iter().flat_map(|ring| &ring.places) {
-            let first = rivers.nodes.partition_point(|node| node.place < *place);
-            if rivers.nodes.get(first).is_some_and(|node| node.place == *place) {
-                lower(first as u32, lake.level);
-            }
+        for place in outline.places() {
+            let first = network.nodes.partition_point(|node| node.place < place);
+            let here = network.nodes[first..].iter().take_while(|node| node.place == place);
+            let on_ground = (first as u32..).zip(here).filter(|(_, node)| node.on_ground);
+            on_ground.for_each(|(node, _)| lower(node, lake));
         }
     }
-    levels
+    let mut still: BTreeMap<u32, Still> = BTreeMap::new();
+    for lake in lakes {
+        let outline = &outlines[lake.outline as usize];
+        let Some(place) = outline.rings.first().and_then(|ring| ring.places.first().copied()) else { continue };
+        let Lake { level, is_fixed, body, .. } = *lake;
+        let of = still.entry(body).or_insert(Still {
+            body,
+            place,
+            id: outline.id,
+            level,
+            is_fixed,
+            shore: 0,
+            nodes: Vec::new(),
+        });
+        for ring in &outline.rings {
+            let ends = ring.places.iter().zip(ring.places.iter().cycle().skip(1));
+            let quanta: i64 = ends.map(|(a, b)| site.lattice.length(*a, *b)).sum();
+            of.shore += (10 * quanta / i64::from(terrain::QUANTA_PER_METRE)).max(1);
+        }
+    }
+    for (node, of) in (0..).zip(lake_of) {
+        if let Some(still) = of.and_then(|(_, body)| still.get_mut(&body)) {
+            still.nodes.push(node);
+        }
+    }
+    still.into_values().collect()
 }

@@ -88,6 +88,28 @@ pub enum Flaw {
         /// The level of the source, in quanta.
         found: i32,
     },
+    /// A lake without a flat inside, whose shore and inside differ by so much.
+    LevelUncertain {
+        /// Quanta between the lower and the upper tenth of its heights.
+        quanta: i32,
+    },
+    /// Rivers that ask for another level of a lake than its own heights do.
+    RiversMoveLevel {
+        /// Quanta by which they raise it.
+        quanta: i32,
+    },
+    /// A bank well below its water.
+    BankBelowWater {
+        /// Quanta between them.
+        quanta: i32,
+    },
+    /// A cut or a fill beyond its limit.
+    BeyondLimit {
+        /// Quanta of the highest fill, or of the deepest cut, less than 0.
+        quanta: i32,
+        /// Whole metres of it that are beyond the limit.
+        metres: u32,
+    },
     /// Shore below the water.
     ShoreBelowWater {
         /// What was filled, in whole cubic metres.
@@ -121,6 +143,17 @@ impl fmt::Display for Flaw {
                 write!(f, "the ground asks for a grade of {:.1} %, over {metres} m", f64::from(*grade_ppm) / 1e4)
             }
             Flaw::ClearanceLacks { quanta } => write!(f, "the deck is {:.2} m too low", metres(*quanta)),
+            Flaw::LevelUncertain { quanta } => {
+                write!(f, "heights along and inside it differ by {:.1} m", metres(*quanta))
+            }
+            Flaw::RiversMoveLevel { quanta } => {
+                write!(f, "its rivers ask for a level {:.2} m off its own", metres(*quanta))
+            }
+            Flaw::BankBelowWater { quanta } => write!(f, "a bank lies {:.1} m below its water", metres(*quanta)),
+            Flaw::BeyondLimit { quanta, metres: length } => {
+                let what = if *quanta < 0 { "cuts" } else { "is filled" };
+                write!(f, "it {what} by {:.1} m, and beyond the limit over {length} m", metres(quanta.abs()))
+            }
             Flaw::LevelRefused { found } => write!(f, "its level of {:.2} m does not fit its shore", metres(*found)),
             Flaw::ShoreBelowWater { cubic_metres } => {
                 write!(f, "shore lies below the water, {cubic_metres} m3 of fill")
@@ -210,6 +243,10 @@ pub enum Remedy {
     BecameLake,
     /// The level of the shore was taken.
     ShoreTaken,
+    /// The level was moved to that of its rivers.
+    RiversFollowed,
+    /// The limit is exceeded.
+    LimitExceeded,
     /// The ground was lifted.
     Lifted,
     /// It was made narrower.
@@ -249,6 +286,8 @@ impl fmt::Display for Remedy {
             Remedy::Levelled => "laid level",
             Remedy::BecameLake => "taken as a lake",
             Remedy::ShoreTaken => "the level of its shore was taken",
+            Remedy::RiversFollowed => "they were followed",
+            Remedy::LimitExceeded => "the limit is exceeded there",
             Remedy::Lifted => "the ground was lifted",
             Remedy::Narrowed => "made narrower",
             Remedy::BecameStrip => "became a strip without slopes",

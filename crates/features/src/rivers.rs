@@ -1,15 +1,53 @@
-//! Heights of rivers and streams: they fall, and lie no higher than their banks.
+//! Heights of rivers and streams: they fall, and lie where most of the DEM along them says.
+//!
+//! Heights lie closest to the ground, by the sum of their distances, while no edge rises; what lies above the fit
+//! weighs less than what lies below, since a DEM sees trees and banks rather than water. A lake is one more node, tied
+//! to the stations inside it. Then the fit is carved down to its banks, as far as it may be, and pools become slopes.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::clean::Notes;
+use crate::fit::{Problem, Tie, fit, keep_ties};
 use crate::flow::Flow;
-use crate::isotonic::{falling, squares};
+use crate::forest::{Range, Sample, UNBOUNDED};
+use crate::grade::samples_of;
+use crate::orient::orient;
 use crate::smooth::filled;
-use crate::{FeatureId, Flaw, Network, Numbering, Remark, Remedy};
+use crate::tilt::tilt;
+use crate::{FeatureId, Flaw, Network, Place, Remark, Remedy};
 
-/// Rounds in which reaches agree on the height of the confluences between them.
-const ROUNDS: usize = 4;
+/// Rounds in which loops of rivers are fitted.
+const ROUNDS: u64 = 2;
+
+/// What a quantum off the ground weighs, above and below together.
+const WEIGHT: i64 = 1000;
+
+/// What a quantum beyond the limits of cut and fill weighs.
+const LIMIT_WEIGHT: i64 = 5 * WEIGHT;
+
+/// Water above its lower bank, or a lake off its level, by more than this is told, in quanta: 3 m and 1 m.
+const BANK_TOLD: i64 = 3 * 128;
+const LAKE_TOLD: i64 = 128;
+
+/// What may be asked of the heights of what flows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FallOptions {
+    /// The share of the ground, in thousandths, that lies below a river.
+    pub tau: u32,
+    /// Quanta by which it is carved down to its banks.
+    pub carve_max: i32,
+    /// Whether pools of rivers and canals become slopes.
+    pub tilt: bool,
+    /// Quanta by which it may cut into the ground, beyond which that weighs more.
+    pub cut_max: i32,
+    /// Quanta by which it may be filled.
+    pub fill_max: i32,
+}
+
+impl FallOptions {
+    /// 35 % below, carved by 2 m, tilted, limits of 10 m.
+    pub const USUAL: Self = Self { tau: 350, carve_max: 2 * 128, tilt: true, cut_max: 10 * 128, fill_max: 10 * 128 };
+}
 
 /// Heights of a network of ways that flow.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -18,6 +56,8 @@ pub struct Fallen {
     pub heights: Vec<i32>,
     /// For every edge, whether water flows from its `b` to its `a`.
     pub turned: Vec<bool>,
+    /// The level of each body of still water, in quanta.
+    pub levels: Vec<i32>,
 }
 
 /// What is known of the ground along rivers: one of each for every node.
@@ -25,15 +65,33 @@ pub struct Fallen {
 pub struct Bed<'a> {
     /// The DEM at the node, in quanta.
     pub ground: &'a [Option<i32>],
+    /// The middle of the DEM's heights around it.
+    pub middle: &'a [Option<i32>],
     /// The lowest of the DEM at the node and one post either side.
     pub lower_bank: &'a [Option<i32>],
-    /// The level of the lake in which or at whose shore the node lies.
-    pub lake: &'a [Option<i32>],
 }
 
-/// Lets a network fall: no edge rises by a quantum, no node stands above its banks, a circle lies level, and a river
-/// enters a lake at its level and leaves at or below it.
-pub fn fall(network: &Network, bed: Bed, remarks: &mut Vec<Remark>) -> Fallen {
+/// A body of level water in which or along which rivers may run.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Still {
+    /// The body of water: the number of its first lake.
+    pub body: u32,
+    /// The first place of its shore.
+    pub place: Place,
+    /// The feature that it is named by.
+    pub id: FeatureId,
+    /// Its level in quanta.
+    pub level: i32,
+    /// Whether its source says so.
+    pub is_fixed: bool,
+    /// Decimetres of its shore.
+    pub shore: i64,
+    /// Nodes of rivers in it or at its shore.
+    pub nodes: Vec<u32>,
+}
+
+/// Lets a network fall: no edge rises by a quantum, a circle lies level, and all nodes of a lake have its level.
+pub fn fall(network: &Network, bed: Bed, still: &[Still], options: FallOptions, remarks: &mut Vec<Remark>) -> Fallen {
     let ground = filled(network, bed.ground);
     let turned = orient(network, &ground, remarks);
     let directed: Vec<(u32, u32)> = network
@@ -42,47 +100,120 @@ pub fn fall(network: &Network, bed: Bed, remarks: &mut Vec<Remark>) -> Fallen {
         .zip(&turned)
         .map(|(edge, turned)| if *turned { (edge.b, edge.a) } else { (edge.a, edge.b) })
         .collect();
-    let flow = Flow::of(network.nodes.len(), &directed);
-    let groups = flow.groups();
+    let groups = Flow::of(network.nodes.len(), &directed).groups();
     remark_circles(network, &groups, remarks);
-    let mut heights = fitted(network, &directed, &ground);
-    for (height, bank) in heights.iter_mut().zip(bed.lower_bank) {
-        *height = bank.map_or(*height, |bank| bank.min(*height));
-    }
-    run_down(&flow, &groups, bed.lake, &mut heights);
-    Fallen { heights, turned }
+    let mut is_level = vec![false; network.nodes.len()];
+    groups.iter().filter(|group| 1 < group.len()).flatten().for_each(|node| is_level[*node as usize] = true);
+    still.iter().flat_map(|still| &still.nodes).for_each(|node| is_level[*node as usize] = true);
+
+    let mut falls = Falls::new(network, &directed, &groups, still, bed);
+    let fitted = falls.fit_to_ground(&ground, options);
+    let carved = falls.carve(&fitted, options.carve_max);
+    let heights = if options.tilt { falls.tilt(carved, &is_level) } else { carved };
+    let (heights, levels) = heights.split_at(network.nodes.len());
+    let whole = |heights: &[i64]| heights.iter().map(|height| *height as i32).collect::<Vec<i32>>();
+    let fallen = Fallen { heights: whole(heights), turned, levels: whole(levels) };
+    remark_banks(network, bed, heights, remarks);
+    remark_moved(network, still, levels, remarks);
+    fallen
 }
 
-/// Which edges flow against the direction of their way: OpenStreetMap draws rivers downhill, others anyhow. A way is
-/// turned round when that halves its squares.
-fn orient(network: &Network, ground: &[i32], remarks: &mut Vec<Remark>) -> Vec<bool> {
-    let mut turned = vec![false; network.edges.len()];
-    let mut first = 0;
-    for edges in network.edges.chunk_by(|a, b| a.way == b.way) {
-        let mut along: Vec<i32> = vec![ground[edges[0].a as usize]];
-        along.extend(edges.iter().map(|edge| ground[edge.b as usize]));
-        let id = network.ways[edges[0].way as usize].id;
-        if edges[0].a == edges[edges.len() - 1].b {
-            // A closed way has no lower end.
-            first += edges.len();
-            continue;
+/// The problem of heights that fall: nodes of the network, then bodies of still water.
+struct Falls<'a> {
+    network: &'a Network,
+    still: &'a [Still],
+    bed: Bed<'a>,
+    problem: Problem,
+    /// The ground at nodes whose height is not that of a lake, where it is known.
+    own: Vec<Option<i32>>,
+}
+
+impl<'a> Falls<'a> {
+    fn new(
+        network: &'a Network,
+        directed: &[(u32, u32)],
+        groups: &[Vec<u32>],
+        still: &'a [Still],
+        bed: Bed<'a>,
+    ) -> Self {
+        let mut group_of = vec![0u32; network.nodes.len()];
+        (0..).zip(groups).for_each(|(number, group)| group.iter().for_each(|node| group_of[*node as usize] = number));
+        let tie = |&(a, b): &(u32, u32)| {
+            let most = if group_of[a as usize] == group_of[b as usize] { 0 } else { UNBOUNDED };
+            Tie { a, b, difference: Range { least: 0, most } }
+        };
+        let mut ties: Vec<Tie> = directed.iter().map(tie).collect();
+        let mut own: Vec<Option<i32>> =
+            network.nodes.iter().zip(bed.ground).map(|(node, ground)| ground.filter(|_| node.on_ground)).collect();
+        for (number, still) in (network.nodes.len() as u32..).zip(still) {
+            let level = Range { least: 0, most: 0 };
+            ties.extend(still.nodes.iter().map(|&node| Tie { a: number, b: node, difference: level }));
+            still.nodes.iter().for_each(|node| own[*node as usize] = None);
         }
-        let uphill = along[0] < along[along.len() - 1];
-        let drawn_downhill = id.numbering != Numbering::Row;
-        let forth = squares(&along);
-        along.reverse();
-        let back = squares(&along);
-        let turn = if drawn_downhill || !uphill { 2 * back < forth } else { back <= 2 * forth };
-        if turn {
-            turned[first..first + edges.len()].fill(true);
-        }
-        if turn && drawn_downhill {
-            let place = network.nodes[edges[0].a as usize].place;
-            Notes { id, lattice: network.lattice, remarks }.write_at(place, Flaw::FlowsUphill, Remedy::TurnedRound);
-        }
-        first += edges.len();
+        let places = network.nodes.iter().map(|node| node.place).chain(still.iter().map(|still| still.place)).collect();
+        let ranges = vec![Range::ALL; network.nodes.len() + still.len()];
+        let problem = Problem { places, ties, ranges, ..Problem::default() };
+        Self { network, still, bed, problem, own }
     }
-    turned
+
+    fn fit_to_ground(&mut self, ground: &[i32], options: FallOptions) -> Vec<i64> {
+        let tau = i64::from(options.tau);
+        let network = self.network;
+        let mut samples = samples_of(network, &self.own, tau, WEIGHT - tau);
+        let limit = |by: i32| -> Vec<Option<i32>> {
+            let of = |(own, middle): (&Option<i32>, &Option<i32>)| own.and(*middle).map(|middle| middle + by);
+            self.own.iter().zip(self.bed.middle).map(of).collect()
+        };
+        samples.extend(samples_of(network, &limit(-options.cut_max), LIMIT_WEIGHT, 0));
+        samples.extend(samples_of(network, &limit(options.fill_max), 0, LIMIT_WEIGHT));
+        for (node, still) in (network.nodes.len() as u32..).zip(self.still) {
+            let (height, weight) = (i64::from(still.level), WEIGHT / 2 * still.shore);
+            samples.push(Sample { node, height, below: weight, above: weight });
+        }
+        let levels = self.still.iter().map(|still| i64::from(still.level));
+        self.problem.wishes = ground.iter().map(|height| i64::from(*height)).chain(levels).collect();
+        self.problem.samples = samples;
+        self.fix_levels();
+        fit(&self.problem, ROUNDS)
+    }
+
+    /// Holds levels that sources give. Where two contradict the fall, the upper one stays.
+    fn fix_levels(&mut self) {
+        let count = self.network.nodes.len();
+        let fixed = self.still.iter().enumerate().filter(|(_, still)| still.is_fixed);
+        let mut most = Problem { ranges: vec![Range::ALL; self.problem.places.len()], ..self.problem.clone() };
+        fixed.clone().for_each(|(number, still)| most.ranges[count + number].most = still.level.into());
+        let most = crate::fit::most(&most);
+        for (number, still) in fixed {
+            let level = most[count + number].min(still.level.into());
+            self.problem.ranges[count + number] = Range { least: level, most: level };
+        }
+    }
+
+    /// Lowers heights to their lower banks, by so much at most; lakes stay.
+    fn carve(&mut self, fitted: &[i64], carve_max: i32) -> Vec<i64> {
+        let network = self.network;
+        let key = |(node, own): (usize, &Option<i32>)| {
+            let bank = i64::from(self.bed.lower_bank[node].or(*own)?);
+            own.and(Some(bank.clamp(fitted[node] - i64::from(carve_max), fitted[node]) as i32))
+        };
+        let keys: Vec<Option<i32>> = self.own.iter().enumerate().map(key).collect();
+        self.problem.samples = samples_of(network, &keys, 1, 1);
+        for (node, height) in fitted.iter().enumerate() {
+            let least = if node < network.nodes.len() { -UNBOUNDED } else { *height };
+            self.problem.ranges[node] = Range { least, most: *height };
+        }
+        let wishes = keys.iter().zip(fitted).map(|(key, fitted)| key.map_or(*fitted, i64::from));
+        self.problem.wishes = wishes.chain(fitted[network.nodes.len()..].iter().copied()).collect();
+        fit(&self.problem, ROUNDS)
+    }
+
+    fn tilt(&mut self, mut heights: Vec<i64>, is_level: &[bool]) -> Vec<i64> {
+        let count = self.network.nodes.len();
+        tilt(self.network, &mut heights[..count], is_level);
+        self.problem.ranges[..count].fill(Range::ALL);
+        keep_ties(&self.problem, heights)
+    }
 }
 
 fn remark_circles(network: &Network, groups: &[Vec<u32>], remarks: &mut Vec<Remark>) {
@@ -98,71 +229,29 @@ fn remark_circles(network: &Network, groups: &[Vec<u32>], remarks: &mut Vec<Rema
     }
 }
 
-/// Falling fits of all reaches. A confluence takes the mean of its reaches, in a bounded number of rounds.
-fn fitted(network: &Network, directed: &[(u32, u32)], ground: &[i32]) -> Vec<i32> {
-    let mut into = vec![0u8; network.nodes.len()];
-    directed.iter().for_each(|(_, to)| into[*to as usize] = into[*to as usize].saturating_add(1));
-    let passes = |node: u32| network.beside(node).len() == 2 && into[node as usize] == 1;
-    let mut reaches = network.runs(&|_| true, &passes);
-    for (nodes, edges) in &mut reaches {
-        if directed[edges[0] as usize].0 != nodes[0] {
-            nodes.reverse();
-        }
+/// Writes down, once for each feature, where water stands well above its lower bank.
+fn remark_banks(network: &Network, bed: Bed, heights: &[i64], remarks: &mut Vec<Remark>) {
+    let mut worst: BTreeMap<u32, (i64, u32)> = BTreeMap::new();
+    for edge in (0..network.edges.len() as u32).filter(|edge| network.is_ground(*edge)) {
+        let edge = &network.edges[edge as usize];
+        let above = |node: u32| bed.lower_bank[node as usize].map(|bank| heights[node as usize] - i64::from(bank));
+        let Some(above) = above(edge.a).filter(|above| BANK_TOLD < *above) else { continue };
+        let of_way = worst.entry(edge.way).or_insert((above, edge.a));
+        *of_way = if of_way.0 < above { (above, edge.a) } else { *of_way };
     }
-    let mut heights = ground.to_vec();
-    for _ in 0..ROUNDS {
-        let mut sums: Vec<(i64, i64)> = vec![(0, 0); heights.len()];
-        let mut next = heights.clone();
-        for (nodes, _) in &reaches {
-            // Inside a reach the ground is asked again each round; its ends stand where the last round left them.
-            let last = nodes.len() - 1;
-            let value = |(at, node): (usize, &u32)| {
-                if at == 0 || at == last { heights[*node as usize] } else { ground[*node as usize] }
-            };
-            let values: Vec<i32> = nodes.iter().enumerate().map(value).collect();
-            for (at, (&node, fit)) in nodes.iter().zip(falling(&values)).enumerate() {
-                if at == 0 || at == last {
-                    let sum = &mut sums[node as usize];
-                    *sum = (sum.0 + i64::from(fit), sum.1 + 1);
-                } else {
-                    next[node as usize] = fit;
-                }
-            }
-        }
-        for (height, (sum, count)) in next.iter_mut().zip(sums) {
-            if 0 < count {
-                *height = sum.div_euclid(count) as i32;
-            }
-        }
-        heights = next;
+    for (way, (quanta, node)) in worst {
+        let (id, place) = (network.ways[way as usize].id, network.nodes[node as usize].place);
+        let flaw = Flaw::BankBelowWater { quanta: quanta as i32 };
+        Notes { id, lattice: network.lattice, remarks }.write_at(place, flaw, Remedy::Lifted);
     }
-    heights
 }
 
-/// Makes heights fall, from source to mouth: none stands above what flows into it, a circle lies at its lowest, and
-/// what flows into a lake stands at its level at least.
-fn run_down(flow: &Flow, groups: &[Vec<u32>], lake: &[Option<i32>], heights: &mut [i32]) {
-    let mut least = vec![i32::MIN; heights.len()];
-    for group in groups.iter().rev() {
-        let of = |node: &u32| {
-            let below = flow.targets(*node).iter().map(|target| least[*target as usize]).max();
-            below.unwrap_or(i32::MIN).max(lake[*node as usize].unwrap_or(i32::MIN))
-        };
-        let needed = group.iter().map(of).max().unwrap_or(i32::MIN);
-        group.iter().for_each(|node| least[*node as usize] = needed);
-    }
-    let mut most = vec![i32::MAX; heights.len()];
-    for group in groups {
-        let level = group.iter().filter_map(|node| lake[*node as usize]).min();
-        let lowest = group.iter().map(|node| heights[*node as usize]).min().unwrap_or(0);
-        let needed = group.iter().map(|node| least[*node as usize]).max().unwrap_or(i32::MIN);
-        let bound = group.iter().map(|node| most[*node as usize]).min().unwrap_or(i32::MAX);
-        let height = level.unwrap_or(lowest.max(needed)).min(bound);
-        for &node in group {
-            heights[node as usize] = height;
-            for &target in flow.targets(node) {
-                most[target as usize] = most[target as usize].min(height);
-            }
+fn remark_moved(network: &Network, still: &[Still], levels: &[i64], remarks: &mut Vec<Remark>) {
+    for (still, level) in still.iter().zip(levels) {
+        let by = level - i64::from(still.level);
+        if LAKE_TOLD < by.abs() {
+            let (id, flaw) = (still.id, Flaw::RiversMoveLevel { quanta: by as i32 });
+            Notes { id, lattice: network.lattice, remarks }.write_at(still.place, flaw, Remedy::RiversFollowed);
         }
     }
 }
@@ -173,13 +262,32 @@ mod tests {
     use crate::samples::{network, way};
     use proptest::prelude::*;
 
+    /// Lakes are nodes with a level: each level is one lake.
     #[track_caller]
     fn check(network: &Network, ground: &[Option<i32>], lake: &[Option<i32>]) -> (Fallen, Vec<Remark>) {
+        check_bed(network, Bed { ground, middle: ground, lower_bank: ground }, lake)
+    }
+
+    #[track_caller]
+    fn check_bed(network: &Network, bed: Bed, lake: &[Option<i32>]) -> (Fallen, Vec<Remark>) {
+        let mut levels: BTreeMap<i32, Vec<u32>> = BTreeMap::new();
+        for (node, level) in (0..).zip(lake).filter_map(|(node, level)| Some((node, (*level)?))) {
+            levels.entry(level).or_default().push(node);
+        }
+        let still = |(body, (level, nodes)): (u32, (i32, Vec<u32>))| {
+            let place = network.nodes[nodes[0] as usize].place;
+            let id = network.ways[0].id;
+            Still { body, place, id, level, is_fixed: level % 2 == 0, shore: 1000, nodes }
+        };
+        let still: Vec<Still> = (0..).zip(levels).map(still).collect();
         let mut remarks = Vec::new();
-        let fallen = fall(network, Bed { ground, lower_bank: ground, lake }, &mut remarks);
+        let fallen = fall(network, bed, &still, FallOptions::USUAL, &mut remarks);
         for (edge, turned) in network.edges.iter().zip(&fallen.turned) {
             let (from, to) = if *turned { (edge.b, edge.a) } else { (edge.a, edge.b) };
             assert!(fallen.heights[to as usize] <= fallen.heights[from as usize], "an edge rises");
+        }
+        for (still, level) in still.iter().zip(&fallen.levels) {
+            assert!(still.nodes.iter().all(|node| fallen.heights[*node as usize] == *level), "a lake is not level");
         }
         (fallen, remarks)
     }
@@ -189,13 +297,44 @@ mod tests {
     }
 
     #[test]
-    fn a_noisy_river_falls_and_stands_nowhere_above_its_banks() {
-        let noise = |east: f64, _: f64| 100.0 - east + (east * 7919.0 % 13.0) / 3.0;
-        let (network, ground, _) = network(vec![stream(1, &[(10.0, 10.0), (60.0, 10.0)])], noise);
-        let none = vec![None; ground.len()];
-        let (fallen, remarks) = check(&network, &ground, &none);
-        assert!(remarks.is_empty());
-        assert!(fallen.heights.iter().zip(&ground).all(|(height, ground)| *height <= ground.unwrap()));
+    fn a_noisy_river_falls_and_a_pit_does_not_drag_down_what_lies_below_it() {
+        let noise = |east: f64, _: f64| 200.0 - east + (east * 7919.0 % 13.0) / 3.0;
+        let (network, middle, _) = network(vec![stream(1, &[(10.0, 10.0), (90.0, 10.0)])], noise);
+        // Two posts wide along the river and one across, so that the middle of nine heights does not have it.
+        let in_pit = |place: Place| (30.0..32.0).contains(&network.lattice.posts_of(place)[0]);
+        let pit = |(node, height): (&crate::Node, &Option<i32>)| {
+            height.map(|height| height - if in_pit(node.place) { 60 * 128 } else { 0 })
+        };
+        let ground: Vec<Option<i32>> = network.nodes.iter().zip(&middle).map(pit).collect();
+        let bed = Bed { ground: &ground, middle: &middle, lower_bank: &ground };
+        let (fallen, remarks) = check_bed(&network, bed, &vec![None; ground.len()]);
+        assert!(remarks.iter().all(|remark| matches!(remark.flaw, Flaw::BankBelowWater { .. })), "{remarks:?}");
+        let far =
+            fallen.heights.iter().zip(&ground).filter(|(height, ground)| 8 * 128 < (*height - ground.unwrap()).abs());
+        assert_eq!(far.count(), 2, "only the pit is passed over");
+    }
+
+    #[test]
+    fn pools_become_slopes_where_it_is_asked_for() {
+        let steps = |east: f64, _: f64| 100.0 - (east / 10.0).floor();
+        let (network, ground, _) = network(vec![way(1, "waterway=river", &[(10.0, 10.0), (60.0, 10.0)])], steps);
+        let (fallen, _) = check(&network, &ground, &vec![None; ground.len()]);
+        let inside = &fallen.heights[6..45];
+        assert!(inside.windows(2).all(|pair| pair[1] < pair[0]), "{inside:?}");
+        let level = FallOptions { tilt: false, ..FallOptions::USUAL };
+        let bed = Bed { ground: &ground, middle: &ground, lower_bank: &ground };
+        let fallen = fall(&network, bed, &[], level, &mut Vec::new());
+        assert_eq!(fallen.heights, ground.into_iter().flatten().collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn levels_that_contradict_the_fall_leave_the_upper_one_where_it_is_and_it_is_said() {
+        let (network, ground, _) = network(vec![stream(1, &[(10.0, 10.0), (60.0, 10.0)])], |_, _| 50.0);
+        let mut lake = vec![None; ground.len()];
+        (lake[5], lake[40]) = (Some(40 * 128), Some(60 * 128));
+        let (fallen, remarks) = check(&network, &ground, &lake);
+        assert_eq!((fallen.heights[5], fallen.heights[40]), (40 * 128, 40 * 128));
+        assert!(remarks.iter().any(|remark| remark.flaw == Flaw::RiversMoveLevel { quanta: -20 * 128 }));
     }
 
     #[test]
@@ -204,7 +343,7 @@ mod tests {
         let (fallen, remarks) = check(&network, &ground, &vec![None; ground.len()]);
         assert!(fallen.turned.iter().all(|turned| *turned));
         assert_eq!(remarks[0].flaw, Flaw::FlowsUphill);
-        assert_eq!(fallen.heights, ground.into_iter().flatten().collect::<Vec<_>>());
+        assert!(fallen.heights.iter().zip(&ground).all(|(height, ground)| *height == ground.unwrap()));
     }
 
     #[test]

@@ -46,7 +46,9 @@ fn levelled(sources: &[Source], shares: &Shares) -> Levelled {
     let hills = |[east, north]: [f64; 2]| 100.0 + 0.02 * east + ((north / 60.0).fract() - 0.5).abs() * 6.0;
     let ground = |place: &Place| terrain::quanta_of_metres(hills(site().lattice.posts_of(*place)));
     let ground: Vec<Option<i32>> = all.stations().iter().map(ground).collect();
-    let levelled = all.level(&ground, GradeOptions::USUAL, shares);
+    let inside = vec![Vec::new(); all.outlines().len()];
+    let sounded = Sounded { heights: &ground, middles: &ground, inside: &inside };
+    let levelled = all.level(sounded, (GradeOptions::USUAL, FallOptions::USUAL), shares);
     check_limits(&levelled, shares);
     levelled
 }

@@ -51,11 +51,18 @@ fn all_stages(sources: Vec<Source>, metres: &dyn Fn(f64, f64) -> f64, most: u32)
     let shores: Vec<Vec<Option<i32>>> = rounded.outlines.iter().map(shore_of).collect();
     let dams = dams(&rounded);
     let has_line = have_line(&rounded.outlines, &rivers, &site);
-    let waters =
-        level(&rounded.outlines, &shores, &has_line, &|place| dams.contains(&place), site.lattice, &mut remarks);
-    let lake = lakes_along(&rounded.outlines, &waters, &rivers, &site);
+    let inside = vec![Histogram::new(); shores.len()];
+    let of_shores = Shores { heights: &shores, inside: &inside, has_line: &has_line };
+    let (is_dam, falls) = (|place: Place| dams.contains(&place), FallOptions::USUAL);
+    let mut waters = level(&rounded.outlines, of_shores, &is_dam, falls, site.lattice, &mut remarks);
+    let still = lakes_along(&rounded.outlines, &waters.lakes, &rivers, &site);
     let bed: Vec<Option<i32>> = rivers.nodes.iter().map(|node| dem(node.place)).collect();
-    let fallen = fall(&rivers, Bed { ground: &bed, lower_bank: &bed, lake: &lake }, &mut remarks);
+    let of_bed = Bed { ground: &bed, middle: &bed, lower_bank: &bed };
+    let fallen = fall(&rivers, of_bed, &still, falls, &mut remarks);
+    for (still, level) in still.iter().zip(&fallen.levels) {
+        let of_body = waters.lakes.iter_mut().filter(|lake| lake.body == still.body);
+        of_body.for_each(|lake| lake.level = *level);
+    }
     let mut strands = channels(&rivers, &fallen);
     for lake in &waters.lakes {
         strands.extend(shore(&rounded.outlines[lake.outline as usize], lake.level));
@@ -71,7 +78,9 @@ fn all_stages(sources: Vec<Source>, metres: &dyn Fn(f64, f64) -> f64, most: u32)
 
     let ground: Vec<Option<i32>> = roads.nodes.iter().map(|node| dem(node.place)).collect();
     let crossed = water(&strands);
-    let heights = grade(&roads, &ground, &[], &crossed, GradeOptions::USUAL, &mut remarks);
+    let afloat = afloat(&rounded.outlines, &waters.lakes, &roads, &sides(&roads), &site);
+    let pins = with_water(&roads, Vec::new(), &afloat, &mut remarks);
+    let heights = grade(&roads, &ground, &pins, &crossed, GradeOptions::USUAL, &mut remarks);
     for (number, edge) in roads.edges.iter().enumerate() {
         let rise = (heights[edge.a as usize] - heights[edge.b as usize]).abs();
         assert!(rise <= edge.rise_max * 3 / 2, "edge {number} is too steep");

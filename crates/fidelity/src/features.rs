@@ -1,7 +1,7 @@
 //! How true a tile is to its features: whether its TIN has their edges, whether lakes lie level and no shore below
 //! them, and how far the ground outside of them lies from the TIN.
 
-use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use terrain::{Dem, FeatureSurface, Features, LatticePoint, LoadModule, Post, PostRect, SurfaceGround, TileFeatures};
 use terrain::{Tin, Vertex};
@@ -43,7 +43,7 @@ impl FeatureFigures {
             steps_per_post: features.kept.steps_per_post,
             edges: owned_edges(&features.kept, tin.rect, area),
             missing: missing_edges(tin, &features.kept),
-            lake_spread: bodies.lake_spread(tin, &features.kept),
+            lake_spread: bodies.lake_spread(tin),
             shore_posts,
             shore_below,
             outside: residuals_without(modules, ground, featured),
@@ -208,22 +208,27 @@ impl<'a> Bodies<'a> {
         self.lake_level(LatticePoint::new(at.row.div_euclid(to_common), at.col.div_euclid(to_common)))
     }
 
-    /// How far any vertex of a TIN in a lake lies from its level, in quanta. Vertices of other features, which cross
-    /// it, are not asked for it.
-    fn lake_spread(&self, tin: &Tin, kept: &Features) -> u32 {
+    /// How far any corner of a triangle of a TIN in a lake lies from its level, in quanta.
+    fn lake_spread(&self, tin: &Tin) -> u32 {
         if !self.has_lake() {
             return 0;
         }
-        let (to_common, to_tin) = common(kept.steps_per_post, tin.steps_per_post);
-        let decided: HashSet<LatticePoint> = kept.vertices.iter().map(|vertex| vertex.at).collect();
-        let off = |vertex: &Vertex| {
-            // A vertex between the places of features is on none of their edges.
-            let at = scaled(vertex.at, to_tin);
-            let place = LatticePoint::new(at.row.div_euclid(to_common), at.col.div_euclid(to_common));
-            let level = self.lake_level(place).filter(|_| !decided.contains(&place))?;
-            Some(vertex.height.abs_diff(level))
+        let off = |&triangle: &[u32; 3]| {
+            let corners = triangle.map(|corner| tin.vertices[corner as usize]);
+            let [a, b, c] = corners.map(|vertex| vertex.at);
+            // A place inside: twice the first corner and both others, on a lattice four times as fine.
+            let inside = LatticePoint::new(2 * a.row + b.row + c.row, 2 * a.col + b.col + c.col);
+            let level = self.lake_level_in(inside, 4 * tin.steps_per_post)?;
+            let is_water = |at: LatticePoint| {
+                let (to_common, to_own) = common(self.steps, tin.steps_per_post);
+                let at = scaled(at, to_own);
+                let at = LatticePoint::new(at.row.div_euclid(to_common), at.col.div_euclid(to_common));
+                self.bodies.iter().any(|body| body.level == level && body.holds(at, self.steps))
+            };
+            let all = [a, b, c].into_iter().all(is_water);
+            all.then(|| corners.iter().map(|vertex| vertex.height.abs_diff(level)).max().unwrap_or(0))
         };
-        tin.vertices.iter().filter_map(off).max().unwrap_or(0)
+        tin.triangles.iter().filter_map(off).max().unwrap_or(0)
     }
 
     /// Posts of `rect` outside all features that lie within a post of a lake, and those of them below its level.
@@ -357,7 +362,11 @@ mod tests {
     }
 
     fn lake(level: i32) -> TileFeatures {
-        let ring = [(24, 24), (24, 104), (104, 104), (104, 24)].map(|(row, col)| vertex(row, col, level));
+        lake_within(24, 104, level)
+    }
+
+    fn lake_within(low: i32, high: i32, level: i32) -> TileFeatures {
+        let ring = [(low, low), (low, high), (high, high), (high, low)].map(|(row, col)| vertex(row, col, level));
         let ring = ring.to_vec();
         let surface = FeatureSurface { class: 2, ground: SurfaceGround::Lake, body: 0, ring: ring.clone() };
         let kept = Features { steps_per_post: STEPS, vertices: ring, ..Features::default() }.canonical();
@@ -365,13 +374,14 @@ mod tests {
     }
 
     #[test]
-    fn a_vertex_in_a_lake_lies_on_its_level_or_is_told() {
-        for (level, spread) in [(5, 0), (9, 4), (-2, 7)] {
-            let features = lake(level);
-            assert_eq!(Bodies::of(&features).lake_spread(&tin(), &features.kept), spread, "{level}");
+    fn a_corner_of_a_triangle_in_a_lake_lies_on_its_level_or_is_told() {
+        // Whatever else it is a corner of: the middle of the TIN stands 5 quanta above its corners.
+        for (level, spread) in [(5, 5), (0, 5), (9, 9), (-2, 7)] {
+            let features = lake_within(0, 128, level);
+            assert_eq!(Bodies::of(&features).lake_spread(&tin()), spread, "{level}");
         }
         let none = TileFeatures::none(TileId { row: 0, col: 0 });
-        assert_eq!(Bodies::of(&none).lake_spread(&tin(), &none.kept), 0);
+        assert_eq!(Bodies::of(&none).lake_spread(&tin()), 0);
     }
 
     #[test]

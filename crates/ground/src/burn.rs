@@ -201,8 +201,9 @@ fn nearest_on([a, b]: [Vertex; 2], at: LatticePoint) -> (f64, f64) {
     ((off_x * off_x + off_y * off_y).sqrt(), height)
 }
 
-/// Posts inside rings, holes left out: row by row, those between an odd and an even crossing.
-fn posts_inside(rings: &[&[Vertex]], steps: i32, rect: PostRect) -> Vec<Post> {
+/// Posts inside rings, holes left out: row by row, those between an odd and an even crossing. Vertices stand on a
+/// lattice of so many steps a post.
+pub fn posts_inside(rings: &[&[Vertex]], steps: i32, rect: PostRect) -> Vec<Post> {
     let mut crossings: HashMap<i32, Vec<i32>> = HashMap::new();
     for ring in rings {
         for (at, a) in ring.iter().enumerate() {

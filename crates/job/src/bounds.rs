@@ -122,6 +122,8 @@ pub const EARTHWORK_M_MAX: f64 = 1000.0;
 pub const GRADE_GIVE: std::ops::RangeInclusive<f64> = 1.0..=10.0;
 /// Posts along a road over which the ground is smoothed.
 pub const SMOOTH_POSTS: std::ops::RangeInclusive<f64> = 0.0..=100.0;
+/// The share of the ground along a river that lies below it.
+pub const RIVER_TAU: std::ops::RangeInclusive<f64> = 0.01..=0.99;
 /// Metres back along a way in which the bank of a deck may sag.
 pub const BANK_M_MAX: f64 = 1000.0;
 /// Metres above the ground that an eye may be: lower ones see nothing but the next bump, higher ones fly.

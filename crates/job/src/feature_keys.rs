@@ -6,7 +6,8 @@ use features::{Form, Kind, RuleKind};
 
 use crate::bounds::{
     BANK_M_MAX, CLEARANCE_M_MAX, EARTHWORK_M_MAX, FEATURE_SOURCES_MAX, GRADE_GIVE, LAYER_CHARS_MAX, LEFT_OUT_WEIGHT,
-    NAME_CHARS_MAX, RULE_GRADE_PERCENT, RULE_WIDTH_M, RULES_MAX, SHARE_MAX, SMOOTH_POSTS, TAG_CHARS_MAX, WKT_CHARS_MAX,
+    NAME_CHARS_MAX, RIVER_TAU, RULE_GRADE_PERCENT, RULE_WIDTH_M, RULES_MAX, SHARE_MAX, SMOOTH_POSTS, TAG_CHARS_MAX,
+    WKT_CHARS_MAX,
 };
 use crate::sections::FILE_SAYS;
 use crate::{HeightsFrom, Key};
@@ -63,6 +64,12 @@ pub(crate) const FEATURES: &[Key] = &[
         .number("posts", SMOOTH_POSTS)
         .otherwise("2 where the DEM is noisy along roads, else 0")
         .example("smooth_posts = 3"),
+    Key::new("river_tau", "the share of the ground along a river that lies below it: a DEM sees banks and trees")
+        .number("a share", RIVER_TAU)
+        .usual("0.35"),
+    Key::new("carve_max_m", "how deep a river is carved down to its lower bank").number(HIGH, EARTHWORK_M).usual("2"),
+    Key::new("river_tilt", "let rivers and canals fall evenly through the pools that a DEM makes of them")
+        .usual("true"),
 ];
 
 pub(crate) const FEATURE_SOURCES: &[Key] = &[

@@ -1,6 +1,6 @@
 //! What a job says about roads, rivers and lakes that become parts of the ground.
 
-use features::{GradeOptions, Kind, Rule};
+use features::{FallOptions, GradeOptions, Kind, Rule};
 
 use crate::{ImportanceSpec, NamedFile};
 
@@ -24,6 +24,8 @@ pub struct FeaturesSpec {
     pub grade_give: f64,
     /// How high decks stand over what they cross, where they rest, and how far roads follow the ground.
     pub options: GradeOptions,
+    /// How rivers follow the ground.
+    pub falls: FallOptions,
 }
 
 /// Where features come from.

@@ -1,6 +1,6 @@
 //! The settings of `[features]`: as TOML, and with what they mean.
 
-use features::{Clearances, GradeOptions, Rule, RuleKind};
+use features::{Clearances, FallOptions, GradeOptions, Rule, RuleKind};
 use terrain::metres_of_quanta;
 
 use crate::setting_list::{List, counted, number, quoted};
@@ -31,6 +31,10 @@ pub(crate) fn describe(features: &FeaturesSpec, list: &mut List) {
     ];
     lengths.into_iter().for_each(|(key, quanta)| list.add(key, number(metres_of_quanta(quanta))));
     list.add("features.grade_give", number(features.grade_give));
+    let FallOptions { tau, carve_max, tilt, cut_max: _, fill_max: _ } = features.falls;
+    list.add("features.river_tau", number(f64::from(tau) / 1000.0));
+    list.add("features.carve_max_m", number(metres_of_quanta(carve_max)));
+    list.add("features.river_tilt", tilt.to_string());
     let smooth_posts = smooth_milliposts.map(|thousandths| number(f64::from(thousandths) / 1000.0));
     smooth_posts.into_iter().for_each(|posts| list.add("features.smooth_posts", posts));
 }

@@ -24,7 +24,8 @@ const FULL: &str = "[features]\nsources = [\"roads.osm.pbf\", { file = \"hydro.g
     { where = {}, kind = \"breakline\", form = \"auto\" }]\n\
     buildings = false\nshare_max = 0.25\nclearance_road_m = 5\n\
     clearance_rail_m = 6.5\nclearance_water_m = 0\nbank_m = 50\n\
-    cut_max_m = 5\nfill_max_m = 6\nclip_m = 2\nsmooth_posts = 1.5\ngrade_give = 1.25\n";
+    cut_max_m = 5\nfill_max_m = 6\nclip_m = 2\nsmooth_posts = 1.5\ngrade_give = 1.25\n\
+    river_tau = 0.4\ncarve_max_m = 1\nriver_tilt = false\n";
 
 #[test]
 fn every_key_of_features_is_read() {

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use features::{Clearances, Form, GradeOptions, Rule, RuleKind};
+use features::{Clearances, FallOptions, Form, GradeOptions, Rule, RuleKind};
 use terrain::HOLE_CLASS;
 
 use crate::bounds::{FEATURE_SOURCES_MAX, NAME_CHARS_MAX, RULES_MAX, TAG_CHARS_MAX, TAGS_MAX};
@@ -36,6 +36,13 @@ pub(super) fn read(
         share_max: features.number("share_max")?,
         left_out_weight: features.number("left_out_weight")?,
         grade_give: features.number("grade_give")?,
+        falls: FallOptions {
+            tau: (features.number("river_tau")? * 1000.0).round() as u32,
+            carve_max: quanta(features, "carve_max_m")?,
+            tilt: features.flag("river_tilt")?,
+            cut_max: quanta(features, "cut_max_m")?,
+            fill_max: quanta(features, "fill_max_m")?,
+        },
         options: GradeOptions {
             clearances: Clearances {
                 road: quanta(features, "clearance_road_m")?,
