@@ -174,8 +174,8 @@ impl Ground {
         self.relief.bounds.map(|bounds| told.fold(bounds, Bounds::and))
     }
 
-    /// From now on, features are burned into every window but natural ones, as `folder` has them. Posts on those that had
-    /// no room weigh `left_out_weight` times what they otherwise would.
+    /// From now on, features are burned into every window but natural ones, as `folder` has them. Posts on those that
+    /// had no room weigh `left_out_weight` times what they otherwise would.
     pub fn burn_in(&self, folder: &Folder, area: &GamingArea, left_out_weight: f64) {
         self.lines.get_or_init(|| Lines::new(folder, area, left_out_weight, self.kept.is_some()));
     }

@@ -242,7 +242,8 @@ pub(super) fn features(features: &ReportFeatures) -> Markup {
         html! { tr { td.thin[is_thin] { (name) } @for cell in amounts.iter().chain(&costs) { td.n { (cell) } } } }
     };
     html! {
-        (table(html! { th { "Class" } th.n { "km" } th.n { "of km wanted" } th.n { "kept" } th.n { "as strips, km" } th.n { "lakes" }
+        (table(html! { th { "Class" } th.n { "km" } th.n { "of km wanted" } th.n { "kept" } th.n { "as strips, km" }
+            th.n { "lakes" }
                 th.n { "triangles" } th.n { "most of a load module" } th.n { "most of a 4 km square" } }, html! {
             @for class in &features.classes { (row(&class.name, is_thin(class), amounts(class), cost(&class.cost))) }
             (row("all", false, [const { String::new() }; 5], cost(&features.all)))
