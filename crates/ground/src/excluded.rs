@@ -3,15 +3,21 @@
 //! Vertices may come to stand between posts, and what places them asks for the nearest post. So a post is taken when it
 //! lies inside, and when the rim passes through the ground that is nearer to it than to any other post.
 
-use terrain::{GridFrame, Post, PostRect};
-
-use crate::given::{GamingAreaFrame, inside};
+use terrain::{GridFrame, Post, PostRect, THOUSANDTHS};
 
 /// Ground that counts as nearer to a post than to others, in posts to each side: more than half, since corners of
 /// polygons are rounded.
 const REACH: f64 = 0.5 + 1.0 / 256.0;
 /// No corner lies farther from the grid's origin, in posts; beyond, it is moved in.
 const FAR: f64 = 1e9;
+
+/// Where an area lies: what polygons need to be told of it.
+pub struct GamingAreaFrame {
+    /// Its posts.
+    pub rect: PostRect,
+    /// Its place.
+    pub frame: GridFrame,
+}
 
 /// The posts of `rect` that keep vertices out of these polygons, in ascending order.
 pub(crate) fn excluded(polygons: &[mask::Polygon], area: &GamingAreaFrame, rect: PostRect) -> Vec<Post> {
@@ -27,6 +33,15 @@ pub(crate) fn excluded(polygons: &[mask::Polygon], area: &GamingAreaFrame, rect:
         }
     }
     rect.posts().zip(taken).filter(|(_, taken)| *taken).map(|(post, _)| post).collect()
+}
+
+/// Whether each post of a window lies inside a polygon, row-major.
+pub(crate) fn inside(polygon: &mask::Polygon, area: &GamingAreaFrame, rect: PostRect) -> Vec<bool> {
+    let shape = mask::Shape::Polygons(vec![polygon.clone()]);
+    let only = mask::Area { class: "inside".into(), weight: THOUSANDTHS, shape };
+    let mask = mask::Mask { default_weight: 0, areas: vec![only], smooth: terrain::Smooth::None, over: Vec::new() };
+    let found = mask::importance(&mask, area.rect, &area.frame, rect);
+    rect.posts().map(|post| 0 < found.weight(post)).collect()
 }
 
 /// Column and row of a place.

@@ -15,7 +15,7 @@ use tin::StartPost;
 
 use crate::GroundError;
 use crate::area::GamingArea;
-use crate::excluded::excluded;
+use crate::excluded::{GamingAreaFrame, excluded, inside};
 
 /// A post that the job gives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -209,14 +209,6 @@ impl Given {
     }
 }
 
-/// Where an area lies: what polygons need to be told of it.
-pub struct GamingAreaFrame {
-    /// Its posts.
-    pub rect: PostRect,
-    /// Its place.
-    pub frame: terrain::GridFrame,
-}
-
 /// The posts that a method chooses on a window, in its order, corners left out.
 pub fn chosen(ground: &DemWindow, method: StartMethod, points: usize) -> Result<Vec<Post>, Impossible> {
     let rect = ground.dem.rect();
@@ -267,15 +259,6 @@ pub fn start_posts(given: &[GivenPost], rect: PostRect, open: terrain::SeamSides
 /// Given posts on a fixed outer border of the area.
 pub fn border_posts(given: &[GivenPost]) -> impl Iterator<Item = Post> {
     given.iter().filter(|post| post.outer).map(|post| post.at)
-}
-
-/// Whether each post of a window lies inside a polygon, row-major.
-pub(crate) fn inside(polygon: &mask::Polygon, area: &GamingAreaFrame, rect: PostRect) -> Vec<bool> {
-    let shape = mask::Shape::Polygons(vec![polygon.clone()]);
-    let only = mask::Area { class: "inside".into(), weight: THOUSANDTHS, shape };
-    let mask = mask::Mask { default_weight: 0, areas: vec![only], smooth: terrain::Smooth::None, over: Vec::new() };
-    let found = mask::importance(&mask, area.rect, &area.frame, rect);
-    rect.posts().map(|post| 0 < found.weight(post)).collect()
 }
 
 /// Posts in metres of a map.

@@ -9,7 +9,7 @@ use crate::bounds::{
     NAME_CHARS_MAX, RIVER_TAU, RULE_GRADE_PERCENT, RULE_WIDTH_M, RULES_MAX, SHARE_MAX, SMOOTH_POSTS, TAG_CHARS_MAX,
     WKT_CHARS_MAX,
 };
-use crate::sections::FILE_SAYS;
+use crate::key::FILE_SAYS;
 use crate::{HeightsFrom, Key};
 
 pub(crate) const FEATURES: &[Key] = &[

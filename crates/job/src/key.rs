@@ -4,6 +4,9 @@ use std::ops::RangeInclusive;
 
 use crate::{Choice, MethodName};
 
+/// What holds of a source where a job does not say: what its file does.
+pub(crate) const FILE_SAYS: &str = "as the file says";
+
 /// A table of a job file, or one that stands in it, and its keys.
 #[derive(Debug)]
 pub struct KeyTable {

@@ -11,6 +11,7 @@ use crate::bounds::{
     THANKS_CHARS_MAX, TITLE_CHARS_MAX, TRIANGLES_MIN, WEIGHT_MAX, WKT_CHARS_MAX,
 };
 use crate::feature_keys::{FEATURE_SOURCES, FEATURES, RULES};
+use crate::key::FILE_SAYS;
 use crate::{
     Allocation, AreaPlace, Borders, ClipHeights, Count, DemSource, Edges, ErrorKey, Key, KeyTable, MethodName,
     OuterBorder, SampleClass, StartMethod,
@@ -139,7 +140,6 @@ const DEM: &[Key] = &[
 ];
 
 const UNIT: &str = "metres in a unit of height,";
-pub(crate) const FILE_SAYS: &str = "as the file says";
 const SOURCE_EXAMPLE: &str = "{ file = \"cell.asc\", crs = \"EPSG:32611\" }";
 
 const SOURCES: &[Key] = &[

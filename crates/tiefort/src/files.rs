@@ -8,7 +8,7 @@ use tempfile::NamedTempFile;
 
 use crate::failure::Failure;
 use crate::left_over;
-use crate::making::Making;
+use crate::signals;
 
 /// Writes a file that appears under its name only when it is whole, and on the disk.
 ///
@@ -33,7 +33,7 @@ pub fn write_whole_or(
     let file = temporary_beside(path)?;
     // Others leave it alone while this process lives.
     let _held = left_over::hold(file.path());
-    let _making = Making::begin(file.path());
+    let _making = signals::making(file.path());
     let mut out = BufWriter::new(file.as_file());
     write(&mut out)?;
     out.flush().map_err(fault)?;
@@ -55,7 +55,7 @@ pub fn make_whole(path: &Path, make: impl FnOnce(&Path) -> Result<(), Failure>) 
     // beside it.
     let folder = tempfile::Builder::new().prefix(left_over::PREFIX).tempdir_in(folder_of(path)).map_err(fault)?;
     let _held = left_over::hold(folder.path());
-    let _making = Making::begin(folder.path());
+    let _making = signals::making(folder.path());
     let file = folder.path().join(path.file_name().unwrap_or("part".as_ref()));
     make(&file)?;
     fs::rename(&file, path).map_err(fault)

@@ -9,6 +9,7 @@ use tempfile::TempDir;
 use crate::failure::Failure;
 use crate::left_over;
 use crate::making::Making;
+use crate::signals;
 
 /// A folder in the making, beside the place where it will appear.
 #[derive(Debug)]
@@ -37,7 +38,7 @@ impl NewFolder {
         builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o777));
         let making = builder.tempdir_in(around).map_err(|error| Failure::output(&path, &error))?;
         let held = left_over::hold(making.path());
-        let noted = Making::begin(making.path());
+        let noted = signals::making(making.path());
         Ok(Self { path, making, _held: held, _making: noted })
     }
 

@@ -5,6 +5,7 @@
 //! then holds writing back, so that nothing is left half-written, says how to go on, and ends the process. What a
 //! tile has not published is done again by the next run.
 
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Once};
 use std::thread;
@@ -15,7 +16,7 @@ use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
 
 use crate::failure::Failure;
-use crate::making;
+use crate::making::{self, Making};
 use crate::terminal;
 
 /// Added to a signal's number, gives the exit code shells expect.
@@ -40,8 +41,14 @@ pub fn begin() {
     let _ = flag::register(signal_hook::consts::SIGXFSZ, Arc::default());
 }
 
+/// Notes what is being made at `path`, under a name that is not its final one: no signal leaves it behind.
+pub fn making(path: &Path) -> Making {
+    end_where_nothing_else_does();
+    Making::begin(path)
+}
+
 /// Ends the program as the first signal would, once what it is making is removed, where no command watches by itself.
-pub fn end_where_nothing_else_does() {
+fn end_where_nothing_else_does() {
     static ONCE: Once = Once::new();
     if !IS_PROGRAM.load(Ordering::SeqCst) {
         return;

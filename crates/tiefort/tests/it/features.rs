@@ -129,7 +129,8 @@ fn init_sizes_limits_from_the_data_or_as_it_is_told() {
     assert!(job.lines().all(|line| line.chars().count() <= 80), "{job}");
     check("simnet.toml", &["--limits", "simnet"], "32 triangles a load module keep", [100, 32, 4096]);
     check("mean.toml", &["--mean", "100"], "100 triangles a load module keep", [300, 100, 12_800]);
-    scene.refuses(&[&["init", "dem.asc", "--mean", "9", "--rms", "1"], &INIT[..]].concat(), &["--mean", "--rms"]);
+    let both = scene.run_to(2, &[&["init", "dem.asc", "--mean", "9", "--rms", "1"], &INIT[..]].concat());
+    assert!(both.stderr.contains("'--mean <N>' cannot be used with '--rms <R>'"), "{}", both.stderr);
     let plan = scene.run_to(0, &["plan", "data.toml"]).stdout;
     assert!(flat(&plan).contains("What budgets would keep of features"), "{plan}");
     let json = scene.run_to(0, &["plan", "data.toml", "--emit", "json"]).stdout;
