@@ -82,10 +82,11 @@ impl Artifact for Levelling<'_> {
 }
 
 /// What features may take of the limits: of each load module, of each window and of the area no more than their share,
-/// and never more than what the points leave that every build starts from.
+/// and never more than what the points leave that every build starts from. What features have already been granted is
+/// not taken off: a worker that levels them again, because the level was lost after it had settled, grants the same.
 pub(crate) fn shares(budget: &Budget, spec: &FeaturesSpec) -> Shares {
     let grid = budget.grid;
-    let start = budget.start();
+    let start = Budget { reserved: Vec::new(), ..budget.clone() }.start();
     let share = |limit: u64, start: u64| {
         let of = |share: f64| ((share * limit as f64) as u64).min(limit.saturating_sub(start));
         Share { main: of(spec.share_main.max(spec.share_max)), others: of(spec.share_max) }
