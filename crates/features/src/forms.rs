@@ -90,7 +90,8 @@ pub fn form(graded: &Graded, strands: &[Strand], site: &Site) -> Formed {
     let thinned = |(number, strand): (usize, &Strand)| thinned(strand, grants.of_strand(number), site, &stays);
     let mut thinned: Vec<Strand> = strands.iter().enumerate().filter_map(thinned).collect();
     let mut formed = round_together(graded, &pieces, &mut wide, &thinned, site);
-    for _ in 0..ROUNDS_LEVEL {
+    // Each round takes the room of a strip or lowers a lake, so that there is a last one.
+    loop {
         let (tilted, uneven) = (tilted(&formed, network, &wide), uneven(&formed));
         if tilted.is_empty() && uneven.is_empty() {
             break;
@@ -109,9 +110,6 @@ pub fn form(graded: &Graded, strands: &[Strand], site: &Site) -> Formed {
     Remark::sort(&mut formed.remarks);
     formed
 }
-
-/// Rounds in which strips that another line tilts become lines themselves.
-const ROUNDS_LEVEL: usize = 3;
 
 /// Rounds strips that have room, and all other lines, together.
 fn round_together(graded: &Graded, pieces: &[Piece], wide: &mut [Wide], thinned: &[Strand], site: &Site) -> Formed {
@@ -469,6 +467,24 @@ mod tests {
             let (place, height) = formed.points[point as usize];
             let ground = crate::samples::ground_at(place, &ground).unwrap();
             assert!((height - ground).abs() < 10, "{height} {ground}");
+        }
+    }
+
+    #[test]
+    fn where_strips_give_way_one_after_another_no_line_is_left_steeper_than_its_grade() {
+        let runways = [
+            vec![(78.0, 56.0), (48.0, 49.0), (58.0, 49.0), (30.0, 63.0)],
+            vec![(48.0, 75.0), (57.0, 52.0), (69.0, 48.0), (25.0, 29.0), (72.0, 49.0)],
+            vec![(31.0, 78.0), (25.0, 35.0), (67.0, 51.0), (26.0, 51.0), (70.0, 49.0)],
+        ];
+        let hills = |east: f64, north: f64| 4.0 * (north / 5.0).sin() + 3.0 * (east / 7.0).cos();
+        for runway in runways {
+            let formed = formed(vec![way(1, "aeroway=runway width=30", &runway)], hills);
+            for edge in formed.edges.iter().filter(|edge| edge.role == Role::Centre) {
+                let [a, b] = [edge.a, edge.b].map(|point| formed.points[point as usize]);
+                let rise_max = site().lattice.rise_max(a.0, b.0, 20_000, 0);
+                assert!((a.1 - b.1).abs() <= rise_max + 1, "{a:?} {b:?}");
+            }
         }
     }
 
