@@ -391,6 +391,27 @@ mod tests {
         }
     }
 
+    /// What level ties in a loop hold together no round moves, so a single network may cost several times the least.
+    #[test]
+    fn heights_on_loops_cost_little_more_than_the_least_on_the_whole() {
+        let mut drawn = 1u64;
+        let mut below = |bound: u64| {
+            drawn = drawn.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (drawn >> 33) % bound
+        };
+        let (mut found, mut least) = (0, 0);
+        for _ in 0..400 {
+            let ends: Vec<(u32, u32)> = (0..8).map(|_| (below(5) as u32, below(5) as u32)).collect();
+            let differences: Vec<(i64, i64)> = (0..8).map(|_| (below(3) as i64, below(4) as i64)).collect();
+            let mut sample = || (below(5) as u32, below(5) as i64, below(4) as i64, below(4) as i64);
+            let samples: Vec<(u32, i64, i64, i64)> = (0..8).map(|_| sample()).collect();
+            let problem = problem(5, ties(&ends, &differences, 5), &samples, &[]);
+            found += cost(&problem, &fit(&problem, 4));
+            least += least_cost(&problem, 0, 4).expect("equal heights keep to everything");
+        }
+        assert!(100 * found <= 110 * least, "{found} where {least} is the least");
+    }
+
     proptest! {
         #[test]
         fn no_other_heights_on_a_tree_cost_less(
@@ -408,7 +429,7 @@ mod tests {
         }
 
         #[test]
-        fn heights_on_loops_keep_to_everything_and_rarely_cost_more_than_the_least(
+        fn heights_on_loops_keep_to_everything_and_no_round_costs_more(
             ends in proptest::collection::vec((0..5u32, 0..5u32), 3..9),
             differences in proptest::collection::vec((0..3i64, 0..4i64), 9),
             samples in proptest::collection::vec((0..5u32, 0..5i64, 0..4i64, 0..4i64), 0..9),
@@ -421,7 +442,6 @@ mod tests {
             let least = least_cost(&problem, 0, 4).expect("equal heights keep to everything");
             prop_assert!(cost(&problem, &some) <= cost(&problem, &none));
             prop_assert!(least <= cost(&problem, &some));
-            prop_assert!(cost(&problem, &some) <= 2 * least + 4, "{} {least}", cost(&problem, &some));
         }
 
         #[test]

@@ -198,7 +198,8 @@ fn waters(
         let known = about(strand.id);
         let kind = known.map_or(kind_of(strand.role), |about| about.kind);
         let places = || strand.stations.iter().map(|(place, _)| *place);
-        let (Some(from), Some(to)) = (places().next(), places().last()) else { continue };
+        let ends = (strand.stations.first(), strand.stations.last());
+        let (Some(&(from, _)), Some(&(to, _))) = ends else { continue };
         let segments = strand.stations.windows(2).filter(|ends| site.holds_middle(ends[0].0, ends[1].0));
         let length: i64 = segments.map(|ends| site.lattice.length(ends[0].0, ends[1].0)).sum();
         let area = if strand.role.is_outline() { doubled_area(&places().collect::<Vec<Place>>()) } else { 0 };

@@ -90,7 +90,7 @@ fn corners([all, strips, benches, free]: [u16; 4]) -> i64 {
 }
 
 /// Changes with each load module once, in order.
-fn summed(changes: &mut Vec<(u32, i64)>) -> Vec<(u32, i64)> {
+fn summed(changes: &mut [(u32, i64)]) -> Vec<(u32, i64)> {
     changes.sort_unstable_by_key(|(module, _)| *module);
     let sums = changes.chunk_by(|a, b| a.0 == b.0).map(|same| (same[0].0, same.iter().map(|(_, by)| by).sum()));
     sums.filter(|(_, by): &(u32, i64)| *by != 0).collect()
