@@ -90,7 +90,8 @@ impl Features {
         Self { vertices, edges, spans, ..*self }
     }
 
-    /// Posts on the sides of the tile that covers `rect` where no border point may stand, in ascending order.
+    /// Posts on the sides of the tile that covers `rect` where no border point may stand, in ascending order: on the
+    /// width of a road that crosses, and between the ends of an edge that runs along a side.
     pub fn barred_posts(&self, rect: PostRect) -> Vec<Post> {
         let mut posts = Vec::new();
         for SideSpan { side, from, to } in &self.spans {
@@ -103,10 +104,28 @@ impl Features {
                 Side::East => Post::new(along, rect.east),
             }));
         }
+        posts.extend(self.edges.iter().flat_map(|ends| self.posts_between(*ends, rect)));
         posts.retain(|&post| rect.contains(post));
         posts.sort_unstable();
         posts.dedup();
         posts
+    }
+
+    /// Posts between the ends of an edge that runs along a side of `rect`; none where it does not.
+    fn posts_between(&self, ends: [u32; 2], rect: PostRect) -> Vec<Post> {
+        let [a, b] = ends.map(|end| self.vertices[end as usize].at);
+        let steps = self.steps_per_post;
+        let along =
+            |one: i32, other: i32| one.min(other).div_euclid(steps) + 1..=(one.max(other) - 1).div_euclid(steps);
+        let is_side =
+            |line: i32, sides: [i32; 2]| sides.contains(&line.div_euclid(steps)) && line.rem_euclid(steps) == 0;
+        if a.row == b.row && is_side(a.row, [rect.south, rect.north]) {
+            return along(a.col, b.col).map(|col| Post::new(a.row / steps, col)).collect();
+        }
+        if a.col == b.col && is_side(a.col, [rect.west, rect.east]) {
+            return along(a.row, b.row).map(|row| Post::new(row, a.col / steps)).collect();
+        }
+        Vec::new()
     }
 }
 
@@ -143,5 +162,16 @@ mod tests {
         let features = Features { steps_per_post: 64, spans, ..Features::default() };
         let rect = PostRect { south: 0, west: 0, north: 20, east: 20 };
         assert_eq!(features.barred_posts(rect), [Post::new(10, 0), Post::new(20, 3), Post::new(20, 4)]);
+    }
+
+    #[test]
+    fn posts_between_the_ends_of_an_edge_along_a_side_are_barred() {
+        let vertices =
+            vec![vertex(160, 0), vertex(160, 24), vertex(160, 33), vertex(80, 8), vertex(80, 80), vertex(8, 0)];
+        let features = Features { vertices, edges: vec![[0, 1], [2, 1], [3, 4], [5, 0]], ..Features::default() };
+        let rect = PostRect { south: 0, west: 0, north: 20, east: 20 };
+        let north = [1, 2, 4].map(|col| Post::new(20, col));
+        let west = (2..20).map(|row| Post::new(row, 0));
+        assert_eq!(features.barred_posts(rect), west.chain(north).collect::<Vec<_>>());
     }
 }

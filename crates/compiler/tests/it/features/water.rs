@@ -4,6 +4,7 @@ use database::{FeatureRemark, LineRole};
 use features::Kind;
 
 use super::drawing::{At, Drawing, Laid, SIDE_M, line, polygon};
+use crate::scene::Words;
 
 /// Ground that falls to the south with noise of some metres.
 fn noisy(east: f64, north: f64) -> f64 {
@@ -26,6 +27,16 @@ fn a_river_on_noisy_ground_falls_all_the_way() {
         (0..=40).map(|at| (1000.0 + 80.0 * f64::from(at % 5), SIDE_M - 50.0 * f64::from(at))).collect();
     let laid = Drawing::new(noisy, &[line("waterway=river", &river)]).built();
     never_rises(&laid, Kind::River);
+}
+
+#[test]
+fn a_river_along_a_border_of_fixed_points_falls_between_its_stations() {
+    let words = Words { modules: "outer_border = \"fixed\"".into(), ..Drawing::words() };
+    let river = [(SIDE_M, SIDE_M), (SIDE_M, 1010.0), (SIDE_M, 0.0)];
+    let laid = Drawing::of(words, noisy, &[line("waterway=river", &river)]).built();
+    let heights: Vec<f64> = (0..=4 * SIDE_M as u32).map(|at| laid.height((SIDE_M, f64::from(at) / 4.0))).collect();
+    let rising = heights.windows(2).position(|pair| pair[1] < pair[0] - 1e-6);
+    assert_eq!(rising, None, "the surface rises downstream: {heights:?}");
 }
 
 #[test]
