@@ -8,7 +8,9 @@ use fidelity::{Curvature, FeatureFigures, Residuals, Tally};
 use ground::Window;
 use job::{Borders, ClipHeights as JobClipHeights, Edges, Job, OuterBorder};
 use load_modules::{ClipHeights, Layout, clip, concatenate, cut_decks, cut_lines};
-use terrain::{HOLE_CLASS, LatticePoint, LoadModule, ModuleCounts, Post, PostRect, TileId, Tin, Vertex, in_turn};
+use terrain::{
+    HOLE_CLASS, Importance, LatticePoint, LoadModule, ModuleCounts, Post, PostRect, TileId, Tin, Vertex, in_turn,
+};
 
 use crate::assembled::{Assembled, ModuleNumbers};
 use crate::keys::{self, StampOf};
@@ -113,7 +115,7 @@ fn make(assembling: &Assembling, stamp: &Stamp) -> Result<(Assembled, Sums), Com
     let lines = cut_lines(keys::lines_of(run.job, &features), features.kept.steps_per_post, &layout);
     modules.iter_mut().zip(lines).for_each(|(module, lines)| module.lines = lines);
     let residuals = fidelity::measure(&mut modules, &window.measured(area));
-    let at_source = run.ground.relief.residuals_at_source(&modules, area, area.tiling.rect(tile))?;
+    let at_source = at_source(run, tile, &modules)?;
     let figures = feature_figures(run, tile, (&own.tin, &modules), &window)?;
     let mut levels = all_levels(run, modules, (&layout, &window.dem, &natural.importance), &features);
     levels[1..].iter_mut().for_each(|level| drop(fidelity::measure(level, &window.measured(area))));
@@ -127,14 +129,30 @@ fn make(assembling: &Assembling, stamp: &Stamp) -> Result<(Assembled, Sums), Com
     Ok((done, sums))
 }
 
+/// Residuals against the sources alone: at the posts of the working grid, where features or water are burned into it,
+/// and at the source's own posts, where those are others.
+fn at_source(run: &Run, tile: TileId, modules: &[LoadModule]) -> Result<[Option<Tally>; 2], CompileError> {
+    let (area, relief) = (&run.area, &run.ground.relief);
+    let rect = area.tiling.rect(tile);
+    let own_posts = relief.residuals_at_source(modules, area, rect)?;
+    if !run.burns_in() {
+        return Ok([None, own_posts]);
+    }
+    let (dem, mask) = (relief.dry(rect)?, Importance::uniform(rect, 0));
+    let source = fidelity::Reference { dem: &dem, mask: &mask, grid: area.grid, spacing: area.frame.spacing };
+    let mut at_grid = Tally::default();
+    modules.iter().for_each(|module| at_grid.merge(&fidelity::residuals(module, &source).total()));
+    Ok([Some(at_grid), own_posts])
+}
+
 fn sums(
     residuals: Residuals,
-    at_source: Option<Tally>,
+    [at_source_grid, at_source]: [Option<Tally>; 2],
     (points, border): (Vec<u64>, u64),
     (heights, curvature): ((i32, i32), Curvature),
 ) -> Sums {
     let (has_source, at_source) = (at_source.is_some(), at_source.unwrap_or_default());
-    Sums { residuals, has_source, at_source, points, border, heights, curvature, features: None }
+    Sums { residuals, at_source_grid, has_source, at_source, points, border, heights, curvature, features: None }
 }
 
 /// How much the ground of a tile curves, for triangles as large as these load modules have them.
@@ -171,7 +189,7 @@ pub(crate) fn read_assembled(run: &Run, tins: &[Published], tile: TileId) -> Res
     let file = folder.stamp_file(&folder.modules_path(tile))?;
     let (modules, coarser) = numbers_of(&levels);
     let residuals = fidelity::measure(&mut levels[0], &window.measured(area));
-    let at_source = run.ground.relief.residuals_at_source(&levels[0], area, area.tiling.rect(tile))?;
+    let at_source = at_source(run, tile, &levels[0])?;
     let own = run.tin(tile, &tins[area.tiling.index(tile)].stamp)?;
     let counted = count_points(run, &own.tin, &[], &window.importance);
     let features = feature_figures(run, tile, (&own.tin, &levels[0]), &window)?;
@@ -240,7 +258,7 @@ pub(crate) fn crs(job: &Job) -> String {
 /// Points by class of the post they stand on, or next south-west of them, those over holes after the job's classes if
 /// there are any; and how many of them are border points that every build starts from.
 /// A point on a seam counts in the tile that owns the post.
-fn count_points(run: &Run, own: &Tin, removed: &[LatticePoint], importance: &terrain::Importance) -> (Vec<u64>, u64) {
+fn count_points(run: &Run, own: &Tin, removed: &[LatticePoint], importance: &Importance) -> (Vec<u64>, u64) {
     let (rect, area) = (own.rect, run.area.rect);
     let steps = own.steps_per_post;
     let side = run.area.grid.side_cells * steps;

@@ -290,10 +290,11 @@ pub(crate) fn measured(run: &Run, modules: Fingerprint) -> Key {
         Borders::Regular => 1,
     };
     // Beside the ground of the tile's own window, which its TIN is made from.
-    let between = if run.ground.relief.has_posts_between() { &run.records[..] } else { &[] };
+    let is_beside = run.ground.relief.has_posts_between() || run.burns_in();
+    let beside = if is_beside { &run.records[..] } else { &[] };
     Key::new("measured").known(MODULES, modules).part(MEASURE, |part| {
         let part = part.number(run.job.class_names().len() as u64).case(is_regular);
-        part.list(between.iter(), |part, record| part.fingerprint(record.blake3))
+        part.list(beside.iter(), |part, record| part.fingerprint(record.blake3))
     })
 }
 

@@ -26,6 +26,7 @@ pub(crate) fn to_measured(tile: TileId, assembled: &Assembled, sums: &Sums) -> M
         modules_file: assembled.file,
         modules: std::iter::once(&assembled.modules).chain(&assembled.coarser).flatten().map(module).collect(),
         classes: sums.residuals.classes.iter().map(to_tally).collect(),
+        at_source_grid: sums.at_source_grid.as_ref().map(to_tally),
         at_source: sums.has_source.then(|| to_tally(&sums.at_source)),
         points: sums.points.clone(),
         border: sums.border,
@@ -81,6 +82,7 @@ impl Sums {
 pub fn sums_of(measured: Measured) -> Sums {
     Sums {
         residuals: Residuals { classes: measured.classes.iter().map(from_tally).collect() },
+        at_source_grid: measured.at_source_grid.as_ref().map(from_tally),
         at_source: measured.at_source.as_ref().map(from_tally).unwrap_or_default(),
         has_source: measured.at_source.is_some(),
         points: measured.points,

@@ -5,7 +5,7 @@ use database::{
     Area, Database, FileStamp, Manifest, ManifestState, Removals, Report, SourceRecord, TileRecord, TileState, files,
 };
 use job::Job;
-use product::{Opened, Product, Told, Wanted, WantedGround};
+use product::{Made, Opened, Product, Told, Wanted, WantedGround};
 use serde_json::{Value, json};
 use terrain::{LatticePoint, TileId};
 
@@ -75,6 +75,8 @@ pub(crate) fn prepare(
     let mut report = findings.report()?;
     let told = findings.told();
     report.features = told.as_ref().map(|told| told.report.clone());
+    let features = run.level.as_ref().map(|settled| (run.job, &settled.level));
+    report.warnings.extend(product::warnings(&Made { report: &report, features }));
     let mut manifest = beginning(run);
     manifest.state = ManifestState::Complete;
     let allocation = run.database.write_json(files::ALLOCATION, &allocation_json(run, shares))?;

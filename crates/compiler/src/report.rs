@@ -69,6 +69,7 @@ impl Findings<'_> {
             limit: limit_of(&self.sums.curvature, sum(|numbers| numbers.triangles), &total),
             border: self.border(),
             heights: Some(self.heights()),
+            residual_against_source_grid: Some(residual_of(self.at_source_grid(&total))),
             residual_against_source: run.ground.relief.has_source_posts().then(|| self.at_source(&total)),
             classes: self.classes(residuals),
             features: None,
@@ -83,7 +84,7 @@ impl Findings<'_> {
             refusals: refusals(&refused),
             bound,
             stops: self.stops(),
-            warnings: run.warnings().into_iter().chain(self.left_out()).chain(self.beyond_sources()).collect(),
+            warnings: run.warnings(),
             outdated: false,
             tiles: Vec::new(),
             files: BTreeMap::new(),
@@ -94,17 +95,6 @@ impl Findings<'_> {
     pub fn told(&self) -> Option<Told> {
         let (settled, figures) = (self.run.level.as_ref()?, self.sums.features.as_ref()?);
         Some(product::told(self.run.job, &self.run.area, &settled.level, figures))
-    }
-
-    /// What of features had no room, where that is more than a person expects.
-    fn left_out(&self) -> Vec<String> {
-        let level = self.run.level.as_ref().map(|settled| &settled.level);
-        level.map_or_else(Vec::new, |level| product::left_out_warnings(self.run.job, level))
-    }
-
-    /// A guard of its own, in jobs with features: it knows the sources' heights and no other.
-    fn beyond_sources(&self) -> Option<String> {
-        self.run.level.as_ref().and_then(|_| beyond_sources(&self.heights()))
     }
 
     fn stops(&self) -> ReportStops {
@@ -140,9 +130,14 @@ impl Findings<'_> {
         ByModule { run: self.run, assembled: self.assembled }
     }
 
+    /// Against the source's heights alone; the working ground's where nothing is burned into that.
+    fn at_source_grid<'a>(&'a self, total: &'a Tally) -> &'a Tally {
+        self.sums.at_source_grid.as_ref().unwrap_or(total)
+    }
+
     /// Against the source's posts; the working grid's where those are the same.
     fn at_source(&self, total: &Tally) -> ReportResidual {
-        residual_of(if self.sums.has_source { &self.sums.at_source } else { total })
+        residual_of(if self.sums.has_source { &self.sums.at_source } else { self.at_source_grid(total) })
     }
 
     fn counts(&self) -> Vec<u32> {
@@ -360,19 +355,6 @@ impl Findings<'_> {
     }
 }
 
-/// What a person should know where roads and water take the surface beyond the heights of the sources: by 10 m and a
-/// fifth of their range, more than fitted heights do there.
-fn beyond_sources(heights: &ReportHeights) -> Option<String> {
-    let [low, high] = heights.sources_m?;
-    (0.2 * (high - low)).max(10.0).lt(&heights.outside_m).then(|| {
-        format!(
-            "the surface reaches {:.2} m beyond the heights of the sources, {low:.2} m to {high:.2} m: a wrong level \
-             or a deep cut may do that, and tiefort render --view residual shows where",
-            heights.outside_m
-        )
-    })
-}
-
 /// Figures of one level from those of its load modules.
 fn level_figures<'a>(level: u32, inner_share: f64, modules: impl Iterator<Item = &'a ModuleNumbers>) -> ReportLevel {
     let mut triangles = 0;
@@ -427,20 +409,5 @@ pub fn residual_of(tally: &Tally) -> ReportResidual {
         mean_abs_m: tally.mean_abs_m(),
         p95_m: tally.percentile_m(95.0),
         p99_m: tally.percentile_m(99.0),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_surface_far_beyond_its_sources_is_told() {
-        let told = |outside_m, sources_m| {
-            beyond_sources(&ReportHeights { surface_m: [0.0, 0.0], sources_m, outside_m }).is_some()
-        };
-        assert_eq!([9.0, 10.0, 11.0].map(|metres| told(metres, Some([500.0, 540.0]))), [false, false, true]);
-        assert_eq!([399.0, 401.0].map(|metres| told(metres, Some([0.0, 2000.0]))), [false, true]);
-        assert!(!told(500.0, None), "nothing is known of sources");
     }
 }

@@ -159,6 +159,11 @@ impl Run<'_> {
         self.level.as_ref()?.left_out.as_ref()
     }
 
+    /// Whether features or water are burned into the sources' heights.
+    pub fn burns_in(&self) -> bool {
+        self.level.is_some() || self.job.dem.water.is_some()
+    }
+
     /// What a person should know of what the run was made from.
     pub fn warnings(&self) -> Vec<String> {
         let of_features = self.level.iter().flat_map(|settled| &settled.level.notes);

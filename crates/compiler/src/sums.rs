@@ -12,6 +12,8 @@ use fidelity::{Curvature, FeatureFigures, Residuals, Tally};
 pub struct Sums {
     /// Against the working grid, by class of ground.
     pub residuals: Residuals,
+    /// The same against the sources' heights alone, where features or water are burned into the working grid.
+    pub at_source_grid: Option<Tally>,
     /// Against the sources' own posts.
     pub at_source: Tally,
     /// Whether that is of every tile: sources have other posts than the working grid.
@@ -51,6 +53,10 @@ impl Adding {
 impl Sums {
     fn merge(&mut self, other: &Sums) {
         self.residuals.merge(&other.residuals);
+        match (&mut self.at_source_grid, &other.at_source_grid) {
+            (Some(mine), Some(others)) => mine.merge(others),
+            (mine, _) => *mine = None,
+        }
         self.at_source.merge(&other.at_source);
         self.has_source &= other.has_source;
         self.points.resize(self.points.len().max(other.points.len()), 0);

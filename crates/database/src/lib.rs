@@ -61,7 +61,8 @@ pub use manifest::{
 };
 mod report_features;
 pub use report_features::{
-    ReportFeatureChecks, ReportFeatureClass, ReportFeatureCost, ReportFeatureRemarks, ReportFeatures,
+    ReportDeckClearance, ReportFeatureChecks, ReportFeatureClass, ReportFeatureCost, ReportFeatureRemarks,
+    ReportFeatures,
 };
 mod report;
 pub use report::{

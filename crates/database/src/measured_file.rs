@@ -22,6 +22,8 @@ pub struct Measured {
     pub modules: Vec<MeasuredModule>,
     /// Residuals against the working grid, by class of ground.
     pub classes: Vec<MeasuredTally>,
+    /// Residuals against the sources' heights at the posts of the working grid, where something is burned into it.
+    pub at_source_grid: Option<MeasuredTally>,
     /// Residuals against the source's own posts, where those are others.
     pub at_source: Option<MeasuredTally>,
     /// Points by class of ground.
@@ -64,6 +66,10 @@ pub struct MeasuredFeatures {
     pub shore_below: u64,
     /// Residuals outside features and their slopes.
     pub outside: MeasuredTally,
+    /// Places of decks that were looked at, those with ground above them, and how far it is at most, in quanta.
+    pub decks: (u64, u64, u32),
+    /// The least height of decks above each class of ground, in quanta.
+    pub deck_clearance: Vec<(u8, i32)>,
 }
 
 /// Counts and residual of one load module.
@@ -107,6 +113,7 @@ struct MeasuredOnDisk {
     blake3: [u8; 32],
     modules: Vec<MeasuredModule>,
     classes: Vec<MeasuredTally>,
+    at_source_grid: Option<MeasuredTally>,
     at_source: Option<MeasuredTally>,
     points: Vec<u64>,
     border: u64,
@@ -116,14 +123,15 @@ struct MeasuredOnDisk {
 
 /// The bytes of what was measured.
 pub fn encode_measured(stamp: &Stamp, measured: &Measured) -> Vec<u8> {
-    let Measured { tile, modules_file, modules, classes, at_source, points, border, heights, curvature, features } =
-        measured.clone();
+    let Measured { tile, modules_file, modules, classes, at_source_grid, at_source, .. } = measured.clone();
+    let Measured { points, border, heights, curvature, features, .. } = measured.clone();
     let on_disk = MeasuredOnDisk {
         tile: (tile.row, tile.col),
         length: modules_file.length,
         blake3: modules_file.blake3.0,
         modules,
         classes,
+        at_source_grid,
         at_source,
         points,
         border,
@@ -147,11 +155,22 @@ pub fn decode_measured(path: &Path, bytes: &[u8]) -> Result<(Stamp, Measured), D
     let (on_disk, features): (MeasuredOnDisk, Option<MeasuredFeatures>) =
         codec::decode_two(payload).map_err(|what| malformed(path, what))?;
     let MeasuredOnDisk { tile: (row, col), length, blake3, modules, classes, .. } = on_disk;
-    let MeasuredOnDisk { at_source, points, border, heights, curvature, .. } = on_disk;
+    let MeasuredOnDisk { at_source_grid, at_source, points, border, heights, curvature, .. } = on_disk;
     let modules_file = FileStamp { length, blake3: Fingerprint(blake3) };
     let tile = TileId { row, col };
-    let measured =
-        Measured { tile, modules_file, modules, classes, at_source, points, border, heights, curvature, features };
+    let measured = Measured {
+        tile,
+        modules_file,
+        modules,
+        classes,
+        at_source_grid,
+        at_source,
+        points,
+        border,
+        heights,
+        curvature,
+        features,
+    };
     Ok((stamp, measured))
 }
 

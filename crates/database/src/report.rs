@@ -8,7 +8,7 @@ use terrain::{Breach, BreachKind, BreachPlace, ModuleId};
 use crate::{FileStamp, ReportFeatures};
 
 /// The content of `report.json`; its keys are a contract. Every number is finite.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Report {
     /// Name of the gaming area.
     pub area: String,
@@ -33,7 +33,7 @@ pub struct Report {
     /// Use of limits before points made room for them, where any did (clipped edges).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub before_removals: Option<ReportBefore>,
-    /// Against the working grid, every post counted once.
+    /// Against the working ground, every post counted once: the DEM on the working grid with features and water in it.
     pub residual: ReportResidual,
     /// The same, of load modules at the outer border of the area and of the others apart.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -44,7 +44,10 @@ pub struct Report {
     /// Heights of the surface, and of the sources under it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub heights: Option<ReportHeights>,
-    /// Against the posts of the source DEM.
+    /// Against the sources at the posts of the working grid, with nothing burned into them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub residual_against_source_grid: Option<ReportResidual>,
+    /// Against the source at its own posts, where there is one: what resampling costs is in it.
     pub residual_against_source: Option<ReportResidual>,
     /// The same for each class of the mask, in the job's order.
     pub classes: Vec<ReportClass>,
@@ -409,6 +412,7 @@ mod tests {
             limit: Some(ReportLimit { triangles: 32, rms_m: 0.75, eta: Some(1.1 / 0.75), rough_share: 0.125 }),
             border: None,
             heights: None,
+            residual_against_source_grid: None,
             residual_against_source: None,
             classes: vec![],
             features: None,

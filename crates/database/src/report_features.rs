@@ -13,6 +13,9 @@ pub struct ReportFeatures {
     pub remarks: ReportFeatureRemarks,
     /// What must hold of features, in figures.
     pub checks: ReportFeatureChecks,
+    /// How low decks pass over the ground of each class.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub deck_clearances: Vec<ReportDeckClearance>,
 }
 
 /// One class of features.
@@ -104,4 +107,22 @@ pub struct ReportFeatureChecks {
     pub outside_rms_m: f64,
     /// The largest of them, in metres.
     pub outside_max_m: f64,
+    /// Places of decks that were looked at, one in each square metre.
+    #[serde(default)]
+    pub deck_samples: u64,
+    /// Those of them at which the ground stands above the deck.
+    #[serde(default)]
+    pub deck_samples_under: u64,
+    /// How far it does at most, in metres.
+    #[serde(default)]
+    pub deck_under_max_m: f64,
+}
+
+/// How low decks pass over one class of ground.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ReportDeckClearance {
+    /// Name of the class.
+    pub class: String,
+    /// The least height of a deck above it, in metres.
+    pub least_m: f64,
 }

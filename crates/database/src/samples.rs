@@ -73,6 +73,7 @@ pub(crate) fn measured() -> Measured {
         modules_file: FileStamp::of(b"slm"),
         modules: vec![MeasuredModule { triangles: 32, posts: 3, largest: 3, ..MeasuredModule::default() }; 2],
         classes: vec![tally.clone(), MeasuredTally::default()],
+        at_source_grid: Some(tally.clone()),
         at_source: Some(tally),
         points: vec![7, 0],
         border: 2,

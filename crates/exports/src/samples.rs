@@ -177,6 +177,7 @@ pub(crate) fn report() -> Report {
         limit: None,
         border: None,
         heights: None,
+        residual_against_source_grid: None,
         residual_against_source: None,
         classes: Vec::new(),
         features: None,

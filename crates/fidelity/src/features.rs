@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use terrain::{Dem, FeatureSurface, Features, LatticePoint, LoadModule, Post, PostRect, SurfaceGround, TileFeatures};
 use terrain::{Tin, Vertex};
 
-use crate::{Reference, Tally, each_residual};
+use crate::{DeckFigures, Reference, Tally, each_residual};
 
 /// What was found of the features of a tile, or of several.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -25,6 +25,8 @@ pub struct FeatureFigures {
     pub shore_below: u64,
     /// Residuals outside features and their slopes.
     pub outside: Tally,
+    /// How far decks stand above the ground.
+    pub decks: DeckFigures,
 }
 
 impl FeatureFigures {
@@ -47,6 +49,7 @@ impl FeatureFigures {
             shore_posts,
             shore_below,
             outside: residuals_without(modules, ground, featured),
+            decks: deck_figures(modules),
         }
     }
 
@@ -61,7 +64,18 @@ impl FeatureFigures {
         self.shore_posts += other.shore_posts;
         self.shore_below += other.shore_below;
         self.outside.merge(&other.outside);
+        self.decks.merge(&other.decks);
     }
+}
+
+/// How far the decks of load modules stand above the ground.
+pub fn deck_figures<'a>(modules: impl IntoIterator<Item = &'a LoadModule>) -> DeckFigures {
+    let mut all = DeckFigures::default();
+    modules
+        .into_iter()
+        .filter(|module| !module.decks.is_empty())
+        .for_each(|module| all.merge(&DeckFigures::of(module)));
+    all
 }
 
 /// Edges of features that a tile counts as its own: those on its northern and eastern side are a neighbour's.

@@ -115,7 +115,7 @@ impl Ground {
         let (rect, frame, given) = (area.rect, area.frame, Given::open(job, area)?);
         let lines = OnceLock::new();
         let mut ground = Self { relief, mask, fault, rect, frame, kept, lines, given, voids, warnings, accuracy_m };
-        if !ground.relief.has_source_posts() {
+        if !ground.relief.is_single() {
             ground.take_census(job, area, workers, stop)?;
         }
         Ok(ground)

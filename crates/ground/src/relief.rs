@@ -1,7 +1,7 @@
 //! Heights of any rectangle of the area, whatever they come from, with water level.
 
-use fidelity::{SourcePosts, Tally, residuals_at_source};
-use source_files::{Patch, Raster, RasterFrame};
+use fidelity::{SourcePosts, Tally, residuals_at_places, residuals_at_source};
+use source_files::{Mosaic, Patch, Raster, RasterFrame};
 use terrain::{Dem, GridFrame, PostRect};
 
 use crate::GroundError;
@@ -75,9 +75,18 @@ impl Relief {
         }))
     }
 
+    /// Whether the source is on the working grid's own system, and no mosaic.
+    pub(crate) fn is_single(&self) -> bool {
+        !matches!(self.source, Source::Mosaic(_) | Source::Wide(_))
+    }
+
     /// Whether the source has posts of its own to measure at: several sources have none in common.
     pub fn has_source_posts(&self) -> bool {
-        !matches!(self.source, Source::Mosaic(_) | Source::Wide(_))
+        match &self.source {
+            Source::Mosaic(mosaic) => mosaic.has_own_posts(),
+            Source::Wide(_) => false,
+            Source::Sample(_) | Source::Raster(_) | Source::Window(_) => true,
+        }
     }
 
     /// Residuals of the load modules of a tile at the source's own posts; `None` where those are the posts of the
@@ -97,8 +106,22 @@ impl Relief {
                 let window = source_files::window_under(windows.files()[0].frame(), &self.frame, tile)?;
                 Ok(self.residuals_at(modules, area, &windows.read(0, window)?))
             }
+            Source::Mosaic(mosaic) if mosaic.has_own_posts() => {
+                Ok(Some(self.residuals_of(modules, area, tile, mosaic)))
+            }
             Source::Sample(_) | Source::Mosaic(_) | Source::Wide(_) => Ok(None),
         }
+    }
+
+    /// Residuals at the posts of the one raster of a mosaic, which has another coordinate system.
+    fn residuals_of(&self, modules: &[terrain::LoadModule], area: &GamingArea, tile: PostRect, of: &Mosaic) -> Tally {
+        let quanta = |metres: f64| metres * f64::from(terrain::QUANTA_PER_METRE);
+        let origin = [self.frame.origin_east_m, self.frame.origin_north_m];
+        let mut places = Vec::new();
+        of.each_own_post(tile, &mut |[east, north], height_m| {
+            places.push([east - origin[0], north - origin[1], height_m].map(quanta));
+        });
+        residuals_at_places(modules, area.grid, self.frame.spacing, &places)
     }
 
     /// Whether the source's posts are others than those of the working grid, so that two sources may differ in what
@@ -107,7 +130,8 @@ impl Relief {
         let frame = match &self.source {
             Source::Raster(raster) => raster.frame(),
             Source::Window(windows) => windows.files()[0].frame(),
-            Source::Sample(_) | Source::Mosaic(_) | Source::Wide(_) => return false,
+            Source::Mosaic(mosaic) => return mosaic.has_own_posts(),
+            Source::Sample(_) | Source::Wide(_) => return false,
         };
         self.offset_between(frame).is_some()
     }

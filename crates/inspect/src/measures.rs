@@ -9,7 +9,7 @@ use fidelity::{DemGround, Measures, ResidualFigures, Triangles, regular_grid};
 use ground::{GamingArea, Ground, GroundError, Window};
 use product::{Opened, choose_ground, locate_weights};
 use schedule::Workers;
-use terrain::{Dem, Importance, Metres, QUANTA_PER_METRE, Tin};
+use terrain::{Dem, Importance, LoadModule, Metres, QUANTA_PER_METRE, Tin};
 
 use crate::verify::read_modules;
 
@@ -62,8 +62,12 @@ pub struct DatabaseFidelity {
     pub area: String,
     /// What it is measured against: the terrain it was built from, or a raster.
     pub against: String,
+    /// Whether that has features or water burned into it: never a raster that was named.
+    pub is_burned: bool,
     /// Residuals as the build measured them, against its own ground.
     pub residual: BuiltResidual,
+    /// Residuals at the posts of the raster itself, where those are others than the posts of the working grid.
+    pub at_own_posts: Option<ResidualFigures>,
     /// All measures, those of residuals too.
     pub measures: Fidelity,
     /// Why residuals are not told by class, where the job has classes: a file that says which ground is which is gone.
@@ -108,13 +112,17 @@ pub fn fidelity(folder: &Path, against: Option<&Path>, sights: Sights) -> Result
         }
         .into());
     }
-    let (triangles, polygons) = triangles_of(&folder, &area)?;
+    let (modules, polygons) = modules_of(&folder, &area)?;
+    let at_own_posts = at_own_posts(&ground, &area, &modules)?;
+    let triangles = Triangles::of_modules(modules.iter(), area.grid, area.frame.spacing);
+    drop(modules);
     let residual = built_residual(&manifest.totals);
     let spacing = Metres(area.frame.spacing.metres());
     let classes = (!job.importance.areas.is_empty()).then_some((&job.importance.classes[..], &importance));
     let subject = Subject { dem: &dem, triangles: &triangles, polygons, spacing, classes };
     let measures = compare(&subject, sights, Some(area.grid.side_cells));
-    Ok(DatabaseFidelity { area: manifest.area.name, against, residual, measures, no_classes })
+    let is_burned = job.features.is_some() || job.dem.water.is_some();
+    Ok(DatabaseFidelity { area: manifest.area.name, against, is_burned, residual, at_own_posts, measures, no_classes })
 }
 
 /// Measures a mesh against the raster it was made from, whose posts are so far apart.
@@ -163,8 +171,18 @@ fn compare(subject: &Subject, sights: Sights, module_cells: Option<i32>) -> Fide
     }
 }
 
-/// The triangles of all load modules, and how many polygons they count.
-fn triangles_of(folder: &Folder, area: &GamingArea) -> Result<(Triangles, u64), CompileError> {
+/// Residuals at the posts of the raster that is measured against; `None` where those are the working grid's.
+fn at_own_posts(
+    ground: &Ground,
+    area: &GamingArea,
+    modules: &[LoadModule],
+) -> Result<Option<ResidualFigures>, CompileError> {
+    let found = ground.relief.residuals_at_source(modules, area, area.rect)?;
+    Ok(found.as_ref().map(ResidualFigures::from))
+}
+
+/// All load modules, and how many polygons they count.
+fn modules_of(folder: &Folder, area: &GamingArea) -> Result<(Vec<LoadModule>, u64), CompileError> {
     let modules = read_modules(folder, area)?;
     let missing = area.grid.all().iter().find(|module| !modules.contains_key(module));
     if let Some(module) = missing {
@@ -177,7 +195,7 @@ fn triangles_of(folder: &Folder, area: &GamingArea) -> Result<(Triangles, u64), 
         .into());
     }
     let polygons = modules.values().map(|module| u64::from(module.polygon_count)).sum();
-    Ok((Triangles::of_modules(modules.values(), area.grid, area.frame.spacing), polygons))
+    Ok((modules.into_values().collect(), polygons))
 }
 
 fn built_residual(totals: &Totals) -> BuiltResidual {

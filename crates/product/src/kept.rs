@@ -1,7 +1,7 @@
 //! Between tallies and figures and the files that keep them.
 
 use database::{MeasuredCurvature, MeasuredFeatures, MeasuredTally};
-use fidelity::{Curvature, FeatureFigures, Tally};
+use fidelity::{Curvature, DeckFigures, FeatureFigures, Tally};
 use terrain::LatticePoint;
 
 /// What is kept of a tally.
@@ -37,7 +37,8 @@ pub fn from_curvature(MeasuredCurvature { cells, integral, rough_cells }: Measur
 
 /// What is kept of the figures of features.
 pub fn to_features(figures: &FeatureFigures) -> MeasuredFeatures {
-    let FeatureFigures { steps_per_post, edges, missing, lake_spread, shore_posts, shore_below, outside } = figures;
+    let FeatureFigures { steps_per_post, edges, missing, lake_spread, shore_posts, shore_below, .. } = figures;
+    let FeatureFigures { outside, decks, .. } = figures;
     MeasuredFeatures {
         steps_per_post: *steps_per_post,
         edges: *edges,
@@ -46,12 +47,16 @@ pub fn to_features(figures: &FeatureFigures) -> MeasuredFeatures {
         shore_posts: *shore_posts,
         shore_below: *shore_below,
         outside: to_tally(outside),
+        decks: (decks.samples, decks.under, decks.deepest),
+        deck_clearance: decks.clearance.iter().map(|(&class, &least)| (class, least)).collect(),
     }
 }
 
 /// The figures of features that were kept.
 pub fn from_features(measured: &MeasuredFeatures) -> FeatureFigures {
-    let MeasuredFeatures { steps_per_post, edges, missing, lake_spread, shore_posts, shore_below, outside } = measured;
+    let MeasuredFeatures { steps_per_post, edges, missing, lake_spread, shore_posts, shore_below, .. } = measured;
+    let &MeasuredFeatures { decks: (samples, under, deepest), ref deck_clearance, ref outside, .. } = measured;
+    let clearance = deck_clearance.iter().copied().collect();
     let ends =
         |&[row, col, to_row, to_col]: &[i32; 4]| [LatticePoint::new(row, col), LatticePoint::new(to_row, to_col)];
     FeatureFigures {
@@ -62,6 +67,7 @@ pub fn from_features(measured: &MeasuredFeatures) -> FeatureFigures {
         shore_posts: *shore_posts,
         shore_below: *shore_below,
         outside: from_tally(outside),
+        decks: DeckFigures { samples, under, deepest, clearance },
     }
 }
 
@@ -75,6 +81,7 @@ mod tests {
         figures.missing = vec![[LatticePoint::new(1, -2), LatticePoint::new(3, 4)]];
         (figures.shore_posts, figures.shore_below) = (7, 2);
         figures.outside.add(-17);
+        figures.decks = DeckFigures { samples: 9, under: 1, deepest: 5, clearance: [(2, -5)].into() };
         assert_eq!(from_features(&to_features(&figures)), figures);
     }
 

@@ -6,14 +6,14 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use database::{
-    AreaLevel, FeatureAmounts, FeatureLine, FeatureRemark, LineRole, ReportFeatureChecks, ReportFeatureClass,
+    AreaLevel, FeatureLine, FeatureRemark, LineRole, ReportDeckClearance, ReportFeatureChecks, ReportFeatureClass,
     ReportFeatureCost, ReportFeatureRemarks, ReportFeatures,
 };
 use fidelity::FeatureFigures;
 use ground::GamingArea;
-use job::Job;
+use job::{HOLE_CLASS_NAME, Job};
 use limits::Windows;
-use terrain::{LatticePoint, QUANTA_PER_METRE};
+use terrain::{LatticePoint, QUANTA_PER_METRE, metres_of_quanta};
 
 use crate::{Opened, ProductError, from_features};
 
@@ -50,6 +50,7 @@ pub fn told(job: &Job, area: &GamingArea, level: &AreaLevel, figures: &FeatureFi
         all: cost(area, level, |_| true),
         remarks: counts(&remarks),
         checks: checks(level, figures, extent_m),
+        deck_clearances: deck_clearances(&names, figures),
     };
     Told { report, remarks }
 }
@@ -73,34 +74,11 @@ pub fn read_told(opened: &Opened) -> Result<Option<(AreaLevel, Told)>, ProductEr
     Ok(Some((level, told)))
 }
 
-/// The share of a main kind that may be left out without a warning, and that of all ways.
-const LEFT_OUT_MAX: [f64; 2] = [0.01, 0.1];
-
-/// What a person should know of what had no room: too much of a main class, of all ways, or lakes of a hectare.
-pub fn left_out_warnings(job: &Job, level: &AreaLevel) -> Vec<String> {
-    let (names, amounts) = (job.class_names(), &level.amounts);
-    let out = |wanted: f64, kept: f64, most: f64| most * wanted < wanted - kept;
-    let told = |what: &str, wanted: f64, kept: f64| {
-        let percent = 100.0 * (wanted - kept) / wanted;
-        let [left, wanted] = [wanted - kept, wanted].map(|metres| metres / 1000.0);
-        format!("{percent:.1} % of {what} had no room and is left out: {left:.1} of {wanted:.1} km")
-    };
-    let mut warnings: Vec<String> = amounts
-        .iter()
-        .filter(|of| of.is_main && out(of.wanted_m, of.kept_m, LEFT_OUT_MAX[0]))
-        .map(|of| told(names.get(usize::from(of.class)).map_or("a class", String::as_str), of.wanted_m, of.kept_m))
-        .collect();
-    let sum = |of: fn(&FeatureAmounts) -> f64| amounts.iter().map(of).sum::<f64>();
-    let (wanted, kept) = (sum(|of| of.wanted_m), sum(|of| of.kept_m));
-    if out(wanted, kept, LEFT_OUT_MAX[1]) {
-        warnings.push(told("all roads, rivers and lines", wanted, kept));
-    }
-    let lakes = amounts.iter().map(|of| of.lakes_wanted - of.lakes_kept).sum::<u32>();
-    if 0 < lakes {
-        let all = amounts.iter().map(|of| of.lakes_wanted).sum::<u32>();
-        warnings.push(format!("{lakes} of {all} lakes of a hectare and more had no room and are left out"));
-    }
-    warnings
+/// How low decks pass over the ground of each class.
+fn deck_clearances(names: &[String], figures: &FeatureFigures) -> Vec<ReportDeckClearance> {
+    let name = |class: u8| names.get(usize::from(class)).map_or(HOLE_CLASS_NAME, String::as_str).to_owned();
+    let least = figures.decks.clearance.iter();
+    least.map(|(&class, &least)| ReportDeckClearance { class: name(class), least_m: metres_of_quanta(least) }).collect()
 }
 
 /// Remarks, each counted once, by the worst that was done.
@@ -196,6 +174,9 @@ fn checks(level: &AreaLevel, figures: &FeatureFigures, extent_m: [f64; 4]) -> Re
         outside_posts: figures.outside.posts,
         outside_rms_m: figures.outside.rms_m(),
         outside_max_m: figures.outside.max_m(),
+        deck_samples: figures.decks.samples,
+        deck_samples_under: figures.decks.under,
+        deck_under_max_m: metres(figures.decks.deepest),
         ..ReportFeatureChecks::default()
     };
     for line in &level.lines {

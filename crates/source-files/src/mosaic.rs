@@ -122,6 +122,36 @@ impl Mosaic {
         self.layers.len()
     }
 
+    /// Whether it is one raster, whose posts can be told: rasters of several grids have none in common, and heights
+    /// that come from another datum are shifted at the posts of the working grid.
+    pub fn has_own_posts(&self) -> bool {
+        matches!(self.layers.as_slice(), [layer] if layer.raster.shift.is_none())
+    }
+
+    /// Calls `each` with the height in metres at every post of its one raster in and around a rectangle of the working
+    /// grid, and with metres east and north in the area's system. Voids are left out.
+    pub fn each_own_post(&self, rect: PostRect, each: &mut dyn FnMut([f64; 2], f64)) {
+        let [layer] = self.layers.as_slice() else { return };
+        let (frame, own) = (&layer.raster.frame, layer.raster.window);
+        let Some(window) = layer.warp.window(rect, 1).and_then(|window| window.intersection(&own)) else { return };
+        let mut heights = Vec::with_capacity(window.posts_wide());
+        for row in window.south..=window.north {
+            heights.clear();
+            layer.raster.push_row_m(row, window.west..window.east + 1, &mut heights);
+            for (col, &height_m) in (window.west..).zip(&heights) {
+                let is_height = layer
+                    .standings
+                    .get(own.index(Post::new(row, col)))
+                    .is_none_or(|&standing| standing == Standing::Height);
+                let place =
+                    [(0, col), (1, row)].map(|(axis, at)| frame.south_west[axis] + f64::from(at) * frame.spacing[axis]);
+                if let Some(place) = frame.crs.to(&self.place.0, place).filter(|_| is_height && height_m.is_finite()) {
+                    each(place, height_m);
+                }
+            }
+        }
+    }
+
     /// Lowest and highest height of all rasters, in metres.
     pub fn range_m(&self) -> Option<(f64, f64)> {
         self.layers.iter().filter_map(|layer| layer.raster.range_m()).reduce(union)

@@ -4,7 +4,7 @@ use std::fmt::Write;
 use std::path::Path;
 
 use database::Report;
-use views::{Align, Table, grouped, stage_table};
+use views::{Align, Table, grouped, leading, stage_table};
 
 use crate::files;
 
@@ -33,8 +33,8 @@ pub fn end_table(end: &End) -> String {
 
 fn findings(report: &Report) -> Table {
     let mut table = Table::new(&[Align::Left, Align::Right, Align::Left]);
-    let residual = &report.residual;
-    let largest = format!("RMS, largest {:.2} m, 95 % within {:.2} m", residual.max_m, residual.p95_m);
+    let (against, residual) = leading(report);
+    let largest = format!("RMS against the {against}, largest {:.2} m", residual.max_m);
     table.row(["Residual", &format!("{:.3} m", residual.rms_m), &largest]);
     let mean = format!("{:.2} per load module, {} points", report.per_load_module.mean, grouped(report.points.total));
     table.row(["Triangles", &grouped(report.triangles), &mean]);

@@ -46,7 +46,8 @@ fn where_any(is_any: bool, figure: f64) -> Value {
     if is_any { json!(figure) } else { Value::Null }
 }
 
-fn residual(found: &ResidualFigures) -> Value {
+/// Residuals of a set of posts.
+pub fn residual(found: &ResidualFigures) -> Value {
     let figure = |metres: f64| where_any(0 < found.posts, metres);
     json!({
         "posts": found.posts,

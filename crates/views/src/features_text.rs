@@ -20,7 +20,8 @@ pub(crate) fn features_text(features: &ReportFeatures) -> String {
     for (what, found) in check_rows(&features.checks) {
         checks.row([what, &found]);
     }
-    format!("{}  {}\n{}", table.text(0), remarks_in_words(features), checks.text(2))
+    let clearances = clearances_in_words(features).map(|words| format!("  {words}\n")).unwrap_or_default();
+    format!("{}  {}\n{}{clearances}", table.text(0), remarks_in_words(features), checks.text(2))
 }
 
 /// Kilometres in the ground, of how many, that in per cent, those of strips among them, and lakes of a class; nothing
@@ -83,11 +84,25 @@ pub(crate) fn check_rows(checks: &ReportFeatureChecks) -> Vec<(&'static str, Str
         ("ends where the source goes on", grouped(checks.loose_ends)),
         ("lakes are level to within", format!("{:.3} m", checks.lake_spread_max_m)),
         ("posts of shores below water", of(checks.shore_posts_below, checks.shore_posts)),
+        ("square metres of decks under ground", under_ground(checks)),
         (
             "residual outside features",
             format!("RMS {:.3} m, largest {:.2} m", checks.outside_rms_m, checks.outside_max_m),
         ),
     ]
+}
+
+fn under_ground(checks: &ReportFeatureChecks) -> String {
+    let of = format!("{} of {}", grouped(checks.deck_samples_under), grouped(checks.deck_samples));
+    let deepest = format!(", by {:.2} m at most", checks.deck_under_max_m);
+    if checks.deck_samples_under == 0 { of } else { of + &deepest }
+}
+
+/// How low decks pass over each class of ground, in words; nothing without decks.
+pub(crate) fn clearances_in_words(features: &ReportFeatures) -> Option<String> {
+    let least = features.deck_clearances.iter().map(|over| format!("{} {:.2} m", over.class, over.least_m));
+    let least: Vec<String> = least.collect();
+    (!least.is_empty()).then(|| format!("least height of decks over {}", least.join(", ")))
 }
 
 #[cfg(test)]

@@ -6,6 +6,8 @@
 // A test that unwraps says by its line what failed.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+mod against;
+pub use against::leading;
 mod breaches;
 pub use breaches::{BreachPlaces, breaches_csv, breaches_geojson};
 mod features;

@@ -6,6 +6,7 @@ use database::{
     ReportStage,
 };
 
+use crate::against::{self, Residual};
 use crate::features_text::features_text;
 use crate::table::{Align, Table, fold, grouped};
 
@@ -39,8 +40,9 @@ fn headline(report: &Report) -> Option<String> {
         grouped(points.corner)
     );
     table.row(["points", &grouped(points.total), &kinds]);
-    let largest = format!("RMS residual against the working grid, largest {:.2} m", report.residual.max_m);
-    table.row(["residual", &format!("{:.3} m", report.residual.rms_m), &largest]);
+    let (words, residual) = against::leading(report);
+    let largest = format!("RMS against the {words}, largest {:.2} m", residual.max_m);
+    table.row(["residual", &format!("{:.3} m", residual.rms_m), &largest]);
     if let Some(eta) = report.limit.and_then(eta_of) {
         let (figure, meaning) = eta.split_once(' ').unwrap_or_default();
         table.row(["eta", figure, meaning]);
@@ -84,25 +86,29 @@ fn before_removals(report: &Report) -> String {
 }
 
 fn residuals(report: &Report) -> Option<String> {
+    let mut all = Table::new(&[Left, Right, Right, Right, Right, Right]);
+    all.row(["Residuals in m, against", "RMS", "mean abs", "95 %", "99 %", "largest"]);
+    for (words, Residual { rms_m, max_m, rest }) in against::told(report) {
+        let rest = rest.map_or_else(Default::default, |rest| metres([(rest[0], 3), (rest[1], 2), (rest[2], 2)]));
+        let [rms, largest] = metres([(rms_m, 3), (max_m, 2)]);
+        all.row([format!("  {words}"), rms].into_iter().chain(rest).chain([largest]));
+    }
     let mut table = Table::new(&[Left, Right, Right, Right, Right, Right, Right, Right]);
-    table.row(["Residuals, m", "posts", "points", "RMS", "mean abs", "95 %", "99 %", "largest"]);
+    table.row(["Working ground, m", "posts", "points", "RMS", "mean abs", "95 %", "99 %", "largest"]);
     let posts: u64 = report.classes.iter().map(|class| class.posts).sum();
-    let all = if report.classes.is_empty() { String::new() } else { grouped(posts) };
-    residual_row(&mut table, "  all posts", all, grouped(report.points.total), &report.residual);
+    let posts = if report.classes.is_empty() { String::new() } else { grouped(posts) };
+    class_row(&mut table, "all posts", [posts, grouped(report.points.total)], &report.residual);
     for class in &report.classes {
-        let name = format!("  {}", class.name);
         if class.posts == 0 {
             // A hole, or a class that lies nowhere in the area: nothing is measured there.
             let none = ["-"; 5].map(str::to_owned);
+            let name = format!("  {}", class.name);
             table.row([name, "-".to_owned(), grouped(class.points)].into_iter().chain(none));
             continue;
         }
-        residual_row(&mut table, &name, grouped(class.posts), grouped(class.points), &class.residual);
+        class_row(&mut table, &class.name, [class.posts, class.points].map(grouped), &class.residual);
     }
-    if let Some(source) = &report.residual_against_source {
-        residual_row(&mut table, "  against source", String::new(), String::new(), source);
-    }
-    let mut text = table.text(0);
+    let mut text = format!("{}\n{}", all.text(0), table.text(0));
     if !report.classes.is_empty() {
         let by_points = report.overall_point_weighted_rms_m;
         text += &format!("  RMS of the classes weighted by points, as in the founding paper: {by_points:.3} m\n");
@@ -157,11 +163,15 @@ pub(crate) fn heights_in_words(heights: &ReportHeights) -> String {
     }
 }
 
-fn residual_row(table: &mut Table, name: &str, posts: String, points: String, residual: &ReportResidual) {
+fn class_row(table: &mut Table, name: &str, counts: [String; 2], residual: &ReportResidual) {
     let ReportResidual { rms_m, max_m, mean_abs_m, p95_m, p99_m } = *residual;
-    let metres = [(rms_m, 3), (mean_abs_m, 3), (p95_m, 2), (p99_m, 2), (max_m, 2)];
-    let metres = metres.map(|(metres, digits)| format!("{metres:.digits$}"));
-    table.row([name.to_owned(), posts, points].into_iter().chain(metres));
+    let figures = metres([(rms_m, 3), (mean_abs_m, 3), (p95_m, 2), (p99_m, 2), (max_m, 2)]);
+    table.row([format!("  {name}")].into_iter().chain(counts).chain(figures));
+}
+
+/// Metres with so many digits.
+fn metres<const N: usize>(all: [(f64, usize); N]) -> [String; N] {
+    all.map(|(metres, digits)| format!("{metres:.digits$}"))
 }
 
 /// Levels of detail, where there are several.

@@ -109,6 +109,7 @@ pub(crate) fn report() -> Report {
             sources_m: Some([690.0, 1_903.5]),
             outside_m: 1.5,
         }),
+        residual_against_source_grid: Some(residual(2.9)),
         residual_against_source: Some(residual(3.1)),
         classes: vec![class("plains", 2_587_215, 64_939, 0.869), class("mountains", 1_313_410, 28_532, 5.268)],
         features: None,
@@ -164,7 +165,9 @@ pub(crate) fn features() -> ReportFeatures {
         cost,
         ..ReportFeatureClass::default()
     };
+    let deck_clearances = vec![database::ReportDeckClearance { class: "stream".into(), least_m: 1.25 }];
     ReportFeatures {
+        deck_clearances,
         classes: vec![class("primary", 4.0, 8.25, 0), class("lake", 0.0, 0.0, 3)],
         all: cost,
         remarks: ReportFeatureRemarks { mended: 3, degraded: 2, left_out: 1 },

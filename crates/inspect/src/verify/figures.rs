@@ -91,7 +91,7 @@ fn differing(
         problems.push("its numbers of load modules are not those of the load-module file");
     }
     let finest = &modules[..finest.min(modules.len())];
-    let tallies = read.classes.iter().chain(&read.at_source);
+    let tallies = read.classes.iter().chain(&read.at_source_grid).chain(&read.at_source);
     if Total::of_tallies(&read.classes) != Total::of(finest.iter().map(|module| module.residual)) {
         problems.push("its residuals by class do not add up to those of the load modules");
     }
@@ -302,8 +302,13 @@ fn of_residuals(figures: &mut Figures, report: &Report, job: &Job, area: &Gaming
         figures.number("limit.eta", found.eta.unwrap_or(0.0), listed.eta.unwrap_or(0.0));
         figures.number("limit.rough_share", found.rough_share, listed.rough_share);
     }
-    if let (Some(listed), true) = (&report.residual_against_source, sums.has_source) {
-        figures.residual("residual_against_source", &residual_of(&sums.at_source), listed);
+    let at_grid = sums.at_source_grid.as_ref().unwrap_or(&total);
+    if let Some(listed) = &report.residual_against_source_grid {
+        figures.residual("residual_against_source_grid", &residual_of(at_grid), listed);
+    }
+    if let Some(listed) = &report.residual_against_source {
+        let found = if sums.has_source { &sums.at_source } else { at_grid };
+        figures.residual("residual_against_source", &residual_of(found), listed);
     }
     if let Some(listed) = &report.border {
         let grid = area.grid;

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use inspect::{DatabaseFidelity, Sights};
 use serde_json::{Value, json};
+use views::grouped;
 
 use crate::arguments::Format;
 use crate::failure::{Failure, Outcome};
@@ -63,10 +64,21 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     Ok(Outcome::Sound)
 }
 
+/// Said of the ground that a database was built from, where it differs from its sources.
+const BURNED: &str =
+    "\nas tiles were refined to it, with roads and water burned in; --against FILE measures against FILE itself";
+
 fn text(found: &DatabaseFidelity) -> String {
     let note = found.no_classes.as_ref().map(|why| format!("\nnote: residuals are not told by class: {why}\n"));
     let figures = measures::text(&found.measures);
-    format!("Gaming area {} against {}\n\n{figures}{}", found.area, found.against, note.unwrap_or_default())
+    let burned = if found.is_burned { BURNED } else { "" };
+    let own = found.at_own_posts.as_ref().map(|own| {
+        let (posts, rms_m, max_m) = (grouped(own.posts), own.rms_m, own.max_m);
+        format!("At the raster's own posts: RMS {rms_m:.3} m, largest {max_m:.2} m, {posts} posts\n")
+    });
+    let (area, against) = (&found.area, &found.against);
+    let (own, note) = (own.unwrap_or_default(), note.unwrap_or_default());
+    format!("Gaming area {area} against {against}{burned}\n{own}\n{figures}{note}")
 }
 
 fn to_json(found: &DatabaseFidelity, sights: Sights) -> Value {
@@ -74,6 +86,8 @@ fn to_json(found: &DatabaseFidelity, sights: Sights) -> Value {
     let mut all = json!({
         "area": found.area,
         "against": found.against,
+        "has_features_burned_in": found.is_burned,
+        "residual_at_own_posts": found.at_own_posts.as_ref().map(measures_json::residual),
         "seed": sights.seed,
         "residual_as_built": {
             "posts": residual.posts,

@@ -15,6 +15,7 @@ use database::{Manifest, Report};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use terrain::{LoadModule, ModuleId};
 
+use crate::against::leading;
 use crate::picture::{RESIDUAL_SCALE_M, Scene};
 use crate::table::grouped;
 
@@ -159,11 +160,12 @@ fn what_it_is(manifest: &Manifest) -> String {
 fn headline(page: &Page) -> Markup {
     let report = page.report;
     let modules = report.per_load_module;
+    let (against, residual) = leading(report);
     let figures = [
         (grouped(report.triangles), format!("triangles, {:.2} in the mean load module", modules.mean)),
         (grouped(report.points.total), "points".into()),
-        (format!("{:.3} m", report.residual.rms_m), "RMS residual, all posts alike".into()),
-        (format!("{:.2} m", report.residual.max_m), "largest residual".into()),
+        (format!("{:.3} m", residual.rms_m), format!("RMS residual against the {against}")),
+        (format!("{:.2} m", residual.max_m), format!("largest residual against the {against}")),
         (
             format!("{} of {}", grouped(modules.max), grouped(modules.limit)),
             format!("{} in the fullest load module", report.count),

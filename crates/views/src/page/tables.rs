@@ -5,7 +5,8 @@ use maud::{Markup, html};
 
 use super::advise;
 use super::marks::{BOUND_ROWS_MAX, Marks, ROWS_MAX};
-use crate::features_text::{amounts, check_rows, cost, is_thin, kept, remarks_in_words};
+use crate::against::{Residual, WORKING, told};
+use crate::features_text::{amounts, check_rows, clearances_in_words, cost, is_thin, kept, remarks_in_words};
 use crate::report::{border_in_words, eta_of, heights_in_words};
 use crate::table::grouped;
 
@@ -152,39 +153,44 @@ pub(super) fn advice(report: &Report) -> Markup {
 }
 
 pub(super) fn residuals(report: &Report) -> Markup {
-    let row = |name: &str, posts: String, points: String, residual: &ReportResidual| {
-        let ReportResidual { rms_m, max_m, mean_abs_m, p95_m, p99_m } = *residual;
+    let row = |name: &str, [posts, points]: [String; 2], [rms_m, max_m]: [f64; 2], rest: Option<[f64; 3]>| {
         html! {
             tr {
                 td { (name) } td.n { (posts) } td.n { (points) }
                 td.n { (format!("{rms_m:.3}")) } td.n { (format!("{max_m:.2}")) }
-                td.n { (format!("{mean_abs_m:.3}")) } td.n { (format!("{p95_m:.2}")) } td.n { (format!("{p99_m:.2}")) }
+                @match rest {
+                    Some([mean_abs_m, p95_m, p99_m]) => {
+                        td.n { (format!("{mean_abs_m:.3}")) } td.n { (format!("{p95_m:.2}")) }
+                        td.n { (format!("{p99_m:.2}")) }
+                    }
+                    None => @for _ in 0..3 { td.n {} }
+                }
             }
         }
     };
+    let posts = grouped(report.classes.iter().map(|class| class.posts).sum());
     html! {
-        (table(html! { th { "Residuals in metres" } th.n { "posts" } th.n { "points" } th.n { "RMS" } th.n { "largest" }
+        (table(html! { th { "Residuals in metres, against" } th.n { "posts" } th.n { "points" }
+                th.n { "RMS" } th.n { "largest" }
                 th.n { "mean" } th.n { "95 %" } th.n { "99 %" } }, html! {
+            @for (words, Residual { rms_m, max_m, rest }) in told(report) {
+                @let all = [posts.clone(), grouped(report.points.total)];
+                @let counts = if words == WORKING { all } else { Default::default() };
+                (row(words, counts, [rms_m, max_m], rest))
+            }
             @for class in &report.classes {
                 @if class.posts == 0 {
                     tr {
-                        td { (&class.name) }
+                        td { "of it " (&class.name) }
                         td.n { "-" }
                         td.n { (grouped(class.points)) }
                         @for _ in 0..5 { td.n { "-" } }
                     }
                 } @else {
-                    (row(&class.name, grouped(class.posts), grouped(class.points), &class.residual))
+                    @let ReportResidual { rms_m, max_m, mean_abs_m, p95_m, p99_m } = class.residual;
+                    @let counts = [grouped(class.posts), grouped(class.points)];
+                    (row(&format!("of it {}", class.name), counts, [rms_m, max_m], Some([mean_abs_m, p95_m, p99_m])))
                 }
-            }
-            (row(
-                "overall, weighted by posts",
-                grouped(report.classes.iter().map(|class| class.posts).sum()),
-                grouped(report.points.total),
-                &report.residual,
-            ))
-            @if let Some(source) = &report.residual_against_source {
-                (row("against the source DEM", String::new(), String::new(), source))
             }
         }))
         @if 1 < report.classes.len() {
@@ -252,6 +258,7 @@ pub(super) fn features(features: &ReportFeatures) -> Markup {
         (table(html! { th { "What must hold" } th { "found" } }, html! {
             @for (what, found) in check_rows(&features.checks) { tr { td { (what) } td { (found) } } }
         }))
+        @if let Some(words) = clearances_in_words(features) { p.quiet { "The " (words) "." } }
     }
 }
 
