@@ -8,6 +8,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use terrain::in_turn;
 
 use crate::clean::Notes;
+use crate::culverts::{Culvert, culvert, enter_culverts, is_near};
 use crate::decks::between;
 use crate::exact::Segment;
 use crate::middles::{Middle, middles};
@@ -89,7 +90,10 @@ pub fn form(graded: &Graded, strands: &[Strand], site: &Site) -> Formed {
     let mut wide = wide_segments(&pieces);
     let thinned = |(number, strand): (usize, &Strand)| thinned(strand, grants.of_strand(number), site, &stays);
     let mut thinned: Vec<Strand> = strands.iter().enumerate().filter_map(thinned).collect();
-    let mut formed = round_together(graded, &pieces, &mut wide, &thinned, site);
+    let (mut formed, culverts) = round_together(graded, &pieces, &mut wide, &thinned, site);
+    if enter_culverts(&mut thinned, culverts) {
+        formed = round_together(graded, &pieces, &mut wide, &thinned, site).0;
+    }
     // Each round takes the room of a strip or lowers a lake, so that there is a last one.
     loop {
         let (tilted, uneven) = (tilted(&formed, network, &wide), uneven(&formed));
@@ -102,7 +106,7 @@ pub fn form(graded: &Graded, strands: &[Strand], site: &Site) -> Formed {
             notes.write_at(place, Flaw::LevelsDisagree, Remedy::Levelled);
         }
         tilted.into_iter().for_each(|number| wide[number as usize].room = Room::None);
-        formed = round_together(graded, &pieces, &mut wide, &thinned, site);
+        formed = round_together(graded, &pieces, &mut wide, &thinned, site).0;
     }
     formed.middles = middles(graded, (&pieces, &wide), (strands, &thinned), site);
     remark_rooms(network, &pieces, &wide, &mut remarks);
@@ -111,8 +115,14 @@ pub fn form(graded: &Graded, strands: &[Strand], site: &Site) -> Formed {
     formed
 }
 
-/// Rounds strips that have room, and all other lines, together.
-fn round_together(graded: &Graded, pieces: &[Piece], wide: &mut [Wide], thinned: &[Strand], site: &Site) -> Formed {
+/// Rounds strips that have room, and all other lines, together; and where channels are to have stations more.
+fn round_together(
+    graded: &Graded,
+    pieces: &[Piece],
+    wide: &mut [Wide],
+    thinned: &[Strand],
+    site: &Site,
+) -> (Formed, Vec<Culvert>) {
     let Graded { network, heights, .. } = *graded;
     let all = share_out(network, pieces, wide, heights);
     let toes = toes(graded, pieces, wide, &all);
@@ -123,11 +133,11 @@ fn round_together(graded: &Graded, pieces: &[Piece], wide: &mut [Wide], thinned:
     lines.extend(thinned.iter().cloned());
     lines.sort_by(|a, b| (a.class, a.role, &a.stations, a.id).cmp(&(b.class, b.role, &b.stations, b.id)));
     let mut remarks = Vec::new();
-    let mut formed = assemble(lines, &faces, site, &mut remarks);
+    let (mut formed, culverts) = assemble(lines, &faces, site, &mut remarks);
     (formed.faces, formed.decks, formed.remarks) = (faces, decks, remarks);
     formed.faces.sort_by(|a, b| (a.class, &a.corners).cmp(&(b.class, &b.corners)));
     formed.decks.sort_by(|a, b| (a.class, &a.corners).cmp(&(b.class, &b.corners)));
-    formed
+    (formed, culverts)
 }
 
 /// A lake that meets water of a lower level, which is its level from now on.
@@ -195,12 +205,7 @@ fn tilted(formed: &Formed, network: &Network, wide: &[Wide]) -> BTreeSet<u32> {
 /// Whether a place lies within a step of the outline of a face.
 fn is_on_outline(face: &Face, place: Place) -> bool {
     let ends = face.corners.iter().zip(face.corners.iter().cycle().skip(1));
-    ends.map(|(a, b)| (a.0, b.0)).any(|(a, b)| {
-        let ([east, north], [to_east, to_north]) = (a.to(b), a.to(place));
-        let (cross, dot) = (east * to_north - north * to_east, east * to_east + north * to_north);
-        let squared = east * east + north * north;
-        (0..=squared).contains(&dot) && i128::from(cross) * i128::from(cross) <= i128::from(squared)
-    })
+    ends.map(|(a, b)| (a.0, b.0)).any(|(a, b)| is_near(a, b, place))
 }
 
 /// Places that two strands in the ground have, or a strand and the network: thinning leaves them to both.
@@ -290,7 +295,7 @@ type Decided = BTreeMap<Place, (Role, u16, Role, i32)>;
 type OfEdge = (u16, Role, FeatureId, bool);
 
 /// Rounds all lines together, decides the height of each point, and leaves out what lies in a strip of higher class.
-fn assemble(lines: Vec<Strand>, faces: &[Face], site: &Site, remarks: &mut Vec<Remark>) -> Formed {
+fn assemble(lines: Vec<Strand>, faces: &[Face], site: &Site, remarks: &mut Vec<Remark>) -> (Formed, Vec<Culvert>) {
     let mut rounded: Vec<Vec<Place>> =
         lines.iter().map(|line| line.stations.iter().map(|(place, _)| *place).collect()).collect();
     let mut hot = Vec::new();
@@ -308,6 +313,7 @@ fn assemble(lines: Vec<Strand>, faces: &[Face], site: &Site, remarks: &mut Vec<R
     }
     let inside = Inside::new(faces, &lines, &rounded);
     let mut edges: BTreeMap<(Place, Place), OfEdge> = BTreeMap::new();
+    let mut culverts = Vec::new();
     for (number, (line, places)) in lines.iter().zip(&rounded).enumerate() {
         let mut cut = 0;
         for (at, ends) in places.windows(2).enumerate() {
@@ -318,6 +324,9 @@ fn assemble(lines: Vec<Strand>, faces: &[Face], site: &Site, remarks: &mut Vec<R
                 let key = (ends[0].min(ends[1]), ends[0].max(ends[1]));
                 let mine = (line.class, line.role, line.id, ends[1] < ends[0]);
                 edges.entry(key).and_modify(|edge| *edge = mine.min(*edge)).or_insert(mine);
+            } else if passes(at) != passes(at + 1) {
+                let ends = if passes(at) { [at, at + 1] } else { [at + 1, at] };
+                culverts.extend(culvert(line, ends.map(|at| (places[at], own[number][at])), site));
             }
             let above = passes(at) && (at == 0 || !passes(at - 1));
             if above {
@@ -334,7 +343,7 @@ fn assemble(lines: Vec<Strand>, faces: &[Face], site: &Site, remarks: &mut Vec<R
     }
     let mut formed = collect(&heights, edges);
     formed.surfaces = surfaces(&lines, &rounded, &heights);
-    formed
+    (formed, culverts)
 }
 
 fn surfaces(lines: &[Strand], rounded: &[Vec<Place>], heights: &Decided) -> Vec<Surface> {
@@ -571,6 +580,22 @@ mod tests {
             formed.remarks.iter().map(|remark| (remark.id.number, &remark.flaw, remark.remedy)).collect();
         assert_eq!(told, [(2, &Flaw::RoadOverRiver, Remedy::Culvert)]);
         assert!(0 < roles(&formed, Role::Channel));
+    }
+
+    #[test]
+    fn no_more_of_a_stream_is_missing_than_passes_below_a_road() {
+        let sources = vec![
+            way(1, "highway=primary", &[(10.0, 20.0), (40.0, 20.0)]),
+            way(2, "waterway=stream tunnel=culvert layer=-1", &[(25.0, 10.0), (25.0, 30.0)]),
+        ];
+        let formed = formed(sources, |_, north| 30.0 + north * 0.1);
+        let lattice = site().lattice;
+        let rows = |edge: &FormedEdge| [edge.a, edge.b].map(|point| formed.points[point as usize].0.row);
+        let channel = formed.edges.iter().filter(|edge| edge.role == Role::Channel).map(rows);
+        let mut rows: Vec<[i32; 2]> = channel.map(|[a, b]| [a.min(b), a.max(b)]).collect();
+        rows.sort_unstable();
+        let gaps = rows.windows(2).map(|pair| f64::from(pair[1][0] - pair[0][1]) * lattice.metres_per_step());
+        assert!(rows.len() < 4 || gaps.fold(0.0, f64::max) < 30.0, "{rows:?}");
     }
 
     #[test]

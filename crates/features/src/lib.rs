@@ -79,6 +79,7 @@ mod orient;
 mod rivers;
 mod tilt;
 pub use rivers::{Bed, FallOptions, Fallen, Still, fall};
+mod culverts;
 mod dams;
 pub use dams::split_at_dams;
 mod lakes;
