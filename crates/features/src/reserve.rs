@@ -83,7 +83,7 @@ pub fn reserve(
     about: &dyn Fn(FeatureId) -> Option<About>,
 ) -> Reserved {
     let stretches = Stretches::of(graded, strands, site, about);
-    let strokes = strokes(&stretches, graded, strands);
+    let strokes = strokes(&stretches, graded, strands, site);
     let outlays = Outlays::of(&stretches, &strokes, graded, strands, (shares, site));
     let choice = Choice { stretches: &stretches, strokes: &strokes, outlays: &outlays, shares, graded, site };
     let mut before = vec![0; shares.modules.len()];

@@ -7,7 +7,7 @@ use std::cmp::Reverse;
 
 use crate::strand::{Graded, Strand};
 use crate::stretches::{Arm, Part, Stretches};
-use crate::{Kind, Place};
+use crate::{Kind, Place, Site};
 
 /// The cosine of the greatest turn of two that continue each other without a name.
 const STRAIGHT: f64 = std::f64::consts::FRAC_1_SQRT_2;
@@ -20,8 +20,9 @@ pub(crate) struct Stroke {
     pub size: i128,
 }
 
-/// All strokes in the order in which they are granted room: by kind, the longest first, then by place.
-pub(crate) fn strokes(stretches: &Stretches, graded: &Graded, strands: &[Strand]) -> Vec<Stroke> {
+/// All strokes in the order in which they are granted room: main kinds before all others, then by kind, the longest
+/// first, then by place.
+pub(crate) fn strokes(stretches: &Stretches, graded: &Graded, strands: &[Strand], site: &Site) -> Vec<Stroke> {
     let mates = mates(stretches, graded, strands);
     let count = stretches.all.len();
     let mut done = vec![false; count];
@@ -40,7 +41,7 @@ pub(crate) fn strokes(stretches: &Stretches, graded: &Graded, strands: &[Strand]
         let first = &stretches.all[stroke.stretches[0].0 as usize];
         let places = stroke.stretches.iter().map(|(stretch, _)| *stretch);
         let is_ring = 0 < first.doubled_area;
-        (rank(first.kind), is_ring, Reverse(stroke.size), first.class, places.min())
+        (!first.is_main(site), rank(first.kind), is_ring, Reverse(stroke.size), first.class, places.min())
     };
     strokes.sort_by_cached_key(key);
     strokes
