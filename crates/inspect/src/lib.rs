@@ -3,7 +3,7 @@
 mod status;
 pub use status::{Status, TileProgress, status};
 mod verify;
-pub use verify::{Verdict, verify};
+pub use verify::{NetworkFound, Verdict, verify};
 mod inadequate;
 pub use inadequate::{Component, Inadequate, inadequate};
 mod measures;

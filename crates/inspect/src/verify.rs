@@ -14,6 +14,8 @@ mod opened;
 mod square;
 mod tins;
 mod total;
+mod waters;
+mod ways;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -49,6 +51,25 @@ pub struct Verdict {
     /// With such a DEM, vertices that stand as far outside the posts around them as any may, counted in each load
     /// module and at each level that has them.
     pub held_vertices: Option<u64>,
+    /// What of roads, rivers and lakes was counted in the load modules; nothing of a job without any.
+    pub network: Option<NetworkFound>,
+}
+
+/// What the load modules hold of roads, rivers and lakes, counted from their lines and triangles.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct NetworkFound {
+    /// Metres of lines that are kept, bridges among them, tunnels not.
+    pub kept_m: f64,
+    /// Stretches of lines in the ground without edges and without ground of another way.
+    pub pieces_missing: u64,
+    /// Those of them that are longer than 30 m.
+    pub gaps: u64,
+    /// Places inside the area at which kept lines end although their way goes on.
+    pub ends: u64,
+    /// Lakes of a hectare and more, whether their outline is in the ground or not.
+    pub lakes: u64,
+    /// Those of them whose posts lie more than 0.5 m RMS off their level.
+    pub lakes_off_level: u64,
 }
 
 /// Re-reads every file of a database and checks what a simulator relies on; with `dem`, recomputes residuals.
@@ -129,9 +150,10 @@ fn check_sums(
     verdict.problems.extend(problems);
     verdict.unchecked.extend(unchecked);
     let report = if folder.path(files::REPORT).exists() { Some(folder.report()?) } else { None };
-    let (problems, unchecked) = features::check(folder, manifest, job, area, modules, report.as_ref())?;
-    verdict.problems.extend(problems);
-    verdict.unchecked.extend(unchecked);
+    let features = features::check(folder, manifest, job, area, modules, report.as_ref())?;
+    verdict.problems.extend(features.problems);
+    verdict.unchecked.extend(features.unchecked);
+    verdict.network = features.network;
     let counts = exceeded::counts(job, area, modules);
     let mut exceeded = exceeded::of_counts(area, &counts);
     verdict.problems.extend(exceeded::wrong_states(manifest, area, &exceeded));

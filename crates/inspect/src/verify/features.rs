@@ -1,19 +1,39 @@
 //! Roads and water: the files of the stages that decide them, what is in the load modules, what the report says.
 
-use database::{Folder, Manifest, Report, ReportFeatures, SourceRecord, files};
+use std::collections::BTreeSet;
+
+use database::{AreaLevel, Folder, Manifest, Report, ReportFeatures, SourceRecord, files};
 use ground::GamingArea;
 use job::Job;
 use product::{Opened, Told, features_file, locate_features, read_told};
 use serde_json::Value;
+use terrain::QUANTA_PER_METRE;
 
+use super::NetworkFound;
 use super::decided::Decided;
 use super::figures::is_of_other_ground;
-use super::laid::Laid;
+use super::laid::{Laid, place_text};
 use super::modules::Modules;
+use super::square::At;
+use super::waters::Waters;
+use super::ways::{Ways, WaysFound};
 use compiler::{ALGORITHM_REVISION, CompileError, level_fingerprint};
 
-/// What is wrong with the features of a database whose files are whole, and, second, what was not checked; nothing of
-/// a job without any.
+/// Steps by which edges may lie off lines that were rounded together with others, once and once more.
+const ROUNDED: f64 = 4.0;
+
+/// What is found of the features of a database.
+#[derive(Default)]
+pub(crate) struct Found {
+    /// What is wrong.
+    pub problems: Vec<String>,
+    /// What was not checked.
+    pub unchecked: Vec<String>,
+    /// What its load modules hold.
+    pub network: Option<NetworkFound>,
+}
+
+/// What is found of the features of a database whose files are whole; nothing of a job without any.
 ///
 /// # Errors
 /// When a file cannot be read that was sound a moment ago.
@@ -24,16 +44,17 @@ pub(crate) fn check(
     area: &GamingArea,
     modules: &Modules,
     report: Option<&Report>,
-) -> Result<(Vec<String>, Vec<String>), CompileError> {
+) -> Result<Found, CompileError> {
     let listed = report.and_then(|report| report.features.as_ref());
     if job.features.is_none() {
         let told = listed.map(|_| "report.json: tells of roads and water, and its job has none".to_owned());
-        return Ok((told.into_iter().collect(), Vec::new()));
+        return Ok(Found { problems: told.into_iter().collect(), ..Found::default() });
     }
     let (.., level) = folder.read_level()?;
     let mut problems = Vec::new();
     let mut decided = Decided::new(area);
     let first_class = job.importance.classes.len();
+    let (mut waters, mut aside) = (Waters::default(), 0.0);
     for (index, &tile) in area.tiles.iter().enumerate() {
         let (file, features) = folder.read_lines(tile)?;
         if level.tiles.get(index) != Some(&file) {
@@ -43,10 +64,15 @@ pub(crate) fn check(
         let (.., measured) = folder.read_measured(tile)?;
         let told = measured.features.map(|found| product::from_features(&found).missing).unwrap_or_default();
         problems.extend(decided.add(&features));
-        problems.extend(Laid { area, features: &features, told: &told, first_class }.problems(modules));
+        let laid = Laid { area, features: &features, told: &told, first_class };
+        problems.extend(laid.problems(modules));
+        waters.add(&laid, modules);
+        aside = ROUNDED * laid.step() as f64;
     }
+    let (network, faults) = network(job, area, modules, &level, (&waters, aside));
+    problems.extend(faults);
     if !problems.is_empty() {
-        return Ok((problems, Vec::new()));
+        return Ok(Found { problems, unchecked: Vec::new(), network: Some(network) });
     }
     problems.extend(decided.problems(&level, modules, listed.map(|features| &features.checks)));
     let opened = Opened::of(folder.clone(), manifest.clone())?;
@@ -64,7 +90,40 @@ pub(crate) fn check(
         }
         Err(unchecked) => Some(unchecked),
     };
-    Ok((problems, unchecked.into_iter().collect()))
+    Ok(Found { problems, unchecked: unchecked.into_iter().collect(), network: Some(network) })
+}
+
+/// What the load modules hold of the network, and what is wrong with that.
+fn network(
+    job: &Job,
+    area: &GamingArea,
+    modules: &Modules,
+    level: &AreaLevel,
+    (waters, aside): (&Waters, f64),
+) -> (NetworkFound, Vec<String>) {
+    let ways = Ways::of(job, modules, aside);
+    let ends = ways.ends(area);
+    let [lakes, lakes_off_level] = waters.counts(area);
+    let WaysFound { kept_m, pieces_missing, gaps } = ways.found;
+    let found = NetworkFound { kept_m, pieces_missing, gaps, ends: ends.len() as u64, lakes, lakes_off_level };
+    let mut problems: Vec<String> = ways.problem(area).into_iter().collect();
+    let quanta = |at: f64, origin: f64| ((at - origin) * f64::from(QUANTA_PER_METRE)).round() as i64;
+    let frame = area.frame;
+    let listed: BTreeSet<At> = level
+        .ends
+        .iter()
+        .map(|end| (quanta(end.at_m[1], frame.origin_north_m), quanta(end.at_m[0], frame.origin_east_m)))
+        .collect();
+    let untold: Vec<&At> = ends.iter().filter(|at| !listed.contains(at)).collect();
+    problems.extend(untold.first().map(|at| {
+        format!(
+            "survey/features.level: does not list {} places at which lines of load modules end although their way goes \
+             on, the first {}",
+            untold.len(),
+            place_text(area, **at)
+        )
+    }));
+    (found, problems)
 }
 
 /// Whether what features came to was made from the published ground along them; else why that is not known.

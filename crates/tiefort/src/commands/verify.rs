@@ -46,9 +46,25 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         let (rms_m, max_m, p99_m) = (residual.rms_m, residual.max_m, residual.p99_m);
         text += &format!("residual: RMS {rms_m:.3} m, 99 % within {p99_m:.2} m, largest {max_m:.2} m\n");
     }
+    text += &verdict.network.as_ref().map(network).unwrap_or_default();
     if let Some(held) = verdict.held_vertices {
         text += &format!("{} vertices stand as far outside the posts around them as any may\n", grouped(held));
     }
     terminal::print(&fold(&text, 2))?;
     Ok(if verdict.problems.is_empty() { Outcome::Sound } else { Outcome::Damaged })
+}
+
+/// What the load modules hold of roads, rivers and lakes.
+fn network(found: &inspect::NetworkFound) -> String {
+    let inspect::NetworkFound { kept_m, pieces_missing, gaps, ends, lakes, lakes_off_level } = *found;
+    format!(
+        "network: {:.1} km kept, {} pieces missing, {} gaps of more than 30 m, {} ends where the source goes on, {} of \
+         {} lakes of a hectare and more off their level\n",
+        kept_m / 1000.0,
+        grouped(pieces_missing),
+        grouped(gaps),
+        grouped(ends),
+        grouped(lakes_off_level),
+        grouped(lakes)
+    )
 }

@@ -11,6 +11,7 @@ mod bad_input;
 mod buildings;
 mod bytes;
 mod left_out;
+mod networks;
 mod outside;
 mod refused;
 mod roads;

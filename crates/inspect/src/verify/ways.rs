@@ -1,0 +1,234 @@
+//! Roads and rivers as the middle lines of load modules tell them, against the triangles: whether what is kept has its
+//! edges, from end to end, and where it ends although its way goes on. Only files of load modules are asked.
+
+use std::collections::BTreeMap;
+
+use ground::GamingArea;
+use job::Job;
+use terrain::{LineKind, LineStorey, LoadModule, ModuleLine, metres_of_quanta};
+
+use super::laid::place_text;
+use super::modules::Modules;
+use super::square::{At, Square};
+
+/// Shorter stretches without edges are what rounding leaves, in metres.
+const BARE_MIN_M: f64 = 3.0;
+/// Longer stretches without edges are gaps, in metres.
+const GAP_MIN_M: f64 = 30.0;
+
+/// What is found of the ways of an area.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct WaysFound {
+    /// Metres of what is kept, bridges among them, tunnels not.
+    pub kept_m: f64,
+    /// Stretches of lines in the ground without edges and without ground of another way.
+    pub pieces_missing: u64,
+    /// Those of them that are longer than 30 m.
+    pub gaps: u64,
+}
+
+/// The ways of an area.
+#[derive(Default)]
+pub(crate) struct Ways {
+    pub found: WaysFound,
+    /// The first place at which an edge is missing.
+    missing: Option<At>,
+    /// What meets at each place: of kept ends, kept lines that pass, and lines that are left out.
+    meetings: BTreeMap<(u8, At), Meeting>,
+}
+
+#[derive(Clone, Copy, Default)]
+struct Meeting {
+    kept_ends: u8,
+    is_passed: bool,
+    goes_on: bool,
+    is_tunnel: bool,
+}
+
+impl Ways {
+    /// The ways of all load modules; edges may lie `aside` quanta off their lines.
+    pub fn of(job: &Job, modules: &Modules, aside: f64) -> Self {
+        let first_class = job.importance.classes.len();
+        let mut ways = Self::default();
+        let names = job.class_names();
+        for module in modules.values().filter(|module| !module.lines.is_empty()) {
+            let ground = Ground::of(module, first_class, aside);
+            for line in &module.lines {
+                let name = names.get(usize::from(line.class)).map_or("", String::as_str);
+                ways.add(line, family(line.traits.kind, name), &ground);
+            }
+        }
+        ways
+    }
+
+    fn add(&mut self, line: &ModuleLine, family: u8, ground: &Ground) {
+        let places: Vec<At> = line.vertices.iter().map(|vertex| ground.square.at(vertex.y, vertex.x)).collect();
+        let traits = line.traits;
+        if traits.is_kept && traits.storey != LineStorey::Tunnel {
+            self.found.kept_m += places.windows(2).map(length_m).sum::<f64>();
+        }
+        if traits.is_in_ground {
+            self.look(&places, traits.kind, ground);
+        }
+        if traits.kind == LineKind::Breakline {
+            return;
+        }
+        let last = places.len() - 1;
+        for (index, &place) in places.iter().enumerate() {
+            let meeting = self.meetings.entry((family, place)).or_default();
+            let is_end = index == 0 || index == last;
+            // What passes on a bridge or in a tunnel does not meet what ends below or above it.
+            meeting.goes_on |= !traits.is_kept && (is_end || traits.storey == LineStorey::Ground);
+            meeting.is_passed |= traits.is_kept && !is_end;
+            if traits.is_kept && is_end {
+                meeting.kept_ends = meeting.kept_ends.saturating_add(1);
+                meeting.is_tunnel |= traits.storey == LineStorey::Tunnel;
+            }
+        }
+    }
+
+    /// Looks for the pieces of a line in the triangles: stretches along which no edge and no other way's ground lies.
+    fn look(&mut self, places: &[At], kind: LineKind, ground: &Ground) {
+        let mut bare: Vec<(f64, f64, At)> = Vec::new();
+        let mut along_m = 0.0;
+        for ends in places.windows(2) {
+            let length_m = length_m(ends);
+            for (from, to) in ground.bare(ends[0], ends[1]) {
+                let (from, to) = (along_m + from * length_m, along_m + to * length_m);
+                match bare.last_mut() {
+                    Some(last) if from - last.1 < BARE_MIN_M => last.1 = to,
+                    _ => bare.push((from, to, ends[0])),
+                }
+            }
+            along_m += length_m;
+        }
+        // Streams pass below roads without edges.
+        let least = if kind == LineKind::Channel { GAP_MIN_M } else { BARE_MIN_M };
+        for (from, to, at) in bare.into_iter().filter(|(from, to, _)| least < to - from) {
+            self.found.pieces_missing += 1;
+            self.found.gaps += u64::from(GAP_MIN_M < to - from);
+            self.missing = self.missing.or(Some(at));
+        }
+    }
+
+    /// Places inside the area at which what is kept ends although its way goes on.
+    pub fn ends(&self, area: &GamingArea) -> Vec<At> {
+        let spacing = i64::from(area.frame.spacing.quanta_per_post());
+        let on = |at: i64, low: i32, high: i32| at == i64::from(low) * spacing || at == i64::from(high) * spacing;
+        let rect = area.rect;
+        let is_border = |(y, x): At| on(y, rect.south, rect.north) || on(x, rect.west, rect.east);
+        let is_end = |of: &Meeting| of.kept_ends == 1 && !of.is_passed && of.goes_on && !of.is_tunnel;
+        let found = self.meetings.iter().filter(|((_, at), of)| is_end(of) && !is_border(*at));
+        found.map(|((_, at), _)| *at).collect()
+    }
+
+    /// What is wrong, in a sentence.
+    pub fn problem(&self, area: &GamingArea) -> Option<String> {
+        let place = place_text(area, self.missing?);
+        let WaysFound { pieces_missing, gaps, .. } = self.found;
+        Some(format!(
+            "load modules: {pieces_missing} stretches of lines that are in the ground have no edges there and no other \
+             way covers them, {gaps} of them longer than 30 m, the first {place}"
+        ))
+    }
+}
+
+/// Roads, rails, runways and channels end apart from each other.
+fn family(kind: LineKind, class: &str) -> u8 {
+    match (kind, class) {
+        (LineKind::Travelled, "rail") => 1,
+        (LineKind::Travelled, "runway") => 2,
+        (LineKind::Travelled, _) => 0,
+        _ => 3,
+    }
+}
+
+fn length_m(ends: &[At]) -> f64 {
+    let [north, east] = [ends[1].0 - ends[0].0, ends[1].1 - ends[0].1].map(|quanta| metres_of_quanta(quanta as i32));
+    north.hypot(east)
+}
+
+/// The triangles of a load module, as lines are looked for in them.
+struct Ground<'a> {
+    square: Square<'a>,
+    /// Triangles that have a class of features.
+    of_features: Vec<[At; 3]>,
+    /// How far edges may lie off a line that was rounded with them, in quanta.
+    aside: f64,
+}
+
+impl<'a> Ground<'a> {
+    fn of(module: &'a LoadModule, first_class: usize, aside: f64) -> Self {
+        let square = Square::of(module);
+        let of_features = module.triangles.iter().zip(&module.classes);
+        let of_features = of_features.filter(|(_, class)| first_class <= usize::from(**class));
+        let of_features = of_features.map(|(triangle, _)| square.corners(triangle)).collect();
+        Self { square, of_features, aside }
+    }
+
+    /// Parts of the line between two places, from 0 to 1, along which neither an edge nor a feature's triangle lies.
+    fn bare(&self, a: At, b: At) -> Vec<(f64, f64)> {
+        let line = Along::of(a, b);
+        let edges = self.square.edges.iter().filter_map(|ends| line.beside(*ends, self.aside));
+        let mut there: Vec<(f64, f64)> = edges.collect();
+        there.extend(self.of_features.iter().filter_map(|corners| line.within(*corners)));
+        there.sort_by(|one, other| one.0.total_cmp(&other.0).then(one.1.total_cmp(&other.1)));
+        let (mut at, mut bare) = (0.0, Vec::new());
+        for (from, to) in there {
+            if at < from {
+                bare.push((at, from));
+            }
+            at = to.max(at);
+        }
+        if at < 1.0 {
+            bare.push((at, 1.0));
+        }
+        bare
+    }
+}
+
+/// A straight line between two places.
+struct Along {
+    from: [f64; 2],
+    unit: [f64; 2],
+    length: f64,
+}
+
+impl Along {
+    fn of(a: At, b: At) -> Self {
+        let [north, east] = [(b.0 - a.0) as f64, (b.1 - a.1) as f64];
+        let length = north.hypot(east).max(1.0);
+        Self { from: [a.0 as f64, a.1 as f64], unit: [north / length, east / length], length }
+    }
+
+    /// How far along a place lies, and how far aside, in quanta.
+    fn of_place(&self, at: At) -> [f64; 2] {
+        let [north, east] = [at.0 as f64 - self.from[0], at.1 as f64 - self.from[1]];
+        [north * self.unit[0] + east * self.unit[1], north * self.unit[1] - east * self.unit[0]]
+    }
+
+    fn part(&self, from: f64, to: f64) -> Option<(f64, f64)> {
+        let (from, to) = (from.min(to).max(0.0) / self.length, from.max(to).min(self.length) / self.length);
+        (from < to).then_some((from, to))
+    }
+
+    /// The part along which an edge lies no farther than `aside`.
+    fn beside(&self, ends: [At; 2], aside: f64) -> Option<(f64, f64)> {
+        let [[from, off], [to, off_too]] = ends.map(|end| self.of_place(end));
+        if aside < off.abs().max(off_too.abs()) { None } else { self.part(from, to) }
+    }
+
+    /// The part inside a triangle.
+    fn within(&self, corners: [At; 3]) -> Option<(f64, f64)> {
+        let places = corners.map(|corner| self.of_place(corner));
+        let mut crossed: Vec<f64> = Vec::new();
+        for (one, other) in [(0, 1), (1, 2), (2, 0)] {
+            let ([from, off], [to, off_too]) = (places[one], places[other]);
+            if (off <= 0.0) != (off_too <= 0.0) {
+                crossed.push(from + (to - from) * off / (off - off_too));
+            }
+        }
+        let [one, other] = crossed[..] else { return None };
+        self.part(one, other)
+    }
+}
