@@ -1,16 +1,15 @@
 //! The stage `profile`: the ground along features, tile by tile. It reads the features and one tile's heights.
 
-use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use database::{FileStamp, Profile};
 use engine::{Artifact, Key, Outcome, Stamp, keep_or_make};
-use features::{Kind, Outline, Place};
+use features::{Outline, Place};
 use ground::{GamingArea, Window, posts_inside};
 use terrain::{Dem, LatticePoint, Post, PostRect, TileId, Vertex};
 
 use crate::keys;
-use crate::read_features::ReadFeatures;
+use crate::read_features::{Basin, ReadFeatures};
 use crate::run::{ALGORITHM_REVISION, Run};
 use crate::{CompileError, Progress, Stage};
 
@@ -85,11 +84,10 @@ pub(crate) fn sound(area: &GamingArea, read: &ReadFeatures, tile: TileId, dem: &
     let inside = |(number, outline): (u32, &Outline)| {
         let rings: Vec<Vec<Vertex>> = outline.rings.iter().map(|ring| vertices(&ring.places)).collect();
         let rings: Vec<&[Vertex]> = rings.iter().map(Vec::as_slice).collect();
-        let mut heights: BTreeMap<i32, u32> = BTreeMap::new();
-        for post in posts_inside(&rings, steps, own) {
-            *heights.entry(dem.height(post)).or_default() += 1;
-        }
-        (!heights.is_empty()).then(|| (number, heights.into_iter().collect()))
+        let mut heights: Vec<i32> = posts_inside(&rings, steps, own).into_iter().map(|post| dem.height(post)).collect();
+        heights.sort_unstable();
+        let histogram = heights.chunk_by(|a, b| a == b).map(|same| (same[0], same.len() as u32));
+        (!heights.is_empty()).then(|| (number, histogram.collect()))
     };
     let inside = basins(area, read, tile).into_iter().filter_map(inside).collect();
     Profile { tile, heights, middles, inside }
@@ -99,15 +97,12 @@ pub(crate) fn sound(area: &GamingArea, read: &ReadFeatures, tile: TileId, dem: &
 fn basins<'a>(area: &GamingArea, read: &'a ReadFeatures, tile: TileId) -> Vec<(u32, &'a Outline)> {
     let steps = read.features.site.lattice.steps_per_post();
     let PostRect { south, west, north, east } = area.tiling.rect(tile);
-    let reaches = |(_, outline): &(u32, &Outline)| {
-        let span = |of: fn(Place) -> i32, low: i32, high: i32| {
-            let (least, most) = (outline.places().map(of).min(), outline.places().map(of).max());
-            least.is_some_and(|least| least <= high * steps) && most.is_some_and(|most| low * steps <= most)
-        };
-        span(|place| place.row, south, north) && span(|place| place.col, west, east)
+    let reaches = |of: &Basin| {
+        let meets = |[least, most]: [i32; 2], low: i32, high: i32| least <= high * steps && low * steps <= most;
+        meets(of.rows, south, north) && meets(of.cols, west, east)
     };
-    let is_water = |(_, outline): &(u32, &Outline)| matches!(outline.traits.kind, Kind::Lake | Kind::River);
-    (0..).zip(read.features.outlines()).filter(is_water).filter(reaches).collect()
+    let outlines = read.features.outlines();
+    read.basins.iter().filter(|of| reaches(of)).map(|of| (of.outline, &outlines[of.outline as usize])).collect()
 }
 
 fn vertices(places: &[Place]) -> Vec<Vertex> {

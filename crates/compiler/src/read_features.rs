@@ -1,6 +1,6 @@
 //! The features of a job on the lattice, and which tile asks the DEM at which of their stations.
 
-use features::{AreaFeatures, Place};
+use features::{AreaFeatures, Kind, Outline, Place};
 use ground::{FeatureTable, GamingArea, Vectors, site};
 use job::Job;
 use terrain::{Each, ModuleId, TileId};
@@ -16,6 +16,28 @@ pub(crate) struct ReadFeatures {
     /// Stations of each tile, by their place among those of the area. What lies beyond the area is in the tile nearest
     /// to it.
     pub by_tile: Vec<Vec<u32>>,
+    /// Polygons of water, in their order.
+    pub basins: Vec<Basin>,
+}
+
+/// A polygon of water, and how far it reaches.
+pub(crate) struct Basin {
+    /// Its number among the outlines.
+    pub outline: u32,
+    /// Its least and its greatest row, in steps.
+    pub rows: [i32; 2],
+    /// Its least and its greatest column, in steps.
+    pub cols: [i32; 2],
+}
+
+impl Basin {
+    /// The box of an outline, where it is one of water.
+    fn of((number, outline): (u32, &Outline)) -> Option<Self> {
+        let span = |of: fn(Place) -> i32| Some([outline.places().map(of).min()?, outline.places().map(of).max()?]);
+        let is_water = matches!(outline.traits.kind, Kind::Lake | Kind::River);
+        let (rows, cols) = (span(|place| place.row)?, span(|place| place.col)?);
+        is_water.then_some(Self { outline: number, rows, cols })
+    }
 }
 
 impl ReadFeatures {
@@ -33,7 +55,8 @@ impl ReadFeatures {
         for (number, &place) in features.stations().iter().enumerate() {
             by_tile[area.tiling.index(tile_of(area, &features, place))].push(number as u32);
         }
-        Ok(Some(Self { vectors, table, features, by_tile }))
+        let basins = (0..).zip(features.outlines()).filter_map(Basin::of).collect();
+        Ok(Some(Self { vectors, table, features, by_tile, basins }))
     }
 
     /// What they are, and what a person should know of their files and rules.

@@ -14,7 +14,7 @@ use crate::exact::Segment;
 use crate::middles::{Middle, middles};
 use crate::pieces::{Piece, pieces};
 use crate::rings::encloses;
-use crate::room::{remark_rooms, share_out, wide_of};
+use crate::room::{AtNodes, remark_rooms, share_out};
 use crate::snap::snap_round;
 use crate::strand::{Graded, Role, Strand};
 use crate::strips::{Face, Room, Wide, wide_segments};
@@ -199,7 +199,8 @@ fn tilted(formed: &Formed, network: &Network, wide: &[Wide]) -> BTreeSet<u32> {
     };
     let is_beside_steep = |face: &Face| steep.iter().any(|place| is_on_outline(face, *place));
     let strips = formed.faces.iter().filter(|face| face.corners.iter().any(has_other_height) || is_beside_steep(face));
-    strips.flat_map(|face| wide_of(face, wide)).collect()
+    let at_nodes = AtNodes::of(wide);
+    strips.flat_map(|face| at_nodes.wide_of(face, wide)).collect()
 }
 
 /// Whether a place lies within a step of the outline of a face.
@@ -229,14 +230,18 @@ fn thinned(strand: &Strand, grant: Grant, site: &Site, shared: &dyn Fn(Place) ->
 
 /// The numbers of the stations that a strand needs. A channel keeps the stations beside a shared place too: where it
 /// passes below a road, only what lies between them is missing.
-pub(crate) fn needed(strand: &Strand, tolerance: Tolerance, site: &Site, shared: &dyn Fn(Place) -> bool) -> Vec<u32> {
+fn needed(strand: &Strand, tolerance: Tolerance, site: &Site, shared: &dyn Fn(Place) -> bool) -> Vec<u32> {
+    thin(&stations(strand, site, shared), tolerance, 0, site.lattice)
+}
+
+/// The stations of a strand, whatever it is thinned with.
+pub(crate) fn stations(strand: &Strand, site: &Site, shared: &dyn Fn(Place) -> bool) -> Vec<Station> {
     let keeps = |at: usize| strand.stations.get(at).is_some_and(|(place, _)| shared(*place));
     let station = |(at, &(place, height)): (usize, &(Place, i32))| {
         let beside = strand.role == Role::Channel && (keeps(at + 1) || (0 < at && keeps(at - 1)));
         Station { place, height, stays: site.on_line(place) || shared(place) || beside, flat: [0; 2] }
     };
-    let stations: Vec<Station> = strand.stations.iter().enumerate().map(station).collect();
-    thin(&stations, tolerance, 0, site.lattice)
+    strand.stations.iter().enumerate().map(station).collect()
 }
 
 fn remark_narrow(network: &Network, pieces: &[Piece], remarks: &mut Vec<Remark>) {

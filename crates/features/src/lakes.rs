@@ -194,8 +194,10 @@ fn quantile(heights: &[(i32, u32)], thousandths: u32) -> i32 {
 /// Bodies that share a stretch of shore are one, at the lowest of their levels; a dam keeps them apart.
 fn join_bodies(outlines: &[Outline], lakes: &mut [Lake], dams: &dyn Fn(Place) -> bool) {
     let mut body: Vec<usize> = (0..lakes.len()).collect();
-    let root = |body: &[usize], mut at: usize| {
+    // Every second one on the way is led past the next, so that no way gets long.
+    let root = |body: &mut [usize], mut at: usize| {
         while body[at] != at {
+            body[at] = body[body[at]];
             at = body[at];
         }
         at
@@ -205,7 +207,7 @@ fn join_bodies(outlines: &[Outline], lakes: &mut [Lake], dams: &dyn Fn(Place) ->
         let places = outlines[lake.outline as usize].rings.iter().flat_map(|ring| &ring.places);
         for place in places.filter(|place| !dams(**place)) {
             let other = *at_place.entry(*place).or_insert(number);
-            let (one, other) = (root(&body, number), root(&body, other));
+            let (one, other) = (root(&mut body, number), root(&mut body, other));
             body[one.max(other)] = one.min(other);
         }
     }
@@ -213,10 +215,10 @@ fn join_bodies(outlines: &[Outline], lakes: &mut [Lake], dams: &dyn Fn(Place) ->
     for (number, lake) in lakes.iter().enumerate() {
         let level = (lake.level, lake.is_fixed);
         let lower = |other: &mut (i32, bool)| *other = if level.0 < other.0 { level } else { *other };
-        levels.entry(root(&body, number)).and_modify(lower).or_insert(level);
+        levels.entry(root(&mut body, number)).and_modify(lower).or_insert(level);
     }
     for (number, lake) in lakes.iter_mut().enumerate() {
-        lake.body = root(&body, number) as u32;
+        lake.body = root(&mut body, number) as u32;
         (lake.level, lake.is_fixed) = levels[&(lake.body as usize)];
     }
 }

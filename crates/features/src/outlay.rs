@@ -5,7 +5,7 @@
 
 use std::collections::HashMap;
 
-use crate::forms::{needed, shared_places};
+use crate::forms::{shared_places, stations};
 use crate::pieces::is_narrow;
 use crate::shares::Shares;
 use crate::strand::{Graded, Strand};
@@ -60,16 +60,13 @@ impl Outlays {
         let outlays = Self { all, points: Vec::new() };
         let mut counting = Counting { outlays, numbers: HashMap::new(), graded, stays: &stays, shares, site };
         for stroke in strokes {
-            for tolerance in 0..=stretches.all[stroke.stretches[0].0 as usize].coarsest() {
-                for run in runs(stretches, stroke, graded) {
-                    counting.run(&run, tolerance);
-                }
-                for (stretch, _) in &stroke.stretches {
-                    if let Part::Strands(numbers) = &stretches.all[*stretch as usize].part {
-                        numbers
-                            .iter()
-                            .for_each(|&number| counting.strand(*stretch, &strands[number as usize], tolerance));
-                    }
+            let coarsest = stretches.all[stroke.stretches[0].0 as usize].coarsest();
+            for tolerance in 0..=coarsest {
+                runs(stretches, stroke, graded).iter().for_each(|run| counting.run(run, tolerance));
+            }
+            for (stretch, _) in &stroke.stretches {
+                if let Part::Strands(numbers) = &stretches.all[*stretch as usize].part {
+                    numbers.iter().for_each(|&number| counting.strand(*stretch, &strands[number as usize], coarsest));
                 }
             }
         }
@@ -173,12 +170,21 @@ impl Counting<'_> {
         }
     }
 
-    fn strand(&mut self, stretch: u32, strand: &Strand, tolerance: u8) {
-        let kept = needed(strand, Tolerance::ALL[usize::from(tolerance)], self.site, self.stays);
-        let points: Vec<u32> = kept.iter().map(|at| self.point(strand.stations[*at as usize].0)).collect();
-        let ends = &mut self.outlays.all[stretch as usize][usize::from(tolerance)].ends;
-        for pair in points.windows(2) {
-            ends.extend([pair[0], pair[1]].map(|point| End { point, wide: false, bench: false, free: false }));
+    /// At every tolerance up to the coarsest; each station is looked up once.
+    fn strand(&mut self, stretch: u32, strand: &Strand, coarsest: u8) {
+        let stations = stations(strand, self.site, self.stays);
+        let mut numbers = vec![None; stations.len()];
+        for tolerance in 0..=usize::from(coarsest) {
+            let kept = thin(&stations, Tolerance::ALL[tolerance], 0, self.site.lattice);
+            let number = |at: &u32| {
+                let at = *at as usize;
+                *numbers[at].get_or_insert_with(|| self.point(stations[at].place))
+            };
+            let points: Vec<u32> = kept.iter().map(number).collect();
+            let ends = &mut self.outlays.all[stretch as usize][tolerance].ends;
+            for pair in points.windows(2) {
+                ends.extend([pair[0], pair[1]].map(|point| End { point, wide: false, bench: false, free: false }));
+            }
         }
     }
 }

@@ -74,7 +74,7 @@ fn losers(network: &Network, pieces: &[Piece], wide: &[Wide], found: &[Face]) ->
             }
         }
     }
-    let mut losers = BTreeSet::new();
+    let (mut losers, at_nodes) = (BTreeSet::new(), AtNodes::of(wide));
     segment_pairs(&segments, &mut |one, other| {
         let (s, t) = (&segments[one as usize], &segments[other as usize]);
         let (p, q) = (&parts[owners[one as usize] as usize], &parts[owners[other as usize] as usize]);
@@ -84,20 +84,70 @@ fn losers(network: &Network, pieces: &[Piece], wide: &[Wide], found: &[Face]) ->
         let (winner, loser) = if p.rank < q.rank { (p, q) } else { (q, p) };
         // A line of lower class is cut where it lies in a strip; that costs no other feature room.
         if let (Some(face), true) = (loser.face, winner.face.is_some() || winner.rank.0 < loser.rank.0) {
-            losers.extend(wide_of(&found[face as usize], wide));
+            losers.extend(at_nodes.wide_of(&found[face as usize], wide));
         }
     });
     losers
 }
 
-/// The strip segments that make a face: its own, or those that meet in a junction.
-pub(crate) fn wide_of(face: &Face, wide: &[Wide]) -> Vec<u32> {
-    match face.wide {
-        Some(own) => vec![own],
-        None => {
-            let meets =
-                |of: &Wide| of.room != Room::None && face.nodes.iter().any(|node| of.a == *node || of.b == *node);
-            (0..wide.len() as u32).filter(|number| meets(&wide[*number as usize])).collect()
+/// The strip segments that end at each node, in the order of nodes.
+pub(crate) struct AtNodes(Vec<(u32, u32)>);
+
+impl AtNodes {
+    /// Those of all strip segments.
+    pub fn of(wide: &[Wide]) -> Self {
+        let mut all: Vec<(u32, u32)> =
+            (0..).zip(wide).flat_map(|(number, of)| [(of.a, number), (of.b, number)]).collect();
+        all.sort_unstable();
+        Self(all)
+    }
+
+    /// The strip segments that make a face: its own, or those that meet in a junction.
+    pub fn wide_of(&self, face: &Face, wide: &[Wide]) -> Vec<u32> {
+        let Some(own) = face.wide else {
+            let at = |node: &u32| {
+                let (first, node) = (self.0.partition_point(|(other, _)| other < node), *node);
+                self.0[first..].iter().take_while(move |(other, _)| *other == node).map(|(_, number)| *number)
+            };
+            let meets = face.nodes.iter().flat_map(at);
+            let mut numbers: Vec<u32> = meets.filter(|number| wide[*number as usize].room != Room::None).collect();
+            numbers.sort_unstable();
+            numbers.dedup();
+            return numbers;
+        };
+        vec![own]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn strips_that_meet_in_a_junction_are_found_by_their_nodes() {
+        let rooms = [Room::Whole, Room::Half, Room::None];
+        let wide: Vec<Wide> = (0..60_u32)
+            .map(|number| {
+                let (a, b) = (number * 7 % 13, number * 5 % 11);
+                Wide { piece: 0, segment: number, a, b, room: rooms[number as usize % 3] }
+            })
+            .collect();
+        let at_nodes = AtNodes::of(&wide);
+        let id = crate::FeatureId { source: 0, numbering: crate::Numbering::Way, number: 1 };
+        let face = |nodes: Vec<u32>, own| Face {
+            class: 1,
+            id,
+            corners: Vec::new(),
+            is_deck: false,
+            centreline: None,
+            nodes,
+            wide: own,
+        };
+        for nodes in [vec![0], vec![3, 1], vec![12, 2, 12], vec![99], Vec::new()] {
+            let meets = |of: &Wide| of.room != Room::None && nodes.iter().any(|node| of.a == *node || of.b == *node);
+            let all: Vec<u32> = (0..60).filter(|number| meets(&wide[*number as usize])).collect();
+            assert_eq!(at_nodes.wide_of(&face(nodes.clone(), None), &wide), all, "{nodes:?}");
         }
+        assert_eq!(at_nodes.wide_of(&face(vec![0], Some(4)), &wide), [4]);
     }
 }
