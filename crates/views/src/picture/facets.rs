@@ -181,7 +181,7 @@ impl Facets {
         facets
     }
 
-    /// How many triangles.
+    /// How many triangles of the ground, bridges not among them.
     pub fn count(&self) -> usize {
         self.corners.len()
     }

@@ -9,7 +9,6 @@ use super::image::Image;
 use super::map_extent::{MapExtent, Posts, SAMPLES, Samples};
 use super::scene::Scene;
 use super::sheet::{Drawing, HATCH_PIXELS, Key, Legend, Sheet, round_marks};
-use crate::table::grouped;
 
 /// Heights in the shading are drawn so many times as large as they are, so that plains show their form.
 pub(crate) const SHADING_TIMES: f64 = 2.0;
@@ -156,8 +155,7 @@ pub(crate) fn relief(scene: &Scene, shown: Shown, longest: usize) -> Vec<Drawing
         ),
     };
     let tin = || {
-        let detail = format!("{} triangles", grouped(facets.count() as u64));
-        let sheet = sheet("relief of the load modules", detail);
+        let sheet = sheet("relief of the load modules", scene.triangles_in_words());
         let mut map = facets_relief(&facets, &map_extent, &tints);
         draw_lines(&mut map, &map_extent, scene, 1.0);
         Drawing { sheet, map, map_extent }

@@ -6,6 +6,7 @@ use terrain::{Dem, GridFrame, LoadModule, ModuleGrid, ModuleId, ModuleRect, Tile
 use super::color::feature_number;
 use super::map_extent::{MapExtent, Posts};
 use super::sheet::Coordinates;
+use crate::table::grouped;
 
 /// A finished area, or a part of it.
 #[derive(Clone, Debug)]
@@ -131,6 +132,12 @@ impl Scene<'_> {
     /// The posts of the ground.
     pub(crate) fn posts(&self, ground: &SceneGround) -> Posts {
         Posts { rect: ground.dem.rect(), spacing_m: [self.frame.spacing.metres(); 2] }
+    }
+
+    /// Triangles of the load modules of the part, those of bridges among them, as limits and the report count them.
+    pub(crate) fn triangles_in_words(&self) -> String {
+        let triangles: u64 = self.modules.iter().map(|module| u64::from(module.counts().triangles)).sum();
+        format!("{} triangles", grouped(triangles))
     }
 
     /// What is looked at, in words.

@@ -48,7 +48,7 @@ pub fn draw_sight(scene: &Scene, shown: Shown, style: Style, sight: &Sight, wide
     let facets = Facets::of_scene(scene);
     let covers = scene.ground.map(|ground| facets.post_covers(ground.dem, scene.frame.spacing.metres()));
     let triangles = Surface::Triangles(&facets);
-    let tin = || Panel { label: format!("TIN, {} triangles", grouped(facets.count() as u64)), surface: triangles };
+    let tin = || Panel { label: format!("TIN, {}", scene.triangles_in_words()), surface: triangles };
     let dem = || {
         let dem = scene.ground.expect("a caller that asks for the ground has it").dem;
         let spacing_m = scene.frame.spacing.metres();

@@ -8,7 +8,6 @@ use super::module_maps::density;
 use super::relief::{Tints, facets_relief};
 use super::scene::Scene;
 use super::sheet::{Drawing, Key, Legend, Sheet};
-use crate::table::grouped;
 
 /// The edges of triangles, as strong as there is room for them.
 pub(crate) fn facets_wireframe(facets: &Facets, map_extent: &MapExtent) -> Image {
@@ -51,7 +50,7 @@ pub(crate) fn wireframe(scene: &Scene, longest: usize) -> Drawing {
     let map = facets_wireframe(&facets, &map_extent);
     let sheet = Sheet {
         title: format!("{}: wireframe", scene.name),
-        subtitle: format!("{}, {} triangles", scene.what(), grouped(facets.count() as u64)),
+        subtitle: format!("{}, {}", scene.what(), scene.triangles_in_words()),
         coordinates: scene.coordinates(),
         legends: vec![Legend::Keys { title: String::new(), keys: vec![(Key::Line(INK), "edge of a triangle".into())] }],
         notes: "Stronger lines are the sides of load modules, where there is room to tell them apart.".into(),
@@ -61,9 +60,26 @@ pub(crate) fn wireframe(scene: &Scene, longest: usize) -> Drawing {
 
 #[cfg(test)]
 mod tests {
+    use terrain::{Decks, LoadModule, ModuleVertex};
+
+    use super::super::relief::{Shown, relief};
     use super::super::scene::SceneLimits;
     use super::*;
     use crate::samples;
+
+    #[test]
+    fn a_caption_counts_the_triangles_of_bridges_as_the_report_does() {
+        let mut modules = samples::modules();
+        let limits = SceneLimits { count: "triangles".into(), ..SceneLimits::default() };
+        let captions = |modules: &[LoadModule]| {
+            let scene = samples::scene(modules, &limits);
+            [wireframe(&scene, 300), relief(&scene, Shown::Tin, 300).remove(0)].map(|drawing| drawing.sheet.subtitle)
+        };
+        assert!(captions(&modules).iter().all(|text| text.ends_with(", 24 triangles")), "{:?}", captions(&modules));
+        let corner = |x, y| ModuleVertex { x, y, z: 90_000 };
+        modules[0].decks = Decks::of_triangles([([corner(0, 0), corner(640, 0), corner(640, 640)], 0)]);
+        assert!(captions(&modules).iter().all(|text| text.ends_with(", 25 triangles")), "{:?}", captions(&modules));
+    }
 
     #[test]
     fn triangles_smaller_than_pixels_are_counted_and_not_drawn() {
