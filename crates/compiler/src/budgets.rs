@@ -2,6 +2,7 @@
 //! each budget is tried on them, as the stages `profile` and `level` do. No TIN is made.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use database::Profile;
@@ -9,13 +10,14 @@ use features::{AreaFeatures, Formed, Kind, Levelled, Storey};
 use ground::{GamingArea, Ground};
 use job::Job;
 use schedule::{Workers, for_each_piece};
-use terrain::LineStorey;
+use terrain::{LineStorey, TileId};
 
 use crate::CompileError;
 use crate::heard::Heard;
 use crate::level::shares;
 use crate::profile::sound;
 use crate::read_features::ReadFeatures;
+use crate::run::Run;
 
 /// Triangles of a load module on average that are tried: SIMNET's first.
 pub const BUDGETS: [u32; 7] = [32, 64, 125, 250, 500, 1000, 2000];
@@ -75,7 +77,7 @@ pub fn limits_of(mean: u32) -> [u32; 2] {
 /// The features of a job with the heights along them, on which budgets are tried.
 pub struct Budgets {
     job: Job,
-    read: ReadFeatures,
+    read: Arc<ReadFeatures>,
     heard: Heard,
 }
 
@@ -93,7 +95,7 @@ impl Budgets {
         let sounded = |&tile| Ok(sound(&area, &read, tile, &source.natural_tile(&area, tile)?.dem));
         let profiles: Vec<Profile> = area.tiles.iter().map(sounded).collect::<Result<_, CompileError>>()?;
         let heard = Heard::of(&read, profiles.iter());
-        Ok(Some(Self { job: job.clone(), read, heard }))
+        Ok(Some(Self { job: job.clone(), read: Arc::new(read), heard }))
     }
 
     /// What a mean and its limits would keep.
@@ -137,4 +139,25 @@ impl Budgets {
         }
         kinds.into_iter().filter(|(_, [_, all])| 0.0 < *all).collect()
     }
+}
+
+/// The least of [`BUDGETS`] above a run's own mean that would keep nearly all of its features, by the ground along
+/// them that is published; `None` where none would.
+///
+/// # Errors
+/// When a file cannot be read.
+pub(crate) fn enough_for(run: &Run) -> Result<Option<Budgeted>, CompileError> {
+    let read = run.features()?;
+    let profile = |&tile: &TileId| Ok(run.database.folder().read_profile(tile)?.2);
+    let profiles: Vec<Profile> = run.area.tiles.iter().map(profile).collect::<Result<_, CompileError>>()?;
+    let heard = Heard::of(&read, profiles.iter());
+    let budgets = Budgets { job: run.job.clone(), read, heard };
+    let own = run.job.limits.mean_per_load_module;
+    for mean in BUDGETS.into_iter().filter(|mean| own < f64::from(*mean)) {
+        let budgeted = budgets.of_mean(mean)?;
+        if budgeted.holds() {
+            return Ok(Some(budgeted));
+        }
+    }
+    Ok(None)
 }

@@ -3,9 +3,9 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use database::{
-    Report, ReportBefore, ReportBorder, ReportBreach, ReportClass, ReportHeights, ReportLevel, ReportLimit, ReportPart,
-    ReportPerModule, ReportPerWindow, ReportPoints, ReportPool, ReportRefusals, ReportResidual, ReportStops,
-    ReportVoids, Totals,
+    Report, ReportBefore, ReportBorder, ReportBreach, ReportClass, ReportEnough, ReportHeights, ReportLevel,
+    ReportLimit, ReportPart, ReportPerModule, ReportPerWindow, ReportPoints, ReportPool, ReportRefusals,
+    ReportResidual, ReportStops, ReportVoids, Totals,
 };
 use fidelity::{Curvature, Residuals, Tally};
 use job::{Choice, HOLE_CLASS_NAME};
@@ -16,6 +16,7 @@ use terrain::{Breach, BreachKind, BreachPlace, ModuleId, ModuleResidual, Refused
 use crate::CompileError;
 use crate::assembled::{Assembled, ModuleNumbers};
 use crate::bound::{bound, of_area};
+use crate::budgets::{Budgeted, enough_for};
 use crate::enforce::{ByModule, Enforced, counted};
 use crate::refine::Published;
 use crate::refused::RefusedPosts;
@@ -73,6 +74,7 @@ impl Findings<'_> {
             residual_against_source: run.ground.relief.has_source_posts().then(|| self.at_source(&total)),
             classes: self.classes(residuals),
             features: None,
+            enough: self.enough()?,
             levels: self.levels(),
             overall_point_weighted_rms_m: self.point_weighted_rms_m(residuals),
             dem_accuracy_m: run.ground.accuracy_m,
@@ -95,6 +97,20 @@ impl Findings<'_> {
     pub fn told(&self) -> Option<Told> {
         let (settled, figures) = (self.run.level.as_ref()?, self.sums.features.as_ref()?);
         Some(product::told(self.run.job, &self.run.area, &settled.level, figures))
+    }
+
+    /// Limits that would keep nearly all features, where too much had no room.
+    fn enough(&self) -> Result<Option<ReportEnough>, CompileError> {
+        let level = self.run.level.as_ref().map(|settled| &settled.level);
+        if !level.is_some_and(|level| product::leaves_much_out(self.run.job, level)) {
+            return Ok(None);
+        }
+        let enough = enough_for(self.run)?;
+        Ok(enough.map(|Budgeted { mean, per_load_module, per_window, .. }| ReportEnough {
+            mean,
+            per_load_module,
+            per_4km: per_window,
+        }))
     }
 
     fn stops(&self) -> ReportStops {

@@ -66,9 +66,9 @@ pub use report_features::{
 };
 mod report;
 pub use report::{
-    Report, ReportBefore, ReportBorder, ReportBound, ReportBreach, ReportClass, ReportHeights, ReportLevel,
-    ReportLimit, ReportPart, ReportPerModule, ReportPerWindow, ReportPlace, ReportPoints, ReportPool, ReportRefusals,
-    ReportResidual, ReportStage, ReportStops, ReportTile, ReportVoids,
+    Report, ReportBefore, ReportBorder, ReportBound, ReportBreach, ReportClass, ReportEnough, ReportHeights,
+    ReportLevel, ReportLimit, ReportPart, ReportPerModule, ReportPerWindow, ReportPlace, ReportPoints, ReportPool,
+    ReportRefusals, ReportResidual, ReportStage, ReportStops, ReportTile, ReportVoids,
 };
 mod lock;
 pub use lock::Lock;

@@ -54,6 +54,10 @@ pub struct Report {
     /// Roads, rivers and lakes, where the job has any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub features: Option<ReportFeatures>,
+    /// The least mean that would keep nearly all of them, where limits leave out more than a person expects and one of
+    /// the means that `plan` tries is enough.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub enough: Option<ReportEnough>,
     /// Levels of detail, the finest first; none where there is only that one.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub levels: Vec<ReportLevel>,
@@ -82,6 +86,17 @@ pub struct Report {
     /// Files written beside the report, and how they must look.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub files: BTreeMap<String, FileStamp>,
+}
+
+/// Limits with which nearly all roads, rivers and lakes would be in the ground.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ReportEnough {
+    /// Triangles of a load module, on average over the area.
+    pub mean: u32,
+    /// At most in one load module.
+    pub per_load_module: u32,
+    /// At most in a square of 4 km.
+    pub per_4km: u32,
 }
 
 /// Seconds that one tile took.
@@ -416,6 +431,7 @@ mod tests {
             residual_against_source: None,
             classes: vec![],
             features: None,
+            enough: None,
             levels: vec![ReportLevel { level: 1, inner_share: 0.5, triangles: 20, rms_m: 1.5, max_m: 11.25 }],
             overall_point_weighted_rms_m: 1.1,
             dem_accuracy_m: Some(2.5),

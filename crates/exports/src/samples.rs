@@ -181,6 +181,7 @@ pub(crate) fn report() -> Report {
         residual_against_source: None,
         classes: Vec::new(),
         features: None,
+        enough: None,
         levels: vec![],
         overall_point_weighted_rms_m: 1.0,
         dem_accuracy_m: None,

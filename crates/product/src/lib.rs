@@ -23,7 +23,7 @@ pub use features_gpkg::features_package;
 mod kept;
 pub use kept::{from_curvature, from_features, from_tally, to_curvature, to_features, to_tally};
 mod warnings;
-pub use warnings::{MATTERS, Made, Matter, Told as MatterTold, table as warnings_table, warnings};
+pub use warnings::{MATTERS, Made, Matter, Told as MatterTold, leaves_much_out, table as warnings_table, warnings};
 mod told;
 pub use told::{Told, read_told, told};
 mod drape;

@@ -132,9 +132,17 @@ pub fn table() -> String {
 /// The share of a main class that may be left out without a warning, and that of all ways.
 const LEFT_OUT_MAX: [f64; 2] = [0.01, 0.1];
 
-/// Too much of a main class, or of all ways, had no room, or lakes of a hectare.
+/// Whether limits leave out so much of the features that it is a warning.
+pub fn leaves_much_out(job: &Job, level: &AreaLevel) -> bool {
+    !left_out_of(job, level).is_empty()
+}
+
 fn left_out(made: &Made) -> Vec<String> {
-    let Some((job, level)) = made.features else { return Vec::new() };
+    made.features.map_or_else(Vec::new, |(job, level)| left_out_of(job, level))
+}
+
+/// Too much of a main class, or of all ways, had no room, or lakes of a hectare.
+fn left_out_of(job: &Job, level: &AreaLevel) -> Vec<String> {
     let (names, amounts) = (job.class_names(), &level.amounts);
     let out = |wanted: f64, kept: f64, most: f64| most * wanted < wanted - kept;
     let told = |what: &str, wanted: f64, kept: f64| {

@@ -2,8 +2,8 @@
 //! at most 80 columns.
 
 use database::{
-    Report, ReportBorder, ReportBreach, ReportHeights, ReportLimit, ReportPart, ReportPlace, ReportResidual,
-    ReportStage,
+    Report, ReportBorder, ReportBreach, ReportEnough, ReportHeights, ReportLimit, ReportPart, ReportPlace,
+    ReportResidual, ReportStage,
 };
 
 use crate::against::{self, Residual};
@@ -20,6 +20,7 @@ pub fn report_text(report: &Report) -> String {
         residuals(report),
         levels(report),
         report.features.as_ref().map(features_text),
+        report.enough.as_ref().map(enough),
         refusals(report),
         bound(report),
         breaches(report),
@@ -267,6 +268,14 @@ fn breach_row(breach: &ReportBreach) -> [String; 7] {
 /// A count; of a residual, which is counted in millimetres, the metres.
 pub(crate) fn amount(breach: &ReportBreach, count: u64) -> String {
     if breach.kind == "residual" { format!("{}.{:03} m", grouped(count / 1000), count % 1000) } else { grouped(count) }
+}
+
+fn enough(enough: &ReportEnough) -> String {
+    let ReportEnough { mean, per_load_module, per_4km } = *enough;
+    format!(
+        "What to change: limits.mean_per_load_module = {mean}, per_load_module = {per_load_module} and \
+         per_4km_square = {per_4km} would keep nearly all roads and water\n"
+    )
 }
 
 fn warnings(report: &Report) -> Option<String> {

@@ -1,6 +1,6 @@
 //! What to change in a job when limits bind: named policies, each with the numbers that it would need.
 
-use database::{Report, ReportBound, ReportPlace};
+use database::{Report, ReportBound, ReportEnough, ReportFeatureClass, ReportPlace};
 use terrain::POINT_COST;
 
 use crate::table::grouped;
@@ -28,10 +28,18 @@ const UNEVEN: f64 = 3.0;
 
 /// What a report gives reason to change, most pressing first. Empty when there is nothing to say.
 pub fn advise(report: &Report) -> Vec<Advice> {
-    [breached(report), module_limit(report), pool(report), window_limit(report), mean(report), importance(report)]
-        .into_iter()
-        .flatten()
-        .collect()
+    [
+        breached(report),
+        network(report),
+        module_limit(report),
+        pool(report),
+        window_limit(report),
+        mean(report),
+        importance(report),
+    ]
+    .into_iter()
+    .flatten()
+    .collect()
 }
 
 fn breached(report: &Report) -> Option<Advice> {
@@ -54,6 +62,29 @@ fn breached(report: &Report) -> Option<Advice> {
         ),
         effect: "Clipped pieces are counted only after the cut. With constrained edges module lines are edges of the \
                  TIN from the start, and no limit is ever exceeded."
+            .into(),
+    })
+}
+
+fn network(report: &Report) -> Option<Advice> {
+    let ReportEnough { mean, per_load_module, per_4km } = report.enough?;
+    let features = report.features.as_ref()?;
+    let sum = |of: fn(&ReportFeatureClass) -> f64| features.classes.iter().map(of).sum::<f64>();
+    let lakes: u64 = features.classes.iter().map(|class| class.lakes_wanted - class.lakes_kept).sum();
+    Some(Advice {
+        policy: "keep-network",
+        found: format!(
+            "Limits leave out {:.1} of {:.1} km of roads and rivers, and {} lakes of a hectare and more.",
+            sum(|class| class.wanted_km - class.kept_km),
+            sum(|class| class.wanted_km),
+            grouped(lakes)
+        ),
+        change: format!(
+            "limits.mean_per_load_module = {mean}; limits.per_load_module = {per_load_module}; \
+             limits.per_4km_square = {per_4km}"
+        ),
+        effect: "The least mean that tiefort plan tries which keeps nearly all: 99.5 % of motorways, primaries, rails \
+                 and rivers, 95 % of every other kind and every lake of a hectare."
             .into(),
     })
 }
@@ -214,6 +245,20 @@ mod tests {
         assert_eq!(advice[1].change, "limits.per_load_module = 105", "99 there, and 3 posts of 2 triangles");
         assert_eq!(advice[2].change, "limits.pool = 506");
         assert_eq!(advice[3].change, "limits.per_4km_square = 4106");
+    }
+
+    #[test]
+    fn a_mean_that_keeps_the_network_is_named_where_too_much_is_left_out() {
+        let mut report = samples::report();
+        report.enough = Some(ReportEnough { mean: 250, per_load_module: 750, per_4km: 32_000 });
+        let class = ReportFeatureClass { wanted_km: 10.0, kept_km: 7.5, lakes_wanted: 2, ..Default::default() };
+        report.features = Some(database::ReportFeatures { classes: vec![class], ..Default::default() });
+        let advice = advise(&report).into_iter().find(|advice| advice.policy == "keep-network").unwrap();
+        assert_eq!(
+            advice.change,
+            "limits.mean_per_load_module = 250; limits.per_load_module = 750; limits.per_4km_square = 32000"
+        );
+        assert!(advice.found.contains("2.5 of 10.0 km") && advice.found.contains("2 lakes"), "{}", advice.found);
     }
 
     #[test]
