@@ -12,7 +12,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/../fuzz"
 seconds=${1:-600}
 shift || true
 targets=("$@")
-all=(geotiff rasters raw polygons vectors geoid pins module_file tile_file manifest job)
+all=(geotiff rasters raw polygons vectors shapefiles geoid pins module_file tile_file manifest job)
 [[ ${#targets[@]} -gt 0 ]] || targets=("${all[@]}")
 
 host=$(rustc -vV | sed -n 's/^host: //p')
@@ -27,6 +27,10 @@ seed() {
     mkdir -p "corpus/$target" "artifacts/$target"
     if [[ $target == module_file ]]; then
         python3 -B ../scripts/fuzz_seeds.py ../docs/FORMAT.md "corpus/$target"
+        return 0
+    fi
+    if [[ $target == shapefiles ]]; then
+        python3 -B ../scripts/fuzz_seeds.py shapefiles "corpus/$target"
         return 0
     fi
     [[ -n ${TIEFORT_DATA:-} ]] || return 0
