@@ -8,7 +8,9 @@ use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
 
 use crate::SourceError;
-use crate::limits::{CHUNK_BYTES_MAX, CHUNKS_MAX, POSTS_A_SIDE_MAX, POSTS_MAX, TAGS_MAX};
+use crate::limits::{
+    CHUNK_BYTES_A_BYTE, CHUNK_BYTES_FREE, CHUNK_BYTES_MAX, CHUNKS_MAX, POSTS_A_SIDE_MAX, POSTS_MAX, TAGS_MAX,
+};
 use crate::store::{Handle, Store};
 use crate::unpacked::Packing;
 
@@ -87,7 +89,7 @@ pub(crate) fn read_layout(store: &Store, file: &mut Handle) -> Result<Layout, So
     let path = store.path();
     let directory = first_directory(store, file)?;
     let first = |tag| directory.iter().find(|&&(found, _)| found == tag).map(|&(_, value)| value);
-    Facts { path, first: &first }.layout()
+    Facts { path, file_bytes: store.file_bytes(), first: &first }.layout()
 }
 
 /// The tags of the first directory, each with the first of its values; all of them lie inside the file.
@@ -219,6 +221,7 @@ impl Bytes<'_> {
 /// What the first directory says.
 struct Facts<'a> {
     path: &'a Path,
+    file_bytes: u64,
     first: &'a dyn Fn(u16) -> Option<u64>,
 }
 
@@ -237,7 +240,8 @@ impl Facts<'_> {
         };
         let layout = Layout { cols, rows, chunk_cols, chunk_rows, tiled, sample, packing };
         let posts = u64::from(chunk_cols) * u64::from(chunk_rows);
-        self.at_most(posts * sample.bytes(), CHUNK_BYTES_MAX, "bytes in a strip or tile")?;
+        let most = CHUNK_BYTES_FREE.saturating_add(CHUNK_BYTES_A_BYTE.saturating_mul(self.file_bytes));
+        self.at_most(posts * sample.bytes(), most.min(CHUNK_BYTES_MAX), "bytes in a strip or tile")?;
         let chunks = u64::from(layout.chunks_across()) * u64::from(rows.div_ceil(chunk_rows));
         self.at_most(chunks, CHUNKS_MAX, "strips or tiles")?;
         Ok(layout)

@@ -7,6 +7,10 @@ pub const POSTS_A_SIDE_MAX: u64 = 1 << 20;
 pub const POSTS_MAX: u64 = 1 << 31;
 /// Bytes of one strip or tile once decoded: it is decoded whole, by every worker at once.
 pub const CHUNK_BYTES_MAX: u64 = 1 << 29;
+/// Bytes of one strip or tile once decoded, whatever the size of its file.
+pub const CHUNK_BYTES_FREE: u64 = 64 << 20;
+/// Bytes beside that for each byte of the file: flat ground is packed to a thousandth, but not in pieces of that size.
+pub const CHUNK_BYTES_A_BYTE: u64 = 64;
 /// Strips or tiles of a file: their offsets and lengths are held in memory (at about 80 bytes each while read).
 pub const CHUNKS_MAX: u64 = 1 << 22;
 /// Tags of a directory: the standard names about 100.

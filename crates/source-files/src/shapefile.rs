@@ -111,6 +111,10 @@ fn big(bytes: &[u8]) -> usize {
 fn runs(store: &Store, record: &[u8], has_heights: bool) -> Result<Vec<Vec<[f64; 3]>>, SourceError> {
     let (parts, points) = (whole(store, record, 36)? as usize, whole(store, record, 40)? as usize);
     let starts = part(store, record, 44, parts.saturating_mul(4))?;
+    // Parts without points are made of nothing, and there is room for a hundred million of them. One is borne.
+    if points.saturating_add(1) < parts {
+        return Err(store.malformed("a record", format!("{parts} parts of {points} points"), "parts with points"));
+    }
     let places_at = 44 + starts.len();
     let places = part(store, record, places_at, points.saturating_mul(16))?;
     let number = |bytes: &[u8]| f64::from_le_bytes(bytes.try_into().expect("eight bytes were cut"));

@@ -27,19 +27,21 @@ pub(crate) struct Heights {
 }
 
 impl Heights {
-    /// Those of all of a raster, in the system `crs` where it names none; what was done to it is told.
+    /// Those of all of a raster, in the system `crs` where it names none; what was done to it is told. `fits` is asked
+    /// for its posts before the first of them is read: a raster of a few kilobytes may have thousands of millions.
     ///
     /// # Errors
-    /// When it cannot be read, or no grid suits it.
+    /// When it cannot be read, no grid suits it, or it does not fit.
     pub fn read(
-        path: &Path,
-        crs: Option<&str>,
+        (path, crs): (&Path, Option<&str>),
+        fits: &dyn Fn(PostRect) -> Result<(), CompileError>,
         workers: usize,
         stop: &AtomicBool,
         progress: &mut dyn Progress,
     ) -> Result<Self, CompileError> {
         progress.tell(Event::Enter(Stage::Read, 0));
         let (file, note) = open_alone(path, crs)?;
+        fits(rect_of(&file)?)?;
         let mut heights = Self::of(&file, &Workers::new(workers), stop)?;
         progress.tell(Event::Leave(Stage::Read));
         heights.notes.splice(0..0, note);
@@ -77,6 +79,14 @@ impl Heights {
         let notes = warnings_of(raster.frame(), raster.range_m(), raster.notes());
         raster.settle_voids(VoidPolicy::Hole)?;
         Ok(Self { dem: Arc::new(raster.dem()), frame: raster.frame().clone(), notes })
+    }
+}
+
+/// The posts that a mesh of a raster stands on.
+fn rect_of(file: &DemFile) -> Result<PostRect, CompileError> {
+    match has_square_posts(file.frame()) {
+        true => Ok(file.rect()),
+        false => Ok(suiting_grid(file.frame())?.rect),
     }
 }
 

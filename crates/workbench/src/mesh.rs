@@ -65,7 +65,8 @@ pub struct Mesh {
 /// # Errors
 /// When the raster cannot be used, or nothing says when to stop.
 pub fn tin(request: &TinRequest, stop: &AtomicBool, progress: &mut dyn Progress) -> Result<Mesh, CompileError> {
-    let heights = Heights::read(&request.dem, request.crs.as_deref(), request.workers, stop, progress)?;
+    let fits = |rect| refuse(request, tiles_of(request, rect), rect);
+    let heights = Heights::read((&request.dem, request.crs.as_deref()), &fits, request.workers, stop, progress)?;
     tin_over(&heights, request, stop, progress)
 }
 
@@ -111,7 +112,7 @@ impl Heights {
         progress: &mut dyn Progress,
     ) -> Result<Vec<TileTin>, CompileError> {
         let workers = Workers::new(request.workers);
-        let tiles = request.tiles.unwrap_or_else(|| suiting_tiles(request, self.dem.rect()));
+        let tiles = tiles_of(request, self.dem.rect());
         let mut job = TinJob::new(request, tiles, &self.dem, self.frame.spacing)?;
         if let Some(TinStart::File(path)) = &request.start {
             job.given = posts_of_file(path, &self.frame, self.dem.rect())?;
@@ -222,9 +223,7 @@ impl<'a> TinJob<'a> {
         spacing_m: [f64; 2],
     ) -> Result<Self, CompileError> {
         let rect = dem.rect();
-        let longest =
-            (rect.cells_high().div_ceil(rows.max(1) as usize)).max(rect.cells_wide().div_ceil(cols.max(1) as usize));
-        refuse(request, (rows, cols), rect, longest)?;
+        refuse(request, (rows, cols), rect)?;
         let tiling = Tiling::new(rect, 1, rows, cols, TileOrder::Color);
         let quantum = if request.method == TinMethod::Paper { terrain::QUANTA_PER_METRE as u32 } else { 1 };
         let units = |metres: f64| (metres * f64::from(terrain::QUANTA_PER_METRE) / f64::from(quantum)).floor() as u64;
@@ -448,6 +447,10 @@ impl<'a> TinJob<'a> {
 
 /// Rows and columns of tiles where none are asked for. Where a residual ends the mesh or it starts from given points,
 /// tiles would make another mesh, and so would the paper's passes.
+fn tiles_of(request: &TinRequest, rect: PostRect) -> (u32, u32) {
+    request.tiles.unwrap_or_else(|| suiting_tiles(request, rect))
+}
+
 fn suiting_tiles(request: &TinRequest, rect: PostRect) -> (u32, u32) {
     let points = request.points.or(request.triangles.map(|triangles| triangles / 2));
     let is_cut = request.method != TinMethod::Paper && request.start.is_none();

@@ -56,13 +56,10 @@ pub struct TinRequest {
     pub workers: usize,
 }
 
-/// Refuses a mesh of so many rows and columns of tiles, the longest of so many cells, that a raster has no room for.
-pub(crate) fn refuse(
-    request: &TinRequest,
-    (rows, cols): (u32, u32),
-    rect: PostRect,
-    longest: usize,
-) -> Result<(), CompileError> {
+/// Refuses a mesh of so many rows and columns of tiles that a raster has no room for.
+pub(crate) fn refuse(request: &TinRequest, (rows, cols): (u32, u32), rect: PostRect) -> Result<(), CompileError> {
+    let longest =
+        (rect.cells_high().div_ceil(rows.max(1) as usize)).max(rect.cells_wide().div_ceil(cols.max(1) as usize));
     let impossible = |key: &str, found: String, expected: &str, hint: &str| {
         Err(GroundError::Impossible { key: key.into(), found, expected: expected.into(), hint: hint.into() }.into())
     };

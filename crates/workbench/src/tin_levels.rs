@@ -25,8 +25,9 @@ pub fn tin_levels(
     progress: &mut dyn Progress,
 ) -> Result<Vec<Mesh>, CompileError> {
     refuse(request, levels)?;
-    let heights = Heights::read(&request.dem, request.crs.as_deref(), request.workers, stop, progress)?;
-    let whole = TinRequest { tiles: Some((1, 1)), ..request.clone() };
+    let whole = TinRequest { tiles: Some((1, 1)), points: levels.last().copied(), ..request.clone() };
+    let fits = |rect| crate::request::refuse(&whole, (1, 1), rect);
+    let heights = Heights::read((&request.dem, request.crs.as_deref()), &fits, request.workers, stop, progress)?;
     if let TinMethod::Optimised(_) = request.method {
         let level = |&points: &usize| {
             let request = TinRequest { points: Some(points), ..whole.clone() };
@@ -35,8 +36,7 @@ pub fn tin_levels(
         };
         return levels.iter().map(level).collect();
     }
-    let most = levels.last().copied();
-    let whole = heights.refine(&TinRequest { points: most, ..whole }, stop, progress)?.swap_remove(0);
+    let whole = heights.refine(&whole, stop, progress)?.swap_remove(0);
     progress.tell(Event::Enter(Stage::Assemble, 0));
     let began = whole.initial_count as usize;
     if let Some(&few) = levels.iter().find(|&&points| points < began) {

@@ -259,3 +259,30 @@ fn voids_of_a_mesh_are_no_vertices_and_in_no_statistic() {
         assert!((mesh.residual.max_m - sums.max_m()).abs() < 1e-9);
     }
 }
+
+#[test]
+fn a_raster_that_no_mesh_has_room_for_is_refused_before_its_heights_are_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("dem.tif");
+    // None of them is a height, which nothing tells before they are read.
+    write_dem(&path, &Dem::from_fn(PostRect::of_size(3, 17_000), |_| None));
+    let request = TinRequest {
+        dem: path,
+        crs: None,
+        method: TinMethod::Greedy { key: ErrorKey::Sse },
+        points: Some(400),
+        triangles: None,
+        max_residual_m: None,
+        rms_m: None,
+        start: None,
+        tiles: None,
+        workers: 2,
+    };
+    let of_one = workbench::tin(&request, &false.into(), &mut Silent).unwrap_err().to_string();
+    assert!(of_one.contains("tiles of 16999 cells, expected tiles below 16384 cells a side"), "{of_one}");
+    let of_levels = workbench::tin_levels(&request, &[100, 400], &false.into(), &mut Silent).unwrap_err().to_string();
+    assert_eq!(of_levels, of_one);
+    let cut = TinRequest { tiles: Some((1, 2)), ..request };
+    let of_two = workbench::tin(&cut, &false.into(), &mut Silent).unwrap_err().to_string();
+    assert!(!of_two.contains("--tiles"), "{of_two}");
+}

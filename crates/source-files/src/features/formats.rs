@@ -9,6 +9,9 @@ use crate::error::{A_JOB, A_TEXT};
 use crate::store::Store;
 use crate::{SourceError, geopackage, shapefile};
 
+/// How a zip archive with something in it begins.
+const ZIP_MARK: [u8; 4] = *b"PK\x03\x04";
+
 /// Formats that are read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Format {
@@ -27,8 +30,14 @@ pub fn is_feature_file(path: &Path) -> bool {
         Ok((store, Format::GeoJson)) => store
             .start(LOOKED_AT)
             .is_ok_and(|start| NAMES.iter().any(|name| start.windows(name.len()).any(|window| window == *name))),
+        // A zipped Shapefile that unpacks to too much is told as what it is.
+        Err(SourceError::TooLarge { .. }) => is_zip(path),
         other => other.is_ok(),
     }
+}
+
+fn is_zip(path: &Path) -> bool {
+    Store::plain(path).and_then(|store| store.start(4)).is_ok_and(|start| start == ZIP_MARK)
 }
 
 /// Whom to name beside anything drawn from the file at `path`, where its format says so.
@@ -72,7 +81,7 @@ pub(super) fn open(path: &Path) -> Result<(Store, Format), SourceError> {
             false => Err(refused(path, &format!("a gzip file of {}", name_of(path, &start)))),
         };
     }
-    if start.starts_with(b"PK\x03\x04") {
+    if start.starts_with(&ZIP_MARK) {
         let shapes = Store::zipped_shapefile(path)?.swap_remove(0);
         return match shapes.start(4)?.starts_with(&shapefile::MARK) {
             true => Ok((shapes, Format::Shapefile)),

@@ -126,6 +126,20 @@ fn a_strip_that_unpacks_far_beyond_its_rows_is_refused_and_not_unpacked() {
 }
 
 #[test]
+fn a_strip_of_far_more_bytes_than_its_file_is_refused_before_anything_is_decoded() {
+    let folder = Folder::new();
+    let of_side = |side: u32| {
+        let tiff = Tiff::of_heights(&[&[1, 2, 3], &[4, 5, 6]]).with(256, Values::Long(vec![side]));
+        let tiff = tiff.with(257, Values::Long(vec![side])).with(278, Values::Long(vec![side]));
+        let bytes = tiff.with(259, Values::Short(vec![8])).bytes();
+        GeoTiff::open(&folder.write("wide.tif", &bytes), None).map(|file| file.rect().posts_wide())
+    };
+    assert_eq!(of_side(5700).unwrap(), 5700);
+    let error = of_side(8192).unwrap_err().to_string();
+    assert!(error.contains("too large: 134217728 bytes in a strip or tile, at most 671"), "{error}");
+}
+
+#[test]
 fn packbits_whose_rows_are_longer_or_shorter_than_the_rasters_are_refused() {
     const PACKBITS: u16 = 32773;
     let folder = Folder::new();

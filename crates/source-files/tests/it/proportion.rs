@@ -252,6 +252,73 @@ fn an_index_that_names_one_record_over_and_over_is_refused() {
 }
 
 #[test]
+fn a_record_of_parts_without_points_is_refused() {
+    let folder = Folder::new();
+    let with = |parts: u32, points: u32| {
+        let mut record = 5_u32.to_le_bytes().to_vec();
+        record.extend([0; 32]);
+        record.extend([parts.to_le_bytes(), points.to_le_bytes()].concat());
+        record.resize(record.len() + 4 * parts as usize + 16 * points as usize, 0);
+        let mut bytes = vec![0, 0, 0x27, 0x0a];
+        bytes.resize(100, 0);
+        bytes.extend([1_u32.to_be_bytes(), (record.len() as u32 / 2).to_be_bytes()].concat());
+        let path = folder.write("a.shp", &[bytes, record].concat());
+        read_features(&path, &WANTED, &in_turn).map(|file| file.features.len())
+    };
+    let text = with(1_000_000, 0).unwrap_err().to_string();
+    assert!(text.contains("1000000 parts of 0 points, expected parts with points"), "{text}");
+    assert_eq!(with(1, 0).unwrap(), 0, "a polygon of nothing is borne");
+}
+
+#[test]
+fn an_index_that_goes_in_circles_is_refused() {
+    let (folder, (shapes, index)) = (Folder::new(), line_of(10));
+    let path = folder.write("a.shp", &shapes);
+    // Into itself, into the header, and to records whose length leads back.
+    for at in [50_u32, 0, 25, 52] {
+        let entry = [at.to_be_bytes(), 50_u32.to_be_bytes()].concat();
+        folder.write("a.shx", &[&index[..100], &entry.repeat(1000)].concat());
+        let error = refusal(&path);
+        assert!(matches!(error, SourceError::Malformed { .. } | SourceError::Truncated { .. }), "{at}: {error}");
+    }
+}
+
+#[test]
+fn a_table_that_promises_more_rows_than_it_has_is_refused() {
+    let (folder, (shapes, _)) = (Folder::new(), line_of(10));
+    let path = folder.write("a.shp", &shapes);
+    let table = |rows: u32, row_bytes: u16| {
+        let mut head =
+            [&[3, 0, 0, 0][..], &rows.to_le_bytes(), &65_u16.to_le_bytes(), &row_bytes.to_le_bytes()].concat();
+        head.resize(32, 0);
+        head.extend(b"highway\0\0\0\0C\0\0\0\0\x07");
+        head.resize(64, 0);
+        head.extend(b"\r primary");
+        folder.write("a.dbf", &head);
+        read_features(&path, &WANTED, &in_turn).map(|file| file.features.len()).map_err(|error| error.to_string())
+    };
+    assert_eq!(table(1, 8), Ok(1));
+    for rows in [2, 1 << 31, u32::MAX] {
+        assert!(table(rows, 8).unwrap_err().contains("truncated: the rows of the table"), "{rows}");
+    }
+    assert!(table(u32::MAX, 0).unwrap_err().contains("columns of 8 bytes in rows of 0"));
+    assert!(table(1, 7).unwrap_err().contains("columns of 8 bytes in rows of 7"));
+}
+
+#[test]
+fn records_of_two_gigabytes_are_refused_unread() {
+    let (folder, (shapes, _)) = (Folder::new(), line_of(10));
+    for (record, name) in [(0x3fff_ffff_u32, "long"), (0x7fff_ffff, "negative")] {
+        let bytes = [&shapes[..104], &record.to_be_bytes(), &shapes[108..]].concat();
+        let path = folder.write(&format!("{name}.shp"), &bytes);
+        // All of it but the start is a hole.
+        std::fs::OpenOptions::new().write(true).open(&path).unwrap().set_len(1 << 31).unwrap();
+        let text = refusal(&path).to_string();
+        assert!(text.contains("too large: 2147483648 bytes"), "{text}");
+    }
+}
+
+#[test]
 fn headers_of_a_shapefile_that_lie_are_refused_or_borne() {
     let folder = Folder::new();
     let (shapes, index) = line_of(10);
