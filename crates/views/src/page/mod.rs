@@ -73,6 +73,7 @@ pub fn report_html(page: &Page) -> String {
             body {
                 h1 { (title) }
                 p.quiet { @if page.title.is_some() { "Gaming area " (report.area) ": " } (what_it_is(manifest)) }
+                @if let Some(features) = &report.features { (tables::in_the_ground(features)) }
                 @if let Some(scene) = page.scene { (maps::first(scene, marks)) }
                 (tables::verdict(report))
                 nav {

@@ -21,13 +21,12 @@ pub(super) fn verdict(report: &Report) -> Markup {
                 " not met: see " a href="#breaches" { "breaches" } "."
             }
         }
-        @if let Some(features) = &report.features { (in_the_ground(features)) }
         @for warning in &report.warnings { pre.quiet { "warning: " (warning) } }
     }
 }
 
 /// How much of every class is in the ground, in a line; too little of one stands out.
-fn in_the_ground(features: &ReportFeatures) -> Markup {
+pub(super) fn in_the_ground(features: &ReportFeatures) -> Markup {
     let told: Vec<_> = features.classes.iter().filter_map(|class| Some((class, kept(class)?))).collect();
     html! {
         @if !told.is_empty() {
