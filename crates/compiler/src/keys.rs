@@ -291,7 +291,10 @@ pub(crate) fn measured(run: &Run, modules: Fingerprint) -> Key {
     };
     // Beside the ground of the tile's own window, which its TIN is made from.
     let is_beside = run.ground.relief.has_posts_between() || run.burns_in();
-    let beside = if is_beside { &run.records[..] } else { &[] };
+    // What features change of a tile is in its load modules.
+    let files = run.job.features.as_ref().map(FeaturesSpec::files).unwrap_or_default();
+    let is_of_ground = |record: &&SourceRecord| !files.iter().any(|file| file.written == record.path);
+    let beside: Vec<&SourceRecord> = run.records.iter().filter(|record| is_beside && is_of_ground(record)).collect();
     Key::new("measured").known(MODULES, modules).part(MEASURE, |part| {
         let part = part.number(run.job.class_names().len() as u64).case(is_regular);
         part.list(beside.iter(), |part, record| part.fingerprint(record.blake3))
