@@ -108,7 +108,7 @@ pub fn form(graded: &Graded, strands: &[Strand], site: &Site) -> Formed {
         tilted.into_iter().for_each(|number| wide[number as usize].room = Room::None);
         formed = round_together(graded, &pieces, &mut wide, &thinned, site).0;
     }
-    formed.middles = middles(graded, (&pieces, &wide), (strands, &thinned), site);
+    formed.middles = middles(graded, (&pieces, &wide), (strands, &thinned), &formed.points, site);
     remark_rooms(network, &pieces, &wide, &mut remarks);
     formed.remarks.append(&mut remarks);
     Remark::sort(&mut formed.remarks);

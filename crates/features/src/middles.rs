@@ -31,11 +31,12 @@ pub struct Middle {
 const TOLERANCE_OUT: Tolerance = Tolerance::ALL[1];
 
 /// The middle lines of a network that was cut into `pieces`, of which `wide` are strips, and of all strands, of which
-/// `thinned` are in the ground.
+/// `thinned` are in the ground, whose heights were decided at `points`.
 pub(crate) fn middles(
     graded: &Graded,
     (pieces, wide): (&[Piece], &[Wide]),
     (strands, thinned): (&[Strand], &[Strand]),
+    points: &[(Place, i32)],
     site: &Site,
 ) -> Vec<Middle> {
     let mut middles = of_pieces(graded, pieces, wide);
@@ -51,6 +52,7 @@ pub(crate) fn middles(
         middles.extend(left_out(strand, kept, site).into_iter().map(|strand| of_strand(strand, false)));
     }
     middles.iter_mut().for_each(|middle| cross_lines(&mut middle.stations, site));
+    let mut middles: Vec<Middle> = middles.into_iter().flat_map(|middle| in_culverts(middle, points)).collect();
     middles.retain(|middle| 2 <= middle.stations.len());
     middles.sort();
     middles
@@ -159,6 +161,27 @@ fn left_out(strand: &Strand, kept: &[&Strand], site: &Site) -> Vec<Strand> {
     parts
 }
 
+/// A channel in parts: where the ground has another height than it, as on a road, it passes below in a culvert.
+fn in_culverts(middle: Middle, points: &[(Place, i32)]) -> Vec<Middle> {
+    let Middle { class, traits, id, stations } = middle;
+    if traits.kind != LineKind::Channel || !traits.is_in_ground {
+        return vec![Middle { class, traits, id, stations }];
+    }
+    let passes = |(place, height): &(Place, i32)| {
+        let found = points.binary_search_by_key(place, |(other, _)| *other);
+        found.is_ok_and(|found| points[found].1 != *height)
+    };
+    let is_below: Vec<bool> = stations.windows(2).map(|ends| ends.iter().any(passes)).collect();
+    let mut from = 0;
+    let parts = is_below.chunk_by(|a, b| a == b).map(|same| {
+        let stations = stations[from..=from + same.len()].to_vec();
+        from += same.len();
+        let culvert = LineTraits { form: LineForm::Nothing, storey: LineStorey::Tunnel, is_in_ground: false, ..traits };
+        Middle { class, traits: if same[0] { culvert } else { traits }, id, stations }
+    });
+    parts.collect()
+}
+
 /// The stations that a line needs which is no edge.
 fn thinned_out(stations: Vec<(Place, i32)>, site: &Site) -> Vec<(Place, i32)> {
     let station = |&(place, height): &(Place, i32)| Station { place, height, stays: site.on_line(place), flat: [0; 2] };
@@ -229,6 +252,24 @@ mod tests {
             site().crossings(Segment { a: ends[0].0, b: ends[1].0 }, &mut |place| crossed.push(place));
             assert!(crossed.is_empty() && ends[0].0 != ends[1].0);
         }
+    }
+
+    #[test]
+    fn a_stream_below_a_road_is_in_a_culvert() {
+        let sources = vec![way(2, "waterway=stream", &[(20.0, 40.0), (20.0, 5.0)])];
+        let formed = formed(sources, |_, north| north * 0.01);
+        let middle = Middle {
+            stations: (0..5).map(|at| (Place::new(0, at), 100 - 10 * at)).collect(),
+            ..of_number(&formed, 2)[0].clone()
+        };
+        let ground = |at: i32, height| (Place::new(0, at), height);
+        assert_eq!(in_culverts(middle.clone(), &[ground(0, 100), ground(4, 60)]), [middle.clone()]);
+        // A road at the third station: the pieces before and behind it pass below.
+        let parts = in_culverts(middle.clone(), &[ground(1, 90), ground(2, 400), ground(4, 60)]);
+        let told: Vec<_> = parts.iter().map(|part| (part.stations.len(), part.traits.is_in_ground)).collect();
+        assert_eq!(told, [(2, true), (3, false), (2, true)]);
+        assert!(parts.iter().all(|part| part.traits.is_kept && part.traits.fit()));
+        assert_eq!(parts[1].traits.storey, LineStorey::Tunnel);
     }
 
     #[test]
