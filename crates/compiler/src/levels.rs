@@ -60,7 +60,11 @@ pub(crate) fn all_levels(
 /// Ground that has the class of a feature, but for some classes; nothing where there is none.
 pub(crate) fn faces(features: &TileFeatures, without: &BTreeSet<u8>) -> Option<Faces> {
     let ring = |surface: &FeatureSurface| surface.ring.iter().map(|vertex| vertex.at).collect();
-    let face = |body: &[FeatureSurface]| Face { class: body[0].class, rings: body.iter().map(ring).collect() };
+    let face = |body: &[FeatureSurface]| Face {
+        class: body[0].class,
+        level: body[0].level(),
+        rings: body.iter().map(ring).collect(),
+    };
     let bodies = features.bodies().filter(|body| !without.contains(&body[0].class));
     let all: Vec<Face> = bodies.map(face).collect();
     let loose = features.shaped_bodies().filter(|body| !without.contains(&body[0].class));

@@ -58,8 +58,10 @@ pub struct MeasuredFeatures {
     pub edges: u64,
     /// Those that it lacks: row and column of one end, then of the other.
     pub missing: Vec<[i32; 4]>,
-    /// How far any vertex in a lake lies from its level, in quanta.
+    /// How far any corner of a triangle of water lies from the level of its lake, in quanta.
     pub lake_spread: u32,
+    /// Square metres inside the shores of lakes that are banks.
+    pub lake_banks_m2: u64,
     /// Posts outside water within a post of a lake.
     pub shore_posts: u64,
     /// Those of them below its level.

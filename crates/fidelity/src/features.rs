@@ -3,7 +3,10 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
-use terrain::{Dem, FeatureSurface, Features, LatticePoint, LoadModule, Post, PostRect, SurfaceGround, TileFeatures};
+use terrain::{
+    Dem, FeatureSurface, Features, LatticePoint, LoadModule, Post, PostRect, QUANTA_PER_METRE, SurfaceGround,
+    TileFeatures,
+};
 use terrain::{Tin, Vertex};
 
 use crate::{DeckFigures, Reference, Tally, each_residual};
@@ -17,8 +20,10 @@ pub struct FeatureFigures {
     pub edges: u64,
     /// Those that it lacks, by place, each once.
     pub missing: Vec<[LatticePoint; 2]>,
-    /// How far any vertex in a lake lies from its level, in quanta.
+    /// How far any corner of a triangle of water lies from the level of its lake, in quanta.
     pub lake_spread: u32,
+    /// Square metres inside the shores of lakes that something else tilts, which are banks and no water.
+    pub lake_banks_m2: u64,
     /// Posts outside features within a post of a lake.
     pub shore_posts: u64,
     /// Those of them below its level.
@@ -41,11 +46,13 @@ impl FeatureFigures {
     ) -> Self {
         let bodies = Bodies::of(features);
         let (shore_posts, shore_below) = bodies.shore(ground.dem, tin.rect);
+        let lakes = bodies.lakes(modules, ground);
         Self {
             steps_per_post: features.kept.steps_per_post,
             edges: owned_edges(&features.kept, tin.rect, area),
             missing: missing_edges(tin, &features.kept),
-            lake_spread: bodies.lake_spread(tin),
+            lake_spread: lakes[0] as u32,
+            lake_banks_m2: lakes[1],
             shore_posts,
             shore_below,
             outside: residuals_without(modules, ground, featured),
@@ -61,6 +68,7 @@ impl FeatureFigures {
         self.missing.sort_unstable();
         self.missing.dedup();
         self.lake_spread = self.lake_spread.max(other.lake_spread);
+        self.lake_banks_m2 += other.lake_banks_m2;
         self.shore_posts += other.shore_posts;
         self.shore_below += other.shore_below;
         self.outside.merge(&other.outside);
@@ -173,6 +181,7 @@ const BLOCK: i32 = 8;
 
 struct Body<'a> {
     ground: SurfaceGround,
+    class: u8,
     /// The height of its first vertex: of a lake its level.
     level: i32,
     rings: Vec<&'a [Vertex]>,
@@ -222,27 +231,38 @@ impl<'a> Bodies<'a> {
         self.lake_level(LatticePoint::new(at.row.div_euclid(to_common), at.col.div_euclid(to_common)))
     }
 
-    /// How far any corner of a triangle of a TIN in a lake lies from its level, in quanta.
-    fn lake_spread(&self, tin: &Tin) -> u32 {
+    /// How far any corner of a triangle of water lies from the level of its lake, in quanta, and square metres inside
+    /// shores that are no water because something tilts them.
+    fn lakes(&self, modules: &[LoadModule], ground: &Reference) -> [u64; 2] {
+        let (mut spread, mut banks) = (0, 0);
         if !self.has_lake() {
-            return 0;
+            return [0, 0];
         }
-        let off = |&triangle: &[u32; 3]| {
-            let corners = triangle.map(|corner| tin.vertices[corner as usize]);
-            let [a, b, c] = corners.map(|vertex| vertex.at);
-            // A place inside: twice the first corner and both others, on a lattice four times as fine.
-            let inside = LatticePoint::new(2 * a.row + b.row + c.row, 2 * a.col + b.col + c.col);
-            let level = self.lake_level_in(inside, 4 * tin.steps_per_post)?;
-            let is_water = |at: LatticePoint| {
-                let (to_common, to_own) = common(self.steps, tin.steps_per_post);
-                let at = scaled(at, to_own);
-                let at = LatticePoint::new(at.row.div_euclid(to_common), at.col.div_euclid(to_common));
-                self.bodies.iter().any(|body| body.level == level && body.holds(at, self.steps))
-            };
-            let all = [a, b, c].into_iter().all(is_water);
-            all.then(|| corners.iter().map(|vertex| vertex.height.abs_diff(level)).max().unwrap_or(0))
-        };
-        tin.triangles.iter().filter_map(off).max().unwrap_or(0)
+        let units = i64::from(ground.spacing.quanta_per_post());
+        for module in modules {
+            let origin = [module.id.row, module.id.col].map(|line| i64::from(line) * i64::from(module.side));
+            for (triangle, class) in module.triangles.iter().zip(&module.classes) {
+                let corners = triangle.map(|v| module.vertices[usize::from(v)]);
+                let [a, b, c] = corners.map(|v| [origin[0] + i64::from(v.y), origin[1] + i64::from(v.x)]);
+                // A place inside: twice the first corner and both others, a quarter of it.
+                let inside = [0, 1].map(|axis| {
+                    let sum = 2 * a[axis] + b[axis] + c[axis];
+                    (sum * i64::from(self.steps)).div_euclid(4 * units) as i32
+                });
+                let at = LatticePoint::new(inside[0], inside[1]);
+                let first = self.near(at).find(|body| body.holds(at, self.steps));
+                let Some(lake) = first.filter(|body| body.ground == SurfaceGround::Lake) else { continue };
+                let off = corners.iter().map(|vertex| vertex.z.abs_diff(lake.level)).max().unwrap_or(0);
+                if *class == lake.class {
+                    spread = spread.max(u64::from(off));
+                } else if 0 < off {
+                    let ([up, right], [to_up, to_right]) = ([b[0] - a[0], b[1] - a[1]], [c[0] - a[0], c[1] - a[1]]);
+                    banks += (right * to_up - up * to_right).unsigned_abs();
+                }
+            }
+        }
+        let quanta = u64::from(QUANTA_PER_METRE.unsigned_abs());
+        [spread, banks.div_ceil(2 * quanta * quanta)]
     }
 
     /// Posts of `rect` outside all features that lie within a post of a lake, and those of them below its level.
@@ -280,7 +300,7 @@ impl<'a> Body<'a> {
             reach = [reach[0].min(a.row), reach[1].min(a.col), reach[2].max(a.row), reach[3].max(a.col)];
         }
         let level = rings.first().and_then(|ring| ring.first()).map_or(0, |vertex| vertex.height);
-        Self { ground: surfaces[0].ground, level, rings, rows, reach }
+        Self { ground: surfaces[0].ground, class: surfaces[0].class, level, rings, rows, reach }
     }
 
     fn near(&self, at: LatticePoint, steps: i32) -> &[[LatticePoint; 2]] {
@@ -333,7 +353,7 @@ fn is_within(a: LatticePoint, b: LatticePoint, at: LatticePoint, steps: i32) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use terrain::TileId;
+    use terrain::{Decks, Importance, ModuleGrid, ModuleId, ModuleResidual, ModuleVertex, Spacing, TileId};
 
     const STEPS: i32 = 16;
     const RECT: PostRect = PostRect { south: 0, west: 0, north: 8, east: 8 };
@@ -388,14 +408,31 @@ mod tests {
     }
 
     #[test]
-    fn a_corner_of_a_triangle_in_a_lake_lies_on_its_level_or_is_told() {
-        // Whatever else it is a corner of: the middle of the TIN stands 5 quanta above its corners.
-        for (level, spread) in [(5, 5), (0, 5), (9, 9), (-2, 7)] {
-            let features = lake_within(0, 128, level);
-            assert_eq!(Bodies::of(&features).lake_spread(&tin()), spread, "{level}");
-        }
-        let none = TileFeatures::none(TileId { row: 0, col: 0 });
-        assert_eq!(Bodies::of(&none).lake_spread(&tin()), 0);
+    fn a_corner_of_water_lies_on_its_level_or_is_told_and_what_is_tilted_is_bank() {
+        let spacing = Spacing::from_metres(10.0).unwrap();
+        let units = spacing.quanta_per_post();
+        // Two triangles of 8 x 8 posts, one corner 5 quanta above the others.
+        let corner = |x: i32, y: i32, z| ModuleVertex { x: (x * units) as u16, y: (y * units) as u16, z };
+        let module = |classes: [u8; 2]| LoadModule {
+            side: (8 * units) as u16,
+            vertices: vec![corner(0, 0, 0), corner(8, 0, 0), corner(8, 8, 5), corner(0, 8, 0)],
+            triangles: vec![[0, 1, 3], [1, 2, 3]],
+            classes: classes.to_vec(),
+            id: ModuleId { row: 0, col: 0 },
+            polygon_count: 2,
+            residual: ModuleResidual::default(),
+            decks: Decks::default(),
+            lines: Vec::new(),
+        };
+        let mask = Importance::uniform(RECT, 1000);
+        let dem = Dem::from_fn(RECT, |_| Some(0));
+        let grid = ModuleGrid { rows: 1, cols: 1, side_cells: 8 };
+        let ground = Reference { dem: &dem, mask: &mask, grid, spacing };
+        let found = |features: &TileFeatures, classes| Bodies::of(features).lakes(&[module(classes)], &ground);
+        assert_eq!(found(&lake_within(0, 128, 0), [2, 2]), [5, 0]);
+        assert_eq!(found(&lake_within(0, 128, 0), [2, 0]), [0, 3200]);
+        assert_eq!(found(&lake_within(0, 128, 5), [2, 2]), [5, 0]);
+        assert_eq!(found(&TileFeatures::none(TileId { row: 0, col: 0 }), [2, 2]), [0, 0]);
     }
 
     #[test]

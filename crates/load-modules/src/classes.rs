@@ -16,7 +16,8 @@ pub(crate) fn of_triangles(module: &LoadModule, layout: &Layout, mask: &Importan
         [origin[0] + i64::from(vertex.y), origin[1] + i64::from(vertex.x)]
     };
     for (class, triangle) in classes.iter_mut().zip(&module.triangles) {
-        if let Some(of_face) = faces.class_at(triangle.map(corner), layout.spacing.quanta_per_post()) {
+        let heights = triangle.map(|v| module.vertices[usize::from(v)].z);
+        if let Some(of_face) = faces.class_at(triangle.map(corner), heights, layout.spacing.quanta_per_post()) {
             *class = of_face;
         }
     }

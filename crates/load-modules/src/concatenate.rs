@@ -76,7 +76,7 @@ mod tests {
             let tin = constrained(&layout, seed);
             let places = |triangle: &[u32; 3]| triangle.map(|v| tin.vertices[v as usize].at).to_vec();
             let wet: Vec<usize> = (0..tin.triangles.len()).step_by(3).collect();
-            let given = wet.iter().map(|&t| Face { class: 7, rings: vec![places(&tin.triangles[t])] });
+            let given = wet.iter().map(|&t| Face { class: 7, level: None, rings: vec![places(&tin.triangles[t])] });
             let faces = Faces::new(&given.collect::<Vec<_>>(), LATTICE_PER_POST);
             let of_tin = faces.of_triangles(&tin);
             assert!((0..of_tin.len()).all(|t| of_tin[t] == wet.binary_search(&t).is_ok().then_some(7)));

@@ -21,6 +21,9 @@ const CELL_POSTS: i32 = 4;
 pub struct Face {
     /// Its class.
     pub class: u8,
+    /// The height of level water: only triangles all of whose corners have it are of the face. What something else
+    /// tilts is the bank of it.
+    pub level: Option<i32>,
     /// Closed rings, the first corner not repeated, in either direction: what lies inside an odd number of them belongs
     /// to the face, so an island is a ring like the shore.
     pub rings: Vec<Vec<LatticePoint>>,
@@ -47,6 +50,7 @@ const PARTS: i64 = 4;
 #[derive(Clone, Debug, PartialEq, Eq)]
 struct Part {
     class: u8,
+    level: Option<i32>,
     edges: Range<u32>,
 }
 
@@ -67,7 +71,7 @@ impl Faces {
     }
 
     /// The class that covers more than half of a triangle, by the centres of its parts.
-    fn class_over(&self, corners: [[i64; 2]; 3], units_per_post: i32) -> Option<u8> {
+    fn class_over(&self, corners: [[i64; 2]; 3], units_per_post: i32, has_level: &dyn Fn(i32) -> bool) -> Option<u8> {
         let [a, b, c] = corners;
         // Places in parts of a side along two of them.
         let at =
@@ -77,7 +81,7 @@ impl Faces {
             let up = [at(i, j), at(i + 1, j), at(i, j + 1)];
             let down = (i + j < PARTS - 1).then(|| [at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)]);
             for part in std::iter::once(up).chain(down) {
-                if let Some(class) = self.class_at(part, units_per_post * PARTS as i32) {
+                if let Some(class) = self.class_in(part, units_per_post * PARTS as i32, has_level) {
                     *found.entry(class).or_default() += 1;
                 }
             }
@@ -91,12 +95,21 @@ impl Faces {
             let at = tin.vertices[v as usize].at;
             [at.row, at.col].map(i64::from)
         };
-        let class = |triangle: &[u32; 3]| self.class_at(triangle.map(corner), tin.steps_per_post);
+        let height = |v: u32| tin.vertices[v as usize].height;
+        let class = |triangle: &[u32; 3]| self.class_at(triangle.map(corner), triangle.map(height), tin.steps_per_post);
         tin.triangles.iter().map(class).collect()
     }
 
-    /// The class at the centre of three corners (row, column), which count in units of which so many make a post.
-    pub(crate) fn class_at(&self, corners: [[i64; 2]; 3], units_per_post: i32) -> Option<u8> {
+    /// The class of a triangle of three corners (row, column) with their heights, by its centre. Corners count in units
+    /// of which so many make a post.
+    pub(crate) fn class_at(&self, corners: [[i64; 2]; 3], heights: [i32; 3], units_per_post: i32) -> Option<u8> {
+        let has_level = |level: i32| heights == [level; 3];
+        let own = self.class_in(corners, units_per_post, &has_level);
+        own.or_else(|| self.loose.as_ref()?.class_over(corners, units_per_post, &has_level))
+    }
+
+    /// The class of the first face that holds the centre of three corners and, where it is level, `has_level` allows.
+    fn class_in(&self, corners: [[i64; 2]; 3], units_per_post: i32, has_level: &dyn Fn(i32) -> bool) -> Option<u8> {
         let centre = Centre::of(corners, self.steps_per_post, units_per_post);
         let cell = i128::from(CELL_POSTS * self.steps_per_post) * centre.den;
         let [row, col] = [centre.row, centre.col].map(|at| i32::try_from(at.div_euclid(cell)).ok());
@@ -105,8 +118,8 @@ impl Faces {
             let edges = &self.edges[part.edges.start as usize..part.edges.end as usize];
             edges.iter().filter(|edge| centre.is_west_of(**edge)).count() % 2 == 1
         };
-        let own = parts.into_iter().find(is_inside).map(|part| part.class);
-        own.or_else(|| self.loose.as_ref()?.class_over(corners, units_per_post))
+        let mut here = parts.into_iter().filter(is_inside);
+        here.find(|part| part.level.is_none_or(has_level)).map(|part| part.class)
     }
 
     fn add(&mut self, face: &Face) {
@@ -129,7 +142,7 @@ impl Faces {
             }
             let first = self.edges.len() as u32;
             self.edges.extend(edges);
-            self.parts.push(Part { class: face.class, edges: first..self.edges.len() as u32 });
+            self.parts.push(Part { class: face.class, level: face.level, edges: first..self.edges.len() as u32 });
         }
     }
 }
@@ -194,12 +207,12 @@ mod tests {
 
     fn face(class: u8, rings: &[&[(i32, i32)]]) -> Face {
         let ring = |ring: &&[(i32, i32)]| ring.iter().map(|&(row, col)| place(row, col)).collect();
-        Face { class, rings: rings.iter().map(ring).collect() }
+        Face { class, level: None, rings: rings.iter().map(ring).collect() }
     }
 
     /// The class at a place, as that of a triangle all of whose corners lie there.
     fn class_of(faces: &Faces, at: LatticePoint) -> Option<u8> {
-        faces.class_at([[i64::from(at.row), i64::from(at.col)]; 3], STEPS)
+        faces.class_at([[i64::from(at.row), i64::from(at.col)]; 3], [0; 3], STEPS)
     }
 
     /// Places without repeats in a square, its corners among them.
@@ -224,7 +237,7 @@ mod tests {
                 .map(|(triangle, &class)| {
                     let mut ring = triangle.map(|v| coarse[v as usize]).to_vec();
                     random.shuffle(&mut ring);
-                    Face { class, rings: vec![ring] }
+                    Face { class, level: None, rings: vec![ring] }
                 })
                 .collect();
             let mut fine = coarse.clone();
@@ -262,7 +275,7 @@ mod tests {
         let places = scatter(&mut random, 20, 12);
         let ring = |triangle: [u32; 3]| vec![triangle.map(|v| places[v as usize]).to_vec()];
         let faces: Vec<Faces> = (delaunay(&places).into_iter())
-            .map(|triangle| Faces::new(&[Face { class: 1, rings: ring(triangle) }], STEPS))
+            .map(|triangle| Faces::new(&[Face { class: 1, level: None, rings: ring(triangle) }], STEPS))
             .collect();
         for (row, col) in (0..20).flat_map(|row| (0..20).map(move |col| (row, col))) {
             let holders = faces.iter().filter(|faces| class_of(faces, place(row, col)).is_some());
@@ -304,5 +317,21 @@ mod tests {
         let given = [face(1, &[]), face(1, &[&[]]), face(1, &[&[(3, 3)]]), face(1, &[&[(0, 0), (90, 90)]])];
         let faces = Faces::new(&given, STEPS);
         assert!((0..90).all(|at| class_of(&faces, place(at, at)).is_none()));
+    }
+
+    #[test]
+    fn only_what_is_level_is_water() {
+        let pond = face(3, &[&[(0, 0), (0, 640), (640, 640), (640, 0)]]);
+        let faces =
+            Faces::new(&[Face { level: Some(7), ..pond.clone() }, face(4, &[&[(0, 0), (0, 9), (9, 9)]])], STEPS);
+        let corners = [[0, 0], [640, 0], [0, 640]];
+        assert_eq!(faces.class_at(corners, [7; 3], STEPS), Some(3));
+        assert_eq!(faces.class_at(corners, [7, 8, 7], STEPS), None);
+        assert_eq!(faces.class_at([[1, 4], [1, 5], [2, 5]], [8; 3], STEPS), Some(4), "what lies below has it");
+        assert_eq!(Faces::new(&[pond.clone()], STEPS).class_at(corners, [7, 8, 7], STEPS), Some(3));
+        // The same of what is not in the TIN.
+        let loose = Faces::new(&[], STEPS).with_loose(&[Face { level: Some(7), ..pond }]);
+        assert_eq!(loose.class_at(corners, [7; 3], STEPS), Some(3));
+        assert_eq!(loose.class_at(corners, [7, 8, 7], STEPS), None);
     }
 }

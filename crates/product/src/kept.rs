@@ -38,12 +38,13 @@ pub fn from_curvature(MeasuredCurvature { cells, integral, rough_cells }: Measur
 /// What is kept of the figures of features.
 pub fn to_features(figures: &FeatureFigures) -> MeasuredFeatures {
     let FeatureFigures { steps_per_post, edges, missing, lake_spread, shore_posts, shore_below, .. } = figures;
-    let FeatureFigures { outside, decks, .. } = figures;
+    let FeatureFigures { lake_banks_m2, outside, decks, .. } = figures;
     MeasuredFeatures {
         steps_per_post: *steps_per_post,
         edges: *edges,
         missing: missing.iter().map(|[a, b]| [a.row, a.col, b.row, b.col]).collect(),
         lake_spread: *lake_spread,
+        lake_banks_m2: *lake_banks_m2,
         shore_posts: *shore_posts,
         shore_below: *shore_below,
         outside: to_tally(outside),
@@ -56,6 +57,7 @@ pub fn to_features(figures: &FeatureFigures) -> MeasuredFeatures {
 pub fn from_features(measured: &MeasuredFeatures) -> FeatureFigures {
     let MeasuredFeatures { steps_per_post, edges, missing, lake_spread, shore_posts, shore_below, .. } = measured;
     let &MeasuredFeatures { decks: (samples, under, deepest), ref deck_clearance, ref outside, .. } = measured;
+    let MeasuredFeatures { lake_banks_m2, .. } = measured;
     let clearance = deck_clearance.iter().copied().collect();
     let ends =
         |&[row, col, to_row, to_col]: &[i32; 4]| [LatticePoint::new(row, col), LatticePoint::new(to_row, to_col)];
@@ -64,6 +66,7 @@ pub fn from_features(measured: &MeasuredFeatures) -> FeatureFigures {
         edges: *edges,
         missing: missing.iter().map(ends).collect(),
         lake_spread: *lake_spread,
+        lake_banks_m2: *lake_banks_m2,
         shore_posts: *shore_posts,
         shore_below: *shore_below,
         outside: from_tally(outside),
@@ -79,7 +82,7 @@ mod tests {
     fn what_was_found_of_features_survives_being_kept() {
         let mut figures = FeatureFigures { steps_per_post: 64, edges: 9, lake_spread: 1, ..FeatureFigures::default() };
         figures.missing = vec![[LatticePoint::new(1, -2), LatticePoint::new(3, 4)]];
-        (figures.shore_posts, figures.shore_below) = (7, 2);
+        (figures.shore_posts, figures.shore_below, figures.lake_banks_m2) = (7, 2, 5);
         figures.outside.add(-17);
         figures.decks = DeckFigures { samples: 9, under: 1, deepest: 5, clearance: [(2, -5)].into() };
         assert_eq!(from_features(&to_features(&figures)), figures);

@@ -69,6 +69,11 @@ impl SurfaceGround {
 }
 
 impl FeatureSurface {
+    /// The level of a lake; nothing else has one.
+    pub fn level(&self) -> Option<i32> {
+        self.ring.first().filter(|_| self.ground == SurfaceGround::Lake).map(|vertex| vertex.height)
+    }
+
     fn is_of_one_body(&self, other: &Self) -> bool {
         (self.class, self.ground, self.body) == (other.class, other.ground, other.body)
     }

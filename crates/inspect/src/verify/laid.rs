@@ -26,6 +26,7 @@ impl Laid<'_> {
         let kept = self.kept();
         let bodies = self.bodies();
         let shaped: BTreeSet<u8> = self.features.shaped.iter().map(|surface| surface.class).collect();
+        let water = self.classes_of_lakes();
         let mut problems = Vec::new();
         for id in self.area.tiling.modules(self.features.tile, self.area.grid).iter() {
             let Some(module) = modules.get(&id) else { continue };
@@ -35,12 +36,23 @@ impl Laid<'_> {
                 kept.lacking_edge(&square),
                 wrong_class(&square, &bodies, &shaped, self.first_class),
                 uneven(&square, &bodies, &kept),
+                tilted_water(&square, &water),
                 wrong_decks(&self.features.decks, &|place| self.at(place), &square),
             ];
             problems.extend(found.into_iter().flatten().map(|what| format!("load module {id}: {what}")));
         }
         problems.extend(bodies.iter().filter_map(|body| self.tilted(body, &bodies, &kept)));
         problems
+    }
+
+    /// Classes that lakes have and nothing else.
+    fn classes_of_lakes(&self) -> BTreeSet<u8> {
+        let all = || self.features.surfaces.iter().chain(&self.features.shaped);
+        let of = |is_lake: bool| {
+            let found = all().filter(move |surface| (surface.ground == SurfaceGround::Lake) == is_lake);
+            found.map(|surface| surface.class).collect::<BTreeSet<u8>>()
+        };
+        of(true).difference(&of(false)).copied().filter(|class| self.first_class <= usize::from(*class)).collect()
     }
 
     /// Quanta between places of the features' lattice.
@@ -205,14 +217,29 @@ fn bodies_under<'a>(square: &Square, bodies: &'a [Body]) -> Vec<Option<&'a Body>
 
 fn wrong_class(square: &Square, bodies: &[Body], shaped: &BTreeSet<u8>, first_class: usize) -> Option<String> {
     let under = bodies_under(square, bodies);
-    let is_wrong = |(class, body): &(&u8, &Option<&Body>)| match body {
+    let is_level =
+        |triangle: &[u16; 3], level: i32| triangle.iter().all(|v| square.module.vertices[usize::from(*v)].z == level);
+    // Of a lake only what is level is water: what a road tilts is its bank.
+    let is_wrong = |((class, triangle), body): &((&u8, &[u16; 3]), &Option<&Body>)| match body {
         _ if **class == HOLE_CLASS => false,
-        Some(body) => **class != body.class,
+        Some(body) if body.level().is_none_or(|level| is_level(triangle, level)) => **class != body.class,
+        Some(body) if **class == body.class => true,
         // What is not in the TIN may cover most of a triangle.
-        None => first_class <= usize::from(**class) && !shaped.contains(*class),
+        _ => first_class <= usize::from(**class) && !shaped.contains(*class),
     };
-    let wrong = square.module.classes.iter().zip(&under).filter(is_wrong).count();
+    let of_triangles = square.module.classes.iter().zip(&square.module.triangles);
+    let wrong = of_triangles.zip(&under).filter(is_wrong).count();
     (0 < wrong).then(|| format!("{wrong} triangles have not the class of the road or water under them"))
+}
+
+/// Water in a load module whose corners differ in height, whatever else is there.
+fn tilted_water(square: &Square, water: &BTreeSet<u8>) -> Option<String> {
+    let z = |v: u16| square.module.vertices[usize::from(v)].z;
+    let of_triangles = square.module.triangles.iter().zip(&square.module.classes);
+    let is_tilted =
+        |(triangle, class): &(&[u16; 3], &u8)| water.contains(class) && triangle.map(z) != [z(triangle[0]); 3];
+    let tilted = of_triangles.filter(is_tilted).count();
+    (0 < tilted).then(|| format!("{tilted} triangles of water are not level"))
 }
 
 /// A lake in a load module with a vertex that is not on its level, and is no other feature's.

@@ -303,7 +303,8 @@ fn a_level_gives_its_triangles_the_classes_of_the_faces_it_is_told_to_show() {
         let vertex = finest.vertices[usize::from(v)];
         terrain::LatticePoint::new(row + i32::from(vertex.y) / step, col + i32::from(vertex.x) / step)
     };
-    let given: Vec<Face> = ponds.iter().map(|t| Face { class: 4, rings: vec![t.map(place).to_vec()] }).collect();
+    let given: Vec<Face> =
+        ponds.iter().map(|t| Face { class: 4, level: None, rings: vec![t.map(place).to_vec()] }).collect();
     let faces = Faces::new(&given, terrain::LATTICE_PER_POST);
     let edges = ponds.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]).collect();
     let wet = LevelFeatures { vertices: Vec::new(), edges, faces: Some(&faces) };
