@@ -35,6 +35,7 @@ mod foresee_features;
 pub use foresee_features::{FeaturesForeseen, foresee_features};
 mod budgets;
 mod chains;
+mod earthworks;
 pub use budgets::{BUDGETS, Budgeted, Budgets, limits_of};
 mod forecast;
 pub use forecast::{Forecast, PAGE_MODULES_MAX, PAGE_POSTS_MAX, StageSeconds};

@@ -7,8 +7,8 @@ use database::{
     LineRole,
 };
 use features::{
-    Cost, Face, FeatureId, Formed, FormedEdge, Levelled, Limit, Middle, Place, Remark, Reserved, Role, Surface, Traits,
-    Why,
+    Cost, Earthworks, Face, FeatureId, Formed, FormedEdge, Levelled, Limit, Middle, Place, Remark, Reserved, Role,
+    Surface, Traits, Why,
 };
 use ground::{GamingArea, slope_reach};
 use job::Job;
@@ -20,6 +20,7 @@ use terrain::{
 use tiling::{outer_border_posts, outer_sides};
 
 use crate::chains::chains;
+use crate::earthworks;
 use crate::read_features::ReadFeatures;
 use crate::run::Run;
 use crate::strips::{is_one_of, strips, whole_strips};
@@ -300,7 +301,13 @@ pub(crate) fn area_level(run: &Run, read: &ReadFeatures, levelled: &Levelled) ->
         }
     };
     let remarks = read.vectors.remarks.iter().cloned().chain(levelled.remarks.iter().map(told)).collect();
-    let formed = &levelled.reserved.formed;
+    let (formed, works, site) = (&levelled.reserved.formed, &levelled.earthworks, read.features.site);
+    let to_metres = metres_of(run, read);
+    let east_north = |place: Place| {
+        let [east, north, _] = to_metres((place, 0));
+        [east, north]
+    };
+    let (name, module_of) = (|id| read.vectors.name(id).to_owned(), |place| site.module_of(place));
     AreaLevel {
         tiles: Vec::new(),
         cost: cost_of(run.job, run.area.grid, &levelled.reserved.cost),
@@ -308,9 +315,12 @@ pub(crate) fn area_level(run: &Run, read: &ReadFeatures, levelled: &Levelled) ->
         amounts: amounts(&levelled.reserved, &classes),
         left_out: left_out(run, read, &levelled.reserved, &classes),
         ends: ends(run, read, &levelled.reserved, &classes),
-        lines: lines(run, read, formed, &classes),
+        lines: lines(run, read, (formed, works), &classes),
         strips: strips(&read.features, formed, &classes, run.area.rect),
         decks: decks(run, read, &formed.decks, &classes),
+        earthworks: earthworks::by_class(works, &classes),
+        moved: earthworks::by_module(works, run.area.grid, &classes),
+        far_off: earthworks::far_off(works, (run.area.grid, &module_of), &classes, (&name, &east_north)),
         remarks,
         notes: read.table.notes.clone(),
     }
@@ -408,7 +418,7 @@ pub(crate) fn reserved(run: &Run, formed: &Formed, pieces: &[TileFeatures]) -> V
 }
 
 /// Edges as lines of their features.
-fn lines(run: &Run, read: &ReadFeatures, formed: &Formed, classes: &[u8]) -> Vec<FeatureLine> {
+fn lines(run: &Run, read: &ReadFeatures, (formed, works): (&Formed, &Earthworks), classes: &[u8]) -> Vec<FeatureLine> {
     let mut groups: BTreeMap<(FeatureId, Role, u16), Vec<&FormedEdge>> = BTreeMap::new();
     for edge in &formed.edges {
         groups.entry((edge.id, edge.role, edge.class)).or_default().push(edge);
@@ -416,10 +426,13 @@ fn lines(run: &Run, read: &ReadFeatures, formed: &Formed, classes: &[u8]) -> Vec
     let to_metres = metres_of(run, read);
     let metres = |point: u32| to_metres(formed.points[point as usize]);
     let traits = read.features.traits_by_id();
-    let mut lines = Vec::new();
+    let (mut lines, mut places) = (Vec::new(), Vec::new());
     for ((id, role, class), edges) in groups {
         let of = traits.get(&id);
         for chain in chains(&edges) {
+            let moves = matches!(role, Role::Side | Role::Centre | Role::Channel);
+            let of_chain = chain.iter().filter(|_| moves).map(|point| formed.points[*point as usize].0);
+            places.push((id, class, of_chain.collect::<Vec<Place>>()));
             lines.push(FeatureLine {
                 feature: read.vectors.name(id).to_owned(),
                 class: classes[usize::from(class)],
@@ -427,10 +440,13 @@ fn lines(run: &Run, read: &ReadFeatures, formed: &Formed, classes: &[u8]) -> Vec
                 width_m: of.map_or(0.0, |of| terrain::metres_of_quanta(of.width)),
                 grade_max_ppm: of.map_or(0, |of| of.grade_ppm),
                 grade_most_ppm: of.map_or(0, |of| of.grade_most_ppm()),
+                moved_m3: [0.0; 2],
                 vertices: chain.into_iter().map(metres).collect(),
             });
         }
     }
+    let moved = earthworks::by_line(&works.pieces, &places);
+    lines.iter_mut().zip(moved).for_each(|(line, moved)| line.moved_m3 = moved);
     lines
 }
 

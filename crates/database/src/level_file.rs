@@ -29,6 +29,12 @@ pub struct AreaLevel {
     pub strips: Vec<StripFigures>,
     /// The surfaces of bridges.
     pub decks: Vec<FeatureFace>,
+    /// What features in the ground move, by class in ascending order.
+    pub earthworks: Vec<FeatureEarthwork>,
+    /// Cubic metres cut and filled in each load module: its place in the area, row-major; the class; both.
+    pub moved: Vec<(u32, u8, [f64; 2])>,
+    /// Where features lie more than 3 m off the ground, the worst of each in each load module, the farthest first.
+    pub far_off: Vec<FeatureFarOff>,
     /// What was mended, degraded or left out.
     pub remarks: Vec<FeatureRemark>,
     /// What a person should know of files and rules.
@@ -97,6 +103,63 @@ pub struct FeatureLeftOut {
     pub lines: Vec<Vec<[f64; 3]>>,
 }
 
+/// What features of a class move, inside the area.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct FeatureEarthwork {
+    /// The class, a number of the job's.
+    pub class: u8,
+    /// Metres of ways on the ground, or of the shores of lakes.
+    pub length_m: f64,
+    /// Metres of them that lie more than 3, 5, 10 and 20 m off the ground.
+    pub off_m: [f64; 4],
+    /// Metres of ways that lie farther off than the limits of cut and fill, and than twice these.
+    pub over_limit_m: [f64; 2],
+    /// Cubic metres cut and filled.
+    pub moved_m3: [f64; 2],
+}
+
+/// A place where a feature lies far off the ground.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FeatureFarOff {
+    /// The feature, as its file names it.
+    pub feature: String,
+    /// Its class, a number of the job's.
+    pub class: u8,
+    /// Its load module, by its place in the area, row-major.
+    pub module: u32,
+    /// Easting and northing, in metres.
+    pub at_m: [f64; 2],
+    /// Metres above the ground; below it less than 0.
+    pub off_m: f64,
+    /// Why.
+    pub cause: OffCause,
+}
+
+/// Why a feature lies off the ground.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum OffCause {
+    /// Its greatest grade.
+    Grade,
+    /// It falls downstream.
+    Falling,
+    /// It lies level.
+    Level,
+    /// A height that is pinned.
+    Pin,
+}
+
+impl OffCause {
+    /// The word for it.
+    pub fn name(self) -> &'static str {
+        match self {
+            OffCause::Grade => "grade",
+            OffCause::Falling => "falling",
+            OffCause::Level => "level",
+            OffCause::Pin => "pin",
+        }
+    }
+}
+
 /// Where what is in the ground ends although its source goes on.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FeatureEnd {
@@ -123,6 +186,8 @@ pub struct FeatureLine {
     pub grade_max_ppm: u32,
     /// The steepest it may be where limits of cut and fill ask for it, in parts per million.
     pub grade_most_ppm: u32,
+    /// Cubic metres cut and filled along it; of a strip with several lines each piece counts for one of them.
+    pub moved_m3: [f64; 2],
     /// Easting, northing and height of its vertices, in metres.
     pub vertices: Vec<[f64; 3]>,
 }
@@ -264,9 +329,20 @@ mod tests {
                 width_m: 3.5,
                 grade_max_ppm: 250_000,
                 grade_most_ppm: 375_000,
+                moved_m3: [0.5, 12.0],
                 vertices: vec![[500_000.5, 4_000_000.0, 12.25]],
             }],
             strips: vec![StripFigures { class: 3, pieces: 2, length_m: 12.5, steeper: 1, fall_max: 9 }],
+            earthworks: vec![FeatureEarthwork { class: 3, off_m: [0.5; 4], ..FeatureEarthwork::default() }],
+            moved: vec![(7, 3, [0.5, 2.5])],
+            far_off: vec![FeatureFarOff {
+                feature: "way/12".into(),
+                class: 3,
+                module: 7,
+                at_m: [0.5, 2.0],
+                off_m: -12.5,
+                cause: OffCause::Falling,
+            }],
             decks: vec![FeatureFace { feature: "way/13".into(), class: 3, ring: vec![[1.0, 2.0, 3.0]] }],
             remarks: vec![FeatureRemark {
                 feature: "way/12".into(),

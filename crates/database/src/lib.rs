@@ -34,8 +34,8 @@ mod lines_file;
 pub use lines_file::{decode_lines, encode_lines};
 mod level_file;
 pub use level_file::{
-    AreaLevel, CULVERT, FeatureAmounts, FeatureEnd, FeatureFace, FeatureLeftOut, FeatureLine, FeatureRemark,
-    FeatureWhy, LineRole, StripFigures, decode_level, encode_level,
+    AreaLevel, CULVERT, FeatureAmounts, FeatureEarthwork, FeatureEnd, FeatureFace, FeatureFarOff, FeatureLeftOut,
+    FeatureLine, FeatureRemark, FeatureWhy, LineRole, OffCause, StripFigures, decode_level, encode_level,
 };
 mod buildings_file;
 pub use buildings_file::{BUILDING_UNITS_PER_METRE, Building, decode_buildings, encode_buildings};
@@ -61,8 +61,8 @@ pub use manifest::{
 };
 mod report_features;
 pub use report_features::{
-    ReportDeckClearance, ReportFeatureChecks, ReportFeatureClass, ReportFeatureCost, ReportFeatureRemarks,
-    ReportFeatures,
+    ReportDeckClearance, ReportEarthwork, ReportEarthworks, ReportFarOff, ReportFeatureChecks, ReportFeatureClass,
+    ReportFeatureCost, ReportFeatureRemarks, ReportFeatures,
 };
 mod report;
 pub use report::{

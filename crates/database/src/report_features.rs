@@ -16,6 +16,61 @@ pub struct ReportFeatures {
     /// How low decks pass over the ground of each class.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub deck_clearances: Vec<ReportDeckClearance>,
+    /// What they move.
+    pub earthworks: ReportEarthworks,
+}
+
+/// What roads, rivers and lakes in the ground cut and fill, against the ground under them.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ReportEarthworks {
+    /// Each class that is in the ground, in the job's order.
+    pub classes: Vec<ReportEarthwork>,
+    /// The ten features that lie farthest off the ground, where they do by more than 3 m, each at its worst place.
+    pub worst: Vec<ReportFarOff>,
+}
+
+/// What a class moves, inside the area.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ReportEarthwork {
+    /// Its name.
+    pub name: String,
+    /// Kilometres of ways on the ground, or of the shores of lakes.
+    pub length_km: f64,
+    /// Those of them that lie more than 3 m off the ground, above or below.
+    pub off_3m_km: f64,
+    /// Those that lie more than 5 m off.
+    pub off_5m_km: f64,
+    /// Those that lie more than 10 m off.
+    pub off_10m_km: f64,
+    /// Those that lie more than 20 m off.
+    pub off_20m_km: f64,
+    /// Kilometres of ways that lie farther off than `cut_max_m` and `fill_max_m` allow.
+    pub over_limit_km: f64,
+    /// Kilometres of ways that lie farther off than twice as much.
+    pub over_twice_limit_km: f64,
+    /// Cubic metres that are cut, slopes with them.
+    pub cut_m3: f64,
+    /// Cubic metres that are filled.
+    pub fill_m3: f64,
+    /// Cubic metres that are cut for each kilometre.
+    pub cut_m3_per_km: f64,
+    /// Cubic metres that are filled for each kilometre.
+    pub fill_m3_per_km: f64,
+}
+
+/// A place where a feature lies far off the ground.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ReportFarOff {
+    /// The feature, as its file names it.
+    pub feature: String,
+    /// Its class.
+    pub class: String,
+    /// Easting and northing, in metres.
+    pub at_m: [f64; 2],
+    /// Metres above the ground; below it less than 0.
+    pub off_m: f64,
+    /// `grade`, `falling`, `level` or `pin`.
+    pub cause: String,
 }
 
 /// One class of features.
@@ -95,8 +150,10 @@ pub struct ReportFeatureChecks {
     pub loose_ends: u64,
     /// Lakes.
     pub lakes: u64,
-    /// How far any vertex of the TIN in a lake lies from the lake's level, in metres.
+    /// How far any corner of a triangle of water lies from the level of its lake, in metres.
     pub lake_spread_max_m: f64,
+    /// Square metres inside the shores of lakes that a road tilts, which are its banks and no water.
+    pub lake_banks_m2: u64,
     /// Posts outside water within a post of a lake.
     pub shore_posts: u64,
     /// Those of them that lie below its level.

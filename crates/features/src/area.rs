@@ -5,13 +5,14 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 
 use terrain::Each;
 
+use crate::earthworks::{Laid, earthworks};
 use crate::pieces::moved;
 use crate::rules::Sorted;
 use crate::{
-    About, Bed, FallOptions, FeatureId, Flaw, GradeOptions, Graded, Grants, Histogram, Lake, Network, Outline, Place,
-    Remark, Reserved, Rule, Shares, Shores, Site, Source, Strand, Traits, Waters, Way, afloat, banks, breaklines,
-    channels, dams, fall, flowing, grade, have_line, lakes_along, level, lift_shores, lines_inside, mend, outline_only,
-    pins, reserve, round, shore, sides, sort_out, split_at_dams, travelled, water, with_water,
+    About, Bed, Earthworks, FallOptions, FeatureId, Flaw, GradeOptions, Graded, Grants, Histogram, Lake, Network,
+    Outline, Place, Remark, Reserved, Rule, Shares, Shores, Site, Source, Strand, Traits, Waters, Way, afloat, banks,
+    breaklines, channels, dams, fall, flowing, grade, have_line, lakes_along, level, lift_shores, lines_inside, mend,
+    outline_only, pins, reserve, round, shore, sides, sort_out, split_at_dams, travelled, water, with_water,
 };
 
 /// Features on the lattice of an area, before their heights are known.
@@ -55,6 +56,17 @@ pub struct Levelled {
     pub reserved: Reserved,
     /// All remarks: those of mending, too.
     pub remarks: Vec<Remark>,
+    /// What they move.
+    pub earthworks: Earthworks,
+}
+
+/// Water with its heights.
+struct Watered {
+    /// Channels, shores and banks.
+    strands: Vec<Strand>,
+    lakes: Vec<Lake>,
+    /// Where rivers lie level.
+    level: HashSet<Place>,
 }
 
 impl AreaFeatures {
@@ -172,7 +184,7 @@ impl AreaFeatures {
         let at = |place: Place| near(place).filter(|_| self.site.holds(place));
         let middle = |place: Place| of(place, middles).filter(|_| self.site.holds(place));
         let mut remarks = self.remarks.clone();
-        let (mut strands, lakes) =
+        let Watered { mut strands, lakes, level } =
             self.waters(Soundings { at: &at, near: &near, middle: &middle, inside }, falls, &mut remarks);
         strands.extend(self.breaklines(&near));
         let roads = &self.roads;
@@ -194,12 +206,27 @@ impl AreaFeatures {
         // What lies beyond the area is counted, not listed.
         remarks.retain(|remark| remark.flaw != Flaw::Outside);
         Remark::sort(&mut remarks);
-        Levelled { reserved, remarks }
+        let width = |id: FeatureId| kinds.get(&id).map_or(0, |traits| traits.width);
+        let earthworks = earthworks(&Laid {
+            ground: &at,
+            site: &self.site,
+            roads: Graded { grants: &reserved.grants, ..graded },
+            pins: &pins,
+            afloat: &afloat,
+            strands: &strands,
+            width: &width,
+            level: &level,
+            outlines: &self.outlines,
+            lakes: &lakes,
+            inside,
+            limits: (options, falls),
+        });
+        Levelled { reserved, remarks, earthworks }
     }
 
     /// Rivers, lakes and what else polygons of water became, by the ground inside the area and that nearest to places
     /// beyond it; and the lakes.
-    fn waters(&self, of: Soundings, falls: FallOptions, remarks: &mut Vec<Remark>) -> (Vec<Strand>, Vec<Lake>) {
+    fn waters(&self, of: Soundings, falls: FallOptions, remarks: &mut Vec<Remark>) -> Watered {
         let Self { site, outlines, rivers, .. } = self;
         let Soundings { at, near, middle, inside } = of;
         let shore_by = |outline: &Outline, ground: Ground| outline.places().map(ground).collect::<Vec<Option<i32>>>();
@@ -236,7 +263,8 @@ impl AreaFeatures {
             outline_only(outline, &shore_by(outline, near))
         };
         strands.extend(waters.outlines_only.iter().flat_map(only));
-        (strands, waters.lakes)
+        let level = rivers.nodes.iter().zip(&fallen.is_level).filter(|(_, is_level)| **is_level);
+        Watered { strands, lakes: waters.lakes, level: level.map(|(node, _)| node.place).collect() }
     }
 
     /// Breaklines at the heights of their source, else of the ground.

@@ -86,6 +86,8 @@ mod lakes;
 pub use lakes::{Histogram, Lake, Shores, Waters, banks, level, lift_shores, outline_only, shore};
 mod afloat;
 pub use afloat::{afloat, with_water};
+mod earthworks;
+pub use earthworks::{Cause, Earthwork, Earthworks, FarOff, Moved, OFF_M};
 mod parts;
 pub use parts::{Line, breaklines, channels, dams, flowing, have_line, lakes_along, lines_inside, travelled, water};
 

@@ -58,6 +58,8 @@ pub struct Fallen {
     pub turned: Vec<bool>,
     /// The level of each body of still water, in quanta.
     pub levels: Vec<i32>,
+    /// For every node, whether it lies level: in still water, or in a circle.
+    pub is_level: Vec<bool>,
 }
 
 /// What is known of the ground along rivers: one of each for every node.
@@ -112,7 +114,7 @@ pub fn fall(network: &Network, bed: Bed, still: &[Still], options: FallOptions, 
     let heights = if options.tilt { falls.tilt(carved, &is_level) } else { carved };
     let (heights, levels) = heights.split_at(network.nodes.len());
     let whole = |heights: &[i64]| heights.iter().map(|height| *height as i32).collect::<Vec<i32>>();
-    let fallen = Fallen { heights: whole(heights), turned, levels: whole(levels) };
+    let fallen = Fallen { heights: whole(heights), turned, levels: whole(levels), is_level };
     remark_banks(network, bed, heights, remarks);
     remark_moved(network, still, levels, remarks);
     fallen

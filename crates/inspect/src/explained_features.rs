@@ -1,6 +1,6 @@
 //! What features take of one load module, and what became of them there.
 
-use database::{FeatureLeftOut, FeatureRemark};
+use database::{FeatureFarOff, FeatureLeftOut, FeatureRemark};
 use product::Product;
 use terrain::ModuleId;
 
@@ -13,6 +13,10 @@ pub struct ExplainedFeatures {
     pub share: f64,
     /// The most that features may take of it.
     pub share_max: f64,
+    /// Cubic metres cut and filled in it, by class.
+    pub moved_m3: Vec<(String, [f64; 2])>,
+    /// Features that lie more than 3 m off the ground in it, each at its worst place, the farthest first.
+    pub far_off: Vec<FeatureFarOff>,
     /// What was mended, degraded or left out in it.
     pub remarks: Vec<FeatureRemark>,
     /// Stretches from junction to junction, and bodies of water, that touch it and are not in the ground.
@@ -37,6 +41,13 @@ pub(crate) fn explained_features(product: &Product, id: ModuleId, extent_m: [f64
         cost,
         share: f64::from(total) / f64::from(product.job.limits.per_load_module.max(1)),
         share_max: spec.share_main.max(spec.share_max),
+        moved_m3: level
+            .moved
+            .iter()
+            .filter(|of| of.0 == place)
+            .map(|&(_, class, moved)| (name(class), moved))
+            .collect(),
+        far_off: level.far_off.iter().filter(|far| far.module == place).cloned().collect(),
         remarks: remarks.iter().filter(lies_here).cloned().collect(),
         left_out: level.left_out.iter().filter(touches).cloned().collect(),
     })

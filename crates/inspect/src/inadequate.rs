@@ -8,6 +8,7 @@ use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
 use compiler::CompileError;
+use database::{FeatureFarOff, OffCause};
 use geometry::Facet;
 use geometry::owned::{PostGrid, visit_residuals};
 use ground::{GamingArea, Ground, Window};
@@ -73,6 +74,8 @@ pub struct Component {
     pub modules: Vec<ModuleId>,
     /// Limits that kept points out of it, as jobs name them.
     pub blocked_by: Vec<&'static str>,
+    /// The feature that lies off the ground there, where one does.
+    pub far_off: Option<FeatureFarOff>,
     /// What could be done.
     pub action: &'static str,
 }
@@ -99,7 +102,18 @@ pub fn inadequate(folder: &Path, tolerance_m: Option<f64>) -> Result<Inadequate,
     for &tile in &area.tiles {
         refused.extend(folder.read_tile(tile)?.1.refused.iter().map(|refusal| refusal.post));
     }
-    let seen = Seen { area: &area, dem: &window.dem, residual_m: &residual_m, counts: &counts, refused: &refused };
+    let far_off = match job.features {
+        Some(_) => folder.read_level()?.2.far_off,
+        None => Vec::new(),
+    };
+    let seen = Seen {
+        area: &area,
+        dem: &window.dem,
+        residual_m: &residual_m,
+        counts: &counts,
+        refused: &refused,
+        far_off: &far_off,
+    };
     let components = seen.components(tolerance_m);
     let frame = &area.frame;
     Ok(Inadequate {
@@ -169,6 +183,8 @@ struct Seen<'a> {
     residual_m: &'a [f32],
     counts: &'a [u32],
     refused: &'a BTreeSet<Post>,
+    /// Where features lie far off the ground, the farthest first.
+    far_off: &'a [FeatureFarOff],
 }
 
 impl Seen<'_> {
@@ -210,7 +226,11 @@ impl Seen<'_> {
         let modules: BTreeSet<ModuleId> = posts.iter().map(|&post| self.module_of(post)).collect();
         let modules: Vec<ModuleId> = modules.into_iter().collect();
         let was_refused = posts.iter().any(|post| self.refused.contains(post));
-        let blocked_by = self.blocked_by(&modules, was_refused);
+        let far_off = self.far_off(&runs(posts)).cloned();
+        let blocked_by = match far_off {
+            Some(_) => vec!["features"],
+            None => self.blocked_by(&modules, was_refused),
+        };
         Component {
             runs: runs(posts),
             posts: posts.len() as u64,
@@ -218,7 +238,8 @@ impl Seen<'_> {
             worst_height_m: metres_of_quanta(self.dem.height(worst)),
             largest_m: residual(worst),
             squares_m2: posts.iter().map(|&post| residual(post) * residual(post)).sum(),
-            action: action(&blocked_by),
+            action: far_off.as_ref().map_or_else(|| action(&blocked_by), |far| action_on(far.cause)),
+            far_off,
             modules,
             blocked_by,
         }
@@ -228,6 +249,20 @@ impl Seen<'_> {
         let grid = self.area.grid;
         let along = |v: i32, count: u32| ((v / grid.side_cells) as u32).min(count - 1);
         ModuleId { row: along(post.row, grid.rows), col: along(post.col, grid.cols) }
+    }
+
+    /// The feature that lies farthest off the ground where its slopes reach some posts: no limit is in their way.
+    fn far_off(&self, runs: &[(i32, i32, i32)]) -> Option<&FeatureFarOff> {
+        let (frame, post_m) = (self.area.frame, self.area.frame.spacing.metres());
+        self.far_off.iter().find(|far| {
+            let [east, north] = far.at_m;
+            let (row, col) = ((north - frame.origin_north_m) / post_m, (east - frame.origin_east_m) / post_m);
+            let reach = SLOPE_RUN * far.off_m.abs() / post_m + 1.0;
+            runs.iter().any(|&(at, first, last)| {
+                let beside = (f64::from(first) - col).max(col - f64::from(last)).max(0.0);
+                (f64::from(at) - row).abs() <= reach && beside <= reach
+            })
+        })
     }
 
     /// The limits that are used up around a component: a point more costs two of what they count.
@@ -255,6 +290,19 @@ impl Seen<'_> {
             found.push("limits.mean_per_load_module");
         }
         found
+    }
+}
+
+/// Metres that the flatter slope beside a feature runs for each metre of height.
+const SLOPE_RUN: f64 = 2.0;
+
+/// What could be done about a feature that lies off the ground.
+fn action_on(cause: OffCause) -> &'static str {
+    match cause {
+        OffCause::Grade => "a road is too steep for its grade: give it a steeper one, a bridge or a tunnel",
+        OffCause::Falling => "a river has to fall: mend its line or the DEM, or raise features.river_tau",
+        OffCause::Level => "water lies level: give the lake its height, or mend its outline",
+        OffCause::Pin => "a pinned height is off the ground: mend it",
     }
 }
 

@@ -23,6 +23,8 @@ const LINES: Layer = Layer {
         ("length_m", "DOUBLE"),
         ("grade_max_percent", "DOUBLE"),
         ("grade_found_percent", "DOUBLE"),
+        ("cut_m3", "DOUBLE"),
+        ("fill_m3", "DOUBLE"),
     ],
     geometry: "LINESTRING",
     has_z: true,
@@ -116,7 +118,8 @@ fn form_of(role: LineRole) -> &'static str {
 fn add_lines(package: &Package, layers: &FeatureLayers) -> rusqlite::Result<()> {
     let mut add = package.begin(&LINES, layers.extent_m)?;
     for line in &layers.level.lines {
-        let FeatureLine { feature, class, role, width_m, grade_max_ppm, grade_most_ppm: _, vertices } = line;
+        let FeatureLine { feature, class, role, width_m, grade_max_ppm, grade_most_ppm: _, moved_m3, vertices } = line;
+        let [cut, fill] = *moved_m3;
         let pairs = || vertices.windows(2).map(|pair| (length_m(pair[0], pair[1]), (pair[1][2] - pair[0][2]).abs()));
         let length: f64 = pairs().map(|(length, _)| length).sum();
         let found = pairs().filter(|pair| 0.0 < pair.0).map(|(length, rise)| 100.0 * rise / length).fold(0.0, f64::max);
@@ -130,7 +133,9 @@ fn add_lines(package: &Package, layers: &FeatureLayers) -> rusqlite::Result<()> 
             width_m,
             length,
             most,
-            found
+            found,
+            cut,
+            fill
         ])?;
     }
     Ok(())
@@ -202,6 +207,7 @@ mod tests {
             width_m: 7.0,
             grade_max_ppm: 100_000,
             grade_most_ppm: 150_000,
+            moved_m3: [12.5, 0.0],
             vertices,
         };
         let middle = [30.0, 40.0, 2.5];
@@ -230,6 +236,7 @@ mod tests {
         assert_eq!(counts, [3.0, 3.0, 1.0, 1.0, 2.0, 1.0]);
         assert_eq!(number("SELECT grade_found_percent FROM lines WHERE fid = 1"), 5.0);
         assert_eq!(number("SELECT grade_max_percent FROM lines WHERE fid = 2"), 10.0);
+        assert_eq!(number("SELECT sum(cut_m3) + sum(fill_m3) FROM lines"), 37.5);
         assert_eq!(number("SELECT lines + 0.0 FROM nodes ORDER BY lines DESC LIMIT 1"), 2.0);
         let text = |query: &str| -> String { package.query_row(query, [], |row| row.get(0)).unwrap() };
         assert_eq!(text("SELECT class FROM decks"), "primary");

@@ -24,6 +24,7 @@ mod kept;
 pub use kept::{from_curvature, from_features, from_tally, to_curvature, to_features, to_tally};
 mod warnings;
 pub use warnings::{MATTERS, Made, Matter, Told as MatterTold, leaves_much_out, table as warnings_table, warnings};
+mod earthworks;
 mod told;
 pub use told::{Told, read_told, told};
 mod drape;

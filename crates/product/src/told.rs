@@ -51,6 +51,7 @@ pub fn told(job: &Job, area: &GamingArea, level: &AreaLevel, figures: &FeatureFi
         remarks: counts(&remarks),
         checks: checks(level, figures, extent_m),
         deck_clearances: deck_clearances(&names, figures),
+        earthworks: crate::earthworks::earthworks(&names, level),
     };
     Told { report, remarks }
 }
@@ -169,6 +170,7 @@ fn checks(level: &AreaLevel, figures: &FeatureFigures, extent_m: [f64; 4]) -> Re
         loose_ends: level.ends.len() as u64,
         lakes: lakes(level.lines.iter(), extent_m),
         lake_spread_max_m: metres(figures.lake_spread),
+        lake_banks_m2: figures.lake_banks_m2,
         shore_posts: figures.shore_posts,
         shore_posts_below: figures.shore_below,
         outside_posts: figures.outside.posts,

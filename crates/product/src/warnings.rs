@@ -8,6 +8,8 @@
 use database::{AreaLevel, FeatureAmounts, Report};
 use job::Job;
 
+use crate::earthworks;
+
 /// What a build made, as far as warnings need it.
 #[derive(Clone, Copy)]
 pub struct Made<'a> {
@@ -42,7 +44,7 @@ pub struct Matter {
 }
 
 /// All that a build knows of what it made, in the order in which warnings are told.
-pub const MATTERS: [Matter; 15] = [
+pub const MATTERS: [Matter; 16] = [
     matter(
         "files, datums, holes and rules of sources that are not as they should be",
         Told::OfStage,
@@ -53,6 +55,11 @@ pub const MATTERS: [Matter; 15] = [
          out for limits",
         Told::Warning(left_out),
         "networks are no longer whole; larger limits keep them, as tiefort plan tells",
+    ),
+    matter(
+        "more than 5 % of a class of ways, and 100 m, beyond the limits of cut and fill, or 1 % beyond twice these",
+        Told::Warning(earthworks),
+        "they lie where no person believes them; less than that is listed with its cause",
     ),
     matter(
         "the surface reaches beyond the heights of its sources by 10 m and a fifth of their range",
@@ -164,6 +171,11 @@ fn left_out_of(job: &Job, level: &AreaLevel) -> Vec<String> {
         warnings.push(format!("{lakes} of {all} lakes of a hectare and more had no room and are left out"));
     }
     warnings
+}
+
+/// Ways lie farther off the ground than cut and fill may be.
+fn earthworks(made: &Made) -> Vec<String> {
+    made.features.map_or_else(Vec::new, |(job, level)| earthworks::warnings(&job.class_names(), level))
 }
 
 /// Roads and water take the surface beyond the heights of the sources, further than fitted heights do.

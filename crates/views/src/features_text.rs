@@ -1,6 +1,8 @@
 //! Roads and water of a report in words: a table of what they cost, and what must hold of them.
 
-use database::{ReportFeatureChecks, ReportFeatureClass, ReportFeatureCost, ReportFeatures};
+use database::{
+    ReportEarthwork, ReportEarthworks, ReportFeatureChecks, ReportFeatureClass, ReportFeatureCost, ReportFeatures,
+};
 
 use crate::table::{Align, Table, grouped};
 
@@ -21,7 +23,54 @@ pub(crate) fn features_text(features: &ReportFeatures) -> String {
         checks.row([what, &found]);
     }
     let clearances = clearances_in_words(features).map(|words| format!("  {words}\n")).unwrap_or_default();
-    format!("{}  {}\n{}{clearances}", table.text(0), remarks_in_words(features), checks.text(2))
+    format!(
+        "{}  {}\n{}{clearances}{}",
+        table.text(0),
+        remarks_in_words(features),
+        checks.text(2),
+        earthworks_text(&features.earthworks)
+    )
+}
+
+/// Cut and fill: a table by class, and the worst places; nothing where no class is in the ground.
+fn earthworks_text(works: &ReportEarthworks) -> String {
+    if works.classes.is_empty() {
+        return String::new();
+    }
+    let mut table = Table::new(&[Left, Right, Right, Right, Right, Right, Right, Right, Right]);
+    table.row(["Cut and fill", "km", "% >3 m", ">5", ">10", ">20", "limit", "cut m3/km", "fill"]);
+    for class in &works.classes {
+        table.row([format!("  {}", class.name)].into_iter().chain(earthwork(class)));
+    }
+    let mut worst = Table::new(&[Left, Left]);
+    for far in &works.worst {
+        worst.row(["off the ground", &far_off_in_words(&far.feature, far.at_m, far.off_m, &far.cause)]);
+    }
+    format!("{}{}", table.text(0), worst.text(2))
+}
+
+/// Kilometres of a class, those of them that lie far off the ground in per cent, and cubic metres for each kilometre.
+pub(crate) fn earthwork(class: &ReportEarthwork) -> [String; 8] {
+    let percent = |km: f64| {
+        if 0.0 < km { format!("{:.2}", 100.0 * km / class.length_km) } else { "-".into() }
+    };
+    let cubic = |metres: f64| grouped(metres.round() as u64);
+    [
+        format!("{:.2}", class.length_km),
+        percent(class.off_3m_km),
+        percent(class.off_5m_km),
+        percent(class.off_10m_km),
+        percent(class.off_20m_km),
+        percent(class.over_limit_km),
+        cubic(class.cut_m3_per_km),
+        cubic(class.fill_m3_per_km),
+    ]
+}
+
+/// How far a feature lies off the ground, where, and why.
+pub fn far_off_in_words(feature: &str, [east, north]: [f64; 2], off_m: f64, cause: &str) -> String {
+    let what = if off_m < 0.0 { "cut" } else { "fill" };
+    format!("{feature}: {what} of {:.1} m at {east:.0} {north:.0}, {cause}", off_m.abs())
 }
 
 /// Kilometres in the ground, of how many, that in per cent, those of strips among them, and lakes of a class; nothing
@@ -83,6 +132,7 @@ pub(crate) fn check_rows(checks: &ReportFeatureChecks) -> Vec<(&'static str, Str
         ("edges of rivers that rise", of(checks.river_edges_rising, checks.river_edges)),
         ("ends where the source goes on", grouped(checks.loose_ends)),
         ("lakes are level to within", format!("{:.3} m", checks.lake_spread_max_m)),
+        ("banks of roads inside shores", format!("{} m2", grouped(checks.lake_banks_m2))),
         ("posts of shores below water", of(checks.shore_posts_below, checks.shore_posts)),
         ("square metres of decks under ground", under_ground(checks)),
         (

@@ -13,7 +13,7 @@ pub use breaches::{BreachPlaces, breaches_csv, breaches_geojson};
 mod features;
 mod features_text;
 pub use features::{features_geojson, outcome};
-pub use features_text::remarks_in_words;
+pub use features_text::{far_off_in_words, remarks_in_words};
 mod page;
 pub use page::{Advice, Page, PageSetting, advise, report_html};
 mod picture;

@@ -4,9 +4,10 @@ use terrain::{Decks, GridFrame, LoadModule, ModuleGrid, ModuleId, ModuleResidual
 
 use crate::picture::{Scene, SceneLimits};
 use database::{
-    Report, ReportBefore, ReportBound, ReportBreach, ReportClass, ReportFeatureChecks, ReportFeatureClass,
-    ReportFeatureCost, ReportFeatureRemarks, ReportFeatures, ReportLevel, ReportPerModule, ReportPerWindow,
-    ReportPlace, ReportPoints, ReportPool, ReportRefusals, ReportResidual, ReportStage, ReportStops, ReportVoids,
+    Report, ReportBefore, ReportBound, ReportBreach, ReportClass, ReportEarthwork, ReportEarthworks, ReportFarOff,
+    ReportFeatureChecks, ReportFeatureClass, ReportFeatureCost, ReportFeatureRemarks, ReportFeatures, ReportLevel,
+    ReportPerModule, ReportPerWindow, ReportPlace, ReportPoints, ReportPool, ReportRefusals, ReportResidual,
+    ReportStage, ReportStops, ReportVoids,
 };
 
 /// 2 x 3 load modules of 20 x 20 cells, 25 m apart.
@@ -177,6 +178,24 @@ pub(crate) fn features() -> ReportFeatures {
             edges_missing: 4,
             outside_rms_m: 1.25,
             ..ReportFeatureChecks::default()
+        },
+        earthworks: ReportEarthworks {
+            classes: vec![ReportEarthwork {
+                name: "primary".into(),
+                length_km: 12.25,
+                off_3m_km: 0.5,
+                off_5m_km: 0.25,
+                cut_m3: 24_500.0,
+                cut_m3_per_km: 2_000.0,
+                ..ReportEarthwork::default()
+            }],
+            worst: vec![ReportFarOff {
+                feature: "way 12".into(),
+                class: "primary".into(),
+                at_m: [543_210.5, 3_912_345.0],
+                off_m: -6.25,
+                cause: "grade".into(),
+            }],
         },
     }
 }

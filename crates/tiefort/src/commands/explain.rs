@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use database::{FeatureLeftOut, FeatureRemark, FeatureWhy};
+use database::{FeatureFarOff, FeatureLeftOut, FeatureRemark, FeatureWhy};
 use inspect::{ExplainedFeatures, Explanation, explain};
 use product::WantedGround;
 use serde_json::{Value, json};
@@ -121,6 +121,11 @@ fn counts(found: &Explanation) -> Table {
 /// Remarks that a text lists; the JSON has them all.
 const REMARKS_MAX: usize = 10;
 
+/// Whole cubic metres.
+fn cubic(metres: f64) -> String {
+    grouped(metres.round() as u64)
+}
+
 fn features_text(features: &ExplainedFeatures) -> String {
     let percent = |share: f64| format!("{:.0} %", 100.0 * share);
     let mut text = match features.cost.iter().map(|(_, triangles)| triangles).sum::<u32>() {
@@ -134,6 +139,16 @@ fn features_text(features: &ExplainedFeatures) -> String {
     let mut table = Table::new(&[Align::Left, Align::Right, Align::Left]);
     for (class, triangles) in &features.cost {
         table.row([class, &grouped(u64::from(*triangles)), "triangles"]);
+    }
+    for (class, [cut, fill]) in &features.moved_m3 {
+        table.row([class, "", &format!("{} m3 cut, {} m3 filled", cubic(*cut), cubic(*fill))]);
+    }
+    for far in features.far_off.iter().take(REMARKS_MAX) {
+        table.row([
+            "off the ground",
+            "",
+            &views::far_off_in_words(&far.feature, far.at_m, far.off_m, far.cause.name()),
+        ]);
     }
     for remark in features.remarks.iter().take(REMARKS_MAX) {
         let FeatureRemark { feature, found, done, .. } = remark;
@@ -234,6 +249,10 @@ fn left_out_json(left: &FeatureLeftOut) -> Value {
     json!({ "feature": left.feature, "length_m": left.length_m, "why": why_text(left.why) })
 }
 
+fn far_off_json(far: &FeatureFarOff) -> Value {
+    json!({ "feature": far.feature, "place_m": far.at_m, "off_m": far.off_m, "cause": far.cause.name() })
+}
+
 fn features_json(features: &ExplainedFeatures) -> Value {
     let remark = |remark: &FeatureRemark| {
         json!({
@@ -245,8 +264,14 @@ fn features_json(features: &ExplainedFeatures) -> Value {
         })
     };
     let cost = features.cost.iter().map(|(name, triangles)| json!({ "name": name, "triangles": triangles }));
+    let moved = features.moved_m3.iter();
+    let moved = moved.map(|(name, [cut, fill])| json!({ "name": name, "cut_m3": cut, "fill_m3": fill }));
     json!({
         "classes": cost.collect::<Vec<_>>(),
+        "earthworks": {
+            "classes": moved.collect::<Vec<_>>(),
+            "worst": features.far_off.iter().map(far_off_json).collect::<Vec<_>>(),
+        },
         "share": features.share,
         "share_max": features.share_max,
         "left_out": features.left_out.iter().map(left_out_json).collect::<Vec<_>>(),

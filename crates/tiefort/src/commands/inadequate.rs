@@ -193,6 +193,9 @@ fn feature(found: &Inadequate, component: &Component) -> Value {
             "blocked": !component.blocked_by.is_empty(),
             "blocked_by": component.blocked_by,
             "action": component.action,
+            "feature": component.far_off.as_ref().map(|far| {
+                json!({ "feature": far.feature, "off_m": far.off_m, "cause": far.cause.name() })
+            }),
         },
     })
 }

@@ -1,12 +1,14 @@
 //! Tables of the page: limits and advice, residuals, breaches, times, sources.
 
-use database::{Manifest, Report, ReportFeatures, ReportResidual};
+use database::{Manifest, Report, ReportEarthworks, ReportFeatures, ReportResidual};
 use maud::{Markup, html};
 
 use super::advise;
 use super::marks::{BOUND_ROWS_MAX, Marks, ROWS_MAX};
 use crate::against::{Residual, WORKING, told};
-use crate::features_text::{amounts, check_rows, clearances_in_words, cost, is_thin, kept, remarks_in_words};
+use crate::features_text::{
+    amounts, check_rows, clearances_in_words, cost, earthwork, is_thin, kept, remarks_in_words,
+};
 use crate::report::{border_in_words, eta_of, heights_in_words};
 use crate::table::grouped;
 
@@ -258,6 +260,29 @@ pub(super) fn features(features: &ReportFeatures) -> Markup {
             @for (what, found) in check_rows(&features.checks) { tr { td { (what) } td { (found) } } }
         }))
         @if let Some(words) = clearances_in_words(features) { p.quiet { "The " (words) "." } }
+        @if !features.earthworks.classes.is_empty() { (earthworks(&features.earthworks)) }
+    }
+}
+
+/// What roads, rivers and lakes move, and where they lie farthest off the ground.
+fn earthworks(works: &ReportEarthworks) -> Markup {
+    html! {
+        (table(html! { th { "Cut and fill" } th.n { "km" } th.n { "% > 3 m off" } th.n { "> 5 m" } th.n { "> 10 m" }
+            th.n { "> 20 m" } th.n { "over limit" } th.n { "cut, m3/km" } th.n { "fill, m3/km" } }, html! {
+            @for class in &works.classes {
+                tr { td { (class.name) } @for cell in earthwork(class) { td.n { (cell) } } }
+            }
+        }))
+        @if !works.worst.is_empty() {
+            (table(html! { th { "Farthest off the ground" } th { "class" } th.n { "east" } th.n { "north" }
+                th.n { "m above" } th { "because of" } }, html! {
+                @for far in &works.worst {
+                    tr { td { (far.feature) } td { (far.class) } td.n { (format!("{:.0}", far.at_m[0])) }
+                        td.n { (format!("{:.0}", far.at_m[1])) } td.n { (format!("{:.1}", far.off_m)) }
+                        td { (far.cause) } }
+                }
+            }))
+        }
     }
 }
 

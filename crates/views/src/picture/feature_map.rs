@@ -78,6 +78,7 @@ mod tests {
             width_m: 7.0,
             grade_max_ppm: 100_000,
             grade_most_ppm: 150_000,
+            moved_m3: [0.0; 2],
             vertices,
         }
     }
