@@ -132,4 +132,6 @@ mod area;
 pub use area::{AreaFeatures, Levelled, Sounded};
 
 #[cfg(test)]
+mod bad_ground;
+#[cfg(test)]
 mod samples;
