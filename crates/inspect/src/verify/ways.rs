@@ -64,7 +64,8 @@ impl Ways {
     fn add(&mut self, line: &ModuleLine, family: u8, ground: &Ground) {
         let places: Vec<At> = line.vertices.iter().map(|vertex| ground.square.at(vertex.y, vertex.x)).collect();
         let traits = line.traits;
-        if traits.is_kept && traits.storey != LineStorey::Tunnel {
+        // A channel in a tunnel is one that passes below a road.
+        if traits.is_kept && (traits.storey != LineStorey::Tunnel || traits.kind == LineKind::Channel) {
             self.found.kept_m += places.windows(2).map(length_m).sum::<f64>();
         }
         if traits.is_in_ground {
