@@ -7,7 +7,7 @@
     scripts/bench.py --callgrind     also count instructions (needs valgrind)
 
 The peer is `pydelatin` (the hmm algorithm), installed from PyPI into `target/bench/venv`; only the call that
-triangulates is timed. The terrain is the DEM of configs/alps.toml where the shared data is (TIEFORT_DATA names its
+triangulates is timed. The terrain is the DEM of tests/jobs/alps.toml where the shared data is (TIEFORT_DATA names its
 folder), else the sample terrain at the same size, for which the bars were not set.
 
 Peer and compiler take turns, round by round, so that both see the same machine. A ratio is ours over the peer's
@@ -76,7 +76,7 @@ def measured(*command):
 
 def find_dem(tiefort):
     """The raster, and the text of a job on it."""
-    job = (ROOT / "configs" / "alps.toml").read_text()
+    job = (ROOT / "tests/jobs/alps.toml").read_text()
     shared = pathlib.Path(os.environ.get("TIEFORT_DATA", ROOT / ".." / "shared" / "data")).resolve()
     dem = shared / "ntc_standin" / "bavarian_alps_50km_1979x1979_utm32n.tif"
     if not dem.exists():
@@ -91,7 +91,7 @@ def find_dem(tiefort):
 
 def replaced(text, pattern, by):
     text, count = re.subn(pattern, lambda _: by, text)
-    assert count == 1, f"{pattern} stands {count} times in configs/alps.toml, expected once"
+    assert count == 1, f"{pattern} stands {count} times in tests/jobs/alps.toml, expected once"
     return text
 
 

@@ -9,7 +9,7 @@ from fidelity import terrain
 from fidelity.workshop import (DATA, FOLDER, ROOT, evaluate, faults, markdown, number, ratio, run, scratch, skip,
                                tell, why, write_heights, write_mesh)
 
-# Areas of configs/, and real rasters in metres that have none: as many load modules as fit.
+# Areas that have a job in the project, and real rasters in metres that have none: as many load modules as fit.
 CONFIGS = ["desert", "alps", "ntc", "ntc-even"]
 RASTERS = {"mackay": "dem/mackay_idaho_738x919_30m_utm12n.tif", "baja": "dem/baja_california_sur_1264x1005_29m.tif",
            "big-butte": "dem/big_butte_idaho_623x672_30m_utm12n.tif",
@@ -64,8 +64,9 @@ def area_of(tiefort, name, job):
 
 
 def job_of_config(name):
-    """The job of configs/; None when its raster is missing."""
-    job = tomllib.loads((ROOT / "configs" / f"{name.removesuffix('-even')}.toml").read_text())
+    """A job of the project; None when its raster is missing."""
+    folder = ROOT / ("configs" if name.startswith("ntc") else "tests/jobs")
+    job = tomllib.loads((folder / f"{name.removesuffix('-even')}.toml").read_text())
     if name.endswith("-even"):
         job.pop("importance")
     sources = [DATA / path.split("shared/data/")[-1] for path in job["dem"].get("sources", [])]
@@ -78,7 +79,7 @@ def job_of_config(name):
 
 
 def job_of_raster(name):
-    """A job like those of configs/ over a raster, as many load modules as lie inside; None when it is missing."""
+    """A job like those of the project over a raster, as many load modules as lie inside; None when it is missing."""
     if not (DATA / RASTERS[name]).exists():
         return skip(name, f"no {DATA / RASTERS[name]}")
     heights, spacing_m, profile = terrain.read(DATA / RASTERS[name])

@@ -19,7 +19,7 @@ setting of it with its value and meaning.
 Paths are relative to the job file.
 A key that is not listed here is an error.
 
-Costs were measured on the desert of `configs/desert.toml` (1021 x 1021 posts, 83,000 triangles), those given as a \
+Costs were measured on the desert of `tests/jobs/desert.toml` (1021 x 1021 posts, 83,000 triangles), those given as a \
 range on several areas; a residual is compared with that of the word that holds where the key is left out.
 Residuals of the efforts and of the paper's method are those of the second table that `scripts/bench_fidelity.py \
 --quick --book` writes, which [Figures](../figures/README.md#how-near-to-the-ground-at-equal-triangles) shows.

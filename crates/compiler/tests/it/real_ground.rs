@@ -1,4 +1,4 @@
-//! The jobs of `configs/` on real ground, where the folder of shared terrain exists.
+//! Jobs on real ground, where the folder of shared terrain exists.
 
 use std::path::{Path, PathBuf};
 
@@ -33,12 +33,12 @@ pub fn read_dem(path: &Path, window: impl FnOnce(PostRect) -> PostRect) -> Dem {
     Dem::from_fn(window, |post: Post| raster.sample(post).and_then(|sample| quanta_of_metres(scale.height_m(sample))))
 }
 
-/// A job of `configs/`, with the shared terrain where it is.
+/// A job of `tests/jobs`, with the shared terrain where it is.
 fn job(name: &str, changes: &[(&str, &str)]) -> Job {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs").join(name);
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/jobs").join(name);
     let mut text = std::fs::read_to_string(&path).unwrap();
-    assert!(text.contains("../../shared/data"), "{name} reads the shared terrain");
-    text = text.replace("../../shared/data", &data_folder().canonicalize().unwrap().to_string_lossy());
+    assert!(text.contains("../../../shared/data"), "{name} reads the shared terrain");
+    text = text.replace("../../../shared/data", &data_folder().canonicalize().unwrap().to_string_lossy());
     for (from, to) in changes {
         assert!(text.contains(from), "{name} does not hold {from:?}");
         text = text.replacen(from, to, 1);
