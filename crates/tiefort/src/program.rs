@@ -14,6 +14,30 @@ pub fn is(program: Option<PathBuf>) {
     }
 }
 
+/// What gives someone the viewer, for the way in which this program came to be here: with a package of Python, by
+/// `cargo install`, or built in a checkout.
+#[cfg(all(feature = "serve", not(feature = "viewer")))]
+pub fn how_to_get_the_viewer() -> String {
+    let node = "it needs Node 20 or newer";
+    if TOLD.get().is_some() {
+        return format!("make the wheel by scripts/build_wheel.sh without --no-viewer ({node}), and install that");
+    }
+    let program = path().ok().and_then(|path| path.canonicalize().ok()).unwrap_or_default();
+    let is_checkout = |folder: &&std::path::Path| folder.join("scripts/build_viewer.sh").exists();
+    if let Some(checkout) = program.ancestors().find(is_checkout) {
+        let script = checkout.join("scripts/build_viewer.sh");
+        return format!(
+            "run `{}` ({node}), then `cargo run --release --features viewer -- view DIR` in {}",
+            script.display(),
+            checkout.display()
+        );
+    }
+    format!(
+        "in a checkout of tiefort, run scripts/build_viewer.sh ({node}), then `cargo install --path crates/tiefort \
+         --locked --features viewer`"
+    )
+}
+
 /// The path of the program.
 ///
 /// # Errors

@@ -1,6 +1,6 @@
 //! `tiefort report`: what a build found.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use database::{Folder, Report};
@@ -60,20 +60,23 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
             serde_json::to_string_pretty(&report).expect("a report that was read from JSON is JSON again") + "\n"
         }
         Format::Text => views::report_text(&report),
-        Format::Html => html(arguments, &report)?,
+        Format::Html => page(&arguments.database, &report, arguments.against.as_deref(), arguments.workers.count())?,
     };
     terminal::print(&text)?;
     Ok(if report.breaches.is_empty() { Outcome::Sound } else { Outcome::Breaches })
 }
 
-/// The page; without the ground's part of it where the ground is not to be found and none was named.
-fn html(arguments: &Arguments, report: &Report) -> Result<String, Failure> {
-    let ground = arguments.against.as_deref().map_or(WantedGround::Recorded, WantedGround::Raster);
-    let wanted = Wanted { part: None, ground, workers: arguments.workers.count() };
-    let product = match Product::read(&arguments.database, &wanted) {
-        Err(error) if error.is_of_the_ground() && arguments.against.is_none() => {
+/// The page of a report; without the ground's part of it where the ground is not to be found and none was named.
+///
+/// # Errors
+/// When the database or the raster `against` cannot be read.
+pub fn page(database: &Path, report: &Report, against: Option<&Path>, workers: usize) -> Result<String, Failure> {
+    let ground = against.map_or(WantedGround::Recorded, WantedGround::Raster);
+    let wanted = Wanted { part: None, ground, workers };
+    let product = match Product::read(database, &wanted) {
+        Err(error) if error.is_of_the_ground() && against.is_none() => {
             terminal::tell(&format!("note: {error}; the page is drawn without it\nhint: --against DEM names it\n"));
-            Product::read(&arguments.database, &Wanted { ground: WantedGround::None, ..wanted })?
+            Product::read(database, &Wanted { ground: WantedGround::None, ..wanted })?
         }
         found => found?,
     };

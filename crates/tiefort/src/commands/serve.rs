@@ -130,7 +130,7 @@ fn options(arguments: &Arguments) -> crate::serve::Options {
 ///
 /// # Errors
 /// When the database cannot be read, or the port is taken.
-#[cfg(feature = "viewer")]
+#[cfg(feature = "serve")]
 pub fn run_with_page(database: &std::path::Path, port: u16, page: crate::serve::Page) -> Result<Outcome, Failure> {
     let arguments = Arguments {
         databases: vec![database.to_path_buf()],

@@ -8,6 +8,7 @@
 //!   ground        load modules in memory, for queries       (queries, body)
 //!   globe         terrain and 3D Tiles, file by file        (files)
 //!   openapi, pages   what can be asked                     (paths)
+//!   report_page   what a browser shows where no viewer is built in
 //! ```
 //! An answer comes from one finished build or says to ask later. All that stays in memory is bounded.
 
@@ -23,6 +24,8 @@ mod pages;
 mod paths;
 mod queries;
 mod refusal;
+#[cfg(not(feature = "viewer"))]
+mod report_page;
 mod routes;
 mod snapshot;
 
@@ -42,6 +45,8 @@ use crate::terminal;
 use answers::Shared;
 use body::Bodies;
 use connections::Limits;
+#[cfg(not(feature = "viewer"))]
+pub use report_page::report_page;
 use routes::Find;
 use snapshot::Served;
 

@@ -1,12 +1,41 @@
-//! `tiefort view`: the server, or word of how to build it in.
+//! `tiefort view`: the server of the viewer, or of the report's page where no viewer is built in.
 
 #[cfg(not(feature = "viewer"))]
-#[test]
-fn without_the_viewer_the_command_says_how_to_build_it_in() {
-    let scene = crate::scene::Scene::new();
-    scene.refuses(&["view", "small.tdb"], &["without the viewer"]);
-    let hint = scene.run_to(2, &["view", "small.tdb"]).stderr;
-    assert!(hint.contains("scripts/build_viewer.sh") && hint.contains("--features viewer"), "{hint}");
+mod report_page {
+    use crate::scene::Scene;
+    use crate::server::Server;
+
+    fn check(options: &[&str]) {
+        let scene = Scene::with_job("small.toml", &[]);
+        scene.run_to(0, &[&["build", "job.toml", "--quiet"], options].concat());
+        let server = Server::start(scene, &["view", "small.tdb"]);
+        let page = server.get("/");
+        assert_eq!((page.status, page.header("content-type")), (200, "text/html; charset=utf-8"));
+        let body = page.text().find("<body").unwrap();
+        let words = ["built without the viewer", "scripts/build_viewer.sh", "--features viewer", "<svg"];
+        let places = words.map(|word| page.text()[body..].find(word).unwrap_or_else(|| panic!("{word} is not there")));
+        assert!(places.is_sorted(), "{places:?}");
+        assert_eq!(server.post("/heights", r#"{"positions": [[505100, 3875100]]}"#).status, 200);
+        assert_eq!(server.get("/small.tdb/tileset.json").status, 200);
+    }
+
+    #[test]
+    fn without_the_viewer_the_page_of_the_report_is_shown() {
+        check(&[]);
+    }
+
+    #[test]
+    fn a_page_that_no_build_wrote_is_drawn() {
+        check(&["--no-html"]);
+    }
+
+    #[test]
+    fn imagery_needs_the_viewer() {
+        let scene = Scene::new();
+        scene.refuses(&["view", "small.tdb", "--imagery", "x.tif"], &["--imagery", "no viewer"]);
+        let hint = scene.run_to(2, &["view", "small.tdb", "--imagery", "x.tif"]).stderr;
+        assert!(hint.contains("scripts/build_viewer.sh") && hint.contains("--features viewer"), "{hint}");
+    }
 }
 
 #[cfg(feature = "viewer")]
