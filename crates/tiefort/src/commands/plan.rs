@@ -25,6 +25,9 @@ Examples:
   tiefort plan ntc.toml --emit slurm --out /share/ntc.tdb > ntc.sh && bash ntc.sh
   tiefort plan ntc.toml --emit dask --out /share/ntc.tdb > ntc.py \\
       && python3 ntc.py scheduler:8786
+  tiefort plan ntc.toml --emit snakemake --out ntc.tdb > Snakefile \\
+      && snakemake --cores 4
+  tiefort plan ntc.toml --emit kubernetes --out /share/ntc.tdb > ntc.yaml
 
 A simulation takes what tiles cost from the report of a database that was built
 from this job, and forecasts it where there is none. Tiles that touch never run
@@ -77,6 +80,10 @@ enum Emit {
     Dask,
     /// A build file for ninja, on one machine
     Ninja,
+    /// A Snakefile
+    Snakemake,
+    /// An Indexed Job for Kubernetes: workers that share a volume
+    Kubernetes,
 }
 
 /// Plans.
@@ -96,6 +103,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         Some(Emit::Ninja) => engines::ninja(&glue()?),
         Some(Emit::Slurm) => engines::slurm(&glue()?),
         Some(Emit::Dask) => engines::dask(&glue()?),
+        Some(Emit::Snakemake) => engines::snakemake(&glue()?),
+        Some(Emit::Kubernetes) => engines::kubernetes(&glue()?)?,
         None => fold(&plan_text(&job, &plan, (features.as_ref(), &budgets::of_job(&job)), &played), 2),
     };
     terminal::print(&text)?;

@@ -1,8 +1,6 @@
 //! A Python program that runs a build on a Dask cluster.
 
-use std::path::Path;
-
-use super::glue::Glue;
+use super::glue::{Glue, literal};
 
 const BODY: &str = r#"
 
@@ -56,9 +54,4 @@ pub fn dask(glue: &Glue) -> String {
         text += &format!("    ([{}], {:?}),\n", words.join(", "), task.after);
     }
     text + "]\n" + BODY
-}
-
-/// A path as Python writes a text: JSON's texts are Python's, too.
-fn literal(path: &Path) -> String {
-    serde_json::Value::from(path.to_string_lossy().into_owned()).to_string()
 }

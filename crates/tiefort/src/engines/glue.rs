@@ -95,6 +95,13 @@ impl Glue {
     }
 }
 
+impl Glue {
+    /// Memory to ask for a task, in MiB: what is forecast, with room.
+    pub fn task_mebibytes(&self) -> u64 {
+        self.task_bytes.div_ceil(1 << 20) * 5 / 4 + 64
+    }
+}
+
 /// Which task does a unit of work.
 type Owner = BTreeMap<Unit, usize>;
 
@@ -138,6 +145,11 @@ fn sorted(places: impl Iterator<Item = usize>) -> Vec<usize> {
 /// A word of a shell, whatever it holds.
 pub fn shell_word(path: &Path) -> String {
     format!("'{}'", path.to_string_lossy().replace('\'', "'\\''"))
+}
+
+/// A path as Python and YAML write a text: JSON's texts are theirs, too.
+pub fn literal(path: &Path) -> String {
+    serde_json::Value::from(path.to_string_lossy().into_owned()).to_string()
 }
 
 #[cfg(test)]

@@ -61,7 +61,6 @@ pub fn slurm(glue: &Glue) -> String {
         glue.area,
         glue.tasks.len()
     );
-    let mebibytes = glue.task_bytes.div_ceil(1 << 20) * 5 / 4 + 64;
     let logs = format!("{}.slurm", glue.out.display());
     for (name, value) in [
         ("tiefort", format!("${{TIEFORT:-{}}}", plain(&glue.program.to_string_lossy()))),
@@ -69,7 +68,7 @@ pub fn slurm(glue: &Glue) -> String {
         ("out", shell_word(&glue.out)),
         ("logs", shell_word(std::path::Path::new(&logs))),
         ("area", shell_word(std::path::Path::new(&glue.area))),
-        ("memory", format!("${{TIEFORT_MEMORY:-{mebibytes}M}}")),
+        ("memory", format!("${{TIEFORT_MEMORY:-{}M}}", glue.task_mebibytes())),
         ("script", "${BASH_SOURCE[0]}".into()),
     ] {
         writeln!(text, "{name}={value}").expect("a text takes all that is written to it");

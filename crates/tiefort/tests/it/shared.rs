@@ -109,6 +109,18 @@ fn a_build_file_for_ninja_names_every_task_after_what_it_needs() {
 }
 
 #[test]
+fn the_job_for_kubernetes_starts_workers_in_the_folder_that_all_files_share() {
+    let scene = nine_tiles();
+    let text = scene.run_to(0, &["plan", "job.toml", "--emit", "kubernetes", "--out", "it's.tdb"]).stdout;
+    let folder = scene.path("").canonicalize().unwrap().display().to_string();
+    for part in ["completionMode: Indexed", "completions: 1", &format!("mountPath: \"{folder}"), r"it'\\''s.tdb"] {
+        assert!(text.contains(part), "{part:?} is not in: {text}");
+    }
+    let away = scene.run_to(2, &["plan", "job.toml", "--emit", "kubernetes", "--out", "/nowhere/it.tdb"]);
+    away.check_error(&["job.toml", "without a folder in common"]);
+}
+
+#[test]
 fn scripts_for_slurm_and_dask_are_well_formed() {
     let scene = nine_tiles();
     for (emit, checker, flag) in [("slurm", "bash", "-n"), ("dask", "python3", "-mpy_compile")] {
