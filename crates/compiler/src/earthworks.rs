@@ -38,7 +38,7 @@ pub(crate) fn far_off(
     works: &Earthworks,
     (grid, module_of): (ModuleGrid, &dyn Fn(Place) -> (i32, i32)),
     classes: &[u8],
-    (name, metres): (&dyn Fn(FeatureId) -> String, &dyn Fn(Place) -> [f64; 2]),
+    (name, metres): (impl Fn(FeatureId) -> String, impl Fn(Place) -> [f64; 2]),
 ) -> Vec<FeatureFarOff> {
     let told = works.far_off.iter().map(|far| FeatureFarOff {
         feature: name(far.id),

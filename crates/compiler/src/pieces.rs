@@ -320,7 +320,7 @@ pub(crate) fn area_level(run: &Run, read: &ReadFeatures, levelled: &Levelled) ->
         decks: decks(run, read, &formed.decks, &classes),
         earthworks: earthworks::by_class(works, &classes),
         moved: earthworks::by_module(works, run.area.grid, &classes),
-        far_off: earthworks::far_off(works, (run.area.grid, &module_of), &classes, (&name, &east_north)),
+        far_off: earthworks::far_off(works, (run.area.grid, &module_of), &classes, (name, east_north)),
         remarks,
         notes: read.table.notes.clone(),
     }

@@ -155,12 +155,14 @@ pub(crate) fn earthworks(laid: &Laid) -> Earthworks {
     Earthworks { far_off, ..found }
 }
 
+/// The farthest of each feature in each load module, with its node where it is a road's.
+type Worst = BTreeMap<(FeatureId, (i32, i32)), (FarOff, Option<u32>)>;
+
 /// What was found so far.
 struct Sums<'a> {
     laid: &'a Laid<'a>,
     found: Earthworks,
-    /// The farthest of each feature in each load module, with its node where it is a road's.
-    worst: BTreeMap<(FeatureId, (i32, i32)), (FarOff, Option<u32>)>,
+    worst: Worst,
 }
 
 impl Sums<'_> {

@@ -132,6 +132,8 @@ mod area;
 pub use area::{AreaFeatures, Levelled, Sounded};
 
 #[cfg(test)]
-mod bad_ground;
-#[cfg(test)]
 mod samples;
+#[cfg(test)]
+mod tests {
+    mod bad_ground;
+}

@@ -263,7 +263,7 @@ mod tests {
             ..of_number(&formed, 2)[0].clone()
         };
         let ground = |at: i32, height| (Place::new(0, at), height);
-        assert_eq!(in_culverts(middle.clone(), &[ground(0, 100), ground(4, 60)]), [middle.clone()]);
+        assert_eq!(in_culverts(middle.clone(), &[ground(0, 100), ground(4, 60)]), std::slice::from_ref(&middle));
         // A road at the third station: the pieces before and behind it pass below.
         let parts = in_culverts(middle.clone(), &[ground(1, 90), ground(2, 400), ground(4, 60)]);
         let told: Vec<_> = parts.iter().map(|part| (part.stations.len(), part.traits.is_in_ground)).collect();

@@ -33,6 +33,7 @@ use terrain::{LoadModule, ModuleId, Side};
 
 use crate::recount;
 use beyond::{Around, Beyond};
+pub use features::NetworkFound;
 use modules::{Modules, at_level};
 
 /// What a verification found.
@@ -53,23 +54,6 @@ pub struct Verdict {
     pub held_vertices: Option<u64>,
     /// What of roads, rivers and lakes was counted in the load modules; nothing of a job without any.
     pub network: Option<NetworkFound>,
-}
-
-/// What the load modules hold of roads, rivers and lakes, counted from their lines and triangles.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct NetworkFound {
-    /// Metres of lines that are kept, bridges among them, tunnels not.
-    pub kept_m: f64,
-    /// Stretches of lines in the ground without edges and without ground of another way.
-    pub pieces_missing: u64,
-    /// Those of them that are longer than 30 m.
-    pub gaps: u64,
-    /// Places inside the area at which kept lines end although their way goes on.
-    pub ends: u64,
-    /// Lakes of a hectare and more, whether their outline is in the ground or not.
-    pub lakes: u64,
-    /// Those of them whose posts lie more than 0.5 m RMS off their level.
-    pub lakes_off_level: u64,
 }
 
 /// Re-reads every file of a database and checks what a simulator relies on; with `dem`, recomputes residuals.

@@ -328,7 +328,7 @@ mod tests {
         assert_eq!(faces.class_at(corners, [7; 3], STEPS), Some(3));
         assert_eq!(faces.class_at(corners, [7, 8, 7], STEPS), None);
         assert_eq!(faces.class_at([[1, 4], [1, 5], [2, 5]], [8; 3], STEPS), Some(4), "what lies below has it");
-        assert_eq!(Faces::new(&[pond.clone()], STEPS).class_at(corners, [7, 8, 7], STEPS), Some(3));
+        assert_eq!(Faces::new(std::slice::from_ref(&pond), STEPS).class_at(corners, [7, 8, 7], STEPS), Some(3));
         // The same of what is not in the TIN.
         let loose = Faces::new(&[], STEPS).with_loose(&[Face { level: Some(7), ..pond }]);
         assert_eq!(loose.class_at(corners, [7; 3], STEPS), Some(3));

@@ -9,7 +9,6 @@ use product::{Opened, Told, features_file, locate_features, read_told};
 use serde_json::Value;
 use terrain::QUANTA_PER_METRE;
 
-use super::NetworkFound;
 use super::decided::Decided;
 use super::figures::is_of_other_ground;
 use super::laid::{Laid, place_text};
@@ -21,6 +20,23 @@ use compiler::{ALGORITHM_REVISION, CompileError, level_fingerprint};
 
 /// Steps by which edges may lie off lines that were rounded together with others, once and once more.
 const ROUNDED: f64 = 4.0;
+
+/// What the load modules hold of roads, rivers and lakes, counted from their lines and triangles.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct NetworkFound {
+    /// Metres of lines that are kept, bridges among them, tunnels not.
+    pub kept_m: f64,
+    /// Stretches of lines in the ground without edges and without ground of another way.
+    pub pieces_missing: u64,
+    /// Those of them that are longer than 30 m.
+    pub gaps: u64,
+    /// Places inside the area at which kept lines end although their way goes on.
+    pub ends: u64,
+    /// Lakes of a hectare and more, whether their outline is in the ground or not.
+    pub lakes: u64,
+    /// Those of them whose posts lie more than 0.5 m RMS off their level.
+    pub lakes_off_level: u64,
+}
 
 /// What is found of the features of a database.
 #[derive(Default)]

@@ -20,6 +20,7 @@ pub mod files;
 mod globe;
 mod ground;
 mod openapi;
+mod page;
 mod pages;
 mod paths;
 mod queries;
@@ -45,6 +46,7 @@ use crate::terminal;
 use answers::Shared;
 use body::Bodies;
 use connections::Limits;
+pub use page::Page;
 #[cfg(not(feature = "viewer"))]
 pub use report_page::report_page;
 use routes::Find;
@@ -70,14 +72,6 @@ pub struct Options {
     pub answer_within: Duration,
     /// What to take heights to be above, whatever databases say.
     pub assumed: Option<Datum>,
-}
-
-/// A page of its own beside the service.
-pub struct Page {
-    /// Its addresses.
-    pub routes: Router,
-    /// The same, whole or up to a `*`.
-    pub paths: &'static [&'static str],
 }
 
 /// Serves until Ctrl-C; `command` is the word that began it.

@@ -8,7 +8,7 @@ use axum::response::{IntoResponse, Response};
 use axum::routing::get;
 use maud::html;
 
-use super::Page;
+use super::page::Page;
 use super::refusal::Refusal;
 use crate::failure::Failure;
 

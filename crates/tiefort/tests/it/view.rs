@@ -16,7 +16,7 @@ mod report_page {
         let places = words.map(|word| page.text()[body..].find(word).unwrap_or_else(|| panic!("{word} is not there")));
         assert!(places.is_sorted(), "{places:?}");
         assert_eq!(server.post("/heights", r#"{"positions": [[505100, 3875100]]}"#).status, 200);
-        assert_eq!(server.get("/small.tdb/tileset.json").status, 200);
+        assert_eq!(server.get("/small.tdb/modules").status, 200);
     }
 
     #[test]

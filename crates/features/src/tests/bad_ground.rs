@@ -87,7 +87,7 @@ fn a_road_over_a_spike_of_the_dem_stays_on_the_ground_around_it() {
         let spiked = |east: f64, north: f64| hill(east, north) + if (east - 50.0).abs() < wide { 300.0 } else { 0.0 };
         let laid = Laid::of(vec![road.clone()], spiked);
         let off = laid.farthest(&[Role::Side, Role::Centre], hill);
-        // Limits weigh twenty times as much as the ground, so that a spike lifts the road a little, whatever its height.
+        // Limits weigh twenty times as much as the ground, so a spike lifts the road a little, whatever its height.
         assert!(off < 20.0, "{wide}: {off} m");
         assert_eq!(laid.levelled.earthworks.far_off[0].off.signum(), -1, "the cut through it is told");
     }
