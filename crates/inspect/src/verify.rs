@@ -356,19 +356,20 @@ fn recompute(
     Ok(all)
 }
 
-/// Vertices that lie outside the heights of the sources by more than the surface misses any post: fitted heights
-/// reach beyond by as much at most.
+/// Vertices that lie outside the heights of the sources by more than the surface misses any post and more than a tenth
+/// of the range of these heights: fitted heights reach beyond by as much at most.
 fn outside(modules: &Modules, bounds: Bounds, residuals: &Residuals) -> Option<String> {
     let largest_m = residual_of(&residuals.total()).max_m;
     let outside_m = |vertex: &terrain::ModuleVertex| bounds.metres_outside(vertex.z);
-    let is_outside = |vertex: &&terrain::ModuleVertex| largest_m + 1.0 < outside_m(vertex);
+    let (low, high) = bounds.metres();
+    let permitted_m = (largest_m + 1.0).max((high - low) / 10.0);
+    let is_outside = |vertex: &&terrain::ModuleVertex| permitted_m < outside_m(vertex);
     let outside =
         modules.values().flat_map(|module| module.vertices.iter().filter(is_outside).map(move |v| (module.id, v)));
     let (count, worst) = outside.fold((0, None), |(count, worst): (usize, Option<(ModuleId, f64)>), (id, vertex)| {
         let found = (id, outside_m(vertex));
         (count + 1, Some(worst.filter(|worst| found.1 <= worst.1).unwrap_or(found)))
     });
-    let (low, high) = bounds.metres();
     worst.map(|(id, metres)| {
         format!(
             "heights: {count} vertices lie outside those of the DEM ({low:.2} m to {high:.2} m), the worst by \
