@@ -15,7 +15,7 @@ use crate::{FallOptions, FeatureId, GradeOptions, Graded, Histogram, Lake, Outli
 /// Metres off the ground beyond which lengths are told.
 pub const OFF_M: [i32; 4] = [3, 5, 10, 20];
 
-/// Metres that both slopes of a way run for each metre of height, half of them.
+/// Metres that a slope beside a way runs for each metre of height; the two of them are triangles.
 const SLOPES: f64 = 1.75;
 
 /// Stations along which the cause of a cut is looked for.
@@ -32,18 +32,6 @@ pub enum Cause {
     Level,
     /// A height that is pinned.
     Pin,
-}
-
-impl Cause {
-    /// The word for it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Cause::Grade => "grade",
-            Cause::Falling => "falling",
-            Cause::Level => "level",
-            Cause::Pin => "pin",
-        }
-    }
 }
 
 /// What features of a class move.

@@ -10,7 +10,7 @@ use crate::Tally;
 const CELLS: usize = 32;
 
 /// Share of the triangle by which rounding may put a place on an edge outside both sides of it.
-const ON_EDGE: f64 = 1e-9;
+pub(crate) const ON_EDGE: f64 = 1e-9;
 
 /// Residuals at places inside `modules`, each counted once: one on a side belongs to the load module north or east of
 /// it, on the area's far borders to the one there.
@@ -89,12 +89,12 @@ pub(crate) fn height_in([a, b, c]: [[f64; 3]; 3], [x, y]: [f64; 2]) -> Option<f6
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use terrain::{Decks, ModuleId, ModuleResidual, ModuleVertex};
 
     /// A load module of 100 m at `col` on a plane that rises 1 m every 10 m to the east.
-    fn ramp(col: u32) -> LoadModule {
+    pub(crate) fn ramp(col: u32) -> LoadModule {
         let vertex = |y, x: u16| ModuleVertex { y, x, z: (i32::from(x) + col as i32 * 12_800) / 10 };
         LoadModule {
             id: ModuleId { row: 0, col },

@@ -7,6 +7,7 @@ use terrain::{LoadModule, ModuleGrid, Post, PostRect, Spacing};
 
 use crate::Tally;
 use crate::by_post::ByPost;
+use crate::places::ON_EDGE;
 use crate::tally::{Histogram, Sums};
 
 /// Where the source's posts lie, in horizontal quanta of 1/128 m from the area's south-west post.
@@ -126,35 +127,12 @@ impl PostsInModule<'_> {
     }
 }
 
-/// Share of the triangle by which rounding may put a post on an edge outside both sides of it.
-const ON_EDGE: f64 = 1e-9;
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use terrain::{Decks, ModuleId, ModuleResidual, ModuleVertex};
+    use crate::places::tests::ramp;
 
     const GRID: ModuleGrid = ModuleGrid { rows: 1, cols: 2, side_cells: 4 };
-
-    /// Two load modules of 100 m on a plane that rises 1 m every 10 m to the east.
-    fn ramp() -> Vec<LoadModule> {
-        let module = |col: u32| {
-            let z = |x: u16| (i32::from(x) + col as i32 * 12_800) / 10;
-            let vertex = |y, x| ModuleVertex { y, x, z: z(x) };
-            LoadModule {
-                id: ModuleId { row: 0, col },
-                side: 12_800,
-                vertices: vec![vertex(0, 0), vertex(0, 12_800), vertex(12_800, 0), vertex(12_800, 12_800)],
-                triangles: vec![[0, 1, 3], [0, 3, 2]],
-                classes: vec![0, 0],
-                polygon_count: 2,
-                residual: ModuleResidual::default(),
-                decks: Decks::default(),
-                lines: Vec::new(),
-            }
-        };
-        vec![module(0), module(1)]
-    }
 
     #[test]
     fn every_source_post_in_the_area_is_counted_once_with_its_residual() {
@@ -169,7 +147,7 @@ mod tests {
             step: [2560.0, 2560.0],
             push_row_m: &push_row_m,
         };
-        let tally = residuals_at_source(&ramp(), GRID, spacing, &source);
+        let tally = residuals_at_source(&[ramp(0), ramp(1)], GRID, spacing, &source);
         assert_eq!((tally.posts, tally.largest), (50, 128));
         assert!((tally.rms_m() - 1.0).abs() < 1e-12);
     }
@@ -187,7 +165,7 @@ mod tests {
             step: [12_800.0, 12_800.0],
             push_row_m: &push_row_m,
         };
-        let tally = residuals_at_source(&ramp(), GRID, spacing, &source);
+        let tally = residuals_at_source(&[ramp(0), ramp(1)], GRID, spacing, &source);
         assert_eq!((tally.posts, tally.largest), (5, 0));
     }
 }
