@@ -28,9 +28,10 @@ cd "$scratch"
 # In a session of its own, so that it can be killed with all it started.
 setsid "${start[@]}" > log 2>&1 &
 session=$!
-# Engines give every task a process group of its own, so the session tells which are theirs: "ID NAME" of each.
+# Engines give every task a process group of its own, so the session tells which are theirs: "ID NAME" of each. A
+# process that ends between the listing and the reading is none of them, and no fault.
 theirs() {
-    sed -n "s/^\([0-9]*\) (\(.*\)) [A-Z] [0-9]* [0-9]* $session .*/\1 \2/p" /proc/[0-9]*/stat 2> /dev/null
+    sed -n "s/^\([0-9]*\) (\(.*\)) [A-Z] [0-9]* [0-9]* $session .*/\1 \2/p" /proc/[0-9]*/stat 2> /dev/null || true
 }
 if [[ $engine == ninja ]]; then
     sleep "${KILL_AFTER_S:-2}"
