@@ -34,7 +34,7 @@ theirs() {
     sed -n "s/^\([0-9]*\) (\(.*\)) [A-Z] [0-9]* [0-9]* $session .*/\1 \2/p" /proc/[0-9]*/stat 2> /dev/null || true
 }
 if [[ $engine == ninja ]]; then
-    sleep "${KILL_AFTER_S:-2}"
+    sleep "${KILL_AFTER_S:-1}"
     mapfile -t doomed < <(theirs | cut -d' ' -f1)
     if kill -KILL "${doomed[@]}" 2> /dev/null; then tell "ninja and its tasks killed"; fi
     wait "$session" || true
