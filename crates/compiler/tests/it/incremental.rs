@@ -8,7 +8,7 @@ use compiler::{Event, Progress, Stage};
 use job::Job;
 use terrain::{Dem, Post, TileId};
 
-use crate::features::{geojson, line, polygon};
+use crate::features::{Drawn, geojson, line, polygon};
 use crate::product::Product;
 use crate::scene::{Scene, Words, assert_same, sample_dem, tile};
 
@@ -152,6 +152,46 @@ fn features(track_to: f64) -> String {
         line("highway=track", &[(3600.0, 3500.0), (4000.0, 4200.0), (track_to, 4000.0)]),
     ];
     geojson(&drawn)
+}
+
+#[test]
+fn a_road_more_or_less_changes_heights_of_what_it_hangs_together_with_only() {
+    let words = Words { features: "sources = [\"features.geojson\"]".into(), ..words() };
+    let dem = sample_dem(words.grid(), 1);
+    let network = |more: &[Drawn]| {
+        let roads = [
+            line("highway=primary", &[(-100.0, 300.0), (2000.0, 500.0), (5200.0, 400.0)]),
+            line("highway=track", &[(700.0, 100.0), (900.0, 1500.0)]),
+            line("waterway=stream", &[(2300.0, 4700.0), (2500.0, 2000.0), (2400.0, -100.0)]),
+            line("highway=track", &[(3900.0, 3900.0), (4000.0, 4200.0), (4600.0, 4000.0)]),
+        ];
+        geojson(&[&roads, more].concat())
+    };
+    // A road that closes a loop of tracks.
+    let more = [line("highway=residential", &[(3900.0, 3900.0), (4300.0, 3800.0), (4600.0, 4000.0)])];
+    let scene = Scene::with_files(&words, |folder: &Path| {
+        crate::scene::write_dem(&folder.join("dem.tif"), &dem);
+        fs::write(folder.join("features.geojson"), network(&[])).unwrap();
+    });
+    drop(scene.build("area", 2));
+    let folder = database::Folder::new(scene.path("area"));
+    let all = || (0..3).flat_map(|row| (0..3).map(move |col| tile(row, col)));
+    let lines = || -> Vec<_> { all().map(|tile| folder.read_lines(tile).unwrap().1).collect() };
+    let alone = lines();
+    for more in [&more[..], &[]] {
+        fs::write(scene.path("features.geojson"), network(more)).unwrap();
+        let (heard, _) = rebuilt(&scene, "a road more or less");
+        assert_eq!(heard.profiled, [tile(2, 2)], "the ground is asked anew where the road is");
+        for (at, why) in &heard.because {
+            // Elsewhere only the triangles that the road leaves are others.
+            let is_its = *at == tile(2, 2);
+            assert_eq!(why.contains("roads, rivers or lakes in it changed"), is_its, "{at}: {why}");
+            assert_eq!(why.contains("heights"), is_its, "{at}: {why}");
+        }
+        for ((at, before), after) in all().zip(&alone).zip(&lines()) {
+            assert_eq!(before == after, at != tile(2, 2) || more.is_empty(), "what is in the ground of {at}");
+        }
+    }
 }
 
 #[test]
