@@ -111,7 +111,9 @@ fn work_on(dem: &Dem, importance: &Importance, start: &Tin, task: &Task, steps: 
     };
     steps(&mut work);
     let (spent, stop, refused, short) = (work.account.spent(), work.stop(), work.refusals(), work.account.short());
-    let steps_per_post = start.steps_per_post.max(task.features.steps_per_post);
+    // Without features in it a TIN is that of a job without any, to the byte.
+    let finer = if has_features { task.features.steps_per_post } else { start.steps_per_post };
+    let steps_per_post = start.steps_per_post.max(finer);
     Optimised { tin: work.sheet.into_tin(start.rect, steps_per_post), spent, refused, stop, left_out, short }
 }
 

@@ -334,6 +334,19 @@ fn sections_taken_out_of_a_job_and_put_back_leave_nothing_of_the_build_before() 
 }
 
 #[test]
+fn features_that_miss_every_tile_leave_the_bytes_of_a_job_without_any() {
+    let plain = Words { size: (2, 2), tiles: (1, 1), ..Words::sample() };
+    let features = "sources = [\"features.geojson\"]".to_owned();
+    let mut scene = Scene::with_files(&Words { features, ..plain.clone() }, |folder: &Path| {
+        let beside = [line("railway=rail", &[(1010.0, -10.0), (1010.0, 1010.0)])];
+        fs::write(folder.join("features.geojson"), geojson(&beside)).unwrap();
+    });
+    drop(scene.build("area", 2));
+    scene.job = Job::from_text(&plain.text(), &scene.path("job.toml")).unwrap();
+    rebuilt(&scene, "without features");
+}
+
+#[test]
 fn a_small_edit_of_an_optimised_area_moves_few_tiles() {
     let words = Words { size: (12, 12), tiles: (4, 4), ..Words::raster() };
     let ground = sample_dem(words.grid(), 1);
