@@ -227,9 +227,10 @@ fn lay_level(tin: &mut Tin, features: &TileFeatures) {
 }
 
 /// Adds what a job gives to a tile's task: points on the area's border to its border, others to what it starts from.
+/// None stands between the ends of a feature's edge along a side, which it would split.
 pub(crate) fn give(task: &mut TileTask, given: &[GivenPost], rect: PostRect) {
     task.start = start_posts(given, rect, task.seams);
-    task.start.retain(|start| !task.kept.contains(&start.at));
+    task.start.retain(|start| !task.kept.contains(&start.at) && task.barred.binary_search(&start.at).is_err());
     let outer: Vec<_> = border_posts(given).filter(|post| !task.border.contains(post)).collect();
     task.border.extend(outer);
     let pinned = task.start.iter().filter(|start| start.pinned).count();

@@ -32,7 +32,7 @@ fn vertices(scene: &Scene, folder: &str) -> BTreeSet<(Post, i32)> {
 }
 
 /// Writes pins; each is (pin, row, col, more properties).
-fn write_pins(path: &Path, pins: &[(&str, i32, i32, &str)]) {
+pub fn write_pins(path: &Path, pins: &[(&str, i32, i32, &str)]) {
     let feature = |&(pin, row, col, more): &(&str, i32, i32, &str)| {
         let at = [ORIGIN_M[0] + f64::from(col) * 25.0, ORIGIN_M[1] + f64::from(row) * 25.0];
         format!(

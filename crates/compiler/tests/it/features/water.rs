@@ -4,7 +4,8 @@ use database::{FeatureRemark, LineRole};
 use features::Kind;
 
 use super::drawing::{At, Drawing, Laid, SIDE_M, line, polygon};
-use crate::scene::Words;
+use crate::given::write_pins;
+use crate::scene::{SIDE_CELLS, Words};
 
 /// Ground that falls to the south with noise of some metres.
 fn noisy(east: f64, north: f64) -> f64 {
@@ -30,13 +31,19 @@ fn a_river_on_noisy_ground_falls_all_the_way() {
 }
 
 #[test]
-fn a_river_along_a_border_of_fixed_points_falls_between_its_stations() {
-    let words = Words { modules: "outer_border = \"fixed\"".into(), ..Drawing::words() };
+fn a_river_along_a_border_of_fixed_or_given_points_falls_between_its_stations() {
+    let fixed = Words { modules: "outer_border = \"fixed\"".into(), ..Drawing::words() };
+    let pinned = Words { tin: "pins = \"pins.geojson\"".into(), ..Drawing::words() };
     let river = [(SIDE_M, SIDE_M), (SIDE_M, 1010.0), (SIDE_M, 0.0)];
-    let laid = Drawing::of(words, noisy, &[line("waterway=river", &river)]).built();
-    let heights: Vec<f64> = (0..=4 * SIDE_M as u32).map(|at| laid.height((SIDE_M, f64::from(at) / 4.0))).collect();
-    let rising = heights.windows(2).position(|pair| pair[1] < pair[0] - 1e-6);
-    assert_eq!(rising, None, "the surface rises downstream: {heights:?}");
+    for words in [fixed, pinned] {
+        let drawing = Drawing::of(words, noisy, &[line("waterway=river", &river)]);
+        let pins = [7, 22, 33, 51].map(|row| ("height", row, 4 * SIDE_CELLS, r#","height_m":900"#));
+        write_pins(&drawing.scene.path("pins.geojson"), &pins);
+        let laid = drawing.built();
+        let heights: Vec<f64> = (0..=4 * SIDE_M as u32).map(|at| laid.height((SIDE_M, f64::from(at) / 4.0))).collect();
+        let rising = heights.windows(2).position(|pair| pair[1] < pair[0] - 1e-6);
+        assert_eq!(rising, None, "quarters of metres from the south at which the surface rises downstream");
+    }
 }
 
 #[test]
