@@ -171,20 +171,7 @@ impl<'a> Ground<'a> {
     fn bare(&self, a: At, b: At) -> Vec<(f64, f64)> {
         let line = Along::of(a, b);
         let edges = self.square.edges.iter().filter_map(|ends| line.beside(*ends, self.aside));
-        let mut there: Vec<(f64, f64)> = edges.collect();
-        there.extend(self.of_features.iter().filter_map(|corners| line.within(*corners)));
-        there.sort_by(|one, other| one.0.total_cmp(&other.0).then(one.1.total_cmp(&other.1)));
-        let (mut at, mut bare) = (0.0, Vec::new());
-        for (from, to) in there {
-            if at < from {
-                bare.push((at, from));
-            }
-            at = to.max(at);
-        }
-        if at < 1.0 {
-            bare.push((at, 1.0));
-        }
-        bare
+        line.bare(edges.chain(self.of_features.iter().filter_map(|corners| line.within(*corners))).collect())
     }
 }
 
@@ -213,6 +200,21 @@ impl Along {
         (from < to).then_some((from, to))
     }
 
+    /// What these parts leave of it. Triangles side by side leave what rounding leaves, which is less than a quantum
+    /// and no stretch.
+    fn bare(&self, mut there: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
+        there.push((1.0, 1.0));
+        there.sort_by(|one, other| one.0.total_cmp(&other.0).then(one.1.total_cmp(&other.1)));
+        let (mut at, mut bare) = (0.0, Vec::new());
+        for (from, to) in there {
+            if at + 1.0 / self.length < from {
+                bare.push((at, from));
+            }
+            at = to.max(at);
+        }
+        bare
+    }
+
     /// The part along which an edge lies no farther than `aside`.
     fn beside(&self, ends: [At; 2], aside: f64) -> Option<(f64, f64)> {
         let [[from, off], [to, off_too]] = ends.map(|end| self.of_place(end));
@@ -231,5 +233,26 @@ impl Along {
         }
         let [one, other] = crossed[..] else { return None };
         self.part(one, other)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn triangles_of_a_strip_leave_nothing_of_its_middle_line_bare() {
+        // North and east, in quanta, with the quad's diagonal either way.
+        let [left, right] = [[(38_611, 4290), (39_200, 4040)], [(39_211, 5710), (39_800, 5460)]];
+        let middle = |at: usize| ((left[at].0 + right[at].0) / 2, (left[at].1 + right[at].1) / 2);
+        let line = Along::of(middle(0), middle(1));
+        for corners in [
+            [[left[0], right[0], right[1]], [left[0], right[1], left[1]]],
+            [[left[0], right[0], left[1]], [right[0], right[1], left[1]]],
+        ] {
+            let there = corners.iter().filter_map(|corners| line.within(*corners)).collect();
+            assert_eq!(line.bare(there), [], "{corners:?}");
+        }
+        assert_eq!(line.bare(vec![(0.1, 0.5), (0.4, 0.9)]), [(0.0, 0.1), (0.9, 1.0)]);
     }
 }
