@@ -46,6 +46,7 @@ SHORT_SEEDS, SHORT_SECONDS = 80, 75
 REFUSALS = [
     r"need more triangles than mean_per_load_module",
     r"a forbidden post, .*, that is a corner",
+    r"fowler-little: .* points, on\s+lines simplified to that tolerance",
 ]
 
 
