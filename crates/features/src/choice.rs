@@ -44,7 +44,18 @@ pub(crate) struct Chosen {
     pub is_bound: bool,
 }
 
+/// One part in so many may be left out where nearly everything is in the ground.
+const LEFT_OUT_PARTS: i64 = 50;
+
 impl Choice<'_> {
+    /// Whether nearly everything inside the area was chosen, by length.
+    pub fn has_nearly_all(&self, chosen: &Chosen) -> bool {
+        let inside = || self.stretches.all.iter().zip(&chosen.ways).filter(|(of, _)| of.is_inside);
+        let all: i64 = inside().map(|(of, _)| of.length).sum();
+        let out: i64 = inside().filter(|(_, way)| way.is_err()).map(|(of, _)| of.length).sum();
+        LEFT_OUT_PARTS * out <= all
+    }
+
     /// The widest form that any part of a stretch may have.
     pub fn form_most_of(&self, stretch: u32) -> u8 {
         self.widest(stretch).0

@@ -19,8 +19,9 @@ use crate::thin::Tolerance;
 const POND_POSTS: i128 = 12;
 
 impl Choice<'_> {
-    /// Chooses where `before` triangles are taken of each load module already.
-    pub fn choose(&self, before: &[i64]) -> Chosen {
+    /// Chooses where `before` triangles are taken of each load module already. Main kinds become wider within the share
+    /// of `wider`.
+    pub fn choose(&self, before: &[i64], wider: Tier) -> Chosen {
         let mut tally = Tally::new(self.outlays, Ledger::new(self.shares, before));
         let mut why: Vec<Option<Why>> = vec![None; self.stretches.all.len()];
         self.offer(&mut tally, &mut why);
@@ -28,7 +29,7 @@ impl Choice<'_> {
             self.offer(&mut tally, &mut why);
             take_back(self, &mut tally, &mut why);
         }
-        let held = self.refine(&mut tally);
+        let held = self.refine(&mut tally, wider);
         self.beyond(&mut tally, &mut why);
         let is_bound = held || why.iter().flatten().any(|why| *why != Why::Beyond);
         let ways = tally.granted.iter().zip(&why).map(|(way, why)| way.ok_or(why.unwrap_or(Why::Beyond))).collect();
@@ -63,7 +64,7 @@ impl Choice<'_> {
     }
 
     /// Makes strokes finer and wider as far as there is room; whether a limit held one of them back.
-    fn refine(&self, tally: &mut Tally) -> bool {
+    fn refine(&self, tally: &mut Tally, wider: Tier) -> bool {
         let kept = |stroke: &Stroke, tally: &Tally| -> Vec<(u32, Way)> {
             let granted = |(stretch, _): &(u32, bool)| Some((*stretch, tally.granted[*stretch as usize]?));
             stroke.stretches.iter().filter_map(granted).collect()
@@ -80,7 +81,9 @@ impl Choice<'_> {
             let stroke = &self.strokes[number as usize];
             let of = kept(stroke, tally);
             let changed: Vec<(u32, Option<Way>)> = of.iter().map(|(at, way)| (*at, Some(step.of(*way)))).collect();
-            match tally.try_set(&changed, Tier::Others) {
+            let is_main = self.stretches.all[of[0].0 as usize].is_main(self.site);
+            let tier = if is_main && step == Step::Wider { wider } else { Tier::Others };
+            match tally.try_set(&changed, tier) {
                 Ok(_) => {
                     let way = step.of(of[0].1);
                     heap.extend(self.gain(stroke, way, step, tally).map(|gain| (gain, Reverse(number), step)));

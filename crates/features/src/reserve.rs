@@ -12,7 +12,7 @@ use crate::cost::{Cost, cost};
 use crate::forms::{Formed, form};
 use crate::outlay::Outlays;
 use crate::shapes::shape;
-use crate::shares::{Ledger, Shares, taken};
+use crate::shares::{Ledger, Shares, Tier, taken};
 use crate::strand::{Graded, Strand};
 use crate::stretches::{About, Part, Stretches};
 use crate::strokes::strokes;
@@ -87,9 +87,19 @@ pub fn reserve(
     let outlays = Outlays::of(&stretches, &strokes, graded, strands, (shares, site));
     let choice = Choice { stretches: &stretches, strokes: &strokes, outlays: &outlays, shares, graded, site };
     let mut before = vec![0; shares.modules.len()];
-    let mut chosen = choice.choose(&before);
+    // One full load module on its way makes a line of all of a motorway, so that main kinds may use all of their share
+    // for their width, unless other ways lose their place by it.
+    let mut wider = Tier::Main;
+    let mut chosen = choice.choose(&before, wider);
     let mut taking_back = TakingBack::new(&choice);
-    for round in 0.. {
+    let mut round = 0;
+    loop {
+        if wider == Tier::Main && !choice.has_nearly_all(&chosen) {
+            (wider, round) = (Tier::Others, 0);
+            before.fill(0);
+            chosen = choice.choose(&before, wider);
+            taking_back = TakingBack::new(&choice);
+        }
         let grants = grants(&choice, &chosen, strands.len());
         let formed = form(&Graded { grants: &grants, ..*graded }, strands, site);
         let cost = cost(&formed, site);
@@ -102,12 +112,12 @@ pub fn reserve(
             let errors = taken.iter().zip(&chosen.estimate).map(|(taken, estimate)| taken - estimate);
             // The second time nothing is offered that the first has refused.
             before = before.iter().zip(errors).map(|(old, new)| if round == 0 { new } else { new.max(*old) }).collect();
-            chosen = choice.choose(&before);
+            chosen = choice.choose(&before, wider);
         } else {
             taking_back.take_back(&mut chosen, &taken, &formed, strands);
         }
+        round += 1;
     }
-    unreachable!("taking back ends when nothing is left")
 }
 
 impl Reserved {

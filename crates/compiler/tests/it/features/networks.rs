@@ -142,6 +142,26 @@ fn the_least_share_and_every_share_are_within_limits_and_none_or_two_are_refused
 }
 
 #[test]
+fn a_motorway_is_as_wide_as_it_is_although_one_load_module_on_its_way_is_half_full() {
+    for (streets, limit, is_wide) in [(2, 100, true), (4, 100, true), (6, 150, true), (8, 100, false)] {
+        let street = |number: u32| {
+            let east = 1040.0 + 420.0 / f64::from(streets) * f64::from(number);
+            line("highway=residential", &[(east, 1100.0), (east + 10.0, 1400.0)])
+        };
+        let mut drawn: Vec<Drawn> = (0..streets).map(street).collect();
+        drawn.push(line("highway=motorway", &[(-50.0, 1210.0), (2050.0, 1230.0)]));
+        let limits = format!("per_load_module = {limit}\nmean_per_load_module = 80\nper_4km_square = 64000");
+        let drawing = Drawing::of(Words { limits, ..Drawing::words() }, hills, &drawn);
+        let classes = drawing.scene.build("area.tdb", 2).report.features.unwrap().classes;
+        let of = |name: &str| classes.iter().find(|class| class.name == name).cloned().unwrap();
+        // Never at the cost of other ways.
+        assert_eq!(of("minor").kept_km, of("minor").wanted_km, "{streets} streets, {limit}");
+        let [strip, line] = [of("motorway").strip_km, of("motorway").line_km];
+        assert!(if is_wide { line == 0.0 } else { strip == 0.0 }, "{streets} streets, {limit}: {strip} and {line} km");
+    }
+}
+
+#[test]
 fn rules_that_make_every_path_a_motorway_are_followed_within_limits() {
     let rules = "rules = [{ where = { highway = [\"path\", \"footway\"] }, kind = \"motorway\" }]";
     let path = |number: i32| {
