@@ -602,7 +602,7 @@ class Job:
         draw, grid, features = self.draw, self.grid, []
         for _ in range(draw.randint(1, 6)):
             row, column = draw.randrange(grid.size[0]), draw.randrange(grid.size[1])
-            if any((column, row) == place for _, *place in self.pinned):
+            if any((column, row) == place[1:] for place in self.pinned):
                 # Two pins at a post contradict each other.
                 continue
             x, y = column * grid.spacing_m, row * grid.spacing_m
