@@ -47,6 +47,18 @@ fn a_river_along_a_border_of_fixed_or_given_points_falls_between_its_stations() 
 }
 
 #[test]
+fn a_stream_that_is_left_out_still_runs_through_what_stands_in_its_way() {
+    let dam = |_: f64, north: f64| 400.0 + 0.02 * north + if (north - 1000.0).abs() < 40.0 { 5.0 } else { 0.0 };
+    let features = format!("{}\nshare_max = 0.01\nshare_main = 0.01", Drawing::words().features);
+    let limits = "per_load_module = 100\nmean_per_load_module = 100".into();
+    let stream = line("waterway=stream", &[(1000.0, 2050.0), (1000.0, -50.0)]);
+    let laid = Drawing::of(Words { features, limits, ..Drawing::words() }, dam, &[stream]).built();
+    assert!(laid.was_told("left out"));
+    let [through, beside] = [1000.0, 1400.0].map(|east| laid.height((east, 1000.0)));
+    assert!(through < 422.5 && 424.0 < beside, "{through} m where it runs, {beside} m beside it");
+}
+
+#[test]
 fn streams_that_end_at_one_place_both_fall_to_it() {
     let basin = |east: f64, _: f64| 400.0 + 0.03 * (east - 1000.0).abs();
     let drawn = [
