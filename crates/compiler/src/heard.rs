@@ -15,13 +15,13 @@ pub(crate) struct Heard {
 impl Heard {
     /// Of the profiles of all tiles, in their order.
     pub fn of<'a>(read: &ReadFeatures, profiles: impl Iterator<Item = &'a Profile>) -> Self {
-        let (count, is_bed) = (read.features.stations().len(), read.features.is_bed());
+        let (count, is_way) = (read.features.stations().len(), read.features.is_way());
         let (mut heights, mut middles) = (vec![None; count], vec![None; count]);
         let mut inside: Vec<Histogram> = vec![Histogram::new(); read.features.outlines().len()];
         for (profile, stations) in profiles.zip(&read.by_tile) {
             stations.iter().zip(&profile.heights).for_each(|(&station, &height)| heights[station as usize] = height);
-            let beds = stations.iter().filter(|station| is_bed[**station as usize]);
-            beds.zip(&profile.middles).for_each(|(&station, &height)| middles[station as usize] = Some(height));
+            let ways = stations.iter().filter(|station| is_way[**station as usize]);
+            ways.zip(&profile.middles).for_each(|(&station, &height)| middles[station as usize] = Some(height));
             for (outline, of) in &profile.inside {
                 let Some(inside) = inside.get_mut(*outline as usize) else { continue };
                 inside.extend(of);

@@ -26,7 +26,7 @@ pub fn level_fingerprint(
     let mut profiles = Vec::new();
     for (index, &tile) in area.tiles.iter().enumerate() {
         let (.., profile) = folder.read_profile(tile)?;
-        let asked = [read.stations(index).len(), read.beds(index).len()];
+        let asked = [read.stations(index).len(), read.on_ways(index).len()];
         if asked != [profile.heights.len(), profile.middles.len()] {
             return Ok(None);
         }

@@ -45,8 +45,8 @@ impl Profiling<'_> {
         self.read.stations(self.index())
     }
 
-    fn beds(&self) -> impl ExactSizeIterator<Item = Place> + Clone + use<> {
-        self.read.beds(self.index()).into_iter()
+    fn on_ways(&self) -> impl ExactSizeIterator<Item = Place> + Clone + use<> {
+        self.read.on_ways(self.index()).into_iter()
     }
 }
 
@@ -56,7 +56,13 @@ impl Artifact for Profiling<'_> {
 
     fn key(&self) -> Key {
         let steps = self.read.features.site.lattice.steps_per_post();
-        keys::profile(self.window, steps, self.stations(), self.beds(), &basins(&self.run.area, self.read, self.tile))
+        keys::profile(
+            self.window,
+            steps,
+            self.stations(),
+            self.on_ways(),
+            &basins(&self.run.area, self.read, self.tile),
+        )
     }
 
     fn published(&self) -> Result<Option<Stamp>, CompileError> {
@@ -65,7 +71,7 @@ impl Artifact for Profiling<'_> {
 
     fn read(&self, _key: &Key) -> Option<(Stamp, (FileStamp, Profile))> {
         let (stamp, file, profile) = self.run.database.folder().read_profile(self.tile).ok()?;
-        let is_whole = profile.heights.len() == self.stations().len() && profile.middles.len() == self.beds().len();
+        let is_whole = profile.heights.len() == self.stations().len() && profile.middles.len() == self.on_ways().len();
         is_whole.then_some((stamp, (file, profile)))
     }
 
@@ -79,7 +85,7 @@ impl Artifact for Profiling<'_> {
 pub(crate) fn sound(area: &GamingArea, read: &ReadFeatures, tile: TileId, dem: &Dem) -> Profile {
     let (index, steps) = (area.tiling.index(tile), read.features.site.lattice.steps_per_post());
     let heights = read.stations(index).map(|place| Some(height_at(dem, steps, place))).collect();
-    let middles = read.beds(index).into_iter().map(|place| middle_at(dem, steps, place)).collect();
+    let middles = read.on_ways(index).into_iter().map(|place| middle_at(dem, steps, place)).collect();
     let own = own_posts(area.tiling.rect(tile), area.rect);
     let inside = |(number, outline): (u32, &Outline)| {
         let rings: Vec<Vec<Vertex>> = outline.rings.iter().map(|ring| vertices(&ring.places)).collect();

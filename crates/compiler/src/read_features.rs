@@ -64,11 +64,11 @@ impl ReadFeatures {
         (&self.features, &self.table.notes)
     }
 
-    /// The stations of a tile through which rivers run.
-    pub fn beds(&self, index: usize) -> Vec<Place> {
-        let (stations, is_bed) = (self.features.stations(), self.features.is_bed());
-        let beds = self.by_tile[index].iter().filter(|station| is_bed[**station as usize]);
-        beds.map(|station| stations[*station as usize]).collect()
+    /// The stations of a tile through which ways run.
+    pub fn on_ways(&self, index: usize) -> Vec<Place> {
+        let (stations, is_way) = (self.features.stations(), self.features.is_way());
+        let ways = self.by_tile[index].iter().filter(|station| is_way[**station as usize]);
+        ways.map(|station| stations[*station as usize]).collect()
     }
 
     /// The stations of a tile.

@@ -15,7 +15,7 @@ pub struct Profile {
     pub tile: TileId,
     /// Its height at each of their stations, in the order of places, in quanta; nothing over a void.
     pub heights: Vec<Option<i32>>,
-    /// The middle one of nine heights around each of those stations through which a river runs, in quanta.
+    /// The middle one of nine heights around each of those stations through which a way runs, in quanta.
     pub middles: Vec<i32>,
     /// Of polygons of water by their number: how often each height occurs at the posts inside, in quanta, ascending.
     pub inside: Vec<(u32, Vec<(i32, u32)>)>,

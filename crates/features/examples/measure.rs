@@ -73,7 +73,7 @@ fn main() {
     };
     let ground: Vec<Option<i32>> = network.nodes.iter().map(|node| ground(node.place)).collect();
     lap("ground");
-    let heights = grade(&network, &ground, &[], &[], GradeOptions::USUAL, &mut remarks);
+    let heights = grade(&network, [&ground; 2], &[], &[], GradeOptions::USUAL, &mut remarks);
     lap("grade");
     let moved = heights.iter().zip(&ground).filter(|(height, ground)| Some(**height) != **ground).count();
     let stations = network.nodes.len();

@@ -34,8 +34,8 @@ pub struct AreaFeatures {
     names: BTreeMap<FeatureId, u64>,
     /// Sorted, each once.
     stations: Vec<Place>,
-    /// Of each station whether a river runs through it.
-    is_bed: Vec<bool>,
+    /// Of each station whether a way runs through it.
+    is_way: Vec<bool>,
 }
 
 /// What the DEM says along features.
@@ -43,7 +43,7 @@ pub struct AreaFeatures {
 pub struct Sounded<'a> {
     /// Its height at each of the [`AreaFeatures::stations`], in quanta.
     pub heights: &'a [Option<i32>],
-    /// The middle one of nine heights around each station that is a [`AreaFeatures::is_bed`].
+    /// The middle one of nine heights around each station that is a [`AreaFeatures::is_way`].
     pub middles: &'a [Option<i32>],
     /// Heights of the posts inside each of the [`AreaFeatures::outlines`].
     pub inside: &'a [Histogram],
@@ -134,11 +134,12 @@ impl AreaFeatures {
             river_banks,
             names,
             stations: Vec::new(),
-            is_bed: Vec::new(),
+            is_way: Vec::new(),
         };
         all.stations = all.asked();
-        let beds: HashSet<Place> = all.rivers.nodes.iter().map(|node| node.place).collect();
-        all.is_bed = all.stations.iter().map(|place| beds.contains(place)).collect();
+        let networks = [&all.roads, &all.rivers];
+        let ways: HashSet<Place> = networks.into_iter().flat_map(|of| &of.nodes).map(|node| node.place).collect();
+        all.is_way = all.stations.iter().map(|place| ways.contains(place)).collect();
         all
     }
 
@@ -148,9 +149,9 @@ impl AreaFeatures {
         &self.stations
     }
 
-    /// Of each station whether a river runs through it, so that heights around it are asked for, too.
-    pub fn is_bed(&self) -> &[bool] {
-        &self.is_bed
+    /// Of each station whether a way runs through it, so that heights around it are asked for, too.
+    pub fn is_way(&self) -> &[bool] {
+        &self.is_way
     }
 
     /// All polygons; those of water are asked for the heights inside.
@@ -191,7 +192,9 @@ impl AreaFeatures {
         let resting = ground_of(roads, &at, &near);
         let afloat = afloat(&self.outlines, &lakes, roads, &self.road_sides, &self.site);
         let pins = with_water(roads, pins(roads, &self.ways), &afloat, &mut remarks);
-        let heights = grade(roads, &resting, &pins, &water(&strands), options, &mut remarks);
+        let amid: Vec<Option<i32>> =
+            roads.nodes.iter().zip(&resting).map(|(node, ground)| middle(node.place).or(*ground)).collect();
+        let heights = grade(roads, [&resting, &amid], &pins, &water(&strands), options, &mut remarks);
         let beside = |(sides, height): (&[Place; 2], &i32)| sides.map(|place| at(place).unwrap_or(*height));
         let beside: Vec<[i32; 2]> = self.road_sides.iter().zip(&heights).map(beside).collect();
         let grants = Grants::default();

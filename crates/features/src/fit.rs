@@ -10,7 +10,7 @@ use std::cmp::Reverse;
 
 use crate::Place;
 use crate::forest::{Member, Range, Sample, UNBOUNDED, Wanted, fit_forest};
-use crate::sweep::spread;
+use crate::sweep::{root, spread};
 
 /// Two nodes with the range of the height of `a` less that of `b`, 0 within it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -310,15 +310,6 @@ impl Part {
         }
         ranges
     }
-}
-
-/// The tree in which a node stands.
-fn root(tree: &mut [u32], mut node: u32) -> u32 {
-    while tree[node as usize] != node {
-        tree[node as usize] = tree[tree[node as usize] as usize];
-        node = tree[node as usize];
-    }
-    node
 }
 
 /// A number that looks drawn at random, of a place and a round (G. Steele and others' `splitmix`, 2014).

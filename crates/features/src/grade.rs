@@ -15,6 +15,9 @@ use crate::{Network, Remark, Way};
 /// Rounds in which loops of roads are fitted.
 const ROUNDS: u64 = 4;
 
+/// Rounds of the fit that shows where grades have to give way.
+const ROUNDS_HARD: u64 = 1;
+
 /// How many times as much a quantum beyond a limit weighs.
 const LIMIT_WEIGHT: i64 = 20;
 
@@ -51,23 +54,25 @@ impl GradeOptions {
 
 /// A height in quanta for every node of a network of ways that are travelled.
 ///
-/// `ground` is the DEM at every node (`None` without one there), `pins` are hard, and decks keep clear of `water`.
+/// `ground` is the DEM at every node and `middle` the middle of its heights around it, from which limits of cut and
+/// fill are counted (`None` without one there); `pins` are hard, and decks keep clear of `water`.
 pub fn grade(
     network: &Network,
-    ground: &[Option<i32>],
+    [ground, middle]: [&[Option<i32>]; 2],
     pins: &[Pin],
     water: &[Water],
     options: GradeOptions,
     remarks: &mut Vec<Remark>,
 ) -> Vec<i32> {
-    assert_eq!(network.nodes.len(), ground.len(), "every node has a height of the ground, or none");
+    let count = network.nodes.len();
+    assert_eq!([count; 2], [ground.len(), middle.len()], "every node has a height of the ground, or none");
     let mut resting: Vec<Option<i32>> =
         network.nodes.iter().zip(ground).map(|(node, ground)| ground.filter(|_| node.on_ground)).collect();
     // A bridge that no road leads to stands on the ground below it.
     network.give_heights(&mut resting, &|node| ground[node as usize]);
     raise_sagging_ends(network, &mut resting, options.bank);
     let pins = one_a_node(network, pins, remarks);
-    let mut swept = lay(network, &resting, &pins, options);
+    let mut swept = lay(network, [&resting, middle], &pins, options);
     straighten(network, &swept.costs, &mut swept.heights);
     clear(network, &mut swept, water, options.clearances, remarks);
     remark_steep(network, &swept.heights, &|edge| network.relaxed_max(edge), remarks);
@@ -75,35 +80,40 @@ pub fn grade(
     swept.heights
 }
 
-/// Fits heights to the ground at nodes that rest on it, twice. Each node has at most one pin.
-fn lay(network: &Network, resting: &[Option<i32>], pins: &[Pin], options: GradeOptions) -> Swept {
+/// Fits heights to the ground at nodes that rest on it, twice, within limits below the lower and above the higher of it
+/// and the middle of its heights. Each node has at most one pin.
+fn lay(network: &Network, [resting, middle]: [&[Option<i32>]; 2], pins: &[Pin], options: GradeOptions) -> Swept {
     let mut costs: Vec<i32> = network.edges.iter().map(|edge| edge.rise_max).collect();
     relax_between_pins(network, &mut costs, pins);
-    let mut limits: Vec<Option<[i32; 2]>> = resting
-        .iter()
-        .map(|height| height.map(|height| [height - options.cut_max, height + options.fill_max]))
-        .collect();
+    let limit = |(resting, middle): (&Option<i32>, &Option<i32>)| {
+        let (resting, middle) = ((*resting)?, middle.or(*resting)?);
+        Some([resting.min(middle) - options.cut_max, resting.max(middle) + options.fill_max])
+    };
+    let mut limits: Vec<Option<[i32; 2]>> = resting.iter().zip(middle).map(limit).collect();
     pins.iter().for_each(|pin| limits[pin.node as usize] = Some([pin.height; 2]));
-    relax_within(network, &mut costs, &limits, &|edge| network.relaxed_max(edge));
     // Where nothing of a network rests on the ground it lies at height 0: it has none to be true to.
     let mut wishes = filled(network, resting);
     straighten(network, &costs, &mut wishes);
-    let mut problem = problem(network, &costs, &limits, pins);
-    let mut fitted = |heights: &[Option<i32>]| -> Vec<i32> {
-        let samples = problem.samples.len();
+    let fitted = |costs: &[i32], heights: &[Option<i32>], rounds: u64| -> Vec<i32> {
+        let mut problem = problem(network, costs, &limits, pins);
         problem.samples.extend(samples_of(network, heights, 1, 1));
         let wishes = wishes.iter().zip(heights).map(|(wish, height)| i64::from(height.unwrap_or(*wish)));
         problem.wishes = wishes.collect();
-        let found = fit(&problem, ROUNDS).into_iter().map(|height| height as i32).collect();
-        problem.samples.truncate(samples);
-        found
+        fit(&problem, rounds).into_iter().map(|height| height as i32).collect()
     };
-    let first = fitted(resting);
+    let hard = fitted(&costs, resting, ROUNDS_HARD);
+    let beyond = |node: u32| {
+        let height = hard[node as usize];
+        limits[node as usize].is_some_and(|[least, most]| height < least || most < height)
+    };
+    relax_within(network, &mut costs, &limits, &|edge| network.relaxed_max(edge), &beyond);
+    let first = fitted(&costs, resting, ROUNDS);
     let clipped = resting
         .iter()
         .zip(&first)
         .map(|(height, first)| height.map(|height| height.clamp(first - options.clip, first + options.clip)));
-    let heights = fitted(&smooth(network, &clipped.collect::<Vec<_>>(), resting, options.smooth_milliposts));
+    let smoothed = smooth(network, &clipped.collect::<Vec<_>>(), resting, options.smooth_milliposts);
+    let heights = fitted(&costs, &smoothed, ROUNDS);
     let (_, most) = bounds(network, &costs, pins);
     Swept { heights, costs, most }
 }
@@ -166,7 +176,7 @@ mod tests {
     #[track_caller]
     fn heights(sources: Vec<Source>, ground: impl Fn(f64, f64) -> f64) -> (Network, Vec<i32>, Vec<Remark>) {
         let (network, ground, mut remarks) = network(sources, ground);
-        let heights = grade(&network, &ground, &[], &[], GradeOptions::USUAL, &mut remarks);
+        let heights = grade(&network, [&ground; 2], &[], &[], GradeOptions::USUAL, &mut remarks);
         for edge in &network.edges {
             let rise = (heights[edge.a as usize] - heights[edge.b as usize]).abs();
             assert!(rise <= edge.rise_max, "a grade is exceeded");
@@ -255,7 +265,7 @@ mod tests {
         let place = network.lattice.place_of([40.0, 20.0]).unwrap();
         let node = network.nodes.iter().position(|node| node.place == place).unwrap() as u32;
         let pins = [Pin { node, height: 1280 }, Pin { node: node + 1, height: 1280 }];
-        let height = grade(&network, &ground, &pins[..1], &[], GradeOptions::USUAL, &mut remarks)[node as usize];
+        let height = grade(&network, [&ground; 2], &pins[..1], &[], GradeOptions::USUAL, &mut remarks)[node as usize];
         assert_eq!(height, 1280);
         // The other end went up alone, twice, so three quarters of the clearance are there.
         assert!(
@@ -268,7 +278,7 @@ mod tests {
     fn two_pins_on_one_junction_that_disagree_are_written_down() {
         let (network, ground, mut remarks) = network(bridge("highway=primary"), |_, _| 10.0);
         let pins = [Pin { node: 10, height: 1000 }, Pin { node: 10, height: 2000 }];
-        let found = grade(&network, &ground, &pins, &[], GradeOptions::USUAL, &mut remarks);
+        let found = grade(&network, [&ground; 2], &pins, &[], GradeOptions::USUAL, &mut remarks);
         assert_eq!(found[10], 1000);
         assert_eq!(remarks[0].flaw, Flaw::PinsDisagree);
     }
@@ -277,7 +287,7 @@ mod tests {
     fn pins_too_steep_for_the_grade_exceed_it_between_them_and_it_is_written_down() {
         let (network, ground, mut remarks) = network(bridge("highway=primary"), |_, _| 10.0);
         let pins = [Pin { node: 10, height: 0 }, Pin { node: 14, height: 2560 }];
-        let found = grade(&network, &ground, &pins, &[], GradeOptions::USUAL, &mut remarks);
+        let found = grade(&network, [&ground; 2], &pins, &[], GradeOptions::USUAL, &mut remarks);
         assert_eq!((found[10], found[14]), (0, 2560));
         assert!(matches!(remarks[0].flaw, Flaw::PinsTooSteep { grade_ppm } if 500_000 <= grade_ppm));
     }

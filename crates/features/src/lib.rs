@@ -13,7 +13,7 @@
 //! Network::of(&travelled(&rounded), ..), Network::of(&flowing(&rounded), ..)
 //! level(&outlines, &shores, ..) -> Waters           lakes; then lakes_along(..) -> Vec<Still> for the rivers
 //! fall(&rivers, Bed, &still, ..) -> Fallen                  rivers; channels(..), shore(..), banks(..) -> Vec<Strand>
-//! grade(&roads, &ground, &pins, &water(&strands), GradeOptions, ..) -> Vec<i32>
+//! grade(&roads, [&ground, &middle], &pins, &water(&strands), GradeOptions, ..) -> Vec<i32>
 //! reserve(&Graded, &strands, &Site, &Shares, about) -> Reserved
 //!     .formed: Formed { points, edges, faces, decks, middles, remarks }, .cost: triangles by load module and class
 //! ```

@@ -62,7 +62,7 @@ fn formed_of(rounded: Rounded, metres: impl Fn(f64, f64) -> f64) -> Formed {
     let (travelled, flowing): (Vec<Way>, Vec<Way>) = ways.into_iter().partition(|way| way.traits.kind.is_travelled());
     let network = Network::of(&travelled, site().lattice, &mut remarks);
     let ground: Vec<Option<i32>> = network.nodes.iter().map(|node| ground_at(node.place, &metres)).collect();
-    let heights = grade(&network, &ground, &[], &[], GradeOptions::USUAL, &mut remarks);
+    let heights = grade(&network, [&ground; 2], &[], &[], GradeOptions::USUAL, &mut remarks);
     let beside: Vec<[i32; 2]> =
         sides(&network).iter().map(|sides| sides.map(|place| ground_at(place, &metres).unwrap_or(0))).collect();
     let strand = |way: &Way| Strand {

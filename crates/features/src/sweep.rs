@@ -6,16 +6,19 @@
 //! whole network, in whole numbers. Where the one lies above the other, limits and grades contradict.
 
 use std::cmp::Reverse;
-use std::collections::BinaryHeap;
+use std::collections::{BTreeMap, BinaryHeap};
 
 use crate::clean::Notes;
-use crate::{Flaw, Network, Remark, Remedy, WayOf};
+use crate::{Edge, Flaw, Network, Remark, Remedy, WayOf};
 
 /// A height for every node, the bound that no height reaches.
 const NONE: i32 = i32::MAX / 2;
 
 /// Steps in which the grade between contradicting pins is raised: by a quarter each.
 const STEEPER_ROUNDS_MAX: usize = 200;
+
+/// So many metres may become steeper than their grade for each that would lie beyond limits of cut and fill otherwise.
+const STEEPER_PER_BEYOND: i64 = 8;
 
 /// Lowers heights to the least `start + c` at every node. `reach` names what a node bounds, and by how much more.
 pub(crate) fn spread(heights: &mut [i64], reach: &impl Fn(u32, &mut dyn FnMut(u32, i64))) {
@@ -106,52 +109,130 @@ pub(crate) fn relax_between_pins(network: &Network, costs: &mut [i32], pins: &[P
     }
     for _ in 0..STEEPER_ROUNDS_MAX {
         let (least, most) = bounds(network, costs, pins);
-        if !raise_torn(network, costs, (&least, &most), &|_| NONE) {
+        if !raise_torn(network, costs, (&least, &most)) {
             break;
         }
     }
 }
 
-/// Raises the grade where limits of cut and fill contradict it, a quarter at a time and at most to `most` of each
-/// edge. `limits` are the least and the greatest height of nodes that have any.
+/// Raises the grade where limits of cut and fill contradict it, to `most` of an edge, on no more of a way than that
+/// asks for and where the ground is steepest. `limits` are the least and the greatest height of nodes that have any.
+///
+/// `beyond` are the nodes that lie beyond their limits as long as no grade gives way: where little does for much that
+/// would have to become steeper, it stays as it is.
 pub(crate) fn relax_within(
     network: &Network,
     costs: &mut [i32],
     limits: &[Option<[i32; 2]>],
     most: &dyn Fn(u32) -> i32,
+    beyond: &dyn Fn(u32) -> bool,
 ) {
     let start = |none: i32, end: usize| limits.iter().map(|limit| limit.map_or(none, |limit| limit[end])).collect();
+    let (hard, mut asking) = (costs.to_vec(), None);
     for _ in 0..STEEPER_ROUNDS_MAX {
         let (above, below) = (highest(network, costs, start(-NONE, 0)), lowest(network, costs, start(NONE, 1)));
-        if !raise_torn(network, costs, (&above, &below), most) {
+        let lacks: Vec<i32> = above.iter().zip(&below).map(|(above, below)| above - below).collect();
+        let mut part = parts_that_lack(network, &lacks);
+        if !raise_steepest(network, costs, (&lacks, &mut part), limits, most) {
             break;
         }
+        asking.get_or_insert(part);
+    }
+    let Some(mut part) = asking else { return };
+    let (mut steeper, mut off): (Vec<i64>, Vec<i64>) = (vec![0; part.len()], vec![0; part.len()]);
+    for (edge, (cost, hard)) in network.edges.iter().zip(costs.iter().zip(&hard)) {
+        steeper[root(&mut part, edge.a) as usize] += if hard < cost { i64::from(edge.length) } else { 0 };
+    }
+    for node in (0..part.len() as u32).filter(|node| beyond(*node)) {
+        let decimetres = network.decimetres_at(node);
+        off[root(&mut part, node) as usize] += decimetres * i64::from(terrain::QUANTA_PER_METRE) / 10;
+    }
+    for (edge, (cost, hard)) in network.edges.iter().zip(costs.iter_mut().zip(hard)) {
+        let part = root(&mut part, edge.a) as usize;
+        *cost = if steeper[part] <= STEEPER_PER_BEYOND * off[part] { *cost } else { hard };
     }
 }
 
-/// Raises by a quarter what edges may rise whose ends both have to lie above their greatest height; whether it did.
-fn raise_torn(
+/// The part in which each node stands: what hangs together by edges both ends of which lack height.
+fn parts_that_lack(network: &Network, lacks: &[i32]) -> Vec<u32> {
+    let mut part: Vec<u32> = (0..lacks.len() as u32).collect();
+    for edge in network.edges.iter().filter(|edge| 0 < lack(lacks, edge)) {
+        let (a, b) = (root(&mut part, edge.a), root(&mut part, edge.b));
+        part[a.max(b) as usize] = a.min(b);
+    }
+    part
+}
+
+/// What both ends of an edge lack at least.
+fn lack(lacks: &[i32], edge: &Edge) -> i32 {
+    lacks[edge.a as usize].min(lacks[edge.b as usize])
+}
+
+/// Raises what edges may rise in each part of a network that lacks height: among those that lack at least half of what
+/// most does the steepest, until they make up for it. Whether it did.
+fn raise_steepest(
     network: &Network,
     costs: &mut [i32],
-    (least, most): (&[i32], &[i32]),
-    most_of: &dyn Fn(u32) -> i32,
+    (lacks, part): (&[i32], &mut [u32]),
+    limits: &[Option<[i32; 2]>],
+    most: &dyn Fn(u32) -> i32,
 ) -> bool {
-    let torn = |node: u32| most[node as usize] < least[node as usize];
-    let mut raised = false;
-    for (number, edge) in network.edges.iter().enumerate() {
-        let (cost, top) = (costs[number], most_of(number as u32));
-        if cost < top && torn(edge.a) && torn(edge.b) {
-            costs[number] = (cost + (cost / 4).max(1)).min(top);
-            raised = true;
+    let steepness = |edge: &Edge| {
+        let middle = |node: u32| limits[node as usize].map(|[least, most]| i64::from(least) + i64::from(most));
+        let rise = middle(edge.a).zip(middle(edge.b)).map_or(0, |(a, b)| (a - b).abs());
+        rise * 1_000_000 / i64::from(edge.length.max(1))
+    };
+    let mut by_part: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+    for (number, edge) in (0u32..).zip(&network.edges) {
+        if 0 < lack(lacks, edge) && costs[number as usize] < most(number) {
+            by_part.entry(root(part, edge.a)).or_default().push(number);
+        }
+    }
+    let raised = !by_part.is_empty();
+    for mut edges in by_part.into_values() {
+        let of = |edge: &u32| &network.edges[*edge as usize];
+        let deepest = edges.iter().map(|edge| lack(lacks, of(edge))).max().unwrap_or(0);
+        edges.retain(|edge| deepest <= 2 * lack(lacks, of(edge)));
+        edges.sort_by_key(|edge| (Reverse(steepness(of(edge))), *edge));
+        let gains: Vec<i32> = edges.iter().map(|edge| most(*edge) - costs[*edge as usize]).collect();
+        // An eighth at least, so that rounds are few where much lies beside what asks for it.
+        let mut wanted = (2 * i64::from(deepest)).max(gains.iter().map(|gain| i64::from(*gain)).sum::<i64>() / 8);
+        for (edge, gain) in edges.into_iter().zip(gains) {
+            if wanted <= 0 {
+                break;
+            }
+            costs[edge as usize] += gain;
+            wanted -= i64::from(gain);
         }
     }
     raised
 }
 
+/// Raises by a quarter what edges may rise whose ends both have to lie above their greatest height; whether it did.
+fn raise_torn(network: &Network, costs: &mut [i32], (least, most): (&[i32], &[i32])) -> bool {
+    let torn = |node: u32| most[node as usize] < least[node as usize];
+    let mut raised = false;
+    let both = |edge: &Edge| torn(edge.a) && torn(edge.b);
+    for (cost, _) in costs.iter_mut().zip(&network.edges).filter(|(_, edge)| both(edge)) {
+        *cost += (*cost / 4).max(1);
+        raised = true;
+    }
+    raised
+}
+
+/// The tree in which a node stands.
+pub(crate) fn root(tree: &mut [u32], mut node: u32) -> u32 {
+    while tree[node as usize] != node {
+        tree[node as usize] = tree[tree[node as usize] as usize];
+        node = tree[node as usize];
+    }
+    node
+}
+
 /// Writes down where the greatest grade is exceeded, once for each feature: the worst of it, and its length.
 pub(crate) fn remark_steep(network: &Network, heights: &[i32], give: &dyn Fn(u32) -> i32, remarks: &mut Vec<Remark>) {
     // Of each way: the steepest grade with its node, and quanta that are steeper than they may be.
-    let mut worst: std::collections::BTreeMap<u32, (u32, u32, i64)> = std::collections::BTreeMap::new();
+    let mut worst: BTreeMap<u32, (u32, u32, i64)> = BTreeMap::new();
     let mut beyond: std::collections::BTreeSet<u32> = std::collections::BTreeSet::new();
     for (number, edge) in network.edges.iter().enumerate() {
         let rise = (heights[edge.a as usize] - heights[edge.b as usize]).abs();
@@ -243,7 +324,7 @@ mod tests {
                 .collect();
             let most = |edge: u32| network.edges[edge as usize].rise_max * 3 / 2;
             let mut raised = costs(&network);
-            relax_within(&network, &mut raised, &limits, &most);
+            relax_within(&network, &mut raised, &limits, &most, &|_| true);
             let paths = all_paths(&network);
             let torn = (0..limits.len()).any(|s| (0..limits.len()).any(|t| {
                 paths[s][t] < i64::from(heights[s % 64]) - i64::from(heights[t % 64]) - 400

@@ -80,7 +80,7 @@ fn all_stages(sources: Vec<Source>, metres: &dyn Fn(f64, f64) -> f64, most: u32)
     let crossed = water(&strands);
     let afloat = afloat(&rounded.outlines, &waters.lakes, &roads, &sides(&roads), &site);
     let pins = with_water(&roads, Vec::new(), &afloat, &mut remarks);
-    let heights = grade(&roads, &ground, &pins, &crossed, GradeOptions::USUAL, &mut remarks);
+    let heights = grade(&roads, [&ground; 2], &pins, &crossed, GradeOptions::USUAL, &mut remarks);
     for (number, edge) in roads.edges.iter().enumerate() {
         let rise = (heights[edge.a as usize] - heights[edge.b as usize]).abs();
         assert!(rise <= edge.rise_max * 3 / 2, "edge {number} is too steep");

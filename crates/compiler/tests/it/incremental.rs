@@ -204,7 +204,7 @@ fn a_moved_road_rebuilds_only_tiles_that_it_reaches_each_with_its_cause() {
     });
     drop(scene.build("area", 2));
     // As many triangles as before, so that no threshold moves.
-    fs::write(scene.path("features.geojson"), features(4595.0)).unwrap();
+    fs::write(scene.path("features.geojson"), features(4599.0)).unwrap();
     let (heard, refined) = rebuilt(&scene, "a moved road");
     assert_eq!(heard.profiled, [tile(2, 2)], "the ground is asked anew where the road was moved");
     assert!(refined.contains(&tile(2, 2)) && refined.len() < 9, "{refined:?}");

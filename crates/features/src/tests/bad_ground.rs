@@ -83,22 +83,40 @@ fn hill(east: f64, north: f64) -> f64 {
 #[test]
 fn a_road_over_a_spike_of_the_dem_stays_on_the_ground_around_it() {
     let road = way(1, "highway=secondary", &[(10.0, 20.0), (90.0, 20.0)]);
-    for wide in [0.6, 1.6, 2.6] {
-        let spiked = |east: f64, north: f64| hill(east, north) + if (east - 50.0).abs() < wide { 300.0 } else { 0.0 };
+    // One post, a wall across the road, and five posts along it.
+    for (along, across, off_max) in [(0.6, 0.6, 1.0), (0.6, 90.0, 1.0), (2.6, 0.6, 5.0)] {
+        let is_in = |east: f64, north: f64| (east - 50.0).abs() < along && (north - 20.0).abs() < across;
+        let spiked = |east: f64, north: f64| hill(east, north) + if is_in(east, north) { 300.0 } else { 0.0 };
         let laid = Laid::of(vec![road.clone()], spiked);
         let off = laid.farthest(&[Role::Side, Role::Centre], hill);
-        // Limits weigh twenty times as much as the ground, so a spike lifts the road a little, whatever its height.
-        assert!(off < 20.0, "{wide}: {off} m");
+        assert!(off < off_max, "{along} {across}: {off} m");
         assert_eq!(laid.levelled.earthworks.far_off[0].off.signum(), -1, "the cut through it is told");
+    }
+}
+
+/// A wall five posts thick may be ground, as far as anyone can tell. What lies beyond limits weighs twenty times as
+/// much as the ground, so the road is lifted until what lies too high outweighs that, however high the wall is.
+#[test]
+fn a_wall_too_wide_for_a_spike_lifts_a_road_no_more_than_its_limits_weigh() {
+    let road = way(1, "highway=secondary", &[(10.0, 20.0), (90.0, 20.0)]);
+    let mut before = 0.0;
+    for tall in [100.0, 300.0, 1000.0] {
+        let walled = |east: f64, north: f64| hill(east, north) + if (east - 50.0).abs() < 2.6 { tall } else { 0.0 };
+        let off = Laid::of(vec![road.clone()], walled).farthest(&[Role::Side, Role::Centre], hill);
+        assert!(off < 20.0 && (before == 0.0 || before == off), "{tall}: {off} m, as for any height: {before} m");
+        before = off;
     }
 }
 
 #[test]
 fn a_river_over_a_pit_of_the_dem_passes_over_it() {
     let river = way(1, "waterway=river", &[(90.0, 20.0), (10.0, 20.0)]);
-    let pit = |east: f64, north: f64| hill(east, north) - if (east - 50.0).abs() < 1.6 { 300.0 } else { 0.0 };
-    let off = Laid::of(vec![river], pit).farthest(&[Role::Channel], hill);
-    assert!(off < 10.0, "within the limits of cut and fill: {off} m");
+    for (along, across, off_max) in [(0.6, 90.0, 1.0), (1.6, 0.6, 2.0), (1.6, 90.0, 6.0)] {
+        let is_in = |east: f64, north: f64| (east - 50.0).abs() < along && (north - 20.0).abs() < across;
+        let pit = |east: f64, north: f64| hill(east, north) - if is_in(east, north) { 300.0 } else { 0.0 };
+        let off = Laid::of(vec![river.clone()], pit).farthest(&[Role::Channel], hill);
+        assert!(off < off_max, "{along} {across}: {off} m");
+    }
 }
 
 #[test]
