@@ -1,5 +1,7 @@
 //! What there is to choose from, and what came of it.
 
+use std::collections::BTreeMap;
+
 use crate::outlay::Outlays;
 use crate::pieces::is_narrow;
 use crate::shares::{Limit, Shares};
@@ -45,15 +47,18 @@ pub(crate) struct Chosen {
 }
 
 /// One part in so many may be left out where nearly everything is in the ground.
-const LEFT_OUT_PARTS: i64 = 50;
+const LEFT_OUT_PARTS: i64 = 20;
 
 impl Choice<'_> {
-    /// Whether nearly everything inside the area was chosen, by length.
+    /// Whether nearly everything inside the area was chosen, by length, of each class.
     pub fn has_nearly_all(&self, chosen: &Chosen) -> bool {
-        let inside = || self.stretches.all.iter().zip(&chosen.ways).filter(|(of, _)| of.is_inside);
-        let all: i64 = inside().map(|(of, _)| of.length).sum();
-        let out: i64 = inside().filter(|(_, way)| way.is_err()).map(|(of, _)| of.length).sum();
-        LEFT_OUT_PARTS * out <= all
+        let mut of_class: BTreeMap<u16, [i64; 2]> = BTreeMap::new();
+        for (of, way) in self.stretches.all.iter().zip(&chosen.ways).filter(|(of, _)| of.is_inside) {
+            let [all, out] = of_class.entry(of.class).or_default();
+            *all += of.length;
+            *out += if way.is_err() { of.length } else { 0 };
+        }
+        of_class.values().all(|[all, out]| LEFT_OUT_PARTS * out <= *all)
     }
 
     /// The widest form that any part of a stretch may have.

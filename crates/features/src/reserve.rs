@@ -89,12 +89,12 @@ pub fn reserve(
     let mut before = vec![0; shares.modules.len()];
     // One full load module on its way makes a line of all of a motorway, so that main kinds may use all of their share
     // for their width, unless other ways lose their place by it.
-    let mut wider = Tier::Main;
+    let mut wider = Tier::Wide;
     let mut chosen = choice.choose(&before, wider);
     let mut taking_back = TakingBack::new(&choice);
     let mut round = 0;
     loop {
-        if wider == Tier::Main && !choice.has_nearly_all(&chosen) {
+        if wider == Tier::Wide && !choice.has_nearly_all(&chosen) {
             (wider, round) = (Tier::Others, 0);
             before.fill(0);
             chosen = choice.choose(&before, wider);

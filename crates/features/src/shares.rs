@@ -17,7 +17,7 @@ impl Share {
     pub const ALL: Self = Self { main: u64::MAX, others: u64::MAX };
 
     fn of(self, tier: Tier) -> i64 {
-        let most = if tier == Tier::Main { self.main } else { self.others };
+        let most = if tier == Tier::Others { self.others } else { self.main };
         i64::try_from(most).unwrap_or(i64::MAX)
     }
 }
@@ -87,6 +87,8 @@ impl Shares {
 pub(crate) enum Tier {
     /// That of the main kinds.
     Main,
+    /// That of the main kinds in load modules and windows, that of all others in the area: the ground has its half.
+    Wide,
     /// That of all others.
     Others,
 }
@@ -152,7 +154,8 @@ impl<'a> Ledger<'a> {
         let cols = self.shares.origins()[1];
         let of_window = found.map(|window| Limit::Window(window / cols, window % cols));
         let sum: i64 = changes.iter().map(|(_, by)| by).sum();
-        let of_area = (0 < sum && self.shares.area.of(tier) < self.area).then_some(Limit::Area);
+        let in_area = if tier == Tier::Wide { Tier::Others } else { tier };
+        let of_area = (0 < sum && self.shares.area.of(in_area) < self.area).then_some(Limit::Area);
         of_window.or(of_area)
     }
 
