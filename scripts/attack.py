@@ -169,6 +169,9 @@ class Attack:
 
     def agree(self, what, faults, *arguments):
         code, said = self.run(*arguments)
+        # What limits left under the ground is told, and no damage.
+        if re.search(r"[1-9]\d* of them\s+under\s+the\s+ground", said):
+            faults = faults - {"deck"}
         if code == 0 and faults:
             self.fault("blind", f"{what} says sound, and the judge found {', '.join(sorted(faults))}")
         if code != 0 and not faults:

@@ -7,9 +7,9 @@ use engine::{Artifact, Fingerprint, Key, Outcome, Stamp, keep_or_make};
 use fidelity::{Curvature, FeatureFigures, Residuals, Tally};
 use ground::Window;
 use job::{Borders, ClipHeights as JobClipHeights, Edges, Job, OuterBorder};
-use load_modules::{ClipHeights, Layout, clip, concatenate, cut_decks, cut_lines};
+use load_modules::{ClipHeights, Layout, clip, concatenate, cut_decks, cut_lines, lift_decks};
 use terrain::{
-    HOLE_CLASS, Importance, LatticePoint, LoadModule, ModuleCounts, Post, PostRect, TileId, Tin, Vertex, in_turn,
+    Decks, HOLE_CLASS, Importance, LatticePoint, LoadModule, ModuleCounts, Post, PostRect, TileId, Tin, Vertex, in_turn,
 };
 
 use crate::assembled::{Assembled, ModuleNumbers};
@@ -111,13 +111,14 @@ fn make(assembling: &Assembling, stamp: &Stamp) -> Result<(Assembled, Sums), Com
         }
     };
     let decks = cut_decks(&features.decks, features.kept.steps_per_post, &layout);
-    modules.iter_mut().zip(decks).for_each(|(module, decks)| module.decks = decks);
+    lift(&mut modules, &decks);
     let lines = cut_lines(keys::lines_of(run.job, &features), features.kept.steps_per_post, &layout);
     modules.iter_mut().zip(lines).for_each(|(module, lines)| module.lines = lines);
     let residuals = fidelity::measure(&mut modules, &window.measured(area));
     let at_source = at_source(run, tile, &modules)?;
     let figures = feature_figures(run, tile, (&own.tin, &modules), &window)?;
     let mut levels = all_levels(run, modules, (&layout, &window.dem, &natural.importance), &features);
+    levels[1..].iter_mut().for_each(|level| lift(level, &decks));
     levels[1..].iter_mut().for_each(|level| drop(fidelity::measure(level, &window.measured(area))));
     let file = publish(run, tile, &layout, fingerprint, &levels)?;
     let counted = count_points(run, &own.tin, &removed[area.tiling.index(tile)], &window.importance);
@@ -127,6 +128,13 @@ fn make(assembling: &Assembling, stamp: &Stamp) -> Result<(Assembled, Sums), Com
     let sums = Sums { features: figures, ..sums(residuals, at_source, counted, ground) };
     done.measured = run.database.write_measured(stamp, &to_measured(tile, &done, &sums))?;
     Ok((done, sums))
+}
+
+/// Gives load modules their decks, raised onto the ground of each.
+fn lift(modules: &mut [LoadModule], decks: &[(Decks, usize)]) {
+    for (module, (decks, most)) in modules.iter_mut().zip(decks).filter(|(_, (decks, _))| !decks.is_empty()) {
+        module.decks = lift_decks(decks, module, *most);
+    }
 }
 
 /// Residuals against the sources alone: at the posts of the working grid, where features or water are burned into it,

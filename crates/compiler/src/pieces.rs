@@ -397,7 +397,8 @@ fn metres_of(run: &Run, read: &ReadFeatures) -> impl Fn((Place, i32)) -> [f64; 3
     }
 }
 
-/// Triangles that features add to each load module, whatever else it holds, by its place: of the ground, and decks.
+/// Triangles that features add to each load module, whatever else it holds, by its place: of the ground, and decks
+/// with what raising them may add.
 pub(crate) fn reserved(run: &Run, formed: &Formed, pieces: &[TileFeatures]) -> Vec<(u32, u32)> {
     let (area, job) = (&run.area, run.job);
     let steps_per_post = pieces.first().map_or(LATTICE_PER_POST, |piece| piece.kept.steps_per_post);
@@ -410,8 +411,8 @@ pub(crate) fn reserved(run: &Run, formed: &Formed, pieces: &[TileFeatures]) -> V
         let modules = area.tiling.modules(piece.tile, area.grid);
         let layout = Layout { grid: area.grid, modules, spacing: area.frame.spacing };
         let decks = cut_decks(&piece.decks, piece.kept.steps_per_post, &layout);
-        for (module, decks) in modules.iter().zip(decks).filter(|(_, decks)| !decks.is_empty()) {
-            *cost.entry(module).or_insert(0) += decks.triangles.len() as u32;
+        for (module, (_, most)) in modules.iter().zip(decks).filter(|(_, (decks, _))| !decks.is_empty()) {
+            *cost.entry(module).or_insert(0) += most as u32;
         }
     }
     cost.into_iter().map(|(module, triangles)| (area.grid.index(module) as u32, triangles)).collect()

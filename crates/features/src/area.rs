@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 
 use terrain::Each;
 
+use crate::aground::{Beside, uncut, under_hills};
 use crate::earthworks::{Laid, earthworks};
 use crate::pieces::moved;
 use crate::rules::Sorted;
@@ -28,6 +29,7 @@ pub struct AreaFeatures {
     dams: HashSet<Place>,
     roads: Network,
     road_sides: Vec<[Place; 2]>,
+    deck_sides: Beside,
     rivers: Network,
     river_banks: Vec<[Place; 2]>,
     /// What stands for the names of features that have one.
@@ -118,6 +120,7 @@ impl AreaFeatures {
         let roads = Network::of(&travelled(&rounded), site.lattice, &mut remarks);
         let rivers = Network::of(&flowing(&rounded), site.lattice, &mut remarks);
         let (road_sides, river_banks) = (sides(&roads), a_post_aside(&rivers));
+        let deck_sides = Beside::of(&roads);
         let (dams, lines) = (dams(&rounded), breaklines(&rounded, &|_| None));
         let outlines = split_at_dams(rounded.outlines, &rounded.ways);
         let ways = rounded.ways;
@@ -130,6 +133,7 @@ impl AreaFeatures {
             dams,
             roads,
             road_sides,
+            deck_sides,
             rivers,
             river_banks,
             names,
@@ -162,6 +166,7 @@ impl AreaFeatures {
     fn asked(&self) -> Vec<Place> {
         let nodes = [&self.roads, &self.rivers].into_iter().flat_map(|network| &network.nodes).map(|node| node.place);
         let beside = [&self.road_sides, &self.river_banks].into_iter().flatten().flatten().copied();
+        let beside = beside.chain(self.deck_sides.places());
         let shores = self.outlines.iter().flat_map(Outline::places);
         let lines = self.lines.iter().flat_map(|line| &line.stations).map(|(place, _)| *place);
         let mut all: Vec<Place> = nodes.chain(beside).chain(shores).chain(lines).collect();
@@ -190,11 +195,14 @@ impl AreaFeatures {
         strands.extend(self.breaklines(&near));
         let roads = &self.roads;
         let resting = ground_of(roads, &at, &near);
+        let hills = under_hills(roads, &resting, options.cut_max, &mut remarks);
         let afloat = afloat(&self.outlines, &lakes, roads, &self.road_sides, &self.site);
         let pins = with_water(roads, pins(roads, &self.ways), &afloat, &mut remarks);
         let amid: Vec<Option<i32>> =
             roads.nodes.iter().zip(&resting).map(|(node, ground)| middle(node.place).or(*ground)).collect();
-        let heights = grade(roads, [&resting, &amid], &pins, &water(&strands), options, &mut remarks);
+        let mut below = water(&strands);
+        below.extend(uncut(roads, (&self.deck_sides, &hills), &at, options.cut_max));
+        let heights = grade(roads, [&resting, &amid], &pins, &below, options, &mut remarks);
         let beside = |(sides, height): (&[Place; 2], &i32)| sides.map(|place| at(place).unwrap_or(*height));
         let beside: Vec<[i32; 2]> = self.road_sides.iter().zip(&heights).map(beside).collect();
         let grants = Grants::default();

@@ -1,8 +1,7 @@
 //! Bridges and tunnels: straight between their ends, free of what runs below, and never touching the ground.
 
 use crate::clean::Notes;
-use crate::exact::Segment;
-use crate::quarters::segment_pairs;
+use crate::passing::{Lack, lacks, overs};
 use crate::sweep::{Swept, highest};
 use crate::{Flaw, Kind, Network, Place, Remark, Remedy, Storey};
 
@@ -21,7 +20,7 @@ impl Clearances {
     /// 4.5 m over roads, 6 m over railways, 1 m over water.
     pub const USUAL: Self = Self { road: 4 * 128 + 64, rail: 6 * 128, water: 128 };
 
-    fn over(&self, kind: Kind) -> i32 {
+    pub(crate) fn over(&self, kind: Kind) -> i32 {
         match kind {
             Kind::Rail => self.rail,
             kind if kind.is_travelled() => self.road,
@@ -146,14 +145,6 @@ pub(crate) fn straighten(network: &Network, costs: &[i32], heights: &mut [i32]) 
     }
 }
 
-/// Where a deck crosses something below: the passage, how much is missing, and where.
-struct Crossing {
-    passage: u32,
-    edge: u32,
-    place: Place,
-    lack: i32,
-}
-
 /// Raises decks clear of what they cross as far as the grade allows; what is left is written down.
 pub(crate) fn clear(
     network: &Network,
@@ -166,15 +157,18 @@ pub(crate) fn clear(
     if !decks.iter().any(|passage| passage.is_deck) {
         return;
     }
-    let pairs = crossing_pairs(network, &decks, water);
-    // The second round is for decks whose road below was raised with them.
-    for _ in 0..2 {
-        let lacks = lacks(network, &swept.heights, &pairs, water, clearances);
+    let overs = overs(network, &decks, water);
+    // A round more for decks whose road below was raised with them.
+    for _ in 0..CLEAR_ROUNDS {
+        let lacks = lacks(network, &swept.heights, &overs, water, clearances);
+        if lacks.is_empty() {
+            break;
+        }
         let mut needed: Vec<i32> = vec![i32::MIN / 2; network.nodes.len()];
-        for crossing in &lacks {
-            let nodes = &decks[crossing.passage as usize].nodes;
+        for lack in &lacks {
+            let nodes = &decks[lack.passage as usize].nodes;
             for &end in [nodes[0], nodes[nodes.len() - 1]].iter() {
-                let raised = (swept.heights[end as usize] + crossing.lack).min(swept.most[end as usize]);
+                let raised = (swept.heights[end as usize] + lack.lack).min(swept.most[end as usize]);
                 needed[end as usize] = needed[end as usize].max(raised);
             }
         }
@@ -184,77 +178,15 @@ pub(crate) fn clear(
         }
         straighten(network, &swept.costs, &mut swept.heights);
     }
-    for crossing in lacks(network, &swept.heights, &pairs, water, clearances) {
-        let id = network.ways[network.edges[crossing.edge as usize].way as usize].id;
-        let flaw = Flaw::ClearanceLacks { quanta: crossing.lack };
-        Notes { id, lattice: network.lattice, remarks }.write_at(crossing.place, flaw, Remedy::LeftAsItIs);
+    for Lack { edge, lack, place, .. } in lacks(network, &swept.heights, &overs, water, clearances) {
+        let id = network.ways[network.edges[edge as usize].way as usize].id;
+        let flaw = Flaw::ClearanceLacks { quanta: lack };
+        Notes { id, lattice: network.lattice, remarks }.write_at(place, flaw, Remedy::LeftAsItIs);
     }
 }
 
-/// A deck's passage and edge, and what it crosses: an edge, or a piece of water counted on from the edges.
-type Pair = (u32, u32, u32, Place);
-
-fn crossing_pairs(network: &Network, decks: &[Passage], water: &[Water]) -> Vec<Pair> {
-    let mut passage_of = vec![u32::MAX; network.edges.len()];
-    for (number, passage) in decks.iter().enumerate().filter(|(_, passage)| passage.is_deck) {
-        passage.edges.iter().for_each(|edge| passage_of[*edge as usize] = number as u32);
-    }
-    let edges = network.edges.len() as u32;
-    let mut segments: Vec<Segment> = (0..edges).map(|edge| network.segment(edge)).collect();
-    segments.extend(water.iter().map(|water| Segment { a: water.ends[0], b: water.ends[1] }));
-    let layer = |number: u32| match (number < edges).then(|| network.traits(number).storey) {
-        Some(Storey::Deck(layer)) => layer.max(1),
-        Some(Storey::Tunnel(layer)) => layer.min(-1),
-        _ => 0,
-    };
-    let mut pairs: Vec<Pair> = Vec::new();
-    segment_pairs(&segments, &mut |one, other| {
-        for (deck, below) in [(one, other), (other, one)] {
-            if edges <= deck || passage_of[deck as usize] == u32::MAX || layer(deck) <= layer(below) {
-                continue;
-            }
-            let meets = |a: u32, b: u32| {
-                let (a, b) = (&network.edges[a as usize], &network.edges[b as usize]);
-                a.a == b.a || a.a == b.b || a.b == b.a || a.b == b.b
-            };
-            if below < edges && meets(deck, below) {
-                continue;
-            }
-            if let Some(place) = segments[deck as usize].crossing(&segments[below as usize]) {
-                pairs.push((passage_of[deck as usize], deck, below, place));
-            }
-        }
-    });
-    pairs.sort_unstable();
-    pairs.dedup();
-    pairs
-}
-
-fn lacks(network: &Network, heights: &[i32], pairs: &[Pair], water: &[Water], clearances: Clearances) -> Vec<Crossing> {
-    let edges = network.edges.len() as u32;
-    let of_edge = |edge: u32| {
-        let Segment { a, b } = network.segment(edge);
-        let ends = &network.edges[edge as usize];
-        ([a, b], [heights[ends.a as usize], heights[ends.b as usize]])
-    };
-    let mut lacks = Vec::new();
-    for &(passage, edge, below, place) in pairs {
-        let (ends, levels, kind) = if below < edges {
-            let (ends, levels) = of_edge(below);
-            (ends, levels, network.traits(below).kind)
-        } else {
-            let water = &water[(below - edges) as usize];
-            (water.ends, water.heights, water.kind)
-        };
-        let (deck_ends, deck_levels) = of_edge(edge);
-        let deck = between(deck_ends, deck_levels, place);
-        let lack = between(ends, levels, place) + clearances.over(kind) - deck;
-        if 0 < lack {
-            lacks.push(Crossing { passage, edge, place, lack });
-        }
-    }
-    lacks
-}
+/// Rounds in which decks are raised: those of several storeys raise one another.
+const CLEAR_ROUNDS: usize = 4;
 
 /// The height at a place on or beside a segment, in quanta.
 pub(crate) fn between(ends: [Place; 2], heights: [i32; 2], place: Place) -> i32 {

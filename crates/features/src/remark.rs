@@ -75,6 +75,13 @@ pub enum Flaw {
         /// Quanta of 1/128 m that are missing.
         quanta: i32,
     },
+    /// A bridge whose deck would run through ground.
+    GroundAboveDeck {
+        /// How far the ground stands above it, in quanta.
+        quanta: i32,
+        /// Whole metres of it that do.
+        metres: u32,
+    },
     /// A road over a river without a bridge.
     RoadOverRiver,
     /// A river digitised uphill.
@@ -153,6 +160,9 @@ impl fmt::Display for Flaw {
             Flaw::BeyondLimit { quanta, metres: length } => {
                 let what = if *quanta < 0 { "cuts" } else { "is filled" };
                 write!(f, "it {what} by {:.1} m, and beyond the limit over {length} m", metres(quanta.abs()))
+            }
+            Flaw::GroundAboveDeck { quanta, metres: length } => {
+                write!(f, "ground stands {:.1} m above the deck, over {length} m", metres(*quanta))
             }
             Flaw::LevelRefused { found } => write!(f, "its level of {:.2} m does not fit its shore", metres(*found)),
             Flaw::ShoreBelowWater { cubic_metres } => {
@@ -303,11 +313,16 @@ impl Remedy {
         matches!(self, Remedy::LeftOut | Remedy::PartLeftOut | Remedy::Cut)
     }
 
-    /// Whether the feature is coarser than asked for because of it.
+    /// Whether the feature falls short of what was asked for because of it.
     pub fn degrades(self) -> bool {
         matches!(
             self,
-            Remedy::Narrowed | Remedy::BecameStrip | Remedy::BecameLine | Remedy::Coarser { .. } | Remedy::OutlineOnly
+            Remedy::Narrowed
+                | Remedy::BecameStrip
+                | Remedy::BecameLine
+                | Remedy::Coarser { .. }
+                | Remedy::OutlineOnly
+                | Remedy::LeftAsItIs
         )
     }
 }

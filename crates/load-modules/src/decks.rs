@@ -4,6 +4,12 @@ use terrain::{Decks, FeatureSurface, LatticePoint, ModuleId, ModuleVertex};
 
 use crate::Layout;
 
+/// Triangles that lifting may add in a load module at most.
+const SPARE_MAX: usize = 4;
+
+/// Quanta north and east together from which an edge has a corner in its middle: 4 m.
+const MIDDLE_MIN: i64 = 4 * 128;
+
 /// A corner in quanta from the area's south-west post.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct Corner {
@@ -15,11 +21,23 @@ struct Corner {
 /// The decks in each load module of a tile, row by row: polygons above the ground, told apart into triangles and cut at
 /// the squares' sides. What two load modules have on the line between them is the same.
 ///
-/// Places of `decks` are in steps of a lattice of so many steps between posts.
-pub fn cut_decks(decks: &[FeatureSurface], steps_per_post: i32, layout: &Layout) -> Vec<Decks> {
+/// Places of `decks` are in steps of a lattice of so many steps between posts. With the decks of each load module goes
+/// how many triangles they may have when they are lifted: limits are held against one for each corner of polygons that
+/// reach into it.
+pub fn cut_decks(decks: &[FeatureSurface], steps_per_post: i32, layout: &Layout) -> Vec<(Decks, usize)> {
     let step = i64::from(layout.spacing.quanta_per_post() / steps_per_post);
+    let side = layout.grid.side_cells * steps_per_post;
     let mut pieces = vec![Vec::new(); layout.modules.count()];
+    let mut corners = vec![0; layout.modules.count()];
     for deck in decks {
+        let span = |of: fn(&LatticePoint) -> i32| {
+            let all = || deck.ring.iter().map(|vertex| of(&vertex.at).div_euclid(side));
+            all().min().unwrap_or(0)..=all().max().unwrap_or(-1)
+        };
+        for row in span(|at| at.row) {
+            let slots = span(|at| at.col).filter_map(|col| layout.slot(row, col));
+            slots.for_each(|slot| corners[slot] += deck.ring.len());
+        }
         let places: Vec<LatticePoint> = deck.ring.iter().map(|vertex| vertex.at).collect();
         for triangle in ears(&places) {
             let corners = triangle.map(|corner| {
@@ -33,7 +51,11 @@ pub fn cut_decks(decks: &[FeatureSurface], steps_per_post: i32, layout: &Layout)
             cut(corners, deck.class, layout, &mut pieces);
         }
     }
-    pieces.into_iter().map(Decks::of_triangles).collect()
+    let most = |(decks, corners): (Decks, usize)| {
+        let most = decks.triangles.len().max(corners.min(decks.triangles.len() + SPARE_MAX));
+        (decks, most)
+    };
+    pieces.into_iter().map(Decks::of_triangles).zip(corners).map(most).collect()
 }
 
 /// Triangles of a simple ring by places in it, counter-clockwise, whichever way it runs; an ear at a time. What is left
@@ -77,19 +99,24 @@ fn cut(corners: [Corner; 3], class: u8, layout: &Layout, pieces: &mut [Vec<([Mod
         for col in west..=east {
             let Some(slot) = layout.slot(row as i32, col as i32) else { continue };
             let id = ModuleId { row: row as u32, col: col as u32 };
+            let [west, south] = [i64::from(id.col) * side, i64::from(id.row) * side];
             let mut polygon = corners.to_vec();
             for (axis, line, keep_above) in [
-                (Axis::X, i64::from(id.col) * side, true),
-                (Axis::X, (i64::from(id.col) + 1) * side, false),
-                (Axis::Y, i64::from(id.row) * side, true),
-                (Axis::Y, (i64::from(id.row) + 1) * side, false),
+                (Axis::X, west, true),
+                (Axis::X, west + side, false),
+                (Axis::Y, south, true),
+                (Axis::Y, south + side, false),
             ] {
                 polygon = kept(&polygon, axis, line, keep_above);
             }
             polygon.dedup();
+            let on_sides = |corner: &Corner| {
+                [corner.x == west, corner.x == west + side, corner.y == south, corner.y == south + side]
+            };
+            let polygon = with_middles(&polygon, &on_sides);
             let local = |corner: Corner| ModuleVertex {
-                y: (corner.y - i64::from(id.row) * side) as u16,
-                x: (corner.x - i64::from(id.col) * side) as u16,
+                y: (corner.y - south) as u16,
+                x: (corner.x - west) as u16,
                 z: corner.z as i32,
             };
             for pair in polygon.windows(2).skip(1) {
@@ -101,6 +128,26 @@ fn cut(corners: [Corner; 3], class: u8, layout: &Layout, pieces: &mut [Vec<([Mod
             }
         }
     }
+}
+
+/// A polygon with a corner in the middle of every long edge from one side of the load module to another, so that decks
+/// can be raised between them; one of these comes first, if there are any.
+fn with_middles(polygon: &[Corner], on_sides: &dyn Fn(&Corner) -> [bool; 4]) -> Vec<Corner> {
+    let mut all = Vec::with_capacity(2 * polygon.len());
+    let mut first = 0;
+    for (at, corner) in polygon.iter().enumerate() {
+        let next = &polygon[(at + 1) % polygon.len()];
+        let [here, there] = [corner, next].map(on_sides);
+        let is_across = here.contains(&true) && there.contains(&true) && (0..4).all(|side| !here[side] || !there[side]);
+        all.push(*corner);
+        if is_across && MIDDLE_MIN <= (corner.x - next.x).abs() + (corner.y - next.y).abs() {
+            let middle = |of: fn(&Corner) -> i64| (of(corner) + of(next)).div_euclid(2);
+            first = all.len();
+            all.push(Corner { x: middle(|at| at.x), y: middle(|at| at.y), z: middle(|at| at.z) });
+        }
+    }
+    all.rotate_left(first);
+    all
 }
 
 #[derive(Clone, Copy)]
@@ -163,8 +210,27 @@ mod tests {
         FeatureSurface { class: 5, ground: SurfaceGround::Road, body: 0, ring }
     }
 
+    fn cut_alone(deck: FeatureSurface) -> Vec<Decks> {
+        cut_decks(&[deck], 64, &layout()).into_iter().map(|(decks, _)| decks).collect()
+    }
+
     fn area(decks: &[Decks]) -> i64 {
         decks.iter().flat_map(|decks| decks.triangles.iter().map(|&triangle| decks.doubled_area(triangle))).sum()
+    }
+
+    #[test]
+    fn what_crosses_a_corner_of_a_load_module_can_be_raised_between_its_sides() {
+        let side = 20 * 64;
+        let deck = deck(&[(side, 0, 0), (2 * side, side, 0), (2 * side, side + 60, 0), (side, 60, 0)]);
+        let decks = cut_alone(deck);
+        let last = layout().side();
+        let is_inside = |at: u16| 0 < at && at < last;
+        for decks in &decks {
+            for triangle in &decks.triangles {
+                let corners = triangle.map(|corner| decks.vertices[usize::from(corner)]);
+                assert!(corners.iter().any(|at| is_inside(at.x) && is_inside(at.y)), "{corners:?}");
+            }
+        }
     }
 
     #[test]
@@ -172,7 +238,7 @@ mod tests {
         let layout = layout();
         let line = 20 * 64;
         let ring = [(100, line - 333, 0), (117, line + 401, 900), (137, line + 400, 900), (120, line - 334, 0)];
-        let cut = cut_decks(&[deck(&ring)], 64, &layout);
+        let cut = cut_alone(deck(&ring));
         cut.iter().for_each(|decks| assert_eq!(decks.check(layout.side()), Ok(())));
         let on = |index: usize, x: u16| -> Vec<(u16, i32)> {
             cut[index].vertices.iter().filter(|v| v.x == x).map(|v| (v.y, v.z)).collect()
@@ -192,12 +258,11 @@ mod tests {
 
     #[test]
     fn a_ring_may_run_either_way_and_turn_inwards_and_one_that_is_no_polygon_makes_nothing() {
-        let layout = layout();
         let inward = [(100, 100, 0), (100, 300, 0), (300, 300, 0), (150, 200, 0)];
         let mut back = inward;
         back.reverse();
-        let (one, other) = (cut_decks(&[deck(&inward)], 64, &layout), cut_decks(&[deck(&back)], 64, &layout));
+        let (one, other) = (cut_alone(deck(&inward)), cut_alone(deck(&back)));
         assert_eq!((one[0].triangles.len(), area(&one)), (2, area(&other)));
-        assert!(cut_decks(&[deck(&[(0, 0, 0), (5, 5, 0)])], 64, &layout).iter().all(Decks::is_empty));
+        assert!(cut_alone(deck(&[(0, 0, 0), (5, 5, 0)])).iter().all(Decks::is_empty));
     }
 }

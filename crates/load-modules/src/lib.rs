@@ -14,6 +14,8 @@ mod classes;
 mod concatenate;
 mod decks;
 pub use decks::cut_decks;
+mod lift;
+pub use lift::lift_decks;
 mod lines;
 pub use lines::cut_lines;
 mod pieces;

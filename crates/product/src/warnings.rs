@@ -44,7 +44,7 @@ pub struct Matter {
 }
 
 /// All that a build knows of what it made, in the order in which warnings are told.
-pub const MATTERS: [Matter; 16] = [
+pub const MATTERS: [Matter; 17] = [
     matter(
         "files, datums, holes and rules of sources that are not as they should be",
         Told::OfStage,
@@ -74,8 +74,13 @@ pub const MATTERS: [Matter; 16] = [
     ),
     matter(
         "decks under the ground",
+        Told::Warning(decks_under),
+        "corners of decks rise onto it as far as they can; vehicles would run into the ground",
+    ),
+    matter(
+        "bridges through ground that is higher",
         Told::Line,
-        "the report counts their square metres, and how far they are under it",
+        "decks rise over its triangles, whatever grade that takes; features.geojson lists each",
     ),
     matter(
         "decks too low over what they cross",
@@ -134,6 +139,19 @@ pub fn table() -> String {
     };
     let rows: String = MATTERS.iter().map(row).collect();
     format!("| what a build finds | told as | because |\n| - | - | - |\n{rows}")
+}
+
+/// Decks lie under the ground.
+fn decks_under(made: &Made) -> Vec<String> {
+    let Some(checks) = made.report.features.as_ref().map(|features| &features.checks) else { return Vec::new() };
+    let told = || {
+        format!(
+            "{} of {} square metres of decks lie under the ground, by {:.2} m at most, where no corner \
+             of theirs could rise far enough",
+            checks.deck_samples_under, checks.deck_samples, checks.deck_under_max_m
+        )
+    };
+    (0 < checks.deck_samples_under).then(told).into_iter().collect()
 }
 
 /// The share of a main class that may be left out without a warning, and that of all ways.

@@ -245,8 +245,10 @@ impl<'a> Decided<'a> {
         let is_wrong = |id: &ModuleId| {
             let at = (id.row as i32, id.col as i32);
             let decks = modules.get(id).map_or(0, |module| module.decks.triangles.len() as u32);
-            let most = triangles.get(&at).copied().unwrap_or(0) + decks;
-            let least = most - anyway.get(&at).copied().unwrap_or(0).min(most);
+            let all = triangles.get(&at).copied().unwrap_or(0) + decks;
+            let least = all - anyway.get(&at).copied().unwrap_or(0).min(all);
+            // Decks may have two corners more, each of two triangles, where ground stands above them.
+            let most = if decks == 0 { all } else { all + 4 };
             !(least..=most).contains(&reserved[grid.index(*id)])
         };
         let id = grid.all().iter().find(is_wrong)?;

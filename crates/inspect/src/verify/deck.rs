@@ -2,12 +2,39 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use terrain::{FeatureSurface, LatticePoint};
+use fidelity::DeckFigures;
+use terrain::{FeatureSurface, LatticePoint, ModuleVertex, QUANTA_PER_METRE};
 
+use super::modules::Modules;
 use super::square::{At, Square, is_on, turn};
 
-/// What is wrong with the decks of a load module: corners that are not there, corners of no deck, or less or more than
-/// the polygons cover.
+/// Quanta that rounding may put a deck above the ground onto which it was raised: 5 cm.
+const ROUNDING: f64 = 6.4;
+
+/// Square quanta of the least piece that a deck and a triangle of the ground have in common.
+const AREA_MIN: f64 = 0.5;
+
+const OF_NONE: &str = "a corner of decks is that of no bridge";
+
+/// What all decks come to, in words: their square metres, and the ground under them. That limits and the ground left
+/// some of them under it is no damage.
+pub(crate) fn told(modules: &Modules, classes: &[String]) -> Option<String> {
+    let mut all = DeckFigures::default();
+    modules.values().for_each(|module| all.merge(&DeckFigures::of(module)));
+    let metres = |quanta: f64| quanta / f64::from(QUANTA_PER_METRE);
+    let under = match all.under {
+        0 => "none of them under the ground".to_owned(),
+        some => format!("{some} of them under the ground, by {:.2} m at most", metres(all.deepest.into())),
+    };
+    let least = all.clearance.iter().filter_map(|(class, quanta)| {
+        classes.get(usize::from(*class)).map(|name| format!("{:.2} m above {name}", metres((*quanta).into())))
+    });
+    let least: Vec<String> = least.collect();
+    (0 < all.samples).then(|| format!("{} square metres, {under}; at least {}", all.samples, least.join(", ")))
+}
+
+/// What is wrong with the decks of a load module: corners that are not there, corners of no deck, corners that are
+/// higher than bridges are and ground beneath them asks for, or less or more than the polygons cover.
 pub(crate) fn wrong_decks(
     decks: &[FeatureSurface],
     at: &dyn Fn(LatticePoint) -> At,
@@ -20,31 +47,42 @@ pub(crate) fn wrong_decks(
         return None;
     }
     let inner = |y: u16, x: u16| 0 < y && y < square.module.side && 0 < x && x < square.module.side;
-    let mut expected: BTreeMap<(At, i32), BTreeSet<u8>> = BTreeMap::new();
-    for (corner, class) in decks.iter().flat_map(|deck| deck.ring.iter().map(|corner| (*corner, deck.class))) {
-        expected.entry(corner).or_default().insert(class);
+    let mut expected: BTreeMap<(At, u8), BTreeSet<i32>> = BTreeMap::new();
+    for ((at, height), class) in decks.iter().flat_map(|deck| deck.ring.iter().map(|corner| (*corner, deck.class))) {
+        expected.entry((at, class)).or_default().insert(height);
     }
     let needed: BTreeSet<(At, i32)> = decks.iter().flat_map(Deck::turns).collect();
-    let corner = |v: u16| {
-        let vertex = found.vertices[usize::from(v)];
-        (square.at(vertex.y, vertex.x), vertex.z)
-    };
-    let mut seen: BTreeSet<(At, i32)> = BTreeSet::new();
+    let mut seen: BTreeMap<At, i32> = BTreeMap::new();
+    // Corners that are higher than any of their bridges, and whether a triangle of theirs rests on the ground.
+    let mut raised: BTreeMap<u16, bool> = BTreeMap::new();
     for (triangle, class) in found.triangles.iter().zip(&found.classes) {
+        let above = height_above(square, triangle.map(|v| found.vertices[usize::from(v)]));
         for &v in triangle {
             let vertex = found.vertices[usize::from(v)];
             if !inner(vertex.y, vertex.x) {
                 continue;
             }
-            if !expected.get(&corner(v)).is_some_and(|classes| classes.contains(class)) {
-                return Some("a corner of decks is that of no bridge".to_owned());
+            let at = square.at(vertex.y, vertex.x);
+            let told = expected.get(&(at, *class)).cloned().unwrap_or_else(|| {
+                decks.iter().filter(|deck| deck.class == *class && deck.holds(at)).flat_map(Deck::reach).collect()
+            });
+            if told.first().is_none_or(|least| vertex.z < *least) {
+                return Some(OF_NONE.to_owned());
             }
-            seen.insert(corner(v));
+            if !told.contains(&vertex.z) {
+                *raised.entry(v).or_default() |= above <= ROUNDING;
+            }
+            let highest = seen.entry(at).or_insert(vertex.z);
+            *highest = (*highest).max(vertex.z);
         }
+    }
+    if raised.values().any(|rests| !rests) {
+        return Some(format!("{OF_NONE}, and no ground stands so high"));
     }
     let [south, west, north, east] = square.reach();
     let is_inside = |(y, x): At| south < y && y < north && west < x && x < east;
-    let missing = needed.iter().filter(|(at, height)| is_inside(*at) && !seen.contains(&(*at, *height))).count();
+    let is_missing = |at: &At, height: &i32| seen.get(at).is_none_or(|highest| highest < height);
+    let missing = needed.iter().filter(|(at, height)| is_inside(*at) && is_missing(at, height)).count();
     if 0 < missing {
         return Some(format!("lacks {missing} corners of decks of bridges"));
     }
@@ -54,6 +92,44 @@ pub(crate) fn wrong_decks(
     let rounding: f64 = decks.iter().filter(|deck| deck.touches(square)).map(Deck::perimeter).sum();
     let is_other = rounding < (told - covered).abs();
     is_other.then(|| "its decks cover not what the bridges do".to_owned())
+}
+
+/// How high a triangle of decks is above the ground at least, in quanta.
+fn height_above(square: &Square, deck: [ModuleVertex; 3]) -> f64 {
+    let at = |vertex: ModuleVertex| [f64::from(vertex.y), f64::from(vertex.x)];
+    let deck = deck.map(|vertex| (at(vertex), f64::from(vertex.z)));
+    let mut least = f64::INFINITY;
+    for ground in &square.module.triangles {
+        let ground = ground.map(|v| square.module.vertices[usize::from(v)]).map(|v| (at(v), f64::from(v.z)));
+        let apart = |axis: usize| {
+            let span = |of: [([f64; 2], f64); 3]| of.map(|(at, _)| at[axis]);
+            let (one, other) = (span(deck), span(ground));
+            one.iter().all(|a| other.iter().all(|b| a <= b)) || one.iter().all(|a| other.iter().all(|b| b <= a))
+        };
+        if apart(0) || apart(1) {
+            continue;
+        }
+        let mut common: Vec<[f64; 2]> = deck.map(|(at, _)| at).to_vec();
+        for side in 0..3 {
+            let [from, to] = [ground[side].0, ground[(side + 1) % 3].0];
+            common = half(&common, |at| doubled(from, to, at));
+        }
+        let area: f64 = (2..common.len()).map(|next| doubled(common[0], common[next - 1], common[next])).sum();
+        let heights =
+            common.iter().filter(|_| AREA_MIN <= area).map(|at| height_in(deck, *at) - height_in(ground, *at));
+        least = heights.fold(least, f64::min);
+    }
+    least
+}
+
+/// Twice the area of a triangle of places, north before east: positive where it turns left.
+fn doubled(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
+    (b[1] - a[1]) * (c[0] - a[0]) - (b[0] - a[0]) * (c[1] - a[1])
+}
+
+/// The height of a triangle's plane at a place.
+fn height_in([(a, of_a), (b, of_b), (c, of_c)]: [([f64; 2], f64); 3], at: [f64; 2]) -> f64 {
+    (of_a * doubled(b, c, at) + of_b * doubled(c, a, at) + of_c * doubled(a, b, at)) / doubled(a, b, c)
 }
 
 /// Decks but for repeated ones.
@@ -110,6 +186,19 @@ impl Deck {
             && !(0..count).any(|one| (one + 1..count).any(|other| far(one, other) && touch(edges[one], edges[other])))
     }
 
+    /// Whether a place lies in it, or as near to its edges as rounding puts it.
+    fn holds(&self, at: At) -> bool {
+        let crosses = |[a, b]: &&[At; 2]| (a.0 <= at.0) != (b.0 <= at.0) && (turn(*a, *b, at) < 0) == (b.0 < a.0);
+        let edges = self.edges();
+        edges.iter().filter(crosses).count() % 2 == 1 || edges.iter().any(|edge| from_edge(*edge, at) <= 2.0)
+    }
+
+    /// All heights between its own, as rounding puts them.
+    fn reach(&self) -> std::ops::RangeInclusive<i32> {
+        let heights = || self.ring.iter().map(|(_, height)| *height);
+        heights().min().unwrap_or(0) - 1..=heights().max().unwrap_or(0) + 1
+    }
+
     fn touches(&self, square: &Square) -> bool {
         let [south, west, north, east] = square.reach();
         let span = |of: fn(&At) -> i64| {
@@ -140,6 +229,15 @@ impl Deck {
         };
         ((0..ring.len()).map(cross).sum::<f64>() / 2.0).abs()
     }
+}
+
+/// Quanta from a place to an edge.
+fn from_edge([a, b]: [At; 2], at: At) -> f64 {
+    let [along, across] =
+        [[b.0 - a.0, b.1 - a.1], [at.0 - a.0, at.1 - a.1]].map(|step| step.map(|quanta| quanta as f64));
+    let whole = along[0] * along[0] + along[1] * along[1];
+    let share = ((along[0] * across[0] + along[1] * across[1]) / whole.max(1.0)).clamp(0.0, 1.0);
+    (across[0] - share * along[0]).hypot(across[1] - share * along[1])
 }
 
 /// What of a ring lies where `above` is not negative. What remains of one that turns inwards may run to and fro along

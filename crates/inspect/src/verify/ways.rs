@@ -171,7 +171,10 @@ impl<'a> Ground<'a> {
     fn bare(&self, a: At, b: At) -> Vec<(f64, f64)> {
         let line = Along::of(a, b);
         let edges = self.square.edges.iter().filter_map(|ends| line.beside(*ends, self.aside));
-        line.bare(edges.chain(self.of_features.iter().filter_map(|corners| line.within(*corners))).collect())
+        // Corners of strips are rounded as lines are.
+        let asides = [-self.aside, 0.0, self.aside];
+        let within = |corners: &[At; 3]| asides.map(|aside| line.within(*corners, aside)).into_iter().flatten();
+        line.bare(edges.chain(self.of_features.iter().flat_map(within)).collect())
     }
 }
 
@@ -221,9 +224,9 @@ impl Along {
         if aside < off.abs().max(off_too.abs()) { None } else { self.part(from, to) }
     }
 
-    /// The part inside a triangle.
-    fn within(&self, corners: [At; 3]) -> Option<(f64, f64)> {
-        let places = corners.map(|corner| self.of_place(corner));
+    /// The part inside a triangle of what lies so far beside it.
+    fn within(&self, corners: [At; 3], aside: f64) -> Option<(f64, f64)> {
+        let places = corners.map(|corner| self.of_place(corner)).map(|[along, off]| [along, off - aside]);
         let mut crossed: Vec<f64> = Vec::new();
         for (one, other) in [(0, 1), (1, 2), (2, 0)] {
             let ([from, off], [to, off_too]) = (places[one], places[other]);
@@ -250,7 +253,7 @@ mod tests {
             [[left[0], right[0], right[1]], [left[0], right[1], left[1]]],
             [[left[0], right[0], left[1]], [right[0], right[1], left[1]]],
         ] {
-            let there = corners.iter().filter_map(|corners| line.within(*corners)).collect();
+            let there = corners.iter().filter_map(|corners| line.within(*corners, 0.0)).collect();
             assert_eq!(line.bare(there), [], "{corners:?}");
         }
         assert_eq!(line.bare(vec![(0.1, 0.5), (0.4, 0.9)]), [(0.0, 0.1), (0.9, 1.0)]);

@@ -47,6 +47,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         text += &format!("residual: RMS {rms_m:.3} m, 99 % within {p99_m:.2} m, largest {max_m:.2} m\n");
     }
     text += &verdict.network.as_ref().map(network).unwrap_or_default();
+    text += &verdict.decks.as_ref().map(|decks| format!("decks: {decks}\n")).unwrap_or_default();
     if let Some(held) = verdict.held_vertices {
         text += &format!("{} vertices stand as far outside the posts around them as any may\n", grouped(held));
     }

@@ -1,0 +1,387 @@
+//! Decks raised where triangles of the ground stand above them.
+//!
+//! A TIN has few points under a bridge, and may stand above it where the DEM does not. Corners of decks rise there; where
+//! they lie too far off for that, a corner is added, as limits leave room for a few in each load module. On the sides of a load module they rise by what is on the side alone, so that both load modules of a
+//! line raise the same corners by as much, whatever either has inside.
+
+use std::collections::BTreeMap;
+
+use terrain::{Decks, LoadModule, ModuleVertex};
+
+/// Quanta that a deck may lie under the ground, as rounding puts it.
+const ROUNDING: f64 = 1.0;
+
+/// What is taken from heights before they are rounded up, so that the last digits do not decide.
+const DIGITS: f64 = 1e-6;
+
+/// Square quanta of the least piece that is one.
+const AREA_MIN: f64 = 1.0;
+
+/// The least part of what is missing at a place that the corners which may rise have to bear: where they lie farther
+/// off, they would have to rise far beyond the ground.
+const SHARE_MIN: f64 = 0.1;
+
+/// The least part of a height that a corner has to make up to have a say in it.
+const WEIGHT_MIN: f64 = 1e-9;
+
+/// Quanta under the ground for which a corner is added.
+const ADDED_FOR: f64 = 4.0;
+
+/// The decks of a load module, raised so far that no triangle of the ground stands above them, with at most so many
+/// triangles.
+pub fn lift_decks(decks: &Decks, ground: &LoadModule, most: usize) -> Decks {
+    let mut decks = decks.clone();
+    loop {
+        let mut lift =
+            Lift { decks: &decks, heights: decks.vertices.iter().map(|vertex| f64::from(vertex.z)).collect() };
+        lift.raise_sides(ground);
+        let left =
+            lift.raise_inside(ground).filter(|left| ADDED_FOR < left.missing && decks.triangles.len() + 2 <= most);
+        let Some(more) = left.and_then(|left| with_corner(&decks, &left, ground.side)) else {
+            return lift.raised();
+        };
+        decks = more;
+    }
+}
+
+/// Decks with one more corner at a place of a triangle, and of its neighbour where it lies on an edge; nothing where
+/// that is a corner already, or on a side of the load module.
+fn with_corner(decks: &Decks, reach: &Reach, side: u16) -> Option<Decks> {
+    let corners = |triangle: &[u16; 3]| triangle.map(|corner| decks.vertices[usize::from(corner)]);
+    let of = corners(&decks.triangles[reach.triangle]);
+    let at = [0, 1].map(|axis| (dot(of.map(|vertex| at(vertex)[axis]), reach.weights) + 0.5).floor() as u16);
+    let plane = dot(of.map(|vertex| f64::from(vertex.z)), weights(of, at.map(f64::from)));
+    let added = ModuleVertex { y: at[1], x: at[0], z: (plane + 0.5).floor() as i32 };
+    if of.iter().any(|corner| place(*corner) == at) || at.iter().any(|along| *along == 0 || *along == side) {
+        return None;
+    }
+    let is_near = |&[from, to]: &[ModuleVertex; 2]| {
+        let [from, to] = [from, to].map(self::at);
+        cross(from, to, at.map(f64::from)).abs() <= EDGE * (to[0] - from[0]).hypot(to[1] - from[1])
+    };
+    let edges = |of: [ModuleVertex; 3]| [[of[0], of[1]], [of[1], of[2]], [of[2], of[0]]];
+    let split = edges(of).into_iter().find(is_near);
+    let mut soup = Vec::with_capacity(decks.triangles.len() + 2);
+    for (number, (triangle, class)) in decks.triangles.iter().zip(&decks.classes).enumerate() {
+        let own = corners(triangle);
+        let is_split = |edge: &[ModuleVertex; 2]| split.is_some_and(|[a, b]| *edge == [a, b] || *edge == [b, a]);
+        if number == reach.triangle || edges(own).iter().any(is_split) {
+            let rest = edges(own).into_iter().filter(|edge| !is_split(edge));
+            soup.extend(rest.map(|[from, to]| ([from, to, added], *class)));
+        } else {
+            soup.push((own, *class));
+        }
+    }
+    let is_turned = |[a, b, c]: &[ModuleVertex; 3]| 0.0 < cross(self::at(*a), self::at(*b), self::at(*c));
+    soup.iter().all(|(corners, _)| is_turned(corners)).then(|| Decks::of_triangles(soup))
+}
+
+/// Quanta from an edge within which a place lies on it.
+const EDGE: f64 = 2.0;
+
+/// Decks, and the heights that their vertices have come to.
+struct Lift<'a> {
+    decks: &'a Decks,
+    heights: Vec<f64>,
+}
+
+/// A place of the ground that a triangle of decks has to reach.
+struct Reach {
+    /// How far the triangle is below it.
+    missing: f64,
+    triangle: usize,
+    /// What of the height there each corner of the triangle makes up.
+    weights: [f64; 3],
+    height: f64,
+}
+
+impl Lift<'_> {
+    /// Raises vertices on the sides onto the ground there, and both ends of an edge along a side so far that it clears
+    /// the vertices of the ground between them.
+    fn raise_sides(&mut self, ground: &LoadModule) {
+        for (axis, line) in [(0, 0), (0, ground.side), (1, 0), (1, ground.side)] {
+            let along = |vertex: &ModuleVertex| f64::from(place(*vertex)[1 - axis]);
+            let is_on = |vertex: &&ModuleVertex| place(**vertex)[axis] == line;
+            let mut side: Vec<[f64; 2]> =
+                ground.vertices.iter().filter(is_on).map(|vertex| [along(vertex), f64::from(vertex.z)]).collect();
+            side.sort_by(|one, other| one[0].total_cmp(&other[0]));
+            for (vertex, height) in self.decks.vertices.iter().zip(&mut self.heights).filter(|(at, _)| is_on(at)) {
+                *height = height.max(height_along(&side, along(vertex)) - ROUNDING);
+            }
+            let top = top(side.iter().map(|vertex| vertex[1]));
+            let mut raised = self.heights.clone();
+            for triangle in &self.decks.triangles {
+                for ends in [[0, 1], [1, 2], [2, 0]].map(|ends| ends.map(|end| usize::from(triangle[end]))) {
+                    let [from, to] = ends.map(|end| &self.decks.vertices[end]);
+                    if !is_on(&from) || !is_on(&to) {
+                        continue;
+                    }
+                    let edge = ends.map(|end| [along(&self.decks.vertices[end]), self.heights[end]]);
+                    let missing = missing_between(edge, &side);
+                    for end in ends {
+                        raised[end] = raised[end].max((self.heights[end] + missing).min(self.most(end, top)));
+                    }
+                }
+            }
+            self.heights = raised;
+        }
+    }
+
+    /// Raises vertices inside until every triangle reaches the ground beneath it: what misses most first. Returns what
+    /// is left.
+    fn raise_inside(&mut self, ground: &LoadModule) -> Option<Reach> {
+        let boxes: Vec<[u16; 4]> = ground.triangles.iter().map(|triangle| bounds(triangle, &ground.vertices)).collect();
+        let mut reaches = Vec::new();
+        for number in 0..self.decks.triangles.len() {
+            let [west, east, south, north] = bounds(&self.decks.triangles[number], &self.decks.vertices);
+            for (beneath, of) in ground.triangles.iter().zip(&boxes) {
+                if of[0] < east && west < of[1] && of[2] < north && south < of[3] {
+                    self.reach(number, beneath.map(|corner| ground.vertices[usize::from(corner)]), &mut reaches);
+                }
+            }
+        }
+        reaches.sort_by(|one, other| other.missing.total_cmp(&one.missing).then(one.triangle.cmp(&other.triangle)));
+        let top = top(ground.vertices.iter().map(|vertex| f64::from(vertex.z)));
+        let is_inside = |vertex: ModuleVertex| place(vertex).iter().all(|at| 0 < *at && *at < ground.side);
+        for &Reach { triangle, weights, height, .. } in &reaches {
+            let corners = self.decks.triangles[triangle].map(usize::from);
+            let missing = height - dot(corners.map(|corner| self.heights[corner]), weights);
+            let shares =
+                [0, 1, 2].map(|at| if is_inside(self.decks.vertices[corners[at]]) { weights[at] } else { 0.0 });
+            // The least rise of all together that does it.
+            let squares = shares.iter().map(|share| share * share).sum::<f64>().max(SHARE_MIN * SHARE_MIN);
+            for at in (0..3).filter(|_| 0.0 < missing) {
+                let most = self.most(corners[at], top);
+                let height = &mut self.heights[corners[at]];
+                *height = (*height + missing * shares[at] / squares).min(most);
+            }
+        }
+        self.lower_inside(&reaches, is_inside);
+        for reach in &mut reaches {
+            let corners = self.decks.triangles[reach.triangle].map(usize::from);
+            reach.missing = reach.height - dot(corners.map(|corner| self.heights[corner]), reach.weights);
+        }
+        reaches.into_iter().max_by(|one, other| one.missing.total_cmp(&other.missing))
+    }
+
+    /// The decks as they have become.
+    fn raised(&self) -> Decks {
+        let raised = |(vertex, height): (&ModuleVertex, &f64)| {
+            let z = (height - DIGITS).ceil() as i32;
+            ModuleVertex { z, ..*vertex }
+        };
+        let vertices: Vec<ModuleVertex> = self.decks.vertices.iter().zip(&self.heights).map(raised).collect();
+        let corners = self.decks.triangles.iter().map(|triangle| triangle.map(|corner| vertices[usize::from(corner)]));
+        Decks::of_triangles(corners.zip(self.decks.classes.iter().copied()))
+    }
+
+    /// Lowers vertices inside again as far as each may alone.
+    fn lower_inside(&mut self, reaches: &[Reach], is_inside: impl Fn(ModuleVertex) -> bool) {
+        let corners = |reach: &Reach| self.decks.triangles[reach.triangle].map(usize::from);
+        let mut of: BTreeMap<usize, Vec<&Reach>> = BTreeMap::new();
+        for reach in reaches {
+            corners(reach).into_iter().for_each(|corner| of.entry(corner).or_default().push(reach));
+        }
+        for (vertex, reaches) in of.into_iter().filter(|(vertex, _)| is_inside(self.decks.vertices[*vertex])) {
+            let mut least = f64::from(self.decks.vertices[vertex].z);
+            for reach in reaches {
+                let (corners, weights, height) = (corners(reach), reach.weights, reach.height);
+                for at in (0..3).filter(|at| corners[*at] == vertex && WEIGHT_MIN < weights[*at]) {
+                    let all = dot(corners.map(|corner| self.heights[corner]), weights);
+                    least = least.max(self.heights[vertex] + (height - all) / weights[at]);
+                }
+            }
+            self.heights[vertex] = self.heights[vertex].min(least);
+        }
+    }
+
+    /// How high a vertex may be raised: as far above the highest ground as it lies below it.
+    fn most(&self, vertex: usize, top: f64) -> f64 {
+        self.heights[vertex].max(2.0 * top - f64::from(self.decks.vertices[vertex].z))
+    }
+
+    /// Adds the corners of what a triangle of decks and one of the ground have in common, where that is above.
+    fn reach(&self, triangle: usize, beneath: [ModuleVertex; 3], reaches: &mut Vec<Reach>) {
+        let corners = self.decks.triangles[triangle].map(usize::from);
+        let [deck, ground] = [corners.map(|corner| self.decks.vertices[corner]), beneath];
+        for at in common(deck, ground) {
+            let weights = weights(deck, at);
+            let height = dot(ground.map(|vertex| f64::from(vertex.z)), self::weights(ground, at)) - ROUNDING;
+            let missing = height - dot(corners.map(|corner| self.heights[corner]), weights);
+            if 0.0 < missing {
+                reaches.push(Reach { missing, triangle, weights, height });
+            }
+        }
+    }
+}
+
+/// The highest of heights of the ground.
+fn top(heights: impl Iterator<Item = f64>) -> f64 {
+    heights.fold(f64::NEG_INFINITY, f64::max)
+}
+
+fn place(vertex: ModuleVertex) -> [u16; 2] {
+    [vertex.x, vertex.y]
+}
+
+fn at(vertex: ModuleVertex) -> [f64; 2] {
+    place(vertex).map(f64::from)
+}
+
+fn dot(one: [f64; 3], other: [f64; 3]) -> f64 {
+    (0..3).map(|at| one[at] * other[at]).sum()
+}
+
+/// The height at a place along a side whose vertices are sorted.
+fn height_along(side: &[[f64; 2]], along: f64) -> f64 {
+    let after = side.partition_point(|vertex| vertex[0] <= along).clamp(1, side.len().max(2) - 1);
+    match side.get(after - 1..=after) {
+        Some(&[[from, low], [to, high]]) => low + (high - low) * (along - from) / (to - from),
+        _ => f64::NEG_INFINITY,
+    }
+}
+
+/// How far vertices of a side stand above an edge along it at most.
+fn missing_between([one, other]: [[f64; 2]; 2], side: &[[f64; 2]]) -> f64 {
+    let [from, to] = if one[0] < other[0] { [one, other] } else { [other, one] };
+    let first = side.partition_point(|vertex| vertex[0] <= from[0]);
+    let between = side[first..].iter().take_while(|vertex| vertex[0] < to[0]);
+    let above = between.map(|[along, height]| height - ROUNDING - height_along(&[from, to], *along));
+    above.fold(0.0, f64::max)
+}
+
+/// West, east, south and north of a triangle.
+fn bounds(triangle: &[u16; 3], vertices: &[ModuleVertex]) -> [u16; 4] {
+    let [a, b, c] = triangle.map(|corner| vertices[usize::from(corner)]);
+    let [west, south] = [a.x.min(b.x).min(c.x), a.y.min(b.y).min(c.y)];
+    [west, a.x.max(b.x).max(c.x), south, a.y.max(b.y).max(c.y)]
+}
+
+/// What each corner of a triangle makes up of the height at a place.
+fn weights(triangle: [ModuleVertex; 3], place: [f64; 2]) -> [f64; 3] {
+    let [a, b, c] = triangle.map(at);
+    let whole = cross(a, b, c);
+    let [of_b, of_c] = [cross(place, c, a) / whole, cross(a, b, place) / whole];
+    [1.0 - of_b - of_c, of_b, of_c]
+}
+
+/// The corners of what two triangles have in common.
+fn common(deck: [ModuleVertex; 3], ground: [ModuleVertex; 3]) -> Vec<[f64; 2]> {
+    let mut shape = deck.map(at).to_vec();
+    let ground = ground.map(at);
+    for side in 0..3 {
+        shape = left_of(&shape, [ground[side], ground[(side + 1) % 3]]);
+    }
+    let area = (1..shape.len().max(2) - 1).map(|at| cross(shape[0], shape[at], shape[at + 1])).sum::<f64>();
+    if area < AREA_MIN { Vec::new() } else { shape }
+}
+
+/// What of a convex shape lies to the left of a line.
+fn left_of(shape: &[[f64; 2]], [from, to]: [[f64; 2]; 2]) -> Vec<[f64; 2]> {
+    let mut kept = Vec::with_capacity(shape.len() + 1);
+    for (at, &here) in shape.iter().enumerate() {
+        let next = shape[(at + 1) % shape.len()];
+        let [own, other] = [cross(from, to, here), cross(from, to, next)];
+        if 0.0 <= own {
+            kept.push(here);
+        }
+        if own * other < 0.0 {
+            kept.push([0, 1].map(|axis| here[axis] + (next[axis] - here[axis]) * own / (own - other)));
+        }
+    }
+    kept
+}
+
+fn cross(from: [f64; 2], to: [f64; 2], at: [f64; 2]) -> f64 {
+    (to[0] - from[0]) * (at[1] - from[1]) - (to[1] - from[1]) * (at[0] - from[0])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use terrain::{ModuleId, ModuleResidual};
+
+    const SIDE: u16 = 12_800;
+
+    fn vertex(x: u16, y: u16, z: i32) -> ModuleVertex {
+        ModuleVertex { y, x, z }
+    }
+
+    /// A load module of four triangles about a hill in its middle, with a hump on its western side.
+    fn hill(height: i32, hump: i32) -> LoadModule {
+        let (side, middle) = (SIDE, SIDE / 2);
+        let places =
+            [(0, 0, 0), (side, 0, 0), (0, middle, hump), (middle, middle, height), (0, side, 0), (side, side, 0)];
+        LoadModule {
+            id: ModuleId { row: 0, col: 0 },
+            side,
+            vertices: places.map(|(x, y, z)| vertex(x, y, z)).to_vec(),
+            triangles: vec![[0, 1, 3], [0, 3, 2], [1, 5, 3], [2, 3, 4], [3, 5, 4]],
+            classes: vec![0; 5],
+            polygon_count: 5,
+            residual: ModuleResidual::default(),
+            decks: Decks::default(),
+            lines: Vec::new(),
+        }
+    }
+
+    /// A deck at a height across the load module, from side to side, with two corners inside.
+    fn deck(z: i32) -> Decks {
+        let at = |(x, y)| vertex(x, y, z);
+        let [a, b, c, d] = [(0, 6000), (6000, 6000), (6000, 6640), (0, 6640)].map(at);
+        let [e, f] = [(SIDE, 6000), (SIDE, 6640)].map(at);
+        Decks::of_triangles([([a, b, c], 3), ([a, c, d], 3), ([b, e, f], 3), ([b, f, c], 3)])
+    }
+
+    /// How far the ground stands above decks at most.
+    fn deepest(decks: &Decks, ground: &LoadModule) -> f64 {
+        let lift = Lift { decks, heights: decks.vertices.iter().map(|vertex| f64::from(vertex.z)).collect() };
+        let mut reaches = Vec::new();
+        for number in 0..decks.triangles.len() {
+            for beneath in &ground.triangles {
+                lift.reach(number, beneath.map(|corner| ground.vertices[usize::from(corner)]), &mut reaches);
+            }
+        }
+        reaches.iter().map(|reach| reach.missing).fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn a_deck_above_the_ground_stays_as_it_is() {
+        assert_eq!(lift_decks(&deck(2000), &hill(1000, 0), 4), deck(2000));
+    }
+
+    #[test]
+    fn a_deck_through_a_hill_rises_over_it_and_its_ends_stay() {
+        let ground = hill(1000, 0);
+        let lifted = lift_decks(&deck(500), &ground, 4);
+        assert_eq!((lifted.check(SIDE), lifted.triangles.len()), (Ok(()), 4));
+        assert!(400.0 < deepest(&deck(500), &ground) && deepest(&lifted, &ground) == 0.0);
+        assert!(lifted.vertices.contains(&vertex(0, 6000, 500)), "its ends stay");
+        // The hill is 400 quanta beside its corners, and 6,400 from its end.
+        assert!(lifted.vertices.iter().all(|vertex| vertex.z < 1100), "no higher than it has to: {lifted:?}");
+    }
+
+    #[test]
+    fn a_corner_is_added_beneath_a_deck_whose_corners_are_too_far_off() {
+        let ground = hill(3000, 0);
+        let at = |(x, y)| vertex(x, y, 0);
+        // From side to side, over the top of the hill.
+        let [a, b, c, d] = [(0, 6390), (SIDE, 6390), (SIDE, 6410), (0, 6410)].map(at);
+        let lifted = lift_decks(&Decks::of_triangles([([a, b, c], 3), ([a, c, d], 3)]), &ground, 4);
+        assert_eq!(lifted.check(SIDE), Ok(()));
+        assert!((lifted.triangles.len(), lifted.vertices.len()) == (4, 5), "{lifted:?}");
+        assert!(lifted.vertices.contains(&vertex(6400, 6400, 2999)), "{lifted:?}");
+    }
+
+    #[test]
+    fn on_the_side_of_a_load_module_a_deck_rises_by_what_is_there_alone() {
+        let sides = |ground: &LoadModule| {
+            let lifted = lift_decks(&deck(500), ground, 4);
+            assert!(deepest(&lifted, ground) == 0.0);
+            lifted.vertices.into_iter().filter(|vertex| vertex.x == 0).collect::<Vec<ModuleVertex>>()
+        };
+        let heights: Vec<i32> = sides(&hill(0, 900)).iter().map(|vertex| vertex.z).collect();
+        assert!(heights.iter().all(|height| 870 < *height), "{heights:?}");
+        assert_eq!(sides(&hill(0, 900)), sides(&hill(1500, 900)));
+    }
+}
