@@ -9,8 +9,8 @@ use crate::places::{each_under, height_in};
 /// Quanta between places at which decks are sampled: a metre.
 const SAMPLE: i32 = 128;
 
-/// Quanta that rounding may put a deck under the ground that it rests on.
-const ROUNDING: i32 = 2;
+/// Quanta that a deck may lie under the ground on which it rests: 5 cm, which is what raising its corners leaves.
+const ROUNDING: i32 = 6;
 
 /// What lies under decks, a place in every square metre.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
