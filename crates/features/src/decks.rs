@@ -1,9 +1,6 @@
 //! Bridges and tunnels: straight between their ends, free of what runs below, and never touching the ground.
 
-use crate::clean::Notes;
-use crate::passing::{Lack, lacks, overs};
-use crate::sweep::{Swept, highest};
-use crate::{Flaw, Kind, Network, Place, Remark, Remedy, Storey};
+use crate::{Kind, Network, Place, Storey};
 
 /// What a deck keeps clear of, in quanta above it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -144,49 +141,6 @@ pub(crate) fn straighten(network: &Network, costs: &[i32], heights: &mut [i32]) 
         }
     }
 }
-
-/// Raises decks clear of what they cross as far as the grade allows; what is left is written down.
-pub(crate) fn clear(
-    network: &Network,
-    swept: &mut Swept,
-    water: &[Water],
-    clearances: Clearances,
-    remarks: &mut Vec<Remark>,
-) {
-    let decks = passages(network);
-    if !decks.iter().any(|passage| passage.is_deck) {
-        return;
-    }
-    let overs = overs(network, &decks, water);
-    // A round more for decks whose road below was raised with them.
-    for _ in 0..CLEAR_ROUNDS {
-        let lacks = lacks(network, &swept.heights, &overs, water, clearances);
-        if lacks.is_empty() {
-            break;
-        }
-        let mut needed: Vec<i32> = vec![i32::MIN / 2; network.nodes.len()];
-        for lack in &lacks {
-            let nodes = &decks[lack.passage as usize].nodes;
-            for &end in [nodes[0], nodes[nodes.len() - 1]].iter() {
-                let raised = (swept.heights[end as usize] + lack.lack).min(swept.most[end as usize]);
-                needed[end as usize] = needed[end as usize].max(raised);
-            }
-        }
-        let least = highest(network, &swept.costs, needed);
-        for (height, least) in swept.heights.iter_mut().zip(least) {
-            *height = (*height).max(least);
-        }
-        straighten(network, &swept.costs, &mut swept.heights);
-    }
-    for Lack { edge, lack, place, .. } in lacks(network, &swept.heights, &overs, water, clearances) {
-        let id = network.ways[network.edges[edge as usize].way as usize].id;
-        let flaw = Flaw::ClearanceLacks { quanta: lack };
-        Notes { id, lattice: network.lattice, remarks }.write_at(place, flaw, Remedy::LeftAsItIs);
-    }
-}
-
-/// Rounds in which decks are raised: those of several storeys raise one another.
-const CLEAR_ROUNDS: usize = 4;
 
 /// The height at a place on or beside a segment, in quanta.
 pub(crate) fn between(ends: [Place; 2], heights: [i32; 2], place: Place) -> i32 {

@@ -5,9 +5,10 @@
 //! never do. A first fit tells noise from ground; what it lies far from is cut off, the rest is smoothed where it is
 //! noisy, and a second fit has the last word.
 
-use crate::decks::{Clearances, Water, clear, raise_sagging_ends, straighten};
+use crate::decks::{Clearances, Water, raise_sagging_ends, straighten};
 use crate::fit::{Problem, Tie, fit};
 use crate::forest::{Range, Sample};
+use crate::passing::clear;
 use crate::smooth::{filled, smooth};
 use crate::sweep::{Pin, Swept, bounds, one_a_node, relax_between_pins, relax_within, remark_steep};
 use crate::{Network, Remark, Way};

@@ -3,12 +3,17 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::decks::{Clearances, Passage, Water, between};
+use crate::clean::Notes;
+use crate::decks::{Clearances, Passage, Water, between, passages, straighten};
 use crate::exact::Segment;
-use crate::{Network, Place, Storey};
+use crate::sweep::{Swept, highest};
+use crate::{Flaw, Network, Place, Remark, Remedy, Storey};
 
 /// Quanta along ways from the ends of a deck within which others lie beside it rather than under it: 100 m.
 const BESIDE: i32 = 100 * 128;
+
+/// Rounds in which decks are raised: those of several storeys raise one another.
+const CLEAR_ROUNDS: usize = 4;
 
 /// Steps of the cells in which edges are looked up.
 const CELL: i32 = 1 << 12;
@@ -16,7 +21,7 @@ const CELL: i32 = 1 << 12;
 /// A deck's edge over something: the passage, the edge, and what lies below, an edge or a piece of water counted on
 /// from the edges.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct Over {
+struct Over {
     pub passage: u32,
     pub edge: u32,
     pub below: u32,
@@ -26,7 +31,7 @@ pub(crate) struct Over {
 
 /// Where clearance is missing: how much, and where.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct Lack {
+struct Lack {
     pub passage: u32,
     pub edge: u32,
     pub lack: i32,
@@ -36,8 +41,48 @@ pub(crate) struct Lack {
 /// A corner of an area, in steps east and north.
 type Corner = [f64; 2];
 
+/// Raises decks clear of what they cross as far as the grade allows; what is left is written down.
+pub(crate) fn clear(
+    network: &Network,
+    swept: &mut Swept,
+    water: &[Water],
+    clearances: Clearances,
+    remarks: &mut Vec<Remark>,
+) {
+    let decks = passages(network);
+    if !decks.iter().any(|passage| passage.is_deck) {
+        return;
+    }
+    let overs = overs(network, &decks, water);
+    // A round more for decks whose road below was raised with them.
+    for _ in 0..CLEAR_ROUNDS {
+        let lacks = lacks(network, &swept.heights, &overs, water, clearances);
+        if lacks.is_empty() {
+            break;
+        }
+        let mut needed: Vec<i32> = vec![i32::MIN / 2; network.nodes.len()];
+        for lack in &lacks {
+            let nodes = &decks[lack.passage as usize].nodes;
+            for &end in [nodes[0], nodes[nodes.len() - 1]].iter() {
+                let raised = (swept.heights[end as usize] + lack.lack).min(swept.most[end as usize]);
+                needed[end as usize] = needed[end as usize].max(raised);
+            }
+        }
+        let least = highest(network, &swept.costs, needed);
+        for (height, least) in swept.heights.iter_mut().zip(least) {
+            *height = (*height).max(least);
+        }
+        straighten(network, &swept.costs, &mut swept.heights);
+    }
+    for Lack { edge, lack, place, .. } in lacks(network, &swept.heights, &overs, water, clearances) {
+        let id = network.ways[network.edges[edge as usize].way as usize].id;
+        let flaw = Flaw::ClearanceLacks { quanta: lack };
+        Notes { id, lattice: network.lattice, remarks }.write_at(place, flaw, Remedy::LeftAsItIs);
+    }
+}
+
 /// All decks over all that they may have to clear.
-pub(crate) fn overs(network: &Network, decks: &[Passage], water: &[Water]) -> Vec<Over> {
+fn overs(network: &Network, decks: &[Passage], water: &[Water]) -> Vec<Over> {
     let belows = Belows { network, water };
     let mut overs = Vec::new();
     let cells = belows.cells(decks);
@@ -62,13 +107,7 @@ pub(crate) fn overs(network: &Network, decks: &[Passage], water: &[Water]) -> Ve
 }
 
 /// Where clearance is missing over anything: of each deck over each feature the worst.
-pub(crate) fn lacks(
-    network: &Network,
-    heights: &[i32],
-    overs: &[Over],
-    water: &[Water],
-    clearances: Clearances,
-) -> Vec<Lack> {
+fn lacks(network: &Network, heights: &[i32], overs: &[Over], water: &[Water], clearances: Clearances) -> Vec<Lack> {
     let belows = Belows { network, water };
     let mut worst: BTreeMap<(u32, u64), Lack> = BTreeMap::new();
     for over in overs {
@@ -265,7 +304,6 @@ fn left_of(polygon: &[Corner], from: Corner, to: Corner) -> Vec<Corner> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::decks::passages;
     use crate::samples::{network, way};
     use crate::{GradeOptions, grade};
 
