@@ -1,9 +1,9 @@
 //! Decks raised where triangles of the ground stand above them.
 //!
 //! A TIN has few points under a bridge, and may stand above it where the DEM does not. Corners of decks rise there;
-//! where they lie too far off for that, a corner is added, as limits leave room for a few in each load module. On the sides
-//! of a load module they rise by what is on the side alone, so that both load modules of a line raise the same corners
-//! by as much, whatever either has inside.
+//! where they lie too far off for that, a corner is added, as limits leave room for a few in each load module.
+//! On the sides of a load module they rise by what is on the side alone, so that both load modules of a line raise the
+//! same corners by as much, whatever either has inside.
 
 use std::collections::BTreeMap;
 
