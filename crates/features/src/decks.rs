@@ -1,4 +1,4 @@
-//! Bridges and tunnels: straight between their ends, free of what runs below, and never touching the ground.
+//! Bridges and tunnels: their ends, straight between them, and heights along them.
 
 use crate::{Kind, Network, Place, Storey};
 

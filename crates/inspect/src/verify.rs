@@ -54,8 +54,8 @@ pub struct Verdict {
     pub held_vertices: Option<u64>,
     /// What of roads, rivers and lakes was counted in the load modules; nothing of a job without any.
     pub network: Option<NetworkFound>,
-    /// Square metres of decks, those under the ground, and how far decks are above each class at least, in words;
-    /// nothing where there are no decks.
+    /// Square metres of decks, those under the ground at any level, and how far decks are above each class at least, in
+    /// words; nothing where there are no decks.
     pub decks: Option<String>,
 }
 
@@ -141,7 +141,7 @@ fn check_sums(
     verdict.problems.extend(features.problems);
     verdict.unchecked.extend(features.unchecked);
     verdict.network = features.network;
-    verdict.decks = deck::told(modules, &job.class_names());
+    verdict.decks = deck::told(levels, &job.class_names());
     let counts = exceeded::counts(job, area, modules);
     let mut exceeded = exceeded::of_counts(area, &counts);
     verdict.problems.extend(exceeded::wrong_states(manifest, area, &exceeded));

@@ -28,8 +28,8 @@ const WEIGHT_MIN: f64 = 1e-9;
 /// Quanta under the ground for which a corner is added.
 const ADDED_FOR: f64 = 4.0;
 
-/// The decks of a load module, raised so far that no triangle of the ground stands above them, with at most so many
-/// triangles.
+/// The decks of a load module, raised onto the triangles of the ground that stand above them as far as corners reach,
+/// with at most so many triangles.
 pub fn lift_decks(decks: &Decks, ground: &LoadModule, most: usize) -> Decks {
     let mut decks = decks.clone();
     loop {

@@ -16,15 +16,21 @@ const AREA_MIN: f64 = 0.5;
 
 const OF_NONE: &str = "a corner of decks is that of no bridge";
 
-/// What all decks come to, in words: their square metres, and the ground under them. That limits and the ground left
-/// some of them under it is no damage.
-pub(crate) fn told(modules: &Modules, classes: &[String]) -> Option<String> {
-    let mut all = DeckFigures::default();
-    modules.values().for_each(|module| all.merge(&DeckFigures::of(module)));
+/// What all decks come to, in words: square metres and the least height over each class at the finest level, and what
+/// lies under the ground at the level that has most of it. That limits and the ground left some there is no damage.
+pub(crate) fn told(levels: &[Modules], classes: &[String]) -> Option<String> {
+    let of_level = |modules: &Modules| {
+        let mut all = DeckFigures::default();
+        modules.values().for_each(|module| all.merge(&DeckFigures::of(module)));
+        all
+    };
+    let by_level: Vec<DeckFigures> = levels.iter().map(of_level).collect();
+    let worst = by_level.iter().max_by_key(|figures| (figures.under, figures.deepest))?;
+    let all = &by_level[0];
     let metres = |quanta: f64| quanta / f64::from(QUANTA_PER_METRE);
-    let under = match all.under {
+    let under = match worst.under {
         0 => "none of them under the ground".to_owned(),
-        some => format!("{some} of them under the ground, by {:.2} m at most", metres(all.deepest.into())),
+        some => format!("{some} of them under the ground, by {:.2} m at most", metres(worst.deepest.into())),
     };
     let least = all.clearance.iter().filter_map(|(class, quanta)| {
         classes.get(usize::from(*class)).map(|name| format!("{:.2} m above {name}", metres((*quanta).into())))
