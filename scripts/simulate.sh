@@ -9,5 +9,5 @@
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
-TIEFORT_SEEDS="${1:-0}..${2:-100000}" cargo test -q -p compiler --test it -- \
+TIEFORT_SEEDS="${1:-0}..${2:-100000}" cargo test -q -p build --test it -- \
     --ignored --exact --nocapture simulated::the_campaign_finds_nothing

@@ -3,7 +3,7 @@
 
 use std::fs;
 
-use database::Folder;
+use store::Folder;
 use libfuzzer_sys::fuzz_target;
 use terrain::TileId;
 

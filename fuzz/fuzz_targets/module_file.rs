@@ -77,7 +77,7 @@ fn seal(bytes: &mut [u8], from: usize, to: usize) {
 fuzz_target!(|bytes: &[u8]| {
     for bytes in [bytes.to_vec(), with_checksums(bytes)] {
         let direct = SlmFile::parse(&bytes);
-        let decoded = database::decode_levels(Path::new("fuzz.slm"), &bytes);
+        let decoded = store::decode_levels(Path::new("fuzz.slm"), &bytes);
         assert!(direct.is_ok() || decoded.is_err(), "the database read what the reader refuses");
         // What is not known is not written again.
         let is_known = |file: &SlmFile| {
@@ -87,7 +87,7 @@ fuzz_target!(|bytes: &[u8]| {
         if let Ok((header, levels)) = decoded
             && direct.as_ref().is_ok_and(is_known)
         {
-            assert_eq!(database::encode_levels(&header, &levels), bytes, "read, written and not the same");
+            assert_eq!(store::encode_levels(&header, &levels), bytes, "read, written and not the same");
         }
     }
 });

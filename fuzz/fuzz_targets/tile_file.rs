@@ -4,7 +4,7 @@
 
 use std::path::Path;
 
-use database::{
+use store::{
     decode_curve, decode_measured, decode_removals, decode_tile, encode_curve, encode_measured, encode_removals,
     encode_tile,
 };

@@ -1,6 +1,6 @@
 //! Classes of triangles as exports name and colour them.
 
-use database::Report;
+use store::Report;
 use terrain::named_class_color;
 
 /// Base colours of classes whose names say nothing of their colour, in order and over again: told apart by the

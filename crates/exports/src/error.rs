@@ -1,7 +1,7 @@
 //! Why an export ended without its files.
 
-use database::DatabaseError;
 use schedule::ScheduleError;
+use store::DatabaseError;
 use thiserror::Error;
 
 /// Why an export ended without its files.

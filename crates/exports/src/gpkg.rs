@@ -6,9 +6,9 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use database::{Report, ReportPlace};
 use rusqlite::{Connection, ToSql, params};
 use source_files::geopackage_parts::{Extent, Layer, Package, add_index, polygon, polygon_z};
+use store::{Report, ReportPlace};
 use terrain::{Decks, HOLE_CLASS, ModuleId, ModuleRect, ModuleVertex, QUANTA_PER_METRE, metres_of_quanta};
 
 use crate::classes::HOLE_NAME;

@@ -5,9 +5,9 @@
 //! source has a height, that of the triangles which close them. Beyond the area the heights of its border go on, since
 //! tiles have sizes of the engine's own.
 
-use geometry::Facet;
-use geometry::owned::{OwnedRows, PostGrid};
 use serde_json::{Value, json};
+use terrain::geometry::Facet;
+use terrain::geometry::owned::{OwnedRows, PostGrid};
 use terrain::{HOLE_CLASS, LoadModule, PostRect, QUANTA_PER_METRE};
 
 use crate::{ExportError, Product, Put, Work};

@@ -1,6 +1,6 @@
 //! One load-module file (`docs/FORMAT.md`) per load module, for simulators that page single files.
 
-use database::{TileModules, encode_levels};
+use store::{TileModules, encode_levels};
 use terrain::{LoadModule, ModuleId, ModuleRect};
 
 use crate::{ExportError, Product, Put, Work};
@@ -94,7 +94,7 @@ mod tests {
         files.sort();
         assert_eq!(files.iter().map(|(name, _)| &**name).collect::<Vec<_>>(), ["r0000c0000.slm", "r0000c0001.slm"]);
         for (index, (name, bytes)) in files.iter().enumerate() {
-            let (header, read) = database::decode_levels(Path::new(name), bytes).unwrap();
+            let (header, read) = store::decode_levels(Path::new(name), bytes).unwrap();
             assert_eq!((header.modules.count(), read.len()), (1, 1 + product.coarser.len()));
             let levels: Vec<_> = product.levels().map(|level| vec![level.modules[index].clone()]).collect();
             assert_eq!(read, levels);

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use database::{Folder, Manifest, TileModules};
+use store::{Folder, Manifest, TileModules};
 use terrain::{GridFrame, HOLE_CLASS, LoadModule, ModuleGrid, ModuleId, ModuleRect, TileId};
 
 use crate::classes::{Classes, names_in};
@@ -60,7 +60,7 @@ impl Product {
         let folder = Folder::new(folder);
         let manifest = folder.finished()?;
         let rect = rect_of(&manifest, block)?;
-        let ids: Vec<TileId> = manifest.tiles.iter().map(database::TileRecord::tile).collect();
+        let ids: Vec<TileId> = manifest.tiles.iter().map(store::TileRecord::tile).collect();
         let read = work.each("tiles read", &ids, |&tile| {
             let (tile, levels) = folder.read_levels(tile)?;
             let mut levels = wanted.of(levels)?;

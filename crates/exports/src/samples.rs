@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use database::{
+use store::{
     Area, Fingerprint, Manifest, Report, ReportBreach, ReportPerModule, ReportPerWindow, ReportPlace, ReportPoints,
     ReportPool, ReportRefusals, ReportResidual, ReportStops, ReportVoids, TileModules, TileRecord,
 };

@@ -5,8 +5,8 @@
 
 use std::io::Write;
 
-use geometry::Facet;
-use geometry::owned::{PostGrid, visit_residuals};
+use terrain::geometry::Facet;
+use terrain::geometry::owned::{PostGrid, visit_residuals};
 use terrain::{Dem, HOLE_CLASS, LoadModule, ModuleId, Post, PostRect, metres_of_quanta};
 
 use crate::blocks::{BLOCK, Blocks, Raster, blocks, overviews};

@@ -221,7 +221,7 @@ mod tests {
             places.push(Post::new(83, 71));
             places.extend(on_side.map(|at| Post::new(at.row, at.col)));
             places.sort_unstable();
-            let triangles = mesh::delaunay(&places);
+            let triangles = terrain::mesh::delaunay(&places);
             let at = |place: &Post| LatticePoint::new(place.row, place.col);
             let vertices = places.iter().map(|place| Vertex { at: at(place), height }).collect();
             module_of(&Tin::new(rect, vertices, triangles), id, spacing)

@@ -1,8 +1,8 @@
 //! The exact pass over the posts that load modules own.
 
 use fearless_simd::{Simd, dispatch, f64x8, i32x8, prelude::*};
-use geometry::Facet;
-use geometry::owned::{PostGrid, visit_residuals};
+use terrain::geometry::Facet;
+use terrain::geometry::owned::{PostGrid, visit_residuals};
 use terrain::{Dem, Importance, LoadModule, ModuleGrid, ModuleResidual, Post, Spacing};
 
 use crate::by_post::ByPost;
@@ -62,7 +62,7 @@ fn count(module: &LoadModule, ground: &Reference, all: &mut Residuals) -> Module
     let rect = ground.grid.posts_of(module.id);
     assert!(ground.dem.rect().contains_rect(&rect), "the DEM window holds load module {}", module.id);
     assert!(ground.mask.rect().contains_rect(&rect), "the mask window holds load module {}", module.id);
-    let level = geometry::widest_level();
+    let level = terrain::geometry::widest_level();
     let own = dispatch!(level, simd => sums(simd, module, ground, all));
     // A load module has at most 2^26 posts, so an RMS residual of 4 km fits.
     let sum_squared = own.sum_squared as u64;
@@ -115,7 +115,7 @@ impl<'a> Owned<'a> {
         let of_row = |ends, row: &[i32]| row.iter().copied().fold(ends, between);
         let ends = rows.fold((i32::MAX, i32::MIN), of_row);
         let (low, top) = module.vertices.iter().map(|vertex| vertex.z).fold(ends, between);
-        let fits = -geometry::WIDENED_MAX <= low && top <= geometry::WIDENED_MAX;
+        let fits = -terrain::geometry::WIDENED_MAX <= low && top <= terrain::geometry::WIDENED_MAX;
         let relief = fits.then(|| i64::from(top) - i64::from(low));
         Self { module, dem, posts, high, wide, relief }
     }
@@ -176,7 +176,7 @@ impl<'a> Owned<'a> {
             let y = row as i64 * i64::from(step) - i64::from(facet.y[0]);
             let plane = splat((facet.py * y - facet.px * i64::from(facet.x[0])) as f64) + cols * east;
             let heights = &heights[first + row * stride + col..][..8];
-            let above = geometry::widened(simd, i32x8::from_slice(simd, heights)) - z0;
+            let above = terrain::geometry::widened(simd, i32x8::from_slice(simd, heights)) - z0;
             (is_inside, division.rounded(above * den - plane))
         });
     }
@@ -261,7 +261,7 @@ mod tests {
         places.sort_unstable();
         places.dedup();
         let points: Vec<_> = places.iter().map(|&(y, x)| Post::new(y as i32, x as i32)).collect();
-        let triangles: Vec<_> = mesh::delaunay(&points).into_iter().map(|t| t.map(|v| v as u16)).collect();
+        let triangles: Vec<_> = terrain::mesh::delaunay(&points).into_iter().map(|t| t.map(|v| v as u16)).collect();
         let mut vertex = |(y, x): (u32, u32)| {
             let z = draw.i32(heights.clone());
             ModuleVertex { y: y as u16, x: x as u16, z }

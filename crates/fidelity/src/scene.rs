@@ -39,7 +39,7 @@ pub fn random_tin(rect: PostRect, count: usize, height: impl Fn(LatticePoint, &m
     }
     places.sort_unstable();
     places.dedup();
-    let triangles = mesh::delaunay(&places);
+    let triangles = terrain::mesh::delaunay(&places);
     let vertices = places
         .iter()
         .map(|place| {

@@ -64,7 +64,7 @@ struct PostsInModule<'a> {
 
 impl PostsInModule<'_> {
     fn count(&self, tally: &mut Tally) {
-        let level = geometry::widest_level();
+        let level = terrain::geometry::widest_level();
         let sums = dispatch!(level, simd => self.sums(simd, tally.histogram()));
         tally.add_sums(&sums);
     }

@@ -1,7 +1,7 @@
 //! Sums and a histogram of residuals, for each class of ground.
 
-use geometry::resample::rounded;
 use terrain::QUANTA_PER_METRE;
+use terrain::geometry::resample::rounded;
 
 /// Residuals below this have a bin for every quantum (32 m); above, 256 bins an octave.
 const FINE: u32 = 1 << FINE_BITS;

@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use compiler::CompileError;
+use build::CompileError;
+use build::ground::GroundError;
+use build::product::{Product, Wanted, WantedGround};
 use fidelity::each_residual;
-use ground::GroundError;
-use product::{Product, Wanted, WantedGround};
 use terrain::{Dem, Importance, LoadModule, ModuleId, QUANTA_PER_METRE};
 
 /// What differs between two databases.

@@ -4,15 +4,15 @@ use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
 use crate::explained_features::{ExplainedFeatures, explained_features};
-use compiler::{CompileError, Stage};
-use database::{Folder, TileState, files};
+use build::ground::GroundError;
+use build::product::{Product, Wanted, WantedGround};
+use build::{CompileError, Stage};
 use fidelity::{Split, best_split};
-use ground::GroundError;
 use job::{Choice, HOLE_CLASS_NAME};
-use limits::Windows;
-use product::{Product, Wanted, WantedGround};
 use schedule::Workers;
 use serde_json::Value;
+use store::{Folder, TileState, files};
+use terrain::limits::Windows;
 use terrain::{
     HOLE_CLASS, Importance, LoadModule, ModuleId, QUANTA_PER_METRE, RefusedBy, Side, StopReason, TileId, TileTin,
     metres_of_quanta,

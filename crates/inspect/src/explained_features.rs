@@ -1,7 +1,7 @@
 //! What features take of one load module, and what became of them there.
 
-use database::{FeatureFarOff, FeatureLeftOut, FeatureRemark};
-use product::Product;
+use build::product::Product;
+use store::{FeatureFarOff, FeatureLeftOut, FeatureRemark};
 use terrain::ModuleId;
 
 /// Roads and water in a load module.

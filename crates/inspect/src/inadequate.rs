@@ -7,14 +7,14 @@ use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-use compiler::CompileError;
-use database::{FeatureFarOff, OffCause};
-use geometry::Facet;
-use geometry::owned::{PostGrid, visit_residuals};
-use ground::{GamingArea, Ground, Window};
+use build::CompileError;
+use build::ground::{GamingArea, Ground, Window};
+use build::product::{Opened, choose_ground, locate_weights};
 use job::Choice;
-use product::{Opened, choose_ground, locate_weights};
 use schedule::Workers;
+use store::{FeatureFarOff, OffCause};
+use terrain::geometry::Facet;
+use terrain::geometry::owned::{PostGrid, visit_residuals};
 use terrain::{
     Dem, GridFrame, Importance, LoadModule, ModuleGrid, ModuleId, ModuleRect, Post, PostRect, THOUSANDTHS,
     metres_of_quanta,

@@ -3,12 +3,12 @@
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-use compiler::CompileError;
-use database::{Folder, Totals};
+use build::CompileError;
+use build::ground::{GamingArea, Ground, GroundError, Window};
+use build::product::{Opened, choose_ground, locate_weights};
 use fidelity::{DemGround, Measures, ResidualFigures, Triangles, regular_grid};
-use ground::{GamingArea, Ground, GroundError, Window};
-use product::{Opened, choose_ground, locate_weights};
 use schedule::Workers;
+use store::{Folder, Totals};
 use terrain::{Dem, Importance, LoadModule, Metres, QUANTA_PER_METRE, Tin};
 
 use crate::verify::read_modules;

@@ -4,10 +4,10 @@ use std::collections::BTreeSet;
 use std::io::Read;
 use std::path::Path;
 
-use compiler::{CompileError, run_name};
-use database::{Folder, Lock, Manifest, ManifestState, TileRecord, TileState};
-use engine::Held;
+use build::{CompileError, run_name};
 use load_module_reader::{MAGIC, open_file};
+use store::engine::Held;
+use store::{Folder, Lock, Manifest, ManifestState, TileRecord, TileState};
 use terrain::TileId;
 
 /// How one tile stands.

@@ -21,14 +21,14 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-use compiler::{CompileError, residual_of};
-use database::{Folder, Manifest, ManifestState, Report, ReportResidual, files};
+use build::ground::{Bounds, GamingArea, Ground, Window};
+use build::product::Opened;
+use build::{CompileError, residual_of};
 use fidelity::Residuals;
-use ground::{Bounds, GamingArea, Ground, Window};
 use job::{DemSource, Edges, Job, LodBorder, SourceEntry, SourceFile, SourceSaid};
-use limits::{polygons_of, triangles_of};
-use product::Opened;
 use schedule::Workers;
+use store::{Folder, Manifest, ManifestState, Report, ReportResidual, files};
+use terrain::limits::{polygons_of, triangles_of};
 use terrain::{LoadModule, ModuleId, Side};
 
 use crate::recount;
@@ -185,7 +185,7 @@ fn check_polygons(job: &Job, levels: &[Modules]) -> Vec<String> {
 }
 
 fn listed(manifest: &Manifest) -> usize {
-    let of_tile = |tile: &database::TileRecord| {
+    let of_tile = |tile: &store::TileRecord| {
         [&tile.tin, &tile.slm, &tile.measured, &tile.curve, &tile.removed]
             .map(Option::is_some)
             .iter()

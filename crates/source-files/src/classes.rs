@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use geometry::resample::{TAP_UNITS, nearest};
+use terrain::geometry::resample::{TAP_UNITS, nearest};
 use terrain::{GridFrame, Post, PostRect};
 
 use crate::crs::Crs;

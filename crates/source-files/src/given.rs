@@ -6,7 +6,7 @@
 use std::path::Path;
 
 use geojson::{FeatureCollection, GeoJson, Geometry, GeometryValue, JsonObject, Position};
-use mask::Polygon;
+use terrain::mask::Polygon;
 
 use crate::SourceError;
 use crate::allowance::Allowance;

@@ -4,7 +4,7 @@
 //! ground between two of them is interpolated as inside one. Whatever is left is a layer of its own. Each post of the
 //! working grid is decided by itself, so it does not depend on the window asked for.
 
-use geometry::resample::{TAP_UNITS, rounded};
+use terrain::geometry::resample::{TAP_UNITS, rounded};
 use terrain::{Dem, GridFrame, Post, PostRect, QUANTA_PER_METRE, Resampling};
 
 use crate::crs::Crs;

@@ -7,7 +7,7 @@
 use std::path::Path;
 
 use geojson::{FeatureCollection, GeoJson, Geometry, GeometryValue, JsonObject, JsonValue, Position};
-use mask::Polygon;
+use terrain::mask::Polygon;
 
 use crate::allowance::{Allowance, VERTEX_BYTES};
 use crate::crs::Crs;

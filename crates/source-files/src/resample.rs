@@ -1,6 +1,6 @@
 //! From a raster's posts to the working grid's: bilinear, one rounding, the same for a post in whatever window.
 
-use geometry::resample::{HeightScale, Tap, Taps, blend_rows, sample_row, tap};
+use terrain::geometry::resample::{HeightScale, Tap, Taps, blend_rows, sample_row, tap};
 use terrain::{Dem, GridFrame, Post, PostRect, QUANTA_PER_METRE, Side};
 
 use crate::{Raster, RasterFrame, SourceError};

@@ -5,7 +5,7 @@
 //! machine to machine, nearly always out of the result. Projected places hang on the grid and not on the window asked
 //! for, so two tiles see the same ground at the seam between them.
 
-use geometry::resample::TAP_UNITS;
+use terrain::geometry::resample::TAP_UNITS;
 use terrain::{GridFrame, PostRect};
 
 use crate::RasterFrame;

@@ -44,3 +44,8 @@ mod each;
 pub use each::{Each, gather, in_turn};
 mod breach;
 pub use breach::{Breach, BreachKind, BreachPlace};
+
+pub mod geometry;
+pub mod limits;
+pub mod mask;
+pub mod mesh;

@@ -3,13 +3,13 @@
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use database::Folder;
 use load_module_reader::{
     Area, Block, Curvature, HOLE_CLASS, Keep, LoadedGround, ProfilePoint, QUANTA_PER_METRE, ReadError, Sight,
 };
 use numpy::{PyArray1, PyArray2, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use store::Folder;
 use tiefort::library::{self, Cause, Failure};
 
 use crate::arrays::places;

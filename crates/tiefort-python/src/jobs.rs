@@ -3,11 +3,11 @@
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
+use ::build::workbench::HeldGround;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use terrain::{ModuleId, TileId};
 use tiefort::library::{self, Failure, SystemClock};
-use workbench::HeldGround;
 
 use crate::meshes::{ARRAY, Placed, raster_of};
 use crate::raised::raised;
@@ -25,14 +25,14 @@ impl Job {
     /// The job that a text holds, as if it were the file at `path`.
     #[staticmethod]
     fn of_text(py: Python<'_>, text: &str, path: PathBuf) -> PyResult<Self> {
-        let job = py.detach(|| job::Job::of_text(text, &path, &ground::find_area));
+        let job = py.detach(|| job::Job::of_text(text, &path, &::build::ground::find_area));
         job.map(|job| Self { job }).map_err(|error| raised(py, &error.into()))
     }
 
     /// The job of a file.
     #[staticmethod]
     fn load(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
-        let job = py.detach(|| job::Job::load_with(&path, &ground::find_area));
+        let job = py.detach(|| job::Job::load_with(&path, &::build::ground::find_area));
         job.map(|job| Self { job }).map_err(|error| raised(py, &error.into()))
     }
 
@@ -86,9 +86,9 @@ pub fn build(
     let (job, workers) = begun.map_err(|failure| raised(py, &failure))?;
     wait_for(py, told, Raising::AwaitsIt, move |stop, progress| {
         let clock = SystemClock::start();
-        let usual = compiler::Options::new(workers, stop, &clock);
-        let options = compiler::Options { fresh: how.fresh, page: how.page, ..usual };
-        let built = compiler::build(&job, &folder, &options, progress)?;
+        let usual = ::build::Options::new(workers, stop, &clock);
+        let options = ::build::Options { fresh: how.fresh, page: how.page, ..usual };
+        let built = ::build::build(&job, &folder, &options, progress)?;
         Ok((library::report_json(&built.report), built.rebuilt, built.kept, built.is_unchanged))
     })
 }
@@ -111,8 +111,8 @@ pub fn tile(
     let (job, workers) = checked.map_err(|failure| raised(py, &failure))?;
     wait_for(py, told, Raising::AwaitsIt, move |stop, progress| {
         let clock = SystemClock::start();
-        let options = compiler::Options { page: how.page, ..compiler::Options::new(workers, stop, &clock) };
-        let rebuilt = compiler::rebuild_tile(&job, &folder, id, release_borders, &options, progress)?;
+        let options = ::build::Options { page: how.page, ..::build::Options::new(workers, stop, &clock) };
+        let rebuilt = ::build::rebuild_tile(&job, &folder, id, release_borders, &options, progress)?;
         let tiles = rebuilt.rebuilt.iter().map(|tile| (tile.row, tile.col)).collect();
         Ok((library::report_json(&rebuilt.report), tiles))
     })

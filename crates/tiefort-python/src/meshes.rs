@@ -3,14 +3,14 @@
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
-use compiler::CompileError;
+use build::CompileError;
+use build::workbench::Mesh;
 use numpy::{PyArray1, PyArray2, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use source_files::{ArrayRaster, Crs, Raster};
 use terrain::{StopReason, metres_of_quanta};
 use tiefort::library::{self, Failure, SystemClock};
-use workbench::Mesh;
 
 use crate::arrays::{places, posts_of};
 use crate::raised::raised;
@@ -43,7 +43,7 @@ pub fn tin_of_array(
     let make = raster_of(py, array, placed)?;
     wait(py, told, move |stop, progress| {
         let clock = SystemClock::start();
-        let mesh = workbench::tin_of_raster(make()?, &request, stop, progress)?;
+        let mesh = build::workbench::tin_of_raster(make()?, &request, stop, progress)?;
         Ok(Tin { mesh, seconds: clock.seconds() })
     })
 }
@@ -78,7 +78,7 @@ pub fn tin_of_file(
     let request = library::tin_request(&path, words).map_err(|failure| raised(py, &failure))?;
     wait(py, told, move |stop, progress| {
         let clock = SystemClock::start();
-        let mesh = workbench::tin(&request, stop, progress)?;
+        let mesh = build::workbench::tin(&request, stop, progress)?;
         Ok(Tin { mesh, seconds: clock.seconds() })
     })
 }

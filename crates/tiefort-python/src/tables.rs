@@ -1,9 +1,9 @@
 //! Rows of numbers as arrays, and figures as dictionaries.
 
-use database::ReportResidual;
 use numpy::{Element, PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use store::ReportResidual;
 
 /// Rows as an array of two dimensions, the second of `N`, made without another copy.
 pub fn table<'py, T: Element, const N: usize>(

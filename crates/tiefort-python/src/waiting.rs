@@ -11,7 +11,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::thread::Builder;
 use std::time::Duration;
 
-use compiler::{Event, Progress};
+use build::{Event, Progress};
 use pyo3::prelude::*;
 use tiefort::library::Failure;
 

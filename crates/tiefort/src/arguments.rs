@@ -38,7 +38,7 @@ impl Workers {
 
     /// What was asked for, or as many as cores and memory allow for `job`; and a remark where memory decides.
     pub fn for_job(&self, job: &Job) -> (usize, Option<String>) {
-        let forecast = compiler::plan(job).map(|plan| plan.forecast);
+        let forecast = build::plan(job).map(|plan| plan.forecast);
         match forecast {
             Ok(forecast) => resources::workers(self.workers.map(|workers| workers as usize), &forecast),
             // The run itself says what is wrong with the job.

@@ -1,6 +1,6 @@
 //! The tile board: one character per tile, north on top, as it stands in the current stage.
 
-use compiler::Event;
+use build::Event;
 use terrain::TileId;
 
 /// What the characters mean, for a person who looks at the board for the first time.
@@ -65,7 +65,7 @@ impl Board {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use compiler::Stage;
+    use build::Stage;
 
     #[test]
     fn the_north_is_on_top_and_a_new_stage_wipes_the_board() {

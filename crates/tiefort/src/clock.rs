@@ -3,7 +3,7 @@
 use std::thread;
 use std::time::{Duration, Instant};
 
-use compiler::Clock;
+use build::Clock;
 use cpu_time::ProcessTime;
 
 /// Time since it was started.

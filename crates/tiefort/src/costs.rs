@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use compiler::{Costs, Plan, TileCosts};
-use database::{Folder, Report};
+use build::{Costs, Plan, TileCosts};
 use job::Job;
+use store::{Folder, Report};
 
 /// Seconds of the tiles of `plan`: from the report of the database in `folder` if that was built in the same tiles,
 /// otherwise as forecast. What a last build kept has no time of its own and takes what the others take on average.
@@ -23,7 +23,8 @@ fn measured(plan: &Plan, report: &Report) -> Option<Costs> {
     let known: BTreeMap<[u32; 2], &BTreeMap<String, f64>> =
         report.tiles.iter().map(|tile| (tile.tile, &tile.seconds)).collect();
     let of_stage = |stage: &str| -> Vec<Option<f64>> {
-        let seconds = |tile: &ground::PlannedTile| known.get(&[tile.tile.row, tile.tile.col])?.get(stage).copied();
+        let seconds =
+            |tile: &build::ground::PlannedTile| known.get(&[tile.tile.row, tile.tile.col])?.get(stage).copied();
         plan.tiles.iter().map(seconds).collect()
     };
     let refine = filled(&of_stage("refine"))?;

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use database::Report;
+use store::Report;
 use views::{Align, Table, grouped, leading, stage_table};
 
 use crate::files;

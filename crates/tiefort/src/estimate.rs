@@ -1,6 +1,6 @@
 //! How long a run still takes: what its stages are forecast to take, set right by what they have taken so far.
 
-use compiler::{Event, Plan, Stage};
+use build::{Event, Plan, Stage};
 
 /// Seconds of measuring that a forecast is worth: machines differ, and the first tiles may be the quick ones.
 const TRUST_S: f64 = 1.0;

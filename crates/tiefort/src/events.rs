@@ -2,9 +2,9 @@
 
 use std::io::{Write, stdout};
 
-use compiler::{Event, Stage};
-use database::ReportStage;
+use build::{Event, Stage};
 use serde_json::{Value, json};
+use store::ReportStage;
 use terrain::TileId;
 
 /// One event as JSON; `stage_time` goes with the end of a stage, `at_s` are seconds since the start.

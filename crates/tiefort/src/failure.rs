@@ -4,12 +4,12 @@ use std::fmt;
 use std::io;
 use std::path::Path;
 
-use compiler::CompileError;
-use database::DatabaseError;
+use build::CompileError;
+use build::ground::GroundError;
+use build::product::ProductError;
 use exports::ExportError;
-use ground::GroundError;
 use job::JobError;
-use product::ProductError;
+use store::DatabaseError;
 
 use crate::terminal::{self, NotPrinted};
 

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use database::{Folder, Report};
 use serde_json::{Value, json};
+use store::{Folder, Report};
 use views::{Align, Table, grouped};
 
 /// A figure of two builds.

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use compiler::Forecast;
+use build::Forecast;
 
 use crate::failure::Failure;
 use crate::files;
@@ -54,7 +54,7 @@ fn free_disk(_: &Path) -> Option<u64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use compiler::StageSeconds;
+    use build::StageSeconds;
 
     #[test]
     fn what_no_machine_has_is_refused_with_both_numbers_and_what_all_have_is_not() {

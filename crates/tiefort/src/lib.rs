@@ -86,11 +86,11 @@ static LONG_VERSION: LazyLock<String> = LazyLock::new(|| {
          algorithm revision {}",
         env!("CARGO_PKG_VERSION"),
         env!("TIEFORT_COMMIT"),
-        database::FORMAT_VERSION,
-        database::MODULES_FORMAT_VERSION_OF_GROUND,
-        database::MODULES_FORMAT_VERSION_WITH_DECKS,
-        database::MODULES_FORMAT_VERSION,
-        compiler::ALGORITHM_REVISION
+        store::FORMAT_VERSION,
+        store::MODULES_FORMAT_VERSION_OF_GROUND,
+        store::MODULES_FORMAT_VERSION_WITH_DECKS,
+        store::MODULES_FORMAT_VERSION,
+        build::ALGORITHM_REVISION
     )
 });
 

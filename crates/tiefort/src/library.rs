@@ -5,13 +5,13 @@ use std::ffi::OsString;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
+use build::product::WantedGround;
+use build::workbench::{HeldGround, Mesh, TinRequest};
 use clap::{Args, Command, FromArgMatches};
-use database::Report;
 use exports::Work;
 use job::Job;
-use product::WantedGround;
+use store::Report;
 use terrain::{ModuleId, TileId};
-use workbench::{HeldGround, Mesh, TinRequest};
 
 pub use crate::clock::SystemClock;
 use crate::commands::{budgets, compare, explain, export, plan, tile, tin};
@@ -25,7 +25,7 @@ pub fn cores() -> usize {
 
 /// Workers for a build of `job`: those asked for, or as many as cores and memory allow.
 pub fn workers_for(job: &Job, asked: Option<usize>) -> usize {
-    compiler::plan(job).map_or_else(|_| asked.unwrap_or_else(cores), |plan| resources::workers(asked, &plan.forecast).0)
+    build::plan(job).map_or_else(|_| asked.unwrap_or_else(cores), |plan| resources::workers(asked, &plan.forecast).0)
 }
 
 /// Refuses a build that will not fit this machine.
@@ -33,7 +33,7 @@ pub fn workers_for(job: &Job, asked: Option<usize>) -> usize {
 /// # Errors
 /// When the job cannot be planned, or more memory or disk is forecast to be needed than is free.
 pub fn check_fits(job: &Job, workers: usize, folder: &Path) -> Result<(), Failure> {
-    fit::check(&compiler::plan(job)?.forecast, workers, folder)
+    fit::check(&build::plan(job)?.forecast, workers, folder)
 }
 
 /// What `tiefort tin` is asked for in these words, without those that say what to read and to write.
@@ -58,8 +58,8 @@ pub fn write_mesh(mesh: &Mesh, out: &Path, on_map: bool) -> Result<(), Failure> 
 /// # Errors
 /// When it cannot be planned.
 pub fn plan(job: &Job) -> Result<String, Failure> {
-    let features = compiler::foresee_features(job)?;
-    Ok(plan::json_text(job, &compiler::plan(job)?, (features.as_ref(), &budgets::of_job(job)), &[]))
+    let features = build::foresee_features(job)?;
+    Ok(plan::json_text(job, &build::plan(job)?, (features.as_ref(), &budgets::of_job(job)), &[]))
 }
 
 /// What `tiefort report --format json` prints.

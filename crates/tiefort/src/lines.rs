@@ -1,7 +1,7 @@
 //! Progress as plain lines, for logs: one per stage, and at most about one a second in between.
 
-use compiler::Event;
-use database::ReportStage;
+use build::Event;
+use store::ReportStage;
 
 use crate::estimate::Estimate;
 use crate::terminal;
@@ -96,7 +96,7 @@ fn time_text(seconds: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use compiler::Stage;
+    use build::Stage;
     use terrain::TileId;
 
     #[test]

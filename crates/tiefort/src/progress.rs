@@ -5,9 +5,9 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 
-use compiler::{Event, Progress, Stage};
-use database::ReportStage;
+use build::{Event, Progress, Stage};
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
+use store::ReportStage;
 use views::fold;
 
 use crate::board::{Board, LEGEND};

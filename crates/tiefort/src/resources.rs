@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use compiler::Forecast;
+use build::Forecast;
 
 use crate::files::bytes_text;
 
@@ -93,7 +93,7 @@ fn above(root: &Path, below: &Path) -> Vec<PathBuf> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use compiler::StageSeconds;
+    use build::StageSeconds;
 
     const FORECAST: Forecast = Forecast {
         memory_bytes: 300 << 20,

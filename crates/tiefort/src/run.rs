@@ -3,11 +3,11 @@
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use compiler::{Built, CompileError, Options, Plan, Stage};
-use database::Report;
-use engine::Lease;
+use build::{Built, CompileError, Options, Plan, Stage};
 use job::Job;
 use serde_json::json;
+use store::Report;
+use store::engine::Lease;
 use views::{Align, Table};
 
 use crate::arguments::{Log, RunArguments};
@@ -91,7 +91,7 @@ impl<'a> Run<'a> {
         let clock = SystemClock::start();
         let (workers, remark) = arguments.workers.for_job(job);
         let (folder, signals) = (arguments.folder(job), Signals::watch()?);
-        let plan = compiler::plan(job).ok();
+        let plan = build::plan(job).ok();
         Ok((Self { job, arguments, folder, workers, clock, is_part, plan, signals, lease: Arc::default() }, remark))
     }
 

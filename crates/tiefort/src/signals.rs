@@ -11,9 +11,9 @@ use std::sync::{Arc, Once};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use engine::Writing;
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
+use store::engine::Writing;
 
 use crate::failure::Failure;
 use crate::making::{self, Making};

@@ -10,6 +10,32 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;
 
+/// Folders of a crate that keep to themselves, and which of the crate's others each may import; the crate's own name is
+/// that of the files beside its root. Stages name no other stage, and what lies below knows nothing of what lies above.
+const ROOMS: [(&str, &[(&str, &[&str])]); 4] = [
+    (
+        "terrain",
+        &[
+            ("terrain", &[]),
+            ("geometry", &["terrain"]),
+            ("limits", &["terrain"]),
+            ("mask", &["terrain"]),
+            ("mesh", &["terrain", "geometry"]),
+        ],
+    ),
+    ("tin", &[("tin", &[]), ("optimiser", &[]), ("tiling", &[]), ("load_modules", &[]), ("methods", &[])]),
+    ("store", &[("engine", &[]), ("store", &["engine"])]),
+    (
+        "build",
+        &[
+            ("ground", &[]),
+            ("product", &["ground"]),
+            ("build", &["ground", "product"]),
+            ("workbench", &["ground", "build"]),
+        ],
+    ),
+];
+
 /// Names of files in the sources of a crate, without ending: `scan` for `scan.rs` and `scan/mod.rs`, nothing for the
 /// root.
 type Files = BTreeMap<String, String>;
@@ -170,19 +196,42 @@ fn circles(edges: &BTreeMap<&str, BTreeSet<String>>) -> BTreeSet<String> {
     edges.keys().map(circle).filter(|circle| !circle.is_empty()).collect()
 }
 
+/// The sources of each crate, by its name.
+fn crates() -> BTreeMap<String, Files> {
+    let crates = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let folders = fs::read_dir(crates).unwrap().map(|entry| entry.unwrap().path());
+    let sources = folders.filter(|folder| folder.join("src").is_dir()).map(|folder| {
+        let mut files = Files::new();
+        read(&folder.join("src"), "", &mut files);
+        (folder.file_name().unwrap().to_string_lossy().into_owned(), files)
+    });
+    sources.collect()
+}
+
 #[test]
 fn no_file_imports_another_in_a_circle() {
-    let crates = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    let mut found = BTreeSet::new();
-    for folder in fs::read_dir(crates).unwrap().map(|entry| entry.unwrap().path()) {
-        if folder.join("src").is_dir() {
-            let mut files = Files::new();
-            read(&folder.join("src"), "", &mut files);
-            let name = folder.file_name().unwrap().to_string_lossy().into_owned();
-            found.extend(circles(&edges(&files)).into_iter().map(|circle| (name.clone(), circle)));
+    let circles = |(name, files): (String, Files)| (name, circles(&edges(&files)));
+    let found: Vec<_> = crates().into_iter().map(circles).filter(|(_, found)| !found.is_empty()).collect();
+    assert!(found.is_empty(), "circles: {found:#?}");
+}
+
+#[test]
+fn a_room_of_a_crate_imports_only_what_it_may() {
+    let crates = crates();
+    let mut faults = Vec::new();
+    for (name, rooms) in ROOMS {
+        let room = |file: &str| {
+            let first = file.split('/').next().unwrap();
+            rooms.iter().find(|(room, _)| *room == first && first != name).map_or(name, |(room, _)| room)
+        };
+        for (file, targets) in edges(&crates[name]) {
+            let from = room(file);
+            let (_, allowed) = rooms.iter().find(|(room, _)| *room == from).unwrap();
+            let strange = targets.iter().filter(|to| room(to) != from && !allowed.contains(&room(to)));
+            faults.extend(strange.map(|to| format!("{name}: {file} imports {to}")));
         }
     }
-    assert!(found.is_empty(), "circles: {found:#?}");
+    assert!(faults.is_empty(), "{faults:#?}");
 }
 
 #[test]

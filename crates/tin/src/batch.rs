@@ -5,7 +5,7 @@
 //! paper without scanning what did not change.
 
 use fearless_simd::Simd;
-use geometry::LocalPost;
+use terrain::geometry::LocalPost;
 use terrain::{LastBatch, StopReason};
 
 use crate::criterion::{Criterion, Largest};

@@ -1,7 +1,7 @@
 //! What a triangle is worth: its largest weighted residual, or its sum of squared ones.
 
 use fearless_simd::Simd;
-use geometry::LocalPost;
+use terrain::geometry::LocalPost;
 
 use crate::weighted_surface::WeightedSurface;
 

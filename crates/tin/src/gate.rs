@@ -1,7 +1,7 @@
 //! Which posts the limits still permit.
 
-use geometry::LocalPost;
-use limits::TileLedger;
+use terrain::geometry::LocalPost;
+use terrain::limits::TileLedger;
 use terrain::{ModuleId, POINT_COST, RefusedBy};
 
 /// What stands between a post and the TIN.

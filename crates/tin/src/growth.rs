@@ -1,8 +1,8 @@
 //! Growing one post at a time: the top of the queue, again and again.
 
 use fearless_simd::Simd;
-use geometry::LocalPost;
-use mesh::Mesh;
+use terrain::geometry::LocalPost;
+use terrain::mesh::Mesh;
 use terrain::{PostRect, StopReason};
 
 use crate::criterion::Criterion;
@@ -145,7 +145,7 @@ pub(crate) struct RunningSquares {
 impl RunningSquares {
     #[inline(always)]
     pub fn new<S: Simd>(growth: &Growth<S>, rms_quanta: f64) -> Self {
-        let squares = |record: &mesh::Triangle| growth.ground.plain_squares(record.corners);
+        let squares = |record: &terrain::mesh::Triangle| growth.ground.plain_squares(record.corners);
         let of_triangle: Vec<f64> = growth.mesh.triangles().iter().map(squares).collect();
         let goal = rms_quanta * rms_quanta * growth.ground.post_count() as f64;
         Self { sum: of_triangle.iter().sum(), of_triangle, goal }

@@ -43,3 +43,8 @@ mod queue;
 mod sequence;
 mod start;
 mod weighted_surface;
+
+pub mod load_modules;
+pub mod methods;
+pub mod optimiser;
+pub mod tiling;

@@ -13,5 +13,5 @@ pub fn prefix(grown: &TileTin, points: usize) -> Tin {
     assert!(grown.initial_count as usize <= points, "a level holds what its TIN began with");
     let vertices = grown.tin.vertices[..points.min(grown.tin.vertices.len())].to_vec();
     let places: Vec<LatticePoint> = vertices.iter().map(|vertex| vertex.at).collect();
-    Tin::new(grown.tin.rect, vertices, mesh::delaunay(&places))
+    Tin::new(grown.tin.rect, vertices, terrain::mesh::delaunay(&places))
 }

@@ -1,6 +1,6 @@
 //! The paper's proximity test: no candidate inside the cylinder of a vertex that is already there.
 
-use geometry::{LocalPost, LocalRect};
+use terrain::geometry::{LocalPost, LocalRect};
 
 use crate::task::Proximity;
 

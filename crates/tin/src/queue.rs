@@ -3,8 +3,8 @@
 
 use std::collections::BinaryHeap;
 
-use geometry::LocalPost;
-use mesh::Mesh;
+use terrain::geometry::LocalPost;
+use terrain::mesh::Mesh;
 
 use crate::criterion::Criterion;
 

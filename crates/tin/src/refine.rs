@@ -1,7 +1,7 @@
 //! One tile from its window to its TIN.
 
 use fearless_simd::{Level, Simd, dispatch};
-use geometry::LocalPost;
+use terrain::geometry::LocalPost;
 use terrain::{Dem, Importance, StopReason, TileTin, Tin, Vertex};
 
 use crate::batch::Passes;
@@ -18,7 +18,7 @@ use crate::weighted_surface::WeightedSurface;
 ///
 /// # Panics
 /// When the window does not cover exactly the tile's posts, or the tile has more than
-/// [`geometry::WORKING_POSTS_MAX`] posts a side.
+/// [`terrain::geometry::WORKING_POSTS_MAX`] posts a side.
 pub fn refine(dem: &Dem, importance: &Importance, task: &TileTask, level: Level) -> TileTin {
     assert_eq!(dem.rect(), task.rect, "the window covers the tile");
     let start = Start::new(task);
@@ -29,7 +29,7 @@ pub fn refine(dem: &Dem, importance: &Importance, task: &TileTask, level: Level)
 
 /// What is left of a growth once the lanes are gone.
 pub(crate) struct Grown {
-    mesh: mesh::Mesh,
+    mesh: terrain::mesh::Mesh,
     sequence: Sequence,
     spent: u32,
 }
@@ -98,7 +98,7 @@ fn finish(dem: &Dem, task: &TileTask, initial: &[LocalPost], grown: Grown, stop:
 }
 
 /// The mesh as a TIN whose vertices stand in insertion order at the DEM's heights.
-fn tin_of(dem: &Dem, order: &[LocalPost], mesh: &mesh::Mesh) -> Tin {
+fn tin_of(dem: &Dem, order: &[LocalPost], mesh: &terrain::mesh::Mesh) -> Tin {
     let rect = dem.rect();
     let wide = rect.posts_wide();
     let place = |post: LocalPost| post.row() as usize * wide + post.col() as usize;

@@ -1,6 +1,6 @@
 //! What happened while a tile was refined: selected posts, refusals, and who wants to know.
 
-use geometry::LocalPost;
+use terrain::geometry::LocalPost;
 use terrain::{ModuleId, PostRect, Refusal, RefusedBy};
 
 /// Told of every post as it is selected, with the gain that selected it.

@@ -1,7 +1,7 @@
 //! What a tile holds before the first post is selected.
 
-use geometry::{LocalPost, LocalRect};
-use mesh::{Lines, Mesh};
+use terrain::geometry::{LocalPost, LocalRect};
+use terrain::mesh::{Lines, Mesh};
 use terrain::{PostRect, Refusal, SeamSides};
 
 use crate::gate::Gate;

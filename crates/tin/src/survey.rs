@@ -5,8 +5,8 @@
 //! the smallest key seen up to it.
 
 use fearless_simd::{Level, dispatch};
-use geometry::LocalPost;
-use limits::{Charged, ModuleLines};
+use terrain::geometry::LocalPost;
+use terrain::limits::{Charged, ModuleLines};
 use terrain::{Dem, GainCurve, GainRun, Importance, PostRect, SeamSides, TileId};
 
 use crate::ladder::ladder_bin;

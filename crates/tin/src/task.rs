@@ -1,6 +1,6 @@
 //! What `refine` is asked to do for one tile.
 
-use limits::{Allowance, ModuleLines, TileLedger};
+use terrain::limits::{Allowance, ModuleLines, TileLedger};
 use terrain::{LastBatch, ModuleId, Post, PostRect, SeamSides, TileId};
 
 /// Everything about one tile's refinement but the ground itself.

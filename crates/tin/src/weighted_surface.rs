@@ -1,8 +1,10 @@
 //! Weighted residuals under a triangle: the scan of `geometry`, times the importance mask.
 
 use fearless_simd::Simd;
-use geometry::{Blocks, Facet, LocalPost, LocalRect, Surface, largest_numerator, locate_all, rounded, squares_sum};
-use geometry::{locate, visit_owned, visit_posts};
+use terrain::geometry::{
+    Blocks, Facet, LocalPost, LocalRect, Surface, largest_numerator, locate_all, rounded, squares_sum,
+};
+use terrain::geometry::{locate, visit_owned, visit_posts};
 use terrain::{Dem, Importance, THOUSANDTHS};
 
 /// Side of the blocks that know their smallest and largest weight, in posts.

@@ -1,6 +1,6 @@
 //! Residuals of a report, each with what it is measured against, in words.
 
-use database::{Report, ReportResidual};
+use store::{Report, ReportResidual};
 
 /// Residuals in metres; outside features the root mean square and the largest are known.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,9 +1,9 @@
 //! Breaches for maps and for tables: as GeoJSON, a polygon for each load module or window with all its numbers, and as
 //! CSV, a line for each.
 
-use database::{Report, ReportBreach, ReportPlace};
 use geojson::{Feature, FeatureCollection, Geometry, JsonObject, JsonValue};
 use serde_json::json;
+use store::{Report, ReportBreach, ReportPlace};
 
 /// Where load modules and windows lie on the ground.
 #[derive(Clone, Copy, Debug, PartialEq)]

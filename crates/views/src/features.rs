@@ -1,8 +1,8 @@
 //! What was mended, degraded or left out of roads, rivers and lakes, for maps: as GeoJSON, a point for each.
 
-use database::FeatureRemark;
 use geojson::{Feature, FeatureCollection, Geometry, JsonObject};
 use serde_json::json;
+use store::FeatureRemark;
 
 /// What became of a feature, in one word.
 pub fn outcome(remark: &FeatureRemark) -> &'static str {

@@ -1,6 +1,6 @@
 //! Roads and water of a report in words: a table of what they cost, and what must hold of them.
 
-use database::{
+use store::{
     ReportEarthwork, ReportEarthworks, ReportFeatureChecks, ReportFeatureClass, ReportFeatureCost, ReportFeatures,
 };
 

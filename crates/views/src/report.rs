@@ -1,7 +1,7 @@
 //! The report as text: what a terrain engineer reads first on top, everything that broke a limit below, no colour,
 //! at most 80 columns.
 
-use database::{
+use store::{
     Report, ReportBorder, ReportBreach, ReportEnough, ReportHeights, ReportLimit, ReportPart, ReportPlace,
     ReportResidual, ReportStage,
 };

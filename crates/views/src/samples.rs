@@ -3,7 +3,7 @@
 use terrain::{Decks, GridFrame, LoadModule, ModuleGrid, ModuleId, ModuleResidual, ModuleVertex, Spacing};
 
 use crate::picture::{Scene, SceneLimits};
-use database::{
+use store::{
     Report, ReportBefore, ReportBound, ReportBreach, ReportClass, ReportEarthwork, ReportEarthworks, ReportFarOff,
     ReportFeatureChecks, ReportFeatureClass, ReportFeatureCost, ReportFeatureRemarks, ReportFeatures, ReportLevel,
     ReportPerModule, ReportPerWindow, ReportPlace, ReportPoints, ReportPool, ReportRefusals, ReportResidual,
@@ -95,17 +95,17 @@ pub(crate) fn report() -> Report {
             per_4km: ReportPerWindow { max: 4_810, limit: 4_096, over: 140, worst_9x9: 5_600 },
         }),
         residual: residual(2.999),
-        limit: Some(database::ReportLimit {
+        limit: Some(store::ReportLimit {
             triangles: 319_998,
             rms_m: 2.4375,
             eta: Some(2.999 / 2.4375),
             rough_share: 0.375,
         }),
-        border: Some(database::ReportBorder {
-            at_border: database::ReportPart { posts: 77_000, rms_m: 3.4, max_m: 31.0 },
-            inside: database::ReportPart { posts: 3_823_528, rms_m: 3.2, max_m: 36.5 },
+        border: Some(store::ReportBorder {
+            at_border: store::ReportPart { posts: 77_000, rms_m: 3.4, max_m: 31.0 },
+            inside: store::ReportPart { posts: 3_823_528, rms_m: 3.2, max_m: 36.5 },
         }),
-        heights: Some(database::ReportHeights {
+        heights: Some(store::ReportHeights {
             surface_m: [688.5, 1_903.25],
             sources_m: Some([690.0, 1_903.5]),
             outside_m: 1.5,
@@ -167,7 +167,7 @@ pub(crate) fn features() -> ReportFeatures {
         cost,
         ..ReportFeatureClass::default()
     };
-    let deck_clearances = vec![database::ReportDeckClearance { class: "stream".into(), least_m: 1.25 }];
+    let deck_clearances = vec![store::ReportDeckClearance { class: "stream".into(), least_m: 1.25 }];
     ReportFeatures {
         deck_clearances,
         classes: vec![class("primary", 4.0, 8.25, 0), class("lake", 0.0, 0.0, 3)],

@@ -2,11 +2,11 @@
 
 use std::collections::HashSet;
 
-use compiler::ALGORITHM_REVISION;
+use build::ALGORITHM_REVISION;
+use build::ground::{GamingArea, Ground, GroundError, Window};
 use fidelity::Bodies;
-use geometry::height_bounds;
-use ground::{GamingArea, Ground, GroundError, Window};
 use job::{Edges, Job};
+use terrain::geometry::height_bounds;
 use terrain::{
     Dem, LATTICE_PER_POST, LatticePoint, LoadModule, ModuleId, ModuleVertex, TileFeatures, metres_of_quanta,
 };

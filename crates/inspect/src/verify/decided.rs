@@ -3,8 +3,8 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
-use database::{AreaLevel, FeatureLine, LineRole, ReportFeatureChecks};
-use ground::GamingArea;
+use build::ground::GamingArea;
+use store::{AreaLevel, FeatureLine, LineRole, ReportFeatureChecks};
 use terrain::{LatticePoint, ModuleId, QUANTA_PER_METRE, SurfaceGround, TileFeatures, Vertex};
 
 use super::laid::place_text;

@@ -2,13 +2,13 @@
 
 use std::path::{Component, Path};
 
-use database::{Manifest, TileRecord, TileState, files};
 use job::{Edges, Job};
+use store::{Manifest, TileRecord, TileState, files};
 use terrain::TileId;
 
-use compiler::database_area;
-use compiler::is_surveyed;
-use ground::GamingArea;
+use build::database_area;
+use build::ground::GamingArea;
+use build::is_surveyed;
 
 /// Names in the list of files that do not stay inside the folder: nothing of theirs is opened.
 pub(crate) fn leading_out(manifest: &Manifest) -> Vec<String> {

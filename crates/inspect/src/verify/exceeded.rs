@@ -1,15 +1,15 @@
 //! Limits that are exceeded, and what the report and `breaches.*` say of them: the two have to be the same.
 
-use database::{Folder, Manifest, Report, ReportBreach, ReportPlace, TileState, files};
 use job::{Edges, Job};
 use serde_json::Value;
+use store::{Folder, Manifest, Report, ReportBreach, ReportPlace, TileState, files};
 use terrain::{LoadModule, ModuleId};
 
 use super::entries::state_word;
 use super::modules::Modules;
 use super::total::Total;
 use crate::recount;
-use ground::GamingArea;
+use build::ground::GamingArea;
 
 /// A limit that is exceeded.
 #[derive(Clone, Debug, PartialEq)]

@@ -2,11 +2,11 @@
 
 use std::collections::BTreeSet;
 
-use database::{AreaLevel, Folder, Manifest, Report, ReportFeatures, SourceRecord, files};
-use ground::GamingArea;
+use build::ground::GamingArea;
+use build::product::{Opened, Told, features_file, locate_features, read_told};
 use job::Job;
-use product::{Opened, Told, features_file, locate_features, read_told};
 use serde_json::Value;
+use store::{AreaLevel, Folder, Manifest, Report, ReportFeatures, SourceRecord, files};
 use terrain::QUANTA_PER_METRE;
 
 use super::decided::Decided;
@@ -16,7 +16,7 @@ use super::modules::Modules;
 use super::square::At;
 use super::waters::Waters;
 use super::ways::{Ways, WaysFound};
-use compiler::{ALGORITHM_REVISION, CompileError, level_fingerprint};
+use build::{ALGORITHM_REVISION, CompileError, level_fingerprint};
 
 /// Steps by which edges may lie off lines that were rounded together with others, once and once more.
 const ROUNDED: f64 = 4.0;
@@ -78,7 +78,7 @@ pub(crate) fn check(
             continue;
         }
         let (.., measured) = folder.read_measured(tile)?;
-        let told = measured.features.map(|found| product::from_features(&found).missing).unwrap_or_default();
+        let told = measured.features.map(|found| build::product::from_features(&found).missing).unwrap_or_default();
         problems.extend(decided.add(&features));
         let laid = Laid { area, features: &features, told: &told, first_class };
         problems.extend(laid.problems(modules));

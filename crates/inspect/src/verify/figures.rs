@@ -1,9 +1,9 @@
 //! Sums over the load modules, added up again in 128 bits, against what `measured/`, `database.json` and the report
 //! say.
 
-use database::{Folder, Manifest, Measured, MeasuredModule, MeasuredTally, Report, ReportResidual};
 use fidelity::Residuals;
 use job::{Choice, Job};
+use store::{Folder, Manifest, Measured, MeasuredModule, MeasuredTally, Report, ReportResidual};
 use terrain::{LoadModule, ModuleCounts, ModuleId, ModuleResidual, StopReason, metres_of_quanta};
 
 use super::exceeded::Exceeded;
@@ -11,8 +11,8 @@ use super::modules::Modules;
 use super::tins::OfTins;
 use super::total::{Total, squares};
 use crate::recount;
-use compiler::{Adding, Sums, limit_of, residual_of, sums_of};
-use ground::GamingArea;
+use build::ground::GamingArea;
+use build::{Adding, Sums, limit_of, residual_of, sums_of};
 
 /// The first revision that measures the heights of all levels, not of the finest alone.
 const ALL_LEVELS_SINCE: u32 = 10;
@@ -78,7 +78,7 @@ pub(crate) fn measured(
 
 fn differing(
     read: &Measured,
-    (slm, revision): (Option<database::FileStamp>, u32),
+    (slm, revision): (Option<store::FileStamp>, u32),
     modules: &[&LoadModule],
     finest: usize,
     points: u64,

@@ -3,7 +3,7 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
-use ground::GamingArea;
+use build::ground::GamingArea;
 use terrain::{FeatureSurface, Features, HOLE_CLASS, LatticePoint, SurfaceGround, TileFeatures, Vertex};
 
 use super::deck::wrong_decks;

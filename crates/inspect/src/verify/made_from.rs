@@ -1,16 +1,16 @@
 //! What tiles say that they were made from, as far as it follows from the job and from other tiles.
 
-use database::{DatabaseError, Fingerprint, Folder, Manifest, TileState};
 use job::{Edges, Job};
-use limits::Allowance;
+use store::{DatabaseError, Fingerprint, Folder, Manifest, TileState};
+use terrain::limits::Allowance;
 use terrain::{ModuleRect, TileFeatures, TileId};
 
 use super::tins::OfTins;
-use compiler::ALGORITHM_REVISION;
-use compiler::{LeftOut, modules_key};
-use compiler::{TileBudget, tile_refinement};
-use compiler::{kept_features, rules};
-use ground::GamingArea;
+use build::ALGORITHM_REVISION;
+use build::ground::GamingArea;
+use build::{LeftOut, modules_key};
+use build::{TileBudget, tile_refinement};
+use build::{kept_features, rules};
 
 /// Load-module files whose fingerprint is not that of the TINs and the job, and, second, what was not checked.
 pub(crate) fn problems(

@@ -2,15 +2,15 @@
 
 use std::collections::BTreeMap;
 
-use database::{DatabaseError, Fingerprint, Folder, load_module};
 use job::Job;
 use load_module_reader::{Header, Module, SlmFile};
+use store::{DatabaseError, Fingerprint, Folder, load_module};
 use terrain::{HOLE_CLASS, TileId};
 
 use super::modules::{Modules, at_level};
-use compiler::CompileError;
-use compiler::database_area;
-use ground::GamingArea;
+use build::CompileError;
+use build::database_area;
+use build::ground::GamingArea;
 
 /// What the load-module files of a database hold.
 pub(crate) struct Opened {

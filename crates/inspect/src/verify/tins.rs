@@ -6,15 +6,15 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use database::{Folder, Manifest, Stamp};
 use job::{Borders, ClipHeights as JobClipHeights, Edges, Job, OuterBorder};
-use load_modules::{ClipHeights, Layout, clip};
+use store::{Folder, Manifest, Stamp};
 use terrain::{
     Importance, LatticePoint, LoadModule, ModuleId, ModuleVertex, RefusedBy, StopReason, TileId, TileTin, Vertex,
 };
+use tin::load_modules::{ClipHeights, Layout, clip};
 
-use compiler::CompileError;
-use ground::GamingArea;
+use build::CompileError;
+use build::ground::GamingArea;
 
 use super::modules::Modules;
 

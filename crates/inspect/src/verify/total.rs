@@ -1,6 +1,6 @@
 //! Residuals of many load modules together, in 128 bits.
 
-use database::MeasuredTally;
+use store::MeasuredTally;
 use terrain::{ModuleResidual, QUANTA_PER_METRE};
 
 /// Residuals of many load modules together. Nothing that a file can hold makes them wrap.

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use ground::GamingArea;
+use build::ground::GamingArea;
 use terrain::{FeatureSurface, LoadModule, ModuleId, Post, SurfaceGround, TileFeatures, metres_of_quanta};
 
 use super::laid::Laid;

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use ground::GamingArea;
+use build::ground::GamingArea;
 use job::Job;
 use terrain::{LineKind, LineStorey, LoadModule, ModuleLine, metres_of_quanta};
 

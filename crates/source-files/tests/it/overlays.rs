@@ -1,7 +1,7 @@
 //! Class rasters and polygons, as the mask gets them.
 
-use mask::Polygon;
 use source_files::{ClassRaster, SourceError, read_polygons};
+use terrain::mask::Polygon;
 use terrain::{Post, PostRect};
 
 use crate::support::{Folder, Tiff, Values, grid};

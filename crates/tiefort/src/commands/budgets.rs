@@ -1,6 +1,6 @@
 //! What budgets would keep of the features of a job, as a table and as JSON.
 
-use compiler::{BUDGETS, Budgeted, Budgets};
+use build::{BUDGETS, Budgeted, Budgets};
 use job::Job;
 use serde_json::{Value, json};
 use views::{Align, Table, grouped};

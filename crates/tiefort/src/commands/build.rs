@@ -38,15 +38,15 @@ pub struct Arguments {
 
 /// Builds.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
-    let mut job = Job::load_with(&arguments.job, &ground::find_area)?;
+    let mut job = Job::load_with(&arguments.job, &build::ground::find_area)?;
     job.dem.strict = arguments.run.strict;
     if !arguments.force {
         let (workers, _) = arguments.run.workers.for_job(&job);
-        fit::check(&compiler::plan(&job)?.forecast, workers, &arguments.run.folder(&job))?;
+        fit::check(&build::plan(&job)?.forecast, workers, &arguments.run.folder(&job))?;
     }
     let run = Run::announce(&job, &arguments.run, "building")?;
     run.finish(|listener| {
-        let built = compiler::build(&job, run.folder(), &run.options(arguments.fresh), listener)?;
+        let built = build::build(&job, run.folder(), &run.options(arguments.fresh), listener)?;
         Ok(Finished::from(built))
     })
 }

@@ -4,14 +4,14 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
+use build::workbench::{
+    CompareEvent, CompareGround, CompareMethod, CompareRequest, CompareRow, Comparison, Equivalent, HeldGround, Made,
+};
 use clap::Args;
 use job::{Job, StartMethod};
 use serde_json::{Value, json};
 use terrain::{Post, PostRect};
 use views::{Align, Facets, Image, Look, Panel, Style, Surface, Table, draw_panels, fold, grouped};
-use workbench::{
-    CompareEvent, CompareGround, CompareMethod, CompareRequest, CompareRow, Comparison, Equivalent, HeldGround, Made,
-};
 
 use crate::arguments::{Format, start_method};
 use crate::commands::tin::without_job;
@@ -141,7 +141,7 @@ fn compared(
     let mut watch = Watch { quiet: arguments.quiet, names: Vec::new(), began: Instant::now(), seconds: Vec::new() };
     watch.names = names(&request);
     let is_job = matches!(request.ground, CompareGround::Job(_));
-    let found = workbench::compare(&request, stop, &mut |event| watch.hear(event)).map_err(Failure::from);
+    let found = build::workbench::compare(&request, stop, &mut |event| watch.hear(event)).map_err(Failure::from);
     let found = found.map_err(|failure| if is_job { failure } else { without_job(failure) })?;
     refuse_all(&found)?;
     if let Some(folder) = &arguments.pictures {
@@ -169,7 +169,7 @@ fn request(arguments: &Arguments) -> Result<CompareRequest, Failure> {
 }
 
 fn load(path: &Path) -> Result<Job, Failure> {
-    Ok(Job::load_with(path, &ground::find_area)?)
+    Ok(Job::load_with(path, &build::ground::find_area)?)
 }
 
 /// When no method could make the points it was asked for, that is an error.

@@ -2,11 +2,11 @@
 
 use std::path::PathBuf;
 
+use build::product::WantedGround;
 use clap::Args;
-use database::{FeatureFarOff, FeatureLeftOut, FeatureRemark, FeatureWhy};
 use inspect::{ExplainedFeatures, Explanation, explain};
-use product::WantedGround;
 use serde_json::{Value, json};
+use store::{FeatureFarOff, FeatureLeftOut, FeatureRemark, FeatureWhy};
 use terrain::{ModuleId, RefusedBy, StopReason, TileId};
 use views::{Align, Table, fold, grouped};
 

@@ -2,12 +2,12 @@
 
 use std::path::PathBuf;
 
+use build::CompileError;
+use build::product::{BuiltFrom, Opened, read_told};
 use clap::{Args, ValueEnum};
-use compiler::CompileError;
-use database::Folder;
 use exports::{Block, Datum, ExportError, Facts, Levels, Mesh, Product, Work};
 use job::Job;
-use product::{BuiltFrom, Opened, read_told};
+use store::Folder;
 use terrain::{ModuleId, PostRect};
 use views::grouped;
 
@@ -407,7 +407,7 @@ fn write_features(arguments: &Arguments) -> Result<(), Failure> {
         let message = "found --format features with a database without roads and water, expected one with some";
         return Err(Failure::new(message, "[features] in a job names their files"));
     };
-    let bytes = product::features_package(&opened.job, &level, &told.remarks).map_err(CompileError::from)?;
+    let bytes = build::product::features_package(&opened.job, &level, &told.remarks).map_err(CompileError::from)?;
     files::write_whole(&arguments.out, |out| std::io::Write::write_all(out, &bytes))
 }
 

@@ -2,10 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
+use build::BUDGETS;
+use build::workbench::{Seen, SeenFeatures, Suggestion};
 use clap::{Args, ValueEnum};
-use compiler::BUDGETS;
 use job::Job;
-use workbench::{Seen, SeenFeatures, Suggestion};
 
 use crate::commands::init_features::{features_section, told_of};
 use crate::commands::init_limits::{Asked, Limits, choose};
@@ -78,20 +78,20 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     // Rasters may take long to look at.
     arguments.out.as_deref().map_or(Ok(()), crate::files::check_free)?;
     let (vectors, files): (Vec<PathBuf>, Vec<PathBuf>) =
-        named_files(&arguments.files)?.into_iter().partition(|path| workbench::is_feature_file(path));
+        named_files(&arguments.files)?.into_iter().partition(|path| build::workbench::is_feature_file(path));
     if let ([first, ..], []) = (vectors.as_slice(), files.as_slice()) {
         let path = first.display();
         let message = format!("{path}: found a file of roads, rivers or lakes, expected a raster beside it");
         return Err(Failure::new(message, "name a raster of heights too, as dem.tif: area and ground come from it"));
     }
     let crs = arguments.crs.as_deref();
-    let suggestion = workbench::look_at(&files, crs).map_err(Failure::from);
+    let suggestion = build::workbench::look_at(&files, crs).map_err(Failure::from);
     let suggestion = suggestion.map_err(|failure| match crs {
         // The hint of a build would tell to write into the job that is about to be made.
         None => failure.hinted_where("no coordinate reference system", "say what it is: --crs EPSG:32611 (your own)"),
         Some(_) => failure,
     })?;
-    let features = workbench::look_at_features(&vectors, &suggestion)?;
+    let features = build::workbench::look_at_features(&vectors, &suggestion)?;
     let datums = known_datums(&suggestion.seen);
     if 1 < datums.len() {
         terminal::tell(&format!(
@@ -136,7 +136,7 @@ fn named_files(named: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
         inside.retain(|path| {
             let ending = crate::files::extension(path);
             let is_of = |endings: &[&str]| endings.contains(&ending.as_str());
-            path.is_file() && (is_of(&ENDINGS) || is_of(&OF_FEATURES) && workbench::is_feature_file(path))
+            path.is_file() && (is_of(&ENDINGS) || is_of(&OF_FEATURES) && build::workbench::is_feature_file(path))
         });
         inside.sort();
         if inside.is_empty() {
@@ -165,7 +165,7 @@ fn found_text(suggestion: &Suggestion, (triangles, rms_m): (u32, Option<f64>), j
         text += "; the area is a part in the middle of the first, see around in the job";
     }
     // The job's files need not be found for that, only its numbers.
-    let plan = Job::from_text(job, Path::new("job")).ok().and_then(|job| compiler::plan(&job).ok());
+    let plan = Job::from_text(job, Path::new("job")).ok().and_then(|job| build::plan(&job).ok());
     if let Some(plan) = plan {
         let memory = crate::files::bytes_text(plan.forecast.memory_bytes);
         text += &format!("; a build takes about {:.0} s of one core and {memory}", plan.forecast.seconds.max(1.0));

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
+use build::workbench::SeenFeatures;
 use views::grouped;
-use workbench::SeenFeatures;
 
 use crate::commands::job_words::{comment, quoted, relative};
 

@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use compiler::{BUDGETS, Budgeted, Budgets, limits_of};
+use build::workbench::Suggestion;
+use build::{BUDGETS, Budgeted, Budgets, limits_of};
 use job::Job;
-use workbench::Suggestion;
 
 use crate::commands::budgets::share;
 use crate::failure::Failure;

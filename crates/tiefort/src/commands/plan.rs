@@ -2,9 +2,9 @@
 
 use std::path::PathBuf;
 
+use build::ground::PlannedTile;
+use build::{Budgeted, FeaturesForeseen, Plan, Played};
 use clap::{Args, ValueEnum};
-use compiler::{Budgeted, FeaturesForeseen, Plan, Played};
-use ground::PlannedTile;
 use job::Job;
 use serde_json::{Value, json};
 use views::{Align, Table, fold, grouped};
@@ -88,12 +88,12 @@ enum Emit {
 
 /// Plans.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
-    let job = Job::load_with(&arguments.job, &ground::find_area)?;
-    let plan = compiler::plan(&job)?;
+    let job = Job::load_with(&arguments.job, &build::ground::find_area)?;
+    let plan = build::plan(&job)?;
     let default = PathBuf::from(format!("{}.tdb", job.area.name));
     let folder = arguments.out.as_ref().unwrap_or(&default);
-    let told = compiler::foresee(&job, folder)?;
-    let features = compiler::foresee_features(&job)?;
+    let told = build::foresee(&job, folder)?;
+    let features = build::foresee_features(&job)?;
     let told = told.iter().chain(features.iter().flat_map(|features| &features.table.notes));
     told.for_each(|note| terminal::tell(&format!("note: {}", terminal::short(note))));
     let played = played(&job, &plan, arguments)?;
@@ -131,7 +131,7 @@ fn played(job: &Job, plan: &Plan, arguments: &Arguments) -> Result<Vec<Played>, 
         return Ok(Vec::new());
     }
     let modules = job.area.grid.count() as u64;
-    Ok(tiles.iter().flat_map(|&tiles| compiler::play(&costs, tiles, modules, job.tiles.order, &workers)).collect())
+    Ok(tiles.iter().flat_map(|&tiles| build::play(&costs, tiles, modules, job.tiles.order, &workers)).collect())
 }
 
 fn plan_text(
@@ -196,7 +196,7 @@ fn corner_table(job: &Job) -> Table {
     let mut table = Table::new(&[Align::Left, Align::Right, Align::Right, Align::Right, Align::Right]);
     let system = format!("EPSG:{}", job.area.epsg);
     table.row(["Corners", &format!("{system} east"), "north", "WGS 84 latitude", "longitude"]);
-    for corner in ground::corners(job) {
+    for corner in build::ground::corners(job) {
         let [east_m, north_m] = corner.place_m.map(|metres| format!("{metres:.2}"));
         let degrees = corner.lon_lat.map(|[longitude, latitude]| [latitude, longitude]);
         let [latitude, longitude] = match degrees {
@@ -248,7 +248,7 @@ pub fn json_text(
         .collect();
     let tiles: Vec<Value> = by_rank(plan).into_iter().map(tile_json).collect();
     let forecast = &plan.forecast;
-    let corners: Vec<Value> = ground::corners(job)
+    let corners: Vec<Value> = build::ground::corners(job)
         .iter()
         .map(|corner| json!({ "name": corner.name, "place_m": corner.place_m, "lon_lat": corner.lon_lat }))
         .collect();

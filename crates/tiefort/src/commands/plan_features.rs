@@ -1,11 +1,11 @@
 //! The features of a job as `plan` tells them: the table of kinds that results, what of each file lies in the area, and
 //! what they are forecast to cost.
 
-use compiler::FeaturesForeseen;
-use database::ReportFeatureCost;
-use ground::{FeatureTable, SourceSeen};
+use build::FeaturesForeseen;
+use build::ground::{FeatureTable, SourceSeen};
 use job::Job;
 use serde_json::{Value, json};
+use store::ReportFeatureCost;
 use views::{Align, Table, grouped};
 
 /// What goes before the widths of the table.

@@ -2,9 +2,9 @@
 
 use std::path::PathBuf;
 
+use build::product::{Product, SceneParts, Wanted, WantedGround};
 use clap::{Args, ValueEnum};
-use database::Folder;
-use product::{Product, SceneParts, Wanted, WantedGround};
+use store::Folder;
 use terrain::{LoadModule, ModuleId, ModuleRect};
 use views::{Eye, Image, Map, RESIDUAL_SCALE_M, Shown, Sight, Style, draw_map, draw_sight};
 

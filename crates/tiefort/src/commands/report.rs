@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
+use build::product::{Product, Wanted, WantedGround};
 use clap::{Args, ValueEnum};
-use database::{Folder, Report};
-use product::{Product, Wanted, WantedGround};
+use store::{Folder, Report};
 
 use crate::arguments::Workers;
 use crate::failure::{Failure, Outcome};
@@ -80,5 +80,5 @@ pub fn page(database: &Path, report: &Report, against: Option<&Path>, workers: u
         }
         found => found?,
     };
-    Ok(product::page(&product, report))
+    Ok(build::product::page(&product, report))
 }

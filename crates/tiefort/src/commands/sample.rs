@@ -2,9 +2,9 @@
 
 use std::path::PathBuf;
 
+use build::workbench::Sample;
 use clap::Args;
 use terrain::Spacing;
-use workbench::Sample;
 
 use crate::failure::{Failure, Outcome};
 use crate::{arguments, files};

@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use database::Manifest;
-use engine::Held;
 use inspect::{Status, TileProgress};
+use store::Manifest;
+use store::engine::Held;
 use views::{fold, grouped};
 
 use crate::board::Board;

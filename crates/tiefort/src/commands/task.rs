@@ -2,9 +2,9 @@
 
 use std::path::PathBuf;
 
+use build::{ORDER, Stage, Unit, UnitEnd, is_of_tiles};
 use clap::builder::PossibleValue;
 use clap::{Args, ValueEnum};
-use compiler::{ORDER, Stage, Unit, UnitEnd, is_of_tiles};
 use job::Job;
 use terrain::TileId;
 
@@ -71,11 +71,11 @@ impl ValueEnum for StageName {
 
 /// Does it.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
-    let job = Job::load_with(&arguments.job, &ground::find_area)?;
+    let job = Job::load_with(&arguments.job, &build::ground::find_area)?;
     let units = units(&job, arguments)?;
     let names: Vec<String> = units.iter().map(Unit::to_string).collect();
     let run = Run::announce_briefly(&job, &arguments.run, &names.join(" "))?;
-    let end = run.listen(|listener| compiler::perform(&job, run.folder(), &units, &run.options(false), listener))?;
+    let end = run.listen(|listener| build::perform(&job, run.folder(), &units, &run.options(false), listener))?;
     match end {
         UnitEnd::Published(built) => Ok(run.conclude(&Finished::from(*built))),
         UnitEnd::Done | UnitEnd::Finished => Ok(Outcome::Sound),

@@ -38,14 +38,14 @@ pub struct Arguments {
 
 /// Re-runs the tile.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
-    let mut job = Job::load_with(&arguments.job, &ground::find_area)?;
+    let mut job = Job::load_with(&arguments.job, &build::ground::find_area)?;
     job.dem.strict = arguments.run.strict;
     check_tile(&job, arguments.tile)?;
     let what = format!("re-running tile {},{} of", arguments.tile.row, arguments.tile.col);
     let run = Run::announce(&job, &arguments.run, &what)?;
     run.finish(|listener| {
         let (tile, release, options) = (arguments.tile, arguments.release_borders, run.options(false));
-        let rebuilt = compiler::rebuild_tile(&job, run.folder(), tile, release, &options, listener)?;
+        let rebuilt = build::rebuild_tile(&job, run.folder(), tile, release, &options, listener)?;
         let names: Vec<String> = rebuilt.rebuilt.iter().map(TileId::to_string).collect();
         let frozen = if rebuilt.frozen { "; frozen: a build makes it whole" } else { "" };
         let tiles = format!("{} built{frozen}", names.join(", "));

@@ -3,15 +3,15 @@
 use std::path::{Path, PathBuf};
 use std::sync::PoisonError;
 
+use build::workbench::{Mesh, TinMethod, TinRequest, TinStart};
+use build::{Stage, Stopwatch};
 use clap::{ArgGroup, Args};
-use compiler::{Stage, Stopwatch};
 use exports::{Coordinates, TinPlace};
 use inspect::{Fidelity, Sights};
 use job::{Effort, ErrorKey, HeightFit, Lattice, MethodName, Optimising, Sight, Usual};
 use serde_json::{Value, json};
 use terrain::{Metres, StopReason};
 use views::{Align, Table, eta_in_words, grouped};
-use workbench::{Mesh, TinMethod, TinRequest, TinStart};
 
 use crate::arguments::{MeshOrigin, Workers, choice, positive, rows_by_columns, start_method, start_methods};
 use crate::clock::SystemClock;
@@ -187,8 +187,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let levels: Vec<usize> = arguments.levels.iter().map(|&points| points as usize).collect();
     let mut watched = Stopwatch::start(&clock, &mut listener);
     let meshed = match levels.is_empty() {
-        true => workbench::tin(&request, signals.stop(), &mut watched).map(|mesh| vec![mesh]),
-        false => workbench::tin_levels(&request, &levels, signals.stop(), &mut watched),
+        true => build::workbench::tin(&request, signals.stop(), &mut watched).map(|mesh| vec![mesh]),
+        false => build::workbench::tin_levels(&request, &levels, signals.stop(), &mut watched),
     };
     listener.finish();
     let seconds = clock.seconds();

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 #[cfg(all(feature = "serve", not(feature = "viewer")))]
-use database::Folder;
+use store::Folder;
 
 use crate::failure::{Failure, Outcome};
 #[cfg(all(feature = "serve", not(feature = "viewer")))]

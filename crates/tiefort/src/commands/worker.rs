@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
+use build::{Clock, Sharing, WorkerEnd};
 use clap::Args;
-use compiler::{Clock, Sharing, WorkerEnd};
 use job::Job;
 
 use crate::arguments::RunArguments;
@@ -44,7 +44,7 @@ pub struct Arguments {
 
 /// Works.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
-    let job = Job::load_with(&arguments.job, &ground::find_area)?;
+    let job = Job::load_with(&arguments.job, &build::ground::find_area)?;
     let run = Run::announce_briefly(&job, &arguments.run, "worker")?;
     let name = name();
     let lease = Duration::from_secs(arguments.lease);
@@ -52,7 +52,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let end = run.listen(|listener| {
         loop {
             // Those that begin at once may find each other half-way; a build or another job stays longer.
-            match compiler::work(&job, run.folder(), &run.options(false), &sharing, listener) {
+            match build::work(&job, run.folder(), &run.options(false), &sharing, listener) {
                 Err(error) if error.is_transient() && run.clock().wall() < lease => run.clock().wait(PAUSE),
                 worked => return worked,
             }

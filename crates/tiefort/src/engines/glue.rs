@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use compiler::{CompileError, ORDER, Plan, Stage, Unit, needs, units};
-use ground::GamingArea;
+use build::ground::GamingArea;
+use build::{CompileError, ORDER, Plan, Stage, Unit, needs, units};
 use job::{DemSource, Job};
 use terrain::TileId;
 
@@ -175,7 +175,7 @@ mod tests {
     /// Whatever a task reads is done by tasks it waits for, directly or by others.
     #[track_caller]
     fn check(job: &Job, pack: usize) {
-        let plan = &compiler::plan(job).unwrap();
+        let plan = &build::plan(job).unwrap();
         let tasks = tasks(job, &GamingArea::new(job).unwrap(), pack);
         let mut reached: Vec<Vec<bool>> = Vec::new();
         for (place, task) in tasks.iter().enumerate() {

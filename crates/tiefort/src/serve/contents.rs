@@ -3,8 +3,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use database::{FileStamp, Fingerprint, Folder, Manifest};
 use load_module_reader::{AreaFrame, Block, Keep, TileFile};
+use store::{FileStamp, Fingerprint, Folder, Manifest};
 use terrain::TileId;
 
 use crate::failure::{Cause, Failure};

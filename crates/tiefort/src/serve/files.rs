@@ -3,8 +3,8 @@
 use axum::body::Bytes;
 use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
-use database::Fingerprint;
 use http_range_header::parse_range_header;
+use store::Fingerprint;
 
 use super::refusal::Refusal;
 

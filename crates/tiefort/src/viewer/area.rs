@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use axum::body::Bytes;
+use build::product::{Product, ProductGround, Wanted, WantedGround, water};
 use job::Choice;
 use load_module_reader::{Area, Keep};
-use product::{Product, ProductGround, Wanted, WantedGround, water};
 use serde_json::json;
 use terrain::{HOLE_CLASS, ModuleGrid, ModuleRect, named_class_color};
 use views::{RESIDUAL_SCALE_M, palette};
@@ -55,7 +55,7 @@ impl Viewed {
         let level = product.features.as_ref().map(|(level, _)| level);
         let in_modules = level.is_some() && VERSION_WITH_LINES <= product.job.modules.format;
         let lines = (!in_modules).then(|| level.map(|level| Lines::of(level, area.frame())).unwrap_or_default());
-        let buildings = Buildings::read(&database::Folder::new(folder), &area);
+        let buildings = Buildings::read(&store::Folder::new(folder), &area);
         Ok(Self {
             folder: folder.to_path_buf(),
             grid: product.grid,

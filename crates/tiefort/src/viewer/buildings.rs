@@ -6,8 +6,8 @@
 
 use std::collections::BTreeMap;
 
-use database::{BUILDING_UNITS_PER_METRE, Building, Folder, files};
 use load_module_reader::{Area, Block, LoadedGround};
+use store::{BUILDING_UNITS_PER_METRE, Building, Folder, files};
 
 use crate::places::ground_around;
 use crate::terminal;

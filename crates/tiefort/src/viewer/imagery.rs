@@ -18,10 +18,10 @@ use axum::extract::{Path as UrlPath, State};
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
-use database::Fingerprint;
+use build::product::{Drape, DrapedArea, SQUARE_PIXELS};
 use load_module_reader::AreaFrame;
 use lru::LruCache;
-use product::{Drape, DrapedArea, SQUARE_PIXELS};
+use store::Fingerprint;
 use tokio::sync::Semaphore;
 
 use super::plain::FAULT;

@@ -6,8 +6,8 @@
 
 use std::collections::BTreeMap;
 
-use database::{AreaLevel, FeatureLine, LineRole};
 use load_module_reader::{Area, AreaFrame, Block, Line, LineKind, LineStorey, QUANTA_PER_METRE, Vertex};
+use store::{AreaLevel, FeatureLine, LineRole};
 
 /// The lines of an area by load module, row and column.
 #[derive(Default)]

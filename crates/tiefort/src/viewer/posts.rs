@@ -3,8 +3,8 @@
 //! As bytes: heights of all posts of the block, its four border lines included, in metres (f32), row by row from the
 //! south-west; then the residual of each, DEM less triangles (f32; not a number at voids).
 
+use build::product::{NO_RESIDUAL, Product, ProductGround, Wanted, WantedGround};
 use load_module_reader::{Block, QUANTA_PER_METRE};
-use product::{NO_RESIDUAL, Product, ProductGround, Wanted, WantedGround};
 use terrain::{ModuleRect, Post};
 
 use super::area::Viewed;

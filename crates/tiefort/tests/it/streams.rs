@@ -3,8 +3,8 @@
 use std::io::{BufRead, BufReader, Read};
 use std::process::{Command, Stdio};
 
-use database::Lock;
 use serde_json::Value;
+use store::Lock;
 
 use crate::scene::{Said, Scene};
 

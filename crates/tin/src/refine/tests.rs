@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 
 use fastrand::Rng;
-use geometry::{levels_available, rounded, visit_posts, widest_level};
-use limits::{Allowance, Windows};
-use mesh::{Lines, Mesh};
+use terrain::geometry::{levels_available, rounded, visit_posts, widest_level};
+use terrain::limits::{Allowance, Windows};
+use terrain::mesh::{Lines, Mesh};
 use terrain::{
     Features, LastBatch, ModuleGrid, ModuleId, ModuleRect, Post, PostRect, SeamSides, Side, SideSpan, TileId,
 };
@@ -61,7 +61,7 @@ fn plain_task(rect: PostRect, rule: Rule, points: usize) -> TileTask {
 
 /// Value at every candidate of a mesh, by visiting every triangle.
 fn values(dem: &Dem, importance: &Importance, mesh: &Mesh, unit: u64) -> BTreeMap<LocalPost, u64> {
-    let surface = geometry::Surface::new(dem);
+    let surface = terrain::geometry::Surface::new(dem);
     let mut values = BTreeMap::new();
     for record in mesh.triangles() {
         let facet = surface.facet(record.corners);

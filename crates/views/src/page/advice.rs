@@ -1,6 +1,6 @@
 //! What to change in a job when limits bind: named policies, each with the numbers that it would need.
 
-use database::{Report, ReportBound, ReportEnough, ReportFeatureClass, ReportPlace};
+use store::{Report, ReportBound, ReportEnough, ReportFeatureClass, ReportPlace};
 use terrain::POINT_COST;
 
 use crate::table::grouped;
@@ -190,7 +190,7 @@ fn mean(report: &Report) -> Option<Advice> {
 fn importance(report: &Report) -> Option<Advice> {
     // Level water, and classes that lie nowhere, say nothing of how ground shares its triangles.
     let classes = report.classes.iter().filter(|class| 0 < class.posts && LEVEL_M < class.residual.rms_m);
-    let by_rms = |a: &&database::ReportClass, b: &&database::ReportClass| a.residual.rms_m.total_cmp(&b.residual.rms_m);
+    let by_rms = |a: &&store::ReportClass, b: &&store::ReportClass| a.residual.rms_m.total_cmp(&b.residual.rms_m);
     let (best, worst) = (classes.clone().min_by(by_rms)?, classes.max_by(by_rms)?);
     if worst.residual.rms_m < UNEVEN * best.residual.rms_m {
         return None;
@@ -252,7 +252,7 @@ mod tests {
         let mut report = samples::report();
         report.enough = Some(ReportEnough { mean: 250, per_load_module: 750, per_4km: 32_000 });
         let class = ReportFeatureClass { wanted_km: 10.0, kept_km: 7.5, lakes_wanted: 2, ..Default::default() };
-        report.features = Some(database::ReportFeatures { classes: vec![class], ..Default::default() });
+        report.features = Some(store::ReportFeatures { classes: vec![class], ..Default::default() });
         let advice = advise(&report).into_iter().find(|advice| advice.policy == "keep-network").unwrap();
         assert_eq!(
             advice.change,

@@ -2,8 +2,8 @@
 
 use std::collections::BTreeSet;
 
-use database::{Report, ReportPlace};
 use maud::{Markup, html};
+use store::{Report, ReportPlace};
 use terrain::{ModuleId, ModuleRect};
 
 use super::place_text;

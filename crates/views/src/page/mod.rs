@@ -11,8 +11,8 @@ mod tables;
 pub(crate) use advice::place_text;
 pub use advice::{Advice, advise};
 
-use database::{Manifest, Report};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
+use store::{Manifest, Report};
 use terrain::{LoadModule, ModuleId};
 
 use crate::against::leading;
@@ -277,7 +277,7 @@ fn worst(page: &Page, scene: &Scene, modules: &[&LoadModule], marks: &Marks) -> 
         div.worst {
             @for module in modules {
                 article {
-                    h3 { (marks.link(database::ReportPlace::Module([module.id.row, module.id.col]))) }
+                    h3 { (marks.link(store::ReportPlace::Module([module.id.row, module.id.col]))) }
                     (maps::module_images(scene, module))
                     p {
                         "RMS " (format!("{:.2}", mean_squares(module).sqrt() / quanta)) " m, largest "
@@ -293,7 +293,7 @@ fn worst(page: &Page, scene: &Scene, modules: &[&LoadModule], marks: &Marks) -> 
 }
 
 fn refused_text(report: &Report, module: ModuleId) -> String {
-    let here = database::ReportPlace::Module([module.row, module.col]);
+    let here = store::ReportPlace::Module([module.row, module.col]);
     let refused: u32 = report.bound.iter().filter(|bound| bound.place == here).map(|bound| bound.refused).sum();
     if refused == 0 { String::new() } else { format!(", {refused} posts refused") }
 }

@@ -1,7 +1,7 @@
 //! Tables of the page: limits and advice, residuals, breaches, times, sources.
 
-use database::{Manifest, Report, ReportEarthworks, ReportFeatures, ReportResidual};
 use maud::{Markup, html};
+use store::{Manifest, Report, ReportEarthworks, ReportFeatures, ReportResidual};
 
 use super::advise;
 use super::marks::{BOUND_ROWS_MAX, Marks, ROWS_MAX};

@@ -1,6 +1,6 @@
 //! The page as a whole: complete, self-contained, and safe whatever names it is given.
 
-use database::{Area, Fingerprint, Manifest, SourceRecord};
+use store::{Area, Fingerprint, Manifest, SourceRecord};
 use terrain::{Dem, GridFrame};
 
 use super::*;

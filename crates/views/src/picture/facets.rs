@@ -2,7 +2,7 @@
 
 use std::f64::consts::FRAC_1_SQRT_2;
 
-use database::LineRole;
+use store::LineRole;
 use terrain::{Dem, HOLE_CLASS, LoadModule, ModuleGrid, Post, QUANTA_PER_METRE, Spacing, Tin, metres_of_quanta};
 
 use super::map_extent::slope;

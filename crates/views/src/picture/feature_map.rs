@@ -67,7 +67,7 @@ mod tests {
     use super::super::scene::{SceneFeatures, SceneLimits};
     use super::*;
     use crate::samples;
-    use database::{FeatureLine, FeatureRemark, LineRole};
+    use store::{FeatureLine, FeatureRemark, LineRole};
     use terrain::{LineForm, LineKind, LineStorey, LineTraits, ModuleLine, ModuleVertex};
 
     fn line(role: LineRole, vertices: Vec<[f64; 3]>) -> FeatureLine {

@@ -1,6 +1,6 @@
 //! Roads and water on a map: their lines in the colours of their classes.
 
-use database::LineRole;
+use store::LineRole;
 use terrain::{ModuleVertex, QUANTA_PER_METRE};
 
 use super::color::{Color, FEATURES};

@@ -1,6 +1,6 @@
 //! Maps with a colour for every load module: how many triangles, how much of a limit; and the tile plan.
 
-use database::TileState;
+use store::TileState;
 use terrain::{ModuleId, ModuleRect, TileId};
 
 use super::color::{BOUND, BREACH, COUNTS, Color, GREY, INK, KINDS, PALE, USE, WHITE, ink_on};

@@ -1,6 +1,6 @@
 //! A finished area, as pictures of it need it: plain values that the caller has read.
 
-use database::{FeatureLine, FeatureRemark};
+use store::{FeatureLine, FeatureRemark};
 use terrain::{Dem, GridFrame, LoadModule, ModuleGrid, ModuleId, ModuleRect, TileId};
 
 use super::color::feature_number;
@@ -105,7 +105,7 @@ pub struct SceneTile {
     /// Its colour: tiles of one colour may be refined at once.
     pub color: u32,
     /// How it stands.
-    pub state: database::TileState,
+    pub state: store::TileState,
 }
 
 impl Scene<'_> {

@@ -1,0 +1,305 @@
+//! Load modules of every tile, their residuals and counts.
+
+use std::collections::BTreeSet;
+
+use crate::ground::Window;
+use fidelity::{Curvature, FeatureFigures, Residuals, Tally};
+use job::{Borders, ClipHeights as JobClipHeights, Edges, Job, OuterBorder};
+use store::engine::{Artifact, Fingerprint, Key, Outcome, Stamp, keep_or_make};
+use store::{FileStamp, Measured, TileModules};
+use terrain::{
+    Decks, HOLE_CLASS, Importance, LatticePoint, LoadModule, ModuleCounts, Post, PostRect, TileId, Tin, Vertex, in_turn,
+};
+use tin::load_modules::{ClipHeights, Layout, clip, concatenate, cut_decks, cut_lines, lift_decks};
+
+use crate::assembled::{Assembled, ModuleNumbers};
+use crate::keys::{self, StampOf};
+use crate::levels::{all_levels, faces};
+use crate::measured::{from_measured, to_measured};
+use crate::refine::Published;
+use crate::run::{ALGORITHM_REVISION, Run};
+use crate::sums::{Adding, Sums};
+use crate::{CompileError, Progress, Stage};
+
+/// Assembles every tile.
+pub(crate) fn assemble(
+    run: &Run,
+    tins: &[Published],
+    progress: &mut dyn Progress,
+) -> Result<(Vec<Assembled>, Sums), CompileError> {
+    let (none, adding) = (vec![Vec::new(); tins.len()], Adding::default());
+    let done = run.for_each_tile(Stage::Assemble, progress, |tile| {
+        Ok(assemble_tile(run, &|index| tins[index].stamp, &none, tile)?.map(|(assembled, sums)| {
+            adding.add(sums);
+            assembled
+        }))
+    })?;
+    Ok((done.into_iter().map(Outcome::into_inner).collect(), adding.finish()))
+}
+
+/// Assembles, measures and publishes one tile, without the points that `removed` lists per tile; or keeps what is
+/// published and fresh.
+pub(crate) fn assemble_tile(
+    run: &Run,
+    stamps: &StampOf,
+    removed: &[Vec<LatticePoint>],
+    tile: TileId,
+) -> Result<Outcome<(Assembled, Sums)>, CompileError> {
+    let features = run.tile_features(tile)?;
+    let modules = keys::modules((run.job, &run.area), stamps, removed, (&features, run.left_out())).fingerprint();
+    keep_or_make(&Assembling { run, stamps, removed, tile, modules }, ALGORITHM_REVISION)
+}
+
+/// A tile's load modules and what is measured of them, as the engine asks for them.
+struct Assembling<'a> {
+    run: &'a Run<'a>,
+    stamps: &'a StampOf<'a>,
+    removed: &'a [Vec<LatticePoint>],
+    tile: TileId,
+    /// Of all that the load modules are made from.
+    modules: Fingerprint,
+}
+
+impl Artifact for Assembling<'_> {
+    type Output = (Assembled, Sums);
+    type Error = CompileError;
+
+    fn key(&self) -> Key {
+        keys::measured(self.run, self.modules)
+    }
+
+    fn published(&self) -> Result<Option<Stamp>, CompileError> {
+        Ok(self.run.database.folder().measured_stamp(self.tile)?)
+    }
+
+    fn read(&self, _key: &Key) -> Option<(Stamp, (Assembled, Sums))> {
+        let (area, folder, tile) = (&self.run.area, self.run.database.folder(), self.tile);
+        let (stamp, file, measured) = folder.read_measured(tile).ok()?;
+        let count = area.tiling.modules(tile, area.grid).count();
+        let (levels, has_features) = (self.run.job.lod.level_count(), self.run.level.is_some());
+        let is_whole = |measured: &Measured| {
+            measured.modules.len() == count * levels && measured.features.is_some() == has_features
+        };
+        folder.check_file(&folder.modules_path(tile), &measured.modules_file).ok().filter(|()| is_whole(&measured))?;
+        Some((stamp, from_measured(measured, count, file)))
+    }
+
+    fn make(&self, _key: &Key, stamp: &Stamp) -> Result<(Assembled, Sums), CompileError> {
+        make(self, stamp)
+    }
+}
+
+fn make(assembling: &Assembling, stamp: &Stamp) -> Result<(Assembled, Sums), CompileError> {
+    let Assembling { run, stamps, removed, tile, modules: fingerprint } = *assembling;
+    let area = &run.area;
+    let window = run.window(tile)?;
+    let layout = Layout { grid: area.grid, modules: area.tiling.modules(tile, area.grid), spacing: area.frame.spacing };
+    let own = run.tin(tile, &stamps(area.tiling.index(tile)))?;
+    let features = run.tile_features(tile)?;
+    let faces = faces(&features, &BTreeSet::new());
+    // What is no feature has the class that the ground has without any.
+    let natural = run.ground.natural_tile(area, tile)?;
+    let mut modules = match run.job.modules.edges {
+        Edges::Constrained => concatenate(&own.tin, &layout, &natural.importance, faces.as_ref()),
+        Edges::Clip(heights) => {
+            let points = points_around(run, stamps, removed, tile)?;
+            let heights = match heights {
+                JobClipHeights::Coplanar => ClipHeights::Coplanar,
+                JobClipHeights::Dem => ClipHeights::Dem(&window.dem),
+            };
+            clip(&points, &layout, heights, &window.importance)
+        }
+    };
+    let decks = cut_decks(&features.decks, features.kept.steps_per_post, &layout);
+    lift(&mut modules, &decks);
+    let lines = cut_lines(keys::lines_of(run.job, &features), features.kept.steps_per_post, &layout);
+    modules.iter_mut().zip(lines).for_each(|(module, lines)| module.lines = lines);
+    let residuals = fidelity::measure(&mut modules, &window.measured(area));
+    let at_source = at_source(run, tile, &modules)?;
+    let figures = feature_figures(run, tile, (&own.tin, &modules), &window)?;
+    let mut levels = all_levels(run, modules, (&layout, &window.dem, &natural.importance), &features);
+    levels[1..].iter_mut().for_each(|level| lift(level, &decks));
+    levels[1..].iter_mut().for_each(|level| drop(fidelity::measure(level, &window.measured(area))));
+    let file = publish(run, tile, &layout, fingerprint, &levels)?;
+    let counted = count_points(run, &own.tin, &removed[area.tiling.index(tile)], &window.importance);
+    let ground = (heights_of(&levels), curvature(run, tile, &levels[0], &window));
+    let (modules, coarser) = numbers_of(&levels);
+    let mut done = Assembled { file, measured: FileStamp::of(&[]), modules, coarser };
+    let sums = Sums { features: figures, ..sums(residuals, at_source, counted, ground) };
+    done.measured = run.database.write_measured(stamp, &to_measured(tile, &done, &sums))?;
+    Ok((done, sums))
+}
+
+/// Gives load modules their decks, raised onto the ground of each.
+fn lift(modules: &mut [LoadModule], decks: &[(Decks, usize)]) {
+    for (module, (decks, most)) in modules.iter_mut().zip(decks).filter(|(_, (decks, _))| !decks.is_empty()) {
+        module.decks = lift_decks(decks, module, *most);
+    }
+}
+
+/// Residuals against the sources alone: at the posts of the working grid, where features or water are burned into it,
+/// and at the source's own posts, where those are others.
+fn at_source(run: &Run, tile: TileId, modules: &[LoadModule]) -> Result<[Option<Tally>; 2], CompileError> {
+    let (area, relief) = (&run.area, &run.ground.relief);
+    let rect = area.tiling.rect(tile);
+    let own_posts = relief.residuals_at_source(modules, area, rect)?;
+    if !run.burns_in() {
+        return Ok([None, own_posts]);
+    }
+    let (dem, mask) = (relief.dry(rect)?, Importance::uniform(rect, 0));
+    let source = fidelity::Reference { dem: &dem, mask: &mask, grid: area.grid, spacing: area.frame.spacing };
+    let mut at_grid = Tally::default();
+    modules.iter().for_each(|module| at_grid.merge(&fidelity::residuals(module, &source).total()));
+    Ok([Some(at_grid), own_posts])
+}
+
+fn sums(
+    residuals: Residuals,
+    [at_source_grid, at_source]: [Option<Tally>; 2],
+    (points, border): (Vec<u64>, u64),
+    (heights, curvature): ((i32, i32), Curvature),
+) -> Sums {
+    let (has_source, at_source) = (at_source.is_some(), at_source.unwrap_or_default());
+    Sums { residuals, at_source_grid, has_source, at_source, points, border, heights, curvature, features: None }
+}
+
+/// How much the ground of a tile curves, for triangles as large as these load modules have them.
+fn curvature(run: &Run, tile: TileId, modules: &[LoadModule], window: &Window) -> Curvature {
+    let triangles = modules.iter().map(|module| module.triangles.len()).sum();
+    fidelity::curvature(&window.dem, run.area.tiling.rect(tile), triangles, &in_turn)
+}
+
+/// How true a tile is to its features, in jobs with some.
+fn feature_figures(
+    run: &Run,
+    tile: TileId,
+    (tin, modules): (&Tin, &[LoadModule]),
+    window: &Window,
+) -> Result<Option<FeatureFigures>, CompileError> {
+    if run.level.is_none() {
+        return Ok(None);
+    }
+    let (features, area) = (run.tile_features(tile)?, &run.area);
+    let ground = window.measured(area);
+    Ok(Some(FeatureFigures::of((tin, modules), &features, &ground, &window.featured, area.rect)))
+}
+
+/// The lowest and the highest vertex of all levels of load modules, in quanta.
+fn heights_of(levels: &[Vec<LoadModule>]) -> (i32, i32) {
+    let heights = levels.iter().flatten().flat_map(|module| &module.vertices).map(|vertex| vertex.z);
+    heights.fold((i32::MAX, i32::MIN), |(low, high), z| (low.min(z), high.max(z)))
+}
+
+/// The published load modules of a tile as they are: their own numbers, and residuals against today's ground.
+pub(crate) fn read_assembled(run: &Run, tins: &[Published], tile: TileId) -> Result<(Assembled, Sums), CompileError> {
+    let (area, folder, window) = (&run.area, run.database.folder(), run.window(tile)?);
+    let (_, mut levels) = folder.read_levels(tile)?;
+    let file = folder.stamp_file(&folder.modules_path(tile))?;
+    let (modules, coarser) = numbers_of(&levels);
+    let residuals = fidelity::measure(&mut levels[0], &window.measured(area));
+    let at_source = at_source(run, tile, &levels[0])?;
+    let own = run.tin(tile, &tins[area.tiling.index(tile)].stamp)?;
+    let counted = count_points(run, &own.tin, &[], &window.importance);
+    let features = feature_figures(run, tile, (&own.tin, &levels[0]), &window)?;
+    let measured = folder.stamp_file(&folder.measured_path(tile))?;
+    let done = Assembled { file, measured, modules, coarser };
+    let ground = (heights_of(&levels), curvature(run, tile, &levels[0], &window));
+    Ok((done, Sums { features, ..sums(residuals, at_source, counted, ground) }))
+}
+
+/// Numbers of the finest level, and of each of the others.
+fn numbers_of(levels: &[Vec<LoadModule>]) -> (Vec<ModuleNumbers>, Vec<Vec<ModuleNumbers>>) {
+    let mut all = levels.iter().map(|level| level.iter().map(numbers).collect());
+    (all.next().unwrap_or_default(), all.collect())
+}
+
+fn numbers(module: &LoadModule) -> ModuleNumbers {
+    let ModuleCounts { triangles, polygons } = module.counts();
+    ModuleNumbers { triangles, polygons, residual: module.residual }
+}
+
+/// The points in and around a tile that clipping needs.
+pub(crate) fn points_around(
+    run: &Run,
+    stamps: &StampOf,
+    removed: &[Vec<LatticePoint>],
+    tile: TileId,
+) -> Result<Vec<Vertex>, CompileError> {
+    let mut near = run.area.tiling.neighbours(tile);
+    near.push(tile);
+    let index = |&other: &TileId| run.area.tiling.index(other);
+    let mut gone: Vec<LatticePoint> = near.iter().flat_map(|other| removed[index(other)].iter().copied()).collect();
+    gone.sort_unstable();
+    let mut all = Vec::new();
+    for other in &near {
+        let tin = run.tin(*other, &stamps(index(other)))?;
+        all.extend(tin.tin.vertices.iter().filter(|vertex| gone.binary_search(&vertex.at).is_err()));
+    }
+    Ok(all)
+}
+
+/// Writes the file of a tile's load modules.
+fn publish(
+    run: &Run,
+    tile: TileId,
+    layout: &Layout,
+    fingerprint: Fingerprint,
+    levels: &[Vec<LoadModule>],
+) -> Result<FileStamp, CompileError> {
+    let header = TileModules {
+        tile,
+        grid: layout.grid,
+        modules: layout.modules,
+        frame: run.area.frame,
+        crs: crs(run.job),
+        vertical_datum: run.job.dem.vertical_datum.clone().unwrap_or_default(),
+        fingerprint,
+    };
+    Ok(run.database.write_modules(&header, levels)?)
+}
+
+/// The area's coordinate reference system, as files name it.
+pub(crate) fn crs(job: &Job) -> String {
+    format!("EPSG:{}", job.area.epsg)
+}
+
+/// Points by class of the post they stand on, or next south-west of them, those over holes after the job's classes if
+/// there are any; and how many of them are border points that every build starts from.
+/// A point on a seam counts in the tile that owns the post.
+fn count_points(run: &Run, own: &Tin, removed: &[LatticePoint], importance: &Importance) -> (Vec<u64>, u64) {
+    let (rect, area) = (own.rect, run.area.rect);
+    let steps = own.steps_per_post;
+    let side = run.area.grid.side_cells * steps;
+    let is_regular = run.job.tiles.borders == Borders::Regular;
+    let is_fixed = run.job.modules.outer_border == OuterBorder::Fixed;
+    let mut points = vec![0; run.job.class_names().len()];
+    let holes = points.len();
+    let mut border = 0;
+    let removed: std::collections::BTreeSet<&LatticePoint> = removed.iter().collect();
+    for vertex in own.vertices.iter().filter(|vertex| !removed.contains(&vertex.at)) {
+        let at = vertex.at;
+        let is_at = |place: i32, line: i32| place == line * steps;
+        let beyond = (is_at(at.row, rect.north) && rect.north != area.north)
+            || (is_at(at.col, rect.east) && rect.east != area.east);
+        if beyond {
+            continue;
+        }
+        let post = Post::new(at.row.div_euclid(steps), at.col.div_euclid(steps));
+        match importance.class(post) {
+            HOLE_CLASS => {
+                points.resize(holes + 1, 0);
+                points[holes] += 1;
+            }
+            class => points[usize::from(class)] += 1,
+        }
+        let on_line = |rect: PostRect| {
+            is_at(at.row, rect.south)
+                || is_at(at.row, rect.north)
+                || is_at(at.col, rect.west)
+                || is_at(at.col, rect.east)
+        };
+        let is_corner = at.row % side == 0 && at.col % side == 0;
+        border += u64::from(!is_corner && ((is_fixed && on_line(area)) || (is_regular && on_line(rect))));
+    }
+    (points, border)
+}

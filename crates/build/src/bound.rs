@@ -1,0 +1,126 @@
+//! Where a limit was met only by refusing posts, and what it cost.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use store::{ReportBound, ReportPlace};
+use terrain::{ModuleId, ModuleRect, ModuleResidual, RefusedBy, TileId, metres_of_quanta};
+
+use crate::CompileError;
+use crate::enforce::ByModule;
+use crate::refine::Published;
+use crate::refused::RefusedPosts;
+use crate::run::Run;
+use crate::without_limits::without_limits;
+
+/// Refusals of the whole area by load module: a tile is refused posts on its sides by load modules of its neighbours.
+pub(crate) fn of_area(tins: &[Published]) -> BTreeMap<ModuleId, RefusedPosts> {
+    let mut modules: BTreeMap<ModuleId, RefusedPosts> = BTreeMap::new();
+    for (module, posts) in tins.iter().flat_map(|tile| &tile.refused) {
+        modules.entry(*module).or_default().merge(posts);
+    }
+    modules
+}
+
+/// The limits that refused posts, most posts first. `counts` are of every load module, row-major.
+pub(crate) fn bound(
+    run: &Run,
+    tins: &[Published],
+    refused: &BTreeMap<ModuleId, RefusedPosts>,
+    counts: &[u32],
+    numbers: &ByModule,
+) -> Result<Vec<ReportBound>, CompileError> {
+    let tiles: BTreeSet<TileId> =
+        refused.keys().map(|&module| run.area.tiling.tile_of_module(module, run.area.grid)).collect();
+    let tiles: Vec<TileId> = tiles.into_iter().collect();
+    let freed = schedule::for_each_independent(&tiles, &run.workers, run.stop, |_, &tile| {
+        without_limits(run, &tins[run.area.tiling.index(tile)], refused)
+    });
+    let freed = freed.map_err(|error| CompileError::from_schedule(crate::Stage::Publish, &tiles, error))?;
+    let freed: BTreeMap<ModuleId, ModuleResidual> = freed.into_iter().flatten().collect();
+
+    let sums = run.area.budget.windows.sums(run.area.grid, counts);
+    let places = by_place(run, refused, &sums);
+    let mut bound: Vec<ReportBound> = places
+        .into_iter()
+        .map(|(place, posts)| {
+            let inside = modules_of(run, place);
+            let with = inside.clone().map(|module| numbers.get(module).residual);
+            let without = inside.map(|module| *freed.get(&module).unwrap_or(&numbers.get(module).residual));
+            let (kind, count, limit) = counted(run, place, counts, &sums);
+            ReportBound {
+                kind: kind.into(),
+                place,
+                count,
+                limit,
+                refused: posts.count(),
+                refused_largest_m: metres_of_quanta(posts.largest() as i32),
+                rms_with_m: rms_m(with),
+                rms_without_m: rms_m(without),
+            }
+        })
+        .collect();
+    bound.sort_by_key(|bound| std::cmp::Reverse(bound.refused));
+    Ok(bound)
+}
+
+/// Refusals by the load module or window whose limit caused them. A refusal by a window is booked to the fullest
+/// window that holds the load module.
+fn by_place(
+    run: &Run,
+    refused: &BTreeMap<ModuleId, RefusedPosts>,
+    sums: &[u32],
+) -> impl Iterator<Item = (ReportPlace, RefusedPosts)> + use<> {
+    let windows = &run.area.budget.windows;
+    let mut modules: BTreeMap<ModuleId, RefusedPosts> = BTreeMap::new();
+    let mut by_window: BTreeMap<ModuleId, RefusedPosts> = BTreeMap::new();
+    for (&module, posts) in refused {
+        let here = ModuleRect { south: module.row, west: module.col, north: module.row + 1, east: module.col + 1 };
+        let sum = |origin: &ModuleId| sums[origin.row as usize * windows.origins.cols() as usize + origin.col as usize];
+        let fullest = windows.touching(here).iter().max_by_key(|origin| (sum(origin), std::cmp::Reverse(*origin)));
+        let is_of_window = |by| by == RefusedBy::Window && fullest.is_some();
+        let (of_window, of_module) = (posts.part(is_of_window), posts.part(|by| !is_of_window(by)));
+        if let Some(origin) = fullest.filter(|_| 0 < of_window.count()) {
+            by_window.entry(origin).or_default().merge(&of_window);
+        }
+        if 0 < of_module.count() {
+            modules.entry(module).or_default().merge(&of_module);
+        }
+    }
+    let module = |(id, posts): (ModuleId, RefusedPosts)| (ReportPlace::Module([id.row, id.col]), posts);
+    let window = |(id, posts): (ModuleId, RefusedPosts)| (ReportPlace::Window([id.row, id.col]), posts);
+    modules.into_iter().map(module).chain(by_window.into_iter().map(window))
+}
+
+fn modules_of(run: &Run, place: ReportPlace) -> impl Iterator<Item = ModuleId> + Clone + use<> {
+    let modules = match place {
+        ReportPlace::Module([row, col]) => ModuleRect { south: row, west: col, north: row + 1, east: col + 1 },
+        ReportPlace::Window([row, col]) => run.area.budget.windows.modules_of(ModuleId { row, col }),
+        ReportPlace::Area => run.area.grid.all(),
+    };
+    (modules.south..modules.north)
+        .flat_map(move |row| (modules.west..modules.east).map(move |col| ModuleId { row, col }))
+}
+
+fn counted(run: &Run, place: ReportPlace, counts: &[u32], sums: &[u32]) -> (&'static str, u64, u64) {
+    let budget = &run.area.budget;
+    match place {
+        ReportPlace::Module([row, col]) => {
+            let count = counts[budget.grid.index(ModuleId { row, col })];
+            ("per_load_module", u64::from(count), u64::from(budget.per_module))
+        }
+        ReportPlace::Window([row, col]) => {
+            let count = sums[row as usize * budget.windows.origins.cols() as usize + col as usize];
+            ("per_4km_square", u64::from(count), u64::from(budget.per_window))
+        }
+        ReportPlace::Area => {
+            let count = counts.iter().map(|&count| u64::from(count)).sum();
+            ("mean_per_load_module", count, budget.area)
+        }
+    }
+}
+
+fn rms_m(parts: impl Iterator<Item = ModuleResidual>) -> f64 {
+    let (squares, posts) =
+        parts.fold((0u64, 0u64), |(squares, posts), part| (squares + part.sum_squared, posts + u64::from(part.posts)));
+    if posts == 0 { 0.0 } else { (squares as f64 / posts as f64).sqrt() / f64::from(terrain::QUANTA_PER_METRE) }
+}

@@ -1,0 +1,163 @@
+//! What budgets of different size would keep of the roads and water of a job: heights are read along features once, and
+//! each budget is tried on them, as the stages `profile` and `level` do. No TIN is made.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use crate::ground::{GamingArea, Ground};
+use features::{AreaFeatures, Formed, Kind, Levelled, Storey};
+use job::Job;
+use schedule::{Workers, for_each_piece};
+use store::Profile;
+use terrain::{LineStorey, TileId};
+
+use crate::CompileError;
+use crate::heard::Heard;
+use crate::level::shares;
+use crate::profile::sound;
+use crate::read_features::ReadFeatures;
+use crate::run::Run;
+
+/// Triangles of a load module on average that are tried: SIMNET's first.
+pub const BUDGETS: [u32; 7] = [32, 64, 125, 250, 500, 1000, 2000];
+/// Of a mean, what a load module may have at most, and a square of 4 km.
+pub const BUDGET_TIMES: [u32; 2] = [3, 128];
+/// What SIMNET's hardware held of a load module and of a square of 4 km.
+pub const SIMNET: [u32; 2] = [100, 4096];
+/// The share of the length of each kind that a budget is to keep: of motorways, primaries, rails and rivers, and of
+/// every other kind.
+pub const KEPT_MIN: [f64; 2] = [0.995, 0.95];
+/// What a budget would keep of the features of an area.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Budgeted {
+    /// Triangles of a load module, on average over the area.
+    pub mean: u32,
+    /// At most in one load module.
+    pub per_load_module: u32,
+    /// At most in a window of 4 km.
+    pub per_window: u32,
+    /// Metres of ways by kind, in the table's order: kept, and all there are, tunnels not among them.
+    pub kinds: Vec<(Kind, [f64; 2])>,
+    /// Lakes of 1 ha and more: kept, and all there are.
+    pub lakes: [u32; 2],
+    /// Triangles that features would take.
+    pub triangles: u64,
+}
+
+impl Budgeted {
+    /// Whether it keeps nearly all: 99.5 % of motorways, primaries, rails and rivers, 95 % of every other kind, and
+    /// every lake of 1 ha.
+    pub fn holds(&self) -> bool {
+        let enough = |&(kind, [kept, all]): &(Kind, [f64; 2])| {
+            let is_main = matches!(kind, Kind::Motorway | Kind::Primary | Kind::Rail | Kind::River);
+            KEPT_MIN[usize::from(!is_main)] * all <= kept
+        };
+        self.lakes[0] == self.lakes[1] && self.kinds.iter().all(enough)
+    }
+
+    /// Whether it keeps all there is.
+    pub fn is_whole(&self) -> bool {
+        self.lakes[0] == self.lakes[1] && self.kinds.iter().all(|(_, [kept, all])| all - kept < 1.0)
+    }
+
+    /// Metres of all kinds for which `picked` says so: kept, and all there are.
+    pub fn metres(&self, picked: impl Fn(Kind) -> bool) -> [f64; 2] {
+        let of = self.kinds.iter().filter(|(kind, _)| picked(*kind)).map(|(_, metres)| *metres);
+        of.fold([0.0; 2], |[kept, all], [more_kept, more]| [kept + more_kept, all + more])
+    }
+}
+
+/// The limits of a mean: those of SIMNET for its own, else three times as much for a load module and 128 times as much
+/// for a square of 4 km.
+pub fn limits_of(mean: u32) -> [u32; 2] {
+    if mean == BUDGETS[0] { SIMNET } else { BUDGET_TIMES.map(|times| mean.saturating_mul(times)) }
+}
+
+/// The features of a job with the heights along them, on which budgets are tried.
+pub struct Budgets {
+    job: Job,
+    read: Arc<ReadFeatures>,
+    heard: Heard,
+}
+
+impl Budgets {
+    /// Reads the features of a job and the ground along them; `None` for a job without any.
+    ///
+    /// # Errors
+    /// When features or rasters cannot be read, or the job is impossible.
+    pub fn open(job: &Job, workers: usize) -> Result<Option<Self>, CompileError> {
+        let (workers, stop) = (Workers::new(workers), AtomicBool::new(false));
+        let area = GamingArea::new(job)?;
+        let each = |count: usize, piece: &(dyn Fn(usize) + Sync)| for_each_piece(&workers, count, piece);
+        let Some(read) = ReadFeatures::open(job, &area, &each)? else { return Ok(None) };
+        let source = Ground::open(job, &area, &workers, &stop)?;
+        let sounded = |&tile| Ok(sound(&area, &read, tile, &source.natural_tile(&area, tile)?.dem));
+        let profiles: Vec<Profile> = area.tiles.iter().map(sounded).collect::<Result<_, CompileError>>()?;
+        let heard = Heard::of(&read, profiles.iter());
+        Ok(Some(Self { job: job.clone(), read: Arc::new(read), heard }))
+    }
+
+    /// What a mean and its limits would keep.
+    ///
+    /// # Errors
+    /// When the job is impossible with these limits.
+    pub fn of_mean(&self, mean: u32) -> Result<Budgeted, CompileError> {
+        let [per_load_module, per_window] = limits_of(mean);
+        let mut job = self.job.clone();
+        (job.limits.mean_per_load_module, job.limits.per_load_module) = (f64::from(mean), per_load_module);
+        job.limits.window.limit = per_window;
+        let area = GamingArea::new(&job)?;
+        let spec = job.features.as_ref().expect("a job with features");
+        let (sounded, shares) = (self.heard.sounded(), shares(&area.budget, spec));
+        let Levelled { reserved, .. } = self.read.features.level(sounded, (spec.options, spec.falls), &shares);
+        let lakes = reserved.amounts.values();
+        let lakes = lakes.fold([0; 2], |[kept, all], of| [kept + of.lakes_kept, all + of.lakes_wanted]);
+        let triangles = reserved.cost.values().flat_map(BTreeMap::values).map(|&count| u64::from(count)).sum();
+        Ok(Budgeted { mean, per_load_module, per_window, kinds: self.kinds(&reserved.formed), lakes, triangles })
+    }
+
+    /// Metres by kind, kept and all, of what lies in the area and in no tunnel.
+    fn kinds(&self, formed: &Formed) -> Vec<(Kind, [f64; 2])> {
+        let features: &AreaFeatures = &self.read.features;
+        let traits = features.traits_by_id();
+        let metres = features.site.lattice.metres_per_step();
+        let mut kinds: BTreeMap<Kind, [f64; 2]> = BTreeMap::new();
+        for middle in formed.middles.iter().filter(|middle| middle.traits.storey != LineStorey::Tunnel) {
+            let Some(of) = traits.get(&middle.id).filter(|of| !matches!(of.storey, Storey::Tunnel(_))) else {
+                continue;
+            };
+            let [kept, all] = kinds.entry(of.kind).or_default();
+            for ends in middle.stations.windows(2) {
+                let (a, b) = (ends[0].0, ends[1].0);
+                if features.site.holds_middle(a, b) {
+                    let length = (a.squared_to(b) as f64).sqrt() * metres;
+                    *all += length;
+                    *kept += if middle.traits.is_kept { length } else { 0.0 };
+                }
+            }
+        }
+        kinds.into_iter().filter(|(_, [_, all])| 0.0 < *all).collect()
+    }
+}
+
+/// The least of [`BUDGETS`] above a run's own mean that would keep nearly all of its features, by the ground along
+/// them that is published; `None` where none would.
+///
+/// # Errors
+/// When a file cannot be read.
+pub(crate) fn enough_for(run: &Run) -> Result<Option<Budgeted>, CompileError> {
+    let read = run.features()?;
+    let profile = |&tile: &TileId| Ok(run.database.folder().read_profile(tile)?.2);
+    let profiles: Vec<Profile> = run.area.tiles.iter().map(profile).collect::<Result<_, CompileError>>()?;
+    let heard = Heard::of(&read, profiles.iter());
+    let budgets = Budgets { job: run.job.clone(), read, heard };
+    let own = run.job.limits.mean_per_load_module;
+    for mean in BUDGETS.into_iter().filter(|mean| own < f64::from(*mean)) {
+        let budgeted = budgets.of_mean(mean)?;
+        if budgeted.holds() {
+            return Ok(Some(budgeted));
+        }
+    }
+    Ok(None)
+}

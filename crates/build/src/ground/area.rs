@@ -1,0 +1,148 @@
+//! What follows from a job before any height is read: grids, tiles, ranks, the budget.
+
+use job::{Borders, Budget as PointBudget, Edges, Job};
+use schedule::RankedTasks;
+use terrain::limits::Windows;
+use terrain::{GridFrame, ModuleGrid, PostRect, TileId};
+use tin::tiling::{Budget, BudgetFault, Tiling};
+
+use crate::ground::GroundError;
+
+/// The gaming area of a job, divided.
+pub struct GamingArea {
+    /// Its load modules.
+    pub grid: ModuleGrid,
+    /// Its posts.
+    pub rect: PostRect,
+    /// Where its posts lie.
+    pub frame: GridFrame,
+    /// Its tiles and their ranks.
+    pub tiling: Tiling,
+    /// Every tile, row-major; tasks are numbered by place in it.
+    pub tiles: Vec<TileId>,
+    /// What the limits leave it.
+    pub budget: Budget,
+}
+
+impl GamingArea {
+    /// Divides the area of a job.
+    ///
+    /// # Errors
+    /// When the limits leave no room for the initial points, or keys contradict each other.
+    pub fn new(job: &Job) -> Result<Self, GroundError> {
+        let grid = job.area.grid;
+        refuse_sizes(job)?;
+        let job::TilesSpec { rows, columns, order, .. } = job.tiles;
+        let tiling = Tiling::new(grid.area(), grid.side_cells, rows, columns, order);
+        let frame = GridFrame {
+            origin_east_m: job.area.origin_m[0],
+            origin_north_m: job.area.origin_m[1],
+            spacing: job.area.spacing,
+        };
+        let window = job.limits.window;
+        let budget = Budget {
+            grid,
+            border_step: job.outer_step_cells(),
+            per_module: job.limits.per_load_module,
+            pool: job.limits.pool,
+            area: job.limits.area_budget(&grid),
+            per_window: window.limit,
+            windows: Windows::of_size(grid, window.rows, window.cols),
+            reserved: Vec::new(),
+        };
+        refuse_impossible(job, &budget)?;
+        let tiles = tiling.tiles().collect();
+        Ok(Self { grid, rect: grid.area(), frame, tiling, tiles, budget })
+    }
+
+    /// The tiles as tasks that wait for their lower-ranked neighbours.
+    pub fn ranked_tasks(&self) -> RankedTasks {
+        let ranks: Vec<_> = self.tiles.iter().map(|&tile| self.tiling.rank(tile)).collect();
+        let around =
+            |&tile: &TileId| self.tiling.neighbours(tile).into_iter().map(|other| self.tiling.index(other)).collect();
+        RankedTasks::new(&ranks, &self.tiles.iter().map(around).collect::<Vec<Vec<usize>>>())
+    }
+
+    /// Places of the tiles from the lowest rank.
+    pub fn by_rank(&self) -> Vec<usize> {
+        let mut by_rank: Vec<usize> = (0..self.tiles.len()).collect();
+        by_rank.sort_by_key(|&index| self.tiling.rank(self.tiles[index]));
+        by_rank
+    }
+}
+
+/// Sizes that no tile can be refined at.
+fn refuse_sizes(job: &Job) -> Result<(), GroundError> {
+    let grid = job.area.grid;
+    if grid.side_cells < 2 {
+        return Err(GroundError::Impossible {
+            key: "area.spacing_m".into(),
+            found: format!("{}, one cell to a load module", job.area.spacing.metres()),
+            expected: "at least two cells along a side".into(),
+            hint: "a load module needs posts inside; use a smaller spacing".into(),
+        });
+    }
+    let longest = |modules: u32, tiles: u32| modules.div_ceil(tiles) as usize * grid.side_cells as usize;
+    let cells = longest(grid.rows, job.tiles.rows).max(longest(grid.cols, job.tiles.columns));
+    if terrain::geometry::WORKING_POSTS_MAX <= cells {
+        return Err(GroundError::Impossible {
+            key: "tiles".into(),
+            found: format!("{} x {}, which makes tiles of {cells} cells a side", job.tiles.rows, job.tiles.columns),
+            expected: format!("tiles below {} cells a side", terrain::geometry::WORKING_POSTS_MAX),
+            hint: "ask for more tiles.rows and tiles.columns".into(),
+        });
+    }
+    Ok(())
+}
+
+fn refuse_impossible(job: &Job, budget: &Budget) -> Result<(), GroundError> {
+    if job.tiles.borders == Borders::Regular && job.modules.edges == Edges::Constrained {
+        return Err(GroundError::Impossible {
+            key: "tiles.borders".into(),
+            found: "\"regular\" beside edges = \"constrained\"".into(),
+            expected: "\"inherit\", or edges = \"clip\"".into(),
+            hint: "regular borders are the paper's alternative, for comparison in clip mode only".into(),
+        });
+    }
+    budget.check().map_err(|fault| {
+        let (key, found, expected) = match fault {
+            BudgetFault::Module { module, start, limit } => (
+                "limits.per_load_module",
+                format!("{limit}, below the {start} triangles that load module {module} starts with"),
+                format!("at least {start}"),
+            ),
+            BudgetFault::Window { origin, start, limit } => (
+                "limits.per_4km_square",
+                format!("{limit}, below the {start} triangles that the window from load module {origin} starts with"),
+                format!("at least {start}"),
+            ),
+            BudgetFault::Area { start, limit } => (
+                "limits.mean_per_load_module",
+                format!("{limit} triangles for the area, below the {start} that the initial points need"),
+                format!("at least {:.2}", start as f64 / budget.grid.count() as f64),
+            ),
+        };
+        GroundError::Impossible {
+            key: key.into(),
+            found,
+            expected,
+            hint: "every load module starts from its four corners and the fixed points of outer sides".into(),
+        }
+    })?;
+    refuse_points(job, budget)
+}
+
+/// Points of constrained edges cost exactly two triangles each, so too many are known before any work.
+fn refuse_points(job: &Job, budget: &Budget) -> Result<(), GroundError> {
+    let (PointBudget::Points(points), Edges::Constrained) = (job.tin.budget, job.modules.edges) else { return Ok(()) };
+    let room = (budget.area - budget.start_total()) / u64::from(terrain::POINT_COST);
+    if points <= room {
+        return Ok(());
+    }
+    Err(GroundError::Impossible {
+        key: "tin.points".into(),
+        found: format!("{points}, which need more triangles than mean_per_load_module leaves"),
+        expected: format!("at most {room}"),
+        hint: "each point adds two triangles; select fewer, or raise limits.mean_per_load_module".into(),
+    })
+}

@@ -1,0 +1,332 @@
+//! The ground of a job: windows of heights and weights on demand.
+
+use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, OnceLock};
+
+use job::{DemSource, Job};
+use schedule::Workers;
+use source_files::{VoidSummary, read_polygons};
+use store::Folder;
+use terrain::mask::Mask;
+use terrain::{Dem, GridFrame, Importance, PostRect, TileFeatures, TileId};
+
+use crate::ground::area::GamingArea;
+use crate::ground::bounds::Bounds;
+use crate::ground::census::Census;
+use crate::ground::excluded::GamingAreaFrame;
+use crate::ground::given::Given;
+use crate::ground::large::WHOLE_BYTES_MAX;
+use crate::ground::lines::Lines;
+use crate::ground::mask_of::{Fault, Opening};
+use crate::ground::relief::Relief;
+use crate::ground::source::Source;
+use crate::ground::sources::Opened;
+use crate::ground::water::{Soundings, Water};
+use crate::ground::window::Window;
+use crate::ground::{GroundError, sources, water};
+
+/// Posts of an area up to which the windows of tiles are kept between stages (7 bytes a post).
+pub const KEPT_POSTS_MAX: usize = 16 << 20;
+
+/// Where heights and weights come from.
+pub struct Ground {
+    /// Heights before any weight.
+    pub relief: Arc<Relief>,
+    mask: Mask<'static>,
+    /// What went wrong in a part of the mask that reads files or heights on demand.
+    fault: Fault,
+    rect: PostRect,
+    frame: GridFrame,
+    kept: Option<Vec<OnceLock<Arc<Window>>>>,
+    lines: OnceLock<Lines>,
+    /// Points that the job gives.
+    pub given: Given,
+    /// Voids of the source under the area.
+    pub voids: VoidSummary,
+    /// Vertical accuracy of the least accurate source that states one, in metres.
+    pub accuracy_m: Option<f64>,
+    /// What a person should know about the sources.
+    pub warnings: Vec<String>,
+}
+
+impl Ground {
+    /// Opens and judges everything the job names.
+    ///
+    /// # Errors
+    /// When a file cannot be used for this area.
+    pub fn open(job: &Job, area: &GamingArea, workers: &Workers, stop: &AtomicBool) -> Result<Self, GroundError> {
+        Self::open_within(job, area, (workers, stop), WHOLE_BYTES_MAX)
+    }
+
+    /// The ground of a finished database in `folder`, with the features that it has burned in.
+    ///
+    /// # Errors
+    /// As [`Ground::open`].
+    pub fn open_built(
+        job: &Job,
+        area: &GamingArea,
+        (workers, stop): (&Workers, &AtomicBool),
+        folder: &Folder,
+    ) -> Result<Self, GroundError> {
+        let ground = Self::open(job, area, workers, stop)?;
+        if let Some(spec) = &job.features {
+            ground.burn_in(folder, area, spec.left_out_weight);
+        }
+        Ok(ground)
+    }
+
+    /// The same, where rasters that take more than `whole_bytes_max` bytes are read by window.
+    pub fn open_within(
+        job: &Job,
+        area: &GamingArea,
+        (workers, stop): (&Workers, &AtomicBool),
+        whole_bytes_max: u64,
+    ) -> Result<Self, GroundError> {
+        let opened = match &job.dem.source {
+            DemSource::Sample { seed } => Opened {
+                source: Source::Sample(*seed),
+                voids: VoidSummary::default(),
+                warnings: Vec::new(),
+                accuracy_m: None,
+                range_m: None,
+            },
+            DemSource::Files { files, .. } => sources::open(job, area, files, workers, stop, whole_bytes_max)?,
+        };
+        let Opened { source, voids, mut warnings, accuracy_m, range_m } = opened;
+        let bounds = range_m.map(Bounds::of_metres);
+        let mut relief = Relief { source, frame: area.frame, water: None, bounds };
+        let polygons = match &job.dem.water {
+            None => Vec::new(),
+            Some(water) => {
+                let polygons = read_polygons(&water.file.path, job.area.epsg)?;
+                relief.water = Some(Water::new(job, polygons.clone(), area.frame, area.rect));
+                if !relief.water.as_ref().is_some_and(|water| water.reaches(area.rect)) {
+                    let path = water.file.path.display();
+                    warnings.push(format!("dem.water: {path}: none of its polygons reaches into the area"));
+                }
+                warnings.extend(find_levels(&mut relief, area, workers, stop)?);
+                polygons
+            }
+        };
+        let (relief, fault) = (Arc::new(relief), Fault::default());
+        let mask = Opening { job, area, relief: &relief, fault: &fault }.mask(polygons)?;
+        let keep = area.rect.post_count() <= KEPT_POSTS_MAX;
+        let kept = keep.then(|| area.tiles.iter().map(|_| OnceLock::new()).collect());
+        let (rect, frame, given) = (area.rect, area.frame, Given::open(job, area)?);
+        let lines = OnceLock::new();
+        let mut ground = Self { relief, mask, fault, rect, frame, kept, lines, given, voids, warnings, accuracy_m };
+        if !ground.relief.is_single() {
+            ground.take_census(job, area, workers, stop)?;
+        }
+        Ok(ground)
+    }
+
+    /// Looks at every post of a mosaic once, and judges what is missing.
+    fn take_census(
+        &mut self,
+        job: &Job,
+        area: &GamingArea,
+        workers: &Workers,
+        stop: &AtomicBool,
+    ) -> Result<(), GroundError> {
+        let of_tile = |_: usize, &tile: &TileId| -> Result<Census, GroundError> {
+            let Some(patch) = self.relief.patch(area.tiling.rect(tile))? else { return Ok(Census::new()) };
+            let census = Census::of(&patch, area.rect);
+            if let Some(kept) = &self.kept {
+                let window = Arc::new(self.with_given(area, tile, self.with_importance(patch.dem())?)?);
+                kept[area.tiling.index(tile)].get_or_init(|| window);
+            }
+            Ok(census)
+        };
+        let mut census = Census::new();
+        // A census is some kilobytes, so those of a large area are added up as they come.
+        for tiles in area.tiles.chunks(1 << 10) {
+            let parts = schedule::for_each_independent(tiles, workers, stop, of_tile)
+                .map_err(|error| GroundError::from_schedule(tiles, error))?;
+            parts.iter().for_each(|part| census.add(part));
+        }
+        self.voids = census.judge(job, area)?;
+        if 0 < census.gap {
+            let (gap, of) = (census.gap, area.rect.post_count());
+            let map = census.map();
+            self.warnings.push(format!("no source reaches {gap} of {of} posts, which are holes (north is up):\n{map}"));
+        }
+        Ok(())
+    }
+
+    /// Weights and classes as the job and its pins have them.
+    fn with_importance(&self, dem: Dem) -> Result<Window, GroundError> {
+        let importance = terrain::mask::importance(&self.mask, self.rect, &self.frame, dem.rect());
+        self.fault.take()?;
+        let place = GamingAreaFrame { rect: self.rect, frame: self.frame };
+        let importance = terrain::mask::without_voids(self.given.weigh(importance, &place), &dem);
+        Ok(Window { dem, importance, given: Vec::new(), forbidden: Vec::new(), featured: Vec::new() })
+    }
+
+    fn with_given(&self, area: &GamingArea, tile: TileId, window: Window) -> Result<Window, GroundError> {
+        let given = self.given.of_tile(area, tile, &window.dem)?;
+        let place = GamingAreaFrame { rect: self.rect, frame: self.frame };
+        Ok(Window { given, forbidden: self.given.forbidden(&place, area.tiling.rect(tile)), ..window })
+    }
+
+    /// What heights lie within: those of the sources, and what the job says itself of water and points.
+    pub fn bounds(&self) -> Option<Bounds> {
+        let told = self.relief.water.iter().flat_map(Water::levels_known).chain(self.given.heights());
+        self.relief.bounds.map(|bounds| told.fold(bounds, Bounds::and))
+    }
+
+    /// From now on, features are burned into every window but natural ones, as `folder` has them. Posts on those that
+    /// had no room weigh `left_out_weight` times what they otherwise would.
+    pub fn burn_in(&self, folder: &Folder, area: &GamingArea, left_out_weight: f64) {
+        self.lines.get_or_init(|| Lines::new(folder, area, left_out_weight, self.kept.is_some()));
+    }
+
+    /// What features put into a tile; nothing before they are burned in.
+    ///
+    /// # Errors
+    /// When the file that says it cannot be read.
+    pub fn features(&self, tile: TileId) -> Result<Arc<TileFeatures>, GroundError> {
+        self.lines.get().map_or_else(|| Ok(Arc::new(TileFeatures::none(tile))), |lines| lines.features(tile))
+    }
+
+    /// The ground of one tile, made once where memory allows: natural, with features burned in if there are any.
+    ///
+    /// # Errors
+    /// When the source has no heights there, or features cannot be read.
+    pub fn tile(&self, area: &GamingArea, tile: TileId) -> Result<Arc<Window>, GroundError> {
+        let Some(lines) = self.lines.get() else { return self.natural_tile(area, tile) };
+        kept_or(lines.kept(area.tiling.index(tile)), || {
+            // Points that the job gives are looked up in what they are given for.
+            let natural = Window::clone(&*self.natural_tile(area, tile)?);
+            let window = lines.burn_tile(natural, tile, area.tiling.rect(tile))?;
+            self.with_given(area, tile, window)
+        })
+    }
+
+    /// The same without features.
+    ///
+    /// # Errors
+    /// When the source has no heights there.
+    pub fn natural_tile(&self, area: &GamingArea, tile: TileId) -> Result<Arc<Window>, GroundError> {
+        let slot = self.kept.as_ref().map(|kept| &kept[area.tiling.index(tile)]);
+        kept_or(slot, || self.with_given(area, tile, self.natural(area.tiling.rect(tile))?))
+    }
+
+    /// The ground of a tile and of `halo` posts around it, put together from the windows of its neighbours, which
+    /// are kept where memory allows.
+    ///
+    /// # Errors
+    /// When the source has no heights there.
+    pub fn around(&self, area: &GamingArea, tile: TileId, halo: i32) -> Result<Window, GroundError> {
+        let wide = area.tiling.rect(tile).grown(halo);
+        let rect = wide.intersection(&self.rect).expect("a tile lies inside the area");
+        let mut near = area.tiling.neighbours(tile);
+        near.push(tile);
+        if self.kept.is_none() || !near.iter().all(|&other| reaches(area.tiling.rect(other), halo)) {
+            return self.window(rect);
+        }
+        let parts = near.iter().map(|&other| self.tile(area, other)).collect::<Result<Vec<_>, _>>()?;
+        let dem = Dem::from_row_fn(rect, |row, heights| {
+            for (part, cols) in
+                parts.iter().filter_map(|part| overlap(part.dem.rect(), rect, row).map(|cols| (part, cols)))
+            {
+                let (from, to) = (cols.start - part.dem.rect().west, cols.start - rect.west);
+                let part = &part.dem.row(row)[from as usize..][..cols.len()];
+                heights[to as usize..][..cols.len()].copy_from_slice(part);
+            }
+        });
+        let importance = join_importance(&parts, rect);
+        Ok(Window { dem, importance, given: Vec::new(), forbidden: Vec::new(), featured: Vec::new() })
+    }
+
+    /// The ground of any rectangle of the area, with features burned in if there are any.
+    ///
+    /// # Errors
+    /// When the source has no heights there, or features cannot be read.
+    pub fn window(&self, rect: PostRect) -> Result<Window, GroundError> {
+        let natural = self.natural(rect)?;
+        match self.lines.get() {
+            Some(lines) => lines.burn(natural),
+            None => Ok(natural),
+        }
+    }
+
+    /// The ground of any rectangle of the area without features.
+    ///
+    /// # Errors
+    /// When the source has no heights there.
+    pub fn natural(&self, rect: PostRect) -> Result<Window, GroundError> {
+        self.with_importance(self.relief.dem(rect)?)
+    }
+}
+
+/// What a slot holds, made if it is empty; made each time where there is no slot.
+pub(crate) fn kept_or(
+    slot: Option<&OnceLock<Arc<Window>>>,
+    make: impl FnOnce() -> Result<Window, GroundError>,
+) -> Result<Arc<Window>, GroundError> {
+    let Some(slot) = slot else { return make().map(Arc::new) };
+    if let Some(window) = slot.get() {
+        return Ok(window.clone());
+    }
+    let window = Arc::new(make()?);
+    Ok(slot.get_or_init(|| window).clone())
+}
+
+/// Whether a halo never reaches beyond a tile.
+fn reaches(tile: PostRect, halo: i32) -> bool {
+    halo <= tile.cells_wide().min(tile.cells_high()) as i32
+}
+
+/// The columns of a row that a part holds of a whole.
+fn overlap(part: PostRect, whole: PostRect, row: i32) -> Option<std::ops::Range<i32>> {
+    let cut = part.intersection(&whole)?;
+    (cut.south <= row && row <= cut.north).then_some(cut.west..cut.east + 1)
+}
+
+fn join_importance(parts: &[Arc<Window>], rect: PostRect) -> Importance {
+    let first = parts[0].importance.uniform_weight();
+    let is_plain = |part: &Arc<Window>| {
+        part.importance.uniform_weight() == first
+            && part.importance.classes_of_row(part.importance.rect().south).is_none()
+    };
+    if let Some(weight) = first
+        && parts.iter().all(is_plain)
+    {
+        return Importance::uniform(rect, weight);
+    }
+    let holder = |post| parts.iter().find(|part| part.importance.rect().contains(post)).expect("parts cover the whole");
+    let posts = || {
+        (rect.south..=rect.north)
+            .flat_map(move |row| (rect.west..=rect.east).map(move |col| terrain::Post::new(row, col)))
+    };
+    let weights = posts().map(|post| holder(post).importance.weight(post)).collect();
+    let classes = posts().map(|post| holder(post).importance.class(post)).collect();
+    Importance::new(rect, weights, classes)
+}
+
+/// Finds the level of each body of water from the heights of all tiles; what a person should know about it.
+fn find_levels(
+    relief: &mut Relief,
+    area: &GamingArea,
+    workers: &Workers,
+    stop: &AtomicBool,
+) -> Result<Option<String>, GroundError> {
+    let Some(water) = relief.water.as_ref().filter(|water| water.is_unknown()) else { return Ok(None) };
+    let tiles: Vec<TileId> = area.tiles.iter().copied().filter(|&tile| water.reaches(area.tiling.rect(tile))).collect();
+    let mut all = Soundings::new();
+    for tiles in tiles.chunks(1 << 10) {
+        let sound = |_: usize, &tile: &TileId| -> Result<Soundings, GroundError> {
+            Ok(water.sound(&relief.dry(area.tiling.rect(tile))?, area.rect))
+        };
+        let parts = schedule::for_each_independent(tiles, workers, stop, sound)
+            .map_err(|error| GroundError::from_schedule(tiles, error))?;
+        parts.into_iter().for_each(|part| water::add(&mut all, part));
+    }
+    let without = relief.water.as_mut().map_or(0, |water| water.level(&all));
+    let told = || format!("{without} bodies of water hold no post with a height and are left as they are");
+    Ok((0 < without).then(told))
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,50 @@
+//! From a job's sources to its ground: where the area lies, and windows of its heights and weights on demand.
+//!
+//! [`Ground::open`] opens and judges all that a job names; [`foresee`] judges what headers tell.
+
+mod error;
+pub use error::GroundError;
+mod area;
+pub use area::GamingArea;
+mod planned;
+pub use planned::{PlannedTile, planned_tiles};
+mod bounds;
+pub use bounds::Bounds;
+mod burn;
+pub use burn::{burn, posts_inside, slope_reach};
+mod buildings;
+mod lines;
+mod vectors;
+pub use vectors::{FeaturesRead, Vectors, site};
+mod excluded;
+mod given;
+pub use given::{Given, GivenPost, border_posts, chosen, posts_of_file, refused, start_posts};
+mod ground;
+pub use self::ground::{Ground, KEPT_POSTS_MAX};
+mod window;
+pub use window::Window;
+mod key;
+pub use key::feed_post;
+mod sight;
+pub use sight::scanned;
+pub use terrain::mask::{Sight, Surroundings};
+mod large;
+pub use large::CACHE_BYTES_MAX;
+mod relief;
+pub use relief::Relief;
+mod source;
+pub use source::{decode, reading, warnings_of};
+mod records;
+pub use records::{records, states};
+mod locate;
+pub use locate::{Corner, corners, covered, find_area, rectangle_around, utm_of};
+mod features_seen;
+pub use features_seen::{FeatureRow, FeatureTable, FeaturesSeen, SourceSeen, features_in};
+mod foresee;
+pub use foresee::foresee;
+
+mod census;
+mod datums;
+mod mask_of;
+mod sources;
+mod water;

@@ -1,0 +1,251 @@
+//! What a build tells of itself: for everything that it measures, whether it is a warning, a line of the report, or
+//! nothing, and why.
+//!
+//! This is the one place that decides. A warning is what a customer would want to know before using the database, and
+//! what sound data do not have: `--strict` ends with an error for each. Warnings about sources come from the stages
+//! that read them; the guide lists all in one table.
+
+use job::Job;
+use store::{AreaLevel, FeatureAmounts, Report};
+
+use crate::product::earthworks;
+
+/// What a build made, as far as warnings need it.
+#[derive(Clone, Copy)]
+pub struct Made<'a> {
+    /// The report, whole but for its warnings.
+    pub report: &'a Report,
+    /// The job, and what its features came to, where it has any.
+    pub features: Option<(&'a Job, &'a AreaLevel)>,
+}
+
+/// What becomes of something that a build knows.
+#[derive(Clone, Copy)]
+pub enum Told {
+    /// A warning, with a sentence for each thing of which it holds.
+    Warning(fn(&Made) -> Vec<String>),
+    /// A warning of the stage that finds it, whose sentence is its own.
+    OfStage,
+    /// A line of the report.
+    Line,
+    /// Nothing.
+    Nothing,
+}
+
+/// One thing that a build knows.
+#[derive(Clone, Copy)]
+pub struct Matter {
+    /// What it is.
+    pub what: &'static str,
+    /// What becomes of it.
+    pub told: Told,
+    /// Why.
+    pub why: &'static str,
+}
+
+/// All that a build knows of what it made, in the order in which warnings are told.
+pub const MATTERS: [Matter; 17] = [
+    matter(
+        "files, datums, holes and rules of sources that are not as they should be",
+        Told::OfStage,
+        "the data, or the job, may be other than meant",
+    ),
+    matter(
+        "more than 1 % of the length of a main class, more than 10 % of that of all ways, or a lake of a hectare, left \
+         out for limits",
+        Told::Warning(left_out),
+        "networks are no longer whole; larger limits keep them, as tiefort plan tells",
+    ),
+    matter(
+        "more than 5 % of a class of ways, and 100 m, beyond the limits of cut and fill, or 1 % beyond twice these",
+        Told::Warning(earthworks),
+        "they lie where no person believes them; less than that is listed with its cause",
+    ),
+    matter(
+        "the surface reaches beyond the heights of its sources by 10 m and a fifth of their range",
+        Told::Warning(beyond_sources),
+        "a wrong level or a deep cut does that; fitted heights do not",
+    ),
+    matter(
+        "features take the surface far from its sources: the RMS against them is a metre and twice that outside \
+         features",
+        Told::Line,
+        "both figures stand in the report, the one against the sources first",
+    ),
+    matter(
+        "decks under the ground",
+        Told::Warning(decks_under),
+        "corners of decks rise onto it as far as they can; vehicles would run into the ground",
+    ),
+    matter(
+        "bridges through ground that is higher",
+        Told::Line,
+        "decks rise over its triangles, whatever grade that takes; features.geojson lists each",
+    ),
+    matter(
+        "decks too low over what they cross",
+        Told::Line,
+        "each is listed in features.geojson, and the report has the least height over each class",
+    ),
+    matter("grades that were relaxed", Told::Line, "the surface is drivable, and each is listed in features.geojson"),
+    matter(
+        "less than that left out, and features made coarser, for limits",
+        Told::Line,
+        "what limits are for; kilometres stand beside those wanted",
+    ),
+    matter(
+        "water without an outlet",
+        Told::Line,
+        "many a lake has none; features.geojson lists rivers that were turned or lie level",
+    ),
+    matter(
+        "limits that could not be met",
+        Told::Line,
+        "breaches have their own list, and --strict ends with an error for them, too",
+    ),
+    matter("posts that limits refused", Told::Line, "what limits are for; the report says what it costs"),
+    matter("voids that were filled, holes that were left", Told::Line, "the job says what becomes of them"),
+    matter("the accuracy that a source states", Told::Line, "it says how much of a residual means anything"),
+    matter(
+        "a DEM whose noise exceeds what features need",
+        Told::Nothing,
+        "noise is not measured apart from the ground's own roughness",
+    ),
+    matter("tiles that were kept, time and memory", Told::Nothing, "they say nothing of the terrain"),
+];
+
+const fn matter(what: &'static str, told: Told, why: &'static str) -> Matter {
+    Matter { what, told, why }
+}
+
+/// The warnings of what was made, without those of stages.
+pub fn warnings(made: &Made) -> Vec<String> {
+    let found = MATTERS.iter().flat_map(|matter| match matter.told {
+        Told::Warning(of) => of(made),
+        Told::OfStage | Told::Line | Told::Nothing => Vec::new(),
+    });
+    found.collect()
+}
+
+/// The table of the guide.
+pub fn table() -> String {
+    let row = |matter: &Matter| {
+        let told = match matter.told {
+            Told::Warning(_) | Told::OfStage => "warning",
+            Told::Line => "line in the report",
+            Told::Nothing => "nothing",
+        };
+        format!("| {} | {told} | {} |\n", matter.what, matter.why)
+    };
+    let rows: String = MATTERS.iter().map(row).collect();
+    format!("| what a build finds | told as | because |\n| - | - | - |\n{rows}")
+}
+
+/// Decks lie under the ground.
+fn decks_under(made: &Made) -> Vec<String> {
+    let Some(checks) = made.report.features.as_ref().map(|features| &features.checks) else { return Vec::new() };
+    let told = || {
+        format!(
+            "{} of {} square metres of decks lie under the ground, by {:.2} m at most, where no corner \
+             of theirs could rise far enough",
+            checks.deck_samples_under, checks.deck_samples, checks.deck_under_max_m
+        )
+    };
+    (0 < checks.deck_samples_under).then(told).into_iter().collect()
+}
+
+/// The share of a main class that may be left out without a warning, and that of all ways.
+const LEFT_OUT_MAX: [f64; 2] = [0.01, 0.1];
+
+/// Whether limits leave out so much of the features that it is a warning.
+pub fn leaves_much_out(job: &Job, level: &AreaLevel) -> bool {
+    !left_out_of(job, level).is_empty()
+}
+
+fn left_out(made: &Made) -> Vec<String> {
+    made.features.map_or_else(Vec::new, |(job, level)| left_out_of(job, level))
+}
+
+/// Too much of a main class, or of all ways, had no room, or lakes of a hectare.
+fn left_out_of(job: &Job, level: &AreaLevel) -> Vec<String> {
+    let (names, amounts) = (job.class_names(), &level.amounts);
+    let out = |wanted: f64, kept: f64, most: f64| most * wanted < wanted - kept;
+    let told = |what: &str, wanted: f64, kept: f64| {
+        let percent = 100.0 * (wanted - kept) / wanted;
+        let [left, wanted] = [wanted - kept, wanted].map(|metres| metres / 1000.0);
+        format!("{percent:.1} % of {what} had no room and is left out: {left:.1} of {wanted:.1} km")
+    };
+    let main = amounts.iter().filter(|of| of.is_main && out(of.wanted_m, of.kept_m, LEFT_OUT_MAX[0]));
+    let name = |class: u8| names.get(usize::from(class)).map_or("a class", String::as_str);
+    let mut warnings: Vec<String> = main.map(|of| told(name(of.class), of.wanted_m, of.kept_m)).collect();
+    let sum = |of: fn(&FeatureAmounts) -> f64| amounts.iter().map(of).sum::<f64>();
+    let (wanted, kept) = (sum(|of| of.wanted_m), sum(|of| of.kept_m));
+    if out(wanted, kept, LEFT_OUT_MAX[1]) {
+        warnings.push(told("all roads, rivers and lines", wanted, kept));
+    }
+    let lakes = amounts.iter().map(|of| of.lakes_wanted - of.lakes_kept).sum::<u32>();
+    if 0 < lakes {
+        let all = amounts.iter().map(|of| of.lakes_wanted).sum::<u32>();
+        warnings.push(format!("{lakes} of {all} lakes of a hectare and more had no room and are left out"));
+    }
+    warnings
+}
+
+/// Ways lie farther off the ground than cut and fill may be.
+fn earthworks(made: &Made) -> Vec<String> {
+    made.features.map_or_else(Vec::new, |(job, level)| earthworks::warnings(&job.class_names(), level))
+}
+
+/// Roads and water take the surface beyond the heights of the sources, further than fitted heights do.
+fn beyond_sources(made: &Made) -> Vec<String> {
+    // A guard of its own, in jobs with features: it knows the sources' heights and no other.
+    let heights = made.report.heights.filter(|_| made.report.features.is_some());
+    let found = heights.and_then(|heights| {
+        let [low, high] = heights.sources_m?;
+        (0.2 * (high - low)).max(10.0).lt(&heights.outside_m).then(|| {
+            format!(
+                "the surface reaches {:.2} m beyond the heights of the sources, {low:.2} m to {high:.2} m: a wrong \
+                 level or a deep cut may do that, and tiefort render --view residual shows where",
+                heights.outside_m
+            )
+        })
+    });
+    found.into_iter().collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use store::{ReportFeatureChecks, ReportFeatures, ReportHeights};
+
+    use super::*;
+
+    fn report(features: Option<ReportFeatureChecks>) -> Report {
+        let features = features.map(|checks| ReportFeatures { checks, ..ReportFeatures::default() });
+        Report { features, ..Report::default() }
+    }
+
+    #[test]
+    fn the_guide_has_the_table() {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/guides/features.md");
+        let page = std::fs::read_to_string(path).unwrap();
+        let (before, rest) = page.split_once(" cargo test -p build -->\n\n").unwrap();
+        let (found, after) = rest.split_once("\n<!-- end of warnings -->").unwrap();
+        if std::env::var_os("UPDATE_GOLDEN").is_some() {
+            let whole = format!("{before} cargo test -p build -->\n\n{}\n<!-- end of warnings -->{after}", table());
+            std::fs::write(path, whole).unwrap();
+        }
+        assert_eq!(found, table(), "UPDATE_GOLDEN=1 rewrites {path}");
+    }
+
+    #[test]
+    fn a_surface_far_beyond_its_sources_is_told() {
+        let told = |outside_m, sources_m| {
+            let heights = Some(ReportHeights { surface_m: [0.0, 0.0], sources_m, outside_m });
+            let report = Report { heights, ..report(Some(ReportFeatureChecks::default())) };
+            !warnings(&Made { report: &report, features: None }).is_empty()
+        };
+        assert_eq!([9.0, 10.0, 11.0].map(|metres| told(metres, Some([500.0, 540.0]))), [false, false, true]);
+        assert_eq!([399.0, 401.0].map(|metres| told(metres, Some([0.0, 2000.0]))), [false, true]);
+        assert!(!told(500.0, None), "nothing is known of sources");
+    }
+}

@@ -1,0 +1,218 @@
+//! One run: a job, its ground, its database, its workers; and how a stage goes through the tiles.
+
+use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, OnceLock};
+
+use crate::ground::{GamingArea, Ground, Window};
+use job::{Budget as PointBudget, Edges, Job};
+use schedule::{Event as Scheduled, RankedTasks, Workers, for_each_piece, in_rank_order_observed};
+use source_files::FileState;
+use store::engine::{Cause, FingerprintBuilder, Outcome, Stamp};
+use store::{AreaLevel, Database, FileStamp, Manifest, RUN_DIGITS, SourceRecord};
+use terrain::{POINT_COST, TileFeatures, TileId, TileTin};
+
+use crate::left_out::LeftOut;
+use crate::read_features::ReadFeatures;
+use crate::tins::Tins;
+use crate::{Clock, CompileError, Event, Progress, Stage};
+
+/// Rises whenever the result of any stage may change for the same input; a test with golden hashes holds it.
+pub const ALGORITHM_REVISION: u32 = 10;
+
+/// What a run needs from its caller.
+#[derive(Clone, Copy)]
+pub struct Options<'a> {
+    /// Tiles at once.
+    pub workers: usize,
+    /// Start over, whatever is published.
+    pub fresh: bool,
+    /// Whether the report's page is drawn; without it, that of an earlier build goes.
+    pub page: bool,
+    /// Raised to ask the run to stop after the tiles in progress.
+    pub stop: &'a AtomicBool,
+    /// What time it is.
+    pub clock: &'a dyn Clock,
+}
+
+impl<'a> Options<'a> {
+    /// Those of a build that goes on from what is there, on so many workers.
+    pub fn new(workers: usize, stop: &'a AtomicBool, clock: &'a dyn Clock) -> Self {
+        Self { workers, fresh: false, page: true, stop, clock }
+    }
+}
+
+/// Everything a stage may look at.
+pub(crate) struct Run<'a> {
+    pub job: &'a Job,
+    pub area: GamingArea,
+    pub ground: Ground,
+    pub workers: Workers,
+    pub page: bool,
+    pub stop: &'a AtomicBool,
+    pub database: Database,
+    /// What the heights and weights are made from.
+    pub records: Vec<SourceRecord>,
+    /// What those files were like before they were hashed.
+    pub states: Vec<FileState>,
+    /// The TINs that this run has published or read.
+    pub tins: Tins,
+    /// What `database.json` said before this run.
+    pub previous: Option<Manifest>,
+    /// Roads, rivers and lakes, once they were asked for.
+    pub read: OnceLock<Arc<ReadFeatures>>,
+    /// What they came to, once that is decided.
+    pub level: Option<Settled>,
+}
+
+/// What features came to, and the file that says so.
+pub(crate) struct Settled {
+    pub file: FileStamp,
+    pub level: AreaLevel,
+    /// What coarser levels leave out of them.
+    pub left_out: Option<LeftOut>,
+}
+
+impl Run<'_> {
+    /// Runs one task per tile in any order, and tells about each.
+    pub fn for_each_tile<R: Send>(
+        &self,
+        stage: Stage,
+        progress: &mut dyn Progress,
+        task: impl Fn(TileId) -> Result<Outcome<R>, CompileError> + Sync,
+    ) -> Result<Vec<Outcome<R>>, CompileError> {
+        let alone = vec![Vec::new(); self.area.tiles.len()];
+        let ranks: Vec<usize> = (0..alone.len()).collect();
+        self.walk(stage, &RankedTasks::new(&ranks, &alone), progress, task)
+    }
+
+    /// Runs one task per tile, each after its lower-ranked neighbours, and tells about each.
+    pub fn in_rank_order<R: Send>(
+        &self,
+        stage: Stage,
+        progress: &mut dyn Progress,
+        task: impl Fn(TileId) -> Result<Outcome<R>, CompileError> + Sync,
+    ) -> Result<Vec<Outcome<R>>, CompileError> {
+        self.walk(stage, &self.area.ranked_tasks(), progress, task)
+    }
+
+    fn walk<R: Send>(
+        &self,
+        stage: Stage,
+        plan: &RankedTasks,
+        progress: &mut dyn Progress,
+        task: impl Fn(TileId) -> Result<Outcome<R>, CompileError> + Sync,
+    ) -> Result<Vec<Outcome<R>>, CompileError> {
+        let tiles = &self.area.tiles;
+        progress.tell(Event::Enter(stage, tiles.len()));
+        let observe = |event: Scheduled<Outcome<R>>| {
+            // Of what other stages make nothing is written down by parts.
+            if let Scheduled::Done(index, Outcome::Made(_, cause)) = &event
+                && stage == Stage::Refine
+                && *cause != Cause::New
+            {
+                progress.tell(Event::Because(stage, tiles[*index], cause.to_string()));
+            }
+            progress.tell(match event {
+                Scheduled::Started(index) => Event::Started(stage, tiles[index]),
+                Scheduled::Done(index, Outcome::Made(..)) => Event::Done(stage, tiles[index]),
+                Scheduled::Done(index, Outcome::Kept(_)) => Event::Kept(stage, tiles[index]),
+            });
+        };
+        let run = |index: usize| task(tiles[index]);
+        let done = in_rank_order_observed(plan, &self.workers, self.stop, run, observe)
+            .map_err(|error| CompileError::from_schedule(stage, tiles, error))?;
+        progress.tell(Event::Leave(stage));
+        Ok(done)
+    }
+
+    /// The TIN of a tile that is published with this stamp.
+    pub fn tin(&self, tile: TileId, stamp: &Stamp) -> Result<Arc<TileTin>, CompileError> {
+        Ok(self.tins.get(self.database.folder(), tile, stamp)?)
+    }
+
+    /// The features of a job that has some, read when they are first asked for.
+    ///
+    /// # Errors
+    /// When a file of them cannot be read at all.
+    pub fn features(&self) -> Result<Arc<ReadFeatures>, CompileError> {
+        if let Some(read) = self.read.get() {
+            return Ok(read.clone());
+        }
+        let read =
+            ReadFeatures::open(self.job, &self.area, &|count, piece| for_each_piece(&self.workers, count, piece))?
+                .expect("a stage of jobs with features");
+        Ok(self.read.get_or_init(|| Arc::new(read)).clone())
+    }
+
+    /// From now on, features are part of the ground, and what they take of the limits is taken.
+    pub fn settle(&mut self, file: FileStamp, level: AreaLevel) {
+        self.area.budget.reserved = level.reserved_of(self.area.grid.count());
+        let left_out_weight = self.job.features.as_ref().map_or(1.0, |spec| spec.left_out_weight);
+        self.ground.burn_in(self.database.folder(), &self.area, left_out_weight);
+        self.read = OnceLock::new();
+        let left_out = LeftOut::of(self.job, &self.area, &level);
+        self.level = Some(Settled { file, level, left_out });
+    }
+
+    /// What coarser levels leave out of features, in jobs where they do.
+    pub fn left_out(&self) -> Option<&LeftOut> {
+        self.level.as_ref()?.left_out.as_ref()
+    }
+
+    /// Whether features or water are burned into the sources' heights.
+    pub fn burns_in(&self) -> bool {
+        self.level.is_some() || self.job.dem.water.is_some()
+    }
+
+    /// What a person should know of what the run was made from.
+    pub fn warnings(&self) -> Vec<String> {
+        let of_features = self.level.iter().flat_map(|settled| &settled.level.notes);
+        let fewer = match self.job.tin.budget {
+            PointBudget::Points(asked) => Some((asked, self.points_beside_features(asked))),
+            PointBudget::Limits => None,
+        };
+        let fewer = fewer.filter(|(asked, fit)| fit < asked).map(|(asked, fit)| {
+            format!(
+                "tin.points: {asked} are asked for, and beside roads and water {fit} fit limits.mean_per_load_module"
+            )
+        });
+        self.ground.warnings.iter().chain(of_features).cloned().chain(fewer).collect()
+    }
+
+    /// Of so many points that a job asks for, those that the limit of the area leaves room for beside features. Without
+    /// features `plan` has made sure that all of them fit.
+    pub fn points_beside_features(&self, asked: u64) -> u64 {
+        let budget = &self.area.budget;
+        if budget.reserved.is_empty() || self.job.modules.edges != Edges::Constrained {
+            return asked;
+        }
+        asked.min(budget.area.saturating_sub(budget.start_total()) / u64::from(POINT_COST))
+    }
+
+    /// What features put into a tile; nothing in jobs without them.
+    pub fn tile_features(&self, tile: TileId) -> Result<Arc<TileFeatures>, CompileError> {
+        Ok(self.ground.features(tile)?)
+    }
+
+    /// The ground of a tile.
+    pub fn window(&self, tile: TileId) -> Result<Arc<Window>, CompileError> {
+        Ok(self.ground.tile(&self.area, tile)?)
+    }
+}
+
+/// What a run is called in `work/`: equal for all processes that build the same from the same.
+pub fn run_name(job: &str, sources: &[SourceRecord], revision: u32) -> String {
+    let mut builder = FingerprintBuilder::new("run").text(job).number(u64::from(revision));
+    for source in sources {
+        builder = builder.text(&source.path).fingerprint(source.blake3);
+    }
+    builder.finish().to_string()[..RUN_DIGITS].to_owned()
+}
+
+/// Whether the files of a job are still what they were, or which is not.
+///
+/// # Errors
+/// When a source is not what it was.
+pub(crate) fn changed(states: &[FileState]) -> Result<(), CompileError> {
+    states.iter().try_for_each(|state| Ok(state.check()?))
+}

@@ -1,0 +1,297 @@
+//! One unit of a build's work, for processes that share a directory: idempotent, and it reads only what is published.
+//!
+//! A unit that is done leaves a mark with the fingerprint of what it published. What builds on it compares mark and
+//! file, and takes the mark back if they differ. `publish` walks through all stages again, keeps what is fresh and
+//! makes what is not, so whatever went wrong before, the result is that of a build.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use job::Job;
+use schedule::Workers;
+use store::engine::{Fingerprint, Outcome, Stamp};
+use store::{Folder, Profile, Share, ShareAllowance, Work};
+use terrain::limits::Allowance;
+use terrain::{LatticePoint, ModuleRect, TileId, TileTin};
+
+use crate::assemble::assemble_tile;
+use crate::build::{Built, finish, open_with};
+use crate::curves::Curves;
+use crate::enter::enter;
+use crate::level::level_area;
+use crate::order::{ORDER, Unit, around, needs, units};
+use crate::profile::profile_tile;
+use crate::refine::{Published, refine_tile};
+use crate::run::{ALGORITHM_REVISION, Options, Run, run_name};
+use crate::survey::{allocate, survey_tile};
+use crate::tasks::{TileBudget, inherited, is_surveyed};
+use crate::{CompileError, Event, Progress, Stage, Stopwatch};
+
+/// A process's part in a build that several processes share.
+pub(crate) struct Session<'a> {
+    pub run: Run<'a>,
+    pub work: Work,
+    /// Whether it was complete and fresh when this process came to it.
+    pub is_finished: bool,
+}
+
+impl<'a> Session<'a> {
+    /// Joins the build of `job` in `folder`, or begins it.
+    pub fn join(
+        job: &'a Job,
+        folder: &Folder,
+        options: &Options<'a>,
+        progress: &mut dyn Progress,
+    ) -> Result<Self, CompileError> {
+        let mut is_finished = false;
+        let run = open_with(job, options, progress, |area, records| {
+            let entered = enter(job, records, folder, area, options.clock)?;
+            is_finished = entered.is_finished;
+            Ok((entered.database, Some(entered.manifest)))
+        })?;
+        let name = run_name(&job.canonical_text(), &run.records, ALGORITHM_REVISION);
+        let work = if is_finished { run.database.folder().work(&name) } else { run.database.work(&name)? };
+        Ok(Self { run, work, is_finished })
+    }
+
+    /// Every unit but the last, in an order in which one process could do them.
+    pub fn units(&self) -> Vec<Unit> {
+        let before = ORDER.into_iter().filter(|&stage| stage != Stage::Publish);
+        before.flat_map(|stage| units(stage, self.run.job, &self.run.area)).collect()
+    }
+
+    /// The units that one needs done.
+    pub fn needs(&self, unit: Unit) -> Vec<Unit> {
+        needs(unit, self.run.job, &self.run.area)
+    }
+
+    /// Does a unit that is not the last, and marks it as done. A panic in it is an error that names the tile.
+    pub fn perform(&mut self, unit: Unit, progress: &mut dyn Progress) -> Result<(), CompileError> {
+        let missing = self.needs(unit).into_iter().find(|&need| self.work.marks().marked(&need.to_string()).is_none());
+        if let Some(need) = missing {
+            return Err(not_ready(unit, need));
+        }
+        let Unit { stage, tile } = unit;
+        if !matches!(stage, Stage::Profile | Stage::Level) {
+            self.take_features(unit)?;
+        }
+        if let Some(tile) = tile {
+            progress.tell(Event::Started(stage, tile));
+        }
+        let here = [tile.unwrap_or(TileId { row: 0, col: 0 })];
+        let done = schedule::for_each_independent(&here, &Workers::new(1), self.run.stop, |_, _| self.make(unit));
+        if let Err(error) = done {
+            let error = CompileError::from_schedule(stage, &here, error);
+            return Err(if self.has_damaged_lines() { self.spoilt(unit, Unit::whole(Stage::Level)) } else { error });
+        }
+        if let Some(tile) = tile {
+            progress.tell(Event::Done(stage, tile));
+        }
+        Ok(())
+    }
+
+    fn make(&self, unit: Unit) -> Result<(), CompileError> {
+        let fingerprint = match (unit.stage, unit.tile) {
+            (Stage::Profile, Some(tile)) => profile_tile(&self.run, tile)?.into_inner().0.blake3,
+            (Stage::Level, None) => self.level()?,
+            (Stage::Survey, Some(tile)) => survey_tile(&self.run, tile)?.into_inner().0.fingerprint,
+            (Stage::Allocate, None) => self.allocate()?,
+            (Stage::Refine, Some(tile)) => self.refine(tile)?.into_inner().stamp.fingerprint,
+            (Stage::Assemble, Some(tile)) => self.assemble(tile)?,
+            _ => unreachable!("{unit} is no unit that a process does by itself"),
+        };
+        Ok(self.work.marks().mark(&unit.to_string(), fingerprint)?)
+    }
+
+    /// Takes over what features came to, where there are any, as another unit has published it.
+    fn take_features(&mut self, unit: Unit) -> Result<(), CompileError> {
+        if self.run.job.features.is_none() || self.run.level.is_some() {
+            return Ok(());
+        }
+        let level = Unit::whole(Stage::Level);
+        let marked = self.work.marks().marked(&level.to_string());
+        match self.run.database.folder().read_level() {
+            Ok((_, file, read)) if Some(file.blake3) == marked => {
+                self.run.settle(file, read);
+                Ok(())
+            }
+            _ => Err(self.spoilt(unit, level)),
+        }
+    }
+
+    /// Whether what features put into a tile is no longer what `level` published. It is read in the middle of every
+    /// later stage, so a unit that failed asks afterwards.
+    fn has_damaged_lines(&self) -> bool {
+        let folder = self.run.database.folder();
+        self.run.level.as_ref().is_some_and(|settled| {
+            let mut lines = self.run.area.tiles.iter().zip(&settled.level.tiles);
+            lines.any(|(&tile, stamp)| folder.check_file(&folder.lines_path(tile), stamp).is_err())
+        })
+    }
+
+    fn level(&self) -> Result<Fingerprint, CompileError> {
+        let profile = |&tile: &TileId| {
+            let unit = Unit::of(Stage::Profile, tile);
+            match self.run.database.folder().read_profile(tile) {
+                Ok((_, file, profile)) if Some(file.blake3) == self.work.marks().marked(&unit.to_string()) => {
+                    Ok(profile)
+                }
+                _ => Err(self.spoilt(Unit::whole(Stage::Level), unit)),
+            }
+        };
+        let profiles: Vec<Profile> = self.run.area.tiles.iter().map(profile).collect::<Result<_, _>>()?;
+        Ok(level_area(&self.run, &profiles)?.into_inner().0.blake3)
+    }
+
+    fn allocate(&self) -> Result<Fingerprint, CompileError> {
+        let run = &self.run;
+        let curve = |tile: TileId| {
+            let unit = Unit::of(Stage::Survey, tile);
+            match run.database.folder().read_curve(tile) {
+                Ok((stamp, curve)) if Some(stamp.fingerprint) == self.work.marks().marked(&unit.to_string()) => {
+                    Ok(curve)
+                }
+                _ => Err(self.spoilt(Unit::whole(Stage::Allocate), unit)),
+            }
+        };
+        let curves = is_surveyed(run.job).then(|| Curves::published(run, curve)).transpose()?;
+        let shares = allocate(run, curves.as_ref(), &mut Silent)?;
+        for (&tile, budget) in run.area.tiles.iter().zip(&shares.tiles) {
+            self.work.write_share(tile, &to_share(budget))?;
+        }
+        Ok(Fingerprint::of_bytes(b"allocated"))
+    }
+
+    fn refine(&self, tile: TileId) -> Result<Outcome<Published>, CompileError> {
+        let unit = Unit::of(Stage::Refine, tile);
+        let share = self.work.read_share(tile).map_err(|_| self.spoilt(unit, Unit::whole(Stage::Allocate)))?;
+        let features = self.run.tile_features(tile)?;
+        let published = |other| Ok(self.published(unit, other)?.1);
+        let seeds = inherited(&self.run.area.tiling, tile, &features.kept, published)?;
+        refine_tile(&self.run, &from_share(&share), seeds, tile)
+    }
+
+    fn assemble(&self, tile: TileId) -> Result<Fingerprint, CompileError> {
+        let area = &self.run.area;
+        let mut near = BTreeMap::new();
+        for other in around(tile, self.run.job, &self.run.area) {
+            let (stamp, tin) = self.published(Unit::of(Stage::Assemble, tile), other)?;
+            self.run.tins.keep(stamp, tin);
+            near.insert(area.tiling.index(other), stamp);
+        }
+        let none: Vec<Vec<LatticePoint>> = vec![Vec::new(); area.tiles.len()];
+        let (assembled, _) = assemble_tile(&self.run, &|index| near[&index], &none, tile)?.into_inner();
+        Ok(assembled.file.blake3)
+    }
+
+    /// The TIN of a tile that is marked as done, as it lies on the disk.
+    fn published(&self, unit: Unit, tile: TileId) -> Result<(Stamp, Arc<TileTin>), CompileError> {
+        match self.run.database.folder().read_tile(tile) {
+            Ok((stamp, tin))
+                if Some(stamp.fingerprint) == self.work.marks().marked(&Unit::of(Stage::Refine, tile).to_string()) =>
+            {
+                Ok((stamp, Arc::new(tin)))
+            }
+            _ => Err(self.spoilt(unit, Unit::of(Stage::Refine, tile))),
+        }
+    }
+
+    /// Takes back the mark of a unit whose result is not what it was, so that it is done again.
+    fn spoilt(&self, unit: Unit, need: Unit) -> CompileError {
+        self.work.marks().unmark(&need.to_string());
+        not_ready(unit, need)
+    }
+
+    /// Removes what processes left that were ended before they could: nothing of it is needed once the build is
+    /// published.
+    pub fn sweep(&self) -> Result<(), CompileError> {
+        self.work.sweep();
+        Ok(self.run.database.sweep()?)
+    }
+
+    /// Declares the database complete, after whatever is still to be done.
+    pub fn publish(self, progress: &mut Stopwatch) -> Result<Built, CompileError> {
+        self.run.database.sweep()?;
+        finish(self.run, progress)
+    }
+}
+
+fn not_ready(unit: Unit, need: Unit) -> CompileError {
+    CompileError::NotReady { unit: unit.to_string(), needs: need.to_string() }
+}
+
+/// What came of a unit of work.
+#[derive(Debug)]
+pub enum UnitEnd {
+    /// It is done, and so are others like it.
+    Done,
+    /// The database was finished and fresh already.
+    Finished,
+    /// It published the database.
+    Published(Box<Built>),
+}
+
+/// Does units of work on the build of `job` in `folder`, in this order.
+///
+/// # Errors
+/// As a build; [`CompileError::NotReady`] when what one needs is not done yet, which is worth trying again.
+pub fn perform(
+    job: &Job,
+    folder: impl Into<Folder>,
+    units: &[Unit],
+    options: &Options,
+    progress: &mut dyn Progress,
+) -> Result<UnitEnd, CompileError> {
+    let progress = &mut Stopwatch::start(options.clock, progress);
+    let mut session = Session::join(job, &folder.into(), options, progress)?;
+    if session.is_finished {
+        session.sweep()?;
+        return Ok(UnitEnd::Finished);
+    }
+    for &unit in units {
+        if unit.stage == Stage::Publish {
+            return Ok(UnitEnd::Published(Box::new(session.publish(progress)?)));
+        }
+        session.perform(unit, progress)?;
+    }
+    Ok(UnitEnd::Done)
+}
+
+/// Listens to nothing.
+struct Silent;
+
+impl Progress for Silent {
+    fn tell(&mut self, _event: Event) {}
+}
+
+fn to_share(budget: &TileBudget) -> Share {
+    let rect = |rect: ModuleRect| [rect.south, rect.west, rect.north, rect.east];
+    Share {
+        points: budget.points.map(|points| points as u64),
+        rms_quanta: budget.rms_quanta,
+        allowance: budget.allowance.as_ref().map(|allowance| ShareAllowance {
+            modules: rect(allowance.modules),
+            module_room: allowance.module_room.clone(),
+            windows: rect(allowance.windows),
+            window_size: allowance.window_size.into(),
+            window_room: allowance.window_room.clone(),
+            triangles: allowance.triangles,
+        }),
+    }
+}
+
+fn from_share(share: &Share) -> TileBudget {
+    let rect = |[south, west, north, east]: [u32; 4]| ModuleRect { south, west, north, east };
+    TileBudget {
+        points: share.points.map(|points| points as usize),
+        rms_quanta: share.rms_quanta,
+        allowance: share.allowance.as_ref().map(|allowance| Allowance {
+            modules: rect(allowance.modules),
+            module_room: allowance.module_room.clone(),
+            windows: rect(allowance.windows),
+            window_size: allowance.window_size.into(),
+            window_room: allowance.window_room.clone(),
+            triangles: allowance.triangles,
+        }),
+    }
+}

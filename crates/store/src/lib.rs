@@ -1,0 +1,90 @@
+//! Our files: one directory per gaming area, in which nothing is ever half-written.
+//!
+//! ```text
+//! ntc.tdb/
+//!   lock                 held while a build runs; stays when none does
+//!   database.json        what was asked for, what is there: written last
+//!   survey/r02c03.curve  gain curves; allocation.json
+//!   tiles/r02c03.tin     one tile's TIN
+//!   modules/r02c03.slm   one tile's load modules (docs/FORMAT.md)
+//!   measured/r02c03.sums what was measured of them
+//!   work/                leases and marks of processes that share the directory; gone at the end of a build
+//!   report.json …        what a run found; the only files that know times
+//! ```
+//!
+//! Every file is written under a temporary name and renamed into place; every file carries a checksum, so damage
+//! is found on reading and named by file and section. `terrain`'s values are mirrored here by private types.
+
+// A test that unwraps says by its line what failed.
+#![cfg_attr(test, allow(clippy::unwrap_used))]
+
+/// What files are stamped with.
+pub use crate::engine::{Fingerprint, Stamp};
+mod error;
+pub use error::{DatabaseError, NotADatabase};
+mod codec;
+mod frame;
+mod tile_file;
+pub use tile_file::{decode_tile, encode_tile};
+mod curve_file;
+pub use curve_file::{decode_curve, encode_curve};
+mod profile_file;
+pub use profile_file::{Profile, decode_profile, encode_profile};
+mod lines_file;
+pub use lines_file::{decode_lines, encode_lines};
+mod level_file;
+pub use level_file::{
+    AreaLevel, CULVERT, FeatureAmounts, FeatureEarthwork, FeatureEnd, FeatureFace, FeatureFarOff, FeatureLeftOut,
+    FeatureLine, FeatureRemark, FeatureWhy, LineRole, OffCause, StripFigures, decode_level, encode_level,
+};
+mod buildings_file;
+pub use buildings_file::{BUILDING_UNITS_PER_METRE, Building, decode_buildings, encode_buildings};
+mod removals_file;
+pub use removals_file::{Removals, decode_removals, encode_removals};
+mod measured_file;
+pub use measured_file::{
+    Measured, MeasuredCurvature, MeasuredFeatures, MeasuredModule, MeasuredTally, decode_measured, encode_measured,
+};
+mod slm;
+/// Version of the load-module files.
+pub use load_module_reader::{
+    VERSION as MODULES_FORMAT_VERSION, VERSION_OF_GROUND as MODULES_FORMAT_VERSION_OF_GROUND,
+    VERSION_WITH_DECKS as MODULES_FORMAT_VERSION_WITH_DECKS,
+};
+pub use slm::{TileModules, decode_levels, decode_modules, encode_levels, encode_modules, load_module};
+mod json;
+mod page;
+pub use page::seal_page;
+mod manifest;
+pub use manifest::{
+    Area, FORMAT_VERSION, FileStamp, Manifest, ManifestState, SourceRecord, TileRecord, TileState, Totals,
+};
+mod report_features;
+pub use report_features::{
+    ReportDeckClearance, ReportEarthwork, ReportEarthworks, ReportFarOff, ReportFeatureChecks, ReportFeatureClass,
+    ReportFeatureCost, ReportFeatureRemarks, ReportFeatures,
+};
+mod report;
+pub use report::{
+    Report, ReportBefore, ReportBorder, ReportBound, ReportBreach, ReportClass, ReportEnough, ReportHeights,
+    ReportLevel, ReportLimit, ReportPart, ReportPerModule, ReportPerWindow, ReportPlace, ReportPoints, ReportPool,
+    ReportRefusals, ReportResidual, ReportStage, ReportStops, ReportTile, ReportVoids,
+};
+mod lock;
+pub use lock::Lock;
+mod work;
+pub use work::{RUN_DIGITS, Share, ShareAllowance, Work};
+mod folder;
+pub use folder::Folder;
+mod names;
+pub use names::files;
+mod database;
+mod read;
+pub use database::Database;
+mod verify;
+pub use verify::Damage;
+
+#[cfg(test)]
+mod samples;
+
+pub mod engine;

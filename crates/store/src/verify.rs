@@ -1,0 +1,138 @@
+//! Reads everything again and says what is not as it was written.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+use crate::engine::is_temporary;
+use serde::Deserialize;
+
+use crate::names::{MEASURED, MODULES, SURVEY, TILES, files};
+use crate::page::check_page;
+use crate::read::check_stamp;
+use crate::{
+    DatabaseError, FileStamp, Folder, Manifest, buildings_file, curve_file, level_file, lines_file, measured_file,
+    profile_file, removals_file, slm, tile_file,
+};
+
+/// One file that is not as it should be.
+#[derive(Debug)]
+pub struct Damage {
+    /// The file.
+    pub path: PathBuf,
+    /// What is wrong with it, by section where that is known.
+    pub error: DatabaseError,
+}
+
+impl Folder {
+    /// Every file that `manifest` lists, with how it must look.
+    pub(crate) fn listed_files(&self, manifest: &Manifest) -> Vec<(PathBuf, FileStamp)> {
+        let of_tiles = manifest.tiles.iter().flat_map(|record| {
+            let tile = record.tile();
+            [
+                (self.tile_path(tile), record.tin),
+                (self.removals_path(tile), record.removed),
+                (self.modules_path(tile), record.slm),
+                (self.measured_path(tile), record.measured),
+                (self.curve_path(tile), record.curve),
+                (self.profile_path(tile), record.profile),
+                (self.lines_path(tile), record.lines),
+            ]
+        });
+        let of_tiles = of_tiles.filter_map(|(path, stamp)| Some((path, stamp?)));
+        let others = manifest.files.iter().map(|(name, stamp)| (self.path(name), *stamp));
+        of_tiles.chain(others).collect()
+    }
+
+    /// Reads every file that `manifest` lists: its sections, what they hold (TINs and load modules are walked for
+    /// cracks), and its hash; also the reports, where there are any. Files of ours that it does not list are named
+    /// too. At most one finding per file, in the order of the manifest.
+    ///
+    /// # Errors
+    /// When a folder cannot be listed; damage is no error but a finding.
+    pub fn verify(&self, manifest: &Manifest) -> Result<Vec<Damage>, DatabaseError> {
+        let listed = self.listed_files(manifest);
+        let mut damage = Vec::new();
+        for (path, stamp) in &listed {
+            if let Err(error) = self.check_listed(path, stamp) {
+                damage.push(Damage { path: path.clone(), error });
+            }
+        }
+        // They know times, so no manifest lists them.
+        damage.extend(self.damage_of_reports());
+        let known: BTreeSet<PathBuf> = listed.into_iter().map(|(path, _)| path).collect();
+        for name in [TILES, MODULES, MEASURED, SURVEY] {
+            for path in self.list(&self.path(name))? {
+                let temporary = path.file_name().is_some_and(|name| is_temporary(&name.to_string_lossy()));
+                if !known.contains(&path) && !temporary {
+                    damage.push(Damage { path: path.clone(), error: DatabaseError::NotListed { path } });
+                }
+            }
+        }
+        Ok(damage)
+    }
+
+    /// Whether every file that `manifest` lists has the bytes it had, and so have the reports; and no file of ours lies
+    /// beside them.
+    ///
+    /// # Errors
+    /// When a folder cannot be listed.
+    pub fn verify_bytes(&self, manifest: &Manifest) -> Result<bool, DatabaseError> {
+        let listed = self.listed_files(manifest);
+        let mut files = 0;
+        for name in [TILES, MODULES, MEASURED, SURVEY] {
+            files += self.list(&self.path(name))?.len();
+        }
+        let is_whole = |(path, stamp): &(PathBuf, FileStamp)| self.check_file(path, stamp).is_ok();
+        Ok(files == listed.len() && listed.iter().all(is_whole) && self.damage_of_reports().is_empty())
+    }
+
+    /// Decodes first, because that names the section; a file that decodes may still be another than the one listed.
+    fn check_listed(&self, path: &Path, stamp: &FileStamp) -> Result<(), DatabaseError> {
+        let bytes = self.read(path)?;
+        match path.extension().and_then(|extension| extension.to_str()) {
+            Some("tin") => {
+                let (_, tile) = tile_file::decode_tile(path, &bytes)?;
+                let unsound = |fault| DatabaseError::UnsoundTin { path: path.to_path_buf(), fault };
+                tile.tin.check().map_err(unsound)?;
+            }
+            Some("slm") => drop(slm::decode_modules(path, &bytes)?),
+            Some("sums") => drop(measured_file::decode_measured(path, &bytes)?),
+            Some("curve") => drop(curve_file::decode_curve(path, &bytes)?),
+            Some("profile") => drop(profile_file::decode_profile(path, &bytes)?),
+            Some("lines") => drop(lines_file::decode_lines(path, &bytes)?),
+            Some("level") => drop(level_file::decode_level(path, &bytes)?),
+            Some("buildings") => drop(buildings_file::decode_buildings(path, &bytes)?),
+            Some("removed") => drop(removals_file::decode_removals(path, &bytes)?),
+            _ => {}
+        }
+        check_stamp(path, &bytes, stamp)
+    }
+
+    /// Reports that are not as they were written: `report.json` by its own checksum, the breaches by what it says of
+    /// them, the page by its last line. One that is gone is no damage: a person may have taken it away.
+    fn damage_of_reports(&self) -> Vec<Damage> {
+        let (beside, report) = match self.read_json(files::REPORT) {
+            Ok(beside) => (beside, Ok(())),
+            Err(error) => (Beside::default(), Err(error)),
+        };
+        let page = self.path(files::REPORT_HTML);
+        let page = self.read(&page).and_then(|bytes| check_page(&page, &bytes));
+        let listed = beside.files.iter().filter(|(name, _)| BREACHES.contains(&name.as_str()));
+        let breaches = listed.map(|(name, stamp)| (name.as_str(), self.check_file(&self.path(name), stamp)));
+        let found = |(name, checked)| match checked {
+            Ok(()) | Err(DatabaseError::Missing { .. }) => None,
+            Err(error) => Some(Damage { path: self.path(name), error }),
+        };
+        [(files::REPORT, report), (files::REPORT_HTML, page)].into_iter().chain(breaches).filter_map(found).collect()
+    }
+}
+
+/// What a report may list: names, not paths, since a damaged or foreign report could name anything.
+const BREACHES: [&str; 2] = [files::BREACHES, files::BREACHES_CSV];
+
+/// What a report says of the files beside it.
+#[derive(Default, Deserialize)]
+struct Beside {
+    #[serde(default)]
+    files: BTreeMap<String, FileStamp>,
+}

@@ -1,0 +1,82 @@
+//! All heights at once: the squares are a quadratic form in them, and conjugate gradients bring it down.
+
+use crate::optimiser::parts::{NONE, Vertex};
+use crate::optimiser::refit::DAMPING;
+use crate::optimiser::tile_mesh::TileMesh;
+
+/// Brings all heights that are free nearer to where the squares are least, in so many steps.
+pub(crate) fn fit_heights(sheet: &mut TileMesh, steps: usize) {
+    let live: Vec<u32> = (0..sheet.triangles.len() as u32).filter(|&triangle| sheet.is_live(triangle)).collect();
+    let (mut residual, stiffness) = pulls(sheet, &live);
+    let is_free: Vec<bool> =
+        sheet.vertices.iter().zip(&residual).map(|(vertex, &pull)| is_free(sheet, vertex, pull)).collect();
+    clear_held(&mut residual, &is_free);
+    let scaled = |residual: &[f64]| residual.iter().zip(&stiffness).map(|(r, s)| r / s).collect::<Vec<f64>>();
+    let mut direction = scaled(&residual);
+    let mut rise = vec![0.0; residual.len()];
+    let mut worth = dot(&residual, &direction);
+    for _ in 0..steps {
+        let mut bent = bend(sheet, &live, &direction);
+        clear_held(&mut bent, &is_free);
+        let curvature = dot(&direction, &bent);
+        if curvature <= 0.0 || worth <= 0.0 {
+            break;
+        }
+        let length = worth / curvature;
+        for i in 0..rise.len() {
+            rise[i] += length * direction[i];
+            residual[i] -= length * bent[i];
+        }
+        let next = scaled(&residual);
+        let before = std::mem::replace(&mut worth, dot(&residual, &next));
+        let kept = worth / before;
+        direction.iter_mut().zip(next).for_each(|(direction, next)| *direction = next + kept * *direction);
+    }
+    for ((vertex, rise), _) in sheet.vertices.iter_mut().zip(rise).zip(is_free).filter(|(_, is_free)| *is_free) {
+        vertex.height = sheet.ground.bounded(vertex.at, vertex.height + rise);
+    }
+    live.into_iter().for_each(|triangle| sheet.settle(triangle));
+}
+
+/// Whether a height may follow its pull.
+pub(crate) fn is_free(sheet: &TileMesh, vertex: &Vertex, pull: f64) -> bool {
+    let further = vertex.height + pull.signum();
+    vertex.edge != NONE && vertex.hold.height_is_free() && sheet.ground.bounded(vertex.at, further) == further
+}
+
+fn clear_held(values: &mut [f64], is_free: &[bool]) {
+    values.iter_mut().zip(is_free).filter(|(_, is_free)| !**is_free).for_each(|(value, _)| *value = 0.0);
+}
+
+/// Half the slope of the squares towards lower heights, and the diagonal of the form, for each vertex.
+fn pulls(sheet: &TileMesh, live: &[u32]) -> (Vec<f64>, Vec<f64>) {
+    let (mut pull, mut stiffness) = (vec![0.0; sheet.vertices.len()], vec![DAMPING; sheet.vertices.len()]);
+    for &triangle in live {
+        let corners = sheet.triangles[triangle as usize].corners;
+        let (form, heights) = (&sheet.forms[triangle as usize], sheet.heights(corners));
+        for (k, corner) in corners.into_iter().enumerate() {
+            pull[corner as usize] += form.pull(k, heights);
+            stiffness[corner as usize] += form.aa[k];
+        }
+    }
+    (pull, stiffness)
+}
+
+/// The form applied to a change of heights.
+fn bend(sheet: &TileMesh, live: &[u32], change: &[f64]) -> Vec<f64> {
+    let mut bent: Vec<f64> = change.iter().map(|change| DAMPING * change).collect();
+    for &triangle in live {
+        let corners = sheet.triangles[triangle as usize].corners.map(|corner| corner as usize);
+        let form = &sheet.forms[triangle as usize];
+        for k in 0..3 {
+            let (l, m) = ((k + 1) % 3, (k + 2) % 3);
+            bent[corners[k]] +=
+                form.aa[k] * change[corners[k]] + form.ab[m] * change[corners[l]] + form.ab[l] * change[corners[m]];
+        }
+    }
+    bent
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}

@@ -1,0 +1,120 @@
+//! What the steps of an optimisation share: the mesh, its account, and what each kind of change keeps between calls.
+
+use crate::optimiser::account::Account;
+use crate::optimiser::deep_thinning::thin_deep;
+use crate::optimiser::gains::Gains;
+use crate::optimiser::insertion::Insertion;
+use crate::optimiser::queue::Queue;
+use crate::optimiser::recipe::ThinBy;
+use crate::optimiser::removal::Removal;
+use crate::optimiser::sweep::Mover;
+use crate::optimiser::task::Task;
+use crate::optimiser::thin::{Filling, Thinning, Until};
+use crate::optimiser::tile_mesh::{Star, TileMesh};
+
+/// Limits of load modules and windows are met once the whole is this share over its budget: earlier, too much would
+/// go where ground is rough.
+const LIMITS_FROM: f64 = 0.1;
+
+/// Everything the steps work with.
+pub(crate) struct Work<'a, 'g> {
+    pub sheet: TileMesh<'g>,
+    pub account: Account,
+    pub task: &'a Task,
+    pub mover: Mover,
+    pub removal: Removal,
+    pub insertion: Insertion,
+    /// Squares that the least useful vertex explains, as far as thinning has found.
+    pub cheapest: Option<f64>,
+}
+
+impl Work<'_, '_> {
+    /// Every step leaves a mesh whose links agree and whose triangles all face up.
+    pub fn check(&self) {
+        debug_assert_eq!(self.sheet.fault(), None);
+    }
+
+    /// Thins to so many times the budget; to the limits of load modules and windows from a tenth over on.
+    pub fn thin(&mut self, times: f64, by: ThinBy) {
+        let share = times - 1.0;
+        let filling = if by == ThinBy::AsItIs { Filling::AsItIs } else { Filling::Fitted };
+        let mut thinning = Thinning::by(filling);
+        if self.account.is_any_over() {
+            self.account.allow_beyond(share.max(LIMITS_FROM));
+            self.thin_on(&mut thinning, Until::Afforded);
+            if share <= LIMITS_FROM {
+                self.thin_on(&mut thinning, Until::LimitsMet);
+            }
+        }
+        self.account.allow_beyond(share);
+        let last = match by {
+            ThinBy::Deep(rest) => {
+                thin_deep(&mut self.sheet, &mut self.account, rest, &mut self.removal, &mut self.mover)
+            }
+            ThinBy::AsItIs | ThinBy::Fitted => {
+                thinning.last = None;
+                self.thin_on(&mut thinning, Until::Afforded);
+                thinning.last
+            }
+        };
+        self.account.allow_beyond(0.0);
+        self.cheapest = Some(last.unwrap_or(0.0).max(0.0));
+        self.sheet.renumber();
+    }
+
+    /// Removes vertices, the cheapest first. Gives what the last one cost.
+    pub fn thin_until(&mut self, until: Until, filling: Filling) -> Option<f64> {
+        let mut thinning = Thinning::by(filling);
+        self.thin_on(&mut thinning, until);
+        thinning.last
+    }
+
+    fn thin_on(&mut self, thinning: &mut Thinning, until: Until) {
+        thinning.run(&mut self.sheet, &mut self.account, until, (&mut self.removal, &mut self.mover));
+    }
+
+    /// Inserts where it gains most while there is room.
+    pub fn fill_up(&mut self) {
+        if self.account.dearest() <= self.account.left() && self.task.rms_quanta.is_none() {
+            self.sheet.mark_all_changed();
+            Gains::default().insert(&mut self.sheet, &mut self.account, usize::MAX, &mut self.insertion);
+        }
+    }
+
+    /// Grows to so many times the budget, where that is one.
+    pub fn grow(&mut self, times: f64) {
+        if self.task.rms_quanta.is_none() {
+            // So much will change that what is known of costs is no guess at them.
+            self.sheet.vertices.iter_mut().for_each(|vertex| vertex.cost = f64::NAN);
+            self.account.allow_beyond(times - 1.0);
+            self.insertion.tries_middles = true;
+            self.fill_by_squares();
+            self.insertion.tries_middles = false;
+            self.account.allow_beyond(0.0);
+        }
+    }
+
+    /// Inserts into the triangle of largest squares while there is room: an order that costs a seventh of that by true
+    /// gains, since nothing is judged before its turn.
+    pub fn fill_by_squares(&mut self) {
+        let mut queue = Queue::default();
+        let squares = |sheet: &TileMesh, triangle: u32| sheet.triangles[triangle as usize].squares;
+        (0..self.sheet.triangles.len() as u32)
+            .for_each(|triangle| queue.enter(triangle, squares(&self.sheet, triangle)));
+        let mut star = Star::default();
+        while self.account.dearest() <= self.account.left() {
+            let Some((triangle, _)) = queue.pop() else { return };
+            let Some(found) = self.insertion.find(&mut self.sheet, triangle) else { continue };
+            let inserted = self.sheet.vertices[found.vertex as usize];
+            if found.gain <= 0.0 || !self.account.permits(&inserted) {
+                self.sheet.drop_vertex(found.vertex);
+                continue;
+            }
+            self.account.charge(&inserted);
+            self.insertion.patch.old.iter().for_each(|&old| queue.cancel(old));
+            self.sheet.apply(&mut self.insertion.patch);
+            self.sheet.star(found.vertex, &mut star);
+            star.triangles().for_each(|triangle| queue.enter(triangle, squares(&self.sheet, triangle)));
+        }
+    }
+}
