@@ -2,26 +2,10 @@
 
 use std::path::Path;
 
-use serde::{Deserialize, Serialize};
-use terrain::{GainCurve, GainRun, ModuleId, TileId};
+use terrain::GainCurve;
 
 use crate::frame::{Kind, malformed};
 use crate::{DatabaseError, Stamp, codec, frame};
-
-/// [`GainCurve`] as it lies on disk.
-#[derive(Serialize, Deserialize)]
-struct CurveOnDisk {
-    tile: (u32, u32),
-    runs: Vec<RunOnDisk>,
-    squares: Vec<(i32, f64)>,
-}
-
-#[derive(Serialize, Deserialize)]
-struct RunOnDisk {
-    module: (u32, u32),
-    bin: i32,
-    cost: u32,
-}
 
 /// The bytes of a curve file.
 ///
@@ -29,13 +13,7 @@ struct RunOnDisk {
 /// When the gain rises along the runs.
 pub fn encode_curve(stamp: &Stamp, curve: &GainCurve) -> Vec<u8> {
     assert!(curve.is_descending(), "a gain curve runs from the best point to the worst");
-    let run = |run: &GainRun| RunOnDisk { module: (run.module.row, run.module.col), bin: run.bin, cost: run.cost };
-    let on_disk = CurveOnDisk {
-        tile: (curve.tile.row, curve.tile.col),
-        runs: curve.runs.iter().map(run).collect(),
-        squares: curve.squares.clone(),
-    };
-    frame::seal(Kind::Curve, stamp, &codec::encode(&on_disk))
+    frame::seal(Kind::Curve, stamp, &codec::encode(curve))
 }
 
 /// The curve whose file, at `path`, has these bytes.
@@ -44,14 +22,7 @@ pub fn encode_curve(stamp: &Stamp, curve: &GainCurve) -> Vec<u8> {
 /// When the file is not as it was written.
 pub fn decode_curve(path: &Path, bytes: &[u8]) -> Result<(Stamp, GainCurve), DatabaseError> {
     let (stamp, payload) = frame::open(Kind::Curve, path, bytes)?;
-    let on_disk: CurveOnDisk = codec::decode(payload).map_err(|what| malformed(path, what))?;
-    let run = |run: RunOnDisk| GainRun {
-        module: ModuleId { row: run.module.0, col: run.module.1 },
-        bin: run.bin,
-        cost: run.cost,
-    };
-    let tile = TileId { row: on_disk.tile.0, col: on_disk.tile.1 };
-    let curve = GainCurve { tile, runs: on_disk.runs.into_iter().map(run).collect(), squares: on_disk.squares };
+    let curve: GainCurve = codec::decode(payload).map_err(|what| malformed(path, what))?;
     if curve.is_descending() {
         return Ok((stamp, curve));
     }

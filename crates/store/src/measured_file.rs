@@ -9,14 +9,15 @@ use serde::{Deserialize, Serialize};
 use terrain::TileId;
 
 use crate::frame::{Kind, malformed};
-use crate::{DatabaseError, FileStamp, Fingerprint, Stamp, codec, frame};
+use crate::{DatabaseError, FileStamp, Stamp, codec, frame};
 
 /// What was measured of the load modules of one tile.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Measured {
     /// The tile.
     pub tile: TileId,
     /// The bytes of the load-module file that was measured.
+    #[serde(with = "bare")]
     pub modules_file: FileStamp,
     /// Numbers of each load module, level by level, row by row.
     pub modules: Vec<MeasuredModule>,
@@ -34,7 +35,8 @@ pub struct Measured {
     pub heights: [i32; 2],
     /// How much the ground curves.
     pub curvature: MeasuredCurvature,
-    /// What was found of features, in jobs with some.
+    /// What was found of features, in jobs with some; it follows the rest, so that files of others end there.
+    #[serde(skip)]
     pub features: Option<MeasuredFeatures>,
 }
 
@@ -108,42 +110,27 @@ pub struct MeasuredTally {
     pub bins: Vec<(u32, u64)>,
 }
 
-#[derive(Serialize, Deserialize)]
-struct MeasuredOnDisk {
-    tile: (u32, u32),
-    length: u64,
-    blake3: [u8; 32],
-    modules: Vec<MeasuredModule>,
-    classes: Vec<MeasuredTally>,
-    at_source_grid: Option<MeasuredTally>,
-    at_source: Option<MeasuredTally>,
-    points: Vec<u64>,
-    border: u64,
-    heights: [i32; 2],
-    curvature: MeasuredCurvature,
+/// The stamp of a file as its length and its hash.
+mod bare {
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    use crate::{FileStamp, Fingerprint};
+
+    pub(super) fn serialize<S: Serializer>(stamp: &FileStamp, serializer: S) -> Result<S::Ok, S::Error> {
+        (stamp.length, stamp.blake3.0).serialize(serializer)
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<FileStamp, D::Error> {
+        let (length, blake3) = Deserialize::deserialize(deserializer)?;
+        Ok(FileStamp { length, blake3: Fingerprint(blake3) })
+    }
 }
 
 /// The bytes of what was measured.
 pub fn encode_measured(stamp: &Stamp, measured: &Measured) -> Vec<u8> {
-    let Measured { tile, modules_file, modules, classes, at_source_grid, at_source, .. } = measured.clone();
-    let Measured { points, border, heights, curvature, features, .. } = measured.clone();
-    let on_disk = MeasuredOnDisk {
-        tile: (tile.row, tile.col),
-        length: modules_file.length,
-        blake3: modules_file.blake3.0,
-        modules,
-        classes,
-        at_source_grid,
-        at_source,
-        points,
-        border,
-        heights,
-        curvature,
-    };
-    let mut bytes = codec::encode(&on_disk);
-    // Files of jobs without features are as they were before there were any.
-    if let Some(features) = features {
-        bytes.extend(codec::encode(&features));
+    let mut bytes = codec::encode(measured);
+    if let Some(features) = &measured.features {
+        bytes.extend(codec::encode(features));
     }
     frame::seal(Kind::Measured, stamp, &bytes)
 }
@@ -154,26 +141,8 @@ pub fn encode_measured(stamp: &Stamp, measured: &Measured) -> Vec<u8> {
 /// When the file is not as it was written.
 pub fn decode_measured(path: &Path, bytes: &[u8]) -> Result<(Stamp, Measured), DatabaseError> {
     let (stamp, payload) = frame::open(Kind::Measured, path, bytes)?;
-    let (on_disk, features): (MeasuredOnDisk, Option<MeasuredFeatures>) =
-        codec::decode_two(payload).map_err(|what| malformed(path, what))?;
-    let MeasuredOnDisk { tile: (row, col), length, blake3, modules, classes, .. } = on_disk;
-    let MeasuredOnDisk { at_source_grid, at_source, points, border, heights, curvature, .. } = on_disk;
-    let modules_file = FileStamp { length, blake3: Fingerprint(blake3) };
-    let tile = TileId { row, col };
-    let measured = Measured {
-        tile,
-        modules_file,
-        modules,
-        classes,
-        at_source_grid,
-        at_source,
-        points,
-        border,
-        heights,
-        curvature,
-        features,
-    };
-    Ok((stamp, measured))
+    let (measured, features): (Measured, _) = codec::decode_two(payload).map_err(|what| malformed(path, what))?;
+    Ok((stamp, Measured { features, ..measured }))
 }
 
 #[cfg(test)]

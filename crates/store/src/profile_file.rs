@@ -9,7 +9,7 @@ use crate::frame::{Kind, malformed};
 use crate::{DatabaseError, Stamp, codec, frame};
 
 /// What the DEM says along features in one tile.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Profile {
     /// The tile.
     pub tile: TileId,
@@ -21,19 +21,9 @@ pub struct Profile {
     pub inside: Vec<(u32, Vec<(i32, u32)>)>,
 }
 
-#[derive(Serialize, Deserialize)]
-struct ProfileOnDisk {
-    tile: (u32, u32),
-    heights: Vec<Option<i32>>,
-    middles: Vec<i32>,
-    inside: Vec<(u32, Vec<(i32, u32)>)>,
-}
-
 /// The bytes of a profile.
 pub fn encode_profile(stamp: &Stamp, profile: &Profile) -> Vec<u8> {
-    let Profile { tile, heights, middles, inside } = profile.clone();
-    let on_disk = ProfileOnDisk { tile: (tile.row, tile.col), heights, middles, inside };
-    frame::seal(Kind::Profile, stamp, &codec::encode(&on_disk))
+    frame::seal(Kind::Profile, stamp, &codec::encode(profile))
 }
 
 /// The profile whose file, at `path`, has these bytes.
@@ -42,9 +32,7 @@ pub fn encode_profile(stamp: &Stamp, profile: &Profile) -> Vec<u8> {
 /// When the file is not as it was written.
 pub fn decode_profile(path: &Path, bytes: &[u8]) -> Result<(Stamp, Profile), DatabaseError> {
     let (stamp, payload) = frame::open(Kind::Profile, path, bytes)?;
-    let ProfileOnDisk { tile: (row, col), heights, middles, inside } =
-        codec::decode(payload).map_err(|what| malformed(path, what))?;
-    Ok((stamp, Profile { tile: TileId { row, col }, heights, middles, inside }))
+    Ok((stamp, codec::decode(payload).map_err(|what| malformed(path, what))?))
 }
 
 #[cfg(test)]

@@ -11,7 +11,7 @@ use crate::frame::{Kind, malformed};
 use crate::{DatabaseError, Stamp, codec, frame};
 
 /// What the enforcer took out of one tile, in order of removal.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Removals {
     /// The tile whose points they were.
     pub tile: TileId,
@@ -19,20 +19,9 @@ pub struct Removals {
     pub points: Vec<LatticePoint>,
 }
 
-/// [`Removals`] as they lie on disk.
-#[derive(Serialize, Deserialize)]
-struct RemovalsOnDisk {
-    tile: (u32, u32),
-    points: Vec<(i32, i32)>,
-}
-
 /// The bytes of a list of removals.
 pub fn encode_removals(stamp: &Stamp, removals: &Removals) -> Vec<u8> {
-    let on_disk = RemovalsOnDisk {
-        tile: (removals.tile.row, removals.tile.col),
-        points: removals.points.iter().map(|point| (point.row, point.col)).collect(),
-    };
-    frame::seal(Kind::Removals, stamp, &codec::encode(&on_disk))
+    frame::seal(Kind::Removals, stamp, &codec::encode(removals))
 }
 
 /// The removals whose file, at `path`, has these bytes.
@@ -41,9 +30,7 @@ pub fn encode_removals(stamp: &Stamp, removals: &Removals) -> Vec<u8> {
 /// When the file is not as it was written.
 pub fn decode_removals(path: &Path, bytes: &[u8]) -> Result<(Stamp, Removals), DatabaseError> {
     let (stamp, payload) = frame::open(Kind::Removals, path, bytes)?;
-    let on_disk: RemovalsOnDisk = codec::decode(payload).map_err(|what| malformed(path, what))?;
-    let points = on_disk.points.into_iter().map(|(row, col)| LatticePoint::new(row, col)).collect();
-    Ok((stamp, Removals { tile: TileId { row: on_disk.tile.0, col: on_disk.tile.1 }, points }))
+    Ok((stamp, codec::decode(payload).map_err(|what| malformed(path, what))?))
 }
 
 #[cfg(test)]

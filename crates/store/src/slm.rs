@@ -227,37 +227,13 @@ fn deck_part(decks: &Decks) -> Vec<u8> {
     part
 }
 
-const KINDS: [LineKind; 3] = [LineKind::Travelled, LineKind::Channel, LineKind::Breakline];
-const FORMS: [LineForm; 4] = [LineForm::Nothing, LineForm::Line, LineForm::Strip, LineForm::Bench];
-const STOREYS: [LineStorey; 3] = [LineStorey::Ground, LineStorey::Bridge, LineStorey::Tunnel];
-
-/// The numbers of kind, form and storey of a line, as all files have them.
-pub(crate) fn line_numbers(traits: &LineTraits) -> [u8; 3] {
-    fn number<T: PartialEq>(all: &[T], one: &T) -> u8 {
-        all.iter().position(|other| other == one).expect("the list is of all there are") as u8
-    }
-    [number(&KINDS, &traits.kind), number(&FORMS, &traits.form), number(&STOREYS, &traits.storey)]
-}
-
-/// A line left out without width, of the kind, form and storey of these numbers; `None` where there are none such.
-pub(crate) fn line_of_numbers([kind, form, storey]: [u8; 3]) -> Option<LineTraits> {
-    Some(LineTraits {
-        kind: *KINDS.get(usize::from(kind))?,
-        form: *FORMS.get(usize::from(form))?,
-        storey: *STOREYS.get(usize::from(storey))?,
-        is_kept: false,
-        is_in_ground: false,
-        width: 0,
-    })
-}
-
 fn line_part(lines: &[ModuleLine]) -> Vec<u8> {
     let mut part = Vec::new();
     let vertices: usize = lines.iter().map(|line| line.vertices.len()).sum();
     put_u32s(&mut part, [lines.len() as u32, vertices as u32]);
     for ModuleLine { class, traits, vertices } in lines {
         let LineTraits { is_kept, is_in_ground, width, .. } = *traits;
-        let [kind, form, storey] = line_numbers(traits);
+        let [kind, form, storey] = [traits.kind.number(), traits.form.number(), traits.storey.number()];
         part.extend([*class, kind, form, u8::from(is_kept) | u8::from(is_in_ground) << 1 | storey << 2]);
         let count = u16::try_from(vertices.len()).expect("a line numbers its vertices in 16 bits");
         put_u16s(&mut part, [width, count]);
@@ -367,8 +343,15 @@ pub fn load_module(module: &Module, side: u16) -> LoadModule {
 fn module_line(line: &load_module_reader::Line, vertices: Vec<ModuleVertex>) -> ModuleLine {
     let load_module_reader::Line { class, kind, form, storey, is_kept, is_in_ground, width, vertices: _ } = *line;
     // The reader numbers them as the file does.
-    let traits = line_of_numbers([kind as u8, form as u8, storey as u8]).expect("both lists are of all there are");
-    ModuleLine { class, traits: LineTraits { is_kept, is_in_ground, width, ..traits }, vertices }
+    let traits = LineTraits {
+        kind: LineKind::ALL[kind as usize],
+        form: LineForm::ALL[form as usize],
+        storey: LineStorey::ALL[storey as usize],
+        is_kept,
+        is_in_ground,
+        width,
+    };
+    ModuleLine { class, traits, vertices }
 }
 
 #[cfg(test)]

@@ -4,8 +4,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 use terrain::{
-    FEATURE_STEPS_MAX, LATTICE_PER_POST, LatticePoint, ModuleId, Post, PostRect, Refusal, RefusedBy, StopReason,
-    TileId, TileTin, Tin, Vertex,
+    FEATURE_STEPS_MAX, LATTICE_PER_POST, LatticePoint, Post, PostRect, Refusal, StopReason, TileId, TileTin, Tin, Vertex,
 };
 
 use crate::frame::{Kind, malformed};
@@ -17,47 +16,30 @@ const POSTS_MAX: i32 = 1 << 27;
 /// [`TileTin`] as it lies on disk.
 #[derive(Serialize, Deserialize)]
 struct TileOnDisk {
-    tile: (u32, u32),
-    /// South, west, north, east.
-    rect: [i32; 4],
-    /// Row, column, height.
-    vertices: Vec<[i32; 3]>,
+    tile: TileId,
+    rect: PostRect,
+    vertices: Vec<Vertex>,
     triangles: Vec<[u32; 3]>,
     initial_count: u32,
     residuals: Vec<u32>,
     triangles_charged: u32,
-    refused: Vec<RefusalOnDisk>,
+    refused: Vec<Refusal>,
     /// Why selection ended, in the lower four bits; in the upper ones how often the lattice halves an eighth of a post.
     stop: u8,
 }
 
-#[derive(Serialize, Deserialize)]
-struct RefusalOnDisk {
-    post: (i32, i32),
-    module: (u32, u32),
-    residual: u32,
-    by: u8,
-}
-
-/// Codes of [`RefusedBy`] are places in this list; new ones go to its end.
-const REFUSED_BY: [RefusedBy; 3] = [RefusedBy::Module, RefusedBy::Window, RefusedBy::Reservation];
-/// Codes of [`StopReason`] are places in this list; new ones go to its end.
-const STOP: [StopReason; 4] =
-    [StopReason::BudgetSpent, StopReason::ResidualReached, StopReason::RmsReached, StopReason::Exhausted];
-
 /// The bytes of a tile file.
 pub fn encode_tile(stamp: &Stamp, tile: &TileTin) -> Vec<u8> {
-    let rect = tile.tin.rect;
     let on_disk = TileOnDisk {
-        tile: (tile.tile.row, tile.tile.col),
-        rect: [rect.south, rect.west, rect.north, rect.east],
-        vertices: tile.tin.vertices.iter().map(|v| [v.at.row, v.at.col, v.height]).collect(),
+        tile: tile.tile,
+        rect: tile.tin.rect,
+        vertices: tile.tin.vertices.clone(),
         triangles: tile.tin.triangles.clone(),
         initial_count: tile.initial_count,
         residuals: tile.residuals.clone(),
         triangles_charged: tile.triangles_charged,
-        refused: tile.refused.iter().map(refusal_to_disk).collect(),
-        stop: code(&STOP, tile.stop) | halvings(tile.tin.steps_per_post) << 4,
+        refused: tile.refused.clone(),
+        stop: tile.stop.number() | halvings(tile.tin.steps_per_post) << 4,
     };
     frame::seal(Kind::Tile, stamp, &codec::encode(&on_disk))
 }
@@ -74,12 +56,14 @@ pub fn decode_tile(path: &Path, bytes: &[u8]) -> Result<(Stamp, TileTin), Databa
 }
 
 fn from_disk(on_disk: TileOnDisk) -> Result<TileTin, String> {
-    let rect = rect_from_disk(on_disk.rect)?;
+    let rect = on_disk.rect;
+    check_rect(rect)?;
     let steps_per_post = steps_from_disk(on_disk.stop >> 4, rect)?;
     let (low, high) = (rect.south_west(), rect.north_east());
     let place = |post: Post| LatticePoint::new(post.row * steps_per_post, post.col * steps_per_post);
     let (low, high) = (place(low), place(high));
-    let inside = |[row, col, _]: &[i32; 3]| (low.row..=high.row).contains(row) && (low.col..=high.col).contains(col);
+    let inside =
+        |Vertex { at, .. }: &Vertex| (low.row..=high.row).contains(&at.row) && (low.col..=high.col).contains(&at.col);
     if let Some(vertex) = on_disk.vertices.iter().position(|vertex| !inside(vertex)) {
         return Err(format!("vertex {vertex} lies outside the tile"));
     }
@@ -91,23 +75,23 @@ fn from_disk(on_disk: TileOnDisk) -> Result<TileTin, String> {
     if count < on_disk.initial_count as usize {
         return Err(format!("found {} initial vertices, expected at most {count}", on_disk.initial_count));
     }
-    let vertex = |[row, col, height]: [i32; 3]| Vertex { at: LatticePoint::new(row, col), height };
-    let vertices = on_disk.vertices.into_iter().map(vertex).collect();
+    let stop = on_disk.stop & 15;
+    let unknown = || format!("found stop reason {stop}, expected below {}", StopReason::ALL.len());
     Ok(TileTin {
-        tile: TileId { row: on_disk.tile.0, col: on_disk.tile.1 },
-        tin: Tin { rect, steps_per_post, vertices, triangles: on_disk.triangles },
+        tile: on_disk.tile,
+        tin: Tin { rect, steps_per_post, vertices: on_disk.vertices, triangles: on_disk.triangles },
         initial_count: on_disk.initial_count,
         residuals: on_disk.residuals,
         triangles_charged: on_disk.triangles_charged,
-        refused: on_disk.refused.into_iter().map(refusal_from_disk).collect::<Result<_, _>>()?,
-        stop: meaning(&STOP, on_disk.stop & 15, "stop reason")?,
+        refused: on_disk.refused,
+        stop: StopReason::of_number(stop).ok_or_else(unknown)?,
     })
 }
 
-fn rect_from_disk([south, west, north, east]: [i32; 4]) -> Result<PostRect, String> {
+fn check_rect(PostRect { south, west, north, east }: PostRect) -> Result<(), String> {
     let bounded = [south, west, north, east].iter().all(|line| (-POSTS_MAX..=POSTS_MAX).contains(line));
     if bounded && south <= north && west <= east {
-        return Ok(PostRect { south, west, north, east });
+        return Ok(());
     }
     Err(format!("rows {south} to {north}, columns {west} to {east} are no rectangle of posts"))
 }
@@ -132,40 +116,13 @@ fn steps_from_disk(halvings: u8, rect: PostRect) -> Result<i32, String> {
     }
 }
 
-fn refusal_to_disk(refusal: &Refusal) -> RefusalOnDisk {
-    RefusalOnDisk {
-        post: (refusal.post.row, refusal.post.col),
-        module: (refusal.module.row, refusal.module.col),
-        residual: refusal.residual,
-        by: code(&REFUSED_BY, refusal.by),
-    }
-}
-
-fn refusal_from_disk(refusal: RefusalOnDisk) -> Result<Refusal, String> {
-    Ok(Refusal {
-        post: Post::new(refusal.post.0, refusal.post.1),
-        module: ModuleId { row: refusal.module.0, col: refusal.module.1 },
-        residual: refusal.residual,
-        by: meaning(&REFUSED_BY, refusal.by, "refusing limit")?,
-    })
-}
-
-fn code<T: PartialEq>(meanings: &[T], value: T) -> u8 {
-    let place = meanings.iter().position(|meaning| *meaning == value);
-    place.expect("the list names every variant") as u8
-}
-
-fn meaning<T: Copy>(meanings: &[T], code: u8, what: &str) -> Result<T, String> {
-    let found = meanings.get(usize::from(code)).copied();
-    found.ok_or_else(|| format!("found {what} {code}, expected below {}", meanings.len()))
-}
-
 const _: () = assert!(POSTS_MAX as i64 * LATTICE_PER_POST as i64 * 2 <= 1 << 31, "lattice differences fit 32 bits");
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::samples;
+    use terrain::RefusedBy;
 
     fn decode(bytes: &[u8]) -> Result<(Stamp, TileTin), DatabaseError> {
         decode_tile(Path::new("r00c01.tin"), bytes)
@@ -199,7 +156,7 @@ mod tests {
 
     #[test]
     fn every_reason_survives() {
-        for (stop, by) in STOP.into_iter().zip(REFUSED_BY.into_iter().cycle()) {
+        for (stop, by) in StopReason::ALL.into_iter().zip(RefusedBy::ALL.into_iter().cycle()) {
             let mut tile = samples::tile();
             tile.stop = stop;
             tile.refused[0].by = by;
@@ -259,6 +216,6 @@ mod tests {
         assert_eq!(read.3, tile.tin.triangles);
         assert_eq!(read.5, tile.residuals);
         assert_eq!(read.7.len(), tile.refused.len());
-        assert_eq!(read.8, code(&STOP, tile.stop));
+        assert_eq!(read.8, tile.stop.number());
     }
 }

@@ -1,9 +1,11 @@
 //! What more points would gain: a survey's record of one tile, for the allocation.
 
+use serde::{Deserialize, Serialize};
+
 use crate::{ModuleId, TileId};
 
 /// What a tile would gain, point by point, as a survey found it.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GainCurve {
     /// Which tile.
     pub tile: TileId,
@@ -15,7 +17,7 @@ pub struct GainCurve {
 }
 
 /// Points inserted into one load module at one step of the gain's ladder.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct GainRun {
     /// The load module that is charged.
     pub module: ModuleId,

@@ -1,5 +1,7 @@
 //! What roads, rivers and shores put into the TIN of a tile: vertices that stay where they are, edges between them.
 
+use serde::{Deserialize, Serialize};
+
 use crate::{LATTICE_PER_POST, LatticePoint, Post, PostRect, Side, Vertex};
 
 /// The finest lattice that vertices of features stand on has this many steps between posts.
@@ -9,7 +11,7 @@ pub const FEATURE_STEPS_MAX: i32 = 64;
 ///
 /// No two edges cross, none runs through a vertex or through a tile or load-module line between its ends; two
 /// vertices never share a place.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Features {
     /// Steps between posts of the lattice that the vertices stand on: a power of two from [`LATTICE_PER_POST`] to
     /// [`FEATURE_STEPS_MAX`].
@@ -23,7 +25,7 @@ pub struct Features {
 }
 
 /// A stretch of a tile's side between two vertices of features, both included: the width of a road that crosses it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct SideSpan {
     /// Which side.
     pub side: Side,

@@ -1,5 +1,7 @@
 //! The lattice on which every vertex of a TIN lies: eighths of a post, or finer steps where features need them.
 
+use serde::{Deserialize, Serialize};
+
 use crate::Post;
 
 /// Lattice steps between neighbouring posts, but for TINs with features (see [`crate::Tin::steps_per_post`]).
@@ -9,7 +11,7 @@ pub const LATTICE_PER_POST: i32 = 8;
 ///
 /// Growing and the paper method use whole posts only; optimising moves free vertices to eighths. Features, and TINs
 /// with features, count in finer steps of their own, which they name; what turns places into posts here knows eighths.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct LatticePoint {
     /// Eighths of a post north of the area's southern edge.
     pub row: i32,

@@ -1,9 +1,10 @@
 //! The words every crate speaks: posts, windows of heights, weights, TINs, load modules, limits.
 //!
-//! Plain values and their invariants; no serialisation (each file format owns its own), no algorithms.
+//! Plain values and their invariants. Files of tiles hold some as they are: their fields, in order, are a layout.
 //! Coordinates: x east, y north, z up; row 0 is the southern edge; (row, column) is always in that order
 //! and is also the order in which every tie is broken.
 
+mod numbered;
 mod post;
 pub use post::{Post, PostRect};
 mod lattice;

@@ -1,6 +1,9 @@
 //! Middle lines of ways in a load module: where roads, rails, rivers and breaklines run, whether they are in the ground
 //! or not.
 
+use serde::{Deserialize, Serialize};
+
+use crate::numbered::numbered;
 use crate::{HOLE_CLASS, ModuleVertex};
 
 /// What kind of way a line is the middle of.
@@ -38,8 +41,27 @@ pub enum LineStorey {
     Tunnel,
 }
 
+impl LineKind {
+    /// All of them, by their numbers in files.
+    pub const ALL: [Self; 3] = [Self::Travelled, Self::Channel, Self::Breakline];
+}
+
+impl LineForm {
+    /// All of them, by their numbers in files.
+    pub const ALL: [Self; 4] = [Self::Nothing, Self::Line, Self::Strip, Self::Bench];
+}
+
+impl LineStorey {
+    /// All of them, by their numbers in files.
+    pub const ALL: [Self; 3] = [Self::Ground, Self::Bridge, Self::Tunnel];
+}
+
+numbered!(LineKind);
+numbered!(LineForm);
+numbered!(LineStorey);
+
 /// All of a line but its class and its vertices.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct LineTraits {
     /// What kind of way.
     pub kind: LineKind,

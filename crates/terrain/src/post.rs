@@ -1,9 +1,11 @@
 //! Posts of the working grid and rectangles of them.
 
+use serde::{Deserialize, Serialize};
+
 /// One post of the working grid. Row 0 is the southern edge, column 0 the western one.
 ///
 /// The order (row, then column) is the order in which ties are broken everywhere.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct Post {
     /// Posts north of the southern edge.
     pub row: i32,
@@ -27,7 +29,7 @@ impl std::fmt::Display for Post {
 /// A rectangle of posts that holds all four of its border lines.
 ///
 /// `n` cells have `n + 1` posts a side; ask [`PostRect::posts_wide`] or [`PostRect::cells_wide`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct PostRect {
     /// Southernmost row.
     pub south: i32,

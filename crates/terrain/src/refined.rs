@@ -1,5 +1,8 @@
 //! What refining made of one tile.
 
+use serde::{Deserialize, Serialize};
+
+use crate::numbered::numbered;
 use crate::{ModuleId, Post, TileId, Tin};
 
 /// The TIN of one tile, as `refine` publishes it. Nothing after it moves a vertex.
@@ -25,7 +28,7 @@ pub struct TileTin {
 }
 
 /// A post that would have been inserted next, had a limit not stood in the way.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Refusal {
     /// The refused post.
     pub post: Post,
@@ -60,3 +63,16 @@ pub enum StopReason {
     /// No selectable post is left: every residual is zero, masked or refused.
     Exhausted,
 }
+
+impl RefusedBy {
+    /// All of them, by their numbers in files.
+    pub const ALL: [Self; 3] = [Self::Module, Self::Window, Self::Reservation];
+}
+
+impl StopReason {
+    /// All of them, by their numbers in files.
+    pub const ALL: [Self; 4] = [Self::BudgetSpent, Self::ResidualReached, Self::RmsReached, Self::Exhausted];
+}
+
+numbered!(RefusedBy);
+numbered!(StopReason);

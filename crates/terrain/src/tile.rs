@@ -1,9 +1,12 @@
 //! Tiles (units of work), load modules (units of product), and the grids they form.
 
+use serde::{Deserialize, Serialize};
+
+use crate::numbered::numbered;
 use crate::{Post, PostRect};
 
 /// A tile by (row, column); 0,0 is the south-west one.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct TileId {
     /// Tiles north of the southernmost row.
     pub row: u32,
@@ -19,7 +22,7 @@ impl std::fmt::Display for TileId {
 }
 
 /// A load module by (row, column); 0,0 is the south-west one.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct ModuleId {
     /// Load modules north of the southernmost row.
     pub row: u32,
@@ -46,8 +49,10 @@ pub enum Side {
     West,
 }
 
+numbered!(Side);
+
 impl Side {
-    /// All four, in the order in which files list them.
+    /// All four, by their numbers in files.
     pub const ALL: [Side; 4] = [Side::South, Side::East, Side::North, Side::West];
 
     /// The side of the neighbour that lies on this one.

@@ -1,10 +1,13 @@
 //! All that features put into one tile: edges of its TIN, ground of their own class, slopes beside it, decks above it.
 
+use serde::{Deserialize, Serialize};
+
+use crate::numbered::numbered;
 use crate::{Features, LineTraits, TileId, Vertex};
 
 /// What features put into a tile. Places are in steps of the feature lattice from the area's south-west post, as in
 /// [`Features::steps_per_post`]; heights are in quanta.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct TileFeatures {
     /// The tile.
     pub tile: TileId,
@@ -24,7 +27,7 @@ pub struct TileFeatures {
 
 /// The middle line of a way, or of a part of it in which nothing changes. It has a vertex wherever it crosses a line
 /// between load modules.
-#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct WayLine {
     /// Class of its way.
     pub class: u8,
@@ -35,7 +38,7 @@ pub struct WayLine {
 }
 
 /// A ring of a feature with what lies inside.
-#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct FeatureSurface {
     /// Class of the triangles inside. Where rings overlap, the first in order has the ground.
     pub class: u8,
@@ -61,7 +64,12 @@ pub enum SurfaceGround {
     River,
 }
 
+numbered!(SurfaceGround);
+
 impl SurfaceGround {
+    /// All of them, by their numbers in files.
+    pub const ALL: [Self; 4] = [Self::Road, Self::Lake, Self::River, Self::Strip];
+
     /// Whether it is part of a road.
     pub fn is_road(self) -> bool {
         matches!(self, Self::Road | Self::Strip)

@@ -2,10 +2,12 @@
 
 use std::collections::HashMap;
 
+use serde::{Deserialize, Serialize};
+
 use crate::{LATTICE_PER_POST, LatticePoint, Post, PostRect};
 
 /// One vertex: a lattice point and its height in quanta of 1/128 m.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct Vertex {
     /// Where it stands.
     pub at: LatticePoint,
