@@ -2,24 +2,14 @@
 
 use std::collections::{BTreeMap, HashMap};
 
-use features::{Cause, Earthworks, FeatureId, Moved, Place};
-use store::{FeatureEarthwork, FeatureFarOff, OffCause};
-use terrain::{ModuleGrid, ModuleId, metres_of_quanta};
+use features::{Earthworks, FeatureId, Moved, Place};
+use store::FeatureFarOff;
+use terrain::{Earthwork, ModuleGrid, ModuleId, metres_of_quanta};
 
 /// What features of each class of the job move; `classes` has the job's number of each.
-pub(crate) fn by_class(works: &Earthworks, classes: &[u8]) -> Vec<FeatureEarthwork> {
-    let mut all: Vec<FeatureEarthwork> = works
-        .classes
-        .iter()
-        .map(|(class, work)| FeatureEarthwork {
-            class: classes[usize::from(*class)],
-            length_m: work.length_m,
-            off_m: work.off_m,
-            over_limit_m: work.over_limit_m,
-            moved_m3: work.moved_m3,
-        })
-        .collect();
-    all.sort_by_key(|work| work.class);
+pub(crate) fn by_class(works: &Earthworks, classes: &[u8]) -> Vec<(u8, Earthwork)> {
+    let mut all: Vec<_> = works.classes.iter().map(|(class, work)| (classes[usize::from(*class)], *work)).collect();
+    all.sort_by_key(|(class, _)| *class);
     all
 }
 
@@ -46,12 +36,7 @@ pub(crate) fn far_off(
         module: number(module_of(far.place), grid).unwrap_or(0),
         at_m: metres(far.place),
         off_m: metres_of_quanta(far.off),
-        cause: match far.cause {
-            Cause::Grade => OffCause::Grade,
-            Cause::Falling => OffCause::Falling,
-            Cause::Level => OffCause::Level,
-            Cause::Pin => OffCause::Pin,
-        },
+        cause: far.cause,
     });
     told.collect()
 }

@@ -73,7 +73,7 @@ mod sums;
 pub use sums::{Adding, Sums};
 mod survey;
 mod tasks;
-pub use tasks::{TileBudget, inherited, is_surveyed, posts_of, tile_refinement};
+pub use tasks::{inherited, is_surveyed, posts_of, tile_refinement};
 mod tins;
 mod without_limits;
 

@@ -10,7 +10,6 @@ use features::{
 use job::Job;
 use store::{
     AreaLevel, FeatureAmounts, FeatureEnd, FeatureFace, FeatureLeftOut, FeatureLine, FeatureRemark, FeatureWhy,
-    LineRole,
 };
 use terrain::{
     FeatureSurface, Features, LATTICE_PER_POST, LatticePoint, LineTraits, ModuleGrid, ModuleId, PostRect, Side,
@@ -437,7 +436,7 @@ fn lines(run: &Run, read: &ReadFeatures, (formed, works): (&Formed, &Earthworks)
             lines.push(FeatureLine {
                 feature: read.vectors.name(id).to_owned(),
                 class: classes[usize::from(class)],
-                role: line_role(role),
+                role: role,
                 width_m: of.map_or(0.0, |of| terrain::metres_of_quanta(of.width)),
                 grade_max_ppm: of.map_or(0, |of| of.grade_ppm),
                 grade_most_ppm: of.map_or(0, |of| of.grade_most_ppm()),
@@ -449,16 +448,4 @@ fn lines(run: &Run, read: &ReadFeatures, (formed, works): (&Formed, &Earthworks)
     let moved = earthworks::by_line(&works.pieces, &places);
     lines.iter_mut().zip(moved).for_each(|(line, moved)| line.moved_m3 = moved);
     lines
-}
-
-fn line_role(role: Role) -> LineRole {
-    match role {
-        Role::Side => LineRole::Side,
-        Role::Centre => LineRole::Centre,
-        Role::Shore => LineRole::Shore,
-        Role::Channel => LineRole::Channel,
-        Role::Bank => LineRole::Bank,
-        Role::Breakline => LineRole::Breakline,
-        Role::Toe => LineRole::Toe,
-    }
 }

@@ -4,7 +4,7 @@ use std::sync::{Arc, OnceLock};
 
 use crate::ground::{Sight, Surroundings, Window, scanned};
 use store::engine::{Artifact, Before, Cause, Key, Outcome, Parts, Stamp, keep_or_make};
-use store::{TileRecord, TileState};
+use store::{TileBudget, TileRecord, TileState};
 use terrain::{ModuleId, StopReason, TileId, TileTin, Vertex};
 
 use crate::cause::{FROZEN, summary};
@@ -13,7 +13,7 @@ use crate::refinement::Refinement;
 use crate::refused::{RefusedPosts, by_module};
 use crate::run::{ALGORITHM_REVISION, Run};
 use crate::survey::Shares;
-use crate::tasks::{TileBudget, inherited, posts_of, tile_refinement};
+use crate::tasks::{inherited, posts_of, tile_refinement};
 use crate::{CompileError, Event, Progress, Stage};
 
 /// What a tile's published TIN was made from, and what the report says of it. The TIN itself is asked of the run.

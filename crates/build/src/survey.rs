@@ -4,6 +4,7 @@ use std::sync::{Mutex, PoisonError};
 
 use crate::ground::Window;
 use job::{Budget as PointBudget, Edges};
+use store::TileBudget;
 use store::engine::{Artifact, Key, Outcome, Stamp, keep_or_make};
 use terrain::{GainCurve, ModuleId, TileId};
 use tin::SurveyTask;
@@ -14,7 +15,7 @@ use crate::curves::{Curves, Profile};
 use crate::keys;
 use crate::refinement::{give, optimising};
 use crate::run::{ALGORITHM_REVISION, Run};
-use crate::tasks::{TileBudget, is_surveyed, is_surveyed_in_haste, survey_task};
+use crate::tasks::{is_surveyed, is_surveyed_in_haste, survey_task};
 use crate::{CompileError, Event, Progress, Stage};
 
 /// What the area's budget came to.

@@ -4,6 +4,7 @@ use std::ops::Deref;
 
 use crate::ground::GamingArea;
 use job::{Allocation, Borders, Budget as PointBudget, Edges, Effort, ErrorKey, Job, Method, OuterBorder};
+use store::TileBudget;
 use terrain::limits::Allowance;
 use terrain::{Features, ModuleId, ModuleRect, Post, SeamSides, Side, TileFeatures, TileId, TileTin, Vertex};
 use tin::tiling::{Budget, Tiling, outer_border_posts, outer_sides};
@@ -18,16 +19,6 @@ const SURVEY_REACH: u64 = 6;
 const SURVEY_REACH_OF_FAST: u64 = 3;
 /// The same, where an RMS residual is asked for that optimising reaches within the budget and selection alone does not.
 const SURVEY_REACH_TO_RMS: u64 = 10;
-
-/// What one tile may spend.
-pub struct TileBudget {
-    /// Points to select, where those are counted.
-    pub points: Option<usize>,
-    /// Triangles it may spend, with constrained edges.
-    pub allowance: Option<Allowance>,
-    /// RMS residual (quanta) that is good enough for this tile, where the area's is shared out.
-    pub rms_quanta: Option<f64>,
-}
 
 /// The refinement of one tile, optimised if the job says so.
 pub fn tile_refinement(

@@ -10,9 +10,8 @@ use std::sync::Arc;
 use job::Job;
 use schedule::Workers;
 use store::engine::{Fingerprint, Outcome, Stamp};
-use store::{Folder, Profile, Share, ShareAllowance, Work};
-use terrain::limits::Allowance;
-use terrain::{LatticePoint, ModuleRect, TileId, TileTin};
+use store::{Folder, Profile, Work};
+use terrain::{LatticePoint, TileId, TileTin};
 
 use crate::assemble::assemble_tile;
 use crate::build::{Built, finish, open_with};
@@ -24,7 +23,7 @@ use crate::profile::profile_tile;
 use crate::refine::{Published, refine_tile};
 use crate::run::{ALGORITHM_REVISION, Options, Run, run_name};
 use crate::survey::{allocate, survey_tile};
-use crate::tasks::{TileBudget, inherited, is_surveyed};
+use crate::tasks::{inherited, is_surveyed};
 use crate::{CompileError, Event, Progress, Stage, Stopwatch};
 
 /// A process's part in a build that several processes share.
@@ -157,7 +156,7 @@ impl<'a> Session<'a> {
         let curves = is_surveyed(run.job).then(|| Curves::published(run, curve)).transpose()?;
         let shares = allocate(run, curves.as_ref(), &mut Silent)?;
         for (&tile, budget) in run.area.tiles.iter().zip(&shares.tiles) {
-            self.work.write_share(tile, &to_share(budget))?;
+            self.work.write_share(tile, budget)?;
         }
         Ok(Fingerprint::of_bytes(b"allocated"))
     }
@@ -168,7 +167,7 @@ impl<'a> Session<'a> {
         let features = self.run.tile_features(tile)?;
         let published = |other| Ok(self.published(unit, other)?.1);
         let seeds = inherited(&self.run.area.tiling, tile, &features.kept, published)?;
-        refine_tile(&self.run, &from_share(&share), seeds, tile)
+        refine_tile(&self.run, &share, seeds, tile)
     }
 
     fn assemble(&self, tile: TileId) -> Result<Fingerprint, CompileError> {
@@ -262,36 +261,4 @@ struct Silent;
 
 impl Progress for Silent {
     fn tell(&mut self, _event: Event) {}
-}
-
-fn to_share(budget: &TileBudget) -> Share {
-    let rect = |rect: ModuleRect| [rect.south, rect.west, rect.north, rect.east];
-    Share {
-        points: budget.points.map(|points| points as u64),
-        rms_quanta: budget.rms_quanta,
-        allowance: budget.allowance.as_ref().map(|allowance| ShareAllowance {
-            modules: rect(allowance.modules),
-            module_room: allowance.module_room.clone(),
-            windows: rect(allowance.windows),
-            window_size: allowance.window_size.into(),
-            window_room: allowance.window_room.clone(),
-            triangles: allowance.triangles,
-        }),
-    }
-}
-
-fn from_share(share: &Share) -> TileBudget {
-    let rect = |[south, west, north, east]: [u32; 4]| ModuleRect { south, west, north, east };
-    TileBudget {
-        points: share.points.map(|points| points as usize),
-        rms_quanta: share.rms_quanta,
-        allowance: share.allowance.as_ref().map(|allowance| Allowance {
-            modules: rect(allowance.modules),
-            module_room: allowance.module_room.clone(),
-            windows: rect(allowance.windows),
-            window_size: allowance.window_size.into(),
-            window_room: allowance.window_room.clone(),
-            triangles: allowance.triangles,
-        }),
-    }
 }

@@ -6,9 +6,8 @@
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 
-use terrain::{QUANTA_PER_METRE, metres_of_quanta};
+use terrain::{Earthwork, OffCause, QUANTA_PER_METRE, Role, metres_of_quanta};
 
-use crate::strand::Role;
 use crate::sweep::Pin;
 use crate::{FallOptions, FeatureId, GradeOptions, Graded, Histogram, Lake, Outline, Place, Site, Strand};
 
@@ -20,32 +19,6 @@ const SLOPES: f64 = 1.75;
 
 /// Stations along which the cause of a cut is looked for.
 const CAUSE_STATIONS_MAX: usize = 5000;
-
-/// Why a feature lies off the ground.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Cause {
-    /// Its greatest grade.
-    Grade,
-    /// It falls downstream.
-    Falling,
-    /// It lies level: in a lake, in a circle, or as the lake that a road meets.
-    Level,
-    /// A height that is pinned.
-    Pin,
-}
-
-/// What features of a class move.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Earthwork {
-    /// Metres along ways, or along the shores of lakes.
-    pub length_m: f64,
-    /// Metres of them that lie farther from the ground than each of [`OFF_M`].
-    pub off_m: [f64; 4],
-    /// Metres of ways that lie farther from the ground than the limits of cut and fill allow, and than twice these.
-    pub over_limit_m: [f64; 2],
-    /// Cubic metres cut and filled.
-    pub moved_m3: [f64; 2],
-}
 
 /// A place where a feature lies more than 3 m off the ground: the worst of it in its load module.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -59,7 +32,7 @@ pub struct FarOff {
     /// Quanta above the ground; below it less than 0.
     pub off: i32,
     /// Why.
-    pub cause: Cause,
+    pub cause: OffCause,
 }
 
 /// What a piece of a way from one station to the next moves.
@@ -219,7 +192,7 @@ impl Sums<'_> {
         }
         let end = usize::from(off[0].abs() < off[1].abs());
         let place = piece.ends[end];
-        let cause = if level.contains(&place) { Cause::Level } else { Cause::Falling };
+        let cause = if level.contains(&place) { OffCause::Level } else { OffCause::Falling };
         let far = FarOff { class: piece.class, id: piece.id, place, off: off[end], cause };
         self.tell(module, far, piece.nodes.map(|nodes| nodes[end]));
     }
@@ -252,7 +225,7 @@ impl Sums<'_> {
                     work.length_m += length;
                     count_off(work, lake.level - ground, length);
                     let off = lake.level - ground;
-                    let far = FarOff { class, id: outline.id, place: *place, off, cause: Cause::Level };
+                    let far = FarOff { class, id: outline.id, place: *place, off, cause: OffCause::Level };
                     self.tell(site.module_of(*place), far, None);
                 }
             }
@@ -289,7 +262,7 @@ fn count_off(work: &mut Earthwork, off: i32, length: f64) {
 
 impl Laid<'_> {
     /// Why a road lies off the ground at a node: what holds it along edges as steep as they may be, or its grade.
-    fn cause(&self, node: u32, off: i32) -> Cause {
+    fn cause(&self, node: u32, off: i32) -> OffCause {
         let Graded { network, heights, .. } = self.roads;
         let has = |pins: &[Pin], node: u32| {
             pins.binary_search_by_key(&node, |pin| pin.node).is_ok_and(|at| pins[at].height == heights[node as usize])
@@ -298,10 +271,10 @@ impl Laid<'_> {
         while let Some(node) = front.pop() {
             // Heights of lakes are among the pins.
             if has(self.afloat, node) {
-                return Cause::Level;
+                return OffCause::Level;
             }
             if has(self.pins, node) {
-                return Cause::Pin;
+                return OffCause::Pin;
             }
             for &(next, edge) in network.beside(node) {
                 // A cut is held down by what lies lower, a fill held up by what lies higher.
@@ -312,7 +285,7 @@ impl Laid<'_> {
                 }
             }
         }
-        Cause::Grade
+        OffCause::Grade
     }
 }
 
@@ -347,7 +320,7 @@ mod tests {
         assert!(all.off_m.windows(2).all(|pair| pair[1] <= pair[0]) && 0.0 < all.off_m[0] && all.off_m[3] == 0.0);
         assert_eq!(all.over_limit_m, [0.0; 2]);
         let [worst, ..] = found.far_off[..] else { panic!("it is told") };
-        assert_eq!((worst.cause, worst.id.number), (Cause::Grade, 1));
+        assert_eq!((worst.cause, worst.id.number), (OffCause::Grade, 1));
         for sum in [
             found.pieces.iter().map(|piece| piece.moved_m3).fold([0.0; 2], |sum, of| [sum[0] + of[0], sum[1] + of[1]]),
             found.modules.values().fold([0.0; 2], |sum, of| [sum[0] + of[0], sum[1] + of[1]]),
@@ -373,17 +346,17 @@ mod tests {
         let found = works(vec![way(1, "natural=water", &ring)], |_, _| 104.0, &inside);
         let all = only(&found);
         assert_eq!((all.moved_m3, all.length_m, all.off_m), ([2000.0, 100.0], 400.0, [400.0, 0.0, 0.0, 0.0]));
-        assert_eq!(found.far_off[0].cause, Cause::Level);
+        assert_eq!(found.far_off[0].cause, OffCause::Level);
     }
 
     #[test]
     fn a_river_that_has_to_fall_says_so_and_one_in_a_circle_lies_level() {
         let river = way(1, "waterway=river", &[(10.0, 10.0), (60.0, 10.0)]);
         let found = works(vec![river], |east, _| if (30.0..34.0).contains(&east) { 180.0 } else { 100.0 - east }, &[]);
-        assert_eq!((found.far_off[0].cause, found.far_off[0].off < 0), (Cause::Falling, true));
+        assert_eq!((found.far_off[0].cause, found.far_off[0].off < 0), (OffCause::Falling, true));
         let ring = [(10.0, 10.0), (40.0, 10.0), (40.0, 40.0), (10.0, 40.0), (10.0, 10.0)];
         let found = works(vec![way(1, "waterway=river", &ring)], |east, _| 2.0 * east, &[]);
-        assert!(found.far_off.iter().all(|far| far.cause == Cause::Level) && !found.far_off.is_empty());
+        assert!(found.far_off.iter().all(|far| far.cause == OffCause::Level) && !found.far_off.is_empty());
     }
 
     #[test]
@@ -412,6 +385,9 @@ mod tests {
             }
             .cause(10, 128)
         };
-        assert_eq!((laid(&pin, &[]), laid(&pin, &pin), laid(&[], &[])), (Cause::Pin, Cause::Level, Cause::Grade));
+        assert_eq!(
+            (laid(&pin, &[]), laid(&pin, &pin), laid(&[], &[])),
+            (OffCause::Pin, OffCause::Level, OffCause::Grade)
+        );
     }
 }

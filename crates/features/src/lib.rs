@@ -89,7 +89,7 @@ pub use lakes::{Histogram, Lake, Shores, Waters, banks, level, lift_shores, outl
 mod afloat;
 pub use afloat::{afloat, with_water};
 mod earthworks;
-pub use earthworks::{Cause, Earthwork, Earthworks, FarOff, Moved, OFF_M};
+pub use earthworks::{Earthworks, FarOff, Moved, OFF_M};
 mod parts;
 pub use parts::{Line, breaklines, channels, dams, flowing, have_line, lakes_along, lines_inside, travelled, water};
 

@@ -1,35 +1,8 @@
 //! What is formed: the heights of a network, and lines with heights that are no travelled way.
 
+pub use terrain::Role;
+
 use crate::{FeatureId, Grants, Network, Place};
-
-/// What an edge of the TIN is to its feature.
-///
-/// Where two have a place in common, what is travelled keeps its height, by class; then the order decides, so that a
-/// shore stays level where a river meets it, and a toe, which only follows the ground, comes last.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Role {
-    /// Part of the outline of a strip or a junction.
-    Side,
-    /// A centreline.
-    Centre,
-    /// The outline of level water.
-    Shore,
-    /// The middle of a river or stream.
-    Channel,
-    /// The outline of a river.
-    Bank,
-    /// A line a job names.
-    Breakline,
-    /// Where the slope of a bench meets the ground.
-    Toe,
-}
-
-impl Role {
-    /// Whether it is the outline of water.
-    pub fn is_outline(self) -> bool {
-        matches!(self, Role::Shore | Role::Bank)
-    }
-}
 
 /// A line with heights that is no travelled way: a channel, a shore, a breakline.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -12,7 +12,8 @@ use build::ground::{GamingArea, Ground, Window};
 use build::product::{Opened, choose_ground, locate_weights};
 use job::Choice;
 use schedule::Workers;
-use store::{FeatureFarOff, OffCause};
+use store::FeatureFarOff;
+use terrain::OffCause;
 use terrain::geometry::Facet;
 use terrain::geometry::owned::{PostGrid, visit_residuals};
 use terrain::{

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
+use terrain::{Earthwork, OffCause, Role};
 
 use crate::frame::{Kind, malformed};
 use crate::{DatabaseError, FileStamp, Stamp, codec, frame};
@@ -29,8 +30,8 @@ pub struct AreaLevel {
     pub strips: Vec<StripFigures>,
     /// The surfaces of bridges.
     pub decks: Vec<FeatureFace>,
-    /// What features in the ground move, by class in ascending order.
-    pub earthworks: Vec<FeatureEarthwork>,
+    /// What features in the ground move, by class, a number of the job's, in ascending order.
+    pub earthworks: Vec<(u8, Earthwork)>,
     /// Cubic metres cut and filled in each load module: its place in the area, row-major; the class; both.
     pub moved: Vec<(u32, u8, [f64; 2])>,
     /// Where features lie more than 3 m off the ground, the worst of each in each load module, the farthest first.
@@ -103,21 +104,6 @@ pub struct FeatureLeftOut {
     pub lines: Vec<Vec<[f64; 3]>>,
 }
 
-/// What features of a class move, inside the area.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct FeatureEarthwork {
-    /// The class, a number of the job's.
-    pub class: u8,
-    /// Metres of ways on the ground, or of the shores of lakes.
-    pub length_m: f64,
-    /// Metres of them that lie more than 3, 5, 10 and 20 m off the ground.
-    pub off_m: [f64; 4],
-    /// Metres of ways that lie farther off than the limits of cut and fill, and than twice these.
-    pub over_limit_m: [f64; 2],
-    /// Cubic metres cut and filled.
-    pub moved_m3: [f64; 2],
-}
-
 /// A place where a feature lies far off the ground.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FeatureFarOff {
@@ -133,31 +119,6 @@ pub struct FeatureFarOff {
     pub off_m: f64,
     /// Why.
     pub cause: OffCause,
-}
-
-/// Why a feature lies off the ground.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum OffCause {
-    /// Its greatest grade.
-    Grade,
-    /// It falls downstream.
-    Falling,
-    /// It lies level.
-    Level,
-    /// A height that is pinned.
-    Pin,
-}
-
-impl OffCause {
-    /// The word for it.
-    pub fn name(self) -> &'static str {
-        match self {
-            OffCause::Grade => "grade",
-            OffCause::Falling => "falling",
-            OffCause::Level => "level",
-            OffCause::Pin => "pin",
-        }
-    }
 }
 
 /// Where what is in the ground ends although its source goes on.
@@ -179,7 +140,7 @@ pub struct FeatureLine {
     /// Its class, a number of the job's.
     pub class: u8,
     /// What it is to its feature.
-    pub role: LineRole,
+    pub role: Role,
     /// Metres wide.
     pub width_m: f64,
     /// The greatest grade of its rule, in parts per million; 0 where it has none.
@@ -216,40 +177,6 @@ pub struct FeatureFace {
     pub class: u8,
     /// Easting, northing and height of its corners, in metres; the first is not repeated.
     pub ring: Vec<[f64; 3]>,
-}
-
-/// What a line of edges is to its feature.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-pub enum LineRole {
-    /// The outline of a strip or a junction.
-    Side,
-    /// A centreline.
-    Centre,
-    /// The outline of level water.
-    Shore,
-    /// The middle of a river or stream.
-    Channel,
-    /// The outline of a river.
-    Bank,
-    /// A line that a job names.
-    Breakline,
-    /// Where a slope meets the ground.
-    Toe,
-}
-
-impl LineRole {
-    /// The word for it.
-    pub fn name(self) -> &'static str {
-        match self {
-            LineRole::Side => "side",
-            LineRole::Centre => "centreline",
-            LineRole::Shore => "shore",
-            LineRole::Channel => "channel",
-            LineRole::Bank => "bank",
-            LineRole::Breakline => "breakline",
-            LineRole::Toe => "toe",
-        }
-    }
 }
 
 /// What is done where a road crosses a channel without a bridge.
@@ -325,7 +252,7 @@ mod tests {
             lines: vec![FeatureLine {
                 feature: "way/12".into(),
                 class: 3,
-                role: LineRole::Centre,
+                role: Role::Centre,
                 width_m: 3.5,
                 grade_max_ppm: 250_000,
                 grade_most_ppm: 375_000,
@@ -333,7 +260,7 @@ mod tests {
                 vertices: vec![[500_000.5, 4_000_000.0, 12.25]],
             }],
             strips: vec![StripFigures { class: 3, pieces: 2, length_m: 12.5, steeper: 1, fall_max: 9 }],
-            earthworks: vec![FeatureEarthwork { class: 3, off_m: [0.5; 4], ..FeatureEarthwork::default() }],
+            earthworks: vec![(3, Earthwork { off_m: [0.5; 4], ..Earthwork::default() })],
             moved: vec![(7, 3, [0.5, 2.5])],
             far_off: vec![FeatureFarOff {
                 feature: "way/12".into(),

@@ -34,8 +34,8 @@ mod lines_file;
 pub use lines_file::{decode_lines, encode_lines};
 mod level_file;
 pub use level_file::{
-    AreaLevel, CULVERT, FeatureAmounts, FeatureEarthwork, FeatureEnd, FeatureFace, FeatureFarOff, FeatureLeftOut,
-    FeatureLine, FeatureRemark, FeatureWhy, LineRole, OffCause, StripFigures, decode_level, encode_level,
+    AreaLevel, CULVERT, FeatureAmounts, FeatureEnd, FeatureFace, FeatureFarOff, FeatureLeftOut, FeatureLine,
+    FeatureRemark, FeatureWhy, StripFigures, decode_level, encode_level,
 };
 mod buildings_file;
 pub use buildings_file::{BUILDING_UNITS_PER_METRE, Building, decode_buildings, encode_buildings};
@@ -73,7 +73,7 @@ pub use report::{
 mod lock;
 pub use lock::Lock;
 mod work;
-pub use work::{RUN_DIGITS, Share, ShareAllowance, Work};
+pub use work::{RUN_DIGITS, TileBudget, Work};
 mod folder;
 pub use folder::Folder;
 mod names;

@@ -4,7 +4,8 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 use terrain::{
-    FEATURE_STEPS_MAX, LATTICE_PER_POST, LatticePoint, Post, PostRect, Refusal, StopReason, TileId, TileTin, Tin, Vertex,
+    FEATURE_STEPS_MAX, LATTICE_PER_POST, LatticePoint, Post, PostRect, Refusal, StopReason, TileId, TileTin, Tin,
+    Vertex,
 };
 
 use crate::frame::{Kind, malformed};

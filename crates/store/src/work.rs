@@ -14,6 +14,7 @@ use std::time::Duration;
 use crate::engine::{Durability, Leases, Marks, Store, remove_all};
 use serde::{Deserialize, Serialize};
 use terrain::TileId;
+use terrain::limits::Allowance;
 
 use crate::read::read;
 use crate::{DatabaseError, json};
@@ -33,32 +34,15 @@ pub struct Work {
     marks: Marks,
 }
 
-/// What one tile may spend, as processes hand it to one another.
+/// What one tile may spend; processes hand it to one another.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Share {
-    /// Points to select.
-    pub points: Option<u64>,
-    /// RMS residual that is good enough, in quanta.
+pub struct TileBudget {
+    /// Points to select, where those are counted.
+    pub points: Option<usize>,
+    /// RMS residual (quanta) that is good enough for this tile, where the area's is shared out.
     pub rms_quanta: Option<f64>,
-    /// Triangles, with constrained edges.
-    pub allowance: Option<ShareAllowance>,
-}
-
-/// Triangles one tile may spend, in all and by load module and window.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct ShareAllowance {
-    /// South, west, north and east of the load modules that the room below is for.
-    pub modules: [u32; 4],
-    /// Room in each of them.
-    pub module_room: Vec<u32>,
-    /// South, west, north and east of the windows' origins.
-    pub windows: [u32; 4],
-    /// Rows and columns of load modules in a window.
-    pub window_size: [u32; 2],
-    /// Room in each window.
-    pub window_room: Vec<u32>,
-    /// Triangles in all.
-    pub triangles: u32,
+    /// Triangles it may spend, with constrained edges.
+    pub allowance: Option<Allowance>,
 }
 
 impl Work {
@@ -110,7 +94,7 @@ impl Work {
     ///
     /// # Errors
     /// When it cannot be written.
-    pub fn write_share(&self, tile: TileId, share: &Share) -> Result<(), DatabaseError> {
+    pub fn write_share(&self, tile: TileId, share: &TileBudget) -> Result<(), DatabaseError> {
         let path = self.share_path(tile);
         let text = json::encode(&path, share)?;
         let written = self.store.replace(&path, text.as_bytes(), Durability::Later);
@@ -121,7 +105,7 @@ impl Work {
     ///
     /// # Errors
     /// When no process has said so yet, or the file is damaged.
-    pub fn read_share(&self, tile: TileId) -> Result<Share, DatabaseError> {
+    pub fn read_share(&self, tile: TileId) -> Result<TileBudget, DatabaseError> {
         let path = self.share_path(tile);
         json::decode(&path, &read(&*self.store, &path)?)
     }
@@ -152,7 +136,7 @@ mod tests {
         assert_eq!(work.marks().marked("refine-r00c01"), Some(fingerprint));
         assert_eq!(work.marks().all().unwrap(), ["refine-r00c01"]);
         assert_eq!(database.work("fedcba9876543210").unwrap().marks().marked("refine-r00c01"), None);
-        let share = Share { points: Some(7), rms_quanta: Some(0.1 + 0.2), allowance: None };
+        let share = TileBudget { points: Some(7), rms_quanta: Some(0.1 + 0.2), allowance: None };
         work.write_share(samples::TILE, &share).unwrap();
         assert_eq!(work.read_share(samples::TILE).unwrap(), share);
         work.marks().unmark("refine-r00c01");

@@ -23,6 +23,8 @@ mod features;
 pub use features::{FEATURE_STEPS_MAX, Features, SideSpan};
 mod tile_features;
 pub use tile_features::{FeatureSurface, SurfaceGround, TileFeatures, WayLine};
+mod earthwork;
+pub use earthwork::{Earthwork, OffCause, Role};
 mod tile;
 pub use tile::{ModuleGrid, ModuleId, ModuleRect, SeamSides, Side, TileId};
 mod curve;

@@ -102,7 +102,7 @@ impl SeamSides {
 }
 
 /// A half-open rectangle of load modules: rows `south..north`, columns `west..east`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct ModuleRect {
     /// First row.
     pub south: u32,

@@ -3,7 +3,8 @@
 
 use std::collections::BTreeSet;
 
-use store::{AreaLevel, FeatureEarthwork, FeatureFarOff, ReportEarthwork, ReportEarthworks, ReportFarOff};
+use store::{AreaLevel, FeatureFarOff, ReportEarthwork, ReportEarthworks, ReportFarOff};
+use terrain::Earthwork;
 
 /// Places that are told of those that lie farthest off.
 const WORST_MAX: usize = 10;
@@ -18,13 +19,13 @@ const OVER_LIMIT_MIN_M: f64 = 100.0;
 /// What features move, as the report gives it; `names` are those of the job's classes.
 pub(crate) fn earthworks(names: &[String], level: &AreaLevel) -> ReportEarthworks {
     let name = |class: u8| names.get(usize::from(class)).cloned().unwrap_or_default();
-    let class = |work: &FeatureEarthwork| {
+    let class = |(class, work): &(u8, Earthwork)| {
         let ([off_3m_km, off_5m_km, off_10m_km, off_20m_km], [cut_m3, fill_m3]) =
             (work.off_m.map(|metres| metres / 1000.0), work.moved_m3);
         let length_km = work.length_m / 1000.0;
         let per_km = |cubic: f64| if 0.0 < length_km { cubic / length_km } else { 0.0 };
         ReportEarthwork {
-            name: name(work.class),
+            name: name(*class),
             length_km,
             off_3m_km,
             off_5m_km,
@@ -52,18 +53,18 @@ pub(crate) fn earthworks(names: &[String], level: &AreaLevel) -> ReportEarthwork
 
 /// What a person should know of ways that lie farther off the ground than cut and fill may be.
 pub(crate) fn warnings(names: &[String], level: &AreaLevel) -> Vec<String> {
-    let over = level.earthworks.iter().filter_map(|work| {
+    let over = level.earthworks.iter().filter_map(|(class, work)| {
         let is_too_much = |at: usize| {
             let metres = work.over_limit_m[at];
             OVER_LIMIT_MIN_M < metres && OVER_LIMIT_MAX[at] * work.length_m < metres
         };
         // The worse one first.
-        [1, 0].into_iter().find(|at| is_too_much(*at)).map(|at| (work, work.over_limit_m[at], at))
+        [1, 0].into_iter().find(|at| is_too_much(*at)).map(|at| ((*class, work), work.over_limit_m[at], at))
     });
-    let told = over.map(|(work, over_m, at)| {
-        let name = names.get(usize::from(work.class)).map_or("a class", String::as_str);
+    let told = over.map(|((class, work), over_m, at)| {
+        let name = names.get(usize::from(class)).map_or("a class", String::as_str);
         let limits = ["the limits", "twice the limits"][at];
-        let worst = level.far_off.iter().find(|far| far.class == work.class);
+        let worst = level.far_off.iter().find(|far| far.class == class);
         let worst = worst.map_or_else(String::new, |far| {
             let ([east, north], what) = (far.at_m, if far.off_m < 0.0 { "cut" } else { "fill" });
             let (off, cause) = (far.off_m.abs(), far.cause.name());
@@ -78,12 +79,12 @@ pub(crate) fn warnings(names: &[String], level: &AreaLevel) -> Vec<String> {
 
 #[cfg(test)]
 mod tests {
-    use store::OffCause;
+    use terrain::OffCause;
 
     use super::*;
 
     fn level(length_m: f64, over_limit_m: [f64; 2]) -> AreaLevel {
-        let work = FeatureEarthwork { class: 1, length_m, over_limit_m, ..FeatureEarthwork::default() };
+        let work = Earthwork { length_m, over_limit_m, ..Earthwork::default() };
         let far = FeatureFarOff {
             feature: "way/7".into(),
             class: 1,
@@ -92,7 +93,7 @@ mod tests {
             off_m: -31.25,
             cause: OffCause::Falling,
         };
-        AreaLevel { earthworks: vec![work], far_off: vec![far.clone(), far], ..AreaLevel::default() }
+        AreaLevel { earthworks: vec![(1, work)], far_off: vec![far.clone(), far], ..AreaLevel::default() }
     }
 
     #[test]

@@ -6,7 +6,8 @@ use std::collections::BTreeMap;
 use job::Job;
 use rusqlite::{Connection, params};
 use source_files::geopackage_parts::{Extent, Layer, Package, add_index, line_z, point, point_z, polygon_z};
-use store::{AreaLevel, FeatureLine, FeatureRemark, LineRole};
+use store::{AreaLevel, FeatureLine, FeatureRemark};
+use terrain::Role;
 use views::outcome;
 
 use crate::product::ProductError;
@@ -106,12 +107,12 @@ fn class_of(layers: &FeatureLayers, class: u8) -> String {
 }
 
 /// The form that a line belongs to.
-fn form_of(role: LineRole) -> &'static str {
+fn form_of(role: Role) -> &'static str {
     match role {
-        LineRole::Centre | LineRole::Channel | LineRole::Breakline => "line",
-        LineRole::Side => "strip",
-        LineRole::Toe => "bench",
-        LineRole::Shore | LineRole::Bank => "polygon",
+        Role::Centre | Role::Channel | Role::Breakline => "line",
+        Role::Side => "strip",
+        Role::Toe => "bench",
+        Role::Shore | Role::Bank => "polygon",
     }
 }
 
@@ -144,7 +145,7 @@ fn add_lines(package: &Package, layers: &FeatureLayers) -> rusqlite::Result<()> 
 fn add_nodes(package: &Package, layers: &FeatureLayers) -> rusqlite::Result<()> {
     let mut nodes: BTreeMap<[u64; 3], ([f64; 3], u32)> = BTreeMap::new();
     for line in &layers.level.lines {
-        if !matches!(line.role, LineRole::Centre | LineRole::Channel) {
+        if !matches!(line.role, Role::Centre | Role::Channel) {
             continue;
         }
         for end in line.vertices.first().into_iter().chain(line.vertices.last()) {
@@ -212,9 +213,9 @@ mod tests {
         };
         let middle = [30.0, 40.0, 2.5];
         let lines = vec![
-            line(LineRole::Centre, vec![[0.0, 0.0, 0.0], middle]),
-            line(LineRole::Centre, vec![middle, [30.0, 140.0, 2.5]]),
-            line(LineRole::Side, vec![middle, [60.0, 140.0, 2.5]]),
+            line(Role::Centre, vec![[0.0, 0.0, 0.0], middle]),
+            line(Role::Centre, vec![middle, [30.0, 140.0, 2.5]]),
+            line(Role::Side, vec![middle, [60.0, 140.0, 2.5]]),
         ];
         let deck = FeatureFace { feature: "way 2".into(), class: 1, ring: vec![[0.0; 3], [5.0, 0.0, 1.0], middle] };
         let level = AreaLevel { lines, decks: vec![deck], ..AreaLevel::default() };

@@ -9,9 +9,10 @@ use crate::ground::GamingArea;
 use fidelity::FeatureFigures;
 use job::{HOLE_CLASS_NAME, Job};
 use store::{
-    AreaLevel, FeatureLine, FeatureRemark, LineRole, ReportDeckClearance, ReportFeatureChecks, ReportFeatureClass,
+    AreaLevel, FeatureLine, FeatureRemark, ReportDeckClearance, ReportFeatureChecks, ReportFeatureClass,
     ReportFeatureCost, ReportFeatureRemarks, ReportFeatures,
 };
+use terrain::Role;
 use terrain::limits::Windows;
 use terrain::{LatticePoint, QUANTA_PER_METRE, metres_of_quanta};
 
@@ -132,7 +133,7 @@ fn cost(area: &GamingArea, level: &AreaLevel, is_meant: impl Fn(u8) -> bool) -> 
 /// How much there is of a class.
 fn lengths(level: &AreaLevel, class: u8, extent_m: [f64; 4]) -> ReportFeatureClass {
     let of_class = || level.lines.iter().filter(move |line| line.class == class);
-    let km = |roles: &[LineRole]| {
+    let km = |roles: &[Role]| {
         let lines = of_class().filter(|line| roles.contains(&line.role));
         sum_km(lines.flat_map(|line| edges(line, extent_m)).map(|[a, b]| length_m(a, b)))
     };
@@ -144,9 +145,9 @@ fn lengths(level: &AreaLevel, class: u8, extent_m: [f64; 4]) -> ReportFeatureCla
         kept_km: amounts.kept_m / 1000.0,
         lakes_wanted: amounts.lakes_wanted.into(),
         lakes_kept: amounts.lakes_kept.into(),
-        line_km: km(&[LineRole::Centre, LineRole::Breakline]),
+        line_km: km(&[Role::Centre, Role::Breakline]),
         strip_km: sum_km(strips.map(|strips| strips.length_m)),
-        channel_km: km(&[LineRole::Channel]),
+        channel_km: km(&[Role::Channel]),
         lakes: lakes(of_class(), extent_m),
         deck_polygons: level.decks.iter().filter(|deck| deck.class == class).count() as u64,
         cost: ReportFeatureCost::default(),
@@ -155,7 +156,7 @@ fn lengths(level: &AreaLevel, class: u8, extent_m: [f64; 4]) -> ReportFeatureCla
 
 /// Lakes among lines: shores of one feature are those of one lake and its islands.
 fn lakes<'a>(lines: impl Iterator<Item = &'a FeatureLine>, extent_m: [f64; 4]) -> u64 {
-    let shores = lines.filter(|line| line.role == LineRole::Shore && edges(line, extent_m).next().is_some());
+    let shores = lines.filter(|line| line.role == Role::Shore && edges(line, extent_m).next().is_some());
     shores.map(|line| &line.feature).collect::<BTreeSet<_>>().len() as u64
 }
 
@@ -183,11 +184,11 @@ fn checks(level: &AreaLevel, figures: &FeatureFigures, extent_m: [f64; 4]) -> Re
     };
     for line in &level.lines {
         match line.role {
-            LineRole::Centre => {
+            Role::Centre => {
                 checks.stations += edges(line, extent_m).count() as u64;
                 checks.stations_steeper += steeper(line, extent_m);
             }
-            LineRole::Channel => {
+            Role::Channel => {
                 checks.river_edges += edges(line, extent_m).count() as u64;
                 checks.river_edges_rising += rising(line, extent_m);
             }

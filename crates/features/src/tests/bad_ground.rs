@@ -236,7 +236,7 @@ fn pins_that_contradict_everything_are_kept_and_told() {
     }
     assert_eq!(laid.count(|flaw| matches!(flaw, Flaw::PinsTooSteep { .. })), 1);
     let told = &laid.levelled.earthworks.far_off[0];
-    assert_eq!(told.cause, crate::Cause::Pin);
+    assert_eq!(told.cause, terrain::OffCause::Pin);
     assert!(laid.levelled.remarks.iter().any(|remark| remark.remedy == Remedy::GradeExceeded));
 }
 

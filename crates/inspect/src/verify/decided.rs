@@ -4,7 +4,8 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
 use build::ground::GamingArea;
-use store::{AreaLevel, FeatureLine, LineRole, ReportFeatureChecks};
+use store::{AreaLevel, FeatureLine, ReportFeatureChecks};
+use terrain::Role;
 use terrain::{LatticePoint, ModuleId, QUANTA_PER_METRE, SurfaceGround, TileFeatures, Vertex};
 
 use super::laid::place_text;
@@ -144,7 +145,7 @@ impl<'a> Decided<'a> {
     /// The first edge of a channel that rises downstream.
     fn rising(&self, line: &FeatureLine) -> Option<String> {
         let edges = self.edges_of(line);
-        let is_channel = line.role == LineRole::Channel;
+        let is_channel = line.role == Role::Channel;
         let [(at, from), (_, to)] = edges.into_iter().find(|[from, to]| is_channel && from.1 < to.1)?;
         let ([from, to], place) = ([from, to].map(terrain::metres_of_quanta), self.text(at));
         Some(format!("survey/features.level: {} rises downstream from {from} m to {to} m {place}", line.feature))
@@ -261,15 +262,15 @@ impl<'a> Decided<'a> {
 
     /// Figures of the report that are not those of the tiles' files.
     fn differing_checks(&self, level: &AreaLevel, listed: &ReportFeatureChecks) -> Vec<String> {
-        let of = |role: LineRole| level.lines.iter().filter(move |line| line.role == role);
-        let edges = |role: LineRole| of(role).map(|line| self.edges_of(line).len() as u64).sum::<u64>();
+        let of = |role: Role| level.lines.iter().filter(move |line| line.role == role);
+        let edges = |role: Role| of(role).map(|line| self.edges_of(line).len() as u64).sum::<u64>();
         let rising = |line: &FeatureLine| self.edges_of(line).iter().filter(|[from, to]| from.1 < to.1).count() as u64;
         let pieces: u64 = level.strips.iter().map(|strips| strips.pieces).sum();
         let pairs = [
             ("edges", self.edges.len() as u64, listed.edges),
-            ("stations", edges(LineRole::Centre) + pieces, listed.stations),
-            ("river_edges", edges(LineRole::Channel), listed.river_edges),
-            ("river_edges_rising", of(LineRole::Channel).map(rising).sum(), listed.river_edges_rising),
+            ("stations", edges(Role::Centre) + pieces, listed.stations),
+            ("river_edges", edges(Role::Channel), listed.river_edges),
+            ("river_edges_rising", of(Role::Channel).map(rising).sum(), listed.river_edges_rising),
         ];
         let wrong = pairs.into_iter().filter(|(_, found, listed)| found != listed);
         let mut problems: Vec<String> = wrong
@@ -277,7 +278,7 @@ impl<'a> Decided<'a> {
                 format!("report.json: features.checks.{key} is {listed}, the files of tiles say {found}")
             })
             .collect();
-        let steep: u64 = of(LineRole::Centre).map(|line| self.steeper(line)).sum();
+        let steep: u64 = of(Role::Centre).map(|line| self.steeper(line)).sum();
         if listed.stations_steeper < steep {
             let listed = listed.stations_steeper;
             problems

@@ -1,15 +1,15 @@
 //! What tiles say that they were made from, as far as it follows from the job and from other tiles.
 
 use job::{Edges, Job};
-use store::{DatabaseError, Fingerprint, Folder, Manifest, TileState};
+use store::{DatabaseError, Fingerprint, Folder, Manifest, TileBudget, TileState};
 use terrain::limits::Allowance;
 use terrain::{ModuleRect, TileFeatures, TileId};
 
 use super::tins::OfTins;
 use build::ALGORITHM_REVISION;
 use build::ground::GamingArea;
+use build::tile_refinement;
 use build::{LeftOut, modules_key};
-use build::{TileBudget, tile_refinement};
 use build::{kept_features, rules};
 
 /// Load-module files whose fingerprint is not that of the TINs and the job, and, second, what was not checked.

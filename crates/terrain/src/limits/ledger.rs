@@ -1,5 +1,7 @@
 //! What one tile may spend, and the ledger that never lets it spend more.
 
+use serde::{Deserialize, Serialize};
+
 use crate::{ModuleId, ModuleRect, POINT_COST, RefusedBy};
 
 use crate::limits::{ShortOf, Shortfall};
@@ -8,7 +10,7 @@ use crate::limits::{ShortOf, Shortfall};
 ///
 /// Tiles spend from their own allowances only; the allowances of all tiles together respect every limit,
 /// so no tile needs to know what another spent.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Allowance {
     /// Load modules the tile can touch: its own and the ring of neighbours beyond its sides.
     pub modules: ModuleRect,

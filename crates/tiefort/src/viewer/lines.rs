@@ -7,7 +7,8 @@
 use std::collections::BTreeMap;
 
 use load_module_reader::{Area, AreaFrame, Block, Line, LineKind, LineStorey, QUANTA_PER_METRE, Vertex};
-use store::{AreaLevel, FeatureLine, LineRole};
+use store::{AreaLevel, FeatureLine};
+use terrain::Role;
 
 /// The lines of an area by load module, row and column.
 #[derive(Default)]
@@ -43,7 +44,7 @@ impl Lines {
     /// Those of an area that lie in a load module of its frame.
     pub fn of(level: &AreaLevel, frame: &AreaFrame) -> Self {
         let mut lines = Self::default();
-        for line in level.lines.iter().filter(|line| matches!(line.role, LineRole::Centre | LineRole::Channel)) {
+        for line in level.lines.iter().filter(|line| matches!(line.role, Role::Centre | Role::Channel)) {
             for ends in line.vertices.windows(2) {
                 lines.add(line, [ends[0], ends[1]], frame);
             }

@@ -2,7 +2,7 @@
 
 use std::f64::consts::FRAC_1_SQRT_2;
 
-use store::LineRole;
+use terrain::Role;
 use terrain::{Dem, HOLE_CLASS, LoadModule, ModuleGrid, Post, QUANTA_PER_METRE, Spacing, Tin, metres_of_quanta};
 
 use super::map_extent::slope;
@@ -256,7 +256,7 @@ fn lines_of(scene: &Scene, features: &SceneFeatures, [west, south, east, north]:
     let origin = [scene.frame.origin_east_m, scene.frame.origin_north_m];
     let is_inside = |[x, y, _]: &[f64; 3]| west <= *x && *x <= east && south <= *y && *y <= north;
     let mut all = Vec::new();
-    for line in features.lines.iter().filter(|line| matches!(line.role, LineRole::Centre | LineRole::Channel)) {
+    for line in features.lines.iter().filter(|line| matches!(line.role, Role::Centre | Role::Channel)) {
         let Some(number) = features.color_of(line.class) else { continue };
         for pair in line.vertices.windows(2) {
             let ends = [pair[0], pair[1]].map(|[x, y, z]| [x - origin[0], y - origin[1], z]);

@@ -67,10 +67,11 @@ mod tests {
     use super::super::scene::{SceneFeatures, SceneLimits};
     use super::*;
     use crate::samples;
-    use store::{FeatureLine, FeatureRemark, LineRole};
+    use store::{FeatureLine, FeatureRemark};
+    use terrain::Role;
     use terrain::{LineForm, LineKind, LineStorey, LineTraits, ModuleLine, ModuleVertex};
 
-    fn line(role: LineRole, vertices: Vec<[f64; 3]>) -> FeatureLine {
+    fn line(role: Role, vertices: Vec<[f64; 3]>) -> FeatureLine {
         FeatureLine {
             feature: "way 1".into(),
             class: 1,
@@ -87,7 +88,7 @@ mod tests {
     fn a_road_is_drawn_in_the_colour_of_its_class_and_what_was_left_out_is_marked() {
         let names = ["plain", "primary"].map(str::to_owned);
         // The scene is 1500 x 1000 m.
-        let lines = [line(LineRole::Centre, vec![[0.0, 250.0, 0.0], [1500.0, 250.0, 0.0]])];
+        let lines = [line(Role::Centre, vec![[0.0, 250.0, 0.0], [1500.0, 250.0, 0.0]])];
         let remark = |at_m, leaves_out| FeatureRemark {
             feature: "way 2".into(),
             at_m,

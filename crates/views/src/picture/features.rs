@@ -1,6 +1,6 @@
 //! Roads and water on a map: their lines in the colours of their classes.
 
-use store::LineRole;
+use terrain::Role;
 use terrain::{ModuleVertex, QUANTA_PER_METRE};
 
 use super::color::{Color, FEATURES};
@@ -17,12 +17,12 @@ pub(crate) fn shows(scene: &Scene, facets: &Facets, cover: Cover) -> bool {
 }
 
 /// Pixels that a line of a role is thick; `None` where it is not drawn.
-fn thickness(role: LineRole) -> Option<f64> {
+fn thickness(role: Role) -> Option<f64> {
     match role {
-        LineRole::Centre | LineRole::Channel => Some(1.6),
-        LineRole::Side | LineRole::Bank | LineRole::Shore => Some(0.9),
-        LineRole::Breakline => Some(0.7),
-        LineRole::Toe => None,
+        Role::Centre | Role::Channel => Some(1.6),
+        Role::Side | Role::Bank | Role::Shore => Some(0.9),
+        Role::Breakline => Some(0.7),
+        Role::Toe => None,
     }
 }
 

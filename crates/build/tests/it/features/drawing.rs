@@ -5,7 +5,8 @@ use std::fs;
 
 use features::Kind;
 use load_module_reader::{Area, Block, Keep, LoadedGround, Module, SlmFile};
-use store::{AreaLevel, Folder, LineRole};
+use store::{AreaLevel, Folder};
+use terrain::Role;
 use terrain::{Dem, LatticePoint, TileFeatures, TileId, Tin, quanta_of_metres};
 
 use crate::scene::{EPSG, ORIGIN_M, SIDE_CELLS, Scene, Words};
@@ -154,7 +155,7 @@ impl Laid {
     }
 
     /// Lines of a role, of the classes of a kind.
-    pub fn lines(&self, kind: Kind, role: LineRole) -> Vec<&Vec<[f64; 3]>> {
+    pub fn lines(&self, kind: Kind, role: Role) -> Vec<&Vec<[f64; 3]>> {
         let of = |line: &&store::FeatureLine| line.role == role && self.classes[usize::from(line.class)] == kind.name();
         self.level.lines.iter().filter(of).map(|line| &line.vertices).collect()
     }
@@ -171,7 +172,7 @@ impl Laid {
             assert_eq!(missing(features, tin), 0, "edges of features that tile {} has not", features.tile);
         }
         // What is travelled keeps its height where it crosses a shore.
-        let travelled = self.level.lines.iter().filter(|line| matches!(line.role, LineRole::Centre | LineRole::Side));
+        let travelled = self.level.lines.iter().filter(|line| matches!(line.role, Role::Centre | Role::Side));
         let travelled: BTreeSet<[u64; 2]> =
             travelled.flat_map(|line| &line.vertices).map(|at| [at[0].to_bits(), at[1].to_bits()]).collect();
         for line in &self.level.lines {
@@ -180,11 +181,11 @@ impl Laid {
                 let [run, rise] =
                     [(ends[1][0] - ends[0][0]).hypot(ends[1][1] - ends[0][1]), (ends[1][2] - ends[0][2]).abs()];
                 let greatest = f64::from(line.grade_most_ppm) / 1e6;
-                if line.role == LineRole::Centre && 0.0 < greatest && !self.was_told("grade") {
+                if line.role == Role::Centre && 0.0 < greatest && !self.was_told("grade") {
                     assert!(rise <= greatest * run + 1.0 / 64.0, "{name}: {rise} m on {run} m");
                 }
                 let is_crossed = ends.iter().any(|at| travelled.contains(&[at[0].to_bits(), at[1].to_bits()]));
-                if line.role == LineRole::Shore && !is_crossed {
+                if line.role == Role::Shore && !is_crossed {
                     assert_eq!(rise, 0.0, "a lake is level");
                 }
             }

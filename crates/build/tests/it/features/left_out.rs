@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use features::Kind;
 use job::Job;
-use store::LineRole;
+use terrain::Role;
 use terrain::{LoadModule, TileId};
 
 use super::drawing::{Drawing, Laid, line, polygon};
@@ -46,7 +46,7 @@ fn places(drawing: &Drawing, level: usize) -> BTreeSet<[i64; 2]> {
 
 /// Vertices of the centrelines and outlines of a kind, likewise; those on the lines between load modules not counted,
 /// which a full border keeps.
-fn inside(laid: &Laid, kind: Kind, roles: &[LineRole]) -> BTreeSet<[i64; 2]> {
+fn inside(laid: &Laid, kind: Kind, roles: &[Role]) -> BTreeSet<[i64; 2]> {
     let quanta = |metres: f64| (metres * 128.0).round() as i64;
     let side = i64::from(SIDE_CELLS) * 25 * 128;
     let lines = roles.iter().flat_map(|role| laid.lines(kind, *role)).flatten();
@@ -56,7 +56,7 @@ fn inside(laid: &Laid, kind: Kind, roles: &[LineRole]) -> BTreeSet<[i64; 2]> {
     all.filter(|at| at.iter().all(is_inside)).collect()
 }
 
-const ROAD: [LineRole; 2] = [LineRole::Centre, LineRole::Side];
+const ROAD: [Role; 2] = [Role::Centre, Role::Side];
 
 #[test]
 fn a_level_does_without_the_classes_that_it_leaves_out_and_keeps_all_others() {
@@ -69,7 +69,7 @@ fn a_level_does_without_the_classes_that_it_leaves_out_and_keeps_all_others() {
         // It verifies what was built: no crack at any level, and fingerprints by what is left out.
         let laid = drawing.built();
         let (primary, track) = (inside(&laid, Kind::Primary, &ROAD), inside(&laid, Kind::Track, &ROAD));
-        let lake = inside(&laid, Kind::Lake, &[LineRole::Shore]);
+        let lake = inside(&laid, Kind::Lake, &[Role::Shore]);
         let own: BTreeSet<[i64; 2]> = track.difference(&primary).copied().collect();
         assert!(!primary.is_empty() && 5 < own.len() && 2 < lake.len());
         let share = |level: usize, of: &BTreeSet<[i64; 2]>| {

@@ -1,7 +1,8 @@
 //! Roads, junctions, bridges and tunnels.
 
 use features::Kind;
-use store::{Folder, LineRole};
+use store::Folder;
+use terrain::Role;
 
 use super::drawing::{At, Drawing, Drawn, Laid, SIDE_M, line};
 use crate::scene::Words;
@@ -17,7 +18,7 @@ fn a_road_across_a_side_slope_of_thirty_percent_is_level_across() {
     let laid =
         Drawing::new(|_, north| 500.0 + 0.3 * north, &[line("highway=primary", &[(0.0, 900.0), (SIDE_M, 910.0)])])
             .built();
-    assert!(!laid.lines(Kind::Primary, LineRole::Side).is_empty(), "the slope asks for a strip");
+    assert!(!laid.lines(Kind::Primary, Role::Side).is_empty(), "the slope asks for a strip");
     for place in [130.0, 777.0, 1410.0] {
         let at = (place, 900.0 + place / 200.0);
         assert!(fall_across(&laid, at, (0.0, 3.0)) < 0.05, "{}", fall_across(&laid, at, (0.0, 3.0)));

@@ -1,7 +1,8 @@
 //! Rivers and lakes.
 
 use features::Kind;
-use store::{FeatureRemark, LineRole};
+use store::FeatureRemark;
+use terrain::Role;
 
 use super::drawing::{At, Drawing, Laid, SIDE_M, line, polygon};
 use crate::given::write_pins;
@@ -14,7 +15,7 @@ fn noisy(east: f64, north: f64) -> f64 {
 
 #[track_caller]
 fn never_rises(laid: &Laid, kind: Kind) {
-    let lines = laid.lines(kind, LineRole::Channel);
+    let lines = laid.lines(kind, Role::Channel);
     assert!(!lines.is_empty());
     for line in lines {
         let heights: Vec<f64> = line.iter().map(|vertex| vertex[2]).collect();
@@ -66,7 +67,7 @@ fn streams_that_end_at_one_place_both_fall_to_it() {
         line("waterway=stream", &[(1900.0, 850.0), (1000.0, 820.0)]),
     ];
     let laid = Drawing::new(basin, &drawn).built();
-    assert_eq!(laid.lines(Kind::Stream, LineRole::Channel).len(), 2, "no line runs through the place they end at");
+    assert_eq!(laid.lines(Kind::Stream, Role::Channel).len(), 2, "no line runs through the place they end at");
     never_rises(&laid, Kind::Stream);
 }
 

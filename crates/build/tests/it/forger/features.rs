@@ -4,9 +4,10 @@ use std::collections::BTreeSet;
 use std::fs;
 
 use store::{
-    AreaLevel, FeatureLine, FileStamp, Folder, LineRole, Manifest, Profile, Stamp, decode_lines, encode_level,
-    encode_lines, encode_profile, files,
+    AreaLevel, FeatureLine, FileStamp, Folder, Manifest, Profile, Stamp, decode_lines, encode_level, encode_lines,
+    encode_profile, files,
 };
+use terrain::Role;
 use terrain::{LatticePoint, QUANTA_PER_METRE, SurfaceGround, TileFeatures, TileId, Vertex};
 
 use super::{Alter, Forged, forged, nothing};
@@ -131,7 +132,7 @@ impl Forged {
     }
 
     /// A vertex in the middle of a line of a role, inside a load module and on no other line, after the one before it.
-    fn middle(&mut self, role: LineRole) -> [Vertex; 2] {
+    fn middle(&mut self, role: Role) -> [Vertex; 2] {
         let (steps, _) = self.steps();
         let lines = self.level().lines.clone();
         let uses = |at: LatticePoint| {
@@ -196,30 +197,30 @@ fn check(table: &[(&str, Alter, Alter, &str)]) {
 }
 
 fn raise_vertex(forged: &mut Forged) {
-    let [_, vertex] = forged.middle(LineRole::Centre);
+    let [_, vertex] = forged.middle(Role::Centre);
     forged.lift_ground(vertex.at, 64);
 }
 
 /// Lifts a vertex of a channel above the one before it.
 fn raise_river(forged: &mut Forged, lift: fn(&mut Forged, LatticePoint, i32)) {
-    let [before, vertex] = forged.middle(LineRole::Channel);
+    let [before, vertex] = forged.middle(Role::Channel);
     lift(forged, vertex.at, before.height - vertex.height + 128);
 }
 
 /// Turns a channel round, so that all of it rises.
 fn turn_river(forged: &mut Forged) {
-    let channel = forged.level().lines.iter_mut().find(|line| line.role == LineRole::Channel).unwrap();
+    let channel = forged.level().lines.iter_mut().find(|line| line.role == Role::Channel).unwrap();
     channel.vertices.reverse();
 }
 
 fn tilt_lake(forged: &mut Forged, lift: fn(&mut Forged, LatticePoint, i32)) {
-    let [_, vertex] = forged.middle(LineRole::Shore);
+    let [_, vertex] = forged.middle(Role::Shore);
     lift(forged, vertex.at, 128);
 }
 
 /// Lifts what lies in a lake and is no vertex of its shore.
 fn raise_lake_inside(forged: &mut Forged) {
-    let ([shore, _], (steps, quanta)) = (forged.middle(LineRole::Shore), forged.steps());
+    let ([shore, _], (steps, quanta)) = (forged.middle(Role::Shore), forged.steps());
     let lake = forged.job_class("lake");
     let kept: BTreeSet<LatticePoint> =
         forged.of_features().lines.iter().flat_map(|(_, lines)| &lines.kept.vertices).map(|vertex| vertex.at).collect();
