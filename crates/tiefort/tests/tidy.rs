@@ -73,7 +73,7 @@ const OWNED_WORDS: [(&str, &[&str]); 10] = [
 ];
 
 /// Where functions are tables of cases, longer than code may be: a row for every message of the job reader.
-const LONG_TABLES: &str = "crates/job/tests/errors";
+const LONG_TABLES: &str = "crates/job/tests/it/errors";
 
 /// Folders that are not ours to check: built, fetched, or made by a run.
 const SKIPPED_FOLDERS: [&str; 6] = ["target", ".git", "scratch", "__pycache__", "node_modules", "dist"];

@@ -1,9 +1,6 @@
 //! What of a network is in the ground where not all of it has room: whole stretches that hang together, by a judge that
 //! sees nothing but the edges that are formed.
 
-// A test that unwraps says by its line what failed.
-#![allow(clippy::unwrap_used)]
-
 use std::collections::{BTreeMap, BTreeSet};
 
 use features::*;

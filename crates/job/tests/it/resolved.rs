@@ -1,8 +1,5 @@
 //! What a job becomes: defaults, units, the canonical text, and the job files of the project.
 
-// A test that unwraps says where it failed, which is all a test has to say.
-#![allow(clippy::unwrap_used)]
-
 use std::path::{Path, PathBuf};
 
 use job::{

@@ -1,8 +1,5 @@
 //! The canonical text of a job, byte for byte: databases hold it, and a build compares it with theirs.
 
-// A test that unwraps says where it failed, which is all a test has to say.
-#![allow(clippy::unwrap_used)]
-
 use std::path::Path;
 
 use job::Job;

@@ -1,8 +1,5 @@
 //! The reference of `report.json` in `docs/reference/report-keys.md`, made from the definition of the report itself.
 
-// A test that unwraps says where it failed, which is all a test has to say.
-#![allow(clippy::unwrap_used)]
-
 use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -14,7 +11,7 @@ use syn::{Attribute, Expr, ExprLit, Fields, GenericArgument, Item, Lit, Meta, Pa
 const HEAD: &str = "\
 # Keys of report.json
 
-<!-- Made from crates/store/src/report.rs: UPDATE_GOLDEN=1 cargo test -p store --test reference -->
+<!-- Made from crates/store/src/report.rs: UPDATE_GOLDEN=1 cargo test -p store --test it reference -->
 
 `report.json` is what a build found; `tiefort report DATABASE --format json` prints it.
 Lengths are in metres, times in seconds.
@@ -202,7 +199,7 @@ fn the_reference_of_the_report_is_current() {
         std::fs::write(&page, &text).unwrap();
     }
     let found = std::fs::read_to_string(&page).unwrap();
-    assert!(found == text, "UPDATE_GOLDEN=1 cargo test -p store --test reference writes {} again", page.display());
+    assert!(found == text, "UPDATE_GOLDEN=1 cargo test -p store --test it reference writes {} again", page.display());
 }
 
 #[test]

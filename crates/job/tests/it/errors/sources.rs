@@ -1,6 +1,6 @@
 //! What a job says of its sources.
 
-use crate::{check, check_part};
+use super::{check, check_part};
 
 #[test]
 fn what_a_job_says_about_a_source_is_checked() {

@@ -1,8 +1,5 @@
 //! What a job reads from the disk: itself, the files it names, and those its patterns find.
 
-// A test that unwraps says where it failed, which is all a test has to say.
-#![allow(clippy::unwrap_used)]
-
 use std::fs;
 use std::path::Path;
 

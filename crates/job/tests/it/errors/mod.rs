@@ -1,8 +1,5 @@
 //! Every way a job can be wrong, one by one, with the paragraph that is told.
 
-// A test that unwraps says where it failed, which is all a test has to say.
-#![allow(clippy::unwrap_used)]
-
 mod features;
 mod numbers;
 mod sources;

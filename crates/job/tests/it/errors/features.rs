@@ -1,6 +1,6 @@
 //! `[features]`: every value that cannot be, and what it does not go with.
 
-use crate::{check, check_part};
+use super::{check, check_part};
 
 /// What is told of a sound job with these keys in `[features]`.
 #[track_caller]
@@ -159,7 +159,7 @@ fn clipped_edges_beside_features_are_refused_with_a_method_that_could_clip() {
         [tin]\nmethod = \"greedy\"\npoints = 9\n";
     let error = job::Job::from_text(text, std::path::Path::new("a.toml")).unwrap_err();
     assert_eq!(
-        crate::told(&error),
+        super::told(&error),
         "a.toml:12: load_modules.edges: found \"clip\" beside [features], expected \"constrained\", since clipping \
          would cut the edges of features hint: remove edges, or leave [features] out"
     );

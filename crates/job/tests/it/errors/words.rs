@@ -1,6 +1,6 @@
 //! Keys and words that no job has, that are missing, or of the wrong kind.
 
-use crate::{check, check_part};
+use super::{check, check_part};
 
 #[test]
 fn text_that_is_not_toml_is_told_with_line_and_column() {

@@ -1,8 +1,5 @@
 //! `[features]` of a sound job: what is read, what is written again, and which files are found.
 
-// A test that unwraps says where it failed, which is all a test has to say.
-#![allow(clippy::unwrap_used)]
-
 use std::fs;
 use std::path::Path;
 

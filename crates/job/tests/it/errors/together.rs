@@ -1,6 +1,6 @@
 //! Keys that do not go together, and sections with rules of their own.
 
-use crate::check;
+use super::check;
 
 #[test]
 fn keys_that_do_not_go_together_are_told_apart() {

@@ -1,6 +1,6 @@
 //! Names and numbers outside what is possible.
 
-use crate::{check, told_of};
+use super::{check, told_of};
 
 #[test]
 fn a_title_is_a_line_of_text() {

@@ -1,7 +1,5 @@
 //! `docs/FORMAT.md` and the reader written from it alone agree with what the encoder writes.
 
-#![allow(clippy::unwrap_used)]
-
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};

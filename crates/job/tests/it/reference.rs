@@ -1,8 +1,5 @@
 //! The reference of job files in `docs/reference/job-keys.md`, made from what the reader itself knows.
 
-// A test that unwraps says where it failed, which is all a test has to say.
-#![allow(clippy::unwrap_used)]
-
 use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::path::Path;
@@ -12,7 +9,7 @@ use job::{Choice, Effort, Key, KeyTable, MethodName, Usual, Values, key_tables};
 const HEAD: &str = "\
 # Keys of a job file
 
-<!-- Made from crates/job/src/sections.rs and choice.rs: UPDATE_GOLDEN=1 cargo test -p job --test reference -->
+<!-- Made from crates/job/src/sections.rs and choice.rs: UPDATE_GOLDEN=1 cargo test -p job --test it reference -->
 
 A job is a TOML file; `tiefort init` writes one for the rasters you have, and `tiefort plan JOB.toml` lists every \
 setting of it with its value and meaning.
@@ -89,7 +86,7 @@ fn the_reference_of_job_files_is_current() {
         std::fs::write(&page, &text).unwrap();
     }
     let found = std::fs::read_to_string(&page).unwrap();
-    assert!(found == text, "UPDATE_GOLDEN=1 cargo test -p job --test reference writes {} again", page.display());
+    assert!(found == text, "UPDATE_GOLDEN=1 cargo test -p job --test it reference writes {} again", page.display());
 }
 
 /// RMS residuals of the rows of the book's table of the whole desert, by the words that a row begins with.

@@ -1,8 +1,5 @@
 //! All stages together, through the public functions only, over a ground that is a function of the place.
 
-// A test that unwraps says by its line what failed.
-#![allow(clippy::unwrap_used)]
-
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use features::*;
