@@ -23,7 +23,7 @@
 
 // From tags to what a feature is.
 mod source;
-pub use source::{FeatureId, Member, Numbering, Position, Shape, Source};
+pub use source::{FeatureId, Numbering, Position, Shape, Source};
 mod remark;
 pub use remark::{Flaw, Remark, Remedy};
 pub mod table;

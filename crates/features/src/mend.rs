@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use crate::clean::{Cleaned, Notes, clean, leave_out_spikes, leave_out_spikes_of_ring};
 use crate::clip::Extent;
 use crate::crowd::leave_out_crowds;
-use crate::rings::{assemble, close, doubled_area};
+use crate::rings::{close, doubled_area};
 use crate::ways::{Area, Way};
 use crate::{Feature, FeatureLattice, Flaw, Form, Place, Position, Remark, Remedy, Shape, Site, gaps};
 
@@ -104,24 +104,13 @@ fn area_of(feature: &Feature, shape: &Shape, extent: Extent, notes: &mut Notes) 
             });
             closed.collect()
         }
-        Shape::Members(members) => {
-            let mut walks = Vec::new();
-            for inner in [false, true] {
-                let lines = members.iter().filter(|member| member.inner == inner);
-                let lines: Vec<Vec<Place>> =
-                    lines.map(|member| clean(&member.positions, notes).places).filter(|line| 2 <= line.len()).collect();
-                walks.extend(assemble(lines, notes).into_iter().map(|ring| (ring, inner)));
-            }
-            walks
-        }
     };
     let first = walks.first().and_then(|(walk, _)| walk.first().copied());
     for (walk, _) in &mut walks {
         leave_out_spikes_of_ring(walk, notes);
     }
     if !walks.iter().any(|(walk, hole)| !hole && 3 <= walk.len()) {
-        let flaw = if matches!(shape, Shape::Members(_)) { Flaw::NoOuterRing } else { Flaw::ZeroArea };
-        notes.write_of(first, flaw, Remedy::LeftOut);
+        notes.write_of(first, Flaw::ZeroArea, Remedy::LeftOut);
         return None;
     }
     for (walk, _) in &mut walks {

@@ -50,8 +50,6 @@ pub enum Flaw {
     UnclosedRing,
     /// A hole outside every outer ring.
     HoleOutside,
-    /// A relation without an outer ring.
-    NoOuterRing,
     /// A line where a polygon is needed, or the other way round.
     WrongShape,
     /// More stations in a load module than can be worked on.
@@ -194,7 +192,6 @@ impl Flaw {
             Flaw::BowTie => "a ring crosses itself",
             Flaw::UnclosedRing => "a ring is not closed",
             Flaw::HoleOutside => "a hole lies outside every outer ring",
-            Flaw::NoOuterRing => "it has no outer ring",
             Flaw::WrongShape => "its shape does not suit its kind",
             Flaw::Crowded => "its load module holds more than can be worked on",
             Flaw::PinsDisagree => "two pinned heights disagree at one place",

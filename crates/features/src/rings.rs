@@ -1,4 +1,4 @@
-//! Rings: put together from member ways, closed, and split into simple ones.
+//! Rings: closed, and split into simple ones.
 
 use std::collections::HashMap;
 
@@ -36,32 +36,6 @@ pub fn encloses(ring: &[Place], place: Place) -> bool {
         }
     }
     inside
-}
-
-/// Joins open lines at equal ends to closed rings; what stays open is closed if little is missing, else left out.
-pub fn assemble(lines: Vec<Vec<Place>>, notes: &mut Notes) -> Vec<Vec<Place>> {
-    let (mut rings, mut open): (Vec<_>, Vec<_>) = lines.into_iter().partition(|line| line.first() == line.last());
-    // Which way is taken first decides nothing but where a ring begins, and how a knot of ways is untied.
-    open.iter_mut().for_each(|line| {
-        if line.last() < line.first() {
-            line.reverse();
-        }
-    });
-    open.sort();
-    while let Some(mut ring) = open.pop() {
-        while ring.first() != ring.last() {
-            let end = ring.last().copied();
-            let next = open.iter().position(|line| line.first().copied() == end || line.last().copied() == end);
-            let Some(next) = next else { break };
-            let mut line = open.remove(next);
-            if line.first().copied() != end {
-                line.reverse();
-            }
-            ring.extend_from_slice(&line[1..]);
-        }
-        rings.push(ring);
-    }
-    rings.into_iter().filter_map(|ring| close(ring, notes)).collect()
 }
 
 /// A ring without its repeated end; one that is open is closed by a straight line if that is short enough.
@@ -210,24 +184,11 @@ mod tests {
     }
 
     #[test]
-    fn member_ways_are_joined_in_any_order_and_direction() {
-        let lines = vec![
-            places(&[(9, 9), (9, 0)]),
-            places(&[(0, 9), (0, 0)]),
-            places(&[(9, 9), (4, 9), (0, 9)]),
-            places(&[(9, 0), (0, 0)]),
-        ];
-        let (rings, flaws) = noted(|notes| assemble(lines, notes));
-        assert_eq!((rings.len(), rings[0].len(), flaws.len()), (1, 5, 0));
-        assert_eq!(doubled_area(&rings[0]).abs(), 162);
-    }
-
-    #[test]
     fn a_ring_that_lacks_a_little_is_closed_and_one_that_lacks_much_is_left_out() {
-        let (rings, flaws) = noted(|notes| assemble(vec![square(0, 9)], notes));
-        assert_eq!((rings.len(), flaws), (1, vec![Flaw::UnclosedRing]));
-        let (rings, flaws) = noted(|notes| assemble(vec![places(&[(0, 0), (0, 9)])], notes));
-        assert_eq!((rings.len(), flaws), (0, vec![Flaw::UnclosedRing]));
+        let (ring, flaws) = noted(|notes| close(square(0, 9), notes));
+        assert_eq!((ring, flaws), (Some(square(0, 9)), vec![Flaw::UnclosedRing]));
+        let (ring, flaws) = noted(|notes| close(places(&[(0, 0), (0, 9)]), notes));
+        assert_eq!((ring, flaws), (None, vec![Flaw::UnclosedRing]));
     }
 
     #[test]

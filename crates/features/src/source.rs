@@ -53,15 +53,6 @@ impl Position {
     }
 }
 
-/// A way of a multipolygon relation.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Member {
-    /// Whether its role is `inner`.
-    pub inner: bool,
-    /// Its positions, in the direction of the way.
-    pub positions: Vec<Position>,
-}
-
 /// The shape of a feature as read.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Shape {
@@ -69,8 +60,6 @@ pub enum Shape {
     Line(Vec<Position>),
     /// Rings, the outer one first; the last position may repeat the first.
     Polygon(Vec<Vec<Position>>),
-    /// The member ways of a multipolygon relation, in any order and direction.
-    Members(Vec<Member>),
 }
 
 impl Shape {
@@ -79,7 +68,6 @@ impl Shape {
         match self {
             Shape::Line(positions) => positions.first().copied(),
             Shape::Polygon(rings) => rings.iter().flatten().next().copied(),
-            Shape::Members(members) => members.iter().flat_map(|member| &member.positions).next().copied(),
         }
     }
 }
