@@ -436,7 +436,7 @@ fn lines(run: &Run, read: &ReadFeatures, (formed, works): (&Formed, &Earthworks)
             lines.push(FeatureLine {
                 feature: read.vectors.name(id).to_owned(),
                 class: classes[usize::from(class)],
-                role: role,
+                role,
                 width_m: of.map_or(0.0, |of| terrain::metres_of_quanta(of.width)),
                 grade_max_ppm: of.map_or(0, |of| of.grade_ppm),
                 grade_most_ppm: of.map_or(0, |of| of.grade_most_ppm()),

@@ -10,9 +10,12 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;
 
+/// Rooms of a crate, each with the others that it may import.
+type Rooms = &'static [(&'static str, &'static [&'static str])];
+
 /// Folders of a crate that keep to themselves, and which of the crate's others each may import; the crate's own name is
 /// that of the files beside its root. Stages name no other stage, and what lies below knows nothing of what lies above.
-const ROOMS: [(&str, &[(&str, &[&str])]); 4] = [
+const ROOMS: [(&str, Rooms); 4] = [
     (
         "terrain",
         &[
