@@ -169,20 +169,13 @@ pub(crate) fn uncut(
 
 #[cfg(test)]
 mod tests {
-    use terrain::in_turn;
-
     use super::*;
-    use crate::area::{Levelled, Sounded};
-    use crate::samples::{check, ground_at, site, way};
-    use crate::{AreaFeatures, FallOptions, GradeOptions, Shares, Source};
+    use crate::area::Levelled;
+    use crate::samples::{self, way};
+    use crate::{Shares, Source};
 
     fn levelled(sources: Vec<Source>, metres: impl Fn(f64, f64) -> f64) -> Levelled {
-        let all = AreaFeatures::of(sources, &[], 1.5, site(), &in_turn);
-        let ground: Vec<Option<i32>> = all.stations().iter().map(|place| ground_at(*place, &metres)).collect();
-        let sounded = Sounded { heights: &ground, middles: &ground, inside: &[] };
-        let levelled = all.level(sounded, (GradeOptions::USUAL, FallOptions::USUAL), &Shares::each([20, 20], 1000));
-        check(&levelled.reserved.formed);
-        levelled
+        samples::levelled(sources, metres, &Shares::each([20, 20], 1000))
     }
 
     /// A road with a bridge between two posts east.

@@ -347,20 +347,10 @@ mod tests {
     use crate::Role;
     use terrain::in_turn;
 
-    use crate::samples::{check, ground_at, site, way};
+    use crate::samples::{self, ground_at, level_usual, site, way};
 
     fn levelled(sources: Vec<Source>, metres: impl Fn(f64, f64) -> f64) -> Levelled {
-        let all = AreaFeatures::of(sources, &[], 1.5, site(), &in_turn);
-        let ground: Vec<Option<i32>> = all.stations().iter().map(|place| ground_at(*place, &metres)).collect();
-        let levelled = level_usual(&all, &ground, &Shares::each([8, 8], 1000));
-        check(&levelled.reserved.formed);
-        levelled
-    }
-
-    fn level_usual(all: &AreaFeatures, ground: &[Option<i32>], shares: &Shares) -> Levelled {
-        let inside = vec![Vec::new(); all.outlines().len()];
-        let sounded = Sounded { heights: ground, middles: ground, inside: &inside };
-        all.level(sounded, (GradeOptions::USUAL, FallOptions::USUAL), shares)
+        samples::levelled(sources, metres, &Shares::each([8, 8], 1000))
     }
 
     fn lake() -> Source {

@@ -106,7 +106,7 @@ mod strand;
 pub use strand::{Graded, Role, Strand};
 mod room;
 mod toes;
-pub use toes::{CUT_RUN, FILL_RUN, reach_max};
+pub use toes::{CUT_RUN, FILL_RUN};
 mod forms;
 pub use forms::{Formed, FormedEdge, Surface, form};
 mod middles;

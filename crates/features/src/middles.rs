@@ -280,12 +280,7 @@ mod tests {
                 way(number, "highway=track", &[(5.0, north), (45.0, north)])
             })
             .collect();
-        let all = crate::AreaFeatures::of(sources, &[], 1.5, site(), &terrain::in_turn);
-        let ground: Vec<Option<i32>> = all.stations().iter().map(|_| Some(0)).collect();
-        let inside = vec![Vec::new(); all.outlines().len()];
-        let sounded = crate::Sounded { heights: &ground, middles: &ground, inside: &inside };
-        let options = (crate::GradeOptions::USUAL, crate::FallOptions::USUAL);
-        let levelled = all.level(sounded, options, &crate::Shares::each([8, 8], 40));
+        let levelled = crate::samples::levelled(sources, |_, _| 0.0, &crate::Shares::each([8, 8], 40));
         let middles = &levelled.reserved.formed.middles;
         let (kept, out): (Vec<&Middle>, Vec<&Middle>) = middles.iter().partition(|middle| middle.traits.is_kept);
         assert!(!kept.is_empty() && !out.is_empty());

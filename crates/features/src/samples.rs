@@ -4,8 +4,9 @@ use terrain::{Post, PostRect, Spacing, in_turn};
 
 use crate::exact::Segment;
 use crate::{
-    FeatureId, Form, Formed, FormedEdge, GradeOptions, Graded, Grants, Network, Numbering, Place, Position, Remark,
-    Role, Rounded, Shape, Site, Source, Strand, Way, form, grade, mend, round, sides, sort_out, touch_at_vertices_only,
+    AreaFeatures, FallOptions, FeatureId, Form, Formed, FormedEdge, GradeOptions, Graded, Grants, Levelled, Network,
+    Numbering, Place, Position, Remark, Role, Rounded, Shape, Shares, Site, Sounded, Source, Strand, Way, form, grade,
+    mend, round, sides, sort_out, touch_at_vertices_only,
 };
 
 /// An area of 400 x 400 posts of 10 m, load modules of 50 posts, tiles of 200.
@@ -40,6 +41,23 @@ pub fn network(sources: Vec<Source>, metres: impl Fn(f64, f64) -> f64) -> (Netwo
 pub fn ground_at(place: Place, metres: &impl Fn(f64, f64) -> f64) -> Option<i32> {
     let [east, north] = site().lattice.posts_of(place);
     terrain::quanta_of_metres(metres(east, north))
+}
+
+/// All that features come to with the usual options; edges are checked to touch at points only.
+#[track_caller]
+pub fn levelled(sources: Vec<Source>, metres: impl Fn(f64, f64) -> f64, shares: &Shares) -> Levelled {
+    let all = AreaFeatures::of(sources, &[], 1.5, site(), &in_turn);
+    let ground: Vec<Option<i32>> = all.stations().iter().map(|place| ground_at(*place, &metres)).collect();
+    let levelled = level_usual(&all, &ground, shares);
+    check(&levelled.reserved.formed);
+    levelled
+}
+
+/// The same over the ground at each station, with no post inside any outline.
+pub fn level_usual(all: &AreaFeatures, ground: &[Option<i32>], shares: &Shares) -> Levelled {
+    let inside = vec![Vec::new(); all.outlines().len()];
+    let sounded = Sounded { heights: ground, middles: ground, inside: &inside };
+    all.level(sounded, (GradeOptions::USUAL, FallOptions::USUAL), shares)
 }
 
 /// Roads formed over a ground, and channels that lie on it; all edges are checked to touch at points only.

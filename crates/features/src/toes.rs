@@ -1,9 +1,9 @@
 //! Benches: where the slopes beside a strip meet the ground, cut 1.5 : 1 and filled 2 : 1.
 
+use crate::Place;
 use crate::pieces::{Piece, moved, sides};
 use crate::strand::{Graded, Role, Strand};
 use crate::strips::{Face, Room, Wide};
-use crate::{Network, Place};
 
 /// Run over rise of a cut.
 pub const CUT_RUN: f64 = 1.5;
@@ -81,14 +81,4 @@ fn sides_from(places: [Place; 2], ground: [i32; 2], corner: Place) -> [f64; 2] {
     let first = places[0].squared_to(corner) <= places[1].squared_to(corner);
     let [near, far] = if first { ground } else { [ground[1], ground[0]] };
     [f64::from(near), f64::from(far)]
-}
-
-/// How far a network's benches reach at most from their centrelines, in quanta.
-pub fn reach_max(network: &Network) -> i32 {
-    network
-        .ways
-        .iter()
-        .map(|way| way.traits.width / 2 + (WIDTHS_MAX * f64::from(way.traits.width)) as i32)
-        .max()
-        .unwrap_or(0)
 }

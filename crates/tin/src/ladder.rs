@@ -27,15 +27,15 @@ pub fn ladder_bin(gain: f64) -> i32 {
     octave * RUNGS as i32 + RUNG.partition_point(|&rung| rung <= mantissa) as i32 - 1
 }
 
-/// The smallest gain on a rung.
-pub fn gain_at_bin(bin: i32) -> f64 {
-    let (octave, rung) = (bin.div_euclid(RUNGS as i32), bin.rem_euclid(RUNGS as i32));
-    RUNG[rung as usize] * f64::from_bits(((octave + 1023) as u64) << 52)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The smallest gain on a rung.
+    fn gain_at_bin(bin: i32) -> f64 {
+        let (octave, rung) = (bin.div_euclid(RUNGS as i32), bin.rem_euclid(RUNGS as i32));
+        RUNG[rung as usize] * f64::from_bits(((octave + 1023) as u64) << 52)
+    }
 
     #[test]
     fn every_rung_begins_at_its_smallest_gain() {

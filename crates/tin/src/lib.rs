@@ -31,13 +31,12 @@ mod prefix;
 pub use prefix::prefix;
 mod survey;
 pub use survey::{CostUnit, SurveyTask, survey};
-mod ladder;
-pub use ladder::{gain_at_bin, ladder_bin};
 
 mod batch;
 mod criterion;
 mod gate;
 mod growth;
+mod ladder;
 mod proximity;
 mod queue;
 mod sequence;
