@@ -7,11 +7,11 @@ use fidelity::{Curvature, Residuals, Tally};
 use job::{Choice, HOLE_CLASS_NAME};
 use store::{
     Report, ReportBefore, ReportBorder, ReportBreach, ReportClass, ReportEnough, ReportHeights, ReportLevel,
-    ReportLimit, ReportPart, ReportPerModule, ReportPerWindow, ReportPoints, ReportPool, ReportRefusals,
+    ReportLimit, ReportPart, ReportPerModule, ReportPerWindow, ReportPlace, ReportPoints, ReportPool, ReportRefusals,
     ReportResidual, ReportStops, ReportVoids, Totals,
 };
 use terrain::limits::Windows;
-use terrain::{Breach, BreachKind, BreachPlace, ModuleId, ModuleResidual, RefusedBy, StopReason, metres_of_quanta};
+use terrain::{ModuleId, ModuleResidual, RefusedBy, StopReason, metres_of_quanta};
 
 use crate::CompileError;
 use crate::assembled::{Assembled, ModuleNumbers};
@@ -82,7 +82,7 @@ impl Findings<'_> {
                 count: (run.ground.voids.filled + run.ground.voids.left) as u64,
                 filled: run.ground.voids.filled as u64,
             },
-            breaches: breaches.iter().map(ReportBreach::from).collect(),
+            breaches,
             refusals: refusals(&refused),
             bound,
             stops: self.stops(),
@@ -273,31 +273,26 @@ impl Findings<'_> {
         if points == 0.0 { 0.0 } else { (squares / points).sqrt() }
     }
 
-    fn breaches(&self, counts: &[u32], refused: &Refused, total: &Tally) -> Vec<Breach> {
+    fn breaches(&self, counts: &[u32], refused: &Refused, total: &Tally) -> Vec<ReportBreach> {
         let budget = &self.run.area.budget;
         let mut breaches = self.module_breaches(counts, refused);
         let sums = budget.windows.sums(budget.grid, counts);
         for (origin, &sum) in budget.windows.origins.iter().zip(&sums).filter(|&(_, &sum)| budget.per_window < sum) {
             let inside: Vec<ModuleId> = budget.windows.modules_of(origin).iter().collect();
-            breaches.push(self.breach(
-                BreachKind::Window,
-                BreachPlace::Window(origin),
-                sum,
-                budget.per_window,
-                (&inside, refused),
-            ));
+            let place = ReportPlace::Window([origin.row, origin.col]);
+            breaches.push(self.breach("per_4km_square", place, sum, budget.per_window, (&inside, refused)));
         }
         let sum: u64 = counts.iter().map(|&count| u64::from(count)).sum();
         if budget.area < sum {
-            let mut breach = self.breach(BreachKind::Mean, BreachPlace::Area, 0, 0, (&[], refused));
-            (breach.count, breach.limit, breach.rms_with_m) = (sum, budget.area, total.rms_m());
-            breaches.push(breach);
+            let breach = self.breach("mean_per_load_module", ReportPlace::Area, 0, 0, (&[], refused));
+            let (count, limit, excess, rms_with_m) = (sum, budget.area, sum - budget.area, total.rms_m());
+            breaches.push(ReportBreach { count, limit, excess, rms_with_m, ..breach });
         }
         breaches.extend(self.residual_breaches(refused, total));
         breaches
     }
 
-    fn module_breaches(&self, counts: &[u32], refused: &Refused) -> Vec<Breach> {
+    fn module_breaches(&self, counts: &[u32], refused: &Refused) -> Vec<ReportBreach> {
         let budget = &self.run.area.budget;
         let mut over: Vec<(u32, ModuleId)> = budget
             .grid
@@ -316,21 +311,21 @@ impl Findings<'_> {
                 pool -= excess;
                 continue;
             }
-            let place = BreachPlace::Module(module);
+            let place = ReportPlace::Module([module.row, module.col]);
             let here = (&[module][..], refused);
-            breaches.push(self.breach(BreachKind::LoadModule, place, count, budget.per_module, here));
+            breaches.push(self.breach("per_load_module", place, count, budget.per_module, here));
         }
         breaches
     }
 
     fn breach(
         &self,
-        kind: BreachKind,
-        place: BreachPlace,
+        kind: &str,
+        place: ReportPlace,
         count: u32,
         limit: u32,
         (inside, refused): (&[ModuleId], &Refused),
-    ) -> Breach {
+    ) -> ReportBreach {
         let (grid, now) = (self.run.area.grid, self.by_module());
         let before = self.enforced.before.as_ref();
         let rms = |of: &dyn Fn(ModuleId) -> ModuleNumbers| {
@@ -340,11 +335,12 @@ impl Findings<'_> {
             });
             if posts == 0 { 0.0 } else { (squares as f64 / posts as f64).sqrt() / f64::from(terrain::QUANTA_PER_METRE) }
         };
-        Breach {
-            kind,
+        ReportBreach {
+            kind: kind.into(),
             place,
             count: u64::from(count),
             limit: u64::from(limit),
+            excess: u64::from(count.saturating_sub(limit)),
             refused: inside.iter().filter_map(|module| refused.get(module)).map(RefusedPosts::count).sum(),
             rms_with_m: rms(&|module| *now.get(module)),
             rms_without_m: before.map(|before| rms(&|module| before[grid.index(module)])),
@@ -352,20 +348,24 @@ impl Findings<'_> {
     }
 
     /// Residuals that the job asked for and that something else kept from being reached.
-    fn residual_breaches(&self, refused: &Refused, total: &Tally) -> Vec<Breach> {
+    fn residual_breaches(&self, refused: &Refused, total: &Tally) -> Vec<ReportBreach> {
         let tin = &self.run.job.tin;
         let asked = [(tin.max_residual_m, total.max_m()), (tin.target_rms_m, total.rms_m())];
         let missed = asked.into_iter().filter_map(|(limit, found)| Some((limit?, found)));
         missed
             .filter(|(limit, found)| limit < found)
-            .map(|(limit, found)| Breach {
-                kind: BreachKind::Residual,
-                place: BreachPlace::Area,
-                count: (found * MILLIMETRES).ceil() as u64,
-                limit: (limit * MILLIMETRES).floor() as u64,
-                refused: refused.values().map(RefusedPosts::count).sum(),
-                rms_with_m: total.rms_m(),
-                rms_without_m: None,
+            .map(|(limit, found)| {
+                let (count, limit) = ((found * MILLIMETRES).ceil() as u64, (limit * MILLIMETRES).floor() as u64);
+                ReportBreach {
+                    kind: "residual".into(),
+                    place: ReportPlace::Area,
+                    count,
+                    limit,
+                    excess: count.saturating_sub(limit),
+                    refused: refused.values().map(RefusedPosts::count).sum(),
+                    rms_with_m: total.rms_m(),
+                    rms_without_m: None,
+                }
             })
             .collect()
     }

@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
-use terrain::{Breach, BreachKind, BreachPlace, ModuleId};
 
 use crate::{FileStamp, ReportFeatures};
 
@@ -363,37 +362,6 @@ pub struct ReportStops {
     pub exhausted: u64,
 }
 
-impl From<&Breach> for ReportBreach {
-    fn from(breach: &Breach) -> Self {
-        let kind = match breach.kind {
-            BreachKind::LoadModule => "per_load_module",
-            BreachKind::Mean => "mean_per_load_module",
-            BreachKind::Window => "per_4km_square",
-            BreachKind::Residual => "residual",
-        };
-        Self {
-            kind: kind.into(),
-            place: breach.place.into(),
-            count: breach.count,
-            limit: breach.limit,
-            excess: breach.excess(),
-            refused: breach.refused,
-            rms_with_m: breach.rms_with_m,
-            rms_without_m: breach.rms_without_m,
-        }
-    }
-}
-
-impl From<BreachPlace> for ReportPlace {
-    fn from(place: BreachPlace) -> Self {
-        match place {
-            BreachPlace::Module(ModuleId { row, col }) => Self::Module([row, col]),
-            BreachPlace::Window(ModuleId { row, col }) => Self::Window([row, col]),
-            BreachPlace::Area => Self::Area,
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use std::path::Path;
@@ -402,11 +370,12 @@ mod tests {
     use crate::{json, samples};
 
     fn report() -> Report {
-        let breach = Breach {
-            kind: BreachKind::Window,
-            place: BreachPlace::Window(ModuleId { row: 4, col: 5 }),
+        let breach = ReportBreach {
+            kind: "per_4km_square".into(),
+            place: ReportPlace::Window([4, 5]),
             count: 4100,
             limit: 4096,
+            excess: 4,
             refused: 3,
             rms_with_m: 1.1,
             rms_without_m: None,
@@ -436,7 +405,7 @@ mod tests {
             overall_point_weighted_rms_m: 1.1,
             dem_accuracy_m: Some(2.5),
             voids: ReportVoids::default(),
-            breaches: vec![ReportBreach::from(&breach)],
+            breaches: vec![breach],
             refusals: ReportRefusals::default(),
             bound: vec![ReportBound {
                 kind: "per_4km_square".into(),

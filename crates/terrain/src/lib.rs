@@ -45,8 +45,6 @@ mod class_colors;
 pub use class_colors::{FEATURE_COLORS, named_class_color};
 mod each;
 pub use each::{Each, gather, in_turn};
-mod breach;
-pub use breach::{Breach, BreachKind, BreachPlace};
 
 pub mod geometry;
 pub mod limits;
