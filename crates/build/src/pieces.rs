@@ -320,6 +320,7 @@ pub(crate) fn area_level(run: &Run, read: &ReadFeatures, levelled: &Levelled) ->
         earthworks: earthworks::by_class(works, &classes),
         moved: earthworks::by_module(works, run.area.grid, &classes),
         far_off: earthworks::far_off(works, (run.area.grid, &module_of), &classes, (name, east_north)),
+        through_hills_m: levelled.through_hills as f64 / f64::from(terrain::QUANTA_PER_METRE),
         remarks,
         notes: read.table.notes.clone(),
     }

@@ -1,14 +1,14 @@
 //! Ground in the way of decks: they clear it as they clear a road, but for what may be cut away.
 //!
-//! The DEM is asked along both sides of every deck. A hill higher than ramps could reach is written down;
-//! decks rise over its triangles when load modules are made.
+//! The DEM is asked along both sides of every deck. Through a hill higher than ramps could reach no deck leads: a way
+//! becomes a tunnel there, which is written down.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use crate::clean::Notes;
-use crate::decks::{Passage, Water, passages};
+use crate::decks::{Passage, Water, between, passages};
 use crate::pieces::{is_narrow, moved};
-use crate::{Edge, FeatureId, Flaw, Kind, Network, Place, Remark, Remedy};
+use crate::{Edge, FeatureId, Flaw, Kind, Network, Place, Remark, Remedy, Storey};
 
 /// Times of what it may be cut that ground may stand above a deck, which is then raised with its ramps.
 const HILL_CUTS: i32 = 3;
@@ -92,38 +92,57 @@ fn parts(network: &Network, edge: u32) -> i32 {
     (2 * network.edges[edge as usize].length / post + 1).max(2)
 }
 
-/// Edges of decks above which the ground stands so high that no cut and no ramp would do: nothing is raised for them
-/// here, and each feature with any is written down.
-pub(crate) fn under_hills(
-    network: &Network,
-    ground: &[Option<i32>],
-    cut_max: i32,
-    remarks: &mut Vec<Remark>,
-) -> BTreeSet<u32> {
-    let mut edges = BTreeSet::new();
-    // Of each feature how far the ground stands above it at most, where, and quanta of length.
-    let mut told: BTreeMap<FeatureId, (i32, Place, i64)> = BTreeMap::new();
+/// Edges of decks above which the ground stands so high that no cut and no ramp would do, each with how far.
+pub(crate) fn under_hills(network: &Network, ground: &[Option<i32>], cut_max: i32) -> BTreeMap<u32, i32> {
+    let mut edges = BTreeMap::new();
     for passage in passages(network).iter().filter(|passage| passage.is_deck) {
         let above = above_line(network, passage, ground);
         for (at, &edge) in passage.edges.iter().enumerate() {
             let highest = above[at].max(above[at + 1]);
-            if highest <= HILL_CUTS * cut_max {
-                continue;
+            if HILL_CUTS * cut_max < highest {
+                edges.insert(edge, highest);
             }
-            edges.insert(edge);
-            let Edge { a, way, length, .. } = network.edges[edge as usize];
-            let place = network.nodes[a as usize].place;
-            let of = told.entry(network.ways[way as usize].id).or_insert((highest, place, 0));
-            let worst = (of.0, of.1).max((highest, place));
-            *of = (worst.0, worst.1, of.2 + i64::from(length));
         }
     }
-    for (id, (quanta, place, length)) in told {
+    edges
+}
+
+/// Edges of decks that have come to lie farther under the ground than it may be cut away, each with how far.
+pub(crate) fn still_under(
+    network: &Network,
+    heights: &[i32],
+    (beside, ground): (&Beside, Ground),
+    cut_max: i32,
+) -> BTreeMap<u32, i32> {
+    let is_deck = |edge: u32| matches!(network.traits(edge).storey, Storey::Deck(_));
+    let above = |(&edge, sides): (&u32, &[Vec<Place>; 2])| {
+        let ends = network.ends(edge);
+        let levels = ends.map(|end| heights[end as usize]);
+        let segment = network.segment(edge);
+        let deck = |place: Place| between([segment.a, segment.b], levels, place);
+        let highest = sides.iter().flatten().filter_map(|&place| Some(ground(place)? - deck(place))).max()?;
+        (cut_max < highest).then_some((edge, highest))
+    };
+    beside.0.iter().filter(|(edge, _)| is_deck(**edge)).filter_map(above).collect()
+}
+
+/// Writes down of each feature which of its decks have become tunnels, and returns how many quanta these are long.
+pub(crate) fn tell_of_hills(network: &Network, edges: &BTreeMap<u32, i32>, remarks: &mut Vec<Remark>) -> i64 {
+    // Of each feature how far the ground stands above it at most, where, and quanta of length.
+    let mut told: BTreeMap<FeatureId, (i32, Place, i64)> = BTreeMap::new();
+    for (&edge, &highest) in edges {
+        let Edge { a, way, length, .. } = network.edges[edge as usize];
+        let place = network.nodes[a as usize].place;
+        let of = told.entry(network.ways[way as usize].id).or_insert((highest, place, 0));
+        let worst = (of.0, of.1).max((highest, place));
+        *of = (worst.0, worst.1, of.2 + i64::from(length));
+    }
+    for (&id, &(quanta, place, length)) in &told {
         let metres = (length / i64::from(terrain::QUANTA_PER_METRE)) as u32;
         let mut notes = Notes { id, lattice: network.lattice, remarks };
-        notes.write_at(place, Flaw::GroundAboveDeck { quanta, metres }, Remedy::LeftAsItIs);
+        notes.write_at(place, Flaw::GroundAboveDeck { quanta, metres }, Remedy::Tunnel);
     }
-    edges
+    told.values().map(|(_, _, length)| length).sum()
 }
 
 /// How far the ground at each node of a deck stands above the straight line between its ends; where that is not known
@@ -146,14 +165,10 @@ fn above_line(network: &Network, passage: &Passage, ground: &[Option<i32>]) -> V
 }
 
 /// Ground under decks as something they have to clear, as far as it may not be cut away: lines across them.
-pub(crate) fn uncut(
-    network: &Network,
-    (beside, under_hills): (&Beside, &BTreeSet<u32>),
-    ground: Ground,
-    cut_max: i32,
-) -> Vec<Water> {
+pub(crate) fn uncut(network: &Network, (beside, ground): (&Beside, Ground), cut_max: i32) -> Vec<Water> {
+    let is_deck = |edge: u32| matches!(network.traits(edge).storey, Storey::Deck(_));
     let mut lines = Vec::new();
-    for (&edge, [left, right]) in beside.0.iter().filter(|(edge, _)| !under_hills.contains(edge)) {
+    for (&edge, [left, right]) in beside.0.iter().filter(|(edge, _)| is_deck(**edge)) {
         let Edge { a, b, .. } = network.edges[edge as usize];
         for (at, (&one, &other)) in left.iter().zip(right).enumerate() {
             // At its ends a deck rests on the ground.
@@ -214,10 +229,16 @@ mod tests {
     }
 
     #[test]
-    fn a_hill_in_the_way_of_a_bridge_is_told_and_no_ramp_is_built_for_it() {
+    fn no_deck_leads_through_a_hill_in_the_way_and_no_ramp_is_built_for_it() {
         let hill = |east: f64, _: f64| 100.0 + (147.0 - (east - 170.0).abs() * 4.0).max(0.0);
         let levelled = levelled(bridge(50.0, 290.0), hill);
         // Beside it ramps may reach three cuts up.
         assert!(is_told(&levelled) && reach(&levelled).1 < 130.0, "{:?}", reach(&levelled));
+        let metres = levelled.through_hills / i64::from(terrain::QUANTA_PER_METRE);
+        assert!((500..800).contains(&metres), "{metres}");
+        let corners = levelled.reserved.formed.decks.iter().flat_map(|deck| &deck.corners);
+        let east = |place: Place| site().lattice.posts_of(place)[0];
+        assert!(corners.clone().all(|(place, _)| 10.0 < (east(*place) - 170.0).abs()), "through the middle");
+        assert_eq!(levelled.reserved.loose_ends, [], "a portal is no end");
     }
 }

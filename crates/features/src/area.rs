@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 
 use terrain::Each;
 
-use crate::aground::{Beside, uncut, under_hills};
+use crate::aground::{Beside, still_under, tell_of_hills, uncut, under_hills};
 use crate::earthworks::{Laid, earthworks};
 use crate::pieces::moved;
 use crate::rules::Sorted;
@@ -60,6 +60,8 @@ pub struct Levelled {
     pub remarks: Vec<Remark>,
     /// What they move.
     pub earthworks: Earthworks,
+    /// Quanta of bridges that would run through hills, and became tunnels.
+    pub through_hills: i64,
 }
 
 /// Water with its heights.
@@ -193,16 +195,20 @@ impl AreaFeatures {
         let Watered { mut strands, lakes, level } =
             self.waters(Soundings { at: &at, near: &near, middle: &middle, inside }, falls, &mut remarks);
         strands.extend(self.breaklines(&near));
-        let roads = &self.roads;
-        let resting = ground_of(roads, &at, &near);
-        let hills = under_hills(roads, &resting, options.cut_max, &mut remarks);
+        let resting = ground_of(&self.roads, &at, &near);
+        let mut hills = under_hills(&self.roads, &resting, options.cut_max);
+        let roads = &self.roads.clone().with_tunnels(hills.keys().copied());
         let afloat = afloat(&self.outlines, &lakes, roads, &self.road_sides, &self.site);
         let pins = with_water(roads, pins(roads, &self.ways), &afloat, &mut remarks);
         let amid: Vec<Option<i32>> =
             roads.nodes.iter().zip(&resting).map(|(node, ground)| middle(node.place).or(*ground)).collect();
         let mut below = water(&strands);
-        below.extend(uncut(roads, (&self.deck_sides, &hills), &at, options.cut_max));
+        below.extend(uncut(roads, (&self.deck_sides, &at), options.cut_max));
         let heights = grade(roads, [&resting, &amid], &pins, &below, options, &mut remarks);
+        let left = still_under(roads, &heights, (&self.deck_sides, &at), options.cut_max);
+        let roads = &roads.clone().with_tunnels(left.keys().copied());
+        hills.extend(left);
+        let through_hills = tell_of_hills(roads, &hills, &mut remarks);
         let beside = |(sides, height): (&[Place; 2], &i32)| sides.map(|place| at(place).unwrap_or(*height));
         let beside: Vec<[i32; 2]> = self.road_sides.iter().zip(&heights).map(beside).collect();
         let grants = Grants::default();
@@ -232,7 +238,7 @@ impl AreaFeatures {
             inside,
             limits: (options, falls),
         });
-        Levelled { reserved, remarks, earthworks }
+        Levelled { reserved, remarks, earthworks, through_hills }
     }
 
     /// Rivers, lakes and what else polygons of water became, by the ground inside the area and that nearest to places

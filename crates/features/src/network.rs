@@ -1,6 +1,6 @@
 //! The network of ways: stations as nodes, what joins them as edges, each stretch of ground once.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
 use crate::clean::Notes;
 use crate::exact::Segment;
@@ -189,6 +189,21 @@ impl Network {
         (5 * quanta / i64::from(terrain::QUANTA_PER_METRE)).max(1)
     }
 
+    /// The network in which some edges are tunnels.
+    pub(crate) fn with_tunnels(mut self, edges: impl Iterator<Item = u32>) -> Self {
+        let mut tunnels: BTreeMap<u32, u32> = BTreeMap::new();
+        for edge in edges {
+            let way = self.edges[edge as usize].way;
+            let tunnel = *tunnels.entry(way).or_insert_with(|| {
+                let of = self.ways[way as usize];
+                self.ways.push(WayOf { traits: Traits { storey: Storey::Tunnel(-1), ..of.traits }, ..of });
+                self.ways.len() as u32 - 1
+            });
+            self.edges[edge as usize].way = tunnel;
+        }
+        self
+    }
+
     /// What an edge is.
     pub fn traits(&self, edge: u32) -> &Traits {
         &self.ways[self.edges[edge as usize].way as usize].traits
@@ -203,6 +218,12 @@ impl Network {
     /// Whether an edge lies on the ground.
     pub fn is_ground(&self, edge: u32) -> bool {
         self.traits(edge).storey == Storey::Ground
+    }
+
+    /// The stations of an edge, in the direction of its way.
+    pub fn ends(&self, edge: u32) -> [u32; 2] {
+        let Edge { a, b, .. } = self.edges[edge as usize];
+        [a, b]
     }
 
     /// The segment of an edge.

@@ -7,7 +7,7 @@ use crate::clean::Notes;
 use crate::decks::{Clearances, Passage, Water, between, passages, straighten};
 use crate::exact::Segment;
 use crate::sweep::{Swept, highest};
-use crate::{Flaw, Network, Place, Remark, Remedy, Storey};
+use crate::{Flaw, Kind, Network, Place, Remark, Remedy, Storey};
 
 /// Quanta along ways from the ends of a deck within which others lie beside it rather than under it: 100 m.
 const BESIDE: i32 = 100 * 128;
@@ -53,7 +53,7 @@ pub(crate) fn clear(
     if !decks.iter().any(|passage| passage.is_deck) {
         return;
     }
-    let overs = overs(network, &decks, water);
+    let mut overs = overs(network, &decks, water);
     // A round more for decks whose road below was raised with them.
     for _ in 0..CLEAR_ROUNDS {
         let lacks = lacks(network, &swept.heights, &overs, water, clearances);
@@ -74,6 +74,9 @@ pub(crate) fn clear(
         }
         straighten(network, &swept.costs, &mut swept.heights);
     }
+    // The ground may be cut away, or bored through.
+    let belows = Belows { network, water };
+    overs.retain(|over| belows.kind(over.below) != Kind::Breakline);
     for Lack { edge, lack, place, .. } in lacks(network, &swept.heights, &overs, water, clearances) {
         let id = network.ways[network.edges[edge as usize].way as usize].id;
         let flaw = Flaw::ClearanceLacks { quanta: lack };
@@ -196,7 +199,7 @@ impl Belows<'_> {
             .map_or_else(|| self.network.segment(number), |water| Segment { a: water.ends[0], b: water.ends[1] })
     }
 
-    fn kind(&self, number: u32) -> crate::Kind {
+    fn kind(&self, number: u32) -> Kind {
         self.water(number).map_or_else(|| self.network.traits(number).kind, |water| water.kind)
     }
 

@@ -242,6 +242,8 @@ pub enum Remedy {
     LeftAsItIs,
     /// A culvert: the road stays and the channel passes.
     Culvert,
+    /// A tunnel: the way leads through, and nothing of it is in the ground.
+    Tunnel,
     /// It was turned round.
     TurnedRound,
     /// It lies level.
@@ -289,6 +291,7 @@ impl fmt::Display for Remedy {
             Remedy::GradeExceeded => "the greatest grade is exceeded there",
             Remedy::LeftAsItIs => "left as it is",
             Remedy::Culvert => "a culvert was assumed",
+            Remedy::Tunnel => "a tunnel was assumed",
             Remedy::TurnedRound => "turned round",
             Remedy::Levelled => "laid level",
             Remedy::BecameLake => "taken as a lake",
@@ -320,6 +323,7 @@ impl Remedy {
                 | Remedy::Coarser { .. }
                 | Remedy::OutlineOnly
                 | Remedy::LeftAsItIs
+                | Remedy::Tunnel
         )
     }
 }

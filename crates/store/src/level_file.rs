@@ -36,6 +36,8 @@ pub struct AreaLevel {
     pub moved: Vec<(u32, u8, [f64; 2])>,
     /// Where features lie more than 3 m off the ground, the worst of each in each load module, the farthest first.
     pub far_off: Vec<FeatureFarOff>,
+    /// Metres of bridges that would run through hills, and became tunnels.
+    pub through_hills_m: f64,
     /// What was mended, degraded or left out.
     pub remarks: Vec<FeatureRemark>,
     /// What a person should know of files and rules.
@@ -270,6 +272,7 @@ mod tests {
                 off_m: -12.5,
                 cause: OffCause::Falling,
             }],
+            through_hills_m: 12.5,
             decks: vec![FeatureFace { feature: "way/13".into(), class: 3, ring: vec![[1.0, 2.0, 3.0]] }],
             remarks: vec![FeatureRemark {
                 feature: "way/12".into(),

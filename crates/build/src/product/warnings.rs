@@ -79,8 +79,8 @@ pub const MATTERS: [Matter; 17] = [
     ),
     matter(
         "bridges through ground that is higher",
-        Told::Line,
-        "decks rise over its triangles, whatever grade that takes; features.geojson lists each",
+        Told::Warning(through_hills),
+        "tunnels are assumed there, and features.geojson lists each; the bridge or the DEM is elsewhere",
     ),
     matter(
         "decks too low over what they cross",
@@ -152,6 +152,15 @@ fn decks_under(made: &Made) -> Vec<String> {
         )
     };
     (0 < checks.deck_samples_under).then(told).into_iter().collect()
+}
+
+/// Bridges would run through hills.
+fn through_hills(made: &Made) -> Vec<String> {
+    let metres = made.features.map_or(0.0, |(_, level)| level.through_hills_m);
+    let told = || {
+        format!("{metres:.0} m of bridges run through ground that is higher: tunnels are assumed, see features.geojson")
+    };
+    (0.0 < metres).then(told).into_iter().collect()
 }
 
 /// The share of a main class that may be left out without a warning, and that of all ways.

@@ -18,9 +18,21 @@ const DIGITS: f64 = 1e-6;
 /// Square quanta of the least piece that is one.
 const AREA_MIN: f64 = 1.0;
 
-/// The least part of what is missing at a place that the corners which may rise have to bear: where they lie farther
-/// off, they would have to rise far beyond the ground.
-const SHARE_MIN: f64 = 0.1;
+/// How far beyond the ground corners may rise for a place beside them.
+#[derive(Clone, Copy)]
+struct Bounds {
+    /// The least part of what is missing at a place that the corners which may rise have to bear: where they lie
+    /// farther off, they would have to rise far beyond the ground.
+    share_min: f64,
+    /// Whether a corner may rise no farther above the highest ground than it lies below that.
+    is_capped: bool,
+}
+
+/// Bounds while corners can be added where they are needed.
+const USUAL: Bounds = Bounds { share_min: 0.1, is_capped: true };
+
+/// Bounds where there is no room for another: a deck that rises steeply is better than one in the ground.
+const LAST: Bounds = Bounds { share_min: 0.005, is_capped: false };
 
 /// The least part of a height that a corner has to make up to have a say in it.
 const WEIGHT_MIN: f64 = 1e-9;
@@ -33,13 +45,13 @@ const ADDED_FOR: f64 = 4.0;
 pub fn lift_decks(decks: &Decks, ground: &LoadModule, most: usize) -> Decks {
     let mut decks = decks.clone();
     loop {
-        let mut lift =
-            Lift { decks: &decks, heights: decks.vertices.iter().map(|vertex| f64::from(vertex.z)).collect() };
-        lift.raise_sides(ground);
-        let left =
-            lift.raise_inside(ground).filter(|left| ADDED_FOR < left.missing && decks.triangles.len() + 2 <= most);
-        let Some(more) = left.and_then(|left| with_corner(&decks, &left, ground.side)) else {
+        let (lift, left) = Lift::onto(ground, &decks, USUAL);
+        let Some(left) = left.filter(|left| ADDED_FOR < left.missing) else {
             return lift.raised();
+        };
+        let has_room = decks.triangles.len() + 2 <= most;
+        let Some(more) = has_room.then(|| with_corner(&decks, &left, ground.side)).flatten() else {
+            return Lift::onto(ground, &decks, LAST).0.raised();
         };
         decks = more;
     }
@@ -84,6 +96,7 @@ const EDGE: f64 = 2.0;
 struct Lift<'a> {
     decks: &'a Decks,
     heights: Vec<f64>,
+    bounds: Bounds,
 }
 
 /// A place of the ground that a triangle of decks has to reach.
@@ -96,7 +109,19 @@ struct Reach {
     height: f64,
 }
 
-impl Lift<'_> {
+impl<'a> Lift<'a> {
+    fn of(decks: &'a Decks, bounds: Bounds) -> Self {
+        Self { decks, heights: decks.vertices.iter().map(|vertex| f64::from(vertex.z)).collect(), bounds }
+    }
+
+    /// Decks raised onto the ground as far as corners reach, and what misses most.
+    fn onto(ground: &LoadModule, decks: &'a Decks, bounds: Bounds) -> (Self, Option<Reach>) {
+        let mut lift = Self::of(decks, bounds);
+        lift.raise_sides(ground);
+        let left = lift.raise_inside(ground);
+        (lift, left)
+    }
+
     /// Raises vertices on the sides onto the ground there, and both ends of an edge along a side so far that it clears
     /// the vertices of the ground between them.
     fn raise_sides(&mut self, ground: &LoadModule) {
@@ -120,7 +145,7 @@ impl Lift<'_> {
                     let edge = ends.map(|end| [along(&self.decks.vertices[end]), self.heights[end]]);
                     let missing = missing_between(edge, &side);
                     for end in ends {
-                        raised[end] = raised[end].max((self.heights[end] + missing).min(self.most(end, top)));
+                        raised[end] = raised[end].max((self.heights[end] + missing).min(self.cap(end, top)));
                     }
                 }
             }
@@ -150,9 +175,13 @@ impl Lift<'_> {
             let shares =
                 [0, 1, 2].map(|at| if is_inside(self.decks.vertices[corners[at]]) { weights[at] } else { 0.0 });
             // The least rise of all together that does it.
-            let squares = shares.iter().map(|share| share * share).sum::<f64>().max(SHARE_MIN * SHARE_MIN);
+            let squares = shares
+                .iter()
+                .map(|share| share * share)
+                .sum::<f64>()
+                .max(self.bounds.share_min * self.bounds.share_min);
             for at in (0..3).filter(|_| 0.0 < missing) {
-                let most = self.most(corners[at], top);
+                let most = if self.bounds.is_capped { self.cap(corners[at], top) } else { f64::INFINITY };
                 let height = &mut self.heights[corners[at]];
                 *height = (*height + missing * shares[at] / squares).min(most);
             }
@@ -196,8 +225,8 @@ impl Lift<'_> {
         }
     }
 
-    /// How high a vertex may be raised: as far above the highest ground as it lies below it.
-    fn most(&self, vertex: usize, top: f64) -> f64 {
+    /// How high a vertex may be raised where that is capped.
+    fn cap(&self, vertex: usize, top: f64) -> f64 {
         self.heights[vertex].max(2.0 * top - f64::from(self.decks.vertices[vertex].z))
     }
 
@@ -336,7 +365,7 @@ mod tests {
 
     /// How far the ground stands above decks at most.
     fn deepest(decks: &Decks, ground: &LoadModule) -> f64 {
-        let lift = Lift { decks, heights: decks.vertices.iter().map(|vertex| f64::from(vertex.z)).collect() };
+        let lift = Lift::of(decks, USUAL);
         let mut reaches = Vec::new();
         for number in 0..decks.triangles.len() {
             for beneath in &ground.triangles {
@@ -372,6 +401,19 @@ mod tests {
         assert_eq!(lifted.check(SIDE), Ok(()));
         assert!((lifted.triangles.len(), lifted.vertices.len()) == (4, 5), "{lifted:?}");
         assert!(lifted.vertices.contains(&vertex(6400, 6400, 2999)), "{lifted:?}");
+    }
+
+    #[test]
+    fn where_no_corner_can_be_added_a_deck_rises_steeply_rather_than_into_the_ground() {
+        let ground = hill(3000, 0);
+        // Its only corner inside is far from the hill.
+        let at = |(x, y)| vertex(x, y, 0);
+        let [a, b, c, d] = [(0, 6390), (SIDE, 6390), (SIDE, 6410), (300, 6410)].map(at);
+        let decks = Decks::of_triangles([([a, b, d], 3), ([b, c, d], 3)]);
+        let lifted = lift_decks(&decks, &ground, 2);
+        assert_eq!((lifted.check(SIDE), lifted.triangles.len()), (Ok(()), 2));
+        let [before, after] = [&decks, &lifted].map(|decks| deepest(decks, &ground));
+        assert!(2000.0 < before && after < ADDED_FOR, "{before} {after} {lifted:?}");
     }
 
     #[test]
