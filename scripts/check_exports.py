@@ -699,6 +699,21 @@ class Terrain:
         codes = numpy.frombuffer(data, "<u2", total, at + 4).astype(int)
         high_water = numpy.concatenate([[0], numpy.cumsum(codes == 0)[:-1]])
         self.triangles = (high_water - codes).reshape(-1, 3)
+        at += 4 + 2 * total
+        for _ in range(4):
+            at += 4 + 2 * struct.unpack_from("<I", data, at)[0]
+        self.extensions = {}
+        while at < len(data):
+            number, length = struct.unpack_from("<BI", data, at)
+            self.extensions[number] = data[at + 5 : at + 5 + length]
+            at += 5 + length
+
+    def water(self):
+        """Whether there is water, by row from the north and column of 256 x 256; None without a mask."""
+        mask = numpy.frombuffer(self.extensions.get(2, b""), numpy.uint8)
+        if len(mask) == 0:
+            return None
+        return numpy.broadcast_to(mask.reshape(-1, 1) if len(mask) == 1 else mask.reshape(256, 256), (256, 256)) == 255
 
 
 def check_quantized_mesh(database, arguments, scratch):
@@ -737,9 +752,31 @@ def check_quantized_mesh(database, arguments, scratch):
     expect(missing == 0, f"every vertex is in a tile ({missing} missing)")
     spread = max(offsets) - min(offsets)
     expect(spread < 5, f"heights differ from the database's by {min(offsets):.3f} to {max(offsets):.3f} m")
+    check_water(database, folder / str(level), degrees, pyproj)
     holes = folder / "holes.geojson"
     rings = json.loads(holes.read_text())["features"][0]["geometry"]["coordinates"] if holes.exists() else []
     expect(len(rings) == database.holes, f"holes.geojson has {len(rings)} triangles over holes")
+
+
+def check_water(database, folder, degrees, pyproj):
+    """The masks of the finest tiles have as much water as the triangles, but for cells that shores cross."""
+    names = [one["name"] for one in database.report["classes"]]
+    water = [number for number, name in enumerate(names) if name in ("water", "lake", "river", "stream")]
+    expected = 0.0
+    for module in database.modules.values():
+        for corners, number in zip(module["triangles"], module["classes"]):
+            if number in water:
+                (ax, ay, _), (bx, by, _), (cx, cy, _) = (module["vertices"][corner] for corner in corners)
+                expected += ((bx - ax) * (cy - ay) - (by - ay) * (cx - ax)) / 2 / 128**2
+    globe, found = pyproj.Geod(ellps="WGS84"), 0.0
+    for path in folder.rglob("*.terrain"):
+        mask = Terrain(path.read_bytes()).water()
+        if mask is not None and mask.any():
+            west, south = int(path.parent.name) * degrees - 180, int(path.stem) * degrees - 90
+            ring = [west, west + degrees, west + degrees, west], [south, south, south + degrees, south + degrees]
+            found += abs(globe.polygon_area_perimeter(*ring)[0]) * mask.mean()
+    off = abs(found - expected) / max(expected, 1.0)
+    expect(off < 0.02 or abs(found - expected) < 2000, f"masks have {found:.0f} m2 of water, triangles {expected:.0f}")
 
 
 def check_headers(folder, pyproj):

@@ -83,7 +83,8 @@ try {
   const places = JSON.parse(readFileSync(values.places));
   if (values.terrain) {
     const heights = await page.evaluate(async (places, address) => {
-      const terrain = await Cesium.CesiumTerrainProvider.fromUrl(address, { requestVertexNormals: true });
+      const wanted = { requestVertexNormals: true, requestWaterMask: true };
+      const terrain = await Cesium.CesiumTerrainProvider.fromUrl(address, wanted);
       const asked = places.map(([lon, lat]) => Cesium.Cartographic.fromDegrees(lon, lat));
       await Cesium.sampleTerrainMostDetailed(terrain, asked);
       window.terrain = terrain;

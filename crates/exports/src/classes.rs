@@ -69,6 +69,17 @@ pub(crate) fn names_in(report: &Report) -> Vec<String> {
     report.classes.iter().map(|class| class.name.clone()).filter(|name| name != HOLE_NAME).collect()
 }
 
+/// The classes of a report that are water: those with rivers, streams or lakes, and those that are named so.
+pub(crate) fn water_in(report: &Report) -> Vec<u8> {
+    let of_features = report.features.iter().flat_map(|features| &features.classes);
+    let has_water = |name: &str| {
+        let mut of = of_features.clone().filter(|class| class.name == name);
+        of.any(|class| 0 < class.lakes || 0.0 < class.channel_km)
+    };
+    let is_water = |name: &str| ["water", "lake", "river", "stream"].contains(&name) || has_water(name);
+    (0..).zip(names_in(report)).filter(|(_, name)| is_water(name)).map(|(number, _)| number).collect()
+}
+
 /// What triangles over holes are called.
 pub(crate) const HOLE_NAME: &str = "hole";
 

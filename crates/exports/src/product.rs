@@ -5,7 +5,7 @@ use std::path::Path;
 use store::{Folder, Manifest, TileModules};
 use terrain::{GridFrame, HOLE_CLASS, LoadModule, ModuleGrid, ModuleId, ModuleRect, TileId};
 
-use crate::classes::{Classes, names_in};
+use crate::classes::{Classes, names_in, water_in};
 use crate::{ExportError, Work};
 
 /// A block of load modules by its south-west and north-east one, both inside.
@@ -33,6 +33,8 @@ pub struct Product {
     pub manifest: Manifest,
     /// The names of the job's classes, in its order.
     pub class_names: Vec<String>,
+    /// Those of them that are water.
+    pub water: Vec<u8>,
     /// The load modules of the whole area.
     pub grid: ModuleGrid,
     /// Where the working grid lies.
@@ -67,12 +69,12 @@ impl Product {
             levels.iter_mut().for_each(|modules| modules.retain(|module| rect.contains(module.id)));
             Ok((tile, levels))
         })?;
-        let class_names = names_in(&folder.report()?);
-        Self::put_together((manifest, class_names), rect, wanted.first(), read)
+        let report = folder.report()?;
+        Self::put_together((manifest, names_in(&report), water_in(&report)), rect, wanted.first(), read)
     }
 
     fn put_together(
-        (manifest, class_names): (Manifest, Vec<String>),
+        (manifest, class_names, water): (Manifest, Vec<String>, Vec<u8>),
         rect: ModuleRect,
         level: usize,
         read: Vec<(TileModules, Vec<Vec<LoadModule>>)>,
@@ -100,7 +102,8 @@ impl Product {
         let mut levels = levels.into_iter();
         let (Some(first), Some(modules)) = (tiles.first(), levels.next()) else { return Err(damaged(0, rect)) };
         let (grid, frame) = (first.grid, first.frame);
-        Ok(Self { manifest, class_names, grid, frame, rect, level, modules, coarser: levels.collect(), tiles, tile_of })
+        let coarser = levels.collect();
+        Ok(Self { manifest, class_names, water, grid, frame, rect, level, modules, coarser, tiles, tile_of })
     }
 
     /// The same at each of its levels, from fine to coarse, one at a time.

@@ -37,6 +37,7 @@ pub(crate) fn product() -> Product {
     Product {
         manifest,
         class_names: Vec::new(),
+        water: Vec::new(),
         grid: GRID,
         frame,
         rect,

@@ -235,8 +235,9 @@ def test_places_outside_have_no_height(database: Path) -> None:
         assert (opened.classes(outside) == 255).all()
         assert np.isfinite(opened.heights([[509_000, 3_878_000], [505_000, 3_875_000]])).all()
         assert opened.heights(np.empty((0, 2))).shape == (0,)
-        sight = opened.line_of_sight([507_000, 3_876_000, 5000], [0, 0, 5000])
-        assert not sight.visible and not sight.known and np.isnan(sight.clearance_m)
+        for absolute in (False, True):
+            sight = opened.line_of_sight([507_000, 3_876_000, 5000], [0, 0, 5000], absolute=absolute)
+            assert not sight.visible and not sight.known and np.isnan(sight.clearance_m)
         with pytest.raises(tiefort.RequestError, match="no ground"):
             opened.viewshed((0, 0), 100)
         for wrong in ([1, 2, 3], ["a", "b"], 5, [[1j, 2]]):
@@ -253,9 +254,9 @@ def test_lines_of_sight_say_what_hides(database: Path) -> None:
         rng = np.random.default_rng(3)
         ends = rng.uniform((west, south), (east, north), (2, 400, 2))
         eyes, targets = (np.column_stack((end, opened.heights(end) + 2)) for end in ends)
-        sight = opened.line_of_sight(eyes, targets)
+        sight = opened.line_of_sight(eyes, targets, absolute=True)
         assert sight.known.all() and 0 < sight.visible.sum() < 400
-        assert np.array_equal(sight.visible, opened.visible(eyes, targets))
+        assert np.array_equal(sight.visible, opened.visible(eyes, targets, absolute=True))
         assert (sight.clearance_m[sight.visible] > -1e-6).all() and (sight.clearance_m[~sight.visible] < 1e-6).all()
         assert np.isnan(sight.blocker[sight.visible]).all()
         blockers = sight.blocker[~sight.visible]
@@ -265,7 +266,11 @@ def test_lines_of_sight_say_what_hides(database: Path) -> None:
             along = eye + np.linspace(0, 1, 2000)[:, None] * (target - eye)
             least = (along[:, 2] - opened.heights(along[:, :2])).min()
             assert clearance <= least + 1e-3 and least - clearance < 1.0
-        one = opened.line_of_sight(eyes[0], targets)
+        # Heights above the ground, as on the command line.
+        above = [np.column_stack((end, np.full(len(end), 2.0))) for end in ends]
+        again = opened.line_of_sight(*above)
+        assert np.array_equal(again.visible, sight.visible) and np.allclose(again.clearance_m, sight.clearance_m)
+        one = opened.line_of_sight(eyes[0], targets, absolute=True)
         assert one.visible.shape == (400,) and one.blocker.shape == (400, 3)
         with pytest.raises(tiefort.RequestError, match="as many"):
             opened.line_of_sight(eyes, targets[:7])
@@ -278,7 +283,7 @@ def test_a_viewshed_is_the_lines_of_sight_to_its_places(database: Path) -> None:
         assert not seen.visible[0, 0] and 1 < seen.visible.sum() < 33 * 33
         place = np.array([507_000 + 3 * 50, 3_876_500 + 5 * 50])
         target = [*place, opened.heights(place)]
-        assert seen.visible[16 - 5, 16 + 3] == opened.visible(seen.at, target)
+        assert seen.visible[16 - 5, 16 + 3] == opened.visible(seen.at, target, absolute=True)
         with pytest.raises(tiefort.RequestError, match="range_m"):
             opened.viewshed((507_000, 3_876_500), -1)
         with pytest.raises(tiefort.RequestError, match="larger spacing_m"):
@@ -291,21 +296,25 @@ def test_places_seen_from_one_eye_are_those_of_single_lines(database: Path) -> N
         ends = np.random.default_rng(4).uniform((west, south), (east, north), (300, 2))
         targets = np.column_stack((ends, opened.heights(ends) + 2))
         eye = (*targets[0, :2], targets[0, 2] + 20)
-        assert 10 < opened.visible(eye, targets).sum() < 290
-        assert (opened.visible(eye, targets) == opened.line_of_sight(eye, targets).visible).all()
+        seen = opened.visible(eye, targets, absolute=True)
+        assert 10 < seen.sum() < 290
+        assert (seen == opened.line_of_sight(eye, targets, absolute=True).visible).all()
 
 
 def test_a_profile_is_the_heights_along_a_line(database: Path) -> None:
     with tiefort.open(database) as opened:
         through = [(506_000, 3_876_000), (507_000, 3_876_000), (507_000, 3_876_500)]
-        found = opened.profile(through, spacing_m=100)
+        found = opened.profile(*through, spacing_m=100)
         assert list(found.along_m) == [100 * step for step in range(16)]
         assert (found.heights == opened.heights(found.places)).all()
         assert (found.classes == opened.classes(found.places)).all()
-        with pytest.raises(tiefort.RequestError, match="through"):
-            opened.profile(through[:1])
+        assert (opened.profile(*through[:2], spacing_m=100).heights == found.heights[:11]).all()
+        with pytest.raises(tiefort.RequestError, match="two or more"):
+            opened.profile(through[0])
+        with pytest.raises(tiefort.RequestError, match="place 0: found 3 places"):
+            opened.profile(through, through[0])
         with pytest.raises(tiefort.RequestError, match="spacing_m"):
-            opened.profile(through, spacing_m=0)
+            opened.profile(*through, spacing_m=0)
     done = run("profile", database, "506000,3876000", "507000,3876000", "--spacing", "100", "--format", "csv")
     assert done.returncode == 0 and len(done.stdout.splitlines()) == 12, done.stderr
 

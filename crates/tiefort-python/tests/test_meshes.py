@@ -209,6 +209,36 @@ def test_a_missing_file_is_told_as_by_the_command_line(tmp_path: Path) -> None:
         tiefort.tin(missing, points=50, crs=4326)
 
 
+def test_what_is_wrong_is_told_in_the_words_of_the_function() -> None:
+    for wrong in ({"effort": "bset"}, {"method": "papr"}, {"tiles": "3y3"}, {"key": "min"}, {"triangles": 1}):
+        with pytest.raises(tiefort.RequestError) as raised:
+            tiefort.tin(hills(), **wrong, **({} if "triangles" in wrong else {"points": 50}))
+        (name,) = wrong
+        assert str(raised.value).startswith(f"{name}: found"), raised.value
+        assert not any(part in str(raised.value) for part in ("--", "Usage", "<")), raised.value
+
+
+def test_voids_stay_holes() -> None:
+    ground = hills(dtype=np.float64)
+    rows, cols = ground.shape
+    ground[rows // 4 : rows // 2, cols // 4 : cols // 2] = np.nan
+    mesh = tiefort.tin(ground, points=400)
+    inside = [[cols * 0.375, rows * 0.625]]
+    assert np.isnan(mesh.sample(inside)).all()
+    assert np.isfinite(mesh.sample([[cols * 0.8, rows * 0.2]])).all()
+    assert np.array_equal(np.unique(mesh.triangles), np.arange(len(mesh.vertices)))
+    corners = mesh.vertices[mesh.triangles][:, :, :2]
+    one, other = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    covered = (one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0]).sum() / 2
+    whole = (rows - 1) * (cols - 1)
+    void = (rows // 4) * (cols // 4)
+    assert abs(whole - covered - void) < void / 4
+
+
+def test_the_package_says_its_version() -> None:
+    assert tiefort.__version__.count(".") == 2 and "__version__" in dir(tiefort)
+
+
 def test_meshes_are_written_whole_or_not_at_all(tmp_path: Path) -> None:
     mesh = tiefort.tin(hills(), points=50)
     with pytest.raises(tiefort.OutputError, match="cannot be written"):

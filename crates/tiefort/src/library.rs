@@ -1,12 +1,14 @@
 //! What functions of the Python package share with the commands: arguments in the command line's words, what commands
 //! tell programs, and meshes written as commands write them. Nothing here prints, watches signals or ends the process.
 
+use std::error::Error;
 use std::ffi::OsString;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
 use build::product::WantedGround;
 use build::workbench::{HeldGround, Mesh, TinRequest};
+use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{Args, Command, FromArgMatches};
 use exports::Work;
 use job::Job;
@@ -115,15 +117,41 @@ pub fn check_writable(path: &Path) -> Result<(), Failure> {
 fn read<A: Args + FromArgMatches>(words: impl IntoIterator<Item = OsString>) -> Result<A, Failure> {
     let command = A::augment_args(Command::new("tiefort").no_binary_name(true).disable_help_flag(true));
     let matches = command.try_get_matches_from(words);
-    matches.and_then(|matches| A::from_arg_matches(&matches)).map_err(|error| refused(&error.to_string()))
+    matches.and_then(|matches| A::from_arg_matches(&matches)).map_err(|error| refused(&error))
 }
 
-/// Why words are refused: the first paragraph of what is told on a terminal, and its tip.
-fn refused(text: &str) -> Failure {
-    let first = text.lines().take_while(|line| !line.trim().is_empty()).map(str::trim).collect::<Vec<_>>().join(" ");
-    let tip = text.lines().find_map(|line| line.trim().strip_prefix("tip: "));
-    let hint = tip.unwrap_or("`tiefort COMMAND --help` says of each argument what it may be");
-    Failure::new(first.strip_prefix("error: ").unwrap_or(&first), hint)
+/// Why words are refused, without what a terminal is told beside it of usage and help.
+fn refused(error: &clap::Error) -> Failure {
+    let text = |kind: ContextKind| match error.get(kind) {
+        Some(ContextValue::String(one)) => vec![one.clone()],
+        Some(ContextValue::Strings(all)) => all.clone(),
+        _ => Vec::new(),
+    };
+    let names = |kind: ContextKind| text(kind).iter().map(|word| argument(word)).collect::<Vec<String>>().join(", ");
+    let name = names(ContextKind::InvalidArg);
+    let found = text(ContextKind::InvalidValue).join(" ");
+    let message = match (error.kind(), error.source()) {
+        (ErrorKind::InvalidValue, _) => {
+            format!("{name}: found {found:?}, expected one of {}", text(ContextKind::ValidValue).join(", "))
+        }
+        (ErrorKind::ValueValidation, Some(why)) => format!("{name}: found {found:?}: {why}"),
+        (ErrorKind::ArgumentConflict, _) => {
+            format!("found {name} and {}, expected one of them", names(ContextKind::PriorArg))
+        }
+        (ErrorKind::MissingRequiredArgument, _) => format!("found nothing for {name}, expected a value"),
+        (ErrorKind::UnknownArgument, _) => format!("found an argument {name}, which there is none of here"),
+        _ => error.kind().to_string(),
+    };
+    let hint = match text(ContextKind::SuggestedValue).first() {
+        Some(similar) => format!("is it {similar:?}?"),
+        None => "the function's documentation says of each argument what it may be".into(),
+    };
+    Failure::new(message, hint)
+}
+
+/// `--max-residual <M>` without what its value is called.
+fn argument(word: &str) -> String {
+    word.split([' ', '=', '<']).next().unwrap_or_default().to_owned()
 }
 
 #[cfg(test)]
@@ -131,12 +159,21 @@ mod tests {
     use super::*;
 
     #[test]
-    fn words_are_refused_as_the_command_line_does() {
+    fn words_are_refused_in_a_sentence() {
         let request = |words: &[&str]| tin_request(Path::new("array"), words.iter().map(Into::into).collect());
         let refused = |words: &[&str]| request(words).unwrap_err().message().to_owned();
         assert_eq!(request(&["--points", "50"]).unwrap().points, Some(50));
-        assert!(refused(&["--triangles", "1"]).starts_with("invalid value '1' for '--triangles <N>'"));
-        assert!(refused(&["--points", "50", "--effort", "bset"]).contains("bset"));
-        assert!(refused(&["--points", "50", "--method", "paper", "--effort", "best"]).contains("--effort"));
+        let of_triangles = refused(&["--triangles", "1"]);
+        assert!(of_triangles.starts_with("--triangles: found \"1\": "), "{of_triangles}");
+        let of_effort = refused(&["--points", "50", "--effort", "bset"]);
+        assert_eq!(of_effort, "--effort: found \"bset\", expected one of fast, normal, best");
+        assert!(refused(&["--points", "50", "--method", "paper", "--effort", "best"]).contains("effort"));
+        let told =
+            [&["--points", "x"][..], &["--effort", "bset"], &["--wings", "2"], &["--points", "5", "--points", "6"]];
+        for words in told {
+            let failure = request(words).unwrap_err();
+            let text = format!("{} {}", failure.message(), failure.hint());
+            assert!(!["Usage", "--help", "<"].iter().any(|part| text.contains(part)), "{text}");
+        }
     }
 }

@@ -23,7 +23,7 @@ use tin::{CostUnit, Proximity, Rule, Stop, SurveyTask, TileTask};
 use crate::workbench::heights::Heights;
 use crate::workbench::join::join;
 use crate::workbench::request::{TinMethod, TinRequest, TinStart, refuse};
-use crate::workbench::tally::{tally_of, tally_on_all};
+use crate::workbench::tally::{tally_of, tally_on_all, without_voids};
 use crate::workbench::tiles::usual_tiles;
 use crate::workbench::trend::continued;
 
@@ -132,10 +132,12 @@ impl Heights {
         let workers = Workers::new(workers);
         let tally = tally_on_all(&self.dem, &tin, &workers, stop)?;
         let each = |count: usize, piece: &(dyn Fn(usize) + Sync)| schedule::for_each_piece(&workers, count, piece);
+        let limit = fidelity::limit(&self.dem, tin.triangles.len(), &each);
+        let tin = without_voids(tin, &self.dem);
         Ok(Mesh {
             points: tin.vertices.len(),
             residual: crate::residual_of(&tally),
-            limit: fidelity::limit(&self.dem, tin.triangles.len(), &each),
+            limit,
             tin,
             dem: Arc::clone(&self.dem),
             east_m: self.frame.south_west[0],

@@ -3,10 +3,11 @@
 //!
 //! Tiles cover their squares: around what is exported the ground goes on from its border and falls to the lowest
 //! height, and where no source has a height the surface that closes the hole is kept; `holes.geojson` says where. A
-//! tile is one surface without classes, so decks are left out.
+//! tile is one surface without classes, so decks are left out; where water is, a mask says.
 
 mod clip;
 mod collar;
+mod extensions;
 mod holes;
 mod lattice;
 mod tile;
@@ -22,6 +23,7 @@ use crate::globe::Globe;
 use crate::mesh::{Mesh, cross, minus, unit};
 use crate::{Datum, ExportError, Product, Put, Work};
 use collar::{GlobeMesh, with_collar};
+use extensions::{CELLS, WaterMask};
 use holes::holes;
 use lattice::{Node, STEPS, height_steps, lon_lat, steps, tiles};
 use tile::Tile;
@@ -32,6 +34,8 @@ const MODULES_PER_TILE: f64 = 5.0;
 const DEGREE_M: f64 = 111_320.0;
 /// Squares of heights along a side of a tile above the finest level.
 const GRID: i64 = 64;
+/// Levels between tiles that list those below them.
+const METADATA_LEVELS: u32 = 10;
 
 /// Writes `layer.json`, `LEVEL/COLUMN/ROW.terrain` and, where there are holes, `holes.geojson`. `assumed` is what to
 /// take heights to be above; else the database says it. Returns what was done to heights.
@@ -73,6 +77,8 @@ pub struct QuantizedMesh<P> {
     /// Of the finest level.
     nodes: Vec<Node>,
     triangles: Vec<[u32; 3]>,
+    /// Which of them are water; empty where none is.
+    wet: Vec<bool>,
     /// Triangles over each tile of the finest level, by row and column.
     of_tile: BTreeMap<[i64; 2], Vec<u32>>,
 }
@@ -95,8 +101,12 @@ impl<P: Borrow<Product>> QuantizedMesh<P> {
         let extent_m = f64::from(whole.rect.rows().max(whole.rect.cols())) * whole.side_m();
         let holes = holes(&mesh, &globe);
         let (nodes, triangles, of_tile) = (Vec::new(), Vec::new(), BTreeMap::new());
+        let mut wet: Vec<bool> = mesh.classes.iter().map(|class| whole.water.contains(class)).collect();
+        if !wet.contains(&true) {
+            wet.clear();
+        }
         let fall_m = (2.0 * collar_m).max(0.2 * extent_m);
-        let mut terrain = Self { product, earth, foot_m, level, fall_m, bounds, holes, nodes, triangles, of_tile };
+        let mut terrain = Self { product, earth, foot_m, level, fall_m, bounds, holes, nodes, triangles, wet, of_tile };
         let outer_m = |height_m| terrain.fallen(height_m, collar_m);
         let sheet = with_collar(terrain.product.borrow(), &mesh, &globe, &terrain.earth, collar_m, outer_m)?;
         terrain.place(sheet);
@@ -147,16 +157,57 @@ impl<P: Borrow<Product>> QuantizedMesh<P> {
 
     /// The bytes of a tile that there is.
     fn made(&self, level: u32, col: i64, row: i64) -> Vec<u8> {
-        if level < self.level {
-            return self.grid(level, col, row).bytes();
-        }
-        let mut tile = Tile::new(level, col, row);
+        let mut tile = if level < self.level { self.grid(level, col, row) } else { self.cut(col, row) };
+        tile.metadata = level.is_multiple_of(METADATA_LEVELS).then(|| self.below(level, col, row));
+        tile.bytes()
+    }
+
+    /// A tile of the triangles themselves.
+    fn cut(&self, col: i64, row: i64) -> Tile {
+        let mut tile = Tile::new(self.level, col, row);
+        let mut water = WaterMask::dry();
         for &triangle in self.of_tile.get(&[row, col]).into_iter().flatten() {
             let corners = self.triangles[triangle as usize].map(|v| self.nodes[v as usize]);
             tile.add(&clip::piece(corners, col, row));
+            // Around what is exported there is none.
+            if self.wet.get(triangle as usize) == Some(&true) {
+                water.add(corners, [col * STEPS, row * STEPS]);
+            }
         }
-        assert!(0.999 < tile.covered(), "ground goes on over all of tile {level}/{col}/{row}");
-        tile.bytes()
+        assert!(0.999 < tile.covered(), "ground goes on over all of tile {}/{col}/{row}", self.level);
+        tile.water = self.has_water().then_some(water);
+        tile
+    }
+
+    fn has_water(&self) -> bool {
+        !self.wet.is_empty()
+    }
+
+    /// Whether there is water at a longitude and latitude.
+    fn is_water_at(&self, place: [f64; 2]) -> bool {
+        let product: &Product = self.product.borrow();
+        let rect = product.rect;
+        let (low, high) = (product.corner_m(rect.south, rect.west), product.corner_m(rect.north, rect.east));
+        let inside = |place: &[f64; 2]| (0..2).all(|axis| low[axis] <= place[axis] && place[axis] < high[axis]);
+        let place = self.earth.place_m(place).filter(inside);
+        place.and_then(|place| class_at(product, place)).is_some_and(|class| product.water.contains(&class))
+    }
+
+    /// What a tile says of the tiles below it, down to the next that says so.
+    fn below(&self, level: u32, col: i64, row: i64) -> Value {
+        let ranges = |below: u32| {
+            let (cols, rows) = self.bounds.tiles(self.level, below);
+            let part = |at: i64, [first, last]: [i64; 2]| {
+                let finer = below - level;
+                [first.max(at << finer), last.min(((at + 1) << finer) - 1)]
+            };
+            let ([west, east], [south, north]) = (part(col, cols), part(row, rows));
+            let is_any = west <= east && south <= north;
+            let range = || json!({ "startX": west, "startY": south, "endX": east, "endY": north });
+            is_any.then(range).into_iter().collect::<Vec<Value>>()
+        };
+        let last = self.level.min(level + METADATA_LEVELS);
+        json!({ "available": (level + 1..=last).map(ranges).collect::<Vec<_>>() })
     }
 
     /// Puts ground and collar on the lattice, and finds the triangles over each tile of the finest level.
@@ -208,6 +259,9 @@ impl<P: Borrow<Product>> QuantizedMesh<P> {
         for (i, j) in (0..GRID).flat_map(|j| (0..GRID).map(move |i| (i, j))) {
             tile.add(&[node(i, j), node(i + 1, j), node(i + 1, j + 1), node(i, j + 1)]);
         }
+        let middle = |tile: i64, cell: i64| tile * STEPS + (2 * cell + 1) * STEPS / (2 * CELLS);
+        let is_water = |i: i64, j: i64| self.is_water_at(lon_lat(level, [middle(col, i), middle(row, j)]));
+        tile.water = self.has_water().then(|| WaterMask::of(is_water));
         tile
     }
 
@@ -241,6 +295,10 @@ impl<P: Borrow<Product>> QuantizedMesh<P> {
         };
         let product: &Product = self.product.borrow();
         let area = &product.manifest.area;
+        let extensions: Vec<&str> = match self.has_water() {
+            true => vec!["octvertexnormals", "watermask", "metadata"],
+            false => vec!["octvertexnormals", "metadata"],
+        };
         let of_holes = if self.holes.is_some() { "; holes are closed, holes.geojson says where" } else { "" };
         json!({
             "tilejson": "2.1.0",
@@ -251,7 +309,8 @@ impl<P: Borrow<Product>> QuantizedMesh<P> {
             "scheme": "tms",
             "projection": "EPSG:4326",
             "tiles": ["{z}/{x}/{y}.terrain"],
-            "extensions": ["octvertexnormals"],
+            "extensions": extensions,
+            "metadataAvailability": METADATA_LEVELS,
             "attribution": product.attributions().join("; "),
             "bounds": self.bounds.degrees,
             "minzoom": 0,
@@ -342,20 +401,32 @@ fn collar_m(product: &Product, earth: &Earth, bounds: &Bounds, level: u32) -> Re
 }
 
 /// Height of the triangles at an easting and northing of a product, in metres above its datum.
-fn height_m(product: &Product, [east_m, north_m]: [f64; 2]) -> Option<f64> {
+fn height_m(product: &Product, place_m: [f64; 2]) -> Option<f64> {
+    let (module, place) = module_at(product, place_m)?;
+    triangle_at(module, place).map(|(_, height)| height)
+}
+
+/// Class of the triangle at an easting and northing of a product.
+fn class_at(product: &Product, place_m: [f64; 2]) -> Option<u8> {
+    let (module, place) = module_at(product, place_m)?;
+    triangle_at(module, place).map(|(triangle, _)| module.classes[triangle])
+}
+
+/// The load module at an easting and northing, and the place in it in quanta.
+fn module_at(product: &Product, [east_m, north_m]: [f64; 2]) -> Option<(&LoadModule, [f64; 2])> {
     let rect = product.rect;
     let index = |metres: f64, first: u32, last: u32| ((metres / product.side_m()) as u32).clamp(first, last);
     let (x, y) = (east_m - product.frame.origin_east_m, north_m - product.frame.origin_north_m);
     let id = ModuleId { row: index(y, rect.south, rect.north - 1), col: index(x, rect.west, rect.east - 1) };
     let corner = [f64::from(id.col) * product.side_m(), f64::from(id.row) * product.side_m()];
     let quanta = f64::from(QUANTA_PER_METRE);
-    height_in(product.module(id)?, [(x - corner[0]) * quanta, (y - corner[1]) * quanta])
+    Some((product.module(id)?, [(x - corner[0]) * quanta, (y - corner[1]) * quanta]))
 }
 
-/// Height of the triangle at a place in quanta, or of the one next to it.
-fn height_in(module: &LoadModule, [x, y]: [f64; 2]) -> Option<f64> {
+/// The triangle at a place in quanta, or the one next to it, and its height there.
+fn triangle_at(module: &LoadModule, [x, y]: [f64; 2]) -> Option<(usize, f64)> {
     let mut best = (f64::NEG_INFINITY, None);
-    for triangle in &module.triangles {
+    for (number, triangle) in module.triangles.iter().enumerate() {
         let [a, b, c] = triangle.map(|v| {
             let v = module.vertices[usize::from(v)];
             [f64::from(v.x), f64::from(v.y), f64::from(v.z)]
@@ -366,7 +437,7 @@ fn height_in(module: &LoadModule, [x, y]: [f64; 2]) -> Option<f64> {
         let least = shares.iter().fold(f64::INFINITY, |least, share| least.min(share / whole));
         if best.0 < least {
             let height = (a[2] * shares[0] + b[2] * shares[1] + c[2] * shares[2]) / whole;
-            best = (least, Some(height / f64::from(QUANTA_PER_METRE)));
+            best = (least, Some((number, height / f64::from(QUANTA_PER_METRE))));
         }
         if 0.0 <= least {
             break;

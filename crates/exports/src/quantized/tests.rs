@@ -18,6 +18,9 @@ struct Decoded {
     /// West, south, east and north.
     edges: [Vec<u32>; 4],
     normals: Vec<[u8; 2]>,
+    /// By row from the north, or one for all.
+    water: Option<Vec<u8>>,
+    metadata: Option<Value>,
 }
 
 impl Decoded {
@@ -65,8 +68,19 @@ fn decode(bytes: &[u8]) -> Decoded {
         edge
     });
     assert_eq!((bytes[at], u32_at(at + 1) as usize), (1, 2 * count));
-    let normals = bytes[at + 5..].chunks_exact(2).map(|pair| [pair[0], pair[1]]).collect();
-    assert_eq!(bytes.len(), at + 5 + 2 * count);
+    let normals = bytes[at + 5..at + 5 + 2 * count].chunks_exact(2).map(|pair| [pair[0], pair[1]]).collect();
+    at += 5 + 2 * count;
+    let (mut water, mut metadata) = (None, None);
+    while at < bytes.len() {
+        let (number, data) = (bytes[at], &bytes[at + 5..at + 5 + u32_at(at + 1) as usize]);
+        match number {
+            2 => water = Some(data.to_vec()),
+            4 => metadata = serde_json::from_slice(&data[4..]).unwrap(),
+            _ => panic!("found extension {number}"),
+        }
+        at += 5 + data.len();
+    }
+    assert_eq!(at, bytes.len());
     let float = |at: usize| f32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
     Decoded {
         foot_m: float(24),
@@ -75,6 +89,8 @@ fn decode(bytes: &[u8]) -> Decoded {
         triangles: indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect(),
         edges,
         normals,
+        water,
+        metadata,
     }
 }
 
@@ -129,6 +145,7 @@ fn check_tiles(files: &BTreeMap<String, Vec<u8>>) {
         }
     }
     assert_eq!(listed, tiles.len());
+    check_metadata(&tiles);
     assert!(tiles.contains_key(&(0, 0, 0)) && tiles.contains_key(&(0, 1, 0)));
     let mut compared = 0;
     for (&(level, col, row), tile) in &tiles {
@@ -161,6 +178,54 @@ fn check_tiles(files: &BTreeMap<String, Vec<u8>>) {
         }
     }
     assert!(0 < compared);
+}
+
+/// Both roots, and every tile that is told of below them, tell of all tiles.
+fn check_metadata(tiles: &BTreeMap<(u32, i64, i64), Decoded>) {
+    let mut told: BTreeSet<(u32, i64, i64)> = [(0, 0, 0), (0, 1, 0)].into();
+    for (&(level, col, row), tile) in tiles {
+        assert_eq!(tile.metadata.is_some(), level % METADATA_LEVELS == 0, "{level}/{col}/{row}");
+        for (below, ranges) in tile.metadata.iter().flat_map(|told| told["available"].as_array().unwrap()).enumerate() {
+            for range in ranges.as_array().unwrap() {
+                let of = |name: &str| range[name].as_i64().unwrap();
+                let cols = of("startX")..=of("endX");
+                let below = level + 1 + below as u32;
+                told.extend(cols.flat_map(|col| (of("startY")..=of("endY")).map(move |row| (below, col, row))));
+            }
+        }
+    }
+    assert!(told.iter().eq(tiles.keys()));
+}
+
+#[test]
+fn a_mask_says_where_water_is_and_there_is_none_without_water() {
+    let mut product = samples::product();
+    let dry = exported(&product);
+    assert!(dry.iter().filter(|(name, _)| name.ends_with("terrain")).all(|(_, bytes)| decode(bytes).water.is_none()));
+    // All of its ground; not that around it.
+    product.water = vec![product.modules[0].classes[0]];
+    let files = exported(&product);
+    let layer: Value = serde_json::from_slice(&files["layer.json"]).unwrap();
+    assert!(layer["extensions"].as_array().unwrap().contains(&json!("watermask")));
+    let earth = Earth::new(&product, Some(Datum::Ellipsoid)).unwrap();
+    let level = finest_level(product.side_m());
+    let (mut wet, mut off) = (0, 0);
+    for (name, bytes) in files.iter().filter(|(name, _)| name.ends_with("terrain")) {
+        let (of, col, row) = key(name);
+        let mask = decode(bytes).water.unwrap();
+        assert!([1, 65_536].contains(&mask.len()) && mask.iter().all(|byte| [0, 255].contains(byte)), "{name}");
+        for (number, &byte) in mask.iter().enumerate().filter(|_| level - 1 <= of && mask.len() != 1) {
+            let (i, j) = (number as i64 % CELLS, CELLS - 1 - number as i64 / CELLS);
+            let middle = |tile: i64, cell: i64| tile * STEPS + (2 * cell + 1) * STEPS / (2 * CELLS);
+            let place = earth.place_m(lon_lat(of, [middle(col, i), middle(row, j)])).unwrap();
+            let [x, y] = [place[0] - 505_000.0, place[1] - 3_875_000.0];
+            let is_water =
+                0.0 < x && x < 1000.0 && 0.0 < y && y < 500.0 && class_at(&product, place) == Some(product.water[0]);
+            wet += u32::from(is_water);
+            off += u32::from((byte == 255) != is_water);
+        }
+    }
+    assert!(1000 < wet && 100 * off < wet, "{off} of {wet}");
 }
 
 #[test]

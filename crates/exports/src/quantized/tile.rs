@@ -2,7 +2,10 @@
 
 use std::collections::HashMap;
 
+use serde_json::Value;
+
 use super::clip::doubled_area;
+use super::extensions::{WaterMask, put_metadata};
 use super::lattice::{Ladder, Node, STEPS, height_m, lon_lat};
 use crate::earth::earth_centred;
 use crate::mesh::{cross, dot, minus, unit};
@@ -22,12 +25,17 @@ pub(crate) struct Tile {
     /// Of the nodes that fall on one place of the lattice the lowest, whichever comes first: so neighbours agree.
     lowest: HashMap<(i64, i64), Node>,
     triangles: Vec<[u32; 3]>,
+    /// Where it has water, if anything exported has.
+    pub water: Option<WaterMask>,
+    /// What it says of the tiles below it, if it is one that does.
+    pub metadata: Option<Value>,
 }
 
 impl Tile {
     pub(crate) fn new(level: u32, col: i64, row: i64) -> Self {
         let (place_of, lowest) = (HashMap::new(), HashMap::new());
-        Self { level, col, row, nodes: Vec::new(), place_of, lowest, triangles: Vec::new() }
+        let (nodes, triangles) = (Vec::new(), Vec::new());
+        Self { level, col, row, nodes, place_of, lowest, triangles, water: None, metadata: None }
     }
 
     /// Adds a convex polygon as a fan; what is thinner than the lattice is left out.
@@ -88,6 +96,8 @@ impl Tile {
         self.put_triangles(&mut bytes, wide);
         self.put_edges(&mut bytes, wide);
         put_normals(&mut bytes, &nodes);
+        self.water.iter().for_each(|water| water.put(&mut bytes));
+        self.metadata.iter().for_each(|metadata| put_metadata(&mut bytes, metadata));
         bytes
     }
 

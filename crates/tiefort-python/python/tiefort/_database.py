@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import operator
+import os
 from dataclasses import dataclass
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
@@ -225,19 +226,23 @@ class Database:
         places, shape = places_of(xy)
         return self._ground.classes(places).reshape(shape)
 
-    def line_of_sight(self, a: npt.ArrayLike, b: npt.ArrayLike) -> LineOfSight:
+    def line_of_sight(self, a: npt.ArrayLike, b: npt.ArrayLike, *, absolute: bool = False) -> LineOfSight:
         """Return what stands between places; `a` and `b` are broadcast against each other.
 
         Parameters
         ----------
         a, b : array_like, shape (..., 3)
             East, north and height of eyes and of targets, in metres.
+        absolute : bool
+            Whether heights are above the vertical datum; they are above the ground unless said so, as they are for
+            ``tiefort sight``.
 
         Returns
         -------
         LineOfSight
+            An end above the ground where there is no ground makes the answer unknown.
         """
-        lines, shape = _lines(a, b)
+        lines, shape = self._lines(a, b, absolute)
         share, clearance_m = self._ground.sights(lines).T
         hidden = share <= 1.0
         blocker = np.where(hidden[:, None], lines[:, :3] + share[:, None] * (lines[:, 3:] - lines[:, :3]), np.nan)
@@ -248,18 +253,41 @@ class Database:
             clearance_m.reshape(shape),
         )
 
-    def visible(self, a: npt.ArrayLike, b: npt.ArrayLike) -> npt.NDArray[np.bool_]:
+    def visible(self, a: npt.ArrayLike, b: npt.ArrayLike, *, absolute: bool = False) -> npt.NDArray[np.bool_]:
         """Return whether nothing stands between places: `line_of_sight` without the rest, in less time."""
-        lines, shape = _lines(a, b)
+        lines, shape = self._lines(a, b, absolute)
         return self._ground.seen(lines).reshape(shape)
 
-    def profile(self, through: npt.ArrayLike, spacing_m: float = 10.0) -> Profile:
-        """Return the ground along a line, as ``tiefort profile`` does.
+    def _lines(
+        self, a: npt.ArrayLike, b: npt.ArrayLike, absolute: bool
+    ) -> tuple[npt.NDArray[np.float64], tuple[int, ...]]:
+        """Both ends of every line, with heights above the datum, and the shape of what is answered."""
+        ends = [places_of(place, 3, name) for place, name in ((a, "a"), (b, "b"))]
+        if not absolute:
+            ends = [(self._raised(rows), shape) for rows, shape in ends]
+        (eyes, of_eyes), (targets, of_targets) = ends
+        try:
+            shape = np.broadcast_shapes(of_eyes, of_targets)
+        except ValueError as error:
+            message = f"found {of_eyes} places a and {of_targets} places b, expected as many, or one"
+            raise RequestError(message, "shapes follow NumPy's rules of broadcasting") from error
+        lines = np.empty((*shape, 6))
+        lines[..., :3] = eyes.reshape((*of_eyes, 3))
+        lines[..., 3:] = targets.reshape((*of_targets, 3))
+        return lines.reshape(-1, 6), shape
+
+    def _raised(self, places: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        """Places whose heights are above the ground, with heights above the datum."""
+        ground = self._ground.heights(np.ascontiguousarray(places[:, :2]))
+        return np.column_stack((places[:, :2], places[:, 2] + ground))
+
+    def profile(self, *places: npt.ArrayLike, spacing_m: float = 10.0) -> Profile:
+        """Return the ground along a line, as ``tiefort profile`` does: ``profile(a, b)``.
 
         Parameters
         ----------
-        through : array_like, shape (n, 2)
-            East and north of the places that it goes through, straight from one to the next, in metres.
+        *places : array_like, shape (2,)
+            East and north of two or more places that it goes through, straight from one to the next, in metres.
         spacing_m : float
             Metres between heights at most; the places are among them.
 
@@ -267,15 +295,22 @@ class Database:
         -------
         Profile
         """
-        places, shape = places_of(through, name="through")
-        if len(shape) != 1 or len(places) < 2:
-            raise RequestError(f"through: found {shape} places, expected a list of two or more", "[[e, n], [e, n]]")
+        if len(places) < 2:
+            raise RequestError(f"profile: found {len(places)} places, expected two or more", "profile(a, b)")
+        rows = []
+        for number, place in enumerate(places):
+            row, shape = places_of(place, name=f"place {number}")
+            if shape != ():
+                message = f"place {number}: found {len(row)} places, expected one"
+                raise RequestError(message, "profile(*places) goes through all of an array")
+            rows.append(row)
+        through = np.concatenate(rows)
         if not (math.isfinite(spacing_m) and 0 < spacing_m):
             raise RequestError(f"spacing_m: found {spacing_m}, expected a number above 0", "in metres")
-        steps = float(np.hypot(*np.diff(places, axis=0).T).sum()) / spacing_m
+        steps = float(np.hypot(*np.diff(through, axis=0).T).sum()) / spacing_m
         if not steps <= _VIEWSHED_MAX:
             raise RequestError(f"found {steps:.0f} heights, expected at most {_VIEWSHED_MAX}", "a larger spacing_m")
-        along, east, north, height, deck, ofclass = self._ground.profile(places, float(spacing_m)).T
+        along, east, north, height, deck, ofclass = self._ground.profile(through, float(spacing_m)).T
         return Profile(along, np.column_stack((east, north)), height, deck, ofclass.astype(np.uint8), self.crs)
 
     def viewshed(
@@ -329,7 +364,7 @@ class Database:
         for first in range(0, len(targets), _AT_ONCE):
             part = targets[first : first + _AT_ONCE]
             heights = self.heights(part) + target_m
-            seen[first : first + _AT_ONCE] = self.visible(eye, np.column_stack((part, heights)))
+            seen[first : first + _AT_ONCE] = self.visible(eye, np.column_stack((part, heights)), absolute=True)
         visible = np.zeros(inside.shape, bool)
         visible[inside] = seen
         corner = (reach + 0.5) * spacing_m
@@ -365,6 +400,31 @@ class Database:
         squares = shapely.box(left, low, left + self.module_side_m, low + self.module_side_m)
         columns = {**counts, "rms_m": table[:, 5], "max_m": table[:, 6]}
         return geopandas.GeoDataFrame(columns, geometry=squares, crs=self.crs)
+
+    def features(self, layer: str = "lines") -> GeoDataFrame:
+        """Return what became of roads, rivers and lakes, as a ``geopandas.GeoDataFrame``.
+
+        Parameters
+        ----------
+        layer : {"lines", "nodes", "decks", "culverts", "remarks"}
+            Lines that are edges of the ground, stations of them, decks of bridges, culverts, or what was mended,
+            degraded or left out, with its place.
+
+        Raises
+        ------
+        RequestError
+            When the database has no features, or there is no such layer.
+        """
+        import geopandas
+
+        self._ground.frame()
+        file = os.path.join(self._path, "features.gpkg")
+        if not os.path.exists(file):
+            raise RequestError(f"{self._path}: found no features", "a job has them in its section [features]")
+        known = list(geopandas.list_layers(file)["name"])
+        if layer not in known:
+            raise RequestError(f"layer: found {layer!r}, expected {_words(known)}", "one layer for each call")
+        return geopandas.read_file(file, layer=layer)
 
     def to_xarray(self, spacing_m: float | None = None) -> DataArray:
         """Return heights of the whole area as an ``xarray.DataArray``, the northern row first.
@@ -403,18 +463,8 @@ def _index(name: str, number: int) -> int:
     return number
 
 
-def _lines(a: npt.ArrayLike, b: npt.ArrayLike) -> tuple[npt.NDArray[np.float64], tuple[int, ...]]:
-    eyes, of_eyes = places_of(a, 3, "a")
-    targets, of_targets = places_of(b, 3, "b")
-    try:
-        shape = np.broadcast_shapes(of_eyes, of_targets)
-    except ValueError as error:
-        message = f"found {of_eyes} places a and {of_targets} places b, expected as many, or one"
-        raise RequestError(message, "shapes follow NumPy's rules of broadcasting") from error
-    lines = np.empty((*shape, 6))
-    lines[..., :3] = eyes.reshape((*of_eyes, 3))
-    lines[..., 3:] = targets.reshape((*of_targets, 3))
-    return lines.reshape(-1, 6), shape
+def _words(names: list[str]) -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} or {names[-1]}"
 
 
 def _data_array(values: npt.NDArray[Any], transform: Affine6, crs: str, name: str) -> DataArray:

@@ -38,14 +38,15 @@ ROW,COL from the south-west, nodes of a glb r0003c0017. Classes are materials
 (glb, 3dtiles, openflight, usd; obj and gazebo with an mtl) or attributes
 (gpkg); the faces of a ply come class by class, and comments in it say which are
 whose. Decks of bridges are meshes of their own, named decks; geotiff,
-quantized-mesh, mbtiles and heightmap hold the ground alone. A geotiff is cloud
-optimised, with overviews; it names the system of its heights where that is
-known. Where no source has a height, rasters have none (NaN) and meshes no
-triangles; gpkg and modules keep these as class 'hole' (255), quantized-mesh
-closes them and says where in holes.geojson, and a heightmap closes them, too.
-3tz is 3dtiles in one file, mbtiles quantized-mesh in one; these four want
-heights above the ellipsoid: they know EGM96 and the ellipsoid, and refuse any
-other datum unless told what to take it for.";
+quantized-mesh, mbtiles and heightmap hold the ground alone, quantized-mesh and
+mbtiles with masks of water. A geotiff is cloud optimised, with overviews; it
+names the system of its heights where that is known. Where no source has a
+height, rasters have none (NaN) and meshes no triangles; gpkg and modules keep
+these as class 'hole' (255), quantized-mesh closes them and says where in
+holes.geojson, and a heightmap closes them, too. 3tz is 3dtiles in one file,
+mbtiles quantized-mesh in one; these four want heights above the ellipsoid: they
+know EGM96 and the ellipsoid, and refuse any other datum unless told what to
+take it for.";
 
 /// Arguments of `export`.
 #[derive(Args)]

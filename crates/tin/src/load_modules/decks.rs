@@ -1,5 +1,7 @@
 //! Decks of bridges, cut at the lines between load modules.
 
+use std::collections::BTreeMap;
+
 use terrain::{Decks, FeatureSurface, LatticePoint, ModuleId, ModuleVertex};
 
 use crate::load_modules::Layout;
@@ -38,6 +40,7 @@ pub fn cut_decks(decks: &[FeatureSurface], steps_per_post: i32, layout: &Layout)
             let slots = span(|at| at.col).filter_map(|col| layout.slot(row, col));
             slots.for_each(|slot| corners[slot] += deck.ring.len());
         }
+        let mut at_corners = BTreeMap::new();
         let places: Vec<LatticePoint> = deck.ring.iter().map(|vertex| vertex.at).collect();
         for triangle in ears(&places) {
             let corners = triangle.map(|corner| {
@@ -48,7 +51,7 @@ pub fn cut_decks(decks: &[FeatureSurface], steps_per_post: i32, layout: &Layout)
                     z: i64::from(vertex.height),
                 }
             });
-            cut(corners, deck.class, layout, &mut pieces);
+            cut(corners, deck.class, (layout, &mut at_corners), &mut pieces);
         }
     }
     let most = |(decks, corners): (Decks, usize)| {
@@ -86,8 +89,14 @@ fn ears(ring: &[LatticePoint]) -> Vec<[usize; 3]> {
     triangles
 }
 
-/// Cuts a triangle into the squares of load modules it lies in.
-fn cut(corners: [Corner; 3], class: u8, layout: &Layout, pieces: &mut [Vec<([ModuleVertex; 3], u8)>]) {
+/// Cuts a triangle of a deck into the squares of load modules it lies in, those of other tiles with them: `at_corners`
+/// has the height of the deck where four squares meet, which its first triangle there decides for all.
+fn cut(
+    corners: [Corner; 3],
+    class: u8,
+    (layout, at_corners): (&Layout, &mut BTreeMap<[i64; 2], i64>),
+    pieces: &mut [Vec<([ModuleVertex; 3], u8)>],
+) {
     let side = i64::from(layout.side());
     let span = |of: fn(&Corner) -> i64| {
         let low = corners.iter().map(of).min().unwrap_or(0).div_euclid(side);
@@ -97,18 +106,20 @@ fn cut(corners: [Corner; 3], class: u8, layout: &Layout, pieces: &mut [Vec<([Mod
     let ((south, north), (west, east)) = (span(|corner| corner.y), span(|corner| corner.x));
     for row in south..=north {
         for col in west..=east {
-            let Some(slot) = layout.slot(row as i32, col as i32) else { continue };
-            let id = ModuleId { row: row as u32, col: col as u32 };
-            let [west, south] = [i64::from(id.col) * side, i64::from(id.row) * side];
+            let slot = layout.slot(row as i32, col as i32);
+            let [west, south] = [col * side, row * side];
             let mut polygon = corners.to_vec();
-            for (axis, line, keep_above) in [
+            let lines = [
                 (Axis::X, west, true),
                 (Axis::X, west + side, false),
                 (Axis::Y, south, true),
                 (Axis::Y, south + side, false),
-            ] {
+            ];
+            for (axis, line, keep_above) in lines {
                 polygon = kept(&polygon, axis, line, keep_above);
             }
+            let lines = lines.map(|(axis, line, _)| (axis, line));
+            polygon.iter_mut().for_each(|corner| *corner = shared(*corner, corners, lines, at_corners));
             polygon.dedup();
             let on_sides = |corner: &Corner| {
                 [corner.x == west, corner.x == west + side, corner.y == south, corner.y == south + side]
@@ -122,12 +133,54 @@ fn cut(corners: [Corner; 3], class: u8, layout: &Layout, pieces: &mut [Vec<([Mod
             for pair in polygon.windows(2).skip(1) {
                 let triangle = [polygon[0], pair[0], pair[1]];
                 let [a, b, c] = triangle;
-                if 0 < (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x) {
+                let is_turned = 0 < (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
+                if let Some(slot) = slot.filter(|_| is_turned) {
                     pieces[slot].push((triangle.map(local), class));
                 }
             }
         }
     }
+}
+
+/// A corner of a piece of a triangle as all pieces there have it: on a line from the edge that crosses it alone, since
+/// one that was cut before crosses elsewhere by a rounding; where lines meet at one height.
+fn shared(
+    corner: Corner,
+    triangle: [Corner; 3],
+    lines: [(Axis, i64); 4],
+    at_corners: &mut BTreeMap<[i64; 2], i64>,
+) -> Corner {
+    if triangle.contains(&corner) {
+        return corner;
+    }
+    let on: Vec<(Axis, i64)> = lines.into_iter().filter(|(axis, line)| axis.of(corner) == *line).collect();
+    match on[..] {
+        [(axis, line)] => {
+            let [a, b, c] = triangle;
+            let crosses = |(a, b): &(Corner, Corner)| {
+                let [a, b] = [*a, *b].map(|end| axis.of(end));
+                a.min(b) < line && line < a.max(b)
+            };
+            let crossings = [(a, b), (b, c), (c, a)].into_iter().filter(crosses);
+            let off = |at: &Corner| (at.x - corner.x).abs() + (at.y - corner.y).abs() + (at.z - corner.z).abs();
+            crossings.map(|(a, b)| crossing(a, b, axis, line)).min_by_key(off).unwrap_or(corner)
+        }
+        [_, _] => {
+            let z = *at_corners.entry([corner.x, corner.y]).or_insert_with(|| height_at(triangle, corner));
+            Corner { z, ..corner }
+        }
+        _ => corner,
+    }
+}
+
+/// The height of a triangle's plane at a place.
+fn height_at([a, b, c]: [Corner; 3], place: Corner) -> i64 {
+    let cross = |from: Corner, to: Corner, at: Corner| {
+        i128::from((to.x - from.x) * (at.y - from.y)) - i128::from((to.y - from.y) * (at.x - from.x))
+    };
+    let (of_b, of_c, whole) = (cross(place, c, a), cross(a, b, place), cross(a, b, c));
+    let rise = of_b * i128::from(b.z - a.z) + of_c * i128::from(c.z - a.z);
+    a.z + (2 * rise + whole).div_euclid(2 * whole) as i64
 }
 
 /// A polygon with a corner in the middle of every long edge from one side of the load module to another, so that decks
@@ -196,6 +249,8 @@ fn crossing(a: Corner, b: Corner, axis: Axis, line: i64) -> Corner {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeSet;
+
     use super::*;
     use terrain::{ModuleGrid, Spacing, SurfaceGround, Vertex};
 
@@ -212,6 +267,30 @@ mod tests {
 
     fn cut_alone(deck: FeatureSurface) -> Vec<Decks> {
         cut_decks(&[deck], 64, &layout()).into_iter().map(|(decks, _)| decks).collect()
+    }
+
+    #[test]
+    fn where_four_load_modules_meet_a_deck_has_one_height_whatever_triangle_lies_there() {
+        let (side, line) = (layout().side(), 20 * 64);
+        for shift in 0..40 {
+            // Its two triangles meet close to the corner, at heights that are no plane.
+            let ring = [
+                (line - 97, line - 301 + shift, 0),
+                (line - 83, line + 299, 77),
+                (line + 101, line + 303, 1),
+                (line + 89, line - 298, 90),
+            ];
+            let cut = cut_alone(deck(&ring));
+            let at = |index: usize, x: u16, y: u16| -> BTreeSet<i32> {
+                cut[index].vertices.iter().filter(|v| (v.x, v.y) == (x, y)).map(|v| v.z).collect()
+            };
+            let heights = [at(0, side, side), at(1, 0, side), at(3, side, 0), at(4, 0, 0)];
+            assert!(heights.iter().all(|of| of.len() == 1 && *of == heights[0]), "{shift}: {heights:?}");
+            let along = |index: usize, line: u16| -> BTreeSet<(u16, i32)> {
+                cut[index].vertices.iter().filter(|v| v.x == line).map(|v| (v.y, v.z)).collect()
+            };
+            assert_eq!([along(0, side), along(3, side)], [along(1, 0), along(4, 0)], "{shift}");
+        }
     }
 
     fn area(decks: &[Decks]) -> i64 {

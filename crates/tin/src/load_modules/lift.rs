@@ -144,7 +144,10 @@ impl<'a> Lift<'a> {
                     }
                     let edge = ends.map(|end| [along(&self.decks.vertices[end]), self.heights[end]]);
                     let missing = missing_between(edge, &side);
-                    for end in ends {
+                    // Where four load modules meet, two of them have nothing of this side.
+                    let is_shared =
+                        |end: &usize| ![0, ground.side].contains(&place(self.decks.vertices[*end])[1 - axis]);
+                    for end in ends.into_iter().filter(is_shared) {
                         raised[end] = raised[end].max((self.heights[end] + missing).min(self.cap(end, top)));
                     }
                 }
@@ -406,12 +409,13 @@ mod tests {
     #[test]
     fn where_no_corner_can_be_added_a_deck_rises_steeply_rather_than_into_the_ground() {
         let ground = hill(3000, 0);
-        // Its only corner inside is far from the hill.
+        // Its corners inside are far from the hill.
         let at = |(x, y)| vertex(x, y, 0);
-        let [a, b, c, d] = [(0, 6390), (SIDE, 6390), (SIDE, 6410), (300, 6410)].map(at);
-        let decks = Decks::of_triangles([([a, b, d], 3), ([b, c, d], 3)]);
-        let lifted = lift_decks(&decks, &ground, 2);
-        assert_eq!((lifted.check(SIDE), lifted.triangles.len()), (Ok(()), 2));
+        let [a, b, c, d] = [(0, 6390), (300, 6390), (300, 6410), (0, 6410)].map(at);
+        let [e, f] = [(SIDE, 6390), (SIDE, 6410)].map(at);
+        let decks = Decks::of_triangles([([a, b, c], 3), ([a, c, d], 3), ([b, e, c], 3), ([e, f, c], 3)]);
+        let lifted = lift_decks(&decks, &ground, 4);
+        assert_eq!((lifted.check(SIDE), lifted.triangles.len()), (Ok(()), 4));
         let [before, after] = [&decks, &lifted].map(|decks| deepest(decks, &ground));
         assert!(2000.0 < before && after < ADDED_FOR, "{before} {after} {lifted:?}");
     }

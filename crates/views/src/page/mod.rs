@@ -73,35 +73,41 @@ pub fn report_html(page: &Page) -> String {
             body {
                 h1 { (title) }
                 p.quiet { @if page.title.is_some() { "Gaming area " (report.area) ": " } (what_it_is(manifest)) }
-                @if let Some(features) = &report.features { (tables::in_the_ground(features)) }
-                @if let Some(scene) = page.scene { (maps::first(scene, marks)) }
-                (tables::verdict(report))
-                nav {
-                    @for (id, name) in sections(page) { a href={ "#" (id) } { (name) } }
-                }
-                (headline(page))
-                section id="limits" { h2 { "Limits" } (tables::limits(report, marks)) (tables::advice(report)) }
-                section id="residuals" {
-                    h2 { "Residuals" } (tables::residuals(report)) (tables::levels(report)) (histograms(page))
-                }
-                @if let Some(features) = &report.features {
-                    section id="features" {
-                        h2 { "Roads and water" } (tables::features(features))
-                        @if let Some(scene) = page.scene { (maps::features(scene)) }
-                    }
-                }
-                @match page.scene {
-                    Some(scene) => {
-                        section id="maps" { h2 { "Maps" } (maps::maps(scene)) }
-                        section id="worst" {
-                            h2 { "The worst load modules" } (worst(page, scene, &worst_modules, marks))
+                div.first[page.scene.is_some()] {
+                    @if let Some(scene) = page.scene { div { (maps::first(scene, marks)) } }
+                    div {
+                        (tables::verdict(report))
+                        @if let Some(features) = &report.features { (tables::in_the_ground(features)) }
+                        (headline(page))
+                        nav {
+                            @for (id, name) in sections(page) { a href={ "#" (id) } { (name) } }
                         }
                     }
-                    None => section id="maps" { h2 { "Maps" } (without_maps()) }
                 }
-                section id="breaches" { h2 { "Breaches" } (tables::breaches(report, marks)) }
-                section id="times" { h2 { "Times" } (tables::stages(report)) }
-                section id="made-from" { h2 { "Made from" } (tables::sources(manifest)) (settings(page)) }
+                main {
+                    section id="limits" { h2 { "Limits" } (tables::limits(report, marks)) (tables::advice(report)) }
+                    section id="residuals" {
+                        h2 { "Residuals" } (tables::residuals(report)) (tables::levels(report)) (histograms(page))
+                    }
+                    @if let Some(features) = &report.features {
+                        section id="features" {
+                            h2 { "Roads and water" } (tables::features(features))
+                            @if let Some(scene) = page.scene { (maps::features(scene)) }
+                        }
+                    }
+                    @match page.scene {
+                        Some(scene) => {
+                            section.whole id="maps" { h2 { "Maps" } (maps::maps(scene)) }
+                            section.whole id="worst" {
+                                h2 { "The worst load modules" } (worst(page, scene, &worst_modules, marks))
+                            }
+                        }
+                        None => section id="maps" { h2 { "Maps" } (without_maps()) }
+                    }
+                    section id="breaches" { h2 { "Breaches" } (tables::breaches(report, marks)) }
+                    section id="times" { h2 { "Times" } (tables::stages(report)) }
+                    section id="made-from" { h2 { "Made from" } (tables::sources(manifest)) (settings(page)) }
+                }
             }
         }
     };

@@ -14,16 +14,18 @@ use crate::table::grouped;
 
 pub(super) fn verdict(report: &Report) -> Markup {
     let breaches = report.breaches.len() as u64;
+    let is_short = 0 < breaches || !report.warnings.is_empty();
     html! {
-        @if breaches == 0 {
-            div.verdict { "Every limit is met." }
-        } @else {
-            div.verdict.breached {
-                b { (grouped(breaches)) } @if breaches == 1 { " limit is" } @else { " limits are" }
-                " not met: see " a href="#breaches" { "breaches" } "."
+        div.verdict.breached[is_short] {
+            @if 0 < breaches {
+                p {
+                    b { (grouped(breaches)) } @if breaches == 1 { " limit is" } @else { " limits are" }
+                    " not met: see " a href="#breaches" { "breaches" } "."
+                }
             }
+            @for warning in &report.warnings { p { b { "Warning: " } (warning) } }
+            @if breaches == 0 { p { "Every limit is met." } }
         }
-        @for warning in &report.warnings { pre.quiet { "warning: " (warning) } }
     }
 }
 
