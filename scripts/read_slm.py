@@ -31,6 +31,9 @@ LINE = struct.Struct("<BBBBHH")
 LINE_KINDS = ["travelled", "channel", "breakline"]
 LINE_FORMS = ["nothing", "line", "strip", "bench"]
 STOREYS = ["ground", "bridge", "tunnel"]
+PRISM = struct.Struct("<QiiBBH")
+CANOPY = struct.Struct("<QIBBHHH")
+OBJECT_KINDS = ["building", "tower", "wall", "wood", "scrub", "orchard", "row"]
 SIDES = ["south", "east", "north", "west"]
 
 
@@ -85,7 +88,7 @@ def parse(data):
     expect(end == len(data), "index", f"sections end at {end} of a file of {len(data)}")
     any_decks = any(module.get("decks", {}).get("triangles") for module in modules)
     expect(any_decks or version != 2, "index", "found no decks in a file of version 2")
-    others = any(module.get("lines") or module.get("unknown_parts") for module in modules)
+    others = any(module.get("lines") or module.get("objects") or module.get("unknown_parts") for module in modules)
     expect(others or version != 3, "index", "found no part other than decks in a file of version 3")
     return header, modules
 
@@ -216,8 +219,8 @@ def checked_decks(body, side, start, counts, part):
 
 
 def parse_parts(data, side, level, place, start, length):
-    """The parts of a load module, which take so many bytes from `start` on: decks, lines, kinds that are not known."""
-    found = {"decks": {"vertices": [], "triangles": [], "classes": []}, "lines": [], "unknown_parts": []}
+    """The parts of a load module, so many bytes from `start` on: decks, lines, objects, kinds that are not known."""
+    found = {"decks": {"vertices": [], "triangles": [], "classes": []}, "lines": [], "objects": [], "unknown_parts": []}
     if length == 0:
         return found
     of = f"load module {place[0]},{place[1]}" + (f" at level {level}" if level else "")
@@ -229,7 +232,7 @@ def parse_parts(data, side, level, place, start, length):
     expect((row, column, found_level) == (*place, level), f"parts of {of}", f"found {(row, column, found_level)}")
     at, last = start + table_bytes, 0
     for kind, bytes_of_part, checksum in PART.iter_unpack(table[TABLE.size :]):
-        part = {1: "decks of ", 2: "lines of "}.get(kind, f"part {kind} of ") + of
+        part = {1: "decks of ", 2: "lines of ", 3: "objects of "}.get(kind, f"part {kind} of ") + of
         expect(last < kind, part, f"found kind {kind} behind {last}")
         expect(4 <= bytes_of_part and bytes_of_part % 4 == 0, part, f"found a length of {bytes_of_part}")
         expect(at + bytes_of_part <= start + length, part, f"found a length of {bytes_of_part}")
@@ -239,6 +242,8 @@ def parse_parts(data, side, level, place, start, length):
             found["decks"] = parse_deck_part(body, side, part)
         elif kind == 2:
             found["lines"] = parse_lines(body, side, part)
+        elif kind == 3:
+            found["objects"] = parse_objects(body, side, part)
         else:
             found["unknown_parts"].append(kind)
         at, last = at + bytes_of_part, kind
@@ -286,6 +291,74 @@ def parse_lines(body, side, part):
         })
     expect(all(a < b for a, b in zip(keys, keys[1:])), part, "lines are not sorted")
     return lines
+
+
+def parse_objects(body, side, part):
+    """Prisms, then canopies."""
+    expect(24 <= len(body), part, f"found {len(body)} bytes")
+    counts = struct.unpack_from("<6I", body)
+    prisms, canopies, rings, corners, places, triangles = counts
+    sizes = [PRISM.size * prisms, CANOPY.size * canopies, 4 * corners, 4 * places, 2 * rings, 6 * triangles, corners]
+    end = 24 + sum(sizes)
+    expect(prisms + canopies and len(body) == padded(end), part, f"found {len(body)} bytes, expected {padded(end)}")
+    expect(not any(body[end:]), part, "padding is not zero")
+    lists, at = [], 24
+    for size in sizes:
+        lists.append(body[at : at + size])
+        at += size
+    records = list(PRISM.iter_unpack(lists[0])), list(CANOPY.iter_unpack(lists[1]))
+    corners, places = (list(struct.iter_unpack("<HH", some)) for some in lists[2:4])
+    lengths = list(struct.unpack(f"<{rings}H", lists[4]))
+    triangles, walls = list(struct.iter_unpack("<3H", lists[5])), list(lists[6])
+    expect(all(max(place) <= side for place in corners + places), part, "a place lies outside the square")
+    expect(sum(record[5] for record in records[0]) == rings and sum(lengths) == len(corners), part, "rings")
+    expect(sum(record[6] for record in records[1]) == len(places), part, "places of canopies")
+    expect(sum(record[1] for record in records[1]) == len(triangles), part, "triangles of canopies")
+    return prisms_of(records[0], lengths, corners, walls, part) + canopies_of(records[1], places, triangles, part)
+
+
+def prisms_of(records, lengths, corners, walls, part):
+    prisms, keys = [], []
+    for number, base, roof, kind, zero, count in records:
+        expect(kind < 3 and zero == 0 and base < roof and 1 <= count, part, f"found no such prism: {number}")
+        own, lengths = lengths[:count], lengths[count:]
+        rings = []
+        for length in own:
+            ring = [(x, y, bool(wall)) for (x, y), wall in zip(corners[:length], walls)]
+            area = sum(a[0] * b[1] - a[1] * b[0] for a, b in zip(ring, ring[1:] + ring[:1]))
+            expect(3 <= length and (0 < area) == (not rings) and area, part, "a ring runs the wrong way")
+            rings.append(ring)
+            corners, walls = corners[length:], walls[length:]
+        keys.append((number, kind, base, roof, rings))
+        prisms.append({"id": number, "kind": OBJECT_KINDS[kind], "base": base, "roof": roof, "rings": rings})
+    expect(all(a < b for a, b in zip(keys, keys[1:])), part, "prisms are not sorted")
+    return prisms
+
+
+def canopies_of(records, places, triangles, part):
+    canopies, keys = [], []
+    for number, count, kind, fullness, height, spacing, place_count in records:
+        sound = 3 <= kind < 7 and 1 <= fullness <= 99 and height and spacing and 3 <= place_count and count
+        expect(sound, part, f"found no such canopy: {number}")
+        own, places = places[:place_count], places[place_count:]
+        faces, triangles = triangles[:count], triangles[count:]
+        for face in faces:
+            expect(max(face) < place_count, part, f"triangle {face} names a place of {place_count}")
+            a, b, c = (own[index] for index in face)
+            area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+            expect(0 < area, part, f"triangle {face} is not counter-clockwise")
+        keys.append((number, kind, height, fullness, spacing, own, faces))
+        canopies.append({
+            "id": number,
+            "kind": OBJECT_KINDS[kind],
+            "height": height,
+            "fullness": fullness,
+            "spacing": spacing,
+            "places": own,
+            "triangles": faces,
+        })
+    expect(all(a < b for a, b in zip(keys, keys[1:])), part, "canopies are not sorted")
+    return canopies
 
 
 def check_vertices(vertices, side, heights, part):
@@ -381,6 +454,10 @@ def summary(header, modules):
     if ways:
         whole, kept = (sum(map(length_m, some)) / 1000 for some in (ways, [way for way in ways if way["kept"]]))
         lines.append(f"lines          {len(ways)}, {whole:.2f} km, of which {kept:.2f} km are kept")
+    objects = [thing for module in finest for thing in module.get("objects", [])]
+    if objects:
+        kinds = collections.Counter(thing["kind"] for thing in objects)
+        lines.append("objects        " + ", ".join(f"{kinds[kind]} {kind}" for kind in OBJECT_KINDS if kinds[kind]))
     for level in range(1, header["levels"]):
         own = [module for module in modules if module["level"] == level]
         count = sum(len(module["triangles"]) for module in own)

@@ -1,6 +1,6 @@
 //! Load modules of every tile, their residuals and counts.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::ground::Window;
 use fidelity::{Curvature, FeatureFigures, Residuals, Tally};
@@ -10,7 +10,7 @@ use store::{FileStamp, Measured, TileModules};
 use terrain::{
     Decks, HOLE_CLASS, Importance, LatticePoint, LoadModule, ModuleCounts, Post, PostRect, TileId, Tin, Vertex, in_turn,
 };
-use tin::load_modules::{ClipHeights, Layout, clip, concatenate, cut_decks, cut_lines, lift_decks};
+use tin::load_modules::{ClipHeights, Layout, clip, concatenate, cut_decks, cut_lines, highest_in, lift_decks, stand};
 
 use crate::assembled::{Assembled, ModuleNumbers};
 use crate::keys::{self, StampOf};
@@ -19,6 +19,7 @@ use crate::measured::{from_measured, to_measured};
 use crate::refine::Published;
 use crate::run::{ALGORITHM_REVISION, Run};
 use crate::sums::{Adding, Sums};
+use crate::tile_objects::TileObjects;
 use crate::{CompileError, Progress, Stage};
 
 /// Assembles every tile.
@@ -46,8 +47,10 @@ pub(crate) fn assemble_tile(
     tile: TileId,
 ) -> Result<Outcome<(Assembled, Sums)>, CompileError> {
     let features = run.tile_features(tile)?;
-    let modules = keys::modules((run.job, &run.area), stamps, removed, (&features, run.left_out())).fingerprint();
-    keep_or_make(&Assembling { run, stamps, removed, tile, modules }, ALGORITHM_REVISION)
+    let objects = run.outlines.as_ref().map(|(_, outlines)| TileObjects::of(outlines, &run.area, tile));
+    let left_out = (&*features, run.left_out());
+    let modules = keys::modules((run.job, &run.area), stamps, removed, left_out, objects.as_ref()).fingerprint();
+    keep_or_make(&Assembling { run, stamps, removed, tile, objects, modules }, ALGORITHM_REVISION)
 }
 
 /// A tile's load modules and what is measured of them, as the engine asks for them.
@@ -56,6 +59,7 @@ struct Assembling<'a> {
     stamps: &'a StampOf<'a>,
     removed: &'a [Vec<LatticePoint>],
     tile: TileId,
+    objects: Option<TileObjects>,
     /// Of all that the load modules are made from.
     modules: Fingerprint,
 }
@@ -90,7 +94,7 @@ impl Artifact for Assembling<'_> {
 }
 
 fn make(assembling: &Assembling, stamp: &Stamp) -> Result<(Assembled, Sums), CompileError> {
-    let Assembling { run, stamps, removed, tile, modules: fingerprint } = *assembling;
+    let &Assembling { run, stamps, removed, tile, ref objects, modules: fingerprint } = assembling;
     let area = &run.area;
     let window = run.window(tile)?;
     let layout = Layout { grid: area.grid, modules: area.tiling.modules(tile, area.grid), spacing: area.frame.spacing };
@@ -120,6 +124,7 @@ fn make(assembling: &Assembling, stamp: &Stamp) -> Result<(Assembled, Sums), Com
     let mut levels = all_levels(run, modules, (&layout, &window.dem, &natural.importance), &features);
     levels[1..].iter_mut().for_each(|level| lift(level, &decks));
     levels[1..].iter_mut().for_each(|level| drop(fidelity::measure(level, &window.measured(area))));
+    place_objects(run, stamps, &mut levels, objects.as_ref(), &layout)?;
     let file = publish(run, tile, &layout, fingerprint, &levels)?;
     let counted = count_points(run, &own.tin, &removed[area.tiling.index(tile)], &window.importance);
     let ground = (heights_of(&levels), curvature(run, tile, &levels[0], &window));
@@ -128,6 +133,28 @@ fn make(assembling: &Assembling, stamp: &Stamp) -> Result<(Assembled, Sums), Com
     let sums = Sums { features: figures, ..sums(residuals, at_source, counted, ground) };
     done.measured = run.database.write_measured(stamp, &to_measured(tile, &done, &sums))?;
     Ok((done, sums))
+}
+
+/// Gives load modules of all levels what stands on them.
+fn place_objects(
+    run: &Run,
+    stamps: &StampOf,
+    levels: &mut [Vec<LoadModule>],
+    objects: Option<&TileObjects>,
+    layout: &Layout,
+) -> Result<(), CompileError> {
+    let Some(TileObjects { own, beside }) = objects else { return Ok(()) };
+    let mut highest = BTreeMap::new();
+    for (&place, pieces) in beside {
+        let tin = run.tin(run.area.tiles[place], &stamps(place))?;
+        let pieces: Vec<_> = pieces.iter().map(|(module, prism)| (*module, prism)).collect();
+        highest_in(&tin.tin, &pieces, layout, &mut highest);
+    }
+    let standing = stand(own, levels, &highest);
+    for level in levels {
+        level.iter_mut().zip(&standing).for_each(|(module, objects)| module.objects.clone_from(objects));
+    }
+    Ok(())
 }
 
 /// Gives load modules their decks, raised onto the ground of each.

@@ -10,6 +10,7 @@ use store::{Area, Database, Folder, Manifest, ManifestState, Report, SourceRecor
 use crate::assemble::assemble;
 use crate::enforce::enforce;
 use crate::level::level;
+use crate::outlines::decide_objects;
 use crate::profile::profile;
 use crate::publish::{beginning, database_area, prepare, publish};
 use crate::refine::refine;
@@ -76,6 +77,7 @@ pub(crate) fn finish(run: Run, progress: &mut Stopwatch) -> Result<Built, Compil
 
 fn stages(mut run: Run, progress: &mut Stopwatch) -> Result<Built, CompileError> {
     decide_features(&mut run, progress)?;
+    decide_objects(&mut run, progress)?;
     let curves = survey(&run, progress)?;
     let mut shares = allocate(&run, curves.as_ref(), progress)?;
     drop(curves);
@@ -148,6 +150,7 @@ pub(crate) fn open_with<'a>(
         previous,
         read: OnceLock::new(),
         level: None,
+        outlines: None,
     })
 }
 

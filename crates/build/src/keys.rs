@@ -3,13 +3,13 @@
 
 use crate::ground::{GamingArea, Surroundings, Window, feed_post};
 use features::{AreaFeatures, Clearances, FallOptions, GradeOptions, Outline, Place, Sounded};
-use job::{Borders, ClipHeights, Edges, FeaturesSpec, Job, LodBorder, LodSpec, ModulesSpec, OuterBorder};
+use job::{Borders, ClipHeights, Edges, FeaturesSpec, Job, LodBorder, LodSpec, ModulesSpec, ObjectsSpec, OuterBorder};
 use store::engine::{Fingerprint, FingerprintBuilder, Key, Part, Stamp};
 use store::{Building, SourceRecord};
 use terrain::limits::Allowance;
 use terrain::{
     FeatureSurface, Features, LastBatch, LatticePoint, LineForm, LineKind, LineStorey, LineTraits, ModuleGrid,
-    ModuleId, ModuleRect, SeamSides, Side, SideSpan, SurfaceGround, TileFeatures, Vertex, WayLine,
+    ModuleId, ModuleRect, Objects, SeamSides, Side, SideSpan, SurfaceGround, TileFeatures, Vertex, WayLine,
 };
 use tin::tiling::Budget;
 use tin::{CostUnit, Frame, Proximity, Rule, Stop, SurveyTask, TileTask};
@@ -17,6 +17,7 @@ use tin::{CostUnit, Frame, Proximity, Rule, Stop, SurveyTask, TileTask};
 use crate::left_out::LeftOut;
 use crate::refinement::{Most, Refinement};
 use crate::run::Run;
+use crate::tile_objects::TileObjects;
 
 /// What the published TIN of a tile was made from, by the tile's place.
 pub(crate) type StampOf<'a> = dyn Fn(usize) -> Stamp + Sync + 'a;
@@ -38,6 +39,8 @@ const LEFT_OUT: Part = Part { name: "left out", changed: "what coarser levels le
 pub(crate) const FEATURES: Part = Part { name: "features", changed: "roads, rivers or lakes in it changed" };
 /// The middle lines of ways, in the ground or not.
 const LINES: Part = Part { name: "lines", changed: "lines of roads or rivers in it changed" };
+/// What stands on the ground.
+const OBJECTS: Part = Part { name: "objects", changed: "buildings, walls or woods in it changed" };
 /// Buildings, which are drawn only.
 const BUILDINGS: Part = Part { name: "buildings", changed: "buildings changed" };
 /// The ground along features.
@@ -46,6 +49,26 @@ const PROFILES: Part = Part { name: "profiles", changed: "the ground along roads
 const MODULES: Part = Part { name: "modules", changed: "the load modules changed" };
 /// How they are measured.
 const MEASURE: Part = Part { name: "measure", changed: "what is measured changed" };
+
+/// Of what stands on the ground of an area: what the job says of it, where the area lies, and the files.
+pub(crate) fn outlines(job: &Job, spec: &ObjectsSpec, records: &[SourceRecord]) -> Key {
+    let is_ours = |record: &&SourceRecord| spec.sources.iter().any(|source| source.file.written == record.path);
+    let files: Vec<Fingerprint> = records.iter().filter(is_ours).map(|record| record.blake3).collect();
+    let settings: Vec<String> = job
+        .describe()
+        .into_iter()
+        .filter(|setting| setting.key.starts_with("objects."))
+        .map(|setting| setting.value)
+        .collect();
+    let ModuleGrid { rows, cols, side_cells } = job.area.grid;
+    Key::new("outlines").part(OBJECTS, |part| {
+        let part = part.list(settings.iter(), |part, value| part.text(value));
+        let part = part.list(files.into_iter(), FingerprintBuilder::fingerprint);
+        let part = part.number(job.area.epsg.into()).number(job.area.spacing.sixteenths().into());
+        let part = job.area.origin_m.into_iter().fold(part, FingerprintBuilder::real);
+        part.number(rows.into()).number(cols.into()).signed(side_cells.into())
+    })
+}
 
 /// Of the buildings of an area.
 pub(crate) fn buildings(all: &[Building]) -> Key {
@@ -251,6 +274,7 @@ pub fn modules(
     stamps: &StampOf,
     removed: &[Vec<LatticePoint>],
     (features, left_out): (&TileFeatures, Option<&LeftOut>),
+    objects: Option<&TileObjects>,
 ) -> Key {
     let tile = features.tile;
     let mut reach = match job.modules.edges {
@@ -276,11 +300,30 @@ pub fn modules(
     };
     let lines = lines_of(job, features);
     let key = if lines.is_empty() { key } else { key.part(LINES, |part| part.list(lines.iter(), feed_line)) };
+    let key = match objects.filter(|objects| objects.own.iter().any(|objects| !objects.is_empty())) {
+        None => key,
+        Some(objects) => key.part(OBJECTS, |part| feed_objects(part, objects, stamps)),
+    };
     // What levels leave out is told by the classes of edges, which the TIN does not say.
     match left_out {
         None => key,
         Some(left_out) => key.part(LEFT_OUT, |part| left_out.feed(part, &features.kept, area.frame.spacing)),
     }
+}
+
+/// What stands on a tile's load modules, and the ground of other tiles under it.
+fn feed_objects(builder: FingerprintBuilder, objects: &TileObjects, stamps: &StampOf) -> FingerprintBuilder {
+    let TileObjects { own, beside } = objects;
+    let builder = builder
+        .list(own.iter(), |builder, objects| builder.rows(std::iter::once(&objects.to_part()[..]), |byte| [byte]));
+    builder.list(beside.iter(), |builder, (place, pieces)| {
+        let builder = builder.fingerprint(stamps(*place).fingerprint);
+        builder.list(pieces.iter(), |builder, (module, prism)| {
+            let alone = Objects { prisms: vec![prism.clone()], canopies: Vec::new() };
+            let builder = builder.number(module.row.into()).number(module.col.into());
+            builder.rows(std::iter::once(&alone.to_part()[..]), |byte| [byte])
+        })
+    })
 }
 
 /// Of what was measured of a tile's load modules.
@@ -293,6 +336,8 @@ pub(crate) fn measured(run: &Run, modules: Fingerprint) -> Key {
     let is_beside = run.ground.relief.has_posts_between() || run.burns_in();
     // What features change of a tile is in its load modules.
     let files = run.job.features.as_ref().map(FeaturesSpec::files).unwrap_or_default();
+    let objects = run.job.objects.iter().flat_map(|objects| &objects.sources).map(|source| &source.file);
+    let files: Vec<_> = files.into_iter().chain(objects).collect();
     let is_of_ground = |record: &&SourceRecord| !files.iter().any(|file| file.written == record.path);
     let beside: Vec<&SourceRecord> = run.records.iter().filter(|record| is_beside && is_of_ground(record)).collect();
     Key::new("measured").known(MODULES, modules).part(MEASURE, |part| {

@@ -3,6 +3,7 @@
 //! ```text
 //!   profile r02c03 ─► level ─┐    (with roads, rivers or lakes)
 //!   survey r02c03 ◄──────────┘
+//!   outlines ─► assemble r02c03              (with buildings, walls or woods)
 //!   survey r02c03 ─► allocate ─► refine r02c03 (after its lower-ranked neighbours) ─► assemble r02c03 ─► publish
 //! ```
 
@@ -16,8 +17,16 @@ use crate::Stage;
 use crate::tasks::is_surveyed;
 
 /// The stages that are shared out, each after the ones before it.
-pub const ORDER: [Stage; 7] =
-    [Stage::Profile, Stage::Level, Stage::Survey, Stage::Allocate, Stage::Refine, Stage::Assemble, Stage::Publish];
+pub const ORDER: [Stage; 8] = [
+    Stage::Profile,
+    Stage::Level,
+    Stage::Outlines,
+    Stage::Survey,
+    Stage::Allocate,
+    Stage::Refine,
+    Stage::Assemble,
+    Stage::Publish,
+];
 
 /// One unit of work: a stage of one tile, or of the whole area.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -58,6 +67,7 @@ pub fn units(stage: Stage, job: &Job, area: &GamingArea) -> Vec<Unit> {
     let of = |&tile: &TileId| Unit::of(stage, tile);
     match stage {
         Stage::Profile | Stage::Level if job.features.is_none() => Vec::new(),
+        Stage::Outlines if job.objects.is_none() => Vec::new(),
         Stage::Survey if !is_surveyed(job) => Vec::new(),
         Stage::Refine => area.by_rank().into_iter().map(|index| of(&area.tiles[index])).collect(),
         _ if is_of_tiles(stage) => area.tiles.iter().map(of).collect(),
@@ -81,18 +91,20 @@ pub fn needs(unit: Unit, job: &Job, area: &GamingArea) -> Vec<Unit> {
             and_level(all(Stage::Allocate).into_iter().chain(inherited).collect())
         }
         (Stage::Assemble, Some(tile)) => {
-            and_level(around(tile, job, area).into_iter().map(|other| Unit::of(Stage::Refine, other)).collect())
+            let tins = around(tile, job, area).into_iter().map(|other| Unit::of(Stage::Refine, other));
+            and_level(all(Stage::Outlines).into_iter().chain(tins).collect())
         }
         (Stage::Publish, _) => all(Stage::Assemble),
         _ => Vec::new(),
     }
 }
 
-/// The tiles whose TINs the load modules of one are made from.
+/// The tiles whose TINs the load modules of one are made from, or may be: a building on the line between two tiles has
+/// one roof.
 pub(crate) fn around(tile: TileId, job: &Job, area: &GamingArea) -> Vec<TileId> {
     let mut around = match job.modules.edges {
-        Edges::Constrained => Vec::new(),
-        Edges::Clip(_) => area.tiling.neighbours(tile),
+        Edges::Constrained if job.objects.is_none() => Vec::new(),
+        Edges::Constrained | Edges::Clip(_) => area.tiling.neighbours(tile),
     };
     around.push(tile);
     around

@@ -12,6 +12,8 @@ pub enum Stage {
     Profile,
     /// How high features lie, over the whole area.
     Level,
+    /// What stands on the ground and has room, over the whole area.
+    Outlines,
     /// Every tile alone: what would more points gain?
     Survey,
     /// The whole area's budget is shared out.
@@ -35,6 +37,7 @@ impl Stage {
             Stage::Read => "read",
             Stage::Profile => "profile",
             Stage::Level => "level",
+            Stage::Outlines => "outlines",
             Stage::Survey => "survey",
             Stage::Allocate => "allocate",
             Stage::Refine => "refine",
@@ -51,6 +54,7 @@ impl Stage {
             Stage::Read => "Heights and weights, ready to be asked",
             Stage::Profile => "The ground along roads and water, tile by tile",
             Stage::Level => "How high roads and water lie",
+            Stage::Outlines => "Buildings, walls and woods that have room",
             Stage::Survey => "What more points would gain, tile by tile",
             Stage::Allocate => "What each tile may spend",
             Stage::Refine => "The TINs of tiles",

@@ -13,6 +13,7 @@ use crate::assemble::crs;
 use crate::assembled::Assembled;
 use crate::buildings::stamp_of_buildings;
 use crate::forecast::{PAGE_MODULES_MAX, PAGE_POSTS_MAX};
+use crate::outlines::objects_report;
 use crate::refine::Published;
 use crate::report::Findings;
 use crate::run::{ALGORITHM_REVISION, Run, changed, run_name};
@@ -84,6 +85,14 @@ pub(crate) fn prepare(
     if let Some(buildings) = stamp_of_buildings(run)? {
         manifest.files.insert(files::BUILDINGS.to_owned(), buildings);
     }
+    match &run.outlines {
+        Some((file, outlines)) => {
+            manifest.files.insert(files::OUTLINES.to_owned(), *file);
+            report.objects = Some(objects_report(run, outlines));
+        }
+        // That of an earlier job.
+        None => run.database.remove(files::OUTLINES)?,
+    }
     for (index, &tile) in run.area.tiles.iter().enumerate() {
         let state = state_of(run, &report, tile, frozen.contains(&tile));
         fill(run, &mut manifest, tile, state, &findings.tins[index], &findings.assembled[index])?;
@@ -101,7 +110,8 @@ pub(crate) fn publish(run: Run, ready: Ready, progress: &mut Stopwatch) -> Resul
     let work = run.database.folder().work(&run_name(&manifest.job, &run.records, ALGORITHM_REVISION));
     // The page opens the ground by itself: there is no room for it twice.
     drop((run.ground, run.tins));
-    let (job, database, level) = (run.job, run.database, run.level.map(|settled| settled.level));
+    let (job, database, outlines) = (run.job, run.database, run.outlines);
+    let level = run.level.map(|settled| settled.level);
 
     // The last moment: from here on everything says that it was made from these files.
     changed(&run.states)?;
@@ -116,6 +126,13 @@ pub(crate) fn publish(run: Run, ready: Ready, progress: &mut Stopwatch) -> Resul
         }
         // Those of an earlier job.
         None => [files::FEATURES, files::FEATURES_GPKG].iter().try_for_each(|name| database.remove(name))?,
+    }
+    match outlines {
+        Some((_, outlines)) => {
+            let (name, text) = crate::product::objects_file(job, &outlines);
+            written.push((name, text.into_bytes()));
+        }
+        None => database.remove(files::OBJECTS)?,
     }
     for (name, bytes) in written {
         let stamp = database.write_bytes(name, &bytes)?;

@@ -74,6 +74,7 @@ impl Findings<'_> {
             residual_against_source: run.ground.relief.has_source_posts().then(|| self.at_source(&total)),
             classes: self.classes(residuals),
             features: None,
+            objects: None,
             enough: self.enough()?,
             levels: self.levels(),
             overall_point_weighted_rms_m: self.point_weighted_rms_m(residuals),

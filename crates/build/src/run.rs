@@ -8,7 +8,7 @@ use job::{Budget as PointBudget, Edges, Job};
 use schedule::{Event as Scheduled, RankedTasks, Workers, for_each_piece, in_rank_order_observed};
 use source_files::FileState;
 use store::engine::{Cause, FingerprintBuilder, Outcome, Stamp};
-use store::{AreaLevel, Database, FileStamp, Manifest, RUN_DIGITS, SourceRecord};
+use store::{AreaLevel, AreaOutlines, Database, FileStamp, Manifest, RUN_DIGITS, SourceRecord};
 use terrain::{POINT_COST, TileFeatures, TileId, TileTin};
 
 use crate::left_out::LeftOut;
@@ -62,6 +62,8 @@ pub(crate) struct Run<'a> {
     pub read: OnceLock<Arc<ReadFeatures>>,
     /// What they came to, once that is decided.
     pub level: Option<Settled>,
+    /// What stands on the ground, once that is decided, and the file that says so.
+    pub outlines: Option<(FileStamp, Arc<AreaOutlines>)>,
 }
 
 /// What features came to, and the file that says so.

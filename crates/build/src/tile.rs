@@ -14,6 +14,7 @@ use crate::build::{decide_features, open};
 use crate::curves::Curves;
 use crate::enforce::enforce;
 use crate::keys;
+use crate::outlines::decide_objects;
 use crate::publish::{beginning, prepare, publish};
 use crate::refine::{Published, Refining};
 use crate::report::Findings;
@@ -60,6 +61,7 @@ pub fn rebuild_tile(
     let mut frozen = refuse_unfinished(&run, folder, tile)?;
     let is_outdated = is_outdated(&run);
     decide_features(&mut run, progress)?;
+    decide_objects(&mut run, progress)?;
     let shares = published_shares(&run, progress)?;
     let mut tins = published_tins(&run)?;
     run.database.begin(&beginning(&run))?;
@@ -112,7 +114,9 @@ fn reassemble(
 ) -> Result<(Vec<Assembled>, Sums), CompileError> {
     let (none, adding) = (vec![Vec::new(); tins.len()], Adding::default());
     let done = run.for_each_tile(Stage::Assemble, progress, |tile| {
-        let is_reached = reached.iter().any(|&(other, _)| other == tile);
+        // A building on the line between two tiles stands on the ground of both.
+        let is_beside = |other: TileId| run.job.objects.is_some() && run.area.tiling.neighbours(tile).contains(&other);
+        let is_reached = reached.iter().any(|&(other, _)| other == tile || is_beside(other));
         let done = match is_reached {
             true => assemble_tile(run, &|index| tins[index].stamp, &none, tile)?,
             false => Outcome::Kept(read_assembled(run, tins, tile)?),
@@ -195,7 +199,8 @@ fn is_whole_but(run: &Run, manifest: &Manifest, tile: TileId) -> bool {
         files.into_iter().all(|(path, stamp)| stamp.is_some_and(|stamp| folder.check_file(&path, &stamp).is_ok()))
     };
     // Clipped load modules reach into their neighbours' files, so nothing around the tile would be as it was.
-    run.job.modules.edges == Edges::Constrained && manifest.tiles.iter().all(is_whole)
+    // Neither would they be where buildings stand on lines between tiles.
+    run.job.modules.edges == Edges::Constrained && run.job.objects.is_none() && manifest.tiles.iter().all(is_whole)
 }
 
 /// The allocation the database was built with, from its published curves.

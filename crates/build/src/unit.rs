@@ -19,6 +19,7 @@ use crate::curves::Curves;
 use crate::enter::enter;
 use crate::level::level_area;
 use crate::order::{ORDER, Unit, around, needs, units};
+use crate::outlines::outlines_area;
 use crate::profile::profile_tile;
 use crate::refine::{Published, refine_tile};
 use crate::run::{ALGORITHM_REVISION, Options, Run, run_name};
@@ -71,8 +72,11 @@ impl<'a> Session<'a> {
             return Err(not_ready(unit, need));
         }
         let Unit { stage, tile } = unit;
-        if !matches!(stage, Stage::Profile | Stage::Level) {
+        if !matches!(stage, Stage::Profile | Stage::Level | Stage::Outlines) {
             self.take_features(unit)?;
+        }
+        if stage == Stage::Assemble {
+            self.take_outlines(unit)?;
         }
         if let Some(tile) = tile {
             progress.tell(Event::Started(stage, tile));
@@ -93,6 +97,7 @@ impl<'a> Session<'a> {
         let fingerprint = match (unit.stage, unit.tile) {
             (Stage::Profile, Some(tile)) => profile_tile(&self.run, tile)?.into_inner().0.blake3,
             (Stage::Level, None) => self.level()?,
+            (Stage::Outlines, None) => outlines_area(&self.run)?.into_inner().0.blake3,
             (Stage::Survey, Some(tile)) => survey_tile(&self.run, tile)?.into_inner().0.fingerprint,
             (Stage::Allocate, None) => self.allocate()?,
             (Stage::Refine, Some(tile)) => self.refine(tile)?.into_inner().stamp.fingerprint,
@@ -115,6 +120,22 @@ impl<'a> Session<'a> {
                 Ok(())
             }
             _ => Err(self.spoilt(unit, level)),
+        }
+    }
+
+    /// Takes over what stands on the ground, where anything does, as another unit has published it.
+    fn take_outlines(&mut self, unit: Unit) -> Result<(), CompileError> {
+        if self.run.job.objects.is_none() || self.run.outlines.is_some() {
+            return Ok(());
+        }
+        let outlines = Unit::whole(Stage::Outlines);
+        let marked = self.work.marks().marked(&outlines.to_string());
+        match self.run.database.folder().read_outlines() {
+            Ok((_, file, read)) if Some(file.blake3) == marked => {
+                self.run.outlines = Some((file, Arc::new(read)));
+                Ok(())
+            }
+            _ => Err(self.spoilt(unit, outlines)),
         }
     }
 

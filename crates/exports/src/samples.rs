@@ -124,6 +124,7 @@ fn modules() -> Vec<LoadModule> {
         residual: ModuleResidual { posts: 400, largest: 300, sum_abs: 25_600, sum_squared: 3_276_800 },
         decks: Decks::default(),
         lines: Vec::new(),
+        objects: terrain::Objects::default(),
     };
     let east = LoadModule {
         id: ModuleId { row: 0, col: 1 },
@@ -141,6 +142,7 @@ fn modules() -> Vec<LoadModule> {
         residual: ModuleResidual { posts: 441, largest: 128, sum_abs: 12_800, sum_squared: 1_638_400 },
         decks: Decks::default(),
         lines: Vec::new(),
+        objects: terrain::Objects::default(),
     };
     [&west, &east].iter().for_each(|module| assert_eq!(module.check(), Ok(())));
     vec![west, east]
@@ -182,6 +184,7 @@ pub(crate) fn report() -> Report {
         residual_against_source: None,
         classes: Vec::new(),
         features: None,
+        objects: None,
         enough: None,
         levels: vec![],
         overall_point_weighted_rms_m: 1.0,

@@ -36,6 +36,9 @@ pub use overview::{IdleRule, Overview, OverviewRow, RowOrigin, overview};
 mod rules;
 pub use rules::{Feature, Rule, RuleKind, Sorted, Storey, Traits, class_names, nearest_tags, sort_out};
 
+// What stands on the ground.
+pub mod objects;
+
 // Onto the lattice.
 mod place;
 pub use place::{COORDINATE_MAX, FeatureLattice, Place, STEPS_PER_POST_MAX};

@@ -110,6 +110,7 @@ mod tests {
             residual: ModuleResidual::default(),
             decks: Decks::of_triangles(triangles.to_vec()),
             lines: Vec::new(),
+            objects: terrain::Objects::default(),
         }
     }
 

@@ -423,6 +423,7 @@ mod tests {
             residual: ModuleResidual::default(),
             decks: Decks::default(),
             lines: Vec::new(),
+            objects: terrain::Objects::default(),
         };
         let mask = Importance::uniform(RECT, 1000);
         let dem = Dem::from_fn(RECT, |_| Some(0));

@@ -106,6 +106,7 @@ pub(crate) mod tests {
             residual: ModuleResidual::default(),
             decks: Decks::default(),
             lines: Vec::new(),
+            objects: terrain::Objects::default(),
         }
     }
 

@@ -93,6 +93,7 @@ pub fn module_of(tin: &Tin, id: ModuleId, spacing: Spacing) -> LoadModule {
         residual: ModuleResidual::default(),
         decks: Decks::default(),
         lines: Vec::new(),
+        objects: terrain::Objects::default(),
     }
 }
 

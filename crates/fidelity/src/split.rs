@@ -110,6 +110,7 @@ mod tests {
             residual: ModuleResidual::default(),
             decks: Decks::default(),
             lines: Vec::new(),
+            objects: terrain::Objects::default(),
         }
     }
 

@@ -287,6 +287,7 @@ mod tests {
             residual: ModuleResidual::default(),
             decks: Decks::default(),
             lines: Vec::new(),
+            objects: terrain::Objects::default(),
         }
     }
 

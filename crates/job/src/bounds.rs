@@ -114,6 +114,14 @@ pub const LEFT_OUT_WEIGHT: std::ops::RangeInclusive<f64> = 0.0..=10.0;
 
 /// The share of a load module's limit that features may take.
 pub const SHARE_MAX: std::ops::RangeInclusive<f64> = 0.01..=1.0;
+/// Corners of a building: fewer than four are no house.
+pub const OBJECT_CORNERS: std::ops::RangeInclusive<u64> = 4..=255;
+/// Square metres under which buildings may be left out.
+pub const OBJECT_AREA_M2: std::ops::RangeInclusive<f64> = 0.0..=10_000.0;
+/// Metres of height that a rule may give: the highest building has 828.
+pub const OBJECT_HEIGHT_M: std::ops::RangeInclusive<f64> = 0.1..=1000.0;
+/// Polygons of objects in a load module or a square of 4 km.
+pub const OBJECT_LIMIT: std::ops::RangeInclusive<u64> = 0..=10_000_000;
 /// Metres that decks may be asked to keep clear of what runs below: the highest bridges leave so much.
 pub const CLEARANCE_M_MAX: f64 = 100.0;
 /// Metres that roads and rivers may cut into the ground or be filled before their grades give way.

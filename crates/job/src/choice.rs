@@ -6,7 +6,7 @@
 use std::mem::discriminant;
 
 use features::{Form, Kind, RuleKind};
-use terrain::{Effort, HeightFit, LastBatch, Lattice, LodBorder, Resampling, Smooth, TileOrder};
+use terrain::{Effort, HeightFit, LastBatch, Lattice, LodBorder, ObjectKind, Resampling, Smooth, TileOrder};
 
 use self::Cost::{Residual, Seconds};
 use crate::{
@@ -114,6 +114,18 @@ const KINDS: [Word<Kind>; 11] = [
 
 impl Choice for Kind {
     const WORDS: &'static [Word<Self>] = &KINDS;
+}
+
+impl Choice for ObjectKind {
+    const WORDS: &'static [Word<Self>] = &[
+        Word::new("building", Self::Building, "level roof, walls to the ground; 6 m high where nothing says more"),
+        Word::new("tower", Self::Tower, "the same of towers, chimneys, silos and tanks; 30 m"),
+        Word::new("wall", Self::Wall, "stretches of wall along a line, 0.5 m wide; 2 m"),
+        Word::new("wood", Self::Wood, "a canopy that takes 90 % of the light in 10 m; 15 m"),
+        Word::new("scrub", Self::Scrub, "a canopy that takes 50 %; 3 m"),
+        Word::new("orchard", Self::Orchard, "a canopy that takes 50 %; 4 m"),
+        Word::new("row", Self::Row, "a canopy along a line: a hedge, 2 m wide and high, or a row of trees, 6 and 12 m"),
+    ];
 }
 
 impl Choice for RuleKind {

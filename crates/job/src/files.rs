@@ -10,7 +10,10 @@ use std::fs;
 use std::path::{Component, Path, PathBuf};
 
 use crate::bounds::{FEATURE_SOURCES_MAX, SOURCES_MAX, VISITED_MAX};
-use crate::{AreaShape, DemSource, Fault, FeatureSource, FeaturesSpec, Job, JobError, NamedFile, SourceFile, Start};
+use crate::{
+    AreaShape, DemSource, Fault, FeatureSource, FeaturesSpec, Job, JobError, NamedFile, ObjectSource, ObjectsSpec,
+    SourceFile, Start,
+};
 
 /// A file that the job mentions: where its name stands in the job, and the fault to tell if it is not there.
 pub(crate) struct Mention {
@@ -26,6 +29,7 @@ pub(crate) enum Place {
     Geoid(usize),
     Water,
     Features(usize),
+    Objects(usize),
     Start,
     Pins,
 }
@@ -33,7 +37,7 @@ pub(crate) enum Place {
 impl Place {
     /// A pattern for the files of a folder.
     fn pattern(self) -> &'static str {
-        if let Place::Features(_) = self { "*.gpkg" } else { "*.tif" }
+        if let Place::Features(_) | Place::Objects(_) = self { "*.gpkg" } else { "*.tif" }
     }
 }
 
@@ -61,9 +65,10 @@ pub(crate) fn locate(job: &mut Job, mentions: Vec<Mention>) -> Result<(), JobErr
     let folder = job.folder().to_owned();
     locate_sources(&mut job.dem.source, &folder, &mentions)?;
     job.features.as_mut().map_or(Ok(()), |features| locate_features(features, &folder, &mentions))?;
+    job.objects.as_mut().map_or(Ok(()), |objects| locate_objects(objects, &folder, &mentions))?;
     for mention in &mentions {
         let named = match mention.place {
-            Place::Source(_) | Place::Features(_) => None,
+            Place::Source(_) | Place::Features(_) | Place::Objects(_) => None,
             Place::Geoid(index) => Some(&job.dem.geoids[index].file),
             Place::Water => job.dem.water.as_ref().map(|water| &water.file),
             Place::ImportanceArea(index) => match &job.importance.areas[index].shape {
@@ -122,6 +127,29 @@ fn locate_features(features: &mut FeaturesSpec, folder: &Path, mentions: &[Menti
         }
     }
     features.sources = found;
+    Ok(())
+}
+
+/// Checks every file of `objects.sources` and expands its patterns. What is taken over from features may be patterns
+/// whose files are checked there already.
+fn locate_objects(objects: &mut ObjectsSpec, folder: &Path, mentions: &[Mention]) -> Result<(), JobError> {
+    let mut found: Vec<ObjectSource> = Vec::new();
+    for (index, source) in objects.sources.iter().enumerate() {
+        let own = mentions.iter().find(|mention| matches!(mention.place, Place::Objects(at) if at == index));
+        let of_features = || mentions.iter().find(|mention| matches!(mention.place, Place::Features(_)));
+        let mention = own.or_else(of_features).expect("every file is mentioned");
+        for file in named_files(&source.file, folder, mention)? {
+            let source = ObjectSource { file, ..source.clone() };
+            if !found.contains(&source) {
+                found.push(source);
+            }
+        }
+        if FEATURE_SOURCES_MAX < found.len() {
+            let expected = format!("at most {FEATURE_SOURCES_MAX} files");
+            return Err(JobError::OutOfRange(Box::new(Fault { expected, ..(*mention.fault).clone() })));
+        }
+    }
+    objects.sources = found;
     Ok(())
 }
 

@@ -6,7 +6,7 @@ use terrain::{
     Effort, HeightFit, LastBatch, Lattice, LoadModule, ModuleGrid, QUANTA_PER_METRE, Resampling, Spacing, TileOrder,
 };
 
-use crate::{FeaturesSpec, GeoidSpec, ImportanceSpec, LodSpec, NamedFile, Start, WaterSpec};
+use crate::{FeaturesSpec, GeoidSpec, ImportanceSpec, LodSpec, NamedFile, ObjectsSpec, Start, WaterSpec};
 
 /// All a run needs, as the job file says it, defaults filled in.
 #[derive(Clone, Debug, PartialEq)]
@@ -21,6 +21,8 @@ pub struct Job {
     pub importance: ImportanceSpec,
     /// Roads, rivers and lakes that become parts of the ground; none where the job has no such section.
     pub features: Option<FeaturesSpec>,
+    /// What stands on the ground; nothing where the job has no such section.
+    pub objects: Option<ObjectsSpec>,
     /// How the work is cut.
     pub tiles: TilesSpec,
     /// What the product is cut into.

@@ -12,13 +12,14 @@ use crate::bounds::{
 };
 use crate::feature_keys::{FEATURE_SOURCES, FEATURES, RULES};
 use crate::key::FILE_SAYS;
+use crate::object_keys::{OBJECT_LIMITS, OBJECT_RULES, OBJECT_SOURCES, OBJECTS};
 use crate::{
     Allocation, AreaPlace, Borders, ClipHeights, Count, DemSource, Edges, ErrorKey, Key, KeyTable, MethodName,
     OuterBorder, SampleClass, StartMethod,
 };
 
 /// All tables, the sections in their order, each before those that stand in it.
-pub(crate) static TABLES: [KeyTable; 19] = [
+pub(crate) static TABLES: [KeyTable; 23] = [
     KeyTable { place: "area", meaning: "The gaming area, whole load modules, and its working grid.", keys: AREA },
     KeyTable { place: "area.around", meaning: "An area around a place.", keys: AROUND },
     KeyTable { place: "dem", meaning: "Where heights come from.", keys: DEM },
@@ -42,6 +43,26 @@ pub(crate) static TABLES: [KeyTable; 19] = [
         place: "features.rules[]",
         meaning: "What becomes of features with certain tags; where no rule says it, the built-in table does.",
         keys: RULES,
+    },
+    KeyTable {
+        place: "objects",
+        meaning: "Buildings, walls and woods that stand on the ground and hide. Without this section there are none.",
+        keys: OBJECTS,
+    },
+    KeyTable {
+        place: "objects.sources[]",
+        meaning: "A source of objects, where more is to be said than its path.",
+        keys: OBJECT_SOURCES,
+    },
+    KeyTable {
+        place: "objects.rules[]",
+        meaning: "What becomes of objects with certain tags; where no rule says it, the built-in table does.",
+        keys: OBJECT_RULES,
+    },
+    KeyTable {
+        place: "objects.limits",
+        meaning: "What may stand there, in polygons: a roof and each wall are one, and each triangle of a wood.",
+        keys: OBJECT_LIMITS,
     },
     KeyTable { place: "tiles", meaning: "How the work is cut.", keys: TILES },
     KeyTable { place: "load_modules", meaning: "What the product is cut into.", keys: LOAD_MODULES },

@@ -68,7 +68,7 @@ fn rule_text(rule: &Rule) -> String {
     format!("{{ {} }}", keys.join(", "))
 }
 
-fn tags_text(tags: &[(String, Vec<String>)]) -> String {
+pub(crate) fn tags_text(tags: &[(String, Vec<String>)]) -> String {
     let tag = |(key, values): &(String, Vec<String>)| {
         let values: Vec<String> = values.iter().map(|value| quoted(value)).collect();
         format!("{} = [{}]", quoted(key), values.join(", "))

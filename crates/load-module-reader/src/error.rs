@@ -37,6 +37,15 @@ pub enum Section {
         /// Its level; 0 is the finest.
         level: u16,
     },
+    /// What stands on the ground of one level of a load module.
+    Objects {
+        /// Its row in the area.
+        row: u32,
+        /// Its column in the area.
+        col: u32,
+        /// Its level; 0 is the finest.
+        level: u16,
+    },
     /// The table of parts of one level of a load module, or a part of a kind that is not known.
     Parts {
         /// Its row in the area.
@@ -56,6 +65,7 @@ impl fmt::Display for Section {
             Section::Module { row, col, level } => of_level(f, "", [row, col], level),
             Section::Decks { row, col, level } => of_level(f, "decks of ", [row, col], level),
             Section::Lines { row, col, level } => of_level(f, "lines of ", [row, col], level),
+            Section::Objects { row, col, level } => of_level(f, "objects of ", [row, col], level),
             Section::Parts { row, col, level } => of_level(f, "parts of ", [row, col], level),
         }
     }

@@ -38,6 +38,14 @@ pub const LINE_BYTES: usize = 8;
 pub const PART_DECKS: u32 = 1;
 /// The kind of the part with middle lines of ways.
 pub const PART_LINES: u32 = 2;
+/// The kind of the part with what stands on the ground.
+pub const PART_OBJECTS: u32 = 3;
+/// Bytes of a part of objects before its prisms.
+pub const FIXED_OBJECTS_BYTES: usize = 24;
+/// Bytes of a prism before the corners of all prisms.
+pub const PRISM_BYTES: usize = 20;
+/// Bytes of a canopy before the places of all canopies.
+pub const CANOPY_BYTES: usize = 20;
 /// Bytes of the longest file that is read: far above any tile, and small enough to hold in memory.
 pub const FILE_BYTES_MAX: u64 = 1 << 30;
 /// The class of triangles over a hole: no source has a height there, and their heights only close the surface.

@@ -68,9 +68,10 @@
 
 mod format;
 pub use format::{
-    DECK_ENTRY_BYTES, FILE_BYTES_MAX, FIXED_DECKS_BYTES, FIXED_DECKS_PART_BYTES, FIXED_HEADER_BYTES, FIXED_LINES_BYTES,
-    FIXED_MODULE_BYTES, FIXED_TABLE_BYTES, HOLE_CLASS, INDEX_ENTRY_BYTES, LEVELS_MAX, LINE_BYTES, MAGIC, PART_DECKS,
-    PART_LINES, PARTS_ENTRY_BYTES, QUANTA_PER_METRE, TABLE_ENTRY_BYTES, VERSION, VERSION_OF_GROUND, VERSION_WITH_DECKS,
+    CANOPY_BYTES, DECK_ENTRY_BYTES, FILE_BYTES_MAX, FIXED_DECKS_BYTES, FIXED_DECKS_PART_BYTES, FIXED_HEADER_BYTES,
+    FIXED_LINES_BYTES, FIXED_MODULE_BYTES, FIXED_OBJECTS_BYTES, FIXED_TABLE_BYTES, HOLE_CLASS, INDEX_ENTRY_BYTES,
+    LEVELS_MAX, LINE_BYTES, MAGIC, PART_DECKS, PART_LINES, PART_OBJECTS, PARTS_ENTRY_BYTES, PRISM_BYTES,
+    QUANTA_PER_METRE, TABLE_ENTRY_BYTES, VERSION, VERSION_OF_GROUND, VERSION_WITH_DECKS,
 };
 mod error;
 pub use error::{ReadError, Section};
@@ -86,6 +87,8 @@ mod decks;
 pub use decks::Decks;
 mod lines;
 pub use lines::{Line, LineForm, LineKind, LineStorey};
+mod objects;
+pub use objects::{Canopy, Corner, ObjectKind, Objects, PRISMS_MAX, Prism};
 mod module;
 mod parts;
 pub use module::{Module, Residual};
@@ -94,13 +97,16 @@ pub use tile_file::{Bytes, Keep, TileFile, open_file};
 mod file;
 pub use file::SlmFile;
 mod lookup;
+mod object_lookups;
 mod terrain_module;
 pub use terrain_module::{Sample, TerrainModule};
 mod frame;
 pub use frame::{AreaFrame, Block};
 mod loaded_ground;
+mod past;
 mod sight;
 pub use loaded_ground::{LoadedGround, Sight};
+pub use past::{Hider, PastObjects, Sighting, Standing};
 pub use sight::Curvature;
 mod eye;
 pub use eye::Eye;

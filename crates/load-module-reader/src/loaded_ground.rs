@@ -205,6 +205,21 @@ impl LoadedGround {
 
     /// [`LoadedGround::sight`] over ground that falls away as the earth does.
     pub fn sight_over(&self, from_m: [f64; 3], to_m: [f64; 3], curvature: Curvature) -> Sight {
+        let side = self.frame.side;
+        self.walk(from_m, to_m, curvature, |module, line| {
+            let nearest = hidden_at(module.lookup(), side, line);
+            module.decks().map_or(nearest, |decks| nearest.min(crossed_at(decks, side, line)))
+        })
+    }
+
+    /// What a line meets first, by what `nearest_in` finds in each load module along it.
+    pub(crate) fn walk(
+        &self,
+        from_m: [f64; 3],
+        to_m: [f64; 3],
+        curvature: Curvature,
+        mut nearest_in: impl FnMut(&TerrainModule, &Line) -> f64,
+    ) -> Sight {
         if self.is_beyond_any_ground(from_m) || self.is_beyond_any_ground(to_m) {
             return Sight::Unknown;
         }
@@ -219,13 +234,7 @@ impl LoadedGround {
             let inside = |index: i64| u32::try_from(index).ok();
             let loaded = inside(row).zip(inside(col)).and_then(|(row, col)| self.module(row, col));
             match loaded {
-                Some(module) => {
-                    let line = Line::in_module(corner, from, to, curvature);
-                    nearest = nearest.min(hidden_at(module.lookup(), self.frame.side, &line));
-                    if let Some(decks) = module.decks() {
-                        nearest = nearest.min(crossed_at(decks, self.frame.side, &line));
-                    }
-                }
+                Some(module) => nearest = nearest_in(module, &Line::in_module(corner, from, to, curvature)),
                 None => left_at = entered_at(corner, side, from, to),
             }
             // What comes later lies further along the line; what is not loaded ends the walk whatever rounding says.

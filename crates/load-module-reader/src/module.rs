@@ -4,7 +4,7 @@ use crate::bytes::{Cursor, check_section};
 use crate::cover::torn_edge_count;
 use crate::parts::Parts;
 use crate::{
-    Decks, FIXED_MODULE_BYTES, Header, IndexEntry, Line, QUANTA_PER_METRE, ReadError, Section, VERSION, Vertex,
+    Decks, FIXED_MODULE_BYTES, Header, IndexEntry, Line, Objects, QUANTA_PER_METRE, ReadError, Section, VERSION, Vertex,
 };
 
 /// Residuals over the posts that a load module owns, in quanta of 1/128 m.
@@ -54,6 +54,8 @@ pub struct Module {
     pub decks: Decks,
     /// Middle lines of ways, in the ground or left out; sorted. The finest level alone has them.
     pub lines: Vec<Line>,
+    /// What stands on the ground.
+    pub objects: Objects,
     /// Kinds of parts that this reader does not know; it has passed over them.
     pub unknown_parts: Vec<u32>,
 }
@@ -104,12 +106,14 @@ impl Module {
             residual: fixed.residual,
             decks: Decks::default(),
             lines: Vec::new(),
+            objects: Objects::default(),
             unknown_parts: Vec::new(),
         };
         module.check_cover(header.side, entry, section)?;
         if header.version == VERSION {
             let parts = Parts::parse(behind, header, entry, level, (row, col))?;
-            (module.decks, module.lines, module.unknown_parts) = (parts.decks, parts.lines, parts.unknown);
+            (module.decks, module.lines) = (parts.decks, parts.lines);
+            (module.objects, module.unknown_parts) = (parts.objects, parts.unknown);
         } else {
             module.decks = Decks::parse(behind, header, entry, level, (row, col))?;
         }

@@ -3,8 +3,8 @@
 
 use crate::bytes::{Cursor, check_section};
 use crate::{
-    Decks, FIXED_DECKS_PART_BYTES, FIXED_TABLE_BYTES, Header, IndexEntry, Line, PART_DECKS, PART_LINES, ReadError,
-    Section, TABLE_ENTRY_BYTES, lines,
+    Decks, FIXED_DECKS_PART_BYTES, FIXED_TABLE_BYTES, Header, IndexEntry, Line, Objects, PART_DECKS, PART_LINES,
+    PART_OBJECTS, ReadError, Section, TABLE_ENTRY_BYTES, lines, objects,
 };
 
 /// What the parts of a load module hold.
@@ -12,6 +12,7 @@ use crate::{
 pub(crate) struct Parts {
     pub decks: Decks,
     pub lines: Vec<Line>,
+    pub objects: Objects,
     pub unknown: Vec<u32>,
 }
 
@@ -44,6 +45,7 @@ impl Parts {
             let section = match part.kind {
                 PART_DECKS => Section::Decks { row, col, level },
                 PART_LINES => Section::Lines { row, col, level },
+                PART_OBJECTS => Section::Objects { row, col, level },
                 _ => Section::Parts { row, col, level },
             };
             // The table has been checked against the length of all parts.
@@ -57,6 +59,7 @@ impl Parts {
             match part.kind {
                 PART_DECKS => parts.decks = read_decks(&mut cursor, part.length, header.side)?,
                 PART_LINES => parts.lines = lines::parse(&mut cursor, part.length, header.side)?,
+                PART_OBJECTS => parts.objects = objects::parse(&mut cursor, part.length, header.side)?,
                 kind => parts.unknown.push(kind),
             }
             start += part.length as usize;

@@ -5,11 +5,11 @@ use crate::lookup::{Corners, Lookup, STEPS};
 
 /// A line of sight over a load module, in quanta from its south-west corner.
 pub(crate) struct Line {
-    start: [f64; 2],
-    end: [f64; 2],
+    pub(crate) start: [f64; 2],
+    pub(crate) end: [f64; 2],
     /// From the start to the end.
     along: [f64; 2],
-    length_squared: f64,
+    pub(crate) length_squared: f64,
     /// Heights of both ends.
     heights: [f64; 2],
     /// Four times as much as its middle hangs below the straight line, for the curvature of the earth.
@@ -28,14 +28,32 @@ impl Line {
     }
 
     /// How far left of the line a place lies, and how far ahead, both times the length.
-    fn seen(&self, place: [f64; 3]) -> (f64, f64) {
+    pub(crate) fn seen(&self, place: [f64; 3]) -> (f64, f64) {
         let (dx, dy) = (place[0] - self.start[0], place[1] - self.start[1]);
         (self.along[0] * dy - self.along[1] * dx, self.along[0] * dx + self.along[1] * dy)
     }
 
     /// Height of the line at a share of it.
-    fn height(&self, at: f64) -> f64 {
+    pub(crate) fn height(&self, at: f64) -> f64 {
         self.heights[0] + at * (self.heights[1] - self.heights[0]) - self.sag * at * (1.0 - at)
+    }
+
+    /// The place at a share of it.
+    pub(crate) fn place(&self, at: f64) -> [f64; 2] {
+        [0, 1].map(|axis| self.start[axis] + at * self.along[axis])
+    }
+
+    /// The shares of it at which it has a height.
+    pub(crate) fn shares_at(&self, height: f64) -> [Option<f64>; 2] {
+        let (rise, over) = (self.heights[1] - self.heights[0] - self.sag, self.heights[0] - height);
+        let within = |at: f64| (0.0..=1.0).contains(&at).then_some(at);
+        if self.sag == 0.0 {
+            return [within(-over / rise), None];
+        }
+        // The larger root of the two first, the other from their product: no difference of near numbers.
+        let root = (rise * rise - 4.0 * self.sag * over).sqrt();
+        let large = -0.5 * (rise + root.copysign(rise));
+        [within(large / self.sag), within(over / large)]
     }
 
     /// The lowest it may be between two shares of it, or a little less.
@@ -184,7 +202,7 @@ fn above(line: f64, deck: f64) -> f64 {
 }
 
 /// The part of a line over or under a triangle: how far along it begins and ends, and the triangle's height there.
-fn part_over(corners: &Corners, line: &Line) -> Option<[[f64; 2]; 2]> {
+pub(crate) fn part_over(corners: &Corners, line: &Line) -> Option<[[f64; 2]; 2]> {
     let mut ends = [[0.0; 2]; 2];
     let mut count = 0;
     for i in 0..3 {

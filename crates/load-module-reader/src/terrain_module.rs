@@ -1,6 +1,7 @@
 //! One load module ready to be asked.
 
 use crate::lookup::{Corners, Lookup, Mesh};
+use crate::object_lookups::ObjectLookups;
 use crate::{HOLE_CLASS, Module};
 
 /// The ground, or a deck, at one place.
@@ -38,6 +39,7 @@ pub struct TerrainModule {
     lookup: Lookup,
     /// Of the decks, where there are any.
     decks: Option<Lookup>,
+    objects: ObjectLookups,
 }
 
 impl TerrainModule {
@@ -46,7 +48,8 @@ impl TerrainModule {
         let lookup = Lookup::new(Mesh { vertices: &module.vertices, triangles: &module.triangles }, side);
         let decks = Mesh { vertices: &module.decks.vertices, triangles: &module.decks.triangles };
         let decks = (!module.decks.is_empty()).then(|| Lookup::new(decks, side));
-        Self { module, lookup, decks }
+        let objects = ObjectLookups::of(&module.objects, side);
+        Self { module, lookup, decks, objects }
     }
 
     /// The load module itself: vertices, triangles, sides, residuals, decks.
@@ -61,6 +64,11 @@ impl TerrainModule {
     /// What finds the decks, where there are any.
     pub(crate) fn decks(&self) -> Option<&Lookup> {
         self.decks.as_ref()
+    }
+
+    /// What finds the objects.
+    pub(crate) fn objects(&self) -> &ObjectLookups {
+        &self.objects
     }
 
     /// Height, normal and class of the ground at a place in steps.

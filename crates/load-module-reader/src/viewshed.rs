@@ -1,6 +1,6 @@
 //! What is seen from a place: a square of places around it, those within range.
 
-use crate::{Curvature, Eye, LoadedGround};
+use crate::{Curvature, Eye, LoadedGround, PastObjects, Sight, Standing};
 
 /// What a place of a viewshed is told as.
 pub const HIDDEN: u8 = 0;
@@ -24,6 +24,8 @@ pub struct Viewshed {
     pub spacing_m: f64,
     /// How the earth falls away.
     pub curvature: Curvature,
+    /// Which objects are looked at; what half of the light reaches is seen.
+    pub standing: Standing,
 }
 
 impl Viewshed {
@@ -44,6 +46,12 @@ impl Viewshed {
         Some(ground.eye([east, north, height_m + self.eye_m], self.curvature))
     }
 
+    /// Whether no object hides what the ground does not.
+    fn is_free(&self, ground: &LoadedGround, eye: &Eye, to: [f64; 3]) -> bool {
+        let past = PastObjects { standing: self.standing, ..PastObjects::all(self.curvature) };
+        self.standing == Standing::None || ground.sight_past(eye.place_m(), to, &past).sight == Sight::Free
+    }
+
     /// What is seen of row `row`, counted from the north, from west to east: [`SEEN`], [`HIDDEN`] or [`NOT_LOOKED_AT`].
     pub fn row(&self, ground: &LoadedGround, eye: &mut Eye, row: u64) -> Vec<u8> {
         let reach = i64::from(self.reach());
@@ -56,7 +64,8 @@ impl Viewshed {
             let height_m = looked_at(right).then(|| ground.height_m(place(right))).flatten();
             height_m.map_or(NOT_LOOKED_AT, |height_m| {
                 let [east, north] = place(right);
-                if eye.sees([east, north, height_m + self.target_m]) { SEEN } else { HIDDEN }
+                let to = [east, north, height_m + self.target_m];
+                if eye.sees(to) && self.is_free(ground, eye, to) { SEEN } else { HIDDEN }
             })
         }));
         seen

@@ -10,19 +10,26 @@ use terrain::{GainCurve, LoadModule, TileFeatures, TileTin};
 use crate::lock::LOCK_NAME;
 use crate::names::{MEASURED, MODULES, SURVEY, TILES, WORK, files};
 use crate::{
-    Area, AreaLevel, Building, DatabaseError, FileStamp, Folder, Lock, Manifest, ManifestState, Measured, Profile,
-    Removals, TileModules, Work, encode_buildings, encode_curve, encode_level, encode_levels, encode_lines,
-    encode_measured, encode_profile, encode_removals, encode_tile, json,
+    Area, AreaLevel, AreaOutlines, Building, DatabaseError, FileStamp, Folder, Lock, Manifest, ManifestState, Measured,
+    Profile, Removals, TileModules, Work, encode_buildings, encode_curve, encode_level, encode_levels, encode_lines,
+    encode_measured, encode_outlines, encode_profile, encode_removals, encode_tile, json,
 };
 
 /// The folders of a database that stay.
 const FOLDERS: [&str; 4] = [TILES, MODULES, MEASURED, SURVEY];
 /// What is written beside a finished build.
-const REPORTS: [&str; 6] =
-    [files::REPORT, files::REPORT_HTML, files::BREACHES, files::BREACHES_CSV, files::FEATURES, files::FEATURES_GPKG];
+const REPORTS: [&str; 7] = [
+    files::REPORT,
+    files::REPORT_HTML,
+    files::BREACHES,
+    files::BREACHES_CSV,
+    files::FEATURES,
+    files::FEATURES_GPKG,
+    files::OBJECTS,
+];
 /// Endings of the names that a build gives to files in those folders.
-const ENDINGS: [&str; 9] =
-    [".tin", ".removed", ".slm", ".sums", ".curve", ".profile", ".lines", ".level", ".buildings"];
+const ENDINGS: [&str; 10] =
+    [".tin", ".removed", ".slm", ".sums", ".curve", ".profile", ".lines", ".level", ".buildings", ".outlines"];
 
 /// A database to write to: by this process alone, or by all that have joined it.
 #[derive(Debug)]
@@ -214,6 +221,14 @@ impl Database {
     /// As [`Database::write_tile`].
     pub fn write_level(&self, stamp: &Stamp, level: &AreaLevel) -> Result<FileStamp, DatabaseError> {
         self.publish(&self.folder.path(files::LEVEL), &encode_level(stamp, level))
+    }
+
+    /// Publishes what stands on the ground of the area, before its heights are known.
+    ///
+    /// # Errors
+    /// When the file cannot be written.
+    pub fn write_outlines(&self, stamp: &Stamp, outlines: &AreaOutlines) -> Result<FileStamp, DatabaseError> {
+        self.publish(&self.folder.path(files::OUTLINES), &encode_outlines(stamp, outlines))
     }
 
     /// Publishes the buildings of the area.

@@ -11,9 +11,9 @@ use crate::frame::{FRAME_BYTES, Kind};
 use crate::names::{MEASURED, MODULES, SURVEY, TILES, WORK, files};
 use crate::read::{check_stamp, read, refuse_other};
 use crate::{
-    AreaLevel, Building, DatabaseError, FileStamp, Manifest, ManifestState, Measured, NotADatabase, Profile, Removals,
-    Report, Stamp, TileModules, Work, buildings_file, curve_file, frame, json, level_file, lines_file, measured_file,
-    profile_file, removals_file, slm, tile_file,
+    AreaLevel, AreaOutlines, Building, DatabaseError, FileStamp, Manifest, ManifestState, Measured, NotADatabase,
+    Profile, Removals, Report, Stamp, TileModules, Work, buildings_file, curve_file, frame, json, level_file,
+    lines_file, measured_file, outlines_file, profile_file, removals_file, slm, tile_file,
 };
 
 /// The directory of a database, to read from. Holds no file open and no lock.
@@ -256,6 +256,25 @@ impl Folder {
     /// When the header cannot be read or is damaged.
     pub fn level_stamp(&self) -> Result<Option<Stamp>, DatabaseError> {
         self.stamp(Kind::Level, &self.path(files::LEVEL))
+    }
+
+    /// What the outlines of objects were made from, by their file's header alone; `None` when there are none.
+    ///
+    /// # Errors
+    /// When the header cannot be read or is damaged.
+    pub fn outlines_stamp(&self) -> Result<Option<Stamp>, DatabaseError> {
+        self.stamp(Kind::Objects, &self.path(files::OUTLINES))
+    }
+
+    /// What stands on the ground of the area, what it was made from, and its file.
+    ///
+    /// # Errors
+    /// When the file is missing or damaged.
+    pub fn read_outlines(&self) -> Result<(Stamp, FileStamp, AreaOutlines), DatabaseError> {
+        let path = self.path(files::OUTLINES);
+        let bytes = self.read(&path)?;
+        let (stamp, outlines) = outlines_file::decode_outlines(&path, &bytes)?;
+        Ok((stamp, FileStamp::of(&bytes), outlines))
     }
 
     /// What the buildings were made from, by their file's header alone; `None` when there are none.

@@ -32,6 +32,7 @@ pub(crate) enum Kind {
     Lines,
     Level,
     Buildings,
+    Objects,
 }
 
 impl Kind {
@@ -45,6 +46,7 @@ impl Kind {
             Kind::Lines => *b"\x89LIN\r\n\x1a\n",
             Kind::Level => *b"\x89LEV\r\n\x1a\n",
             Kind::Buildings => *b"\x89BLD\r\n\x1a\n",
+            Kind::Objects => *b"\x89OBJ\r\n\x1a\n",
         }
     }
 
@@ -55,7 +57,7 @@ impl Kind {
             Kind::Measured => 3,
             // 2: corners as steps from one to the next.
             Kind::Buildings => 2,
-            Kind::Tile | Kind::Curve | Kind::Removals | Kind::Profile | Kind::Lines | Kind::Level => 1,
+            Kind::Tile | Kind::Curve | Kind::Removals | Kind::Profile | Kind::Lines | Kind::Level | Kind::Objects => 1,
         }
     }
 }

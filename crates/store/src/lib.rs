@@ -37,6 +37,10 @@ pub use level_file::{
     AreaLevel, CULVERT, FeatureAmounts, FeatureEnd, FeatureFace, FeatureFarOff, FeatureLeftOut, FeatureLine,
     FeatureRemark, FeatureWhy, StripFigures, decode_level, encode_level,
 };
+mod report_objects;
+pub use report_objects::{ObjectSums, ReportObjectLimit, ReportObjects};
+mod outlines_file;
+pub use outlines_file::{AreaOutlines, ModuleOutlines, ObjectLeftOut, decode_outlines, encode_outlines};
 mod buildings_file;
 pub use buildings_file::{BUILDING_UNITS_PER_METRE, Building, decode_buildings, encode_buildings};
 mod removals_file;

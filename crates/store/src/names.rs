@@ -20,6 +20,10 @@ pub mod files {
     pub const ALLOCATION: &str = "survey/allocation.json";
     /// What features of the area came to: their heights, their cost, what was mended.
     pub const LEVEL: &str = "survey/features.level";
+    /// What stands on the ground, before its heights are known.
+    pub const OUTLINES: &str = "survey/objects.outlines";
+    /// What of it had no room.
+    pub const OBJECTS: &str = "objects.geojson";
     /// Buildings of the sources of features, which are drawn only.
     pub const BUILDINGS: &str = "survey/features.buildings";
 }

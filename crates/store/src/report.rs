@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use crate::{FileStamp, ReportFeatures};
+use crate::{FileStamp, ReportFeatures, ReportObjects};
 
 /// The content of `report.json`; its keys are a contract. Every number is finite.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -53,6 +53,9 @@ pub struct Report {
     /// Roads, rivers and lakes, where the job has any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub features: Option<ReportFeatures>,
+    /// Buildings, walls and woods, where the job has any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub objects: Option<ReportObjects>,
     /// The least mean that would keep nearly all of them, where limits leave out more than a person expects and one of
     /// the means that `plan` tries is enough.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -400,6 +403,7 @@ mod tests {
             residual_against_source: None,
             classes: vec![],
             features: None,
+            objects: None,
             enough: None,
             levels: vec![ReportLevel { level: 1, inner_share: 0.5, triangles: 20, rms_m: 1.5, max_m: 11.25 }],
             overall_point_weighted_rms_m: 1.1,

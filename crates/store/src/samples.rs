@@ -126,6 +126,7 @@ pub(crate) fn modules() -> Vec<LoadModule> {
         residual: ModuleResidual { posts: 400, largest: 300, sum_abs: 25_600, sum_squared: 3_276_800 },
         decks: Decks::default(),
         lines: Vec::new(),
+        objects: terrain::Objects::default(),
     };
     let east = LoadModule {
         id: ModuleId { row: 2, col: 4 },
@@ -143,6 +144,7 @@ pub(crate) fn modules() -> Vec<LoadModule> {
         residual: ModuleResidual { posts: 399, largest: 128, sum_abs: 12_800, sum_squared: 1_638_400 },
         decks: Decks::default(),
         lines: Vec::new(),
+        objects: terrain::Objects::default(),
     };
     [&west, &east].iter().for_each(|module| assert_eq!(module.check(), Ok(())));
     vec![west, east]
@@ -215,5 +217,32 @@ pub(crate) fn area() -> Area {
         module_cols: 5,
         tile_rows: 1,
         tile_cols: 2,
+    }
+}
+
+/// A house with a courtyard on a line between load modules, and a wood.
+pub(crate) fn objects() -> load_module_reader::Objects {
+    use load_module_reader::{Canopy, Corner, ObjectKind, Objects, Prism};
+    let ring = |places: &[[u16; 2]]| places.iter().map(|&[x, y]| Corner { x, y, has_wall: x != 0 }).collect();
+    Objects {
+        prisms: vec![Prism {
+            id: 77,
+            kind: ObjectKind::Building,
+            base: -5,
+            roof: 900,
+            rings: vec![
+                ring(&[[0, 100], [2_000, 100], [2_000, 2_100], [0, 2_100]]),
+                ring(&[[500, 500], [500, 900], [900, 900]]),
+            ],
+        }],
+        canopies: vec![Canopy {
+            id: 78,
+            kind: ObjectKind::Wood,
+            height: 1_920,
+            fullness: 90,
+            spacing: 512,
+            places: vec![[0, 9_000], [5_000, 9_000], [0, 12_000]],
+            triangles: vec![[0, 1, 2]],
+        }],
     }
 }

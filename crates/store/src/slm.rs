@@ -4,7 +4,7 @@ use std::path::Path;
 
 use load_module_reader::{
     DECK_ENTRY_BYTES, FIXED_HEADER_BYTES, Header, INDEX_ENTRY_BYTES, LEVELS_MAX, MAGIC, Module, PART_DECKS, PART_LINES,
-    PARTS_ENTRY_BYTES, QUANTA_PER_METRE, SlmFile, VERSION, VERSION_OF_GROUND, VERSION_WITH_DECKS, Vertex,
+    PART_OBJECTS, PARTS_ENTRY_BYTES, QUANTA_PER_METRE, SlmFile, VERSION, VERSION_OF_GROUND, VERSION_WITH_DECKS, Vertex,
 };
 use terrain::{
     Decks, GridFrame, LineForm, LineKind, LineStorey, LineTraits, LoadModule, ModuleGrid, ModuleId, ModuleLine,
@@ -48,7 +48,7 @@ pub fn encode_modules(tile: &TileModules, modules: &[LoadModule]) -> Vec<u8> {
 }
 
 /// The bytes of the file that holds these levels of a tile's load modules, the finest first: of format version 3 if any
-/// of them has lines, else of version 2 if any has decks, else of version 1.
+/// of them has lines or objects, else of version 2 if any has decks, else of version 1.
 ///
 /// # Panics
 /// When there are none or more than eight, or the load modules of one are not exactly those of the tile, row by row
@@ -109,7 +109,8 @@ fn encode(tile: &TileModules, levels: &[&[LoadModule]]) -> Vec<u8> {
 /// The least version of the format that holds all there is.
 fn version_of(levels: &[&[LoadModule]]) -> u16 {
     let any = |has: fn(&LoadModule) -> bool| levels.iter().any(|modules| modules.iter().any(has));
-    match (any(|module| !module.lines.is_empty()), any(|module| !module.decks.is_empty())) {
+    let is_parted = any(|module| !module.lines.is_empty() || !module.objects.is_empty());
+    match (is_parted, any(|module| !module.decks.is_empty())) {
         (true, _) => VERSION,
         (false, true) => VERSION_WITH_DECKS,
         (false, false) => VERSION_OF_GROUND,
@@ -208,6 +209,9 @@ fn put_parts(file: &mut Vec<u8>, module: &LoadModule, level: u32) {
     }
     if !module.lines.is_empty() {
         parts.push((PART_LINES, line_part(&module.lines)));
+    }
+    if !module.objects.is_empty() {
+        parts.push((PART_OBJECTS, module.objects.to_part()));
     }
     if parts.is_empty() {
         return;
@@ -337,6 +341,7 @@ pub fn load_module(module: &Module, side: u16) -> LoadModule {
             classes: module.decks.classes.clone(),
         },
         lines: module.lines.iter().map(|line| module_line(line, vertices(&line.vertices))).collect(),
+        objects: module.objects.clone(),
     }
 }
 

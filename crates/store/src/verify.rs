@@ -11,7 +11,7 @@ use crate::page::check_page;
 use crate::read::check_stamp;
 use crate::{
     DatabaseError, FileStamp, Folder, Manifest, buildings_file, curve_file, level_file, lines_file, measured_file,
-    profile_file, removals_file, slm, tile_file,
+    outlines_file, profile_file, removals_file, slm, tile_file,
 };
 
 /// One file that is not as it should be.
@@ -101,6 +101,7 @@ impl Folder {
             Some("profile") => drop(profile_file::decode_profile(path, &bytes)?),
             Some("lines") => drop(lines_file::decode_lines(path, &bytes)?),
             Some("level") => drop(level_file::decode_level(path, &bytes)?),
+            Some("outlines") => drop(outlines_file::decode_outlines(path, &bytes)?),
             Some("buildings") => drop(buildings_file::decode_buildings(path, &bytes)?),
             Some("removed") => drop(removals_file::decode_removals(path, &bytes)?),
             _ => {}

@@ -37,6 +37,8 @@ mod decks;
 pub use decks::{DeckFault, Decks};
 mod module_line;
 pub use module_line::{LineFault, LineForm, LineKind, LineStorey, LineTraits, ModuleLine};
+// What stands on the ground is the same value here and in a file.
+pub use load_module_reader::{Canopy, Corner, ObjectKind, Objects, PRISMS_MAX, Prism};
 mod load_module;
 pub use load_module::{LoadModule, LoadModuleFault, ModuleCounts, ModuleResidual};
 mod choices;

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use crate::{DeckFault, Decks, LineFault, ModuleId, ModuleLine, ModuleVertex, module_line};
+use crate::{DeckFault, Decks, LineFault, ModuleId, ModuleLine, ModuleVertex, Objects, module_line};
 
 /// One finished load module.
 ///
@@ -28,6 +28,8 @@ pub struct LoadModule {
     pub decks: Decks,
     /// Middle lines of ways, in order; they count against no limit.
     pub lines: Vec<ModuleLine>,
+    /// What stands on the ground; it counts against limits of its own.
+    pub objects: Objects,
 }
 
 /// What of a load module counts against limits.
@@ -219,6 +221,7 @@ mod tests {
             residual: ModuleResidual::default(),
             decks: Decks::default(),
             lines: Vec::new(),
+            objects: Objects::default(),
         }
     }
 

@@ -15,10 +15,10 @@ pub fn outcome(remark: &FeatureRemark) -> &'static str {
 
 /// Remarks as a feature collection, indented, in metres of the coordinate system with this EPSG code (named by a `crs`
 /// member, as GDAL and QGIS read it). One without a place has no geometry.
-pub fn features_geojson(remarks: &[FeatureRemark], epsg: u32) -> String {
+pub fn features_geojson(name: &str, remarks: &[FeatureRemark], epsg: u32) -> String {
     let features = remarks.iter().map(feature).collect();
     let crs = json!({ "type": "name", "properties": { "name": format!("urn:ogc:def:crs:EPSG::{epsg}") } });
-    let members = [("name".to_owned(), json!("features")), ("crs".to_owned(), crs)];
+    let members = [("name".to_owned(), json!(name)), ("crs".to_owned(), crs)];
     let collection = FeatureCollection { bbox: None, features, foreign_members: Some(members.into_iter().collect()) };
     let text = serde_json::to_string_pretty(&collection).expect("texts and finite numbers are JSON");
     text + "\n"
@@ -58,7 +58,7 @@ mod tests {
             degrades,
         };
         let remarks = [remark(Some([505_000.5, 3_875_000.0]), true, true), remark(None, false, true)];
-        let value: Value = serde_json::from_str(&features_geojson(&remarks, 32611)).unwrap();
+        let value: Value = serde_json::from_str(&features_geojson("features", &remarks, 32611)).unwrap();
         assert_eq!(value["crs"]["properties"]["name"], "urn:ogc:def:crs:EPSG::32611");
         assert_eq!(value["features"][0]["geometry"]["coordinates"], json!([505_000.5, 3_875_000.0]));
         let of = |index: usize, key: &str| value["features"][index]["properties"][key].clone();
@@ -69,7 +69,7 @@ mod tests {
 
     #[test]
     fn no_remark_is_an_empty_collection() {
-        let value: Value = serde_json::from_str(&features_geojson(&[], 1)).unwrap();
+        let value: Value = serde_json::from_str(&features_geojson("features", &[], 1)).unwrap();
         assert_eq!(value["features"], json!([]));
     }
 }

@@ -12,6 +12,7 @@ mod breaches;
 pub use breaches::{BreachPlaces, breaches_csv, breaches_geojson};
 mod features;
 mod features_text;
+mod objects_text;
 pub use features::{features_geojson, outcome};
 pub use features_text::{far_off_in_words, remarks_in_words};
 mod page;

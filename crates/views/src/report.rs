@@ -8,6 +8,7 @@ use store::{
 
 use crate::against::{self, Residual};
 use crate::features_text::features_text;
+use crate::objects_text::objects_text;
 use crate::table::{Align, Table, fold, grouped};
 
 use Align::{Left, Right};
@@ -20,6 +21,7 @@ pub fn report_text(report: &Report) -> String {
         residuals(report),
         levels(report),
         report.features.as_ref().map(features_text),
+        report.objects.as_ref().map(objects_text),
         report.enough.as_ref().map(enough),
         refusals(report),
         bound(report),

@@ -36,6 +36,7 @@ pub(crate) fn modules() -> Vec<LoadModule> {
             residual: ModuleResidual::default(),
             decks: Decks::default(),
             lines: Vec::new(),
+            objects: terrain::Objects::default(),
         }
     };
     GRID.all().iter().map(module).collect()
@@ -114,6 +115,7 @@ pub(crate) fn report() -> Report {
         residual_against_source: Some(residual(3.1)),
         classes: vec![class("plains", 2_587_215, 64_939, 0.869), class("mountains", 1_313_410, 28_532, 5.268)],
         features: None,
+        objects: None,
         enough: None,
         levels: vec![],
         overall_point_weighted_rms_m: 2.999,

@@ -14,6 +14,8 @@ mod burn;
 pub use burn::{burn, posts_inside, slope_reach};
 mod buildings;
 mod lines;
+mod objects;
+pub use objects::FoundObjects;
 mod vectors;
 pub use vectors::{FeaturesRead, Vectors, site};
 mod excluded;

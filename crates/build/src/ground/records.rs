@@ -72,6 +72,12 @@ fn named_files<'a>(job: &'a Job) -> Vec<Named<'a>> {
     };
     all.extend(others.map(|file| named(file, false)));
     all.extend(job.features.iter().flat_map(FeaturesSpec::files).map(|file| named(file, true)));
+    for source in job.objects.iter().flat_map(|objects| &objects.sources) {
+        // Hashed with what lies beside it, and once, where features are read from it, too.
+        if !all.iter().any(|other| other.is_features && other.path == source.file.path) {
+            all.push(named(&source.file, true));
+        }
+    }
     all
 }
 

@@ -181,7 +181,7 @@ fn bad_crs(written: &str, found: &str) -> GroundError {
 }
 
 /// The area and one load module around it, in metres; its south-west corner lies at `origin_m`.
-fn bounds(area: &GamingArea, origin_m: [f64; 2]) -> Extent {
+pub(super) fn bounds(area: &GamingArea, origin_m: [f64; 2]) -> Extent {
     let spacing = area.frame.spacing.metres();
     let reach = area.rect.grown(area.grid.side_cells);
     let metres = |posts: [i32; 2], origin_m: f64| posts.map(|post| origin_m + f64::from(post) * spacing);

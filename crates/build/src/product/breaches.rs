@@ -1,7 +1,7 @@
 //! What a report lists as files for maps and for tables: breaches, and what became of features.
 
 use job::Job;
-use store::{FeatureRemark, Report, files};
+use store::{AreaOutlines, FeatureRemark, ObjectLeftOut, Report, files};
 use views::{BreachPlaces, breaches_csv, breaches_geojson, features_geojson};
 
 /// Names and texts of the files that list the breaches of `report`, whose job this is.
@@ -19,5 +19,26 @@ pub fn breaches(job: &Job, report: &Report) -> [(&'static str, String); 2] {
 
 /// Name and text of the file that lists what was mended, degraded or left out of the features of this job.
 pub fn features_file(job: &Job, remarks: &[FeatureRemark]) -> (&'static str, String) {
-    (files::FEATURES, features_geojson(remarks, job.area.epsg))
+    (files::FEATURES, features_geojson("features", remarks, job.area.epsg))
+}
+
+/// Name and text of the file that lists which objects of this job had no room, and what was mended.
+pub fn objects_file(job: &Job, outlines: &AreaOutlines) -> (&'static str, String) {
+    let left_out = |object: &ObjectLeftOut| {
+        let ObjectLeftOut { kind, at_m, height_m, silhouette_m2, is_window, full: [row, col] } = object;
+        let place = if *is_window { "the square of 4 km from" } else { "" };
+        FeatureRemark {
+            feature: format!("{kind}, {height_m:.1} m high"),
+            at_m: Some(*at_m),
+            found: format!("{place} load module {row},{col} is full of what hides more than {silhouette_m2:.1} m2")
+                .trim_start()
+                .to_owned(),
+            done: "left out".to_owned(),
+            leaves_out: true,
+            degrades: false,
+        }
+    };
+    let all: Vec<FeatureRemark> =
+        outlines.left_out.iter().map(left_out).chain(outlines.remarks.iter().cloned()).collect();
+    (files::OBJECTS, features_geojson("objects", &all, job.area.epsg))
 }

@@ -17,7 +17,7 @@ pub use views::NO_RESIDUAL;
 mod scene;
 pub use scene::{SceneParts, water};
 mod breaches;
-pub use breaches::{breaches, features_file};
+pub use breaches::{breaches, features_file, objects_file};
 mod features_gpkg;
 pub use features_gpkg::features_package;
 mod kept;

@@ -32,6 +32,8 @@ pub struct Words {
     pub tin: String,
     /// The whole section; none where it is empty.
     pub features: String,
+    /// A section with its head, or nothing.
+    pub objects: String,
 }
 
 impl Words {
@@ -48,6 +50,7 @@ impl Words {
             limits: empty(),
             tin: empty(),
             features: empty(),
+            objects: empty(),
         }
     }
 
@@ -61,12 +64,12 @@ impl Words {
     }
 
     pub fn text(&self) -> String {
-        let Self { size: (rows, cols), tiles, dem, importance, order, modules, limits, tin, features } = self;
+        let Self { size: (rows, cols), tiles, dem, importance, order, modules, limits, tin, features, objects } = self;
         let [east, north] = ORIGIN_M;
         format!(
             "[area]\nname = \"small\"\ncrs = \"EPSG:{EPSG}\"\norigin_m = [{east}, {north}]\nsize_m = [{}, {}]\n\
              spacing_m = 25\n[dem]\n{dem}\n[importance]\n{importance}\n[tiles]\nrows = {}\ncolumns = {}\n{order}\n\
-             [load_modules]\n{modules}\n[limits]\n{limits}\n[tin]\n{tin}\n{}",
+             [load_modules]\n{modules}\n[limits]\n{limits}\n[tin]\n{tin}\n{}{objects}\n",
             cols * 500,
             rows * 500,
             tiles.0,

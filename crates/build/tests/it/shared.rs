@@ -11,7 +11,7 @@ use terrain::TileId;
 use crate::modes;
 use crate::scene::{Scene, SetBy, Silent, Words, assert_same, options, sample_dem, tile};
 
-fn perform(scene: &Scene, units: &[Unit]) -> Result<UnitEnd, CompileError> {
+pub fn perform(scene: &Scene, units: &[Unit]) -> Result<UnitEnd, CompileError> {
     build::perform(&scene.job, &scene.path("area"), units, &options(1, &false.into()), &mut Silent)
 }
 

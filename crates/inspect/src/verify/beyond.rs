@@ -148,6 +148,7 @@ mod tests {
             residual: ModuleResidual::default(),
             decks: terrain::Decks::default(),
             lines: Vec::new(),
+            objects: terrain::Objects::default(),
         };
         let height = |post: Post| if post.col < 3 { 12_800 } else { 12_800 + 40 * 128 };
         let features = TileFeatures::none(terrain::TileId { row: 0, col: 0 });

@@ -32,7 +32,8 @@ pub(crate) fn problems(manifest: &Manifest, job: &Job, area: &GamingArea) -> Vec
     }
     let level = job.features.is_some().then_some(files::LEVEL);
     let has_buildings = job.features.as_ref().is_some_and(job::FeaturesSpec::has_buildings);
-    let needed: Vec<&str> = std::iter::once(files::ALLOCATION).chain(level).collect();
+    let outlines = job.objects.is_some().then_some(files::OUTLINES);
+    let needed: Vec<&str> = std::iter::once(files::ALLOCATION).chain(level).chain(outlines).collect();
     // A database that was built before buildings were kept has none.
     let is_of_job = |name: &str| needed.contains(&name) || (has_buildings && name == files::BUILDINGS);
     for name in manifest.files.keys().filter(|name| !is_of_job(name)) {

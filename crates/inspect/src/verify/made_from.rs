@@ -9,7 +9,7 @@ use super::tins::OfTins;
 use build::ALGORITHM_REVISION;
 use build::ground::GamingArea;
 use build::tile_refinement;
-use build::{LeftOut, modules_key};
+use build::{LeftOut, TileObjects, modules_key};
 use build::{kept_features, rules};
 
 /// Load-module files whose fingerprint is not that of the TINs and the job, and, second, what was not checked.
@@ -37,6 +37,13 @@ pub(crate) fn problems(
             return (problems, unchecked);
         }
     };
+    let outlines = match job.objects.as_ref().map(|_| folder.read_outlines()).transpose() {
+        Ok(read) => read.map(|(.., outlines)| outlines),
+        Err(error) => {
+            problems.push(error.to_string());
+            return (problems, unchecked);
+        }
+    };
     let mut thinned = 0;
     for (&tile, found) in area.tiles.iter().zip(found) {
         let near = area.tiling.neighbours(tile);
@@ -54,7 +61,9 @@ pub(crate) fn problems(
             }
         };
         let stamps = |index: usize| tins.stamps[index];
-        let key = modules_key((job, area), &stamps, &tins.removed, (&features, left_out.as_ref()));
+        let objects = outlines.as_ref().map(|outlines| TileObjects::of(outlines, area, tile));
+        let features = (&features, left_out.as_ref());
+        let key = modules_key((job, area), &stamps, &tins.removed, features, objects.as_ref());
         let expected = key.fingerprint();
         if *found != expected {
             problems.push(format!("modules/{tile}.slm: its fingerprint is not that of its TIN and its job"));

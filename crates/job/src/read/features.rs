@@ -182,7 +182,7 @@ fn rule(item: &Entry, importance: &ImportanceSpec) -> Result<Rule, JobError> {
 }
 
 /// Tags that a feature must have: of each key one of some values, or any.
-fn tags(entry: &Entry) -> Result<Vec<(String, Vec<String>)>, JobError> {
+pub(super) fn tags(entry: &Entry) -> Result<Vec<(String, Vec<String>)>, JobError> {
     let fits = |text: &str| (1..=TAG_CHARS_MAX).contains(&text.chars().count());
     let mut tags = Vec::new();
     for (key, value) in entry.items()? {

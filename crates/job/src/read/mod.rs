@@ -7,6 +7,7 @@ mod given;
 mod importance;
 mod limits;
 mod lod;
+mod objects;
 mod tiles;
 mod tin;
 
@@ -24,6 +25,7 @@ struct Sections<'a> {
     dem: Section<'a>,
     importance: Section<'a>,
     features: Section<'a>,
+    objects: Section<'a>,
     tiles: Section<'a>,
     modules: Section<'a>,
     limits: Section<'a>,
@@ -49,6 +51,7 @@ pub(crate) fn read<'a>(
         dem: section("dem")?,
         importance: section("importance")?,
         features: section("features")?,
+        objects: section("objects")?,
         tiles: section("tiles")?,
         modules: section("load_modules")?,
         limits: section("limits")?,
@@ -77,6 +80,8 @@ fn job_of(sections: &Sections, path: &Path, find: Option<&FindArea>) -> Result<(
     let mut importance = importance::read(&sections.importance, &dem.source, path, &mut mentions)?;
     dem.water = importance::water(&sections.dem, &mut importance, path, &mut mentions)?;
     let features = features::read(&sections.features, &dem.source, &importance, path, &mut mentions)?;
+    let objects = objects::read(&sections.objects, features.as_ref(), path, &mut mentions)?;
+    objects::refuse_beside(&sections.objects, &sections.modules, modules.edges, modules.format)?;
     let tiles = tiles::read(&sections.tiles, &area.grid)?;
     let limits = limits::read(&sections.limits, &area.grid, modules.side_m)?;
     let given = given::read(&sections.tin, path, &mut mentions)?;
@@ -85,7 +90,8 @@ fn job_of(sections: &Sections, path: &Path, find: Option<&FindArea>) -> Result<(
     features::refuse_beside(&sections.features, others, modules.edges, tin.method.name())?;
     modules.outer_border = area::outer_border(&sections.modules, modules.edges, tin.method)?;
     let lod = lod::read(&sections.lod, features.as_ref())?;
-    Ok((Job { path: path.to_owned(), area, dem, importance, features, tiles, modules, limits, tin, lod }, mentions))
+    let path = path.to_owned();
+    Ok((Job { path, area, dem, importance, features, objects, tiles, modules, limits, tin, lod }, mentions))
 }
 
 /// The files of `dem.sources`, patterns expanded.

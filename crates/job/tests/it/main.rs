@@ -7,5 +7,6 @@ mod canonical;
 mod errors;
 mod features;
 mod files;
+mod objects;
 mod reference;
 mod resolved;

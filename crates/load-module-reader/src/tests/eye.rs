@@ -5,7 +5,7 @@ use std::sync::Arc;
 use fastrand::Rng;
 
 use super::{SIDE, agrees_with_small_steps, by_search, rough, sample_ground};
-use crate::{Curvature, LoadedGround, Module, NOT_LOOKED_AT, SEEN, Sight, TerrainModule, Viewshed};
+use crate::{Curvature, LoadedGround, Module, NOT_LOOKED_AT, SEEN, Sight, Standing, TerrainModule, Viewshed};
 
 const CORNER: [f64; 2] = [501_500.0, 3_876_000.25];
 /// A small planet: a middle hangs by metres over half a kilometre.
@@ -86,8 +86,15 @@ fn refraction_flattens_the_earth_and_no_number_does_nothing() {
 fn a_viewshed_tells_each_place_as_a_line_of_sight_does() {
     let (ground, _) = rough_ground();
     let place_m = [CORNER[0] + 480.0, CORNER[1] + 250.0];
-    let viewshed =
-        Viewshed { place_m, eye_m: 20.0, target_m: 1.0, range_m: 300.0, spacing_m: 7.0, curvature: Curvature::NONE };
+    let viewshed = Viewshed {
+        place_m,
+        eye_m: 20.0,
+        target_m: 1.0,
+        range_m: 300.0,
+        spacing_m: 7.0,
+        curvature: Curvature::NONE,
+        standing: Standing::None,
+    };
     let mut eye = viewshed.eye(&ground).unwrap();
     assert_eq!((viewshed.reach(), viewshed.side()), (42, 85));
     let mut counts = [0; 3];

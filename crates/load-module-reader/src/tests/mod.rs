@@ -2,6 +2,7 @@
 
 mod decks;
 mod eye;
+mod objects;
 
 use std::sync::Arc;
 
@@ -10,8 +11,8 @@ use fastrand::Rng;
 use crate::cover::torn_edge_count;
 use crate::lookup::STEPS;
 use crate::{
-    Area, Block, Decks, Keep, LoadedGround, Module, ReadError, Residual, Sight, SlmFile, TerrainModule, TileFile,
-    Vertex, sample,
+    Area, Block, Decks, Keep, LoadedGround, Module, Objects, ReadError, Residual, Sight, SlmFile, TerrainModule,
+    TileFile, Vertex, sample,
 };
 
 const SIDE: u16 = 64_000;
@@ -57,6 +58,7 @@ fn rough(n: u16, seed: u64) -> Module {
         residual,
         decks: Decks::default(),
         lines: Vec::new(),
+        objects: Objects::default(),
         unknown_parts: Vec::new(),
     }
 }

@@ -36,6 +36,7 @@ fn flat(id: ModuleId) -> LoadModule {
         residual: ModuleResidual { posts: 441, largest: 300, sum_abs: 25_600, sum_squared: 3_276_800 },
         decks: Decks::default(),
         lines: Vec::new(),
+        objects: terrain::Objects::default(),
     }
 }
 

@@ -5,7 +5,7 @@ use std::sync::{Mutex, PoisonError};
 
 use clap::Args;
 use exports::{ByteRaster, write_byte_raster};
-use load_module_reader::{Area, Curvature, LoadedGround, SEEN, Sight, Viewshed};
+use load_module_reader::{Area, Curvature, Hider, LoadedGround, PastObjects, SEEN, Sight, Standing, Viewshed};
 use schedule::{Workers, for_each_piece};
 use terrain::Spacing;
 use views::{SeenGround, draw_seen, fold, grouped};
@@ -26,8 +26,10 @@ how far the line stays above the ground. With --range: every place around it,
 as a GeoTIFF (1 seen, 0 hidden, 255 not looked at) or as a picture.
 
 Heights of both ends are metres above the ground. Decks of bridges hide what is
-behind them, as ground does. In Python: Database.line_of_sight and
-Database.viewshed, which answer the same.
+behind them, as ground does, and so do buildings and walls where the database
+has some ([objects] of its job); woods take light away, and what less than half
+of it reaches is hidden. --objects none leaves all of that out, as Python's
+Database.line_of_sight and Database.viewshed do.
 
 Exit codes: 0, whatever is seen; 2 for what cannot be looked at.";
 
@@ -67,6 +69,9 @@ pub struct Arguments {
     /// With --curvature: how far air bends light, as a part of the earth's own [default: 0.13]
     #[arg(long, value_name = "K", value_parser = refraction, requires = "curvature")]
     refraction: Option<f64>,
+    /// What stands on the ground and is looked at: none, buildings (with walls), or all
+    #[arg(long, value_name = "WHICH", value_parser = standing, default_value = "all")]
+    objects: Standing,
     /// The GeoTIFF or picture to write
     #[arg(long, value_name = "FILE.tif|png", requires = "range")]
     out: Option<PathBuf>,
@@ -78,6 +83,15 @@ fn not_negative(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(number) if number.is_finite() && 0.0 <= number => Ok(number),
         _ => Err("expected 0 or a number above it".into()),
+    }
+}
+
+fn standing(text: &str) -> Result<Standing, String> {
+    match text {
+        "none" => Ok(Standing::None),
+        "buildings" => Ok(Standing::Buildings),
+        "all" => Ok(Standing::All),
+        _ => Err("expected none, buildings or all".into()),
     }
 }
 
@@ -125,11 +139,14 @@ fn line(arguments: &Arguments, area: &Area, to: [f64; 3], curvature: Curvature) 
     let (from, to) = (end("--from", arguments.from, &ground)?, end("--to", to, &ground)?);
     let run = [0, 1, 2].map(|axis| to[axis] - from[axis]);
     let length_m = (run[0] * run[0] + run[1] * run[1]).sqrt();
-    let seen = match ground.sight_over(from, to, curvature) {
+    let past = PastObjects { standing: arguments.objects, ..PastObjects::all(curvature) };
+    let sighting = ground.sight_past(from, to, &past);
+    let by = sighting.by.map_or("ground", Hider::name);
+    let seen = match sighting.sight {
         Sight::Free => "visible".to_owned(),
         Sight::Unknown => "unknown: the line leaves the area".to_owned(),
         Sight::Hidden(at) => format!(
-            "hidden, first {:.1} m from the eye, at {:.1},{:.1}",
+            "hidden by {by}, first {:.1} m from the eye, at {:.1},{:.1}",
             at * length_m,
             from[0] + at * run[0],
             from[1] + at * run[1]
@@ -141,6 +158,10 @@ fn line(arguments: &Arguments, area: &Area, to: [f64; 3], curvature: Curvature) 
     text += &format!("distance   {length_m:.1} m\n");
     if let Some(clearance_m) = ground.clearance_over_m(from, to, curvature) {
         text += &format!("clearance  {clearance_m:.2} m above the ground at least\n");
+    }
+    if 0.0 < sighting.wood_m {
+        let (metres, left) = (sighting.wood_m, 100.0 * sighting.transmission);
+        text += &format!("woods      {metres:.1} m inside, which leave {left:.0} % of the light\n");
     }
     terminal::print(&text)?;
     Ok(Outcome::Sound)
@@ -180,7 +201,15 @@ fn around(
         Failure::new(format!("--spacing: found {spacing_m}, expected a multiple of 1/16 m"), "such as 25 or 12.5")
     })?;
     let target_m = arguments.target.unwrap_or(0.0);
-    let viewshed = Viewshed { place_m: [east, north], eye_m, target_m, range_m, spacing_m, curvature };
+    let viewshed = Viewshed {
+        place_m: [east, north],
+        eye_m,
+        target_m,
+        range_m,
+        spacing_m,
+        curvature,
+        standing: arguments.objects,
+    };
     let most = if kind == Kind::Png { PIXELS_MAX } else { PLACES_MAX };
     let side = viewshed.side();
     if most < side.saturating_mul(side) {

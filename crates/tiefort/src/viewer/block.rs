@@ -82,6 +82,7 @@ mod tests {
                 classes: vec![2],
             },
             lines: Vec::new(),
+            objects: terrain::Objects::default(),
             unknown_parts: Vec::new(),
         };
         let mut out = Vec::new();

@@ -170,7 +170,15 @@ fn viewshed_of(
     if !numbers.iter().all(|number| number.is_finite() && 0.0 <= *number) || range_m == 0.0 || spacing_m == 0.0 {
         return Err("expected a range and a spacing above 0, and a target of 0 or more metres".into());
     }
-    let viewshed = Viewshed { place_m, eye_m, target_m, range_m, spacing_m, curvature };
+    let viewshed = Viewshed {
+        place_m,
+        eye_m,
+        target_m,
+        range_m,
+        spacing_m,
+        curvature,
+        standing: load_module_reader::Standing::None,
+    };
     let side = viewshed.side();
     if SIDE_MAX < side {
         return Err(format!("found {side} places along a side, expected {SIDE_MAX} at most"));

@@ -61,7 +61,11 @@ fn one_place_sees_another_or_is_told_what_hides_it() {
     let far = scene.run_to(0, &["sight", "small.tdb", "--from", "506000,3875500,1", "--to", "508500,3878500,1"]);
     let Sight::Hidden(at) = sight else { panic!("{sight:?}, {}", far.stdout) };
     let place = format!("at {:.1},{:.1}\n", from[0] + at * 2500.0, from[1] + at * 3000.0);
-    assert!(far.stdout.starts_with("hidden, first ") && far.stdout.contains(&place), "{place}: {}", far.stdout);
+    assert!(
+        far.stdout.starts_with("hidden by ground, first ") && far.stdout.contains(&place),
+        "{place}: {}",
+        far.stdout
+    );
 }
 
 #[test]

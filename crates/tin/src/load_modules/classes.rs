@@ -84,6 +84,7 @@ mod tests {
             residual: ModuleResidual::default(),
             decks: Decks::default(),
             lines: Vec::new(),
+            objects: terrain::Objects::default(),
         };
         let mask = Importance::new(PostRect::of_size(5, 5), vec![1000; 25], classes.concat());
         assert_eq!(of_triangles(&module, &layout, &mask, None), expected);

@@ -18,6 +18,8 @@ mod lift;
 pub use lift::lift_decks;
 mod lines;
 pub use lines::cut_lines;
+mod stand;
+pub use stand::{highest_in, stand};
 mod pieces;
 pub use concatenate::concatenate;
 mod clip;

@@ -89,6 +89,7 @@ impl Pieces {
             residual: ModuleResidual::default(),
             decks: Decks::default(),
             lines: Vec::new(),
+            objects: terrain::Objects::default(),
         };
         let sides = self.fan(&corners, &mut module).unwrap_or_else(|| triangulate_afresh(&mut module));
         module.triangles.sort_unstable();

@@ -12,6 +12,7 @@ mod buildings;
 mod bytes;
 mod left_out;
 mod networks;
+mod objects;
 mod outside;
 mod refused;
 mod roads;

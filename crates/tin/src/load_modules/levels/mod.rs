@@ -128,6 +128,7 @@ fn load_module(
         decks: finest.decks.clone(),
         // They are the same at every level, so that the finest has them alone.
         lines: Vec::new(),
+        objects: terrain::Objects::default(),
     };
     module.classes = classes::of_triangles(&module, layout, mask, faces);
     let sides = 3 * module.triangles.len();

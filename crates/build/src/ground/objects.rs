@@ -1,0 +1,108 @@
+//! Buildings, walls and woods of a job's sources, with what they are by their tags.
+
+use features::objects::{FoundObject, FoundShape, traits};
+use job::{Job, ObjectsSpec};
+use source_files::{Crs, Done, FeatureFile, VectorFeature, VectorShape, Vertices, Wanted};
+use store::FeatureRemark;
+use terrain::{Each, ObjectKind};
+
+use crate::ground::GroundError;
+use crate::ground::area::GamingArea;
+use crate::ground::vectors::bounds;
+
+/// Keys of OpenStreetMap that the built-in table of objects looks at.
+const KEYS: [&str; 6] = ["building", "building:part", "landuse", "natural", "barrier", "man_made"];
+
+/// What the sources of objects hold that lies in the area or near it.
+#[derive(Debug, Default)]
+pub struct FoundObjects {
+    /// The objects, source by source; what is none by rules and table is not among them.
+    pub objects: Vec<FoundObject>,
+    /// What could not be read of single ones.
+    pub remarks: Vec<FeatureRemark>,
+    /// What a person should know about the files, each behind the name of its file.
+    pub notes: Vec<String>,
+}
+
+impl FoundObjects {
+    /// Reads the objects of a job that has some; `each` runs what falls into pieces.
+    ///
+    /// # Errors
+    /// When a file cannot be read at all. What is wrong with single objects is a remark.
+    pub fn read(job: &Job, spec: &ObjectsSpec, area: &GamingArea, each: Each) -> Result<Self, GroundError> {
+        let mut found = Self::default();
+        for source in &spec.sources {
+            let name = source.file.written.as_str();
+            let crs = source.crs.as_deref().map(|text| Crs::named(text).map_err(|found| bad_crs(name, &found)));
+            let crs = crs.transpose()?;
+            let mut keys: Vec<&str> = KEYS.into_iter().chain(spec.keys()).collect();
+            keys.sort_unstable();
+            keys.dedup();
+            let wanted = Wanted {
+                epsg: job.area.epsg,
+                bounds: bounds(area, [area.frame.origin_east_m, area.frame.origin_north_m]),
+                layer: source.layer.as_deref(),
+                crs: crs.as_ref(),
+                keys: &keys,
+                buildings: false,
+            };
+            let FeatureFile { features, remarks, notes, .. } =
+                source_files::read_features(&source.file.path, &wanted, each)?;
+            found.notes.extend(notes.iter().map(|note| format!("{name}: {note}")));
+            let before = found.objects.len();
+            for feature in features {
+                let said = (source.kind, source.height.as_deref());
+                if let Some((traits, bad_tags)) = traits(|key| feature.tag(key), said, &spec.rules) {
+                    let shape = shape_of(&feature, traits.kind, area);
+                    found.objects.push(FoundObject { name: feature.id, traits, bad_tags, shape });
+                }
+            }
+            if found.objects.len() == before {
+                found.notes.push(format!("{name}: no building, wall or wood in the area"));
+            }
+            // Of what is no object nothing is told: ways without places in a file of roads are no concern of these.
+            let is_object = |id: &str| found.objects[before..].iter().any(|object| object.name == id);
+            let own = remarks.into_iter().filter(|remark| is_object(&remark.id));
+            let told: Vec<FeatureRemark> = own
+                .map(|remark| FeatureRemark {
+                    leaves_out: matches!(remark.done, Done::LeftOut(_)),
+                    feature: remark.id,
+                    at_m: remark.at,
+                    found: remark.found,
+                    done: remark.done.text().to_owned(),
+                    degrades: false,
+                })
+                .collect();
+            found.remarks.extend(told);
+        }
+        Ok(found)
+    }
+}
+
+/// In metres from the south-west post. A closed line is a polygon where only polygons are such objects: formats that
+/// have lines only close them.
+fn shape_of(feature: &VectorFeature, kind: ObjectKind, area: &GamingArea) -> FoundShape {
+    let origin = [area.frame.origin_east_m, area.frame.origin_north_m];
+    let ring = |line: &Vertices| -> Vec<[f64; 2]> {
+        line.places.iter().map(|place| [0, 1].map(|axis| place[axis] - origin[axis])).collect()
+    };
+    match &feature.shape {
+        VectorShape::Polygon(rings) => FoundShape::Polygon(rings.iter().map(ring).collect()),
+        VectorShape::Line(line) => {
+            let is_closed = 3 < line.places.len() && line.places.first() == line.places.last();
+            match is_closed && !matches!(kind, ObjectKind::Wall | ObjectKind::Row) {
+                true => FoundShape::Polygon(vec![ring(line)]),
+                false => FoundShape::Line(ring(line)),
+            }
+        }
+    }
+}
+
+fn bad_crs(written: &str, found: &str) -> GroundError {
+    GroundError::Impossible {
+        key: "objects.sources".into(),
+        found: format!("crs of {written}: {found}"),
+        expected: "a system that can be computed".into(),
+        hint: "give a code, as crs = \"EPSG:4326\"".into(),
+    }
+}

@@ -1,0 +1,156 @@
+//! The stage `outlines`: what stands on the ground of the area and has room, before its heights are known. It sees
+//! vectors, never a raster.
+
+use std::sync::Arc;
+
+use features::objects::{Full, Granted, ObjectLimits, ObjectTally, Wanting, objects};
+use job::{Job, ObjectsSpec};
+use schedule::for_each_piece;
+use store::engine::{Artifact, Key, Outcome, Stamp, keep_or_make};
+use store::{
+    AreaOutlines, FeatureRemark, FileStamp, ModuleOutlines, ObjectLeftOut, ObjectSums, ReportObjectLimit, ReportObjects,
+};
+use terrain::Each;
+
+use crate::ground::{FoundObjects, GamingArea};
+use crate::keys;
+use crate::run::{ALGORITHM_REVISION, Run};
+use crate::{CompileError, Event, Progress, Stage};
+
+/// What stands on the ground, where the job wants it: from here on load modules are assembled with it.
+pub(crate) fn decide_objects(run: &mut Run, progress: &mut dyn Progress) -> Result<(), CompileError> {
+    if run.job.objects.is_none() {
+        return Ok(());
+    }
+    progress.tell(Event::Enter(Stage::Outlines, 0));
+    let (file, outlines) = outlines_area(run)?.into_inner();
+    progress.tell(Event::Leave(Stage::Outlines));
+    outlines.notes.iter().for_each(|note| progress.tell(Event::Note(note.clone())));
+    run.outlines = Some((file, Arc::new(outlines)));
+    Ok(())
+}
+
+/// The same of one process among others.
+pub(crate) fn outlines_area(run: &Run) -> Result<Outcome<(FileStamp, AreaOutlines)>, CompileError> {
+    let spec = run.job.objects.as_ref().expect("a stage of jobs with objects");
+    keep_or_make(&Outlining { run, spec }, ALGORITHM_REVISION)
+}
+
+/// What stands on the ground, as the engine asks for it.
+struct Outlining<'a> {
+    run: &'a Run<'a>,
+    spec: &'a ObjectsSpec,
+}
+
+impl Artifact for Outlining<'_> {
+    type Output = (FileStamp, AreaOutlines);
+    type Error = CompileError;
+
+    fn key(&self) -> Key {
+        keys::outlines(self.run.job, self.spec, &self.run.records)
+    }
+
+    fn published(&self) -> Result<Option<Stamp>, CompileError> {
+        Ok(self.run.database.folder().outlines_stamp()?)
+    }
+
+    fn read(&self, _key: &Key) -> Option<(Stamp, (FileStamp, AreaOutlines))> {
+        let (stamp, file, outlines) = self.run.database.folder().read_outlines().ok()?;
+        Some((stamp, (file, outlines)))
+    }
+
+    fn make(&self, _key: &Key, stamp: &Stamp) -> Result<(FileStamp, AreaOutlines), CompileError> {
+        let each: Each = &|count, piece| for_each_piece(&self.run.workers, count, piece);
+        let outlines = outlines_of(self.run.job, self.spec, &self.run.area, each)?;
+        Ok((self.run.database.write_outlines(stamp, &outlines)?, outlines))
+    }
+}
+
+/// What stands on the ground of a job's area within its limits.
+pub(crate) fn outlines_of(
+    job: &Job,
+    spec: &ObjectsSpec,
+    area: &GamingArea,
+    each: Each,
+) -> Result<AreaOutlines, CompileError> {
+    let FoundObjects { objects: found, remarks, notes } = FoundObjects::read(job, spec, area, each)?;
+    let side = i32::from(job.modules.side_quanta);
+    let granted = objects(found, &spec.options, &limits_of(job, spec), side);
+    Ok(AreaOutlines { notes, ..to_outlines(job, granted, remarks) })
+}
+
+/// The limits of objects in a job.
+pub(crate) fn limits_of(job: &Job, spec: &ObjectsSpec) -> ObjectLimits {
+    ObjectLimits {
+        per_module: spec.per_load_module,
+        per_window: spec.per_4km_square,
+        size: [job.area.grid.rows, job.area.grid.cols].map(|count| count as i32),
+        window: [job.limits.window.rows, job.limits.window.cols].map(|count| count as i32),
+    }
+}
+
+fn to_outlines(job: &Job, granted: Granted, mut remarks: Vec<FeatureRemark>) -> AreaOutlines {
+    let Granted { modules, kinds, left_out, remarks: mended } = granted;
+    let map = |[east, north]: [f64; 2]| [job.area.origin_m[0] + east, job.area.origin_m[1] + north];
+    remarks.extend(mended.into_iter().map(|(feature, at_m, found, done)| FeatureRemark {
+        feature,
+        at_m: at_m.map(map),
+        found,
+        leaves_out: done == "left out",
+        done: done.to_owned(),
+        degrades: false,
+    }));
+    let sums = |(kind, [kept, wanted]): (terrain::ObjectKind, [ObjectTally; 2])| ObjectSums {
+        kind: kind.name().to_owned(),
+        wanted: wanted.count,
+        kept: kept.count,
+        wanted_m2: wanted.silhouette_m2,
+        kept_m2: kept.silhouette_m2,
+    };
+    let wanting = |Wanting { kind, at_m, height_m, silhouette_m2, full }: Wanting| {
+        let (is_window, full) = match full {
+            Full::Module(module) => (false, module),
+            Full::Window(window) => (true, window),
+        };
+        ObjectLeftOut { kind: kind.name().to_owned(), at_m: map(at_m), height_m, silhouette_m2, is_window, full }
+    };
+    let module = |([row, col], objects): ([i32; 2], terrain::Objects)| ModuleOutlines {
+        // Those beyond the area are granted nothing.
+        row: row as u32,
+        col: col as u32,
+        objects,
+    };
+    AreaOutlines {
+        side: job.modules.side_quanta,
+        modules: modules.into_iter().map(module).collect(),
+        kinds: kinds.into_iter().map(sums).collect(),
+        left_out: left_out.into_iter().map(wanting).collect(),
+        remarks,
+        notes: Vec::new(),
+    }
+}
+
+/// What the report says of objects: how much of them has room, and how full load modules and windows are.
+pub(crate) fn objects_report(run: &Run, outlines: &AreaOutlines) -> ReportObjects {
+    let spec = run.job.objects.as_ref().expect("a stage of jobs with objects");
+    let grid = run.area.grid;
+    let mut counts = vec![0_u32; grid.count()];
+    for ModuleOutlines { row, col, objects } in &outlines.modules {
+        counts[(row * grid.cols + col) as usize] = objects.polygons() as u32;
+    }
+    let sums = run.area.budget.windows.sums(grid, &counts);
+    ReportObjects {
+        kinds: outlines.kinds.clone(),
+        polygons: counts.iter().map(|&count| u64::from(count)).sum(),
+        per_load_module: ReportObjectLimit {
+            max: counts.iter().max().copied().unwrap_or(0).into(),
+            limit: spec.per_load_module.into(),
+        },
+        per_4km: ReportObjectLimit {
+            max: sums.iter().max().copied().unwrap_or(0).into(),
+            limit: spec.per_4km_square.into(),
+        },
+        left_out: outlines.left_out.len() as u64,
+        remarks: outlines.remarks.len() as u64,
+    }
+}

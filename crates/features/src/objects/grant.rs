@@ -1,0 +1,268 @@
+//! What has room: where a load module or a window would hold more than it may, what hides least is left out.
+
+use std::collections::BTreeMap;
+
+use terrain::{Canopy, ObjectKind, Objects, PRISMS_MAX, Prism};
+
+use super::cut::{Piece, border, canopy_lists, cut, walled};
+use super::mend::{ObjectRemark, Outline};
+use super::plan::METRE;
+
+/// What may stand in a load module and in a window, in polygons: a roof and each wall are one, and each triangle of a
+/// canopy.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ObjectLimits {
+    /// Of a load module.
+    pub per_module: u32,
+    /// Of a window.
+    pub per_window: u32,
+    /// Rows and columns of load modules in the area.
+    pub size: [i32; 2],
+    /// Rows and columns of load modules in a window.
+    pub window: [i32; 2],
+}
+
+/// What of one kind is there.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ObjectTally {
+    /// Buildings, towers and stretches of wall; of canopies their parts in single load modules.
+    pub count: u64,
+    /// Silhouette, square metres.
+    pub silhouette_m2: f64,
+}
+
+/// An object, or the part of a wood in one load module, that had no room.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Wanting {
+    /// What it is.
+    pub kind: ObjectKind,
+    /// Its first corner, metres east and north of the place 0, 0.
+    pub at_m: [f64; 2],
+    /// Its height, metres.
+    pub height_m: f64,
+    /// Its silhouette, square metres.
+    pub silhouette_m2: f64,
+    /// What was full: the load module by row and column, or a window by its first ones.
+    pub full: Full,
+}
+
+/// What was full.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Full {
+    /// A load module.
+    Module([i32; 2]),
+    /// The window that begins at a load module.
+    Window([i32; 2]),
+}
+
+/// What stands where.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Granted {
+    /// By row and column of load modules.
+    pub modules: BTreeMap<[i32; 2], Objects>,
+    /// By kind: what is there, and what was wanted.
+    pub kinds: BTreeMap<ObjectKind, [ObjectTally; 2]>,
+    /// What had no room, what hides most first.
+    pub left_out: Vec<Wanting>,
+    /// What was wrong with objects, and what was done.
+    pub remarks: Vec<ObjectRemark>,
+}
+
+/// What is granted whole, or not at all.
+struct Claim {
+    outline: usize,
+    kind: ObjectKind,
+    silhouette_m2: f64,
+    /// What stands in each load module, for so many polygons.
+    parts: Vec<([i32; 2], Part, u32)>,
+}
+
+enum Part {
+    Prism(Prism),
+    Canopy(Canopy),
+}
+
+pub(super) fn grant(outlines: Vec<Outline>, limits: &ObjectLimits, side: i32) -> Granted {
+    let [rows, cols] = limits.size;
+    let inside = |[row, col]: [i32; 2]| 0 <= row && row < rows && 0 <= col && col < cols;
+    let mut claims = Vec::new();
+    for (number, outline) in outlines.iter().enumerate() {
+        let pieces: Vec<Piece> = cut(&outline.plan, side).into_iter().filter(|piece| inside(piece.module)).collect();
+        match outline.traits.kind.is_prism() {
+            true => claims.extend(prisms(number, outline, &pieces, side)),
+            false => claims.extend(canopies(number, outline, &pieces, side)),
+        }
+    }
+    // Outlines are sorted, so ties go by content.
+    claims.sort_by(|a, b| b.silhouette_m2.total_cmp(&a.silhouette_m2).then(a.outline.cmp(&b.outline)));
+    let mut room = Room::new(limits);
+    let mut granted = Granted::default();
+    for claim in claims {
+        let tally = granted.kinds.entry(claim.kind).or_default();
+        let add = |tally: &mut ObjectTally| {
+            tally.count += 1;
+            tally.silhouette_m2 += claim.silhouette_m2;
+        };
+        add(&mut tally[1]);
+        let costs: Vec<([i32; 2], u32)> = claim.parts.iter().map(|(module, _, cost)| (*module, *cost)).collect();
+        if let Err(full) = room.take(&costs) {
+            let outline = &outlines[claim.outline];
+            granted.left_out.push(Wanting {
+                kind: claim.kind,
+                at_m: outline.plan[0][0].map(|quanta| f64::from(quanta) / METRE),
+                height_m: f64::from(outline.traits.height) / METRE,
+                silhouette_m2: claim.silhouette_m2,
+                full,
+            });
+            continue;
+        }
+        add(&mut tally[0]);
+        for (module, part, _) in claim.parts {
+            let objects = granted.modules.entry(module).or_default();
+            match part {
+                Part::Prism(prism) => objects.prisms.push(prism),
+                Part::Canopy(canopy) => objects.canopies.push(canopy),
+            }
+        }
+    }
+    for objects in granted.modules.values_mut() {
+        objects.prisms.sort();
+        objects.canopies.sort();
+    }
+    granted
+}
+
+/// A building as one claim; one that is longer or wider than a load module as one for each, since its roof could not
+/// be level over so much ground.
+fn prisms(number: usize, outline: &Outline, pieces: &[Piece], side: i32) -> Vec<Claim> {
+    let kind = outline.traits.kind;
+    let across = |axis: usize| {
+        let at = || pieces.iter().map(move |piece| piece.module[axis]);
+        at().max().unwrap_or(0) - at().min().unwrap_or(0)
+    };
+    let is_large = 1 < across(0) || 1 < across(1);
+    let mut claims: Vec<Claim> = Vec::new();
+    for (index, piece) in pieces.iter().enumerate() {
+        let rings = walled(piece, &outline.plan, side);
+        let around = border(&rings);
+        let own = if is_large { index as u64 + 1 } else { 0 };
+        let (base, roof) = (outline.traits.bottom, outline.traits.height);
+        let prism = Prism { id: id_of(outline, own), kind, base, roof, rings };
+        let cost = prism.polygons() as u32;
+        let part = (piece.module, Part::Prism(prism), cost);
+        let silhouette_m2 = outline.traits.silhouette_m2(around);
+        match claims.last_mut().filter(|_| !is_large) {
+            Some(claim) => {
+                claim.parts.push(part);
+                claim.silhouette_m2 += silhouette_m2;
+            }
+            None => claims.push(Claim { outline: number, kind, silhouette_m2, parts: vec![part] }),
+        }
+    }
+    claims
+}
+
+/// A wood as a claim in each load module: it need not be level, and so much need not hang together.
+fn canopies(number: usize, outline: &Outline, pieces: &[Piece], side: i32) -> Vec<Claim> {
+    /// Metres between stems of trees, and of what is lower.
+    const SPACING_M: [f64; 2] = [4.0, 2.0];
+    let traits = &outline.traits;
+    let spacing_m = SPACING_M[usize::from(traits.kind != ObjectKind::Wood)];
+    let claim = |pieces: &[Piece]| {
+        let around = pieces.iter().map(|piece| border(&walled(piece, &outline.plan, side))).sum();
+        // Numbered in 16 bits: what has more corners in one load module is no outline that a person drew.
+        let fits = pieces.iter().flat_map(|piece| piece.plan.iter()).map(Vec::len).sum::<usize>() < PLACES_MAX;
+        let (places, triangles) = if fits { canopy_lists(pieces) } else { Default::default() };
+        let cost = if fits { triangles.len() as u32 } else { u32::MAX };
+        let canopy = Canopy {
+            id: id_of(outline, 0),
+            kind: traits.kind,
+            height: u16::try_from(traits.height).unwrap_or(u16::MAX),
+            fullness: traits.fullness,
+            spacing: (spacing_m * METRE) as u16,
+            places,
+            triangles,
+        };
+        let parts = vec![(pieces[0].module, Part::Canopy(canopy), cost)];
+        Claim { outline: number, kind: traits.kind, silhouette_m2: traits.silhouette_m2(around), parts }
+    };
+    pieces.chunk_by(|a, b| a.module == b.module).map(claim).filter(|claim| 0 < claim.parts[0].2).collect()
+}
+
+/// Corners of a canopy in one load module at most.
+const PLACES_MAX: usize = 1 << 15;
+
+/// A number for an outline, by what it is and where (FNV-1a); `part` tells its parts apart.
+fn id_of(outline: &Outline, part: u64) -> u64 {
+    let traits = &outline.traits;
+    let mut id = 0xcbf2_9ce4_8422_2325_u64;
+    let mut feed = |number: u64| {
+        for byte in number.to_le_bytes() {
+            id = (id ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
+        }
+    };
+    [traits.kind as u64, traits.bottom as u64, traits.height as u64, part].into_iter().for_each(&mut feed);
+    outline.plan.iter().flatten().flatten().for_each(|&at| feed(u64::from(at.cast_unsigned())));
+    id
+}
+
+/// What is left of the limits.
+struct Room<'a> {
+    limits: &'a ObjectLimits,
+    modules: Vec<u32>,
+    /// By the load module in which they begin.
+    windows: Vec<u32>,
+    window_size: [i32; 2],
+    prisms: Vec<u32>,
+}
+
+impl<'a> Room<'a> {
+    fn new(limits: &'a ObjectLimits) -> Self {
+        let [rows, cols] = limits.size;
+        // An area smaller than a window is one.
+        let window_size = [0, 1].map(|axis| limits.window[axis].min(limits.size[axis]).max(1));
+        let count = (rows * cols) as usize;
+        let windows = vec![limits.per_window; count];
+        Self { limits, modules: vec![limits.per_module; count], windows, window_size, prisms: vec![0; count] }
+    }
+
+    fn index(&self, [row, col]: [i32; 2]) -> usize {
+        (row * self.limits.size[1] + col) as usize
+    }
+
+    /// The first load modules of the windows that hold one.
+    fn windows_over(&self, module: [i32; 2]) -> impl Iterator<Item = [i32; 2]> + use<> {
+        let range = [0, 1].map(|axis| {
+            let wide = self.window_size[axis];
+            (module[axis] - wide + 1).max(0)..=module[axis].min(self.limits.size[axis] - wide)
+        });
+        let [rows, cols] = range;
+        rows.flat_map(move |row| cols.clone().map(move |col| [row, col]))
+    }
+
+    /// Takes what these parts cost, or nothing where one of them does not fit.
+    fn take(&mut self, costs: &[([i32; 2], u32)]) -> Result<(), Full> {
+        let mut of_windows: BTreeMap<[i32; 2], u64> = BTreeMap::new();
+        for &(module, cost) in costs {
+            let index = self.index(module);
+            if self.modules[index] < cost || PRISMS_MAX as u32 <= self.prisms[index] {
+                return Err(Full::Module(module));
+            }
+            self.windows_over(module).for_each(|window| *of_windows.entry(window).or_default() += u64::from(cost));
+        }
+        let full = of_windows.iter().find(|(window, cost)| u64::from(self.windows[self.index(**window)]) < **cost);
+        if let Some((&window, _)) = full {
+            return Err(Full::Window(window));
+        }
+        for &(module, cost) in costs {
+            let index = self.index(module);
+            self.modules[index] -= cost;
+            self.prisms[index] += 1;
+        }
+        for (window, cost) in of_windows {
+            let index = self.index(window);
+            self.windows[index] -= cost as u32;
+        }
+        Ok(())
+    }
+}

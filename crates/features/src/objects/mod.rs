@@ -1,0 +1,34 @@
+//! Buildings, walls and woods: from tags and shapes to what stands in the square of each load module.
+//!
+//! ```text
+//! traits(tags, kind, rules) -> Traits          what it is, how high, how dense
+//! mended(found, options) -> Vec<Outline>       on the lattice, without flaws, few corners; woods united
+//! grant(outlines, limits) -> Granted           what hides least is left out where there is no room
+//! ```
+//!
+//! Heights are above the ground, which is not known here: the roof of a [`Prism`] is that of its highest ground plus
+//! `roof`, and one with a `base` above 0 hangs in the air. Nothing depends on the order in which objects come.
+
+mod corners;
+mod cut;
+mod grant;
+mod mend;
+mod plan;
+mod table;
+
+pub use grant::{Full, Granted, ObjectLimits, ObjectTally, Wanting};
+pub use mend::{FoundObject, FoundShape, ObjectOptions, ObjectRemark, Outline, mended};
+pub use table::{ObjectRule, Traits, traits};
+
+/// What stands in an area with a grid of load modules.
+///
+/// `side` is that of a load module in quanta; load modules are numbered by row and column from the place 0, 0.
+pub fn objects(found: Vec<FoundObject>, options: &ObjectOptions, limits: &ObjectLimits, side: i32) -> Granted {
+    let (outlines, remarks) = mended(found, options);
+    let mut granted = grant::grant(outlines, limits, side);
+    granted.remarks = remarks;
+    granted
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,138 @@
+//! Objects from tags to load modules.
+
+use terrain::ObjectKind;
+
+use super::plan::METRE;
+use super::*;
+
+const SIDE: i32 = 64_000;
+const OPTIONS: ObjectOptions = ObjectOptions { corners_max: 15, area_min_m2: 20.0 };
+const LIMITS: ObjectLimits = ObjectLimits { per_module: 400, per_window: 12_800, size: [2, 2], window: [8, 8] };
+
+fn object(name: &str, tags: &[(&str, &'static str)], shape: FoundShape) -> FoundObject {
+    let tag = |key: &str| tags.iter().find(|(name, _)| *name == key).map(|(_, value)| *value);
+    let (traits, bad_tags) = traits(tag, (None, None), &[]).unwrap();
+    FoundObject { name: name.into(), traits, bad_tags, shape }
+}
+
+/// A closed square from a corner on, in metres, clockwise.
+fn square([x, y]: [f64; 2], side: f64) -> Vec<[f64; 2]> {
+    [[0.0, 0.0], [0.0, side], [side, side], [side, 0.0], [0.0, 0.0]].map(|[dx, dy]| [x + dx, y + dy]).to_vec()
+}
+
+fn house(at: [f64; 2], side: f64, height: &'static str) -> FoundObject {
+    object("house", &[("building", "yes"), ("height", height)], FoundShape::Polygon(vec![square(at, side)]))
+}
+
+fn made(found: Vec<FoundObject>) -> Granted {
+    objects(found, &OPTIONS, &LIMITS, SIDE)
+}
+
+#[test]
+fn nothing_depends_on_the_order_and_what_is_there_twice_is_kept_once() {
+    let all = vec![
+        house([10.0, 10.0], 10.0, "6"),
+        house([495.0, 495.0], 10.0, "9"),
+        house([15.0, 12.0], 10.0, "6"),
+        object("wood", &[("natural", "wood")], FoundShape::Polygon(vec![square([300.0, 300.0], 400.0)])),
+        object("wood", &[("natural", "wood")], FoundShape::Polygon(vec![square([600.0, 600.0], 200.0)])),
+        object("row", &[("natural", "tree_row")], FoundShape::Line(vec![[50.0, 50.0], [90.0, 50.0], [90.0, 99.0]])),
+        house([10.0, 10.0], 10.0, "6"),
+    ];
+    let one = made(all.clone());
+    assert_eq!(one, made(all.into_iter().rev().collect()));
+    assert_eq!(one.kinds[&ObjectKind::Building][0].count, 3, "overlaps stay");
+    assert_eq!(one.kinds[&ObjectKind::Wood][0].count, 4, "united, one part in each load module");
+    assert_eq!(one.remarks.len(), 1);
+    let corner: Vec<_> = one
+        .modules
+        .values()
+        .map(|objects| objects.prisms.iter().filter(|prism| prism.roof == 9 * 128).count())
+        .collect();
+    assert_eq!(corner, [1, 1, 1, 1], "a house over the corner of four");
+    let ids = |row, col| one.modules[&[row, col]].canopies.iter().map(|canopy| canopy.id).max();
+    assert_eq!(ids(0, 1), ids(1, 0));
+}
+
+#[test]
+fn what_hides_least_goes_first_and_whole() {
+    let mut found: Vec<FoundObject> = (0..30).map(|k| house([10.0 + 15.0 * f64::from(k), 100.0], 10.0, "6")).collect();
+    found.push(house([495.0, 300.0], 10.0, "30"));
+    found.push(house([30.0, 400.0], 10.0, "5"));
+    // 32 houses of 5 polygons, one of them half in the next load module, with a wall less on both sides.
+    let limits = ObjectLimits { per_module: 154, ..LIMITS };
+    let granted = objects(found, &OPTIONS, &limits, SIDE);
+    let [kept, wanted] = granted.kinds[&ObjectKind::Building];
+    assert_eq!((kept.count, wanted.count), (31, 32));
+    assert_eq!(granted.left_out.len(), 1);
+    assert_eq!((granted.left_out[0].height_m, granted.left_out[0].full), (5.0, grant::Full::Module([0, 0])));
+    assert!(kept.silhouette_m2 < wanted.silhouette_m2);
+    assert_eq!(granted.modules[&[0, 0]].polygons(), 154);
+    let limits = ObjectLimits { per_window: 4, ..LIMITS };
+    let none = objects(vec![house([10.0, 10.0], 10.0, "6")], &OPTIONS, &limits, SIDE);
+    assert_eq!((none.modules.len(), none.left_out[0].full), (0, grant::Full::Window([0, 0])));
+}
+
+#[test]
+fn bad_outlines_are_mended_or_left_out_and_told() {
+    let bow = vec![[0.0, 0.0], [20.0, 20.0], [20.0, 0.0], [0.0, 20.0], [0.0, 0.0]];
+    let flat = vec![[0.0, 0.0], [20.0, 0.0], [40.0, 0.0], [0.0, 0.0]];
+    let polygon = |ring: Vec<[f64; 2]>| object("x", &[("building", "yes")], FoundShape::Polygon(vec![ring]));
+    let crossed = made(vec![polygon(bow.iter().map(|[x, y]| [x + 50.0, y + 50.0]).collect())]);
+    assert_eq!(crossed.kinds[&ObjectKind::Building][0].count, 2, "a bow tie is two triangles");
+    for (ring, told) in [
+        (flat, "without area"),
+        (square([100.0, 100.0], 3.0), "area_min"),
+        (vec![[f64::NAN, 0.0], [1.0, 1.0], [1.0, 0.0]], "a place"),
+        (square([1e9, 0.0], 10.0), "a place"),
+    ] {
+        let granted = made(vec![polygon(ring)]);
+        assert!(granted.modules.is_empty());
+        assert!(granted.remarks[0].2.contains(told), "{:?}", granted.remarks);
+    }
+    assert!(made(vec![polygon(square([-100.0, -100.0], 50.0))]).kinds.is_empty(), "outside the area");
+    let line = object("x", &[("natural", "wood")], FoundShape::Line(vec![[0.0, 0.0], [9.0, 9.0]]));
+    assert_eq!(made(vec![line]).remarks[0].3, "left out");
+}
+
+#[test]
+fn parts_stand_in_the_place_of_their_building() {
+    let part = |at, side, height| {
+        object("p", &[("building:part", "yes"), ("height", height)], FoundShape::Polygon(vec![square(at, side)]))
+    };
+    let whole = house([100.0, 100.0], 30.0, "20");
+    let with = made(vec![whole.clone(), part([100.0, 100.0], 25.0, "12"), part([110.0, 110.0], 6.0, "40")]);
+    let mut roofs: Vec<i32> = with.modules[&[0, 0]].prisms.iter().map(|prism| prism.roof / 128).collect();
+    roofs.sort_unstable();
+    assert_eq!(roofs, [12, 40]);
+    let small = made(vec![whole, part([100.0, 100.0], 10.0, "12")]);
+    assert_eq!(small.modules[&[0, 0]].prisms.len(), 2, "a part of a ninth leaves the rest standing");
+}
+
+#[test]
+fn a_wood_of_many_corners_is_cut_smoothed_and_covered_by_triangles() {
+    let corners = 100_000;
+    let ring: Vec<[f64; 2]> = (0..corners)
+        .map(|k| {
+            let turn = f64::from(k) / f64::from(corners) * std::f64::consts::TAU;
+            let far = 380.0 + 60.0 * (turn * 40.0).sin() + f64::from(k % 2);
+            [500.0 + far * turn.cos(), 500.0 + far * turn.sin()]
+        })
+        .collect();
+    let wood = object("wood", &[("landuse", "forest")], FoundShape::Polygon(vec![ring]));
+    let limits = ObjectLimits { per_module: 2_000, ..LIMITS };
+    let granted = objects(vec![wood], &OPTIONS, &limits, SIDE);
+    assert_eq!(granted.modules.len(), 4);
+    let area: f64 = granted.modules.values().flat_map(|objects| &objects.canopies).map(area_m2).sum();
+    // The integral of half the square of the distance.
+    let expected = std::f64::consts::PI * (380.5 * 380.5 + 60.0 * 60.0 / 2.0);
+    assert!((area - expected).abs() < 0.01 * expected, "{area} of {expected}");
+}
+
+fn area_m2(canopy: &terrain::Canopy) -> f64 {
+    let doubled = |triangle: &[u16; 3]| {
+        let [a, b, c] = triangle.map(|index| canopy.places[usize::from(index)].map(f64::from));
+        (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+    };
+    canopy.triangles.iter().map(doubled).sum::<f64>() / (2.0 * METRE * METRE)
+}

@@ -1,0 +1,142 @@
+//! `[objects]`: buildings, walls and woods that stand on the ground.
+
+use std::path::Path;
+
+use features::objects::{ObjectOptions, ObjectRule};
+use terrain::ObjectKind;
+
+use super::features::tags;
+use crate::bounds::{FEATURE_SOURCES_MAX, RULES_MAX};
+use crate::entry::{Entry, Section};
+use crate::files::{Mention, Place, has_wildcard, leaves_after_wildcard};
+use crate::{Edges, FeatureSource, FeaturesSpec, JobError, ObjectSource, ObjectsSpec, usual_text};
+
+pub(super) fn read(
+    objects: &Section,
+    features: Option<&FeaturesSpec>,
+    job: &Path,
+    mentions: &mut Vec<Mention>,
+) -> Result<Option<ObjectsSpec>, JobError> {
+    if !objects.is_there() {
+        return Ok(None);
+    }
+    let sources = match objects.optional("sources") {
+        Some(entry) => sources(&entry, job, mentions)?,
+        None => of_features(objects, features)?,
+    };
+    let rules = objects.optional("rules").map_or(Ok(Vec::new()), |rules| read_rules(&rules))?;
+    let limits = objects.optional("limits").map(|limits| limits.table()).transpose()?;
+    let limit = |key: &str| match &limits {
+        Some(limits) => limits.whole_u32(key),
+        None => Ok(usual_text(&format!("objects.limits.{key}")).parse().expect("what holds is a whole number")),
+    };
+    Ok(Some(ObjectsSpec {
+        sources,
+        rules,
+        options: ObjectOptions {
+            corners_max: objects.whole("corners_max")? as usize,
+            area_min_m2: objects.number("area_min_m2")?,
+        },
+        per_load_module: limit("per_load_module")?,
+        per_4km_square: limit("per_4km_square")?,
+    }))
+}
+
+/// Refuses what cannot hold objects.
+pub(super) fn refuse_beside(objects: &Section, modules: &Section, edges: Edges, format: u32) -> Result<(), JobError> {
+    const BESIDE: &str = "[objects]";
+    if !objects.is_there() {
+        return Ok(());
+    }
+    if let (Edges::Clip(_), Some(entry)) = (edges, modules.optional("edges")) {
+        let expected = "\"constrained\", since objects stand on ground that is settled before it is cut";
+        return Err(entry.conflict(BESIDE, expected, "remove edges, or leave [objects] out"));
+    }
+    if let (true, Some(entry)) = (format < 3, modules.optional("format")) {
+        return Err(entry.conflict(
+            BESIDE,
+            "3, the first version with objects",
+            "remove format, or leave [objects] out",
+        ));
+    }
+    Ok(())
+}
+
+/// The files of `[features]`.
+fn of_features(objects: &Section, features: Option<&FeaturesSpec>) -> Result<Vec<ObjectSource>, JobError> {
+    let mut sources: Vec<ObjectSource> = Vec::new();
+    for source in features.iter().flat_map(|features| &features.sources) {
+        let FeatureSource::File { file, layer, kind: _, crs } = source else { continue };
+        let (file, layer, crs) = (file.clone(), layer.clone(), crs.clone());
+        let source = ObjectSource { file, layer, kind: None, height: None, crs };
+        if !sources.contains(&source) {
+            sources.push(source);
+        }
+    }
+    match sources.is_empty() {
+        // Where patterns of features find no file there is an error already.
+        true => objects.required("sources").map(|_| sources),
+        false => Ok(sources),
+    }
+}
+
+fn sources(entry: &Entry, job: &Path, mentions: &mut Vec<Mention>) -> Result<Vec<ObjectSource>, JobError> {
+    let items = entry.list()?;
+    if items.is_empty() || FEATURE_SOURCES_MAX < items.len() {
+        return Err(entry.out_of_range(entry.expected()));
+    }
+    let mut sources = Vec::new();
+    for item in &items {
+        let source = source(item, job)?;
+        if has_wildcard(&source.file.written) && leaves_after_wildcard(&source.file.written) {
+            let mut fault = item.fault("a pattern without .. behind its first wildcard");
+            fault.hint = "name the folder first: sources = [\"../other/*.gpkg\"]".to_owned();
+            return Err(JobError::LeavesFolder(fault));
+        }
+        let fault = item.fault("a file of polygons and lines");
+        mentions.push(Mention { place: Place::Objects(sources.len()), fault });
+        sources.push(source);
+    }
+    Ok(sources)
+}
+
+fn source(item: &Entry, job: &Path) -> Result<ObjectSource, JobError> {
+    if !item.is_table() {
+        return Ok(ObjectSource { file: item.file(job)?, layer: None, kind: None, height: None, crs: None });
+    }
+    let table = item.table()?;
+    let text = |key: &str| table.optional(key).map(|entry| entry.prose(|c| c == '\0')).transpose();
+    Ok(ObjectSource {
+        file: table.required("file")?.file(job)?,
+        layer: text("layer")?,
+        kind: table.optional("kind").map(|kind| kind.word()).transpose()?,
+        height: text("height")?,
+        crs: text("crs")?,
+    })
+}
+
+fn read_rules(entry: &Entry) -> Result<Vec<ObjectRule>, JobError> {
+    let items = entry.list()?;
+    if RULES_MAX < items.len() {
+        return Err(entry.out_of_range(entry.expected()));
+    }
+    items.iter().map(rule).collect()
+}
+
+fn rule(item: &Entry) -> Result<ObjectRule, JobError> {
+    let table = item.table()?;
+    let tags = tags(&table.required("where")?)?;
+    let kind = table.optional("kind").map(|kind| kind_of(&kind)).transpose()?;
+    if let (Some(None), Some(other)) = (kind, table.optional("height_m")) {
+        let hint = "remove it, or write another kind";
+        return Err(other.conflict("kind = \"none\"", "no more keys, since these objects are left out", hint));
+    }
+    Ok(ObjectRule { tags, kind, height_m: table.optional("height_m").map(|entry| entry.number()).transpose()? })
+}
+
+fn kind_of(entry: &Entry) -> Result<Option<ObjectKind>, JobError> {
+    match entry.text()? {
+        "none" => Ok(None),
+        _ => Ok(Some(entry.word()?)),
+    }
+}
