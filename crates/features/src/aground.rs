@@ -186,7 +186,7 @@ pub(crate) fn uncut(network: &Network, (beside, ground): (&Beside, Ground), cut_
 mod tests {
     use super::*;
     use crate::area::Levelled;
-    use crate::samples::{self, way};
+    use crate::samples::{self, site, way};
     use crate::{Shares, Source};
 
     fn levelled(sources: Vec<Source>, metres: impl Fn(f64, f64) -> f64) -> Levelled {

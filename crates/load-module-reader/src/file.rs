@@ -60,7 +60,9 @@ impl SlmFile {
 
     /// The same load modules have one file only: with decks alone it is of version 2.
     fn check_version(&self) -> Result<(), ReadError> {
-        let more = |module: &Module| !module.lines.is_empty() || !module.unknown_parts.is_empty();
+        let more = |module: &Module| {
+            !module.lines.is_empty() || !module.objects.is_empty() || !module.unknown_parts.is_empty()
+        };
         if self.header.version != VERSION || self.modules.iter().any(more) {
             return Ok(());
         }

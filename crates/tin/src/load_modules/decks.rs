@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use terrain::{Decks, FeatureSurface, LatticePoint, ModuleId, ModuleVertex};
+use terrain::{Decks, FeatureSurface, LatticePoint, ModuleVertex};
 
 use crate::load_modules::Layout;
 
