@@ -130,13 +130,15 @@ impl Heights {
     /// When it is stopped.
     pub fn mesh(&self, tin: Tin, ended: StopReason, workers: usize, stop: &AtomicBool) -> Result<Mesh, CompileError> {
         let workers = Workers::new(workers);
-        let tin = without_voids(tin, &self.dem);
         let tally = tally_on_all(&self.dem, &tin, &workers, stop)?;
         let each = |count: usize, piece: &(dyn Fn(usize) + Sync)| schedule::for_each_piece(&workers, count, piece);
+        let limit = fidelity::limit(&self.dem, tin.triangles.len(), &each);
+        // Residuals are those of all that is known, also at the rims of voids.
+        let tin = without_voids(tin, &self.dem);
         Ok(Mesh {
             points: tin.vertices.len(),
             residual: crate::residual_of(&tally),
-            limit: fidelity::limit(&self.dem, tin.triangles.len(), &each),
+            limit,
             tin,
             dem: Arc::clone(&self.dem),
             east_m: self.frame.south_west[0],

@@ -206,7 +206,7 @@ fn without_covered(outlines: Vec<Outline>) -> Vec<Outline> {
         if near.is_empty() {
             return false;
         }
-        let over: i64 = common(&[outline.plan.clone()], &union(&near)).iter().map(doubled_area).sum();
+        let over: i64 = common(std::slice::from_ref(&outline.plan), &union(&near)).iter().map(doubled_area).sum();
         PARTS_MIN * doubled_area(&outline.plan) as f64 <= over as f64
     };
     let covered: Vec<bool> = outlines.iter().map(is_covered).collect();

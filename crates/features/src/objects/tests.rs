@@ -75,7 +75,7 @@ fn what_hides_least_goes_first_and_whole() {
 
 #[test]
 fn bad_outlines_are_mended_or_left_out_and_told() {
-    let bow = vec![[0.0, 0.0], [20.0, 20.0], [20.0, 0.0], [0.0, 20.0], [0.0, 0.0]];
+    let bow = [[0.0, 0.0], [20.0, 20.0], [20.0, 0.0], [0.0, 20.0], [0.0, 0.0]];
     let flat = vec![[0.0, 0.0], [20.0, 0.0], [40.0, 0.0], [0.0, 0.0]];
     let polygon = |ring: Vec<[f64; 2]>| object("x", &[("building", "yes")], FoundShape::Polygon(vec![ring]));
     let crossed = made(vec![polygon(bow.iter().map(|[x, y]| [x + 50.0, y + 50.0]).collect())]);
