@@ -5,7 +5,7 @@
 //! never of the order in which they came.
 //!
 //! ```
-//! use crate::Post;
+//! use terrain::{Post, mesh};
 //!
 //! let corners = [Post::new(0, 0), Post::new(0, 4), Post::new(4, 0), Post::new(4, 4)];
 //! let triangles = mesh::delaunay(&corners);
