@@ -6,7 +6,7 @@
 //! grant(outlines, limits) -> Granted           what hides least is left out where there is no room
 //! ```
 //!
-//! Heights are above the ground, which is not known here: the roof of a [`Prism`] is that of its highest ground plus
+//! Heights are above the ground, which is not known here: the roof of a prism is that of its highest ground plus
 //! `roof`, and one with a `base` above 0 hangs in the air. Nothing depends on the order in which objects come.
 
 mod corners;

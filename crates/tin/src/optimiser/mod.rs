@@ -8,8 +8,8 @@
 //! judged by what comes of them once their vertices have moved.
 //!
 //! ```
-//! use optimiser::{Budget, Task, optimise};
 //! use terrain::{Dem, Effort, Features, HeightFit, Importance, Lattice, Post, PostRect, SeamSides, Tin, Vertex};
+//! use tin::optimiser::{Budget, Task, optimise};
 //!
 //! // Heights are whole numbers of 1/128 m.
 //! let rect = PostRect::of_size(65, 65);
