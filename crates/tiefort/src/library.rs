@@ -127,18 +127,18 @@ fn refused(error: &clap::Error) -> Failure {
         Some(ContextValue::Strings(all)) => all.clone(),
         _ => Vec::new(),
     };
-    let names = |kind: ContextKind| text(kind).iter().map(|word| argument(word)).collect::<Vec<String>>().join(", ");
+    let names = |kind: ContextKind| text(kind).iter().flat_map(|words| flags(words)).collect::<Vec<&str>>().join(", ");
     let name = names(ContextKind::InvalidArg);
     let found = text(ContextKind::InvalidValue).join(" ");
     let message = match (error.kind(), error.source()) {
         (ErrorKind::InvalidValue, _) => {
             format!("{name}: found {found:?}, expected one of {}", text(ContextKind::ValidValue).join(", "))
         }
-        (ErrorKind::ValueValidation, Some(why)) => format!("{name}: found {found:?}: {why}"),
+        (ErrorKind::ValueValidation, Some(why)) => format!("{name}: found {found:?}, {}", expected(&why.to_string())),
         (ErrorKind::ArgumentConflict, _) => {
             format!("found {name} and {}, expected one of them", names(ContextKind::PriorArg))
         }
-        (ErrorKind::MissingRequiredArgument, _) => format!("found nothing for {name}, expected a value"),
+        (ErrorKind::MissingRequiredArgument, _) => format!("found nothing, expected a value for one of {name}"),
         (ErrorKind::UnknownArgument, _) => format!("found an argument {name}, which there is none of here"),
         _ => error.kind().to_string(),
     };
@@ -149,9 +149,19 @@ fn refused(error: &clap::Error) -> Failure {
     Failure::new(message, hint)
 }
 
-/// `--max-residual <M>` without what its value is called.
-fn argument(word: &str) -> String {
-    word.split([' ', '=', '<']).next().unwrap_or_default().to_owned()
+/// The flags in words such as `<--points <N>|--rms <R>>`, without what their values are called.
+fn flags(words: &str) -> impl Iterator<Item = &str> {
+    words.split([' ', '=', '<', '>', '|']).filter(|word| word.starts_with("--"))
+}
+
+/// What a value should have been: a range in words, where it is one.
+fn expected(why: &str) -> String {
+    let range = why.split_once(" is not in ").and_then(|(_, range)| range.split_once("..="));
+    match range {
+        Some((least, most)) if most.len() < u32::MAX.to_string().len() => format!("expected {least} to {most}"),
+        Some((least, _)) => format!("expected {least} or more"),
+        None => why.to_owned(),
+    }
 }
 
 #[cfg(test)]
@@ -164,7 +174,10 @@ mod tests {
         let refused = |words: &[&str]| request(words).unwrap_err().message().to_owned();
         assert_eq!(request(&["--points", "50"]).unwrap().points, Some(50));
         let of_triangles = refused(&["--triangles", "1"]);
-        assert!(of_triangles.starts_with("--triangles: found \"1\": "), "{of_triangles}");
+        assert_eq!(of_triangles, "--triangles: found \"1\", expected 2 or more");
+        let without_end =
+            "found nothing, expected a value for one of --points, --triangles, --max-residual, --rms, --levels";
+        assert_eq!(refused(&[]), without_end);
         let of_effort = refused(&["--points", "50", "--effort", "bset"]);
         assert_eq!(of_effort, "--effort: found \"bset\", expected one of fast, normal, best");
         assert!(refused(&["--points", "50", "--method", "paper", "--effort", "best"]).contains("effort"));
