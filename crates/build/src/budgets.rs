@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use crate::ground::{GamingArea, Ground};
-use features::{AreaFeatures, Formed, Kind, Levelled, Storey};
+use features::{AreaFeatures, Formed, Kind, Levelled};
 use job::Job;
 use schedule::{Workers, for_each_piece};
 use store::Profile;
@@ -124,7 +124,7 @@ impl Budgets {
         let metres = features.site.lattice.metres_per_step();
         let mut kinds: BTreeMap<Kind, [f64; 2]> = BTreeMap::new();
         for middle in formed.middles.iter().filter(|middle| middle.traits.storey != LineStorey::Tunnel) {
-            let Some(of) = traits.get(&middle.id).filter(|of| !matches!(of.storey, Storey::Tunnel(_))) else {
+            let Some(of) = traits.get(&middle.id).filter(|of| !of.storey.is_tunnel()) else {
                 continue;
             };
             let [kept, all] = kinds.entry(of.kind).or_default();

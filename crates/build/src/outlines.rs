@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use features::objects::{Full, Granted, ObjectLimits, ObjectTally, Wanting, objects};
+use features::objects::{Full, Granted, ObjectLimits, ObjectRemark, ObjectTally, Wanting, objects};
 use job::{Job, ObjectsSpec};
 use schedule::for_each_piece;
 use store::engine::{Artifact, Key, Outcome, Stamp, keep_or_make};
@@ -92,12 +92,12 @@ pub(crate) fn limits_of(job: &Job, spec: &ObjectsSpec) -> ObjectLimits {
 fn to_outlines(job: &Job, granted: Granted, mut remarks: Vec<FeatureRemark>) -> AreaOutlines {
     let Granted { modules, kinds, left_out, remarks: mended } = granted;
     let map = |[east, north]: [f64; 2]| [job.area.origin_m[0] + east, job.area.origin_m[1] + north];
-    remarks.extend(mended.into_iter().map(|(feature, at_m, found, done)| FeatureRemark {
-        feature,
+    remarks.extend(mended.into_iter().map(|ObjectRemark { name, at_m, found, done }| FeatureRemark {
+        feature: name,
         at_m: at_m.map(map),
         found,
-        leaves_out: done == "left out",
-        done: done.to_owned(),
+        leaves_out: done.is_none(),
+        done: done.unwrap_or("left out").to_owned(),
         degrades: false,
     }));
     let sums = |(kind, [kept, wanted]): (terrain::ObjectKind, [ObjectTally; 2])| ObjectSums {

@@ -6,7 +6,7 @@ use crate::clean::Notes;
 use crate::parts::lakes_along;
 use crate::rings::encloses;
 use crate::sweep::{Pin, bounds};
-use crate::{Flaw, Lake, Network, Outline, Place, Remark, Remedy, Site, Storey};
+use crate::{Flaw, Lake, Network, Outline, Place, Remark, Remedy, Site};
 
 /// Rounds in which pins that a road cannot reach are given up.
 const ROUNDS: usize = 4;
@@ -37,7 +37,7 @@ pub fn afloat(outlines: &[Outline], lakes: &[Lake], roads: &Network, sides: &[[P
     }
     let bears_deck = |node: u32| {
         let storeys = roads.beside(node).iter().map(|(_, edge)| roads.traits(*edge).storey);
-        storeys.into_iter().any(|storey| matches!(storey, Storey::Deck(_)))
+        storeys.into_iter().any(|storey| storey.is_deck())
     };
     let mut pins: Vec<Pin> = levels.into_iter().map(|(node, height)| Pin { node, height }).collect();
     pins.retain(|pin| !bears_deck(pin.node));

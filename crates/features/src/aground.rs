@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use crate::clean::Notes;
 use crate::decks::{Passage, Water, between, passages};
 use crate::pieces::{is_narrow, moved};
-use crate::{Edge, FeatureId, Flaw, Kind, Network, Place, Remark, Remedy, Storey};
+use crate::{Edge, FeatureId, Flaw, Kind, Network, Place, Remark, Remedy};
 
 /// Times of what it may be cut that ground may stand above a deck, which is then raised with its ramps.
 const HILL_CUTS: i32 = 3;
@@ -114,7 +114,7 @@ pub(crate) fn still_under(
     (beside, ground): (&Beside, Ground),
     cut_max: i32,
 ) -> BTreeMap<u32, i32> {
-    let is_deck = |edge: u32| matches!(network.traits(edge).storey, Storey::Deck(_));
+    let is_deck = |edge: u32| network.traits(edge).storey.is_deck();
     let above = |(&edge, sides): (&u32, &[Vec<Place>; 2])| {
         let ends = network.ends(edge);
         let levels = ends.map(|end| heights[end as usize]);
@@ -166,7 +166,7 @@ fn above_line(network: &Network, passage: &Passage, ground: &[Option<i32>]) -> V
 
 /// Ground under decks as something they have to clear, as far as it may not be cut away: lines across them.
 pub(crate) fn uncut(network: &Network, (beside, ground): (&Beside, Ground), cut_max: i32) -> Vec<Water> {
-    let is_deck = |edge: u32| matches!(network.traits(edge).storey, Storey::Deck(_));
+    let is_deck = |edge: u32| network.traits(edge).storey.is_deck();
     let mut lines = Vec::new();
     for (&edge, [left, right]) in beside.0.iter().filter(|(edge, _)| is_deck(**edge)) {
         let Edge { a, b, .. } = network.edges[edge as usize];

@@ -197,7 +197,7 @@ impl AreaFeatures {
         strands.extend(self.breaklines(&near));
         let resting = ground_of(&self.roads, &at, &near);
         let mut hills = under_hills(&self.roads, &resting, options.cut_max);
-        let roads = &self.roads.clone().with_tunnels(hills.keys().copied());
+        let roads = &*self.roads.with_tunnels(&hills);
         let afloat = afloat(&self.outlines, &lakes, roads, &self.road_sides, &self.site);
         let pins = with_water(roads, pins(roads, &self.ways), &afloat, &mut remarks);
         let amid: Vec<Option<i32>> =
@@ -206,7 +206,7 @@ impl AreaFeatures {
         below.extend(uncut(roads, (&self.deck_sides, &at), options.cut_max));
         let heights = grade(roads, [&resting, &amid], &pins, &below, options, &mut remarks);
         let left = still_under(roads, &heights, (&self.deck_sides, &at), options.cut_max);
-        let roads = &roads.clone().with_tunnels(left.keys().copied());
+        let roads = &*roads.with_tunnels(&left);
         hills.extend(left);
         let through_hills = tell_of_hills(roads, &hills, &mut remarks);
         let beside = |(sides, height): (&[Place; 2], &i32)| sides.map(|place| at(place).unwrap_or(*height));

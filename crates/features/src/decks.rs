@@ -1,6 +1,6 @@
 //! Bridges and tunnels: their ends, straight between them, and heights along them.
 
-use crate::{Kind, Network, Place, Storey};
+use crate::{Kind, Network, Place};
 
 /// What a deck keeps clear of, in quanta above it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,7 +48,7 @@ pub(crate) struct Passage {
 /// All decks and tunnels of a network.
 pub(crate) fn passages(network: &Network) -> Vec<Passage> {
     let picked = |edge: u32| !network.is_ground(edge);
-    let is_deck = |edge: u32| matches!(network.traits(edge).storey, Storey::Deck(_));
+    let is_deck = |edge: u32| network.traits(edge).storey.is_deck();
     let follows = |node: u32| match network.beside(node) {
         [(_, one), (_, other)] => !network.nodes[node as usize].on_ground && is_deck(*one) == is_deck(*other),
         _ => false,

@@ -89,7 +89,7 @@ fn beside_pieces(graded: &Graded, site: &Site) -> Vec<Middle> {
     let Graded { network, heights, grants, .. } = *graded;
     let way = |edge: u32| network.edges[edge as usize].way as usize;
     let is_out: Vec<bool> = (0..network.edges.len() as u32).map(|edge| grants.of_edge(edge).out).collect();
-    let is_tunnel = |edge: u32| matches!(network.traits(edge).storey, Storey::Tunnel(_));
+    let is_tunnel = |edge: u32| network.traits(edge).storey.is_tunnel();
     let picked = |edge: u32| is_out[edge as usize] || is_tunnel(edge);
     let follows = |node: u32| match network.beside(node) {
         [(_, one), (_, other)] => {

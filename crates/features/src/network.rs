@@ -1,5 +1,6 @@
 //! The network of ways: stations as nodes, what joins them as edges, each stretch of ground once.
 
+use std::borrow::Cow;
 use std::collections::{BTreeMap, HashMap};
 
 use crate::clean::Notes;
@@ -189,19 +190,20 @@ impl Network {
         (5 * quanta / i64::from(terrain::QUANTA_PER_METRE)).max(1)
     }
 
-    /// The network in which some edges are tunnels.
-    pub(crate) fn with_tunnels(mut self, edges: impl Iterator<Item = u32>) -> Self {
+    /// The network in which the edges that are keys are tunnels: itself where there are none.
+    pub(crate) fn with_tunnels<T>(&self, edges: &BTreeMap<u32, T>) -> Cow<'_, Self> {
+        let mut network = Cow::Borrowed(self);
         let mut tunnels: BTreeMap<u32, u32> = BTreeMap::new();
-        for edge in edges {
-            let way = self.edges[edge as usize].way;
-            let tunnel = *tunnels.entry(way).or_insert_with(|| {
-                let of = self.ways[way as usize];
-                self.ways.push(WayOf { traits: Traits { storey: Storey::Tunnel(-1), ..of.traits }, ..of });
-                self.ways.len() as u32 - 1
+        for &edge in edges.keys() {
+            let Self { edges, ways, .. } = network.to_mut();
+            let way = &mut edges[edge as usize].way;
+            *way = *tunnels.entry(*way).or_insert_with(|| {
+                let of = ways[*way as usize];
+                ways.push(WayOf { traits: Traits { storey: Storey::Tunnel(-1), ..of.traits }, ..of });
+                ways.len() as u32 - 1
             });
-            self.edges[edge as usize].way = tunnel;
         }
-        self
+        network
     }
 
     /// What an edge is.

@@ -12,7 +12,7 @@ use crate::strand::{Graded, Strand};
 use crate::stretches::{Part, Stretches};
 use crate::strokes::Stroke;
 use crate::thin::{Station, Tolerance, thin};
-use crate::{Form, Grants, Place, Site, Storey, Traits};
+use crate::{Form, Grants, Place, Site, Traits};
 
 /// The end of a segment between two stations that stay.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -92,7 +92,7 @@ fn runs(stretches: &Stretches, stroke: &Stroke, graded: &Graded) -> Vec<Run> {
             let at = if against { edges.len() - 1 - at } else { at };
             let (from, to) = if against { (nodes[at + 1], nodes[at]) } else { (nodes[at], nodes[at + 1]) };
             let traits = *network.traits(edges[at]);
-            if matches!(traits.storey, Storey::Tunnel(_)) {
+            if traits.storey.is_tunnel() {
                 continue;
             }
             match runs.last_mut().filter(|run| run.traits == traits && run.nodes.last() == Some(&from)) {
@@ -148,7 +148,7 @@ impl Counting<'_> {
         kept.into_iter().for_each(|at| needs[at as usize] = true);
         let is_mark = |at: &usize| needs[*at] || run.edges[*at - 1].1 != run.edges[*at].1;
         let marks: Vec<usize> = (0..count).filter(|at| *at == 0 || *at + 1 == count || is_mark(at)).collect();
-        let is_deck = matches!(run.traits.storey, Storey::Deck(_));
+        let is_deck = run.traits.storey.is_deck();
         let wide = !is_narrow(&run.traits, network)
             && matches!(run.traits.form, Form::Strip | Form::StripAlways | Form::Bench);
         let bench = wide && run.traits.form == Form::Bench;

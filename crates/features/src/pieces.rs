@@ -1,7 +1,7 @@
 //! Chains cut into pieces whose stations are thinned, each segment of which is a line or a strip.
 
 use crate::thin::{Station, thin};
-use crate::{FeatureId, Form, Grant, Grants, Network, Place, Site, Storey, Traits};
+use crate::{FeatureId, Form, Grant, Grants, Network, Place, Site, Traits};
 
 /// Steps of the lattice below which a strip is a line.
 pub const STRIP_STEPS_MIN: i32 = 4;
@@ -29,7 +29,7 @@ impl Piece {
 
     /// Whether it is a deck.
     pub fn is_deck(&self) -> bool {
-        matches!(self.traits.storey, Storey::Deck(_))
+        self.traits.storey.is_deck()
     }
 }
 
@@ -72,7 +72,7 @@ pub fn pieces(
     grants: &Grants,
 ) -> Vec<Piece> {
     let grant = |edge: u32| grants.of_edge(edge);
-    let picked = |edge: u32| !grant(edge).out && !matches!(network.traits(edge).storey, Storey::Tunnel(_));
+    let picked = |edge: u32| !grant(edge).out && !network.traits(edge).storey.is_tunnel();
     // Where only two of those that meet are in the ground, the way goes on.
     let follows = |node: u32| {
         let mut meet = network.beside(node).iter().map(|(_, edge)| *edge).filter(|edge| picked(*edge));
@@ -125,7 +125,7 @@ fn form_of(traits: &Traits, grant: Grant, network: &Network) -> Form {
     if is_narrow(traits, network) {
         return Form::Line;
     }
-    if matches!(traits.storey, Storey::Deck(_)) {
+    if traits.storey.is_deck() {
         return Form::StripAlways;
     }
     match (traits.form, grant.most) {

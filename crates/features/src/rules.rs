@@ -75,6 +75,18 @@ pub enum Storey {
     Tunnel(i8),
 }
 
+impl Storey {
+    /// Whether it is a bridge.
+    pub fn is_deck(self) -> bool {
+        matches!(self, Self::Deck(_))
+    }
+
+    /// Whether it is a tunnel.
+    pub fn is_tunnel(self) -> bool {
+        matches!(self, Self::Tunnel(_))
+    }
+}
+
 /// All that later stages ask of a feature, but its id and its shape.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Traits {

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 
 use crate::rings::doubled_area;
 use crate::strand::{Graded, Role, Strand};
-use crate::{FeatureId, Kind, Place, Site, Storey};
+use crate::{FeatureId, Kind, Place, Site};
 
 /// What a feature is beside what its traits say.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -154,7 +154,7 @@ fn ways(graded: &Graded, site: &Site, about: &dyn Fn(FeatureId) -> Option<About>
     let follows = |node: u32| matches!(network.beside(node), [(_, one), (_, other)] if of(*one) == of(*other));
     let stretch = |(nodes, edges): (Vec<u32>, Vec<u32>)| {
         let (kind, class, is_inside) = of(edges[0]);
-        let is_tunnel = |edge: &u32| matches!(network.traits(*edge).storey, Storey::Tunnel(_));
+        let is_tunnel = |edge: &u32| network.traits(*edge).storey.is_tunnel();
         let above = || edges.iter().filter(|edge| !is_tunnel(edge));
         let length =
             if is_inside { above().map(|edge| i64::from(network.edges[*edge as usize].length)).sum() } else { 0 };

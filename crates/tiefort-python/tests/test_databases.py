@@ -346,6 +346,25 @@ def test_the_whole_area_goes_to_other_packages(database: Path) -> None:
         assert modules.total_bounds.tolist() == list(opened.bounds)
 
 
+def test_features_are_tables_of_places(database: Path, tmp_path: Path) -> None:
+    with tiefort.open(database) as opened, pytest.raises(tiefort.RequestError, match="no features"):
+        opened.features()
+    pytest.importorskip("geopandas")
+    places = [[505_100, 3_875_500], [507_000, 3_876_000], [508_900, 3_876_100]]
+    road = {"properties": {"highway": "primary"}, "geometry": {"type": "LineString", "coordinates": places}}
+    roads = {"type": "FeatureCollection", "features": [{"type": "Feature", **road}]}
+    (tmp_path / "roads.geojson").write_text(json.dumps(roads))
+    sources = [{"file": str(tmp_path / "roads.geojson"), "crs": "EPSG:32611"}]
+    tiefort.build({**JOB, "features": {"sources": sources}}, tmp_path / "roads.tdb")
+    with tiefort.open(tmp_path / "roads.tdb") as opened:
+        lines = opened.features()
+        assert set(lines["class"]) == {"primary"} and lines.crs == opened.crs
+        assert np.allclose(lines.total_bounds, [505_100, 3_875_500, 508_900, 3_876_100], atol=10)
+        assert len(opened.features("decks")) == 0
+        with pytest.raises(tiefort.RequestError, match="expected lines, nodes"):
+            opened.features("roads")
+
+
 def test_a_closed_or_foreign_database_is_told(database: Path, tmp_path: Path) -> None:
     opened = tiefort.open(database)
     opened.heights([507_000, 3_876_000])

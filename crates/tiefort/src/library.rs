@@ -151,7 +151,8 @@ fn refused(error: &clap::Error) -> Failure {
 
 /// The flags in words such as `<--points <N>|--rms <R>>`, without what their values are called.
 fn flags(words: &str) -> impl Iterator<Item = &str> {
-    words.split([' ', '=', '<', '>', '|']).filter(|word| word.starts_with("--"))
+    // Several meshes at once are for the command alone.
+    words.split([' ', '=', '<', '>', '|']).filter(|word| word.starts_with("--") && *word != "--levels")
 }
 
 /// What a value should have been: a range in words, where it is one.
@@ -175,8 +176,7 @@ mod tests {
         assert_eq!(request(&["--points", "50"]).unwrap().points, Some(50));
         let of_triangles = refused(&["--triangles", "1"]);
         assert_eq!(of_triangles, "--triangles: found \"1\", expected 2 or more");
-        let without_end =
-            "found nothing, expected a value for one of --points, --triangles, --max-residual, --rms, --levels";
+        let without_end = "found nothing, expected a value for one of --points, --triangles, --max-residual, --rms";
         assert_eq!(refused(&[]), without_end);
         let of_effort = refused(&["--points", "50", "--effort", "bset"]);
         assert_eq!(of_effort, "--effort: found \"bset\", expected one of fast, normal, best");

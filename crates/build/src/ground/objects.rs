@@ -1,5 +1,7 @@
 //! Buildings, walls and woods of a job's sources, with what they are by their tags.
 
+use std::collections::HashSet;
+
 use features::objects::{FoundObject, FoundShape, traits};
 use job::{Job, ObjectsSpec};
 use source_files::{Crs, Done, FeatureFile, VectorFeature, VectorShape, Vertices, Wanted};
@@ -61,8 +63,8 @@ impl FoundObjects {
                 found.notes.push(format!("{name}: no building, wall or wood in the area"));
             }
             // Of what is no object nothing is told: ways without places in a file of roads are no concern of these.
-            let is_object = |id: &str| found.objects[before..].iter().any(|object| object.name == id);
-            let own = remarks.into_iter().filter(|remark| is_object(&remark.id));
+            let names: HashSet<&str> = found.objects[before..].iter().map(|object| object.name.as_str()).collect();
+            let own = remarks.into_iter().filter(|remark| names.contains(remark.id.as_str()));
             let told: Vec<FeatureRemark> = own
                 .map(|remark| FeatureRemark {
                     leaves_out: matches!(remark.done, Done::LeftOut(_)),

@@ -58,46 +58,44 @@ const WOOD_M2_MIN: f64 = 400.0;
 const CLASS_M: f64 = 3.0;
 /// Metres of a stretch of wall, which has one roof.
 const WALL_M_MAX: f64 = 25.0;
+/// Why an object with a place that is no number, or is far away, is left out.
+const NO_PLACE: &str = "a place that is none";
 /// The part of an outline that parts of the building have to cover to stand in its place.
 const PARTS_MIN: f64 = 0.5;
 
-/// What was wrong with an object, and what was done: its name, where, and in words.
-pub type ObjectRemark = (String, Option<[f64; 2]>, String, &'static str);
+/// What was wrong with an object, and what was done.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ObjectRemark {
+    /// How its source names it; empty where it is about several.
+    pub name: String,
+    /// Its first place, in metres.
+    pub at_m: Option<[f64; 2]>,
+    /// What was wrong.
+    pub found: String,
+    /// What was done; `None` where it was left out.
+    pub done: Option<&'static str>,
+}
 
 /// Outlines of what was found, sorted, each once; and what was wrong.
 pub fn mended(found: Vec<FoundObject>, options: &ObjectOptions) -> (Vec<Outline>, Vec<ObjectRemark>) {
     let (mut outlines, mut remarks) = (Vec::new(), Vec::new());
     let mut woods: BTreeMap<(ObjectKind, i32), Vec<(Traits, Plan)>> = BTreeMap::new();
     for object in found {
-        let at = first_place(&object.shape);
+        let at_m = first_place(&object.shape);
+        let mut tell = |found, done| remarks.push(ObjectRemark { name: object.name.clone(), at_m, found, done });
         for (key, value) in &object.bad_tags {
-            let wrong = format!("{key} = {value:?}, which is no such number");
-            remarks.push((object.name.clone(), at, wrong, "taken as if it were not there"));
+            let found = format!("{key} = {value:?}, which is no such number");
+            tell(found, Some("taken as if it were not there"));
         }
         let traits = object.traits;
-        let mut leave_out = |why: &str| remarks.push((object.name.clone(), at, why.to_owned(), "left out"));
-        match (&object.shape, traits.kind) {
-            (FoundShape::Line(line), ObjectKind::Wall) => {
-                let stretches = lattice(line).map(|line| stretches(&line, traits.width, WALL_M_MAX * METRE));
-                let plans = stretches.unwrap_or_default();
-                outlines.extend(plans.into_iter().map(|plan| Outline { traits, plan }));
-            }
-            (FoundShape::Line(line), ObjectKind::Row) => {
-                let stretches = lattice(line).map(|line| stretches(&line, traits.width, f64::MAX));
-                let plans = union(&stretches.unwrap_or_default());
-                outlines.extend(plans.into_iter().map(|plan| Outline { traits, plan }));
-            }
-            (FoundShape::Polygon(rings), _) if traits.kind.is_prism() => match building(rings, traits, options) {
-                Ok(plans) => outlines.extend(plans.into_iter().map(|plan| Outline { traits, plan })),
-                Err(why) => leave_out(why),
-            },
-            (FoundShape::Polygon(rings), _) => {
-                let rings: Option<Plan> = rings.iter().map(|ring| lattice(ring)).collect();
+        match plans_of(&object.shape, traits, options) {
+            Err(why) => tell(why.to_owned(), None),
+            Ok(plans) if is_wood(&object.shape, traits.kind) => {
                 let class = (f64::from(traits.height) / (CLASS_M * METRE)).floor() as i32;
-                let plans = sorted_out(rings.unwrap_or_default()).into_iter().map(|plan| (traits, plan));
+                let plans = plans.into_iter().map(|plan| (traits, plan));
                 woods.entry((traits.kind, class)).or_default().extend(plans);
             }
-            (FoundShape::Line(_), _) => leave_out("a line, where a polygon is needed"),
+            Ok(plans) => outlines.extend(plans.into_iter().map(|plan| Outline { traits, plan })),
         }
     }
     woods.into_values().for_each(|woods| outlines.extend(united(woods)));
@@ -105,10 +103,34 @@ pub fn mended(found: Vec<FoundObject>, options: &ObjectOptions) -> (Vec<Outline>
     let all = outlines.len();
     outlines.dedup();
     if outlines.len() < all {
-        remarks.push((String::new(), None, format!("{} that are there twice", all - outlines.len()), "kept once"));
+        let found = format!("{} that are there twice", all - outlines.len());
+        remarks.push(ObjectRemark { name: String::new(), at_m: None, found, done: Some("kept once") });
     }
-    remarks.sort_by(|a, b| (&a.0, &a.2).cmp(&(&b.0, &b.2)));
+    remarks.sort_by(|a, b| (&a.name, &a.found).cmp(&(&b.name, &b.found)));
     (without_covered(outlines), remarks)
+}
+
+/// Whether it is united with others of its kind and height: all polygons but those of buildings.
+fn is_wood(shape: &FoundShape, kind: ObjectKind) -> bool {
+    matches!(shape, FoundShape::Polygon(_)) && !kind.is_prism()
+}
+
+/// What an object covers, or why that is nothing.
+fn plans_of(shape: &FoundShape, traits: Traits, options: &ObjectOptions) -> Result<Vec<Plan>, &'static str> {
+    let plans = match (shape, traits.kind) {
+        (FoundShape::Line(line), ObjectKind::Wall) => {
+            stretches(&lattice(line).ok_or(NO_PLACE)?, traits.width, WALL_M_MAX * METRE)
+        }
+        (FoundShape::Line(line), ObjectKind::Row) => {
+            union(&stretches(&lattice(line).ok_or(NO_PLACE)?, traits.width, f64::MAX))
+        }
+        (FoundShape::Line(_), _) => return Err("a line, where a polygon is needed"),
+        (FoundShape::Polygon(rings), kind) if kind.is_prism() => building(rings, traits, options)?,
+        (FoundShape::Polygon(rings), _) => {
+            sorted_out(rings.iter().map(|ring| lattice(ring)).collect::<Option<_>>().ok_or(NO_PLACE)?)
+        }
+    };
+    if plans.is_empty() { Err("without length or area") } else { Ok(plans) }
 }
 
 fn first_place(shape: &FoundShape) -> Option<[f64; 2]> {
@@ -134,7 +156,7 @@ fn building(rings: &[Vec<[f64; 2]>], traits: Traits, options: &ObjectOptions) ->
         let snapped = |at: At| at.map(|quanta| (quanta + STEP / 2).div_euclid(STEP) * STEP);
         Some(lattice(ring)?.into_iter().map(snapped).collect::<Ring>())
     };
-    let rings: Plan = rings.iter().map(coarse).collect::<Option<_>>().ok_or("a place that is none")?;
+    let rings: Plan = rings.iter().map(coarse).collect::<Option<_>>().ok_or(NO_PLACE)?;
     let least = if traits.kind == ObjectKind::Building { options.area_min_m2 } else { 0.0 };
     let is_large = |plan: &Plan| 2.0 * least * METRE * METRE <= doubled_area(plan) as f64;
     let all = sorted_out(rings);

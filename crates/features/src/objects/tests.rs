@@ -88,11 +88,21 @@ fn bad_outlines_are_mended_or_left_out_and_told() {
     ] {
         let granted = made(vec![polygon(ring)]);
         assert!(granted.modules.is_empty());
-        assert!(granted.remarks[0].2.contains(told), "{:?}", granted.remarks);
+        assert!(granted.remarks[0].found.contains(told), "{:?}", granted.remarks);
     }
     assert!(made(vec![polygon(square([-100.0, -100.0], 50.0))]).kinds.is_empty(), "outside the area");
     let line = object("x", &[("natural", "wood")], FoundShape::Line(vec![[0.0, 0.0], [9.0, 9.0]]));
-    assert_eq!(made(vec![line]).remarks[0].3, "left out");
+    assert_eq!(made(vec![line]).remarks[0].done, None);
+    // Whatever it would have been.
+    let far = vec![[0.0, 0.0], [f64::INFINITY, 5.0], [9.0, 9.0]];
+    for (tag, shape) in [
+        (("barrier", "wall"), FoundShape::Line(far.clone())),
+        (("natural", "tree_row"), FoundShape::Line(vec![[3.0, 3.0], [3.0, 3.0]])),
+        (("natural", "wood"), FoundShape::Polygon(vec![far])),
+    ] {
+        let told = made(vec![object("x", &[tag], shape)]).remarks;
+        assert!(told.len() == 1 && told[0].done.is_none(), "{tag:?}: {told:?}");
+    }
 }
 
 #[test]
