@@ -415,12 +415,12 @@ class Database:
         RequestError
             When the database has no features, or there is no such layer.
         """
-        import geopandas
-
         self._ground.frame()
         file = os.path.join(self._path, "features.gpkg")
         if not os.path.exists(file):
             raise RequestError(f"{self._path}: found no features", "a job has them in its section [features]")
+        import geopandas
+
         known = list(geopandas.list_layers(file)["name"])
         if layer not in known:
             raise RequestError(f"layer: found {layer!r}, expected {_words(known)}", "one layer for each call")
