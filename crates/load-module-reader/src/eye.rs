@@ -7,8 +7,10 @@
 use std::cell::OnceCell;
 
 use crate::lookup::Lookup;
+use crate::object_lookups::ObjectLookups;
+use crate::past::{Stretch, below_top, entered, lost_in};
 use crate::sight::{Curvature, Line, crossed_at, hidden_in};
-use crate::{LoadedGround, Module};
+use crate::{LoadedGround, Module, Standing, TerrainModule};
 
 /// Quanta by which ground must stay below a line to be left out: far more than rounding.
 const MARGIN: f64 = 2.0;
@@ -23,8 +25,48 @@ pub struct Eye<'a> {
     is_blind: bool,
     /// Of each load module the top in quanta, and those of its cells once they were asked for.
     tops: Vec<(f64, OnceCell<Vec<i32>>)>,
+    /// The same of its objects.
+    object_tops: Vec<OnceCell<ObjectTops>>,
     /// The load module that hid the last place, by row and column.
     blocker: Option<[u32; 2]>,
+    /// The load module whose prisms hid the last place that the ground did not hide.
+    prism_blocker: Option<[u32; 2]>,
+    stretches: Vec<Stretch>,
+}
+
+/// How high something rises in quanta: in all, and in each cell of what finds it.
+struct Tops {
+    highest: f64,
+    cells: Vec<i32>,
+}
+
+impl Tops {
+    fn of(cells: Vec<i32>) -> Self {
+        Self { highest: cells.iter().copied().max().map_or(f64::NEG_INFINITY, f64::from), cells }
+    }
+}
+
+/// How high the objects of a load module rise: prisms, and what each lookup of canopies finds.
+struct ObjectTops {
+    prisms: Tops,
+    canopies: Vec<Tops>,
+}
+
+impl ObjectTops {
+    fn of(module: &TerrainModule, side: u16, ground: &[i32]) -> Self {
+        let (objects, ObjectLookups { prisms, canopies }) = (&module.module().objects, module.objects());
+        let roof = |corners: [[i32; 3]; 3]| objects.prisms[corners[0][2] as usize].roof;
+        let prisms = Tops::of(prisms.as_ref().map_or_else(Vec::new, |prisms| prisms.tops(roof)));
+        let crown = |corners: [[i32; 3]; 3]| {
+            let [low, high] = [i32::min, i32::max].map(|end| {
+                [0, 1].map(|axis| f64::from(corners.map(|corner| corner[axis]).into_iter().reduce(end).unwrap_or(0)))
+            });
+            let cells = module.lookup().cells_within(side, [low, high]);
+            let under = cells.map(|[row, col]| ground[(row * module.lookup().across() + col) as usize]).max();
+            under.unwrap_or(i32::MAX).saturating_add(objects.canopies[corners[0][2] as usize].height.into())
+        };
+        Self { prisms, canopies: canopies.iter().map(|canopies| Tops::of(canopies.tops(crown))).collect() }
+    }
 }
 
 impl LoadedGround {
@@ -33,7 +75,10 @@ impl LoadedGround {
         let is_blind = self.is_beyond_any_ground(from_m) || self.is_below(from_m);
         let top = |module: &Module| module.vertices.iter().map(|vertex| vertex.z).max().unwrap_or(i32::MIN);
         let tops = self.modules().iter().map(|module| (f64::from(top(module.module())), OnceCell::new())).collect();
-        Eye { ground: self, from_m, from: self.quanta(from_m), curvature, is_blind, tops, blocker: None }
+        let object_tops = self.modules().iter().map(|_| OnceCell::new()).collect();
+        let from = self.quanta(from_m);
+        let (blocker, prism_blocker, stretches) = (None, None, Vec::new());
+        Eye { ground: self, from_m, from, curvature, is_blind, tops, object_tops, blocker, prism_blocker, stretches }
     }
 }
 
@@ -61,6 +106,90 @@ impl Eye<'_> {
         !self.ground.is_below(to_m)
     }
 
+    /// The share of light that objects leave from a place which [`Eye::sees`]: what [`LoadedGround::sight_past`] tells,
+    /// but 0 where a prism stands between, and where less than a two-hundredth is left.
+    pub fn light(&mut self, to_m: [f64; 3], standing: Standing) -> f64 {
+        if standing == Standing::None {
+            return 1.0;
+        }
+        let to = self.ground.quanta(to_m);
+        if self.prism_blocker.is_some_and(|[row, col]| self.is_behind_prisms(row, col, to)) {
+            return 0.0;
+        }
+        self.prism_blocker = None;
+        let length_m = (0..3).map(|axis| (to_m[axis] - self.from_m[axis]).powi(2)).sum::<f64>().sqrt();
+        let (most, mut lost) = (-0.005_f64.ln(), 0.0);
+        // What hides a place stands before it more often than before the eye.
+        for [row, col] in self.ground.modules_along(to, self.from) {
+            let (row, col) = (row as u32, col as u32);
+            if self.is_behind_prisms(row, col, to) {
+                self.prism_blocker = Some([row, col]);
+                return 0.0;
+            }
+            if standing == Standing::All {
+                lost += self.lost_in_canopies(row, col, to, length_m);
+            }
+            if most < lost {
+                return 0.0;
+            }
+        }
+        (-lost).exp()
+    }
+
+    /// The line to a place in quanta over a load module that is loaded, with that and the tops of its objects.
+    fn past_objects(&self, row: u32, col: u32, to: [f64; 3]) -> Option<(&TerrainModule, &ObjectTops, Line)> {
+        let (ground, side) = (self.ground, self.ground.frame().side);
+        let index = ground.block().contains(row, col).then(|| ground.block().index(row, col))?;
+        let module = &*ground.modules()[index];
+        if module.module().objects.is_empty() {
+            return None;
+        }
+        let of_ground = self.tops[index].1.get_or_init(|| tops_of(module.lookup()));
+        let tops = self.object_tops[index].get_or_init(|| ObjectTops::of(module, side, of_ground));
+        let corner = [col, row].map(|index| f64::from(index) * f64::from(side));
+        Some((module, tops, Line::in_module(corner, self.from, to, self.curvature)))
+    }
+
+    fn is_behind_prisms(&self, row: u32, col: u32, to: [f64; 3]) -> bool {
+        let side = self.ground.frame().side;
+        let Some((module, tops, line)) = self.past_objects(row, col, to) else { return false };
+        let Some(lookup) = &module.objects().prisms else { return false };
+        if is_above(&line, [0.0; 2], [f64::from(side); 2], tops.prisms.highest) {
+            return false;
+        }
+        let prisms = &module.module().objects.prisms;
+        let (mut is_hidden, mut last) = (false, usize::MAX);
+        let wanted = |row, col| may_rise(lookup, side, &tops.prisms.cells, &line, [row, col]);
+        lookup.triangles_along_in(side, line.start, line.end, wanted, |corners| {
+            let number = corners[0][2] as usize;
+            if !is_hidden && number != std::mem::replace(&mut last, number) {
+                is_hidden = entered(&prisms[number], &line).is_finite();
+            }
+        });
+        is_hidden
+    }
+
+    /// The logarithm of the share of light that the canopies of one load module take.
+    fn lost_in_canopies(&mut self, row: u32, col: u32, to: [f64; 3], length_m: f64) -> f64 {
+        let mut stretches = std::mem::take(&mut self.stretches);
+        stretches.clear();
+        let side = self.ground.frame().side;
+        if let Some((module, tops, line)) = self.past_objects(row, col, to) {
+            for (lookup, tops) in module.objects().canopies.iter().zip(&tops.canopies) {
+                if is_above(&line, [0.0; 2], [f64::from(side); 2], tops.highest) {
+                    continue;
+                }
+                let wanted = |row, col| may_rise(lookup, side, &tops.cells, &line, [row, col]);
+                lookup.triangles_along_in(side, line.start, line.end, wanted, |corners| {
+                    below_top(module, side, &line, &corners, &mut stretches);
+                });
+            }
+        }
+        let lost = lost_in(&mut stretches, length_m);
+        self.stretches = stretches;
+        lost
+    }
+
     /// The eye's own place.
     pub fn place_m(&self) -> [f64; 3] {
         self.from_m
@@ -82,9 +211,14 @@ impl Eye<'_> {
             return false;
         }
         let lookup = module.lookup();
-        let tops = tops.get_or_init(|| lookup.tops());
+        let tops = tops.get_or_init(|| tops_of(lookup));
         hidden_in(lookup, side, &line, |row, col| may_rise(lookup, side, tops, &line, [row, col])).is_finite()
     }
+}
+
+/// Of each cell, row by row, the height in quanta that no triangle which touches it rises above.
+fn tops_of(lookup: &Lookup) -> Vec<i32> {
+    lookup.tops(|corners| corners.map(|corner| corner[2]).into_iter().max().unwrap_or(i32::MIN))
 }
 
 /// Whether a line stays above a height wherever it lies over a rectangle.

@@ -89,7 +89,7 @@ impl LoadedGround {
     /// The load module under a place, by its place in `modules`, and the place in it in steps. The far sides of the
     /// area belong to it.
     #[inline]
-    fn locate(&self, [east_m, north_m]: [f64; 2]) -> Option<(usize, [i64; 2])> {
+    pub(crate) fn locate(&self, [east_m, north_m]: [f64; 2]) -> Option<(usize, [i64; 2])> {
         let (col, x) = self.steps(east_m - self.frame.origin_m[0], self.frame.cols)?;
         let (row, y) = self.steps(north_m - self.frame.origin_m[1], self.frame.rows)?;
         self.block.contains(row, col).then(|| (self.block.index(row, col), [x, y]))

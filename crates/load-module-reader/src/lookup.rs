@@ -166,11 +166,11 @@ impl Lookup {
         self.across
     }
 
-    /// Of each cell, row by row, the height in quanta that no triangle which touches it rises above.
-    pub(crate) fn tops(&self) -> Vec<i32> {
-        let top = |index: usize| self.corners(index).map(|corner| corner[2]).into_iter().max().unwrap_or(i32::MIN);
+    /// Of each cell, row by row, the largest of what `height` gives for the triangles that touch it.
+    pub(crate) fn tops(&self, height: impl Fn(Corners) -> i32) -> Vec<i32> {
         let cells = (0..self.across).flat_map(|row| (0..self.across).map(move |col| (row, col)));
-        let highest = |(row, col)| self.triangles_of(self.cell_at(row, col)).map(top).max();
+        let highest =
+            |(row, col)| self.triangles_of(self.cell_at(row, col)).map(|index| height(self.corners(index))).max();
         cells.map(|cell| highest(cell).unwrap_or(i32::MIN)).collect()
     }
 
@@ -290,6 +290,21 @@ impl Lookup {
     fn height_in_list(&self, cell: &[u32; CELL], place: [i64; 2]) -> Option<f64> {
         let held = self.triangles_of(cell).map(|index| self.shares(index, place)).find(|(_, shares)| holds(*shares));
         held.map(|(corners, shares)| height_m(&corners, shares))
+    }
+
+    /// Calls `each` with every triangle that may touch a rectangle between two corners in quanta, with some more than
+    /// once.
+    pub(crate) fn triangles_within(&self, side: u16, rectangle: [[f64; 2]; 2], mut each: impl FnMut(Corners)) {
+        for [row, col] in self.cells_within(side, rectangle) {
+            self.triangles_of(self.cell_at(row, col)).for_each(|index| each(self.corners(index)));
+        }
+    }
+
+    /// Row and column of each cell that a rectangle between two corners in quanta touches.
+    pub(crate) fn cells_within(&self, side: u16, [low, high]: [[f64; 2]; 2]) -> impl Iterator<Item = [u32; 2]> {
+        let row_at = |quanta: f64| self.row(quanta.clamp(0.0, f64::from(side)) as i32);
+        let [rows, cols] = [1, 0].map(|axis| row_at(low[axis])..=row_at(high[axis]));
+        rows.flat_map(move |row| cols.clone().map(move |col| [row, col]))
     }
 
     /// Calls `each` with every triangle that a line between two places in quanta may touch, with some more than once.

@@ -1,9 +1,9 @@
 //! Lines of sight past what stands on the ground: prisms hide, canopies take light away.
 
-use crate::lookup::STEPS;
+use crate::lookup::{Corners, STEPS};
 use crate::objects::ObjectKind;
 use crate::sight::{Curvature, Line, crossed_at, hidden_at, part_over};
-use crate::{Canopy, LoadedGround, Prism, QUANTA_PER_METRE, Sight, TerrainModule};
+use crate::{LoadedGround, Prism, QUANTA_PER_METRE, Sight, TerrainModule};
 
 /// Which objects a line of sight looks at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -61,7 +61,7 @@ impl Hider {
         }
     }
 
-    const fn of(kind: ObjectKind) -> Self {
+    pub(crate) const fn of(kind: ObjectKind) -> Self {
         match kind {
             ObjectKind::Building | ObjectKind::Tower => Self::Building,
             ObjectKind::Wall | ObjectKind::Row => Self::Row,
@@ -85,7 +85,7 @@ pub struct Sighting {
 
 /// A stretch of a line inside a canopy: where it begins and ends along the line, what it takes a metre.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Stretch {
+pub(crate) struct Stretch {
     /// Which canopy of its load module: two may begin and end together.
     canopy: i32,
     from: f64,
@@ -121,7 +121,7 @@ impl LoadedGround {
                 });
             }
             if past.standing == Standing::All {
-                canopies_along(module, side, line, &mut stretches);
+                canopies_along(module, side, line, nearest.min(1.0), &mut stretches);
             }
             nearest
         });
@@ -149,14 +149,18 @@ fn length_m(from_m: [f64; 3], to_m: [f64; 3]) -> f64 {
     [0, 1, 2].map(|axis| to_m[axis] - from_m[axis]).iter().map(|run| run * run).sum::<f64>().sqrt()
 }
 
+/// The logarithm of the share of light that stretches take, which are sorted and told once each: a triangle may be met
+/// more than once.
+pub(crate) fn lost_in(stretches: &mut Vec<Stretch>, length_m: f64) -> f64 {
+    stretches.sort_by(|a, b| a.from.total_cmp(&b.from).then(a.to.total_cmp(&b.to)).then(a.canopy.cmp(&b.canopy)));
+    stretches.dedup();
+    stretches.iter().map(|stretch| (stretch.to - stretch.from) * length_m * stretch.per_metre).sum()
+}
+
 /// What woods leave of the light, by the stretches of a line in them up to where it ends otherwise.
 fn dimmed(hard: Sighting, length_m: f64, mut stretches: Vec<Stretch>, least: f64) -> Sighting {
-    stretches.sort_by(|a, b| a.from.total_cmp(&b.from).then(a.to.total_cmp(&b.to)).then(a.canopy.cmp(&b.canopy)));
-    // A triangle may be met more than once.
-    stretches.dedup();
-    let metres = |stretch: &Stretch| (stretch.to - stretch.from) * length_m;
-    let wood_m = stretches.iter().map(metres).sum();
-    let lost: f64 = stretches.iter().map(|stretch| metres(stretch) * stretch.per_metre).sum();
+    let lost = lost_in(&mut stretches, length_m);
+    let wood_m = stretches.iter().map(|stretch| (stretch.to - stretch.from) * length_m).sum();
     let all = Sighting { transmission: (-lost).exp(), wood_m, ..hard };
     let most = -least.ln();
     if lost <= most {
@@ -202,7 +206,7 @@ fn prisms_along(module: &TerrainModule, side: u16, line: &Line, mut found: impl 
 }
 
 /// Where a line first is inside a prism; infinity where it never is.
-fn entered(prism: &Prism, line: &Line) -> f64 {
+pub(crate) fn entered(prism: &Prism, line: &Line) -> f64 {
     let [base, roof] = [prism.base, prism.roof].map(f64::from);
     let is_level_with = |height: f64| base <= height && height + ROUNDING < roof;
     if is_level_with(line.height(0.0)) && holds(prism, line.start) {
@@ -248,32 +252,30 @@ pub(crate) fn holds(prism: &Prism, [x, y]: [f64; 2]) -> bool {
     inside
 }
 
-/// Adds the stretches of a line inside the canopies of a load module.
-fn canopies_along(module: &TerrainModule, side: u16, line: &Line, stretches: &mut Vec<Stretch>) {
-    let canopies = &module.module().objects.canopies;
+/// Adds the stretches of a line inside the canopies of a load module, up to a share of the line and a little more.
+fn canopies_along(module: &TerrainModule, side: u16, line: &Line, last: f64, stretches: &mut Vec<Stretch>) {
     for lookup in &module.objects().canopies {
-        lookup.triangles_along(side, line.start, line.end, |corners| {
-            let Some([first, last]) = part_over(&corners, line) else { return };
-            let number = corners[0][2];
-            let [first, last] = [first[0], last[0]];
-            if first < last {
-                let canopy = (number, &canopies[number as usize]);
-                below_top(module, side, line, canopy, [first, last], stretches);
-            }
+        lookup.triangles_along(side, line.start, line.place(last), |corners| {
+            below_top(module, side, line, &corners, stretches);
         });
     }
 }
 
 /// Adds the parts of a line over one triangle of a canopy that lie below its top, ground triangle by ground triangle.
-fn below_top(
+pub(crate) fn below_top(
     module: &TerrainModule,
     side: u16,
     line: &Line,
-    (number, canopy): (i32, &Canopy),
-    [first, last]: [f64; 2],
+    corners: &Corners,
     stretches: &mut Vec<Stretch>,
 ) {
     const DEPTH_M: f64 = 10.0;
+    let Some([first, last]) = part_over(corners, line).map(|ends| ends.map(|end| end[0])) else { return };
+    if last <= first {
+        return;
+    }
+    let number = corners[0][2];
+    let canopy = &module.module().objects.canopies[number as usize];
     let per_metre = -(1.0 - f64::from(canopy.fullness) / 100.0).ln() / DEPTH_M;
     let by = Hider::of(canopy.kind);
     module.lookup().triangles_along(side, line.place(first), line.place(last), |corners| {

@@ -1,6 +1,6 @@
 //! What is seen from a place: a square of places around it, those within range.
 
-use crate::{Curvature, Eye, LoadedGround, PastObjects, Sight, Standing};
+use crate::{Curvature, Eye, LoadedGround, Standing};
 
 /// What a place of a viewshed is told as.
 pub const HIDDEN: u8 = 0;
@@ -26,6 +26,17 @@ pub struct Viewshed {
     pub curvature: Curvature,
     /// Which objects are looked at; what half of the light reaches is seen.
     pub standing: Standing,
+    /// Whether what it looks at stands on roofs and decks where there are any, and not below them.
+    pub is_on_roofs: bool,
+}
+
+/// What a viewshed tells of a place.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Look {
+    /// [`SEEN`], [`HIDDEN`] or [`NOT_LOOKED_AT`].
+    pub seen: u8,
+    /// Per cent of the light that reaches the eye, 0 where ground, a deck or a prism hides it; or [`NOT_LOOKED_AT`].
+    pub light: u8,
 }
 
 impl Viewshed {
@@ -46,28 +57,23 @@ impl Viewshed {
         Some(ground.eye([east, north, height_m + self.eye_m], self.curvature))
     }
 
-    /// Whether no object hides what the ground does not.
-    fn is_free(&self, ground: &LoadedGround, eye: &Eye, to: [f64; 3]) -> bool {
-        let past = PastObjects { standing: self.standing, ..PastObjects::all(self.curvature) };
-        self.standing == Standing::None || ground.sight_past(eye.place_m(), to, &past).sight == Sight::Free
-    }
-
-    /// What is seen of row `row`, counted from the north, from west to east: [`SEEN`], [`HIDDEN`] or [`NOT_LOOKED_AT`].
-    pub fn row(&self, ground: &LoadedGround, eye: &mut Eye, row: u64) -> Vec<u8> {
+    /// What is seen of row `row`, counted from the north, from west to east.
+    pub fn row(&self, ground: &LoadedGround, eye: &mut Eye, row: u64) -> Vec<Look> {
         let reach = i64::from(self.reach());
         let up = (reach - row as i64) as f64 * self.spacing_m;
         let places = (-reach..=reach).map(|step| step as f64 * self.spacing_m);
         let looked_at = |right: f64| right * right + up * up <= self.range_m * self.range_m;
-        let place = |right: f64| [self.place_m[0] + right, self.place_m[1] + up];
-        let mut seen = Vec::with_capacity(self.side() as usize);
-        seen.extend(places.map(|right| {
-            let height_m = looked_at(right).then(|| ground.height_m(place(right))).flatten();
-            height_m.map_or(NOT_LOOKED_AT, |height_m| {
-                let [east, north] = place(right);
-                let to = [east, north, height_m + self.target_m];
-                if eye.sees(to) && self.is_free(ground, eye, to) { SEEN } else { HIDDEN }
+        let height_m = |place| if self.is_on_roofs { ground.roof_m(place) } else { ground.height_m(place) };
+        let mut looks = Vec::with_capacity(self.side() as usize);
+        looks.extend(places.map(|right| {
+            let place = [self.place_m[0] + right, self.place_m[1] + up];
+            let height_m = looked_at(right).then(|| height_m(place)).flatten();
+            height_m.map_or(Look { seen: NOT_LOOKED_AT, light: NOT_LOOKED_AT }, |height_m| {
+                let to = [place[0], place[1], height_m + self.target_m];
+                let light = if eye.sees(to) { eye.light(to, self.standing) } else { 0.0 };
+                Look { seen: if 0.5 <= light { SEEN } else { HIDDEN }, light: (100.0 * light).round() as u8 }
             })
         }));
-        seen
+        looks
     }
 }

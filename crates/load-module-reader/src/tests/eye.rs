@@ -5,7 +5,7 @@ use std::sync::Arc;
 use fastrand::Rng;
 
 use super::{SIDE, agrees_with_small_steps, by_search, rough, sample_ground};
-use crate::{Curvature, LoadedGround, Module, NOT_LOOKED_AT, SEEN, Sight, Standing, TerrainModule, Viewshed};
+use crate::{Curvature, LoadedGround, Look, Module, NOT_LOOKED_AT, SEEN, Sight, Standing, TerrainModule, Viewshed};
 
 const CORNER: [f64; 2] = [501_500.0, 3_876_000.25];
 /// A small planet: a middle hangs by metres over half a kilometre.
@@ -94,6 +94,7 @@ fn a_viewshed_tells_each_place_as_a_line_of_sight_does() {
         spacing_m: 7.0,
         curvature: Curvature::NONE,
         standing: Standing::None,
+        is_on_roofs: false,
     };
     let mut eye = viewshed.eye(&ground).unwrap();
     assert_eq!((viewshed.reach(), viewshed.side()), (42, 85));
@@ -101,7 +102,7 @@ fn a_viewshed_tells_each_place_as_a_line_of_sight_does() {
     for row in 0..85 {
         let found = viewshed.row(&ground, &mut eye, row);
         assert_eq!(found.len(), 85);
-        for (col, number) in found.into_iter().enumerate() {
+        for (col, Look { seen: number, light }) in found.into_iter().enumerate() {
             let (right, up) = ((col as f64 - 42.0) * 7.0, (42.0 - row as f64) * 7.0);
             let place = [place_m[0] + right, place_m[1] + up];
             let height = ground.height_m(place).filter(|_| right * right + up * up <= 300.0 * 300.0);
@@ -109,6 +110,7 @@ fn a_viewshed_tells_each_place_as_a_line_of_sight_does() {
                 u8::from(ground.sight(eye.place_m(), [place[0], place[1], height_m + 1.0]) == Sight::Free)
             });
             assert_eq!(number, expected, "row {row}, column {col}");
+            assert_eq!(light, [0, 100, u8::MAX][usize::from(number.min(2))]);
             counts[usize::from(number.min(2))] += 1;
         }
     }

@@ -289,3 +289,97 @@ fn roofs_are_stood_on_and_walls_have_two_sides() {
     check(hangs(), [50.0, 150.0, 179.0], [300.0, 150.0, 179.0], None);
     check(hangs(), [150.0, 150.0, 170.0], [150.0, 160.0, 190.0], Some(0.5));
 }
+
+#[test]
+fn tops_and_obstacles_agree_with_places_around() {
+    const RADIUS_M: f64 = 4.0;
+    let (ground, module) = ground_with(scattered(5, &rough(9, 7)));
+    let objects = &module.objects;
+    let over = |canopy: &Canopy, place: [f64; 2]| {
+        canopy.triangles.iter().any(|triangle| {
+            let at = triangle.map(|index| canopy.places[usize::from(index)].map(f64::from));
+            let left = |a: [f64; 2], b: [f64; 2]| (b[0] - a[0]) * (place[1] - a[1]) - (b[1] - a[1]) * (place[0] - a[0]);
+            (0..3).all(|i| 0.0 <= left(at[i], at[(i + 1) % 3]))
+        })
+    };
+    let mut draw = Rng::with_seed(29);
+    let mut counts = [0; 3];
+    for _ in 0..600 {
+        let [x, y] = [0, 1].map(|_| f64::from(draw.u32(10_000..490_000)) / 1000.0);
+        let place = [x * 128.0, y * 128.0];
+        let ground_m = by_search(&module, place);
+        let world = [CORNER[0] + x, CORNER[1] + y];
+        let roofs =
+            objects.prisms.iter().filter(|prism| holds(prism, place)).map(|prism| f64::from(prism.roof) / 128.0);
+        let crowns = objects.canopies.iter().filter(|canopy| over(canopy, place));
+        let crowns = crowns.map(|canopy| ground_m + f64::from(canopy.height) / 128.0);
+        let expected = roofs.chain(crowns).fold(ground_m, f64::max);
+        let top = ground.top(world).unwrap();
+        assert!((top.height_m - expected).abs() < 1e-4, "{x} {y}: {top:?}, expected {expected}");
+        assert_eq!(top.of == Hider::Ground, top.height_m == ground.height_m(world).unwrap());
+
+        let wheels_m = ground_m + 20.0 * draw.f64();
+        let around = |inside: &dyn Fn([f64; 2]) -> bool| {
+            let steps = || (-40..=40).map(|step| f64::from(step) * RADIUS_M / 40.0);
+            let places = steps().flat_map(|dx| steps().map(move |dy| [dx, dy]));
+            let near = places.filter(|[dx, dy]| inside([place[0] + dx * 128.0, place[1] + dy * 128.0]));
+            near.map(|[dx, dy]| dx.hypot(dy)).fold(f64::INFINITY, f64::min)
+        };
+        let [low, high] = [0.3, 3.0].map(|above| (wheels_m + above) * 128.0);
+        let blocks = |prism: &&Prism| f64::from(prism.base) < high && low < f64::from(prism.roof);
+        let wall_m = around(&|at| objects.prisms.iter().filter(blocks).any(|prism| holds(prism, at)));
+        let stem_m = around(&|at| objects.canopies.iter().any(|canopy| over(canopy, at)));
+        match ground.obstacle_at([world[0], world[1], wheels_m], RADIUS_M) {
+            Some(found) if found.spacing_m.is_none() => {
+                assert!(wall_m - 0.2 < found.distance_m && (found.distance_m < wall_m + 0.2 || 3.8 < found.distance_m));
+                counts[0] += 1;
+            }
+            Some(found) => {
+                assert!(3.8 < wall_m && (stem_m < RADIUS_M || 3.8 < found.distance_m), "{found:?} {wall_m} {stem_m}");
+                assert_eq!(found.spacing_m, Some(4.0));
+                counts[1] += 1;
+            }
+            None => {
+                assert!(3.8 < wall_m && 3.8 < stem_m, "{x} {y}: {wall_m} {stem_m}");
+                counts[2] += 1;
+            }
+        }
+    }
+    assert!(counts.iter().all(|&count| 60 < count), "{counts:?}");
+    assert_eq!(ground.top([0.0, 0.0]), None);
+    assert_eq!(ground.obstacle_at([0.0, f64::NAN, 0.0], 3.0), None);
+    assert_eq!(ground.obstacle_at([CORNER[0], CORNER[1], 0.0], f64::NAN), None);
+}
+
+#[test]
+fn an_eye_past_objects_sees_what_single_lines_say() {
+    let (ground, _) = ground_with(scattered(5, &rough(9, 7)));
+    let mut draw = Rng::with_seed(3);
+    let mut counts = [0; 4];
+    for curvature in [Curvature::NONE, Curvature(2e-5)] {
+        for _ in 0..30 {
+            let mut place = |up: f64| {
+                let [x, y] = [1000.0, 500.0].map(|reach: f64| reach * draw.f64());
+                let height_m = ground.height_m([CORNER[0] + x, CORNER[1] + y]).unwrap();
+                [CORNER[0] + x, CORNER[1] + y, height_m + up * draw.f64()]
+            };
+            let from = place(120.0);
+            let mut eye = ground.eye(from, curvature);
+            for _ in 0..200 {
+                let to = place(30.0);
+                if !eye.sees(to) {
+                    counts[0] += 1;
+                    continue;
+                }
+                for standing in [Standing::None, Standing::Buildings, Standing::All] {
+                    let all = ground.sight_past(from, to, &PastObjects { standing, least: 1e-9, curvature });
+                    let expected = if all.sight == Sight::Free { all.transmission } else { 0.0 };
+                    let light = eye.light(to, standing);
+                    assert!((light - expected).abs() < 1e-9 || light == 0.0 && expected < 0.005, "{light} {all:?}");
+                    counts[if expected == 0.0 { 1 } else { 2 + usize::from(expected < 1.0) }] += 1;
+                }
+            }
+        }
+    }
+    assert!(counts.iter().all(|&count| 100 < count), "{counts:?}");
+}
