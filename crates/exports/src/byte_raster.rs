@@ -1,8 +1,8 @@
-//! A number of a byte at each place of a grid, as a GeoTIFF: what is seen from somewhere.
+//! Numbers of a byte at each place of a grid, as a GeoTIFF: what is seen from somewhere.
 
 use std::io::{Result, Seek, Write};
 
-use source_files::write_classes;
+use source_files::write_bytes;
 use terrain::{GridFrame, PostRect, Spacing};
 
 /// Where the numbers lie.
@@ -16,10 +16,13 @@ pub struct ByteRaster {
     pub size: [usize; 2],
     /// The coordinate system, EPSG:this.
     pub epsg: u16,
+    /// Numbers at each place.
+    pub bands: u16,
 }
 
 /// Writes the numbers. `rows` is asked for one band of rows after another, by the first and the last of them counted
-/// from the north, and gives their numbers row by row from the north.
+/// from the north, and gives their numbers row by row from the north, those of a place one behind
+/// the other.
 ///
 /// # Errors
 /// Those of `out`.
@@ -28,12 +31,12 @@ pub fn write_byte_raster(
     raster: &ByteRaster,
     mut rows: impl FnMut(usize, usize) -> Vec<u8>,
 ) -> Result<()> {
-    let ByteRaster { origin_m: [origin_east_m, origin_north_m], spacing, size: [wide, high], epsg } = *raster;
+    let ByteRaster { origin_m: [origin_east_m, origin_north_m], spacing, size: [wide, high], epsg, bands } = *raster;
     let frame = GridFrame { origin_east_m, origin_north_m, spacing };
-    write_classes(out, &frame, PostRect::of_size(high, wide), epsg, |band| {
+    write_bytes(out, &frame, PostRect::of_size(high, wide), epsg, bands, |band| {
         let from_north = |row: i32| high - 1 - row as usize;
         let numbers = rows(from_north(band.north), from_north(band.south));
         // The writer takes them from the south.
-        numbers.rchunks(wide).flatten().copied().collect()
+        numbers.rchunks(usize::from(bands) * wide).flatten().copied().collect()
     })
 }

@@ -119,6 +119,65 @@ typedef struct {
     uint8_t is_in_ground;             /* 1 where triangles of the ground have its edges */
 } lmr_line;
 
+/* What an object is: prisms, then canopies. */
+enum {
+    LMR_BUILDING = 0, LMR_TOWER = 1, LMR_WALL = 2,
+    LMR_WOOD = 3, LMR_SCRUB = 4, LMR_ORCHARD = 5, LMR_TREE_ROW = 6
+};
+
+/* A building, tower or stretch of wall in the square of a load module: a level roof and upright walls. Pieces of one
+ * object in several load modules have the same id. */
+typedef struct {
+    uint64_t id;
+    int32_t base, roof;               /* quanta of 1/128 m above the vertical datum */
+    uint8_t kind;                     /* LMR_BUILDING, LMR_TOWER, LMR_WALL */
+    size_t ring_count;                /* the roofline counter-clockwise, then courtyards clockwise */
+} lmr_prism;
+
+/* A corner of a ring, in quanta from the load module's south-west corner. */
+typedef struct {
+    uint16_t x, y;
+    uint8_t has_wall;                 /* 0 where the object goes on in the next load module up to the next corner */
+} lmr_corner;
+
+/* Leaves over the ground: their top follows the ground. What is pointed to lives until the ground is moved or unloaded.
+ */
+typedef struct {
+    uint64_t id;
+    const uint16_t (*places)[2];      /* quanta from the load module's south-west corner */
+    size_t place_count;
+    const uint16_t (*triangles)[3];   /* of the plan, counter-clockwise: indices into places */
+    size_t triangle_count;
+    uint16_t height;                  /* quanta above the ground right below */
+    uint16_t spacing;                 /* quanta between stems */
+    uint8_t kind;                     /* LMR_WOOD, LMR_SCRUB, LMR_ORCHARD, LMR_TREE_ROW */
+    uint8_t fullness;                 /* per cent of the light that 10 m of it take away */
+} lmr_canopy;
+
+/* Which objects lmr_sight_past looks at, and what hides. */
+enum { LMR_NO_OBJECTS = 0, LMR_BUILDINGS = 1, LMR_ALL_OBJECTS = 2 };
+enum { LMR_BY_GROUND = 1, LMR_BY_DECK = 2, LMR_BY_BUILDING = 3, LMR_BY_WOOD = 4, LMR_BY_ROW = 5 };
+
+typedef struct {
+    double share;                     /* how far along the line is hidden; 1 where it is not */
+    double transmission;              /* the share of light that woods leave */
+    double wood_m;                    /* metres inside woods */
+    uint8_t hidden_by;                /* 0, or LMR_BY_GROUND to LMR_BY_ROW */
+} lmr_sighting;
+
+typedef struct {
+    double height_m;
+    uint8_t of;                       /* LMR_BY_GROUND to LMR_BY_ROW */
+} lmr_top;
+
+/* What stands in a vehicle's way. */
+typedef struct {
+    uint64_t id;
+    double distance_m;                /* to its plan; 0 inside */
+    double spacing_m;                 /* between stems; 0 of what cannot be passed */
+    uint8_t kind;                     /* LMR_BUILDING to LMR_TREE_ROW */
+} lmr_obstacle;
+
 /* What lmr_sight answers. */
 enum { LMR_FREE = 0, LMR_HIDDEN = 1, LMR_UNKNOWN = 2, LMR_INVALID = 3 };
 
@@ -165,6 +224,18 @@ int lmr_heights_below(const lmr_ground *ground, const double (*places_m)[3], dou
  * the area's corner). LMR_INVALID: ground, from_m or to_m is NULL. */
 int lmr_sight(const lmr_ground *ground, const double from_m[3], const double to_m[3], double *share);
 
+/* The same past buildings, walls and woods. A line is hidden where it goes through a wall or a roof, at its beginning
+ * where that lies inside one, and in a wood where less of the light than `least` (over 0 up to 1, usually 0.5) is left.
+ * LMR_INVALID also where objects or least are something else. `sighting` may be NULL. */
+int lmr_sight_past(const lmr_ground *ground, const double from_m[3], const double to_m[3], int objects, double least,
+                   lmr_sighting *sighting);
+/* The highest of the ground, decks, roofs and tops of woods over a place. 1 or 0 as lmr_height. */
+int lmr_top_at(const lmr_ground *ground, double east_m, double north_m, lmr_top *top);
+/* What a vehicle hits that stands at a place (east, north, height of its wheels) and reaches radius_m around it: the
+ * nearest building, tower or wall between 0.3 and 3 m above its wheels, else what has the densest stems. 1, or 0 where
+ * its way is free, nothing is loaded, without ground or without a place to write to. */
+int lmr_obstacle_at(const lmr_ground *ground, const double place_m[3], double radius_m, lmr_obstacle *obstacle);
+
 /* Load modules that are loaded, row by row from the south-west. 0 without ground. */
 size_t lmr_module_count(const lmr_ground *ground);
 /* 1, or 0 when there is no such one, without ground or without a place to write to. */
@@ -174,6 +245,16 @@ int lmr_decks_at(const lmr_ground *ground, size_t index, lmr_decks *decks);
 size_t lmr_line_count(const lmr_ground *ground, size_t index);
 /* One of them: 1, or 0 when there is no such one, without ground or without a place to write to. */
 int lmr_line_at(const lmr_ground *ground, size_t index, size_t line, lmr_line *out);
+/* Buildings, towers and walls of a load module. 0 when there is no such one, or without ground. */
+size_t lmr_prism_count(const lmr_ground *ground, size_t index);
+/* One of them: 1, or 0 when there is no such one, without ground or without a place to write to. */
+int lmr_prism_at(const lmr_ground *ground, size_t index, size_t prism, lmr_prism *out);
+/* The corners of one ring of it, as many as corner_count is set to; NULL when there is no such one, without ground or
+ * without a place to write to. They live until the ground is moved or unloaded. */
+const lmr_corner *lmr_ring_at(const lmr_ground *ground, size_t index, size_t prism, size_t ring, size_t *corner_count);
+/* Woods, scrub, orchards and rows of a load module, and one of them, as above. */
+size_t lmr_canopy_count(const lmr_ground *ground, size_t index);
+int lmr_canopy_at(const lmr_ground *ground, size_t index, size_t canopy, lmr_canopy *out);
 
 #ifdef __cplusplus
 }

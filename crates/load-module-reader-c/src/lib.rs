@@ -4,6 +4,7 @@
 //! may be mapped into memory. Nothing is decided here; each function turns its arguments and calls the reader.
 //! A pointer that is null or not aligned is never followed: the function answers as the header says.
 
+mod objects;
 mod pointers;
 mod values;
 

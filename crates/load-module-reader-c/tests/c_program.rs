@@ -6,6 +6,8 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use load_module_reader::{Canopy, Corner, ObjectKind, Objects, Prism};
+
 /// The worked example of `docs/FORMAT.md` without a deck, byte by byte.
 fn worked_example() -> Vec<u8> {
     example_of_version(1)
@@ -19,6 +21,49 @@ fn with_a_deck() -> Vec<u8> {
 /// That with lines too.
 fn with_lines() -> Vec<u8> {
     example_of_version(3)
+}
+
+/// That with a tower and a wood too.
+fn with_objects() -> Vec<u8> {
+    let corner = |x: u16, y: u16, has_wall: bool| Corner { x, y, has_wall };
+    let outer = [[51_200, 9_600], [64_000, 9_600], [64_000, 16_000], [51_200, 16_000]];
+    let court = [[56_320, 11_000], [56_320, 12_000], [58_000, 12_000], [58_000, 11_000]];
+    let tower = Prism {
+        id: 7,
+        kind: ObjectKind::Tower,
+        base: 990 * 128,
+        roof: 1020 * 128,
+        rings: vec![
+            outer.iter().map(|&[x, y]| corner(x, y, [x, y] != outer[1])).collect(),
+            court.iter().map(|&[x, y]| corner(x, y, true)).collect(),
+        ],
+    };
+    let wood = Canopy {
+        id: 9,
+        kind: ObjectKind::Wood,
+        height: 15 * 128,
+        fullness: 90,
+        spacing: 4 * 128,
+        places: vec![[6_400, 44_800], [19_200, 44_800], [19_200, 57_600], [6_400, 57_600]],
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+    };
+    let part = Objects { prisms: vec![tower], canopies: vec![wood] }.to_part();
+    let mut file = with_lines();
+    // One more entry in the table of parts, before its checksum, and the part behind the others.
+    let (index, parts, table_end) = (144..184, 308, 348);
+    let mut entry = [3, part.len() as u32, 0].map(u32::to_le_bytes).concat();
+    entry[8..].copy_from_slice(&checksum(&part));
+    file.splice(table_end..table_end, entry);
+    file[320] = 3;
+    seal(&mut file[parts..table_end + 16]);
+    file.extend(&part);
+    let length = (file.len() - parts) as u32;
+    file[176..180].copy_from_slice(&length.to_le_bytes());
+    seal(&mut file[index]);
+    let length = file.len() as u64;
+    file[16..24].copy_from_slice(&length.to_le_bytes());
+    seal(&mut file[..144]);
+    file
 }
 
 fn example_of_version(version: usize) -> Vec<u8> {
@@ -67,10 +112,14 @@ fn raise(bytes: &mut [u8], by: i32) {
 
 /// Puts the CRC-32 of what is before them into the last four bytes.
 fn seal(part: &mut [u8]) {
-    let (body, checksum) = part.split_last_chunk_mut::<4>().unwrap();
+    let (body, last) = part.split_last_chunk_mut::<4>().unwrap();
+    *last = checksum(body);
+}
+
+fn checksum(body: &[u8]) -> [u8; 4] {
     let bit = |sum: u32| if sum & 1 == 1 { sum >> 1 ^ 0xedb8_8320 } else { sum >> 1 };
     let sum = body.iter().fold(u32::MAX, |sum, &byte| (0..8).fold(sum ^ u32::from(byte), |sum, _| bit(sum)));
-    *checksum = (!sum).to_le_bytes();
+    (!sum).to_le_bytes()
 }
 
 /// The static library of this crate, newest first: it lies beside the tests, or one folder up.
@@ -109,8 +158,13 @@ fn a_program_in_c_gets_right_answers() {
     let folder = tempfile::tempdir().unwrap();
     let program = folder.path().join("drive");
     compile("drive.c", &["-std=c99", "-pedantic"], &program).unwrap();
-    let files =
-        [("1", "0", worked_example()), ("2", "0", two_levels()), ("1", "1", with_a_deck()), ("1", "2", with_lines())];
+    let files = [
+        ("1", "0", worked_example()),
+        ("2", "0", two_levels()),
+        ("1", "1", with_a_deck()),
+        ("1", "2", with_lines()),
+        ("1", "3", with_objects()),
+    ];
     for (levels, decks, file) in files {
         let area = folder.path().join(format!("{levels}-{decks}"));
         std::fs::create_dir_all(area.join("modules")).unwrap();
@@ -159,6 +213,7 @@ fn damaged_files_and_hostile_arguments_do_no_harm() {
     std::fs::write(seeds.join("one.slm"), worked_example()).unwrap();
     std::fs::write(seeds.join("two.slm"), two_levels()).unwrap();
     std::fs::write(seeds.join("deck.slm"), with_a_deck()).unwrap();
+    std::fs::write(seeds.join("objects.slm"), with_objects()).unwrap();
     let (first, last, seconds) = ("1", "400", "3");
     run(&seeds, &[first, seconds, last]);
 }

@@ -1,6 +1,6 @@
 /*
  * Opens the database named on the command line in every way, and asks everything there is to ask. Behind the name: how
- * many levels of detail it has, and whether there is a deck.
+ * many levels of detail it has, and 1 where there is a deck, 2 with lines too, 3 with objects too.
  */
 #include "load_module_reader.h"
 
@@ -93,6 +93,55 @@ static void ask_decks(const lmr_area *area, int has_decks) {
     lmr_unload(ground);
 }
 
+/* In the east stands a tower with a court, its wall open to the east, and in the north lies a wood; or neither. */
+static void ask_objects(const lmr_area *area, int has_objects) {
+    char why[256];
+    lmr_ground *ground = lmr_load(area, 505250, 3875250, LMR_ALL, why, sizeof why);
+    size_t corners = 0;
+    lmr_prism tower;
+    lmr_canopy wood;
+    expect(lmr_prism_count(ground, 0) == (size_t)has_objects && lmr_prism_count(ground, 1) == 0, "as many prisms");
+    expect(lmr_canopy_count(ground, 0) == (size_t)has_objects, "as many canopies");
+    expect(lmr_prism_at(ground, 0, 0, &tower) == has_objects && !lmr_prism_at(ground, 0, 1, &tower), "the tower");
+    expect(lmr_canopy_at(ground, 0, 0, &wood) == has_objects && !lmr_canopy_at(ground, 1, 0, &wood), "the wood");
+    const lmr_corner *ring = lmr_ring_at(ground, 0, 0, 0, &corners);
+    expect(!ring == !has_objects && !lmr_ring_at(ground, 0, 0, 2, &corners), "its roofline, and no third ring");
+    const double west[3] = {505300, 3875100, 1005}, east[3] = {505490, 3875100, 1005};
+    const double south[3] = {505100, 3875300, 1005}, north[3] = {505100, 3875450, 1005};
+    lmr_sighting found;
+    int seen = lmr_sight_past(ground, west, east, LMR_ALL_OBJECTS, 0.5, &found);
+    expect(seen == (has_objects ? LMR_HIDDEN : LMR_FREE), "the tower hides");
+    expect(!has_objects || (found.hidden_by == LMR_BY_BUILDING && fabs(found.share * 190 - 100) < 1e-6), "where");
+    expect(lmr_sight_past(ground, west, east, LMR_NO_OBJECTS, 0.5, NULL) == LMR_FREE, "not when it is left out");
+    seen = lmr_sight_past(ground, south, north, LMR_ALL_OBJECTS, 0.5, &found);
+    expect(seen == (has_objects ? LMR_HIDDEN : LMR_FREE), "the wood hides");
+    expect(!has_objects || (found.hidden_by == LMR_BY_WOOD && fabs(found.wood_m - 100) < 0.1), "so much wood");
+    expect(lmr_sight_past(ground, south, north, LMR_BUILDINGS, 0.5, &found) == LMR_FREE, "it is no building");
+    expect(found.hidden_by == 0 && found.share == 1, "nothing hides");
+    expect(lmr_sight_past(ground, south, north, 3, 0.5, &found) == LMR_INVALID, "no such objects");
+    expect(lmr_sight_past(ground, south, north, 2, 0, &found) == LMR_INVALID, "no such least");
+    lmr_top top;
+    double height;
+    expect(lmr_top_at(ground, 505410, 3875100, &top) && lmr_height(ground, 505410, 3875100, &height), "a top");
+    expect(has_objects ? top.height_m == 1020 && top.of == LMR_BY_BUILDING : top.height_m == height, "the roof");
+    expect(!lmr_top_at(ground, 0, 0, &top), "no top far away");
+    lmr_obstacle wall, stems;
+    const double beside[3] = {505398, 3875100, 1000}, inside[3] = {505100, 3875400, 1001};
+    expect(lmr_obstacle_at(ground, beside, 1, &wall) == 0, "past the wall");
+    expect(lmr_obstacle_at(ground, beside, 3, &wall) == has_objects, "against the wall");
+    expect(lmr_obstacle_at(ground, inside, 3, &stems) == has_objects, "into the wood");
+    if (has_objects) {
+        expect(tower.id == 7 && tower.roof == 1020 * 128 && tower.ring_count == 2, "what the tower is");
+        lmr_ring_at(ground, 0, 0, 0, &corners);
+        expect(corners == 4 && ring[0].x == 51200 && ring[0].has_wall && !ring[1].has_wall, "its corners");
+        expect(wood.id == 9 && wood.kind == LMR_WOOD && wood.fullness == 90 && wood.triangle_count == 2, "the wood");
+        expect(wood.places[2][1] == 57600 && wood.triangles[1][2] == 3, "its plan");
+        expect(wall.kind == LMR_TOWER && wall.distance_m == 2 && wall.spacing_m == 0, "a wall stops");
+        expect(stems.kind == LMR_WOOD && stems.distance_m == 0 && stems.spacing_m == 4, "stems are apart");
+    }
+    lmr_unload(ground);
+}
+
 static void ask(const lmr_area *area) {
     char why[256] = "";
     lmr_frame frame;
@@ -141,7 +190,8 @@ int main(int argc, char **argv) {
             ask(area);
             ask_levels(area, (uint32_t)atoi(argv[2]));
             ask_decks(area, argv[3][0] != '0');
-            ask_lines(area, argv[3][0] == '2');
+            ask_lines(area, argv[3][0] >= '2');
+            ask_objects(area, argv[3][0] == '3');
         }
         lmr_close(area);
     }

@@ -348,6 +348,20 @@ static void ask_sight(const lmr_ground *ground, const lmr_frame *frame, double h
     for (int i = 0; i < 6; i++) {
         if (!isfinite(ends[i / 3][i % 3])) expect(sight == LMR_UNKNOWN, "nothing is known of places that are none");
     }
+    lmr_sighting found;
+    double least = below(8) ? 0.5 : odd_double();
+    int past = lmr_sight_past(ground, ends[0], ends[1], (int)below(4), least, below(8) ? &found : NULL);
+    expect(past == LMR_INVALID || sight != LMR_HIDDEN || past == LMR_HIDDEN, "objects hide, and show nothing");
+    if (lmr_sight_past(ground, ends[0], ends[1], LMR_ALL_OBJECTS, 0.5, &found) != LMR_UNKNOWN) {
+        expect(0 <= found.share && found.share <= 1 && 0 <= found.transmission && found.transmission <= 1, "shares");
+        expect(0 <= found.wood_m && found.hidden_by <= LMR_BY_ROW, "woods and what hides");
+    }
+    lmr_obstacle obstacle;
+    double radius = below(4) ? (double)below(100) : odd_double();
+    if (lmr_obstacle_at(ground, ends[0], radius, &obstacle)) {
+        expect(0 <= obstacle.distance_m && obstacle.distance_m <= radius + 1e-6, "it is reached");
+        expect(obstacle.kind <= LMR_TREE_ROW && (obstacle.kind <= LMR_WALL) == (obstacle.spacing_m == 0), "its kind");
+    }
 }
 
 /* The topmost of ground and decks: never below the ground where there is no ceiling, never above one. */
@@ -356,6 +370,9 @@ static void ask_below(const lmr_ground *ground, const double place[2], int found
     lmr_surface surface;
     expect(lmr_height_below(ground, place[0], place[1], INFINITY, &top) == found, "a top where there is ground");
     expect(!found || on_ground <= top, "the ground or a deck above it");
+    lmr_top highest;
+    expect(lmr_top_at(ground, place[0], place[1], &highest) == found, "what lies on top");
+    expect(!found || (top <= highest.height_m && LMR_BY_GROUND <= highest.of && highest.of <= LMR_BY_ROW), "its kind");
     double ceiling = below(3) ? (below(2) ? on_ground : top) + (double)below(9) - 4 : odd_double();
     const double places[1][3] = {{place[0], place[1], ceiling}};
     double height = 0;
@@ -412,6 +429,38 @@ static void draw_lines(const lmr_ground *ground, const lmr_frame *frame, size_t 
     }
 }
 
+static void draw_objects(const lmr_ground *ground, const lmr_frame *frame, size_t module) {
+    const double side = frame->side_m * 128;
+    size_t count = lmr_prism_count(ground, module), corners = 0;
+    lmr_prism prism;
+    lmr_canopy canopy;
+    expect(!lmr_prism_at(ground, module, count, &prism) && !lmr_prism_at(ground, module, SIZE_MAX, &prism), "none");
+    for (size_t i = 0; i < count; i++) {
+        expect(lmr_prism_at(ground, module, i, &prism) == 1 && prism.kind <= LMR_WALL, "every prism");
+        expect(prism.base < prism.roof && 1 <= prism.ring_count, "it has a height and a plan");
+        expect(!lmr_ring_at(ground, module, i, prism.ring_count, &corners), "no ring behind the last");
+        for (size_t r = 0; r < prism.ring_count; r++) {
+            const lmr_corner *ring = lmr_ring_at(ground, module, i, r, &corners);
+            expect(ring && 3 <= corners, "every ring");
+            for (size_t c = 0; c < corners; c++) {
+                expect(ring[c].x <= side && ring[c].y <= side && ring[c].has_wall <= 1, "inside");
+            }
+        }
+    }
+    count = lmr_canopy_count(ground, module);
+    expect(!lmr_canopy_at(ground, module, count, &canopy) && !lmr_canopy_at(ground, SIZE_MAX, 0, &canopy), "none");
+    for (size_t i = 0; i < count; i++) {
+        expect(lmr_canopy_at(ground, module, i, &canopy) == 1 && LMR_WOOD <= canopy.kind, "every canopy");
+        expect(canopy.kind <= LMR_TREE_ROW && canopy.height && canopy.spacing && canopy.fullness < 100, "what it is");
+        for (size_t v = 0; v < canopy.place_count; v++) {
+            expect(canopy.places[v][0] <= side && canopy.places[v][1] <= side, "inside");
+        }
+        for (size_t t = 0; t < 3 * canopy.triangle_count; t++) {
+            expect(canopy.triangles[t / 3][t % 3] < canopy.place_count, "an index of a place");
+        }
+    }
+}
+
 static void draw_modules(const lmr_ground *ground, const lmr_frame *frame) {
     size_t count = lmr_module_count(ground);
     lmr_module module;
@@ -438,6 +487,7 @@ static void draw_modules(const lmr_ground *ground, const lmr_frame *frame) {
             sum += decks.classes[t];
         }
         draw_lines(ground, frame, i);
+        draw_objects(ground, frame, i);
     }
 }
 
@@ -467,6 +517,19 @@ static void ask_nothing(const lmr_area *area, lmr_ground *ground) {
     expect(!lmr_surface_below(NULL, 0, 0, 0, &surface) && !lmr_surface_below(ground, 0, 0, 0, NULL), "no surface");
     expect(!lmr_heights_below(NULL, triples, &height, 1) && !lmr_heights_below(ground, NULL, &height, 1), "none");
     expect(!lmr_decks_at(NULL, 0, &decks) && !lmr_decks_at(ground, 0, NULL), "no decks");
+    lmr_sighting sighting;
+    lmr_top top;
+    lmr_obstacle obstacle;
+    lmr_prism prism;
+    lmr_canopy canopy;
+    size_t count;
+    expect(lmr_sight_past(NULL, three, three, 2, 0.5, &sighting) == LMR_INVALID, "no sight past objects");
+    expect(lmr_sight_past(ground, NULL, three, 2, 0.5, &sighting) == LMR_INVALID, "nor without an end");
+    expect(!lmr_top_at(NULL, 0, 0, &top) && !lmr_top_at(ground, 0, 0, NULL), "no top");
+    expect(!lmr_obstacle_at(NULL, three, 1, &obstacle) && !lmr_obstacle_at(ground, NULL, 1, &obstacle), "no obstacle");
+    expect(!lmr_prism_at(NULL, 0, 0, &prism) && !lmr_prism_at(ground, 0, 0, NULL), "no prism");
+    expect(!lmr_ring_at(NULL, 0, 0, 0, &count) && !lmr_ring_at(ground, 0, 0, 0, NULL), "no ring");
+    expect(!lmr_canopy_at(NULL, 0, 0, &canopy) && !lmr_canopy_at(ground, 0, 0, NULL), "no canopy");
     lmr_line line;
     expect(!lmr_line_count(NULL, 0) && !lmr_line_count(ground, SIZE_MAX), "no lines");
     expect(!lmr_line_at(NULL, 0, 0, &line) && !lmr_line_at(ground, 0, 0, NULL), "no line");

@@ -57,6 +57,8 @@ impl fmt::Display for ObjectKind {
 }
 
 /// A corner of a roofline, in quanta from the load module's south-west corner.
+// Laid out as C has it, for `load-module-reader-c`.
+#[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Corner {
     /// East.

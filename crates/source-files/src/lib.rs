@@ -72,4 +72,4 @@ pub use given::{GivenFeature, GivenShape, read_given};
 pub mod geopackage_parts;
 pub mod geotiff_parts;
 mod write;
-pub use write::{write_classes, write_heights};
+pub use write::{write_bytes, write_classes, write_heights};

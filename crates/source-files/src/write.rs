@@ -56,14 +56,33 @@ pub fn write_classes(
     grid: &GridFrame,
     rect: PostRect,
     epsg: u16,
-    mut classes: impl FnMut(PostRect) -> Vec<u8>,
+    classes: impl FnMut(PostRect) -> Vec<u8>,
 ) -> io::Result<()> {
-    let strip = |band: PostRect| {
-        let classes = classes(band);
-        assert_eq!(classes.len(), band.post_count(), "one class per post of the band that was asked for");
-        classes.rchunks(band.posts_wide()).flatten().copied().collect()
+    write_bytes(out, grid, rect, epsg, 1, classes)
+}
+
+/// [`write_classes`] with several numbers of a byte at each post, one behind the other: a band of the file each.
+///
+/// # Errors
+/// As [`write_heights`].
+///
+/// # Panics
+/// When `numbers` does not give `bands` numbers per post of the rows that were asked for.
+pub fn write_bytes(
+    out: &mut (impl Write + Seek),
+    grid: &GridFrame,
+    rect: PostRect,
+    epsg: u16,
+    bands: u16,
+    mut numbers: impl FnMut(PostRect) -> Vec<u8>,
+) -> io::Result<()> {
+    let count = usize::from(bands);
+    let strip = |rows: PostRect| {
+        let numbers = numbers(rows);
+        assert_eq!(numbers.len(), count * rows.post_count(), "as many numbers per post as there are bands");
+        numbers.rchunks(count * rows.posts_wide()).flatten().copied().collect()
     };
-    write(out, &Head { grid, rect, epsg, kind: Kind::Classes }, strip)
+    write(out, &Head { grid, rect, epsg, kind: Kind::Bytes(bands) }, strip)
 }
 
 /// One row of heights in metres, from west to east.
@@ -77,15 +96,16 @@ fn floats(dem: &Dem, row: i32) -> Vec<f32> {
 #[derive(Clone, Copy)]
 enum Kind {
     Heights,
-    Classes,
+    /// So many of them at each post.
+    Bytes(u16),
 }
 
 impl Kind {
-    /// Bits a sample, its format, and TIFF's code of the predictor.
-    fn sample(self) -> (u16, SampleFormat, u16) {
+    /// Samples at a post, bits of each, its format, and TIFF's code of the predictor.
+    fn sample(self) -> (u16, u16, SampleFormat, u16) {
         match self {
-            Kind::Heights => (32, SampleFormat::IEEEFP, 3),
-            Kind::Classes => (8, SampleFormat::Uint, 1),
+            Kind::Heights => (1, 32, SampleFormat::IEEEFP, 3),
+            Kind::Bytes(bands) => (bands, 8, SampleFormat::Uint, 1),
         }
     }
 }
@@ -145,19 +165,24 @@ fn write_sample_tags<K: TiffKind>(
     rows_per_strip: u32,
 ) -> TiffResult<()> {
     const BLACK_IS_ZERO: u16 = 1;
-    let (bits, format, predictor) = head.kind.sample();
+    let (samples, bits, format, predictor) = head.kind.sample();
+    let of_each = |value: u16| vec![value; usize::from(samples)];
     directory.write_tag(Tag::ImageWidth, head.rect.posts_wide() as u32)?;
     directory.write_tag(Tag::ImageLength, head.rect.posts_high() as u32)?;
-    directory.write_tag(Tag::BitsPerSample, bits)?;
+    directory.write_tag(Tag::BitsPerSample, &of_each(bits)[..])?;
     directory.write_tag(Tag::Compression, CompressionMethod::Deflate.to_u16())?;
     directory.write_tag(Tag::PhotometricInterpretation, BLACK_IS_ZERO)?;
-    directory.write_tag(Tag::SamplesPerPixel, 1_u16)?;
+    directory.write_tag(Tag::SamplesPerPixel, samples)?;
+    if 1 < samples {
+        // Of no kind that programs which show pictures know.
+        directory.write_tag(Tag::ExtraSamples, &of_each(0)[1..])?;
+    }
     directory.write_tag(Tag::RowsPerStrip, rows_per_strip)?;
     directory.write_tag(Tag::XResolution, Rational { n: 1, d: 1 })?;
     directory.write_tag(Tag::YResolution, Rational { n: 1, d: 1 })?;
     directory.write_tag(Tag::ResolutionUnit, ResolutionUnit::None.to_u16())?;
     directory.write_tag(Tag::Predictor, predictor)?;
-    directory.write_tag(Tag::SampleFormat, format.to_u16())
+    directory.write_tag(Tag::SampleFormat, &of_each(format.to_u16())[..])
 }
 
 fn write_place_tags<K: TiffKind>(

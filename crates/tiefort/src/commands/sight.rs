@@ -1,11 +1,13 @@
 //! `tiefort sight`: what is seen from a place.
 
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use clap::Args;
 use exports::{ByteRaster, write_byte_raster};
-use load_module_reader::{Area, Curvature, Hider, LoadedGround, PastObjects, SEEN, Sight, Standing, Viewshed};
+use load_module_reader::{
+    Area, Curvature, Hider, LoadedGround, Look, PastObjects, SEEN, Sight, Standing, TerrainModule, Viewshed,
+};
 use schedule::{Workers, for_each_piece};
 use terrain::Spacing;
 use views::{SeenGround, draw_seen, fold, grouped};
@@ -23,7 +25,8 @@ Examples:
 
 With --to: whether one place sees the other, what stands in the way first, and
 how far the line stays above the ground. With --range: every place around it,
-as a GeoTIFF (1 seen, 0 hidden, 255 not looked at) or as a picture.
+as a GeoTIFF (1 seen, 0 hidden, 255 not looked at) or as a picture. Where woods
+are looked at, a second band tells the per cent of the light that they leave.
 
 Heights of both ends are metres above the ground. Decks of bridges hide what is
 behind them, as ground does, and so do buildings and walls where the database
@@ -72,6 +75,10 @@ pub struct Arguments {
     /// What stands on the ground and is looked at: none, buildings (with walls), or all
     #[arg(long, value_name = "WHICH", value_parser = standing, default_value = "all")]
     objects: Standing,
+    /// With --range: whether what it looks at stands on the ground or on roofs
+    #[arg(long, value_name = "WHERE", value_parser = ["ground", "roof"], default_value = "ground",
+        conflicts_with = "to")]
+    target_on: String,
     /// The GeoTIFF or picture to write
     #[arg(long, value_name = "FILE.tif|png", requires = "range")]
     out: Option<PathBuf>,
@@ -209,6 +216,7 @@ fn around(
         spacing_m,
         curvature,
         standing: arguments.objects,
+        is_on_roofs: arguments.target_on == "roof",
     };
     let most = if kind == Kind::Png { PIXELS_MAX } else { PLACES_MAX };
     let side = viewshed.side();
@@ -246,20 +254,26 @@ struct Count {
 
 impl Looks<'_> {
     /// Rows of the viewshed, both included, counted from the north.
-    fn rows(&self, first: usize, last: usize, count: &mut Count) -> Vec<u8> {
+    fn rows(&self, first: usize, last: usize, count: &mut Count) -> Vec<Look> {
         let pieces = (last + 1 - first).div_ceil(ROWS_AT_ONCE);
         let found = Mutex::new(vec![Vec::new(); pieces]);
         for_each_piece(&self.workers, pieces, &|piece| {
             let start = first + piece * ROWS_AT_ONCE;
             let rows = start..=(start + ROWS_AT_ONCE - 1).min(last);
             let Some(mut eye) = self.viewshed.eye(self.ground) else { return };
-            let numbers = rows.flat_map(|row| self.viewshed.row(self.ground, &mut eye, row as u64)).collect();
-            found.lock().unwrap_or_else(PoisonError::into_inner)[piece] = numbers;
+            let looks = rows.flat_map(|row| self.viewshed.row(self.ground, &mut eye, row as u64)).collect();
+            found.lock().unwrap_or_else(PoisonError::into_inner)[piece] = looks;
         });
         let rows = found.into_inner().unwrap_or_else(PoisonError::into_inner).concat();
-        count.places += rows.iter().filter(|&&number| number <= SEEN).count() as u64;
-        count.seen += rows.iter().filter(|&&number| number == SEEN).count() as u64;
+        count.places += rows.iter().filter(|look| look.seen <= SEEN).count() as u64;
+        count.seen += rows.iter().filter(|look| look.seen == SEEN).count() as u64;
         rows
+    }
+
+    /// Whether there are woods, and they are looked at.
+    fn has_woods(&self) -> bool {
+        let has_some = |module: &Arc<TerrainModule>| !module.module().objects.canopies.is_empty();
+        self.viewshed.standing == Standing::All && self.ground.modules().iter().any(has_some)
     }
 
     /// South-western place.
@@ -278,17 +292,22 @@ fn write_tiff(looks: &Looks, spacing: Spacing, out: &Path) -> Result<Count, Fail
         )
     })?;
     let side = looks.viewshed.side() as usize;
-    let raster = ByteRaster { origin_m: looks.corner(), spacing, size: [side, side], epsg };
+    let bands = if looks.has_woods() { 2 } else { 1 };
+    let raster = ByteRaster { origin_m: looks.corner(), spacing, size: [side, side], epsg, bands };
     let mut count = Count::default();
-    files::write_whole(out, |out| write_byte_raster(out, &raster, |first, last| looks.rows(first, last, &mut count)))?;
+    let mut numbers = |first, last| {
+        let rows = looks.rows(first, last, &mut count);
+        rows.iter().flat_map(|look| [look.seen, look.light]).step_by(3 - usize::from(bands)).collect()
+    };
+    files::write_whole(out, |out| write_byte_raster(out, &raster, &mut numbers))?;
     Ok(count)
 }
 
 fn write_png(looks: &Looks, out: &Path) -> Result<Count, Failure> {
     let side = looks.viewshed.side() as usize;
     let mut count = Count::default();
-    let numbers = looks.rows(0, side - 1, &mut count);
-    let seen: Vec<Option<bool>> = numbers.iter().map(|&number| (number <= SEEN).then_some(number == SEEN)).collect();
+    let rows = looks.rows(0, side - 1, &mut count);
+    let seen: Vec<Option<bool>> = rows.iter().map(|look| (look.seen <= SEEN).then_some(look.seen == SEEN)).collect();
     let ([west, south], step_m) = (looks.corner(), looks.viewshed.spacing_m);
     let place = |at: usize| [west + (at % side) as f64 * step_m, south + (side - 1 - at / side) as f64 * step_m];
     let height = |at: usize| looks.ground.height_m(place(at)).map_or(f32::NAN, |height_m| height_m as f32);

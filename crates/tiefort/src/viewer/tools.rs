@@ -178,6 +178,7 @@ fn viewshed_of(
         spacing_m,
         curvature,
         standing: load_module_reader::Standing::None,
+        is_on_roofs: false,
     };
     let side = viewshed.side();
     if SIDE_MAX < side {
@@ -187,7 +188,7 @@ fn viewshed_of(
     let mut eye = viewshed.eye(&ground).ok_or("found a place without ground")?;
     let mut out: Vec<u8> = (side as u32).to_le_bytes().to_vec();
     out.extend((spacing_m as f32).to_le_bytes());
-    out.extend((0..side).flat_map(|row| viewshed.row(&ground, &mut eye, row)));
+    out.extend((0..side).flat_map(|row| viewshed.row(&ground, &mut eye, row)).map(|look| look.seen));
     Ok(out)
 }
 
