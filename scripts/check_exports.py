@@ -5,10 +5,12 @@
 
 With --holes a database with holes is built and checked, too, with --bridge one with a bridge over a valley. PROGRAM is
 target/release/tiefort unless said. Needs rasterio, rio-cogeo, meshio, geopandas, pyogrio, pyproj and numpy; osgconv
-(Debian's openscenegraph); node with what scripts/exports/package.json names for glTF and CesiumJS, which also loads
-from `tiefort serve`, and chromium; a
-Python that has QGIS (Debian's python3-qgis); usd-core and mujoco; Debian's libsdformat-dev. A reader that is missing
-is told and skipped, unless --all is given.
+(Debian's openscenegraph); a Python that has QGIS (Debian's python3-qgis); usd-core and mujoco; Debian's
+libsdformat-dev; chromium and node for glTF and CesiumJS, which also loads from `tiefort serve`, with
+
+    npm install --prefix DIR 3d-tiles-tools@0.5.4 cesium@1.140.0 gltf-validator@2.0.0-dev.3.10 puppeteer-core@24.43.1
+
+A reader that is missing is told and skipped, unless --all is given.
 """
 
 import argparse
@@ -362,13 +364,18 @@ def check_glb(database, arguments, scratch):
     validate([glb], arguments)
 
 
+def readers(arguments):
+    """The script of readers, where it finds their packages."""
+    script = pathlib.Path(arguments.node_modules) / "readers.mjs"
+    shutil.copy(HERE / "exports" / "readers.mjs", script)
+    return script
+
+
 def validate(files, arguments):
     if not arguments.node_modules or not shutil.which("node"):
         raise Skip("no --node-modules with gltf-validator, or no node")
-    script = pathlib.Path(arguments.node_modules) / "validate_gltf.mjs"
-    if not script.exists():
-        shutil.copy(HERE / "exports" / "validate_gltf.mjs", script)
-    ran = subprocess.run(["node", str(script), *map(str, files)], capture_output=True, text=True)
+    script = readers(arguments)
+    ran = subprocess.run(["node", str(script), "gltf", *map(str, files)], capture_output=True, text=True)
     expect(ran.returncode == 0, f"gltf-validator: {ran.stdout.strip().splitlines()[-1]}")
 
 
@@ -565,11 +572,37 @@ def check_styles(path, classes):
         expect(set(categories) == wanted and set(categories.values() or symbols) == symbols, f"style of {name}")
 
 
+# Opens layers of a GeoPackage in QGIS, without a window, and tells as JSON how it would draw each.
+QGIS_STYLES = '''
+import json
+import os
+import sys
+
+os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
+from qgis.core import QgsApplication, QgsVectorLayer
+
+application = QgsApplication([], False)
+application.initQgis()
+found = {}
+for name in sys.argv[2:]:
+    layer = QgsVectorLayer(f"{sys.argv[1]}|layername={name}", name, "ogr")
+    _, loaded = layer.loadDefaultStyle()
+    renderer = layer.renderer()
+    categories = renderer.categories() if hasattr(renderer, "categories") else []
+    found[name] = {
+        "loaded": loaded, "renderer": renderer.type(),
+        "classes": {int(of.value()): [of.label(), of.symbol().symbolLayer(0).properties()["style"]]
+                    for of in categories},
+    }
+print(json.dumps(found))
+'''
+
+
 def check_in_qgis(path, names, arguments):
     if not arguments.qgis_python:
         raise Skip("no --qgis-python")
     layers = ["load_modules", "tiles", "breaches", "triangles"]
-    command = [arguments.qgis_python, str(HERE / "exports" / "qgis_styles.py"), str(path), *layers]
+    command = [arguments.qgis_python, "-c", QGIS_STYLES, str(path), *layers]
     found = json.loads(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
     expect(all(of["loaded"] for of in found.values()), "QGIS takes the style of every layer from the package")
     wanted = {str(of): [name, "b_diagonal" if of == HOLE else "solid"] for of, name in names.items()}
@@ -853,9 +886,7 @@ def check_serve(database, arguments, scratch):
 
 
 def run_cesium(arguments, scratch, terrain, tileset):
-    script = pathlib.Path(arguments.node_modules) / "cesium.mjs"
-    shutil.copy(HERE / "exports" / "cesium.mjs", script)
-    command = ["node", str(script), "--terrain", str(terrain), "--tileset", str(tileset)]
+    command = ["node", str(readers(arguments)), "--terrain", str(terrain), "--tileset", str(tileset)]
     command += ["--places", str(scratch / "places.json")]
     command += ["--pictures", arguments.pictures] if arguments.pictures else []
     ran = subprocess.run(command, capture_output=True, text=True)

@@ -15,11 +15,7 @@ import { tmpdir } from "node:os";
 import { dirname, join } from "node:path";
 import { fileURLToPath, pathToFileURL } from "node:url";
 import { parseArgs } from "node:util";
-import { housed, turned } from "./viewer/buildings.mjs";
-import { draped } from "./viewer/imagery.mjs";
-import * as tools from "./viewer/tools.mjs";
-import { curved, tracked } from "./viewer/tracks.mjs";
-import { until } from "./viewer/wait.mjs";
+import * as looks from "./viewer/looks.mjs";
 
 const root = join(dirname(fileURLToPath(import.meta.url)), "..");
 const library = createRequire(join(root, "crates", "tiefort", "viewer", "package.json")).resolve("puppeteer-core");
@@ -197,31 +193,31 @@ async function check() {
   await clicked(page);
   await shown(page);
   const told = { address, expect, picture, pause, run, folder, open, size: SIZE, own, settled, serveJob };
-  await tools.colored(page, told);
-  await tools.asked(page, told);
-  await curved(page, told);
-  await tracked(page, told);
-  await tools.linked(page, told);
-  await tools.framed(page, told);
+  await looks.colored(page, told);
+  await looks.asked(page, told);
+  await looks.curved(page, told);
+  await looks.tracked(page, told);
+  await looks.linked(page, told);
+  await looks.framed(page, told);
   await touched(page);
   await flown(page);
-  await tools.linked(page, told);
-  await tools.paced(page, { ...told, start, isIdle: values.idle });
-  await tools.begun(page, told);
-  await turned(page, told);
-  await draped({ ...told, browser, program: values.tiefort, scratch, middle });
+  await looks.linked(page, told);
+  await looks.paced(page, { ...told, start, isIdle: values.idle });
+  await looks.begun(page, told);
+  await looks.turned(page, told);
+  await looks.draped({ ...told, browser, program: values.tiefort, scratch, middle });
   if (0 < own.decks.length) await bridged(page);
   expect(failed.length === 0, `every answer was whole ${failed.slice(0, 3)}`);
   const isOurs = (url) => url.startsWith(address) || url === "about:blank" || url.startsWith("data:");
   expect(wanted.every(isOurs), "nothing else was asked");
   // It asks another server.
-  if (!positionals[0]) await housed(page, told);
+  if (!positionals[0]) await looks.housed(page, told);
   expect(said.length === 0, `no error in the console ${said.slice(0, 3)}`);
 }
 
 async function open(page, start, of = address) {
   await page.goto(`${of}?${start}`, { timeout: 120_000 });
-  await until(page, "window.tiefort !== undefined");
+  await looks.until(page, "window.tiefort !== undefined");
   await settled(page);
 }
 
@@ -231,7 +227,7 @@ function state(page) {
 
 /** Waits until all that is wanted is there, and two pictures more. */
 async function settled(page) {
-  await until(page, () => {
+  await looks.until(page, () => {
     const { block, modules, waiting, height, fault, lit } = window.tiefort.state();
     const wanted = (block[2] - block[0]) * (block[3] - block[1]);
     return fault !== null || (lit && height !== null && waiting === 0 && modules === wanted);
@@ -321,7 +317,7 @@ async function drive(page, metres) {
   }
   await page.keyboard.up("ShiftLeft");
   await page.keyboard.up("KeyW");
-  await until(page, "window.tiefort.state().speed === 0", 60_000);
+  await looks.until(page, "window.tiefort.state().speed === 0", 60_000);
   const after = await state(page);
   const gone = Math.hypot(after.east - before.east, after.north - before.north);
   const frame = frames.sort((a, b) => a - b)[Math.floor(frames.length / 2)];
@@ -355,7 +351,7 @@ async function shown(page) {
   await picture(page, "without-edges");
   await page.keyboard.press("KeyG");
   const isRead = () => !document.getElementById("note").textContent.startsWith("reading");
-  await until(page, isRead);
+  await looks.until(page, isRead);
   const { showsDem } = await state(page);
   const note = await page.$eval("#note", (box) => box.textContent);
   expect(showsDem || note.includes("not at hand"), showsDem ? "the DEM is shown" : `no DEM, and told so: ${note}`);
@@ -414,7 +410,7 @@ async function bridged(page) {
   await picture(page, "on-deck");
   const far = Math.min(150, 0.2 * long.length);
   await page.keyboard.down("KeyW");
-  await until(page, `${far} < window.tiefort.state().driven`);
+  await looks.until(page, `${far} < window.tiefort.state().driven`);
   const along = await state(page);
   await page.keyboard.up("KeyW");
   // On a slow machine it has driven past the end of a short one before it is asked.

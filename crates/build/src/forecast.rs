@@ -2,7 +2,7 @@
 //!
 //! The rates are those of one core of a server of 2023: the seconds of processor time of one stage, or the bytes at
 //! its peak, divided by what it goes by. The builds they were measured on have 2501, 5001, 10,001 and 20,001 posts a
-//! side of the sample terrain in tiles of 17 x 17 load modules (`scripts/bench_size.py`); two GeoTIFFs of real terrain,
+//! side of the sample terrain in tiles of 17 x 17 load modules (`scripts/bench.py size`); two GeoTIFFs of real terrain,
 //! one in the area's own system and one in degrees; and `configs/paper.toml`. The forecast of each was within a factor
 //! of 1.5 of what it took. Other machines differ in time, and jobs that end at a residual take less than their budget.
 

@@ -6,7 +6,7 @@
  *
  * Most damaged files have their checksums made right again, so that what lies behind them is reached. A round that
  * ends the process, takes longer than a few seconds, or breaks a promise of the header, prints its number; with this
- * number as FIRST and LAST it is repeated, and its files lie in WORK/modules. scripts/fuzz_c.sh builds and runs this.
+ * number as FIRST and LAST it is repeated, and its files lie in WORK/modules. scripts/fuzz.sh c builds and runs this.
  */
 #include "load_module_reader.h"
 

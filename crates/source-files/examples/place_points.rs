@@ -1,4 +1,4 @@
-//! Places points of WGS 84 in another coordinate system, for comparison with PROJ (`scripts/compare_crs.py`).
+//! Places points of WGS 84 in another coordinate system, for comparison with PROJ (`scripts/compare.py crs`).
 //!
 //! `place_points SYSTEM` reads lines of longitude and latitude from stdin and writes lines of two coordinates, and
 //! those brought back to longitude and latitude. SYSTEM is `EPSG:CODE`, well-known text, or the path of a raster.

@@ -1,4 +1,4 @@
-//! Prints what the reader makes of a raster, for comparison with another (`scripts/compare_sources.py`).
+//! Prints what the reader makes of a raster, for comparison with another (`scripts/compare.py sources`).
 //!
 //! `read_posts FILE [EPSG:CODE]` writes one line of facts to stderr and every sample to stdout: 64-bit floats,
 //! little-endian, northern row first as files have it, NaN where void. A refusal is a line that begins with `refused:`.

@@ -1,4 +1,4 @@
-//! Resamples rasters onto a grid, for comparison with GDAL's warp (`scripts/compare_warp.py`).
+//! Resamples rasters onto a grid, for comparison with GDAL's warp (`scripts/compare.py warp`).
 //!
 //! `resample_posts bilinear|cubic EPSG EAST NORTH COLS ROWS SPACING FILE…` writes the heights to stdout: 32-bit floats,
 //! little-endian, northern row first, NaN where there is none; and the seconds to read and to resample to stderr.

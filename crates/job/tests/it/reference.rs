@@ -18,7 +18,7 @@ A key that is not listed here is an error.
 
 Costs were measured on the desert of `tests/jobs/desert.toml` (1021 x 1021 posts, 83,000 triangles), those given as a \
 range on several areas; a residual is compared with that of the word that holds where the key is left out.
-Residuals of the efforts and of the paper's method are those of the second table that `scripts/bench_fidelity.py \
+Residuals of the efforts and of the paper's method are those of the second table that `scripts/bench.py fidelity \
 --quick --book` writes, which [Figures](../figures/README.md#how-near-to-the-ground-at-equal-triangles) shows.
 What each effort costs and gains on other areas, in residual, lines of sight, thin triangles and processor time, is in \
 [Figures](../figures/README.md#what-each-effort-costs-and-gains).

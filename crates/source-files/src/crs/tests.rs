@@ -1,4 +1,4 @@
-//! A few figures computed by PROJ 9.5.1; a thousand places of each system are compared by `scripts/compare_crs.py`.
+//! A few figures computed by PROJ 9.5.1; a thousand places of each system are compared by `scripts/compare.py crs`.
 
 use super::*;
 

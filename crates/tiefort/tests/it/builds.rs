@@ -124,7 +124,7 @@ fn peak_bytes(process: u32) -> Option<u64> {
 
 #[test]
 fn a_forecast_is_near_what_a_build_takes() {
-    // Within 1.5 on a quiet machine, as `scripts/bench_size.py` measures it; this holds the order of size.
+    // Within 1.5 on a quiet machine, as `scripts/bench.py size` measures it; this holds the order of size.
     const FACTOR: f64 = 2.0;
     for size in ["4000, 4000", "24000, 24000"] {
         let scene = Scene::with_job(

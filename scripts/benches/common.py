@@ -1,24 +1,38 @@
-"""What the fidelity benchmark works with: a Python with its packages, its C++ programs, files, runs, tables."""
+"""What benches share: a Python with packages, C++ programs, files, runs, tables, and what the book shows."""
 
+import argparse
 import contextlib
 import hashlib
+import inspect
 import json
 import os
 import pathlib
+import re
 import shutil
 import struct
 import subprocess
 import sys
 import venv
 
-from bench import LAUNCHER, ROOT
-
+ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
+FIGURES = ROOT / "docs" / "figures" / "README.md"
 TARGET = pathlib.Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
-FOLDER = TARGET / "bench" / "fidelity"
+FOLDER = TARGET / "bench"
 VENV = FOLDER / "venv"
 PACKAGES = ["pydelatin==0.4.0", "numpy", "rasterio"]
 SOURCES = pathlib.Path(__file__).resolve().parent
 DATA = pathlib.Path(os.environ.get("TIEFORT_DATA", ROOT / ".." / "shared" / "data")).resolve()
+
+# A process of its own, small, so that the peak it reports is its child's and not that of our arrays.
+LAUNCHER = """
+import json, resource, subprocess, sys, time
+start = time.perf_counter()
+done = subprocess.run(sys.argv[1:], capture_output=True, text=True)
+wall_s = time.perf_counter() - start
+used = resource.getrusage(resource.RUSAGE_CHILDREN)
+json.dump({"code": done.returncode, "out": done.stdout, "err": done.stderr, "wall_s": wall_s,
+           "cpu_s": used.ru_utime + used.ru_stime, "peak_mb": used.ru_maxrss * 1024 / 1e6}, sys.stdout)
+"""
 
 
 def tell(text):
@@ -33,15 +47,38 @@ def skip(what, why):
 # --- programs ---
 
 
-def prepare_venv():
+def parser_of(bench):
+    """A parser of the arguments of a bench, whose documentation tells what it measures; `--tiefort` names a program."""
+    parser = argparse.ArgumentParser(prog=f"bench.py {bench.__name__}", description=inspect.cleandoc(bench.__doc__),
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--tiefort", metavar="PATH", type=pathlib.Path, default=TARGET / "release" / "tiefort",
+                        help="the program to measure (default: target/release/tiefort, built if it is missing)")
+    return parser
+
+
+def program(options):
+    """The program to measure."""
+    if options.tiefort == TARGET / "release" / "tiefort" and not options.tiefort.exists():
+        subprocess.run(["cargo", "build", "--release", "-p", "tiefort"], cwd=ROOT, check=True)
+    return options.tiefort.resolve(strict=True)
+
+
+def load():
+    """How busy the machine is, over 1, 5 and 15 minutes."""
+    return ", ".join(f"{load:.2f}" for load in os.getloadavg())
+
+
+def prepare_venv(*more):
     """Installs the packages, and goes on in the Python that has them."""
     if pathlib.Path(sys.prefix) == VENV:
         return
     python = VENV / ("Scripts" if os.name == "nt" else "bin") / "python"
     if not python.exists():
         venv.create(VENV, with_pip=True)
-    subprocess.run([python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", *PACKAGES], check=True)
-    sys.exit(subprocess.run([python, *sys.argv]).returncode)
+    subprocess.run([python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", *PACKAGES, *more],
+                   check=True)
+    sys.stdout.flush()
+    sys.exit(subprocess.run([python, *sys.orig_argv[1:]]).returncode)
 
 
 def compiled(name, *flags):
@@ -159,3 +196,11 @@ def markdown(title, head, rows):
     ]
     rule = "| " + " | ".join(["-" * widths[0], *("-" * (w - 1) + ":" for w in widths[1:])]) + " |"
     print("\n".join([f"\n### {title}\n", padded[0], rule, *padded[1:]]), flush=True)
+
+
+def put(page, name, text):
+    """Replaces the figures of that name on a page; `text` is Markdown."""
+    places = re.compile(rf"(<!-- figures: {re.escape(name)}, [^\n]*-->\n).*?(<!-- end of figures -->)", re.DOTALL)
+    after, count = places.subn(lambda found: f"{found[1]}\n{text.strip()}\n\n{found[2]}", page.read_text())
+    assert count == 1, f"{page}: found {count} places for the figures {name}, expected one"
+    page.write_text(after)

@@ -1,32 +1,21 @@
-#!/usr/bin/env python3
-"""Measure roads, rivers and lakes in real ground: what they cost, how true they are, and what the rest of it loses.
+"""Roads, rivers and lakes: what they cost in real ground, as a network grows, and in one load module."""
 
-    scripts/bench_features.py                   every extract that is there
-    scripts/bench_features.py --only baja       those whose name has this in it
-    scripts/bench_features.py --json all.json   every figure, for a program
-
-Each extract is built twice, from the job that `tiefort init` writes for its DEM and vectors: once as it is, and once
-without features and with as many triangles as the first build left beside them. Both surfaces are read from the
-load-module files by scripts/read_slm.py and compared with the DEM as rasterio resamples it, at the posts that lie
-60 m or more from every feature; nothing of the compiler takes part. Also counted from the files alone: triangles of
-load modules and of 4 km squares against their limits.
-
-The table has a row for each check of the report, and the ratio of both RMS residuals. Exit code 1 when a check fails
-or the ratio of an extract marked * is above 1.05. Missing data is skipped loudly.
-"""
-
-import argparse
+import array
 import json
 import math
 import os
 import pathlib
+import random
+import resource
 import struct
+import subprocess
 import sys
+import tempfile
+import time
 import tomllib
 
-from bench import ROOT
-from fidelity.areas import toml
-from fidelity.workshop import DATA, FOLDER, markdown, prepare_venv, run, scratch, skip, tell, why
+from benches.areas import toml
+from benches.common import DATA, FOLDER, markdown, parser_of, prepare_venv, program, run, scratch, skip, tell, why
 
 VECTORS = DATA / "vectors"
 # Name, DEM, vectors, kinds of them where their file does not say, whether the ratio of RMS residuals is a bar.
@@ -48,7 +37,22 @@ ASIDE_M = 60
 MODULE_M = 500
 
 
-def main():
+def features():
+    """Measure roads, rivers and lakes in real ground: what they cost, how true they are, and what the rest of it loses.
+
+        scripts/bench.py features                   every extract that is there
+        scripts/bench.py features --only baja       those whose name has this in it
+        scripts/bench.py features --json all.json   every figure, for a program
+
+    Each extract is built twice, from the job that `tiefort init` writes for its DEM and vectors: once as it is, and
+    once without features and with as many triangles as the first build left beside them. Both surfaces are read from
+    the load-module files by scripts/read_slm.py and compared with the DEM as rasterio resamples it, at the posts that
+    lie 60 m or more from every feature; nothing of the compiler takes part. Also counted from the files alone:
+    triangles of load modules and of 4 km squares against their limits.
+
+    The table has a row for each check of the report, and the ratio of both RMS residuals. Exit code 1 when a check
+    fails or the ratio of an extract marked * is above 1.05. Missing data is skipped loudly.
+    """
     options = parsed()
     prepare_venv()
     results, failed = {}, False
@@ -61,7 +65,7 @@ def main():
             skip(name, f"no {missing[0]}")
             continue
         tell(f"{name}…")
-        result = measured(options.tiefort, name, files, kinds)
+        result = measured(program(options), name, files, kinds)
         if result is None:
             failed = True
             continue
@@ -74,8 +78,7 @@ def main():
 
 
 def parsed():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--tiefort", default=ROOT / "target" / "release" / "tiefort", help="the program")
+    parser = parser_of(features)
     parser.add_argument("--only", help="extracts whose name has this in it")
     parser.add_argument("--json", help="a file for every figure")
     return parser.parse_args()
@@ -297,5 +300,162 @@ def show(results):
     markdown("Roads, rivers and lakes in real ground", head, rows)
 
 
-if __name__ == "__main__":
-    sys.exit(main())
+# --- a network that grows ---
+
+
+LENGTH_KM, STEP_KM, TILE_KM = 1000, 20, 10
+ORIGIN_M = (500000, 3900000)
+CLASSES = ["motorway", "primary", "residential", "track"]
+BATCH = 200
+
+
+def scale():
+    """Measure the stages `profile` and `level` on strips of a road grid over 1000 km: time and memory as it grows.
+
+        scripts/bench.py scale             strips of 25, 50 and 100 km
+        scripts/bench.py scale 25 50       strips of so many kilometres
+
+    Roads run every 20 km both ways, of four classes, over the built-in terrain at 25 m: 100,000 km of them over 1000
+    km x 1000 km. Each strip is 1000 km long; both stages run as units of work (`tiefort task`). The last row is the
+    whole, by the straight line through the last two strips.
+    """
+    parser = parser_of(scale)
+    parser.add_argument("km", nargs="*", type=int, default=[25, 50, 100], help="widths of strips")
+    options = parser.parse_args()
+    strips = [strip(program(options), width) for width in options.km]
+    rows = [list(map(float, strip)) for strip in strips]
+    if 1 < len(rows):
+        before, last = rows[-2:]
+        share = (LENGTH_KM - last[0]) / (last[0] - before[0])
+        rows.append([b + (b - a) * share for a, b in zip(before, last)])
+    head = ["strip km", "roads km", "profile s", "MB", "level s", "MB"]
+    cells = [[f"{row[0]:.0f}", *(f"{number:,.1f}" for number in row[1:])] for row in rows]
+    markdown("A grid of roads, 1000 km long", head, cells)
+
+
+def strip(tiefort, width_km):
+    """Width, kilometres of road, and seconds and megabytes of both stages."""
+    with scratch("feature-scale") as folder:
+        folder.mkdir(parents=True)
+        roads_km = write_grid(folder / "roads.geojson", width_km)
+        rows = math.ceil(width_km / TILE_KM)
+        job = folder / "strip.toml"
+        job.write_text(
+            f'[area]\nname = "strip"\ncrs = "EPSG:32611"\norigin_m = {list(ORIGIN_M)}\n'
+            f"size_m = [{LENGTH_KM * 1000}, {width_km * 1000}]\nspacing_m = 25\n"
+            f'[dem]\nsource = "sample"\n[features]\nsources = ["roads.geojson"]\n'
+            f"[tiles]\ncolumns = {LENGTH_KM // TILE_KM}\nrows = {rows}\n"
+        )
+        tiles = [f"{row},{column}" for row in range(rows) for column in range(LENGTH_KM // TILE_KM)]
+        found = [width_km, roads_km]
+        for stage, units in (("profile", tiles), ("level", [])):
+            tell(f"{stage} of {width_km} km")
+            seconds, peak_mb = 0.0, 0.0
+            for at in range(0, max(len(units), 1), BATCH):
+                ran = run(tiefort, "task", job, stage, *units[at : at + BATCH], "--out", folder / "strip.tdb")
+                if ran["code"] != 0:
+                    sys.exit(why(ran))
+                seconds, peak_mb = seconds + ran["wall_s"], max(peak_mb, ran["peak_mb"])
+            found += [seconds, peak_mb]
+        return found
+
+
+def write_grid(path, width_km):
+    """A grid of winding roads as GeoJSON; returns how many kilometres they are."""
+    lines = []
+    for across, length, count in ((True, width_km, LENGTH_KM // STEP_KM), (False, LENGTH_KM, width_km // STEP_KM + 1)):
+        for number in range(count):
+            middle = (number + 0.5) * STEP_KM * 1000
+            if not across and width_km * 1000 < middle:
+                continue
+            line = [(t, middle + 300 * math.sin(t / 900 + number)) for t in range(0, length * 1000 + 1, 200)]
+            lines.append([(aside, t) if across else (t, aside) for t, aside in line])
+    features = [
+        {
+            "type": "Feature",
+            "properties": {"highway": CLASSES[number % len(CLASSES)]},
+            "geometry": {
+                "type": "LineString",
+                "coordinates": [[round(ORIGIN_M[0] + x, 2), round(ORIGIN_M[1] + y, 2)] for x, y in line],
+            },
+        }
+        for number, line in enumerate(lines)
+    ]
+    crs = {"type": "name", "properties": {"name": "EPSG:32611"}}
+    path.write_text(json.dumps({"type": "FeatureCollection", "crs": crs, "features": features}))
+    return sum(math.dist(a, b) for line in lines for a, b in zip(line, line[1:])) / 1000
+
+
+# --- all roads in one load module ---
+
+
+CROWD_ORIGIN = (505000.0, 3875000.0)
+SEGMENTS_PER_ROAD = 10
+CROWD_JOB = """[area]
+name = "crowd"
+crs = "EPSG:32611"
+origin_m = [505000.0, 3875000.0]
+size_m = [2000, 2000]
+spacing_m = 25
+[dem]
+source = "sample"
+seed = 1
+[tiles]
+rows = 2
+columns = 2
+[features]
+sources = ["roads.shp"]
+"""
+
+
+def write_roads(folder: pathlib.Path, segments: int) -> int:
+    """Tracks that wander about in one square of 500 m, as a Shapefile; gives how many there are."""
+    random.seed(1)
+    roads, words = max(1, segments // SEGMENTS_PER_ROAD), 50
+    bounds = struct.pack("<4d", *CROWD_ORIGIN, CROWD_ORIGIN[0] + 2000, CROWD_ORIGIN[1] + 2000)
+    with open(folder / "roads.shp", "wb") as file:
+        file.write(bytes(100))
+        for road in range(roads):
+            x, y = random.random() * 500, random.random() * 500
+            places = array.array("d")
+            for _ in range(SEGMENTS_PER_ROAD + 1):
+                x = min(max(x + random.uniform(-15, 15), 0), 500)
+                y = min(max(y + random.uniform(-15, 15), 0), 500)
+                places.extend((CROWD_ORIGIN[0] + 500 + x, CROWD_ORIGIN[1] + 500 + y))
+            content = struct.pack("<i", 3) + bounds + struct.pack("<iii", 1, len(places) // 2, 0) + places.tobytes()
+            file.write(struct.pack(">ii", road + 1, len(content) // 2) + content)
+            words += 4 + len(content) // 2
+        file.seek(0)
+        file.write(struct.pack(">i5ii", 9994, 0, 0, 0, 0, 0, words) + struct.pack("<ii", 1000, 3) + bounds + bytes(32))
+    field = b"highway\0\0\0\0C" + bytes(4) + bytes([10, 0]) + bytes(14) + b"\r"
+    header = struct.pack("<BBBBIHH20x", 3, 26, 1, 1, roads, 65, 11) + field
+    (folder / "roads.dbf").write_bytes(header + b" track     " * roads + b"\x1a")
+    return roads
+
+
+def crowd():
+    """Builds a job whose roads all lie in one load module, and tells what that took: time, memory, what became of them.
+
+        scripts/bench.py crowd [SEGMENTS]      1,000,000 by default
+
+    Whatever is drawn, the build has to end, within its limits, and to tell of every road.
+    """
+    parser = parser_of(crowd)
+    parser.add_argument("segments", nargs="?", type=int, default=1_000_000)
+    options = parser.parse_args()
+    tiefort, segments = program(options), options.segments
+    with tempfile.TemporaryDirectory() as name:
+        folder = pathlib.Path(name)
+        (folder / "job.toml").write_text(CROWD_JOB)
+        roads = write_roads(folder, segments)
+        command = [tiefort, "build", "job.toml", "--out", "out.tdb", "--no-html", "--quiet"]
+        began = time.monotonic()
+        subprocess.run(command, cwd=folder, check=True)
+        seconds = time.monotonic() - began
+        used = resource.getrusage(resource.RUSAGE_CHILDREN)
+        report = json.loads((folder / "out.tdb/report.json").read_text())
+        told = report["features"]["remarks"]
+        print(f"{segments} segments of {roads} roads: {seconds:.1f} s, {used.ru_utime + used.ru_stime:.1f} s of CPU, "
+              f"{used.ru_maxrss / 1024:.0f} MB; {told}; {len(report['breaches'])} breaches")
+        assert not report["breaches"], "no limit may be exceeded"
+        subprocess.run([tiefort, "verify", "out.tdb"], cwd=folder, check=True)

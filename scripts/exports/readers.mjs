@@ -1,19 +1,40 @@
-// Loads the exports for globes in CesiumJS, in a headless Chromium, and compares heights with given places.
+// Readers of exports that are not ours. Run it where `npm install` has put what check_exports.py names.
 //
-//   node cesium.mjs --terrain DIR --tileset DIR --places places.json [--pictures DIR] [--chromium /usr/bin/chromium]
-//   node cesium.mjs --terrain http://…/NAME --tileset http://…/NAME --places places.json
+//   node readers.mjs gltf FILE.glb…
+//   node readers.mjs --terrain DIR --tileset DIR --places places.json [--pictures DIR] [--chromium /usr/bin/chromium]
+//   node readers.mjs --terrain http://…/NAME --tileset http://…/NAME --places places.json
 //
-// The second form loads them from `tiefort serve --cors '*'`, as a page of another origin does.
-// places.json: [[longitude, latitude, height above the ellipsoid], …] of the compiled surface. Run it where `npm
-// install` has put cesium and puppeteer-core. Exit code 0 when everything agrees.
+// The first form validates glTF by Khronos' validator: no error and no warning may be found. The others load what is
+// for globes in CesiumJS, in a headless Chromium, and compare heights with given places; the last one loads it from
+// `tiefort serve --cors '*'`, as a page of another origin does.
+// places.json: [[longitude, latitude, height above the ellipsoid], …] of the compiled surface. Exit code 0 when
+// everything agrees.
 import { createServer } from "node:http";
 import { mkdtempSync, readFileSync, rmSync } from "node:fs";
 import { createRequire } from "node:module";
 import { tmpdir } from "node:os";
 import { dirname, extname, join, normalize } from "node:path";
 import { parseArgs } from "node:util";
-import puppeteer from "puppeteer-core";
 
+if (process.argv[2] === "gltf") process.exit((await validated(process.argv.slice(3))) === 0 ? 0 : 1);
+
+async function validated(paths) {
+  const { default: validator } = await import("gltf-validator");
+  let faults = 0;
+  for (const path of paths) {
+    const report = await validator.validateBytes(new Uint8Array(readFileSync(path)), { maxIssues: 20 });
+    const { numErrors, numWarnings, numInfos, numHints, messages } = report.issues;
+    faults += numErrors + numWarnings;
+    if (0 < numErrors + numWarnings || paths.length <= 2) {
+      console.log(`${path}: ${numErrors} errors, ${numWarnings} warnings, ${numInfos} infos, ${numHints} hints`);
+      messages.filter((message) => message.severity <= 1).forEach((message) => console.log("  ", message));
+    }
+  }
+  console.log(`${paths.length} files, ${faults} errors and warnings`);
+  return faults;
+}
+
+const { default: puppeteer } = await import("puppeteer-core");
 const { values } = parseArgs({
   options: {
     terrain: { type: "string" },

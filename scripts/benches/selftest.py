@@ -1,17 +1,10 @@
-#!/usr/bin/env python3
-"""Holds the evaluator against meshes that are right, and against ones broken on purpose.
-
-    python3 scripts/fidelity/selftest.py
-
-Needs g++ and nothing else. Exits with 1 when the evaluator misses a fault or sees one that is not there.
-"""
+"""Holds the evaluator against meshes that are right, and against ones broken on purpose."""
 
 import array
 import json
 import pathlib
 import struct
 import subprocess
-import sys
 import tempfile
 
 SIDE = 9  # posts
@@ -182,7 +175,11 @@ def plane(column, row):
     return south_west + (other - south_west) * north + (north_east - other) * east
 
 
-def main():
+def selftest():
+    """Holds the evaluator of benches against meshes that are right, and against ones broken on purpose.
+
+    Needs g++ and nothing else. Exits with 1 when the evaluator misses a fault or sees one that is not there.
+    """
     with tempfile.TemporaryDirectory() as folder:
         tester = Tester(pathlib.Path(folder))
         tester.right_meshes()
@@ -190,7 +187,3 @@ def main():
         tester.unreadable_files()
     print("the evaluator is as it should be" if not tester.failed else f"{tester.failed} failed")
     return 1 if tester.failed else 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())
