@@ -24,7 +24,9 @@ def sealed(part):
 
 
 def worked_example(page, version):
-    block = page.split("```hex\n")[version].split("```")[0]
+    """The bytes of an example: of version 1 on the page, of versions 2 and 3 in files beside it."""
+    path = [page, page.parent / "format" / "deck.hex", page.parent / "format" / "lines.hex"][version - 1]
+    block = path.read_text().split("```hex\n")[-1].split("```")[0]
     words = (line.split("|")[0].split()[1:] for line in block.splitlines())
     return bytes(int(word, 16) for line in words for word in line)
 
@@ -96,7 +98,7 @@ def main():
         return
     page = pathlib.Path(sys.argv[1])
     for version, name in ((1, "levels"), (2, "decks"), (3, "lines")):
-        example = worked_example(page.read_text(), version)
+        example = worked_example(page, version)
         assert with_levels(example, 1) == example, "one level is the example itself"
         for count in range(1, 9):
             (folder / f"{name}-{count}.slm").write_bytes(with_levels(example, count))

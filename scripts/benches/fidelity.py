@@ -8,7 +8,7 @@ import time
 
 from benches import areas
 from benches.areas import EFFORT_HEAD, EFFORT_ROWS, best_paper, effort_cells
-from benches.common import (FIGURES, FOLDER, ROOT, compiled, digest, evaluate, faults, lindstrom_turk, load, markdown,
+from benches.common import (FIGURES, FOLDER, compiled, digest, evaluate, faults, lindstrom_turk, load, markdown,
                             number, parser_of, prepare_venv, program, put, ratio, run, skip, tell, why, write_mesh)
 
 # Short runs are repeated until they took so long together, or so often.
@@ -273,7 +273,7 @@ def efforts(jobs):
         yield f"{name}: angles below 5 degrees of normal, %, at most as before", thin[0], thin[1], False
 
 
-# --- what README and the book show ---
+# --- what the book shows ---
 
 
 # Rows of a raster and of an area as they are called there, and as they are called here.
@@ -313,19 +313,6 @@ def of_area(name, results):
     return text
 
 
-def of_readme(results):
-    """The regular grid, the paper's method and the program as it is by default, in three columns."""
-    clipped = min((found for key, found in results.items() if key.startswith("paper + clip")),
-                  key=lambda found: found["rms_m"])
-    rows = {"regular grid of 125 m": results["regular grid"], "the founding paper's method": clipped,
-            "tiefort": results["normal, sight"]}
-    text = "| the same desert of 25 km, 32 triangles a load module | RMS residual | lines of sight kept |\n"
-    text += "| - | -: | -: |\n"
-    for name, found in rows.items():
-        text += f"| {name} | {found['rms_m']:.3f} m | {100 * found['judged']['sight']['agreement']:.1f} % |\n"
-    return text
-
-
 def of_efforts(areas):
     """What each effort costs and gains, area after area."""
     text = ""
@@ -346,7 +333,6 @@ def write_book(results):
     raster = [found for name, found in results["rasters"].items() if name.startswith("desert-window")][-1]
     text = of_raster(raster) + "\n" + "\n".join(of_area(*item) for item in results["areas"].items())
     put(FIGURES, "fidelity", text)
-    put(ROOT / "README.md", "headline", of_readme(results["areas"]["desert"]))
 
 
 # --- start ---
@@ -361,7 +347,7 @@ def arguments():
     parser.add_argument("--reuse-peer", action="store_true", help="keep what Lindstrom-Turk made and took earlier")
     parser.add_argument("--json", type=pathlib.Path, metavar="FILE", help="also write every figure here")
     parser.add_argument("--book", action="store_true",
-                        help="also put the figures of the desert into README and the book")
+                        help="also put the figures of the desert into the book")
     parser.add_argument("--before", type=pathlib.Path, metavar="PROGRAM", help="an earlier program, for table 4")
     return parser.parse_args()
 
@@ -374,7 +360,7 @@ def fidelity():
         scripts/bench.py fidelity --large          Lindstrom-Turk on large rasters too: minutes, a gigabyte
         scripts/bench.py fidelity --only desert    inputs and jobs whose name has this in it
         scripts/bench.py fidelity --json all.json  every figure, for a program
-        scripts/bench.py fidelity --quick --book   put the figures of the desert into README and the book
+        scripts/bench.py fidelity --quick --book   put the figures of the desert into the book
         scripts/bench.py fidelity --tables 4 --book                put what each effort costs and gains into the book
         scripts/bench.py fidelity --tables 4 --before PROGRAM      hold it against an earlier program, too
 

@@ -67,8 +67,9 @@ fn with_objects() -> Vec<u8> {
 }
 
 fn example_of_version(version: usize) -> Vec<u8> {
-    let text = include_str!("../../../docs/FORMAT.md");
-    let hex = text.split("```hex").nth(version).unwrap().split("```").next().unwrap();
+    let page = include_str!("../../../docs/FORMAT.md").split("```hex").nth(1).unwrap().split("```").next().unwrap();
+    let (deck, lines) = (include_str!("../../../docs/format/deck.hex"), include_str!("../../../docs/format/lines.hex"));
+    let hex = [page, deck, lines][version - 1];
     let lines = hex.lines().filter_map(|line| line.split('|').next());
     // The first number of a line is its offset.
     lines.flat_map(|line| line.split_whitespace().skip(1)).map(|byte| u8::from_str_radix(byte, 16).unwrap()).collect()

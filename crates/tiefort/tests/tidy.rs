@@ -540,25 +540,6 @@ fn programs_that_documents_name_exist() {
     expect_none(faults);
 }
 
-#[test]
-fn every_decision_stands_in_the_index_under_its_number() {
-    let folder = root().join("docs/decisions");
-    let index = fs::read_to_string(folder.join("README.md")).unwrap();
-    let mut faults = Vec::new();
-    let names = fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
-    let mut names: Vec<String> = names.filter(|name| name != "README.md").collect();
-    names.sort();
-    for (name, number) in names.iter().zip(1..) {
-        let page = fs::read_to_string(folder.join(name)).unwrap();
-        let title = page.lines().next().unwrap_or_default().trim_start_matches("# ");
-        let row = format!("- [{number:04}]({name}) {title}");
-        if index.lines().filter(|line| *line == row).count() != 1 {
-            faults.push(format!("docs/decisions/README.md: found no line of its own `{row}`"));
-        }
-    }
-    expect_none(faults);
-}
-
 /// A line without its comment.
 fn code_of(line: &str) -> &str {
     line.split("//").next().unwrap_or_default()
