@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use load_module_reader::{
-    Area, Block, Curvature, HOLE_CLASS, Keep, LoadedGround, ProfilePoint, QUANTA_PER_METRE, ReadError, Sight,
+    Area, Block, Curvature, HOLE_CLASS, Hider, Keep, LoadedGround, PastObjects, ProfilePoint, QUANTA_PER_METRE,
+    ReadError, Sight, Standing,
 };
 use numpy::{PyArray1, PyArray2, PyReadonlyArray2};
 use pyo3::prelude::*;
@@ -123,13 +124,25 @@ fn runs_from_one_eye<'a>(
     })
 }
 
-fn hidden_at(ground: &LoadedGround, line: &[f64; 6]) -> f64 {
-    let [from, to] = ends(line);
-    match ground.sight(from, to) {
-        Sight::Free => FREE,
-        Sight::Hidden(share) => share,
-        Sight::Unknown => f64::NAN,
+/// Which objects a word stands for.
+fn standing(py: Python<'_>, word: &str) -> PyResult<Standing> {
+    match word {
+        "none" => Ok(Standing::None),
+        "buildings" => Ok(Standing::Buildings),
+        "all" => Ok(Standing::All),
+        _ => {
+            let message = format!("objects: found {word:?}, expected none, buildings or all");
+            Err(named(py, "RequestError", &message, "what stands on the ground and is looked at"))
+        }
     }
+}
+
+/// What hides, by its place among these, and none behind them.
+const HIDERS: [Hider; 5] = [Hider::Ground, Hider::Deck, Hider::Building, Hider::Wood, Hider::Row];
+
+fn number_of(hider: Option<Hider>) -> f64 {
+    let found = hider.and_then(|hider| HIDERS.iter().position(|other| *other == hider));
+    found.unwrap_or(HIDERS.len()) as f64
 }
 
 /// Heights at places: at places far apart load module by load module, since each then stays in the processor's cache.
@@ -255,15 +268,21 @@ impl Ground {
 
     /// Whether each line, six numbers from an eye to a target, meets nothing and stays on the ground: lines from one
     /// eye, one after the other, take less time.
-    fn seen<'py>(&self, py: Python<'py>, lines: PyReadonlyArray2<'py, f64>) -> PyResult<Bound<'py, PyArray1<bool>>> {
+    fn seen<'py>(
+        &self,
+        py: Python<'py>,
+        lines: PyReadonlyArray2<'py, f64>,
+        objects: &str,
+    ) -> PyResult<Bound<'py, PyArray1<bool>>> {
+        let past = PastObjects { standing: standing(py, objects)?, ..PastObjects::all(Curvature::NONE) };
         let each = |ground: &LoadedGround, lines: &[[f64; 6]], seen: &mut [bool]| {
             for (lines, seen) in runs_from_one_eye(lines, seen) {
                 let mut eye = (EYE_LINES_MIN <= lines.len()).then(|| ground.eye(ends(&lines[0])[0], Curvature::NONE));
                 for (line, seen) in lines.iter().zip(seen) {
                     let [from, to] = ends(line);
                     *seen = match &mut eye {
-                        Some(eye) => eye.sees(to),
-                        None => ground.sight(from, to) == Sight::Free,
+                        Some(eye) => eye.sees(to) && past.least <= eye.light(to, past.standing),
+                        None => ground.sight_past(from, to, &past).sight == Sight::Free,
                     };
                 }
             }
@@ -293,20 +312,84 @@ impl Ground {
     }
 
     /// How far along each line something hides the rest, 2 where nothing does and not a number where the line leaves
-    /// the ground first; and how far the line stays above the ground at least.
-    fn sights<'py>(&self, py: Python<'py>, lines: PyReadonlyArray2<'py, f64>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let each = |ground: &LoadedGround, lines: &[[f64; 6]], sights: &mut [[f64; 2]]| {
-            let has_decks = ground.modules().iter().any(|module| !module.module().decks.is_empty());
+    /// the ground first; how far the line stays above the ground at least; the share of light that woods leave; and
+    /// what hides, by its place in `hiders`.
+    fn sights<'py>(
+        &self,
+        py: Python<'py>,
+        lines: PyReadonlyArray2<'py, f64>,
+        objects: &str,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let past = PastObjects { standing: standing(py, objects)?, ..PastObjects::all(Curvature::NONE) };
+        let each = |ground: &LoadedGround, lines: &[[f64; 6]], sights: &mut [[f64; 4]]| {
+            let is_bare = ground.modules().iter().all(|module| {
+                let module = module.module();
+                module.decks.is_empty() && (past.standing == Standing::None || module.objects.is_empty())
+            });
             for (sight, line) in sights.iter_mut().zip(lines) {
                 let [from, to] = ends(line);
                 let clearance_m = ground.clearance_m(from, to);
                 // What never comes below the ground is seen: both questions look at the same crossings.
-                let is_free = !has_decks && clearance_m.is_some_and(|metres| 0.0 <= metres);
-                let share = if is_free { FREE } else { hidden_at(ground, line) };
-                *sight = [share, clearance_m.unwrap_or(f64::NAN)];
+                *sight = if is_bare && clearance_m.is_some_and(|metres| 0.0 <= metres) {
+                    [FREE, clearance_m.unwrap_or(f64::NAN), 1.0, number_of(None)]
+                } else {
+                    let found = ground.sight_past(from, to, &past);
+                    let share = match found.sight {
+                        Sight::Free => FREE,
+                        Sight::Hidden(share) => share,
+                        Sight::Unknown => f64::NAN,
+                    };
+                    [share, clearance_m.unwrap_or(f64::NAN), found.transmission, number_of(found.by)]
+                };
             }
         };
-        table(py, self.ask(py, (places(&lines)?, LINES_AT_ONCE), [f64::NAN; 2], each)?.into_iter())
+        table(py, self.ask(py, (places(&lines)?, LINES_AT_ONCE), [f64::NAN; 4], each)?.into_iter())
+    }
+
+    /// The words for what hides; the last one is for nothing.
+    #[staticmethod]
+    fn hiders() -> Vec<&'static str> {
+        HIDERS.iter().map(|hider| hider.name()).chain([""]).collect()
+    }
+
+    /// Heights of what lies on top at places: woods and all, or only what can be stood on.
+    fn tops<'py>(
+        &self,
+        py: Python<'py>,
+        xy: PyReadonlyArray2<'py, f64>,
+        with_woods: bool,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let each = |ground: &LoadedGround, places: &[[f64; 2]], heights: &mut [f64]| {
+            for (height, &place) in heights.iter_mut().zip(places) {
+                let top = || ground.top(place).map(|top| top.height_m);
+                let found = if with_woods { top() } else { ground.roof_m(place) };
+                *height = found.unwrap_or(f64::NAN);
+            }
+        };
+        Ok(PyArray1::from_vec(py, self.ask(py, (places(&xy)?, AT_ONCE), f64::NAN, each)?))
+    }
+
+    /// What a vehicle hits at a place: word for its kind, id, metres to it, metres between stems.
+    fn obstacle(
+        &self,
+        py: Python<'_>,
+        place_m: [f64; 3],
+        radius_m: f64,
+    ) -> PyResult<Option<(&'static str, u64, f64, Option<f64>)>> {
+        let held = self.held(py)?;
+        let reached = [-1.0, 1.0].map(|side| [place_m[0] + side * radius_m, place_m[1] + side * radius_m]);
+        let found = py.detach(|| {
+            let block = around(&held.area, &reached);
+            self.loaded(held, block).map(|ground| ground.obstacle_at(place_m, radius_m))
+        });
+        let found = found.map_err(|failure| raised(py, &failure))?;
+        Ok(found.map(|found| (found.kind.name(), found.id, found.distance_m, found.spacing_m)))
+    }
+
+    /// What stands on the ground: pieces of prisms, and of canopies.
+    fn objects(&self, py: Python<'_>) -> PyResult<(Vec<PrismRow>, Vec<CanopyRow>)> {
+        let area = self.held(py)?.area;
+        wait(py, None, move |_, _| objects_of(&area).map_err(|error| unreadable(&error)))
     }
 
     /// One load module at a level of detail.
@@ -345,6 +428,37 @@ impl Ground {
         let rows = wait(py, None, move |_, _| rows_of(&area).map_err(|error| unreadable(&error)))?;
         table(py, rows.into_iter())
     }
+}
+
+/// Word for the kind, id, metres of base and roof, rings on the map.
+type PrismRow = (&'static str, u64, f64, f64, Vec<Vec<[f64; 2]>>);
+/// Word for the kind, id, metres of height and between stems, fullness, triangles on the map.
+type CanopyRow = (&'static str, u64, f64, f64, f64, Vec<[[f64; 2]; 3]>);
+
+/// All that stands in load modules, row by row from the south-west.
+fn objects_of(area: &Area) -> Result<(Vec<PrismRow>, Vec<CanopyRow>), ReadError> {
+    let metres = |quanta: i32| f64::from(quanta) / f64::from(QUANTA_PER_METRE);
+    let (mut prisms, mut canopies) = (Vec::new(), Vec::new());
+    for south in 0..area.frame().rows {
+        let ground = area.load(Block { south, west: 0, north: south + 1, east: area.frame().cols })?;
+        for module in ground.modules().iter().map(|module| module.module()) {
+            let [east, north] = [module.col, module.row].map(|index| f64::from(index) * area.frame().side_m());
+            let corner = [area.frame().origin_m[0] + east, area.frame().origin_m[1] + north];
+            let place = |x: u16, y: u16| [corner[0] + metres(x.into()), corner[1] + metres(y.into())];
+            prisms.extend(module.objects.prisms.iter().map(|prism| {
+                let rings = prism.rings.iter().map(|ring| ring.iter().map(|at| place(at.x, at.y)).collect()).collect();
+                (prism.kind.name(), prism.id, metres(prism.base), metres(prism.roof), rings)
+            }));
+            canopies.extend(module.objects.canopies.iter().map(|canopy| {
+                let at = |index: u16| canopy.places[usize::from(index)];
+                let triangle = |corners: &[u16; 3]| corners.map(|index| place(at(index)[0], at(index)[1]));
+                let triangles = canopy.triangles.iter().map(triangle).collect();
+                let [height, spacing] = [canopy.height, canopy.spacing].map(|quanta| metres(quanta.into()));
+                (canopy.kind.name(), canopy.id, height, spacing, f64::from(canopy.fullness) / 100.0, triangles)
+            }));
+        }
+    }
+    Ok((prisms, canopies))
 }
 
 /// What there is to tell of every load module.

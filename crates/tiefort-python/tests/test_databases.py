@@ -365,6 +365,48 @@ def test_features_are_tables_of_places(database: Path, tmp_path: Path) -> None:
             opened.features("roads")
 
 
+def test_buildings_and_woods_hide_and_block(tmp_path: Path) -> None:
+    def block(west: float, south: float, side: float, **tags: str) -> dict[str, object]:
+        east, north = west + side, south + side
+        ring = [[west, south], [east, south], [east, north], [west, north], [west, south]]
+        return {"type": "Feature", "properties": tags, "geometry": {"type": "Polygon", "coordinates": [ring]}}
+
+    blocks = [
+        block(506_100, 3_876_100, 20, building="yes", height="30"),
+        block(507_100, 3_876_600, 300, natural="wood"),
+    ]
+    (tmp_path / "town.geojson").write_text(json.dumps({"type": "FeatureCollection", "features": blocks}))
+    sources = [{"file": str(tmp_path / "town.geojson"), "crs": "EPSG:32611"}]
+    tiefort.build({**JOB, "objects": {"sources": sources}}, tmp_path / "town.tdb")
+    with tiefort.open(tmp_path / "town.tdb") as opened:
+        eye, behind = [506_050, 3_876_110, 2], [506_170, 3_876_110, 2]
+        found = opened.line_of_sight(eye, behind)
+        assert not found.visible and found.hidden_by == "building" and abs(found.blocker[0] - 506_100) < 0.01
+        assert opened.visible(eye, behind, objects="none")
+        wood = opened.line_of_sight([507_050, 3_876_750, 2], [507_450, 3_876_750, 2], objects="all")
+        assert wood.hidden_by in ("wood", "ground") and wood.transmission < 0.5
+        assert opened.line_of_sight(eye, behind, objects="none").hidden_by == ""
+        roof, ground = opened.tops([506_110, 3_876_110]), opened.heights([506_110, 3_876_110])
+        assert 29.9 < roof - ground < 60 and opened.tops([506_050, 3_876_110]) == opened.heights(eye[:2])
+        assert opened.tops([507_200, 3_876_700], woods=False) == opened.heights([507_200, 3_876_700])
+        wall = opened.obstacle_at([506_098, 3_876_110], 3)
+        assert (
+            wall is not None and (wall.kind, wall.spacing_m) == ("building", None) and abs(wall.distance_m - 2) < 0.01
+        )
+        stems = opened.obstacle_at([507_200, 3_876_700], 3)
+        assert stems is not None and stems.kind == "wood" and stems.spacing_m == 4
+        assert opened.obstacle_at([506_050, 3_876_110], 3) is None
+        with pytest.raises(tiefort.RequestError, match="objects: found 'some'"):
+            opened.visible(eye, behind, objects="some")
+        seen = opened.viewshed((506_110, 3_876_160), 60, eye_m=2, spacing_m=5)
+        on_roofs = opened.viewshed((506_110, 3_876_160), 60, eye_m=60, spacing_m=5, target_on="roof")
+        assert on_roofs.visible.sum() > seen.visible.sum()
+        pytest.importorskip("geopandas")
+        table = opened.objects()
+        assert set(table.kind) == {"building", "wood"} and abs(table.area[table.kind == "building"].sum() - 400) < 1
+        assert abs(table.area[table.kind == "wood"].sum() - 90_000) < 100
+
+
 def test_a_closed_or_foreign_database_is_told(database: Path, tmp_path: Path) -> None:
     opened = tiefort.open(database)
     opened.heights([507_000, 3_876_000])

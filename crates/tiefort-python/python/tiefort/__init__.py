@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     __version__: str
-    from ._database import Database, LineOfSight, Profile, Viewshed, open
+    from ._database import Database, LineOfSight, Obstacle, Profile, Viewshed, open
     from ._errors import (
         BusyError,
         ClosedError,
@@ -47,6 +47,7 @@ __all__ = [
     "JobError",
     "LineOfSight",
     "Mesh",
+    "Obstacle",
     "OutputError",
     "Profile",
     "Progress",
@@ -70,7 +71,7 @@ __all__ = [
 ]
 
 _HOMES = {
-    "_database": ("Database", "LineOfSight", "Profile", "Viewshed", "open"),
+    "_database": ("Database", "LineOfSight", "Obstacle", "Profile", "Viewshed", "open"),
     "_errors": (
         "BusyError",
         "ClosedError",

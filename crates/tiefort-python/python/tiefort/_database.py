@@ -42,13 +42,42 @@ class LineOfSight:
         East, north and height of the first place that hides the rest; NaN where nothing does.
     clearance_m : ndarray of float64, shape (...)
         How far the whole line stays above the ground at least, in metres; negative where the ground rises above it,
-        NaN where it leaves the area. Decks of bridges are not counted.
+        NaN where it leaves the area. Decks of bridges and objects are not counted.
+    hidden_by : ndarray of str, shape (...)
+        ``"ground"``, ``"deck"``, ``"building"``, ``"wood"`` or ``"row"`` (a wall, hedge or row of trees); empty where
+        nothing hides.
+    transmission : ndarray of float64, shape (...)
+        The share of light that woods leave on the way to the target, or to the first thing that lets none through.
     """
 
     visible: npt.NDArray[np.bool_]
     known: npt.NDArray[np.bool_]
     blocker: npt.NDArray[np.float64]
     clearance_m: npt.NDArray[np.float64]
+    hidden_by: npt.NDArray[np.str_]
+    transmission: npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Obstacle:
+    """What stands in a vehicle's way.
+
+    Attributes
+    ----------
+    kind : str
+        ``"building"``, ``"tower"``, ``"wall"``, ``"wood"``, ``"scrub"``, ``"orchard"`` or ``"row"``.
+    id : int
+        The number of all of its pieces.
+    distance_m : float
+        Metres from the place to it; 0 inside.
+    spacing_m : float or None
+        Metres between stems; None of what cannot be passed.
+    """
+
+    kind: str
+    id: int
+    distance_m: float
+    spacing_m: float | None
 
 
 @dataclass(frozen=True)
@@ -226,7 +255,51 @@ class Database:
         places, shape = places_of(xy)
         return self._ground.classes(places).reshape(shape)
 
-    def line_of_sight(self, a: npt.ArrayLike, b: npt.ArrayLike, *, absolute: bool = False) -> LineOfSight:
+    def tops(self, xy: npt.ArrayLike, *, woods: bool = True) -> npt.NDArray[np.float64]:
+        """Return heights of what lies on top: the highest of the ground, decks, roofs and, unless left out, woods.
+
+        Parameters
+        ----------
+        xy : array_like, shape (..., 2)
+            East and north in metres.
+        woods : bool
+            Whether tops of woods count; without them it is where someone can stand.
+
+        Returns
+        -------
+        ndarray of float64, shape (...)
+            Metres above the vertical datum; NaN outside of the area.
+        """
+        places, shape = places_of(xy)
+        return self._ground.tops(places, bool(woods)).reshape(shape)
+
+    def obstacle_at(self, at: npt.ArrayLike, radius_m: float, *, wheels_m: float | None = None) -> Obstacle | None:
+        """Return what a vehicle hits, or None where its way is free.
+
+        That is the nearest building, tower or wall between 0.3 and 3 m above its wheels, else the wood or row whose
+        stems stand closest together.
+
+        Parameters
+        ----------
+        at : array_like, shape (2,)
+            East and north of the vehicle, in metres.
+        radius_m : float
+            How far it reaches around that.
+        wheels_m : float, optional
+            Height of its wheels above the vertical datum; the ground's unless given.
+        """
+        places, shape = places_of(at, name="at")
+        if shape != ():
+            raise RequestError(f"at: found {len(places)} places, expected one", "call obstacle_at once for each")
+        if not (math.isfinite(radius_m) and 0 <= radius_m):
+            raise RequestError(f"radius_m: found {radius_m}, expected 0 or a number above it", "in metres")
+        height_m = float(self._ground.heights(places)[0]) if wheels_m is None else float(wheels_m)
+        found = self._ground.obstacle((float(places[0, 0]), float(places[0, 1]), height_m), float(radius_m))
+        return None if found is None else Obstacle(*found)
+
+    def line_of_sight(
+        self, a: npt.ArrayLike, b: npt.ArrayLike, *, absolute: bool = False, objects: str = "all"
+    ) -> LineOfSight:
         """Return what stands between places; `a` and `b` are broadcast against each other.
 
         Parameters
@@ -236,6 +309,8 @@ class Database:
         absolute : bool
             Whether heights are above the vertical datum; they are above the ground unless said so, as they are for
             ``tiefort sight``.
+        objects : {"all", "buildings", "none"}
+            What stands on the ground and is looked at: all, buildings with towers and walls, or nothing.
 
         Returns
         -------
@@ -243,7 +318,7 @@ class Database:
             An end above the ground where there is no ground makes the answer unknown.
         """
         lines, shape = self._lines(a, b, absolute)
-        share, clearance_m = self._ground.sights(lines).T
+        share, clearance_m, transmission, by = self._ground.sights(lines, objects).T
         hidden = share <= 1.0
         blocker = np.where(hidden[:, None], lines[:, :3] + share[:, None] * (lines[:, 3:] - lines[:, :3]), np.nan)
         return LineOfSight(
@@ -251,12 +326,16 @@ class Database:
             ~np.isnan(share).reshape(shape),
             blocker.reshape((*shape, 3)),
             clearance_m.reshape(shape),
+            np.array(self._ground.hiders())[by.astype(np.int64)].reshape(shape),
+            transmission.reshape(shape),
         )
 
-    def visible(self, a: npt.ArrayLike, b: npt.ArrayLike, *, absolute: bool = False) -> npt.NDArray[np.bool_]:
+    def visible(
+        self, a: npt.ArrayLike, b: npt.ArrayLike, *, absolute: bool = False, objects: str = "all"
+    ) -> npt.NDArray[np.bool_]:
         """Return whether nothing stands between places: `line_of_sight` without the rest, in less time."""
         lines, shape = self._lines(a, b, absolute)
-        return self._ground.seen(lines).reshape(shape)
+        return self._ground.seen(lines, objects).reshape(shape)
 
     def _lines(
         self, a: npt.ArrayLike, b: npt.ArrayLike, absolute: bool
@@ -321,6 +400,8 @@ class Database:
         eye_m: float = 2.0,
         target_m: float = 0.0,
         spacing_m: float | None = None,
+        objects: str = "all",
+        target_on: str = "ground",
     ) -> Viewshed:
         """Return what is seen from one place, as ``tiefort sight`` does.
 
@@ -334,6 +415,10 @@ class Database:
             Metres of the eye and of what it looks at above the ground.
         spacing_m : float, optional
             Metres between the places that it looks at; those of the working grid unless given.
+        objects : {"all", "buildings", "none"}
+            What stands on the ground and is looked at.
+        target_on : {"ground", "roof"}
+            Whether what it looks at stands on the ground, or on roofs and decks where there are any.
 
         Returns
         -------
@@ -355,6 +440,8 @@ class Database:
         if _VIEWSHED_MAX < (2 * reach + 1) ** 2:
             message = f"found {2 * reach + 1} x {2 * reach + 1} places to look at, expected at most {_VIEWSHED_MAX}"
             raise RequestError(message, "ask for a larger spacing_m or a smaller range_m")
+        if target_on not in ("ground", "roof"):
+            raise RequestError(f"target_on: found {target_on!r}, expected ground or roof", "where it stands")
         steps = np.arange(-reach, reach + 1) * spacing_m
         dx, dy = np.meshgrid(steps, steps[::-1])
         inside = dx**2 + dy**2 <= range_m**2
@@ -363,8 +450,9 @@ class Database:
         seen = np.zeros(len(targets), bool)
         for first in range(0, len(targets), _AT_ONCE):
             part = targets[first : first + _AT_ONCE]
-            heights = self.heights(part) + target_m
-            seen[first : first + _AT_ONCE] = self.visible(eye, np.column_stack((part, heights)), absolute=True)
+            heights = (self.tops(part, woods=False) if target_on == "roof" else self.heights(part)) + target_m
+            places = np.column_stack((part, heights))
+            seen[first : first + _AT_ONCE] = self.visible(eye, places, absolute=True, objects=objects)
         visible = np.zeros(inside.shape, bool)
         visible[inside] = seen
         corner = (reach + 0.5) * spacing_m
@@ -425,6 +513,27 @@ class Database:
         if layer not in known:
             raise RequestError(f"layer: found {layer!r}, expected {_words(known)}", "one layer for each call")
         return geopandas.read_file(file, layer=layer)
+
+    def objects(self) -> GeoDataFrame:
+        """Return what stands on the ground, as a ``geopandas.GeoDataFrame``: a row for each piece in a load module.
+
+        Columns are `kind`, `id` (of all pieces of one object), `base_m` and `roof_m` of buildings, towers and walls
+        above the vertical datum, `height_m` above the ground, `fullness` and `spacing_m` of woods and rows; NaN
+        elsewhere.
+        """
+        import geopandas
+        import shapely
+
+        prisms, canopies = self._ground.objects()
+        nan = math.nan
+        rows = [(kind, id, base, roof, nan, nan, nan) for kind, id, base, roof, _ in prisms]
+        rows += [(kind, id, nan, nan, height, full, apart) for kind, id, height, apart, full, _ in canopies]
+        plans = [shapely.Polygon(rings[0], rings[1:]) for *_, rings in prisms]
+        plans += [shapely.union_all(shapely.polygons(np.array(triangles))) for *_, triangles in canopies]
+        names = ("kind", "id", "base_m", "roof_m", "height_m", "fullness", "spacing_m")
+        columns = {name: [row[place] for row in rows] for place, name in enumerate(names)}
+        columns["id"] = np.array(columns["id"], np.uint64)
+        return geopandas.GeoDataFrame(columns, geometry=plans, crs=self.crs)
 
     def to_xarray(self, spacing_m: float | None = None) -> DataArray:
         """Return heights of the whole area as an ``xarray.DataArray``, the northern row first.

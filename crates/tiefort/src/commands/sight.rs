@@ -31,8 +31,7 @@ are looked at, a second band tells the per cent of the light that they leave.
 Heights of both ends are metres above the ground. Decks of bridges hide what is
 behind them, as ground does, and so do buildings and walls where the database
 has some ([objects] of its job); woods take light away, and what less than half
-of it reaches is hidden. --objects none leaves all of that out, as Python's
-Database.line_of_sight and Database.viewshed do.
+of it reaches is hidden. --objects none leaves all of that out.
 
 Exit codes: 0, whatever is seen; 2 for what cannot be looked at.";
 
