@@ -22,6 +22,7 @@ pub use build::{Built, build};
 mod tile;
 pub use tile::{Rebuilt, rebuild_tile};
 mod outlines;
+pub use outlines::{OBJECT_BUDGETS, ObjectBudget, ObjectBudgets};
 mod tile_objects;
 pub use tile_objects::TileObjects;
 mod order;

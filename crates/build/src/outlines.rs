@@ -3,9 +3,9 @@
 
 use std::sync::Arc;
 
-use features::objects::{Full, Granted, ObjectLimits, ObjectRemark, ObjectTally, Wanting, objects};
+use features::objects::{Full, Granted, ObjectLimits, ObjectRemark, ObjectTally, Outline, Wanting, granted, mended};
 use job::{Job, ObjectsSpec};
-use schedule::for_each_piece;
+use schedule::{Workers, for_each_piece};
 use store::engine::{Artifact, Key, Outcome, Stamp, keep_or_make};
 use store::{
     AreaOutlines, FeatureRemark, FileStamp, ModuleOutlines, ObjectLeftOut, ObjectSums, ReportObjectLimit, ReportObjects,
@@ -66,6 +66,66 @@ impl Artifact for Outlining<'_> {
     }
 }
 
+/// The objects of a job, on which limits are tried.
+pub struct ObjectBudgets {
+    job: Job,
+    outlines: Vec<Outline>,
+}
+
+/// What a limit would keep of objects.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ObjectBudget {
+    /// Polygons of objects in a load module at most.
+    pub per_load_module: u32,
+    /// The same in a square of 4 km.
+    pub per_window: u32,
+    /// By kind.
+    pub kinds: Vec<ObjectSums>,
+}
+
+impl ObjectBudget {
+    /// Whether nearly all is kept that hides: 95 % of the silhouette of each kind.
+    pub fn holds(&self) -> bool {
+        const KEPT_MIN: f64 = 0.95;
+        self.kinds.iter().all(|sums| KEPT_MIN * sums.wanted_m2 <= sums.kept_m2)
+    }
+}
+
+/// Polygons of objects in a load module at most that are tried, from the usual limit on.
+pub const OBJECT_BUDGETS: [u32; 7] = [400, 800, 1600, 3200, 6400, 12_800, 25_600];
+
+impl ObjectBudgets {
+    /// Reads the objects of a job; `None` for a job without any.
+    ///
+    /// # Errors
+    /// When a file cannot be read, or the job is impossible.
+    pub fn open(job: &Job, workers: usize) -> Result<Option<Self>, CompileError> {
+        let Some(spec) = &job.objects else { return Ok(None) };
+        let (workers, area) = (Workers::new(workers), GamingArea::new(job)?);
+        let each = |count: usize, piece: &(dyn Fn(usize) + Sync)| for_each_piece(&workers, count, piece);
+        let found = FoundObjects::read(job, spec, &area, &each)?;
+        Ok(Some(Self { job: job.clone(), outlines: mended(found.objects, &spec.options).0 }))
+    }
+
+    /// What the job's own limits keep.
+    pub fn own(&self) -> ObjectBudget {
+        let spec = self.job.objects.as_ref().expect("a job with objects");
+        self.within(spec.per_load_module, spec.per_4km_square)
+    }
+
+    /// What would be kept with so many polygons in a load module, and 32 times as many in a square of 4 km.
+    pub fn of(&self, per_load_module: u32) -> ObjectBudget {
+        self.within(per_load_module, 32 * per_load_module)
+    }
+
+    fn within(&self, per_load_module: u32, per_window: u32) -> ObjectBudget {
+        let spec = self.job.objects.as_ref().expect("a job with objects");
+        let limits = ObjectLimits { per_module: per_load_module, per_window, ..limits_of(&self.job, spec) };
+        let Granted { kinds, .. } = granted(&self.outlines, &limits, self.job.modules.side_quanta.into());
+        ObjectBudget { per_load_module, per_window, kinds: kinds.into_iter().map(sums_of).collect() }
+    }
+}
+
 /// What stands on the ground of a job's area within its limits.
 pub(crate) fn outlines_of(
     job: &Job,
@@ -75,8 +135,9 @@ pub(crate) fn outlines_of(
 ) -> Result<AreaOutlines, CompileError> {
     let FoundObjects { objects: found, remarks, notes } = FoundObjects::read(job, spec, area, each)?;
     let side = i32::from(job.modules.side_quanta);
-    let granted = objects(found, &spec.options, &limits_of(job, spec), side);
-    Ok(AreaOutlines { notes, ..to_outlines(job, granted, remarks) })
+    let (outlines, mended) = mended(found, &spec.options);
+    let granted = granted(&outlines, &limits_of(job, spec), side);
+    Ok(AreaOutlines { notes, ..to_outlines(job, granted, mended, remarks) })
 }
 
 /// The limits of objects in a job.
@@ -89,8 +150,23 @@ pub(crate) fn limits_of(job: &Job, spec: &ObjectsSpec) -> ObjectLimits {
     }
 }
 
-fn to_outlines(job: &Job, granted: Granted, mut remarks: Vec<FeatureRemark>) -> AreaOutlines {
-    let Granted { modules, kinds, left_out, remarks: mended } = granted;
+fn sums_of((kind, [kept, wanted]): (terrain::ObjectKind, [ObjectTally; 2])) -> ObjectSums {
+    ObjectSums {
+        kind: kind.name().to_owned(),
+        wanted: wanted.count,
+        kept: kept.count,
+        wanted_m2: wanted.silhouette_m2,
+        kept_m2: kept.silhouette_m2,
+    }
+}
+
+fn to_outlines(
+    job: &Job,
+    granted: Granted,
+    mended: Vec<ObjectRemark>,
+    mut remarks: Vec<FeatureRemark>,
+) -> AreaOutlines {
+    let Granted { modules, kinds, left_out } = granted;
     let map = |[east, north]: [f64; 2]| [job.area.origin_m[0] + east, job.area.origin_m[1] + north];
     remarks.extend(mended.into_iter().map(|ObjectRemark { name, at_m, found, done }| FeatureRemark {
         feature: name,
@@ -100,13 +176,6 @@ fn to_outlines(job: &Job, granted: Granted, mut remarks: Vec<FeatureRemark>) -> 
         done: done.unwrap_or("left out").to_owned(),
         degrades: false,
     }));
-    let sums = |(kind, [kept, wanted]): (terrain::ObjectKind, [ObjectTally; 2])| ObjectSums {
-        kind: kind.name().to_owned(),
-        wanted: wanted.count,
-        kept: kept.count,
-        wanted_m2: wanted.silhouette_m2,
-        kept_m2: kept.silhouette_m2,
-    };
     let wanting = |Wanting { kind, at_m, height_m, silhouette_m2, full }: Wanting| {
         let (is_window, full) = match full {
             Full::Module(module) => (false, module),
@@ -123,7 +192,7 @@ fn to_outlines(job: &Job, granted: Granted, mut remarks: Vec<FeatureRemark>) -> 
     AreaOutlines {
         side: job.modules.side_quanta,
         modules: modules.into_iter().map(module).collect(),
-        kinds: kinds.into_iter().map(sums).collect(),
+        kinds: kinds.into_iter().map(sums_of).collect(),
         left_out: left_out.into_iter().map(wanting).collect(),
         remarks,
         notes: Vec::new(),

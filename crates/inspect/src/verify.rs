@@ -12,6 +12,7 @@ mod made_from;
 mod modules;
 mod opened;
 mod square;
+mod standing;
 mod tins;
 mod total;
 mod waters;
@@ -57,6 +58,8 @@ pub struct Verdict {
     /// Square metres of decks, those under the ground at any level, and how far decks are above each class at least, in
     /// words; nothing where there are no decks.
     pub decks: Option<String>,
+    /// What stands on the ground, in words; nothing of a job without objects.
+    pub objects: Option<String>,
 }
 
 /// Re-reads every file of a database and checks what a simulator relies on; with `dem`, recomputes residuals.
@@ -142,6 +145,13 @@ fn check_sums(
     verdict.unchecked.extend(features.unchecked);
     verdict.network = features.network;
     verdict.decks = deck::told(levels, &job.class_names());
+    if let Some(spec) = &job.objects {
+        let (_, _, outlines) = folder.read_outlines()?;
+        let of_report = report.as_ref().and_then(|report| report.objects.as_ref());
+        let standing = standing::check(area, spec, levels, &outlines, of_report);
+        verdict.problems.extend(standing.problems);
+        verdict.objects = Some(standing.told);
+    }
     let counts = exceeded::counts(job, area, modules);
     let mut exceeded = exceeded::of_counts(area, &counts);
     verdict.problems.extend(exceeded::wrong_states(manifest, area, &exceeded));

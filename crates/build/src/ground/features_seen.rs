@@ -4,10 +4,13 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-use features::{FeatureId, Form, IdleRule, Kind, Numbering, OverviewRow, RowOrigin, Rule, Shape, Source, overview};
+use features::objects::{OBJECT_KEYS, traits};
+use features::{
+    FeatureId, Form, IdleRule, Kind, Numbering, OverviewRow, RowOrigin, Rule, Shape, Source, overview as overview_of,
+};
 use job::Choice;
 use source_files::{BUILT_IN_KEYS, Extent, VectorFeature, VectorShape, Wanted, read_features};
-use terrain::in_turn;
+use terrain::{ObjectKind, in_turn};
 
 use crate::ground::GroundError;
 use crate::ground::vectors::{FeaturesRead, Vectors};
@@ -60,7 +63,9 @@ pub struct FeaturesSeen {
     pub outside: u64,
     /// How many inside have which kind, in the table's order.
     pub kinds: Vec<(&'static str, usize)>,
-    /// How many inside have none.
+    /// How many inside are objects of which kind, in the order of kinds.
+    pub objects: Vec<(&'static str, usize)>,
+    /// How many inside are neither.
     pub without_kind: usize,
     /// Whether all inside are polygons, or all are lines; `None` where there are both, or none.
     pub are_polygons: Option<bool>,
@@ -71,7 +76,7 @@ pub struct FeaturesSeen {
 impl FeatureTable {
     /// What rules and the built-in table make of features that were read.
     pub fn of(vectors: &Vectors, rules: &[Rule]) -> Self {
-        let overview = overview(&vectors.sources, rules);
+        let overview = overview_of(&vectors.sources, rules);
         let mut notes = vectors.notes.clone();
         let mut sources: Vec<SourceSeen> =
             vectors.files.iter().map(|read| SourceSeen { read: read.clone(), without_kind: 0 }).collect();
@@ -110,13 +115,23 @@ pub fn features_in(
 ) -> Result<FeaturesSeen, GroundError> {
     let side = |axis: usize| [origin_m[axis], origin_m[axis] + size_m[axis]];
     let bounds = Extent { east: side(0), north: side(1) };
-    let wanted = Wanted { epsg, bounds, layer, crs: None, keys: &BUILT_IN_KEYS, buildings: false };
+    let mut keys = [&BUILT_IN_KEYS[..], &OBJECT_KEYS].concat();
+    keys.sort_unstable();
+    keys.dedup();
+    let wanted = Wanted { epsg, bounds, layer, crs: None, keys: &keys, buildings: false };
     let read = read_features(path, &wanted, &in_turn)?;
     let is_polygon = |feature: &VectorFeature| matches!(feature.shape, VectorShape::Polygon(_));
     let first = read.features.first().map(is_polygon);
     let are_polygons = first.filter(|first| read.features.iter().all(|feature| is_polygon(feature) == *first));
+    let object = |feature: &VectorFeature| traits(|key| feature.tag(key), (None, None), &[]).map(|(of, _)| of.kind);
+    let of_objects: Vec<Option<ObjectKind>> = read.features.iter().map(object).collect();
     let sources: Vec<Source> = read.features.into_iter().map(source_of).collect();
-    let overview = overview(&sources, &[]);
+    let mut objects: BTreeMap<ObjectKind, usize> = BTreeMap::new();
+    of_objects.iter().flatten().for_each(|kind| *objects.entry(*kind).or_default() += 1);
+    let others = sources.iter().zip(&of_objects).filter(|(_, object)| object.is_none()).map(|(source, _)| source);
+    let others: Vec<Source> = others.cloned().collect();
+    let without_kind = overview_of(&others, &[]).unmatched.values().sum();
+    let overview = overview_of(&sources, &[]);
     let mut kinds: BTreeMap<Kind, usize> = BTreeMap::new();
     for row in overview.rows.iter().filter(|row| 0 < row.count) {
         row.kind.into_iter().for_each(|kind| *kinds.entry(kind).or_default() += row.count);
@@ -125,7 +140,8 @@ pub fn features_in(
         found: read.found,
         outside: read.outside,
         kinds: kinds.into_iter().map(|(kind, count)| (kind.name(), count)).collect(),
-        without_kind: overview.unmatched.values().sum(),
+        objects: objects.into_iter().map(|(kind, count)| (kind.name(), count)).collect(),
+        without_kind,
         are_polygons,
         notes: read.notes,
     })

@@ -2,7 +2,7 @@
 
 use std::collections::HashSet;
 
-use features::objects::{FoundObject, FoundShape, traits};
+use features::objects::{FoundObject, FoundShape, OBJECT_KEYS, traits};
 use job::{Job, ObjectsSpec};
 use source_files::{Crs, Done, FeatureFile, VectorFeature, VectorShape, Vertices, Wanted};
 use store::FeatureRemark;
@@ -11,9 +11,6 @@ use terrain::{Each, ObjectKind};
 use crate::ground::GroundError;
 use crate::ground::area::GamingArea;
 use crate::ground::vectors::bounds;
-
-/// Keys of OpenStreetMap that the built-in table of objects looks at.
-const KEYS: [&str; 6] = ["building", "building:part", "landuse", "natural", "barrier", "man_made"];
 
 /// What the sources of objects hold that lies in the area or near it.
 #[derive(Debug, Default)]
@@ -37,7 +34,7 @@ impl FoundObjects {
             let name = source.file.written.as_str();
             let crs = source.crs.as_deref().map(|text| Crs::named(text).map_err(|found| bad_crs(name, &found)));
             let crs = crs.transpose()?;
-            let mut keys: Vec<&str> = KEYS.into_iter().chain(spec.keys()).collect();
+            let mut keys: Vec<&str> = OBJECT_KEYS.into_iter().chain(spec.keys()).collect();
             keys.sort_unstable();
             keys.dedup();
             let wanted = Wanted {

@@ -19,6 +19,8 @@ pub struct SeenFeatures {
     pub seen: FeaturesSeen,
     /// Where no tag says a kind: the kind that the name of the layer or the file suggests.
     pub kind_by_name: Option<&'static str>,
+    /// The same of objects.
+    pub object_by_name: Option<&'static str>,
 }
 
 /// Parts of names, the kinds that they suggest, and whether those are polygons; `None` where they may be either.
@@ -57,24 +59,47 @@ pub fn look_at_features(paths: &[PathBuf], suggestion: &Suggestion) -> Result<Ve
         for layer in layers {
             let area = [suggestion.origin_m, suggestion.size_m];
             let seen = features_in(path, layer.as_deref(), suggestion.epsg, area)?;
-            let says_none = seen.kinds.is_empty() && 0 < seen.without_kind;
+            let says_none = seen.kinds.is_empty() && seen.objects.is_empty() && 0 < seen.without_kind;
             let kind_by_name = says_none.then(|| kind_by_name(path, layer.as_deref(), &seen)).flatten();
-            all.push(SeenFeatures { path: path.clone(), layer, seen, kind_by_name });
+            let is_open = says_none && kind_by_name.is_none();
+            let object_by_name = is_open.then(|| object_by_name(path, layer.as_deref(), &seen)).flatten();
+            all.push(SeenFeatures { path: path.clone(), layer, seen, kind_by_name, object_by_name });
         }
     }
     Ok(all)
 }
 
+/// Parts of names, and the kinds of objects that polygons with them are.
+const OBJECT_NAMES: [(&str, &str); 7] = [
+    ("building", "building"),
+    ("house", "building"),
+    ("footprint", "building"),
+    ("forest", "wood"),
+    ("wood", "wood"),
+    ("tree", "wood"),
+    ("canopy", "wood"),
+];
+
+/// The kind of object that the name of a layer suggests, or else that of its file.
+fn object_by_name(path: &Path, layer: Option<&str>, seen: &FeaturesSeen) -> Option<&'static str> {
+    let of = |name: String| OBJECT_NAMES.iter().find(|(part, _)| name.contains(part)).map(|(_, kind)| *kind);
+    (seen.are_polygons == Some(true)).then(|| names(path, layer).filter_map(of).next()).flatten()
+}
+
+/// The name of a layer and that of its file, in small letters.
+fn names(path: &Path, layer: Option<&str>) -> impl Iterator<Item = String> {
+    let file = path.file_name().map(|name| name.to_string_lossy().to_lowercase());
+    layer.map(str::to_lowercase).into_iter().chain(file)
+}
+
 /// The kind that the name of a layer suggests, or else that of its file.
 fn kind_by_name(path: &Path, layer: Option<&str>, seen: &FeaturesSeen) -> Option<&'static str> {
-    let file = path.file_name().map(|name| name.to_string_lossy());
-    let names = [layer, file.as_deref()].into_iter().flatten().map(str::to_lowercase);
     let fits = |shape: Option<bool>| shape.is_none() || seen.are_polygons == shape;
     let of = |name: String| {
         let found = NAMES.iter().find(|(part, _, shape)| name.contains(part) && fits(*shape));
         found.map(|(_, kind, _)| *kind)
     };
-    names.filter_map(of).next()
+    names(path, layer).filter_map(of).next()
 }
 
 #[cfg(test)]
@@ -84,7 +109,7 @@ mod tests {
     #[track_caller]
     fn check(file: &str, layer: Option<&str>, are_polygons: Option<bool>, expected: Option<&str>) {
         let (found, kinds, notes) = (1, Vec::new(), Vec::new());
-        let seen = FeaturesSeen { found, outside: 0, kinds, without_kind: 1, are_polygons, notes };
+        let seen = FeaturesSeen { found, outside: 0, kinds, objects: Vec::new(), without_kind: 1, are_polygons, notes };
         assert_eq!(kind_by_name(Path::new(file), layer, &seen), expected);
     }
 
@@ -104,5 +129,7 @@ mod tests {
     fn every_kind_that_a_name_suggests_is_one() {
         let words: Vec<&str> = <job::FeatureKind as job::Choice>::WORDS.iter().map(|word| word.name).collect();
         assert!(NAMES.iter().all(|(_, kind, _)| words.contains(kind)));
+        let words: Vec<&str> = <terrain::ObjectKind as job::Choice>::WORDS.iter().map(|word| word.name).collect();
+        assert!(OBJECT_NAMES.iter().all(|(_, kind)| words.contains(kind)));
     }
 }

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use terrain::{Canopy, ObjectKind, Objects, PRISMS_MAX, Prism};
 
 use super::cut::{Piece, border, canopy_lists, cut, walled};
-use super::mend::{ObjectRemark, Outline};
+use super::mend::Outline;
 use super::plan::METRE;
 
 /// What may stand in a load module and in a window, in polygons: a roof and each wall are one, and each triangle of a
@@ -64,8 +64,6 @@ pub struct Granted {
     pub kinds: BTreeMap<ObjectKind, [ObjectTally; 2]>,
     /// What had no room, what hides most first.
     pub left_out: Vec<Wanting>,
-    /// What was wrong with objects, and what was done.
-    pub remarks: Vec<ObjectRemark>,
 }
 
 /// What is granted whole, or not at all.
@@ -82,7 +80,9 @@ enum Part {
     Canopy(Canopy),
 }
 
-pub(super) fn grant(outlines: Vec<Outline>, limits: &ObjectLimits, side: i32) -> Granted {
+/// What has room of outlines, in load modules with a side of so many quanta that are numbered by row and column from
+/// the place 0, 0.
+pub fn granted(outlines: &[Outline], limits: &ObjectLimits, side: i32) -> Granted {
     let [rows, cols] = limits.size;
     let inside = |[row, col]: [i32; 2]| 0 <= row && row < rows && 0 <= col && col < cols;
     let mut claims = Vec::new();

@@ -3,7 +3,7 @@
 //! ```text
 //! traits(tags, kind, rules) -> Traits          what it is, how high, how dense
 //! mended(found, options) -> Vec<Outline>       on the lattice, without flaws, few corners; woods united
-//! grant(outlines, limits) -> Granted           what hides least is left out where there is no room
+//! granted(outlines, limits) -> Granted         what hides least is left out where there is no room
 //! ```
 //!
 //! Heights are above the ground, which is not known here: the roof of a prism is that of its highest ground plus
@@ -16,19 +16,9 @@ mod mend;
 mod plan;
 mod table;
 
-pub use grant::{Full, Granted, ObjectLimits, ObjectTally, Wanting};
+pub use grant::{Full, Granted, ObjectLimits, ObjectTally, Wanting, granted};
 pub use mend::{FoundObject, FoundShape, ObjectOptions, ObjectRemark, Outline, mended};
-pub use table::{ObjectRule, Traits, traits};
-
-/// What stands in an area with a grid of load modules.
-///
-/// `side` is that of a load module in quanta; load modules are numbered by row and column from the place 0, 0.
-pub fn objects(found: Vec<FoundObject>, options: &ObjectOptions, limits: &ObjectLimits, side: i32) -> Granted {
-    let (outlines, remarks) = mended(found, options);
-    let mut granted = grant::grant(outlines, limits, side);
-    granted.remarks = remarks;
-    granted
-}
+pub use table::{OBJECT_KEYS, ObjectRule, Traits, traits};
 
 #[cfg(test)]
 mod tests;

@@ -70,6 +70,9 @@ pub struct Traits {
     pub fullness: u8,
 }
 
+/// Keys of OpenStreetMap by which the table tells what an object is.
+pub const OBJECT_KEYS: [&str; 6] = ["building", "building:part", "landuse", "natural", "barrier", "man_made"];
+
 /// What a job says of objects with certain tags.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ObjectRule {

@@ -24,8 +24,13 @@ fn house(at: [f64; 2], side: f64, height: &'static str) -> FoundObject {
     object("house", &[("building", "yes"), ("height", height)], FoundShape::Polygon(vec![square(at, side)]))
 }
 
-fn made(found: Vec<FoundObject>) -> Granted {
-    objects(found, &OPTIONS, &LIMITS, SIDE)
+fn made(found: Vec<FoundObject>) -> (Granted, Vec<ObjectRemark>) {
+    objects(found, &LIMITS)
+}
+
+fn objects(found: Vec<FoundObject>, limits: &ObjectLimits) -> (Granted, Vec<ObjectRemark>) {
+    let (outlines, remarks) = mended(found, &OPTIONS);
+    (granted(&outlines, limits, SIDE), remarks)
 }
 
 #[test]
@@ -39,11 +44,11 @@ fn nothing_depends_on_the_order_and_what_is_there_twice_is_kept_once() {
         object("row", &[("natural", "tree_row")], FoundShape::Line(vec![[50.0, 50.0], [90.0, 50.0], [90.0, 99.0]])),
         house([10.0, 10.0], 10.0, "6"),
     ];
-    let one = made(all.clone());
-    assert_eq!(one, made(all.into_iter().rev().collect()));
+    let (one, remarks) = made(all.clone());
+    assert_eq!((one.clone(), remarks.clone()), made(all.into_iter().rev().collect()));
     assert_eq!(one.kinds[&ObjectKind::Building][0].count, 3, "overlaps stay");
     assert_eq!(one.kinds[&ObjectKind::Wood][0].count, 4, "united, one part in each load module");
-    assert_eq!(one.remarks.len(), 1);
+    assert_eq!(remarks.len(), 1);
     let corner: Vec<_> = one
         .modules
         .values()
@@ -61,7 +66,7 @@ fn what_hides_least_goes_first_and_whole() {
     found.push(house([30.0, 400.0], 10.0, "5"));
     // 32 houses of 5 polygons, one of them half in the next load module, with a wall less on both sides.
     let limits = ObjectLimits { per_module: 154, ..LIMITS };
-    let granted = objects(found, &OPTIONS, &limits, SIDE);
+    let (granted, _) = objects(found, &limits);
     let [kept, wanted] = granted.kinds[&ObjectKind::Building];
     assert_eq!((kept.count, wanted.count), (31, 32));
     assert_eq!(granted.left_out.len(), 1);
@@ -69,7 +74,7 @@ fn what_hides_least_goes_first_and_whole() {
     assert!(kept.silhouette_m2 < wanted.silhouette_m2);
     assert_eq!(granted.modules[&[0, 0]].polygons(), 154);
     let limits = ObjectLimits { per_window: 4, ..LIMITS };
-    let none = objects(vec![house([10.0, 10.0], 10.0, "6")], &OPTIONS, &limits, SIDE);
+    let (none, _) = objects(vec![house([10.0, 10.0], 10.0, "6")], &limits);
     assert_eq!((none.modules.len(), none.left_out[0].full), (0, grant::Full::Window([0, 0])));
 }
 
@@ -78,7 +83,7 @@ fn bad_outlines_are_mended_or_left_out_and_told() {
     let bow = [[0.0, 0.0], [20.0, 20.0], [20.0, 0.0], [0.0, 20.0], [0.0, 0.0]];
     let flat = vec![[0.0, 0.0], [20.0, 0.0], [40.0, 0.0], [0.0, 0.0]];
     let polygon = |ring: Vec<[f64; 2]>| object("x", &[("building", "yes")], FoundShape::Polygon(vec![ring]));
-    let crossed = made(vec![polygon(bow.iter().map(|[x, y]| [x + 50.0, y + 50.0]).collect())]);
+    let (crossed, _) = made(vec![polygon(bow.iter().map(|[x, y]| [x + 50.0, y + 50.0]).collect())]);
     assert_eq!(crossed.kinds[&ObjectKind::Building][0].count, 2, "a bow tie is two triangles");
     for (ring, told) in [
         (flat, "without area"),
@@ -86,13 +91,13 @@ fn bad_outlines_are_mended_or_left_out_and_told() {
         (vec![[f64::NAN, 0.0], [1.0, 1.0], [1.0, 0.0]], "a place"),
         (square([1e9, 0.0], 10.0), "a place"),
     ] {
-        let granted = made(vec![polygon(ring)]);
+        let (granted, remarks) = made(vec![polygon(ring)]);
         assert!(granted.modules.is_empty());
-        assert!(granted.remarks[0].found.contains(told), "{:?}", granted.remarks);
+        assert!(remarks[0].found.contains(told), "{remarks:?}");
     }
-    assert!(made(vec![polygon(square([-100.0, -100.0], 50.0))]).kinds.is_empty(), "outside the area");
+    assert!(made(vec![polygon(square([-100.0, -100.0], 50.0))]).0.kinds.is_empty(), "outside the area");
     let line = object("x", &[("natural", "wood")], FoundShape::Line(vec![[0.0, 0.0], [9.0, 9.0]]));
-    assert_eq!(made(vec![line]).remarks[0].done, None);
+    assert_eq!(made(vec![line]).1[0].done, None);
     // Whatever it would have been.
     let far = vec![[0.0, 0.0], [f64::INFINITY, 5.0], [9.0, 9.0]];
     for (tag, shape) in [
@@ -100,7 +105,7 @@ fn bad_outlines_are_mended_or_left_out_and_told() {
         (("natural", "tree_row"), FoundShape::Line(vec![[3.0, 3.0], [3.0, 3.0]])),
         (("natural", "wood"), FoundShape::Polygon(vec![far])),
     ] {
-        let told = made(vec![object("x", &[tag], shape)]).remarks;
+        let (_, told) = made(vec![object("x", &[tag], shape)]);
         assert!(told.len() == 1 && told[0].done.is_none(), "{tag:?}: {told:?}");
     }
 }
@@ -111,11 +116,11 @@ fn parts_stand_in_the_place_of_their_building() {
         object("p", &[("building:part", "yes"), ("height", height)], FoundShape::Polygon(vec![square(at, side)]))
     };
     let whole = house([100.0, 100.0], 30.0, "20");
-    let with = made(vec![whole.clone(), part([100.0, 100.0], 25.0, "12"), part([110.0, 110.0], 6.0, "40")]);
+    let (with, _) = made(vec![whole.clone(), part([100.0, 100.0], 25.0, "12"), part([110.0, 110.0], 6.0, "40")]);
     let mut roofs: Vec<i32> = with.modules[&[0, 0]].prisms.iter().map(|prism| prism.roof / 128).collect();
     roofs.sort_unstable();
     assert_eq!(roofs, [12, 40]);
-    let small = made(vec![whole, part([100.0, 100.0], 10.0, "12")]);
+    let (small, _) = made(vec![whole, part([100.0, 100.0], 10.0, "12")]);
     assert_eq!(small.modules[&[0, 0]].prisms.len(), 2, "a part of a ninth leaves the rest standing");
 }
 
@@ -131,7 +136,7 @@ fn a_wood_of_many_corners_is_cut_smoothed_and_covered_by_triangles() {
         .collect();
     let wood = object("wood", &[("landuse", "forest")], FoundShape::Polygon(vec![ring]));
     let limits = ObjectLimits { per_module: 2_000, ..LIMITS };
-    let granted = objects(vec![wood], &OPTIONS, &limits, SIDE);
+    let (granted, _) = objects(vec![wood], &limits);
     assert_eq!(granted.modules.len(), 4);
     let area: f64 = granted.modules.values().flat_map(|objects| &objects.canopies).map(area_m2).sum();
     // The integral of half the square of the distance.

@@ -1,8 +1,9 @@
-//! What budgets would keep of the features of a job, as a table and as JSON.
+//! What budgets would keep of the features and objects of a job, as a table and as JSON.
 
-use build::{BUDGETS, Budgeted, Budgets};
+use build::{BUDGETS, Budgeted, Budgets, OBJECT_BUDGETS, ObjectBudget, ObjectBudgets};
 use job::Job;
 use serde_json::{Value, json};
+use store::ObjectSums;
 use views::{Align, Table, grouped};
 
 use crate::{resources, terminal};
@@ -78,4 +79,56 @@ pub fn table_json(budgets: &[Budgeted]) -> Value {
         })
     };
     budgets.iter().map(of).collect()
+}
+
+/// What limits would keep of the objects of a job, up to the first that keeps nearly all.
+pub fn objects_of_job(job: &Job) -> Vec<ObjectBudget> {
+    let budgets = match ObjectBudgets::open(job, resources::cores()) {
+        Ok(Some(budgets)) => budgets,
+        Ok(None) => return Vec::new(),
+        Err(error) => {
+            terminal::tell(&format!("note: what limits would keep of buildings and woods is not known: {error}"));
+            return Vec::new();
+        }
+    };
+    let mut tried: Vec<ObjectBudget> = Vec::new();
+    for most in OBJECT_BUDGETS {
+        tried.push(budgets.of(most));
+        if tried.last().is_some_and(ObjectBudget::holds) {
+            break;
+        }
+    }
+    tried
+}
+
+/// What limits would keep of objects, those of the job marked; empty where there are none.
+pub fn objects_text(job: &Job, tried: &[ObjectBudget]) -> String {
+    let Some(first) = tried.first() else { return String::new() };
+    let mut table = Table::new(&vec![Align::Right; 2 + first.kinds.len()]);
+    let names = first.kinds.iter().map(|sums| format!("{} ({})", sums.kind, grouped(sums.wanted)));
+    table.row(["polygons".to_owned(), "in 4 km".to_owned()].into_iter().chain(names));
+    for of in tried {
+        let limits = [of.per_load_module, of.per_window].map(|count| grouped(count.into()));
+        table.row(limits.into_iter().chain(of.kinds.iter().map(|sums| share([sums.kept_m2, sums.wanted_m2]))));
+    }
+    let own = job.objects.as_ref().map_or(0, |spec| spec.per_load_module);
+    format!(
+        "\nWhat limits would keep of what objects hide: roofs, walls and triangles of woods in a load module and in a \
+         square of 4 km; the kept share of the silhouette of each kind. This job has {} in a load module.\n{}",
+        grouped(own.into()),
+        table.text(0)
+    )
+}
+
+/// The same for a program.
+pub fn objects_json(tried: &[ObjectBudget]) -> Value {
+    let kind = |sums: &ObjectSums| {
+        json!({ "kind": sums.kind, "wanted": sums.wanted, "kept": sums.kept, "wanted_m2": sums.wanted_m2,
+                "kept_m2": sums.kept_m2 })
+    };
+    let of = |budget: &ObjectBudget| {
+        json!({ "per_load_module": budget.per_load_module, "per_4km_square": budget.per_window,
+                "kinds": budget.kinds.iter().map(kind).collect::<Vec<_>>(), "holds": budget.holds() })
+    };
+    tried.iter().map(of).collect()
 }

@@ -7,7 +7,7 @@ use build::workbench::{Seen, SeenFeatures, Suggestion};
 use clap::{Args, ValueEnum};
 use job::Job;
 
-use crate::commands::init_features::{features_section, told_of};
+use crate::commands::init_features::{features_section, objects_section, told_of};
 use crate::commands::init_limits::{Asked, Limits, choose};
 use crate::commands::job_words::{comment, quoted, relative};
 use crate::failure::{Failure, Outcome};
@@ -21,14 +21,15 @@ Examples:
   tiefort init dem.tif roads.osm.pbf lakes.gpkg --out mine.toml
 
 The job covers the largest rectangle of whole load modules inside the rasters.
-Roads, rivers and lakes become parts of the ground there.";
+Roads, rivers and lakes become parts of the ground there, buildings, walls and
+woods stand on it.";
 
 /// Arguments of `init`.
 #[derive(Args)]
 #[command(after_help = AFTER_HELP)]
 pub struct Arguments {
     /// Rasters, or folders of them: GeoTIFF, DTED, HGT, Esri ASCII, raw with a .hdr; also in .gz and .zip; in order of
-    /// priority. Roads, rivers and lakes: .osm.pbf, GeoPackage, Shapefile, GeoJSON
+    /// priority. Roads, water, buildings and woods: .osm.pbf, GeoPackage, Shapefile, GeoJSON
     #[arg(value_name = "FILES", required = true)]
     files: Vec<PathBuf>,
     /// Where to write the job; it must not exist yet [default: standard output]
@@ -81,7 +82,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         named_files(&arguments.files)?.into_iter().partition(|path| build::workbench::is_feature_file(path));
     if let ([first, ..], []) = (vectors.as_slice(), files.as_slice()) {
         let path = first.display();
-        let message = format!("{path}: found a file of roads, rivers or lakes, expected a raster beside it");
+        let message = format!("{path}: found a file of roads, water or buildings, expected a raster beside it");
         return Err(Failure::new(message, "name a raster of heights too, as dem.tif: area and ground come from it"));
     }
     let crs = arguments.crs.as_deref();
@@ -271,6 +272,7 @@ fn job_text(
     text += &voids_text(seen);
     text += &datum_text(seen);
     text += &features_section(features, folder);
+    text += &objects_section(features, &limits.objects, folder);
     text += &format!(
         "\n[tiles]\ncolumns = {}\nrows = {}\n\n[limits]\n\
          {}per_load_module = {}         # triangles\n\

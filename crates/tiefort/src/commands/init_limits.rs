@@ -3,10 +3,12 @@
 use std::path::Path;
 
 use build::workbench::Suggestion;
-use build::{BUDGETS, Budgeted, Budgets, limits_of};
+use build::{BUDGETS, Budgeted, Budgets, ObjectBudget, limits_of};
 use job::Job;
+use views::grouped;
 
-use crate::commands::budgets::share;
+use crate::commands::budgets::{objects_of_job, share};
+use crate::commands::init_features::kept_text;
 use crate::failure::Failure;
 use crate::{resources, terminal};
 
@@ -32,14 +34,16 @@ pub struct Limits {
     pub most: [u32; 2],
     /// What budgets would keep; empty without features.
     pub budgets: Vec<Budgeted>,
-    /// Why it is these, in a line; nothing where there is nothing to say.
-    pub said: Option<String>,
+    /// Why it is these, in a line each.
+    pub said: Vec<String>,
+    /// What limits would keep of objects, the one that is chosen last; empty without objects.
+    pub objects: Vec<ObjectBudget>,
 }
 
 impl Limits {
     /// Those of a mean, of which nothing is known.
     pub fn of(mean: u32) -> Self {
-        Self { mean, most: limits_of(mean), budgets: Vec::new(), said: None }
+        Self { mean, most: limits_of(mean), budgets: Vec::new(), said: Vec::new(), objects: Vec::new() }
     }
 
     /// Triangles of a load module that are left to the ground, on average.
@@ -76,15 +80,18 @@ pub fn choose(asked: Asked, suggestion: &Suggestion, text: &str) -> Result<Limit
         Asked::Mean(mean) => Some(mean),
         Asked::Rms(rms_m) => Some(suggestion.triangles_for(rms_m)?),
     };
+    let usual = Limits::of(mean.unwrap_or(BUDGETS[0]));
     // What cannot be opened is refused by a build, in its own words.
-    let opened = Job::from_text(text, Path::new("job")).map(|job| Budgets::open(&job, resources::cores()));
-    let budgets = match opened {
-        Ok(Ok(Some(budgets))) => budgets,
-        Ok(Err(error)) => {
+    let Ok(job) = Job::from_text(text, Path::new("job")) else { return Ok(usual) };
+    let objects = objects_of_job(&job);
+    let usual = Limits { said: objects_said(&objects).into_iter().collect(), objects, ..usual };
+    let budgets = match Budgets::open(&job, resources::cores()) {
+        Ok(Some(budgets)) => budgets,
+        Err(error) => {
             terminal::tell(&format!("note: what budgets would keep of roads and water is not known: {error}"));
-            return Ok(Limits::of(mean.unwrap_or(BUDGETS[0])));
+            return Ok(usual);
         }
-        Ok(Ok(None)) | Err(_) => return Ok(Limits::of(mean.unwrap_or(BUDGETS[0]))),
+        Ok(None) => return Ok(usual),
     };
     let mut tried = Vec::new();
     for rung in BUDGETS {
@@ -102,11 +109,18 @@ pub fn choose(asked: Asked, suggestion: &Suggestion, text: &str) -> Result<Limit
     }
     let Some(chosen) = tried.iter().find(|of| mean.map_or_else(|| of.holds(), |mean| of.mean == mean)).or(tried.last())
     else {
-        return Ok(Limits::of(mean.unwrap_or(BUDGETS[0])));
+        return Ok(usual);
     };
-    let said = Some(sentence(chosen, &tried, mean.is_some()));
+    let said = [vec![sentence(chosen, &tried, mean.is_some())], usual.said].concat();
     let (mean, most) = (chosen.mean, [chosen.per_load_module, chosen.per_window]);
-    Ok(Limits { mean, most, budgets: tried, said })
+    Ok(Limits { mean, most, budgets: tried, said, ..usual })
+}
+
+/// Why objects have these limits.
+fn objects_said(tried: &[ObjectBudget]) -> Option<String> {
+    let chosen = tried.last().filter(|chosen| !chosen.kinds.is_empty())?;
+    let most = grouped(chosen.per_load_module.into());
+    Some(format!("{most} roofs, walls and triangles of woods in a load module keep {}", kept_text(chosen)))
 }
 
 /// Why it is this mean.

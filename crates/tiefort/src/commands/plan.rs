@@ -147,6 +147,7 @@ fn plan_text(
         text += &format!("\n{}", plan_features::tables_text(features, job));
         text += &budgets::table_text(budgets);
     }
+    text += &budgets::objects_text(job, &budgets::objects_of_job(job));
     if !played.is_empty() {
         text += &format!("\n{}", played_table(played).text(0));
     }
@@ -263,6 +264,7 @@ pub fn json_text(
                       "disk_bytes": forecast.disk_bytes },
         "features": features.map(plan_features::tables_json),
         "budgets": budgets::table_json(budgets),
+        "objects": budgets::objects_json(&budgets::objects_of_job(job)),
         "simulation": simulation,
         "tiles": tiles,
     });

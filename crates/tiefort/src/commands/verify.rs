@@ -48,6 +48,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     }
     text += &verdict.network.as_ref().map(network).unwrap_or_default();
     text += &verdict.decks.as_ref().map(|decks| format!("decks: {decks}\n")).unwrap_or_default();
+    text += &verdict.objects.as_ref().map(|objects| format!("objects: {objects}\n")).unwrap_or_default();
     if let Some(held) = verdict.held_vertices {
         text += &format!("{} vertices stand as far outside the posts around them as any may\n", grouped(held));
     }

@@ -165,7 +165,7 @@ fn init_takes_features_from_a_folder_and_refuses_them_alone() {
     fs::write(scene.path("all/settings.json"), "[1, 2]").unwrap();
     let said = scene.run_to(0, &[&["init", "all"], &INIT[..]].concat());
     assert!(said.stdout.contains("roads.geojson\",\n") && !said.stdout.contains("settings"), "{}", said.stdout);
-    let parts = ["all/roads.geojson: found a file of roads, rivers or lakes, expected a raster beside it"];
+    let parts = ["all/roads.geojson: found a file of roads, water or buildings, expected a raster beside it"];
     scene.refuses(&[&["init", "all/roads.geojson"], &INIT[..]].concat(), &parts);
 }
 
