@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-use crate::explained_features::{ExplainedFeatures, explained_features};
+use crate::explained_features::{ExplainedFeatures, ExplainedObjects, explained_features, explained_objects};
 use build::ground::GroundError;
 use build::product::{Product, Wanted, WantedGround};
 use build::{CompileError, Stage};
@@ -63,6 +63,8 @@ pub struct Explanation {
     pub no_ground: Option<String>,
     /// Roads and water here, in jobs with some.
     pub features: Option<ExplainedFeatures>,
+    /// What stands on it, in jobs with objects.
+    pub objects: Option<ExplainedObjects>,
 }
 
 /// The fullest window around a load module.
@@ -128,7 +130,10 @@ pub fn explain(
     let allocation = folder.read_json(files::ALLOCATION)?;
     let splits = splits(&product, workers)?;
     let levels = levels(&folder, planned.tile, module)?;
-    Ok(Explanation { no_ground, levels, ..explained(&product, module, &tin, &allocation, splits.as_deref()) })
+    let found = explained(&product, module, &tin, &allocation, splits.as_deref());
+    let own = &product.modules[product.grid.index(module)];
+    let objects = explained_objects(&folder, &product, own, found.extent_m)?;
+    Ok(Explanation { no_ground, levels, objects, ..found })
 }
 
 fn check_inside(module: ModuleId, product: &Product) -> Result<(), CompileError> {
@@ -209,6 +214,7 @@ fn explained(
         no_ground: None,
         levels: Vec::new(),
         features: explained_features(product, id, [west, south, west + side_m, south + side_m]),
+        objects: None,
     }
 }
 

@@ -1,8 +1,10 @@
-//! What features take of one load module, and what became of them there.
+//! What features and objects take of one load module, and what became of them there.
 
+use build::CompileError;
 use build::product::Product;
-use store::{FeatureFarOff, FeatureLeftOut, FeatureRemark};
-use terrain::ModuleId;
+use std::collections::BTreeMap;
+use store::{FeatureFarOff, FeatureLeftOut, FeatureRemark, Folder, ObjectLeftOut};
+use terrain::{LoadModule, ModuleId, ObjectKind};
 
 /// Roads and water in a load module.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -51,4 +53,42 @@ pub(crate) fn explained_features(product: &Product, id: ModuleId, extent_m: [f64
         remarks: remarks.iter().filter(lies_here).cloned().collect(),
         left_out: level.left_out.iter().filter(touches).cloned().collect(),
     })
+}
+
+/// What stands on a load module.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ExplainedObjects {
+    /// By kind: pieces, and the polygons that they count.
+    pub kinds: Vec<(&'static str, [u64; 2])>,
+    /// The limit of a load module.
+    pub limit: u32,
+    /// What begins in it and had no room, what hides most first.
+    pub left_out: Vec<ObjectLeftOut>,
+    /// What was mended or left out in it.
+    pub remarks: Vec<FeatureRemark>,
+}
+
+/// That of a load module; nothing of a job without objects.
+pub(crate) fn explained_objects(
+    folder: &Folder,
+    product: &Product,
+    module: &LoadModule,
+    [west, south, east, north]: [f64; 4],
+) -> Result<Option<ExplainedObjects>, CompileError> {
+    let Some(spec) = &product.job.objects else { return Ok(None) };
+    let (_, _, outlines) = folder.read_outlines()?;
+    let mut kinds: BTreeMap<ObjectKind, [u64; 2]> = BTreeMap::new();
+    let of_prisms = module.objects.prisms.iter().map(|prism| (prism.kind, prism.polygons()));
+    let of_canopies = module.objects.canopies.iter().map(|canopy| (canopy.kind, canopy.triangles.len()));
+    for (kind, polygons) in of_prisms.chain(of_canopies) {
+        let [count, all] = kinds.entry(kind).or_default();
+        (*count, *all) = (*count + 1, *all + polygons as u64);
+    }
+    let is_here = |[x, y]: [f64; 2]| west <= x && x <= east && south <= y && y <= north;
+    Ok(Some(ExplainedObjects {
+        kinds: kinds.into_iter().map(|(kind, counts)| (kind.name(), counts)).collect(),
+        limit: spec.per_load_module,
+        left_out: outlines.left_out.into_iter().filter(|left| is_here(left.at_m)).collect(),
+        remarks: outlines.remarks.into_iter().filter(|remark| remark.at_m.is_some_and(is_here)).collect(),
+    }))
 }

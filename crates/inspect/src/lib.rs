@@ -13,7 +13,7 @@ pub use fidelity::{
 };
 pub use measures::{BuiltResidual, ClassResidual, DatabaseFidelity, Fidelity, Sights, fidelity, measure};
 mod explained_features;
-pub use explained_features::ExplainedFeatures;
+pub use explained_features::{ExplainedFeatures, ExplainedObjects};
 mod explain;
 pub use explain::{ExplainedRefusal, ExplainedWindow, Explanation, OneMore, explain};
 mod difference;

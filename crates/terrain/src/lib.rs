@@ -45,6 +45,8 @@ mod choices;
 pub use choices::{Effort, HeightFit, LastBatch, Lattice, LodBorder, Resampling, Smooth, TileOrder};
 mod class_colors;
 pub use class_colors::{FEATURE_COLORS, named_class_color};
+mod plan_triangles;
+pub use plan_triangles::plan_triangles;
 mod each;
 pub use each::{Each, gather, in_turn};
 

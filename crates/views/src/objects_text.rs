@@ -1,20 +1,24 @@
 //! Buildings, walls and woods of a report in words.
 
-use store::ReportObjects;
+use store::{ObjectSums, ReportObjects};
 
 use crate::table::{Align, Table, grouped};
 
 use Align::{Left, Right};
 
+/// Kind, kept and wanted in number, in square metres of silhouette, and the share in per cent.
+pub(crate) fn objects_row(sums: &ObjectSums) -> [String; 6] {
+    let share = if 0.0 < sums.wanted_m2 { format!("{:.1}", 100.0 * sums.kept_m2 / sums.wanted_m2) } else { "-".into() };
+    let [kept_m2, wanted_m2] = [sums.kept_m2, sums.wanted_m2].map(|square| grouped(square.round() as u64));
+    [sums.kind.clone(), grouped(sums.kept), grouped(sums.wanted), kept_m2, wanted_m2, share]
+}
+
 /// The block of the text report.
 pub(crate) fn objects_text(objects: &ReportObjects) -> String {
     let mut table = Table::new(&[Left, Right, Right, Right, Right, Right]);
     table.row(["Objects", "kept", "of", "m2 seen", "of", "%"]);
-    for sums in &objects.kinds {
-        let share =
-            if 0.0 < sums.wanted_m2 { format!("{:.1}", 100.0 * sums.kept_m2 / sums.wanted_m2) } else { "-".into() };
-        let [kept_m2, wanted_m2] = [sums.kept_m2, sums.wanted_m2].map(|square| grouped(square.round() as u64));
-        table.row([format!("  {}", sums.kind), grouped(sums.kept), grouped(sums.wanted), kept_m2, wanted_m2, share]);
+    for [kind, numbers @ ..] in objects.kinds.iter().map(objects_row) {
+        table.row([format!("  {kind}")].into_iter().chain(numbers));
     }
     let of = |found: store::ReportObjectLimit| format!("{} of {}", grouped(found.max), grouped(found.limit));
     format!(
@@ -32,7 +36,7 @@ pub(crate) fn objects_text(objects: &ReportObjects) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use store::{ObjectSums, ReportObjectLimit};
+    use store::ReportObjectLimit;
 
     #[test]
     fn what_is_kept_of_what_was_wanted_is_told_by_kind() {

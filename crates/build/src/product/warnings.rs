@@ -6,7 +6,7 @@
 //! that read them; the guide lists all in one table.
 
 use job::Job;
-use store::{AreaLevel, FeatureAmounts, Report};
+use store::{AreaLevel, FeatureAmounts, ObjectSums, Report};
 
 use crate::product::earthworks;
 
@@ -44,7 +44,7 @@ pub struct Matter {
 }
 
 /// All that a build knows of what it made, in the order in which warnings are told.
-pub const MATTERS: [Matter; 17] = [
+pub const MATTERS: [Matter; 18] = [
     matter(
         "files, datums, holes and rules of sources that are not as they should be",
         Told::OfStage,
@@ -55,6 +55,11 @@ pub const MATTERS: [Matter; 17] = [
          out for limits",
         Told::Warning(left_out),
         "networks are no longer whole; larger limits keep them, as tiefort plan tells",
+    ),
+    matter(
+        "more than 5 % of what objects of a kind hide left out for [objects.limits]",
+        Told::Warning(objects_left_out),
+        "lines of sight go where buildings or woods stand; larger limits keep them, as tiefort plan tells",
     ),
     matter(
         "more than 5 % of a class of ways, and 100 m, beyond the limits of cut and fill, or 1 % beyond twice these",
@@ -198,6 +203,23 @@ fn left_out_of(job: &Job, level: &AreaLevel) -> Vec<String> {
         warnings.push(format!("{lakes} of {all} lakes of a hectare and more had no room and are left out"));
     }
     warnings
+}
+
+/// Too much of what objects hide had no room.
+fn objects_left_out(made: &Made) -> Vec<String> {
+    const KEPT_MIN: f64 = 0.95;
+    let kinds = made.report.objects.iter().flat_map(|objects| &objects.kinds);
+    let thin = kinds.filter(|sums| sums.kept_m2 < KEPT_MIN * sums.wanted_m2);
+    let told = |sums: &ObjectSums| {
+        let percent = 100.0 * (1.0 - sums.kept_m2 / sums.wanted_m2);
+        let ObjectSums { kind, wanted, kept, .. } = sums;
+        format!(
+            "{percent:.1} % of what objects of kind {kind} hide had no room and is left out: {} of {wanted} objects; \
+             tiefort plan tells which [objects.limits] keep them",
+            wanted - kept
+        )
+    };
+    thin.map(told).collect()
 }
 
 /// Ways lie farther off the ground than cut and fill may be.

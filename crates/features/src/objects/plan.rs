@@ -1,11 +1,10 @@
-//! Exact operations on plans: outlines with holes, whose places are whole quanta. All of them are those of `i_overlay`
-//! and `i_triangle`, which compute in whole numbers; their results are put into one order.
+//! Exact operations on plans: outlines with holes, whose places are whole quanta. All of them are those of
+//! `i_overlay`, which computes in whole numbers; its results are put into one order.
 
 use i_overlay::core::fill_rule::FillRule;
 use i_overlay::core::overlay::{Overlay, ShapeType};
 use i_overlay::core::overlay_rule::OverlayRule;
 use i_overlay::i_float::int::point::IntPoint;
-use i_triangle::int::triangulatable::IntTriangulatable;
 
 /// Quanta of a metre.
 pub(super) const METRE: f64 = terrain::QUANTA_PER_METRE as f64;
@@ -61,14 +60,6 @@ pub(super) fn union(plans: &[Plan]) -> Vec<Plan> {
 /// What both cover.
 pub(super) fn common(subject: &[Plan], clip: &[Plan]) -> Vec<Plan> {
     run(subject, clip, OverlayRule::Intersect, FillRule::NonZero)
-}
-
-/// Places and triangles, counter-clockwise, that cover a plan exactly once.
-pub(super) fn triangles(plan: &Plan) -> (Vec<At>, Vec<[u32; 3]>) {
-    let shape: Vec<Vec<IntPoint<i32>>> = plan.iter().map(|ring| to_points(ring)).collect();
-    let made = shape.triangulate().to_triangulation::<u32>();
-    let triangles = made.indices.as_chunks().0.to_vec();
-    (made.points.iter().map(|at| [at.x, at.y]).collect(), triangles)
 }
 
 /// Twice the area, holes taken off.

@@ -4,9 +4,9 @@ use std::path::PathBuf;
 
 use build::product::WantedGround;
 use clap::Args;
-use inspect::{ExplainedFeatures, Explanation, explain};
+use inspect::{ExplainedFeatures, ExplainedObjects, Explanation, explain};
 use serde_json::{Value, json};
-use store::{FeatureFarOff, FeatureLeftOut, FeatureRemark, FeatureWhy};
+use store::{FeatureFarOff, FeatureLeftOut, FeatureRemark, FeatureWhy, ObjectLeftOut};
 use terrain::{ModuleId, RefusedBy, StopReason, TileId};
 use views::{Align, Table, fold, grouped};
 
@@ -64,6 +64,10 @@ fn text(found: &Explanation) -> String {
     text += "\n";
     if let Some(features) = &found.features {
         text += &features_text(features);
+        text += "\n";
+    }
+    if let Some(objects) = &found.objects {
+        text += &objects_text(objects);
         text += "\n";
     }
     text += &refused_text(found);
@@ -167,6 +171,59 @@ fn features_text(features: &ExplainedFeatures) -> String {
         text += &format!("  and {} more: --format json\n", grouped(more as u64));
     }
     text
+}
+
+fn objects_text(objects: &ExplainedObjects) -> String {
+    let all: u64 = objects.kinds.iter().map(|(_, [_, polygons])| polygons).sum();
+    let limit = grouped(objects.limit.into());
+    let mut text = match all {
+        0 => "No building and no wood.\n".to_owned(),
+        _ => format!("Buildings and woods count {} polygons; the limit is {limit}:\n", grouped(all)),
+    };
+    let mut table = Table::new(&[Align::Left, Align::Right, Align::Left]);
+    for (kind, [count, polygons]) in &objects.kinds {
+        table.row([*kind, &grouped(*count), &format!("with {} roofs, walls and triangles", grouped(*polygons))]);
+    }
+    for remark in objects.remarks.iter().take(REMARKS_MAX) {
+        let FeatureRemark { feature, found, done, .. } = remark;
+        table.row(["remark", "", &format!("{feature}: {found}; {done}")]);
+    }
+    text += &table.text(2);
+    for left in objects.left_out.iter().take(REMARKS_MAX) {
+        let [east, north] = left.at_m;
+        text += &format!("  left out: {}, {:.1} m high, at {east:.0} {north:.0}: ", left.kind, left.height_m);
+        text += &format!("{}\n", full_text(left));
+    }
+    let more = (objects.left_out.len() + objects.remarks.len()).saturating_sub(2 * REMARKS_MAX);
+    if 0 < more {
+        text += &format!("  and {} more in objects.geojson\n", grouped(more as u64));
+    }
+    text
+}
+
+/// What had no room for an object.
+fn full_text(left: &ObjectLeftOut) -> String {
+    let [row, col] = left.full;
+    match left.is_window {
+        true => format!("the 4 km square from load module {row},{col} has no room"),
+        false => format!("load module {row},{col} has no room"),
+    }
+}
+
+fn objects_json(objects: &ExplainedObjects) -> Value {
+    let kind =
+        |(name, [count, polygons]): &(&str, [u64; 2])| json!({ "kind": name, "count": count, "polygons": polygons });
+    let left = |left: &ObjectLeftOut| {
+        json!({ "kind": left.kind, "place_m": left.at_m, "height_m": left.height_m,
+                "silhouette_m2": left.silhouette_m2, "why": full_text(left) })
+    };
+    let remark = |remark: &FeatureRemark| json!({ "object": remark.feature, "place_m": remark.at_m, "found": remark.found, "done": remark.done });
+    json!({
+        "kinds": objects.kinds.iter().map(kind).collect::<Vec<_>>(),
+        "limit": objects.limit,
+        "left_out": objects.left_out.iter().map(left).collect::<Vec<_>>(),
+        "remarks": objects.remarks.iter().map(remark).collect::<Vec<_>>(),
+    })
 }
 
 /// Why something is not in the ground, a limit with its place.
@@ -334,5 +391,6 @@ pub fn to_json(found: &Explanation) -> Value {
         })).collect::<Vec<_>>(),
         "no_ground": found.no_ground,
         "features": found.features.as_ref().map(features_json),
+        "objects": found.objects.as_ref().map(objects_json),
     })
 }

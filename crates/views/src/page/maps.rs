@@ -130,7 +130,7 @@ pub(super) fn maps(scene: &Scene) -> Markup {
 
 /// Roads and water, and what became of them.
 pub(super) fn features(scene: &Scene) -> Markup {
-    let caption = "Where roads and water run, and where something was wrong with one.";
+    let caption = "Where roads and water run, what stands beside them, and where something was wrong with one.";
     figures(scene, Map::Features, MAP_PIXELS, caption)
 }
 

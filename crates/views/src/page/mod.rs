@@ -95,6 +95,12 @@ pub fn report_html(page: &Page) -> String {
                             @if let Some(scene) = page.scene { (maps::features(scene)) }
                         }
                     }
+                    @if let Some(objects) = &report.objects {
+                        section id="objects" {
+                            h2 { "Buildings and woods" } (tables::objects(objects))
+                            @if let (None, Some(scene)) = (&report.features, page.scene) { (maps::features(scene)) }
+                        }
+                    }
                     @match page.scene {
                         Some(scene) => {
                             section.whole id="maps" { h2 { "Maps" } (maps::maps(scene)) }
@@ -114,10 +120,11 @@ pub fn report_html(page: &Page) -> String {
     page.into_string()
 }
 
-const SECTIONS: [(&str, &str); 8] = [
+const SECTIONS: [(&str, &str); 9] = [
     ("limits", "Limits"),
     ("residuals", "Residuals"),
     ("features", "Roads and water"),
+    ("objects", "Buildings and woods"),
     ("maps", "Maps"),
     ("worst", "Worst load modules"),
     ("breaches", "Breaches"),
@@ -128,9 +135,11 @@ const SECTIONS: [(&str, &str); 8] = [
 /// Those that this page has.
 fn sections(page: &Page) -> impl Iterator<Item = (&'static str, &'static str)> {
     let (has_scene, has_features) = (page.scene.is_some(), page.report.features.is_some());
+    let has_objects = page.report.objects.is_some();
     SECTIONS.into_iter().filter(move |&(id, _)| match id {
         "worst" => has_scene,
         "features" => has_features,
+        "objects" => has_objects,
         _ => true,
     })
 }

@@ -1,7 +1,7 @@
 //! Tables of the page: limits and advice, residuals, breaches, times, sources.
 
 use maud::{Markup, html};
-use store::{Manifest, Report, ReportEarthworks, ReportFeatures, ReportResidual};
+use store::{Manifest, Report, ReportEarthworks, ReportFeatures, ReportObjectLimit, ReportObjects, ReportResidual};
 
 use super::advise;
 use super::marks::{BOUND_ROWS_MAX, Marks, ROWS_MAX};
@@ -9,6 +9,7 @@ use crate::against::{Residual, WORKING, told};
 use crate::features_text::{
     amounts, check_rows, clearances_in_words, cost, earthwork, is_thin, kept, remarks_in_words,
 };
+use crate::objects_text::objects_row;
 use crate::report::{border_in_words, eta_of, heights_in_words};
 use crate::table::grouped;
 
@@ -263,6 +264,24 @@ pub(super) fn features(features: &ReportFeatures) -> Markup {
         }))
         @if let Some(words) = clearances_in_words(features) { p.quiet { "The " (words) "." } }
         @if !features.earthworks.classes.is_empty() { (earthworks(&features.earthworks)) }
+    }
+}
+
+/// How much of what stands on the ground has room.
+pub(super) fn objects(objects: &ReportObjects) -> Markup {
+    let limit = |of: ReportObjectLimit| format!("{} of {}", grouped(of.max), grouped(of.limit));
+    html! {
+        (table(html! { th { "Kind" } th.n { "kept" } th.n { "of" } th.n { "m2 seen from the side" } th.n { "of" }
+            th.n { "kept" } }, html! {
+            @for [kind, numbers @ ..] in objects.kinds.iter().map(objects_row) {
+                tr { td { (kind) } @for cell in numbers { td.n { (cell) } } }
+            }
+        }))
+        p {
+            (grouped(objects.polygons)) " roofs, walls and triangles of woods: " (limit(objects.per_load_module))
+            " in the fullest load module, " (limit(objects.per_4km)) " in the fullest square of 4 km. "
+            (grouped(objects.left_out)) " had no room; " (grouped(objects.remarks)) " remarks, in objects.geojson."
+        }
     }
 }
 

@@ -6,6 +6,7 @@ use terrain::Role;
 use terrain::{Dem, HOLE_CLASS, LoadModule, ModuleGrid, Post, QUANTA_PER_METRE, Spacing, Tin, metres_of_quanta};
 
 use super::map_extent::slope;
+use super::objects::{Solid, solids};
 use super::scene::{Scene, SceneFeatures};
 
 /// Triangles with the places of their corners: east, north and up, in metres.
@@ -26,6 +27,8 @@ pub struct Facets {
     pub(crate) decks: Vec<([[f64; 3]; 3], u8)>,
     /// Edges that are the middle of a road, a river or a stream, and their place among the colours of features.
     pub(crate) lines: Vec<([[f64; 3]; 2], u8)>,
+    /// What stands on the ground.
+    pub(crate) objects: Vec<Solid>,
 }
 
 /// What a triangle or a post lies over.
@@ -58,6 +61,7 @@ impl Facets {
             covers: Vec::new(),
             decks: Vec::new(),
             lines: Vec::new(),
+            objects: Vec::new(),
         }
     }
 
@@ -88,6 +92,9 @@ impl Facets {
         modules: impl IntoIterator<Item = &'a LoadModule> + Clone,
     ) -> Self {
         let mut facets = self.with_covers(modules.clone(), scene.water);
+        let corner =
+            |module: &LoadModule| [module.id.col, module.id.row].map(|index| f64::from(index) * scene.side_m());
+        facets.objects = modules.clone().into_iter().flat_map(|module| solids(module, corner(module))).collect();
         if let Some(features) = scene.features {
             let decks = modules.clone().into_iter().filter(|module| !module.decks.is_empty());
             facets.decks = decks.flat_map(|module| decks_of(module, scene, &features)).collect();

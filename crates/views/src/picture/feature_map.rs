@@ -1,9 +1,10 @@
-//! Where roads and water run, and marks where one was mended, degraded or left out.
+//! Where roads and water run, what stands beside them, and marks where one was mended, degraded or left out.
 
 use super::color::{BOUND, BREACH, Color, GREY, WHITE, mix};
 use super::facets::Facets;
 use super::features::{draw_left_out, draw_lines, keys, pixel, shows};
 use super::image::Image;
+use super::objects::{draw_plans, object_keys};
 use super::relief::{Tints, facets_relief};
 use super::scene::Scene;
 use super::sheet::{Drawing, Key, Legend, Sheet};
@@ -30,6 +31,7 @@ pub(crate) fn feature_map(scene: &Scene, longest: usize) -> Drawing {
     let (wide, high) = (map_extent.pixels[0], map_extent.pixels[1]);
     let faint = (0..wide * high).map(|place| mix(relief.pixel(place % wide, place / wide), WHITE, 0.6)).collect();
     let mut map = Image::of(wide, high, faint);
+    draw_plans(&mut map, &map_extent, scene);
     let remarks = scene.features.map_or(&[][..], |features| features.remarks);
     let (half, mut counts) = (half_side(remarks.len()), [0_u64; 3]);
     for (number, (word, color)) in OUTCOMES.into_iter().enumerate() {
@@ -45,8 +47,9 @@ pub(crate) fn feature_map(scene: &Scene, longest: usize) -> Drawing {
     draw_lines(&mut map, &map_extent, scene, 1.4);
     let marks = OUTCOMES.iter().zip(counts).rev();
     let marks = marks.map(|((word, color), count)| (Key::Filled(*color), format!("{word}: {}", grouped(count))));
+    let on_map = [keys(|cover| shows(scene, &facets, cover)), object_keys(scene)].concat();
     let legends = vec![
-        Legend::Keys { title: "Roads and water".into(), keys: keys(|cover| shows(scene, &facets, cover)) },
+        Legend::Keys { title: "What is there".into(), keys: on_map },
         Legend::Keys { title: "What became of them".into(), keys: marks.collect() },
     ];
     let dotted = if has_left_out { " Dotted lines are left out of the ground." } else { "" };

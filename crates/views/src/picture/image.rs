@@ -62,6 +62,32 @@ impl Image {
         }
     }
 
+    /// Fills what rings enclose an odd number of times: pixels whose middles lie inside; a whole number is a middle.
+    pub(crate) fn fill_rings(&mut self, rings: &[&[[f64; 2]]], color: Color) {
+        let ends = |ring: &&[[f64; 2]]| -> Vec<([f64; 2], [f64; 2])> {
+            ring.iter().copied().zip(ring.iter().copied().cycle().skip(1)).collect()
+        };
+        let edges: Vec<([f64; 2], [f64; 2])> = rings.iter().flat_map(ends).collect();
+        let (low, high) = edges
+            .iter()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), (a, _)| (low.min(a[1]), high.max(a[1])));
+        let mut crossings = Vec::new();
+        for y in low.ceil().max(0.0) as i64..=high.floor().min(self.high as f64 - 1.0) as i64 {
+            let at = y as f64;
+            let crossing = |(a, b): &([f64; 2], [f64; 2])| {
+                ((a[1] <= at) != (b[1] <= at)).then(|| a[0] + (at - a[1]) / (b[1] - a[1]) * (b[0] - a[0]))
+            };
+            crossings.clear();
+            crossings.extend(edges.iter().filter_map(crossing));
+            crossings.sort_by(f64::total_cmp);
+            for pair in crossings.as_chunks::<2>().0 {
+                for x in pair[0].ceil().max(0.0) as i64..pair[1].ceil().min(self.wide as f64) as i64 {
+                    self.blend(x, y, color, 1.0);
+                }
+            }
+        }
+    }
+
     /// Draws the outline of a rectangle, `thick` pixels inwards.
     pub(crate) fn outline(&mut self, [left, top, wide, high]: [i64; 4], thick: i64, color: Color) {
         self.fill([left, top, wide, thick], color);

@@ -18,6 +18,7 @@ mod features;
 mod image;
 mod map_extent;
 mod module_maps;
+mod objects;
 mod panels;
 mod perspective;
 mod relief;

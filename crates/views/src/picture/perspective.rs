@@ -10,6 +10,7 @@ use super::color::{Color, FEATURES, GREY, HAZE, INK, NOTHING, SKY, WATER, WHITE,
 use super::depth::{Corner, DepthImage};
 use super::facets::{Cover, Facets, light_of_triangle};
 use super::image::Image;
+use super::objects::Solid;
 use super::relief::{Tints, lights, range_m};
 
 /// What stands in a picture.
@@ -314,7 +315,8 @@ impl Stage {
         }
     }
 
-    /// Lines of features, and bridges with sides that hang from them: else one seen from a bank would be a line.
+    /// Lines of features, what stands on the ground, and bridges with sides that hang from them: else one seen from a
+    /// bank would be a line.
     fn draw_features(&mut self, surface: &Surface, times: f64) {
         let Surface::Triangles(facets) = surface else { return };
         let (view, half_m) = (self.view, self.haze_half_m);
@@ -337,6 +339,10 @@ impl Stage {
                 self.depth.triangle(&view, [corner(a, DECK_HUNG_M), corner(b, DECK_HUNG_M), hung[1]], &side);
                 self.depth.triangle(&view, [corner(a, DECK_HUNG_M), hung[1], hung[0]], &side);
             }
+        }
+        for Solid { corners, color } in &facets.objects {
+            let paint = |_: [f64; 2], ahead: f64| mix(*color, HAZE, haze_share(ahead, half_m));
+            self.depth.triangle(&view, corners.map(|at| corner(at, 0.0)), &paint);
         }
     }
 

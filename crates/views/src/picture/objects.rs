@@ -1,0 +1,148 @@
+//! What stands on the ground, in pictures: solid in views of the area, as plans on maps.
+
+use terrain::{Canopy, Corner, LoadModule, ObjectKind, Prism, QUANTA_PER_METRE, plan_triangles};
+
+use super::color::{Color, lit};
+use super::image::Image;
+use super::map_extent::MapExtent;
+use super::scene::Scene;
+use super::sheet::Key;
+
+/// A triangle of a wall, a roof or a crown, in metres from the area's south-west post, and its colour under its light.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Solid {
+    pub(crate) corners: [[f64; 3]; 3],
+    pub(crate) color: Color,
+}
+
+/// The colour of a kind: of walls, or of leaves.
+fn color_of(kind: ObjectKind) -> Color {
+    match kind {
+        ObjectKind::Building => [186, 168, 150],
+        ObjectKind::Tower => [150, 150, 156],
+        ObjectKind::Wall => [140, 132, 122],
+        ObjectKind::Wood => [62, 96, 58],
+        ObjectKind::Scrub => [120, 138, 82],
+        ObjectKind::Orchard => [98, 134, 74],
+        ObjectKind::Row => [78, 112, 66],
+    }
+}
+
+/// Roofs of buildings.
+const ROOF: Color = [146, 84, 68];
+
+/// What stands on a load module whose south-west corner is `corner_m`.
+pub(crate) fn solids(module: &LoadModule, corner_m: [f64; 2]) -> Vec<Solid> {
+    let mut all = Vec::new();
+    module.objects.prisms.iter().for_each(|prism| add_prism(prism, corner_m, &mut all));
+    module.objects.canopies.iter().for_each(|canopy| add_canopy(canopy, module, corner_m, &mut all));
+    all
+}
+
+fn metres(quanta: i32) -> f64 {
+    f64::from(quanta) / f64::from(QUANTA_PER_METRE)
+}
+
+fn add_prism(prism: &Prism, corner_m: [f64; 2], all: &mut Vec<Solid>) {
+    let [base, roof] = [prism.base, prism.roof].map(metres);
+    let at = |x: i32, y: i32, z: f64| [corner_m[0] + metres(x), corner_m[1] + metres(y), z];
+    for (a, b) in prism.rings.iter().flat_map(|ring| edges(ring)).filter(|(a, _)| a.has_wall) {
+        let [a, b] = [a, b].map(|corner| [i32::from(corner.x), i32::from(corner.y)]);
+        add_wall([at(a[0], a[1], base), at(b[0], b[1], base)], [roof; 2], color_of(prism.kind), all);
+    }
+    let ring = |ring: &Vec<Corner>| ring.iter().map(|corner| [corner.x, corner.y].map(i32::from)).collect();
+    let (places, triangles) = plan_triangles(&prism.rings.iter().map(ring).collect::<Vec<Vec<[i32; 2]>>>());
+    let color = if prism.kind == ObjectKind::Building { ROOF } else { color_of(prism.kind) };
+    let place = |index: u32| at(places[index as usize][0], places[index as usize][1], roof);
+    all.extend(triangles.iter().map(|triangle| Solid { corners: triangle.map(place), color }));
+}
+
+fn edges(ring: &[Corner]) -> impl Iterator<Item = (Corner, Corner)> {
+    ring.iter().copied().zip(ring.iter().copied().cycle().skip(1))
+}
+
+/// An upright wall over two places, up to the heights `tops`, under light from the north-west.
+fn add_wall([a, b]: [[f64; 3]; 2], tops: [f64; 2], color: Color, all: &mut Vec<Solid>) {
+    const LIGHT: [f64; 2] = [-std::f64::consts::FRAC_1_SQRT_2, std::f64::consts::FRAC_1_SQRT_2];
+    let run = [b[0] - a[0], b[1] - a[1]];
+    let length = (run[0] * run[0] + run[1] * run[1]).sqrt();
+    // Rings run counter-clockwise, so outside lies to the right.
+    let towards = (LIGHT[0] * run[1] - LIGHT[1] * run[0]) / length.max(1e-9);
+    let color = lit(color, (0.82 + 0.2 * towards) as f32);
+    let [top_a, top_b] = [[a[0], a[1], tops[0]], [b[0], b[1], tops[1]]];
+    all.push(Solid { corners: [a, b, top_b], color });
+    all.push(Solid { corners: [a, top_b, top_a], color });
+}
+
+/// The top of a canopy, and its sides where it ends.
+fn add_canopy(canopy: &Canopy, module: &LoadModule, corner_m: [f64; 2], all: &mut Vec<Solid>) {
+    let ground: Vec<f64> = canopy.places.iter().map(|place| ground_under(module, *place)).collect();
+    let height_m = metres(canopy.height.into());
+    let at = |index: u16, up: f64| {
+        let [x, y] = canopy.places[usize::from(index)].map(i32::from).map(metres);
+        [corner_m[0] + x, corner_m[1] + y, ground[usize::from(index)] + up]
+    };
+    let color = color_of(canopy.kind);
+    all.extend(canopy.triangles.iter().map(|triangle| {
+        let corners = triangle.map(|index| at(index, height_m));
+        Solid { corners, color: lit(color, super::facets::light_of_triangle(corners, 1.0)) }
+    }));
+    let directed = || canopy.triangles.iter().flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)]);
+    let inner: std::collections::BTreeSet<(u16, u16)> = directed().collect();
+    for (a, b) in directed().filter(|(a, b)| !inner.contains(&(*b, *a))) {
+        let tops = [at(a, height_m)[2], at(b, height_m)[2]];
+        add_wall([at(a, 0.0), at(b, 0.0)], tops, lit(color, 0.8), all);
+    }
+}
+
+/// Height of the ground of a load module at a place in it, in metres.
+fn ground_under(module: &LoadModule, [x, y]: [u16; 2]) -> f64 {
+    let [x, y] = [f64::from(x), f64::from(y)];
+    let found = module.triangles.iter().find_map(|triangle| {
+        let [a, b, c] = triangle.map(|index| {
+            let vertex = &module.vertices[usize::from(index)];
+            [f64::from(vertex.x), f64::from(vertex.y), metres(vertex.z)]
+        });
+        let left = |p: [f64; 3], q: [f64; 3]| (q[0] - p[0]) * (y - p[1]) - (q[1] - p[1]) * (x - p[0]);
+        let shares = [left(b, c), left(c, a), left(a, b)];
+        let all: f64 = shares.iter().sum();
+        let is_over = 0.0 < all && shares.iter().all(|share| 0.0 <= *share);
+        is_over.then(|| (shares[0] * a[2] + shares[1] * b[2] + shares[2] * c[2]) / all)
+    });
+    found.unwrap_or(0.0)
+}
+
+/// Draws the plans of what stands on the load modules of a scene, woods below buildings.
+pub(crate) fn draw_plans(image: &mut Image, map_extent: &MapExtent, scene: &Scene) {
+    for module in scene.modules {
+        let corner = [module.id.col, module.id.row].map(|index| f64::from(index) * scene.side_m());
+        let at = |[x, y]: [u16; 2]| {
+            map_extent.at([corner[0] + metres(x.into()), corner[1] + metres(y.into())]).map(|at| at - 0.5)
+        };
+        for canopy in &module.objects.canopies {
+            for triangle in &canopy.triangles {
+                let ring = triangle.map(|index| at(canopy.places[usize::from(index)]));
+                image.fill_rings(&[&ring], color_of(canopy.kind));
+            }
+        }
+        for prism in &module.objects.prisms {
+            let rings: Vec<Vec<[f64; 2]>> =
+                prism.rings.iter().map(|ring| ring.iter().map(|corner| at([corner.x, corner.y])).collect()).collect();
+            let color = if prism.kind == ObjectKind::Building { ROOF } else { color_of(prism.kind) };
+            image.fill_rings(&rings.iter().map(Vec::as_slice).collect::<Vec<_>>(), color);
+        }
+    }
+}
+
+/// The colours of kinds that stand on the load modules of a scene.
+pub(crate) fn object_keys(scene: &Scene) -> Vec<(Key, String)> {
+    let objects = || scene.modules.iter().map(|module| &module.objects);
+    let has = |kind: &ObjectKind| {
+        objects().any(|all| {
+            all.prisms.iter().any(|prism| prism.kind == *kind) || all.canopies.iter().any(|wood| wood.kind == *kind)
+        })
+    };
+    let color = |kind: ObjectKind| if kind == ObjectKind::Building { ROOF } else { color_of(kind) };
+    let there = ObjectKind::ALL.into_iter().filter(has);
+    there.map(|kind| (Key::Filled(color(kind)), kind.name().to_owned())).collect()
+}
