@@ -120,6 +120,7 @@ class Attack:
         found["level"] += judge.levels(database)
         found["deck crack"] += judge.deck_cracks(database)
         found["deck"] += judge.sunken_decks(database)
+        found["object"] += judge.standing(database, *self.scene.job.object_limits)
         found["river"] += judge.feature_lines(database) + judge.rising_lines(database)
         for kind, faults in found.items():
             for fault in faults[:3]:

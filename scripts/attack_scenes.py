@@ -443,6 +443,69 @@ class Network:
         path.write_text(json.dumps({"type": "FeatureCollection", "features": found}))
 
 
+class Objects(Network):
+    """Buildings, walls and woods, some of them bad; drawn apart, so that networks of a seed stay as they are."""
+
+    def __init__(self, draw, grid):
+        self.draw, self.grid, self.features = draw, grid, []
+        makers = [self.house, self.house, self.house, self.row_of_houses, self.wood, self.wood, self.wall, self.bad]
+        for _ in range(draw.choice([1, 4, 15, 60])):
+            draw.choice(makers)()
+
+    def building(self):
+        tags = {"building": self.draw.choice(["yes", "house", "church", "garage"])}
+        if self.draw.random() < 0.5:
+            tags["height"] = self.draw.choice(["3", "12 m", "25.5", "140"])
+        elif self.draw.random() < 0.5:
+            tags["building:levels"] = str(self.draw.randint(1, 30))
+        return tags
+
+    def block(self, x, y, wide, deep, turn=0.0):
+        corners = [(0, 0), (wide, 0), (wide, deep), (0, deep), (0, 0)]
+        cos, sin = math.cos(turn), math.sin(turn)
+        return [(x + cos * a - sin * b, y + sin * a + cos * b) for a, b in corners]
+
+    def house(self):
+        (x, y), draw = self.somewhere(), self.draw
+        if draw.random() < 0.3:
+            # On a line between load modules, or on the corner of four.
+            x = 500 * round(x / 500) + draw.uniform(-20, 20)
+            y = 500 * round(y / 500) + draw.uniform(-20, 20) if draw.random() < 0.5 else y
+        wide, deep = draw.uniform(4, 60), draw.uniform(4, 60)
+        rings = [self.block(x, y, wide, deep, draw.choice([0, 0, draw.uniform(0, 3)]))]
+        if min(wide, deep) > 20 and draw.random() < 0.3:
+            rings = [self.block(x, y, wide, deep), self.block(x + 6, y + 6, wide - 12, deep - 12)]
+        self.add("Polygon", rings, self.building())
+
+    def row_of_houses(self):
+        (x, y), side = self.somewhere(0), self.draw.uniform(6, 15)
+        for number in range(self.draw.randint(3, 30)):
+            self.add("Polygon", [self.block(x + number * side, y, side, side)], self.building())
+
+    def wood(self):
+        tags = self.draw.choice([{"natural": "wood"}, {"landuse": "forest"}, {"natural": "scrub"},
+                                 {"landuse": "orchard"}, {"natural": "wood", "height": "30"}])
+        self.add("Polygon", [self.blob(3, 60)[2]], tags)
+
+    def wall(self):
+        tags = self.draw.choice([{"barrier": "wall"}, {"barrier": "hedge"}, {"natural": "tree_row"},
+                                 {"barrier": "city_wall"}])
+        self.add("LineString", self.walk(), tags)
+
+    def bad(self):
+        (x, y), tags = self.somewhere(0), self.building()
+        far = 1e7 if self.draw.random() < 0.2 else 60
+        ring = self.draw.choice([
+            [(x, y), (x + 40, y + 40), (x + 40, y), (x, y + 40), (x, y)],
+            [(x, y), (x + far, y), (x + 30, y), (x, y)],
+            [(x, y), (x + 1, y), (x + 1, y + 1), (x, y)],
+            [(x, y), (x + far, y + 1), (x + far, y + far), (x, y + 30), (x, y)],
+        ])
+        tags["height"] = self.draw.choice(["-5", "1e9", "3 storeys", "nan", "9"])
+        for _ in range(self.draw.choice([1, 1, 2])):
+            self.add("Polygon", [ring], tags)
+
+
 # Jobs.
 
 
@@ -458,11 +521,13 @@ class Job:
         self.sections = {"area": {"name": '"attack"', "crs": f'"{CRS}"', "origin_m": f"[{west}, {south}]",
                                   "size_m": f"[{grid.width_m}, {grid.height_m}]", "spacing_m": f"{grid.spacing_m}"}}
         self.limits = {}
+        self.object_limits = (400, 12800)
         self.pinned = []
         self.clip = not has_features and draw.random() < 0.2
         self.paper = not has_features and not self.clip and draw.random() < 0.1
         self.dem()
         self.features(has_features)
+        self.objects(scene.objects)
         self.importance()
         self.tiles()
         self.budget()
@@ -526,6 +591,23 @@ class Job:
         if draw.random() < 0.1:
             rules.append('{ where = { highway = [] }, kind = "motorway" }')
         self.sections["features"]["rules"] = f"[{', '.join(rules)}]"
+
+    def objects(self, wanted):
+        if not wanted or self.clip:
+            return
+        draw = random.Random(f"objects of {self.folder.name} {self.tag}")
+        own = {"sources": f'[{{ file = "objects.geojson", crs = "{CRS}" }}]'}
+        if draw.random() < 0.5:
+            self.object_limits = draw.choice([(40, 500), (400, 3000), (100000, 3200000)])
+            own["limits"] = "{{ per_load_module = {}, per_4km_square = {} }}".format(*self.object_limits)
+        if draw.random() < 0.3:
+            own["corners_max"] = draw.choice(["4", "8", "40"])
+        if draw.random() < 0.3:
+            own["area_min_m2"] = draw.choice(["0", "200"])
+        if draw.random() < 0.2:
+            own["rules"] = '[{ where = { building = ["church"] }, height_m = 40 }, ' \
+                '{ where = { building = ["garage"] }, kind = "none" }]'
+        self.sections["objects"] = own
 
     def importance(self):
         draw = self.draw
@@ -657,4 +739,8 @@ class Scene:
         self.network = Network(self.draw, self.grid) if self.draw.random() < 0.55 else None
         if self.network:
             self.network.write(folder / "features.geojson")
+        apart = random.Random(f"objects {seed}")
+        self.objects = Objects(apart, self.grid) if apart.random() < 0.4 else None
+        if self.objects:
+            self.objects.write(folder / "objects.geojson")
         self.job = Job(self.draw, self)

@@ -18,6 +18,7 @@ lakes        heights over all vertices of connected triangles of water
 decks        how far decks stand above the triangles under them, exactly, over their whole area
 feature_lines  lines of features.gpkg are edges of triangles, and channels fall
 rising_lines   the same of the lines in load modules
+standing       walls reach the ground, roofs stand over it, pieces of an object fit together, limits of objects hold
 """
 
 import argparse
@@ -74,6 +75,7 @@ class Module:
     ground: Mesh
     decks: Mesh = None
     lines: list = field(default_factory=list)
+    objects: list = field(default_factory=list)
 
 
 def triangle_count(module):
@@ -122,6 +124,7 @@ class Database:
                     Mesh.of(part, west, south),
                     Mesh.of(decks, west, south) if decks and decks["triangles"] else None,
                     part.get("lines", []),
+                    part.get("objects", []),
                 )
         rows, columns = first["area_modules"]
         report = folder / "report.json"
@@ -691,6 +694,68 @@ def judge(database, limits_of_job=None, posts=None, own_borders=False, exempt=No
         faults += beyond(database, posts, exempt).faults
     faults += uneven_lakes(database, water) + sunken_decks(database)
     return faults + feature_lines(database) + rising_lines(database)
+
+
+def heights_at(mesh, x, y):
+    """Heights of a mesh at places, in quanta; NaN where it has none."""
+    found = np.full(len(x), np.nan)
+    for cx, cy, cz in zip(*mesh.corners()):
+        near = (cx.min() <= x) & (x <= cx.max()) & (cy.min() <= y) & (y <= cy.max()) & np.isnan(found)
+        if not near.any():
+            continue
+        px, py = x[near] - cx[0], y[near] - cy[0]
+        ux, uy, vx, vy = cx[1] - cx[0], cy[1] - cy[0], cx[2] - cx[0], cy[2] - cy[0]
+        area = ux * vy - uy * vx
+        s, t = (px * vy - py * vx) / area, (ux * py - uy * px) / area
+        held = (-1e-9 <= s) & (-1e-9 <= t) & (s + t <= 1 + 1e-9)
+        found[np.flatnonzero(near)[held]] = (cz[0] + s * (cz[1] - cz[0]) + t * (cz[2] - cz[0]))[held]
+    return found
+
+
+def along_walls(rings, step=128.0):
+    """Places along the edges of rings, a metre apart at most."""
+    places = []
+    for ring in rings:
+        corners = np.array([corner[:2] for corner in ring], float)
+        for a, b in zip(corners, np.roll(corners, -1, axis=0)):
+            count = max(math.ceil(np.hypot(*(b - a)) / step), 1)
+            places.append(a + np.arange(count)[:, None] / count * (b - a))
+    return np.concatenate(places)
+
+
+def standing(database, per_module, per_window):
+    """What is wrong with objects, none of which hang in the air; limits in polygons of a load module and of 4 km."""
+    faults, roofs, highest = [], {}, {}
+    counts = np.zeros((database.rows, database.columns), int)
+    for place, module in database.levels[0].items():
+        others = [level[place].objects for level in database.levels[1:]]
+        if any(other != module.objects for other in others):
+            faults.append(f"load module {place}: levels have other objects")
+        corner = np.array([place[1], place[0]]) * database.side
+        for one in module.objects:
+            if "rings" not in one:
+                counts[place] += len(one["triangles"])
+                continue
+            counts[place] += 1 + sum(corner[2] for ring in one["rings"] for corner in ring)
+            at = along_walls(one["rings"]) + corner
+            grounds = [heights_at(level[place].ground, *at.T) for level in database.levels]
+            low = min(np.nanmin(ground) for ground in grounds)
+            if low + 1.5 < one["base"]:
+                faults.append(f"load module {place}: {one['kind']} {one['id']:x} floats {(one['base'] - low) / QUANTA} m")
+            high = np.nanmax(grounds[0])
+            highest[one["id"]] = max(high, highest.get(one["id"], -math.inf))
+            roofs.setdefault(one["id"], set()).add((one["roof"], one["kind"]))
+    for number, told in roofs.items():
+        if len(told) > 1:
+            faults.append(f"object {number:x} has several roofs or kinds: {sorted(told)}")
+        elif min(roof for roof, _ in told) < highest[number]:
+            faults.append(f"object {number:x} has a roof under the ground")
+    if counts.max() > per_module:
+        faults.append(f"{counts.max()} polygons of objects in a load module, the limit is {per_module}")
+    most = windows(counts, database.side / QUANTA)
+    if most > per_window:
+        faults.append(f"{most} polygons of objects in 4 km, the limit is {per_window}")
+    return faults
 
 
 def main():

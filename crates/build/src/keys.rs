@@ -2,6 +2,7 @@
 //! decided whether it counts.
 
 use crate::ground::{GamingArea, Surroundings, Window, feed_post};
+use features::objects::Plan;
 use features::{AreaFeatures, Clearances, FallOptions, GradeOptions, Outline, Place, Sounded};
 use job::{Borders, ClipHeights, Edges, FeaturesSpec, Job, LodBorder, LodSpec, ModulesSpec, ObjectsSpec, OuterBorder};
 use store::engine::{Fingerprint, FingerprintBuilder, Key, Part, Stamp};
@@ -50,8 +51,9 @@ const MODULES: Part = Part { name: "modules", changed: "the load modules changed
 /// How they are measured.
 const MEASURE: Part = Part { name: "measure", changed: "what is measured changed" };
 
-/// Of what stands on the ground of an area: what the job says of it, where the area lies, and the files.
-pub(crate) fn outlines(job: &Job, spec: &ObjectsSpec, records: &[SourceRecord]) -> Key {
+/// Of what stands on the ground of an area: what the job says of it, where the area lies, the files, and what woods
+/// leave free.
+pub(crate) fn outlines(job: &Job, spec: &ObjectsSpec, records: &[SourceRecord], free: &[Plan]) -> Key {
     let is_ours = |record: &&SourceRecord| spec.sources.iter().any(|source| source.file.written == record.path);
     let files: Vec<Fingerprint> = records.iter().filter(is_ours).map(|record| record.blake3).collect();
     let settings: Vec<String> = job
@@ -66,7 +68,12 @@ pub(crate) fn outlines(job: &Job, spec: &ObjectsSpec, records: &[SourceRecord]) 
         let part = part.list(files.into_iter(), FingerprintBuilder::fingerprint);
         let part = part.number(job.area.epsg.into()).number(job.area.spacing.sixteenths().into());
         let part = job.area.origin_m.into_iter().fold(part, FingerprintBuilder::real);
-        part.number(rows.into()).number(cols.into()).signed(side_cells.into())
+        let part = part.number(rows.into()).number(cols.into()).signed(side_cells.into());
+        part.list(free.iter(), |part, plan| {
+            part.list(plan.iter(), |part, ring| {
+                part.list(ring.iter(), |part, [east, north]| part.signed((*east).into()).signed((*north).into()))
+            })
+        })
     })
 }
 

@@ -3,7 +3,9 @@
 
 use std::sync::Arc;
 
-use features::objects::{Full, Granted, ObjectLimits, ObjectRemark, ObjectTally, Outline, Wanting, granted, mended};
+use features::objects::{
+    Full, Granted, ObjectLimits, ObjectRemark, ObjectTally, Outline, Plan, Wanting, granted, mended,
+};
 use job::{Job, ObjectsSpec};
 use schedule::{Workers, for_each_piece};
 use store::engine::{Artifact, Key, Outcome, Stamp, keep_or_make};
@@ -14,6 +16,7 @@ use terrain::Each;
 
 use crate::ground::{FoundObjects, GamingArea};
 use crate::keys;
+use crate::read_features::ReadFeatures;
 use crate::run::{ALGORITHM_REVISION, Run};
 use crate::{CompileError, Event, Progress, Stage};
 
@@ -33,13 +36,16 @@ pub(crate) fn decide_objects(run: &mut Run, progress: &mut dyn Progress) -> Resu
 /// The same of one process among others.
 pub(crate) fn outlines_area(run: &Run) -> Result<Outcome<(FileStamp, AreaOutlines)>, CompileError> {
     let spec = run.job.objects.as_ref().expect("a stage of jobs with objects");
-    keep_or_make(&Outlining { run, spec }, ALGORITHM_REVISION)
+    let free = if run.job.features.is_some() { run.features()?.features.covered() } else { Vec::new() };
+    keep_or_make(&Outlining { run, spec, free }, ALGORITHM_REVISION)
 }
 
 /// What stands on the ground, as the engine asks for it.
 struct Outlining<'a> {
     run: &'a Run<'a>,
     spec: &'a ObjectsSpec,
+    /// What woods leave free.
+    free: Vec<Plan>,
 }
 
 impl Artifact for Outlining<'_> {
@@ -47,7 +53,7 @@ impl Artifact for Outlining<'_> {
     type Error = CompileError;
 
     fn key(&self) -> Key {
-        keys::outlines(self.run.job, self.spec, &self.run.records)
+        keys::outlines(self.run.job, self.spec, &self.run.records, &self.free)
     }
 
     fn published(&self) -> Result<Option<Stamp>, CompileError> {
@@ -61,7 +67,7 @@ impl Artifact for Outlining<'_> {
 
     fn make(&self, _key: &Key, stamp: &Stamp) -> Result<(FileStamp, AreaOutlines), CompileError> {
         let each: Each = &|count, piece| for_each_piece(&self.run.workers, count, piece);
-        let outlines = outlines_of(self.run.job, self.spec, &self.run.area, each)?;
+        let outlines = outlines_of(self.run.job, (self.spec, &self.free), &self.run.area, each)?;
         Ok((self.run.database.write_outlines(stamp, &outlines)?, outlines))
     }
 }
@@ -70,6 +76,7 @@ impl Artifact for Outlining<'_> {
 pub struct ObjectBudgets {
     job: Job,
     outlines: Vec<Outline>,
+    free: Vec<Plan>,
 }
 
 /// What a limit would keep of objects.
@@ -104,7 +111,9 @@ impl ObjectBudgets {
         let (workers, area) = (Workers::new(workers), GamingArea::new(job)?);
         let each = |count: usize, piece: &(dyn Fn(usize) + Sync)| for_each_piece(&workers, count, piece);
         let found = FoundObjects::read(job, spec, &area, &each)?;
-        Ok(Some(Self { job: job.clone(), outlines: mended(found.objects, &spec.options).0 }))
+        let features = ReadFeatures::open(job, &area, &each)?;
+        let free = features.map_or_else(Vec::new, |read| read.features.covered());
+        Ok(Some(Self { job: job.clone(), outlines: mended(found.objects, &spec.options).0, free }))
     }
 
     /// What the job's own limits keep.
@@ -121,7 +130,7 @@ impl ObjectBudgets {
     fn within(&self, per_load_module: u32, per_window: u32) -> ObjectBudget {
         let spec = self.job.objects.as_ref().expect("a job with objects");
         let limits = ObjectLimits { per_module: per_load_module, per_window, ..limits_of(&self.job, spec) };
-        let Granted { kinds, .. } = granted(&self.outlines, &limits, self.job.modules.side_quanta.into());
+        let Granted { kinds, .. } = granted(&self.outlines, &self.free, &limits, self.job.modules.side_quanta.into());
         ObjectBudget { per_load_module, per_window, kinds: kinds.into_iter().map(sums_of).collect() }
     }
 }
@@ -129,14 +138,14 @@ impl ObjectBudgets {
 /// What stands on the ground of a job's area within its limits.
 pub(crate) fn outlines_of(
     job: &Job,
-    spec: &ObjectsSpec,
+    (spec, free): (&ObjectsSpec, &[Plan]),
     area: &GamingArea,
     each: Each,
 ) -> Result<AreaOutlines, CompileError> {
     let FoundObjects { objects: found, remarks, notes } = FoundObjects::read(job, spec, area, each)?;
     let side = i32::from(job.modules.side_quanta);
     let (outlines, mended) = mended(found, &spec.options);
-    let granted = granted(&outlines, &limits_of(job, spec), side);
+    let granted = granted(&outlines, free, &limits_of(job, spec), side);
     Ok(AreaOutlines { notes, ..to_outlines(job, granted, mended, remarks) })
 }
 
@@ -166,7 +175,7 @@ fn to_outlines(
     mended: Vec<ObjectRemark>,
     mut remarks: Vec<FeatureRemark>,
 ) -> AreaOutlines {
-    let Granted { modules, kinds, left_out } = granted;
+    let Granted { modules, kinds, left_out, overlaps } = granted;
     let map = |[east, north]: [f64; 2]| [job.area.origin_m[0] + east, job.area.origin_m[1] + north];
     remarks.extend(mended.into_iter().map(|ObjectRemark { name, at_m, found, done }| FeatureRemark {
         feature: name,
@@ -174,6 +183,14 @@ fn to_outlines(
         found,
         leaves_out: done.is_none(),
         done: done.unwrap_or("left out").to_owned(),
+        degrades: false,
+    }));
+    remarks.extend(overlaps.into_iter().map(|at_m| FeatureRemark {
+        feature: "wood".to_owned(),
+        at_m: Some(map(at_m)),
+        found: "roads, water or buildings under it, which cost more to leave free than the wood".to_owned(),
+        done: "left over them".to_owned(),
+        leaves_out: false,
         degrades: false,
     }));
     let wanting = |Wanting { kind, at_m, height_m, silhouette_m2, full }: Wanting| {

@@ -3,14 +3,15 @@
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 
-use terrain::Each;
+use terrain::{Each, QUANTA_PER_METRE};
 
 use crate::aground::{Beside, still_under, tell_of_hills, uncut, under_hills};
 use crate::earthworks::{Laid, earthworks};
+use crate::objects::{Plan, strips};
 use crate::pieces::moved;
 use crate::rules::Sorted;
 use crate::{
-    About, Bed, Earthworks, FallOptions, FeatureId, Flaw, GradeOptions, Graded, Grants, Histogram, Lake, Network,
+    About, Bed, Earthworks, FallOptions, FeatureId, Flaw, GradeOptions, Graded, Grants, Histogram, Kind, Lake, Network,
     Outline, Place, Remark, Reserved, Rule, Shares, Shores, Site, Source, Strand, Traits, Waters, Way, afloat, banks,
     breaklines, channels, dams, fall, flowing, grade, have_line, lakes_along, level, lift_shores, lines_inside, mend,
     outline_only, pins, reserve, round, shore, sides, sort_out, split_at_dams, travelled, water, with_water,
@@ -163,6 +164,24 @@ impl AreaFeatures {
     /// All polygons; those of water are asked for the heights inside.
     pub fn outlines(&self) -> &[Outline] {
         &self.outlines
+    }
+
+    /// What roads, railways and water cover, a metre added on both sides of ways, in quanta east and north of the
+    /// place 0, 0: woods leave it free. Tunnels are not among it.
+    pub fn covered(&self) -> Vec<Plan> {
+        const ASIDE: i32 = 2 * QUANTA_PER_METRE;
+        let quanta = self.site.lattice.quanta_per_step();
+        let at = |place: &Place| [place.col, place.row].map(|step| step * quanta);
+        let is_open = |way: &&Way| way.traits.kind.is_travelled() && !way.traits.storey.is_tunnel();
+        let ways = self.ways.iter().filter(is_open);
+        let ways = ways.flat_map(|way| {
+            let line: Vec<[i32; 2]> = way.places.iter().map(at).collect();
+            strips(&line, way.traits.width + ASIDE)
+        });
+        let water = self.outlines.iter().filter(|outline| matches!(outline.traits.kind, Kind::Lake | Kind::River));
+        let water =
+            water.map(|outline| outline.rings.iter().map(|ring| ring.places.iter().map(at).collect()).collect());
+        ways.chain(water).collect()
     }
 
     fn asked(&self) -> Vec<Place> {

@@ -44,7 +44,7 @@ pub use posts::{PostHeights, residuals_at_posts, residuals_by_class};
 mod draw;
 mod samples;
 mod sight;
-pub use sight::{EYE_M, LineOfSight, RANGE_M, line_of_sight, sees_on};
+pub use sight::{EYE_M, LineOfSight, Pair, RANGE_M, drawn_pairs, line_of_sight, sees_on};
 mod slope;
 pub use slope::{SlopeDifference, slope};
 mod grade;

@@ -92,8 +92,7 @@ pub fn line_of_sight(dem: &Dem, triangles: &Triangles, spacing: Metres, pairs: u
     assert!(dem.rect().contains_rect(&rect), "the DEM holds the ground of the triangles");
     let samples = DemSamples::new(dem);
     let mut found = LineOfSight::default();
-    for index in 0..pairs {
-        let pair = draw_pair(rect, spacing, Draw::new(seed, u64::from(index)));
+    for pair in drawn_pairs(rect, spacing, pairs, seed) {
         match pair.filter(|&pair| dem.void_count() == 0 || !touches_void(&samples, pair)) {
             Some(pair) => *found.count(sees(&samples, pair), sees_on(triangles, pair)) += 1,
             None => found.left_out += 1,
@@ -114,7 +113,12 @@ impl LineOfSight {
 }
 
 /// Two places, east and north in posts.
-type Pair = [[f64; 2]; 2];
+pub type Pair = [[f64; 2]; 2];
+
+/// So many pairs inside `rect`, whose posts are so far apart: east and north in posts; `None` where none was found.
+pub fn drawn_pairs(rect: PostRect, spacing: Metres, pairs: u32, seed: u64) -> impl Iterator<Item = Option<Pair>> {
+    (0..pairs).map(move |index| draw_pair(rect, spacing, Draw::new(seed, u64::from(index))))
+}
 
 /// A pair inside `rect`; `None` where none was found.
 fn draw_pair(rect: PostRect, spacing: Metres, mut draw: Draw) -> Option<Pair> {

@@ -11,7 +11,9 @@ pub use fidelity::{
     Cover, Distances, Drainage, GRADES, Hausdorff, LineOfSight, Measures, MeshForm, Registration, ResidualFigures,
     SeamVisibility, SlopeClasses, SlopeDifference,
 };
-pub use measures::{BuiltResidual, ClassResidual, DatabaseFidelity, Fidelity, Sights, fidelity, measure};
+pub use measures::{
+    BuiltResidual, ClassResidual, DatabaseFidelity, Fidelity, PastObjectsFound, Sights, fidelity, measure,
+};
 mod explained_features;
 pub use explained_features::{ExplainedFeatures, ExplainedObjects};
 mod explain;

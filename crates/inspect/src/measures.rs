@@ -70,8 +70,55 @@ pub struct DatabaseFidelity {
     pub at_own_posts: Option<ResidualFigures>,
     /// All measures, those of residuals too.
     pub measures: Fidelity,
+    /// What objects hide, in databases with some.
+    pub past_objects: Option<PastObjectsFound>,
     /// Why residuals are not told by class, where the job has classes: a file that says which ground is which is gone.
     pub no_classes: Option<String>,
+}
+
+/// How many of the pairs of the line-of-sight test are seen over the load modules, and past what stands on them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct PastObjectsFound {
+    /// Pairs of places.
+    pub pairs: u64,
+    /// Seen over the ground and decks alone.
+    pub over_ground: u64,
+    /// Past buildings and walls, too.
+    pub past_buildings: u64,
+    /// Past woods, too, with half of the light or more.
+    pub past_all: u64,
+}
+
+/// What objects of a database hide of the pairs that lines of sight are tested with.
+fn past_objects(folder: &Folder, area: &GamingArea, sights: Sights) -> Result<PastObjectsFound, CompileError> {
+    use load_module_reader::{Area, Curvature, Keep, PastObjects, Sight, Standing};
+    let damaged = |error| {
+        let (path, fault) = (folder.dir().join("modules"), Box::new(error));
+        CompileError::from(store::DatabaseError::Modules { path, fault })
+    };
+    let opened = Area::open(folder.dir(), Keep::OnDisk).map_err(damaged)?;
+    let ground = opened.load(opened.whole()).map_err(damaged)?;
+    let spacing = Metres(area.frame.spacing.metres());
+    let origin = [area.frame.origin_east_m, area.frame.origin_north_m];
+    let mut found = PastObjectsFound::default();
+    for pair in fidelity::drawn_pairs(area.rect, spacing, sights.pairs, sights.seed).flatten() {
+        let ends = pair.map(|place| {
+            let [east, north] = [0, 1].map(|axis| origin[axis] + place[axis] * spacing.0);
+            ground.height_m([east, north]).map(|height_m| [east, north, height_m + fidelity::EYE_M])
+        });
+        let [Some(from), Some(to)] = ends else { continue };
+        let sees = |standing| {
+            let past = PastObjects { standing, ..PastObjects::all(Curvature::NONE) };
+            ground.sight_past(from, to, &past).sight == Sight::Free
+        };
+        found.pairs += 1;
+        if sees(Standing::None) {
+            found.over_ground += 1;
+            found.past_buildings += u64::from(sees(Standing::Buildings));
+            found.past_all += u64::from(sees(Standing::All));
+        }
+    }
+    Ok(found)
 }
 
 /// Residuals that `database.json` keeps, in metres.
@@ -121,8 +168,10 @@ pub fn fidelity(folder: &Path, against: Option<&Path>, sights: Sights) -> Result
     let classes = (!job.importance.areas.is_empty()).then_some((&job.importance.classes[..], &importance));
     let subject = Subject { dem: &dem, triangles: &triangles, polygons, spacing, classes };
     let measures = compare(&subject, sights, Some(area.grid.side_cells));
+    let past_objects = job.objects.is_some().then(|| past_objects(&folder, &area, sights)).transpose()?;
     let is_burned = job.features.is_some() || job.dem.water.is_some();
-    Ok(DatabaseFidelity { area: manifest.area.name, against, is_burned, residual, at_own_posts, measures, no_classes })
+    let area = manifest.area.name;
+    Ok(DatabaseFidelity { area, against, is_burned, residual, at_own_posts, measures, past_objects, no_classes })
 }
 
 /// Measures a mesh against the raster it was made from, whose posts are so far apart.

@@ -4,9 +4,10 @@ use std::collections::BTreeMap;
 
 use terrain::{Canopy, ObjectKind, Objects, PRISMS_MAX, Prism};
 
+use super::clear::Clear;
 use super::cut::{Piece, border, canopy_lists, cut, walled};
 use super::mend::Outline;
-use super::plan::METRE;
+use super::plan::{METRE, Plan};
 
 /// What may stand in a load module and in a window, in polygons: a roof and each wall are one, and each triangle of a
 /// canopy.
@@ -64,6 +65,9 @@ pub struct Granted {
     pub kinds: BTreeMap<ObjectKind, [ObjectTally; 2]>,
     /// What had no room, what hides most first.
     pub left_out: Vec<Wanting>,
+    /// Woods that stay over roads, water or buildings, since they would cost more than twice as much without: a place in
+    /// each load module, metres east and north.
+    pub overlaps: Vec<[f64; 2]>,
 }
 
 /// What is granted whole, or not at all.
@@ -81,22 +85,26 @@ enum Part {
 }
 
 /// What has room of outlines, in load modules with a side of so many quanta that are numbered by row and column from
-/// the place 0, 0.
-pub fn granted(outlines: &[Outline], limits: &ObjectLimits, side: i32) -> Granted {
+/// the place 0, 0. Woods leave buildings and `free`, in quanta too, clear where that costs no more than they do.
+pub fn granted(outlines: &[Outline], free: &[Plan], limits: &ObjectLimits, side: i32) -> Granted {
     let [rows, cols] = limits.size;
+    let solid = outlines.iter().filter(|outline| outline.traits.kind.is_prism()).map(|outline| &outline.plan);
+    let has_woods = outlines.iter().any(|outline| !outline.traits.kind.is_prism());
+    let clear = if has_woods { Clear::of(solid.chain(free), side) } else { Clear::default() };
+    let mut overlaps = Vec::new();
     let inside = |[row, col]: [i32; 2]| 0 <= row && row < rows && 0 <= col && col < cols;
     let mut claims = Vec::new();
     for (number, outline) in outlines.iter().enumerate() {
         let pieces: Vec<Piece> = cut(&outline.plan, side).into_iter().filter(|piece| inside(piece.module)).collect();
         match outline.traits.kind.is_prism() {
             true => claims.extend(prisms(number, outline, &pieces, side)),
-            false => claims.extend(canopies(number, outline, &pieces, side)),
+            false => claims.extend(canopies((number, outline), &pieces, &clear, side, &mut overlaps)),
         }
     }
     // Outlines are sorted, so ties go by content.
     claims.sort_by(|a, b| b.silhouette_m2.total_cmp(&a.silhouette_m2).then(a.outline.cmp(&b.outline)));
     let mut room = Room::new(limits);
-    let mut granted = Granted::default();
+    let mut granted = Granted { overlaps, ..Granted::default() };
     for claim in claims {
         let tally = granted.kinds.entry(claim.kind).or_default();
         let add = |tally: &mut ObjectTally| {
@@ -163,16 +171,36 @@ fn prisms(number: usize, outline: &Outline, pieces: &[Piece], side: i32) -> Vec<
 }
 
 /// A wood as a claim in each load module: it need not be level, and so much need not hang together.
-fn canopies(number: usize, outline: &Outline, pieces: &[Piece], side: i32) -> Vec<Claim> {
+fn canopies(
+    (number, outline): (usize, &Outline),
+    pieces: &[Piece],
+    clear: &Clear,
+    side: i32,
+    overlaps: &mut Vec<[f64; 2]>,
+) -> Vec<Claim> {
+    /// Triangles that a wood may cost in any case.
+    const SMALL: usize = 12;
     /// Metres between stems of trees, and of what is lower.
     const SPACING_M: [f64; 2] = [4.0, 2.0];
     let traits = &outline.traits;
     let spacing_m = SPACING_M[usize::from(traits.kind != ObjectKind::Wood)];
+    let mut lists = |pieces: &[Piece]| {
+        let whole = canopy_lists(pieces);
+        let Some(without) = clear.cut_out(pieces) else { return whole };
+        let cleared = canopy_lists(&without);
+        if cleared.1.len() <= (2 * whole.1.len()).max(SMALL) {
+            return cleared;
+        }
+        let [row, col] = pieces[0].module;
+        let at = pieces[0].plan[0][0];
+        overlaps.push([0, 1].map(|axis| f64::from([col, row][axis] * side + at[axis]) / METRE));
+        whole
+    };
     let claim = |pieces: &[Piece]| {
         let around = pieces.iter().map(|piece| border(&walled(piece, &outline.plan, side))).sum();
         // Numbered in 16 bits: what has more corners in one load module is no outline that a person drew.
         let fits = pieces.iter().flat_map(|piece| piece.plan.iter()).map(Vec::len).sum::<usize>() < PLACES_MAX;
-        let (places, triangles) = if fits { canopy_lists(pieces) } else { Default::default() };
+        let (places, triangles) = if fits { lists(pieces) } else { Default::default() };
         let cost = if fits { triangles.len() as u32 } else { u32::MAX };
         let canopy = Canopy {
             id: id_of(outline, 0),

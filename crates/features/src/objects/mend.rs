@@ -168,6 +168,11 @@ fn building(rings: &[Vec<[f64; 2]>], traits: Traits, options: &ObjectOptions) ->
     if large.is_empty() { Err("smaller than objects.area_min_m2") } else { Ok(large) }
 }
 
+/// What a way covers that is so many quanta wide: a rectangle along each of its edges.
+pub fn strips(line: &[[i32; 2]], width: i32) -> Vec<Plan> {
+    stretches(line, width, f64::MAX)
+}
+
 /// The rectangles along a line, each as long as `most` quanta at most; they overlap where the line bends.
 fn stretches(line: &[At], width: i32, most: f64) -> Vec<Plan> {
     let mut plans = Vec::new();

@@ -9,11 +9,11 @@ use i_overlay::i_float::int::point::IntPoint;
 /// Quanta of a metre.
 pub(super) const METRE: f64 = terrain::QUANTA_PER_METRE as f64;
 /// East and north in quanta.
-pub(super) type At = [i32; 2];
+pub type At = [i32; 2];
 /// A closed line; the last place is joined to the first.
-pub(super) type Ring = Vec<At>;
+pub type Ring = Vec<At>;
 /// The outer ring counter-clockwise, then holes clockwise.
-pub(super) type Plan = Vec<Ring>;
+pub type Plan = Vec<Ring>;
 
 /// Places beyond this, either way, are not computed with: 4,194 km.
 pub(super) const FAR: i32 = 1 << 29;
@@ -55,6 +55,11 @@ pub(super) fn sorted_out(rings: Plan) -> Vec<Plan> {
 /// All that any of the plans covers.
 pub(super) fn union(plans: &[Plan]) -> Vec<Plan> {
     run(plans, &[], OverlayRule::Subject, FillRule::NonZero)
+}
+
+/// What the first cover and the others do not.
+pub(super) fn difference(subject: &[Plan], clip: &[Plan]) -> Vec<Plan> {
+    run(subject, clip, OverlayRule::Difference, FillRule::NonZero)
 }
 
 /// What both cover.

@@ -30,7 +30,7 @@ fn made(found: Vec<FoundObject>) -> (Granted, Vec<ObjectRemark>) {
 
 fn objects(found: Vec<FoundObject>, limits: &ObjectLimits) -> (Granted, Vec<ObjectRemark>) {
     let (outlines, remarks) = mended(found, &OPTIONS);
-    (granted(&outlines, limits, SIDE), remarks)
+    (granted(&outlines, &[], limits, SIDE), remarks)
 }
 
 #[test]
@@ -150,4 +150,26 @@ fn area_m2(canopy: &terrain::Canopy) -> f64 {
         (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
     };
     canopy.triangles.iter().map(doubled).sum::<f64>() / (2.0 * METRE * METRE)
+}
+
+#[test]
+fn woods_leave_roads_and_buildings_free() {
+    let wood = object("wood", &[("natural", "wood")], FoundShape::Polygon(vec![square([100.0, 100.0], 300.0)]));
+    let (outlines, _) = mended(vec![wood, house([200.0, 300.0], 20.0, "6")], &OPTIONS);
+    let quanta = |[x, y]: [f64; 2]| [x, y].map(|metres| (metres * METRE) as i32);
+    let road = strips(&[[50.0, 150.0], [250.0, 150.0], [450.0, 200.0]].map(quanta), 8 * 128);
+    let area = |free: &[Plan]| {
+        let granted = granted(&outlines, free, &LIMITS, SIDE);
+        assert!(granted.overlaps.is_empty());
+        area_m2(&granted.modules[&[0, 0]].canopies[0])
+    };
+    assert!((area(&[]) - (90_000.0 - 400.0)).abs() < 1.0, "{}", area(&[]));
+    let bend = 150.0 * (1.0_f64 + 0.0625).sqrt();
+    let expected = 90_000.0 - 400.0 - 8.0 * (150.0 + bend);
+    assert!((area(&road) - expected).abs() < 20.0, "{}, expected {expected}", area(&road));
+    // As many roads as would cost more than the wood.
+    let many: Vec<Plan> =
+        (0..40).flat_map(|k| strips(&[[90.0 + 8.0 * f64::from(k), 90.0], [98.0, 410.0]].map(quanta), 128)).collect();
+    let crossed = granted(&outlines, &many, &LIMITS, SIDE);
+    assert_eq!((crossed.overlaps.len(), crossed.modules[&[0, 0]].canopies[0].triangles.len()), (1, 2));
 }

@@ -33,7 +33,9 @@ pub(crate) fn told(levels: &[Modules], classes: &[String]) -> Option<String> {
         some => format!("{some} of them under the ground, by {:.2} m at most", metres(worst.deepest.into())),
     };
     let least = all.clearance.iter().filter_map(|(class, quanta)| {
-        classes.get(usize::from(*class)).map(|name| format!("{:.2} m above {name}", metres((*quanta).into())))
+        // What rounding puts under the ground lies on it.
+        let above = if worst.under == 0 { (*quanta).max(0) } else { *quanta };
+        classes.get(usize::from(*class)).map(|name| format!("{:.2} m above {name}", metres(above.into())))
     });
     let least: Vec<String> = least.collect();
     (0 < all.samples).then(|| format!("{} square metres, {under}; at least {}", all.samples, least.join(", ")))

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use inspect::{DatabaseFidelity, Sights};
+use inspect::{DatabaseFidelity, PastObjectsFound, Sights};
 use serde_json::{Value, json};
 use views::grouped;
 
@@ -78,7 +78,17 @@ fn text(found: &DatabaseFidelity) -> String {
     });
     let (area, against) = (&found.area, &found.against);
     let (own, note) = (own.unwrap_or_default(), note.unwrap_or_default());
-    format!("Gaming area {area} against {against}{burned}\n{own}\n{figures}{note}")
+    let past = found.past_objects.map(|past| past_text(&past)).unwrap_or_default();
+    format!("Gaming area {area} against {against}{burned}\n{own}\n{figures}{past}{note}")
+}
+
+fn past_text(past: &PastObjectsFound) -> String {
+    let share = |count: u64| format!("{:.2} %", 100.0 * count as f64 / past.pairs.max(1) as f64);
+    let [ground, buildings, all] = [past.over_ground, past.past_buildings, past.past_all].map(share);
+    format!(
+        "\nOf {} pairs {ground} are seen over the ground, {buildings} past buildings and walls, {all} past woods too\n",
+        grouped(past.pairs)
+    )
 }
 
 fn to_json(found: &DatabaseFidelity, sights: Sights) -> Value {
@@ -89,6 +99,12 @@ fn to_json(found: &DatabaseFidelity, sights: Sights) -> Value {
         "has_features_burned_in": found.is_burned,
         "residual_at_own_posts": found.at_own_posts.as_ref().map(measures_json::residual),
         "seed": sights.seed,
+        "past_objects": found.past_objects.map(|past| json!({
+            "pairs": past.pairs,
+            "over_ground": past.over_ground,
+            "past_buildings": past.past_buildings,
+            "past_all": past.past_all,
+        })),
         "residual_as_built": {
             "posts": residual.posts,
             "rms_m": residual.rms_m,

@@ -115,7 +115,7 @@ pub fn objects_section(all: &[SeenFeatures], tried: &[ObjectBudget], folder: &Pa
     text += "[objects.limits]\n# What limits would keep of what they hide:\n";
     for of in tried {
         let own = if of == chosen { "  (this job)" } else { "" };
-        text += &comment(&format!("  {:>6}: {}{own}", of.per_load_module, kept_text(of)));
+        text += &format!("#   {:>6}: {}{own}\n", of.per_load_module, kept_text(of));
     }
     text + &format!(
         "per_load_module = {}   # roofs, walls, and triangles of woods\nper_4km_square = {}\n",

@@ -12,17 +12,31 @@ type Corners = [[f64; 3]; 3];
 /// Of each prism, by its id, the highest ground under what of it stands on the load modules of `tin`, another tile's;
 /// `pieces` are those load modules with what stands there.
 pub fn highest_in(tin: &Tin, pieces: &[(ModuleId, &Prism)], layout: &Layout, highest: &mut BTreeMap<u64, i32>) {
-    let quanta = layout.spacing.quanta_per_post() / tin.steps_per_post;
+    let quanta = i64::from(layout.spacing.quanta_per_post() / tin.steps_per_post);
     let side = i64::from(layout.side());
-    for (module, prism) in pieces {
-        let corner = [i64::from(module.col) * side, i64::from(module.row) * side];
-        let local = |index: u32| {
-            let vertex = &tin.vertices[index as usize];
-            let at = [vertex.at.col, vertex.at.row].map(|step| i64::from(step) * i64::from(quanta));
-            [(at[0] - corner[0]) as f64, (at[1] - corner[1]) as f64, f64::from(vertex.height)]
+    // Of each load module that is asked for, the triangles over it.
+    let mut over: BTreeMap<ModuleId, Vec<Corners>> = pieces.iter().map(|(module, _)| (*module, Vec::new())).collect();
+    for triangle in &tin.triangles {
+        let vertices = triangle.map(|index| &tin.vertices[index as usize]);
+        let places = vertices.map(|vertex| [vertex.at.col, vertex.at.row].map(|step| i64::from(step) * quanta));
+        let range = |axis: usize| {
+            let of = |end: fn(i64, i64) -> i64| places.map(|at| at[axis]).into_iter().reduce(end).unwrap_or(0);
+            // On a line it lies over both.
+            let index = |at: i64| at.div_euclid(side).max(0) as u32;
+            index(of(i64::min) - 1)..=index(of(i64::max))
         };
-        let triangles = tin.triangles.iter().map(|triangle| triangle.map(local));
-        if let Some([_, high]) = under(prism, triangles) {
+        for (row, col) in range(1).flat_map(|row| range(0).map(move |col| (row, col))) {
+            if let Some(over) = over.get_mut(&ModuleId { row, col }) {
+                let corner = [i64::from(col) * side, i64::from(row) * side];
+                over.push([0, 1, 2].map(|k| {
+                    let [x, y] = [0, 1].map(|axis| (places[k][axis] - corner[axis]) as f64);
+                    [x, y, f64::from(vertices[k].height)]
+                }));
+            }
+        }
+    }
+    for (module, prism) in pieces {
+        if let Some([_, high]) = under(prism, over[module].iter().copied()) {
             raise(highest, prism.id, high);
         }
     }
