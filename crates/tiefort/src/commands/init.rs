@@ -109,7 +109,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     terminal::tell(&found_text(&suggestion, (limits.mean, rms_m), &text(Path::new(""), "area")));
     features.iter().for_each(|seen| terminal::tell(&told_of(seen)));
     limits.said.iter().for_each(|said| terminal::tell(said));
-    remarks(&suggestion, limits.mean).iter().for_each(|remark| terminal::tell(&format!("note: {remark}")));
+    let of_objects = surface_model(&suggestion.seen).filter(|_| !limits.objects.is_empty());
+    let remarks = remarks(&suggestion, limits.mean).into_iter().chain(of_objects);
+    remarks.for_each(|remark| terminal::tell(&format!("note: {remark}")));
     let Some(out) = &arguments.out else {
         terminal::print(&text(Path::new(""), "area"))?;
         return Ok(Outcome::Sound);
@@ -175,6 +177,18 @@ fn found_text(suggestion: &Suggestion, (triangles, rms_m): (u32, Option<f64>), j
         text += &format!("; {triangles} triangles a load module leave an RMS residual {}", about(rms_m));
     }
     text
+}
+
+/// That a raster has roofs and crowns in its heights already, where its name is that of a surface model.
+fn surface_model(seen: &[Seen]) -> Option<String> {
+    const NAMES: [&str; 8] = ["_dsm", "glo-30", "glo30", "glo-90", "aw3d30", "astgtm", "aster", "srtm"];
+    let name_of = |seen: &&Seen| seen.path.file_name().map(|name| name.to_string_lossy().to_lowercase());
+    let found = seen.iter().find(|seen| name_of(seen).is_some_and(|name| NAMES.iter().any(|of| name.contains(of))))?;
+    Some(format!(
+        "{} is a surface model by its name: where roofs and crowns are in its heights, buildings and woods on top of it \
+         count twice",
+        found.path.display()
+    ))
 }
 
 /// Kilometres of the width and the height of the rectangle around the files that whole load modules leave out; `None`
