@@ -741,7 +741,8 @@ def standing(database, per_module, per_window):
             grounds = [heights_at(level[place].ground, *at.T) for level in database.levels]
             low = min(np.nanmin(ground) for ground in grounds)
             if low + 1.5 < one["base"]:
-                faults.append(f"load module {place}: {one['kind']} {one['id']:x} floats {(one['base'] - low) / QUANTA} m")
+                floats_m = (one["base"] - low) / QUANTA
+                faults.append(f"load module {place}: {one['kind']} {one['id']:x} floats {floats_m} m")
             high = np.nanmax(grounds[0])
             highest[one["id"]] = max(high, highest.get(one["id"], -math.inf))
             roofs.setdefault(one["id"], set()).add((one["roof"], one["kind"]))
