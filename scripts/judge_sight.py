@@ -5,7 +5,8 @@
 
 The caster is Embree, by trimesh; what it casts at are triangles of the ground, decks, walls and roofs read by
 FORMAT.md. Metres inside woods are counted by small steps. Lines that a centimetre up or down would change are ties.
-Needs the Python package of this project, NumPy, shapely, trimesh and embreex. Exit codes: 0 all agree but ties, 1 some do not.
+Needs the Python package of this project, NumPy, shapely, trimesh and embreex. Exit codes: 0 all agree but
+ties, 1 some do not.
 """
 
 import argparse
