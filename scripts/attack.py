@@ -230,7 +230,7 @@ class Attack:
         be another area, which is refused."""
         sections = self.scene.job.sections
         # Clipped edges need another method than the one that holds where none is named.
-        known = ["features", "lod", "importance", "limits"] + ["tin"] * (not self.scene.job.clip)
+        known = ["features", "objects", "lod", "importance", "limits"] + ["tin"] * (not self.scene.job.clip)
         optional = [section for section in known if section in sections]
         optional += [key for key in ("tin.pins", "dem.water", "tin.start", "lod.border", "features.rules")
                      if key.split(".")[1] in sections.get(key.split(".")[0], {})]
