@@ -4,8 +4,8 @@
     python3 scripts/check_exports.py [DIR...] [--holes] [--bridge] [--tiefort PROGRAM] [--node-modules DIR]
 
 With --holes a database with holes is built and checked, too, with --bridge one with a bridge over a valley. PROGRAM is
-target/release/tiefort unless said. Needs rasterio, rio-cogeo, meshio, geopandas, pyogrio, pyproj and numpy; osgconv
-(Debian's openscenegraph); a Python that has QGIS (Debian's python3-qgis); usd-core and mujoco; Debian's
+target/release/tiefort unless said. Needs rasterio, rio-cogeo, meshio, geopandas, trimesh, rtree, pyogrio, pyproj and
+numpy; osgconv (Debian's openscenegraph); a Python that has QGIS (Debian's python3-qgis); usd-core and mujoco; Debian's
 libsdformat-dev; chromium and node for glTF and CesiumJS, which also loads from `tiefort serve`, with
 
     npm install --prefix DIR 3d-tiles-tools@0.5.4 cesium@1.140.0 gltf-validator@2.0.0-dev.3.10 puppeteer-core@24.43.1
@@ -34,7 +34,7 @@ import numpy
 
 sys.path.insert(0, str(pathlib.Path(__file__).parent))
 import read_slm  # noqa: E402
-from exports import engines  # noqa: E402
+from exports import engines, objects  # noqa: E402
 
 HERE = pathlib.Path(__file__).parent
 HOLE = 255
@@ -908,7 +908,7 @@ CHECKS = [
     ("quantized-mesh", check_quantized_mesh),
     ("cesium", check_cesium),
     ("serve", check_serve),
-    *[(name, functools.partial(check, tools=TOOLS)) for name, check in engines.CHECKS],
+    *[(name, functools.partial(check, tools=TOOLS)) for name, check in engines.CHECKS + objects.CHECKS],
 ]
 
 if __name__ == "__main__":

@@ -20,12 +20,20 @@ const COLOURS: [[f64; 3]; 8] = [
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Classes<'a> {
     names: &'a [String],
+    /// Other names for materials, by those that they would have.
+    materials: &'a [(String, String)],
 }
 
 impl<'a> Classes<'a> {
-    /// Classes with these names.
-    pub(crate) fn named(names: &'a [String]) -> Self {
-        Self { names }
+    /// Classes with these names, and with other names for some materials.
+    pub(crate) fn named(names: &'a [String], materials: &'a [(String, String)]) -> Self {
+        Self { names, materials }
+    }
+
+    /// The name of a material that would have this one.
+    pub(crate) fn material(self, word: String) -> String {
+        let other = self.materials.iter().find(|(of, _)| *of == word);
+        other.map_or(word, |(_, name)| as_word(name))
     }
 
     /// The name of a class, where a job has several: a single one needs none.
@@ -35,8 +43,7 @@ impl<'a> Classes<'a> {
 
     /// The same as one word, which ends no line of a text and no word in it; `class_3` without a name.
     pub(crate) fn word(self, class: u8) -> String {
-        let word = |c: char| if c.is_ascii_alphanumeric() || "-_.".contains(c) { c } else { '_' };
-        self.name(class).map_or_else(|| format!("class_{class}"), |name| name.chars().map(word).collect())
+        self.name(class).map_or_else(|| format!("class_{class}"), as_word)
     }
 
     /// Red, green and blue from 0 to 255, as screens show them.
@@ -51,6 +58,11 @@ impl<'a> Classes<'a> {
     }
 }
 
+/// A name as one word.
+fn as_word(name: &str) -> String {
+    name.chars().map(|c| if c.is_ascii_alphanumeric() || "-_.".contains(c) { c } else { '_' }).collect()
+}
+
 /// The colour of a class by its name and number, as screens show it.
 pub(crate) fn color(name: &str, class: u8) -> [u8; 3] {
     let numbered = COLOURS[usize::from(class) % COLOURS.len()].map(|part| (part * 255.0).round() as u8);
@@ -58,7 +70,7 @@ pub(crate) fn color(name: &str, class: u8) -> [u8; 3] {
 }
 
 /// A part of a colour as screens show it, as light: the curve of sRGB, to a thousandth.
-fn linear(part: u8) -> f64 {
+pub(crate) fn linear(part: u8) -> f64 {
     let part = f64::from(part) / 255.0;
     let light = if part <= 0.04045 { part / 12.92 } else { ((part + 0.055) / 1.055).powf(2.4) };
     (light * 1000.0).round() / 1000.0
@@ -90,7 +102,7 @@ mod tests {
     #[test]
     fn a_class_has_the_colour_of_its_name_or_else_of_its_number() {
         let names = ["default", "a b\nc", "motorway", "lake"].map(str::to_owned);
-        let classes = Classes { names: &names };
+        let classes = Classes::named(&names, &[]);
         assert_eq!(classes.color(2), named_class_color("motorway").unwrap());
         assert_eq!((classes.color(0), classes.color(9)), ([140, 128, 92], [87, 107, 77]));
         assert_eq!([classes.light(0), classes.light(3)], [[0.55, 0.50, 0.36], [0.117, 0.323, 0.552]]);
@@ -100,6 +112,6 @@ mod tests {
     #[test]
     fn a_single_class_needs_no_name() {
         let names = ["default".to_owned()];
-        assert_eq!(Classes { names: &names }.word(0), "class_0");
+        assert_eq!(Classes::named(&names, &[]).word(0), "class_0");
     }
 }

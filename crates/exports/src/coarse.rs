@@ -52,7 +52,7 @@ fn corner_vertex(product: &Product, mesh: &Mesh, row: u32, col: u32) -> u32 {
     let index = ((module_row - rect.south) * rect.cols() + module_col - rect.west) as usize;
     let module = &product.modules[index];
     let (x, y) = ((col - module_col) as u16 * module.side, (row - module_row) as u16 * module.side);
-    for (own, whole) in module.triangles.iter().zip(&mesh.triangles[mesh.starts[index]..]) {
+    for (own, whole) in module.triangles.iter().zip(&mesh.triangles[mesh.module_starts()[index]..]) {
         for (v, vertex) in own.iter().zip(whole) {
             let found = module.vertices[usize::from(*v)];
             if (found.x, found.y) == (x, y) {

@@ -22,6 +22,7 @@ mod opcode {
     pub const VERTEX_PALETTE: u16 = 67;
     pub const VERTEX_NORMAL: u16 = 69;
     pub const VERTEX_LIST: u16 = 72;
+    pub const MATERIAL: u16 = 113;
 }
 
 /// A file in the making.
@@ -46,8 +47,10 @@ pub(crate) struct Place {
 /// How a face is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Face {
-    /// The class, as surface material.
-    pub class: u8,
+    /// The class, or what the object is made of, as surface material.
+    pub code: i16,
+    /// Its place in the palette of materials.
+    pub material: i16,
     pub color: [u8; 3],
     /// Whether it is drawn from both sides.
     pub is_seen_from_below: bool,
@@ -192,6 +195,23 @@ impl Records {
         }
     }
 
+    /// A material of the palette by its name: white, so that faces keep their colours, and dull.
+    pub(crate) fn material(&mut self, index: i32, name: &str) {
+        const IS_USED: u32 = 0x8000_0000;
+        let floats = |records: &mut Self, numbers: &[f32]| {
+            numbers.iter().for_each(|number| records.put(&number.to_be_bytes()));
+        };
+        self.open(opcode::MATERIAL, 84);
+        self.i32s(&[index]);
+        self.text(name, 12);
+        self.u32s(&[IS_USED]);
+        floats(self, &[1.0; 6]);
+        // Nothing shines: no highlight, no light of its own, all opaque.
+        floats(self, &[0.0; 7]);
+        floats(self, &[1.0]);
+        self.zeros(4);
+    }
+
     /// A triangle over vertices of the palette, its class as surface material.
     pub(crate) fn face(&mut self, triangle: [u32; 3], face: Face) {
         const TERRAIN_PACKED_COLOUR: u32 = 0x8000_0000 | 0x2000_0000 | 0x1000_0000;
@@ -201,8 +221,8 @@ impl Records {
         self.zeros(8 + 4 + 2);
         self.put(&[u8::from(face.is_seen_from_below), 0]);
         self.zeros(4 + 2);
-        // No textures, no material; the class as surface material code; no feature.
-        self.i16s(&[-1, -1, -1, i16::from(face.class), 0]);
+        // No textures; the class as surface material code; no feature.
+        self.i16s(&[-1, -1, face.material, face.code, 0]);
         self.zeros(4 + 2 + 2);
         self.u32s(&[TERRAIN_PACKED_COLOUR]);
         self.put(&[FACE_COLOUR_WITH_NORMALS]);
@@ -251,16 +271,18 @@ mod tests {
         all.header(&Place { offset_m: [5.0e5, 3.9e6], corners, utm_zone: Some(11), radius_m: 2828.0 });
         assert_eq!(all.bytes.len(), 324);
         all.comment("abc");
+        all.material(0, "building_wall");
         all.vertices(&[([0.0; 3], [0.0, 0.0, 1.0]); 3]);
         all.push();
         all.group("a");
         all.object("r0001c0002");
-        all.face([0, 1, 2], Face { class: 3, color: [1, 2, 3], is_seen_from_below: true });
+        all.face([0, 1, 2], Face { code: 3, material: 0, color: [1, 2, 3], is_seen_from_below: true });
         all.external("squares/r00c00.flt");
         all.pop();
         let expected = [
             (1, 324),
             (31, 8),
+            (113, 84),
             (67, 8),
             (69, 56),
             (69, 56),

@@ -1,17 +1,20 @@
 //! A world for Gazebo (SDF 1.9): a model for each block of load modules, its mesh an OBJ beside it, and levels that
 //! load the blocks near a performer.
 //!
-//! x points east, y north, z up; the origin is the south-west corner of what is exported, at height 0.
+//! Ribbons are seen alone. Objects are seen as meshes, and hit as boxes: one for each building that is nearly a rectangle, else one for each of
+//! its walls; woods are seen alone. x points east, y north, z up; the origin is the south-west corner of what is exported, at height 0.
 
 use std::fmt::Write as _;
 
 use terrain::{ModuleId, ModuleRect, QUANTA_PER_METRE, metres_of_quanta};
 
+use crate::boxes::{UprightBox, boxes};
 use crate::gpkg_styles::escaped;
 use crate::mesh::{Part, class_groups};
 use crate::modules::group_name;
 use crate::polygon_files::{put_obj_faces, put_obj_vertices};
-use crate::{Datum, Earth, ExportError, Mesh, Product, Put, Work, obj_materials};
+use crate::sheets::Material;
+use crate::{Datum, Earth, ExportError, Mesh, Product, Put, Sheet, Work, obj_materials};
 
 /// Load modules along the side of a block, as many as a level pages at once.
 const BLOCK_MODULES: u32 = 4;
@@ -31,21 +34,43 @@ pub fn write_gazebo(product: &Product, put: &Put, work: &Work) -> Result<(), Exp
     let materials = obj_materials(product, &mesh);
     let squares = product.squares(BLOCK_MODULES);
     let blocks = work.each("blocks", &squares, |&rect| {
-        let (ground, decks) = (mesh.part(product, rect), mesh.deck_part(product, rect));
-        if ground.triangles.is_empty() && decks.triangles.is_empty() {
-            return Ok(None);
+        let (seen, solid): (Vec<_>, Vec<_>) = mesh
+            .parts(product, rect)
+            .into_iter()
+            .partition(|(sheet, _)| matches!(sheet, Sheet::Ribbons | Sheet::Objects));
+        let block = Block { rect, is_solid: !solid.is_empty(), is_seen: !seen.is_empty() };
+        for (name, parts) in [(block.solid_name(), &solid), (block.seen_name(), &seen)] {
+            if !parts.is_empty() {
+                let text = block_text(product, &mesh, rect, parts, materials.is_some());
+                put(&name, text.as_bytes()).map_err(ExportError::write(&name))?;
+            }
         }
-        let name = format!("meshes/{}.obj", group_name(rect));
-        let text = block_text(product, &mesh, rect, &[(false, &ground), (true, &decks)], materials.is_some());
-        put(&name, text.as_bytes()).map_err(ExportError::write(&name))?;
-        Ok(Some(rect))
+        Ok(Some(block).filter(|block| block.is_solid || block.is_seen))
     })?;
     if let Some(text) = materials {
         put("meshes/classes.mtl", text.as_bytes()).map_err(ExportError::write("meshes/classes.mtl"))?;
     }
-    let blocks: Vec<ModuleRect> = blocks.into_iter().flatten().collect();
+    let blocks: Vec<Block> = blocks.into_iter().flatten().collect();
     let text = world(product, &mesh, &blocks)?;
     put("area.sdf", text.as_bytes()).map_err(ExportError::write("area.sdf"))
+}
+
+/// A block of load modules, and which meshes it has: one that bodies hit, and one that is seen alone.
+#[derive(Clone, Copy)]
+struct Block {
+    rect: ModuleRect,
+    is_solid: bool,
+    is_seen: bool,
+}
+
+impl Block {
+    fn solid_name(&self) -> String {
+        format!("meshes/{}.obj", group_name(self.rect))
+    }
+
+    fn seen_name(&self) -> String {
+        format!("meshes/{}_seen.obj", group_name(self.rect))
+    }
 }
 
 /// A block as OBJ, counted from its own south-west corner.
@@ -53,7 +78,7 @@ fn block_text(
     product: &Product,
     mesh: &Mesh,
     rect: ModuleRect,
-    parts: &[(bool, &Part)],
+    parts: &[(Sheet, Part)],
     has_materials: bool,
 ) -> String {
     let [west, south] = corner(product, rect);
@@ -68,11 +93,12 @@ fn block_text(
     let mut first = 0;
     // Nothing fails where bytes go to memory.
     let _ = put_obj_vertices(&mut bytes, parts.iter().flat_map(|(_, part)| &part.vertices).map(metres));
-    for (is_deck, part) in parts.iter().filter(|(_, part)| !part.triangles.is_empty()) {
-        bytes.extend(format!("o {}\n", if *is_deck { "decks" } else { "ground" }).bytes());
+    for (sheet, part) in parts {
+        bytes.extend(format!("o {}\n", sheet.name()).bytes());
         for (class, triangles) in class_groups(&part.triangles, &part.classes) {
             if has_materials {
-                bytes.extend(format!("usemtl {}\n", product.classes().word(class)).bytes());
+                let material = Material { sheet: *sheet, class };
+                bytes.extend(format!("usemtl {}\n", material.word(product.classes())).bytes());
             }
             let moved: Vec<[u32; 3]> = triangles.iter().map(|triangle| triangle.map(|v| v + first)).collect();
             let _ = put_obj_faces(&mut bytes, moved.iter());
@@ -87,7 +113,7 @@ fn corner(product: &Product, rect: ModuleRect) -> [i32; 2] {
     product.corner(ModuleId { row: rect.south, col: rect.west })
 }
 
-fn world(product: &Product, mesh: &Mesh, blocks: &[ModuleRect]) -> Result<String, ExportError> {
+fn world(product: &Product, mesh: &Mesh, blocks: &[Block]) -> Result<String, ExportError> {
     let place_m = product.corner_m(product.rect.south, product.rect.west);
     // Longitudes and latitudes only.
     let [longitude, latitude] = Earth::new(product, Some(Datum::Ellipsoid))?.lon_lat(place_m)?;
@@ -119,8 +145,8 @@ fn world(product: &Product, mesh: &Mesh, blocks: &[ModuleRect]) -> Result<String
          <light type=\"directional\" name=\"sun\">\n      <cast_shadows>true</cast_shadows>\n      \
          <diffuse>0.9 0.9 0.85 1</diffuse>\n      <direction>0.5 -0.4 -0.8</direction>\n    </light>\n"
     );
-    for &rect in blocks {
-        put_model(&mut text, product, rect);
+    for block in blocks {
+        put_model(&mut text, product, block);
     }
     put_observer(&mut text, product, mesh);
     text.push_str("    <plugin filename=\"ignored\" name=\"gz::sim\">\n");
@@ -129,26 +155,44 @@ fn world(product: &Product, mesh: &Mesh, blocks: &[ModuleRect]) -> Result<String
         "      <performer name=\"observer\">\n        <ref>observer</ref>\n        \
          <geometry><box><size>{OBSERVER_M} {OBSERVER_M} {OBSERVER_M}</size></box></geometry>\n      </performer>"
     );
-    for &rect in blocks {
-        put_level(&mut text, product, rect);
+    for block in blocks {
+        put_level(&mut text, product, block.rect);
     }
     text.push_str("    </plugin>\n  </world>\n</sdf>\n");
     Ok(text)
 }
 
-fn put_model(text: &mut String, product: &Product, rect: ModuleRect) {
-    let [east, north] = corner(product, rect).map(metres_of_quanta);
-    let name = group_name(rect);
+fn put_model(text: &mut String, product: &Product, block: &Block) {
+    let corner = corner(product, block.rect).map(metres_of_quanta);
+    let [east, north] = corner;
+    let name = group_name(block.rect);
     let _ = writeln!(
         text,
         "    <model name=\"{name}\">\n      <static>true</static>\n      <pose>{east} {north} 0 0 0 0</pose>\n      \
          <link name=\"ground\">"
     );
-    for element in ["collision", "visual"] {
+    let mesh = |text: &mut String, element: &str, name: &str, file: &str| {
         let _ = writeln!(
             text,
-            "        <{element} name=\"{element}\">\n          \
-             <geometry><mesh><uri>meshes/{name}.obj</uri></mesh></geometry>\n        </{element}>"
+            "        <{element} name=\"{name}\">\n          \
+             <geometry><mesh><uri>{file}</uri></mesh></geometry>\n        </{element}>"
+        );
+    };
+    if block.is_solid {
+        ["collision", "visual"].iter().for_each(|element| mesh(text, element, element, &block.solid_name()));
+    }
+    if block.is_seen {
+        mesh(text, "visual", "seen", &block.seen_name());
+    }
+    for (number, found) in boxes(product, block.rect).into_iter().enumerate() {
+        let UprightBox { middle_m: [x, y, z], size_m: [long, wide, high], turned } = found;
+        let _ = writeln!(
+            text,
+            "        <collision name=\"object_{number}\">\n          \
+             <pose>{} {} {z} 0 0 {turned:.6}</pose>\n          \
+             <geometry><box><size>{long:.4} {wide:.4} {high:.4}</size></box></geometry>\n        </collision>",
+            x - corner[0],
+            y - corner[1],
         );
     }
     text.push_str("      </link>\n    </model>\n");

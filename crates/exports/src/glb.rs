@@ -6,20 +6,21 @@
 use std::io::{Result, Write};
 
 use serde_json::{Value, json};
-use terrain::{ModuleId, ModuleRect, Tin, metres_of_quanta};
+use terrain::{ModuleId, Tin, metres_of_quanta};
 
 use crate::classes::Classes;
+use crate::glb_features::FoundFeatures;
 use crate::mesh::{Part, class_groups, normals};
-use crate::modules::{deck_name, module_name};
-use crate::{Facts, Mesh, Product, TinPlace};
+use crate::modules::{alone, sheet_name};
+use crate::objects::Thing;
+use crate::sheets::Material;
+use crate::{Facts, Mesh, Product, Sheet, TinPlace};
 
 /// Meshes as they go into a glTF, each in a node of its own.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Gltf<'a> {
-    /// Of the ground, in order; none without triangles.
-    pub nodes: Vec<GltfNode>,
-    /// Of decks, likewise.
-    pub decks: Vec<GltfNode>,
+    /// Nodes of each sheet, in order; none without triangles.
+    pub sheets: Vec<(Sheet, Vec<GltfNode>)>,
     /// What materials are called, and their colours.
     pub classes: Classes<'a>,
     /// What else to tell a reader.
@@ -37,6 +38,10 @@ pub(crate) struct GltfNode {
     pub normals: Vec<[f32; 3]>,
     /// Triangles of each class of ground, in order.
     pub groups: Vec<(u8, Vec<[u32; 3]>)>,
+    /// What else to tell a reader.
+    pub extras: Value,
+    /// What of it a click finds, where that is told.
+    pub features: Option<FoundFeatures>,
 }
 
 /// Turns east, north, up into glTF's axes.
@@ -57,10 +62,11 @@ impl GltfNode {
 const ARRAY_BUFFER: u32 = 34962;
 const ELEMENT_ARRAY_BUFFER: u32 = 34963;
 
-/// The document and the numbers of a glTF in the making: views of all positions, all normals and all indices.
+/// The document and the numbers of a glTF in the making: views of all positions, all normals, all indices, and all
+/// numbers of features.
 #[derive(Default)]
 struct Parts {
-    views: [Vec<u8>; 3],
+    views: [Vec<u8>; 4],
     accessors: Vec<Value>,
     meshes: Vec<Value>,
     nodes: Vec<Value>,
@@ -70,6 +76,7 @@ impl Parts {
     const POSITIONS: usize = 0;
     const NORMALS: usize = 1;
     const INDICES: usize = 2;
+    const FEATURES: usize = 3;
 
     /// Adds an accessor; its number.
     fn accessor(&mut self, view: usize, start: usize, component: u32, count: usize, kind: &str) -> usize {
@@ -80,31 +87,92 @@ impl Parts {
     }
 
     fn vectors(&mut self, view: usize, vectors: &[[f32; 3]]) -> usize {
-        const F32: u32 = 5126;
-        let start = self.views[view].len();
-        let bytes = vectors.as_flattened().iter().flat_map(|number| number.to_le_bytes());
-        self.views[view].extend(bytes);
-        self.accessor(view, start, F32, vectors.len(), "VEC3")
+        self.floats(view, vectors.as_flattened(), "VEC3", vectors.len())
     }
 
-    /// Adds a node of the ground or of decks; `materials` are those of the file, for decks or not.
-    fn add(&mut self, node: &GltfNode, is_deck: bool, materials: &[(bool, u8)]) {
+    fn floats(&mut self, view: usize, numbers: &[f32], kind: &str, count: usize) -> usize {
+        const F32: u32 = 5126;
+        let start = self.views[view].len();
+        self.views[view].extend(numbers.iter().flat_map(|number| number.to_le_bytes()));
+        self.accessor(view, start, F32, count, kind)
+    }
+
+    /// Adds a node of a sheet; `materials` are those of the file.
+    fn add(&mut self, node: &GltfNode, sheet: Sheet, materials: &[Material]) {
         let positions = self.vectors(Self::POSITIONS, &node.positions);
         let [low, high] = bounds(&node.positions);
         (self.accessors[positions]["min"], self.accessors[positions]["max"]) = (json!(low), json!(high));
         let normals = self.vectors(Self::NORMALS, &node.normals);
+        let mut attributes = json!({ "POSITION": positions, "NORMAL": normals });
+        if let Some(features) = &node.features {
+            let numbers: Vec<f32> = features.of_vertices.iter().map(|&number| number as f32).collect();
+            attributes["_FEATURE_ID_0"] = json!(self.floats(Self::FEATURES, &numbers, "SCALAR", numbers.len()));
+        }
         let mut primitives = Vec::with_capacity(node.groups.len());
         for (class, triangles) in &node.groups {
             let start = self.views[Self::INDICES].len();
             let component = put_indices(&mut self.views[Self::INDICES], triangles, node.positions.len());
             pad(&mut self.views[Self::INDICES], 0);
             let indices = self.accessor(Self::INDICES, start, component, 3 * triangles.len(), "SCALAR");
-            let material = materials.iter().position(|of| *of == (is_deck, *class));
-            primitives.push(json!({ "attributes": { "POSITION": positions, "NORMAL": normals }, "indices": indices,
-                                    "material": material, "mode": 4 }));
+            let material = materials.iter().position(|of| *of == Material { sheet, class: *class }.by_sides());
+            let mut primitive =
+                json!({ "attributes": attributes, "indices": indices, "material": material, "mode": 4 });
+            if let Some(features) = &node.features {
+                primitive["extensions"] = features.primitive();
+            }
+            primitives.push(primitive);
         }
-        self.nodes.push(json!({ "name": node.name, "mesh": self.meshes.len() }));
+        let mut named = json!({ "name": node.name, "mesh": self.meshes.len() });
+        if !node.extras.is_null() {
+            named["extras"] = node.extras.clone();
+        }
+        self.nodes.push(named);
         self.meshes.push(json!({ "name": node.name, "primitives": primitives }));
+    }
+}
+
+impl Parts {
+    /// The views that hold anything, and their bytes.
+    fn put_views(&mut self) -> (Vec<Value>, Vec<u8>) {
+        let (mut views, mut binary) = (Vec::new(), Vec::new());
+        for (index, bytes) in self.views.iter().enumerate().filter(|(_, bytes)| !bytes.is_empty()) {
+            let mut view = json!({ "buffer": 0, "byteOffset": binary.len(), "byteLength": bytes.len() });
+            // What several accessors share has to say where the next vertex begins.
+            let (target, stride) = match index {
+                Self::INDICES => (ELEMENT_ARRAY_BUFFER, None),
+                Self::FEATURES => (ARRAY_BUFFER, Some(size_of::<f32>())),
+                _ => (ARRAY_BUFFER, Some(size_of::<[f32; 3]>())),
+            };
+            view["target"] = json!(target);
+            if let Some(stride) = stride {
+                view["byteStride"] = json!(stride);
+            }
+            let at = views.len();
+            for accessor in self.accessors.iter_mut().filter(|accessor| accessor["bufferView"] == index) {
+                accessor["bufferView"] = json!(at);
+            }
+            views.push(view);
+            binary.extend_from_slice(bytes);
+        }
+        (views, binary)
+    }
+
+    /// Puts what is not ground below a node of its sheet; the nodes at the top.
+    fn put_parents(&mut self, sheets: &[(Sheet, Vec<GltfNode>)]) -> Vec<usize> {
+        let (mut top, mut first) = (Vec::new(), 0);
+        let mut parents = Vec::new();
+        for (sheet, nodes) in sheets {
+            let own: Vec<usize> = (first..first + nodes.len()).collect();
+            first += nodes.len();
+            match sheet {
+                Sheet::Ground => top.extend(own),
+                _ if own.is_empty() => {}
+                _ => parents.push(json!({ "name": sheet.name(), "children": own })),
+            }
+        }
+        top.extend(self.nodes.len()..self.nodes.len() + parents.len());
+        self.nodes.extend(parents);
+        top
     }
 }
 
@@ -115,64 +183,51 @@ impl Gltf<'_> {
         if !self.extras.is_null() {
             asset["extras"] = self.extras.clone();
         }
-        if self.nodes.is_empty() && self.decks.is_empty() {
+        if self.sheets.iter().all(|(_, nodes)| nodes.is_empty()) {
             // No list may be empty.
             return container(&json!({ "asset": asset, "scene": 0, "scenes": [{ "name": "empty" }] }), &[]);
         }
-        let used = |nodes: &[GltfNode], is_deck: bool| -> Vec<(bool, u8)> {
-            nodes.iter().flat_map(|node| &node.groups).map(|(class, _)| (is_deck, *class)).collect()
+        let all = || self.sheets.iter().flat_map(|(sheet, nodes)| nodes.iter().map(|node| (*sheet, node)));
+        let used = |(sheet, node): (Sheet, &GltfNode)| -> Vec<Material> {
+            node.groups.iter().map(|&(class, _)| Material { sheet, class }.by_sides()).collect()
         };
-        let mut materials = [used(&self.nodes, false), used(&self.decks, true)].concat();
+        let mut materials: Vec<Material> = all().flat_map(used).collect();
         materials.sort_unstable();
         materials.dedup();
         let mut parts = Parts::default();
-        self.nodes.iter().for_each(|node| parts.add(node, false, &materials));
-        self.decks.iter().for_each(|node| parts.add(node, true, &materials));
-        let mut top: Vec<usize> = (0..self.nodes.len()).collect();
-        if !self.decks.is_empty() {
-            let children: Vec<usize> = (self.nodes.len()..parts.nodes.len()).collect();
-            top.push(parts.nodes.len());
-            parts.nodes.push(json!({ "name": "decks", "children": children }));
-        }
-        let mut binary = Vec::new();
-        let mut views = Vec::new();
-        for (index, bytes) in parts.views.iter().enumerate() {
-            let mut view = json!({ "buffer": 0, "byteOffset": binary.len(), "byteLength": bytes.len() });
-            if index == Parts::INDICES {
-                view["target"] = json!(ELEMENT_ARRAY_BUFFER);
-            } else {
-                view["target"] = json!(ARRAY_BUFFER);
-                // What several accessors share has to say where the next vertex begins.
-                view["byteStride"] = json!(size_of::<[f32; 3]>());
-            }
-            views.push(view);
-            binary.extend_from_slice(bytes);
-        }
-        let document = json!({
+        all().for_each(|(sheet, node)| parts.add(node, sheet, &materials));
+        let top = parts.put_parents(&self.sheets);
+        let (mut views, mut binary) = parts.put_views();
+        let mut document = json!({
             "asset": asset, "scene": 0, "scenes": [{ "nodes": top }],
             "nodes": parts.nodes, "meshes": parts.meshes,
-            "materials": materials.into_iter().map(|of| material(self.classes, of)).collect::<Vec<_>>(),
-            "accessors": parts.accessors, "bufferViews": views, "buffers": [{ "byteLength": binary.len() }],
+            "materials": materials.into_iter().map(|of| material_of(self.classes, of)).collect::<Vec<_>>(),
+            "accessors": parts.accessors,
         });
+        if let Some(features) = all().find_map(|(_, node)| node.features.as_ref()) {
+            document["extensionsUsed"] = json!(["EXT_mesh_features", "EXT_structural_metadata"]);
+            document["extensions"] = json!({ "EXT_structural_metadata": features.metadata(&mut views, &mut binary) });
+        }
+        document["bufferViews"] = json!(views);
+        document["buffers"] = json!([{ "byteLength": binary.len() }]);
         container(&document, &binary)
     }
 }
 
-/// The material of a class, for decks or not.
-fn material(classes: Classes, (is_deck, class): (bool, u8)) -> Value {
-    let [red, green, blue] = classes.light(class);
-    let word = classes.word(class);
-    let mut material = json!({
-        "name": if is_deck { format!("decks_{word}") } else { word },
+/// The material as glTF describes it.
+fn material_of(classes: Classes, material: Material) -> Value {
+    let [red, green, blue] = material.light(classes);
+    let word = material.word(classes);
+    let mut value = json!({
+        "name": if material.sheet == Sheet::Decks { format!("decks_{word}") } else { word },
         "pbrMetallicRoughness": {
             "baseColorFactor": [red, green, blue, 1.0], "metallicFactor": 0.0, "roughnessFactor": 1.0,
         },
     });
-    if is_deck {
-        // A deck has no thickness, and is seen from below too.
-        material["doubleSided"] = json!(true);
+    if material.sheet.is_seen_from_below() {
+        value["doubleSided"] = json!(true);
     }
-    material
+    value
 }
 
 fn bounds(vectors: &[[f32; 3]]) -> [[f32; 3]; 2] {
@@ -221,8 +276,9 @@ fn container(document: &Value, binary: &[u8]) -> Vec<u8> {
 }
 
 /// Writes `mesh` as binary glTF, counted from the south-west corner of what is exported: a node for each load module,
-/// over vertices of its own, and one for its decks below a node `decks`. Normals are those of the whole mesh, so that
-/// no line shows between two.
+/// over vertices of its own, one for its decks and ribbons below nodes `decks` and `ribbons`, and one for each
+/// object below a node `objects`.
+/// Normals are those of the whole mesh, so that no line shows between two.
 ///
 /// # Errors
 /// Those of `out`.
@@ -230,21 +286,32 @@ pub fn write_glb(out: &mut impl Write, product: &Product, mesh: &Mesh) -> Result
     let facts = Facts::y_up(product);
     let positions: Vec<[f32; 3]> = mesh.metres().map(turned).collect();
     let normals: Vec<[f32; 3]> = mesh.normals().into_iter().map(turned).collect();
-    let node = |name: String, part: Part| {
+    let node = |name: String, extras: Value, part: &Part| {
         let node = GltfNode {
             name,
             positions: part.vertices.iter().map(|&v| positions[v as usize]).collect(),
             normals: part.vertices.iter().map(|&v| normals[v as usize]).collect(),
-            groups: Vec::new(),
+            extras,
+            ..GltfNode::default()
         };
         node.with_groups(&part.triangles, &part.classes)
     };
-    let alone = |id: ModuleId| ModuleRect { south: id.row, west: id.col, north: id.row + 1, east: id.col + 1 };
-    let of_module = |id: ModuleId| node(module_name(id), mesh.part(product, alone(id)));
-    let of_decks = |id: ModuleId| node(deck_name(alone(id)), mesh.deck_part(product, alone(id)));
+    let of_module = |sheet: Sheet, id: ModuleId| {
+        node(sheet_name(sheet, alone(id)), Value::Null, &mesh.part(product, sheet, alone(id)))
+    };
+    let of_modules = |sheet: Sheet| -> Vec<GltfNode> {
+        let all = product.rect.iter().map(|id| of_module(sheet, id));
+        all.filter(|node| !node.groups.is_empty()).collect()
+    };
+    let of_thing = |(thing, part): (Thing, Part)| node(thing.name(), thing.told(), &part);
+    let things = mesh.part(product, Sheet::Objects, product.rect).by_thing();
     let gltf = Gltf {
-        nodes: product.rect.iter().map(of_module).filter(|node| !node.groups.is_empty()).collect(),
-        decks: product.rect.iter().map(of_decks).filter(|node| !node.groups.is_empty()).collect(),
+        sheets: vec![
+            (Sheet::Ground, of_modules(Sheet::Ground)),
+            (Sheet::Decks, of_modules(Sheet::Decks)),
+            (Sheet::Ribbons, of_modules(Sheet::Ribbons)),
+            (Sheet::Objects, things.into_iter().map(of_thing).collect()),
+        ],
         classes: product.classes(),
         extras: json!({
             "crs": product.crs(), "vertical_datum": product.vertical_datum(), "offset_m": facts.offset_m,
@@ -275,10 +342,10 @@ pub fn write_tin_glb(out: &mut impl Write, tin: &Tin, place: &TinPlace) -> Resul
         positions: places.iter().copied().map(turned).collect(),
         normals: normals(&places, &tin.triangles).into_iter().map(turned).collect(),
         groups: vec![(0, tin.triangles.clone())],
+        ..GltfNode::default()
     };
     let gltf = Gltf {
-        nodes: vec![node],
-        decks: Vec::new(),
+        sheets: vec![(Sheet::Ground, vec![node])],
         classes: Classes::default(),
         extras: json!({
             "crs": place.crs, "axes": "x east, y up, z south",

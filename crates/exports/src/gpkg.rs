@@ -1,4 +1,4 @@
-//! A GeoPackage for QGIS: load modules, breaches, tiles, the triangles themselves and decks, as layers of one
+//! A GeoPackage for QGIS: load modules, breaches, tiles, the triangles themselves, decks and objects, as layers of one
 //! file.
 //!
 //! The one export that opens its file itself, because the library does; it is given a temporary name.
@@ -12,6 +12,7 @@ use store::{Report, ReportPlace};
 use terrain::{Decks, HOLE_CLASS, ModuleId, ModuleRect, ModuleVertex, QUANTA_PER_METRE, metres_of_quanta};
 
 use crate::classes::HOLE_NAME;
+use crate::gpkg_objects::add_objects;
 use crate::{ExportError, Product, Step, Work, gpkg_styles};
 
 const MODULES: Layer = Layer {
@@ -109,6 +110,7 @@ pub fn write_gpkg(
 
     let with_classes: Vec<&str> = layers[3..].iter().map(|layer| layer.name).collect();
     gpkg_styles::add(&transaction, &with_classes, &class_values(product, &names)).map_err(fault)?;
+    layers.extend(add_objects(&package.0, product, extent(product, product.rect)).map_err(fault)?);
     for layer in layers {
         add_index(&transaction, layer.name).map_err(fault)?;
     }

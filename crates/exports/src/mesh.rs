@@ -1,11 +1,14 @@
-//! The load modules of a product as one mesh: vertices on shared sides are one vertex, those of decks their own.
+//! The load modules of a product as one mesh: vertices on shared sides are one vertex, those of decks and objects their
+//! own.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::ops::Range;
 
-use terrain::{HOLE_CLASS, LoadModule, ModuleId, ModuleRect, ModuleVertex, QUANTA_PER_METRE};
+use terrain::{HOLE_CLASS, LoadModule, ModuleId, ModuleRect, ModuleVertex, ObjectKind, QUANTA_PER_METRE};
 
-use crate::Product;
+use crate::objects::{Facet, Thing, things_in};
+use crate::ribbons::Ribbons;
+use crate::{Product, Sheet};
 
 /// What coordinates are counted from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -21,17 +24,18 @@ pub enum Coordinates {
 pub struct Mesh {
     /// East, north and up in quanta of 1/128 m; east and north from the mesh's south-west corner.
     pub vertices: Vec<[i32; 3]>,
-    /// Corners, counter-clockwise seen from above: those of the ground, then those of decks.
+    /// Corners, counter-clockwise seen from above or from outside, sheet after sheet.
     pub triangles: Vec<[u32; 3]>,
-    /// Class of each triangle.
+    /// Class of each triangle; of objects, the number of the material.
     pub classes: Vec<u8>,
-    /// First triangle of each load module's ground, row by row from the south-west, and the end of the last.
-    pub(crate) starts: Vec<usize>,
-    /// The same of the decks of each load module; empty where no load module has any.
-    pub(crate) deck_starts: Vec<usize>,
+    /// Of each sheet, the first triangle of each load module, row by row from the south-west, and the end of the last;
+    /// empty where no load module has any.
+    starts: [Vec<usize>; Sheet::ALL.len()],
+    /// Objects with their triangles, in the order of these.
+    things: Vec<(Thing, Range<usize>)>,
 }
 
-/// Some load modules of a mesh, over vertices of their own.
+/// Some load modules of a sheet of a mesh, over vertices of their own.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Part {
     /// Vertices of the mesh, in the order in which they are first used.
@@ -42,15 +46,49 @@ pub(crate) struct Part {
     pub classes: Vec<u8>,
     /// Each load module, and its triangles among those of the part.
     pub modules: Vec<(ModuleId, Range<usize>)>,
+    /// Each object, or piece of one, and its triangles among those of the part.
+    pub things: Vec<(Thing, Range<usize>)>,
+}
+
+impl Part {
+    /// Each object of a part of objects with all of its pieces, over vertices of its own, by kind and number.
+    pub(crate) fn by_thing(&self) -> Vec<(Thing, Self)> {
+        let mut pieces: BTreeMap<(ObjectKind, u64), (Thing, Vec<Range<usize>>)> = BTreeMap::new();
+        for (thing, range) in &self.things {
+            let (whole, ranges) = pieces.entry((thing.kind, thing.id)).or_insert_with(|| (*thing, Vec::new()));
+            whole.height = whole.height.max(thing.height);
+            ranges.push(range.clone());
+        }
+        let part = |ranges: Vec<Range<usize>>| {
+            let (mut part, mut place_of) = (Self::default(), HashMap::new());
+            for index in ranges.into_iter().flatten() {
+                let placed = self.triangles[index].map(|v| {
+                    *place_of.entry(v).or_insert_with(|| {
+                        part.vertices.push(self.vertices[v as usize]);
+                        part.vertices.len() as u32 - 1
+                    })
+                });
+                part.triangles.push(placed);
+                part.classes.push(self.classes[index]);
+            }
+            part
+        };
+        pieces.into_values().map(|(thing, ranges)| (thing, part(ranges))).collect()
+    }
 }
 
 /// Extent in quanta up to which every coordinate is exact as a 32-bit float.
 const EXACT_QUANTA_MAX: i32 = 1 << 24;
 
 impl Mesh {
-    /// Ground and decks of a product: triangles over holes, where no source has a height, are left out.
+    /// All sheets of a product: triangles over holes, where no source has a height, are left out.
     pub fn of(product: &Product) -> Self {
-        Self::whole(product).without_holes().with_decks(product)
+        Self::whole(product).without_holes().with_sheets(product)
+    }
+
+    /// The same with all that is above the ground.
+    pub(crate) fn with_sheets(self, product: &Product) -> Self {
+        self.with_decks(product).with_ribbons(product).with_objects(product)
     }
 
     /// All ground of a product, triangles over holes too.
@@ -58,10 +96,10 @@ impl Mesh {
         let mut mesh = Self::default();
         let mut shared = HashMap::new();
         for module in &product.modules {
-            mesh.starts.push(mesh.triangles.len());
+            mesh.begin_module(Sheet::Ground);
             mesh.add(module, product.corner(module.id), &mut shared);
         }
-        mesh.starts.push(mesh.triangles.len());
+        mesh.begin_module(Sheet::Ground);
         mesh
     }
 
@@ -72,8 +110,8 @@ impl Mesh {
         }
         let mut left = Self::default();
         let mut place_of = vec![u32::MAX; self.vertices.len()];
-        for range in self.starts.windows(2).map(|ends| ends[0]..ends[1]) {
-            left.starts.push(left.triangles.len());
+        for range in self.starts[Sheet::Ground as usize].windows(2).map(|ends| ends[0]..ends[1]) {
+            left.begin_module(Sheet::Ground);
             for index in range.filter(|&index| self.classes[index] != HOLE_CLASS) {
                 let placed = self.triangles[index].map(|v| {
                     let place = &mut place_of[v as usize];
@@ -87,18 +125,18 @@ impl Mesh {
                 left.classes.push(self.classes[index]);
             }
         }
-        left.starts.push(left.triangles.len());
+        left.begin_module(Sheet::Ground);
         left
     }
 
     /// The same with the decks of its product: they share vertices with each other, and none with the ground.
-    pub(crate) fn with_decks(mut self, product: &Product) -> Self {
+    fn with_decks(mut self, product: &Product) -> Self {
         if product.deck_triangles() == 0 {
             return self;
         }
         let mut shared = HashMap::new();
         for module in &product.modules {
-            self.deck_starts.push(self.triangles.len());
+            self.begin_module(Sheet::Decks);
             let corner = product.corner(module.id);
             let mut place = |vertex: &ModuleVertex| {
                 let place = [corner[0] + i32::from(vertex.x), corner[1] + i32::from(vertex.y), vertex.z];
@@ -112,39 +150,96 @@ impl Mesh {
             self.triangles.extend(placed);
             self.classes.extend_from_slice(&module.decks.classes);
         }
-        self.deck_starts.push(self.triangles.len());
+        self.begin_module(Sheet::Decks);
         self
     }
 
-    /// The triangles of the ground.
-    pub(crate) fn ground(&self) -> Range<usize> {
-        0..self.starts.last().copied().unwrap_or(0)
+    /// The same with ribbons, unless they are not wanted.
+    fn with_ribbons(mut self, product: &Product) -> Self {
+        let Some(ribbons) = product.has_ribbons.then(|| Ribbons::of(product)).flatten() else { return self };
+        for module in &product.modules {
+            self.begin_module(Sheet::Ribbons);
+            ribbons.in_module(product, module.id).iter().for_each(|facet| self.add_facet(facet));
+        }
+        self.begin_module(Sheet::Ribbons);
+        self
     }
 
-    /// The triangles of decks.
-    pub(crate) fn decks(&self) -> Range<usize> {
-        self.ground().end..self.triangles.len()
+    /// The same with the objects of its product, each over vertices of its own.
+    fn with_objects(mut self, product: &Product) -> Self {
+        if product.modules.iter().all(|module| module.objects.is_empty()) {
+            return self;
+        }
+        for module in &product.modules {
+            self.begin_module(Sheet::Objects);
+            for (thing, facets) in things_in(product, module.id) {
+                let first = self.triangles.len();
+                facets.iter().for_each(|facet| self.add_facet(facet));
+                self.things.push((thing, first..self.triangles.len()));
+            }
+        }
+        self.begin_module(Sheet::Objects);
+        self
     }
 
-    /// The ground of the load modules of `rect`, which `product`, of which this is the mesh, holds: without holes.
-    pub(crate) fn part(&self, product: &Product, rect: ModuleRect) -> Part {
-        self.part_of(&self.starts, product, rect)
+    /// Adds a facet: what rounding leaves without an area has no triangle.
+    fn add_facet(&mut self, facet: &Facet) {
+        let mut shared = HashMap::new();
+        for polygon in &facet.polygons {
+            for corner in 2..polygon.len() {
+                let corners = [polygon[0], polygon[corner - 1], polygon[corner]];
+                if !faces_somewhere(corners, polygon) {
+                    continue;
+                }
+                let triangle = corners.map(|place| {
+                    *shared.entry(place).or_insert_with(|| {
+                        self.vertices.push(place);
+                        self.vertices.len() as u32 - 1
+                    })
+                });
+                self.triangles.push(triangle);
+                self.classes.push(facet.material);
+            }
+        }
     }
 
-    /// The decks of the load modules of `rect`; without triangles where they have none.
-    pub(crate) fn deck_part(&self, product: &Product, rect: ModuleRect) -> Part {
-        if self.deck_starts.is_empty() { Part::default() } else { self.part_of(&self.deck_starts, product, rect) }
+    fn begin_module(&mut self, sheet: Sheet) {
+        self.starts[sheet as usize].push(self.triangles.len());
     }
 
-    fn part_of(&self, starts: &[usize], product: &Product, rect: ModuleRect) -> Part {
-        let mut part = Part::default();
+    /// The first triangle of the ground of each load module, row by row from the south-west.
+    pub(crate) fn module_starts(&self) -> &[usize] {
+        &self.starts[Sheet::Ground as usize]
+    }
+
+    /// The triangles of a sheet.
+    pub(crate) fn sheet(&self, sheet: Sheet) -> Range<usize> {
+        match self.starts[sheet as usize].as_slice() {
+            [first, .., last] => *first..*last,
+            _ => 0..0,
+        }
+    }
+
+    /// A sheet in the load modules of `rect`, which `product`, of which this is the mesh, holds: without holes, and
+    /// without triangles where they have none of it.
+    pub(crate) fn part(&self, product: &Product, sheet: Sheet, rect: ModuleRect) -> Part {
+        let (starts, mut part) = (&self.starts[sheet as usize], Part::default());
+        if starts.is_empty() {
+            return part;
+        }
         let mut place_of = HashMap::new();
         for id in rect.iter() {
             let (row, col) = (id.row - product.rect.south, id.col - product.rect.west);
             let index = (row * product.rect.cols() + col) as usize;
             let own = starts[index]..starts[index + 1];
             let start = part.triangles.len();
-            for index in own.filter(|&index| self.classes[index] != HOLE_CLASS) {
+            if sheet == Sheet::Objects {
+                let first = self.things.partition_point(|(_, range)| range.start < own.start);
+                let things = self.things[first..].iter().take_while(|(_, range)| range.start < own.end);
+                let moved = |at: usize| start + at - own.start;
+                part.things.extend(things.map(|(thing, range)| (*thing, moved(range.start)..moved(range.end))));
+            }
+            for index in own.filter(|&index| sheet == Sheet::Objects || self.classes[index] != HOLE_CLASS) {
                 let placed = self.triangles[index].map(|v| {
                     *place_of.entry(v).or_insert_with(|| {
                         part.vertices.push(v);
@@ -157,6 +252,17 @@ impl Mesh {
             part.modules.push((id, start..part.triangles.len()));
         }
         part
+    }
+
+    /// All sheets in the load modules of `rect` that have a triangle there.
+    pub(crate) fn parts(&self, product: &Product, rect: ModuleRect) -> Vec<(Sheet, Part)> {
+        let parts = Sheet::ALL.map(|sheet| (sheet, self.part(product, sheet, rect)));
+        parts.into_iter().filter(|(_, part)| !part.triangles.is_empty()).collect()
+    }
+
+    /// The highest of the objects of a part above what they stand on, in quanta.
+    pub(crate) fn tallest(parts: &[(Sheet, Part)]) -> i32 {
+        parts.iter().flat_map(|(_, part)| &part.things).map(|(thing, _)| thing.height).max().unwrap_or(0)
     }
 
     fn add(&mut self, module: &LoadModule, corner: [i32; 2], shared: &mut HashMap<[i32; 2], u32>) {
@@ -190,6 +296,18 @@ impl Mesh {
         let places: Vec<[f64; 3]> = self.metres().collect();
         normals(&places, &self.triangles)
     }
+}
+
+/// Whether three corners of a polygon span a triangle that faces as the polygon does. Seen from above, rounding may
+/// turn the narrowest over.
+fn faces_somewhere(corners: [[i32; 3]; 3], polygon: &[[i32; 3]]) -> bool {
+    let normal = |[a, b, c]: [[i32; 3]; 3]| {
+        let [a, b, c] = [a, b, c].map(|place| place.map(f64::from));
+        cross(minus(b, a), minus(c, a))
+    };
+    let of = normal(corners);
+    let is_upright = (2..polygon.len()).all(|at| normal([polygon[0], polygon[at - 1], polygon[at]])[2] == 0.0);
+    if is_upright { of != [0.0; 3] } else { 0.0 < of[2] }
 }
 
 /// Triangles by class, in the order of classes.
@@ -257,7 +375,7 @@ mod tests {
     fn a_part_has_the_triangles_of_its_load_modules_over_its_own_vertices() {
         let product = samples::product();
         let mesh = Mesh::of(&product);
-        let part = mesh.part(&product, samples::eastern().rect);
+        let part = mesh.part(&product, Sheet::Ground, samples::eastern().rect);
         assert_eq!((part.vertices.len(), part.triangles.len()), (5, 4));
         for (own, whole) in part.triangles.iter().zip(&mesh.triangles[2..]) {
             assert_eq!(own.map(|v| part.vertices[v as usize]), *whole);
@@ -273,9 +391,9 @@ mod tests {
         // The eastern load module, its two western triangles excepted, is a hole, and so is its north-eastern corner.
         let mesh = Mesh::of(&product);
         assert_eq!((mesh.vertices.len(), mesh.triangles.len()), (6, 4));
-        assert!(!mesh.classes.contains(&HOLE_CLASS) && mesh.starts == [0, 2, 4]);
+        assert!(!mesh.classes.contains(&HOLE_CLASS) && mesh.module_starts() == [0, 2, 4]);
         assert!(mesh.triangles.iter().flatten().all(|&v| (v as usize) < mesh.vertices.len()));
-        for part in [mesh.part(&product, product.rect), whole.part(&product, product.rect)] {
+        for part in [&mesh, &whole].map(|of| of.part(&product, Sheet::Ground, product.rect)) {
             assert_eq!((part.vertices.len(), part.triangles.len(), part.classes.len()), (6, 4, 4));
             assert_eq!(part.modules[1].1, 2..4);
         }
@@ -285,15 +403,15 @@ mod tests {
     fn decks_follow_the_ground_over_vertices_of_their_own() {
         let product = samples::with_bridge();
         let (mesh, ground) = (Mesh::of(&product), Mesh::whole(&product));
-        assert_eq!((mesh.ground(), mesh.decks()), (0..6, 6..12));
+        assert_eq!([Sheet::Ground, Sheet::Decks].map(|sheet| mesh.sheet(sheet)), [0..6, 6..12]);
         assert_eq!((&mesh.vertices[..7], &mesh.triangles[..6]), (&ground.vertices[..], &ground.triangles[..]));
         // The lower bridge goes on over the line between the load modules: two vertices are shared.
         assert_eq!((mesh.vertices.len(), &mesh.classes[6..]), (7 + 6 + 4, &[1, 1, 1, 1, 2, 2][..]));
-        let (both, east) = (mesh.deck_part(&product, product.rect), samples::eastern().rect);
+        let (both, east) = (mesh.part(&product, Sheet::Decks, product.rect), samples::eastern().rect);
         assert_eq!((both.vertices.len(), both.triangles.len()), (10, 6));
-        assert_eq!(mesh.deck_part(&product, east).modules, [(ModuleId { row: 0, col: 1 }, 0..4)]);
-        assert_eq!(mesh.part(&product, east).triangles.len(), 4);
-        assert!(ground.deck_part(&product, east).triangles.is_empty());
+        assert_eq!(mesh.part(&product, Sheet::Decks, east).modules, [(ModuleId { row: 0, col: 1 }, 0..4)]);
+        assert_eq!(mesh.part(&product, Sheet::Ground, east).triangles.len(), 4);
+        assert!(ground.part(&product, Sheet::Decks, east).triangles.is_empty());
     }
 
     #[test]

@@ -3,16 +3,20 @@
 use store::{TileModules, encode_levels};
 use terrain::{LoadModule, ModuleId, ModuleRect};
 
-use crate::{ExportError, Product, Put, Work};
+use crate::{ExportError, Product, Put, Sheet, Work};
 
 /// The name of a load module: `r0012c0034`.
 pub(crate) fn module_name(id: ModuleId) -> String {
     format!("r{:04}c{:04}", id.row, id.col)
 }
 
-/// The name of the decks of a rectangle of load modules: `decks_r0012c0034`.
-pub(crate) fn deck_name(rect: ModuleRect) -> String {
-    format!("decks_{}", group_name(rect))
+/// The name of a sheet of a rectangle of load modules: that of the load modules for the ground, else
+/// `decks_r0012c0034`.
+pub(crate) fn sheet_name(sheet: Sheet, rect: ModuleRect) -> String {
+    match sheet {
+        Sheet::Ground => group_name(rect),
+        _ => format!("{}_{}", sheet.name(), group_name(rect)),
+    }
 }
 
 /// The name of the load modules of a rectangle: the south-west one, and the north-east one if there are several.
@@ -20,6 +24,11 @@ pub(crate) fn group_name(rect: ModuleRect) -> String {
     let low = ModuleId { row: rect.south, col: rect.west };
     let high = ModuleId { row: rect.north - 1, col: rect.east - 1 };
     if low == high { module_name(low) } else { format!("{}_{}", module_name(low), module_name(high)) }
+}
+
+/// The rectangle of one load module.
+pub(crate) fn alone(id: ModuleId) -> ModuleRect {
+    ModuleRect { south: id.row, west: id.col, north: id.row + 1, east: id.col + 1 }
 }
 
 /// The name of a load module's file: `r0012c0034.slm`.
@@ -40,7 +49,7 @@ pub fn write_modules(product: &Product, put: &Put, work: &Work) -> Result<(), Ex
         let coarser = product.coarser.iter().map(|level| level[index].clone());
         let levels = std::iter::once(module.clone()).chain(coarser);
         let name = file_name(module.id, "slm");
-        put(&name, &alone(tile, levels.collect())).map_err(ExportError::write(&name))
+        put(&name, &file_of(tile, levels.collect())).map_err(ExportError::write(&name))
     })?;
     Ok(())
 }
@@ -49,13 +58,12 @@ pub fn write_modules(product: &Product, put: &Put, work: &Work) -> Result<(), Ex
 /// file of its tile says. `None` where the tile has no such load module.
 pub fn module_file(tile: &TileModules, levels: &[Vec<LoadModule>], id: ModuleId) -> Option<Vec<u8>> {
     let at = |level: &Vec<LoadModule>| level.iter().find(|module| module.id == id).cloned();
-    Some(alone(tile, levels.iter().map(at).collect::<Option<_>>()?))
+    Some(file_of(tile, levels.iter().map(at).collect::<Option<_>>()?))
 }
 
 /// The file of a load module that is given at all of its levels.
-fn alone(tile: &TileModules, levels: Vec<LoadModule>) -> Vec<u8> {
-    let ModuleId { row, col } = levels[0].id;
-    let modules = ModuleRect { south: row, west: col, north: row + 1, east: col + 1 };
+fn file_of(tile: &TileModules, levels: Vec<LoadModule>) -> Vec<u8> {
+    let modules = alone(levels[0].id);
     let levels: Vec<Vec<LoadModule>> = levels.into_iter().map(|module| vec![module]).collect();
     encode_levels(&TileModules { modules, ..tile.clone() }, &levels)
 }

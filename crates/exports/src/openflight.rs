@@ -1,7 +1,10 @@
 //! OpenFlight: a file for each 4 km square, one that refers to all of them, and a MetaFlight index.
 //!
 //! All files count from one origin, the south-west corner of what is exported, and say in their headers where it lies;
-//! so they fit together as they are. Triangles over holes are left out; decks are a group of their own in their square.
+//! so they fit together as they are. Triangles over holes are left out; decks and objects are groups of their own
+//! in their square.
+
+use std::ops::Range;
 
 use terrain::{ModuleId, ModuleRect};
 
@@ -9,8 +12,9 @@ use crate::earth::Earth;
 use crate::flt_records::{Face, Place, Records};
 use crate::mesh::{Mesh, Part};
 use crate::metaflight::{Grid, metaflight};
-use crate::modules::{deck_name, module_name};
-use crate::{Coordinates, Datum, ExportError, Facts, Product, Put, Work};
+use crate::modules::{alone, sheet_name};
+use crate::sheets::Material;
+use crate::{Coordinates, Datum, ExportError, Facts, Product, Put, Sheet, Work};
 
 /// Side of a square in metres.
 pub(crate) const SQUARE_M: f64 = 4000.0;
@@ -28,18 +32,26 @@ pub fn write_openflight(product: &Product, put: &Put, work: &Work) -> Result<(),
     let earth = Earth::new(product, Some(Datum::Ellipsoid))?;
     let about = Facts::z_up(product, Coordinates::Local).comments(product).join("\n");
     work.each("squares", &squares, |&rect| {
-        let (part, decks) = (mesh.part(product, rect), mesh.deck_part(product, rect));
+        let mut parts = mesh.parts(product, rect);
+        if parts.first().is_none_or(|(sheet, _)| *sheet != Sheet::Ground) {
+            // The group of the ground is there in any case, with an object for each load module.
+            parts.insert(0, (Sheet::Ground, mesh.part(product, Sheet::Ground, rect)));
+        }
         let mut records = Records::default();
         records.header(&place(product, &earth, rect)?);
         records.comment(&about);
+        let materials = mesh.groups();
+        for (index, material) in materials.iter().enumerate() {
+            records.material(index as i32, &material.word(product.classes()));
+        }
         let vertex = |&v: &u32| (places[v as usize], normals[v as usize]);
-        records.vertices(&part.vertices.iter().chain(&decks.vertices).map(vertex).collect::<Vec<_>>());
+        records.vertices(&parts.iter().flat_map(|(_, part)| &part.vertices).map(vertex).collect::<Vec<_>>());
         records.push();
-        records.group("square");
-        put_objects(&mut records, product, &part, None);
-        if !decks.triangles.is_empty() {
-            records.group("decks");
-            put_objects(&mut records, product, &decks, Some(part.vertices.len() as u32));
+        let mut first = 0;
+        for (sheet, part) in &parts {
+            records.group(if *sheet == Sheet::Ground { "square" } else { sheet.name() });
+            put_objects(&mut records, (product, &materials), (*sheet, part), first);
+            first += part.vertices.len() as u32;
         }
         records.pop();
         let name = format!("squares/{}", square_name(product, rect, "flt"));
@@ -61,20 +73,30 @@ pub fn write_openflight(product: &Product, put: &Put, work: &Work) -> Result<(),
     put("area.mft", index.as_bytes()).map_err(ExportError::write("area.mft"))
 }
 
-/// The faces of each load module as an object: of its ground, or of its decks, whose vertices begin at this one.
-fn put_objects(records: &mut Records, product: &Product, part: &Part, decks_from: Option<u32>) {
-    let (classes, first) = (product.classes(), decks_from.unwrap_or(0));
-    records.push();
-    for (id, triangles) in &part.modules {
-        if decks_from.is_some() && triangles.is_empty() {
-            continue;
+/// The faces of each load module of a sheet, or of each object, as an object; its vertices begin at `first`.
+fn put_objects(
+    records: &mut Records,
+    (product, materials): (&Product, &[Material]),
+    (sheet, part): (Sheet, &Part),
+    first: u32,
+) {
+    let of_module = |(id, range): &(ModuleId, Range<usize>)| (sheet_name(sheet, alone(*id)), range.clone());
+    let objects: Vec<(String, Range<usize>)> = match sheet {
+        Sheet::Objects => part.things.iter().map(|(thing, range)| (thing.name(), range.clone())).collect(),
+        Sheet::Ground => part.modules.iter().map(of_module).collect(),
+        Sheet::Decks | Sheet::Ribbons => {
+            part.modules.iter().filter(|(_, range)| !range.is_empty()).map(of_module).collect()
         }
-        let alone = ModuleRect { south: id.row, west: id.col, north: id.row + 1, east: id.col + 1 };
-        records.object(&if decks_from.is_some() { deck_name(alone) } else { module_name(*id) });
+    };
+    records.push();
+    for (name, range) in objects {
+        records.object(&name);
         records.push();
-        let of_module = part.triangles[triangles.clone()].iter().zip(&part.classes[triangles.clone()]);
-        for (triangle, &class) in of_module {
-            let face = Face { class, color: classes.color(class), is_seen_from_below: decks_from.is_some() };
+        for (triangle, &class) in part.triangles[range.clone()].iter().zip(&part.classes[range]) {
+            let material = Material { sheet, class };
+            let (code, color) = (material.number(), material.color(product.classes()));
+            let material = materials.iter().position(|of| *of == material).map_or(-1, |place| place as i16);
+            let face = Face { code, material, color, is_seen_from_below: sheet.is_seen_from_below() };
             records.face(triangle.map(|v| first + v), face);
         }
         records.pop();

@@ -2,7 +2,9 @@
 
 use std::io::{Result, Write};
 
-use crate::{Coordinates, Facts, Mesh, Product};
+use crate::mesh::class_groups;
+use crate::sheets::Material;
+use crate::{Coordinates, Facts, Mesh, Product, Sheet};
 
 /// Writes `mesh` as binary little-endian PLY. Faces have corners only, since readers (meshio is one) take all lists to
 /// lie one behind the other; so triangles come class by class, those of decks after all of the ground, and comments say
@@ -19,9 +21,11 @@ pub fn write_ply(out: &mut impl Write, product: &Product, mesh: &Mesh, coordinat
     let mut first = 0;
     for &group in &groups {
         let end = first + mesh.of_group(group).count();
-        let kind = if group.is_deck { "decks class" } else { "class" };
-        let name = classes.name(group.class).map(|_| format!(" {}", classes.word(group.class))).unwrap_or_default();
-        comments.push(format!("{kind} {} faces {first} to {}{name}", group.class, end - 1));
+        let Material { sheet, class } = group;
+        let kind = if sheet == Sheet::Ground { "class".to_owned() } else { format!("{} class", sheet.name()) };
+        let is_named = sheet == Sheet::Objects || classes.name(class).is_some();
+        let name = if is_named { format!(" {}", group.word(classes)) } else { String::new() };
+        comments.push(format!("{kind} {class} faces {first} to {}{name}", end - 1));
         first = end;
     }
     let triangles = groups.iter().flat_map(|&group| mesh.of_group(group));
@@ -29,7 +33,8 @@ pub fn write_ply(out: &mut impl Write, product: &Product, mesh: &Mesh, coordinat
     put_ply(out, &ply, metres(mesh, product, &facts), triangles)
 }
 
-/// Writes `mesh` as OBJ, the triangles of each class as a group, and decks as an object of their own. `library` is the
+/// Writes `mesh` as OBJ, the triangles of each class as a group, decks as an object of their own, and each building,
+/// wood and the like as one. `library` is the
 /// name of the file with the materials of [`obj_materials`], where there is one. Nothing is buffered here: give it a
 /// `BufWriter`.
 ///
@@ -45,24 +50,37 @@ pub fn write_obj(
     let facts = Facts::z_up(product, coordinates);
     let mut comments = facts.comments(product);
     let (groups, classes) = (mesh.groups(), product.classes());
-    let named = groups.iter().filter(|group| !group.is_deck && classes.name(group.class).is_some());
+    let named = groups.iter().filter(|group| group.sheet == Sheet::Ground && classes.name(group.class).is_some());
     comments.extend(named.map(|group| format!("class {} {}", group.class, classes.word(group.class))));
     put_obj_comments(out, &comments)?;
     if let Some(library) = library {
         writeln!(out, "mtllib {library}")?;
     }
     put_obj_vertices(out, metres(mesh, product, &facts))?;
-    let mut was_deck = false;
-    for group in groups {
-        if group.is_deck && !was_deck {
-            writeln!(out, "o decks")?;
+    let has_materials = library.is_some();
+    let mut last = Sheet::Ground;
+    for group in groups.into_iter().filter(|group| group.sheet != Sheet::Objects) {
+        let Material { sheet, class } = group;
+        if sheet != last {
+            writeln!(out, "o {}", sheet.name())?;
         }
-        was_deck = group.is_deck;
-        writeln!(out, "g {}class_{}", if group.is_deck { "decks_" } else { "" }, group.class)?;
-        if library.is_some() {
-            writeln!(out, "usemtl {}", classes.word(group.class))?;
+        last = sheet;
+        let prefix = if sheet == Sheet::Ground { String::new() } else { format!("{}_", sheet.name()) };
+        writeln!(out, "g {prefix}class_{class}")?;
+        if has_materials {
+            writeln!(out, "usemtl {}", group.word(classes))?;
         }
         put_obj_faces(out, mesh.of_group(group))?;
+    }
+    for (thing, part) in mesh.part(product, Sheet::Objects, product.rect).by_thing() {
+        writeln!(out, "o {}", thing.name())?;
+        for (class, triangles) in class_groups(&part.triangles, &part.classes) {
+            if has_materials {
+                writeln!(out, "usemtl {}", Material { sheet: Sheet::Objects, class }.word(classes))?;
+            }
+            let of_mesh = |triangle: &[u32; 3]| triangle.map(|v| part.vertices[v as usize]);
+            put_obj_faces(out, triangles.iter().map(of_mesh).collect::<Vec<_>>().iter())?;
+        }
     }
     Ok(())
 }
@@ -71,12 +89,12 @@ pub fn write_obj(
 /// needs none.
 pub fn obj_materials(product: &Product, mesh: &Mesh) -> Option<String> {
     let (groups, classes) = (mesh.groups(), product.classes());
-    let mut present: Vec<u8> = groups.iter().map(|group| group.class).collect();
+    let mut present: Vec<Material> = groups.iter().map(|group| group.in_library()).collect();
     present.sort_unstable();
     present.dedup();
-    let material = |class: u8| {
-        let [red, green, blue] = classes.color(class).map(|part| f64::from(part) / 255.0);
-        format!("newmtl {}\nKd {red:.3} {green:.3} {blue:.3}\nillum 1\n", classes.word(class))
+    let material = |material: Material| {
+        let [red, green, blue] = material.color(classes).map(|part| f64::from(part) / 255.0);
+        format!("newmtl {}\nKd {red:.3} {green:.3} {blue:.3}\nillum 1\n", material.word(classes))
     };
     (1 < groups.len()).then(|| present.into_iter().map(material).collect())
 }
@@ -142,30 +160,22 @@ pub(crate) fn put_obj_faces<'a>(out: &mut impl Write, triangles: impl Iterator<I
     triangles.into_iter().try_for_each(|[a, b, c]| writeln!(out, "f {} {} {}", a + 1, b + 1, c + 1))
 }
 
-/// The triangles of one class, on the ground or of decks.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Group {
-    pub is_deck: bool,
-    pub class: u8,
-}
-
 impl Mesh {
-    /// The triangles of a group.
-    pub(crate) fn of_group(&self, group: Group) -> impl Iterator<Item = &[u32; 3]> {
-        let range = if group.is_deck { self.decks() } else { self.ground() };
+    /// The triangles of a material.
+    pub(crate) fn of_group(&self, group: Material) -> impl Iterator<Item = &[u32; 3]> {
+        let range = self.sheet(group.sheet);
         let all = self.triangles[range.clone()].iter().zip(&self.classes[range]);
         all.filter(move |(_, class)| **class == group.class).map(|(triangle, _)| triangle)
     }
 
-    /// Every group that has a triangle: those of the ground by class, then those of decks.
-    pub(crate) fn groups(&self) -> Vec<Group> {
-        let present = |is_deck: bool| {
+    /// Every material that has a triangle, sheet by sheet.
+    pub(crate) fn groups(&self) -> Vec<Material> {
+        let present = |sheet: Sheet| {
             let mut present = [false; 256];
-            let range = if is_deck { self.decks() } else { self.ground() };
-            self.classes[range].iter().for_each(|&class| present[usize::from(class)] = true);
-            (0..=u8::MAX).filter(move |&class| present[usize::from(class)]).map(move |class| Group { is_deck, class })
+            self.classes[self.sheet(sheet)].iter().for_each(|&class| present[usize::from(class)] = true);
+            (0..=u8::MAX).filter(move |&class| present[usize::from(class)]).map(move |class| Material { sheet, class })
         };
-        present(false).chain(present(true)).collect()
+        Sheet::ALL.into_iter().flat_map(present).collect()
     }
 }
 

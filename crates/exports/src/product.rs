@@ -1,11 +1,14 @@
 //! What is exported: the load modules of an area, or of a block of it, and where they lie.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use store::{Folder, Manifest, TileModules};
-use terrain::{GridFrame, HOLE_CLASS, LoadModule, ModuleGrid, ModuleId, ModuleRect, TileId};
+use terrain::{GridFrame, HOLE_CLASS, LoadModule, ModuleGrid, ModuleId, ModuleLine, ModuleRect, TileId};
 
 use crate::classes::{Classes, names_in, water_in};
+use crate::ribbon_lines::length_m;
+use crate::sheets::object_material_names;
 use crate::{ExportError, Work};
 
 /// A block of load modules by its south-west and north-east one, both inside.
@@ -47,6 +50,12 @@ pub struct Product {
     pub modules: Vec<LoadModule>,
     /// The same at coarser levels, where these are exported, too.
     pub coarser: Vec<Vec<LoadModule>>,
+    /// Middle lines of ways in each of them, which the finest level alone has.
+    pub lines: Vec<Vec<ModuleLine>>,
+    /// Whether ways that are lines in the ground are seen as bands over it.
+    pub has_ribbons: bool,
+    /// Other names for materials, by those that they would have.
+    pub(crate) materials: Vec<(String, String)>,
     /// The tile of each of them.
     pub(crate) tiles: Vec<TileModules>,
     /// Place in `tiles` of each module's tile.
@@ -65,12 +74,18 @@ impl Product {
         let ids: Vec<TileId> = manifest.tiles.iter().map(store::TileRecord::tile).collect();
         let read = work.each("tiles read", &ids, |&tile| {
             let (tile, levels) = folder.read_levels(tile)?;
+            let finest = levels.first().map_or(&[][..], Vec::as_slice).iter().filter(|module| rect.contains(module.id));
+            let lines: Vec<_> = finest.map(|module| (module.id, module.lines.clone())).collect();
             let mut levels = wanted.of(levels)?;
             levels.iter_mut().for_each(|modules| modules.retain(|module| rect.contains(module.id)));
-            Ok((tile, levels))
+            Ok(((tile, levels), lines))
         })?;
         let report = folder.report()?;
-        Self::put_together((manifest, names_in(&report), water_in(&report)), rect, wanted.first(), read)
+        let (read, lines): (Vec<_>, Vec<_>) = read.into_iter().unzip();
+        let mut lines: Vec<(ModuleId, Vec<ModuleLine>)> = lines.into_iter().flatten().collect();
+        lines.sort_by_key(|(id, _)| *id);
+        let product = Self::put_together((manifest, names_in(&report), water_in(&report)), rect, wanted.first(), read)?;
+        Ok(Self { lines: lines.into_iter().map(|(_, lines)| lines).collect(), ..product })
     }
 
     fn put_together(
@@ -103,7 +118,23 @@ impl Product {
         let (Some(first), Some(modules)) = (tiles.first(), levels.next()) else { return Err(damaged(0, rect)) };
         let (grid, frame) = (first.grid, first.frame);
         let coarser = levels.collect();
-        Ok(Self { manifest, class_names, water, grid, frame, rect, level, modules, coarser, tiles, tile_of })
+        let (lines, has_ribbons, materials) = (Vec::new(), true, Vec::new());
+        Ok(Self {
+            manifest,
+            class_names,
+            water,
+            grid,
+            frame,
+            rect,
+            level,
+            modules,
+            coarser,
+            lines,
+            has_ribbons,
+            materials,
+            tiles,
+            tile_of,
+        })
     }
 
     /// The same at each of its levels, from fine to coarse, one at a time.
@@ -151,9 +182,43 @@ impl Product {
         self.modules.iter().map(|module| module.decks.triangles.len()).sum()
     }
 
+    /// Length of the ways that are seen as ribbons, in metres.
+    pub fn ribbons_m(&self) -> f64 {
+        if self.has_ribbons { length_m(&self.lines) } else { 0.0 }
+    }
+
+    /// How many objects stand on what is exported.
+    pub fn object_count(&self) -> usize {
+        let objects = || self.modules.iter().map(|module| &module.objects);
+        let prisms = objects().flat_map(|objects| objects.prisms.iter().map(|prism| (prism.kind, prism.id)));
+        let canopies = objects().flat_map(|objects| objects.canopies.iter().map(|canopy| (canopy.kind, canopy.id)));
+        prisms.chain(canopies).collect::<BTreeSet<_>>().len()
+    }
+
+    /// Gives materials other names, each by the one that it would have.
+    ///
+    /// # Errors
+    /// When no material has one of these names.
+    pub fn name_materials(&mut self, materials: Vec<(String, String)>) -> Result<(), ExportError> {
+        let known: Vec<String> = (0..self.class_names.len().clamp(1, 255) as u8)
+            .map(|class| self.classes().word(class))
+            .chain(object_material_names().map(str::to_owned))
+            .collect();
+        if let Some((unknown, _)) = materials.iter().find(|(word, _)| !known.contains(word)) {
+            return Err(ExportError::Impossible {
+                what: "--material".into(),
+                found: format!("{unknown:?}"),
+                expected: format!("one of {}", known.join(", ")),
+                hint: "write --material CLASS=NAME, once for each material that is called otherwise".into(),
+            });
+        }
+        self.materials = materials;
+        Ok(())
+    }
+
     /// The classes of the job, by name and colour.
     pub(crate) fn classes(&self) -> Classes<'_> {
-        Classes::named(&self.class_names)
+        Classes::named(&self.class_names, &self.materials)
     }
 
     /// The coordinate system as the database names it.

@@ -7,8 +7,8 @@ use store::{
     ReportPool, ReportRefusals, ReportResidual, ReportStops, ReportVoids, TileModules, TileRecord,
 };
 use terrain::{
-    Decks, GridFrame, HOLE_CLASS, LoadModule, ModuleGrid, ModuleId, ModuleRect, ModuleResidual, ModuleVertex, Spacing,
-    TileId,
+    Canopy, Corner, Decks, GridFrame, HOLE_CLASS, LineForm, LineKind, LineStorey, LineTraits, LoadModule, ModuleGrid,
+    ModuleId, ModuleLine, ModuleRect, ModuleResidual, ModuleVertex, ObjectKind, Prism, Spacing, TileId,
 };
 
 use crate::Product;
@@ -44,6 +44,9 @@ pub(crate) fn product() -> Product {
         level: 0,
         modules: modules(),
         coarser: Vec::new(),
+        lines: Vec::new(),
+        has_ribbons: true,
+        materials: Vec::new(),
         tiles: vec![tile_modules],
         tile_of: vec![0, 0],
     }
@@ -83,6 +86,56 @@ pub(crate) fn with_bridge() -> Product {
     let over = square([0, 9000], [129_152, 129_280], 1).into_iter().chain(square([0, 9000], [130_000, 130_128], 2));
     product.modules[1].decks = Decks::of_triangles(over);
     product.modules.iter().for_each(|module| assert_eq!(module.check(), Ok(())));
+    product
+}
+
+/// A house over the line between both load modules with a courtyard, a chimney, and a wood that goes on in both.
+pub(crate) fn with_objects() -> Product {
+    let mut product = product();
+    let ring = |corners: &[[u16; 2]], open: usize| -> Vec<Corner> {
+        corners.iter().enumerate().map(|(n, &[x, y])| Corner { x, y, has_wall: n != open }).collect()
+    };
+    let house = |rings| Prism { id: 7, kind: ObjectKind::Building, base: 128_100, roof: 129_500, rings };
+    let chimney = ring(&[[1000, 1000], [1500, 1000], [1500, 1500], [1000, 1500]], 9);
+    let chimney = Prism { id: 3, kind: ObjectKind::Tower, base: 127_900, roof: 135_000, rings: vec![chimney] };
+    let wood = |west: u16, east: u16| Canopy {
+        id: 9,
+        kind: ObjectKind::Wood,
+        height: 1920,
+        fullness: 90,
+        spacing: 512,
+        places: vec![[west, 40_000], [east, 40_000], [east, 50_000], [west, 50_000]],
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+    };
+    let west_ring = ring(&[[60_000, 20_000], [64_000, 20_000], [64_000, 26_000], [60_000, 26_000]], 1);
+    let yard = ring(&[[61_000, 22_000], [61_000, 24_000], [63_000, 24_000], [63_000, 22_000]], 9);
+    let east_ring = ring(&[[0, 20_000], [3_000, 20_000], [3_000, 26_000], [0, 26_000]], 3);
+    product.modules[0].objects.prisms = vec![chimney, house(vec![west_ring, yard])];
+    product.modules[0].objects.canopies = vec![wood(50_000, 64_000)];
+    product.modules[1].objects.prisms = vec![house(vec![east_ring])];
+    product.modules[1].objects.canopies = vec![wood(0, 30_000)];
+    product.modules.iter().for_each(|module| assert_eq!(module.check(), Ok(())));
+    product
+}
+
+/// A road 7 m wide that bends on the line between both load modules, and a stream that it crosses.
+pub(crate) fn with_ways() -> Product {
+    let mut product = product();
+    product.class_names = ["default", "minor", "stream"].map(str::to_owned).to_vec();
+    let line = |class, kind, width, places: &[[u16; 2]]| {
+        let vertices = places.iter().map(|&[x, y]| ModuleVertex { y, x, z: 0 }).collect();
+        let (form, storey) = (LineForm::Line, LineStorey::Ground);
+        ModuleLine {
+            class,
+            traits: LineTraits { kind, form, storey, is_kept: true, is_in_ground: true, width },
+            vertices,
+        }
+    };
+    let road = |places: &[[u16; 2]]| line(1, LineKind::Travelled, 896, places);
+    let stream = line(2, LineKind::Channel, 256, &[[50_000, 0], [50_000, 64_000]]);
+    let west = vec![road(&[[10_000, 20_000], [40_000, 30_000], [64_000, 30_000]]), stream];
+    product.lines = vec![west, vec![road(&[[0, 30_000], [30_000, 60_000]])]];
+    product.modules.iter_mut().for_each(|module| module.classes.fill(0));
     product
 }
 

@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 use terrain::{QUANTA_PER_METRE, metres_of_quanta};
 
-use crate::{Coordinates, Mesh, Product};
+use crate::{Coordinates, Mesh, Product, Sheet};
 
 /// What a reader of one exported file needs to know of it.
 #[derive(Clone, Debug, PartialEq)]
@@ -89,6 +89,10 @@ pub fn sidecar(product: &Product, mesh: &Mesh, facts: &Facts) -> String {
     });
     if 0 < product.deck_triangles() {
         value["deck_triangles"] = json!(product.deck_triangles());
+    }
+    let objects = mesh.sheet(Sheet::Objects).len();
+    if 0 < objects {
+        value["object_triangles"] = json!(objects);
     }
     if 1 < product.class_names.len() {
         value["classes"] = json!(product.class_names);

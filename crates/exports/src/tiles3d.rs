@@ -3,7 +3,8 @@
 //! left out, and in the coarse mesh load modules that are holes for more than half.
 //!
 //! Where load modules have coarser levels, those of a square are a mesh between the two, level by level.
-//! Decks are nodes of their own in the files of groups and levels; the coarse mesh of a square has none, and one class.
+//! Decks and objects are nodes of their own in the files of groups and levels; the coarse mesh of a square has none, and
+//! one class.
 //! Every square has a frame of its own, so that 32-bit floats are fine to a fraction of a millimetre. A geometric error
 //! is measured: of a square, how far its load modules lie from it; of a level in it and of a group, the largest
 //! residual.
@@ -12,16 +13,17 @@ use std::collections::BTreeMap;
 use std::sync::{Mutex, PoisonError};
 
 use serde_json::{Value, json};
-use terrain::{ModuleRect, QUANTA_PER_METRE};
+use terrain::{ModuleRect, QUANTA_PER_METRE, metres_of_quanta};
 
 use crate::coarse::Coarse;
 use crate::earth::Earth;
 use crate::glb::{Gltf, GltfNode, turned};
+use crate::glb_features::FoundFeatures;
 use crate::globe::{Globe, LocalFrame};
 use crate::mesh::{Mesh, Part};
-use crate::modules::{deck_name, group_name};
+use crate::modules::{group_name, sheet_name};
 use crate::openflight::{square_name, square_side};
-use crate::{Datum, ExportError, Product, Put, Work};
+use crate::{Datum, ExportError, Product, Put, Sheet, Work};
 
 /// Writes `tileset.json`, `squares/*.glb`, `groups/*.glb` and, for coarser levels, `levels/K/*.glb`. `assumed` is what
 /// to take heights to be above; else the database says it. Returns what was done to heights.
@@ -132,7 +134,7 @@ impl Layers {
     fn of(product: &Product, assumed: Option<Datum>, work: &Work) -> Result<Self, ExportError> {
         let earth = Earth::new(product, assumed)?;
         let layer = |product: Product| {
-            let mesh = Mesh::whole(&product).with_decks(&product);
+            let mesh = Mesh::whole(&product).with_sheets(&product);
             let globe = Globe::of(&product, &mesh, &earth, work)?;
             Ok(Layer { product, mesh, globe })
         };
@@ -182,8 +184,8 @@ impl Layers {
         let coarse = Coarse::of(&finest.product, &finest.mesh, rect);
         let middle = coarse.vertices[coarse.vertices.len() / 2] as usize;
         let frame = LocalFrame::at(finest.globe.lon_lat[middle], finest.globe.height_m[middle]);
-        let parts: Vec<Parts> = self.layers.iter().map(|layer| layer.parts(rect)).collect();
-        if parts.iter().all(|parts| parts.triangle_count() == 0) {
+        let parts: Vec<Parts> = self.layers.iter().map(|layer| layer.mesh.parts(&layer.product, rect)).collect();
+        if parts.iter().all(Vec::is_empty) {
             return Ok(None);
         }
         let bounds = box_around(self.layers.iter().zip(&parts).flat_map(|(layer, parts)| layer.places(&frame, parts)));
@@ -203,10 +205,12 @@ impl Layers {
             put_children(&mut level, children);
             children = vec![level];
         }
+        // The coarse mesh lacks what stands on the ground.
+        let coarse_error_m = coarse.error_m.max(metres_of_quanta(Mesh::tallest(&parts[0])));
         let mut tile = json!({
             "transform": frame.matrix(),
             "boundingVolume": { "box": bounds },
-            "geometricError": if self.layers.len() == 1 { coarse.error_m } else { coarse.error_m.max(error_m) },
+            "geometricError": if self.layers.len() == 1 { coarse_error_m } else { coarse_error_m.max(error_m) },
         });
         put_children(&mut tile, children);
         if !coarse.triangles.is_empty() {
@@ -215,7 +219,7 @@ impl Layers {
                 let classes = vec![0; coarse.triangles.len()];
                 let node = finest.node(&frame, group_name(rect), &coarse.vertices);
                 let nodes = vec![node.with_groups(&coarse.triangles, &classes)];
-                Gltf { nodes, ..Gltf::default() }.bytes()
+                Gltf { sheets: vec![(Sheet::Ground, nodes)], ..Gltf::default() }.bytes()
             })?;
             tile["content"] = json!({ "uri": uri });
         }
@@ -237,35 +241,18 @@ fn halves(rect: ModuleRect) -> [ModuleRect; 2] {
     }
 }
 
-/// Ground and decks of some load modules.
-struct Parts {
-    ground: Part,
-    decks: Part,
-}
-
-impl Parts {
-    fn triangle_count(&self) -> usize {
-        self.ground.triangles.len() + self.decks.triangles.len()
-    }
-}
+/// What some load modules have of each sheet.
+type Parts = Vec<(Sheet, Part)>;
 
 impl Layer {
-    fn parts(&self, rect: ModuleRect) -> Parts {
-        Parts { ground: self.mesh.part(&self.product, rect), decks: self.mesh.deck_part(&self.product, rect) }
-    }
-
-    /// The ground and the decks of a rectangle, each a node where there is any.
+    /// The sheets of a rectangle, each a node where there is any.
     fn gltf(&self, frame: &LocalFrame, rect: ModuleRect, parts: &Parts) -> Gltf<'_> {
-        let nodes = |name: String, part: &Part| match part.triangles.is_empty() {
-            true => Vec::new(),
-            false => vec![self.node(frame, name, &part.vertices).with_groups(&part.triangles, &part.classes)],
+        let node = |(sheet, part): &(Sheet, Part)| {
+            let features = (*sheet == Sheet::Objects).then(|| FoundFeatures::of(part));
+            let node = GltfNode { features, ..self.node(frame, sheet_name(*sheet, rect), &part.vertices) };
+            (*sheet, vec![node.with_groups(&part.triangles, &part.classes)])
         };
-        Gltf {
-            nodes: nodes(group_name(rect), &parts.ground),
-            decks: nodes(deck_name(rect), &parts.decks),
-            classes: self.product.classes(),
-            ..Gltf::default()
-        }
+        Gltf { sheets: parts.iter().map(node).collect(), classes: self.product.classes(), ..Gltf::default() }
     }
 
     /// Hands out a file for each group of load modules of a square; their tiles.
@@ -273,11 +260,12 @@ impl Layer {
         let mut tiles = Vec::new();
         let mut left = vec![square];
         while let Some(rect) = left.pop() {
-            let parts = self.parts(rect);
-            if parts.triangle_count() == 0 {
+            let parts = self.mesh.parts(&self.product, rect);
+            let triangles: usize = parts.iter().map(|(_, part)| part.triangles.len()).sum();
+            if triangles == 0 {
                 continue;
             }
-            if GROUP_TRIANGLES_MAX < parts.triangle_count() && 1 < rect.count() {
+            if GROUP_TRIANGLES_MAX < triangles && 1 < rect.count() {
                 left.extend(halves(rect));
                 continue;
             }
@@ -298,9 +286,10 @@ impl Layer {
         f64::from(residuals.max().unwrap_or(0)) / f64::from(QUANTA_PER_METRE)
     }
 
-    /// Where the vertices of ground and decks lie in a frame.
+    /// Where the vertices of all sheets lie in a frame.
     fn places(&self, frame: &LocalFrame, parts: &Parts) -> impl Iterator<Item = [f64; 3]> {
-        parts.ground.vertices.iter().chain(&parts.decks.vertices).map(|&v| frame.local(self.globe.place[v as usize]))
+        let vertices = parts.iter().flat_map(|(_, part)| &part.vertices);
+        vertices.map(|&v| frame.local(self.globe.place[v as usize]))
     }
 
     /// Vertices of the mesh in a frame.
@@ -311,7 +300,7 @@ impl Layer {
             name,
             positions: vertices.iter().map(place).collect(),
             normals: vertices.iter().map(normal).collect(),
-            groups: Vec::new(),
+            ..GltfNode::default()
         }
     }
 }

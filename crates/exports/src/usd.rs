@@ -1,15 +1,17 @@
 //! OpenUSD as text: one file for each tile, which the file of the area names as payloads, z up, in metres.
 //!
 //! Points of a tile are counted from its own south-west corner and are whole 1/128 m, which a 32-bit float holds
-//! exactly; the area's file moves each tile to its place. Ground and decks are meshes of triangles with a collision
-//! schema; classes are subsets of faces with materials. Triangles over holes are left out.
+//! exactly; the area's file moves each tile to its place. Ground, decks and objects are meshes of triangles, all but
+//! ribbons and woods with a collision schema; classes are subsets of faces with materials. Triangles over holes are left out.
 
 use std::fmt::Write as _;
 
 use terrain::{ModuleRect, QUANTA_PER_METRE, TileId};
 
 use crate::mesh::Part;
-use crate::{Coordinates, ExportError, Facts, Mesh, Product, Put, Work};
+use crate::objects::Thing;
+use crate::sheets::Material;
+use crate::{Coordinates, ExportError, Facts, Mesh, Product, Put, Sheet, Work};
 
 /// Writes `area.usda` and a file for each tile in the folder `tiles`.
 ///
@@ -94,27 +96,40 @@ fn corner(product: &Product, tile: &Tile) -> [i32; 2] {
 }
 
 fn tile_text(product: &Product, mesh: &Mesh, normals: &[[f64; 3]], tile: &Tile) -> String {
-    let parts = [("ground", mesh.part(product, tile.rect)), ("decks", mesh.deck_part(product, tile.rect))];
-    let mut classes: Vec<u8> = parts.iter().flat_map(|(_, part)| &part.classes).copied().collect();
-    classes.sort_unstable();
-    classes.dedup();
+    let parts = mesh.parts(product, tile.rect);
+    let of_part = |(sheet, part): &(Sheet, Part)| {
+        let sheet = *sheet;
+        part.classes.iter().map(move |&class| Material { sheet, class }.in_library()).collect::<Vec<_>>()
+    };
+    let mut materials: Vec<Material> = parts.iter().flat_map(of_part).collect();
+    materials.sort_unstable();
+    materials.dedup();
     let root = &tile.name;
     let mut text = format!("#usda 1.0\n(\n    defaultPrim = \"{root}\"\n{HEAD})\n\ndef Xform \"{root}\"\n{{\n");
     text.push_str("    def Scope \"Materials\"\n    {\n");
-    for &class in &classes {
-        put_material(&mut text, product, root, class);
+    for &material in &materials {
+        put_material(&mut text, product, root, material);
     }
     text.push_str("    }\n");
     let corner = corner(product, tile);
-    for (name, part) in parts.iter().filter(|(_, part)| !part.triangles.is_empty()) {
-        put_mesh(&mut text, &Drawn { product, mesh, normals, corner, root, name, part });
+    for (sheet, part) in &parts {
+        let draw = |text: &mut String, thing: Option<Thing>, part: &Part| {
+            put_mesh(text, &Drawn { product, mesh, normals, corner, root, sheet: *sheet, thing, part });
+        };
+        if *sheet != Sheet::Objects {
+            draw(&mut text, None, part);
+            continue;
+        }
+        text.push_str("\n    def Scope \"objects\"\n    {\n");
+        part.by_thing().iter().for_each(|(thing, part)| draw(&mut text, Some(*thing), part));
+        text.push_str("    }\n");
     }
     text.push_str("}\n");
     text
 }
 
-fn put_material(text: &mut String, product: &Product, root: &str, class: u8) {
-    let (name, [red, green, blue]) = (class_name(product, class), product.classes().light(class));
+fn put_material(text: &mut String, product: &Product, root: &str, material: Material) {
+    let (name, [red, green, blue]) = (material_name(product, material), material.light(product.classes()));
     let _ = write!(
         text,
         "        def Material \"{name}\"\n        {{\n            \
@@ -134,12 +149,17 @@ struct Drawn<'a> {
     normals: &'a [[f64; 3]],
     corner: [i32; 2],
     root: &'a str,
-    name: &'a str,
+    sheet: Sheet,
+    /// Which object it is, where it is one.
+    thing: Option<Thing>,
     part: &'a Part,
 }
 
+/// What a mesh says of itself that bodies hit.
+const COLLIDES: &str = " (\n        prepend apiSchemas = [\"PhysicsCollisionAPI\", \"PhysicsMeshCollisionAPI\"]\n    )";
+
 fn put_mesh(text: &mut String, drawn: &Drawn) {
-    let Drawn { product, mesh, normals, corner: [west, south], root, name, part } = drawn;
+    let Drawn { mesh, normals, corner: [west, south], sheet, thing, part, .. } = drawn;
     let places: Vec<[i32; 3]> = part
         .vertices
         .iter()
@@ -152,13 +172,18 @@ fn put_mesh(text: &mut String, drawn: &Drawn) {
         let picked = places.iter().copied().reduce(|a, b| [0, 1, 2].map(|axis| pick(a[axis], b[axis])));
         point(picked.unwrap_or_default())
     };
-    let _ = writeln!(
-        text,
-        "\n    def Mesh \"{name}\" (\n        \
-         prepend apiSchemas = [\"PhysicsCollisionAPI\", \"PhysicsMeshCollisionAPI\"]\n    )\n    {{"
-    );
-    // A deck has no thickness, and is seen from below too.
-    let _ = writeln!(text, "        uniform bool doubleSided = {}", u8::from(*name == "decks"));
+    let name = thing.map_or_else(|| sheet.name().to_owned(), |thing| thing.name());
+    let collides = *sheet != Sheet::Ribbons && thing.is_none_or(|thing| thing.kind.is_prism());
+    let _ = writeln!(text, "\n    def Mesh \"{name}\"{}\n    {{", if collides { COLLIDES } else { "" });
+    if let Some(thing) = thing {
+        let (id, class, height) = (thing.id, thing.kind.name(), metres(thing.height));
+        let _ = writeln!(
+            text,
+            "        custom uint64 object:id = {id}\n        custom string object:class = \"{class}\"\n        \
+             custom double object:height_m = {height}"
+        );
+    }
+    let _ = writeln!(text, "        uniform bool doubleSided = {}", u8::from(sheet.is_seen_from_below()));
     let _ = writeln!(text, "        float3[] extent = [{}, {}]", bound(i32::min), bound(i32::max));
     put_list(text, "int[] faceVertexCounts", part.triangles.iter().map(|_| "3"));
     put_list(text, "int[] faceVertexIndices", part.triangles.as_flattened());
@@ -170,17 +195,25 @@ fn put_mesh(text: &mut String, drawn: &Drawn) {
     // The list ends its line; what is said of it follows in brackets.
     text.pop();
     text.push_str(" (\n            interpolation = \"vertex\"\n        )\n");
-    text.push_str(
-        "        bool physics:collisionEnabled = 1\n        uniform token physics:approximation = \"none\"\n",
-    );
+    if collides {
+        text.push_str(
+            "        bool physics:collisionEnabled = 1\n        uniform token physics:approximation = \"none\"\n",
+        );
+    }
     put_list(text, "point3f[] points", places.iter().map(|place| point(*place)));
     text.push_str("        uniform token subdivisionScheme = \"none\"\n");
     text.push_str("        uniform token subsetFamily:materialBind:familyType = \"partition\"\n");
+    put_subsets(text, drawn);
+    text.push_str("    }\n");
+}
+
+/// The faces of each material.
+fn put_subsets(text: &mut String, Drawn { product, root, sheet, part, .. }: &Drawn) {
     let mut classes = part.classes.clone();
     classes.sort_unstable();
     classes.dedup();
     for class in classes {
-        let subset = class_name(product, class);
+        let subset = material_name(product, Material { sheet: *sheet, class }.in_library());
         let _ = writeln!(
             text,
             "\n        def GeomSubset \"{subset}\" (\n            \
@@ -193,7 +226,6 @@ fn put_mesh(text: &mut String, drawn: &Drawn) {
         put_list(text, "int[] indices", faces);
         let _ = writeln!(text, "            rel material:binding = </{root}/Materials/{subset}>\n        }}");
     }
-    text.push_str("    }\n");
 }
 
 /// A list as one line.
@@ -214,14 +246,18 @@ fn point([x, y, z]: [i32; 3]) -> String {
     format!("({}, {}, {})", metres(x), metres(y), metres(z))
 }
 
-/// The name of a class where names are identifiers: each class has another.
-fn class_name(product: &Product, class: u8) -> String {
+/// The name of a material where names are identifiers: each has another.
+fn material_name(product: &Product, material: Material) -> String {
     let classes = product.classes();
-    let name = |class: u8| identifier(&classes.word(class), "class");
-    let own = name(class);
+    let name = |material: Material| identifier(&material.word(classes), "class");
+    let own = name(material);
+    if material.sheet == Sheet::Objects {
+        return format!("object_{own}");
+    }
     // Two names may differ in what no identifier can hold.
-    let is_alone = (0..product.class_names.len().min(256)).filter(|of| name(*of as u8) == own).count() <= 1;
-    if is_alone { own } else { format!("{own}_{class}") }
+    let is_own = |class: &usize| name(Material { class: *class as u8, ..material }) == own;
+    let is_alone = (0..product.class_names.len().min(256)).filter(is_own).count() <= 1;
+    if is_alone { own } else { format!("{own}_{}", material.class) }
 }
 
 /// A text as the name of a prim: ASCII letters, digits and underscores, no digit first.
@@ -294,7 +330,10 @@ mod tests {
         assert_eq!(["a b", "7th", "", "é"].map(|text| identifier(text, "area")), ["a_b", "_7th", "area", "_"]);
         let mut product = samples::product();
         product.class_names = ["a b", "a_b", "c"].map(str::to_owned).to_vec();
-        assert_eq!([0, 1, 2].map(|class| class_name(&product, class)), ["a_b_0", "a_b_1", "c"]);
+        assert_eq!(
+            [0, 1, 2].map(|class| material_name(&product, Material { sheet: Sheet::Ground, class })),
+            ["a_b_0", "a_b_1", "c"]
+        );
         assert_eq!(quoted("a \"b\" \\ \n"), "\"a \\\"b\\\" \\\\  \"");
     }
 }

@@ -5,6 +5,7 @@ const FLAGS: u8 = 0b0000_0011;
 /// Codes of well-known binary.
 const POLYGON: u32 = 3;
 const POLYGON_Z: u32 = 1003;
+const MULTIPOLYGON: u32 = 6;
 const POINT: u32 = 1;
 const POINT_Z: u32 = 1001;
 const LINE_Z: u32 = 1002;
@@ -32,6 +33,21 @@ pub fn point_z(srs: i32, place: [f64; 3]) -> Vec<u8> {
 /// A line with heights.
 pub fn line_z(srs: i32, places: &[[f64; 3]]) -> Vec<u8> {
     with_places(head(srs, places), &[LINE_Z, places.len() as u32], places)
+}
+
+/// Polygons of an outer ring and holes each; no ring repeats its first place.
+pub fn polygons(srs: i32, shapes: &[Vec<Vec<[f64; 2]>>]) -> Vec<u8> {
+    let all: Vec<[f64; 2]> = shapes.iter().flatten().flatten().copied().collect();
+    let mut bytes = with_places::<2>(head(srs, &all), &[MULTIPOLYGON, shapes.len() as u32], &[]);
+    for shape in shapes {
+        bytes = with_places::<2>(bytes, &[POLYGON, shape.len() as u32], &[]);
+        for ring in shape {
+            let closed = ring.iter().chain(ring.first());
+            bytes.extend_from_slice(&(ring.len() as u32 + 1).to_le_bytes());
+            bytes.extend(closed.flatten().flat_map(|number| number.to_le_bytes()));
+        }
+    }
+    bytes
 }
 
 fn blob<const N: usize>(srs: i32, kind: u32, ring: &[[f64; N]]) -> Vec<u8> {

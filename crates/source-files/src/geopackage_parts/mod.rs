@@ -5,7 +5,7 @@
 mod geometry;
 mod index;
 
-pub use geometry::{line_z, point, point_z, polygon, polygon_z};
+pub use geometry::{line_z, point, point_z, polygon, polygon_z, polygons};
 pub use index::add_index;
 
 use rusqlite::{Connection, params};

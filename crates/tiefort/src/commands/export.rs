@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use build::CompileError;
 use build::product::{BuiltFrom, Opened, read_told};
 use clap::{Args, ValueEnum};
-use exports::{Block, Datum, ExportError, Facts, Levels, Mesh, Product, Work};
+use exports::{Block, CARRIES, Carries, Datum, ExportError, Facts, Levels, Mesh, Product, Work};
 use job::Job;
 use store::Folder;
 use terrain::{ModuleId, PostRect};
@@ -34,23 +34,25 @@ files of modules hold all levels; 3dtiles puts levels coarser than K between a
 square of 4 km and its load modules. A mesh (ply, obj, glb) is counted in metres
 from the south-west corner of what is exported, as usd and gazebo are; the file
 itself, or NAME.json beside it, says where that is. Load modules are named
-ROW,COL from the south-west, nodes of a glb r0003c0017. Classes are materials
-(glb, 3dtiles, openflight, usd; obj and gazebo with an mtl) or attributes
-(gpkg); the faces of a ply come class by class, and comments in it say which are
-whose. Decks of bridges are meshes of their own, named decks; geotiff,
-quantized-mesh, mbtiles and heightmap hold the ground alone, quantized-mesh and
-mbtiles with masks of water. A geotiff is cloud optimised, with overviews; it
-names the system of its heights where that is known. Where no source has a
-height, rasters have none (NaN) and meshes no triangles; gpkg and modules keep
-these as class 'hole' (255), quantized-mesh closes them and says where in
-holes.geojson, and a heightmap closes them, too. 3tz is 3dtiles in one file,
-mbtiles quantized-mesh in one; these four want heights above the ellipsoid: they
-know EGM96 and the ellipsoid, and refuse any other datum unless told what to
-take it for.";
+ROW,COL from the south-west, nodes of a glb r0003c0017. A geotiff is cloud
+optimised, with overviews; it names the system of its heights where that is
+known. 3tz is 3dtiles in one file, mbtiles quantized-mesh in one; these four
+want heights above the ellipsoid: they know EGM96 and the ellipsoid, and refuse
+any other datum unless told what to take it for.
+
+Ribbons are bands over roads, rails and streams that are lines in the ground, 5
+cm above it; objects are buildings, walls and woods. Classes, ribbons and
+objects are called by names, which --material gives otherwise.
+
+What becomes of them in which format:";
+
+fn after_help() -> String {
+    format!("{AFTER_HELP}{}", exports::carries_text())
+}
 
 /// Arguments of `export`.
 #[derive(Args)]
-#[command(after_help = AFTER_HELP)]
+#[command(after_help = after_help())]
 pub struct Arguments {
     /// Folder of the terrain database
     #[arg(value_name = "DIR")]
@@ -84,6 +86,12 @@ pub struct Arguments {
     /// in one, else 2017 or 2049]; for heightmap only
     #[arg(long, value_name = "N")]
     size: Option<usize>,
+    /// Whether roads, rails and streams that are lines in the ground are bands over it, where the format has meshes
+    #[arg(long, value_name = "BOOL", default_value_t = true, action = clap::ArgAction::Set)]
+    ribbons: bool,
+    /// Another name for a material, once for each: primary=asphalt, building_wall=plaster
+    #[arg(long = "material", value_name = "MATERIAL=NAME", value_parser = material)]
+    materials: Vec<(String, String)>,
     #[command(flatten)]
     workers: Workers,
     /// Print errors only
@@ -170,6 +178,12 @@ fn block(text: &str) -> Result<Block, String> {
     Ok(Block { south_west: module(south_west).map_err(wrong)?, north_east: module(north_east).map_err(wrong)? })
 }
 
+fn material(text: &str) -> Result<(String, String), String> {
+    let named = text.split_once('=').filter(|(word, name)| !word.is_empty() && !name.is_empty());
+    let (word, name) = named.ok_or("expected MATERIAL=NAME, such as primary=asphalt")?;
+    Ok((word.to_owned(), name.to_owned()))
+}
+
 /// Reads what heights are to be taken to be above.
 ///
 /// # Errors
@@ -198,36 +212,16 @@ impl Format {
         }
     }
 
-    /// What becomes of triangles over holes, where no source has a height.
-    fn of_holes(self) -> &'static str {
-        match self {
-            Format::Modules => "of class 255, as in the database",
-            Format::Gpkg => "in the layer triangles, of class hole",
-            Format::Features => "in none of its layers",
-            Format::Geotiff => "NaN in the raster",
-            Format::QuantizedMesh => "kept, since tiles must be closed; holes.geojson says where they are",
-            Format::Mbtiles => "kept, since tiles must be closed; the entry holes of metadata says where they are",
-            Format::Heightmap => "as high as the triangles that close them; heightmap.json counts the samples",
-            Format::Ply | Format::Obj | Format::Glb | Format::Openflight | Format::Tiles3d => "left out",
-            Format::Archive | Format::Usd | Format::Gazebo => "left out",
-        }
+    /// What it has of what a database has.
+    fn carries(self) -> &'static Carries {
+        let value = self.to_possible_value();
+        let name = value.as_ref().map_or("", |value| value.get_name());
+        CARRIES.iter().find(|row| row.format == name).expect("each format has a row")
     }
 
     /// Whether it has room for the ground alone, and decks are left out.
     fn is_without_decks(self) -> bool {
         matches!(self, Format::Geotiff | Format::QuantizedMesh | Format::Mbtiles | Format::Heightmap)
-    }
-
-    /// What becomes of decks of bridges.
-    fn of_decks(self) -> &'static str {
-        match self {
-            Format::Modules => "in the files of their load modules",
-            Format::Gpkg | Format::Features => "in the layer decks",
-            Format::Geotiff | Format::QuantizedMesh => "left out: there is room for the ground alone",
-            Format::Mbtiles | Format::Heightmap => "left out: there is room for the ground alone",
-            Format::Ply | Format::Obj | Format::Glb | Format::Openflight | Format::Tiles3d => "meshes of their own",
-            Format::Archive | Format::Usd | Format::Gazebo => "meshes of their own",
-        }
     }
 
     /// Whether its heights are above the ellipsoid of WGS 84.
@@ -314,7 +308,9 @@ fn export(arguments: &Arguments, work: &Work) -> Result<String, Failure> {
         Some(_) => None,
         None => Some(NewFolder::begin(&arguments.out)?),
     };
-    let product = Product::read(&arguments.database, arguments.modules, levels(arguments), work)?;
+    let mut product = Product::read(&arguments.database, arguments.modules, levels(arguments), work)?;
+    product.has_ribbons = arguments.ribbons;
+    product.name_materials(arguments.materials.clone())?;
     match arguments.format {
         Format::Ply | Format::Obj | Format::Glb => write_mesh(arguments, &product)?,
         Format::Geotiff => write_raster(arguments, &product, work)?,
@@ -340,8 +336,13 @@ fn export(arguments: &Arguments, work: &Work) -> Result<String, Failure> {
         }
         folder.finish()?;
     }
+    Ok(summary(arguments.format, &product, said))
+}
+
+/// What was exported, in words; `said` is what was done to heights.
+fn summary(format: Format, product: &Product, said: Option<Datum>) -> String {
     let triangles: usize = product.modules.iter().map(|module| module.triangles.len()).sum();
-    let triangles = triangles + if arguments.format.is_without_decks() { 0 } else { product.deck_triangles() };
+    let triangles = triangles + if format.is_without_decks() { 0 } else { product.deck_triangles() };
     let modules = match product.modules.len() {
         1 => "1 load module".to_owned(),
         count => format!("{} load modules", grouped(count as u64)),
@@ -355,16 +356,25 @@ fn export(arguments: &Arguments, work: &Work) -> Result<String, Failure> {
             format!(" at level {level}, {} more at levels up to {}", grouped(coarser as u64), level + more)
         }
     };
+    let carries = format.carries();
     let holes = match product.hole_triangles() {
         0 => String::new(),
-        1 => format!("1 triangle over a hole is {}\n", arguments.format.of_holes()),
-        count => format!("{} triangles over holes are {}\n", grouped(count as u64), arguments.format.of_holes()),
+        1 => format!("1 triangle over a hole is {}\n", carries.holes),
+        count => format!("{} triangles over holes are {}\n", grouped(count as u64), carries.holes),
     };
     let decks = match product.deck_triangles() {
         0 => String::new(),
-        count => format!("{} triangles of decks are {}\n", grouped(count as u64), arguments.format.of_decks()),
+        count => format!("{} triangles of decks are {}\n", grouped(count as u64), carries.decks),
     };
-    Ok(format!("{said}{holes}{decks}{modules}, {} triangles{level}", grouped(triangles as u64)))
+    let ribbons = match product.ribbons_m() / 1000.0 {
+        0.0 => String::new(),
+        km => format!("ribbons of {km:.1} km are {}\n", carries.ribbons),
+    };
+    let objects = match product.object_count() {
+        0 => String::new(),
+        count => format!("{} objects are {}\n", grouped(count as u64), carries.objects),
+    };
+    format!("{said}{holes}{decks}{ribbons}{objects}{modules}, {} triangles{level}", grouped(triangles as u64))
 }
 
 /// Writes what is one file for globes; what was done to heights.

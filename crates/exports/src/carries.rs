@@ -1,0 +1,181 @@
+//! What each format carries of what a database has: the one table for the help, the guide and the end of an export.
+
+/// What a format has of what a database has.
+#[derive(Clone, Copy, Debug)]
+pub struct Carries {
+    /// The format's name.
+    pub format: &'static str,
+    /// What classes of ground become.
+    pub classes: &'static str,
+    /// What decks of bridges become.
+    pub decks: &'static str,
+    /// What roads, rails and streams become that are lines in the ground.
+    pub ribbons: &'static str,
+    /// What buildings, walls and woods become.
+    pub objects: &'static str,
+    /// What becomes of triangles over holes, where no source has a height.
+    pub holes: &'static str,
+}
+
+const LEFT_OUT: &str = "left out";
+const GROUND_ALONE: &str = "left out: there is room for the ground alone";
+
+const MESH: Carries = Carries {
+    format: "",
+    classes: "materials",
+    decks: "meshes of their own",
+    ribbons: "meshes of their own",
+    objects: "meshes of their own",
+    holes: LEFT_OUT,
+};
+const RASTER: Carries =
+    Carries { classes: LEFT_OUT, decks: GROUND_ALONE, ribbons: GROUND_ALONE, objects: GROUND_ALONE, ..MESH };
+const CLOSED: &str = "kept, since tiles must be closed; holes.geojson says where they are";
+
+/// The table, in the order of the formats.
+pub const CARRIES: [Carries; 15] = [
+    Carries {
+        format: "modules",
+        classes: "a class for each triangle",
+        decks: "in the files of their load modules",
+        ribbons: "middle lines in the files of their load modules",
+        objects: "in the files of their load modules",
+        holes: "of class 255, as in the database",
+    },
+    Carries {
+        format: "ply",
+        classes: "faces class by class",
+        decks: "faces behind those of the ground",
+        ribbons: "faces behind those of decks",
+        objects: "the last faces",
+        ..MESH
+    },
+    Carries { format: "obj", classes: "materials in NAME.mtl", objects: "an object each", ..MESH },
+    Carries { format: "glb", objects: "a node each, with id and height", ..MESH },
+    Carries { format: "geotiff", holes: "NaN in the raster", ..RASTER },
+    Carries {
+        format: "gpkg",
+        classes: "an attribute",
+        decks: "in the layer decks",
+        ribbons: "left out: --format features has the lines",
+        objects: "in the layers buildings, woods, rows and points",
+        holes: "in the layer triangles, of class hole",
+    },
+    Carries {
+        format: "features",
+        classes: "an attribute",
+        decks: "in the layer decks",
+        ribbons: "in the layer lines",
+        objects: "left out: --format gpkg has them",
+        holes: "in none of its layers",
+    },
+    Carries {
+        format: "openflight",
+        classes: "materials and surface material codes",
+        objects: "an object each, their materials from code 256 on",
+        ..MESH
+    },
+    Carries { format: "3dtiles", objects: "meshes whose features have id, class and height", ..MESH },
+    Carries { format: "quantized-mesh", classes: "water alone, as a mask", holes: CLOSED, ..RASTER },
+    Carries { format: "3tz", objects: "meshes whose features have id, class and height", ..MESH },
+    Carries {
+        format: "mbtiles",
+        classes: "water alone, as a mask",
+        holes: "kept, since tiles must be closed; the entry holes of metadata says where they are",
+        ..RASTER
+    },
+    Carries { format: "usd", classes: "subsets with materials", objects: "a prim each, with id and height", ..MESH },
+    Carries {
+        format: "heightmap",
+        holes: "as high as the triangles that close them; heightmap.json counts the samples",
+        ..RASTER
+    },
+    Carries {
+        format: "gazebo",
+        classes: "materials in classes.mtl",
+        ribbons: "meshes that are seen and not hit",
+        objects: "meshes that are seen, and boxes that are hit",
+        ..MESH
+    },
+];
+
+/// A column of the table: what it is called, and how it is read.
+type Column = (&'static str, fn(&Carries) -> &'static str);
+
+const COLUMNS: [Column; 5] = [
+    ("classes", |row| row.classes),
+    ("decks of bridges", |row| row.decks),
+    ("ribbons", |row| row.ribbons),
+    ("objects", |row| row.objects),
+    ("holes", |row| row.holes),
+];
+
+/// The table of the guide.
+pub fn carries_table() -> String {
+    let head: String = COLUMNS.iter().map(|(name, _)| format!(" {name} |")).collect();
+    let row = |row: &Carries| {
+        let cells: String = COLUMNS.iter().map(|(_, of)| format!(" {} |", of(row))).collect();
+        format!("| {} |{cells}\n", row.format)
+    };
+    let rows: String = CARRIES.iter().map(row).collect();
+    format!("| |{head}\n|{} - |\n{rows}", " - |".repeat(COLUMNS.len()))
+}
+
+/// The same for the help: below each thing what becomes of it, and in which formats.
+pub fn carries_text() -> String {
+    let mut text = String::new();
+    for (name, of) in COLUMNS {
+        text += &format!("\n\n  {name}");
+        let mut told: Vec<(&str, Vec<&str>)> = Vec::new();
+        for row in &CARRIES {
+            match told.iter_mut().find(|(word, _)| *word == of(row)) {
+                Some((_, formats)) => formats.push(row.format),
+                None => told.push((of(row), vec![row.format])),
+            }
+        }
+        for (word, formats) in told {
+            text += &wrapped(&format!("{}: {word}", formats.join(", ")));
+        }
+    }
+    text
+}
+
+/// Lines of at most 80 columns, below the name of what they are about.
+fn wrapped(text: &str) -> String {
+    const COLUMNS_MAX: usize = 80;
+    let (mut lines, mut line) = (String::new(), "   ".to_owned());
+    for word in text.split(' ') {
+        if COLUMNS_MAX < line.len() + 1 + word.len() {
+            lines += &format!("\n{line}");
+            line = "     ".to_owned();
+        }
+        line += &format!(" {word}");
+    }
+    format!("{lines}\n{line}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_guide_has_the_table() {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/guides/exports.md");
+        let page = std::fs::read_to_string(path).unwrap();
+        let (before, rest) = page.split_once(" cargo test -p exports -->\n\n").unwrap();
+        let (found, after) = rest.split_once("\n<!-- end of what formats carry -->").unwrap();
+        if std::env::var_os("UPDATE_GOLDEN").is_some() {
+            let table = carries_table();
+            let whole =
+                format!("{before} cargo test -p exports -->\n\n{table}\n<!-- end of what formats carry -->{after}");
+            std::fs::write(path, whole).unwrap();
+        }
+        assert_eq!(found, carries_table(), "UPDATE_GOLDEN=1 rewrites {path}");
+    }
+
+    #[test]
+    fn the_help_is_no_wider_than_a_terminal() {
+        let text = carries_text();
+        assert!(text.lines().all(|line| line.len() <= 80) && text.contains("gazebo"), "{text}");
+    }
+}

@@ -1,0 +1,131 @@
+//! Layers of a GeoPackage for what stands on the ground: buildings, woods, rows and points.
+
+use std::collections::BTreeMap;
+
+use rusqlite::params;
+use source_files::geopackage_parts::{Extent, Layer, Package, point_z, polygons};
+use terrain::{Canopy, LoadModule, ObjectKind, Prism, QUANTA_PER_METRE, metres_of_quanta};
+
+use crate::Product;
+use crate::objects::{canopy_shapes, prism_rings};
+
+const BUILDINGS: Layer = Layer {
+    name: "buildings",
+    description: "buildings by their rooflines, heights above the vertical datum",
+    columns: &[
+        ("id", "INTEGER"),
+        ("class", "TEXT"),
+        ("base_m", "DOUBLE"),
+        ("roof_m", "DOUBLE"),
+        ("height_m", "DOUBLE"),
+        ("fullness", "DOUBLE"),
+        ("spacing_m", "DOUBLE"),
+    ],
+    geometry: "MULTIPOLYGON",
+    has_z: false,
+};
+const WOODS: Layer = Layer { name: "woods", description: "woods, scrub and orchards", ..BUILDINGS };
+const ROWS: Layer = Layer { name: "rows", description: "rows of trees, hedges and walls", ..BUILDINGS };
+const POINTS: Layer = Layer {
+    name: "points",
+    description: "towers, chimneys and the like, at their middle",
+    geometry: "POINT",
+    has_z: true,
+    ..BUILDINGS
+};
+
+/// An object whose pieces are put together.
+#[derive(Default)]
+struct Whole {
+    shapes: Vec<Vec<Vec<[f64; 2]>>>,
+    /// Of prisms alone, as the roof.
+    base: Option<i32>,
+    roof: Option<i32>,
+    /// Of canopies alone.
+    height: Option<i32>,
+    fullness: Option<f64>,
+    spacing: Option<f64>,
+}
+
+/// Adds a layer for each group of kinds that the product has any of; these layers.
+pub(crate) fn add_objects(
+    package: &Package,
+    product: &Product,
+    extent: Extent,
+) -> rusqlite::Result<Vec<&'static Layer>> {
+    let mut layers = Vec::new();
+    let wholes = wholes(product);
+    for layer in [&BUILDINGS, &WOODS, &ROWS, &POINTS] {
+        let own = || wholes.iter().filter(|((kind, _), _)| std::ptr::eq(layer_of(*kind), layer));
+        if own().next().is_none() {
+            continue;
+        }
+        layers.push(layer);
+        let mut add = package.begin(layer, extent)?;
+        for ((kind, id), whole) in own() {
+            let height = whole.height.or_else(|| Some(whole.roof? - whole.base?));
+            let geometry = match layer.geometry {
+                "POINT" => point_z(package.srs, middle(whole)),
+                _ => polygons(package.srs, &whole.shapes),
+            };
+            add.execute(params![
+                geometry,
+                id.cast_signed(),
+                kind.name(),
+                whole.base.map(metres_of_quanta),
+                whole.roof.map(metres_of_quanta),
+                height.map(metres_of_quanta),
+                whole.fullness,
+                whole.spacing,
+            ])?;
+        }
+    }
+    Ok(layers)
+}
+
+fn layer_of(kind: ObjectKind) -> &'static Layer {
+    match kind {
+        ObjectKind::Building => &BUILDINGS,
+        ObjectKind::Tower => &POINTS,
+        ObjectKind::Wall | ObjectKind::Row => &ROWS,
+        ObjectKind::Wood | ObjectKind::Scrub | ObjectKind::Orchard => &WOODS,
+    }
+}
+
+/// All objects by kind and number.
+fn wholes(product: &Product) -> BTreeMap<(ObjectKind, u64), Whole> {
+    let mut wholes: BTreeMap<(ObjectKind, u64), Whole> = BTreeMap::new();
+    for module in &product.modules {
+        for prism in &module.objects.prisms {
+            let &Prism { id, kind, base, roof, .. } = prism;
+            let whole = wholes.entry((kind, id)).or_default();
+            whole.shapes.push(placed(product, module, &prism_rings(prism)));
+            whole.base = Some(whole.base.map_or(base, |other| other.min(base)));
+            whole.roof = Some(whole.roof.map_or(roof, |other| other.max(roof)));
+        }
+        for canopy in &module.objects.canopies {
+            let &Canopy { id, kind, height, fullness, spacing, .. } = canopy;
+            let whole = wholes.entry((kind, id)).or_default();
+            whole.shapes.extend(canopy_shapes(canopy).iter().map(|shape| placed(product, module, shape)));
+            whole.height = Some(height.into());
+            whole.fullness = Some(f64::from(fullness) / 100.0);
+            whole.spacing = Some(metres_of_quanta(spacing.into()));
+        }
+    }
+    wholes
+}
+
+/// Rings in quanta from the corner of a load module as eastings and northings.
+fn placed(product: &Product, module: &LoadModule, rings: &[Vec<[i32; 2]>]) -> Vec<Vec<[f64; 2]>> {
+    let corner_m = product.corner_m(module.id.row, module.id.col);
+    let metres = |at: &[i32; 2]| [0, 1].map(|axis| corner_m[axis] + f64::from(at[axis]) / f64::from(QUANTA_PER_METRE));
+    rings.iter().map(|ring| ring.iter().map(metres).collect()).collect()
+}
+
+/// The middle of the extent of an object, on its roof.
+fn middle(whole: &Whole) -> [f64; 3] {
+    let of = |axis: usize| whole.shapes.iter().flatten().flatten().map(move |place| place[axis]);
+    let middle =
+        |axis| f64::midpoint(of(axis).fold(f64::INFINITY, f64::min), of(axis).fold(f64::NEG_INFINITY, f64::max));
+    [middle(0), middle(1), whole.roof.map_or(0.0, metres_of_quanta)]
+}

@@ -1,0 +1,115 @@
+//! What an exported mesh consists of, and how the materials of each are called and coloured.
+
+use terrain::ObjectKind;
+
+use crate::classes::{Classes, linear};
+
+/// One of the meshes that an export shows, each with vertices of its own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Sheet {
+    /// The ground, by class.
+    Ground,
+    /// Decks of bridges, by class.
+    Decks,
+    /// Bands over ways that are lines in the ground, by class.
+    Ribbons,
+    /// What stands on the ground, by material.
+    Objects,
+}
+
+impl Sheet {
+    /// All of them, in the order in which files have them.
+    pub const ALL: [Self; 4] = [Self::Ground, Self::Decks, Self::Ribbons, Self::Objects];
+
+    /// What it is called in files.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Ground => "ground",
+            Self::Decks => "decks",
+            Self::Ribbons => "ribbons",
+            Self::Objects => "objects",
+        }
+    }
+
+    /// Whether it is seen from below too: it has no thickness.
+    pub(crate) const fn is_seen_from_below(self) -> bool {
+        matches!(self, Self::Decks | Self::Objects)
+    }
+}
+
+/// Materials of objects by number: two for each kind, for its top and its sides, in the order of kinds.
+const OBJECT_MATERIALS: [(&str, [u8; 3]); 2 * ObjectKind::ALL.len()] = [
+    ("building_roof", [150, 92, 74]),
+    ("building_wall", [214, 204, 186]),
+    ("tower_roof", [128, 128, 132]),
+    ("tower_wall", [168, 168, 170]),
+    ("wall_top", [150, 144, 132]),
+    ("wall_side", [164, 156, 142]),
+    ("wood_top", [62, 92, 52]),
+    ("wood_side", [54, 80, 46]),
+    ("scrub_top", [104, 118, 66]),
+    ("scrub_side", [94, 106, 60]),
+    ("orchard_top", [120, 140, 80]),
+    ("orchard_side", [108, 126, 72]),
+    ("row_top", [72, 104, 56]),
+    ("row_side", [64, 92, 50]),
+];
+
+/// The names of all materials that objects may have.
+pub(crate) fn object_material_names() -> impl Iterator<Item = &'static str> {
+    OBJECT_MATERIALS.iter().map(|(name, _)| *name)
+}
+
+/// The number of an object's material.
+pub(crate) const fn object_material(kind: ObjectKind, is_side: bool) -> u8 {
+    2 * kind as u8 + is_side as u8
+}
+
+/// The material of triangles: the class of a sheet of ground, or the number of one of objects.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Material {
+    pub sheet: Sheet,
+    pub class: u8,
+}
+
+impl Material {
+    /// Its name as one word.
+    pub(crate) fn word(self, classes: Classes) -> String {
+        classes.material(match self.sheet {
+            Sheet::Objects => OBJECT_MATERIALS[usize::from(self.class)].0.to_owned(),
+            Sheet::Ground | Sheet::Decks | Sheet::Ribbons => classes.word(self.class),
+        })
+    }
+
+    /// Red, green and blue from 0 to 255, as screens show them.
+    pub(crate) fn color(self, classes: Classes) -> [u8; 3] {
+        match self.sheet {
+            Sheet::Objects => OBJECT_MATERIALS[usize::from(self.class)].1,
+            Sheet::Ground | Sheet::Decks | Sheet::Ribbons => classes.color(self.class),
+        }
+    }
+
+    /// Red, green and blue from 0 to 1, as light adds up.
+    pub(crate) fn light(self, classes: Classes) -> [f64; 3] {
+        match self.sheet {
+            Sheet::Objects => self.color(classes).map(linear),
+            Sheet::Ground | Sheet::Decks | Sheet::Ribbons => classes.light(self.class),
+        }
+    }
+
+    /// The same material where that of the ground serves all that has a class.
+    pub(crate) fn in_library(self) -> Self {
+        let sheet = if self.sheet == Sheet::Objects { Sheet::Objects } else { Sheet::Ground };
+        Self { sheet, ..self }
+    }
+
+    /// The same where what is seen from both sides has a material of its own.
+    pub(crate) fn by_sides(self) -> Self {
+        if self.sheet.is_seen_from_below() { self } else { self.in_library() }
+    }
+
+    /// A number that no other material of a file has: that of the class, and from 256 on those of objects.
+    pub(crate) fn number(self) -> i16 {
+        i16::from(self.class) + if self.sheet == Sheet::Objects { 256 } else { 0 }
+    }
+}

@@ -1,0 +1,268 @@
+//! Exports read back by decoders of their own, and looked at from above.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::Mutex;
+use std::sync::atomic::AtomicBool;
+
+use rusqlite::Connection;
+use schedule::Workers;
+use serde_json::Value;
+
+use crate::{Coordinates, ExportError, Mesh, Product, Put, Work, samples};
+
+/// A mesh of a binary glTF: its name and material, and its triangles with y up.
+struct Found {
+    node: String,
+    material: String,
+    triangles: Vec<[[f64; 3]; 3]>,
+}
+
+fn document(bytes: &[u8]) -> (Value, &[u8]) {
+    let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()) as usize;
+    let json = word(12);
+    (serde_json::from_slice(&bytes[20..20 + json]).unwrap(), &bytes[28 + json..])
+}
+
+fn number(value: &Value) -> usize {
+    value.as_u64().unwrap() as usize
+}
+
+/// The numbers of an accessor, vector by vector.
+fn accessor(document: &Value, binary: &[u8], index: &Value) -> Vec<Vec<f64>> {
+    let accessor = &document["accessors"][number(index)];
+    let view = &document["bufferViews"][number(&accessor["bufferView"])];
+    let start = number(&view["byteOffset"]) + number(&accessor["byteOffset"]);
+    let parts = match accessor["type"].as_str().unwrap() {
+        "VEC3" => 3,
+        "VEC2" => 2,
+        _ => 1,
+    };
+    let size = match number(&accessor["componentType"]) {
+        5121 => 1,
+        5123 => 2,
+        _ => 4,
+    };
+    let stride = view["byteStride"].as_u64().map_or(parts * size, |stride| stride as usize);
+    let read = |at: usize| match number(&accessor["componentType"]) {
+        5121 => f64::from(binary[at]),
+        5123 => f64::from(u16::from_le_bytes([binary[at], binary[at + 1]])),
+        5125 => f64::from(u32::from_le_bytes(binary[at..at + 4].try_into().unwrap())),
+        _ => f64::from(f32::from_le_bytes(binary[at..at + 4].try_into().unwrap())),
+    };
+    let vector = |n: usize| (0..parts).map(|part| read(start + n * stride + part * size)).collect();
+    (0..number(&accessor["count"])).map(vector).collect()
+}
+
+fn meshes(bytes: &[u8]) -> Vec<Found> {
+    let (document, binary) = document(bytes);
+    let mut found = Vec::new();
+    for node in document["nodes"].as_array().unwrap().iter().filter(|node| node.get("mesh").is_some()) {
+        for primitive in document["meshes"][number(&node["mesh"])]["primitives"].as_array().unwrap() {
+            let places = accessor(&document, binary, &primitive["attributes"]["POSITION"]);
+            let corners: Vec<[f64; 3]> = accessor(&document, binary, &primitive["indices"])
+                .into_iter()
+                .map(|index| <[f64; 3]>::try_from(places[index[0] as usize].clone()).unwrap())
+                .collect();
+            found.push(Found {
+                node: node["name"].as_str().unwrap().to_owned(),
+                material: document["materials"][number(&primitive["material"])]["name"].as_str().unwrap().to_owned(),
+                triangles: corners.as_chunks::<3>().0.to_vec(),
+            });
+        }
+    }
+    found
+}
+
+/// The highest triangle over a place, by its height and its material.
+fn from_above(meshes: &[Found], [east, north]: [f64; 2]) -> Option<(f64, &str)> {
+    let hit = |[a, b, c]: &[[f64; 3]; 3]| {
+        let side = |p: &[f64; 3], q: &[f64; 3]| (q[0] - p[0]) * (north + p[2]) - (p[2] - q[2]) * (east - p[0]);
+        let (of_a, of_b, of_c) = (side(b, c), side(c, a), side(a, b));
+        let all = of_a + of_b + of_c;
+        let is_over = 0.0 < all && [of_a, of_b, of_c].iter().all(|part| -1e-9 * all <= *part);
+        is_over.then(|| (of_a * a[1] + of_b * b[1] + of_c * c[1]) / all)
+    };
+    let all = meshes.iter().flat_map(|mesh| mesh.triangles.iter().map(move |triangle| (hit(triangle), mesh)));
+    let hits = all.filter_map(|(height, mesh)| Some((height?, mesh.material.as_str())));
+    hits.max_by(|(a, _), (b, _)| a.total_cmp(b))
+}
+
+fn glb(product: &Product) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    crate::write_glb(&mut bytes, product, &Mesh::of(product)).unwrap();
+    bytes
+}
+
+/// The files of an export that writes a folder.
+fn files(write: impl Fn(&Put, &Work) -> Result<(), ExportError>) -> BTreeMap<String, Vec<u8>> {
+    let files = Mutex::new(BTreeMap::new());
+    let put = |name: &str, bytes: &[u8]| {
+        files.lock().unwrap().insert(name.to_owned(), bytes.to_vec());
+        Ok(())
+    };
+    with_work(|work| write(&put, work).unwrap());
+    files.into_inner().unwrap()
+}
+
+fn with_work(run: impl FnOnce(&Work)) {
+    let (workers, stop) = (Workers::new(2), AtomicBool::new(false));
+    run(&Work { workers: &workers, stop: &stop, tell: &|_| {} });
+}
+
+#[test]
+fn rays_from_above_meet_roofs_woods_and_the_ground_of_courtyards() {
+    let product = samples::with_objects();
+    let found = meshes(&glb(&product));
+    let at = |x: f64, y: f64| from_above(&found, [x / 128.0, y / 128.0]).unwrap();
+    assert_eq!(at(60_500.0, 25_000.0), (129_500.0 / 128.0, "building_roof"));
+    assert_eq!(at(66_000.0, 23_000.0), (129_500.0 / 128.0, "building_roof"));
+    assert_eq!(at(1_200.0, 1_300.0), (135_000.0 / 128.0, "tower_roof"));
+    assert_eq!(at(62_000.0, 23_000.0).1, "class_0", "a courtyard");
+    // 15 m above the ground right below, on both sides of the line between load modules.
+    let bare = meshes(&glb(&samples::product()));
+    for (x, y) in [(51_000.0, 41_000.0), (60_000.0, 49_000.0), (70_000.0, 41_500.0), (90_000.0, 48_500.0)] {
+        let ground = from_above(&bare, [x / 128.0, y / 128.0]).unwrap().0;
+        let (top, material) = at(x, y);
+        assert!((top - ground - 15.0).abs() < 0.01 && material == "wood_top", "{top} {ground} {material}");
+    }
+}
+
+#[test]
+fn an_object_is_a_node_with_its_number_and_has_no_wall_where_it_goes_on() {
+    let bytes = glb(&samples::with_objects());
+    let (document, _) = document(&bytes);
+    let nodes = document["nodes"].as_array().unwrap();
+    let house = nodes.iter().find(|node| node["name"] == "building_7").unwrap();
+    assert_eq!(house["extras"], serde_json::json!({ "id": "7", "class": "building", "height_m": 10.9375 }));
+    let parent = nodes.iter().find(|node| node["name"] == "objects").unwrap();
+    assert_eq!(parent["children"].as_array().unwrap().len(), 3);
+    let on_line = |found: &Found| {
+        let upright = |triangle: &&[[f64; 3]; 3]| triangle.iter().all(|place| place[0] == 500.0);
+        found.triangles.iter().filter(upright).count()
+    };
+    let found = meshes(&bytes);
+    assert_eq!(found.iter().filter(|mesh| mesh.node != "r0000c0000").map(on_line).sum::<usize>(), 0);
+    // Three walls of the western piece, four of the courtyard, three of the eastern piece.
+    let walls = found.iter().find(|mesh| mesh.material == "building_wall").unwrap();
+    assert_eq!(walls.triangles.len(), 2 * (3 + 4 + 3));
+    // Seen from outside, walls run counter-clockwise: away from the middle of the house, or of its courtyard.
+    let closed = found.iter().filter(|mesh| mesh.node == "tower_3").flat_map(|mesh| &mesh.triangles);
+    let volume: f64 = closed
+        .map(|[a, b, c]| {
+            let [a, b, c] = [a, b, c].map(|p| [p[0] - 10.0, p[1] - 127_900.0 / 128.0, p[2] + 10.0]);
+            (a[0] * (b[1] * c[2] - b[2] * c[1])
+                + a[1] * (b[2] * c[0] - b[0] * c[2])
+                + a[2] * (b[0] * c[1] - b[1] * c[0]))
+                / 6.0
+        })
+        .sum();
+    let expected = (500.0_f64 / 128.0).powi(2) * 7_100.0 / 128.0;
+    assert!((volume / expected - 1.0).abs() < 1e-3, "{volume} {expected}");
+}
+
+#[test]
+fn every_format_of_meshes_has_the_objects() {
+    let product = samples::with_objects();
+    let obj = |coordinates, library| {
+        let mut bytes = Vec::new();
+        crate::write_obj(&mut bytes, &product, &Mesh::of(&product), coordinates, library).unwrap();
+        String::from_utf8(bytes).unwrap()
+    };
+    let text = obj(Coordinates::Local, Some("a.mtl"));
+    for part in ["\no building_7\nusemtl building_roof\n", "\no tower_3\n", "\no wood_9\nusemtl wood_top\n"] {
+        assert!(text.contains(part), "{part} is not in {text}");
+    }
+    assert!(crate::obj_materials(&product, &Mesh::of(&product)).unwrap().contains("newmtl building_wall\n"));
+    let usd = files(|put, work| crate::write_usd(&product, put, work));
+    let tile = String::from_utf8_lossy(&usd["tiles/tile_r00c00.usda"]).into_owned();
+    assert!(tile.contains("def Mesh \"building_7\" (") && tile.contains("uint64 object:id = 7\n"), "{tile}");
+    assert!(tile.contains("def Mesh \"wood_9\"\n") && tile.contains("</tile_r00c00/Materials/object_wood_top>"));
+    let gazebo = files(|put, work| crate::write_gazebo(&product, put, work));
+    let world = String::from_utf8_lossy(&gazebo["area.sdf"]).into_owned();
+    // A chimney, the eastern piece of the house, and the western one, whose courtyard leaves 83 % of it.
+    assert_eq!(world.matches("<collision name=\"object_").count(), 3, "{world}");
+    assert!(gazebo.contains_key("meshes/r0000c0000_r0000c0001_seen.obj"));
+    let flight = files(|put, work| crate::write_openflight(&product, put, work));
+    let square = &flight["squares/r00c00.flt"];
+    assert!(square.windows(10).any(|window| window == b"building_7") && square.windows(6).any(|w| w == b"wood_9"));
+    let tiles = files(|put, work| crate::write_3dtiles(&product, None, put, work).map(|_| ()));
+    let group = meshes(&tiles["groups/r0000c0000_r0000c0001.glb"]);
+    assert!(group.iter().any(|mesh| mesh.node == "objects_r0000c0000_r0000c0001" && mesh.material == "wood_side"));
+}
+
+#[test]
+fn a_package_has_objects_as_layers_whose_pieces_are_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.gpkg");
+    let write = |path: &Path, product: &Product| {
+        with_work(|work| crate::write_gpkg(path, product, &samples::report(), [8, 8], work).unwrap());
+    };
+    write(&path, &samples::with_objects());
+    let package = Connection::open(&path).unwrap();
+    let told = |layer: &str| -> (i64, String, Option<f64>, f64, Option<f64>, Vec<u8>) {
+        let columns = "count(*), class, roof_m, height_m, fullness, geom";
+        let query = format!("SELECT {columns} FROM {layer}");
+        package
+            .query_row(&query, [], |row| {
+                Ok((row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?, row.get(4)?, row.get(5)?))
+            })
+            .unwrap()
+    };
+    let (count, class, roof, height, fullness, geometry) = told("buildings");
+    assert_eq!((count, class.as_str(), roof, height, fullness), (1, "building", Some(1011.71875), 10.9375, None));
+    let word = |at: usize| u32::from_le_bytes(geometry[at..at + 4].try_into().unwrap());
+    // Two polygons, the first with a courtyard.
+    assert_eq!([word(41), word(45), word(50), word(54)], [6, 2, 3, 2]);
+    let double = |at: usize| f64::from_le_bytes(geometry[at..at + 8].try_into().unwrap());
+    assert_eq!([double(62), double(70)], [505_000.0 + 60_000.0 / 128.0, 3_875_000.0 + 20_000.0 / 128.0]);
+    let (count, class, roof, height, fullness, geometry) = told("woods");
+    assert_eq!((count, class.as_str(), roof, height, fullness), (1, "wood", None, 15.0, Some(0.9)));
+    assert_eq!(u32::from_le_bytes(geometry[45..49].try_into().unwrap()), 2);
+    assert_eq!(told("points").1, "tower");
+    let rows: i64 = package
+        .query_row("SELECT count(*) FROM gpkg_contents WHERE table_name = 'rows'", [], |row| row.get(0))
+        .unwrap();
+    assert_eq!(rows, 0, "what there is none of has no layer");
+}
+
+#[test]
+fn ribbons_lie_5_cm_over_the_ground_as_wide_as_their_ways_and_once() {
+    let product = samples::with_ways();
+    let found = meshes(&glb(&product));
+    let bare = meshes(&glb(&Product { has_ribbons: false, ..product.clone() }));
+    let seen = |x: f64, y: f64| {
+        let (top, material) = from_above(&found, [x, y]).unwrap();
+        let up = top - from_above(&bare, [x, y]).unwrap().0;
+        assert!(material == "default" && up == 0.0 || (up - 0.05).abs() < 0.01, "{up} {material} at {x} {y}");
+        material
+    };
+    // On both sides of the line between load modules, where the road bends, to the edge and beyond it.
+    for (x, y, expected) in [
+        (400.0, 30_000.0 / 128.0, "minor"),
+        (450.0, 30_000.0 / 128.0 + 3.4, "minor"),
+        (450.0, 30_000.0 / 128.0 + 3.6, "default"),
+        (499.9, 30_000.0 / 128.0, "minor"),
+        (500.1, 30_000.0 / 128.0 - 3.4, "minor"),
+        (600.0, 30_000.0 / 128.0 + 100.0, "minor"),
+        (600.0, 30_000.0 / 128.0 + 106.0, "default"),
+        (50_000.0 / 128.0, 30_000.0 / 128.0, "minor"),
+        (50_000.0 / 128.0, 300.0, "stream"),
+        (50_000.0 / 128.0 + 1.1, 300.0, "default"),
+    ] {
+        assert_eq!(seen(x, y), expected, "{x} {y}");
+    }
+    // Areas of the bands, but for what the road takes from the stream: no place is covered twice.
+    let area = |material: &str| -> f64 {
+        let own = found.iter().filter(|mesh| mesh.node.starts_with("ribbons") && mesh.material == material);
+        let plan = |[a, b, c]: &[[f64; 3]; 3]| ((b[0] - a[0]) * (a[2] - c[2]) - (a[2] - b[2]) * (c[0] - a[0])) / 2.0;
+        own.flat_map(|mesh| &mesh.triangles).map(plan).sum()
+    };
+    let along = |x: f64, y: f64| x.hypot(y) / 128.0;
+    let road = along(30_000.0, 10_000.0) + along(24_000.0, 0.0) + along(30_000.0, 30_000.0);
+    // Half a disc of twelve corners at both ends.
+    assert!((area("minor") - 7.0 * road - 3.0 * 3.5 * 3.5).abs() < 3.0, "{}", area("minor"));
+    assert!((area("stream") - 2.0 * (500.0 - 7.0)).abs() < 1.0, "{}", area("stream"));
+    let (document, _) = document(&glb(&product));
+    assert!(document["nodes"].as_array().unwrap().iter().any(|node| node["name"] == "ribbons_r0000c0001"));
+}
