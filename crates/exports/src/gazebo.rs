@@ -1,8 +1,9 @@
 //! A world for Gazebo (SDF 1.9): a model for each block of load modules, its mesh an OBJ beside it, and levels that
 //! load the blocks near a performer.
 //!
-//! Ribbons are seen alone. Objects are seen as meshes, and hit as boxes: one for each building that is nearly a rectangle, else one for each of
-//! its walls; woods are seen alone. x points east, y north, z up; the origin is the south-west corner of what is exported, at height 0.
+//! Ribbons are seen alone. Objects are seen as meshes, and hit as boxes: one for each building that is nearly a
+//! rectangle, else one for each of its walls; woods are seen alone. x points east, y north, z up; the origin is the
+//! south-west corner of what is exported, at height 0.
 
 use std::fmt::Write as _;
 
@@ -31,7 +32,7 @@ const OBSERVER_M: f64 = 2.0;
 /// When a file cannot be written, the area's system cannot be computed, or the work was asked to stop.
 pub fn write_gazebo(product: &Product, put: &Put, work: &Work) -> Result<(), ExportError> {
     let mesh = Mesh::of(product);
-    let materials = obj_materials(product, &mesh);
+    let materials = obj_materials(product, &mesh, None);
     let squares = product.squares(BLOCK_MODULES);
     let blocks = work.each("blocks", &squares, |&rect| {
         let (seen, solid): (Vec<_>, Vec<_>) = mesh

@@ -14,7 +14,7 @@ use crate::mesh::{Part, class_groups, normals};
 use crate::modules::{alone, sheet_name};
 use crate::objects::Thing;
 use crate::sheets::Material;
-use crate::{Facts, Mesh, Product, Sheet, TinPlace};
+use crate::{Facts, Mesh, Product, Sheet, Texture, TinPlace};
 
 /// Meshes as they go into a glTF, each in a node of its own.
 #[derive(Clone, Debug, Default)]
@@ -25,6 +25,8 @@ pub(crate) struct Gltf<'a> {
     pub classes: Classes<'a>,
     /// What else to tell a reader.
     pub extras: Value,
+    /// What all that has places in it is seen with.
+    pub texture: Option<Texture>,
 }
 
 /// A mesh as it goes into a glTF: axes turned, in metres.
@@ -36,6 +38,8 @@ pub(crate) struct GltfNode {
     pub positions: Vec<[f32; 3]>,
     /// Unit vectors.
     pub normals: Vec<[f32; 3]>,
+    /// Places in the texture, where there is one.
+    pub uvs: Vec<[f32; 2]>,
     /// Triangles of each class of ground, in order.
     pub groups: Vec<(u8, Vec<[u32; 3]>)>,
     /// What else to tell a reader.
@@ -62,11 +66,11 @@ impl GltfNode {
 const ARRAY_BUFFER: u32 = 34962;
 const ELEMENT_ARRAY_BUFFER: u32 = 34963;
 
-/// The document and the numbers of a glTF in the making: views of all positions, all normals, all indices, and all
-/// numbers of features.
+/// The document and the numbers of a glTF in the making: views of all positions, all normals, all indices, all
+/// numbers of features, and all places in a texture.
 #[derive(Default)]
 struct Parts {
-    views: [Vec<u8>; 4],
+    views: [Vec<u8>; 5],
     accessors: Vec<Value>,
     meshes: Vec<Value>,
     nodes: Vec<Value>,
@@ -77,6 +81,7 @@ impl Parts {
     const NORMALS: usize = 1;
     const INDICES: usize = 2;
     const FEATURES: usize = 3;
+    const UVS: usize = 4;
 
     /// Adds an accessor; its number.
     fn accessor(&mut self, view: usize, start: usize, component: u32, count: usize, kind: &str) -> usize {
@@ -107,6 +112,10 @@ impl Parts {
         if let Some(features) = &node.features {
             let numbers: Vec<f32> = features.of_vertices.iter().map(|&number| number as f32).collect();
             attributes["_FEATURE_ID_0"] = json!(self.floats(Self::FEATURES, &numbers, "SCALAR", numbers.len()));
+        }
+        if !node.uvs.is_empty() {
+            let uvs = node.uvs.as_flattened();
+            attributes["TEXCOORD_0"] = json!(self.floats(Self::UVS, uvs, "VEC2", node.uvs.len()));
         }
         let mut primitives = Vec::with_capacity(node.groups.len());
         for (class, triangles) in &node.groups {
@@ -141,6 +150,7 @@ impl Parts {
             let (target, stride) = match index {
                 Self::INDICES => (ELEMENT_ARRAY_BUFFER, None),
                 Self::FEATURES => (ARRAY_BUFFER, Some(size_of::<f32>())),
+                Self::UVS => (ARRAY_BUFFER, Some(size_of::<[f32; 2]>())),
                 _ => (ARRAY_BUFFER, Some(size_of::<[f32; 3]>())),
             };
             view["target"] = json!(target);
@@ -198,15 +208,19 @@ impl Gltf<'_> {
         all().for_each(|(sheet, node)| parts.add(node, sheet, &materials));
         let top = parts.put_parents(&self.sheets);
         let (mut views, mut binary) = parts.put_views();
+        let material = |of: Material| material_of(self.classes, of, self.texture.is_some());
         let mut document = json!({
             "asset": asset, "scene": 0, "scenes": [{ "nodes": top }],
             "nodes": parts.nodes, "meshes": parts.meshes,
-            "materials": materials.into_iter().map(|of| material_of(self.classes, of)).collect::<Vec<_>>(),
+            "materials": materials.into_iter().map(material).collect::<Vec<_>>(),
             "accessors": parts.accessors,
         });
         if let Some(features) = all().find_map(|(_, node)| node.features.as_ref()) {
             document["extensionsUsed"] = json!(["EXT_mesh_features", "EXT_structural_metadata"]);
             document["extensions"] = json!({ "EXT_structural_metadata": features.metadata(&mut views, &mut binary) });
+        }
+        if let Some(texture) = &self.texture {
+            put_texture(&mut document, &mut views, &mut binary, texture);
         }
         document["bufferViews"] = json!(views);
         document["buffers"] = json!([{ "byteLength": binary.len() }]);
@@ -214,8 +228,24 @@ impl Gltf<'_> {
     }
 }
 
+/// Puts a texture that ends at its borders.
+fn put_texture(document: &mut Value, views: &mut Vec<Value>, binary: &mut Vec<u8>, texture: &Texture) {
+    const CLAMPED: u32 = 33071;
+    const LINEAR: u32 = 9729;
+    const LINEAR_BETWEEN_LINEAR: u32 = 9987;
+    let view = json!({ "buffer": 0, "byteOffset": binary.len(), "byteLength": texture.jpeg.len() });
+    binary.extend_from_slice(&texture.jpeg);
+    pad(binary, 0);
+    document["images"] = json!([{ "bufferView": views.len(), "mimeType": "image/jpeg" }]);
+    document["samplers"] = json!([{
+        "magFilter": LINEAR, "minFilter": LINEAR_BETWEEN_LINEAR, "wrapS": CLAMPED, "wrapT": CLAMPED,
+    }]);
+    document["textures"] = json!([{ "sampler": 0, "source": 0 }]);
+    views.push(view);
+}
+
 /// The material as glTF describes it.
-fn material_of(classes: Classes, material: Material) -> Value {
+fn material_of(classes: Classes, material: Material, has_texture: bool) -> Value {
     let [red, green, blue] = material.light(classes);
     let word = material.word(classes);
     let mut value = json!({
@@ -224,6 +254,10 @@ fn material_of(classes: Classes, material: Material) -> Value {
             "baseColorFactor": [red, green, blue, 1.0], "metallicFactor": 0.0, "roughnessFactor": 1.0,
         },
     });
+    if has_texture && material.sheet != Sheet::Objects {
+        value["pbrMetallicRoughness"]["baseColorFactor"] = json!([1.0, 1.0, 1.0, 1.0]);
+        value["pbrMetallicRoughness"]["baseColorTexture"] = json!({ "index": 0 });
+    }
     if material.sheet.is_seen_from_below() {
         value["doubleSided"] = json!(true);
     }
@@ -282,41 +316,45 @@ fn container(document: &Value, binary: &[u8]) -> Vec<u8> {
 ///
 /// # Errors
 /// Those of `out`.
-pub fn write_glb(out: &mut impl Write, product: &Product, mesh: &Mesh) -> Result<()> {
+pub fn write_glb(out: &mut impl Write, product: &Product, mesh: &Mesh, texture: Option<Texture>) -> Result<()> {
     let facts = Facts::y_up(product);
     let positions: Vec<[f32; 3]> = mesh.metres().map(turned).collect();
     let normals: Vec<[f32; 3]> = mesh.normals().into_iter().map(turned).collect();
-    let node = |name: String, extras: Value, part: &Part| {
+    let node = |name: String, (sheet, extras): (Sheet, Value), part: &Part| {
+        let uvs = texture.as_ref().filter(|_| sheet != Sheet::Objects).map(|texture| mesh.uvs(texture, &part.vertices));
         let node = GltfNode {
             name,
             positions: part.vertices.iter().map(|&v| positions[v as usize]).collect(),
             normals: part.vertices.iter().map(|&v| normals[v as usize]).collect(),
+            uvs: uvs.unwrap_or_default(),
             extras,
             ..GltfNode::default()
         };
         node.with_groups(&part.triangles, &part.classes)
     };
     let of_module = |sheet: Sheet, id: ModuleId| {
-        node(sheet_name(sheet, alone(id)), Value::Null, &mesh.part(product, sheet, alone(id)))
+        node(sheet_name(sheet, alone(id)), (sheet, Value::Null), &mesh.part(product, sheet, alone(id)))
     };
     let of_modules = |sheet: Sheet| -> Vec<GltfNode> {
         let all = product.rect.iter().map(|id| of_module(sheet, id));
         all.filter(|node| !node.groups.is_empty()).collect()
     };
-    let of_thing = |(thing, part): (Thing, Part)| node(thing.name(), thing.told(), &part);
+    let of_thing = |(thing, part): (Thing, Part)| node(thing.name(), (Sheet::Objects, thing.told()), &part);
     let things = mesh.part(product, Sheet::Objects, product.rect).by_thing();
+    let sheets = vec![
+        (Sheet::Ground, of_modules(Sheet::Ground)),
+        (Sheet::Decks, of_modules(Sheet::Decks)),
+        (Sheet::Ribbons, of_modules(Sheet::Ribbons)),
+        (Sheet::Objects, things.into_iter().map(of_thing).collect()),
+    ];
     let gltf = Gltf {
-        sheets: vec![
-            (Sheet::Ground, of_modules(Sheet::Ground)),
-            (Sheet::Decks, of_modules(Sheet::Decks)),
-            (Sheet::Ribbons, of_modules(Sheet::Ribbons)),
-            (Sheet::Objects, things.into_iter().map(of_thing).collect()),
-        ],
+        sheets,
         classes: product.classes(),
         extras: json!({
             "crs": product.crs(), "vertical_datum": product.vertical_datum(), "offset_m": facts.offset_m,
             "axes": facts.axes, "attribution": product.attributions(),
         }),
+        texture,
     };
     out.write_all(&gltf.bytes())
 }
@@ -351,6 +389,7 @@ pub fn write_tin_glb(out: &mut impl Write, tin: &Tin, place: &TinPlace) -> Resul
             "crs": place.crs, "axes": "x east, y up, z south",
             "offset_m": [place.origin_m[0] + south_west[0], place.origin_m[1] + south_west[1], 0.0],
         }),
+        texture: None,
     };
     out.write_all(&gltf.bytes())
 }
@@ -364,7 +403,7 @@ mod tests {
     fn a_glb_is_two_chunks_whose_lengths_add_up_and_whose_views_fit() {
         let product = samples::product();
         let mut bytes = Vec::new();
-        write_glb(&mut bytes, &product, &Mesh::of(&product)).unwrap();
+        write_glb(&mut bytes, &product, &Mesh::of(&product), None).unwrap();
         let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()) as usize;
         assert_eq!((&bytes[..4], word(4), word(8)), (&b"glTF"[..], 2, bytes.len()));
         let document: Value = serde_json::from_slice(&bytes[20..20 + word(12)]).unwrap();
@@ -392,7 +431,7 @@ mod tests {
     fn decks_are_nodes_below_one_of_their_own_and_materials_have_the_names_and_colours_of_classes() {
         let product = samples::with_bridge();
         let mut bytes = Vec::new();
-        write_glb(&mut bytes, &product, &Mesh::of(&product)).unwrap();
+        write_glb(&mut bytes, &product, &Mesh::of(&product), None).unwrap();
         let length = u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize;
         let document: Value = serde_json::from_slice(&bytes[20..20 + length]).unwrap();
         assert_eq!(document["nodes"][4], json!({ "name": "decks", "children": [2, 3] }));
@@ -415,7 +454,7 @@ mod tests {
     fn nodes_are_named_after_load_modules_and_holes_are_left_out() {
         let names = |product: &Product| -> Vec<(String, u64)> {
             let mut bytes = Vec::new();
-            write_glb(&mut bytes, product, &Mesh::of(product)).unwrap();
+            write_glb(&mut bytes, product, &Mesh::of(product), None).unwrap();
             let length = u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize;
             let document: Value = serde_json::from_slice(&bytes[20..20 + length]).unwrap();
             let count = |node: &Value| -> u64 {

@@ -7,7 +7,7 @@ use source_files::geopackage_parts::{Extent, Layer, Package, point_z, polygons};
 use terrain::{Canopy, LoadModule, ObjectKind, Prism, QUANTA_PER_METRE, metres_of_quanta};
 
 use crate::Product;
-use crate::objects::{canopy_shapes, prism_rings};
+use crate::objects::{canopy_shapes, prism_rings, united};
 
 const BUILDINGS: Layer = Layer {
     name: "buildings",
@@ -37,7 +37,8 @@ const POINTS: Layer = Layer {
 /// An object whose pieces are put together.
 #[derive(Default)]
 struct Whole {
-    shapes: Vec<Vec<Vec<[f64; 2]>>>,
+    /// Of all pieces, in quanta from the south-west corner of what is exported.
+    rings: Vec<Vec<[i32; 2]>>,
     /// Of prisms alone, as the roof.
     base: Option<i32>,
     roof: Option<i32>,
@@ -65,8 +66,8 @@ pub(crate) fn add_objects(
         for ((kind, id), whole) in own() {
             let height = whole.height.or_else(|| Some(whole.roof? - whole.base?));
             let geometry = match layer.geometry {
-                "POINT" => point_z(package.srs, middle(whole)),
-                _ => polygons(package.srs, &whole.shapes),
+                "POINT" => point_z(package.srs, middle(product, whole)),
+                _ => polygons(package.srs, &placed(product, &united(&whole.rings))),
             };
             add.execute(params![
                 geometry,
@@ -99,14 +100,14 @@ fn wholes(product: &Product) -> BTreeMap<(ObjectKind, u64), Whole> {
         for prism in &module.objects.prisms {
             let &Prism { id, kind, base, roof, .. } = prism;
             let whole = wholes.entry((kind, id)).or_default();
-            whole.shapes.push(placed(product, module, &prism_rings(prism)));
+            whole.rings.extend(moved(product, module, prism_rings(prism)));
             whole.base = Some(whole.base.map_or(base, |other| other.min(base)));
             whole.roof = Some(whole.roof.map_or(roof, |other| other.max(roof)));
         }
         for canopy in &module.objects.canopies {
             let &Canopy { id, kind, height, fullness, spacing, .. } = canopy;
             let whole = wholes.entry((kind, id)).or_default();
-            whole.shapes.extend(canopy_shapes(canopy).iter().map(|shape| placed(product, module, shape)));
+            whole.rings.extend(canopy_shapes(canopy).into_iter().flat_map(|shape| moved(product, module, shape)));
             whole.height = Some(height.into());
             whole.fullness = Some(f64::from(fullness) / 100.0);
             whole.spacing = Some(metres_of_quanta(spacing.into()));
@@ -115,17 +116,28 @@ fn wholes(product: &Product) -> BTreeMap<(ObjectKind, u64), Whole> {
     wholes
 }
 
-/// Rings in quanta from the corner of a load module as eastings and northings.
-fn placed(product: &Product, module: &LoadModule, rings: &[Vec<[i32; 2]>]) -> Vec<Vec<[f64; 2]>> {
-    let corner_m = product.corner_m(module.id.row, module.id.col);
-    let metres = |at: &[i32; 2]| [0, 1].map(|axis| corner_m[axis] + f64::from(at[axis]) / f64::from(QUANTA_PER_METRE));
-    rings.iter().map(|ring| ring.iter().map(metres).collect()).collect()
+/// Rings in quanta from the corner of a load module as such from that of what is exported.
+fn moved(product: &Product, module: &LoadModule, rings: Vec<Vec<[i32; 2]>>) -> Vec<Vec<[i32; 2]>> {
+    let corner = product.corner(module.id);
+    let place = |[x, y]: [i32; 2]| [corner[0] + x, corner[1] + y];
+    rings.into_iter().map(|ring| ring.into_iter().map(place).collect()).collect()
+}
+
+/// Shapes in quanta from the corner of what is exported as eastings and northings.
+fn placed(product: &Product, shapes: &[Vec<Vec<[i32; 2]>>]) -> Vec<Vec<Vec<[f64; 2]>>> {
+    let ring = |ring: &Vec<[i32; 2]>| ring.iter().map(|&at| place_m(product, at)).collect();
+    shapes.iter().map(|shape| shape.iter().map(ring).collect()).collect()
+}
+
+fn place_m(product: &Product, at: [i32; 2]) -> [f64; 2] {
+    let corner_m = product.corner_m(product.rect.south, product.rect.west);
+    [0, 1].map(|axis| corner_m[axis] + f64::from(at[axis]) / f64::from(QUANTA_PER_METRE))
 }
 
 /// The middle of the extent of an object, on its roof.
-fn middle(whole: &Whole) -> [f64; 3] {
-    let of = |axis: usize| whole.shapes.iter().flatten().flatten().map(move |place| place[axis]);
-    let middle =
-        |axis| f64::midpoint(of(axis).fold(f64::INFINITY, f64::min), of(axis).fold(f64::NEG_INFINITY, f64::max));
-    [middle(0), middle(1), whole.roof.map_or(0.0, metres_of_quanta)]
+fn middle(product: &Product, whole: &Whole) -> [f64; 3] {
+    let of = |axis: usize| whole.rings.iter().flatten().map(move |place| place[axis]);
+    let middle = |axis| of(axis).min().unwrap_or(0).midpoint(of(axis).max().unwrap_or(0));
+    let [east, north] = place_m(product, [middle(0), middle(1)]);
+    [east, north, whole.roof.map_or(0.0, metres_of_quanta)]
 }

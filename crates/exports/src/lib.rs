@@ -18,6 +18,8 @@ pub use sheets::Sheet;
 mod product;
 mod ribbon_lines;
 pub use product::{Block, Levels, Product};
+mod textures;
+pub use textures::{Texture, Textures};
 mod carries;
 pub use carries::{CARRIES, Carries, carries_table, carries_text};
 mod drape;

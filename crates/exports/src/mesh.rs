@@ -8,7 +8,7 @@ use terrain::{HOLE_CLASS, LoadModule, ModuleId, ModuleRect, ModuleVertex, Object
 
 use crate::objects::{Facet, Thing, things_in};
 use crate::ribbons::Ribbons;
-use crate::{Product, Sheet};
+use crate::{Product, Sheet, Texture};
 
 /// What coordinates are counted from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -284,6 +284,13 @@ impl Mesh {
     /// East, north and up of each vertex in metres from the mesh's south-west corner.
     pub(crate) fn metres(&self) -> impl ExactSizeIterator<Item = [f64; 3]> {
         self.vertices.iter().map(|vertex| vertex.map(|quanta| f64::from(quanta) / f64::from(QUANTA_PER_METRE)))
+    }
+
+    /// Where vertices lie in a texture.
+    pub(crate) fn uvs(&self, texture: &Texture, vertices: &[u32]) -> Vec<[f32; 2]> {
+        let metres = |quanta: i32| f64::from(quanta) / f64::from(QUANTA_PER_METRE);
+        let place = |&v: &u32| self.vertices[v as usize].map(metres);
+        vertices.iter().map(place).map(|[x, y, _]| texture.uv([x, y])).collect()
     }
 
     /// Whether every coordinate, counted from the south-west corner, is exact as a 32-bit float.

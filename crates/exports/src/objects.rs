@@ -132,10 +132,16 @@ pub(crate) fn prism_rings(prism: &Prism) -> Vec<Vec<[i32; 2]>> {
 
 /// What the triangles of a canopy cover: shapes of an outer ring counter-clockwise and clearings clockwise.
 pub(crate) fn canopy_shapes(canopy: &Canopy) -> Vec<Vec<Vec<[i32; 2]>>> {
-    let mut overlay = Overlay::<i32>::new(3 * canopy.triangles.len());
-    for triangle in &canopy.triangles {
-        let corners = triangle.map(|at| canopy.places[usize::from(at)].map(i32::from));
-        overlay.add_contour(&corners.map(|[x, y]| IntPoint::new(x, y)), ShapeType::Subject);
+    let triangle = |of: &[u16; 3]| of.map(|at| canopy.places[usize::from(at)].map(i32::from)).to_vec();
+    united(&canopy.triangles.iter().map(triangle).collect::<Vec<_>>())
+}
+
+/// What rings cover together, those of holes clockwise: shapes of an outer ring and holes.
+pub(crate) fn united(rings: &[Vec<[i32; 2]>]) -> Vec<Vec<Vec<[i32; 2]>>> {
+    let mut overlay = Overlay::<i32>::new(rings.iter().map(Vec::len).sum());
+    for ring in rings {
+        let ring: Vec<IntPoint<i32>> = ring.iter().map(|&[x, y]| IntPoint::new(x, y)).collect();
+        overlay.add_contour(&ring, ShapeType::Subject);
     }
     let shapes = overlay.overlay(OverlayRule::Subject, FillRule::NonZero);
     let ring = |ring: Vec<IntPoint<i32>>| ring.into_iter().map(|at| [at.x, at.y]).collect();

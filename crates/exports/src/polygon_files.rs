@@ -4,7 +4,7 @@ use std::io::{Result, Write};
 
 use crate::mesh::class_groups;
 use crate::sheets::Material;
-use crate::{Coordinates, Facts, Mesh, Product, Sheet};
+use crate::{Coordinates, Facts, Mesh, Product, Sheet, Texture};
 
 /// Writes `mesh` as binary little-endian PLY. Faces have corners only, since readers (meshio is one) take all lists to
 /// lie one behind the other; so triangles come class by class, those of decks after all of the ground, and comments say
@@ -46,6 +46,7 @@ pub fn write_obj(
     mesh: &Mesh,
     coordinates: Coordinates,
     library: Option<&str>,
+    texture: Option<&Texture>,
 ) -> Result<()> {
     let facts = Facts::z_up(product, coordinates);
     let mut comments = facts.comments(product);
@@ -57,6 +58,11 @@ pub fn write_obj(
         writeln!(out, "mtllib {library}")?;
     }
     put_obj_vertices(out, metres(mesh, product, &facts))?;
+    if let Some(texture) = texture {
+        let all: Vec<u32> = (0..mesh.vertices.len() as u32).collect();
+        // From the southern side.
+        mesh.uvs(texture, &all).iter().try_for_each(|[u, v]| writeln!(out, "vt {u} {}", 1.0 - v))?;
+    }
     let has_materials = library.is_some();
     let mut last = Sheet::Ground;
     for group in groups.into_iter().filter(|group| group.sheet != Sheet::Objects) {
@@ -70,7 +76,10 @@ pub fn write_obj(
         if has_materials {
             writeln!(out, "usemtl {}", group.word(classes))?;
         }
-        put_obj_faces(out, mesh.of_group(group))?;
+        match texture {
+            Some(_) => mesh.of_group(group).try_for_each(|corners| put_textured_face(out, corners))?,
+            None => put_obj_faces(out, mesh.of_group(group))?,
+        }
     }
     for (thing, part) in mesh.part(product, Sheet::Objects, product.rect).by_thing() {
         writeln!(out, "o {}", thing.name())?;
@@ -85,18 +94,28 @@ pub fn write_obj(
     Ok(())
 }
 
+/// A face whose corners have the same numbers as vertices and as places in a texture.
+fn put_textured_face(out: &mut impl Write, corners: &[u32; 3]) -> Result<()> {
+    let [a, b, c] = corners.map(|corner| corner + 1);
+    writeln!(out, "f {a}/{a} {b}/{b} {c}/{c}")
+}
+
 /// The text of a library of materials for an OBJ, one for each class; `None` where all is ground of one class, which
-/// needs none.
-pub fn obj_materials(product: &Product, mesh: &Mesh) -> Option<String> {
+/// needs none. `texture` is the name of the
+/// file that all but objects are seen with, where there is one.
+pub fn obj_materials(product: &Product, mesh: &Mesh, texture: Option<&str>) -> Option<String> {
     let (groups, classes) = (mesh.groups(), product.classes());
     let mut present: Vec<Material> = groups.iter().map(|group| group.in_library()).collect();
     present.sort_unstable();
     present.dedup();
     let material = |material: Material| {
-        let [red, green, blue] = material.color(classes).map(|part| f64::from(part) / 255.0);
-        format!("newmtl {}\nKd {red:.3} {green:.3} {blue:.3}\nillum 1\n", material.word(classes))
+        let map = texture.filter(|_| material.sheet != Sheet::Objects);
+        let color = if map.is_some() { [255; 3] } else { material.color(classes) };
+        let [red, green, blue] = color.map(|part| f64::from(part) / 255.0);
+        let map = map.map_or_else(String::new, |name| format!("map_Kd {name}\n"));
+        format!("newmtl {}\nKd {red:.3} {green:.3} {blue:.3}\nillum 1\n{map}", material.word(classes))
     };
-    (1 < groups.len()).then(|| present.into_iter().map(material).collect())
+    (1 < groups.len() || texture.is_some()).then(|| present.into_iter().map(material).collect())
 }
 
 /// Coordinates of the vertices as the file has them.
@@ -187,7 +206,7 @@ mod tests {
     fn text(coordinates: Coordinates) -> String {
         let product = samples::product();
         let mut bytes = Vec::new();
-        write_obj(&mut bytes, &product, &Mesh::of(&product), coordinates, None).unwrap();
+        write_obj(&mut bytes, &product, &Mesh::of(&product), coordinates, None, None).unwrap();
         String::from_utf8(bytes).unwrap()
     }
 
@@ -220,7 +239,7 @@ mod tests {
         let product = samples::with_bridge();
         let mesh = Mesh::of(&product);
         let mut bytes = Vec::new();
-        write_obj(&mut bytes, &product, &mesh, Coordinates::Local, Some("a.mtl")).unwrap();
+        write_obj(&mut bytes, &product, &mesh, Coordinates::Local, Some("a.mtl"), None).unwrap();
         let text = String::from_utf8(bytes).unwrap();
         let words = |line: &&str| !["#", "v ", "f "].iter().any(|start| line.starts_with(start));
         let groups = ["g class_0", "usemtl default", "g class_1", "usemtl motorway"];
@@ -228,7 +247,7 @@ mod tests {
         let lines: Vec<&str> = text.lines().filter(words).collect();
         assert_eq!(lines, [&["mtllib a.mtl"][..], &groups, &decks].concat());
         assert!(text.contains("\n# class 1 motorway\n") && text.lines().filter(|l| l.starts_with("f ")).count() == 12);
-        let materials = obj_materials(&product, &mesh).unwrap();
+        let materials = obj_materials(&product, &mesh, None).unwrap();
         assert!(materials.contains("newmtl motorway\nKd 0.204 0.188 0.180\n"), "{materials}");
         assert_eq!(materials.matches("newmtl").count(), 3);
         let mut bytes = Vec::new();
@@ -244,6 +263,6 @@ mod tests {
     fn ground_of_one_class_needs_no_materials() {
         let mut product = samples::product();
         product.modules.iter_mut().for_each(|module| module.classes.fill(0));
-        assert_eq!(obj_materials(&product, &Mesh::of(&product)), None);
+        assert_eq!(obj_materials(&product, &Mesh::of(&product), None), None);
     }
 }

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 use std::path::Path;
+use std::sync::Arc;
 
 use store::{Folder, Manifest, TileModules};
 use terrain::{GridFrame, HOLE_CLASS, LoadModule, ModuleGrid, ModuleId, ModuleLine, ModuleRect, TileId};
@@ -9,6 +10,7 @@ use terrain::{GridFrame, HOLE_CLASS, LoadModule, ModuleGrid, ModuleId, ModuleLin
 use crate::classes::{Classes, names_in, water_in};
 use crate::ribbon_lines::length_m;
 use crate::sheets::object_material_names;
+use crate::textures::{Place, Texture, Textures};
 use crate::{ExportError, Work};
 
 /// A block of load modules by its south-west and north-east one, both inside.
@@ -56,6 +58,8 @@ pub struct Product {
     pub has_ribbons: bool,
     /// Other names for materials, by those that they would have.
     pub(crate) materials: Vec<(String, String)>,
+    /// Orthophotos that the ground is seen with.
+    pub textures: Option<Arc<Textures>>,
     /// The tile of each of them.
     pub(crate) tiles: Vec<TileModules>,
     /// Place in `tiles` of each module's tile.
@@ -118,7 +122,7 @@ impl Product {
         let (Some(first), Some(modules)) = (tiles.first(), levels.next()) else { return Err(damaged(0, rect)) };
         let (grid, frame) = (first.grid, first.frame);
         let coarser = levels.collect();
-        let (lines, has_ribbons, materials) = (Vec::new(), true, Vec::new());
+        let (lines, has_ribbons, materials, textures) = (Vec::new(), true, Vec::new(), None);
         Ok(Self {
             manifest,
             class_names,
@@ -132,6 +136,7 @@ impl Product {
             lines,
             has_ribbons,
             materials,
+            textures,
             tiles,
             tile_of,
         })
@@ -193,6 +198,17 @@ impl Product {
         let prisms = objects().flat_map(|objects| objects.prisms.iter().map(|prism| (prism.kind, prism.id)));
         let canopies = objects().flat_map(|objects| objects.canopies.iter().map(|canopy| (canopy.kind, canopy.id)));
         prisms.chain(canopies).collect::<BTreeSet<_>>().len()
+    }
+
+    /// The texture of some of its load modules, where it has orthophotos, with texels no finer than `texel_m`.
+    ///
+    /// # Errors
+    /// When a picture has changed, or part of it cannot be decoded.
+    pub fn texture(&self, rect: ModuleRect, texel_m: f64) -> Result<Option<Texture>, ExportError> {
+        let origin_m = self.corner_m(self.rect.south, self.rect.west);
+        let [low_m, high_m] = [self.corner_m(rect.south, rect.west), self.corner_m(rect.north, rect.east)];
+        let place = Place { origin_m, low_m, high_m, module_m: self.side_m(), below: self.classes().color(0) };
+        self.textures.as_ref().map(|textures| textures.of(&place, texel_m)).transpose()
     }
 
     /// Gives materials other names, each by the one that it would have.

@@ -47,6 +47,7 @@ pub(crate) fn product() -> Product {
         lines: Vec::new(),
         has_ribbons: true,
         materials: Vec::new(),
+        textures: None,
         tiles: vec![tile_modules],
         tile_of: vec![0, 0],
     }

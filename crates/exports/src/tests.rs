@@ -2,14 +2,15 @@
 
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::sync::Mutex;
 use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, Mutex};
 
 use rusqlite::Connection;
 use schedule::Workers;
 use serde_json::Value;
+use terrain::ModuleRect;
 
-use crate::{Coordinates, ExportError, Mesh, Product, Put, Work, samples};
+use crate::{ByteRaster, Coordinates, ExportError, Mesh, Product, Put, Textures, Work, samples};
 
 /// A mesh of a binary glTF: its name and material, and its triangles with y up.
 struct Found {
@@ -90,7 +91,8 @@ fn from_above(meshes: &[Found], [east, north]: [f64; 2]) -> Option<(f64, &str)> 
 
 fn glb(product: &Product) -> Vec<u8> {
     let mut bytes = Vec::new();
-    crate::write_glb(&mut bytes, product, &Mesh::of(product)).unwrap();
+    let texture = product.texture(product.rect, 0.0).unwrap();
+    crate::write_glb(&mut bytes, product, &Mesh::of(product), texture).unwrap();
     bytes
 }
 
@@ -166,14 +168,14 @@ fn every_format_of_meshes_has_the_objects() {
     let product = samples::with_objects();
     let obj = |coordinates, library| {
         let mut bytes = Vec::new();
-        crate::write_obj(&mut bytes, &product, &Mesh::of(&product), coordinates, library).unwrap();
+        crate::write_obj(&mut bytes, &product, &Mesh::of(&product), coordinates, library, None).unwrap();
         String::from_utf8(bytes).unwrap()
     };
     let text = obj(Coordinates::Local, Some("a.mtl"));
     for part in ["\no building_7\nusemtl building_roof\n", "\no tower_3\n", "\no wood_9\nusemtl wood_top\n"] {
         assert!(text.contains(part), "{part} is not in {text}");
     }
-    assert!(crate::obj_materials(&product, &Mesh::of(&product)).unwrap().contains("newmtl building_wall\n"));
+    assert!(crate::obj_materials(&product, &Mesh::of(&product), None).unwrap().contains("newmtl building_wall\n"));
     let usd = files(|put, work| crate::write_usd(&product, put, work));
     let tile = String::from_utf8_lossy(&usd["tiles/tile_r00c00.usda"]).into_owned();
     assert!(tile.contains("def Mesh \"building_7\" (") && tile.contains("uint64 object:id = 7\n"), "{tile}");
@@ -212,13 +214,14 @@ fn a_package_has_objects_as_layers_whose_pieces_are_one() {
     let (count, class, roof, height, fullness, geometry) = told("buildings");
     assert_eq!((count, class.as_str(), roof, height, fullness), (1, "building", Some(1011.71875), 10.9375, None));
     let word = |at: usize| u32::from_le_bytes(geometry[at..at + 4].try_into().unwrap());
-    // Two polygons, the first with a courtyard.
-    assert_eq!([word(41), word(45), word(50), word(54)], [6, 2, 3, 2]);
+    // One polygon over both load modules, with a courtyard.
+    assert_eq!([word(41), word(45), word(50), word(54)], [6, 1, 3, 2]);
     let double = |at: usize| f64::from_le_bytes(geometry[at..at + 8].try_into().unwrap());
-    assert_eq!([double(62), double(70)], [505_000.0 + 60_000.0 / 128.0, 3_875_000.0 + 20_000.0 / 128.0]);
+    let extent = [60_000.0, 67_000.0].map(|quanta| 505_000.0 + quanta / 128.0);
+    assert_eq!([double(8), double(16)], extent);
     let (count, class, roof, height, fullness, geometry) = told("woods");
     assert_eq!((count, class.as_str(), roof, height, fullness), (1, "wood", None, 15.0, Some(0.9)));
-    assert_eq!(u32::from_le_bytes(geometry[45..49].try_into().unwrap()), 2);
+    assert_eq!(u32::from_le_bytes(geometry[45..49].try_into().unwrap()), 1);
     assert_eq!(told("points").1, "tower");
     let rows: i64 = package
         .query_row("SELECT count(*) FROM gpkg_contents WHERE table_name = 'rows'", [], |row| row.get(0))
@@ -265,4 +268,98 @@ fn ribbons_lie_5_cm_over_the_ground_as_wide_as_their_ways_and_once() {
     assert!((area("stream") - 2.0 * (500.0 - 7.0)).abs() < 1.0, "{}", area("stream"));
     let (document, _) = document(&glb(&product));
     assert!(document["nodes"].as_array().unwrap().iter().any(|node| node["name"] == "ribbons_r0000c0001"));
+}
+
+/// An orthophoto of a metre a pixel over all of the sample, in dark and light squares of 20 m, dark in the south-west.
+fn checkerboard(path: &Path) {
+    let is_light = |east: usize, north: usize| (east / 20 + north / 20) % 2 == 1;
+    let raster = ByteRaster {
+        origin_m: [505_000.5, 3_875_000.5],
+        spacing: terrain::Spacing::from_metres(1.0).unwrap(),
+        size: [1000, 500],
+        epsg: 32_611,
+        bands: 1,
+    };
+    let row = |row: usize| (0..1000).map(move |col| if is_light(col, 499 - row) { 235 } else { 20 });
+    let mut file = std::fs::File::create(path).unwrap();
+    crate::write_byte_raster(&mut file, &raster, |first, last| (first..=last).flat_map(row).collect()).unwrap();
+}
+
+/// Brightness and sides of a picture.
+fn decoded(jpeg: &[u8]) -> (Vec<u8>, usize, usize) {
+    let mut decoder = zune_jpeg::JpegDecoder::new(std::io::Cursor::new(jpeg));
+    let colors = decoder.decode().unwrap();
+    let (wide, high) = decoder.dimensions().unwrap();
+    assert_eq!(colors.len(), 3 * wide * high);
+    (colors.chunks(3).map(|color| color[1]).collect(), wide, high)
+}
+
+fn textured(folder: &Path, product: Product, texel_m: f64) -> Product {
+    let path = folder.join("board.tif");
+    checkerboard(&path);
+    let ends = [[505_000.0, 3_875_000.0], [506_000.0, 3_875_500.0]];
+    let textures = Textures::open(&[path], product.crs(), ends, Some(texel_m), 4096).unwrap();
+    Product { textures: Some(Arc::new(textures)), ..product }
+}
+
+#[test]
+fn a_checkerboard_lies_on_the_ground_where_it_lies_in_its_photo() {
+    let folder = tempfile::tempdir().unwrap();
+    let bytes = glb(&textured(folder.path(), samples::product(), 1.0));
+    let (document, binary) = document(&bytes);
+    let view = &document["bufferViews"][number(&document["images"][0]["bufferView"])];
+    let start = number(&view["byteOffset"]);
+    let (texels, wide, high) = decoded(&binary[start..start + number(&view["byteLength"])]);
+    assert_eq!((wide, high), (1001, 501), "one texel on each metre, the borders among them");
+    assert_eq!(document["samplers"][0]["wrapS"], 33071);
+    let mut seen = 0;
+    for mesh in document["meshes"].as_array().unwrap() {
+        for primitive in mesh["primitives"].as_array().unwrap() {
+            let material = &document["materials"][number(&primitive["material"])]["pbrMetallicRoughness"];
+            assert_eq!(material["baseColorTexture"]["index"], 0);
+            let read = |name: &str| accessor(&document, binary, &primitive["attributes"][name]);
+            let (places, uvs) = (read("POSITION"), read("TEXCOORD_0"));
+            let indices: Vec<usize> =
+                accessor(&document, binary, &primitive["indices"]).iter().map(|index| index[0] as usize).collect();
+            for corners in indices.as_chunks::<3>().0 {
+                for (a, b) in (1..40).flat_map(|a| (1..40 - a).map(move |b| (f64::from(a) / 40.0, f64::from(b) / 40.0)))
+                {
+                    let blend = |of: &[Vec<f64>], part: usize| {
+                        let [p, q, r] = corners.map(|corner| of[corner][part]);
+                        p + a * (q - p) + b * (r - p)
+                    };
+                    let [east, north] = [blend(&places, 0), -blend(&places, 2)];
+                    let from_edge = |at: f64| (at % 20.0).min(20.0 - at % 20.0);
+                    if from_edge(east).min(from_edge(north)) < 2.0 {
+                        continue;
+                    }
+                    let [col, row] = [blend(&uvs, 0) * wide as f64, blend(&uvs, 1) * high as f64].map(|at| at as usize);
+                    let is_light = ((east / 20.0) as usize + (north / 20.0) as usize) % 2 == 1;
+                    assert_eq!(128 < texels[row * wide + col], is_light, "{east} {north} {col} {row}");
+                    seen += 1;
+                }
+            }
+        }
+    }
+    assert!(2000 < seen, "{seen}");
+}
+
+#[test]
+fn textures_of_neighbours_agree_on_their_border_and_hold_to_a_size() {
+    let folder = tempfile::tempdir().unwrap();
+    let product = textured(folder.path(), samples::product(), 1.0);
+    let of = |west: u32| ModuleRect { south: 0, west, north: 1, east: west + 1 };
+    let texture = |rect: ModuleRect, texel_m: f64| decoded(&product.texture(rect, texel_m).unwrap().unwrap().jpeg);
+    let ((west, wide, high), (east, _, _)) = (texture(of(0), 0.0), texture(of(1), 0.0));
+    assert_eq!((wide, high), (501, 501));
+    let off = (0..high).map(|row| west[row * wide + wide - 1].abs_diff(east[row * wide])).max().unwrap();
+    assert!(off < 40, "{off}, of 215 between dark and light");
+    // Texels of 3 m do not divide a load module of 500 m: they are a little larger.
+    assert_eq!(texture(of(0), 3.0).1, 167);
+    assert_eq!(texture(product.rect, 700.0).1, 3);
+    let tiles = files(|put, work| crate::write_3dtiles(&product, None, put, work).map(|_| ()));
+    let (document, _) = document(&tiles["groups/r0000c0000_r0000c0001.glb"]);
+    assert_eq!(document["images"][0]["mimeType"], "image/jpeg");
+    let same = files(|put, work| crate::write_3dtiles(&product, None, put, work).map(|_| ()));
+    assert!(tiles == same);
 }

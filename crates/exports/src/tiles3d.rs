@@ -2,12 +2,11 @@
 //! glTF. A group is halved until it has no more triangles than a viewer likes to load at once. Triangles over holes are
 //! left out, and in the coarse mesh load modules that are holes for more than half.
 //!
-//! Where load modules have coarser levels, those of a square are a mesh between the two, level by level.
-//! Decks and objects are nodes of their own in the files of groups and levels; the coarse mesh of a square has none, and
-//! one class.
-//! Every square has a frame of its own, so that 32-bit floats are fine to a fraction of a millimetre. A geometric error
-//! is measured: of a square, how far its load modules lie from it; of a level in it and of a group, the largest
-//! residual.
+//! Where load modules have coarser levels, those of a square are a mesh between the two, level by level. Decks and
+//! objects are nodes of their own in the files of groups and levels; the coarse mesh of a square has none, and one
+//! class. Every square has a frame of its own, so that 32-bit floats are fine to a fraction of a millimetre. A
+//! geometric error is measured: of a square, how far its load modules lie from it; of a level in it and of a group, the
+//! largest residual.
 
 use std::collections::BTreeMap;
 use std::sync::{Mutex, PoisonError};
@@ -23,7 +22,7 @@ use crate::globe::{Globe, LocalFrame};
 use crate::mesh::{Mesh, Part};
 use crate::modules::{group_name, sheet_name};
 use crate::openflight::{square_name, square_side};
-use crate::{Datum, ExportError, Product, Put, Sheet, Work};
+use crate::{Datum, ExportError, Product, Put, Sheet, Texture, Work};
 
 /// Writes `tileset.json`, `squares/*.glb`, `groups/*.glb` and, for coarser levels, `levels/K/*.glb`. `assumed` is what
 /// to take heights to be above; else the database says it. Returns what was done to heights.
@@ -194,7 +193,8 @@ impl Layers {
         for (layer, parts) in self.layers.iter().zip(&parts).skip(1) {
             let name = square_name(&layer.product, rect, "glb");
             let uri = format!("levels/{}/{name}", layer.product.level);
-            take(&uri, &|| layer.gltf(&frame, rect, parts).bytes())?;
+            let texture = layer.product.texture(rect, layer.error_m(rect))?;
+            take(&uri, &|| layer.gltf(&frame, rect, parts, texture.clone()).bytes())?;
             // What is coarser is never said to be truer, or a viewer would not go on to the finer.
             error_m = error_m.max(layer.error_m(rect));
             let mut level = json!({
@@ -215,11 +215,12 @@ impl Layers {
         put_children(&mut tile, children);
         if !coarse.triangles.is_empty() {
             let uri = format!("squares/{}", square_name(&finest.product, rect, "glb"));
+            let texture = finest.product.texture(rect, coarse.error_m)?;
             take(&uri, &|| {
                 let classes = vec![0; coarse.triangles.len()];
-                let node = finest.node(&frame, group_name(rect), &coarse.vertices);
+                let node = finest.node(&frame, group_name(rect), &coarse.vertices, texture.as_ref());
                 let nodes = vec![node.with_groups(&coarse.triangles, &classes)];
-                Gltf { sheets: vec![(Sheet::Ground, nodes)], ..Gltf::default() }.bytes()
+                Gltf { sheets: vec![(Sheet::Ground, nodes)], texture: texture.clone(), ..Gltf::default() }.bytes()
             })?;
             tile["content"] = json!({ "uri": uri });
         }
@@ -246,13 +247,16 @@ type Parts = Vec<(Sheet, Part)>;
 
 impl Layer {
     /// The sheets of a rectangle, each a node where there is any.
-    fn gltf(&self, frame: &LocalFrame, rect: ModuleRect, parts: &Parts) -> Gltf<'_> {
+    fn gltf(&self, frame: &LocalFrame, rect: ModuleRect, parts: &Parts, texture: Option<Texture>) -> Gltf<'_> {
         let node = |(sheet, part): &(Sheet, Part)| {
             let features = (*sheet == Sheet::Objects).then(|| FoundFeatures::of(part));
-            let node = GltfNode { features, ..self.node(frame, sheet_name(*sheet, rect), &part.vertices) };
+            let texture = texture.as_ref().filter(|_| *sheet != Sheet::Objects);
+            let node = self.node(frame, sheet_name(*sheet, rect), &part.vertices, texture);
+            let node = GltfNode { features, ..node };
             (*sheet, vec![node.with_groups(&part.triangles, &part.classes)])
         };
-        Gltf { sheets: parts.iter().map(node).collect(), classes: self.product.classes(), ..Gltf::default() }
+        let sheets = parts.iter().map(node).collect();
+        Gltf { sheets, classes: self.product.classes(), texture, ..Gltf::default() }
     }
 
     /// Hands out a file for each group of load modules of a square; their tiles.
@@ -270,7 +274,8 @@ impl Layer {
                 continue;
             }
             let uri = format!("groups/{}.glb", group_name(rect));
-            take(&uri, &|| self.gltf(frame, rect, &parts).bytes())?;
+            let texture = self.product.texture(rect, 0.0)?;
+            take(&uri, &|| self.gltf(frame, rect, &parts, texture.clone()).bytes())?;
             tiles.push(json!({
                 "boundingVolume": { "box": box_around(self.places(frame, &parts)) },
                 "geometricError": self.error_m(rect),
@@ -293,13 +298,14 @@ impl Layer {
     }
 
     /// Vertices of the mesh in a frame.
-    fn node(&self, frame: &LocalFrame, name: String, vertices: &[u32]) -> GltfNode {
+    fn node(&self, frame: &LocalFrame, name: String, vertices: &[u32], texture: Option<&Texture>) -> GltfNode {
         let place = |&v: &u32| turned(frame.local(self.globe.place[v as usize]));
         let normal = |&v: &u32| turned(frame.turned(self.globe.normal[v as usize]));
         GltfNode {
             name,
             positions: vertices.iter().map(place).collect(),
             normals: vertices.iter().map(normal).collect(),
+            uvs: texture.map(|texture| self.mesh.uvs(texture, vertices)).unwrap_or_default(),
             ..GltfNode::default()
         }
     }

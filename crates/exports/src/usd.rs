@@ -2,7 +2,8 @@
 //!
 //! Points of a tile are counted from its own south-west corner and are whole 1/128 m, which a 32-bit float holds
 //! exactly; the area's file moves each tile to its place. Ground, decks and objects are meshes of triangles, all but
-//! ribbons and woods with a collision schema; classes are subsets of faces with materials. Triangles over holes are left out.
+//! ribbons and woods with a collision schema; classes are subsets of faces with materials. Triangles over holes are
+//! left out.
 
 use std::fmt::Write as _;
 

@@ -1,11 +1,12 @@
 //! `tiefort export`: a finished database in another program's format.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use build::CompileError;
 use build::product::{BuiltFrom, Opened, read_told};
 use clap::{Args, ValueEnum};
-use exports::{Block, CARRIES, Carries, Datum, ExportError, Facts, Levels, Mesh, Product, Work};
+use exports::{Block, CARRIES, Carries, Datum, ExportError, Facts, Levels, Mesh, Product, Textures, Work};
 use job::Job;
 use store::Folder;
 use terrain::{ModuleId, PostRect};
@@ -92,6 +93,16 @@ pub struct Arguments {
     /// Another name for a material, once for each: primary=asphalt, building_wall=plaster
     #[arg(long = "material", value_name = "MATERIAL=NAME", value_parser = material)]
     materials: Vec<(String, String)>,
+    /// Orthophotos that the ground is seen with, later ones above earlier: GeoTIFF in any system; for glb, obj, 3dtiles
+    /// and 3tz
+    #[arg(long, value_name = "FILE", num_args = 1..)]
+    imagery: Vec<PathBuf>,
+    /// Metres of a texel, or more where its texture would be too large [default: that of the finest orthophoto]
+    #[arg(long, value_name = "M", value_parser = texel_m, requires = "imagery")]
+    texel_m: Option<f64>,
+    /// Texels along a side of a texture at most
+    #[arg(long, value_name = "N", default_value_t = 4096, value_parser = clap::value_parser!(u16).range(16..=16384))]
+    texture_max: u16,
     #[command(flatten)]
     workers: Workers,
     /// Print errors only
@@ -176,6 +187,11 @@ fn block(text: &str) -> Result<Block, String> {
     let wrong = |_| "expected ROW,COL..ROW,COL, the south-west and the north-east load module, such as 2,3..5,7";
     let (south_west, north_east) = text.split_once("..").unwrap_or((text, text));
     Ok(Block { south_west: module(south_west).map_err(wrong)?, north_east: module(north_east).map_err(wrong)? })
+}
+
+fn texel_m(text: &str) -> Result<f64, String> {
+    let metres = text.parse().ok().filter(|metres: &f64| (0.001..=1e6).contains(metres));
+    metres.ok_or_else(|| "expected metres, such as 0.5".to_owned())
 }
 
 fn material(text: &str) -> Result<(String, String), String> {
@@ -273,6 +289,11 @@ fn check(arguments: &Arguments) -> Result<(), Failure> {
             "leave --assume-datum out; only 3dtiles, 3tz, quantized-mesh and mbtiles need it",
         ));
     }
+    let has_textures = matches!(arguments.format, Format::Glb | Format::Obj | Format::Tiles3d | Format::Archive);
+    if !arguments.imagery.is_empty() && !has_textures {
+        let message = "found --imagery with a format that has no textures, expected glb, obj, 3dtiles or 3tz";
+        return Err(Failure::new(message, "leave --imagery out, or choose one of these formats"));
+    }
     let is_heightmap = arguments.format == Format::Heightmap;
     if !is_heightmap && (arguments.size.is_some() || arguments.engine != HeightmapEngine::Unreal) {
         let message = "found --size or --engine with another format than heightmap, expected none";
@@ -311,6 +332,7 @@ fn export(arguments: &Arguments, work: &Work) -> Result<String, Failure> {
     let mut product = Product::read(&arguments.database, arguments.modules, levels(arguments), work)?;
     product.has_ribbons = arguments.ribbons;
     product.name_materials(arguments.materials.clone())?;
+    open_imagery(arguments, &mut product)?;
     match arguments.format {
         Format::Ply | Format::Obj | Format::Glb => write_mesh(arguments, &product)?,
         Format::Geotiff => write_raster(arguments, &product, work)?,
@@ -337,6 +359,19 @@ fn export(arguments: &Arguments, work: &Work) -> Result<String, Failure> {
         folder.finish()?;
     }
     Ok(summary(arguments.format, &product, said))
+}
+
+/// Lays orthophotos over what is exported, where some are named.
+fn open_imagery(arguments: &Arguments, product: &mut Product) -> Result<(), Failure> {
+    if arguments.imagery.is_empty() {
+        return Ok(());
+    }
+    let rect = product.rect;
+    let ends = [product.corner_m(rect.south, rect.west), product.corner_m(rect.north, rect.east)];
+    let most = usize::from(arguments.texture_max);
+    let textures = Textures::open(&arguments.imagery, product.crs(), ends, arguments.texel_m, most)?;
+    product.textures = Some(Arc::new(textures));
+    Ok(())
 }
 
 /// What was exported, in words; `said` is what was done to heights.
@@ -429,14 +464,21 @@ fn write_mesh(arguments: &Arguments, product: &Product) -> Result<(), Failure> {
         Format::Glb => Facts::y_up(product),
         _ => Facts::z_up(product, coordinates),
     };
-    let materials = exports::obj_materials(product, &mesh).filter(|_| arguments.format == Format::Obj);
+    let texture = product.texture(product.rect, 0.0)?;
+    let photo = arguments.out.with_extension("jpg");
+    let photo_name = texture.as_ref().and(photo.file_name()).map(|name| name.to_string_lossy().into_owned());
+    let is_obj = arguments.format == Format::Obj;
+    let materials = exports::obj_materials(product, &mesh, photo_name.as_deref()).filter(|_| is_obj);
     let beside_it = arguments.out.with_extension("mtl");
     let library = materials.as_ref().and(beside_it.file_name()).map(|name| name.to_string_lossy().into_owned());
     files::write_whole(&arguments.out, |out| match arguments.format {
-        Format::Obj => exports::write_obj(out, product, &mesh, coordinates, library.as_deref()),
-        Format::Glb => exports::write_glb(out, product, &mesh),
+        Format::Obj => exports::write_obj(out, product, &mesh, coordinates, library.as_deref(), texture.as_ref()),
+        Format::Glb => exports::write_glb(out, product, &mesh, texture.clone()),
         _ => exports::write_ply(out, product, &mesh, coordinates),
     })?;
+    if let Some(texture) = texture.filter(|_| is_obj) {
+        files::write_whole(&photo, |out| std::io::Write::write_all(out, &texture.jpeg))?;
+    }
     if let Some(text) = materials {
         files::write_whole(&beside_it, |out| std::io::Write::write_all(out, text.as_bytes()))?;
     }

@@ -1,0 +1,143 @@
+//! Textures from orthophotos: one for each unit that a program loads, seen straight from above.
+
+use std::fmt;
+use std::path::PathBuf;
+
+use crate::ExportError;
+use source_files::{Crs, Imagery, Keep, SourceError, Square};
+
+/// Bytes of decoded strips and tiles that are kept.
+const KEPT_BYTES_MAX: usize = 256 << 20;
+/// Sides of what a picture draws at once are multiples of this.
+const SIDE_STEP: usize = 16;
+/// Quality of a texture as JPEG, of 100.
+const QUALITY: u8 = 90;
+
+/// Orthophotos laid over a product, later ones above earlier.
+pub struct Textures {
+    pictures: Vec<Imagery>,
+    crs: Crs,
+    keep: Keep,
+    texel_m: f64,
+    side_max: usize,
+}
+
+impl fmt::Debug for Textures {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} pictures, a texel of {} m", self.pictures.len(), self.texel_m)
+    }
+}
+
+/// Where load modules lie that have a texture.
+pub(crate) struct Place {
+    /// South-west corner of what is exported.
+    pub origin_m: [f64; 2],
+    /// South-west and north-east corner of the load modules.
+    pub low_m: [f64; 2],
+    pub high_m: [f64; 2],
+    /// Side of one.
+    pub module_m: f64,
+    /// The colour where no picture is.
+    pub below: [u8; 3],
+}
+
+/// The texture of some load modules: its outermost texels have their middles on the borders of these, so that those
+/// of two units beside each other have the same.
+#[derive(Clone, Debug)]
+pub struct Texture {
+    /// Its file.
+    pub jpeg: Vec<u8>,
+    /// West and north of its north-western corner, in metres from the south-west corner of what is exported.
+    corner_m: [f64; 2],
+    size_m: [f64; 2],
+}
+
+impl Texture {
+    /// Where a place lies in it: from its western and from its northern side, as shares of its size.
+    pub(crate) fn uv(&self, [east, north]: [f64; 2]) -> [f32; 2] {
+        [(east - self.corner_m[0]) / self.size_m[0], (self.corner_m[1] - north) / self.size_m[1]]
+            .map(|share| share as f32)
+    }
+}
+
+impl Textures {
+    /// Opens the pictures for ground from `low` to `high` of a coordinate system. A texel is that of the finest of
+    /// them unless it is given; no texture has more texels along a side than `side_max`.
+    ///
+    /// # Errors
+    /// When one is no picture that can be drawn, or lies nowhere in what is exported.
+    pub fn open(
+        paths: &[PathBuf],
+        crs: &str,
+        [low, high]: [[f64; 2]; 2],
+        texel_m: Option<f64>,
+        side_max: usize,
+    ) -> Result<Self, ExportError> {
+        let crs = Crs::named(crs).map_err(|found| ExportError::Impossible {
+            what: format!("the coordinate system {crs}"),
+            found,
+            expected: "one that pictures are brought to".into(),
+            hint: "leave --imagery out".into(),
+        })?;
+        let opened = paths.iter().enumerate().map(|(id, path)| Imagery::open(path, id));
+        let pictures: Vec<Imagery> = opened.collect::<Result<_, _>>().map_err(of_source)?;
+        if let Some(at) = pictures.iter().position(|picture| !picture.reaches(&crs, low, high)) {
+            return Err(ExportError::Impossible {
+                what: paths[at].display().to_string(),
+                found: "a picture that lies elsewhere".into(),
+                expected: "one that reaches into what is exported".into(),
+                hint: "check its coordinate system with gdalinfo, or name a picture of this area".into(),
+            });
+        }
+        let middle = [0, 1].map(|axis| f64::midpoint(low[axis], high[axis]));
+        let own = pictures.iter().filter_map(|picture| picture.pixel_m(&crs, middle)).fold(f64::INFINITY, f64::min);
+        let texel_m = texel_m.unwrap_or(if own.is_finite() { own } else { 1.0 });
+        Ok(Self { pictures, crs, keep: Keep::new(KEPT_BYTES_MAX), texel_m, side_max })
+    }
+
+    /// The texture of the load modules of a rectangle, with texels no finer than `texel_m`.
+    pub(crate) fn of(&self, place: &Place, texel_m: f64) -> Result<Texture, ExportError> {
+        let &Place { origin_m, low_m, high_m, module_m, below } = place;
+        let sides = [0, 1].map(|axis| high_m[axis] - low_m[axis]);
+        let texel_m = self.texel_m(module_m, sides[0].max(sides[1]), texel_m);
+        let texels = sides.map(|side| (side / texel_m - 1e-9).ceil() as usize + 1);
+        let side = texels[0].max(texels[1]).next_multiple_of(SIDE_STEP);
+        let corner = [low_m[0] - texel_m / 2.0, high_m[1] + texel_m / 2.0];
+        let square = Square { crs: &self.crs, corner, pixel_m: texel_m, side };
+        let mut pixels = vec![0; 4 * side * side];
+        for picture in &self.pictures {
+            picture.draw(&square, &self.keep, &mut pixels).map_err(of_source)?;
+        }
+        let opaque = |pixel: &[u8; 4]| {
+            // Colours come multiplied with how opaque they are; the ground shows where none is.
+            let rest = 255 - u32::from(pixel[3]);
+            [0, 1, 2].map(|part| (u32::from(pixel[part]) + u32::from(below[part]) * rest / 255).min(255) as u8)
+        };
+        let rows = pixels.chunks_exact(4 * side).take(texels[1]);
+        let colors: Vec<u8> = rows.flat_map(|row| row[..4 * texels[0]].as_chunks::<4>().0).flat_map(opaque).collect();
+        Ok(Texture {
+            jpeg: jpeg(&colors, texels)?,
+            corner_m: [0, 1].map(|axis| corner[axis] - origin_m[axis]),
+            size_m: texels.map(|count| count as f64 * texel_m),
+        })
+    }
+
+    /// The finest texel that a texture of so many metres may have: load modules have a whole number of them.
+    fn texel_m(&self, module_m: f64, longest_m: f64, texel_m: f64) -> f64 {
+        let least = texel_m.max(self.texel_m).max(longest_m / (self.side_max - 1) as f64);
+        // Rounded down, a module has fewer texels, each of them longer.
+        if least <= module_m { module_m / (module_m / least + 1e-9).floor() } else { least }
+    }
+}
+
+fn jpeg(colors: &[u8], [wide, high]: [usize; 2]) -> Result<Vec<u8>, ExportError> {
+    let mut bytes = Vec::new();
+    let encoder = jpeg_encoder::Encoder::new(&mut bytes, QUALITY);
+    let made = encoder.encode(colors, wide as u16, high as u16, jpeg_encoder::ColorType::Rgb);
+    made.map_err(|error| ExportError::write("texture")(std::io::Error::other(error)))?;
+    Ok(bytes)
+}
+
+fn of_source(error: SourceError) -> ExportError {
+    ExportError::Ground { message: error.to_string(), hint: None }
+}
