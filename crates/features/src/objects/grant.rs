@@ -271,12 +271,18 @@ impl<'a> Room<'a> {
     /// Takes what these parts cost, or nothing where one of them does not fit.
     fn take(&mut self, costs: &[([i32; 2], u32)]) -> Result<(), Full> {
         let mut of_windows: BTreeMap<[i32; 2], u64> = BTreeMap::new();
+        // What crosses the side of a load module may have several parts in it.
+        let mut of_modules: BTreeMap<[i32; 2], (u64, usize)> = BTreeMap::new();
         for &(module, cost) in costs {
+            let (sum, parts) = of_modules.entry(module).or_default();
+            (*sum, *parts) = (*sum + u64::from(cost), *parts + 1);
+            self.windows_over(module).for_each(|window| *of_windows.entry(window).or_default() += u64::from(cost));
+        }
+        for (module, (cost, parts)) in of_modules {
             let index = self.index(module);
-            if self.modules[index] < cost || PRISMS_MAX as u32 <= self.prisms[index] {
+            if u64::from(self.modules[index]) < cost || PRISMS_MAX < self.prisms[index] as usize + parts {
                 return Err(Full::Module(module));
             }
-            self.windows_over(module).for_each(|window| *of_windows.entry(window).or_default() += u64::from(cost));
         }
         let full = of_windows.iter().find(|(window, cost)| u64::from(self.windows[self.index(**window)]) < **cost);
         if let Some((&window, _)) = full {

@@ -79,6 +79,20 @@ fn what_hides_least_goes_first_and_whole() {
 }
 
 #[test]
+fn what_has_several_pieces_in_a_load_module_costs_all_of_them_there() {
+    // Open to the east, both of its wings reach over the side of a load module: 7 polygons, and twice 4 beyond it.
+    let ring = [[480, 100], [520, 100], [520, 110], [490, 110], [490, 130], [520, 130], [520, 140], [480, 140]];
+    let ring = ring.into_iter().cycle().take(9).map(|at: [i32; 2]| at.map(f64::from)).collect();
+    let found = object("house", &[("building", "yes")], FoundShape::Polygon(vec![ring]));
+    for (per_module, kept) in [(7, 0), (8, 1)] {
+        let limits = ObjectLimits { per_module, ..LIMITS };
+        let granted = objects(vec![found.clone()], &OPTIONS, &limits, SIDE);
+        assert_eq!(granted.kinds[&ObjectKind::Building][0].count, kept, "{per_module}");
+        assert_eq!(granted.left_out.first().map(|left| left.full), (kept == 0).then_some(grant::Full::Module([0, 1])));
+    }
+}
+
+#[test]
 fn bad_outlines_are_mended_or_left_out_and_told() {
     let bow = [[0.0, 0.0], [20.0, 20.0], [20.0, 0.0], [0.0, 20.0], [0.0, 0.0]];
     let flat = vec![[0.0, 0.0], [20.0, 0.0], [40.0, 0.0], [0.0, 0.0]];
