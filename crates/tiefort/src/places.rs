@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use load_module_reader::{Area, AreaFrame, Block, Keep, LoadedGround, ReadError};
+use load_module_reader::{Area, AreaFrame, Block, Keep, LoadedGround, ReadError, Standing};
 
 use crate::failure::{Cause, Failure};
 
@@ -24,6 +24,16 @@ pub fn place_above(text: &str) -> Result<[f64; 3], String> {
         None => {
             Err("expected EAST,NORTH,ABOVE in metres, the last above the ground, such as 521000,3893000,2.5".into())
         }
+    }
+}
+
+/// Reads which objects are looked at.
+pub fn standing(text: &str) -> Result<Standing, String> {
+    match text {
+        "none" => Ok(Standing::None),
+        "buildings" => Ok(Standing::Buildings),
+        "all" => Ok(Standing::All),
+        _ => Err("expected none, buildings or all".into()),
     }
 }
 

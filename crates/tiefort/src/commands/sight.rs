@@ -72,7 +72,7 @@ pub struct Arguments {
     #[arg(long, value_name = "K", value_parser = refraction, requires = "curvature")]
     refraction: Option<f64>,
     /// What stands on the ground and is looked at: none, buildings (with walls), or all
-    #[arg(long, value_name = "WHICH", value_parser = standing, default_value = "all")]
+    #[arg(long, value_name = "WHICH", value_parser = places::standing, default_value = "all")]
     objects: Standing,
     /// With --range: whether what it looks at stands on the ground or on roofs
     #[arg(long, value_name = "WHERE", value_parser = ["ground", "roof"], default_value = "ground",
@@ -89,15 +89,6 @@ fn not_negative(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(number) if number.is_finite() && 0.0 <= number => Ok(number),
         _ => Err("expected 0 or a number above it".into()),
-    }
-}
-
-fn standing(text: &str) -> Result<Standing, String> {
-    match text {
-        "none" => Ok(Standing::None),
-        "buildings" => Ok(Standing::Buildings),
-        "all" => Ok(Standing::All),
-        _ => Err("expected none, buildings or all".into()),
     }
 }
 

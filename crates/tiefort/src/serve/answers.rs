@@ -24,7 +24,8 @@ use super::body::{Bodies, Received};
 use super::contents::TileModulesFile;
 use super::files::{self, Part};
 use super::globe::Kind;
-use super::queries::{Heights, Lines, RawQuery};
+use super::looks::{ObstacleAsked, ProfileAsked, ViewshedAsked};
+use super::queries::{Heights, HeightsAsked, Lines, Looking};
 use super::refusal::Refusal;
 use super::snapshot::{Served, Snapshot};
 use crate::arguments::row_col;
@@ -139,6 +140,9 @@ fn described(name: &str, snapshot: &Snapshot) -> Value {
             "modules": at("modules"),
             "heights": at("heights"),
             "line_of_sight": at("line-of-sight"),
+            "viewshed": at("viewshed"),
+            "profile": at("profile"),
+            "obstacle": at("obstacle"),
             "explain": at("explain"),
         },
     })
@@ -317,7 +321,7 @@ fn one_module(snapshot: &Snapshot, of_tile: &TileModulesFile, id: ModuleId, head
 pub async fn heights(
     State(shared): Context,
     UrlPath(name): UrlPath<String>,
-    Query(query): Query<RawQuery>,
+    Query(query): Query<HeightsAsked>,
     request: Request,
 ) -> Answer {
     numbers(&shared, &name, request, move |body| Heights::of(body, query), Heights::answer).await
@@ -326,7 +330,7 @@ pub async fn heights(
 pub async fn line_of_sight(
     State(shared): Context,
     UrlPath(name): UrlPath<String>,
-    Query(query): Query<RawQuery>,
+    Query(query): Query<Looking>,
     request: Request,
 ) -> Answer {
     numbers(&shared, &name, request, move |body| Lines::of(body, query), Lines::answer).await
@@ -349,6 +353,43 @@ async fn numbers<T: 'static>(
         Ok(([(header::CONTENT_TYPE, kind)], answer).into_response())
     };
     at_a_place(&shared.queries, look).await
+}
+
+pub async fn viewshed(
+    State(shared): Context,
+    UrlPath(name): UrlPath<String>,
+    Query(asked): Query<ViewshedAsked>,
+) -> Answer {
+    let served = shared.named(&name)?;
+    let look = move || served.ask(|snapshot| asked.answer(snapshot));
+    let seen = at_a_place(&shared.queries, look).await?;
+    Ok(([(header::CONTENT_TYPE, "application/octet-stream")], seen).into_response())
+}
+
+pub async fn profile(
+    State(shared): Context,
+    UrlPath(name): UrlPath<String>,
+    Query(asked): Query<ProfileAsked>,
+) -> Answer {
+    value(&shared, &name, move |snapshot| asked.answer(snapshot)).await
+}
+
+pub async fn obstacle(
+    State(shared): Context,
+    UrlPath(name): UrlPath<String>,
+    Query(asked): Query<ObstacleAsked>,
+) -> Answer {
+    value(&shared, &name, move |snapshot| asked.answer(snapshot)).await
+}
+
+/// What `ask` says, as JSON.
+async fn value(
+    shared: &Shared,
+    name: &str,
+    ask: impl Fn(&Snapshot) -> Result<Value, Refusal> + Send + 'static,
+) -> Answer {
+    let served = shared.named(name)?;
+    Ok(json_answer(&at_a_place(&shared.queries, move || served.ask(ask)).await?))
 }
 
 /// What may stand behind the question mark of `explain`.

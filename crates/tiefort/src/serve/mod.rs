@@ -5,7 +5,7 @@
 //!   routes        address to answer; packing, other origins, refusals in JSON
 //!   answers       what each address answers, from a
 //!   snapshot      database as one build left it: opened again when its record changed   (contents)
-//!   ground        load modules in memory, for queries       (queries, body)
+//!   ground        load modules in memory, for queries       (queries, body, looks)
 //!   globe         terrain and 3D Tiles, file by file        (files)
 //!   openapi, pages   what can be asked                     (paths)
 //!   report_page   what a browser shows where no viewer is built in
@@ -19,6 +19,7 @@ mod contents;
 pub mod files;
 mod globe;
 mod ground;
+mod looks;
 mod openapi;
 mod page;
 mod pages;

@@ -57,6 +57,9 @@ pub fn document() -> Value {
             paths::MODULE: { "get": module() },
             paths::HEIGHTS: { "post": heights() },
             paths::SIGHT: { "post": line_of_sight() },
+            paths::VIEWSHED: { "get": viewshed() },
+            paths::PROFILE: { "get": profile() },
+            paths::OBSTACLE: { "get": obstacle() },
             paths::EXPLAIN: { "get": explain() },
         },
     })
@@ -159,6 +162,7 @@ fn heights() -> Value {
                 "positions": list(numbers(2), "east and north"),
                 "level": { "type": "integer", "minimum": 0 },
                 "ceiling": { "type": "number", "description": ceiling },
+                "objects": { "enum": ["none", "buildings", "all"], "default": "none", "description": TOPS },
             },
         },
         "example": { "positions": [[530125.0, 3899310.5], [530150.0, 3899310.5]], "level": 0 },
@@ -166,14 +170,21 @@ fn heights() -> Value {
     let answer = json!({
         "schema": {
             "type": "object",
-            "properties": { "heights": list(json!({ "type": ["number", "null"] }), "null outside the area") },
+            "properties": {
+                "heights": list(json!({ "type": ["number", "null"] }), "null outside the area"),
+                "top_of": list(json!({ "type": ["string", "null"] }), "with objects: what each belongs to"),
+            },
         },
     });
     query(
         "Heights at positions",
         "Numbers in JSON are finite, and a height is null outside the area. A raw position that is not a number, \
          infinite or outside is answered with NaN.",
-        &[level(), in_query("ceiling", "number", &format!("with raw numbers: {ceiling}"))],
+        &[
+            level(),
+            in_query("ceiling", "number", &format!("with raw numbers: {ceiling}")),
+            in_query("objects", "string", &format!("with raw numbers: {TOPS}")),
+        ],
         body,
         [
             "little-endian 64-bit floats, two for each position: east, north",
@@ -193,9 +204,12 @@ fn line_of_sight() -> Value {
             "properties": {
                 "lines": list(numbers(6), "from, then to"),
                 "level": { "type": "integer", "minimum": 0 },
+                "objects": { "enum": ["all", "buildings", "none"], "default": "all", "description": OBJECTS },
+                "above_ground": { "type": "boolean", "default": false, "description": ABOVE_GROUND },
+                "curvature": { "type": "boolean", "default": false, "description": CURVATURE },
             },
         },
-        "example": { "lines": [[530125.0, 3899310.5, 720.0, 531600.0, 3899700.0, 715.0]] },
+        "example": { "lines": [[530125.0, 3899310.5, 720.0, 531600.0, 3899700.0, 715.0]], "objects": "all" },
     });
     let or_null = |of: &str, description: &str| json!({ "type": [of, "null"], "description": description });
     let answer = json!({
@@ -205,8 +219,13 @@ fn line_of_sight() -> Value {
                 "type": "object",
                 "properties": {
                     "visible": or_null("boolean", "null where it leaves the area before anything blocks it"),
-                    "blocked_at": or_null("number", "share of the line at which something first stands in its way"),
+                    "blocked_at": or_null("number", "share of the line at which it ends: at something, or in woods \
+                        where less than half of the light is left"),
                     "blocker": or_null("array", "east, north and height of the line there"),
+                    "hidden_by": or_null("string", "what it ends at: ground, deck, building, wood or row"),
+                    "transmission": or_null("number", "share of light that woods leave on the way"),
+                    "wood_m": or_null("number", "metres of the line inside woods"),
+                    "ends": list(numbers(3), "with above_ground: east, north and height of both ends"),
                     "clearance_m": or_null("number", "least height above the ground, below 0 where blocked"),
                 },
             }), "in the order of the lines") },
@@ -214,15 +233,104 @@ fn line_of_sight() -> Value {
     });
     query(
         "Lines of sight",
-        "Ground and decks stand in the way. Heights are above the area's vertical datum.",
-        &[level()],
+        "Ground and decks stand in the way, and buildings, walls and woods where the database has some. Heights are \
+         above the area's vertical datum, unless above_ground says otherwise.",
+        &[
+            level(),
+            in_query("objects", "string", OBJECTS),
+            in_query("above_ground", "boolean", ABOVE_GROUND),
+            in_query("curvature", "boolean", CURVATURE),
+        ],
         body,
         [
             "little-endian 64-bit floats, six for each line",
-            "little-endian 64-bit floats, three for each line: 1 visible, 0 not, NaN unknown; share of the line at \
-             which it is blocked; least height above the ground in metres; NaN where there is none",
+            "little-endian 64-bit floats, five for each line: 1 visible, 0 not, NaN unknown; share of the line at \
+             which it is blocked; least height above the ground in metres; what hides it, 0 ground, 1 deck, 2 \
+             building, 3 wood, 4 row; share of light that woods leave; NaN where there is none",
         ],
         answer,
+    )
+}
+
+const OBJECTS: &str = "which objects are looked at: all, buildings (with walls) or none";
+const TOPS: &str = "of what heights are: none, the ground; buildings, the highest of ground, decks and roofs; all, \
+    with the tops of woods and rows";
+const ABOVE_GROUND: &str = "whether heights of both ends are metres above the ground";
+const CURVATURE: &str = "whether the earth falls away as it does, and air bends light";
+
+/// A question by address; parameters are name, kind, description and an example where it has to be there.
+fn asked(summary: &str, description: &str, kind: (&str, &str), query: &[(&str, &str, &str, Option<&str>)]) -> Value {
+    let mut operation = get(summary, description, &["database"], &[kind]);
+    if let Some(parameters) = operation["parameters"].as_array_mut() {
+        for (name, kind, description, example) in query {
+            let mut parameter = in_query(name, kind, description);
+            if let Some(example) = example {
+                parameter["required"] = true.into();
+                parameter["example"] = (*example).into();
+            }
+            parameters.push(parameter);
+        }
+    }
+    operation["responses"]["400"] = json!({ "description": "what cannot be asked: error says why" });
+    operation["responses"]["422"] = json!({ "description": "more load modules than are read for one answer" });
+    operation
+}
+
+fn viewshed() -> Value {
+    asked(
+        "What is seen around a place",
+        "As `tiefort sight --range`. What is hidden by ground, decks or objects, or is left less than half of the \
+         light by woods, is not seen.",
+        (
+            "application/octet-stream",
+            "little-endian: places along a side (u32), metres between them (f32); then row by row from the north, west \
+             to east, 1 seen, 0 hidden, 255 not looked at (u8); then, in the same order, per cent of the light that is \
+             left, 255 not looked at (u8); the eye is in the middle",
+        ),
+        &[
+            ("from", "string", "EAST,NORTH,ABOVE of the eye, the last above the ground", Some("530125,3899310,2.5")),
+            ("range_m", "number", "how far it sees", Some("5000")),
+            ("target_m", "number", "metres above the ground of what it looks at; else 0", None),
+            ("spacing_m", "number", "metres between places; else 25", None),
+            ("level", "integer", "level of detail, 0 being the finest", None),
+            ("objects", "string", OBJECTS, None),
+            ("curvature", "boolean", CURVATURE, None),
+            ("target_on", "string", "whether what it looks at stands on the ground or, with roof, on roofs", None),
+        ],
+    )
+}
+
+fn profile() -> Value {
+    asked(
+        "Heights along a line",
+        "As `tiefort profile`: at both ends, and at equal steps between.",
+        (
+            "application/json",
+            "along_m, metres from the beginning; height_m of the ground there, null where it has none; with objects \
+             also top_m and top_of",
+        ),
+        &[
+            ("from", "string", "EAST,NORTH of the beginning", Some("530125,3899310")),
+            ("to", "string", "EAST,NORTH of the end", Some("531600,3899700")),
+            ("spacing_m", "number", "metres between heights; else 25", None),
+            ("level", "integer", "level of detail, 0 being the finest", None),
+            ("objects", "string", "buildings or all: also the highest of ground, decks, roofs and crowns", None),
+        ],
+    )
+}
+
+fn obstacle() -> Value {
+    asked(
+        "What a vehicle hits",
+        "The nearest building, tower or wall within a radius, else the wood or row whose stems stand closest together.",
+        (
+            "application/json",
+            "obstacle: its kind, id, distance_m and, of what has stems, spacing_m; null where the way is free",
+        ),
+        &[
+            ("at", "string", "EAST,NORTH,ABOVE of its wheels, the last above the ground", Some("530125,3899310,0")),
+            ("radius_m", "number", "how far it reaches around that place", Some("2")),
+        ],
     )
 }
 

@@ -13,4 +13,7 @@ pub const MODULES: &str = "/{database}/modules";
 pub const MODULE: &str = "/{database}/modules/{file}";
 pub const HEIGHTS: &str = "/{database}/heights";
 pub const SIGHT: &str = "/{database}/line-of-sight";
+pub const VIEWSHED: &str = "/{database}/viewshed";
+pub const PROFILE: &str = "/{database}/profile";
+pub const OBSTACLE: &str = "/{database}/obstacle";
 pub const EXPLAIN: &str = "/{database}/explain";

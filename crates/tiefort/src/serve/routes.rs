@@ -53,6 +53,9 @@ pub fn routes(shared: Arc<Shared>, cors: &[String], has_index: bool) -> Router {
         .route(paths::MODULE, get(answers::module_file))
         .route(paths::HEIGHTS, post(answers::heights))
         .route(paths::SIGHT, post(answers::line_of_sight))
+        .route(paths::VIEWSHED, get(answers::viewshed))
+        .route(paths::PROFILE, get(answers::profile))
+        .route(paths::OBSTACLE, get(answers::obstacle))
         .route(paths::EXPLAIN, get(answers::explained))
         .fallback(async |uri: Uri| {
             Refusal::missing(format!("found {}, expected an address that /docs lists", uri.path()), "/ lists databases")

@@ -70,6 +70,9 @@ fn every_address_that_openapi_lists_is_answered_and_no_other() {
             }
             "/{database}/modules/{file}" => "/small.tdb/modules/r00c01.slm".to_owned(),
             "/{database}/explain" => "/small.tdb/explain?module=3,4".to_owned(),
+            "/{database}/viewshed" => "/small.tdb/viewshed?from=507000,3876500,20&range_m=600".to_owned(),
+            "/{database}/obstacle" => "/small.tdb/obstacle?at=507000,3876500,0&radius_m=2".to_owned(),
+            "/{database}/profile" => "/small.tdb/profile?from=506000,3876000&to=507000,3876000".to_owned(),
             path => path.replace("{database}", "small.tdb"),
         };
         for (method, operation) in methods.as_object().unwrap() {
@@ -90,7 +93,7 @@ fn every_address_that_openapi_lists_is_answered_and_no_other() {
             count += 1;
         }
     }
-    assert_eq!(count, 14);
+    assert_eq!(count, 17);
     assert_eq!(server.get("/small.tdb/").json()["load_modules"], json!([8, 8]));
     for (path, part) in [("/", "small.tdb"), ("/docs", "line-of-sight")] {
         let page = server.get(path);
@@ -214,7 +217,7 @@ fn heights_and_lines_of_sight_are_those_of_the_reader() {
     let answer = server.post("/line-of-sight", &json!({ "lines": lines }).to_string()).json();
     let raw = server.post_raw("/line-of-sight", &lines.concat());
     let mut seen = [0, 0];
-    for ((line, answer), raw) in lines.iter().zip(answer["lines"].as_array().unwrap()).zip(raw.chunks_exact(3)) {
+    for ((line, answer), raw) in lines.iter().zip(answer["lines"].as_array().unwrap()).zip(raw.chunks_exact(5)) {
         let (from, to) = ([line[0], line[1], line[2]], [line[3], line[4], line[5]]);
         let clearance = ground.clearance_m(from, to);
         let (visible, at) = match ground.sight(from, to) {
@@ -229,13 +232,80 @@ fn heights_and_lines_of_sight_are_those_of_the_reader() {
         assert_eq!((answer["visible"].as_bool(), answer["blocked_at"].as_f64()), (Some(visible), at), "{line:?}");
         assert_eq!(answer["clearance_m"].as_f64(), clearance);
         assert_eq!(answer["blocker"].is_null(), visible);
-        let numbers = [f64::from(u8::from(visible)), at.unwrap_or(f64::NAN), clearance.unwrap_or(f64::NAN)];
+        let hider = if visible { f64::NAN } else { 0.0 };
+        assert_eq!(answer["hidden_by"].as_str(), (!visible).then_some("ground"));
+        assert_eq!((answer["transmission"].as_f64(), answer["wood_m"].as_f64()), (Some(1.0), Some(0.0)));
+        let [at, clearance] = [at, clearance].map(|number| number.unwrap_or(f64::NAN));
+        let numbers = [f64::from(u8::from(visible)), at, clearance, hider, 1.0];
         assert!(raw.iter().zip(&numbers).all(|(a, b)| same(a, b)), "{raw:?} is not {numbers:?}");
         seen[usize::from(visible)] += 1;
     }
     assert!(20 < seen[0] && 20 < seen[1], "{seen:?}");
     let outside = server.post("/line-of-sight", r#"{"lines": [[0, 0, 1, 1e9, 5, 2]]}"#).json();
     assert_eq!(outside["lines"][0]["visible"], Value::Null);
+}
+
+/// A house beside a line of sight, a wall along the next, a wood over the third.
+const OBJECTS: &str = r#"{"type": "FeatureCollection",
+    "crs": {"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::32611"}}, "features": [
+    {"type": "Feature", "properties": {"building": "yes", "height": "30"}, "geometry": {"type": "Polygon",
+        "coordinates": [[[505600, 3875600], [505620, 3875600], [505620, 3875620], [505600, 3875620],
+        [505600, 3875600]]]}},
+    {"type": "Feature", "properties": {"natural": "wood", "height": "25"}, "geometry": {"type": "Polygon",
+        "coordinates": [[[505600, 3875700], [505606, 3875700], [505606, 3875900], [505600, 3875900],
+        [505600, 3875700]], [[505610, 3875710], [505620, 3875710], [505620, 3875720], [505610, 3875710]]]}}]}"#;
+
+#[test]
+fn lines_of_sight_and_viewsheds_look_past_objects_as_the_command_does() {
+    let scene = Scene::with_job("small.toml", &[]);
+    let job = std::fs::read_to_string(scene.path("job.toml")).unwrap();
+    std::fs::write(scene.path("town.geojson"), OBJECTS).unwrap();
+    let sections = "[features]\nsources = [\"town.geojson\"]\n[objects]\n";
+    std::fs::write(scene.path("job.toml"), format!("{job}\n{sections}")).unwrap();
+    scene.run_to(0, &["build", "job.toml", "--quiet", "--no-html"]);
+    let server = Server::start(scene, &["serve", "small.tdb", "--port", "0"]);
+    let lines = [
+        [505_590.0, 3_875_610.0, 3.0, 505_640.0, 3_875_610.0, 3.0],
+        [505_590.0, 3_875_800.0, 3.0, 505_640.0, 3_875_800.0, 3.0],
+    ];
+    for (objects, expected) in
+        [("none", [None, None]), ("buildings", [Some("building"), None]), ("all", [Some("building"), Some("wood")])]
+    {
+        let body = json!({ "lines": lines, "objects": objects, "above_ground": true }).to_string();
+        let answer = server.post("/line-of-sight", &body).json();
+        for ((line, answer), by) in lines.iter().zip(answer["lines"].as_array().unwrap()).zip(expected) {
+            assert_eq!(answer["hidden_by"].as_str(), by, "{objects}: {answer}");
+            let [from, to] = [&line[..3], &line[3..]].map(|end| format!("{},{},{}", end[0], end[1], end[2]));
+            let words = ["sight", "small.tdb", "--from", &from, "--to", &to, "--objects", objects];
+            let said = server.scene.run_to(0, &words).stdout;
+            let told = by.map_or("visible".to_owned(), |by| format!("hidden by {by}, first"));
+            let clearance = format!("clearance  {:.2} m", answer["clearance_m"].as_f64().unwrap());
+            assert!(said.starts_with(&told) && said.contains(&clearance), "{answer}: {said}");
+            let height = format!("at {:.2} m", answer["ends"][0][2].as_f64().unwrap());
+            assert!(said.contains(&height), "{height}: {said}");
+        }
+        let path = format!("/viewshed?from=505590,3875610,3&target_m=3&range_m=50&spacing_m=5&objects={objects}");
+        let seen = server.get(&path).body;
+        let side = 21;
+        assert_eq!((seen.len(), &seen[..4]), (8 + 2 * side * side, &(side as u32).to_le_bytes()[..]));
+        // 50 m to the east, behind the house.
+        assert_eq!(seen[8 + side * (side / 2) + side - 1], u8::from(objects == "none"), "{objects}");
+    }
+    let curved = json!({ "lines": [lines[1]], "above_ground": true, "curvature": true }).to_string();
+    let curved = server.post("/line-of-sight", &curved).json()["lines"][0]["transmission"].as_f64().unwrap();
+    assert!(0.2 < curved && curved < 0.3, "6 m of a wood leave a quarter of the light: {curved}");
+    let profile = server.get("/profile?from=505590,3875610&to=505640,3875610&spacing_m=10&objects=all").json();
+    assert_eq!(profile["height_m"].as_array().unwrap().len(), 6);
+    assert_eq!(profile["top_of"], json!(["ground", "building", "building", "ground", "ground", "ground"]));
+    let places = json!([[505_590, 3_875_610], [505_610, 3_875_610], [505_603, 3_875_800]]);
+    for (objects, of) in [("all", ["ground", "building", "wood"]), ("buildings", ["ground", "building", "ground"])] {
+        let tops = server.post("/heights", &json!({ "positions": places, "objects": objects }).to_string()).json();
+        assert_eq!(tops["top_of"], json!(of), "{tops}");
+    }
+    let hit = |at: &str| server.get(&format!("/obstacle?at={at},0&radius_m=2")).json()["obstacle"].clone();
+    assert_eq!(hit("505599,3875610")["kind"], "building");
+    assert_eq!((&hit("505603,3875800")["kind"], &hit("505603,3875800")["spacing_m"]), (&json!("wood"), &json!(4.0)));
+    assert_eq!(hit("505590,3875610"), Value::Null);
 }
 
 #[test]
@@ -264,7 +334,29 @@ fn what_cannot_be_read_is_refused_in_words() {
     server.ask("POST", "/line-of-sight", &raw, &[0; 8]).check_refusal(400, &["multiple of 48"]);
     server.post("/heights?hight=3", "{}").check_refusal(400, &["hight"]);
     for asked in ["/heights?level=1", "/heights?ceiling=9"] {
-        server.post(asked, r#"{"positions": []}"#).check_refusal(400, &["found level or ceiling", "in the JSON"]);
+        server.post(asked, r#"{"positions": []}"#).check_refusal(400, &["found a level or more", "in the JSON"]);
+    }
+    server.post("/line-of-sight?objects=none", r#"{"lines": []}"#).check_refusal(400, &["in the JSON"]);
+    server.post("/line-of-sight", "{}").check_refusal(400, &["found no lines"]);
+    server
+        .post("/line-of-sight", r#"{"lines": [], "objects": "some"}"#)
+        .check_refusal(400, &["none, buildings or all"]);
+    server.post("/line-of-sight", r#"{"lines": [], "round": true}"#).check_refusal(400, &["unknown field `round`"]);
+    for (asked, part) in [
+        ("/viewshed?from=507000,3876500&range_m=9", "EAST,NORTH,ABOVE"),
+        ("/viewshed?from=1,2,3&range_m=9", "where there is no ground"),
+        ("/viewshed?from=507000,3876500,2&range_m=0", "range_m=0"),
+        ("/viewshed?from=507000,3876500,2&range_m=9&target_m=-1", "target_m=-1"),
+        ("/viewshed?from=507000,3876500,2&range_m=9&objects=some", "none, buildings or all"),
+        ("/viewshed?from=507000,3876500,2&range_m=900000&spacing_m=1", "places along a side"),
+        ("/viewshed?from=507000,3876500,2&range_m=9&level=3", "found level 3"),
+        ("/profile?from=506000,3876000&to=507000,3876000&spacing_m=0", "spacing_m=0"),
+        ("/profile?from=506000,3876000&to=507000,3876000&spacing_m=0.001", "steps"),
+        ("/profile?from=506000,3876000&to=1,2", "to: found 1,2"),
+        ("/obstacle?at=506000,3876000,0&radius_m=-1", "radius_m=-1"),
+        ("/obstacle?at=1,2,0&radius_m=1", "at: found 1,2"),
+    ] {
+        server.get(asked).check_refusal(400, &["found", part]);
     }
     // Raw numbers that are no places are answered with what is none.
     let strange = [f64::NAN, 1.0, f64::INFINITY, 1.0, 1.0, f64::NEG_INFINITY, 1e300, -1e300];
